@@ -1,0 +1,18 @@
+// Contract of the three ways to store a survivor; slots.glsl, atomic.glsl and ballot.glsl each
+// define
+//
+//   uint incoming_count(uint bounce)
+//       number of entries of `paths` that this bounce has to look at;
+//   bool append_survivor(uint index, Photon photon, Path path, bool alive)
+//       called once by every invocation in uniform control flow, dead lanes too. Stores the photon
+//       in the photon map and its path among the outgoing ones when `alive`. Returns whether both
+//       were stored; false for a live photon means that the photon map was full, nothing was
+//       written, and the caller counts it as dropped.
+//
+// counters[0] is the length of the photon map, counters[1 + k] the number of paths entering bounce k.
+// Counters run on when an array is full: readers take the smaller of counter and capacity.
+
+layout(set = 1, binding = 0, scalar) readonly buffer Paths { Path paths[]; };
+layout(set = 1, binding = 1, scalar) writeonly buffer NextPaths { Path next_paths[]; };
+layout(set = 1, binding = 2, scalar) writeonly buffer Photons { Photon photons[]; };
+layout(set = 1, binding = 3, scalar) buffer Counters { uint counters[]; };

@@ -1,0 +1,37 @@
+// The longest candidate list of any point, which decides how many slices the grid gather needs.
+// Dispatched by src/estimate.rs once a chunk. One thread = one point.
+// After it longest[0] = candidates of the busiest point.
+#version 460
+#extension GL_GOOGLE_include_directive : require
+#extension GL_EXT_scalar_block_layout : require
+#extension GL_KHR_shader_subgroup_basic : require
+#extension GL_KHR_shader_subgroup_arithmetic : require
+#include "records.glsl"
+
+layout(local_size_x_id = 0) in;
+layout(push_constant, scalar) uniform Push { GatherPush push; };
+layout(set = 0, binding = 0, scalar) readonly buffer Points { Point points[]; };
+layout(set = 1, binding = 0, scalar) buffer Longest { uint longest[]; };
+
+#include "dispatch.glsl"
+#include "grid.glsl"
+#include "stages/grid_rows.glsl"
+
+void main()
+{
+    uint index = invocation_index();
+    uint candidate_count = 0;
+    if (index < push.point_count) {
+        CellBox box = cells_in_reach(points[index].position);
+        for (uint z = box.first.z; z <= box.last.z; z++) {
+            for (uint y = box.first.y; y <= box.last.y; y++) {
+                uvec2 run = row_run(box, y, z);
+                candidate_count += run.y - run.x;
+            }
+        }
+    }
+    uint longest_here = subgroupMax(candidate_count);
+    if (subgroupElect()) {
+        atomicMax(longest[0], longest_here);
+    }
+}

@@ -1,0 +1,25 @@
+// Counts the photons of each grid cell.
+// Dispatched by src/index.rs once a chunk. One thread = one entry of the photon map.
+// After it cells[c] = photons in cell c.
+#version 460
+#extension GL_GOOGLE_include_directive : require
+#extension GL_EXT_scalar_block_layout : require
+#include "records.glsl"
+
+layout(local_size_x_id = 0) in;
+layout(push_constant, scalar) uniform Push { IndexPush push; };
+#include "stages/photon_list.glsl"
+layout(set = 1, binding = 2, scalar) buffer Cells { uint cells[]; };
+
+#include "dispatch.glsl"
+#include "grid.glsl"
+
+void main()
+{
+    uint index = invocation_index();
+    if (index >= photon_list_length(push.photon_capacity) || photons[index].wall == NO_WALL) {
+        return;
+    }
+    uvec3 cell = cell_of(photons[index].position, push.origin, push.cells_per_metre, push.cell_count);
+    atomicAdd(cells[cell_number(cell, push.cell_count)], 1);
+}

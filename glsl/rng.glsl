@@ -1,0 +1,128 @@
+// Random numbers of a photon, a function of (seed, round, photon, draw) alone. Twin of src/rng.rs.
+//
+// `stream` is what a path carries between bounces: the 48-bit state of rand48, the two state words
+// of MT19937 that the next output needs, nothing for Philox.
+
+layout(constant_id = 1) const uint RNG = RNG_PHILOX;
+
+// The top 24 bits as a number in [0, 1): every value is exact in f32 and none rounds up to 1.
+float unit_float(uint bits24)
+{
+    return float(bits24) * (1.0 / 16777216.0);
+}
+
+// x * multiplier + increment mod 2^48; .x holds the low 32 bits, .y the high 16.
+uvec2 affine48(uvec2 x, uvec2 multiplier, uvec2 increment)
+{
+    uint high, low, carry;
+    umulExtended(x.x, multiplier.x, high, low);
+    high += x.x * multiplier.y + x.y * multiplier.x;
+    low = uaddCarry(low, increment.x, carry);
+    return uvec2(low, (high + increment.y + carry) & 0xffffu);
+}
+
+float rand48_next(inout uvec2 state, RandomKey key)
+{
+    float u = unit_float((state.y << 8) | (state.x >> 24));
+    state = affine48(state, key.leap_multiplier, key.leap_increment);
+    return u;
+}
+
+// Bijective 32-bit finaliser (Wellons, "prospecting for hash functions", lowbias32): distinct
+// photons get distinct seeds.
+uint mix32(uint x)
+{
+    x ^= x >> 16;
+    x *= 0x7feb352du;
+    x ^= x >> 15;
+    x *= 0x846ca68bu;
+    return x ^ (x >> 16);
+}
+
+// Seeding recurrence of MT19937 (Matsumoto and Nishimura, 2002): word `index` from the one before.
+uint mt_word(uint previous, uint index)
+{
+    return 1812433253u * (previous ^ (previous >> 30)) + index;
+}
+
+uvec2 mt_open(uint seed)
+{
+    uint word = seed;
+    for (uint i = 1; i <= MT_MIDDLE; i++) {
+        word = mt_word(word, i);
+    }
+    return uvec2(seed, word);
+}
+
+// Output `draw` of the twister; draw + MT_MIDDLE must stay below 624, the words that seeding made.
+float mt_next(inout uvec2 words, uint draw)
+{
+    uint next = mt_word(words.x, draw + 1);
+    uint mixed = (words.x & 0x80000000u) | (next & 0x7fffffffu);
+    uint y = words.y ^ (mixed >> 1) ^ ((mixed & 1u) * 0x9908b0dfu);
+    y ^= y >> 11;
+    y ^= (y << 7) & 0x9d2c5680u;
+    y ^= (y << 15) & 0xefc60000u;
+    y ^= y >> 18;
+    words = uvec2(next, mt_word(words.y, draw + MT_MIDDLE + 1));
+    return unit_float(y >> 8);
+}
+
+// Philox4x32-10 (Salmon et al. 2011).
+uvec4 philox(uvec4 counter, uvec2 key)
+{
+    for (uint i = 0; i < 10; i++) {
+        uint high0, low0, high1, low1;
+        umulExtended(0xd2511f53u, counter.x, high0, low0);
+        umulExtended(0xcd9e8d57u, counter.z, high1, low1);
+        counter = uvec4(high1 ^ counter.y ^ key.x, low1, high0 ^ counter.w ^ key.y, low0);
+        key += uvec2(0x9e3779b9u, 0xbb67ae85u);
+    }
+    return counter;
+}
+
+// Block 0 of a photon serves its emission, block k its bounce k - 1.
+vec4 philox_block(RandomKey key, uint photon, uint block)
+{
+    uvec4 bits = philox(uvec4(photon, key.round, block, 0u), key.seed) >> 8;
+    return vec4(unit_float(bits.x), unit_float(bits.y), unit_float(bits.z), unit_float(bits.w));
+}
+
+// Opens a photon's stream; `rand48_state` is its first state, which only rand48 needs.
+uvec2 open_stream(RandomKey key, uint photon, uvec2 rand48_state)
+{
+    if (RNG == RNG_RAND48) {
+        return rand48_state;
+    }
+    if (RNG == RNG_MT) {
+        return mt_open(mix32(key.photons_before + photon + mix32(key.seed.x + mix32(key.seed.y))));
+    }
+    return uvec2(0);
+}
+
+// Emission: (disc radius, disc angle, cosine, azimuth).
+vec4 draw_emission(RandomKey key, uint photon, inout uvec2 stream)
+{
+    if (RNG == RNG_PHILOX) {
+        return philox_block(key, photon, 0);
+    }
+    vec4 u;
+    for (uint i = 0; i < EMISSION_DRAWS; i++) {
+        u[i] = RNG == RNG_RAND48 ? rand48_next(stream, key) : mt_next(stream, i);
+    }
+    return u;
+}
+
+// Bounce: (roulette, cosine, azimuth).
+vec3 draw_bounce(RandomKey key, uint photon, uint bounce, inout uvec2 stream)
+{
+    if (RNG == RNG_PHILOX) {
+        return philox_block(key, photon, bounce + 1).xyz;
+    }
+    uint first = EMISSION_DRAWS + BOUNCE_DRAWS * bounce;
+    vec3 u;
+    for (uint i = 0; i < BOUNCE_DRAWS; i++) {
+        u[i] = RNG == RNG_RAND48 ? rand48_next(stream, key) : mt_next(stream, first + i);
+    }
+    return u;
+}

@@ -1,0 +1,43 @@
+// Density estimation: what each point receives from the photons of its wall within the radius.
+// The including kernel chose how the film adds.
+
+layout(set = 0, binding = 0, scalar) readonly buffer Points { Point points[]; };
+
+// Sums of one invocation, each as (low word, high word).
+struct Gathered {
+    uvec2 sums[2];
+};
+
+Gathered nothing_gathered()
+{
+    Gathered gathered;
+    gathered.sums[0] = uvec2(0);
+    gathered.sums[1] = uvec2(0);
+    return gathered;
+}
+
+// Inclusive at the rim, and only photons of the same wall: at an edge the other wall's light is not
+// this one's.
+bool within_radius(Point point, vec3 position, uint wall)
+{
+    precise vec3 offset = position - point.position;
+    precise float distance_squared = offset.x * offset.x + offset.y * offset.y + offset.z * offset.z;
+    return wall == point.wall && distance_squared <= push.radius_squared;
+}
+
+void gather_photon(inout Gathered gathered, float flux, float weight)
+{
+    gathered.sums[0] = add_words(gathered.sums[0], to_fixed_point(flux, push.film_scale));
+    if (CHANNEL_COUNT == 2) {
+        gathered.sums[1] = add_words(gathered.sums[1], to_fixed_point(weight, push.film_scale));
+    }
+}
+
+void add_gathered(uint point, Gathered gathered)
+{
+    for (uint channel = 0; channel < CHANNEL_COUNT; channel++) {
+        if (gathered.sums[channel] != uvec2(0)) {
+            add_to_film(point * CHANNEL_COUNT + channel, gathered.sums[channel]);
+        }
+    }
+}

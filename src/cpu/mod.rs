@@ -1,0 +1,11 @@
+//! The builder that the paper calls the CPU implementation: the modified algorithm, on one thread as
+//! in the paper or on many, with the same stages as on the GPU. Its functions are the twins of the
+//! GLSL ones, operation by operation in f32, and judge them in tests.
+
+pub mod bsdf;
+pub mod emission;
+pub mod estimate;
+pub mod index;
+pub mod room;
+pub mod sampling;
+pub mod trace;

@@ -1,0 +1,65 @@
+//! Everything that can go wrong, each as one sentence: what, which value, what is allowed.
+
+use std::path::PathBuf;
+
+use crate::constants::LOOP_LIMIT;
+use crate::ledger::Ledger;
+
+pub type Result<T> = std::result::Result<T, Error>;
+
+#[derive(Debug, thiserror::Error)]
+pub enum Error {
+    /// An option's value is not allowed.
+    #[error("{option} {value}: {allowed}")]
+    Setting { option: &'static str, value: String, allowed: String },
+
+    /// A file or folder that an option names cannot be written.
+    #[error("{option} {}: cannot be written ({reason}); name a file or folder that can", path.display())]
+    Output { option: &'static str, path: PathBuf, reason: String },
+
+    /// There is no Vulkan loader, or no device behind it.
+    #[error("no Vulkan device: {reason}")]
+    NoVulkan { reason: String },
+
+    /// `--device` names a device that is not there.
+    #[error("--device {wanted}: no such Vulkan device; there is {present}")]
+    DeviceAbsent { wanted: String, present: String },
+
+    /// A device lacks something that every kernel needs.
+    #[error("{device}: lacks {what}, which photonmill needs; choose another with --device, or --variant cpu")]
+    DeviceLacks { device: String, what: String },
+
+    /// A device fails the start-up check.
+    #[error("{device}: fails the start-up check, so its results could not be trusted: {what} (loops are kept to {LOOP_LIMIT} iterations); update its driver, or choose another with --device")]
+    DeviceWrong { device: String, what: String },
+
+    /// A Vulkan call failed.
+    #[error("{call} failed on the device: {reason}")]
+    Device { call: &'static str, reason: String },
+
+    /// The device lost photons or counted them twice.
+    #[error("the photon ledger does not close: {ledger:?}; the device or its driver loses work, try --variant cpu or another --device")]
+    LedgerOpen { ledger: Ledger },
+
+    /// The validation layer was asked for and is not installed.
+    #[error("--validate: the layer VK_LAYER_KHRONOS_validation is not installed; install the Vulkan validation layers, or leave --validate out")]
+    NoValidationLayer,
+
+    /// The validation layer complained.
+    #[error("--validate: {count} message(s) from the validation layer, the first: {first}")]
+    Validation { count: usize, first: String },
+}
+
+impl Error {
+    /// 2 for input that the user can mend, 1 for everything else.
+    pub fn exit_code(&self) -> u8 {
+        match self {
+            Error::Setting { .. } | Error::Output { .. } | Error::DeviceAbsent { .. } => 2,
+            _ => 1,
+        }
+    }
+
+    pub(crate) fn setting(option: &'static str, value: impl ToString, allowed: impl Into<String>) -> Error {
+        Error::Setting { option, value: value.to_string(), allowed: allowed.into() }
+    }
+}

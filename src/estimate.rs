@@ -1,0 +1,89 @@
+//! Density estimation: adds to the film what each point receives from a chunk's photons.
+
+use crate::constants::GATHER_SLICE;
+use crate::error::Result;
+use crate::gpu::kernels::{CandidateCount, GatherBruteTwoWords, GatherBruteU64, GatherGridTwoWords, GatherGridU64, SliceCount};
+use crate::gpu::{Commands, Extent, Gpu, Kernel, Module};
+use crate::plan::Plan;
+use crate::records::{DispatchSizePush, GatherPush};
+use crate::resources::{IndexBuffers, Resources};
+use crate::trace::photon_list_capacity;
+
+/// Kernels that the estimate needs.
+pub fn modules(plan: &Plan, gpu: &Gpu) -> Vec<Module> {
+    match (plan.gathers_by_grid(), gpu.facts().int64_atomics) {
+        (false, true) => vec![GatherBruteU64::MODULE],
+        (false, false) => vec![GatherBruteTwoWords::MODULE],
+        (true, true) => vec![CandidateCount::MODULE, SliceCount::MODULE, GatherGridU64::MODULE],
+        (true, false) => vec![CandidateCount::MODULE, SliceCount::MODULE, GatherGridTwoWords::MODULE],
+    }
+}
+
+/// Most groups along y that any device must allow.
+const MAX_GROUPS_Y: u32 = 65_535;
+
+fn push(plan: &Plan, photon_count: u32) -> GatherPush {
+    GatherPush {
+        point_count: plan.points.len() as u32,
+        first_slice: 0,
+        photon_capacity: photon_list_capacity(plan, photon_count),
+        radius_squared: (plan.settings.radius * plan.settings.radius) as f32,
+        reach: plan.grid.reach,
+        film_scale: plan.film_scale() as f32,
+        origin: plan.grid.origin.into(),
+        cells_per_metre: plan.grid.cells_per_metre,
+        cell_count: plan.grid.cell_count.into(),
+    }
+}
+
+/// Every point steps through the whole photon list, a slice of it an invocation. The host hands over
+/// the commands whenever they amount to a submission's work.
+pub fn gather_brute(commands: &mut Commands, resources: &Resources, plan: &Plan, photon_count: u32, int64_atomics: bool) -> Result<()> {
+    let Resources { film, points, photons, counters, .. } = resources;
+    let mut push = push(plan, photon_count);
+    let point_groups = push.point_count.div_ceil(plan.settings.group_size);
+    let slice_count = push.photon_capacity.div_ceil(GATHER_SLICE);
+    let tests_per_slice = u64::from(push.point_count) * u64::from(GATHER_SLICE);
+    let slices_per_dispatch = (plan.pair_tests_per_submission / tests_per_slice).clamp(1, u64::from(MAX_GROUPS_Y)) as u32;
+    commands.scope("gather", |commands| {
+        while push.first_slice < slice_count {
+            let slices = slices_per_dispatch.min(slice_count - push.first_slice);
+            let extent = Extent::Groups(point_groups, slices);
+            if int64_atomics {
+                commands.dispatch(GatherBruteU64 { points, film, photons, counters }, &push, extent)?;
+            } else {
+                commands.dispatch(GatherBruteTwoWords { points, film, photons, counters }, &push, extent)?;
+            }
+            push.first_slice += slices;
+            commands.add_work(u64::from(slices) * tests_per_slice);
+            if commands.work() >= plan.pair_tests_per_submission {
+                commands.submit()?;
+            }
+        }
+        Ok(())
+    })
+}
+
+/// Every point tests the photons of the grid cells in reach.
+pub fn gather_grid(commands: &mut Commands, resources: &Resources, index: &IndexBuffers, plan: &Plan, photon_count: u32, int64_atomics: bool) -> Result<()> {
+    let Resources { film, points, dispatch_args, .. } = resources;
+    let IndexBuffers { cells, sorted_photons, longest, .. } = index;
+    let push = push(plan, photon_count);
+    commands.scope("gather", |commands| {
+        commands.fill(longest, 0, 1, 0);
+        commands.dispatch(CandidateCount { points, longest, cells }, &push, Extent::Items(u64::from(push.point_count)))?;
+        let size = DispatchSizePush {
+            counter: 0,
+            capacity: push.point_count,
+            items_per_group: plan.settings.group_size,
+            max_groups: MAX_GROUPS_Y,
+        };
+        commands.dispatch(SliceCount { longest, dispatch_args }, &size, Extent::Groups(1, 1))?;
+        let extent = Extent::Indirect(dispatch_args);
+        if int64_atomics {
+            commands.dispatch(GatherGridU64 { points, film, cells, sorted_photons }, &push, extent)
+        } else {
+            commands.dispatch(GatherGridTwoWords { points, film, cells, sorted_photons }, &push, extent)
+        }
+    })
+}

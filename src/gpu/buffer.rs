@@ -1,0 +1,115 @@
+//! Storage buffers.
+
+use std::rc::Rc;
+
+use ash::vk;
+use bytemuck::Pod;
+use gpu_allocator::MemoryLocation;
+use gpu_allocator::vulkan::{Allocation, AllocationCreateDesc, AllocationScheme};
+
+use super::{Context, Gpu, call};
+use crate::error::{Error, Result};
+
+/// Who touches a buffer's memory.
+#[derive(Debug, Clone, Copy, PartialEq, Eq)]
+pub enum Memory {
+    /// The device alone.
+    Device,
+    /// Written by the host, copied by the device.
+    Upload,
+    /// Copied by the device, read by the host.
+    ReadBack,
+}
+
+pub struct Buffer {
+    name: String,
+    size_bytes: u64,
+    raw: vk::Buffer,
+    allocation: Option<Allocation>,
+    context: Rc<Context>,
+}
+
+impl Gpu {
+    /// A buffer of `count` elements of `T`, and of one at least, as Vulkan has no empty ones. Its
+    /// content is undefined.
+    pub fn buffer<T: Pod>(&self, name: &str, count: u64, memory: Memory) -> Result<Buffer> {
+        let size_bytes = count.max(1) * size_of::<T>() as u64;
+        let largest = self.facts.storage_buffer_range_bytes.min(self.facts.allocation_bytes);
+        assert!(size_bytes <= largest, "buffer {name}: {size_bytes} bytes, the plan must keep to {largest}");
+        let info = vk::BufferCreateInfo::default().size(size_bytes).usage(
+            vk::BufferUsageFlags::STORAGE_BUFFER
+                | vk::BufferUsageFlags::INDIRECT_BUFFER
+                | vk::BufferUsageFlags::TRANSFER_SRC
+                | vk::BufferUsageFlags::TRANSFER_DST,
+        );
+        let device = &self.context.device;
+        // SAFETY: `info` is complete; the buffer is destroyed in Drop.
+        let raw = call("vkCreateBuffer", unsafe { device.create_buffer(&info, None) })?;
+        let mut buffer = Buffer { name: name.to_owned(), size_bytes, raw, allocation: None, context: self.context.clone() };
+        // SAFETY: the buffer was just made.
+        let requirements = unsafe { device.get_buffer_memory_requirements(raw) };
+        let allocation = self
+            .context
+            .allocator
+            .borrow_mut()
+            .as_mut()
+            .expect("the allocator lives as long as the device")
+            .allocate(&AllocationCreateDesc {
+                name,
+                requirements,
+                location: match memory {
+                    Memory::Device => MemoryLocation::GpuOnly,
+                    Memory::Upload => MemoryLocation::CpuToGpu,
+                    Memory::ReadBack => MemoryLocation::GpuToCpu,
+                },
+                linear: true,
+                allocation_scheme: AllocationScheme::GpuAllocatorManaged,
+            })
+            .map_err(|error| Error::Device {
+                call: "memory allocation",
+                reason: format!("{size_bytes} bytes for {name}: {error}; ask for fewer --photons at once with --chunk"),
+            })?;
+        // SAFETY: memory and offset come from the allocator for these requirements, and the allocation is
+        // freed after the buffer.
+        call("vkBindBufferMemory", unsafe { device.bind_buffer_memory(raw, allocation.memory(), allocation.offset()) })?;
+        buffer.allocation = Some(allocation);
+        self.context.set_name(raw, name);
+        Ok(buffer)
+    }
+}
+
+impl Buffer {
+    pub fn name(&self) -> &str {
+        &self.name
+    }
+
+    pub fn size_bytes(&self) -> u64 {
+        self.size_bytes
+    }
+
+    pub(super) fn raw(&self) -> vk::Buffer {
+        self.raw
+    }
+
+    pub(super) fn mapped(&self) -> &[u8] {
+        let allocation = self.allocation.as_ref().expect("bound at creation");
+        &allocation.mapped_slice().expect("the host maps upload and read-back buffers")[..self.size_bytes as usize]
+    }
+
+    pub(super) fn mapped_mut(&mut self) -> &mut [u8] {
+        let size_bytes = self.size_bytes as usize;
+        let allocation = self.allocation.as_mut().expect("bound at creation");
+        &mut allocation.mapped_slice_mut().expect("the host maps upload and read-back buffers")[..size_bytes]
+    }
+}
+
+impl Drop for Buffer {
+    fn drop(&mut self) {
+        // SAFETY: commands wait for the device before they return, so nothing uses the buffer.
+        unsafe { self.context.device.destroy_buffer(self.raw, None) };
+        if let (Some(allocation), Some(allocator)) = (self.allocation.take(), self.context.allocator.borrow_mut().as_mut()) {
+            // Freeing fails only for memory of another allocator.
+            let _ = allocator.free(allocation);
+        }
+    }
+}

@@ -1,0 +1,83 @@
+//! The start-up check: what every run relies on, asked of the device before it is trusted.
+//!
+//! Software and young drivers get such things wrong without a word: lavapipe, for one, leaves the
+//! loops of an invocation after 65 535 iterations.
+
+use std::time::Instant;
+
+use super::kernels::{CheckTwoWords, CheckU64};
+use super::{Commands, Constants, Extent, Gpu, Memory};
+use crate::constants::LOOP_LIMIT;
+use crate::error::{Error, Result};
+use crate::records::CheckPush;
+
+/// What the check found beyond passing.
+#[derive(Debug, Clone, Copy, PartialEq, Eq)]
+pub struct LoopCount {
+    pub wanted: u32,
+    pub done: u32,
+}
+
+/// Fails unless the device counts, votes and adds right.
+pub(super) fn run(gpu: &Gpu) -> Result<()> {
+    let wrong = |what: String| Error::DeviceWrong { device: gpu.facts.name.clone(), what };
+    let push = CheckPush { iteration_count: LOOP_LIMIT, addend_low: 0xC000_0001, addend_high: 3, add_count: 5 };
+    let answers = ask(gpu, &push)?;
+
+    let expected_chain = (0..LOOP_LIMIT).fold(1u32, |chain, _| chain.wrapping_mul(1_664_525).wrapping_add(1_013_904_223));
+    if answers.iterations != LOOP_LIMIT || answers.chain != expected_chain {
+        return Err(wrong(format!("a loop of {LOOP_LIMIT} iterations ended after {}", answers.iterations)));
+    }
+    // Full subgroups of width w have w / 2 odd lanes each, whose exclusive counts are 0, 1, ...
+    let odd_lanes = GROUP_SIZE / answers.subgroups.max(1) / 2;
+    let order_sum = answers.subgroups * (odd_lanes * odd_lanes.saturating_sub(1) / 2);
+    if answers.survivors != GROUP_SIZE / 2 || answers.order_sum != order_sum {
+        return Err(wrong(format!(
+            "a ballot of {} odd lanes found {} of them and ordered them to {} instead of {order_sum}",
+            GROUP_SIZE / 2,
+            answers.survivors,
+            answers.order_sum
+        )));
+    }
+    let addend = u64::from(push.addend_low) | u64::from(push.addend_high) << 32;
+    let expected_sum = addend * u64::from(push.add_count) * u64::from(GROUP_SIZE);
+    if answers.film_sum != expected_sum {
+        return Err(wrong(format!("64-bit sums came to {} instead of {expected_sum}", answers.film_sum)));
+    }
+    Ok(())
+}
+
+/// How far a loop of `wanted` iterations really gets.
+pub fn loop_count(gpu: &Gpu, wanted: u32) -> Result<LoopCount> {
+    let push = CheckPush { iteration_count: wanted, addend_low: 0, addend_high: 0, add_count: 0 };
+    Ok(LoopCount { wanted, done: ask(gpu, &push)?.iterations })
+}
+
+/// Invocations of the check's one work group: every device allows 128.
+const GROUP_SIZE: u32 = 128;
+
+struct Answers {
+    iterations: u32,
+    chain: u32,
+    survivors: u32,
+    order_sum: u32,
+    subgroups: u32,
+    film_sum: u64,
+}
+
+fn ask(gpu: &Gpu, push: &CheckPush) -> Result<Answers> {
+    let mut commands = Commands::new(gpu, Constants::new(GROUP_SIZE), Instant::now())?;
+    let answers = gpu.buffer::<u32>("check answers", 5, Memory::Device)?;
+    let film = gpu.buffer::<u64>("check film", 1, Memory::Device)?;
+    commands.fill(&answers, 0, 5, 0);
+    commands.fill(&film, 0, 2, 0);
+    if gpu.facts.int64_atomics {
+        commands.dispatch(CheckU64 { film: &film, answers: &answers }, push, Extent::Groups(1, 1))?;
+    } else {
+        commands.dispatch(CheckTwoWords { film: &film, answers: &answers }, push, Extent::Groups(1, 1))?;
+    }
+    let words = commands.read::<u32>(&answers, 5)?;
+    let film_sum = commands.read::<u64>(&film, 1)?[0];
+    let [iterations, chain, survivors, order_sum, subgroups] = words[..] else { unreachable!("five words were read") };
+    Ok(Answers { iterations, chain, survivors, order_sum, subgroups, film_sum })
+}

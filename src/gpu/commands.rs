@@ -1,0 +1,433 @@
+//! A recording of dispatches and copies: names every buffer, places barriers by what each kernel
+//! reads and writes, times every scope, and stays within the device's limits.
+
+use std::collections::{HashMap, HashSet};
+use std::rc::Rc;
+use std::time::Instant;
+
+use ash::vk;
+use bytemuck::Pod;
+
+use super::timestamps::{TimedScope, Timestamps};
+use super::{Buffer, Constants, Context, Gpu, Kernel, Memory, call};
+use crate::error::Result;
+use crate::records::DispatchArgs;
+use crate::timings::{Clock, Span, Timings};
+
+/// How many invocations or groups a dispatch has.
+pub enum Extent<'a> {
+    /// One invocation an item; folded into rows where the device allows too few groups along x.
+    Items(u64),
+    /// Groups along x and y.
+    Groups(u32, u32),
+    /// As a [`DispatchArgs`] record on the device says.
+    Indirect(&'a Buffer),
+}
+
+/// What happened to buffers since the last barrier.
+#[derive(Default)]
+struct Hazards {
+    read: HashSet<vk::Buffer>,
+    written: HashSet<vk::Buffer>,
+}
+
+struct OpenScope {
+    name: String,
+    begin: u32,
+}
+
+/// Commands being recorded, and the timings of those that ran.
+pub struct Commands<'gpu> {
+    gpu: &'gpu Gpu,
+    constants: Constants,
+    started: Instant,
+    pool: vk::CommandPool,
+    command_buffer: vk::CommandBuffer,
+    fence: vk::Fence,
+    descriptor_pools: Vec<vk::DescriptorPool>,
+    descriptor_pool_in_use: usize,
+    descriptor_sets: HashMap<(vk::DescriptorSetLayout, Vec<vk::Buffer>), vk::DescriptorSet>,
+    timestamps: Timestamps,
+    open_scopes: Vec<OpenScope>,
+    timed_scopes: Vec<TimedScope>,
+    hazards: Hazards,
+    /// Buffers that only this submission needs.
+    staging: Vec<Buffer>,
+    work: u64,
+    dispatch_count: u64,
+    submission_count: u64,
+    timings: Timings,
+    context: Rc<Context>,
+}
+
+/// Descriptor sets and storage buffers of one descriptor pool.
+const SETS_PER_POOL: u32 = 256;
+const BUFFERS_PER_POOL: u32 = 8 * SETS_PER_POOL;
+
+impl<'gpu> Commands<'gpu> {
+    /// `started` is the zero of all times.
+    pub fn new(gpu: &'gpu Gpu, constants: Constants, started: Instant) -> Result<Commands<'gpu>> {
+        let device = &gpu.context.device;
+        let pool_info = vk::CommandPoolCreateInfo::default()
+            .queue_family_index(gpu.facts.queue_family)
+            .flags(vk::CommandPoolCreateFlags::RESET_COMMAND_BUFFER);
+        let timestamps = Timestamps::new(gpu)?;
+        // SAFETY: all infos are complete; everything is destroyed in Drop.
+        let (pool, command_buffer, fence) = unsafe {
+            let pool = call("vkCreateCommandPool", device.create_command_pool(&pool_info, None))?;
+            let buffer_info = vk::CommandBufferAllocateInfo::default().command_pool(pool).command_buffer_count(1);
+            let command_buffer = call("vkAllocateCommandBuffers", device.allocate_command_buffers(&buffer_info))?[0];
+            let fence = call("vkCreateFence", device.create_fence(&vk::FenceCreateInfo::default(), None))?;
+            (pool, command_buffer, fence)
+        };
+        let mut commands = Commands {
+            gpu,
+            constants,
+            started,
+            pool,
+            command_buffer,
+            fence,
+            descriptor_pools: Vec::new(),
+            descriptor_pool_in_use: 0,
+            descriptor_sets: HashMap::new(),
+            timestamps,
+            open_scopes: Vec::new(),
+            timed_scopes: Vec::new(),
+            hazards: Hazards::default(),
+            staging: Vec::new(),
+            work: 0,
+            dispatch_count: 0,
+            submission_count: 0,
+            timings: Timings::default(),
+            context: gpu.context.clone(),
+        };
+        commands.begin()?;
+        Ok(commands)
+    }
+
+    fn begin(&mut self) -> Result<()> {
+        let info = vk::CommandBufferBeginInfo::default().flags(vk::CommandBufferUsageFlags::ONE_TIME_SUBMIT);
+        // SAFETY: the last submission has ended, so the command buffer may be recorded again.
+        call("vkBeginCommandBuffer", unsafe { self.context.device.begin_command_buffer(self.command_buffer, &info) })?;
+        self.timestamps.reset(self.command_buffer);
+        Ok(())
+    }
+
+    /// Records `body` under a name inside the scopes that are open, and times it on the device.
+    pub fn scope<T>(&mut self, name: &str, body: impl FnOnce(&mut Self) -> Result<T>) -> Result<T> {
+        let path = match self.open_scopes.last() {
+            Some(outer) => format!("{}/{name}", outer.name),
+            None => name.to_owned(),
+        };
+        self.timings.count(&path);
+        let begin = self.timestamps.write(self.command_buffer);
+        self.open_scopes.push(OpenScope { name: path, begin });
+        let result = body(self);
+        self.close_scope();
+        result
+    }
+
+    fn close_scope(&mut self) {
+        let scope = self.open_scopes.pop().expect("a scope is open");
+        let end = self.timestamps.write(self.command_buffer);
+        self.timed_scopes.push(Timestamps::scope(scope.name, scope.begin, end));
+    }
+
+    /// Timestamps left in this submission; a scope takes two.
+    pub fn timestamps_left(&self) -> u32 {
+        self.timestamps.left()
+    }
+
+    /// Runs a kernel on its buffers.
+    pub fn dispatch<K: Kernel>(&mut self, kernel: K, push: &K::Push, extent: Extent) -> Result<()> {
+        let module = K::MODULE;
+        let buffers = kernel.buffers();
+        let pipeline = self.gpu.pipeline(&module, &self.constants)?;
+        let sets = (0..pipeline.set_layouts.len() as u32)
+            .map(|set| {
+                let of_set: Vec<(u32, vk::Buffer)> = module
+                    .bindings
+                    .iter()
+                    .zip(&buffers)
+                    .filter(|(binding, _)| binding.set == set)
+                    .map(|(binding, buffer)| (binding.binding, buffer.raw()))
+                    .collect();
+                self.descriptor_set(pipeline.set_layouts[set as usize], &of_set)
+            })
+            .collect::<Result<Vec<_>>>()?;
+        let mut accesses: Vec<(&Buffer, bool, bool)> =
+            module.bindings.iter().zip(&buffers).map(|(binding, buffer)| (*buffer, binding.reads, binding.writes)).collect();
+        if let Extent::Indirect(args) = &extent {
+            accesses.push((args, true, false));
+        }
+        self.order(&accesses);
+
+        let (device, command_buffer) = (&self.context.device, self.command_buffer);
+        // SAFETY: the command buffer is recording; pipeline, sets and buffers live until the
+        // submission has ended; group counts are within the device's limits.
+        unsafe {
+            device.cmd_bind_pipeline(command_buffer, vk::PipelineBindPoint::COMPUTE, pipeline.raw);
+            device.cmd_bind_descriptor_sets(command_buffer, vk::PipelineBindPoint::COMPUTE, pipeline.layout, 0, &sets, &[]);
+            if module.push_bytes != 0 {
+                device.cmd_push_constants(command_buffer, pipeline.layout, vk::ShaderStageFlags::COMPUTE, 0, bytemuck::bytes_of(push));
+            }
+            match extent {
+                Extent::Items(items) => {
+                    let DispatchArgs { x, y, z } = self.fold(items.div_ceil(u64::from(self.constants.group_size)));
+                    device.cmd_dispatch(command_buffer, x, y, z);
+                }
+                Extent::Groups(x, y) => {
+                    assert!(x <= self.gpu.facts.work_group_count_x && y <= self.gpu.facts.work_group_count_y, "{x} x {y} groups");
+                    device.cmd_dispatch(command_buffer, x, y, 1);
+                }
+                Extent::Indirect(args) => device.cmd_dispatch_indirect(command_buffer, args.raw(), 0),
+            }
+        }
+        self.dispatch_count += 1;
+        Ok(())
+    }
+
+    /// Groups laid out in rows that the device allows; glsl/dispatch.glsl reads them back.
+    fn fold(&self, groups: u64) -> DispatchArgs {
+        let columns = groups.min(u64::from(self.gpu.facts.work_group_count_x));
+        let rows = if columns == 0 { 0 } else { groups.div_ceil(columns) };
+        assert!(rows <= u64::from(self.gpu.facts.work_group_count_y), "{groups} groups");
+        DispatchArgs { x: columns as u32, y: rows as u32, z: 1 }
+    }
+
+    /// Sets `words` 32-bit words of a buffer, from word `first` on.
+    pub fn fill(&mut self, buffer: &Buffer, first: u64, words: u64, value: u32) {
+        self.order(&[(buffer, false, true)]);
+        assert!(4 * (first + words) <= buffer.size_bytes(), "{}: words {first} to {}", buffer.name(), first + words);
+        // SAFETY: the buffer outlives the submission; the range is inside it.
+        unsafe { self.context.device.cmd_fill_buffer(self.command_buffer, buffer.raw(), 4 * first, 4 * words, value) };
+    }
+
+    /// Copies host data to the start of a buffer.
+    pub fn upload<T: Pod>(&mut self, buffer: &Buffer, content: &[T]) -> Result<()> {
+        let bytes: &[u8] = bytemuck::cast_slice(content);
+        assert!(bytes.len() as u64 <= buffer.size_bytes(), "{}: {} bytes", buffer.name(), bytes.len());
+        if bytes.is_empty() {
+            return Ok(());
+        }
+        let mut staging = self.gpu.buffer::<u8>("upload", bytes.len() as u64, Memory::Upload)?;
+        staging.mapped_mut().copy_from_slice(bytes);
+        self.copy(&staging, buffer, bytes.len() as u64);
+        self.staging.push(staging);
+        Ok(())
+    }
+
+    fn copy(&mut self, from: &Buffer, to: &Buffer, bytes: u64) {
+        self.order(&[(from, true, false), (to, false, true)]);
+        let region = [vk::BufferCopy::default().size(bytes)];
+        // SAFETY: both buffers outlive the submission and hold `bytes`.
+        unsafe { self.context.device.cmd_copy_buffer(self.command_buffer, from.raw(), to.raw(), &region) };
+    }
+
+    /// Runs everything recorded so far and returns the first `count` elements of a buffer.
+    pub fn read<T: Pod>(&mut self, buffer: &Buffer, count: usize) -> Result<Vec<T>> {
+        let bytes = (count * size_of::<T>()) as u64;
+        assert!(bytes <= buffer.size_bytes(), "{}: {bytes} bytes of {}", buffer.name(), buffer.size_bytes());
+        if count == 0 {
+            self.submit()?;
+            return Ok(Vec::new());
+        }
+        let read_back = self.gpu.buffer::<u8>("read back", bytes, Memory::ReadBack)?;
+        self.copy(buffer, &read_back, bytes);
+        self.submit()?;
+        Ok(bytemuck::pod_collect_to_vec(read_back.mapped()))
+    }
+
+    /// Counts work of any unit towards [`Commands::work`].
+    pub fn add_work(&mut self, amount: u64) {
+        self.work += amount;
+    }
+
+    /// Work counted since the last submission.
+    pub fn work(&self) -> u64 {
+        self.work
+    }
+
+    /// Runs everything recorded so far and waits for it. Scopes that are open go on in the next
+    /// submission; the time between the two is in none.
+    pub fn submit(&mut self) -> Result<()> {
+        let open: Vec<String> = self.open_scopes.iter().map(|scope| scope.name.clone()).collect();
+        while !self.open_scopes.is_empty() {
+            self.close_scope();
+        }
+        let host_reads = vk::MemoryBarrier2::default()
+            .src_stage_mask(vk::PipelineStageFlags2::ALL_COMMANDS)
+            .src_access_mask(vk::AccessFlags2::MEMORY_WRITE)
+            .dst_stage_mask(vk::PipelineStageFlags2::HOST)
+            .dst_access_mask(vk::AccessFlags2::HOST_READ);
+        self.record_barrier(host_reads);
+
+        let context = self.context.clone();
+        let device = &context.device;
+        let submitted = Instant::now();
+        let command_buffers = [vk::CommandBufferSubmitInfo::default().command_buffer(self.command_buffer)];
+        let submission = [vk::SubmitInfo2::default().command_buffer_infos(&command_buffers)];
+        // SAFETY: everything recorded is alive; the fence is unsignalled, and waiting for it ends
+        // all use of it and of the command buffer.
+        unsafe {
+            call("vkEndCommandBuffer", device.end_command_buffer(self.command_buffer))?;
+            call("vkQueueSubmit2", device.queue_submit2(self.gpu.queue, &submission, self.fence))?;
+            call("vkWaitForFences", device.wait_for_fences(&[self.fence], true, u64::MAX))?;
+            call("vkResetFences", device.reset_fences(&[self.fence]))?;
+        }
+        let wall = submitted.elapsed();
+        self.submission_count += 1;
+        self.collect_timings(submitted, wall)?;
+
+        // SAFETY: the submission has ended, so its descriptor sets are free.
+        unsafe {
+            for pool in &self.descriptor_pools {
+                call("vkResetDescriptorPool", device.reset_descriptor_pool(*pool, vk::DescriptorPoolResetFlags::empty()))?;
+            }
+        }
+        self.descriptor_sets.clear();
+        self.descriptor_pool_in_use = 0;
+        self.staging.clear();
+        self.hazards = Hazards::default();
+        self.work = 0;
+        self.begin()?;
+        for name in open {
+            let begin = self.timestamps.write(self.command_buffer);
+            self.open_scopes.push(OpenScope { name, begin });
+        }
+        Ok(())
+    }
+
+    /// Books the submission: each scope with its device time, and the host's time of the whole under
+    /// the outermost scope's name.
+    fn collect_timings(&mut self, submitted: Instant, wall: std::time::Duration) -> Result<()> {
+        let start = submitted.duration_since(self.started);
+        let timed = std::mem::take(&mut self.timed_scopes);
+        if let Some(times) = self.timestamps.read(&timed)? {
+            for (scope, (begin, duration)) in timed.iter().zip(times) {
+                self.timings.add(Span { name: scope.name.clone(), clock: Clock::Gpu, start: start + begin, duration });
+            }
+        }
+        let outermost = timed.last().map(|scope| scope.name.split('/').next().unwrap_or_default().to_owned());
+        if let Some(name) = outermost {
+            self.timings.add(Span { name, clock: Clock::Wall, start, duration: wall });
+        }
+        Ok(())
+    }
+
+    pub fn timings(&mut self) -> &mut Timings {
+        &mut self.timings
+    }
+
+    /// Dispatches recorded so far.
+    pub fn dispatch_count(&self) -> u64 {
+        self.dispatch_count
+    }
+
+    pub fn submission_count(&self) -> u64 {
+        self.submission_count
+    }
+
+    fn descriptor_set(&mut self, layout: vk::DescriptorSetLayout, buffers: &[(u32, vk::Buffer)]) -> Result<vk::DescriptorSet> {
+        let key = (layout, buffers.iter().map(|(_, buffer)| *buffer).collect());
+        if let Some(set) = self.descriptor_sets.get(&key) {
+            return Ok(*set);
+        }
+        let set = self.allocate_set(layout)?;
+        let infos: Vec<[vk::DescriptorBufferInfo; 1]> = buffers
+            .iter()
+            .map(|(_, buffer)| [vk::DescriptorBufferInfo::default().buffer(*buffer).range(vk::WHOLE_SIZE)])
+            .collect();
+        let writes: Vec<_> = buffers
+            .iter()
+            .zip(&infos)
+            .map(|((binding, _), info)| {
+                vk::WriteDescriptorSet::default()
+                    .dst_set(set)
+                    .dst_binding(*binding)
+                    .descriptor_type(vk::DescriptorType::STORAGE_BUFFER)
+                    .buffer_info(info)
+            })
+            .collect();
+        // SAFETY: the set was just allocated and is in no submission.
+        unsafe { self.context.device.update_descriptor_sets(&writes, &[]) };
+        self.descriptor_sets.insert(key, set);
+        Ok(set)
+    }
+
+    fn allocate_set(&mut self, layout: vk::DescriptorSetLayout) -> Result<vk::DescriptorSet> {
+        let device = &self.context.device;
+        let layouts = [layout];
+        loop {
+            if let Some(pool) = self.descriptor_pools.get(self.descriptor_pool_in_use) {
+                let info = vk::DescriptorSetAllocateInfo::default().descriptor_pool(*pool).set_layouts(&layouts);
+                // SAFETY: pool and layout are alive.
+                match unsafe { device.allocate_descriptor_sets(&info) } {
+                    Ok(sets) => return Ok(sets[0]),
+                    Err(vk::Result::ERROR_OUT_OF_POOL_MEMORY | vk::Result::ERROR_FRAGMENTED_POOL) => self.descriptor_pool_in_use += 1,
+                    Err(code) => return call("vkAllocateDescriptorSets", Err(code)),
+                }
+                continue;
+            }
+            let sizes = [vk::DescriptorPoolSize::default().ty(vk::DescriptorType::STORAGE_BUFFER).descriptor_count(BUFFERS_PER_POOL)];
+            let info = vk::DescriptorPoolCreateInfo::default().max_sets(SETS_PER_POOL).pool_sizes(&sizes);
+            // SAFETY: `info` is complete; destroyed in Drop.
+            self.descriptor_pools.push(call("vkCreateDescriptorPool", unsafe { device.create_descriptor_pool(&info, None) })?);
+        }
+    }
+}
+
+/// Barriers: one memory barrier before a command that reads what an earlier one wrote, or writes
+/// what an earlier one read or wrote.
+impl Commands<'_> {
+    /// Takes (buffer, reads, writes) of everything that the next command touches.
+    fn order(&mut self, accesses: &[(&Buffer, bool, bool)]) {
+        let waits = |(buffer, _, writes): &(&Buffer, bool, bool)| {
+            self.hazards.written.contains(&buffer.raw()) || (*writes && self.hazards.read.contains(&buffer.raw()))
+        };
+        if accesses.iter().any(waits) {
+            self.barrier();
+        }
+        for (buffer, reads, writes) in accesses {
+            if *reads {
+                self.hazards.read.insert(buffer.raw());
+            }
+            if *writes {
+                self.hazards.written.insert(buffer.raw());
+            }
+        }
+    }
+
+    fn barrier(&mut self) {
+        let stages = vk::PipelineStageFlags2::COMPUTE_SHADER | vk::PipelineStageFlags2::ALL_TRANSFER | vk::PipelineStageFlags2::DRAW_INDIRECT;
+        self.record_barrier(
+            vk::MemoryBarrier2::default()
+                .src_stage_mask(stages)
+                .src_access_mask(vk::AccessFlags2::MEMORY_WRITE)
+                .dst_stage_mask(stages)
+                .dst_access_mask(vk::AccessFlags2::MEMORY_READ | vk::AccessFlags2::MEMORY_WRITE),
+        );
+        self.hazards = Hazards::default();
+    }
+
+    fn record_barrier(&self, barrier: vk::MemoryBarrier2) {
+        let barriers = [barrier];
+        let dependency = vk::DependencyInfo::default().memory_barriers(&barriers);
+        // SAFETY: the command buffer is recording.
+        unsafe { self.context.device.cmd_pipeline_barrier2(self.command_buffer, &dependency) };
+    }
+}
+
+impl Drop for Commands<'_> {
+    fn drop(&mut self) {
+        let device = &self.context.device;
+        // SAFETY: every submission was waited for.
+        unsafe {
+            for pool in &self.descriptor_pools {
+                device.destroy_descriptor_pool(*pool, None);
+            }
+            device.destroy_fence(self.fence, None);
+            device.destroy_command_pool(self.pool, None);
+        }
+    }
+}

@@ -1,0 +1,235 @@
+//! Instance, choice of a physical device, and the logical device with its one queue.
+
+use std::ffi::CStr;
+
+use ash::vk;
+use serde::Serialize;
+
+use super::{call, validation::Messages};
+use crate::error::{Error, Result};
+
+const VALIDATION_LAYER: &CStr = c"VK_LAYER_KHRONOS_validation";
+
+/// A device and the limits that matter here.
+#[derive(Debug, Clone, PartialEq, Serialize)]
+pub struct DeviceFacts {
+    pub index: usize,
+    pub name: String,
+    /// discrete, integrated, virtual, cpu or other.
+    pub kind: &'static str,
+    /// Name and version, as the driver calls itself.
+    pub driver: String,
+    pub vulkan: String,
+    pub subgroup_size: u32,
+    pub storage_buffer_range_bytes: u64,
+    pub allocation_bytes: u64,
+    pub device_memory_bytes: u64,
+    pub storage_buffers_per_stage: u32,
+    pub work_group_count_x: u32,
+    pub work_group_count_y: u32,
+    pub work_group_size: u32,
+    /// Valid bits of a timestamp; 0 means that the queue has none.
+    pub timestamp_bits: u32,
+    /// Nanoseconds a timestamp tick.
+    pub timestamp_period_ns: f32,
+    pub int64_atomics: bool,
+    /// What the device lacks of what every kernel needs; empty if it can be used.
+    pub lacks: Vec<String>,
+    #[serde(skip)]
+    pub(super) queue_family: u32,
+    #[serde(skip)]
+    pub(super) pipeline_cache_id: String,
+}
+
+/// Loads the Vulkan loader at run time and makes an instance.
+pub(super) fn instance(validate: bool) -> Result<(ash::Entry, ash::Instance, Option<Messages>)> {
+    let no_vulkan = |reason: String| Error::NoVulkan { reason };
+    // SAFETY: the loader is the system's own library; its initialisers are trusted.
+    let entry = unsafe { ash::Entry::load() }.map_err(|_| no_vulkan("the Vulkan loader (libvulkan) is not installed".into()))?;
+    let app = vk::ApplicationInfo::default()
+        .application_name(c"photonmill")
+        .api_version(vk::API_VERSION_1_3);
+
+    let mut layers = Vec::new();
+    let mut extensions = Vec::new();
+    if validate {
+        // SAFETY: plain enumeration.
+        let present = call("vkEnumerateInstanceLayerProperties", unsafe { entry.enumerate_instance_layer_properties() })?;
+        if !present.iter().any(|layer| layer.layer_name_as_c_str() == Ok(VALIDATION_LAYER)) {
+            return Err(Error::NoValidationLayer);
+        }
+        layers.push(VALIDATION_LAYER.as_ptr());
+        extensions.push(ash::ext::debug_utils::NAME.as_ptr());
+        extensions.push(ash::ext::validation_features::NAME.as_ptr());
+    }
+    let synchronisation = [vk::ValidationFeatureEnableEXT::SYNCHRONIZATION_VALIDATION];
+    let mut features = vk::ValidationFeaturesEXT::default().enabled_validation_features(&synchronisation);
+    let mut info = vk::InstanceCreateInfo::default()
+        .application_info(&app)
+        .enabled_layer_names(&layers)
+        .enabled_extension_names(&extensions);
+    if validate {
+        info = info.push_next(&mut features);
+    }
+    // SAFETY: all pointers in `info` are alive.
+    let instance = unsafe { entry.create_instance(&info, None) }.map_err(|code| no_vulkan(format!("vkCreateInstance says {code}")))?;
+    let messages = if validate { Some(Messages::listen(&entry, &instance)?) } else { None };
+    Ok((entry, instance, messages))
+}
+
+/// Every physical device, in the loader's order.
+pub(super) fn all(instance: &ash::Instance) -> Result<Vec<(vk::PhysicalDevice, DeviceFacts)>> {
+    // SAFETY: plain enumeration.
+    let devices = unsafe { instance.enumerate_physical_devices() }
+        .map_err(|code| Error::NoVulkan { reason: format!("vkEnumeratePhysicalDevices says {code}") })?;
+    Ok(devices.into_iter().enumerate().map(|(index, device)| (device, facts(instance, device, index))).collect())
+}
+
+/// The device that `wanted` names by index or part of a name, else the best one.
+pub(super) fn choose(instance: &ash::Instance, wanted: Option<&str>) -> Result<(vk::PhysicalDevice, DeviceFacts)> {
+    let devices = all(instance)?;
+    if devices.is_empty() && wanted.is_none() {
+        return Err(Error::NoVulkan { reason: "the Vulkan loader finds no device".into() });
+    }
+    let chosen = match wanted {
+        Some(wanted) => devices
+            .iter()
+            .find(|(_, facts)| match wanted.parse::<usize>() {
+                Ok(index) => facts.index == index,
+                Err(_) => facts.name.to_lowercase().contains(&wanted.to_lowercase()),
+            })
+            .ok_or_else(|| Error::DeviceAbsent { wanted: wanted.to_owned(), present: describe(&devices) })?,
+        None => devices
+            .iter()
+            .min_by_key(|(_, facts)| (!facts.lacks.is_empty(), rank(facts.kind), facts.index))
+            .expect("there is a device"),
+    };
+    if let Some(what) = chosen.1.lacks.first() {
+        return Err(Error::DeviceLacks { device: chosen.1.name.clone(), what: what.clone() });
+    }
+    Ok(chosen.clone())
+}
+
+fn describe(devices: &[(vk::PhysicalDevice, DeviceFacts)]) -> String {
+    let list: Vec<String> = devices.iter().map(|(_, facts)| format!("{} '{}'", facts.index, facts.name)).collect();
+    if list.is_empty() { "none".to_owned() } else { list.join(", ") }
+}
+
+fn rank(kind: &str) -> u32 {
+    match kind {
+        "discrete" => 0,
+        "integrated" => 1,
+        "virtual" => 2,
+        "cpu" => 3,
+        _ => 4,
+    }
+}
+
+fn facts(instance: &ash::Instance, device: vk::PhysicalDevice, index: usize) -> DeviceFacts {
+    let mut v11 = vk::PhysicalDeviceVulkan11Properties::default();
+    let mut v12 = vk::PhysicalDeviceVulkan12Properties::default();
+    let mut v13 = vk::PhysicalDeviceVulkan13Properties::default();
+    let mut f12 = vk::PhysicalDeviceVulkan12Features::default();
+    let mut f13 = vk::PhysicalDeviceVulkan13Features::default();
+    // SAFETY: the device belongs to the instance; only a 1.3 device fills the 1.3 structs, and they
+    // are chained only for one.
+    let (properties, features, families, memory) = unsafe {
+        let version = instance.get_physical_device_properties(device).api_version;
+        let mut properties = vk::PhysicalDeviceProperties2::default();
+        let mut features = vk::PhysicalDeviceFeatures2::default();
+        if version >= vk::API_VERSION_1_3 {
+            properties = properties.push_next(&mut v11).push_next(&mut v12).push_next(&mut v13);
+            features = features.push_next(&mut f12).push_next(&mut f13);
+        }
+        instance.get_physical_device_properties2(device, &mut properties);
+        instance.get_physical_device_features2(device, &mut features);
+        (
+            properties.properties,
+            features.features,
+            instance.get_physical_device_queue_family_properties(device),
+            instance.get_physical_device_memory_properties(device),
+        )
+    };
+    let limits = properties.limits;
+    // A queue family with compute only leaves the desktop's graphics queue alone.
+    let queue_family = families
+        .iter()
+        .enumerate()
+        .filter(|(_, family)| family.queue_flags.contains(vk::QueueFlags::COMPUTE))
+        .max_by_key(|(index, family)| (family.timestamp_valid_bits, std::cmp::Reverse(*index)))
+        .map(|(index, _)| index as u32);
+
+    let subgroup_needs = vk::SubgroupFeatureFlags::BASIC | vk::SubgroupFeatureFlags::BALLOT | vk::SubgroupFeatureFlags::ARITHMETIC;
+    let mut lacks = Vec::new();
+    let mut need = |present: bool, what: &str| {
+        if !present {
+            lacks.push(what.to_owned());
+        }
+    };
+    need(properties.api_version >= vk::API_VERSION_1_3, "Vulkan 1.3");
+    need(queue_family.is_some(), "a compute queue");
+    need(f12.scalar_block_layout == vk::TRUE, "scalarBlockLayout");
+    need(f13.synchronization2 == vk::TRUE, "synchronization2");
+    need(f13.maintenance4 == vk::TRUE, "maintenance4");
+    need(
+        v11.subgroup_supported_operations.contains(subgroup_needs) && v11.subgroup_supported_stages.contains(vk::ShaderStageFlags::COMPUTE),
+        "subgroup ballots and arithmetic in compute shaders",
+    );
+
+    let version = |v: u32| format!("{}.{}.{}", vk::api_version_major(v), vk::api_version_minor(v), vk::api_version_patch(v));
+    let text = |name: std::result::Result<&CStr, _>| name.map(|name: &CStr| name.to_string_lossy().into_owned()).unwrap_or_default();
+    let heaps = &memory.memory_heaps[..memory.memory_heap_count as usize];
+    DeviceFacts {
+        index,
+        name: properties.device_name_as_c_str().map(|name| name.to_string_lossy().into_owned()).unwrap_or_default(),
+        kind: match properties.device_type {
+            vk::PhysicalDeviceType::DISCRETE_GPU => "discrete",
+            vk::PhysicalDeviceType::INTEGRATED_GPU => "integrated",
+            vk::PhysicalDeviceType::VIRTUAL_GPU => "virtual",
+            vk::PhysicalDeviceType::CPU => "cpu",
+            _ => "other",
+        },
+        driver: format!("{} {}", text(v12.driver_name_as_c_str()), text(v12.driver_info_as_c_str())).trim().to_owned(),
+        vulkan: version(properties.api_version),
+        subgroup_size: v11.subgroup_size,
+        storage_buffer_range_bytes: u64::from(limits.max_storage_buffer_range),
+        allocation_bytes: v11.max_memory_allocation_size.min(v13.max_buffer_size),
+        device_memory_bytes: heaps
+            .iter()
+            .filter(|heap| heap.flags.contains(vk::MemoryHeapFlags::DEVICE_LOCAL))
+            .map(|heap| heap.size)
+            .max()
+            .unwrap_or(0),
+        storage_buffers_per_stage: limits.max_per_stage_descriptor_storage_buffers,
+        work_group_count_x: limits.max_compute_work_group_count[0],
+        work_group_count_y: limits.max_compute_work_group_count[1],
+        work_group_size: limits.max_compute_work_group_invocations.min(limits.max_compute_work_group_size[0]),
+        timestamp_bits: queue_family.map_or(0, |family| families[family as usize].timestamp_valid_bits),
+        timestamp_period_ns: limits.timestamp_period,
+        int64_atomics: features.shader_int64 == vk::TRUE && f12.shader_buffer_int64_atomics == vk::TRUE,
+        lacks,
+        queue_family: queue_family.unwrap_or(0),
+        pipeline_cache_id: properties.pipeline_cache_uuid.iter().map(|byte| format!("{byte:02x}")).collect(),
+    }
+}
+
+/// The logical device with the features that the kernels use, and its queue.
+pub(super) fn create(instance: &ash::Instance, physical: vk::PhysicalDevice, facts: &DeviceFacts) -> Result<(ash::Device, vk::Queue)> {
+    let queues = [vk::DeviceQueueCreateInfo::default().queue_family_index(facts.queue_family).queue_priorities(&[1.0])];
+    let features = vk::PhysicalDeviceFeatures::default().shader_int64(facts.int64_atomics);
+    let mut v12 = vk::PhysicalDeviceVulkan12Features::default()
+        .scalar_block_layout(true)
+        .shader_buffer_int64_atomics(facts.int64_atomics);
+    let mut v13 = vk::PhysicalDeviceVulkan13Features::default().synchronization2(true).maintenance4(true);
+    let info = vk::DeviceCreateInfo::default()
+        .queue_create_infos(&queues)
+        .enabled_features(&features)
+        .push_next(&mut v12)
+        .push_next(&mut v13);
+    // SAFETY: all pointers in `info` are alive, and `facts` says that the features are there.
+    unsafe {
+        let device = call("vkCreateDevice", instance.create_device(physical, &info, None))?;
+        let queue = device.get_device_queue(facts.queue_family, 0);
+        Ok((device, queue))
+    }
+}

@@ -1,0 +1,167 @@
+//! The Vulkan compute engine: one device, one queue, buffers, kernels, commands and timestamps. It
+//! knows nothing of photons.
+
+pub mod buffer;
+pub mod check;
+pub mod commands;
+pub mod device;
+pub mod kernel;
+pub mod timestamps;
+mod validation;
+
+use std::cell::RefCell;
+use std::collections::HashMap;
+use std::rc::Rc;
+
+use ash::vk;
+use gpu_allocator::vulkan::{Allocator, AllocatorCreateDesc};
+
+pub use buffer::{Buffer, Memory};
+pub use commands::{Commands, Extent};
+pub use device::DeviceFacts;
+pub use kernel::{Constants, Kernel, Module};
+
+use crate::error::{Error, Result};
+use validation::Messages;
+
+/// The kernels that `build.rs` found, one struct each.
+pub mod kernels {
+    use super::buffer::Buffer;
+    use super::kernel::{Binding, Kernel, Module, ReflectedStruct};
+    use crate::records::Field;
+
+    include!(concat!(env!("OUT_DIR"), "/kernels.rs"));
+}
+
+/// How to open a device.
+#[derive(Debug, Clone, Default)]
+pub struct Options {
+    /// Index or part of a name; `None` prefers a discrete GPU.
+    pub device: Option<String>,
+    /// Validation layer with synchronisation validation.
+    pub validate: bool,
+    /// Behave as on a device without timestamps.
+    pub without_timestamps: bool,
+    /// Behave as on a device without 64-bit atomics.
+    pub without_int64_atomics: bool,
+}
+
+/// An open device.
+pub struct Gpu {
+    facts: DeviceFacts,
+    queue: vk::Queue,
+    pipelines: RefCell<HashMap<kernel::PipelineKey, Rc<kernel::Pipeline>>>,
+    cache: kernel::DiskCache,
+    context: Rc<Context>,
+}
+
+/// What must outlive every object of the device; destroyed with the last of them.
+pub(crate) struct Context {
+    allocator: RefCell<Option<Allocator>>,
+    device: ash::Device,
+    /// Names for tools and messages; only with the validation layer.
+    debug: Option<ash::ext::debug_utils::Device>,
+    messages: Option<Messages>,
+    instance: ash::Instance,
+    _entry: ash::Entry,
+}
+
+impl Drop for Context {
+    fn drop(&mut self) {
+        // SAFETY: every object of the device holds an Rc of this context, so all are gone; the
+        // allocator frees its memory before the device goes.
+        unsafe {
+            self.allocator.borrow_mut().take();
+            self.device.destroy_device(None);
+            if let Some(messages) = self.messages.take() {
+                messages.destroy();
+            }
+            self.instance.destroy_instance(None);
+        }
+    }
+}
+
+/// Turns a Vulkan result into an [`Error`] that names the call.
+pub(crate) fn call<T>(name: &'static str, result: ash::prelude::VkResult<T>) -> Result<T> {
+    result.map_err(|code| Error::Device { call: name, reason: format!("{code} ({code:?})") })
+}
+
+impl Gpu {
+    /// Opens a device and runs the start-up check on it.
+    pub fn open(options: &Options) -> Result<Gpu> {
+        let (entry, instance, messages) = device::instance(options.validate)?;
+        let opened = device::choose(&instance, options.device.as_deref())
+            .and_then(|(physical, facts)| device::create(&instance, physical, &facts).map(|(device, queue)| (physical, facts, device, queue)));
+        let (physical_device, mut facts, device, queue) = match opened {
+            Ok(opened) => opened,
+            Err(error) => {
+                // SAFETY: nothing else was made from this instance.
+                unsafe {
+                    if let Some(messages) = messages {
+                        messages.destroy();
+                    }
+                    instance.destroy_instance(None);
+                }
+                return Err(error);
+            }
+        };
+        facts.timestamp_bits = if options.without_timestamps { 0 } else { facts.timestamp_bits };
+        facts.int64_atomics &= !options.without_int64_atomics;
+        let debug = messages.is_some().then(|| ash::ext::debug_utils::Device::new(&instance, &device));
+        let allocator = Allocator::new(&AllocatorCreateDesc {
+            instance: instance.clone(),
+            device: device.clone(),
+            physical_device,
+            debug_settings: Default::default(),
+            buffer_device_address: false,
+            allocation_sizes: Default::default(),
+        })
+        .map_err(|error| Error::Device { call: "the memory allocator", reason: error.to_string() })?;
+        let context = Rc::new(Context {
+            allocator: RefCell::new(Some(allocator)),
+            device,
+            debug,
+            messages,
+            instance,
+            _entry: entry,
+        });
+        let cache = kernel::DiskCache::open(&context, &facts)?;
+        let gpu = Gpu { facts, queue, pipelines: RefCell::default(), cache, context };
+        check::run(&gpu)?;
+        Ok(gpu)
+    }
+
+    /// Devices that the loader lists, in its order.
+    pub fn list() -> Result<Vec<DeviceFacts>> {
+        let (_entry, instance, _) = device::instance(false)?;
+        let facts = device::all(&instance).map(|devices| devices.into_iter().map(|(_, facts)| facts).collect());
+        // SAFETY: nothing else was made from this instance.
+        unsafe { instance.destroy_instance(None) };
+        facts
+    }
+
+    pub fn facts(&self) -> &DeviceFacts {
+        &self.facts
+    }
+
+    /// Fails if the validation layer has said anything so far.
+    pub fn check_validation(&self) -> Result<()> {
+        let messages = self.context.messages.as_ref().map(Messages::all).unwrap_or_default();
+        match messages.first() {
+            None => Ok(()),
+            Some(first) => Err(Error::Validation { count: messages.len(), first: first.clone() }),
+        }
+    }
+}
+
+impl Context {
+    /// Gives an object a name in validation messages and debuggers.
+    fn set_name<T: vk::Handle>(&self, object: T, name: &str) {
+        if let Some(debug) = &self.debug {
+            let name = std::ffi::CString::new(name).expect("names hold no zero byte");
+            let info = vk::DebugUtilsObjectNameInfoEXT::default().object_handle(object).object_name(&name);
+            // SAFETY: the object belongs to this device. Failing to name it changes nothing.
+            let _ = unsafe { debug.set_debug_utils_object_name(&info) };
+        }
+    }
+}

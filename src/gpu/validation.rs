@@ -1,0 +1,63 @@
+//! The Khronos validation layer: what it says is kept, and any message is an error in the end.
+
+use std::ffi::{CStr, c_void};
+use std::sync::Mutex;
+
+use ash::vk;
+
+use super::call;
+use crate::error::Result;
+
+/// Messages of one instance.
+pub(super) struct Messages {
+    loader: ash::ext::debug_utils::Instance,
+    messenger: vk::DebugUtilsMessengerEXT,
+    /// Behind a pointer that stays put, because the layer holds it.
+    list: Box<Mutex<Vec<String>>>,
+}
+
+impl Messages {
+    pub(super) fn listen(entry: &ash::Entry, instance: &ash::Instance) -> Result<Messages> {
+        let list = Box::new(Mutex::new(Vec::new()));
+        let loader = ash::ext::debug_utils::Instance::new(entry, instance);
+        let info = vk::DebugUtilsMessengerCreateInfoEXT::default()
+            .message_severity(vk::DebugUtilsMessageSeverityFlagsEXT::WARNING | vk::DebugUtilsMessageSeverityFlagsEXT::ERROR)
+            .message_type(vk::DebugUtilsMessageTypeFlagsEXT::VALIDATION | vk::DebugUtilsMessageTypeFlagsEXT::PERFORMANCE)
+            .pfn_user_callback(Some(keep))
+            .user_data((&raw const *list).cast_mut().cast());
+        // SAFETY: the callback gets the list, which lives as long as the messenger.
+        let messenger = call("vkCreateDebugUtilsMessengerEXT", unsafe { loader.create_debug_utils_messenger(&info, None) })?;
+        Ok(Messages { loader, messenger, list })
+    }
+
+    pub(super) fn all(&self) -> Vec<String> {
+        self.list.lock().expect("no panic while holding the messages").clone()
+    }
+
+    /// Stops listening.
+    ///
+    /// # Safety
+    /// The instance must still be alive.
+    pub(super) unsafe fn destroy(self) {
+        // SAFETY: the caller keeps the instance alive.
+        unsafe { self.loader.destroy_debug_utils_messenger(self.messenger, None) };
+    }
+}
+
+/// Called by the layer on any thread.
+unsafe extern "system" fn keep(
+    _severity: vk::DebugUtilsMessageSeverityFlagsEXT,
+    _kind: vk::DebugUtilsMessageTypeFlagsEXT,
+    message: *const vk::DebugUtilsMessengerCallbackDataEXT<'_>,
+    list: *mut c_void,
+) -> vk::Bool32 {
+    // SAFETY: the layer passes a valid message and the pointer that `listen` gave it.
+    unsafe {
+        let list = &*list.cast::<Mutex<Vec<String>>>();
+        let text = CStr::from_ptr((*message).p_message).to_string_lossy().into_owned();
+        if let Ok(mut list) = list.lock() {
+            list.push(text);
+        }
+    }
+    vk::FALSE
+}

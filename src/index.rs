@@ -1,0 +1,61 @@
+//! The index of a chunk's photons: counted by grid cell, prefix sums, sorted into cell order.
+
+use crate::constants::SCAN_ITEMS;
+use crate::error::Result;
+use crate::gpu::kernels::{CellCount, CellScatter, DispatchSize, ScanAdd, ScanBlocks};
+use crate::gpu::{Buffer, Commands, Extent, Kernel, Module};
+use crate::plan::Plan;
+use crate::records::{DispatchSizePush, ScanPush};
+use crate::resources::{IndexBuffers, Resources};
+use crate::trace::{INDIRECT_GROUPS_X, photon_list_capacity};
+
+/// Kernels that the index needs.
+pub fn modules(plan: &Plan) -> Vec<Module> {
+    if !plan.gathers_by_grid() {
+        return Vec::new();
+    }
+    vec![CellCount::MODULE, ScanBlocks::MODULE, ScanAdd::MODULE, CellScatter::MODULE, DispatchSize::MODULE]
+}
+
+/// Sorts the photon map into cell order.
+pub fn build(commands: &mut Commands, resources: &Resources, index: &IndexBuffers, plan: &Plan, photon_count: u32) -> Result<()> {
+    let Resources { photons, counters, dispatch_args, .. } = resources;
+    let IndexBuffers { cells, block_sums, sorted_photons, .. } = index;
+    let push = plan.grid.index_push(photon_list_capacity(plan, photon_count));
+    let extent = || if plan.has_slots() { Extent::Items(u64::from(push.photon_capacity)) } else { Extent::Indirect(dispatch_args) };
+    commands.scope("index", |commands| {
+        commands.scope("count", |commands| {
+            commands.fill(cells, 0, u64::from(plan.grid.cells()), 0);
+            if !plan.has_slots() {
+                let size = DispatchSizePush {
+                    counter: 0,
+                    capacity: push.photon_capacity,
+                    items_per_group: plan.settings.group_size,
+                    max_groups: INDIRECT_GROUPS_X,
+                };
+                commands.dispatch(DispatchSize { counters, dispatch_args }, &size, Extent::Groups(1, 1))?;
+            }
+            commands.dispatch(CellCount { photons, counters, cells }, &push, extent())
+        })?;
+        commands.scope("scan", |commands| scan(commands, cells, block_sums, plan.grid.cells(), plan.settings.group_size))?;
+        commands.scope("sort", |commands| {
+            commands.dispatch(CellScatter { photons, counters, cells, sorted_photons }, &push, extent())
+        })
+    })
+}
+
+/// Turns `item_count` numbers into their exclusive prefix sums; `levels` as `resources::block_sums`
+/// makes them.
+pub fn scan(commands: &mut Commands, items: &Buffer, levels: &[Buffer], item_count: u32, group_size: u32) -> Result<()> {
+    let [block_sums, coarser @ ..] = levels else { panic!("a prefix sum has a level") };
+    let threads = Extent::Items(u64::from(item_count.div_ceil(SCAN_ITEMS)));
+    let push = ScanPush { item_count };
+    commands.dispatch(ScanBlocks { items, block_sums }, &push, threads)?;
+    if coarser.is_empty() {
+        return Ok(());
+    }
+    let block_count = item_count.div_ceil(group_size * SCAN_ITEMS);
+    scan(commands, block_sums, coarser, block_count, group_size)?;
+    let threads = Extent::Items(u64::from(item_count.div_ceil(SCAN_ITEMS)));
+    commands.dispatch(ScanAdd { items, block_sums }, &push, threads)
+}

@@ -1,0 +1,108 @@
+//! How many photons are traced at once: what the device's buffers hold for certain, and what its
+//! gather does in a fraction of a second.
+
+use serde::Serialize;
+
+use crate::error::{Error, Result};
+use crate::records::{Path, Photon};
+use crate::scene::Scene;
+use crate::settings::{Gather, Settings};
+
+/// What a device allows.
+#[derive(Debug, Clone, Copy, PartialEq, Eq, Serialize)]
+pub struct Limits {
+    /// Largest buffer, bytes.
+    pub buffer_bytes: u64,
+    /// Memory for all buffers together, bytes.
+    pub memory_bytes: u64,
+    /// Pair tests (point, photon) of one submission: about a tenth of a second, far from the two
+    /// seconds after which a desktop driver takes the device away.
+    pub pair_tests_per_submission: u64,
+    pub group_size: u32,
+}
+
+impl Limits {
+    /// Limits of the CPU builder, which splits only to keep its arrays small.
+    pub fn of_host() -> Limits {
+        Limits { buffer_bytes: 1 << 29, memory_bytes: 1 << 31, pair_tests_per_submission: 1 << 40, group_size: 1024 }
+    }
+
+    /// Pair tests a tenth of a second by kind of device: a slow one of its kind does 2^36 (discrete),
+    /// 2^33 (integrated) or 2^30 (CPU) a second.
+    pub fn pair_tests_of(kind: &str) -> u64 {
+        match kind {
+            "discrete" => 1 << 33,
+            "cpu" => 1 << 28,
+            _ => 1 << 30,
+        }
+    }
+}
+
+/// Expected work of a gather.
+#[derive(Debug, Clone, Copy)]
+pub struct Work {
+    points: f64,
+    /// Photons that a point tests for each photon emitted.
+    tests_per_photon: f64,
+}
+
+impl Work {
+    pub fn new(scene: &Scene, settings: &Settings, point_count: usize) -> Work {
+        // A photon is stored albedo + albedo^2 + ... times at most, and never more than `bounces`.
+        let albedo = scene.walls().map(|(_, wall)| f64::from(wall.albedo)).fold(0.0, f64::max);
+        let stored = (albedo / (1.0 - albedo)).min(f64::from(settings.bounces));
+        let tests_per_photon = match settings.gather {
+            Gather::Brute => f64::from(settings.bounces),
+            Gather::Grid => {
+                // About three cells of a radius along both sides of the wall, photons spread over
+                // all walls alike.
+                let extent = scene.max_corner - scene.min_corner;
+                let share = |edge: f64| (3.0 * settings.radius / edge).min(1.0);
+                let walls = scene.walls().count() as f64;
+                stored / walls * share(extent.x).max(share(extent.y)).max(share(extent.z)).powi(2)
+            }
+        };
+        Work { points: point_count as f64, tests_per_photon }
+    }
+
+    pub fn pair_tests(&self, photons: u32) -> u64 {
+        (self.points * self.tests_per_photon * f64::from(photons)) as u64
+    }
+}
+
+/// Photons traced at once.
+///
+/// The photon map has room for `bounces` photons of each path, the most that can be stored, so it
+/// can never be full: a round that does not fit is split here, and nothing is dropped there.
+pub fn chunk_photons(settings: &Settings, limits: &Limits, work: &Work) -> Result<u32> {
+    let bounces = u64::from(settings.bounces);
+    let (path, photon) = (size_of::<Path>() as u64, size_of::<Photon>() as u64);
+    let by_buffer = (limits.buffer_bytes / path).min(limits.buffer_bytes / (photon * bounces));
+    // Two path arrays, the photon map, and the same again at most for its sorted copy.
+    let by_memory = limits.memory_bytes / (2 * path + 2 * photon * bounces);
+    // Entries are numbered in 32 bits.
+    let by_index = u64::from(u32::MAX) / bounces;
+    let fits = by_buffer.min(by_memory).min(by_index);
+    // A chunk may hold one photon more than its share of each of the two lights.
+    let spare = 2;
+    if fits < 2 + spare {
+        return Err(Error::setting(
+            "--bounces",
+            settings.bounces,
+            format!("two photons' maps do not fit the device's buffers of {} bytes; ask for fewer bounces", limits.buffer_bytes),
+        ));
+    }
+    if settings.group_size > limits.group_size {
+        return Err(Error::setting("--group-size", settings.group_size, format!("must be at most {} on this device", limits.group_size)));
+    }
+    let by_time = match settings.gather {
+        // The brute gather splits its own dispatches.
+        Gather::Brute => u64::MAX,
+        Gather::Grid => {
+            let tests = (work.points * work.tests_per_photon).max(1e-9);
+            ((limits.pair_tests_per_submission as f64 / tests) as u64).max(1024)
+        }
+    };
+    let chunk = (fits - spare).min(by_time).min(u64::from(settings.photons));
+    Ok((chunk as u32).min(settings.chunk.unwrap_or(u32::MAX)))
+}

@@ -1,0 +1,269 @@
+//! What a run will do, decided before any Vulkan call: which effects are kept, how photons are dealt
+//! to lights and chunks, how large every array is, and the film's fixed-point scale.
+
+pub mod capacity;
+pub mod effect;
+
+use std::ops::Range;
+
+use serde::Serialize;
+
+pub use capacity::Limits;
+pub use effect::Decision;
+
+use crate::error::Result;
+use crate::records::{IndexPush, Photon, Point};
+use crate::rng::Streams;
+use crate::scene::Scene;
+use crate::settings::{Gather, Settings, Variant};
+
+/// A run of photons of one light inside a chunk.
+#[derive(Debug, Clone, Copy, PartialEq, Eq)]
+pub struct EmissionRange {
+    pub light: u32,
+    /// Number within the round.
+    pub first_photon: u32,
+    pub count: u32,
+}
+
+#[derive(Debug, Clone, PartialEq)]
+pub struct Plan {
+    pub settings: Settings,
+    pub decisions: Vec<Decision>,
+    /// Sums a point keeps: flux, and where it differs from the paper's illumination, that too.
+    pub channel_count: u32,
+    /// Fixed-point bits after the binary point of a film sum.
+    pub film_shift: u32,
+    /// Photons of a round that each light emits.
+    pub light_photons: Vec<u32>,
+    /// Flux of a photon of each light, relative to the strongest.
+    pub relative_flux: Vec<f32>,
+    /// Watts of a photon of relative flux 1, times the photons of the run.
+    pub flux_unit: f64,
+    pub chunks_per_round: u32,
+    /// Photons of the largest chunk: what the path arrays hold.
+    pub path_capacity: u32,
+    /// Entries of the photon map.
+    pub photon_capacity: u32,
+    pub points: Vec<Point>,
+    pub grid: Grid,
+    /// Pair tests (point, photon) after which commands are handed to the device.
+    pub pair_tests_per_submission: u64,
+}
+
+/// The uniform grid that sorts photons.
+#[derive(Debug, Clone, Copy, PartialEq, Serialize)]
+pub struct Grid {
+    pub origin: [f32; 3],
+    pub cells_per_metre: f32,
+    pub cell_count: [u32; 3],
+    /// A little over the radius, so that rounding never costs a photon at the rim.
+    pub reach: f32,
+}
+
+impl Grid {
+    /// Cells of the radius or more, at most [`MAX_CELLS_PER_AXIS`] along an axis.
+    fn new(scene: &Scene, radius: f64) -> Grid {
+        let extent = scene.max_corner - scene.min_corner;
+        let cell = radius.max(extent.max_element() / f64::from(MAX_CELLS_PER_AXIS));
+        Grid {
+            origin: scene.min_corner.as_vec3().to_array(),
+            cells_per_metre: (1.0 / cell) as f32,
+            cell_count: extent.to_array().map(|edge| ((edge / cell).ceil() as u32).clamp(1, MAX_CELLS_PER_AXIS)),
+            reach: (radius * (1.0 + 1.0 / 1024.0)) as f32,
+        }
+    }
+
+    pub fn cells(&self) -> u32 {
+        self.cell_count.iter().product()
+    }
+
+    pub fn index_push(&self, photon_capacity: u32) -> IndexPush {
+        IndexPush {
+            origin: self.origin.into(),
+            cells_per_metre: self.cells_per_metre,
+            cell_count: self.cell_count.into(),
+            photon_capacity,
+        }
+    }
+}
+
+const MAX_CELLS_PER_AXIS: u32 = 128;
+
+impl Plan {
+    pub fn new(scene: &Scene, settings: &Settings, limits: &Limits) -> Result<Plan> {
+        settings.validate()?;
+        let light_photons = deal(settings.photons, &scene.lights.iter().map(|light| light.power).collect::<Vec<_>>());
+        let watts: Vec<f64> =
+            scene.lights.iter().zip(&light_photons).map(|(light, count)| light.power / f64::from(*count)).collect();
+        let strongest = watts.iter().fold(0.0, |a: f64, b| a.max(*b));
+        let relative_flux: Vec<f32> = watts.iter().map(|flux| (flux / strongest) as f32).collect();
+
+        let equal_flux = relative_flux.iter().all(|flux| *flux == 1.0);
+        let decisions = effect::decide(scene, settings, equal_flux);
+        let channel_count = if settings.has_phong() || !equal_flux { 2 } else { 1 };
+        let film_shift = if channel_count == 1 { 0 } else { film_shift(settings) };
+
+        let points: Vec<Point> = scene
+            .walls()
+            .flat_map(|(face, _)| {
+                let centres: Vec<_> = scene.rectangle(face).texel_centres(settings.mesh, settings.mesh).collect();
+                centres.into_iter().map(move |centre| Point { position: centre.as_vec3(), wall: face as u32 })
+            })
+            .collect();
+        let grid = Grid::new(scene, settings.radius);
+        let work = capacity::Work::new(scene, settings, points.len());
+        let chunk_photons = capacity::chunk_photons(settings, limits, &work)?;
+        let chunks_per_round = settings.photons.div_ceil(chunk_photons);
+        let mut plan = Plan {
+            settings: settings.clone(),
+            decisions,
+            channel_count,
+            film_shift,
+            light_photons,
+            relative_flux,
+            flux_unit: strongest * settings.total_photons() as f64,
+            chunks_per_round,
+            path_capacity: 0,
+            photon_capacity: 0,
+            points,
+            grid,
+            pair_tests_per_submission: limits.pair_tests_per_submission,
+        };
+        plan.path_capacity = (0..chunks_per_round).map(|chunk| photons_of(&plan.chunk(chunk))).max().expect("a round has a chunk");
+        plan.photon_capacity = plan.path_capacity * settings.bounces;
+        Ok(plan)
+    }
+
+    /// The photons of one chunk: of each light the same share, so that whatever has run so far is
+    /// a fair sample of all lights.
+    pub fn chunk(&self, chunk: u32) -> Vec<EmissionRange> {
+        let chunks = u64::from(self.chunks_per_round);
+        let mut first_of_light = 0;
+        let mut ranges = Vec::new();
+        for (light, &count) in self.light_photons.iter().enumerate() {
+            let part = |chunk: u64| (u64::from(count) * chunk / chunks) as u32;
+            let Range { start, end } = part(u64::from(chunk))..part(u64::from(chunk) + 1);
+            if end > start {
+                ranges.push(EmissionRange { light: light as u32, first_photon: first_of_light + start, count: end - start });
+            }
+            first_of_light += count;
+        }
+        ranges
+    }
+
+    pub fn streams(&self) -> Streams {
+        Streams {
+            rng: self.settings.rng,
+            seed: self.settings.seed,
+            photons: self.settings.photons,
+            draws_per_photon: self.settings.draws_per_photon(),
+        }
+    }
+
+    pub fn has_slots(&self) -> bool {
+        self.settings.variant == Variant::Naive
+    }
+
+    /// Fixed-point units in 1.
+    pub fn film_scale(&self) -> f64 {
+        (1u64 << self.film_shift) as f64
+    }
+
+    /// Pair tests that one chunk's gather is expected to cost.
+    pub fn pair_tests(&self, scene: &Scene, photons: u32) -> u64 {
+        capacity::Work::new(scene, &self.settings, self.points.len()).pair_tests(photons)
+    }
+
+    /// Bytes of the photon map.
+    pub fn photon_map_bytes(&self) -> u64 {
+        u64::from(self.photon_capacity) * size_of::<Photon>() as u64
+    }
+
+    pub fn gathers_by_grid(&self) -> bool {
+        self.settings.gather == Gather::Grid
+    }
+}
+
+/// Photons of a list of ranges.
+pub fn photons_of(ranges: &[EmissionRange]) -> u32 {
+    ranges.iter().map(|range| range.count).sum()
+}
+
+/// Deals `photons` to lights by power: each its whole share, the rest by largest remainder (the
+/// earlier light first), and one at least to each.
+fn deal(photons: u32, powers: &[f64]) -> Vec<u32> {
+    let total: f64 = powers.iter().sum();
+    let exact: Vec<f64> = powers.iter().map(|power| f64::from(photons) * power / total).collect();
+    let mut counts: Vec<u32> = exact.iter().map(|share| (share.floor() as u32).max(1)).collect();
+    let mut by_remainder: Vec<usize> = (0..counts.len()).collect();
+    by_remainder.sort_by(|&a, &b| exact[b].fract().total_cmp(&exact[a].fract()).then(a.cmp(&b)));
+    let mut next = by_remainder.iter().cycle();
+    while counts.iter().sum::<u32>() < photons {
+        counts[*next.next().expect("there is a light")] += 1;
+    }
+    while counts.iter().sum::<u32>() > photons {
+        let richest = (0..counts.len()).max_by_key(|&light| counts[light]).expect("there is a light");
+        counts[richest] -= 1;
+    }
+    counts
+}
+
+/// Bits after the binary point of a film sum.
+///
+/// A stored photon adds at most 1 to a point's channel, and a run stores at most
+/// E = photons * rounds * bounces of them, so a sum is at most E * 2^shift <= 2^63: it cannot
+/// overflow 64 bits. No more than 31 bits, so that one photon's share fits a 32-bit word.
+fn film_shift(settings: &Settings) -> u32 {
+    let events = settings.total_photons() * u64::from(settings.bounces);
+    let bits = u64::BITS - (events - 1).leading_zeros();
+    (63 - bits).min(31)
+}
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+    use crate::scene::open_box::open_box;
+    use crate::settings::Preset;
+
+    #[test]
+    fn photons_are_dealt_by_power_and_none_is_lost() {
+        assert_eq!(deal(5000, &[1.0, 1.0]), [2500, 2500]);
+        assert_eq!(deal(5001, &[1.0, 1.0]), [2501, 2500]);
+        assert_eq!(deal(5000, &[1e8, 1.0]), [4999, 1]);
+        assert_eq!(deal(7, &[1.0, 2.0, 4.0]), [1, 2, 4]);
+        assert_eq!(deal(3, &[1.0, 1e6, 1.0]), [1, 1, 1]);
+    }
+
+    #[test]
+    fn film_sums_cannot_overflow() {
+        for (photons, rounds, bounces) in [(5000, 1, 15), (5000, 100, 15), (1 << 31, 1, 15), (1 << 30, 1 << 13, 16), (2, 1, 1)] {
+            let settings = Settings { photons, rounds, bounces, ..Settings::default() };
+            let events = u128::from(settings.total_photons()) * u128::from(bounces);
+            let shift = film_shift(&settings);
+            assert!(events << shift <= 1 << 63, "{events} events, shift {shift}");
+            assert!((16..=31).contains(&shift), "{events} events, shift {shift}");
+        }
+    }
+
+    /// Whatever the split, every photon of the round is in one chunk, and every chunk holds each
+    /// light's share.
+    #[test]
+    fn chunks_partition_the_round() {
+        for (photons, chunk) in [(5000, None), (5000, Some(64)), (5001, Some(7)), (11, Some(2))] {
+            let settings = Settings { photons, chunk, ..Settings::preset(Preset::Modified) };
+            let plan = Plan::new(&open_box(&settings), &settings, &Limits::of_host()).unwrap();
+            let mut seen = vec![0; photons as usize];
+            for chunk in 0..plan.chunks_per_round {
+                let ranges = plan.chunk(chunk);
+                assert!(photons_of(&ranges) <= plan.path_capacity);
+                for range in ranges {
+                    let light = usize::from(range.first_photon >= plan.light_photons[0]);
+                    assert_eq!(range.light as usize, light);
+                    (0..range.count).for_each(|k| seen[(range.first_photon + k) as usize] += 1);
+                }
+            }
+            assert!(seen.iter().all(|count| *count == 1), "{photons} photons, chunks of {chunk:?}");
+        }
+    }
+}

@@ -1,0 +1,314 @@
+//! Random numbers of a photon, a function of (seed, round, photon, draw) alone, so that every
+//! builder, split and thread traces the same photons. Twin of `glsl/rng.glsl`.
+
+use glam::UVec2;
+use serde::Serialize;
+
+use crate::constants::{self, BOUNCE_DRAWS, EMISSION_DRAWS, MT_MIDDLE};
+use crate::records::RandomKey;
+
+/// Which generator a run draws from.
+#[derive(Debug, Clone, Copy, PartialEq, Eq, Serialize)]
+#[serde(rename_all = "lowercase")]
+pub enum Rng {
+    /// The paper's: the C library's 48-bit generator, one sequence leap-frogged over the photons of
+    /// a round (van Meel et al. 2008): photon i draws numbers i, i + N, i + 2N, ... of `srand48(seed)`.
+    Rand48,
+    /// The paper's alternative: MT19937, seeded anew for each photon by a bijection of its number in
+    /// the run, so that no two photons share a stream.
+    Mt,
+    /// Philox4x32-10 (Salmon et al. 2011), counter-based.
+    Philox,
+}
+
+impl Rng {
+    pub fn code(self) -> u32 {
+        match self {
+            Rng::Rand48 => constants::RNG_RAND48,
+            Rng::Mt => constants::RNG_MT,
+            Rng::Philox => constants::RNG_PHILOX,
+        }
+    }
+}
+
+/// Bounces for which a photon's MT19937 stream suffices: its outputs 0 to 226 need nothing beyond
+/// the 624 words that seeding makes.
+pub const MT_MAX_BOUNCES: u32 = (624 - MT_MIDDLE - EMISSION_DRAWS) / BOUNCE_DRAWS;
+
+/// x -> multiplier * x + increment mod 2^48: one or many steps of rand48.
+#[derive(Debug, Clone, Copy, PartialEq, Eq)]
+pub struct Affine48 {
+    pub multiplier: u64,
+    pub increment: u64,
+}
+
+const MASK48: u64 = (1 << 48) - 1;
+
+impl Affine48 {
+    const IDENTITY: Affine48 = Affine48 { multiplier: 1, increment: 0 };
+    /// One step of drand48.
+    pub const STEP: Affine48 = Affine48 { multiplier: 0x5_DEEC_E66D, increment: 0xB };
+
+    pub fn apply(self, state: u64) -> u64 {
+        self.multiplier.wrapping_mul(state).wrapping_add(self.increment) & MASK48
+    }
+
+    /// First `self`, then `next`.
+    fn then(self, next: Affine48) -> Affine48 {
+        Affine48 {
+            multiplier: next.multiplier.wrapping_mul(self.multiplier) & MASK48,
+            increment: next.apply(self.increment),
+        }
+    }
+
+    /// `count` steps at once, by repeated squaring.
+    pub fn steps(count: u64) -> Affine48 {
+        let mut result = Affine48::IDENTITY;
+        let mut power = Affine48::STEP;
+        let mut rest = count;
+        while rest != 0 {
+            if rest & 1 == 1 {
+                result = result.then(power);
+            }
+            power = power.then(power);
+            rest >>= 1;
+        }
+        result
+    }
+}
+
+/// Low 32 bits and high bits of a 48- or 64-bit number, as GLSL takes them.
+pub fn words(value: u64) -> UVec2 {
+    UVec2::new(value as u32, (value >> 32) as u32)
+}
+
+fn from_words(words: UVec2) -> u64 {
+    u64::from(words.x) | (u64::from(words.y) << 32)
+}
+
+/// The state one draw on.
+pub fn rand48_step(state: UVec2) -> UVec2 {
+    words(Affine48::STEP.apply(from_words(state)))
+}
+
+/// State of `srand48(seed)`.
+pub fn srand48(seed: u32) -> u64 {
+    (u64::from(seed) << 16) | 0x330E
+}
+
+/// The streams of a run: what its seed, photons a round and draws a photon make of the generator.
+#[derive(Debug, Clone, Copy)]
+pub struct Streams {
+    pub rng: Rng,
+    pub seed: u64,
+    /// Photons of a round.
+    pub photons: u32,
+    pub draws_per_photon: u64,
+}
+
+impl Streams {
+    /// The key that all photons of a round share.
+    pub fn key(self, round: u32) -> RandomKey {
+        // From one draw of a photon to its next.
+        let leap = Affine48::steps(u64::from(self.photons));
+        RandomKey {
+            seed: words(self.seed),
+            round,
+            photons_before: round.wrapping_mul(self.photons),
+            leap_multiplier: words(leap.multiplier),
+            leap_increment: words(leap.increment),
+        }
+    }
+
+    /// From the first state of photon i in round 0 to that of photon `first_photon` + i in `round`.
+    pub fn jump(self, round: u32, first_photon: u32) -> Affine48 {
+        // The caller has checked that a run's draws stay below 2^48 (Settings::validate).
+        Affine48::steps(u64::from(round) * u64::from(self.photons) * self.draws_per_photon + u64::from(first_photon))
+    }
+
+    /// First states of photons 0 to `count` - 1 of round 0: the initial set that, as the paper says,
+    /// the host prepares. Later rounds and photons are reached from it by [`Streams::jump`]. Only
+    /// rand48 needs any; the others get one unused entry.
+    pub fn first_states(self, count: u32) -> Vec<UVec2> {
+        if self.rng != Rng::Rand48 {
+            return vec![UVec2::ZERO];
+        }
+        let mut state = srand48(self.seed as u32);
+        (0..count)
+            .map(|_| {
+                state = Affine48::STEP.apply(state);
+                words(state)
+            })
+            .collect()
+    }
+}
+
+fn unit_float(bits24: u32) -> f32 {
+    bits24 as f32 * (1.0 / 16_777_216.0)
+}
+
+fn rand48_next(state: &mut UVec2, key: &RandomKey) -> f32 {
+    let u = unit_float((state.y << 8) | (state.x >> 24));
+    let leap = Affine48 { multiplier: from_words(key.leap_multiplier), increment: from_words(key.leap_increment) };
+    *state = words(leap.apply(from_words(*state)));
+    u
+}
+
+fn mix32(mut x: u32) -> u32 {
+    x ^= x >> 16;
+    x = x.wrapping_mul(0x7feb_352d);
+    x ^= x >> 15;
+    x = x.wrapping_mul(0x846c_a68b);
+    x ^ (x >> 16)
+}
+
+fn mt_word(previous: u32, index: u32) -> u32 {
+    1_812_433_253u32.wrapping_mul(previous ^ (previous >> 30)).wrapping_add(index)
+}
+
+/// State of the twister that `init_genrand(seed)` starts.
+pub fn mt_open(seed: u32) -> UVec2 {
+    UVec2::new(seed, (1..=MT_MIDDLE).fold(seed, mt_word))
+}
+
+/// The 32-bit output number `draw` of the twister.
+pub fn mt_next_word(words: &mut UVec2, draw: u32) -> u32 {
+    let next = mt_word(words.x, draw + 1);
+    let mixed = (words.x & 0x8000_0000) | (next & 0x7fff_ffff);
+    let mut y = words.y ^ (mixed >> 1) ^ ((mixed & 1) * 0x9908_b0df);
+    y ^= y >> 11;
+    y ^= (y << 7) & 0x9d2c_5680;
+    y ^= (y << 15) & 0xefc6_0000;
+    y ^= y >> 18;
+    *words = UVec2::new(next, mt_word(words.y, draw + MT_MIDDLE + 1));
+    y
+}
+
+/// Philox4x32-10.
+pub fn philox(mut counter: [u32; 4], mut key: [u32; 2]) -> [u32; 4] {
+    for _ in 0..10 {
+        let product0 = u64::from(counter[0]) * 0xd251_1f53;
+        let product1 = u64::from(counter[2]) * 0xcd9e_8d57;
+        counter = [
+            (product1 >> 32) as u32 ^ counter[1] ^ key[0],
+            product1 as u32,
+            (product0 >> 32) as u32 ^ counter[3] ^ key[1],
+            product0 as u32,
+        ];
+        key = [key[0].wrapping_add(0x9e37_79b9), key[1].wrapping_add(0xbb67_ae85)];
+    }
+    counter
+}
+
+fn philox_block(key: &RandomKey, photon: u32, block: u32) -> [f32; 4] {
+    philox([photon, key.round, block, 0], [key.seed.x, key.seed.y]).map(|bits| unit_float(bits >> 8))
+}
+
+/// Opens a photon's stream; `rand48_state` is its first state, which only rand48 needs.
+pub fn open_stream(rng: Rng, key: &RandomKey, photon: u32, rand48_state: UVec2) -> UVec2 {
+    match rng {
+        Rng::Rand48 => rand48_state,
+        Rng::Mt => {
+            let run = mix32(key.seed.x.wrapping_add(mix32(key.seed.y)));
+            mt_open(mix32(key.photons_before.wrapping_add(photon).wrapping_add(run)))
+        }
+        Rng::Philox => UVec2::ZERO,
+    }
+}
+
+/// Emission: disc radius, disc angle, cosine, azimuth.
+pub fn draw_emission(rng: Rng, key: &RandomKey, photon: u32, stream: &mut UVec2) -> [f32; 4] {
+    match rng {
+        Rng::Rand48 => std::array::from_fn(|_| rand48_next(stream, key)),
+        Rng::Mt => std::array::from_fn(|draw| unit_float(mt_next_word(stream, draw as u32) >> 8)),
+        Rng::Philox => philox_block(key, photon, 0),
+    }
+}
+
+/// Bounce: roulette, cosine, azimuth.
+pub fn draw_bounce(rng: Rng, key: &RandomKey, photon: u32, bounce: u32, stream: &mut UVec2) -> [f32; 3] {
+    let first = EMISSION_DRAWS + BOUNCE_DRAWS * bounce;
+    match rng {
+        Rng::Rand48 => std::array::from_fn(|_| rand48_next(stream, key)),
+        Rng::Mt => std::array::from_fn(|draw| unit_float(mt_next_word(stream, first + draw as u32) >> 8)),
+        Rng::Philox => {
+            let [roulette, cosine, azimuth, _] = philox_block(key, photon, bounce + 1);
+            [roulette, cosine, azimuth]
+        }
+    }
+}
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+
+    /// drand48 after srand48(1), from the C library.
+    #[test]
+    fn rand48_gives_the_c_librarys_numbers() {
+        let mut state = srand48(1);
+        let mut draw = || {
+            state = Affine48::STEP.apply(state);
+            state as f64 / (1u64 << 48) as f64
+        };
+        assert_eq!(draw(), 0.041_630_344_771_878_214);
+        assert_eq!(draw(), 0.454_492_444_728_629_15);
+        assert_eq!(draw(), 0.834_817_218_166_914_9);
+        for _ in 3..1_000_000 {
+            draw();
+        }
+        assert_eq!(state, 0x7606_edea_e14e);
+        assert_eq!(Affine48::steps(1_000_000).apply(srand48(1)), 0x7606_edea_e14e);
+    }
+
+    #[test]
+    fn leap_frogged_streams_are_the_one_sequence() {
+        let (photons, bounces) = (7, 3);
+        let draws = u64::from(EMISSION_DRAWS + BOUNCE_DRAWS * bounces);
+        let streams = Streams { rng: Rng::Rand48, seed: 5, photons, draws_per_photon: draws };
+        let first = streams.first_states(photons);
+        for round in 0..3 {
+            let key = streams.key(round);
+            for photon in 0..photons {
+                let jump = streams.jump(round, photon);
+                let mut stream = words(jump.apply(from_words(first[0])));
+                let mut drawn = draw_emission(Rng::Rand48, &key, photon, &mut stream).to_vec();
+                for bounce in 0..bounces {
+                    drawn.extend(draw_bounce(Rng::Rand48, &key, photon, bounce, &mut stream));
+                }
+                for (k, u) in drawn.iter().enumerate() {
+                    let place = (u64::from(round) * draws + k as u64) * u64::from(photons) + u64::from(photon) + 1;
+                    let expected = Affine48::steps(place).apply(srand48(5));
+                    assert_eq!(*u, unit_float((expected >> 24) as u32), "round {round} photon {photon} draw {k}");
+                }
+            }
+        }
+    }
+
+    /// First and 227th outputs of MT19937 with the reference seed 5489.
+    #[test]
+    fn twister_gives_the_reference_outputs() {
+        let mut reference = [0u32; 624];
+        reference[0] = 5489;
+        for i in 1..624 {
+            reference[i] = mt_word(reference[i - 1], i as u32);
+        }
+        let mut stream = mt_open(5489);
+        let outputs: Vec<u32> = (0..227).map(|draw| mt_next_word(&mut stream, draw)).collect();
+        assert_eq!(outputs[..5], [3_499_211_612, 581_869_302, 3_890_346_734, 3_586_334_585, 545_404_204]);
+        assert_eq!(stream.x, reference[227]);
+        assert_eq!(stream.y, mt_word(reference[623], 624));
+    }
+
+    /// Known answers of Random123.
+    #[test]
+    fn philox_gives_the_known_answers() {
+        assert_eq!(philox([0; 4], [0; 2]), [0x6627_e8d5, 0xe169_c58d, 0xbc57_ac4c, 0x9b00_dbd8]);
+        assert_eq!(philox([u32::MAX; 4], [u32::MAX; 2]), [0x408f_276d, 0x41c8_3b0e, 0xa20b_c7c6, 0x6d54_51fd]);
+    }
+
+    #[test]
+    fn unit_floats_stay_below_one() {
+        assert_eq!(unit_float(0), 0.0);
+        assert!(unit_float(u32::MAX >> 8) < 1.0);
+    }
+}

@@ -1,0 +1,336 @@
+//! What a run is asked to do: counts, radius, seed, builder. Defaults are the paper's, each choice
+//! that the paper leaves open is a field here, and [`Settings::validate`] is the one place that
+//! judges values.
+
+use serde::Serialize;
+
+use crate::constants;
+use crate::error::{Error, Result};
+use crate::rng::{self, Rng};
+
+/// How the photon map is built.
+#[derive(Debug, Clone, Copy, PartialEq, Eq, Serialize)]
+#[serde(rename_all = "lowercase")]
+pub enum Variant {
+    /// The paper's first: one slot a photon and bounce, empty ones included.
+    Naive,
+    /// The paper's second: survivors only, one atomic a thread.
+    Atomic,
+    /// Survivors only, one atomic a subgroup.
+    Ballot,
+    /// The second one on the CPU.
+    Cpu,
+}
+
+impl Variant {
+    pub const ON_GPU: [Variant; 3] = [Variant::Naive, Variant::Atomic, Variant::Ballot];
+
+    pub fn name(self) -> &'static str {
+        match self {
+            Variant::Naive => "naive",
+            Variant::Atomic => "atomic",
+            Variant::Ballot => "ballot",
+            Variant::Cpu => "cpu",
+        }
+    }
+}
+
+/// How photons near a point are found.
+#[derive(Debug, Clone, Copy, PartialEq, Eq, Serialize)]
+#[serde(rename_all = "lowercase")]
+pub enum Gather {
+    /// Step through the whole photon list, as the paper does.
+    Brute,
+    /// Look into the cells of a sorted uniform grid.
+    Grid,
+}
+
+/// Radiant intensity of a light.
+#[derive(Debug, Clone, Copy, PartialEq, Eq, Serialize)]
+#[serde(rename_all = "lowercase")]
+pub enum EmissionLaw {
+    /// The same in all directions of the hemisphere.
+    Uniform,
+    /// Proportional to the cosine (Lambertian).
+    Cosine,
+}
+
+impl EmissionLaw {
+    pub fn code(self) -> u32 {
+        match self {
+            EmissionLaw::Uniform => constants::EMISSION_UNIFORM,
+            EmissionLaw::Cosine => constants::EMISSION_COSINE,
+        }
+    }
+}
+
+/// Which direction the Phong weight compares with the direction to the eye.
+#[derive(Debug, Clone, Copy, PartialEq, Eq, Serialize)]
+#[serde(rename_all = "lowercase")]
+pub enum PhongDirection {
+    /// The mirror direction of the arriving photon.
+    Mirror,
+    /// The direction in which the photon left.
+    Sampled,
+}
+
+impl PhongDirection {
+    pub fn code(self) -> u32 {
+        match self {
+            PhongDirection::Mirror => constants::PHONG_MIRROR,
+            PhongDirection::Sampled => constants::PHONG_SAMPLED,
+        }
+    }
+}
+
+/// The paper's experiments.
+#[derive(Debug, Clone, Copy, PartialEq, Eq, Serialize)]
+#[serde(rename_all = "lowercase")]
+pub enum Preset {
+    /// Figure 1: naive slots, 2 bounces.
+    Naive,
+    /// Figure 2: the modified implementation, 15 bounces.
+    Modified,
+    /// Figure 3: the same with Phong walls, shininess 2.
+    Phong,
+    /// Figure 4: rounds of 5000 photons, radius 0.025 m, shininess 5.
+    Rounds,
+}
+
+/// Walls of the open box in the order of their numbers; the sixth face is the opening.
+pub const WALL_NAMES: [&str; 5] = ["left", "right", "floor", "ceiling", "back"];
+
+#[derive(Debug, Clone, PartialEq, Serialize)]
+pub struct Settings {
+    pub variant: Variant,
+    /// Photons emitted in a round, by all lights together.
+    pub photons: u32,
+    pub rounds: u32,
+    /// Most bounces of a photon.
+    pub bounces: u32,
+    /// Radius of the density estimate, metres.
+    pub radius: f64,
+    /// Photons within the radius, a round, that count as full illumination.
+    pub full_light: f64,
+    pub seed: u64,
+    pub rng: Rng,
+    pub gather: Gather,
+    pub emission: EmissionLaw,
+    /// Phong exponent of each wall in the order of [`WALL_NAMES`]; `None` is Lambertian.
+    pub shininess: [Option<f32>; 5],
+    pub phong_direction: PhongDirection,
+    /// Eye of the Phong weight, metres.
+    pub eye: [f32; 3],
+    /// Radius of each disc of light, metres.
+    pub light_radius: f64,
+    /// Power of the floor's and of the left wall's light, watts.
+    pub light_power: [f64; 2],
+    /// Share of photons that each wall reflects.
+    pub reflectance: f32,
+    /// Texels along each side of a wall.
+    pub mesh: u32,
+    /// Divide irradiance by the part of the disc that lies on the wall.
+    pub edge_correction: bool,
+    /// Threads of the CPU builder.
+    pub threads: usize,
+    /// Invocations of a work group.
+    pub group_size: u32,
+    /// Most photons traced at once; `None`: as many as the device's buffers hold.
+    pub chunk: Option<u32>,
+}
+
+/// Half the edge of the open box, metres.
+pub const HALF_WIDTH: f64 = 0.25;
+
+/// Photons of the paper's round, to which its `full_light` refers.
+pub const PAPER_PHOTONS: u32 = 5000;
+
+impl Default for Settings {
+    fn default() -> Settings {
+        Settings::preset(Preset::Modified)
+    }
+}
+
+impl Settings {
+    pub fn preset(preset: Preset) -> Settings {
+        let modified = Settings {
+            variant: Variant::Atomic,
+            photons: PAPER_PHOTONS,
+            rounds: 1,
+            bounces: 15,
+            radius: 0.05,
+            full_light: 90.0,
+            seed: 1,
+            rng: Rng::Rand48,
+            gather: Gather::Grid,
+            emission: EmissionLaw::Uniform,
+            shininess: [None; 5],
+            phong_direction: PhongDirection::Mirror,
+            eye: [0.0, 0.0, 1.0],
+            light_radius: 0.05,
+            light_power: [1.0, 1.0],
+            reflectance: 0.75,
+            mesh: 64,
+            edge_correction: true,
+            threads: 1,
+            group_size: 128,
+            chunk: None,
+        };
+        match preset {
+            Preset::Modified => modified,
+            Preset::Naive => Settings { variant: Variant::Naive, bounces: 2, ..modified },
+            Preset::Phong => Settings { shininess: [Some(2.0); 5], ..modified },
+            Preset::Rounds => {
+                Settings { rounds: 100, radius: 0.025, full_light: 10.0, shininess: [Some(5.0); 5], ..modified }
+            }
+        }
+    }
+
+    /// The same full light for another photon count: as many photons within the radius in
+    /// proportion.
+    pub fn full_light_for(&self, photons: u32) -> f64 {
+        self.full_light * f64::from(photons) / f64::from(self.photons)
+    }
+
+    /// Photons of the whole run.
+    pub fn total_photons(&self) -> u64 {
+        u64::from(self.photons) * u64::from(self.rounds)
+    }
+
+    /// Random numbers that one photon may draw.
+    pub fn draws_per_photon(&self) -> u64 {
+        u64::from(constants::EMISSION_DRAWS) + u64::from(constants::BOUNCE_DRAWS) * u64::from(self.bounces)
+    }
+
+    /// Whether some wall follows the paper's Phong model.
+    pub fn has_phong(&self) -> bool {
+        self.shininess.iter().any(Option::is_some)
+    }
+
+    /// Refuses what no run could do right; every refusal names option, value and remedy.
+    pub fn validate(&self) -> Result<()> {
+        let width = 2.0 * HALF_WIDTH;
+        within("--photons", self.photons, 2..=MAX_PHOTONS, "photons a round, at least one for each of the two lights")?;
+        within("--rounds", self.rounds, 1..=u32::MAX, "rounds")?;
+        within("--bounces", self.bounces, 1..=MAX_BOUNCES, "bounces")?;
+        within("--mesh", self.mesh, 1..=MAX_MESH, "texels along a wall")?;
+        if !(self.radius >= width * MIN_RADIUS_SHARE && self.radius <= width) {
+            return Err(Error::setting(
+                "--radius",
+                self.radius,
+                format!("must be from {:e} to {width} metres (the box's width)", width * MIN_RADIUS_SHARE),
+            ));
+        }
+        positive("--full-light", self.full_light, "photons within the radius")?;
+        for (light, power) in self.light_power.iter().enumerate() {
+            if !(power.is_finite() && *power > 0.0) {
+                let which = ["floor", "left"][light];
+                return Err(Error::setting("--light-power", power, format!("must be a number of watts above 0 ({which} light)")));
+            }
+        }
+        let weakest_share = self.light_power.iter().fold(f64::INFINITY, |a, b| a.min(*b)) / self.light_power.iter().sum::<f64>();
+        if weakest_share < 1e-6 {
+            let [floor, left] = self.light_power;
+            return Err(Error::setting("--light-power", format!("{floor},{left}"), "the weaker light must have a millionth of all power or more"));
+        }
+        if !(self.light_radius > 0.0 && self.light_radius <= HALF_WIDTH) {
+            return Err(Error::setting("--light-radius", self.light_radius, format!("must be above 0 and at most {HALF_WIDTH} metres, so that the disc fits its wall")));
+        }
+        if !(0.0..=1.0).contains(&self.reflectance) {
+            return Err(Error::setting("--reflectance", self.reflectance, "must be from 0 to 1"));
+        }
+        for shininess in self.shininess.iter().flatten() {
+            if !(shininess.is_finite() && *shininess >= 0.0) {
+                return Err(Error::setting("--shininess", shininess, "must be a number from 0 up; leave it out for Lambertian walls"));
+            }
+        }
+        if self.eye.iter().any(|coordinate| !coordinate.is_finite()) {
+            let [x, y, z] = self.eye;
+            return Err(Error::setting("--eye", format!("{x},{y},{z}"), "must be three finite numbers"));
+        }
+        within("--threads", self.threads as u64, 1..=1024, "threads")?;
+        if !(self.group_size.is_power_of_two() && (32..=1024).contains(&self.group_size)) {
+            return Err(Error::setting("--group-size", self.group_size, "must be a power of two from 32 to 1024"));
+        }
+        if let Some(chunk) = self.chunk {
+            within("--chunk", chunk, 2..=MAX_PHOTONS, "photons traced at once, at least one for each of the two lights")?;
+        }
+        self.validate_random_numbers()?;
+        let events = self.total_photons().saturating_mul(u64::from(self.bounces));
+        if events > MAX_EVENTS {
+            return Err(Error::setting(
+                "--rounds",
+                self.rounds,
+                format!("photons * rounds * bounces is {events}, and the film's 64-bit sums hold {MAX_EVENTS}; ask for fewer"),
+            ));
+        }
+        Ok(())
+    }
+
+    fn validate_random_numbers(&self) -> Result<()> {
+        match self.rng {
+            Rng::Philox => Ok(()),
+            Rng::Rand48 => {
+                within("--seed", self.seed, 0..=u64::from(u32::MAX), "with --rng rand48, as srand48 takes 32 bits")?;
+                let draws = u128::from(self.total_photons()) * u128::from(self.draws_per_photon());
+                if draws > 1 << 48 {
+                    return Err(Error::setting(
+                        "--rng",
+                        "rand48",
+                        format!("the run draws {draws} numbers and the generator has 2^48, so streams would overlap; use --rng philox"),
+                    ));
+                }
+                Ok(())
+            }
+            Rng::Mt => {
+                let most = rng::MT_MAX_BOUNCES;
+                if self.bounces > most {
+                    return Err(Error::setting("--bounces", self.bounces, format!("must be at most {most} with --rng mt, whose streams hold 227 numbers; use --rng philox")));
+                }
+                if self.total_photons() > 1 << 32 {
+                    return Err(Error::setting("--rng", "mt", "seeds 2^32 streams, and the run has more photons; use --rng philox"));
+                }
+                Ok(())
+            }
+        }
+    }
+
+    /// A remark on settings that are allowed and unwise.
+    pub fn warning(&self) -> Option<String> {
+        let twos = self.photons.trailing_zeros();
+        (self.rng == Rng::Rand48 && twos >= 10).then(|| {
+            format!(
+                "rand48 leap-frogged by {} = {} * 2^{twos} gives streams that are almost regular; use an odd --photons or --rng philox",
+                self.photons,
+                self.photons >> twos
+            )
+        })
+    }
+}
+
+/// Photons of a round: their numbers and the counters of a round are 32-bit.
+const MAX_PHOTONS: u32 = 1 << 31;
+const MAX_BOUNCES: u32 = 10_000;
+/// Texels along a wall; points are numbered in 32 bits and held in one buffer of 128 MiB.
+const MAX_MESH: u32 = 1024;
+/// Smallest radius relative to the box: below it the squares of f32 distances lose their meaning.
+const MIN_RADIUS_SHARE: f64 = 1.0 / 65_536.0;
+/// Photons * bounces that a film sum can hold with 16 bits after the binary point.
+pub const MAX_EVENTS: u64 = 1 << 47;
+
+fn within<T>(option: &'static str, value: T, allowed: std::ops::RangeInclusive<T>, what: &str) -> Result<()>
+where
+    T: PartialOrd + Copy + std::fmt::Display,
+{
+    if allowed.contains(&value) {
+        return Ok(());
+    }
+    Err(Error::setting(option, value, format!("must be from {} to {} ({what})", allowed.start(), allowed.end())))
+}
+
+fn positive(option: &'static str, value: f64, what: &str) -> Result<()> {
+    if value.is_finite() && value > 0.0 {
+        return Ok(());
+    }
+    Err(Error::setting(option, value, format!("must be a number above 0 ({what})")))
+}

@@ -1,0 +1,102 @@
+//! Where time goes: nested scopes, each with its time on the device, on the host, or both.
+
+use std::collections::HashMap;
+use std::time::Duration;
+
+use serde::Serialize;
+
+/// One line of the timing table: everything that ran under one name.
+#[derive(Debug, Clone, PartialEq, Serialize)]
+pub struct Row {
+    /// Path from the outermost scope, such as `round/build/bounce 3`.
+    pub name: String,
+    pub count: u64,
+    /// Time on the device, all counts together; `None` where nothing ran there or the device has no
+    /// timestamps.
+    pub gpu_ms: Option<f64>,
+    /// Time on the host's clock, all counts together; `None` for what happens inside a submission,
+    /// which the host cannot see.
+    pub wall_ms: Option<f64>,
+}
+
+/// Which clock saw a span.
+#[derive(Debug, Clone, Copy, PartialEq, Eq)]
+pub enum Clock {
+    Gpu,
+    Wall,
+}
+
+/// One run of one scope, for the trace file.
+#[derive(Debug, Clone, PartialEq)]
+pub struct Span {
+    pub name: String,
+    pub clock: Clock,
+    /// Since the start of the run. Device spans are placed by the host's time of their submission.
+    pub start: Duration,
+    pub duration: Duration,
+}
+
+/// Timings of a run, in the order in which scopes first appeared.
+#[derive(Debug, Clone, Default)]
+pub struct Timings {
+    rows: Vec<Row>,
+    by_name: HashMap<String, usize>,
+    spans: Vec<Span>,
+    spans_left_out: u64,
+}
+
+/// Spans kept for the trace file; a longer run keeps its sums only.
+const MAX_SPANS: usize = 200_000;
+
+impl Timings {
+    pub fn rows(&self) -> &[Row] {
+        &self.rows
+    }
+
+    pub fn spans(&self) -> &[Span] {
+        &self.spans
+    }
+
+    /// Spans that did not fit.
+    pub fn spans_left_out(&self) -> u64 {
+        self.spans_left_out
+    }
+
+    pub fn row(&self, name: &str) -> Option<&Row> {
+        self.by_name.get(name).map(|&index| &self.rows[index])
+    }
+
+    fn row_mut(&mut self, name: &str) -> &mut Row {
+        let index = *self.by_name.entry(name.to_owned()).or_insert_with(|| {
+            self.rows.push(Row { name: name.to_owned(), count: 0, gpu_ms: None, wall_ms: None });
+            self.rows.len() - 1
+        });
+        &mut self.rows[index]
+    }
+
+    /// Counts one more run of a scope, before its time is known, so that rows stand in call order.
+    pub fn count(&mut self, name: &str) {
+        self.row_mut(name).count += 1;
+    }
+
+    /// Adds time to a scope.
+    pub fn add(&mut self, span: Span) {
+        let milliseconds = span.duration.as_secs_f64() * 1e3;
+        let row = self.row_mut(&span.name);
+        let sum = match span.clock {
+            Clock::Gpu => &mut row.gpu_ms,
+            Clock::Wall => &mut row.wall_ms,
+        };
+        *sum = Some(sum.unwrap_or(0.0) + milliseconds);
+        if self.spans.len() < MAX_SPANS {
+            self.spans.push(span);
+        } else {
+            self.spans_left_out += 1;
+        }
+    }
+
+    /// Milliseconds of a scope on the device, else on the host's clock.
+    pub fn best_ms(&self, name: &str) -> Option<f64> {
+        self.row(name).and_then(|row| row.gpu_ms.or(row.wall_ms))
+    }
+}
