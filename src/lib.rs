@@ -1,4 +1,5 @@
 //! Photon mapping on any Vulkan GPU.
+pub mod cli;
 pub mod constants;
 pub mod cpu;
 pub mod error;
@@ -7,6 +8,7 @@ pub mod film;
 pub mod gpu;
 pub mod index;
 pub mod ledger;
+pub mod output;
 pub mod plan;
 pub mod records;
 pub mod render;

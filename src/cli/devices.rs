@@ -1,0 +1,64 @@
+//! `photonmill devices`: what the Vulkan loader offers, with the limits that matter here.
+
+use clap::Args;
+
+use crate::constants::LOOP_LIMIT;
+use crate::error::Result;
+use crate::gpu::{DeviceFacts, Gpu, Options, check};
+
+#[derive(Args)]
+pub(super) struct DevicesArgs {
+    /// Print JSON
+    #[arg(long)]
+    json: bool,
+}
+
+pub(super) fn run(args: &DevicesArgs) -> Result<()> {
+    let devices = Gpu::list()?;
+    if args.json {
+        println!("{}", serde_json::to_string_pretty(&devices).expect("device facts are plain data"));
+        return Ok(());
+    }
+    if devices.is_empty() {
+        println!("The Vulkan loader finds no device; photonmill would run its CPU builder.");
+    }
+    for facts in &devices {
+        print(facts);
+    }
+    Ok(())
+}
+
+fn print(facts: &DeviceFacts) {
+    println!("{} {} ({})", facts.index, facts.name, facts.kind);
+    let line = |what: &str, value: String| println!("    {what:<26} {value}");
+    line("driver", facts.driver.clone());
+    line("Vulkan", facts.vulkan.clone());
+    line("subgroup size", facts.subgroup_size.to_string());
+    line("storage buffer range", mebibytes(facts.storage_buffer_range_bytes));
+    line("largest allocation", mebibytes(facts.allocation_bytes));
+    line("device memory", mebibytes(facts.device_memory_bytes));
+    line("storage buffers a stage", facts.storage_buffers_per_stage.to_string());
+    line("work groups", format!("{} x {}", facts.work_group_count_x, facts.work_group_count_y));
+    line("work-group size", facts.work_group_size.to_string());
+    line("timestamps", match facts.timestamp_bits {
+        0 => "none".to_owned(),
+        bits => format!("{bits} bits of {} ns", facts.timestamp_period_ns),
+    });
+    line("64-bit atomics", if facts.int64_atomics { "yes" } else { "no: two 32-bit words instead" }.to_owned());
+    line("start-up check", verdict(facts));
+}
+
+/// Opens the device, which runs the check, and asks how far its loops count.
+fn verdict(facts: &DeviceFacts) -> String {
+    const WANTED: u32 = 100_000;
+    let opened = Gpu::open(&Options { device: Some(facts.index.to_string()), ..Options::default() });
+    match opened.and_then(|gpu| check::loop_count(&gpu, WANTED)) {
+        Ok(count) if count.done == WANTED => "passed".to_owned(),
+        Ok(count) => format!("passed; loops end after {} iterations (photonmill does {LOOP_LIMIT} at most)", count.done),
+        Err(error) => error.to_string(),
+    }
+}
+
+fn mebibytes(bytes: u64) -> String {
+    format!("{} MiB", bytes >> 20)
+}

@@ -1,0 +1,142 @@
+//! The command line: clap structs turned into settings, one file a subcommand. Nothing else knows
+//! clap.
+
+mod devices;
+mod paper;
+mod run;
+
+use std::sync::Arc;
+use std::sync::atomic::{AtomicBool, Ordering};
+
+use clap::error::{ContextKind, ContextValue, ErrorKind};
+use clap::{Args, Parser, Subcommand};
+
+use crate::error::{Error, Result};
+use crate::gpu::{Gpu, Options};
+
+/// Photon mapping on any Vulkan GPU.
+///
+/// Without a subcommand, lights the open box of the paper 'Photon Mapping On The GPU' and writes its
+/// picture, a timing table and the photon ledger. With no option at all that is the paper's modified
+/// implementation with 15 bounces.
+#[derive(Parser)]
+#[command(version, args_conflicts_with_subcommands = true, max_term_width = 100)]
+struct Cli {
+    #[command(subcommand)]
+    command: Option<Command>,
+    #[command(flatten)]
+    run: run::RunArgs,
+}
+
+#[derive(Subcommand)]
+enum Command {
+    /// Lists Vulkan devices with the limits that matter here
+    Devices(devices::DevicesArgs),
+    /// Regenerates every figure and table of the paper as images, CSV and one HTML page
+    Paper(paper::PaperArgs),
+}
+
+/// Which device, and how closely it is watched.
+#[derive(Args)]
+#[command(next_help_heading = "Device")]
+struct DeviceArgs {
+    /// Vulkan device, by index or part of its name; see `photonmill devices` [default: a discrete GPU
+    /// if there is one]
+    #[arg(long, value_name = "INDEX|NAME")]
+    device: Option<String>,
+    /// Turn on the Vulkan validation layer with synchronisation validation; any message is an error
+    #[arg(long)]
+    validate: bool,
+}
+
+impl DeviceArgs {
+    fn options(&self) -> Options {
+        Options { device: self.device.clone(), validate: self.validate, ..Options::default() }
+    }
+
+    /// The device, or `None` after one line on stderr if there is no Vulkan and none was asked for.
+    fn open(&self) -> Result<Option<Gpu>> {
+        match Gpu::open(&self.options()) {
+            Ok(gpu) => Ok(Some(gpu)),
+            Err(error @ (Error::NoVulkan { .. } | Error::DeviceLacks { .. })) if self.device.is_none() => {
+                eprintln!("photonmill: {error}; running the CPU builder instead");
+                Ok(None)
+            }
+            Err(error) => Err(error),
+        }
+    }
+}
+
+/// Runs the program on the process's arguments and returns its exit code.
+pub fn main() -> u8 {
+    let cli = match Cli::try_parse() {
+        Ok(cli) => cli,
+        Err(error) if !error.use_stderr() => {
+            // Help or version: what was asked for.
+            let _ = error.print();
+            return 0;
+        }
+        Err(error) => {
+            eprintln!("photonmill: {}", one_line(&error));
+            return 2;
+        }
+    };
+    let cancelled = cancel_on_interrupt();
+    let result = match cli.command {
+        None => run::run(&cli.run, &cancelled),
+        Some(Command::Devices(args)) => devices::run(&args),
+        Some(Command::Paper(args)) => paper::run(&args, &cancelled),
+    };
+    match result {
+        Ok(()) if cancelled.load(Ordering::Relaxed) => 130,
+        Ok(()) => 0,
+        Err(error) => {
+            eprintln!("photonmill: {error}");
+            error.exit_code()
+        }
+    }
+}
+
+/// The first Ctrl-C ends the run after the photons that are under way, the second at once.
+fn cancel_on_interrupt() -> Arc<AtomicBool> {
+    let cancelled = Arc::new(AtomicBool::new(false));
+    let flag = cancelled.clone();
+    let handler = move || {
+        if flag.swap(true, Ordering::Relaxed) {
+            std::process::exit(130);
+        }
+        eprintln!("\nphotonmill: ending after the photons under way; Ctrl-C again to end at once");
+    };
+    // Without a handler Ctrl-C ends the program at once, and files still appear whole or not at all.
+    let _ = ctrlc::set_handler(handler);
+    cancelled
+}
+
+/// clap's complaint as one sentence with option, value and what is allowed.
+fn one_line(error: &clap::Error) -> String {
+    let context = |kind: ContextKind| match error.get(kind) {
+        Some(ContextValue::String(text)) => text.clone(),
+        Some(ContextValue::Strings(texts)) => texts.join(", "),
+        _ => String::new(),
+    };
+    let argument = context(ContextKind::InvalidArg);
+    let value = context(ContextKind::InvalidValue);
+    let option = argument.split([' ', '=']).next().unwrap_or_default();
+    match error.kind() {
+        ErrorKind::InvalidValue if !context(ContextKind::ValidValue).is_empty() => {
+            let shown = if value.is_empty() { "(no value)" } else { &value };
+            format!("{option} {shown}: must be one of {}", context(ContextKind::ValidValue))
+        }
+        ErrorKind::ValueValidation => {
+            let reason = std::error::Error::source(error).map(ToString::to_string).unwrap_or_default();
+            format!("{option} {value}: {reason}")
+        }
+        ErrorKind::UnknownArgument => format!("{argument}: there is no such option; see --help"),
+        ErrorKind::InvalidSubcommand => format!("{}: there is no such subcommand; see --help", context(ContextKind::InvalidSubcommand)),
+        _ => {
+            let rendered = error.render().to_string();
+            let sentence: Vec<&str> = rendered.lines().take_while(|line| !line.is_empty()).map(str::trim).collect();
+            sentence.join(" ").trim_start_matches("error: ").to_owned()
+        }
+    }
+}

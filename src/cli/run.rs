@@ -1,0 +1,284 @@
+//! The main job: light the open box with one builder.
+
+use std::path::PathBuf;
+use std::sync::atomic::AtomicBool;
+use std::time::Instant;
+
+use clap::{Args, ValueEnum};
+use indicatif::{ProgressBar, ProgressStyle};
+
+use super::DeviceArgs;
+use crate::error::{Error, Result};
+use crate::film::estimate_walls;
+use crate::output::destination::{Destination, Folder};
+use crate::output::image::{Format, overview};
+use crate::output::lightmap::{self, Quantity};
+use crate::output::{report, trace_file};
+use crate::render::{self, Control, Outcome};
+use crate::rng::Rng;
+use crate::scene::open_box::open_box;
+use crate::settings::{EmissionLaw, Gather, PhongDirection, Preset, Settings, Variant, WALL_NAMES};
+use crate::timings::{Clock, Span};
+
+#[derive(Args)]
+pub(super) struct RunArgs {
+    /// Experiment of the paper whose settings are the defaults [default: modified]
+    #[arg(long, value_enum, help_heading = "Experiment")]
+    preset: Option<PresetArg>,
+    /// How the photon map is built [default: atomic; naive with --preset naive]
+    #[arg(long, value_enum, help_heading = "Experiment")]
+    variant: Option<VariantArg>,
+    /// Photons of a round, all lights together [default: 5000]
+    #[arg(long, help_heading = "Experiment")]
+    photons: Option<u32>,
+    /// Rounds whose photons add up [default: 1; 100 with --preset rounds]
+    #[arg(long, help_heading = "Experiment")]
+    rounds: Option<u32>,
+    /// Most bounces of a photon [default: 15; 2 with --preset naive]
+    #[arg(long, help_heading = "Experiment")]
+    bounces: Option<u32>,
+    /// Seed of the random numbers [default: 1]
+    #[arg(long, help_heading = "Experiment")]
+    seed: Option<u64>,
+    /// Random numbers: the paper's drand48, its alternative the Mersenne Twister, or counter-based
+    /// [default: rand48]
+    #[arg(long, value_enum, help_heading = "Experiment")]
+    rng: Option<RngArg>,
+
+    /// Radius of the density estimate, metres [default: 0.05; 0.025 with --preset rounds]
+    #[arg(long, allow_negative_numbers = true, help_heading = "Estimate")]
+    radius: Option<f64>,
+    /// Photons within the radius, a round, that count as full illumination [default: 90 for every
+    /// 5000 photons; 10 with --preset rounds]
+    #[arg(long, allow_negative_numbers = true, help_heading = "Estimate")]
+    full_light: Option<f64>,
+    /// How photons near a point are found: step through all, or look into a sorted grid; the result
+    /// is the same to the bit [default: grid]
+    #[arg(long, value_enum, help_heading = "Estimate")]
+    gather: Option<GatherArg>,
+    /// Texels along each side of a wall [default: 64]
+    #[arg(long, help_heading = "Estimate")]
+    mesh: Option<u32>,
+    /// Divide irradiance and radiosity by the part of the disc that lies on the wall; the paper's
+    /// illumination stays as it is [default: on]
+    #[arg(long, value_enum, help_heading = "Estimate")]
+    edge_correction: Option<SwitchArg>,
+
+    /// Directions of emission: the same intensity in all of the hemisphere, or proportional to the
+    /// cosine [default: uniform]
+    #[arg(long, value_enum, help_heading = "Scene")]
+    emission: Option<EmissionArg>,
+    /// Phong exponent of all walls, or five of them for left,right,floor,ceiling,back [default: none,
+    /// Lambertian; 2 with --preset phong, 5 with --preset rounds]
+    #[arg(long, value_name = "N|N,N,N,N,N", value_parser = shininess, allow_negative_numbers = true, help_heading = "Scene")]
+    shininess: Option<[f32; 5]>,
+    /// Direction that the Phong weight compares with the eye's: mirrored, or sampled [default: mirror]
+    #[arg(long, value_enum, help_heading = "Scene")]
+    phong_direction: Option<PhongDirectionArg>,
+    /// Eye of the Phong weight, metres [default: 0,0,1]
+    #[arg(long, value_name = "X,Y,Z", value_parser = numbers::<f32, 3>, allow_hyphen_values = true, help_heading = "Scene")]
+    eye: Option<[f32; 3]>,
+    /// Share of photons that a wall reflects [default: 0.75]
+    #[arg(long, allow_negative_numbers = true, help_heading = "Scene")]
+    reflectance: Option<f32>,
+    /// Radius of the two discs of light, metres [default: 0.05]
+    #[arg(long, allow_negative_numbers = true, help_heading = "Scene")]
+    light_radius: Option<f64>,
+    /// Power of the floor's and the left wall's light, watts [default: 1,1]
+    #[arg(long, value_name = "W,W", value_parser = numbers::<f64, 2>, allow_hyphen_values = true, help_heading = "Scene")]
+    light_power: Option<[f64; 2]>,
+
+    #[command(flatten)]
+    device: DeviceArgs,
+    /// Threads of --variant cpu, or `all` [default: 1, as in the paper]
+    #[arg(long, value_name = "N|all", value_parser = threads, help_heading = "Device")]
+    threads: Option<usize>,
+    /// Invocations of a work group [default: 128]
+    #[arg(long, help_heading = "Device")]
+    group_size: Option<u32>,
+    /// Most photons traced at once; the result is the same to the bit [default: what the device holds]
+    #[arg(long, help_heading = "Device")]
+    chunk: Option<u32>,
+
+    /// Picture of the box: .png shows illumination 0 to 1, .exr keeps it unclamped
+    #[arg(short, long, value_name = "FILE", default_value = "open-box.png", help_heading = "Output")]
+    output: PathBuf,
+    /// Write each wall's irradiance in W/m2 as <wall>.exr, and layout.json, into this folder
+    #[arg(long, value_name = "DIR", help_heading = "Output")]
+    irradiance: Option<PathBuf>,
+    /// The same for radiosity, the reflected flux
+    #[arg(long, value_name = "DIR", help_heading = "Output")]
+    radiosity: Option<PathBuf>,
+    /// Write settings, ledger and timings as JSON
+    #[arg(long, value_name = "FILE", help_heading = "Output")]
+    json: Option<PathBuf>,
+    /// Write the timings as a Chrome trace, for Perfetto or chrome://tracing
+    #[arg(long, value_name = "FILE", help_heading = "Output")]
+    trace: Option<PathBuf>,
+}
+
+/// An enum of the settings as clap values.
+macro_rules! value_enum {
+    ($argument:ident => $setting:ident { $($(#[$doc:meta])* $variant:ident),* $(,)? }) => {
+        #[derive(Clone, Copy, ValueEnum)]
+        enum $argument { $($(#[$doc])* $variant),* }
+
+        impl From<$argument> for $setting {
+            fn from(argument: $argument) -> $setting {
+                match argument { $($argument::$variant => $setting::$variant),* }
+            }
+        }
+    };
+}
+
+value_enum!(PresetArg => Preset { Naive, Modified, Phong, Rounds });
+value_enum!(VariantArg => Variant { Naive, Atomic, Ballot, Cpu });
+value_enum!(RngArg => Rng { Rand48, Mt, Philox });
+value_enum!(GatherArg => Gather { Brute, Grid });
+value_enum!(EmissionArg => EmissionLaw { Uniform, Cosine });
+value_enum!(PhongDirectionArg => PhongDirection { Mirror, Sampled });
+
+#[derive(Clone, Copy, PartialEq, Eq, ValueEnum)]
+enum SwitchArg {
+    On,
+    Off,
+}
+
+fn numbers<T: std::str::FromStr + Copy + Default, const N: usize>(text: &str) -> std::result::Result<[T; N], String> {
+    let parts: Vec<T> = text.split(',').filter_map(|part| part.trim().parse().ok()).collect();
+    let wanted = format!("must be {N} numbers with commas between");
+    if text.split(',').count() != N {
+        return Err(wanted);
+    }
+    parts.try_into().map_err(|_| wanted)
+}
+
+fn shininess(text: &str) -> std::result::Result<[f32; 5], String> {
+    let wanted = || format!("must be one number, or five for {}", WALL_NAMES.join(","));
+    match numbers::<f32, 1>(text) {
+        Ok([all]) => Ok([all; 5]),
+        Err(_) => numbers::<f32, 5>(text).map_err(|_| wanted()),
+    }
+}
+
+fn threads(text: &str) -> std::result::Result<usize, String> {
+    if text == "all" {
+        return Ok(std::thread::available_parallelism().map_or(1, usize::from));
+    }
+    text.parse().map_err(|_| "must be a number of threads, or all".to_owned())
+}
+
+impl RunArgs {
+    fn settings(&self) -> Settings {
+        let preset = Settings::preset(self.preset.map_or(Preset::Modified, Preset::from));
+        let photons = self.photons.unwrap_or(preset.photons);
+        Settings {
+            variant: self.variant.map_or(preset.variant, Variant::from),
+            photons,
+            rounds: self.rounds.unwrap_or(preset.rounds),
+            bounces: self.bounces.unwrap_or(preset.bounces),
+            radius: self.radius.unwrap_or(preset.radius),
+            full_light: self.full_light.unwrap_or_else(|| preset.full_light_for(photons)),
+            seed: self.seed.unwrap_or(preset.seed),
+            rng: self.rng.map_or(preset.rng, Rng::from),
+            gather: self.gather.map_or(preset.gather, Gather::from),
+            emission: self.emission.map_or(preset.emission, EmissionLaw::from),
+            shininess: self.shininess.map_or(preset.shininess, |all| all.map(Some)),
+            phong_direction: self.phong_direction.map_or(preset.phong_direction, PhongDirection::from),
+            eye: self.eye.unwrap_or(preset.eye),
+            light_radius: self.light_radius.unwrap_or(preset.light_radius),
+            light_power: self.light_power.unwrap_or(preset.light_power),
+            reflectance: self.reflectance.unwrap_or(preset.reflectance),
+            mesh: self.mesh.unwrap_or(preset.mesh),
+            edge_correction: self.edge_correction.map_or(preset.edge_correction, |switch| switch == SwitchArg::On),
+            threads: self.threads.unwrap_or(preset.threads),
+            group_size: self.group_size.unwrap_or(preset.group_size),
+            chunk: self.chunk.or(preset.chunk),
+        }
+    }
+}
+
+pub(super) fn run(args: &RunArgs, cancelled: &AtomicBool) -> Result<()> {
+    let settings = args.settings();
+    settings.validate()?;
+    if settings.reflectance == 0.0 && args.irradiance.is_some() {
+        return Err(Error::setting("--reflectance", 0, "must be above 0 with --irradiance, as the photon map holds reflected photons only"));
+    }
+    if let (Variant::Cpu, Some(device)) = (settings.variant, &args.device.device) {
+        return Err(Error::setting("--device", device, "has no use with --variant cpu; leave one of the two out"));
+    }
+    let outputs = Outputs::open(args)?;
+    if let Some(warning) = settings.warning() {
+        eprintln!("photonmill: warning: {warning}");
+    }
+    let gpu = match settings.variant {
+        Variant::Cpu => None,
+        _ => args.device.open()?,
+    };
+    let scene = open_box(&settings);
+    let bar = progress_bar(settings.total_photons());
+    let mut control = Control { cancelled, progress: &mut |emitted, _| bar.set_position(emitted) };
+    let outcome = match &gpu {
+        Some(gpu) => render::on_gpu(gpu, &scene, &settings, &mut control)?,
+        None => render::on_cpu(&scene, &settings, &mut control)?,
+    };
+    bar.finish_and_clear();
+    if outcome.cancelled {
+        eprintln!("photonmill: ended after {} of {} photons; what is written is of these", outcome.fates.emitted, settings.total_photons());
+    }
+    outputs.write(outcome, &scene)
+}
+
+fn progress_bar(photons: u64) -> ProgressBar {
+    let style = ProgressStyle::with_template("{bar:32} {human_pos}/{human_len} photons, {per_sec}, {eta} left").expect("the template is valid");
+    ProgressBar::new(photons).with_style(style)
+}
+
+/// Everything that the run will write, opened before it starts.
+struct Outputs {
+    picture: (Destination, Format),
+    irradiance: Option<Folder>,
+    radiosity: Option<Folder>,
+    json: Option<Destination>,
+    trace: Option<Destination>,
+}
+
+impl Outputs {
+    fn open(args: &RunArgs) -> Result<Outputs> {
+        let file = |option, path: &Option<PathBuf>| path.as_ref().map(|path| Destination::open(option, path)).transpose();
+        let folder = |option, path: &Option<PathBuf>| path.as_ref().map(|path| Folder::open(option, path)).transpose();
+        Ok(Outputs {
+            picture: (Destination::open("-o", &args.output)?, Format::of("-o", &args.output)?),
+            json: file("--json", &args.json)?,
+            trace: file("--trace", &args.trace)?,
+            irradiance: folder("--irradiance", &args.irradiance)?,
+            radiosity: folder("--radiosity", &args.radiosity)?,
+        })
+    }
+
+    fn write(self, mut outcome: Outcome, scene: &crate::scene::Scene) -> Result<()> {
+        let walls = estimate_walls(&outcome.film, scene, &outcome.plan);
+        let (destination, format) = self.picture;
+        let picture = destination.path().display().to_string();
+        let began = Instant::now();
+        destination.write(&overview(scene, &walls).encode(format))?;
+        for (folder, quantity) in [(&self.irradiance, Quantity::Irradiance), (&self.radiosity, Quantity::Radiosity)] {
+            if let Some(folder) = folder {
+                lightmap::write(folder, quantity, scene, &walls)?;
+            }
+        }
+        let run = outcome.timings.spans().iter().map(|span| span.start + span.duration).max().unwrap_or_default();
+        outcome.timings.count("output");
+        outcome.timings.add(Span { name: "output".into(), clock: Clock::Wall, start: run, duration: began.elapsed() });
+
+        if let Some(json) = self.json {
+            json.write(&report::json(&outcome, &walls))?;
+        }
+        if let Some(trace) = self.trace {
+            let device = outcome.device.as_ref().map_or("CPU", |facts| &facts.name);
+            trace.write(&trace_file::chrome_trace(&outcome.timings, device))?;
+        }
+        println!("{}\nwrote {picture}", report::text(&outcome));
+        Ok(())
+    }
+}

@@ -1,0 +1,273 @@
+//! The box as a picture, like the paper's figures: the walls unfolded, and seen from several angles.
+
+use std::io::Cursor;
+use std::path::Path;
+
+use glam::DVec3;
+use image::codecs::openexr::OpenExrEncoder;
+use image::codecs::png::PngEncoder;
+use image::{ExtendedColorType, ImageEncoder};
+
+use crate::error::{Error, Result};
+use crate::film::WallEstimate;
+use crate::scene::rectangle::Rectangle;
+use crate::scene::{Scene, face_axis};
+
+/// A grey picture, row by row from the top.
+#[derive(Debug, Clone, PartialEq)]
+pub struct Picture {
+    pub width: usize,
+    pub height: usize,
+    pub values: Vec<f64>,
+}
+
+/// File formats, by the name's extension.
+#[derive(Debug, Clone, Copy, PartialEq, Eq)]
+pub enum Format {
+    /// 8 bits, values from 0 to 1 as they are: the paper's illumination is a display value.
+    Png,
+    /// 32-bit floats, values not clamped.
+    Exr,
+}
+
+impl Format {
+    pub fn of(option: &'static str, path: &Path) -> Result<Format> {
+        match path.extension().and_then(|extension| extension.to_str()).map(str::to_lowercase).as_deref() {
+            Some("png") => Ok(Format::Png),
+            Some("exr") => Ok(Format::Exr),
+            _ => Err(Error::setting(option, path.display(), "must end in .png or .exr")),
+        }
+    }
+}
+
+/// A wall's texels as a function of position.
+struct Texture<'a> {
+    rectangle: Rectangle,
+    values: &'a [f64],
+    mesh: usize,
+}
+
+impl<'a> Texture<'a> {
+    fn of_walls(scene: &Scene, walls: &'a [WallEstimate]) -> Vec<(usize, Texture<'a>)> {
+        walls
+            .iter()
+            .map(|wall| {
+                let mesh = wall.illumination.len().isqrt();
+                (wall.face, Texture { rectangle: scene.rectangle(wall.face), values: &wall.illumination, mesh })
+            })
+            .collect()
+    }
+
+    /// (s, t) of a point of the wall's plane; each in [0, 1] on the wall.
+    fn coordinates(&self, point: DVec3) -> (f64, f64) {
+        let from_origin = point - self.rectangle.origin;
+        let along = |side: DVec3| from_origin.dot(side) / side.length_squared();
+        (along(self.rectangle.u), along(self.rectangle.v))
+    }
+
+    /// The texel that holds a point.
+    fn nearest(&self, point: DVec3) -> f64 {
+        let (s, t) = self.coordinates(point);
+        let index = |x: f64| ((x * self.mesh as f64) as usize).min(self.mesh - 1);
+        self.values[index(t) * self.mesh + index(s)]
+    }
+
+    /// Bilinear between texel centres.
+    fn smooth(&self, point: DVec3) -> f64 {
+        let (s, t) = self.coordinates(point);
+        let last = (self.mesh - 1) as f64;
+        let place = |x: f64| (x * self.mesh as f64 - 0.5).clamp(0.0, last);
+        let (column, row) = (place(s), place(t));
+        let texel = |i: f64, j: f64| self.values[j.min(last) as usize * self.mesh + i.min(last) as usize];
+        let (i, j, di, dj) = (column.floor(), row.floor(), column.fract(), row.fract());
+        let lower = texel(i, j) * (1.0 - di) + texel(i + 1.0, j) * di;
+        let upper = texel(i, j + 1.0) * (1.0 - di) + texel(i + 1.0, j + 1.0) * di;
+        lower * (1.0 - dj) + upper * dj
+    }
+}
+
+/// Pixels along a wall in the unfolded picture.
+const WALL_PIXELS: usize = 192;
+/// Pixels along a perspective view: two by two of them are as high as the unfolded box.
+const VIEW_PIXELS: usize = 3 * WALL_PIXELS / 2;
+/// Rays along each side of a pixel.
+const RAYS: usize = 3;
+
+/// The unfolded walls on the left, four views on the right.
+pub fn overview(scene: &Scene, walls: &[WallEstimate]) -> Picture {
+    let mut picture = Picture::black(3 * WALL_PIXELS + 2 * VIEW_PIXELS, 3 * WALL_PIXELS);
+    picture.paste(&unfolded(scene, walls), 0, 0);
+    for (place, eye) in VIEWS.iter().enumerate() {
+        let view = perspective(scene, walls, *eye, VIEW_PIXELS);
+        picture.paste(&view, 3 * WALL_PIXELS + place % 2 * VIEW_PIXELS, place / 2 * VIEW_PIXELS);
+    }
+    picture
+}
+
+/// The box seen from one point, as one picture.
+pub fn view(scene: &Scene, walls: &[WallEstimate], pixels: usize) -> Picture {
+    perspective(scene, walls, VIEWS[1], pixels)
+}
+
+/// The walls folded out around the back wall, as one looks in through the opening.
+pub fn unfolded(scene: &Scene, walls: &[WallEstimate]) -> Picture {
+    let (min, max) = (scene.min_corner, scene.max_corner);
+    let side = WALL_PIXELS;
+    let mut picture = Picture::black(3 * side, 3 * side);
+    for (face, texture) in Texture::of_walls(scene, walls) {
+        // Column and row of the wall's square, and its point at (x, y), both from 0 to 1 with y up.
+        type Unfold = fn(DVec3, DVec3, f64, f64) -> DVec3;
+        let (column, row, point): (usize, usize, Unfold) = match face {
+            0 => (0, 1, |min, max, x, y| DVec3::new(min.x, mix(min.y, max.y, y), mix(max.z, min.z, x))),
+            1 => (2, 1, |min, max, x, y| DVec3::new(max.x, mix(min.y, max.y, y), mix(min.z, max.z, x))),
+            2 => (1, 2, |min, max, x, y| DVec3::new(mix(min.x, max.x, x), min.y, mix(max.z, min.z, y))),
+            3 => (1, 0, |min, max, x, y| DVec3::new(mix(min.x, max.x, x), max.y, mix(min.z, max.z, y))),
+            4 => (1, 1, |min, max, x, y| DVec3::new(mix(min.x, max.x, x), mix(min.y, max.y, y), min.z)),
+            // The opening of other rooms would cover the view.
+            _ => continue,
+        };
+        for j in 0..side {
+            for i in 0..side {
+                let x = (i as f64 + 0.5) / side as f64;
+                let y = 1.0 - (j as f64 + 0.5) / side as f64;
+                picture.values[(row * side + j) * picture.width + column * side + i] = texture.nearest(point(min, max, x, y));
+            }
+        }
+    }
+    picture
+}
+
+fn mix(a: f64, b: f64, t: f64) -> f64 {
+    a + (b - a) * t
+}
+
+/// Eyes, in half widths of the box from its centre, all in front of the opening.
+const VIEWS: [[f64; 3]; 4] = [[0.0, 0.0, 4.2], [1.9, 1.3, 3.6], [-1.9, 1.3, 3.6], [1.2, -2.0, 3.5]];
+
+/// Only the insides of walls are drawn, so that a wall between eye and box does not hide it.
+fn perspective(scene: &Scene, walls: &[WallEstimate], eye: [f64; 3], pixels: usize) -> Picture {
+    let centre = 0.5 * (scene.min_corner + scene.max_corner);
+    let half = 0.5 * (scene.max_corner - scene.min_corner).max_element();
+    let eye = centre + half * DVec3::from(eye);
+    let forward = (centre - eye).normalize();
+    let right = forward.cross(DVec3::Y).normalize();
+    let up = right.cross(forward);
+    // Wide enough for the sphere around the box.
+    let half_width = 1.12 * half * 3f64.sqrt() / (eye - centre).length();
+
+    let textures = Texture::of_walls(scene, walls);
+    let seen = |x: f64, y: f64| {
+        let direction = forward + half_width * (x * right + y * up);
+        let hits = textures.iter().filter_map(|(face, texture)| {
+            let (axis, sign) = face_axis(*face);
+            // From inside, a ray runs towards the wall's own side.
+            if direction[axis] * sign <= 0.0 {
+                return None;
+            }
+            let distance = (texture.rectangle.origin[axis] - eye[axis]) / direction[axis];
+            let point = eye + distance * direction;
+            let (s, t) = texture.coordinates(point);
+            let on_wall = distance > 0.0 && (0.0..=1.0).contains(&s) && (0.0..=1.0).contains(&t);
+            on_wall.then(|| (distance, texture.smooth(point)))
+        });
+        hits.min_by(|a, b| a.0.total_cmp(&b.0)).map_or(0.0, |(_, value)| value)
+    };
+    let mut picture = Picture::black(pixels, pixels);
+    for j in 0..pixels {
+        for i in 0..pixels {
+            let sum: f64 = (0..RAYS * RAYS)
+                .map(|ray| {
+                    let x = i as f64 + ((ray % RAYS) as f64 + 0.5) / RAYS as f64;
+                    let y = j as f64 + ((ray / RAYS) as f64 + 0.5) / RAYS as f64;
+                    seen(2.0 * x / pixels as f64 - 1.0, 1.0 - 2.0 * y / pixels as f64)
+                })
+                .sum();
+            picture.values[j * pixels + i] = sum / (RAYS * RAYS) as f64;
+        }
+    }
+    picture
+}
+
+impl Picture {
+    pub fn black(width: usize, height: usize) -> Picture {
+        Picture { width, height, values: vec![0.0; width * height] }
+    }
+
+    /// Copies another picture in, its upper left corner at (column, row).
+    pub fn paste(&mut self, other: &Picture, column: usize, row: usize) {
+        for j in 0..other.height {
+            let to = (row + j) * self.width + column;
+            self.values[to..to + other.width].copy_from_slice(&other.values[j * other.width..(j + 1) * other.width]);
+        }
+    }
+
+    /// The file's bytes.
+    pub fn encode(&self, format: Format) -> Vec<u8> {
+        match format {
+            Format::Png => {
+                let bytes: Vec<u8> = self.values.iter().map(|value| (value.clamp(0.0, 1.0) * 255.0).round() as u8).collect();
+                let mut file = Vec::new();
+                PngEncoder::new(&mut file)
+                    .write_image(&bytes, self.width as u32, self.height as u32, ExtendedColorType::L8)
+                    .expect("a picture in memory can be encoded");
+                file
+            }
+            Format::Exr => {
+                // Grey as three equal channels, which every reader of EXR shows.
+                let bytes: Vec<u8> = self.values.iter().flat_map(|value| [*value as f32; 3]).flat_map(f32::to_ne_bytes).collect();
+                let mut file = Cursor::new(Vec::new());
+                OpenExrEncoder::new(&mut file)
+                    .write_image(&bytes, self.width as u32, self.height as u32, ExtendedColorType::Rgb32F)
+                    .expect("a picture in memory can be encoded");
+                file.into_inner()
+            }
+        }
+    }
+}
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+    use crate::scene::open_box::open_box;
+    use crate::settings::Settings;
+
+    /// Walls that shine with 0.1 times their face number plus one.
+    fn numbered_walls(scene: &Scene) -> Vec<WallEstimate> {
+        let wall = |face: usize, name| {
+            let illumination = vec![0.1 * (face + 1) as f64; 16];
+            WallEstimate { name, face, radiosity: illumination.clone(), irradiance: illumination.clone(), illumination }
+        };
+        scene.walls().map(|(face, described)| wall(face, described.name)).collect()
+    }
+
+    #[test]
+    fn walls_stand_where_they_belong() {
+        let scene = open_box(&Settings::default());
+        let walls = numbered_walls(&scene);
+        let unfolded = unfolded(&scene, &walls);
+        let at = |column: usize, row: usize| {
+            let (i, j) = (column * WALL_PIXELS + WALL_PIXELS / 2, row * WALL_PIXELS + WALL_PIXELS / 2);
+            (unfolded.values[j * unfolded.width + i] * 10.0).round() as usize
+        };
+        assert_eq!([at(0, 1), at(2, 1), at(1, 2), at(1, 0), at(1, 1), at(0, 0)], [1, 2, 3, 4, 5, 0]);
+
+        // Straight in front, the back wall is in the middle, the floor below, the left wall left.
+        let front = perspective(&scene, &walls, VIEWS[0], 64);
+        let at = |i: usize, j: usize| (front.values[j * 64 + i] * 10.0).round() as usize;
+        assert_eq!([at(32, 32), at(12, 32), at(51, 32), at(32, 51), at(32, 12)], [5, 1, 2, 3, 4]);
+    }
+
+    #[test]
+    fn formats_follow_the_name() {
+        assert_eq!(Format::of("-o", Path::new("a.PNG")).unwrap(), Format::Png);
+        assert_eq!(Format::of("-o", Path::new("b/a.exr")).unwrap(), Format::Exr);
+        assert!(Format::of("-o", Path::new("a.jpg")).is_err());
+    }
+
+    #[test]
+    fn an_exr_holds_the_values_untouched() {
+        let picture = Picture { width: 2, height: 1, values: vec![0.125, 7.5] };
+        let read = image::load_from_memory_with_format(&picture.encode(Format::Exr), image::ImageFormat::OpenExr).unwrap().into_rgb32f();
+        assert_eq!(read.into_raw(), [0.125, 0.125, 0.125, 7.5, 7.5, 7.5]);
+    }
+}

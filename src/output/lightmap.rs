@@ -1,0 +1,63 @@
+//! Irradiance or radiosity of every wall as float images, with a file that says where texels lie.
+
+use serde::Serialize;
+
+use super::destination::Folder;
+use super::image::{Format, Picture};
+use crate::error::Result;
+use crate::film::WallEstimate;
+use crate::scene::Scene;
+
+/// Physical quantities of a wall's texel, both in W/m2.
+#[derive(Debug, Clone, Copy, PartialEq, Eq, Serialize)]
+#[serde(rename_all = "lowercase")]
+pub enum Quantity {
+    Irradiance,
+    Radiosity,
+}
+
+#[derive(Serialize)]
+struct Layout<'a> {
+    quantity: Quantity,
+    unit: &'static str,
+    walls: Vec<WallLayout<'a>>,
+}
+
+/// The centre of the texel in column i, row j lies at origin + (i + 1/2) / width u + (j + 1/2) / height v.
+#[derive(Serialize)]
+struct WallLayout<'a> {
+    name: &'a str,
+    file: String,
+    origin: [f64; 3],
+    u: [f64; 3],
+    v: [f64; 3],
+    width: usize,
+    height: usize,
+}
+
+/// Writes `<wall>.exr` for every wall, then `layout.json`.
+pub fn write(folder: &Folder, quantity: Quantity, scene: &Scene, walls: &[WallEstimate]) -> Result<()> {
+    let mut layout = Layout { quantity, unit: "W/m2", walls: Vec::new() };
+    for wall in walls {
+        let values = match quantity {
+            Quantity::Irradiance => &wall.irradiance,
+            Quantity::Radiosity => &wall.radiosity,
+        };
+        let mesh = values.len().isqrt();
+        let file = format!("{}.exr", wall.name);
+        let picture = Picture { width: mesh, height: mesh, values: values.clone() };
+        folder.write(&file, &picture.encode(Format::Exr))?;
+        let rectangle = scene.rectangle(wall.face);
+        layout.walls.push(WallLayout {
+            name: wall.name,
+            file,
+            origin: rectangle.origin.to_array(),
+            u: rectangle.u.to_array(),
+            v: rectangle.v.to_array(),
+            width: mesh,
+            height: mesh,
+        });
+    }
+    let json = serde_json::to_vec_pretty(&layout).expect("a layout is plain data");
+    folder.write("layout.json", &json)
+}

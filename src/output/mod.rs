@@ -1,0 +1,7 @@
+//! What a run writes: pictures, irradiance, the report and the trace file.
+
+pub mod destination;
+pub mod image;
+pub mod lightmap;
+pub mod report;
+pub mod trace_file;

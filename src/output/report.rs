@@ -1,0 +1,158 @@
+//! What a run says of itself: the timing table and ledger for people, JSON for programs.
+
+use std::fmt::Write;
+
+use serde::Serialize;
+
+use crate::film::WallEstimate;
+use crate::gpu::DeviceFacts;
+use crate::ledger::{BounceFates, Ledger};
+use crate::plan::Decision;
+use crate::render::Outcome;
+use crate::settings::Settings;
+use crate::timings::{Row, Timings};
+
+/// The JSON report.
+#[derive(Serialize)]
+struct Report<'a> {
+    photonmill: &'static str,
+    /// Device name; `cpu` for the CPU builder.
+    device: &'a str,
+    driver: String,
+    device_facts: Option<&'a DeviceFacts>,
+    seed: u64,
+    settings: &'a Settings,
+    plan: PlanReport<'a>,
+    /// The run was ended before its last photon; all numbers are of the photons emitted.
+    cancelled: bool,
+    ledger: Ledger,
+    /// Fates of the paths that entered each bounce.
+    bounces: &'a [BounceFates],
+    timings: &'a [Row],
+    dispatches: u64,
+    submissions: u64,
+    walls: Vec<WallReport>,
+}
+
+#[derive(Serialize)]
+struct PlanReport<'a> {
+    decisions: &'a [Decision],
+    light_photons: &'a [u32],
+    chunks_per_round: u32,
+    photon_map_entries: u32,
+    photon_map_bytes: u64,
+    grid: Option<crate::plan::Grid>,
+    film_channels: u32,
+    film_fixed_point_bits: u32,
+}
+
+/// Means over a wall's texels.
+#[derive(Serialize)]
+struct WallReport {
+    name: &'static str,
+    illumination: f64,
+    irradiance: f64,
+    radiosity: f64,
+}
+
+/// The run as JSON.
+pub fn json(outcome: &Outcome, walls: &[WallEstimate]) -> Vec<u8> {
+    let plan = &outcome.plan;
+    let mean = |values: &[f64]| values.iter().sum::<f64>() / values.len() as f64;
+    let report = Report {
+        photonmill: env!("CARGO_PKG_VERSION"),
+        device: outcome.device.as_ref().map_or("cpu", |facts| &facts.name),
+        driver: driver(outcome),
+        device_facts: outcome.device.as_ref(),
+        seed: plan.settings.seed,
+        settings: &plan.settings,
+        plan: PlanReport {
+            decisions: &plan.decisions,
+            light_photons: &plan.light_photons,
+            chunks_per_round: plan.chunks_per_round,
+            photon_map_entries: plan.photon_capacity,
+            photon_map_bytes: plan.photon_map_bytes(),
+            grid: plan.gathers_by_grid().then_some(plan.grid),
+            film_channels: plan.channel_count,
+            film_fixed_point_bits: plan.film_shift,
+        },
+        cancelled: outcome.cancelled,
+        ledger: outcome.fates.ledger(),
+        bounces: &outcome.fates.bounces,
+        timings: outcome.timings.rows(),
+        dispatches: outcome.dispatches,
+        submissions: outcome.submissions,
+        walls: walls
+            .iter()
+            .map(|wall| WallReport {
+                name: wall.name,
+                illumination: mean(&wall.illumination),
+                irradiance: mean(&wall.irradiance),
+                radiosity: mean(&wall.radiosity),
+            })
+            .collect(),
+    };
+    serde_json::to_vec_pretty(&report).expect("a report is plain data")
+}
+
+fn driver(outcome: &Outcome) -> String {
+    match &outcome.device {
+        Some(facts) => facts.driver.clone(),
+        None => format!("photonmill on {} thread(s)", outcome.plan.settings.threads),
+    }
+}
+
+/// The run in words: device, settings, ledger and timing table.
+pub fn text(outcome: &Outcome) -> String {
+    let mut text = String::new();
+    let settings = &outcome.plan.settings;
+    let device = outcome.device.as_ref().map_or("CPU", |facts| &facts.name);
+    writeln!(text, "{device}, {}", driver(outcome)).unwrap();
+    writeln!(
+        text,
+        "open-box, {}: {} round(s) of {} photons, {} bounces, radius {} m, {} gather, {} seed {}",
+        settings.variant.name(),
+        settings.rounds,
+        settings.photons,
+        settings.bounces,
+        settings.radius,
+        format!("{:?}", settings.gather).to_lowercase(),
+        format!("{:?}", settings.rng).to_lowercase(),
+        settings.seed
+    )
+    .unwrap();
+    for decision in &outcome.plan.decisions {
+        let verb = if decision.kept { "with" } else { "without" };
+        writeln!(text, "  {verb} {}: {}", decision.effect, decision.reason).unwrap();
+    }
+    text.push('\n');
+    text.push_str(&ledger(&outcome.fates.ledger()));
+    text.push('\n');
+    text.push_str(&timing_table(&outcome.timings, outcome.device.as_ref()));
+    text
+}
+
+/// One line that anybody can add up.
+fn ledger(ledger: &Ledger) -> String {
+    let Ledger { emitted, absorbed, escaped, cut_off, dropped, stored } = ledger;
+    format!(
+        "ledger: {emitted} emitted = {absorbed} absorbed + {escaped} escaped + {cut_off} cut off + {dropped} dropped\n        {stored} photons stored\n"
+    )
+}
+
+/// Scopes indented by depth, time on the device and on the host's clock.
+fn timing_table(timings: &Timings, device: Option<&DeviceFacts>) -> String {
+    let mut text = String::new();
+    let cell = |milliseconds: Option<f64>| milliseconds.map_or("-".to_owned(), |value| format!("{value:.3}"));
+    writeln!(text, "{:<28} {:>9} {:>12} {:>12}", "pass", "count", "GPU ms", "wall ms").unwrap();
+    for row in timings.rows() {
+        let depth = row.name.matches('/').count();
+        let name = row.name.rsplit('/').next().unwrap_or(&row.name);
+        let indented = format!("{}{name}", "  ".repeat(depth));
+        writeln!(text, "{indented:<28} {:>9} {:>12} {:>12}", row.count, cell(row.gpu_ms), cell(row.wall_ms)).unwrap();
+    }
+    if device.is_some_and(|facts| facts.timestamp_bits == 0) {
+        text.push_str("This device has no timestamps: GPU times are not known.\n");
+    }
+    text
+}
