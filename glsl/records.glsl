@@ -110,7 +110,8 @@ struct ScanPush {
 };
 
 struct GatherPush {
-    uint point_count;
+    uint first_point;
+    uint end_point;
     uint first_slice;
     uint photon_capacity;
     float radius_squared;

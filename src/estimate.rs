@@ -24,7 +24,8 @@ const MAX_GROUPS_Y: u32 = 65_535;
 
 fn push(plan: &Plan, photon_count: u32) -> GatherPush {
     GatherPush {
-        point_count: plan.points.len() as u32,
+        first_point: 0,
+        end_point: plan.points.len() as u32,
         first_slice: 0,
         photon_capacity: photon_list_capacity(plan, photon_count),
         radius_squared: (plan.settings.radius * plan.settings.radius) as f32,
@@ -40,24 +41,30 @@ fn push(plan: &Plan, photon_count: u32) -> GatherPush {
 /// the commands whenever they amount to a submission's work.
 pub fn gather_brute(commands: &mut Commands, resources: &Resources, plan: &Plan, photon_count: u32, int64_atomics: bool) -> Result<()> {
     let Resources { film, points, photons, counters, .. } = resources;
-    let mut push = push(plan, photon_count);
-    let point_groups = push.point_count.div_ceil(plan.settings.group_size);
-    let slice_count = push.photon_capacity.div_ceil(GATHER_SLICE);
-    let tests_per_slice = u64::from(push.point_count) * u64::from(GATHER_SLICE);
-    let slices_per_dispatch = (plan.pair_tests_per_submission / tests_per_slice).clamp(1, u64::from(MAX_GROUPS_Y)) as u32;
+    let whole = push(plan, photon_count);
+    let slice_count = whole.photon_capacity.div_ceil(GATHER_SLICE);
+    let budget = plan.pair_tests_per_submission;
+    let slice = u64::from(GATHER_SLICE);
+    // As many points as one slice's budget holds, then as many slices as these points leave room for.
+    let points_at_once = (budget / slice).clamp(1, u64::from(whole.end_point)) as u32;
+    let slices_at_once = (budget / (u64::from(points_at_once) * slice)).clamp(1, u64::from(MAX_GROUPS_Y)) as u32;
     commands.scope("gather", |commands| {
-        while push.first_slice < slice_count {
-            let slices = slices_per_dispatch.min(slice_count - push.first_slice);
-            let extent = Extent::Groups(point_groups, slices);
-            if int64_atomics {
-                commands.dispatch(GatherBruteU64 { points, film, photons, counters }, &push, extent)?;
-            } else {
-                commands.dispatch(GatherBruteTwoWords { points, film, photons, counters }, &push, extent)?;
-            }
-            push.first_slice += slices;
-            commands.add_work(u64::from(slices) * tests_per_slice);
-            if commands.work() >= plan.pair_tests_per_submission {
-                commands.submit()?;
+        for first_slice in (0..slice_count).step_by(slices_at_once as usize) {
+            for first_point in (0..whole.end_point).step_by(points_at_once as usize) {
+                let slices = slices_at_once.min(slice_count - first_slice);
+                let end_point = whole.end_point.min(first_point.saturating_add(points_at_once));
+                let push = GatherPush { first_point, end_point, first_slice, ..whole };
+                let point_count = end_point - first_point;
+                let extent = Extent::Groups(point_count.div_ceil(plan.settings.group_size), slices);
+                if int64_atomics {
+                    commands.dispatch(GatherBruteU64 { points, film, photons, counters }, &push, extent)?;
+                } else {
+                    commands.dispatch(GatherBruteTwoWords { points, film, photons, counters }, &push, extent)?;
+                }
+                commands.add_work(u64::from(slices) * u64::from(point_count) * slice);
+                if commands.work() >= budget {
+                    commands.submit()?;
+                }
             }
         }
         Ok(())
@@ -71,10 +78,10 @@ pub fn gather_grid(commands: &mut Commands, resources: &Resources, index: &Index
     let push = push(plan, photon_count);
     commands.scope("gather", |commands| {
         commands.fill(longest, 0, 1, 0);
-        commands.dispatch(CandidateCount { points, longest, cells }, &push, Extent::Items(u64::from(push.point_count)))?;
+        commands.dispatch(CandidateCount { points, longest, cells }, &push, Extent::Items(u64::from(push.end_point)))?;
         let size = DispatchSizePush {
             counter: 0,
-            capacity: push.point_count,
+            capacity: push.end_point,
             items_per_group: plan.settings.group_size,
             max_groups: MAX_GROUPS_Y,
         };

@@ -193,7 +193,10 @@ records! {
     }
 
     GatherPush {
-        point_count: u32,
+        /// Points `first_point` to `end_point` - 1 and slices from `first_slice` on: what one dispatch
+        /// covers.
+        first_point: u32,
+        end_point: u32,
         first_slice: u32,
         photon_capacity: u32,
         radius_squared: f32,

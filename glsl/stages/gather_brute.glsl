@@ -7,8 +7,8 @@ layout(constant_id = 5) const bool HAS_SLOTS = false;
 
 void gather()
 {
-    uint index = gl_WorkGroupID.x * gl_WorkGroupSize.x + gl_LocalInvocationIndex;
-    if (index >= push.point_count) {
+    uint index = push.first_point + gl_WorkGroupID.x * gl_WorkGroupSize.x + gl_LocalInvocationIndex;
+    if (index >= push.end_point) {
         return;
     }
     Point point = points[index];

@@ -5,8 +5,8 @@ layout(set = 1, binding = 2, scalar) readonly buffer SortedPhotons { SortedPhoto
 
 void gather()
 {
-    uint index = gl_WorkGroupID.x * gl_WorkGroupSize.x + gl_LocalInvocationIndex;
-    if (index >= push.point_count) {
+    uint index = push.first_point + gl_WorkGroupID.x * gl_WorkGroupSize.x + gl_LocalInvocationIndex;
+    if (index >= push.end_point) {
         return;
     }
     Point point = points[index];

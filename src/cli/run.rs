@@ -29,16 +29,16 @@ pub(super) struct RunArgs {
     #[arg(long, value_enum, help_heading = "Experiment")]
     variant: Option<VariantArg>,
     /// Photons of a round, all lights together [default: 5000]
-    #[arg(long, help_heading = "Experiment")]
+    #[arg(long, value_parser = whole::<u32>, allow_negative_numbers = true, help_heading = "Experiment")]
     photons: Option<u32>,
     /// Rounds whose photons add up [default: 1; 100 with --preset rounds]
-    #[arg(long, help_heading = "Experiment")]
+    #[arg(long, value_parser = whole::<u32>, allow_negative_numbers = true, help_heading = "Experiment")]
     rounds: Option<u32>,
     /// Most bounces of a photon [default: 15; 2 with --preset naive]
-    #[arg(long, help_heading = "Experiment")]
+    #[arg(long, value_parser = whole::<u32>, allow_negative_numbers = true, help_heading = "Experiment")]
     bounces: Option<u32>,
     /// Seed of the random numbers [default: 1]
-    #[arg(long, help_heading = "Experiment")]
+    #[arg(long, value_parser = whole::<u64>, allow_negative_numbers = true, help_heading = "Experiment")]
     seed: Option<u64>,
     /// Random numbers: the paper's drand48, its alternative the Mersenne Twister, or counter-based
     /// [default: rand48]
@@ -46,18 +46,18 @@ pub(super) struct RunArgs {
     rng: Option<RngArg>,
 
     /// Radius of the density estimate, metres [default: 0.05; 0.025 with --preset rounds]
-    #[arg(long, allow_negative_numbers = true, help_heading = "Estimate")]
+    #[arg(long, value_parser = number::<f64>, allow_negative_numbers = true, help_heading = "Estimate")]
     radius: Option<f64>,
     /// Photons within the radius, a round, that count as full illumination [default: 90 for every
     /// 5000 photons; 10 with --preset rounds]
-    #[arg(long, allow_negative_numbers = true, help_heading = "Estimate")]
+    #[arg(long, value_parser = number::<f64>, allow_negative_numbers = true, help_heading = "Estimate")]
     full_light: Option<f64>,
     /// How photons near a point are found: step through all, or look into a sorted grid; the result
     /// is the same to the bit [default: grid]
     #[arg(long, value_enum, help_heading = "Estimate")]
     gather: Option<GatherArg>,
     /// Texels along each side of a wall [default: 64]
-    #[arg(long, help_heading = "Estimate")]
+    #[arg(long, value_parser = whole::<u32>, allow_negative_numbers = true, help_heading = "Estimate")]
     mesh: Option<u32>,
     /// Divide irradiance and radiosity by the part of the disc that lies on the wall; the paper's
     /// illumination stays as it is [default: on]
@@ -70,7 +70,7 @@ pub(super) struct RunArgs {
     emission: Option<EmissionArg>,
     /// Phong exponent of all walls, or five of them for left,right,floor,ceiling,back [default: none,
     /// Lambertian; 2 with --preset phong, 5 with --preset rounds]
-    #[arg(long, value_name = "N|N,N,N,N,N", value_parser = shininess, allow_negative_numbers = true, help_heading = "Scene")]
+    #[arg(long, value_name = "N|N,N,N,N,N", value_parser = shininess, allow_hyphen_values = true, help_heading = "Scene")]
     shininess: Option<[f32; 5]>,
     /// Direction that the Phong weight compares with the eye's: mirrored, or sampled [default: mirror]
     #[arg(long, value_enum, help_heading = "Scene")]
@@ -79,10 +79,10 @@ pub(super) struct RunArgs {
     #[arg(long, value_name = "X,Y,Z", value_parser = numbers::<f32, 3>, allow_hyphen_values = true, help_heading = "Scene")]
     eye: Option<[f32; 3]>,
     /// Share of photons that a wall reflects [default: 0.75]
-    #[arg(long, allow_negative_numbers = true, help_heading = "Scene")]
+    #[arg(long, value_parser = number::<f32>, allow_negative_numbers = true, help_heading = "Scene")]
     reflectance: Option<f32>,
     /// Radius of the two discs of light, metres [default: 0.05]
-    #[arg(long, allow_negative_numbers = true, help_heading = "Scene")]
+    #[arg(long, value_parser = number::<f64>, allow_negative_numbers = true, help_heading = "Scene")]
     light_radius: Option<f64>,
     /// Power of the floor's and the left wall's light, watts [default: 1,1]
     #[arg(long, value_name = "W,W", value_parser = numbers::<f64, 2>, allow_hyphen_values = true, help_heading = "Scene")]
@@ -94,10 +94,10 @@ pub(super) struct RunArgs {
     #[arg(long, value_name = "N|all", value_parser = threads, help_heading = "Device")]
     threads: Option<usize>,
     /// Invocations of a work group [default: 128]
-    #[arg(long, help_heading = "Device")]
+    #[arg(long, value_parser = whole::<u32>, allow_negative_numbers = true, help_heading = "Device")]
     group_size: Option<u32>,
     /// Most photons traced at once; the result is the same to the bit [default: what the device holds]
-    #[arg(long, help_heading = "Device")]
+    #[arg(long, value_parser = whole::<u32>, allow_negative_numbers = true, help_heading = "Device")]
     chunk: Option<u32>,
 
     /// Picture of the box: .png shows illumination 0 to 1, .exr keeps it unclamped
@@ -151,6 +151,15 @@ fn numbers<T: std::str::FromStr + Copy + Default, const N: usize>(text: &str) ->
         return Err(wanted);
     }
     parts.try_into().map_err(|_| wanted)
+}
+
+/// A whole number, with what is allowed in words; its range is the settings' affair.
+fn whole<T: std::str::FromStr>(text: &str) -> std::result::Result<T, String> {
+    text.parse().map_err(|_| format!("must be a whole number, at most {}", (1u128 << (8 * size_of::<T>())) - 1))
+}
+
+fn number<T: std::str::FromStr>(text: &str) -> std::result::Result<T, String> {
+    text.parse().map_err(|_| "must be a number".to_owned())
 }
 
 fn shininess(text: &str) -> std::result::Result<[f32; 5], String> {

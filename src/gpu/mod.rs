@@ -89,7 +89,10 @@ pub(crate) fn call<T>(name: &'static str, result: ash::prelude::VkResult<T>) -> 
 impl Gpu {
     /// Opens a device and runs the start-up check on it.
     pub fn open(options: &Options) -> Result<Gpu> {
-        let (entry, instance, messages) = device::instance(options.validate)?;
+        let (entry, instance, messages) = device::instance(options.validate).map_err(|error| match (error, &options.device) {
+            (Error::NoVulkan { reason }, Some(wanted)) => Error::DeviceAbsent { wanted: wanted.clone(), present: format!("none ({reason})") },
+            (error, _) => error,
+        })?;
         let opened = device::choose(&instance, options.device.as_deref())
             .and_then(|(physical, facts)| device::create(&instance, physical, &facts).map(|(device, queue)| (physical, facts, device, queue)));
         let (physical_device, mut facts, device, queue) = match opened {

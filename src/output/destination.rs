@@ -29,7 +29,10 @@ impl Destination {
             Some(folder) if !folder.as_os_str().is_empty() => folder,
             _ => Path::new("."),
         };
-        let file = temporary_in(folder).map_err(|error| refuse(error.to_string()))?;
+        if !folder.is_dir() {
+            return Err(refuse(format!("there is no folder {}", folder.display())));
+        }
+        let file = temporary_in(folder).map_err(|error| refuse(error.kind().to_string()))?;
         Ok(Destination { option, path: path.to_owned(), file })
     }
 
@@ -64,7 +67,7 @@ pub struct Folder {
 
 impl Folder {
     pub fn open(option: &'static str, path: &Path) -> Result<Folder> {
-        let refuse = |error: std::io::Error| Error::Output { option, path: path.to_owned(), reason: error.to_string() };
+        let refuse = |error: std::io::Error| Error::Output { option, path: path.to_owned(), reason: error.kind().to_string() };
         let made = !path.exists();
         std::fs::create_dir_all(path).map_err(refuse)?;
         let folder = Folder { option, path: path.to_owned(), made };

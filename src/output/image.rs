@@ -142,7 +142,7 @@ fn mix(a: f64, b: f64, t: f64) -> f64 {
 }
 
 /// Eyes, in half widths of the box from its centre, all in front of the opening.
-const VIEWS: [[f64; 3]; 4] = [[0.0, 0.0, 4.2], [1.9, 1.3, 3.6], [-1.9, 1.3, 3.6], [1.2, -2.0, 3.5]];
+const VIEWS: [[f64; 3]; 4] = [[0.0, 0.0, 4.2], [1.7, 1.2, 4.2], [-1.7, 1.2, 4.2], [1.2, -1.8, 4.2]];
 
 /// Only the insides of walls are drawn, so that a wall between eye and box does not hide it.
 fn perspective(scene: &Scene, walls: &[WallEstimate], eye: [f64; 3], pixels: usize) -> Picture {
@@ -152,8 +152,8 @@ fn perspective(scene: &Scene, walls: &[WallEstimate], eye: [f64; 3], pixels: usi
     let forward = (centre - eye).normalize();
     let right = forward.cross(DVec3::Y).normalize();
     let up = right.cross(forward);
-    // Wide enough for the sphere around the box.
-    let half_width = 1.12 * half * 3f64.sqrt() / (eye - centre).length();
+    // Wide enough for the box from every eye above.
+    let half_width = 1.4 * half / (eye - centre).length();
 
     let textures = Texture::of_walls(scene, walls);
     let seen = |x: f64, y: f64| {
@@ -254,7 +254,7 @@ mod tests {
         // Straight in front, the back wall is in the middle, the floor below, the left wall left.
         let front = perspective(&scene, &walls, VIEWS[0], 64);
         let at = |i: usize, j: usize| (front.values[j * 64 + i] * 10.0).round() as usize;
-        assert_eq!([at(32, 32), at(12, 32), at(51, 32), at(32, 51), at(32, 12)], [5, 1, 2, 3, 4]);
+        assert_eq!([at(32, 32), at(8, 32), at(55, 32), at(32, 55), at(32, 8)], [5, 1, 2, 3, 4]);
     }
 
     #[test]

@@ -1,0 +1,185 @@
+//! What the integration tests share: a validated device, runs that nobody cancels, and checks that
+//! say what is wrong instead of only that something is.
+//!
+//! `PHOTONMILL_DEVICE` names the device by index or part of its name. Without any Vulkan device a
+//! test fails, unless `PHOTONMILL_NO_GPU=1` says that there is none on purpose.
+#![allow(dead_code, reason = "every test file takes its part")]
+
+pub mod reference;
+
+use std::ops::Deref;
+use std::sync::atomic::AtomicBool;
+
+use photonmill::cpu;
+use photonmill::gpu::{Constants, Gpu, Options};
+use photonmill::plan::{Limits, Plan};
+use photonmill::records::{Path, Photon};
+use photonmill::render::{self, Control, Outcome};
+use photonmill::scene::Scene;
+use photonmill::scene::open_box::open_box;
+use photonmill::settings::Settings;
+
+/// A device under the validation layer, which must not have said a word by the end of the test.
+pub struct Device(Gpu);
+
+impl Deref for Device {
+    type Target = Gpu;
+
+    fn deref(&self) -> &Gpu {
+        &self.0
+    }
+}
+
+impl Drop for Device {
+    fn drop(&mut self) {
+        // A test that fails already says why.
+        if !std::thread::panicking() {
+            self.0.check_validation().unwrap();
+        }
+    }
+}
+
+/// The device of the tests; `None` where `PHOTONMILL_NO_GPU=1` asks to go without.
+pub fn device() -> Option<Device> {
+    device_with(Options::default())
+}
+
+/// The same with some of its abilities masked off.
+pub fn device_with(options: Options) -> Option<Device> {
+    open(options).map(Device)
+}
+
+/// The same without the promise that validation stays silent, for tests that make it speak.
+pub fn open(options: Options) -> Option<Gpu> {
+    if std::env::var("PHOTONMILL_NO_GPU").is_ok_and(|value| value == "1") {
+        eprintln!("SKIPPED: PHOTONMILL_NO_GPU=1, so nothing that needs a GPU was tested here");
+        return None;
+    }
+    let options = Options { device: std::env::var("PHOTONMILL_DEVICE").ok(), validate: true, ..options };
+    match Gpu::open(&options) {
+        Ok(gpu) => Some(gpu),
+        Err(error) => panic!("{error}; set PHOTONMILL_NO_GPU=1 to test without a GPU"),
+    }
+}
+
+/// Runs the open box on a device to its end.
+pub fn run(gpu: &Gpu, settings: &Settings) -> Outcome {
+    run_scene(gpu, &open_box(settings), settings)
+}
+
+/// Runs a scene on a device to its end.
+pub fn run_scene(gpu: &Gpu, scene: &Scene, settings: &Settings) -> Outcome {
+    let never = AtomicBool::new(false);
+    let mut control = Control { cancelled: &never, progress: &mut |_, _| {} };
+    render::on_gpu(gpu, scene, settings, &mut control).unwrap_or_else(|error| panic!("{error}\n{settings:?}"))
+}
+
+/// Runs the open box on the CPU builder to its end.
+pub fn run_on_cpu(settings: &Settings) -> Outcome {
+    run_scene_on_cpu(&open_box(settings), settings)
+}
+
+/// Runs a scene on the CPU builder to its end.
+pub fn run_scene_on_cpu(scene: &Scene, settings: &Settings) -> Outcome {
+    let never = AtomicBool::new(false);
+    let mut control = Control { cancelled: &never, progress: &mut |_, _| {} };
+    render::on_cpu(scene, settings, &mut control).unwrap_or_else(|error| panic!("{error}\n{settings:?}"))
+}
+
+/// Photons of round 0 of the open box, as a builder of the device stores them.
+pub fn photons(gpu: &Gpu, settings: &Settings) -> Vec<Photon> {
+    render::photons_on_gpu(gpu, &open_box(settings), settings).unwrap_or_else(|error| panic!("{error}\n{settings:?}"))
+}
+
+/// The same from the CPU builder.
+pub fn photons_on_cpu(settings: &Settings) -> Vec<Photon> {
+    render::photons_on_cpu(&open_box(settings), settings).unwrap_or_else(|error| panic!("{error}\n{settings:?}"))
+}
+
+/// What a device would do with these settings.
+pub fn plan_for(gpu: &Gpu, scene: &Scene, settings: &Settings) -> Plan {
+    Plan::new(scene, settings, &render::limits(gpu.facts())).unwrap()
+}
+
+/// What the CPU builder would do with these settings.
+pub fn plan_for_host(settings: &Settings) -> Plan {
+    Plan::new(&open_box(settings), settings, &Limits::of_host()).unwrap()
+}
+
+/// Specialization constants for tests that dispatch kernels on their own.
+pub fn constants_for(plan: &Plan) -> Constants {
+    let settings = &plan.settings;
+    Constants::new(settings.group_size)
+        .set("RNG", settings.rng.code())
+        .set("EMISSION_LAW", settings.emission.code())
+        .set("HAS_PHONG", u32::from(settings.has_phong()))
+        .set("PHONG_DIRECTION", settings.phong_direction.code())
+        .set("HAS_SLOTS", u32::from(plan.has_slots()))
+        .set("CHANNEL_COUNT", plan.channel_count)
+}
+
+/// Paths of the first chunk of round 0 as they leave their lights.
+pub fn emitted_paths(scene: &Scene, plan: &Plan) -> Vec<Path> {
+    cpu::trace::Tracer::new(scene, plan).emit(0, &plan.chunk(0))
+}
+
+/// Sorted by photon and bounce, which no two entries of a photon map share.
+pub fn in_order(mut photons: Vec<Photon>) -> Vec<Photon> {
+    photons.sort_by_key(|photon| (photon.photon, photon.bounce));
+    photons
+}
+
+/// `Err` holds the complaint.
+pub type Check = Result<(), String>;
+
+/// Fails unless `check` complains.
+pub fn assert_complains(what: &str, check: Check) {
+    if check.is_ok() {
+        panic!("the check did not complain about {what}");
+    }
+}
+
+/// Fails with the check's complaint and what it was about.
+pub fn assert_holds(what: impl std::fmt::Display, check: Check) {
+    if let Err(complaint) = check {
+        panic!("{what}: {complaint}");
+    }
+}
+
+/// Standard errors that a statistical test allows: a false alarm in 1.7 million checks, and with its
+/// fixed seed a test that passes once passes always.
+pub const Z_LIMIT: f64 = 5.0;
+
+/// A mean against its expected value.
+pub fn z_check(what: &str, measured: f64, expected: f64, standard_error: f64) -> Check {
+    let z = (measured - expected) / standard_error;
+    // Written so that NaN complains.
+    if z.abs() <= Z_LIMIT {
+        return Ok(());
+    }
+    Err(format!("{what}: {measured} where {expected} +- {standard_error:.3e} is right, z = {z:.2}"))
+}
+
+/// `count` of `trials` against its probability, by the binomial standard error.
+pub fn share_check(what: &str, count: u64, trials: u64, probability: f64) -> Check {
+    let share = count as f64 / trials as f64;
+    z_check(what, share, probability, (probability * (1.0 - probability) / trials as f64).sqrt())
+}
+
+/// Two lists of integers, place by place.
+pub fn equal_sums(what: &str, found: &[u64], expected: &[u64]) -> Check {
+    if found.len() != expected.len() {
+        return Err(format!("{what}: {} sums instead of {}", found.len(), expected.len()));
+    }
+    let differing: Vec<usize> = (0..found.len()).filter(|&place| found[place] != expected[place]).collect();
+    match differing.first() {
+        None => Ok(()),
+        Some(&first) => Err(format!(
+            "{what}: {} of {} sums differ, the first at {first}: {} instead of {}",
+            differing.len(),
+            found.len(),
+            found[first],
+            expected[first]
+        )),
+    }
+}
