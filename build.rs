@@ -30,9 +30,11 @@ fn main() {
     kernels.sort();
 
     let compiler = Compiler::new().expect("shaderc starts");
-    let mut failures = String::new();
+    // A fault in a shared file is found by every kernel that includes it, and shown once.
+    let mut failures = BTreeSet::new();
     let mut structs = String::new();
     let mut layouts = String::new();
+    let mut max_buffers = 0;
     for path in &kernels {
         match compile(&compiler, &glsl, path) {
             Ok(words) => {
@@ -40,17 +42,19 @@ fn main() {
                 let bytes: Vec<u8> = words.iter().flat_map(|word| word.to_le_bytes()).collect();
                 fs::write(out.join(format!("{name}.spv")), bytes).expect("OUT_DIR can be written");
                 let kernel = reflect(&words);
+                max_buffers = max_buffers.max(kernel.buffers.len());
                 write_kernel(&mut structs, &name, &kernel);
                 write_layouts(&mut layouts, &name, &kernel);
             }
-            Err(message) => failures.push_str(&message),
+            Err(message) => drop(failures.insert(message)),
         }
     }
     if !failures.is_empty() {
-        eprintln!("{failures}");
+        failures.iter().for_each(|message| eprint!("{message}"));
         std::process::exit(1);
     }
-    let source = format!("{structs}\n/// Every struct in a buffer or push-constant block of a kernel.\npub const STRUCTS: &[(&str, ReflectedStruct)] = &[\n{layouts}];\n");
+    let buffer_count = format!("/// Storage buffers that the kernel with the most of them binds.\npub const MAX_BUFFERS: u32 = {max_buffers};\n");
+    let source = format!("{structs}\n{buffer_count}\n/// Every struct in a buffer or push-constant block of a kernel.\npub const STRUCTS: &[(&str, ReflectedStruct)] = &[\n{layouts}];\n");
     fs::write(out.join("kernels.rs"), source).expect("OUT_DIR can be written");
 }
 
@@ -197,6 +201,8 @@ fn write_kernel(source: &mut String, name: &str, kernel: &Kernel) {
         writeln!(source, "            (\"{constant}\", {id}),").unwrap();
     }
     writeln!(source, "        ],\n    }};\n").unwrap();
+    // The least that a Vulkan device may offer.
+    writeln!(source, "    const FITS: () = assert!(size_of::<{push}>() <= 128, \"push constants of {name}\");\n").unwrap();
     writeln!(source, "    fn buffers(&self) -> Vec<&Buffer> {{").unwrap();
     let fields: Vec<String> = kernel.buffers.iter().map(|buffer| format!("self.{}", buffer.name)).collect();
     writeln!(source, "        vec![{}]\n    }}\n}}\n", fields.join(", ")).unwrap();

@@ -1,10 +1,55 @@
-//! Photon mapping on any Vulkan GPU.
+//! Photon mapping on any Vulkan GPU: GLSL compute kernels on raw Vulkan, results that are the same to
+//! the bit however the work is split, and a ledger of every photon.
+//!
+//! # The straight line
+//!
+//! ```text
+//! scene -> plan -> resources -> trace -> index -> estimate -> film -> output
+//! what     which   bytes on     photons  cells,   flux per    sums    images,
+//! is lit   effects the device   of hits  sorted   point               report
+//! ```
+//!
+//! [`render`] is that line on one page; each stage hands a value to the next and none calls back. A
+//! module uses only what stands to its left:
+//!
+//! ```text
+//! constants, records, error, ledger, rng, settings, timings < scene < plan < cpu
+//! constants, records, error, ledger, timings < gpu
+//! plan, gpu < resources < trace < index < estimate < film < render < output < paper < cli
+//! ```
+//!
+//! [`gpu`] knows no photon; [`scene`] and [`plan`] know no Vulkan; `tests/architecture.rs` checks it.
+//!
+//! # What never changes by accident
+//!
+//! - **A photon is (seed, round, number).** Its random numbers ([`rng`]) follow from these alone, so
+//!   every builder, thread count and split traces the same photons.
+//! - **Sums are integers.** The film ([`film`]) is 64-bit fixed point with a scale that cannot
+//!   overflow ([`plan`]), so the order of additions does not matter.
+//! - **The ledger closes.** emitted = absorbed + escaped + cut off + dropped, and nothing is ever
+//!   dropped ([`ledger`]): the plan splits what does not fit.
+//! - **Nothing in world units.** No epsilon anywhere: a path leaves its own wall by the wall's number
+//!   ([`cpu::room`]).
+//!
+//! # What is estimated
+//!
+//! As in the paper, a photon is stored where a wall *reflects* it. So the density of stored photons
+//! estimates the reflected flux, the radiosity; the irradiance is that over the wall's albedo.
+//!
+//! # Rust and GLSL in step
+//!
+//! `build.rs` compiles each kernel of `glsl/kernels`, reflects it, and writes a struct whose fields
+//! are its buffers ([`gpu::kernels`]), so that a dispatch names every buffer. Records stand in
+//! [`records`] and `glsl/records.glsl`; `tests/layout.rs` compares them. Numbers that both languages
+//! need stand in [`constants`] only. Every GLSL function of transport has a Rust twin under [`cpu`].
+
 pub mod cli;
 pub mod constants;
 pub mod cpu;
 pub mod error;
 pub mod estimate;
 pub mod film;
+#[expect(unsafe_code, reason = "Vulkan's functions are unsafe; nothing outside this module is")]
 pub mod gpu;
 pub mod index;
 pub mod ledger;

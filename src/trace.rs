@@ -110,7 +110,7 @@ const TIMESTAMP_RESERVE: u32 = 64;
 
 /// Timestamps after which a chunk need not submit on its own account.
 pub fn timestamps_per_chunk(plan: &Plan) -> u32 {
-    (2 * plan.settings.bounces + TIMESTAMP_RESERVE).min(4 * TIMESTAMP_RESERVE)
+    (6 * plan.settings.bounces + TIMESTAMP_RESERVE).min(4 * TIMESTAMP_RESERVE)
 }
 
 /// Entries of the photon map that a chunk uses: all slots, or as many as there is room for.
@@ -127,7 +127,7 @@ fn one_bounce(
     push: &TracePush,
 ) -> Result<()> {
     let [even, odd] = &resources.paths;
-    let (paths, next_paths) = if push.bounce % 2 == 0 { (even, odd) } else { (odd, even) };
+    let (paths, next_paths) = if push.bounce.is_multiple_of(2) { (even, odd) } else { (odd, even) };
     // Every photon enters bounce 0, and the naive builder looks at every slot each time. After that
     // only the device knows how many paths are left.
     let extent = if push.bounce == 0 || compaction == Compaction::Slots {

@@ -47,11 +47,14 @@ struct DeviceArgs {
     /// Turn on the Vulkan validation layer with synchronisation validation; any message is an error
     #[arg(long)]
     validate: bool,
+    /// Time every dispatch on the device, not only every pass
+    #[arg(long)]
+    time_dispatches: bool,
 }
 
 impl DeviceArgs {
     fn options(&self) -> Options {
-        Options { device: self.device.clone(), validate: self.validate, ..Options::default() }
+        Options { device: self.device.clone(), validate: self.validate, time_dispatches: self.time_dispatches, ..Options::default() }
     }
 
     /// The device, or `None` after one line on stderr if there is no Vulkan and none was asked for.

@@ -140,6 +140,14 @@ impl<'gpu> Commands<'gpu> {
 
     /// Runs a kernel on its buffers.
     pub fn dispatch<K: Kernel>(&mut self, kernel: K, push: &K::Push, extent: Extent) -> Result<()> {
+        if self.gpu.time_dispatches {
+            return self.scope(K::MODULE.name, |commands| commands.record_dispatch(kernel, push, extent));
+        }
+        self.record_dispatch(kernel, push, extent)
+    }
+
+    fn record_dispatch<K: Kernel>(&mut self, kernel: K, push: &K::Push, extent: Extent) -> Result<()> {
+        let () = K::FITS;
         let module = K::MODULE;
         let buffers = kernel.buffers();
         let pipeline = self.gpu.pipeline(&module, &self.constants)?;

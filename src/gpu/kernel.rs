@@ -17,6 +17,8 @@ pub trait Kernel {
     /// Record behind the push constants; `()` if there are none.
     type Push: Pod;
     const MODULE: Module;
+    /// Fails to compile if the push constants exceed what every device allows.
+    const FITS: ();
     /// In the order of `MODULE.bindings`.
     fn buffers(&self) -> Vec<&Buffer>;
 }

@@ -40,6 +40,8 @@ pub struct Options {
     pub device: Option<String>,
     /// Validation layer with synchronisation validation.
     pub validate: bool,
+    /// Time every dispatch beside every pass; each costs two more timestamps.
+    pub time_dispatches: bool,
     /// Behave as on a device without timestamps.
     pub without_timestamps: bool,
     /// Behave as on a device without 64-bit atomics.
@@ -49,6 +51,7 @@ pub struct Options {
 /// An open device.
 pub struct Gpu {
     facts: DeviceFacts,
+    time_dispatches: bool,
     queue: vk::Queue,
     pipelines: RefCell<HashMap<kernel::PipelineKey, Rc<kernel::Pipeline>>>,
     cache: kernel::DiskCache,
@@ -129,7 +132,7 @@ impl Gpu {
             _entry: entry,
         });
         let cache = kernel::DiskCache::open(&context, &facts)?;
-        let gpu = Gpu { facts, queue, pipelines: RefCell::default(), cache, context };
+        let gpu = Gpu { facts, time_dispatches: options.time_dispatches, queue, pipelines: RefCell::default(), cache, context };
         check::run(&gpu)?;
         Ok(gpu)
     }

@@ -152,8 +152,13 @@ fn perspective(scene: &Scene, walls: &[WallEstimate], eye: [f64; 3], pixels: usi
     let forward = (centre - eye).normalize();
     let right = forward.cross(DVec3::Y).normalize();
     let up = right.cross(forward);
-    // Wide enough for the box from every eye above.
-    let half_width = 1.4 * half / (eye - centre).length();
+    // The picture fits the corner that stands out most.
+    let reach = |corner: usize| {
+        let side = |axis: usize| if corner >> axis & 1 == 1 { scene.max_corner[axis] } else { scene.min_corner[axis] };
+        let from_eye = DVec3::new(side(0), side(1), side(2)) - eye;
+        from_eye.dot(right).abs().max(from_eye.dot(up).abs()) / from_eye.dot(forward)
+    };
+    let half_width = 1.03 * (0..8).map(reach).fold(0.0, f64::max);
 
     let textures = Texture::of_walls(scene, walls);
     let seen = |x: f64, y: f64| {

@@ -1,0 +1,223 @@
+//! The program as a user meets it: refusals in one line with exit code 2, outputs whole or not at
+//! all, the CPU builder where there is no Vulkan, and Ctrl-C.
+
+use std::path::Path;
+use std::process::{Command, Output, Stdio};
+use std::time::{Duration, Instant};
+
+use serde_json::Value;
+
+/// The program, run in a folder of its own.
+fn photonmill(folder: &Path, arguments: &[&str]) -> Command {
+    let mut command = Command::new(env!("CARGO_BIN_EXE_photonmill"));
+    command.current_dir(folder).args(arguments).stdin(Stdio::null());
+    command
+}
+
+fn run(folder: &Path, arguments: &[&str]) -> Output {
+    photonmill(folder, arguments).output().expect("the program starts")
+}
+
+/// Arguments that choose the device under test, with the validation layer on.
+fn on_device(arguments: &[&'static str]) -> Vec<String> {
+    let mut all: Vec<String> = arguments.iter().map(ToString::to_string).collect();
+    if std::env::var_os("PHOTONMILL_NO_GPU").is_none() {
+        all.push("--validate".into());
+    }
+    if let Ok(device) = std::env::var("PHOTONMILL_DEVICE") {
+        all.extend(["--device".into(), device]);
+    }
+    all
+}
+
+fn run_on_device(folder: &Path, arguments: &[&'static str]) -> Output {
+    let arguments = on_device(arguments);
+    run(folder, &arguments.iter().map(String::as_str).collect::<Vec<_>>())
+}
+
+fn text(bytes: &[u8]) -> String {
+    String::from_utf8_lossy(bytes).into_owned()
+}
+
+fn json(path: &Path) -> Value {
+    serde_json::from_slice(&std::fs::read(path).expect("the report was written")).expect("the report is JSON")
+}
+
+fn entries(folder: &Path) -> Vec<String> {
+    std::fs::read_dir(folder).unwrap().map(|entry| entry.unwrap().file_name().to_string_lossy().into_owned()).collect()
+}
+
+#[test]
+fn bad_input_is_refused_in_one_line() {
+    // Arguments, and what the line must name: option, value, what is allowed.
+    let cases: &[(&[&str], [&str; 3])] = &[
+        (&["--photons", "0"], ["--photons", "0", "from 2"]),
+        (&["--photons", "-5"], ["--photons", "-5", "whole number"]),
+        (&["--photons", "many"], ["--photons", "many", "whole number"]),
+        (&["--rounds", "0"], ["--rounds", "0", "from 1"]),
+        (&["--bounces", "0"], ["--bounces", "0", "from 1"]),
+        (&["--radius", "0"], ["--radius", "0", "0.5"]),
+        (&["--radius", "0.51"], ["--radius", "0.51", "0.5"]),
+        (&["--radius", "-0.1"], ["--radius", "-0.1", "0.5"]),
+        (&["--radius", "nan"], ["--radius", "NaN", "0.5"]),
+        (&["--radius", "inf"], ["--radius", "inf", "0.5"]),
+        (&["--full-light", "0"], ["--full-light", "0", "above 0"]),
+        (&["--shininess", "-1"], ["--shininess", "-1", "from 0 up"]),
+        (&["--shininess", "nan"], ["--shininess", "NaN", "from 0 up"]),
+        (&["--shininess", "1,2"], ["--shininess", "1,2", "left,right,floor,ceiling,back"]),
+        (&["--reflectance", "1.1"], ["--reflectance", "1.1", "0 to 1"]),
+        (&["--light-power", "1,-1"], ["--light-power", "-1", "above 0"]),
+        (&["--light-radius", "0.3"], ["--light-radius", "0.3", "0.25"]),
+        (&["--variant", "atomik"], ["--variant", "atomik", "naive, atomic, ballot, cpu"]),
+        (&["--rng", "dice"], ["--rng", "dice", "rand48, mt, philox"]),
+        (&["--rng", "mt", "--bounces", "75"], ["--bounces", "75", "74"]),
+        (&["--seed", "4294967296"], ["--seed", "4294967296", "4294967295"]),
+        (&["--group-size", "48"], ["--group-size", "48", "power of two"]),
+        (&["--threads", "0"], ["--threads", "0", "from 1"]),
+        (&["--chunk", "1"], ["--chunk", "1", "from 2"]),
+        (&["--photons", "2147483648", "--rounds", "100000"], ["--rng", "rand48", "philox"]),
+        (&["--photons", "2147483648", "--rounds", "100000", "--rng", "philox"], ["--rounds", "100000", "fewer"]),
+        (&["--device", "no such card"], ["--device", "no such card", "there is"]),
+        (&["--device", "0", "--variant", "cpu"], ["--device", "0", "leave one"]),
+        (&["--device", "999"], ["--device", "999", "there is"]),
+        (&["-o", "absent/a.png"], ["-o", "absent/a.png", "folder"]),
+        (&["-o", "a.jpg"], ["-o", "a.jpg", ".png or .exr"]),
+        (&["--json", "absent/a.json"], ["--json", "absent/a.json", "folder"]),
+        (&["--json", "."], ["--json", ".", "folder"]),
+        (&["--trace", "absent/a.json"], ["--trace", "absent/a.json", "folder"]),
+        (&["--irradiance", "/dev/null/x"], ["--irradiance", "/dev/null/x", "cannot be written"]),
+        (&["--irradiance", "i", "--reflectance", "0"], ["--reflectance", "0", "above 0"]),
+        (&["--colour"], ["--colour", "no such option", "--help"]),
+        (&["bake"], ["bake", "no such subcommand", "--help"]),
+        (&["paper"], ["--out", "required", ""]),
+        (&["paper", "--out", "/dev/null/x"], ["--out", "/dev/null/x", "cannot be written"]),
+    ];
+    let folder = tempfile::tempdir().unwrap();
+    for (arguments, named) in cases {
+        let output = run(folder.path(), arguments);
+        let stderr = text(&output.stderr);
+        assert_eq!(output.status.code(), Some(2), "{arguments:?}: {stderr}");
+        assert_eq!(stderr.trim_end().lines().count(), 1, "{arguments:?}: {stderr}");
+        assert!(stderr.starts_with("photonmill: "), "{arguments:?}: {stderr}");
+        for word in named {
+            assert!(stderr.contains(word), "{arguments:?} must name {word:?}: {stderr}");
+        }
+        assert!(output.stdout.is_empty(), "{arguments:?}: {}", text(&output.stdout));
+        assert_eq!(entries(folder.path()), Vec::<String>::new(), "{arguments:?} left something behind");
+    }
+}
+
+#[test]
+fn a_run_writes_everything_it_was_asked_for() {
+    let folder = tempfile::tempdir().unwrap();
+    let at = |name: &str| folder.path().join(name);
+    let arguments =
+        ["--variant", "atomic", "-o", "a.exr", "--json", "a.json", "--trace", "t.json", "--irradiance", "irradiance", "--radiosity", "radiosity"];
+    let output = run_on_device(folder.path(), &arguments);
+    assert!(output.status.success(), "{}", text(&output.stderr));
+    let stdout = text(&output.stdout);
+    for word in ["ledger: 5000 emitted = 2498 absorbed + 2498 escaped + 4 cut off + 0 dropped", "7511 photons stored", "bounce 15", "gather"] {
+        assert!(stdout.contains(word), "{word}: {stdout}");
+    }
+
+    let report = json(&at("a.json"));
+    let ledger = &report["ledger"];
+    let count = |fate: &str| ledger[fate].as_u64().unwrap();
+    assert_eq!(count("emitted"), count("absorbed") + count("escaped") + count("cut_off") + count("dropped"));
+    assert_eq!((count("emitted"), count("stored"), count("dropped")), (5000, 7511, 0));
+    assert_eq!(report["seed"], 1);
+    assert_eq!(report["settings"]["bounces"], 15);
+    assert!(report["device"].is_string() && report["driver"].is_string());
+    let timings = report["timings"].as_array().unwrap();
+    let named = |name: &str| timings.iter().find(|row| row["name"] == name).unwrap_or_else(|| panic!("no timing {name}: {timings:?}"));
+    for name in ["round", "round/build", "round/build/bounce 7", "round/gather"] {
+        assert_eq!(named(name)["count"], 1, "{name}");
+        if std::env::var_os("PHOTONMILL_NO_GPU").is_none() {
+            assert!(named(name)["gpu_ms"].as_f64().unwrap() > 0.0, "{name}");
+        }
+    }
+    assert!(named("round")["wall_ms"].as_f64().unwrap() > 0.0);
+
+    let trace = json(&at("t.json"));
+    let spans = trace["traceEvents"].as_array().unwrap();
+    assert!(spans.iter().any(|span| span["name"] == "gather" && span["dur"].as_f64().unwrap() > 0.0), "{spans:?}");
+
+    let layout = json(&at("irradiance/layout.json"));
+    let walls = layout["walls"].as_array().unwrap();
+    assert_eq!(walls.iter().map(|wall| wall["name"].as_str().unwrap()).collect::<Vec<_>>(), ["left", "right", "floor", "ceiling", "back"]);
+    let floor = &walls[2];
+    assert_eq!(floor["origin"], serde_json::json!([-0.25, -0.25, -0.25]));
+    assert_eq!((&floor["u"], &floor["v"]), (&serde_json::json!([0.0, 0.0, 0.5]), &serde_json::json!([0.5, 0.0, 0.0])));
+    assert_eq!((&floor["width"], &floor["height"], &floor["file"]), (&64.into(), &64.into(), &"floor.exr".into()));
+    let texels = |path: &str| image::open(at(path)).unwrap().into_rgb32f().into_raw();
+    let (irradiance, radiosity) = (texels("irradiance/floor.exr"), texels("radiosity/floor.exr"));
+    assert_eq!(irradiance.len(), 3 * 64 * 64);
+    for (irradiance, radiosity) in irradiance.iter().zip(&radiosity) {
+        assert!((radiosity - 0.75 * irradiance).abs() <= 1e-6 * irradiance, "{radiosity} {irradiance}");
+    }
+    // 2 W in a box of 1.25 m2 of walls: some watts a square metre.
+    let mean = irradiance.iter().sum::<f32>() / irradiance.len() as f32;
+    assert!((1.0..4.0).contains(&mean), "{mean}");
+    assert!(image::open(at("a.exr")).is_ok());
+}
+
+#[test]
+fn the_builders_write_the_same_picture() {
+    let folder = tempfile::tempdir().unwrap();
+    let picture = |variant: &'static str| {
+        let output = run_on_device(folder.path(), &["--variant", variant, "--rounds", "2", "--rng", "philox", "-o", "a.png"]);
+        assert!(output.status.success(), "{}", text(&output.stderr));
+        std::fs::read(folder.path().join("a.png")).unwrap()
+    };
+    let naive = picture("naive");
+    assert_eq!(naive, picture("atomic"));
+    assert_eq!(naive, picture("ballot"));
+}
+
+#[test]
+fn without_vulkan_the_cpu_builder_runs() {
+    let folder = tempfile::tempdir().unwrap();
+    // A loader that knows no driver is a machine without a device.
+    let without = |arguments: &[&str]| {
+        photonmill(folder.path(), arguments).env("VK_DRIVER_FILES", "/nonexistent").env("VK_ICD_FILENAMES", "/nonexistent").output().unwrap()
+    };
+    let output = without(&["-o", "a.png", "--json", "a.json"]);
+    let stderr = text(&output.stderr);
+    assert!(output.status.success(), "{stderr}");
+    assert_eq!(stderr.trim_end().lines().count(), 1, "{stderr}");
+    assert!(stderr.contains("no Vulkan device") && stderr.contains("CPU builder"), "{stderr}");
+    let report = json(&folder.path().join("a.json"));
+    assert_eq!((&report["device"], &report["ledger"]["stored"]), (&"cpu".into(), &7511.into()));
+
+    let refused = without(&["--device", "0"]);
+    assert_eq!(refused.status.code(), Some(2));
+    assert!(text(&refused.stderr).contains("there is none"), "{}", text(&refused.stderr));
+}
+
+#[test]
+fn an_interrupt_saves_what_is_finished() {
+    let folder = tempfile::tempdir().unwrap();
+    let arguments = on_device(&["--rounds", "4000000", "--rng", "philox", "-o", "a.png", "--json", "a.json"]);
+    let started = Instant::now();
+    let child = photonmill(folder.path(), &arguments.iter().map(String::as_str).collect::<Vec<_>>())
+        .stdout(Stdio::piped())
+        .stderr(Stdio::piped())
+        .spawn()
+        .unwrap();
+    std::thread::sleep(Duration::from_secs(2));
+    assert!(Command::new("kill").args(["-INT", &child.id().to_string()]).status().unwrap().success());
+    let output = child.wait_with_output().unwrap();
+    assert!(started.elapsed() < Duration::from_secs(60), "the run went on for {:?}", started.elapsed());
+    assert_eq!(output.status.code(), Some(130), "{}", text(&output.stderr));
+    let report = json(&folder.path().join("a.json"));
+    let emitted = report["ledger"]["emitted"].as_u64().unwrap();
+    assert!(emitted > 0 && emitted < 4_000_000 * 5000, "{emitted}");
+    assert_eq!((&report["cancelled"], &report["ledger"]["dropped"]), (&true.into(), &0.into()));
+    // The picture is that of the photons that were emitted, not a dark one.
+    let picture = image::open(folder.path().join("a.png")).unwrap().into_luma8();
+    let brightest = picture.pixels().map(|pixel| pixel.0[0]).max().unwrap();
+    assert!(brightest > 100, "{brightest}");
+    let mut names = entries(folder.path());
+    names.sort();
+    assert_eq!(names, ["a.json", "a.png"]);
+}
