@@ -53,8 +53,11 @@ fn main() {
         failures.iter().for_each(|message| eprint!("{message}"));
         std::process::exit(1);
     }
-    let buffer_count = format!("/// Storage buffers that the kernel with the most of them binds.\npub const MAX_BUFFERS: u32 = {max_buffers};\n");
-    let source = format!("{structs}\n{buffer_count}\n/// Every struct in a buffer or push-constant block of a kernel.\npub const STRUCTS: &[(&str, ReflectedStruct)] = &[\n{layouts}];\n");
+    let buffer_count =
+        format!("/// Storage buffers that the kernel with the most of them binds.\npub const MAX_BUFFERS: u32 = {max_buffers};\n");
+    let source = format!(
+        "{structs}\n{buffer_count}\n/// Every struct in a buffer or push-constant block of a kernel.\npub const STRUCTS: &[(&str, ReflectedStruct)] = &[\n{layouts}];\n"
+    );
     fs::write(out.join("kernels.rs"), source).expect("OUT_DIR can be written");
 }
 
@@ -79,9 +82,8 @@ fn compile(compiler: &Compiler, glsl: &Path, path: &Path) -> Result<Vec<u32>, St
         Ok(ResolvedInclude { resolved_name: format!("glsl/{name}"), content })
     });
     let shown = path.strip_prefix(glsl.parent().expect("glsl lies in the package")).unwrap_or(path).display().to_string();
-    let artifact = compiler
-        .compile_into_spirv(&source, ShaderKind::Compute, &shown, "main", Some(&options))
-        .map_err(|error| error.to_string())?;
+    let artifact =
+        compiler.compile_into_spirv(&source, ShaderKind::Compute, &shown, "main", Some(&options)).map_err(|error| error.to_string())?;
     println!("cargo:rerun-if-changed={}", path.display());
     for file in included.borrow().iter() {
         println!("cargo:rerun-if-changed={}", file.display());
@@ -108,19 +110,13 @@ struct Kernel {
 }
 
 fn reflect(words: &[u32]) -> Kernel {
-    let entry_points = ReflectConfig::new()
-        .spv(words)
-        .ref_all_rscs(true)
-        .reflect()
-        .expect("spirq reads what shaderc wrote");
+    let entry_points = ReflectConfig::new().spv(words).ref_all_rscs(true).reflect().expect("spirq reads what shaderc wrote");
     let mut kernel = Kernel::default();
     for variable in &entry_points[0].vars {
         match variable {
             Variable::Descriptor { desc_bind, desc_ty: DescriptorType::StorageBuffer(_), ty, .. } => {
                 let Type::Struct(block) = ty else { panic!("a storage buffer that is no block: {ty:?}") };
-                let [member] = block.members.as_slice() else {
-                    panic!("a buffer block holds one array: {block:?}")
-                };
+                let [member] = block.members.as_slice() else { panic!("a buffer block holds one array: {block:?}") };
                 kernel.buffers.push(Buffer {
                     name: member.name.clone().expect("buffers have names"),
                     set: desc_bind.set(),
@@ -135,12 +131,8 @@ fn reflect(words: &[u32]) -> Kernel {
                 }
             }
             Variable::PushConstant { ty: Type::Struct(block), .. } => {
-                let [member] = block.members.as_slice() else {
-                    panic!("a push-constant block holds one record: {block:?}")
-                };
-                let Type::Struct(record) = &member.ty else {
-                    panic!("a push-constant block holds one record: {block:?}")
-                };
+                let [member] = block.members.as_slice() else { panic!("a push-constant block holds one record: {block:?}") };
+                let Type::Struct(record) = &member.ty else { panic!("a push-constant block holds one record: {block:?}") };
                 kernel.push = Some(record.clone());
                 kernel.records.push(record.clone());
             }
@@ -194,7 +186,8 @@ fn write_kernel(source: &mut String, name: &str, kernel: &Kernel) {
     for Buffer { name, set, binding, access } in &kernel.buffers {
         let reads = *access != AccessType::WriteOnly;
         let writes = *access != AccessType::ReadOnly;
-        writeln!(source, "            Binding {{ name: \"{name}\", set: {set}, binding: {binding}, reads: {reads}, writes: {writes} }},").unwrap();
+        writeln!(source, "            Binding {{ name: \"{name}\", set: {set}, binding: {binding}, reads: {reads}, writes: {writes} }},")
+            .unwrap();
     }
     writeln!(source, "        ],\n        constants: &[").unwrap();
     for (constant, id) in &kernel.constants {
@@ -225,10 +218,7 @@ fn write_layouts(source: &mut String, kernel_name: &str, kernel: &Kernel) {
                 format!("Field {{ name: \"{field}\", kind: \"{kind}\", offset: {offset} }}, ")
             })
             .collect();
-        writeln!(
-            source,
-            "    (\"{kernel_name}\", ReflectedStruct {{ name: \"{name}\", stride_bytes: {stride:?}, fields: &[{fields}] }}),"
-        )
-        .unwrap();
+        writeln!(source, "    (\"{kernel_name}\", ReflectedStruct {{ name: \"{name}\", stride_bytes: {stride:?}, fields: &[{fields}] }}),")
+            .unwrap();
     }
 }

@@ -30,7 +30,9 @@ pub enum Error {
     DeviceLacks { device: String, what: String },
 
     /// A device fails the start-up check.
-    #[error("{device}: fails the start-up check, so its results could not be trusted: {what} (loops are kept to {LOOP_LIMIT} iterations); update its driver, or choose another with --device")]
+    #[error(
+        "{device}: fails the start-up check, so its results could not be trusted: {what} (loops are kept to {LOOP_LIMIT} iterations); update its driver, or choose another with --device"
+    )]
     DeviceWrong { device: String, what: String },
 
     /// A Vulkan call failed.
@@ -42,7 +44,9 @@ pub enum Error {
     LedgerOpen { ledger: Ledger },
 
     /// The validation layer was asked for and is not installed.
-    #[error("--validate: the layer VK_LAYER_KHRONOS_validation is not installed; install the Vulkan validation layers, or leave --validate out")]
+    #[error(
+        "--validate: the layer VK_LAYER_KHRONOS_validation is not installed; install the Vulkan validation layers, or leave --validate out"
+    )]
     NoValidationLayer,
 
     /// The validation layer complained.

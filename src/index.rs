@@ -18,8 +18,10 @@ pub fn modules(plan: &Plan) -> Vec<Module> {
 }
 
 /// Sorts the photon map into cell order.
-pub fn build(commands: &mut Commands, resources: &Resources, index: &IndexBuffers, plan: &Plan, photon_count: u32) -> Result<()> {
-    let Resources { photons, counters, dispatch_args, .. } = resources;
+///
+/// Does nothing where the plan has no index.
+pub fn build(commands: &mut Commands, resources: &Resources, plan: &Plan, photon_count: u32) -> Result<()> {
+    let Resources { photons, counters, dispatch_args, index: Some(index), .. } = resources else { return Ok(()) };
     let IndexBuffers { cells, block_sums, sorted_photons, .. } = index;
     let push = plan.grid.index_push(photon_list_capacity(plan, photon_count));
     let extent = || if plan.has_slots() { Extent::Items(u64::from(push.photon_capacity)) } else { Extent::Indirect(dispatch_args) };
@@ -38,9 +40,7 @@ pub fn build(commands: &mut Commands, resources: &Resources, index: &IndexBuffer
             commands.dispatch(CellCount { photons, counters, cells }, &push, extent())
         })?;
         commands.scope("scan", |commands| scan(commands, cells, block_sums, plan.grid.cells(), plan.settings.group_size))?;
-        commands.scope("sort", |commands| {
-            commands.dispatch(CellScatter { photons, counters, cells, sorted_photons }, &push, extent())
-        })
+        commands.scope("sort", |commands| commands.dispatch(CellScatter { photons, counters, cells, sorted_photons }, &push, extent()))
     })
 }
 

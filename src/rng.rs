@@ -55,10 +55,7 @@ impl Affine48 {
 
     /// First `self`, then `next`.
     fn then(self, next: Affine48) -> Affine48 {
-        Affine48 {
-            multiplier: next.multiplier.wrapping_mul(self.multiplier) & MASK48,
-            increment: next.apply(self.increment),
-        }
+        Affine48 { multiplier: next.multiplier.wrapping_mul(self.multiplier) & MASK48, increment: next.apply(self.increment) }
     }
 
     /// `count` steps at once, by repeated squaring.

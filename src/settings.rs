@@ -180,9 +180,7 @@ impl Settings {
             Preset::Modified => modified,
             Preset::Naive => Settings { variant: Variant::Naive, bounces: 2, ..modified },
             Preset::Phong => Settings { shininess: [Some(2.0); 5], ..modified },
-            Preset::Rounds => {
-                Settings { rounds: 100, radius: 0.025, full_light: 10.0, shininess: [Some(5.0); 5], ..modified }
-            }
+            Preset::Rounds => Settings { rounds: 100, radius: 0.025, full_light: 10.0, shininess: [Some(5.0); 5], ..modified },
         }
     }
 
@@ -231,10 +229,18 @@ impl Settings {
         let weakest_share = self.light_power.iter().fold(f64::INFINITY, |a, b| a.min(*b)) / self.light_power.iter().sum::<f64>();
         if weakest_share < 1e-6 {
             let [floor, left] = self.light_power;
-            return Err(Error::setting("--light-power", format!("{floor},{left}"), "the weaker light must have a millionth of all power or more"));
+            return Err(Error::setting(
+                "--light-power",
+                format!("{floor},{left}"),
+                "the weaker light must have a millionth of all power or more",
+            ));
         }
         if !(self.light_radius > 0.0 && self.light_radius <= HALF_WIDTH) {
-            return Err(Error::setting("--light-radius", self.light_radius, format!("must be above 0 and at most {HALF_WIDTH} metres, so that the disc fits its wall")));
+            return Err(Error::setting(
+                "--light-radius",
+                self.light_radius,
+                format!("must be above 0 and at most {HALF_WIDTH} metres, so that the disc fits its wall"),
+            ));
         }
         if !(0.0..=1.0).contains(&self.reflectance) {
             return Err(Error::setting("--reflectance", self.reflectance, "must be from 0 to 1"));
@@ -285,7 +291,11 @@ impl Settings {
             Rng::Mt => {
                 let most = rng::MT_MAX_BOUNCES;
                 if self.bounces > most {
-                    return Err(Error::setting("--bounces", self.bounces, format!("must be at most {most} with --rng mt, whose streams hold 227 numbers; use --rng philox")));
+                    return Err(Error::setting(
+                        "--bounces",
+                        self.bounces,
+                        format!("must be at most {most} with --rng mt, whose streams hold 227 numbers; use --rng philox"),
+                    ));
                 }
                 if self.total_photons() > 1 << 32 {
                     return Err(Error::setting("--rng", "mt", "seeds 2^32 streams, and the run has more photons; use --rng philox"));

@@ -1,7 +1,7 @@
 //! Where time goes: nested scopes, each with its time on the device, on the host, or both.
 
 use std::collections::HashMap;
-use std::time::Duration;
+use std::time::{Duration, Instant};
 
 use serde::Serialize;
 
@@ -98,5 +98,41 @@ impl Timings {
     /// Milliseconds of a scope on the device, else on the host's clock.
     pub fn best_ms(&self, name: &str) -> Option<f64> {
         self.row(name).and_then(|row| row.gpu_ms.or(row.wall_ms))
+    }
+}
+
+/// Times nested scopes on the host's clock.
+pub struct HostClock {
+    started: Instant,
+    /// Name of the whole, and of the scopes that are open.
+    whole: &'static str,
+    open: Vec<String>,
+    timings: Timings,
+}
+
+impl HostClock {
+    /// `whole` names the row that spans everything.
+    pub fn start(whole: &'static str) -> HostClock {
+        let mut timings = Timings::default();
+        timings.count(whole);
+        HostClock { started: Instant::now(), whole, open: Vec::new(), timings }
+    }
+
+    pub fn time<T>(&mut self, name: &str, body: impl FnOnce(&mut Self) -> T) -> T {
+        let path = self.open.last().map_or_else(|| name.to_owned(), |outer| format!("{outer}/{name}"));
+        self.timings.count(&path);
+        self.open.push(path);
+        let begin = Instant::now();
+        let result = body(self);
+        let (start, duration) = (begin.duration_since(self.started), begin.elapsed());
+        let name = self.open.pop().expect("pushed above");
+        self.timings.add(Span { name, clock: Clock::Wall, start, duration });
+        result
+    }
+
+    pub fn finish(mut self) -> Timings {
+        let whole = Span { name: self.whole.to_owned(), clock: Clock::Wall, start: Duration::ZERO, duration: self.started.elapsed() };
+        self.timings.add(whole);
+        self.timings
     }
 }

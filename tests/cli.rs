@@ -111,12 +111,26 @@ fn bad_input_is_refused_in_one_line() {
 fn a_run_writes_everything_it_was_asked_for() {
     let folder = tempfile::tempdir().unwrap();
     let at = |name: &str| folder.path().join(name);
-    let arguments =
-        ["--variant", "atomic", "-o", "a.exr", "--json", "a.json", "--trace", "t.json", "--irradiance", "irradiance", "--radiosity", "radiosity"];
+    let arguments = [
+        "--variant",
+        "atomic",
+        "-o",
+        "a.exr",
+        "--json",
+        "a.json",
+        "--trace",
+        "t.json",
+        "--irradiance",
+        "irradiance",
+        "--radiosity",
+        "radiosity",
+    ];
     let output = run_on_device(folder.path(), &arguments);
     assert!(output.status.success(), "{}", text(&output.stderr));
     let stdout = text(&output.stdout);
-    for word in ["ledger: 5000 emitted = 2498 absorbed + 2498 escaped + 4 cut off + 0 dropped", "7511 photons stored", "bounce 15", "gather"] {
+    for word in
+        ["ledger: 5000 emitted = 2498 absorbed + 2498 escaped + 4 cut off + 0 dropped", "7511 photons stored", "bounce 15", "gather"]
+    {
         assert!(stdout.contains(word), "{word}: {stdout}");
     }
 
@@ -179,7 +193,11 @@ fn without_vulkan_the_cpu_builder_runs() {
     let folder = tempfile::tempdir().unwrap();
     // A loader that knows no driver is a machine without a device.
     let without = |arguments: &[&str]| {
-        photonmill(folder.path(), arguments).env("VK_DRIVER_FILES", "/nonexistent").env("VK_ICD_FILENAMES", "/nonexistent").output().unwrap()
+        photonmill(folder.path(), arguments)
+            .env("VK_DRIVER_FILES", "/nonexistent")
+            .env("VK_ICD_FILENAMES", "/nonexistent")
+            .output()
+            .unwrap()
     };
     let output = without(&["-o", "a.png", "--json", "a.json"]);
     let stderr = text(&output.stderr);

@@ -40,10 +40,13 @@ fn print(facts: &DeviceFacts) {
     line("storage buffers a stage", facts.storage_buffers_per_stage.to_string());
     line("work groups", format!("{} x {}", facts.work_group_count_x, facts.work_group_count_y));
     line("work-group size", facts.work_group_size.to_string());
-    line("timestamps", match facts.timestamp_bits {
-        0 => "none".to_owned(),
-        bits => format!("{bits} bits of {} ns", facts.timestamp_period_ns),
-    });
+    line(
+        "timestamps",
+        match facts.timestamp_bits {
+            0 => "none".to_owned(),
+            bits => format!("{bits} bits of {} ns", facts.timestamp_period_ns),
+        },
+    );
     line("64-bit atomics", if facts.int64_atomics { "yes" } else { "no: two 32-bit words instead" }.to_owned());
     line("start-up check", verdict(facts));
 }

@@ -211,7 +211,11 @@ pub(super) fn run(args: &RunArgs, cancelled: &AtomicBool) -> Result<()> {
     let settings = args.settings();
     settings.validate()?;
     if settings.reflectance == 0.0 && args.irradiance.is_some() {
-        return Err(Error::setting("--reflectance", 0, "must be above 0 with --irradiance, as the photon map holds reflected photons only"));
+        return Err(Error::setting(
+            "--reflectance",
+            0,
+            "must be above 0 with --irradiance, as the photon map holds reflected photons only",
+        ));
     }
     if let (Variant::Cpu, Some(device)) = (settings.variant, &args.device.device) {
         return Err(Error::setting("--device", device, "has no use with --variant cpu; leave one of the two out"));
@@ -239,7 +243,8 @@ pub(super) fn run(args: &RunArgs, cancelled: &AtomicBool) -> Result<()> {
 }
 
 fn progress_bar(photons: u64) -> ProgressBar {
-    let style = ProgressStyle::with_template("{bar:32} {human_pos}/{human_len} photons, {per_sec}, {eta} left").expect("the template is valid");
+    let style =
+        ProgressStyle::with_template("{bar:32} {human_pos}/{human_len} photons, {per_sec}, {eta} left").expect("the template is valid");
     ProgressBar::new(photons).with_style(style)
 }
 

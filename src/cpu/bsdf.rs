@@ -11,11 +11,8 @@ pub fn phong_lobe(cosine: f32, shininess: f32) -> f32 {
         return 0.0;
     }
     let x = 1.0 - cosine;
-    let logarithm = if x < 0.03125 {
-        -x * (1.0 + x * (1.0 / 2.0 + x * (1.0 / 3.0 + x * (1.0 / 4.0))))
-    } else {
-        std::f32::consts::LN_2 * cosine.log2()
-    };
+    let logarithm =
+        if x < 0.03125 { -x * (1.0 + x * (1.0 / 2.0 + x * (1.0 / 3.0 + x * (1.0 / 4.0)))) } else { std::f32::consts::LN_2 * cosine.log2() };
     if shininess == 0.0 { 1.0 } else { (std::f32::consts::LOG2_E * shininess * logarithm).exp2().min(1.0) }
 }
 
@@ -30,9 +27,5 @@ pub fn view_weight(wall: &Wall, position: Vec3, arriving: Vec3, reflected: Vec3,
         PhongDirection::Sampled => reflected,
         PhongDirection::Mirror => arriving - 2.0 * arriving.dot(wall.normal) * wall.normal,
     };
-    if eye_distance_squared > 0.0 {
-        phong_lobe(to_eye.dot(lobe) * (1.0 / eye_distance_squared.sqrt()), wall.shininess)
-    } else {
-        0.0
-    }
+    if eye_distance_squared > 0.0 { phong_lobe(to_eye.dot(lobe) * (1.0 / eye_distance_squared.sqrt()), wall.shininess) } else { 0.0 }
 }

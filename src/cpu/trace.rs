@@ -32,12 +32,7 @@ const MIN_PATHS_PER_THREAD: usize = 256;
 
 impl<'a> Tracer<'a> {
     pub fn new(scene: &Scene, plan: &'a Plan) -> Tracer<'a> {
-        Tracer {
-            plan,
-            room: scene.room_record(),
-            walls: scene.wall_records(),
-            lights: scene.light_records(&plan.relative_flux),
-        }
+        Tracer { plan, room: scene.room_record(), walls: scene.wall_records(), lights: scene.light_records(&plan.relative_flux) }
     }
 
     /// Paths of a chunk as they leave their lights.
@@ -103,14 +98,7 @@ impl<'a> Tracer<'a> {
             path.wall = hit.wall;
             let weight = view_weight(wall, hit.position, arriving, path.direction, settings.eye.into(), settings.phong_direction);
             bounced.tally.stored += 1;
-            bounced.photons.push(Photon {
-                position: hit.position,
-                wall: hit.wall,
-                flux: path.flux,
-                weight,
-                photon: path.photon,
-                bounce,
-            });
+            bounced.photons.push(Photon { position: hit.position, wall: hit.wall, flux: path.flux, weight, photon: path.photon, bounce });
             bounced.paths.push(path);
         }
         bounced

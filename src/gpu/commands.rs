@@ -3,13 +3,13 @@
 
 use std::collections::{HashMap, HashSet};
 use std::rc::Rc;
-use std::time::Instant;
+use std::time::{Duration, Instant};
 
 use ash::vk;
 use bytemuck::Pod;
 
 use super::timestamps::{TimedScope, Timestamps};
-use super::{Buffer, Constants, Context, Gpu, Kernel, Memory, call};
+use super::{Buffer, Constants, Context, DeviceFacts, Gpu, Kernel, Memory, call};
 use crate::error::Result;
 use crate::records::DispatchArgs;
 use crate::timings::{Clock, Span, Timings};
@@ -308,7 +308,7 @@ impl<'gpu> Commands<'gpu> {
 
     /// Books the submission: each scope with its device time, and the host's time of the whole under
     /// the outermost scope's name.
-    fn collect_timings(&mut self, submitted: Instant, wall: std::time::Duration) -> Result<()> {
+    fn collect_timings(&mut self, submitted: Instant, wall: Duration) -> Result<()> {
         let start = submitted.duration_since(self.started);
         let timed = std::mem::take(&mut self.timed_scopes);
         if let Some(times) = self.timestamps.read(&timed)? {
@@ -327,6 +327,17 @@ impl<'gpu> Commands<'gpu> {
         &mut self.timings
     }
 
+    /// Ends the recording; `whole` names the row that spans all of it on the host's clock.
+    pub fn finish(mut self, whole: &str) -> Timings {
+        let mut timings = std::mem::take(&mut self.timings);
+        timings.add(Span { name: whole.to_owned(), clock: Clock::Wall, start: Duration::ZERO, duration: self.started.elapsed() });
+        timings
+    }
+
+    pub fn facts(&self) -> &DeviceFacts {
+        &self.gpu.facts
+    }
+
     /// Dispatches recorded so far.
     pub fn dispatch_count(&self) -> u64 {
         self.dispatch_count
@@ -342,10 +353,8 @@ impl<'gpu> Commands<'gpu> {
             return Ok(*set);
         }
         let set = self.allocate_set(layout)?;
-        let infos: Vec<[vk::DescriptorBufferInfo; 1]> = buffers
-            .iter()
-            .map(|(_, buffer)| [vk::DescriptorBufferInfo::default().buffer(*buffer).range(vk::WHOLE_SIZE)])
-            .collect();
+        let infos: Vec<[vk::DescriptorBufferInfo; 1]> =
+            buffers.iter().map(|(_, buffer)| [vk::DescriptorBufferInfo::default().buffer(*buffer).range(vk::WHOLE_SIZE)]).collect();
         let writes: Vec<_> = buffers
             .iter()
             .zip(&infos)
@@ -407,7 +416,8 @@ impl Commands<'_> {
     }
 
     fn barrier(&mut self) {
-        let stages = vk::PipelineStageFlags2::COMPUTE_SHADER | vk::PipelineStageFlags2::ALL_TRANSFER | vk::PipelineStageFlags2::DRAW_INDIRECT;
+        let stages =
+            vk::PipelineStageFlags2::COMPUTE_SHADER | vk::PipelineStageFlags2::ALL_TRANSFER | vk::PipelineStageFlags2::DRAW_INDIRECT;
         self.record_barrier(
             vk::MemoryBarrier2::default()
                 .src_stage_mask(stages)

@@ -47,9 +47,7 @@ pub(super) fn instance(validate: bool) -> Result<(ash::Entry, ash::Instance, Opt
     let no_vulkan = |reason: String| Error::NoVulkan { reason };
     // SAFETY: the loader is the system's own library; its initialisers are trusted.
     let entry = unsafe { ash::Entry::load() }.map_err(|_| no_vulkan("the Vulkan loader (libvulkan) is not installed".into()))?;
-    let app = vk::ApplicationInfo::default()
-        .application_name(c"photonmill")
-        .api_version(vk::API_VERSION_1_3);
+    let app = vk::ApplicationInfo::default().application_name(c"photonmill").api_version(vk::API_VERSION_1_3);
 
     let mut layers = Vec::new();
     let mut extensions = Vec::new();
@@ -65,10 +63,8 @@ pub(super) fn instance(validate: bool) -> Result<(ash::Entry, ash::Instance, Opt
     }
     let synchronisation = [vk::ValidationFeatureEnableEXT::SYNCHRONIZATION_VALIDATION];
     let mut features = vk::ValidationFeaturesEXT::default().enabled_validation_features(&synchronisation);
-    let mut info = vk::InstanceCreateInfo::default()
-        .application_info(&app)
-        .enabled_layer_names(&layers)
-        .enabled_extension_names(&extensions);
+    let mut info =
+        vk::InstanceCreateInfo::default().application_info(&app).enabled_layer_names(&layers).enabled_extension_names(&extensions);
     if validate {
         info = info.push_next(&mut features);
     }
@@ -100,10 +96,9 @@ pub(super) fn choose(instance: &ash::Instance, wanted: Option<&str>) -> Result<(
                 Err(_) => facts.name.to_lowercase().contains(&wanted.to_lowercase()),
             })
             .ok_or_else(|| Error::DeviceAbsent { wanted: wanted.to_owned(), present: describe(&devices) })?,
-        None => devices
-            .iter()
-            .min_by_key(|(_, facts)| (!facts.lacks.is_empty(), rank(facts.kind), facts.index))
-            .expect("there is a device"),
+        None => {
+            devices.iter().min_by_key(|(_, facts)| (!facts.lacks.is_empty(), rank(facts.kind), facts.index)).expect("there is a device")
+        }
     };
     if let Some(what) = chosen.1.lacks.first() {
         return Err(Error::DeviceLacks { device: chosen.1.name.clone(), what: what.clone() });
@@ -172,10 +167,7 @@ fn facts(instance: &ash::Instance, device: vk::PhysicalDevice, index: usize) -> 
     need(f12.scalar_block_layout == vk::TRUE, "scalarBlockLayout");
     need(f13.synchronization2 == vk::TRUE, "synchronization2");
     need(f13.maintenance4 == vk::TRUE, "maintenance4");
-    need(
-        limits.max_per_stage_descriptor_storage_buffers >= MAX_BUFFERS,
-        &format!("room for {MAX_BUFFERS} storage buffers in a kernel"),
-    );
+    need(limits.max_per_stage_descriptor_storage_buffers >= MAX_BUFFERS, &format!("room for {MAX_BUFFERS} storage buffers in a kernel"));
     need(
         v11.subgroup_supported_operations.contains(subgroup_needs) && v11.subgroup_supported_stages.contains(vk::ShaderStageFlags::COMPUTE),
         "subgroup ballots and arithmetic in compute shaders",
@@ -222,15 +214,10 @@ fn facts(instance: &ash::Instance, device: vk::PhysicalDevice, index: usize) -> 
 pub(super) fn create(instance: &ash::Instance, physical: vk::PhysicalDevice, facts: &DeviceFacts) -> Result<(ash::Device, vk::Queue)> {
     let queues = [vk::DeviceQueueCreateInfo::default().queue_family_index(facts.queue_family).queue_priorities(&[1.0])];
     let features = vk::PhysicalDeviceFeatures::default().shader_int64(facts.int64_atomics);
-    let mut v12 = vk::PhysicalDeviceVulkan12Features::default()
-        .scalar_block_layout(true)
-        .shader_buffer_int64_atomics(facts.int64_atomics);
+    let mut v12 = vk::PhysicalDeviceVulkan12Features::default().scalar_block_layout(true).shader_buffer_int64_atomics(facts.int64_atomics);
     let mut v13 = vk::PhysicalDeviceVulkan13Features::default().synchronization2(true).maintenance4(true);
-    let info = vk::DeviceCreateInfo::default()
-        .queue_create_infos(&queues)
-        .enabled_features(&features)
-        .push_next(&mut v12)
-        .push_next(&mut v13);
+    let info =
+        vk::DeviceCreateInfo::default().queue_create_infos(&queues).enabled_features(&features).push_next(&mut v12).push_next(&mut v13);
     // SAFETY: all pointers in `info` are alive, and `facts` says that the features are there.
     unsafe {
         let device = call("vkCreateDevice", instance.create_device(physical, &info, None))?;

@@ -225,4 +225,3 @@ impl Drop for DiskCache {
         unsafe { self.context.device.destroy_pipeline_cache(self.raw, None) };
     }
 }
-

@@ -93,11 +93,14 @@ impl Gpu {
     /// Opens a device and runs the start-up check on it.
     pub fn open(options: &Options) -> Result<Gpu> {
         let (entry, instance, messages) = device::instance(options.validate).map_err(|error| match (error, &options.device) {
-            (Error::NoVulkan { reason }, Some(wanted)) => Error::DeviceAbsent { wanted: wanted.clone(), present: format!("none ({reason})") },
+            (Error::NoVulkan { reason }, Some(wanted)) => {
+                Error::DeviceAbsent { wanted: wanted.clone(), present: format!("none ({reason})") }
+            }
             (error, _) => error,
         })?;
-        let opened = device::choose(&instance, options.device.as_deref())
-            .and_then(|(physical, facts)| device::create(&instance, physical, &facts).map(|(device, queue)| (physical, facts, device, queue)));
+        let opened = device::choose(&instance, options.device.as_deref()).and_then(|(physical, facts)| {
+            device::create(&instance, physical, &facts).map(|(device, queue)| (physical, facts, device, queue))
+        });
         let (physical_device, mut facts, device, queue) = match opened {
             Ok(opened) => opened,
             Err(error) => {
@@ -123,14 +126,7 @@ impl Gpu {
             allocation_sizes: Default::default(),
         })
         .map_err(|error| Error::Device { call: "the memory allocator", reason: error.to_string() })?;
-        let context = Rc::new(Context {
-            allocator: RefCell::new(Some(allocator)),
-            device,
-            debug,
-            messages,
-            instance,
-            _entry: entry,
-        });
+        let context = Rc::new(Context { allocator: RefCell::new(Some(allocator)), device, debug, messages, instance, _entry: entry });
         let cache = kernel::DiskCache::open(&context, &facts)?;
         let gpu = Gpu { facts, time_dispatches: options.time_dispatches, queue, pipelines: RefCell::default(), cache, context };
         check::run(&gpu)?;

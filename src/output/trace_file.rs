@@ -9,7 +9,8 @@ pub fn chrome_trace(timings: &Timings, device: &str) -> Vec<u8> {
         Clock::Wall => 0,
         Clock::Gpu => 1,
     };
-    let name_track = |clock: Clock, name: &str| json!({"ph": "M", "name": "thread_name", "pid": 0, "tid": track(clock), "args": {"name": name}});
+    let name_track =
+        |clock: Clock, name: &str| json!({"ph": "M", "name": "thread_name", "pid": 0, "tid": track(clock), "args": {"name": name}});
     let mut events = vec![name_track(Clock::Wall, "host"), name_track(Clock::Gpu, device)];
     events.extend(timings.spans().iter().map(|span| {
         json!({

@@ -39,7 +39,7 @@ impl Limits {
 }
 
 /// Expected work of a gather.
-#[derive(Debug, Clone, Copy)]
+#[derive(Debug, Clone, Copy, PartialEq)]
 pub struct Work {
     points: f64,
     /// Photons that a point tests for each photon emitted.
@@ -65,6 +65,7 @@ impl Work {
         Work { points: point_count as f64, tests_per_photon }
     }
 
+    /// Pair tests of the gather of a chunk.
     pub fn pair_tests(&self, photons: u32) -> u64 {
         (self.points * self.tests_per_photon * f64::from(photons)) as u64
     }

@@ -8,7 +8,7 @@ use std::ops::Range;
 
 use serde::Serialize;
 
-pub use capacity::Limits;
+pub use capacity::{Limits, Work};
 pub use effect::Decision;
 
 use crate::error::Result;
@@ -47,6 +47,8 @@ pub struct Plan {
     pub photon_capacity: u32,
     pub points: Vec<Point>,
     pub grid: Grid,
+    /// What a gather is expected to cost.
+    pub work: Work,
     /// Pair tests (point, photon) after which commands are handed to the device.
     pub pair_tests_per_submission: u64,
 }
@@ -79,12 +81,7 @@ impl Grid {
     }
 
     pub fn index_push(&self, photon_capacity: u32) -> IndexPush {
-        IndexPush {
-            origin: self.origin.into(),
-            cells_per_metre: self.cells_per_metre,
-            cell_count: self.cell_count.into(),
-            photon_capacity,
-        }
+        IndexPush { origin: self.origin.into(), cells_per_metre: self.cells_per_metre, cell_count: self.cell_count.into(), photon_capacity }
     }
 }
 
@@ -94,8 +91,7 @@ impl Plan {
     pub fn new(scene: &Scene, settings: &Settings, limits: &Limits) -> Result<Plan> {
         settings.validate()?;
         let light_photons = deal(settings.photons, &scene.lights.iter().map(|light| light.power).collect::<Vec<_>>());
-        let watts: Vec<f64> =
-            scene.lights.iter().zip(&light_photons).map(|(light, count)| light.power / f64::from(*count)).collect();
+        let watts: Vec<f64> = scene.lights.iter().zip(&light_photons).map(|(light, count)| light.power / f64::from(*count)).collect();
         let strongest = watts.iter().fold(0.0, |a: f64, b| a.max(*b));
         let relative_flux: Vec<f32> = watts.iter().map(|flux| (flux / strongest) as f32).collect();
 
@@ -112,7 +108,7 @@ impl Plan {
             })
             .collect();
         let grid = Grid::new(scene, settings.radius);
-        let work = capacity::Work::new(scene, settings, points.len());
+        let work = Work::new(scene, settings, points.len());
         let chunk_photons = capacity::chunk_photons(settings, limits, &work)?;
         let chunks_per_round = settings.photons.div_ceil(chunk_photons);
         let mut plan = Plan {
@@ -128,6 +124,7 @@ impl Plan {
             photon_capacity: 0,
             points,
             grid,
+            work,
             pair_tests_per_submission: limits.pair_tests_per_submission,
         };
         plan.path_capacity = (0..chunks_per_round).map(|chunk| photons_of(&plan.chunk(chunk))).max().expect("a round has a chunk");
@@ -168,11 +165,6 @@ impl Plan {
     /// Fixed-point units in 1.
     pub fn film_scale(&self) -> f64 {
         (1u64 << self.film_shift) as f64
-    }
-
-    /// Pair tests that one chunk's gather is expected to cost.
-    pub fn pair_tests(&self, scene: &Scene, photons: u32) -> u64 {
-        capacity::Work::new(scene, &self.settings, self.points.len()).pair_tests(photons)
     }
 
     /// Bytes of the photon map.

@@ -10,11 +10,7 @@ use crate::settings::{HALF_WIDTH, Settings, WALL_NAMES};
 const LIT_FACES: [usize; 2] = [2, 0];
 
 pub fn open_box(settings: &Settings) -> Scene {
-    let wall = |face: usize| Wall {
-        name: WALL_NAMES[face],
-        albedo: settings.reflectance,
-        shininess: settings.shininess[face],
-    };
+    let wall = |face: usize| Wall { name: WALL_NAMES[face], albedo: settings.reflectance, shininess: settings.shininess[face] };
     Scene {
         name: "open-box",
         min_corner: DVec3::splat(-HALF_WIDTH),

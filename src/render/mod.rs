@@ -1,0 +1,46 @@
+//! The straight line: scene, plan, resources, then rounds of photons traced, indexed and estimated;
+//! [`on_gpu`] walks it with kernels, [`on_cpu`] with their twins.
+
+mod book;
+mod on_cpu;
+mod on_gpu;
+
+use std::sync::atomic::AtomicBool;
+
+pub use on_cpu::{on_cpu, photons_on_cpu};
+pub use on_gpu::{limits, on_gpu, photons_on_gpu};
+
+use crate::film::Film;
+use crate::gpu::DeviceFacts;
+use crate::ledger::Fates;
+use crate::plan::Plan;
+use crate::timings::Timings;
+
+/// How a caller watches a run and ends it early.
+pub struct Control<'a> {
+    /// Set from outside to end the run after the photons that are under way.
+    pub cancelled: &'a AtomicBool,
+    /// Told the photons emitted so far, of how many.
+    pub progress: &'a mut dyn FnMut(u64, u64),
+}
+
+/// What a run leaves behind.
+#[derive(Debug, Clone)]
+pub struct Outcome {
+    pub plan: Plan,
+    pub film: Film,
+    pub fates: Fates,
+    pub timings: Timings,
+    /// `None` for the CPU builder.
+    pub device: Option<DeviceFacts>,
+    /// The run was ended before its last photon.
+    pub cancelled: bool,
+    pub dispatches: u64,
+    pub submissions: u64,
+}
+
+/// (round, chunk) of the whole run, in order.
+fn units(plan: &Plan) -> impl Iterator<Item = (u32, u32)> {
+    let chunks = plan.chunks_per_round;
+    (0..plan.settings.rounds).flat_map(move |round| (0..chunks).map(move |chunk| (round, chunk)))
+}

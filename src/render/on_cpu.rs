@@ -1,0 +1,95 @@
+//! The line on the CPU.
+
+use rayon::{ThreadPool, ThreadPoolBuilder};
+
+use super::book::Book;
+use super::{Control, Outcome, units};
+use crate::cpu::trace::Tracer;
+use crate::cpu::{estimate, index::Index};
+use crate::error::{Error, Result};
+use crate::film::Film;
+use crate::plan::{EmissionRange, Limits, Plan, photons_of};
+use crate::records::{Photon, Tally};
+use crate::scene::Scene;
+use crate::settings::{Settings, Variant};
+use crate::timings::HostClock;
+
+/// Runs on the CPU, on `settings.threads` threads.
+pub fn on_cpu(scene: &Scene, settings: &Settings, control: &mut Control) -> Result<Outcome> {
+    let mut clock = HostClock::start("run");
+    let plan = plan(scene, settings)?;
+    let pool = thread_pool(settings)?;
+    let tracer = Tracer::new(scene, &plan);
+    let mut sums = vec![0u64; plan.points.len() * plan.channel_count as usize];
+    let mut book = Book::new(&plan, control);
+    for (round, chunk) in units(&plan) {
+        let ranges = plan.chunk(chunk);
+        let tallies = clock.time("round", |clock| {
+            let (photons, tallies) = clock.time("build", |clock| trace(&pool, &tracer, &plan, round, &ranges, clock));
+            if plan.gathers_by_grid() {
+                let index = clock.time("index", |_| Index::build(plan.grid, &photons));
+                clock.time("gather", |_| pool.install(|| estimate::gather_grid(&plan, &index, &mut sums)));
+            } else {
+                clock.time("gather", |_| pool.install(|| estimate::gather_brute(&plan, &photons, &mut sums)));
+            }
+            tallies
+        });
+        book.emitted += u64::from(photons_of(&ranges));
+        if book.settle(&tallies)? {
+            break;
+        }
+    }
+    Ok(Outcome {
+        film: Film::new(&plan, sums, book.fates.emitted),
+        fates: book.fates,
+        cancelled: book.cancelled,
+        timings: clock.finish(),
+        device: None,
+        dispatches: 0,
+        submissions: 0,
+        plan,
+    })
+}
+
+fn plan(scene: &Scene, settings: &Settings) -> Result<Plan> {
+    let settings = Settings { variant: Variant::Cpu, ..settings.clone() };
+    Plan::new(scene, &settings, &Limits::of_host())
+}
+
+fn thread_pool(settings: &Settings) -> Result<ThreadPool> {
+    let threads = settings.threads;
+    ThreadPoolBuilder::new()
+        .num_threads(threads)
+        .build()
+        .map_err(|error| Error::setting("--threads", threads, format!("cannot be started ({error}); ask for fewer")))
+}
+
+/// Photons of a chunk and the fates of its paths, bounce by bounce.
+fn trace(
+    pool: &ThreadPool,
+    tracer: &Tracer,
+    plan: &Plan,
+    round: u32,
+    ranges: &[EmissionRange],
+    clock: &mut HostClock,
+) -> (Vec<Photon>, Vec<Tally>) {
+    let mut paths = clock.time("emit", |_| tracer.emit(round, ranges));
+    let mut photons = Vec::new();
+    let mut tallies = Vec::new();
+    for bounce in 0..plan.settings.bounces {
+        let bounced = clock.time(&format!("bounce {}", bounce + 1), |_| pool.install(|| tracer.bounce(&paths, round, bounce)));
+        photons.extend(bounced.photons);
+        tallies.push(bounced.tally);
+        paths = bounced.paths;
+    }
+    (photons, tallies)
+}
+
+/// The photon map of round 0, for comparing builders.
+pub fn photons_on_cpu(scene: &Scene, settings: &Settings) -> Result<Vec<Photon>> {
+    let mut clock = HostClock::start("run");
+    let plan = plan(scene, settings)?;
+    let pool = thread_pool(settings)?;
+    let tracer = Tracer::new(scene, &plan);
+    Ok((0..plan.chunks_per_round).flat_map(|chunk| trace(&pool, &tracer, &plan, 0, &plan.chunk(chunk), &mut clock).0).collect())
+}

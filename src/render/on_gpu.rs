@@ -1,0 +1,121 @@
+//! The line on the GPU.
+
+use std::time::Instant;
+
+use super::book::Book;
+use super::{Control, Outcome, units};
+use crate::constants::NO_WALL;
+use crate::error::Result;
+use crate::film::Film;
+use crate::gpu::{Commands, Constants, DeviceFacts, Gpu};
+use crate::plan::{Limits, Plan, photons_of};
+use crate::records::{Photon, Tally};
+use crate::resources::Resources;
+use crate::scene::Scene;
+use crate::settings::Settings;
+use crate::{estimate, index, trace};
+
+/// Runs on the GPU.
+pub fn on_gpu(gpu: &Gpu, scene: &Scene, settings: &Settings, control: &mut Control) -> Result<Outcome> {
+    let started = Instant::now();
+    let plan = Plan::new(scene, settings, &limits(gpu.facts()))?;
+    let mut commands = Commands::new(gpu, constants(&plan), started)?;
+    commands.timings().count("run");
+    let resources = commands.scope("set-up", |commands| Resources::new(gpu, commands, scene, &plan))?;
+    prepare(gpu, &plan)?;
+    commands.submit()?;
+
+    let mut book = Book::new(&plan, control);
+    for (round, chunk) in units(&plan) {
+        let ranges = plan.chunk(chunk);
+        commands.scope("round", |commands| {
+            trace::chunk(commands, &resources, &plan, round, &ranges)?;
+            index::build(commands, &resources, &plan, photons_of(&ranges))?;
+            estimate::gather(commands, &resources, &plan, photons_of(&ranges))
+        })?;
+        book.emitted += u64::from(photons_of(&ranges));
+        if is_due(&commands, &plan, &book) && settle(&mut commands, &resources, &mut book)? {
+            break;
+        }
+    }
+    settle(&mut commands, &resources, &mut book)?;
+    let sums = commands.read::<u64>(&resources.film, plan.points.len() * plan.channel_count as usize)?;
+    gpu.check_validation()?;
+
+    Ok(Outcome {
+        film: Film::new(&plan, sums, book.fates.emitted),
+        fates: book.fates,
+        cancelled: book.cancelled,
+        dispatches: commands.dispatch_count(),
+        submissions: commands.submission_count(),
+        timings: commands.finish("run"),
+        device: Some(gpu.facts().clone()),
+        plan,
+    })
+}
+
+/// What the plan may use of a device.
+pub fn limits(facts: &DeviceFacts) -> Limits {
+    Limits {
+        buffer_bytes: facts.storage_buffer_range_bytes.min(facts.allocation_bytes),
+        // Half, as the device is not ours alone.
+        memory_bytes: facts.device_memory_bytes / 2,
+        pair_tests_per_submission: Limits::pair_tests_of(facts.kind),
+        group_size: facts.work_group_size,
+    }
+}
+
+/// Specialization constants of a plan.
+fn constants(plan: &Plan) -> Constants {
+    let settings = &plan.settings;
+    Constants::new(settings.group_size)
+        .set("RNG", settings.rng.code())
+        .set("EMISSION_LAW", settings.emission.code())
+        .set("HAS_PHONG", u32::from(settings.has_phong()))
+        .set("PHONG_DIRECTION", settings.phong_direction.code())
+        .set("HAS_SLOTS", u32::from(plan.has_slots()))
+        .set("CHANNEL_COUNT", plan.channel_count)
+}
+
+/// Makes the pipelines of the plan, and only those.
+fn prepare(gpu: &Gpu, plan: &Plan) -> Result<()> {
+    let modules = [trace::modules(plan), index::modules(plan), estimate::modules(plan, gpu.facts())].concat();
+    gpu.prepare(&modules, &constants(plan))
+}
+
+/// Whether the recorded commands should go to the device now.
+fn is_due(commands: &Commands, plan: &Plan, book: &Book) -> bool {
+    // Tallies are 32-bit on the device.
+    let tallies_full = book.open() + u64::from(plan.path_capacity) > u64::from(u32::MAX);
+    let timestamps_short = commands.timestamps_left() < trace::timestamps_per_chunk(plan);
+    commands.work() >= plan.pair_tests_per_submission || timestamps_short || tallies_full
+}
+
+/// Runs what is recorded, books the fates of its photons, and says whether to stop.
+fn settle(commands: &mut Commands, resources: &Resources, book: &mut Book) -> Result<bool> {
+    if book.open() == 0 {
+        return Ok(book.cancelled);
+    }
+    let bounces = book.fates.bounces.len();
+    let tallies: Vec<Tally> = commands.read(&resources.tallies, bounces)?;
+    commands.fill(&resources.tallies, 0, 4 * bounces as u64, 0);
+    book.settle(&tallies)
+}
+
+/// The photon map of round 0, for comparing builders.
+pub fn photons_on_gpu(gpu: &Gpu, scene: &Scene, settings: &Settings) -> Result<Vec<Photon>> {
+    let plan = Plan::new(scene, settings, &limits(gpu.facts()))?;
+    let mut commands = Commands::new(gpu, constants(&plan), Instant::now())?;
+    let resources = Resources::new(gpu, &mut commands, scene, &plan)?;
+    let mut photons = Vec::new();
+    for chunk in 0..plan.chunks_per_round {
+        let ranges = plan.chunk(chunk);
+        trace::chunk(&mut commands, &resources, &plan, 0, &ranges)?;
+        let capacity = trace::photon_list_capacity(&plan, photons_of(&ranges));
+        let length = if plan.has_slots() { capacity } else { commands.read::<u32>(&resources.counters, 1)?[0].min(capacity) };
+        let stored = commands.read::<Photon>(&resources.photons, length as usize)?;
+        photons.extend(stored.into_iter().filter(|photon| photon.wall != NO_WALL));
+    }
+    gpu.check_validation()?;
+    Ok(photons)
+}
