@@ -84,12 +84,8 @@ fn gather_grid(commands: &mut Commands, resources: &Resources, index: &IndexBuff
     let push = push(plan, photon_count);
     commands.fill(longest, 0, 1, 0);
     commands.dispatch(CandidateCount { points, longest, cells }, &push, Extent::Items(u64::from(push.end_point)))?;
-    let size = DispatchSizePush {
-        counter: 0,
-        capacity: push.end_point,
-        items_per_group: plan.settings.group_size,
-        max_groups: MAX_GROUPS_Y,
-    };
+    let size =
+        DispatchSizePush { counter: 0, capacity: push.end_point, items_per_group: plan.settings.group_size, max_groups: MAX_GROUPS_Y };
     commands.dispatch(SliceCount { longest, dispatch_args }, &size, Extent::Groups(1, 1))?;
     commands.add_work(plan.work.pair_tests(photon_count));
     let extent = Extent::Indirect(dispatch_args);

@@ -55,54 +55,42 @@ pub const INDIRECT_GROUPS_X: u32 = 65_535;
 
 /// Traces the photons of a chunk into the photon map and adds their fates to the tallies.
 pub fn chunk(commands: &mut Commands, resources: &Resources, plan: &Plan, round: u32, ranges: &[EmissionRange]) -> Result<()> {
-    let compaction = Compaction::of(plan.settings.variant);
     let photon_count = photons_of(ranges);
-    let streams = plan.streams();
-    let key = streams.key(round);
     commands.scope("build", |commands| {
         commands.fill(&resources.counters, 0, u64::from(plan.settings.bounces) + 2, 0);
         commands.fill(&resources.counters, 1, 1, photon_count);
-        commands.scope("emit", |commands| {
-            let mut path_offset = 0;
-            for range in ranges {
-                let jump = streams.jump(round, range.first_photon);
-                let push = EmitPush {
-                    key,
-                    light: range.light,
-                    first_photon: range.first_photon,
-                    photon_count: range.count,
-                    path_offset,
-                    jump_multiplier: words(jump.multiplier),
-                    jump_increment: words(jump.increment),
-                };
-                let kernel = Emit {
-                    lights: &resources.lights,
-                    walls: &resources.walls,
-                    stream_seeds: &resources.stream_seeds,
-                    paths: &resources.paths[0],
-                };
-                commands.dispatch(kernel, &push, Extent::Items(u64::from(range.count)))?;
-                path_offset += range.count;
-            }
-            Ok(())
-        })?;
+        commands.scope("emit", |commands| emit(commands, resources, plan, round, ranges))?;
         for bounce in 0..plan.settings.bounces {
             if commands.timestamps_left() < TIMESTAMP_RESERVE {
                 commands.submit()?;
             }
-            let push = TracePush {
-                key,
-                bounce,
-                path_capacity: plan.path_capacity,
-                photon_capacity: photon_list_capacity(plan, photon_count),
-                eye: plan.settings.eye.into(),
-            };
-            commands.scope(&format!("bounce {}", bounce + 1), |commands| {
-                one_bounce(commands, resources, plan, compaction, photon_count, &push)
-            })?;
+            let name = format!("bounce {}", bounce + 1);
+            commands.scope(&name, |commands| one_bounce(commands, resources, plan, round, bounce, photon_count))?;
         }
         Ok(())
     })
+}
+
+/// Writes the paths of a chunk as they leave their lights, light after light.
+pub fn emit(commands: &mut Commands, resources: &Resources, plan: &Plan, round: u32, ranges: &[EmissionRange]) -> Result<()> {
+    let Resources { lights, walls, stream_seeds, paths: [paths, _], .. } = resources;
+    let streams = plan.streams();
+    let mut path_offset = 0;
+    for range in ranges {
+        let jump = streams.jump(round, range.first_photon);
+        let push = EmitPush {
+            key: streams.key(round),
+            light: range.light,
+            first_photon: range.first_photon,
+            photon_count: range.count,
+            path_offset,
+            jump_multiplier: words(jump.multiplier),
+            jump_increment: words(jump.increment),
+        };
+        commands.dispatch(Emit { lights, walls, stream_seeds, paths }, &push, Extent::Items(u64::from(range.count)))?;
+        path_offset += range.count;
+    }
+    Ok(())
 }
 
 /// Timestamps that must be left for the scopes that are open and those that follow the bounces.
@@ -118,23 +106,22 @@ pub fn photon_list_capacity(plan: &Plan, photon_count: u32) -> u32 {
     if plan.has_slots() { photon_count * plan.settings.bounces } else { plan.photon_capacity }
 }
 
-fn one_bounce(
-    commands: &mut Commands,
-    resources: &Resources,
-    plan: &Plan,
-    compaction: Compaction,
-    photon_count: u32,
-    push: &TracePush,
-) -> Result<()> {
-    let [even, odd] = &resources.paths;
-    let (paths, next_paths) = if push.bounce.is_multiple_of(2) { (even, odd) } else { (odd, even) };
+fn one_bounce(commands: &mut Commands, resources: &Resources, plan: &Plan, round: u32, bounce: u32, photon_count: u32) -> Result<()> {
+    let compaction = Compaction::of(plan.settings.variant);
+    let push = TracePush {
+        key: plan.streams().key(round),
+        bounce,
+        path_capacity: plan.path_capacity,
+        photon_capacity: photon_list_capacity(plan, photon_count),
+        eye: plan.settings.eye.into(),
+    };
     // Every photon enters bounce 0, and the naive builder looks at every slot each time. After that
     // only the device knows how many paths are left.
-    let extent = if push.bounce == 0 || compaction == Compaction::Slots {
+    let extent = if bounce == 0 || compaction == Compaction::Slots {
         Extent::Items(u64::from(photon_count))
     } else {
         let size = DispatchSizePush {
-            counter: 1 + push.bounce,
+            counter: 1 + bounce,
             capacity: plan.path_capacity,
             items_per_group: plan.settings.group_size,
             max_groups: INDIRECT_GROUPS_X,
@@ -143,10 +130,12 @@ fn one_bounce(
         commands.dispatch(kernel, &size, Extent::Groups(1, 1))?;
         Extent::Indirect(&resources.dispatch_args)
     };
+    let [even, odd] = &resources.paths;
+    let (paths, next_paths) = if bounce.is_multiple_of(2) { (even, odd) } else { (odd, even) };
     let Resources { rooms, walls, photons, counters, tallies, .. } = resources;
     match compaction {
-        Compaction::Slots => commands.dispatch(TraceSlots { rooms, walls, paths, next_paths, photons, counters, tallies }, push, extent),
-        Compaction::Atomic => commands.dispatch(TraceAtomic { rooms, walls, paths, next_paths, photons, counters, tallies }, push, extent),
-        Compaction::Ballot => commands.dispatch(TraceBallot { rooms, walls, paths, next_paths, photons, counters, tallies }, push, extent),
+        Compaction::Slots => commands.dispatch(TraceSlots { rooms, walls, paths, next_paths, photons, counters, tallies }, &push, extent),
+        Compaction::Atomic => commands.dispatch(TraceAtomic { rooms, walls, paths, next_paths, photons, counters, tallies }, &push, extent),
+        Compaction::Ballot => commands.dispatch(TraceBallot { rooms, walls, paths, next_paths, photons, counters, tallies }, &push, extent),
     }
 }

@@ -16,7 +16,9 @@ fn compare(kernel: &str, found: &ReflectedStruct, twin: &Layout) -> Result<(), S
         }
     }
     match found.stride_bytes {
-        Some(stride) if stride != twin.size_bytes => Err(format!("{place}: neighbours lie {stride} bytes apart, its twin has {}", twin.size_bytes)),
+        Some(stride) if stride != twin.size_bytes => {
+            Err(format!("{place}: neighbours lie {stride} bytes apart, its twin has {}", twin.size_bytes))
+        }
         _ => Ok(()),
     }
 }

@@ -147,12 +147,15 @@ fn a_round_larger_than_a_buffer_splits_and_drops_nothing() {
     }
 }
 
+/// What is spoiled, and how.
+type Spoil = (&'static str, fn(&mut Fates));
+
 #[test]
 fn the_check_complains_about_lost_and_doubled_photons() {
     let settings = small();
     let fates = run_on_cpu(&settings).fates;
     assert_holds("the run itself", closes(&fates, 5000));
-    let spoils: [(&str, fn(&mut Fates)); 6] = [
+    let spoils: [Spoil; 5] = [
         ("a stored photon lost", |fates| fates.bounces[3].stored -= 1),
         ("an absorbed photon counted twice", |fates| fates.bounces[0].absorbed += 1),
         ("an escape booked at the next bounce", |fates| {
@@ -163,17 +166,11 @@ fn the_check_complains_about_lost_and_doubled_photons() {
             fates.bounces[14].absorbed -= 1;
             fates.bounces[14].dropped += 1;
         }),
-        ("a bounce left out", |fates| drop(fates.bounces.pop())),
         ("a photon emitted twice", |fates| fates.emitted += 1),
     ];
     for (what, spoil) in spoils {
         let mut spoiled = fates.clone();
         spoil(&mut spoiled);
-        // A lost last bounce still closes: its photons count as cut off one bounce earlier.
-        if what == "a bounce left out" {
-            assert_ne!(spoiled, fates);
-            continue;
-        }
         assert_complains(what, closes(&spoiled, 5000));
     }
 }

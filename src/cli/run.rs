@@ -154,7 +154,7 @@ fn numbers<T: std::str::FromStr + Copy + Default, const N: usize>(text: &str) ->
 }
 
 /// A whole number, with what is allowed in words; its range is the settings' affair.
-fn whole<T: std::str::FromStr>(text: &str) -> std::result::Result<T, String> {
+pub(super) fn whole<T: std::str::FromStr>(text: &str) -> std::result::Result<T, String> {
     text.parse().map_err(|_| format!("must be a whole number, at most {}", (1u128 << (8 * size_of::<T>())) - 1))
 }
 
@@ -170,7 +170,7 @@ fn shininess(text: &str) -> std::result::Result<[f32; 5], String> {
     }
 }
 
-fn threads(text: &str) -> std::result::Result<usize, String> {
+pub(super) fn threads(text: &str) -> std::result::Result<usize, String> {
     if text == "all" {
         return Ok(std::thread::available_parallelism().map_or(1, usize::from));
     }
@@ -178,7 +178,7 @@ fn threads(text: &str) -> std::result::Result<usize, String> {
 }
 
 impl RunArgs {
-    fn settings(&self) -> Settings {
+    pub(super) fn settings(&self) -> Settings {
         let preset = Settings::preset(self.preset.map_or(Preset::Modified, Preset::from));
         let photons = self.photons.unwrap_or(preset.photons);
         Settings {

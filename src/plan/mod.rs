@@ -38,7 +38,8 @@ pub struct Plan {
     pub light_photons: Vec<u32>,
     /// Flux of a photon of each light, relative to the strongest.
     pub relative_flux: Vec<f32>,
-    /// Watts of a photon of relative flux 1, times the photons of the run.
+    /// Watts of a photon of relative flux 1, times the photons emitted: a run of n photons shares its
+    /// lights' power among them, so that each carries `flux_unit` / n.
     pub flux_unit: f64,
     pub chunks_per_round: u32,
     /// Photons of the largest chunk: what the path arrays hold.
@@ -118,7 +119,7 @@ impl Plan {
             film_shift,
             light_photons,
             relative_flux,
-            flux_unit: strongest * settings.total_photons() as f64,
+            flux_unit: strongest * f64::from(settings.photons),
             chunks_per_round,
             path_capacity: 0,
             photon_capacity: 0,

@@ -8,7 +8,7 @@ mod on_gpu;
 use std::sync::atomic::AtomicBool;
 
 pub use on_cpu::{on_cpu, photons_on_cpu};
-pub use on_gpu::{limits, on_gpu, photons_on_gpu};
+pub use on_gpu::{constants, limits, on_gpu, photons_on_gpu};
 
 use crate::film::Film;
 use crate::gpu::DeviceFacts;

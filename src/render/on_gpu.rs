@@ -66,7 +66,7 @@ pub fn limits(facts: &DeviceFacts) -> Limits {
 }
 
 /// Specialization constants of a plan.
-fn constants(plan: &Plan) -> Constants {
+pub fn constants(plan: &Plan) -> Constants {
     let settings = &plan.settings;
     Constants::new(settings.group_size)
         .set("RNG", settings.rng.code())

@@ -10,10 +10,9 @@ pub mod reference;
 use std::ops::Deref;
 use std::sync::atomic::AtomicBool;
 
-use photonmill::cpu;
-use photonmill::gpu::{Constants, Gpu, Options};
+use photonmill::gpu::{Gpu, Options};
 use photonmill::plan::{Limits, Plan};
-use photonmill::records::{Path, Photon};
+use photonmill::records::Photon;
 use photonmill::render::{self, Control, Outcome};
 use photonmill::scene::Scene;
 use photonmill::scene::open_box::open_box;
@@ -104,23 +103,6 @@ pub fn plan_for(gpu: &Gpu, scene: &Scene, settings: &Settings) -> Plan {
 /// What the CPU builder would do with these settings.
 pub fn plan_for_host(settings: &Settings) -> Plan {
     Plan::new(&open_box(settings), settings, &Limits::of_host()).unwrap()
-}
-
-/// Specialization constants for tests that dispatch kernels on their own.
-pub fn constants_for(plan: &Plan) -> Constants {
-    let settings = &plan.settings;
-    Constants::new(settings.group_size)
-        .set("RNG", settings.rng.code())
-        .set("EMISSION_LAW", settings.emission.code())
-        .set("HAS_PHONG", u32::from(settings.has_phong()))
-        .set("PHONG_DIRECTION", settings.phong_direction.code())
-        .set("HAS_SLOTS", u32::from(plan.has_slots()))
-        .set("CHANNEL_COUNT", plan.channel_count)
-}
-
-/// Paths of the first chunk of round 0 as they leave their lights.
-pub fn emitted_paths(scene: &Scene, plan: &Plan) -> Vec<Path> {
-    cpu::trace::Tracer::new(scene, plan).emit(0, &plan.chunk(0))
 }
 
 /// Sorted by photon and bounce, which no two entries of a photon map share.

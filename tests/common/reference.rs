@@ -63,9 +63,14 @@ impl Drand48 {
     }
 }
 
+/// Sign of the side that a face lies on.
+fn side(face: usize) -> f64 {
+    if face.is_multiple_of(2) { -1.0 } else { 1.0 }
+}
+
 /// Into the room from a wall: along its axis by the cosine, along the two axes after it by the rest.
 fn leaving(wall: usize, cosine: f64, turn: f64) -> [f64; 3] {
-    let (axis, inward) = (wall / 2, if wall % 2 == 0 { 1.0 } else { -1.0 });
+    let (axis, inward) = (wall / 2, -side(wall));
     let sine = (1.0 - cosine * cosine).max(0.0).sqrt();
     let angle = std::f64::consts::TAU * turn;
     let mut direction = [0.0; 3];
@@ -79,17 +84,17 @@ fn leaving(wall: usize, cosine: f64, turn: f64) -> [f64; 3] {
 fn exit(position: [f64; 3], direction: [f64; 3], on_face: usize) -> ([f64; 3], usize) {
     let (mut nearest, mut face) = (f64::INFINITY, usize::MAX);
     for candidate in 0..6 {
-        let (axis, side) = (candidate / 2, if candidate % 2 == 0 { -HALF_EDGE } else { HALF_EDGE });
-        if candidate == on_face || direction[axis] * side <= 0.0 {
+        let (axis, plane) = (candidate / 2, side(candidate) * HALF_EDGE);
+        if candidate == on_face || direction[axis] * plane <= 0.0 {
             continue;
         }
-        let distance = (side - position[axis]) / direction[axis];
+        let distance = (plane - position[axis]) / direction[axis];
         if distance < nearest {
             (nearest, face) = (distance, candidate);
         }
     }
     let mut end: [f64; 3] = std::array::from_fn(|axis| (position[axis] + nearest * direction[axis]).clamp(-HALF_EDGE, HALF_EDGE));
-    end[face / 2] = if face % 2 == 0 { -HALF_EDGE } else { HALF_EDGE };
+    end[face / 2] = side(face) * HALF_EDGE;
     (end, face)
 }
 

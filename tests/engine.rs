@@ -1,0 +1,247 @@
+//! The engine: devices and their choice, the start-up check, validation messages, timings.
+
+mod common;
+
+use std::time::Instant;
+
+use common::{Check, assert_complains, assert_holds, device, device_with, open, run, run_on_cpu};
+use photonmill::constants::LOOP_LIMIT;
+use photonmill::error::Error;
+use photonmill::gpu::kernels::ScanAdd;
+use photonmill::gpu::{Commands, Constants, Extent, Gpu, Memory, Options, check};
+use photonmill::records::ScanPush;
+use photonmill::rng::Rng;
+use photonmill::settings::{Gather, Settings, Variant};
+use photonmill::timings::{Clock, Row, Timings};
+
+/// Opening a device runs the start-up check on it, with 64-bit sums and with sums of two words.
+#[test]
+fn the_start_up_check_passes() {
+    let Some(gpu) = device() else { return };
+    assert!(gpu.facts().lacks.is_empty());
+    assert!(gpu.facts().subgroup_size >= 1 && gpu.facts().storage_buffer_range_bytes >= 1 << 27);
+    drop(gpu);
+    let lesser = device_with(Options { without_int64_atomics: true, without_timestamps: true, ..Options::default() }).unwrap();
+    assert!(!lesser.facts().int64_atomics);
+    assert_eq!(lesser.facts().timestamp_bits, 0);
+}
+
+/// Every loop of the kernels stays within what every device counts right; beyond, a device may leave a
+/// loop early and must say so here.
+#[test]
+fn loops_count_right_up_to_the_limit() {
+    let Some(gpu) = device() else { return };
+    for wanted in [0, 1, 1000, LOOP_LIMIT - 1, LOOP_LIMIT] {
+        let count = check::loop_count(&gpu, wanted).unwrap();
+        assert_eq!((count.wanted, count.done), (wanted, wanted));
+    }
+    let long = check::loop_count(&gpu, 200_000).unwrap();
+    println!("{}: {} of {} iterations", gpu.facts().name, long.done, long.wanted);
+    assert_eq!(long.wanted, 200_000);
+    assert!(long.done >= LOOP_LIMIT && long.done <= long.wanted);
+}
+
+#[test]
+fn a_device_that_is_absent_is_named_with_those_present() {
+    if device().is_none() {
+        return;
+    }
+    let present = Gpu::list().unwrap();
+    assert!(!present.is_empty());
+    for wanted in ["no such device", "4096"] {
+        let Err(error) = Gpu::open(&Options { device: Some(wanted.to_owned()), ..Options::default() }) else {
+            panic!("{wanted} was opened")
+        };
+        assert!(matches!(error, Error::DeviceAbsent { .. }), "{error}");
+        let message = error.to_string();
+        assert!(message.contains(wanted) && !message.contains('\n'), "{message}");
+        for facts in &present {
+            assert!(message.contains(&facts.name), "{message} leaves out {}", facts.name);
+        }
+        assert_eq!(error.exit_code(), 2);
+    }
+}
+
+#[test]
+fn a_device_opens_by_index_and_by_part_of_its_name() {
+    let Some(default) = device() else { return };
+    let facts = default.facts();
+    for name in [facts.index.to_string(), facts.name.clone(), facts.name[..4].to_uppercase()] {
+        let Ok(gpu) = Gpu::open(&Options { device: Some(name.clone()), validate: true, ..Options::default() }) else { panic!("{name}") };
+        gpu.check_validation().unwrap();
+        if name.len() > 4 || name.parse::<usize>().is_ok() {
+            assert_eq!(gpu.facts().name, facts.name);
+        }
+    }
+}
+
+/// A mistake that the layer sees while commands are recorded; they never run.
+#[test]
+fn a_validation_message_is_an_error() {
+    let Some(gpu) = open(Options::default()) else { return };
+    gpu.check_validation().unwrap();
+    {
+        let mut commands = Commands::new(&gpu, Constants::new(128), Instant::now()).unwrap();
+        let items = gpu.buffer::<u32>("items", 128, Memory::Device).unwrap();
+        let block_sums = gpu.buffer::<u32>("block sums", 1, Memory::Device).unwrap();
+        // One word cannot hold the three of a dispatch size.
+        let too_small = gpu.buffer::<u32>("too small", 1, Memory::Device).unwrap();
+        let kernel = ScanAdd { items: &items, block_sums: &block_sums };
+        commands.dispatch(kernel, &ScanPush { item_count: 128 }, Extent::Indirect(&too_small)).unwrap();
+    }
+    let error = gpu.check_validation().unwrap_err();
+    assert!(matches!(error, Error::Validation { count: 1.., .. }), "{error}");
+    assert!(error.to_string().contains("vkCmdDispatchIndirect"), "{error}");
+    // Once said, it stays said.
+    assert!(gpu.check_validation().is_err());
+}
+
+#[test]
+fn without_the_layer_nothing_is_said() {
+    if device().is_none() {
+        return;
+    }
+    let gpu = Gpu::open(&Options { device: std::env::var("PHOTONMILL_DEVICE").ok(), ..Options::default() }).unwrap();
+    gpu.check_validation().unwrap();
+}
+
+/// Scopes directly inside another one.
+fn children<'a>(rows: &'a [Row], parent: &'a str) -> impl Iterator<Item = &'a Row> {
+    rows.iter()
+        .filter(move |row| row.name.strip_prefix(parent).and_then(|rest| rest.strip_prefix('/')).is_some_and(|name| !name.contains('/')))
+}
+
+/// On each clock a scope lasts as long as those inside it together, or longer, and no time on the
+/// device is longer than the host waited for it.
+fn nesting_check(rows: &[Row]) -> Check {
+    // Timestamps are rounded to nanoseconds, so sums of many may be a little off.
+    let slack = |count: u64| 1e-6 * (count as f64 + 2.0);
+    for row in rows {
+        for (clock, of) in [("device", (|row| row.gpu_ms) as fn(&Row) -> Option<f64>), ("host", |row| row.wall_ms)] {
+            let inside: f64 = children(rows, &row.name).filter_map(of).sum();
+            let count: u64 = children(rows, &row.name).map(|row| row.count).sum();
+            if let Some(time) = of(row)
+                && inside > time + slack(count)
+            {
+                return Err(format!("{} took {time} ms on the {clock}, what is inside it {inside} ms", row.name));
+            }
+        }
+        if let (Some(gpu), Some(wall)) = (row.gpu_ms, row.wall_ms)
+            && gpu > wall
+        {
+            return Err(format!("{} took {gpu} ms on the device within {wall} ms", row.name));
+        }
+    }
+    Ok(())
+}
+
+/// How often each scope must have run.
+fn count_check(timings: &Timings, settings: &Settings, chunks: u64) -> Check {
+    let rounds = u64::from(settings.rounds) * chunks;
+    let mut names = vec!["round".to_owned(), "round/build".to_owned(), "round/build/emit".to_owned(), "round/gather".to_owned()];
+    names.extend((1..=settings.bounces).map(|bounce| format!("round/build/bounce {bounce}")));
+    if settings.gather == Gather::Grid {
+        names.push("round/index".to_owned());
+    }
+    for name in &names {
+        match timings.row(name) {
+            Some(row) if row.count == rounds => {}
+            Some(row) => return Err(format!("{name} ran {} times instead of {rounds}", row.count)),
+            None => return Err(format!("{name} is missing")),
+        }
+    }
+    let bounces = timings.rows().iter().filter(|row| row.name.contains("bounce")).count();
+    if bounces != settings.bounces as usize {
+        return Err(format!("{bounces} rows of bounces instead of {}", settings.bounces));
+    }
+    Ok(())
+}
+
+#[test]
+fn timings_nest_and_count() {
+    let Some(gpu) = device() else { return };
+    for variant in Variant::ON_GPU {
+        // 120 bounces of many rounds take more timestamps than one submission has.
+        for (rounds, bounces, chunk, gather) in
+            [(1, 15, None, Gather::Grid), (7, 2, Some(1000), Gather::Brute), (40, 120, None, Gather::Grid)]
+        {
+            let settings =
+                Settings { variant, rounds, bounces, chunk, gather, mesh: 16, photons: 2001, rng: Rng::Philox, ..Settings::default() };
+            let outcome = run(&gpu, &settings);
+            let what = format!("{variant:?}, {rounds} rounds");
+            assert_holds(&what, count_check(&outcome.timings, &settings, u64::from(outcome.plan.chunks_per_round)));
+            assert_holds(&what, nesting_check(outcome.timings.rows()));
+            assert!(outcome.submissions >= 1 && outcome.dispatches > u64::from(bounces));
+            if gpu.facts().timestamp_bits != 0 {
+                for name in ["round", "round/build", "round/build/emit", "round/build/bounce 1", "round/gather"] {
+                    assert!(outcome.timings.row(name).unwrap().gpu_ms.is_some_and(|ms| ms > 0.0), "{what}: {name}");
+                }
+            }
+            let wall = outcome.timings.row("run").unwrap().wall_ms.unwrap();
+            let waited: f64 = outcome
+                .timings
+                .rows()
+                .iter()
+                .filter(|row| !row.name.contains('/') && row.name != "run")
+                .filter_map(|row| row.wall_ms)
+                .sum();
+            assert!(waited <= wall, "{what}: waited {waited} ms of {wall}");
+            // Spans of the trace file add up to the rows.
+            let spans: f64 = outcome
+                .timings
+                .spans()
+                .iter()
+                .filter(|span| span.clock == Clock::Gpu && span.name == "round")
+                .map(|span| span.duration.as_secs_f64() * 1e3)
+                .sum();
+            let row = outcome.timings.row("round").unwrap().gpu_ms.unwrap_or(0.0);
+            assert!((spans - row).abs() <= 1e-6 * row.max(1.0), "{spans} and {row}");
+        }
+    }
+}
+
+#[test]
+fn the_cpu_builder_is_timed_on_the_host() {
+    let settings = Settings { rounds: 3, chunk: Some(1500), mesh: 16, ..Settings::default() };
+    let outcome = run_on_cpu(&settings);
+    assert_holds("cpu", count_check(&outcome.timings, &settings, u64::from(outcome.plan.chunks_per_round)));
+    assert_holds("cpu", nesting_check(outcome.timings.rows()));
+    assert!(outcome.timings.rows().iter().all(|row| row.gpu_ms.is_none() && row.wall_ms.is_some()));
+    assert!(outcome.device.is_none());
+}
+
+/// A run makes no pipeline that its plan has no use for, and a second one none at all.
+#[test]
+fn a_run_makes_the_pipelines_of_its_plan_once() {
+    let Some(gpu) = device() else { return };
+    let settings = Settings { variant: Variant::Naive, gather: Gather::Brute, mesh: 8, ..Settings::default() };
+    let before = gpu.pipeline_count();
+    run(&gpu, &settings);
+    // Emission, one bounce, one gather.
+    assert_eq!(gpu.pipeline_count() - before, 3);
+    run(&gpu, &settings);
+    assert_eq!(gpu.pipeline_count() - before, 3);
+}
+
+#[test]
+fn the_checks_of_timings_complain() {
+    let settings = Settings { rounds: 2, mesh: 4, ..Settings::default() };
+    let timings = run_on_cpu(&settings).timings;
+    assert_holds("the run itself", nesting_check(timings.rows()));
+    let spoiled = |spoil: fn(&mut Row)| {
+        let mut rows = timings.rows().to_vec();
+        rows.iter_mut().filter(|row| row.name == "round/build").for_each(spoil);
+        rows
+    };
+    assert_complains("a scope longer than its parent", nesting_check(&spoiled(|row| row.wall_ms = Some(1e9))));
+    assert_complains("a scope shorter than what it holds", nesting_check(&spoiled(|row| row.wall_ms = Some(0.0))));
+    assert_complains("a device faster than time", nesting_check(&spoiled(|row| row.gpu_ms = Some(1e9))));
+
+    let mut twice = timings.clone();
+    twice.count("round/build/bounce 3");
+    assert_complains("a bounce counted twice", count_check(&twice, &settings, 1));
+    let mut extra = timings.clone();
+    extra.count("round/build/bounce 16");
+    assert_complains("a bounce too many", count_check(&extra, &settings, 1));
+    assert_complains("a round left out", count_check(&timings, &Settings { rounds: 3, ..settings.clone() }, 1));
+}

@@ -1,0 +1,363 @@
+//! Same bits: the film's integer sums do not depend on the builder, the gather, the work groups, the
+//! split into dispatches, the run or the device's abilities, and hold exactly what lies in reach.
+
+mod common;
+
+use std::time::Instant;
+
+use common::{
+    Check, assert_complains, assert_holds, device, device_with, equal_sums, photons, photons_on_cpu, plan_for, plan_for_host, run,
+    run_on_cpu,
+};
+use glam::Vec3;
+use photonmill::cpu;
+use photonmill::film::Film;
+use photonmill::gpu::{Commands, Gpu, Options};
+use photonmill::plan::Plan;
+use photonmill::records::Photon;
+use photonmill::render::constants;
+use photonmill::resources::Resources;
+use photonmill::rng::Rng;
+use photonmill::scene::open_box::open_box;
+use photonmill::settings::{Gather, Preset, Settings, Variant};
+use photonmill::{estimate, index};
+
+/// What changes the film's channels and its fixed point. A smaller mesh than the paper's, and no
+/// multiple of a work group, keeps the brute gathers short.
+fn effects() -> Vec<(&'static str, Settings)> {
+    let paper = Settings { mesh: 19, ..Settings::default() };
+    let glossy = [Some(2.0), None, Some(0.5), Some(0.01), Some(5.0)];
+    vec![
+        ("Lambertian walls", paper.clone()),
+        ("Phong walls", Settings { shininess: glossy, ..paper.clone() }),
+        ("lights of unequal power", Settings { light_power: [3.0, 0.2], ..paper.clone() }),
+        ("an odd number of photons", Settings { photons: 4999, rng: Rng::Philox, ..paper.clone() }),
+        ("several rounds", Settings { photons: 1201, rounds: 4, shininess: glossy, light_power: [1.0, 2.0], radius: 0.025, ..paper }),
+    ]
+}
+
+fn film(gpu: &Gpu, settings: &Settings) -> Film {
+    run(gpu, settings).film
+}
+
+fn assert_same(what: &str, how: &str, found: &Film, expected: &Film) {
+    let what = format!("{what}, {how}");
+    assert_eq!((found.channel_count, found.scale, found.emitted), (expected.channel_count, expected.scale, expected.emitted), "{what}");
+    assert_holds(&what, equal_sums(&what, &found.sums, &expected.sums));
+}
+
+#[test]
+fn runs_and_builders_and_gathers_give_the_same_bits() {
+    let Some(gpu) = device() else { return };
+    for (what, settings) in effects() {
+        let expected = film(&gpu, &settings);
+        assert!(expected.sums.iter().filter(|sum| **sum > 0).count() > expected.sums.len() / 2, "{what}: a dark film proves nothing");
+        for run in 1..10 {
+            assert_same(what, &format!("run {run}"), &film(&gpu, &settings), &expected);
+        }
+        for variant in Variant::ON_GPU {
+            for gather in [Gather::Grid, Gather::Brute] {
+                let other = Settings { variant, gather, ..settings.clone() };
+                assert_same(what, &format!("{variant:?} {gather:?}"), &film(&gpu, &other), &expected);
+            }
+        }
+    }
+}
+
+#[test]
+fn work_groups_and_chunks_give_the_same_bits() {
+    let Some(gpu) = device() else { return };
+    for (what, settings) in effects() {
+        let expected = film(&gpu, &settings);
+        for (place, group_size) in [32, 64, 256, 512, 1024].into_iter().enumerate() {
+            if group_size > gpu.facts().work_group_size {
+                continue;
+            }
+            let variant = Variant::ON_GPU[place % 3];
+            for gather in [Gather::Grid, Gather::Brute] {
+                let other = Settings { group_size, variant, gather, ..settings.clone() };
+                assert_same(what, &format!("groups of {group_size}, {variant:?} {gather:?}"), &film(&gpu, &other), &expected);
+            }
+        }
+        for (place, chunk) in [301, 1024, 4998].into_iter().enumerate() {
+            let other = Settings { chunk: Some(chunk), variant: Variant::ON_GPU[place % 3], ..settings.clone() };
+            let outcome = run(&gpu, &other);
+            assert_eq!(outcome.plan.chunks_per_round, settings.photons.div_ceil(chunk), "{what}");
+            assert_same(what, &format!("chunks of {chunk}"), &outcome.film, &expected);
+        }
+    }
+}
+
+#[test]
+fn a_device_without_abilities_gives_the_same_bits() {
+    let Some(gpu) = device() else { return };
+    for (without_int64_atomics, without_timestamps) in [(true, false), (false, true), (true, true)] {
+        let Some(lesser) = device_with(Options { without_int64_atomics, without_timestamps, ..Options::default() }) else { return };
+        assert!(!(without_int64_atomics && lesser.facts().int64_atomics));
+        for (what, settings) in effects() {
+            let expected = film(&gpu, &settings);
+            for gather in [Gather::Grid, Gather::Brute] {
+                let outcome = run(&lesser, &Settings { gather, ..settings.clone() });
+                assert_same(what, &format!("64-bit atomics masked: {without_int64_atomics}, {gather:?}"), &outcome.film, &expected);
+                let rows = outcome.timings.rows();
+                assert!(!rows.is_empty());
+                if without_timestamps {
+                    assert!(rows.iter().all(|row| row.gpu_ms.is_none()), "{rows:?}");
+                    assert!(outcome.timings.row("run").unwrap().wall_ms.is_some());
+                } else if lesser.facts().timestamp_bits != 0 {
+                    assert!(outcome.timings.row("round/gather").unwrap().gpu_ms.is_some(), "{rows:?}");
+                }
+            }
+        }
+    }
+}
+
+/// The CPU's gather of some photons: what the device's must equal, to the bit, as both test the same
+/// f32 numbers.
+fn gathered_on_cpu(plan: &Plan, photons: &[Photon]) -> Vec<u64> {
+    let mut by_brute = vec![0; plan.points.len() * plan.channel_count as usize];
+    cpu::estimate::gather_brute(plan, photons, &mut by_brute);
+    let mut by_grid = vec![0; by_brute.len()];
+    cpu::estimate::gather_grid(plan, &cpu::index::Index::build(plan.grid, photons), &mut by_grid);
+    assert_holds("the CPU's grid", equal_sums("grid against brute", &by_grid, &by_brute));
+    by_brute
+}
+
+/// The device's gather of photons that are handed to it.
+fn gathered_on_gpu(gpu: &Gpu, settings: &Settings, photons: &[Photon]) -> Vec<u64> {
+    let scene = open_box(settings);
+    let plan = plan_for(gpu, &scene, settings);
+    assert!(photons.len() <= plan.photon_capacity as usize);
+    let mut commands = Commands::new(gpu, constants(&plan), Instant::now()).unwrap();
+    let resources = Resources::new(gpu, &mut commands, &scene, &plan).unwrap();
+    commands.upload(&resources.photons, photons).unwrap();
+    commands.upload(&resources.counters, &[photons.len() as u32]).unwrap();
+    index::build(&mut commands, &resources, &plan, settings.photons).unwrap();
+    estimate::gather(&mut commands, &resources, &plan, settings.photons).unwrap();
+    commands.read(&resources.film, plan.points.len() * plan.channel_count as usize).unwrap()
+}
+
+#[test]
+fn device_and_cpu_gather_the_same_photons_to_the_same_bits() {
+    let Some(gpu) = device() else { return };
+    for (what, settings) in effects().into_iter().filter(|(_, settings)| settings.rounds == 1) {
+        let map = photons(&gpu, &settings);
+        let plan = plan_for(&gpu, &open_box(&settings), &settings);
+        for radius in [0.5 / 65_536.0, 0.003, 0.025, 0.05, 0.1, 0.5] {
+            let settings = Settings { radius, ..settings.clone() };
+            let plan = Plan { grid: plan_for(&gpu, &open_box(&settings), &settings).grid, settings: settings.clone(), ..plan.clone() };
+            assert_holds(
+                format!("{what}, radius {radius}"),
+                equal_sums("the device's film", &film(&gpu, &settings).sums, &gathered_on_cpu(&plan, &map)),
+            );
+        }
+    }
+}
+
+/// Sum over all photons of the texels of their wall within the radius, counted photon by photon.
+fn texels_in_reach(plan: &Plan, photons: &[Photon]) -> u64 {
+    let radius_squared = (plan.settings.radius * plan.settings.radius) as f32;
+    let in_reach = |photon: &Photon| {
+        let reached = plan.points.iter().filter(|point| {
+            let offset = photon.position - point.position;
+            // The kernels' order of operations, so that photons on the rim fall to the same side.
+            point.wall == photon.wall && offset.x * offset.x + offset.y * offset.y + offset.z * offset.z <= radius_squared
+        });
+        reached.count() as u64
+    };
+    photons.iter().map(in_reach).sum()
+}
+
+fn mass_check(film: &Film, plan: &Plan, photons: &[Photon]) -> Check {
+    equal_sums("mass", &[film.sums.iter().sum()], &[texels_in_reach(plan, photons)])
+}
+
+#[test]
+fn the_film_holds_every_photon_once_for_each_texel_in_reach() {
+    let Some(gpu) = device() else { return };
+    for (radius, gather) in [(0.05, Gather::Grid), (0.05, Gather::Brute), (0.025, Gather::Grid), (0.5, Gather::Grid)] {
+        let settings = Settings { radius, gather, mesh: 32, ..Settings::default() };
+        let plan = plan_for(&gpu, &open_box(&settings), &settings);
+        let found = film(&gpu, &settings);
+        let map = photons(&gpu, &settings);
+        // One sum a texel, of whole photons.
+        assert_eq!((found.channel_count, found.scale), (1, 1.0));
+        assert_holds(format!("radius {radius} {gather:?}"), mass_check(&found, &plan, &map));
+
+        assert_complains("a photon lost", mass_check(&found, &plan, &map[1..]));
+        assert_complains("a photon doubled", mass_check(&found, &plan, &[&map[..], &map[..1]].concat()));
+        if radius < 0.5 {
+            let wider = Plan { settings: Settings { radius: 1.01 * radius, ..settings.clone() }, ..plan.clone() };
+            assert_complains("a radius 1 % too large", mass_check(&found, &wider, &map));
+        }
+    }
+}
+
+/// The device's film and a film of the CPU builder's own photons: the same but for photons on the rim.
+#[test]
+fn the_cpu_builders_film_agrees_to_single_counts() {
+    let Some(gpu) = device() else { return };
+    let settings = Settings::default();
+    let (device, host) = (film(&gpu, &settings), run_on_cpu(&settings).film);
+    assert_eq!((device.channel_count, device.scale), (host.channel_count, host.scale));
+    let differences: Vec<u64> = device.sums.iter().zip(&host.sums).map(|(a, b)| a.abs_diff(*b)).collect();
+    let pairs: u64 = host.sums.iter().sum();
+    assert!(differences.iter().all(|difference| *difference <= 1));
+    assert!(differences.iter().sum::<u64>() as f64 <= 2e-5 * pairs as f64, "{} of {pairs}", differences.iter().sum::<u64>());
+
+    // The CPU's own choices change no bit at all.
+    for (threads, gather, chunk) in
+        [(2, Gather::Grid, None), (3, Gather::Brute, None), (1, Gather::Brute, Some(777)), (2, Gather::Grid, Some(64))]
+    {
+        let other = run_on_cpu(&Settings { threads, gather, chunk, ..settings.clone() }).film;
+        assert_same("cpu", &format!("{threads} threads {gather:?} chunks of {chunk:?}"), &other, &host);
+    }
+}
+
+/// One photon at a place on the back wall, where x and y lie along the wall.
+fn photon_at(x: f32, y: f32) -> Photon {
+    Photon { position: Vec3::new(x, y, -0.25), wall: 4, flux: 1.0, weight: 1.0, photon: 0, bounce: 0 }
+}
+
+/// (radius in texels, photon, texels in reach): a radius is inclusive, and in these units every number
+/// is exact, so that ties are ties.
+fn ties() -> Vec<(f64, Photon, u64)> {
+    let pitch = 0.5 / 64.0;
+    let centre = photon_at(0.5 * pitch, 0.5 * pitch);
+    let corner = photon_at(0.0, 0.0);
+    // Twelve texels lie exactly 5 away (5 + 0 and 3 + 4), and would be missed by a strict test: 69.
+    vec![(5.0, centre, 81), (6.4, centre, 129), (3.2, centre, 37), (6.4, corner, 124)]
+}
+
+#[test]
+fn a_photon_on_the_rim_counts() {
+    let gpu = device();
+    for (radius_in_texels, photon, expected) in ties() {
+        let settings = Settings { radius: radius_in_texels * 0.5 / 64.0, ..Settings::default() };
+        let on_cpu = gathered_on_cpu(&plan_for_host(&settings), &[photon]);
+        assert_eq!(on_cpu.iter().sum::<u64>(), expected, "radius of {radius_in_texels} texels");
+        for gather in [Gather::Grid, Gather::Brute] {
+            let Some(gpu) = &gpu else { continue };
+            let on_gpu = gathered_on_gpu(gpu, &Settings { gather, ..settings.clone() }, &[photon]);
+            assert_holds(format!("{gather:?}"), equal_sums("one photon", &on_gpu, &on_cpu));
+        }
+    }
+}
+
+/// An empty map is dark; a single photon is one count within the radius and nothing outside, also in
+/// the corner cells of the grid.
+#[test]
+fn an_empty_map_and_a_map_of_one() {
+    let Some(gpu) = device() else { return };
+    for gather in [Gather::Grid, Gather::Brute] {
+        let settings = Settings { gather, ..Settings::default() };
+        assert!(gathered_on_gpu(&gpu, &settings, &[]).iter().all(|sum| *sum == 0));
+        let plan = plan_for(&gpu, &open_box(&settings), &settings);
+        for (x, y) in [(0.25, 0.25), (-0.25, -0.25), (0.25, -0.25), (0.1, 0.25), (0.0, 0.0)] {
+            let photon = photon_at(x, y);
+            let found = gathered_on_gpu(&gpu, &settings, &[photon]);
+            assert_holds(format!("{gather:?}"), equal_sums("one photon", &found, &gathered_on_cpu(&plan, &[photon])));
+            assert_eq!(found.iter().sum::<u64>(), texels_in_reach(&plan, &[photon]));
+            assert!(found.iter().all(|sum| *sum <= 1) && found[..4 * 4096].iter().all(|sum| *sum == 0), "other walls stay dark");
+        }
+    }
+    // Nothing is stored in a black box, and the whole line still runs.
+    for variant in Variant::ON_GPU {
+        let black = film(&gpu, &Settings { reflectance: 0.0, variant, ..Settings::default() });
+        assert!(black.sums.iter().all(|sum| *sum == 0));
+    }
+}
+
+/// A photon list far beyond the 65 535 iterations after which lavapipe leaves its loops.
+#[test]
+fn long_photon_lists_are_gathered_to_the_end() {
+    let Some(gpu) = device() else { return };
+    // Few points keep the brute gather short; what is long is the list.
+    let settings =
+        Settings { photons: 200_000, rng: Rng::Philox, mesh: 8, chunk: Some(200_000), variant: Variant::Ballot, ..Settings::default() };
+    let map = photons(&gpu, &settings);
+    assert!(map.len() > 290_000);
+    let plan = plan_for(&gpu, &open_box(&settings), &settings);
+    let expected = gathered_on_cpu(&plan, &map);
+    for gather in [Gather::Brute, Gather::Grid] {
+        let outcome = run(&gpu, &Settings { gather, ..settings.clone() });
+        assert_eq!(outcome.plan.photon_capacity, plan.photon_capacity);
+        assert_holds(format!("{gather:?}"), equal_sums("200 000 photons", &outcome.film.sums, &expected));
+    }
+    // Every photon within reach of every point of its wall: a list of 60 000 for each, in many slices.
+    let settings = Settings { radius: 0.5, mesh: 2, ..settings };
+    let plan = plan_for(&gpu, &open_box(&settings), &settings);
+    let expected = gathered_on_cpu(&plan, &map);
+    for (gather, variant) in [(Gather::Brute, Variant::Ballot), (Gather::Grid, Variant::Ballot), (Gather::Brute, Variant::Naive)] {
+        let found = film(&gpu, &Settings { gather, variant, ..settings.clone() });
+        assert_holds(format!("{gather:?} {variant:?}, wide"), equal_sums("200 000 photons", &found.sums, &expected));
+    }
+    let cut_short = gathered_on_cpu(&plan, &map[..65_535]);
+    assert_complains("a list cut short", equal_sums("65 535 photons", &cut_short, &expected));
+}
+
+#[test]
+#[ignore = "6e9 pair tests on the paper's mesh take half a minute on a software device"]
+fn long_photon_lists_are_gathered_to_the_end_on_the_papers_mesh() {
+    let Some(gpu) = device() else { return };
+    let settings = Settings { photons: 200_000, rng: Rng::Philox, threads: 2, ..Settings::default() };
+    let expected = film(&gpu, &settings);
+    let brute = film(&gpu, &Settings { gather: Gather::Brute, ..settings.clone() });
+    assert_same("200 000 photons", "brute", &brute, &expected);
+    let plan = plan_for_host(&settings);
+    assert_holds("cpu", equal_sums("cpu", &gathered_on_cpu(&plan, &photons(&gpu, &settings)), &expected.sums));
+}
+
+/// Rounds are other photons each: what the second one adds is not what the first one did.
+#[test]
+fn a_run_is_the_sum_of_rounds_that_differ() {
+    let Some(gpu) = device() else { return };
+    for rng in [Rng::Rand48, Rng::Mt, Rng::Philox] {
+        let of = |rounds| film(&gpu, &Settings { rng, rounds, ..Settings::preset(Preset::Modified) });
+        let (one, two, three) = (of(1), of(2), of(3));
+        assert_eq!(three.emitted, 15_000);
+        let added = |more: &Film, less: &Film| {
+            more.sums.iter().zip(&less.sums).map(|(more, less)| more.checked_sub(*less).unwrap()).collect::<Vec<u64>>()
+        };
+        let (second, third) = (added(&two, &one), added(&three, &two));
+        for (what, found, other) in [
+            ("second like the first", &second, &one.sums),
+            ("third like the second", &third, &second),
+            ("third like the first", &third, &one.sums),
+        ] {
+            assert_complains(&format!("{rng:?}: a round that repeats, {what}"), equal_sums("round", found, other));
+        }
+        // And each is as bright as the others but for noise: a round stores 7512 +- 141 photons, and
+        // the film counts each some 115 times.
+        let mass = |sums: &[u64]| sums.iter().sum::<u64>() as f64;
+        for (what, sums) in [("second", &second), ("third", &third)] {
+            let ratio = mass(sums) / mass(&one.sums);
+            assert!((ratio - 1.0).abs() < 0.15, "{rng:?}: the {what} round is {ratio} of the first");
+        }
+    }
+}
+
+/// What the comparisons above would say of a film that is off.
+#[test]
+fn the_checks_complain_about_spoiled_films() {
+    let settings = Settings::default();
+    let map = photons_on_cpu(&settings);
+    let plan = plan_for_host(&settings);
+    let expected = gathered_on_cpu(&plan, &map);
+    assert_holds("the film itself", equal_sums("film", &expected, &expected));
+    let mut heavier = expected.clone();
+    *heavier.iter_mut().max().unwrap() += 1;
+    let gained: Vec<u64> = expected.iter().map(|sum| (*sum as f64 * 1.01).round() as u64).collect();
+    let mut wrapped = expected.clone();
+    wrapped[77] += 1 << 32;
+    let moved: Vec<Photon> = map.iter().map(|photon| Photon { position: photon.position * 1.001, ..*photon }).collect();
+    for (what, spoiled) in [
+        ("one count more", heavier),
+        ("a gain of 1 %", gained),
+        ("a carry too many", wrapped),
+        ("a photon lost", gathered_on_cpu(&plan, &map[1..])),
+        ("a scale of 0.1 %", gathered_on_cpu(&plan, &moved)),
+    ] {
+        assert_complains(what, equal_sums("film", &spoiled, &expected));
+    }
+}

@@ -1,0 +1,359 @@
+//! Same photons: whatever stores them, in whatever groups and chunks, the photon map of a seed is the
+//! same set, bit for bit on one device, and the CPU builder agrees photon by photon.
+
+mod common;
+
+use std::collections::{HashMap, HashSet};
+
+use common::{Check, assert_complains, assert_holds, device, in_order, photons, photons_on_cpu};
+use photonmill::gpu::Gpu;
+use photonmill::records::Photon;
+use photonmill::rng::{self, Rng, Streams};
+use photonmill::settings::{EmissionLaw, PhongDirection, Settings, Variant};
+
+const GENERATORS: [Rng; 3] = [Rng::Rand48, Rng::Mt, Rng::Philox];
+/// Around subgroups of 8, 32 and 64, around the work group of 128, and two odd numbers of photons.
+const COUNTS: [u32; 12] = [2, 3, 7, 8, 9, 31, 63, 64, 65, 129, 1000, 5001];
+
+/// Two photon maps as sets, bit for bit.
+fn same_set(found: &[Photon], expected: &[Photon]) -> Check {
+    let (found, expected) = (in_order(found.to_vec()), in_order(expected.to_vec()));
+    if found.len() != expected.len() {
+        return Err(format!("{} photons instead of {}", found.len(), expected.len()));
+    }
+    let differing = found.iter().zip(&expected).find(|(a, b)| bytemuck::bytes_of(*a) != bytemuck::bytes_of(*b));
+    differing.map_or(Ok(()), |(a, b)| Err(format!("{a:?} instead of {b:?}")))
+}
+
+/// No photon is stored twice at a bounce, none at a bounce before which it was not stored, none
+/// outside the numbers of the round.
+fn each_once(found: &[Photon], photon_count: u32, bounces: u32) -> Check {
+    let seen: HashSet<(u32, u32)> = found.iter().map(|photon| (photon.photon, photon.bounce)).collect();
+    if seen.len() != found.len() {
+        return Err(format!("{} of {} photons are there twice", found.len() - seen.len(), found.len()));
+    }
+    for &(photon, bounce) in &seen {
+        if photon >= photon_count || bounce >= bounces {
+            return Err(format!("photon {photon} at bounce {bounce} is none of {photon_count} with {bounces} bounces"));
+        }
+        if bounce > 0 && !seen.contains(&(photon, bounce - 1)) {
+            return Err(format!("photon {photon} was stored at bounce {bounce} and not before"));
+        }
+    }
+    Ok(())
+}
+
+/// The three builders on the device store one set; returns it.
+fn builders_agree(gpu: &Gpu, settings: &Settings) -> Vec<Photon> {
+    let of = |variant| photons(gpu, &Settings { variant, ..settings.clone() });
+    let expected = of(Variant::Naive);
+    let what = |variant| {
+        let Settings { photons, rng, emission, shininess, group_size, chunk, .. } = settings;
+        format!(
+            "{variant:?}, {photons} photons, {rng:?}, {emission:?}, shininess {:?}, groups of {group_size}, chunks of {chunk:?}",
+            shininess[0]
+        )
+    };
+    assert_holds(what(Variant::Naive), each_once(&expected, settings.photons, settings.bounces));
+    for variant in [Variant::Atomic, Variant::Ballot] {
+        let found = of(variant);
+        assert_holds(what(variant), each_once(&found, settings.photons, settings.bounces));
+        assert_holds(what(variant), same_set(&found, &expected));
+    }
+    expected
+}
+
+#[test]
+fn builders_store_the_same_photons_at_every_count() {
+    let Some(gpu) = device() else { return };
+    for rng in GENERATORS {
+        for photons in COUNTS {
+            let stored = builders_agree(&gpu, &Settings { photons, rng, ..Settings::default() });
+            // Empty maps would agree with each other; a handful of photons may all be absorbed.
+            assert!(photons < 63 || stored.len() as u32 > photons, "{rng:?}, {photons} photons stored {}", stored.len());
+        }
+    }
+}
+
+#[test]
+fn builders_store_the_same_photons_for_every_effect() {
+    let Some(gpu) = device() else { return };
+    for rng in GENERATORS {
+        for emission in [EmissionLaw::Uniform, EmissionLaw::Cosine] {
+            for shininess in [[None; 5], [Some(2.0), None, Some(0.5), Some(0.0), Some(50.0)]] {
+                for photons in [65, 1000] {
+                    builders_agree(&gpu, &Settings { photons, rng, emission, shininess, ..Settings::default() });
+                }
+            }
+        }
+    }
+    let sampled = Settings { phong_direction: PhongDirection::Sampled, shininess: [Some(2.0); 5], ..Settings::default() };
+    builders_agree(&gpu, &sampled);
+    builders_agree(&gpu, &Settings { light_power: [3.0, 0.5], ..Settings::default() });
+}
+
+#[test]
+fn group_sizes_and_chunks_change_no_photon() {
+    let Some(gpu) = device() else { return };
+    let settings = Settings { photons: 1001, ..Settings::default() };
+    for rng in GENERATORS {
+        let settings = Settings { rng, ..settings.clone() };
+        let expected = photons(&gpu, &settings);
+        for group_size in [32, 64, 128, 256, 512, 1024].into_iter().filter(|size| *size <= gpu.facts().work_group_size) {
+            let found = builders_agree(&gpu, &Settings { group_size, ..settings.clone() });
+            assert_holds(format!("{rng:?}, groups of {group_size}"), same_set(&found, &expected));
+        }
+        for chunk in [65, 500, 1000, 1001, 5000] {
+            let found = builders_agree(&gpu, &Settings { chunk: Some(chunk), ..settings.clone() });
+            assert_holds(format!("{rng:?}, chunks of {chunk}"), same_set(&found, &expected));
+        }
+    }
+}
+
+#[test]
+fn the_order_of_appending_changes_no_photon() {
+    let Some(gpu) = device() else { return };
+    for variant in [Variant::Atomic, Variant::Ballot] {
+        let settings = Settings { variant, photons: 20_001, ..Settings::default() };
+        let expected = photons(&gpu, &settings);
+        for run in 1..10 {
+            assert_holds(format!("{variant:?}, run {run}"), same_set(&photons(&gpu, &settings), &expected));
+        }
+    }
+}
+
+#[test]
+fn two_naive_bounces_are_the_first_two_of_fifteen() {
+    let Some(gpu) = device() else { return };
+    for rng in GENERATORS {
+        let settings = Settings { rng, ..Settings::default() };
+        let naive = photons(&gpu, &Settings { variant: Variant::Naive, bounces: 2, ..settings.clone() });
+        let mut modified = photons(&gpu, &settings);
+        assert!(modified.iter().any(|photon| photon.bounce >= 10), "{rng:?}");
+        modified.retain(|photon| photon.bounce < 2);
+        assert_holds(format!("{rng:?}"), same_set(&naive, &modified));
+    }
+}
+
+/// How two maps of the same photons differ where rounding may differ.
+#[derive(Debug)]
+struct Disagreement {
+    /// Photons with another fate: another wall, or stored by one builder alone.
+    flipped: usize,
+    /// Metres, of the pairs that remain, sorted.
+    distances: Vec<f64>,
+    /// Of the Phong weights, sorted.
+    weights: Vec<f64>,
+}
+
+impl Disagreement {
+    fn between(found: &[Photon], expected: &[Photon]) -> Disagreement {
+        let mut by_key: HashMap<(u32, u32), Photon> = found.iter().map(|photon| ((photon.photon, photon.bounce), *photon)).collect();
+        let mut flipped = HashSet::new();
+        let (mut distances, mut weights) = (Vec::new(), Vec::new());
+        for photon in expected {
+            match by_key.remove(&(photon.photon, photon.bounce)) {
+                Some(twin) if twin.wall == photon.wall && twin.flux == photon.flux => {
+                    distances.push(f64::from(twin.position.distance(photon.position)));
+                    weights.push(f64::from((twin.weight - photon.weight).abs()));
+                }
+                _ => {
+                    flipped.insert(photon.photon);
+                }
+            }
+        }
+        flipped.extend(by_key.keys().map(|(photon, _)| *photon));
+        distances.sort_by(f64::total_cmp);
+        weights.sort_by(f64::total_cmp);
+        Disagreement { flipped: flipped.len(), distances, weights }
+    }
+
+    /// The bounds for the same random words in two arithmetics of f32 accuracy: other fates for at
+    /// most 1e-5 of the photons; positions 7e-8 m apart in the median, 1.1e-5 at 99.9 % and 2e-3 at
+    /// most (grazing paths) between one of them and f64, so twice that between the two.
+    fn check(&self, photon_count: u32) -> Check {
+        let at = |sorted: &[f64], share: f64| sorted.get((sorted.len() as f64 * share) as usize).copied().unwrap_or(0.0);
+        let worst = |sorted: &[f64]| sorted.last().copied().unwrap_or(0.0);
+        let allowed_flips = f64::from(photon_count) * 1e-5;
+        let bounds = [
+            ("photons with another fate", self.flipped as f64, allowed_flips),
+            ("median distance", at(&self.distances, 0.5), 1.4e-7),
+            ("distance at 99.9 %", at(&self.distances, 0.999), 2.2e-5),
+            ("largest distance", worst(&self.distances), 4e-3),
+            // A weight is a function of position and direction with a slope of about its exponent.
+            ("median difference of weights", at(&self.weights, 0.5), 1e-5),
+            ("difference of weights at 99.9 %", at(&self.weights, 0.999), 1e-3),
+        ];
+        match bounds.iter().find(|(_, value, bound)| value > bound) {
+            None => Ok(()),
+            Some((what, value, bound)) => Err(format!("{what}: {value} where {bound} is allowed")),
+        }
+    }
+}
+
+#[test]
+fn the_cpu_builder_agrees_photon_by_photon() {
+    let Some(gpu) = device() else { return };
+    for rng in GENERATORS {
+        for (emission, shininess) in [(EmissionLaw::Uniform, [None; 5]), (EmissionLaw::Cosine, [Some(2.0); 5])] {
+            let settings = Settings { photons: 200_001, rng, emission, shininess, threads: 2, ..Settings::default() };
+            let disagreement = Disagreement::between(&photons(&gpu, &settings), &photons_on_cpu(&settings));
+            assert!(disagreement.distances.len() > 290_000);
+            println!(
+                "{rng:?}, {emission:?}: {} flipped, distance up to {:e}, weights up to {:e}",
+                disagreement.flipped,
+                disagreement.distances.last().unwrap(),
+                disagreement.weights.last().unwrap()
+            );
+            assert_holds(format!("{rng:?}, {emission:?}"), disagreement.check(settings.photons));
+        }
+    }
+}
+
+#[test]
+fn threads_change_no_photon_of_the_cpu_builder() {
+    for photons in [2, 3, 511, 512, 513, 5001] {
+        for rng in GENERATORS {
+            let settings = Settings { photons, rng, ..Settings::default() };
+            let expected = photons_on_cpu(&settings);
+            assert_holds("one thread", each_once(&expected, photons, settings.bounces));
+            for threads in [2, 3, 8] {
+                let found = photons_on_cpu(&Settings { threads, ..settings.clone() });
+                assert_holds(format!("{rng:?}, {photons} photons, {threads} threads"), same_set(&found, &expected));
+            }
+            let found = photons_on_cpu(&Settings { chunk: Some(64), threads: 3, ..settings.clone() });
+            assert_holds(format!("{rng:?}, {photons} photons in chunks"), same_set(&found, &expected));
+        }
+    }
+}
+
+#[test]
+fn no_two_photons_draw_the_same_numbers() {
+    for rng in GENERATORS {
+        let settings = Settings { rng, photons: 30_001, rounds: 4, ..Settings::default() };
+        let emission_draws =
+            |streams, round, photon| draws_of(streams, round, photon, 0).iter().map(|draw| draw.to_bits()).collect::<Vec<u32>>();
+        let streams = streams_of(&settings);
+        let mut seen = HashSet::new();
+        let mut before = vec![0; 4];
+        for round in 0..settings.rounds {
+            for photon in 0..settings.photons {
+                let draws = emission_draws(streams, round, photon);
+                // Four draws of 24 bits hold no birthday among 120 004 photons but with chance 1e-19.
+                assert!(seen.insert(draws.clone()), "{rng:?}: round {round} photon {photon} repeats {draws:?}");
+                let repeated = draws.iter().zip(&before).filter(|(now, then)| now == then).count();
+                assert!(repeated < 2, "{rng:?}: round {round} photon {photon} repeats {repeated} draws of its neighbour");
+                before = draws;
+            }
+        }
+        // Another seed is another run.
+        let other = emission_draws(Streams { seed: 2, ..streams }, 0, 0);
+        assert!(!seen.contains(&other), "{rng:?}");
+    }
+}
+
+/// Every draw of a photon: four of its emission, three of each bounce.
+fn draws_of(streams: Streams, round: u32, photon: u32, bounces: u32) -> Vec<f32> {
+    let key = streams.key(round);
+    let state = rng::words(streams.jump(round, photon + 1).apply(rng::srand48(streams.seed as u32)));
+    let mut stream = rng::open_stream(streams.rng, &key, photon, state);
+    let mut draws = rng::draw_emission(streams.rng, &key, photon, &mut stream).to_vec();
+    for bounce in 0..bounces {
+        draws.extend(rng::draw_bounce(streams.rng, &key, photon, bounce, &mut stream));
+    }
+    draws
+}
+
+fn streams_of(settings: &Settings) -> Streams {
+    Streams { rng: settings.rng, seed: settings.seed, photons: settings.photons, draws_per_photon: settings.draws_per_photon() }
+}
+
+#[test]
+fn no_two_bounces_draw_the_same_numbers() {
+    for rng in GENERATORS {
+        let settings = Settings { rng, photons: 3001, rounds: 2, ..Settings::default() };
+        let mut seen = HashSet::new();
+        for (round, photon) in (0..settings.rounds).flat_map(|round| (0..settings.photons).map(move |photon| (round, photon))) {
+            let draws = draws_of(streams_of(&settings), round, photon, settings.bounces);
+            assert!(draws.iter().all(|draw| (0.0..1.0).contains(draw)));
+            for (bounce, draws) in draws[4..].chunks(3).enumerate() {
+                // 90 030 triples of 24 bits each: a birthday has chance 1e-12.
+                let bits = [draws[0].to_bits(), draws[1].to_bits(), draws[2].to_bits()];
+                assert!(seen.insert(bits), "{rng:?}: round {round}, photon {photon}, bounce {bounce} repeats {draws:?}");
+            }
+        }
+    }
+}
+
+/// Outputs of MT19937 as its authors wrote it: 624 words seeded, all of them twisted, then tempered.
+fn twister(seed: u32, count: usize) -> Vec<u32> {
+    let mut words = vec![seed];
+    for i in 1..624u32 {
+        let last = words[i as usize - 1];
+        words.push(1_812_433_253u32.wrapping_mul(last ^ (last >> 30)).wrapping_add(i));
+    }
+    for i in 0..624 {
+        let mixed = (words[i] & 0x8000_0000) | (words[(i + 1) % 624] & 0x7fff_ffff);
+        words[i] = words[(i + 397) % 624] ^ (mixed >> 1) ^ if mixed % 2 == 1 { 0x9908_b0df } else { 0 };
+    }
+    let temper = |mut y: u32| {
+        y ^= y >> 11;
+        y ^= (y << 7) & 0x9d2c_5680;
+        y ^= (y << 15) & 0xefc6_0000;
+        y ^ (y >> 18)
+    };
+    words.iter().take(count).map(|word| temper(*word)).collect()
+}
+
+#[test]
+fn a_photons_draws_are_its_twisters_outputs_in_order() {
+    assert_eq!(twister(5489, 3), [3_499_211_612, 581_869_302, 3_890_346_734]);
+    let settings = Settings { rng: Rng::Mt, bounces: rng::MT_MAX_BOUNCES, photons: 501, rounds: 2, ..Settings::default() };
+    let streams = streams_of(&settings);
+    for (round, photon) in [(0, 0), (0, 1), (0, 500), (1, 0), (1, 77)] {
+        // The first of the two words that a stream keeps is the first of the twister, its seed.
+        let seed = rng::open_stream(Rng::Mt, &streams.key(round), photon, glam::UVec2::ZERO).x;
+        let draws = draws_of(streams, round, photon, settings.bounces);
+        let expected: Vec<f32> = twister(seed, draws.len()).iter().map(|word| (word >> 8) as f32 / 16_777_216.0).collect();
+        assert_eq!(draws, expected, "round {round}, photon {photon}");
+    }
+}
+
+#[test]
+fn the_checks_complain_about_spoiled_maps() {
+    let settings = Settings::default();
+    let map = photons_on_cpu(&settings);
+    assert_holds("the map itself", same_set(&map, &map));
+    let spoiled = |spoil: fn(&mut Vec<Photon>)| {
+        let mut spoiled = map.clone();
+        spoil(&mut spoiled);
+        spoiled
+    };
+    let lost = spoiled(|map| map.truncate(map.len() - 1));
+    let doubled = spoiled(|map| map.push(map[100]));
+    let replaced = spoiled(|map| map[100] = map[101]);
+    let nudged = spoiled(|map| map[100].position.x = f32::from_bits(map[100].position.x.to_bits() + 1));
+    let heavier = spoiled(|map| map[100].weight *= 1.01);
+    for (what, map_now) in [
+        ("a lost photon", &lost),
+        ("a doubled one", &doubled),
+        ("one in place of another", &replaced),
+        ("one ulp", &nudged),
+        ("a weight", &heavier),
+    ] {
+        assert_complains(what, same_set(map_now, &map));
+    }
+    for (what, map_now) in [("a doubled photon", &doubled), ("one in place of another", &replaced)] {
+        assert_complains(what, each_once(map_now, settings.photons, settings.bounces));
+    }
+    let orphan = spoiled(|map| map.retain(|photon| photon.bounce != 1));
+    assert_complains("a photon without its last bounce", each_once(&orphan, settings.photons, settings.bounces));
+    assert_complains("a photon beyond the round", each_once(&map, settings.photons - 1, settings.bounces));
+
+    assert_holds("the map itself", Disagreement::between(&map, &map).check(settings.photons));
+    let moved = spoiled(|map| map.iter_mut().for_each(|photon| photon.position *= 1.0 + 1e-5));
+    let rewalled = spoiled(|map| map[100].wall ^= 1);
+    for (what, map_now) in [("a lost photon", &lost), ("a wall", &rewalled), ("a scale of 1e-5", &moved)] {
+        assert_complains(what, Disagreement::between(map_now, &map).check(settings.photons));
+    }
+}

@@ -1,0 +1,507 @@
+//! Prefix sum, grid index, appending to a full map and the size of an indirect dispatch, each against
+//! the plain way to do it on the host.
+
+mod common;
+
+use std::collections::HashSet;
+use std::time::Instant;
+
+use bytemuck::Zeroable;
+use common::{Check, Device, assert_complains, assert_holds, device, equal_sums, in_order, photons, plan_for, run};
+use photonmill::constants::{NO_WALL, SCAN_ITEMS};
+use photonmill::gpu::kernels::{DispatchSize, TraceAtomic, TraceBallot, TraceSlots};
+use photonmill::gpu::{Commands, Constants, Extent, Memory};
+use photonmill::plan::Plan;
+use photonmill::records::{DispatchArgs, DispatchSizePush, Path, Photon, SortedPhoton, Tally, TracePush};
+use photonmill::render::constants;
+use photonmill::resources::{Resources, block_sums};
+use photonmill::rng::Rng;
+use photonmill::scene::open_box::open_box;
+use photonmill::scene::{Scene, Wall};
+use photonmill::settings::{Settings, Variant};
+use photonmill::{index, trace};
+
+/// Words that nothing may touch.
+const GUARD: u32 = 0xDEAD_BEEF;
+
+/// Numbers of a linear congruential generator, 0 to `below` - 1.
+fn numbers(count: usize, below: u32) -> Vec<u32> {
+    let mut state = 12_345u64;
+    (0..count)
+        .map(|_| {
+            state = state.wrapping_mul(6_364_136_223_846_793_005).wrapping_add(1_442_695_040_888_963_407);
+            (state >> 33) as u32 % below
+        })
+        .collect()
+}
+
+/// The device's exclusive prefix sums, and the guard words that stand behind them in the same buffer.
+fn prefix_sums(gpu: &Device, items: &[u32], group_size: u32) -> (Vec<u32>, Vec<u32>) {
+    let guards = 64;
+    let mut commands = Commands::new(gpu, Constants::new(group_size), Instant::now()).unwrap();
+    let buffer = gpu.buffer::<u32>("items", items.len() as u64 + guards, Memory::Device).unwrap();
+    let levels = block_sums(gpu, items.len() as u64, group_size).unwrap();
+    commands.fill(&buffer, 0, items.len() as u64 + guards, GUARD);
+    commands.upload(&buffer, items).unwrap();
+    index::scan(&mut commands, &buffer, &levels, items.len() as u32, group_size).unwrap();
+    let mut sums = commands.read::<u32>(&buffer, items.len() + guards as usize).unwrap();
+    let behind = sums.split_off(items.len());
+    (sums, behind)
+}
+
+fn running_sums(items: &[u32]) -> Vec<u32> {
+    items
+        .iter()
+        .scan(0u32, |before, item| {
+            let sum = *before;
+            *before = before.wrapping_add(*item);
+            Some(sum)
+        })
+        .collect()
+}
+
+fn same_numbers(found: &[u32], expected: &[u32]) -> Check {
+    if found.len() != expected.len() {
+        return Err(format!("{} numbers instead of {}", found.len(), expected.len()));
+    }
+    match (0..found.len()).find(|&place| found[place] != expected[place]) {
+        None => Ok(()),
+        Some(place) => Err(format!("number {place} is {} instead of {}", found[place], expected[place])),
+    }
+}
+
+#[test]
+fn the_prefix_sum_is_the_running_sum() {
+    let Some(gpu) = device() else { return };
+    for group_size in [32, 128, 1024].into_iter().filter(|size| *size <= gpu.facts().work_group_size) {
+        let subgroup = gpu.facts().subgroup_size * SCAN_ITEMS;
+        let block = group_size * SCAN_ITEMS;
+        let sizes = [
+            0,
+            1,
+            3,
+            4,
+            5,
+            subgroup - 1,
+            subgroup,
+            subgroup + 1,
+            block - 1,
+            block,
+            block + 1,
+            2 * block + 1,
+            block * block,
+            block * block + 1,
+            1_000_000,
+        ];
+        for size in sizes.into_iter().filter(|size| *size <= 1_100_000) {
+            let items = numbers(size as usize, 1000);
+            let (sums, behind) = prefix_sums(&gpu, &items, group_size);
+            let what = format!("{size} items, groups of {group_size}");
+            assert_holds(&what, same_numbers(&sums, &running_sums(&items)));
+            assert!(behind.iter().all(|word| *word == GUARD), "{what}: wrote behind the end");
+        }
+    }
+}
+
+/// More work groups than a device must allow along x, so that the dispatch is folded into rows where
+/// it allows no more.
+#[test]
+fn the_prefix_sum_survives_folded_dispatches() {
+    let Some(gpu) = device() else { return };
+    let group_size = 32;
+    let size = 65_535 * group_size * SCAN_ITEMS + 77;
+    let items = numbers(size as usize, 400);
+    let (sums, behind) = prefix_sums(&gpu, &items, group_size);
+    assert_holds("a folded prefix sum", same_numbers(&sums, &running_sums(&items)));
+    assert!(behind.iter().all(|word| *word == GUARD));
+}
+
+#[test]
+fn the_check_of_sums_complains() {
+    let items = numbers(1000, 1000);
+    let expected = running_sums(&items);
+    let spoiled = |spoil: fn(&mut Vec<u32>)| {
+        let mut spoiled = expected.clone();
+        spoil(&mut spoiled);
+        spoiled
+    };
+    assert_complains("a number off by one", same_numbers(&spoiled(|sums| sums[999] += 1), &expected));
+    assert_complains("a number lost", same_numbers(&spoiled(|sums| sums.truncate(999)), &expected));
+    let inclusive: Vec<u32> = expected.iter().zip(&items).map(|(sum, item)| sum + item).collect();
+    assert_complains("an inclusive sum", same_numbers(&inclusive, &expected));
+    let mut two = items.clone();
+    two.swap(3, 700);
+    assert_complains("items swapped", same_numbers(&running_sums(&two), &expected));
+}
+
+/// Bits of a photon in grid order, so that sets can be compared.
+fn sorted_bits(photon: &SortedPhoton) -> [u32; 6] {
+    let SortedPhoton { position, wall, flux, weight } = *photon;
+    [position.x.to_bits(), position.y.to_bits(), position.z.to_bits(), wall, flux.to_bits(), weight.to_bits()]
+}
+
+/// The index holds each photon once, in the run of its own cell.
+fn index_check(plan: &Plan, cells: &[u32], sorted: &[SortedPhoton], map: &[Photon]) -> Check {
+    let grid = &plan.grid;
+    let mut expected: Vec<[u32; 6]> = map
+        .iter()
+        .map(|photon| sorted_bits(&SortedPhoton { position: photon.position, wall: photon.wall, flux: photon.flux, weight: photon.weight }))
+        .collect();
+    let mut found: Vec<[u32; 6]> = sorted.iter().map(sorted_bits).collect();
+    expected.sort_unstable();
+    found.sort_unstable();
+    if found != expected {
+        return Err("the sorted photons are not the photons of the map".to_owned());
+    }
+    if cells.last() != Some(&(map.len() as u32)) {
+        return Err(format!("the last cell ends at {:?} of {}", cells.last(), map.len()));
+    }
+    let mut begin = 0;
+    for (cell, &end) in cells.iter().enumerate() {
+        if end < begin {
+            return Err(format!("cell {cell} ends at {end} before it begins at {begin}"));
+        }
+        for photon in &sorted[begin as usize..end as usize] {
+            let place: [u32; 3] = std::array::from_fn(|axis| {
+                let along = (photon.position[axis] - grid.origin[axis]) * grid.cells_per_metre;
+                (along.floor().max(0.0) as u32).min(grid.cell_count[axis] - 1)
+            });
+            let number = (place[2] * grid.cell_count[1] + place[1]) * grid.cell_count[0] + place[0];
+            if number as usize != cell {
+                return Err(format!("{photon:?} of cell {number} lies in cell {cell}"));
+            }
+        }
+        begin = end;
+    }
+    Ok(())
+}
+
+#[test]
+fn the_index_holds_every_photon_in_its_cell() {
+    let Some(gpu) = device() else { return };
+    for variant in Variant::ON_GPU {
+        for (photon_count, radius, group_size) in
+            [(2, 0.05, 128), (129, 0.05, 32), (5000, 0.05, 128), (5001, 0.001, 256), (20_001, 0.5, 64)]
+        {
+            let settings =
+                Settings { variant, photons: photon_count, radius, group_size, chunk: Some(photon_count), ..Settings::default() };
+            let scene = open_box(&settings);
+            let plan = plan_for(&gpu, &scene, &settings);
+            assert_eq!(plan.chunks_per_round, 1);
+            let mut commands = Commands::new(&gpu, constants(&plan), Instant::now()).unwrap();
+            let resources = Resources::new(&gpu, &mut commands, &scene, &plan).unwrap();
+            let buffers = resources.index.as_ref().expect("a grid gather has an index");
+            trace::chunk(&mut commands, &resources, &plan, 0, &plan.chunk(0)).unwrap();
+            index::build(&mut commands, &resources, &plan, photon_count).unwrap();
+            let map = photons(&gpu, &settings);
+            let cells = commands.read::<u32>(&buffers.cells, plan.grid.cells() as usize).unwrap();
+            let sorted = commands.read::<SortedPhoton>(&buffers.sorted_photons, map.len()).unwrap();
+            assert_holds(format!("{variant:?}, {photon_count} photons, radius {radius}"), index_check(&plan, &cells, &sorted, &map));
+
+            if photon_count == 5000 {
+                let mut swapped = sorted.clone();
+                swapped.swap(10, sorted.len() - 10);
+                assert_complains("photons in each other's cells", index_check(&plan, &cells, &swapped, &map));
+                let mut doubled = sorted.clone();
+                doubled[10] = doubled[11];
+                assert_complains("a photon in place of another", index_check(&plan, &cells, &doubled, &map));
+                let mut shifted = cells.clone();
+                let busy = (1..cells.len()).find(|&cell| cells[cell] > cells[cell - 1]).unwrap();
+                shifted[busy] -= 1;
+                assert_complains("a cell that ends early", index_check(&plan, &shifted, &sorted, &map));
+            }
+        }
+    }
+}
+
+/// What some bounces left behind when the photon map has room for `capacity` photons.
+struct Appended {
+    /// Of the photon map, as far as there was room.
+    photons: Vec<Photon>,
+    /// Behind the photon map and behind the outgoing paths, inside the buffers that were bound.
+    guards: Vec<u32>,
+    counters: Vec<u32>,
+    tallies: Vec<Tally>,
+}
+
+/// Entries of each array that stand behind its capacity.
+const GUARD_ENTRIES: u64 = 64;
+
+fn append(gpu: &Device, scene: &Scene, settings: &Settings, capacity: u32) -> Appended {
+    let plan = plan_for(gpu, scene, settings);
+    let (path_count, bounces) = (settings.photons, settings.bounces);
+    let mut commands = Commands::new(gpu, constants(&plan), Instant::now()).unwrap();
+    let resources = Resources::new(gpu, &mut commands, scene, &plan).unwrap();
+    trace::emit(&mut commands, &resources, &plan, 0, &plan.chunk(0)).unwrap();
+    let paths = commands.read::<Path>(&resources.paths[0], path_count as usize).unwrap();
+    let photons = gpu.buffer::<Photon>("photons", u64::from(capacity) + GUARD_ENTRIES, Memory::Device).unwrap();
+    let path_entries = u64::from(path_count) + GUARD_ENTRIES;
+    let ends = [
+        gpu.buffer::<Path>("even paths", path_entries, Memory::Device).unwrap(),
+        gpu.buffer::<Path>("odd paths", path_entries, Memory::Device).unwrap(),
+    ];
+    commands.fill(&photons, 0, photons.size_bytes() / 4, GUARD);
+    ends.iter().for_each(|paths| commands.fill(paths, 0, paths.size_bytes() / 4, GUARD));
+    commands.upload(&ends[0], &paths).unwrap();
+    commands.fill(&resources.counters, 0, u64::from(bounces) + 2, 0);
+    commands.fill(&resources.counters, 1, 1, path_count);
+    for bounce in 0..bounces {
+        let push = TracePush {
+            key: plan.streams().key(0),
+            bounce,
+            path_capacity: path_count,
+            photon_capacity: capacity,
+            eye: settings.eye.into(),
+        };
+        let (paths, next_paths) = if bounce % 2 == 0 { (&ends[0], &ends[1]) } else { (&ends[1], &ends[0]) };
+        let Resources { rooms, walls, counters, tallies, .. } = &resources;
+        let (photons, extent) = (&photons, Extent::Items(u64::from(path_count)));
+        match settings.variant {
+            Variant::Naive => commands.dispatch(TraceSlots { rooms, walls, paths, next_paths, photons, counters, tallies }, &push, extent),
+            Variant::Atomic => {
+                commands.dispatch(TraceAtomic { rooms, walls, paths, next_paths, photons, counters, tallies }, &push, extent)
+            }
+            Variant::Ballot => {
+                commands.dispatch(TraceBallot { rooms, walls, paths, next_paths, photons, counters, tallies }, &push, extent)
+            }
+            Variant::Cpu => unreachable!("kernels only"),
+        }
+        .unwrap();
+    }
+    let map = commands.read::<Photon>(&photons, (u64::from(capacity) + GUARD_ENTRIES) as usize).unwrap();
+    let (map, behind) = map.split_at(capacity as usize);
+    let mut guards: Vec<u32> = bytemuck::cast_slice(behind).to_vec();
+    for paths in &ends {
+        let all = commands.read::<Path>(paths, path_entries as usize).unwrap();
+        guards.extend_from_slice(bytemuck::cast_slice(&all[path_count as usize..]));
+    }
+    Appended {
+        photons: map.to_vec(),
+        guards,
+        counters: commands.read(&resources.counters, bounces as usize + 2).unwrap(),
+        tallies: commands.read(&resources.tallies, bounces as usize).unwrap(),
+    }
+}
+
+/// Everything that must hold of a map with too little room; `all` are the photons that exist.
+fn overflow_check(appended: &Appended, settings: &Settings, capacity: u32, all: &[Photon]) -> Check {
+    let fail = |complaint: String| Err(complaint);
+    if let Some(word) = appended.guards.iter().find(|word| **word != GUARD) {
+        return fail(format!("a guard word became {word:#x}"));
+    }
+    let stored: Vec<Photon> = appended.photons.iter().filter(|photon| photon.wall != NO_WALL && photon.wall != GUARD).copied().collect();
+    let told: u32 = appended.tallies.iter().map(|tally| tally.stored).sum();
+    if stored.len() as u32 != told {
+        return fail(format!("{} photons are in the map, {told} were counted", stored.len()));
+    }
+    let exist: HashSet<Vec<u8>> = all.iter().map(|photon| bytemuck::bytes_of(photon).to_vec()).collect();
+    if let Some(stranger) = stored.iter().find(|photon| !exist.contains(bytemuck::bytes_of(*photon))) {
+        return fail(format!("{stranger:?} is no photon of this run"));
+    }
+    if stored.iter().map(|photon| (photon.photon, photon.bounce)).collect::<HashSet<_>>().len() != stored.len() {
+        return fail("a photon is there twice".to_owned());
+    }
+    let mut entering = settings.photons;
+    for (bounce, tally) in appended.tallies.iter().enumerate() {
+        if tally.stored + tally.absorbed + tally.escaped + tally.dropped != entering {
+            return fail(format!("bounce {}: {entering} entered, {tally:?}", bounce + 1));
+        }
+        entering = tally.stored;
+    }
+    let survivors: u32 = appended.tallies.iter().map(|tally| tally.stored + tally.dropped).sum();
+    let first = &appended.tallies[0];
+    let needed = all.iter().filter(|photon| photon.bounce == 0).count() as u32;
+    if first.stored + first.dropped != needed {
+        return fail(format!("{} + {} survivors of the first bounce, {needed} are right", first.stored, first.dropped));
+    }
+    if settings.variant == Variant::Naive {
+        // Slot = number of the photon, so it is known which ones find no room.
+        let fits = all.iter().filter(|photon| photon.bounce * settings.photons + photon.photon < capacity);
+        // A photon that was dropped at one bounce has no later ones.
+        let kept: Vec<Photon> = fits.filter(|photon| photon.photon < capacity).copied().collect();
+        if in_order(stored) != in_order(kept) {
+            return fail("other photons than those of the slots that exist".to_owned());
+        }
+        return Ok(());
+    }
+    if told != capacity.min(survivors) {
+        return fail(format!("{told} of {capacity} places taken by {survivors} survivors"));
+    }
+    if appended.counters[0] != survivors {
+        return fail(format!("the counter says {} instead of the need, {survivors}", appended.counters[0]));
+    }
+    for (bounce, tally) in appended.tallies.iter().enumerate() {
+        if appended.counters[2 + bounce] != tally.stored {
+            return fail(format!("{} paths leave bounce {}, {} were stored", appended.counters[2 + bounce], bounce + 1, tally.stored));
+        }
+    }
+    Ok(())
+}
+
+#[test]
+fn a_full_map_drops_counts_and_keeps_to_its_room() {
+    let Some(gpu) = device() else { return };
+    for variant in Variant::ON_GPU {
+        for photon_count in [9, 65, 1000, 5001] {
+            let settings = Settings { variant, photons: photon_count, bounces: 3, ..Settings::default() };
+            let scene = open_box(&settings);
+            let all = photons(&gpu, &settings);
+            let need = if variant == Variant::Naive { photon_count * settings.bounces } else { all.len() as u32 };
+            // Half of the need; room for none but one; all but one; enough.
+            for capacity in [need / 2, 1, need - 1, need, need + 17] {
+                let what = format!("{variant:?}, {photon_count} photons, room for {capacity} of {need}");
+                let appended = append(&gpu, &scene, &settings, capacity);
+                assert_holds(&what, overflow_check(&appended, &settings, capacity, &all));
+                let dropped: u32 = appended.tallies.iter().map(|tally| tally.dropped).sum();
+                if capacity >= need {
+                    assert_eq!(dropped, 0, "{what}");
+                } else if capacity == need / 2 && photon_count >= 65 {
+                    assert!(dropped > 0, "{what}");
+                }
+            }
+        }
+    }
+}
+
+/// All survive, none survives: in a closed white or black room.
+#[test]
+fn appending_at_survival_none_and_all() {
+    let Some(gpu) = device() else { return };
+    for variant in Variant::ON_GPU {
+        for (albedo, stored_each) in [(0.0, 0), (1.0, 3)] {
+            for photon_count in [2, 7, 8, 9, 31, 33, 127, 128, 129, 1000] {
+                let settings = Settings { variant, photons: photon_count, bounces: 3, reflectance: albedo, ..Settings::default() };
+                let mut scene = open_box(&settings);
+                scene.faces[5] = Some(Wall { name: "front", albedo, shininess: None });
+                let capacity = photon_count * 3;
+                let appended = append(&gpu, &scene, &settings, capacity);
+                let what = format!("{variant:?}, {photon_count} photons, albedo {albedo}");
+                assert!(appended.guards.iter().all(|word| *word == GUARD), "{what}");
+                let stored: HashSet<(u32, u32)> = appended
+                    .photons
+                    .iter()
+                    .filter(|photon| photon.wall != NO_WALL && photon.wall != GUARD)
+                    .map(|photon| (photon.photon, photon.bounce))
+                    .collect();
+                assert_eq!(stored.len() as u32, photon_count * stored_each, "{what}");
+                assert_eq!(appended.tallies.iter().map(|tally| tally.stored).sum::<u32>(), photon_count * stored_each, "{what}");
+            }
+        }
+    }
+}
+
+/// What is spoiled, and how.
+type Spoil = (&'static str, fn(&mut Appended));
+
+#[test]
+fn the_check_of_a_full_map_complains() {
+    let Some(gpu) = device() else { return };
+    let settings = Settings { photons: 1000, bounces: 3, ..Settings::default() };
+    let all = photons(&gpu, &settings);
+    let capacity = all.len() as u32 / 2;
+    let spoils: [Spoil; 7] = [
+        ("a write behind the end", |appended| appended.guards[5] = 0),
+        ("a photon lost", |appended| appended.photons[5] = Photon { wall: NO_WALL, ..Photon::zeroed() }),
+        ("a photon doubled", |appended| appended.photons[5] = appended.photons[6]),
+        ("a photon made up", |appended| appended.photons[5].position.x *= 1.01),
+        ("a drop that was not counted", |appended| appended.tallies[1].dropped -= 1),
+        ("a counter that stops at the end", |appended| appended.counters[0] = appended.photons.len() as u32),
+        ("a path without a photon", |appended| appended.counters[2] += 1),
+    ];
+    let scene = open_box(&settings);
+    assert_holds("the map itself", overflow_check(&append(&gpu, &scene, &settings, capacity), &settings, capacity, &all));
+    for (what, spoil) in spoils {
+        let mut spoiled = append(&gpu, &scene, &settings, capacity);
+        spoil(&mut spoiled);
+        assert_complains(what, overflow_check(&spoiled, &settings, capacity, &all));
+    }
+}
+
+/// The size that the device computes for an indirect dispatch of `items` items.
+fn dispatch_size(gpu: &Device, items: u32, push: DispatchSizePush) -> DispatchArgs {
+    let mut commands = Commands::new(gpu, Constants::new(128), Instant::now()).unwrap();
+    let counters = gpu.buffer::<u32>("counters", 3, Memory::Device).unwrap();
+    let dispatch_args = gpu.buffer::<DispatchArgs>("dispatch args", 2, Memory::Device).unwrap();
+    commands.fill(&counters, 0, 3, 17);
+    commands.fill(&counters, u64::from(push.counter), 1, items);
+    commands.fill(&dispatch_args, 0, 6, GUARD);
+    commands.dispatch(DispatchSize { counters: &counters, dispatch_args: &dispatch_args }, &push, Extent::Groups(1, 1)).unwrap();
+    let sizes = commands.read::<DispatchArgs>(&dispatch_args, 2).unwrap();
+    assert_eq!(sizes[1], DispatchArgs { x: GUARD, y: GUARD, z: GUARD });
+    sizes[0]
+}
+
+/// Enough groups for every item, no row in vain, and no more along x than allowed.
+fn dispatch_check(size: DispatchArgs, items: u64, push: DispatchSizePush) -> Check {
+    let wanted = items.min(u64::from(push.capacity)).div_ceil(u64::from(push.items_per_group));
+    let groups = u64::from(size.x) * u64::from(size.y);
+    let fits = size.x <= push.max_groups && size.z == 1 && groups >= wanted;
+    let in_vain = if wanted == 0 { groups } else { (groups - wanted.min(groups)) / u64::from(size.x.max(1)) };
+    if fits && in_vain == 0 { Ok(()) } else { Err(format!("{size:?} for {wanted} groups of at most {} a row", push.max_groups)) }
+}
+
+#[test]
+fn indirect_dispatches_are_folded_below_the_limit() {
+    let Some(gpu) = device() else { return };
+    for group in [32u32, 128, 1024] {
+        let row = 65_535 * group;
+        for items in [
+            0,
+            1,
+            group - 1,
+            group,
+            group + 1,
+            row - 1,
+            row,
+            row + 1,
+            row + group,
+            2 * row - 1,
+            2 * row,
+            2 * row + 1,
+            u32::MAX - 1,
+            u32::MAX,
+        ] {
+            for capacity in [u32::MAX, row, 1000] {
+                for counter in [0, 2] {
+                    let push = DispatchSizePush { counter, capacity, items_per_group: group, max_groups: 65_535 };
+                    let size = dispatch_size(&gpu, items, push);
+                    assert_holds(format!("{items} items, {push:?}"), dispatch_check(size, u64::from(items), push));
+                }
+            }
+        }
+    }
+    let push = DispatchSizePush { counter: 0, capacity: u32::MAX, items_per_group: 64, max_groups: 65_535 };
+    // 2^22 photons in groups of 64 are one group more than a row holds.
+    assert_eq!(dispatch_size(&gpu, 1 << 22, push), DispatchArgs { x: 65_535, y: 2, z: 1 });
+    for (what, size) in [
+        ("a group too few", DispatchArgs { x: 65_535, y: 1, z: 1 }),
+        ("a row too long", DispatchArgs { x: 65_536, y: 1, z: 1 }),
+        ("a row in vain", DispatchArgs { x: 65_535, y: 3, z: 1 }),
+        ("no depth", DispatchArgs { x: 65_535, y: 2, z: 0 }),
+    ] {
+        assert_complains(what, dispatch_check(size, 1 << 22, push));
+    }
+}
+
+/// One group less than a full row of them, a full row, and more: photons of the folded rows are traced
+/// like the others.
+#[test]
+fn rounds_around_a_full_row_of_groups_lose_no_photon() {
+    let Some(gpu) = device() else { return };
+    let row = 65_535 * 32;
+    for variant in Variant::ON_GPU {
+        // The builders dispatch alike, so one of them tries every count.
+        let counts = if variant == Variant::Ballot { &[row - 1, row, row + 1, row + 33][..] } else { &[row + 33] };
+        for &photon_count in counts {
+            let settings =
+                Settings { variant, photons: photon_count, bounces: 1, mesh: 1, group_size: 32, rng: Rng::Philox, ..Settings::default() };
+            let folded = run(&gpu, &settings);
+            assert_eq!(folded.plan.chunks_per_round, 1, "{photon_count} photons do not fit one dispatch here");
+            let ledger = folded.fates.ledger();
+            assert!(ledger.closes() && ledger.emitted == u64::from(photon_count), "{ledger:?}");
+            let split = run(&gpu, &Settings { chunk: Some(1_000_003), ..settings.clone() });
+            assert_eq!(split.fates, folded.fates);
+            assert_holds("film", equal_sums("a folded round", &folded.film.sums, &split.film.sums));
+        }
+    }
+}
