@@ -54,6 +54,7 @@ pub mod gpu;
 pub mod index;
 pub mod ledger;
 pub mod output;
+pub mod paper;
 pub mod plan;
 pub mod records;
 pub mod render;

@@ -47,19 +47,13 @@ struct DeviceArgs {
     /// Turn on the Vulkan validation layer with synchronisation validation; any message is an error
     #[arg(long)]
     validate: bool,
-    /// Time every dispatch on the device, not only every pass
-    #[arg(long)]
-    time_dispatches: bool,
 }
 
 impl DeviceArgs {
-    fn options(&self) -> Options {
-        Options { device: self.device.clone(), validate: self.validate, time_dispatches: self.time_dispatches, ..Options::default() }
-    }
-
     /// The device, or `None` after one line on stderr if there is no Vulkan and none was asked for.
-    fn open(&self) -> Result<Option<Gpu>> {
-        match Gpu::open(&self.options()) {
+    fn open(&self, time_dispatches: bool) -> Result<Option<Gpu>> {
+        let options = Options { device: self.device.clone(), validate: self.validate, time_dispatches, ..Options::default() };
+        match Gpu::open(&options) {
             Ok(gpu) => Ok(Some(gpu)),
             Err(error @ (Error::NoVulkan { .. } | Error::DeviceLacks { .. })) if self.device.is_none() => {
                 eprintln!("photonmill: {error}; running the CPU builder instead");

@@ -90,6 +90,9 @@ pub(super) struct RunArgs {
 
     #[command(flatten)]
     device: DeviceArgs,
+    /// Time every dispatch on the device, not only every pass
+    #[arg(long, help_heading = "Device")]
+    time_dispatches: bool,
     /// Threads of --variant cpu, or `all` [default: 1, as in the paper]
     #[arg(long, value_name = "N|all", value_parser = threads, help_heading = "Device")]
     threads: Option<usize>,
@@ -226,7 +229,7 @@ pub(super) fn run(args: &RunArgs, cancelled: &AtomicBool) -> Result<()> {
     }
     let gpu = match settings.variant {
         Variant::Cpu => None,
-        _ => args.device.open()?,
+        _ => args.device.open(args.time_dispatches)?,
     };
     let scene = open_box(&settings);
     let bar = progress_bar(settings.total_photons());

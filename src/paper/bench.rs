@@ -1,0 +1,185 @@
+//! The bench on which experiments run: the device if there is one, else the CPU builder; and the
+//! statistics of repeated runs.
+
+use std::sync::atomic::{AtomicBool, Ordering};
+use std::time::{Duration, Instant};
+
+use crate::error::{Error, Result};
+use crate::gpu::Gpu;
+use crate::render::{self, Control, Outcome};
+use crate::scene::open_box::open_box;
+use crate::settings::{Settings, Variant};
+
+/// Why no further experiment runs.
+pub enum Stop {
+    Cancelled,
+    Failed(Error),
+}
+
+pub type Step<T> = std::result::Result<T, Stop>;
+
+impl From<Error> for Stop {
+    fn from(error: Error) -> Stop {
+        Stop::Failed(error)
+    }
+}
+
+/// What the times were measured on.
+#[derive(Debug, Clone)]
+pub struct Machine {
+    /// `None` without Vulkan.
+    pub device: Option<Device>,
+    /// The host's processor.
+    pub cpu: String,
+}
+
+#[derive(Debug, Clone)]
+pub struct Device {
+    pub name: String,
+    pub driver: String,
+    pub has_timestamps: bool,
+    /// A software device, whose 'GPU' is the CPU.
+    pub is_cpu: bool,
+}
+
+pub struct Bench<'a> {
+    gpu: Option<&'a Gpu>,
+    cancelled: &'a AtomicBool,
+    /// Told one line an experiment.
+    progress: &'a mut dyn FnMut(&str),
+    begun: usize,
+    expected: usize,
+}
+
+/// A case is not repeated once its runs have taken this long.
+pub const PATIENCE: Duration = Duration::from_secs(6);
+
+impl<'a> Bench<'a> {
+    pub fn new(gpu: Option<&'a Gpu>, cancelled: &'a AtomicBool, progress: &'a mut dyn FnMut(&str)) -> Bench<'a> {
+        Bench { gpu, cancelled, progress, begun: 0, expected: 0 }
+    }
+
+    pub fn has_gpu(&self) -> bool {
+        self.gpu.is_some()
+    }
+
+    /// The builder that stands for `variant` here.
+    pub fn available(&self, variant: Variant) -> Variant {
+        if self.has_gpu() { variant } else { Variant::Cpu }
+    }
+
+    pub fn machine(&self) -> Machine {
+        let device = self.gpu.map(Gpu::facts).map(|facts| Device {
+            name: facts.name.clone(),
+            driver: facts.driver.clone(),
+            has_timestamps: facts.timestamp_bits > 0,
+            is_cpu: facts.kind == "cpu",
+        });
+        Machine { device, cpu: processor() }
+    }
+
+    /// Sets how many experiments there will be.
+    pub fn expect(&mut self, experiments: usize) {
+        self.expected = experiments;
+    }
+
+    /// Begins an experiment, unless the user has had enough.
+    pub fn begin(&mut self, title: &str) -> Step<()> {
+        if self.cancelled.load(Ordering::Relaxed) {
+            return Err(Stop::Cancelled);
+        }
+        self.begun += 1;
+        (self.progress)(&format!("[{}/{}] {title}", self.begun, self.expected));
+        Ok(())
+    }
+
+    /// One run to its last photon.
+    pub fn run(&self, settings: &Settings) -> Step<Outcome> {
+        let outcome = self.run_once(settings)?;
+        if outcome.cancelled { Err(Stop::Cancelled) } else { Ok(outcome) }
+    }
+
+    fn run_once(&self, settings: &Settings) -> Result<Outcome> {
+        let scene = open_box(settings);
+        let mut control = Control { cancelled: self.cancelled, progress: &mut |_, _| {} };
+        match (settings.variant, self.gpu) {
+            (Variant::Cpu, _) | (_, None) => render::on_cpu(&scene, settings, &mut control),
+            (_, Some(gpu)) => render::on_gpu(gpu, &scene, settings, &mut control),
+        }
+    }
+
+    /// `repeats` runs after one that is dropped, as it makes pipelines and fills caches. A case that
+    /// is slow is repeated less, and one whose first run alone is slow keeps that run.
+    pub fn repeat(&self, settings: &Settings, repeats: usize) -> Step<Vec<Outcome>> {
+        let began = Instant::now();
+        let mut outcomes = vec![self.run(settings)?];
+        while outcomes.len() <= repeats && began.elapsed() < PATIENCE {
+            outcomes.push(self.run(settings)?);
+        }
+        if outcomes.len() > 1 {
+            outcomes.remove(0);
+        }
+        Ok(outcomes)
+    }
+}
+
+/// Median and extremes of repeated runs.
+#[derive(Debug, Clone, Copy, PartialEq)]
+pub struct Spread {
+    pub median: f64,
+    pub min: f64,
+    pub max: f64,
+    pub repeats: usize,
+}
+
+impl Spread {
+    /// `None` for no value at all.
+    pub fn of(mut values: Vec<f64>) -> Option<Spread> {
+        values.sort_by(f64::total_cmp);
+        let (min, max) = (*values.first()?, *values.last()?);
+        let middle = values.len() / 2;
+        let median = if values.len() % 2 == 1 { values[middle] } else { 0.5 * (values[middle - 1] + values[middle]) };
+        Some(Spread { median, min, max, repeats: values.len() })
+    }
+}
+
+/// The host's processor, as Linux calls it; elsewhere its architecture.
+fn processor() -> String {
+    let threads = std::thread::available_parallelism().map_or(1, usize::from);
+    let listed = std::fs::read_to_string("/proc/cpuinfo").unwrap_or_default();
+    let model = listed.lines().find_map(|line| line.strip_prefix("model name")?.split_once(": ").map(|(_, name)| name.trim().to_owned()));
+    format!("{}, {threads} threads", model.unwrap_or_else(|| std::env::consts::ARCH.to_owned()))
+}
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+
+    #[test]
+    fn the_median_stands_between_the_extremes() {
+        let spread = |values: &[f64]| Spread::of(values.to_vec());
+        assert_eq!(spread(&[]), None);
+        assert_eq!(spread(&[3.0, 9.0, 1.0]), Some(Spread { median: 3.0, min: 1.0, max: 9.0, repeats: 3 }));
+        assert_eq!(spread(&[4.0, 2.0]), Some(Spread { median: 3.0, min: 2.0, max: 4.0, repeats: 2 }));
+    }
+
+    #[test]
+    fn a_cancelled_bench_begins_nothing() {
+        let cancelled = AtomicBool::new(true);
+        let mut lines = 0;
+        let mut count = |_: &str| lines += 1;
+        let mut bench = Bench::new(None, &cancelled, &mut count);
+        assert!(matches!(bench.begin("figure 1"), Err(Stop::Cancelled)));
+        assert_eq!(lines, 0);
+    }
+
+    #[test]
+    fn the_first_run_is_dropped() {
+        let cancelled = AtomicBool::new(false);
+        let bench_settings = Settings { variant: Variant::Cpu, photons: 10, mesh: 2, ..Settings::default() };
+        let mut silent = |_: &str| {};
+        let bench = Bench::new(None, &cancelled, &mut silent);
+        let Ok(outcomes) = bench.repeat(&bench_settings, 3) else { panic!("a run of ten photons fails") };
+        assert_eq!(outcomes.len(), 3);
+    }
+}

@@ -1,0 +1,142 @@
+//! The paper's four figures: films of its settings, as pictures side by side.
+
+use super::bench::{Bench, Step};
+use super::{command, published};
+use crate::film::{WallEstimate, estimate_walls};
+use crate::output::image::{Format, Picture, overview, view};
+use crate::scene::open_box::open_box;
+use crate::settings::{Preset, Settings};
+
+pub const COUNT: usize = 4;
+
+pub struct Figure {
+    pub number: usize,
+    pub title: &'static str,
+    /// What to look for.
+    pub caption: &'static str,
+    pub frames: Vec<Frame>,
+    pub width: usize,
+    pub height: usize,
+    pub png: Vec<u8>,
+}
+
+/// One picture of a figure.
+pub struct Frame {
+    pub label: String,
+    pub command: String,
+    pub settings: Settings,
+    pub walls: Vec<WallEstimate>,
+}
+
+impl Figure {
+    pub fn file_name(&self) -> String {
+        format!("figure{}.png", self.number)
+    }
+}
+
+/// What a figure shows, before it is made.
+struct Exhibit {
+    title: &'static str,
+    caption: &'static str,
+    /// Label, preset and settings of each frame.
+    frames: Vec<(String, Preset, Settings)>,
+    columns: usize,
+}
+
+pub fn make(bench: &mut Bench, figures: &mut Vec<Figure>) -> Step<()> {
+    for (place, exhibit) in exhibits().into_iter().enumerate() {
+        let number = place + 1;
+        bench.begin(&format!("figure {number}: {}", exhibit.title))?;
+        let frames = exhibit.frames.into_iter().map(|(label, preset, settings)| frame(bench, label, preset, settings));
+        let frames = frames.collect::<Step<Vec<Frame>>>()?;
+        let picture = compose(&frames, exhibit.columns);
+        figures.push(Figure {
+            number,
+            title: exhibit.title,
+            caption: exhibit.caption,
+            width: picture.width,
+            height: picture.height,
+            png: picture.encode(Format::Png),
+            frames,
+        });
+    }
+    Ok(())
+}
+
+fn exhibits() -> [Exhibit; COUNT] {
+    let naive = Settings::preset(Preset::Naive);
+    let modified = Settings::preset(Preset::Modified);
+    let phong = |shininess: f32| Settings { shininess: [Some(shininess); 5], ..Settings::preset(Preset::Phong) };
+    let rounds = |rounds: u32| Settings { rounds, ..Settings::preset(Preset::Rounds) };
+    [
+        Exhibit {
+            title: "the naive implementation, 2 bounces",
+            caption: "On the left the box folded open around its back wall, on the right seen from four points in front of its opening. \
+                A light shines along its own wall and not onto it, so the glow is on the walls next to it: \
+                low on the walls around the floor's light, and at the left of those around the left wall's. \
+                Places that no light reaches well are dim but not black. \
+                The blotches are noise: 5000 photons are few, and each is spread over a disc of radius 0.05 m.",
+            frames: vec![("2 bounces".to_owned(), Preset::Naive, naive.clone())],
+            columns: 1,
+        },
+        Exhibit {
+            title: "15 bounces (left) against 2 bounces (right)",
+            caption: "Both show the same photons for two bounces; the thirteen after them brighten every wall, its shaded places too. \
+                The paper's text puts the two in this order, its caption in the other; this page follows the text.",
+            frames: vec![
+                ("15 bounces, modified".to_owned(), Preset::Modified, modified),
+                ("2 bounces, naive".to_owned(), Preset::Naive, naive),
+            ],
+            columns: 2,
+        },
+        Exhibit {
+            title: "Phong walls, shininess 2.0, 0.5 and 0.01",
+            caption: "A photon counts by the cosine between its mirror direction and the direction to the eye, to the power of the shininess. \
+                At 2.0 the back wall, which faces the eye, is the brightest and the walls along the line of sight are dark; \
+                towards 0 every photon mirrored to the eye's side counts as 1, and the picture approaches figure 2's left one.",
+            frames: published::FIGURE_3_SHININESS
+                .map(|shininess| (format!("shininess {shininess}"), Preset::Phong, phong(shininess)))
+                .into(),
+            columns: 3,
+        },
+        Exhibit {
+            title: "1, 5, 10, 25, 50 and 100 rounds",
+            caption: "From top left to bottom right, 5000 photons more with every round. The grain fades, while the radius, now 0.025 m, \
+                stays: dark rims along the edges, where part of each disc lies beyond the wall, remain at 100 rounds.",
+            frames: published::FIGURE_4_ROUNDS
+                .map(|count| (format!("{count} {}", if count == 1 { "round" } else { "rounds" }), Preset::Rounds, rounds(count)))
+                .into(),
+            columns: 3,
+        },
+    ]
+}
+
+fn frame(bench: &Bench, label: String, preset: Preset, settings: Settings) -> Step<Frame> {
+    let settings = Settings { variant: bench.available(settings.variant), ..settings };
+    let outcome = bench.run(&settings)?;
+    let walls = estimate_walls(&outcome.film, &open_box(&settings), &outcome.plan);
+    Ok(Frame { label, command: command::line(preset, &settings), settings, walls })
+}
+
+/// Pixels between pictures.
+const GAP: usize = 6;
+/// Pixels along a picture, for two and for three in a row.
+const HALF_ROW: usize = 480;
+const THIRD_ROW: usize = 384;
+
+/// One frame as an overview, several as a mesh of views.
+fn compose(frames: &[Frame], columns: usize) -> Picture {
+    let scene = |frame: &Frame| open_box(&frame.settings);
+    if let [only] = frames {
+        return overview(&scene(only), &only.walls);
+    }
+    let side = if columns == 2 { HALF_ROW } else { THIRD_ROW };
+    let along = |count: usize| count * side + (count - 1) * GAP;
+    let mut picture = Picture::black(along(columns), along(frames.len().div_ceil(columns)));
+    picture.values.fill(1.0);
+    for (place, frame) in frames.iter().enumerate() {
+        let (column, row) = (place % columns, place / columns);
+        picture.paste(&view(&scene(frame), &frame.walls, side), column * (side + GAP), row * (side + GAP));
+    }
+    picture
+}

@@ -1,0 +1,83 @@
+//! The paper's figures, running times and table, measured again on this machine and set beside the
+//! published numbers; out come pictures, CSV and one page.
+
+pub mod bench;
+pub mod chart;
+pub mod command;
+pub mod experiments;
+pub mod figures;
+pub mod page;
+pub mod published;
+#[cfg(test)]
+mod sample;
+pub mod tables;
+pub mod verdicts;
+pub mod words;
+
+use crate::error::Result;
+use crate::output::destination::Folder;
+use bench::{Bench, Machine, Step, Stop};
+use experiments::{LeftOut, RunningTime, TotalTime};
+use figures::Figure;
+
+/// What is measured besides the paper's own settings.
+#[derive(Debug, Clone, Copy)]
+pub struct Request {
+    /// Photons of a round at the size that fills the device.
+    pub large: u32,
+    /// Runs whose median counts.
+    pub repeats: usize,
+    /// Threads of a second CPU builder; 1: there is none.
+    pub threads: usize,
+}
+
+/// Everything that was found.
+pub struct Reproduction {
+    pub machine: Machine,
+    pub request: Request,
+    pub figures: Vec<Figure>,
+    pub running_times: Vec<RunningTime>,
+    pub totals: Vec<TotalTime>,
+    /// Experiments that would have taken too long.
+    pub passes_left_out: Vec<LeftOut>,
+    pub totals_left_out: Vec<LeftOut>,
+    /// False if it was ended before its last experiment.
+    pub complete: bool,
+}
+
+/// Runs every experiment; one that is ended from outside leaves what was finished before it.
+pub fn reproduce(bench: &mut Bench, request: Request) -> Result<Reproduction> {
+    let mut found = Reproduction {
+        machine: bench.machine(),
+        request,
+        figures: Vec::new(),
+        running_times: Vec::new(),
+        totals: Vec::new(),
+        passes_left_out: Vec::new(),
+        totals_left_out: Vec::new(),
+        complete: false,
+    };
+    bench.expect(figures::COUNT + experiments::count(bench, &request));
+    match run_all(bench, &mut found) {
+        Ok(()) => found.complete = true,
+        Err(Stop::Cancelled) => {}
+        Err(Stop::Failed(error)) => return Err(error),
+    }
+    Ok(found)
+}
+
+fn run_all(bench: &mut Bench, found: &mut Reproduction) -> Step<()> {
+    figures::make(bench, &mut found.figures)?;
+    experiments::running_times(bench, found)?;
+    experiments::totals(bench, found)
+}
+
+/// Writes pictures and tables, and last the page.
+pub fn write(folder: &Folder, found: &Reproduction) -> Result<()> {
+    for figure in &found.figures {
+        folder.write(&figure.file_name(), &figure.png)?;
+    }
+    folder.write("running_times.csv", &tables::running_times(&found.running_times))?;
+    folder.write("table1.csv", &tables::totals(&found.totals))?;
+    folder.write("index.html", page::html(found).as_bytes())
+}

@@ -1,0 +1,70 @@
+//! A reproduction with made-up times, for the tests of what is said of it.
+
+use super::bench::{Device, Machine, Spread};
+use super::experiments::{Builder, LeftOut, Pass, RunningTime, TotalTime};
+use super::figures::Figure;
+use super::{Reproduction, Request, command, published};
+use crate::settings::{Gather, Preset, Settings, Variant};
+use crate::timings::Clock;
+
+const LARGE: u32 = 65_536;
+
+pub fn reproduction() -> Reproduction {
+    Reproduction {
+        machine: Machine {
+            device: Some(Device { name: "a device".to_owned(), driver: "its driver".to_owned(), has_timestamps: true, is_cpu: true }),
+            cpu: "a processor".to_owned(),
+        },
+        request: Request { large: LARGE, repeats: 7, threads: 1 },
+        figures: vec![Figure {
+            number: 1,
+            title: "a figure",
+            caption: "A caption.",
+            frames: Vec::new(),
+            width: 1,
+            height: 1,
+            png: vec![1, 2, 3],
+        }],
+        running_times: running_times(),
+        totals: totals(),
+        passes_left_out: Vec::new(),
+        totals_left_out: vec![LeftOut { what: "a long run".to_owned(), predicted_ms: 100_000.0 }],
+        complete: true,
+    }
+}
+
+fn running_times() -> Vec<RunningTime> {
+    let mut times = Vec::new();
+    for photons in [published::PHOTONS, LARGE] {
+        for bounces in [published::BOUNCES, 15] {
+            for variant in [Variant::Naive, Variant::Atomic, Variant::Ballot, Variant::Cpu] {
+                let passes = [(Pass::Map, None), (Pass::Rendering, Some(Gather::Brute)), (Pass::Rendering, Some(Gather::Grid))];
+                times.extend(passes.map(|(pass, gather)| RunningTime {
+                    photons,
+                    bounces,
+                    builder: Builder::of(variant),
+                    pass,
+                    gather,
+                    clock: if variant == Variant::Cpu { Clock::Wall } else { Clock::Gpu },
+                    ms: Spread { median: f64::from(photons) / 1000.0, min: 0.5, max: 100.0, repeats: 7 },
+                    stored: u64::from(photons),
+                    command: command::line(Preset::Modified, &Settings { variant, photons, ..Settings::default() }),
+                }));
+            }
+        }
+    }
+    times
+}
+
+fn totals() -> Vec<TotalTime> {
+    let series = [(published::PHOTONS, Gather::Brute), (published::PHOTONS, Gather::Grid), (LARGE, Gather::Grid)];
+    let total = |photons: u32, rounds: u32, gather: Gather| TotalTime {
+        photons_per_round: photons,
+        rounds,
+        gather,
+        gpu_ms: Some(f64::from(rounds)),
+        wall_ms: f64::from(rounds) + 1.0,
+        command: command::line(Preset::Rounds, &Settings { photons, rounds, gather, ..Settings::preset(Preset::Rounds) }),
+    };
+    series.into_iter().flat_map(|(photons, gather)| published::TABLE_1.map(|(rounds, _)| total(photons, rounds, gather))).collect()
+}
