@@ -17,6 +17,10 @@ pub enum Error {
     #[error("{option} {}: cannot be written ({reason}); name a file or folder that can", path.display())]
     Output { option: &'static str, path: PathBuf, reason: String },
 
+    /// A scene file, or something in it, cannot be used.
+    #[error("{}: {object} {reason}", path.display())]
+    Scene { path: PathBuf, object: String, reason: String },
+
     /// There is no Vulkan loader, or no device behind it.
     #[error("no Vulkan device: {reason}")]
     NoVulkan { reason: String },
@@ -58,7 +62,7 @@ impl Error {
     /// 2 for input that the user can mend, 1 for everything else.
     pub fn exit_code(&self) -> u8 {
         match self {
-            Error::Setting { .. } | Error::Output { .. } | Error::DeviceAbsent { .. } => 2,
+            Error::Setting { .. } | Error::Output { .. } | Error::Scene { .. } | Error::DeviceAbsent { .. } => 2,
             _ => 1,
         }
     }

@@ -4,7 +4,7 @@
 use std::f64::consts::PI;
 
 use crate::plan::Plan;
-use crate::scene::Scene;
+use crate::scene::room::RoomScene;
 
 /// Sums of a run, point by point, and what they are worth.
 #[derive(Debug, Clone, PartialEq)]
@@ -67,7 +67,7 @@ pub struct WallEstimate {
 /// The radiosity of a point is the flux of the photons stored within the radius over the area in
 /// which they were looked for: with edge correction the part of the disc that lies on the wall,
 /// without it the whole disc, which is dark along edges.
-pub fn estimate_walls(film: &Film, scene: &Scene, plan: &Plan) -> Vec<WallEstimate> {
+pub fn estimate_walls(film: &Film, scene: &RoomScene, plan: &Plan) -> Vec<WallEstimate> {
     let settings = &plan.settings;
     let mesh = settings.mesh as usize;
     // A film without photons is dark, not undefined.

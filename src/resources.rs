@@ -5,7 +5,7 @@ use crate::error::Result;
 use crate::gpu::{Buffer, Commands, Gpu, Memory};
 use crate::plan::Plan;
 use crate::records::{self, DispatchArgs, Path, Photon, Point, SortedPhoton, Tally};
-use crate::scene::Scene;
+use crate::scene::room::RoomScene;
 use glam::UVec2;
 
 pub struct Resources {
@@ -41,7 +41,7 @@ pub struct IndexBuffers {
 
 impl Resources {
     /// Makes the buffers and records the upload of what never changes.
-    pub fn new(gpu: &Gpu, commands: &mut Commands, scene: &Scene, plan: &Plan) -> Result<Resources> {
+    pub fn new(gpu: &Gpu, commands: &mut Commands, scene: &RoomScene, plan: &Plan) -> Result<Resources> {
         let bounces = u64::from(plan.settings.bounces);
         let paths = u64::from(plan.path_capacity);
         let photons = u64::from(plan.photon_capacity);

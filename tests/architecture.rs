@@ -233,7 +233,7 @@ fn the_check_complains_about_arrows_to_the_right() {
     assert!(complains("cpu", "use crate::resources::Resources;"));
     assert!(complains("film", "use super::render::Outcome;"));
     assert!(complains("estimate", "use crate::cpu::index::Index;"));
-    assert!(complains("records", "use crate::scene::Scene;"));
+    assert!(complains("records", "use crate::scene::room::RoomScene;"));
     assert!(complains("trace", "use crate::{\n    error::Result,\n    index,\n};"));
     assert!(!wrong_arrows("plan", false, "use super::super::gpu::Gpu;").is_empty());
 

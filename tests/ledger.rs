@@ -8,7 +8,7 @@ use photonmill::gpu::Gpu;
 use photonmill::ledger::{BounceFates, Fates};
 use photonmill::rng::Rng;
 use photonmill::scene::open_box::open_box;
-use photonmill::scene::{Scene, Wall};
+use photonmill::scene::room::{RoomScene, Wall};
 use photonmill::settings::{EmissionLaw, Settings, Variant};
 
 /// Every path that entered a bounce has one fate there, and who was stored enters the next.
@@ -39,7 +39,7 @@ fn closes(fates: &Fates, emitted: u64) -> Check {
 
 /// The fates of the device's builders and of the CPU's, all alike and all closed. A photon whose fate
 /// hangs on the last bit is rarer than one in 1e5, and these runs are smaller.
-fn fates(gpu: &Gpu, scene: &Scene, settings: &Settings) -> Fates {
+fn fates(gpu: &Gpu, scene: &RoomScene, settings: &Settings) -> Fates {
     let total = settings.total_photons();
     let expected = run_scene_on_cpu(scene, settings).fates;
     assert_holds(format!("cpu\n{settings:?}"), closes(&expected, total));

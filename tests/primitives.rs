@@ -17,7 +17,7 @@ use photonmill::render::constants;
 use photonmill::resources::{Resources, block_sums};
 use photonmill::rng::Rng;
 use photonmill::scene::open_box::open_box;
-use photonmill::scene::{Scene, Wall};
+use photonmill::scene::room::{RoomScene, Wall};
 use photonmill::settings::{Settings, Variant};
 use photonmill::{index, trace};
 
@@ -227,7 +227,7 @@ struct Appended {
 /// Entries of each array that stand behind its capacity.
 const GUARD_ENTRIES: u64 = 64;
 
-fn append(gpu: &Device, scene: &Scene, settings: &Settings, capacity: u32) -> Appended {
+fn append(gpu: &Device, scene: &RoomScene, settings: &Settings, capacity: u32) -> Appended {
     let plan = plan_for(gpu, scene, settings);
     let (path_count, bounces) = (settings.photons, settings.bounces);
     let mut commands = Commands::new(gpu, constants(&plan), Instant::now()).unwrap();

@@ -17,6 +17,7 @@ use crate::output::{report, trace_file};
 use crate::render::{self, Control, Outcome};
 use crate::rng::Rng;
 use crate::scene::open_box::open_box;
+use crate::scene::room::RoomScene;
 use crate::settings::{EmissionLaw, Gather, PhongDirection, Preset, Settings, Variant, WALL_NAMES};
 use crate::timings::{Clock, Span};
 
@@ -273,7 +274,7 @@ impl Outputs {
         })
     }
 
-    fn write(self, mut outcome: Outcome, scene: &crate::scene::Scene) -> Result<()> {
+    fn write(self, mut outcome: Outcome, scene: &RoomScene) -> Result<()> {
         let walls = estimate_walls(&outcome.film, scene, &outcome.plan);
         let (destination, format) = self.picture;
         let picture = destination.path().display().to_string();

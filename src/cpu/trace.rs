@@ -9,7 +9,7 @@ use super::sampling::{sample_cosine_hemisphere, to_world};
 use crate::plan::{EmissionRange, Plan};
 use crate::records::{DiscLight, Path, Photon, RandomKey, Room, Tally, Wall};
 use crate::rng::{self, words};
-use crate::scene::Scene;
+use crate::scene::room::RoomScene;
 
 /// The scene and settings as the tracing functions read them.
 pub struct Tracer<'a> {
@@ -31,7 +31,7 @@ pub struct Bounced {
 const MIN_PATHS_PER_THREAD: usize = 256;
 
 impl<'a> Tracer<'a> {
-    pub fn new(scene: &Scene, plan: &'a Plan) -> Tracer<'a> {
+    pub fn new(scene: &RoomScene, plan: &'a Plan) -> Tracer<'a> {
         Tracer { plan, room: scene.room_record(), walls: scene.wall_records(), lights: scene.light_records(&plan.relative_flux) }
     }
 

@@ -11,7 +11,7 @@ use image::{ExtendedColorType, ImageEncoder};
 use crate::error::{Error, Result};
 use crate::film::WallEstimate;
 use crate::scene::rectangle::Rectangle;
-use crate::scene::{Scene, face_axis};
+use crate::scene::room::{RoomScene, face_axis};
 
 /// A grey picture, row by row from the top.
 #[derive(Debug, Clone, PartialEq)]
@@ -48,7 +48,7 @@ struct Texture<'a> {
 }
 
 impl<'a> Texture<'a> {
-    fn of_walls(scene: &Scene, walls: &'a [WallEstimate]) -> Vec<(usize, Texture<'a>)> {
+    fn of_walls(scene: &RoomScene, walls: &'a [WallEstimate]) -> Vec<(usize, Texture<'a>)> {
         walls
             .iter()
             .map(|wall| {
@@ -94,7 +94,7 @@ const VIEW_PIXELS: usize = 3 * WALL_PIXELS / 2;
 const RAYS: usize = 3;
 
 /// The unfolded walls on the left, four views on the right.
-pub fn overview(scene: &Scene, walls: &[WallEstimate]) -> Picture {
+pub fn overview(scene: &RoomScene, walls: &[WallEstimate]) -> Picture {
     let mut picture = Picture::black(3 * WALL_PIXELS + 2 * VIEW_PIXELS, 3 * WALL_PIXELS);
     picture.paste(&unfolded(scene, walls), 0, 0);
     for (place, eye) in VIEWS.iter().enumerate() {
@@ -105,12 +105,12 @@ pub fn overview(scene: &Scene, walls: &[WallEstimate]) -> Picture {
 }
 
 /// The box seen from one point, as one picture.
-pub fn view(scene: &Scene, walls: &[WallEstimate], pixels: usize) -> Picture {
+pub fn view(scene: &RoomScene, walls: &[WallEstimate], pixels: usize) -> Picture {
     perspective(scene, walls, VIEWS[1], pixels)
 }
 
 /// The walls folded out around the back wall, as one looks in through the opening.
-pub fn unfolded(scene: &Scene, walls: &[WallEstimate]) -> Picture {
+pub fn unfolded(scene: &RoomScene, walls: &[WallEstimate]) -> Picture {
     let (min, max) = (scene.min_corner, scene.max_corner);
     let side = WALL_PIXELS;
     let mut picture = Picture::black(3 * side, 3 * side);
@@ -145,7 +145,7 @@ fn mix(a: f64, b: f64, t: f64) -> f64 {
 const VIEWS: [[f64; 3]; 4] = [[0.0, 0.0, 4.2], [1.7, 1.2, 4.2], [-1.7, 1.2, 4.2], [1.2, -1.8, 4.2]];
 
 /// Only the insides of walls are drawn, so that a wall between eye and box does not hide it.
-fn perspective(scene: &Scene, walls: &[WallEstimate], eye: [f64; 3], pixels: usize) -> Picture {
+fn perspective(scene: &RoomScene, walls: &[WallEstimate], eye: [f64; 3], pixels: usize) -> Picture {
     let centre = 0.5 * (scene.min_corner + scene.max_corner);
     let half = 0.5 * (scene.max_corner - scene.min_corner).max_element();
     let eye = centre + half * DVec3::from(eye);
@@ -237,7 +237,7 @@ mod tests {
     use crate::settings::Settings;
 
     /// Walls that shine with 0.1 times their face number plus one.
-    fn numbered_walls(scene: &Scene) -> Vec<WallEstimate> {
+    fn numbered_walls(scene: &RoomScene) -> Vec<WallEstimate> {
         let wall = |face: usize, name| {
             let illumination = vec![0.1 * (face + 1) as f64; 16];
             WallEstimate { name, face, radiosity: illumination.clone(), irradiance: illumination.clone(), illumination }

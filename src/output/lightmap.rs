@@ -6,7 +6,7 @@ use super::destination::Folder;
 use super::image::{Format, Picture};
 use crate::error::Result;
 use crate::film::WallEstimate;
-use crate::scene::Scene;
+use crate::scene::room::RoomScene;
 
 /// Physical quantities of a wall's texel, both in W/m2.
 #[derive(Debug, Clone, Copy, PartialEq, Eq, Serialize)]
@@ -36,7 +36,7 @@ struct WallLayout<'a> {
 }
 
 /// Writes `<wall>.exr` for every wall, then `layout.json`.
-pub fn write(folder: &Folder, quantity: Quantity, scene: &Scene, walls: &[WallEstimate]) -> Result<()> {
+pub fn write(folder: &Folder, quantity: Quantity, scene: &RoomScene, walls: &[WallEstimate]) -> Result<()> {
     let mut layout = Layout { quantity, unit: "W/m2", walls: Vec::new() };
     for wall in walls {
         let values = match quantity {

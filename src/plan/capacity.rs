@@ -5,7 +5,7 @@ use serde::Serialize;
 
 use crate::error::{Error, Result};
 use crate::records::{Path, Photon};
-use crate::scene::Scene;
+use crate::scene::room::RoomScene;
 use crate::settings::{Gather, Settings};
 
 /// What a device allows.
@@ -47,7 +47,7 @@ pub struct Work {
 }
 
 impl Work {
-    pub fn new(scene: &Scene, settings: &Settings, point_count: usize) -> Work {
+    pub fn new(scene: &RoomScene, settings: &Settings, point_count: usize) -> Work {
         // A photon is stored albedo + albedo^2 + ... times at most, and never more than `bounces`.
         let albedo = scene.walls().map(|(_, wall)| f64::from(wall.albedo)).fold(0.0, f64::max);
         let stored = (albedo / (1.0 - albedo)).min(f64::from(settings.bounces));

@@ -14,7 +14,7 @@ pub use effect::Decision;
 use crate::error::Result;
 use crate::records::{IndexPush, Photon, Point};
 use crate::rng::Streams;
-use crate::scene::Scene;
+use crate::scene::room::RoomScene;
 use crate::settings::{Gather, Settings, Variant};
 
 /// A run of photons of one light inside a chunk.
@@ -66,7 +66,7 @@ pub struct Grid {
 
 impl Grid {
     /// Cells of the radius or more, at most [`MAX_CELLS_PER_AXIS`] along an axis.
-    fn new(scene: &Scene, radius: f64) -> Grid {
+    fn new(scene: &RoomScene, radius: f64) -> Grid {
         let extent = scene.max_corner - scene.min_corner;
         let cell = radius.max(extent.max_element() / f64::from(MAX_CELLS_PER_AXIS));
         Grid {
@@ -89,7 +89,7 @@ impl Grid {
 const MAX_CELLS_PER_AXIS: u32 = 128;
 
 impl Plan {
-    pub fn new(scene: &Scene, settings: &Settings, limits: &Limits) -> Result<Plan> {
+    pub fn new(scene: &RoomScene, settings: &Settings, limits: &Limits) -> Result<Plan> {
         settings.validate()?;
         let light_photons = deal(settings.photons, &scene.lights.iter().map(|light| light.power).collect::<Vec<_>>());
         let watts: Vec<f64> = scene.lights.iter().zip(&light_photons).map(|(light, count)| light.power / f64::from(*count)).collect();

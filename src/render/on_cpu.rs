@@ -10,12 +10,12 @@ use crate::error::{Error, Result};
 use crate::film::Film;
 use crate::plan::{EmissionRange, Limits, Plan, photons_of};
 use crate::records::{Photon, Tally};
-use crate::scene::Scene;
+use crate::scene::room::RoomScene;
 use crate::settings::{Settings, Variant};
 use crate::timings::HostClock;
 
 /// Runs on the CPU, on `settings.threads` threads.
-pub fn on_cpu(scene: &Scene, settings: &Settings, control: &mut Control) -> Result<Outcome> {
+pub fn on_cpu(scene: &RoomScene, settings: &Settings, control: &mut Control) -> Result<Outcome> {
     let mut clock = HostClock::start("run");
     let plan = plan(scene, settings)?;
     let pool = thread_pool(settings)?;
@@ -51,7 +51,7 @@ pub fn on_cpu(scene: &Scene, settings: &Settings, control: &mut Control) -> Resu
     })
 }
 
-fn plan(scene: &Scene, settings: &Settings) -> Result<Plan> {
+fn plan(scene: &RoomScene, settings: &Settings) -> Result<Plan> {
     let settings = Settings { variant: Variant::Cpu, ..settings.clone() };
     Plan::new(scene, &settings, &Limits::of_host())
 }
@@ -86,7 +86,7 @@ fn trace(
 }
 
 /// The photon map of round 0, for comparing builders.
-pub fn photons_on_cpu(scene: &Scene, settings: &Settings) -> Result<Vec<Photon>> {
+pub fn photons_on_cpu(scene: &RoomScene, settings: &Settings) -> Result<Vec<Photon>> {
     let mut clock = HostClock::start("run");
     let plan = plan(scene, settings)?;
     let pool = thread_pool(settings)?;

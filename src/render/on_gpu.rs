@@ -11,12 +11,12 @@ use crate::gpu::{Commands, Constants, DeviceFacts, Gpu};
 use crate::plan::{Limits, Plan, photons_of};
 use crate::records::{Photon, Tally};
 use crate::resources::Resources;
-use crate::scene::Scene;
+use crate::scene::room::RoomScene;
 use crate::settings::Settings;
 use crate::{estimate, index, trace};
 
 /// Runs on the GPU.
-pub fn on_gpu(gpu: &Gpu, scene: &Scene, settings: &Settings, control: &mut Control) -> Result<Outcome> {
+pub fn on_gpu(gpu: &Gpu, scene: &RoomScene, settings: &Settings, control: &mut Control) -> Result<Outcome> {
     let started = Instant::now();
     let plan = Plan::new(scene, settings, &limits(gpu.facts()))?;
     let mut commands = Commands::new(gpu, constants(&plan), started)?;
@@ -103,7 +103,7 @@ fn settle(commands: &mut Commands, resources: &Resources, book: &mut Book) -> Re
 }
 
 /// The photon map of round 0, for comparing builders.
-pub fn photons_on_gpu(gpu: &Gpu, scene: &Scene, settings: &Settings) -> Result<Vec<Photon>> {
+pub fn photons_on_gpu(gpu: &Gpu, scene: &RoomScene, settings: &Settings) -> Result<Vec<Photon>> {
     let plan = Plan::new(scene, settings, &limits(gpu.facts()))?;
     let mut commands = Commands::new(gpu, constants(&plan), Instant::now())?;
     let resources = Resources::new(gpu, &mut commands, scene, &plan)?;

@@ -1,107 +1,69 @@
-//! What is lit: a room of walls, and discs of light flush with them.
+//! What is lit: triangle meshes with materials, lights and cameras ([`Scene`]), read from glTF or
+//! built in; and the paper's box, a convex room ([`room::RoomScene`]).
 
+pub mod built_in;
+pub mod camera;
+pub mod gltf;
+pub mod light;
+pub mod material;
+pub mod mesh;
 pub mod open_box;
 pub mod rectangle;
+pub mod room;
+pub mod texture;
 
-use glam::{DVec3, Vec3};
+use std::path::Path;
 
-use crate::constants::{FACE_COUNT, NO_WALL};
-use crate::records;
+use glam::DVec3;
 
-/// An axis-aligned convex room whose faces are walls or openings, with lights in its walls.
-#[derive(Debug, Clone, PartialEq)]
+pub use camera::Camera;
+pub use light::Light;
+pub use material::{Material, Surface};
+pub use mesh::Mesh;
+pub use texture::Texture;
+
+use crate::error::{Error, Result};
+
+/// Meshes in world space, metres, y up, with what they are made of and what lights them.
+#[derive(Debug, Clone, Default)]
 pub struct Scene {
-    pub name: &'static str,
-    pub min_corner: DVec3,
-    pub max_corner: DVec3,
-    /// Face 2 * axis + (1 on the positive side); `None` is an opening.
-    pub faces: [Option<Wall>; FACE_COUNT as usize],
-    pub lights: Vec<DiscLight>,
-}
-
-#[derive(Debug, Clone, PartialEq)]
-pub struct Wall {
-    pub name: &'static str,
-    /// Share of arriving light that is reflected.
-    pub albedo: f32,
-    /// Phong exponent; `None` is Lambertian.
-    pub shininess: Option<f32>,
-}
-
-/// A disc of light that neither blocks nor changes its wall.
-#[derive(Debug, Clone, PartialEq)]
-pub struct DiscLight {
-    /// Face in whose centre the disc lies.
-    pub face: usize,
-    /// Metres.
-    pub radius: f64,
-    /// Watts.
-    pub power: f64,
-}
-
-/// Axis (0 to 2) of a face and the sign of its side.
-pub fn face_axis(face: usize) -> (usize, f64) {
-    (face / 2, if face % 2 == 1 { 1.0 } else { -1.0 })
+    pub name: String,
+    pub meshes: Vec<Mesh>,
+    pub materials: Vec<Material>,
+    pub textures: Vec<Texture>,
+    /// Lights that are no mesh; meshes of an emissive material shine as well.
+    pub lights: Vec<Light>,
+    pub cameras: Vec<Camera>,
+    /// What the file holds and this program leaves out, each once.
+    pub warnings: Vec<String>,
 }
 
 impl Scene {
-    /// The walls with their face numbers, openings left out.
-    pub fn walls(&self) -> impl Iterator<Item = (usize, &Wall)> {
-        self.faces.iter().enumerate().filter_map(|(face, wall)| wall.as_ref().map(|wall| (face, wall)))
-    }
-
-    /// A face as a rectangle: u and v follow the two axes after the face's own, cyclically.
-    pub fn rectangle(&self, face: usize) -> rectangle::Rectangle {
-        let (axis, sign) = face_axis(face);
-        let extent = self.max_corner - self.min_corner;
-        let mut origin = self.min_corner;
-        if sign > 0.0 {
-            origin[axis] = self.max_corner[axis];
+    /// A built-in scene by name, else a `.gltf` or `.glb` file. `radiometric`: punctual lights are
+    /// given in W/sr and W/m2 instead of candela and lux.
+    pub fn open(name: &str, radiometric: bool) -> Result<Scene> {
+        if let Some(scene) = built_in::by_name(name) {
+            return Ok(scene);
         }
-        let along = |axis: usize| DVec3::AXES[axis] * extent[axis];
-        rectangle::Rectangle { origin, u: along((axis + 1) % 3), v: along((axis + 2) % 3) }
+        let path = Path::new(name);
+        match path.extension().and_then(|extension| extension.to_str()).map(str::to_lowercase).as_deref() {
+            Some("gltf" | "glb") => gltf::load(path, radiometric),
+            _ => Err(Error::setting("SCENE", name, format!("must be a .gltf or .glb file, or one of {}", built_in::NAMES.join(", ")))),
+        }
     }
 
-    pub fn room_record(&self) -> records::Room {
-        records::Room { min_corner: self.min_corner.as_vec3(), max_corner: self.max_corner.as_vec3() }
+    pub fn triangle_count(&self) -> usize {
+        self.meshes.iter().map(|mesh| mesh.triangles.len()).sum()
     }
 
-    pub fn wall_records(&self) -> Vec<records::Wall> {
-        self.faces
-            .iter()
-            .enumerate()
-            .map(|(face, wall)| {
-                let (axis, sign) = face_axis(face);
-                records::Wall {
-                    normal: Vec3::AXES[axis] * -sign as f32,
-                    tangent: Vec3::AXES[(axis + 1) % 3],
-                    bitangent: Vec3::AXES[(axis + 2) % 3],
-                    albedo: wall.as_ref().map_or(0.0, |wall| wall.albedo),
-                    shininess: wall.as_ref().and_then(|wall| wall.shininess).unwrap_or(-1.0),
-                    is_open: u32::from(wall.is_none()),
-                }
-            })
-            .collect()
+    /// Smallest box around all meshes: (lower corner, upper corner).
+    pub fn bounds(&self) -> (DVec3, DVec3) {
+        let corners = self.meshes.iter().flat_map(|mesh| &mesh.positions);
+        corners.fold((DVec3::INFINITY, DVec3::NEG_INFINITY), |(min, max), position| (min.min(*position), max.max(*position)))
     }
 
-    /// One record a light; `relative_flux` is that of each of its photons.
-    pub fn light_records(&self, relative_flux: &[f32]) -> Vec<records::DiscLight> {
-        self.lights
-            .iter()
-            .zip(relative_flux)
-            .map(|(light, flux)| records::DiscLight {
-                centre: self.rectangle(light.face).centre().as_vec3(),
-                radius: light.radius as f32,
-                wall: light.face as u32,
-                flux: *flux,
-            })
-            .collect()
-    }
-
-    /// Watts of all lights.
-    pub fn power(&self) -> f64 {
-        self.lights.iter().map(|light| light.power).sum()
+    /// Whether anything shines.
+    pub fn is_lit(&self) -> bool {
+        !self.lights.is_empty() || self.meshes.iter().any(|mesh| self.materials[mesh.material].is_emissive())
     }
 }
-
-const _: () = assert!(NO_WALL > FACE_COUNT);

@@ -3,15 +3,15 @@
 
 use glam::DVec3;
 
-use super::{DiscLight, Scene, Wall};
+use super::room::{DiscLight, RoomScene, Wall};
 use crate::settings::{HALF_WIDTH, Settings, WALL_NAMES};
 
 /// Face numbers of the two lit walls, in the order in which photons are dealt out.
 const LIT_FACES: [usize; 2] = [2, 0];
 
-pub fn open_box(settings: &Settings) -> Scene {
+pub fn open_box(settings: &Settings) -> RoomScene {
     let wall = |face: usize| Wall { name: WALL_NAMES[face], albedo: settings.reflectance, shininess: settings.shininess[face] };
-    Scene {
+    RoomScene {
         name: "open-box",
         min_corner: DVec3::splat(-HALF_WIDTH),
         max_corner: DVec3::splat(HALF_WIDTH),

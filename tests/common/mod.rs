@@ -14,8 +14,8 @@ use photonmill::gpu::{Gpu, Options};
 use photonmill::plan::{Limits, Plan};
 use photonmill::records::Photon;
 use photonmill::render::{self, Control, Outcome};
-use photonmill::scene::Scene;
 use photonmill::scene::open_box::open_box;
+use photonmill::scene::room::RoomScene;
 use photonmill::settings::Settings;
 
 /// A device under the validation layer, which must not have said a word by the end of the test.
@@ -67,7 +67,7 @@ pub fn run(gpu: &Gpu, settings: &Settings) -> Outcome {
 }
 
 /// Runs a scene on a device to its end.
-pub fn run_scene(gpu: &Gpu, scene: &Scene, settings: &Settings) -> Outcome {
+pub fn run_scene(gpu: &Gpu, scene: &RoomScene, settings: &Settings) -> Outcome {
     let never = AtomicBool::new(false);
     let mut control = Control { cancelled: &never, progress: &mut |_, _| {} };
     render::on_gpu(gpu, scene, settings, &mut control).unwrap_or_else(|error| panic!("{error}\n{settings:?}"))
@@ -79,7 +79,7 @@ pub fn run_on_cpu(settings: &Settings) -> Outcome {
 }
 
 /// Runs a scene on the CPU builder to its end.
-pub fn run_scene_on_cpu(scene: &Scene, settings: &Settings) -> Outcome {
+pub fn run_scene_on_cpu(scene: &RoomScene, settings: &Settings) -> Outcome {
     let never = AtomicBool::new(false);
     let mut control = Control { cancelled: &never, progress: &mut |_, _| {} };
     render::on_cpu(scene, settings, &mut control).unwrap_or_else(|error| panic!("{error}\n{settings:?}"))
@@ -96,7 +96,7 @@ pub fn photons_on_cpu(settings: &Settings) -> Vec<Photon> {
 }
 
 /// What a device would do with these settings.
-pub fn plan_for(gpu: &Gpu, scene: &Scene, settings: &Settings) -> Plan {
+pub fn plan_for(gpu: &Gpu, scene: &RoomScene, settings: &Settings) -> Plan {
     Plan::new(scene, settings, &render::limits(gpu.facts())).unwrap()
 }
 

@@ -1,0 +1,139 @@
+//! Numbers out of glTF buffers, with every offset checked: a file from anywhere may say anything.
+
+use gltf::accessor::{DataType, Dimensions};
+use gltf::{Accessor, buffer};
+
+use super::Loader;
+use crate::error::Result;
+
+/// Bytes of one element of an accessor, and where they lie.
+struct Elements<'a> {
+    bytes: &'a [u8],
+    stride: usize,
+    size: usize,
+}
+
+impl<'a> Elements<'a> {
+    fn element(&self, index: usize) -> &'a [u8] {
+        &self.bytes[index * self.stride..index * self.stride + self.size]
+    }
+}
+
+/// `N` numbers an element. Integers are scaled to [0, 1] or [-1, 1] where the accessor says so.
+pub(super) fn read<const N: usize>(loader: &Loader, accessor: &Accessor, what: &str) -> Result<Vec<[f32; N]>> {
+    let size = number_bytes(accessor.data_type());
+    elements(loader, accessor, components(N), what)?
+        .into_iter()
+        .map(|element| {
+            let numbers: [f32; N] =
+                std::array::from_fn(|k| number(&element[k * size..(k + 1) * size], accessor.data_type(), accessor.normalized()));
+            match numbers.iter().find(|number| !number.is_finite()) {
+                Some(number) => Err(loader.refuse(what, format!("holds {number}; every number must be finite"))),
+                None => Ok(numbers),
+            }
+        })
+        .collect()
+}
+
+/// Indices of vertices.
+pub(super) fn read_indices(loader: &Loader, accessor: &Accessor, what: &str) -> Result<Vec<u32>> {
+    if !matches!(accessor.data_type(), DataType::U8 | DataType::U16 | DataType::U32) {
+        return Err(loader.refuse(what, "has indices that are no unsigned integers"));
+    }
+    let elements = elements(loader, accessor, Dimensions::Scalar, what)?;
+    Ok(elements.into_iter().map(integer).collect())
+}
+
+fn components(count: usize) -> Dimensions {
+    match count {
+        1 => Dimensions::Scalar,
+        2 => Dimensions::Vec2,
+        3 => Dimensions::Vec3,
+        _ => Dimensions::Vec4,
+    }
+}
+
+fn number_bytes(kind: DataType) -> usize {
+    match kind {
+        DataType::I8 | DataType::U8 => 1,
+        DataType::I16 | DataType::U16 => 2,
+        DataType::U32 | DataType::F32 => 4,
+    }
+}
+
+/// The little-endian unsigned integer in one to four bytes.
+fn integer(bytes: &[u8]) -> u32 {
+    bytes.iter().rev().fold(0, |value, byte| value << 8 | u32::from(*byte))
+}
+
+fn number(bytes: &[u8], kind: DataType, normalized: bool) -> f32 {
+    let bits = integer(bytes);
+    let (value, largest) = match kind {
+        DataType::F32 => return f32::from_bits(bits),
+        DataType::U32 => (bits as f32, u32::MAX as f32),
+        DataType::U8 | DataType::U16 => (bits as f32, if bytes.len() == 1 { 255.0 } else { 65_535.0 }),
+        DataType::I8 => (f32::from(bits as u8 as i8), 127.0),
+        DataType::I16 => (f32::from(bits as u16 as i16), 32_767.0),
+    };
+    if normalized { (value / largest).max(-1.0) } else { value }
+}
+
+/// The bytes of every element, sparse replacements made.
+fn elements<'a>(loader: &'a Loader, accessor: &Accessor, dimensions: Dimensions, what: &str) -> Result<Vec<&'a [u8]>> {
+    if accessor.dimensions() != dimensions {
+        return Err(loader.refuse(what, format!("is of type {:?} where {dimensions:?} is wanted", accessor.dimensions())));
+    }
+    let size = number_bytes(accessor.data_type()) * dimensions.multiplicity();
+    let count = accessor.count();
+    let mut elements: Vec<&[u8]> = match accessor.view() {
+        Some(view) => {
+            let dense = slice(loader, &view, accessor.offset(), count, size, what)?;
+            (0..count).map(|index| dense.element(index)).collect()
+        }
+        // Without a view the accessor holds zeros; a count that no file backs must not fill memory.
+        None if count <= loader.file_bytes => vec![&[0u8; 16][..size]; count],
+        None => return Err(loader.refuse(what, format!("claims {count} elements that the file does not hold"))),
+    };
+    if let Some(sparse) = accessor.sparse() {
+        let (indices, values) = (sparse.indices(), sparse.values());
+        let index_size = match indices.index_type() {
+            gltf::accessor::sparse::IndexType::U8 => 1,
+            gltf::accessor::sparse::IndexType::U16 => 2,
+            gltf::accessor::sparse::IndexType::U32 => 4,
+        };
+        let replaced = slice(loader, &indices.view(), indices.offset(), sparse.count(), index_size, what)?;
+        let by = slice(loader, &values.view(), values.offset(), sparse.count(), size, what)?;
+        for k in 0..sparse.count() {
+            let index = integer(replaced.element(k)) as usize;
+            let Some(element) = elements.get_mut(index) else {
+                return Err(loader.refuse(what, format!("replaces element {index} of {count}")));
+            };
+            *element = by.element(k);
+        }
+    }
+    Ok(elements)
+}
+
+/// `count` elements of `size` bytes from `offset` in a buffer view.
+fn slice<'a>(loader: &'a Loader, view: &buffer::View, offset: usize, count: usize, size: usize, what: &str) -> Result<Elements<'a>> {
+    let stride = view.stride().unwrap_or(size);
+    let bytes = view_bytes(loader, view, what)?;
+    let end = match count {
+        0 => Some(offset),
+        _ => (count - 1).checked_mul(stride).and_then(|last| last.checked_add(size)).and_then(|length| length.checked_add(offset)),
+    };
+    match end.and_then(|end| bytes.get(offset..end)) {
+        Some(bytes) if stride >= size => Ok(Elements { bytes, stride, size }),
+        Some(_) => Err(loader.refuse(what, format!("has elements of {size} bytes every {stride} bytes"))),
+        None => Err(loader.refuse(what, format!("runs past the {} bytes of buffer view {}", bytes.len(), view.index()))),
+    }
+}
+
+/// The bytes of a buffer view.
+pub(super) fn view_bytes<'a>(loader: &'a Loader, view: &buffer::View, what: &str) -> Result<&'a [u8]> {
+    let buffer = &loader.buffers[view.buffer().index()];
+    let end = view.offset().checked_add(view.length());
+    end.and_then(|end| buffer.get(view.offset()..end)).ok_or_else(|| {
+        loader.refuse(what, format!("lies in buffer view {}, which runs past the {} bytes of its buffer", view.index(), buffer.len()))
+    })
+}

@@ -1,0 +1,128 @@
+//! Triangle meshes in world space.
+
+use glam::{DVec2, DVec3};
+
+/// One primitive of one node: vertices, triangles, one material.
+#[derive(Debug, Clone, Default)]
+pub struct Mesh {
+    /// Name of its node, or of its mesh.
+    pub name: String,
+    /// Metres, world.
+    pub positions: Vec<DVec3>,
+    /// Unit shading normals, one a vertex; empty where the mesh is flat.
+    pub normals: Vec<DVec3>,
+    /// Texture coordinates, one a vertex, of up to two sets; empty where there are none.
+    pub uvs: [Vec<DVec2>; 2],
+    /// Counter-clockwise from the front.
+    pub triangles: Vec<[u32; 3]>,
+    pub material: usize,
+}
+
+/// Triangles whose area is below this share of the mesh's squared extent cannot be hit: their normals
+/// would be noise.
+const MIN_AREA_SHARE: f64 = 1.0 / (1u64 << 40) as f64;
+
+impl Mesh {
+    /// Corners of a triangle.
+    pub fn corners(&self, triangle: usize) -> [DVec3; 3] {
+        self.triangles[triangle].map(|vertex| self.positions[vertex as usize])
+    }
+
+    /// Twice the area, along the front's normal.
+    fn doubled_area([a, b, c]: [DVec3; 3]) -> DVec3 {
+        (b - a).cross(c - a)
+    }
+
+    pub fn area(&self, triangle: usize) -> f64 {
+        0.5 * Mesh::doubled_area(self.corners(triangle)).length()
+    }
+
+    /// Unit normal of a triangle's front.
+    pub fn normal(&self, triangle: usize) -> DVec3 {
+        Mesh::doubled_area(self.corners(triangle)).normalize()
+    }
+
+    /// Takes away triangles without area and returns their number.
+    pub fn drop_degenerate_triangles(&mut self, scene_extent: f64) -> usize {
+        let before = self.triangles.len();
+        let least = MIN_AREA_SHARE * scene_extent * scene_extent;
+        let positions = &self.positions;
+        self.triangles.retain(|vertices| {
+            let corners = vertices.map(|vertex| positions[vertex as usize]);
+            0.5 * Mesh::doubled_area(corners).length() > least
+        });
+        before - self.triangles.len()
+    }
+
+    /// A parallelogram of two triangles: `origin`, `origin` + u, `origin` + u + v, `origin` + v; its
+    /// front faces along u x v.
+    pub fn parallelogram(name: &str, origin: DVec3, u: DVec3, v: DVec3, material: usize) -> Mesh {
+        Mesh {
+            name: name.to_owned(),
+            positions: vec![origin, origin + u, origin + u + v, origin + v],
+            uvs: [vec![DVec2::ZERO, DVec2::X, DVec2::ONE, DVec2::Y], Vec::new()],
+            triangles: vec![[0, 1, 2], [0, 2, 3]],
+            material,
+            ..Mesh::default()
+        }
+    }
+
+    /// A sphere with smooth normals, of `segments` meridians and half as many parallels.
+    pub fn sphere(name: &str, centre: DVec3, radius: f64, segments: u32, material: usize) -> Mesh {
+        let rings = segments / 2;
+        let mut mesh = Mesh { name: name.to_owned(), material, ..Mesh::default() };
+        for ring in 0..=rings {
+            let polar = std::f64::consts::PI * f64::from(ring) / f64::from(rings);
+            for segment in 0..=segments {
+                let azimuth = std::f64::consts::TAU * f64::from(segment) / f64::from(segments);
+                let normal = DVec3::new(polar.sin() * azimuth.cos(), polar.cos(), polar.sin() * azimuth.sin());
+                mesh.positions.push(centre + radius * normal);
+                mesh.normals.push(normal);
+                mesh.uvs[0].push(DVec2::new(f64::from(segment) / f64::from(segments), f64::from(ring) / f64::from(rings)));
+            }
+        }
+        let vertex = |ring: u32, segment: u32| ring * (segments + 1) + segment;
+        for ring in 0..rings {
+            for segment in 0..segments {
+                let [a, b, c, d] =
+                    [vertex(ring, segment), vertex(ring, segment + 1), vertex(ring + 1, segment + 1), vertex(ring + 1, segment)];
+                // At the poles one side of the quadrilateral has no length.
+                if ring > 0 {
+                    mesh.triangles.push([a, b, c]);
+                }
+                if ring + 1 < rings {
+                    mesh.triangles.push([a, c, d]);
+                }
+            }
+        }
+        mesh
+    }
+}
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+
+    #[test]
+    fn spheres_face_outwards_and_have_their_area() {
+        let centre = DVec3::new(1.0, 2.0, 3.0);
+        let sphere = Mesh::sphere("ball", centre, 0.5, 64, 0);
+        let mut area = 0.0;
+        for triangle in 0..sphere.triangles.len() {
+            let [a, b, c] = sphere.corners(triangle);
+            assert!(sphere.normal(triangle).dot((a + b + c) / 3.0 - centre) > 0.0, "triangle {triangle}");
+            area += sphere.area(triangle);
+        }
+        let exact = std::f64::consts::PI;
+        assert!(area < exact && area > 0.995 * exact, "{area}");
+    }
+
+    #[test]
+    fn triangles_without_area_go() {
+        let mut mesh = Mesh::parallelogram("wall", DVec3::ZERO, DVec3::X, DVec3::Y, 0);
+        mesh.positions.push(DVec3::new(0.5, 1e-25, 0.0));
+        mesh.triangles.extend([[0, 1, 4], [2, 2, 3]]);
+        assert_eq!(mesh.drop_degenerate_triangles(1.0), 2);
+        assert_eq!(mesh.triangles.len(), 2);
+    }
+}

@@ -1,0 +1,295 @@
+//! Scenes from glTF: what a file says is what the scene holds, what it cannot be used for is refused
+//! in one line, and no mutated file makes the loader panic.
+
+use std::path::PathBuf;
+
+use base64::Engine;
+use base64::engine::general_purpose::STANDARD as BASE64;
+use glam::{DVec3, Vec3};
+use photonmill::error::Error;
+use photonmill::scene::light::LightKind;
+use photonmill::scene::{Scene, Surface};
+use serde_json::{Value, json};
+
+/// A unit square in the plane z = 0: positions, normals, coordinates and indices in one buffer.
+fn square_buffer() -> Vec<u8> {
+    let floats = |numbers: &[f32]| numbers.iter().flat_map(|number| number.to_le_bytes()).collect::<Vec<u8>>();
+    let mut bytes = floats(&[0., 0., 0., 1., 0., 0., 1., 1., 0., 0., 1., 0.]);
+    bytes.extend(floats(&[0., 0., 1., 0., 0., 1., 0., 0., 1., 0., 0., 1.]));
+    bytes.extend(floats(&[0., 0., 1., 0., 1., 1., 0., 1.]));
+    bytes.extend([0u16, 1, 2, 0, 2, 3].iter().flat_map(|index| index.to_le_bytes()));
+    bytes
+}
+
+/// A scene of one square, with everything that the tests change.
+fn square() -> Value {
+    let bytes = square_buffer();
+    json!({
+        "asset": {"version": "2.0"},
+        "scene": 0,
+        "scenes": [{"nodes": [0, 1, 2, 3, 4]}],
+        "nodes": [
+            {"name": "wall", "mesh": 0, "translation": [1, 2, 3], "scale": [2, 2, 2]},
+            {"name": "eye", "camera": 0, "translation": [0, 0, 5]},
+            {"name": "bulb", "translation": [0, 4, 0], "extensions": {"KHR_lights_punctual": {"light": 0}}},
+            {"name": "sun", "extensions": {"KHR_lights_punctual": {"light": 1}}},
+            {"name": "beam", "extensions": {"KHR_lights_punctual": {"light": 2}}}
+        ],
+        "meshes": [{"name": "square", "primitives": [{
+            "attributes": {"POSITION": 0, "NORMAL": 1, "TEXCOORD_0": 2}, "indices": 3, "material": 0
+        }]}],
+        "materials": [{
+            "name": "glow", "pbrMetallicRoughness": {"baseColorFactor": [0.5, 0.25, 0.125, 1], "metallicFactor": 0},
+            "emissiveFactor": [1, 0.5, 0.25], "extensions": {"KHR_materials_emissive_strength": {"emissiveStrength": 8}}
+        }],
+        "cameras": [{"type": "perspective", "perspective": {"yfov": 0.7, "znear": 0.1}}],
+        "extensionsUsed": ["KHR_lights_punctual", "KHR_materials_emissive_strength"],
+        "extensions": {"KHR_lights_punctual": {"lights": [
+            {"type": "point", "name": "bulb", "color": [1, 0.5, 0.25], "intensity": 683},
+            {"type": "directional", "intensity": 1366},
+            {"type": "spot", "intensity": 68.3, "spot": {"innerConeAngle": 0.2, "outerConeAngle": 0.4}}
+        ]}},
+        "buffers": [{"byteLength": bytes.len(), "uri": format!("data:application/octet-stream;base64,{}", BASE64.encode(&bytes))}],
+        "bufferViews": [
+            {"buffer": 0, "byteOffset": 0, "byteLength": 48},
+            {"buffer": 0, "byteOffset": 48, "byteLength": 48},
+            {"buffer": 0, "byteOffset": 96, "byteLength": 32},
+            {"buffer": 0, "byteOffset": 128, "byteLength": 12}
+        ],
+        "accessors": [
+            {"bufferView": 0, "componentType": 5126, "count": 4, "type": "VEC3", "min": [0, 0, 0], "max": [1, 1, 0]},
+            {"bufferView": 1, "componentType": 5126, "count": 4, "type": "VEC3"},
+            {"bufferView": 2, "componentType": 5126, "count": 4, "type": "VEC2"},
+            {"bufferView": 3, "componentType": 5123, "count": 6, "type": "SCALAR"}
+        ]
+    })
+}
+
+struct File {
+    _folder: tempfile::TempDir,
+    path: PathBuf,
+}
+
+fn file(name: &str, content: &[u8]) -> File {
+    let folder = tempfile::tempdir().unwrap();
+    let path = folder.path().join(name);
+    std::fs::write(&path, content).unwrap();
+    File { _folder: folder, path }
+}
+
+fn open(name: &str, content: &[u8]) -> Result<Scene, Error> {
+    Scene::open(file(name, content).path.to_str().unwrap(), false)
+}
+
+fn load(value: &Value) -> Result<Scene, Error> {
+    open("scene.gltf", value.to_string().as_bytes())
+}
+
+/// The same scene as a binary file.
+fn glb(mut value: Value) -> Vec<u8> {
+    let mut binary = square_buffer();
+    value["buffers"][0].as_object_mut().unwrap().remove("uri");
+    let mut text = value.to_string().into_bytes();
+    text.resize(text.len().next_multiple_of(4), b' ');
+    binary.resize(binary.len().next_multiple_of(4), 0);
+    let chunk = |kind: &[u8; 4], content: &[u8]| [&(content.len() as u32).to_le_bytes(), kind.as_slice(), content].concat();
+    let chunks = [chunk(b"JSON", &text), chunk(b"BIN\0", &binary)].concat();
+    [b"glTF".as_slice(), &2u32.to_le_bytes(), &(12 + chunks.len() as u32).to_le_bytes(), &chunks].concat()
+}
+
+#[test]
+fn a_file_says_what_the_scene_holds() {
+    for scene in [load(&square()).unwrap(), open("scene.glb", &glb(square())).unwrap()] {
+        let [mesh] = scene.meshes.as_slice() else { panic!("{:?}", scene.meshes) };
+        assert_eq!(mesh.name, "wall");
+        assert_eq!(mesh.positions[2], DVec3::new(3.0, 4.0, 3.0));
+        assert_eq!((mesh.normals[0], mesh.normal(0), mesh.area(0)), (DVec3::Z, DVec3::Z, 2.0));
+        assert_eq!(mesh.triangles, [[0, 1, 2], [0, 2, 3]]);
+        let material = &scene.materials[mesh.material];
+        assert_eq!((material.surface, material.base_colour), (Surface::Lambert, Vec3::new(0.5, 0.25, 0.125)));
+        // Factor times strength is radiance, untouched.
+        assert_eq!(material.emission, Vec3::new(8.0, 4.0, 2.0));
+        assert_eq!((scene.cameras[0].name.as_str(), scene.cameras[0].eye), ("eye", DVec3::new(0.0, 0.0, 5.0)));
+        assert_eq!(scene.cameras[0].forward, DVec3::NEG_Z);
+        // 683 lumens a watt.
+        let kinds: Vec<&LightKind> = scene.lights.iter().map(|light| &light.kind).collect();
+        assert_eq!(*kinds[0], LightKind::Point { position: DVec3::new(0.0, 4.0, 0.0), intensity: Vec3::new(1.0, 0.5, 0.25) });
+        assert_eq!(*kinds[1], LightKind::Directional { direction: DVec3::NEG_Z, irradiance: Vec3::splat(2.0) });
+        let LightKind::Spot { intensity, outer_angle, .. } = kinds[2] else { panic!("{kinds:?}") };
+        assert!((intensity.x - 0.1).abs() < 1e-6 && *outer_angle == 0.4, "{kinds:?}");
+        assert_eq!(scene.warnings, Vec::<String>::new());
+    }
+    let radiometric = Scene::open(file("a.glb", &glb(square())).path.to_str().unwrap(), true).unwrap();
+    assert!(matches!(radiometric.lights[1].kind, LightKind::Directional { irradiance, .. } if irradiance == Vec3::splat(1366.0)));
+}
+
+#[test]
+fn instances_are_meshes_of_their_own_and_mirrored_ones_keep_their_front() {
+    let mut value = square();
+    value["nodes"][0]["children"] = json!([5]);
+    value["nodes"].as_array_mut().unwrap().push(json!({"name": "twin", "mesh": 0, "scale": [-1, 1, 1]}));
+    let scene = load(&value).unwrap();
+    assert_eq!(scene.meshes.len(), 2);
+    let twin = &scene.meshes[1];
+    assert_eq!(twin.positions[2], DVec3::new(-1.0, 4.0, 3.0));
+    assert_eq!((twin.normal(0), twin.normals[0]), (DVec3::Z, DVec3::Z));
+}
+
+#[test]
+fn textures_are_read_as_linear_values() {
+    let mut png = Vec::new();
+    let picture = image::RgbImage::from_fn(2, 1, |i, _| image::Rgb(if i == 0 { [255, 0, 188] } else { [0, 255, 0] }));
+    picture.write_to(&mut std::io::Cursor::new(&mut png), image::ImageFormat::Png).unwrap();
+    let mut value = square();
+    value["images"] = json!([{"uri": format!("data:image/png;base64,{}", BASE64.encode(&png))}]);
+    value["textures"] = json!([{"source": 0}]);
+    value["materials"][0]["pbrMetallicRoughness"]["baseColorTexture"] = json!({"index": 0});
+    let scene = load(&value).unwrap();
+    let texture = &scene.textures[scene.materials[0].base_colour_texture.unwrap().texture];
+    assert_eq!((texture.width, texture.height), (2, 1));
+    assert!((texture.texels[0] - Vec3::new(1.0, 0.0, 0.502_886)).abs().max_element() < 1e-5, "{:?}", texture.texels);
+
+    value["images"] = json!([{"name": "paint", "uri": format!("data:image/png;base64,{}", BASE64.encode(&png[..30]))}]);
+    assert_refused(&value, &["texture image 'paint'", "cannot be decoded"]);
+}
+
+#[test]
+fn what_is_left_out_is_named_once() {
+    let mut value = square();
+    value["materials"][0]["alphaMode"] = json!("BLEND");
+    value["materials"].as_array_mut().unwrap().push(json!({"alphaMode": "MASK"}));
+    value["animations"] = json!([{"channels": [], "samplers": []}]);
+    value["extensionsUsed"].as_array_mut().unwrap().push(json!("KHR_materials_clearcoat"));
+    value["cameras"][0] = json!({"type": "orthographic", "orthographic": {"xmag": 1, "ymag": 1, "zfar": 9, "znear": 0.1}});
+    let scene = load(&value).unwrap();
+    let [warning] = scene.warnings.as_slice() else { panic!("{:?}", scene.warnings) };
+    for word in ["transparency by alpha", "animations", "KHR_materials_clearcoat", "orthographic cameras"] {
+        assert_eq!(warning.matches(word).count(), 1, "{word}: {warning}");
+    }
+}
+
+#[test]
+fn a_scene_without_light_or_with_flat_triangles_is_a_warning() {
+    let mut value = square();
+    value["materials"] = json!([{"name": "dull"}]);
+    value["scenes"][0]["nodes"] = json!([0]);
+    value["accessors"][3]["count"] = json!(3);
+    let scene = load(&value).unwrap();
+    assert_eq!((scene.triangle_count(), scene.cameras.len()), (1, 0));
+    assert!(scene.warnings.iter().any(|warning| warning.contains("dark")), "{:?}", scene.warnings);
+
+    // Two corners of the second triangle in one place.
+    let mut bytes = square_buffer();
+    bytes[136..138].copy_from_slice(&2u16.to_le_bytes());
+    bytes[138..140].copy_from_slice(&2u16.to_le_bytes());
+    let mut value = square();
+    value["buffers"][0]["uri"] = json!(format!("data:application/octet-stream;base64,{}", BASE64.encode(&bytes)));
+    let scene = load(&value).unwrap();
+    assert_eq!(scene.triangle_count(), 1);
+    assert!(scene.warnings.iter().any(|warning| warning.contains("1 triangle(s) have no area")), "{:?}", scene.warnings);
+}
+
+fn assert_refused(value: &Value, named: &[&str]) {
+    assert_refusal(load(value), named);
+}
+
+fn assert_refusal(result: Result<Scene, Error>, named: &[&str]) {
+    let error = result.expect_err(&format!("must be refused for {named:?}"));
+    assert_eq!(error.exit_code(), 2, "{error}");
+    let line = error.to_string();
+    assert_eq!(line.lines().count(), 1, "{line}");
+    for word in named {
+        assert!(line.contains(word), "must name {word:?}: {line}");
+    }
+}
+
+#[test]
+fn what_cannot_be_used_is_refused_with_file_and_object() {
+    type Spoil = fn(&mut Value);
+    let cases: &[(Spoil, &[&str])] = &[
+        (|v| v["bufferViews"][0]["byteOffset"] = json!(1_000_000), &["scene.gltf", "mesh 'wall'", "buffer view 0"]),
+        (|v| v["bufferViews"][0]["byteLength"] = json!(40), &["mesh 'wall'", "runs past"]),
+        (|v| v["accessors"][0]["count"] = json!(400_000_000), &["mesh 'wall'", "runs past"]),
+        (|v| v["accessors"][0].as_object_mut().unwrap().remove("bufferView").map_or((), drop), &["scene.gltf"]),
+        (|v| v["accessors"][1]["count"] = json!(3), &["mesh 'wall'", "3 normals for 4 vertices"]),
+        (|v| v["accessors"][3]["componentType"] = json!(5126), &["mesh 'wall'", "indices"]),
+        (|v| v["buffers"][0]["byteLength"] = json!(10_000), &["buffer 0", "140 bytes", "10000"]),
+        (|v| v["buffers"][0]["uri"] = json!("absent.bin"), &["absent.bin", "cannot be read"]),
+        (|v| v["buffers"][0]["uri"] = json!("%zz"), &["buffer 0", "%zz"]),
+        (|v| v["buffers"][0]["uri"] = json!("https://example.com/a.bin"), &["buffer 0", "only files beside this one"]),
+        (|v| v["buffers"][0]["uri"] = json!("data:x;base64,@@@"), &["buffer 0", "not base64"]),
+        (|v| v["materials"][0]["pbrMetallicRoughness"]["baseColorFactor"] = json!([2, 0, 0, 1]), &["material 'glow'", "from 0 to 1"]),
+        (|v| v["materials"][0]["emissiveFactor"] = json!([-1, 0, 0]), &["material 'glow'", "emits"]),
+        (|v| v["nodes"][0]["scale"] = json!([1e300, 1, 1]), &["'wall'", "finite"]),
+        (|v| v["extensions"]["KHR_lights_punctual"]["lights"][0]["intensity"] = json!(-1), &["light 'bulb'", "0 or more"]),
+        (|v| v["extensions"]["KHR_lights_punctual"]["lights"][2]["spot"]["outerConeAngle"] = json!(0.1), &["light", "cones"]),
+        (|v| v["scenes"][0]["nodes"] = json!([1]), &["no triangle"]),
+        (|v| v["meshes"][0]["primitives"][0]["mode"] = json!(1), &["no triangle"]),
+        (|v| v["meshes"][0]["primitives"][0]["material"] = json!(7), &["scene.gltf"]),
+        (|v| v["extensionsRequired"] = json!(["KHR_draco_mesh_compression"]), &["scene.gltf", "KHR_draco_mesh_compression"]),
+        (|v| v["asset"]["version"] = json!("9.9"), &["scene.gltf", "9.9"]),
+    ];
+    for (spoil, named) in cases {
+        let mut value = square();
+        spoil(&mut value);
+        assert_refused(&value, named);
+    }
+    // A vertex that is no number, an index past the vertices.
+    let mut nan = square_buffer();
+    nan[4..8].copy_from_slice(&f32::NAN.to_le_bytes());
+    let mut past = square_buffer();
+    past[130..132].copy_from_slice(&9u16.to_le_bytes());
+    for (bytes, named) in [(nan, ["mesh 'wall'", "NaN"]), (past, ["mesh 'wall'", "vertex 9 of 4"])] {
+        let mut value = square();
+        value["buffers"][0]["uri"] = json!(format!("data:application/octet-stream;base64,{}", BASE64.encode(&bytes)));
+        assert_refused(&value, &named);
+    }
+    // Files that are none.
+    let whole = glb(square());
+    assert_refusal(open("a.glb", &whole[..whole.len() / 2]), &["a.glb"]);
+    assert_refusal(open("a.glb", &[]), &["a.glb"]);
+    assert_refusal(open("a.gltf", b"{"), &["a.gltf"]);
+    assert_refusal(Scene::open("absent.glb", false), &["absent.glb", "cannot be read"]);
+    assert_refusal(Scene::open("cornel", false), &["SCENE cornel", "cornell-spheres"]);
+}
+
+/// Nodes within themselves, and deeper than any hierarchy.
+#[test]
+fn endless_hierarchies_end() {
+    let mut value = square();
+    value["nodes"][0]["children"] = json!([0]);
+    assert_refused(&value, &["'wall'"]);
+}
+
+/// Bytes changed, cut and repeated at random, JSON values replaced: the loader answers, and quickly.
+#[test]
+fn no_mutated_file_makes_the_loader_panic() {
+    let whole = glb(square());
+    let text = square().to_string().into_bytes();
+    let mut state = 1u64;
+    let mut random = |below: usize| {
+        state = state.wrapping_mul(6_364_136_223_846_793_005).wrapping_add(1_442_695_040_888_963_407);
+        ((state >> 33) as usize) % below.max(1)
+    };
+    let mut refused = 0;
+    for case in 0..4000 {
+        let (name, seed) = if case % 2 == 0 { ("a.glb", &whole) } else { ("a.gltf", &text) };
+        let mut bytes = seed.clone();
+        for _ in 0..=random(6) {
+            let place = random(bytes.len());
+            match random(5) {
+                0 => bytes[place] ^= 1 << random(8),
+                1 => bytes[place] = random(256) as u8,
+                2 => bytes.truncate(place.max(1)),
+                3 => bytes[place] = b"0123456789-eE.[]{},:"[random(20)],
+                _ => {
+                    let end = (place + random(16)).min(bytes.len());
+                    let part = bytes[place..end].to_vec();
+                    bytes.splice(place..place, part);
+                }
+            }
+        }
+        refused += usize::from(open(name, &bytes).is_err());
+    }
+    assert!(refused > 1000, "the mutations must matter: {refused} of 4000 were refused");
+}
