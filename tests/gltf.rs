@@ -293,3 +293,26 @@ fn no_mutated_file_makes_the_loader_panic() {
     }
     assert!(refused > 1000, "the mutations must matter: {refused} of 4000 were refused");
 }
+
+/// What Blender's own exporter writes (tools/make_blender_scene.py).
+#[test]
+fn a_blender_file_loads() {
+    let scene = Scene::open(concat!(env!("CARGO_MANIFEST_DIR"), "/tests/scenes/blender.glb"), false).unwrap();
+    let material_of = |mesh: &str| {
+        let mesh = scene.meshes.iter().find(|candidate| candidate.name.starts_with(mesh)).unwrap_or_else(|| panic!("no mesh {mesh}"));
+        &scene.materials[mesh.material]
+    };
+    assert_eq!(material_of("mirror").surface, Surface::Mirror);
+    let Surface::Dielectric { ior } = material_of("glass").surface else { panic!("{:?}", material_of("glass")) };
+    assert!((ior - 1.45).abs() < 1e-6, "{ior}");
+    assert!(material_of("tiles").base_colour_texture.is_some());
+    assert!((material_of("panel").emission - Vec3::new(12.0, 9.6, 7.2)).abs().max_element() < 1e-4, "{:?}", material_of("panel"));
+    assert_eq!(scene.cameras[0].name, "eye");
+    // Blender's z is up; glTF's and ours is y.
+    assert!((scene.cameras[0].eye - DVec3::new(0.0, 1.8, 5.0)).length() < 1e-5, "{:?}", scene.cameras);
+    let kinds: Vec<&LightKind> = scene.lights.iter().map(|light| &light.kind).collect();
+    assert!(kinds.iter().any(|kind| matches!(kind, LightKind::Point { .. })), "{kinds:?}");
+    assert!(kinds.iter().any(|kind| matches!(kind, LightKind::Spot { .. })), "{kinds:?}");
+    assert!(kinds.iter().any(|kind| matches!(kind, LightKind::Directional { .. })), "{kinds:?}");
+    assert_eq!(scene.triangle_count(), 3 * 2 + 2 * (32 * 16 * 2 - 2 * 32));
+}
