@@ -45,6 +45,6 @@ constants! {
     GATHER_SLICE = 4_096;
     /// Items that one invocation of the prefix sum handles.
     SCAN_ITEMS = 4;
-    /// Subgroups that a work group can hold at most (1024 invocations in subgroups of 8).
-    MAX_SUBGROUPS = 128;
+    /// Subgroups that a work group can hold at most: 1024 invocations in subgroups of one.
+    MAX_SUBGROUPS = 1_024;
 }

@@ -25,8 +25,8 @@ pub enum Error {
     #[error("no Vulkan device: {reason}")]
     NoVulkan { reason: String },
 
-    /// `--device` names a device that is not there.
-    #[error("--device {wanted}: no such Vulkan device; there is {present}")]
+    /// `--device` names a device that is not there, or several.
+    #[error("--device {wanted}: names no one Vulkan device; there is {present}")]
     DeviceAbsent { wanted: String, present: String },
 
     /// A device lacks something that every kernel needs.
@@ -62,7 +62,7 @@ impl Error {
     /// 2 for input that the user can mend, 1 for everything else.
     pub fn exit_code(&self) -> u8 {
         match self {
-            Error::Setting { .. } | Error::Output { .. } | Error::Scene { .. } | Error::DeviceAbsent { .. } => 2,
+            Error::Setting { .. } | Error::Output { .. } | Error::Scene { .. } | Error::DeviceAbsent { .. } | Error::NoValidationLayer => 2,
             _ => 1,
         }
     }

@@ -22,7 +22,8 @@ pub fn modules(plan: &Plan, facts: &DeviceFacts) -> Vec<Module> {
 /// Most groups along y that any device must allow.
 const MAX_GROUPS_Y: u32 = 65_535;
 
-fn push(plan: &Plan, photon_count: u32) -> GatherPush {
+/// A gather of all points; its dispatches each cover a part.
+fn whole_push(plan: &Plan, photon_count: u32) -> GatherPush {
     GatherPush {
         first_point: 0,
         end_point: plan.points.len() as u32,
@@ -37,6 +38,22 @@ fn push(plan: &Plan, photon_count: u32) -> GatherPush {
     }
 }
 
+/// Runs of points, none so long that its dispatch would exceed a submission's work or the groups that
+/// the device allows along x.
+fn point_ranges(commands: &Commands, plan: &Plan, tests_per_point: u64) -> impl Iterator<Item = (u32, u32)> + use<> {
+    let group_size = u64::from(plan.settings.group_size);
+    let most_groups = u64::from(commands.facts().work_group_count_x);
+    let groups = (plan.pair_tests_per_submission / tests_per_point.max(1) / group_size).clamp(1, most_groups);
+    let (points, step) = (plan.points.len(), (groups * group_size) as usize);
+    (0..points).step_by(step).map(move |first| (first as u32, points.min(first + step) as u32))
+}
+
+/// Counts work, and hands the commands over once they amount to a submission.
+fn add_work(commands: &mut Commands, plan: &Plan, pair_tests: u64) -> Result<()> {
+    commands.add_work(pair_tests);
+    if commands.work() >= plan.pair_tests_per_submission { commands.submit() } else { Ok(()) }
+}
+
 /// Adds a chunk to the film.
 pub fn gather(commands: &mut Commands, resources: &Resources, plan: &Plan, photon_count: u32) -> Result<()> {
     commands.scope("gather", |commands| match &resources.index {
@@ -45,33 +62,26 @@ pub fn gather(commands: &mut Commands, resources: &Resources, plan: &Plan, photo
     })
 }
 
-/// Every point steps through the whole photon list, a slice of it an invocation. The host hands over
-/// the commands whenever they amount to a submission's work.
+/// Every point steps through the whole photon list, a slice of it an invocation.
 fn gather_brute(commands: &mut Commands, resources: &Resources, plan: &Plan, photon_count: u32) -> Result<()> {
     let Resources { film, points, photons, counters, .. } = resources;
-    let whole = push(plan, photon_count);
+    let whole = whole_push(plan, photon_count);
     let slice_count = whole.photon_capacity.div_ceil(GATHER_SLICE);
-    let budget = plan.pair_tests_per_submission;
-    let slice = u64::from(GATHER_SLICE);
-    // As many points as one slice's budget holds, then as many slices as these points leave room for.
-    let points_at_once = (budget / slice).clamp(1, u64::from(whole.end_point)) as u32;
-    let slices_at_once = (budget / (u64::from(points_at_once) * slice)).clamp(1, u64::from(MAX_GROUPS_Y)) as u32;
-    for first_slice in (0..slice_count).step_by(slices_at_once as usize) {
-        for first_point in (0..whole.end_point).step_by(points_at_once as usize) {
+    let tests_per_point = u64::from(GATHER_SLICE);
+    for (first_point, end_point) in point_ranges(commands, plan, tests_per_point) {
+        let point_count = end_point - first_point;
+        let tests_per_slice = u64::from(point_count) * tests_per_point;
+        let slices_at_once = (plan.pair_tests_per_submission / tests_per_slice).clamp(1, u64::from(MAX_GROUPS_Y)) as u32;
+        for first_slice in (0..slice_count).step_by(slices_at_once as usize) {
             let slices = slices_at_once.min(slice_count - first_slice);
-            let end_point = whole.end_point.min(first_point.saturating_add(points_at_once));
             let push = GatherPush { first_point, end_point, first_slice, ..whole };
-            let point_count = end_point - first_point;
             let extent = Extent::Groups(point_count.div_ceil(plan.settings.group_size), slices);
             if commands.facts().int64_atomics {
                 commands.dispatch(GatherBruteU64 { points, film, photons, counters }, &push, extent)?;
             } else {
                 commands.dispatch(GatherBruteTwoWords { points, film, photons, counters }, &push, extent)?;
             }
-            commands.add_work(u64::from(slices) * u64::from(point_count) * slice);
-            if commands.work() >= budget {
-                commands.submit()?;
-            }
+            add_work(commands, plan, u64::from(slices) * tests_per_slice)?;
         }
     }
     Ok(())
@@ -81,17 +91,26 @@ fn gather_brute(commands: &mut Commands, resources: &Resources, plan: &Plan, pho
 fn gather_grid(commands: &mut Commands, resources: &Resources, index: &IndexBuffers, plan: &Plan, photon_count: u32) -> Result<()> {
     let Resources { film, points, dispatch_args, .. } = resources;
     let IndexBuffers { cells, sorted_photons, longest, .. } = index;
-    let push = push(plan, photon_count);
+    let whole = whole_push(plan, photon_count);
     commands.fill(longest, 0, 1, 0);
-    commands.dispatch(CandidateCount { points, longest, cells }, &push, Extent::Items(u64::from(push.end_point)))?;
-    let size =
-        DispatchSizePush { counter: 0, capacity: push.end_point, items_per_group: plan.settings.group_size, max_groups: MAX_GROUPS_Y };
-    commands.dispatch(SliceCount { longest, dispatch_args }, &size, Extent::Groups(1, 1))?;
-    commands.add_work(plan.work.pair_tests(photon_count));
-    let extent = Extent::Indirect(dispatch_args);
-    if commands.facts().int64_atomics {
-        commands.dispatch(GatherGridU64 { points, film, cells, sorted_photons }, &push, extent)
-    } else {
-        commands.dispatch(GatherGridTwoWords { points, film, cells, sorted_photons }, &push, extent)
+    commands.dispatch(CandidateCount { points, longest, cells }, &whole, Extent::Items(u64::from(whole.end_point)))?;
+    let tests_per_point = plan.work.tests_per_point(photon_count);
+    for (first_point, end_point) in point_ranges(commands, plan, tests_per_point) {
+        let size = DispatchSizePush {
+            counter: 0,
+            capacity: end_point - first_point,
+            items_per_group: plan.settings.group_size,
+            max_groups: MAX_GROUPS_Y,
+        };
+        commands.dispatch(SliceCount { longest, dispatch_args }, &size, Extent::Groups(1, 1))?;
+        let push = GatherPush { first_point, end_point, ..whole };
+        let extent = Extent::Indirect(dispatch_args);
+        if commands.facts().int64_atomics {
+            commands.dispatch(GatherGridU64 { points, film, cells, sorted_photons }, &push, extent)?;
+        } else {
+            commands.dispatch(GatherGridTwoWords { points, film, cells, sorted_photons }, &push, extent)?;
+        }
+        add_work(commands, plan, u64::from(end_point - first_point) * tests_per_point)?;
     }
+    Ok(())
 }

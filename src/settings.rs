@@ -219,11 +219,15 @@ impl Settings {
                 format!("must be from {:e} to {width} metres (the box's width)", width * MIN_RADIUS_SHARE),
             ));
         }
-        positive("--full-light", self.full_light, "photons within the radius")?;
+        if !(self.full_light >= 1.0 / MAX_QUANTITY && self.full_light <= MAX_QUANTITY) {
+            let allowed = format!("must be from {:e} to {MAX_QUANTITY:e} (photons within the radius)", 1.0 / MAX_QUANTITY);
+            return Err(Error::setting("--full-light", self.full_light, allowed));
+        }
         for (light, power) in self.light_power.iter().enumerate() {
-            if !(power.is_finite() && *power > 0.0) {
+            if !(*power >= 1.0 / MAX_QUANTITY && *power <= MAX_QUANTITY) {
                 let which = ["floor", "left"][light];
-                return Err(Error::setting("--light-power", power, format!("must be a number of watts above 0 ({which} light)")));
+                let allowed = format!("must be from {:e} to {MAX_QUANTITY:e} watts ({which} light)", 1.0 / MAX_QUANTITY);
+                return Err(Error::setting("--light-power", power, allowed));
             }
         }
         let weakest_share = self.light_power.iter().fold(f64::INFINITY, |a, b| a.min(*b)) / self.light_power.iter().sum::<f64>();
@@ -250,9 +254,9 @@ impl Settings {
                 return Err(Error::setting("--shininess", shininess, "must be a number from 0 up; leave it out for Lambertian walls"));
             }
         }
-        if self.eye.iter().any(|coordinate| !coordinate.is_finite()) {
+        if !self.eye.iter().all(|coordinate| coordinate.abs() <= MAX_EYE) {
             let [x, y, z] = self.eye;
-            return Err(Error::setting("--eye", format!("{x},{y},{z}"), "must be three finite numbers"));
+            return Err(Error::setting("--eye", format!("{x},{y},{z}"), format!("must be three numbers from -{MAX_EYE:e} to {MAX_EYE:e}")));
         }
         within("--threads", self.threads as u64, 1..=1024, "threads")?;
         if !(self.group_size.is_power_of_two() && (32..=1024).contains(&self.group_size)) {
@@ -321,6 +325,10 @@ impl Settings {
 /// Photons of a round: their numbers and the counters of a round are 32-bit.
 const MAX_PHOTONS: u32 = 1 << 31;
 const MAX_BOUNCES: u32 = 10_000;
+/// Metres; the square of a larger one would come close to what f32 holds.
+const MAX_EYE: f32 = 1e15;
+/// Watts and photons: far from what f64 and f32 hold, either way.
+const MAX_QUANTITY: f64 = 1e12;
 /// Texels along a wall; points are numbered in 32 bits and held in one buffer of 128 MiB.
 const MAX_MESH: u32 = 1024;
 /// Smallest radius relative to the box: below it the squares of f32 distances lose their meaning.
@@ -336,11 +344,4 @@ where
         return Ok(());
     }
     Err(Error::setting(option, value, format!("must be from {} to {} ({what})", allowed.start(), allowed.end())))
-}
-
-fn positive(option: &'static str, value: f64, what: &str) -> Result<()> {
-    if value.is_finite() && value > 0.0 {
-        return Ok(());
-    }
-    Err(Error::setting(option, value, format!("must be a number above 0 ({what})")))
 }

@@ -59,6 +59,7 @@ pub fn chunk(commands: &mut Commands, resources: &Resources, plan: &Plan, round:
     commands.scope("build", |commands| {
         commands.fill(&resources.counters, 0, u64::from(plan.settings.bounces) + 2, 0);
         commands.fill(&resources.counters, 1, 1, photon_count);
+        commands.add_work(plan.work.tracing(photon_count));
         commands.scope("emit", |commands| emit(commands, resources, plan, round, ranges))?;
         for bounce in 0..plan.settings.bounces {
             if commands.timestamps_left() < TIMESTAMP_RESERVE {

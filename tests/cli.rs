@@ -61,12 +61,12 @@ fn bad_input_is_refused_in_one_line() {
         (&["--radius", "-0.1"], ["--radius", "-0.1", "0.5"]),
         (&["--radius", "nan"], ["--radius", "NaN", "0.5"]),
         (&["--radius", "inf"], ["--radius", "inf", "0.5"]),
-        (&["--full-light", "0"], ["--full-light", "0", "above 0"]),
+        (&["--full-light", "0"], ["--full-light", "0", "from 1e-12"]),
         (&["--shininess", "-1"], ["--shininess", "-1", "from 0 up"]),
         (&["--shininess", "nan"], ["--shininess", "NaN", "from 0 up"]),
         (&["--shininess", "1,2"], ["--shininess", "1,2", "left,right,floor,ceiling,back"]),
         (&["--reflectance", "1.1"], ["--reflectance", "1.1", "0 to 1"]),
-        (&["--light-power", "1,-1"], ["--light-power", "-1", "above 0"]),
+        (&["--light-power", "1,-1"], ["--light-power", "-1", "from 1e-12"]),
         (&["--light-radius", "0.3"], ["--light-radius", "0.3", "0.25"]),
         (&["--variant", "atomik"], ["--variant", "atomik", "naive, atomic, ballot, cpu"]),
         (&["--rng", "dice"], ["--rng", "dice", "rand48, mt, philox"]),
@@ -75,11 +75,20 @@ fn bad_input_is_refused_in_one_line() {
         (&["--group-size", "48"], ["--group-size", "48", "power of two"]),
         (&["--threads", "0"], ["--threads", "0", "from 1"]),
         (&["--chunk", "1"], ["--chunk", "1", "from 2"]),
-        (&["--photons", "2147483648", "--rounds", "100000"], ["--rng", "rand48", "philox"]),
+        (&["--photons", "2147483648", "--rounds", "100000", "--rng", "rand48"], ["--rng", "rand48", "philox"]),
         (&["--photons", "2147483648", "--rounds", "100000", "--rng", "philox"], ["--rounds", "100000", "fewer"]),
         (&["--device", "no such card"], ["--device", "no such card", "there is"]),
         (&["--device", "0", "--variant", "cpu"], ["--device", "0", "leave one"]),
         (&["--device", "999"], ["--device", "999", "there is"]),
+        (&["--device", ""], ["--device", "names no one", "there is"]),
+        (&["--validate", "--variant", "cpu"], ["--validate", "on", "leave one"]),
+        (&["--eye", "0,0,1e20"], ["--eye", "0,0,1", "from -1e15"]),
+        (&["--light-power", "1e308,1e308"], ["--light-power", "1", "1e12"]),
+        (&["-o", "new.png/"], ["-o", "new.png", "folder"]),
+        (&["--json", "x", "--trace", "x"], ["--trace x", "--json", "writes it too"]),
+        (&["-o", "d.png", "--json", "./d.png"], ["./d.png", "-o", "writes it too"]),
+        (&["--irradiance", "i", "--radiosity", "i"], ["--radiosity", "left.exr", "--irradiance writes it too"]),
+        (&["--irradiance", ".", "--json", "layout.json"], ["layout.json", "--json", "writes it too"]),
         (&["-o", "absent/a.png"], ["-o", "absent/a.png", "folder"]),
         (&["-o", "a.jpg"], ["-o", "a.jpg", ".png or .exr"]),
         (&["--json", "absent/a.json"], ["--json", "absent/a.json", "folder"]),
@@ -224,7 +233,11 @@ fn an_interrupt_saves_what_is_finished() {
         .unwrap();
     std::thread::sleep(Duration::from_secs(2));
     assert!(Command::new("kill").args(["-INT", &child.id().to_string()]).status().unwrap().success());
+    // A run that does not hear it must not hang the test.
+    let id = child.id().to_string();
+    let guard = Command::new("bash").args(["-c", &format!("sleep 60; kill -9 {id}")]).spawn();
     let output = child.wait_with_output().unwrap();
+    let _ = guard.and_then(|mut guard| guard.kill());
     assert!(started.elapsed() < Duration::from_secs(60), "the run went on for {:?}", started.elapsed());
     assert_eq!(output.status.code(), Some(130), "{}", text(&output.stderr));
     let report = json(&folder.path().join("a.json"));
@@ -238,4 +251,40 @@ fn an_interrupt_saves_what_is_finished() {
     let mut names = entries(folder.path());
     names.sort();
     assert_eq!(names, ["a.json", "a.png"]);
+}
+
+/// A reader that goes away, a full disk: one line at most, no panic.
+#[test]
+fn output_that_nobody_takes_is_no_panic() {
+    let folder = tempfile::tempdir().unwrap();
+    let shell = |line: &str| {
+        let line = line.replace("photonmill", env!("CARGO_BIN_EXE_photonmill"));
+        Command::new("bash").args(["-c", &format!("set -o pipefail; {line}")]).current_dir(folder.path()).output().unwrap()
+    };
+    let gone = shell("photonmill --variant cpu -o a.png | true");
+    assert!(gone.status.success(), "{}", text(&gone.stderr));
+    let full = shell("photonmill --variant cpu -o a.png > /dev/full");
+    assert_eq!((full.status.code(), text(&full.stderr).lines().count()), (Some(2), 1), "{}", text(&full.stderr));
+    let mute = shell("photonmill --photons 0 2> /dev/full");
+    assert_eq!(mute.status.code(), Some(2));
+}
+
+/// The paper's page, whole, at a large size that is hardly larger than the paper's.
+#[test]
+fn the_paper_is_regenerated() {
+    let folder = tempfile::tempdir().unwrap();
+    let output = run_on_device(folder.path(), &["paper", "--out", "paper", "--large", "5001", "--repeats", "1"]);
+    assert!(output.status.success(), "{}", text(&output.stderr));
+    let mut names = entries(&folder.path().join("paper"));
+    names.sort();
+    let figures = ["figure1.png", "figure2.png", "figure3.png", "figure4.png"];
+    assert_eq!(names, [&figures[..], &["index.html", "running_times.csv", "table1.csv"]].concat());
+    let page = std::fs::read_to_string(folder.path().join("paper/index.html")).unwrap();
+    for word in ["still holds", "105640", "7511", "Figure 4", "data:image/png;base64,"] {
+        assert!(page.contains(word) || page.contains(&word.replace("105640", "105\u{202f}640").replace("7511", "7511")), "{word}");
+    }
+    assert!(!page.contains("http://") && !page.contains("src=\"/"), "the page opens without a network");
+    let table = std::fs::read_to_string(folder.path().join("paper/table1.csv")).unwrap();
+    let published: Vec<&str> = table.lines().skip(1).take(5).filter_map(|line| line.rsplit(',').next()).collect();
+    assert_eq!(published, ["2130", "10670", "20850", "53280", "105640"]);
 }

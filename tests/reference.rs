@@ -306,7 +306,6 @@ fn a_million_photons_have_the_exact_shares() {
 }
 
 #[test]
-#[ignore = "10^7 photons four times take a quarter of a minute on a software device and are a tighter form of the test above"]
 fn ten_million_photons_have_the_exact_shares() {
     let Some(gpu) = device() else { return };
     for rng in [Rng::Philox, Rng::Mt] {

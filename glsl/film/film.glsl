@@ -7,8 +7,8 @@
 
 layout(constant_id = 6) const uint CHANNEL_COUNT = 1;
 
-// What one photon adds to a channel, in the film's fixed-point unit; value lies in [0, 1] and
-// film_scale is a power of two up to 2^31, so the product is exact and fits 32 bits.
+// What one photon adds to a channel, in the film's fixed-point unit, rounded once: value lies in [0, 1]
+// and film_scale is a power of two up to 2^31, so the product is exact and fits 32 bits.
 uint to_fixed_point(float value, float film_scale)
 {
     return uint(roundEven(value * film_scale));

@@ -18,7 +18,7 @@ void gather()
 
     Gathered gathered = nothing_gathered();
     for (uint i = begin; i < end; i++) {
-        if (within_radius(point, photons[i].position, photons[i].wall)) {
+        if (photons[i].wall == point.wall && within_radius(point, photons[i].position)) {
             gather_photon(gathered, photons[i].flux, photons[i].weight);
         }
     }

@@ -2,8 +2,9 @@
 
 use clap::Args;
 
+use super::say;
 use crate::constants::LOOP_LIMIT;
-use crate::error::Result;
+use crate::error::{Error, Result};
 use crate::gpu::{DeviceFacts, Gpu, Options, check};
 
 #[derive(Args)]
@@ -14,23 +15,22 @@ pub(super) struct DevicesArgs {
 }
 
 pub(super) fn run(args: &DevicesArgs) -> Result<()> {
-    let devices = Gpu::list()?;
+    let (devices, reason) = match Gpu::list() {
+        Err(Error::NoVulkan { reason }) => (Vec::new(), reason),
+        devices => (devices?, "the Vulkan loader finds none".to_owned()),
+    };
     if args.json {
-        println!("{}", serde_json::to_string_pretty(&devices).expect("device facts are plain data"));
-        return Ok(());
+        return say(&serde_json::to_string_pretty(&devices).expect("device facts are plain data"));
     }
     if devices.is_empty() {
-        println!("The Vulkan loader finds no device; photonmill would run its CPU builder.");
+        return say(&format!("No Vulkan device: {reason}. photonmill would run its CPU builder."));
     }
-    for facts in &devices {
-        print(facts);
-    }
-    Ok(())
+    say(&devices.iter().map(description).collect::<Vec<_>>().join("\n"))
 }
 
-fn print(facts: &DeviceFacts) {
-    println!("{} {} ({})", facts.index, facts.name, facts.kind);
-    let line = |what: &str, value: String| println!("    {what:<26} {value}");
+fn description(facts: &DeviceFacts) -> String {
+    let mut text = format!("{} {} ({})", facts.index, facts.name, facts.kind);
+    let mut line = |what: &str, value: String| text.push_str(&format!("\n    {what:<26} {value}"));
     line("driver", facts.driver.clone());
     line("Vulkan", facts.vulkan.clone());
     line("subgroup size", facts.subgroup_size.to_string());
@@ -49,6 +49,7 @@ fn print(facts: &DeviceFacts) {
     );
     line("64-bit atomics", if facts.int64_atomics { "yes" } else { "no: two 32-bit words instead" }.to_owned());
     line("start-up check", verdict(facts));
+    text
 }
 
 /// Opens the device, which runs the check, and asks how far its loops count.

@@ -5,10 +5,12 @@ mod devices;
 mod paper;
 mod run;
 
+use std::io::{ErrorKind, Write};
+use std::path::PathBuf;
 use std::sync::Arc;
 use std::sync::atomic::{AtomicBool, Ordering};
 
-use clap::error::{ContextKind, ContextValue, ErrorKind};
+use clap::error::{ContextKind, ContextValue, ErrorKind as ParseErrorKind};
 use clap::{Args, Parser, Subcommand};
 
 use crate::error::{Error, Result};
@@ -56,12 +58,20 @@ impl DeviceArgs {
         match Gpu::open(&options) {
             Ok(gpu) => Ok(Some(gpu)),
             Err(error @ (Error::NoVulkan { .. } | Error::DeviceLacks { .. })) if self.device.is_none() => {
-                eprintln!("photonmill: {error}; running the CPU builder instead");
+                complain(&format!("{error}; running the CPU builder instead"));
                 Ok(None)
             }
             Err(error) => Err(error),
         }
     }
+}
+
+/// How a command ended that did not fail.
+#[derive(Debug, Clone, Copy, PartialEq, Eq)]
+enum End {
+    Finished,
+    /// By Ctrl-C, with what was finished saved.
+    Cancelled,
 }
 
 /// Runs the program on the process's arguments and returns its exit code.
@@ -74,27 +84,43 @@ pub fn main() -> u8 {
             return 0;
         }
         Err(error) => {
-            eprintln!("photonmill: {}", one_line(&error));
+            complain(&one_line(&error));
             return 2;
         }
     };
     let cancelled = cancel_on_interrupt();
     let result = match cli.command {
         None => run::run(&cli.run, &cancelled),
-        Some(Command::Devices(args)) => devices::run(&args),
+        Some(Command::Devices(args)) => devices::run(&args).map(|()| End::Finished),
         Some(Command::Paper(args)) => paper::run(&args, &cancelled),
     };
     match result {
-        Ok(()) if cancelled.load(Ordering::Relaxed) => 130,
-        Ok(()) => 0,
+        Ok(End::Finished) => 0,
+        Ok(End::Cancelled) => 130,
         Err(error) => {
-            eprintln!("photonmill: {error}");
+            complain(&error.to_string());
             error.exit_code()
         }
     }
 }
 
-/// The first Ctrl-C ends the run after the photons that are under way, the second at once.
+/// One line on stderr. Where nobody can read it, the exit code still tells.
+fn complain(line: &str) {
+    let _ = writeln!(std::io::stderr(), "photonmill: {line}");
+}
+
+/// Text on stdout; a reader that has gone away, as `head` does, has seen enough.
+fn say(text: &str) -> Result<()> {
+    match writeln!(std::io::stdout(), "{text}") {
+        Err(error) if error.kind() != ErrorKind::BrokenPipe => {
+            Err(Error::Output { option: "standard output", path: PathBuf::from("(stdout)"), reason: error.kind().to_string() })
+        }
+        _ => Ok(()),
+    }
+}
+
+/// The first Ctrl-C (or SIGTERM) ends the run after the photons that are under way, the second at
+/// once; no temporary file exists before the end.
 fn cancel_on_interrupt() -> Arc<AtomicBool> {
     let cancelled = Arc::new(AtomicBool::new(false));
     let flag = cancelled.clone();
@@ -102,7 +128,7 @@ fn cancel_on_interrupt() -> Arc<AtomicBool> {
         if flag.swap(true, Ordering::Relaxed) {
             std::process::exit(130);
         }
-        eprintln!("\nphotonmill: ending after the photons under way; Ctrl-C again to end at once");
+        complain("ending after the photons under way; Ctrl-C again to end at once");
     };
     // Without a handler Ctrl-C ends the program at once, and files still appear whole or not at all.
     let _ = ctrlc::set_handler(handler);
@@ -120,16 +146,18 @@ fn one_line(error: &clap::Error) -> String {
     let value = context(ContextKind::InvalidValue);
     let option = argument.split([' ', '=']).next().unwrap_or_default();
     match error.kind() {
-        ErrorKind::InvalidValue if !context(ContextKind::ValidValue).is_empty() => {
+        ParseErrorKind::InvalidValue if !context(ContextKind::ValidValue).is_empty() => {
             let shown = if value.is_empty() { "(no value)" } else { &value };
             format!("{option} {shown}: must be one of {}", context(ContextKind::ValidValue))
         }
-        ErrorKind::ValueValidation => {
+        ParseErrorKind::ValueValidation => {
             let reason = std::error::Error::source(error).map(ToString::to_string).unwrap_or_default();
             format!("{option} {value}: {reason}")
         }
-        ErrorKind::UnknownArgument => format!("{argument}: there is no such option; see --help"),
-        ErrorKind::InvalidSubcommand => format!("{}: there is no such subcommand; see --help", context(ContextKind::InvalidSubcommand)),
+        ParseErrorKind::UnknownArgument => format!("{argument}: there is no such option; see --help"),
+        ParseErrorKind::InvalidSubcommand => {
+            format!("{}: there is no such subcommand; see --help", context(ContextKind::InvalidSubcommand))
+        }
         _ => {
             let rendered = error.render().to_string();
             let sentence: Vec<&str> = rendered.lines().take_while(|line| !line.is_empty()).map(str::trim).collect();

@@ -5,8 +5,8 @@ use std::sync::atomic::AtomicBool;
 
 use clap::Args;
 
-use super::DeviceArgs;
 use super::run::{threads, whole};
+use super::{DeviceArgs, End, complain, say};
 use crate::error::{Error, Result};
 use crate::output::destination::Folder;
 use crate::paper::bench::Bench;
@@ -34,7 +34,7 @@ pub(super) struct PaperArgs {
 const LARGE_ON_GPU: u32 = 1 << 22;
 const LARGE_ON_CPU: u32 = 1 << 16;
 
-pub(super) fn run(args: &PaperArgs, cancelled: &AtomicBool) -> Result<()> {
+pub(super) fn run(args: &PaperArgs, cancelled: &AtomicBool) -> Result<End> {
     args.validate()?;
     let folder = Folder::open("--out", &args.out)?;
     let gpu = args.device.open(false)?;
@@ -44,14 +44,14 @@ pub(super) fn run(args: &PaperArgs, cancelled: &AtomicBool) -> Result<()> {
         repeats: args.repeats as usize,
         threads: args.threads.unwrap_or(1),
     };
-    let mut progress = |line: &str| eprintln!("{line}");
+    let mut progress = |line: &str| complain(line);
     let found = paper::reproduce(&mut Bench::new(gpu.as_ref(), cancelled, &mut progress), request)?;
     paper::write(&folder, &found)?;
     if !found.complete {
-        eprintln!("photonmill: incomplete: ended before the last experiment; what was finished is written");
+        complain("incomplete: ended before the last experiment; what was finished is written");
     }
-    println!("wrote {}", folder.path().join("index.html").display());
-    Ok(())
+    say(&format!("wrote {}", folder.path().join("index.html").display()))?;
+    Ok(if found.complete { End::Finished } else { End::Cancelled })
 }
 
 impl PaperArgs {

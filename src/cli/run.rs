@@ -7,10 +7,10 @@ use std::time::Instant;
 use clap::{Args, ValueEnum};
 use indicatif::{ProgressBar, ProgressStyle};
 
-use super::DeviceArgs;
+use super::{DeviceArgs, End, complain, say};
 use crate::error::{Error, Result};
 use crate::film::estimate_walls;
-use crate::output::destination::{Destination, Folder};
+use crate::output::destination::{Destination, Folder, check_distinct, write_all};
 use crate::output::image::{Format, overview};
 use crate::output::lightmap::{self, Quantity};
 use crate::output::{report, trace_file};
@@ -42,7 +42,7 @@ pub(super) struct RunArgs {
     #[arg(long, value_parser = whole::<u64>, allow_negative_numbers = true, help_heading = "Experiment")]
     seed: Option<u64>,
     /// Random numbers: the paper's drand48, its alternative the Mersenne Twister, or counter-based
-    /// [default: rand48]
+    /// [default: rand48 with the paper's 5000 photons a round, philox with any other number]
     #[arg(long, value_enum, help_heading = "Experiment")]
     rng: Option<RngArg>,
 
@@ -50,7 +50,7 @@ pub(super) struct RunArgs {
     #[arg(long, value_parser = number::<f64>, allow_negative_numbers = true, help_heading = "Estimate")]
     radius: Option<f64>,
     /// Photons within the radius, a round, that count as full illumination [default: 90 for every
-    /// 5000 photons; 10 with --preset rounds]
+    /// 5000 photons of a round; 10 for every 5000 with --preset rounds]
     #[arg(long, value_parser = number::<f64>, allow_negative_numbers = true, help_heading = "Estimate")]
     full_light: Option<f64>,
     /// How photons near a point are found: step through all, or look into a sorted grid; the result
@@ -193,7 +193,7 @@ impl RunArgs {
             radius: self.radius.unwrap_or(preset.radius),
             full_light: self.full_light.unwrap_or_else(|| preset.full_light_for(photons)),
             seed: self.seed.unwrap_or(preset.seed),
-            rng: self.rng.map_or(preset.rng, Rng::from),
+            rng: self.rng.map_or(if photons == preset.photons { preset.rng } else { Rng::Philox }, Rng::from),
             gather: self.gather.map_or(preset.gather, Gather::from),
             emission: self.emission.map_or(preset.emission, EmissionLaw::from),
             shininess: self.shininess.map_or(preset.shininess, |all| all.map(Some)),
@@ -211,7 +211,7 @@ impl RunArgs {
     }
 }
 
-pub(super) fn run(args: &RunArgs, cancelled: &AtomicBool) -> Result<()> {
+pub(super) fn run(args: &RunArgs, cancelled: &AtomicBool) -> Result<End> {
     let settings = args.settings();
     settings.validate()?;
     if settings.reflectance == 0.0 && args.irradiance.is_some() {
@@ -224,15 +224,18 @@ pub(super) fn run(args: &RunArgs, cancelled: &AtomicBool) -> Result<()> {
     if let (Variant::Cpu, Some(device)) = (settings.variant, &args.device.device) {
         return Err(Error::setting("--device", device, "has no use with --variant cpu; leave one of the two out"));
     }
-    let outputs = Outputs::open(args)?;
+    if settings.variant == Variant::Cpu && args.device.validate {
+        return Err(Error::setting("--validate", "on", "has no use with --variant cpu; leave one of the two out"));
+    }
+    let scene = open_box(&settings);
+    let outputs = Outputs::open(args, &scene)?;
     if let Some(warning) = settings.warning() {
-        eprintln!("photonmill: warning: {warning}");
+        complain(&format!("warning: {warning}"));
     }
     let gpu = match settings.variant {
         Variant::Cpu => None,
         _ => args.device.open(args.time_dispatches)?,
     };
-    let scene = open_box(&settings);
     let bar = progress_bar(settings.total_photons());
     let mut control = Control { cancelled, progress: &mut |emitted, _| bar.set_position(emitted) };
     let outcome = match &gpu {
@@ -240,10 +243,13 @@ pub(super) fn run(args: &RunArgs, cancelled: &AtomicBool) -> Result<()> {
         None => render::on_cpu(&scene, &settings, &mut control)?,
     };
     bar.finish_and_clear();
+    let end = if outcome.cancelled { End::Cancelled } else { End::Finished };
     if outcome.cancelled {
-        eprintln!("photonmill: ended after {} of {} photons; what is written is of these", outcome.fates.emitted, settings.total_photons());
+        let (emitted, total) = (outcome.fates.emitted, settings.total_photons());
+        complain(&format!("ended after {emitted} of {total} photons; what is written is of these"));
     }
-    outputs.write(outcome, &scene)
+    outputs.write(outcome, &scene)?;
+    Ok(end)
 }
 
 fn progress_bar(photons: u64) -> ProgressBar {
@@ -252,7 +258,7 @@ fn progress_bar(photons: u64) -> ProgressBar {
     ProgressBar::new(photons).with_style(style)
 }
 
-/// Everything that the run will write, opened before it starts.
+/// Everything that the run will write, checked before it starts.
 struct Outputs {
     picture: (Destination, Format),
     irradiance: Option<Folder>,
@@ -262,41 +268,45 @@ struct Outputs {
 }
 
 impl Outputs {
-    fn open(args: &RunArgs) -> Result<Outputs> {
+    fn open(args: &RunArgs, scene: &RoomScene) -> Result<Outputs> {
         let file = |option, path: &Option<PathBuf>| path.as_ref().map(|path| Destination::open(option, path)).transpose();
         let folder = |option, path: &Option<PathBuf>| path.as_ref().map(|path| Folder::open(option, path)).transpose();
-        Ok(Outputs {
+        let outputs = Outputs {
             picture: (Destination::open("-o", &args.output)?, Format::of("-o", &args.output)?),
             json: file("--json", &args.json)?,
             trace: file("--trace", &args.trace)?,
             irradiance: folder("--irradiance", &args.irradiance)?,
             radiosity: folder("--radiosity", &args.radiosity)?,
-        })
+        };
+        let folders = [&outputs.irradiance, &outputs.radiosity].into_iter().flatten();
+        let mut all = vec![outputs.picture.0.clone()];
+        all.extend([&outputs.json, &outputs.trace].into_iter().flatten().cloned());
+        all.extend(folders.flat_map(|folder| lightmap::destinations(folder, scene)));
+        check_distinct(&all)?;
+        Ok(outputs)
     }
 
     fn write(self, mut outcome: Outcome, scene: &RoomScene) -> Result<()> {
+        let began = Instant::now();
         let walls = estimate_walls(&outcome.film, scene, &outcome.plan);
         let (destination, format) = self.picture;
         let picture = destination.path().display().to_string();
-        let began = Instant::now();
-        destination.write(&overview(scene, &walls).encode(format))?;
+        let mut files = vec![(destination, overview(scene, &walls).encode(format))];
         for (folder, quantity) in [(&self.irradiance, Quantity::Irradiance), (&self.radiosity, Quantity::Radiosity)] {
-            if let Some(folder) = folder {
-                lightmap::write(folder, quantity, scene, &walls)?;
-            }
+            files.extend(folder.iter().flat_map(|folder| lightmap::files(folder, quantity, scene, &walls)));
         }
         let run = outcome.timings.spans().iter().map(|span| span.start + span.duration).max().unwrap_or_default();
         outcome.timings.count("output");
         outcome.timings.add(Span { name: "output".into(), clock: Clock::Wall, start: run, duration: began.elapsed() });
 
         if let Some(json) = self.json {
-            json.write(&report::json(&outcome, &walls))?;
+            files.push((json, report::json(&outcome, &walls)));
         }
         if let Some(trace) = self.trace {
             let device = outcome.device.as_ref().map_or("CPU", |facts| &facts.name);
-            trace.write(&trace_file::chrome_trace(&outcome.timings, device))?;
+            files.push((trace, trace_file::chrome_trace(&outcome.timings, device)));
         }
-        println!("{}\nwrote {picture}", report::text(&outcome));
-        Ok(())
+        write_all(files)?;
+        say(&format!("{}\nwrote {picture}", report::text(&outcome)))
     }
 }

@@ -29,7 +29,7 @@ where
     let scale = plan.film_scale() as f32;
     let one_point = |(point, sums): (&Point, &mut [u64])| {
         for photon in runs_near(point).flatten() {
-            if within_radius(point, photon, radius_squared) {
+            if photon.wall == point.wall && within_radius(point, photon, radius_squared) {
                 sums[0] += to_fixed_point(photon.flux, scale);
                 if channels == 2 {
                     sums[1] += to_fixed_point(photon.weight, scale);
@@ -47,7 +47,7 @@ where
 fn within_radius(point: &Point, photon: &SortedPhoton, radius_squared: f32) -> bool {
     let offset = photon.position - point.position;
     let distance_squared = offset.x * offset.x + offset.y * offset.y + offset.z * offset.z;
-    photon.wall == point.wall && distance_squared <= radius_squared
+    distance_squared <= radius_squared
 }
 
 fn to_fixed_point(value: f32, scale: f32) -> u64 {

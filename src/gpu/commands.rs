@@ -110,6 +110,8 @@ impl<'gpu> Commands<'gpu> {
         // SAFETY: the last submission has ended, so the command buffer may be recorded again.
         call("vkBeginCommandBuffer", unsafe { self.context.device.begin_command_buffer(self.command_buffer, &info) })?;
         self.timestamps.reset(self.command_buffer);
+        // The fence of the last submission made its writes available; this makes them visible here.
+        self.barrier();
         Ok(())
     }
 

@@ -89,13 +89,7 @@ pub(super) fn choose(instance: &ash::Instance, wanted: Option<&str>) -> Result<(
         return Err(Error::NoVulkan { reason: "the Vulkan loader finds no device".into() });
     }
     let chosen = match wanted {
-        Some(wanted) => devices
-            .iter()
-            .find(|(_, facts)| match wanted.parse::<usize>() {
-                Ok(index) => facts.index == index,
-                Err(_) => facts.name.to_lowercase().contains(&wanted.to_lowercase()),
-            })
-            .ok_or_else(|| Error::DeviceAbsent { wanted: wanted.to_owned(), present: describe(&devices) })?,
+        Some(wanted) => named(&devices, wanted)?,
         None => {
             devices.iter().min_by_key(|(_, facts)| (!facts.lacks.is_empty(), rank(facts.kind), facts.index)).expect("there is a device")
         }
@@ -104,6 +98,22 @@ pub(super) fn choose(instance: &ash::Instance, wanted: Option<&str>) -> Result<(
         return Err(Error::DeviceLacks { device: chosen.1.name.clone(), what: what.clone() });
     }
     Ok(chosen.clone())
+}
+
+type Found = (vk::PhysicalDevice, DeviceFacts);
+
+/// The device of that index, else the one whose name holds `wanted`.
+fn named<'a>(devices: &'a [Found], wanted: &str) -> Result<&'a Found> {
+    let by_index = wanted.parse().ok().and_then(|index: usize| devices.iter().find(|(_, facts)| facts.index == index));
+    let holds = |facts: &DeviceFacts| !wanted.is_empty() && facts.name.to_lowercase().contains(&wanted.to_lowercase());
+    let by_name: Vec<&Found> = devices.iter().filter(|(_, facts)| holds(facts)).collect();
+    match (by_index, by_name.as_slice()) {
+        (Some(device), _) => Ok(device),
+        (None, [device]) => Ok(device),
+        // Several cards of one name are as good as each other.
+        (None, [device, others @ ..]) if others.iter().all(|other| other.1.name == device.1.name) => Ok(device),
+        _ => Err(Error::DeviceAbsent { wanted: wanted.to_owned(), present: describe(devices) }),
+    }
 }
 
 fn describe(devices: &[(vk::PhysicalDevice, DeviceFacts)]) -> String {

@@ -2,9 +2,8 @@
 
 use serde::Serialize;
 
-use super::destination::Folder;
+use super::destination::{Destination, Folder};
 use super::image::{Format, Picture};
-use crate::error::Result;
 use crate::film::WallEstimate;
 use crate::scene::room::RoomScene;
 
@@ -35,22 +34,34 @@ struct WallLayout<'a> {
     height: usize,
 }
 
-/// Writes `<wall>.exr` for every wall, then `layout.json`.
-pub fn write(folder: &Folder, quantity: Quantity, scene: &RoomScene, walls: &[WallEstimate]) -> Result<()> {
+/// Files of a lightmap, before there is any content.
+pub fn destinations(folder: &Folder, scene: &RoomScene) -> Vec<Destination> {
+    let walls = scene.walls().map(|(_, wall)| folder.file(&image_name(wall.name)));
+    walls.chain([folder.file(LAYOUT)]).collect()
+}
+
+const LAYOUT: &str = "layout.json";
+
+fn image_name(wall: &str) -> String {
+    format!("{wall}.exr")
+}
+
+/// `<wall>.exr` for every wall, and `layout.json`.
+pub fn files(folder: &Folder, quantity: Quantity, scene: &RoomScene, walls: &[WallEstimate]) -> Vec<(Destination, Vec<u8>)> {
     let mut layout = Layout { quantity, unit: "W/m2", walls: Vec::new() };
+    let mut files = Vec::new();
     for wall in walls {
         let values = match quantity {
             Quantity::Irradiance => &wall.irradiance,
             Quantity::Radiosity => &wall.radiosity,
         };
         let mesh = values.len().isqrt();
-        let file = format!("{}.exr", wall.name);
         let picture = Picture { width: mesh, height: mesh, values: values.clone() };
-        folder.write(&file, &picture.encode(Format::Exr))?;
+        files.push((folder.file(&image_name(wall.name)), picture.encode(Format::Exr)));
         let rectangle = scene.rectangle(wall.face);
         layout.walls.push(WallLayout {
             name: wall.name,
-            file,
+            file: image_name(wall.name),
             origin: rectangle.origin.to_array(),
             u: rectangle.u.to_array(),
             v: rectangle.v.to_array(),
@@ -58,6 +69,6 @@ pub fn write(folder: &Folder, quantity: Quantity, scene: &RoomScene, walls: &[Wa
             height: mesh,
         });
     }
-    let json = serde_json::to_vec_pretty(&layout).expect("a layout is plain data");
-    folder.write("layout.json", &json)
+    files.push((folder.file(LAYOUT), serde_json::to_vec_pretty(&layout).expect("a layout is plain data")));
+    files
 }

@@ -15,7 +15,7 @@ pub mod verdicts;
 pub mod words;
 
 use crate::error::Result;
-use crate::output::destination::Folder;
+use crate::output::destination::{Folder, write_all};
 use bench::{Bench, Machine, Step, Stop};
 use experiments::{LeftOut, RunningTime, TotalTime};
 use figures::Figure;
@@ -72,12 +72,11 @@ fn run_all(bench: &mut Bench, found: &mut Reproduction) -> Step<()> {
     experiments::totals(bench, found)
 }
 
-/// Writes pictures and tables, and last the page.
+/// Writes pictures, tables and the page.
 pub fn write(folder: &Folder, found: &Reproduction) -> Result<()> {
-    for figure in &found.figures {
-        folder.write(&figure.file_name(), &figure.png)?;
-    }
-    folder.write("running_times.csv", &tables::running_times(&found.running_times))?;
-    folder.write("table1.csv", &tables::totals(&found.totals))?;
-    folder.write("index.html", page::html(found).as_bytes())
+    let mut files: Vec<_> = found.figures.iter().map(|figure| (folder.file(&figure.file_name()), figure.png.clone())).collect();
+    files.push((folder.file("running_times.csv"), tables::running_times(&found.running_times)));
+    files.push((folder.file("table1.csv"), tables::totals(&found.totals)));
+    files.push((folder.file("index.html"), page::html(found).into_bytes()));
+    write_all(files)
 }

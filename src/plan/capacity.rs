@@ -6,7 +6,7 @@ use serde::Serialize;
 use crate::error::{Error, Result};
 use crate::records::{Path, Photon};
 use crate::scene::room::RoomScene;
-use crate::settings::{Gather, Settings};
+use crate::settings::{Gather, Settings, Variant};
 
 /// What a device allows.
 #[derive(Debug, Clone, Copy, PartialEq, Eq, Serialize)]
@@ -22,28 +22,34 @@ pub struct Limits {
 }
 
 impl Limits {
-    /// Limits of the CPU builder, which splits only to keep its arrays small.
+    /// Limits of the CPU builder, which splits to keep its arrays small and to hear Ctrl-C.
     pub fn of_host() -> Limits {
-        Limits { buffer_bytes: 1 << 29, memory_bytes: 1 << 31, pair_tests_per_submission: 1 << 40, group_size: 1024 }
+        Limits { buffer_bytes: 1 << 29, memory_bytes: 1 << 31, pair_tests_per_submission: 1 << 27, group_size: 1024 }
     }
 
     /// Pair tests a tenth of a second by kind of device: a slow one of its kind does 2^36 (discrete),
-    /// 2^33 (integrated) or 2^30 (CPU) a second.
+    /// 2^33 (integrated) or 2^28 (CPU; lavapipe on two cores) a second.
     pub fn pair_tests_of(kind: &str) -> u64 {
         match kind {
             "discrete" => 1 << 33,
-            "cpu" => 1 << 28,
+            "cpu" => 1 << 25,
             _ => 1 << 30,
         }
     }
 }
 
-/// Expected work of a gather.
+/// Submissions that a chunk may take: between chunks a run can be ended.
+const SUBMISSIONS_PER_CHUNK: f64 = 10.0;
+/// Work of one flight of a photon, in pair tests.
+const PAIR_TESTS_PER_FLIGHT: f64 = 16.0;
+
+/// Expected work of a chunk.
 #[derive(Debug, Clone, Copy, PartialEq)]
 pub struct Work {
     points: f64,
     /// Photons that a point tests for each photon emitted.
     tests_per_photon: f64,
+    flights_per_photon: f64,
 }
 
 impl Work {
@@ -52,22 +58,27 @@ impl Work {
         let albedo = scene.walls().map(|(_, wall)| f64::from(wall.albedo)).fold(0.0, f64::max);
         let stored = (albedo / (1.0 - albedo)).min(f64::from(settings.bounces));
         let tests_per_photon = match settings.gather {
-            Gather::Brute => f64::from(settings.bounces),
+            Gather::Brute if settings.variant == Variant::Naive => f64::from(settings.bounces),
+            Gather::Brute => stored,
             Gather::Grid => {
-                // About three cells of a radius along both sides of the wall, photons spread over
-                // all walls alike.
-                let extent = scene.max_corner - scene.min_corner;
-                let share = |edge: f64| (3.0 * settings.radius / edge).min(1.0);
-                let walls = scene.walls().count() as f64;
-                stored / walls * share(extent.x).max(share(extent.y)).max(share(extent.z)).powi(2)
+                // The cells in reach are three radii wide and may hold pieces of two walls; photons
+                // are taken as spread over all walls alike.
+                let areas = scene.walls().map(|(face, _)| scene.rectangle(face)).map(|wall| wall.u.length() * wall.v.length());
+                let in_reach = 2.0 * (3.0 * settings.radius).powi(2);
+                stored * (in_reach / areas.sum::<f64>()).min(1.0)
             }
         };
-        Work { points: point_count as f64, tests_per_photon }
+        Work { points: point_count as f64, tests_per_photon, flights_per_photon: stored + 1.0 }
     }
 
-    /// Pair tests of the gather of a chunk.
-    pub fn pair_tests(&self, photons: u32) -> u64 {
-        (self.points * self.tests_per_photon * f64::from(photons)) as u64
+    /// Pair tests of one point for a chunk.
+    pub fn tests_per_point(&self, photons: u32) -> u64 {
+        (self.tests_per_photon * f64::from(photons)).ceil() as u64
+    }
+
+    /// Flights of a chunk, as pair tests.
+    pub fn tracing(&self, photons: u32) -> u64 {
+        (self.flights_per_photon * PAIR_TESTS_PER_FLIGHT * f64::from(photons)) as u64
     }
 }
 
@@ -96,14 +107,12 @@ pub fn chunk_photons(settings: &Settings, limits: &Limits, work: &Work) -> Resul
     if settings.group_size > limits.group_size {
         return Err(Error::setting("--group-size", settings.group_size, format!("must be at most {} on this device", limits.group_size)));
     }
-    let by_time = match settings.gather {
-        // The brute gather splits its own dispatches.
-        Gather::Brute => u64::MAX,
-        Gather::Grid => {
-            let tests = (work.points * work.tests_per_photon).max(1e-9);
-            ((limits.pair_tests_per_submission as f64 / tests) as u64).max(1024)
-        }
-    };
-    let chunk = (fits - spare).min(by_time).min(u64::from(settings.photons));
+    // A point's tests are not split further than by work group, nor a chunk by Ctrl-C.
+    let budget = limits.pair_tests_per_submission as f64;
+    let tests_per_photon = work.tests_per_photon.max(1e-9);
+    let by_dispatch = budget / (f64::from(settings.group_size) * tests_per_photon);
+    let by_chunk = SUBMISSIONS_PER_CHUNK * budget / (work.points * tests_per_photon + work.flights_per_photon * PAIR_TESTS_PER_FLIGHT);
+    let by_time = by_dispatch.min(by_chunk) as u64;
+    let chunk = (fits - spare).min(by_time).clamp(2, u64::from(settings.photons));
     Ok((chunk as u32).min(settings.chunk.unwrap_or(u32::MAX)))
 }

@@ -11,7 +11,7 @@ use serde::Serialize;
 pub use capacity::{Limits, Work};
 pub use effect::Decision;
 
-use crate::error::Result;
+use crate::error::{Error, Result};
 use crate::records::{IndexPush, Photon, Point};
 use crate::rng::Streams;
 use crate::scene::room::RoomScene;
@@ -87,6 +87,8 @@ impl Grid {
 }
 
 const MAX_CELLS_PER_AXIS: u32 = 128;
+/// Fixed-point units that the faintest photon must be worth: a thousandth is lost to rounding at most.
+const MIN_FIXED_POINT: f64 = 512.0;
 
 impl Plan {
     pub fn new(scene: &RoomScene, settings: &Settings, limits: &Limits) -> Result<Plan> {
@@ -100,6 +102,13 @@ impl Plan {
         let decisions = effect::decide(scene, settings, equal_flux);
         let channel_count = if settings.has_phong() || !equal_flux { 2 } else { 1 };
         let film_shift = if channel_count == 1 { 0 } else { film_shift(settings) };
+
+        let faintest = relative_flux.iter().fold(1.0f32, |a, b| a.min(*b));
+        if channel_count == 2 && f64::from(faintest) * ((1u64 << film_shift) as f64) < MIN_FIXED_POINT {
+            let [floor, left] = settings.light_power;
+            let allowed = "are too far apart for the film's sums over so many photons; bring them closer, or ask for fewer photons * rounds * bounces";
+            return Err(Error::setting("--light-power", format!("{floor},{left}"), allowed));
+        }
 
         let points: Vec<Point> = scene
             .walls()

@@ -14,12 +14,21 @@ pub(super) struct Book<'a, 'c> {
     /// Photons handed out, of which `fates` may not know yet.
     pub(super) emitted: u64,
     pub(super) fates: Fates,
+    /// Submissions of which the fates are booked.
+    pub(super) submissions_settled: u64,
     pub(super) cancelled: bool,
 }
 
 impl<'a, 'c> Book<'a, 'c> {
     pub(super) fn new(plan: &Plan, control: &'a mut Control<'c>) -> Book<'a, 'c> {
-        Book { control, total: plan.settings.total_photons(), emitted: 0, fates: Fates::new(plan.settings.bounces), cancelled: false }
+        Book {
+            control,
+            total: plan.settings.total_photons(),
+            emitted: 0,
+            fates: Fates::new(plan.settings.bounces),
+            submissions_settled: 0,
+            cancelled: false,
+        }
     }
 
     /// Photons whose fates are not booked.

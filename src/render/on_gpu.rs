@@ -26,6 +26,7 @@ pub fn on_gpu(gpu: &Gpu, scene: &RoomScene, settings: &Settings, control: &mut C
     commands.submit()?;
 
     let mut book = Book::new(&plan, control);
+    book.submissions_settled = commands.submission_count();
     for (round, chunk) in units(&plan) {
         let ranges = plan.chunk(chunk);
         commands.scope("round", |commands| {
@@ -88,7 +89,9 @@ fn is_due(commands: &Commands, plan: &Plan, book: &Book) -> bool {
     // Tallies are 32-bit on the device.
     let tallies_full = book.open() + u64::from(plan.path_capacity) > u64::from(u32::MAX);
     let timestamps_short = commands.timestamps_left() < trace::timestamps_per_chunk(plan);
-    commands.work() >= plan.pair_tests_per_submission || timestamps_short || tallies_full
+    // A long gather hands commands over by itself, and nobody has looked at the result yet.
+    let submitted = commands.submission_count() > book.submissions_settled;
+    commands.work() >= plan.pair_tests_per_submission || submitted || timestamps_short || tallies_full
 }
 
 /// Runs what is recorded, books the fates of its photons, and says whether to stop.
@@ -99,6 +102,7 @@ fn settle(commands: &mut Commands, resources: &Resources, book: &mut Book) -> Re
     let bounces = book.fates.bounces.len();
     let tallies: Vec<Tally> = commands.read(&resources.tallies, bounces)?;
     commands.fill(&resources.tallies, 0, 4 * bounces as u64, 0);
+    book.submissions_settled = commands.submission_count();
     book.settle(&tallies)
 }
 
