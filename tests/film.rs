@@ -361,3 +361,20 @@ fn the_checks_complain_about_spoiled_films() {
         assert_complains(what, equal_sums("film", &spoiled, &expected));
     }
 }
+
+/// Many points with all photons in reach: the gather is cut into several dispatches and submissions,
+/// and nothing is lost or added twice at the cuts.
+#[test]
+fn a_gather_that_is_cut_into_parts_is_whole() {
+    let Some(gpu) = device() else { return };
+    let settings = Settings { photons: 301, mesh: 200, radius: 0.5, group_size: 32, rng: Rng::Philox, ..Settings::default() };
+    let grid = run(&gpu, &settings);
+    let brute = run(&gpu, &Settings { gather: Gather::Brute, ..settings.clone() });
+    assert_holds("grid and brute", equal_sums("200 x 200 texels", &grid.film.sums, &brute.film.sums));
+    let tests = grid.plan.points.len() as u64 * grid.plan.work.tests_per_point(settings.photons);
+    let submissions_needed = tests / grid.plan.pair_tests_per_submission;
+    assert!(grid.submissions > submissions_needed, "{} submissions for the work of {submissions_needed}", grid.submissions);
+    if gpu.facts().kind == "cpu" {
+        assert!(submissions_needed > 2, "the test must cut: {submissions_needed}");
+    }
+}

@@ -18,7 +18,7 @@ void gather()
 
     Gathered gathered = nothing_gathered();
     for (uint i = begin; i < end; i++) {
-        if (photons[i].wall == point.wall && within_radius(point, photons[i].position)) {
+        if (within_radius(point, photons[i].position, photons[i].wall)) {
             gather_photon(gathered, photons[i].flux, photons[i].weight);
         }
     }

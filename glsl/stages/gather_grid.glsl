@@ -23,7 +23,7 @@ void gather()
             uint begin = run.x + clamp(slice_begin, passed, passed + run_length) - passed;
             uint end = run.x + clamp(slice_end, passed, passed + run_length) - passed;
             for (uint i = begin; i < end; i++) {
-                if (sorted_photons[i].wall == point.wall && within_radius(point, sorted_photons[i].position)) {
+                if (within_radius(point, sorted_photons[i].position, sorted_photons[i].wall)) {
                     gather_photon(gathered, sorted_photons[i].flux, sorted_photons[i].weight);
                 }
             }

@@ -107,12 +107,13 @@ pub fn chunk_photons(settings: &Settings, limits: &Limits, work: &Work) -> Resul
     if settings.group_size > limits.group_size {
         return Err(Error::setting("--group-size", settings.group_size, format!("must be at most {} on this device", limits.group_size)));
     }
-    // A point's tests are not split further than by work group, nor a chunk by Ctrl-C.
+    // A point's tests are not split further than by work group, nor a chunk by Ctrl-C; who asks for
+    // larger chunks gets them.
     let budget = limits.pair_tests_per_submission as f64;
     let tests_per_photon = work.tests_per_photon.max(1e-9);
     let by_dispatch = budget / (f64::from(settings.group_size) * tests_per_photon);
     let by_chunk = SUBMISSIONS_PER_CHUNK * budget / (work.points * tests_per_photon + work.flights_per_photon * PAIR_TESTS_PER_FLIGHT);
     let by_time = by_dispatch.min(by_chunk) as u64;
-    let chunk = (fits - spare).min(by_time).clamp(2, u64::from(settings.photons));
-    Ok((chunk as u32).min(settings.chunk.unwrap_or(u32::MAX)))
+    let wanted = settings.chunk.map_or(by_time, u64::from);
+    Ok((fits - spare).min(wanted).clamp(2, u64::from(settings.photons)) as u32)
 }
