@@ -159,6 +159,11 @@ impl Plan {
         ranges
     }
 
+    /// Every chunk of a round.
+    pub fn chunks(&self) -> impl Iterator<Item = Vec<EmissionRange>> {
+        (0..self.chunks_per_round).map(|chunk| self.chunk(chunk))
+    }
+
     pub fn streams(&self) -> Streams {
         Streams {
             rng: self.settings.rng,

@@ -38,9 +38,3 @@ pub struct Outcome {
     pub dispatches: u64,
     pub submissions: u64,
 }
-
-/// (round, chunk) of the whole run, in order.
-fn units(plan: &Plan) -> impl Iterator<Item = (u32, u32)> {
-    let chunks = plan.chunks_per_round;
-    (0..plan.settings.rounds).flat_map(move |round| (0..chunks).map(move |chunk| (round, chunk)))
-}

@@ -3,7 +3,7 @@
 use rayon::{ThreadPool, ThreadPoolBuilder};
 
 use super::book::Book;
-use super::{Control, Outcome, units};
+use super::{Control, Outcome};
 use crate::cpu::trace::Tracer;
 use crate::cpu::{estimate, index::Index};
 use crate::error::{Error, Result};
@@ -22,20 +22,24 @@ pub fn on_cpu(scene: &RoomScene, settings: &Settings, control: &mut Control) -> 
     let tracer = Tracer::new(scene, &plan);
     let mut sums = vec![0u64; plan.points.len() * plan.channel_count as usize];
     let mut book = Book::new(&plan, control);
-    for (round, chunk) in units(&plan) {
-        let ranges = plan.chunk(chunk);
-        let tallies = clock.time("round", |clock| {
-            let (photons, tallies) = clock.time("build", |clock| trace(&pool, &tracer, &plan, round, &ranges, clock));
-            if plan.gathers_by_grid() {
-                let index = clock.time("index", |_| Index::build(plan.grid, &photons));
-                clock.time("gather", |_| pool.install(|| estimate::gather_grid(&plan, &index, &mut sums)));
-            } else {
-                clock.time("gather", |_| pool.install(|| estimate::gather_brute(&plan, &photons, &mut sums)));
+    for round in 0..settings.rounds {
+        clock.time("round", |clock| {
+            for ranges in plan.chunks() {
+                let (photons, tallies) = clock.time("build", |clock| trace(&pool, &tracer, &plan, round, &ranges, clock));
+                if plan.gathers_by_grid() {
+                    let index = clock.time("index", |_| Index::build(plan.grid, &photons));
+                    clock.time("gather", |_| pool.install(|| estimate::gather_grid(&plan, &index, &mut sums)));
+                } else {
+                    clock.time("gather", |_| pool.install(|| estimate::gather_brute(&plan, &photons, &mut sums)));
+                }
+                book.emitted += u64::from(photons_of(&ranges));
+                if book.settle(&tallies)? {
+                    break;
+                }
             }
-            tallies
-        });
-        book.emitted += u64::from(photons_of(&ranges));
-        if book.settle(&tallies)? {
+            Ok(())
+        })?;
+        if book.cancelled {
             break;
         }
     }
@@ -91,5 +95,5 @@ pub fn photons_on_cpu(scene: &RoomScene, settings: &Settings) -> Result<Vec<Phot
     let plan = plan(scene, settings)?;
     let pool = thread_pool(settings)?;
     let tracer = Tracer::new(scene, &plan);
-    Ok((0..plan.chunks_per_round).flat_map(|chunk| trace(&pool, &tracer, &plan, 0, &plan.chunk(chunk), &mut clock).0).collect())
+    Ok(plan.chunks().flat_map(|ranges| trace(&pool, &tracer, &plan, 0, &ranges, &mut clock).0).collect())
 }

@@ -3,7 +3,7 @@
 use std::time::Instant;
 
 use super::book::Book;
-use super::{Control, Outcome, units};
+use super::{Control, Outcome};
 use crate::constants::NO_WALL;
 use crate::error::Result;
 use crate::film::Film;
@@ -27,15 +27,20 @@ pub fn on_gpu(gpu: &Gpu, scene: &RoomScene, settings: &Settings, control: &mut C
 
     let mut book = Book::new(&plan, control);
     book.submissions_settled = commands.submission_count();
-    for (round, chunk) in units(&plan) {
-        let ranges = plan.chunk(chunk);
+    for round in 0..settings.rounds {
         commands.scope("round", |commands| {
-            trace::chunk(commands, &resources, &plan, round, &ranges)?;
-            index::build(commands, &resources, &plan, photons_of(&ranges))?;
-            estimate::gather(commands, &resources, &plan, photons_of(&ranges))
+            for ranges in plan.chunks() {
+                trace::chunk(commands, &resources, &plan, round, &ranges)?;
+                index::build(commands, &resources, &plan, photons_of(&ranges))?;
+                estimate::gather(commands, &resources, &plan, photons_of(&ranges))?;
+                book.emitted += u64::from(photons_of(&ranges));
+                if is_due(commands, &plan, &book) && settle(commands, &resources, &mut book)? {
+                    break;
+                }
+            }
+            Ok(())
         })?;
-        book.emitted += u64::from(photons_of(&ranges));
-        if is_due(&commands, &plan, &book) && settle(&mut commands, &resources, &mut book)? {
+        if book.cancelled {
             break;
         }
     }
