@@ -122,17 +122,28 @@ impl<'a> Bench<'a> {
         Ok(outcome)
     }
 
-    /// `repeats` runs after the warm-up. A case that is slow is repeated less, and one whose first run
-    /// alone is slow keeps that run.
-    pub fn repeat(&self, settings: &Settings, repeats: usize) -> Step<Vec<Outcome>> {
-        let began = Instant::now();
-        let warm = self.warm_up(settings)?;
-        let mut outcomes = Vec::new();
-        while outcomes.len() < repeats && began.elapsed() < PATIENCE {
-            outcomes.push(self.run(settings)?);
+    /// `repeats` runs of every case after its warm-up, in turn, so that a clock that drifts touches all
+    /// alike. A case that is slow is repeated less, and one whose warm-up alone is slow keeps that.
+    pub fn repeat_in_turn(&self, cases: &[Settings], repeats: usize) -> Step<Vec<Vec<Outcome>>> {
+        let mut warm = Vec::new();
+        let mut spent = Vec::new();
+        for settings in cases {
+            let began = Instant::now();
+            warm.push(self.warm_up(settings)?);
+            spent.push(began.elapsed());
         }
-        if outcomes.is_empty() {
-            outcomes.push(warm);
+        let mut outcomes = vec![Vec::new(); cases.len()];
+        for _ in 0..repeats {
+            for (case, settings) in cases.iter().enumerate().filter(|(case, _)| spent[*case] < PATIENCE).collect::<Vec<_>>() {
+                let began = Instant::now();
+                outcomes[case].push(self.run(settings)?);
+                spent[case] += began.elapsed();
+            }
+        }
+        for (outcomes, warm) in outcomes.iter_mut().zip(warm) {
+            if outcomes.is_empty() {
+                outcomes.push(warm);
+            }
         }
         Ok(outcomes)
     }
@@ -194,7 +205,7 @@ mod tests {
         let bench_settings = Settings { variant: Variant::Cpu, photons: 10, mesh: 2, ..Settings::default() };
         let mut silent = |_: &str| {};
         let bench = Bench::new(None, &cancelled, &mut silent);
-        let Ok(outcomes) = bench.repeat(&bench_settings, 3) else { panic!("a run of ten photons fails") };
-        assert_eq!(outcomes.len(), 3);
+        let Ok(outcomes) = bench.repeat_in_turn(&[bench_settings.clone(), bench_settings], 3) else { panic!("a run of ten photons fails") };
+        assert_eq!(outcomes.iter().map(Vec::len).collect::<Vec<_>>(), [3, 3]);
     }
 }

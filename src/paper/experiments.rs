@@ -163,23 +163,35 @@ fn cases(bench: &Bench, request: &Request) -> Vec<Case> {
     cases
 }
 
-/// Both passes of every case.
+/// Both passes of every case. Builders are measured in turn, the GPU's apart from the CPU's, while
+/// which a GPU would idle.
 pub fn running_times(bench: &mut Bench, found: &mut Reproduction) -> Step<()> {
-    for case in cases(bench, &found.request) {
-        bench.begin(&case.title())?;
-        if let Some(predicted_ms) = predicted(&case, found).filter(|ms| *ms > LONGEST_PASS_MS) {
-            found.passes_left_out.push(LeftOut { what: case.title(), predicted_ms });
-            continue;
+    let all = cases(bench, &found.request);
+    let alike = |a: &Case, b: &Case| {
+        (a.photons, a.bounces, a.gather, a.builder.variant == Variant::Cpu)
+            == (b.photons, b.bounces, b.gather, b.builder.variant == Variant::Cpu)
+    };
+    for group in all.chunk_by(alike) {
+        let mut measured = Vec::new();
+        for case in group {
+            bench.begin(&case.title())?;
+            match predicted(case, found).filter(|ms| *ms > LONGEST_PASS_MS) {
+                Some(predicted_ms) => found.passes_left_out.push(LeftOut { what: case.title(), predicted_ms }),
+                None => measured.push(case),
+            }
         }
-        let repeats = if case.photons == found.request.large { found.request.repeats.min(LARGE_REPEATS) } else { found.request.repeats };
-        let settings = case.settings();
-        let outcomes = bench.repeat(&settings, repeats)?;
-        let command = command::line(Preset::Modified, &settings);
-        // The map does not depend on the gather, and is timed where the gather disturbs least.
-        if case.gather == Gather::Grid {
-            found.running_times.extend(running_time(&case, Pass::Map, &outcomes, &command));
+        let is_large = group[0].photons == found.request.large;
+        let repeats = if is_large { found.request.repeats.min(LARGE_REPEATS) } else { found.request.repeats };
+        let settings: Vec<Settings> = measured.iter().map(|case| case.settings()).collect();
+        let outcomes = bench.repeat_in_turn(&settings, repeats)?;
+        for ((case, settings), outcomes) in measured.iter().zip(&settings).zip(&outcomes) {
+            let command = command::line(Preset::Modified, settings);
+            // The map does not depend on the gather, and is timed where the gather disturbs least.
+            if case.gather == Gather::Grid {
+                found.running_times.extend(running_time(case, Pass::Map, outcomes, &command));
+            }
+            found.running_times.extend(running_time(case, Pass::Rendering, outcomes, &command));
         }
-        found.running_times.extend(running_time(&case, Pass::Rendering, &outcomes, &command));
     }
     Ok(())
 }
