@@ -38,15 +38,6 @@ impl Film {
         let last = self.channel_count as usize - 1;
         self.sums[point * self.channel_count as usize + last] as f64 / self.scale
     }
-
-    /// Adds the sums of another part of the same run, exactly.
-    pub fn merge(&mut self, other: &Film) {
-        assert_eq!((self.sums.len(), self.channel_count, self.scale), (other.sums.len(), other.channel_count, other.scale));
-        for (sum, addend) in self.sums.iter_mut().zip(&other.sums) {
-            *sum += addend;
-        }
-        self.emitted += other.emitted;
-    }
 }
 
 /// One wall of the result: its texels row by row, column i along u, row j along v.

@@ -157,7 +157,7 @@ fn facts(instance: &ash::Instance, device: vk::PhysicalDevice, index: usize) -> 
         )
     };
     let limits = properties.limits;
-    // A queue family with compute only leaves the desktop's graphics queue alone.
+    // The first compute family among those with the best timestamps.
     let queue_family = families
         .iter()
         .enumerate()
