@@ -122,6 +122,183 @@ struct GatherPush {
     uvec3 cell_count;
 };
 
+struct BvhNode {
+    vec3 origin;
+    uint spacing;
+    uint first_child;
+    uint first_triangle;
+    uvec2 meta;
+    uvec2 min_x;
+    uvec2 max_x;
+    uvec2 min_y;
+    uvec2 max_y;
+    uvec2 min_z;
+    uvec2 max_z;
+};
+
+struct Triangle {
+    vec3 a;
+    vec3 b;
+    vec3 c;
+    uint material;
+};
+
+struct TriangleNormals {
+    uint a;
+    uint b;
+    uint c;
+};
+
+struct TriangleUvs {
+    vec2 base_a;
+    vec2 base_b;
+    vec2 base_c;
+    vec2 emission_a;
+    vec2 emission_b;
+    vec2 emission_c;
+};
+
+struct SurfaceMaterial {
+    vec3 base_colour;
+    uint surface;
+    vec3 emission;
+    float parameter;
+    uint base_texture;
+    uint emission_texture;
+    uint two_sided;
+};
+
+struct TextureInfo {
+    uint width;
+    uint height;
+    uint first_texel;
+    uint wrap;
+};
+
+struct Emitter {
+    uint kind;
+    uint triangle;
+    float cumulative;
+    float probability;
+    vec3 flux;
+    vec3 strength;
+    vec3 position;
+    vec3 direction;
+    float size;
+    float cos_outer;
+};
+
+struct LightPath {
+    vec3 position;
+    uint photon;
+    vec3 direction;
+    uint arrival;
+    vec3 flux;
+};
+
+struct MapPhoton {
+    vec3 position;
+    uint normal;
+    vec3 flux;
+    uint wi;
+};
+
+struct VisiblePoint {
+    vec3 position;
+    uint normal;
+    vec3 weight;
+    uint shading_normal;
+    uint wo;
+    float exponent;
+    uint surface;
+    uint arrivals;
+};
+
+struct Receiver {
+    vec3 position;
+    vec3 normal;
+    vec3 shading_normal;
+};
+
+struct Draws {
+    uvec2 seed;
+    uint round;
+    uint domain;
+};
+
+struct EmissionPush {
+    Draws draws;
+    uint first_photon;
+    uint photon_count;
+    uint emitter_count;
+    float scene_radius;
+};
+
+struct FlightPush {
+    Draws draws;
+    uint bounce;
+    uint path_capacity;
+    uint photon_capacity;
+    uint stored;
+    uint caustic_only;
+    uint caustic_surfaces;
+};
+
+struct ViewPush {
+    Draws draws;
+    uint width;
+    uint height;
+    uint first_pixel;
+    uint end_pixel;
+    vec3 eye;
+    vec3 forward;
+    vec3 right;
+    vec3 up;
+    uint emitter_count;
+    float film_scale;
+    float film_limit;
+};
+
+struct ReceivePush {
+    Draws draws;
+    uint first_point;
+    uint end_point;
+    uint emitter_count;
+    float film_scale;
+    float film_limit;
+    float radius;
+};
+
+struct CellPush {
+    vec3 origin;
+    float cells_per_unit;
+    uint bucket_mask;
+    uint photon_capacity;
+};
+
+struct LookupPush {
+    uint first_point;
+    uint end_point;
+    uint point_count;
+    uint arrival;
+    float radius;
+    CellPush cells;
+};
+
+struct ResolvePush {
+    uint first_pixel;
+    uint end_pixel;
+    uint points_per_pixel;
+    uint point_count;
+    uint arrivals;
+    float film_scale;
+    float film_limit;
+    float global_radius;
+    float caustic_radius;
+    float global_flux;
+    float caustic_flux;
+};
+
 struct CheckPush {
     uint iteration_count;
     uint addend_low;

@@ -3,13 +3,9 @@
 // `stream` is what a path carries between bounces: the 48-bit state of rand48, the two state words
 // of MT19937 that the next output needs, nothing for Philox.
 
-layout(constant_id = 1) const uint RNG = RNG_PHILOX;
+#include "philox.glsl"
 
-// The top 24 bits as a number in [0, 1): every value is exact in f32 and none rounds up to 1.
-float unit_float(uint bits24)
-{
-    return float(bits24) * (1.0 / 16777216.0);
-}
+layout(constant_id = 1) const uint RNG = RNG_PHILOX;
 
 // x * multiplier + increment mod 2^48; .x holds the low 32 bits, .y the high 16.
 uvec2 affine48(uvec2 x, uvec2 multiplier, uvec2 increment)
@@ -68,24 +64,10 @@ float mt_next(inout uvec2 words, uint draw)
     return unit_float(y >> 8);
 }
 
-// Philox4x32-10 (Salmon et al. 2011).
-uvec4 philox(uvec4 counter, uvec2 key)
-{
-    for (uint i = 0; i < 10; i++) {
-        uint high0, low0, high1, low1;
-        umulExtended(0xd2511f53u, counter.x, high0, low0);
-        umulExtended(0xcd9e8d57u, counter.z, high1, low1);
-        counter = uvec4(high1 ^ counter.y ^ key.x, low1, high0 ^ counter.w ^ key.y, low0);
-        key += uvec2(0x9e3779b9u, 0xbb67ae85u);
-    }
-    return counter;
-}
-
 // Block 0 of a photon serves its emission, block k its bounce k - 1.
 vec4 philox_block(RandomKey key, uint photon, uint block)
 {
-    uvec4 bits = philox(uvec4(photon, key.round, block, 0u), key.seed) >> 8;
-    return vec4(unit_float(bits.x), unit_float(bits.y), unit_float(bits.z), unit_float(bits.w));
+    return philox_floats(uvec4(photon, key.round, block, DOMAIN_PHOTONS), key.seed);
 }
 
 // Opens a photon's stream; `rand48_state` is its first state, which only rand48 needs.

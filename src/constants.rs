@@ -25,6 +25,16 @@ constants! {
     EMISSION_DRAWS = 4;
     /// Draws of one bounce: roulette, cosine, azimuth.
     BOUNCE_DRAWS = 3;
+    /// Last word of Philox's counter: whose random numbers these are. The paper's photons and those of
+    /// the global map.
+    DOMAIN_PHOTONS = 0;
+    DOMAIN_CAUSTIC_PHOTONS = 1;
+    DOMAIN_CAMERA = 2;
+    DOMAIN_RECEIVERS = 3;
+    /// Philox blocks of an emission in a scene of triangles; bounce b has block `EMISSION_BLOCKS` + b.
+    EMISSION_BLOCKS = 2;
+    /// Philox blocks of one vertex of a path from the camera: one to go on, the others for light.
+    VERTEX_BLOCKS = 64;
     /// Distance between the two state words that one output of MT19937 combines.
     MT_MIDDLE = 397;
 
@@ -37,6 +47,69 @@ constants! {
     PHONG_MIRROR = 0;
     /// `PHONG_DIRECTION`: the direction in which the photon was reflected.
     PHONG_SAMPLED = 1;
+
+    /// How a surface scatters; see `scene::Surface`.
+    SURFACE_LAMBERT = 0;
+    SURFACE_PAPER_PHONG = 1;
+    SURFACE_GLOSSY = 2;
+    SURFACE_MIRROR = 3;
+    SURFACE_DIELECTRIC = 4;
+    /// No surface: a point that receives, of which irradiance is asked.
+    SURFACE_RECEIVER = 5;
+    /// A material without a texture, a triangle without smooth normals, a ray without a hit.
+    NONE = 0xffff_ffff;
+
+    /// What an emitter is; see `scene::LightKind`.
+    EMITTER_TRIANGLE = 0;
+    EMITTER_POINT = 1;
+    EMITTER_SPOT = 2;
+    EMITTER_DIRECTIONAL = 3;
+    EMITTER_DISC_COSINE = 4;
+    EMITTER_DISC_UNIFORM = 5;
+    EMITTER_ENVIRONMENT = 6;
+
+    /// How a photon reached its place, as bits of a mask: straight from the light, over mirrors and
+    /// glass alone, or over a surface that scatters.
+    ARRIVED_DIRECT = 1;
+    ARRIVED_CAUSTIC = 2;
+    ARRIVED_INDIRECT = 4;
+    /// A caustic over surfaces whose caustics are left out.
+    ARRIVED_UNWANTED = 8;
+
+    /// Parts of a picture, as bits of a mask.
+    PART_DIRECT = 1;
+    PART_SPECULAR = 2;
+    PART_CAUSTIC = 4;
+    PART_INDIRECT = 8;
+    PART_COUNT = 4;
+
+    /// Bits of a visible point's arrivals: it lies behind a mirror or glass, or behind a gather ray.
+    SEEN_OVER_SPECULAR = 256;
+    SEEN_BY_GATHER = 512;
+
+    /// `GATHER_RAYS`: which visible points take their indirect light from a ray of a final gather.
+    GATHER_NONE = 0;
+    GATHER_GLOSSY = 1;
+    GATHER_ALL = 2;
+
+    /// `KERNEL`: weight of a photon by its distance.
+    KERNEL_BOX = 0;
+    KERNEL_CONE = 1;
+    KERNEL_EPANECHNIKOV = 2;
+
+    /// `FILTER`: how a pixel weighs the picture around it.
+    FILTER_BOX = 0;
+    FILTER_TENT = 1;
+    FILTER_GAUSSIAN = 2;
+
+    /// Bits after the binary point of the flux that a point gathers.
+    FLUX_BITS = 24;
+    /// Most that a shading normal may change a photon's flux by, all bounces together.
+    MAX_SHADING_GAIN = 8;
+    /// Mirrors and panes of glass that a path from the camera passes at most.
+    MAX_CHAIN = 32;
+    /// Entries of the stack that traverses the bounding volume hierarchy.
+    BVH_STACK = 32;
 
     /// Most loop iterations that one invocation may do in one dispatch. lavapipe leaves its loops
     /// without a word after 65 535 iterations over all loops of a shader.

@@ -64,3 +64,4 @@ pub mod scene;
 pub mod settings;
 pub mod timings;
 pub mod trace;
+pub mod transport;

@@ -5,7 +5,7 @@
 //! of a photon divided by that of the strongest photon of the run (see [`crate::film`]).
 
 use bytemuck::{Pod, Zeroable};
-use glam::{UVec2, UVec3, Vec3};
+use glam::{UVec2, UVec3, Vec2, Vec3};
 
 /// One field of a record, as reflection names it.
 #[derive(Debug, Clone, Copy, PartialEq, Eq)]
@@ -32,7 +32,7 @@ macro_rules! glsl_types {
     ($($rust:ty => $kind:literal),* $(,)?) => { $(impl GlslType for $rust { const KIND: &'static str = $kind; })* };
 }
 
-glsl_types!(f32 => "f32", u32 => "u32", Vec3 => "vec3<f32>", UVec2 => "vec2<u32>", UVec3 => "vec3<u32>");
+glsl_types!(f32 => "f32", u32 => "u32", Vec2 => "vec2<f32>", Vec3 => "vec3<f32>", UVec2 => "vec2<u32>", UVec3 => "vec3<u32>");
 
 macro_rules! records {
     ($($(#[$doc:meta])* $name:ident { $($(#[$field_doc:meta])* $field:ident: $kind:ty,)* })*) => {
@@ -207,6 +207,229 @@ records! {
         origin: Vec3,
         cells_per_metre: f32,
         cell_count: UVec3,
+    }
+
+    /// Node of a compressed wide BVH (Ylitie, Karras and Laine 2017): eight children in boxes of 8-bit
+    /// planes.
+    BvhNode {
+        origin: Vec3,
+        /// Exponents of the planes' spacing along x, y, z, and the mask of children that are nodes, a
+        /// byte each.
+        spacing: u32,
+        first_child: u32,
+        first_triangle: u32,
+        /// A byte a child: where it is, or how many triangles it holds.
+        meta: UVec2,
+        min_x: UVec2,
+        max_x: UVec2,
+        min_y: UVec2,
+        max_y: UVec2,
+        min_z: UVec2,
+        max_z: UVec2,
+    }
+
+    /// In the order of the BVH's leaves; its front is where it runs counter-clockwise.
+    Triangle {
+        a: Vec3,
+        b: Vec3,
+        c: Vec3,
+        material: u32,
+    }
+
+    /// Shading normals at a triangle's corners, octahedral; all `NONE` on a flat triangle.
+    TriangleNormals {
+        a: u32,
+        b: u32,
+        c: u32,
+    }
+
+    /// Texture coordinates at a triangle's corners.
+    TriangleUvs {
+        base_a: Vec2,
+        base_b: Vec2,
+        base_c: Vec2,
+        emission_a: Vec2,
+        emission_b: Vec2,
+        emission_c: Vec2,
+    }
+
+    SurfaceMaterial {
+        base_colour: Vec3,
+        /// `SURFACE_...`.
+        surface: u32,
+        /// Radiance of the front, W/m2/sr.
+        emission: Vec3,
+        /// Exponent or index of refraction.
+        parameter: f32,
+        base_texture: u32,
+        emission_texture: u32,
+        two_sided: u32,
+    }
+
+    TextureInfo {
+        width: u32,
+        height: u32,
+        first_texel: u32,
+        /// 0 repeat, 1 mirrored, 2 clamp: of u, and of v times 4.
+        wrap: u32,
+    }
+
+    /// A light, or a triangle that shines. Lengths are those of the normalised scene.
+    Emitter {
+        /// `EMITTER_...`.
+        kind: u32,
+        triangle: u32,
+        /// Share of the emitters up to and with this one.
+        cumulative: f32,
+        probability: f32,
+        /// Relative flux of each of its photons.
+        flux: Vec3,
+        /// Radiance, radiant intensity or irradiance, as its kind has it; of a uniform disc the
+        /// intensity of a unit of area.
+        strength: Vec3,
+        position: Vec3,
+        /// Its axis or normal; a directional light's flight.
+        direction: Vec3,
+        /// Radius of a disc, cosine of a spot's inner cone.
+        size: f32,
+        /// Cosine of a spot's outer cone.
+        cos_outer: f32,
+    }
+
+    /// A photon in flight through a scene of triangles.
+    LightPath {
+        position: Vec3,
+        /// Number within its round.
+        photon: u32,
+        direction: Vec3,
+        /// `ARRIVED_...`, were it stored at its next hit.
+        arrival: u32,
+        flux: Vec3,
+    }
+
+    /// A photon where it arrived at a surface that scatters: one entry of a photon map.
+    MapPhoton {
+        position: Vec3,
+        /// Geometric normal on the side of its arrival, octahedral.
+        normal: u32,
+        flux: Vec3,
+        /// Where it came from, octahedral in 2 x 15 bits, and log2 of `ARRIVED_...` above.
+        wi: u32,
+    }
+
+    /// A point whose light the photon maps are asked for.
+    VisiblePoint {
+        position: Vec3,
+        /// Geometric and shading normal, octahedral.
+        normal: u32,
+        /// What a unit of flux density that arrives adds to the pixel, W/m2/sr per W/m2.
+        weight: Vec3,
+        shading_normal: u32,
+        /// Towards the eye, octahedral.
+        wo: u32,
+        exponent: f32,
+        surface: u32,
+        /// Mask of the arrivals that count, and `SEEN_...`; 0: no point.
+        arrivals: u32,
+    }
+
+    /// A point and its normals, of which irradiance is asked.
+    Receiver {
+        position: Vec3,
+        normal: Vec3,
+        shading_normal: Vec3,
+    }
+
+    /// Whose random numbers are drawn: seed, round, and a `DOMAIN_...`.
+    Draws {
+        seed: UVec2,
+        round: u32,
+        domain: u32,
+    }
+
+    EmissionPush {
+        draws: Draws,
+        first_photon: u32,
+        photon_count: u32,
+        emitter_count: u32,
+        /// Of a sphere around the scene.
+        scene_radius: f32,
+    }
+
+    FlightPush {
+        draws: Draws,
+        bounce: u32,
+        path_capacity: u32,
+        photon_capacity: u32,
+        /// Mask of the arrivals that are stored.
+        stored: u32,
+        /// 1: photons end where they scatter, as those of a caustic map do.
+        caustic_only: u32,
+        /// Mask of the surfaces (1 << `SURFACE_...`) whose caustics are wanted.
+        caustic_surfaces: u32,
+    }
+
+    ViewPush {
+        draws: Draws,
+        width: u32,
+        height: u32,
+        first_pixel: u32,
+        end_pixel: u32,
+        eye: Vec3,
+        forward: Vec3,
+        /// To the picture's right and upper edge, at unit distance.
+        right: Vec3,
+        up: Vec3,
+        emitter_count: u32,
+        /// Film units in 1 W/m2/sr.
+        film_scale: f32,
+        /// Largest sum of one pass, film units.
+        film_limit: f32,
+    }
+
+    ReceivePush {
+        draws: Draws,
+        first_point: u32,
+        end_point: u32,
+        emitter_count: u32,
+        film_scale: f32,
+        film_limit: f32,
+        /// Within which a surface makes a point one of its own.
+        radius: f32,
+    }
+
+    /// A hashed grid: cells of a row lie side by side.
+    CellPush {
+        origin: Vec3,
+        cells_per_unit: f32,
+        bucket_mask: u32,
+        photon_capacity: u32,
+    }
+
+    LookupPush {
+        first_point: u32,
+        end_point: u32,
+        point_count: u32,
+        /// Index of the arrival that the map holds, where it holds one only: where its sums stand.
+        arrival: u32,
+        radius: f32,
+        cells: CellPush,
+    }
+
+    ResolvePush {
+        first_pixel: u32,
+        end_pixel: u32,
+        points_per_pixel: u32,
+        point_count: u32,
+        /// Mask of the arrivals that some map holds.
+        arrivals: u32,
+        film_scale: f32,
+        film_limit: f32,
+        global_radius: f32,
+        caustic_radius: f32,
+        /// Flux of a photon of relative flux 1, over the photons of the round.
+        global_flux: f32,
+        caustic_flux: f32,
     }
 
     CheckPush {

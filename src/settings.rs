@@ -2,6 +2,8 @@
 //! that the paper leaves open is a field here, and [`Settings::validate`] is the one place that
 //! judges values.
 
+pub mod transport;
+
 use serde::Serialize;
 
 use crate::constants;

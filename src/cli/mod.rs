@@ -3,7 +3,10 @@
 
 mod devices;
 mod paper;
+mod plan;
+mod render;
 mod run;
+mod transport;
 
 use std::io::{ErrorKind, Write};
 use std::path::PathBuf;
@@ -34,6 +37,10 @@ struct Cli {
 enum Command {
     /// Lists Vulkan devices with the limits that matter here
     Devices(devices::DevicesArgs),
+    /// Renders what a camera sees of a scene
+    Render(render::RenderArgs),
+    /// Prints which effects a scene calls for, and why
+    Plan(plan::PlanArgs),
     /// Regenerates every figure and table of the paper as images, CSV and one HTML page
     Paper(paper::PaperArgs),
 }
@@ -92,6 +99,8 @@ pub fn main() -> u8 {
     let result = match cli.command {
         None => run::run(&cli.run, &cancelled),
         Some(Command::Devices(args)) => devices::run(&args).map(|()| End::Finished),
+        Some(Command::Render(args)) => render::run(&args, &cancelled),
+        Some(Command::Plan(args)) => plan::run(&args).map(|()| End::Finished),
         Some(Command::Paper(args)) => paper::run(&args, &cancelled),
     };
     match result {

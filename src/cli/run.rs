@@ -125,7 +125,7 @@ pub(super) struct RunArgs {
 macro_rules! value_enum {
     ($argument:ident => $setting:ident { $($(#[$doc:meta])* $variant:ident),* $(,)? }) => {
         #[derive(Clone, Copy, ValueEnum)]
-        enum $argument { $($(#[$doc])* $variant),* }
+        pub(super) enum $argument { $($(#[$doc])* $variant),* }
 
         impl From<$argument> for $setting {
             fn from(argument: $argument) -> $setting {
@@ -135,6 +135,8 @@ macro_rules! value_enum {
     };
 }
 
+pub(super) use value_enum;
+
 value_enum!(PresetArg => Preset { Naive, Modified, Phong, Rounds });
 value_enum!(VariantArg => Variant { Naive, Atomic, Ballot, Cpu });
 value_enum!(RngArg => Rng { Rand48, Mt, Philox });
@@ -143,12 +145,12 @@ value_enum!(EmissionArg => EmissionLaw { Uniform, Cosine });
 value_enum!(PhongDirectionArg => PhongDirection { Mirror, Sampled });
 
 #[derive(Clone, Copy, PartialEq, Eq, ValueEnum)]
-enum SwitchArg {
+pub(super) enum SwitchArg {
     On,
     Off,
 }
 
-fn numbers<T: std::str::FromStr + Copy + Default, const N: usize>(text: &str) -> std::result::Result<[T; N], String> {
+pub(super) fn numbers<T: std::str::FromStr + Copy + Default, const N: usize>(text: &str) -> std::result::Result<[T; N], String> {
     let parts: Vec<T> = text.split(',').filter_map(|part| part.trim().parse().ok()).collect();
     let wanted = format!("must be {N} numbers with commas between");
     if text.split(',').count() != N {
@@ -162,7 +164,7 @@ pub(super) fn whole<T: std::str::FromStr>(text: &str) -> std::result::Result<T, 
     text.parse().map_err(|_| format!("must be a whole number, at most {}", (1u128 << (8 * size_of::<T>())) - 1))
 }
 
-fn number<T: std::str::FromStr>(text: &str) -> std::result::Result<T, String> {
+pub(super) fn number<T: std::str::FromStr>(text: &str) -> std::result::Result<T, String> {
     text.parse().map_err(|_| "must be a number".to_owned())
 }
 

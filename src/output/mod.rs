@@ -1,7 +1,9 @@
 //! What a run writes: pictures, irradiance, the report and the trace file.
 
+pub mod colour;
 pub mod destination;
 pub mod image;
+pub mod light_report;
 pub mod lightmap;
 pub mod report;
 pub mod trace_file;

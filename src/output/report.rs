@@ -133,7 +133,7 @@ pub fn text(outcome: &Outcome) -> String {
 }
 
 /// One line that anybody can add up.
-fn ledger(ledger: &Ledger) -> String {
+pub(super) fn ledger(ledger: &Ledger) -> String {
     let Ledger { emitted, absorbed, escaped, cut_off, dropped, stored } = ledger;
     format!(
         "ledger: {emitted} emitted = {absorbed} absorbed + {escaped} escaped + {cut_off} cut off + {dropped} dropped\n        {stored} photons stored\n"
@@ -141,7 +141,7 @@ fn ledger(ledger: &Ledger) -> String {
 }
 
 /// Scopes indented by depth, time on the device and on the host's clock.
-fn timing_table(timings: &Timings, device: Option<&DeviceFacts>) -> String {
+pub(super) fn timing_table(timings: &Timings, device: Option<&DeviceFacts>) -> String {
     let mut text = String::new();
     let cell = |milliseconds: Option<f64>| milliseconds.map_or("-".to_owned(), |value| format!("{value:.3}"));
     writeln!(text, "{:<28} {:>9} {:>12} {:>12}", "pass", "count", "GPU ms", "wall ms").unwrap();

@@ -7,6 +7,11 @@ use glam::Vec3;
 pub enum Surface {
     /// Equal radiance in all directions of the front.
     Lambert,
+    /// The paper's Phong (section 4.4): light is scattered as by [`Surface::Lambert`], and what leaves
+    /// towards the eye is weighted by max(cos, 0)^exponent around the mirror direction.
+    PaperPhong {
+        exponent: f32,
+    },
     /// Modified Phong lobe (Lafortune and Willems 1994), (n + 2) / 2 pi cos^n around the mirror
     /// direction.
     Glossy {
@@ -40,6 +45,13 @@ pub struct Material {
     pub emission_texture: Option<TextureUse>,
     /// The back scatters (and shines) as the front does.
     pub two_sided: bool,
+}
+
+impl Surface {
+    /// Whether light leaves in single directions, so that no density estimate can see it.
+    pub fn is_specular(self) -> bool {
+        matches!(self, Surface::Mirror | Surface::Dielectric { .. })
+    }
 }
 
 impl Material {

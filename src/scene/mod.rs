@@ -2,7 +2,9 @@
 //! built in; and the paper's box, a convex room ([`room::RoomScene`]).
 
 pub mod built_in;
+pub mod bvh;
 pub mod camera;
+pub mod geometry;
 pub mod gltf;
 pub mod light;
 pub mod material;
@@ -14,15 +16,16 @@ pub mod texture;
 
 use std::path::Path;
 
-use glam::DVec3;
+use glam::{DVec3, Vec3};
 
 pub use camera::Camera;
-pub use light::Light;
+pub use light::{Light, LightKind};
 pub use material::{Material, Surface};
 pub use mesh::Mesh;
 pub use texture::Texture;
 
 use crate::error::{Error, Result};
+use crate::settings::transport::Effect;
 
 /// Meshes in world space, metres, y up, with what they are made of and what lights them.
 #[derive(Debug, Clone, Default)]
@@ -50,6 +53,37 @@ impl Scene {
             Some("gltf" | "glb") => gltf::load(path, radiometric),
             _ => Err(Error::setting("SCENE", name, format!("must be a .gltf or .glb file, or one of {}", built_in::NAMES.join(", ")))),
         }
+    }
+
+    /// The scene without what some effects would need.
+    pub fn without(&self, effects: &[Effect]) -> Scene {
+        let lacks = |effect: Effect| effects.contains(&effect);
+        let mut scene = self.clone();
+        scene.lights.retain(|light| {
+            !match light.kind {
+                LightKind::Point { .. } => lacks(Effect::PointLights),
+                LightKind::Spot { .. } => lacks(Effect::SpotLights),
+                LightKind::Directional { .. } => lacks(Effect::DirectionalLights),
+                LightKind::Disc { .. } => lacks(Effect::DiscLights),
+                LightKind::Environment { .. } => lacks(Effect::Environment),
+            }
+        });
+        for material in &mut scene.materials {
+            if lacks(Effect::MeshLights) {
+                material.emission = Vec3::ZERO;
+            }
+            if lacks(Effect::Glossy) && matches!(material.surface, Surface::Glossy { .. }) {
+                material.surface = Surface::Lambert;
+            }
+            if lacks(Effect::TwoSided) {
+                material.two_sided = false;
+            }
+            if lacks(Effect::Textures) {
+                material.base_colour_texture = None;
+                material.emission_texture = None;
+            }
+        }
+        scene
     }
 
     pub fn triangle_count(&self) -> usize {

@@ -1,0 +1,26 @@
+// Density estimation of a photon map, sums added by film/two_words.glsl.
+// Dispatched by src/transport/lookup.rs once a map and chunk. One thread = one slice of a point's
+// candidates: points along x, slices along y.
+#version 460
+#extension GL_GOOGLE_include_directive : require
+#extension GL_EXT_scalar_block_layout : require
+#extension GL_EXT_control_flow_attributes : require
+#include "records.glsl"
+
+layout(local_size_x_id = 0) in;
+layout(push_constant, scalar) uniform Push { LookupPush push; };
+
+#include "film/film.glsl"
+#include "film/two_words.glsl"
+#include "scene/directions.glsl"
+#include "scene/effects.glsl"
+#include "scene/lobes.glsl"
+#include "scene/belongs.glsl"
+#include "scene/cells.glsl"
+#include "stages/map_rows.glsl"
+#include "stages/lookup.glsl"
+
+void main()
+{
+    look_up();
+}

@@ -1,0 +1,25 @@
+// Counts the photons of each bucket of a map.
+// Dispatched by src/transport/maps.rs once a chunk. One thread = one photon.
+// After it cells[b] = photons in bucket b.
+#version 460
+#extension GL_GOOGLE_include_directive : require
+#extension GL_EXT_scalar_block_layout : require
+#extension GL_EXT_control_flow_attributes : require
+#include "records.glsl"
+
+layout(local_size_x_id = 0) in;
+layout(push_constant, scalar) uniform Push { CellPush push; };
+layout(set = 1, binding = 0, scalar) readonly buffer Map { MapPhoton map[]; };
+layout(set = 1, binding = 1, scalar) readonly buffer Counters { uint counters[]; };
+layout(set = 1, binding = 2, scalar) buffer Cells { uint cells[]; };
+
+#include "dispatch.glsl"
+#include "scene/cells.glsl"
+
+void main()
+{
+    uint index = invocation_index();
+    if (index < min(counters[0], push.photon_capacity)) {
+        atomicAdd(cells[bucket_of(cell_at(map[index].position, push), push)], 1);
+    }
+}

@@ -1,0 +1,64 @@
+// What each pixel sees: a path from the camera over mirrors and glass to the first surface that
+// scatters, its emission and direct light, and where asked one ray further for a final gather.
+// Dispatched by src/transport/points.rs once a pass. One thread = one pixel.
+#version 460
+#extension GL_GOOGLE_include_directive : require
+#extension GL_EXT_scalar_block_layout : require
+#extension GL_EXT_control_flow_attributes : require
+#extension GL_KHR_shader_subgroup_basic : require
+#extension GL_KHR_shader_subgroup_arithmetic : require
+#include "records.glsl"
+
+layout(local_size_x_id = 0) in;
+layout(push_constant, scalar) uniform Push { ViewPush push; };
+
+#include "dispatch.glsl"
+#include "philox.glsl"
+#include "sampling.glsl"
+#include "scene/effects.glsl"
+#include "scene/directions.glsl"
+#include "scene/bvh.glsl"
+#include "scene/surface.glsl"
+#include "scene/lobes.glsl"
+#include "scene/scatter.glsl"
+#include "scene/lights.glsl"
+#include "scene/direct.glsl"
+#include "scene/film.glsl"
+#include "stages/visible_point.glsl"
+#include "stages/chain.glsl"
+
+// Offset from a pixel's centre, in pixels, as likely as the filter weighs it.
+float filter_offset(float u)
+{
+    if (FILTER == FILTER_TENT) {
+        return u < 0.5 ? sqrt(2.0 * u) - 1.0 : 1.0 - sqrt(2.0 - 2.0 * u);
+    }
+    return u - 0.5;
+}
+
+vec2 filter_offsets(vec2 u)
+{
+    if (FILTER == FILTER_GAUSSIAN) {
+        // Of half a pixel's deviation, cut at four deviations (Box and Muller 1958).
+        vec2 sin_cos = sin_cos_turns(u.y);
+        return 0.5 * sqrt(-1.3862943611198906 * log2(max(1.0 - u.x, 1.0 / 16777216.0) * (1.0 - 3.3546263e-4) + 3.3546263e-4)) * sin_cos.yx;
+    }
+    return vec2(filter_offset(u.x), filter_offset(u.y));
+}
+
+void main()
+{
+    uint pixel = push.first_pixel + invocation_index();
+    if (pixel >= push.end_pixel) {
+        return;
+    }
+    vec4 u = philox_floats(uvec4(pixel, push.draws.round, 0, push.draws.domain), push.draws.seed);
+    vec2 place = vec2(pixel % push.width, pixel / push.width) + 0.5 + filter_offsets(u.xy);
+    vec2 picture = vec2(2.0, -2.0) * place / vec2(push.width, push.height) + vec2(-1.0, 1.0);
+    vec3 direction = normalize(push.forward + picture.x * push.right + picture.y * push.up);
+
+    Chain chain = new_chain(push.eye, direction, vec3(1.0));
+    follow(chain, pixel, push.draws, push.emitter_count);
+    write_pass_sum(pixel, chain.light, push.film_scale, push.film_limit);
+    write_points(chain, pixel);
+}

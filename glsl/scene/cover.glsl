@@ -1,0 +1,147 @@
+// How much surface a density estimate covers.
+
+// Integral of the kernel over a disc of radius 1, over pi.
+float kernel_norm()
+{
+    if (KERNEL == KERNEL_BOX) {
+        return 1.0;
+    }
+    if (KERNEL == KERNEL_CONE) {
+        return 1.0 / 3.0;
+    }
+    return 0.5;
+}
+
+// Integral of the kernel over the triangle between the centre and the piece from s0 to s1 of a line at
+// distance h, all within the disc of radius 1.
+float kernel_under_line(float h, float s0, float s1)
+{
+    if (KERNEL == KERNEL_BOX) {
+        return 0.5 * h * (s1 - s0);
+    }
+    if (KERNEL == KERNEL_CONE) {
+        float q0 = sqrt(h * h + s0 * s0), q1 = sqrt(h * h + s1 * s1);
+        float height = max(abs(h), 1e-12);
+        float cubes = h * (s1 * q1 - s0 * q0) + h * h * h * (asinh(s1 / height) - asinh(s0 / height));
+        return 0.5 * h * (s1 - s0) - cubes / 6.0;
+    }
+    return 0.5 * h * (s1 - s0) - 0.25 * h * (h * h * (s1 - s0) + (s1 * s1 * s1 - s0 * s0 * s0) / 3.0);
+}
+
+// Integral over the sector between two directions.
+float kernel_in_sector(vec2 from, vec2 to)
+{
+    float angle = atan(from.x * to.y - from.y * to.x, dot(from, to));
+    return 0.5 * kernel_norm() * angle;
+}
+
+// Integral of the kernel over the triangle between the centre and an edge, clipped to the unit disc;
+// signed by the edge's direction.
+float kernel_over_edge(vec2 from, vec2 to)
+{
+    vec2 edge = to - from;
+    float edge_length = length(edge);
+    if (edge_length == 0.0) {
+        return 0.0;
+    }
+    vec2 along = edge / edge_length;
+    float h = from.x * along.y - from.y * along.x;
+    float s0 = dot(from, along), s1 = dot(to, along);
+    float half_chord_squared = 1.0 - h * h;
+    if (half_chord_squared <= 0.0) {
+        return kernel_in_sector(from, to);
+    }
+    float half_chord = sqrt(half_chord_squared);
+    float c0 = clamp(s0, -half_chord, half_chord), c1 = clamp(s1, -half_chord, half_chord);
+    vec2 foot = h * vec2(along.y, -along.x);
+    float sum = kernel_under_line(h, c0, c1);
+    if (c0 != s0) {
+        sum += kernel_in_sector(from, foot + along * c0);
+    }
+    if (c1 != s1) {
+        sum += kernel_in_sector(foot + along * c1, to);
+    }
+    return sum;
+}
+
+// Integral of the kernel over the part of a triangle that belongs to an estimate, in units of 2^-28 of the
+// squared radius: integers add up alike in whatever order the triangles come.
+uint kernel_over_triangle(uint index, vec3 position, vec3 normal, float radius)
+{
+    Triangle triangle = triangles[index];
+    vec3 front = triangle_normal(triangle);
+    bool turned = false;
+    if (HAS_TWO_SIDED) {
+        turned = dot(front, normal) < 0.0 && materials[triangle.material].two_sided != 0;
+    }
+    vec3 side = turned ? -front : front;
+    float height = dot(position - triangle.a, side);
+    if (abs(height) >= radius || !belongs(normal, side, height, radius)) {
+        return 0;
+    }
+    // In the triangle's own plane, in units of the disc that the sphere cuts out of it.
+    float disc = sqrt((radius - height) * (radius + height));
+    vec3 centre = position - height * side;
+    vec3 x = normalize(triangle.b - triangle.a);
+    vec3 y = cross(front, x);
+    vec2 a = vec2(dot(triangle.a - centre, x), dot(triangle.a - centre, y)) / disc;
+    vec2 b = vec2(dot(triangle.b - centre, x), dot(triangle.b - centre, y)) / disc;
+    vec2 c = vec2(dot(triangle.c - centre, x), dot(triangle.c - centre, y)) / disc;
+    float whole = kernel_over_edge(a, b) + kernel_over_edge(b, c) + kernel_over_edge(c, a);
+    float share = disc / radius;
+    return uint(roundEven(max(whole, 0.0) * share * share * 268435456.0));
+}
+
+// Integral of the kernel over all surface that belongs to an estimate: the area, with the box kernel.
+float covered_area(vec3 position, vec3 normal, float radius)
+{
+    uint sum = 0;
+    if (HAS_BVH) {
+        // A little wider than the sphere, for the rounding of the boxes.
+        float reach = radius * (1.0 + 1.0 / 1024.0);
+        // Siblings to visit: the first of them, and a bit for each in reach above the mask of those that are
+        // nodes at all.
+        uvec2 group = uvec2(0, 0x100u);
+        uvec2 stack[BVH_STACK];
+        uint depth = 0;
+        for (;;) {
+            uint slot = findLSB(group.y >> 8);
+            group.y &= ~(0x100u << slot);
+            if (group.y > 0xffu) {
+                stack[depth++] = group;
+            }
+            uint place = group.x + bitCount(group.y & ((1u << slot) - 1u));
+            BvhNode node = nodes[place];
+            vec3 spacing = uintBitsToFloat((uvec3(node.spacing, node.spacing >> 8, node.spacing >> 16) & 0xffu) << 23);
+            uint child_nodes = node.spacing >> 24;
+            uint near_nodes = 0;
+            uint near_leaves = 0;
+            [[unroll]] for (uint child = 0; child < 8; child++) {
+                vec3 low = vec3(byte_of(node.min_x, child), byte_of(node.min_y, child), byte_of(node.min_z, child)) * spacing + node.origin;
+                vec3 high = vec3(byte_of(node.max_x, child), byte_of(node.max_y, child), byte_of(node.max_z, child)) * spacing + node.origin;
+                uint meta = byte_of(node.meta, child);
+                if (meta != 0 && all(lessThanEqual(low, position + reach)) && all(greaterThanEqual(high, position - reach))) {
+                    bool is_node = ((child_nodes >> child) & 1u) != 0;
+                    near_nodes |= is_node ? 1u << child : 0;
+                    near_leaves |= is_node ? 0 : (meta >> 5) << (meta & 31u);
+                }
+            }
+            while (near_leaves != 0) {
+                sum += kernel_over_triangle(node.first_triangle + findLSB(near_leaves), position, normal, radius);
+                near_leaves &= near_leaves - 1;
+            }
+            group = uvec2(node.first_child, (near_nodes << 8) | child_nodes);
+            if (near_nodes == 0) {
+                if (depth == 0) {
+                    break;
+                }
+                group = stack[--depth];
+            }
+        }
+    } else {
+        for (uint index = 0; index < triangles.length(); index++) {
+            sum += kernel_over_triangle(index, position, normal, radius);
+        }
+    }
+    return float(sum) * (1.0 / 268435456.0) * radius * radius;
+}

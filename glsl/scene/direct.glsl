@@ -1,0 +1,38 @@
+// Direct light by shadow rays.
+
+// A point that light arrives at: a surface, or a receiver.
+struct Target {
+    vec3 position;
+    vec3 error;
+    vec3 ng;
+    vec3 ns;
+    vec3 wo;
+    uint kind;
+    float exponent;
+};
+
+// What arrives straight from lights, times lobe and cosine: irradiance where there is no lobe. Its random
+// numbers are blocks `first_block` and on of this invocation.
+vec3 direct_light(Target point, uint emitter_count, Draws draws, uint index, uint first_block)
+{
+    vec3 sum = vec3(0.0);
+    if (emitter_count == 0) {
+        return sum;
+    }
+    for (uint ray = 0; ray < SHADOW_RAYS; ray++) {
+        vec4 u = philox_floats(uvec4(index, draws.round, first_block + ray, draws.domain), draws.seed);
+        // The choice of a light is stratified over the rays.
+        u.x = min((float(ray) + u.x) / float(SHADOW_RAYS), 1.0 - 1.0 / 16777216.0);
+        Arriving arriving = sample_light(emitter_count, point.position, point.ns, u);
+        float cosine = dot(arriving.wi, point.ns);
+        if (cosine > 0.0 && dot(arriving.wi, point.ng) > 0.0 && max(arriving.radiance.x, max(arriving.radiance.y, arriving.radiance.z)) > 0.0) {
+            vec3 start = offset_origin(point.position, point.error, point.ng, point.ng);
+            bool hidden = arriving.is_far ? traverse(start, arriving.wi, uintBitsToFloat(0x7f7fffffu), true).triangle != NONE
+                                          : is_occluded(start, arriving.target - start);
+            if (!hidden) {
+                sum += arriving.radiance * (cosine * lobe_weight(point.kind, point.exponent, point.ns, point.wo, arriving.wi));
+            }
+        }
+    }
+    return sum / float(SHADOW_RAYS);
+}

@@ -1,0 +1,32 @@
+// What a scene and a request call for, as specialization constants: code of effects that are left out is
+// no part of the pipeline. src/plan/transport.rs sets them.
+
+// A scene of few triangles needs no tree: its list is tested from end to end.
+layout(constant_id = 7) const bool HAS_BVH = true;
+layout(constant_id = 8) const bool HAS_SMOOTH_NORMALS = true;
+layout(constant_id = 9) const bool HAS_TEXTURES = true;
+layout(constant_id = 10) const bool HAS_TWO_SIDED = true;
+layout(constant_id = 11) const bool HAS_GLOSSY = true;
+layout(constant_id = 12) const bool HAS_MIRROR = true;
+layout(constant_id = 13) const bool HAS_DIELECTRIC = true;
+layout(constant_id = 14) const bool HAS_PAPER_PHONG = true;
+layout(constant_id = 15) const bool HAS_TRIANGLE_LIGHTS = true;
+layout(constant_id = 16) const bool HAS_POINT_LIGHTS = true;
+layout(constant_id = 17) const bool HAS_SPOT_LIGHTS = true;
+layout(constant_id = 18) const bool HAS_DIRECTIONAL_LIGHTS = true;
+layout(constant_id = 19) const bool HAS_DISC_LIGHTS = true;
+layout(constant_id = 20) const bool HAS_ENVIRONMENT = true;
+// Rays towards lights from a visible point, each to a light of its own choice; 0 where the photon maps
+// hold direct light too.
+layout(constant_id = 21) const uint SHADOW_RAYS = 1;
+layout(constant_id = 22) const uint KERNEL = KERNEL_BOX;
+layout(constant_id = 23) const bool HAS_EDGE_CORRECTION = true;
+// Photons of a caustic map of its own; without one the global map holds caustics too.
+layout(constant_id = 24) const bool HAS_CAUSTIC_MAP = true;
+// The global map holds direct light and caustics as well.
+layout(constant_id = 25) const bool HAS_ALL_ARRIVALS = false;
+layout(constant_id = 26) const uint GATHER_RAYS = GATHER_NONE;
+// Parts of the picture that are asked for.
+layout(constant_id = 27) const uint PARTS = 15;
+layout(constant_id = 28) const uint FILTER = FILTER_BOX;
+layout(constant_id = 29) const bool HAS_SPECULAR_CHAINS = true;

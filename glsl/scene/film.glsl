@@ -1,0 +1,75 @@
+// The film of a picture: for each pixel and channel the sum of all passes and the sum of their squares,
+// exact integers (64 and 128 bits), so that passes add up in any order. One invocation owns a pixel.
+
+// A count of what a film cannot hold: [0] values that are no number, [1] values cut to the largest.
+layout(set = 1, binding = 0, scalar) buffer Anomalies { uint anomalies[]; };
+
+// A value in film units as a 64-bit integer (low word, high word), at most `limit` units.
+uvec2 to_film_units(float value, float scale, float limit)
+{
+    float units = roundEven(value * scale);
+    if (isnan(units) || isinf(units)) {
+        atomicAdd(anomalies[0], 1);
+        return uvec2(0);
+    }
+    if (units > limit) {
+        atomicAdd(anomalies[1], 1);
+    }
+    units = clamp(units, 0.0, limit);
+    // Exact: a float is a 24-bit integer times a power of two.
+    float high = floor(units * (1.0 / 4294967296.0));
+    return uvec2(uint(units - high * 4294967296.0), uint(high));
+}
+
+// Film units of each part of the picture over all pixels, channels and passes: two words each.
+layout(set = 1, binding = 6, scalar) buffer PartTotals { uint part_totals[]; };
+
+// Adds what the invocations of a subgroup have of a part. 16 bits at a time, as a subgroup's sum of those
+// fits 32.
+void add_part_total(uint part, uvec2 amount)
+{
+    uvec4 halves = uvec4(amount.x & 0xffffu, amount.x >> 16, amount.y & 0xffffu, amount.y >> 16);
+    halves = subgroupAdd(halves);
+    if (subgroupElect()) {
+        uint middle = (halves.x >> 16) + halves.y;
+        uint low = (halves.x & 0xffffu) | (middle << 16);
+        uint high = halves.z + (middle >> 16) + (halves.w << 16);
+        uint before = atomicAdd(part_totals[2 * part], low);
+        high += before > 0xffffffffu - low ? 1 : 0;
+        if (high != 0) {
+            atomicAdd(part_totals[2 * part + 1], high);
+        }
+    }
+}
+
+uvec2 add64(uvec2 a, uvec2 b)
+{
+    uint carry;
+    a.x = uaddCarry(a.x, b.x, carry);
+    a.y += b.y + carry;
+    return a;
+}
+
+uvec4 add128(uvec4 a, uvec4 b)
+{
+    uvec4 sum;
+    uint carry = 0;
+    for (uint word = 0; word < 4; word++) {
+        uint c0, c1;
+        uint partial = uaddCarry(a[word], b[word], c0);
+        sum[word] = uaddCarry(partial, carry, c1);
+        carry = c0 + c1;
+    }
+    return sum;
+}
+
+uvec4 square64(uvec2 a)
+{
+    uint h0, l0, h1, l1, h2, l2;
+    umulExtended(a.x, a.x, h0, l0);
+    umulExtended(a.x, a.y, h1, l1);
+    umulExtended(a.y, a.y, h2, l2);
+    uvec4 square = uvec4(l0, h0, l2, h2);
+    uvec4 middle = uvec4(0, l1, h1, 0);
+    return add128(add128(square, middle), middle);
+}

@@ -1,0 +1,199 @@
+// Lights: where photons start, and what arrives at a point straight from them.
+
+layout(set = 0, binding = 7, scalar) readonly buffer Emitters { Emitter emitters[]; };
+
+// Chosen by power: the first emitter whose cumulative share lies above u.
+uint pick_emitter(uint emitter_count, float u)
+{
+    uint low = 0;
+    uint high = emitter_count - 1;
+    while (low < high) {
+        uint middle = (low + high) / 2;
+        if (emitters[middle].cumulative > u) {
+            high = middle;
+        } else {
+            low = middle + 1;
+        }
+    }
+    return low;
+}
+
+// Barycentric weights of the second and third corner, uniform over a triangle.
+vec2 sample_triangle(vec2 u)
+{
+    float root = sqrt(u.x);
+    return vec2(root * (1.0 - u.y), root * u.y);
+}
+
+vec3 sample_disc(vec3 centre, vec3 normal, float radius, vec2 u)
+{
+    vec2 sin_cos = sin_cos_turns(u.y);
+    return centre + to_frame(vec3(radius * sqrt(u.x) * sin_cos.yx, 0.0), normal);
+}
+
+vec3 position_error(vec3 position)
+{
+    return (abs(position)) * (1.0 / 1048576.0);
+}
+
+float triangle_area(Triangle triangle)
+{
+    return 0.5 * length(cross(triangle.b - triangle.a, triangle.c - triangle.a));
+}
+
+// glTF's falloff between a spot's cones.
+float spot_falloff(Emitter light, float cosine)
+{
+    float share = clamp((cosine - light.cos_outer) / max(light.size - light.cos_outer, 1e-6), 0.0, 1.0);
+    return share * share;
+}
+
+struct Emission {
+    vec3 position;
+    vec3 direction;
+    vec3 flux;
+};
+
+// A photon's start; u and w = eight uniform numbers.
+Emission sample_emission(uint emitter_count, float scene_radius, vec4 u, vec4 w)
+{
+    Emitter light = emitters[pick_emitter(emitter_count, u.x)];
+    Emission emission = Emission(light.position, light.direction, light.flux);
+    if (HAS_TRIANGLE_LIGHTS) {
+        if (light.kind == EMITTER_TRIANGLE) {
+            Triangle triangle = triangles[light.triangle];
+            SurfaceMaterial material = materials[triangle.material];
+            vec2 at = sample_triangle(u.yz);
+            vec3 normal = triangle_normal(triangle);
+            if (HAS_TWO_SIDED) {
+                normal = material.two_sided != 0 && u.w < 0.5 ? -normal : normal;
+            }
+            emission.direction = to_frame(sample_cosine_hemisphere(w.x, w.y), normal);
+            emission.position = offset_origin(triangle_point(triangle, at.x, at.y), triangle_error(triangle, at.x, at.y), normal, normal);
+            if (HAS_TEXTURES) {
+                if (material.emission_texture != NONE) {
+                    TriangleUvs uv = uvs[light.triangle];
+                    emission.flux *=
+                        sample_texture(material.emission_texture, mixed_uv(uv.emission_a, uv.emission_b, uv.emission_c, at.x, at.y));
+                }
+            }
+        }
+    }
+    if (HAS_POINT_LIGHTS) {
+        if (light.kind == EMITTER_POINT) {
+            float z = 1.0 - 2.0 * w.x;
+            emission.direction = direction_at(z, 4.0 * w.x * (1.0 - w.x), w.y);
+        }
+    }
+    if (HAS_SPOT_LIGHTS) {
+        if (light.kind == EMITTER_SPOT) {
+            // In proportion to the intensity: the inner cone evenly, the ring by its falloff.
+            float inner = 1.0 - light.size;
+            float ring = (light.size - light.cos_outer) / 3.0;
+            float below = w.x * (inner + ring);
+            float cosine = below < inner ? 1.0 - below
+                                         : light.cos_outer + (light.size - light.cos_outer) * exp2(log2(max(1.0 - (below - inner) / max(ring, 1e-12), 1e-12)) / 3.0);
+            emission.direction = to_frame(direction_at(cosine, (1.0 - cosine) * (1.0 + cosine), w.y), light.direction);
+        }
+    }
+    if (HAS_DISC_LIGHTS) {
+        if (light.kind == EMITTER_DISC_COSINE || light.kind == EMITTER_DISC_UNIFORM) {
+            vec3 start = sample_disc(light.position, light.direction, light.size, u.yz);
+            vec3 local = light.kind == EMITTER_DISC_COSINE ? sample_cosine_hemisphere(w.x, w.y) : sample_uniform_hemisphere(w.x, w.y);
+            emission.direction = to_frame(local, light.direction);
+            emission.position = offset_origin(start, position_error(start), light.direction, light.direction);
+        }
+    }
+    // What comes from beyond the scene starts on a disc that covers it.
+    bool is_far = false;
+    if (HAS_DIRECTIONAL_LIGHTS) {
+        is_far = is_far || light.kind == EMITTER_DIRECTIONAL;
+    }
+    if (HAS_ENVIRONMENT) {
+        if (light.kind == EMITTER_ENVIRONMENT) {
+            is_far = true;
+            emission.direction = direction_at(1.0 - 2.0 * w.x, 4.0 * w.x * (1.0 - w.x), w.y);
+        }
+    }
+    if (is_far) {
+        emission.position = sample_disc(-2.0 * scene_radius * emission.direction, emission.direction, scene_radius, u.yz);
+    }
+    return emission;
+}
+
+// What one light adds at a point: `radiance` is what arrives along wi, over the probability density of
+// this sample; the light ends at `target`, or comes from beyond the scene.
+struct Arriving {
+    vec3 wi;
+    vec3 radiance;
+    vec3 target;
+    bool is_far;
+};
+
+// u = (light, two for its area, spare).
+Arriving sample_light(uint emitter_count, vec3 position, vec3 ns, vec4 u)
+{
+    Emitter light = emitters[pick_emitter(emitter_count, u.x)];
+    Arriving arriving = Arriving(vec3(0.0), light.strength / light.probability, light.position, false);
+    float cos_light = 1.0;
+    if (HAS_TRIANGLE_LIGHTS) {
+        if (light.kind == EMITTER_TRIANGLE) {
+            Triangle triangle = triangles[light.triangle];
+            SurfaceMaterial material = materials[triangle.material];
+            vec2 at = sample_triangle(u.yz);
+            vec3 normal = triangle_normal(triangle);
+            vec3 point = triangle_point(triangle, at.x, at.y);
+            float side = dot(normal, position - point);
+            if (HAS_TWO_SIDED) {
+                normal = material.two_sided != 0 && side < 0.0 ? -normal : normal;
+            }
+            arriving.target = offset_origin(point, triangle_error(triangle, at.x, at.y), normal, normal);
+            arriving.radiance = emitted_radiance(material, light.triangle, at.x, at.y) * (triangle_area(triangle) / light.probability);
+            cos_light = max(dot(normal, normalize(position - point)), 0.0);
+        }
+    }
+    if (HAS_SPOT_LIGHTS) {
+        if (light.kind == EMITTER_SPOT) {
+            cos_light = spot_falloff(light, dot(normalize(position - light.position), light.direction));
+        }
+    }
+    if (HAS_DISC_LIGHTS) {
+        if (light.kind == EMITTER_DISC_COSINE || light.kind == EMITTER_DISC_UNIFORM) {
+            vec3 point = sample_disc(light.position, light.direction, light.size, u.yz);
+            arriving.target = offset_origin(point, position_error(point), light.direction, light.direction);
+            arriving.radiance *= 3.14159265358979324 * light.size * light.size;
+            float cosine = dot(light.direction, normalize(position - point));
+            cos_light = light.kind == EMITTER_DISC_COSINE ? max(cosine, 0.0) : (cosine > 0.0 ? 1.0 : 0.0);
+        }
+    }
+    if (HAS_DIRECTIONAL_LIGHTS) {
+        arriving.is_far = arriving.is_far || light.kind == EMITTER_DIRECTIONAL;
+    }
+    arriving.wi = -light.direction;
+    if (HAS_ENVIRONMENT) {
+        if (light.kind == EMITTER_ENVIRONMENT) {
+            arriving.is_far = true;
+            vec3 local = sample_cosine_hemisphere(u.y, u.z);
+            arriving.wi = to_frame(local, ns);
+            arriving.radiance *= 3.14159265358979324 / max(local.z, 1e-6);
+        }
+    }
+    if (!arriving.is_far) {
+        vec3 way = arriving.target - position;
+        float distance_squared = dot(way, way);
+        arriving.wi = distance_squared > 0.0 ? way * inversesqrt(distance_squared) : vec3(0.0);
+        arriving.radiance *= distance_squared > 0.0 ? cos_light / distance_squared : 0.0;
+    }
+    return arriving;
+}
+
+// Radiance from beyond the scene.
+vec3 environment_radiance(uint emitter_count)
+{
+    if (HAS_ENVIRONMENT && emitter_count != 0) {
+        // It stands last among the emitters.
+        Emitter light = emitters[emitter_count - 1];
+        return light.kind == EMITTER_ENVIRONMENT ? light.strength : vec3(0.0);
+    }
+    return vec3(0.0);
+}

@@ -1,0 +1,123 @@
+// What a ray met: position, normals, material.
+
+layout(set = 0, binding = 2, scalar) readonly buffer Normals { TriangleNormals normals[]; };
+layout(set = 0, binding = 3, scalar) readonly buffer Uvs { TriangleUvs uvs[]; };
+layout(set = 0, binding = 4, scalar) readonly buffer Materials { SurfaceMaterial materials[]; };
+layout(set = 0, binding = 5, scalar) readonly buffer Textures { TextureInfo textures[]; };
+layout(set = 0, binding = 6, scalar) readonly buffer Texels { uvec2 texels[]; };
+
+struct Surface {
+    vec3 position;
+    vec3 error; // bound of each coordinate's
+    vec3 ng; // geometric normal on the side of wo
+    vec3 ns; // shading normal on the same side
+    bool front;
+    bool scatters;
+    uint kind;
+    float parameter;
+    vec3 base_colour;
+    vec3 emission; // radiance towards wo
+};
+
+uint wrapped(int place, uint size, uint wrap)
+{
+    int extent = int(size);
+    if (wrap == 2) {
+        return uint(clamp(place, 0, extent - 1));
+    }
+    int period = wrap == 1 ? 2 * extent : extent;
+    int folded = place - period * int(floor(float(place) / float(period)));
+    folded = folded < 0 ? folded + period : (folded >= period ? folded - period : folded);
+    return uint(folded < extent ? folded : period - 1 - folded);
+}
+
+vec3 texel(TextureInfo info, int i, int j)
+{
+    uint place = wrapped(j, info.height, info.wrap >> 2) * info.width + wrapped(i, info.width, info.wrap & 3u);
+    uvec2 halves = texels[info.first_texel + place];
+    return vec3(unpackHalf2x16(halves.x), unpackHalf2x16(halves.y).x);
+}
+
+// Bilinear between texel centres.
+vec3 sample_texture(uint texture_index, vec2 uv)
+{
+    TextureInfo info = textures[texture_index];
+    vec2 place = uv * vec2(info.width, info.height) - 0.5;
+    vec2 corner = floor(place);
+    vec2 share = place - corner;
+    int i = int(corner.x), j = int(corner.y);
+    return mix(mix(texel(info, i, j), texel(info, i + 1, j), share.x), mix(texel(info, i, j + 1), texel(info, i + 1, j + 1), share.x),
+               share.y);
+}
+
+vec2 mixed_uv(vec2 a, vec2 b, vec2 c, float u, float v)
+{
+    return (1.0 - u - v) * a + u * b + v * c;
+}
+
+vec3 triangle_normal(Triangle triangle)
+{
+    return normalize(cross(triangle.b - triangle.a, triangle.c - triangle.a));
+}
+
+vec3 triangle_point(Triangle triangle, float u, float v)
+{
+    precise vec3 point = (1.0 - u - v) * triangle.a + u * triangle.b + v * triangle.c;
+    return point;
+}
+
+// Radiance that leaves a triangle's shining side.
+vec3 emitted_radiance(SurfaceMaterial material, uint index, float u, float v)
+{
+    vec3 emission = material.emission;
+    if (HAS_TEXTURES) {
+        if (material.emission_texture != NONE) {
+            TriangleUvs at = uvs[index];
+            emission *= sample_texture(material.emission_texture, mixed_uv(at.emission_a, at.emission_b, at.emission_c, u, v));
+        }
+    }
+    return emission;
+}
+
+Surface surface_at(Hit hit, vec3 wo)
+{
+    Triangle triangle = triangles[hit.triangle];
+    SurfaceMaterial material = materials[triangle.material];
+    Surface surface;
+    surface.position = triangle_point(triangle, hit.u, hit.v);
+    surface.error = triangle_error(triangle, hit.u, hit.v);
+    vec3 normal = triangle_normal(triangle);
+    surface.front = dot(normal, wo) >= 0.0;
+    surface.ng = surface.front ? normal : -normal;
+    surface.ns = surface.ng;
+    if (HAS_SMOOTH_NORMALS) {
+        TriangleNormals at = normals[hit.triangle];
+        if (at.a != NONE) {
+            vec3 smooth_normal = normalize((1.0 - hit.u - hit.v) * unpack_normal(at.a) + hit.u * unpack_normal(at.b) + hit.v * unpack_normal(at.c));
+            smooth_normal = dot(smooth_normal, surface.ng) < 0.0 ? -smooth_normal : smooth_normal;
+            // Seen from below its shading normal, a surface is what its triangles are.
+            surface.ns = dot(smooth_normal, wo) > 0.0 ? smooth_normal : surface.ng;
+        }
+    }
+    surface.kind = material.surface;
+    surface.parameter = material.parameter;
+    bool shown = surface.front;
+    if (HAS_TWO_SIDED) {
+        shown = shown || material.two_sided != 0;
+    }
+    surface.scatters = shown || surface.kind == SURFACE_DIELECTRIC;
+    surface.base_colour = material.base_colour;
+    if (HAS_TEXTURES) {
+        if (material.base_texture != NONE) {
+            TriangleUvs at = uvs[hit.triangle];
+            surface.base_colour *= sample_texture(material.base_texture, mixed_uv(at.base_a, at.base_b, at.base_c, hit.u, hit.v));
+        }
+    }
+    surface.emission = shown ? emitted_radiance(material, hit.triangle, hit.u, hit.v) : vec3(0.0);
+    return surface;
+}
+
+bool is_specular(Surface surface)
+{
+    return surface.kind == SURFACE_MIRROR || surface.kind == SURFACE_DIELECTRIC;
+}

@@ -1,0 +1,140 @@
+// A path from the eye: mirrors and glass, the first surface that scatters (a visible point), and where a
+// final gather is asked for, a sampled ray and a second chain to a second visible point.
+
+struct Chain {
+    vec3 position;
+    vec3 direction;
+    vec3 weight; // radiance at the eye for radiance that arrives along the ray
+    bool saw_specular; // before the first visible point
+    bool gathers; // the first visible point, or a receiver, lies behind
+    bool starts_nowhere; // at a receiver that no photon can reach
+    bool sees_emission; // what shines at the next vertex has not been counted yet
+    uint point_count;
+    VisiblePoint points[2];
+    vec3 light[3]; // direct, specular, indirect
+};
+
+Chain new_chain(vec3 position, vec3 direction, vec3 weight)
+{
+    Chain chain = Chain(position, direction, weight, false, false, false, true, 0, VisiblePoint[](no_point(), no_point()),
+                        vec3[](vec3(0.0), vec3(0.0), vec3(0.0)));
+    return chain;
+}
+
+// The part of the picture that light of the current vertex belongs to, when it arrived in this way.
+uint part_of(Chain chain, uint arrival)
+{
+    return chain.saw_specular ? PART_SPECULAR
+         : chain.gathers      ? PART_INDIRECT
+                              : (arrival == ARRIVED_DIRECT ? PART_DIRECT : (arrival == ARRIVED_CAUSTIC ? PART_CAUSTIC : PART_INDIRECT));
+}
+
+void add_light(inout Chain chain, vec3 radiance)
+{
+    uint part = part_of(chain, ARRIVED_DIRECT);
+    if ((PARTS & part) != 0) {
+        uint place = part == PART_DIRECT ? 0 : (part == PART_SPECULAR ? 1 : 2);
+        chain.light[place] += chain.weight * radiance;
+    }
+}
+
+// The arrivals at the current vertex that some part asks for // by photons: shadow rays see to direct light, and a gather ray to indirect.
+uint arrivals_wanted(Chain chain, bool gathers)
+{
+    uint wanted = 0;
+    uint first = ARRIVED_DIRECT;
+    if (SHADOW_RAYS != 0) {
+        first = ARRIVED_CAUSTIC;
+    }
+    uint last = gathers ? ARRIVED_CAUSTIC : ARRIVED_INDIRECT;
+    for (uint arrival = first; arrival <= last; arrival *= 2) {
+        wanted |= (PARTS & part_of(chain, arrival)) != 0 ? arrival : 0;
+    }
+    return wanted;
+}
+
+bool gathers_here(Surface surface)
+{
+    if (HAS_GLOSSY) {
+        return GATHER_RAYS == GATHER_ALL || (GATHER_RAYS == GATHER_GLOSSY && surface.kind == SURFACE_GLOSSY);
+    }
+    return GATHER_RAYS == GATHER_ALL;
+}
+
+// Follows the chain to its end. Random numbers: block 1 + VERTEX_BLOCKS * depth goes on, the blocks after
+// it are for direct light.
+void follow(inout Chain chain, uint index, Draws draws, uint emitter_count)
+{
+    for (uint depth = 0; depth < MAX_CHAIN; depth++) {
+        vec3 wo = -chain.direction;
+        Hit hit = closest_hit(chain.position, chain.direction);
+        if (hit.triangle == NONE) {
+            if (chain.sees_emission) {
+                add_light(chain, environment_radiance(emitter_count));
+            }
+            return;
+        }
+        Surface surface = surface_at(hit, wo);
+        if (chain.sees_emission) {
+            add_light(chain, surface.emission);
+        }
+        if (!surface.scatters) {
+            return;
+        }
+        uint block = 1 + VERTEX_BLOCKS * depth;
+        vec3 u = philox_floats(uvec4(index, draws.round, block, draws.domain), draws.seed).xyz;
+        bool specular = is_specular(surface);
+        if (!specular) {
+            vec3 scale = surface.base_colour * scatter_scale(surface.kind, surface.parameter);
+            if (SHADOW_RAYS != 0) {
+                if ((PARTS & part_of(chain, ARRIVED_DIRECT)) != 0) {
+                    Target here = Target(surface.position, surface.error, surface.ng, surface.ns, wo, surface.kind, surface.parameter);
+                    add_light(chain, scale * direct_light(here, emitter_count, draws, index, block + 1));
+                }
+            }
+            bool gathers = !chain.gathers && gathers_here(surface) && (PARTS & part_of(chain, ARRIVED_INDIRECT)) != 0;
+            uint arrivals = arrivals_wanted(chain, gathers);
+            arrivals |= arrivals == 0 ? 0 : (chain.saw_specular ? SEEN_OVER_SPECULAR : 0) | (chain.gathers ? SEEN_BY_GATHER : 0);
+            chain.points[chain.point_count++] = VisiblePoint(surface.position, pack_normal(surface.ng), chain.weight * scale,
+                                                             pack_normal(surface.ns), pack_direction(wo, 0), surface.parameter,
+                                                             surface.kind, arrivals);
+            if (!gathers) {
+                return;
+            }
+            chain.gathers = true;
+            // Shadow rays and the caustic map have counted what shines from here on.
+            chain.sees_emission = false;
+        }
+        bool ends = specular && !chain.gathers;
+        if (HAS_SPECULAR_CHAINS) {
+            ends = false;
+        }
+        if (ends) {
+            return;
+        }
+        Scatter scatter = sample_scatter(surface, wo, u, true);
+        if (!scatter.alive) {
+            return;
+        }
+        if (surface.kind == SURFACE_PAPER_PHONG) {
+            scatter.weight *= lobe_weight(surface.kind, surface.parameter, surface.ns, wo, scatter.direction);
+        }
+        chain.weight *= scatter.weight;
+        // No caustic map holds what reaches a receiver in the air over mirrors and glass.
+        chain.sees_emission = chain.sees_emission || (chain.starts_nowhere && specular);
+        chain.saw_specular = chain.saw_specular || (specular && !chain.gathers);
+        chain.position = offset_origin(surface.position, surface.error, surface.ng, scatter.direction);
+        chain.direction = scatter.direction;
+    }
+}
+
+void write_points(Chain chain, uint pixel)
+{
+    uint per_pixel = 1;
+    if (GATHER_RAYS != GATHER_NONE) {
+        per_pixel = 2;
+    }
+    for (uint k = 0; k < per_pixel; k++) {
+        visible_points[per_pixel * pixel + k] = chain.points[k];
+    }
+}

@@ -1,0 +1,92 @@
+// Density estimation of a photon map: each visible point sums the flux of the photons that belong to it.
+// A point's candidates are shared out in slices of GATHER_SLICE, so that no invocation loops long. The
+// including kernel chose how sums are added.
+
+layout(set = 0, binding = 0, scalar) readonly buffer VisiblePoints { VisiblePoint visible_points[]; };
+layout(set = 1, binding = 2, scalar) readonly buffer SortedMap { MapPhoton sorted_map[]; };
+
+void look_up()
+{
+    uint index = push.first_point + gl_WorkGroupID.x * gl_WorkGroupSize.x + gl_LocalInvocationIndex;
+    if (index >= push.end_point) {
+        return;
+    }
+    VisiblePoint point = visible_points[index];
+    if (point.arrivals == 0) {
+        return;
+    }
+    vec3 normal = unpack_normal(point.normal);
+    vec3 ns = unpack_normal(point.shading_normal);
+    vec3 wo = unpack_direction(point.wo);
+    CellRange range = cells_near(point.position);
+    uint photon_count = cells[push.cells.bucket_mask];
+    uint slice_begin = gl_WorkGroupID.y * GATHER_SLICE;
+    uint slice_end = slice_begin + GATHER_SLICE;
+
+    // Three channels of each arrival; the first three of a map that holds one arrival only.
+    uvec2 sums[9];
+    [[unroll]] for (uint k = 0; k < 9; k++) {
+        sums[k] = uvec2(0);
+    }
+    bool found = false;
+    uint passed = 0; // candidates in the rows before this one
+    for (int z = range.first.z; z <= range.last.z; z++) {
+        for (int y = range.first.y; y <= range.last.y; y++) {
+            uvec2 run = row_of_photons(range, ivec2(y, z));
+            uint begin = clamp(slice_begin, passed, passed + run.y) - passed;
+            uint end = clamp(slice_end, passed, passed + run.y) - passed;
+            for (uint k = begin; k < end; k++) {
+                uint place = run.x + k;
+                place = place >= photon_count ? place - photon_count : place;
+                vec3 position = sorted_map[place].position;
+                precise vec3 way = position - point.position;
+                precise float distance_squared = way.x * way.x + way.y * way.y + way.z * way.z;
+                if (distance_squared <= push.radius * push.radius && cell_at(position, push.cells).yz == ivec2(y, z)) {
+                    MapPhoton photon = sorted_map[place];
+                    vec3 photon_normal = unpack_normal(photon.normal);
+                    precise float height = -(way.x * photon_normal.x + way.y * photon_normal.y + way.z * photon_normal.z);
+                    bool counts = belongs(normal, photon_normal, height, push.radius) && ((point.arrivals >> (photon.wi >> 30)) & 1u) != 0;
+                    vec3 wi = unpack_direction(photon.wi);
+                    float cosine = dot(wi, ns);
+                    if (counts && cosine > 0.0) {
+                        float weight = lobe_weight(point.surface, point.exponent, ns, wo, wi);
+                        if (KERNEL != KERNEL_BOX) {
+                            float height_squared = height * height;
+                            weight *= kernel_weight(clamp((distance_squared - height_squared) / (push.radius * push.radius - height_squared), 0.0, 1.0));
+                        }
+                        if (HAS_SMOOTH_NORMALS) {
+                            weight *= point.normal == point.shading_normal ? 1.0 : shading_gain(cosine, dot(wi, photon_normal));
+                        }
+                        precise vec3 flux = photon.flux * weight;
+                        [[unroll]] for (uint channel = 0; channel < 3; channel++) {
+                            uint amount = to_fixed_point(flux[channel], float(1u << FLUX_BITS));
+                            if (HAS_ALL_ARRIVALS) {
+                                [[unroll]] for (uint arrival = 0; arrival < 3; arrival++) {
+                                    sums[3 * arrival + channel] = add_words(sums[3 * arrival + channel], arrival == photon.wi >> 30 ? amount : 0);
+                                }
+                            } else {
+                                sums[channel] = add_words(sums[channel], amount);
+                            }
+                        }
+                        found = true;
+                    }
+                }
+            }
+            passed += run.y;
+        }
+    }
+    if (found) {
+        // Without direct light the first set of sums is that of caustics.
+        uint first = 3 * ((push.arrival - 1) * push.point_count + index);
+        uint sum_count = 3;
+        if (HAS_ALL_ARRIVALS) {
+            first = 3 * index;
+            sum_count = 9;
+        }
+        [[unroll]] for (uint k = 0; k < 9; k++) {
+            if (k < sum_count && sums[k] != uvec2(0)) {
+                add_to_film(first + k / 3 * 3 * push.point_count + k % 3, sums[k]);
+            }
+        }
+    }
+}

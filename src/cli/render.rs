@@ -1,0 +1,112 @@
+//! `photonmill render`: what a camera sees of a scene.
+
+use std::path::PathBuf;
+use std::sync::atomic::AtomicBool;
+
+use clap::Args;
+
+use super::run::number;
+use super::transport::{FilterArg, Job, PartArg, ReportArgs, SceneArgs, TransportArgs, camera, geometry, light, plan, size};
+use super::{DeviceArgs, End, say};
+use crate::error::{Error, Result};
+use crate::output::colour::ColourPicture;
+use crate::output::destination::{Destination, check_distinct, write_all};
+use crate::output::image::Format;
+use crate::output::light_report;
+use crate::plan::transport::Sensor;
+use crate::settings::transport::{Filter, Part, TransportSettings};
+use crate::transport::Lit;
+
+#[derive(Args)]
+pub(super) struct RenderArgs {
+    #[command(flatten)]
+    scene: SceneArgs,
+    /// Picture: an .exr of linear radiance, W/m2/sr, or a .png for the eye
+    #[arg(short, long, value_name = "FILE", help_heading = "Output")]
+    output: PathBuf,
+    /// Standard error of each pixel, an .exr in the same unit
+    #[arg(long, value_name = "FILE", help_heading = "Output")]
+    error_image: Option<PathBuf>,
+    /// Brightness of a PNG in stops: each doubles it [default: so that the picture's mean is a middle
+    /// grey]
+    #[arg(long, value_name = "STOPS", value_parser = number::<f32>, allow_negative_numbers = true, help_heading = "Output")]
+    exposure: Option<f32>,
+    /// Width and height in pixels
+    #[arg(long, value_name = "WxH", value_parser = size, default_value = "640x480", help_heading = "Scene")]
+    size: (u32, u32),
+    /// Camera by name [default: the first; one that sees everything if there is none]
+    #[arg(long, value_name = "NAME", help_heading = "Scene")]
+    camera: Option<String>,
+    /// Only this part of the light; the four add up to the whole to the bit
+    #[arg(long, value_enum, help_heading = "Transport")]
+    part: Option<PartArg>,
+    /// How a pixel weighs the picture around its centre [default: box]
+    #[arg(long, value_enum, help_heading = "Estimate")]
+    filter: Option<FilterArg>,
+    #[command(flatten)]
+    transport: TransportArgs,
+    #[command(flatten)]
+    report: ReportArgs,
+    #[command(flatten)]
+    device: DeviceArgs,
+}
+
+pub(super) fn run(args: &RenderArgs, cancelled: &AtomicBool) -> Result<End> {
+    let usual = args.transport.settings();
+    let settings =
+        TransportSettings { part: args.part.map_or(usual.part, Part::from), filter: args.filter.map_or(usual.filter, Filter::from), ..usual };
+    settings.validate()?;
+    let format = Format::of("-o", &args.output)?;
+    if let (Format::Exr, Some(exposure)) = (format, args.exposure) {
+        return Err(Error::setting("--exposure", exposure, "is for PNG only: an EXR holds radiance untouched"));
+    }
+    if let Some(exposure) = args.exposure.filter(|stops| stops.is_nan() || stops.abs() > 64.0) {
+        return Err(Error::setting("--exposure", exposure, "must be from -64 to 64 stops"));
+    }
+    let picture = Destination::open("-o", &args.output)?;
+    let errors = args.error_image.as_ref().map(|path| Destination::open("--error-image", path)).transpose()?;
+    if let Some(path) = &args.error_image
+        && Format::of("--error-image", path)? != Format::Exr
+    {
+        return Err(Error::setting("--error-image", path.display(), "must end in .exr"));
+    }
+    let reports = args.report.open()?;
+    let all: Vec<Destination> = [vec![picture.clone()], errors.clone().into_iter().collect(), reports.destinations()].concat();
+    check_distinct(&all)?;
+
+    let scene = args.scene.open()?;
+    let camera = camera(&scene, args.camera.as_deref())?;
+    let (width, height) = args.size;
+    let job = Job { scene: &scene, settings: &settings, sensor: Sensor::Picture { width, height }, camera: Some(&camera), phases: &[] };
+    let geometry = geometry(&scene, &settings)?;
+    let gpu = args.report.device(&args.device)?;
+    let plan = plan(&gpu, &job, &geometry)?;
+    let lit = light(&gpu, &job, &geometry, plan, cancelled)?;
+
+    let image = radiance(&lit, width, height);
+    let stops = args.exposure.unwrap_or_else(|| image.usual_exposure());
+    let text = light_report::text(&scene.name, &lit, reports.explain);
+    let mut files = vec![(picture, image.encode(format, stops))];
+    if let Some(errors) = errors {
+        files.push((errors, standard_error(&lit, width, height).encode(Format::Exr, 0.0)));
+    }
+    files.extend(reports.files(&scene, &lit));
+    write_all(files)?;
+    let shown = match format {
+        Format::Png => format!(" at {stops:+.2} stops"),
+        Format::Exr => String::new(),
+    };
+    say(&format!("{text}\nwrote {}{shown}", args.output.display()))?;
+    Ok(if lit.cancelled { End::Cancelled } else { End::Finished })
+}
+
+/// W/m2/sr.
+fn radiance(lit: &Lit, width: u32, height: u32) -> ColourPicture {
+    let pixels = (0..lit.film.pixels()).map(|pixel| lit.film.mean(pixel, &lit.plan).as_vec3()).collect();
+    ColourPicture { width, height, pixels }
+}
+
+fn standard_error(lit: &Lit, width: u32, height: u32) -> ColourPicture {
+    let pixels = (0..lit.film.pixels()).map(|pixel| lit.film.standard_error(pixel, &lit.plan).as_vec3()).collect();
+    ColourPicture { width, height, pixels }
+}

@@ -1,0 +1,270 @@
+//! What the commands that light a scene of triangles share: options, the scene, the run.
+
+use std::path::PathBuf;
+use std::sync::atomic::AtomicBool;
+
+use clap::{Args, ValueEnum};
+use indicatif::{ProgressBar, ProgressStyle};
+
+use super::run::{number, numbers, whole};
+use super::{DeviceArgs, complain};
+use crate::error::{Error, Result};
+use crate::gpu::{Gpu, Options};
+use crate::output::destination::Destination;
+use crate::output::trace_file;
+use crate::output::light_report;
+use crate::plan::transport::{Sensor, TransportPlan};
+use crate::records::Receiver;
+use crate::render;
+use crate::scene::geometry::Geometry;
+use crate::scene::light::{Light, LightKind};
+use crate::scene::{Camera, Scene};
+use crate::settings::transport::{Append, Effect, Filter, Illumination, Kernel, Part, TransportSettings};
+use crate::transport::{self, Lit, View, Watch};
+
+#[derive(Args)]
+pub(super) struct SceneArgs {
+    /// A built-in scene by name, or a .gltf or .glb file
+    #[arg(value_name = "SCENE")]
+    pub(super) scene: String,
+    /// Punctual lights of a glTF file are in W/sr and W/m2 already [default: candela and lux, divided by
+    /// 683 lm/W]
+    #[arg(long, help_heading = "Scene")]
+    radiometric: bool,
+    /// Light from everywhere beyond the scene, W/m2/sr: one number, or three for red, green, blue
+    #[arg(long, value_name = "R,G,B", value_parser = colour, help_heading = "Scene")]
+    environment: Option<[f32; 3]>,
+}
+
+#[derive(Args)]
+pub(super) struct TransportArgs {
+    /// Photons of the global map, each round [default: 131072]
+    #[arg(long, value_parser = whole::<u32>, allow_negative_numbers = true, help_heading = "Transport")]
+    photons: Option<u32>,
+    /// Photons of the caustic map, each round [default: as --photons]
+    #[arg(long, value_parser = whole::<u32>, allow_negative_numbers = true, help_heading = "Transport")]
+    caustic_photons: Option<u32>,
+    /// Independent rounds, of which the result is the mean [default: 16]
+    #[arg(long, value_parser = whole::<u32>, allow_negative_numbers = true, help_heading = "Transport")]
+    rounds: Option<u32>,
+    /// Most bounces of a photon [default: 32]
+    #[arg(long, value_parser = whole::<u32>, allow_negative_numbers = true, help_heading = "Transport")]
+    bounces: Option<u32>,
+    /// Seed of the random numbers [default: 1]
+    #[arg(long, value_parser = whole::<u64>, allow_negative_numbers = true, help_heading = "Transport")]
+    seed: Option<u64>,
+    /// Shadow rays from each visible point, each round [default: 4]
+    #[arg(long, value_parser = whole::<u32>, allow_negative_numbers = true, help_heading = "Transport")]
+    shadow_rays: Option<u32>,
+    /// Take indirect light from a ray to the next surface instead of the map where the camera looks
+    #[arg(long, help_heading = "Transport")]
+    final_gather: bool,
+    /// Where direct light and caustics come from: shadow rays and a map of their own, or all of it from one
+    /// photon map, as in the paper [default: split]
+    #[arg(long, value_enum, help_heading = "Transport")]
+    illumination: Option<IlluminationArg>,
+    /// How photons take places in their map; the result is the same to the bit [default: ballot]
+    #[arg(long, value_enum, help_heading = "Transport")]
+    variant: Option<AppendArg>,
+    /// Most photons traced at once; the result is the same to the bit [default: what the device holds]
+    #[arg(long, value_parser = whole::<u32>, allow_negative_numbers = true, help_heading = "Transport")]
+    chunk: Option<u32>,
+    /// Invocations of a work group, a power of two [default: 128]
+    #[arg(long, value_parser = whole::<u32>, allow_negative_numbers = true, help_heading = "Transport")]
+    group_size: Option<u32>,
+
+    /// Radius of the global map's estimate in the first round, metres [default: by the scene's area]
+    #[arg(long, value_parser = number::<f64>, allow_negative_numbers = true, help_heading = "Estimate")]
+    radius: Option<f64>,
+    /// The same of the caustic map [default: by the scene's area, a quarter of the global map's]
+    #[arg(long, value_parser = number::<f64>, allow_negative_numbers = true, help_heading = "Estimate")]
+    caustic_radius: Option<f64>,
+    /// How fast the radius shrinks from round to round (Knaus and Zwicker 2011), above 0; 1 keeps it
+    /// [default: 0.667]
+    #[arg(long, value_parser = number::<f64>, allow_negative_numbers = true, help_heading = "Estimate", conflicts_with = "fixed_radius")]
+    alpha: Option<f64>,
+    /// Keep the radius, as `--alpha 1` does
+    #[arg(long, help_heading = "Estimate")]
+    fixed_radius: bool,
+    /// How a photon's weight falls with its distance [default: box]
+    #[arg(long, value_enum, help_heading = "Estimate")]
+    kernel: Option<KernelArg>,
+    /// Divide by the area that really lies on the surface [default: on]
+    #[arg(long, value_enum, help_heading = "Estimate")]
+    edge_correction: Option<super::run::SwitchArg>,
+
+    /// Simulate an effect even where the scene does not need it; see `photonmill plan`
+    #[arg(long, value_name = "EFFECT", value_enum, value_delimiter = ',', help_heading = "Plan")]
+    with: Vec<EffectArg>,
+    /// Leave an effect out, even where the scene needs it
+    #[arg(long, value_name = "EFFECT", value_enum, value_delimiter = ',', help_heading = "Plan")]
+    without: Vec<EffectArg>,
+}
+
+/// What a run tells beside its result.
+#[derive(Args)]
+pub(super) struct ReportArgs {
+    /// Print which effects were kept or dropped and why, what each cost and gave
+    #[arg(long, help_heading = "Output")]
+    explain: bool,
+    /// Report as JSON
+    #[arg(long, value_name = "FILE", help_heading = "Output")]
+    json: Option<PathBuf>,
+    /// Chrome trace of all passes, for Perfetto
+    #[arg(long, value_name = "FILE", help_heading = "Output")]
+    trace: Option<PathBuf>,
+    /// Time every single dispatch
+    #[arg(long, help_heading = "Output")]
+    time_dispatches: bool,
+}
+
+super::run::value_enum!(IlluminationArg => Illumination { Split, Photons });
+super::run::value_enum!(AppendArg => Append { Atomic, Ballot });
+super::run::value_enum!(KernelArg => Kernel { Box, Cone, Epanechnikov });
+super::run::value_enum!(FilterArg => Filter { Box, Tent, Gaussian });
+super::run::value_enum!(PartArg => Part { All, Direct, Specular, Caustic, Indirect });
+super::run::value_enum!(EffectArg => Effect {
+    Direct, Indirect, Glossy, ReflectiveCaustics, RefractiveCaustics, SpecularChains, Textures, Environment, MeshLights,
+    PointLights, SpotLights, DirectionalLights, DiscLights, Bvh, TwoSided, SmoothNormals,
+});
+
+fn colour(text: &str) -> std::result::Result<[f32; 3], String> {
+    let all = match numbers::<f32, 1>(text) {
+        Ok([grey]) => [grey; 3],
+        Err(_) => numbers::<f32, 3>(text).map_err(|_| "must be one number, or three with commas between".to_owned())?,
+    };
+    if all.iter().all(|value| value.is_finite() && *value >= 0.0) { Ok(all) } else { Err("must be 0 or more".to_owned()) }
+}
+
+impl SceneArgs {
+    /// The scene, its warnings told.
+    pub(super) fn open(&self) -> Result<Scene> {
+        let mut scene = Scene::open(&self.scene, self.radiometric)?;
+        if let Some(radiance) = self.environment {
+            scene.lights.push(Light { name: "--environment".into(), kind: LightKind::Environment { radiance: radiance.into() } });
+        }
+        for warning in &scene.warnings {
+            complain(&format!("warning: {warning}"));
+        }
+        if !scene.is_lit() {
+            complain("warning: nothing shines in this scene: it is dark");
+        }
+        Ok(scene)
+    }
+}
+
+impl TransportArgs {
+    pub(super) fn settings(&self) -> TransportSettings {
+        let usual = TransportSettings::default();
+        let photons = self.photons.unwrap_or(usual.photons);
+        TransportSettings {
+            photons,
+            caustic_photons: self.caustic_photons.unwrap_or(photons),
+            rounds: self.rounds.unwrap_or(usual.rounds),
+            bounces: self.bounces.unwrap_or(usual.bounces),
+            seed: self.seed.unwrap_or(usual.seed),
+            radius: self.radius,
+            caustic_radius: self.caustic_radius,
+            alpha: if self.fixed_radius { 1.0 } else { self.alpha.unwrap_or(usual.alpha) },
+            kernel: self.kernel.map_or(usual.kernel, Kernel::from),
+            edge_correction: self.edge_correction.map_or(usual.edge_correction, |switch| switch == super::run::SwitchArg::On),
+            shadow_rays: self.shadow_rays.unwrap_or(usual.shadow_rays),
+            final_gather: self.final_gather,
+            illumination: self.illumination.map_or(usual.illumination, Illumination::from),
+            append: self.variant.map_or(usual.append, Append::from),
+            group_size: self.group_size.unwrap_or(usual.group_size),
+            chunk: self.chunk,
+            with: self.with.iter().map(|effect| (*effect).into()).collect(),
+            without: self.without.iter().map(|effect| (*effect).into()).collect(),
+            ..usual
+        }
+    }
+}
+
+/// The outputs of [`ReportArgs`], checked before the run.
+pub(super) struct Reports {
+    pub(super) explain: bool,
+    json: Option<Destination>,
+    trace: Option<Destination>,
+}
+
+impl ReportArgs {
+    pub(super) fn open(&self) -> Result<Reports> {
+        let file = |option, path: &Option<PathBuf>| path.as_ref().map(|path| Destination::open(option, path)).transpose();
+        Ok(Reports { explain: self.explain, json: file("--json", &self.json)?, trace: file("--trace", &self.trace)? })
+    }
+
+    /// The device; a scene of triangles needs one.
+    pub(super) fn device(&self, device: &DeviceArgs) -> Result<Gpu> {
+        let options =
+            Options { device: device.device.clone(), validate: device.validate, time_dispatches: self.time_dispatches, ..Options::default() };
+        Gpu::open(&options)
+    }
+}
+
+impl Reports {
+    pub(super) fn destinations(&self) -> Vec<Destination> {
+        [&self.json, &self.trace].into_iter().flatten().cloned().collect()
+    }
+
+    pub(super) fn files(self, scene: &Scene, lit: &Lit) -> Vec<(Destination, Vec<u8>)> {
+        let json = self.json.map(|json| (json, light_report::json(&scene.name, lit)));
+        let trace = self.trace.map(|trace| (trace, trace_file::chrome_trace(&lit.timings, &lit.device.name)));
+        json.into_iter().chain(trace).collect()
+    }
+}
+
+/// What a run is about.
+pub(super) struct Job<'a> {
+    pub(super) scene: &'a Scene,
+    pub(super) settings: &'a TransportSettings,
+    pub(super) sensor: Sensor,
+    pub(super) camera: Option<&'a Camera>,
+    pub(super) phases: &'a [Vec<Receiver>],
+}
+
+/// The geometry of what is left of a scene, and the plan.
+pub(super) fn plan(gpu: &Gpu, job: &Job, geometry: &Geometry) -> Result<TransportPlan> {
+    TransportPlan::new(job.scene, geometry, job.settings, job.sensor, &render::limits(gpu.facts()))
+}
+
+/// Geometry of a scene without the effects that are left out.
+pub(super) fn geometry(scene: &Scene, settings: &TransportSettings) -> Result<Geometry> {
+    Geometry::new(&scene.without(&settings.without))
+}
+
+/// Runs all rounds, with a bar.
+pub(super) fn light(gpu: &Gpu, job: &Job, geometry: &Geometry, plan: TransportPlan, cancelled: &AtomicBool) -> Result<Lit> {
+    let style = ProgressStyle::with_template("{bar:32} {human_pos}/{human_len} rounds, {per_sec}, {eta} left").expect("the template is valid");
+    let bar = ProgressBar::new(u64::from(plan.settings.rounds)).with_style(style);
+    let mut watch = Watch { cancelled, progress: &mut |done, _| bar.set_position(u64::from(done)) };
+    let lit = transport::light(gpu, &View { geometry, camera: job.camera, phases: job.phases }, plan, &mut watch)?;
+    bar.finish_and_clear();
+    if lit.cancelled {
+        complain(&format!("ended after {} of {} rounds; what is written is of these", lit.film.rounds, lit.plan.settings.rounds));
+    }
+    Ok(lit)
+}
+
+/// `800x600`.
+pub(super) fn size(text: &str) -> std::result::Result<(u32, u32), String> {
+    let parsed = text.split_once('x').and_then(|(width, height)| Some((width.parse().ok()?, height.parse().ok()?)));
+    parsed
+        .filter(|(width, height): &(u32, u32)| (1..=65_536).contains(width) && (1..=65_536).contains(height))
+        .ok_or_else(|| "must be WIDTHxHEIGHT, each from 1 to 65536".to_owned())
+}
+
+/// The camera by name, else the scene's first, else one that sees all of it.
+pub(super) fn camera(scene: &Scene, name: Option<&str>) -> Result<Camera> {
+    match name {
+        Some(name) => scene.cameras.iter().find(|camera| camera.name == name).cloned().ok_or_else(|| {
+            let names: Vec<&str> = scene.cameras.iter().map(|camera| camera.name.as_str()).collect();
+            let there = if names.is_empty() { "the scene has none; leave --camera out".to_owned() } else { format!("must be one of {}", names.join(", ")) };
+            Error::setting("--camera", name, there)
+        }),
+        None => Ok(scene.cameras.first().cloned().unwrap_or_else(|| {
+            let (min, max) = scene.bounds();
+            Camera::around(min, max)
+        })),
+    }
+}

@@ -1,0 +1,90 @@
+//! Colour pictures: linear floats as EXR, or for the eye as PNG.
+
+use std::io::Cursor;
+
+use glam::Vec3;
+use image::codecs::openexr::OpenExrEncoder;
+use image::codecs::png::PngEncoder;
+use image::{ExtendedColorType, ImageEncoder};
+
+use super::image::Format;
+
+/// Row by row from the top, linear scene-referred values.
+#[derive(Debug, Clone, PartialEq)]
+pub struct ColourPicture {
+    pub width: u32,
+    pub height: u32,
+    pub pixels: Vec<Vec3>,
+}
+
+impl ColourPicture {
+    /// `stops` doubles the brightness of a PNG so many times; an EXR holds the values untouched.
+    pub fn encode(&self, format: Format, stops: f32) -> Vec<u8> {
+        let mut bytes = Cursor::new(Vec::new());
+        let (width, height) = (self.width, self.height);
+        match format {
+            Format::Exr => {
+                let values: Vec<f32> = self.pixels.iter().flat_map(|pixel| pixel.to_array()).collect();
+                OpenExrEncoder::new(&mut bytes).write_image(bytemuck::cast_slice(&values), width, height, ExtendedColorType::Rgb32F)
+            }
+            Format::Png => {
+                let codes: Vec<u8> = self.pixels.iter().flat_map(|pixel| (*pixel * stops.exp2()).to_array().map(srgb_code)).collect();
+                PngEncoder::new(&mut bytes).write_image(&codes, width, height, ExtendedColorType::Rgb8)
+            }
+        }
+        .expect("a picture in memory can be encoded");
+        bytes.into_inner()
+    }
+
+    /// Stops that bring the mean luminance of what is not brighter than ten times the median to a
+    /// middle grey of 0.18.
+    pub fn usual_exposure(&self) -> f32 {
+        let mut luminances: Vec<f32> = self.pixels.iter().map(|pixel| luminance(*pixel)).filter(|luminance| *luminance > 0.0).collect();
+        if luminances.is_empty() {
+            return 0.0;
+        }
+        luminances.sort_by(f32::total_cmp);
+        let median = luminances[luminances.len() / 2];
+        let usual: Vec<f64> = luminances.iter().filter(|luminance| **luminance <= 10.0 * median).map(|luminance| f64::from(*luminance)).collect();
+        let mean = usual.iter().sum::<f64>() / usual.len() as f64;
+        (0.18 / mean).log2() as f32
+    }
+}
+
+fn luminance(colour: Vec3) -> f32 {
+    colour.dot(Vec3::new(0.2126, 0.7152, 0.0722))
+}
+
+/// The sRGB transfer function (IEC 61966-2-1), from linear to 8-bit code.
+pub fn srgb_code(linear: f32) -> u8 {
+    let linear = linear.clamp(0.0, 1.0);
+    let encoded = if linear <= 0.003_130_8 { 12.92 * linear } else { 1.055 * linear.powf(1.0 / 2.4) - 0.055 };
+    (encoded * 255.0).round() as u8
+}
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+
+    #[test]
+    fn codes_meet_the_standard() {
+        assert_eq!([0.0, 1.0, 2.0, 0.5, 0.18].map(srgb_code), [0, 255, 255, 188, 118]);
+        assert_eq!(srgb_code(f32::NAN), 0);
+    }
+
+    #[test]
+    fn exr_values_come_back_untouched() {
+        let pixels = vec![Vec3::new(0.0, 1e-6, 12345.678), Vec3::splat(3.0)];
+        let picture = ColourPicture { width: 2, height: 1, pixels: pixels.clone() };
+        let read = image::load_from_memory(&picture.encode(Format::Exr, 5.0)).unwrap().into_rgb32f();
+        let values: Vec<f32> = pixels.iter().flat_map(|pixel| pixel.to_array()).collect();
+        assert_eq!(read.into_raw(), values);
+    }
+
+    #[test]
+    fn usual_exposure_brings_a_grey_wall_to_the_middle() {
+        let picture = ColourPicture { width: 10, height: 1, pixels: [vec![Vec3::splat(4.0); 9], vec![Vec3::splat(1e6)]].concat() };
+        assert!((4.0 * picture.usual_exposure().exp2() - 0.18).abs() < 1e-5);
+        assert_eq!(ColourPicture { width: 1, height: 1, pixels: vec![Vec3::ZERO] }.usual_exposure(), 0.0);
+    }
+}

@@ -1,0 +1,187 @@
+//! What lighting a scene says of itself: the plan as a table, timings, ledgers and error; JSON for
+//! programs.
+
+use std::fmt::Write;
+
+use serde::Serialize;
+
+use super::report::{ledger, timing_table};
+use crate::ledger::Ledger;
+use crate::plan::transport::{EffectDecision, MapPlan, TransportPlan};
+use crate::settings::transport::{Effect, TransportSettings};
+use crate::timings::{Row, Timings};
+use crate::transport::Lit;
+
+/// A row of the plan: what was decided, and after a run what it cost and gave.
+#[derive(Serialize)]
+pub struct EffectRow<'a> {
+    #[serde(flatten)]
+    decision: &'a EffectDecision,
+    /// GPU time of the passes that exist for this effect, ms; `None` where it shares its passes with
+    /// others, or nothing ran.
+    gpu_ms: Option<f64>,
+    /// Share of all light in the result; `None` where an effect is no part of its own.
+    share: Option<f64>,
+}
+
+/// The rows of a plan, with what a run measured.
+pub fn rows<'a>(plan: &'a TransportPlan, run: Option<(&Timings, &[u64])>) -> Vec<EffectRow<'a>> {
+    let pass = |name: &str| run.and_then(|(timings, _)| timings.row(name)).and_then(|row| row.gpu_ms);
+    let share = |part: usize| {
+        run.and_then(|(_, totals)| {
+            let all: f64 = totals.iter().map(|total| *total as f64).sum();
+            (all > 0.0).then(|| totals[part] as f64 / all)
+        })
+    };
+    plan.decisions
+        .iter()
+        .map(|decision| {
+            let (gpu_ms, share) = match decision.effect {
+                _ if !decision.kept => (None, None),
+                Effect::Direct => (pass("round/see"), share(0)),
+                Effect::SpecularChains => (None, share(1)),
+                Effect::ReflectiveCaustics | Effect::RefractiveCaustics => (pass("round/caustic"), share(2)),
+                Effect::Indirect => (pass("round/global"), share(3)),
+                _ => (None, None),
+            };
+            EffectRow { decision, gpu_ms, share }
+        })
+        .collect()
+}
+
+/// The plan as a table.
+pub fn plan_table(plan: &TransportPlan, run: Option<(&Timings, &[u64])>) -> String {
+    let mut text = String::new();
+    let rows = rows(plan, run);
+    write!(text, "{:<20} {:<8} {:>10} {:>12}", "effect", "", "photons", "bytes").unwrap();
+    if run.is_some() {
+        write!(text, " {:>9} {:>7}", "GPU ms", "light").unwrap();
+    }
+    text.push_str("  evidence\n");
+    let dash = || "-".to_owned();
+    let count = |value: u64| if value == 0 { dash() } else { value.to_string() };
+    for row in &rows {
+        let verb = if row.decision.kept { "kept" } else { "dropped" };
+        let decision = row.decision;
+        write!(text, "{:<20} {verb:<8} {:>10} {:>12}", decision.effect.name(), count(decision.photons), count(decision.bytes)).unwrap();
+        if run.is_some() {
+            let milliseconds = row.gpu_ms.map_or_else(dash, |value| format!("{value:.3}"));
+            let share = row.share.map_or_else(dash, |value| format!("{:.1} %", 100.0 * value));
+            write!(text, " {milliseconds:>9} {share:>7}").unwrap();
+        }
+        writeln!(text, "  {}", decision.evidence).unwrap();
+    }
+    let shared: Vec<&str> = rows
+        .iter()
+        .filter(|row| row.decision.kept && matches!(row.decision.effect, Effect::ReflectiveCaustics | Effect::RefractiveCaustics))
+        .map(|row| row.decision.effect.name())
+        .collect();
+    if shared.len() > 1 {
+        writeln!(text, "{} share one caustic map: its photons, bytes, time and light stand in both rows.", shared.join(" and ")).unwrap();
+    }
+    text
+}
+
+/// One line on effects that the scene needs and the user left out.
+pub fn missing(plan: &TransportPlan) -> Option<String> {
+    let names: Vec<&str> = plan.missing().iter().map(|effect| effect.name()).collect();
+    (!names.is_empty()).then(|| format!("left out, though the scene has it: {}; the result lacks that light", names.join(", ")))
+}
+
+/// The JSON report of a run.
+#[derive(Serialize)]
+struct Report<'a> {
+    photonmill: &'static str,
+    scene: &'a str,
+    device: &'a str,
+    driver: &'a str,
+    settings: &'a TransportSettings,
+    plan: PlanReport<'a>,
+    cancelled: bool,
+    rounds: u32,
+    /// Of the global map's photons and of the caustic map's.
+    ledgers: [Ledger; 2],
+    /// Root mean square of the standard errors over that of the values.
+    relative_error: f64,
+    anomalies: Anomalies,
+    timings: &'a [Row],
+    dispatches: u64,
+    submissions: u64,
+}
+
+#[derive(Serialize)]
+struct Anomalies {
+    not_a_number: u32,
+    cut_to_largest: u32,
+}
+
+#[derive(Serialize)]
+struct PlanReport<'a> {
+    effects: Vec<EffectRow<'a>>,
+    maps: Vec<&'a MapPlan>,
+    points_per_pixel: u32,
+    bytes: u64,
+}
+
+fn plan_report<'a>(plan: &'a TransportPlan, run: Option<(&Timings, &[u64])>) -> PlanReport<'a> {
+    PlanReport { effects: rows(plan, run), maps: plan.maps().collect(), points_per_pixel: plan.points_per_pixel, bytes: plan.bytes }
+}
+
+/// A plan as JSON.
+pub fn plan_json(plan: &TransportPlan) -> Vec<u8> {
+    serde_json::to_vec_pretty(&plan_report(plan, None)).expect("a plan is plain data")
+}
+
+/// A run as JSON.
+pub fn json(scene: &str, lit: &Lit) -> Vec<u8> {
+    let report = Report {
+        photonmill: env!("CARGO_PKG_VERSION"),
+        scene,
+        device: &lit.device.name,
+        driver: &lit.device.driver,
+        settings: &lit.plan.settings,
+        plan: plan_report(&lit.plan, Some((&lit.timings, &lit.part_totals))),
+        cancelled: lit.cancelled,
+        rounds: lit.film.rounds,
+        ledgers: [lit.fates[0].ledger(), lit.fates[1].ledger()],
+        relative_error: lit.film.relative_error(&lit.plan),
+        anomalies: Anomalies { not_a_number: lit.anomalies[0], cut_to_largest: lit.anomalies[1] },
+        timings: lit.timings.rows(),
+        dispatches: lit.dispatches,
+        submissions: lit.submissions,
+    };
+    serde_json::to_vec_pretty(&report).expect("a report is plain data")
+}
+
+/// A run in words.
+pub fn text(scene: &str, lit: &Lit, explain: bool) -> String {
+    let mut text = String::new();
+    let settings = &lit.plan.settings;
+    writeln!(text, "{}, {}", lit.device.name, lit.device.driver).unwrap();
+    let maps: Vec<String> = lit.plan.maps().map(|map| format!("{} {} photons", map.photons, map.name)).collect();
+    let maps = if maps.is_empty() { "no photons".to_owned() } else { maps.join(" and ") };
+    writeln!(text, "{scene}: {} round(s) of {maps}, {} bounces, seed {}", lit.film.rounds, settings.bounces, settings.seed).unwrap();
+    if explain {
+        writeln!(text, "\n{}", plan_table(&lit.plan, Some((&lit.timings, &lit.part_totals)))).unwrap();
+    }
+    if let Some(line) = missing(&lit.plan) {
+        writeln!(text, "{line}").unwrap();
+    }
+    for map in lit.plan.maps() {
+        let fates = &lit.fates[usize::from(map.caustic_only)];
+        write!(text, "{} {}", map.name, ledger(&fates.ledger())).unwrap();
+    }
+    if lit.anomalies[0] > 0 {
+        writeln!(text, "warning: {} value(s) were no number and count as 0", lit.anomalies[0]).unwrap();
+    }
+    if lit.anomalies[1] > 0 {
+        writeln!(text, "warning: {} value(s) were larger than a pixel can hold and were cut", lit.anomalies[1]).unwrap();
+    }
+    match lit.film.rounds {
+        1 => text.push_str("noise: unknown from a single round\n"),
+        _ => writeln!(text, "noise: {:.2} % of the result's root mean square", 100.0 * lit.film.relative_error(&lit.plan)).unwrap(),
+    }
+    text.push('\n');
+    text.push_str(&timing_table(&lit.timings, Some(&lit.device)));
+    text
+}

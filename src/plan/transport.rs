@@ -1,0 +1,524 @@
+//! What lighting a scene of triangles will do: which effects are kept and why, which maps are traced with
+//! how many photons, the schedule of radii, and the size of every buffer.
+
+use std::f64::consts::PI;
+
+use serde::Serialize;
+
+use super::Limits;
+use crate::constants::*;
+use crate::error::{Error, Result};
+use crate::records::*;
+use crate::scene::geometry::Geometry;
+use crate::scene::{Material, Scene, Surface};
+use crate::settings::transport::{Effect, Illumination, Part, TransportSettings};
+
+/// One effect, kept or dropped, with the evidence.
+#[derive(Debug, Clone, PartialEq, Eq, Serialize)]
+pub struct EffectDecision {
+    pub effect: Effect,
+    pub kept: bool,
+    /// What the scene and the request say, whatever was forced.
+    pub needed: bool,
+    pub evidence: String,
+    /// Photons of a round that are traced for it.
+    pub photons: u64,
+    /// Device memory that exists for it alone.
+    pub bytes: u64,
+}
+
+/// What light is asked of.
+#[derive(Debug, Clone, Copy, PartialEq, Eq, Serialize)]
+#[serde(rename_all = "lowercase")]
+pub enum Sensor {
+    /// A camera's picture.
+    Picture { width: u32, height: u32 },
+    /// Irradiance at points; of a phase's many points one set is asked each round.
+    Receivers { count: u32 },
+}
+
+impl Sensor {
+    pub fn pixels(self) -> u32 {
+        match self {
+            Sensor::Picture { width, height } => width * height,
+            Sensor::Receivers { count } => count,
+        }
+    }
+}
+
+/// A photon map of each round.
+#[derive(Debug, Clone, PartialEq, Serialize)]
+pub struct MapPlan {
+    pub name: &'static str,
+    pub domain: u32,
+    /// Photons of a round.
+    pub photons: u32,
+    /// Photons traced at once, and entries that the map of those can have.
+    pub chunk_photons: u32,
+    pub capacity: u32,
+    pub bounces: u32,
+    /// Mask of the arrivals that are stored.
+    pub stored: u32,
+    /// Photons end where they scatter.
+    pub caustic_only: bool,
+    pub bucket_count: u32,
+    /// Of the first round, normalised.
+    pub radius: f64,
+}
+
+impl MapPlan {
+    /// (first photon, count) of each chunk.
+    pub fn chunks(&self) -> impl Iterator<Item = (u32, u32)> + use<> {
+        let (photons, step) = (self.photons, self.chunk_photons);
+        (0..photons.div_ceil(step)).map(move |chunk| (chunk * step, step.min(photons - chunk * step)))
+    }
+}
+
+#[derive(Debug, Clone, PartialEq)]
+pub struct TransportPlan {
+    pub settings: TransportSettings,
+    pub sensor: Sensor,
+    pub decisions: Vec<EffectDecision>,
+    /// Specialization constants of all kernels.
+    pub constants: Vec<(&'static str, u32)>,
+    pub global: Option<MapPlan>,
+    pub caustic: Option<MapPlan>,
+    /// Mask of `SURFACE_...` whose caustics are wanted.
+    pub caustic_surfaces: u32,
+    pub points_per_pixel: u32,
+    /// Sets of sums a visible point has, one an arrival.
+    pub arrival_sets: u32,
+    /// Mask of the arrivals that some map holds.
+    pub arrivals: u32,
+    /// Film units in 1 W/m2/sr or W/m2, a power of two, and the most that one round may add.
+    pub film_scale: f64,
+    pub film_limit: f64,
+    /// Rays or pair tests after which commands are handed to the device.
+    pub work_per_submission: u64,
+    /// Bytes of all buffers.
+    pub bytes: u64,
+}
+
+/// Triangles up to which a list is tested from end to end instead of a tree.
+const LIST_TRIANGLES: usize = 24;
+/// Photons within the first radius of the global map, on average.
+const PHOTONS_PER_ESTIMATE: f64 = 60.0;
+/// A caustic's photons lie closer: its radius over that of as many photons spread over everything.
+const CAUSTIC_RADIUS_SHARE: f64 = 0.25;
+/// Radii relative to the scene's normalised extent: from f32's resolution of positions up to all of it.
+const RADIUS_RANGE: (f64, f64) = (1.0 / 32_768.0, 2.0);
+/// Bits of a film unit below the scene's mean radiance.
+const FILM_BITS: i32 = 24;
+/// Bytes of a pixel on the film: sums and squares of three channels.
+const FILM_PIXEL_BYTES: u64 = 3 * 8 + 3 * 16;
+/// Work of a ray, in pair tests.
+const RAY_COST: u64 = 64;
+
+impl TransportPlan {
+    pub fn new(scene: &Scene, geometry: &Geometry, settings: &TransportSettings, sensor: Sensor, limits: &Limits) -> Result<TransportPlan> {
+        settings.validate()?;
+        let facts = Facts::new(scene, geometry, settings, sensor);
+        let mut decisions: Vec<EffectDecision> = Effect::ALL.iter().map(|effect| facts.decide(*effect, settings)).collect();
+        let keeps = |effect: Effect| decisions.iter().any(|decision| decision.effect == effect && decision.kept);
+
+        let split = settings.illumination == Illumination::Split;
+        let caustic_surfaces = (u32::from(keeps(Effect::ReflectiveCaustics)) << SURFACE_MIRROR)
+            | (u32::from(keeps(Effect::RefractiveCaustics)) << SURFACE_DIELECTRIC);
+        let caustics = caustic_surfaces != 0;
+        let stored = [
+            (keeps(Effect::Direct) && !split, ARRIVED_DIRECT),
+            (caustics && !split, ARRIVED_CAUSTIC),
+            (keeps(Effect::Indirect), ARRIVED_INDIRECT),
+        ]
+        .iter()
+        .map(|(kept, arrival)| if *kept { *arrival } else { 0 })
+        .sum::<u32>();
+
+        let map = |name, domain, photons: u32, stored, caustic_only: bool, radius: Option<f64>, option| -> Result<MapPlan> {
+            let share = if caustic_only { CAUSTIC_RADIUS_SHARE } else { 1.0 };
+            let usual = (PHOTONS_PER_ESTIMATE * geometry.area / (PI * 2.0 * f64::from(photons))).sqrt() * share;
+            let radius = match radius {
+                None => usual.clamp(RADIUS_RANGE.0, 0.125),
+                Some(metres) => {
+                    let (least, most) = (RADIUS_RANGE.0 * geometry.unit, RADIUS_RANGE.1 * geometry.unit);
+                    if !(least..=most).contains(&metres) {
+                        return Err(Error::setting(option, metres, format!("must be from {least:e} to {most} metres in this scene")));
+                    }
+                    metres / geometry.unit
+                }
+            };
+            // Photons of a pass land once at every bounce at most; a caustic's only once.
+            let landings = if caustic_only { 1 } else { u64::from(settings.bounces) };
+            let chunk_photons = chunk_photons(photons, landings, settings, limits)?;
+            let capacity = chunk_photons * landings as u32;
+            Ok(MapPlan {
+                name,
+                domain,
+                photons,
+                chunk_photons,
+                capacity,
+                bounces: settings.bounces,
+                stored,
+                caustic_only,
+                bucket_count: (chunk_photons * 2).clamp(1 << 10, 1 << 24).next_power_of_two().min(1 << 24),
+                radius,
+            })
+        };
+        // Without a light there is nothing to trace.
+        let shines = !geometry.emitters.is_empty();
+        let global = (shines && stored != 0)
+            .then(|| map("global", DOMAIN_PHOTONS, settings.photons, stored, false, settings.radius, "--radius"))
+            .transpose()?;
+        let caustic = (shines && split && caustics)
+            .then(|| {
+                let radius = settings.caustic_radius;
+                map("caustic", DOMAIN_CAUSTIC_PHOTONS, settings.caustic_photons, ARRIVED_CAUSTIC, true, radius, "--caustic-radius")
+            })
+            .transpose()?;
+        let arrivals = stored | if caustic.is_some() { ARRIVED_CAUSTIC } else { 0 };
+
+        let indirect = keeps(Effect::Indirect);
+        let gather_rays = match (indirect, settings.final_gather, keeps(Effect::Glossy)) {
+            (true, true, _) => GATHER_ALL,
+            (true, false, true) if split => GATHER_GLOSSY,
+            _ => GATHER_NONE,
+        };
+        let points_per_pixel = if gather_rays == GATHER_NONE { 1 } else { 2 };
+        let arrival_sets = if split { 2 } else { 3 };
+        let flag = |effect: Effect| u32::from(keeps(effect));
+        let shadow_rays = if split && keeps(Effect::Direct) { settings.shadow_rays } else { 0 };
+        let constants = vec![
+            ("HAS_BVH", flag(Effect::Bvh)),
+            ("HAS_SMOOTH_NORMALS", flag(Effect::SmoothNormals)),
+            ("HAS_TEXTURES", flag(Effect::Textures)),
+            ("HAS_TWO_SIDED", flag(Effect::TwoSided)),
+            ("HAS_GLOSSY", flag(Effect::Glossy)),
+            ("HAS_MIRROR", u32::from(facts.has(|surface| surface == Surface::Mirror) || settings.forces(Effect::SpecularChains))),
+            (
+                "HAS_DIELECTRIC",
+                u32::from(facts.has(|surface| matches!(surface, Surface::Dielectric { .. })) || settings.forces(Effect::SpecularChains)),
+            ),
+            ("HAS_PAPER_PHONG", u32::from(facts.has(|surface| matches!(surface, Surface::PaperPhong { .. })))),
+            ("HAS_TRIANGLE_LIGHTS", flag(Effect::MeshLights)),
+            ("HAS_POINT_LIGHTS", flag(Effect::PointLights)),
+            ("HAS_SPOT_LIGHTS", flag(Effect::SpotLights)),
+            ("HAS_DIRECTIONAL_LIGHTS", flag(Effect::DirectionalLights)),
+            ("HAS_DISC_LIGHTS", flag(Effect::DiscLights)),
+            ("HAS_ENVIRONMENT", flag(Effect::Environment)),
+            ("SHADOW_RAYS", shadow_rays),
+            ("KERNEL", settings.kernel.code()),
+            ("HAS_EDGE_CORRECTION", u32::from(settings.edge_correction)),
+            ("HAS_CAUSTIC_MAP", u32::from(caustic.is_some())),
+            ("HAS_ALL_ARRIVALS", u32::from(!split)),
+            ("GATHER_RAYS", gather_rays),
+            ("PARTS", settings.part.mask()),
+            ("FILTER", settings.filter.code()),
+            ("HAS_SPECULAR_CHAINS", flag(Effect::SpecularChains)),
+        ];
+
+        let mut plan = TransportPlan {
+            settings: settings.clone(),
+            sensor,
+            decisions: Vec::new(),
+            constants,
+            global,
+            caustic,
+            caustic_surfaces,
+            points_per_pixel,
+            arrival_sets,
+            arrivals,
+            film_scale: 1.0,
+            film_limit: 1.0,
+            work_per_submission: limits.pair_tests_per_submission,
+            bytes: 0,
+        };
+        plan.set_film(geometry);
+        plan.check_sizes(geometry, limits)?;
+        for decision in &mut decisions {
+            plan.give(decision, geometry);
+        }
+        plan.decisions = decisions;
+        Ok(plan)
+    }
+
+    pub fn keeps(&self, effect: Effect) -> bool {
+        self.decisions.iter().any(|decision| decision.effect == effect && decision.kept)
+    }
+
+    pub fn maps(&self) -> impl Iterator<Item = &MapPlan> {
+        self.global.iter().chain(&self.caustic)
+    }
+
+    /// Radius of a map in a round, normalised: r_(i+1)^2 = r_i^2 (i + alpha) / (i + 1) with i from 1
+    /// (Knaus and Zwicker 2011, equation 15).
+    pub fn radius(&self, map: &MapPlan, round: u32) -> f64 {
+        let alpha = self.settings.alpha;
+        if alpha == 1.0 {
+            return map.radius;
+        }
+        let log: f64 = (1..=round).map(|i| ((f64::from(i) + alpha) / (f64::from(i) + 1.0)).ln()).sum();
+        (map.radius * (0.5 * log).exp()).max(RADIUS_RANGE.0)
+    }
+
+    pub fn visible_points(&self) -> u32 {
+        self.sensor.pixels() * self.points_per_pixel
+    }
+
+    /// Pixels of one dispatch that casts `rays` rays each.
+    pub fn pixels_at_once(&self, rays: u32) -> u32 {
+        (self.work_per_submission / (RAY_COST * u64::from(rays.max(1)))).clamp(1 << 12, 1 << 22) as u32
+    }
+
+    /// Rays of one pixel, roughly.
+    pub fn rays_per_pixel(&self) -> u32 {
+        let vertices = self.points_per_pixel;
+        vertices * (1 + self.constant("SHADOW_RAYS"))
+    }
+
+    pub fn constant(&self, name: &str) -> u32 {
+        self.constants.iter().find(|(known, _)| *known == name).map_or(0, |(_, value)| *value)
+    }
+
+    /// A unit far below the scene's mean radiance, and sums that cannot overflow.
+    fn set_film(&mut self, geometry: &Geometry) {
+        let mean = (geometry.power / 3.0 / (PI * geometry.area)).max(f64::MIN_POSITIVE);
+        let limit = 2f64.powi(62) / f64::from(self.settings.rounds);
+        let by_mean = FILM_BITS - mean.log2().floor() as i32;
+        // A picture of a lamp may be far above the mean.
+        let brightest = 4.0 * geometry.brightest().max(mean);
+        let by_brightest = (limit / brightest).log2().floor() as i32;
+        self.film_scale = 2f64.powi(by_mean.min(by_brightest).clamp(-126, 126));
+        self.film_limit = limit;
+    }
+
+    fn check_sizes(&mut self, geometry: &Geometry, limits: &Limits) -> Result<()> {
+        let pixels = u64::from(self.sensor.pixels());
+        let points = u64::from(self.visible_points());
+        let film = [
+            ("the film", 48 * pixels),
+            ("visible points", points * size_of::<VisiblePoint>() as u64),
+            ("estimates", points * u64::from(self.arrival_sets) * 24),
+        ];
+        let scene = [
+            ("triangles", size_of_val(geometry.triangles.as_slice()) as u64),
+            ("the triangles' texture coordinates", size_of_val(geometry.uvs.as_slice()) as u64),
+            ("the triangles' hierarchy", size_of_val(geometry.nodes.as_slice()) as u64),
+            ("textures", size_of_val(geometry.texels.as_slice()) as u64),
+            ("emitters", size_of_val(geometry.emitters.as_slice()) as u64),
+        ];
+        let too_large = |(_, bytes): &&(&'static str, u64)| *bytes > limits.buffer_bytes;
+        if let Some((what, bytes)) = scene.iter().find(too_large) {
+            let allowed = format!("its {what} take {bytes} bytes, the device's buffers hold {}; choose another --device", limits.buffer_bytes);
+            return Err(Error::setting("SCENE", format!("({} triangles)", geometry.triangles.len()), allowed));
+        }
+        if film.iter().any(|(_, bytes)| *bytes > limits.buffer_bytes) {
+            let per_pixel = film.iter().map(|(_, bytes)| bytes / pixels).max().unwrap_or(1);
+            let most = limits.buffer_bytes / per_pixel;
+            return Err(match self.sensor {
+                Sensor::Picture { width, height } => Error::setting(
+                    "--size",
+                    format!("{width}x{height}"),
+                    format!("has {pixels} pixels, the device's buffers hold {most}; ask for a smaller picture"),
+                ),
+                Sensor::Receivers { count } => {
+                    Error::setting("points", count, format!("are too many, the device's buffers hold {most} at once; ask for fewer"))
+                }
+            });
+        }
+        let maps: u64 = self
+            .maps()
+            .map(|map| {
+                u64::from(map.capacity) * 2 * size_of::<MapPhoton>() as u64
+                    + u64::from(map.chunk_photons) * 2 * size_of::<LightPath>() as u64
+                    + u64::from(map.bucket_count) * 4
+            })
+            .sum();
+        self.bytes = maps + pixels * (FILM_PIXEL_BYTES + 24) + film[1].1 + film[2].1 + scene.iter().map(|(_, bytes)| bytes).sum::<u64>();
+        if self.bytes > limits.memory_bytes {
+            return Err(Error::setting(
+                "--chunk",
+                self.settings.chunk.map_or("(default)".into(), |chunk| chunk.to_string()),
+                format!(
+                    "the run takes {} bytes of memory and the device has {}; ask for smaller chunks or a smaller picture",
+                    self.bytes, limits.memory_bytes
+                ),
+            ));
+        }
+        Ok(())
+    }
+
+    /// Photons and bytes that exist for one effect.
+    fn give(&self, decision: &mut EffectDecision, geometry: &Geometry) {
+        if !decision.kept {
+            return;
+        }
+        let map_bytes = |map: &MapPlan| u64::from(map.capacity) * 2 * size_of::<MapPhoton>() as u64 + u64::from(map.bucket_count) * 4;
+        (decision.photons, decision.bytes) = match decision.effect {
+            Effect::Indirect => self.global.as_ref().map_or((0, 0), |map| (u64::from(map.photons), map_bytes(map))),
+            Effect::ReflectiveCaustics | Effect::RefractiveCaustics => {
+                self.caustic.as_ref().map_or((0, 0), |map| (u64::from(map.photons), map_bytes(map)))
+            }
+            Effect::Textures => (0, size_of_val(geometry.uvs.as_slice()) as u64 + size_of_val(geometry.texels.as_slice()) as u64),
+            Effect::SmoothNormals => (0, size_of_val(geometry.normals.as_slice()) as u64),
+            Effect::Bvh => (0, size_of_val(geometry.nodes.as_slice()) as u64),
+            _ => (0, 0),
+        };
+    }
+
+    /// Effects that the scene needs and the user left out.
+    pub fn missing(&self) -> Vec<Effect> {
+        self.decisions.iter().filter(|decision| decision.needed && !decision.kept).map(|decision| decision.effect).collect()
+    }
+}
+
+/// Photons traced at once, so that their map can never be full.
+fn chunk_photons(photons: u32, landings: u64, settings: &TransportSettings, limits: &Limits) -> Result<u32> {
+    let (path, photon) = (size_of::<LightPath>() as u64, size_of::<MapPhoton>() as u64);
+    let by_buffer = (limits.buffer_bytes / path).min(limits.buffer_bytes / (photon * landings));
+    // Two maps of a chunk, sorted and unsorted, and its paths twice, with room for the film.
+    let by_memory = limits.memory_bytes / 2 / (4 * photon * landings + 4 * path);
+    let fits = by_buffer.min(by_memory).min(u64::from(u32::MAX) / landings);
+    if fits == 0 {
+        return Err(Error::setting(
+            "--bounces",
+            settings.bounces,
+            format!("one photon's map does not fit the device's buffers of {} bytes; ask for fewer bounces", limits.buffer_bytes),
+        ));
+    }
+    Ok(fits.min(settings.chunk.map_or(u64::MAX, u64::from)).min(u64::from(photons)) as u32)
+}
+
+/// What the scene holds and the request asks for.
+struct Facts<'a> {
+    materials: Vec<&'a Material>,
+    emitters: [usize; 7],
+    triangles: usize,
+    smooth: usize,
+    part: Part,
+    is_picture: bool,
+    split: bool,
+}
+
+impl<'a> Facts<'a> {
+    fn new(scene: &'a Scene, geometry: &Geometry, settings: &TransportSettings, sensor: Sensor) -> Facts<'a> {
+        let mut used = vec![false; scene.materials.len()];
+        geometry.triangles.iter().for_each(|triangle| used[triangle.material as usize] = true);
+        let mut emitters = [0; 7];
+        let shining = scene.meshes.iter().filter(|mesh| scene.materials[mesh.material].is_emissive());
+        emitters[EMITTER_TRIANGLE as usize] = shining.map(|mesh| mesh.triangles.len()).sum();
+        scene.lights.iter().for_each(|light| emitters[light.kind.code() as usize] += 1);
+        Facts {
+            materials: scene.materials.iter().zip(used).filter(|(_, used)| *used).map(|(material, _)| material).collect(),
+            emitters,
+            triangles: geometry.triangles.len(),
+            smooth: geometry.normals.iter().filter(|normals| normals.a != NONE).count(),
+            part: settings.part,
+            is_picture: matches!(sensor, Sensor::Picture { .. }),
+            split: settings.illumination == Illumination::Split,
+        }
+    }
+
+    fn has(&self, is: impl Fn(Surface) -> bool) -> bool {
+        self.materials.iter().any(|material| is(material.surface))
+    }
+
+    /// Names of the materials that `is` holds for, at most three of them.
+    fn named(&self, is: impl Fn(&Material) -> bool) -> Option<String> {
+        let names: Vec<&str> = self.materials.iter().filter(|material| is(material)).map(|material| material.name.as_str()).collect();
+        match names.as_slice() {
+            [] => None,
+            [first, second, _, _, ..] => Some(format!("{first}, {second} and {} more", names.len() - 2)),
+            few => Some(few.join(", ")),
+        }
+    }
+
+    fn decide(&self, effect: Effect, settings: &TransportSettings) -> EffectDecision {
+        let (needed, evidence) = self.evidence(effect);
+        let kept = (needed || settings.forces(effect)) && !settings.leaves_out(effect);
+        let evidence = match (needed, kept) {
+            (true, false) => format!("left out by --without, though needed: {evidence}"),
+            (false, true) => format!("forced by --with: {evidence}"),
+            _ => evidence,
+        };
+        EffectDecision { effect, kept, needed, evidence, photons: 0, bytes: 0 }
+    }
+
+    fn evidence(&self, effect: Effect) -> (bool, String) {
+        let lit = self.emitters.iter().sum::<usize>() > 0;
+        let wants = |part: Part| self.part == Part::All || self.part == part || (self.is_picture && self.part == Part::Specular);
+        let mirrors = self.named(|material| material.surface == Surface::Mirror);
+        let glass = self.named(|material| matches!(material.surface, Surface::Dielectric { .. }));
+        // Photons are of use where something scatters them to a sensor.
+        let receives = !self.is_picture || self.has(|surface| !surface.is_specular());
+        let lights = |kind: u32, what: &str| match self.emitters[kind as usize] {
+            0 => (false, format!("no {what} light")),
+            count => (true, format!("{count} {what} light(s)")),
+        };
+        let caustic = |found: &Option<String>, what: &str| match found {
+            None => (false, format!("no {what} material: no such caustic")),
+            Some(_) if !lit => (false, "nothing shines".into()),
+            Some(_) if !receives => (false, "no surface scatters light: nothing to see a caustic on".into()),
+            Some(_) if !(wants(Part::Caustic) || (self.part == Part::Indirect)) => (false, format!("only {:?} light was asked for", self.part).to_lowercase()),
+            Some(names) => (true, format!("{what}: {names}")),
+        };
+        match effect {
+            Effect::Direct if !lit => (false, "nothing shines".into()),
+            Effect::Direct if !receives => (false, "no surface scatters light".into()),
+            Effect::Direct if self.part == Part::Caustic => (false, "only caustics were asked for".into()),
+            Effect::Direct if self.part == Part::Indirect && self.split => (true, "indirect light of a gather ray has direct light at its end".into()),
+            Effect::Direct => (true, format!("{} light(s) reach surfaces that scatter", self.emitters.iter().sum::<usize>())),
+            Effect::Indirect if !lit => (false, "nothing shines".into()),
+            Effect::Indirect if !receives => (false, "no surface scatters light".into()),
+            Effect::Indirect if !wants(Part::Indirect) => (false, format!("only {:?} light was asked for", self.part).to_lowercase()),
+            Effect::Indirect => match self.named(|material| !material.surface.is_specular() && material.base_colour.max_element() > 0.0) {
+                Some(names) => (true, format!("scatter light: {names}")),
+                None => (false, "every surface that scatters is black".into()),
+            },
+            Effect::Glossy => match self.named(|material| matches!(material.surface, Surface::Glossy { .. })) {
+                Some(names) => (true, format!("glossy: {names}")),
+                None => (false, "no glossy material".into()),
+            },
+            Effect::ReflectiveCaustics => {
+                let both = match (&mirrors, &glass) {
+                    (Some(mirrors), _) => Some(mirrors.clone()),
+                    (None, _) => None,
+                };
+                caustic(&both, "mirror")
+            }
+            Effect::RefractiveCaustics => caustic(&glass, "dielectric"),
+            Effect::SpecularChains => {
+                let found = self.named(|material| material.surface.is_specular());
+                match found {
+                    None => (false, "no mirror and no dielectric material".into()),
+                    Some(names) => (true, format!("followed through: {names}")),
+                }
+            }
+            Effect::Textures => {
+                match self.named(|material| material.base_colour_texture.is_some() || material.emission_texture.is_some()) {
+                    Some(names) => (true, format!("textured: {names}")),
+                    None => (false, "no textured material".into()),
+                }
+            }
+            Effect::Environment => lights(EMITTER_ENVIRONMENT, "environment"),
+            Effect::MeshLights => match self.emitters[EMITTER_TRIANGLE as usize] {
+                0 => (false, "no triangle shines".into()),
+                count => (true, format!("{count} triangle(s) shine")),
+            },
+            Effect::PointLights => lights(EMITTER_POINT, "point"),
+            Effect::SpotLights => lights(EMITTER_SPOT, "spot"),
+            Effect::DirectionalLights => lights(EMITTER_DIRECTIONAL, "directional"),
+            Effect::DiscLights => match self.emitters[EMITTER_DISC_COSINE as usize] + self.emitters[EMITTER_DISC_UNIFORM as usize] {
+                0 => (false, "no disc light".into()),
+                count => (true, format!("{count} disc light(s)")),
+            },
+            Effect::Bvh if self.triangles <= LIST_TRIANGLES => (false, format!("{} triangles: a list is as fast", self.triangles)),
+            Effect::Bvh => (true, format!("{} triangles", self.triangles)),
+            Effect::TwoSided => match self.named(|material| material.two_sided) {
+                Some(names) => (true, format!("two-sided: {names}")),
+                None => (false, "every surface has one side".into()),
+            },
+            Effect::SmoothNormals if self.smooth == 0 => (false, "every triangle is flat".into()),
+            Effect::SmoothNormals => (true, format!("{} triangle(s) have smooth normals", self.smooth)),
+        }
+    }
+}

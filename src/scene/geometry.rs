@@ -1,0 +1,468 @@
+//! A scene as the kernels see it: triangles in the order of the BVH's leaves, materials, textures and
+//! emitters, as plain records.
+//!
+//! Lengths are normalised: `local = (world - centre) / unit` with `unit` a power of two, so that scaling a
+//! scene by a power of two changes no bit, and every coordinate lies within (-1, 1). Radiance and
+//! irradiance keep their units; a flux in W is divided by `unit`^2.
+
+use std::f64::consts::{PI, TAU};
+
+use glam::{DVec2, DVec3, UVec2, Vec2, Vec3};
+
+use super::bvh::Bvh;
+use super::light::LightKind;
+use super::texture::Wrap;
+use super::{Material, Mesh, Scene, Surface};
+use crate::constants::*;
+use crate::error::{Error, Result};
+use crate::records::{BvhNode, Emitter, SurfaceMaterial, TextureInfo, Triangle, TriangleNormals, TriangleUvs};
+use crate::settings::EmissionLaw;
+
+#[derive(Debug, Clone)]
+pub struct Geometry {
+    pub centre: DVec3,
+    /// Metres in a normalised length of 1.
+    pub unit: f64,
+    /// Lowest and highest corner, normalised.
+    pub bounds: (Vec3, Vec3),
+    /// Radius of a sphere around the middle that holds everything, normalised.
+    pub radius: f64,
+    /// Area of all triangles, normalised.
+    pub area: f64,
+    pub nodes: Vec<BvhNode>,
+    pub triangles: Vec<Triangle>,
+    /// For each triangle (mesh, triangle of the mesh).
+    pub sources: Vec<(u32, u32)>,
+    pub normals: Vec<TriangleNormals>,
+    pub uvs: Vec<TriangleUvs>,
+    pub materials: Vec<SurfaceMaterial>,
+    pub textures: Vec<TextureInfo>,
+    pub texels: Vec<UVec2>,
+    /// What shines, the environment last.
+    pub emitters: Vec<Emitter>,
+    /// W of a photon of relative flux 1 that stands for all light, over `unit`^2.
+    pub flux_unit: f64,
+    /// W of all emitters, all channels together, over `unit`^2.
+    pub power: f64,
+}
+
+/// Most triangles: their numbers and those of the BVH's nodes are 32-bit, and a photon's choice of
+/// emitter has 24 bits.
+const MAX_TRIANGLES: usize = 1 << 28;
+const MAX_EMITTERS: usize = 1 << 22;
+/// Values that a random choice of emitter can take.
+const CHOICES: u32 = 1 << 24;
+
+impl Geometry {
+    pub fn new(scene: &Scene) -> Result<Geometry> {
+        let refuse = |object: &str, reason: String| Error::Scene { path: (&scene.name).into(), object: object.into(), reason };
+        let count = scene.triangle_count();
+        if count == 0 {
+            return Err(refuse("the scene", "holds no triangle".into()));
+        }
+        if count > MAX_TRIANGLES {
+            return Err(refuse("the scene", format!("holds {count} triangles, at most {MAX_TRIANGLES} can be numbered")));
+        }
+        let (min, max) = scene.bounds();
+        let extent = (max - min).max_element();
+        if !(extent.is_normal() && extent < 1e30) {
+            return Err(refuse("the scene", format!("is {extent} metres wide; allowed is anything above 0 and below 1e30")));
+        }
+        let centre = 0.5 * (min + max);
+        let unit = 2f64.powi(extent.log2().ceil() as i32);
+        let local = |position: DVec3| ((position - centre) / unit).as_vec3();
+
+        let sources: Vec<(u32, u32)> = scene
+            .meshes
+            .iter()
+            .enumerate()
+            .flat_map(|(mesh, of)| (0..of.triangles.len() as u32).map(move |triangle| (mesh as u32, triangle)))
+            .collect();
+        let corners: Vec<[Vec3; 3]> =
+            sources.iter().map(|&(mesh, triangle)| scene.meshes[mesh as usize].corners(triangle as usize).map(local)).collect();
+        // What f32 makes a line of cannot be hit, and its normal would be no number.
+        let is_solid = |[a, b, c]: &[Vec3; 3]| (*b - *a).cross(*c - *a).length_squared() > 0.0;
+        let (sources, corners): (Vec<_>, Vec<_>) = sources.into_iter().zip(corners).filter(|(_, corners)| is_solid(corners)).unzip();
+        if corners.is_empty() {
+            return Err(refuse("the scene", "holds no triangle with an area".into()));
+        }
+        let Bvh { nodes, order } = Bvh::build(&corners)?;
+        let sources: Vec<(u32, u32)> = order.iter().map(|&place| sources[place as usize]).collect();
+        let triangles: Vec<Triangle> = order
+            .iter()
+            .zip(&sources)
+            .map(|(&place, &(mesh, _))| {
+                let [a, b, c] = corners[place as usize];
+                Triangle { a, b, c, material: scene.meshes[mesh as usize].material as u32 }
+            })
+            .collect();
+        let normals = sources.iter().map(|&(mesh, triangle)| corner_normals(&scene.meshes[mesh as usize], triangle as usize)).collect();
+        let uvs = sources
+            .iter()
+            .map(|&(mesh, triangle)| {
+                let mesh = &scene.meshes[mesh as usize];
+                corner_uvs(mesh, &scene.materials[mesh.material], triangle as usize)
+            })
+            .collect();
+        let (textures, texels) = pack_textures(scene);
+
+        let mut geometry = Geometry {
+            centre,
+            unit,
+            bounds: (local(min), local(max)),
+            radius: (0.5 * (max - min).length() / unit) * 1.001,
+            area: triangles.iter().map(|triangle| area(triangle)).sum(),
+            nodes,
+            triangles,
+            sources,
+            normals,
+            uvs,
+            materials: scene.materials.iter().map(material_record).collect(),
+            textures,
+            texels,
+            emitters: Vec::new(),
+            flux_unit: 1.0,
+            power: 0.0,
+        };
+        geometry.add_emitters(scene)?;
+        Ok(geometry)
+    }
+
+    pub fn to_local(&self, position: DVec3) -> Vec3 {
+        ((position - self.centre) / self.unit).as_vec3()
+    }
+
+    fn add_emitters(&mut self, scene: &Scene) -> Result<()> {
+        let mut found: Vec<Found> = Vec::new();
+        for (index, triangle) in self.triangles.iter().enumerate() {
+            let material = &scene.materials[triangle.material as usize];
+            if material.is_emissive() {
+                let sides = if material.two_sided { 2.0 } else { 1.0 };
+                let flux = PI * sides * area(triangle) * material.emission.as_dvec3();
+                let (mean, brightest) = match material.emission_texture {
+                    Some(texture) => texture_over(&scene.textures[texture.texture], &self.uvs[index]),
+                    None => (DVec3::ONE, 1.0),
+                };
+                let emitter = Emitter { kind: EMITTER_TRIANGLE, triangle: index as u32, strength: material.emission, ..Emitter::default() };
+                found.push(Found { emitter, flux, weight: (flux * mean).element_sum(), brightest });
+            }
+        }
+        // The environment comes last, where the kernels look for it.
+        let mut lights: Vec<&LightKind> = scene.lights.iter().map(|light| &light.kind).collect();
+        lights.sort_by_key(|kind| matches!(kind, LightKind::Environment { .. }));
+        found.extend(lights.into_iter().map(|kind| self.emitter_of(kind)));
+        found.retain(|found| found.weight > 0.0);
+        if found.len() > MAX_EMITTERS {
+            return Err(Error::Scene {
+                path: (&scene.name).into(),
+                object: "the scene".into(),
+                reason: format!("has {} triangles and lights that shine, at most {MAX_EMITTERS} can be chosen from", found.len()),
+            });
+        }
+        self.power = found.iter().map(|found| found.weight).sum();
+        let choices = choices(&found.iter().map(|found| found.weight / self.power).collect::<Vec<_>>());
+        let mut before = 0;
+        for (found, choices) in found.iter_mut().zip(&choices) {
+            found.emitter.probability = *choices as f32 / CHOICES as f32;
+            found.flux /= f64::from(found.emitter.probability);
+            before += choices;
+            found.emitter.cumulative = before as f32 / CHOICES as f32;
+        }
+        self.flux_unit = found.iter().map(|found| found.flux.max_element() * found.brightest).fold(0.0, f64::max);
+        if self.flux_unit == 0.0 {
+            self.flux_unit = 1.0;
+        }
+        self.emitters =
+            found.into_iter().map(|found| Emitter { flux: (found.flux / self.flux_unit).as_vec3(), ..found.emitter }).collect();
+        Ok(())
+    }
+
+    fn emitter_of(&self, kind: &LightKind) -> Found {
+        let area_unit = self.unit * self.unit;
+        let (emitter, flux) = match *kind {
+            LightKind::Point { position, intensity } => {
+                let strength = intensity.as_dvec3() / area_unit;
+                let emitter =
+                    Emitter { kind: EMITTER_POINT, position: self.to_local(position), strength: strength.as_vec3(), ..Emitter::default() };
+                (emitter, 2.0 * TAU * strength)
+            }
+            LightKind::Spot { position, direction, intensity, inner_angle, outer_angle } => {
+                let strength = intensity.as_dvec3() / area_unit;
+                let (inner, outer) = (f64::from(inner_angle).cos(), f64::from(outer_angle).cos());
+                let emitter = Emitter {
+                    kind: EMITTER_SPOT,
+                    position: self.to_local(position),
+                    direction: direction.as_vec3(),
+                    strength: strength.as_vec3(),
+                    size: inner as f32,
+                    cos_outer: outer as f32,
+                    ..Emitter::default()
+                };
+                // The square of a falloff that is linear in the cosine has a third of the ring's light.
+                (emitter, TAU * ((1.0 - inner) + (inner - outer) / 3.0) * strength)
+            }
+            LightKind::Directional { direction, irradiance } => {
+                let emitter = Emitter {
+                    kind: EMITTER_DIRECTIONAL,
+                    direction: direction.as_vec3(),
+                    strength: irradiance,
+                    ..Emitter::default()
+                };
+                (emitter, PI * self.radius * self.radius * irradiance.as_dvec3())
+            }
+            LightKind::Disc { centre, normal, radius, power, law } => {
+                let flux = power.as_dvec3() / area_unit;
+                let radius = radius / self.unit;
+                let disc = PI * radius * radius;
+                let (kind, strength) = match law {
+                    EmissionLaw::Cosine => (EMITTER_DISC_COSINE, flux / (PI * disc)),
+                    EmissionLaw::Uniform => (EMITTER_DISC_UNIFORM, flux / (TAU * disc)),
+                };
+                let emitter = Emitter {
+                    kind,
+                    position: self.to_local(centre),
+                    direction: normal.as_vec3(),
+                    strength: strength.as_vec3(),
+                    size: radius as f32,
+                    ..Emitter::default()
+                };
+                (emitter, flux)
+            }
+            LightKind::Environment { radiance } => {
+                let emitter = Emitter { kind: EMITTER_ENVIRONMENT, strength: radiance, ..Emitter::default() };
+                (emitter, 2.0 * TAU * PI * self.radius * self.radius * radiance.as_dvec3())
+            }
+        };
+        Found { emitter, flux, weight: flux.element_sum(), brightest: 1.0 }
+    }
+
+    /// Radiance of the brightest thing that a camera can see, W/m2/sr.
+    pub fn brightest(&self) -> f64 {
+        let shines = self.materials.iter().map(|material| material.emission);
+        let environment = self.emitters.iter().filter(|emitter| emitter.kind == EMITTER_ENVIRONMENT).map(|emitter| emitter.strength);
+        shines.chain(environment).map(|radiance| f64::from(radiance.max_element())).fold(0.0, f64::max)
+    }
+}
+
+/// An emitter before its probability is known.
+struct Found {
+    emitter: Emitter,
+    /// Per channel, texture left out.
+    flux: DVec3,
+    weight: f64,
+    /// Largest value of its texture.
+    brightest: f64,
+}
+
+/// Deals the choices of a random number to emitters by their share, at least one to each, so that the
+/// probability that a kernel divides by is the one with which it chose.
+fn choices(shares: &[f64]) -> Vec<u32> {
+    if shares.is_empty() {
+        return Vec::new();
+    }
+    let free = f64::from(CHOICES - shares.len() as u32);
+    let mut dealt = 0u32;
+    let mut sum = 0.0;
+    let mut choices: Vec<u32> = shares
+        .iter()
+        .map(|share| {
+            sum += share;
+            let until = (sum * free).round().min(free) as u32;
+            let own = until.saturating_sub(dealt);
+            dealt += own;
+            own + 1
+        })
+        .collect();
+    // What rounding of the shares' sum left over.
+    *choices.last_mut().expect("there is a share") += free as u32 - dealt;
+    choices
+}
+
+fn area(triangle: &Triangle) -> f64 {
+    let (a, b, c) = (triangle.a.as_dvec3(), triangle.b.as_dvec3(), triangle.c.as_dvec3());
+    0.5 * (b - a).cross(c - a).length()
+}
+
+/// Mean and largest value of a texture over a triangle. The mean only steers choices; a hundredth of the
+/// whole texture's is in it, so that what falls between the samples keeps its chance.
+fn texture_over(texture: &super::Texture, uvs: &TriangleUvs) -> (DVec3, f64) {
+    const STEPS: u32 = 8;
+    let [a, b, c] = [uvs.emission_a, uvs.emission_b, uvs.emission_c].map(Vec2::as_dvec2);
+    let mut sum = DVec3::ZERO;
+    for i in 0..STEPS {
+        for j in 0..STEPS {
+            let root = ((f64::from(i) + 0.5) / f64::from(STEPS)).sqrt();
+            let (u, v) = (root * (1.0 - (f64::from(j) + 0.5) / f64::from(STEPS)), root * (f64::from(j) + 0.5) / f64::from(STEPS));
+            sum += texture.sample(a + u * (b - a) + v * (c - a)).as_dvec3();
+        }
+    }
+    let whole: DVec3 = texture.texels.iter().map(|texel| texel.as_dvec3()).sum::<DVec3>() / texture.texels.len() as f64;
+    let brightest = texture.texels.iter().map(|texel| texel.max_element()).fold(0.0, f32::max);
+    (0.99 * sum / f64::from(STEPS * STEPS) + 0.01 * whole, f64::from(brightest))
+}
+
+fn corner_normals(mesh: &Mesh, triangle: usize) -> TriangleNormals {
+    let flat = TriangleNormals { a: NONE, b: NONE, c: NONE };
+    if mesh.normals.is_empty() {
+        return flat;
+    }
+    let normals = mesh.triangles[triangle].map(|vertex| mesh.normals[vertex as usize]);
+    // Normals that are all the triangle's own are no smooth shading.
+    let own = mesh.normal(triangle);
+    if normals.iter().any(|normal| normal.length_squared() < 0.25) || normals.iter().all(|normal| normal.dot(own) > 1.0 - 1e-9) {
+        return flat;
+    }
+    let [a, b, c] = normals.map(|normal| pack_normal(normal.as_vec3()));
+    TriangleNormals { a, b, c }
+}
+
+fn corner_uvs(mesh: &Mesh, material: &Material, triangle: usize) -> TriangleUvs {
+    let of_set = |set: Option<usize>| -> [Vec2; 3] {
+        match set {
+            Some(set) if !mesh.uvs[set].is_empty() => {
+                // Whole turns mean nothing and would cost digits.
+                let uvs = mesh.triangles[triangle].map(|vertex| mesh.uvs[set][vertex as usize]);
+                let base: DVec2 = uvs[0].floor() - uvs[0].floor() % 2.0;
+                uvs.map(|uv| (uv - if base.abs().max_element() > 64.0 { base } else { DVec2::ZERO }).as_vec2())
+            }
+            _ => [Vec2::ZERO; 3],
+        }
+    };
+    let [base_a, base_b, base_c] = of_set(material.base_colour_texture.map(|texture| texture.uv_set));
+    let [emission_a, emission_b, emission_c] = of_set(material.emission_texture.map(|texture| texture.uv_set));
+    TriangleUvs { base_a, base_b, base_c, emission_a, emission_b, emission_c }
+}
+
+fn material_record(material: &Material) -> SurfaceMaterial {
+    let (surface, parameter) = match material.surface {
+        Surface::Lambert => (SURFACE_LAMBERT, 0.0),
+        Surface::PaperPhong { exponent } => (SURFACE_PAPER_PHONG, exponent),
+        Surface::Glossy { exponent } => (SURFACE_GLOSSY, exponent),
+        Surface::Mirror => (SURFACE_MIRROR, 0.0),
+        Surface::Dielectric { ior } => (SURFACE_DIELECTRIC, ior),
+    };
+    SurfaceMaterial {
+        base_colour: material.base_colour,
+        surface,
+        emission: material.emission,
+        parameter,
+        base_texture: material.base_colour_texture.map_or(NONE, |texture| texture.texture as u32),
+        emission_texture: material.emission_texture.map_or(NONE, |texture| texture.texture as u32),
+        two_sided: u32::from(material.two_sided),
+    }
+}
+
+/// Textures that a material uses, as half floats.
+fn pack_textures(scene: &Scene) -> (Vec<TextureInfo>, Vec<UVec2>) {
+    let mut texels = Vec::new();
+    let infos = scene
+        .textures
+        .iter()
+        .enumerate()
+        .map(|(index, texture)| {
+            let uses = |of: Option<super::material::TextureUse>| of.is_some_and(|of| of.texture == index);
+            let first_texel = texels.len() as u32;
+            if scene.materials.iter().any(|material| uses(material.base_colour_texture) || uses(material.emission_texture)) {
+                texels.extend(texture.texels.iter().map(|texel| {
+                    let half = |value: f32| u32::from(half::f16::from_f32(value).to_bits());
+                    UVec2::new(half(texel.x) | half(texel.y) << 16, half(texel.z))
+                }));
+            }
+            let code = |wrap: Wrap| match wrap {
+                Wrap::Repeat => 0,
+                Wrap::MirroredRepeat => 1,
+                Wrap::Clamp => 2,
+            };
+            TextureInfo {
+                width: texture.width,
+                height: texture.height,
+                first_texel,
+                wrap: code(texture.wrap[0]) | code(texture.wrap[1]) << 2,
+            }
+        })
+        .collect();
+    (infos, texels)
+}
+
+/// A unit vector in 2 x 16 bits (Cigolle et al. 2014). Twin of `glsl/scene/directions.glsl`.
+pub fn pack_normal(n: Vec3) -> u32 {
+    let sign = |x: f32| if x >= 0.0 { 1.0 } else { -1.0 };
+    let flat = Vec2::new(n.x, n.y) / (n.x.abs() + n.y.abs() + n.z.abs());
+    let folded = if n.z >= 0.0 { flat } else { (1.0 - flat.yx().abs()) * Vec2::new(sign(flat.x), sign(flat.y)) };
+    let code = |x: f32| ((x.clamp(-1.0, 1.0) * 32767.0).round_ties_even() + 32767.0) as u32;
+    code(folded.x) | code(folded.y) << 16
+}
+
+/// What [`pack_normal`] packed.
+pub fn unpack_normal(code: u32) -> Vec3 {
+    let o = Vec2::new((code & 0xffff) as f32 - 32767.0, (code >> 16) as f32 - 32767.0) / 32767.0;
+    let sign = |x: f32| if x >= 0.0 { 1.0 } else { -1.0 };
+    let z = 1.0 - o.x.abs() - o.y.abs();
+    let flat = if z >= 0.0 { o } else { (1.0 - o.yx().abs()) * Vec2::new(sign(o.x), sign(o.y)) };
+    flat.extend(z).normalize()
+}
+
+use glam::Vec2Swizzles as _;
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+    use crate::scene::built_in;
+
+    #[test]
+    fn normals_survive_packing() {
+        for code in 0..10_000u32 {
+            let z = 1.0 - (code as f32 + 0.5) / 5000.0;
+            let azimuth = code as f32 * 2.399_963;
+            let flat = (1.0 - z * z).sqrt();
+            let n = Vec3::new(flat * azimuth.cos(), flat * azimuth.sin(), z);
+            let error = unpack_normal(pack_normal(n)).angle_between(n);
+            assert!(error < 4e-4, "{n}: {error}");
+        }
+        for axis in [Vec3::X, Vec3::Y, Vec3::Z] {
+            assert_eq!(unpack_normal(pack_normal(axis)), axis);
+            assert_eq!(unpack_normal(pack_normal(-axis)), -axis);
+        }
+    }
+
+    #[test]
+    fn choices_follow_the_shares_and_leave_none_out() {
+        let mut shares = vec![1e-12; 1000];
+        shares.push(0.25);
+        shares.push(0.75 - 1e-9);
+        let dealt = choices(&shares);
+        assert_eq!(dealt.iter().map(|choices| u64::from(*choices)).sum::<u64>(), u64::from(CHOICES));
+        assert!(dealt.iter().all(|choices| *choices >= 1));
+        assert!((f64::from(dealt[1000]) / f64::from(CHOICES) - 0.25).abs() < 1e-4);
+        assert!(choices(&[]).is_empty());
+        assert_eq!(choices(&[1.0]), [CHOICES]);
+    }
+
+    /// Moved and scaled by powers of two, a scene gives the same records.
+    #[test]
+    fn powers_of_two_change_no_bit() {
+        let scene = built_in::by_name("cornell").unwrap();
+        let reference = Geometry::new(&scene).unwrap();
+        for k in [-20, -3, 1, 20] {
+            let mut scaled = scene.clone();
+            scaled.meshes.iter_mut().flat_map(|mesh| &mut mesh.positions).for_each(|position| *position *= 2f64.powi(k));
+            let geometry = Geometry::new(&scaled).unwrap();
+            assert_eq!(geometry.triangles, reference.triangles);
+            assert_eq!(geometry.nodes, reference.nodes);
+            assert_eq!(geometry.emitters, reference.emitters);
+        }
+    }
+
+    #[test]
+    fn emitters_hold_all_power() {
+        let scene = built_in::by_name("cornell").unwrap();
+        let geometry = Geometry::new(&scene).unwrap();
+        let watts = geometry.power * geometry.unit * geometry.unit;
+        let exact = PI * 0.09 * (17.0 + 12.0 + 4.0);
+        assert!((watts / exact - 1.0).abs() < 1e-5, "{watts} W, {exact} W");
+        // Every photon of these two equal triangles carries the same.
+        assert_eq!(geometry.emitters.len(), 2);
+        assert!(geometry.emitters.iter().all(|emitter| (emitter.flux.max_element() - 1.0).abs() < 1e-6));
+        assert_eq!(geometry.emitters[1].cumulative, 1.0);
+    }
+}

@@ -1,0 +1,270 @@
+//! What lighting a scene of triangles is asked to do.
+
+use serde::Serialize;
+
+use super::within;
+use crate::constants;
+use crate::error::{Error, Result};
+
+/// Where direct light and caustics come from.
+#[derive(Debug, Clone, Copy, PartialEq, Eq, Serialize)]
+#[serde(rename_all = "lowercase")]
+pub enum Illumination {
+    /// Direct light by shadow rays, caustics from a map of their own, the rest from the global map
+    /// (Jensen 1996).
+    Split,
+    /// Everything from one photon map, as the paper has it.
+    Photons,
+}
+
+/// Parts of a picture.
+#[derive(Debug, Clone, Copy, PartialEq, Eq, Serialize)]
+#[serde(rename_all = "lowercase")]
+pub enum Part {
+    All,
+    /// Light that comes straight from a lamp to what the camera sees, and lamps themselves.
+    Direct,
+    /// Whatever is seen in mirrors and through glass.
+    Specular,
+    /// Light that reached what the camera sees over mirrors and glass alone.
+    Caustic,
+    /// Light that was scattered before.
+    Indirect,
+}
+
+impl Part {
+    pub const EACH: [Part; 4] = [Part::Direct, Part::Specular, Part::Caustic, Part::Indirect];
+
+    pub fn mask(self) -> u32 {
+        match self {
+            Part::All => Part::EACH.iter().map(|part| part.mask()).sum(),
+            Part::Direct => constants::PART_DIRECT,
+            Part::Specular => constants::PART_SPECULAR,
+            Part::Caustic => constants::PART_CAUSTIC,
+            Part::Indirect => constants::PART_INDIRECT,
+        }
+    }
+}
+
+/// How a photon's weight falls with its distance.
+#[derive(Debug, Clone, Copy, PartialEq, Eq, Serialize)]
+#[serde(rename_all = "lowercase")]
+pub enum Kernel {
+    Box,
+    Cone,
+    Epanechnikov,
+}
+
+impl Kernel {
+    pub fn code(self) -> u32 {
+        match self {
+            Kernel::Box => constants::KERNEL_BOX,
+            Kernel::Cone => constants::KERNEL_CONE,
+            Kernel::Epanechnikov => constants::KERNEL_EPANECHNIKOV,
+        }
+    }
+}
+
+/// How a pixel weighs the picture around its centre.
+#[derive(Debug, Clone, Copy, PartialEq, Eq, Serialize)]
+#[serde(rename_all = "lowercase")]
+pub enum Filter {
+    /// Its own square.
+    Box,
+    /// A tent two pixels wide.
+    Tent,
+    /// A Gaussian of half a pixel's deviation.
+    Gaussian,
+}
+
+impl Filter {
+    pub fn code(self) -> u32 {
+        match self {
+            Filter::Box => constants::FILTER_BOX,
+            Filter::Tent => constants::FILTER_TENT,
+            Filter::Gaussian => constants::FILTER_GAUSSIAN,
+        }
+    }
+}
+
+/// How photons take places in their map.
+#[derive(Debug, Clone, Copy, PartialEq, Eq, Serialize)]
+#[serde(rename_all = "lowercase")]
+pub enum Append {
+    Atomic,
+    Ballot,
+}
+
+/// What a scene may call for; each can be forced on or left out.
+#[derive(Debug, Clone, Copy, PartialEq, Eq, PartialOrd, Ord, Hash, Serialize)]
+#[serde(rename_all = "kebab-case")]
+pub enum Effect {
+    Direct,
+    Indirect,
+    Glossy,
+    ReflectiveCaustics,
+    RefractiveCaustics,
+    SpecularChains,
+    Textures,
+    Environment,
+    MeshLights,
+    PointLights,
+    SpotLights,
+    DirectionalLights,
+    DiscLights,
+    Bvh,
+    TwoSided,
+    SmoothNormals,
+}
+
+impl Effect {
+    pub const ALL: [Effect; 16] = [
+        Effect::Direct,
+        Effect::Indirect,
+        Effect::Glossy,
+        Effect::ReflectiveCaustics,
+        Effect::RefractiveCaustics,
+        Effect::SpecularChains,
+        Effect::Textures,
+        Effect::Environment,
+        Effect::MeshLights,
+        Effect::PointLights,
+        Effect::SpotLights,
+        Effect::DirectionalLights,
+        Effect::DiscLights,
+        Effect::Bvh,
+        Effect::TwoSided,
+        Effect::SmoothNormals,
+    ];
+
+    pub fn name(self) -> &'static str {
+        match self {
+            Effect::Direct => "direct",
+            Effect::Indirect => "indirect",
+            Effect::Glossy => "glossy",
+            Effect::ReflectiveCaustics => "reflective-caustics",
+            Effect::RefractiveCaustics => "refractive-caustics",
+            Effect::SpecularChains => "specular-chains",
+            Effect::Textures => "textures",
+            Effect::Environment => "environment",
+            Effect::MeshLights => "mesh-lights",
+            Effect::PointLights => "point-lights",
+            Effect::SpotLights => "spot-lights",
+            Effect::DirectionalLights => "directional-lights",
+            Effect::DiscLights => "disc-lights",
+            Effect::Bvh => "bvh",
+            Effect::TwoSided => "two-sided",
+            Effect::SmoothNormals => "smooth-normals",
+        }
+    }
+}
+
+#[derive(Debug, Clone, PartialEq, Serialize)]
+pub struct TransportSettings {
+    /// Photons of the global map, each pass.
+    pub photons: u32,
+    /// Photons of the caustic map, each pass.
+    pub caustic_photons: u32,
+    /// Independent passes, of which the result is the mean.
+    pub rounds: u32,
+    /// Most bounces of a photon.
+    pub bounces: u32,
+    pub seed: u64,
+    /// Radius of the first pass's density estimate, metres; `None`: by the scene's area and the
+    /// photons.
+    pub radius: Option<f64>,
+    /// The same of the caustic map.
+    pub caustic_radius: Option<f64>,
+    /// How fast the radius shrinks, r_(i+1)^2 = r_i^2 (i + alpha) / (i + 1) (Knaus and Zwicker 2011);
+    /// 1 keeps it.
+    pub alpha: f64,
+    pub kernel: Kernel,
+    pub edge_correction: bool,
+    /// Shadow rays from each visible point, each pass.
+    pub shadow_rays: u32,
+    /// Indirect light by a ray to the next surface instead of the map where the camera looks.
+    pub final_gather: bool,
+    pub illumination: Illumination,
+    pub part: Part,
+    pub filter: Filter,
+    pub append: Append,
+    pub group_size: u32,
+    /// Most photons traced at once; `None`: as many as the device's buffers hold.
+    pub chunk: Option<u32>,
+    /// Effects forced on, and effects left out, whatever the scene holds.
+    pub with: Vec<Effect>,
+    pub without: Vec<Effect>,
+}
+
+impl Default for TransportSettings {
+    fn default() -> TransportSettings {
+        TransportSettings {
+            photons: 1 << 17,
+            caustic_photons: 1 << 17,
+            rounds: 16,
+            bounces: 32,
+            seed: 1,
+            radius: None,
+            caustic_radius: None,
+            alpha: 2.0 / 3.0,
+            kernel: Kernel::Box,
+            edge_correction: true,
+            shadow_rays: 4,
+            final_gather: false,
+            illumination: Illumination::Split,
+            part: Part::All,
+            filter: Filter::Box,
+            append: Append::Ballot,
+            group_size: 128,
+            chunk: None,
+            with: Vec::new(),
+            without: Vec::new(),
+        }
+    }
+}
+
+/// Photons of a pass: their numbers are 32-bit.
+const MAX_PHOTONS: u32 = 1 << 31;
+const MAX_ROUNDS: u32 = 1 << 20;
+/// Random-number blocks of a bounce are numbered in 32 bits, and each is a dispatch.
+const MAX_BOUNCES: u32 = 10_000;
+/// A visible point draws one block of random numbers a ray.
+const MAX_SHADOW_RAYS: u32 = constants::VERTEX_BLOCKS - 2;
+
+impl TransportSettings {
+    pub fn validate(&self) -> Result<()> {
+        within("--photons", self.photons, 1..=MAX_PHOTONS, "photons of the global map, each round")?;
+        within("--caustic-photons", self.caustic_photons, 1..=MAX_PHOTONS, "photons of the caustic map, each round")?;
+        within("--rounds", self.rounds, 1..=MAX_ROUNDS, "rounds")?;
+        within("--bounces", self.bounces, 1..=MAX_BOUNCES, "bounces")?;
+        within("--shadow-rays", self.shadow_rays, 1..=MAX_SHADOW_RAYS, "shadow rays from each visible point, each round")?;
+        for (option, radius) in [("--radius", self.radius), ("--caustic-radius", self.caustic_radius)] {
+            if let Some(radius) = radius
+                && !(radius.is_finite() && radius > 0.0)
+            {
+                return Err(Error::setting(option, radius, "must be a number of metres above 0"));
+            }
+        }
+        if !(self.alpha > 0.0 && self.alpha <= 1.0) {
+            return Err(Error::setting("--alpha", self.alpha, "must be above 0 and at most 1, which keeps the radius"));
+        }
+        if !(self.group_size.is_power_of_two() && (32..=1024).contains(&self.group_size)) {
+            return Err(Error::setting("--group-size", self.group_size, "must be a power of two from 32 to 1024"));
+        }
+        if let Some(chunk) = self.chunk {
+            within("--chunk", chunk, 1..=MAX_PHOTONS, "photons traced at once")?;
+        }
+        if let Some(both) = self.with.iter().find(|effect| self.without.contains(effect)) {
+            return Err(Error::setting("--without", both.name(), "stands in --with too; choose one"));
+        }
+        Ok(())
+    }
+
+    pub fn forces(&self, effect: Effect) -> bool {
+        self.with.contains(&effect)
+    }
+
+    pub fn leaves_out(&self, effect: Effect) -> bool {
+        self.without.contains(&effect)
+    }
+}

@@ -1,0 +1,204 @@
+//! Lighting a scene of triangles: rounds of photons, maps and visible points, on the GPU.
+//!
+//! Each round is independent: its own photons, its own paths from the camera, its own radius (Knaus and
+//! Zwicker 2011). So the mean over rounds converges to the right answer, its variance tells the error, and
+//! any round could run anywhere.
+//!
+//! ```text
+//! see       paths from the camera over mirrors and glass: visible points, direct light by shadow rays
+//! photons   of the global map: traced, sorted, looked up at every visible point
+//! caustics  the same with photons that took mirrors and glass only
+//! resolve   flux over area that really lies on the surface, times reflectance: to the film
+//! ```
+
+pub mod film;
+pub mod photons;
+pub mod points;
+pub mod resources;
+
+use std::sync::atomic::{AtomicBool, Ordering};
+use std::time::Instant;
+
+pub use film::RoundFilm;
+use resources::{PhotonBuffers, TransportResources};
+
+use crate::constants::PART_COUNT;
+use crate::error::{Error, Result};
+use crate::gpu::kernels::*;
+use crate::gpu::{Commands, Constants, DeviceFacts, Gpu, Kernel, Module};
+use crate::ledger::Fates;
+use crate::plan::transport::{MapPlan, Sensor, TransportPlan};
+use crate::records::{Receiver, Tally};
+use crate::scene::geometry::Geometry;
+use crate::scene::Camera;
+use crate::settings::transport::Append;
+use crate::timings::Timings;
+
+/// What is lit and what looks at it.
+pub struct View<'a> {
+    pub geometry: &'a Geometry,
+    /// For a picture.
+    pub camera: Option<&'a Camera>,
+    /// Sets of receivers of equal length, one a round in turn; none for a picture.
+    pub phases: &'a [Vec<Receiver>],
+}
+
+/// How a caller watches a run and ends it early.
+pub struct Watch<'a> {
+    /// Set from outside to end the run after the round that is under way.
+    pub cancelled: &'a AtomicBool,
+    /// Told the rounds done so far, of how many.
+    pub progress: &'a mut dyn FnMut(u32, u32),
+}
+
+/// What a run leaves behind.
+#[derive(Debug, Clone)]
+pub struct Lit {
+    pub plan: TransportPlan,
+    pub film: RoundFilm,
+    /// Light of each part (direct, specular, caustic, indirect) over all pixels and channels, film units.
+    pub part_totals: Vec<u64>,
+    /// Fates of the photons of the global map and of the caustic map.
+    pub fates: [Fates; 2],
+    pub timings: Timings,
+    pub device: DeviceFacts,
+    pub cancelled: bool,
+    pub dispatches: u64,
+    pub submissions: u64,
+    pub pipelines: usize,
+    /// Values that were no number, and values cut to the film's largest.
+    pub anomalies: [u32; 2],
+}
+
+/// Kernels that the plan needs, and no others.
+pub fn modules(plan: &TransportPlan, facts: &DeviceFacts) -> Vec<Module> {
+    let mut modules = vec![Resolve::MODULE];
+    modules.push(match plan.sensor {
+        Sensor::Picture { .. } => crate::gpu::kernels::View::MODULE,
+        Sensor::Receivers { .. } => Receive::MODULE,
+    });
+    if plan.maps().next().is_some() {
+        modules.extend([Shine::MODULE, MapCount::MODULE, MapScatter::MODULE, ScanBlocks::MODULE, ScanAdd::MODULE]);
+        modules.extend([DispatchSize::MODULE, LookupCount::MODULE, SliceCount::MODULE]);
+        modules.push(match plan.settings.append {
+            Append::Atomic => FlyAtomic::MODULE,
+            Append::Ballot => FlyBallot::MODULE,
+        });
+        modules.push(if facts.int64_atomics { LookupU64::MODULE } else { LookupTwoWords::MODULE });
+    }
+    modules
+}
+
+fn constants(plan: &TransportPlan) -> Constants {
+    plan.constants.iter().fold(Constants::new(plan.settings.group_size), |constants, (name, value)| constants.set(name, *value))
+}
+
+/// Timestamps that a round may need.
+const TIMESTAMPS_PER_ROUND: u32 = 64;
+
+/// Runs all rounds of a plan.
+pub fn light(gpu: &Gpu, view: &View, plan: TransportPlan, watch: &mut Watch) -> Result<Lit> {
+    let started = Instant::now();
+    let pipelines_before = gpu.pipeline_count();
+    gpu.prepare(&modules(&plan, gpu.facts()), &constants(&plan))?;
+    let mut commands = Commands::new(gpu, constants(&plan), started)?;
+    commands.timings().count("run");
+    let resources = commands.scope("set-up", |commands| TransportResources::new(gpu, commands, view.geometry, &plan, view.phases))?;
+    commands.submit()?;
+
+    let mut fates = [Fates::new(plan.settings.bounces), Fates::new(plan.settings.bounces)];
+    let (mut done, mut settled, mut cancelled) = (0, 0, false);
+    for round in 0..plan.settings.rounds {
+        commands.scope("round", |commands| one_round(commands, &resources, view, &plan, round))?;
+        done = round + 1;
+        let last = done == plan.settings.rounds;
+        // Tallies are 32-bit on the device.
+        let open = u64::from(done - settled + 1) * plan.maps().map(|map| u64::from(map.photons)).max().unwrap_or(0);
+        let short = commands.timestamps_left() < TIMESTAMPS_PER_ROUND || open > u64::from(u32::MAX);
+        if last || short || commands.work() * 2 >= plan.work_per_submission {
+            settle(&mut commands, &resources, &plan, u64::from(done - settled), &mut fates)?;
+            settled = done;
+            (watch.progress)(done, plan.settings.rounds);
+            cancelled = !last && watch.cancelled.load(Ordering::Relaxed);
+            if cancelled {
+                break;
+            }
+        }
+    }
+    let pixels = plan.sensor.pixels() as usize;
+    let sums = commands.read::<u64>(&resources.film_sums, 3 * pixels)?;
+    let squares = commands.read::<u64>(&resources.film_squares, 6 * pixels)?;
+    let part_totals = commands.read::<u64>(&resources.part_totals, PART_COUNT as usize)?;
+    let anomalies = commands.read::<u32>(&resources.anomalies, 2)?;
+    gpu.check_validation()?;
+    Ok(Lit {
+        film: RoundFilm::new(done, sums, squares),
+        part_totals,
+        fates,
+        cancelled,
+        dispatches: commands.dispatch_count(),
+        submissions: commands.submission_count(),
+        pipelines: gpu.pipeline_count() - pipelines_before,
+        timings: commands.finish("run"),
+        device: gpu.facts().clone(),
+        anomalies: [anomalies[0], anomalies[1]],
+        plan,
+    })
+}
+
+fn one_round(commands: &mut Commands, resources: &TransportResources, view: &View, plan: &TransportPlan, round: u32) -> Result<()> {
+    commands.scope("see", |commands| points::see(commands, resources, view.geometry, plan, view.camera, round))?;
+    let sums = 3 * u64::from(plan.visible_points()) * u64::from(plan.arrival_sets);
+    if let Some(photons) = &resources.photons {
+        commands.fill(&resources.estimates, 0, 2 * sums, 0);
+        for map in plan.maps() {
+            commands.scope(map.name, |commands| one_map(commands, resources, photons, view.geometry, plan, map, round))?;
+        }
+    }
+    commands.scope("resolve", |commands| points::resolve(commands, resources, view.geometry, plan, round))
+}
+
+/// Work of one flight of a photon, in the plan's units.
+const WORK_PER_PHOTON: u64 = 256;
+
+fn one_map(
+    commands: &mut Commands,
+    resources: &TransportResources,
+    photons: &PhotonBuffers,
+    geometry: &Geometry,
+    plan: &TransportPlan,
+    map: &MapPlan,
+    round: u32,
+) -> Result<()> {
+    for chunk in map.chunks() {
+        if commands.timestamps_left() < TIMESTAMPS_PER_ROUND || commands.work() >= plan.work_per_submission {
+            commands.submit()?;
+        }
+        let cells = photons::cells(geometry, plan, map, round);
+        commands.scope("trace", |commands| photons::trace(commands, resources, photons, geometry, plan, map, round, chunk))?;
+        commands.add_work(WORK_PER_PHOTON * u64::from(chunk.1));
+        commands.scope("index", |commands| photons::index(commands, photons, plan, &cells))?;
+        commands.scope("look up", |commands| points::look_up(commands, resources, photons, plan, map, cells, round))?;
+    }
+    Ok(())
+}
+
+/// Runs what is recorded and books the fates of its photons.
+fn settle(commands: &mut Commands, resources: &TransportResources, plan: &TransportPlan, rounds: u64, fates: &mut [Fates; 2]) -> Result<()> {
+    let bounces = plan.settings.bounces as usize;
+    for map in plan.maps() {
+        let which = usize::from(map.caustic_only);
+        let tallies = &resources.photons.as_ref().expect("a map has photons").tallies[which];
+        let counts: Vec<Tally> = commands.read(tallies, bounces)?;
+        commands.fill(tallies, 0, 4 * bounces as u64, 0);
+        fates[which].add(rounds * u64::from(map.photons), &counts);
+        let ledger = fates[which].ledger();
+        if !ledger.closes() || ledger.dropped != 0 {
+            return Err(Error::LedgerOpen { ledger });
+        }
+    }
+    if plan.maps().next().is_none() {
+        commands.submit()?;
+    }
+    Ok(())
+}

@@ -1,0 +1,102 @@
+//! Photons of a chunk through a scene of triangles, and the index of their map.
+
+use super::resources::{PhotonBuffers, TransportResources};
+use crate::error::Result;
+use crate::gpu::kernels::{DispatchSize, FlyAtomic, FlyBallot, MapCount, MapScatter, Shine};
+use crate::gpu::{Commands, Extent};
+use crate::index::scan;
+use crate::plan::transport::{MapPlan, TransportPlan};
+use crate::records::{CellPush, DispatchSizePush, Draws, EmissionPush, FlightPush};
+use crate::rng::words;
+use crate::scene::geometry::Geometry;
+use crate::settings::transport::Append;
+use crate::trace::INDIRECT_GROUPS_X;
+
+/// The grid of a map in a round: cells as wide as the radius, its corner a little outside of the scene.
+pub fn cells(geometry: &Geometry, plan: &TransportPlan, map: &MapPlan, round: u32) -> CellPush {
+    let radius = plan.radius(map, round) as f32;
+    CellPush {
+        origin: geometry.bounds.0 - 4.0 * radius,
+        cells_per_unit: 1.0 / radius,
+        bucket_mask: map.bucket_count - 1,
+        photon_capacity: map.capacity,
+    }
+}
+
+/// Traces the photons of a chunk into the map and adds their fates to its tallies.
+pub fn trace(
+    commands: &mut Commands,
+    resources: &TransportResources,
+    photons: &PhotonBuffers,
+    geometry: &Geometry,
+    plan: &TransportPlan,
+    map: &MapPlan,
+    round: u32,
+    (first_photon, photon_count): (u32, u32),
+) -> Result<()> {
+    let draws = Draws { seed: words(plan.settings.seed), round, domain: map.domain };
+    let TransportResources { nodes, triangles, normals, uvs, materials, textures, texels, emitters, .. } = resources;
+    let PhotonBuffers { paths: [even, odd], counters, dispatch_args, tallies, .. } = photons;
+    commands.fill(counters, 0, u64::from(map.bounces) + 2, 0);
+    commands.fill(counters, 1, 1, photon_count);
+    let push = EmissionPush {
+        draws,
+        first_photon,
+        photon_count,
+        emitter_count: geometry.emitters.len() as u32,
+        scene_radius: geometry.radius as f32,
+    };
+    let kernel = Shine { nodes, triangles, normals, uvs, materials, textures, texels, emitters, light_paths: even };
+    commands.dispatch(kernel, &push, Extent::Items(u64::from(photon_count)))?;
+    for bounce in 0..map.bounces {
+        let push = FlightPush {
+            draws,
+            bounce,
+            path_capacity: map.chunk_photons,
+            photon_capacity: map.capacity,
+            stored: map.stored,
+            caustic_only: u32::from(map.caustic_only),
+            caustic_surfaces: plan.caustic_surfaces,
+        };
+        // Every photon enters bounce 0; after that only the device knows how many paths are left.
+        let extent = if bounce == 0 {
+            Extent::Items(u64::from(photon_count))
+        } else {
+            dispatch_size(commands, photons, plan, 1 + bounce, map.chunk_photons)?;
+            Extent::Indirect(dispatch_args)
+        };
+        let (light_paths, next_light_paths) = if bounce.is_multiple_of(2) { (even, odd) } else { (odd, even) };
+        let tallies = &tallies[usize::from(map.caustic_only)];
+        let map = &photons.map;
+        match plan.settings.append {
+            Append::Atomic => commands.dispatch(
+                FlyAtomic { nodes, triangles, normals, uvs, materials, textures, texels, light_paths, next_light_paths, map, counters, tallies },
+                &push,
+                extent,
+            )?,
+            Append::Ballot => commands.dispatch(
+                FlyBallot { nodes, triangles, normals, uvs, materials, textures, texels, light_paths, next_light_paths, map, counters, tallies },
+                &push,
+                extent,
+            )?,
+        }
+    }
+    Ok(())
+}
+
+fn dispatch_size(commands: &mut Commands, photons: &PhotonBuffers, plan: &TransportPlan, counter: u32, capacity: u32) -> Result<()> {
+    let PhotonBuffers { counters, dispatch_args, .. } = photons;
+    let push = DispatchSizePush { counter, capacity, items_per_group: plan.settings.group_size, max_groups: INDIRECT_GROUPS_X };
+    commands.dispatch(DispatchSize { counters, dispatch_args }, &push, Extent::Groups(1, 1))
+}
+
+/// Sorts the map by the buckets of its cells.
+pub fn index(commands: &mut Commands, photons: &PhotonBuffers, plan: &TransportPlan, cells_push: &CellPush) -> Result<()> {
+    let PhotonBuffers { map, sorted_map, counters, cells, block_sums, dispatch_args, .. } = photons;
+    let buckets = cells_push.bucket_mask + 1;
+    commands.fill(cells, 0, u64::from(buckets), 0);
+    dispatch_size(commands, photons, plan, 0, cells_push.photon_capacity)?;
+    commands.dispatch(MapCount { map, counters, cells }, cells_push, Extent::Indirect(dispatch_args))?;
+    scan(commands, cells, block_sums, buckets, plan.settings.group_size)?;
+    commands.dispatch(MapScatter { map, counters, cells, sorted_map }, cells_push, Extent::Indirect(dispatch_args))
+}

@@ -1,0 +1,199 @@
+//! What the sensor sees: visible points and known light at the start of a round, density estimates of the
+//! maps, and the film at its end.
+
+use super::resources::{PhotonBuffers, TransportResources};
+use crate::constants::{DOMAIN_CAMERA, DOMAIN_RECEIVERS};
+use crate::error::Result;
+use crate::gpu::kernels::{LookupCount, LookupTwoWords, LookupU64, Receive, Resolve, SliceCount, View};
+use crate::gpu::{Commands, Extent};
+use crate::plan::transport::{MapPlan, Sensor, TransportPlan};
+use crate::records::{CellPush, DispatchSizePush, Draws, LookupPush, ReceivePush, ResolvePush, ViewPush};
+use crate::rng::words;
+use crate::scene::Camera;
+use crate::scene::geometry::Geometry;
+
+/// Most groups along y that any device must allow.
+const MAX_GROUPS_Y: u32 = 65_535;
+/// Candidates of a point, roughly: what a lookup counts as work.
+const TESTS_PER_POINT: u64 = 256;
+
+/// Runs of `count` items, `step` long.
+fn runs(count: u32, step: u32) -> impl Iterator<Item = (u32, u32)> {
+    (0..count).step_by(step as usize).map(move |first| (first, count.min(first.saturating_add(step))))
+}
+
+/// Hands the commands over once they amount to a submission.
+fn add_work(commands: &mut Commands, plan: &TransportPlan, work: u64) -> Result<()> {
+    commands.add_work(work);
+    if commands.work() >= plan.work_per_submission { commands.submit() } else { Ok(()) }
+}
+
+/// Finds the visible points of a round and writes the light that needs no photons.
+pub fn see(
+    commands: &mut Commands,
+    resources: &TransportResources,
+    geometry: &Geometry,
+    plan: &TransportPlan,
+    camera: Option<&Camera>,
+    round: u32,
+) -> Result<()> {
+    let TransportResources { nodes, triangles, normals, uvs, materials, textures, texels, emitters, .. } = resources;
+    let TransportResources { visible_points, pass_sums, part_totals, anomalies, .. } = resources;
+    let step = plan.pixels_at_once(plan.rays_per_pixel());
+    let emitter_count = geometry.emitters.len() as u32;
+    let draws = |domain| Draws { seed: words(plan.settings.seed), round, domain };
+    for (first, end) in runs(plan.sensor.pixels(), step) {
+        match plan.sensor {
+            Sensor::Picture { width, height } => {
+                let camera = camera.expect("a picture has a camera");
+                let half_height = (0.5 * camera.vertical_view).tan();
+                let half_width = half_height * f64::from(width) / f64::from(height);
+                let push = ViewPush {
+                    draws: draws(DOMAIN_CAMERA),
+                    width,
+                    height,
+                    first_pixel: first,
+                    end_pixel: end,
+                    eye: geometry.to_local(camera.eye),
+                    forward: camera.forward.as_vec3(),
+                    right: (half_width * camera.right).as_vec3(),
+                    up: (half_height * camera.up).as_vec3(),
+                    emitter_count,
+                    film_scale: plan.film_scale as f32,
+                    film_limit: plan.film_limit as f32,
+                };
+                let kernel = View {
+                    nodes,
+                    triangles,
+                    normals,
+                    uvs,
+                    materials,
+                    textures,
+                    texels,
+                    emitters,
+                    anomalies,
+                    visible_points,
+                    pass_sums,
+                    part_totals,
+                };
+                commands.dispatch(kernel, &push, Extent::Items(u64::from(end - first)))?;
+            }
+            Sensor::Receivers { .. } => {
+                let receivers = &resources.receivers[round as usize % resources.receivers.len()];
+                let radius = plan.maps().map(|map| plan.radius(map, round)).fold(f64::INFINITY, f64::min);
+                let push = ReceivePush {
+                    draws: draws(DOMAIN_RECEIVERS),
+                    first_point: first,
+                    end_point: end,
+                    emitter_count,
+                    film_scale: plan.film_scale as f32,
+                    film_limit: plan.film_limit as f32,
+                    radius: if radius.is_finite() { radius as f32 } else { 1.0 / 1024.0 },
+                };
+                let kernel = Receive {
+                    nodes,
+                    triangles,
+                    normals,
+                    uvs,
+                    materials,
+                    textures,
+                    texels,
+                    emitters,
+                    receivers,
+                    anomalies,
+                    visible_points,
+                    pass_sums,
+                    part_totals,
+                };
+                commands.dispatch(kernel, &push, Extent::Items(u64::from(end - first)))?;
+            }
+        }
+        add_work(commands, plan, 64 * u64::from(end - first) * u64::from(plan.rays_per_pixel()))?;
+    }
+    Ok(())
+}
+
+/// Adds a chunk of a map to the estimates of all visible points.
+pub fn look_up(
+    commands: &mut Commands,
+    resources: &TransportResources,
+    photons: &PhotonBuffers,
+    plan: &TransportPlan,
+    map: &MapPlan,
+    cells_push: CellPush,
+    round: u32,
+) -> Result<()> {
+    let PhotonBuffers { cells, sorted_map, longest, dispatch_args, .. } = photons;
+    let TransportResources { visible_points, estimates, .. } = resources;
+    let point_count = plan.visible_points();
+    let step = (plan.work_per_submission / TESTS_PER_POINT).clamp(1 << 12, 1 << 22) as u32;
+    for (first_point, end_point) in runs(point_count, step) {
+        let push = LookupPush {
+            first_point,
+            end_point,
+            point_count,
+            arrival: map.stored.trailing_zeros(),
+            radius: plan.radius(map, round) as f32,
+            cells: cells_push,
+        };
+        commands.fill(longest, 0, 1, 0);
+        commands.dispatch(LookupCount { visible_points, longest, cells }, &push, Extent::Items(u64::from(end_point - first_point)))?;
+        let size = DispatchSizePush {
+            counter: 0,
+            capacity: end_point - first_point,
+            items_per_group: plan.settings.group_size,
+            max_groups: MAX_GROUPS_Y,
+        };
+        commands.dispatch(SliceCount { longest, dispatch_args }, &size, Extent::Groups(1, 1))?;
+        let extent = Extent::Indirect(dispatch_args);
+        if commands.facts().int64_atomics {
+            commands.dispatch(LookupU64 { visible_points, film: estimates, cells, sorted_map }, &push, extent)?;
+        } else {
+            commands.dispatch(LookupTwoWords { visible_points, film: estimates, cells, sorted_map }, &push, extent)?;
+        }
+        add_work(commands, plan, TESTS_PER_POINT * u64::from(end_point - first_point))?;
+    }
+    Ok(())
+}
+
+/// Ends a round: estimates and known light go to the film.
+pub fn resolve(commands: &mut Commands, resources: &TransportResources, geometry: &Geometry, plan: &TransportPlan, round: u32) -> Result<()> {
+    let TransportResources { nodes, triangles, normals, uvs, materials, textures, texels, visible_points, .. } = resources;
+    let TransportResources { pass_sums, estimates, film_sums, film_squares, part_totals, anomalies, .. } = resources;
+    let radius = |map: &Option<MapPlan>| map.as_ref().map_or(1.0, |map| plan.radius(map, round)) as f32;
+    let flux = |map: &Option<MapPlan>| map.as_ref().map_or(0.0, |map| geometry.flux_unit / f64::from(map.photons)) as f32;
+    for (first_pixel, end_pixel) in runs(plan.sensor.pixels(), plan.pixels_at_once(4)) {
+        let push = ResolvePush {
+            first_pixel,
+            end_pixel,
+            points_per_pixel: plan.points_per_pixel,
+            point_count: plan.visible_points(),
+            arrivals: plan.arrivals,
+            film_scale: plan.film_scale as f32,
+            film_limit: plan.film_limit as f32,
+            global_radius: radius(&plan.global),
+            caustic_radius: radius(&plan.caustic),
+            global_flux: flux(&plan.global),
+            caustic_flux: flux(&plan.caustic),
+        };
+        let kernel = Resolve {
+            nodes,
+            triangles,
+            normals,
+            uvs,
+            materials,
+            textures,
+            texels,
+            anomalies,
+            visible_points,
+            pass_sums,
+            estimates,
+            film_sums,
+            film_squares,
+            part_totals,
+        };
+        commands.dispatch(kernel, &push, Extent::Items(u64::from(end_pixel - first_pixel)))?;
+        add_work(commands, plan, 256 * u64::from(end_pixel - first_pixel))?;
+    }
+    Ok(())
+}

@@ -1,0 +1,129 @@
+//! Every buffer of lighting a scene of triangles, named and sized by the plan.
+
+use bytemuck::Pod;
+use glam::UVec2;
+
+use crate::constants::PART_COUNT;
+use crate::error::Result;
+use crate::gpu::{Buffer, Commands, Gpu, Memory};
+use crate::plan::transport::{MapPlan, TransportPlan};
+use crate::records::*;
+use crate::resources::block_sums;
+use crate::scene::geometry::Geometry;
+use crate::settings::transport::Effect;
+
+pub struct TransportResources {
+    // The scene, written once; what the plan dropped has one empty element.
+    pub nodes: Buffer,
+    pub triangles: Buffer,
+    pub normals: Buffer,
+    pub uvs: Buffer,
+    pub materials: Buffer,
+    pub textures: Buffer,
+    pub texels: Buffer,
+    pub emitters: Buffer,
+    /// Points of all phases; empty for a picture.
+    pub receivers: Vec<Buffer>,
+    // Photons of the chunk under way.
+    pub photons: Option<PhotonBuffers>,
+    // What the sensor sees in the round under way.
+    pub visible_points: Buffer,
+    pub pass_sums: Buffer,
+    pub estimates: Buffer,
+    // All rounds.
+    pub film_sums: Buffer,
+    pub film_squares: Buffer,
+    pub part_totals: Buffer,
+    pub anomalies: Buffer,
+}
+
+/// Photons in flight and their map; both maps of a round use the same ones in turn.
+pub struct PhotonBuffers {
+    /// Paths entering even bounces and odd bounces.
+    pub paths: [Buffer; 2],
+    pub map: Buffer,
+    pub sorted_map: Buffer,
+    /// Length of the map, then the paths entering each bounce.
+    pub counters: Buffer,
+    pub dispatch_args: Buffer,
+    /// Photons in each bucket; after sorting, one past the last photon of each.
+    pub cells: Buffer,
+    pub block_sums: Vec<Buffer>,
+    /// Candidates of the busiest point.
+    pub longest: Buffer,
+    /// Fates of the submission under way, one tally a bounce: of the global map's photons, and of the
+    /// caustic map's.
+    pub tallies: [Buffer; 2],
+}
+
+impl TransportResources {
+    /// Makes the buffers and records the upload of what never changes. `phases` are sets of receivers
+    /// of equal length; none for a picture.
+    pub fn new(
+        gpu: &Gpu,
+        commands: &mut Commands,
+        geometry: &Geometry,
+        plan: &TransportPlan,
+        phases: &[Vec<Receiver>],
+    ) -> Result<TransportResources> {
+        fn filled<T: Pod>(gpu: &Gpu, commands: &mut Commands, name: &str, content: &[T], kept: bool) -> Result<Buffer> {
+            let content = if kept { content } else { &[] };
+            let buffer = gpu.buffer::<T>(name, content.len() as u64, Memory::Device)?;
+            commands.upload(&buffer, content)?;
+            Ok(buffer)
+        }
+        let pixels = u64::from(plan.sensor.pixels());
+        let points = u64::from(plan.visible_points());
+        let estimates = 3 * points * u64::from(plan.arrival_sets);
+        let device = Memory::Device;
+        let textured = plan.keeps(Effect::Textures);
+        let resources = TransportResources {
+            nodes: filled(gpu, commands, "nodes", &geometry.nodes, plan.keeps(Effect::Bvh))?,
+            triangles: filled(gpu, commands, "triangles", &geometry.triangles, true)?,
+            normals: filled(gpu, commands, "normals", &geometry.normals, plan.keeps(Effect::SmoothNormals))?,
+            uvs: filled(gpu, commands, "uvs", &geometry.uvs, textured)?,
+            materials: filled(gpu, commands, "materials", &geometry.materials, true)?,
+            textures: filled(gpu, commands, "textures", &geometry.textures, textured)?,
+            texels: filled::<UVec2>(gpu, commands, "texels", &geometry.texels, textured)?,
+            emitters: filled(gpu, commands, "emitters", &geometry.emitters, true)?,
+            receivers: phases.iter().map(|phase| filled(gpu, commands, "receivers", phase, true)).collect::<Result<_>>()?,
+            photons: if plan.maps().next().is_some() { Some(PhotonBuffers::new(gpu, commands, plan)?) } else { None },
+            visible_points: gpu.buffer::<VisiblePoint>("visible points", points, device)?,
+            pass_sums: gpu.buffer::<u64>("pass sums", 3 * pixels, device)?,
+            estimates: gpu.buffer::<u64>("estimates", estimates, device)?,
+            film_sums: gpu.buffer::<u64>("film sums", 3 * pixels, device)?,
+            film_squares: gpu.buffer::<u64>("film squares", 6 * pixels, device)?,
+            part_totals: gpu.buffer::<u64>("part totals", u64::from(PART_COUNT), device)?,
+            anomalies: gpu.buffer::<u32>("anomalies", 2, device)?,
+        };
+        commands.fill(&resources.film_sums, 0, 6 * pixels, 0);
+        commands.fill(&resources.film_squares, 0, 12 * pixels, 0);
+        commands.fill(&resources.part_totals, 0, 2 * u64::from(PART_COUNT), 0);
+        commands.fill(&resources.anomalies, 0, 2, 0);
+        Ok(resources)
+    }
+}
+
+impl PhotonBuffers {
+    fn new(gpu: &Gpu, commands: &mut Commands, plan: &TransportPlan) -> Result<PhotonBuffers> {
+        let most = |size: fn(&MapPlan) -> u32| plan.maps().map(size).max().map_or(0, u64::from);
+        let device = Memory::Device;
+        let (paths, capacity, buckets) = (most(|map| map.chunk_photons), most(|map| map.capacity), most(|map| map.bucket_count));
+        let bounces = u64::from(plan.settings.bounces);
+        let buffers = PhotonBuffers {
+            paths: [gpu.buffer::<LightPath>("even light paths", paths, device)?, gpu.buffer::<LightPath>("odd light paths", paths, device)?],
+            map: gpu.buffer::<MapPhoton>("map", capacity, device)?,
+            sorted_map: gpu.buffer::<MapPhoton>("sorted map", capacity, device)?,
+            counters: gpu.buffer::<u32>("counters", bounces + 2, device)?,
+            dispatch_args: gpu.buffer::<DispatchArgs>("dispatch args", 1, device)?,
+            cells: gpu.buffer::<u32>("cells", buckets, device)?,
+            block_sums: block_sums(gpu, buckets, plan.settings.group_size)?,
+            longest: gpu.buffer::<u32>("longest", 1, device)?,
+            tallies: [gpu.buffer::<Tally>("global tallies", bounces, device)?, gpu.buffer::<Tally>("caustic tallies", bounces, device)?],
+        };
+        for tallies in &buffers.tallies {
+            commands.fill(tallies, 0, 4 * bounces, 0);
+        }
+        Ok(buffers)
+    }
+}
