@@ -88,7 +88,59 @@ fn compile(compiler: &Compiler, glsl: &Path, path: &Path) -> Result<Vec<u32>, St
     for file in included.borrow().iter() {
         println!("cargo:rerun-if-changed={}", file.display());
     }
-    Ok(artifact.as_binary().to_vec())
+    Ok(uncontracted(artifact.as_binary()))
+}
+
+/// Functions whose rounding decides no result: they may fuse a product and a sum.
+const MAY_CONTRACT: [&str; 1] = ["intersect_children("];
+
+/// Marks every floating-point operation as one to be rounded by itself, as `precise` does in GLSL: else a
+/// driver may fuse and reorder operations in one pipeline and not in another, and a specialization that
+/// takes an unused effect away would change the last bit of a result.
+fn uncontracted(words: &[u32]) -> Vec<u32> {
+    const HEADER_WORDS: usize = 5;
+    const NAME: u32 = 5;
+    const FUNCTION: u32 = 54;
+    const DECORATE: u32 = 71;
+    const NO_CONTRACTION: u32 = 42;
+    // OpTypeVoid, the first instruction that may stand after all decorations.
+    const FIRST_TYPES: std::ops::RangeInclusive<u32> = 19..=33;
+    // Negation, sums, differences, products, quotients, remainders, products of vectors and matrices.
+    let is_arithmetic = |op: u32| matches!(op, 127 | 129 | 131 | 133 | 136 | 140..=148);
+
+    let instructions = || {
+        let mut at = HEADER_WORDS;
+        std::iter::from_fn(move || {
+            let first = *words.get(at)?;
+            let instruction = (at, first & 0xffff, &words[at..at + (first >> 16) as usize]);
+            at += (first >> 16) as usize;
+            Some(instruction)
+        })
+    };
+    let name_of = |instruction: &[u32]| -> String {
+        let bytes = instruction[2..].iter().flat_map(|word| word.to_le_bytes());
+        bytes.take_while(|byte| *byte != 0).map(char::from).collect()
+    };
+    let free: BTreeSet<u32> = instructions()
+        .filter(|(_, op, instruction)| *op == NAME && MAY_CONTRACT.iter().any(|name| name_of(instruction).starts_with(name)))
+        .map(|(_, _, instruction)| instruction[1])
+        .collect();
+    let decorated: BTreeSet<u32> = instructions()
+        .filter(|(_, op, instruction)| *op == DECORATE && instruction[2] == NO_CONTRACTION)
+        .map(|(_, _, instruction)| instruction[1])
+        .collect();
+    let mut function = 0;
+    let mut results = Vec::new();
+    for (_, op, instruction) in instructions() {
+        match op {
+            FUNCTION => function = instruction[2],
+            op if is_arithmetic(op) && !free.contains(&function) && !decorated.contains(&instruction[2]) => results.push(instruction[2]),
+            _ => {}
+        }
+    }
+    let place = instructions().find(|(_, op, _)| FIRST_TYPES.contains(op)).expect("a module has types").0;
+    let decorations = results.iter().flat_map(|result| [DECORATE | 3 << 16, *result, NO_CONTRACTION]);
+    words[..place].iter().copied().chain(decorations).chain(words[place..].iter().copied()).collect()
 }
 
 struct Buffer {

@@ -36,8 +36,9 @@ float kernel_in_sector(vec2 from, vec2 to)
 }
 
 // Integral of the kernel over the triangle between the centre and an edge, clipped to the unit disc;
-// signed by the edge's direction.
-float kernel_over_edge(vec2 from, vec2 to)
+// signed by the edge's direction. Says whether the edge enters the disc, and counts the edges that have the
+// centre on their left.
+float kernel_over_edge(vec2 from, vec2 to, inout bool enters, inout uint left_count)
 {
     vec2 edge = to - from;
     float edge_length = length(edge);
@@ -47,12 +48,14 @@ float kernel_over_edge(vec2 from, vec2 to)
     vec2 along = edge / edge_length;
     float h = from.x * along.y - from.y * along.x;
     float s0 = dot(from, along), s1 = dot(to, along);
+    left_count += h > 0.0 ? 1 : 0;
     float half_chord_squared = 1.0 - h * h;
     if (half_chord_squared <= 0.0) {
         return kernel_in_sector(from, to);
     }
     float half_chord = sqrt(half_chord_squared);
     float c0 = clamp(s0, -half_chord, half_chord), c1 = clamp(s1, -half_chord, half_chord);
+    enters = enters || c0 != c1;
     vec2 foot = h * vec2(along.y, -along.x);
     float sum = kernel_under_line(h, c0, c1);
     if (c0 != s0) {
@@ -87,7 +90,15 @@ uint kernel_over_triangle(uint index, vec3 position, vec3 normal, float radius)
     vec2 a = vec2(dot(triangle.a - centre, x), dot(triangle.a - centre, y)) / disc;
     vec2 b = vec2(dot(triangle.b - centre, x), dot(triangle.b - centre, y)) / disc;
     vec2 c = vec2(dot(triangle.c - centre, x), dot(triangle.c - centre, y)) / disc;
-    float whole = kernel_over_edge(a, b) + kernel_over_edge(b, c) + kernel_over_edge(c, a);
+    bool enters = false;
+    uint left_count = 0;
+    float whole = kernel_over_edge(a, b, enters, left_count);
+    whole += kernel_over_edge(b, c, enters, left_count);
+    whole += kernel_over_edge(c, a, enters, left_count);
+    // No edge in the disc: all of it or nothing, not the rounding of sectors that cancel.
+    if (!enters) {
+        whole = left_count == 3 ? 3.14159265358979324 * kernel_norm() : 0.0;
+    }
     float share = disc / radius;
     return uint(roundEven(max(whole, 0.0) * share * share * 268435456.0));
 }
