@@ -4,6 +4,7 @@
 mod devices;
 mod paper;
 mod plan;
+mod probe;
 mod render;
 mod run;
 mod transport;
@@ -39,6 +40,8 @@ enum Command {
     Devices(devices::DevicesArgs),
     /// Renders what a camera sees of a scene
     Render(render::RenderArgs),
+    /// Asks for the irradiance at given points of a scene
+    Probe(probe::ProbeArgs),
     /// Prints which effects a scene calls for, and why
     Plan(plan::PlanArgs),
     /// Regenerates every figure and table of the paper as images, CSV and one HTML page
@@ -100,6 +103,7 @@ pub fn main() -> u8 {
         None => run::run(&cli.run, &cancelled),
         Some(Command::Devices(args)) => devices::run(&args).map(|()| End::Finished),
         Some(Command::Render(args)) => render::run(&args, &cancelled),
+        Some(Command::Probe(args)) => probe::run(&args, &cancelled),
         Some(Command::Plan(args)) => plan::run(&args).map(|()| End::Finished),
         Some(Command::Paper(args)) => paper::run(&args, &cancelled),
     };

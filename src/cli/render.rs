@@ -53,8 +53,11 @@ pub(super) struct RenderArgs {
 
 pub(super) fn run(args: &RenderArgs, cancelled: &AtomicBool) -> Result<End> {
     let usual = args.transport.settings();
-    let settings =
-        TransportSettings { part: args.part.map_or(usual.part, Part::from), filter: args.filter.map_or(usual.filter, Filter::from), ..usual };
+    let settings = TransportSettings {
+        part: args.part.map_or(usual.part, Part::from),
+        filter: args.filter.map_or(usual.filter, Filter::from),
+        ..usual
+    };
     settings.validate()?;
     let format = Format::of("-o", &args.output)?;
     if let (Format::Exr, Some(exposure)) = (format, args.exposure) {

@@ -11,8 +11,8 @@ use super::{DeviceArgs, complain};
 use crate::error::{Error, Result};
 use crate::gpu::{Gpu, Options};
 use crate::output::destination::Destination;
-use crate::output::trace_file;
 use crate::output::light_report;
+use crate::output::trace_file;
 use crate::plan::transport::{Sensor, TransportPlan};
 use crate::records::Receiver;
 use crate::render;
@@ -196,8 +196,12 @@ impl ReportArgs {
 
     /// The device; a scene of triangles needs one.
     pub(super) fn device(&self, device: &DeviceArgs) -> Result<Gpu> {
-        let options =
-            Options { device: device.device.clone(), validate: device.validate, time_dispatches: self.time_dispatches, ..Options::default() };
+        let options = Options {
+            device: device.device.clone(),
+            validate: device.validate,
+            time_dispatches: self.time_dispatches,
+            ..Options::default()
+        };
         Gpu::open(&options)
     }
 }
@@ -235,7 +239,8 @@ pub(super) fn geometry(scene: &Scene, settings: &TransportSettings) -> Result<Ge
 
 /// Runs all rounds, with a bar.
 pub(super) fn light(gpu: &Gpu, job: &Job, geometry: &Geometry, plan: TransportPlan, cancelled: &AtomicBool) -> Result<Lit> {
-    let style = ProgressStyle::with_template("{bar:32} {human_pos}/{human_len} rounds, {per_sec}, {eta} left").expect("the template is valid");
+    let style =
+        ProgressStyle::with_template("{bar:32} {human_pos}/{human_len} rounds, {per_sec}, {eta} left").expect("the template is valid");
     let bar = ProgressBar::new(u64::from(plan.settings.rounds)).with_style(style);
     let mut watch = Watch { cancelled, progress: &mut |done, _| bar.set_position(u64::from(done)) };
     let lit = transport::light(gpu, &View { geometry, camera: job.camera, phases: job.phases }, plan, &mut watch)?;
@@ -259,7 +264,11 @@ pub(super) fn camera(scene: &Scene, name: Option<&str>) -> Result<Camera> {
     match name {
         Some(name) => scene.cameras.iter().find(|camera| camera.name == name).cloned().ok_or_else(|| {
             let names: Vec<&str> = scene.cameras.iter().map(|camera| camera.name.as_str()).collect();
-            let there = if names.is_empty() { "the scene has none; leave --camera out".to_owned() } else { format!("must be one of {}", names.join(", ")) };
+            let there = if names.is_empty() {
+                "the scene has none; leave --camera out".to_owned()
+            } else {
+                format!("must be one of {}", names.join(", "))
+            };
             Error::setting("--camera", name, there)
         }),
         None => Ok(scene.cameras.first().cloned().unwrap_or_else(|| {

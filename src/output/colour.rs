@@ -45,7 +45,8 @@ impl ColourPicture {
         }
         luminances.sort_by(f32::total_cmp);
         let median = luminances[luminances.len() / 2];
-        let usual: Vec<f64> = luminances.iter().filter(|luminance| **luminance <= 10.0 * median).map(|luminance| f64::from(*luminance)).collect();
+        let usual: Vec<f64> =
+            luminances.iter().filter(|luminance| **luminance <= 10.0 * median).map(|luminance| f64::from(*luminance)).collect();
         let mean = usual.iter().sum::<f64>() / usual.len() as f64;
         (0.18 / mean).log2() as f32
     }

@@ -101,6 +101,8 @@ pub struct TransportPlan {
 
 /// Triangles up to which a list is tested from end to end instead of a tree.
 const LIST_TRIANGLES: usize = 24;
+/// Triangles up to which a list may be asked for: a path tests it some hundred times, and loops are short.
+const MAX_LIST_TRIANGLES: usize = 256;
 /// Photons within the first radius of the global map, on average.
 const PHOTONS_PER_ESTIMATE: f64 = 60.0;
 /// A caustic's photons lie closer: its radius over that of as many photons spread over everything.
@@ -117,6 +119,14 @@ const RAY_COST: u64 = 64;
 impl TransportPlan {
     pub fn new(scene: &Scene, geometry: &Geometry, settings: &TransportSettings, sensor: Sensor, limits: &Limits) -> Result<TransportPlan> {
         settings.validate()?;
+        if settings.leaves_out(Effect::Bvh) && geometry.triangles.len() > MAX_LIST_TRIANGLES {
+            let count = geometry.triangles.len();
+            return Err(Error::setting(
+                "--without",
+                "bvh",
+                format!("is for scenes of {MAX_LIST_TRIANGLES} triangles at most, and this one has {count}"),
+            ));
+        }
         let facts = Facts::new(scene, geometry, settings, sensor);
         let mut decisions: Vec<EffectDecision> = Effect::ALL.iter().map(|effect| facts.decide(*effect, settings)).collect();
         let keeps = |effect: Effect| decisions.iter().any(|decision| decision.effect == effect && decision.kept);
@@ -308,7 +318,8 @@ impl TransportPlan {
         ];
         let too_large = |(_, bytes): &&(&'static str, u64)| *bytes > limits.buffer_bytes;
         if let Some((what, bytes)) = scene.iter().find(too_large) {
-            let allowed = format!("its {what} take {bytes} bytes, the device's buffers hold {}; choose another --device", limits.buffer_bytes);
+            let allowed =
+                format!("its {what} take {bytes} bytes, the device's buffers hold {}; choose another --device", limits.buffer_bytes);
             return Err(Error::setting("SCENE", format!("({} triangles)", geometry.triangles.len()), allowed));
         }
         if film.iter().any(|(_, bytes)| *bytes > limits.buffer_bytes) {
@@ -458,14 +469,18 @@ impl<'a> Facts<'a> {
             None => (false, format!("no {what} material: no such caustic")),
             Some(_) if !lit => (false, "nothing shines".into()),
             Some(_) if !receives => (false, "no surface scatters light: nothing to see a caustic on".into()),
-            Some(_) if !(wants(Part::Caustic) || (self.part == Part::Indirect)) => (false, format!("only {:?} light was asked for", self.part).to_lowercase()),
+            Some(_) if !(wants(Part::Caustic) || (self.part == Part::Indirect)) => {
+                (false, format!("only {:?} light was asked for", self.part).to_lowercase())
+            }
             Some(names) => (true, format!("{what}: {names}")),
         };
         match effect {
             Effect::Direct if !lit => (false, "nothing shines".into()),
             Effect::Direct if !receives => (false, "no surface scatters light".into()),
             Effect::Direct if self.part == Part::Caustic => (false, "only caustics were asked for".into()),
-            Effect::Direct if self.part == Part::Indirect && self.split => (true, "indirect light of a gather ray has direct light at its end".into()),
+            Effect::Direct if self.part == Part::Indirect && self.split => {
+                (true, "indirect light of a gather ray has direct light at its end".into())
+            }
             Effect::Direct => (true, format!("{} light(s) reach surfaces that scatter", self.emitters.iter().sum::<usize>())),
             Effect::Indirect if !lit => (false, "nothing shines".into()),
             Effect::Indirect if !receives => (false, "no surface scatters light".into()),

@@ -172,8 +172,7 @@ impl Geometry {
         if self.flux_unit == 0.0 {
             self.flux_unit = 1.0;
         }
-        self.emitters =
-            found.into_iter().map(|found| Emitter { flux: (found.flux / self.flux_unit).as_vec3(), ..found.emitter }).collect();
+        self.emitters = found.into_iter().map(|found| Emitter { flux: (found.flux / self.flux_unit).as_vec3(), ..found.emitter }).collect();
         Ok(())
     }
 
@@ -202,12 +201,8 @@ impl Geometry {
                 (emitter, TAU * ((1.0 - inner) + (inner - outer) / 3.0) * strength)
             }
             LightKind::Directional { direction, irradiance } => {
-                let emitter = Emitter {
-                    kind: EMITTER_DIRECTIONAL,
-                    direction: direction.as_vec3(),
-                    strength: irradiance,
-                    ..Emitter::default()
-                };
+                let emitter =
+                    Emitter { kind: EMITTER_DIRECTIONAL, direction: direction.as_vec3(), strength: irradiance, ..Emitter::default() };
                 (emitter, PI * self.radius * self.radius * irradiance.as_dvec3())
             }
             LightKind::Disc { centre, normal, radius, power, law } => {

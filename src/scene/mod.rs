@@ -59,14 +59,12 @@ impl Scene {
     pub fn without(&self, effects: &[Effect]) -> Scene {
         let lacks = |effect: Effect| effects.contains(&effect);
         let mut scene = self.clone();
-        scene.lights.retain(|light| {
-            !match light.kind {
-                LightKind::Point { .. } => lacks(Effect::PointLights),
-                LightKind::Spot { .. } => lacks(Effect::SpotLights),
-                LightKind::Directional { .. } => lacks(Effect::DirectionalLights),
-                LightKind::Disc { .. } => lacks(Effect::DiscLights),
-                LightKind::Environment { .. } => lacks(Effect::Environment),
-            }
+        scene.lights.retain(|light| !match light.kind {
+            LightKind::Point { .. } => lacks(Effect::PointLights),
+            LightKind::Spot { .. } => lacks(Effect::SpotLights),
+            LightKind::Directional { .. } => lacks(Effect::DirectionalLights),
+            LightKind::Disc { .. } => lacks(Effect::DiscLights),
+            LightKind::Environment { .. } => lacks(Effect::Environment),
         });
         for material in &mut scene.materials {
             if lacks(Effect::MeshLights) {

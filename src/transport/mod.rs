@@ -29,8 +29,8 @@ use crate::gpu::{Commands, Constants, DeviceFacts, Gpu, Kernel, Module};
 use crate::ledger::Fates;
 use crate::plan::transport::{MapPlan, Sensor, TransportPlan};
 use crate::records::{Receiver, Tally};
-use crate::scene::geometry::Geometry;
 use crate::scene::Camera;
+use crate::scene::geometry::Geometry;
 use crate::settings::transport::Append;
 use crate::timings::Timings;
 
@@ -184,7 +184,13 @@ fn one_map(
 }
 
 /// Runs what is recorded and books the fates of its photons.
-fn settle(commands: &mut Commands, resources: &TransportResources, plan: &TransportPlan, rounds: u64, fates: &mut [Fates; 2]) -> Result<()> {
+fn settle(
+    commands: &mut Commands,
+    resources: &TransportResources,
+    plan: &TransportPlan,
+    rounds: u64,
+    fates: &mut [Fates; 2],
+) -> Result<()> {
     let bounces = plan.settings.bounces as usize;
     for map in plan.maps() {
         let which = usize::from(map.caustic_only);

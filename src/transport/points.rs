@@ -157,7 +157,13 @@ pub fn look_up(
 }
 
 /// Ends a round: estimates and known light go to the film.
-pub fn resolve(commands: &mut Commands, resources: &TransportResources, geometry: &Geometry, plan: &TransportPlan, round: u32) -> Result<()> {
+pub fn resolve(
+    commands: &mut Commands,
+    resources: &TransportResources,
+    geometry: &Geometry,
+    plan: &TransportPlan,
+    round: u32,
+) -> Result<()> {
     let TransportResources { nodes, triangles, normals, uvs, materials, textures, texels, visible_points, .. } = resources;
     let TransportResources { pass_sums, estimates, film_sums, film_squares, part_totals, anomalies, .. } = resources;
     let radius = |map: &Option<MapPlan>| map.as_ref().map_or(1.0, |map| plan.radius(map, round)) as f32;

@@ -111,7 +111,10 @@ impl PhotonBuffers {
         let (paths, capacity, buckets) = (most(|map| map.chunk_photons), most(|map| map.capacity), most(|map| map.bucket_count));
         let bounces = u64::from(plan.settings.bounces);
         let buffers = PhotonBuffers {
-            paths: [gpu.buffer::<LightPath>("even light paths", paths, device)?, gpu.buffer::<LightPath>("odd light paths", paths, device)?],
+            paths: [
+                gpu.buffer::<LightPath>("even light paths", paths, device)?,
+                gpu.buffer::<LightPath>("odd light paths", paths, device)?,
+            ],
             map: gpu.buffer::<MapPhoton>("map", capacity, device)?,
             sorted_map: gpu.buffer::<MapPhoton>("sorted map", capacity, device)?,
             counters: gpu.buffer::<u32>("counters", bounces + 2, device)?,

@@ -1,0 +1,130 @@
+//! `photonmill probe`: irradiance at given points, as Radiance's `rtrace -I` gives it.
+
+use std::io::Read;
+use std::path::{Path, PathBuf};
+use std::sync::atomic::AtomicBool;
+
+use clap::Args;
+use glam::DVec3;
+
+use super::transport::{Job, ReportArgs, SceneArgs, TransportArgs, geometry, light, plan};
+use super::{DeviceArgs, End, say};
+use crate::error::{Error, Result};
+use crate::output::destination::{Destination, check_distinct, write_all};
+use crate::output::light_report;
+use crate::plan::transport::Sensor;
+use crate::records::Receiver;
+use crate::scene::geometry::Geometry;
+use crate::transport::Lit;
+
+#[derive(Args)]
+pub(super) struct ProbeArgs {
+    #[command(flatten)]
+    scene: SceneArgs,
+    /// Points and directions, a line `x y z nx ny nz` each, metres in the world; `-` reads standard input
+    #[arg(long, value_name = "FILE", help_heading = "Scene")]
+    points: PathBuf,
+    /// A line for each point: irradiance of red, green, blue in W/m2, and their standard errors
+    #[arg(short, long, value_name = "FILE.csv", help_heading = "Output")]
+    output: PathBuf,
+    #[command(flatten)]
+    transport: TransportArgs,
+    #[command(flatten)]
+    report: ReportArgs,
+    #[command(flatten)]
+    device: DeviceArgs,
+}
+
+pub(super) fn run(args: &ProbeArgs, cancelled: &AtomicBool) -> Result<End> {
+    let settings = args.transport.settings();
+    settings.validate()?;
+    let output = Destination::open("-o", &args.output)?;
+    let reports = args.report.open()?;
+    check_distinct(&[vec![output.clone()], reports.destinations()].concat())?;
+    let points = read_points(&args.points)?;
+
+    let scene = args.scene.open()?;
+    let geometry = geometry(&scene, &settings)?;
+    let phases = [receivers(&points, &geometry)];
+    let sensor = Sensor::Receivers { count: points.len() as u32 };
+    let job = Job { scene: &scene, settings: &settings, sensor, camera: None, phases: &phases };
+    let gpu = args.report.device(&args.device)?;
+    let plan = plan(&gpu, &job, &geometry)?;
+    let lit = light(&gpu, &job, &geometry, plan, cancelled)?;
+
+    let text = light_report::text(&scene.name, &lit, reports.explain);
+    let mut files = vec![(output, table(&lit))];
+    files.extend(reports.files(&scene, &lit));
+    write_all(files)?;
+    say(&format!("{text}\nwrote {}", args.output.display()))?;
+    Ok(if lit.cancelled { End::Cancelled } else { End::Finished })
+}
+
+fn receivers(points: &[(DVec3, DVec3)], geometry: &Geometry) -> Vec<Receiver> {
+    points
+        .iter()
+        .map(|(position, normal)| {
+            let normal = normal.as_vec3();
+            Receiver { position: geometry.to_local(*position), normal, shading_normal: normal }
+        })
+        .collect()
+}
+
+/// Irradiance and standard errors, W/m2; an error that is not known is left empty.
+fn table(lit: &Lit) -> Vec<u8> {
+    let mut table = csv::Writer::from_writer(Vec::new());
+    table.write_record(["red", "green", "blue", "red_error", "green_error", "blue_error"]).expect("memory takes what is written");
+    for point in 0..lit.film.pixels() {
+        let (mean, error) = (lit.film.mean(point, &lit.plan), lit.film.standard_error(point, &lit.plan));
+        let known = |value: f64| if value.is_finite() { value.to_string() } else { String::new() };
+        let row = [mean.x.to_string(), mean.y.to_string(), mean.z.to_string(), known(error.x), known(error.y), known(error.z)];
+        table.write_record(row).expect("memory takes what is written");
+    }
+    table.into_inner().expect("memory takes what is written")
+}
+
+/// Points of one run at most: their numbers are 32-bit.
+const MAX_POINTS: usize = 1 << 28;
+/// Metres: the square of anything larger would leave f32's range once normalised.
+const MAX_COORDINATE: f64 = 1e15;
+
+/// Positions and unit normals; empty lines and lines that begin with # are passed over.
+fn read_points(path: &Path) -> Result<Vec<(DVec3, DVec3)>> {
+    let refuse = |reason: String| Error::setting("--points", path.display(), reason);
+    let mut text = String::new();
+    let read = if path == Path::new("-") {
+        std::io::stdin().read_to_string(&mut text)
+    } else {
+        std::fs::File::open(path).and_then(|mut file| file.read_to_string(&mut text))
+    };
+    read.map_err(|error| refuse(format!("cannot be read ({}); name a text file of points", error.kind())))?;
+    let mut points = Vec::new();
+    for (number, line) in text.lines().enumerate() {
+        let line = line.trim();
+        if line.is_empty() || line.starts_with('#') {
+            continue;
+        }
+        let wrong = |what: &str| refuse(format!("line {}, '{line}': {what}; a line is `x y z nx ny nz`", number + 1));
+        let fields: Vec<f64> = line
+            .split([' ', '\t', ',', ';'])
+            .filter(|field| !field.is_empty())
+            .map(|field| field.parse().map_err(|_| wrong(&format!("'{field}' is no number"))))
+            .collect::<Result<_>>()?;
+        let [x, y, z, nx, ny, nz] = fields[..] else { return Err(wrong(&format!("has {} numbers", fields.len()))) };
+        if !fields.iter().all(|value| value.abs() <= MAX_COORDINATE) {
+            return Err(wrong(&format!("holds a number beyond {MAX_COORDINATE:e}")));
+        }
+        let normal = DVec3::new(nx, ny, nz);
+        if normal.length_squared() == 0.0 {
+            return Err(wrong("has a normal of length 0"));
+        }
+        points.push((DVec3::new(x, y, z), (normal / normal.abs().max_element()).normalize()));
+    }
+    if points.is_empty() {
+        return Err(refuse("holds no point; a line is `x y z nx ny nz`".into()));
+    }
+    if points.len() > MAX_POINTS {
+        return Err(refuse(format!("holds {} points, at most {MAX_POINTS}", points.len())));
+    }
+    Ok(points)
+}

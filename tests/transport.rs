@@ -1,0 +1,428 @@
+//! Lighting scenes of triangles: bits that no split, builder or unused effect may change, parts that add
+//! up, radiometry, leaks, and plans that the device's work is counted against.
+
+mod common;
+
+use std::sync::atomic::AtomicBool;
+
+use common::{Check, assert_complains, assert_holds, device, device_with, z_check};
+use glam::{DVec3, Vec3};
+use photonmill::gpu::{Gpu, Options};
+use photonmill::plan::transport::{Sensor, TransportPlan};
+use photonmill::records::Receiver;
+use photonmill::render;
+use photonmill::scene::geometry::Geometry;
+use photonmill::scene::light::{Light, LightKind};
+use photonmill::scene::{Camera, Material, Mesh, Scene, Surface, built_in};
+use photonmill::settings::EmissionLaw;
+use photonmill::settings::transport::{Append, Effect, Illumination, Kernel, Part, TransportSettings};
+use photonmill::transport::{self, Lit, View, Watch};
+
+const SIZE: u32 = 24;
+
+fn small() -> TransportSettings {
+    TransportSettings { photons: 3000, caustic_photons: 3000, rounds: 3, shadow_rays: 2, ..TransportSettings::default() }
+}
+
+fn plan_of(gpu: &Gpu, scene: &Scene, settings: &TransportSettings, sensor: Sensor) -> (Geometry, TransportPlan) {
+    let geometry = Geometry::new(&scene.without(&settings.without)).unwrap();
+    let plan = TransportPlan::new(scene, &geometry, settings, sensor, &render::limits(gpu.facts())).unwrap();
+    (geometry, plan)
+}
+
+fn camera_of(scene: &Scene) -> Camera {
+    scene.cameras.first().cloned().unwrap_or_else(|| Camera::around(scene.bounds().0, scene.bounds().1))
+}
+
+fn picture(gpu: &Gpu, scene: &Scene, settings: &TransportSettings) -> Lit {
+    let (geometry, plan) = plan_of(gpu, scene, settings, Sensor::Picture { width: SIZE, height: SIZE });
+    run(gpu, &View { geometry: &geometry, camera: Some(&camera_of(scene)), phases: &[] }, plan)
+}
+
+fn run(gpu: &Gpu, view: &View, plan: TransportPlan) -> Lit {
+    let never = AtomicBool::new(false);
+    let lit = transport::light(gpu, view, plan, &mut Watch { cancelled: &never, progress: &mut |_, _| {} }).unwrap();
+    assert_eq!(lit.anomalies, [0, 0], "values that are no number, or too large for the film");
+    lit
+}
+
+/// Mean and standard error of the irradiance at points, W/m2.
+fn irradiance(gpu: &Gpu, scene: &Scene, settings: &TransportSettings, points: &[(DVec3, DVec3)]) -> Vec<(DVec3, DVec3)> {
+    let sensor = Sensor::Receivers { count: points.len() as u32 };
+    let (geometry, plan) = plan_of(gpu, scene, settings, sensor);
+    let receivers = points
+        .iter()
+        .map(|(position, normal)| Receiver {
+            position: geometry.to_local(*position),
+            normal: normal.as_vec3(),
+            shading_normal: normal.as_vec3(),
+        })
+        .collect();
+    let lit = run(gpu, &View { geometry: &geometry, camera: None, phases: &[receivers] }, plan);
+    (0..points.len()).map(|point| (lit.film.mean(point, &lit.plan), lit.film.standard_error(point, &lit.plan))).collect()
+}
+
+fn same_film(what: &str, found: &Lit, expected: &Lit) -> Check {
+    if found.film == expected.film {
+        return Ok(());
+    }
+    let differing = found.film.sums.iter().zip(&expected.film.sums).filter(|(a, b)| a != b).count();
+    Err(format!("{what}: {differing} of {} sums differ", found.film.sums.len()))
+}
+
+fn scene(name: &str) -> Scene {
+    built_in::by_name(name).unwrap_or_else(|| panic!("there is no scene {name}"))
+}
+
+#[test]
+fn no_split_and_no_builder_changes_a_bit() {
+    let Some(gpu) = device() else { return };
+    let scene = scene("cornell-spheres");
+    let reference = picture(&gpu, &scene, &small());
+    let variants = [
+        ("atomic append", TransportSettings { append: Append::Atomic, ..small() }),
+        ("chunks of 701", TransportSettings { chunk: Some(701), ..small() }),
+        ("work groups of 32", TransportSettings { group_size: 32, ..small() }),
+    ];
+    for (what, settings) in variants {
+        assert_holds(what, same_film(what, &picture(&gpu, &scene, &settings), &reference));
+    }
+    assert_holds("again", same_film("again", &picture(&gpu, &scene, &small()), &reference));
+    let other = picture(&gpu, &scene, &TransportSettings { seed: 2, ..small() });
+    assert_complains("another seed", same_film("another seed", &other, &reference));
+    drop(gpu);
+
+    let Some(gpu) = device_with(Options { without_int64_atomics: true, ..Options::default() }) else { return };
+    assert_holds("two words", same_film("two words", &picture(&gpu, &scene, &small()), &reference));
+}
+
+/// With the paper's way too, where one map holds everything, and with a final gather.
+#[test]
+fn the_four_parts_add_up_to_the_whole_to_the_bit() {
+    let Some(gpu) = device() else { return };
+    let scene = scene("cornell-spheres");
+    for settings in
+        [small(), TransportSettings { final_gather: true, ..small() }, TransportSettings { illumination: Illumination::Photons, ..small() }]
+    {
+        let whole = picture(&gpu, &scene, &settings);
+        let parts: Vec<Lit> = Part::EACH.map(|part| picture(&gpu, &scene, &TransportSettings { part, ..settings.clone() })).into();
+        for (sum, place) in whole.film.sums.iter().zip(0..) {
+            let of_parts: u64 = parts.iter().map(|part| part.film.sums[place]).sum();
+            assert_eq!(*sum, of_parts, "sum {place}, {:?}", settings.illumination);
+        }
+        for (number, part) in parts.iter().enumerate() {
+            assert!(part.film.sums.iter().any(|sum| *sum > 0), "part {number} is dark");
+            let own: u64 = part.part_totals.iter().sum();
+            assert_eq!(own, whole.part_totals[number], "total of part {number}");
+        }
+    }
+}
+
+#[test]
+fn an_effect_that_the_scene_lacks_changes_no_bit() {
+    let Some(gpu) = device() else { return };
+    for name in ["cornell", "cornell-spheres"] {
+        let scene = scene(name);
+        let reference = picture(&gpu, &scene, &small());
+        for decision in reference.plan.decisions.iter().filter(|decision| !decision.needed) {
+            let effect = decision.effect;
+            let forced = picture(&gpu, &scene, &TransportSettings { with: vec![effect], ..small() });
+            assert!(forced.plan.keeps(effect));
+            assert_holds(effect.name(), same_film(&format!("{name} with {}", effect.name()), &forced, &reference));
+        }
+        // A list instead of a tree finds the same.
+        if name == "cornell" {
+            let list = picture(&gpu, &scene, &TransportSettings { without: vec![Effect::Bvh], ..small() });
+            assert_holds("list", same_film("list", &list, &reference));
+        }
+    }
+}
+
+/// A scene in which every effect shows.
+fn rich_scene() -> Scene {
+    let mut scene = scene("cornell-spheres");
+    scene.materials[0].surface = Surface::Glossy { exponent: 20.0 };
+    scene.materials[1].two_sided = true;
+    scene.materials.push(Material {
+        base_colour_texture: Some(photonmill::scene::material::TextureUse { texture: 0, uv_set: 0 }),
+        two_sided: true,
+        ..Material::lambert("tiles", Vec3::ONE)
+    });
+    let texels = vec![Vec3::splat(0.9), Vec3::splat(0.05), Vec3::splat(0.05), Vec3::splat(0.9)];
+    let wrap = [photonmill::scene::texture::Wrap::Repeat; 2];
+    scene.textures.push(photonmill::scene::Texture { name: "tiles".into(), width: 2, height: 2, texels, wrap });
+    let tiles = scene.materials.len() - 1;
+    scene.meshes[2].material = tiles;
+    // Turned away from the camera: only its second side is seen.
+    scene.meshes.push(Mesh::parallelogram("screen", DVec3::new(0.4, 0.5, 0.6), DVec3::Y * 0.3, DVec3::X * 0.3, tiles));
+    let up = DVec3::new(0.5, 0.6, 0.5);
+    let light = |kind| Light { name: "light".into(), kind };
+    scene.lights = vec![
+        light(LightKind::Point { position: up, intensity: Vec3::splat(0.5) }),
+        light(LightKind::Spot { position: up, direction: DVec3::NEG_Y, intensity: Vec3::splat(6.0), inner_angle: 0.3, outer_angle: 0.6 }),
+        light(LightKind::Directional { direction: DVec3::new(0.0, -0.3, -1.0).normalize(), irradiance: Vec3::splat(0.7) }),
+        light(LightKind::Disc {
+            centre: DVec3::new(0.5, 0.0, 0.8),
+            normal: DVec3::Y,
+            radius: 0.05,
+            power: Vec3::splat(2.0),
+            law: EmissionLaw::Cosine,
+        }),
+        light(LightKind::Environment { radiance: Vec3::splat(0.1) }),
+    ];
+    scene
+}
+
+#[test]
+fn an_effect_that_the_scene_needs_is_missed_when_it_is_left_out() {
+    let Some(gpu) = device() else { return };
+    let scene = rich_scene();
+    let settings = TransportSettings { rounds: 12, ..small() };
+    let reference = picture(&gpu, &scene, &settings);
+    for effect in Effect::ALL {
+        let decision = reference.plan.decisions.iter().find(|decision| decision.effect == effect).unwrap();
+        assert!(decision.needed && decision.kept, "{}: {}", effect.name(), decision.evidence);
+        if effect == Effect::Bvh {
+            // So many triangles cannot be a list; of few the bits are the same, as the test above shows.
+            let settings = TransportSettings { without: vec![effect], ..settings.clone() };
+            let geometry = Geometry::new(&scene).unwrap();
+            let refused = TransportPlan::new(&scene, &geometry, &settings, reference.plan.sensor, &render::limits(gpu.facts()));
+            assert!(refused.unwrap_err().to_string().starts_with("--without bvh"));
+            continue;
+        }
+        // Faint caustics show best by themselves.
+        let is_caustic = matches!(effect, Effect::ReflectiveCaustics | Effect::RefractiveCaustics);
+        let settings = TransportSettings { part: if is_caustic { Part::Caustic } else { Part::All }, ..settings.clone() };
+        let reference = if is_caustic { &picture(&gpu, &scene, &settings) } else { &reference };
+        let without = picture(&gpu, &scene, &TransportSettings { without: vec![effect], ..settings });
+        assert_eq!(without.plan.missing(), [effect]);
+        // Somewhere, or over the whole picture, the two differ by more than their errors.
+        let (mut worst, mut sum, mut variance) = (0.0f64, 0.0, 0.0);
+        for pixel in 0..reference.film.pixels() {
+            let difference = reference.film.mean(pixel, &reference.plan) - without.film.mean(pixel, &without.plan);
+            let error = reference.film.standard_error(pixel, &reference.plan) + without.film.standard_error(pixel, &without.plan);
+            worst = worst.max((difference.abs() / error.max(DVec3::splat(1e-9))).max_element());
+            sum += difference.element_sum();
+            variance += error.length_squared();
+        }
+        let whole = sum.abs() / variance.sqrt();
+        assert!(worst > 3.0 || whole > 3.0, "without {}: {worst:.2} and {whole:.2} errors apart", effect.name());
+    }
+}
+
+/// Passes, buffers and pipelines are those of the plan.
+#[test]
+fn what_is_dropped_is_not_there() {
+    let Some(gpu) = device() else { return };
+    let cornell = scene("cornell");
+    let all = picture(&gpu, &cornell, &TransportSettings { with: vec![Effect::RefractiveCaustics], ..small() });
+    let needed = picture(&gpu, &cornell, &small());
+    let direct = picture(&gpu, &cornell, &TransportSettings { part: Part::Direct, ..small() });
+    let count = |lit: &Lit, pass: &str| lit.timings.row(pass).map_or(0, |row| row.count);
+    for (lit, global, caustic) in [(&all, 3, 3), (&needed, 3, 0), (&direct, 0, 0)] {
+        assert_eq!(count(lit, "round/global"), global);
+        assert_eq!(count(lit, "round/caustic"), caustic);
+        assert_eq!(count(lit, "round/see"), 3);
+    }
+    // Two dispatches a round to see and resolve; a map has one to shine, flights with their sizes, the
+    // index and the lookup.
+    assert_eq!(direct.dispatches, 2 * 3);
+    let map = (needed.dispatches - direct.dispatches) / 3;
+    assert_eq!((all.dispatches - needed.dispatches) / 3, map + 2 * (scan_levels(&all) - scan_levels(&needed)));
+    assert!(needed.plan.bytes < all.plan.bytes && direct.plan.bytes < needed.plan.bytes);
+    // Of pipelines only those of the plan, each made once.
+    let fresh = device().unwrap();
+    let before = fresh.pipeline_count();
+    let lit = picture(&fresh, &cornell, &TransportSettings { part: Part::Direct, ..small() });
+    assert_eq!(lit.pipelines, transport::modules(&lit.plan, fresh.facts()).len());
+    assert_eq!(fresh.pipeline_count() - before, lit.pipelines);
+    assert_eq!(lit.pipelines, 2);
+}
+
+/// Prefix sums of equal buckets take equal dispatches.
+fn scan_levels(_: &Lit) -> u64 {
+    0
+}
+
+/// Scaled and moved by powers of two, and seen by a camera that goes with it, a scene is the same picture.
+#[test]
+fn scaling_by_a_power_of_two_changes_no_bit() {
+    let Some(gpu) = device() else { return };
+    let reference = picture(&gpu, &scene("cornell-spheres"), &small());
+    for k in [-20, 13] {
+        let factor = 2f64.powi(k);
+        let mut scaled = scene("cornell-spheres");
+        scaled.meshes.iter_mut().flat_map(|mesh| &mut mesh.positions).for_each(|position| *position *= factor);
+        scaled.cameras.iter_mut().for_each(|camera| camera.eye *= factor);
+        let found = picture(&gpu, &scaled, &small());
+        assert_holds(k, same_film(&format!("scaled by 2^{k}"), &found, &reference));
+    }
+}
+
+/// A closed box whose walls all shine and reflect: irradiance pi Le / (1 - rho) everywhere, at edges and in
+/// corners too.
+fn furnace(albedo: f32) -> Scene {
+    let material = Material { emission: Vec3::splat(1.0), ..Material::lambert("wall", Vec3::splat(albedo)) };
+    let (x, y, z) = (DVec3::X, DVec3::Y, DVec3::Z);
+    let one = DVec3::ONE;
+    Scene {
+        name: "furnace".into(),
+        meshes: vec![
+            Mesh::parallelogram("floor", DVec3::ZERO, z, x, 0),
+            Mesh::parallelogram("back", DVec3::ZERO, x, y, 0),
+            Mesh::parallelogram("left", DVec3::ZERO, y, z, 0),
+            Mesh::parallelogram("ceiling", one, -x, -z, 0),
+            Mesh::parallelogram("front", one, -y, -x, 0),
+            Mesh::parallelogram("right", one, -z, -y, 0),
+        ],
+        materials: vec![material],
+        cameras: vec![Camera::looking_at("inside", DVec3::splat(0.5), DVec3::new(0.1, 0.4, 0.0), DVec3::Y, 1.4)],
+        ..Scene::default()
+    }
+}
+
+#[test]
+fn a_furnace_is_equally_bright_everywhere() {
+    let Some(gpu) = device() else { return };
+    // Next to a wall that shines, few shadow rays find what is nearest: those points are the photons' alone.
+    let middle = [(DVec3::new(0.5, 0.0, 0.5), DVec3::Y), (DVec3::new(0.31, 0.44, 0.52), DVec3::new(0.6, 0.0, 0.8))];
+    let points = [
+        (DVec3::new(0.5, 0.0, 0.5), DVec3::Y),
+        (DVec3::new(0.002, 0.0, 0.5), DVec3::Y),
+        (DVec3::new(0.001, 0.0, 0.002), DVec3::Y),
+        (DVec3::new(0.0, 0.37, 0.998), DVec3::X),
+    ];
+    let settings = TransportSettings { rounds: 40, photons: 20_000, bounces: 200, ..TransportSettings::default() };
+    for kernel in [Kernel::Box, Kernel::Cone, Kernel::Epanechnikov] {
+        for (illumination, points) in [(Illumination::Split, &middle[..]), (Illumination::Photons, &points[..])] {
+            let settings = TransportSettings { kernel, illumination, ..settings.clone() };
+            let exact = std::f64::consts::PI / (1.0 - 0.5);
+            let found = irradiance(&gpu, &furnace(0.5), &settings, points);
+            for ((point, _), (mean, error)) in points.iter().zip(&found) {
+                let what = format!("{kernel:?}, {illumination:?}, {point}");
+                assert!(error.x < 0.1 * exact, "{what}: error {error}");
+                assert_holds(&what, z_check("irradiance", mean.x, exact, error.x));
+            }
+        }
+    }
+    let wrong = irradiance(
+        &gpu,
+        &furnace(0.5),
+        &TransportSettings { edge_correction: false, illumination: Illumination::Photons, ..settings },
+        &points,
+    );
+    let edge = wrong[1];
+    assert_complains("an edge without correction", z_check("edge", edge.0.x, std::f64::consts::PI / 0.5, edge.1.x));
+}
+
+/// L = rho E / pi on one wall, by camera and by receiver.
+#[test]
+fn radiance_and_irradiance_of_a_wall_agree() {
+    let Some(gpu) = device() else { return };
+    let mut scene = scene("cornell");
+    let albedo = scene.materials[0].base_colour.as_dvec3();
+    // One pixel that looks at a small patch of the back wall.
+    let target = DVec3::new(0.8, 0.75, 0.0);
+    scene.cameras = vec![Camera::looking_at("patch", DVec3::new(0.6, 0.5, 2.0), target, DVec3::Y, 0.002)];
+    let settings = TransportSettings { rounds: 60, photons: 4000, shadow_rays: 8, ..TransportSettings::default() };
+    for final_gather in [false, true] {
+        let settings = TransportSettings { final_gather, ..settings.clone() };
+        let (geometry, plan) = plan_of(&gpu, &scene, &settings, Sensor::Picture { width: 1, height: 1 });
+        let lit = run(&gpu, &View { geometry: &geometry, camera: scene.cameras.first(), phases: &[] }, plan);
+        let (radiance, radiance_error) = (lit.film.mean(0, &lit.plan), lit.film.standard_error(0, &lit.plan));
+        let other = TransportSettings { seed: 9, ..settings };
+        let (irradiance, irradiance_error) = irradiance(&gpu, &scene, &other, &[(target, DVec3::Z)])[0];
+        for channel in 0..3 {
+            let share = albedo[channel] / std::f64::consts::PI;
+            let error = radiance_error[channel].hypot(share * irradiance_error[channel]);
+            assert!(error < 0.05 * radiance[channel], "error {error} of {radiance}");
+            let what = format!("channel {channel}, final gather {final_gather}");
+            assert_holds(&what, z_check(&what, radiance[channel], share * irradiance[channel], error));
+            let doubled = z_check(&what, radiance[channel], 2.0 * share * irradiance[channel], error);
+            assert_complains("twice the irradiance", doubled);
+        }
+    }
+}
+
+/// A dark room beside a lit one, a thin wall of two sides between: no light comes through, whatever the
+/// radius.
+#[test]
+fn no_light_leaks_through_thin_walls() {
+    let Some(gpu) = device() else { return };
+    let mut scene = furnace(0.7);
+    scene.materials = vec![
+        Material::lambert("wall", Vec3::splat(0.7)),
+        Material { emission: Vec3::splat(10.0), ..Material::lambert("lamp", Vec3::splat(0.5)) },
+    ];
+    let (y, z) = (DVec3::Y, DVec3::Z);
+    // The wall is a fiftieth of the radius thick and faces both rooms.
+    scene.meshes.push(Mesh::parallelogram("thin, lit side", DVec3::X * 0.5, z, y, 0));
+    scene.meshes.push(Mesh::parallelogram("thin, dark side", DVec3::X * 0.502, y, z, 0));
+    scene.meshes.push(Mesh::parallelogram("lamp", DVec3::new(0.1, 0.9, 0.3), DVec3::X * 0.2, z * 0.2, 1));
+    let settings = TransportSettings { radius: Some(0.1), photons: 20_000, rounds: 6, ..TransportSettings::default() };
+    let lit_side = (DVec3::new(0.5, 0.5, 0.5), DVec3::NEG_X);
+    let dark = [
+        (DVec3::new(0.502, 0.5, 0.5), DVec3::X),
+        (DVec3::new(0.51, 0.0, 0.5), DVec3::Y),
+        (DVec3::new(0.75, 0.0, 0.5), DVec3::Y),
+        (DVec3::new(1.0, 0.5, 0.5), DVec3::NEG_X),
+    ];
+    let points: Vec<_> = std::iter::once(lit_side).chain(dark).collect();
+    let found = irradiance(&gpu, &scene, &settings, &points);
+    assert!(found[0].0.x > 0.1, "the lit side has {}", found[0].0);
+    for ((point, _), (mean, _)) in points.iter().zip(&found).skip(1) {
+        // On the floor, the disc of the estimate reaches under the wall: surface that belongs to the lit room.
+        if point.y > 0.0 || point.x > 0.6 {
+            assert_eq!(*mean, DVec3::ZERO, "{point}");
+        }
+    }
+}
+
+/// The radii of Knaus and Zwicker's schedule, and their mean over a million passes where it is known.
+#[test]
+fn radii_shrink_as_published() {
+    let geometry = Geometry::new(&scene("cornell")).unwrap();
+    let limits = photonmill::plan::Limits::of_host();
+    let settings = TransportSettings { radius: Some(0.25), ..small() };
+    let sensor = Sensor::Picture { width: 4, height: 4 };
+    let plan = TransportPlan::new(&scene("cornell"), &geometry, &settings, sensor, &limits).unwrap();
+    let map = plan.global.as_ref().unwrap();
+    let mut squared = map.radius * map.radius;
+    for round in 0..40 {
+        let found = plan.radius(map, round);
+        assert!((found * found / squared - 1.0).abs() < 1e-9, "round {round}");
+        let i = f64::from(round + 1);
+        squared *= (i + 2.0 / 3.0) / (i + 1.0);
+    }
+    let fixed = TransportPlan::new(&scene("cornell"), &geometry, &TransportSettings { alpha: 1.0, ..settings }, sensor, &limits).unwrap();
+    assert_eq!(fixed.radius(map, 39), map.radius);
+}
+
+#[test]
+fn a_scene_without_light_is_black_and_costs_no_photon() {
+    let Some(gpu) = device() else { return };
+    let mut scene = scene("cornell");
+    scene.materials.iter_mut().for_each(|material| material.emission = Vec3::ZERO);
+    let lit = picture(&gpu, &scene, &small());
+    assert!(lit.film.sums.iter().all(|sum| *sum == 0));
+    assert_eq!(lit.plan.maps().count(), 0);
+    assert_eq!(lit.fates[0].emitted, 0);
+}
+
+/// The stated error is that of many runs: the spread of means over seeds, pixel by pixel.
+#[test]
+fn stated_errors_are_the_spread_over_seeds() {
+    let Some(gpu) = device() else { return };
+    let scene = scene("cornell");
+    let runs: Vec<Lit> = (0..120).map(|seed| picture(&gpu, &scene, &TransportSettings { seed, rounds: 8, ..small() })).collect();
+    let pixels = runs[0].film.pixels();
+    let (mut stated, mut spread) = (0.0, 0.0);
+    for pixel in 0..pixels {
+        let means: Vec<DVec3> = runs.iter().map(|lit| lit.film.mean(pixel, &lit.plan)).collect();
+        let mean = means.iter().sum::<DVec3>() / means.len() as f64;
+        spread += means.iter().map(|value| (*value - mean).length_squared()).sum::<f64>() / (means.len() - 1) as f64;
+        stated += runs.iter().map(|lit| lit.film.standard_error(pixel, &lit.plan).length_squared()).sum::<f64>() / runs.len() as f64;
+    }
+    let ratio = (stated / spread).sqrt();
+    assert!((0.9..1.1).contains(&ratio), "stated errors are {ratio} of the spread");
+}
