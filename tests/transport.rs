@@ -153,6 +153,9 @@ fn rich_scene() -> Scene {
     scene.textures.push(photonmill::scene::Texture { name: "tiles".into(), width: 2, height: 2, texels, wrap });
     let tiles = scene.materials.len() - 1;
     scene.meshes[2].material = tiles;
+    // Coarse enough for its smooth normals to matter.
+    let mirror = scene.meshes.iter_mut().find(|mesh| mesh.name == "mirror sphere").unwrap();
+    *mirror = Mesh::sphere("mirror sphere", DVec3::new(0.3, 0.19, 0.34), 0.18, 10, mirror.material);
     // Turned away from the camera: only its second side is seen.
     scene.meshes.push(Mesh::parallelogram("screen", DVec3::new(0.4, 0.5, 0.6), DVec3::Y * 0.3, DVec3::X * 0.3, tiles));
     let up = DVec3::new(0.5, 0.6, 0.5);

@@ -2,18 +2,56 @@
 
 use glam::{DVec3, Vec3};
 
+use super::closed_forms;
+use super::light::{Light, LightKind};
 use super::material::{Material, Surface};
+use super::open_box;
+use super::room::face_axis;
 use super::{Camera, Mesh, Scene};
+use crate::settings::Settings;
 
-pub const NAMES: [&str; 3] = ["cornell", "cornell-spheres", "caustic-sphere"];
+/// Every built-in scene, those of [`closed_forms`] last.
+pub fn names() -> Vec<&'static str> {
+    [&["open-box", "cornell", "cornell-spheres", "caustic-sphere"], &closed_forms::NAMES[..]].concat()
+}
 
 pub fn by_name(name: &str) -> Option<Scene> {
     match name {
+        "open-box" => Some(open_box()),
         "cornell" => Some(cornell()),
         "cornell-spheres" => Some(cornell_spheres()),
         "caustic-sphere" => Some(caustic_sphere()),
-        _ => None,
+        _ => closed_forms::by_name(name),
     }
+}
+
+/// The paper's box, lamps of the default settings; the walls take the Phong exponents they are given there.
+fn open_box() -> Scene {
+    let settings = Settings::default();
+    let room = open_box::open_box(&settings);
+    let mut scene = Scene { name: room.name.into(), ..Scene::default() };
+    for (face, wall) in room.walls() {
+        let rectangle = room.rectangle(face);
+        // u x v looks along the positive axis; the wall faces into the room.
+        let (_, sign) = face_axis(face);
+        let (u, v) = if sign < 0.0 { (rectangle.u, rectangle.v) } else { (rectangle.v, rectangle.u) };
+        let surface = wall.shininess.map_or(Surface::Lambert, |exponent| Surface::PaperPhong { exponent });
+        scene.materials.push(Material { surface, ..Material::lambert(wall.name, Vec3::splat(wall.albedo)) });
+        scene.meshes.push(Mesh::parallelogram(wall.name, rectangle.origin, u, v, scene.materials.len() - 1));
+    }
+    for light in &room.lights {
+        let (axis, sign) = face_axis(light.face);
+        let kind = LightKind::Disc {
+            centre: room.rectangle(light.face).centre(),
+            normal: -sign * DVec3::AXES[axis],
+            radius: light.radius,
+            power: Vec3::splat(light.power as f32),
+            law: settings.emission,
+        };
+        scene.lights.push(Light { name: format!("lamp on face {}", light.face), kind });
+    }
+    scene.cameras.push(Camera::looking_at("front", DVec3::new(0.0, 0.0, 1.0), DVec3::ZERO, DVec3::Y, 0.7));
+    scene
 }
 
 /// Edge of the Cornell box, metres.
@@ -113,7 +151,7 @@ mod tests {
 
     #[test]
     fn every_name_is_a_lit_scene() {
-        for name in NAMES {
+        for name in names() {
             let scene = by_name(name).unwrap();
             assert_eq!(scene.name, name);
             assert!(scene.is_lit() && scene.triangle_count() > 0 && !scene.cameras.is_empty(), "{name}");

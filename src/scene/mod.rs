@@ -4,6 +4,7 @@
 pub mod built_in;
 pub mod bvh;
 pub mod camera;
+pub mod closed_forms;
 pub mod geometry;
 pub mod gltf;
 pub mod light;
@@ -51,7 +52,7 @@ impl Scene {
         let path = Path::new(name);
         match path.extension().and_then(|extension| extension.to_str()).map(str::to_lowercase).as_deref() {
             Some("gltf" | "glb") => gltf::load(path, radiometric),
-            _ => Err(Error::setting("SCENE", name, format!("must be a .gltf or .glb file, or one of {}", built_in::NAMES.join(", ")))),
+            _ => Err(Error::setting("SCENE", name, format!("must be a .gltf or .glb file, or one of {}", built_in::names().join(", ")))),
         }
     }
 
