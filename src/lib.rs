@@ -15,7 +15,7 @@
 //! ```text
 //! constants, records, error, ledger, rng, settings, timings < scene < plan < cpu
 //! constants, records, error, ledger, timings < gpu
-//! plan, gpu < resources < trace < index < estimate < film < render < output < paper < cli
+//! plan, gpu < resources < trace < index < estimate < film < render < output < bake < paper < cli
 //! ```
 //!
 //! [`gpu`] knows no photon; [`scene`] and [`plan`] know no Vulkan; `tests/architecture.rs` checks it.
@@ -43,6 +43,7 @@
 //! [`records`] and `glsl/records.glsl`; `tests/layout.rs` compares them. Numbers that both languages
 //! need stand in [`constants`] only. Every GLSL function of transport has a Rust twin under [`cpu`].
 
+pub mod bake;
 pub mod cli;
 pub mod constants;
 pub mod cpu;

@@ -24,7 +24,7 @@ impl ColourPicture {
         let (width, height) = (self.width, self.height);
         match format {
             Format::Exr => {
-                let values: Vec<f32> = self.pixels.iter().flat_map(|pixel| pixel.to_array()).collect();
+                let values: Vec<f32> = self.pixels.iter().flat_map(Vec3::to_array).collect();
                 OpenExrEncoder::new(&mut bytes).write_image(bytemuck::cast_slice(&values), width, height, ExtendedColorType::Rgb32F)
             }
             Format::Png => {
@@ -78,7 +78,7 @@ mod tests {
         let pixels = vec![Vec3::new(0.0, 1e-6, 12345.678), Vec3::splat(3.0)];
         let picture = ColourPicture { width: 2, height: 1, pixels: pixels.clone() };
         let read = image::load_from_memory(&picture.encode(Format::Exr, 5.0)).unwrap().into_rgb32f();
-        let values: Vec<f32> = pixels.iter().flat_map(|pixel| pixel.to_array()).collect();
+        let values: Vec<f32> = pixels.iter().flat_map(Vec3::to_array).collect();
         assert_eq!(read.into_raw(), values);
     }
 

@@ -105,7 +105,7 @@ pub fn check_distinct(destinations: &[Destination]) -> Result<()> {
 }
 
 /// Writes every file, or none: all are there under temporary names before the first gets its own.
-pub fn write_all(files: Vec<(Destination, Vec<u8>)>) -> Result<()> {
+pub fn write_all(files: impl IntoIterator<Item = (Destination, Vec<u8>)>) -> Result<()> {
     let mut staged = Vec::new();
     for (destination, content) in files {
         let target = destination.target();

@@ -111,7 +111,7 @@ impl Geometry {
             unit,
             bounds: (local(min), local(max)),
             radius: (0.5 * (max - min).length() / unit) * 1.001,
-            area: triangles.iter().map(|triangle| area(triangle)).sum(),
+            area: triangles.iter().map(area).sum(),
             nodes,
             triangles,
             sources,

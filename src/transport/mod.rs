@@ -43,6 +43,15 @@ pub struct View<'a> {
     pub phases: &'a [Vec<Receiver>],
 }
 
+/// One round of a run: what its stages share.
+#[derive(Clone, Copy)]
+pub struct Round<'a> {
+    pub resources: &'a TransportResources,
+    pub geometry: &'a Geometry,
+    pub plan: &'a TransportPlan,
+    pub number: u32,
+}
+
 /// How a caller watches a run and ends it early.
 pub struct Watch<'a> {
     /// Set from outside to end the run after the round that is under way.
@@ -108,9 +117,11 @@ pub fn light(gpu: &Gpu, view: &View, plan: TransportPlan, watch: &mut Watch) -> 
 
     let mut fates = [Fates::new(plan.settings.bounces), Fates::new(plan.settings.bounces)];
     let (mut done, mut settled, mut cancelled) = (0, 0, false);
-    for round in 0..plan.settings.rounds {
-        commands.scope("round", |commands| one_round(commands, &resources, view, &plan, round))?;
-        done = round + 1;
+    for number in 0..plan.settings.rounds {
+        commands.scope("round", |commands| {
+            one_round(commands, view, Round { resources: &resources, geometry: view.geometry, plan: &plan, number })
+        })?;
+        done = number + 1;
         let last = done == plan.settings.rounds;
         // Tallies are 32-bit on the device.
         let open = u64::from(done - settled + 1) * plan.maps().map(|map| u64::from(map.photons)).max().unwrap_or(0);
@@ -146,39 +157,32 @@ pub fn light(gpu: &Gpu, view: &View, plan: TransportPlan, watch: &mut Watch) -> 
     })
 }
 
-fn one_round(commands: &mut Commands, resources: &TransportResources, view: &View, plan: &TransportPlan, round: u32) -> Result<()> {
-    commands.scope("see", |commands| points::see(commands, resources, view.geometry, plan, view.camera, round))?;
+fn one_round(commands: &mut Commands, view: &View, round: Round) -> Result<()> {
+    let Round { resources, plan, .. } = round;
+    commands.scope("see", |commands| points::see(commands, round, view.camera))?;
     let sums = 3 * u64::from(plan.visible_points()) * u64::from(plan.arrival_sets);
     if let Some(photons) = &resources.photons {
         commands.fill(&resources.estimates, 0, 2 * sums, 0);
         for map in plan.maps() {
-            commands.scope(map.name, |commands| one_map(commands, resources, photons, view.geometry, plan, map, round))?;
+            commands.scope(map.name, |commands| one_map(commands, round, photons, map))?;
         }
     }
-    commands.scope("resolve", |commands| points::resolve(commands, resources, view.geometry, plan, round))
+    commands.scope("resolve", |commands| points::resolve(commands, round))
 }
 
 /// Work of one flight of a photon, in the plan's units.
 const WORK_PER_PHOTON: u64 = 256;
 
-fn one_map(
-    commands: &mut Commands,
-    resources: &TransportResources,
-    photons: &PhotonBuffers,
-    geometry: &Geometry,
-    plan: &TransportPlan,
-    map: &MapPlan,
-    round: u32,
-) -> Result<()> {
+fn one_map(commands: &mut Commands, round: Round, photons: &PhotonBuffers, map: &MapPlan) -> Result<()> {
     for chunk in map.chunks() {
-        if commands.timestamps_left() < TIMESTAMPS_PER_ROUND || commands.work() >= plan.work_per_submission {
+        if commands.timestamps_left() < TIMESTAMPS_PER_ROUND || commands.work() >= round.plan.work_per_submission {
             commands.submit()?;
         }
-        let cells = photons::cells(geometry, plan, map, round);
-        commands.scope("trace", |commands| photons::trace(commands, resources, photons, geometry, plan, map, round, chunk))?;
+        let cells = photons::cells(round, map);
+        commands.scope("trace", |commands| photons::trace(commands, round, photons, map, chunk))?;
         commands.add_work(WORK_PER_PHOTON * u64::from(chunk.1));
-        commands.scope("index", |commands| photons::index(commands, photons, plan, &cells))?;
-        commands.scope("look up", |commands| points::look_up(commands, resources, photons, plan, map, cells, round))?;
+        commands.scope("index", |commands| photons::index(commands, photons, round.plan, &cells))?;
+        commands.scope("look up", |commands| points::look_up(commands, round, photons, map, cells))?;
     }
     Ok(())
 }

@@ -1,5 +1,6 @@
 //! Photons of a chunk through a scene of triangles, and the index of their map.
 
+use super::Round;
 use super::resources::{PhotonBuffers, TransportResources};
 use crate::error::Result;
 use crate::gpu::kernels::{DispatchSize, FlyAtomic, FlyBallot, MapCount, MapScatter, Shine};
@@ -8,15 +9,14 @@ use crate::index::scan;
 use crate::plan::transport::{MapPlan, TransportPlan};
 use crate::records::{CellPush, DispatchSizePush, Draws, EmissionPush, FlightPush};
 use crate::rng::words;
-use crate::scene::geometry::Geometry;
 use crate::settings::transport::Append;
 use crate::trace::INDIRECT_GROUPS_X;
 
 /// The grid of a map in a round: cells as wide as the radius, its corner a little outside of the scene.
-pub fn cells(geometry: &Geometry, plan: &TransportPlan, map: &MapPlan, round: u32) -> CellPush {
-    let radius = plan.radius(map, round) as f32;
+pub fn cells(round: Round, map: &MapPlan) -> CellPush {
+    let radius = round.plan.radius(map, round.number) as f32;
     CellPush {
-        origin: geometry.bounds.0 - 4.0 * radius,
+        origin: round.geometry.bounds.0 - 4.0 * radius,
         cells_per_unit: 1.0 / radius,
         bucket_mask: map.bucket_count - 1,
         photon_capacity: map.capacity,
@@ -26,15 +26,13 @@ pub fn cells(geometry: &Geometry, plan: &TransportPlan, map: &MapPlan, round: u3
 /// Traces the photons of a chunk into the map and adds their fates to its tallies.
 pub fn trace(
     commands: &mut Commands,
-    resources: &TransportResources,
+    round: Round,
     photons: &PhotonBuffers,
-    geometry: &Geometry,
-    plan: &TransportPlan,
     map: &MapPlan,
-    round: u32,
     (first_photon, photon_count): (u32, u32),
 ) -> Result<()> {
-    let draws = Draws { seed: words(plan.settings.seed), round, domain: map.domain };
+    let Round { resources, geometry, plan, number } = round;
+    let draws = Draws { seed: words(plan.settings.seed), round: number, domain: map.domain };
     let TransportResources { nodes, triangles, normals, uvs, materials, textures, texels, emitters, .. } = resources;
     let PhotonBuffers { paths: [even, odd], counters, dispatch_args, tallies, .. } = photons;
     commands.fill(counters, 0, u64::from(map.bounces) + 2, 0);

@@ -1,6 +1,7 @@
 //! What the sensor sees: visible points and known light at the start of a round, density estimates of the
 //! maps, and the film at its end.
 
+use super::Round;
 use super::resources::{PhotonBuffers, TransportResources};
 use crate::constants::{DOMAIN_CAMERA, DOMAIN_RECEIVERS};
 use crate::error::Result;
@@ -10,7 +11,6 @@ use crate::plan::transport::{MapPlan, Sensor, TransportPlan};
 use crate::records::{CellPush, DispatchSizePush, Draws, LookupPush, ReceivePush, ResolvePush, ViewPush};
 use crate::rng::words;
 use crate::scene::Camera;
-use crate::scene::geometry::Geometry;
 
 /// Most groups along y that any device must allow.
 const MAX_GROUPS_Y: u32 = 65_535;
@@ -29,14 +29,8 @@ fn add_work(commands: &mut Commands, plan: &TransportPlan, work: u64) -> Result<
 }
 
 /// Finds the visible points of a round and writes the light that needs no photons.
-pub fn see(
-    commands: &mut Commands,
-    resources: &TransportResources,
-    geometry: &Geometry,
-    plan: &TransportPlan,
-    camera: Option<&Camera>,
-    round: u32,
-) -> Result<()> {
+pub fn see(commands: &mut Commands, round: Round, camera: Option<&Camera>) -> Result<()> {
+    let Round { resources, geometry, plan, number: round } = round;
     let TransportResources { nodes, triangles, normals, uvs, materials, textures, texels, emitters, .. } = resources;
     let TransportResources { visible_points, pass_sums, part_totals, anomalies, .. } = resources;
     let step = plan.pixels_at_once(plan.rays_per_pixel());
@@ -114,15 +108,8 @@ pub fn see(
 }
 
 /// Adds a chunk of a map to the estimates of all visible points.
-pub fn look_up(
-    commands: &mut Commands,
-    resources: &TransportResources,
-    photons: &PhotonBuffers,
-    plan: &TransportPlan,
-    map: &MapPlan,
-    cells_push: CellPush,
-    round: u32,
-) -> Result<()> {
+pub fn look_up(commands: &mut Commands, round: Round, photons: &PhotonBuffers, map: &MapPlan, cells_push: CellPush) -> Result<()> {
+    let Round { resources, plan, number: round, .. } = round;
     let PhotonBuffers { cells, sorted_map, longest, dispatch_args, .. } = photons;
     let TransportResources { visible_points, estimates, .. } = resources;
     let point_count = plan.visible_points();
@@ -157,13 +144,8 @@ pub fn look_up(
 }
 
 /// Ends a round: estimates and known light go to the film.
-pub fn resolve(
-    commands: &mut Commands,
-    resources: &TransportResources,
-    geometry: &Geometry,
-    plan: &TransportPlan,
-    round: u32,
-) -> Result<()> {
+pub fn resolve(commands: &mut Commands, round: Round) -> Result<()> {
+    let Round { resources, geometry, plan, number: round } = round;
     let TransportResources { nodes, triangles, normals, uvs, materials, textures, texels, visible_points, .. } = resources;
     let TransportResources { pass_sums, estimates, film_sums, film_squares, part_totals, anomalies, .. } = resources;
     let radius = |map: &Option<MapPlan>| map.as_ref().map_or(1.0, |map| plan.radius(map, round)) as f32;
