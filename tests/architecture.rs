@@ -8,8 +8,23 @@ use std::path::{Path, PathBuf};
 /// What everyone may use, and what among itself has no order.
 const GROUND: [&str; 7] = ["error", "constants", "records", "ledger", "rng", "settings", "timings"];
 /// From left to right.
-const LINE: [&str; 14] =
-    ["scene", "plan", "gpu", "resources", "trace", "index", "estimate", "film", "render", "output", "bake", "paper", "cli", "main"];
+const LINE: [&str; 15] = [
+    "scene",
+    "plan",
+    "gpu",
+    "resources",
+    "trace",
+    "index",
+    "estimate",
+    "film",
+    "render",
+    "transport",
+    "output",
+    "bake",
+    "paper",
+    "cli",
+    "main",
+];
 /// Beside the line: seen by `render` and what follows it.
 const CPU: &str = "cpu";
 

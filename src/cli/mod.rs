@@ -1,6 +1,7 @@
 //! The command line: clap structs turned into settings, one file a subcommand. Nothing else knows
 //! clap.
 
+mod bake;
 mod devices;
 mod paper;
 mod plan;
@@ -40,6 +41,8 @@ enum Command {
     Devices(devices::DevicesArgs),
     /// Renders what a camera sees of a scene
     Render(render::RenderArgs),
+    /// Bakes the irradiance of every surface into lightmaps
+    Bake(bake::BakeArgs),
     /// Asks for the irradiance at given points of a scene
     Probe(probe::ProbeArgs),
     /// Prints which effects a scene calls for, and why
@@ -103,6 +106,7 @@ pub fn main() -> u8 {
         None => run::run(&cli.run, &cancelled),
         Some(Command::Devices(args)) => devices::run(&args).map(|()| End::Finished),
         Some(Command::Render(args)) => render::run(&args, &cancelled),
+        Some(Command::Bake(args)) => bake::run(&args, &cancelled),
         Some(Command::Probe(args)) => probe::run(&args, &cancelled),
         Some(Command::Plan(args)) => plan::run(&args).map(|()| End::Finished),
         Some(Command::Paper(args)) => paper::run(&args, &cancelled),

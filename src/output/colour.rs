@@ -20,20 +20,10 @@ pub struct ColourPicture {
 impl ColourPicture {
     /// `stops` doubles the brightness of a PNG so many times; an EXR holds the values untouched.
     pub fn encode(&self, format: Format, stops: f32) -> Vec<u8> {
-        let mut bytes = Cursor::new(Vec::new());
-        let (width, height) = (self.width, self.height);
         match format {
-            Format::Exr => {
-                let values: Vec<f32> = self.pixels.iter().flat_map(Vec3::to_array).collect();
-                OpenExrEncoder::new(&mut bytes).write_image(bytemuck::cast_slice(&values), width, height, ExtendedColorType::Rgb32F)
-            }
-            Format::Png => {
-                let codes: Vec<u8> = self.pixels.iter().flat_map(|pixel| (*pixel * stops.exp2()).to_array().map(srgb_code)).collect();
-                PngEncoder::new(&mut bytes).write_image(&codes, width, height, ExtendedColorType::Rgb8)
-            }
+            Format::Exr => exr(self.width, self.height, &self.pixels),
+            Format::Png => png(self.width, self.height, self.pixels.iter().map(|pixel| *pixel * stops.exp2())),
         }
-        .expect("a picture in memory can be encoded");
-        bytes.into_inner()
     }
 
     /// Stops that bring the mean luminance of what is not brighter than ten times the median to a
@@ -50,6 +40,33 @@ impl ColourPicture {
         let mean = usual.iter().sum::<f64>() / usual.len() as f64;
         (0.18 / mean).log2() as f32
     }
+}
+
+/// Three 32-bit float channels, values untouched, row by row.
+pub fn exr(width: u32, height: u32, values: &[Vec3]) -> Vec<u8> {
+    let bytes: Vec<u8> = values.iter().flat_map(Vec3::to_array).flat_map(f32::to_ne_bytes).collect();
+    let mut file = Cursor::new(Vec::new());
+    OpenExrEncoder::new(&mut file)
+        .write_image(&bytes, width, height, ExtendedColorType::Rgb32F)
+        .expect("a picture in memory can be encoded");
+    file.into_inner()
+}
+
+/// Linear values as 8-bit sRGB, clamped to 0 to 1.
+pub fn png(width: u32, height: u32, values: impl Iterator<Item = Vec3>) -> Vec<u8> {
+    eight_bits(width, height, values.map(|value| value.to_array().map(srgb_code)))
+}
+
+/// Linear values as they are in 8 bits, clamped to 0 to 1.
+pub fn linear_png(width: u32, height: u32, values: impl Iterator<Item = Vec3>) -> Vec<u8> {
+    eight_bits(width, height, values.map(|value| value.to_array().map(|channel| (channel.clamp(0.0, 1.0) * 255.0).round() as u8)))
+}
+
+fn eight_bits(width: u32, height: u32, pixels: impl Iterator<Item = [u8; 3]>) -> Vec<u8> {
+    let bytes: Vec<u8> = pixels.flatten().collect();
+    let mut file = Vec::new();
+    PngEncoder::new(&mut file).write_image(&bytes, width, height, ExtendedColorType::Rgb8).expect("a picture in memory can be encoded");
+    file
 }
 
 fn luminance(colour: Vec3) -> f32 {
@@ -70,7 +87,10 @@ mod tests {
     #[test]
     fn codes_meet_the_standard() {
         assert_eq!([0.0, 1.0, 2.0, 0.5, 0.18].map(srgb_code), [0, 255, 255, 188, 118]);
-        assert_eq!(srgb_code(f32::NAN), 0);
+        assert_eq!([f32::NAN, -1.0, f32::INFINITY].map(srgb_code), [0, 0, 255]);
+        for code in 0..=255 {
+            assert_eq!(srgb_code(crate::scene::texture::linear_of_srgb(code)), code);
+        }
     }
 
     #[test]

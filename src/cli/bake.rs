@@ -1,0 +1,113 @@
+//! `photonmill bake`: irradiance of every surface as lightmaps, and the scene with them assigned.
+
+use std::path::PathBuf;
+use std::sync::atomic::AtomicBool;
+
+use clap::Args;
+use glam::DVec3;
+
+use super::run::number;
+use super::transport::{Job, ReportArgs, SceneArgs, TransportArgs, geometry, light, plan};
+use super::{DeviceArgs, End, complain, say};
+use crate::bake::{self, Layout, PHASE_COUNT, TexelEstimate};
+use crate::error::{Error, Result};
+use crate::output::colour::ColourPicture;
+use crate::output::destination::{Folder, check_distinct, write_all};
+use crate::output::light_report;
+use crate::plan::transport::Sensor;
+use crate::records::Receiver;
+use crate::scene::Scene;
+use crate::scene::geometry::Geometry;
+use crate::transport::Lit;
+
+#[derive(Args)]
+pub(super) struct BakeArgs {
+    #[command(flatten)]
+    scene: SceneArgs,
+    /// Folder for the maps and the scene; made if it is not there
+    #[arg(short, long, value_name = "DIR", help_heading = "Output")]
+    output: PathBuf,
+    /// Texels along a metre of surface [default: so that all maps have about 65 536 texels]
+    #[arg(long, value_name = "N", value_parser = number::<f64>, allow_negative_numbers = true, help_heading = "Scene")]
+    texels_per_metre: Option<f64>,
+    /// Brightness of the PNGs in stops: each doubles it [default: so that the mean is a middle grey]
+    #[arg(long, value_name = "STOPS", value_parser = number::<f32>, allow_negative_numbers = true, help_heading = "Output")]
+    exposure: Option<f32>,
+    #[command(flatten)]
+    transport: TransportArgs,
+    #[command(flatten)]
+    report: ReportArgs,
+    #[command(flatten)]
+    device: DeviceArgs,
+}
+
+pub(super) fn run(args: &BakeArgs, cancelled: &AtomicBool) -> Result<End> {
+    let settings = args.transport.settings();
+    settings.validate()?;
+    if let Some(exposure) = args.exposure.filter(|stops| stops.is_nan() || stops.abs() > 64.0) {
+        return Err(Error::setting("--exposure", exposure, "must be from -64 to 64 stops"));
+    }
+    let folder = Folder::open("-o", &args.output)?;
+    let reports = args.report.open()?;
+    check_distinct(&reports.destinations())?;
+
+    let scene = args.scene.open()?;
+    let layout = Layout::new(&scene, args.texels_per_metre.unwrap_or_else(|| usual_density(&scene)))?;
+    layout.warnings.iter().for_each(|warning| complain(&format!("warning: {warning}")));
+    let geometry = geometry(&scene, &settings)?;
+    // Each round asks for one point of every texel, a different one in turn.
+    let phases: Vec<Vec<Receiver>> =
+        (0..PHASE_COUNT.min(settings.rounds as usize)).map(|phase| receivers(&layout, phase, &geometry)).collect();
+    let sensor = Sensor::Receivers { count: layout.texel_count() as u32 };
+    let job = Job { scene: &scene, settings: &settings, sensor, camera: None, phases: &phases };
+    let gpu = args.report.device(&args.device)?;
+    let plan = plan(&gpu, &job, &geometry)?;
+    let lit = light(&gpu, &job, &geometry, plan, cancelled)?;
+
+    let estimates = estimates(&lit);
+    let stops = args.exposure.unwrap_or_else(|| usual_exposure(&estimates));
+    bake::write(&folder, &scene, &layout, &layout.maps(&estimates), stops.exp2())?;
+    let text = light_report::text(&scene.name, &lit, reports.explain);
+    write_all(reports.files(&scene, &lit))?;
+    let maps = layout.lightmaps().count();
+    let document = args.output.join("scene.gltf");
+    say(&format!("{text}\nwrote {maps} lightmap(s) of {} texels and {} at {stops:+.2} stops", layout.texel_count(), document.display()))?;
+    Ok(if lit.cancelled { End::Cancelled } else { End::Finished })
+}
+
+/// Texels of all maps together, unless the user asks for a density.
+const USUAL_TEXELS: f64 = 65_536.0;
+
+fn usual_density(scene: &Scene) -> f64 {
+    let baked = scene.meshes.iter().filter(|mesh| !scene.materials[mesh.material].surface.is_specular());
+    let area: f64 = baked.map(|mesh| (0..mesh.triangles.len()).map(|triangle| mesh.area(triangle)).sum::<f64>()).sum();
+    (USUAL_TEXELS / area.max(f64::MIN_POSITIVE)).sqrt()
+}
+
+fn receivers(layout: &Layout, phase: usize, geometry: &Geometry) -> Vec<Receiver> {
+    layout
+        .phase(phase)
+        .iter()
+        .map(|sample| Receiver {
+            position: geometry.to_local(sample.position),
+            normal: sample.geometric_normal.as_vec3(),
+            shading_normal: sample.shading_normal.as_vec3(),
+        })
+        .collect()
+}
+
+fn estimates(lit: &Lit) -> Vec<TexelEstimate> {
+    // Of a single round no error is known; a map cannot say so but by a value that is no number.
+    let known = |error: DVec3| if error.is_finite() { error.as_vec3() } else { glam::Vec3::NAN };
+    (0..lit.film.pixels())
+        .map(|texel| TexelEstimate {
+            irradiance: lit.film.mean(texel, &lit.plan).as_vec3(),
+            standard_error: known(lit.film.standard_error(texel, &lit.plan)),
+        })
+        .collect()
+}
+
+fn usual_exposure(estimates: &[TexelEstimate]) -> f32 {
+    let pixels = estimates.iter().map(|estimate| estimate.irradiance / std::f32::consts::PI).collect();
+    ColourPicture { width: estimates.len() as u32, height: 1, pixels }.usual_exposure()
+}

@@ -1,0 +1,659 @@
+//! Lightmaps without their light: coordinates that do not overlap, texels that lie on their triangles,
+//! filled gutters, files that hold what they were given and open again.
+
+use std::collections::{BTreeMap, BTreeSet};
+use std::path::Path;
+
+use glam::{DVec2, DVec3, Vec3};
+use photonmill::bake::{self, Layout, MAX_SIDE, Map, MeshLightmap, PHASE_COUNT, TexelEstimate};
+use photonmill::output::destination::Folder;
+use photonmill::scene::light::{Light, LightKind};
+use photonmill::scene::material::TextureUse;
+use photonmill::scene::texture::Wrap;
+use photonmill::scene::{Camera, Material, Mesh, Scene, Surface, Texture};
+
+const BLENDER: &str = concat!(env!("CARGO_MANIFEST_DIR"), "/tests/scenes/blender.glb");
+
+fn open(name: &str) -> Scene {
+    Scene::open(name, false).unwrap()
+}
+
+/// A scene of one white mesh.
+fn scene_of(mesh: Mesh) -> Scene {
+    Scene { name: "one".into(), meshes: vec![mesh], materials: vec![Material::lambert("white", Vec3::splat(0.5))], ..Scene::default() }
+}
+
+/// The lightmap of one white mesh, and what was warned of.
+fn lightmap_of(mesh: Mesh, texels_per_metre: f64) -> (MeshLightmap, Vec<String>) {
+    let mut layout = Layout::new(&scene_of(mesh), texels_per_metre).unwrap();
+    (layout.meshes.remove(0).unwrap(), layout.warnings)
+}
+
+/// A bumpy sheet with handles: no plane, no sphere.
+fn torus(rings: u32, sides: u32) -> Mesh {
+    let mut mesh = Mesh { name: "torus".into(), ..Mesh::default() };
+    for ring in 0..rings {
+        for side in 0..sides {
+            let (a, b) =
+                (f64::from(ring) / f64::from(rings) * std::f64::consts::TAU, f64::from(side) / f64::from(sides) * std::f64::consts::TAU);
+            let radius = 0.35 * (1.0 + 0.2 * (3.0 * a).sin());
+            let out = DVec3::new(a.cos(), 0.0, a.sin());
+            mesh.positions.push(out * (1.0 + radius * b.cos()) + DVec3::Y * radius * b.sin());
+            let vertex = |r: u32, s: u32| r % rings * sides + s % sides;
+            let [p, q, r, s] = [vertex(ring, side), vertex(ring, side + 1), vertex(ring + 1, side + 1), vertex(ring + 1, side)];
+            mesh.triangles.extend([[p, q, r], [p, r, s]]);
+        }
+    }
+    mesh
+}
+
+/// Texel centres of a fine grid that lie well inside more than one triangle.
+fn doubly_claimed(lightmap: &MeshLightmap) -> usize {
+    let (columns, rows) = (4 * lightmap.width as usize, 4 * lightmap.height as usize);
+    let mut claims = vec![0u8; columns * rows];
+    for triangle in &lightmap.mesh.triangles {
+        let size = DVec2::new(columns as f64, rows as f64);
+        let [a, b, c] = triangle.map(|vertex| lightmap.uvs[vertex as usize] * size);
+        let area = (b - a).perp_dot(c - a);
+        let (low, high) = (a.min(b).min(c), a.max(b).max(c));
+        for j in low.y.max(0.0) as usize..(high.y.ceil() as usize).min(rows) {
+            for i in low.x.max(0.0) as usize..(high.x.ceil() as usize).min(columns) {
+                let p = DVec2::new(i as f64 + 0.5, j as f64 + 0.5);
+                let inside = [(a, b), (b, c), (c, a)].iter().all(|(from, to)| (*to - *from).perp_dot(p - *from) / area > 1e-3);
+                claims[j * columns + i] += u8::from(inside);
+            }
+        }
+    }
+    claims.iter().filter(|claims| **claims > 1).count()
+}
+
+/// Area that the triangle has in the map, texels.
+fn texel_area(lightmap: &MeshLightmap, triangle: usize) -> f64 {
+    let size = DVec2::new(lightmap.width.into(), lightmap.height.into());
+    let [a, b, c] = lightmap.mesh.triangles[triangle].map(|vertex| lightmap.uvs[vertex as usize] * size);
+    0.5 * (b - a).perp_dot(c - a).abs()
+}
+
+#[test]
+fn unwrapped_meshes_do_not_overlap_and_keep_their_density() {
+    let meshes = [
+        (Mesh::parallelogram("wall", DVec3::ZERO, DVec3::X * 2.0, DVec3::new(0.3, 0.0, 1.0), 0), 64.0),
+        (Mesh::sphere("ball", DVec3::new(1e6, -2.0, 3.0), 0.5, 48, 0), 64.0),
+        (torus(60, 24), 32.0),
+        // Enough triangles to be cut and packed in the faster way.
+        (torus(300, 60), 64.0),
+        // As small as bacteria, as large as a country.
+        (Mesh::sphere("spore", DVec3::ZERO, 1e-6, 24, 0), 64e6),
+        (Mesh::parallelogram("land", DVec3::ZERO, DVec3::X * 1e6, DVec3::Z * 1e6, 0), 1e-4),
+    ];
+    for (mesh, density) in meshes {
+        let (name, triangles, original) = (mesh.name.clone(), mesh.triangles.len(), mesh.clone());
+        let (lightmap, warnings) = lightmap_of(mesh, density);
+        assert_eq!(warnings, Vec::<String>::new(), "{name}");
+        assert_eq!((lightmap.mesh.triangles.len(), lightmap.is_second_set), (triangles, false), "{name}");
+        assert_eq!(lightmap.uvs.len(), lightmap.mesh.positions.len());
+        assert!(lightmap.uvs.iter().all(|uv| uv.min_element() >= 0.0 && uv.max_element() <= 1.0), "{name}");
+        assert_eq!(doubly_claimed(&lightmap), 0, "{name}");
+        for triangle in 0..triangles {
+            assert_eq!(lightmap.mesh.corners(triangle), original.corners(triangle), "{name} {triangle}");
+            let share = texel_area(&lightmap, triangle) / (lightmap.mesh.area(triangle) * density * density);
+            assert!((0.4..2.5).contains(&share), "{name}: triangle {triangle} has {share} of its texels");
+        }
+        let whole = (0..triangles).map(|triangle| texel_area(&lightmap, triangle)).sum::<f64>();
+        let wanted = (0..triangles).map(|triangle| original.area(triangle)).sum::<f64>() * density * density;
+        assert!((0.8..1.25).contains(&(whole / wanted)), "{name}: {whole} texels of {wanted}");
+    }
+}
+
+#[test]
+fn charts_stand_apart() {
+    let (lightmap, _) = lightmap_of(torus(60, 24), 32.0);
+    // Vertices that share a triangle share a chart.
+    let mut chart: Vec<usize> = (0..lightmap.uvs.len()).collect();
+    fn root(chart: &mut [usize], vertex: usize) -> usize {
+        let mut vertex = vertex;
+        while chart[vertex] != vertex {
+            chart[vertex] = chart[chart[vertex]];
+            vertex = chart[vertex];
+        }
+        vertex
+    }
+    for [a, b, c] in &lightmap.mesh.triangles {
+        for other in [b, c] {
+            let (from, to) = (root(&mut chart, *a as usize), root(&mut chart, *other as usize));
+            chart[from] = to;
+        }
+    }
+    let of_texel: BTreeMap<(u32, u32), usize> = lightmap
+        .texels
+        .iter()
+        .map(|texel| {
+            let vertex = lightmap.mesh.triangles[texel.points[0].triangle as usize][0];
+            ((texel.x, texel.y), root(&mut chart, vertex as usize))
+        })
+        .collect();
+    let charts: BTreeSet<usize> = of_texel.values().copied().collect();
+    assert!(charts.len() > 1, "a torus is cut into several charts");
+    for ((x, y), own) in &of_texel {
+        for (dx, dy) in (-2..=2).flat_map(|dx| (-2..=2).map(move |dy| (dx, dy))) {
+            let place = (x.wrapping_add_signed(dx), y.wrapping_add_signed(dy));
+            assert!(of_texel.get(&place).is_none_or(|other| other == own), "charts {own} and another within two texels of {x} {y}");
+        }
+    }
+}
+
+/// What is wrong with the points of a lightmap's texels.
+fn wrong_points(lightmap: &MeshLightmap) -> Vec<String> {
+    let mut wrong = Vec::new();
+    let size = DVec2::new(lightmap.width.into(), lightmap.height.into());
+    for texel in &lightmap.texels {
+        for point in &texel.points {
+            let sample = point.sample(&lightmap.mesh);
+            let [a, b, c] = lightmap.mesh.corners(point.triangle as usize);
+            // The three parts into which the point cuts its triangle have the triangle's area.
+            let parts = [(a, b), (b, c), (c, a)].map(|(p, q)| 0.5 * (p - sample.position).cross(q - sample.position).length());
+            let area = lightmap.mesh.area(point.triangle as usize);
+            if (parts.iter().sum::<f64>() - area).abs() > 1e-5 * area {
+                wrong.push(format!("{} lies beside its triangle", sample.position));
+            }
+            // Its place in the map is within the texel, unless the triangle is smaller than that.
+            let [u, v, w] = lightmap.mesh.triangles[point.triangle as usize].map(|vertex| lightmap.uvs[vertex as usize] * size);
+            let [second, third] = point.weights.map(f64::from);
+            let place = u * (1.0 - second - third) + v * second + w * third;
+            let beside = place - DVec2::new(f64::from(texel.x) + 0.5, f64::from(texel.y) + 0.5);
+            if beside.abs().max_element() > 0.5 + 1e-3 {
+                wrong.push(format!("{place} is no place in texel {} {}", texel.x, texel.y));
+            }
+            let unit = |normal: DVec3| (normal.length() - 1.0).abs() < 1e-9;
+            if !unit(sample.geometric_normal) || !unit(sample.shading_normal) || sample.shading_normal.dot(sample.geometric_normal) <= 0.0 {
+                wrong.push(format!("{sample:?} has wrong normals"));
+            }
+        }
+    }
+    wrong
+}
+
+#[test]
+fn texels_lie_on_their_triangles_and_every_triangle_has_some() {
+    let mut scene = open(BLENDER);
+    scene.meshes.push(torus(60, 24));
+    scene.meshes.push(Mesh::sphere("ball", DVec3::Y, 0.4, 32, 0));
+    let layout = Layout::new(&scene, 96.0).unwrap();
+    assert!(layout.lightmaps().count() > 3);
+    for (_, lightmap) in layout.lightmaps() {
+        let name = &lightmap.mesh.name;
+        assert_eq!(wrong_points(lightmap), Vec::<String>::new(), "{name}");
+        let places: BTreeSet<(u32, u32)> = lightmap.texels.iter().map(|texel| (texel.y, texel.x)).collect();
+        assert_eq!(places.len(), lightmap.texels.len(), "{name}: a texel is listed twice");
+        assert!(lightmap.texels.is_sorted_by_key(|texel| (texel.y, texel.x)), "{name}");
+        let seen: BTreeSet<u32> = lightmap.texels.iter().flat_map(|texel| texel.points.map(|point| point.triangle)).collect();
+        let size = DVec2::new(lightmap.width.into(), lightmap.height.into());
+        for (index, triangle) in lightmap.mesh.triangles.iter().enumerate() {
+            let centroid = triangle.iter().map(|vertex| lightmap.uvs[*vertex as usize] * size).sum::<DVec2>() / 3.0;
+            assert!(places.contains(&(centroid.y as u32, centroid.x as u32)), "{name}: triangle {index} lies in no covered texel");
+            // A triangle of two texels is looked at itself.
+            assert!(texel_area(lightmap, index) < 4.0 || seen.contains(&(index as u32)), "{name}: triangle {index} has no point");
+        }
+    }
+
+    let mut spoilt = layout.meshes.into_iter().flatten().next().unwrap();
+    spoilt.texels[0].points[1].weights[0] += 0.7;
+    assert!(!wrong_points(&spoilt).is_empty());
+}
+
+#[test]
+fn phases_are_of_one_length_and_their_mean_is_the_texel() {
+    let wall = Mesh::parallelogram("wall", DVec3::ZERO, DVec3::X, DVec3::Z * 0.5, 0);
+    let scene = scene_of(wall);
+    let layout = Layout::new(&scene, 40.0).unwrap();
+    let phases = layout.phases();
+    assert_eq!(phases.len(), PHASE_COUNT);
+    let lightmap = layout.meshes[0].as_ref().unwrap();
+    let (mut inner, mut four_points) = (0, 0);
+    for (index, texel) in lightmap.texels.iter().enumerate() {
+        let positions: Vec<DVec3> = phases.iter().map(|phase| phase[index].position).collect();
+        assert!(phases.iter().all(|phase| phase.len() == layout.texel_count() && phase[index].geometric_normal == DVec3::NEG_Y));
+        let neighbours = |x: u32, y: u32| lightmap.texels.iter().any(|texel| (texel.x, texel.y) == (x, y));
+        if neighbours(texel.x + 1, texel.y)
+            && neighbours(texel.x, texel.y + 1)
+            && neighbours(texel.x - 1, texel.y)
+            && neighbours(texel.x, texel.y - 1)
+        {
+            inner += 1;
+            // Four different points, a quarter texel (of 1/40 m) apart at least.
+            let apart = positions.iter().enumerate().flat_map(|(k, p)| positions[..k].iter().map(move |q| p.distance(*q)));
+            four_points += usize::from(apart.fold(f64::INFINITY, f64::min) > 0.25 / 40.0);
+        }
+    }
+    assert!(inner > 600 && four_points == inner, "{four_points} of {inner}");
+}
+
+/// A wall of two triangles, its second set given.
+fn wall_with(second_set: [[f64; 2]; 4]) -> Mesh {
+    let mut wall = Mesh::parallelogram("bake wall", DVec3::ZERO, DVec3::X * 2.0, DVec3::Y, 0);
+    wall.uvs[1] = second_set.map(DVec2::from).to_vec();
+    wall
+}
+
+#[test]
+fn a_good_second_set_is_taken() {
+    let (lightmap, warnings) = lightmap_of(wall_with([[0.1, 0.1], [0.9, 0.1], [0.9, 0.9], [0.1, 0.9]]), 32.0);
+    assert_eq!((lightmap.is_second_set, warnings), (true, Vec::new()));
+    assert_eq!(lightmap.uvs, lightmap.mesh.uvs[1]);
+    // Two metres on 0.8 of the width, one on 0.8 of the height.
+    assert_eq!((lightmap.width, lightmap.height), (80, 40));
+    assert_eq!(doubly_claimed(&lightmap), 0);
+    // A mirrored one is none the worse.
+    let (mirrored, warnings) = lightmap_of(wall_with([[1.0, 0.0], [0.0, 0.0], [0.0, 1.0], [1.0, 1.0]]), 32.0);
+    assert_eq!((mirrored.is_second_set, warnings, mirrored.width), (true, Vec::new(), 64));
+}
+
+#[test]
+fn a_bad_second_set_is_named_and_replaced() {
+    let bad = [
+        ("overlaps itself", [[0.0, 0.0], [1.0, 0.0], [0.0, 1.0], [1.0, 0.2]]),
+        ("leaves the range", [[0.0, 0.0], [2.0, 0.0], [2.0, 1.0], [0.0, 1.0]]),
+        ("not finite", [[0.0, 0.0], [f64::NAN, 0.0], [1.0, 1.0], [0.0, 1.0]]),
+        ("no area", [[0.5, 0.5]; 4]),
+        ("no area", [[0.0, 0.0], [1.0, 0.0], [1.0, 1.0], [0.5, 0.5]]),
+    ];
+    for (reason, second_set) in bad {
+        let (lightmap, warnings) = lightmap_of(wall_with(second_set), 32.0);
+        let [warning] = warnings.as_slice() else { panic!("{reason}: {warnings:?}") };
+        assert!(warning.contains("'bake wall'") && warning.contains(reason), "{warning}");
+        assert!(!lightmap.is_second_set && doubly_claimed(&lightmap) == 0, "{reason}");
+    }
+    // The check of this file sees what the layout refuses.
+    let (mut spoilt, _) = lightmap_of(wall_with(bad[0].1), 32.0);
+    spoilt.uvs = bad[0].1.map(DVec2::from)[..].to_vec();
+    spoilt.mesh = wall_with(bad[0].1);
+    assert!(doubly_claimed(&spoilt) > 100);
+}
+
+#[test]
+fn large_maps_are_coarser_and_too_many_texels_are_refused() {
+    let wall = || Mesh::parallelogram("great wall", DVec3::ZERO, DVec3::X * 100.0, DVec3::Y * 10.0, 0);
+    for mesh in [wall(), Mesh { uvs: [Vec::new(), wall().uvs[0].clone()], ..wall() }] {
+        let (lightmap, warnings) = lightmap_of(mesh, 100.0);
+        assert!(lightmap.width.max(lightmap.height) == MAX_SIDE, "{} x {}", lightmap.width, lightmap.height);
+        assert!(matches!(warnings.as_slice(), [warning] if warning.contains("4096") && warning.contains("'great wall'")), "{warnings:?}");
+    }
+    // Far less than a texel a mesh is still a map.
+    let (tiny, warnings) = lightmap_of(torus(12, 8), 1e-9);
+    assert!(warnings.is_empty() && tiny.width.min(tiny.height) >= 4 && !tiny.texels.is_empty(), "{} x {}", tiny.width, tiny.height);
+    for density in [0.0, -1.0, f64::NAN, f64::INFINITY] {
+        let error = Layout::new(&scene_of(wall()), density).unwrap_err();
+        assert!(error.exit_code() == 2 && error.to_string().contains("--texels-per-metre"), "{error}");
+    }
+    let mut scene = scene_of(wall());
+    scene.meshes = (0..64).map(|_| Mesh { uvs: [Vec::new(), wall().uvs[0].clone()], ..wall() }).collect();
+    let error = Layout::new(&scene, 1e4).unwrap_err().to_string();
+    assert!(error.contains("--texels-per-metre 10000") && !error.contains('\n'), "{error}");
+}
+
+#[test]
+fn mirrors_and_glass_have_no_map() {
+    let scene = open("cornell-spheres");
+    let layout = Layout::new(&scene, 64.0).unwrap();
+    for (mesh, lightmap) in scene.meshes.iter().zip(&layout.meshes) {
+        assert_eq!(lightmap.is_none(), scene.materials[mesh.material].surface.is_specular(), "{}", mesh.name);
+    }
+    let mut mirrors = scene_of(Mesh::sphere("ball", DVec3::ZERO, 1.0, 8, 0));
+    mirrors.materials[0].surface = Surface::Mirror;
+    let layout = Layout::new(&mirrors, 64.0).unwrap();
+    assert_eq!((layout.texel_count(), layout.warnings.len()), (0, 1));
+}
+
+/// Results that name their texel.
+fn numbered(layout: &Layout) -> Vec<TexelEstimate> {
+    let estimate = |index: usize| TexelEstimate {
+        irradiance: Vec3::new(index as f32 + 1.0, 0.5, 0.25),
+        standard_error: Vec3::new(0.125, index as f32 + 1.0, 0.0),
+    };
+    (0..layout.texel_count()).map(estimate).collect()
+}
+
+#[test]
+fn gutters_are_filled_from_the_nearest_texel() {
+    let scene = scene_of(torus(24, 10));
+    let layout = Layout::new(&scene, 12.0).unwrap();
+    let [map] = &layout.maps(&numbered(&layout))[..] else { panic!("one map") };
+    let lightmap = layout.meshes[0].as_ref().unwrap();
+    assert_eq!(map.irradiance.len(), (map.width * map.height) as usize);
+    assert!(lightmap.texels.len() < map.irradiance.len(), "there is a gutter");
+    for (place, (irradiance, error)) in map.irradiance.iter().zip(&map.error).enumerate() {
+        let (x, y) = (place as u32 % map.width, place as u32 / map.width);
+        let distance = |index: usize| {
+            let texel = &lightmap.texels[index];
+            texel.x.abs_diff(x).pow(2) + texel.y.abs_diff(y).pow(2)
+        };
+        let least = (0..lightmap.texels.len()).map(distance).min().unwrap();
+        let source = irradiance.x as usize - 1;
+        assert_eq!(distance(source), least, "texel {x} {y}");
+        assert_eq!((irradiance.y, irradiance.z, error.y), (0.5, 0.25, irradiance.x), "texel {x} {y}");
+        if least == 0 {
+            assert_eq!((lightmap.texels[source].x, lightmap.texels[source].y), (x, y));
+        }
+    }
+}
+
+#[test]
+fn the_same_scene_gives_the_same_layout() {
+    let scene = open(BLENDER);
+    let layouts = [1, 4].map(|threads| {
+        let pool = rayon::ThreadPoolBuilder::new().num_threads(threads).build().unwrap();
+        pool.install(|| Layout::new(&scene, 40.0).unwrap())
+    });
+    let [first, second] = &layouts;
+    assert_eq!(first.phases(), second.phases());
+    for ((_, a), (_, b)) in first.lightmaps().zip(second.lightmaps()) {
+        assert_eq!((a.width, a.height, &a.uvs, &a.texels), (b.width, b.height, &b.uvs, &b.texels));
+    }
+    let folders = layouts.each_ref().map(|layout| write(&scene, layout, &numbered(layout), 0.01).0);
+    let names = files(folders[0].path());
+    assert_eq!(names, files(folders[1].path()));
+    for name in names {
+        let [one, two] = folders.each_ref().map(|folder| std::fs::read(folder.path().join(&name)).unwrap());
+        assert!(one == two, "{name} differs");
+    }
+}
+
+fn files(folder: &Path) -> BTreeSet<String> {
+    std::fs::read_dir(folder).unwrap().map(|entry| entry.unwrap().file_name().into_string().unwrap()).collect()
+}
+
+fn write(scene: &Scene, layout: &Layout, results: &[TexelEstimate], exposure: f32) -> (tempfile::TempDir, Vec<Map>) {
+    let folder = tempfile::tempdir().unwrap();
+    let maps = layout.maps(results);
+    bake::write(&Folder::open("-o", folder.path()).unwrap(), scene, layout, &maps, exposure).unwrap();
+    (folder, maps)
+}
+
+fn read(folder: &Path, name: &str) -> Scene {
+    open(folder.join(name).to_str().unwrap())
+}
+
+/// Both written scenes hold the geometry of the one they were made from.
+fn assert_same_geometry(written: &Scene, scene: &Scene) {
+    assert_eq!(written.meshes.len(), scene.meshes.len());
+    assert_eq!(written.triangle_count(), scene.triangle_count());
+    let (low, high) = scene.bounds();
+    let extent = (high - low).max_element();
+    for (written, mesh) in written.meshes.iter().zip(&scene.meshes) {
+        assert_eq!(written.name, mesh.name);
+        assert_eq!(written.normals.is_empty(), mesh.normals.is_empty());
+        for triangle in 0..mesh.triangles.len() {
+            for corner in 0..3 {
+                let [new, old] = [written, mesh].map(|mesh| mesh.triangles[triangle][corner] as usize);
+                let difference = written.positions[new].distance(mesh.positions[old]);
+                assert!(difference < 1e-6 * extent, "{}: triangle {triangle} moved by {difference}", mesh.name);
+                if !mesh.normals.is_empty() {
+                    assert!(written.normals[new].distance(mesh.normals[old]) < 1e-5, "{}: triangle {triangle}", mesh.name);
+                }
+                if !mesh.uvs[0].is_empty() {
+                    assert!(written.uvs[0][new].distance(mesh.uvs[0][old]) < 1e-5, "{}: triangle {triangle}", mesh.name);
+                }
+            }
+        }
+    }
+    for (written, camera) in written.cameras.iter().zip(&scene.cameras) {
+        assert_eq!(written.name, camera.name);
+        assert!(written.eye.distance(camera.eye) < 1e-5 * extent && written.forward.distance(camera.forward) < 1e-5, "{}", camera.name);
+        assert!(written.up.distance(camera.up) < 1e-5 && (written.vertical_view - camera.vertical_view).abs() < 1e-6, "{}", camera.name);
+    }
+    assert_eq!(written.cameras.len(), scene.cameras.len());
+}
+
+fn assert_same_materials(written: &Scene, scene: &Scene) {
+    for (written_mesh, mesh) in written.meshes.iter().zip(&scene.meshes) {
+        let (new, old) = (&written.materials[written_mesh.material], &scene.materials[mesh.material]);
+        assert_eq!((&new.name, new.base_colour, new.two_sided), (&old.name, old.base_colour, old.two_sided));
+        assert!((new.emission - old.emission).abs().max_element() <= 1e-6 * old.emission.max_element(), "{}", old.name);
+        match (new.surface, old.surface) {
+            (Surface::Glossy { exponent: new }, Surface::Glossy { exponent: old }) => assert!((new - old).abs() <= 1e-3 * (old + 1.0)),
+            (new, old) => assert_eq!(new, old),
+        }
+        let textures = |of: &Material| [of.base_colour_texture, of.emission_texture].into_iter().flatten().collect::<Vec<_>>();
+        for (new, old) in textures(new).iter().zip(textures(old)) {
+            let (new, old) = (&written.textures[new.texture], &scene.textures[old.texture]);
+            assert_eq!((new.width, new.height, new.wrap, &new.texels), (old.width, old.height, old.wrap, &old.texels));
+        }
+        assert_eq!(textures(new).len(), textures(old).len(), "{}", old.name);
+    }
+}
+
+/// Coordinates of the lightmap as another reader of glTF sees them.
+fn assert_lightmap_coordinates(path: &Path, layout: &Layout) {
+    let (document, buffers, images) = gltf::import(path).unwrap();
+    assert!(!images.is_empty());
+    for (mesh, lightmap) in document.meshes().zip(&layout.meshes) {
+        let primitive = mesh.primitives().next().unwrap();
+        let reader = primitive.reader(|buffer| Some(&buffers[buffer.index()]));
+        let Some(lightmap) = lightmap else { continue };
+        let read: Vec<[f32; 2]> = reader.read_tex_coords(1).expect("TEXCOORD_1").into_f32().collect();
+        assert_eq!(read, lightmap.uvs.iter().map(|uv| uv.as_vec2().to_array()).collect::<Vec<_>>(), "{}", lightmap.mesh.name);
+        assert_eq!(reader.read_indices().unwrap().into_u32().count(), 3 * lightmap.mesh.triangles.len());
+        assert!(primitive.attributes().all(|(_, accessor)| accessor.count() == lightmap.mesh.positions.len()));
+    }
+}
+
+#[test]
+fn written_scenes_open_again() {
+    for name in ["cornell-spheres", "cornell", BLENDER] {
+        let scene = open(name);
+        let layout = Layout::new(&scene, 32.0).unwrap();
+        let (folder, _) = write(&scene, &layout, &numbered(&layout), 1e-3);
+        for file in ["scene.gltf", "scene_lightmap.gltf"] {
+            let written = read(folder.path(), file);
+            assert_same_geometry(&written, &scene);
+            assert_lightmap_coordinates(&folder.path().join(file), &layout);
+        }
+        let with_lightmaps = read(folder.path(), "scene_lightmap.gltf");
+        assert_same_materials(&with_lightmaps, &scene);
+        assert!(with_lightmaps.lights.is_empty());
+
+        let shining = read(folder.path(), "scene.gltf");
+        for (mesh, lightmap) in shining.meshes.iter().zip(&layout.meshes) {
+            let material = &shining.materials[mesh.material];
+            let Some(TextureUse { texture, uv_set }) = material.emission_texture.filter(|_| lightmap.is_some()) else {
+                assert!(lightmap.is_none(), "{}: no radiance", mesh.name);
+                continue;
+            };
+            let lightmap = lightmap.as_ref().unwrap();
+            assert_eq!((material.base_colour, material.emission, uv_set), (Vec3::ZERO, Vec3::ONE, 1));
+            assert_eq!((shining.textures[texture].width, shining.textures[texture].height), (lightmap.width, lightmap.height));
+        }
+        assert_eq!(shining.lights.len(), scene.lights.len());
+        for (written, light) in shining.lights.iter().zip(&scene.lights) {
+            assert_same_light(written, light);
+        }
+    }
+}
+
+fn assert_same_light(written: &Light, light: &Light) {
+    assert_eq!(written.name, light.name);
+    let near = |a: Vec3, b: Vec3| (a - b).abs().max_element() <= 1e-5 * b.max_element();
+    let close = |a: DVec3, b: DVec3| a.distance(b) < 1e-5 * (1.0 + b.length());
+    let same = match (&written.kind, &light.kind) {
+        (LightKind::Point { position: p, intensity: i }, LightKind::Point { position, intensity }) => {
+            close(*p, *position) && near(*i, *intensity)
+        }
+        (LightKind::Directional { direction: d, irradiance: e }, LightKind::Directional { direction, irradiance }) => {
+            close(*d, *direction) && near(*e, *irradiance)
+        }
+        (
+            LightKind::Spot { position: p, direction: d, intensity: i, inner_angle: a, outer_angle: b },
+            LightKind::Spot { position, direction, intensity, inner_angle, outer_angle },
+        ) => close(*p, *position) && close(*d, *direction) && near(*i, *intensity) && a == inner_angle && b == outer_angle,
+        _ => false,
+    };
+    assert!(same, "{written:?} was {light:?}");
+}
+
+/// One mesh of every kind of surface, a texture on both sets, all lights.
+fn zoo() -> Scene {
+    let square = |place: usize, material: usize| {
+        let mut mesh = Mesh::parallelogram("a square", DVec3::X * (2 * place) as f64, DVec3::X, DVec3::Y, material);
+        mesh.uvs[1] = [[0.25, 0.0], [0.75, 0.0], [0.75, 3.0], [0.25, 3.0]].map(DVec2::from).to_vec();
+        mesh
+    };
+    let material = |name: &str, surface: Surface| Material { surface, ..Material::lambert(name, Vec3::new(0.5, 0.25, 1.0)) };
+    let used = |texture, uv_set| Some(TextureUse { texture, uv_set });
+    let mut lamp = Material { emission: Vec3::new(0.5, 8.0, 2.0), two_sided: true, ..material("lamp", Surface::Lambert) };
+    (lamp.base_colour_texture, lamp.emission_texture) = (used(2, 0), used(1, 1));
+    let second = Material { base_colour_texture: used(2, 1), ..material("second", Surface::Lambert) };
+    let texture = |name: &str, texels: Vec<Vec3>, wrap| Texture { name: name.into(), width: texels.len() as u32, height: 1, texels, wrap };
+    let point = |name: &str, kind| Light { name: format!("light '{name}'"), kind };
+    Scene {
+        name: "zoo".into(),
+        meshes: (0..6).map(|place| square(place, place)).collect(),
+        materials: vec![
+            lamp,
+            second,
+            material("metal", Surface::Glossy { exponent: 40.0 }),
+            material("mirror", Surface::Mirror),
+            material("glass", Surface::Dielectric { ior: 1.33 }),
+            material("white", Surface::Lambert),
+        ],
+        textures: vec![
+            texture("unused", vec![Vec3::ONE], [Wrap::Repeat; 2]),
+            texture("glow", vec![Vec3::X, Vec3::ONE], [Wrap::Clamp, Wrap::Repeat]),
+            texture("checker", vec![Vec3::ONE, Vec3::ZERO, Vec3::Y], [Wrap::MirroredRepeat; 2]),
+        ],
+        lights: vec![
+            point("bulb", LightKind::Point { position: DVec3::Y, intensity: Vec3::new(1.0, 2.0, 3.0) }),
+            point("sun", LightKind::Directional { direction: DVec3::new(0.6, -0.8, 0.0), irradiance: Vec3::splat(5.0) }),
+            point(
+                "beam",
+                LightKind::Spot {
+                    position: DVec3::ONE,
+                    direction: DVec3::Z,
+                    intensity: Vec3::splat(0.5),
+                    inner_angle: 0.25,
+                    outer_angle: 0.5,
+                },
+            ),
+        ],
+        cameras: vec![Camera::looking_at("eye", DVec3::new(3.0, 4.0, 5.0), DVec3::ZERO, DVec3::Y, 0.8)],
+        warnings: Vec::new(),
+    }
+}
+
+#[test]
+fn every_surface_light_and_texture_round_trips() {
+    let scene = zoo();
+    let layout = Layout::new(&scene, 16.0).unwrap();
+    let (folder, _) = write(&scene, &layout, &numbered(&layout), 1.0);
+    let written = read(folder.path(), "scene_lightmap.gltf");
+    assert_same_materials(&written, &scene);
+    assert_eq!(read(folder.path(), "scene.gltf").lights.len(), 3);
+    read(folder.path(), "scene.gltf").lights.iter().zip(&scene.lights).for_each(|(written, light)| assert_same_light(written, light));
+    assert!(!folder.path().join("texture_0.png").exists(), "nothing uses it");
+
+    // Only the second set is used: it is the first one now.
+    let second = &written.meshes[1];
+    assert_eq!(written.materials[second.material].base_colour_texture.unwrap().uv_set, 0);
+    assert!(second.uvs[0].iter().any(|uv| uv.y == 3.0), "{:?}", second.uvs[0]);
+    // Both are used, and the second was no lightmap.
+    let (document, buffers, _) = gltf::import(folder.path().join("scene_lightmap.gltf")).unwrap();
+    let lamp = document.meshes().next().unwrap().primitives().next().unwrap();
+    let moved: Vec<[f32; 2]> = lamp.reader(|buffer| Some(&buffers[buffer.index()])).read_tex_coords(2).unwrap().into_f32().collect();
+    assert!(moved.contains(&[0.75, 3.0]), "{moved:?}");
+    assert_eq!(lamp.material().emissive_texture().unwrap().tex_coord(), 2);
+    assert_eq!(lamp.material().pbr_metallic_roughness().base_color_texture().unwrap().tex_coord(), 0);
+}
+
+#[test]
+fn pictures_hold_what_they_were_given() {
+    let mut scene = scene_of(Mesh::parallelogram("wall", DVec3::ZERO, DVec3::X, DVec3::Y, 0));
+    scene.materials[0].base_colour = Vec3::new(0.5, 1.0, 0.25);
+    scene.materials[0].emission = Vec3::new(0.0, 0.0, 0.125);
+    let layout = Layout::new(&scene, 16.0).unwrap();
+    let pi = std::f32::consts::PI;
+    let mut results = vec![TexelEstimate { irradiance: Vec3::splat(pi), standard_error: Vec3::new(1e-7, 2e6, 0.1) }; layout.texel_count()];
+    results[5].irradiance = Vec3::new(-0.0, 1e-30, 7e7);
+    let (folder, maps) = write(&scene, &layout, &results, 0.5);
+    let open = |name: &str| image::open(folder.path().join(name)).unwrap();
+    for (name, values) in [("wall_irradiance.exr", &maps[0].irradiance), ("wall_error.exr", &maps[0].error)] {
+        let read = open(name).into_rgb32f();
+        assert_eq!((read.width(), read.height()), (maps[0].width, maps[0].height));
+        let bits = |value: &f32| value.to_bits();
+        let wanted: Vec<u32> = values.iter().flat_map(Vec3::to_array).map(|value| bits(&value)).collect();
+        assert!(read.as_raw().iter().map(bits).eq(wanted), "{name}");
+    }
+    let (x, y) = {
+        let texel = layout.meshes[0].as_ref().unwrap().texels[100];
+        (texel.x, texel.y)
+    };
+    let pixel = |name: &str| open(name).into_rgb8().get_pixel(x, y).0;
+    // Half of irradiance / pi = 1; half of 0.5, 1 and 0.25 + 0.125; both as sRGB.
+    assert_eq!(pixel("wall.png"), [188, 188, 188]);
+    assert_eq!(pixel("wall_radiance.png"), [137, 188, 120]);
+
+    // Linear times intensity is irradiance times the exposure.
+    let document: serde_json::Value = serde_json::from_slice(&std::fs::read(folder.path().join("scene_lightmap.gltf")).unwrap()).unwrap();
+    let extension = &document["materials"][0]["extensions"]["MOZ_lightmap"];
+    assert_eq!(extension["texCoord"], 1);
+    let intensity = extension["intensity"].as_f64().unwrap();
+    let shown = intensity * f64::from(pixel("wall_lightmap.png")[0]) / 255.0;
+    assert!((shown - 0.5 * std::f64::consts::PI).abs() < 0.5 / 255.0 * intensity + 1e-6, "{shown}");
+    let texture = extension["index"].as_u64().unwrap() as usize;
+    let image = document["textures"][texture]["source"].as_u64().unwrap() as usize;
+    assert_eq!(document["images"][image]["uri"], "wall_lightmap.png");
+    assert_eq!(document["extensionsUsed"], serde_json::json!(["MOZ_lightmap"]));
+}
+
+#[test]
+fn a_texture_is_seen_in_the_radiance() {
+    let mut scene = scene_of(Mesh::parallelogram("wall", DVec3::ZERO, DVec3::X, DVec3::Y, 0));
+    let texels = vec![Vec3::X, Vec3::Y];
+    scene.textures.push(Texture { name: "halves".into(), width: 2, height: 1, texels, wrap: [Wrap::Clamp; 2] });
+    scene.materials[0].base_colour = Vec3::ONE;
+    scene.materials[0].base_colour_texture = Some(TextureUse { texture: 0, uv_set: 0 });
+    let layout = Layout::new(&scene, 32.0).unwrap();
+    let results = vec![TexelEstimate { irradiance: Vec3::splat(std::f32::consts::PI), ..TexelEstimate::default() }; layout.texel_count()];
+    let (folder, _) = write(&scene, &layout, &results, 1.0);
+    let picture = image::open(folder.path().join("wall_radiance.png")).unwrap().into_rgb8();
+    for texel in &layout.meshes[0].as_ref().unwrap().texels {
+        let x = texel.points.iter().map(|point| point.sample(&scene.meshes[0]).position.x).sum::<f64>() / 4.0;
+        let [red, green, _] = picture.get_pixel(texel.x, texel.y).0;
+        assert!(
+            if x < 0.2 {
+                red == 255 && green == 0
+            } else if x > 0.8 {
+                red == 0 && green == 255
+            } else {
+                true
+            },
+            "{x}: {red} {green}"
+        );
+    }
+}
+
+#[test]
+fn names_are_unique_and_stay_in_the_folder() {
+    let names = ["wall", "WALL", "wall", "wall_radiance", "wall_2", "../wall", "scene", "texture_0", "", "Würfel 1"];
+    let mut scene = scene_of(Mesh::default());
+    scene.meshes =
+        names.iter().enumerate().map(|(k, name)| Mesh::parallelogram(name, DVec3::X * (2 * k) as f64, DVec3::X, DVec3::Y, 0)).collect();
+    let layout = Layout::new(&scene, 4.0).unwrap();
+    let (folder, _) = write(&scene, &layout, &numbered(&layout), 1.0);
+    let written = files(folder.path());
+    // Five pictures a mesh, two documents and their numbers, and none twice even without case.
+    assert_eq!(written.len(), 5 * names.len() + 3, "{written:?}");
+    assert_eq!(written.iter().map(|name| name.to_lowercase()).collect::<BTreeSet<_>>().len(), written.len(), "{written:?}");
+    assert!(written.contains("Würfel_1_irradiance.exr"), "{written:?}");
+    assert_same_geometry(&read(folder.path(), "scene.gltf"), &scene);
+}
+
+#[test]
+fn nothing_is_written_where_something_cannot_be() {
+    let scene = open("cornell");
+    let layout = Layout::new(&scene, 8.0).unwrap();
+    let folder = tempfile::tempdir().unwrap();
+    std::fs::create_dir(folder.path().join("scene.bin")).unwrap();
+    let maps = layout.maps(&numbered(&layout));
+    let result = bake::write(&Folder::open("-o", folder.path()).unwrap(), &scene, &layout, &maps, 1.0);
+    assert!(result.is_err());
+    assert_eq!(files(folder.path()), BTreeSet::from(["scene.bin".to_owned()]));
+}
