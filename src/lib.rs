@@ -28,20 +28,25 @@
 //!   overflow ([`plan`]), so the order of additions does not matter.
 //! - **The ledger closes.** emitted = absorbed + escaped + cut off + dropped, and nothing is ever
 //!   dropped ([`ledger`]): the plan splits what does not fit.
-//! - **Nothing in world units.** No epsilon anywhere: a path leaves its own wall by the wall's number
-//!   ([`cpu::room`]).
+//! - **Nothing in world units.** A path leaves its own wall by the wall's number ([`cpu::room`]), and a
+//!   triangle by what its position may be wrong (`offset_origin` in `glsl/scene/bvh.glsl`); lengths are
+//!   normalised by a power of two ([`scene::geometry`]).
+//! - **Every operation is rounded by itself** (`build.rs`): a driver may not fuse two in one pipeline and
+//!   not in another, so an effect that is forced on changes no bit of a scene that lacks it.
 //!
 //! # What is estimated
 //!
-//! As in the paper, a photon is stored where a wall *reflects* it. So the density of stored photons
-//! estimates the reflected flux, the radiosity; the irradiance is that over the wall's albedo.
+//! In the paper's box, as in the paper, a photon is stored where a wall *reflects* it. So the density of
+//! stored photons estimates the reflected flux, the radiosity; the irradiance is that over the wall's albedo.
+//! In a scene of triangles it is stored where it *arrives*, so the density is the irradiance itself.
 //!
 //! # Rust and GLSL in step
 //!
 //! `build.rs` compiles each kernel of `glsl/kernels`, reflects it, and writes a struct whose fields
 //! are its buffers ([`gpu::kernels`]), so that a dispatch names every buffer. Records stand in
 //! [`records`] and `glsl/records.glsl`; `tests/layout.rs` compares them. Numbers that both languages
-//! need stand in [`constants`] only. Every GLSL function of transport has a Rust twin under [`cpu`].
+//! need stand in [`constants`] only. Every GLSL function of the paper's line has a Rust twin under
+//! [`cpu`]; that of triangles is judged by [`judge`].
 
 pub mod bake;
 pub mod cli;
@@ -53,6 +58,7 @@ pub mod film;
 #[expect(unsafe_code, reason = "Vulkan's functions are unsafe; nothing outside this module is")]
 pub mod gpu;
 pub mod index;
+pub mod judge;
 pub mod ledger;
 pub mod output;
 pub mod paper;

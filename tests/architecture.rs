@@ -8,8 +8,9 @@ use std::path::{Path, PathBuf};
 /// What everyone may use, and what among itself has no order.
 const GROUND: [&str; 7] = ["error", "constants", "records", "ledger", "rng", "settings", "timings"];
 /// From left to right.
-const LINE: [&str; 15] = [
+const LINE: [&str; 16] = [
     "scene",
+    "judge",
     "plan",
     "gpu",
     "resources",

@@ -8,6 +8,7 @@ use std::sync::atomic::AtomicBool;
 use common::{Check, assert_complains, assert_holds, device, device_with, z_check};
 use glam::{DVec3, Vec3};
 use photonmill::gpu::{Gpu, Options};
+use photonmill::judge::{Judge, Verdict};
 use photonmill::plan::transport::{Sensor, TransportPlan};
 use photonmill::records::Receiver;
 use photonmill::render;
@@ -428,4 +429,24 @@ fn stated_errors_are_the_spread_over_seeds() {
     }
     let ratio = (stated / spread).sqrt();
     assert!((0.9..1.1).contains(&ratio), "stated errors are {ratio} of the spread");
+}
+
+/// Pictures against the path tracer, within what both state.
+#[test]
+fn pictures_agree_with_the_judge() {
+    let Some(gpu) = device() else { return };
+    for (name, photons, rounds, samples) in
+        [("cornell", 5000, 48, 192), ("cornell-spheres", 10_000, 64, 384), ("caustic-sphere", 20_000, 64, 768)]
+    {
+        let scene = scene(name);
+        let settings = TransportSettings { photons, caustic_photons: photons, rounds, ..TransportSettings::default() };
+        let lit = picture(&gpu, &scene, &settings);
+        let judged = Judge::new(&scene, settings.bounces).image(&camera_of(&scene), SIZE, SIZE, samples, 77);
+        let means: Vec<DVec3> = (0..lit.film.pixels()).map(|pixel| lit.film.mean(pixel, &lit.plan)).collect();
+        let errors: Vec<DVec3> = (0..lit.film.pixels()).map(|pixel| lit.film.standard_error(pixel, &lit.plan)).collect();
+        let verdict = Verdict::new(&means, &errors, &judged, None);
+        assert!(verdict.agrees(), "{name}: {verdict}");
+        let brighter: Vec<DVec3> = means.iter().map(|mean| 1.3 * *mean).collect();
+        assert!(!Verdict::new(&brighter, &errors, &judged, None).agrees(), "{name}, a third brighter, is not noticed");
+    }
 }

@@ -5,15 +5,17 @@ use std::sync::atomic::AtomicBool;
 
 use clap::Args;
 
-use super::run::number;
+use super::run::{number, whole};
 use super::transport::{FilterArg, Job, PartArg, ReportArgs, SceneArgs, TransportArgs, camera, geometry, light, plan, size};
 use super::{DeviceArgs, End, say};
 use crate::error::{Error, Result};
+use crate::judge::{self, Judge, Verdict};
 use crate::output::colour::ColourPicture;
 use crate::output::destination::{Destination, check_distinct, write_all};
 use crate::output::image::Format;
 use crate::output::light_report;
 use crate::plan::transport::Sensor;
+use crate::scene::{Camera, Scene};
 use crate::settings::transport::{Filter, Part, TransportSettings};
 use crate::transport::Lit;
 
@@ -34,6 +36,10 @@ pub(super) struct RenderArgs {
     /// Width and height in pixels
     #[arg(long, value_name = "WxH", value_parser = size, default_value = "640x480", help_heading = "Scene")]
     size: (u32, u32),
+    /// Hold the picture against a path tracer on the CPU of so many samples a pixel, and say whether they
+    /// agree within their errors
+    #[arg(long, value_name = "SAMPLES", value_parser = whole::<u32>, allow_negative_numbers = true, num_args = 0..=1, default_missing_value = "256", help_heading = "Output")]
+    judge: Option<u32>,
     /// Camera by name [default: the first; one that sees everything if there is none]
     #[arg(long, value_name = "NAME", help_heading = "Scene")]
     camera: Option<String>,
@@ -60,6 +66,14 @@ pub(super) fn run(args: &RenderArgs, cancelled: &AtomicBool) -> Result<End> {
     };
     settings.validate()?;
     let format = Format::of("-o", &args.output)?;
+    if let Some(samples) = args.judge {
+        if !(2..=MAX_JUDGE_SAMPLES).contains(&samples) {
+            return Err(Error::setting("--judge", samples, format!("must be from 2 to {MAX_JUDGE_SAMPLES} samples a pixel")));
+        }
+        if settings.filter != Filter::Box || settings.rounds < 2 {
+            return Err(Error::setting("--judge", samples, "needs --filter box and two rounds or more, whose spread is the error"));
+        }
+    }
     if let (Format::Exr, Some(exposure)) = (format, args.exposure) {
         return Err(Error::setting("--exposure", exposure, "is for PNG only: an EXR holds radiance untouched"));
     }
@@ -87,6 +101,7 @@ pub(super) fn run(args: &RenderArgs, cancelled: &AtomicBool) -> Result<End> {
     let lit = light(&gpu, &job, &geometry, plan, cancelled)?;
 
     let image = radiance(&lit, width, height);
+    let verdict = args.judge.map(|samples| verdict(&lit, &scene, &camera, (width, height), samples));
     let stops = args.exposure.unwrap_or_else(|| image.usual_exposure());
     let text = light_report::text(&scene.name, &lit, reports.explain);
     let mut files = vec![(picture, image.encode(format, stops))];
@@ -99,8 +114,28 @@ pub(super) fn run(args: &RenderArgs, cancelled: &AtomicBool) -> Result<End> {
         Format::Png => format!(" at {stops:+.2} stops"),
         Format::Exr => String::new(),
     };
-    say(&format!("{text}\nwrote {}{shown}", args.output.display()))?;
+    let verdict = verdict.map_or(String::new(), |verdict| format!("\njudge: {verdict}"));
+    say(&format!("{text}{verdict}\nwrote {}{shown}", args.output.display()))?;
     Ok(if lit.cancelled { End::Cancelled } else { End::Finished })
+}
+
+const MAX_JUDGE_SAMPLES: u32 = 1 << 24;
+
+/// How the picture compares with a path tracer's.
+fn verdict(lit: &Lit, scene: &Scene, camera: &Camera, (width, height): (u32, u32), samples: u32) -> Verdict {
+    let settings = &lit.plan.settings;
+    let part = match settings.part {
+        Part::All => None,
+        Part::Direct => Some(judge::Part::Direct),
+        Part::Specular => Some(judge::Part::Specular),
+        Part::Caustic => Some(judge::Part::Caustic),
+        Part::Indirect => Some(judge::Part::Indirect),
+    };
+    // Other random numbers than the photons'.
+    let judged = Judge::new(scene, settings.bounces).image(camera, width, height, samples, settings.seed ^ 0x6a75_6467_65);
+    let means: Vec<_> = (0..lit.film.pixels()).map(|pixel| lit.film.mean(pixel, &lit.plan)).collect();
+    let errors: Vec<_> = (0..lit.film.pixels()).map(|pixel| lit.film.standard_error(pixel, &lit.plan)).collect();
+    Verdict::new(&means, &errors, &judged, part)
 }
 
 /// W/m2/sr.

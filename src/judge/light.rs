@@ -1,0 +1,161 @@
+//! Where light comes from: shining triangles and the lights that are no mesh.
+
+use std::f64::consts::PI;
+
+use glam::{DVec3, Vec3};
+
+use super::geometry::{Geometry, Ray};
+use super::material::{around, sample_lobe};
+use super::{Random, uniform};
+use crate::scene::Scene;
+use crate::scene::light::LightKind;
+use crate::settings::EmissionLaw;
+
+enum Emitter<'a> {
+    /// Number of a triangle.
+    Triangle(usize),
+    Light(&'a LightKind),
+}
+
+pub struct Emitters<'a> {
+    emitters: Vec<Emitter<'a>>,
+    /// The share of power of this emitter and all before it.
+    cumulative: Vec<f64>,
+}
+
+/// What arrives at a point from one sampled place.
+pub struct Arriving {
+    /// Unit, towards the light.
+    pub wi: DVec3,
+    /// On a surface that faces the light, W/m2, over the density of the sample.
+    pub irradiance: DVec3,
+    /// The place; `None` beyond the scene.
+    pub place: Option<DVec3>,
+}
+
+fn sum(colour: Vec3) -> f64 {
+    colour.as_dvec3().element_sum()
+}
+
+/// Watts, roughly for some; no estimate depends on it but by its noise.
+fn power(light: &LightKind, scene_radius: f64) -> f64 {
+    let cross_section = PI * scene_radius * scene_radius;
+    match light {
+        LightKind::Point { intensity, .. } => 4.0 * PI * sum(*intensity),
+        LightKind::Spot { intensity, outer_angle, .. } => 2.0 * PI * (1.0 - f64::from(*outer_angle).cos()) * sum(*intensity),
+        LightKind::Directional { irradiance, .. } => cross_section * sum(*irradiance),
+        LightKind::Disc { power, .. } => sum(*power),
+        LightKind::Environment { radiance } => 4.0 * PI * cross_section * sum(*radiance),
+    }
+}
+
+/// glTF's falloff between the cones, from the cosine to the axis.
+fn spot_falloff(cosine: f64, inner_angle: f32, outer_angle: f32) -> f64 {
+    let (inner, outer) = (f64::from(inner_angle).cos(), f64::from(outer_angle).cos());
+    let share = (cosine - outer) / (inner - outer).max(f64::MIN_POSITIVE);
+    share.clamp(0.0, 1.0).powi(2)
+}
+
+/// A disc's radiant intensity over its power in a direction at this cosine to its normal, 1/sr.
+fn disc_intensity(law: EmissionLaw, cosine: f64) -> f64 {
+    match law {
+        EmissionLaw::Cosine => cosine.max(0.0) / PI,
+        EmissionLaw::Uniform => 0.5 / PI * f64::from(cosine > 0.0),
+    }
+}
+
+impl<'a> Emitters<'a> {
+    pub fn new(scene: &'a Scene, geometry: &Geometry<'a>) -> Emitters<'a> {
+        let (min, max) = scene.bounds();
+        let radius = if geometry.triangles.is_empty() { 1.0 } else { 0.5 * (max - min).length() };
+        let of_triangles = geometry.triangles.iter().enumerate().map(|(number, triangle)| {
+            let sides = if triangle.material.two_sided { 2.0 } else { 1.0 };
+            (Emitter::Triangle(number), sides * PI * triangle.area * sum(triangle.material.emission))
+        });
+        let of_lights = scene.lights.iter().map(|light| (Emitter::Light(&light.kind), power(&light.kind, radius)));
+        let (emitters, powers): (Vec<_>, Vec<_>) = of_triangles.chain(of_lights).filter(|(_, power)| *power > 0.0).unzip();
+        let total: f64 = powers.iter().sum();
+        let mut below = 0.0;
+        let cumulative = powers.iter().map(|power| {
+            below += power / total;
+            below
+        });
+        Emitters { cumulative: cumulative.collect(), emitters }
+    }
+
+    /// Light straight from one emitter, chosen by power, at a point with this shading normal. `None`
+    /// where nothing can arrive. What lies between is not looked at.
+    pub fn sample(&self, geometry: &Geometry, position: DVec3, ns: DVec3, rng: &mut Random) -> Option<Arriving> {
+        let last = self.emitters.len().checked_sub(1)?;
+        let u = uniform(rng);
+        // The last sum may round to less than 1.
+        let choice = self.cumulative.partition_point(|share| *share <= u).min(last);
+        let probability = self.cumulative[choice] - if choice > 0 { self.cumulative[choice - 1] } else { 0.0 };
+        let from = |place: DVec3, intensity: &dyn Fn(DVec3) -> DVec3| {
+            let (wi, distance) = (place - position).normalize_and_length();
+            Arriving { wi, irradiance: intensity(-wi) / (distance * distance), place: Some(place) }
+        };
+        let mut arriving = match self.emitters[choice] {
+            Emitter::Triangle(number) => {
+                let triangle = &geometry.triangles[number];
+                let (root, share) = (uniform(rng).sqrt(), uniform(rng));
+                let weights = DVec3::new(1.0 - root, root * (1.0 - share), root * share);
+                let point = triangle.point(weights);
+                let is_front = (position - point).dot(triangle.normal) > 0.0;
+                if !is_front && !triangle.material.two_sided {
+                    return None;
+                }
+                let normal = if is_front { triangle.normal } else { -triangle.normal };
+                let radiance = geometry.emission(triangle, weights);
+                from(point + geometry.offset * normal, &|w| radiance * triangle.area * w.dot(normal).max(0.0))
+            }
+            Emitter::Light(light) => match light {
+                LightKind::Point { position: place, intensity } => from(*place, &|_| intensity.as_dvec3()),
+                LightKind::Spot { position: place, direction, intensity, inner_angle, outer_angle } => {
+                    from(*place, &|w| intensity.as_dvec3() * spot_falloff(w.dot(*direction), *inner_angle, *outer_angle))
+                }
+                LightKind::Directional { direction, irradiance } => {
+                    Arriving { wi: -*direction, irradiance: irradiance.as_dvec3(), place: None }
+                }
+                LightKind::Disc { centre, normal, radius, power, law } => {
+                    let (distance, azimuth) = (radius * uniform(rng).sqrt(), 2.0 * PI * uniform(rng));
+                    let place = centre + around(*normal, DVec3::new(distance * azimuth.cos(), distance * azimuth.sin(), geometry.offset));
+                    from(place, &|w| power.as_dvec3() * disc_intensity(*law, w.dot(*normal)))
+                }
+                LightKind::Environment { radiance } => {
+                    let wi = sample_lobe(ns, 1.0, rng);
+                    Arriving { wi, irradiance: PI / wi.dot(ns) * radiance.as_dvec3(), place: None }
+                }
+            },
+        };
+        arriving.irradiance /= probability;
+        Some(arriving)
+    }
+
+    /// Radiance that arrives from beyond the scene.
+    pub fn environment(&self) -> DVec3 {
+        let radiance = |emitter: &Emitter| match emitter {
+            Emitter::Light(LightKind::Environment { radiance }) => radiance.as_dvec3(),
+            _ => DVec3::ZERO,
+        };
+        self.emitters.iter().map(radiance).sum()
+    }
+
+    /// Radiance of all discs whose front a ray crosses before `t_max`.
+    pub fn discs_along(&self, geometry: &Geometry, ray: &Ray, t_max: f64) -> DVec3 {
+        let radiance = |emitter: &Emitter| {
+            let Emitter::Light(LightKind::Disc { centre, normal, radius, power, law }) = emitter else { return DVec3::ZERO };
+            // A hair in front of the wall that it may lie in.
+            let centre = centre + geometry.offset * normal;
+            let cosine = -ray.direction.dot(*normal);
+            let t = (ray.origin - centre).dot(*normal) / cosine;
+            let crosses = cosine > 0.0 && t > 0.0 && t < t_max;
+            if crosses && (ray.origin + t * ray.direction).distance(centre) <= *radius {
+                power.as_dvec3() * disc_intensity(*law, cosine) / (cosine * PI * radius * radius)
+            } else {
+                DVec3::ZERO
+            }
+        };
+        self.emitters.iter().map(radiance).sum()
+    }
+}

@@ -1,0 +1,187 @@
+//! What is right: a path tracer that shares no code with the photon maps it judges.
+//!
+//! A scene goes in; estimates of radiance and irradiance come out, each with its standard error. It is
+//! unidirectional (from the eye, with light sampling at every surface that is not specular), in f64,
+//! and without bias, but for two limits: paths of more than `max_bounces` bounces are left out, and so
+//! are caustics of point, spot and directional lights, which no path from the eye can meet.
+
+mod geometry;
+mod light;
+mod material;
+mod path;
+mod verdict;
+
+use std::ops::{Add, Index, IndexMut};
+
+use glam::DVec3;
+use rand_pcg::rand_core::{Rng, SeedableRng};
+use rayon::prelude::*;
+
+use crate::scene::{Camera, Scene};
+use geometry::Geometry;
+use light::Emitters;
+pub use material::fresnel;
+pub use verdict::Verdict;
+
+/// A camera path runs through specular surfaces (mirrors, glass) to the first one that is not: x. Light
+/// is told apart by what lies before and behind x.
+#[derive(Debug, Clone, Copy, PartialEq, Eq)]
+pub enum Part {
+    /// Emission that is seen as such, and light that reaches x straight from where it is emitted.
+    Direct,
+    /// All that is seen through specular surfaces.
+    Specular,
+    /// What reaches x from its emitter through specular surfaces only, one or more.
+    Caustic,
+    /// All else that reaches x.
+    Indirect,
+}
+
+/// Radiance (W/m2/sr) or irradiance (W/m2) by [`Part`], linear RGB. Irradiance has no specular part.
+#[derive(Debug, Clone, Copy, PartialEq, Default)]
+pub struct Parts {
+    pub direct: DVec3,
+    pub specular: DVec3,
+    pub caustic: DVec3,
+    pub indirect: DVec3,
+}
+
+/// The mean of independent samples.
+#[derive(Debug, Clone, Copy, PartialEq, Default)]
+pub struct Estimate {
+    pub mean: Parts,
+    /// Standard error of each part's mean, and of the total's; infinite for less than two samples.
+    pub standard_error: Parts,
+    pub total_standard_error: DVec3,
+}
+
+/// Radiance by pixel, row by row from the top.
+#[derive(Debug, Clone, PartialEq)]
+pub struct Image {
+    pub width: u32,
+    pub height: u32,
+    pub pixels: Vec<Estimate>,
+}
+
+/// A scene, ready for rays.
+pub struct Judge<'a> {
+    geometry: Geometry<'a>,
+    emitters: Emitters<'a>,
+    max_bounces: u32,
+}
+
+/// Random numbers of one pixel or point.
+pub type Random = rand_pcg::Pcg64;
+
+/// The random numbers `index` of a seed: what a pixel's result depends on, whichever thread computes it.
+pub fn random(seed: u64, index: u64) -> Random {
+    Random::seed_from_u64(seed.rotate_left(32) ^ index)
+}
+
+/// Uniform in [0, 1).
+fn uniform(rng: &mut Random) -> f64 {
+    (rng.next_u64() >> 11) as f64 / (1u64 << 53) as f64
+}
+
+impl<'a> Judge<'a> {
+    /// `max_bounces`: surfaces that may scatter light on its way from the emitter to the eye, or to the
+    /// point that irradiance is asked for; `u32::MAX` for no limit.
+    pub fn new(scene: &'a Scene, max_bounces: u32) -> Judge<'a> {
+        let geometry = Geometry::new(scene);
+        let emitters = Emitters::new(scene, &geometry);
+        Judge { geometry, emitters, max_bounces }
+    }
+
+    /// A picture. Samples are spread evenly over each pixel's square.
+    pub fn image(&self, camera: &Camera, width: u32, height: u32, samples_per_pixel: u32, seed: u64) -> Image {
+        let aspect = f64::from(width) / f64::from(height);
+        let pixel = |number: u32| {
+            let (column, row) = (f64::from(number % width), f64::from(number / width));
+            let mut rng = random(seed, u64::from(number));
+            Estimate::of(samples_per_pixel, || {
+                let x = 2.0 * (column + uniform(&mut rng)) / f64::from(width) - 1.0;
+                let y = 1.0 - 2.0 * (row + uniform(&mut rng)) / f64::from(height);
+                self.radiance(camera.eye, camera.direction(x, y, aspect), &mut rng)
+            })
+        };
+        Image { width, height, pixels: (0..width * height).into_par_iter().map(pixel).collect() }
+    }
+
+    /// Irradiance at points, each with the unit normal of the side that is lit.
+    pub fn irradiance_at(&self, points: &[(DVec3, DVec3)], samples: u32, seed: u64) -> Vec<Estimate> {
+        let estimate = |(index, (point, normal)): (usize, &(DVec3, DVec3))| {
+            let mut rng = random(seed, index as u64);
+            Estimate::of(samples, || self.irradiance(*point, *normal, &mut rng))
+        };
+        points.par_iter().enumerate().map(estimate).collect()
+    }
+}
+
+impl Estimate {
+    /// Means and variances of `samples` draws (Welford's recurrence).
+    fn of(samples: u32, mut draw: impl FnMut() -> Parts) -> Estimate {
+        let (mut mean, mut squares, mut total_squares) = (Parts::default(), Parts::default(), DVec3::ZERO);
+        for count in 1..=samples {
+            let sample = draw();
+            let before = sample.zip(mean, |a, b| a - b);
+            let total_before = before.total();
+            mean = mean.zip(before, |a, b| a + b / f64::from(count));
+            let after = sample.zip(mean, |a, b| a - b);
+            squares = squares + before.zip(after, |a, b| a * b);
+            total_squares += total_before * after.total();
+        }
+        let of_mean = |squares: DVec3| match samples {
+            0 | 1 => DVec3::INFINITY,
+            // Rounding may leave a sum of products a hair below nothing.
+            _ => (squares / (f64::from(samples) * f64::from(samples - 1))).max(DVec3::ZERO).map(f64::sqrt),
+        };
+        Estimate { mean, standard_error: squares.zip(squares, |a, _| of_mean(a)), total_standard_error: of_mean(total_squares) }
+    }
+}
+
+impl Parts {
+    pub fn total(&self) -> DVec3 {
+        self.direct + self.specular + self.caustic + self.indirect
+    }
+
+    fn zip(self, other: Parts, f: impl Fn(DVec3, DVec3) -> DVec3) -> Parts {
+        Parts {
+            direct: f(self.direct, other.direct),
+            specular: f(self.specular, other.specular),
+            caustic: f(self.caustic, other.caustic),
+            indirect: f(self.indirect, other.indirect),
+        }
+    }
+}
+
+impl Add for Parts {
+    type Output = Parts;
+
+    fn add(self, other: Parts) -> Parts {
+        self.zip(other, |a, b| a + b)
+    }
+}
+
+impl Index<Part> for Parts {
+    type Output = DVec3;
+
+    fn index(&self, part: Part) -> &DVec3 {
+        match part {
+            Part::Direct => &self.direct,
+            Part::Specular => &self.specular,
+            Part::Caustic => &self.caustic,
+            Part::Indirect => &self.indirect,
+        }
+    }
+}
+
+impl IndexMut<Part> for Parts {
+    fn index_mut(&mut self, part: Part) -> &mut DVec3 {
+        match part {
+            Part::Direct => &mut self.direct,
+            Part::Specular => &mut self.specular,
+            Part::Caustic => &mut self.caustic,
+            Part::Indirect => &mut self.indirect,
+        }
+    }
+}

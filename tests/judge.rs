@@ -1,0 +1,473 @@
+//! The judge, judged: scenes whose light is known in closed form.
+
+use std::f64::consts::PI;
+
+use glam::{DVec3, Vec3};
+use photonmill::judge::{Estimate, Image, Judge, fresnel, random};
+use photonmill::scene::light::LightKind;
+use photonmill::scene::material::TextureUse;
+use photonmill::scene::texture::Wrap;
+use photonmill::scene::{Camera, Light, Material, Mesh, Scene, Surface, Texture, built_in};
+use photonmill::settings::EmissionLaw;
+
+const NO_LIMIT: u32 = u32::MAX;
+
+fn scene(meshes: Vec<Mesh>, materials: Vec<Material>, lights: Vec<LightKind>) -> Scene {
+    let lights = lights.into_iter().map(|kind| Light { name: "light".into(), kind }).collect();
+    Scene { meshes, materials, lights, ..Scene::default() }
+}
+
+/// A base colour that differs between channels.
+const COLOUR: Vec3 = Vec3::new(0.75, 0.5, 0.25);
+
+fn material(surface: Surface, base_colour: Vec3) -> Material {
+    Material { surface, ..Material::lambert("material", base_colour) }
+}
+
+fn lamp(emission: Vec3) -> Material {
+    Material { emission, ..Material::lambert("lamp", Vec3::ZERO) }
+}
+
+fn environment() -> LightKind {
+    LightKind::Environment { radiance: Vec3::new(1.0, 2.0, 4.0) }
+}
+
+const SKY: DVec3 = DVec3::new(1.0, 2.0, 4.0);
+
+/// A horizontal square of side 2 `half` around the axis z, at this height; its front looks up, or down.
+fn square(height: f64, half: f64, up: bool, material: usize) -> Mesh {
+    let corner = DVec3::new(-half, -half, height);
+    let (u, v) = (2.0 * half * DVec3::X, 2.0 * half * DVec3::Y);
+    if up { Mesh::parallelogram("square", corner, u, v, material) } else { Mesh::parallelogram("square", corner, v, u, material) }
+}
+
+/// The faces of a box from -half to half: bottom, top, then the sides; fronts look in or out.
+fn faces(half: DVec3, inwards: bool, materials: [usize; 6]) -> Vec<Mesh> {
+    let (x, y, z) = (2.0 * half.x * DVec3::X, 2.0 * half.y * DVec3::Y, 2.0 * half.z * DVec3::Z);
+    // Origin and edges, with u x v inwards.
+    let sides = [(-half, x, y), (half, -y, -x), (-half, y, z), (half, -z, -y), (-half, z, x), (half, -x, -z)];
+    let face = |((origin, u, v), material)| {
+        let (u, v) = if inwards { (u, v) } else { (v, u) };
+        Mesh::parallelogram("face", origin, u, v, material)
+    };
+    sides.into_iter().zip(materials).map(face).collect()
+}
+
+/// Whether an estimate meets what is expected, within 4.5 standard errors and a few roundings.
+fn meets(mean: DVec3, standard_error: DVec3, expected: DVec3) -> bool {
+    let allowed = 4.5 * standard_error + 1e-9 * expected.abs() + 1e-15;
+    mean.is_finite() && (mean - expected).abs().cmple(allowed).all()
+}
+
+#[track_caller]
+fn assert_meets(what: &str, mean: DVec3, standard_error: DVec3, expected: DVec3) {
+    assert!(meets(mean, standard_error, expected), "{what}: {mean} +- {standard_error}, expected {expected}");
+}
+
+#[track_caller]
+fn assert_total(what: &str, estimate: &Estimate, expected: DVec3) {
+    assert_meets(what, estimate.mean.total(), estimate.total_standard_error, expected);
+}
+
+fn irradiance(scene: &Scene, point: DVec3, normal: DVec3, samples: u32) -> Estimate {
+    Judge::new(scene, NO_LIMIT).irradiance_at(&[(point, normal)], samples, 1)[0]
+}
+
+/// Radiance towards `eye` from `target`: a picture of one pixel that is all but a single ray.
+fn radiance(scene: &Scene, eye: DVec3, target: DVec3, samples: u32) -> Estimate {
+    let camera = Camera::looking_at("ray", eye, target, DVec3::Z, 1e-9);
+    Judge::new(scene, NO_LIMIT).image(&camera, 1, 1, samples, 1).pixels[0]
+}
+
+fn disc(height: f64, normal: DVec3, law: EmissionLaw) -> LightKind {
+    LightKind::Disc { centre: DVec3::Z * height, normal, radius: 0.5, power: Vec3::new(1.0, 2.0, 3.0), law }
+}
+
+/// Irradiance of such a disc on its axis, facing it.
+fn disc_irradiance(distance: f64, law: EmissionLaw) -> DVec3 {
+    let power = DVec3::new(1.0, 2.0, 3.0);
+    let slant_squared = 0.25 + distance * distance;
+    match law {
+        EmissionLaw::Cosine => power / (PI * slant_squared),
+        EmissionLaw::Uniform => power / (PI * 0.25) * (1.0 - distance / slant_squared.sqrt()),
+    }
+}
+
+#[test]
+fn a_disc_lights_the_point_on_its_axis() {
+    for law in [EmissionLaw::Cosine, EmissionLaw::Uniform] {
+        let lit = scene(vec![], vec![], vec![disc(1.5, -DVec3::Z, law)]);
+        let estimate = irradiance(&lit, DVec3::ZERO, DVec3::Z, 20_000);
+        assert_total("front", &estimate, disc_irradiance(1.5, law));
+        assert_eq!(estimate.mean.total(), estimate.mean.direct);
+        assert_eq!(irradiance(&lit, DVec3::Z * 3.0, -DVec3::Z, 100).mean.total(), DVec3::ZERO, "back");
+    }
+}
+
+#[test]
+fn point_lights_fall_off_with_distance_and_cosine() {
+    let bulb = LightKind::Point { position: DVec3::new(3.0, 0.0, 4.0), intensity: Vec3::new(50.0, 25.0, 0.0) };
+    let lit = scene(vec![], vec![], vec![bulb.clone()]);
+    let expected = DVec3::new(50.0, 25.0, 0.0) / 25.0 * 0.8;
+    assert_total("alone", &irradiance(&lit, DVec3::ZERO, DVec3::Z, 2), expected);
+    // A plate blocks it from either side; the receiver itself, a surface, does not.
+    let plates = |height| vec![square(0.0, 9.0, true, 0), square(height, 9.0, true, 0)];
+    let black = || vec![Material::lambert("black", Vec3::ZERO)];
+    assert_total("lit", &irradiance(&scene(plates(5.0), black(), vec![bulb.clone()]), DVec3::ZERO, DVec3::Z, 2), expected);
+    assert_total("shadow", &irradiance(&scene(plates(2.0), black(), vec![bulb]), DVec3::ZERO, DVec3::Z, 2), DVec3::ZERO);
+}
+
+#[test]
+fn two_lights_add_up_whatever_their_power() {
+    let bulb = |x: f64, intensity: f32| LightKind::Point { position: DVec3::new(x, 0.0, 1.0), intensity: Vec3::splat(intensity) };
+    let lit = scene(vec![], vec![], vec![bulb(0.0, 1.0), bulb(1.0, 30.0)]);
+    let expected = DVec3::splat(1.0 + 30.0 / 2f64.powf(1.5));
+    assert_total("both", &irradiance(&lit, DVec3::ZERO, DVec3::Z, 20_000), expected);
+}
+
+#[test]
+fn spots_fall_off_between_their_cones() {
+    let (inner_angle, outer_angle) = (0.3f32, 0.9f32);
+    let (inner, outer) = (f64::from(inner_angle).cos(), f64::from(outer_angle).cos());
+    let spot = LightKind::Spot { position: DVec3::Z, direction: -DVec3::Z, intensity: Vec3::ONE, inner_angle, outer_angle };
+    let lit = scene(vec![], vec![], vec![spot]);
+    for (cosine, falloff) in [(1.0, 1.0), (0.999 * inner + 0.001, 1.0), (0.5 * (inner + outer), 0.25), (0.99 * outer, 0.0)] {
+        let point = DVec3::new((1.0f64 / (cosine * cosine) - 1.0).sqrt(), 0.0, 0.0);
+        let expected = DVec3::splat(falloff * cosine.powi(3));
+        assert_meets("spot", irradiance(&lit, point, DVec3::Z, 2).mean.total(), DVec3::splat(1e-12), expected);
+    }
+}
+
+#[test]
+fn the_sun_lights_by_its_cosine() {
+    let sun = LightKind::Directional { direction: DVec3::new(0.6, 0.0, -0.8), irradiance: COLOUR };
+    let lit = scene(vec![square(0.0, 1.0, true, 0)], vec![material(Surface::Lambert, COLOUR)], vec![sun]);
+    let expected = 0.8 * COLOUR.as_dvec3();
+    assert_total("irradiance", &irradiance(&lit, DVec3::ZERO, DVec3::Z, 2), expected);
+    let seen = expected * COLOUR.as_dvec3() / PI;
+    assert_total("radiance", &radiance(&lit, DVec3::new(0.5, 0.2, 3.0), DVec3::new(0.1, 0.2, 0.0), 2), seen);
+    assert_total("back", &radiance(&lit, DVec3::new(0.5, 0.2, -3.0), DVec3::new(0.1, 0.2, 0.0), 2), DVec3::ZERO);
+}
+
+#[test]
+fn the_sky_lights_an_open_plane() {
+    let mut lit = scene(vec![square(0.0, 1.0, true, 0)], vec![material(Surface::Lambert, COLOUR)], vec![environment()]);
+    assert_total("irradiance", &irradiance(&lit, DVec3::new(0.3, 0.2, 0.0), DVec3::Z, 100), PI * SKY);
+    let (above, below, spot) = (DVec3::new(0.0, 1.0, 2.0), DVec3::new(0.0, 1.0, -2.0), DVec3::new(0.3, 0.2, 0.0));
+    let seen = radiance(&lit, above, spot, 100);
+    assert_total("plane", &seen, COLOUR.as_dvec3() * SKY);
+    assert_eq!(seen.mean.direct, seen.mean.total());
+    assert_total("sky", &radiance(&lit, above, DVec3::Z * 9.0, 2), SKY);
+    assert_total("back", &radiance(&lit, below, spot, 2), DVec3::ZERO);
+    lit.materials[0].two_sided = true;
+    assert_total("both sides", &radiance(&lit, below, spot, 100), COLOUR.as_dvec3() * SKY);
+}
+
+/// All walls shine and scatter alike, whether as mirrors or not.
+fn furnace(surfaces: [Surface; 6]) -> Scene {
+    let shining = |surface| Material { emission: Vec3::new(1.0, 2.0, 3.0), ..material(surface, COLOUR) };
+    scene(faces(DVec3::new(1.0, 0.7, 0.5), true, [0, 1, 2, 3, 4, 5]), surfaces.map(shining).to_vec(), vec![])
+}
+
+const EMITTED: DVec3 = DVec3::new(1.0, 2.0, 3.0);
+
+#[test]
+fn a_furnace_glows_evenly() {
+    let expected = EMITTED / (1.0 - COLOUR.as_dvec3());
+    let mut surfaces = [Surface::Lambert; 6];
+    let eye = DVec3::new(0.2, 0.1, -0.1);
+    let rough = furnace(surfaces);
+    assert_total("all rough", &radiance(&rough, eye, DVec3::new(0.3, 0.5, -0.5), 20_000), expected);
+    let on_floor = irradiance(&rough, DVec3::new(0.3, 0.5, -0.5), DVec3::Z, 20_000);
+    assert_total("irradiance", &on_floor, PI * expected);
+    assert_meets("direct", on_floor.mean.direct, on_floor.standard_error.direct, PI * EMITTED);
+
+    // With mirrors the same light comes in all parts, and none of it twice.
+    surfaces[1] = Surface::Mirror;
+    surfaces[2] = Surface::Mirror;
+    let shiny = furnace(surfaces);
+    let floor = radiance(&shiny, eye, DVec3::new(0.3, 0.5, -0.5), 40_000);
+    assert_total("floor", &floor, expected);
+    assert!(floor.mean.caustic.min_element() > 0.01 && floor.mean.indirect.min_element() > 0.01, "{floor:?}");
+    assert_eq!(floor.mean.specular, DVec3::ZERO);
+    let mirror = radiance(&shiny, eye, DVec3::new(0.3, 0.5, 0.5), 20_000);
+    assert_total("mirror", &mirror, expected);
+    assert_eq!(mirror.mean.direct, EMITTED);
+    assert_meets("specular", mirror.mean.specular, mirror.standard_error.specular, expected - EMITTED);
+    assert_total("irradiance", &irradiance(&shiny, DVec3::new(0.3, 0.5, -0.5), DVec3::Z, 40_000), PI * expected);
+
+    // To all but the eye the paper's Phong is Lambertian.
+    let phong = furnace([Surface::PaperPhong { exponent: 20.0 }; 6]);
+    assert_total("phong", &irradiance(&phong, DVec3::new(0.3, 0.5, -0.5), DVec3::Z, 20_000), PI * expected);
+}
+
+#[test]
+fn bounces_are_a_geometric_series() {
+    let lit = furnace([Surface::Lambert; 6]);
+    let camera = Camera::looking_at("ray", DVec3::ZERO, DVec3::new(0.3, 0.5, -0.5), DVec3::Z, 1.0);
+    let (mut expected, mut term) = (DVec3::ZERO, EMITTED);
+    for max_bounces in 0..8 {
+        expected += term;
+        term *= COLOUR.as_dvec3();
+        let judge = Judge::new(&lit, max_bounces);
+        assert_total("radiance", &judge.image(&camera, 1, 1, 10_000, 3).pixels[0], expected);
+        let at_wall = judge.irradiance_at(&[(DVec3::Z * -0.5, DVec3::Z)], 10_000, 4)[0];
+        assert_total("irradiance", &at_wall, PI * expected);
+    }
+}
+
+#[test]
+fn a_lamp_is_seen_in_a_mirror_and_lights_through_it() {
+    let materials = || vec![material(Surface::Mirror, COLOUR), lamp(Vec3::new(1.0, 2.0, 3.0))];
+    let lit = scene(vec![square(0.0, 5.0, true, 0), square(2.0, 1.0, false, 1)], materials(), vec![]);
+    let seen = radiance(&lit, DVec3::new(3.0, 0.0, 2.0), DVec3::new(1.5, 0.1, 0.0), 2);
+    assert_total("lamp", &seen, COLOUR.as_dvec3() * EMITTED);
+    assert_eq!(seen.mean.specular, seen.mean.total());
+
+    for law in [EmissionLaw::Cosine, EmissionLaw::Uniform] {
+        let lit = scene(vec![square(0.0, 5.0, true, 0)], materials(), vec![disc(1.0, -DVec3::Z, law)]);
+        // From below its lamp a receiver sees the lamp's image only, as far below the mirror.
+        let estimate = irradiance(&lit, DVec3::Z * 0.5, -DVec3::Z, 200_000);
+        assert_total("image", &estimate, COLOUR.as_dvec3() * disc_irradiance(1.5, law));
+        assert_eq!(estimate.mean.caustic, estimate.mean.total());
+        // The eye sees a disc neither itself nor mirrored.
+        assert_total("disc", &radiance(&lit, DVec3::Z * 0.5, DVec3::Z, 2), DVec3::ZERO);
+        assert_total("mirrored disc", &radiance(&lit, DVec3::Z * 0.5, DVec3::X * 0.01, 2), DVec3::ZERO);
+    }
+}
+
+#[test]
+fn discs_in_walls_shine_into_the_room() {
+    // The mirror is the floor, the disc lies in the very plane of the ceiling.
+    let lit = scene(
+        vec![square(0.0, 5.0, true, 0), square(1.0, 5.0, false, 1)],
+        vec![material(Surface::Mirror, COLOUR), material(Surface::Lambert, Vec3::ZERO)],
+        vec![disc(1.0, -DVec3::Z, EmissionLaw::Cosine)],
+    );
+    let up = irradiance(&lit, DVec3::ZERO, DVec3::Z, 20_000);
+    assert_total("direct", &up, disc_irradiance(1.0, EmissionLaw::Cosine));
+    let down = irradiance(&lit, DVec3::Z * 0.5, -DVec3::Z, 200_000);
+    assert_total("mirrored", &down, COLOUR.as_dvec3() * disc_irradiance(1.5, EmissionLaw::Cosine));
+}
+
+#[test]
+fn fresnel_meets_its_special_values() {
+    let near = |a: f64, b: f64| assert!((a - b).abs() < 1e-12, "{a} and {b}");
+    near(fresnel(1.0, 1.0, 1.5), 0.04);
+    near(fresnel(1.0, 1.5, 1.0), 0.04);
+    near(fresnel(0.0, 1.0, 1.5), 1.0);
+    near(fresnel(0.3, 1.0, 1.0), 0.0);
+    // Brewster's angle: no parallel reflection.
+    let brewster = 1.5f64.atan();
+    near(fresnel(brewster.cos(), 1.0, 1.5), 0.5 * (1.25f64 / 3.25).powi(2));
+    // The same from either side of the boundary.
+    let (angle, refracted) = (0.7f64, (0.7f64.sin() / 1.5).asin());
+    near(fresnel(angle.cos(), 1.0, 1.5), fresnel(refracted.cos(), 1.5, 1.0));
+    let critical = (1.0f64 / 1.5).asin();
+    assert_eq!(fresnel((critical + 1e-6).cos(), 1.5, 1.0), 1.0);
+    assert!(fresnel((critical - 1e-2).cos(), 1.5, 1.0) < 0.6);
+}
+
+#[test]
+fn glass_transmits_what_it_does_not_reflect() {
+    let glass = material(Surface::Dielectric { ior: 1.5 }, Vec3::ONE);
+    let slab = || faces(DVec3::new(5.0, 5.0, 0.1), false, [0; 6]);
+    let mut meshes = slab();
+    meshes.push(square(-1.0, 5.0, true, 1));
+    let lit = scene(meshes, vec![glass.clone(), lamp(Vec3::ONE)], vec![]);
+    let (eye, target) = (DVec3::new(0.3, 0.2, 3.0), DVec3::new(0.3, 0.2, 0.0));
+    let transmitted = 0.96 * 0.96 / (1.0 - 0.04 * 0.04);
+    let seen = radiance(&lit, eye, target, 20_000);
+    assert_total("slab", &seen, DVec3::splat(transmitted));
+    assert_eq!(seen.mean.specular, seen.mean.total());
+
+    // Nothing is lost: under an even sky glass is invisible, and inside radiance is n^2 times as high.
+    let lit = scene(slab(), vec![glass], vec![environment()]);
+    assert_total("slant", &radiance(&lit, eye, DVec3::new(1.0, 0.5, 0.0), 20_000), SKY);
+    assert_total("inside", &radiance(&lit, DVec3::ZERO, DVec3::Z, 20_000), 2.25 * SKY);
+}
+
+#[test]
+fn refraction_obeys_snell() {
+    // A lamp no wider than a pencil at the bottom of a pool, seen where Snell's law says.
+    let water = material(Surface::Dielectric { ior: 1.25 }, Vec3::ONE);
+    let lit = scene(vec![square(0.0, 5.0, true, 0), square(-1.0, 0.01, true, 1)], vec![water, lamp(Vec3::ONE)], vec![]);
+    let eye_at = |sine: f64| {
+        let surface = DVec3::X * (sine / 1.25 / (1.0 - (sine / 1.25).powi(2)).sqrt());
+        (surface + DVec3::new(sine, 0.0, (1.0 - sine * sine).sqrt()), surface)
+    };
+    for sine in [0.1, 0.5, 0.9] {
+        let (eye, surface) = eye_at(sine);
+        let reflectance = fresnel((1.0 - sine * sine).sqrt(), 1.0, f64::from(1.25f32));
+        let expected = DVec3::splat((1.0 - reflectance) / (1.25 * 1.25));
+        assert_total("lamp", &radiance(&lit, eye, surface, 20_000), expected);
+        assert_total("beside", &radiance(&lit, eye, surface + DVec3::X * 0.05, 100), DVec3::ZERO);
+    }
+}
+
+#[test]
+fn lobes_weigh_the_light_of_a_point() {
+    let position = DVec3::new(-1.0, 0.0, 1.0);
+    let bulb = LightKind::Point { position, intensity: Vec3::ONE };
+    let arriving = COLOUR.as_dvec3() * 0.5f64.sqrt() / 2.0;
+    // 30 degrees off the mirror direction.
+    let eye = DVec3::new(75f64.to_radians().sin(), 0.0, 75f64.to_radians().cos());
+    let cosine = 30f64.to_radians().cos();
+    for (surface, expected) in [
+        (Surface::Lambert, 1.0 / PI),
+        (Surface::PaperPhong { exponent: 10.0 }, cosine.powi(10) / PI),
+        (Surface::PaperPhong { exponent: 0.0 }, 1.0 / PI),
+        (Surface::Glossy { exponent: 10.0 }, 12.0 / (2.0 * PI) * cosine.powi(10)),
+        (Surface::Mirror, 0.0),
+    ] {
+        let lit = scene(vec![square(0.0, 1.0, true, 0)], vec![material(surface, COLOUR)], vec![bulb.clone()]);
+        let seen = radiance(&lit, 3.0 * eye, DVec3::ZERO, 2);
+        // The picture is a little wider than a ray.
+        assert_meets("lobe", seen.mean.total(), DVec3::splat(1e-8), expected * arriving);
+    }
+}
+
+/// Behind a pane of index 1 the sky is seen as it is, but no light sampling reaches it.
+#[test]
+fn sampling_lobes_and_sampling_lights_agree() {
+    let pane = || material(Surface::Dielectric { ior: 1.0 }, Vec3::ONE);
+    for (surface, weight) in [
+        (Surface::Lambert, 1.0),
+        (Surface::PaperPhong { exponent: 3.0 }, 2.0 / 5.0),
+        (Surface::Glossy { exponent: 0.0 }, 1.0),
+        (Surface::Glossy { exponent: 30.0 }, 1.0),
+    ] {
+        let mut meshes = vec![square(0.0, 1.0, true, 0)];
+        let expected = weight * COLOUR.as_dvec3() * SKY;
+        let open = scene(meshes.clone(), vec![material(surface, COLOUR)], vec![environment()]);
+        let sampled_light = radiance(&open, DVec3::Z * 0.5, DVec3::ZERO, 40_000);
+        assert_meets("light", sampled_light.mean.direct, sampled_light.standard_error.direct, expected);
+        assert_eq!(sampled_light.mean.direct, sampled_light.mean.total());
+        meshes.extend(faces(DVec3::splat(2.0), false, [1; 6]));
+        let closed = scene(meshes, vec![material(surface, COLOUR), pane()], vec![environment()]);
+        let sampled_lobe = radiance(&closed, DVec3::Z * 0.5, DVec3::ZERO, 40_000);
+        assert_meets("lobe", sampled_lobe.mean.caustic, sampled_lobe.standard_error.caustic, expected);
+        assert_eq!(sampled_lobe.mean.caustic, sampled_lobe.mean.total());
+    }
+    // At a slant part of a lobe lies below the surface.
+    let glossy = material(Surface::Glossy { exponent: 5.0 }, COLOUR);
+    let mut meshes = vec![square(0.0, 1.0, true, 0)];
+    let eye = DVec3::new(0.9, 0.0, 0.2);
+    let open = radiance(&scene(meshes.clone(), vec![glossy.clone()], vec![environment()]), eye, DVec3::ZERO, 100_000);
+    meshes.extend(faces(DVec3::splat(2.0), false, [1; 6]));
+    let closed = radiance(&scene(meshes, vec![glossy, pane()], vec![environment()]), eye, DVec3::ZERO, 100_000);
+    let noise = (open.total_standard_error.powf(2.0) + closed.total_standard_error.powf(2.0)).map(f64::sqrt);
+    assert_meets("slant", open.mean.total(), noise, closed.mean.total());
+    assert!(open.mean.total().cmplt(0.9 * COLOUR.as_dvec3() * SKY).all());
+}
+
+#[test]
+fn textures_shade_lamps_and_walls() {
+    let texture = Texture { name: "ramp".into(), width: 2, height: 1, texels: vec![Vec3::ZERO, Vec3::ONE], wrap: [Wrap::Clamp; 2] };
+    let textured = Some(TextureUse { texture: 0, uv_set: 0 });
+    let plain = |material| scene(vec![square(0.0, 1.0, true, 0)], vec![material], vec![]);
+    let mut lit = plain(Material { emission_texture: textured, ..lamp(Vec3::new(1.0, 2.0, 3.0)) });
+    lit.textures.push(texture.clone());
+    for (x, share) in [(-0.75, 0.0), (0.0, 0.5), (0.75, 1.0)] {
+        let seen = radiance(&lit, DVec3::new(x, 0.3, 1.0), DVec3::new(x, 0.3, 0.0), 2);
+        assert_meets("lamp", seen.mean.total(), DVec3::splat(1e-8), share * EMITTED);
+    }
+    // A ramp and its mirror image make a plain lamp, so that on the axis each gives half.
+    let whole = irradiance(&plain(lamp(Vec3::new(1.0, 2.0, 3.0))), DVec3::Z, -DVec3::Z, 100_000);
+    let form_factor = 4.0 / (2f64.sqrt() * PI) * (1.0 / 2f64.sqrt()).atan();
+    assert_total("plain lamp", &whole, PI * form_factor * EMITTED);
+    assert_total("ramp", &irradiance(&lit, DVec3::Z, -DVec3::Z, 100_000), 0.5 * PI * form_factor * EMITTED);
+
+    let wall = Material { base_colour_texture: textured, ..material(Surface::Lambert, COLOUR) };
+    let mut wall = scene(vec![square(0.0, 1.0, true, 0)], vec![wall], vec![environment()]);
+    wall.textures.push(texture);
+    for (x, share) in [(-0.75, 0.0), (0.0, 0.5), (0.75, 1.0)] {
+        let seen = radiance(&wall, DVec3::new(x, 0.3, 1.0), DVec3::new(x, 0.3, 0.0), 20);
+        assert_meets("wall", seen.mean.total(), DVec3::splat(1e-8), share * COLOUR.as_dvec3() * SKY);
+    }
+}
+
+#[test]
+fn shading_normals_bend_reflections() {
+    // A flat mirror that is shaded as if it were tilted by 22.5 degrees turns a ray by 45.
+    let (sin, cos) = (PI / 8.0).sin_cos();
+    let mut mirror = square(0.0, 1.0, true, 0);
+    mirror.normals = vec![DVec3::new(sin, 0.0, cos); 4];
+    let side = Mesh::parallelogram("lamp", DVec3::new(2.0, -0.1, 1.9), DVec3::Z * 0.2, DVec3::Y * 0.2, 1);
+    let lit = scene(vec![mirror, side], vec![material(Surface::Mirror, COLOUR), lamp(Vec3::ONE)], vec![]);
+    assert_total("lamp", &radiance(&lit, DVec3::Z, DVec3::ZERO, 2), COLOUR.as_dvec3());
+}
+
+#[test]
+fn pictures_stand_upright() {
+    let top_left = Mesh::parallelogram("lamp", DVec3::new(-1.0, 0.0, 0.0), DVec3::X, DVec3::Y, 0);
+    let lit = scene(vec![top_left], vec![lamp(Vec3::ONE)], vec![]);
+    let camera = Camera::looking_at("front", DVec3::Z, DVec3::ZERO, DVec3::Y, PI / 2.0);
+    let Image { width, height, pixels } = Judge::new(&lit, 0).image(&camera, 2, 2, 50, 1);
+    assert_eq!((width, height, pixels.len()), (2, 2, 4));
+    assert_eq!(pixels.iter().map(|pixel| pixel.mean.total().x).collect::<Vec<_>>(), [1.0, 0.0, 0.0, 0.0]);
+    // Samples cover each pixel evenly: the lamp's edge is where it is.
+    let edge = &Judge::new(&lit, 0).image(&camera, 1, 1, 20_000, 1).pixels[0];
+    assert_total("quarter", edge, DVec3::splat(0.25));
+}
+
+fn picture(scene: &Scene, seed: u64, threads: usize) -> Image {
+    let pool = rayon::ThreadPoolBuilder::new().num_threads(threads).build().unwrap();
+    pool.install(|| Judge::new(scene, 10).image(&scene.cameras[0], 24, 16, 8, seed))
+}
+
+#[test]
+fn results_depend_on_the_seed_and_not_on_threads() {
+    let scene = built_in::by_name("cornell-spheres").unwrap();
+    let one = picture(&scene, 7, 1);
+    assert_eq!(one, picture(&scene, 7, 2));
+    assert_ne!(one, picture(&scene, 8, 2));
+    let sum = |part: fn(&Estimate) -> DVec3| one.pixels.iter().map(part).sum::<DVec3>();
+    let parts = [sum(|p| p.mean.direct), sum(|p| p.mean.specular), sum(|p| p.mean.caustic), sum(|p| p.mean.indirect)];
+    assert!(parts.iter().all(|part| part.min_element() > 0.0), "{parts:?}");
+    let total = sum(|p| p.mean.total());
+    assert_meets("total", parts.iter().sum(), DVec3::ZERO, total);
+    // A single sample, too, has nothing but its parts.
+    let camera = &scene.cameras[0];
+    let judge = Judge::new(&scene, 10);
+    let sample = judge.radiance(camera.eye, camera.forward, &mut random(1, 2));
+    assert_eq!(sample.total(), sample.direct + sample.specular + sample.caustic + sample.indirect);
+}
+
+#[test]
+fn standard_errors_are_what_means_scatter_by() {
+    let lit = scene(vec![], vec![], vec![disc(0.5, -DVec3::Z, EmissionLaw::Cosine)]);
+    let estimates = Judge::new(&lit, 0).irradiance_at(&[(DVec3::ZERO, DVec3::Z); 2000], 100, 5);
+    let scores = estimates.iter().map(|estimate| {
+        assert_eq!(estimate.standard_error.direct, estimate.total_standard_error);
+        (estimate.mean.total() - disc_irradiance(0.5, EmissionLaw::Cosine)) / estimate.total_standard_error
+    });
+    let squares = scores.map(|score| score * score).sum::<DVec3>() / 2000.0;
+    assert!(squares.cmpgt(DVec3::splat(0.85)).all() && squares.cmplt(DVec3::splat(1.15)).all(), "{squares}");
+
+    // Parts of a sample depend on each other: a lamp in front of a mirror under as bright a sky.
+    let half = Mesh::parallelogram("lamp", DVec3::new(-1.0, -1.0, 0.5), DVec3::X, 2.0 * DVec3::Y, 0);
+    let materials = vec![lamp(Vec3::ONE), material(Surface::Mirror, Vec3::ONE)];
+    let lit = scene(vec![half, square(0.0, 1.0, true, 1)], materials, vec![LightKind::Environment { radiance: Vec3::ONE }]);
+    let camera = Camera::looking_at("down", DVec3::Z, DVec3::ZERO, DVec3::Y, 0.5);
+    let estimate = Judge::new(&lit, NO_LIMIT).image(&camera, 1, 1, 10_000, 1).pixels[0];
+    let binomial = DVec3::splat(0.005);
+    assert_meets("direct", estimate.mean.direct, binomial, DVec3::splat(0.5));
+    assert!((estimate.standard_error.direct - binomial).abs().max_element() < 1e-5, "{estimate:?}");
+    assert!((estimate.standard_error.specular - binomial).abs().max_element() < 1e-5, "{estimate:?}");
+    assert!((estimate.mean.total() - 1.0).abs().max_element() < 1e-9 && estimate.total_standard_error.max_element() < 1e-9, "{estimate:?}");
+    let single = Judge::new(&lit, NO_LIMIT).image(&camera, 1, 1, 1, 1).pixels[0];
+    assert_eq!(single.total_standard_error, DVec3::INFINITY);
+}
+
+#[test]
+fn the_checks_complain_about_one_percent() {
+    let lit = scene(vec![], vec![], vec![disc(1.5, -DVec3::Z, EmissionLaw::Uniform)]);
+    let estimate = irradiance(&lit, DVec3::ZERO, DVec3::Z, 20_000);
+    let (mean, error) = (estimate.mean.total(), estimate.total_standard_error);
+    assert!(meets(mean, error, disc_irradiance(1.5, EmissionLaw::Uniform)));
+    assert!(!meets(1.01 * mean, error, disc_irradiance(1.5, EmissionLaw::Uniform)));
+    assert!(!meets(mean, error, disc_irradiance(1.5, EmissionLaw::Cosine)));
+    assert!(!meets(DVec3::NAN, DVec3::NAN, DVec3::ONE));
+    assert!(!meets(DVec3::INFINITY, DVec3::INFINITY, DVec3::ONE));
+}
