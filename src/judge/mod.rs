@@ -2,8 +2,11 @@
 //!
 //! A scene goes in; estimates of radiance and irradiance come out, each with its standard error. It is
 //! unidirectional (from the eye, with light sampling at every surface that is not specular), in f64,
-//! and without bias, but for two limits: paths of more than `max_bounces` bounces are left out, and so
+//! and without bias but for two limits: paths of more than `max_bounces` bounces are left out, and so
 //! are caustics of point, spot and directional lights, which no path from the eye can meet.
+//!
+//! Standard errors tell little where few samples carry the light: in caustics of small lamps, and next
+//! to shining triangles that meet other surfaces, where 1 / distance^2 has no bound.
 
 mod geometry;
 mod light;

@@ -67,7 +67,7 @@ impl Judge<'_> {
             let hit = self.geometry.closest_hit(&ray, f64::INFINITY);
             let emitted_to = prefix.part_of_emission();
             // Discs are seen by other surfaces, never by the eye.
-            if prefix.counts_emission && true {
+            if prefix.counts_emission && prefix.rough_count > 0 {
                 let t_max = hit.map_or(f64::INFINITY, |hit| hit.t);
                 parts[emitted_to] += prefix.beta * self.emitters.discs_along(&self.geometry, &ray, t_max);
             }

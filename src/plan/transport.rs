@@ -2,6 +2,7 @@
 //! how many photons, the schedule of radii, and the size of every buffer.
 
 use std::f64::consts::PI;
+use std::time::{Duration, Instant};
 
 use serde::Serialize;
 
@@ -97,6 +98,8 @@ pub struct TransportPlan {
     pub work_per_submission: u64,
     /// Bytes of all buffers.
     pub bytes: u64,
+    /// Time that planning took.
+    pub planned_in: Duration,
 }
 
 /// Triangles up to which a list is tested from end to end instead of a tree.
@@ -118,6 +121,7 @@ const RAY_COST: u64 = 64;
 
 impl TransportPlan {
     pub fn new(scene: &Scene, geometry: &Geometry, settings: &TransportSettings, sensor: Sensor, limits: &Limits) -> Result<TransportPlan> {
+        let began = Instant::now();
         settings.validate()?;
         if settings.leaves_out(Effect::Bvh) && geometry.triangles.len() > MAX_LIST_TRIANGLES {
             let count = geometry.triangles.len();
@@ -241,6 +245,7 @@ impl TransportPlan {
             film_limit: 1.0,
             work_per_submission: limits.pair_tests_per_submission,
             bytes: 0,
+            planned_in: Duration::ZERO,
         };
         plan.set_film(geometry);
         plan.check_sizes(geometry, limits)?;
@@ -248,6 +253,7 @@ impl TransportPlan {
             plan.give(decision, geometry);
         }
         plan.decisions = decisions;
+        plan.planned_in = began.elapsed();
         Ok(plan)
     }
 

@@ -17,7 +17,7 @@ pub mod points;
 pub mod resources;
 
 use std::sync::atomic::{AtomicBool, Ordering};
-use std::time::Instant;
+use std::time::{Duration, Instant};
 
 pub use film::RoundFilm;
 use resources::{PhotonBuffers, TransportResources};
@@ -32,7 +32,7 @@ use crate::records::{Receiver, Tally};
 use crate::scene::Camera;
 use crate::scene::geometry::Geometry;
 use crate::settings::transport::Append;
-use crate::timings::Timings;
+use crate::timings::{Clock, Span, Timings};
 
 /// What is lit and what looks at it.
 pub struct View<'a> {
@@ -112,6 +112,8 @@ pub fn light(gpu: &Gpu, view: &View, plan: TransportPlan, watch: &mut Watch) -> 
     gpu.prepare(&modules(&plan, gpu.facts()), &constants(&plan))?;
     let mut commands = Commands::new(gpu, constants(&plan), started)?;
     commands.timings().count("run");
+    commands.timings().count("plan");
+    commands.timings().add(Span { name: "plan".into(), clock: Clock::Wall, start: Duration::ZERO, duration: plan.planned_in });
     let resources = commands.scope("set-up", |commands| TransportResources::new(gpu, commands, view.geometry, &plan, view.phases))?;
     commands.submit()?;
 
