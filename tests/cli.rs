@@ -97,7 +97,7 @@ fn bad_input_is_refused_in_one_line() {
         (&["--irradiance", "/dev/null/x"], ["--irradiance", "/dev/null/x", "cannot be written"]),
         (&["--irradiance", "i", "--reflectance", "0"], ["--reflectance", "0", "above 0"]),
         (&["--colour"], ["--colour", "no such option", "--help"]),
-        (&["bake"], ["bake", "no such subcommand", "--help"]),
+        (&["bakery"], ["bakery", "no such subcommand", "--help"]),
         (&["paper"], ["--out", "required", ""]),
         (&["paper", "--out", "/dev/null/x"], ["--out", "/dev/null/x", "cannot be written"]),
     ];
