@@ -288,20 +288,19 @@ fn furnace(albedo: f32) -> Scene {
 #[test]
 fn a_furnace_is_equally_bright_everywhere() {
     let Some(gpu) = device() else { return };
-    // Next to a wall that shines, few shadow rays find what is nearest: those points are the photons' alone.
-    let middle = [(DVec3::new(0.5, 0.0, 0.5), DVec3::Y), (DVec3::new(0.31, 0.44, 0.52), DVec3::new(0.6, 0.0, 0.8))];
     let points = [
         (DVec3::new(0.5, 0.0, 0.5), DVec3::Y),
         (DVec3::new(0.002, 0.0, 0.5), DVec3::Y),
         (DVec3::new(0.001, 0.0, 0.002), DVec3::Y),
         (DVec3::new(0.0, 0.37, 0.998), DVec3::X),
+        (DVec3::new(0.31, 0.44, 0.52), DVec3::new(0.6, 0.0, 0.8)),
     ];
     let settings = TransportSettings { rounds: 40, photons: 20_000, bounces: 200, ..TransportSettings::default() };
     for kernel in [Kernel::Box, Kernel::Cone, Kernel::Epanechnikov] {
-        for (illumination, points) in [(Illumination::Split, &middle[..]), (Illumination::Photons, &points[..])] {
+        for illumination in [Illumination::Split, Illumination::Photons] {
             let settings = TransportSettings { kernel, illumination, ..settings.clone() };
             let exact = std::f64::consts::PI / (1.0 - 0.5);
-            let found = irradiance(&gpu, &furnace(0.5), &settings, points);
+            let found = irradiance(&gpu, &furnace(0.5), &settings, &points);
             for ((point, _), (mean, error)) in points.iter().zip(&found) {
                 let what = format!("{kernel:?}, {illumination:?}, {point}");
                 assert!(error.x < 0.1 * exact, "{what}: error {error}");
@@ -339,7 +338,7 @@ fn radiance_and_irradiance_of_a_wall_agree() {
         for channel in 0..3 {
             let share = albedo[channel] / std::f64::consts::PI;
             let error = radiance_error[channel].hypot(share * irradiance_error[channel]);
-            assert!(error < 0.05 * radiance[channel], "error {error} of {radiance}");
+            assert!(error < 0.08 * radiance[channel], "error {error} of {radiance}");
             let what = format!("channel {channel}, final gather {final_gather}");
             assert_holds(&what, z_check(&what, radiance[channel], share * irradiance[channel], error));
             let doubled = z_check(&what, radiance[channel], 2.0 * share * irradiance[channel], error);

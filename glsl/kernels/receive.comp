@@ -60,7 +60,11 @@ void main()
         chain.weight = vec3(3.14159265358979324);
         chain.gathers = true;
         chain.starts_nowhere = !on_surface;
+        // Neither shadow rays nor photons know what shines on a point in the air, where the maps are to hold it.
         chain.sees_emission = false;
+        if (HAS_ALL_ARRIVALS) {
+            chain.sees_emission = !on_surface;
+        }
         follow(chain, index, push.draws, push.emitter_count);
     }
     write_pass_sum(index, chain.light, push.film_scale, push.film_limit);

@@ -121,6 +121,46 @@ Emission sample_emission(uint emitter_count, float scene_radius, vec4 u, vec4 w)
     return emission;
 }
 
+// Solid angle above which a triangle is sampled by direction: close by, the squared distance of a point on
+// it may be next to nothing, and few points would carry nearly all of the light.
+const float MIN_SPHERICAL = 0.05;
+
+float angle_between(vec3 a, vec3 b)
+{
+    return atan(length(cross(a, b)), dot(a, b));
+}
+
+// A direction within the spherical triangle of three unit vectors, evenly by solid angle, and that angle
+// (Arvo 1995); 0 if it is too small to be worth it.
+vec4 sample_spherical_triangle(vec3 a, vec3 b, vec3 c, vec2 u)
+{
+    float volume = abs(dot(a, cross(b, c)));
+    float base = 1.0 + dot(a, b) + dot(b, c) + dot(c, a);
+    if (2.0 * atan(volume, base) < MIN_SPHERICAL) {
+        return vec4(0.0);
+    }
+    vec3 ab = normalize(cross(a, b)), bc = normalize(cross(b, c)), ca = normalize(cross(c, a));
+    float alpha = angle_between(ab, -ca);
+    float angles = alpha + angle_between(bc, -ab) + angle_between(ca, -bc);
+    float excess = angles - 3.14159265358979324;
+    // The arc from b to a point c' of the arc from a to c cuts off the share u.x of the area.
+    float part = 3.14159265358979324 + u.x * excess;
+    vec2 of_part = sin_cos_turns(fract(part * 0.15915494309189535));
+    vec2 of_alpha = sin_cos_turns(alpha * 0.15915494309189535);
+    float sin_phi = of_part.x * of_alpha.y - of_part.y * of_alpha.x;
+    float cos_phi = of_part.y * of_alpha.y + of_part.x * of_alpha.x;
+    float k1 = cos_phi + of_alpha.y;
+    float k2 = sin_phi - of_alpha.x * dot(a, b);
+    float divisor = (k2 * sin_phi + k1 * cos_phi) * of_alpha.x;
+    float cosine = abs(divisor) > 1e-12 ? clamp((k2 + (k2 * cos_phi - k1 * sin_phi) * of_alpha.y) / divisor, -1.0, 1.0) : 1.0;
+    vec3 towards_c = c - dot(c, a) * a;
+    vec3 corner = cosine * a + sqrt(1.0 - cosine * cosine) * towards_c * inversesqrt(max(dot(towards_c, towards_c), 1e-30));
+    float z = 1.0 - u.y * (1.0 - dot(corner, b));
+    vec3 towards_corner = corner - dot(corner, b) * b;
+    vec3 direction = z * b + sqrt(max(1.0 - z * z, 0.0)) * towards_corner * inversesqrt(max(dot(towards_corner, towards_corner), 1e-30));
+    return vec4(direction, excess);
+}
+
 // What one light adds at a point: `radiance` is what arrives along wi, over the probability density of
 // this sample; the light ends at `target`, or comes from beyond the scene.
 struct Arriving {
@@ -136,6 +176,7 @@ Arriving sample_light(uint emitter_count, vec3 position, vec3 ns, vec4 u)
     Emitter light = emitters[pick_emitter(emitter_count, u.x)];
     Arriving arriving = Arriving(vec3(0.0), light.strength / light.probability, light.position, false);
     float cos_light = 1.0;
+    bool by_direction = false;
     if (HAS_TRIANGLE_LIGHTS) {
         if (light.kind == EMITTER_TRIANGLE) {
             Triangle triangle = triangles[light.triangle];
@@ -150,6 +191,18 @@ Arriving sample_light(uint emitter_count, vec3 position, vec3 ns, vec4 u)
             arriving.target = offset_origin(point, triangle_error(triangle, at.x, at.y), normal, normal);
             arriving.radiance = emitted_radiance(material, light.triangle, at.x, at.y) * (triangle_area(triangle) / light.probability);
             cos_light = max(dot(normal, normalize(position - point)), 0.0);
+            if (cos_light > 0.0 && material.emission_texture == NONE) {
+                vec4 direction = sample_spherical_triangle(normalize(triangle.a - position), normalize(triangle.b - position),
+                                                           normalize(triangle.c - position), u.yz);
+                float approach = -dot(direction.xyz, normal);
+                if (direction.w > 0.0 && approach > 0.0) {
+                    by_direction = true;
+                    point = position + direction.xyz * (dot(normal, position - triangle.a) / approach);
+                    vec3 error = position_error(point) + position_error(triangle.a) + position_error(position);
+                    arriving.target = offset_origin(point, error, normal, normal);
+                    arriving.radiance = material.emission * (direction.w / light.probability);
+                }
+            }
         }
     }
     if (HAS_SPOT_LIGHTS) {
@@ -182,7 +235,9 @@ Arriving sample_light(uint emitter_count, vec3 position, vec3 ns, vec4 u)
         vec3 way = arriving.target - position;
         float distance_squared = dot(way, way);
         arriving.wi = distance_squared > 0.0 ? way * inversesqrt(distance_squared) : vec3(0.0);
-        arriving.radiance *= distance_squared > 0.0 ? cos_light / distance_squared : 0.0;
+        if (!by_direction) {
+            arriving.radiance *= distance_squared > 0.0 ? cos_light / distance_squared : 0.0;
+        }
     }
     return arriving;
 }

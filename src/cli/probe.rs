@@ -8,13 +8,14 @@ use clap::Args;
 use glam::DVec3;
 
 use super::transport::{Job, ReportArgs, SceneArgs, TransportArgs, geometry, light, plan};
-use super::{DeviceArgs, End, say};
+use super::{DeviceArgs, End, complain, say};
 use crate::error::{Error, Result};
 use crate::output::destination::{Destination, check_distinct, write_all};
 use crate::output::light_report;
 use crate::plan::transport::Sensor;
 use crate::records::Receiver;
 use crate::scene::geometry::Geometry;
+use crate::settings::transport::Illumination;
 use crate::transport::Lit;
 
 #[derive(Args)]
@@ -44,6 +45,9 @@ pub(super) fn run(args: &ProbeArgs, cancelled: &AtomicBool) -> Result<End> {
     let points = read_points(&args.points)?;
 
     let scene = args.scene.open()?;
+    if settings.illumination == Illumination::Photons && !scene.lights.is_empty() {
+        complain("warning: with --illumination photons, points that lie on no surface get no direct light of lights that are no mesh");
+    }
     let geometry = geometry(&scene, &settings)?;
     let phases = [receivers(&points, &geometry)];
     let sensor = Sensor::Receivers { count: points.len() as u32 };
