@@ -43,7 +43,7 @@ fn picture(gpu: &Gpu, scene: &Scene, settings: &TransportSettings) -> Lit {
 fn run(gpu: &Gpu, view: &View, plan: TransportPlan) -> Lit {
     let never = AtomicBool::new(false);
     let lit = transport::light(gpu, view, plan, &mut Watch { cancelled: &never, progress: &mut |_, _| {} }).unwrap();
-    assert_eq!(lit.anomalies, [0, 0], "values that are no number, or too large for the film");
+    assert_eq!(lit.anomalies, [0, 0, 0], "values that are no number, or too large for the film");
     lit
 }
 
@@ -443,9 +443,9 @@ fn pictures_agree_with_the_judge() {
         let judged = Judge::new(&scene, settings.bounces).image(&camera_of(&scene), SIZE, SIZE, samples, 77);
         let means: Vec<DVec3> = (0..lit.film.pixels()).map(|pixel| lit.film.mean(pixel, &lit.plan)).collect();
         let errors: Vec<DVec3> = (0..lit.film.pixels()).map(|pixel| lit.film.standard_error(pixel, &lit.plan)).collect();
-        let verdict = Verdict::new(&means, &errors, &judged, None);
+        let verdict = Verdict::new(&means, &errors, rounds, &judged, None);
         assert!(verdict.agrees(), "{name}: {verdict}");
         let brighter: Vec<DVec3> = means.iter().map(|mean| 1.3 * *mean).collect();
-        assert!(!Verdict::new(&brighter, &errors, &judged, None).agrees(), "{name}, a third brighter, is not noticed");
+        assert!(!Verdict::new(&brighter, &errors, rounds, &judged, None).agrees(), "{name}, a third brighter, is not noticed");
     }
 }

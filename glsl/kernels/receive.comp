@@ -30,6 +30,9 @@ layout(set = 0, binding = 8, scalar) readonly buffer Receivers { Receiver receiv
 #include "stages/visible_point.glsl"
 #include "stages/chain.glsl"
 
+// A degree: what single precision and the facets of a fine mesh may turn a normal by.
+const float RECEIVER_NORMAL_COSINE = 0.99985;
+
 void main()
 {
     uint index = push.first_point + invocation_index();
@@ -44,8 +47,10 @@ void main()
     if (SHADOW_RAYS != 0) {
         add_light(chain, direct_light(here, push.emitter_count, push.draws, index, 1 + VERTEX_BLOCKS * MAX_CHAIN));
     }
-    // Photons only ever land on surfaces: any other point looks around.
-    bool on_surface = covered_area(receiver.position, ng, push.radius) > 0.0;
+    // Photons only ever land on surfaces, and tell the irradiance of those: any other point, or direction, looks
+    // around.
+    bool whole;
+    bool on_surface = covered_area(receiver.position, ng, push.radius, RECEIVER_NORMAL_COSINE, whole) > 0.0;
     bool gathers = GATHER_RAYS == GATHER_ALL || !on_surface;
     if (on_surface) {
         uint arrivals = arrivals_wanted(chain, gathers);

@@ -41,8 +41,13 @@ float estimate_area(VisiblePoint point, float radius)
 {
     float area = 3.14159265358979324 * kernel_norm() * radius * radius;
     if (HAS_EDGE_CORRECTION) {
+        bool whole;
+        float covered = covered_area(point.position, unpack_normal(point.normal), radius, MIN_NORMAL_COSINE, whole);
+        if (whole) {
+            atomicAdd(anomalies[2], 1);
+        }
         // Photons were found, so some surface is there; rounding may call a sliver nothing.
-        return max(covered_area(point.position, unpack_normal(point.normal), radius), area * (1.0 / 4096.0));
+        return max(covered, area * (1.0 / 4096.0));
     }
     return area;
 }

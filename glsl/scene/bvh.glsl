@@ -32,6 +32,18 @@ ShearedRay sheared(vec3 origin, vec3 direction)
     return ShearedRay(origin, shear, axis);
 }
 
+// The distance below which rounding may have put a hit in front of the ray (Pharr, Jakob and Humphreys,
+// section 6.8.7): a ray that leaves a triangle does not meet it, or another of its plane, again.
+float nearest_certain(ShearedRay ray, vec3 a, vec3 b, vec3 c, vec3 edges, float determinant)
+{
+    const float rounding = 1.0 / 4194304.0; // four half-ulps
+    float z = abs(ray.shear.z) * max(abs(a.z), max(abs(b.z), abs(c.z)));
+    vec2 flat_part = max(abs(a.xy), max(abs(b.xy), abs(c.xy))) + abs(ray.shear.xy) * max(abs(a.z), max(abs(b.z), abs(c.z)));
+    float edge = max(abs(edges.x), max(abs(edges.y), abs(edges.z)));
+    float edge_error = 6.0 * rounding * flat_part.x * flat_part.y;
+    return 3.0 * (2.0 * rounding * edge * z + edge_error * z) / abs(determinant);
+}
+
 // Takes the triangle if the ray meets it within (0, hit.t), or at hit.t with a smaller number: then the
 // nearest hit does not depend on the order of the tests. `precise` keeps an edge's value the same, sign
 // apart, in both triangles that share it: no ray slips through between them.
@@ -55,7 +67,7 @@ void intersect_triangle(ShearedRay ray, uint index, inout Hit hit)
         return;
     }
     precise float t = ray.shear.z * (u * a.z + v * b.z + w * c.z) / determinant;
-    if (t > 0.0 && (t < hit.t || (t == hit.t && index < hit.triangle))) {
+    if (t > nearest_certain(ray, a, b, c, vec3(u, v, w), determinant) && (t < hit.t || (t == hit.t && index < hit.triangle))) {
         precise float second = v / determinant;
         precise float third = w / determinant;
         hit = Hit(t, index, second, third);
@@ -102,7 +114,8 @@ Hit traverse(vec3 origin, vec3 direction, float t_max, bool any)
     ShearedRay ray = sheared(origin, direction);
     if (HAS_BVH) {
         // An axis along which the ray does not move is given a speed too small to matter.
-        vec3 speed = mix(direction, vec3(1.0 / 1152921504606846976.0), equal(direction, vec3(0.0)));
+        const float slowest = 1.0 / 1152921504606846976.0;
+        vec3 speed = mix(direction, vec3(slowest), lessThan(abs(direction), vec3(slowest)));
         vec3 inverse = 1.0 / speed;
         uint octant = (direction.x < 0.0 ? 0 : 4) | (direction.y < 0.0 ? 0 : 2) | (direction.z < 0.0 ? 0 : 1);
 
@@ -169,8 +182,10 @@ vec3 offset_origin(vec3 position, vec3 error, vec3 normal, vec3 direction)
     return mix(intBitsToFloat(bits + away), start, equal(start, vec3(0.0)));
 }
 
-// Bound of the error of a point on a triangle, from its corners.
-vec3 triangle_error(Triangle triangle, float u, float v)
+// Bound of the error of each coordinate of a point on a triangle: a few roundings of its largest corner's. It is
+// the same along every axis, as a plane through the origin is no more exact than its corners.
+vec3 triangle_error(Triangle triangle)
 {
-    return (abs((1.0 - u - v) * triangle.a) + abs(u * triangle.b) + abs(v * triangle.c)) * (1.0 / 1048576.0);
+    vec3 largest = max(abs(triangle.a), max(abs(triangle.b), abs(triangle.c)));
+    return vec3(max(largest.x, max(largest.y, largest.z)) * (1.0 / 1048576.0));
 }

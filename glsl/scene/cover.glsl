@@ -67,11 +67,16 @@ float kernel_over_edge(vec2 from, vec2 to, inout bool enters, inout uint left_co
     return sum;
 }
 
-// Integral of the kernel over the part of a triangle that belongs to an estimate, in units of 2^-28 of the
+// Integral of the kernel over the part of a triangle that belongs to an estimate, in units of 2^-24 of the
 // squared radius: integers add up alike in whatever order the triangles come.
-uint kernel_over_triangle(uint index, vec3 position, vec3 normal, float radius)
+uint kernel_over_triangle(uint index, vec3 position, vec3 normal, float radius, float least_cosine)
 {
     Triangle triangle = triangles[index];
+    // No photon is ever stored on a mirror or on glass.
+    uint kind = materials[triangle.material].surface;
+    if (kind == SURFACE_MIRROR || kind == SURFACE_DIELECTRIC) {
+        return 0;
+    }
     vec3 front = triangle_normal(triangle);
     bool turned = false;
     if (HAS_TWO_SIDED) {
@@ -79,7 +84,7 @@ uint kernel_over_triangle(uint index, vec3 position, vec3 normal, float radius)
     }
     vec3 side = turned ? -front : front;
     float height = dot(position - triangle.a, side);
-    if (abs(height) >= radius || !belongs(normal, side, height, radius)) {
+    if (abs(height) >= radius || !belongs(normal, side, height, radius, least_cosine)) {
         return 0;
     }
     // In the triangle's own plane, in units of the disc that the sphere cuts out of it.
@@ -100,13 +105,25 @@ uint kernel_over_triangle(uint index, vec3 position, vec3 normal, float radius)
         whole = left_count == 3 ? 3.14159265358979324 * kernel_norm() : 0.0;
     }
     float share = disc / radius;
-    return uint(roundEven(max(whole, 0.0) * share * share * 268435456.0));
+    return uint(roundEven(max(whole, 0.0) * share * share * 16777216.0));
 }
 
-// Integral of the kernel over all surface that belongs to an estimate: the area, with the box kernel.
-float covered_area(vec3 position, vec3 normal, float radius)
+// Triangles that one estimate looks at: a mesh so dense that more lie within the radius is taken as a surface
+// that goes on beyond it.
+const uint MAX_COVERED = 8192;
+
+uint saturated_sum(uint a, uint b)
+{
+    return a > 0xffffffffu - b ? 0xffffffffu : a + b;
+}
+
+// Integral of the kernel over all surface that belongs to an estimate: the area, with the box kernel. Whole is set
+// if it could not be found: then the whole disc stands for it.
+float covered_area(vec3 position, vec3 normal, float radius, float least_cosine, out bool whole)
 {
     uint sum = 0;
+    uint seen = 0;
+    whole = false;
     if (HAS_BVH) {
         // A little wider than the sphere, for the rounding of the boxes.
         float reach = radius * (1.0 + 1.0 / 1024.0);
@@ -138,8 +155,13 @@ float covered_area(vec3 position, vec3 normal, float radius)
                 }
             }
             while (near_leaves != 0) {
-                sum += kernel_over_triangle(node.first_triangle + findLSB(near_leaves), position, normal, radius);
+                sum = saturated_sum(sum, kernel_over_triangle(node.first_triangle + findLSB(near_leaves), position, normal, radius, least_cosine));
                 near_leaves &= near_leaves - 1;
+                seen++;
+            }
+            if (seen > MAX_COVERED) {
+                whole = true;
+                return 3.14159265358979324 * kernel_norm() * radius * radius;
             }
             group = uvec2(node.first_child, (near_nodes << 8) | child_nodes);
             if (near_nodes == 0) {
@@ -151,8 +173,8 @@ float covered_area(vec3 position, vec3 normal, float radius)
         }
     } else {
         for (uint index = 0; index < triangles.length(); index++) {
-            sum += kernel_over_triangle(index, position, normal, radius);
+            sum = saturated_sum(sum, kernel_over_triangle(index, position, normal, radius, least_cosine));
         }
     }
-    return float(sum) * (1.0 / 268435456.0) * radius * radius;
+    return float(sum) * (1.0 / 16777216.0) * radius * radius;
 }

@@ -1,7 +1,8 @@
 // The film of a picture: for each pixel and channel the sum of all passes and the sum of their squares,
 // exact integers (64 and 128 bits), so that passes add up in any order. One invocation owns a pixel.
 
-// A count of what a film cannot hold: [0] values that are no number, [1] values cut to the largest.
+// Counts: [0] values that are no number, [1] values cut to the film's largest, [2] estimates on a mesh too dense
+// for its area to be found.
 layout(set = 1, binding = 0, scalar) buffer Anomalies { uint anomalies[]; };
 
 // A value in film units as a 64-bit integer (low word, high word), at most `limit` units.

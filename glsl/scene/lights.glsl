@@ -31,9 +31,12 @@ vec3 sample_disc(vec3 centre, vec3 normal, float radius, vec2 u)
     return centre + to_frame(vec3(radius * sqrt(u.x) * sin_cos.yx, 0.0), normal);
 }
 
+// Bound of the error of each coordinate of a point on no triangle. What lies there, of a scene one unit wide,
+// is no better known than to a part of that.
 vec3 position_error(vec3 position)
 {
-    return (abs(position)) * (1.0 / 1048576.0);
+    vec3 size = abs(position);
+    return vec3(max(max(size.x, 0.25), max(size.y, size.z)) * (1.0 / 1048576.0));
 }
 
 float triangle_area(Triangle triangle)
@@ -69,7 +72,7 @@ Emission sample_emission(uint emitter_count, float scene_radius, vec4 u, vec4 w)
                 normal = material.two_sided != 0 && u.w < 0.5 ? -normal : normal;
             }
             emission.direction = to_frame(sample_cosine_hemisphere(w.x, w.y), normal);
-            emission.position = offset_origin(triangle_point(triangle, at.x, at.y), triangle_error(triangle, at.x, at.y), normal, normal);
+            emission.position = offset_origin(triangle_point(triangle, at.x, at.y), triangle_error(triangle), normal, normal);
             if (HAS_TEXTURES) {
                 if (material.emission_texture != NONE) {
                     TriangleUvs uv = uvs[light.triangle];
@@ -188,7 +191,7 @@ Arriving sample_light(uint emitter_count, vec3 position, vec3 ns, vec4 u)
             if (HAS_TWO_SIDED) {
                 normal = material.two_sided != 0 && side < 0.0 ? -normal : normal;
             }
-            arriving.target = offset_origin(point, triangle_error(triangle, at.x, at.y), normal, normal);
+            arriving.target = offset_origin(point, triangle_error(triangle), normal, normal);
             arriving.radiance = emitted_radiance(material, light.triangle, at.x, at.y) * (triangle_area(triangle) / light.probability);
             cos_light = max(dot(normal, normalize(position - point)), 0.0);
             if (cos_light > 0.0 && material.emission_texture == NONE) {
@@ -198,7 +201,7 @@ Arriving sample_light(uint emitter_count, vec3 position, vec3 ns, vec4 u)
                 if (direction.w > 0.0 && approach > 0.0) {
                     by_direction = true;
                     point = position + direction.xyz * (dot(normal, position - triangle.a) / approach);
-                    vec3 error = position_error(point) + position_error(triangle.a) + position_error(position);
+                    vec3 error = position_error(point) + triangle_error(triangle);
                     arriving.target = offset_origin(point, error, normal, normal);
                     arriving.radiance = material.emission * (direction.w / light.probability);
                 }

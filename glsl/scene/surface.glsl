@@ -85,7 +85,7 @@ Surface surface_at(Hit hit, vec3 wo)
     SurfaceMaterial material = materials[triangle.material];
     Surface surface;
     surface.position = triangle_point(triangle, hit.u, hit.v);
-    surface.error = triangle_error(triangle, hit.u, hit.v);
+    surface.error = triangle_error(triangle);
     vec3 normal = triangle_normal(triangle);
     surface.front = dot(normal, wo) >= 0.0;
     surface.ng = surface.front ? normal : -normal;

@@ -45,7 +45,7 @@ void look_up()
                     MapPhoton photon = sorted_map[place];
                     vec3 photon_normal = unpack_normal(photon.normal);
                     precise float height = -(way.x * photon_normal.x + way.y * photon_normal.y + way.z * photon_normal.z);
-                    bool counts = belongs(normal, photon_normal, height, push.radius) && ((point.arrivals >> (photon.wi >> 30)) & 1u) != 0;
+                    bool counts = belongs(normal, photon_normal, height, push.radius, MIN_NORMAL_COSINE) && ((point.arrivals >> (photon.wi >> 30)) & 1u) != 0;
                     vec3 wi = unpack_direction(photon.wi);
                     float cosine = dot(wi, ns);
                     if (counts && cosine > 0.0) {

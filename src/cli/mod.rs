@@ -103,13 +103,13 @@ pub fn main() -> u8 {
     };
     let cancelled = cancel_on_interrupt();
     let result = match cli.command {
-        None => run::run(&cli.run, &cancelled),
+        None => hearing(|| run::run(&cli.run, &cancelled)),
         Some(Command::Devices(args)) => devices::run(&args).map(|()| End::Finished),
         Some(Command::Render(args)) => render::run(&args, &cancelled),
         Some(Command::Bake(args)) => bake::run(&args, &cancelled),
         Some(Command::Probe(args)) => probe::run(&args, &cancelled),
         Some(Command::Plan(args)) => plan::run(&args).map(|()| End::Finished),
-        Some(Command::Paper(args)) => paper::run(&args, &cancelled),
+        Some(Command::Paper(args)) => hearing(|| paper::run(&args, &cancelled)),
     };
     match result {
         Ok(End::Finished) => 0,
@@ -123,6 +123,8 @@ pub fn main() -> u8 {
 
 /// One line on stderr. Where nobody can read it, the exit code still tells.
 fn complain(line: &str) {
+    // Names of files and of things in them may hold anything; a complaint stays one line.
+    let line: String = line.chars().map(|letter| if letter.is_control() { ' ' } else { letter }).collect();
     let _ = writeln!(std::io::stderr(), "photonmill: {line}");
 }
 
@@ -136,13 +138,24 @@ fn say(text: &str) -> Result<()> {
     }
 }
 
+/// Whether what is under way looks at the flag; a scene that is being read does not.
+static HEARS_CANCELLING: AtomicBool = AtomicBool::new(false);
+
+/// Runs `body`, which looks at the flag.
+fn hearing<T>(body: impl FnOnce() -> T) -> T {
+    HEARS_CANCELLING.store(true, Ordering::Relaxed);
+    let result = body();
+    HEARS_CANCELLING.store(false, Ordering::Relaxed);
+    result
+}
+
 /// The first Ctrl-C (or SIGTERM) ends the run after the photons that are under way, the second at
 /// once; no temporary file exists before the end.
 fn cancel_on_interrupt() -> Arc<AtomicBool> {
     let cancelled = Arc::new(AtomicBool::new(false));
     let flag = cancelled.clone();
     let handler = move || {
-        if flag.swap(true, Ordering::Relaxed) {
+        if flag.swap(true, Ordering::Relaxed) || !HEARS_CANCELLING.load(Ordering::Relaxed) {
             std::process::exit(130);
         }
         complain("ending after the photons under way; Ctrl-C again to end at once");

@@ -17,7 +17,7 @@ pub(super) struct PlanArgs {
     #[command(flatten)]
     scene: SceneArgs,
     /// Width and height in pixels
-    #[arg(long, value_name = "WxH", value_parser = size, default_value = "640x480", help_heading = "Scene")]
+    #[arg(long, value_name = "WxH", value_parser = size, allow_hyphen_values = true, default_value = "640x480", help_heading = "Scene")]
     size: (u32, u32),
     /// Only this part of the light
     #[arg(long, value_enum, help_heading = "Transport")]

@@ -15,6 +15,7 @@ use crate::output::light_report;
 use crate::plan::transport::Sensor;
 use crate::records::Receiver;
 use crate::scene::geometry::Geometry;
+use crate::scene::{Light, LightKind, Mesh};
 use crate::settings::transport::Illumination;
 use crate::transport::Lit;
 
@@ -45,6 +46,11 @@ pub(super) fn run(args: &ProbeArgs, cancelled: &AtomicBool) -> Result<End> {
     let points = read_points(&args.points)?;
 
     let scene = args.scene.open()?;
+    let is_specular = |mesh: &Mesh| scene.materials[mesh.material].surface.is_specular();
+    let is_point_like = |light: &Light| !matches!(light.kind, LightKind::Environment { .. });
+    if scene.lights.iter().any(is_point_like) && scene.meshes.iter().any(is_specular) {
+        complain("warning: points that lie on no surface get no light over mirrors and through glass from lights that are no mesh");
+    }
     if settings.illumination == Illumination::Photons && !scene.lights.is_empty() {
         complain("warning: with --illumination photons, points that lie on no surface get no direct light of lights that are no mesh");
     }
@@ -119,7 +125,7 @@ fn read_points(path: &Path) -> Result<Vec<(DVec3, DVec3)>> {
             return Err(wrong(&format!("holds a number beyond {MAX_COORDINATE:e}")));
         }
         let normal = DVec3::new(nx, ny, nz);
-        if normal.length_squared() == 0.0 {
+        if normal == DVec3::ZERO {
             return Err(wrong("has a normal of length 0"));
         }
         points.push((DVec3::new(x, y, z), (normal / normal.abs().max_element()).normalize()));

@@ -34,7 +34,7 @@ pub(super) struct RenderArgs {
     #[arg(long, value_name = "STOPS", value_parser = number::<f32>, allow_negative_numbers = true, help_heading = "Output")]
     exposure: Option<f32>,
     /// Width and height in pixels
-    #[arg(long, value_name = "WxH", value_parser = size, default_value = "640x480", help_heading = "Scene")]
+    #[arg(long, value_name = "WxH", value_parser = size, allow_hyphen_values = true, default_value = "640x480", help_heading = "Scene")]
     size: (u32, u32),
     /// Hold the picture against a path tracer on the CPU of so many samples a pixel, and say whether they
     /// agree within their errors
@@ -101,7 +101,6 @@ pub(super) fn run(args: &RenderArgs, cancelled: &AtomicBool) -> Result<End> {
     let lit = light(&gpu, &job, &geometry, plan, cancelled)?;
 
     let image = radiance(&lit, width, height);
-    let verdict = args.judge.map(|samples| verdict(&lit, &scene, &camera, (width, height), samples));
     let stops = args.exposure.unwrap_or_else(|| image.usual_exposure());
     let text = light_report::text(&scene.name, &lit, reports.explain);
     let mut files = vec![(picture, image.encode(format, stops))];
@@ -114,8 +113,11 @@ pub(super) fn run(args: &RenderArgs, cancelled: &AtomicBool) -> Result<End> {
         Format::Png => format!(" at {stops:+.2} stops"),
         Format::Exr => String::new(),
     };
-    let verdict = verdict.map_or(String::new(), |verdict| format!("\njudge: {verdict}"));
-    say(&format!("{text}{verdict}\nwrote {}{shown}", args.output.display()))?;
+    say(&format!("{text}\nwrote {}{shown}", args.output.display()))?;
+    if let Some(samples) = args.judge {
+        // The picture is there; who has seen enough may end the program.
+        say(&format!("judge: {}", verdict(&lit, &scene, &camera, (width, height), samples)))?;
+    }
     Ok(if lit.cancelled { End::Cancelled } else { End::Finished })
 }
 
@@ -131,11 +133,12 @@ fn verdict(lit: &Lit, scene: &Scene, camera: &Camera, (width, height): (u32, u32
         Part::Caustic => Some(judge::Part::Caustic),
         Part::Indirect => Some(judge::Part::Indirect),
     };
-    // Other random numbers than the photons'.
-    let judged = Judge::new(scene, settings.bounces).image(camera, width, height, samples, settings.seed ^ 0x6a75_6467_65);
+    // Of the same scene, without what was left out, and with other random numbers than the photons'.
+    let scene = scene.without(&settings.without);
+    let judged = Judge::new(&scene, settings.bounces).image(camera, width, height, samples, settings.seed ^ 0x6a75_6467_65);
     let means: Vec<_> = (0..lit.film.pixels()).map(|pixel| lit.film.mean(pixel, &lit.plan)).collect();
     let errors: Vec<_> = (0..lit.film.pixels()).map(|pixel| lit.film.standard_error(pixel, &lit.plan)).collect();
-    Verdict::new(&means, &errors, &judged, part)
+    Verdict::new(&means, &errors, lit.film.rounds.min(samples), &judged, part)
 }
 
 /// W/m2/sr.

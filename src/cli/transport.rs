@@ -7,7 +7,7 @@ use clap::{Args, ValueEnum};
 use indicatif::{ProgressBar, ProgressStyle};
 
 use super::run::{number, numbers, whole};
-use super::{DeviceArgs, complain};
+use super::{DeviceArgs, complain, hearing};
 use crate::error::{Error, Result};
 use crate::gpu::{Gpu, Options};
 use crate::output::destination::Destination;
@@ -32,7 +32,7 @@ pub(super) struct SceneArgs {
     #[arg(long, help_heading = "Scene")]
     radiometric: bool,
     /// Light from everywhere beyond the scene, W/m2/sr: one number, or three for red, green, blue
-    #[arg(long, value_name = "R,G,B", value_parser = colour, help_heading = "Scene")]
+    #[arg(long, value_name = "R,G,B", value_parser = colour, allow_hyphen_values = true, help_heading = "Scene")]
     environment: Option<[f32; 3]>,
 }
 
@@ -234,7 +234,14 @@ pub(super) fn plan(gpu: &Gpu, job: &Job, geometry: &Geometry) -> Result<Transpor
 
 /// Geometry of a scene without the effects that are left out.
 pub(super) fn geometry(scene: &Scene, settings: &TransportSettings) -> Result<Geometry> {
-    Geometry::new(&scene.without(&settings.without))
+    let geometry = Geometry::new(&scene.without(&settings.without))?;
+    if geometry.left_out > 0 {
+        complain(&format!(
+            "warning: {} triangle(s) have no area in single precision, or lie on others, and are left out",
+            geometry.left_out
+        ));
+    }
+    Ok(geometry)
 }
 
 /// Runs all rounds, with a bar.
@@ -243,7 +250,8 @@ pub(super) fn light(gpu: &Gpu, job: &Job, geometry: &Geometry, plan: TransportPl
         ProgressStyle::with_template("{bar:32} {human_pos}/{human_len} rounds, {per_sec}, {eta} left").expect("the template is valid");
     let bar = ProgressBar::new(u64::from(plan.settings.rounds)).with_style(style);
     let mut watch = Watch { cancelled, progress: &mut |done, _| bar.set_position(u64::from(done)) };
-    let lit = transport::light(gpu, &View { geometry, camera: job.camera, phases: job.phases }, plan, &mut watch)?;
+    let view = View { geometry, camera: job.camera, phases: job.phases };
+    let lit = hearing(|| transport::light(gpu, &view, plan, &mut watch))?;
     bar.finish_and_clear();
     if lit.cancelled {
         complain(&format!("ended after {} of {} rounds; what is written is of these", lit.film.rounds, lit.plan.settings.rounds));
@@ -251,12 +259,16 @@ pub(super) fn light(gpu: &Gpu, job: &Job, geometry: &Geometry, plan: TransportPl
     Ok(lit)
 }
 
+/// Of a picture; numbers of its sums are 32-bit.
+const MAX_PIXELS: u32 = 1 << 28;
+
 /// `800x600`.
 pub(super) fn size(text: &str) -> std::result::Result<(u32, u32), String> {
     let parsed = text.split_once('x').and_then(|(width, height)| Some((width.parse().ok()?, height.parse().ok()?)));
     parsed
-        .filter(|(width, height): &(u32, u32)| (1..=65_536).contains(width) && (1..=65_536).contains(height))
-        .ok_or_else(|| "must be WIDTHxHEIGHT, each from 1 to 65536".to_owned())
+        .filter(|(width, height): &(u32, u32)| (1..=65_535).contains(width) && (1..=65_535).contains(height))
+        .filter(|(width, height)| width * height <= MAX_PIXELS)
+        .ok_or_else(|| format!("must be WIDTHxHEIGHT, each from 1 to 65535, and {MAX_PIXELS} pixels at most"))
 }
 
 /// The camera by name, else the scene's first, else one that sees all of it.

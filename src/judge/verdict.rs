@@ -9,6 +9,9 @@ const BLOCKS: u32 = 12;
 /// Standard errors beyond which a block disagrees: by chance one in 16 000 does.
 const Z_LIMIT: f64 = 4.0;
 
+/// Of f32 pictures of many operations.
+const ROUNDING: f64 = 1e-5;
+
 /// A comparison, block by block.
 #[derive(Debug, Clone, PartialEq)]
 pub struct Verdict {
@@ -29,7 +32,10 @@ impl Verdict {
     ///
     /// Photons are shared by neighbouring pixels, so the error of a block's mean is taken as that of its
     /// pixels, as though they erred together: that is never too small.
-    pub fn new(means: &[DVec3], errors: &[DVec3], judged: &Image, part: Option<Part>) -> Verdict {
+    ///
+    /// What neither saw, neither states an error of: an edge or a spark that a pixel's `samples` (the fewer of both)
+    /// all missed may be worth one sample of what the block holds, and each number is rounded.
+    pub fn new(means: &[DVec3], errors: &[DVec3], samples: u32, judged: &Image, part: Option<Part>) -> Verdict {
         let of = |parts: &Parts| part.map_or(parts.total(), |part| parts[part]);
         let (width, height) = (judged.width, judged.height);
         let side = |length: u32, block: u32| (block * length / BLOCKS)..((block + 1) * length / BLOCKS);
@@ -37,7 +43,8 @@ impl Verdict {
         let (mut sum, mut expected_sum, mut sum_error, mut expected_variance) = (0.0, 0.0, 0.0, 0.0);
         let (mut differences, mut squares) = (0.0, 0.0);
         for block in 0..BLOCKS * BLOCKS {
-            let (mut mean, mut error, mut expected, mut variance, mut count) = (DVec3::ZERO, DVec3::ZERO, DVec3::ZERO, DVec3::ZERO, 0.0);
+            let (mut mean, mut error, mut expected, mut variance) = (DVec3::ZERO, DVec3::ZERO, DVec3::ZERO, DVec3::ZERO);
+            let (mut brightest, mut count) = (DVec3::ZERO, 0.0);
             for row in side(height, block / BLOCKS) {
                 for column in side(width, block % BLOCKS) {
                     let pixel = (row * width + column) as usize;
@@ -47,6 +54,7 @@ impl Verdict {
                     expected += of(&estimate.mean);
                     let deviation = part.map_or(estimate.total_standard_error, |part| estimate.standard_error[part]);
                     variance += deviation * deviation;
+                    brightest = brightest.max(means[pixel]).max(of(&estimate.mean));
                     count += 1.0;
                 }
             }
@@ -56,7 +64,9 @@ impl Verdict {
             verdict.blocks += 1;
             for channel in 0..3 {
                 let difference = (mean[channel] - expected[channel]) / count;
-                let deviation = (error[channel] * error[channel] + variance[channel]).sqrt() / count;
+                let unseen = brightest[channel] / f64::from(samples.max(1));
+                let rounding = ROUNDING * expected[channel];
+                let deviation = (error[channel].powi(2) + variance[channel] + count * unseen * unseen + rounding * rounding).sqrt() / count;
                 if difference != 0.0 {
                     let z = difference.abs() / deviation;
                     verdict.worst = verdict.worst.max(z);
@@ -90,11 +100,12 @@ impl std::fmt::Display for Verdict {
         let verdict = if self.agrees() { "agrees" } else { "DISAGREES" };
         write!(
             f,
-            "{verdict} within the stated errors: {} of {} blocks further apart than {Z_LIMIT} standard errors (worst {:.2}), light {:.4} of the judge's, blocks differ by {:.2} %",
+            "{verdict} within the stated errors: {} of {} blocks' channels further apart than {Z_LIMIT} standard errors (worst {:.2}), light {:.4} of the judge's (+- {:.4}), blocks differ by {:.2} %",
             self.apart,
-            self.blocks,
+            3 * self.blocks,
             self.worst,
             self.ratio,
+            self.ratio_error,
             100.0 * self.relative_difference
         )
     }
@@ -116,14 +127,14 @@ mod tests {
         };
         let judged = Image { width: 20, height: 16, pixels: vec![estimate; 320] };
         let errors = vec![DVec3::splat(0.01); 320];
-        assert!(Verdict::new(&vec![direct; 320], &errors, &judged, None).agrees());
+        assert!(Verdict::new(&vec![direct; 320], &errors, 1000, &judged, None).agrees());
         let mut shifted = vec![direct; 320];
-        assert!(!Verdict::new(&vec![1.1 * direct; 320], &errors, &judged, Some(Part::Direct)).agrees());
+        assert!(!Verdict::new(&vec![1.1 * direct; 320], &errors, 1000, &judged, Some(Part::Direct)).agrees());
         shifted[17] = DVec3::splat(5.0);
-        assert!(!Verdict::new(&shifted, &errors, &judged, None).agrees());
+        assert!(!Verdict::new(&shifted, &errors, 1000, &judged, None).agrees());
         // Light where the judge is certain that there is none.
         let dark = Image { pixels: vec![Estimate::default(); 320], ..judged };
-        assert!(!Verdict::new(&vec![direct; 320], &vec![DVec3::ZERO; 320], &dark, None).agrees());
-        assert!(Verdict::new(&vec![DVec3::ZERO; 320], &errors, &dark, None).agrees());
+        assert!(!Verdict::new(&vec![direct; 320], &vec![DVec3::ZERO; 320], 1000, &dark, None).agrees());
+        assert!(Verdict::new(&vec![DVec3::ZERO; 320], &errors, 1000, &dark, None).agrees());
     }
 }

@@ -113,6 +113,7 @@ struct Report<'a> {
 struct Anomalies {
     not_a_number: u32,
     cut_to_largest: u32,
+    too_dense: u32,
 }
 
 #[derive(Serialize)]
@@ -145,7 +146,7 @@ pub fn json(scene: &str, lit: &Lit) -> Vec<u8> {
         rounds: lit.film.rounds,
         ledgers: [lit.fates[0].ledger(), lit.fates[1].ledger()],
         relative_error: lit.film.relative_error(&lit.plan),
-        anomalies: Anomalies { not_a_number: lit.anomalies[0], cut_to_largest: lit.anomalies[1] },
+        anomalies: Anomalies { not_a_number: lit.anomalies[0], cut_to_largest: lit.anomalies[1], too_dense: lit.anomalies[2] },
         timings: lit.timings.rows(),
         dispatches: lit.dispatches,
         submissions: lit.submissions,
@@ -176,6 +177,11 @@ pub fn text(scene: &str, lit: &Lit, explain: bool) -> String {
     }
     if lit.anomalies[1] > 0 {
         writeln!(text, "warning: {} value(s) were larger than a pixel can hold and were cut", lit.anomalies[1]).unwrap();
+    }
+    if lit.anomalies[2] > 0 {
+        let count = lit.anomalies[2];
+        writeln!(text, "warning: {count} estimate(s) cover too many triangles for an edge correction; a smaller --radius mends it")
+            .unwrap();
     }
     match lit.film.rounds {
         1 => text.push_str("noise: unknown from a single round\n"),

@@ -41,7 +41,7 @@ pub enum Sensor {
 impl Sensor {
     pub fn pixels(self) -> u32 {
         match self {
-            Sensor::Picture { width, height } => width * height,
+            Sensor::Picture { width, height } => width.saturating_mul(height),
             Sensor::Receivers { count } => count,
         }
     }
@@ -277,7 +277,7 @@ impl TransportPlan {
     }
 
     pub fn visible_points(&self) -> u32 {
-        self.sensor.pixels() * self.points_per_pixel
+        self.sensor.pixels().saturating_mul(self.points_per_pixel)
     }
 
     /// Pixels of one dispatch that casts `rays` rays each.
@@ -324,8 +324,7 @@ impl TransportPlan {
         ];
         let too_large = |(_, bytes): &&(&'static str, u64)| *bytes > limits.buffer_bytes;
         if let Some((what, bytes)) = scene.iter().find(too_large) {
-            let allowed =
-                format!("its {what} take {bytes} bytes, the device's buffers hold {}; choose another --device", limits.buffer_bytes);
+            let allowed = format!("{what} take {bytes} bytes, the device's buffers hold {}; choose another --device", limits.buffer_bytes);
             return Err(Error::setting("SCENE", format!("({} triangles)", geometry.triangles.len()), allowed));
         }
         if film.iter().any(|(_, bytes)| *bytes > limits.buffer_bytes) {
@@ -338,7 +337,7 @@ impl TransportPlan {
                     format!("has {pixels} pixels, the device's buffers hold {most}; ask for a smaller picture"),
                 ),
                 Sensor::Receivers { count } => {
-                    Error::setting("points", count, format!("are too many, the device's buffers hold {most} at once; ask for fewer"))
+                    Error::setting("--points", count, format!("are too many, the device's buffers hold {most} at once; ask for fewer"))
                 }
             });
         }
@@ -413,7 +412,8 @@ struct Facts<'a> {
     smooth: usize,
     part: Part,
     is_picture: bool,
-    split: bool,
+    /// Some indirect light comes by a gather ray, at whose end there is light of all kinds.
+    gathers: bool,
 }
 
 impl<'a> Facts<'a> {
@@ -424,6 +424,7 @@ impl<'a> Facts<'a> {
         let shining = scene.meshes.iter().filter(|mesh| scene.materials[mesh.material].is_emissive());
         emitters[EMITTER_TRIANGLE as usize] = shining.map(|mesh| mesh.triangles.len()).sum();
         scene.lights.iter().for_each(|light| emitters[light.kind.code() as usize] += 1);
+        let glossy = scene.materials.iter().zip(&used).any(|(material, used)| *used && matches!(material.surface, Surface::Glossy { .. }));
         Facts {
             materials: scene.materials.iter().zip(used).filter(|(_, used)| *used).map(|(material, _)| material).collect(),
             emitters,
@@ -431,7 +432,7 @@ impl<'a> Facts<'a> {
             smooth: geometry.normals.iter().filter(|normals| normals.a != NONE).count(),
             part: settings.part,
             is_picture: matches!(sensor, Sensor::Picture { .. }),
-            split: settings.illumination == Illumination::Split,
+            gathers: settings.final_gather || glossy && settings.illumination == Illumination::Split,
         }
     }
 
@@ -475,7 +476,7 @@ impl<'a> Facts<'a> {
             None => (false, format!("no {what} material: no such caustic")),
             Some(_) if !lit => (false, "nothing shines".into()),
             Some(_) if !receives => (false, "no surface scatters light: nothing to see a caustic on".into()),
-            Some(_) if !(wants(Part::Caustic) || (self.part == Part::Indirect)) => {
+            Some(_) if !(wants(Part::Caustic) || (self.part == Part::Indirect && self.gathers)) => {
                 (false, format!("only {:?} light was asked for", self.part).to_lowercase())
             }
             Some(names) => (true, format!("{what}: {names}")),
@@ -484,9 +485,8 @@ impl<'a> Facts<'a> {
             Effect::Direct if !lit => (false, "nothing shines".into()),
             Effect::Direct if !receives => (false, "no surface scatters light".into()),
             Effect::Direct if self.part == Part::Caustic => (false, "only caustics were asked for".into()),
-            Effect::Direct if self.part == Part::Indirect && self.split => {
-                (true, "indirect light of a gather ray has direct light at its end".into())
-            }
+            Effect::Direct if self.part == Part::Indirect && !self.gathers => (false, "only indirect light was asked for".into()),
+            Effect::Direct if self.part == Part::Indirect => (true, "a gather ray ends in direct light".into()),
             Effect::Direct => (true, format!("{} light(s) reach surfaces that scatter", self.emitters.iter().sum::<usize>())),
             Effect::Indirect if !lit => (false, "nothing shines".into()),
             Effect::Indirect if !receives => (false, "no surface scatters light".into()),

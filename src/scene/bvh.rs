@@ -14,6 +14,9 @@ use crate::constants::BVH_STACK;
 use crate::error::{Error, Result};
 use crate::records::BvhNode;
 
+/// Of the thread that builds: a thousand levels and more.
+const STACK_BYTES: usize = 256 << 20;
+
 pub struct Bvh {
     pub nodes: Vec<BvhNode>,
     /// Triangles in the order of the leaves.
@@ -27,7 +30,16 @@ impl Bvh {
         // Splitting triangles would put some into several leaves, and an area asked of the leaves would count
         // them twice.
         let parameters = BvhBuildParams { pre_split: false, ..BvhBuildParams::fast_build() };
-        let tree = build_cwbvh_from_tris(&triangles, parameters, &mut Duration::default());
+        // The builder recurses as deep as the tree is, and asserts that it is not too deep.
+        let build = move || build_cwbvh_from_tris(&triangles, parameters, &mut Duration::default());
+        let built = std::thread::Builder::new().stack_size(STACK_BYTES).spawn(build).map(|thread| thread.join());
+        let Ok(Ok(tree)) = built else {
+            return Err(Error::Scene {
+                path: "the scene".into(),
+                object: "the triangles' hierarchy".into(),
+                reason: "cannot be built; remove triangles that lie on one another".into(),
+            });
+        };
         let depth = depth(&tree);
         if depth > BVH_STACK as usize {
             return Err(Error::Scene {

@@ -5,6 +5,7 @@
 //! scene by a power of two changes no bit, and every coordinate lies within (-1, 1). Radiance and
 //! irradiance keep their units; a flux in W is divided by `unit`^2.
 
+use std::collections::HashSet;
 use std::f64::consts::{PI, TAU};
 
 use glam::{DVec2, DVec3, UVec2, Vec2, Vec3};
@@ -44,6 +45,8 @@ pub struct Geometry {
     pub flux_unit: f64,
     /// W of all emitters, all channels together, over `unit`^2.
     pub power: f64,
+    /// Triangles that f32 makes a line of, or that lie on others.
+    pub left_out: usize,
 }
 
 /// Most triangles: their numbers and those of the BVH's nodes are 32-bit, and a photon's choice of
@@ -82,7 +85,12 @@ impl Geometry {
             sources.iter().map(|&(mesh, triangle)| scene.meshes[mesh as usize].corners(triangle as usize).map(local)).collect();
         // What f32 makes a line of cannot be hit, and its normal would be no number.
         let is_solid = |[a, b, c]: &[Vec3; 3]| (*b - *a).cross(*c - *a).length_squared() > 0.0;
-        let (sources, corners): (Vec<_>, Vec<_>) = sources.into_iter().zip(corners).filter(|(_, corners)| is_solid(corners)).unzip();
+        // Of triangles that lie on one another, facing alike, only the first can be met; the others would shine, and
+        // count as surface, where none is seen.
+        let mut seen = HashSet::with_capacity(corners.len());
+        let (sources, corners): (Vec<_>, Vec<_>) =
+            sources.into_iter().zip(corners).filter(|(_, corners)| is_solid(corners) && seen.insert(in_fixed_order(corners))).unzip();
+        let left_out = count - corners.len();
         if corners.is_empty() {
             return Err(refuse("the scene", "holds no triangle with an area".into()));
         }
@@ -123,6 +131,7 @@ impl Geometry {
             emitters: Vec::new(),
             flux_unit: 1.0,
             power: 0.0,
+            left_out,
         };
         geometry.add_emitters(scene)?;
         Ok(geometry)
@@ -147,10 +156,27 @@ impl Geometry {
                 found.push(Found { emitter, flux, weight: (flux * mean).element_sum(), brightest });
             }
         }
-        // The environment comes last, where the kernels look for it.
-        let mut lights: Vec<&LightKind> = scene.lights.iter().map(|light| &light.kind).collect();
-        lights.sort_by_key(|kind| matches!(kind, LightKind::Environment { .. }));
-        found.extend(lights.into_iter().map(|kind| self.emitter_of(kind)));
+        let mut sky = Vec3::ZERO;
+        for light in &scene.lights {
+            if let LightKind::Environment { radiance } = light.kind {
+                sky += radiance;
+                continue;
+            }
+            let emitter = self.emitter_of(&light.kind);
+            if !(emitter.emitter.strength.is_finite() && emitter.weight.is_finite() && emitter.emitter.position.is_finite()) {
+                return Err(Error::Scene {
+                    path: (&scene.name).into(),
+                    object: light.name.clone(),
+                    reason: format!(
+                        "leaves the range of numbers: the scene is {} metres wide, which its strength or place does not fit",
+                        self.unit
+                    ),
+                });
+            }
+            found.push(emitter);
+        }
+        // One environment, the sum of all, comes last, where the kernels look for it.
+        found.push(self.emitter_of(&LightKind::Environment { radiance: sky }));
         found.retain(|found| found.weight > 0.0);
         if found.len() > MAX_EMITTERS {
             return Err(Error::Scene {
@@ -237,6 +263,14 @@ impl Geometry {
         let environment = self.emitters.iter().filter(|emitter| emitter.kind == EMITTER_ENVIRONMENT).map(|emitter| emitter.strength);
         shines.chain(environment).map(|radiance| f64::from(radiance.max_element())).fold(0.0, f64::max)
     }
+}
+
+/// The bits of a triangle's corners, the same from whichever corner it is read.
+fn in_fixed_order(corners: &[Vec3; 3]) -> [[u32; 3]; 3] {
+    // The sum turns -0 into 0.
+    let bits = corners.map(|corner| (corner + Vec3::ZERO).to_array().map(f32::to_bits));
+    let first = (0..3).min_by_key(|corner| bits[*corner]).expect("a triangle has corners");
+    [bits[first], bits[(first + 1) % 3], bits[(first + 2) % 3]]
 }
 
 /// An emitter before its probability is known.

@@ -18,9 +18,9 @@ pub struct Mesh {
     pub material: usize,
 }
 
-/// Triangles whose area is below this share of the mesh's squared extent cannot be hit: their normals
-/// would be noise.
-const MIN_AREA_SHARE: f64 = 1.0 / (1u64 << 40) as f64;
+/// Triangles whose area is below this share of the scene's squared extent are lines: rounding of their corners
+/// alone gives so much. What single precision cannot tell from a line goes when the scene is normalised.
+const MIN_AREA_SHARE: f64 = 1.0 / (1u128 << 80) as f64;
 
 impl Mesh {
     /// Corners of a triangle.

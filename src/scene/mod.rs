@@ -89,10 +89,10 @@ impl Scene {
         self.meshes.iter().map(|mesh| mesh.triangles.len()).sum()
     }
 
-    /// Smallest box around all meshes: (lower corner, upper corner).
+    /// Smallest box around all triangles: (lower corner, upper corner).
     pub fn bounds(&self) -> (DVec3, DVec3) {
-        let corners = self.meshes.iter().flat_map(|mesh| &mesh.positions);
-        corners.fold((DVec3::INFINITY, DVec3::NEG_INFINITY), |(min, max), position| (min.min(*position), max.max(*position)))
+        let corners = self.meshes.iter().flat_map(|mesh| (0..mesh.triangles.len()).flat_map(|triangle| mesh.corners(triangle)));
+        corners.fold((DVec3::INFINITY, DVec3::NEG_INFINITY), |(min, max), position| (min.min(position), max.max(position)))
     }
 
     /// Whether anything shines.

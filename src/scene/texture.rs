@@ -39,6 +39,8 @@ impl Texture {
     /// Bilinear between texel centres.
     pub fn sample(&self, uv: DVec2) -> Vec3 {
         let place = DVec2::new(uv.x * f64::from(self.width) - 0.5, uv.y * f64::from(self.height) - 0.5);
+        // Beyond that a coordinate has no fraction left, and its place no meaning.
+        let place = place.clamp(DVec2::splat(-1e15), DVec2::splat(1e15));
         let (corner, share) = (place.floor(), place.fract_gl().as_vec2());
         let texel = |di: i64, dj: i64| {
             let i = self.wrap[0].index(corner.x as i64 + di, self.width);

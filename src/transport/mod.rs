@@ -75,8 +75,9 @@ pub struct Lit {
     pub dispatches: u64,
     pub submissions: u64,
     pub pipelines: usize,
-    /// Values that were no number, and values cut to the film's largest.
-    pub anomalies: [u32; 2],
+    /// Values that were no number, values cut to the film's largest, and estimates on a mesh too dense for the
+    /// area within the radius to be found.
+    pub anomalies: [u32; 3],
 }
 
 /// Kernels that the plan needs, and no others.
@@ -142,7 +143,7 @@ pub fn light(gpu: &Gpu, view: &View, plan: TransportPlan, watch: &mut Watch) -> 
     let sums = commands.read::<u64>(&resources.film_sums, 3 * pixels)?;
     let squares = commands.read::<u64>(&resources.film_squares, 6 * pixels)?;
     let part_totals = commands.read::<u64>(&resources.part_totals, PART_COUNT as usize)?;
-    let anomalies = commands.read::<u32>(&resources.anomalies, 2)?;
+    let anomalies = commands.read::<u32>(&resources.anomalies, 3)?;
     gpu.check_validation()?;
     Ok(Lit {
         film: RoundFilm::new(done, sums, squares),
@@ -154,7 +155,7 @@ pub fn light(gpu: &Gpu, view: &View, plan: TransportPlan, watch: &mut Watch) -> 
         pipelines: gpu.pipeline_count() - pipelines_before,
         timings: commands.finish("run"),
         device: gpu.facts().clone(),
-        anomalies: [anomalies[0], anomalies[1]],
+        anomalies: [anomalies[0], anomalies[1], anomalies[2]],
         plan,
     })
 }

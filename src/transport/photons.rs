@@ -23,6 +23,9 @@ pub fn cells(round: Round, map: &MapPlan) -> CellPush {
     }
 }
 
+/// Timestamps that must be left for the scopes that are open and for a bounce.
+const TIMESTAMP_RESERVE: u32 = 32;
+
 /// Traces the photons of a chunk into the map and adds their fates to its tallies.
 pub fn trace(
     commands: &mut Commands,
@@ -47,6 +50,9 @@ pub fn trace(
     let kernel = Shine { nodes, triangles, normals, uvs, materials, textures, texels, emitters, light_paths: even };
     commands.dispatch(kernel, &push, Extent::Items(u64::from(photon_count)))?;
     for bounce in 0..map.bounces {
+        if commands.timestamps_left() < TIMESTAMP_RESERVE {
+            commands.submit()?;
+        }
         let push = FlightPush {
             draws,
             bounce,

@@ -94,12 +94,12 @@ impl TransportResources {
             film_sums: gpu.buffer::<u64>("film sums", 3 * pixels, device)?,
             film_squares: gpu.buffer::<u64>("film squares", 6 * pixels, device)?,
             part_totals: gpu.buffer::<u64>("part totals", u64::from(PART_COUNT), device)?,
-            anomalies: gpu.buffer::<u32>("anomalies", 2, device)?,
+            anomalies: gpu.buffer::<u32>("anomalies", 3, device)?,
         };
         commands.fill(&resources.film_sums, 0, 6 * pixels, 0);
         commands.fill(&resources.film_squares, 0, 12 * pixels, 0);
         commands.fill(&resources.part_totals, 0, 2 * u64::from(PART_COUNT), 0);
-        commands.fill(&resources.anomalies, 0, 2, 0);
+        commands.fill(&resources.anomalies, 0, 3, 0);
         Ok(resources)
     }
 }

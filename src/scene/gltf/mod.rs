@@ -7,7 +7,8 @@
 
 mod accessor;
 
-use std::collections::BTreeSet;
+use std::collections::hash_map::Entry;
+use std::collections::{BTreeSet, HashMap};
 use std::path::{Path, PathBuf};
 
 use base64::Engine;
@@ -27,6 +28,12 @@ use crate::error::{Error, Result};
 const MAX_FILE_BYTES: u64 = 4 << 30;
 const READ_EXTENSIONS: [&str; 4] =
     ["KHR_lights_punctual", "KHR_materials_emissive_strength", "KHR_materials_ior", "KHR_materials_transmission"];
+/// Of all instances together: as many as the GPU's buffers of 4 GiB hold.
+const MAX_TRIANGLES: usize = 100_000_000;
+/// Of all textures together: 1.5 GiB.
+const MAX_TEXELS: u64 = 1 << 27;
+/// Texture coordinates beyond that have no digits left for a place in the picture.
+const MAX_UV: f64 = 1e6;
 /// Nodes within nodes; deeper ones would be a cycle.
 const MAX_DEPTH: usize = 512;
 
@@ -34,6 +41,9 @@ const MAX_DEPTH: usize = 512;
 pub fn load(path: &Path, radiometric: bool) -> Result<Scene> {
     let content = read_file(path, path)?;
     let refuse = |reason: String| Error::Scene { path: path.to_owned(), object: "the file".into(), reason };
+    binary_length(&content).map_err(refuse)?;
+    let unchecked = Gltf::from_slice_without_validation(&content).map_err(|error| refuse(one_line(&error)))?;
+    missing_members(unchecked.document.as_json()).map_err(refuse)?;
     let Gltf { document, blob } = Gltf::from_slice(&content).map_err(|error| refuse(one_line(&error)))?;
     let version = document.as_json().asset.version.as_str();
     if !version.starts_with("2.") {
@@ -48,6 +58,10 @@ pub fn load(path: &Path, radiometric: bool) -> Result<Scene> {
         buffers: Vec::new(),
         scene: Scene { name: path.file_stem().unwrap_or_default().to_string_lossy().into_owned(), ..Scene::default() },
         left_out: BTreeSet::new(),
+        nodes_read: BTreeSet::new(),
+        triangle_count: 0,
+        texel_count: 0,
+        texture_places: HashMap::new(),
         unit: if radiometric { 1.0 } else { 1.0 / LUMENS_PER_WATT },
     };
     loader.read_buffers(&document, blob)?;
@@ -56,6 +70,52 @@ pub fn load(path: &Path, radiometric: bool) -> Result<Scene> {
     loader.read_nodes(&document)?;
     loader.name_what_is_left_out(&document);
     loader.finish()
+}
+
+/// Checks the length that a .glb announces: a file that was cut off is not to be read as far as it goes.
+fn binary_length(content: &[u8]) -> std::result::Result<(), String> {
+    if !content.starts_with(b"glTF") {
+        return Ok(());
+    }
+    let announced = content.get(8..12).map_or(0, |bytes| u32::from_le_bytes([bytes[0], bytes[1], bytes[2], bytes[3]]) as usize);
+    if announced != content.len() {
+        return Err(format!("announces {announced} bytes and has {}", content.len()));
+    }
+    Ok(())
+}
+
+/// Members without which the `gltf` crate would stop the program.
+fn missing_members(root: &gltf::json::Root) -> std::result::Result<(), String> {
+    use gltf::json::validation::Checked;
+    for (number, mesh) in root.meshes.iter().enumerate() {
+        for (place, primitive) in mesh.primitives.iter().enumerate() {
+            let mut accessors = primitive.attributes.values().chain(&primitive.indices).map(|accessor| accessor.value());
+            if let Some(accessor) = accessors.find(|accessor| *accessor >= root.accessors.len()) {
+                return Err(format!("has a mesh {number} whose primitive {place} uses accessor {accessor} of {}", root.accessors.len()));
+            }
+        }
+    }
+    for (number, image) in root.images.iter().enumerate() {
+        if image.uri.is_none() && (image.buffer_view.is_none() || image.mime_type.is_none()) {
+            return Err(format!("has an image {number} with neither a URI nor a buffer view and its MIME type"));
+        }
+    }
+    for (number, camera) in root.cameras.iter().enumerate() {
+        let whole = match camera.type_ {
+            Checked::Valid(gltf::json::camera::Type::Perspective) => camera.perspective.is_some(),
+            Checked::Valid(gltf::json::camera::Type::Orthographic) => camera.orthographic.is_some(),
+            Checked::Invalid => true,
+        };
+        if !whole {
+            return Err(format!("has a camera {number} without the numbers of its type"));
+        }
+    }
+    Ok(())
+}
+
+/// A name without line breaks and other control characters.
+fn printable(name: &str) -> String {
+    name.chars().map(|letter| if letter.is_control() { ' ' } else { letter }).collect()
 }
 
 fn one_line(error: &gltf::Error) -> String {
@@ -82,6 +142,13 @@ pub(super) struct Loader {
     scene: Scene,
     /// What the file holds and the scene does not, each once.
     left_out: BTreeSet<String>,
+    /// Nodes that were read; each has one place in the scene.
+    nodes_read: BTreeSet<usize>,
+    /// Triangles and vertices of all instances so far.
+    triangle_count: usize,
+    texel_count: u64,
+    /// Where a texture of the file stands in the scene.
+    texture_places: HashMap<usize, usize>,
     /// Watts in one unit of a punctual light.
     unit: f32,
 }
@@ -133,16 +200,35 @@ impl Loader {
             used.extend(material.pbr_metallic_roughness().base_color_texture().map(|info| info.texture().index()));
             used.extend(material.emissive_texture().map(|info| info.texture().index()));
         }
-        for texture in document.textures() {
-            let read = if used.contains(&texture.index()) { self.read_texture(&texture)? } else { Texture::white() };
-            self.scene.textures.push(read);
+        // Materials that use the same picture in the same way share it.
+        let mut places: HashMap<(usize, Option<usize>), usize> = HashMap::new();
+        for texture in document.textures().filter(|texture| used.contains(&texture.index())) {
+            let place = match places.entry((texture.source().index(), texture.sampler().index())) {
+                Entry::Occupied(place) => *place.get(),
+                Entry::Vacant(free) => {
+                    let read = self.read_texture(&texture)?;
+                    self.texel_count += u64::from(read.width) * u64::from(read.height);
+                    if self.texel_count > MAX_TEXELS {
+                        return Err(self.refuse(
+                            &read.name,
+                            format!("makes more than {MAX_TEXELS} texels, the most that are read; use smaller pictures"),
+                        ));
+                    }
+                    self.scene.textures.push(read);
+                    *free.insert(self.scene.textures.len() - 1)
+                }
+            };
+            self.texture_places.insert(texture.index(), place);
         }
         Ok(())
     }
 
     fn read_texture(&self, texture: &gltf::Texture) -> Result<Texture> {
         let source = texture.source();
-        let what = format!("texture image {}", source.name().map_or_else(|| source.index().to_string(), |name| format!("'{name}'")));
+        let what = format!(
+            "texture image {}",
+            source.name().map(printable).map_or_else(|| source.index().to_string(), |name| format!("'{name}'"))
+        );
         let bytes = match source.source() {
             gltf::image::Source::View { view, .. } => accessor::view_bytes(self, &view, &what)?.to_vec(),
             gltf::image::Source::Uri { uri, .. } => self.read_uri(uri, &what)?,
@@ -180,7 +266,7 @@ impl Loader {
 
     fn read_material(&mut self, material: &gltf::Material) -> Result<Material> {
         let pbr = material.pbr_metallic_roughness();
-        let name = material.name().map_or_else(|| format!("material {}", material.index().unwrap_or(0)), str::to_owned);
+        let name = material.name().map_or_else(|| format!("material {}", material.index().unwrap_or(0)), printable);
         let transmission = material.transmission();
         let factor = transmission.as_ref().map_or(0.0, gltf::material::Transmission::transmission_factor);
         let ior = material.ior().unwrap_or(1.5);
@@ -217,12 +303,13 @@ impl Loader {
         if !in_range(pbr.metallic_factor(), 0.0, 1.0) || !in_range(pbr.roughness_factor(), 0.0, 1.0) || !in_range(factor, 0.0, 1.0) {
             return Err(self.refuse(&object, "has a metallic, roughness or transmission factor outside 0 to 1"));
         }
+        let places = self.texture_places.clone();
         let mut texture_use = |info: Option<gltf::texture::Info>| {
             info.map(|info| {
                 if info.tex_coord() > 1 {
                     self.leave_out("texture coordinates beyond the second set (the first is used)");
                 }
-                TextureUse { texture: info.texture().index(), uv_set: if info.tex_coord() == 1 { 1 } else { 0 } }
+                TextureUse { texture: places[&info.texture().index()], uv_set: if info.tex_coord() == 1 { 1 } else { 0 } }
             })
         };
         Ok(Material {
@@ -247,9 +334,12 @@ impl Loader {
     }
 
     fn read_node(&mut self, node: &gltf::Node, parent: DMat4, depth: usize) -> Result<()> {
-        let what = format!("node {}", node.name().map_or_else(|| node.index().to_string(), |name| format!("'{name}'")));
+        let what = format!("node {}", node.name().map(printable).map_or_else(|| node.index().to_string(), |name| format!("'{name}'")));
         if depth > MAX_DEPTH {
             return Err(self.refuse(&what, format!("lies more than {MAX_DEPTH} nodes deep, or within itself")));
+        }
+        if !self.nodes_read.insert(node.index()) {
+            return Err(self.refuse(&what, "has two parents; a node has one place in a scene"));
         }
         let matrix = DMat4::from_cols_array_2d(&node.transform().matrix().map(|column| column.map(f64::from)));
         let to_world = parent * matrix;
@@ -261,7 +351,7 @@ impl Loader {
         }
         if let Some(mesh) = node.mesh() {
             for primitive in mesh.primitives() {
-                let name = node.name().or(mesh.name()).map_or_else(|| format!("mesh {}", mesh.index()), str::to_owned);
+                let name = node.name().or(mesh.name()).map_or_else(|| format!("mesh {}", mesh.index()), printable);
                 self.read_primitive(&primitive, name, to_world)?;
             }
         }
@@ -321,7 +411,14 @@ impl Loader {
                     .map(|[u, v]| DVec2::new(f64::from(u), f64::from(v)))
                     .collect();
                 of_vertices(uvs.len(), "texture coordinates")?;
+                if let Some(uv) = uvs.iter().find(|uv| !(uv.abs().max_element() <= MAX_UV)) {
+                    return Err(self.refuse(&what, format!("has the texture coordinates {uv}; they must be within {MAX_UV:e}")));
+                }
             }
+        }
+        self.triangle_count += primitive.indices().map_or(positions.len(), |indices| indices.count()) / 3 + positions.len() / 4;
+        if self.triangle_count > MAX_TRIANGLES {
+            return Err(self.refuse(&what, format!("brings the scene over {MAX_TRIANGLES} triangles, the most that are read")));
         }
         let indices = match primitive.indices() {
             Some(indices) => accessor::read_indices(self, &indices, &what)?,
@@ -354,7 +451,7 @@ impl Loader {
             self.leave_out(format!("a camera with a vertical view of {vertical_view} radians"));
             return;
         }
-        let name = node.name().or(camera.name()).map_or_else(|| format!("camera {}", camera.index()), str::to_owned);
+        let name = node.name().or(camera.name()).map_or_else(|| format!("camera {}", camera.index()), printable);
         let eye = to_world.transform_point3(DVec3::ZERO);
         let target = eye + to_world.transform_vector3(DVec3::NEG_Z).normalize_or(DVec3::NEG_Z);
         let up = to_world.transform_vector3(DVec3::Y);
@@ -362,7 +459,7 @@ impl Loader {
     }
 
     fn read_light(&mut self, light: &gltf::khr_lights_punctual::Light, node: &str, to_world: DMat4) -> Result<()> {
-        let what = format!("light {}", light.name().map_or_else(|| format!("of {node}"), |name| format!("'{name}'")));
+        let what = format!("light {}", light.name().map(printable).map_or_else(|| format!("of {node}"), |name| format!("'{name}'")));
         let strength = Vec3::from(light.color()) * light.intensity() * self.unit;
         if !strength.is_finite() || strength.min_element() < 0.0 {
             return Err(self
@@ -419,16 +516,7 @@ impl Loader {
             let list: Vec<&str> = self.left_out.iter().map(String::as_str).collect();
             self.scene.warnings.push(format!("not simulated: {}", list.join(", ")));
         }
-        if !self.scene.is_lit() {
-            self.scene.warnings.push("nothing shines in this scene: it is dark".into());
-        }
         Ok(self.scene)
-    }
-}
-
-impl Texture {
-    fn white() -> Texture {
-        Texture { name: "unused".into(), width: 1, height: 1, texels: vec![Vec3::ONE], wrap: [Wrap::Repeat; 2] }
     }
 }
 

@@ -1,0 +1,512 @@
+//! Files as nobody would write them. Whatever the loader takes must become records and a plan: no panic, no
+//! endless loop, no memory without bound, no number that is none.
+
+use std::fmt::Debug;
+use std::panic::{AssertUnwindSafe, catch_unwind};
+use std::path::Path;
+use std::sync::mpsc;
+use std::time::{Duration, Instant};
+
+use base64::Engine;
+use base64::engine::general_purpose::STANDARD as BASE64;
+use glam::Vec3;
+use photonmill::plan::Limits;
+use photonmill::plan::transport::{Sensor, TransportPlan};
+use photonmill::scene::Scene;
+use photonmill::scene::geometry::Geometry;
+use photonmill::settings::transport::TransportSettings;
+use serde_json::{Value, json};
+
+const BLENDER: &[u8] = include_bytes!("scenes/blender.glb");
+/// The same mutations each time.
+const SEED: u64 = 1;
+
+/// What became of a file.
+#[derive(Debug, PartialEq, Eq)]
+enum Fate {
+    /// The line that says why.
+    Refused(String),
+    /// Its triangles.
+    Planned(usize),
+}
+
+/// Loads, packs and plans a file, and looks at what is handed to a device.
+fn plan(folder: &Path, name: &str, content: &[u8]) -> Fate {
+    let path = folder.join(name);
+    std::fs::write(&path, content).unwrap();
+    let outcome = Scene::open(path.to_str().unwrap(), false).and_then(|scene| {
+        let geometry = Geometry::new(&scene)?;
+        let sensor = Sensor::Picture { width: 16, height: 16 };
+        let plan = TransportPlan::new(&scene, &geometry, &TransportSettings::default(), sensor, &Limits::of_host())?;
+        assert!(plan.film_scale.is_finite() && plan.film_scale > 0.0, "film scale {}", plan.film_scale);
+        assert!(plan.bytes <= Limits::of_host().memory_bytes, "{} bytes", plan.bytes);
+        check_records(&geometry);
+        Ok(geometry.triangles.len())
+    });
+    match outcome {
+        Ok(triangles) => Fate::Planned(triangles),
+        Err(error) => {
+            let line = error.to_string();
+            assert_eq!((error.exit_code(), line.lines().count()), (2, 1), "{line}");
+            Fate::Refused(line)
+        }
+    }
+}
+
+fn check_records(geometry: &Geometry) {
+    let near = |what: &str, v: Vec3| assert!(v.is_finite() && v.abs().max_element() <= 1.0, "{what} {v}");
+    let finite = |what: &str, v: Vec3| assert!(v.is_finite() && v.min_element() >= 0.0, "{what} {v}");
+    geometry.triangles.iter().for_each(|triangle| [triangle.a, triangle.b, triangle.c].iter().for_each(|corner| near("corner", *corner)));
+    for emitter in &geometry.emitters {
+        finite("strength", emitter.strength);
+        finite("flux", emitter.flux);
+        assert!(emitter.position.is_finite() && emitter.direction.is_finite(), "{emitter:?}");
+        assert!(emitter.probability > 0.0, "{emitter:?}");
+    }
+    assert!(geometry.emitters.is_sorted_by(|a, b| a.cumulative < b.cumulative), "cumulative shares must rise");
+    assert!(geometry.emitters.last().is_none_or(|last| last.cumulative == 1.0), "the last share must be 1");
+    assert!(geometry.uvs.iter().all(|uv| uv.base_a.is_finite() && uv.base_b.is_finite() && uv.base_c.is_finite()), "coordinates");
+    assert!(geometry.flux_unit.is_finite() && geometry.flux_unit > 0.0 && geometry.power.is_finite() && geometry.area > 0.0);
+}
+
+/// Longer than any case may take, on a slow machine.
+const PATIENCE: Duration = Duration::from_secs(20);
+
+/// Runs `work` and fails with `what` where it panics or does not end.
+fn in_time<T: Send + 'static>(what: &str, work: impl FnOnce() -> T + Send + 'static) -> T {
+    let (send, receive) = mpsc::channel();
+    std::thread::spawn(move || {
+        let _ = send.send(catch_unwind(AssertUnwindSafe(work)));
+    });
+    match receive.recv_timeout(PATIENCE) {
+        Ok(Ok(value)) => value,
+        Ok(Err(_)) => panic!("{what}: panics, as said above"),
+        Err(_) => panic!("{what}: no end after {PATIENCE:?}"),
+    }
+}
+
+fn plan_value(what: &str, value: &Value) -> Fate {
+    let text = value.to_string().into_bytes();
+    in_time(what, move || plan(tempfile::tempdir().unwrap().path(), "scene.gltf", &text))
+}
+
+fn assert_refused(what: &str, value: &Value) {
+    let fate = plan_value(what, value);
+    assert!(matches!(fate, Fate::Refused(_)), "{what}: {fate:?}");
+}
+
+/// Random numbers that are the same on every machine.
+struct Random(u64);
+
+impl Random {
+    fn below(&mut self, limit: usize) -> usize {
+        self.0 = self.0.wrapping_mul(6_364_136_223_846_793_005).wrapping_add(1_442_695_040_888_963_407);
+        ((self.0 >> 33) as usize) % limit.max(1)
+    }
+
+    fn pick<T: Clone>(&mut self, of: &[T]) -> T {
+        of[self.below(of.len())].clone()
+    }
+}
+
+/// JSON and binary part of a glb file.
+fn parts_of(glb: &[u8]) -> (Value, Vec<u8>) {
+    let length = |at: usize| u32::from_le_bytes(glb[at..at + 4].try_into().unwrap()) as usize;
+    let text = 20..20 + length(12);
+    let binary = text.end + 8..text.end + 8 + length(text.end);
+    (serde_json::from_slice(&glb[text]).unwrap(), glb[binary].to_vec())
+}
+
+fn glb_of(value: &Value, binary: &[u8]) -> Vec<u8> {
+    let chunk = |kind: &[u8; 4], content: &[u8], fill: u8| {
+        let mut content = content.to_vec();
+        content.resize(content.len().next_multiple_of(4), fill);
+        [&(content.len() as u32).to_le_bytes(), kind.as_slice(), &content].concat()
+    };
+    let chunks = [chunk(b"JSON", value.to_string().as_bytes(), b' '), chunk(b"BIN\0", binary, 0)].concat();
+    [b"glTF".as_slice(), &2u32.to_le_bytes(), &(12 + chunks.len() as u32).to_le_bytes(), &chunks].concat()
+}
+
+/// Two triangles that shine through a texture, under a lamp of each kind.
+fn square() -> Value {
+    let floats = |numbers: &[f32]| numbers.iter().flat_map(|number| number.to_le_bytes()).collect::<Vec<u8>>();
+    let mut bytes = floats(&[0., 0., 0., 1., 0., 0., 1., 1., 0., 0., 1., 0.]);
+    bytes.extend(floats(&[0., 0., 1., 0., 0., 1., 0., 0., 1., 0., 0., 1.]));
+    bytes.extend(floats(&[0., 0., 1., 0., 1., 1., 0., 1.]));
+    bytes.extend([0u16, 1, 2, 0, 2, 3].iter().flat_map(|index| index.to_le_bytes()));
+    let mut png = Vec::new();
+    let picture = image::RgbImage::from_fn(3, 2, |i, j| image::Rgb([(i * 100) as u8, (j * 200) as u8, 50]));
+    picture.write_to(&mut std::io::Cursor::new(&mut png), image::ImageFormat::Png).unwrap();
+    let start = bytes.len();
+    bytes.extend(&png);
+    json!({
+        "asset": {"version": "2.0"}, "scene": 0, "scenes": [{"nodes": [0, 1, 2, 3, 4]}],
+        "nodes": [
+            {"name": "wall", "mesh": 0, "translation": [1, 2, 3], "scale": [2, 2, 2]},
+            {"name": "eye", "camera": 0, "translation": [0, 0, 5]},
+            {"name": "bulb", "translation": [0, 4, 0], "extensions": {"KHR_lights_punctual": {"light": 0}}},
+            {"name": "sun", "rotation": [0, 0.6, 0, 0.8], "extensions": {"KHR_lights_punctual": {"light": 1}}},
+            {"name": "beam", "extensions": {"KHR_lights_punctual": {"light": 2}}}
+        ],
+        "meshes": [{"name": "square", "primitives": [
+            {"attributes": {"POSITION": 0, "NORMAL": 1, "TEXCOORD_0": 2}, "indices": 3, "material": 0, "mode": 4},
+            {"attributes": {"POSITION": 0, "TEXCOORD_1": 2}, "material": 1, "mode": 5}
+        ]}],
+        "materials": [
+            {"name": "glow", "emissiveFactor": [1, 0.5, 0.25], "emissiveTexture": {"index": 0},
+             "pbrMetallicRoughness": {"baseColorFactor": [0.5, 0.25, 0.125, 1], "metallicFactor": 0},
+             "extensions": {"KHR_materials_emissive_strength": {"emissiveStrength": 8}}},
+            {"name": "glass", "doubleSided": true, "extensions": {
+                "KHR_materials_ior": {"ior": 1.5}, "KHR_materials_transmission": {"transmissionFactor": 1}},
+             "pbrMetallicRoughness": {"baseColorTexture": {"index": 0, "texCoord": 1}, "roughnessFactor": 0.3}}
+        ],
+        "textures": [{"source": 0, "sampler": 0}], "samplers": [{"wrapS": 33071, "wrapT": 33648}],
+        "images": [{"bufferView": 4, "mimeType": "image/png"}],
+        "cameras": [{"type": "perspective", "perspective": {"yfov": 0.7, "znear": 0.1}}],
+        "extensionsUsed": ["KHR_lights_punctual", "KHR_materials_emissive_strength"],
+        "extensions": {"KHR_lights_punctual": {"lights": [
+            {"type": "point", "color": [1, 0.5, 0.25], "intensity": 683},
+            {"type": "directional", "intensity": 1366},
+            {"type": "spot", "intensity": 68.3, "spot": {"innerConeAngle": 0.2, "outerConeAngle": 0.4}}
+        ]}},
+        "buffers": [{"byteLength": bytes.len(), "uri": data_uri(&bytes)}],
+        "bufferViews": [
+            {"buffer": 0, "byteOffset": 0, "byteLength": 48}, {"buffer": 0, "byteOffset": 48, "byteLength": 48},
+            {"buffer": 0, "byteOffset": 96, "byteLength": 32}, {"buffer": 0, "byteOffset": 128, "byteLength": 12},
+            {"buffer": 0, "byteOffset": start, "byteLength": png.len()}
+        ],
+        "accessors": [
+            {"bufferView": 0, "componentType": 5126, "count": 4, "type": "VEC3", "min": [0, 0, 0], "max": [1, 1, 0]},
+            {"bufferView": 1, "componentType": 5126, "count": 4, "type": "VEC3"},
+            {"bufferView": 2, "componentType": 5126, "count": 4, "type": "VEC2"},
+            {"bufferView": 3, "componentType": 5123, "count": 6, "type": "SCALAR"}
+        ]
+    })
+}
+
+fn data_uri(bytes: &[u8]) -> String {
+    format!("data:application/octet-stream;base64,{}", BASE64.encode(bytes))
+}
+
+/// The square's own numbers changed: 12 positions, 12 normals, 8 coordinates.
+fn square_with(change: impl FnOnce(&mut [f32; 32])) -> Value {
+    let mut value = square();
+    let uri = value["buffers"][0]["uri"].as_str().unwrap().rsplit(',').next().unwrap().to_owned();
+    let mut bytes = BASE64.decode(uri).unwrap();
+    let mut numbers: [f32; 32] = std::array::from_fn(|k| f32::from_le_bytes(bytes[4 * k..4 * k + 4].try_into().unwrap()));
+    change(&mut numbers);
+    numbers.iter().enumerate().for_each(|(k, number)| bytes[4 * k..4 * k + 4].copy_from_slice(&number.to_le_bytes()));
+    value["buffers"][0]["uri"] = json!(data_uri(&bytes));
+    value
+}
+
+/// Pointers to all values within a value.
+fn pointers(value: &Value, at: &str, found: &mut Vec<String>) {
+    found.push(at.to_owned());
+    match value {
+        Value::Array(items) => items.iter().enumerate().for_each(|(k, item)| pointers(item, &format!("{at}/{k}"), found)),
+        Value::Object(members) => members.iter().for_each(|(key, item)| pointers(item, &format!("{at}/{key}"), found)),
+        _ => {}
+    }
+}
+
+/// One value replaced, taken away, doubled, or taken from another place of the file.
+fn mutate(value: &mut Value, random: &mut Random) {
+    let mut all = Vec::new();
+    pointers(value, "", &mut all);
+    let (place, other) = (random.pick(&all[1..]), random.pick(&all[1..]));
+    // What is embedded is changed byte by byte elsewhere.
+    if place.ends_with("/uri") {
+        return;
+    }
+    let numbers = [0.0, -1.0, 0.5, 1e-38, 1e-20, 1e18, 1e30, 3e38, -3e38, 1e300, 1e-300];
+    let integers = [0, 1, 2, 3, 4, 5, 7, 255, 5120, 5121, 5125, 65_535, 1 << 24, u64::from(u32::MAX), u64::MAX];
+    let new = match random.below(7) {
+        0 | 1 => json!(random.pick(&numbers)),
+        2 | 3 => json!(random.pick(&integers)),
+        4 => value.pointer(&other).unwrap().clone(),
+        5 => random.pick(&[json!(null), json!([]), json!({}), json!(""), json!("VEC4"), json!(true), json!("spot"), json!([0, 0])]),
+        _ => {
+            let (parent, key) = place.rsplit_once('/').unwrap();
+            match value.pointer_mut(parent).unwrap() {
+                Value::Array(items) => {
+                    let item = items[key.parse::<usize>().unwrap()].clone();
+                    items.push(item);
+                }
+                Value::Object(members) => drop(members.remove(key)),
+                _ => unreachable!("only these have members"),
+            }
+            return;
+        }
+    };
+    *value.pointer_mut(&place).unwrap() = new;
+}
+
+/// Most memory that this process has held, bytes.
+fn peak_memory() -> Option<u64> {
+    let status = std::fs::read_to_string("/proc/self/status").ok()?;
+    let line = status.lines().find(|line| line.starts_with("VmHWM:"))?;
+    Some(line.split_whitespace().nth(1)?.parse::<u64>().ok()? * 1024)
+}
+
+/// Cases `make` makes are refused in one line or planned; neither may be all of them.
+fn survive(what: &str, count: usize, mut make: impl FnMut(&mut Random) -> Vec<u8> + Send + 'static) {
+    let name = if what.ends_with("gltf") { "a.gltf" } else { "a.glb" };
+    let (send, receive) = mpsc::channel();
+    std::thread::spawn(move || {
+        let mut random = Random(SEED);
+        let folder = tempfile::tempdir().unwrap();
+        for _ in 0..count {
+            let content = make(&mut random);
+            let started = Instant::now();
+            let fate = catch_unwind(AssertUnwindSafe(|| plan(folder.path(), name, &content)));
+            if fate.is_err() {
+                // To look at.
+                std::fs::write(std::env::temp_dir().join(format!("photonmill-fuzz-{name}")), &content).unwrap();
+            }
+            if send.send((fate.is_err(), matches!(fate, Ok(Fate::Planned(_))), started.elapsed())).is_err() {
+                return;
+            }
+        }
+    });
+    let (mut planned, mut panics) = (0, Vec::new());
+    for case in 0..count {
+        let Ok((panicked, is_planned, took)) = receive.recv_timeout(PATIENCE) else { panic!("{what}: case {case} does not end") };
+        assert!(took < Duration::from_secs(5), "{what}: case {case} takes {took:?}");
+        planned += usize::from(is_planned);
+        if panicked {
+            panics.push(case);
+        }
+    }
+    assert!(panics.is_empty(), "{what}: cases {panics:?} panic, as said above; the last is in the folder for temporary files");
+    assert!(planned > count / 20 && planned < count, "{what}: {planned} of {count} were planned; the mutations must matter");
+    if let Some(bytes) = peak_memory() {
+        assert!(bytes < 1 << 30, "{what}: {bytes} bytes of memory");
+    }
+}
+
+#[test]
+fn mutated_values_of_a_file_by_hand_are_planned_or_refused() {
+    let seed = square();
+    assert_eq!(plan_value("as it is", &seed), Fate::Planned(3), "one of four lies on another");
+    survive("gltf", 4000, move |random| {
+        let mut value = seed.clone();
+        (0..=random.below(3)).for_each(|_| mutate(&mut value, random));
+        value.to_string().into_bytes()
+    });
+}
+
+#[test]
+fn mutated_values_of_a_blender_file_are_planned_or_refused() {
+    let (value, binary) = parts_of(BLENDER);
+    survive("values of a glb", 500, move |random| {
+        let mut value = value.clone();
+        (0..=random.below(2)).for_each(|_| mutate(&mut value, random));
+        glb_of(&value, &binary)
+    });
+}
+
+/// Vertices, normals, coordinates and indices become extreme numbers.
+#[test]
+fn mutated_numbers_of_a_blender_file_are_planned_or_refused() {
+    let (value, binary) = parts_of(BLENDER);
+    let words = [0.0f32, -0.0, 1.0, 1e-38, 1e-45, 1e-20, -1e10, 1e18, 3e38, f32::INFINITY].map(f32::to_bits);
+    survive("numbers of a glb", 500, move |random| {
+        let mut binary = binary.clone();
+        for _ in 0..=random.below(12) {
+            let word = random.below(binary.len() / 4 - 1) * 4;
+            let new = match random.below(8) {
+                0 => random.below(1 << 31) as u32,
+                1 => 0x0001_0000 * random.below(500) as u32,
+                _ => random.pick(&words[..9]),
+            };
+            binary[word..word + 4].copy_from_slice(&new.to_le_bytes());
+        }
+        glb_of(&value, &binary)
+    });
+}
+
+#[test]
+fn mutated_bytes_of_a_blender_file_are_planned_or_refused() {
+    survive("bytes of a glb", 800, |random| {
+        let mut bytes = BLENDER.to_vec();
+        for _ in 0..=random.below(3) {
+            let place = random.below(bytes.len());
+            match random.below(6) {
+                0 => bytes.truncate(place),
+                1 => bytes.truncate(random.below(30)),
+                2 => drop(bytes.splice(place..place, [0; 3])),
+                3 => bytes.get_mut(random.below(24)).into_iter().for_each(|byte| *byte = random.below(256) as u8),
+                _ => bytes.get_mut(place).into_iter().for_each(|byte| *byte ^= 1 << random.below(8)),
+            }
+        }
+        bytes
+    });
+}
+
+/// A glb's lengths are the file's word, not the truth.
+#[test]
+fn wrong_lengths_of_a_glb_are_refused() {
+    for (at, lengths) in [(8, [0u32, 1, 11, 12, 19, 20, u32::MAX]), (12, [0, 1, 3, 7, 1 << 20, u32::MAX - 3, u32::MAX])] {
+        for length in lengths {
+            let mut bytes = BLENDER.to_vec();
+            bytes[at..at + 4].copy_from_slice(&length.to_le_bytes());
+            let what = format!("length {length} at {at}");
+            let fate = in_time(&what, move || plan(tempfile::tempdir().unwrap().path(), "a.glb", &bytes));
+            assert!(matches!(fate, Fate::Refused(_)), "{what}: {fate:?}");
+        }
+    }
+    for length in 0..24 {
+        let fate = in_time(&format!("{length} bytes"), move || plan(tempfile::tempdir().unwrap().path(), "a.glb", &BLENDER[..length]));
+        assert!(matches!(fate, Fate::Refused(_)), "{length} bytes: {fate:?}");
+    }
+}
+
+type Change = fn(&mut Value);
+
+/// Members that the specification asks for and a file leaves out.
+#[test]
+fn members_that_are_missing_are_refused() {
+    let cases: &[(&str, Change)] = &[
+        ("an image in a buffer view without its type", |v| drop(v["images"][0].as_object_mut().unwrap().remove("mimeType"))),
+        ("an image without a source", |v| v["images"][0] = json!({"name": "nothing"})),
+        ("a perspective camera without its numbers", |v| v["cameras"][0] = json!({"type": "perspective"})),
+        ("a camera of the other kind", |v| v["cameras"][0]["type"] = json!("orthographic")),
+        ("a spot without cones", |v| drop(v["extensions"]["KHR_lights_punctual"]["lights"][2].as_object_mut().unwrap().remove("spot"))),
+        ("a light that is not there", |v| v["nodes"][2]["extensions"]["KHR_lights_punctual"]["light"] = json!(3)),
+        ("lights without a list", |v| drop(v.as_object_mut().unwrap().remove("extensions"))),
+        ("a texture without a picture", |v| drop(v["textures"][0].as_object_mut().unwrap().remove("source"))),
+        ("sparse values without any", |v| v["accessors"][0]["sparse"] = json!({"count": 3})),
+        ("a scene that is not there", |v| v["scene"] = json!(4)),
+    ];
+    let mut wrong = Vec::new();
+    for (what, change) in cases {
+        let mut value = square();
+        change(&mut value);
+        let fate = catch_unwind(AssertUnwindSafe(|| plan_value(what, &value)));
+        // A picture that a browser would guess the type of may be read.
+        let is_guessed = what.contains("without its type") && matches!(fate, Ok(Fate::Planned(_)));
+        if !is_guessed && !matches!(fate, Ok(Fate::Refused(_))) {
+            wrong.push(*what);
+        }
+    }
+    assert!(wrong.is_empty(), "not refused: {wrong:?}");
+}
+
+/// glTF's nodes are a tree. Where each node lists its successor twice, a walk without memory takes 2^depth
+/// steps.
+#[test]
+fn nodes_with_two_parents_end() {
+    let mut value = square();
+    let depth = 60;
+    let nodes: Vec<Value> = (0..depth).map(|k| if k + 1 < depth { json!({"children": [k + 1, k + 1]}) } else { json!({}) }).collect();
+    value["nodes"] = json!(nodes);
+    value["scenes"][0]["nodes"] = json!([0]);
+    assert_refused("a chain of double links", &value);
+
+    let mut value = square();
+    value["nodes"][0]["children"] = json!([0, 0, 0]);
+    assert_refused("a node three times within itself", &value);
+}
+
+/// A few bytes that claim much.
+#[test]
+fn claims_without_content_take_no_memory() {
+    let before = peak_memory();
+    let cases: &[(&str, Change)] = &[
+        ("elements", |v| drop(std::mem::replace(&mut v["accessors"][0]["count"], json!(u32::MAX)))),
+        ("elements without a view", |v| {
+            v["accessors"][0] = json!({"componentType": 5126, "count": 4e9 as u64, "type": "VEC3", "min": [0, 0, 0], "max": [1, 1, 0]});
+        }),
+        ("sparse elements", |v| {
+            v["accessors"][0]["sparse"] =
+                json!({"count": 4e9 as u64, "indices": {"bufferView": 3, "componentType": 5123}, "values": {"bufferView": 0}});
+        }),
+        ("a buffer", |v| v["buffers"][0]["byteLength"] = json!(1u64 << 40)),
+        ("a stride", |v| v["bufferViews"][0]["byteStride"] = json!(252)),
+    ];
+    for (what, change) in cases {
+        let mut value = square();
+        change(&mut value);
+        assert_refused(what, &value);
+    }
+    if let (Some(before), Some(after)) = (before, peak_memory()) {
+        assert!(after - before < 1 << 29, "{} bytes more", after - before);
+    }
+}
+
+/// One picture that many textures use is unpacked once.
+#[test]
+fn textures_that_share_a_picture_share_its_memory() {
+    let mut png = Vec::new();
+    image::RgbImage::new(1024, 1024).write_to(&mut std::io::Cursor::new(&mut png), image::ImageFormat::Png).unwrap();
+    let mut value = square();
+    value["images"] = json!([{"uri": format!("data:image/png;base64,{}", BASE64.encode(&png))}]);
+    value["textures"] = json!(vec![json!({"source": 0}); 100]);
+    let material = |k: usize| json!({"pbrMetallicRoughness": {"baseColorTexture": {"index": k}, "metallicFactor": 0}});
+    value["materials"] = json!((0..100).map(material).collect::<Vec<_>>());
+    // 100 times 12 bytes a texel would be 1.2 GB.
+    plan_value("100 textures of one picture", &value);
+    if let Some(bytes) = peak_memory() {
+        assert!(bytes < 1 << 30, "{bytes} bytes of memory");
+    }
+}
+
+/// The mean of a texture over a triangle whose coordinates lie far apart.
+#[test]
+fn texture_coordinates_of_any_size_are_planned_or_refused() {
+    for far in [1e4, 1e9, 1e18, 1e19, 1e30, 3e38] {
+        for second in [0.0, -far] {
+            let value = square_with(|numbers| (numbers[24], numbers[26], numbers[31]) = (second, far, -far));
+            plan_value(&format!("coordinates from {second} to {far}"), &value);
+        }
+    }
+}
+
+/// Lights far from the scene, and scenes so small or large that a light's strength in their own unit leaves
+/// the range of f32.
+#[test]
+fn lights_out_of_range_are_planned_or_refused() {
+    let mut wrong = Vec::new();
+    for factor in [1e-37, 1e-30, 1e-19, 1e-10, 1e10, 1e19, 1e29] {
+        let mut value = square();
+        value["nodes"][0]["scale"] = json!([factor, factor, factor]);
+        value["nodes"][0].as_object_mut().unwrap().remove("translation");
+        if catch_unwind(AssertUnwindSafe(|| plan_value(&format!("scaled by {factor}"), &value))).is_err() {
+            wrong.push(format!("scale {factor}"));
+        }
+    }
+    for distance in [1e6, 1e18, 3e38] {
+        let mut value = square();
+        value["nodes"][2]["translation"] = json!([0, distance, 0]);
+        value["nodes"][4]["translation"] = json!([distance, 0, 0]);
+        value["nodes"][1]["translation"] = json!([0, 0, distance]);
+        if catch_unwind(AssertUnwindSafe(|| plan_value(&format!("lights at {distance} m"), &value))).is_err() {
+            wrong.push(format!("distance {distance}"));
+        }
+    }
+    assert!(wrong.is_empty(), "{wrong:?}");
+}
+
+/// Triangles that lie on one another leave a hierarchy nothing to part them by.
+#[test]
+fn many_equal_triangles_are_planned_or_refused() {
+    let mut value = square();
+    let primitive = value["meshes"][0]["primitives"][0].clone();
+    value["meshes"][0]["primitives"] = json!(vec![primitive; 3000]);
+    match plan_value("6000 triangles, each 3000 times", &value) {
+        // Of each, the first is left.
+        Fate::Planned(triangles) => assert_eq!(triangles, 2),
+        Fate::Refused(line) => panic!("{line}"),
+    }
+}
+
+/// A name may hold anything; a complaint stays one line.
+#[test]
+fn names_with_line_breaks_do_not_break_the_line() {
+    let mut value = square();
+    value["nodes"][0]["name"] = json!("wall\nof\r\nmany\u{1b}[31m lines");
+    value["accessors"][1]["count"] = json!(3);
+    let Fate::Refused(line) = plan_value("a name of several lines", &value) else { panic!("must be refused") };
+    assert!(!line.chars().any(char::is_control), "{line:?}");
+}

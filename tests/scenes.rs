@@ -1,0 +1,590 @@
+//! `photonmill render`, `probe` and `plan` as their users meet them.
+
+use std::io::Write;
+use std::path::Path;
+use std::process::{Command, Output, Stdio};
+
+use base64::Engine;
+use base64::engine::general_purpose::STANDARD as BASE64;
+use serde_json::{Value, json};
+
+const EFFECTS: [&str; 16] = [
+    "direct",
+    "indirect",
+    "glossy",
+    "reflective-caustics",
+    "refractive-caustics",
+    "specular-chains",
+    "textures",
+    "environment",
+    "mesh-lights",
+    "point-lights",
+    "spot-lights",
+    "directional-lights",
+    "disc-lights",
+    "bvh",
+    "two-sided",
+    "smooth-normals",
+];
+const BLENDER: &str = concat!(env!("CARGO_MANIFEST_DIR"), "/tests/scenes/blender.glb");
+const TINY: [&str; 6] = ["--size", "16x16", "--photons", "2000", "--rounds", "2"];
+
+/// A folder of its own in which the program runs.
+struct Place(tempfile::TempDir);
+
+impl Place {
+    fn new() -> Place {
+        Place(tempfile::tempdir().unwrap())
+    }
+
+    fn write(&self, name: &str, content: impl AsRef<[u8]>) {
+        std::fs::write(self.0.path().join(name), content).unwrap();
+    }
+
+    fn command(&self, arguments: &[&str]) -> Command {
+        let mut command = Command::new(env!("CARGO_BIN_EXE_photonmill"));
+        command.current_dir(self.0.path()).args(arguments).stdin(Stdio::null());
+        if let (Ok(device), false) = (std::env::var("PHOTONMILL_DEVICE"), arguments.contains(&"--device")) {
+            command.args(["--device", &device]);
+        }
+        command
+    }
+
+    fn run(&self, arguments: &[&str]) -> Output {
+        self.command(arguments).output().expect("the program starts")
+    }
+
+    /// Its stdout and stderr; it must end well.
+    fn succeed(&self, arguments: &[&str]) -> (String, String) {
+        let output = self.run(arguments);
+        assert!(output.status.success(), "{arguments:?}: {}", text(&output.stderr));
+        (text(&output.stdout), text(&output.stderr))
+    }
+
+    /// `render` at a tiny size into a.exr, and its pixels.
+    fn exr(&self, arguments: &[&str]) -> Vec<f32> {
+        self.succeed(&[&["render"], arguments, &TINY, &["-o", "a.exr"]].concat());
+        self.pixels("a.exr")
+    }
+
+    fn pixels(&self, name: &str) -> Vec<f32> {
+        image::open(self.0.path().join(name)).unwrap().into_rgb32f().into_raw()
+    }
+
+    fn json(&self, name: &str) -> Value {
+        serde_json::from_slice(&std::fs::read(self.0.path().join(name)).unwrap()).unwrap()
+    }
+
+    fn names(&self) -> Vec<String> {
+        let mut names: Vec<String> =
+            std::fs::read_dir(self.0.path()).unwrap().map(|entry| entry.unwrap().file_name().to_string_lossy().into_owned()).collect();
+        names.sort();
+        names
+    }
+
+    /// Exit code 2, one line that names each word, nothing on stdout, no new file.
+    fn refuse(&self, arguments: &[&str], named: &[&str]) -> Option<String> {
+        let before = self.names();
+        let output = self.run(arguments);
+        let stderr = text(&output.stderr);
+        let fault = if output.status.code() != Some(2) {
+            format!("ends with {:?}", output.status.code())
+        } else if stderr.trim_end().lines().count() != 1 || !stderr.starts_with("photonmill: ") {
+            "is not one line".to_owned()
+        } else if let Some(word) = named.iter().find(|word| !stderr.contains(**word)) {
+            format!("must name {word:?}")
+        } else if !output.stdout.is_empty() || self.names() != before {
+            "left something behind".to_owned()
+        } else {
+            return None;
+        };
+        Some(format!("{arguments:?} {fault}: {}", stderr.lines().take(4).collect::<Vec<_>>().join(" | ")))
+    }
+}
+
+fn text(bytes: &[u8]) -> String {
+    String::from_utf8_lossy(bytes).into_owned()
+}
+
+fn no_gpu() -> bool {
+    std::env::var("PHOTONMILL_NO_GPU").is_ok_and(|value| value == "1")
+}
+
+/// A square of 2 m in the plane z = 0 that faces +z; `change` makes of it what a test needs.
+fn square(change: impl FnOnce(&mut Value)) -> String {
+    let floats = |numbers: &[f32]| numbers.iter().flat_map(|number| number.to_le_bytes()).collect::<Vec<u8>>();
+    let mut bytes = floats(&[-1., -1., 0., 1., -1., 0., 1., 1., 0., -1., 1., 0.]);
+    bytes.extend([0u16, 1, 2, 0, 2, 3, 1, 1, 2].iter().flat_map(|index| index.to_le_bytes()));
+    let mut value = json!({
+        "asset": {"version": "2.0"}, "scenes": [{"nodes": [0, 1, 2, 3]}],
+        "nodes": [
+            {"name": "wall", "mesh": 0},
+            {"name": "eye", "camera": 0, "translation": [0, 0, 2]},
+            {"name": "side", "camera": 0, "translation": [0.5, 0, 1]},
+            {"name": "bulb", "translation": [0, 0, 1], "extensions": {"KHR_lights_punctual": {"light": 0}}}
+        ],
+        "meshes": [{"primitives": [{"attributes": {"POSITION": 0}, "indices": 1}]}],
+        "cameras": [{"type": "perspective", "perspective": {"yfov": 0.7, "znear": 0.1}}],
+        "extensionsUsed": ["KHR_lights_punctual"],
+        "extensions": {"KHR_lights_punctual": {"lights": [{"type": "point", "intensity": 683}]}},
+        "buffers": [{"byteLength": bytes.len(), "uri": format!("data:application/octet-stream;base64,{}", BASE64.encode(&bytes))}],
+        "bufferViews": [{"buffer": 0, "byteOffset": 0, "byteLength": 48}, {"buffer": 0, "byteOffset": 48, "byteLength": 18}],
+        "accessors": [
+            {"bufferView": 0, "componentType": 5126, "count": 4, "type": "VEC3", "min": [-1, -1, 0], "max": [1, 1, 0]},
+            {"bufferView": 1, "componentType": 5123, "count": 6, "type": "SCALAR"}
+        ]
+    });
+    change(&mut value);
+    value.to_string()
+}
+
+fn srgb(linear: f32) -> f32 {
+    let linear = linear.clamp(0.0, 1.0);
+    255.0 * if linear <= 0.003_130_8 { 12.92 * linear } else { 1.055 * linear.powf(1.0 / 2.4) - 0.055 }
+}
+
+fn assert_none(faults: Vec<Option<String>>) {
+    let faults: Vec<String> = faults.into_iter().flatten().collect();
+    assert!(faults.is_empty(), "{}", faults.join("\n"));
+}
+
+#[test]
+fn bad_options_are_refused_in_one_line() {
+    let place = Place::new();
+    place.write("scene.gltf", square(|_| {}));
+    let size = |size: &'static str| place.refuse(&["render", "cornell", "-o", "a.exr", "--size", size], &["--size", size]);
+    let on = |arguments: &[&'static str], named: &[&str]| place.refuse(&[&["render"], arguments].concat(), named);
+    let mut faults: Vec<Option<String>> =
+        ["0x16", "16", "16x", "x16", "16x16x16", "16*16", "65537x16", "1.5x2", "-1x4", ""].map(size).into();
+    faults.extend([
+        on(&["cornell", "-o", "a.exr", "--size", "65536x65536"], &["--size 65536x65536"]),
+        on(&["cornell", "-o", "a.exr", "--size", "65536x32768"], &["--size 65536x32768"]),
+        place.refuse(&["plan", "cornell", "--size", "65536x65536"], &["--size 65536x65536"]),
+        on(&["cornell"], &["--output"]),
+        on(&["cornell", "-o", "a.jpg"], &["-o a.jpg", ".png or .exr"]),
+        on(&["cornell", "-o", "absent/a.exr"], &["-o", "absent"]),
+        on(&["cornell", "-o", "a.exr", "--json", "a.exr"], &["--json", "-o writes it too"]),
+        on(&["cornell", "-o", "a.exr", "--exposure", "1"], &["--exposure", "PNG"]),
+        on(&["cornell", "-o", "a.png", "--exposure", "nan"], &["--exposure"]),
+        on(&["cornell", "-o", "a.png", "--exposure", "999"], &["--exposure", "64"]),
+        on(&["cornell", "-o", "a.exr", "--error-image", "e.png"], &["--error-image", ".exr"]),
+        on(&["cornell", "-o", "a.exr", "--camera", "nobody"], &["--camera nobody", "front"]),
+        on(&["scene.gltf", "-o", "a.exr", "--camera", "nobody"], &["--camera nobody", "eye, side"]),
+        on(&["cornell", "-o", "a.exr", "--with", "magic"], &["--with magic", "smooth-normals"]),
+        on(&["cornell", "-o", "a.exr", "--without", "magic"], &["--without magic", "smooth-normals"]),
+        on(&["cornell", "-o", "a.exr", "--with", "glossy", "--without", "direct,glossy"], &["--without glossy", "--with"]),
+        on(&["cornell", "-o", "a.exr", "--part", "half"], &["--part half", "caustic"]),
+        on(&["cornell", "-o", "a.exr", "--photons", "0"], &["--photons 0", "1"]),
+        on(&["cornell", "-o", "a.exr", "--rounds", "0"], &["--rounds 0", "1"]),
+        on(&["cornell", "-o", "a.exr", "--radius", "nan"], &["--radius"]),
+        on(&["cornell", "-o", "a.exr", "--radius", "1000"], &["--radius 1000", "metres"]),
+        on(&["cornell", "-o", "a.exr", "--alpha", "0"], &["--alpha 0"]),
+        on(&["cornell", "-o", "a.exr", "--alpha", "0.5", "--fixed-radius"], &["--alpha", "--fixed-radius"]),
+        on(&["cornell", "-o", "a.exr", "--environment", "red"], &["--environment red"]),
+        on(&["cornell", "-o", "a.exr", "--environment", "1,2"], &["--environment 1,2"]),
+        on(&["cornell", "-o", "a.exr", "--environment", "nan"], &["--environment nan"]),
+        on(&["cornell", "-o", "a.exr", "--environment", "-1"], &["--environment -1", "0 or more"]),
+        on(&["cornell", "-o", "a.exr", "--device", "nonsense"], &["--device nonsense", "there is"]),
+        place.refuse(&["plan", "cornell", "--device", "nonsense"], &["--device nonsense", "there is"]),
+    ]);
+    assert_none(faults);
+}
+
+#[test]
+fn bad_scenes_are_refused_in_one_line() {
+    let place = Place::new();
+    std::fs::create_dir(place.0.path().join("folder.glb")).unwrap();
+    let blender = std::fs::read(BLENDER).unwrap();
+    place.write("half.glb", &blender[..blender.len() / 2]);
+    place.write("empty.glb", "");
+    place.write("scene.obj", "v 0 0 0");
+    place.write("broken.gltf", "{");
+    place.write(
+        "lines.gltf",
+        square(|v| {
+            v["nodes"][0]["name"] = json!("a\nb");
+            v["accessors"][0]["count"] = json!(99);
+        }),
+    );
+    place.write("points.txt", "0.5 0 0.5 0 1 0");
+    let cases: &[(&str, &[&str])] = &[
+        ("absent.glb", &["absent.glb", "cannot be read"]),
+        ("cornel", &["SCENE cornel", "cornell-spheres", ".gltf"]),
+        ("", &["SCENE"]),
+        ("scene.obj", &["scene.obj", ".gltf or .glb"]),
+        ("folder.glb", &["folder.glb", "is no file"]),
+        (".", &["SCENE .", ".glb"]),
+        ("half.glb", &["half.glb"]),
+        ("empty.glb", &["empty.glb"]),
+        ("broken.gltf", &["broken.gltf"]),
+        ("lines.gltf", &["lines.gltf", "mesh"]),
+    ];
+    let mut faults = Vec::new();
+    for (scene, named) in cases {
+        faults.push(place.refuse(&["render", scene, "-o", "a.exr", "--json", "a.json"], named));
+        faults.push(place.refuse(&["probe", scene, "--points", "points.txt", "-o", "a.csv"], named));
+        faults.push(place.refuse(&["plan", scene], named));
+    }
+    assert_none(faults);
+}
+
+#[test]
+fn bad_points_are_refused_with_their_line() {
+    let place = Place::new();
+    let good = "0.5 0 0.5 0 1 0\n";
+    let cases: &[(&str, String, &[&str])] = &[
+        ("empty.txt", String::new(), &["no point"]),
+        ("comments.txt", "# nothing\n\n".into(), &["no point"]),
+        ("five.txt", format!("{good}# five\n1 2 3 4 5\n"), &["line 3", "5 numbers"]),
+        ("seven.txt", format!("{good}1 2 3 4 5 6 7\n"), &["line 2", "7 numbers"]),
+        ("nan.txt", format!("{good}{good}nan 0 0 0 1 0\n"), &["line 3", "nan"]),
+        ("infinite.txt", "0 0 inf 0 1 0".into(), &["line 1", "inf"]),
+        ("huge.txt", "0 0 1e16 0 1 0".into(), &["line 1", "1e15"]),
+        ("zero.txt", format!("{good}\n0 0 0 0 0 0\n"), &["line 3", "normal"]),
+        ("words.txt", "x y z nx ny nz\n".into(), &["line 1", "'x'"]),
+    ];
+    let mut faults = vec![
+        place.refuse(&["probe", "cornell", "--points", "absent.txt", "-o", "a.csv"], &["--points absent.txt", "cannot be read"]),
+        place.refuse(&["probe", "cornell", "--points", ".", "-o", "a.csv"], &["--points .", "cannot be read"]),
+        place.refuse(&["probe", "cornell", "--points", "-", "-o", "a.csv"], &["--points -", "no point"]),
+        place.refuse(&["probe", "cornell", "-o", "a.csv"], &["--points"]),
+    ];
+    for (name, content, named) in cases {
+        place.write(name, content);
+        let named = [&["--points", name], *named].concat();
+        faults.push(place.refuse(&["probe", "cornell", "--points", name, "-o", "a.csv"], &named));
+    }
+    place.write("bytes.txt", [0xff, 0xfe, 0x00]);
+    faults.push(place.refuse(&["probe", "cornell", "--points", "bytes.txt", "-o", "a.csv"], &["--points bytes.txt"]));
+    assert_none(faults);
+}
+
+/// A row a point in their order, from a file with comments and from standard input, the same to the bit.
+#[test]
+fn a_probe_writes_a_row_a_point() {
+    if no_gpu() {
+        return;
+    }
+    let place = Place::new();
+    let points = "# floor, and above it\n0.5 0 0.5 0 1 0\n\n  0.2,0,0.2,0,7,0\n0.5\t0\t0.5\t0\t1\t0\n0.5 0 0.5 0 -1 0";
+    place.write("points.txt", points);
+    let run = ["probe", "cornell", "--photons", "2000", "--rounds", "4"];
+    place.succeed(&[&run[..], &["--points", "points.txt", "-o", "a.csv"]].concat());
+    let mut child = place.command(&[&run[..], &["--points", "-", "-o", "b.csv"]].concat());
+    let mut child = child.stdin(Stdio::piped()).stdout(Stdio::null()).spawn().unwrap();
+    child.stdin.take().unwrap().write_all(points.as_bytes()).unwrap();
+    assert!(child.wait().unwrap().success());
+    let table = |name: &str| std::fs::read_to_string(place.0.path().join(name)).unwrap();
+    assert_eq!(table("a.csv"), table("b.csv"));
+    let lines: Vec<String> = table("a.csv").lines().map(str::to_owned).collect();
+    assert_eq!((lines.len(), lines[0].as_str()), (5, "red,green,blue,red_error,green_error,blue_error"));
+    let rows: Vec<Vec<f64>> = lines[1..].iter().map(|line| line.split(',').map(|field| field.parse().unwrap()).collect()).collect();
+    // Two random streams at one place, both near 5 W/m2; nothing from below the floor.
+    assert!(rows[..3].iter().all(|row| row.len() == 6 && row.iter().all(|value| *value > 0.0)), "{rows:?}");
+    assert!((rows[0][0] / rows[2][0] - 1.0).abs() < 1.0, "{rows:?}");
+    assert_eq!(rows[3][..3], [0.0; 3], "{rows:?}");
+
+    // Of one round no error is known.
+    place.succeed(&["probe", "cornell", "--points", "points.txt", "--rounds", "1", "--photons", "1000", "-o", "c.csv"]);
+    assert!(table("c.csv").lines().nth(1).unwrap().ends_with(",,,"), "{}", table("c.csv"));
+}
+
+#[test]
+fn an_exr_is_linear_and_a_png_obeys_its_exposure() {
+    if no_gpu() {
+        return;
+    }
+    let place = Place::new();
+    let linear = place.exr(&["cornell"]);
+    let exr = image::open(place.0.path().join("a.exr")).unwrap();
+    assert!(matches!(exr, image::DynamicImage::ImageRgb32F(_)), "{:?}", exr.color());
+    // The lamp's own radiance stands in it, far above what a screen shows.
+    assert!(linear.iter().any(|value| *value > 1.0) && linear.iter().all(|value| value.is_finite() && *value >= 0.0));
+    for stops in ["-2", "0", "1", "3.5"] {
+        place.succeed(&[&["render", "cornell"], &TINY[..], &["-o", "a.png", "--exposure", stops]].concat());
+        let png = image::open(place.0.path().join("a.png")).unwrap().into_rgb8().into_raw();
+        let factor = stops.parse::<f32>().unwrap().exp2();
+        for (code, value) in png.iter().zip(&linear) {
+            assert!((f32::from(*code) - srgb(value * factor)).abs() <= 0.51, "{stops} stops: {code} for {value}");
+        }
+    }
+    // Left alone, it is neither dark nor burnt out.
+    let (stdout, _) = place.succeed(&[&["render", "cornell"], &TINY[..], &["-o", "a.png"]].concat());
+    assert!(stdout.contains("wrote a.png at ") && stdout.contains("stops"), "{stdout}");
+    let png = image::open(place.0.path().join("a.png")).unwrap().into_luma8().into_raw();
+    let mean = png.iter().map(|code| f64::from(*code)).sum::<f64>() / png.len() as f64;
+    assert!((40.0..200.0).contains(&mean), "{mean}");
+}
+
+#[test]
+fn a_camera_is_chosen_by_name() {
+    if no_gpu() {
+        return;
+    }
+    let place = Place::new();
+    place.write("scene.gltf", square(|_| {}));
+    let first = place.exr(&["scene.gltf"]);
+    assert_eq!(place.exr(&["scene.gltf", "--camera", "eye"]), first);
+    assert_ne!(place.exr(&["scene.gltf", "--camera", "side"]), first);
+}
+
+#[test]
+fn four_parts_add_up_to_the_whole() {
+    if no_gpu() {
+        return;
+    }
+    let place = Place::new();
+    for scene in ["cornell-spheres", BLENDER] {
+        let whole = place.exr(&[scene]);
+        let parts = ["direct", "specular", "caustic", "indirect"].map(|part| place.exr(&[scene, "--part", part]));
+        for (pixel, value) in whole.iter().enumerate() {
+            let sum: f32 = parts.iter().map(|part| part[pixel]).sum();
+            assert!((sum - value).abs() <= 1e-6 * value.max(1e-3), "{scene}, value {pixel}: {sum} instead of {value}");
+        }
+        assert_eq!(place.exr(&[scene, "--part", "all"]), whole);
+    }
+}
+
+/// Effect and whether it was kept, of each row of a table.
+fn rows_of(table: &str) -> Vec<(String, bool)> {
+    table
+        .lines()
+        .filter_map(|line| {
+            let mut words = line.split_whitespace();
+            let (name, verb) = (words.next()?, words.next()?);
+            (EFFECTS.contains(&name) && ["kept", "dropped"].contains(&verb)).then(|| (name.to_owned(), verb == "kept"))
+        })
+        .collect()
+}
+
+#[test]
+fn tables_and_json_tell_one_plan_with_a_row_an_effect() {
+    let place = Place::new();
+    for scene in ["cornell", "cornell-spheres", "open-box", "glass-slab", BLENDER] {
+        for options in
+            [&[][..], &["--part", "direct"], &["--with", "glossy,textures"], &["--without", "mesh-lights", "--illumination", "photons"]]
+        {
+            let (table, _) = place.succeed(&[&["plan", scene], options].concat());
+            let (json, _) = place.succeed(&[&["plan", scene, "--json"], options].concat());
+            let json: Value = serde_json::from_str(&json).unwrap();
+            let rows = rows_of(&table);
+            assert_eq!(rows.iter().map(|(name, _)| name.as_str()).collect::<Vec<_>>(), EFFECTS, "{table}");
+            for (row, (name, kept)) in json["effects"].as_array().unwrap().iter().zip(&rows) {
+                assert_eq!((&row["effect"], &row["kept"]), (&json!(name), &json!(kept)), "{table}");
+                let evidence = row["evidence"].as_str().unwrap();
+                let line = table.lines().find(|line| line.starts_with(&format!("{name} "))).unwrap();
+                assert!(!evidence.is_empty() && line.ends_with(evidence), "{line}");
+                for number in ["photons", "bytes"].map(|field| row[field].as_u64().unwrap()).iter().filter(|number| **number > 0) {
+                    assert!(line.split_whitespace().any(|word| word == number.to_string()), "{number}: {line}");
+                }
+            }
+            assert!(table.contains(&format!("{} bytes of device memory", json["bytes"])), "{table}");
+            assert_eq!(table.matches(" photons a round in ").count(), json["maps"].as_array().unwrap().len(), "{table}");
+        }
+    }
+}
+
+#[test]
+fn a_run_explains_itself_and_its_report_closes() {
+    if no_gpu() {
+        return;
+    }
+    let place = Place::new();
+    let run = [&["render", "cornell-spheres"], &TINY[..], &["-o", "a.exr", "--explain", "--json", "a.json", "--trace", "t.json"]].concat();
+    let (stdout, _) = place.succeed(&run);
+    assert_eq!(rows_of(&stdout).iter().map(|(name, _)| name.as_str()).collect::<Vec<_>>(), EFFECTS, "{stdout}");
+    for word in ["GPU ms", "light", "evidence", "noise: ", "global ledger: ", "caustic ledger: ", "wrote a.exr"] {
+        assert!(stdout.contains(word), "{word}: {stdout}");
+    }
+    let report = place.json("a.json");
+    let ledgers = report["ledgers"].as_array().unwrap();
+    for ledger in ledgers {
+        let count = |fate: &str| ledger[fate].as_u64().unwrap();
+        assert_eq!(count("emitted"), count("absorbed") + count("escaped") + count("cut_off") + count("dropped"), "{ledger}");
+        assert_eq!((count("emitted"), count("dropped")), (4000, 0), "{ledger}");
+    }
+    assert_eq!((ledgers.len(), &report["rounds"], &report["cancelled"]), (2, &json!(2), &json!(false)));
+    assert_eq!(report["anomalies"], json!({"not_a_number": 0, "cut_to_largest": 0, "too_dense": 0}));
+    let timings = report["timings"].as_array().unwrap();
+    for name in ["round", "round/see", "round/global", "round/caustic", "round/resolve"] {
+        let row = timings.iter().find(|row| row["name"] == name).unwrap_or_else(|| panic!("no {name}: {timings:?}"));
+        assert!(row["count"] == 2 && row["gpu_ms"].as_f64().unwrap() > 0.0, "{row}");
+    }
+    let effects = report["plan"]["effects"].as_array().unwrap();
+    let shares = ["direct", "specular-chains", "refractive-caustics", "indirect"];
+    let share = |name: &str| effects.iter().find(|row| row["effect"] == name).unwrap()["share"].as_f64().unwrap();
+    assert!((shares.iter().map(|name| share(name)).sum::<f64>() - 1.0).abs() < 1e-9, "{effects:?}");
+    assert!(!place.json("t.json")["traceEvents"].as_array().unwrap().is_empty());
+
+    // What is not asked for is not told; one round knows no error and still is JSON.
+    let (stdout, _) =
+        place.succeed(&["render", "cornell", "--size", "4x4", "--photons", "10", "--rounds", "1", "-o", "a.png", "--json", "b.json"]);
+    assert!(rows_of(&stdout).is_empty() && stdout.contains("unknown from a single round"), "{stdout}");
+    assert!(place.json("b.json")["relative_error"].is_null());
+}
+
+#[test]
+fn effects_are_forced_and_left_out_by_name() {
+    if no_gpu() {
+        return;
+    }
+    let place = Place::new();
+    let reference = place.exr(&["cornell"]);
+    assert_eq!(place.exr(&["cornell", "--with", "glossy,refractive-caustics", "--with", "textures"]), reference);
+    assert_eq!(place.exr(&["cornell", "--without", "glossy,textures"]), reference);
+    assert_ne!(place.exr(&["cornell", "--without", "indirect"]), reference);
+    let run = [&["render", "cornell"], &TINY[..], &["-o", "a.exr", "--without", "indirect", "--without", "glossy"]].concat();
+    for arguments in [run, vec!["plan", "cornell", "--without", "indirect,glossy"]] {
+        let (stdout, _) = place.succeed(&arguments);
+        let line = stdout.lines().find(|line| line.contains("left out") && !line.starts_with("indirect"));
+        assert!(line.is_some_and(|line| line.contains("indirect") && !line.contains("glossy")), "{stdout}");
+    }
+}
+
+#[test]
+fn punctual_lights_are_photometric_unless_told() {
+    if no_gpu() {
+        return;
+    }
+    let place = Place::new();
+    place.write("scene.gltf", square(|_| {}));
+    let direct = ["scene.gltf", "--part", "direct"];
+    let lumens = place.exr(&direct);
+    let watts = place.exr(&[&direct[..], &["--radiometric"]].concat());
+    assert!(lumens.iter().any(|value| *value > 0.1));
+    for (watt, lumen) in watts.iter().zip(&lumens) {
+        assert!((watt - 683.0 * lumen).abs() <= 1e-4 * watt, "{watt} W, {lumen} lm");
+    }
+    // 1 W/sr from 1 m on a white wall, seen in the middle: 1 / pi.
+    let middle = lumens[3 * (16 * 8 + 8)];
+    assert!((middle * std::f32::consts::PI - 1.0).abs() < 0.03, "{middle}");
+}
+
+#[test]
+fn an_environment_lights_the_scene_and_is_seen() {
+    if no_gpu() {
+        return;
+    }
+    let place = Place::new();
+    place.write("dark.gltf", square(|v| v["scenes"][0]["nodes"] = json!([0, 1])));
+    let run = [&["render", "dark.gltf"], &TINY[..], &["-o", "a.exr", "--environment", "2,1,0.5"]].concat();
+    let (_, stderr) = place.succeed(&run);
+    assert!(!stderr.contains("dark") || !stderr.contains("nothing shines"), "it is lit: {stderr}");
+    // A white wall under an even sky is as bright as the sky.
+    let pixels = place.pixels("a.exr");
+    let mean = |channel: usize| pixels.iter().skip(channel).step_by(3).sum::<f32>() / 256.0;
+    for (channel, sky) in [2.0, 1.0, 0.5].iter().enumerate() {
+        assert!((mean(channel) / sky - 1.0).abs() < 0.05, "channel {channel}: {} of {sky}", mean(channel));
+    }
+    // Grey by one number; off the wall the sky alone is seen, untouched.
+    place.succeed(&["render", "mirror-corridor", "--size", "4x4", "--photons", "10", "--rounds", "2", "--environment", "3", "-o", "b.exr"]);
+    assert_eq!(place.exr(&["dark.gltf", "--environment", "0"]), vec![0.0; 3 * 256]);
+}
+
+#[test]
+fn a_scene_without_light_is_black_with_one_warning() {
+    if no_gpu() {
+        return;
+    }
+    let place = Place::new();
+    place.write("dark.gltf", square(|v| v["scenes"][0]["nodes"] = json!([0, 1])));
+    let (_, stderr) = place.succeed(&[&["render", "dark.gltf"], &TINY[..], &["-o", "a.exr"]].concat());
+    assert_eq!(stderr.matches("nothing shines").count(), 1, "{stderr}");
+    assert_eq!(place.pixels("a.exr"), vec![0.0; 3 * 256]);
+    place.succeed(&[&["render", "dark.gltf"], &TINY[..], &["-o", "a.png"]].concat());
+    assert!(image::open(place.0.path().join("a.png")).unwrap().into_rgb8().into_raw().iter().all(|code| *code == 0));
+}
+
+#[test]
+fn a_scene_without_a_camera_is_seen_whole() {
+    if no_gpu() {
+        return;
+    }
+    let place = Place::new();
+    place.write("scene.gltf", square(|v| v["scenes"][0]["nodes"] = json!([0, 3])));
+    let pixels = place.exr(&["scene.gltf"]);
+    let lit = |i: usize, j: usize| pixels[3 * (16 * j + i)] > 0.0;
+    assert!(lit(8, 8), "the middle is dark");
+    assert!((0..16).all(|k| !lit(k, 0) && !lit(k, 15) && !lit(0, k) && !lit(15, k)), "the wall is cut off");
+    assert_none(vec![place.refuse(&["render", "scene.gltf", "-o", "b.exr", "--camera", "eye"], &["--camera eye", "none"])]);
+}
+
+#[test]
+fn zero_area_triangles_are_a_warning_and_the_picture_is_right() {
+    if no_gpu() {
+        return;
+    }
+    let place = Place::new();
+    place.write("plain.gltf", square(|_| {}));
+    place.write("flat.gltf", square(|v| v["accessors"][1]["count"] = json!(9)));
+    let (_, stderr) = place.succeed(&[&["render", "flat.gltf"], &TINY[..], &["-o", "flat.exr"]].concat());
+    assert!(stderr.contains("warning: 1 triangle(s) have no area") && stderr.lines().count() == 1, "{stderr}");
+    assert_eq!(place.pixels("flat.exr"), place.exr(&["plain.gltf"]));
+}
+
+#[test]
+fn a_blender_file_renders_with_all_that_it_holds() {
+    if no_gpu() {
+        return;
+    }
+    let place = Place::new();
+    let (stdout, stderr) = place.succeed(&[&["render", BLENDER], &TINY[..], &["-o", "a.exr", "--explain", "--camera", "eye"]].concat());
+    assert!(!stderr.contains("nothing shines"), "{stderr}");
+    let kept: Vec<String> = rows_of(&stdout).into_iter().filter(|(_, kept)| *kept).map(|(name, _)| name).collect();
+    for effect in ["textures", "point-lights", "spot-lights", "directional-lights", "mesh-lights", "refractive-caustics", "bvh"] {
+        assert!(kept.iter().any(|name| name == effect), "{effect}: {kept:?}");
+    }
+    let pixels = place.pixels("a.exr");
+    assert!(pixels.iter().all(|value| value.is_finite()) && pixels.iter().filter(|value| **value > 0.0).count() > 300);
+}
+
+#[test]
+fn errors_of_pixels_are_written_beside_the_picture() {
+    if no_gpu() {
+        return;
+    }
+    let place = Place::new();
+    place.succeed(&[&["render", "cornell"], &TINY[..], &["-o", "a.exr", "--error-image", "e.exr"]].concat());
+    let errors = place.pixels("e.exr");
+    assert!(errors.len() == 3 * 256 && errors.iter().all(|error| error.is_finite() && *error >= 0.0));
+    assert_eq!(place.names(), ["a.exr", "e.exr"]);
+}
+
+/// A reader that goes away, a full disk.
+#[test]
+fn output_that_nobody_takes_is_no_panic() {
+    let place = Place::new();
+    let shell = |line: &str| {
+        let line = line.replace("photonmill", env!("CARGO_BIN_EXE_photonmill"));
+        Command::new("bash").args(["-c", &format!("set -o pipefail; {line}")]).current_dir(place.0.path()).output().unwrap()
+    };
+    for line in ["photonmill plan cornell | true", "photonmill plan cornell --json | head -c 1 > /dev/null"] {
+        let gone = shell(line);
+        assert!(gone.status.success() && gone.stderr.is_empty(), "{line}: {}", text(&gone.stderr));
+    }
+    let full = shell("photonmill plan cornell > /dev/full");
+    assert_eq!((full.status.code(), text(&full.stderr).lines().count()), (Some(2), 1), "{}", text(&full.stderr));
+    if !no_gpu() {
+        let gone = shell("photonmill render cornell --size 4x4 --photons 10 --rounds 1 -o a.png | true");
+        assert!(gone.status.success() && gone.stderr.is_empty(), "{}", text(&gone.stderr));
+        assert!(place.0.path().join("a.png").exists());
+    }
+}
+
+/// A plan needs a device's limits, not the device; a picture needs the device and says so.
+#[test]
+fn without_vulkan_a_scene_is_planned_but_not_rendered() {
+    let place = Place::new();
+    let without = |arguments: &[&str]| {
+        let mut command = place.command(arguments);
+        command.env("VK_DRIVER_FILES", "/nonexistent").env("VK_ICD_FILENAMES", "/nonexistent").env_remove("PHOTONMILL_DEVICE");
+        command.output().unwrap()
+    };
+    if std::env::var_os("PHOTONMILL_DEVICE").is_none() {
+        assert!(without(&["plan", "cornell"]).status.success());
+        let refused = without(&["render", "cornell", "-o", "a.exr"]);
+        let stderr = text(&refused.stderr);
+        assert!(!refused.status.success() && stderr.lines().count() == 1 && stderr.contains("no Vulkan device"), "{stderr}");
+        assert!(!Path::exists(&place.0.path().join("a.exr")));
+    }
+}
