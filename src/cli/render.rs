@@ -135,7 +135,7 @@ fn verdict(lit: &Lit, scene: &Scene, camera: &Camera, (width, height): (u32, u32
     };
     // Of the same scene, without what was left out, and with other random numbers than the photons'.
     let scene = scene.without(&settings.without);
-    let judged = Judge::new(&scene, settings.bounces).image(camera, width, height, samples, settings.seed ^ 0x6a75_6467_65);
+    let judged = Judge::new(&scene, settings.bounces).image(camera, width, height, samples, !settings.seed);
     let means: Vec<_> = (0..lit.film.pixels()).map(|pixel| lit.film.mean(pixel, &lit.plan)).collect();
     let errors: Vec<_> = (0..lit.film.pixels()).map(|pixel| lit.film.standard_error(pixel, &lit.plan)).collect();
     Verdict::new(&means, &errors, lit.film.rounds.min(samples), &judged, part)

@@ -32,7 +32,7 @@ impl Bvh {
         let parameters = BvhBuildParams { pre_split: false, ..BvhBuildParams::fast_build() };
         // The builder recurses as deep as the tree is, and asserts that it is not too deep.
         let build = move || build_cwbvh_from_tris(&triangles, parameters, &mut Duration::default());
-        let built = std::thread::Builder::new().stack_size(STACK_BYTES).spawn(build).map(|thread| thread.join());
+        let built = std::thread::Builder::new().stack_size(STACK_BYTES).spawn(build).map(std::thread::JoinHandle::join);
         let Ok(Ok(tree)) = built else {
             return Err(Error::Scene {
                 path: "the scene".into(),

@@ -89,7 +89,7 @@ fn missing_members(root: &gltf::json::Root) -> std::result::Result<(), String> {
     use gltf::json::validation::Checked;
     for (number, mesh) in root.meshes.iter().enumerate() {
         for (place, primitive) in mesh.primitives.iter().enumerate() {
-            let mut accessors = primitive.attributes.values().chain(&primitive.indices).map(|accessor| accessor.value());
+            let mut accessors = primitive.attributes.values().chain(&primitive.indices).map(gltf::json::Index::value);
             if let Some(accessor) = accessors.find(|accessor| *accessor >= root.accessors.len()) {
                 return Err(format!("has a mesh {number} whose primitive {place} uses accessor {accessor} of {}", root.accessors.len()));
             }
@@ -411,7 +411,7 @@ impl Loader {
                     .map(|[u, v]| DVec2::new(f64::from(u), f64::from(v)))
                     .collect();
                 of_vertices(uvs.len(), "texture coordinates")?;
-                if let Some(uv) = uvs.iter().find(|uv| !(uv.abs().max_element() <= MAX_UV)) {
+                if let Some(uv) = uvs.iter().find(|uv| uv.is_nan() || uv.abs().max_element() > MAX_UV) {
                     return Err(self.refuse(&what, format!("has the texture coordinates {uv}; they must be within {MAX_UV:e}")));
                 }
             }
