@@ -434,9 +434,12 @@ fn stated_errors_are_the_spread_over_seeds() {
 #[test]
 fn pictures_agree_with_the_judge() {
     let Some(gpu) = device() else { return };
-    for (name, photons, rounds, samples) in
-        [("cornell", 5000, 48, 192), ("cornell-spheres", 10_000, 64, 384), ("caustic-sphere", 20_000, 64, 768)]
-    {
+    for (name, photons, rounds, samples) in [
+        ("cornell", 5000, 48, 192),
+        ("open-box-phong", 5000, 48, 192),
+        ("cornell-spheres", 10_000, 64, 384),
+        ("caustic-sphere", 20_000, 64, 768),
+    ] {
         let scene = scene(name);
         let settings = TransportSettings { photons, caustic_photons: photons, rounds, ..TransportSettings::default() };
         let lit = picture(&gpu, &scene, &settings);

@@ -36,9 +36,9 @@ pub(super) struct RenderArgs {
     /// Width and height in pixels
     #[arg(long, value_name = "WxH", value_parser = size, allow_hyphen_values = true, default_value = "640x480", help_heading = "Scene")]
     size: (u32, u32),
-    /// Hold the picture against a path tracer on the CPU of so many samples a pixel, and say whether they
+    /// Hold the picture against a path tracer on the CPU of so many samples a pixel (64), and say whether they
     /// agree within their errors
-    #[arg(long, value_name = "SAMPLES", value_parser = whole::<u32>, allow_negative_numbers = true, num_args = 0..=1, default_missing_value = "256", help_heading = "Output")]
+    #[arg(long, value_name = "SAMPLES", value_parser = whole::<u32>, allow_negative_numbers = true, num_args = 0..=1, default_missing_value = "64", help_heading = "Output")]
     judge: Option<u32>,
     /// Camera by name [default: the first; one that sees everything if there is none]
     #[arg(long, value_name = "NAME", help_heading = "Scene")]

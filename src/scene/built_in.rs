@@ -8,16 +8,17 @@ use super::material::{Material, Surface};
 use super::open_box;
 use super::room::face_axis;
 use super::{Camera, Mesh, Scene};
-use crate::settings::Settings;
+use crate::settings::{Preset, Settings};
 
 /// Every built-in scene, those of [`closed_forms`] last.
 pub fn names() -> Vec<&'static str> {
-    [&["open-box", "cornell", "cornell-spheres", "caustic-sphere"], &closed_forms::NAMES[..]].concat()
+    [&["open-box", "open-box-phong", "cornell", "cornell-spheres", "caustic-sphere"], &closed_forms::NAMES[..]].concat()
 }
 
 pub fn by_name(name: &str) -> Option<Scene> {
     match name {
-        "open-box" => Some(open_box()),
+        "open-box" => Some(open_box(name, Preset::Modified)),
+        "open-box-phong" => Some(open_box(name, Preset::Phong)),
         "cornell" => Some(cornell()),
         "cornell-spheres" => Some(cornell_spheres()),
         "caustic-sphere" => Some(caustic_sphere()),
@@ -25,11 +26,11 @@ pub fn by_name(name: &str) -> Option<Scene> {
     }
 }
 
-/// The paper's box, lamps of the default settings; the walls take the Phong exponents they are given there.
-fn open_box() -> Scene {
-    let settings = Settings::default();
+/// The paper's box, with the lamps and walls of one of its experiments.
+fn open_box(name: &str, preset: Preset) -> Scene {
+    let settings = Settings::preset(preset);
     let room = open_box::open_box(&settings);
-    let mut scene = Scene { name: room.name.into(), ..Scene::default() };
+    let mut scene = Scene { name: name.into(), ..Scene::default() };
     for (face, wall) in room.walls() {
         let rectangle = room.rectangle(face);
         // u x v looks along the positive axis; the wall faces into the room.
