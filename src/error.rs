@@ -47,6 +47,12 @@ pub enum Error {
     #[error("the photon ledger does not close: {ledger:?}; the device or its driver loses work, try --variant cpu or another --device")]
     LedgerOpen { ledger: Ledger },
 
+    /// A closed form came out wrong.
+    #[error(
+        "{device}: {failed} of {of} closed forms are wrong, the first: {first}; its results cannot be trusted: update its driver, or choose another with --device"
+    )]
+    SelfcheckFailed { device: String, failed: usize, of: usize, first: String },
+
     /// The validation layer was asked for and is not installed.
     #[error(
         "--validate: the layer VK_LAYER_KHRONOS_validation is not installed; install the Vulkan validation layers, or leave --validate out"

@@ -14,11 +14,25 @@
 //!
 //! ```text
 //! constants, records, error, ledger, rng, settings, timings < scene < plan < cpu
+//! scene < judge
 //! constants, records, error, ledger, timings < gpu
-//! plan, gpu < resources < trace < index < estimate < film < render < output < bake < paper < cli
+//! plan, gpu < resources < trace < index < estimate < film < render < transport < selfcheck < output
+//! output < bake < paper < cli
 //! ```
 //!
 //! [`gpu`] knows no photon; [`scene`] and [`plan`] know no Vulkan; `tests/architecture.rs` checks it.
+//!
+//! # Two kinds of scene, two lines
+//!
+//! The paper's box is a convex room ([`scene::room`]); its line is the one above, as small as the paper's.
+//! A scene of triangles ([`scene::Scene`], from glTF or built in) goes by [`scene::geometry`] and
+//! [`plan::transport`] to [`transport`], the same line with rays in it: points that a camera or a lightmap asks
+//! about, a global and a caustic map, density estimates, film. The two share the engine, prefix sums, random
+//! numbers, the ledger and the way photons take places in a map.
+//!
+//! [`plan::transport`] decides which effects a scene calls for; what it drops is in no buffer, no pass and, by
+//! specialization constants (`glsl/scene/effects.glsl`), in no pipeline. [`judge`] is a path tracer on the CPU
+//! that shares nothing with it but the scene; [`selfcheck`] holds a device against closed forms.
 //!
 //! # What never changes by accident
 //!
@@ -68,6 +82,7 @@ pub mod render;
 pub mod resources;
 pub mod rng;
 pub mod scene;
+pub mod selfcheck;
 pub mod settings;
 pub mod timings;
 pub mod trace;

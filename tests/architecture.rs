@@ -8,7 +8,7 @@ use std::path::{Path, PathBuf};
 /// What everyone may use, and what among itself has no order.
 const GROUND: [&str; 7] = ["error", "constants", "records", "ledger", "rng", "settings", "timings"];
 /// From left to right.
-const LINE: [&str; 16] = [
+const LINE: [&str; 17] = [
     "scene",
     "judge",
     "plan",
@@ -20,6 +20,7 @@ const LINE: [&str; 16] = [
     "film",
     "render",
     "transport",
+    "selfcheck",
     "output",
     "bake",
     "paper",

@@ -8,6 +8,7 @@ mod plan;
 mod probe;
 mod render;
 mod run;
+mod selfcheck;
 mod transport;
 
 use std::io::{ErrorKind, Write};
@@ -47,6 +48,8 @@ enum Command {
     Probe(probe::ProbeArgs),
     /// Prints which effects a scene calls for, and why
     Plan(plan::PlanArgs),
+    /// Holds this device against closed forms, in under a minute
+    Selfcheck(selfcheck::SelfcheckArgs),
     /// Regenerates every figure and table of the paper as images, CSV and one HTML page
     Paper(paper::PaperArgs),
 }
@@ -109,6 +112,7 @@ pub fn main() -> u8 {
         Some(Command::Bake(args)) => bake::run(&args, &cancelled),
         Some(Command::Probe(args)) => probe::run(&args, &cancelled),
         Some(Command::Plan(args)) => plan::run(&args).map(|()| End::Finished),
+        Some(Command::Selfcheck(args)) => hearing(|| selfcheck::run(&args, &cancelled)),
         Some(Command::Paper(args)) => hearing(|| paper::run(&args, &cancelled)),
     };
     match result {
