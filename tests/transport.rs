@@ -11,13 +11,13 @@ use photonmill::gpu::{Gpu, Options};
 use photonmill::judge::{Judge, Verdict};
 use photonmill::plan::transport::{Sensor, TransportPlan};
 use photonmill::records::Receiver;
-use photonmill::render;
+use photonmill::render::{self, Control};
 use photonmill::scene::geometry::Geometry;
 use photonmill::scene::light::{Light, LightKind};
 use photonmill::scene::{Camera, Material, Mesh, Scene, Surface, built_in};
 use photonmill::settings::EmissionLaw;
 use photonmill::settings::transport::{Append, Effect, Illumination, Kernel, Part, TransportSettings};
-use photonmill::transport::{self, Lit, View, Watch};
+use photonmill::transport::{self, Lit, View};
 
 const SIZE: u32 = 24;
 
@@ -42,7 +42,7 @@ fn picture(gpu: &Gpu, scene: &Scene, settings: &TransportSettings) -> Lit {
 
 fn run(gpu: &Gpu, view: &View, plan: TransportPlan) -> Lit {
     let never = AtomicBool::new(false);
-    let lit = transport::light(gpu, view, plan, &mut Watch { cancelled: &never, progress: &mut |_, _| {} }).unwrap();
+    let lit = transport::light(gpu, view, plan, &mut Control { cancelled: &never, progress: &mut |_, _| {} }).unwrap();
     assert_eq!(lit.anomalies, [0, 0, 0], "values that are no number, or too large for the film");
     lit
 }
@@ -232,7 +232,7 @@ fn what_is_dropped_is_not_there() {
     // index and the lookup.
     assert_eq!(direct.dispatches, 2 * 3);
     let map = (needed.dispatches - direct.dispatches) / 3;
-    assert_eq!((all.dispatches - needed.dispatches) / 3, map + 2 * (scan_levels(&all) - scan_levels(&needed)));
+    assert_eq!((all.dispatches - needed.dispatches) / 3, map);
     assert!(needed.plan.bytes < all.plan.bytes && direct.plan.bytes < needed.plan.bytes);
     // Of pipelines only those of the plan, each made once.
     let fresh = device().unwrap();
@@ -241,11 +241,6 @@ fn what_is_dropped_is_not_there() {
     assert_eq!(lit.pipelines, transport::modules(&lit.plan, fresh.facts()).len());
     assert_eq!(fresh.pipeline_count() - before, lit.pipelines);
     assert_eq!(lit.pipelines, 2);
-}
-
-/// Prefix sums of equal buckets take equal dispatches.
-fn scan_levels(_: &Lit) -> u64 {
-    0
 }
 
 /// Scaled and moved by powers of two, and seen by a camera that goes with it, a scene is the same picture.
@@ -260,28 +255,6 @@ fn scaling_by_a_power_of_two_changes_no_bit() {
         scaled.cameras.iter_mut().for_each(|camera| camera.eye *= factor);
         let found = picture(&gpu, &scaled, &small());
         assert_holds(k, same_film(&format!("scaled by 2^{k}"), &found, &reference));
-    }
-}
-
-/// A closed box whose walls all shine and reflect: irradiance pi Le / (1 - rho) everywhere, at edges and in
-/// corners too.
-fn furnace(albedo: f32) -> Scene {
-    let material = Material { emission: Vec3::splat(1.0), ..Material::lambert("wall", Vec3::splat(albedo)) };
-    let (x, y, z) = (DVec3::X, DVec3::Y, DVec3::Z);
-    let one = DVec3::ONE;
-    Scene {
-        name: "furnace".into(),
-        meshes: vec![
-            Mesh::parallelogram("floor", DVec3::ZERO, z, x, 0),
-            Mesh::parallelogram("back", DVec3::ZERO, x, y, 0),
-            Mesh::parallelogram("left", DVec3::ZERO, y, z, 0),
-            Mesh::parallelogram("ceiling", one, -x, -z, 0),
-            Mesh::parallelogram("front", one, -y, -x, 0),
-            Mesh::parallelogram("right", one, -z, -y, 0),
-        ],
-        materials: vec![material],
-        cameras: vec![Camera::looking_at("inside", DVec3::splat(0.5), DVec3::new(0.1, 0.4, 0.0), DVec3::Y, 1.4)],
-        ..Scene::default()
     }
 }
 
@@ -300,7 +273,7 @@ fn a_furnace_is_equally_bright_everywhere() {
         for illumination in [Illumination::Split, Illumination::Photons] {
             let settings = TransportSettings { kernel, illumination, ..settings.clone() };
             let exact = std::f64::consts::PI / (1.0 - 0.5);
-            let found = irradiance(&gpu, &furnace(0.5), &settings, &points);
+            let found = irradiance(&gpu, &scene("furnace"), &settings, &points);
             for ((point, _), (mean, error)) in points.iter().zip(&found) {
                 let what = format!("{kernel:?}, {illumination:?}, {point}");
                 assert!(error.x < 0.1 * exact, "{what}: error {error}");
@@ -310,7 +283,7 @@ fn a_furnace_is_equally_bright_everywhere() {
     }
     let wrong = irradiance(
         &gpu,
-        &furnace(0.5),
+        &scene("furnace"),
         &TransportSettings { edge_correction: false, illumination: Illumination::Photons, ..settings },
         &points,
     );
@@ -352,7 +325,7 @@ fn radiance_and_irradiance_of_a_wall_agree() {
 #[test]
 fn no_light_leaks_through_thin_walls() {
     let Some(gpu) = device() else { return };
-    let mut scene = furnace(0.7);
+    let mut scene = scene("furnace");
     scene.materials = vec![
         Material::lambert("wall", Vec3::splat(0.7)),
         Material { emission: Vec3::splat(10.0), ..Material::lambert("lamp", Vec3::splat(0.5)) },

@@ -15,12 +15,12 @@ use crate::output::light_report;
 use crate::output::trace_file;
 use crate::plan::transport::{Sensor, TransportPlan};
 use crate::records::Receiver;
-use crate::render;
+use crate::render::{self, Control};
 use crate::scene::geometry::Geometry;
 use crate::scene::light::{Light, LightKind};
 use crate::scene::{Camera, Scene};
 use crate::settings::transport::{Append, Effect, Filter, Illumination, Kernel, Part, TransportSettings};
-use crate::transport::{self, Lit, View, Watch};
+use crate::transport::{self, Lit, View};
 
 #[derive(Args)]
 pub(super) struct SceneArgs {
@@ -249,9 +249,9 @@ pub(super) fn light(gpu: &Gpu, job: &Job, geometry: &Geometry, plan: TransportPl
     let style =
         ProgressStyle::with_template("{bar:32} {human_pos}/{human_len} rounds, {per_sec}, {eta} left").expect("the template is valid");
     let bar = ProgressBar::new(u64::from(plan.settings.rounds)).with_style(style);
-    let mut watch = Watch { cancelled, progress: &mut |done, _| bar.set_position(u64::from(done)) };
+    let mut control = Control { cancelled, progress: &mut |done, _| bar.set_position(done) };
     let view = View { geometry, camera: job.camera, phases: job.phases };
-    let lit = hearing(|| transport::light(gpu, &view, plan, &mut watch))?;
+    let lit = hearing(|| transport::light(gpu, &view, plan, &mut control))?;
     bar.finish_and_clear();
     if lit.cancelled {
         complain(&format!("ended after {} of {} rounds; what is written is of these", lit.film.rounds, lit.plan.settings.rounds));

@@ -7,7 +7,8 @@ use serde::Serialize;
 
 use super::report::{ledger, timing_table};
 use crate::ledger::Ledger;
-use crate::plan::transport::{EffectDecision, MapPlan, TransportPlan};
+use crate::plan::evidence::EffectDecision;
+use crate::plan::transport::{MapPlan, TransportPlan};
 use crate::settings::transport::{Effect, TransportSettings};
 use crate::timings::{Row, Timings};
 use crate::transport::Lit;

@@ -3,6 +3,7 @@
 
 pub mod capacity;
 pub mod effect;
+pub mod evidence;
 pub mod transport;
 
 use std::ops::Range;

@@ -7,26 +7,13 @@ use std::time::{Duration, Instant};
 use serde::Serialize;
 
 use super::Limits;
+use super::evidence::{EffectDecision, Facts};
 use crate::constants::*;
 use crate::error::{Error, Result};
 use crate::records::*;
 use crate::scene::geometry::Geometry;
-use crate::scene::{Material, Scene, Surface};
-use crate::settings::transport::{Effect, Illumination, Part, TransportSettings};
-
-/// One effect, kept or dropped, with the evidence.
-#[derive(Debug, Clone, PartialEq, Eq, Serialize)]
-pub struct EffectDecision {
-    pub effect: Effect,
-    pub kept: bool,
-    /// What the scene and the request say, whatever was forced.
-    pub needed: bool,
-    pub evidence: String,
-    /// Photons of a round that are traced for it.
-    pub photons: u64,
-    /// Device memory that exists for it alone.
-    pub bytes: u64,
-}
+use crate::scene::{Scene, Surface};
+use crate::settings::transport::{Effect, Illumination, TransportSettings};
 
 /// What light is asked of.
 #[derive(Debug, Clone, Copy, PartialEq, Eq, Serialize)]
@@ -102,8 +89,6 @@ pub struct TransportPlan {
     pub planned_in: Duration,
 }
 
-/// Triangles up to which a list is tested from end to end instead of a tree.
-const LIST_TRIANGLES: usize = 24;
 /// Triangles up to which a list may be asked for: a path tests it some hundred times, and loops are short.
 const MAX_LIST_TRIANGLES: usize = 256;
 /// Photons within the first radius of the global map, on average.
@@ -402,144 +387,4 @@ fn chunk_photons(photons: u32, landings: u64, settings: &TransportSettings, limi
         ));
     }
     Ok(fits.min(settings.chunk.map_or(u64::MAX, u64::from)).min(u64::from(photons)) as u32)
-}
-
-/// What the scene holds and the request asks for.
-struct Facts<'a> {
-    materials: Vec<&'a Material>,
-    emitters: [usize; 7],
-    triangles: usize,
-    smooth: usize,
-    part: Part,
-    is_picture: bool,
-    /// Some indirect light comes by a gather ray, at whose end there is light of all kinds.
-    gathers: bool,
-}
-
-impl<'a> Facts<'a> {
-    fn new(scene: &'a Scene, geometry: &Geometry, settings: &TransportSettings, sensor: Sensor) -> Facts<'a> {
-        let mut used = vec![false; scene.materials.len()];
-        geometry.triangles.iter().for_each(|triangle| used[triangle.material as usize] = true);
-        let mut emitters = [0; 7];
-        let shining = scene.meshes.iter().filter(|mesh| scene.materials[mesh.material].is_emissive());
-        emitters[EMITTER_TRIANGLE as usize] = shining.map(|mesh| mesh.triangles.len()).sum();
-        scene.lights.iter().for_each(|light| emitters[light.kind.code() as usize] += 1);
-        let glossy = scene.materials.iter().zip(&used).any(|(material, used)| *used && matches!(material.surface, Surface::Glossy { .. }));
-        Facts {
-            materials: scene.materials.iter().zip(used).filter(|(_, used)| *used).map(|(material, _)| material).collect(),
-            emitters,
-            triangles: geometry.triangles.len(),
-            smooth: geometry.normals.iter().filter(|normals| normals.a != NONE).count(),
-            part: settings.part,
-            is_picture: matches!(sensor, Sensor::Picture { .. }),
-            gathers: settings.final_gather || glossy && settings.illumination == Illumination::Split,
-        }
-    }
-
-    fn has(&self, is: impl Fn(Surface) -> bool) -> bool {
-        self.materials.iter().any(|material| is(material.surface))
-    }
-
-    /// Names of the materials that `is` holds for, at most three of them.
-    fn named(&self, is: impl Fn(&Material) -> bool) -> Option<String> {
-        let names: Vec<&str> = self.materials.iter().filter(|material| is(material)).map(|material| material.name.as_str()).collect();
-        match names.as_slice() {
-            [] => None,
-            [first, second, _, _, ..] => Some(format!("{first}, {second} and {} more", names.len() - 2)),
-            few => Some(few.join(", ")),
-        }
-    }
-
-    fn decide(&self, effect: Effect, settings: &TransportSettings) -> EffectDecision {
-        let (needed, evidence) = self.evidence(effect);
-        let kept = (needed || settings.forces(effect)) && !settings.leaves_out(effect);
-        let evidence = match (needed, kept) {
-            (true, false) => format!("left out by --without, though needed: {evidence}"),
-            (false, true) => format!("forced by --with: {evidence}"),
-            _ => evidence,
-        };
-        EffectDecision { effect, kept, needed, evidence, photons: 0, bytes: 0 }
-    }
-
-    fn evidence(&self, effect: Effect) -> (bool, String) {
-        let lit = self.emitters.iter().sum::<usize>() > 0;
-        let wants = |part: Part| self.part == Part::All || self.part == part || (self.is_picture && self.part == Part::Specular);
-        let mirrors = self.named(|material| material.surface == Surface::Mirror);
-        let glass = self.named(|material| matches!(material.surface, Surface::Dielectric { .. }));
-        // Photons are of use where something scatters them to a sensor.
-        let receives = !self.is_picture || self.has(|surface| !surface.is_specular());
-        let lights = |kind: u32, what: &str| match self.emitters[kind as usize] {
-            0 => (false, format!("no {what} light")),
-            count => (true, format!("{count} {what} light(s)")),
-        };
-        let caustic = |found: &Option<String>, what: &str| match found {
-            None => (false, format!("no {what} material: no such caustic")),
-            Some(_) if !lit => (false, "nothing shines".into()),
-            Some(_) if !receives => (false, "no surface scatters light: nothing to see a caustic on".into()),
-            Some(_) if !(wants(Part::Caustic) || (self.part == Part::Indirect && self.gathers)) => {
-                (false, format!("only {:?} light was asked for", self.part).to_lowercase())
-            }
-            Some(names) => (true, format!("{what}: {names}")),
-        };
-        match effect {
-            Effect::Direct if !lit => (false, "nothing shines".into()),
-            Effect::Direct if !receives => (false, "no surface scatters light".into()),
-            Effect::Direct if self.part == Part::Caustic => (false, "only caustics were asked for".into()),
-            Effect::Direct if self.part == Part::Indirect && !self.gathers => (false, "only indirect light was asked for".into()),
-            Effect::Direct if self.part == Part::Indirect => (true, "a gather ray ends in direct light".into()),
-            Effect::Direct => (true, format!("{} light(s) reach surfaces that scatter", self.emitters.iter().sum::<usize>())),
-            Effect::Indirect if !lit => (false, "nothing shines".into()),
-            Effect::Indirect if !receives => (false, "no surface scatters light".into()),
-            Effect::Indirect if !wants(Part::Indirect) => (false, format!("only {:?} light was asked for", self.part).to_lowercase()),
-            Effect::Indirect => match self.named(|material| !material.surface.is_specular() && material.base_colour.max_element() > 0.0) {
-                Some(names) => (true, format!("scatter light: {names}")),
-                None => (false, "every surface that scatters is black".into()),
-            },
-            Effect::Glossy => match self.named(|material| matches!(material.surface, Surface::Glossy { .. })) {
-                Some(names) => (true, format!("glossy: {names}")),
-                None => (false, "no glossy material".into()),
-            },
-            Effect::ReflectiveCaustics => {
-                let both = match (&mirrors, &glass) {
-                    (Some(mirrors), _) => Some(mirrors.clone()),
-                    (None, _) => None,
-                };
-                caustic(&both, "mirror")
-            }
-            Effect::RefractiveCaustics => caustic(&glass, "dielectric"),
-            Effect::SpecularChains => {
-                let found = self.named(|material| material.surface.is_specular());
-                match found {
-                    None => (false, "no mirror and no dielectric material".into()),
-                    Some(names) => (true, format!("followed through: {names}")),
-                }
-            }
-            Effect::Textures => {
-                match self.named(|material| material.base_colour_texture.is_some() || material.emission_texture.is_some()) {
-                    Some(names) => (true, format!("textured: {names}")),
-                    None => (false, "no textured material".into()),
-                }
-            }
-            Effect::Environment => lights(EMITTER_ENVIRONMENT, "environment"),
-            Effect::MeshLights => match self.emitters[EMITTER_TRIANGLE as usize] {
-                0 => (false, "no triangle shines".into()),
-                count => (true, format!("{count} triangle(s) shine")),
-            },
-            Effect::PointLights => lights(EMITTER_POINT, "point"),
-            Effect::SpotLights => lights(EMITTER_SPOT, "spot"),
-            Effect::DirectionalLights => lights(EMITTER_DIRECTIONAL, "directional"),
-            Effect::DiscLights => match self.emitters[EMITTER_DISC_COSINE as usize] + self.emitters[EMITTER_DISC_UNIFORM as usize] {
-                0 => (false, "no disc light".into()),
-                count => (true, format!("{count} disc light(s)")),
-            },
-            Effect::Bvh if self.triangles <= LIST_TRIANGLES => (false, format!("{} triangles: a list is as fast", self.triangles)),
-            Effect::Bvh => (true, format!("{} triangles", self.triangles)),
-            Effect::TwoSided => match self.named(|material| material.two_sided) {
-                Some(names) => (true, format!("two-sided: {names}")),
-                None => (false, "every surface has one side".into()),
-            },
-            Effect::SmoothNormals if self.smooth == 0 => (false, "every triangle is flat".into()),
-            Effect::SmoothNormals => (true, format!("{} triangle(s) have smooth normals", self.smooth)),
-        }
-    }
 }

@@ -18,9 +18,9 @@ use crate::timings::Timings;
 
 /// How a caller watches a run and ends it early.
 pub struct Control<'a> {
-    /// Set from outside to end the run after the photons that are under way.
+    /// Set from outside to end the run after the photons, or the round, under way.
     pub cancelled: &'a AtomicBool,
-    /// Told the photons emitted so far, of how many.
+    /// Told the photons emitted, or the rounds done, so far, of how many.
     pub progress: &'a mut dyn FnMut(u64, u64),
 }
 

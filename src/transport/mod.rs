@@ -16,7 +16,7 @@ pub mod photons;
 pub mod points;
 pub mod resources;
 
-use std::sync::atomic::{AtomicBool, Ordering};
+use std::sync::atomic::Ordering;
 use std::time::{Duration, Instant};
 
 pub use film::RoundFilm;
@@ -29,6 +29,7 @@ use crate::gpu::{Commands, Constants, DeviceFacts, Gpu, Kernel, Module};
 use crate::ledger::Fates;
 use crate::plan::transport::{MapPlan, Sensor, TransportPlan};
 use crate::records::{Receiver, Tally};
+use crate::render::Control;
 use crate::scene::Camera;
 use crate::scene::geometry::Geometry;
 use crate::settings::transport::Append;
@@ -50,14 +51,6 @@ pub struct Round<'a> {
     pub geometry: &'a Geometry,
     pub plan: &'a TransportPlan,
     pub number: u32,
-}
-
-/// How a caller watches a run and ends it early.
-pub struct Watch<'a> {
-    /// Set from outside to end the run after the round that is under way.
-    pub cancelled: &'a AtomicBool,
-    /// Told the rounds done so far, of how many.
-    pub progress: &'a mut dyn FnMut(u32, u32),
 }
 
 /// What a run leaves behind.
@@ -106,8 +99,8 @@ fn constants(plan: &TransportPlan) -> Constants {
 /// Timestamps that a round may need.
 const TIMESTAMPS_PER_ROUND: u32 = 64;
 
-/// Runs all rounds of a plan.
-pub fn light(gpu: &Gpu, view: &View, plan: TransportPlan, watch: &mut Watch) -> Result<Lit> {
+/// Runs all rounds of a plan; progress is told in rounds.
+pub fn light(gpu: &Gpu, view: &View, plan: TransportPlan, control: &mut Control) -> Result<Lit> {
     let started = Instant::now();
     let pipelines_before = gpu.pipeline_count();
     gpu.prepare(&modules(&plan, gpu.facts()), &constants(&plan))?;
@@ -132,8 +125,8 @@ pub fn light(gpu: &Gpu, view: &View, plan: TransportPlan, watch: &mut Watch) -> 
         if last || short || commands.work() * 2 >= plan.work_per_submission {
             settle(&mut commands, &resources, &plan, u64::from(done - settled), &mut fates)?;
             settled = done;
-            (watch.progress)(done, plan.settings.rounds);
-            cancelled = !last && watch.cancelled.load(Ordering::Relaxed);
+            (control.progress)(u64::from(done), u64::from(plan.settings.rounds));
+            cancelled = !last && control.cancelled.load(Ordering::Relaxed);
             if cancelled {
                 break;
             }
