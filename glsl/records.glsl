@@ -305,3 +305,14 @@ struct CheckPush {
     uint addend_high;
     uint add_count;
 };
+
+struct MathResults {
+    float sum_of_product;
+    float quotient;
+    float root;
+    float inverse_root;
+    float exp2;
+    float log2;
+    float angle;
+    float asinh;
+};

@@ -16,7 +16,7 @@ Hit intersect_room(Room room, vec3 position, vec3 direction, uint on_wall)
         float d = direction[axis];
         float plane = d > 0.0 ? room.max_corner[axis] : room.min_corner[axis];
         bool leaves_own_wall = on_wall == 2 * axis + (d > 0.0 ? 1 : 0);
-        distances[axis] = d == 0.0 || leaves_own_wall ? infinity : (plane - position[axis]) / d;
+        distances[axis] = d == 0.0 || leaves_own_wall ? infinity : divide(plane - position[axis], d);
     }
     uint axis = distances.y < distances.x ? 1 : 0;
     axis = distances.z < distances[axis] ? 2 : axis;

@@ -438,4 +438,20 @@ records! {
         addend_high: u32,
         add_count: u32,
     }
+
+    /// Functions of `glsl/math.glsl` at (a, b).
+    MathResults {
+        /// a b + a
+        sum_of_product: f32,
+        /// a / b
+        quotient: f32,
+        /// Of a.
+        root: f32,
+        inverse_root: f32,
+        exp2: f32,
+        log2: f32,
+        /// Angle of (b, a).
+        angle: f32,
+        asinh: f32,
+    }
 }

@@ -66,6 +66,23 @@ impl EmissionLaw {
     }
 }
 
+/// How quotients, roots and logarithms are rounded.
+#[derive(Debug, Clone, Copy, PartialEq, Eq, Serialize)]
+#[serde(rename_all = "lowercase")]
+pub enum Math {
+    /// As the device has them.
+    Fast,
+    /// The same bits on every device, and on the CPU builder.
+    Strict,
+}
+
+impl Math {
+    /// Value of the kernels' STRICT_MATH.
+    pub fn code(self) -> u32 {
+        u32::from(self == Math::Strict)
+    }
+}
+
 /// Which direction the Phong weight compares with the direction to the eye.
 #[derive(Debug, Clone, Copy, PartialEq, Eq, Serialize)]
 #[serde(rename_all = "lowercase")]
@@ -117,6 +134,7 @@ pub struct Settings {
     pub seed: u64,
     pub rng: Rng,
     pub gather: Gather,
+    pub math: Math,
     pub emission: EmissionLaw,
     /// Phong exponent of each wall in the order of [`WALL_NAMES`]; `None` is Lambertian.
     pub shininess: [Option<f32>; 5],
@@ -165,6 +183,7 @@ impl Settings {
             seed: 1,
             rng: Rng::Rand48,
             gather: Gather::Grid,
+            math: Math::Fast,
             emission: EmissionLaw::Uniform,
             shininess: [None; 5],
             phong_direction: PhongDirection::Mirror,

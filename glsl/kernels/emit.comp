@@ -12,6 +12,7 @@ layout(set = 0, binding = 1, scalar) readonly buffer Walls { Wall walls[]; };
 layout(set = 1, binding = 0, scalar) readonly buffer StreamSeeds { uvec2 stream_seeds[]; };
 layout(set = 1, binding = 1, scalar) writeonly buffer Paths { Path paths[]; };
 
+#include "math.glsl"
 #include "dispatch.glsl"
 #include "rng.glsl"
 #include "sampling.glsl"

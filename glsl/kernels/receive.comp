@@ -13,6 +13,7 @@ layout(local_size_x_id = 0) in;
 layout(push_constant, scalar) uniform Push { ReceivePush push; };
 layout(set = 0, binding = 8, scalar) readonly buffer Receivers { Receiver receivers[]; };
 
+#include "math.glsl"
 #include "dispatch.glsl"
 #include "philox.glsl"
 #include "sampling.glsl"

@@ -17,6 +17,7 @@ layout(set = 1, binding = 3, scalar) readonly buffer Estimates { uvec2 estimates
 layout(set = 1, binding = 4, scalar) buffer FilmSums { uvec2 film_sums[]; };
 layout(set = 1, binding = 5, scalar) buffer FilmSquares { uvec4 film_squares[]; };
 
+#include "math.glsl"
 #include "dispatch.glsl"
 #include "scene/effects.glsl"
 #include "scene/directions.glsl"
@@ -95,7 +96,7 @@ void main()
                 area = estimate_area(point, is_caustic ? push.caustic_radius : push.global_radius);
             }
             global_area = is_caustic ? global_area : area;
-            vec3 radiance = point.weight * (flux * ((is_caustic ? push.caustic_flux : push.global_flux) / area));
+            vec3 radiance = point.weight * (flux * divide(is_caustic ? push.caustic_flux : push.global_flux, area));
             uint part = part_number(point.arrivals, arrival);
             for (uint channel = 0; channel < 3; channel++) {
                 uvec2 units = to_film_units(radiance[channel], push.film_scale, push.film_limit);

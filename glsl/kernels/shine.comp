@@ -10,6 +10,7 @@ layout(local_size_x_id = 0) in;
 layout(push_constant, scalar) uniform Push { EmissionPush push; };
 layout(set = 1, binding = 0, scalar) writeonly buffer LightPaths { LightPath light_paths[]; };
 
+#include "math.glsl"
 #include "dispatch.glsl"
 #include "philox.glsl"
 #include "sampling.glsl"

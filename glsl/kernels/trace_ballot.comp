@@ -11,6 +11,7 @@ layout(local_size_x_id = 0) in;
 layout(push_constant, scalar) uniform Push { TracePush push; };
 layout(set = 1, binding = 4, scalar) buffer Tallies { Tally tallies[]; };
 
+#include "math.glsl"
 #include "dispatch.glsl"
 #include "rng.glsl"
 #include "sampling.glsl"

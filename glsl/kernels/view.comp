@@ -12,6 +12,7 @@
 layout(local_size_x_id = 0) in;
 layout(push_constant, scalar) uniform Push { ViewPush push; };
 
+#include "math.glsl"
 #include "dispatch.glsl"
 #include "philox.glsl"
 #include "sampling.glsl"
@@ -54,7 +55,7 @@ void main()
     }
     vec4 u = philox_floats(uvec4(pixel, push.draws.round, 0, push.draws.domain), push.draws.seed);
     vec2 place = vec2(pixel % push.width, pixel / push.width) + 0.5 + filter_offsets(u.xy);
-    vec2 picture = vec2(2.0, -2.0) * place / vec2(push.width, push.height) + vec2(-1.0, 1.0);
+    vec2 picture = vec2(divide(2.0 * place.x, push.width) - 1.0, 1.0 - divide(2.0 * place.y, push.height));
     vec3 direction = normalize(push.forward + picture.x * push.right + picture.y * push.up);
 
     Chain chain = new_chain(push.eye, direction, vec3(1.0));

@@ -28,7 +28,7 @@ ShearedRay sheared(vec3 origin, vec3 direction)
     vec3 size = abs(direction);
     uint axis = size.x > size.y ? (size.x > size.z ? 0 : 2) : (size.y > size.z ? 1 : 2);
     vec3 d = along_axis(direction, axis);
-    precise vec3 shear = vec3(d.x / d.z, d.y / d.z, 1.0 / d.z);
+    precise vec3 shear = vec3(divide(d.x, d.z), divide(d.y, d.z), divide(1.0, d.z));
     return ShearedRay(origin, shear, axis);
 }
 
@@ -41,7 +41,7 @@ float nearest_certain(ShearedRay ray, vec3 a, vec3 b, vec3 c, vec3 edges, float 
     vec2 flat_part = max(abs(a.xy), max(abs(b.xy), abs(c.xy))) + abs(ray.shear.xy) * max(abs(a.z), max(abs(b.z), abs(c.z)));
     float edge = max(abs(edges.x), max(abs(edges.y), abs(edges.z)));
     float edge_error = 6.0 * rounding * flat_part.x * flat_part.y;
-    return 3.0 * (2.0 * rounding * edge * z + edge_error * z) / abs(determinant);
+    return divide(3.0 * (2.0 * rounding * edge * z + edge_error * z), abs(determinant));
 }
 
 // Takes the triangle if the ray meets it within (0, hit.t), or at hit.t with a smaller number: then the
@@ -66,10 +66,10 @@ void intersect_triangle(ShearedRay ray, uint index, inout Hit hit)
     if (determinant == 0.0) {
         return;
     }
-    precise float t = ray.shear.z * (u * a.z + v * b.z + w * c.z) / determinant;
+    precise float t = divide(ray.shear.z * (u * a.z + v * b.z + w * c.z), determinant);
     if (t > nearest_certain(ray, a, b, c, vec3(u, v, w), determinant) && (t < hit.t || (t == hit.t && index < hit.triangle))) {
-        precise float second = v / determinant;
-        precise float third = w / determinant;
+        precise float second = divide(v, determinant);
+        precise float third = divide(w, determinant);
         hit = Hit(t, index, second, third);
     }
 }
@@ -116,7 +116,7 @@ Hit traverse(vec3 origin, vec3 direction, float t_max, bool any)
         // An axis along which the ray does not move is given a speed too small to matter.
         const float slowest = 1.0 / 1152921504606846976.0;
         vec3 speed = mix(direction, vec3(slowest), lessThan(abs(direction), vec3(slowest)));
-        vec3 inverse = 1.0 / speed;
+        vec3 inverse = vec3(native_quotient(1.0, speed.x), native_quotient(1.0, speed.y), native_quotient(1.0, speed.z));
         uint octant = (direction.x < 0.0 ? 0 : 4) | (direction.y < 0.0 ? 0 : 2) | (direction.z < 0.0 ? 0 : 1);
 
         // Nodes to visit: the first of their siblings, and bits 24 to 31 for those still to come above the

@@ -22,10 +22,10 @@ float kernel_under_line(float h, float s0, float s1)
     if (KERNEL == KERNEL_CONE) {
         float q0 = sqrt(h * h + s0 * s0), q1 = sqrt(h * h + s1 * s1);
         float height = max(abs(h), 1e-12);
-        float cubes = h * (s1 * q1 - s0 * q0) + h * h * h * (asinh(s1 / height) - asinh(s0 / height));
-        return 0.5 * h * (s1 - s0) - cubes / 6.0;
+        float cubes = h * (s1 * q1 - s0 * q0) + h * h * h * (asinh(divide(s1, height)) - asinh(divide(s0, height)));
+        return 0.5 * h * (s1 - s0) - cubes * (1.0 / 6.0);
     }
-    return 0.5 * h * (s1 - s0) - 0.25 * h * (h * h * (s1 - s0) + (s1 * s1 * s1 - s0 * s0 * s0) / 3.0);
+    return 0.5 * h * (s1 - s0) - 0.25 * h * (h * h * (s1 - s0) + (s1 * s1 * s1 - s0 * s0 * s0) * (1.0 / 3.0));
 }
 
 // Integral over the sector between two directions.
@@ -41,11 +41,11 @@ float kernel_in_sector(vec2 from, vec2 to)
 float kernel_over_edge(vec2 from, vec2 to, inout bool enters, inout uint left_count)
 {
     vec2 edge = to - from;
-    float edge_length = length(edge);
+    float edge_length = norm(edge);
     if (edge_length == 0.0) {
         return 0.0;
     }
-    vec2 along = edge / edge_length;
+    vec2 along = divide(edge, edge_length);
     float h = from.x * along.y - from.y * along.x;
     float s0 = dot(from, along), s1 = dot(to, along);
     left_count += h > 0.0 ? 1 : 0;
@@ -92,9 +92,9 @@ uint kernel_over_triangle(uint index, vec3 position, vec3 normal, float radius, 
     vec3 centre = position - height * side;
     vec3 x = normalize(triangle.b - triangle.a);
     vec3 y = cross(front, x);
-    vec2 a = vec2(dot(triangle.a - centre, x), dot(triangle.a - centre, y)) / disc;
-    vec2 b = vec2(dot(triangle.b - centre, x), dot(triangle.b - centre, y)) / disc;
-    vec2 c = vec2(dot(triangle.c - centre, x), dot(triangle.c - centre, y)) / disc;
+    vec2 a = divide(vec2(dot(triangle.a - centre, x), dot(triangle.a - centre, y)), disc);
+    vec2 b = divide(vec2(dot(triangle.b - centre, x), dot(triangle.b - centre, y)), disc);
+    vec2 c = divide(vec2(dot(triangle.c - centre, x), dot(triangle.c - centre, y)), disc);
     bool enters = false;
     uint left_count = 0;
     float whole = kernel_over_edge(a, b, enters, left_count);
@@ -104,7 +104,7 @@ uint kernel_over_triangle(uint index, vec3 position, vec3 normal, float radius, 
     if (!enters) {
         whole = left_count == 3 ? 3.14159265358979324 * kernel_norm() : 0.0;
     }
-    float share = disc / radius;
+    float share = divide(disc, radius);
     return uint(roundEven(max(whole, 0.0) * share * share * 16777216.0));
 }
 

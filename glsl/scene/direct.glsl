@@ -22,7 +22,7 @@ vec3 direct_light(Target point, uint emitter_count, Draws draws, uint index, uin
     for (uint ray = 0; ray < SHADOW_RAYS; ray++) {
         vec4 u = philox_floats(uvec4(index, draws.round, first_block + ray, draws.domain), draws.seed);
         // The choice of a light is stratified over the rays.
-        u.x = min((float(ray) + u.x) / float(SHADOW_RAYS), 1.0 - 1.0 / 16777216.0);
+        u.x = min(divide(float(ray) + u.x, float(SHADOW_RAYS)), 1.0 - 1.0 / 16777216.0);
         Arriving arriving = sample_light(emitter_count, point.position, point.ns, u);
         float cosine = dot(arriving.wi, point.ns);
         if (cosine > 0.0 && dot(arriving.wi, point.ng) > 0.0 && max(arriving.radiance.x, max(arriving.radiance.y, arriving.radiance.z)) > 0.0) {
@@ -34,5 +34,5 @@ vec3 direct_light(Target point, uint emitter_count, Draws draws, uint index, uin
             }
         }
     }
-    return sum / float(SHADOW_RAYS);
+    return divide(sum, float(SHADOW_RAYS));
 }

@@ -3,7 +3,7 @@
 
 vec2 octahedral(vec3 v)
 {
-    vec2 flat_part = v.xy / (abs(v.x) + abs(v.y) + abs(v.z));
+    vec2 flat_part = divide(v.xy, abs(v.x) + abs(v.y) + abs(v.z));
     vec2 signs = vec2(flat_part.x >= 0.0 ? 1.0 : -1.0, flat_part.y >= 0.0 ? 1.0 : -1.0);
     return v.z >= 0.0 ? flat_part : (1.0 - abs(flat_part.yx)) * signs;
 }
@@ -30,7 +30,7 @@ uint pack_normal(vec3 n)
 
 vec3 unpack_normal(uint code)
 {
-    return from_octahedral((vec2(code & 0xffffu, code >> 16) - 32767.0) / 32767.0);
+    return from_octahedral((vec2(code & 0xffffu, code >> 16) - 32767.0) * (1.0 / 32767.0));
 }
 
 // A direction in 2 x 15 bits and a number below 4 above them.
@@ -42,14 +42,14 @@ uint pack_direction(vec3 d, uint number)
 
 vec3 unpack_direction(uint code)
 {
-    return from_octahedral((vec2(code & 0x7fffu, (code >> 15) & 0x7fffu) - 16383.0) / 16383.0);
+    return from_octahedral((vec2(code & 0x7fffu, (code >> 15) & 0x7fffu) - 16383.0) * (1.0 / 16383.0));
 }
 
 // Tangents of a unit vector (Duff et al. 2017).
 vec3 to_frame(vec3 local, vec3 n)
 {
     float s = n.z >= 0.0 ? 1.0 : -1.0;
-    float a = -1.0 / (s + n.z);
+    float a = divide(-1.0, s + n.z);
     float b = n.x * n.y * a;
     vec3 tangent = vec3(1.0 + s * n.x * n.x * a, s * b, -s * n.x);
     vec3 bitangent = vec3(b, s + n.y * n.y * a, -n.y);

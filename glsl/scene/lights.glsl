@@ -41,13 +41,13 @@ vec3 position_error(vec3 position)
 
 float triangle_area(Triangle triangle)
 {
-    return 0.5 * length(cross(triangle.b - triangle.a, triangle.c - triangle.a));
+    return 0.5 * norm(cross(triangle.b - triangle.a, triangle.c - triangle.a));
 }
 
 // glTF's falloff between a spot's cones.
 float spot_falloff(Emitter light, float cosine)
 {
-    float share = clamp((cosine - light.cos_outer) / max(light.size - light.cos_outer, 1e-6), 0.0, 1.0);
+    float share = clamp(divide(cosine - light.cos_outer, max(light.size - light.cos_outer, 1e-6)), 0.0, 1.0);
     return share * share;
 }
 
@@ -92,10 +92,10 @@ Emission sample_emission(uint emitter_count, float scene_radius, vec4 u, vec4 w)
         if (light.kind == EMITTER_SPOT) {
             // In proportion to the intensity: the inner cone evenly, the ring by its falloff.
             float inner = 1.0 - light.size;
-            float ring = (light.size - light.cos_outer) / 3.0;
+            float ring = (light.size - light.cos_outer) * (1.0 / 3.0);
             float below = w.x * (inner + ring);
             float cosine = below < inner ? 1.0 - below
-                                         : light.cos_outer + (light.size - light.cos_outer) * exp2(log2(max(1.0 - (below - inner) / max(ring, 1e-12), 1e-12)) / 3.0);
+                                         : light.cos_outer + (light.size - light.cos_outer) * exp2(log2(max(1.0 - divide(below - inner, max(ring, 1e-12)), 1e-12)) * (1.0 / 3.0));
             emission.direction = to_frame(direction_at(cosine, (1.0 - cosine) * (1.0 + cosine), w.y), light.direction);
         }
     }
@@ -130,7 +130,7 @@ const float MIN_SPHERICAL = 0.05;
 
 float angle_between(vec3 a, vec3 b)
 {
-    return atan(length(cross(a, b)), dot(a, b));
+    return atan(norm(cross(a, b)), dot(a, b));
 }
 
 // A direction within the spherical triangle of three unit vectors, evenly by solid angle, and that angle
@@ -148,14 +148,15 @@ vec4 sample_spherical_triangle(vec3 a, vec3 b, vec3 c, vec2 u)
     float excess = angles - 3.14159265358979324;
     // The arc from b to a point c' of the arc from a to c cuts off the share u.x of the area.
     float part = 3.14159265358979324 + u.x * excess;
-    vec2 of_part = sin_cos_turns(fract(part * 0.15915494309189535));
+    float turns = part * 0.15915494309189535;
+    vec2 of_part = sin_cos_turns(turns - floor(turns));
     vec2 of_alpha = sin_cos_turns(alpha * 0.15915494309189535);
     float sin_phi = of_part.x * of_alpha.y - of_part.y * of_alpha.x;
     float cos_phi = of_part.y * of_alpha.y + of_part.x * of_alpha.x;
     float k1 = cos_phi + of_alpha.y;
     float k2 = sin_phi - of_alpha.x * dot(a, b);
     float divisor = (k2 * sin_phi + k1 * cos_phi) * of_alpha.x;
-    float cosine = abs(divisor) > 1e-12 ? clamp((k2 + (k2 * cos_phi - k1 * sin_phi) * of_alpha.y) / divisor, -1.0, 1.0) : 1.0;
+    float cosine = abs(divisor) > 1e-12 ? clamp(divide(k2 + (k2 * cos_phi - k1 * sin_phi) * of_alpha.y, divisor), -1.0, 1.0) : 1.0;
     vec3 towards_c = c - dot(c, a) * a;
     vec3 corner = cosine * a + sqrt(1.0 - cosine * cosine) * towards_c * inversesqrt(max(dot(towards_c, towards_c), 1e-30));
     float z = 1.0 - u.y * (1.0 - dot(corner, b));
@@ -177,7 +178,7 @@ struct Arriving {
 Arriving sample_light(uint emitter_count, vec3 position, vec3 ns, vec4 u)
 {
     Emitter light = emitters[pick_emitter(emitter_count, u.x)];
-    Arriving arriving = Arriving(vec3(0.0), light.strength / light.probability, light.position, false);
+    Arriving arriving = Arriving(vec3(0.0), divide(light.strength, light.probability), light.position, false);
     float cos_light = 1.0;
     bool by_direction = false;
     if (HAS_TRIANGLE_LIGHTS) {
@@ -192,7 +193,7 @@ Arriving sample_light(uint emitter_count, vec3 position, vec3 ns, vec4 u)
                 normal = material.two_sided != 0 && side < 0.0 ? -normal : normal;
             }
             arriving.target = offset_origin(point, triangle_error(triangle), normal, normal);
-            arriving.radiance = emitted_radiance(material, light.triangle, at.x, at.y) * (triangle_area(triangle) / light.probability);
+            arriving.radiance = emitted_radiance(material, light.triangle, at.x, at.y) * divide(triangle_area(triangle), light.probability);
             cos_light = max(dot(normal, normalize(position - point)), 0.0);
             if (cos_light > 0.0 && material.emission_texture == NONE) {
                 vec4 direction = sample_spherical_triangle(normalize(triangle.a - position), normalize(triangle.b - position),
@@ -200,10 +201,10 @@ Arriving sample_light(uint emitter_count, vec3 position, vec3 ns, vec4 u)
                 float approach = -dot(direction.xyz, normal);
                 if (direction.w > 0.0 && approach > 0.0) {
                     by_direction = true;
-                    point = position + direction.xyz * (dot(normal, position - triangle.a) / approach);
+                    point = position + direction.xyz * divide(dot(normal, position - triangle.a), approach);
                     vec3 error = position_error(point) + triangle_error(triangle);
                     arriving.target = offset_origin(point, error, normal, normal);
-                    arriving.radiance = material.emission * (direction.w / light.probability);
+                    arriving.radiance = material.emission * divide(direction.w, light.probability);
                 }
             }
         }
@@ -231,7 +232,7 @@ Arriving sample_light(uint emitter_count, vec3 position, vec3 ns, vec4 u)
             arriving.is_far = true;
             vec3 local = sample_cosine_hemisphere(u.y, u.z);
             arriving.wi = to_frame(local, ns);
-            arriving.radiance *= 3.14159265358979324 / max(local.z, 1e-6);
+            arriving.radiance *= divide(3.14159265358979324, max(local.z, 1e-6));
         }
     }
     if (!arriving.is_far) {
@@ -239,7 +240,7 @@ Arriving sample_light(uint emitter_count, vec3 position, vec3 ns, vec4 u)
         float distance_squared = dot(way, way);
         arriving.wi = distance_squared > 0.0 ? way * inversesqrt(distance_squared) : vec3(0.0);
         if (!by_direction) {
-            arriving.radiance *= distance_squared > 0.0 ? cos_light / distance_squared : 0.0;
+            arriving.radiance *= distance_squared > 0.0 ? divide(cos_light, distance_squared) : 0.0;
         }
     }
     return arriving;

@@ -34,5 +34,5 @@ float lobe_weight(uint kind, float exponent, vec3 ns, vec3 wo, vec3 wi)
 // that the light sees to those that the eye sees.
 float shading_gain(float shading_cosine, float geometric_cosine)
 {
-    return min(abs(shading_cosine) / max(abs(geometric_cosine), 1e-6), float(MAX_SHADING_GAIN));
+    return min(divide(abs(shading_cosine), max(abs(geometric_cosine), 1e-6)), float(MAX_SHADING_GAIN));
 }

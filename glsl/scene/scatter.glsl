@@ -9,8 +9,8 @@ struct Scatter {
 // Fresnel reflectance of unpolarised light; eta = n_i / n_t.
 float fresnel(float cos_i, float cos_t, float eta)
 {
-    float parallel = (cos_i - eta * cos_t) / (cos_i + eta * cos_t);
-    float perpendicular = (eta * cos_i - cos_t) / (eta * cos_i + cos_t);
+    float parallel = divide(cos_i - eta * cos_t, cos_i + eta * cos_t);
+    float perpendicular = divide(eta * cos_i - cos_t, eta * cos_i + cos_t);
     return 0.5 * (parallel * parallel + perpendicular * perpendicular);
 }
 
@@ -27,7 +27,7 @@ Scatter sample_scatter(Surface surface, vec3 wo, vec3 u, bool carries_radiance)
     }
     if (HAS_DIELECTRIC) {
         if (surface.kind == SURFACE_DIELECTRIC) {
-            float eta = surface.front ? 1.0 / surface.parameter : surface.parameter;
+            float eta = surface.front ? divide(1.0, surface.parameter) : surface.parameter;
             float cos_i = min(dot(wo, ns), 1.0);
             float cos_t_squared = 1.0 - eta * eta * (1.0 - cos_i * cos_i);
             float cos_t = sqrt(max(cos_t_squared, 0.0));
@@ -44,10 +44,10 @@ Scatter sample_scatter(Surface surface, vec3 wo, vec3 u, bool carries_radiance)
     if (HAS_GLOSSY) {
         if (surface.kind == SURFACE_GLOSSY) {
             float n = surface.parameter;
-            float cosine = exp2(log2(max(u.y, 1.0 / 16777216.0)) / (n + 1.0));
+            float cosine = exp2(divide(log2(max(u.y, 1.0 / 16777216.0)), n + 1.0));
             vec3 wi = to_frame(direction_at(cosine, (1.0 - cosine) * (1.0 + cosine), u.z), mirrored(wo, ns));
             float cos_out = dot(wi, ns);
-            vec3 weight = surface.base_colour * ((n + 2.0) / (n + 1.0) * max(cos_out, 0.0));
+            vec3 weight = surface.base_colour * (divide(n + 2.0, n + 1.0) * max(cos_out, 0.0));
             return Scatter(wi, weight, cos_out > 0.0 && dot(wi, surface.ng) > 0.0);
         }
     }

@@ -26,7 +26,7 @@ uint wrapped(int place, uint size, uint wrap)
         return uint(clamp(place, 0, extent - 1));
     }
     int period = wrap == 1 ? 2 * extent : extent;
-    int folded = place - period * int(floor(float(place) / float(period)));
+    int folded = place - period * int(floor(divide(float(place), float(period))));
     folded = folded < 0 ? folded + period : (folded >= period ? folded - period : folded);
     return uint(folded < extent ? folded : period - 1 - folded);
 }
@@ -46,8 +46,9 @@ vec3 sample_texture(uint texture_index, vec2 uv)
     vec2 corner = floor(place);
     vec2 share = place - corner;
     int i = int(corner.x), j = int(corner.y);
-    return mix(mix(texel(info, i, j), texel(info, i + 1, j), share.x), mix(texel(info, i, j + 1), texel(info, i + 1, j + 1), share.x),
-               share.y);
+    vec3 lower = (1.0 - share.x) * texel(info, i, j) + share.x * texel(info, i + 1, j);
+    vec3 upper = (1.0 - share.x) * texel(info, i, j + 1) + share.x * texel(info, i + 1, j + 1);
+    return (1.0 - share.y) * lower + share.y * upper;
 }
 
 vec2 mixed_uv(vec2 a, vec2 b, vec2 c, float u, float v)

@@ -39,10 +39,10 @@ void fly()
             float before = max(path.flux.x, max(path.flux.y, path.flux.z));
             float after = max(flux.x, max(flux.y, flux.z));
             // Survival in proportion to the flux that is left, so that survivors carry about what they did.
-            float survival = before > 0.0 ? min(after / before, 1.0) : 0.0;
+            float survival = before > 0.0 ? min(divide(after, before), 1.0) : 0.0;
             alive = surface.scatters && scatter.alive && u.x < survival && (specular || push.caustic_only == 0);
             absorbed = !alive;
-            flux = min(flux / max(survival, 1e-12), vec3(float(MAX_SHADING_GAIN)));
+            flux = min(divide(flux, max(survival, 1e-12)), vec3(float(MAX_SHADING_GAIN)));
 
             uint onward = ARRIVED_INDIRECT;
             if (specular) {

@@ -52,7 +52,7 @@ void look_up()
                         float weight = lobe_weight(point.surface, point.exponent, ns, wo, wi);
                         if (KERNEL != KERNEL_BOX) {
                             float height_squared = height * height;
-                            weight *= kernel_weight(clamp((distance_squared - height_squared) / (push.radius * push.radius - height_squared), 0.0, 1.0));
+                            weight *= kernel_weight(clamp(divide(distance_squared - height_squared, push.radius * push.radius - height_squared), 0.0, 1.0));
                         }
                         if (HAS_SMOOTH_NORMALS) {
                             weight *= point.normal == point.shading_normal ? 1.0 : shading_gain(cosine, dot(wi, photon_normal));

@@ -18,7 +18,7 @@ use crate::render::{self, Control, Outcome};
 use crate::rng::Rng;
 use crate::scene::open_box::open_box;
 use crate::scene::room::RoomScene;
-use crate::settings::{EmissionLaw, Gather, PhongDirection, Preset, Settings, Variant, WALL_NAMES};
+use crate::settings::{EmissionLaw, Gather, Math, PhongDirection, Preset, Settings, Variant, WALL_NAMES};
 use crate::timings::{Clock, Span};
 
 #[derive(Args)]
@@ -57,6 +57,9 @@ pub(super) struct RunArgs {
     /// is the same to the bit [default: grid]
     #[arg(long, value_enum, help_heading = "Estimate")]
     gather: Option<GatherArg>,
+    /// Arithmetic: as fast as the device has it, or the same bits on every device and on the CPU [default: fast]
+    #[arg(long, value_enum, help_heading = "Estimate")]
+    math: Option<MathArg>,
     /// Texels along each side of a wall [default: 64]
     #[arg(long, value_parser = whole::<u32>, allow_negative_numbers = true, help_heading = "Estimate")]
     mesh: Option<u32>,
@@ -141,6 +144,7 @@ value_enum!(PresetArg => Preset { Naive, Modified, Phong, Rounds });
 value_enum!(VariantArg => Variant { Naive, Atomic, Ballot, Cpu });
 value_enum!(RngArg => Rng { Rand48, Mt, Philox });
 value_enum!(GatherArg => Gather { Brute, Grid });
+value_enum!(MathArg => Math { Fast, Strict });
 value_enum!(EmissionArg => EmissionLaw { Uniform, Cosine });
 value_enum!(PhongDirectionArg => PhongDirection { Mirror, Sampled });
 
@@ -197,6 +201,7 @@ impl RunArgs {
             seed: self.seed.unwrap_or(preset.seed),
             rng: self.rng.map_or(if photons == preset.photons { preset.rng } else { Rng::Philox }, Rng::from),
             gather: self.gather.map_or(preset.gather, Gather::from),
+            math: self.math.map_or(preset.math, Math::from),
             emission: self.emission.map_or(preset.emission, EmissionLaw::from),
             shininess: self.shininess.map_or(preset.shininess, |all| all.map(Some)),
             phong_direction: self.phong_direction.map_or(preset.phong_direction, PhongDirection::from),

@@ -19,6 +19,7 @@ use crate::render::{self, Control};
 use crate::scene::geometry::Geometry;
 use crate::scene::light::{Light, LightKind};
 use crate::scene::{Camera, Scene};
+use crate::settings::Math;
 use crate::settings::transport::{Append, Effect, Filter, Illumination, Kernel, Part, TransportSettings};
 use crate::transport::{self, Lit, View};
 
@@ -66,6 +67,9 @@ pub(super) struct TransportArgs {
     /// How photons take places in their map; the result is the same to the bit [default: ballot]
     #[arg(long, value_enum, help_heading = "Transport")]
     variant: Option<AppendArg>,
+    /// Arithmetic: as fast as the device has it, or the same bits on every device [default: fast]
+    #[arg(long, value_enum, help_heading = "Transport")]
+    math: Option<super::run::MathArg>,
     /// Most photons traced at once; the result is the same to the bit [default: what the device holds]
     #[arg(long, value_parser = whole::<u32>, allow_negative_numbers = true, help_heading = "Transport")]
     chunk: Option<u32>,
@@ -172,6 +176,7 @@ impl TransportArgs {
             final_gather: self.final_gather,
             illumination: self.illumination.map_or(usual.illumination, Illumination::from),
             append: self.variant.map_or(usual.append, Append::from),
+            math: self.math.map_or(usual.math, Math::from),
             group_size: self.group_size.unwrap_or(usual.group_size),
             chunk: self.chunk,
             with: self.with.iter().map(|effect| (*effect).into()).collect(),

@@ -2,6 +2,7 @@
 
 use glam::Vec3;
 
+use super::math::{exp2, log2};
 use crate::records::Wall;
 use crate::settings::PhongDirection;
 
@@ -12,8 +13,8 @@ pub fn phong_lobe(cosine: f32, shininess: f32) -> f32 {
     }
     let x = 1.0 - cosine;
     let logarithm =
-        if x < 0.03125 { -x * (1.0 + x * (1.0 / 2.0 + x * (1.0 / 3.0 + x * (1.0 / 4.0)))) } else { std::f32::consts::LN_2 * cosine.log2() };
-    if shininess == 0.0 { 1.0 } else { (std::f32::consts::LOG2_E * shininess * logarithm).exp2().min(1.0) }
+        if x < 0.03125 { -x * (1.0 + x * (1.0 / 2.0 + x * (1.0 / 3.0 + x * (1.0 / 4.0)))) } else { std::f32::consts::LN_2 * log2(cosine) };
+    if shininess == 0.0 { 1.0 } else { exp2(std::f32::consts::LOG2_E * shininess * logarithm).min(1.0) }
 }
 
 /// What a stored photon weighs at the eye: 1 on a Lambertian wall (shininess below 0).

@@ -6,6 +6,7 @@ pub mod bsdf;
 pub mod emission;
 pub mod estimate;
 pub mod index;
+pub mod math;
 pub mod room;
 pub mod sampling;
 pub mod trace;

@@ -5,11 +5,14 @@
 
 use std::time::Instant;
 
-use super::kernels::{CheckTwoWords, CheckU64};
+use glam::Vec2;
+
+use super::kernels::{CheckMath, CheckTwoWords, CheckU64};
 use super::{Commands, Constants, Extent, Gpu, Memory};
 use crate::constants::LOOP_LIMIT;
 use crate::error::{Error, Result};
-use crate::records::CheckPush;
+use crate::records::{CheckPush, MathResults};
+use crate::settings::Math;
 
 /// What the check found beyond passing.
 #[derive(Debug, Clone, Copy, PartialEq, Eq)]
@@ -51,6 +54,40 @@ pub(super) fn run(gpu: &Gpu) -> Result<()> {
 pub fn loop_count(gpu: &Gpu, wanted: u32) -> Result<LoopCount> {
     let push = CheckPush { iteration_count: wanted, addend_low: 0, addend_high: 0, add_count: 0 };
     Ok(LoopCount { wanted, done: ask(gpu, &push)?.iterations })
+}
+
+/// What `glsl/math.glsl` computes of each pair on the device.
+pub fn math(gpu: &Gpu, operands: &[Vec2], math: Math) -> Result<Vec<MathResults>> {
+    let constants = Constants::new(GROUP_SIZE).set("STRICT_MATH", math.code());
+    let mut commands = Commands::new(gpu, constants, Instant::now())?;
+    let inputs = gpu.buffer::<Vec2>("operands", operands.len() as u64, Memory::Device)?;
+    let results = gpu.buffer::<MathResults>("math results", operands.len() as u64, Memory::Device)?;
+    commands.upload(&inputs, operands)?;
+    commands.dispatch(CheckMath { operands: &inputs, results: &results }, &(), Extent::Items(operands.len() as u64))?;
+    commands.read(&results, operands.len())
+}
+
+/// Fails unless sums, products, and the quotients and roots made from them are rounded to nearest, each by itself:
+/// on that rests all of `--math strict`.
+pub fn strict_math(gpu: &Gpu) -> Result<()> {
+    let operands: Vec<Vec2> = (0..STRICT_SAMPLES).map(sample).collect();
+    let results = math(gpu, &operands, Math::Strict)?;
+    let wrong = operands.iter().zip(&results).find_map(|(operand, result)| {
+        let Vec2 { x: a, y: b } = *operand;
+        let found = [result.sum_of_product, result.quotient, result.root];
+        let expected = [a * b + a, a / b, a.sqrt()];
+        (found.map(f32::to_bits) != expected.map(f32::to_bits))
+            .then(|| format!("of {a:e} and {b:e} made {found:?} instead of {expected:?}"))
+    });
+    wrong.map_or(Ok(()), |what| Err(Error::DeviceWrong { device: gpu.facts.name.clone(), what: format!("{what}; use --math fast") }))
+}
+
+const STRICT_SAMPLES: u32 = 4096;
+
+/// Positive numbers over 32 binary orders of magnitude, far from where results are no normal numbers.
+fn sample(k: u32) -> Vec2 {
+    let number = |word: u32| f32::from_bits((word & 0x007f_ffff) | ((111 + (word >> 27)) << 23));
+    Vec2::new(number(k.wrapping_mul(0x9e37_79b1) ^ k), number(k.wrapping_mul(0x85eb_ca77) ^ (k << 7)))
 }
 
 /// Invocations of the check's one work group: every device allows 128.

@@ -7,18 +7,22 @@ use super::{Control, Outcome};
 use crate::constants::NO_WALL;
 use crate::error::Result;
 use crate::film::Film;
+use crate::gpu::check::strict_math;
 use crate::gpu::{Commands, Constants, DeviceFacts, Gpu};
 use crate::plan::{Limits, Plan, photons_of};
 use crate::records::{Photon, Tally};
 use crate::resources::Resources;
 use crate::scene::room::RoomScene;
-use crate::settings::Settings;
+use crate::settings::{Math, Settings};
 use crate::{estimate, index, trace};
 
 /// Runs on the GPU.
 pub fn on_gpu(gpu: &Gpu, scene: &RoomScene, settings: &Settings, control: &mut Control) -> Result<Outcome> {
     let started = Instant::now();
     let plan = Plan::new(scene, settings, &limits(gpu.facts()))?;
+    if settings.math == Math::Strict {
+        strict_math(gpu)?;
+    }
     let mut commands = Commands::new(gpu, constants(&plan), started)?;
     commands.timings().count("run");
     let resources = commands.scope("set-up", |commands| Resources::new(gpu, commands, scene, &plan))?;
@@ -76,6 +80,7 @@ pub fn constants(plan: &Plan) -> Constants {
     let settings = &plan.settings;
     Constants::new(settings.group_size)
         .set("RNG", settings.rng.code())
+        .set("STRICT_MATH", settings.math.code())
         .set("EMISSION_LAW", settings.emission.code())
         .set("HAS_PHONG", u32::from(settings.has_phong()))
         .set("PHONG_DIRECTION", settings.phong_direction.code())

@@ -2,7 +2,7 @@
 
 use serde::Serialize;
 
-use super::within;
+use super::{Math, within};
 use crate::constants;
 use crate::error::{Error, Result};
 
@@ -188,6 +188,7 @@ pub struct TransportSettings {
     pub part: Part,
     pub filter: Filter,
     pub append: Append,
+    pub math: Math,
     pub group_size: u32,
     /// Most photons traced at once; `None`: as many as the device's buffers hold.
     pub chunk: Option<u32>,
@@ -215,6 +216,7 @@ impl Default for TransportSettings {
             part: Part::All,
             filter: Filter::Box,
             append: Append::Ballot,
+            math: Math::Fast,
             group_size: 128,
             chunk: None,
             with: Vec::new(),

@@ -24,6 +24,7 @@ use resources::{PhotonBuffers, TransportResources};
 
 use crate::constants::PART_COUNT;
 use crate::error::{Error, Result};
+use crate::gpu::check::strict_math;
 use crate::gpu::kernels::*;
 use crate::gpu::{Commands, Constants, DeviceFacts, Gpu, Kernel, Module};
 use crate::ledger::Fates;
@@ -32,6 +33,7 @@ use crate::records::{Receiver, Tally};
 use crate::render::Control;
 use crate::scene::Camera;
 use crate::scene::geometry::Geometry;
+use crate::settings::Math;
 use crate::settings::transport::Append;
 use crate::timings::{Clock, Span, Timings};
 
@@ -102,6 +104,9 @@ const TIMESTAMPS_PER_ROUND: u32 = 64;
 /// Runs all rounds of a plan; progress is told in rounds.
 pub fn light(gpu: &Gpu, view: &View, plan: TransportPlan, control: &mut Control) -> Result<Lit> {
     let started = Instant::now();
+    if plan.settings.math == Math::Strict {
+        strict_math(gpu)?;
+    }
     let pipelines_before = gpu.pipeline_count();
     gpu.prepare(&modules(&plan, gpu.facts()), &constants(&plan))?;
     let mut commands = Commands::new(gpu, constants(&plan), started)?;

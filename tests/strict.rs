@@ -1,0 +1,256 @@
+//! `--math strict`: functions that are right and the same on every device, photons that the CPU builder traces to
+//! the bit, and films whose bits are written down here.
+
+mod common;
+
+use std::sync::atomic::AtomicBool;
+
+use common::{Check, assert_complains, assert_holds, device, equal_sums, in_order, photons, photons_on_cpu, run, run_on_cpu};
+use glam::Vec2;
+use photonmill::cpu;
+use photonmill::gpu::{Gpu, check};
+use photonmill::plan::transport::{Sensor, TransportPlan};
+use photonmill::records::{MathResults, Photon};
+use photonmill::render::{self, Control};
+use photonmill::rng::philox;
+use photonmill::scene::geometry::Geometry;
+use photonmill::scene::{Camera, Scene, built_in};
+use photonmill::settings::transport::{Append, Illumination, Kernel, TransportSettings};
+use photonmill::settings::{EmissionLaw, Math, Settings, Variant};
+use photonmill::transport::{self, Lit, View};
+
+/// Numbers of every size, evenly over exponents and mantissas, and those at which functions change their ways.
+fn operands() -> Vec<Vec2> {
+    let odd = [
+        0.0,
+        1.0,
+        2.0,
+        3.0,
+        0.5,
+        1.0 - f32::EPSILON / 2.0,
+        1.0 + f32::EPSILON,
+        2.0 - f32::EPSILON,
+        16_777_215.0,
+        16_777_217.0,
+        f32::MIN_POSITIVE,
+        f32::MAX,
+        f32::INFINITY,
+        std::f32::consts::SQRT_2,
+        0.414_213_57,
+        1e-30,
+        1e30,
+        125.5,
+        127.5,
+        128.0,
+    ];
+    let signed: Vec<f32> = odd.iter().flat_map(|number| [*number, -number]).collect();
+    let pairs = signed.iter().flat_map(|a| signed.iter().map(|b| Vec2::new(*a, *b)));
+    let random = (0..1 << 17).map(|k| {
+        let words = philox([k, 0, 0, 0], [7, 7]);
+        // Half of them near 1, where angles and exponentials are used.
+        let number = |word: u32| {
+            let exponent = if k % 2 == 0 { 1 + (word >> 8) % 254 } else { 117 + (word >> 8) % 17 };
+            f32::from_bits((word << 31) | (exponent << 23) | (word >> 9))
+        };
+        Vec2::new(number(words[0]), number(words[1]))
+    });
+    pairs.chain(random).collect()
+}
+
+/// What IEEE 754 rounds to nearest, with results too small for a normal number taken for 0.
+fn flushed(x: f32) -> f32 {
+    if x.is_subnormal() { 0.0f32.copysign(x) } else { x }
+}
+
+fn same_number(what: &str, operand: Vec2, found: f32, expected: f32) -> Check {
+    // The smallest normal number may be what a still smaller one was rounded up to.
+    let same = found.to_bits() == expected.to_bits()
+        || (found.is_nan() && expected.is_nan())
+        || (found == 0.0 && expected.abs() == f32::MIN_POSITIVE && found.is_sign_negative() == expected.is_sign_negative());
+    if same { Ok(()) } else { Err(format!("{what} of {operand:?}: {found:e} instead of {expected:e}")) }
+}
+
+/// Off the f64 value by at most `ulps` units in the last place.
+fn near(what: &str, operand: Vec2, found: f32, expected: f64, ulps: f64) -> Check {
+    let unit = f64::from(f32::from_bits((expected as f32).abs().to_bits() + 1)) - f64::from((expected as f32).abs());
+    let off = (f64::from(found) - expected).abs() / unit;
+    if off <= ulps { Ok(()) } else { Err(format!("{what} of {operand:?}: {found:e} instead of {expected:e}, {off:.1} units off")) }
+}
+
+fn check_functions(operand: Vec2, found: &MathResults) -> Check {
+    let Vec2 { x: a, y: b } = operand;
+    same_number("a / b", operand, found.quotient, flushed(a / b))?;
+    same_number("root", operand, found.root, flushed(a.sqrt()))?;
+    if a > 0.0 && a.is_finite() {
+        same_number("inverse root", operand, found.inverse_root, flushed(1.0 / a.sqrt()))?;
+        same_number("logarithm, against its twin", operand, found.log2, cpu::math::log2(a))?;
+        // Near 1 the logarithm's own size is the measure.
+        near("logarithm", operand, found.log2, f64::from(a).log2(), 3.0)?;
+    }
+    if a.is_finite() {
+        same_number("power", operand, found.exp2, cpu::math::exp2(a))?;
+        if (-125.0..128.0).contains(&a) {
+            near("power", operand, found.exp2, f64::from(a).exp2(), 2.0)?;
+        }
+        if a.abs() > 1e-18 && a.abs() < 1e18 {
+            near("asinh", operand, found.asinh, f64::from(a).asinh(), 6.0)?;
+        }
+    }
+    let ratio = f64::from(a.abs()) / f64::from(b.abs());
+    if a.is_finite() && b.is_finite() && (1e-30..1e30).contains(&ratio) {
+        near("angle", operand, found.angle, f64::from(a).atan2(f64::from(b)), 3.0)?;
+    }
+    Ok(())
+}
+
+/// Quotients and roots as IEEE 754 rounds them; the other functions within their bounds, and as their twins have them.
+#[test]
+fn functions_are_right_to_the_bit() {
+    let Some(gpu) = device() else { return };
+    let operands = operands();
+    let results = check::math(&gpu, &operands, Math::Strict).unwrap();
+    for (operand, found) in operands.iter().zip(&results) {
+        assert_holds("strict", check_functions(*operand, found));
+    }
+    let (operand, found) = (Vec2::new(3.0, 7.0), check::math(&gpu, &[Vec2::new(3.0, 7.0)], Math::Strict).unwrap()[0]);
+    assert_holds("three sevenths", check_functions(operand, &found));
+    let next = |x: f32| f32::from_bits(x.to_bits() + 1);
+    assert_complains("a quotient one unit off", check_functions(operand, &MathResults { quotient: next(found.quotient), ..found }));
+    assert_complains("a root one unit off", check_functions(operand, &MathResults { root: next(found.root), ..found }));
+    assert_complains("a power off its twin", check_functions(operand, &MathResults { exp2: next(found.exp2), ..found }));
+    assert_complains("an angle 0.001 % off", check_functions(operand, &MathResults { angle: 1.00001 * found.angle, ..found }));
+}
+
+#[test]
+fn a_device_that_rounds_to_nearest_is_let_in() {
+    let Some(gpu) = device() else { return };
+    check::strict_math(&gpu).unwrap();
+}
+
+fn strict(settings: &Settings) -> Settings {
+    Settings { math: Math::Strict, ..settings.clone() }
+}
+
+fn same_photons(found: Vec<Photon>, expected: Vec<Photon>) -> Check {
+    let (found, expected) = (in_order(found), in_order(expected));
+    if found.len() != expected.len() {
+        return Err(format!("{} photons instead of {}", found.len(), expected.len()));
+    }
+    let differing: Vec<_> = found.iter().zip(&expected).filter(|(a, b)| bytemuck::bytes_of(*a) != bytemuck::bytes_of(*b)).collect();
+    differing.first().map_or(Ok(()), |(a, b)| Err(format!("{} photons differ, the first {a:?} instead of {b:?}", differing.len())))
+}
+
+/// The paper's box: the device's photons and films are the CPU builder's, bit for bit.
+#[test]
+fn the_cpu_builder_agrees_to_the_bit() {
+    let Some(gpu) = device() else { return };
+    for (emission, shininess) in
+        [(EmissionLaw::Uniform, [None; 5]), (EmissionLaw::Cosine, [Some(0.01), Some(0.5), Some(2.0), Some(5.0), Some(1e4)])]
+    {
+        let settings = strict(&Settings { photons: 50_001, emission, shininess, threads: 2, mesh: 32, ..Settings::default() });
+        let (found, expected) = (photons(&gpu, &settings), photons_on_cpu(&settings));
+        assert_holds(format!("{emission:?}"), same_photons(found.clone(), expected.clone()));
+        let mut spoiled = found;
+        spoiled[100].position.x = f32::from_bits(spoiled[100].position.x.to_bits() + 1);
+        assert_complains("one bit of one photon", same_photons(spoiled, expected));
+
+        let on_cpu = run_on_cpu(&settings).film;
+        for variant in Variant::ON_GPU {
+            let on_gpu = run(&gpu, &Settings { variant, ..settings.clone() }).film;
+            assert_holds(format!("{emission:?}, {variant:?}"), equal_sums("the film", &on_gpu.sums, &on_cpu.sums));
+        }
+    }
+}
+
+fn small() -> TransportSettings {
+    TransportSettings {
+        photons: 2000,
+        caustic_photons: 2000,
+        rounds: 2,
+        shadow_rays: 2,
+        math: Math::Strict,
+        ..TransportSettings::default()
+    }
+}
+
+fn picture(gpu: &Gpu, scene: &Scene, settings: &TransportSettings) -> Lit {
+    let geometry = Geometry::new(scene).unwrap();
+    let plan =
+        TransportPlan::new(scene, &geometry, settings, Sensor::Picture { width: 24, height: 24 }, &render::limits(gpu.facts())).unwrap();
+    let camera = scene.cameras.first().cloned().unwrap_or_else(|| Camera::around(scene.bounds().0, scene.bounds().1));
+    let view = View { geometry: &geometry, camera: Some(&camera), phases: &[] };
+    let never = AtomicBool::new(false);
+    transport::light(gpu, &view, plan, &mut Control { cancelled: &never, progress: &mut |_, _| {} }).unwrap()
+}
+
+/// 64 bits of all sums and squares (FNV-1a).
+fn fingerprint(sums: &[u64]) -> u64 {
+    sums.iter()
+        .flat_map(|sum| sum.to_le_bytes())
+        .fold(0xcbf2_9ce4_8422_2325, |hash, byte| (hash ^ u64::from(byte)).wrapping_mul(0x0100_0000_01b3))
+}
+
+/// A picture's film and the paper's films, whose bits every device must find. A change of any random number,
+/// rounding or formula shows here; the bits are to be written anew only with a reason.
+const BITS: [(&str, u64); 17] = [
+    ("open-box", 0x8217_c645_0557_2b79),
+    ("open-box-phong", 0x3e4f_b575_129b_7f3e),
+    ("cornell", 0x958d_26e5_f652_2423),
+    ("cornell-spheres", 0xf42f_618e_cd54_ac41),
+    ("caustic-sphere", 0x6714_5444_9c7f_aff0),
+    ("furnace", 0xc565_c470_c750_0f24),
+    ("integrating-sphere", 0xcb55_a6cb_baae_1e26),
+    ("point-over-plane", 0x029c_f75a_d93a_c586),
+    ("disc-over-plane", 0x5e4f_01bf_127c_6429),
+    ("sun-over-plane", 0x3d22_25fb_f4e7_0615),
+    ("sky-over-plane", 0xdaea_fad9_294c_53ce),
+    ("mirror-corridor", 0x202e_76cf_9105_c625),
+    ("glass-slab", 0xe872_3630_204a_df1d),
+    ("cornell-spheres from photons", 0x2686_3b73_d200_0341),
+    ("cornell-spheres gathered", 0x5d3c_ea89_6a59_ea1b),
+    ("blender.glb", 0xaa6b_c212_a4ef_f733),
+    ("the paper's box", 0x52ea_c413_af81_4929),
+];
+
+fn bits_of(gpu: &Gpu, name: &str) -> u64 {
+    if name == "the paper's box" {
+        return fingerprint(&run(gpu, &strict(&Settings { shininess: [Some(2.0); 5], ..Settings::default() })).film.sums);
+    }
+    let settings = match name {
+        "cornell-spheres from photons" => {
+            TransportSettings { illumination: Illumination::Photons, kernel: Kernel::Epanechnikov, ..small() }
+        }
+        "cornell-spheres gathered" => TransportSettings { final_gather: true, kernel: Kernel::Cone, append: Append::Atomic, ..small() },
+        _ => small(),
+    };
+    let scene = match name {
+        "blender.glb" => Scene::open(&format!("{}/tests/scenes/blender.glb", env!("CARGO_MANIFEST_DIR")), false).unwrap(),
+        _ => built_in::by_name(name.split(' ').next().unwrap()).unwrap(),
+    };
+    let film = picture(gpu, &scene, &settings).film;
+    let squares = film.squares.iter().flat_map(|square| [*square as u64, (*square >> 64) as u64]);
+    fingerprint(&film.sums.iter().copied().chain(squares).collect::<Vec<_>>())
+}
+
+#[test]
+fn every_device_finds_these_bits() {
+    let Some(gpu) = device() else { return };
+    let found: Vec<(&str, u64)> = BITS.iter().map(|(name, _)| (*name, bits_of(&gpu, name))).collect();
+    let differing: Vec<String> =
+        found.iter().zip(&BITS).filter(|(a, b)| a != b).map(|((name, bits), _)| format!("(\"{name}\", {bits:#018x}),")).collect();
+    assert!(differing.is_empty(), "{} of {} differ:\n{}", differing.len(), BITS.len(), differing.join("\n"));
+}
+
+/// Rounding changes which way single paths go, and nothing on the whole.
+#[test]
+fn fast_and_strict_differ_by_far_less_than_the_noise() {
+    let Some(gpu) = device() else { return };
+    let scene = built_in::by_name("cornell-spheres").unwrap();
+    let settings = TransportSettings { rounds: 4, ..small() };
+    let lit = [Math::Fast, Math::Strict].map(|math| picture(&gpu, &scene, &TransportSettings { math, ..settings.clone() }));
+    let rms = |f: &dyn Fn(usize) -> f64| (0..lit[0].film.pixels()).map(|pixel| f(pixel).powi(2)).sum::<f64>().sqrt();
+    let difference = rms(&|pixel| (lit[0].film.mean(pixel, &lit[0].plan) - lit[1].film.mean(pixel, &lit[1].plan)).length());
+    let noise = rms(&|pixel| lit[1].film.standard_error(pixel, &lit[1].plan).length());
+    println!("difference over noise: {:.2e}", difference / noise);
+    assert!(difference < 0.1 * noise, "{difference} against {noise}");
+}
