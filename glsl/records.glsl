@@ -291,6 +291,7 @@ struct ResolvePush {
     uint points_per_pixel;
     uint point_count;
     uint arrivals;
+    uint round;
     float film_scale;
     float film_limit;
     float global_radius;

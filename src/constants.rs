@@ -102,6 +102,13 @@ constants! {
     FILTER_TENT = 1;
     FILTER_GAUSSIAN = 2;
 
+    /// What `--paranoid` found odd: a photon, light at a point, a density estimate there.
+    ODD_PHOTON = 0;
+    ODD_LIGHT = 1;
+    ODD_ESTIMATE = 2;
+    /// Odd values of which the owner is written down.
+    MAX_ODDITIES = 64;
+
     /// Bits after the binary point of the flux that a point gathers.
     FLUX_BITS = 24;
     /// Most that a shading normal may change a photon's flux by, all bounces together.

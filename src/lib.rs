@@ -74,6 +74,7 @@ pub mod gpu;
 pub mod index;
 pub mod judge;
 pub mod ledger;
+pub mod oddities;
 pub mod output;
 pub mod paper;
 pub mod plan;

@@ -423,6 +423,7 @@ records! {
         point_count: u32,
         /// Mask of the arrivals that some map holds.
         arrivals: u32,
+        round: u32,
         film_scale: f32,
         film_limit: f32,
         global_radius: f32,

@@ -3,6 +3,7 @@
 use crate::constants::SCAN_ITEMS;
 use crate::error::Result;
 use crate::gpu::{Buffer, Commands, Gpu, Memory};
+use crate::oddities;
 use crate::plan::Plan;
 use crate::records::{self, DispatchArgs, Path, Photon, Point, SortedPhoton, Tally};
 use crate::scene::room::RoomScene;
@@ -27,6 +28,7 @@ pub struct Resources {
     /// The index; `None` where the gather is brute.
     pub index: Option<IndexBuffers>,
     pub film: Buffer,
+    pub oddities: Buffer,
 }
 
 pub struct IndexBuffers {
@@ -61,6 +63,7 @@ impl Resources {
             tallies: gpu.buffer::<Tally>("tallies", bounces, device)?,
             index: if plan.gathers_by_grid() { Some(IndexBuffers::new(gpu, plan)?) } else { None },
             film: gpu.buffer::<u64>("film", sums, device)?,
+            oddities: oddities::buffer(gpu, commands)?,
         };
         commands.upload(&resources.rooms, &[scene.room_record()])?;
         commands.upload(&resources.walls, &scene.wall_records())?;

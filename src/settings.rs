@@ -153,6 +153,8 @@ pub struct Settings {
     pub edge_correction: bool,
     /// Threads of the CPU builder.
     pub threads: usize,
+    /// Look for values that are infinite or no number.
+    pub paranoid: bool,
     /// Invocations of a work group.
     pub group_size: u32,
     /// Most photons traced at once; `None`: as many as the device's buffers hold.
@@ -194,6 +196,7 @@ impl Settings {
             mesh: 64,
             edge_correction: true,
             threads: 1,
+            paranoid: false,
             group_size: 128,
             chunk: None,
         };

@@ -74,7 +74,7 @@ pub fn chunk(commands: &mut Commands, resources: &Resources, plan: &Plan, round:
 
 /// Writes the paths of a chunk as they leave their lights, light after light.
 pub fn emit(commands: &mut Commands, resources: &Resources, plan: &Plan, round: u32, ranges: &[EmissionRange]) -> Result<()> {
-    let Resources { lights, walls, stream_seeds, paths: [paths, _], .. } = resources;
+    let Resources { lights, walls, stream_seeds, paths: [paths, _], oddities, .. } = resources;
     let streams = plan.streams();
     let mut path_offset = 0;
     for range in ranges {
@@ -88,7 +88,7 @@ pub fn emit(commands: &mut Commands, resources: &Resources, plan: &Plan, round: 
             jump_multiplier: words(jump.multiplier),
             jump_increment: words(jump.increment),
         };
-        commands.dispatch(Emit { lights, walls, stream_seeds, paths }, &push, Extent::Items(u64::from(range.count)))?;
+        commands.dispatch(Emit { lights, walls, stream_seeds, paths, oddities }, &push, Extent::Items(u64::from(range.count)))?;
         path_offset += range.count;
     }
     Ok(())
@@ -133,10 +133,16 @@ fn one_bounce(commands: &mut Commands, resources: &Resources, plan: &Plan, round
     };
     let [even, odd] = &resources.paths;
     let (paths, next_paths) = if bounce.is_multiple_of(2) { (even, odd) } else { (odd, even) };
-    let Resources { rooms, walls, photons, counters, tallies, .. } = resources;
+    let Resources { rooms, walls, photons, counters, tallies, oddities, .. } = resources;
     match compaction {
-        Compaction::Slots => commands.dispatch(TraceSlots { rooms, walls, paths, next_paths, photons, counters, tallies }, &push, extent),
-        Compaction::Atomic => commands.dispatch(TraceAtomic { rooms, walls, paths, next_paths, photons, counters, tallies }, &push, extent),
-        Compaction::Ballot => commands.dispatch(TraceBallot { rooms, walls, paths, next_paths, photons, counters, tallies }, &push, extent),
+        Compaction::Slots => {
+            commands.dispatch(TraceSlots { rooms, walls, paths, next_paths, photons, counters, tallies, oddities }, &push, extent)
+        }
+        Compaction::Atomic => {
+            commands.dispatch(TraceAtomic { rooms, walls, paths, next_paths, photons, counters, tallies, oddities }, &push, extent)
+        }
+        Compaction::Ballot => {
+            commands.dispatch(TraceBallot { rooms, walls, paths, next_paths, photons, counters, tallies, oddities }, &push, extent)
+        }
     }
 }

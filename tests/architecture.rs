@@ -8,11 +8,12 @@ use std::path::{Path, PathBuf};
 /// What everyone may use, and what among itself has no order.
 const GROUND: [&str; 7] = ["error", "constants", "records", "ledger", "rng", "settings", "timings"];
 /// From left to right.
-const LINE: [&str; 17] = [
+const LINE: [&str; 18] = [
     "scene",
     "judge",
     "plan",
     "gpu",
+    "oddities",
     "resources",
     "trace",
     "index",

@@ -13,6 +13,7 @@ layout(set = 1, binding = 0, scalar) readonly buffer StreamSeeds { uvec2 stream_
 layout(set = 1, binding = 1, scalar) writeonly buffer Paths { Path paths[]; };
 
 #include "math.glsl"
+#include "oddities.glsl"
 #include "dispatch.glsl"
 #include "rng.glsl"
 #include "sampling.glsl"
@@ -35,5 +36,6 @@ void main()
     vec3 position;
     vec3 direction;
     emit_from_disc(light, walls[light.wall], u, position, direction);
+    note_unless(is_finite(position) && is_finite(direction) && is_finite(light.flux), ODD_PHOTON, DOMAIN_PHOTONS, push.key.round, photon);
     paths[push.path_offset + index] = Path(position, light.wall, direction, photon, stream, light.flux);
 }

@@ -14,6 +14,7 @@ layout(set = 1, binding = 3, scalar) buffer Counters { uint counters[]; };
 layout(set = 1, binding = 4, scalar) buffer Tallies { Tally tallies[]; };
 
 #include "math.glsl"
+#include "oddities.glsl"
 #include "dispatch.glsl"
 #include "philox.glsl"
 #include "sampling.glsl"

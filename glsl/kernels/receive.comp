@@ -14,6 +14,7 @@ layout(push_constant, scalar) uniform Push { ReceivePush push; };
 layout(set = 0, binding = 8, scalar) readonly buffer Receivers { Receiver receivers[]; };
 
 #include "math.glsl"
+#include "oddities.glsl"
 #include "dispatch.glsl"
 #include "philox.glsl"
 #include "sampling.glsl"
@@ -73,6 +74,8 @@ void main()
         }
         follow(chain, index, push.draws, push.emitter_count);
     }
+    note_unless(is_finite(chain.light[0]) && is_finite(chain.light[1]) && is_finite(chain.light[2]), ODD_LIGHT, push.draws.domain,
+                push.draws.round, index);
     write_pass_sum(index, chain.light, push.film_scale, push.film_limit);
     write_points(chain, index);
 }

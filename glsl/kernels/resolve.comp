@@ -18,6 +18,7 @@ layout(set = 1, binding = 4, scalar) buffer FilmSums { uvec2 film_sums[]; };
 layout(set = 1, binding = 5, scalar) buffer FilmSquares { uvec4 film_squares[]; };
 
 #include "math.glsl"
+#include "oddities.glsl"
 #include "dispatch.glsl"
 #include "scene/effects.glsl"
 #include "scene/directions.glsl"
@@ -97,6 +98,7 @@ void main()
             }
             global_area = is_caustic ? global_area : area;
             vec3 radiance = point.weight * (flux * divide(is_caustic ? push.caustic_flux : push.global_flux, area));
+            note_unless(is_finite(radiance), ODD_ESTIMATE, 0, push.round, pixel);
             uint part = part_number(point.arrivals, arrival);
             for (uint channel = 0; channel < 3; channel++) {
                 uvec2 units = to_film_units(radiance[channel], push.film_scale, push.film_limit);

@@ -11,6 +11,7 @@ layout(push_constant, scalar) uniform Push { EmissionPush push; };
 layout(set = 1, binding = 0, scalar) writeonly buffer LightPaths { LightPath light_paths[]; };
 
 #include "math.glsl"
+#include "oddities.glsl"
 #include "dispatch.glsl"
 #include "philox.glsl"
 #include "sampling.glsl"
@@ -30,5 +31,7 @@ void main()
     vec4 u = philox_floats(uvec4(photon, push.draws.round, 0, push.draws.domain), push.draws.seed);
     vec4 w = philox_floats(uvec4(photon, push.draws.round, 1, push.draws.domain), push.draws.seed);
     Emission emission = sample_emission(push.emitter_count, push.scene_radius, u, w);
+    note_unless(is_finite(emission.position) && is_finite(emission.direction) && is_finite(emission.flux), ODD_PHOTON,
+                push.draws.domain, push.draws.round, photon);
     light_paths[index] = LightPath(emission.position, photon, emission.direction, ARRIVED_DIRECT, emission.flux);
 }

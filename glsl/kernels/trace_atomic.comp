@@ -12,6 +12,7 @@ layout(push_constant, scalar) uniform Push { TracePush push; };
 layout(set = 1, binding = 4, scalar) buffer Tallies { Tally tallies[]; };
 
 #include "math.glsl"
+#include "oddities.glsl"
 #include "dispatch.glsl"
 #include "rng.glsl"
 #include "sampling.glsl"

@@ -13,6 +13,7 @@ layout(local_size_x_id = 0) in;
 layout(push_constant, scalar) uniform Push { ViewPush push; };
 
 #include "math.glsl"
+#include "oddities.glsl"
 #include "dispatch.glsl"
 #include "philox.glsl"
 #include "sampling.glsl"
@@ -60,6 +61,8 @@ void main()
 
     Chain chain = new_chain(push.eye, direction, vec3(1.0));
     follow(chain, pixel, push.draws, push.emitter_count);
+    note_unless(is_finite(chain.light[0]) && is_finite(chain.light[1]) && is_finite(chain.light[2]), ODD_LIGHT, push.draws.domain,
+                push.draws.round, pixel);
     write_pass_sum(pixel, chain.light, push.film_scale, push.film_limit);
     write_points(chain, pixel);
 }

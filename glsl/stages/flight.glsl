@@ -36,6 +36,9 @@ void fly()
                     flux *= min(gain * back_gain, float(MAX_SHADING_GAIN));
                 }
             }
+            // Before the cuts below, which would hide what is no number.
+            note_unless(is_finite(surface.position) && is_finite(scatter.direction) && is_finite(flux), ODD_PHOTON, push.draws.domain,
+                        push.draws.round, path.photon);
             float before = max(path.flux.x, max(path.flux.y, path.flux.z));
             float after = max(flux.x, max(flux.y, flux.z));
             // Survival in proportion to the flux that is left, so that survivors carry about what they did.

@@ -34,6 +34,8 @@ void trace_bounce()
         photon = Photon(hit.position, hit.wall, path.flux, weight, path.photon, push.bounce);
     }
 
+    note_unless(!alive || (is_finite(photon.position) && is_finite(path.direction) && is_finite(photon.weight)), ODD_PHOTON,
+                DOMAIN_PHOTONS, push.key.round, path.photon);
     bool stored = append_survivor(index, photon, path, alive);
     tally(push.bounce, stored, absorbed, escaped, alive && !stored);
 }

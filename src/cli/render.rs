@@ -6,7 +6,7 @@ use std::sync::atomic::AtomicBool;
 use clap::Args;
 
 use super::run::{number, whole};
-use super::transport::{FilterArg, Job, PartArg, ReportArgs, SceneArgs, TransportArgs, camera, geometry, light, plan, size};
+use super::transport::{FilterArg, Job, PartArg, ReportArgs, SceneArgs, TransportArgs, camera, geometry, light, photon_name, plan, size};
 use super::{DeviceArgs, End, say};
 use crate::error::{Error, Result};
 use crate::judge::{self, Judge, Verdict};
@@ -18,14 +18,15 @@ use crate::plan::transport::Sensor;
 use crate::scene::{Camera, Scene};
 use crate::settings::transport::{Filter, Part, TransportSettings};
 use crate::transport::Lit;
+use crate::transport::replay::{self, PhotonName};
 
 #[derive(Args)]
 pub(super) struct RenderArgs {
     #[command(flatten)]
     scene: SceneArgs,
     /// Picture: an .exr of linear radiance, W/m2/sr, or a .png for the eye
-    #[arg(short, long, value_name = "FILE", help_heading = "Output")]
-    output: PathBuf,
+    #[arg(short, long, value_name = "FILE", required_unless_present = "replay", help_heading = "Output")]
+    output: Option<PathBuf>,
     /// Standard error of each pixel, an .exr in the same unit
     #[arg(long, value_name = "FILE", help_heading = "Output")]
     error_image: Option<PathBuf>,
@@ -40,6 +41,10 @@ pub(super) struct RenderArgs {
     /// agree within their errors
     #[arg(long, value_name = "SAMPLES", value_parser = whole::<u32>, allow_negative_numbers = true, num_args = 0..=1, default_missing_value = "64", help_heading = "Output")]
     judge: Option<u32>,
+    /// Trace one photon of the run by itself, print its path and end: round and number from 0, `:caustic` for one of
+    /// the caustic map
+    #[arg(long, value_name = "ROUND:PHOTON", value_parser = photon_name, help_heading = "Output")]
+    replay: Option<PhotonName>,
     /// Camera by name [default: the first; one that sees everything if there is none]
     #[arg(long, value_name = "NAME", help_heading = "Scene")]
     camera: Option<String>,
@@ -65,7 +70,11 @@ pub(super) fn run(args: &RenderArgs, cancelled: &AtomicBool) -> Result<End> {
         ..usual
     };
     settings.validate()?;
-    let format = Format::of("-o", &args.output)?;
+    if let Some(name) = args.replay {
+        return show_photon(args, &settings, name);
+    }
+    let output = args.output.as_ref().expect("clap asks for it");
+    let format = Format::of("-o", output)?;
     if let Some(samples) = args.judge {
         if !(2..=MAX_JUDGE_SAMPLES).contains(&samples) {
             return Err(Error::setting("--judge", samples, format!("must be from 2 to {MAX_JUDGE_SAMPLES} samples a pixel")));
@@ -80,7 +89,7 @@ pub(super) fn run(args: &RenderArgs, cancelled: &AtomicBool) -> Result<End> {
     if let Some(exposure) = args.exposure.filter(|stops| stops.is_nan() || stops.abs() > 64.0) {
         return Err(Error::setting("--exposure", exposure, "must be from -64 to 64 stops"));
     }
-    let picture = Destination::open("-o", &args.output)?;
+    let picture = Destination::open("-o", output)?;
     let errors = args.error_image.as_ref().map(|path| Destination::open("--error-image", path)).transpose()?;
     if let Some(path) = &args.error_image
         && Format::of("--error-image", path)? != Format::Exr
@@ -113,12 +122,25 @@ pub(super) fn run(args: &RenderArgs, cancelled: &AtomicBool) -> Result<End> {
         Format::Png => format!(" at {stops:+.2} stops"),
         Format::Exr => String::new(),
     };
-    say(&format!("{text}\nwrote {}{shown}", args.output.display()))?;
+    say(&format!("{text}\nwrote {}{shown}", output.display()))?;
     if let Some(samples) = args.judge {
         // The picture is there; who has seen enough may end the program.
         say(&format!("judge: {}", verdict(&lit, &scene, &camera, (width, height), samples)))?;
     }
     Ok(if lit.cancelled { End::Cancelled } else { End::Finished })
+}
+
+/// The path of one photon of the run that these options ask for.
+fn show_photon(args: &RenderArgs, settings: &TransportSettings, name: PhotonName) -> Result<End> {
+    let scene = args.scene.open()?;
+    let (width, height) = args.size;
+    let job = Job { scene: &scene, settings, sensor: Sensor::Picture { width, height }, camera: None, phases: &[] };
+    let geometry = geometry(&scene, settings)?;
+    let gpu = args.report.device(&args.device)?;
+    let plan = plan(&gpu, &job, &geometry)?;
+    let path = replay::replay(&gpu, &geometry, &plan, name)?;
+    say(&path.table(&geometry, &plan))?;
+    Ok(End::Finished)
 }
 
 const MAX_JUDGE_SAMPLES: u32 = 1 << 24;

@@ -7,6 +7,7 @@ use std::time::Instant;
 use clap::{Args, ValueEnum};
 use indicatif::{ProgressBar, ProgressStyle};
 
+use super::transport::photon_name;
 use super::{DeviceArgs, End, complain, say};
 use crate::error::{Error, Result};
 use crate::film::estimate_walls;
@@ -20,6 +21,7 @@ use crate::scene::open_box::open_box;
 use crate::scene::room::RoomScene;
 use crate::settings::{EmissionLaw, Gather, Math, PhongDirection, Preset, Settings, Variant, WALL_NAMES};
 use crate::timings::{Clock, Span};
+use crate::transport::replay::PhotonName;
 
 #[derive(Args)]
 pub(super) struct RunArgs {
@@ -94,6 +96,12 @@ pub(super) struct RunArgs {
 
     #[command(flatten)]
     device: DeviceArgs,
+    /// Look for values that are infinite or no number, and say whose they are
+    #[arg(long, help_heading = "Output")]
+    paranoid: bool,
+    /// Trace one photon of the run by itself, print where it is stored and end: round and number from 0
+    #[arg(long, value_name = "ROUND:PHOTON", value_parser = photon_name, help_heading = "Output")]
+    replay: Option<PhotonName>,
     /// Time every dispatch on the device, not only every pass
     #[arg(long, help_heading = "Device")]
     time_dispatches: bool,
@@ -212,6 +220,7 @@ impl RunArgs {
             mesh: self.mesh.unwrap_or(preset.mesh),
             edge_correction: self.edge_correction.map_or(preset.edge_correction, |switch| switch == SwitchArg::On),
             threads: self.threads.unwrap_or(preset.threads),
+            paranoid: self.paranoid,
             group_size: self.group_size.unwrap_or(preset.group_size),
             chunk: self.chunk.or(preset.chunk),
         }
@@ -235,6 +244,9 @@ pub(super) fn run(args: &RunArgs, cancelled: &AtomicBool) -> Result<End> {
         return Err(Error::setting("--validate", "on", "has no use with --variant cpu; leave one of the two out"));
     }
     let scene = open_box(&settings);
+    if let Some(name) = args.replay {
+        return show_photon(args, &settings, &scene, name);
+    }
     let outputs = Outputs::open(args, &scene)?;
     if let Some(warning) = settings.warning() {
         complain(&format!("warning: {warning}"));
@@ -257,6 +269,27 @@ pub(super) fn run(args: &RunArgs, cancelled: &AtomicBool) -> Result<End> {
     }
     outputs.write(outcome, &scene)?;
     Ok(end)
+}
+
+/// Where one photon of the run is stored.
+fn show_photon(args: &RunArgs, settings: &Settings, scene: &RoomScene, name: PhotonName) -> Result<End> {
+    let PhotonName { round, photon, caustic } = name;
+    if caustic {
+        return Err(Error::setting("--replay", format!("{round}:{photon}:caustic"), "the paper's box has one map; leave :caustic out"));
+    }
+    let gpu = if settings.variant == Variant::Cpu { None } else { args.device.open(false)? };
+    let stored = match &gpu {
+        Some(gpu) => render::replay_on_gpu(gpu, scene, settings, round, photon)?,
+        None => render::replay_on_cpu(scene, settings, round, photon)?,
+    };
+    say(&format!("{:>6} {:<8} {:>10} {:>10} {:>10} {:>10}", "bounce", "wall", "x, m", "y", "z", "weight"))?;
+    for photon in &stored {
+        let wall = scene.faces[photon.wall as usize].as_ref().map_or("opening", |wall| wall.name);
+        let p = photon.position;
+        say(&format!("{:>6} {wall:<8} {:>10.6} {:>10.6} {:>10.6} {:>10.6}", photon.bounce, p.x, p.y, p.z, photon.weight))?;
+    }
+    say(&format!("stored {} time(s), then absorbed, out of the box or cut off", stored.len()))?;
+    Ok(End::Finished)
 }
 
 fn progress_bar(photons: u64) -> ProgressBar {

@@ -21,6 +21,7 @@ use crate::scene::light::{Light, LightKind};
 use crate::scene::{Camera, Scene};
 use crate::settings::Math;
 use crate::settings::transport::{Append, Effect, Filter, Illumination, Kernel, Part, TransportSettings};
+use crate::transport::replay::PhotonName;
 use crate::transport::{self, Lit, View};
 
 #[derive(Args)]
@@ -97,6 +98,9 @@ pub(super) struct TransportArgs {
     #[arg(long, value_enum, help_heading = "Estimate")]
     edge_correction: Option<super::run::SwitchArg>,
 
+    /// Look on the device for values that are infinite or no number, and say whose they are
+    #[arg(long, help_heading = "Output")]
+    paranoid: bool,
     /// Simulate an effect even where the scene does not need it; see `photonmill plan`
     #[arg(long, value_name = "EFFECT", value_enum, value_delimiter = ',', help_heading = "Plan")]
     with: Vec<EffectArg>,
@@ -131,6 +135,15 @@ super::run::value_enum!(EffectArg => Effect {
     Direct, Indirect, Glossy, ReflectiveCaustics, RefractiveCaustics, SpecularChains, Textures, Environment, MeshLights,
     PointLights, SpotLights, DirectionalLights, DiscLights, Bvh, TwoSided, SmoothNormals,
 });
+
+/// `3:4711`, `3:4711:caustic`.
+pub(super) fn photon_name(text: &str) -> std::result::Result<PhotonName, String> {
+    let (numbers, caustic) = text.strip_suffix(":caustic").map_or((text, false), |numbers| (numbers, true));
+    let parsed = numbers.split_once(':').and_then(|(round, photon)| Some((round.parse().ok()?, photon.parse().ok()?)));
+    parsed
+        .map(|(round, photon)| PhotonName { round, photon, caustic })
+        .ok_or_else(|| "must be ROUND:PHOTON, two whole numbers, or ROUND:PHOTON:caustic".to_owned())
+}
 
 fn colour(text: &str) -> std::result::Result<[f32; 3], String> {
     let all = match numbers::<f32, 1>(text) {
@@ -177,6 +190,7 @@ impl TransportArgs {
             illumination: self.illumination.map_or(usual.illumination, Illumination::from),
             append: self.variant.map_or(usual.append, Append::from),
             math: self.math.map_or(usual.math, Math::from),
+            paranoid: self.paranoid,
             group_size: self.group_size.unwrap_or(usual.group_size),
             chunk: self.chunk,
             with: self.with.iter().map(|effect| (*effect).into()).collect(),

@@ -12,7 +12,6 @@ use super::{Commands, Constants, Extent, Gpu, Memory};
 use crate::constants::LOOP_LIMIT;
 use crate::error::{Error, Result};
 use crate::records::{CheckPush, MathResults};
-use crate::settings::Math;
 
 /// What the check found beyond passing.
 #[derive(Debug, Clone, Copy, PartialEq, Eq)]
@@ -56,9 +55,9 @@ pub fn loop_count(gpu: &Gpu, wanted: u32) -> Result<LoopCount> {
     Ok(LoopCount { wanted, done: ask(gpu, &push)?.iterations })
 }
 
-/// What `glsl/math.glsl` computes of each pair on the device.
-pub fn math(gpu: &Gpu, operands: &[Vec2], math: Math) -> Result<Vec<MathResults>> {
-    let constants = Constants::new(GROUP_SIZE).set("STRICT_MATH", math.code());
+/// What the strict functions of `glsl/math.glsl` make of each pair on the device.
+pub fn math(gpu: &Gpu, operands: &[Vec2]) -> Result<Vec<MathResults>> {
+    let constants = Constants::new(GROUP_SIZE).set("STRICT_MATH", 1);
     let mut commands = Commands::new(gpu, constants, Instant::now())?;
     let inputs = gpu.buffer::<Vec2>("operands", operands.len() as u64, Memory::Device)?;
     let results = gpu.buffer::<MathResults>("math results", operands.len() as u64, Memory::Device)?;
@@ -71,7 +70,7 @@ pub fn math(gpu: &Gpu, operands: &[Vec2], math: Math) -> Result<Vec<MathResults>
 /// on that rests all of `--math strict`.
 pub fn strict_math(gpu: &Gpu) -> Result<()> {
     let operands: Vec<Vec2> = (0..STRICT_SAMPLES).map(sample).collect();
-    let results = math(gpu, &operands, Math::Strict)?;
+    let results = math(gpu, &operands)?;
     let wrong = operands.iter().zip(&results).find_map(|(operand, result)| {
         let Vec2 { x: a, y: b } = *operand;
         let found = [result.sum_of_product, result.quotient, result.root];

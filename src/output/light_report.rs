@@ -7,6 +7,7 @@ use serde::Serialize;
 
 use super::report::{ledger, timing_table};
 use crate::ledger::Ledger;
+use crate::oddities::Oddities;
 use crate::plan::evidence::EffectDecision;
 use crate::plan::transport::{MapPlan, TransportPlan};
 use crate::settings::transport::{Effect, TransportSettings};
@@ -105,6 +106,8 @@ struct Report<'a> {
     /// Root mean square of the standard errors over that of the values.
     relative_error: f64,
     anomalies: Anomalies,
+    /// What `--paranoid` found; null where nobody looked.
+    oddities: Option<&'a Oddities>,
     timings: &'a [Row],
     dispatches: u64,
     submissions: u64,
@@ -148,6 +151,7 @@ pub fn json(scene: &str, lit: &Lit) -> Vec<u8> {
         ledgers: [lit.fates[0].ledger(), lit.fates[1].ledger()],
         relative_error: lit.film.relative_error(&lit.plan),
         anomalies: Anomalies { not_a_number: lit.anomalies[0], cut_to_largest: lit.anomalies[1], too_dense: lit.anomalies[2] },
+        oddities: lit.oddities.as_ref(),
         timings: lit.timings.rows(),
         dispatches: lit.dispatches,
         submissions: lit.submissions,
@@ -183,6 +187,9 @@ pub fn text(scene: &str, lit: &Lit, explain: bool) -> String {
         let count = lit.anomalies[2];
         writeln!(text, "warning: {count} estimate(s) cover too many triangles for an edge correction; a smaller --radius mends it")
             .unwrap();
+    }
+    if let Some(oddities) = &lit.oddities {
+        writeln!(text, "{}", oddities.text()).unwrap();
     }
     match lit.film.rounds {
         1 => text.push_str("noise: unknown from a single round\n"),

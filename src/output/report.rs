@@ -7,6 +7,7 @@ use serde::Serialize;
 use crate::film::WallEstimate;
 use crate::gpu::DeviceFacts;
 use crate::ledger::{BounceFates, Ledger};
+use crate::oddities::Oddities;
 use crate::plan::Decision;
 use crate::render::Outcome;
 use crate::settings::Settings;
@@ -32,6 +33,8 @@ struct Report<'a> {
     dispatches: u64,
     submissions: u64,
     walls: Vec<WallReport>,
+    /// What `--paranoid` found; null where nobody looked.
+    oddities: Option<&'a Oddities>,
 }
 
 #[derive(Serialize)]
@@ -91,6 +94,7 @@ pub fn json(outcome: &Outcome, walls: &[WallEstimate]) -> Vec<u8> {
                 radiosity: mean(&wall.radiosity),
             })
             .collect(),
+        oddities: outcome.oddities.as_ref(),
     };
     serde_json::to_vec_pretty(&report).expect("a report is plain data")
 }
@@ -127,6 +131,9 @@ pub fn text(outcome: &Outcome) -> String {
     }
     text.push('\n');
     text.push_str(&ledger(&outcome.fates.ledger()));
+    if let Some(oddities) = &outcome.oddities {
+        writeln!(text, "{}", oddities.text()).unwrap();
+    }
     text.push('\n');
     text.push_str(&timing_table(&outcome.timings, outcome.device.as_ref()));
     text

@@ -166,6 +166,19 @@ impl Plan {
         (0..self.chunks_per_round).map(|chunk| self.chunk(chunk))
     }
 
+    /// The range of one photon of a round.
+    pub fn range_of(&self, photon: u32) -> Result<EmissionRange> {
+        let mut first_of_next = 0;
+        let light = self.light_photons.iter().position(|count| {
+            first_of_next += count;
+            photon < first_of_next
+        });
+        let allowed = || format!("a round has photons 0 to {}", self.settings.photons - 1);
+        light
+            .map(|light| EmissionRange { light: light as u32, first_photon: photon, count: 1 })
+            .ok_or_else(|| Error::setting("--replay", photon, allowed()))
+    }
+
     pub fn streams(&self) -> Streams {
         Streams {
             rng: self.settings.rng,

@@ -204,6 +204,7 @@ impl TransportPlan {
             ("HAS_DIRECTIONAL_LIGHTS", flag(Effect::DirectionalLights)),
             ("HAS_DISC_LIGHTS", flag(Effect::DiscLights)),
             ("HAS_ENVIRONMENT", flag(Effect::Environment)),
+            ("PARANOID", u32::from(settings.paranoid)),
             ("STRICT_MATH", settings.math.code()),
             ("SHADOW_RAYS", shadow_rays),
             ("KERNEL", settings.kernel.code()),

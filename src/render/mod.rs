@@ -7,12 +7,13 @@ mod on_gpu;
 
 use std::sync::atomic::AtomicBool;
 
-pub use on_cpu::{on_cpu, photons_on_cpu};
-pub use on_gpu::{constants, limits, on_gpu, photons_on_gpu};
+pub use on_cpu::{on_cpu, photons_on_cpu, replay_on_cpu};
+pub use on_gpu::{constants, limits, on_gpu, photons_on_gpu, replay_on_gpu};
 
 use crate::film::Film;
 use crate::gpu::DeviceFacts;
 use crate::ledger::Fates;
+use crate::oddities::Oddities;
 use crate::plan::Plan;
 use crate::timings::Timings;
 
@@ -37,4 +38,6 @@ pub struct Outcome {
     pub cancelled: bool,
     pub dispatches: u64,
     pub submissions: u64,
+    /// What `--paranoid` found; `None` where nobody looked.
+    pub oddities: Option<Oddities>,
 }

@@ -8,6 +8,7 @@ use crate::cpu::trace::Tracer;
 use crate::cpu::{estimate, index::Index};
 use crate::error::{Error, Result};
 use crate::film::Film;
+use crate::oddities::{Oddities, What};
 use crate::plan::{EmissionRange, Limits, Plan, photons_of};
 use crate::records::{Photon, Tally};
 use crate::scene::room::RoomScene;
@@ -22,10 +23,14 @@ pub fn on_cpu(scene: &RoomScene, settings: &Settings, control: &mut Control) -> 
     let tracer = Tracer::new(scene, &plan);
     let mut sums = vec![0u64; plan.points.len() * plan.channel_count as usize];
     let mut book = Book::new(&plan, control);
+    let mut oddities = Oddities::default();
     for round in 0..settings.rounds {
         clock.time("round", |clock| {
             for ranges in plan.chunks() {
                 let (photons, tallies) = clock.time("build", |clock| trace(&pool, &tracer, &plan, round, &ranges, clock));
+                if settings.paranoid {
+                    photons.iter().filter(|photon| !is_finite(photon)).for_each(|photon| oddities.add(What::Photon, round, photon.photon));
+                }
                 if plan.gathers_by_grid() {
                     let index = clock.time("index", |_| Index::build(plan.grid, &photons));
                     clock.time("gather", |_| pool.install(|| estimate::gather_grid(&plan, &index, &mut sums)));
@@ -44,6 +49,7 @@ pub fn on_cpu(scene: &RoomScene, settings: &Settings, control: &mut Control) -> 
         }
     }
     Ok(Outcome {
+        oddities: settings.paranoid.then_some(oddities),
         film: Film::new(&plan, sums, book.fates.emitted),
         fates: book.fates,
         cancelled: book.cancelled,
@@ -53,6 +59,10 @@ pub fn on_cpu(scene: &RoomScene, settings: &Settings, control: &mut Control) -> 
         submissions: 0,
         plan,
     })
+}
+
+fn is_finite(photon: &Photon) -> bool {
+    photon.position.is_finite() && photon.weight.is_finite() && photon.flux.is_finite()
 }
 
 fn plan(scene: &RoomScene, settings: &Settings) -> Result<Plan> {
@@ -87,6 +97,13 @@ fn trace(
         paths = bounced.paths;
     }
     (photons, tallies)
+}
+
+/// One photon by itself: what is stored of it.
+pub fn replay_on_cpu(scene: &RoomScene, settings: &Settings, round: u32, photon: u32) -> Result<Vec<Photon>> {
+    let plan = plan(scene, settings)?;
+    let tracer = Tracer::new(scene, &plan);
+    Ok(trace(&thread_pool(settings)?, &tracer, &plan, round, &[plan.range_of(photon)?], &mut HostClock::start("run")).0)
 }
 
 /// The photon map of round 0, for comparing builders.

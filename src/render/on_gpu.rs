@@ -9,7 +9,8 @@ use crate::error::Result;
 use crate::film::Film;
 use crate::gpu::check::strict_math;
 use crate::gpu::{Commands, Constants, DeviceFacts, Gpu};
-use crate::plan::{Limits, Plan, photons_of};
+use crate::oddities::Oddities;
+use crate::plan::{EmissionRange, Limits, Plan, photons_of};
 use crate::records::{Photon, Tally};
 use crate::resources::Resources;
 use crate::scene::room::RoomScene;
@@ -50,9 +51,11 @@ pub fn on_gpu(gpu: &Gpu, scene: &RoomScene, settings: &Settings, control: &mut C
     }
     settle(&mut commands, &resources, &mut book)?;
     let sums = commands.read::<u64>(&resources.film, plan.points.len() * plan.channel_count as usize)?;
+    let oddities = if settings.paranoid { Some(Oddities::read(&mut commands, &resources.oddities)?) } else { None };
     gpu.check_validation()?;
 
     Ok(Outcome {
+        oddities,
         film: Film::new(&plan, sums, book.fates.emitted),
         fates: book.fates,
         cancelled: book.cancelled,
@@ -80,6 +83,7 @@ pub fn constants(plan: &Plan) -> Constants {
     let settings = &plan.settings;
     Constants::new(settings.group_size)
         .set("RNG", settings.rng.code())
+        .set("PARANOID", u32::from(settings.paranoid))
         .set("STRICT_MATH", settings.math.code())
         .set("EMISSION_LAW", settings.emission.code())
         .set("HAS_PHONG", u32::from(settings.has_phong()))
@@ -119,13 +123,23 @@ fn settle(commands: &mut Commands, resources: &Resources, book: &mut Book) -> Re
 /// The photon map of round 0, for comparing builders.
 pub fn photons_on_gpu(gpu: &Gpu, scene: &RoomScene, settings: &Settings) -> Result<Vec<Photon>> {
     let plan = Plan::new(scene, settings, &limits(gpu.facts()))?;
-    let mut commands = Commands::new(gpu, constants(&plan), Instant::now())?;
-    let resources = Resources::new(gpu, &mut commands, scene, &plan)?;
+    stored(gpu, scene, &plan, 0, plan.chunks())
+}
+
+/// One photon by itself: what is stored of it. A photon is (seed, round, number), so it takes the same path alone as
+/// among millions.
+pub fn replay_on_gpu(gpu: &Gpu, scene: &RoomScene, settings: &Settings, round: u32, photon: u32) -> Result<Vec<Photon>> {
+    let plan = Plan::new(scene, settings, &limits(gpu.facts()))?;
+    stored(gpu, scene, &plan, round, std::iter::once(vec![plan.range_of(photon)?]))
+}
+
+fn stored(gpu: &Gpu, scene: &RoomScene, plan: &Plan, round: u32, chunks: impl Iterator<Item = Vec<EmissionRange>>) -> Result<Vec<Photon>> {
+    let mut commands = Commands::new(gpu, constants(plan), Instant::now())?;
+    let resources = Resources::new(gpu, &mut commands, scene, plan)?;
     let mut photons = Vec::new();
-    for chunk in 0..plan.chunks_per_round {
-        let ranges = plan.chunk(chunk);
-        trace::chunk(&mut commands, &resources, &plan, 0, &ranges)?;
-        let capacity = trace::photon_list_capacity(&plan, photons_of(&ranges));
+    for ranges in chunks {
+        trace::chunk(&mut commands, &resources, plan, round, &ranges)?;
+        let capacity = trace::photon_list_capacity(plan, photons_of(&ranges));
         let length = if plan.has_slots() { capacity } else { commands.read::<u32>(&resources.counters, 1)?[0].min(capacity) };
         let stored = commands.read::<Photon>(&resources.photons, length as usize)?;
         photons.extend(stored.into_iter().filter(|photon| photon.wall != NO_WALL));

@@ -137,6 +137,11 @@ impl Geometry {
         Ok(geometry)
     }
 
+    /// A normalised position in metres of the scene.
+    pub fn to_world(&self, position: Vec3) -> DVec3 {
+        position.as_dvec3() * self.unit + self.centre
+    }
+
     pub fn to_local(&self, position: DVec3) -> Vec3 {
         ((position - self.centre) / self.unit).as_vec3()
     }

@@ -189,6 +189,8 @@ pub struct TransportSettings {
     pub filter: Filter,
     pub append: Append,
     pub math: Math,
+    /// Look for values that are infinite or no number.
+    pub paranoid: bool,
     pub group_size: u32,
     /// Most photons traced at once; `None`: as many as the device's buffers hold.
     pub chunk: Option<u32>,
@@ -217,6 +219,7 @@ impl Default for TransportSettings {
             filter: Filter::Box,
             append: Append::Ballot,
             math: Math::Fast,
+            paranoid: false,
             group_size: 128,
             chunk: None,
             with: Vec::new(),

@@ -14,6 +14,7 @@
 pub mod film;
 pub mod photons;
 pub mod points;
+pub mod replay;
 pub mod resources;
 
 use std::sync::atomic::Ordering;
@@ -28,6 +29,7 @@ use crate::gpu::check::strict_math;
 use crate::gpu::kernels::*;
 use crate::gpu::{Commands, Constants, DeviceFacts, Gpu, Kernel, Module};
 use crate::ledger::Fates;
+use crate::oddities::Oddities;
 use crate::plan::transport::{MapPlan, Sensor, TransportPlan};
 use crate::records::{Receiver, Tally};
 use crate::render::Control;
@@ -73,6 +75,8 @@ pub struct Lit {
     /// Values that were no number, values cut to the film's largest, and estimates on a mesh too dense for the
     /// area within the radius to be found.
     pub anomalies: [u32; 3],
+    /// What `--paranoid` found; `None` where nobody looked.
+    pub oddities: Option<Oddities>,
 }
 
 /// Kernels that the plan needs, and no others.
@@ -142,6 +146,7 @@ pub fn light(gpu: &Gpu, view: &View, plan: TransportPlan, control: &mut Control)
     let squares = commands.read::<u64>(&resources.film_squares, 6 * pixels)?;
     let part_totals = commands.read::<u64>(&resources.part_totals, PART_COUNT as usize)?;
     let anomalies = commands.read::<u32>(&resources.anomalies, 3)?;
+    let oddities = if plan.settings.paranoid { Some(Oddities::read(&mut commands, &resources.oddities)?) } else { None };
     gpu.check_validation()?;
     Ok(Lit {
         film: RoundFilm::new(done, sums, squares),
@@ -154,6 +159,7 @@ pub fn light(gpu: &Gpu, view: &View, plan: TransportPlan, control: &mut Control)
         timings: commands.finish("run"),
         device: gpu.facts().clone(),
         anomalies: [anomalies[0], anomalies[1], anomalies[2]],
+        oddities,
         plan,
     })
 }

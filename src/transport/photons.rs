@@ -26,92 +26,109 @@ pub fn cells(round: Round, map: &MapPlan) -> CellPush {
 /// Timestamps that must be left for the scopes that are open and for a bounce.
 const TIMESTAMP_RESERVE: u32 = 32;
 
-/// Traces the photons of a chunk into the map and adds their fates to its tallies.
-pub fn trace(
+/// Traces the photons (first, count) of a chunk into the map and adds their fates to its tallies.
+pub fn trace(commands: &mut Commands, round: Round, photons: &PhotonBuffers, map: &MapPlan, chunk: (u32, u32)) -> Result<()> {
+    emit(commands, round, photons, map, chunk)?;
+    for bounce in 0..map.bounces {
+        if commands.timestamps_left() < TIMESTAMP_RESERVE {
+            commands.submit()?;
+        }
+        // Every photon enters bounce 0; after that only the device knows how many paths are left.
+        let extent = if bounce == 0 {
+            Extent::Items(u64::from(chunk.1))
+        } else {
+            dispatch_size(commands, photons, round.plan, 1 + bounce, map.chunk_photons)?;
+            Extent::Indirect(&photons.dispatch_args)
+        };
+        fly(commands, round, photons, map, bounce, extent)?;
+    }
+    Ok(())
+}
+
+fn draws(round: Round, map: &MapPlan) -> Draws {
+    Draws { seed: words(round.plan.settings.seed), round: round.number, domain: map.domain }
+}
+
+/// Writes the paths of a chunk as they leave the lights.
+pub fn emit(
     commands: &mut Commands,
     round: Round,
     photons: &PhotonBuffers,
     map: &MapPlan,
     (first_photon, photon_count): (u32, u32),
 ) -> Result<()> {
-    let Round { resources, geometry, plan, number } = round;
-    let draws = Draws { seed: words(plan.settings.seed), round: number, domain: map.domain };
-    let TransportResources { nodes, triangles, normals, uvs, materials, textures, texels, emitters, .. } = resources;
-    let PhotonBuffers { paths: [even, odd], counters, dispatch_args, tallies, .. } = photons;
+    let Round { resources, geometry, .. } = round;
+    let TransportResources { nodes, triangles, normals, uvs, materials, textures, texels, emitters, oddities, .. } = resources;
+    let PhotonBuffers { paths: [light_paths, _], counters, .. } = photons;
     commands.fill(counters, 0, u64::from(map.bounces) + 2, 0);
     commands.fill(counters, 1, 1, photon_count);
     let push = EmissionPush {
-        draws,
+        draws: draws(round, map),
         first_photon,
         photon_count,
         emitter_count: geometry.emitters.len() as u32,
         scene_radius: geometry.radius as f32,
     };
-    let kernel = Shine { nodes, triangles, normals, uvs, materials, textures, texels, emitters, light_paths: even };
-    commands.dispatch(kernel, &push, Extent::Items(u64::from(photon_count)))?;
-    for bounce in 0..map.bounces {
-        if commands.timestamps_left() < TIMESTAMP_RESERVE {
-            commands.submit()?;
-        }
-        let push = FlightPush {
-            draws,
-            bounce,
-            path_capacity: map.chunk_photons,
-            photon_capacity: map.capacity,
-            stored: map.stored,
-            caustic_only: u32::from(map.caustic_only),
-            caustic_surfaces: plan.caustic_surfaces,
-        };
-        // Every photon enters bounce 0; after that only the device knows how many paths are left.
-        let extent = if bounce == 0 {
-            Extent::Items(u64::from(photon_count))
-        } else {
-            dispatch_size(commands, photons, plan, 1 + bounce, map.chunk_photons)?;
-            Extent::Indirect(dispatch_args)
-        };
-        let (light_paths, next_light_paths) = if bounce.is_multiple_of(2) { (even, odd) } else { (odd, even) };
-        let tallies = &tallies[usize::from(map.caustic_only)];
-        let map = &photons.map;
-        match plan.settings.append {
-            Append::Atomic => commands.dispatch(
-                FlyAtomic {
-                    nodes,
-                    triangles,
-                    normals,
-                    uvs,
-                    materials,
-                    textures,
-                    texels,
-                    light_paths,
-                    next_light_paths,
-                    map,
-                    counters,
-                    tallies,
-                },
-                &push,
-                extent,
-            )?,
-            Append::Ballot => commands.dispatch(
-                FlyBallot {
-                    nodes,
-                    triangles,
-                    normals,
-                    uvs,
-                    materials,
-                    textures,
-                    texels,
-                    light_paths,
-                    next_light_paths,
-                    map,
-                    counters,
-                    tallies,
-                },
-                &push,
-                extent,
-            )?,
-        }
+    let kernel = Shine { nodes, triangles, normals, uvs, materials, textures, texels, emitters, light_paths, oddities };
+    commands.dispatch(kernel, &push, Extent::Items(u64::from(photon_count)))
+}
+
+/// One flight of every path that is left.
+pub fn fly(commands: &mut Commands, round: Round, photons: &PhotonBuffers, map: &MapPlan, bounce: u32, extent: Extent) -> Result<()> {
+    let Round { resources, plan, .. } = round;
+    let TransportResources { nodes, triangles, normals, uvs, materials, textures, texels, oddities, .. } = resources;
+    let push = FlightPush {
+        draws: draws(round, map),
+        bounce,
+        path_capacity: map.chunk_photons,
+        photon_capacity: map.capacity,
+        stored: map.stored,
+        caustic_only: u32::from(map.caustic_only),
+        caustic_surfaces: plan.caustic_surfaces,
+    };
+    let tallies = &photons.tallies[usize::from(map.caustic_only)];
+    let PhotonBuffers { paths: [even, odd], counters, map, .. } = photons;
+    let (light_paths, next_light_paths) = if bounce.is_multiple_of(2) { (even, odd) } else { (odd, even) };
+    match plan.settings.append {
+        Append::Atomic => commands.dispatch(
+            FlyAtomic {
+                nodes,
+                triangles,
+                normals,
+                uvs,
+                materials,
+                textures,
+                texels,
+                light_paths,
+                next_light_paths,
+                map,
+                counters,
+                tallies,
+                oddities,
+            },
+            &push,
+            extent,
+        ),
+        Append::Ballot => commands.dispatch(
+            FlyBallot {
+                nodes,
+                triangles,
+                normals,
+                uvs,
+                materials,
+                textures,
+                texels,
+                light_paths,
+                next_light_paths,
+                map,
+                counters,
+                tallies,
+                oddities,
+            },
+            &push,
+            extent,
+        ),
     }
-    Ok(())
 }
 
 fn dispatch_size(commands: &mut Commands, photons: &PhotonBuffers, plan: &TransportPlan, counter: u32, capacity: u32) -> Result<()> {

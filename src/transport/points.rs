@@ -32,7 +32,7 @@ fn add_work(commands: &mut Commands, plan: &TransportPlan, work: u64) -> Result<
 pub fn see(commands: &mut Commands, round: Round, camera: Option<&Camera>) -> Result<()> {
     let Round { resources, geometry, plan, number: round } = round;
     let TransportResources { nodes, triangles, normals, uvs, materials, textures, texels, emitters, .. } = resources;
-    let TransportResources { visible_points, pass_sums, part_totals, anomalies, .. } = resources;
+    let TransportResources { visible_points, pass_sums, part_totals, anomalies, oddities, .. } = resources;
     let step = plan.pixels_at_once(plan.rays_per_pixel());
     let emitter_count = geometry.emitters.len() as u32;
     let draws = |domain| Draws { seed: words(plan.settings.seed), round, domain };
@@ -69,6 +69,7 @@ pub fn see(commands: &mut Commands, round: Round, camera: Option<&Camera>) -> Re
                     visible_points,
                     pass_sums,
                     part_totals,
+                    oddities,
                 };
                 commands.dispatch(kernel, &push, Extent::Items(u64::from(end - first)))?;
             }
@@ -98,6 +99,7 @@ pub fn see(commands: &mut Commands, round: Round, camera: Option<&Camera>) -> Re
                     visible_points,
                     pass_sums,
                     part_totals,
+                    oddities,
                 };
                 commands.dispatch(kernel, &push, Extent::Items(u64::from(end - first)))?;
             }
@@ -147,7 +149,7 @@ pub fn look_up(commands: &mut Commands, round: Round, photons: &PhotonBuffers, m
 pub fn resolve(commands: &mut Commands, round: Round) -> Result<()> {
     let Round { resources, geometry, plan, number: round } = round;
     let TransportResources { nodes, triangles, normals, uvs, materials, textures, texels, visible_points, .. } = resources;
-    let TransportResources { pass_sums, estimates, film_sums, film_squares, part_totals, anomalies, .. } = resources;
+    let TransportResources { pass_sums, estimates, film_sums, film_squares, part_totals, anomalies, oddities, .. } = resources;
     let radius = |map: &Option<MapPlan>| map.as_ref().map_or(1.0, |map| plan.radius(map, round)) as f32;
     let flux = |map: &Option<MapPlan>| map.as_ref().map_or(0.0, |map| geometry.flux_unit / f64::from(map.photons)) as f32;
     for (first_pixel, end_pixel) in runs(plan.sensor.pixels(), plan.pixels_at_once(4)) {
@@ -157,6 +159,7 @@ pub fn resolve(commands: &mut Commands, round: Round) -> Result<()> {
             points_per_pixel: plan.points_per_pixel,
             point_count: plan.visible_points(),
             arrivals: plan.arrivals,
+            round,
             film_scale: plan.film_scale as f32,
             film_limit: plan.film_limit as f32,
             global_radius: radius(&plan.global),
@@ -179,6 +182,7 @@ pub fn resolve(commands: &mut Commands, round: Round) -> Result<()> {
             film_sums,
             film_squares,
             part_totals,
+            oddities,
         };
         commands.dispatch(kernel, &push, Extent::Items(u64::from(end_pixel - first_pixel)))?;
         add_work(commands, plan, 256 * u64::from(end_pixel - first_pixel))?;

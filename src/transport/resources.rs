@@ -6,6 +6,7 @@ use glam::UVec2;
 use crate::constants::PART_COUNT;
 use crate::error::Result;
 use crate::gpu::{Buffer, Commands, Gpu, Memory};
+use crate::oddities;
 use crate::plan::transport::{MapPlan, TransportPlan};
 use crate::records::*;
 use crate::resources::block_sums;
@@ -35,6 +36,7 @@ pub struct TransportResources {
     pub film_squares: Buffer,
     pub part_totals: Buffer,
     pub anomalies: Buffer,
+    pub oddities: Buffer,
 }
 
 /// Photons in flight and their map; both maps of a round use the same ones in turn.
@@ -95,6 +97,7 @@ impl TransportResources {
             film_squares: gpu.buffer::<u64>("film squares", 6 * pixels, device)?,
             part_totals: gpu.buffer::<u64>("part totals", u64::from(PART_COUNT), device)?,
             anomalies: gpu.buffer::<u32>("anomalies", 3, device)?,
+            oddities: oddities::buffer(gpu, commands)?,
         };
         commands.fill(&resources.film_sums, 0, 6 * pixels, 0);
         commands.fill(&resources.film_squares, 0, 12 * pixels, 0);

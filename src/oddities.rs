@@ -1,0 +1,88 @@
+//! `--paranoid`: values that are infinite or no number, as the kernels noted them (`glsl/oddities.glsl`).
+
+use serde::Serialize;
+
+use crate::constants::*;
+use crate::error::Result;
+use crate::gpu::{Buffer, Commands, Gpu, Memory};
+
+/// One value that is no finite number, and whose it is.
+#[derive(Debug, Clone, Copy, PartialEq, Eq, Serialize)]
+pub struct Oddity {
+    pub what: What,
+    pub round: u32,
+    /// Photon, pixel or receiver.
+    pub item: u32,
+}
+
+#[derive(Debug, Clone, Copy, PartialEq, Eq, Serialize)]
+#[serde(rename_all = "snake_case")]
+pub enum What {
+    /// A photon of the global map (or of the paper's one map), leaving its light or at a surface.
+    Photon,
+    CausticPhoton,
+    /// Light that reaches a pixel or receiver without the help of photons.
+    SeenLight,
+    /// A density estimate at a pixel or receiver.
+    Estimate,
+}
+
+/// How many there were, and the first of them.
+#[derive(Debug, Clone, PartialEq, Eq, Default, Serialize)]
+pub struct Oddities {
+    pub count: u32,
+    pub first: Vec<Oddity>,
+}
+
+const WORDS: usize = 1 + 4 * MAX_ODDITIES as usize;
+
+/// The buffer in which kernels note what is odd.
+pub fn buffer(gpu: &Gpu, commands: &mut Commands) -> Result<Buffer> {
+    let buffer = gpu.buffer::<u32>("oddities", WORDS as u64, Memory::Device)?;
+    commands.fill(&buffer, 0, WORDS as u64, 0);
+    Ok(buffer)
+}
+
+impl Oddities {
+    pub fn read(commands: &mut Commands, buffer: &Buffer) -> Result<Oddities> {
+        let words = commands.read::<u32>(buffer, WORDS)?;
+        let noted = words[1..].chunks_exact(4).take(words[0] as usize);
+        let mut first: Vec<Oddity> = noted
+            .map(|note| {
+                let what = match (note[0], note[1]) {
+                    (ODD_PHOTON, DOMAIN_CAUSTIC_PHOTONS) => What::CausticPhoton,
+                    (ODD_PHOTON, _) => What::Photon,
+                    (ODD_LIGHT, _) => What::SeenLight,
+                    _ => What::Estimate,
+                };
+                Oddity { what, round: note[2], item: note[3] }
+            })
+            .collect();
+        // Devices note in any order.
+        first.sort_by_key(|oddity| (oddity.round, oddity.what as u32, oddity.item));
+        first.dedup();
+        Ok(Oddities { count: words[0], first })
+    }
+
+    pub fn add(&mut self, what: What, round: u32, item: u32) {
+        self.count += 1;
+        if self.first.len() < MAX_ODDITIES as usize {
+            self.first.push(Oddity { what, round, item });
+        }
+    }
+
+    /// What a run says of them: one line.
+    pub fn text(&self) -> String {
+        let Some(first) = self.first.first() else {
+            return "paranoid: every position, direction, flux and radiance is a finite number".to_owned();
+        };
+        let Oddity { round, item, .. } = first;
+        let whose = match first.what {
+            What::Photon => format!("photon {item} of round {round}; --replay {round}:{item} traces it alone"),
+            What::CausticPhoton => format!("caustic photon {item} of round {round}; --replay {round}:{item}:caustic traces it alone"),
+            What::SeenLight => format!("light at pixel or point {item} in round {round}"),
+            What::Estimate => format!("the estimate at pixel or point {item} in round {round}"),
+        };
+        format!("paranoid: {} value(s) are infinite or no number, the first: {whose}", self.count)
+    }
+}

@@ -1,0 +1,89 @@
+//! One photon of a run by itself: a photon is (seed, round, number), so it takes the same path alone as among
+//! millions.
+
+use std::time::Instant;
+
+use super::resources::TransportResources;
+use super::{Round, constants, photons};
+use crate::constants::{DOMAIN_CAUSTIC_PHOTONS, DOMAIN_PHOTONS};
+use crate::error::{Error, Result};
+use crate::gpu::{Commands, Extent, Gpu};
+use crate::oddities::Oddities;
+use crate::plan::transport::TransportPlan;
+use crate::records::{LightPath, Tally};
+use crate::scene::geometry::Geometry;
+
+/// Which photon.
+#[derive(Debug, Clone, Copy, PartialEq, Eq)]
+pub struct PhotonName {
+    pub round: u32,
+    pub photon: u32,
+    /// Of the caustic map.
+    pub caustic: bool,
+}
+
+/// The photon as it left its light and each surface, normalised as in the kernels, and how it ended.
+#[derive(Debug, Clone, PartialEq)]
+pub struct Path {
+    pub name: PhotonName,
+    pub vertices: Vec<LightPath>,
+    pub fate: &'static str,
+    /// What `--paranoid` found on this path; `None` where nobody looked.
+    pub oddities: Option<Oddities>,
+}
+
+pub fn replay(gpu: &Gpu, geometry: &Geometry, plan: &TransportPlan, name: PhotonName) -> Result<Path> {
+    let PhotonName { round: number, photon, caustic } = name;
+    let domain = if caustic { DOMAIN_CAUSTIC_PHOTONS } else { DOMAIN_PHOTONS };
+    let kind = if caustic { "caustic" } else { "global" };
+    let shown = format!("{number}:{photon}");
+    let Some(map) = plan.maps().find(|map| map.domain == domain) else {
+        return Err(Error::setting("--replay", shown, format!("this run has no {kind} map")));
+    };
+    if photon >= map.photons {
+        return Err(Error::setting("--replay", shown, format!("a round has photons 0 to {} in the {kind} map", map.photons - 1)));
+    }
+    let mut commands = Commands::new(gpu, constants(plan), Instant::now())?;
+    let resources = TransportResources::new(gpu, &mut commands, geometry, plan, &[])?;
+    let buffers = resources.photons.as_ref().expect("a map has photons");
+    let round = Round { resources: &resources, geometry, plan, number };
+    photons::emit(&mut commands, round, buffers, map, (photon, 1))?;
+    let mut vertices = commands.read::<LightPath>(&buffers.paths[0], 1)?;
+    let mut fate = "is cut off at the last bounce";
+    for bounce in 0..map.bounces {
+        photons::fly(&mut commands, round, buffers, map, bounce, Extent::Items(1))?;
+        let tally = commands.read::<Tally>(&buffers.tallies[usize::from(caustic)], bounce as usize + 1)?[bounce as usize];
+        if tally.stored == 0 {
+            fate = if tally.escaped == 1 { "leaves the scene" } else { "is absorbed" };
+            break;
+        }
+        vertices.extend(commands.read::<LightPath>(&buffers.paths[(bounce as usize + 1) % 2], 1)?);
+    }
+    let oddities = if plan.settings.paranoid { Some(Oddities::read(&mut commands, &resources.oddities)?) } else { None };
+    Ok(Path { name, vertices, fate, oddities })
+}
+
+impl Path {
+    /// A line a vertex: where, whither, and the power that it carries on.
+    pub fn table(&self, geometry: &Geometry, plan: &TransportPlan) -> String {
+        let photons = plan.maps().find(|map| map.caustic_only == self.name.caustic).map_or(1, |map| map.photons);
+        let watts = geometry.flux_unit * geometry.unit * geometry.unit / f64::from(photons);
+        let row = |(bounce, vertex): (usize, &LightPath)| {
+            let p = geometry.to_world(vertex.position);
+            let (d, flux) = (vertex.direction, vertex.flux.as_dvec3() * watts);
+            format!(
+                "{bounce:>6} {:>11.6} {:>11.6} {:>11.6} {:>9.6} {:>9.6} {:>9.6} {:>11.4e} {:>11.4e} {:>11.4e}",
+                p.x, p.y, p.z, d.x, d.y, d.z, flux.x, flux.y, flux.z
+            )
+        };
+        let PhotonName { round, photon, caustic } = self.name;
+        let head = format!("{}photon {photon} of round {round}, seed {}", if caustic { "caustic " } else { "" }, plan.settings.seed);
+        let columns = format!(
+            "{:>6} {:>11} {:>11} {:>11} {:>9} {:>9} {:>9} {:>11} {:>11} {:>11}",
+            "bounce", "x, m", "y", "z", "towards x", "y", "z", "red, W", "green", "blue"
+        );
+        let rows: Vec<String> = self.vertices.iter().enumerate().map(row).collect();
+        let oddities = self.oddities.as_ref().map_or_else(String::new, |oddities| format!("\n{}", oddities.text()));
+        format!("{head}\n{columns}\n{}\nthen it {}{oddities}", rows.join("\n"), self.fate)
+    }
+}

@@ -1,0 +1,110 @@
+//! `--paranoid` and `--replay`: no run has a value that is infinite or no number; one that is planted is counted and
+//! its photon named; and that photon takes the same path alone as among all others.
+
+mod common;
+
+use std::collections::BTreeSet;
+use std::sync::atomic::AtomicBool;
+
+use common::{device, in_order, photons, photons_on_cpu, run, run_on_cpu};
+use glam::Vec3;
+use photonmill::gpu::Gpu;
+use photonmill::oddities::{Oddities, What};
+use photonmill::plan::transport::{Sensor, TransportPlan};
+use photonmill::render::{self, Control};
+use photonmill::scene::geometry::Geometry;
+use photonmill::scene::open_box::open_box;
+use photonmill::scene::{Camera, Scene, built_in};
+use photonmill::settings::transport::{Illumination, TransportSettings};
+use photonmill::settings::{Preset, Settings, Variant};
+use photonmill::transport::replay::{PhotonName, replay};
+use photonmill::transport::{self, Lit, View};
+
+const SENSOR: Sensor = Sensor::Picture { width: 24, height: 24 };
+
+fn paranoid() -> TransportSettings {
+    TransportSettings { photons: 3000, caustic_photons: 3000, rounds: 2, paranoid: true, ..TransportSettings::default() }
+}
+
+fn plan_of(gpu: &Gpu, scene: &Scene, geometry: &Geometry, settings: &TransportSettings) -> TransportPlan {
+    TransportPlan::new(scene, geometry, settings, SENSOR, &render::limits(gpu.facts())).unwrap()
+}
+
+fn light(gpu: &Gpu, scene: &Scene, geometry: &Geometry, settings: &TransportSettings) -> Lit {
+    let camera = scene.cameras.first().cloned().unwrap_or_else(|| Camera::around(scene.bounds().0, scene.bounds().1));
+    let view = View { geometry, camera: Some(&camera), phases: &[] };
+    let never = AtomicBool::new(false);
+    let plan = plan_of(gpu, scene, geometry, settings);
+    transport::light(gpu, &view, plan, &mut Control { cancelled: &never, progress: &mut |_, _| {} }).unwrap()
+}
+
+#[test]
+fn no_built_in_scene_has_a_value_that_is_no_number() {
+    let Some(gpu) = device() else { return };
+    for name in built_in::names() {
+        let scene = built_in::by_name(name).unwrap();
+        let geometry = Geometry::new(&scene).unwrap();
+        for (illumination, final_gather) in [(Illumination::Split, true), (Illumination::Photons, false)] {
+            let settings = TransportSettings { illumination, final_gather, photons: 1000, ..paranoid() };
+            let lit = light(&gpu, &scene, &geometry, &settings);
+            assert_eq!(lit.oddities, Some(Oddities::default()), "{name}, {illumination:?}");
+            // Looking changes nothing.
+            let unwatched = light(&gpu, &scene, &geometry, &TransportSettings { paranoid: false, ..settings });
+            assert_eq!(unwatched.oddities, None);
+            assert_eq!(unwatched.film, lit.film, "{name}, {illumination:?}");
+        }
+    }
+    for preset in [Preset::Naive, Preset::Modified, Preset::Phong, Preset::Rounds] {
+        let settings = Settings { paranoid: true, rounds: 2, ..Settings::preset(preset) };
+        assert_eq!(run(&gpu, &settings).oddities, Some(Oddities::default()), "{preset:?}");
+        assert_eq!(run_on_cpu(&settings).oddities, Some(Oddities::default()), "{preset:?}");
+    }
+}
+
+/// The mirror reflects no number: the photons that are named are those that meet it.
+#[test]
+fn a_planted_value_is_counted_and_its_photon_named() {
+    let Some(gpu) = device() else { return };
+    let scene = built_in::by_name("cornell-spheres").unwrap();
+    let mut geometry = Geometry::new(&scene).unwrap();
+    let mirror = scene.materials.iter().position(|material| material.name == "mirror").unwrap();
+    for poison in [f32::NAN, f32::INFINITY] {
+        geometry.materials[mirror].base_colour = Vec3::new(1.0, poison, 1.0);
+        let settings = TransportSettings { rounds: 1, photons: 400, caustic_photons: 50, ..paranoid() };
+        let lit = light(&gpu, &scene, &geometry, &settings);
+        let oddities = lit.oddities.unwrap();
+        assert!(oddities.count > 10, "{oddities:?}");
+        assert!(oddities.text().contains("--replay 0:"), "{}", oddities.text());
+        let plan = plan_of(&gpu, &scene, &geometry, &settings);
+        let named: BTreeSet<u32> = oddities.first.iter().filter(|oddity| oddity.what == What::Photon).map(|oddity| oddity.item).collect();
+        // All of them were written down, so that those not named have nothing odd.
+        assert!(oddities.first.len() < 64 && !named.is_empty(), "{oddities:?}");
+        for photon in named.iter().copied().take(6).chain((0..400).filter(|photon| !named.contains(photon)).take(6)) {
+            let path = replay(&gpu, &geometry, &plan, PhotonName { round: 0, photon, caustic: false }).unwrap();
+            assert_eq!(path.oddities.unwrap().count > 0, named.contains(&photon), "photon {photon}: {:?}", path.vertices);
+        }
+    }
+}
+
+/// Every builder's map holds of a photon what it stores when it is traced alone.
+#[test]
+fn a_photon_alone_takes_the_path_that_it_takes_among_others() {
+    let Some(gpu) = device() else { return };
+    for settings in [Settings::default(), Settings { photons: 20_001, rng: photonmill::rng::Rng::Philox, ..Settings::default() }] {
+        for variant in Variant::ON_GPU {
+            let settings = Settings { variant, ..settings.clone() };
+            let all = in_order(photons(&gpu, &settings));
+            let most = all.iter().max_by_key(|photon| photon.bounce).unwrap().photon;
+            for photon in [0, 1, most, settings.photons / 2, settings.photons - 1] {
+                let expected: Vec<_> = all.iter().copied().filter(|stored| stored.photon == photon).collect();
+                let found = in_order(render::replay_on_gpu(&gpu, &open_box(&settings), &settings, 0, photon).unwrap());
+                assert_eq!(found, expected, "{variant:?}, photon {photon}");
+            }
+        }
+        let all = in_order(photons_on_cpu(&settings));
+        let most = all.iter().max_by_key(|photon| photon.bounce).unwrap().photon;
+        let expected: Vec<_> = all.into_iter().filter(|stored| stored.photon == most).collect();
+        assert!(expected.len() > 5);
+        assert_eq!(in_order(render::replay_on_cpu(&open_box(&settings), &settings, 0, most).unwrap()), expected);
+    }
+}
