@@ -254,15 +254,17 @@ fn append(gpu: &Device, scene: &RoomScene, settings: &Settings, capacity: u32) -
             eye: settings.eye.into(),
         };
         let (paths, next_paths) = if bounce % 2 == 0 { (&ends[0], &ends[1]) } else { (&ends[1], &ends[0]) };
-        let Resources { rooms, walls, counters, tallies, .. } = &resources;
+        let Resources { rooms, walls, counters, tallies, oddities, .. } = &resources;
         let (photons, extent) = (&photons, Extent::Items(u64::from(path_count)));
         match settings.variant {
-            Variant::Naive => commands.dispatch(TraceSlots { rooms, walls, paths, next_paths, photons, counters, tallies }, &push, extent),
+            Variant::Naive => {
+                commands.dispatch(TraceSlots { rooms, walls, paths, next_paths, photons, counters, tallies, oddities }, &push, extent)
+            }
             Variant::Atomic => {
-                commands.dispatch(TraceAtomic { rooms, walls, paths, next_paths, photons, counters, tallies }, &push, extent)
+                commands.dispatch(TraceAtomic { rooms, walls, paths, next_paths, photons, counters, tallies, oddities }, &push, extent)
             }
             Variant::Ballot => {
-                commands.dispatch(TraceBallot { rooms, walls, paths, next_paths, photons, counters, tallies }, &push, extent)
+                commands.dispatch(TraceBallot { rooms, walls, paths, next_paths, photons, counters, tallies, oddities }, &push, extent)
             }
             Variant::Cpu => unreachable!("kernels only"),
         }
