@@ -287,6 +287,7 @@ fn the_paper_is_regenerated() {
     }
     assert!(!page.contains("http://") && !page.contains("src=\"/"), "the page opens without a network");
     let table = std::fs::read_to_string(folder.path().join("paper/table1.csv")).unwrap();
-    let published: Vec<&str> = table.lines().skip(1).take(5).filter_map(|line| line.rsplit(',').next()).collect();
-    assert_eq!(published, ["2130", "10670", "20850", "53280", "105640"]);
+    let published: Vec<&str> = table.lines().skip(1).filter_map(|line| line.rsplit(',').next()).collect();
+    // A busy machine leaves the longest runs by brute force out, and says so; the grid's are short.
+    assert!(published.windows(5).any(|rows| rows == ["2130", "10670", "20850", "53280", "105640"]), "{published:?}");
 }

@@ -153,7 +153,8 @@ impl Gpu {
         // SAFETY: as above.
         pipeline.layout = call("vkCreatePipelineLayout", unsafe { device.create_pipeline_layout(&info, None) })?;
 
-        let words = ash::util::read_spv(&mut Cursor::new(module.spirv)).expect("build.rs wrote whole SPIR-V words");
+        let own = || ash::util::read_spv(&mut Cursor::new(module.spirv)).expect("build.rs wrote whole SPIR-V words");
+        let words = self.replaced.iter().find(|(name, _)| name == module.name).map_or_else(own, |(_, words)| words.clone());
         let info = vk::ShaderModuleCreateInfo::default().code(&words);
         // SAFETY: the code comes from the GLSL compiler.
         let shader = call("vkCreateShaderModule", unsafe { device.create_shader_module(&info, None) })?;

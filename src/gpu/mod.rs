@@ -46,12 +46,15 @@ pub struct Options {
     pub without_timestamps: bool,
     /// Behave as on a device without 64-bit atomics.
     pub without_int64_atomics: bool,
+    /// SPIR-V in place of a kernel's own, by the kernel's name: how tests plant faults.
+    pub replaced: Vec<(String, Vec<u32>)>,
 }
 
 /// An open device.
 pub struct Gpu {
     facts: DeviceFacts,
     time_dispatches: bool,
+    replaced: Vec<(String, Vec<u32>)>,
     queue: vk::Queue,
     pipelines: RefCell<HashMap<kernel::PipelineKey, Rc<kernel::Pipeline>>>,
     cache: kernel::DiskCache,
@@ -128,7 +131,15 @@ impl Gpu {
         .map_err(|error| Error::Device { call: "the memory allocator", reason: error.to_string() })?;
         let context = Rc::new(Context { allocator: RefCell::new(Some(allocator)), device, debug, messages, instance, _entry: entry });
         let cache = kernel::DiskCache::open(&context, &facts)?;
-        let gpu = Gpu { facts, time_dispatches: options.time_dispatches, queue, pipelines: RefCell::default(), cache, context };
+        let gpu = Gpu {
+            facts,
+            time_dispatches: options.time_dispatches,
+            replaced: options.replaced.clone(),
+            queue,
+            pipelines: RefCell::default(),
+            cache,
+            context,
+        };
         check::run(&gpu)?;
         Ok(gpu)
     }

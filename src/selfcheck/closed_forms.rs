@@ -140,7 +140,7 @@ fn sun_and_sky() -> Vec<Case> {
         for illumination in BOTH {
             cases.push(case(format!("{name}, {illumination:?}: irradiance"), expected, move |gpu| {
                 let settings = TransportSettings { bounces: 2, ..settings(illumination, 0.25) };
-                irradiance(gpu, &scene(name), &settings, &floor(DVec3::ZERO, 4.0))
+                irradiance(gpu, &scene(name), &settings, &floor(DVec3::ZERO, 4.4))
             }));
         }
     }

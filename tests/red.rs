@@ -1,0 +1,335 @@
+//! Checks that can fail: faults are planted in the kernels' sources, and the checks of the other tests must
+//! complain. Checks of numbers on the host show it beside themselves (`assert_complains`).
+
+mod common;
+#[path = "../glsl/compile.rs"]
+mod compile;
+
+use std::path::Path;
+use std::sync::atomic::AtomicBool;
+
+use common::{Check, assert_complains, assert_holds, equal_sums, in_order, open, photons, photons_on_cpu, run_on_cpu};
+use glam::{DVec3, Vec3};
+use photonmill::constants;
+use photonmill::gpu::{Gpu, Options, check};
+use photonmill::plan::transport::{Sensor, TransportPlan};
+use photonmill::render::{self, Control};
+use photonmill::scene::geometry::Geometry;
+use photonmill::scene::open_box::open_box;
+use photonmill::scene::{Material, Mesh, Scene, built_in};
+use photonmill::selfcheck::measure::irradiance;
+use photonmill::selfcheck::{self, Finding};
+use photonmill::settings::transport::{Append, Illumination, TransportSettings};
+use photonmill::settings::{Gather, Math, Settings, Variant};
+use photonmill::transport::{self, RoundFilm, View};
+
+/// What is asked of a device.
+#[derive(Debug, Clone, Copy)]
+enum Question {
+    /// A builder's photon map is the CPU builder's, bit for bit.
+    Photons(Variant),
+    /// So is the film.
+    Film(Gather),
+    /// The ledger closes and nothing is dropped.
+    Ledger(Variant),
+    /// A closed form of `selfcheck`, by name.
+    ClosedForm(&'static str),
+    /// Lists of survivors in any order give the same picture.
+    Appends,
+    /// A lamp shut in a box 2^-11 of the scene high lights nothing outside.
+    Gap,
+    /// Strict quotients and roots are IEEE 754's.
+    StrictMath,
+}
+
+use Question::*;
+
+struct Fault {
+    what: &'static str,
+    /// Under `glsl/`.
+    file: &'static str,
+    from: &'static str,
+    to: &'static str,
+    /// Kernels that run the spoiled source.
+    kernels: &'static [&'static str],
+    /// Questions that must be answered wrong.
+    noticed_by: &'static [Question],
+}
+
+const FAULTS: [Fault; 18] = [
+    Fault {
+        what: "every other lane of a subgroup writes over its neighbour",
+        file: "append/ballot.glsl",
+        from: "subgroupBallotExclusiveBitCount(survivors);",
+        to: "(subgroupBallotExclusiveBitCount(survivors) & 0xfffffffeu);",
+        kernels: &["trace_ballot", "fly_ballot"],
+        noticed_by: &[Photons(Variant::Ballot), Appends],
+    },
+    Fault {
+        what: "a lane is lost",
+        file: "append/compact.glsl",
+        from: "bool stored = alive &&",
+        to: "bool stored = alive && gl_SubgroupInvocationID != 5u &&",
+        kernels: &["trace_atomic"],
+        noticed_by: &[Ledger(Variant::Atomic), Photons(Variant::Atomic)],
+    },
+    Fault {
+        what: "a survivor's path is forgotten",
+        file: "append/slots.glsl",
+        from: "next_paths[index] = path;",
+        to: "if (index % 10u != 7u) next_paths[index] = path;",
+        kernels: &["trace_slots"],
+        noticed_by: &[Ledger(Variant::Naive), Photons(Variant::Naive)],
+    },
+    Fault {
+        what: "a photon is gathered twice",
+        file: "stages/gather_grid.glsl",
+        from: "gather_photon(gathered, sorted_photons[i].flux, sorted_photons[i].weight);",
+        to: "gather_photon(gathered, sorted_photons[i].flux, sorted_photons[i].weight);\n\
+             if (i == 100u) gather_photon(gathered, sorted_photons[i].flux, sorted_photons[i].weight);",
+        kernels: &["gather_grid_u64", "gather_grid_two_words"],
+        noticed_by: &[Film(Gather::Grid)],
+    },
+    Fault {
+        what: "a photon in fifty is stored twice",
+        file: "stages/flight.glsl",
+        from: "        map[place] = photon;",
+        to: "        map[place] = photon;\n        if (path.photon % 50u == 0u) map[atomicAdd(counters[0], 1)] = photon;",
+        kernels: &["fly_atomic"],
+        noticed_by: &[Appends],
+    },
+    Fault {
+        what: "the radius is 1 % too large over the grid",
+        file: "stages/estimate.glsl",
+        from: "distance_squared <= push.radius_squared",
+        to: "distance_squared <= 1.0201 * push.radius_squared",
+        kernels: &["gather_grid_u64", "gather_grid_two_words"],
+        noticed_by: &[Film(Gather::Grid)],
+    },
+    Fault {
+        what: "the radius is 1 % too small by brute force",
+        file: "stages/estimate.glsl",
+        from: "distance_squared <= push.radius_squared",
+        to: "distance_squared <= 0.9801 * push.radius_squared",
+        kernels: &["gather_brute_u64", "gather_brute_two_words"],
+        noticed_by: &[Film(Gather::Brute)],
+    },
+    Fault {
+        what: "the radius of a lookup is 1 % too small",
+        file: "stages/lookup.glsl",
+        from: "distance_squared <= push.radius * push.radius &&",
+        to: "distance_squared <= 0.9801 * push.radius * push.radius &&",
+        kernels: &["lookup_u64", "lookup_two_words"],
+        noticed_by: &[ClosedForm("furnace, Photons: irradiance")],
+    },
+    Fault {
+        what: "shadow rays count the cosine twice",
+        file: "scene/direct.glsl",
+        from: "(cosine * lobe_weight",
+        to: "(cosine * cosine * lobe_weight",
+        kernels: &["receive", "view"],
+        noticed_by: &[ClosedForm("point light, 0.5 m aside: irradiance"), ClosedForm("point light: radiance of the plane")],
+    },
+    Fault {
+        what: "reflected directions have the cosine thrice",
+        file: "sampling.glsl",
+        from: "direction_at(sqrt(u), 1.0 - u, azimuth)",
+        to: "direction_at(sqrt(sqrt(u)), 1.0 - sqrt(u), azimuth)",
+        kernels: &["trace_ballot", "shine", "fly_ballot"],
+        noticed_by: &[
+            ClosedForm("open box, ballot builder, uniform lamps: stored a photon"),
+            ClosedForm("disc light, photons: irradiance"),
+        ],
+    },
+    Fault {
+        what: "the probability of a light is taken for twice its value",
+        file: "scene/lights.glsl",
+        from: "divide(light.strength, light.probability)",
+        to: "divide(light.strength, 2.0 * light.probability)",
+        kernels: &["receive"],
+        noticed_by: &[ClosedForm("disc light: irradiance")],
+    },
+    Fault {
+        what: "photons are sorted into the cell beside theirs",
+        file: "kernels/map_scatter.comp",
+        from: "bucket_of(cell_at(photon.position, push), push)",
+        to: "((bucket_of(cell_at(photon.position, push), push) + uint(index % 3u == 0u)) & push.bucket_mask)",
+        kernels: &["map_scatter"],
+        noticed_by: &[ClosedForm("furnace, Photons: irradiance")],
+    },
+    Fault {
+        what: "one photon is sorted into the cell beside its own",
+        file: "kernels/cell_scatter.comp",
+        from: "cell_number(cell, push.cell_count)",
+        to: "(cell_number(cell, push.cell_count) ^ uint(index == 11u))",
+        kernels: &["cell_scatter"],
+        noticed_by: &[Film(Gather::Grid)],
+    },
+    Fault {
+        what: "sums are kept in f32",
+        file: "film/film.glsl",
+        from: "sum.x = uaddCarry(sum.x, amount, carry);",
+        to: "sum.x = uint(float(sum.x) + float(amount)); carry = 0;",
+        kernels: &["gather_grid_u64", "gather_grid_two_words"],
+        noticed_by: &[Film(Gather::Grid)],
+    },
+    Fault {
+        what: "edges are not corrected",
+        file: "kernels/resolve.comp",
+        from: "if (HAS_EDGE_CORRECTION) {",
+        to: "if (false) {",
+        kernels: &["resolve"],
+        noticed_by: &[ClosedForm("furnace, Photons: irradiance"), ClosedForm("sun-over-plane, Photons: irradiance")],
+    },
+    Fault {
+        what: "rays start a fixed length off their surface",
+        file: "scene/bvh.glsl",
+        from: "precise vec3 start = position + way;",
+        to: "precise vec3 start = position + 1e-3 * normal * (dot(direction, normal) < 0.0 ? -1.0 : 1.0);",
+        kernels: &["shine", "fly_ballot", "fly_atomic", "receive", "view"],
+        noticed_by: &[Gap],
+    },
+    Fault {
+        what: "glass has the inverse index",
+        file: "scene/scatter.glsl",
+        from: "surface.front ? divide(1.0, surface.parameter) : surface.parameter",
+        to: "surface.front ? surface.parameter : divide(1.0, surface.parameter)",
+        kernels: &["view"],
+        noticed_by: &[ClosedForm("glass slab: radiance")],
+    },
+    Fault {
+        what: "strict quotients are cut instead of rounded",
+        file: "math.glsl",
+        from: "quotient += uint(off) + uint(2 * remainder > d);",
+        to: "quotient += uint(off);",
+        kernels: &["check_math"],
+        noticed_by: &[StrictMath],
+    },
+];
+
+fn strict() -> Settings {
+    Settings { math: Math::Strict, shininess: [Some(2.0); 5], mesh: 16, ..Settings::default() }
+}
+
+fn small() -> TransportSettings {
+    TransportSettings {
+        photons: 3000,
+        rounds: 2,
+        shadow_rays: 2,
+        illumination: Illumination::Photons,
+        math: Math::Strict,
+        ..TransportSettings::default()
+    }
+}
+
+fn film(gpu: &Gpu, scene: &Scene, settings: &TransportSettings) -> RoundFilm {
+    let geometry = Geometry::new(scene).unwrap();
+    let plan =
+        TransportPlan::new(scene, &geometry, settings, Sensor::Picture { width: 16, height: 16 }, &render::limits(gpu.facts())).unwrap();
+    let never = AtomicBool::new(false);
+    let view = View { geometry: &geometry, camera: scene.cameras.first(), phases: &[] };
+    transport::light(gpu, &view, plan, &mut Control { cancelled: &never, progress: &mut |_, _| {} }).unwrap().film
+}
+
+fn same_film(found: &RoundFilm, expected: &RoundFilm) -> Check {
+    equal_sums("the film", &found.sums, &expected.sums)
+}
+
+fn cornell() -> Scene {
+    built_in::by_name("cornell").unwrap()
+}
+
+/// A lamp shut in by a flat box of a height of 2^-11; the light on the floor of the room around it.
+fn light_outside_of_a_gap(gpu: &Gpu) -> f64 {
+    let mut scene = built_in::by_name("furnace").unwrap();
+    scene.materials = vec![
+        Material::lambert("wall", Vec3::splat(0.7)),
+        Material { emission: Vec3::splat(10.0), ..Material::lambert("lamp", Vec3::splat(0.5)) },
+    ];
+    let (corner, height) = (DVec3::splat(0.4), DVec3::Y / 2048.0);
+    let (x, z) = (DVec3::X * 0.2, DVec3::Z * 0.2);
+    let mut side = |name: &str, origin: DVec3, u: DVec3, v: DVec3, material: usize| {
+        // Both faces, as light must not pass either way.
+        scene.meshes.push(Mesh::parallelogram(name, origin, u, v, material));
+        scene.meshes.push(Mesh::parallelogram(name, origin, v, u, 0));
+    };
+    side("lamp", corner, z, x, 1);
+    side("lid", corner + height, x, z, 0);
+    side("left", corner, z, height, 0);
+    side("right", corner + x, height, z, 0);
+    side("back", corner, height, x, 0);
+    side("front", corner + z, x, height, 0);
+    let settings = TransportSettings { photons: 20_000, rounds: 1, illumination: Illumination::Photons, ..TransportSettings::default() };
+    irradiance(gpu, &scene, &settings, &[(DVec3::new(0.5, 0.0, 0.5), DVec3::Y), (DVec3::new(0.5, 1.0, 0.5), DVec3::NEG_Y)]).unwrap().mean
+}
+
+fn ask(gpu: &Gpu, question: Question) -> Check {
+    let never = AtomicBool::new(false);
+    match question {
+        Photons(variant) => {
+            let settings = Settings { variant, ..strict() };
+            let (found, expected) = (in_order(photons(gpu, &settings)), in_order(photons_on_cpu(&settings)));
+            if found == expected { Ok(()) } else { Err(format!("{} photons, not the {} of the CPU builder", found.len(), expected.len())) }
+        }
+        Film(gather) => {
+            let settings = Settings { gather, ..strict() };
+            let mut control = Control { cancelled: &never, progress: &mut |_, _| {} };
+            let found = render::on_gpu(gpu, &open_box(&settings), &settings, &mut control).map_err(|error| error.to_string())?;
+            equal_sums("the film", &found.film.sums, &run_on_cpu(&settings).film.sums)
+        }
+        Ledger(variant) => {
+            let settings = Settings { variant, mesh: 1, ..strict() };
+            let mut control = Control { cancelled: &never, progress: &mut |_, _| {} };
+            render::on_gpu(gpu, &open_box(&settings), &settings, &mut control).map_or_else(|error| Err(error.to_string()), |_| Ok(()))
+        }
+        ClosedForm(name) => {
+            let case = selfcheck::cases().into_iter().find(|case| case.name == name).unwrap_or_else(|| panic!("there is no case {name}"));
+            let finding = Finding::new(name, case.expected, (case.measure)(Some(gpu)).map_err(|error| error.to_string())?);
+            if finding.passed { Ok(()) } else { Err(format!("{finding:?}")) }
+        }
+        Appends => {
+            let of = |append| film(gpu, &cornell(), &TransportSettings { append, ..small() });
+            same_film(&of(Append::Ballot), &of(Append::Atomic))
+        }
+        Gap => match light_outside_of_a_gap(gpu) {
+            0.0 => Ok(()),
+            leaked => Err(format!("{leaked} W/m2 leave the box")),
+        },
+        StrictMath => check::strict_math(gpu).map_err(|error| error.to_string()),
+    }
+}
+
+/// The kernels with a fault in them.
+fn spoiled(fault: &Fault) -> Vec<(String, Vec<u32>)> {
+    let glsl = Path::new(env!("CARGO_MANIFEST_DIR")).join("glsl");
+    let edit = |file: &str, text: String| {
+        if file != fault.file {
+            return text;
+        }
+        assert_eq!(text.matches(fault.from).count(), 1, "{}: {} says no longer {:?}", fault.what, fault.file, fault.from);
+        text.replace(fault.from, fault.to)
+    };
+    let compile = |kernel: &&str| {
+        let name = format!("kernels/{kernel}.comp");
+        let compiled = compile::compile(&glsl, &name, constants::SHARED_WITH_GLSL, &edit).unwrap_or_else(|error| panic!("{error}"));
+        assert!(compiled.files.contains(&glsl.join(fault.file)), "{kernel} has nothing of {}", fault.file);
+        (kernel.to_string(), compiled.words)
+    };
+    fault.kernels.iter().map(compile).collect()
+}
+
+#[test]
+fn every_planted_fault_is_noticed() {
+    let Some(healthy) = open(Options::default()) else { return };
+    let mut asked: Vec<Question> = Vec::new();
+    for fault in &FAULTS {
+        let faulty = open(Options { replaced: spoiled(fault), ..Options::default() }).unwrap();
+        for question in fault.noticed_by {
+            if !asked.iter().any(|before| format!("{before:?}") == format!("{question:?}")) {
+                assert_holds(format!("{question:?} of a device without a fault"), ask(&healthy, *question));
+                asked.push(*question);
+            }
+            assert_complains(&format!("{}, asked for {question:?}", fault.what), ask(&faulty, *question));
+        }
+    }
+}
