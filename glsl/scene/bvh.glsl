@@ -32,6 +32,14 @@ ShearedRay sheared(vec3 origin, vec3 direction)
     return ShearedRay(origin, shear, axis);
 }
 
+// Bound of the error of each coordinate of a point on a triangle: a few roundings of its largest corner's. It is
+// the same along every axis, as a plane through the origin is no more exact than its corners.
+float triangle_error(Triangle triangle)
+{
+    vec3 largest = max(abs(triangle.a), max(abs(triangle.b), abs(triangle.c)));
+    return max(largest.x, max(largest.y, largest.z)) * (1.0 / 1048576.0);
+}
+
 // The distance below which rounding may have put a hit in front of the ray (Pharr, Jakob and Humphreys,
 // section 6.8.7): a ray that leaves a triangle does not meet it, or another of its plane, again.
 float nearest_certain(ShearedRay ray, vec3 a, vec3 b, vec3 c, vec3 edges, float determinant)
@@ -42,6 +50,17 @@ float nearest_certain(ShearedRay ray, vec3 a, vec3 b, vec3 c, vec3 edges, float 
     float edge = max(abs(edges.x), max(abs(edges.y), abs(edges.z)));
     float edge_error = 6.0 * rounding * flat_part.x * flat_part.y;
     return divide(3.0 * (2.0 * rounding * edge * z + edge_error * z), abs(determinant));
+}
+
+// Whether a ray whose distance to a triangle is lost in rounding meets it: it must come towards its plane from a
+// place off it. So a ray meets the wall beside the one that it leaves, however close to their edge, and never the
+// one that it leaves, nor another of that plane.
+bool comes_towards(ShearedRay ray, vec3 a, vec3 b, vec3 c, float error)
+{
+    vec3 normal = cross(b - a, c - a);
+    float height = -dot(normal, a);
+    float approach = dot(normal, vec3(ray.shear.xy, 1.0)) * (ray.shear.z < 0.0 ? -1.0 : 1.0);
+    return height * height > 0.0625 * error * error * dot(normal, normal) && (height > 0.0) != (approach > 0.0);
 }
 
 // Takes the triangle if the ray meets it within (0, hit.t), or at hit.t with a smaller number: then the
@@ -67,7 +86,10 @@ void intersect_triangle(ShearedRay ray, uint index, inout Hit hit)
         return;
     }
     precise float t = divide(ray.shear.z * (u * a.z + v * b.z + w * c.z), determinant);
-    if (t > nearest_certain(ray, a, b, c, vec3(u, v, w), determinant) && (t < hit.t || (t == hit.t && index < hit.triangle))) {
+    if (t < hit.t || (t == hit.t && index < hit.triangle)) {
+        if (t <= nearest_certain(ray, a, b, c, vec3(u, v, w), determinant) && !comes_towards(ray, a, b, c, triangle_error(triangle))) {
+            return;
+        }
         precise float second = divide(v, determinant);
         precise float third = divide(w, determinant);
         hit = Hit(t, index, second, third);
@@ -173,19 +195,11 @@ bool is_occluded(vec3 origin, vec3 way)
 // Where a ray starts that leaves `position` towards `direction`: off the surface by what the position may
 // be wrong, and one float further (Pharr, Jakob and Humphreys, section 6.8.6). `error` bounds each
 // coordinate's error.
-vec3 offset_origin(vec3 position, vec3 error, vec3 normal, vec3 direction)
+vec3 offset_origin(vec3 position, float error, vec3 normal, vec3 direction)
 {
-    precise vec3 way = dot(abs(normal), error) * (dot(direction, normal) < 0.0 ? -normal : normal);
+    precise vec3 way = error * (abs(normal.x) + abs(normal.y) + abs(normal.z)) * (dot(direction, normal) < 0.0 ? -normal : normal);
     precise vec3 start = position + way;
     ivec3 bits = floatBitsToInt(start);
     ivec3 away = ivec3(sign(way)) * (ivec3(1) | (bits >> 31));
     return mix(intBitsToFloat(bits + away), start, equal(start, vec3(0.0)));
-}
-
-// Bound of the error of each coordinate of a point on a triangle: a few roundings of its largest corner's. It is
-// the same along every axis, as a plane through the origin is no more exact than its corners.
-vec3 triangle_error(Triangle triangle)
-{
-    vec3 largest = max(abs(triangle.a), max(abs(triangle.b), abs(triangle.c)));
-    return vec3(max(largest.x, max(largest.y, largest.z)) * (1.0 / 1048576.0));
 }

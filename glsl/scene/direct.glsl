@@ -3,7 +3,7 @@
 // A point that light arrives at: a surface, or a receiver.
 struct Target {
     vec3 position;
-    vec3 error;
+    float error;
     vec3 ng;
     vec3 ns;
     vec3 wo;

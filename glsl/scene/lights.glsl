@@ -33,10 +33,10 @@ vec3 sample_disc(vec3 centre, vec3 normal, float radius, vec2 u)
 
 // Bound of the error of each coordinate of a point on no triangle. What lies there, of a scene one unit wide,
 // is no better known than to a part of that.
-vec3 position_error(vec3 position)
+float position_error(vec3 position)
 {
     vec3 size = abs(position);
-    return vec3(max(max(size.x, 0.25), max(size.y, size.z)) * (1.0 / 1048576.0));
+    return max(max(size.x, 0.25), max(size.y, size.z)) * (1.0 / 1048576.0);
 }
 
 float triangle_area(Triangle triangle)
@@ -72,7 +72,9 @@ Emission sample_emission(uint emitter_count, float scene_radius, vec4 u, vec4 w)
                 normal = material.two_sided != 0 && u.w < 0.5 ? -normal : normal;
             }
             emission.direction = to_frame(sample_cosine_hemisphere(w.x, w.y), normal);
-            emission.position = offset_origin(triangle_point(triangle, at.x, at.y), triangle_error(triangle), normal, normal);
+            float error = triangle_error(triangle);
+            vec2 inside = off_the_edges(triangle, at, error);
+            emission.position = offset_origin(triangle_point(triangle, inside.x, inside.y), error, normal, normal);
             if (HAS_TEXTURES) {
                 if (material.emission_texture != NONE) {
                     TriangleUvs uv = uvs[light.triangle];
@@ -202,7 +204,7 @@ Arriving sample_light(uint emitter_count, vec3 position, vec3 ns, vec4 u)
                 if (direction.w > 0.0 && approach > 0.0) {
                     by_direction = true;
                     point = position + direction.xyz * divide(dot(normal, position - triangle.a), approach);
-                    vec3 error = position_error(point) + triangle_error(triangle);
+                    float error = position_error(point) + triangle_error(triangle);
                     arriving.target = offset_origin(point, error, normal, normal);
                     arriving.radiance = material.emission * divide(direction.w, light.probability);
                 }

@@ -8,7 +8,7 @@ layout(set = 0, binding = 6, scalar) readonly buffer Texels { uvec2 texels[]; };
 
 struct Surface {
     vec3 position;
-    vec3 error; // bound of each coordinate's
+    float error; // bound of each coordinate's
     vec3 ng; // geometric normal on the side of wo
     vec3 ns; // shading normal on the same side
     bool front;
@@ -67,6 +67,25 @@ vec3 triangle_point(Triangle triangle, float u, float v)
     return point;
 }
 
+// Barycentric weights of the second and third corner, moved into the triangle until the point is off its edges by
+// its own error: what starts there starts on the right side of the wall beyond the edge.
+vec2 off_the_edges(Triangle triangle, vec2 weights, float error)
+{
+    vec3 ab = triangle.b - triangle.a, ac = triangle.c - triangle.a, bc = triangle.c - triangle.b;
+    vec3 perpendicular = cross(ab, ac);
+    vec3 all_weights = vec3(1.0 - weights.x - weights.y, weights);
+    // Distance from the edge opposite a corner = its weight * |perpendicular| / edge.
+    float area_squared = dot(perpendicular, perpendicular);
+    vec3 edges_squared = vec3(dot(bc, bc), dot(ac, ac), dot(ab, ab));
+    vec3 least_squared = error * error * edges_squared;
+    if (all(greaterThanEqual(all_weights, vec3(0.0))) && all(greaterThanEqual(all_weights * all_weights * area_squared, least_squared))) {
+        return weights;
+    }
+    vec3 least = divide(least_squared, area_squared);
+    all_weights = max(all_weights, min(vec3(sqrt(least.x), sqrt(least.y), sqrt(least.z)), vec3(0.25)));
+    return divide(all_weights.yz, all_weights.x + all_weights.y + all_weights.z);
+}
+
 // Radiance that leaves a triangle's shining side.
 vec3 emitted_radiance(SurfaceMaterial material, uint index, float u, float v)
 {
@@ -85,8 +104,9 @@ Surface surface_at(Hit hit, vec3 wo)
     Triangle triangle = triangles[hit.triangle];
     SurfaceMaterial material = materials[triangle.material];
     Surface surface;
-    surface.position = triangle_point(triangle, hit.u, hit.v);
     surface.error = triangle_error(triangle);
+    vec2 inside = off_the_edges(triangle, vec2(hit.u, hit.v), surface.error);
+    surface.position = triangle_point(triangle, inside.x, inside.y);
     vec3 normal = triangle_normal(triangle);
     surface.front = dot(normal, wo) >= 0.0;
     surface.ng = surface.front ? normal : -normal;
