@@ -241,6 +241,24 @@ fn no_kernel_forks_inside_a_function() {
     }
 }
 
+/// Ways in which one invocation waits for another. No device promises that the other one moves on.
+fn waits(source: &str) -> Vec<&'static str> {
+    let code = code_of(source);
+    ["atomicCompSwap", "atomicExchange", "coherent", "volatile", "while (atomic", "while (!atomic"]
+        .into_iter()
+        .filter(|way| code.contains(way))
+        .collect()
+}
+
+#[test]
+fn no_kernel_waits_for_another_invocation() {
+    for (path, source) in files(&root("glsl")) {
+        assert_eq!(waits(&source), [""; 0], "{}", path.display());
+    }
+    assert_eq!(waits("while (atomicCompSwap(lock, 0, 1) != 0) {}").len(), 2);
+    assert!(waits("// atomicExchange would wait\natomicAdd(count, 1);").is_empty());
+}
+
 #[test]
 fn the_check_complains_about_arrows_to_the_right() {
     let complains = |module: &str, source: &str| !wrong_arrows(module, true, source).is_empty();

@@ -168,6 +168,28 @@ fn what_is_left_out_is_named_once() {
     }
 }
 
+/// At half a turn a picture is mirrored, at none all of its rays are one.
+#[test]
+fn views_too_wide_or_too_narrow_are_left_out_by_name() {
+    let with = |angle: f64| {
+        let mut value = square();
+        value["cameras"][0]["perspective"]["yfov"] = json!(angle);
+        load(&value)
+    };
+    for angle in [0.0, 1e-4, -0.7, 3.13, std::f64::consts::PI, 7.0, 1e30] {
+        match with(angle) {
+            Ok(scene) => {
+                assert!(scene.cameras.is_empty(), "{angle}");
+                assert!(scene.warnings.iter().any(|warning| warning.contains("vertical view")), "{angle}: {:?}", scene.warnings);
+            }
+            Err(error) => assert_eq!(error.exit_code(), 2, "{angle}: {error}"),
+        }
+    }
+    for angle in [0.0021, 0.7, 3.11] {
+        assert_eq!(with(angle).unwrap().cameras.len(), 1, "{angle}");
+    }
+}
+
 #[test]
 fn a_scene_without_light_is_read_and_flat_triangles_are_a_warning() {
     let mut value = square();

@@ -1,18 +1,133 @@
 //! Hard cases of geometry and materials: whatever is done to a scene that should not change its light does not,
-//! and extremes stay finite and right.
+//! and extremes stay finite and right. `tests/random_numbers.rs` and `tests/extremes.rs` do the same for random
+//! numbers, and for sums, estimates and sizes.
+//!
+//! # Which test shows what
+//!
+//! Known failures of renderers by their number in a catalogue, and the tests that show that they do not happen here,
+//! or why they cannot: rays and triangles (G), sampling (S), random numbers (R), accumulation (A), density
+//! estimation (E), lobes (B), indices (I), scheduling (D), cameras (C), glass (L), many photons (M). The last test
+//! of this file holds the table against the sources.
+//!
+//! | case | tests |
+//! | --- | --- |
+//! | G1 | photons_leave_a_surface_once_and_for_all, photons_on_edges_and_in_corners_stay_in_the_room |
+//! | G2 | grazing_and_straight_directions_end_in_the_room |
+//! | G3 | thin_walls_and_sheets_let_no_light_through, small_lamps_shine_by_their_area |
+//! | G4 | black_walls_absorb_the_first_flights_hits, a_light_flush_with_a_wall_shines_into_the_room |
+//! | G5 | rays_at_edges_and_corners_meet_a_wall |
+//! | G6 | every_operation_is_rounded_by_itself |
+//! | G7 | axis_parallel_rays_meet_the_same_by_tree_and_list |
+//! | G8 | flat_doubled_and_reordered_triangles_change_no_bit, triangles_without_area_go |
+//! | G9 | - no sphere is intersected: spheres are meshes |
+//! | G10 | a_furnace_glows_alike_however_it_is_turned |
+//! | G11 | the_smallest_lamps_shine_into_the_room_or_are_left_out |
+//! | G12 | ten_thousand_sizes_away_the_light_is_the_same_to_the_bit, size_and_place_do_not_change_the_light |
+//! | G13 | every_power_of_two_is_the_same_light_to_the_bit, the_open_box_of_any_power_of_two_stores_the_same_photons |
+//! | G14 | flat_doubled_and_reordered_triangles_change_no_bit, two_sheets_at_one_place_show_each_its_own_side |
+//! | G15 | thin_walls_and_sheets_let_no_light_through, no_light_leaks_from_one_shelf_to_the_next |
+//! | S1 | unit_floats_stay_below_one |
+//! | S2 | grazing_and_straight_directions_end_in_the_room |
+//! | S3 | discs_and_hemispheres_have_their_moments |
+//! | S4 | discs_and_hemispheres_have_their_moments |
+//! | S5 | discs_and_hemispheres_have_their_moments |
+//! | S6 | choices_follow_the_shares_and_leave_none_out |
+//! | S7 | photons_are_dealt_by_power_and_none_is_lost |
+//! | S8 | a_closed_white_room_stores_everything, appending_at_survival_none_and_all |
+//! | S9 | each_channel_has_its_own_reflectance |
+//! | S10 | a_thousand_bounces_store_a_geometric_series, reflectances_and_bounces_at_their_ends_are_right |
+//! | S11 | a_million_photons_have_the_exact_shares |
+//! | S12 | lobes_reflect_what_lies_above_the_horizon |
+//! | S13 | lobes_of_any_width_throw_their_share |
+//! | S14 | - no quasi-Monte Carlo numbers |
+//! | R1 | rand48_gives_the_c_librarys_numbers, rand48_jumps_and_steps_meet_across_2_to_the_48 |
+//! | R2 | draws_are_even_alone_in_pairs_and_in_triples |
+//! | R3 | neighbouring_photons_do_not_resemble_each_other |
+//! | R4 | neighbouring_photons_do_not_resemble_each_other |
+//! | R5 | no_two_bounces_draw_the_same_numbers |
+//! | R6 | no_two_photons_draw_the_same_numbers, sixteen_million_photons_are_all_different |
+//! | R7 | two_naive_bounces_are_the_first_two_of_fifteen |
+//! | R8 | philox_gives_the_known_answers |
+//! | R9 | a_run_draws_the_whole_period_and_no_number_twice |
+//! | A1 | a_texel_counts_beyond_2_to_the_24 |
+//! | A2 | mixed_weights_are_summed_to_half_a_unit_each |
+//! | A3 | - no compensated sum: sums are integers |
+//! | A4 | runs_and_builders_and_gathers_give_the_same_bits |
+//! | A5 | film_sums_cannot_overflow, film_sums_are_refused_before_they_could_overflow |
+//! | A6 | the_start_up_check_passes, a_texel_counts_beyond_2_to_the_24 |
+//! | A7 | a_device_without_abilities_gives_the_same_bits |
+//! | A8 | standard_errors_survive_a_mean_far_above_them |
+//! | A9 | a_run_is_the_sum_of_rounds_that_differ |
+//! | A10 | faint_light_is_right_to_half_a_film_unit, light_is_linear_in_power_over_24_decades |
+//! | A11 | - no pair of floats: sums are integers |
+//! | E1 | edges_and_corners_are_dark_by_what_lies_beyond_them, edge_correction_divides_by_what_lies_on_the_wall |
+//! | E2 | edges_and_corners_are_dark_by_what_lies_beyond_them, disc_at_an_edge_and_in_a_corner |
+//! | E3 | a_lit_floor_does_not_light_the_foot_of_the_wall |
+//! | E4 | a_photon_on_the_rim_counts |
+//! | E5 | - no estimator by the nearest k photons |
+//! | E6 | - no estimator by the nearest k photons; fewer in reach, or none: E8, E11 |
+//! | E7 | every_kernel_of_every_radius_integrates_to_one |
+//! | E8 | an_empty_map_and_a_map_of_one, a_map_of_one_photon_is_one_disc |
+//! | E9 | the_index_holds_every_photon_in_its_cell, device_and_cpu_gather_the_same_photons_to_the_same_bits |
+//! | E10 | no_split_and_no_builder_changes_a_bit |
+//! | E11 | radii_from_the_whole_scene_to_below_the_photons_spacing_are_right |
+//! | E12 | radii_of_ten_thousand_rounds_follow_the_gamma_function |
+//! | E13 | stated_errors_are_the_spread_over_seeds |
+//! | E14 | the_film_holds_every_photon_once_for_each_texel_in_reach |
+//! | B1 | phong_weights_have_their_mean_and_vanish_behind, a_sun_in_a_plate_is_a_power_of_the_cosine |
+//! | B2 | phong_weights_have_their_mean_and_vanish_behind |
+//! | B3 | phong_weights_have_their_mean_and_vanish_behind |
+//! | B4 | lobes_reflect_what_lies_above_the_horizon |
+//! | B5 | phong_weights_are_powers_of_the_cosine, a_sun_in_a_plate_is_a_power_of_the_cosine |
+//! | B6 | lobes_reflect_what_lies_above_the_horizon |
+//! | I1 | slots_of_a_chunk_are_numbered_in_32_bits, maps_of_a_chunk_are_numbered_in_32_bits |
+//! | I2 | rounds_around_a_full_row_of_groups_lose_no_photon, photons_of_a_second_row_of_groups_reach_the_map |
+//! | I3 | slots_of_a_chunk_are_numbered_in_32_bits, a_round_larger_than_a_buffer_splits_and_drops_nothing |
+//! | I4 | a_full_map_drops_counts_and_keeps_to_its_room |
+//! | I5 | builders_store_the_same_photons_at_every_count, pictures_of_any_shape_are_whole |
+//! | I6 | photons_of_the_largest_numbers_are_their_own |
+//! | I7 | group_sizes_and_chunks_change_no_photon, the_prefix_sum_is_the_running_sum |
+//! | I8 | totals_exceed_32_bits, a_trillion_photons_merge_into_the_same_light |
+//! | D1 | long_photon_lists_are_gathered_to_the_end, loops_count_right_up_to_the_limit |
+//! | D2 | a_gather_that_is_cut_into_parts_is_whole |
+//! | D3 | the_order_of_appending_changes_no_photon |
+//! | D4 | a_validation_message_is_an_error, runs_and_builders_and_gathers_give_the_same_bits |
+//! | D5 | no_kernel_waits_for_another_invocation |
+//! | D6 | - no run is taken up again: what an interrupt leaves is whole (tests/cli.rs) |
+//! | D7 | tick_counts_wrap_at_their_valid_bits, timings_nest_and_count |
+//! | C1 | views_too_wide_or_too_narrow_are_left_out_by_name |
+//! | C2 | frames_are_orthonormal_even_straight_down |
+//! | C3 | an_eye_on_a_photon_sees_no_weight_and_no_nan, an_eye_on_a_surface_sees_numbers |
+//! | L1 | total_reflection_begins_at_the_critical_angle |
+//! | L2 | glass_reflects_by_fresnel_up_to_the_horizon |
+//! | L3 | an_index_of_one_reflects_nothing_at_any_angle, glass_of_the_air_s_own_index_is_not_there |
+//! | L4 | total_reflection_begins_at_the_critical_angle |
+//! | L5 | every_closed_form_holds |
+//! | L6 | diffuse_light_crosses_glass_by_its_mean_transmittance |
+//! | L7 | - no medium absorbs and no glass disperses |
+//! | M1 | work_groups_and_chunks_give_the_same_bits |
+//! | M2 | - no results of several runs are read and merged |
+//! | M3 | photons_of_the_largest_numbers_are_their_own, a_billion_photons_have_the_exact_share |
 
 mod common;
 
+use std::collections::HashSet;
 use std::f64::consts::PI;
 
-use common::{Check, assert_complains, assert_holds, device, z_check};
-use glam::{DVec2, DVec3, Vec3};
+use common::{Check, assert_complains, assert_holds, device, mean_red, received, relative_check, seen, share_check, z_check};
+use glam::{DQuat, DVec2, DVec3, Vec3};
 use photonmill::gpu::Gpu;
+use photonmill::plan::Plan;
+use photonmill::plan::transport::{Sensor, TransportPlan};
+use photonmill::scene::geometry::Geometry;
 use photonmill::scene::light::{Light, LightKind};
-use photonmill::scene::{Material, Mesh, Scene, Surface, built_in};
+use photonmill::scene::open_box::open_box;
+use photonmill::scene::{Camera, Material, Mesh, Scene, Surface, built_in};
 use photonmill::selfcheck::Estimate;
-use photonmill::selfcheck::measure::irradiance;
-use photonmill::settings::transport::{Illumination, TransportSettings};
+use photonmill::selfcheck::measure::{irradiance, radiance};
+use photonmill::settings::transport::{Effect, Illumination, Part, TransportSettings};
+use photonmill::settings::{EmissionLaw, Settings, Variant};
+use photonmill::transport::Lit;
 
 fn settings() -> TransportSettings {
     TransportSettings { photons: 4000, caustic_photons: 4000, rounds: 2, shadow_rays: 8, ..TransportSettings::default() }
@@ -85,6 +200,8 @@ fn how_a_wall_is_cut_does_not_change_its_light() {
     };
     let fine = replace(&|mesh| tessellated(mesh, 40));
     assert_holds("3200 triangles a wall", same_light("3200 triangles a wall", fine, expected));
+    let finest = replace(&|mesh| if mesh.name == "floor" { tessellated(mesh, 224) } else { mesh.clone() });
+    assert_holds("100 352 triangles a wall", same_light("100 352 triangles a wall", finest, expected));
     let sliver = replace(&|mesh| {
         let mut mesh = mesh.clone();
         // A vertex a hair from the diagonal: two slivers beside two triangles.
@@ -160,7 +277,7 @@ fn a_light_flush_with_a_wall_shines_into_the_room() {
         normal: DVec3::Y,
         radius: 0.1,
         power: Vec3::ONE,
-        law: photonmill::settings::EmissionLaw::Cosine,
+        law: EmissionLaw::Cosine,
     };
     scene.lights = vec![Light { name: "flush".into(), kind: kind(0.0) }];
     let above = [(DVec3::Y * 2.0, DVec3::NEG_Y)];
@@ -172,4 +289,905 @@ fn a_light_flush_with_a_wall_shines_into_the_room() {
         let beside = irradiance(&gpu, &scene, &settings, &[(DVec3::X * 0.3, DVec3::Y)]).unwrap();
         assert_eq!(beside.mean, 0.0, "{illumination:?}: the lamp's own wall");
     }
+}
+
+fn scene(name: &str) -> Scene {
+    built_in::by_name(name).unwrap_or_else(|| panic!("there is no scene {name}"))
+}
+
+fn light(kind: LightKind) -> Light {
+    Light { name: "light".into(), kind }
+}
+
+/// Maps alone, of a radius so small that looking them up takes no time.
+fn flights(photons: u32, bounces: u32) -> TransportSettings {
+    TransportSettings {
+        photons,
+        bounces,
+        rounds: 1,
+        radius: Some(1.0 / 1024.0),
+        illumination: Illumination::Photons,
+        ..TransportSettings::default()
+    }
+}
+
+/// A closed cube of 1 m, seen from inside, without light of its own.
+fn closed_room(albedo: f32) -> Scene {
+    let mut room = scene("furnace");
+    room.materials[0] = Material::lambert("wall", Vec3::splat(albedo));
+    room
+}
+
+/// Photons that left the scene.
+fn escaped(lit: &Lit) -> u64 {
+    lit.fates.iter().map(|fates| fates.ledger().escaped).sum()
+}
+
+fn none_escapes(what: &str, lit: &Lit) -> Check {
+    let flown: u64 = lit.fates[0].bounces.iter().map(|bounce| bounce.stored + bounce.absorbed + bounce.escaped).sum();
+    match escaped(lit) {
+        0 => Ok(()),
+        lost => Err(format!("{what}: {lost} of {} photons and {flown} flights left a closed room", lit.fates[0].emitted)),
+    }
+}
+
+/// Floating-point operations of a module that a driver may fuse or reorder, in functions other than `free`: results
+/// of arithmetic without the decoration `NoContraction`.
+fn contractible(spirv: &[u8], free: &str) -> usize {
+    let words: Vec<u32> = spirv.chunks_exact(4).map(|word| u32::from_le_bytes(word.try_into().unwrap())).collect();
+    let mut instructions = Vec::new();
+    let mut at = 5;
+    while at < words.len() {
+        let length = (words[at] >> 16) as usize;
+        instructions.push((words[at] & 0xffff, &words[at + 1..at + length]));
+        at += length;
+    }
+    let name =
+        |of: &[u32]| of[1..].iter().flat_map(|word| word.to_le_bytes()).take_while(|byte| *byte != 0).map(char::from).collect::<String>();
+    // OpName is 5, OpDecorate 71, NoContraction 42, OpFunction 54.
+    let free: Vec<u32> = instructions.iter().filter(|(op, of)| *op == 5 && name(of).starts_with(free)).map(|(_, of)| of[0]).collect();
+    let exact: HashSet<u32> = instructions.iter().filter(|(op, of)| *op == 71 && of[1] == 42).map(|(_, of)| of[0]).collect();
+    let mut function = 0;
+    let mut count = 0;
+    for (op, of) in &instructions {
+        if *op == 54 {
+            function = of[1];
+        }
+        // Sums, differences, products and quotients; products of vectors and matrices.
+        let is_arithmetic = matches!(op, 129 | 131 | 133 | 136 | 142..=148);
+        count += usize::from(is_arithmetic && !free.contains(&function) && !exact.contains(&of[1]));
+    }
+    count
+}
+
+/// Where a driver fused a product and a sum, an edge would have another sign in each of the triangles that share it.
+/// Only boxes of the hierarchy, which are widened, may be tested as fast as can be.
+#[test]
+fn every_operation_is_rounded_by_itself() {
+    let Some(gpu) = device() else { return };
+    let limits = photonmill::render::limits(gpu.facts());
+    let mut modules = Vec::new();
+    for illumination in [Illumination::Split, Illumination::Photons] {
+        for sensor in [Sensor::Picture { width: 1, height: 1 }, Sensor::Receivers { count: 1 }] {
+            let settings = TransportSettings { illumination, ..settings() };
+            let plan = TransportPlan::new(&cornell(), &Geometry::new(&cornell()).unwrap(), &settings, sensor, &limits).unwrap();
+            modules.extend(photonmill::transport::modules(&plan, gpu.facts()));
+        }
+    }
+    for variant in Variant::ON_GPU {
+        let settings = Settings { variant, ..Settings::default() };
+        let plan = Plan::new(&open_box(&settings), &settings, &limits).unwrap();
+        modules.extend(photonmill::trace::modules(&plan));
+        modules.extend(photonmill::estimate::modules(&plan, gpu.facts()));
+    }
+    assert!(modules.len() > 20);
+    for module in &modules {
+        assert_eq!(contractible(module.spirv, "intersect_children("), 0, "{}", module.name);
+    }
+    // The exception is seen where it is none.
+    assert!(modules.iter().any(|module| contractible(module.spirv, "no such function") > 0));
+}
+
+/// Rays that are aimed at places of a closed room, half of them exactly: a spot of the narrowest cone whose cosine
+/// f32 tells from 1.
+fn aimed_at(places: &[DVec3], from: DVec3) -> Vec<Light> {
+    let spot = |place: &DVec3| {
+        let direction = (*place - from).normalize();
+        light(LightKind::Spot { position: from, direction, intensity: Vec3::splat(1e7), inner_angle: 3.5e-4, outer_angle: 3.5e-4 })
+    };
+    places.iter().map(spot).collect()
+}
+
+/// Points of a cube's edges and corners.
+fn edges_and_corners() -> Vec<DVec3> {
+    let mut places: Vec<DVec3> = (0..8).map(|corner| DVec3::from_array([0, 1, 2].map(|axis| f64::from(corner >> axis & 1)))).collect();
+    for edge in 0..12 {
+        let (axis, side) = (edge / 4, edge % 4);
+        for step in 0..24 {
+            let mut place = DVec3::ZERO;
+            place[axis] = (f64::from(step) + 0.3) / 24.0;
+            place[(axis + 1) % 3] = (side & 1) as f64;
+            place[(axis + 2) % 3] = (side >> 1) as f64;
+            places.push(place);
+        }
+    }
+    places
+}
+
+/// Photons whose first flight ends on the edges that triangles share, on edges between walls and in corners: each
+/// meets something.
+#[test]
+fn rays_at_edges_and_corners_meet_a_wall() {
+    let Some(gpu) = device() else { return };
+    let from = DVec3::new(0.37, 0.52, 0.61);
+    let inner: Vec<DVec3> = (0..40)
+        .flat_map(|i| {
+            (0..6).map(move |face| {
+                // Vertices of a wall of 40 x 40 cells, and points of its diagonals.
+                let (s, t) = (f64::from(i) / 40.0, if face % 2 == 0 { f64::from(i) / 40.0 } else { f64::from(7 * i % 40) / 40.0 });
+                [
+                    DVec3::new(s, t, 0.0),
+                    DVec3::new(s, t, 1.0),
+                    DVec3::new(s, 0.0, t),
+                    DVec3::new(s, 1.0, t),
+                    DVec3::new(0.0, s, t),
+                    DVec3::new(1.0, s, t),
+                ][face]
+            })
+        })
+        .collect();
+    for cells in [1, 40] {
+        let mut room = closed_room(0.9);
+        room.meshes.iter_mut().for_each(|mesh| *mesh = tessellated(mesh, cells));
+        for (what, places) in [("edges and corners of the room", edges_and_corners()), ("edges and corners of triangles", inner.clone())] {
+            room.lights = aimed_at(&places, from);
+            let lit = received(&gpu, &room, &flights(200_000, 1), &[(DVec3::new(0.5, 0.0, 0.5), DVec3::Y)]);
+            let what = format!("{what}, {cells} x {cells} cells");
+            assert_holds(&what, none_escapes(&what, &lit));
+        }
+    }
+    // A wall that ends 2^-12 before its neighbour lets photons out.
+    let mut open = closed_room(0.9);
+    open.meshes[0].positions.iter_mut().for_each(|position| position.z = position.z.max(1.0 / 4096.0));
+    open.lights = aimed_at(&edges_and_corners(), from);
+    let lit = received(&gpu, &open, &flights(200_000, 1), &[(DVec3::new(0.5, 0.0, 0.5), DVec3::Y)]);
+    assert_complains("a gap of a 4096th", none_escapes("a gap", &lit));
+}
+
+/// Photons that start on walls, some within a rounding of an edge, and photons that were sent into edges and
+/// corners: none finds a way out, however often it is scattered.
+#[test]
+fn photons_on_edges_and_in_corners_stay_in_the_room() {
+    let Some(gpu) = device() else { return };
+    let point = [(DVec3::new(0.5, 0.0, 0.5), DVec3::Y)];
+    let furnace = received(&gpu, &scene("furnace"), &flights(1_000_000, 1), &point);
+    let mut room = closed_room(0.9);
+    room.lights = aimed_at(&edges_and_corners(), DVec3::new(0.37, 0.52, 0.61));
+    let aimed = received(&gpu, &room, &flights(100_000, 8), &point);
+    let checks = [none_escapes("from anywhere on the walls", &furnace), none_escapes("from edges and corners", &aimed)];
+    let complaints: Vec<String> = checks.into_iter().filter_map(Result::err).collect();
+    assert!(complaints.is_empty(), "{}", complaints.join("; "));
+}
+
+/// What a flat or convex surface scatters never meets it again: neither the triangle it left nor those beside it.
+fn none_returns(what: &str, lit: &Lit) -> Check {
+    let [first, second] = [lit.fates[0].bounces[0], lit.fates[0].bounces[1]];
+    assert!(first.stored > 10_000, "{what}: only {} photons were scattered", first.stored);
+    if second.stored + second.absorbed == 0 && second.escaped == first.stored {
+        return Ok(());
+    }
+    Err(format!("{what}: {} of {} scattered photons met the surface again", second.stored + second.absorbed, first.stored))
+}
+
+#[test]
+fn photons_leave_a_surface_once_and_for_all() {
+    let Some(gpu) = device() else { return };
+    let sun = |direction: DVec3| light(LightKind::Directional { direction: direction.normalize(), irradiance: Vec3::ONE });
+    let tilts = [DQuat::IDENTITY, DQuat::from_axis_angle(DVec3::new(0.3, 0.5, -0.8).normalize(), 1.1), DQuat::from_rotation_z(1e-4)];
+    for (number, tilt) in tilts.into_iter().enumerate() {
+        for cells in [1, 40] {
+            for (size, place) in
+                [(1.0, DVec3::ZERO), (1e-3, DVec3::new(0.1, -0.2, 0.3)), (1e4, DVec3::ZERO), (1.0, DVec3::new(1e4, -2e4, 5e3))]
+            {
+                let mut plane = scene("sun-over-plane");
+                plane.materials[0].base_colour = Vec3::ONE;
+                plane.meshes[0] = tessellated(&plane.meshes[0], cells);
+                plane.meshes[0].positions.iter_mut().for_each(|position| *position = tilt * *position * size + place);
+                plane.lights = vec![sun(tilt * DVec3::new(0.3, -1.0, 0.2))];
+                let settings = TransportSettings { radius: None, ..flights(40_000, 2) };
+                let lit = received(&gpu, &plane, &settings, &[(place, tilt * DVec3::Y)]);
+                let what = format!("tilt {number}, {cells} x {cells} cells, size {size} at {place}");
+                assert_holds(&what, none_returns(&what, &lit));
+            }
+        }
+    }
+    let material = Material::lambert("ball", Vec3::ONE);
+    for segments in [8, 64] {
+        let mut ball = Scene { materials: vec![material.clone()], lights: vec![sun(DVec3::new(0.3, -1.0, 0.2))], ..Scene::default() };
+        ball.meshes = vec![Mesh { normals: Vec::new(), ..Mesh::sphere("ball", DVec3::new(0.2, 0.7, -0.4), 0.9, segments, 0) }];
+        let lit = received(&gpu, &ball, &flights(100_000, 2), &[(DVec3::new(0.2, 1.6, -0.4), DVec3::Y)]);
+        assert_holds(segments, none_returns(&format!("ball of {segments} segments"), &lit));
+        // A bowl sees itself.
+        ball.meshes[0].triangles.iter_mut().for_each(|triangle| triangle.swap(1, 2));
+        ball.lights = vec![light(LightKind::Point { position: DVec3::new(0.2, 0.7, -0.4), intensity: Vec3::ONE })];
+        let lit = received(&gpu, &ball, &flights(100_000, 2), &[(DVec3::new(0.2, -0.2, -0.4), DVec3::Y)]);
+        assert_complains("the inside of a ball", none_returns("bowl", &lit));
+    }
+}
+
+/// Two rooms side by side, the left one lit. `wall` is what stands between.
+fn lit_and_dark_room(wall: impl Fn(&mut Scene)) -> Scene {
+    let mut rooms = closed_room(0.7);
+    rooms.materials.push(Material { two_sided: true, ..Material::lambert("sheet", Vec3::splat(0.7)) });
+    rooms.lights = vec![light(LightKind::Point { position: DVec3::new(0.2, 0.6, 0.4), intensity: Vec3::ONE })];
+    wall(&mut rooms);
+    rooms
+}
+
+/// A wall of 2^-12 of the room's width, and a sheet of no thickness at all: one side as bright as can be, the other
+/// black, to the last bit.
+#[test]
+fn thin_walls_and_sheets_let_no_light_through() {
+    let Some(gpu) = device() else { return };
+    let half = DVec3::X * 0.5;
+    let thin = DVec3::X * (0.5 + 1.0 / 4096.0);
+    let (y, z) = (DVec3::Y, DVec3::Z);
+    let two_walls = lit_and_dark_room(|scene| {
+        scene.meshes.push(Mesh::parallelogram("lit side", half, z, y, 0));
+        scene.meshes.push(Mesh::parallelogram("dark side", thin, y, z, 0));
+    });
+    let sheet = lit_and_dark_room(|scene| scene.meshes.push(Mesh::parallelogram("sheet", half, z, y, 1)));
+    let no_wall = lit_and_dark_room(|_| {});
+    let points = [(half, DVec3::NEG_X), (thin, DVec3::X), (DVec3::new(0.99, 0.0, 0.4), y), (DVec3::X, DVec3::NEG_X)]
+        .map(|(at, normal)| (at + DVec3::new(0.0, 0.5, 0.5) * (y + z - normal.abs()), normal));
+    let check = |what: &str, lit: &Lit| -> Check {
+        let means: Vec<DVec3> = (0..points.len()).map(|point| lit.film.mean(point, &lit.plan)).collect();
+        assert!(means[0].x > 0.1, "{what}: the lit side has {}", means[0]);
+        match means[1..].iter().find(|mean| **mean != DVec3::ZERO) {
+            None => Ok(()),
+            Some(mean) => Err(format!("{what}: {mean} W/m2 in the dark room")),
+        }
+    };
+    for illumination in [Illumination::Split, Illumination::Photons] {
+        for radius in [0.3, 0.02] {
+            let settings = TransportSettings {
+                illumination,
+                photons: 20_000,
+                rounds: 4,
+                radius: Some(radius),
+                alpha: 1.0,
+                ..TransportSettings::default()
+            };
+            for (what, rooms) in [("a 4096th", &two_walls), ("a sheet", &sheet)] {
+                let what = format!("{what}, {illumination:?}, radius {radius}");
+                let points: Vec<_> = points
+                    .iter()
+                    .map(|(at, normal)| (if rooms.meshes.len() == 7 && at.x == thin.x { at.with_x(0.5) } else { *at }, *normal))
+                    .collect();
+                assert_holds(&what, check(&what, &received(&gpu, rooms, &settings, &points)));
+            }
+            assert_complains("no wall", check("no wall", &received(&gpu, &no_wall, &settings, &points)));
+        }
+    }
+}
+
+/// Walls that meet at an edge share no light: the floor is lit from straight above, the wall that rises from it is
+/// not.
+#[test]
+fn a_lit_floor_does_not_light_the_foot_of_the_wall() {
+    let Some(gpu) = device() else { return };
+    let mut corner = scene("sun-over-plane");
+    corner.materials[0].base_colour = Vec3::ZERO;
+    corner.lights = vec![light(LightKind::Directional { direction: DVec3::NEG_Y, irradiance: Vec3::ONE })];
+    corner.meshes.push(Mesh::parallelogram("wall", DVec3::new(-2.0, 0.0, -2.0), DVec3::Y * 2.0, DVec3::Z * 4.0, 0));
+    for illumination in [Illumination::Split, Illumination::Photons] {
+        let settings =
+            TransportSettings { illumination, photons: 100_000, radius: Some(0.3), alpha: 1.0, rounds: 2, ..TransportSettings::default() };
+        let points =
+            [(DVec3::new(-1.99, 0.0, 0.0), DVec3::Y), (DVec3::new(-2.0, 0.01, 0.0), DVec3::X), (DVec3::new(-2.0, 0.0, 0.0), DVec3::X)];
+        let lit = received(&gpu, &corner, &settings, &points);
+        let [floor, wall, foot] = [0, 1, 2].map(|point| lit.film.mean(point, &lit.plan).x);
+        assert!(floor > 0.8, "{illumination:?}: the floor has {floor}");
+        assert_eq!((wall, foot), (0.0, 0.0), "{illumination:?}");
+    }
+}
+
+/// The cornell box with every kind of light, at a size of 2^k: lengths go with it, intensities with its square.
+fn scaled_cornell(k: i32) -> (Scene, Vec<(DVec3, DVec3)>) {
+    let factor = 2f64.powi(k);
+    let strength = (factor * factor) as f32;
+    let (mut scene, points) = moved(cornell(), factor, DVec3::ZERO);
+    let up = DVec3::new(0.5, 0.6, 0.5) * factor;
+    scene.lights = vec![
+        light(LightKind::Point { position: up, intensity: Vec3::splat(0.5) * strength }),
+        light(LightKind::Spot {
+            position: up,
+            direction: DVec3::NEG_Y,
+            intensity: Vec3::splat(6.0) * strength,
+            inner_angle: 0.3,
+            outer_angle: 0.6,
+        }),
+        light(LightKind::Directional { direction: DVec3::new(0.0, -0.3, -1.0).normalize(), irradiance: Vec3::splat(0.7) }),
+        light(LightKind::Disc {
+            centre: DVec3::new(0.5, 0.0, 0.8) * factor,
+            normal: DVec3::Y,
+            radius: 0.05 * factor,
+            power: Vec3::splat(2.0) * strength,
+            law: EmissionLaw::Uniform,
+        }),
+        light(LightKind::Environment { radiance: Vec3::splat(0.1) }),
+    ];
+    (scene, points)
+}
+
+fn same_sums(what: &str, found: &Lit, expected: &Lit) -> Check {
+    if found.film == expected.film && found.fates == expected.fates { Ok(()) } else { Err(format!("{what}: other light or other fates")) }
+}
+
+/// From a millionth to a million times its size no decision and no bit of the light changes.
+#[test]
+fn every_power_of_two_is_the_same_light_to_the_bit() {
+    let Some(gpu) = device() else { return };
+    let of = |k: i32, settings: &TransportSettings| {
+        let (scene, points) = scaled_cornell(k);
+        let radius = settings.radius.map(|radius| radius * 2f64.powi(k));
+        received(&gpu, &scene, &TransportSettings { radius, ..settings.clone() }, &points)
+    };
+    let settings = TransportSettings {
+        photons: 1500,
+        caustic_photons: 1500,
+        rounds: 2,
+        shadow_rays: 4,
+        radius: Some(0.1),
+        ..TransportSettings::default()
+    };
+    let expected = of(0, &settings);
+    assert!(mean_red(&expected) > 0.5);
+    for k in -20..=20 {
+        assert_holds(k, same_sums(&format!("scaled by 2^{k}"), &of(k, &settings), &expected));
+    }
+    let wider = of(0, &TransportSettings { radius: Some(0.1 * (1.0 + 1e-6)), ..settings });
+    assert_complains("a radius a millionth larger", same_sums("radius", &wider, &expected));
+}
+
+/// The paper's box at every such size: the photons of both builders go with it.
+#[test]
+fn the_open_box_of_any_power_of_two_stores_the_same_photons() {
+    let gpu = device();
+    for variant in [Variant::Cpu, Variant::Naive, Variant::Ballot] {
+        let settings = Settings { variant, photons: 1001, shininess: [Some(2.0); 5], ..Settings::default() };
+        let of = |k: i32| {
+            let factor = 2f64.powi(k);
+            let mut scene = open_box(&settings);
+            scene.min_corner *= factor;
+            scene.max_corner *= factor;
+            scene.lights.iter_mut().for_each(|light| light.radius *= factor);
+            let settings = Settings { eye: settings.eye.map(|place| place * factor as f32), ..settings.clone() };
+            let photons = match (variant, &gpu) {
+                (Variant::Cpu, _) => photonmill::render::photons_on_cpu(&scene, &settings),
+                (_, Some(gpu)) => photonmill::render::photons_on_gpu(gpu, &scene, &settings),
+                (_, None) => return Vec::new(),
+            };
+            let mut photons = common::in_order(photons.unwrap());
+            photons.iter_mut().for_each(|photon| photon.position /= factor as f32);
+            photons
+        };
+        let expected = of(0);
+        assert!(gpu.is_none() || expected.len() > 1001);
+        (-20..=20).for_each(|k| assert_eq!(of(k), expected, "{variant:?}, 2^{k}"));
+    }
+}
+
+/// A scene whose coordinates are whole multiples of 2^-20 m, moved by ten thousand times its size: every number of
+/// it is still exact, and so is the light.
+#[test]
+fn ten_thousand_sizes_away_the_light_is_the_same_to_the_bit() {
+    let Some(gpu) = device() else { return };
+    let settings = TransportSettings { photons: 1500, caustic_photons: 1500, rounds: 2, ..TransportSettings::default() };
+    let of = |way: DVec3| {
+        let mut scene = cornell();
+        scene.meshes.iter_mut().flat_map(|mesh| &mut mesh.positions).for_each(|at| *at = (*at * 1_048_576.0).round() / 1_048_576.0 + way);
+        let points: Vec<_> = POINTS.iter().map(|(at, normal)| ((*at * 1_048_576.0).round() / 1_048_576.0 + way, *normal)).collect();
+        received(&gpu, &scene, &settings, &points)
+    };
+    let expected = of(DVec3::ZERO);
+    for way in [DVec3::new(1e4, -2e4, 5e3), DVec3::new(-1e4, 0.0, 1e4), DVec3::splat(1_048_576.0)] {
+        assert_holds(way, same_sums("moved", &of(way), &expected));
+    }
+    assert_complains(
+        "a light in another place",
+        same_sums("moved", &received(&gpu, &cornell(), &TransportSettings { seed: 2, ..settings.clone() }, &POINTS), &expected),
+    );
+}
+
+/// Along an axis, from and within the planes of walls, where a box of a hierarchy is flat and a slope infinite:
+/// a tree finds what the list of all triangles finds.
+#[test]
+fn axis_parallel_rays_meet_the_same_by_tree_and_list() {
+    let Some(gpu) = device() else { return };
+    let mut room = cornell();
+    room.materials.iter_mut().for_each(|material| material.emission = Vec3::ZERO);
+    let sun = |direction| light(LightKind::Directional { direction, irradiance: Vec3::ONE });
+    let flush = |centre, normal| light(LightKind::Disc { centre, normal, radius: 0.3, power: Vec3::ONE, law: EmissionLaw::Uniform });
+    room.lights = [DVec3::X, DVec3::Y, DVec3::Z].into_iter().flat_map(|axis| [sun(axis), sun(-axis)]).collect();
+    room.lights.extend([flush(DVec3::new(0.5, 0.0, 0.5), DVec3::Y), flush(DVec3::new(0.0, 0.5, 0.5), DVec3::X)]);
+    let lit = |with: &[Effect], without: &[Effect], room: &Scene| {
+        let settings = TransportSettings {
+            with: with.to_vec(),
+            without: without.to_vec(),
+            illumination: Illumination::Photons,
+            photons: 60_000,
+            rounds: 2,
+            bounces: 4,
+            ..TransportSettings::default()
+        };
+        received(&gpu, room, &settings, &POINTS)
+    };
+    let (tree, list) = (lit(&[Effect::Bvh], &[], &room), lit(&[], &[Effect::Bvh], &room));
+    assert!(tree.plan.keeps(Effect::Bvh) && !list.plan.keeps(Effect::Bvh) && mean_red(&list) > 0.0);
+    assert_holds("tree", same_sums("tree", &tree, &list));
+    room.meshes.remove(6);
+    assert_complains("a block less", same_sums("a block less", &lit(&[Effect::Bvh], &[], &room), &list));
+}
+
+/// Triangles without area, triangles given twice, and the order in which triangles are given change no bit.
+#[test]
+fn flat_doubled_and_reordered_triangles_change_no_bit() {
+    let Some(gpu) = device() else { return };
+    // A lamp that is no mesh: numbers choose it alike in whatever order triangles come.
+    let mut plain = cornell();
+    plain.materials.iter_mut().for_each(|material| material.emission = Vec3::ZERO);
+    plain.lights = vec![light(LightKind::Point { position: DVec3::new(0.4, 0.8, 0.6), intensity: Vec3::ONE })];
+    let settings = TransportSettings { photons: 20_000, rounds: 2, ..TransportSettings::default() };
+    let of = |spoil: &dyn Fn(&mut Mesh)| {
+        let mut scene = plain.clone();
+        scene.meshes.iter_mut().for_each(spoil);
+        (Geometry::new(&scene).unwrap().left_out, received(&gpu, &scene, &settings, &POINTS))
+    };
+    let meshes = plain.meshes.len();
+    let (none, expected) = of(&|_| {});
+    assert_eq!(none, 0);
+    let (flat, found) = of(&|mesh| {
+        // A point, a line, and one whose third corner is 1e-25 off its first.
+        mesh.positions.push(mesh.positions[0] + DVec3::splat(1e-25));
+        let last = mesh.positions.len() as u32 - 1;
+        mesh.triangles.extend([[0, 0, 0], [0, 1, 1], [0, 1, last]]);
+    });
+    assert_eq!(flat, 3 * meshes);
+    assert_holds("flat triangles", same_sums("flat triangles", &found, &expected));
+    let triangles: usize = plain.triangle_count();
+    let (doubled, found) = of(&|mesh| mesh.triangles.extend(mesh.triangles.clone().iter().map(|[a, b, c]| [*b, *c, *a])));
+    assert_eq!(doubled, triangles);
+    assert_holds("every triangle twice", same_sums("every triangle twice", &found, &expected));
+    let (_, found) = of(&|mesh| mesh.triangles.reverse());
+    assert_holds("the other order", same_sums("the other order", &found, &expected));
+    let (_, found) = of(&|mesh| mesh.positions[0] += DVec3::splat(1e-3));
+    assert_complains("a corner a millimetre off", same_sums("a corner", &found, &expected));
+}
+
+/// A surface that is given twice, once for each side and with a material each, is seen from both.
+#[test]
+fn two_sheets_at_one_place_show_each_its_own_side() {
+    let Some(gpu) = device() else { return };
+    let mut sheets = scene("sun-over-plane");
+    sheets.materials = vec![Material::lambert("above", Vec3::splat(0.8)), Material::lambert("below", Vec3::splat(0.4))];
+    let (u, v) = (DVec3::X * 4.0, DVec3::Z * 4.0);
+    // Turned, so that no coordinate is a round number.
+    let tilt = DQuat::from_axis_angle(DVec3::new(0.3, 0.5, -0.8).normalize(), 1.1);
+    let sheet = |name, a: DVec3, b: DVec3, material| Mesh::parallelogram(name, tilt * (-0.5 * (u + v)), tilt * a, tilt * b, material);
+    let faces = [sheet("above", v, u, 0), sheet("below", u, v, 1)];
+    let sun = |y: f64| light(LightKind::Directional { direction: tilt * DVec3::new(0.0, y, 0.0), irradiance: Vec3::ONE });
+    sheets.lights = vec![sun(-1.0), sun(1.0)];
+    let settings = TransportSettings { shadow_rays: 8, ..settings() };
+    let mut complaints = Vec::new();
+    for order in [[0, 1], [1, 0]] {
+        sheets.meshes = order.map(|face| faces[face].clone()).into();
+        for (side, albedo) in [(1.0, 0.8), (-1.0, 0.4)] {
+            let found =
+                radiance(&gpu, sheets.clone(), &settings, tilt * DVec3::new(0.3, side * 1.5, 0.4), tilt * DVec3::new(0.1, 0.0, 0.2))
+                    .unwrap();
+            // Each sun is chosen by half of the rays, stratified.
+            let what = format!("order {order:?}, side {side}");
+            complaints.extend(relative_check(&what, found.mean, albedo / PI, 1e-4).err());
+        }
+    }
+    assert!(complaints.is_empty(), "{}", complaints.join("; "));
+}
+
+/// A black room with a lamp of 1 W/m2/sr and 2^-k m in its middle, and a point straight below it.
+fn room_with_lamp(k: i32) -> (Scene, (DVec3, DVec3)) {
+    let edge = 2f64.powi(-k);
+    let mut room = closed_room(0.0);
+    room.materials.push(Material { emission: Vec3::ONE, ..Material::lambert("lamp", Vec3::ZERO) });
+    let corner = DVec3::splat(0.5);
+    let positions = vec![corner, corner + DVec3::X * edge, corner + DVec3::Z * edge];
+    room.meshes.push(Mesh { name: "lamp".into(), positions, triangles: vec![[0, 1, 2]], material: 1, ..Mesh::default() });
+    (room, (DVec3::new(0.5 + edge / 3.0, 0.0, 0.5 + edge / 3.0), DVec3::Y))
+}
+
+/// Lamps ever smaller are as bright as points of their power, by photons and by shadow rays.
+#[test]
+fn small_lamps_shine_by_their_area() {
+    let Some(gpu) = device() else { return };
+    let mut complaints = Vec::new();
+    for k in [3, 4, 6, 8, 12, 16, 22] {
+        let (room, below) = room_with_lamp(k);
+        let area = 0.5 * 4f64.powi(-k);
+        // L A cos cos / d^2, and what the lamp's extent takes from it: 2 E[r^2] / d^2 of it, E[r^2] = edge^2 / 9.
+        let (expected, extent) = (area / 0.25, 8.0 / 9.0 * 4f64.powi(-k));
+        let direct = TransportSettings { photons: 1, rounds: 1, bounces: 1, shadow_rays: 32, ..settings() };
+        let found = irradiance(&gpu, &room, &direct, &[below]).unwrap();
+        println!("lamp of 2^-{k} m: shadow rays see {:.4} of its light", found.mean / expected);
+        let error = found.standard_error.max((extent + 1e-4) * expected);
+        complaints.extend(z_check(&format!("2^-{k}, shadow rays"), found.mean, expected, error).err());
+        let photons = TransportSettings {
+            photons: 10_000,
+            rounds: 1,
+            bounces: 1,
+            radius: Some(0.1),
+            alpha: 1.0,
+            illumination: Illumination::Photons,
+            ..settings()
+        };
+        let mapped = irradiance(&gpu, &room, &photons, &[below]).unwrap();
+        // A disc of radius h below sees A / h^2 (1 - 1 / (1 + (h / d)^2)).
+        let mean = area * (1.0 - 1.0 / (1.0 + 0.04)) / 0.01;
+        complaints.extend(z_check(&format!("2^-{k}, photons"), mapped.mean, mean, mapped.standard_error.hypot(extent * mean)).err());
+    }
+    assert!(complaints.is_empty(), "{}", complaints.join("; "));
+}
+
+/// A triangle whose normal any device may take for nothing, the square of its length being below the least normal
+/// number of f32, 2^-126, is left out; any other sends its photons into the room.
+#[test]
+fn the_smallest_lamps_shine_into_the_room_or_are_left_out() {
+    let Some(gpu) = device() else { return };
+    for k in [22, 26, 30, 31, 32, 33, 35, 37, 38, 40, 60, 74] {
+        let (room, below) = room_with_lamp(k);
+        assert_eq!(Geometry::new(&room).unwrap().left_out, usize::from(4 * k > 126), "a lamp of 2^-{k}");
+        let lit = received(&gpu, &room, &flights(5000, 1), &[below]);
+        assert_holds(k, none_escapes(&format!("a lamp of 2^-{k}"), &lit));
+    }
+}
+
+/// A furnace turned so that its floor looks almost along -z, where frames of tangents break: as bright as ever.
+#[test]
+fn a_furnace_glows_alike_however_it_is_turned() {
+    let Some(gpu) = device() else { return };
+    let settings =
+        TransportSettings { photons: 6000, bounces: 60, radius: Some(0.3), alpha: 1.0, illumination: Illumination::Photons, ..settings() };
+    for e in [1e-2, 1e-4, 1e-6, 0.0] {
+        let turn = DQuat::from_rotation_arc(DVec3::Y, DVec3::new(e, 0.0, -1.0).normalize());
+        let mut furnace = scene("furnace");
+        furnace.meshes.iter_mut().flat_map(|mesh| &mut mesh.positions).for_each(|at| *at = turn * *at);
+        // Away from the middle of the ceiling and on a wall: skewed directions would miss one and meet the other.
+        let points =
+            [(DVec3::new(0.2, 1.0, 0.3), DVec3::NEG_Y), (DVec3::new(0.0, 0.2, 0.5), DVec3::X), (DVec3::new(0.5, 0.0, 0.5), DVec3::Y)];
+        for (at, normal) in points {
+            let found = irradiance(&gpu, &furnace, &settings, &[(turn * at, turn * normal)]).unwrap();
+            assert!(found.standard_error < 0.1, "{found:?}");
+            assert_holds(format!("{e}, {normal}"), z_check("irradiance", found.mean, 2.0 * PI, found.standard_error));
+        }
+    }
+}
+
+/// Three channels of their own reflectance: each is a series of its own, and roulette by the brightest is repaid.
+#[test]
+fn each_channel_has_its_own_reflectance() {
+    let Some(gpu) = device() else { return };
+    for colour in [Vec3::new(0.9, 0.1, 0.1), Vec3::new(0.1, 0.9, 0.1), Vec3::new(0.5, 0.5, 0.9)] {
+        let mut furnace = scene("furnace");
+        furnace.materials[0].base_colour = colour;
+        let settings = TransportSettings {
+            photons: 8000,
+            bounces: 300,
+            radius: Some(0.5),
+            alpha: 1.0,
+            illumination: Illumination::Photons,
+            ..settings()
+        };
+        let exact = PI / (1.0 - f64::from(colour.x));
+        let found = irradiance(&gpu, &furnace, &settings, &[(DVec3::new(0.5, 0.0, 0.5), DVec3::Y)]).unwrap();
+        assert!(found.standard_error < 0.02 * exact, "{colour}: {found:?}");
+        assert_holds(colour, z_check("red", found.mean, exact, found.standard_error));
+        let grey = PI / (1.0 - f64::from(colour.element_sum()) / 3.0);
+        assert_complains("their mean", z_check("red", found.mean, grey, found.standard_error));
+    }
+}
+
+fn plate(surface: Surface, lights: Vec<Light>) -> Scene {
+    let mut plate = scene("sky-over-plane");
+    plate.materials[0] = Material { surface, ..Material::lambert("plate", Vec3::ONE) };
+    plate.lights = lights;
+    plate
+}
+
+fn towards(angle: f64) -> DVec3 {
+    DVec3::new(angle.sin(), angle.cos(), 0.0)
+}
+
+/// Share of an even sky that a lobe (n + 2) / (2 pi) cos^n sends to an eye at 0, 30, 60 and 80 degrees: what lies
+/// below the horizon is lost. By quadrature.
+#[test]
+fn lobes_reflect_what_lies_above_the_horizon() {
+    let Some(gpu) = device() else { return };
+    let table = [
+        (0.01, [1.0, 0.9318, 0.7472, 0.5835]),
+        (0.5, [1.0, 0.8956, 0.6560, 0.4711]),
+        (2.0, [1.0, 0.8705, 0.5625, 0.3444]),
+        (5.0, [1.0, 0.8663, 0.5194, 0.2693]),
+    ];
+    let sky = || vec![light(LightKind::Environment { radiance: Vec3::ONE })];
+    for (exponent, albedos) in table {
+        for (degrees, albedo) in [0.0f64, 30.0, 60.0, 80.0].into_iter().zip(albedos) {
+            let settings = TransportSettings { photons: 1, rounds: 1, shadow_rays: 32, ..settings() };
+            let eye = towards(degrees.to_radians());
+            let found = radiance(&gpu, plate(Surface::Glossy { exponent }, sky()), &settings, eye, DVec3::ZERO).unwrap();
+            // The table has four digits.
+            let error = found.standard_error.hypot(5e-5);
+            println!("exponent {exponent}, {degrees} degrees: {:.4} +- {:.4}, expected {albedo}", found.mean, found.standard_error);
+            assert!(found.standard_error < 0.01, "{found:?}");
+            assert_holds(format!("exponent {exponent}, {degrees} degrees"), z_check("albedo", found.mean, albedo, error));
+            assert!(found.mean <= 1.0 + 5.0 * error, "more light than there is");
+            assert_complains(
+                "(n + 1) in place of (n + 2)",
+                z_check("albedo", found.mean, albedo * f64::from((exponent + 1.0) / (exponent + 2.0)), error),
+            );
+        }
+    }
+}
+
+/// Light of a narrow beam that a lobe throws onto a screen at unit distance: the share within a radius h is
+/// 1 - cos^(n + 2), of the angle whose tangent is h. The least roughness that is no mirror has n = 48 826.
+#[test]
+fn lobes_of_any_width_throw_their_share() {
+    let Some(gpu) = device() else { return };
+    // Half of the beam is 3.45e-4 off its axis, beside a lobe 6.4e-3 wide at the last exponent: 0.1 % of the light.
+    for (exponent, tolerance) in [(0.0, 0.0), (5.0, 0.0), (100.0, 0.0), (1e4, 0.0), (48_826.0, 0.001)] {
+        let n = f64::from(exponent);
+        // Half of the light within h.
+        let cosine = 0.5f64.powf(1.0 / (n + 2.0));
+        let h = (1.0 - cosine * cosine).sqrt() / cosine;
+        let spot = LightKind::Spot {
+            position: DVec3::Y * 0.9,
+            direction: DVec3::NEG_Y,
+            intensity: Vec3::splat(1e7),
+            inner_angle: 3.5e-4,
+            outer_angle: 3.5e-4,
+        };
+        let watts = 2.0 * PI * (1.0 - f64::from(3.5e-4f32).cos()) * 1e7;
+        let mut bench = plate(Surface::Glossy { exponent }, vec![light(spot)]);
+        bench.materials.push(Material::lambert("screen", Vec3::ZERO));
+        bench.meshes.push(Mesh::parallelogram("screen", DVec3::new(-2.0, 1.0, -2.0), DVec3::X * 4.0, DVec3::Z * 4.0, 1));
+        let settings = TransportSettings { photons: 20_000, bounces: 2, radius: Some(h), alpha: 1.0, ..settings() };
+        let found = irradiance(&gpu, &bench, &settings, &[(DVec3::Y, DVec3::NEG_Y)]).unwrap();
+        let expected = 0.5 * watts / (PI * h * h);
+        let error = found.standard_error.hypot(tolerance * expected);
+        println!("exponent {exponent}: {:.5} +- {:.5} of the expected", found.mean / expected, found.standard_error / expected);
+        assert!(found.standard_error < 0.02 * expected, "{found:?}");
+        assert_holds(exponent, z_check("within h", found.mean, expected, error));
+        assert_complains("a lobe a fifth wider", z_check("within h", found.mean, expected * (1.0 - 0.5f64.powf(1.0 / 1.44)) / 0.5, error));
+    }
+}
+
+/// The sun in a plate: albedo E cos / pi by cos^n of the angle off the mirror direction, by each of the paper's
+/// exponents and both models; behind the lobe there is nothing.
+#[test]
+fn a_sun_in_a_plate_is_a_power_of_the_cosine() {
+    let Some(gpu) = device() else { return };
+    let incidence = PI / 4.0;
+    let sun = || vec![light(LightKind::Directional { direction: -towards(incidence), irradiance: Vec3::splat(2.0) })];
+    let mut worst = [0.0f64; 2];
+    for exponent in [0.0f32, 0.01, 0.5, 2.0, 5.0, 1e4] {
+        let n = f64::from(exponent);
+        for (surface, scale) in [(Surface::PaperPhong { exponent }, 1.0 / PI), (Surface::Glossy { exponent }, (n + 2.0) / (2.0 * PI))] {
+            for off in [0.0, 0.005, 0.02, 0.5, 0.7, -0.5, 1.2, 1.6, 2.0] {
+                // From the mirror direction over the normal towards the sun.
+                let eye = towards(-incidence + off);
+                if eye.y < 0.05 {
+                    continue;
+                }
+                let camera = Camera::looking_at("eye", eye, DVec3::ZERO, DVec3::Z, 1e-5);
+                let settings =
+                    TransportSettings { photons: 1, rounds: 1, shadow_rays: 1, part: Part::Direct, ..TransportSettings::default() };
+                let lit = seen(&gpu, &plate(surface, sun()), &settings, &camera, [4, 4]);
+                let found = mean_red(&lit);
+                let what = format!("{surface:?}, {off} off");
+                if off > PI / 2.0 {
+                    assert_eq!(found, 0.0, "{what}");
+                    continue;
+                }
+                let exact = 2.0 * incidence.cos() * scale * off.cos().powf(n);
+                if exact < 1e-4 {
+                    assert!(found < 2e-4, "{what}: {found}");
+                    continue;
+                }
+                // A cosine in f32 is off by u, which the exponent multiplies; log2 may be off by 2^-21.
+                let (place, allowed) = if n > 5.0 { (1, 5e-3) } else { (0, 5e-5) };
+                worst[place] = worst[place].max((found / exact - 1.0).abs());
+                assert_holds(&what, relative_check(&what, found, exact, allowed));
+                assert_complains("1 % more", relative_check(&what, 1.01 * found, exact, allowed));
+            }
+        }
+    }
+    println!("relative error up to {:.1e}, at exponent 1e4 {:.1e}", worst[0], worst[1]);
+}
+
+/// Reflectance of a boundary for unpolarised light, in f64.
+fn fresnel(cos_i: f64, eta: f64) -> f64 {
+    let k = 1.0 - eta * eta * (1.0 - cos_i * cos_i);
+    if k <= 0.0 {
+        return 1.0;
+    }
+    let cos_t = k.sqrt();
+    let parallel = (cos_i - eta * cos_t) / (cos_i + eta * cos_t);
+    let perpendicular = (eta * cos_i - cos_t) / (eta * cos_i + cos_t);
+    0.5 * (parallel * parallel + perpendicular * perpendicular)
+}
+
+/// A surface of glass, 4 m wide, under an even sky and `depth` over a black ground that catches what goes through.
+fn over_glass(ior: f32, depth: f64) -> Scene {
+    let mut scene = plate(Surface::Dielectric { ior }, vec![light(LightKind::Environment { radiance: Vec3::ONE })]);
+    scene.materials.push(Material::lambert("ground", Vec3::ZERO));
+    scene.meshes.push(Mesh::parallelogram("ground", DVec3::new(-40.0, -depth, -40.0), DVec3::Z * 80.0, DVec3::X * 80.0, 1));
+    scene
+}
+
+/// Radiance along one ray and the number of samples.
+fn along(gpu: &Gpu, scene: &Scene, eye: DVec3) -> (f64, f64) {
+    let camera = Camera::looking_at("ray", eye, DVec3::ZERO, DVec3::Z, 1e-6);
+    let settings = TransportSettings { photons: 1, caustic_photons: 1, rounds: 4, part: Part::Specular, ..TransportSettings::default() };
+    let lit = seen(gpu, scene, &settings, &camera, [64, 64]);
+    (mean_red(&lit), 4.0 * 64.0 * 64.0)
+}
+
+/// From outside, up to the horizon: F = 0.04, 0.38770, 0.90418, 0.98991, 0.99899 at 0, 80, 89, 89.9 and 89.99 degrees.
+#[test]
+fn glass_reflects_by_fresnel_up_to_the_horizon() {
+    let Some(gpu) = device() else { return };
+    for (degrees, printed) in [(0.0f64, 0.04), (80.0, 0.387_70), (89.0, 0.904_18), (89.9, 0.989_91), (89.99, 0.998_99)] {
+        let reflectance = fresnel(degrees.to_radians().cos(), 1.0 / 1.5);
+        assert!((reflectance - printed).abs() < 1e-5, "{degrees} degrees: {reflectance}");
+        let (found, samples) = along(&gpu, &over_glass(1.5, 0.25), towards(degrees.to_radians()));
+        let error = (reflectance * (1.0 - reflectance) / samples).sqrt();
+        println!("{degrees} degrees: {found:.5}, expected {reflectance:.5} +- {error:.5}");
+        assert_holds(degrees, z_check("reflectance", found, reflectance, error));
+        let other = fresnel(degrees.to_radians().cos(), 1.0 / 2.5);
+        let error = (other * (1.0 - other) / samples).sqrt();
+        if degrees <= 80.0 {
+            assert_complains("diamond", z_check("reflectance", found, other, error));
+        }
+    }
+}
+
+/// From inside, around the critical angle of 41.8103 degrees: radiance n^2 (1 - F) below it, nothing beyond.
+#[test]
+fn total_reflection_begins_at_the_critical_angle() {
+    let Some(gpu) = device() else { return };
+    for degrees in [0.0f64, 30.0, 41.0, 41.8, 41.809, 41.82, 45.0, 60.0] {
+        let (found, samples) = along(&gpu, &over_glass(1.5, 0.25), towards(degrees.to_radians()) * DVec3::new(0.2, -0.2, 0.2));
+        if degrees > 41.8103 {
+            assert_eq!(found, 0.0, "{degrees} degrees");
+            continue;
+        }
+        let passed = 1.0 - fresnel(degrees.to_radians().cos(), 1.5);
+        let error = 2.25 * (passed * (1.0 - passed) / samples).sqrt();
+        println!("{degrees} degrees: {found:.5}, expected {:.5} +- {error:.5}", 2.25 * passed);
+        assert_holds(degrees, z_check("radiance", found, 2.25 * passed, error));
+        assert_complains("no n^2", z_check("radiance", found, passed, error));
+    }
+}
+
+/// An index of 1 is no surface: whatever the angle, nothing is reflected and everything goes through unturned.
+#[test]
+fn an_index_of_one_reflects_nothing_at_any_angle() {
+    let Some(gpu) = device() else { return };
+    let mut complaints = Vec::new();
+    for degrees in [0.0f64, 60.0, 89.0, 89.9, 89.99, 89.999] {
+        let (found, _) = along(&gpu, &over_glass(1.0, 1.0 / 4096.0), towards(degrees.to_radians()));
+        if found != 0.0 {
+            complaints.push(format!("at {degrees} degrees {found} is reflected"));
+        }
+    }
+    assert!(complaints.is_empty(), "{}", complaints.join("; "));
+}
+
+/// Diffuse light that meets glass: 0.4036542 of it leaves, 0.9082220 enters, n^2 times as much; flux is not scaled.
+#[test]
+fn diffuse_light_crosses_glass_by_its_mean_transmittance() {
+    let Some(gpu) = device() else { return };
+    let disc = |height: f64, normal| {
+        light(LightKind::Disc { centre: DVec3::Y * height, normal, radius: 0.01, power: Vec3::ONE, law: EmissionLaw::Cosine })
+    };
+    for (what, height, normal, expected) in [("leaving", -0.1, DVec3::Y, 0.403_654_2), ("entering", 0.1, DVec3::NEG_Y, 0.908_222_0)] {
+        let mut scene = plate(Surface::Dielectric { ior: 1.5 }, vec![disc(height, normal)]);
+        // So wide that one photon in a hundred thousand misses it.
+        scene.meshes[0].positions.iter_mut().for_each(|at| *at *= 16.0);
+        scene.materials.push(Material::lambert("ground", Vec3::ZERO));
+        scene.meshes.push(Mesh::parallelogram("ground", DVec3::new(-400.0, -0.25, -400.0), DVec3::Z * 800.0, DVec3::X * 800.0, 1));
+        let settings = TransportSettings { radius: None, ..flights(400_000, 2) };
+        let fates = received(&gpu, &scene, &settings, &[(DVec3::Y * -0.25, DVec3::Y)]).fates[0].clone();
+        let through = if height < 0.0 { fates.bounces[1].escaped } else { fates.bounces[1].absorbed };
+        println!("{what}: {} passes, expected {expected}", through as f64 / fates.emitted as f64);
+        assert_holds(what, share_check(what, through, fates.emitted, expected));
+        assert_complains("flux over n^2", share_check(what, through, fates.emitted, expected / 2.25));
+    }
+}
+
+/// Eyes on a surface, in a corner and in the plane of a wall see numbers.
+#[test]
+fn an_eye_on_a_surface_sees_numbers() {
+    let Some(gpu) = device() else { return };
+    let cornell = cornell();
+    let settings = TransportSettings { photons: 500, rounds: 1, ..TransportSettings::default() };
+    for (eye, target) in [
+        (DVec3::new(0.5, 0.0, 0.9), DVec3::new(0.5, 0.5, 0.0)),
+        (DVec3::ZERO, DVec3::ONE),
+        (DVec3::new(0.5, 0.0, 0.9), DVec3::new(0.5, 0.0, 0.0)),
+        (DVec3::new(0.5, 0.0, 0.9), DVec3::new(0.5, -1.0, 0.9)),
+    ] {
+        let camera = Camera::looking_at("eye", eye, target, DVec3::Y, 1.0);
+        // The device counts values that are no number, and there are none.
+        let lit = seen(&gpu, &cornell, &settings, &camera, [16, 16]);
+        assert!(mean_red(&lit).is_finite(), "{eye} to {target}");
+    }
+}
+
+/// Rows (case, what shows it) of the table above.
+fn cases(source: &str) -> Vec<(String, String)> {
+    let rows = source.lines().filter_map(|line| line.strip_prefix("//! | ")?.strip_suffix(" |"));
+    let cells = rows.filter_map(|row| row.split_once(" | ")).map(|(case, shown)| (case.to_owned(), shown.to_owned()));
+    cells.filter(|(case, _)| case.chars().any(|symbol| symbol.is_ascii_digit())).collect()
+}
+
+/// Every source of the crate and of its tests.
+fn sources(folder: &str) -> Vec<String> {
+    let entries = std::fs::read_dir(folder).unwrap().map(|entry| entry.unwrap().path());
+    entries
+        .flat_map(|path| match path.is_dir() {
+            true => sources(path.to_str().unwrap()),
+            false if path.extension().is_some_and(|kind| kind == "rs") => vec![std::fs::read_to_string(path).unwrap()],
+            false => Vec::new(),
+        })
+        .collect()
+}
+
+/// Every case of the catalogue stands in the table once, and every test that it names is a test.
+fn table_check(cases: &[(String, String)], sources: &[String]) -> Check {
+    let counts = [('G', 15), ('S', 14), ('R', 9), ('A', 11), ('E', 14), ('B', 6), ('I', 8), ('D', 7), ('C', 3), ('L', 7), ('M', 3)];
+    let all: Vec<String> = counts.iter().flat_map(|(group, count)| (1..=*count).map(move |number| format!("{group}{number}"))).collect();
+    if let Some(case) = all.iter().find(|case| cases.iter().filter(|(named, _)| named == *case).count() != 1) {
+        return Err(format!("{case} does not stand in the table once"));
+    }
+    if cases.len() != all.len() {
+        return Err(format!("{} cases instead of {}", cases.len(), all.len()));
+    }
+    for (case, shown) in cases.iter().filter(|(_, shown)| !shown.starts_with("- ")) {
+        for name in shown.split(", ") {
+            let head = format!("fn {name}()");
+            let has_test = |source: &String| {
+                let mut places = source.match_indices(&head);
+                places.any(|(at, _)| source[..at].trim_end().lines().rev().take(2).any(|line| line.trim() == "#[test]"))
+            };
+            if !sources.iter().any(has_test) {
+                return Err(format!("{case}: {name} is no test"));
+            }
+        }
+    }
+    Ok(())
+}
+
+#[test]
+fn the_table_names_every_case_and_tests_that_exist() {
+    let root = env!("CARGO_MANIFEST_DIR");
+    let sources = ["src", "tests"].iter().flat_map(|folder| sources(&format!("{root}/{folder}"))).collect::<Vec<_>>();
+    let cases = cases(include_str!("hard_cases.rs"));
+    assert_holds("the table", table_check(&cases, &sources));
+    let absent = cases.iter().filter(|(_, shown)| shown.starts_with("- ")).count();
+    println!("{} cases, {absent} of them cannot occur here", cases.len());
+    assert_complains("a case less", table_check(&cases[1..], &sources));
+    assert_complains("a case twice", table_check(&[&cases[..], &cases[..1]].concat(), &sources));
+    let renamed = |name: &str| [&[("G1".to_owned(), name.to_owned())], &cases[1..]].concat();
+    assert_complains("a test that is none", table_check(&renamed("table_check"), &sources));
+    assert_complains("a test that was renamed", table_check(&renamed("photons_leave_a_surface_for_good"), &sources));
 }

@@ -5,7 +5,7 @@ mod common;
 
 use std::collections::{HashMap, HashSet};
 
-use common::{Check, assert_complains, assert_holds, device, in_order, photons, photons_on_cpu};
+use common::{Check, assert_complains, assert_holds, device, draws_of, in_order, photons, photons_on_cpu, streams_of};
 use photonmill::gpu::Gpu;
 use photonmill::records::Photon;
 use photonmill::rng::{self, Rng, Streams};
@@ -250,22 +250,6 @@ fn no_two_photons_draw_the_same_numbers() {
         let other = emission_draws(Streams { seed: 2, ..streams }, 0, 0);
         assert!(!seen.contains(&other), "{rng:?}");
     }
-}
-
-/// Every draw of a photon: four of its emission, three of each bounce.
-fn draws_of(streams: Streams, round: u32, photon: u32, bounces: u32) -> Vec<f32> {
-    let key = streams.key(round);
-    let state = rng::words(streams.jump(round, photon + 1).apply(rng::srand48(streams.seed as u32)));
-    let mut stream = rng::open_stream(streams.rng, &key, photon, state);
-    let mut draws = rng::draw_emission(streams.rng, &key, photon, &mut stream).to_vec();
-    for bounce in 0..bounces {
-        draws.extend(rng::draw_bounce(streams.rng, &key, photon, bounce, &mut stream));
-    }
-    draws
-}
-
-fn streams_of(settings: &Settings) -> Streams {
-    Streams { rng: settings.rng, seed: settings.seed, photons: settings.photons, draws_per_photon: settings.draws_per_photon() }
 }
 
 #[test]

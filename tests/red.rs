@@ -190,10 +190,10 @@ const FAULTS: [Fault; 18] = [
         noticed_by: &[Gap],
     },
     Fault {
-        what: "glass has the inverse index",
+        what: "glass reflects one and a half times as much",
         file: "scene/scatter.glsl",
-        from: "surface.front ? divide(1.0, surface.parameter) : surface.parameter",
-        to: "surface.front ? surface.parameter : divide(1.0, surface.parameter)",
+        from: "if (u.x < reflectance) {",
+        to: "if (u.x < 1.5 * reflectance) {",
         kernels: &["view"],
         noticed_by: &[ClosedForm("glass slab: radiance")],
     },

@@ -164,7 +164,7 @@ fn rich_scene() -> Scene {
     scene.lights = vec![
         light(LightKind::Point { position: up, intensity: Vec3::splat(0.5) }),
         light(LightKind::Spot { position: up, direction: DVec3::NEG_Y, intensity: Vec3::splat(6.0), inner_angle: 0.3, outer_angle: 0.6 }),
-        light(LightKind::Directional { direction: DVec3::new(0.0, -0.3, -1.0).normalize(), irradiance: Vec3::splat(0.7) }),
+        light(LightKind::Directional { direction: DVec3::new(0.0, -0.3, -1.0).normalize(), irradiance: Vec3::splat(2.0) }),
         light(LightKind::Disc {
             centre: DVec3::new(0.5, 0.0, 0.8),
             normal: DVec3::Y,

@@ -86,10 +86,13 @@ void intersect_triangle(ShearedRay ray, uint index, inout Hit hit)
         return;
     }
     precise float t = divide(ray.shear.z * (u * a.z + v * b.z + w * c.z), determinant);
+    float certain = nearest_certain(ray, a, b, c, vec3(u, v, w), determinant);
+    if (t <= certain && !comes_towards(ray, a, b, c, triangle_error(triangle))) {
+        return;
+    }
+    // A back at the same place as a front lies behind it, whichever way their distances were rounded.
+    t += (determinant < 0.0) != (ray.shear.z < 0.0) ? min(certain, t * (1.0 / 262144.0)) : 0.0;
     if (t < hit.t || (t == hit.t && index < hit.triangle)) {
-        if (t <= nearest_certain(ray, a, b, c, vec3(u, v, w), determinant) && !comes_towards(ray, a, b, c, triangle_error(triangle))) {
-            return;
-        }
         precise float second = divide(v, determinant);
         precise float third = divide(w, determinant);
         hit = Hit(t, index, second, third);

@@ -194,7 +194,7 @@ Arriving sample_light(uint emitter_count, vec3 position, vec3 ns, vec4 u)
             if (HAS_TWO_SIDED) {
                 normal = material.two_sided != 0 && side < 0.0 ? -normal : normal;
             }
-            arriving.target = offset_origin(point, triangle_error(triangle), normal, normal);
+            arriving.target = offset_origin(point, position_error(point) + triangle_error(triangle), normal, normal);
             arriving.radiance = emitted_radiance(material, light.triangle, at.x, at.y) * divide(triangle_area(triangle), light.probability);
             cos_light = max(dot(normal, normalize(position - point)), 0.0);
             if (cos_light > 0.0 && material.emission_texture == NONE) {

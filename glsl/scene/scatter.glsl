@@ -29,7 +29,8 @@ Scatter sample_scatter(Surface surface, vec3 wo, vec3 u, bool carries_radiance)
         if (surface.kind == SURFACE_DIELECTRIC) {
             float eta = surface.front ? divide(1.0, surface.parameter) : surface.parameter;
             float cos_i = min(dot(wo, ns), 1.0);
-            float cos_t_squared = 1.0 - eta * eta * (1.0 - cos_i * cos_i);
+            // Exact where the index is 1.
+            float cos_t_squared = eta * eta * cos_i * cos_i + (1.0 - eta) * (1.0 + eta);
             float cos_t = sqrt(max(cos_t_squared, 0.0));
             float reflectance = cos_t_squared > 0.0 ? fresnel(cos_i, cos_t, eta) : 1.0;
             if (u.x < reflectance) {

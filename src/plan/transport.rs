@@ -97,8 +97,9 @@ const PHOTONS_PER_ESTIMATE: f64 = 60.0;
 const CAUSTIC_RADIUS_SHARE: f64 = 0.25;
 /// Radii relative to the scene's normalised extent: from f32's resolution of positions up to all of it.
 const RADIUS_RANGE: (f64, f64) = (1.0 / 32_768.0, 2.0);
-/// Bits of a film unit below the scene's mean radiance.
-const FILM_BITS: i32 = 24;
+/// Bits of a film unit below the scene's mean radiance: as many as leave so many above it, within these.
+const FILM_BITS: (i32, i32) = (24, 32);
+const FILM_HEADROOM_BITS: i32 = 24;
 /// Bytes of a pixel on the film: sums and squares of three channels.
 const FILM_PIXEL_BYTES: u64 = 3 * 8 + 3 * 16;
 /// Work of a ray, in pair tests.
@@ -286,7 +287,8 @@ impl TransportPlan {
     fn set_film(&mut self, geometry: &Geometry) {
         let mean = (geometry.power / 3.0 / (PI * geometry.area)).max(f64::MIN_POSITIVE);
         let limit = 2f64.powi(62) / f64::from(self.settings.rounds);
-        let by_mean = FILM_BITS - mean.log2().floor() as i32;
+        let bits = (limit.log2() as i32 - FILM_HEADROOM_BITS).clamp(FILM_BITS.0, FILM_BITS.1);
+        let by_mean = bits - mean.log2().floor() as i32;
         // A picture of a lamp may be far above the mean.
         let brightest = 4.0 * geometry.brightest().max(mean);
         let by_brightest = (limit / brightest).log2().floor() as i32;

@@ -83,8 +83,9 @@ impl Geometry {
             .collect();
         let corners: Vec<[Vec3; 3]> =
             sources.iter().map(|&(mesh, triangle)| scene.meshes[mesh as usize].corners(triangle as usize).map(local)).collect();
-        // What f32 makes a line of cannot be hit, and its normal would be no number.
-        let is_solid = |[a, b, c]: &[Vec3; 3]| (*b - *a).cross(*c - *a).length_squared() > 0.0;
+        // What f32 makes a line of cannot be hit, and its normal would be no number; on a device that takes numbers
+        // without a leading 1 for nothing, neither would that of a square below the least normal one.
+        let is_solid = |[a, b, c]: &[Vec3; 3]| (*b - *a).cross(*c - *a).length_squared() >= f32::MIN_POSITIVE;
         // Of triangles that lie on one another, facing alike, only the first can be met; the others would shine, and
         // count as surface, where none is seen.
         let mut seen = HashSet::with_capacity(corners.len());

@@ -10,13 +10,20 @@ pub mod reference;
 use std::ops::Deref;
 use std::sync::atomic::AtomicBool;
 
+use glam::DVec3;
 use photonmill::gpu::{Gpu, Options};
+use photonmill::plan::transport::{Sensor, TransportPlan};
 use photonmill::plan::{Limits, Plan};
-use photonmill::records::Photon;
+use photonmill::records::{Photon, Receiver};
 use photonmill::render::{self, Control, Outcome};
+use photonmill::rng::{self, Streams};
+use photonmill::scene::geometry::Geometry;
 use photonmill::scene::open_box::open_box;
 use photonmill::scene::room::RoomScene;
+use photonmill::scene::{Camera, Scene};
 use photonmill::settings::Settings;
+use photonmill::settings::transport::TransportSettings;
+use photonmill::transport::{self, Lit, View};
 
 /// A device under the validation layer, which must not have said a word by the end of the test.
 pub struct Device(Gpu);
@@ -103,6 +110,87 @@ pub fn plan_for(gpu: &Gpu, scene: &RoomScene, settings: &Settings) -> Plan {
 /// What the CPU builder would do with these settings.
 pub fn plan_for_host(settings: &Settings) -> Plan {
     Plan::new(&open_box(settings), settings, &Limits::of_host()).unwrap()
+}
+
+/// Every draw of a photon: four of its emission, three of each bounce.
+pub fn draws_of(streams: Streams, round: u32, photon: u32, bounces: u32) -> Vec<f32> {
+    let key = streams.key(round);
+    let state = rng::words(streams.jump(round, photon + 1).apply(rng::srand48(streams.seed as u32)));
+    let mut stream = rng::open_stream(streams.rng, &key, photon, state);
+    let mut draws = rng::draw_emission(streams.rng, &key, photon, &mut stream).to_vec();
+    for bounce in 0..bounces {
+        draws.extend(rng::draw_bounce(streams.rng, &key, photon, bounce, &mut stream));
+    }
+    draws
+}
+
+/// The streams that a run draws from.
+pub fn streams_of(settings: &Settings) -> Streams {
+    Streams { rng: settings.rng, seed: settings.seed, photons: settings.photons, draws_per_photon: settings.draws_per_photon() }
+}
+
+fn light(gpu: &Gpu, view: &View, plan: TransportPlan) -> Lit {
+    let never = AtomicBool::new(false);
+    let lit = transport::light(gpu, view, plan, &mut Control { cancelled: &never, progress: &mut |_, _| {} }).unwrap();
+    assert_eq!(lit.anomalies, [0, 0, 0], "values that are no number, or too large for the film");
+    lit
+}
+
+/// What arrives at points (position, normal) of a scene of triangles.
+pub fn received(gpu: &Gpu, scene: &Scene, settings: &TransportSettings, points: &[(DVec3, DVec3)]) -> Lit {
+    received_within(gpu, scene, settings, points, &render::limits(gpu.facts()))
+}
+
+/// The same within other limits than the device's own.
+pub fn received_within(gpu: &Gpu, scene: &Scene, settings: &TransportSettings, points: &[(DVec3, DVec3)], limits: &Limits) -> Lit {
+    let geometry = Geometry::new(scene).unwrap();
+    let receiver = |(position, normal): &(DVec3, DVec3)| Receiver {
+        position: geometry.to_local(*position),
+        normal: normal.as_vec3(),
+        shading_normal: normal.as_vec3(),
+    };
+    let receivers = points.iter().map(receiver).collect();
+    let sensor = Sensor::Receivers { count: points.len() as u32 };
+    let plan = TransportPlan::new(scene, &geometry, settings, sensor, limits).unwrap();
+    light(gpu, &View { geometry: &geometry, camera: None, phases: &[receivers] }, plan)
+}
+
+/// What a camera sees of a scene of triangles.
+pub fn seen(gpu: &Gpu, scene: &Scene, settings: &TransportSettings, camera: &Camera, [width, height]: [u32; 2]) -> Lit {
+    let geometry = Geometry::new(scene).unwrap();
+    let plan = TransportPlan::new(scene, &geometry, settings, Sensor::Picture { width, height }, &render::limits(gpu.facts())).unwrap();
+    light(gpu, &View { geometry: &geometry, camera: Some(camera), phases: &[] }, plan)
+}
+
+/// Mean of the red channel over all pixels or points.
+pub fn mean_red(lit: &Lit) -> f64 {
+    let pixels = lit.film.pixels();
+    (0..pixels).map(|pixel| lit.film.mean(pixel, &lit.plan).x).sum::<f64>() / pixels as f64
+}
+
+/// A relative error against what is allowed.
+pub fn relative_check(what: &str, found: f64, expected: f64, allowed: f64) -> Check {
+    let error = (found / expected - 1.0).abs();
+    // Written so that NaN complains.
+    if error <= allowed {
+        Ok(())
+    } else {
+        Err(format!("{what}: {found} where {expected} is right, {error:e} off where {allowed:e} may be"))
+    }
+}
+
+/// Counts of 100 classes that are equally likely, by chi-square on both sides: 99 degrees of freedom leave
+/// (44.7, 183.7) once in a million either way. Too even is as wrong as too uneven.
+pub fn evenness_check(what: &str, classes: impl Iterator<Item = usize>) -> Check {
+    let mut counts = [0u64; 100];
+    classes.for_each(|class| counts[class] += 1);
+    let expected = counts.iter().sum::<u64>() as f64 / 100.0;
+    let chi_square: f64 = counts.iter().map(|count| (*count as f64 - expected).powi(2) / expected).sum();
+    if 44.7 < chi_square && chi_square < 183.7 {
+        Ok(())
+    } else {
+        Err(format!("{what}: chi-square {chi_square:.1} of 99 degrees of freedom"))
+    }
 }
 
 /// Sorted by photon and bounce, which no two entries of a photon map share.

@@ -1,0 +1,675 @@
+//! Sums, estimates and sizes at their ends: more photons than f32 or 32 bits count, light over many decades, the
+//! least and the largest radius, one photon and none, and plans around every limit.
+
+mod common;
+
+use std::f64::consts::PI;
+use std::time::Instant;
+
+use common::{
+    Check, Device, assert_complains, assert_holds, device, device_with, equal_sums, mean_red, photons_on_cpu, plan_for, plan_for_host,
+    received, received_within, relative_check, run, run_on_cpu, run_scene, run_scene_on_cpu, seen, share_check, z_check,
+};
+use glam::{DVec3, Vec3};
+use photonmill::cpu::bsdf::phong_lobe;
+use photonmill::film::{Film, estimate_walls};
+use photonmill::gpu::{Commands, Options};
+use photonmill::ledger::Fates;
+use photonmill::plan::transport::{Sensor, TransportPlan};
+use photonmill::plan::{Limits, Plan};
+use photonmill::records::{MapPhoton, Photon, Tally};
+use photonmill::render::constants;
+use photonmill::resources::Resources;
+use photonmill::rng::Rng;
+use photonmill::scene::geometry::Geometry;
+use photonmill::scene::light::{Light, LightKind};
+use photonmill::scene::open_box::open_box;
+use photonmill::scene::rectangle::disc_rectangle_area;
+use photonmill::scene::room::Wall;
+use photonmill::scene::{Scene, built_in};
+use photonmill::selfcheck::measure::irradiance;
+use photonmill::settings::transport::{Illumination, Kernel, TransportSettings};
+use photonmill::settings::{EmissionLaw, Gather, MAX_EVENTS, Settings, Variant};
+use photonmill::transport::{Lit, RoundFilm};
+use photonmill::{estimate, index};
+
+/// Half of an f32's spacing below 1.
+const U: f64 = 1.0 / 16_777_216.0;
+
+fn scene(name: &str) -> Scene {
+    built_in::by_name(name).unwrap_or_else(|| panic!("there is no scene {name}"))
+}
+
+/// Film sums of a photon list that is gathered again and again.
+fn gathered(gpu: &Device, settings: &Settings, photons: &[Photon], times: u32) -> Vec<u64> {
+    let scene = open_box(settings);
+    let plan = plan_for(gpu, &scene, settings);
+    assert!(photons.len() <= plan.photon_capacity as usize);
+    let mut commands = Commands::new(gpu, constants(&plan), Instant::now()).unwrap();
+    let resources = Resources::new(gpu, &mut commands, &scene, &plan).unwrap();
+    commands.upload(&resources.photons, photons).unwrap();
+    commands.upload(&resources.counters, &[photons.len() as u32]).unwrap();
+    index::build(&mut commands, &resources, &plan, settings.photons).unwrap();
+    for _ in 0..times {
+        estimate::gather(&mut commands, &resources, &plan, settings.photons).unwrap();
+    }
+    commands.read(&resources.film, plan.points.len() * plan.channel_count as usize).unwrap()
+}
+
+/// 42 million photons on one texel: f32 would stop counting at 2^24.
+#[test]
+fn a_texel_counts_beyond_2_to_the_24() {
+    let (count, times) = (1 << 20, 40);
+    let on_the_back_wall = Photon { position: Vec3::new(0.0, 0.0, -0.25), wall: 4, flux: 1.0, weight: 1.0, photon: 0, bounce: 0 };
+    let expected = [0, 0, 0, 0, u64::from(count * times)];
+    for without_int64_atomics in [false, true] {
+        let Some(gpu) = device_with(Options { without_int64_atomics, ..Options::default() }) else { return };
+        let settings = Settings { photons: count, chunk: Some(count), bounces: 1, mesh: 1, rng: Rng::Philox, ..Settings::default() };
+        let found = gathered(&gpu, &settings, &vec![on_the_back_wall; count as usize], times);
+        assert_holds(format!("64-bit atomics masked: {without_int64_atomics}"), equal_sums("one texel", &found, &expected));
+    }
+    let in_f32 = (0..count * times).fold(0.0f32, |sum, _| sum + 1.0);
+    assert_complains("a sum in f32", equal_sums("one texel", &[0, 0, 0, 0, in_f32 as u64], &expected));
+}
+
+/// Runs that are merged sum by sum: a million million photons are as bright as the five thousand that they repeat.
+#[test]
+fn a_trillion_photons_merge_into_the_same_light() {
+    let settings = Settings { mesh: 16, ..Settings::default() };
+    let outcome = run_on_cpu(&settings);
+    let scene = open_box(&settings);
+    let one = estimate_walls(&outcome.film, &scene, &outcome.plan);
+    for times in [200_000u64, 200_000_000] {
+        let merged = Film {
+            sums: outcome.film.sums.iter().map(|sum| sum.checked_mul(times).unwrap()).collect(),
+            emitted: outcome.film.emitted * times,
+            ..outcome.film.clone()
+        };
+        for (found, expected) in estimate_walls(&merged, &scene, &outcome.plan).iter().zip(&one) {
+            for (found, expected) in found.irradiance.iter().zip(&expected.irradiance).filter(|(_, expected)| **expected > 0.0) {
+                assert_holds(times, relative_check("irradiance", *found, *expected, 8.0 * f64::EPSILON));
+                let less = found * (1.0 - U);
+                assert_complains("a count kept in f32", relative_check("irradiance", less, *expected, 8.0 * f64::EPSILON));
+            }
+        }
+    }
+    // Tallies are 32-bit on the device, and their sums are not.
+    let mut fates = Fates::new(1);
+    let round = Tally { stored: 3_000_000_000, absorbed: 500_000_000, escaped: 499_999_999, dropped: 1 };
+    (0..250).for_each(|_| fates.add(4_000_000_000, &[round]));
+    let ledger = fates.ledger();
+    assert!(ledger.closes());
+    assert_eq!((ledger.emitted, ledger.stored, ledger.dropped), (1_000_000_000_000, 750_000_000_000, 250));
+}
+
+/// Lights of 1e-12 W to 1e12 W: 24 decades of power change no sum, and the light in proportion.
+#[test]
+fn light_is_linear_in_power_over_24_decades() {
+    let of = |light_power: [f64; 2]| {
+        let settings = Settings { light_power, mesh: 8, ..Settings::default() };
+        let outcome = run_on_cpu(&settings);
+        let walls = estimate_walls(&outcome.film, &open_box(&settings), &outcome.plan);
+        (outcome.film.sums, walls.into_iter().flat_map(|wall| wall.irradiance).collect::<Vec<f64>>())
+    };
+    let (sums, one_watt) = of([1.0, 1.0]);
+    assert!(one_watt.iter().all(|irradiance| *irradiance > 0.0));
+    for exponent in [-12, -7, 3, 12] {
+        let watts = 10f64.powi(exponent);
+        let (found, irradiance) = of([watts, watts]);
+        assert_holds(exponent, equal_sums("the film", &found, &sums));
+        for (found, one) in irradiance.iter().zip(&one_watt) {
+            assert_holds(exponent, relative_check("irradiance", *found, one * watts, 8.0 * f64::EPSILON));
+        }
+    }
+    for refused in [[1e-13, 1.0], [1.0, 1e13], [1.0, 0.999e-6]] {
+        assert!(Settings { light_power: refused, ..Settings::default() }.validate().is_err(), "{refused:?}");
+    }
+}
+
+/// Weights and fluxes that differ by many decades, mixed in one texel: a sum is off by no more than half a unit of
+/// fixed point for each photon.
+#[test]
+fn mixed_weights_are_summed_to_half_a_unit_each() {
+    let settings = Settings {
+        shininess: [Some(1e4), None, Some(0.01), Some(5.0), Some(0.0)],
+        light_power: [1.0, 1.1e-6],
+        mesh: 16,
+        ..Settings::default()
+    };
+    let (map, plan, film) = (photons_on_cpu(&settings), plan_for_host(&settings), run_on_cpu(&settings).film);
+    let radius_squared = (settings.radius * settings.radius) as f32;
+    let (mut decades, mut worst) = (0.0f64, 0.0f64);
+    for (place, point) in plan.points.iter().enumerate() {
+        let near = map.iter().filter(|photon| {
+            let offset = photon.position - point.position;
+            photon.wall == point.wall && offset.x * offset.x + offset.y * offset.y + offset.z * offset.z <= radius_squared
+        });
+        let (mut flux, mut weight, mut count) = (0.0, 0.0, 0.0);
+        for photon in near {
+            flux += f64::from(photon.flux);
+            weight += f64::from(photon.weight);
+            count += 1.0;
+            decades = decades.max(if photon.weight > 0.0 { -f64::from(photon.weight).log10() } else { 0.0 });
+        }
+        let half_units = 0.5 * count / film.scale;
+        for (what, found, exact) in [("flux", film.flux(place), flux), ("power", film.power(place), weight)] {
+            assert!((found - exact).abs() <= half_units, "{what} of point {place}: {found} where {exact} +- {half_units:e} is right");
+            worst = worst.max((found - exact).abs());
+        }
+    }
+    println!("weights over {decades:.1} decades, sums off by {worst:.1e} at most");
+    assert!(decades > 12.0, "weights over {decades} decades only");
+}
+
+/// Faint surfaces beside bright ones are right to half a unit of the film, 2^-24 of the scene's mean radiance.
+#[test]
+fn faint_light_is_right_to_half_a_film_unit() {
+    let Some(gpu) = device() else { return };
+    let settings = TransportSettings { photons: 1, rounds: 2, shadow_rays: 1, ..TransportSettings::default() };
+    for exponent in [0, -3, -6, -9, -12] {
+        let mut plane = scene("sky-over-plane");
+        let albedo = 10f32.powi(exponent);
+        plane.materials[0].base_colour = Vec3::splat(albedo);
+        let camera = photonmill::scene::Camera::looking_at("above", DVec3::Y * 1.5, DVec3::ZERO, DVec3::Z, 0.1);
+        let lit = seen(&gpu, &plane, &settings, &camera, [8, 8]);
+        let (found, expected) = (mean_red(&lit), f64::from(albedo));
+        let half_unit = 0.5 / lit.plan.film_scale;
+        println!("albedo 1e{exponent}: {found:e}, {:.1e} off, half a unit is {half_unit:.1e}", (found - expected).abs());
+        // A sky is sampled by the cosine: every ray sees the same, but for some roundings of f32.
+        assert!((found - expected).abs() <= half_unit + 16.0 * U * expected, "{found:e} where {expected:e} is right");
+    }
+}
+
+/// 1000 +- 0.1 over a million rounds: the difference of two squares that agree in eight digits.
+#[test]
+fn standard_errors_survive_a_mean_far_above_them() {
+    let furnace = scene("furnace");
+    let settings = TransportSettings { rounds: 1_000_000, ..TransportSettings::default() };
+    let geometry = Geometry::new(&furnace).unwrap();
+    let sensor = Sensor::Picture { width: 1, height: 1 };
+    let plan = TransportPlan::new(&furnace, &geometry, &settings, sensor, &Limits::of_host()).unwrap();
+    let units = |value: f64| (value * plan.film_scale).round() as u64;
+    let (low, high) = (units(999.9), units(1000.1));
+    let half = u64::from(settings.rounds) / 2;
+    let square = |value: u64| u128::from(value) * u128::from(value);
+    let squares = u128::from(half) * (square(low) + square(high));
+    let film = RoundFilm::new(settings.rounds, vec![half * (low + high); 3], [squares as u64, (squares >> 64) as u64].repeat(3));
+    let exact = 0.1 / (f64::from(settings.rounds) - 1.0).sqrt();
+    assert_holds("mean", relative_check("mean", film.mean(0, &plan).x, 1000.0, 1e-6));
+    assert_holds("error", relative_check("standard error", film.standard_error(0, &plan).x, exact, 1e-3));
+    // As f32 would have it: nothing is left of the variance, or it is negative.
+    let (mut sum, mut sum_of_squares) = (0.0f32, 0.0f32);
+    for value in [999.9f32, 1000.1].repeat(half as usize) {
+        sum += value;
+        sum_of_squares += value * value;
+    }
+    let n = settings.rounds as f32;
+    let naive = (f64::from(sum_of_squares / n - (sum / n) * (sum / n)) / f64::from(settings.rounds)).sqrt();
+    assert_complains("sums in f32", relative_check("standard error", naive, exact, 1e-3));
+}
+
+/// The most events that 64-bit sums hold, and one more.
+#[test]
+fn film_sums_are_refused_before_they_could_overflow() {
+    let most = Settings { photons: 1 << 31, bounces: 1 << 4, rounds: 1 << 12, rng: Rng::Philox, ..Settings::default() };
+    assert_eq!(most.total_photons() * u64::from(most.bounces), MAX_EVENTS);
+    most.validate().unwrap();
+    let host = Limits::of_host();
+    let plan = Plan::new(&open_box(&most), &Settings { mesh: 1, shininess: [Some(2.0); 5], ..most.clone() }, &host).unwrap();
+    // Photons of weight 1 only, in every texel at every bounce.
+    assert!(u128::from(MAX_EVENTS) << plan.film_shift <= 1 << 63);
+    assert!(Settings { rounds: most.rounds + 1, ..most.clone() }.validate().is_err());
+    assert!(Settings { bounces: most.bounces + 1, ..most }.validate().is_err());
+}
+
+/// max(cosine, 0)^shininess at the paper's exponents and beyond, from the last number below 1 down to 0.
+#[test]
+fn phong_weights_are_powers_of_the_cosine() {
+    let mut worst = [0.0f64; 6];
+    for (place, shininess) in [0.0f32, 0.01, 0.5, 2.0, 5.0, 1e4].into_iter().enumerate() {
+        for step in 0..200_000u32 {
+            // Half of them close to 1, where a power of ten thousand lives.
+            let cosine = if step % 2 == 0 { step as f32 / 200_000.0 } else { 1.0 - (step as f32 / 200_000.0).powi(4) * 0.01 };
+            let exact = if cosine > 0.0 { f64::from(cosine).powf(f64::from(shininess)) } else { 0.0 };
+            let found = f64::from(phong_lobe(cosine, shininess));
+            if exact < f64::from(f32::MIN_POSITIVE) {
+                assert!(found <= f64::from(f32::MIN_POSITIVE), "{cosine}^{shininess}: {found}");
+                continue;
+            }
+            worst[place] = worst[place].max((found / exact - 1.0).abs());
+            // Below 1e-20 a relative error weighs nothing.
+            if exact > 1e-20 {
+                assert_holds(shininess, relative_check(&format!("{cosine}^{shininess}"), found, exact, 5e-5));
+            }
+        }
+        for away in [0.0, -0.0, -f32::MIN_POSITIVE, -0.5, -1.0] {
+            assert_eq!(phong_lobe(away, shininess), 0.0, "cosine {away}");
+        }
+        assert_eq!(phong_lobe(1.0, shininess), 1.0);
+        assert_eq!(phong_lobe(f32::MIN_POSITIVE, 0.0), 1.0);
+    }
+    println!("relative errors at shininess 0, 0.01, 0.5, 2, 5, 1e4: {worst:?}");
+    assert_complains("an exponent 1 % too large", relative_check("0.5^2.02", 0.5f64.powf(2.02), 0.25, 5e-5));
+}
+
+/// Directions that leave by the cosine and an eye straight above: E[w] = 2 / (n + 2), and E[w^2] by the same with
+/// 2 n. On the device, the photons without weight are those whose mirror direction points away from the eye,
+/// whatever the exponent.
+#[test]
+fn phong_weights_have_their_mean_and_vanish_behind() {
+    let count = 400_000u32;
+    let draws: Vec<f32> = first_draws(count);
+    for shininess in [0.0f32, 0.01, 0.5, 2.0, 5.0, 1e4] {
+        let n = f64::from(shininess);
+        let (mean, square) = (2.0 / (n + 2.0), 2.0 / (2.0 * n + 2.0));
+        let sum: f64 = draws.iter().map(|u| f64::from(phong_lobe(u.sqrt(), shininess))).sum();
+        let error = ((square - mean * mean) / f64::from(count)).sqrt().max(U);
+        assert_holds(shininess, z_check("mean weight", sum / f64::from(count), mean, error));
+        if shininess > 0.0 {
+            assert_complains("1 / (n + 1)", z_check("mean weight", sum / f64::from(count), 1.0 / (n + 1.0), error));
+        }
+    }
+    let Some(gpu) = device() else { return };
+    let weights = |shininess: f32| {
+        let settings = Settings { shininess: [Some(shininess); 5], photons: 20_001, ..Settings::default() };
+        let map = common::in_order(common::photons(&gpu, &settings));
+        assert!(map.iter().all(|photon| (0.0..=1.0).contains(&photon.weight)), "shininess {shininess}");
+        map.iter().map(|photon| photon.weight).collect::<Vec<f32>>()
+    };
+    let ones = weights(0.0);
+    assert!(ones.iter().all(|weight| *weight == 0.0 || *weight == 1.0), "a power of 0 is 1 where there is light");
+    let dark = ones.iter().filter(|weight| **weight == 0.0).count();
+    assert!(dark > 1000, "only {dark} photons point away");
+    for shininess in [0.01, 0.5, 2.0, 5.0] {
+        let same = ones.iter().zip(weights(shininess)).all(|(one, weight)| (*one == 0.0) == (weight == 0.0));
+        assert!(same, "shininess {shininess} has other photons without weight");
+    }
+    let narrow = weights(1e4);
+    assert!(ones.iter().zip(&narrow).all(|(one, weight)| weight <= one) && narrow.iter().any(|weight| *weight > 0.0));
+}
+
+/// Numbers in [0, 1), drawn as photons draw them.
+fn first_draws(count: u32) -> Vec<f32> {
+    let settings = Settings { rng: Rng::Philox, photons: count, ..Settings::default() };
+    (0..count).map(|photon| common::draws_of(common::streams_of(&settings), 0, photon, 0)[0]).collect()
+}
+
+/// From a photon's own place there is no direction to the eye, and from an eye in the wall's plane none but along it.
+#[test]
+fn an_eye_on_a_photon_sees_no_weight_and_no_nan() {
+    let settings = Settings { shininess: [Some(2.0); 5], ..Settings::default() };
+    let all = photons_on_cpu(&settings);
+    for place in [0, all.len() / 2, all.len() - 1] {
+        let eye = all[place].position.to_array();
+        let settings = Settings { eye, ..settings.clone() };
+        let map = photons_on_cpu(&settings);
+        assert_eq!(map[place].weight, 0.0);
+        assert!(map.iter().all(|photon| (0.0..=1.0).contains(&photon.weight)));
+        let Some(gpu) = device() else { continue };
+        let on_device = common::in_order(common::photons(&gpu, &settings));
+        assert!(on_device.iter().all(|photon| (0.0..=1.0).contains(&photon.weight)));
+    }
+}
+
+/// Photons stored in a closed room are rho / (1 - rho) each on average, with the variance rho / (1 - rho)^2.
+#[test]
+fn a_thousand_bounces_store_a_geometric_series() {
+    let gpu = device();
+    for (albedo, bounces, photons) in [(0.75f32, 200, 100_001), (0.99, 2000, 10_001), (0.999, 9000, 1001)] {
+        let settings = Settings { reflectance: albedo, bounces, photons, mesh: 1, rng: Rng::Philox, ..Settings::default() };
+        let mut scene = open_box(&settings);
+        scene.faces[5] = Some(Wall { name: "front", albedo, shininess: None });
+        let mut ledgers = vec![("cpu", run_scene_on_cpu(&scene, &settings).fates.ledger())];
+        if let Some(gpu) = gpu.as_ref().filter(|_| bounces <= 2000) {
+            ledgers.push(("device", run_scene(gpu, &scene, &settings).fates.ledger()));
+        }
+        let rho = f64::from(albedo);
+        let (mean, deviation) = (rho / (1.0 - rho), rho.sqrt() / (1.0 - rho));
+        // What the cap takes: rho^(bounces + 1) / (1 - rho), far below the noise.
+        let error = deviation / f64::from(photons).sqrt();
+        assert!(rho.powi(bounces as i32 + 1) / (1.0 - rho) < 0.5 * error);
+        for (builder, ledger) in ledgers {
+            let found = ledger.stored as f64 / f64::from(photons);
+            println!("{builder}, albedo {albedo}: {found} stored a photon, {mean} expected, z = {:.2}", (found - mean) / error);
+            assert_eq!((ledger.escaped, ledger.dropped), (0, 0));
+            assert_holds(builder, z_check("stored a photon", found, mean, error));
+            assert_complains("five bounces", z_check("stored a photon", mean * (1.0 - rho.powi(5)), mean, error));
+        }
+    }
+}
+
+/// 1e9 photons in one run: the share that the first flight stores, to 8e-5 of a closed form.
+#[test]
+#[ignore = "a billion photons take minutes on a software device"]
+fn a_billion_photons_have_the_exact_share() {
+    let Some(gpu) = device() else { return };
+    let settings =
+        Settings { photons: 1_000_000_000, bounces: 1, mesh: 1, rng: Rng::Philox, variant: Variant::Ballot, ..Settings::default() };
+    let fates = run(&gpu, &settings).fates;
+    assert_eq!(fates.emitted, 1_000_000_000);
+    assert_holds("first bounce", share_check("stored", fates.bounces[0].stored, fates.emitted, 0.586_425_3));
+}
+
+fn over_plane(kind: LightKind) -> Scene {
+    let mut plane = scene("point-over-plane");
+    plane.lights = vec![Light { name: "lamp".into(), kind }];
+    plane
+}
+
+/// One photon of 1 W within the radius: 1 / (pi r^2) there, nothing elsewhere, whatever kernel is flat.
+#[test]
+fn a_map_of_one_photon_is_one_disc() {
+    let Some(gpu) = device() else { return };
+    let close = LightKind::Disc { centre: DVec3::Y * 1e-3, normal: DVec3::NEG_Y, radius: 1e-3, power: Vec3::ONE, law: EmissionLaw::Cosine };
+    for radius in [0.05, 0.2, 1.0] {
+        let settings = TransportSettings {
+            photons: 1,
+            rounds: 1,
+            bounces: 1,
+            radius: Some(radius),
+            alpha: 1.0,
+            illumination: Illumination::Photons,
+            ..TransportSettings::default()
+        };
+        let points = [(DVec3::ZERO, DVec3::Y), (DVec3::X * 1.9, DVec3::Y), (DVec3::ZERO, DVec3::NEG_Y)];
+        let lit = received(&gpu, &over_plane(close.clone()), &settings, &points);
+        let expected = 1.0 / (PI * radius * radius);
+        // The area is known to 2^-24 of the squared radius, and some roundings of f32 follow.
+        assert_holds(radius, relative_check("one photon", lit.film.mean(0, &lit.plan).x, expected, 16.0 * U));
+        assert_eq!([lit.film.mean(1, &lit.plan), lit.film.mean(2, &lit.plan)], [DVec3::ZERO; 2], "radius {radius}");
+        assert_complains(
+            "a radius 1 % too large",
+            relative_check("one photon", lit.film.mean(0, &lit.plan).x, expected / 1.0201, 16.0 * U),
+        );
+    }
+}
+
+fn furnace_settings(radius: f64) -> TransportSettings {
+    TransportSettings {
+        photons: 10_000,
+        rounds: 2,
+        bounces: 60,
+        radius: Some(radius),
+        alpha: 1.0,
+        illumination: Illumination::Photons,
+        ..TransportSettings::default()
+    }
+}
+
+/// From all of the scene, twice over, down to a two-hundredth of the distance between photons: the estimate stays
+/// right on average, at edges and in corners too; outside of what positions allow a radius is refused.
+#[test]
+fn radii_from_the_whole_scene_to_below_the_photons_spacing_are_right() {
+    let Some(gpu) = device() else { return };
+    let exact = PI / 0.5;
+    let middle = |k: usize| (DVec3::new((k % 8) as f64 / 8.0 + 0.06, 0.0, (k / 8) as f64 / 8.0 + 0.06), DVec3::Y);
+    let edges = |k: usize| (DVec3::new(if k.is_multiple_of(2) { 1e-4 } else { 1.0 - 1e-4 }, 0.0, k as f64 / 64.0 + 1e-3), DVec3::Y);
+    for (radius, most) in [(2.0, 0.02), (1.0, 0.02), (0.3, 0.02), (0.01, 0.1), (0.002, 0.3)] {
+        for (what, points) in [("middle", (0..64).map(middle).collect::<Vec<_>>()), ("edges", (0..64).map(edges).collect())] {
+            let found = irradiance(&gpu, &scene("furnace"), &furnace_settings(radius), &points).unwrap();
+            println!("radius {radius}, {what}: {:.4} +- {:.4}, expected {exact:.4}", found.mean, found.standard_error);
+            assert!(found.standard_error < most * exact, "radius {radius}, {what}: {found:?}");
+            assert_holds(format!("radius {radius}, {what}"), z_check("irradiance", found.mean, exact, found.standard_error));
+        }
+    }
+    let furnace = scene("furnace");
+    let geometry = Geometry::new(&furnace).unwrap();
+    let sensor = Sensor::Receivers { count: 1 };
+    let plan =
+        |radius: f64| TransportPlan::new(&furnace, &geometry, &furnace_settings(radius), sensor, &photonmill::render::limits(gpu.facts()));
+    let least = 1.0 / 32_768.0;
+    assert!(plan(2.0).is_ok() && plan(least).is_ok());
+    for radius in [2.0f64.next_up(), least.next_down(), 1e-23, f64::MIN_POSITIVE, 1e30, f64::NAN, f64::INFINITY, 0.0, -0.1] {
+        assert!(plan(radius).unwrap_err().to_string().starts_with("--radius"), "{radius}");
+    }
+    // Where no photon is in reach of any point there is nothing, and no division by it.
+    let lit = received(&gpu, &furnace, &furnace_settings(least), &[(DVec3::new(0.5, 0.0, 0.5), DVec3::Y)]);
+    assert!(lit.film.mean(0, &lit.plan).is_finite());
+    // The paper's box, at both ends of what it allows.
+    for radius in [0.5, 0.5 / 65_536.0] {
+        Settings { radius, ..Settings::default() }.validate().unwrap();
+    }
+    for radius in [0.5f64.next_up(), (0.5f64 / 65_536.0).next_down(), f64::NAN] {
+        assert!(Settings { radius, ..Settings::default() }.validate().is_err(), "{radius}");
+    }
+}
+
+/// Without correction an estimate at an edge is dark by the share of the disc beyond it, a half on the edge and
+/// three quarters in a corner; with it, by nothing. The same photons tell both.
+#[test]
+fn edges_and_corners_are_dark_by_what_lies_beyond_them() {
+    let Some(gpu) = device() else { return };
+    let radius = 0.2;
+    let at = |x: f64, z: f64| (DVec3::new(x * radius, 0.0, z * radius), DVec3::Y);
+    let places = [(0.0, 2.5), (0.25, 2.5), (0.5, 2.5), (0.75, 2.5), (1.0, 2.5), (2.5, 2.5), (0.0, 0.0), (0.5, 0.5), (0.8, 0.8), (0.3, 0.9)];
+    let points: Vec<_> = places.iter().map(|(x, z)| at(*x, *z)).collect();
+    let lit =
+        |edge_correction| received(&gpu, &scene("furnace"), &TransportSettings { edge_correction, ..furnace_settings(radius) }, &points);
+    let (with, without) = (lit(true), lit(false));
+    let mut worst = 0.0f64;
+    for (place, (x, z)) in places.iter().enumerate() {
+        let share = disc_rectangle_area(1.0, [-x, 5.0 - x], [-z, 5.0 - z]) / PI;
+        let ratio = without.film.mean(place, &without.plan).x / with.film.mean(place, &with.plan).x;
+        worst = worst.max((ratio / share - 1.0).abs());
+        // An area in f32 is the sum over six edges of some twenty roundings each.
+        assert_holds(format!("{x}, {z} radii from the walls"), relative_check("share", ratio, share, 128.0 * U));
+        assert_complains("a share 0.1 % larger", relative_check("share", 1.001 * ratio, share, 128.0 * U));
+    }
+    println!("covered shares off by {worst:.1e} at most");
+    for (place, expected) in [(0, 0.5), (1, 0.6575), (2, 0.8045), (3, 0.9279), (4, 1.0), (6, 0.25), (7, 0.63408), (8, 0.89591)] {
+        let share = without.film.mean(place, &without.plan).x / with.film.mean(place, &with.plan).x;
+        assert!((share - expected).abs() < 5e-5, "place {place}: {share} where {expected} is right");
+    }
+}
+
+/// All weight functions integrate to 1: a furnace is as bright by each, and none looks beyond its radius.
+#[test]
+fn every_kernel_of_every_radius_integrates_to_one() {
+    let Some(gpu) = device() else { return };
+    let points = [(DVec3::new(0.5, 0.0, 0.5), DVec3::Y), (DVec3::new(0.0, 0.0, 0.5), DVec3::Y), (DVec3::new(1e-3, 0.0, 1e-3), DVec3::Y)];
+    for kernel in [Kernel::Box, Kernel::Cone, Kernel::Epanechnikov] {
+        for radius in [2.0, 0.1] {
+            let settings = TransportSettings { kernel, photons: 20_000, ..furnace_settings(radius) };
+            let found = irradiance(&gpu, &scene("furnace"), &settings, &points).unwrap();
+            assert!(found.standard_error < 0.03 * 2.0 * PI, "{kernel:?}, {radius}: {found:?}");
+            assert_holds(format!("{kernel:?}, radius {radius}"), z_check("irradiance", found.mean, 2.0 * PI, found.standard_error));
+        }
+    }
+}
+
+/// r_n / r_1 of the schedule with alpha = 2/3, from Gamma(n + alpha) / (Gamma(1 + alpha) n!).
+#[test]
+fn radii_of_ten_thousand_rounds_follow_the_gamma_function() {
+    let furnace = scene("furnace");
+    let geometry = Geometry::new(&furnace).unwrap();
+    let settings = TransportSettings { rounds: 10_000, alpha: 2.0 / 3.0, ..furnace_settings(0.25) };
+    let plan = TransportPlan::new(&furnace, &geometry, &settings, Sensor::Receivers { count: 1 }, &Limits::of_host()).unwrap();
+    let map = plan.global.as_ref().unwrap();
+    // ln Gamma(n + a) - ln n! - ln Gamma(1 + a) as a product of the first terms and Stirling's series of the rest.
+    let alpha = 2.0 / 3.0;
+    let stirling =
+        |x: f64| (x - 0.5) * x.ln() - x + 0.5 * (2.0 * PI).ln() + 1.0 / (12.0 * x) - 1.0 / (360.0 * x.powi(3)) + 1.0 / (1260.0 * x.powi(5));
+    let ln_gamma = |x: f64| stirling(x + 20.0) - (0..20).map(|k| (x + f64::from(k)).ln()).sum::<f64>();
+    for (n, printed) in [(10, 0.713), (100, 0.488), (1000, 0.333), (10_000, 0.227)] {
+        let exact = (0.5 * (ln_gamma(f64::from(n) + alpha) - ln_gamma(f64::from(n) + 1.0) - ln_gamma(1.0 + alpha))).exp();
+        let found = plan.radius(map, n - 1) / map.radius;
+        assert!((exact - printed).abs() < 6e-4, "{n}: {exact}");
+        assert_holds(n, relative_check("radius", found, exact, 1e-6));
+        assert_complains("a round too early", relative_check("radius", plan.radius(map, n - 2) / map.radius, exact, 1e-6));
+    }
+}
+
+/// What a device could hold at most: buffers are ranges of 32 bits.
+fn vast() -> Limits {
+    Limits { buffer_bytes: u64::MAX / 4, memory_bytes: u64::MAX / 4, pair_tests_per_submission: u64::MAX / 1024, group_size: 1024 }
+}
+
+/// photons * bounces beyond 2^32: every chunk's slots are numbered within 32 bits, whatever is asked, and the split
+/// comes where the next photon's would not be.
+#[test]
+fn slots_of_a_chunk_are_numbered_in_32_bits() {
+    let plan = |photons: u32, bounces: u32, limits: &Limits| {
+        let settings =
+            Settings { photons, bounces, chunk: Some(1 << 31), mesh: 1, rng: Rng::Philox, variant: Variant::Naive, ..Settings::default() };
+        Plan::new(&open_box(&settings), &settings, limits).unwrap()
+    };
+    let check = |plan: &Plan, limits: &Limits| {
+        let slots = u64::from(plan.path_capacity) * u64::from(plan.settings.bounces);
+        assert!(slots <= u64::from(u32::MAX) && u64::from(plan.photon_capacity) == slots, "{slots} slots");
+        assert!(slots * size_of::<Photon>() as u64 <= limits.buffer_bytes);
+        assert!(u64::from(plan.path_capacity) * u64::from(plan.chunks_per_round) >= u64::from(plan.settings.photons));
+    };
+    for bounces in [1, 2, 15, 1000, 10_000] {
+        for photons in [2, 300_000_000, (1 << 31) - 1, 1 << 31] {
+            check(&plan(photons, bounces, &vast()), &vast());
+        }
+    }
+    // 2^32 - 1 slots of 15 bounces; a chunk keeps room for a photon more of each of the two lights.
+    let most = u32::MAX / 15 - 2;
+    assert_eq!((most, plan(most, 15, &vast()).chunks_per_round), (286_331_151, 1));
+    assert_eq!(plan(most + 1, 15, &vast()).chunks_per_round, 2);
+    // And where a buffer of 2^27 bytes ends: 279 620 photons of 15 slots of 32 bytes.
+    let small = Limits { buffer_bytes: 1 << 27, ..vast() };
+    let most = (1 << 27) / 32 / 15 - 2;
+    assert_eq!((most, plan(most, 15, &small).chunks_per_round), (279_618, 1));
+    assert_eq!(plan(most + 1, 15, &small).chunks_per_round, 2);
+    check(&plan(1 << 31, 15, &small), &small);
+    // Room for fewer than two photons is an error that names the bounces.
+    let none = Limits { buffer_bytes: 3 * 32 * 15, ..vast() };
+    let settings = Settings { mesh: 1, ..Settings::default() };
+    assert!(Plan::new(&open_box(&settings), &settings, &none).unwrap_err().to_string().starts_with("--bounces"));
+}
+
+/// The same for maps of scenes of triangles.
+#[test]
+fn maps_of_a_chunk_are_numbered_in_32_bits() {
+    let furnace = scene("furnace");
+    let geometry = Geometry::new(&furnace).unwrap();
+    // A storage buffer's range is a 32-bit number of bytes.
+    for buffer_bytes in [1 << 27, u64::from(u32::MAX)] {
+        let limits = Limits { buffer_bytes, ..vast() };
+        for bounces in [1, 2, 15, 10_000] {
+            for photons in [1, 300_000_000, 1 << 31] {
+                let settings = TransportSettings { photons, bounces, illumination: Illumination::Photons, ..TransportSettings::default() };
+                let plan = TransportPlan::new(&furnace, &geometry, &settings, Sensor::Receivers { count: 1 }, &limits).unwrap();
+                let map = plan.global.as_ref().unwrap();
+                let landings = u64::from(map.chunk_photons) * u64::from(bounces);
+                assert!(u64::from(map.capacity) == landings && landings <= u64::from(u32::MAX), "{landings} landings");
+                assert!(landings * size_of::<MapPhoton>() as u64 <= buffer_bytes);
+                let covered: u64 = map.chunks().map(|(_, count)| u64::from(count)).sum();
+                assert_eq!(covered, u64::from(photons));
+                let (first, count) = map.chunks().last().unwrap();
+                assert_eq!(u64::from(first) + u64::from(count), u64::from(photons));
+            }
+        }
+    }
+    // Pictures up to what a buffer holds, and one row more.
+    let limits = Limits { buffer_bytes: 1 << 27, ..vast() };
+    let settings = TransportSettings { photons: 1, ..TransportSettings::default() };
+    let size = |width, height| TransportPlan::new(&furnace, &geometry, &settings, Sensor::Picture { width, height }, &limits);
+    assert!(size(1, 1).is_ok() && size(65_536, 1).is_ok());
+    // Film sums and estimates take 48 bytes a pixel.
+    let rows = (1 << 27) / 48 / 1024;
+    assert!(size(1024, rows).is_ok());
+    assert!(size(1024, rows + 1).unwrap_err().to_string().starts_with("--size"));
+}
+
+/// One group more than a row of 65 535 of them: photons of the second row fly, land and are looked up too.
+#[test]
+fn photons_of_a_second_row_of_groups_reach_the_map() {
+    let Some(gpu) = device() else { return };
+    let photons = 65_535 * 32 + 33;
+    let settings = TransportSettings {
+        photons,
+        group_size: 32,
+        rounds: 1,
+        bounces: 1,
+        radius: Some(0.01),
+        illumination: Illumination::Photons,
+        ..TransportSettings::default()
+    };
+    let points = [(DVec3::new(0.5, 0.0, 0.5), DVec3::Y), (DVec3::new(0.5, 0.5, 0.0), DVec3::Z)];
+    // A software device counts less memory than it has.
+    let limits = Limits { memory_bytes: 1 << 33, ..photonmill::render::limits(gpu.facts()) };
+    let lit = |settings: &TransportSettings| received_within(&gpu, &scene("furnace"), settings, &points, &limits);
+    let whole = lit(&settings);
+    assert_eq!(whole.plan.global.as_ref().unwrap().chunk_photons, photons, "the photons do not fit one dispatch here");
+    let split = lit(&TransportSettings { chunk: Some(1_000_003), ..settings.clone() });
+    assert_eq!((&whole.film, &whole.fates), (&split.film, &split.fates));
+    let flown = |lit: &Lit| lit.fates[0].bounces[0].stored + lit.fates[0].bounces[0].absorbed + lit.fates[0].bounces[0].escaped;
+    assert_eq!(flown(&whole), u64::from(photons));
+    assert_eq!(flown(&lit(&TransportSettings { photons: photons - 33, ..settings })), u64::from(photons) - 33);
+}
+
+/// Pictures of one pixel, of odd sides and of one long row, by small and large work groups.
+#[test]
+fn pictures_of_any_shape_are_whole() {
+    let Some(gpu) = device() else { return };
+    let cornell = scene("cornell");
+    let camera = cornell.cameras[0].clone();
+    for size in [[1, 1], [63, 65], [4097, 1], [1, 129]] {
+        let of = |group_size| {
+            let settings = TransportSettings { group_size, photons: 2000, rounds: 1, shadow_rays: 1, ..TransportSettings::default() };
+            seen(&gpu, &cornell, &settings, &camera, size).film
+        };
+        let expected = of(128);
+        assert_eq!(expected.pixels() as u32, size[0] * size[1]);
+        let lit = expected.sums.chunks(3).filter(|pixel| pixel.iter().any(|sum| *sum > 0)).count();
+        // The camera sees past the room on a wide picture, and nothing but the room on a square one.
+        assert!(lit > 0 && (size[0] > 1000 || lit > expected.pixels() / 2), "{size:?}: {lit} pixels are lit");
+        for group_size in [32, 1024] {
+            assert!(of(group_size) == expected, "{size:?}, work groups of {group_size}");
+        }
+    }
+}
+
+/// Sums of a run with every gather stay numbers and closed at once: the smallest and the largest of everything that
+/// the paper's box takes.
+#[test]
+fn the_ends_of_every_setting_give_numbers() {
+    let gpu = device();
+    let base = Settings { photons: 2, mesh: 3, rng: Rng::Philox, ..Settings::default() };
+    let ends = [
+        ("least photons", base.clone()),
+        ("least lamps", Settings { light_radius: f64::MIN_POSITIVE, photons: 101, ..base.clone() }),
+        ("largest lamps", Settings { light_radius: 0.25, photons: 101, ..base.clone() }),
+        ("least radius", Settings { radius: 0.5 / 65_536.0, photons: 101, ..base.clone() }),
+        ("largest radius", Settings { radius: 0.5, photons: 101, ..base.clone() }),
+        ("far eye", Settings { eye: [1e15, -1e15, 1e15], shininess: [Some(5.0); 5], photons: 101, ..base.clone() }),
+        ("eye in a corner", Settings { eye: [-0.25; 3], shininess: [Some(1e4); 5], photons: 101, ..base.clone() }),
+        ("largest exponent", Settings { shininess: [Some(f32::MAX); 5], photons: 101, ..base.clone() }),
+        ("least exponent", Settings { shininess: [Some(f32::MIN_POSITIVE); 5], photons: 101, ..base.clone() }),
+        ("white walls", Settings { reflectance: 1.0, bounces: 300, photons: 101, ..base.clone() }),
+        ("black walls", Settings { reflectance: 0.0, photons: 101, ..base }),
+    ];
+    for (what, settings) in ends {
+        for gather in [Gather::Grid, Gather::Brute] {
+            let settings = Settings { gather, ..settings.clone() };
+            let mut outcomes = vec![run_on_cpu(&settings)];
+            outcomes.extend(gpu.as_ref().map(|gpu| run(gpu, &settings)));
+            for outcome in outcomes {
+                assert!(outcome.fates.ledger().closes(), "{what}");
+                for wall in estimate_walls(&outcome.film, &open_box(&settings), &outcome.plan) {
+                    let values = wall.illumination.iter().chain(&wall.radiosity);
+                    assert!(values.clone().all(|value| value.is_finite() && *value >= 0.0), "{what}, {gather:?}: {}", wall.name);
+                    // Black walls have no radiosity to divide by an albedo of nothing.
+                    if settings.reflectance > 0.0 {
+                        assert!(wall.irradiance.iter().all(|value| value.is_finite()), "{what}, {gather:?}: {}", wall.name);
+                    }
+                }
+            }
+        }
+    }
+}
+
+/// What the checks of this file say of values that are off.
+#[test]
+fn the_checks_of_numbers_complain() {
+    let complains = |found: f64| -> Check { relative_check("value", found, 2.0, 1e-6) };
+    assert_holds("itself", complains(2.0));
+    for (what, found) in
+        [("a little more", 2.0 + 4e-6), ("a little less", 2.0 - 4e-6), ("no number", f64::NAN), ("infinity", f64::INFINITY)]
+    {
+        assert_complains(what, complains(found));
+    }
+}

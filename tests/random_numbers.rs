@@ -1,0 +1,366 @@
+//! Random numbers at their ends: around the generators' periods and the largest photon numbers, neighbours that
+//! must not resemble each other, and directions drawn from the least and the greatest numbers.
+
+mod common;
+
+use std::collections::HashSet;
+use std::time::Instant;
+
+use common::{Check, assert_complains, assert_holds, device, draws_of, evenness_check, plan_for, streams_of, z_check};
+use glam::{DVec3, Vec3};
+use photonmill::cpu::emission::emit_from_disc;
+use photonmill::cpu::room::intersect_room;
+use photonmill::cpu::sampling::{sample_cosine_hemisphere, sample_uniform_hemisphere};
+use photonmill::cpu::trace::Tracer;
+use photonmill::gpu::Commands;
+use photonmill::plan::{EmissionRange, Plan};
+use photonmill::records::Path;
+use photonmill::render::constants;
+use photonmill::resources::Resources;
+use photonmill::rng::{Affine48, Rng, Streams, srand48};
+use photonmill::scene::open_box::open_box;
+use photonmill::settings::{EmissionLaw, Settings};
+use photonmill::trace;
+
+const GENERATORS: [Rng; 3] = [Rng::Rand48, Rng::Mt, Rng::Philox];
+/// Half of an f32's spacing below 1.
+const U: f64 = 1.0 / 16_777_216.0;
+const PERIOD: u64 = 1 << 48;
+
+/// One step of the C library's generator, in whole numbers that cannot wrap.
+fn stepped(state: u64) -> u64 {
+    ((u128::from(state) * 0x5_DEEC_E66D + 0xB) % u128::from(PERIOD)) as u64
+}
+
+/// The sequence has 2^48 states and closes: jumps and steps meet before, at and behind its end.
+#[test]
+fn rand48_jumps_and_steps_meet_across_2_to_the_48() {
+    let start = srand48(1);
+    assert_eq!(Affine48::steps(PERIOD).apply(start), start);
+    assert_eq!(Affine48::steps(PERIOD - 1).apply(stepped(start)), start);
+    // Half a period is none.
+    assert_ne!(Affine48::steps(PERIOD / 2).apply(start), start);
+    let mut state = Affine48::steps(PERIOD - 1000).apply(start);
+    for place in PERIOD - 999..PERIOD + 1000 {
+        state = stepped(state);
+        assert_eq!(Affine48::steps(place).apply(start), state, "place {place}");
+        assert_eq!(Affine48::steps(place % PERIOD).apply(start), state, "place {place}");
+    }
+    // States whose products leave 64 bits, and the largest.
+    for state in [PERIOD - 1, PERIOD - 2, PERIOD / 2, (1 << 32) - 1, 1 << 32, 0] {
+        assert_eq!(Affine48::STEP.apply(state), stepped(state), "state {state:x}");
+    }
+}
+
+/// Each photon's draws are its own part of the one sequence, to the last photon of the longest run that is
+/// allowed: 2^31 photons, 2^13 rounds, 16 draws. One round more is refused.
+#[test]
+fn a_run_draws_the_whole_period_and_no_number_twice() {
+    let whole = Settings { photons: 1 << 31, rounds: 1 << 13, bounces: 4, ..Settings::default() };
+    assert_eq!(u128::from(whole.total_photons()) * u128::from(whole.draws_per_photon()), u128::from(PERIOD));
+    whole.validate().unwrap();
+    for beyond in [Settings { rounds: whole.rounds + 1, ..whole.clone() }, Settings { bounces: 5, ..whole.clone() }] {
+        assert!(beyond.validate().unwrap_err().to_string().contains("2^48"));
+        Settings { rng: Rng::Philox, ..beyond }.validate().unwrap();
+    }
+    let streams = streams_of(&whole);
+    let start = srand48(1);
+    // Draw k of photon i in round r stands at place (16 r + k) 2^31 + i + 1; the last one at 2^48.
+    let key = streams.key(whole.rounds - 1);
+    let last = whole.photons - 1;
+    let mut state = Affine48::steps(1).apply(streams.jump(whole.rounds - 1, last).apply(start));
+    let leap = Affine48 {
+        multiplier: u64::from(key.leap_multiplier.x) | u64::from(key.leap_multiplier.y) << 32,
+        increment: u64::from(key.leap_increment.x) | u64::from(key.leap_increment.y) << 32,
+    };
+    (1..16).for_each(|_| state = leap.apply(state));
+    assert_eq!(state, start, "the last draw closes the sequence");
+
+    // The same layout in small, with every place looked at.
+    let small = Settings { photons: 25, rounds: 3, bounces: 2, ..whole };
+    let mut places: HashSet<u32> = HashSet::new();
+    for (round, photon) in (0..3).flat_map(|round| (0..25).map(move |photon| (round, photon))) {
+        draws_of(streams_of(&small), round, photon, 2).iter().for_each(|draw| assert!(places.insert(draw.to_bits())));
+    }
+    assert_eq!(places.len(), 25 * 3 * 10);
+}
+
+/// First of `count` equal classes that a number in [0, 1) may fall into.
+fn class(u: f32, count: usize) -> usize {
+    (f64::from(u) * count as f64) as usize
+}
+
+/// Numbers alone, pairs and triples of a photon's draws fill their classes evenly, and not too evenly.
+#[test]
+fn draws_are_even_alone_in_pairs_and_in_triples() {
+    for rng in GENERATORS {
+        let settings = Settings { rng, photons: 20_001, ..Settings::default() };
+        let draws: Vec<Vec<f32>> = (0..settings.photons).map(|photon| draws_of(streams_of(&settings), 0, photon, 2)).collect();
+        for k in 0..8 {
+            let what = |of: &str| format!("{rng:?}, {of} from draw {k}");
+            assert_holds(what("numbers"), evenness_check("numbers", draws.iter().map(|u| class(u[k], 100))));
+            assert_holds(what("pairs"), evenness_check("pairs", draws.iter().map(|u| 10 * class(u[k], 10) + class(u[k + 1], 10))));
+            let triple = |u: &Vec<f32>| 20 * class(u[k], 5) + 4 * class(u[k + 1], 5) + class(u[k + 2], 4);
+            assert_holds(what("triples"), evenness_check("triples", draws.iter().map(triple)));
+        }
+        let steps = (0..20_000).map(|i| class((i as f32 + 0.5) / 20_000.0, 100));
+        assert_complains("numbers at even steps", evenness_check("steps", steps));
+        assert_complains("numbers a hundredth too small", evenness_check("numbers", draws.iter().map(|u| class(0.99 * u[0], 100))));
+    }
+}
+
+/// Correlation of two rows of numbers in [0, 1); of independent ones its standard error is 1 / sqrt(n).
+fn correlation_check(what: &str, rows: impl Iterator<Item = (f32, f32)>) -> Check {
+    let (mut sum, mut count) = (0.0, 0.0f64);
+    for (a, b) in rows {
+        sum += 12.0 * (f64::from(a) - 0.5) * (f64::from(b) - 0.5);
+        count += 1.0;
+    }
+    z_check(what, sum / count, 0.0, 1.0 / count.sqrt())
+}
+
+/// The third difference of four draws of one photon, which is a constant where a power of two leap-frogs
+/// rand48: such streams are parabolas.
+fn third_difference(u: &[f32]) -> usize {
+    let sum = f64::from(u[3]) - 3.0 * f64::from(u[2]) + 3.0 * f64::from(u[1]) - f64::from(u[0]);
+    (sum.rem_euclid(1.0) * 100.0) as usize % 100
+}
+
+/// Photons side by side: the same draw of each fills its classes like chance, and is independent of the next
+/// photon's; draws of one photon follow no parabola.
+#[test]
+fn neighbouring_photons_do_not_resemble_each_other() {
+    for rng in GENERATORS {
+        for photons in [5000, 5001] {
+            let settings = Settings { rng, photons, ..Settings::default() };
+            let draws: Vec<Vec<f32>> = (0..photons).map(|photon| draws_of(streams_of(&settings), 0, photon, 3)).collect();
+            for k in 0..13 {
+                let what = format!("{rng:?}, {photons} photons, draw {k}");
+                assert_holds(&what, evenness_check("photons", draws.iter().map(|u| class(u[k], 100))));
+                for lag in [1, 2, 8, 32, 64] {
+                    let pairs = draws.iter().zip(&draws[lag..]);
+                    assert_holds(format!("{what}, {lag} apart"), correlation_check("draws", pairs.map(|(a, b)| (a[k], b[k]))));
+                }
+            }
+            let differences = draws.iter().flat_map(|u| (0..10).map(|k| third_difference(&u[k..])));
+            assert_holds(format!("{rng:?}, {photons} photons"), evenness_check("third differences", differences));
+        }
+    }
+    // What is known to be bad: a power of two of photons, about which a run is warned,
+    let even = Settings { photons: 1 << 16, ..Settings::default() };
+    assert!(even.warning().is_some() && Settings::default().warning().is_none());
+    let parabolas = (0..even.photons).map(|photon| third_difference(&draws_of(streams_of(&even), 0, photon, 1)));
+    assert_complains("leaps of a power of two", evenness_check("third differences", parabolas));
+    // and a generator started anew with each photon's number.
+    let seeded = (0..5000).map(|seed| Affine48::STEP.apply(srand48(seed)) as f64 / PERIOD as f64);
+    assert_complains("seeds in a row", evenness_check("first draws", seeded.map(|u| class(u as f32, 100))));
+    let shifted =
+        (0..5000).map(|i| (class(i as f32 * 0.618_034 % 1.0, 100) as f32 / 100.0, class(i as f32 * 0.618_034 % 1.0, 100) as f32 / 100.0));
+    assert_complains("a row against itself", correlation_check("draws", shifted));
+}
+
+/// The paths of some photons as they leave their light, by the device.
+fn emitted(gpu: &common::Device, plan: &Plan, round: u32, range: EmissionRange) -> Vec<Path> {
+    let scene = open_box(&plan.settings);
+    let mut commands = Commands::new(gpu, constants(plan), Instant::now()).unwrap();
+    let resources = Resources::new(gpu, &mut commands, &scene, plan).unwrap();
+    trace::emit(&mut commands, &resources, plan, round, &[range]).unwrap();
+    commands.read(&resources.paths[0], range.count as usize).unwrap()
+}
+
+/// The same photons by another builder: the same streams, bit for bit, and places and directions within a few
+/// roundings (radius, square root, polynomial, two products).
+fn same_start(found: &[Path], expected: &[Path]) -> Check {
+    for (a, b) in found.iter().zip(expected) {
+        if (a.photon, a.stream, a.wall) != (b.photon, b.stream, b.wall) {
+            return Err(format!("{a:?} instead of {b:?}"));
+        }
+        // Sums carry what is no number, and a maximum would not.
+        let off = f64::from((a.position - b.position).abs().element_sum() + (a.direction - b.direction).abs().element_sum());
+        if off.is_nan() || off > 8.0 * U {
+            return Err(format!("{a:?} is {off:e} off {b:?}"));
+        }
+    }
+    if found.len() == expected.len() { Ok(()) } else { Err(format!("{} photons instead of {}", found.len(), expected.len())) }
+}
+
+/// Numbers that f32 does not tell apart (2^24), the last of the largest round, and rounds so late that 2^47
+/// photons lie before them: every photon is one of its own, and both builders start the same ones.
+#[test]
+fn photons_of_the_largest_numbers_are_their_own() {
+    let Some(gpu) = device() else { return };
+    for (rng, bounces, round) in [(Rng::Philox, 1, (1 << 16) - 1), (Rng::Rand48, 4, (1 << 13) - 1), (Rng::Mt, 1, 1)] {
+        let settings = Settings { rng, bounces, photons: 1 << 31, rounds: round + 1, mesh: 1, chunk: Some(1 << 20), ..Settings::default() };
+        let scene = open_box(&settings);
+        let plan = plan_for(&gpu, &scene, &settings);
+        let tracer = Tracer::new(&scene, &plan);
+        let mut starts = HashSet::new();
+        for (light, first_photon) in [(0, 0), (0, (1 << 24) - 32), (1, (1 << 31) - 64)] {
+            for round in [0, round] {
+                let range = EmissionRange { light, first_photon, count: 64 };
+                let (found, expected) = (emitted(&gpu, &plan, round, range), tracer.emit(round, &[range]));
+                assert_holds(format!("{rng:?}, round {round}, photons from {first_photon}"), same_start(&found, &expected));
+                for path in &found {
+                    let bits = [path.position.to_array(), path.direction.to_array()].concat().into_iter().map(f32::to_bits);
+                    assert!(starts.insert(bits.collect::<Vec<u32>>()), "{rng:?}, round {round}: {path:?} starts twice");
+                }
+                let next = EmissionRange { first_photon: first_photon ^ 1, ..range };
+                assert_complains("the neighbours", same_start(&emitted(&gpu, &plan, round, next), &expected));
+            }
+        }
+    }
+}
+
+/// A mean against its closed form, by the standard deviation of a single value.
+fn mean_check(what: &str, values: impl Iterator<Item = f64>, expected: f64, deviation: f64) -> Check {
+    let (sum, count) = values.fold((0.0, 0.0f64), |(sum, count), value| (sum + value, count + 1.0));
+    z_check(what, sum / count, expected, deviation / count.sqrt())
+}
+
+/// Moments of the places on a disc and of the directions of an emission, and their lengths.
+fn emission_check(law: EmissionLaw, radius: f64, starts: &[(DVec3, DVec3)]) -> Check {
+    mean_check(
+        "squared distance",
+        starts.iter().map(|(place, _)| (place.x * place.x + place.y * place.y) / (radius * radius)),
+        0.5,
+        0.288_675,
+    )?;
+    let (cosine, cosine_deviation, square, square_deviation): (f64, f64, f64, f64) = match law {
+        EmissionLaw::Uniform => (0.5, 0.288_675, 1.0 / 3.0, (1.0f64 / 5.0 - 1.0 / 9.0).sqrt()),
+        EmissionLaw::Cosine => (2.0 / 3.0, (1.0f64 / 18.0).sqrt(), 0.25, 0.25),
+    };
+    mean_check("cosine", starts.iter().map(|(_, d)| d.z), cosine, cosine_deviation)?;
+    for axis in 0..2 {
+        mean_check("tangent", starts.iter().map(|(_, d)| d[axis]), 0.0, square.sqrt())?;
+        mean_check("squared tangent", starts.iter().map(|(_, d)| d[axis] * d[axis]), square, square_deviation)?;
+        // Equal solid angles, and no corners of a cube: E[x^4] = 1/5 on a sphere, 1/8 by the cosine.
+        let (fourth, deviation) = match law {
+            EmissionLaw::Uniform => (0.2, (1.0f64 / 9.0 - 1.0 / 25.0).sqrt()),
+            EmissionLaw::Cosine => (0.125, (7.0f64 / 128.0 - 1.0 / 64.0).sqrt()),
+        };
+        mean_check("fourth power", starts.iter().map(|(_, d)| d[axis].powi(4)), fourth, deviation)?;
+    }
+    match starts.iter().find(|(_, d)| !d.is_finite() || (d.length() - 1.0).abs() > 4.0 * U) {
+        None => Ok(()),
+        Some((_, d)) => Err(format!("{d} is {} long", d.length())),
+    }
+}
+
+#[test]
+fn discs_and_hemispheres_have_their_moments() {
+    let gpu = device();
+    for law in [EmissionLaw::Uniform, EmissionLaw::Cosine] {
+        let settings = Settings {
+            emission: law,
+            photons: 400_001,
+            rng: Rng::Philox,
+            bounces: 1,
+            mesh: 1,
+            chunk: Some(400_001),
+            ..Settings::default()
+        };
+        let scene = open_box(&settings);
+        let host = common::plan_for_host(&settings);
+        let range = EmissionRange { light: 0, first_photon: 0, count: 200_000 };
+        let local = |paths: Vec<Path>| -> Vec<(DVec3, DVec3)> {
+            // The floor's light: the axes after its own, then its normal.
+            paths
+                .iter()
+                .map(|path| (path.position.as_dvec3(), path.direction.as_dvec3()))
+                .map(|(p, d)| (DVec3::new(p.z, p.x, 0.0), DVec3::new(d.z, d.x, d.y)))
+                .collect()
+        };
+        let mut starts = vec![("cpu", local(Tracer::new(&scene, &host).emit(0, &[range])))];
+        if let Some(gpu) = &gpu {
+            starts.push(("device", local(emitted(gpu, &plan_for(gpu, &scene, &settings), 0, range))));
+        }
+        for (builder, starts) in starts {
+            assert_holds(format!("{builder}, {law:?}"), emission_check(law, settings.light_radius, &starts));
+            let linear =
+                starts.iter().map(|(place, d)| (*place * place.truncate().length() / settings.light_radius, *d)).collect::<Vec<_>>();
+            assert_complains("a radius without its square root", emission_check(law, settings.light_radius, &linear));
+            let longer = starts.iter().map(|(place, d)| (*place, *d * 1.000_001)).collect::<Vec<_>>();
+            assert_complains("directions a millionth too long", emission_check(law, settings.light_radius, &longer));
+            let other = if law == EmissionLaw::Uniform { EmissionLaw::Cosine } else { EmissionLaw::Uniform };
+            assert_complains("the other law", emission_check(other, settings.light_radius, &starts));
+        }
+    }
+}
+
+/// The least and the greatest numbers that a generator gives, and those at which sine and cosine change places:
+/// every direction is a unit vector that does not point into its wall, and every flight ends inside the room.
+#[test]
+fn grazing_and_straight_directions_end_in_the_room() {
+    let ends = [0.0f32, f32::EPSILON / 2.0, 0.125, 0.25, 0.5, 0.75, 0.875, 1.0 - f32::EPSILON / 2.0];
+    for u in ends {
+        for azimuth in ends {
+            for direction in [sample_cosine_hemisphere(u, azimuth), sample_uniform_hemisphere(u, azimuth)] {
+                let length = direction.as_dvec3().length();
+                assert!((length - 1.0).abs() <= 4.0 * U && direction.z >= 0.0, "{u}, {azimuth}: {direction}");
+            }
+        }
+    }
+    let settings = Settings::default();
+    let scene = open_box(&settings);
+    let (room, walls) = (scene.room_record(), scene.wall_records());
+    let (min, max) = (scene.min_corner.as_vec3(), scene.max_corner.as_vec3());
+    let mut flights = 0;
+    let mut fly = |position: Vec3, direction: Vec3, wall: u32| {
+        let hit = intersect_room(&room, position, direction, wall);
+        let inside = hit.position.cmpge(min).all() && hit.position.cmple(max).all();
+        assert!(inside && hit.wall != wall, "from {position} on wall {wall} along {direction}: {hit:?}");
+        flights += 1;
+        hit
+    };
+    for light in scene.light_records(&[1.0, 1.0]) {
+        for law in [EmissionLaw::Uniform, EmissionLaw::Cosine] {
+            for place in 0..ends.len().pow(4) {
+                let u = [0, 1, 2, 3].map(|k| ends[place / ends.len().pow(k) % ends.len()]);
+                let (position, direction) = emit_from_disc(&light, &walls[light.wall as usize], law, u);
+                fly(position, direction, light.wall);
+            }
+        }
+    }
+    // From every edge and corner of every wall, along every axis and diagonal that leaves it.
+    for (face, wall) in walls.iter().enumerate() {
+        for corner in 0..27 {
+            let third = |axis: usize| [min, 0.5 * (min + max), max][corner / 3usize.pow(axis as u32) % 3][axis];
+            let mut position = Vec3::from_array([0, 1, 2].map(third));
+            position[face / 2] = if face % 2 == 1 { max[face / 2] } else { min[face / 2] };
+            for way in 0..27 {
+                let direction = Vec3::from_array([0, 1, 2].map(|axis| [-1.0, 0.0, 1.0][way / 3usize.pow(axis) % 3]));
+                if direction.dot(wall.normal) >= 0.0 && direction != Vec3::ZERO {
+                    let hit = fly(position, direction.normalize(), face as u32);
+                    assert!(hit.position.is_finite());
+                }
+            }
+        }
+    }
+    assert!(flights > 2 * 2 * 4096, "{flights} flights");
+}
+
+/// Photons enough for a birthday among 24 bits many times over: not two share all their numbers.
+#[test]
+#[ignore = "sixteen million streams take a minute"]
+fn sixteen_million_photons_are_all_different() {
+    for rng in [Rng::Philox, Rng::Mt] {
+        let streams = Streams { rng, seed: 3, photons: 1 << 24, draws_per_photon: 49 };
+        let mut starts: Vec<[u32; 4]> = (0..1 << 24)
+            .map(|photon| {
+                let draws = draws_of(streams, 0, photon, 0);
+                [0, 1, 2, 3].map(|k| (f64::from(draws[k]) / U) as u32)
+            })
+            .collect();
+        starts.sort_unstable();
+        assert!(starts.windows(2).all(|pair| pair[0] != pair[1]), "{rng:?}");
+    }
+}
+
+/// A limit wide enough for chance is narrow enough for faults: one number in a hundred misplaced shows.
+#[test]
+fn the_checks_of_chance_complain() {
+    let even = |count: u32| (0..count).map(|i| f64::from(i % 1000) / 1000.0 + 0.0005);
+    assert_holds("uniform numbers", mean_check("mean", even(1_000_000), 0.5, 0.288_675));
+    assert_complains("numbers a hundredth too large", mean_check("mean", even(1_000_000).map(|u| 1.01 * u), 0.5, 0.288_675));
+    assert_complains("no number", mean_check("mean", [f64::NAN].into_iter(), 0.5, 0.288_675));
+}
