@@ -6,9 +6,10 @@ mod common;
 use std::f64::consts::PI;
 use std::time::Instant;
 
+use common::lit::{mean_red, received, received_within, seen};
 use common::{
-    Check, Device, assert_complains, assert_holds, device, device_with, equal_sums, mean_red, photons_on_cpu, plan_for, plan_for_host,
-    received, received_within, relative_check, run, run_on_cpu, run_scene, run_scene_on_cpu, seen, share_check, z_check,
+    Check, Device, assert_complains, assert_holds, device, device_with, equal_sums, photons_on_cpu, plan_for, plan_for_host,
+    relative_check, run, run_on_cpu, run_scene, run_scene_on_cpu, share_check, z_check,
 };
 use glam::{DVec3, Vec3};
 use photonmill::cpu::bsdf::phong_lobe;

@@ -114,7 +114,8 @@ mod common;
 use std::collections::HashSet;
 use std::f64::consts::PI;
 
-use common::{Check, assert_complains, assert_holds, device, mean_red, received, relative_check, seen, share_check, z_check};
+use common::lit::{mean_red, received, seen};
+use common::{Check, assert_complains, assert_holds, device, relative_check, share_check, z_check};
 use glam::{DQuat, DVec2, DVec3, Vec3};
 use photonmill::gpu::Gpu;
 use photonmill::plan::Plan;

@@ -3,21 +3,17 @@
 
 mod common;
 
-use std::sync::atomic::AtomicBool;
-
+use common::lit::seen;
 use common::{Check, assert_complains, assert_holds, device, equal_sums, in_order, photons, photons_on_cpu, run, run_on_cpu};
 use glam::Vec2;
 use photonmill::cpu;
 use photonmill::gpu::{Gpu, check};
-use photonmill::plan::transport::{Sensor, TransportPlan};
 use photonmill::records::{MathResults, Photon};
-use photonmill::render::{self, Control};
 use photonmill::rng::philox;
-use photonmill::scene::geometry::Geometry;
 use photonmill::scene::{Camera, Scene, built_in};
 use photonmill::settings::transport::{Append, Illumination, Kernel, TransportSettings};
 use photonmill::settings::{EmissionLaw, Math, Settings, Variant};
-use photonmill::transport::{self, Lit, View};
+use photonmill::transport::Lit;
 
 /// Numbers of every size, evenly over exponents and mantissas, and those at which functions change their ways.
 fn operands() -> Vec<Vec2> {
@@ -174,13 +170,8 @@ fn small() -> TransportSettings {
 }
 
 fn picture(gpu: &Gpu, scene: &Scene, settings: &TransportSettings) -> Lit {
-    let geometry = Geometry::new(scene).unwrap();
-    let plan =
-        TransportPlan::new(scene, &geometry, settings, Sensor::Picture { width: 24, height: 24 }, &render::limits(gpu.facts())).unwrap();
     let camera = scene.cameras.first().cloned().unwrap_or_else(|| Camera::around(scene.bounds().0, scene.bounds().1));
-    let view = View { geometry: &geometry, camera: Some(&camera), phases: &[] };
-    let never = AtomicBool::new(false);
-    transport::light(gpu, &view, plan, &mut Control { cancelled: &never, progress: &mut |_, _| {} }).unwrap()
+    seen(gpu, scene, settings, &camera, [24, 24])
 }
 
 /// 64 bits of all sums and squares (FNV-1a).

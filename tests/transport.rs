@@ -3,15 +3,13 @@
 
 mod common;
 
-use std::sync::atomic::AtomicBool;
-
+use common::lit::{light, received};
 use common::{Check, assert_complains, assert_holds, device, device_with, z_check};
 use glam::{DVec3, Vec3};
 use photonmill::gpu::{Gpu, Options};
 use photonmill::judge::{Judge, Verdict};
 use photonmill::plan::transport::{Sensor, TransportPlan};
-use photonmill::records::Receiver;
-use photonmill::render::{self, Control};
+use photonmill::render;
 use photonmill::scene::geometry::Geometry;
 use photonmill::scene::light::{Light, LightKind};
 use photonmill::scene::{Camera, Material, Mesh, Scene, Surface, built_in};
@@ -37,29 +35,12 @@ fn camera_of(scene: &Scene) -> Camera {
 
 fn picture(gpu: &Gpu, scene: &Scene, settings: &TransportSettings) -> Lit {
     let (geometry, plan) = plan_of(gpu, scene, settings, Sensor::Picture { width: SIZE, height: SIZE });
-    run(gpu, &View { geometry: &geometry, camera: Some(&camera_of(scene)), phases: &[] }, plan)
-}
-
-fn run(gpu: &Gpu, view: &View, plan: TransportPlan) -> Lit {
-    let never = AtomicBool::new(false);
-    let lit = transport::light(gpu, view, plan, &mut Control { cancelled: &never, progress: &mut |_, _| {} }).unwrap();
-    assert_eq!(lit.anomalies, [0, 0, 0], "values that are no number, or too large for the film");
-    lit
+    light(gpu, &View { geometry: &geometry, camera: Some(&camera_of(scene)), phases: &[] }, plan)
 }
 
 /// Mean and standard error of the irradiance at points, W/m2.
 fn irradiance(gpu: &Gpu, scene: &Scene, settings: &TransportSettings, points: &[(DVec3, DVec3)]) -> Vec<(DVec3, DVec3)> {
-    let sensor = Sensor::Receivers { count: points.len() as u32 };
-    let (geometry, plan) = plan_of(gpu, scene, settings, sensor);
-    let receivers = points
-        .iter()
-        .map(|(position, normal)| Receiver {
-            position: geometry.to_local(*position),
-            normal: normal.as_vec3(),
-            shading_normal: normal.as_vec3(),
-        })
-        .collect();
-    let lit = run(gpu, &View { geometry: &geometry, camera: None, phases: &[receivers] }, plan);
+    let lit = received(gpu, scene, settings, points);
     (0..points.len()).map(|point| (lit.film.mean(point, &lit.plan), lit.film.standard_error(point, &lit.plan))).collect()
 }
 
@@ -304,7 +285,7 @@ fn radiance_and_irradiance_of_a_wall_agree() {
     for final_gather in [false, true] {
         let settings = TransportSettings { final_gather, ..settings.clone() };
         let (geometry, plan) = plan_of(&gpu, &scene, &settings, Sensor::Picture { width: 1, height: 1 });
-        let lit = run(&gpu, &View { geometry: &geometry, camera: scene.cameras.first(), phases: &[] }, plan);
+        let lit = light(&gpu, &View { geometry: &geometry, camera: scene.cameras.first(), phases: &[] }, plan);
         let (radiance, radiance_error) = (lit.film.mean(0, &lit.plan), lit.film.standard_error(0, &lit.plan));
         let other = TransportSettings { seed: 9, ..settings };
         let (irradiance, irradiance_error) = irradiance(&gpu, &scene, &other, &[(target, DVec3::Z)])[0];

@@ -5,15 +5,20 @@ use std::f64::consts::PI;
 
 use glam::DVec3;
 
-use super::measure::{irradiance, radiance};
+use super::measure::{irradiance, mean_radiance, radiance};
 use super::{Case, Estimate};
 use crate::error::Result;
 use crate::gpu::Gpu;
-use crate::scene::Scene;
 use crate::scene::closed_forms::{DISC_RADIUS, WALL_ALBEDO, by_name};
-use crate::settings::transport::{Illumination, TransportSettings};
+use crate::scene::light::LightKind;
+use crate::scene::{Camera, Scene};
+use crate::settings::EmissionLaw;
+use crate::settings::transport::{Append, Illumination, TransportSettings};
 
 const BOTH: [Illumination; 2] = [Illumination::Split, Illumination::Photons];
+/// Each way of lighting, and photons by each builder.
+const WAYS: [(Illumination, Append); 3] =
+    [(Illumination::Split, Append::Ballot), (Illumination::Photons, Append::Ballot), (Illumination::Photons, Append::Atomic)];
 
 fn scene(name: &str) -> Scene {
     by_name(name).unwrap_or_else(|| panic!("there is no scene {name}"))
@@ -39,6 +44,20 @@ fn floor(middle: DVec3, side: f64) -> Vec<(DVec3, DVec3)> {
     (0..64).map(|k| (middle + DVec3::new(place(k % 8), 0.0, place(k / 8)), DVec3::Y)).collect()
 }
 
+/// Points of all walls of the furnace, from edge to edge: wherever a photon lands some of them see it.
+fn all_walls() -> Vec<(DVec3, DVec3)> {
+    let place = |k: u32| (f64::from(k) + 0.5) / 5.0;
+    let of_axis = |axis: usize| {
+        let (u, v) = (DVec3::AXES[(axis + 1) % 3], DVec3::AXES[(axis + 2) % 3]);
+        let normal = DVec3::AXES[axis];
+        (0..25).flat_map(move |k| {
+            let point = place(k % 5) * u + place(k / 5) * v;
+            [(point, normal), (point + normal, -normal)]
+        })
+    };
+    (0..3).flat_map(of_axis).collect()
+}
+
 fn case(name: String, expected: f64, measure: impl Fn(&Gpu) -> Result<Estimate> + 'static) -> Case {
     Case { name, expected, on_gpu: true, measure: Box::new(move |gpu| measure(gpu.expect("this case runs on a device only"))) }
 }
@@ -47,21 +66,20 @@ pub fn cases() -> Vec<Case> {
     [furnace(), integrating_sphere(), point(), disc(), sun_and_sky(), mirrors(), glass()].into_iter().flatten().collect()
 }
 
-/// Irradiance pi / (1 - albedo), radiance 1 / (1 - albedo).
+/// Irradiance pi / (1 - albedo), radiance 1 / (1 - albedo), wherever one looks.
 fn furnace() -> Vec<Case> {
     let share = 1.0 - f64::from(WALL_ALBEDO);
-    BOTH.into_iter()
-        .flat_map(|illumination| {
-            let settings = settings(illumination, 0.2);
+    WAYS.into_iter()
+        .flat_map(|(illumination, append)| {
+            // More bounces than 24 have 1e-7 of the light.
+            let settings = TransportSettings { append, bounces: 24, ..settings(illumination, 0.2) };
             let other = settings.clone();
-            // From edge to edge.
-            let points = floor(DVec3::new(0.5, 0.0, 0.5), 1.0);
+            let what = format!("furnace, {illumination:?}, {append:?}");
             [
-                case(format!("furnace, {illumination:?}: irradiance"), PI / share, move |gpu| {
-                    irradiance(gpu, &scene("furnace"), &settings, &points)
-                }),
-                case(format!("furnace, {illumination:?}: radiance"), 1.0 / share, move |gpu| {
-                    radiance(gpu, scene("furnace"), &other, DVec3::splat(0.5), DVec3::new(0.3, 0.4, 0.0))
+                case(format!("{what}: irradiance"), PI / share, move |gpu| irradiance(gpu, &scene("furnace"), &settings, &all_walls())),
+                case(format!("{what}: radiance"), 1.0 / share, move |gpu| {
+                    let camera = Camera::looking_at("wide", DVec3::splat(0.5), DVec3::new(0.3, 0.4, 0.0), DVec3::Y, 2.2);
+                    mean_radiance(gpu, scene("furnace"), &other, camera)
                 }),
             ]
         })
@@ -82,7 +100,8 @@ fn integrating_sphere() -> Vec<Case> {
                         (mesh.corners(triangle).iter().sum::<DVec3>() / 3.0, mesh.normal(triangle))
                     })
                     .collect();
-                let found = irradiance(gpu, &sphere, &settings(illumination, 0.2), &points)?;
+                let settings = TransportSettings { bounces: 24, ..settings(illumination, 0.2) };
+                let found = irradiance(gpu, &sphere, &settings, &points)?;
                 // The sphere is of facets, a little smaller and nearer to the lamp.
                 Ok(Estimate { standard_error: found.standard_error.max(0.001 * expected), ..found })
             })
@@ -102,7 +121,8 @@ fn point() -> Vec<Case> {
             })
         })
         .collect();
-    let h: f64 = 0.7;
+    // The wider, the more photons.
+    let h: f64 = 1.9;
     cases.push(case("point light, photons: irradiance".into(), 2.0 / (h * h) * (1.0 - 1.0 / (1.0 + h * h).sqrt()), move |gpu| {
         let photons = TransportSettings { photons: 60_000, bounces: 2, ..settings(Illumination::Photons, h) };
         irradiance(gpu, &scene("point-over-plane"), &photons, &at(0.0))
@@ -114,7 +134,8 @@ fn point() -> Vec<Case> {
     cases
 }
 
-/// 1 / (pi (R^2 + 1)) straight below; photons tell the mean over a disc of radius h, from the form factor of two
+/// 1 / (pi (R^2 + 1)) straight below, and for equal intensity in all directions the disc's solid angle over
+/// 2 pi (pi R^2), (1 - 1 / sqrt(1 + R^2)) / (pi R^2); photons tell the mean over a disc of radius h, from the form factor of two
 /// discs that face each other.
 fn disc() -> Vec<Case> {
     let below = [(DVec3::ZERO, DVec3::Y)];
@@ -122,7 +143,17 @@ fn disc() -> Vec<Case> {
     let h: f64 = 0.5;
     let x = 1.0 + (1.0 + h * h) / (r * r);
     let mean = 0.5 * (x - (x * x - 4.0 * (h / r).powi(2)).sqrt()) / (PI * h * h);
+    let by_intensity = (1.0 - 1.0 / (1.0 + r * r).sqrt()) / (PI * r * r);
     vec![
+        case("disc light of equal intensity: irradiance".into(), by_intensity, move |gpu| {
+            let mut scene = scene("disc-over-plane");
+            for light in &mut scene.lights {
+                if let LightKind::Disc { law, .. } = &mut light.kind {
+                    *law = EmissionLaw::Uniform;
+                }
+            }
+            irradiance(gpu, &scene, &settings(Illumination::Split, 0.1), &below)
+        }),
         case("disc light: irradiance".into(), 1.0 / (PI * (r * r + 1.0)), move |gpu| {
             irradiance(gpu, &scene("disc-over-plane"), &settings(Illumination::Split, 0.1), &below)
         }),
@@ -139,7 +170,8 @@ fn sun_and_sky() -> Vec<Case> {
     for (name, expected) in [("sun-over-plane", 1.6), ("sky-over-plane", PI)] {
         for illumination in BOTH {
             cases.push(case(format!("{name}, {illumination:?}: irradiance"), expected, move |gpu| {
-                let settings = TransportSettings { bounces: 2, ..settings(illumination, 0.25) };
+                // A sixth of the sky's photons meets the plane.
+                let settings = TransportSettings { bounces: 2, photons: 120_000, ..settings(illumination, 0.25) };
                 irradiance(gpu, &scene(name), &settings, &floor(DVec3::ZERO, 4.4))
             }));
         }
@@ -164,11 +196,22 @@ fn mirrors() -> Vec<Case> {
         .collect()
 }
 
-/// (1 - F) / (1 + F), F = 0.04: the sum over all reflections within the slab.
+/// (1 - F) / (1 + F): the sum over all reflections within the slab; F = 0.04 straight on.
 fn glass() -> Vec<Case> {
-    let fresnel: f64 = (0.5f64 / 2.5).powi(2);
-    vec![case("glass slab: radiance".into(), (1.0 - fresnel) / (1.0 + fresnel), |gpu| {
-        let settings = TransportSettings { photons: 1, caustic_photons: 1, ..settings(Illumination::Split, 0.1) };
-        radiance(gpu, scene("glass-slab"), &settings, DVec3::Z * 2.0, DVec3::ZERO)
-    })]
+    let of = |name: &str, degrees: f64| {
+        let fresnel = reflectance(degrees.to_radians(), 1.5);
+        case(format!("glass slab, {name}: radiance"), (1.0 - fresnel) / (1.0 + fresnel), move |gpu| {
+            let rays = TransportSettings { photons: 1, caustic_photons: 1, rounds: 16, ..settings(Illumination::Split, 0.1) };
+            let (sin, cos) = degrees.to_radians().sin_cos();
+            radiance(gpu, scene("glass-slab"), &rays, 2.0 * DVec3::new(sin, 0.0, cos), DVec3::ZERO)
+        })
+    };
+    vec![of("straight on", 0.0), of("at 60 degrees", 60.0)]
+}
+
+/// What a smooth surface reflects of unpolarised light (Fresnel; Born and Wolf 1.5.2).
+fn reflectance(angle: f64, ior: f64) -> f64 {
+    let (cos, inner_cos) = (angle.cos(), (angle.sin() / ior).asin().cos());
+    let amplitude = |a: f64, b: f64| ((a - b) / (a + b)).powi(2);
+    0.5 * (amplitude(cos, ior * inner_cos) + amplitude(ior * cos, inner_cos))
 }

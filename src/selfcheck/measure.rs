@@ -57,7 +57,12 @@ pub fn irradiance(gpu: &Gpu, scene: &Scene, settings: &TransportSettings, points
 }
 
 /// Radiance along one ray, W/m2/sr, seen through a picture of a narrow view.
-pub fn radiance(gpu: &Gpu, mut scene: Scene, settings: &TransportSettings, eye: DVec3, target: DVec3) -> Result<Estimate> {
-    scene.cameras = vec![Camera::looking_at("ray", eye, target, DVec3::Y, 0.003)];
+pub fn radiance(gpu: &Gpu, scene: Scene, settings: &TransportSettings, eye: DVec3, target: DVec3) -> Result<Estimate> {
+    mean_radiance(gpu, scene, settings, Camera::looking_at("ray", eye, target, DVec3::Y, 0.003))
+}
+
+/// Radiance over a camera's picture, W/m2/sr.
+pub fn mean_radiance(gpu: &Gpu, mut scene: Scene, settings: &TransportSettings, camera: Camera) -> Result<Estimate> {
+    scene.cameras = vec![camera];
     light(gpu, &scene, settings, Sensor::Picture { width: 24, height: 24 }, &[])
 }

@@ -5,25 +5,22 @@
 //! test fails, unless `PHOTONMILL_NO_GPU=1` says that there is none on purpose.
 #![allow(dead_code, reason = "every test file takes its part")]
 
+pub mod family;
+pub mod lit;
+pub mod radiosity;
 pub mod reference;
 
 use std::ops::Deref;
 use std::sync::atomic::AtomicBool;
 
-use glam::DVec3;
 use photonmill::gpu::{Gpu, Options};
-use photonmill::plan::transport::{Sensor, TransportPlan};
 use photonmill::plan::{Limits, Plan};
-use photonmill::records::{Photon, Receiver};
+use photonmill::records::Photon;
 use photonmill::render::{self, Control, Outcome};
 use photonmill::rng::{self, Streams};
-use photonmill::scene::geometry::Geometry;
 use photonmill::scene::open_box::open_box;
 use photonmill::scene::room::RoomScene;
-use photonmill::scene::{Camera, Scene};
 use photonmill::settings::Settings;
-use photonmill::settings::transport::TransportSettings;
-use photonmill::transport::{self, Lit, View};
 
 /// A device under the validation layer, which must not have said a word by the end of the test.
 pub struct Device(Gpu);
@@ -127,45 +124,6 @@ pub fn draws_of(streams: Streams, round: u32, photon: u32, bounces: u32) -> Vec<
 /// The streams that a run draws from.
 pub fn streams_of(settings: &Settings) -> Streams {
     Streams { rng: settings.rng, seed: settings.seed, photons: settings.photons, draws_per_photon: settings.draws_per_photon() }
-}
-
-fn light(gpu: &Gpu, view: &View, plan: TransportPlan) -> Lit {
-    let never = AtomicBool::new(false);
-    let lit = transport::light(gpu, view, plan, &mut Control { cancelled: &never, progress: &mut |_, _| {} }).unwrap();
-    assert_eq!(lit.anomalies, [0, 0, 0], "values that are no number, or too large for the film");
-    lit
-}
-
-/// What arrives at points (position, normal) of a scene of triangles.
-pub fn received(gpu: &Gpu, scene: &Scene, settings: &TransportSettings, points: &[(DVec3, DVec3)]) -> Lit {
-    received_within(gpu, scene, settings, points, &render::limits(gpu.facts()))
-}
-
-/// The same within other limits than the device's own.
-pub fn received_within(gpu: &Gpu, scene: &Scene, settings: &TransportSettings, points: &[(DVec3, DVec3)], limits: &Limits) -> Lit {
-    let geometry = Geometry::new(scene).unwrap();
-    let receiver = |(position, normal): &(DVec3, DVec3)| Receiver {
-        position: geometry.to_local(*position),
-        normal: normal.as_vec3(),
-        shading_normal: normal.as_vec3(),
-    };
-    let receivers = points.iter().map(receiver).collect();
-    let sensor = Sensor::Receivers { count: points.len() as u32 };
-    let plan = TransportPlan::new(scene, &geometry, settings, sensor, limits).unwrap();
-    light(gpu, &View { geometry: &geometry, camera: None, phases: &[receivers] }, plan)
-}
-
-/// What a camera sees of a scene of triangles.
-pub fn seen(gpu: &Gpu, scene: &Scene, settings: &TransportSettings, camera: &Camera, [width, height]: [u32; 2]) -> Lit {
-    let geometry = Geometry::new(scene).unwrap();
-    let plan = TransportPlan::new(scene, &geometry, settings, Sensor::Picture { width, height }, &render::limits(gpu.facts())).unwrap();
-    light(gpu, &View { geometry: &geometry, camera: Some(camera), phases: &[] }, plan)
-}
-
-/// Mean of the red channel over all pixels or points.
-pub fn mean_red(lit: &Lit) -> f64 {
-    let pixels = lit.film.pixels();
-    (0..pixels).map(|pixel| lit.film.mean(pixel, &lit.plan).x).sum::<f64>() / pixels as f64
 }
 
 /// A relative error against what is allowed.

@@ -1,0 +1,127 @@
+//! Scenes of triangles, lit to the end: irradiance at points, radiance along a ray.
+
+use std::sync::atomic::AtomicBool;
+
+use glam::{DVec3, Vec3};
+use photonmill::gpu::Gpu;
+use photonmill::plan::Limits;
+use photonmill::plan::transport::{Sensor, TransportPlan};
+use photonmill::records::Receiver;
+use photonmill::render::{self, Control};
+use photonmill::scene::geometry::Geometry;
+use photonmill::scene::light::LightKind;
+use photonmill::scene::{Camera, Light, Material, Mesh, Scene, Surface};
+use photonmill::settings::transport::{Append, Illumination, TransportSettings};
+use photonmill::transport::{self, Lit, View};
+
+/// Builders of a map of a scene of triangles.
+pub const APPENDS: [Append; 2] = [Append::Atomic, Append::Ballot];
+pub const BOTH: [Illumination; 2] = [Illumination::Split, Illumination::Photons];
+
+/// Runs to the end, with nothing odd.
+pub fn light(gpu: &Gpu, view: &View, plan: TransportPlan) -> Lit {
+    let never = AtomicBool::new(false);
+    let lit = transport::light(gpu, view, plan, &mut Control { cancelled: &never, progress: &mut |_, _| {} }).unwrap();
+    assert_eq!(lit.anomalies, [0, 0, 0], "values that are no number, or too large for the film");
+    lit
+}
+
+/// What arrives at points (position, normal) of a scene of triangles.
+pub fn received(gpu: &Gpu, scene: &Scene, settings: &TransportSettings, points: &[(DVec3, DVec3)]) -> Lit {
+    received_within(gpu, scene, settings, points, &render::limits(gpu.facts()))
+}
+
+/// The same within other limits than the device's own.
+pub fn received_within(gpu: &Gpu, scene: &Scene, settings: &TransportSettings, points: &[(DVec3, DVec3)], limits: &Limits) -> Lit {
+    let geometry = Geometry::new(scene).unwrap();
+    let receiver = |(position, normal): &(DVec3, DVec3)| Receiver {
+        position: geometry.to_local(*position),
+        normal: normal.as_vec3(),
+        shading_normal: normal.as_vec3(),
+    };
+    let receivers = points.iter().map(receiver).collect();
+    let sensor = Sensor::Receivers { count: points.len() as u32 };
+    let plan = TransportPlan::new(scene, &geometry, settings, sensor, limits).unwrap();
+    light(gpu, &View { geometry: &geometry, camera: None, phases: &[receivers] }, plan)
+}
+
+/// What a camera sees of a scene of triangles.
+pub fn seen(gpu: &Gpu, scene: &Scene, settings: &TransportSettings, camera: &Camera, [width, height]: [u32; 2]) -> Lit {
+    let geometry = Geometry::new(scene).unwrap();
+    let plan = TransportPlan::new(scene, &geometry, settings, Sensor::Picture { width, height }, &render::limits(gpu.facts())).unwrap();
+    light(gpu, &View { geometry: &geometry, camera: Some(camera), phases: &[] }, plan)
+}
+
+/// Mean of the red channel over all pixels or points.
+pub fn mean_red(lit: &Lit) -> f64 {
+    let pixels = lit.film.pixels();
+    (0..pixels).map(|pixel| lit.film.mean(pixel, &lit.plan).x).sum::<f64>() / pixels as f64
+}
+
+/// Mean of every pixel or point.
+pub fn means(lit: &Lit) -> Vec<DVec3> {
+    (0..lit.film.pixels()).map(|pixel| lit.film.mean(pixel, &lit.plan)).collect()
+}
+
+/// Irradiance at points, W/m2, of each of several runs of other seeds.
+pub fn irradiances(
+    gpu: &Gpu,
+    scene: &Scene,
+    settings: &TransportSettings,
+    points: &[(DVec3, DVec3)],
+    seeds: std::ops::Range<u64>,
+) -> Vec<Vec<DVec3>> {
+    seeds.map(|seed| means(&received(gpu, scene, &TransportSettings { seed, ..settings.clone() }, points))).collect()
+}
+
+/// Radiance along one ray, W/m2/sr, once for each pixel of a picture so narrow that they are all but the same ray;
+/// pixels draw random numbers of their own. The red channel of a grey scene.
+pub fn radiances(gpu: &Gpu, scene: &Scene, settings: &TransportSettings, eye: DVec3, target: DVec3, side: u32) -> Vec<f64> {
+    let up = if (target - eye).normalize().y.abs() > 0.9 { DVec3::X } else { DVec3::Y };
+    let camera = Camera::looking_at("ray", eye, target, up, 2e-4);
+    means(&seen(gpu, scene, settings, &camera, [side, side])).into_iter().map(|mean| mean.x).collect()
+}
+
+pub fn scene_of(meshes: Vec<Mesh>, materials: Vec<Material>, lights: Vec<LightKind>) -> Scene {
+    let lights = lights.into_iter().map(|kind| Light { name: "light".into(), kind }).collect();
+    Scene { meshes, materials, lights, ..Scene::default() }
+}
+
+/// Scatters this share evenly.
+pub fn matt(albedo: f32) -> Material {
+    Material::lambert("matt", Vec3::splat(albedo))
+}
+
+/// Scatters this share, and shines with 1 W/m2/sr.
+pub fn shining(albedo: f32) -> Material {
+    Material { emission: Vec3::ONE, ..matt(albedo) }
+}
+
+pub fn mirror(reflectance: f32) -> Material {
+    Material { surface: Surface::Mirror, ..matt(reflectance) }
+}
+
+pub fn glass(ior: f32) -> Material {
+    Material { surface: Surface::Dielectric { ior }, ..matt(1.0) }
+}
+
+/// A horizontal rectangle around the y axis, `width` along x and `depth` along z, that faces up or down.
+pub fn level(height: f64, [width, depth]: [f64; 2], faces_up: bool, material: usize) -> Mesh {
+    let corner = DVec3::new(-0.5 * width, height, -0.5 * depth);
+    let (x, z) = (DVec3::X * width, DVec3::Z * depth);
+    if faces_up { Mesh::parallelogram("level", corner, z, x, material) } else { Mesh::parallelogram("level", corner, x, z, material) }
+}
+
+/// The four sides of a square shaft of 1 m around the y axis, that face its inside.
+pub fn shaft(bottom: f64, top: f64, material: usize) -> Vec<Mesh> {
+    let (x, z, y) = (DVec3::X, DVec3::Z, DVec3::Y * (top - bottom));
+    let corner = DVec3::new(-0.5, bottom, -0.5);
+    let sides = [(corner, x, y), (corner, y, z), (corner + x, z, y), (corner + z, y, x)];
+    sides.into_iter().map(|(origin, u, v)| Mesh::parallelogram("side", origin, u, v, material)).collect()
+}
+
+/// Middles of n x n squares of a horizontal square of 1 m around the y axis.
+pub fn grid(height: f64, normal: DVec3, n: usize) -> Vec<(DVec3, DVec3)> {
+    let place = |i: usize| (i as f64 + 0.5) / n as f64 - 0.5;
+    (0..n * n).map(|k| (DVec3::new(place(k % n), height, place(k / n)), normal)).collect()
+}
