@@ -317,3 +317,28 @@ struct MathResults {
     float angle;
     float asinh;
 };
+
+struct SamplingCase {
+    uvec2 words;
+    vec3 normal;
+    float exponent;
+    vec3 a;
+    vec3 b;
+    vec3 c;
+};
+
+struct Samples {
+    vec3 cosine_hemisphere;
+    vec3 uniform_hemisphere;
+    vec3 sphere;
+    vec3 lobe;
+    vec3 disc;
+    vec2 triangle;
+    vec2 filter_offset;
+    vec3 in_triangle;
+    float solid_angle;
+    vec3 tangent;
+    vec3 bitangent;
+    vec3 unpacked_normal;
+    vec3 unpacked_direction;
+};

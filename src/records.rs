@@ -455,4 +455,40 @@ records! {
         angle: f32,
         asinh: f32,
     }
+
+    /// What the functions that sample are asked at.
+    SamplingCase {
+        /// Two random words, as the generator gives them.
+        words: UVec2,
+        /// Of a disc, and of what is made into a frame or packed; a unit vector.
+        normal: Vec3,
+        /// Of a lobe.
+        exponent: f32,
+        /// Unit vectors: corners of a spherical triangle.
+        a: Vec3,
+        b: Vec3,
+        c: Vec3,
+    }
+
+    /// What the functions of `glsl/sampling.glsl`, `glsl/filter.glsl` and `glsl/scene` make of a case.
+    Samples {
+        /// Around the z axis.
+        cosine_hemisphere: Vec3,
+        uniform_hemisphere: Vec3,
+        sphere: Vec3,
+        lobe: Vec3,
+        /// A point of the unit disc around the origin.
+        disc: Vec3,
+        /// Barycentric.
+        triangle: Vec2,
+        filter_offset: Vec2,
+        /// A direction within the spherical triangle, and the angle that it was chosen from.
+        in_triangle: Vec3,
+        solid_angle: f32,
+        tangent: Vec3,
+        bitangent: Vec3,
+        /// The normal, packed in 2 x 16 and in 2 x 15 bits.
+        unpacked_normal: Vec3,
+        unpacked_direction: Vec3,
+    }
 }

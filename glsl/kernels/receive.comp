@@ -24,6 +24,7 @@ layout(set = 0, binding = 8, scalar) readonly buffer Receivers { Receiver receiv
 #include "scene/surface.glsl"
 #include "scene/lobes.glsl"
 #include "scene/scatter.glsl"
+#include "scene/areas.glsl"
 #include "scene/lights.glsl"
 #include "scene/direct.glsl"
 #include "scene/belongs.glsl"

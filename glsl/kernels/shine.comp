@@ -19,6 +19,7 @@ layout(set = 1, binding = 0, scalar) writeonly buffer LightPaths { LightPath lig
 #include "scene/directions.glsl"
 #include "scene/bvh.glsl"
 #include "scene/surface.glsl"
+#include "scene/areas.glsl"
 #include "scene/lights.glsl"
 
 void main()

@@ -18,35 +18,18 @@ layout(push_constant, scalar) uniform Push { ViewPush push; };
 #include "philox.glsl"
 #include "sampling.glsl"
 #include "scene/effects.glsl"
+#include "filter.glsl"
 #include "scene/directions.glsl"
 #include "scene/bvh.glsl"
 #include "scene/surface.glsl"
 #include "scene/lobes.glsl"
 #include "scene/scatter.glsl"
+#include "scene/areas.glsl"
 #include "scene/lights.glsl"
 #include "scene/direct.glsl"
 #include "scene/film.glsl"
 #include "stages/visible_point.glsl"
 #include "stages/chain.glsl"
-
-// Offset from a pixel's centre, in pixels, as likely as the filter weighs it.
-float filter_offset(float u)
-{
-    if (FILTER == FILTER_TENT) {
-        return u < 0.5 ? sqrt(2.0 * u) - 1.0 : 1.0 - sqrt(2.0 - 2.0 * u);
-    }
-    return u - 0.5;
-}
-
-vec2 filter_offsets(vec2 u)
-{
-    if (FILTER == FILTER_GAUSSIAN) {
-        // Of half a pixel's deviation, cut at four deviations (Box and Muller 1958).
-        vec2 sin_cos = sin_cos_turns(u.y);
-        return 0.5 * sqrt(-1.3862943611198906 * log2(max(1.0 - u.x, 1.0 / 16777216.0) * (1.0 - 3.3546263e-4) + 3.3546263e-4)) * sin_cos.yx;
-    }
-    return vec2(filter_offset(u.x), filter_offset(u.y));
-}
 
 void main()
 {

@@ -45,8 +45,7 @@ Scatter sample_scatter(Surface surface, vec3 wo, vec3 u, bool carries_radiance)
     if (HAS_GLOSSY) {
         if (surface.kind == SURFACE_GLOSSY) {
             float n = surface.parameter;
-            float cosine = exp2(divide(log2(max(u.y, 1.0 / 16777216.0)), n + 1.0));
-            vec3 wi = to_frame(direction_at(cosine, (1.0 - cosine) * (1.0 + cosine), u.z), mirrored(wo, ns));
+            vec3 wi = to_frame(sample_lobe(n, u.y, u.z), mirrored(wo, ns));
             float cos_out = dot(wi, ns);
             vec3 weight = surface.base_colour * (divide(n + 2.0, n + 1.0) * max(cos_out, 0.0));
             return Scatter(wi, weight, cos_out > 0.0 && dot(wi, surface.ng) > 0.0);

@@ -22,13 +22,18 @@ fn direction_at(cosine: f32, sine_squared: f32, azimuth: f32) -> Vec3 {
     Vec3::new(sine * sin_cos.y, sine * sin_cos.x, cosine)
 }
 
+/// A number that is 0 stands for what lies below a generator's last bit: no direction lies in the surface.
+const LEAST: f32 = 1.0 / 33_554_432.0;
+
 /// pdf = cosine / pi.
 pub fn sample_cosine_hemisphere(u: f32, azimuth: f32) -> Vec3 {
+    let u = u.max(LEAST);
     direction_at(u.sqrt(), 1.0 - u, azimuth)
 }
 
 /// pdf = 1 / (2 pi).
 pub fn sample_uniform_hemisphere(u: f32, azimuth: f32) -> Vec3 {
+    let u = u.max(LEAST);
     direction_at(u, (1.0 - u) * (1.0 + u), azimuth)
 }
 

@@ -7,11 +7,11 @@ use std::time::Instant;
 
 use glam::Vec2;
 
-use super::kernels::{CheckMath, CheckTwoWords, CheckU64};
+use super::kernels::{CheckMath, CheckSampling, CheckTwoWords, CheckU64};
 use super::{Commands, Constants, Extent, Gpu, Memory};
 use crate::constants::LOOP_LIMIT;
 use crate::error::{Error, Result};
-use crate::records::{CheckPush, MathResults};
+use crate::records::{CheckPush, MathResults, Samples, SamplingCase};
 
 /// What the check found beyond passing.
 #[derive(Debug, Clone, Copy, PartialEq, Eq)]
@@ -64,6 +64,17 @@ pub fn math(gpu: &Gpu, operands: &[Vec2]) -> Result<Vec<MathResults>> {
     commands.upload(&inputs, operands)?;
     commands.dispatch(CheckMath { operands: &inputs, results: &results }, &(), Extent::Items(operands.len() as u64))?;
     commands.read(&results, operands.len())
+}
+
+/// What the functions that sample make of each case on the device, under `constants` by name.
+pub fn sampling(gpu: &Gpu, constants: &[(&'static str, u32)], cases: &[SamplingCase]) -> Result<Vec<Samples>> {
+    let constants = constants.iter().fold(Constants::new(GROUP_SIZE), |constants, (name, value)| constants.set(name, *value));
+    let mut commands = Commands::new(gpu, constants, Instant::now())?;
+    let inputs = gpu.buffer::<SamplingCase>("sampling cases", cases.len() as u64, Memory::Device)?;
+    let results = gpu.buffer::<Samples>("samples", cases.len() as u64, Memory::Device)?;
+    commands.upload(&inputs, cases)?;
+    commands.dispatch(CheckSampling { cases: &inputs, results: &results }, &(), Extent::Items(cases.len() as u64))?;
+    commands.read(&results, cases.len())
 }
 
 /// Fails unless sums, products, and the quotients and roots made from them are rounded to nearest, each by itself:

@@ -1,4 +1,4 @@
-//! One photon of a run by itself: a photon is (seed, round, number), so it takes the same path alone as among
+//! Photons of a run by themselves: a photon is (seed, round, number), so it takes the same path alone as among
 //! millions.
 
 use std::time::Instant;
@@ -9,7 +9,7 @@ use crate::constants::{DOMAIN_CAUSTIC_PHOTONS, DOMAIN_PHOTONS};
 use crate::error::{Error, Result};
 use crate::gpu::{Commands, Extent, Gpu};
 use crate::oddities::Oddities;
-use crate::plan::transport::TransportPlan;
+use crate::plan::transport::{MapPlan, TransportPlan};
 use crate::records::{LightPath, Tally};
 use crate::scene::geometry::Geometry;
 
@@ -43,24 +43,57 @@ pub fn replay(gpu: &Gpu, geometry: &Geometry, plan: &TransportPlan, name: Photon
     if photon >= map.photons {
         return Err(Error::setting("--replay", shown, format!("a round has photons 0 to {} in the {kind} map", map.photons - 1)));
     }
+    let Flights { paths, tallies, oddities } = light_paths(gpu, geometry, plan, map, number, (photon, 1), map.bounces)?;
+    let fate = match tallies.last() {
+        Some(tally) if tally.escaped == 1 => "leaves the scene",
+        Some(tally) if tally.absorbed == 1 => "is absorbed",
+        _ => "is cut off at the last bounce",
+    };
+    Ok(Path { name, vertices: paths.concat(), fate, oddities })
+}
+
+/// Some photons in flight.
+#[derive(Debug, Clone, PartialEq)]
+pub struct Flights {
+    /// As they leave the lights, then those that are left after each flight.
+    pub paths: Vec<Vec<LightPath>>,
+    /// Their fates in each flight.
+    pub tallies: Vec<Tally>,
+    /// What `--paranoid` found; `None` where nobody looked.
+    pub oddities: Option<Oddities>,
+}
+
+/// The photons (first, count) of a round of `map`, no more than it traces at once, through `flights` flights or until
+/// none is left.
+pub fn light_paths(
+    gpu: &Gpu,
+    geometry: &Geometry,
+    plan: &TransportPlan,
+    map: &MapPlan,
+    number: u32,
+    chunk: (u32, u32),
+    flights: u32,
+) -> Result<Flights> {
+    assert!(chunk.1 <= map.chunk_photons && flights <= map.bounces, "{chunk:?}, {flights} flights of {map:?}");
     let mut commands = Commands::new(gpu, constants(plan), Instant::now())?;
     let resources = TransportResources::new(gpu, &mut commands, geometry, plan, &[])?;
     let buffers = resources.photons.as_ref().expect("a map has photons");
     let round = Round { resources: &resources, geometry, plan, number };
-    photons::emit(&mut commands, round, buffers, map, (photon, 1))?;
-    let mut vertices = commands.read::<LightPath>(&buffers.paths[0], 1)?;
-    let mut fate = "is cut off at the last bounce";
-    for bounce in 0..map.bounces {
-        photons::fly(&mut commands, round, buffers, map, bounce, Extent::Items(1))?;
-        let tally = commands.read::<Tally>(&buffers.tallies[usize::from(caustic)], bounce as usize + 1)?[bounce as usize];
-        if tally.stored == 0 {
-            fate = if tally.escaped == 1 { "leaves the scene" } else { "is absorbed" };
+    photons::emit(&mut commands, round, buffers, map, chunk)?;
+    let mut paths = vec![commands.read::<LightPath>(&buffers.paths[0], chunk.1 as usize)?];
+    let mut tallies: Vec<Tally> = Vec::new();
+    let mut left = chunk.1;
+    for bounce in 0..flights {
+        photons::fly(&mut commands, round, buffers, map, bounce, Extent::Items(u64::from(left)))?;
+        tallies = commands.read(&buffers.tallies[usize::from(map.caustic_only)], bounce as usize + 1)?;
+        left = tallies[bounce as usize].stored;
+        if left == 0 {
             break;
         }
-        vertices.extend(commands.read::<LightPath>(&buffers.paths[(bounce as usize + 1) % 2], 1)?);
+        paths.push(commands.read(&buffers.paths[(bounce as usize + 1) % 2], left as usize)?);
     }
     let oddities = if plan.settings.paranoid { Some(Oddities::read(&mut commands, &resources.oddities)?) } else { None };
-    Ok(Path { name, vertices, fate, oddities })
+    Ok(Flights { paths, tallies, oddities })
 }
 
 impl Path {

@@ -1,6 +1,6 @@
 //! Many tests of one subject, judged together: the more there are, the further each may be off by chance.
 
-use std::f64::consts::{FRAC_2_PI, PI};
+use statrs::distribution::{ChiSquared, ContinuousCDF, Normal, StudentsT};
 
 use super::Check;
 
@@ -134,40 +134,17 @@ impl Family {
     }
 }
 
-/// Chance of a standard normal number beyond z on either side: 1 - erf(z / sqrt 2), by the series of positive
-/// terms exp(-x^2) 2 x / sqrt pi (1 + 2 x^2 / 3 + (2 x^2)^2 / (3 5) + ...) (DLMF 7.6.2).
+/// Chance of a standard normal number beyond z on either side.
 pub fn normal_p_value(z: f64) -> f64 {
-    if z > 8.0 {
-        // Below the rounding of 1 - erf, and below any limit here.
-        return 0.0;
-    }
-    let squared = 0.5 * z * z;
-    let (mut term, mut sum, mut divisor) = (1.0, 1.0, 1.0);
-    while term > 1e-17 * sum {
-        divisor += 2.0;
-        term *= 2.0 * squared / divisor;
-        sum += term;
-    }
-    1.0 - (-squared).exp() * z * (2.0 / PI).sqrt() * sum
+    2.0 * Normal::standard().sf(z)
 }
 
-/// The same of Student's t (Abramowitz and Stegun 26.7.3, 26.7.4).
+/// The same of Student's t.
 pub fn student_p_value(t: f64, freedom: u32) -> f64 {
-    let angle = (t / f64::from(freedom).sqrt()).atan();
-    let (sine, cosine) = angle.sin_cos();
-    let is_odd = freedom % 2 == 1;
-    let (mut term, mut sum) = if is_odd { (cosine, if freedom > 1 { cosine } else { 0.0 }) } else { (1.0, 1.0) };
-    let mut order = if is_odd { 3 } else { 2 };
-    while order < freedom {
-        term *= cosine * cosine * f64::from(order - 1) / f64::from(order);
-        sum += term;
-        order += 2;
-    }
-    if is_odd { 1.0 - FRAC_2_PI * (angle + sine * sum) } else { 1.0 - sine * sum }
+    2.0 * StudentsT::new(0.0, 1.0, f64::from(freedom)).expect("there is a degree of freedom").sf(t)
 }
 
-/// Number of standard errors that a chi-squared sum of so many squares is from its mean (Wilson and Hilferty 1931).
+/// The standard normal number that is as unlikely to be exceeded as a chi-squared sum of so many squares.
 pub fn chi_squared_z(sum: f64, freedom: f64) -> f64 {
-    let spread = 2.0 / (9.0 * freedom);
-    ((sum / freedom).cbrt() - (1.0 - spread)) / spread.sqrt()
+    Normal::standard().inverse_cdf(ChiSquared::new(freedom).expect("there is a degree of freedom").cdf(sum))
 }

@@ -5,6 +5,8 @@
 //! test fails, unless `PHOTONMILL_NO_GPU=1` says that there is none on purpose.
 #![allow(dead_code, reason = "every test file takes its part")]
 
+pub mod chi_square;
+pub mod densities;
 pub mod family;
 pub mod lit;
 pub mod radiosity;

@@ -1,0 +1,502 @@
+//! Photons as they leave every kind of light, and every kind of surface, against the densities, shares and weights
+//! that they should have.
+
+mod common;
+
+use std::f64::consts::{FRAC_PI_2, PI, TAU};
+
+use common::chi_square::{ONE, counts_check, density_check, even};
+use common::densities::{
+    AXIS, ULP, angles, disc_check, frame, hemisphere_check, independence_check, is_unit, lobe, lobe_angles, on_sphere, polar, sphere_check,
+    triangle_check,
+};
+use common::{Check, assert_complains, assert_holds, device, share_check, z_check};
+use glam::{DMat3, DVec2, DVec3, Vec3};
+use photonmill::constants::EMISSION_BLOCKS;
+use photonmill::gpu::Gpu;
+use photonmill::plan::transport::{Sensor, TransportPlan};
+use photonmill::records::{LightPath, Tally};
+use photonmill::render;
+use photonmill::rng::philox;
+use photonmill::scene::geometry::Geometry;
+use photonmill::scene::light::{Light, LightKind};
+use photonmill::scene::material::TextureUse;
+use photonmill::scene::texture::Wrap;
+use photonmill::scene::{Material, Mesh, Scene, Surface, Texture};
+use photonmill::settings::transport::{Effect, Illumination, TransportSettings};
+use photonmill::settings::{EmissionLaw, Math};
+use photonmill::transport::replay::{Flights, light_paths};
+
+/// Photons of each scene.
+const SAMPLES: u32 = 1 << 17;
+const BOTH: [Math; 2] = [Math::Fast, Math::Strict];
+
+/// A plane of 1 m around the origin and one light.
+fn scene(normal: DVec3, material: Material, kind: LightKind) -> Scene {
+    let frame = frame(normal, DVec3::X);
+    let (u, v) = (frame.x_axis, frame.y_axis);
+    Scene {
+        name: "sampling".into(),
+        meshes: vec![Mesh::parallelogram("plane", -0.5 * (u + v), u, v, 0)],
+        materials: vec![material],
+        lights: vec![Light { name: "light".into(), kind }],
+        ..Scene::default()
+    }
+}
+
+/// A device's photons of one scene after another; all effects are on, so that all scenes share their kernels.
+struct Tracer<'a> {
+    gpu: &'a Gpu,
+    math: Math,
+}
+
+struct Traced {
+    geometry: Geometry,
+    /// As they leave the light.
+    emitted: Vec<LightPath>,
+    /// Those that one flight left, and what became of all.
+    survivors: Vec<LightPath>,
+    tally: Tally,
+}
+
+impl Tracer<'_> {
+    fn trace_photons(&self, scene: &Scene, photons: (u32, u32)) -> Traced {
+        let geometry = Geometry::new(scene).unwrap();
+        let settings = TransportSettings {
+            photons: photons.0 + photons.1,
+            chunk: Some(photons.1),
+            bounces: 1,
+            illumination: Illumination::Photons,
+            math: self.math,
+            with: Effect::ALL.to_vec(),
+            ..TransportSettings::default()
+        };
+        let limits = render::limits(self.gpu.facts());
+        let plan = TransportPlan::new(scene, &geometry, &settings, Sensor::Receivers { count: 1 }, &limits).unwrap();
+        let map = plan.global.as_ref().expect("a lit scene has a map");
+        let Flights { mut paths, tallies, .. } = light_paths(self.gpu, &geometry, &plan, map, 0, photons, 1).unwrap();
+        let survivors = if paths.len() == 2 { paths.pop().unwrap() } else { Vec::new() };
+        Traced { geometry, emitted: paths.pop().unwrap(), survivors, tally: tallies[0] }
+    }
+
+    fn trace(&self, scene: &Scene) -> Traced {
+        self.trace_photons(scene, (0, SAMPLES))
+    }
+}
+
+impl Traced {
+    fn directions(paths: &[LightPath]) -> Vec<Vec3> {
+        paths.iter().map(|path| path.direction).collect()
+    }
+
+    /// Normal of the scene's first triangle.
+    fn normal(&self) -> DVec3 {
+        let triangle = self.geometry.triangles[0];
+        let [a, b, c] = [triangle.a, triangle.b, triangle.c].map(Vec3::as_dvec3);
+        (b - a).cross(c - a).normalize()
+    }
+}
+
+fn white() -> Material {
+    Material::lambert("white", Vec3::ONE)
+}
+
+#[test]
+fn triangles_shine_by_the_cosine_from_all_of_their_area() {
+    let Some(gpu) = device() else { return };
+    let tracer = Tracer { gpu: &gpu, math: Math::Fast };
+    let texels = vec![Vec3::new(1.0, 0.25, 0.5), Vec3::new(0.125, 1.0, 0.5), Vec3::new(0.5, 0.75, 0.0), Vec3::new(0.25, 0.5, 2.0)];
+    let texture = Texture { name: "four texels".into(), width: 2, height: 2, texels, wrap: [Wrap::Clamp; 2] };
+    let lamp = |two_sided: bool, textured: bool| {
+        let mut mesh = Mesh::parallelogram("lamp", DVec3::ZERO, DVec3::new(0.6, 0.1, -0.2), DVec3::new(0.1, 0.3, 0.5), 0);
+        mesh.triangles.truncate(1);
+        let emission_texture = textured.then_some(TextureUse { texture: 0, uv_set: 0 });
+        let material = Material { emission: Vec3::ONE, emission_texture, two_sided, ..white() };
+        Scene { name: "lamp".into(), meshes: vec![mesh], materials: vec![material], textures: vec![texture.clone()], ..Scene::default() }
+    };
+    for (what, two_sided, textured) in [("one side", false, false), ("two sides", true, false), ("a textured side", false, true)] {
+        let traced = tracer.trace(&lamp(two_sided, textured));
+        let normal = traced.normal();
+        let triangle = traced.geometry.triangles[0];
+        let (a, u, v) = (triangle.a.as_dvec3(), (triangle.b - triangle.a).as_dvec3(), (triangle.c - triangle.a).as_dvec3());
+        let to_weights = DMat3::from_cols(u, v, normal).inverse();
+        let weights: Vec<DVec3> = traced.emitted.iter().map(|path| to_weights * (path.position.as_dvec3() - a)).collect();
+        // On the side to which the photon flies, by no more than rounding asks for.
+        for (path, at) in traced.emitted.iter().zip(&weights) {
+            let height = at.z * path.direction.as_dvec3().dot(normal).signum();
+            assert!(height > 0.0 && height < 1e-5, "{what}: {path:?} starts {height:e} above its side");
+        }
+        assert_holds("positions", triangle_check(what, &weights.iter().map(|at| at.truncate()).collect::<Vec<_>>()));
+        let front: Vec<Vec3> = Traced::directions(&traced.emitted).into_iter().filter(|d| d.as_dvec3().dot(normal) > 0.0).collect();
+        let back: Vec<Vec3> = Traced::directions(&traced.emitted).into_iter().filter(|d| d.as_dvec3().dot(normal) <= 0.0).collect();
+        for (side, directions) in [(normal, &front), (-normal, &back)] {
+            if side == normal || two_sided {
+                let what = format!("{what}, directions");
+                assert_holds(&what, hemisphere_check(&what, directions, frame(side, DVec3::X), |wi| wi.dot(side) / PI));
+                let from_uniform = hemisphere_check("fault", directions, frame(side, DVec3::X), |_| 1.0 / TAU);
+                assert_complains("cosines for uniform directions", from_uniform);
+            }
+        }
+        if two_sided {
+            assert_holds("sides", share_check("front", front.len() as u64, u64::from(SAMPLES), 0.5));
+        } else {
+            assert_eq!(back, []);
+        }
+        let cosine_squared = |path: &LightPath| path.direction.as_dvec3().dot(normal).powi(2);
+        let joint: Vec<(f64, f64)> =
+            weights.iter().zip(&traced.emitted).map(|(at, path)| ((at.x + at.y).powi(2), cosine_squared(path))).collect();
+        assert_holds("place and direction", independence_check(what, &joint));
+        assert_complains("a number drawn twice", independence_check("fault", &joint.iter().map(|(x, _)| (*x, *x)).collect::<Vec<_>>()));
+
+        let base = traced.geometry.emitters[0].flux.as_dvec3();
+        for (path, at) in traced.emitted.iter().zip(&weights) {
+            let uv = DVec2::new(at.x + at.y, at.y);
+            let expected = if textured { base * texture.sample(uv).as_dvec3() } else { base };
+            let off = (path.flux.as_dvec3() - expected).abs().max_element();
+            assert!(off < 1e-4, "{what}: {path:?} instead of flux {expected}");
+        }
+    }
+}
+
+/// A light alone over a plane that it need not hit.
+fn lit(kind: LightKind) -> Scene {
+    scene(DVec3::Y, white(), kind)
+}
+
+#[test]
+fn lights_emit_as_their_kinds_have_it() {
+    let Some(gpu) = device() else { return };
+    let tracer = Tracer { gpu: &gpu, math: Math::Fast };
+    let axis = AXIS.normalize().as_vec3().as_dvec3().normalize();
+    let position = DVec3::new(0.25, 0.5, -0.125);
+
+    let point = tracer.trace(&lit(LightKind::Point { position, intensity: Vec3::ONE }));
+    assert!(point.emitted.iter().all(|path| path.position == position.as_vec3()));
+    assert_holds("point", sphere_check("point light", &Traced::directions(&point.emitted)));
+
+    for (inner, outer) in [(20f64, 40f64), (0.0, 30.0), (1.0, 1.5), (59.0, 60.0), (45.0, 90.0)] {
+        let (inner_angle, outer_angle) = (inner.to_radians() as f32, outer.to_radians() as f32);
+        let spot =
+            tracer.trace(&lit(LightKind::Spot { position, direction: AXIS.normalize(), intensity: Vec3::ONE, inner_angle, outer_angle }));
+        let frame = frame(axis, DVec3::X);
+        let places: Vec<(f64, f64)> = spot.emitted.iter().map(|path| polar(frame, path.direction)).collect();
+        let spot_check = |inner: f64, outer: f64| {
+            // glTF's falloff is linear in the cosine, and squared.
+            let (cos_inner, cos_outer) = (inner.cos(), outer.cos());
+            let whole = TAU * (1.0 - cos_inner + (cos_inner - cos_outer) / 3.0);
+            let falloff = |wi: DVec3| ((wi.dot(axis) - cos_outer) / (cos_inner - cos_outer)).clamp(0.0, 1.0).powi(2) / whole;
+            let mut polar = even(0.0, inner, 8);
+            polar.extend(&even(inner, outer, 12)[1..]);
+            polar.dedup();
+            density_check(&format!("spot {inner:.3} {outer:.3}"), &places, places.len(), &angles(polar), ONE, &on_sphere(frame, falloff))
+        };
+        let (inner, outer) = (f64::from(inner_angle), f64::from(outer_angle));
+        assert_holds("spot", spot_check(inner, outer));
+        assert_complains("a spot 3 % narrower than its light", spot_check(1.03 * inner, 1.03 * outer));
+    }
+
+    let sun = tracer.trace(&lit(LightKind::Directional { direction: AXIS.normalize(), irradiance: Vec3::ONE }));
+    assert!(sun.emitted.iter().all(|path| path.direction == AXIS.normalize().as_vec3()));
+    let radius = sun.geometry.radius;
+    let places: Vec<DVec3> = sun.emitted.iter().map(|path| path.position.as_dvec3() + 2.0 * radius * axis).collect();
+    assert_holds("sun", disc_check("directional light", &places, axis, radius));
+    assert_complains("a disc 1 % smaller", disc_check("fault", &places, axis, 0.99 * radius));
+
+    for (what, law) in [("cosine disc", EmissionLaw::Cosine), ("uniform disc", EmissionLaw::Uniform)] {
+        let disc = tracer.trace(&lit(LightKind::Disc { centre: position, normal: AXIS.normalize(), radius: 0.125, power: Vec3::ONE, law }));
+        // Rounding lifted them off the disc.
+        let flat = |path: &LightPath| {
+            let from_centre = path.position.as_dvec3() - position;
+            from_centre - from_centre.dot(axis) * axis
+        };
+        assert_holds(what, disc_check(what, &disc.emitted.iter().map(flat).collect::<Vec<_>>(), axis, 0.125));
+        let directions = Traced::directions(&disc.emitted);
+        let as_law = |law| {
+            let density = move |wi: DVec3| if law == EmissionLaw::Cosine { wi.dot(axis) / PI } else { 1.0 / TAU };
+            hemisphere_check(what, &directions, frame(axis, DVec3::X), density)
+        };
+        assert_holds(what, as_law(law));
+        let other = if law == EmissionLaw::Cosine { EmissionLaw::Uniform } else { EmissionLaw::Cosine };
+        assert_complains("the other law of discs", as_law(other));
+    }
+
+    let sky = tracer.trace(&lit(LightKind::Environment { radiance: Vec3::ONE }));
+    assert_holds("sky", sphere_check("sky, directions", &Traced::directions(&sky.emitted)));
+    let radius = sky.geometry.radius;
+    let places: Vec<(f64, f64)> = sky
+        .emitted
+        .iter()
+        .map(|path| {
+            let (start, way) = (path.position.as_dvec3(), path.direction.as_dvec3());
+            assert!((start.dot(way) + 2.0 * radius).abs() < 1e-5, "{path:?}");
+            ((start + 2.0 * radius * way).length_squared() / (radius * radius), 0.5 + 0.5 * way.z)
+        })
+        .collect();
+    assert_holds("sky", independence_check("sky, starts", &places));
+    assert_complains("r = u in the sky's disc", independence_check("fault", &places.iter().map(|(x, y)| (x * x, *y)).collect::<Vec<_>>()));
+}
+
+/// Among several lights each gets photons by its power.
+#[test]
+fn lights_are_chosen_by_their_power() {
+    let Some(gpu) = device() else { return };
+    let tracer = Tracer { gpu: &gpu, math: Math::Fast };
+    let powers = [1.0f32, 20.0, 5.0, 0.01, 8.0];
+    let mut scene = lit(LightKind::Environment { radiance: Vec3::ZERO });
+    scene.lights = (0..powers.len())
+        .map(|k| Light {
+            name: format!("light {k}"),
+            kind: LightKind::Point { position: DVec3::Y * k as f64, intensity: Vec3::splat(powers[k]) },
+        })
+        .collect();
+    let traced = tracer.trace(&scene);
+    let counts: Vec<u64> = (0..powers.len())
+        .map(|k| traced.emitted.iter().filter(|path| path.position == traced.geometry.to_local(DVec3::Y * k as f64)).count() as u64)
+        .collect();
+    let whole: f64 = powers.iter().map(|power| f64::from(*power)).sum();
+    let shares: Vec<f64> = powers.iter().map(|power| f64::from(*power) / whole).collect();
+    assert_holds("choice", counts_check("choice of lights", &counts, &shares));
+    assert_complains("lights chosen evenly", counts_check("fault", &counts, &[0.2; 5]));
+    // What a light was chosen by less it carries more of.
+    assert!(traced.emitted.iter().all(|path| (path.flux.x - 1.0).abs() < 1e-3));
+}
+
+/// A beam of one direction, at an incidence in degrees, onto the front of a plane, or its back.
+fn beam(material: Material, incidence: f64, from_behind: bool) -> Scene {
+    let normal = AXIS.normalize();
+    let frame = frame(normal, DVec3::X);
+    let (sin, cos) = incidence.to_radians().sin_cos();
+    let wo = cos * if from_behind { -normal } else { normal } + sin * (0.6 * frame.x_axis + 0.8 * frame.y_axis);
+    // A cone so narrow that in f32 its cosine is 1.
+    let kind = LightKind::Spot { position: wo, direction: -wo, intensity: Vec3::ONE, inner_angle: 0.0, outer_angle: 1e-4 };
+    scene(normal, material, kind)
+}
+
+/// The beam's wo as the kernels have it, and the plane's normal on that side.
+fn beam_at(traced: &Traced) -> (DVec3, DVec3) {
+    let first = traced.emitted[0];
+    assert!(traced.emitted.iter().all(|path| path.direction == first.direction && path.position == first.position));
+    let wo = -first.direction.as_dvec3();
+    let normal = traced.normal();
+    (wo, if normal.dot(wo) < 0.0 { -normal } else { normal })
+}
+
+#[test]
+fn lambertian_surfaces_scatter_by_the_cosine() {
+    let Some(gpu) = device() else { return };
+    let colour = Vec3::new(0.75, 0.3, 0.1);
+    for math in BOTH {
+        let tracer = Tracer { gpu: &gpu, math };
+        for (incidence, from_behind) in [(0.0, false), (60.0, false), (89.0, false), (45.0, true)] {
+            let what = format!("{math:?}, Lambert at {incidence} degrees");
+            let traced =
+                tracer.trace(&beam(Material { two_sided: from_behind, ..Material::lambert("grey", colour) }, incidence, from_behind));
+            let normal = beam_at(&traced).1;
+            let frame = frame(normal, DVec3::X);
+            let places: Vec<(f64, f64)> = traced.survivors.iter().map(|path| polar(frame, path.direction)).collect();
+            let scattered = |albedo: f64, density: &dyn Fn(DVec3) -> f64| {
+                let grid = angles(even(0.0, FRAC_PI_2, 20));
+                density_check(&what, &places, SAMPLES as usize, &grid, (albedo, 1e-6), &on_sphere(frame, |wi| albedo * density(wi)))
+            };
+            let albedo = f64::from(colour.x);
+            assert_holds(&what, scattered(albedo, &|wi| wi.dot(normal) / PI));
+            assert_complains("a uniform density", scattered(albedo, &|_| 1.0 / TAU));
+            assert_complains("an albedo 3 % off", scattered(0.97 * albedo, &|wi| wi.dot(normal) / PI));
+            assert_holds(&what, share_check("survivors", u64::from(traced.tally.stored), u64::from(SAMPLES), albedo));
+            assert_complains("an albedo 1 % off", share_check("fault", u64::from(traced.tally.stored), u64::from(SAMPLES), 0.99 * albedo));
+            assert_eq!(traced.tally.stored + traced.tally.absorbed, SAMPLES);
+            // Roulette by the largest channel; the others lose what it did not take.
+            for path in &traced.survivors {
+                let off = (path.flux - traced.emitted[0].flux * colour / colour.x).abs().max_element();
+                assert!(off < 1e-6, "{what}: {path:?}");
+            }
+        }
+        // A back that does not scatter.
+        assert_eq!(tracer.trace(&beam(Material::lambert("grey", colour), 45.0, true)).tally.stored, 0);
+    }
+}
+
+/// Albedo of the lobe (n + 2) / 2 pi cos^n at incidences 0, 30, 60, 80, 89.9 degrees, of the part above the horizon.
+const ALBEDOS: [(f64, [f64; 5]); 7] = [
+    (0.01, [1.0, 0.9318, 0.7472, 0.5835, 0.4974]),
+    (0.5, [1.0, 0.8956, 0.6560, 0.4711, 0.3823]),
+    (2.0, [1.0, 0.8705, 0.5625, 0.3444, 0.2509]),
+    (5.0, [1.0, 0.8663, 0.5194, 0.2693, 0.1706]),
+    (1e4, [1.0, 0.8660, 0.5, 0.1737, 0.0049]),
+    // Wide of the horizon it is the cosine.
+    (48_826.0, [1.0, 0.866_025, 0.5, 0.173_648, f64::NAN]),
+    (1e6, [1.0, 0.866_025, 0.5, 0.173_648, f64::NAN]),
+];
+const INCIDENCES: [f64; 5] = [0.0, 30.0, 60.0, 80.0, 89.9];
+
+#[test]
+fn glossy_surfaces_scatter_by_their_lobe() {
+    let Some(gpu) = device() else { return };
+    for (n, albedos) in ALBEDOS {
+        for (albedo, incidence) in albedos.into_iter().zip(INCIDENCES).filter(|(albedo, _)| albedo.is_finite()) {
+            // A colour for which the weight f cosine / pdf is the cosine: survivors are distributed by f cosine.
+            let colour = (n + 1.0) / (n + 2.0);
+            let glossy = |colour: f64| Material {
+                surface: Surface::Glossy { exponent: n as f32 },
+                ..Material::lambert("glossy", Vec3::splat(colour as f32))
+            };
+            let what = format!("lobe {n} at {incidence} degrees");
+            let tracer = Tracer { gpu: &gpu, math: if incidence == 60.0 { Math::Strict } else { Math::Fast } };
+            let traced = tracer.trace(&beam(glossy(colour), incidence, false));
+            let (wo, normal) = beam_at(&traced);
+            let mirror = (2.0 * wo.dot(normal) * normal - wo).normalize();
+            let frame = frame(mirror, normal);
+            let places: Vec<(f64, f64)> = traced.survivors.iter().map(|path| polar(frame, path.direction)).collect();
+            let scattered = |n: f64, bound: f64| {
+                let f_cosine = move |wi: DVec3| colour * (n + 2.0) / TAU * lobe(wi.dot(mirror), n) * wi.dot(normal).max(0.0);
+                let total = (colour * albedo, bound);
+                density_check(&what, &places, SAMPLES as usize, &lobe_angles(n), total, &on_sphere(frame, f_cosine))
+            };
+            // The table has four digits.
+            assert_holds(&what, scattered(n, 6e-5));
+            // Where few photons are left they tell less.
+            if incidence < 85.0 {
+                assert_complains(&format!("{what}: an exponent 10 % off"), scattered(1.1 * (n + 2.0) - 2.0, 1.0));
+            }
+            assert_holds(&what, share_check("survivors", u64::from(traced.tally.stored), u64::from(SAMPLES), colour * albedo));
+
+            // White: what is heavier than 1 keeps its flux, so that the flux that is left is the albedo.
+            if [0.5, 48_826.0].contains(&n) {
+                let traced = tracer.trace(&beam(glossy(1.0), incidence, false));
+                let flux: Vec<f64> = traced.survivors.iter().map(|path| f64::from(path.flux.x / traced.emitted[0].flux.x)).collect();
+                let trials = f64::from(SAMPLES);
+                let (sum, squares) = (flux.iter().sum::<f64>(), flux.iter().map(|flux| flux * flux).sum::<f64>());
+                let mean = sum / trials;
+                let error = ((squares / trials - mean * mean).max(0.0) / trials).sqrt().max(1e-5);
+                assert_holds(&what, z_check(&format!("{what}: flux"), mean, albedo, error));
+            }
+        }
+    }
+}
+
+/// Fresnel reflectance in f64, by Snell's law; 1 where nothing is transmitted.
+fn reflectance(cos_i: f64, eta: f64) -> f64 {
+    let sine_squared = eta * eta * (1.0 - cos_i * cos_i);
+    if sine_squared >= 1.0 {
+        return 1.0;
+    }
+    let cos_t = (1.0 - sine_squared).sqrt();
+    let (parallel, perpendicular) = ((cos_i - eta * cos_t) / (cos_i + eta * cos_t), (eta * cos_i - cos_t) / (eta * cos_i + cos_t));
+    0.5 * (parallel * parallel + perpendicular * perpendicular)
+}
+
+/// Shares and directions of what a smooth surface reflects and transmits, with eta = n_i / n_t.
+fn smooth_check(what: &str, traced: &Traced, eta: f64, reflectance: f64) -> Check {
+    let (wo, normal) = beam_at(traced);
+    let cos_i = wo.dot(normal);
+    let mirror = 2.0 * cos_i * normal - wo;
+    let cos_t = (1.0 - eta * eta * (1.0 - cos_i * cos_i)).max(0.0).sqrt();
+    let refracted = (eta * cos_i - cos_t) * normal - eta * wo;
+    let mut reflected_count = 0;
+    for path in &traced.survivors {
+        let wi = path.direction.as_dvec3();
+        let reflected = wi.dot(normal) > 0.0;
+        reflected_count += u64::from(reflected);
+        let off = (wi - if reflected { mirror } else { refracted }).length();
+        // The angle of what grazes the surface is known to the root of what its cosine's square is.
+        let bound = 8.0 * ULP / if reflected { 1.0 } else { cos_t.max(1e-3) };
+        if off > bound {
+            return Err(format!("{what}: {wi}, {off:e} off"));
+        }
+    }
+    if traced.survivors.len() as u32 != SAMPLES {
+        return Err(format!("{what}: {} of {SAMPLES} go on", traced.survivors.len()));
+    }
+    println!("{what}: {:.6} reflected, {reflectance:.6} expected", reflected_count as f64 / f64::from(SAMPLES));
+    if reflectance == 0.0 || reflectance == 1.0 {
+        let exact = u64::from(SAMPLES) * u64::from(reflectance == 1.0);
+        return if reflected_count == exact { Ok(()) } else { Err(format!("{what}: {reflected_count} reflected")) };
+    }
+    share_check(what, reflected_count, u64::from(SAMPLES), reflectance)
+}
+
+#[test]
+fn glass_reflects_by_fresnel_and_refracts_by_snell() {
+    let Some(gpu) = device() else { return };
+    let glass = |ior: f32| Material { surface: Surface::Dielectric { ior }, ..white() };
+    let outside = [0.0, 45.0, 56.31, 80.0, 89.0, 89.9].map(|incidence| (1.5f32, incidence, false));
+    // Total reflection begins at 41.81 degrees, with an index of 2.4 at 24.62.
+    let inside = [0.0, 30.0, 41.0, 41.7, 41.82, 60.0, 89.9].map(|incidence| (1.5f32, incidence, true));
+    let others =
+        [(2.4f32, 30.0, false), (2.4, 24.5, true), (2.4, 24.7, true), (1.0001, 89.9, false), (0.8, 40.0, false), (0.8, 60.0, false)];
+    for math in BOTH {
+        let tracer = Tracer { gpu: &gpu, math };
+        for (ior, incidence, from_behind) in outside.into_iter().chain(inside).chain(others) {
+            let what = format!("{math:?}, index {ior} at {incidence} degrees from {}", if from_behind { "within" } else { "without" });
+            let traced = tracer.trace(&beam(glass(ior), incidence, from_behind));
+            let (wo, normal) = beam_at(&traced);
+            let cos_i = wo.dot(normal);
+            let eta = if from_behind { f64::from(ior) } else { 1.0 / f64::from(ior) };
+            assert_holds(&what, smooth_check(&what, &traced, eta, reflectance(cos_i, eta)));
+            if ior == 1.5 && incidence > 0.0 {
+                assert_complains("an index upside down", smooth_check("fault", &traced, 1.0 / eta, reflectance(cos_i, 1.0 / eta)));
+            }
+        }
+        // An interface between equals is none, however it is met.
+        for incidence in [0.0, 60.0, 89.9, 89.99] {
+            let traced = tracer.trace(&beam(glass(1.0), incidence, false));
+            assert_holds(incidence, smooth_check(&format!("{math:?}, index 1 at {incidence} degrees"), &traced, 1.0, 0.0));
+        }
+        for incidence in [0.0, 60.0, 89.9] {
+            let traced = tracer.trace(&beam(Material { surface: Surface::Mirror, ..white() }, incidence, false));
+            assert_holds(incidence, smooth_check(&format!("{math:?}, mirror at {incidence} degrees"), &traced, 1.0, 1.0));
+        }
+        let dim = tracer.trace(&beam(Material { surface: Surface::Mirror, ..Material::lambert("dim", Vec3::splat(0.8)) }, 30.0, false));
+        assert_holds("a dim mirror", share_check("survivors", u64::from(dim.tally.stored), u64::from(SAMPLES), f64::from(0.8f32)));
+        assert_complains("a mirror 1 % brighter", share_check("fault", u64::from(dim.tally.stored), u64::from(SAMPLES), 0.808));
+    }
+}
+
+/// The first photons of seed 1 whose 24 bits of a word are all zeros, and all ones.
+fn edge_photons(block: u32, word: usize) -> [u32; 2] {
+    [0, 0x00ff_ffff].map(|bits| (0..u32::MAX).find(|photon| philox([*photon, 0, block, 0], [1, 0])[word] >> 8 == bits).unwrap())
+}
+
+/// The same words where photons draw them: one in 16 million does.
+#[test]
+fn photons_with_words_at_their_ends_fly_on() {
+    let Some(gpu) = device() else { return };
+    let tracer = Tracer { gpu: &gpu, math: Math::Fast };
+    let axis = AXIS.normalize();
+    let disc = |law| LightKind::Disc { centre: DVec3::ZERO, normal: axis, radius: 0.125, power: Vec3::ONE, law };
+    let spot =
+        LightKind::Spot { position: DVec3::ZERO, direction: axis, intensity: Vec3::ONE, inner_angle: 0.5, outer_angle: FRAC_PI_2 as f32 };
+    let mut lamp = lit(LightKind::Point { position: DVec3::ZERO, intensity: Vec3::ONE });
+    lamp.materials[0].emission = Vec3::ONE;
+    lamp.lights.clear();
+    let lights = [
+        ("lamp", lamp, DVec3::Y, 1e-4),
+        ("cosine disc", lit(disc(EmissionLaw::Cosine)), axis, 1e-4),
+        // Rounding of the frame may turn what all but lies in a surface into it.
+        ("uniform disc", lit(disc(EmissionLaw::Uniform)), axis, -2.0 * ULP),
+        ("spot", lit(spot), axis, -2.0 * ULP),
+        ("point", lit(LightKind::Point { position: DVec3::ZERO, intensity: Vec3::ONE }), DVec3::ZERO, -1.0),
+        ("sky", lit(LightKind::Environment { radiance: Vec3::ONE }), DVec3::ZERO, -1.0),
+    ];
+    for photon in [0, 1].into_iter().flat_map(|word| edge_photons(1, word)) {
+        for (what, scene, axis, least) in &lights {
+            let path = tracer.trace_photons(scene, (photon, 1)).emitted[0];
+            assert_holds(format!("photon {photon}"), is_unit(what, path.direction, 4.0 * ULP));
+            assert!(path.position.is_finite() && path.flux.min_element() > 0.0, "photon {photon}, {what}: {path:?}");
+            assert!(path.direction.as_dvec3().dot(*axis) > *least, "photon {photon}, {what}: {path:?}");
+        }
+    }
+    for photon in [2, 3].into_iter().flat_map(|word| edge_photons(EMISSION_BLOCKS, word)) {
+        for surface in [Surface::Lambert, Surface::Glossy { exponent: 0.5 }, Surface::Glossy { exponent: 48_826.0 }] {
+            let traced = tracer.trace_photons(&beam(Material { surface, ..white() }, 0.0, false), (photon, 1));
+            let what = format!("photon {photon} on {surface:?}");
+            // A wide lobe ends in the dark above the horizon.
+            assert!(traced.tally.stored == 1 || surface == Surface::Glossy { exponent: 0.5 }, "{what} ends");
+            for path in &traced.survivors {
+                assert_holds(&what, is_unit("onward", path.direction, 4.0 * ULP));
+                let cosine = path.direction.as_dvec3().dot(beam_at(&traced).1);
+                assert!(cosine > 1e-4 && path.position.is_finite(), "{what}: {path:?}");
+            }
+        }
+    }
+}
