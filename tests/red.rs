@@ -120,7 +120,7 @@ const FAULTS: [Fault; 18] = [
         from: "distance_squared <= push.radius * push.radius &&",
         to: "distance_squared <= 0.9801 * push.radius * push.radius &&",
         kernels: &["lookup_u64", "lookup_two_words"],
-        noticed_by: &[ClosedForm("furnace, Photons: irradiance")],
+        noticed_by: &[ClosedForm("furnace, Photons, Ballot: irradiance")],
     },
     Fault {
         what: "shadow rays count the cosine twice",
@@ -155,7 +155,7 @@ const FAULTS: [Fault; 18] = [
         from: "bucket_of(cell_at(photon.position, push), push)",
         to: "((bucket_of(cell_at(photon.position, push), push) + uint(index % 3u == 0u)) & push.bucket_mask)",
         kernels: &["map_scatter"],
-        noticed_by: &[ClosedForm("furnace, Photons: irradiance")],
+        noticed_by: &[ClosedForm("furnace, Photons, Ballot: irradiance")],
     },
     Fault {
         what: "one photon is sorted into the cell beside its own",
@@ -179,7 +179,7 @@ const FAULTS: [Fault; 18] = [
         from: "if (HAS_EDGE_CORRECTION) {",
         to: "if (false) {",
         kernels: &["resolve"],
-        noticed_by: &[ClosedForm("furnace, Photons: irradiance"), ClosedForm("sun-over-plane, Photons: irradiance")],
+        noticed_by: &[ClosedForm("furnace, Photons, Ballot: irradiance"), ClosedForm("sun-over-plane, Photons: irradiance")],
     },
     Fault {
         what: "rays start a fixed length off their surface",
@@ -195,7 +195,7 @@ const FAULTS: [Fault; 18] = [
         from: "if (u.x < reflectance) {",
         to: "if (u.x < 1.5 * reflectance) {",
         kernels: &["view"],
-        noticed_by: &[ClosedForm("glass slab: radiance")],
+        noticed_by: &[ClosedForm("glass slab, at 60 degrees: radiance")],
     },
     Fault {
         what: "strict quotients are cut instead of rounded",
