@@ -8,21 +8,17 @@ use std::f64::consts::PI;
 use std::sync::atomic::AtomicBool;
 
 use common::family::{FALSE_ALARM, Family, normal_p_value};
-use common::lit::{APPENDS, irradiances, level, matt, received, scene_of, shining};
+use common::lit::{APPENDS, irradiances, level, matt, received, scene, scene_of, shining};
 use common::radiosity::{cells_of, form_factor_from, on_wall};
 use common::{assert_complains, assert_holds, device};
 use glam::{DVec3, Vec3};
 use photonmill::scene::closed_forms::NAMES;
 use photonmill::scene::light::LightKind;
-use photonmill::scene::{Mesh, Scene, built_in};
+use photonmill::scene::{Mesh, Scene};
 use photonmill::selfcheck::measure::{irradiance, radiance};
 use photonmill::selfcheck::{self, Estimate, Finding};
 use photonmill::settings::EmissionLaw;
 use photonmill::settings::transport::{Illumination, TransportSettings};
-
-fn scene(name: &str) -> Scene {
-    built_in::by_name(name).unwrap_or_else(|| panic!("there is no scene {name}"))
-}
 
 /// Right within the error, and the error small enough for 1 % to be seen.
 fn check(finding: &Finding) {

@@ -6,7 +6,7 @@ mod common;
 use std::f64::consts::PI;
 use std::time::Instant;
 
-use common::lit::{mean_red, received, received_within, seen};
+use common::lit::{mean_red, received, received_within, scene, seen};
 use common::{
     Check, Device, assert_complains, assert_holds, device, device_with, equal_sums, photons_on_cpu, plan_for, plan_for_host,
     relative_check, run, run_on_cpu, run_scene, run_scene_on_cpu, share_check, z_check,
@@ -22,12 +22,12 @@ use photonmill::records::{MapPhoton, Photon, Tally};
 use photonmill::render::constants;
 use photonmill::resources::Resources;
 use photonmill::rng::Rng;
+use photonmill::scene::Scene;
 use photonmill::scene::geometry::Geometry;
 use photonmill::scene::light::{Light, LightKind};
 use photonmill::scene::open_box::open_box;
 use photonmill::scene::rectangle::disc_rectangle_area;
 use photonmill::scene::room::Wall;
-use photonmill::scene::{Scene, built_in};
 use photonmill::selfcheck::measure::irradiance;
 use photonmill::settings::transport::{Illumination, Kernel, TransportSettings};
 use photonmill::settings::{EmissionLaw, Gather, MAX_EVENTS, Settings, Variant};
@@ -36,10 +36,6 @@ use photonmill::{estimate, index};
 
 /// Half of an f32's spacing below 1.
 const U: f64 = 1.0 / 16_777_216.0;
-
-fn scene(name: &str) -> Scene {
-    built_in::by_name(name).unwrap_or_else(|| panic!("there is no scene {name}"))
-}
 
 /// Film sums of a photon list that is gathered again and again.
 fn gathered(gpu: &Device, settings: &Settings, photons: &[Photon], times: u32) -> Vec<u64> {

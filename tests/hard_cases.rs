@@ -1,6 +1,6 @@
-//! Hard cases of geometry and materials: whatever is done to a scene that should not change its light does not,
-//! and extremes stay finite and right. `tests/random_numbers.rs` and `tests/extremes.rs` do the same for random
-//! numbers, and for sums, estimates and sizes.
+//! Hard cases of geometry: whatever is done to a scene that should not change its light does not, and no light is lost
+//! or leaks. `tests/hard_materials.rs`, `tests/random_numbers.rs` and `tests/extremes.rs` do the same for materials,
+//! random numbers, and for sums, estimates and sizes.
 //!
 //! # Which test shows what
 //!
@@ -114,29 +114,22 @@ mod common;
 use std::collections::HashSet;
 use std::f64::consts::PI;
 
-use common::lit::{mean_red, received, seen};
-use common::{Check, assert_complains, assert_holds, device, relative_check, share_check, z_check};
+use common::lit::{flights, lamp, mean_red, received, same_light, scene, seen};
+use common::{Check, assert_complains, assert_holds, device, relative_check, z_check};
 use glam::{DQuat, DVec2, DVec3, Vec3};
-use photonmill::gpu::Gpu;
 use photonmill::plan::Plan;
 use photonmill::plan::transport::{Sensor, TransportPlan};
 use photonmill::scene::geometry::Geometry;
 use photonmill::scene::light::{Light, LightKind};
 use photonmill::scene::open_box::open_box;
-use photonmill::scene::{Camera, Material, Mesh, Scene, Surface, built_in};
-use photonmill::selfcheck::Estimate;
+use photonmill::scene::{Camera, Material, Mesh, Scene, built_in};
 use photonmill::selfcheck::measure::{irradiance, radiance};
-use photonmill::settings::transport::{Effect, Illumination, Part, TransportSettings};
+use photonmill::settings::transport::{Effect, Illumination, TransportSettings};
 use photonmill::settings::{EmissionLaw, Settings, Variant};
 use photonmill::transport::Lit;
 
 fn settings() -> TransportSettings {
     TransportSettings { photons: 4000, caustic_photons: 4000, rounds: 2, shadow_rays: 8, ..TransportSettings::default() }
-}
-
-/// Two independent estimates of one light.
-fn same_light(what: &str, found: Estimate, expected: Estimate) -> Check {
-    z_check(what, found.mean, expected.mean, found.standard_error.hypot(expected.standard_error).max(1e-5 * expected.mean.abs()))
 }
 
 fn cornell() -> Scene {
@@ -216,58 +209,6 @@ fn how_a_wall_is_cut_does_not_change_its_light() {
     assert_holds("every triangle twice", same_light("every triangle twice", doubled, expected));
 }
 
-/// A lamp and a glass pane in a room: an index of refraction of 1 is no pane.
-fn behind_a_pane(ior: Option<f32>) -> Scene {
-    let mut scene = cornell();
-    if let Some(ior) = ior {
-        scene.materials.push(Material { surface: Surface::Dielectric { ior }, ..Material::lambert("pane", Vec3::ONE) });
-        let pane = scene.materials.len() - 1;
-        let (x, z) = (DVec3::X, DVec3::Z);
-        scene.meshes.push(Mesh::parallelogram("above", DVec3::new(0.0, 0.97, 0.0), z, x, pane));
-        scene.meshes.push(Mesh::parallelogram("below", DVec3::new(0.0, 0.96, 0.0), x, z, pane));
-    }
-    scene
-}
-
-#[test]
-fn glass_of_the_air_s_own_index_is_not_there() {
-    let Some(gpu) = device() else { return };
-    // A wide radius: all direct light comes as a caustic now.
-    let settings = TransportSettings { photons: 30_000, caustic_photons: 30_000, caustic_radius: Some(0.08), ..settings() };
-    let expected = irradiance(&gpu, &behind_a_pane(None), &settings, &POINTS).unwrap();
-    for ior in [1.0, 1.0 + 1e-6] {
-        let found = irradiance(&gpu, &behind_a_pane(Some(ior)), &TransportSettings { seed: 97, ..settings.clone() }, &POINTS).unwrap();
-        // The wide radius blurs the light by a per cent or so.
-        let found = Estimate { standard_error: found.standard_error.hypot(0.01 * expected.mean), ..found };
-        assert_holds(ior, same_light(&format!("index {ior}"), found, expected));
-    }
-    let found = irradiance(&gpu, &behind_a_pane(Some(2.5)), &settings, &POINTS).unwrap();
-    assert_complains("an index of 2.5", same_light("index 2.5", found, expected));
-}
-
-/// The furnace at the ends of reflectance and of bounces.
-#[test]
-fn reflectances_and_bounces_at_their_ends_are_right() {
-    let Some(gpu) = device() else { return };
-    let furnace = |albedo: f32| {
-        let mut scene = built_in::by_name("furnace").unwrap();
-        scene.materials[0].base_colour = Vec3::splat(albedo);
-        scene
-    };
-    let points = [(DVec3::new(0.5, 0.0, 0.5), DVec3::Y), (DVec3::new(0.2, 0.0, 0.999), DVec3::Y)];
-    let ask = |gpu: &Gpu, albedo, bounces| {
-        let settings = TransportSettings { bounces, radius: Some(0.2), alpha: 1.0, illumination: Illumination::Photons, ..settings() };
-        irradiance(gpu, &furnace(albedo), &settings, &points).unwrap()
-    };
-    // b landings: 1 + rho + ... + rho^(b - 1) times pi.
-    for (albedo, bounces, exact) in [(0.0, 32, PI), (1.0, 1, PI), (1.0, 7, 7.0 * PI), (0.9, 1000, 10.0 * PI), (0.5, 2, 1.5 * PI)] {
-        let Estimate { mean, standard_error } = ask(&gpu, albedo, bounces);
-        let what = format!("albedo {albedo}, {bounces} bounces");
-        assert!(standard_error < 0.05 * exact, "{what}: error {standard_error}");
-        assert_holds(&what, z_check(&what, mean, exact, standard_error));
-    }
-}
-
 /// A lamp flush with a wall lights what faces it, and neither its wall nor what lies behind.
 #[test]
 fn a_light_flush_with_a_wall_shines_into_the_room() {
@@ -289,26 +230,6 @@ fn a_light_flush_with_a_wall_shines_into_the_room() {
         let settings = TransportSettings { illumination, bounces: 1, ..settings() };
         let beside = irradiance(&gpu, &scene, &settings, &[(DVec3::X * 0.3, DVec3::Y)]).unwrap();
         assert_eq!(beside.mean, 0.0, "{illumination:?}: the lamp's own wall");
-    }
-}
-
-fn scene(name: &str) -> Scene {
-    built_in::by_name(name).unwrap_or_else(|| panic!("there is no scene {name}"))
-}
-
-fn light(kind: LightKind) -> Light {
-    Light { name: "light".into(), kind }
-}
-
-/// Maps alone, of a radius so small that looking them up takes no time.
-fn flights(photons: u32, bounces: u32) -> TransportSettings {
-    TransportSettings {
-        photons,
-        bounces,
-        rounds: 1,
-        radius: Some(1.0 / 1024.0),
-        illumination: Illumination::Photons,
-        ..TransportSettings::default()
     }
 }
 
@@ -394,7 +315,7 @@ fn every_operation_is_rounded_by_itself() {
 fn aimed_at(places: &[DVec3], from: DVec3) -> Vec<Light> {
     let spot = |place: &DVec3| {
         let direction = (*place - from).normalize();
-        light(LightKind::Spot { position: from, direction, intensity: Vec3::splat(1e7), inner_angle: 3.5e-4, outer_angle: 3.5e-4 })
+        lamp(LightKind::Spot { position: from, direction, intensity: Vec3::splat(1e7), inner_angle: 3.5e-4, outer_angle: 3.5e-4 })
     };
     places.iter().map(spot).collect()
 }
@@ -483,7 +404,7 @@ fn none_returns(what: &str, lit: &Lit) -> Check {
 #[test]
 fn photons_leave_a_surface_once_and_for_all() {
     let Some(gpu) = device() else { return };
-    let sun = |direction: DVec3| light(LightKind::Directional { direction: direction.normalize(), irradiance: Vec3::ONE });
+    let sun = |direction: DVec3| lamp(LightKind::Directional { direction: direction.normalize(), irradiance: Vec3::ONE });
     let tilts = [DQuat::IDENTITY, DQuat::from_axis_angle(DVec3::new(0.3, 0.5, -0.8).normalize(), 1.1), DQuat::from_rotation_z(1e-4)];
     for (number, tilt) in tilts.into_iter().enumerate() {
         for cells in [1, 40] {
@@ -510,7 +431,7 @@ fn photons_leave_a_surface_once_and_for_all() {
         assert_holds(segments, none_returns(&format!("ball of {segments} segments"), &lit));
         // A bowl sees itself.
         ball.meshes[0].triangles.iter_mut().for_each(|triangle| triangle.swap(1, 2));
-        ball.lights = vec![light(LightKind::Point { position: DVec3::new(0.2, 0.7, -0.4), intensity: Vec3::ONE })];
+        ball.lights = vec![lamp(LightKind::Point { position: DVec3::new(0.2, 0.7, -0.4), intensity: Vec3::ONE })];
         let lit = received(&gpu, &ball, &flights(100_000, 2), &[(DVec3::new(0.2, -0.2, -0.4), DVec3::Y)]);
         assert_complains("the inside of a ball", none_returns("bowl", &lit));
     }
@@ -520,7 +441,7 @@ fn photons_leave_a_surface_once_and_for_all() {
 fn lit_and_dark_room(wall: impl Fn(&mut Scene)) -> Scene {
     let mut rooms = closed_room(0.7);
     rooms.materials.push(Material { two_sided: true, ..Material::lambert("sheet", Vec3::splat(0.7)) });
-    rooms.lights = vec![light(LightKind::Point { position: DVec3::new(0.2, 0.6, 0.4), intensity: Vec3::ONE })];
+    rooms.lights = vec![lamp(LightKind::Point { position: DVec3::new(0.2, 0.6, 0.4), intensity: Vec3::ONE })];
     wall(&mut rooms);
     rooms
 }
@@ -579,7 +500,7 @@ fn a_lit_floor_does_not_light_the_foot_of_the_wall() {
     let Some(gpu) = device() else { return };
     let mut corner = scene("sun-over-plane");
     corner.materials[0].base_colour = Vec3::ZERO;
-    corner.lights = vec![light(LightKind::Directional { direction: DVec3::NEG_Y, irradiance: Vec3::ONE })];
+    corner.lights = vec![lamp(LightKind::Directional { direction: DVec3::NEG_Y, irradiance: Vec3::ONE })];
     corner.meshes.push(Mesh::parallelogram("wall", DVec3::new(-2.0, 0.0, -2.0), DVec3::Y * 2.0, DVec3::Z * 4.0, 0));
     for illumination in [Illumination::Split, Illumination::Photons] {
         let settings =
@@ -600,23 +521,23 @@ fn scaled_cornell(k: i32) -> (Scene, Vec<(DVec3, DVec3)>) {
     let (mut scene, points) = moved(cornell(), factor, DVec3::ZERO);
     let up = DVec3::new(0.5, 0.6, 0.5) * factor;
     scene.lights = vec![
-        light(LightKind::Point { position: up, intensity: Vec3::splat(0.5) * strength }),
-        light(LightKind::Spot {
+        lamp(LightKind::Point { position: up, intensity: Vec3::splat(0.5) * strength }),
+        lamp(LightKind::Spot {
             position: up,
             direction: DVec3::NEG_Y,
             intensity: Vec3::splat(6.0) * strength,
             inner_angle: 0.3,
             outer_angle: 0.6,
         }),
-        light(LightKind::Directional { direction: DVec3::new(0.0, -0.3, -1.0).normalize(), irradiance: Vec3::splat(0.7) }),
-        light(LightKind::Disc {
+        lamp(LightKind::Directional { direction: DVec3::new(0.0, -0.3, -1.0).normalize(), irradiance: Vec3::splat(0.7) }),
+        lamp(LightKind::Disc {
             centre: DVec3::new(0.5, 0.0, 0.8) * factor,
             normal: DVec3::Y,
             radius: 0.05 * factor,
             power: Vec3::splat(2.0) * strength,
             law: EmissionLaw::Uniform,
         }),
-        light(LightKind::Environment { radiance: Vec3::splat(0.1) }),
+        lamp(LightKind::Environment { radiance: Vec3::splat(0.1) }),
     ];
     (scene, points)
 }
@@ -708,8 +629,8 @@ fn axis_parallel_rays_meet_the_same_by_tree_and_list() {
     let Some(gpu) = device() else { return };
     let mut room = cornell();
     room.materials.iter_mut().for_each(|material| material.emission = Vec3::ZERO);
-    let sun = |direction| light(LightKind::Directional { direction, irradiance: Vec3::ONE });
-    let flush = |centre, normal| light(LightKind::Disc { centre, normal, radius: 0.3, power: Vec3::ONE, law: EmissionLaw::Uniform });
+    let sun = |direction| lamp(LightKind::Directional { direction, irradiance: Vec3::ONE });
+    let flush = |centre, normal| lamp(LightKind::Disc { centre, normal, radius: 0.3, power: Vec3::ONE, law: EmissionLaw::Uniform });
     room.lights = [DVec3::X, DVec3::Y, DVec3::Z].into_iter().flat_map(|axis| [sun(axis), sun(-axis)]).collect();
     room.lights.extend([flush(DVec3::new(0.5, 0.0, 0.5), DVec3::Y), flush(DVec3::new(0.0, 0.5, 0.5), DVec3::X)]);
     let lit = |with: &[Effect], without: &[Effect], room: &Scene| {
@@ -738,7 +659,7 @@ fn flat_doubled_and_reordered_triangles_change_no_bit() {
     // A lamp that is no mesh: numbers choose it alike in whatever order triangles come.
     let mut plain = cornell();
     plain.materials.iter_mut().for_each(|material| material.emission = Vec3::ZERO);
-    plain.lights = vec![light(LightKind::Point { position: DVec3::new(0.4, 0.8, 0.6), intensity: Vec3::ONE })];
+    plain.lights = vec![lamp(LightKind::Point { position: DVec3::new(0.4, 0.8, 0.6), intensity: Vec3::ONE })];
     let settings = TransportSettings { photons: 20_000, rounds: 2, ..TransportSettings::default() };
     let of = |spoil: &dyn Fn(&mut Mesh)| {
         let mut scene = plain.clone();
@@ -777,7 +698,7 @@ fn two_sheets_at_one_place_show_each_its_own_side() {
     let tilt = DQuat::from_axis_angle(DVec3::new(0.3, 0.5, -0.8).normalize(), 1.1);
     let sheet = |name, a: DVec3, b: DVec3, material| Mesh::parallelogram(name, tilt * (-0.5 * (u + v)), tilt * a, tilt * b, material);
     let faces = [sheet("above", v, u, 0), sheet("below", u, v, 1)];
-    let sun = |y: f64| light(LightKind::Directional { direction: tilt * DVec3::new(0.0, y, 0.0), irradiance: Vec3::ONE });
+    let sun = |y: f64| lamp(LightKind::Directional { direction: tilt * DVec3::new(0.0, y, 0.0), irradiance: Vec3::ONE });
     sheets.lights = vec![sun(-1.0), sun(1.0)];
     let settings = TransportSettings { shadow_rays: 8, ..settings() };
     let mut complaints = Vec::new();
@@ -869,249 +790,6 @@ fn a_furnace_glows_alike_however_it_is_turned() {
             assert!(found.standard_error < 0.1, "{found:?}");
             assert_holds(format!("{e}, {normal}"), z_check("irradiance", found.mean, 2.0 * PI, found.standard_error));
         }
-    }
-}
-
-/// Three channels of their own reflectance: each is a series of its own, and roulette by the brightest is repaid.
-#[test]
-fn each_channel_has_its_own_reflectance() {
-    let Some(gpu) = device() else { return };
-    for colour in [Vec3::new(0.9, 0.1, 0.1), Vec3::new(0.1, 0.9, 0.1), Vec3::new(0.5, 0.5, 0.9)] {
-        let mut furnace = scene("furnace");
-        furnace.materials[0].base_colour = colour;
-        let settings = TransportSettings {
-            photons: 8000,
-            bounces: 300,
-            radius: Some(0.5),
-            alpha: 1.0,
-            illumination: Illumination::Photons,
-            ..settings()
-        };
-        let exact = PI / (1.0 - f64::from(colour.x));
-        let found = irradiance(&gpu, &furnace, &settings, &[(DVec3::new(0.5, 0.0, 0.5), DVec3::Y)]).unwrap();
-        assert!(found.standard_error < 0.02 * exact, "{colour}: {found:?}");
-        assert_holds(colour, z_check("red", found.mean, exact, found.standard_error));
-        let grey = PI / (1.0 - f64::from(colour.element_sum()) / 3.0);
-        assert_complains("their mean", z_check("red", found.mean, grey, found.standard_error));
-    }
-}
-
-fn plate(surface: Surface, lights: Vec<Light>) -> Scene {
-    let mut plate = scene("sky-over-plane");
-    plate.materials[0] = Material { surface, ..Material::lambert("plate", Vec3::ONE) };
-    plate.lights = lights;
-    plate
-}
-
-fn towards(angle: f64) -> DVec3 {
-    DVec3::new(angle.sin(), angle.cos(), 0.0)
-}
-
-/// Share of an even sky that a lobe (n + 2) / (2 pi) cos^n sends to an eye at 0, 30, 60 and 80 degrees: what lies
-/// below the horizon is lost. By quadrature.
-#[test]
-fn lobes_reflect_what_lies_above_the_horizon() {
-    let Some(gpu) = device() else { return };
-    let table = [
-        (0.01, [1.0, 0.9318, 0.7472, 0.5835]),
-        (0.5, [1.0, 0.8956, 0.6560, 0.4711]),
-        (2.0, [1.0, 0.8705, 0.5625, 0.3444]),
-        (5.0, [1.0, 0.8663, 0.5194, 0.2693]),
-    ];
-    let sky = || vec![light(LightKind::Environment { radiance: Vec3::ONE })];
-    for (exponent, albedos) in table {
-        for (degrees, albedo) in [0.0f64, 30.0, 60.0, 80.0].into_iter().zip(albedos) {
-            let settings = TransportSettings { photons: 1, rounds: 1, shadow_rays: 32, ..settings() };
-            let eye = towards(degrees.to_radians());
-            let found = radiance(&gpu, plate(Surface::Glossy { exponent }, sky()), &settings, eye, DVec3::ZERO).unwrap();
-            // The table has four digits.
-            let error = found.standard_error.hypot(5e-5);
-            println!("exponent {exponent}, {degrees} degrees: {:.4} +- {:.4}, expected {albedo}", found.mean, found.standard_error);
-            assert!(found.standard_error < 0.01, "{found:?}");
-            assert_holds(format!("exponent {exponent}, {degrees} degrees"), z_check("albedo", found.mean, albedo, error));
-            assert!(found.mean <= 1.0 + 5.0 * error, "more light than there is");
-            assert_complains(
-                "(n + 1) in place of (n + 2)",
-                z_check("albedo", found.mean, albedo * f64::from((exponent + 1.0) / (exponent + 2.0)), error),
-            );
-        }
-    }
-}
-
-/// Light of a narrow beam that a lobe throws onto a screen at unit distance: the share within a radius h is
-/// 1 - cos^(n + 2), of the angle whose tangent is h. The least roughness that is no mirror has n = 48 826.
-#[test]
-fn lobes_of_any_width_throw_their_share() {
-    let Some(gpu) = device() else { return };
-    // Half of the beam is 3.45e-4 off its axis, beside a lobe 6.4e-3 wide at the last exponent: 0.1 % of the light.
-    for (exponent, tolerance) in [(0.0, 0.0), (5.0, 0.0), (100.0, 0.0), (1e4, 0.0), (48_826.0, 0.001)] {
-        let n = f64::from(exponent);
-        // Half of the light within h.
-        let cosine = 0.5f64.powf(1.0 / (n + 2.0));
-        let h = (1.0 - cosine * cosine).sqrt() / cosine;
-        let spot = LightKind::Spot {
-            position: DVec3::Y * 0.9,
-            direction: DVec3::NEG_Y,
-            intensity: Vec3::splat(1e7),
-            inner_angle: 3.5e-4,
-            outer_angle: 3.5e-4,
-        };
-        let watts = 2.0 * PI * (1.0 - f64::from(3.5e-4f32).cos()) * 1e7;
-        let mut bench = plate(Surface::Glossy { exponent }, vec![light(spot)]);
-        bench.materials.push(Material::lambert("screen", Vec3::ZERO));
-        bench.meshes.push(Mesh::parallelogram("screen", DVec3::new(-2.0, 1.0, -2.0), DVec3::X * 4.0, DVec3::Z * 4.0, 1));
-        let settings = TransportSettings { photons: 20_000, bounces: 2, radius: Some(h), alpha: 1.0, ..settings() };
-        let found = irradiance(&gpu, &bench, &settings, &[(DVec3::Y, DVec3::NEG_Y)]).unwrap();
-        let expected = 0.5 * watts / (PI * h * h);
-        let error = found.standard_error.hypot(tolerance * expected);
-        println!("exponent {exponent}: {:.5} +- {:.5} of the expected", found.mean / expected, found.standard_error / expected);
-        assert!(found.standard_error < 0.02 * expected, "{found:?}");
-        assert_holds(exponent, z_check("within h", found.mean, expected, error));
-        assert_complains("a lobe a fifth wider", z_check("within h", found.mean, expected * (1.0 - 0.5f64.powf(1.0 / 1.44)) / 0.5, error));
-    }
-}
-
-/// The sun in a plate: albedo E cos / pi by cos^n of the angle off the mirror direction, by each of the paper's
-/// exponents and both models; behind the lobe there is nothing.
-#[test]
-fn a_sun_in_a_plate_is_a_power_of_the_cosine() {
-    let Some(gpu) = device() else { return };
-    let incidence = PI / 4.0;
-    let sun = || vec![light(LightKind::Directional { direction: -towards(incidence), irradiance: Vec3::splat(2.0) })];
-    let mut worst = [0.0f64; 2];
-    for exponent in [0.0f32, 0.01, 0.5, 2.0, 5.0, 1e4] {
-        let n = f64::from(exponent);
-        for (surface, scale) in [(Surface::PaperPhong { exponent }, 1.0 / PI), (Surface::Glossy { exponent }, (n + 2.0) / (2.0 * PI))] {
-            for off in [0.0, 0.005, 0.02, 0.5, 0.7, -0.5, 1.2, 1.6, 2.0] {
-                // From the mirror direction over the normal towards the sun.
-                let eye = towards(-incidence + off);
-                if eye.y < 0.05 {
-                    continue;
-                }
-                let camera = Camera::looking_at("eye", eye, DVec3::ZERO, DVec3::Z, 1e-5);
-                let settings =
-                    TransportSettings { photons: 1, rounds: 1, shadow_rays: 1, part: Part::Direct, ..TransportSettings::default() };
-                let lit = seen(&gpu, &plate(surface, sun()), &settings, &camera, [4, 4]);
-                let found = mean_red(&lit);
-                let what = format!("{surface:?}, {off} off");
-                if off > PI / 2.0 {
-                    assert_eq!(found, 0.0, "{what}");
-                    continue;
-                }
-                let exact = 2.0 * incidence.cos() * scale * off.cos().powf(n);
-                if exact < 1e-4 {
-                    assert!(found < 2e-4, "{what}: {found}");
-                    continue;
-                }
-                // A cosine in f32 is off by u, which the exponent multiplies; log2 may be off by 2^-21.
-                let (place, allowed) = if n > 5.0 { (1, 5e-3) } else { (0, 5e-5) };
-                worst[place] = worst[place].max((found / exact - 1.0).abs());
-                assert_holds(&what, relative_check(&what, found, exact, allowed));
-                assert_complains("1 % more", relative_check(&what, 1.01 * found, exact, allowed));
-            }
-        }
-    }
-    println!("relative error up to {:.1e}, at exponent 1e4 {:.1e}", worst[0], worst[1]);
-}
-
-/// Reflectance of a boundary for unpolarised light, in f64.
-fn fresnel(cos_i: f64, eta: f64) -> f64 {
-    let k = 1.0 - eta * eta * (1.0 - cos_i * cos_i);
-    if k <= 0.0 {
-        return 1.0;
-    }
-    let cos_t = k.sqrt();
-    let parallel = (cos_i - eta * cos_t) / (cos_i + eta * cos_t);
-    let perpendicular = (eta * cos_i - cos_t) / (eta * cos_i + cos_t);
-    0.5 * (parallel * parallel + perpendicular * perpendicular)
-}
-
-/// A surface of glass, 4 m wide, under an even sky and `depth` over a black ground that catches what goes through.
-fn over_glass(ior: f32, depth: f64) -> Scene {
-    let mut scene = plate(Surface::Dielectric { ior }, vec![light(LightKind::Environment { radiance: Vec3::ONE })]);
-    scene.materials.push(Material::lambert("ground", Vec3::ZERO));
-    scene.meshes.push(Mesh::parallelogram("ground", DVec3::new(-40.0, -depth, -40.0), DVec3::Z * 80.0, DVec3::X * 80.0, 1));
-    scene
-}
-
-/// Radiance along one ray and the number of samples.
-fn along(gpu: &Gpu, scene: &Scene, eye: DVec3) -> (f64, f64) {
-    let camera = Camera::looking_at("ray", eye, DVec3::ZERO, DVec3::Z, 1e-6);
-    let settings = TransportSettings { photons: 1, caustic_photons: 1, rounds: 4, part: Part::Specular, ..TransportSettings::default() };
-    let lit = seen(gpu, scene, &settings, &camera, [64, 64]);
-    (mean_red(&lit), 4.0 * 64.0 * 64.0)
-}
-
-/// From outside, up to the horizon: F = 0.04, 0.38770, 0.90418, 0.98991, 0.99899 at 0, 80, 89, 89.9 and 89.99 degrees.
-#[test]
-fn glass_reflects_by_fresnel_up_to_the_horizon() {
-    let Some(gpu) = device() else { return };
-    for (degrees, printed) in [(0.0f64, 0.04), (80.0, 0.387_70), (89.0, 0.904_18), (89.9, 0.989_91), (89.99, 0.998_99)] {
-        let reflectance = fresnel(degrees.to_radians().cos(), 1.0 / 1.5);
-        assert!((reflectance - printed).abs() < 1e-5, "{degrees} degrees: {reflectance}");
-        let (found, samples) = along(&gpu, &over_glass(1.5, 0.25), towards(degrees.to_radians()));
-        let error = (reflectance * (1.0 - reflectance) / samples).sqrt();
-        println!("{degrees} degrees: {found:.5}, expected {reflectance:.5} +- {error:.5}");
-        assert_holds(degrees, z_check("reflectance", found, reflectance, error));
-        let other = fresnel(degrees.to_radians().cos(), 1.0 / 2.5);
-        let error = (other * (1.0 - other) / samples).sqrt();
-        if degrees <= 80.0 {
-            assert_complains("diamond", z_check("reflectance", found, other, error));
-        }
-    }
-}
-
-/// From inside, around the critical angle of 41.8103 degrees: radiance n^2 (1 - F) below it, nothing beyond.
-#[test]
-fn total_reflection_begins_at_the_critical_angle() {
-    let Some(gpu) = device() else { return };
-    for degrees in [0.0f64, 30.0, 41.0, 41.8, 41.809, 41.82, 45.0, 60.0] {
-        let (found, samples) = along(&gpu, &over_glass(1.5, 0.25), towards(degrees.to_radians()) * DVec3::new(0.2, -0.2, 0.2));
-        if degrees > 41.8103 {
-            assert_eq!(found, 0.0, "{degrees} degrees");
-            continue;
-        }
-        let passed = 1.0 - fresnel(degrees.to_radians().cos(), 1.5);
-        let error = 2.25 * (passed * (1.0 - passed) / samples).sqrt();
-        println!("{degrees} degrees: {found:.5}, expected {:.5} +- {error:.5}", 2.25 * passed);
-        assert_holds(degrees, z_check("radiance", found, 2.25 * passed, error));
-        assert_complains("no n^2", z_check("radiance", found, passed, error));
-    }
-}
-
-/// An index of 1 is no surface: whatever the angle, nothing is reflected and everything goes through unturned.
-#[test]
-fn an_index_of_one_reflects_nothing_at_any_angle() {
-    let Some(gpu) = device() else { return };
-    let mut complaints = Vec::new();
-    for degrees in [0.0f64, 60.0, 89.0, 89.9, 89.99, 89.999] {
-        let (found, _) = along(&gpu, &over_glass(1.0, 1.0 / 4096.0), towards(degrees.to_radians()));
-        if found != 0.0 {
-            complaints.push(format!("at {degrees} degrees {found} is reflected"));
-        }
-    }
-    assert!(complaints.is_empty(), "{}", complaints.join("; "));
-}
-
-/// Diffuse light that meets glass: 0.4036542 of it leaves, 0.9082220 enters, n^2 times as much; flux is not scaled.
-#[test]
-fn diffuse_light_crosses_glass_by_its_mean_transmittance() {
-    let Some(gpu) = device() else { return };
-    let disc = |height: f64, normal| {
-        light(LightKind::Disc { centre: DVec3::Y * height, normal, radius: 0.01, power: Vec3::ONE, law: EmissionLaw::Cosine })
-    };
-    for (what, height, normal, expected) in [("leaving", -0.1, DVec3::Y, 0.403_654_2), ("entering", 0.1, DVec3::NEG_Y, 0.908_222_0)] {
-        let mut scene = plate(Surface::Dielectric { ior: 1.5 }, vec![disc(height, normal)]);
-        // So wide that one photon in a hundred thousand misses it.
-        scene.meshes[0].positions.iter_mut().for_each(|at| *at *= 16.0);
-        scene.materials.push(Material::lambert("ground", Vec3::ZERO));
-        scene.meshes.push(Mesh::parallelogram("ground", DVec3::new(-400.0, -0.25, -400.0), DVec3::Z * 800.0, DVec3::X * 800.0, 1));
-        let settings = TransportSettings { radius: None, ..flights(400_000, 2) };
-        let fates = received(&gpu, &scene, &settings, &[(DVec3::Y * -0.25, DVec3::Y)]).fates[0].clone();
-        let through = if height < 0.0 { fates.bounces[1].escaped } else { fates.bounces[1].absorbed };
-        println!("{what}: {} passes, expected {expected}", through as f64 / fates.emitted as f64);
-        assert_holds(what, share_check(what, through, fates.emitted, expected));
-        assert_complains("flux over n^2", share_check(what, through, fates.emitted, expected / 2.25));
     }
 }
 

@@ -3,7 +3,7 @@
 
 mod common;
 
-use common::lit::{light, received};
+use common::lit::{light, received, scene};
 use common::{Check, assert_complains, assert_holds, device, device_with, z_check};
 use glam::{DVec3, Vec3};
 use photonmill::gpu::{Gpu, Options};
@@ -12,7 +12,7 @@ use photonmill::plan::transport::{Sensor, TransportPlan};
 use photonmill::render;
 use photonmill::scene::geometry::Geometry;
 use photonmill::scene::light::{Light, LightKind};
-use photonmill::scene::{Camera, Material, Mesh, Scene, Surface, built_in};
+use photonmill::scene::{Camera, Material, Mesh, Scene, Surface};
 use photonmill::settings::EmissionLaw;
 use photonmill::settings::transport::{Append, Effect, Illumination, Kernel, Part, TransportSettings};
 use photonmill::transport::{self, Lit, View};
@@ -50,10 +50,6 @@ fn same_film(what: &str, found: &Lit, expected: &Lit) -> Check {
     }
     let differing = found.film.sums.iter().zip(&expected.film.sums).filter(|(a, b)| a != b).count();
     Err(format!("{what}: {differing} of {} sums differ", found.film.sums.len()))
-}
-
-fn scene(name: &str) -> Scene {
-    built_in::by_name(name).unwrap_or_else(|| panic!("there is no scene {name}"))
 }
 
 #[test]

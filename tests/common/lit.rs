@@ -10,9 +10,12 @@ use photonmill::records::Receiver;
 use photonmill::render::{self, Control};
 use photonmill::scene::geometry::Geometry;
 use photonmill::scene::light::LightKind;
-use photonmill::scene::{Camera, Light, Material, Mesh, Scene, Surface};
+use photonmill::scene::{Camera, Light, Material, Mesh, Scene, Surface, built_in};
+use photonmill::selfcheck::Estimate;
 use photonmill::settings::transport::{Append, Illumination, TransportSettings};
 use photonmill::transport::{self, Lit, View};
+
+use super::{Check, z_check};
 
 /// Builders of a map of a scene of triangles.
 pub const APPENDS: [Append; 2] = [Append::Atomic, Append::Ballot];
@@ -124,4 +127,31 @@ pub fn shaft(bottom: f64, top: f64, material: usize) -> Vec<Mesh> {
 pub fn grid(height: f64, normal: DVec3, n: usize) -> Vec<(DVec3, DVec3)> {
     let place = |i: usize| (i as f64 + 0.5) / n as f64 - 0.5;
     (0..n * n).map(|k| (DVec3::new(place(k % n), height, place(k / n)), normal)).collect()
+}
+
+/// A built-in scene.
+pub fn scene(name: &str) -> Scene {
+    built_in::by_name(name).unwrap_or_else(|| panic!("there is no scene {name}"))
+}
+
+/// A light without a name of its own.
+pub fn lamp(kind: LightKind) -> Light {
+    Light { name: "light".into(), kind }
+}
+
+/// Maps alone, of a radius so small that looking them up takes no time.
+pub fn flights(photons: u32, bounces: u32) -> TransportSettings {
+    TransportSettings {
+        photons,
+        bounces,
+        rounds: 1,
+        radius: Some(1.0 / 1024.0),
+        illumination: Illumination::Photons,
+        ..TransportSettings::default()
+    }
+}
+
+/// Two independent estimates of one light.
+pub fn same_light(what: &str, found: Estimate, expected: Estimate) -> Check {
+    z_check(what, found.mean, expected.mean, found.standard_error.hypot(expected.standard_error).max(1e-5 * expected.mean.abs()))
 }
