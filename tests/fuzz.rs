@@ -10,10 +10,12 @@ use std::time::{Duration, Instant};
 use base64::Engine;
 use base64::engine::general_purpose::STANDARD as BASE64;
 use glam::Vec3;
-use photonmill::plan::Limits;
 use photonmill::plan::transport::{Sensor, TransportPlan};
+use photonmill::plan::{Limits, Plan, photons_of};
 use photonmill::scene::Scene;
 use photonmill::scene::geometry::Geometry;
+use photonmill::scene::open_box::open_box;
+use photonmill::settings::Settings;
 use photonmill::settings::transport::TransportSettings;
 use serde_json::{Value, json};
 
@@ -501,12 +503,81 @@ fn many_equal_triangles_are_planned_or_refused() {
     }
 }
 
+/// Planning looks at no chunk, however many are asked for.
+#[test]
+fn a_billion_chunks_are_planned_at_once() {
+    let settings = Settings { photons: 1 << 31, chunk: Some(2), ..Settings::default() };
+    let plan = in_time("a billion chunks", move || Plan::new(&open_box(&settings), &settings, &Limits::of_host()).unwrap());
+    let last = plan.chunks_per_round - 1;
+    assert!((1..=4).contains(&plan.path_capacity) && last > 1 << 29, "{} chunks of {}", last + 1, plan.path_capacity);
+    for chunk in [0, 1, last / 2, last] {
+        assert!(photons_of(&plan.chunk(chunk)) <= plan.path_capacity, "chunk {chunk}");
+    }
+}
+
 /// A name may hold anything; a complaint stays one line.
 #[test]
 fn names_with_line_breaks_do_not_break_the_line() {
     let mut value = square();
     value["nodes"][0]["name"] = json!("wall\nof\r\nmany\u{1b}[31m lines");
     value["accessors"][1]["count"] = json!(3);
-    let Fate::Refused(line) = plan_value("a name of several lines", &value) else { panic!("must be refused") };
-    assert!(!line.chars().any(char::is_control), "{line:?}");
+    assert_one_line("a name of several lines", &value);
+
+    let cases: &[(&str, Change)] = &[
+        ("a version", |v| v["asset"]["version"] = json!("1\n0")),
+        ("an extension", |v| v["extensionsRequired"] = json!(["EXT\nof\r\nlines"])),
+        ("a file", |v| v["buffers"][0]["uri"] = json!("no%0Awhere.bin")),
+        ("a place", |v| v["buffers"][0]["uri"] = json!("https:\n//there")),
+    ];
+    for (what, change) in cases {
+        let mut value = square();
+        change(&mut value);
+        assert_one_line(what, &value);
+    }
+}
+
+fn assert_one_line(what: &str, value: &Value) {
+    match plan_value(what, value) {
+        Fate::Refused(line) => assert!(!line.chars().any(char::is_control), "{what}: {line:?}"),
+        fate => panic!("{what} must be refused: {fate:?}"),
+    }
+}
+
+/// The square with a JPEG of eight by eight for its picture, changed.
+fn square_with_jpeg(change: impl FnOnce(&mut Vec<u8>)) -> Value {
+    let mut jpeg = Vec::new();
+    image::RgbImage::new(8, 8).write_to(&mut std::io::Cursor::new(&mut jpeg), image::ImageFormat::Jpeg).unwrap();
+    change(&mut jpeg);
+    let mut value = square();
+    value["images"][0] = json!({"uri": format!("data:image/jpeg;base64,{}", BASE64.encode(&jpeg))});
+    value
+}
+
+/// What the JPEG decoder says of a file that was cut off ends in a line break.
+#[test]
+fn pictures_cut_off_are_refused_in_one_line() {
+    let mut whole = 0;
+    let value = square_with_jpeg(|jpeg| whole = jpeg.len());
+    assert!(matches!(plan_value("a whole picture", &value), Fate::Planned(_)));
+    let refused = (0..whole).filter(|length| {
+        let value = square_with_jpeg(|jpeg| jpeg.truncate(*length));
+        matches!(plan_value(&format!("{length} bytes of a picture"), &value), Fate::Refused(_))
+    });
+    // Its last bytes a decoder may do without.
+    assert!(refused.count() > whole * 3 / 4);
+}
+
+/// A few bytes that claim a picture whose numbers would take 3 GiB: it is refused for its size before it is unfolded.
+#[test]
+fn pictures_that_claim_too_much_are_refused_before_they_are_decoded() {
+    let value = square_with_jpeg(|jpeg| {
+        // Start of frame: marker, length, precision, then height and width.
+        let frame = jpeg.windows(2).position(|marker| marker == [0xff, 0xc0]).unwrap();
+        jpeg[frame + 5..frame + 9].copy_from_slice(&[0x40, 0, 0x40, 0]);
+    });
+    let Fate::Refused(line) = plan_value("16384 by 16384 texels", &value) else { panic!("must be refused") };
+    assert!(line.contains("texels"), "{line}");
+    if let Some(bytes) = peak_memory() {
+        assert!(bytes < 1 << 30, "{bytes} bytes of memory");
+    }
 }

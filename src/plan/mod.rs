@@ -139,7 +139,8 @@ impl Plan {
             work,
             pair_tests_per_submission: limits.pair_tests_per_submission,
         };
-        plan.path_capacity = (0..chunks_per_round).map(|chunk| photons_of(&plan.chunk(chunk))).max().expect("a round has a chunk");
+        // Of each light's photons the larger share: there may be a billion chunks, too many to look at each.
+        plan.path_capacity = plan.light_photons.iter().map(|count| count.div_ceil(chunks_per_round)).sum();
         plan.photon_capacity = plan.path_capacity * settings.bounces;
         Ok(plan)
     }

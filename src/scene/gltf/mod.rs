@@ -18,6 +18,7 @@ use glam::{DMat3, DMat4, DVec2, DVec3, Vec3};
 use gltf::khr_lights_punctual::Kind;
 use gltf::mesh::Mode;
 use gltf::{Gltf, Semantic};
+use image::{DynamicImage, ImageDecoder};
 
 use super::light::{LUMENS_PER_WATT, Light, LightKind};
 use super::material::{Material, TextureUse, surface_of};
@@ -41,11 +42,11 @@ const MAX_DEPTH: usize = 512;
 /// Reads a file.
 pub fn load(path: &Path, radiometric: bool) -> Result<Scene> {
     let content = read_file(path, path)?;
-    let refuse = |reason: String| Error::Scene { path: path.to_owned(), object: "the file".into(), reason };
+    let refuse = |reason: String| Error::Scene { path: path.to_owned(), object: "the file".into(), reason: one_line(&reason) };
     malformed::binary_length(&content).map_err(refuse)?;
-    let unchecked = Gltf::from_slice_without_validation(&content).map_err(|error| refuse(one_line(&error)))?;
+    let unchecked = Gltf::from_slice_without_validation(&content).map_err(|error| refuse(error.to_string()))?;
     malformed::missing_members(unchecked.document.as_json()).map_err(refuse)?;
-    let Gltf { document, blob } = Gltf::from_slice(&content).map_err(|error| refuse(one_line(&error)))?;
+    let Gltf { document, blob } = Gltf::from_slice(&content).map_err(|error| refuse(error.to_string()))?;
     let version = document.as_json().asset.version.as_str();
     if !version.starts_with("2.") {
         return Err(refuse(format!("is of glTF version {version}; 2.0 is read")));
@@ -78,12 +79,13 @@ fn printable(name: &str) -> String {
     name.chars().map(|letter| if letter.is_control() { ' ' } else { letter }).collect()
 }
 
-fn one_line(error: &gltf::Error) -> String {
-    error.to_string().lines().map(str::trim).collect::<Vec<_>>().join(" ")
+/// What a file or a decoder says, without its line breaks.
+fn one_line(text: &str) -> String {
+    printable(&text.lines().map(str::trim).collect::<Vec<_>>().join(" "))
 }
 
 fn read_file(path: &Path, of: &Path) -> Result<Vec<u8>> {
-    let refuse = |reason: String| Error::Scene { path: of.to_owned(), object: format!("{}", path.display()), reason };
+    let refuse = |reason: String| Error::Scene { path: of.to_owned(), object: printable(&path.display().to_string()), reason };
     let facts = std::fs::metadata(path).map_err(|error| refuse(format!("cannot be read ({})", error.kind())))?;
     if !facts.is_file() {
         return Err(refuse("is no file".into()));
@@ -116,11 +118,11 @@ pub(super) struct Loader {
 impl Loader {
     /// An error that names the file and the object in it.
     fn refuse(&self, object: &str, reason: impl Into<String>) -> Error {
-        Error::Scene { path: self.path.clone(), object: object.to_owned(), reason: reason.into() }
+        Error::Scene { path: self.path.clone(), object: object.to_owned(), reason: one_line(&reason.into()) }
     }
 
     fn leave_out(&mut self, what: impl Into<String>) {
-        self.left_out.insert(what.into());
+        self.left_out.insert(one_line(&what.into()));
     }
 
     fn read_buffers(&mut self, document: &gltf::Document, mut blob: Option<Vec<u8>>) -> Result<()> {
@@ -168,12 +170,6 @@ impl Loader {
                 Entry::Vacant(free) => {
                     let read = self.read_texture(&texture)?;
                     self.texel_count += u64::from(read.width) * u64::from(read.height);
-                    if self.texel_count > MAX_TEXELS {
-                        return Err(self.refuse(
-                            &read.name,
-                            format!("makes more than {MAX_TEXELS} texels, the most that are read; use smaller pictures"),
-                        ));
-                    }
                     self.scene.textures.push(read);
                     *free.insert(self.scene.textures.len() - 1)
                 }
@@ -198,8 +194,16 @@ impl Loader {
         // A picture of a few bytes must not unfold into gigabytes.
         let mut limits = image::Limits::default();
         limits.max_alloc = Some(1 << 30);
-        reader.limits(limits);
-        let picture = reader.decode().map_err(|error| self.refuse(&what, format!("cannot be decoded ({error})")))?.into_rgb8();
+        reader.limits(limits.clone());
+        let undecodable = |error: image::ImageError| self.refuse(&what, format!("cannot be decoded ({})", one_line(&error.to_string())));
+        let decoder = reader.into_decoder().map_err(undecodable)?;
+        let (width, height) = decoder.dimensions();
+        // Asked before it is decoded: as numbers it takes many times the memory.
+        if self.texel_count + u64::from(width) * u64::from(height) > MAX_TEXELS {
+            return Err(self.refuse(&what, format!("makes more than {MAX_TEXELS} texels, the most that are read; use smaller pictures")));
+        }
+        limits.reserve(decoder.total_bytes()).map_err(undecodable)?;
+        let picture = DynamicImage::from_decoder(decoder).map_err(undecodable)?.into_rgb8();
         let wrap = |mode: gltf::texture::WrappingMode| match mode {
             gltf::texture::WrappingMode::ClampToEdge => Wrap::Clamp,
             gltf::texture::WrappingMode::MirroredRepeat => Wrap::MirroredRepeat,

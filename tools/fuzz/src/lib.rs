@@ -1,0 +1,17 @@
+//! What the targets share.
+
+pub mod mutation;
+
+use photonmill::error::Error;
+
+/// Takes away the hook by which libFuzzer ends the program at every panic: the loader catches some on threads of
+/// their own. A panic that leaves the target still ends it.
+pub fn panics_are_caught() {
+    drop(std::panic::take_hook());
+}
+
+/// A refusal is one line, and the user's to mend.
+pub fn refused(error: &Error) {
+    let line = error.to_string();
+    assert!(error.exit_code() == 2 && !line.is_empty() && line.lines().count() == 1, "{line:?}");
+}

@@ -1,0 +1,184 @@
+//! Settings of any value -> validation -> plan: a plan whose sizes hold, or one line that says why not.
+
+#![no_main]
+
+use std::sync::LazyLock;
+
+use arbitrary::{Arbitrary, Result, Unstructured};
+use libfuzzer_sys::fuzz_target;
+use photonmill::plan::transport::{MapPlan, Sensor, TransportPlan};
+use photonmill::plan::{Limits, Plan, photons_of};
+use photonmill::rng::Rng;
+use photonmill::scene::geometry::Geometry;
+use photonmill::scene::open_box::open_box;
+use photonmill::scene::{Scene, built_in};
+use photonmill::settings::transport::{Append, Effect, Filter, Illumination, Kernel, Part, TransportSettings};
+use photonmill::settings::{EmissionLaw, Gather, PhongDirection, Preset, Settings, Variant};
+use photonmill_fuzz::{panics_are_caught, refused};
+
+static SCENES: LazyLock<Vec<(Scene, Geometry)>> = LazyLock::new(|| {
+    let scenes = ["open-box-phong", "cornell", "cornell-spheres", "glass-slab", "sky-over-plane", "mirror-corridor"];
+    let scene = |name: &&str| built_in::by_name(name).expect("it is built in");
+    scenes.iter().map(scene).map(|scene| Geometry::new(&scene).map(|geometry| (scene, geometry)).expect("it has triangles")).collect()
+});
+
+#[derive(Debug)]
+struct Room(Settings);
+
+#[derive(Debug)]
+struct Triangles {
+    scene: usize,
+    sensor: Sensor,
+    settings: TransportSettings,
+}
+
+#[derive(Debug, Arbitrary)]
+enum Request {
+    Room(Room),
+    Triangles(Triangles),
+}
+
+fuzz_target!(init: panics_are_caught(), |request: Request| {
+    let outcome = match &request {
+        Request::Room(Room(settings)) => plan_room(settings),
+        Request::Triangles(request) => plan_triangles(request),
+    };
+    if let Err(error) = outcome {
+        refused(&error);
+    }
+});
+
+fn plan_room(settings: &Settings) -> photonmill::error::Result<()> {
+    let limits = Limits::of_host();
+    let accepted = settings.validate();
+    let plan = Plan::new(&open_box(settings), settings, &limits);
+    if let Err(error) = accepted {
+        assert!(plan.is_err(), "planned though refused: {error}");
+        return Err(error);
+    }
+    let plan = plan?;
+    assert!(plan.photon_map_bytes() <= limits.buffer_bytes, "{} bytes of photons", plan.photon_map_bytes());
+    assert!(plan.light_photons.iter().sum::<u32>() == settings.photons && plan.light_photons.iter().all(|count| *count > 0));
+    assert!(plan.flux_unit.is_finite() && plan.flux_unit > 0.0, "flux unit {}", plan.flux_unit);
+    assert!(plan.relative_flux.iter().all(|flux| *flux > 0.0 && *flux <= 1.0), "{:?}", plan.relative_flux);
+    let last = plan.chunks_per_round - 1;
+    for chunk in [0, last / 2, last] {
+        assert!(photons_of(&plan.chunk(chunk)) <= plan.path_capacity, "chunk {chunk} of {last} does not fit {}", plan.path_capacity);
+    }
+    assert!(plan.grid.cells() > 0 && plan.grid.cells_per_metre.is_finite() && plan.grid.reach > 0.0, "{:?}", plan.grid);
+    Ok(())
+}
+
+fn plan_triangles(request: &Triangles) -> photonmill::error::Result<()> {
+    let Triangles { scene, sensor, settings } = request;
+    let (scene, geometry) = &SCENES[*scene];
+    let limits = Limits::of_host();
+    let accepted = settings.validate();
+    let plan = TransportPlan::new(scene, geometry, settings, *sensor, &limits);
+    if let Err(error) = accepted {
+        assert!(plan.is_err(), "planned though refused: {error}");
+        return Err(error);
+    }
+    let plan = plan?;
+    assert!(plan.bytes <= limits.memory_bytes, "{} bytes", plan.bytes);
+    assert!(plan.film_scale.is_finite() && plan.film_scale > 0.0, "film scale {}", plan.film_scale);
+    plan.maps().for_each(|map| check_map(&plan, map, &limits));
+    assert!(plan.pixels_at_once(plan.rays_per_pixel()) > 0);
+    Ok(())
+}
+
+fn check_map(plan: &TransportPlan, map: &MapPlan, limits: &Limits) {
+    assert!(map.chunk_photons >= 1 && map.chunk_photons <= map.photons && map.bucket_count.is_power_of_two(), "{map:?}");
+    assert!(u64::from(map.capacity) * 32 <= 2 * limits.memory_bytes && map.capacity >= map.chunk_photons, "{map:?}");
+    let chunks = map.chunks();
+    // Each chunk is a dispatch; only the ends of a long list are looked at.
+    assert_eq!(chunks.size_hint().0 as u32, map.photons.div_ceil(map.chunk_photons), "{map:?}");
+    assert_eq!(map.chunks().next(), Some((0, map.chunk_photons)));
+    let radii: Vec<f64> = [0, 1, 2, plan.settings.rounds.min(1000) - 1].iter().map(|round| plan.radius(map, *round)).collect();
+    assert!(radii.iter().all(|radius| radius.is_finite() && *radius > 0.0), "{radii:?}");
+}
+
+impl<'a> Arbitrary<'a> for Room {
+    fn arbitrary(u: &mut Unstructured<'a>) -> Result<Room> {
+        let preset = *u.choose(&[Preset::Naive, Preset::Modified, Preset::Phong, Preset::Rounds])?;
+        let usual = Settings::preset(preset);
+        Ok(Room(Settings {
+            variant: *u.choose(&[Variant::Naive, Variant::Atomic, Variant::Ballot, Variant::Cpu])?,
+            photons: count(u, usual.photons)?,
+            rounds: count(u, usual.rounds)?,
+            bounces: count(u, usual.bounces)?,
+            radius: number(u, usual.radius)?,
+            full_light: number(u, usual.full_light)?,
+            seed: u.arbitrary()?,
+            rng: *u.choose(&[Rng::Rand48, Rng::Mt, Rng::Philox])?,
+            gather: *u.choose(&[Gather::Brute, Gather::Grid])?,
+            emission: *u.choose(&[EmissionLaw::Uniform, EmissionLaw::Cosine])?,
+            shininess: if u.arbitrary()? { u.arbitrary()? } else { usual.shininess },
+            phong_direction: *u.choose(&[PhongDirection::Mirror, PhongDirection::Sampled])?,
+            eye: if u.arbitrary()? { u.arbitrary()? } else { usual.eye },
+            light_radius: number(u, usual.light_radius)?,
+            light_power: [number(u, usual.light_power[0])?, number(u, usual.light_power[1])?],
+            reflectance: number(u, f64::from(usual.reflectance))? as f32,
+            mesh: count(u, usual.mesh)?,
+            edge_correction: u.arbitrary()?,
+            threads: count(u, 1)? as usize,
+            group_size: count(u, usual.group_size)?,
+            chunk: if u.arbitrary()? { Some(count(u, 64)?) } else { None },
+        }))
+    }
+}
+
+impl<'a> Arbitrary<'a> for Triangles {
+    fn arbitrary(u: &mut Unstructured<'a>) -> Result<Triangles> {
+        let usual = TransportSettings::default();
+        let sensor = match u.arbitrary()? {
+            true => Sensor::Picture { width: count(u, 64)?, height: count(u, 64)? },
+            false => Sensor::Receivers { count: count(u, 64)? },
+        };
+        let settings = TransportSettings {
+            photons: count(u, usual.photons)?,
+            caustic_photons: count(u, usual.caustic_photons)?,
+            rounds: count(u, usual.rounds)?,
+            bounces: count(u, usual.bounces)?,
+            seed: u.arbitrary()?,
+            radius: if u.arbitrary()? { Some(number(u, 0.05)?) } else { None },
+            caustic_radius: if u.arbitrary()? { Some(number(u, 0.05)?) } else { None },
+            alpha: number(u, usual.alpha)?,
+            kernel: *u.choose(&[Kernel::Box, Kernel::Cone, Kernel::Epanechnikov])?,
+            edge_correction: u.arbitrary()?,
+            shadow_rays: count(u, usual.shadow_rays)?,
+            final_gather: u.arbitrary()?,
+            illumination: *u.choose(&[Illumination::Split, Illumination::Photons])?,
+            part: *u.choose(&[Part::All, Part::Direct, Part::Specular, Part::Caustic, Part::Indirect])?,
+            filter: *u.choose(&[Filter::Box, Filter::Tent, Filter::Gaussian])?,
+            append: *u.choose(&[Append::Atomic, Append::Ballot])?,
+            group_size: count(u, usual.group_size)?,
+            chunk: if u.arbitrary()? { Some(count(u, 64)?) } else { None },
+            with: effects(u)?,
+            without: effects(u)?,
+        };
+        Ok(Triangles { scene: u.choose_index(SCENES.len())?, sensor, settings })
+    }
+}
+
+/// The usual value, a power of two or its neighbour, or any.
+fn count(u: &mut Unstructured, usual: u32) -> Result<u32> {
+    Ok(match u.int_in_range(0..=3u8)? {
+        0 => usual,
+        1 => (1u32 << u.int_in_range(0..=31)?).wrapping_add(u.int_in_range(0..=2)?).wrapping_sub(1),
+        2 => u32::from(u.arbitrary::<u16>()?),
+        _ => u.arbitrary()?,
+    })
+}
+
+fn number(u: &mut Unstructured, usual: f64) -> Result<f64> {
+    Ok(match u.int_in_range(0..=3u8)? {
+        0 | 1 => usual,
+        2 => usual * 2f64.powi(u.int_in_range(-64..=64)?),
+        _ => u.arbitrary()?,
+    })
+}
+
+fn effects(u: &mut Unstructured) -> Result<Vec<Effect>> {
+    (0..u.int_in_range(0..=4)?).map(|_| u.choose(&Effect::ALL).copied()).collect()
+}
