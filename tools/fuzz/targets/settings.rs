@@ -13,7 +13,7 @@ use photonmill::scene::geometry::Geometry;
 use photonmill::scene::open_box::open_box;
 use photonmill::scene::{Scene, built_in};
 use photonmill::settings::transport::{Append, Effect, Filter, Illumination, Kernel, Part, TransportSettings};
-use photonmill::settings::{EmissionLaw, Gather, PhongDirection, Preset, Settings, Variant};
+use photonmill::settings::{EmissionLaw, Gather, Math, PhongDirection, Preset, Settings, Variant};
 use photonmill_fuzz::{panics_are_caught, refused};
 
 static SCENES: LazyLock<Vec<(Scene, Geometry)>> = LazyLock::new(|| {
@@ -112,6 +112,8 @@ impl<'a> Arbitrary<'a> for Room {
             seed: u.arbitrary()?,
             rng: *u.choose(&[Rng::Rand48, Rng::Mt, Rng::Philox])?,
             gather: *u.choose(&[Gather::Brute, Gather::Grid])?,
+            math: *u.choose(&[Math::Fast, Math::Strict])?,
+            paranoid: u.arbitrary()?,
             emission: *u.choose(&[EmissionLaw::Uniform, EmissionLaw::Cosine])?,
             shininess: if u.arbitrary()? { u.arbitrary()? } else { usual.shininess },
             phong_direction: *u.choose(&[PhongDirection::Mirror, PhongDirection::Sampled])?,
@@ -152,6 +154,8 @@ impl<'a> Arbitrary<'a> for Triangles {
             part: *u.choose(&[Part::All, Part::Direct, Part::Specular, Part::Caustic, Part::Indirect])?,
             filter: *u.choose(&[Filter::Box, Filter::Tent, Filter::Gaussian])?,
             append: *u.choose(&[Append::Atomic, Append::Ballot])?,
+            math: *u.choose(&[Math::Fast, Math::Strict])?,
+            paranoid: u.arbitrary()?,
             group_size: count(u, usual.group_size)?,
             chunk: if u.arbitrary()? { Some(count(u, 64)?) } else { None },
             with: effects(u)?,
