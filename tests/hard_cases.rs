@@ -14,7 +14,7 @@
 //! | G1 | photons_leave_a_surface_once_and_for_all, photons_on_edges_and_in_corners_stay_in_the_room |
 //! | G2 | grazing_and_straight_directions_end_in_the_room |
 //! | G3 | thin_walls_and_sheets_let_no_light_through, small_lamps_shine_by_their_area |
-//! | G4 | black_walls_absorb_the_first_flights_hits, a_light_flush_with_a_wall_shines_into_the_room |
+//! | G4 | black_walls_absorb_the_first_flights_hits, a_light_flush_with_a_wall_shines_into_the_room, flat_lamps_light_nothing_of_their_own_plane |
 //! | G5 | rays_at_edges_and_corners_meet_a_wall |
 //! | G6 | every_operation_is_rounded_by_itself |
 //! | G7 | axis_parallel_rays_meet_the_same_by_tree_and_list |
@@ -207,6 +207,38 @@ fn how_a_wall_is_cut_does_not_change_its_light() {
     assert_holds("slivers", same_light("slivers", sliver, expected));
     let doubled = replace(&|mesh| Mesh { triangles: [&mesh.triangles[..], &mesh.triangles[..]].concat(), ..mesh.clone() });
     assert_holds("every triangle twice", same_light("every triangle twice", doubled, expected));
+}
+
+/// A disc in its wall and a lamp in its ceiling light nothing of their own plane, however close: the rounding of a
+/// grazing cosine is not divided by the distance.
+#[test]
+fn flat_lamps_light_nothing_of_their_own_plane() {
+    let Some(gpu) = device() else { return };
+    let direct = TransportSettings { photons: 1, rounds: 40, bounces: 1, shadow_rays: 32, ..settings() };
+    let grid = |middle: DVec3, normal: DVec3, width: f64| {
+        let (u, v) = normal.any_orthonormal_pair();
+        let place = move |k: i32| width * (f64::from(k) / 15.0 - 0.5);
+        (0..256).map(|k| (middle + u * place(k % 16) + v * place(k / 16), normal)).collect::<Vec<_>>()
+    };
+    for law in [EmissionLaw::Uniform, EmissionLaw::Cosine] {
+        let mut room = closed_room(0.0);
+        let disc = LightKind::Disc { centre: DVec3::new(0.5, 0.0, 0.5), normal: DVec3::Y, radius: 0.1, power: Vec3::ONE, law };
+        room.lights = vec![lamp(disc)];
+        let own = received(&gpu, &room, &direct, &grid(DVec3::new(0.5, 0.0, 0.5), DVec3::Y, 0.4));
+        assert_eq!(mean_red(&own), 0.0, "{law:?}");
+        let opposite = received(&gpu, &room, &direct, &grid(DVec3::new(0.5, 1.0, 0.5), DVec3::NEG_Y, 0.4));
+        assert!(mean_red(&opposite) > 0.1, "{law:?}");
+    }
+    // The lamp is a part of the ceiling, turned so that no coordinate is a round number.
+    let turn = DQuat::from_axis_angle(DVec3::new(0.2, 0.7, -0.4).normalize(), 0.8);
+    let mut room = closed_room(0.0);
+    room.materials.push(Material { emission: Vec3::ONE, ..Material::lambert("lamp", Vec3::ZERO) });
+    room.meshes.push(Mesh::parallelogram("lamp", DVec3::new(0.3, 1.0, 0.3), DVec3::X * 0.4, DVec3::Z * 0.4, 1));
+    room.meshes.iter_mut().flat_map(|mesh| &mut mesh.positions).for_each(|at| *at = turn * *at);
+    let own = grid(turn * DVec3::new(0.5, 1.0, 0.5), turn * DVec3::NEG_Y, 0.8);
+    assert_eq!(mean_red(&received(&gpu, &room, &direct, &own)), 0.0);
+    let opposite = grid(turn * DVec3::new(0.5, 0.0, 0.5), turn * DVec3::Y, 0.4);
+    assert!(mean_red(&received(&gpu, &room, &direct, &opposite)) > 0.1);
 }
 
 /// A lamp flush with a wall lights what faces it, and neither its wall nor what lies behind.

@@ -112,6 +112,13 @@ Emission sample_emission(uint emitter_count, float scene_radius, vec4 u, vec4 w)
     return emission;
 }
 
+// Whether a point at signed height `height` over a flat lamp lies off its plane for certain. What lies in that plane
+// gets nothing from it, and close by, the rounding of that nothing over the squared distance could be anything.
+bool is_before(float height, vec3 position, float error)
+{
+    return abs(height) > 2.0 * (position_error(position) + error);
+}
+
 // What one light adds at a point: `radiance` is what arrives along wi, over the probability density of
 // this sample; the light ends at `target`, or comes from beyond the scene.
 struct Arriving {
@@ -141,7 +148,7 @@ Arriving sample_light(uint emitter_count, vec3 position, vec3 ns, vec4 u)
             }
             arriving.target = offset_origin(point, position_error(point) + triangle_error(triangle), normal, normal);
             arriving.radiance = emitted_radiance(material, light.triangle, at.x, at.y) * divide(triangle_area(triangle), light.probability);
-            cos_light = max(dot(normal, normalize(position - point)), 0.0);
+            cos_light = is_before(side, position, triangle_error(triangle)) ? max(dot(normal, normalize(position - point)), 0.0) : 0.0;
             if (cos_light > 0.0 && material.emission_texture == NONE) {
                 vec4 direction = sample_spherical_triangle(normalize(triangle.a - position), normalize(triangle.b - position),
                                                            normalize(triangle.c - position), u.yz);
@@ -168,6 +175,7 @@ Arriving sample_light(uint emitter_count, vec3 position, vec3 ns, vec4 u)
             arriving.radiance *= 3.14159265358979324 * light.size * light.size;
             float cosine = dot(light.direction, normalize(position - point));
             cos_light = light.kind == EMITTER_DISC_COSINE ? max(cosine, 0.0) : (cosine > 0.0 ? 1.0 : 0.0);
+            cos_light = is_before(dot(light.direction, position - light.position), position, position_error(light.position)) ? cos_light : 0.0;
         }
     }
     if (HAS_DIRECTIONAL_LIGHTS) {
