@@ -16,7 +16,8 @@
 //! constants, records, error, ledger, rng, settings, timings < scene < plan < cpu
 //! scene < judge
 //! constants, records, error, ledger, timings < gpu
-//! plan, gpu < resources < trace < index < estimate < film < render < transport < selfcheck < output
+//! gpu < oddities
+//! plan, oddities < resources < trace < index < estimate < film < render < transport < selfcheck < output
 //! output < bake < paper < cli
 //! ```
 //!
@@ -45,8 +46,12 @@
 //! - **Nothing in world units.** A path leaves its own wall by the wall's number ([`cpu::room`]), and a
 //!   triangle by what its position may be wrong (`offset_origin` in `glsl/scene/bvh.glsl`); lengths are
 //!   normalised by a power of two ([`scene::geometry`]).
-//! - **Every operation is rounded by itself** (`build.rs`): a driver may not fuse two in one pipeline and
+//! - **Every operation is rounded by itself** (`glsl/compile.rs`): a driver may not fuse two in one pipeline and
 //!   not in another, so an effect that is forced on changes no bit of a scene that lacks it.
+//! - **What devices round as they like stands in one file** (`glsl/math.glsl`), beside functions that are the same to
+//!   the bit everywhere: `--math strict` takes those.
+//! - **Nothing that is no number passes unseen**: `--paranoid` names its photon ([`oddities`]), and
+//!   [`transport::replay`] traces that one alone.
 //!
 //! # What is estimated
 //!
