@@ -56,7 +56,7 @@ fn a_million_triangles_load_and_render() {
     let plan = TransportPlan::new(&loaded, &geometry, &settings, sensor, &render::limits(gpu.facts())).unwrap();
     let never = AtomicBool::new(false);
     let view = View { geometry: &geometry, camera: loaded.cameras.first(), phases: &[] };
-    let lit = transport::light(&gpu, &view, plan, &mut Control { cancelled: &never, progress: &mut |_, _| {} }).unwrap();
+    let lit = transport::light(&gpu, &view, plan, &mut Control { cancelled: &never, progress: &mut |_| {} }).unwrap();
     let row = |name: &str| lit.timings.row(name).and_then(|row| row.gpu_ms).unwrap_or_default();
     println!("read {read:?}, hierarchy {built:?}, GPU ms: 4 rounds {:.1}, photons {:.1}", row("round"), row("round/global/trace"));
     assert_eq!(lit.anomalies[..2], [0, 0]);

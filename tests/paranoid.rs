@@ -35,7 +35,7 @@ fn light(gpu: &Gpu, scene: &Scene, geometry: &Geometry, settings: &TransportSett
     let view = View { geometry, camera: Some(&camera), phases: &[] };
     let never = AtomicBool::new(false);
     let plan = plan_of(gpu, scene, geometry, settings);
-    transport::light(gpu, &view, plan, &mut Control { cancelled: &never, progress: &mut |_, _| {} }).unwrap()
+    transport::light(gpu, &view, plan, &mut Control { cancelled: &never, progress: &mut |_| {} }).unwrap()
 }
 
 #[test]

@@ -228,7 +228,7 @@ fn film(gpu: &Gpu, scene: &Scene, settings: &TransportSettings) -> RoundFilm {
         TransportPlan::new(scene, &geometry, settings, Sensor::Picture { width: 16, height: 16 }, &render::limits(gpu.facts())).unwrap();
     let never = AtomicBool::new(false);
     let view = View { geometry: &geometry, camera: scene.cameras.first(), phases: &[] };
-    transport::light(gpu, &view, plan, &mut Control { cancelled: &never, progress: &mut |_, _| {} }).unwrap().film
+    transport::light(gpu, &view, plan, &mut Control { cancelled: &never, progress: &mut |_| {} }).unwrap().film
 }
 
 fn same_film(found: &RoundFilm, expected: &RoundFilm) -> Check {
@@ -274,13 +274,13 @@ fn ask(gpu: &Gpu, question: Question) -> Check {
         }
         Film(gather) => {
             let settings = Settings { gather, ..strict() };
-            let mut control = Control { cancelled: &never, progress: &mut |_, _| {} };
+            let mut control = Control { cancelled: &never, progress: &mut |_| {} };
             let found = render::on_gpu(gpu, &open_box(&settings), &settings, &mut control).map_err(|error| error.to_string())?;
             equal_sums("the film", &found.film.sums, &run_on_cpu(&settings).film.sums)
         }
         Ledger(variant) => {
             let settings = Settings { variant, mesh: 1, ..strict() };
-            let mut control = Control { cancelled: &never, progress: &mut |_, _| {} };
+            let mut control = Control { cancelled: &never, progress: &mut |_| {} };
             render::on_gpu(gpu, &open_box(&settings), &settings, &mut control).map_or_else(|error| Err(error.to_string()), |_| Ok(()))
         }
         ClosedForm(name) => {

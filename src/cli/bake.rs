@@ -62,7 +62,7 @@ pub(super) fn run(args: &BakeArgs, cancelled: &AtomicBool) -> Result<End> {
     let job = Job { scene: &scene, settings: &settings, sensor, camera: None, phases: &phases };
     let gpu = args.report.device(&args.device)?;
     let plan = plan(&gpu, &job, &geometry)?;
-    let lit = light(&gpu, &job, &geometry, plan, cancelled)?;
+    let lit = light(&gpu, &job, &geometry, plan, args.report.progress, cancelled)?;
 
     let estimates = estimates(&lit);
     let stops = args.exposure.unwrap_or_else(|| usual_exposure(&estimates));
@@ -72,7 +72,7 @@ pub(super) fn run(args: &BakeArgs, cancelled: &AtomicBool) -> Result<End> {
     let maps = layout.lightmaps().count();
     let document = args.output.join("scene.gltf");
     say(&format!("{text}\nwrote {maps} lightmap(s) of {} texels and {} at {stops:+.2} stops", layout.texel_count(), document.display()))?;
-    Ok(if lit.cancelled { End::Cancelled } else { End::Finished })
+    Ok(End::of(&lit))
 }
 
 /// Texels of all maps together, unless the user asks for a density.

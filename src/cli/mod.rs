@@ -21,6 +21,7 @@ use clap::{Args, Parser, Subcommand};
 
 use crate::error::{Error, Result};
 use crate::gpu::{Gpu, Options};
+use crate::transport::{self as transport_line, Lit};
 
 /// Photon mapping on any Vulkan GPU.
 ///
@@ -88,6 +89,12 @@ enum End {
     Finished,
     /// By Ctrl-C, with what was finished saved.
     Cancelled,
+}
+
+impl End {
+    fn of(lit: &Lit) -> End {
+        if lit.end == transport_line::End::Cancelled { End::Cancelled } else { End::Finished }
+    }
 }
 
 /// Runs the program on the process's arguments and returns its exit code.

@@ -60,14 +60,14 @@ pub(super) fn run(args: &ProbeArgs, cancelled: &AtomicBool) -> Result<End> {
     let job = Job { scene: &scene, settings: &settings, sensor, camera: None, phases: &phases };
     let gpu = args.report.device(&args.device)?;
     let plan = plan(&gpu, &job, &geometry)?;
-    let lit = light(&gpu, &job, &geometry, plan, cancelled)?;
+    let lit = light(&gpu, &job, &geometry, plan, args.report.progress, cancelled)?;
 
     let text = light_report::text(&scene.name, &lit, reports.explain);
     let mut files = vec![(output, table(&lit))];
     files.extend(reports.files(&scene, &lit));
     write_all(files)?;
     say(&format!("{text}\nwrote {}", args.output.display()))?;
-    Ok(if lit.cancelled { End::Cancelled } else { End::Finished })
+    Ok(End::of(&lit))
 }
 
 fn receivers(points: &[(DVec3, DVec3)], geometry: &Geometry) -> Vec<Receiver> {

@@ -107,7 +107,7 @@ pub(super) fn run(args: &RenderArgs, cancelled: &AtomicBool) -> Result<End> {
     let geometry = geometry(&scene, &settings)?;
     let gpu = args.report.device(&args.device)?;
     let plan = plan(&gpu, &job, &geometry)?;
-    let lit = light(&gpu, &job, &geometry, plan, cancelled)?;
+    let lit = light(&gpu, &job, &geometry, plan, args.report.progress, cancelled)?;
 
     let image = radiance(&lit, width, height);
     let stops = args.exposure.unwrap_or_else(|| image.usual_exposure());
@@ -127,7 +127,7 @@ pub(super) fn run(args: &RenderArgs, cancelled: &AtomicBool) -> Result<End> {
         // The picture is there; who has seen enough may end the program.
         say(&format!("judge: {}", verdict(&lit, &scene, &camera, (width, height), samples)))?;
     }
-    Ok(if lit.cancelled { End::Cancelled } else { End::Finished })
+    Ok(End::of(&lit))
 }
 
 /// The path of one photon of the run that these options ask for.

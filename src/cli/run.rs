@@ -256,7 +256,7 @@ pub(super) fn run(args: &RunArgs, cancelled: &AtomicBool) -> Result<End> {
         _ => args.device.open(args.time_dispatches)?,
     };
     let bar = progress_bar(settings.total_photons());
-    let mut control = Control { cancelled, progress: &mut |emitted, _| bar.set_position(emitted) };
+    let mut control = Control { cancelled, progress: &mut |progress| bar.set_position(progress.done) };
     let outcome = match &gpu {
         Some(gpu) => render::on_gpu(gpu, &scene, &settings, &mut control)?,
         None => render::on_cpu(&scene, &settings, &mut control)?,

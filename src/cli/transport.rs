@@ -1,5 +1,6 @@
 //! What the commands that light a scene of triangles share: options, the scene, the run.
 
+use std::io::Write;
 use std::path::PathBuf;
 use std::sync::atomic::AtomicBool;
 
@@ -15,12 +16,12 @@ use crate::output::light_report;
 use crate::output::trace_file;
 use crate::plan::transport::{Sensor, TransportPlan};
 use crate::records::Receiver;
-use crate::render::{self, Control};
+use crate::render::{self, Control, Progress};
 use crate::scene::geometry::Geometry;
 use crate::scene::light::{Light, LightKind};
 use crate::scene::{Camera, Scene};
 use crate::settings::Math;
-use crate::settings::transport::{Append, Effect, Filter, Illumination, Kernel, Part, TransportSettings};
+use crate::settings::transport::{Append, Effect, Filter, Illumination, Kernel, Part, Stop, TransportSettings};
 use crate::transport::replay::PhotonName;
 use crate::transport::{self, Lit, View};
 
@@ -46,9 +47,18 @@ pub(super) struct TransportArgs {
     /// Photons of the caustic map, each round [default: as --photons]
     #[arg(long, value_parser = whole::<u32>, allow_negative_numbers = true, help_heading = "Transport")]
     caustic_photons: Option<u32>,
-    /// Independent rounds, of which the result is the mean [default: 16]
+    /// Independent rounds, of which the result is the mean [default: 16; 65536 at most with --error or --time]
     #[arg(long, value_parser = whole::<u32>, allow_negative_numbers = true, help_heading = "Transport")]
     rounds: Option<u32>,
+    /// End when the relative error is at most this, in per cent of the result's root mean square
+    #[arg(long, value_name = "PERCENT", value_parser = share, allow_negative_numbers = true, help_heading = "Transport")]
+    error: Option<f64>,
+    /// Chance that the error is no larger than stated [default: 95%]
+    #[arg(long, value_name = "PERCENT", value_parser = share, allow_negative_numbers = true, help_heading = "Transport")]
+    confidence: Option<f64>,
+    /// End after this time: 2s, 500ms, 3m
+    #[arg(long, value_name = "TIME", value_parser = seconds, allow_negative_numbers = true, help_heading = "Transport")]
+    time: Option<f64>,
     /// Most bounces of a photon [default: 32]
     #[arg(long, value_parser = whole::<u32>, allow_negative_numbers = true, help_heading = "Transport")]
     bounces: Option<u32>,
@@ -115,6 +125,9 @@ pub(super) struct ReportArgs {
     /// Print which effects were kept or dropped and why, what each cost and gave
     #[arg(long, help_heading = "Output")]
     explain: bool,
+    /// How far the run has come: a bar on a terminal, or lines of JSON on stderr
+    #[arg(long, value_enum, default_value = "bar", help_heading = "Output")]
+    pub(super) progress: ProgressArg,
     /// Report as JSON
     #[arg(long, value_name = "FILE", help_heading = "Output")]
     json: Option<PathBuf>,
@@ -135,6 +148,31 @@ super::run::value_enum!(EffectArg => Effect {
     Direct, Indirect, Glossy, ReflectiveCaustics, RefractiveCaustics, SpecularChains, Textures, Environment, MeshLights,
     PointLights, SpotLights, DirectionalLights, DiscLights, Bvh, TwoSided, SmoothNormals,
 });
+
+/// Rounds of a run that ends by itself.
+const MOST_ROUNDS: u32 = 65_536;
+
+/// `1%` or `1`, per cent.
+fn share(text: &str) -> std::result::Result<f64, String> {
+    let number = text.strip_suffix('%').unwrap_or(text).trim();
+    number.parse().map(|percent: f64| percent / 100.0).map_err(|_| "must be a number of per cent, as 1%".to_owned())
+}
+
+/// `2s`, `500ms`, `3m`, or seconds.
+fn seconds(text: &str) -> std::result::Result<f64, String> {
+    let units = [("ms", 1e-3), ("s", 1.0), ("m", 60.0), ("h", 3600.0)];
+    let (number, unit) = units.iter().find_map(|(name, unit)| Some((text.strip_suffix(name)?, *unit))).unwrap_or((text, 1.0));
+    number.trim().parse().map(|count: f64| count * unit).map_err(|_| "must be a time, as 2s, 500ms or 3m".to_owned())
+}
+
+/// How a run tells how far it has come.
+#[derive(Clone, Copy, PartialEq, Eq, ValueEnum)]
+pub(super) enum ProgressArg {
+    /// A bar, where stderr is a terminal.
+    Bar,
+    /// A line of JSON on stderr at every step.
+    Json,
+}
 
 /// `3:4711`, `3:4711:caustic`.
 pub(super) fn photon_name(text: &str) -> std::result::Result<PhotonName, String> {
@@ -177,7 +215,8 @@ impl TransportArgs {
         TransportSettings {
             photons,
             caustic_photons: self.caustic_photons.unwrap_or(photons),
-            rounds: self.rounds.unwrap_or(usual.rounds),
+            rounds: self.rounds.unwrap_or(if self.error.is_some() || self.time.is_some() { MOST_ROUNDS } else { usual.rounds }),
+            stop: Stop { error: self.error, confidence: self.confidence.unwrap_or(usual.stop.confidence), seconds: self.time },
             bounces: self.bounces.unwrap_or(usual.bounces),
             seed: self.seed.unwrap_or(usual.seed),
             radius: self.radius,
@@ -263,19 +302,50 @@ pub(super) fn geometry(scene: &Scene, settings: &TransportSettings) -> Result<Ge
     Ok(geometry)
 }
 
-/// Runs all rounds, with a bar.
-pub(super) fn light(gpu: &Gpu, job: &Job, geometry: &Geometry, plan: TransportPlan, cancelled: &AtomicBool) -> Result<Lit> {
-    let style =
-        ProgressStyle::with_template("{bar:32} {human_pos}/{human_len} rounds, {per_sec}, {eta} left").expect("the template is valid");
+/// Runs all rounds, and tells how far it has come.
+pub(super) fn light(
+    gpu: &Gpu,
+    job: &Job,
+    geometry: &Geometry,
+    plan: TransportPlan,
+    told: ProgressArg,
+    cancelled: &AtomicBool,
+) -> Result<Lit> {
+    let style = ProgressStyle::with_template("{bar:32} {msg}").expect("the template is valid");
     let bar = ProgressBar::new(u64::from(plan.settings.rounds)).with_style(style);
-    let mut control = Control { cancelled, progress: &mut |done, _| bar.set_position(done) };
+    let mut tell = |progress: &Progress| match told {
+        ProgressArg::Bar => {
+            bar.set_position(((share_done(progress) * progress.total as f64) as u64).min(progress.total));
+            bar.set_message(progress_line(progress));
+        }
+        ProgressArg::Json => {
+            // Where nobody can read it, the run goes on.
+            let _ = writeln!(std::io::stderr(), "{}", serde_json::to_string(progress).expect("progress is plain data"));
+        }
+    };
+    let mut control = Control { cancelled, progress: &mut tell };
     let view = View { geometry, camera: job.camera, phases: job.phases };
     let lit = hearing(|| transport::light(gpu, &view, plan, &mut control))?;
     bar.finish_and_clear();
-    if lit.cancelled {
+    if lit.end == transport::End::Cancelled {
         complain(&format!("ended after {} of {} rounds; what is written is of these", lit.film.rounds, lit.plan.settings.rounds));
     }
     Ok(lit)
+}
+
+/// By the time that is predicted, as a run may end before its last round.
+fn share_done(progress: &Progress) -> f64 {
+    progress.seconds_left.map_or(0.0, |left| progress.seconds / (progress.seconds + left).max(1e-9))
+}
+
+/// Rounds, rate, error now and wanted, and the predicted end.
+fn progress_line(progress: &Progress) -> String {
+    let Progress { done, seconds, photons, .. } = progress;
+    let rate = *photons as f64 / seconds.max(1e-9);
+    let wanted = progress.error_wanted.map_or_else(String::new, |wanted| format!(" of {:.3} % wanted", 100.0 * wanted));
+    let error = progress.error.map_or_else(String::new, |error| format!(", error {:.3} %{wanted}", 100.0 * error));
+    let left = progress.seconds_left.map_or_else(String::new, |left| format!(", {left:.1} s left"));
+    format!("{done} rounds, {rate:.2e} photons/s{error}{left}")
 }
 
 /// Of a picture; numbers of its sums are 32-bit.

@@ -12,7 +12,8 @@ use crate::plan::evidence::EffectDecision;
 use crate::plan::transport::{MapPlan, TransportPlan};
 use crate::settings::transport::{Effect, TransportSettings};
 use crate::timings::{Row, Timings};
-use crate::transport::Lit;
+use crate::transport::stop::error_bound;
+use crate::transport::{End, Lit};
 
 /// A row of the plan: what was decided, and after a run what it cost and gave.
 #[derive(Serialize)]
@@ -99,12 +100,14 @@ struct Report<'a> {
     driver: &'a str,
     settings: &'a TransportSettings,
     plan: PlanReport<'a>,
-    cancelled: bool,
+    end: End,
     rounds: u32,
     /// Of the global map's photons and of the caustic map's.
     ledgers: [Ledger; 2],
     /// Root mean square of the standard errors over that of the values.
     relative_error: f64,
+    /// What the relative error is not above, with the confidence of the settings; null from a single round.
+    error_bound: Option<f64>,
     anomalies: Anomalies,
     /// What `--paranoid` found; null where nobody looked.
     oddities: Option<&'a Oddities>,
@@ -146,10 +149,11 @@ pub fn json(scene: &str, lit: &Lit) -> Vec<u8> {
         driver: &lit.device.driver,
         settings: &lit.plan.settings,
         plan: plan_report(&lit.plan, Some((&lit.timings, &lit.part_totals))),
-        cancelled: lit.cancelled,
+        end: lit.end,
         rounds: lit.film.rounds,
         ledgers: [lit.fates[0].ledger(), lit.fates[1].ledger()],
         relative_error: lit.film.relative_error(&lit.plan),
+        error_bound: Some(error_bound(&lit.film, &lit.plan, lit.plan.settings.stop.confidence)).filter(|bound| bound.is_finite()),
         anomalies: Anomalies { not_a_number: lit.anomalies[0], cut_to_largest: lit.anomalies[1], too_dense: lit.anomalies[2] },
         oddities: lit.oddities.as_ref(),
         timings: lit.timings.rows(),
@@ -167,6 +171,11 @@ pub fn text(scene: &str, lit: &Lit, explain: bool) -> String {
     let maps: Vec<String> = lit.plan.maps().map(|map| format!("{} {} photons", map.photons, map.name)).collect();
     let maps = if maps.is_empty() { "no photons".to_owned() } else { maps.join(" and ") };
     writeln!(text, "{scene}: {} round(s) of {maps}, {} bounces, seed {}", lit.film.rounds, settings.bounces, settings.seed).unwrap();
+    if lit.end != End::Rounds && lit.end != End::Cancelled {
+        let seconds = settings.stop.seconds.unwrap_or_default();
+        let why = if lit.end == End::Time { format!("after {seconds} s") } else { "at the error wanted".to_owned() };
+        writeln!(text, "ended {why}, {} of at most {} rounds", lit.film.rounds, settings.rounds).unwrap();
+    }
     if explain {
         writeln!(text, "\n{}", plan_table(&lit.plan, Some((&lit.timings, &lit.part_totals)))).unwrap();
     }
@@ -193,7 +202,17 @@ pub fn text(scene: &str, lit: &Lit, explain: bool) -> String {
     }
     match lit.film.rounds {
         1 => text.push_str("noise: unknown from a single round\n"),
-        _ => writeln!(text, "noise: {:.2} % of the result's root mean square", 100.0 * lit.film.relative_error(&lit.plan)).unwrap(),
+        _ => {
+            let confidence = settings.stop.confidence;
+            let bound = error_bound(&lit.film, &lit.plan, confidence);
+            let (noise, confidence) = (100.0 * lit.film.relative_error(&lit.plan), 100.0 * confidence);
+            writeln!(
+                text,
+                "noise: {noise:.2} % of the result's root mean square, at most {:.2} % ({confidence} % confidence)",
+                100.0 * bound
+            )
+            .unwrap();
+        }
     }
     text.push('\n');
     text.push_str(&timing_table(&lit.timings, Some(&lit.device)));

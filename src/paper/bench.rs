@@ -104,7 +104,7 @@ impl<'a> Bench<'a> {
 
     fn run_once(&self, settings: &Settings) -> Result<Outcome> {
         let scene = open_box(settings);
-        let mut control = Control { cancelled: self.cancelled, progress: &mut |_, _| {} };
+        let mut control = Control { cancelled: self.cancelled, progress: &mut |_| {} };
         match (settings.variant, self.gpu) {
             (Variant::Cpu, _) | (_, None) => render::on_cpu(&scene, settings, &mut control),
             (_, Some(gpu)) => render::on_gpu(gpu, &scene, settings, &mut control),

@@ -2,7 +2,7 @@
 
 use std::sync::atomic::Ordering;
 
-use super::Control;
+use super::{Control, Progress};
 use crate::error::{Error, Result};
 use crate::ledger::Fates;
 use crate::plan::Plan;
@@ -43,7 +43,8 @@ impl<'a, 'c> Book<'a, 'c> {
         if !ledger.closes() || ledger.dropped != 0 {
             return Err(Error::LedgerOpen { ledger });
         }
-        (self.control.progress)(self.emitted, self.total);
+        let (done, total) = (self.emitted, self.total);
+        (self.control.progress)(&Progress { done, total, photons: done, ..Progress::default() });
         self.cancelled = self.emitted < self.total && self.control.cancelled.load(Ordering::Relaxed);
         Ok(self.cancelled)
     }

@@ -7,6 +7,8 @@ mod on_gpu;
 
 use std::sync::atomic::AtomicBool;
 
+use serde::Serialize;
+
 pub use on_cpu::{on_cpu, photons_on_cpu, replay_on_cpu};
 pub use on_gpu::{constants, limits, on_gpu, photons_on_gpu, replay_on_gpu};
 
@@ -21,8 +23,24 @@ use crate::timings::Timings;
 pub struct Control<'a> {
     /// Set from outside to end the run after the photons, or the round, under way.
     pub cancelled: &'a AtomicBool,
-    /// Told the photons emitted, or the rounds done, so far, of how many.
-    pub progress: &'a mut dyn FnMut(u64, u64),
+    /// Told from time to time how far the run has come.
+    pub progress: &'a mut dyn FnMut(&Progress),
+}
+
+/// How far a run has come.
+#[derive(Debug, Clone, Default, PartialEq, Serialize)]
+pub struct Progress {
+    /// Photons emitted, or rounds done, and how many there will be at most.
+    pub done: u64,
+    pub total: u64,
+    /// Wall time since the start, and predicted until the end, seconds.
+    pub seconds: f64,
+    pub seconds_left: Option<f64>,
+    /// Relative error that the result has not more of, with the confidence asked for, and the one that is wanted.
+    pub error: Option<f64>,
+    pub error_wanted: Option<f64>,
+    /// Photons traced so far, of all maps.
+    pub photons: u64,
 }
 
 /// What a run leaves behind.

@@ -42,7 +42,7 @@ fn light(gpu: &Gpu, scene: &Scene, settings: &TransportSettings, sensor: Sensor,
             let settings = TransportSettings { seed, ..settings.clone() };
             let plan = TransportPlan::new(scene, &geometry, &settings, sensor, &render::limits(gpu.facts()))?;
             let never = AtomicBool::new(false);
-            let lit = transport::light(gpu, &view, plan, &mut Control { cancelled: &never, progress: &mut |_, _| {} })?;
+            let lit = transport::light(gpu, &view, plan, &mut Control { cancelled: &never, progress: &mut |_| {} })?;
             let sum: f64 = (0..lit.film.pixels()).map(|pixel| lit.film.mean(pixel, &lit.plan).x).sum();
             // What is no number makes the case fail instead of counting as dark.
             Ok(if lit.anomalies == [0, 0, 0] { sum / lit.film.pixels() as f64 } else { f64::NAN })

@@ -31,7 +31,7 @@ fn case(variant: Variant, emission: EmissionLaw, expected: f64) -> Case {
         on_gpu: variant != Variant::Cpu,
         measure: Box::new(move |gpu| {
             let never = AtomicBool::new(false);
-            let mut control = Control { cancelled: &never, progress: &mut |_, _| {} };
+            let mut control = Control { cancelled: &never, progress: &mut |_| {} };
             let scene = open_box(&settings);
             let outcome = match gpu.filter(|_| variant != Variant::Cpu) {
                 Some(gpu) => render::on_gpu(gpu, &scene, &settings, &mut control)?,

@@ -16,12 +16,15 @@ pub mod photons;
 pub mod points;
 pub mod replay;
 pub mod resources;
+pub mod stop;
 
 use std::sync::atomic::Ordering;
 use std::time::{Duration, Instant};
 
 pub use film::RoundFilm;
 use resources::{PhotonBuffers, TransportResources};
+pub use stop::End;
+use stop::Watch;
 
 use crate::constants::PART_COUNT;
 use crate::error::{Error, Result};
@@ -68,7 +71,7 @@ pub struct Lit {
     pub fates: [Fates; 2],
     pub timings: Timings,
     pub device: DeviceFacts,
-    pub cancelled: bool,
+    pub end: End,
     pub dispatches: u64,
     pub submissions: u64,
     pub pipelines: usize,
@@ -121,7 +124,8 @@ pub fn light(gpu: &Gpu, view: &View, plan: TransportPlan, control: &mut Control)
     commands.submit()?;
 
     let mut fates = [Fates::new(plan.settings.bounces), Fates::new(plan.settings.bounces)];
-    let (mut done, mut settled, mut cancelled) = (0, 0, false);
+    let mut watch = Watch::new(plan.settings.stop, started);
+    let (mut done, mut settled, mut end) = (0, 0, End::Rounds);
     for number in 0..plan.settings.rounds {
         commands.scope("round", |commands| {
             one_round(commands, view, Round { resources: &resources, geometry: view.geometry, plan: &plan, number })
@@ -131,28 +135,30 @@ pub fn light(gpu: &Gpu, view: &View, plan: TransportPlan, control: &mut Control)
         // Tallies are 32-bit on the device.
         let open = u64::from(done - settled + 1) * plan.maps().map(|map| u64::from(map.photons)).max().unwrap_or(0);
         let short = commands.timestamps_left() < TIMESTAMPS_PER_ROUND || open > u64::from(u32::MAX);
-        if last || short || commands.work() * 2 >= plan.work_per_submission {
+        if last || short || watch.is_due(done) || commands.work() * 2 >= plan.work_per_submission {
             settle(&mut commands, &resources, &plan, u64::from(done - settled), &mut fates)?;
             settled = done;
-            (control.progress)(u64::from(done), u64::from(plan.settings.rounds));
-            cancelled = !last && control.cancelled.load(Ordering::Relaxed);
-            if cancelled {
+            if watch.is_due(done) {
+                watch.look(&film(&mut commands, &resources, &plan, done)?, &plan);
+            }
+            (control.progress)(&watch.progress(done, &plan));
+            let cancelled = control.cancelled.load(Ordering::Relaxed).then_some(End::Cancelled);
+            if let Some(reason) = watch.end(done).or(cancelled).filter(|_| !last) {
+                end = reason;
                 break;
             }
         }
     }
-    let pixels = plan.sensor.pixels() as usize;
-    let sums = commands.read::<u64>(&resources.film_sums, 3 * pixels)?;
-    let squares = commands.read::<u64>(&resources.film_squares, 6 * pixels)?;
+    let film = film(&mut commands, &resources, &plan, done)?;
     let part_totals = commands.read::<u64>(&resources.part_totals, PART_COUNT as usize)?;
     let anomalies = commands.read::<u32>(&resources.anomalies, 3)?;
     let oddities = if plan.settings.paranoid { Some(Oddities::read(&mut commands, &resources.oddities)?) } else { None };
     gpu.check_validation()?;
     Ok(Lit {
-        film: RoundFilm::new(done, sums, squares),
+        film,
         part_totals,
         fates,
-        cancelled,
+        end,
         dispatches: commands.dispatch_count(),
         submissions: commands.submission_count(),
         pipelines: gpu.pipeline_count() - pipelines_before,
@@ -162,6 +168,13 @@ pub fn light(gpu: &Gpu, view: &View, plan: TransportPlan, control: &mut Control)
         oddities,
         plan,
     })
+}
+
+fn film(commands: &mut Commands, resources: &TransportResources, plan: &TransportPlan, rounds: u32) -> Result<RoundFilm> {
+    let pixels = plan.sensor.pixels() as usize;
+    let sums = commands.read::<u64>(&resources.film_sums, 3 * pixels)?;
+    let squares = commands.read::<u64>(&resources.film_squares, 6 * pixels)?;
+    Ok(RoundFilm::new(rounds, sums, squares))
 }
 
 fn one_round(commands: &mut Commands, view: &View, round: Round) -> Result<()> {

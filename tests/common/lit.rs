@@ -24,7 +24,7 @@ pub const BOTH: [Illumination; 2] = [Illumination::Split, Illumination::Photons]
 /// Runs to the end, with nothing odd.
 pub fn light(gpu: &Gpu, view: &View, plan: TransportPlan) -> Lit {
     let never = AtomicBool::new(false);
-    let lit = transport::light(gpu, view, plan, &mut Control { cancelled: &never, progress: &mut |_, _| {} }).unwrap();
+    let lit = transport::light(gpu, view, plan, &mut Control { cancelled: &never, progress: &mut |_| {} }).unwrap();
     assert_eq!(lit.anomalies, [0, 0, 0], "values that are no number, or too large for the film");
     lit
 }

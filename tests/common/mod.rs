@@ -75,7 +75,7 @@ pub fn run(gpu: &Gpu, settings: &Settings) -> Outcome {
 /// Runs a scene on a device to its end.
 pub fn run_scene(gpu: &Gpu, scene: &RoomScene, settings: &Settings) -> Outcome {
     let never = AtomicBool::new(false);
-    let mut control = Control { cancelled: &never, progress: &mut |_, _| {} };
+    let mut control = Control { cancelled: &never, progress: &mut |_| {} };
     render::on_gpu(gpu, scene, settings, &mut control).unwrap_or_else(|error| panic!("{error}\n{settings:?}"))
 }
 
@@ -87,7 +87,7 @@ pub fn run_on_cpu(settings: &Settings) -> Outcome {
 /// Runs a scene on the CPU builder to its end.
 pub fn run_scene_on_cpu(scene: &RoomScene, settings: &Settings) -> Outcome {
     let never = AtomicBool::new(false);
-    let mut control = Control { cancelled: &never, progress: &mut |_, _| {} };
+    let mut control = Control { cancelled: &never, progress: &mut |_| {} };
     render::on_cpu(scene, settings, &mut control).unwrap_or_else(|error| panic!("{error}\n{settings:?}"))
 }
 
