@@ -74,7 +74,7 @@ impl Oddities {
     /// What a run says of them: one line.
     pub fn text(&self) -> String {
         let Some(first) = self.first.first() else {
-            return "paranoid: every position, direction, flux and radiance is a finite number".to_owned();
+            return "paranoid: nothing infinite and no NaN where it looks (photons as emitted and scattered, light before the film)".to_owned();
         };
         let Oddity { round, item, .. } = first;
         let whose = match first.what {
