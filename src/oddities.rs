@@ -74,7 +74,8 @@ impl Oddities {
     /// What a run says of them: one line.
     pub fn text(&self) -> String {
         let Some(first) = self.first.first() else {
-            return "paranoid: nothing infinite and no NaN where it looks (photons as emitted and scattered, light before the film)".to_owned();
+            return "paranoid: nothing infinite and no NaN where it looks (photons as emitted and scattered, light before the film)"
+                .to_owned();
         };
         let Oddity { round, item, .. } = first;
         let whose = match first.what {
