@@ -3,8 +3,11 @@
 
 layout(constant_id = 31) const bool PARANOID = false;
 
-// [0]: how many there are; then four words each of the first: ODD_..., the photons' domain, round, item.
+// For each kind ODD_...: how many there are, then three words each of the first: the photons' domain, round, item.
+// Kinds have room of their own, so that many pixels do not keep a photon's name out.
 layout(set = 1, binding = 15, scalar) buffer Oddities { uint oddities[]; };
+
+const uint ODDITY_WORDS = 1 + 3 * MAX_ODDITIES;
 
 bool is_finite(float x)
 {
@@ -21,13 +24,14 @@ bool is_finite(vec3 v)
 void note_unless(bool fine, uint what, uint domain, uint round, uint item)
 {
     if (PARANOID) {
-        if (!fine) {
-            uint place = atomicAdd(oddities[0], 1);
+        // As many as count; more would wrap.
+        uint kind = what * ODDITY_WORDS;
+        if (!fine && oddities[kind] < 0x40000000u) {
+            uint place = atomicAdd(oddities[kind], 1);
             if (place < MAX_ODDITIES) {
-                oddities[4 * place + 1] = what;
-                oddities[4 * place + 2] = domain;
-                oddities[4 * place + 3] = round;
-                oddities[4 * place + 4] = item;
+                oddities[kind + 3 * place + 1] = domain;
+                oddities[kind + 3 * place + 2] = round;
+                oddities[kind + 3 * place + 3] = item;
             }
         }
     }

@@ -280,7 +280,9 @@ struct LookupPush {
     uint first_point;
     uint end_point;
     uint point_count;
+    uint points_per_pixel;
     uint arrival;
+    uint round;
     float radius;
     CellPush cells;
 };

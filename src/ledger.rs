@@ -72,6 +72,17 @@ impl Fates {
     }
 }
 
+/// How the one photon of these tallies ended.
+pub fn fate(tallies: &[Tally]) -> &'static str {
+    if tallies.iter().any(|tally| tally.escaped > 0) {
+        "leaves the scene"
+    } else if tallies.iter().any(|tally| tally.absorbed > 0) {
+        "is absorbed"
+    } else {
+        "is cut off at the last bounce"
+    }
+}
+
 #[cfg(test)]
 mod tests {
     use super::*;

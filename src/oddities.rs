@@ -27,45 +27,49 @@ pub enum What {
     Estimate,
 }
 
-/// How many there were, and the first of them.
+/// How many there were, about 2^32 at most, and the first of them, photons before all else: what follows from
+/// them is no news.
 #[derive(Debug, Clone, PartialEq, Eq, Default, Serialize)]
 pub struct Oddities {
     pub count: u32,
     pub first: Vec<Oddity>,
 }
 
-const WORDS: usize = 1 + 4 * MAX_ODDITIES as usize;
+/// Kinds, and words of each in the buffer.
+const KINDS: usize = 3;
+const WORDS: usize = 1 + 3 * MAX_ODDITIES as usize;
 
 /// The buffer in which kernels note what is odd.
 pub fn buffer(gpu: &Gpu, commands: &mut Commands) -> Result<Buffer> {
-    let buffer = gpu.buffer::<u32>("oddities", WORDS as u64, Memory::Device)?;
-    commands.fill(&buffer, 0, WORDS as u64, 0);
+    let buffer = gpu.buffer::<u32>("oddities", (KINDS * WORDS) as u64, Memory::Device)?;
+    commands.fill(&buffer, 0, (KINDS * WORDS) as u64, 0);
     Ok(buffer)
 }
 
 impl Oddities {
     pub fn read(commands: &mut Commands, buffer: &Buffer) -> Result<Oddities> {
-        let words = commands.read::<u32>(buffer, WORDS)?;
-        let noted = words[1..].chunks_exact(4).take(words[0] as usize);
-        let mut first: Vec<Oddity> = noted
-            .map(|note| {
-                let what = match (note[0], note[1]) {
+        let words = commands.read::<u32>(buffer, KINDS * WORDS)?;
+        let mut oddities = Oddities::default();
+        for (kind, words) in words.chunks_exact(WORDS).enumerate() {
+            oddities.count = oddities.count.saturating_add(words[0]);
+            for note in words[1..].chunks_exact(3).take(words[0] as usize) {
+                let what = match (kind as u32, note[0]) {
                     (ODD_PHOTON, DOMAIN_CAUSTIC_PHOTONS) => What::CausticPhoton,
                     (ODD_PHOTON, _) => What::Photon,
                     (ODD_LIGHT, _) => What::SeenLight,
                     _ => What::Estimate,
                 };
-                Oddity { what, round: note[2], item: note[3] }
-            })
-            .collect();
+                oddities.first.push(Oddity { what, round: note[1], item: note[2] });
+            }
+        }
         // Devices note in any order.
-        first.sort_by_key(|oddity| (oddity.round, oddity.what as u32, oddity.item));
-        first.dedup();
-        Ok(Oddities { count: words[0], first })
+        oddities.first.sort_by_key(|oddity| (oddity.what as u32, oddity.round, oddity.item));
+        oddities.first.dedup();
+        Ok(oddities)
     }
 
     pub fn add(&mut self, what: What, round: u32, item: u32) {
-        self.count += 1;
+        self.count = self.count.saturating_add(1);
         if self.first.len() < MAX_ODDITIES as usize {
             self.first.push(Oddity { what, round, item });
         }
@@ -74,13 +78,14 @@ impl Oddities {
     /// What a run says of them: one line.
     pub fn text(&self) -> String {
         let Some(first) = self.first.first() else {
-            return "paranoid: nothing infinite and no NaN where it looks (photons as emitted and scattered, light before the film)"
-                .to_owned();
+            return "paranoid: no position, direction, flux or radiance is infinite or no number".to_owned();
         };
         let Oddity { round, item, .. } = first;
         let whose = match first.what {
-            What::Photon => format!("photon {item} of round {round}; --replay {round}:{item} traces it alone"),
-            What::CausticPhoton => format!("caustic photon {item} of round {round}; --replay {round}:{item}:caustic traces it alone"),
+            What::Photon => format!("photon {item} of round {round}; run or render with --replay {round}:{item} traces it alone"),
+            What::CausticPhoton => {
+                format!("caustic photon {item} of round {round}; render with --replay {round}:{item}:caustic traces it alone")
+            }
             What::SeenLight => format!("light at pixel or point {item} in round {round}"),
             What::Estimate => format!("the estimate at pixel or point {item} in round {round}"),
         };

@@ -410,8 +410,10 @@ records! {
         first_point: u32,
         end_point: u32,
         point_count: u32,
+        points_per_pixel: u32,
         /// Index of the arrival that the map holds, where it holds one only: where its sums stand.
         arrival: u32,
+        round: u32,
         radius: f32,
         cells: CellPush,
     }

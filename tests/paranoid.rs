@@ -78,7 +78,7 @@ fn a_planted_value_is_counted_and_its_photon_named() {
         let plan = plan_of(&gpu, &scene, &geometry, &settings);
         let named: BTreeSet<u32> = oddities.first.iter().filter(|oddity| oddity.what == What::Photon).map(|oddity| oddity.item).collect();
         // All of them were written down, so that those not named have nothing odd.
-        assert!(oddities.first.len() < 64 && !named.is_empty(), "{oddities:?}");
+        assert!(named.len() < 60 && !named.is_empty(), "{oddities:?}");
         for photon in named.iter().copied().take(6).chain((0..400).filter(|photon| !named.contains(photon)).take(6)) {
             let path = replay(&gpu, &geometry, &plan, PhotonName { round: 0, photon, caustic: false }).unwrap();
             assert_eq!(path.oddities.unwrap().count > 0, named.contains(&photon), "photon {photon}: {:?}", path.vertices);
@@ -97,7 +97,7 @@ fn a_photon_alone_takes_the_path_that_it_takes_among_others() {
             let most = all.iter().max_by_key(|photon| photon.bounce).unwrap().photon;
             for photon in [0, 1, most, settings.photons / 2, settings.photons - 1] {
                 let expected: Vec<_> = all.iter().copied().filter(|stored| stored.photon == photon).collect();
-                let found = in_order(render::replay_on_gpu(&gpu, &open_box(&settings), &settings, 0, photon).unwrap());
+                let found = in_order(render::replay_on_gpu(&gpu, &open_box(&settings), &settings, 0, photon).unwrap().stored);
                 assert_eq!(found, expected, "{variant:?}, photon {photon}");
             }
         }
@@ -105,6 +105,6 @@ fn a_photon_alone_takes_the_path_that_it_takes_among_others() {
         let most = all.iter().max_by_key(|photon| photon.bounce).unwrap().photon;
         let expected: Vec<_> = all.into_iter().filter(|stored| stored.photon == most).collect();
         assert!(expected.len() > 5);
-        assert_eq!(in_order(render::replay_on_cpu(&open_box(&settings), &settings, 0, most).unwrap()), expected);
+        assert_eq!(in_order(render::replay_on_cpu(&open_box(&settings), &settings, 0, most).unwrap().stored), expected);
     }
 }

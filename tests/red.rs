@@ -21,7 +21,7 @@ use photonmill::selfcheck::measure::irradiance;
 use photonmill::selfcheck::{self, Finding};
 use photonmill::settings::transport::{Append, Illumination, TransportSettings};
 use photonmill::settings::{Gather, Math, Settings, Variant};
-use photonmill::transport::{self, RoundFilm, View};
+use photonmill::transport::{self, Lit, RoundFilm, View};
 
 /// What is asked of a device.
 #[derive(Debug, Clone, Copy)]
@@ -40,6 +40,8 @@ enum Question {
     Gap,
     /// Strict quotients and roots are IEEE 754's.
     StrictMath,
+    /// `--paranoid` finds nothing that is infinite or no number.
+    Finite,
 }
 
 use Question::*;
@@ -56,7 +58,7 @@ struct Fault {
     noticed_by: &'static [Question],
 }
 
-const FAULTS: [Fault; 18] = [
+const FAULTS: [Fault; 24] = [
     Fault {
         what: "every other lane of a subgroup writes over its neighbour",
         file: "append/ballot.glsl",
@@ -205,6 +207,54 @@ const FAULTS: [Fault; 18] = [
         kernels: &["check_math"],
         noticed_by: &[StrictMath],
     },
+    Fault {
+        what: "a light in 50 shines with no number",
+        file: "scene/direct.glsl",
+        from: "float cosine = dot(arriving.wi, point.ns);",
+        to: "if (u.y < 0.02) arriving.radiance.x = uintBitsToFloat(0x7fc00000u);\n        float cosine = dot(arriving.wi, point.ns);",
+        kernels: &["view"],
+        noticed_by: &[Finite],
+    },
+    Fault {
+        what: "a photon in 500 starts nowhere",
+        file: "stages/flight.glsl",
+        from: "surface.ng, scatter.direction);",
+        to: "surface.ng, scatter.direction);\n            if (u.z < 0.002) start.y = uintBitsToFloat(0x7fc00000u);",
+        kernels: &["fly_ballot"],
+        noticed_by: &[Finite],
+    },
+    Fault {
+        what: "a photon in 500 carries no number into the map",
+        file: "stages/flight.glsl",
+        from: "map[place] = photon;",
+        to: "if (path.photon % 500u == 7u) photon.flux.y = uintBitsToFloat(0x7fc00000u);\n        map[place] = photon;",
+        kernels: &["fly_ballot"],
+        noticed_by: &[Finite],
+    },
+    Fault {
+        what: "a path from the eye goes on nowhere",
+        file: "stages/chain.glsl",
+        from: "chain.direction = scatter.direction;",
+        to: "chain.direction = scatter.direction;\n        if (u.x < 0.01) chain.direction.z = uintBitsToFloat(0x7fc00000u);",
+        kernels: &["view"],
+        noticed_by: &[Finite],
+    },
+    Fault {
+        what: "a path from the eye goes on from nowhere",
+        file: "stages/chain.glsl",
+        from: "chain.direction = scatter.direction;",
+        to: "chain.direction = scatter.direction;\n        if (u.x < 0.01) chain.position.z = uintBitsToFloat(0x7fc00000u);",
+        kernels: &["view"],
+        noticed_by: &[Finite],
+    },
+    Fault {
+        what: "a reflected direction of the paper's box is no number",
+        file: "stages/trace.glsl",
+        from: "path.wall = hit.wall;",
+        to: "path.wall = hit.wall;\n        if (u.x < 0.002) path.direction.y = uintBitsToFloat(0x7fc00000u);",
+        kernels: &["trace_atomic"],
+        noticed_by: &[Finite],
+    },
 ];
 
 fn strict() -> Settings {
@@ -222,13 +272,17 @@ fn small() -> TransportSettings {
     }
 }
 
-fn film(gpu: &Gpu, scene: &Scene, settings: &TransportSettings) -> RoundFilm {
+fn lit(gpu: &Gpu, scene: &Scene, settings: &TransportSettings) -> Lit {
     let geometry = Geometry::new(scene).unwrap();
     let plan =
         TransportPlan::new(scene, &geometry, settings, Sensor::Picture { width: 16, height: 16 }, &render::limits(gpu.facts())).unwrap();
     let never = AtomicBool::new(false);
     let view = View { geometry: &geometry, camera: scene.cameras.first(), phases: &[] };
-    transport::light(gpu, &view, plan, &mut Control { cancelled: &never, progress: &mut |_| {} }).unwrap().film
+    transport::light(gpu, &view, plan, &mut Control { cancelled: &never, progress: &mut |_| {} }).unwrap()
+}
+
+fn film(gpu: &Gpu, scene: &Scene, settings: &TransportSettings) -> RoundFilm {
+    lit(gpu, scene, settings).film
 }
 
 fn same_film(found: &RoundFilm, expected: &RoundFilm) -> Check {
@@ -297,6 +351,26 @@ fn ask(gpu: &Gpu, question: Question) -> Check {
             leaked => Err(format!("{leaked} W/m2 leave the box")),
         },
         StrictMath => check::strict_math(gpu).map_err(|error| error.to_string()),
+        Finite => {
+            let scene = built_in::by_name("cornell-spheres").unwrap();
+            let (count, text) = [Illumination::Split, Illumination::Photons]
+                .map(|illumination| {
+                    let settings = TransportSettings { illumination, paranoid: true, rounds: 1, ..small() };
+                    lit(gpu, &scene, &settings).oddities.unwrap()
+                })
+                .into_iter()
+                .chain([render::on_gpu(
+                    gpu,
+                    &open_box(&strict()),
+                    &Settings { paranoid: true, ..strict() },
+                    &mut Control { cancelled: &never, progress: &mut |_| {} },
+                )
+                .unwrap()
+                .oddities
+                .unwrap()])
+                .fold((0, String::new()), |(count, _), oddities| (count + oddities.count, oddities.text()));
+            if count == 0 { Ok(()) } else { Err(text) }
+        }
     }
 }
 

@@ -11,6 +11,7 @@ layout(local_size_x_id = 0) in;
 layout(push_constant, scalar) uniform Push { LookupPush push; };
 
 #include "math.glsl"
+#include "oddities.glsl"
 #include "film/film.glsl"
 #include "film/two_words.glsl"
 #include "scene/directions.glsl"

@@ -13,6 +13,7 @@ layout(local_size_x_id = 0) in;
 layout(push_constant, scalar) uniform Push { LookupPush push; };
 
 #include "math.glsl"
+#include "oddities.glsl"
 #include "film/film.glsl"
 #include "film/u64.glsl"
 #include "scene/directions.glsl"

@@ -53,7 +53,9 @@ void main()
     // Photons only ever land on surfaces, and tell the irradiance of those: any other point, or direction, looks
     // around.
     bool whole;
-    bool on_surface = covered_area(receiver.position, ng, push.radius, RECEIVER_NORMAL_COSINE, whole) > 0.0;
+    float covered = covered_area(receiver.position, ng, push.radius, RECEIVER_NORMAL_COSINE, whole);
+    note_unless(is_finite(covered), ODD_LIGHT, push.draws.domain, push.draws.round, index);
+    bool on_surface = covered > 0.0;
     bool gathers = GATHER_RAYS == GATHER_ALL || !on_surface;
     if (on_surface) {
         uint arrivals = arrivals_wanted(chain, gathers);

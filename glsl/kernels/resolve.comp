@@ -39,12 +39,13 @@ vec3 gathered_flux(uint place)
 }
 
 // Area in which photons were looked for, weighted by the kernel.
-float estimate_area(VisiblePoint point, float radius)
+float estimate_area(VisiblePoint point, uint pixel, float radius)
 {
     float area = 3.14159265358979324 * kernel_norm() * radius * radius;
     if (HAS_EDGE_CORRECTION) {
         bool whole;
         float covered = covered_area(point.position, unpack_normal(point.normal), radius, MIN_NORMAL_COSINE, whole);
+        note_unless(is_finite(covered), ODD_ESTIMATE, 0, push.round, pixel);
         if (whole) {
             atomicAdd(anomalies[2], 1);
         }
@@ -94,7 +95,7 @@ void main()
             }
             float area = is_caustic ? 0.0 : global_area;
             if (area == 0.0) {
-                area = estimate_area(point, is_caustic ? push.caustic_radius : push.global_radius);
+                area = estimate_area(point, pixel, is_caustic ? push.caustic_radius : push.global_radius);
             }
             global_area = is_caustic ? global_area : area;
             vec3 radiance = point.weight * (flux * divide(is_caustic ? push.caustic_flux : push.global_flux, area));

@@ -9,7 +9,7 @@ layout(set = 1, binding = 0, scalar) buffer Anomalies { uint anomalies[]; };
 uvec2 to_film_units(float value, float scale, float limit)
 {
     float units = roundEven(value * scale);
-    if (isnan(units) || isinf(units)) {
+    if (!is_finite(units)) {
         atomicAdd(anomalies[0], 1);
         return uvec2(0);
     }

@@ -38,7 +38,8 @@ void add_light(inout Chain chain, vec3 radiance)
     }
 }
 
-// The arrivals at the current vertex that some part asks for // by photons: shadow rays see to direct light, and a gather ray to indirect.
+// The arrivals at the current vertex that some part asks for by photons: shadow rays see to direct light, and a gather
+// ray to indirect.
 uint arrivals_wanted(Chain chain, bool gathers)
 {
     uint wanted = 0;
@@ -66,6 +67,8 @@ bool gathers_here(Surface surface)
 void follow(inout Chain chain, uint index, Draws draws, uint emitter_count)
 {
     for (uint depth = 0; depth < MAX_CHAIN; depth++) {
+        note_unless(is_finite(chain.position) && is_finite(chain.direction) && is_finite(chain.weight), ODD_LIGHT, draws.domain,
+                    draws.round, index);
         vec3 wo = -chain.direction;
         Hit hit = closest_hit(chain.position, chain.direction);
         if (hit.triangle == NONE) {

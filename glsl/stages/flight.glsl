@@ -36,9 +36,10 @@ void fly()
                     flux *= min(gain * back_gain, float(MAX_SHADING_GAIN));
                 }
             }
+            vec3 start = offset_origin(surface.position, surface.error, surface.ng, scatter.direction);
             // Before the cuts below, which would hide what is no number.
-            note_unless(is_finite(surface.position) && is_finite(scatter.direction) && is_finite(flux), ODD_PHOTON, push.draws.domain,
-                        push.draws.round, path.photon);
+            note_unless(is_finite(photon.position) && is_finite(photon.flux) && is_finite(start) && is_finite(scatter.direction)
+                            && is_finite(flux), ODD_PHOTON, push.draws.domain, push.draws.round, path.photon);
             float before = max(path.flux.x, max(path.flux.y, path.flux.z));
             float after = max(flux.x, max(flux.y, flux.z));
             // Survival in proportion to the flux that is left, so that survivors carry about what they did.
@@ -52,7 +53,6 @@ void fly()
                 bool wanted = ((push.caustic_surfaces >> surface.kind) & 1u) != 0;
                 onward = path.arrival >= ARRIVED_INDIRECT ? path.arrival : (wanted ? ARRIVED_CAUSTIC : ARRIVED_UNWANTED);
             }
-            vec3 start = offset_origin(surface.position, surface.error, surface.ng, scatter.direction);
             path = LightPath(start, path.photon, scatter.direction, onward, flux);
         }
     }

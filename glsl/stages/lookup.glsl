@@ -58,6 +58,7 @@ void look_up()
                             weight *= point.normal == point.shading_normal ? 1.0 : shading_gain(cosine, dot(wi, photon_normal));
                         }
                         precise vec3 flux = photon.flux * weight;
+                        note_unless(is_finite(flux), ODD_ESTIMATE, 0, push.round, index / push.points_per_pixel);
                         [[unroll]] for (uint channel = 0; channel < 3; channel++) {
                             uint amount = to_fixed_point(flux[channel], float(1u << FLUX_BITS));
                             if (HAS_ALL_ARRIVALS) {

@@ -43,7 +43,8 @@ pub(super) struct RenderArgs {
     judge: Option<u32>,
     /// Trace one photon of the run by itself, print its path and end: round and number from 0, `:caustic` for one of
     /// the caustic map
-    #[arg(long, value_name = "ROUND:PHOTON", value_parser = photon_name, help_heading = "Output")]
+    #[arg(long, value_name = "ROUND:PHOTON", value_parser = photon_name, help_heading = "Output",
+        conflicts_with_all = ["output", "error_image", "exposure", "judge", "explain", "json", "trace", "time_dispatches"])]
     replay: Option<PhotonName>,
     /// Camera by name [default: the first; one that sees everything if there is none]
     #[arg(long, value_name = "NAME", help_heading = "Scene")]

@@ -100,7 +100,8 @@ pub(super) struct RunArgs {
     #[arg(long, help_heading = "Output")]
     paranoid: bool,
     /// Trace one photon of the run by itself, print where it is stored and end: round and number from 0
-    #[arg(long, value_name = "ROUND:PHOTON", value_parser = photon_name, help_heading = "Output")]
+    #[arg(long, value_name = "ROUND:PHOTON", value_parser = photon_name, help_heading = "Output",
+        conflicts_with_all = ["output", "irradiance", "radiosity", "json", "trace", "time_dispatches"])]
     replay: Option<PhotonName>,
     /// Time every dispatch on the device, not only every pass
     #[arg(long, help_heading = "Device")]
@@ -275,20 +276,27 @@ pub(super) fn run(args: &RunArgs, cancelled: &AtomicBool) -> Result<End> {
 fn show_photon(args: &RunArgs, settings: &Settings, scene: &RoomScene, name: PhotonName) -> Result<End> {
     let PhotonName { round, photon, caustic } = name;
     if caustic {
-        return Err(Error::setting("--replay", format!("{round}:{photon}:caustic"), "the paper's box has one map; leave :caustic out"));
+        return Err(Error::setting("--replay", name, "the paper's box has one map; leave :caustic out"));
     }
     let gpu = if settings.variant == Variant::Cpu { None } else { args.device.open(false)? };
-    let stored = match &gpu {
+    let path = match &gpu {
         Some(gpu) => render::replay_on_gpu(gpu, scene, settings, round, photon)?,
         None => render::replay_on_cpu(scene, settings, round, photon)?,
     };
+    let name_of = |wall: u32| scene.faces[wall as usize].as_ref().map_or("opening", |wall| wall.name);
+    let (p, d) = (path.start.position, path.start.direction);
+    say(&format!("photon {photon} of round {round}, seed {}", settings.seed))?;
     say(&format!("{:>6} {:<8} {:>10} {:>10} {:>10} {:>10}", "bounce", "wall", "x, m", "y", "z", "weight"))?;
-    for photon in &stored {
-        let wall = scene.faces[photon.wall as usize].as_ref().map_or("opening", |wall| wall.name);
-        let p = photon.position;
-        say(&format!("{:>6} {wall:<8} {:>10.6} {:>10.6} {:>10.6} {:>10.6}", photon.bounce, p.x, p.y, p.z, photon.weight))?;
+    let start = name_of(path.start.wall);
+    say(&format!("{:>6} {start:<8} {:>10.6} {:>10.6} {:>10.6}   towards {:.6}, {:.6}, {:.6}", "light", p.x, p.y, p.z, d.x, d.y, d.z))?;
+    for photon in &path.stored {
+        let (wall, p) = (name_of(photon.wall), photon.position);
+        say(&format!("{:>6} {wall:<8} {:>10.6} {:>10.6} {:>10.6} {:>10.6}", photon.bounce + 1, p.x, p.y, p.z, photon.weight))?;
     }
-    say(&format!("stored {} time(s), then absorbed, out of the box or cut off", stored.len()))?;
+    say(&format!("stored {} time(s), then it {}", path.stored.len(), path.fate))?;
+    if let Some(oddities) = &path.oddities {
+        say(&oddities.text())?;
+    }
     Ok(End::Finished)
 }
 

@@ -17,6 +17,7 @@ use crate::gpu::DeviceFacts;
 use crate::ledger::Fates;
 use crate::oddities::Oddities;
 use crate::plan::Plan;
+use crate::records::{Path, Photon};
 use crate::timings::Timings;
 
 /// How a caller watches a run and ends it early.
@@ -56,6 +57,17 @@ pub struct Outcome {
     pub cancelled: bool,
     pub dispatches: u64,
     pub submissions: u64,
+    /// What `--paranoid` found; `None` where nobody looked.
+    pub oddities: Option<Oddities>,
+}
+
+/// One photon of a run by itself.
+#[derive(Debug, Clone, PartialEq)]
+pub struct Replayed {
+    /// As it leaves its light.
+    pub start: Path,
+    pub stored: Vec<Photon>,
+    pub fate: &'static str,
     /// What `--paranoid` found; `None` where nobody looked.
     pub oddities: Option<Oddities>,
 }

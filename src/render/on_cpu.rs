@@ -3,14 +3,15 @@
 use rayon::{ThreadPool, ThreadPoolBuilder};
 
 use super::book::Book;
-use super::{Control, Outcome};
+use super::{Control, Outcome, Replayed};
 use crate::cpu::trace::Tracer;
 use crate::cpu::{estimate, index::Index};
 use crate::error::{Error, Result};
 use crate::film::Film;
+use crate::ledger::fate;
 use crate::oddities::{Oddities, What};
 use crate::plan::{EmissionRange, Limits, Plan, photons_of};
-use crate::records::{Photon, Tally};
+use crate::records::{Path, Photon, Tally};
 use crate::scene::room::RoomScene;
 use crate::settings::{Settings, Variant};
 use crate::timings::HostClock;
@@ -27,10 +28,7 @@ pub fn on_cpu(scene: &RoomScene, settings: &Settings, control: &mut Control) -> 
     for round in 0..settings.rounds {
         clock.time("round", |clock| {
             for ranges in plan.chunks() {
-                let (photons, tallies) = clock.time("build", |clock| trace(&pool, &tracer, &plan, round, &ranges, clock));
-                if settings.paranoid {
-                    photons.iter().filter(|photon| !is_finite(photon)).for_each(|photon| oddities.add(What::Photon, round, photon.photon));
-                }
+                let (photons, tallies) = clock.time("build", |clock| trace(&pool, &tracer, &plan, round, &ranges, clock, &mut oddities));
                 if plan.gathers_by_grid() {
                     let index = clock.time("index", |_| Index::build(plan.grid, &photons));
                     clock.time("gather", |_| pool.install(|| estimate::gather_grid(&plan, &index, &mut sums)));
@@ -61,8 +59,14 @@ pub fn on_cpu(scene: &RoomScene, settings: &Settings, control: &mut Control) -> 
     })
 }
 
-fn is_finite(photon: &Photon) -> bool {
-    photon.position.is_finite() && photon.weight.is_finite() && photon.flux.is_finite()
+/// Notes what no path and no photon may hold.
+fn look_at(paths: &[Path], photons: &[Photon], round: u32, oddities: &mut Oddities) {
+    let odd_paths = paths.iter().filter(|path| !(path.position.is_finite() && path.direction.is_finite() && path.flux.is_finite()));
+    let odd_photons =
+        photons.iter().filter(|photon| !(photon.position.is_finite() && photon.weight.is_finite() && photon.flux.is_finite()));
+    for photon in odd_paths.map(|path| path.photon).chain(odd_photons.map(|photon| photon.photon)) {
+        oddities.add(What::Photon, round, photon);
+    }
 }
 
 fn plan(scene: &RoomScene, settings: &Settings) -> Result<Plan> {
@@ -86,12 +90,19 @@ fn trace(
     round: u32,
     ranges: &[EmissionRange],
     clock: &mut HostClock,
+    oddities: &mut Oddities,
 ) -> (Vec<Photon>, Vec<Tally>) {
     let mut paths = clock.time("emit", |_| tracer.emit(round, ranges));
+    if plan.settings.paranoid {
+        look_at(&paths, &[], round, oddities);
+    }
     let mut photons = Vec::new();
     let mut tallies = Vec::new();
     for bounce in 0..plan.settings.bounces {
         let bounced = clock.time(&format!("bounce {}", bounce + 1), |_| pool.install(|| tracer.bounce(&paths, round, bounce)));
+        if plan.settings.paranoid {
+            look_at(&bounced.paths, &bounced.photons, round, oddities);
+        }
         photons.extend(bounced.photons);
         tallies.push(bounced.tally);
         paths = bounced.paths;
@@ -99,11 +110,16 @@ fn trace(
     (photons, tallies)
 }
 
-/// One photon by itself: what is stored of it.
-pub fn replay_on_cpu(scene: &RoomScene, settings: &Settings, round: u32, photon: u32) -> Result<Vec<Photon>> {
+/// One photon by itself.
+pub fn replay_on_cpu(scene: &RoomScene, settings: &Settings, round: u32, photon: u32) -> Result<Replayed> {
     let plan = plan(scene, settings)?;
     let tracer = Tracer::new(scene, &plan);
-    Ok(trace(&thread_pool(settings)?, &tracer, &plan, round, &[plan.range_of(photon)?], &mut HostClock::start("run")).0)
+    let ranges = [plan.range_of(round, photon)?];
+    let start = tracer.emit(round, &ranges)[0];
+    let mut oddities = Oddities::default();
+    let (stored, tallies) =
+        trace(&thread_pool(settings)?, &tracer, &plan, round, &ranges, &mut HostClock::start("run"), &mut oddities);
+    Ok(Replayed { start, stored, fate: fate(&tallies), oddities: settings.paranoid.then_some(oddities) })
 }
 
 /// The photon map of round 0, for comparing builders.
@@ -112,5 +128,5 @@ pub fn photons_on_cpu(scene: &RoomScene, settings: &Settings) -> Result<Vec<Phot
     let plan = plan(scene, settings)?;
     let pool = thread_pool(settings)?;
     let tracer = Tracer::new(scene, &plan);
-    Ok(plan.chunks().flat_map(|ranges| trace(&pool, &tracer, &plan, 0, &ranges, &mut clock).0).collect())
+    Ok(plan.chunks().flat_map(|ranges| trace(&pool, &tracer, &plan, 0, &ranges, &mut clock, &mut Oddities::default()).0).collect())
 }

@@ -3,15 +3,16 @@
 use std::time::Instant;
 
 use super::book::Book;
-use super::{Control, Outcome};
+use super::{Control, Outcome, Replayed};
 use crate::constants::NO_WALL;
 use crate::error::Result;
 use crate::film::Film;
 use crate::gpu::check::strict_math;
 use crate::gpu::{Commands, Constants, DeviceFacts, Gpu};
+use crate::ledger::fate;
 use crate::oddities::Oddities;
 use crate::plan::{EmissionRange, Limits, Plan, photons_of};
-use crate::records::{Photon, Tally};
+use crate::records::{Path, Photon, Tally};
 use crate::resources::Resources;
 use crate::scene::room::RoomScene;
 use crate::settings::{Math, Settings};
@@ -123,27 +124,39 @@ fn settle(commands: &mut Commands, resources: &Resources, book: &mut Book) -> Re
 /// The photon map of round 0, for comparing builders.
 pub fn photons_on_gpu(gpu: &Gpu, scene: &RoomScene, settings: &Settings) -> Result<Vec<Photon>> {
     let plan = Plan::new(scene, settings, &limits(gpu.facts()))?;
-    stored(gpu, scene, &plan, 0, plan.chunks())
-}
-
-/// One photon by itself: what is stored of it. A photon is (seed, round, number), so it takes the same path alone as
-/// among millions.
-pub fn replay_on_gpu(gpu: &Gpu, scene: &RoomScene, settings: &Settings, round: u32, photon: u32) -> Result<Vec<Photon>> {
-    let plan = Plan::new(scene, settings, &limits(gpu.facts()))?;
-    stored(gpu, scene, &plan, round, std::iter::once(vec![plan.range_of(photon)?]))
-}
-
-fn stored(gpu: &Gpu, scene: &RoomScene, plan: &Plan, round: u32, chunks: impl Iterator<Item = Vec<EmissionRange>>) -> Result<Vec<Photon>> {
-    let mut commands = Commands::new(gpu, constants(plan), Instant::now())?;
-    let resources = Resources::new(gpu, &mut commands, scene, plan)?;
+    let mut commands = Commands::new(gpu, constants(&plan), Instant::now())?;
+    let resources = Resources::new(gpu, &mut commands, scene, &plan)?;
     let mut photons = Vec::new();
-    for ranges in chunks {
-        trace::chunk(&mut commands, &resources, plan, round, &ranges)?;
-        let capacity = trace::photon_list_capacity(plan, photons_of(&ranges));
-        let length = if plan.has_slots() { capacity } else { commands.read::<u32>(&resources.counters, 1)?[0].min(capacity) };
-        let stored = commands.read::<Photon>(&resources.photons, length as usize)?;
-        photons.extend(stored.into_iter().filter(|photon| photon.wall != NO_WALL));
+    for ranges in plan.chunks() {
+        photons.extend(stored(&mut commands, &resources, &plan, 0, &ranges)?);
     }
     gpu.check_validation()?;
     Ok(photons)
+}
+
+/// One photon by itself. A photon is (seed, round, number), so it takes the same path alone as among millions.
+pub fn replay_on_gpu(gpu: &Gpu, scene: &RoomScene, settings: &Settings, round: u32, photon: u32) -> Result<Replayed> {
+    let plan = Plan::new(scene, settings, &limits(gpu.facts()))?;
+    if settings.math == Math::Strict {
+        strict_math(gpu)?;
+    }
+    let ranges = [plan.range_of(round, photon)?];
+    let mut commands = Commands::new(gpu, constants(&plan), Instant::now())?;
+    let resources = Resources::new(gpu, &mut commands, scene, &plan)?;
+    trace::emit(&mut commands, &resources, &plan, round, &ranges)?;
+    let start = commands.read::<Path>(&resources.paths[0], 1)?[0];
+    let stored = stored(&mut commands, &resources, &plan, round, &ranges)?;
+    let tallies: Vec<Tally> = commands.read(&resources.tallies, settings.bounces as usize)?;
+    let oddities = if settings.paranoid { Some(Oddities::read(&mut commands, &resources.oddities)?) } else { None };
+    gpu.check_validation()?;
+    Ok(Replayed { start, stored, fate: fate(&tallies), oddities })
+}
+
+/// What a chunk leaves in the photon map.
+fn stored(commands: &mut Commands, resources: &Resources, plan: &Plan, round: u32, ranges: &[EmissionRange]) -> Result<Vec<Photon>> {
+    trace::chunk(commands, resources, plan, round, ranges)?;
+    let capacity = trace::photon_list_capacity(plan, photons_of(ranges));
+    let length = if plan.has_slots() { capacity } else { commands.read::<u32>(&resources.counters, 1)?[0].min(capacity) };
+    let stored = commands.read::<Photon>(&resources.photons, length as usize)?;
+    Ok(stored.into_iter().filter(|photon| photon.wall != NO_WALL).collect())
 }

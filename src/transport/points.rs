@@ -113,7 +113,7 @@ pub fn see(commands: &mut Commands, round: Round, camera: Option<&Camera>) -> Re
 pub fn look_up(commands: &mut Commands, round: Round, photons: &PhotonBuffers, map: &MapPlan, cells_push: CellPush) -> Result<()> {
     let Round { resources, plan, number: round, .. } = round;
     let PhotonBuffers { cells, sorted_map, longest, dispatch_args, .. } = photons;
-    let TransportResources { visible_points, estimates, .. } = resources;
+    let TransportResources { visible_points, estimates, oddities, .. } = resources;
     let point_count = plan.visible_points();
     let step = (plan.work_per_submission / TESTS_PER_POINT).clamp(1 << 12, 1 << 22) as u32;
     for (first_point, end_point) in runs(point_count, step) {
@@ -121,7 +121,9 @@ pub fn look_up(commands: &mut Commands, round: Round, photons: &PhotonBuffers, m
             first_point,
             end_point,
             point_count,
+            points_per_pixel: plan.points_per_pixel,
             arrival: map.stored.trailing_zeros(),
+            round,
             radius: plan.radius(map, round) as f32,
             cells: cells_push,
         };
@@ -136,9 +138,9 @@ pub fn look_up(commands: &mut Commands, round: Round, photons: &PhotonBuffers, m
         commands.dispatch(SliceCount { longest, dispatch_args }, &size, Extent::Groups(1, 1))?;
         let extent = Extent::Indirect(dispatch_args);
         if commands.facts().int64_atomics {
-            commands.dispatch(LookupU64 { visible_points, film: estimates, cells, sorted_map }, &push, extent)?;
+            commands.dispatch(LookupU64 { visible_points, film: estimates, cells, sorted_map, oddities }, &push, extent)?;
         } else {
-            commands.dispatch(LookupTwoWords { visible_points, film: estimates, cells, sorted_map }, &push, extent)?;
+            commands.dispatch(LookupTwoWords { visible_points, film: estimates, cells, sorted_map, oddities }, &push, extent)?;
         }
         add_work(commands, plan, TESTS_PER_POINT * u64::from(end_point - first_point))?;
     }

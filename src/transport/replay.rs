@@ -7,11 +7,14 @@ use super::resources::TransportResources;
 use super::{Round, constants, photons};
 use crate::constants::{DOMAIN_CAUSTIC_PHOTONS, DOMAIN_PHOTONS};
 use crate::error::{Error, Result};
+use crate::gpu::check::strict_math;
 use crate::gpu::{Commands, Extent, Gpu};
+use crate::ledger::fate;
 use crate::oddities::Oddities;
 use crate::plan::transport::{MapPlan, TransportPlan};
 use crate::records::{LightPath, Tally};
 use crate::scene::geometry::Geometry;
+use crate::settings::Math;
 
 /// Which photon.
 #[derive(Debug, Clone, Copy, PartialEq, Eq)]
@@ -20,6 +23,12 @@ pub struct PhotonName {
     pub photon: u32,
     /// Of the caustic map.
     pub caustic: bool,
+}
+
+impl std::fmt::Display for PhotonName {
+    fn fmt(&self, f: &mut std::fmt::Formatter) -> std::fmt::Result {
+        write!(f, "{}:{}{}", self.round, self.photon, if self.caustic { ":caustic" } else { "" })
+    }
 }
 
 /// The photon as it left its light and each surface, normalised as in the kernels, and how it ended.
@@ -36,20 +45,22 @@ pub fn replay(gpu: &Gpu, geometry: &Geometry, plan: &TransportPlan, name: Photon
     let PhotonName { round: number, photon, caustic } = name;
     let domain = if caustic { DOMAIN_CAUSTIC_PHOTONS } else { DOMAIN_PHOTONS };
     let kind = if caustic { "caustic" } else { "global" };
-    let shown = format!("{number}:{photon}");
+    let refuse = |allowed: String| Error::setting("--replay", name, allowed);
+    let rounds = plan.settings.rounds;
+    if number >= rounds {
+        return Err(refuse(format!("the run has rounds 0 to {}", rounds - 1)));
+    }
     let Some(map) = plan.maps().find(|map| map.domain == domain) else {
-        return Err(Error::setting("--replay", shown, format!("this run has no {kind} map")));
+        return Err(refuse(format!("this run has no {kind} map")));
     };
     if photon >= map.photons {
-        return Err(Error::setting("--replay", shown, format!("a round has photons 0 to {} in the {kind} map", map.photons - 1)));
+        return Err(refuse(format!("a round has photons 0 to {} in the {kind} map", map.photons - 1)));
+    }
+    if plan.settings.math == Math::Strict {
+        strict_math(gpu)?;
     }
     let Flights { paths, tallies, oddities } = light_paths(gpu, geometry, plan, map, number, (photon, 1), map.bounces)?;
-    let fate = match tallies.last() {
-        Some(tally) if tally.escaped == 1 => "leaves the scene",
-        Some(tally) if tally.absorbed == 1 => "is absorbed",
-        _ => "is cut off at the last bounce",
-    };
-    Ok(Path { name, vertices: paths.concat(), fate, oddities })
+    Ok(Path { name, vertices: paths.concat(), fate: fate(&tallies), oddities })
 }
 
 /// Some photons in flight.

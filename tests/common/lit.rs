@@ -26,7 +26,15 @@ pub fn light(gpu: &Gpu, view: &View, plan: TransportPlan) -> Lit {
     let never = AtomicBool::new(false);
     let lit = transport::light(gpu, view, plan, &mut Control { cancelled: &never, progress: &mut |_| {} }).unwrap();
     assert_eq!(lit.anomalies, [0, 0, 0], "values that are no number, or too large for the film");
+    if let Some(oddities) = &lit.oddities {
+        assert_eq!(oddities.count, 0, "{}", oddities.text());
+    }
     lit
+}
+
+/// The device looks for values that are no finite number.
+fn watched(settings: &TransportSettings) -> TransportSettings {
+    TransportSettings { paranoid: true, ..settings.clone() }
 }
 
 /// What arrives at points (position, normal) of a scene of triangles.
@@ -44,14 +52,15 @@ pub fn received_within(gpu: &Gpu, scene: &Scene, settings: &TransportSettings, p
     };
     let receivers = points.iter().map(receiver).collect();
     let sensor = Sensor::Receivers { count: points.len() as u32 };
-    let plan = TransportPlan::new(scene, &geometry, settings, sensor, limits).unwrap();
+    let plan = TransportPlan::new(scene, &geometry, &watched(settings), sensor, limits).unwrap();
     light(gpu, &View { geometry: &geometry, camera: None, phases: &[receivers] }, plan)
 }
 
 /// What a camera sees of a scene of triangles.
 pub fn seen(gpu: &Gpu, scene: &Scene, settings: &TransportSettings, camera: &Camera, [width, height]: [u32; 2]) -> Lit {
     let geometry = Geometry::new(scene).unwrap();
-    let plan = TransportPlan::new(scene, &geometry, settings, Sensor::Picture { width, height }, &render::limits(gpu.facts())).unwrap();
+    let sensor = Sensor::Picture { width, height };
+    let plan = TransportPlan::new(scene, &geometry, &watched(settings), sensor, &render::limits(gpu.facts())).unwrap();
     light(gpu, &View { geometry: &geometry, camera: Some(camera), phases: &[] }, plan)
 }
 

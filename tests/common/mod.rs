@@ -76,7 +76,15 @@ pub fn run(gpu: &Gpu, settings: &Settings) -> Outcome {
 pub fn run_scene(gpu: &Gpu, scene: &RoomScene, settings: &Settings) -> Outcome {
     let never = AtomicBool::new(false);
     let mut control = Control { cancelled: &never, progress: &mut |_| {} };
-    render::on_gpu(gpu, scene, settings, &mut control).unwrap_or_else(|error| panic!("{error}\n{settings:?}"))
+    let settings = &Settings { paranoid: true, ..settings.clone() };
+    sound(render::on_gpu(gpu, scene, settings, &mut control).unwrap_or_else(|error| panic!("{error}\n{settings:?}")))
+}
+
+/// Whatever is run here has no value that is infinite or no number.
+fn sound(outcome: Outcome) -> Outcome {
+    let oddities = outcome.oddities.as_ref().expect("somebody looked");
+    assert_eq!(oddities.count, 0, "{}", oddities.text());
+    outcome
 }
 
 /// Runs the open box on the CPU builder to its end.
@@ -88,7 +96,8 @@ pub fn run_on_cpu(settings: &Settings) -> Outcome {
 pub fn run_scene_on_cpu(scene: &RoomScene, settings: &Settings) -> Outcome {
     let never = AtomicBool::new(false);
     let mut control = Control { cancelled: &never, progress: &mut |_| {} };
-    render::on_cpu(scene, settings, &mut control).unwrap_or_else(|error| panic!("{error}\n{settings:?}"))
+    let settings = &Settings { paranoid: true, ..settings.clone() };
+    sound(render::on_cpu(scene, settings, &mut control).unwrap_or_else(|error| panic!("{error}\n{settings:?}")))
 }
 
 /// Photons of round 0 of the open box, as a builder of the device stores them.
