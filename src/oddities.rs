@@ -82,9 +82,9 @@ impl Oddities {
         };
         let Oddity { round, item, .. } = first;
         let whose = match first.what {
-            What::Photon => format!("photon {item} of round {round}; run or render with --replay {round}:{item} traces it alone"),
+            What::Photon => format!("photon {item} of round {round}; --replay {round}:{item}, of render or the main job, traces it alone"),
             What::CausticPhoton => {
-                format!("caustic photon {item} of round {round}; render with --replay {round}:{item}:caustic traces it alone")
+                format!("caustic photon {item} of round {round}; --replay {round}:{item}:caustic, of render, traces it alone")
             }
             What::SeenLight => format!("light at pixel or point {item} in round {round}"),
             What::Estimate => format!("the estimate at pixel or point {item} in round {round}"),
