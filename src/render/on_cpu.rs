@@ -117,8 +117,7 @@ pub fn replay_on_cpu(scene: &RoomScene, settings: &Settings, round: u32, photon:
     let ranges = [plan.range_of(round, photon)?];
     let start = tracer.emit(round, &ranges)[0];
     let mut oddities = Oddities::default();
-    let (stored, tallies) =
-        trace(&thread_pool(settings)?, &tracer, &plan, round, &ranges, &mut HostClock::start("run"), &mut oddities);
+    let (stored, tallies) = trace(&thread_pool(settings)?, &tracer, &plan, round, &ranges, &mut HostClock::start("run"), &mut oddities);
     Ok(Replayed { start, stored, fate: fate(&tallies), oddities: settings.paranoid.then_some(oddities) })
 }
 
