@@ -23,7 +23,7 @@ pub(super) fn run(args: &SelfcheckArgs, cancelled: &AtomicBool) -> Result<End> {
     let device = gpu.as_ref().map_or("CPU".to_owned(), |gpu| format!("{}, {}", gpu.facts().name, gpu.facts().driver));
     let began = Instant::now();
     if !args.json {
-        say(&format!("{device}\n{:<58} {:>11} {:>11} {:>10} {:>6}", "case", "expected", "found", "std error", "z"))?;
+        say(&format!("{device}\n{:<58} {:>11} {:>11} {:>10} {:>6} verdict", "case", "expected", "found", "std error", "z"))?;
     }
     let mut written = Ok(());
     let findings = selfcheck::run(gpu.as_ref(), cancelled, |finding| {
