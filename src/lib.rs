@@ -18,7 +18,7 @@
 //! constants, records, error, ledger, timings < gpu
 //! gpu < oddities
 //! plan, oddities < resources < trace < index < estimate < film < render < transport < selfcheck < output
-//! output < bake < paper < cli
+//! output < bake < paper < study < cli
 //! ```
 //!
 //! [`gpu`] knows no photon; [`scene`] and [`plan`] know no Vulkan; `tests/architecture.rs` checks it.
@@ -90,6 +90,7 @@ pub mod rng;
 pub mod scene;
 pub mod selfcheck;
 pub mod settings;
+pub mod study;
 pub mod timings;
 pub mod trace;
 pub mod transport;

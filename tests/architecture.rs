@@ -8,7 +8,7 @@ use std::path::{Path, PathBuf};
 /// What everyone may use, and what among itself has no order.
 const GROUND: [&str; 7] = ["error", "constants", "records", "ledger", "rng", "settings", "timings"];
 /// From left to right.
-const LINE: [&str; 18] = [
+const LINE: [&str; 19] = [
     "scene",
     "judge",
     "plan",
@@ -25,6 +25,7 @@ const LINE: [&str; 18] = [
     "output",
     "bake",
     "paper",
+    "study",
     "cli",
     "main",
 ];

@@ -9,6 +9,7 @@ mod probe;
 mod render;
 mod run;
 mod selfcheck;
+mod study;
 mod transport;
 
 use std::io::{ErrorKind, Write};
@@ -51,6 +52,8 @@ enum Command {
     Plan(plan::PlanArgs),
     /// Holds this device against closed forms, in under a minute
     Selfcheck(selfcheck::SelfcheckArgs),
+    /// Measures what accuracy costs in time on this device, choice by choice, and writes a page of it
+    Study(study::StudyArgs),
     /// Regenerates every figure and table of the paper as images, CSV and one HTML page
     Paper(paper::PaperArgs),
 }
@@ -120,6 +123,7 @@ pub fn main() -> u8 {
         Some(Command::Probe(args)) => probe::run(&args, &cancelled),
         Some(Command::Plan(args)) => plan::run(&args).map(|()| End::Finished),
         Some(Command::Selfcheck(args)) => hearing(|| selfcheck::run(&args, &cancelled)),
+        Some(Command::Study(args)) => hearing(|| study::run(&args, &cancelled)),
         Some(Command::Paper(args)) => hearing(|| paper::run(&args, &cancelled)),
     };
     match result {

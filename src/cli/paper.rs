@@ -81,7 +81,7 @@ mod tests {
     use clap::Parser;
 
     use crate::cli::Cli;
-    use crate::paper::command;
+    use crate::output::command;
     use crate::rng::Rng;
     use crate::settings::{Gather, Preset, Settings, Variant};
 
@@ -97,7 +97,7 @@ mod tests {
                 Settings { photons: 65_536, full_light, rng: Rng::Philox, rounds: 5, ..defaults.clone() },
                 Settings { shininess: [Some(0.01); 5], ..defaults.clone() },
             ] {
-                let line = command::line(preset, &settings);
+                let line = command::main_job(preset, &settings);
                 let Ok(cli) = Cli::try_parse_from(line.split_whitespace()) else { panic!("{line} cannot be parsed") };
                 assert_eq!(cli.run.settings(), settings, "{line}");
             }

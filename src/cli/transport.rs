@@ -159,7 +159,7 @@ fn share(text: &str) -> std::result::Result<f64, String> {
 }
 
 /// `2s`, `500ms`, `3m`, or seconds.
-fn seconds(text: &str) -> std::result::Result<f64, String> {
+pub(super) fn seconds(text: &str) -> std::result::Result<f64, String> {
     let units = [("ms", 1e-3), ("s", 1.0), ("m", 60.0), ("h", 3600.0)];
     let (number, unit) = units.iter().find_map(|(name, unit)| Some((text.strip_suffix(name)?, *unit))).unwrap_or((text, 1.0));
     number.trim().parse().map(|count: f64| count * unit).map_err(|_| "must be a time, as 2s, 500ms or 3m".to_owned())

@@ -12,6 +12,7 @@ mod geometry;
 mod light;
 mod material;
 mod path;
+pub mod radiosity;
 mod verdict;
 
 use std::ops::{Add, Index, IndexMut};

@@ -4,7 +4,9 @@ use plotters::coord::Shift;
 use plotters::prelude::*;
 
 use super::experiments::{Builder, Pass, TotalTime};
-use super::{Reproduction, published, words};
+use super::{Reproduction, published};
+use crate::output::svg::{Drawn, SCALE, TEXT, decades, svg};
+use crate::output::words;
 use crate::settings::{Gather, Variant};
 
 /// Colours that stand out on white and on black alike, and apart from each other without hue.
@@ -12,14 +14,6 @@ const PAPER: RGBColor = RGBColor(0x8a, 0x8a, 0x8a);
 const BRUTE: RGBColor = RGBColor(0xd9, 0x5f, 0x02);
 const GRID: RGBColor = RGBColor(0x1b, 0x8f, 0xd6);
 const LARGE: RGBColor = RGBColor(0x2c, 0xa0, 0x5a);
-/// Lines of the scale; the page gives them its own colour.
-const SCALE: RGBColor = RGBColor(0x99, 0x99, 0x98);
-
-/// Size of letters.
-const TEXT: u32 = 17;
-
-type Drawn<T> = Result<T, DrawingAreaErrorKind<std::io::Error>>;
-
 /// Time against photons, both logarithmic, of table 1.
 pub fn totals(found: &Reproduction) -> Option<String> {
     let line = |totals: Vec<&TotalTime>| totals.iter().map(|total| (total.photons() as f64, total.best_ms())).collect::<Vec<_>>();
@@ -135,34 +129,10 @@ fn draw_running_times(area: &DrawingArea<SVGBackend, Shift>, rows: &[(String, Op
     Ok(())
 }
 
-/// Whole decades around all values.
-fn decades(values: impl Iterator<Item = f64>) -> std::ops::Range<f64> {
-    let (low, high) = values.fold((f64::INFINITY, 0.0f64), |(low, high), value| (low.min(value), high.max(value)));
-    let low = low.log10().floor();
-    10f64.powf(low)..10f64.powf(high.log10().ceil().max(low + 1.0))
-}
-
-/// Draws, and makes the SVG fit for being part of a page: it scales with its box, and names no
-/// address.
-fn svg(size: (u32, u32), draw: impl FnOnce(&DrawingArea<SVGBackend, Shift>) -> Drawn<()>) -> String {
-    let mut text = String::new();
-    {
-        let area = SVGBackend::with_string(&mut text, size).into_drawing_area();
-        draw(&area).and_then(|()| area.present()).expect("drawing into memory cannot fail");
-    }
-    text.replacen(" xmlns=\"http://www.w3.org/2000/svg\"", "", 1).replacen("<svg ", "<svg role=\"img\" ", 1)
-}
-
 #[cfg(test)]
 mod tests {
     use super::super::sample;
     use super::*;
-
-    #[test]
-    fn scales_end_on_decades() {
-        assert_eq!(decades([2130.0, 105_640.0].into_iter()), 1e3..1e6);
-        assert_eq!(decades([100.0].into_iter()), 1e2..1e3);
-    }
 
     #[test]
     fn charts_name_their_series_and_no_address() {

@@ -2,8 +2,9 @@
 //! photon count (table 1).
 
 use super::bench::{Bench, Spread, Step};
-use super::words;
-use super::{Reproduction, Request, command, published};
+use crate::output::words;
+use super::{Reproduction, Request, published};
+use crate::output::command;
 use crate::render::Outcome;
 use crate::rng::Rng;
 use crate::settings::{Gather, Preset, Settings, Variant};
@@ -185,7 +186,7 @@ pub fn running_times(bench: &mut Bench, found: &mut Reproduction) -> Step<()> {
         let settings: Vec<Settings> = measured.iter().map(|case| case.settings()).collect();
         let outcomes = bench.repeat_in_turn(&settings, repeats)?;
         for ((case, settings), outcomes) in measured.iter().zip(&settings).zip(&outcomes) {
-            let command = command::line(Preset::Modified, settings);
+            let command = command::main_job(Preset::Modified, settings);
             // The map does not depend on the gather, and is timed where the gather disturbs least.
             if case.gather == Gather::Grid {
                 found.running_times.extend(running_time(case, Pass::Map, outcomes, &command));
@@ -257,7 +258,7 @@ pub fn totals(bench: &mut Bench, found: &mut Reproduction) -> Step<()> {
             let wall_ms = row("run").and_then(|row| row.wall_ms).expect("a run has its wall time");
             let gpu_ms = row("round").and_then(|row| row.gpu_ms);
             a_round = Some(wall_ms / f64::from(rounds));
-            let command = command::line(Preset::Rounds, &settings);
+            let command = command::main_job(Preset::Rounds, &settings);
             found.totals.push(TotalTime { photons_per_round: photons, rounds, gather, gpu_ms, wall_ms, command });
         }
     }

@@ -1,7 +1,8 @@
 //! The paper's four figures: films of its settings, as pictures side by side.
 
 use super::bench::{Bench, Step};
-use super::{command, published};
+use super::published;
+use crate::output::command;
 use crate::film::{WallEstimate, estimate_walls};
 use crate::output::image::{Format, Picture, overview, view};
 use crate::scene::open_box::open_box;
@@ -115,7 +116,7 @@ fn frame(bench: &Bench, label: String, preset: Preset, settings: Settings) -> St
     let settings = Settings { variant: bench.available(settings.variant), ..settings };
     let outcome = bench.run(&settings)?;
     let walls = estimate_walls(&outcome.film, &open_box(&settings), &outcome.plan);
-    Ok(Frame { label, command: command::line(preset, &settings), settings, walls })
+    Ok(Frame { label, command: command::main_job(preset, &settings), settings, walls })
 }
 
 /// Pixels between pictures.

@@ -3,7 +3,6 @@
 
 pub mod bench;
 pub mod chart;
-pub mod command;
 pub mod experiments;
 pub mod figures;
 pub mod page;
@@ -12,7 +11,6 @@ pub mod published;
 mod sample;
 pub mod tables;
 pub mod verdicts;
-pub mod words;
 
 use crate::error::Result;
 use crate::output::destination::{Folder, write_all};

@@ -8,7 +8,7 @@ use super::bench::PATIENCE;
 use super::experiments::{Builder, LONGEST_PASS_MS, LONGEST_TOTAL_MS, LeftOut, Pass, RunningTime, TotalTime};
 use super::figures::Figure;
 use super::verdicts::{self, Standing};
-use super::words::{count, duration, number, times};
+use crate::output::words::{count, duration, number, times};
 use super::{Reproduction, chart, published};
 use crate::settings::{Gather, Variant};
 
@@ -21,7 +21,7 @@ pub fn html(found: &Reproduction) -> String {
                 meta name="viewport" content="width=device-width, initial-scale=1";
                 meta name="color-scheme" content="light dark";
                 title { "Photon Mapping On The GPU, measured again" }
-                style { (PreEscaped(include_str!("page.css"))) }
+                style { (PreEscaped(include_str!("../output/page.css"))) }
             }
             body {
                 main {

@@ -3,7 +3,8 @@
 use super::bench::{Device, Machine, Spread};
 use super::experiments::{Builder, LeftOut, Pass, RunningTime, TotalTime};
 use super::figures::Figure;
-use super::{Reproduction, Request, command, published};
+use super::{Reproduction, Request, published};
+use crate::output::command;
 use crate::settings::{Gather, Preset, Settings, Variant};
 use crate::timings::Clock;
 
@@ -48,7 +49,7 @@ fn running_times() -> Vec<RunningTime> {
                     clock: if variant == Variant::Cpu { Clock::Wall } else { Clock::Gpu },
                     ms: Spread { median: f64::from(photons) / 1000.0, min: 0.5, max: 100.0, repeats: 7 },
                     stored: u64::from(photons),
-                    command: command::line(Preset::Modified, &Settings { variant, photons, ..Settings::default() }),
+                    command: command::main_job(Preset::Modified, &Settings { variant, photons, ..Settings::default() }),
                 }));
             }
         }
@@ -64,7 +65,7 @@ fn totals() -> Vec<TotalTime> {
         gather,
         gpu_ms: Some(f64::from(rounds)),
         wall_ms: f64::from(rounds) + 1.0,
-        command: command::line(Preset::Rounds, &Settings { photons, rounds, gather, ..Settings::preset(Preset::Rounds) }),
+        command: command::main_job(Preset::Rounds, &Settings { photons, rounds, gather, ..Settings::preset(Preset::Rounds) }),
     };
     series.into_iter().flat_map(|(photons, gather)| published::TABLE_1.map(|(rounds, _)| total(photons, rounds, gather))).collect()
 }

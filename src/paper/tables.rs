@@ -1,6 +1,6 @@
 //! Measured times as CSV, for programs.
 
-use super::command;
+use crate::output::command;
 use super::experiments::{RunningTime, TotalTime};
 use crate::timings::Clock;
 

@@ -2,7 +2,7 @@
 
 use super::experiments::{Builder, Pass, TotalTime};
 use super::figures::Frame;
-use super::words::{count, duration, list, number, times};
+use crate::output::words::{count, duration, list, number, times};
 use super::{Reproduction, published};
 use crate::film::WallEstimate;
 use crate::scene::open_box::open_box;

@@ -1,0 +1,100 @@
+//! `photonmill study`: what accuracy costs in time, in a folder.
+
+use std::path::PathBuf;
+use std::sync::atomic::AtomicBool;
+use std::time::Duration;
+
+use clap::Args;
+
+use super::run::whole;
+use super::transport::seconds;
+use super::{DeviceArgs, End, complain, say};
+use crate::error::{Error, Result};
+use crate::gpu::{Gpu, Options};
+use crate::output::destination::Folder;
+use crate::scene::Scene;
+use crate::study::{self, Request};
+
+#[derive(Args)]
+pub(super) struct StudyArgs {
+    /// A built-in scene by name, or a .gltf or .glb file; `open-box` is held against radiosity, others against path tracing
+    #[arg(value_name = "SCENE")]
+    scene: String,
+    /// Folder for index.html, points.csv, study.json and SVG; a study that was cut off goes on from what is there
+    #[arg(long, value_name = "DIR")]
+    out: PathBuf,
+    /// Wall time of all measurements together, not of the reference: 90s, 10m
+    #[arg(long, value_name = "TIME", value_parser = seconds, allow_negative_numbers = true, default_value = "2m")]
+    budget: f64,
+    /// Pixels along each side of the picture, or texels along each wall of the open box [default: 48; 12 on a CPU]
+    #[arg(long, value_parser = whole::<u32>, allow_negative_numbers = true)]
+    size: Option<u32>,
+    /// Photons of a round [default: 262144; 8192 on a CPU]
+    #[arg(long, value_parser = whole::<u32>, allow_negative_numbers = true)]
+    photons: Option<u32>,
+    /// Runs of every point, whose spread is the error of what is found
+    #[arg(long, value_parser = whole::<u32>, allow_negative_numbers = true, default_value = "5")]
+    repeats: u32,
+    /// Seed of the first run of every point
+    #[arg(long, value_parser = whole::<u64>, allow_negative_numbers = true, default_value = "1")]
+    seed: u64,
+    /// Samples a pixel of the path-traced reference, which is kept in the user's cache
+    #[arg(long, value_parser = whole::<u32>, allow_negative_numbers = true, default_value = "4096")]
+    reference_samples: u32,
+    #[command(flatten)]
+    device: DeviceArgs,
+}
+
+pub(super) fn run(args: &StudyArgs, cancelled: &AtomicBool) -> Result<End> {
+    let folder = Folder::open("--out", &args.out)?;
+    args.validate()?;
+    let scene = Scene::open(&args.scene, false)?;
+    for warning in &scene.warnings {
+        complain(&format!("warning: {warning}"));
+    }
+    let options = Options { device: args.device.device.clone(), validate: args.device.validate, ..Options::default() };
+    let gpu = Gpu::open(&options)?;
+    let is_cpu = gpu.facts().kind == "cpu";
+    let request = Request {
+        scene: args.scene.clone(),
+        size: args.size.unwrap_or(if is_cpu { 12 } else { 48 }),
+        photons: args.photons.unwrap_or(if is_cpu { 8192 } else { 1 << 18 }),
+        repeats: args.repeats,
+        seed: args.seed,
+        reference_samples: args.reference_samples,
+        budget: Duration::from_secs_f64(args.budget),
+    };
+    let study = study::run(&gpu, &scene, request, &folder, cancelled, &mut |line| complain(line))?;
+    study::write(&folder, &study)?;
+    for part in &study.parts {
+        say(&format!("\n{}", part.quantity))?;
+        for sentence in part.sentences() {
+            say(&format!("  {sentence}"))?;
+        }
+    }
+    if !study.complete {
+        complain("incomplete: ended before the last point; the same command goes on from there");
+    }
+    say(&format!("wrote {}", folder.path().join("index.html").display()))?;
+    Ok(if study.complete { End::Finished } else { End::Cancelled })
+}
+
+impl StudyArgs {
+    fn validate(&self) -> Result<()> {
+        let within = |option, value: u64, allowed: std::ops::RangeInclusive<u64>, what: &str| {
+            if allowed.contains(&value) {
+                return Ok(());
+            }
+            Err(Error::setting(option, value, format!("must be from {} to {} ({what})", allowed.start(), allowed.end())))
+        };
+        within("--size", u64::from(self.size.unwrap_or(48)), 2..=1024, "pixels or texels along a side")?;
+        within("--photons", u64::from(self.photons.unwrap_or(8192)), 64..=1 << 28, "photons a round")?;
+        within("--repeats", u64::from(self.repeats), 2..=1000, "runs of a point, whose spread is its error")?;
+        within("--seed", self.seed, 0..=u64::from(u32::MAX) - 1000, "as srand48 takes 32 bits")?;
+        within("--reference-samples", u64::from(self.reference_samples), 16..=1 << 24, "samples a pixel")?;
+        if !(1.0..=1e6).contains(&self.budget) {
+            return Err(Error::setting("--budget", self.budget, "must be from 1s to 1000000s"));
+        }
+        Ok(())
+    }
+}

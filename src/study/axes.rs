@@ -1,0 +1,208 @@
+//! What a user may choose: axes, and the configurations along each.
+
+use serde::Serialize;
+
+use crate::rng::Rng;
+use crate::settings::transport::{Append, Effect, Illumination, Kernel, TransportSettings};
+use crate::settings::{Gather, Math, Settings, Variant};
+
+#[derive(Debug, Clone, Copy, PartialEq, Eq, PartialOrd, Ord, Serialize)]
+#[serde(rename_all = "snake_case")]
+pub enum Axis {
+    Base,
+    Builder,
+    Photons,
+    Radius,
+    Schedule,
+    Kernel,
+    Nearest,
+    Edges,
+    Bounces,
+    Randomness,
+    Sums,
+    Arithmetic,
+    Direct,
+    Gather,
+    Index,
+    Effects,
+    Paper,
+}
+
+impl Axis {
+    pub fn name(self) -> &'static str {
+        match self {
+            Axis::Base => "base",
+            Axis::Builder => "builder",
+            Axis::Photons => "photons a round",
+            Axis::Radius => "radius",
+            Axis::Schedule => "radius schedule",
+            Axis::Kernel => "kernel",
+            Axis::Nearest => "nearest photons",
+            Axis::Edges => "edge correction",
+            Axis::Bounces => "bounces",
+            Axis::Randomness => "random numbers",
+            Axis::Sums => "sums",
+            Axis::Arithmetic => "arithmetic",
+            Axis::Direct => "direct light",
+            Axis::Gather => "final gather",
+            Axis::Index => "index",
+            Axis::Effects => "effects",
+            Axis::Paper => "the paper's rounds",
+        }
+    }
+}
+
+/// Which of the two lines, and how.
+#[derive(Debug, Clone, PartialEq)]
+pub enum Line {
+    /// The paper's box.
+    Paper(Settings),
+    /// A scene of triangles.
+    Scene(TransportSettings),
+}
+
+#[derive(Debug, Clone, PartialEq)]
+pub struct Configuration {
+    pub axis: Axis,
+    pub label: String,
+    pub line: Line,
+    pub is_base: bool,
+}
+
+impl Configuration {
+    /// Rounds that sums and random numbers allow.
+    pub fn most_rounds(&self) -> u32 {
+        match &self.line {
+            Line::Paper(settings) => (0..31)
+                .map(|doublings| 1u32 << doublings)
+                .take_while(|rounds| Settings { rounds: *rounds, ..settings.clone() }.validate().is_ok())
+                .last()
+                .unwrap_or(0),
+            Line::Scene(_) => 1 << 20,
+        }
+    }
+}
+
+/// A list of configurations along axes of one line.
+struct Sweep<S> {
+    base: S,
+    wrap: fn(S) -> Line,
+    all: Vec<Configuration>,
+}
+
+impl<S: Clone + PartialEq> Sweep<S> {
+    fn new(base: S, label: &str, wrap: fn(S) -> Line) -> Sweep<S> {
+        let first = Configuration { axis: Axis::Base, label: label.to_owned(), line: wrap(base.clone()), is_base: true };
+        Sweep { base, wrap, all: vec![first] }
+    }
+
+    /// One more choice; what the base has already is not measured again.
+    fn add(&mut self, axis: Axis, label: impl Into<String>, change: impl FnOnce(&mut S)) {
+        let mut settings = self.base.clone();
+        change(&mut settings);
+        if settings != self.base {
+            self.all.push(Configuration { axis, label: label.into(), line: (self.wrap)(settings), is_base: false });
+        }
+    }
+}
+
+/// Irradiance of the walls by the paper's line.
+pub fn of_paper(mesh: u32, photons: u32) -> Vec<Configuration> {
+    let base = Settings { mesh, photons, rng: Rng::Philox, radius: 0.025, bounces: 30, ..Settings::default() };
+    let base = Settings { full_light: base.full_light_for(photons), ..base };
+    let mut sweep = Sweep::new(base, "atomic, grid, radius 0.025 m, 30 bounces, philox", Line::Paper);
+    sweep.add(Axis::Builder, "naive slots", |s| s.variant = Variant::Naive);
+    sweep.add(Axis::Builder, "subgroup ballot", |s| s.variant = Variant::Ballot);
+    sweep.add(Axis::Builder, "CPU, one thread", |s| s.variant = Variant::Cpu);
+    for (factor, name) in [(16, "a sixteenth of the photons"), (4, "a quarter of the photons")] {
+        sweep.add(Axis::Photons, name, |s| s.photons = (photons / factor).max(2));
+    }
+    sweep.add(Axis::Photons, "four times the photons", |s| s.photons = photons * 4);
+    for radius in [0.1, 0.05, 0.0125, 0.00625] {
+        sweep.add(Axis::Radius, format!("radius {radius} m"), |s| s.radius = radius);
+    }
+    sweep.add(Axis::Edges, "no edge correction", |s| s.edge_correction = false);
+    for bounces in [2, 5, 15, 60] {
+        sweep.add(Axis::Bounces, format!("{bounces} bounces"), |s| s.bounces = bounces);
+    }
+    sweep.add(Axis::Randomness, "rand48", |s| s.rng = Rng::Rand48);
+    sweep.add(Axis::Randomness, "Mersenne Twister", |s| s.rng = Rng::Mt);
+    sweep.add(Axis::Arithmetic, "strict", |s| s.math = Math::Strict);
+    sweep.add(Axis::Index, "brute force", |s| s.gather = Gather::Brute);
+    sweep.all
+}
+
+/// The paper's figure 4 and table 1: rounds of 5000 photons, at its two radii.
+pub fn of_the_papers_rounds(mesh: u32) -> Vec<Configuration> {
+    let of = |radius: f64| Settings { mesh, radius, rounds: 1, ..Settings::default() };
+    let mut sweep = Sweep::new(of(0.025), "radius 0.025 m, 15 bounces, rand48", Line::Paper);
+    sweep.all[0].axis = Axis::Paper;
+    sweep.add(Axis::Paper, "radius 0.05 m", |s| s.radius = 0.05);
+    sweep.add(Axis::Paper, "radius 0.0125 m", |s| s.radius = 0.0125);
+    sweep.all
+}
+
+/// The same rounds by the line of scenes, whose radius may shrink.
+pub fn of_the_papers_rounds_that_shrink() -> Vec<Configuration> {
+    let of = |alpha: f64| TransportSettings {
+        photons: 5000,
+        caustic_photons: 5000,
+        bounces: 15,
+        radius: Some(0.05),
+        illumination: Illumination::Photons,
+        alpha,
+        ..TransportSettings::default()
+    };
+    [(1.0, "radius 0.05 m, triangles"), (2.0 / 3.0, "radius from 0.05 m, shrinking by alpha 2/3, triangles")]
+        .map(|(alpha, label)| Configuration { axis: Axis::Paper, label: label.to_owned(), line: Line::Scene(of(alpha)), is_base: false })
+        .to_vec()
+}
+
+/// Light that a picture may do without, if the scene has it.
+const REMOVABLE: [Effect; 5] =
+    [Effect::Indirect, Effect::Glossy, Effect::ReflectiveCaustics, Effect::RefractiveCaustics, Effect::SmoothNormals];
+
+/// Whatever a scene of triangles may be lit by: `kept` are the effects that it calls for, `radius` that of its global
+/// map in metres, if it has one, and `has_few_triangles` says whether a list of them may be tested from end to end.
+pub fn of_scene(photons: u32, kept: &[Effect], radius: Option<f64>, has_few_triangles: bool) -> Vec<Configuration> {
+    let base = TransportSettings { photons, caustic_photons: photons, ..TransportSettings::default() };
+    let mut sweep = Sweep::new(base, "ballot, shrinking radius, shadow rays", Line::Scene);
+    sweep.add(Axis::Builder, "atomic", |s| s.append = Append::Atomic);
+    let of_photons = |s: &mut TransportSettings, photons: u32| (s.photons, s.caustic_photons) = (photons, photons);
+    sweep.add(Axis::Photons, "a sixteenth of the photons", |s| of_photons(s, (photons / 16).max(1)));
+    sweep.add(Axis::Photons, "a quarter of the photons", |s| of_photons(s, (photons / 4).max(1)));
+    sweep.add(Axis::Photons, "four times the photons", |s| of_photons(s, photons * 4));
+    for (factor, name) in [(2.0, "twice the radius"), (0.5, "half the radius")] {
+        if let Some(radius) = radius {
+            sweep.add(Axis::Radius, name, |s| s.radius = Some(significant(factor * radius)));
+        }
+    }
+    for alpha in [0.5, 0.8, 1.0] {
+        let label = if alpha == 1.0 { "fixed radius".to_owned() } else { format!("alpha {alpha}") };
+        sweep.add(Axis::Schedule, label, |s| s.alpha = alpha);
+    }
+    sweep.add(Axis::Kernel, "cone", |s| s.kernel = Kernel::Cone);
+    sweep.add(Axis::Kernel, "Epanechnikov", |s| s.kernel = Kernel::Epanechnikov);
+    sweep.add(Axis::Edges, "no edge correction", |s| s.edge_correction = false);
+    for bounces in [2, 5, 15] {
+        sweep.add(Axis::Bounces, format!("{bounces} bounces"), |s| s.bounces = bounces);
+    }
+    sweep.add(Axis::Arithmetic, "strict", |s| s.math = Math::Strict);
+    sweep.add(Axis::Direct, "one shadow ray", |s| s.shadow_rays = 1);
+    sweep.add(Axis::Direct, "sixteen shadow rays", |s| s.shadow_rays = 16);
+    sweep.add(Axis::Direct, "direct light from photons", |s| s.illumination = Illumination::Photons);
+    sweep.add(Axis::Gather, "final gather", |s| s.final_gather = true);
+    sweep.add(Axis::Effects, "every effect forced on", |s| s.with = Effect::ALL.to_vec());
+    if has_few_triangles {
+        sweep.add(Axis::Index, "a list of triangles, no tree", |s| s.without = vec![Effect::Bvh]);
+    }
+    for effect in REMOVABLE.into_iter().filter(|effect| kept.contains(effect)) {
+        sweep.add(Axis::Effects, format!("without {}", effect.name()), |s| s.without = vec![effect]);
+    }
+    sweep.all
+}
+
+/// Three digits, as people write them.
+fn significant(value: f64) -> f64 {
+    format!("{value:.2e}").parse().expect("a number was written")
+}

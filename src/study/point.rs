@@ -1,0 +1,231 @@
+//! One point of a curve: a configuration at a number of rounds, run several times.
+
+use std::time::Duration;
+
+use serde::{Deserialize, Serialize};
+use statrs::distribution::{ContinuousCDF, StudentsT};
+
+use super::axes::Axis;
+use super::reference::Reference;
+
+/// What one run left.
+#[derive(Debug, Clone)]
+pub struct Shot {
+    /// As many as the reference has.
+    pub values: Vec<f64>,
+    /// All rounds on the device; `None` for the CPU builder and where there are no timestamps.
+    pub gpu_ms: Option<f64>,
+    /// All rounds on the host's clock.
+    pub wall_ms: f64,
+    pub photons: u64,
+    /// Photons still flying after the last bounce, over those emitted.
+    pub cut_off: f64,
+}
+
+/// Chance that a stated interval holds the truth.
+pub const CONFIDENCE: f64 = 0.95;
+
+/// A number and the interval that holds it with [`CONFIDENCE`].
+#[derive(Debug, Clone, Copy, PartialEq, Serialize)]
+pub struct Estimate {
+    pub value: f64,
+    pub low: f64,
+    pub high: f64,
+}
+
+impl Estimate {
+    /// The mean of independent values, by Student's distribution; of a single one nothing is known.
+    pub fn of_mean(values: &[f64]) -> Estimate {
+        let count = values.len() as f64;
+        let mean = values.iter().sum::<f64>() / count;
+        if values.len() < 2 {
+            return Estimate { value: mean, low: f64::NEG_INFINITY, high: f64::INFINITY };
+        }
+        let variance = values.iter().map(|value| (value - mean).powi(2)).sum::<f64>() / (count - 1.0);
+        let student = StudentsT::new(0.0, 1.0, count - 1.0).expect("there is a degree of freedom");
+        let half = student.inverse_cdf(0.5 + 0.5 * CONFIDENCE) * (variance / count).sqrt();
+        Estimate { value: mean, low: mean - half, high: mean + half }
+    }
+
+    pub fn map(self, f: impl Fn(f64) -> f64) -> Estimate {
+        Estimate { value: f(self.value), low: f(self.low), high: f(self.high) }
+    }
+}
+
+/// The root of what may have come out below nothing.
+fn root(square: f64) -> f64 {
+    square.max(0.0).sqrt()
+}
+
+#[derive(Debug, Clone, PartialEq, Serialize, Deserialize)]
+pub struct Point {
+    /// Repeats the first run; the others have the seeds that follow its own.
+    pub command: String,
+    pub rounds: u32,
+    pub photons: u64,
+    pub cut_off: f64,
+    /// Of each run.
+    pub gpu_ms: Vec<Option<f64>>,
+    pub wall_ms: Vec<f64>,
+    /// Of each run, set-up and all, seconds.
+    pub seconds: Vec<f64>,
+    /// Mean squared error of each run over the reference's mean square, less what the reference's own noise adds.
+    pub squared_errors: Vec<f64>,
+    /// The part of it that differs from run to run.
+    pub squared_noise: f64,
+}
+
+impl Point {
+    pub fn of(shots: &[(Shot, Duration)], reference: &Reference, command: String, rounds: u32) -> Point {
+        let (first, _) = &shots[0];
+        let count = shots.len() as f64;
+        let size = reference.mean_square();
+        let spread = |place: usize| {
+            let mean = shots.iter().map(|(shot, _)| shot.values[place]).sum::<f64>() / count;
+            shots.iter().map(|(shot, _)| (shot.values[place] - mean).powi(2)).sum::<f64>() / (count - 1.0).max(1.0)
+        };
+        Point {
+            command,
+            rounds,
+            photons: first.photons,
+            cut_off: first.cut_off,
+            gpu_ms: shots.iter().map(|(shot, _)| shot.gpu_ms).collect(),
+            wall_ms: shots.iter().map(|(shot, _)| shot.wall_ms).collect(),
+            seconds: shots.iter().map(|(_, spent)| spent.as_secs_f64()).collect(),
+            squared_errors: shots.iter().map(|(shot, _)| reference.squared_error(&shot.values) / size).collect(),
+            squared_noise: reference.mean_over(spread) / size,
+        }
+    }
+
+    pub fn spent(&self) -> Duration {
+        Duration::from_secs_f64(self.seconds.iter().sum())
+    }
+
+    /// Relative root mean square error.
+    pub fn error(&self) -> Estimate {
+        Estimate::of_mean(&self.squared_errors).map(root)
+    }
+
+    /// What independent runs differ by, relative to the reference.
+    pub fn noise(&self) -> f64 {
+        root(self.squared_noise)
+    }
+
+    /// What all runs have in common. Below its upper end nothing can be told from noise.
+    pub fn bias(&self) -> Estimate {
+        Estimate::of_mean(&self.squared_errors).map(|square| root(square - self.squared_noise))
+    }
+
+    /// Of all rounds: on the device where it has a clock, else the host's. The middle one, the shortest and the longest.
+    pub fn ms(&self) -> Estimate {
+        let device: Option<Vec<f64>> = self.gpu_ms.iter().copied().collect();
+        let mut all = device.unwrap_or_else(|| self.wall_ms.clone());
+        all.sort_by(f64::total_cmp);
+        Estimate { value: all[all.len() / 2], low: all[0], high: all[all.len() - 1] }
+    }
+
+    pub fn wall(&self) -> f64 {
+        let mut all = self.wall_ms.clone();
+        all.sort_by(f64::total_cmp);
+        all[all.len() / 2]
+    }
+}
+
+/// A configuration at all its numbers of rounds.
+#[derive(Debug, Clone, PartialEq, Serialize)]
+pub struct Curve {
+    pub axis: Axis,
+    pub label: String,
+    /// What the others of its quantity are compared with.
+    pub is_base: bool,
+    pub points: Vec<Point>,
+}
+
+impl Curve {
+    /// Milliseconds to a relative error for one of the runs, or for the mean of all: along straight lines between points
+    /// on logarithmic scales, and only as far as was measured.
+    fn crossing(points: &[(f64, f64)], error: f64) -> Option<f64> {
+        let mut before: Option<(f64, f64)> = None;
+        for &(ms, found) in points {
+            if found <= error {
+                let Some((ms_before, found_before)) = before else { return None };
+                let share = (found_before / error).ln() / (found_before / found.max(1e-12)).ln();
+                return Some(ms_before * (ms / ms_before).powf(share));
+            }
+            before = Some((ms, found));
+        }
+        None
+    }
+
+    /// The same, with the interval that the single runs give.
+    pub fn time_to(&self, error: f64) -> Option<Estimate> {
+        let mean: Vec<(f64, f64)> = self.points.iter().map(|point| (point.ms().value, point.error().value)).collect();
+        let value = Curve::crossing(&mean, error)?;
+        let each: Vec<f64> = self.logs_of_time_to(error).into_iter().flatten().collect();
+        if each.len() < 2 {
+            return Some(Estimate { value, low: 0.0, high: f64::INFINITY });
+        }
+        let spread = Estimate::of_mean(&each);
+        Some(Estimate { value, low: value * (spread.low - spread.value).exp(), high: value * (spread.high - spread.value).exp() })
+    }
+
+    /// Logarithm of the time that each run by itself takes to an error.
+    fn logs_of_time_to(&self, error: f64) -> Vec<Option<f64>> {
+        let runs = self.points.iter().map(|point| point.squared_errors.len()).min().unwrap_or(0);
+        (0..runs)
+            .map(|run| {
+                let points: Vec<_> = self.points.iter().map(|point| (point.ms().value, root(point.squared_errors[run]))).collect();
+                Curve::crossing(&points, error).map(f64::ln)
+            })
+            .collect()
+    }
+
+    /// How many times longer than `other` this takes to an error, run by run.
+    pub fn times_longer(&self, other: &Curve, error: f64) -> Option<Estimate> {
+        let (own, others) = (self.time_to(error)?, other.time_to(error)?);
+        let value = own.value / others.value;
+        let each: Vec<f64> =
+            self.logs_of_time_to(error).into_iter().zip(other.logs_of_time_to(error)).filter_map(|(own, other)| Some(own? - other?)).collect();
+        if each.len() < 2 {
+            return Some(Estimate { value, low: 0.0, high: f64::INFINITY });
+        }
+        let spread = Estimate::of_mean(&each);
+        Some(Estimate { value, low: value * (spread.low - spread.value).exp(), high: value * (spread.high - spread.value).exp() })
+    }
+
+    /// Relative error after a time, where that lies between two points.
+    pub fn error_after(&self, ms: f64) -> Option<f64> {
+        self.points.windows(2).find_map(|pair| {
+            let ((t0, e0), (t1, e1)) = ((pair[0].ms().value, pair[0].error().value), (pair[1].ms().value, pair[1].error().value));
+            (t0 <= ms && ms <= t1 && t1 > t0).then(|| e0 * (e1 / e0).powf((ms / t0).ln() / (t1 / t0).ln()))
+        })
+    }
+
+    /// The smallest error that was measured.
+    pub fn best_error(&self) -> f64 {
+        self.points.iter().map(|point| point.error().value).fold(f64::INFINITY, f64::min)
+    }
+
+    pub fn longest(&self) -> f64 {
+        self.points.iter().map(|point| point.ms().value).fold(0.0, f64::max)
+    }
+
+    /// Slope of the error over time on logarithmic scales, by least squares through the points whose noise is at least
+    /// nine tenths of their error: -1/2 where only noise counts.
+    pub fn noise_slope(&self) -> Option<f64> {
+        let noisy: Vec<(f64, f64)> = self
+            .points
+            .iter()
+            .filter(|point| point.noise() >= 0.9 * point.error().value && point.noise() > 0.0)
+            .map(|point| ((point.photons as f64).ln(), point.noise().ln()))
+            .collect();
+        if noisy.len() < 3 {
+            return None;
+        }
+        let count = noisy.len() as f64;
+        let (x, y) = noisy.iter().fold((0.0, 0.0), |(x, y), point| (x + point.0 / count, y + point.1 / count));
+        let (above, below) =
+            noisy.iter().fold((0.0, 0.0), |(above, below), point| (above + (point.0 - x) * (point.1 - y), below + (point.0 - x).powi(2)));
+        Some(above / below)
+    }
+}

@@ -1,0 +1,86 @@
+//! Points that are finished, on disk: a study that was cut off goes on where it ended.
+
+use std::collections::HashMap;
+use std::io::Write;
+
+use serde::{Deserialize, Serialize};
+
+use super::Request;
+use super::point::Point;
+use crate::error::{Error, Result};
+use crate::gpu::DeviceFacts;
+use crate::output::destination::Folder;
+
+/// What points are of; those of another study are no use.
+#[derive(Debug, PartialEq, Serialize, Deserialize)]
+struct Head {
+    photonmill: String,
+    device: String,
+    driver: String,
+    request: serde_json::Value,
+}
+
+pub struct Store {
+    file: std::fs::File,
+    path: std::path::PathBuf,
+    points: HashMap<String, Point>,
+}
+
+/// A head, then a point a line.
+const NAME: &str = "points.jsonl";
+
+impl Store {
+    pub fn open(folder: &Folder, request: &Request, device: &DeviceFacts) -> Result<Store> {
+        let path = folder.path().join(NAME);
+        let refuse = |reason: String| Error::Output { option: "--out", path: path.clone(), reason };
+        std::fs::create_dir_all(folder.path()).map_err(|error| refuse(error.kind().to_string()))?;
+        let head = Head {
+            photonmill: env!("CARGO_PKG_VERSION").to_owned(),
+            device: device.name.clone(),
+            driver: device.driver.clone(),
+            request: serde_json::to_value(request).expect("a request is plain data"),
+        };
+        let mut points = HashMap::new();
+        let mut kept = String::new();
+        match std::fs::read_to_string(&path) {
+            Ok(text) => {
+                let mut lines = text.lines();
+                if lines.next().and_then(|line| serde_json::from_str(line).ok()).as_ref() != Some(&head) {
+                    return Err(Error::setting(
+                        "--out",
+                        folder.path().display(),
+                        format!("holds {NAME} of a study of something else, or on another device; name another folder, or delete that file"),
+                    ));
+                }
+                // A last line that was cut off is measured again.
+                for (line, point) in lines.filter_map(|line| Some((line, serde_json::from_str::<Point>(line).ok()?))) {
+                    kept.push_str(line);
+                    kept.push('\n');
+                    points.insert(point.command.clone(), point);
+                }
+            }
+            Err(error) if error.kind() == std::io::ErrorKind::NotFound => {}
+            Err(error) => return Err(refuse(error.kind().to_string())),
+        }
+        let head = serde_json::to_string(&head).expect("a head is plain data");
+        // The file as it was stands until the new one is whole.
+        let file = tempfile::NamedTempFile::new_in(folder.path())
+            .and_then(|mut file| file.write_all(format!("{head}\n{kept}").as_bytes()).map(|()| file))
+            .and_then(|file| file.persist(&path).map_err(|error| error.error))
+            .map_err(|error| refuse(error.kind().to_string()))?;
+        Ok(Store { file, path, points })
+    }
+
+    pub fn find(&self, command: &str) -> Option<Point> {
+        self.points.get(command).cloned()
+    }
+
+    pub fn keep(&mut self, point: &Point) -> Result<()> {
+        let line = serde_json::to_string(point).expect("a point is plain data") + "\n";
+        self.file.write_all(line.as_bytes()).and_then(|()| self.file.flush()).map_err(|error| Error::Output {
+            option: "--out",
+            path: self.path.clone(),
+            reason: error.kind().to_string(),
+        })
+    }
+}

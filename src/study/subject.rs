@@ -1,0 +1,174 @@
+//! What is measured: a quantity with its reference, the configurations that find it, and how one of them runs.
+
+use std::sync::atomic::{AtomicBool, Ordering};
+
+use glam::DVec3;
+
+use super::Request;
+use super::axes::{self, Configuration, Line};
+use super::point::Shot;
+use super::reference::{Reference, wall_points};
+use crate::error::Result;
+use crate::film::estimate_walls;
+use crate::gpu::Gpu;
+use crate::judge::radiosity::inward;
+use crate::ledger::Ledger;
+use crate::output::command;
+use crate::plan::transport::{Sensor, TransportPlan};
+use crate::records::Receiver;
+use crate::render::{self, Control};
+use crate::scene::geometry::Geometry;
+use crate::scene::open_box::open_box;
+use crate::scene::{Camera, Scene};
+use crate::settings::transport::{Effect, TransportSettings};
+use crate::settings::{Preset, Settings, Variant};
+use crate::timings::Timings;
+use crate::transport::{self, Lit, View};
+
+pub struct Subject {
+    pub quantity: String,
+    pub reference: Reference,
+    pub configurations: Vec<Configuration>,
+    scene: Scene,
+    camera: Option<Camera>,
+    /// Points and normals, where no camera looks.
+    receivers: Vec<(DVec3, DVec3)>,
+    size: u32,
+    /// The scene as the user named it.
+    name: String,
+}
+
+/// Triangles up to which a list of them may be asked for.
+const FEW_TRIANGLES: usize = 256;
+
+impl Subject {
+    /// Quantities of a scene; making their references may take a while.
+    pub fn all(gpu: &Gpu, scene: &Scene, request: &Request, tell: &mut dyn FnMut(&str)) -> Result<Vec<Subject>> {
+        let Request { scene: name, size, photons, reference_samples, .. } = request.clone();
+        let subject = |quantity: &str, reference, configurations| Subject {
+            quantity: quantity.to_owned(),
+            reference,
+            configurations,
+            scene: scene.clone(),
+            camera: None,
+            receivers: Vec::new(),
+            size,
+            name: name.clone(),
+        };
+        if name == "open-box" {
+            tell("reference: radiosity of the box");
+            let usual = Settings::default();
+            let reference = Reference::walls(&usual, size);
+            let points = wall_points(size);
+            let receivers = || points.iter().map(|(wall, point)| (*point, inward(*wall))).collect();
+            let papers = axes::of_the_papers_rounds(size).into_iter().chain(axes::of_the_papers_rounds_that_shrink()).collect();
+            return Ok(vec![
+                subject("irradiance of the walls, the paper's line", reference.clone(), axes::of_paper(size, photons)),
+                Subject {
+                    receivers: receivers(),
+                    ..subject("irradiance of the walls, triangles", reference.clone(), scene_axes(gpu, scene, request)?)
+                },
+                Subject { receivers: receivers(), ..subject("the paper's own question: rounds of 5000 photons", reference, papers) },
+            ]);
+        }
+        let camera = scene.cameras.first().cloned().unwrap_or_else(|| {
+            let (min, max) = scene.bounds();
+            Camera::around(min, max)
+        });
+        tell(&format!("reference: path tracing of {size} x {size} pixels, {reference_samples} samples each, unless the cache has it"));
+        let reference = Reference::picture(scene, &camera, size, reference_samples);
+        Ok(vec![Subject { camera: Some(camera), ..subject("picture", reference, scene_axes(gpu, scene, request)?) }])
+    }
+
+    /// What repeats a run.
+    pub fn command(&self, configuration: &Configuration, rounds: u32, seed: u64) -> String {
+        match &configuration.line {
+            Line::Paper(settings) => command::main_job(Preset::Modified, &Settings { rounds, seed, ..settings.clone() }),
+            Line::Scene(settings) => {
+                let settings = TransportSettings { rounds, seed, ..settings.clone() };
+                let job = match self.camera {
+                    Some(_) => format!("render {} --size {}x{} -o picture.exr", self.name, self.size, self.size),
+                    None => format!("probe {} --points {POINTS} -o irradiance.csv", self.name),
+                };
+                command::on_scene(&job, &settings)
+            }
+        }
+    }
+
+    /// The points that are probed, as `photonmill probe --points` reads them; `None` for a picture.
+    pub fn points_file(&self) -> Option<String> {
+        let line = |(p, n): &(DVec3, DVec3)| format!("{} {} {} {} {} {}\n", p.x, p.y, p.z, n.x, n.y, n.z);
+        if self.receivers.is_empty() { None } else { Some(self.receivers.iter().map(line).collect()) }
+    }
+
+    /// One run; `None` where somebody ended it.
+    pub fn run(&self, gpu: &Gpu, configuration: &Configuration, rounds: u32, seed: u64, cancelled: &AtomicBool) -> Result<Option<Shot>> {
+        let mut control = Control { cancelled, progress: &mut |_| {} };
+        let shot = match &configuration.line {
+            Line::Paper(settings) => {
+                let settings = Settings { rounds, seed, ..settings.clone() };
+                let room = open_box(&settings);
+                let outcome = match settings.variant {
+                    Variant::Cpu => render::on_cpu(&room, &settings, &mut control)?,
+                    _ => render::on_gpu(gpu, &room, &settings, &mut control)?,
+                };
+                let walls = estimate_walls(&outcome.film, &room, &outcome.plan);
+                let values = walls.into_iter().flat_map(|wall| wall.irradiance).collect();
+                shot(values, &outcome.timings, outcome.fates.ledger())
+            }
+            Line::Scene(settings) => {
+                let settings = TransportSettings { rounds, seed, ..settings.clone() };
+                let lit = self.light(gpu, settings, &mut control)?;
+                let channels = if self.camera.is_some() { 3 } else { 1 };
+                let values = (0..lit.film.pixels())
+                    .flat_map(|pixel| lit.film.mean(pixel, &lit.plan).to_array().into_iter().take(channels))
+                    .collect();
+                let [global, caustic] = lit.fates.each_ref().map(|fates| fates.ledger());
+                let both = Ledger { emitted: global.emitted + caustic.emitted, cut_off: global.cut_off, ..global };
+                shot(values, &lit.timings, both)
+            }
+        };
+        Ok((!cancelled.load(Ordering::Relaxed)).then_some(shot))
+    }
+
+    fn light(&self, gpu: &Gpu, settings: TransportSettings, control: &mut Control) -> Result<Lit> {
+        let scene = self.scene.without(&settings.without);
+        let geometry = Geometry::new(&scene)?;
+        let sensor = match self.camera {
+            Some(_) => Sensor::Picture { width: self.size, height: self.size },
+            None => Sensor::Receivers { count: self.receivers.len() as u32 },
+        };
+        let receiver = |(position, normal): &(DVec3, DVec3)| {
+            let normal = normal.as_vec3();
+            Receiver { position: geometry.to_local(*position), normal, shading_normal: normal }
+        };
+        let phases: Vec<Vec<Receiver>> =
+            if self.receivers.is_empty() { Vec::new() } else { vec![self.receivers.iter().map(receiver).collect()] };
+        let plan = TransportPlan::new(&self.scene, &geometry, &settings, sensor, &render::limits(gpu.facts()))?;
+        transport::light(gpu, &View { geometry: &geometry, camera: self.camera.as_ref(), phases: &phases }, plan, control)
+    }
+}
+
+/// The file beside the page that the commands read points from.
+pub const POINTS: &str = "points.txt";
+
+fn shot(values: Vec<f64>, timings: &Timings, ledger: Ledger) -> Shot {
+    let round = timings.row("round");
+    Shot {
+        values,
+        gpu_ms: round.and_then(|row| row.gpu_ms),
+        wall_ms: round.and_then(|row| row.wall_ms).or_else(|| timings.row("run").and_then(|row| row.wall_ms)).unwrap_or(0.0),
+        photons: ledger.emitted,
+        cut_off: ledger.cut_off as f64 / ledger.emitted.max(1) as f64,
+    }
+}
+
+fn scene_axes(gpu: &Gpu, scene: &Scene, request: &Request) -> Result<Vec<Configuration>> {
+    let geometry = Geometry::new(scene)?;
+    let settings = TransportSettings { photons: request.photons, caustic_photons: request.photons, ..TransportSettings::default() };
+    let sensor = Sensor::Picture { width: request.size, height: request.size };
+    let plan = TransportPlan::new(scene, &geometry, &settings, sensor, &render::limits(gpu.facts()))?;
+    let kept: Vec<Effect> = plan.decisions.iter().filter(|decision| decision.kept).map(|decision| decision.effect).collect();
+    let radius = plan.global.as_ref().map(|map| map.radius * geometry.unit);
+    Ok(axes::of_scene(request.photons, &kept, radius, geometry.triangles.len() <= FEW_TRIANGLES))
+}
