@@ -16,7 +16,7 @@ use crate::plan::transport::Sensor;
 use crate::records::Receiver;
 use crate::scene::geometry::Geometry;
 use crate::scene::{Light, LightKind, Mesh};
-use crate::settings::transport::Illumination;
+use crate::settings::transport::{Illumination, TransportSettings};
 use crate::transport::Lit;
 
 #[derive(Args)]
@@ -37,8 +37,14 @@ pub(super) struct ProbeArgs {
     device: DeviceArgs,
 }
 
+impl ProbeArgs {
+    pub(super) fn settings(&self) -> TransportSettings {
+        self.transport.settings()
+    }
+}
+
 pub(super) fn run(args: &ProbeArgs, cancelled: &AtomicBool) -> Result<End> {
-    let settings = args.transport.settings();
+    let settings = args.settings();
     settings.validate()?;
     let output = Destination::open("-o", &args.output)?;
     let reports = args.report.open()?;

@@ -98,3 +98,41 @@ impl StudyArgs {
         Ok(())
     }
 }
+
+#[cfg(test)]
+mod tests {
+    use clap::Parser;
+
+    use super::super::{Cli, Command};
+    use crate::output::command;
+    use crate::settings::Preset;
+    use crate::settings::transport::Effect;
+    use crate::study::axes::{self, Group, Line};
+
+    fn parse(line: &str) -> Cli {
+        Cli::try_parse_from(line.split(' ')).unwrap_or_else(|error| panic!("{line}: {error}"))
+    }
+
+    #[test]
+    fn printed_commands_give_the_settings_they_stand_for() {
+        let groups: Vec<Group> =
+            [axes::of_paper(12, 8192), axes::of_the_papers_rounds(12), axes::of_scene(8192, &Effect::ALL, Some(0.1), true)].concat();
+        let configurations: Vec<_> = groups.iter().flat_map(|group| &group.configurations).collect();
+        assert!(configurations.len() > 50);
+        for configuration in configurations {
+            match &configuration.line {
+                Line::Paper(settings) => {
+                    let line = command::main_job(Preset::Modified, settings);
+                    let parsed = parse(&line).run.settings();
+                    // Full light is of the paper's picture, which no study looks at.
+                    assert_eq!(crate::settings::Settings { full_light: settings.full_light, ..parsed }, *settings, "{line}");
+                }
+                Line::Scene(settings) => {
+                    let line = command::on_scene("probe open-box --points points.txt -o irradiance.csv", settings);
+                    let Some(Command::Probe(probe)) = parse(&line).command else { panic!("{line}") };
+                    assert_eq!(probe.settings(), *settings, "{line}");
+                }
+            }
+        }
+    }
+}

@@ -2,9 +2,9 @@
 //! photon count (table 1).
 
 use super::bench::{Bench, Spread, Step};
-use crate::output::words;
 use super::{Reproduction, Request, published};
 use crate::output::command;
+use crate::output::words;
 use crate::render::Outcome;
 use crate::rng::Rng;
 use crate::settings::{Gather, Preset, Settings, Variant};

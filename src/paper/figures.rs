@@ -2,8 +2,8 @@
 
 use super::bench::{Bench, Step};
 use super::published;
-use crate::output::command;
 use crate::film::{WallEstimate, estimate_walls};
+use crate::output::command;
 use crate::output::image::{Format, Picture, overview, view};
 use crate::scene::open_box::open_box;
 use crate::settings::{Preset, Settings};

@@ -8,8 +8,8 @@ use super::bench::PATIENCE;
 use super::experiments::{Builder, LONGEST_PASS_MS, LONGEST_TOTAL_MS, LeftOut, Pass, RunningTime, TotalTime};
 use super::figures::Figure;
 use super::verdicts::{self, Standing};
-use crate::output::words::{count, duration, number, times};
 use super::{Reproduction, chart, published};
+use crate::output::words::{count, duration, number, times};
 use crate::settings::{Gather, Variant};
 
 pub fn html(found: &Reproduction) -> String {

@@ -1,7 +1,7 @@
 //! Measured times as CSV, for programs.
 
-use crate::output::command;
 use super::experiments::{RunningTime, TotalTime};
+use crate::output::command;
 use crate::timings::Clock;
 
 const RUNNING_TIMES: [&str; 11] =

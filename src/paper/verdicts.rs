@@ -2,9 +2,9 @@
 
 use super::experiments::{Builder, Pass, TotalTime};
 use super::figures::Frame;
-use crate::output::words::{count, duration, list, number, times};
 use super::{Reproduction, published};
 use crate::film::WallEstimate;
+use crate::output::words::{count, duration, list, number, times};
 use crate::scene::open_box::open_box;
 use crate::settings::{Gather, Variant};
 

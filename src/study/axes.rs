@@ -1,15 +1,14 @@
 //! What a user may choose: axes, and the configurations along each.
 
-use serde::Serialize;
+use serde::{Deserialize, Serialize};
 
 use crate::rng::Rng;
 use crate::settings::transport::{Append, Effect, Illumination, Kernel, TransportSettings};
 use crate::settings::{Gather, Math, Settings, Variant};
 
-#[derive(Debug, Clone, Copy, PartialEq, Eq, PartialOrd, Ord, Serialize)]
+#[derive(Debug, Clone, Copy, PartialEq, Eq, Hash, Serialize, Deserialize)]
 #[serde(rename_all = "snake_case")]
 pub enum Axis {
-    Base,
     Builder,
     Photons,
     Radius,
@@ -31,7 +30,6 @@ pub enum Axis {
 impl Axis {
     pub fn name(self) -> &'static str {
         match self {
-            Axis::Base => "base",
             Axis::Builder => "builder",
             Axis::Photons => "photons a round",
             Axis::Radius => "radius",
@@ -63,10 +61,15 @@ pub enum Line {
 
 #[derive(Debug, Clone, PartialEq)]
 pub struct Configuration {
-    pub axis: Axis,
     pub label: String,
     pub line: Line,
-    pub is_base: bool,
+}
+
+/// What is measured in turn, so that a clock that drifts touches all alike: the base, then its alternatives.
+#[derive(Debug, Clone, PartialEq)]
+pub struct Group {
+    pub axis: Axis,
+    pub configurations: Vec<Configuration>,
 }
 
 impl Configuration {
@@ -83,31 +86,37 @@ impl Configuration {
     }
 }
 
-/// A list of configurations along axes of one line.
+/// Alternatives to a base, axis by axis.
 struct Sweep<S> {
     base: S,
+    label: String,
     wrap: fn(S) -> Line,
-    all: Vec<Configuration>,
+    groups: Vec<Group>,
 }
 
 impl<S: Clone + PartialEq> Sweep<S> {
     fn new(base: S, label: &str, wrap: fn(S) -> Line) -> Sweep<S> {
-        let first = Configuration { axis: Axis::Base, label: label.to_owned(), line: wrap(base.clone()), is_base: true };
-        Sweep { base, wrap, all: vec![first] }
+        Sweep { base, label: label.to_owned(), wrap, groups: Vec::new() }
     }
 
     /// One more choice; what the base has already is not measured again.
     fn add(&mut self, axis: Axis, label: impl Into<String>, change: impl FnOnce(&mut S)) {
         let mut settings = self.base.clone();
         change(&mut settings);
-        if settings != self.base {
-            self.all.push(Configuration { axis, label: label.into(), line: (self.wrap)(settings), is_base: false });
+        if settings == self.base {
+            return;
         }
+        if self.groups.last().is_none_or(|group| group.axis != axis) {
+            let base = Configuration { label: self.label.clone(), line: (self.wrap)(self.base.clone()) };
+            self.groups.push(Group { axis, configurations: vec![base] });
+        }
+        let configuration = Configuration { label: label.into(), line: (self.wrap)(settings) };
+        self.groups.last_mut().expect("pushed above").configurations.push(configuration);
     }
 }
 
 /// Irradiance of the walls by the paper's line.
-pub fn of_paper(mesh: u32, photons: u32) -> Vec<Configuration> {
+pub fn of_paper(mesh: u32, photons: u32) -> Vec<Group> {
     let base = Settings { mesh, photons, rng: Rng::Philox, radius: 0.025, bounces: 30, ..Settings::default() };
     let base = Settings { full_light: base.full_light_for(photons), ..base };
     let mut sweep = Sweep::new(base, "atomic, grid, radius 0.025 m, 30 bounces, philox", Line::Paper);
@@ -129,22 +138,17 @@ pub fn of_paper(mesh: u32, photons: u32) -> Vec<Configuration> {
     sweep.add(Axis::Randomness, "Mersenne Twister", |s| s.rng = Rng::Mt);
     sweep.add(Axis::Arithmetic, "strict", |s| s.math = Math::Strict);
     sweep.add(Axis::Index, "brute force", |s| s.gather = Gather::Brute);
-    sweep.all
+    sweep.groups
 }
 
-/// The paper's figure 4 and table 1: rounds of 5000 photons, at its two radii.
-pub fn of_the_papers_rounds(mesh: u32) -> Vec<Configuration> {
-    let of = |radius: f64| Settings { mesh, radius, rounds: 1, ..Settings::default() };
-    let mut sweep = Sweep::new(of(0.025), "radius 0.025 m, 15 bounces, rand48", Line::Paper);
-    sweep.all[0].axis = Axis::Paper;
+/// The paper's figure 4 and table 1: rounds of 5000 photons, at its two radii and another, and by the line of scenes,
+/// whose radius may shrink.
+pub fn of_the_papers_rounds(mesh: u32) -> Vec<Group> {
+    let base = Settings { mesh, radius: 0.025, rounds: 1, ..Settings::default() };
+    let mut sweep = Sweep::new(base, "radius 0.025 m", Line::Paper);
     sweep.add(Axis::Paper, "radius 0.05 m", |s| s.radius = 0.05);
     sweep.add(Axis::Paper, "radius 0.0125 m", |s| s.radius = 0.0125);
-    sweep.all
-}
-
-/// The same rounds by the line of scenes, whose radius may shrink.
-pub fn of_the_papers_rounds_that_shrink() -> Vec<Configuration> {
-    let of = |alpha: f64| TransportSettings {
+    let triangles = |alpha: f64| TransportSettings {
         photons: 5000,
         caustic_photons: 5000,
         bounces: 15,
@@ -153,9 +157,10 @@ pub fn of_the_papers_rounds_that_shrink() -> Vec<Configuration> {
         alpha,
         ..TransportSettings::default()
     };
-    [(1.0, "radius 0.05 m, triangles"), (2.0 / 3.0, "radius from 0.05 m, shrinking by alpha 2/3, triangles")]
-        .map(|(alpha, label)| Configuration { axis: Axis::Paper, label: label.to_owned(), line: Line::Scene(of(alpha)), is_base: false })
-        .to_vec()
+    let shrinking = [(1.0, "radius 0.05 m, as triangles"), (2.0 / 3.0, "radius from 0.05 m that shrinks (alpha 2/3), as triangles")]
+        .map(|(alpha, label)| Configuration { label: label.to_owned(), line: Line::Scene(triangles(alpha)) });
+    sweep.groups[0].configurations.extend(shrinking);
+    sweep.groups
 }
 
 /// Light that a picture may do without, if the scene has it.
@@ -164,7 +169,7 @@ const REMOVABLE: [Effect; 5] =
 
 /// Whatever a scene of triangles may be lit by: `kept` are the effects that it calls for, `radius` that of its global
 /// map in metres, if it has one, and `has_few_triangles` says whether a list of them may be tested from end to end.
-pub fn of_scene(photons: u32, kept: &[Effect], radius: Option<f64>, has_few_triangles: bool) -> Vec<Configuration> {
+pub fn of_scene(photons: u32, kept: &[Effect], radius: Option<f64>, has_few_triangles: bool) -> Vec<Group> {
     let base = TransportSettings { photons, caustic_photons: photons, ..TransportSettings::default() };
     let mut sweep = Sweep::new(base, "ballot, shrinking radius, shadow rays", Line::Scene);
     sweep.add(Axis::Builder, "atomic", |s| s.append = Append::Atomic);
@@ -192,14 +197,14 @@ pub fn of_scene(photons: u32, kept: &[Effect], radius: Option<f64>, has_few_tria
     sweep.add(Axis::Direct, "sixteen shadow rays", |s| s.shadow_rays = 16);
     sweep.add(Axis::Direct, "direct light from photons", |s| s.illumination = Illumination::Photons);
     sweep.add(Axis::Gather, "final gather", |s| s.final_gather = true);
-    sweep.add(Axis::Effects, "every effect forced on", |s| s.with = Effect::ALL.to_vec());
     if has_few_triangles {
         sweep.add(Axis::Index, "a list of triangles, no tree", |s| s.without = vec![Effect::Bvh]);
     }
+    sweep.add(Axis::Effects, "every effect forced on", |s| s.with = Effect::ALL.to_vec());
     for effect in REMOVABLE.into_iter().filter(|effect| kept.contains(effect)) {
         sweep.add(Axis::Effects, format!("without {}", effect.name()), |s| s.without = vec![effect]);
     }
-    sweep.all
+    sweep.groups
 }
 
 /// Three digits, as people write them.

@@ -25,8 +25,8 @@ type Area<'a> = DrawingArea<SVGBackend<'a>, Shift>;
 /// A chart for each axis and one of everything, by names fit for files.
 pub fn all(part: &Part) -> Vec<(String, String)> {
     let mut charts: Vec<(String, String)> = overview(part).map(|drawn| ("overview".to_owned(), drawn)).into_iter().collect();
-    for axis in part.axes() {
-        charts.extend(of_axis(&part.along(axis)).map(|drawn| (axis.name().replace([' ', '\''], "-"), drawn)));
+    for comparison in &part.comparisons {
+        charts.extend(of_axis(&comparison.curves).map(|drawn| (comparison.axis.name().replace([' ', '\''], "-"), drawn)));
     }
     charts
 }
@@ -37,15 +37,15 @@ pub fn alone(drawn: &str) -> String {
 }
 
 /// The curves with their bands; nothing where no time is known.
-pub fn of_axis(curves: &[&Curve]) -> Option<String> {
-    let range = ranges(curves.iter().copied())?;
+pub fn of_axis(curves: &[Curve]) -> Option<String> {
+    let range = ranges(curves.iter())?;
     let height = 420 + 22 * curves.len() as u32;
     Some(svg((760, height), |area| draw(area, range, curves)))
 }
 
 /// Every point, and those that no other beats.
 pub fn overview(part: &Part) -> Option<String> {
-    let range = ranges(part.curves.iter())?;
+    let range = ranges(part.curves())?;
     Some(svg((760, 440), |area| draw_overview(area, range, part)))
 }
 
@@ -89,7 +89,7 @@ macro_rules! axes {
     }};
 }
 
-fn draw(area: &Area, (x, y): (Range, Range), curves: &[&Curve]) -> Drawn<()> {
+fn draw(area: &Area, (x, y): (Range, Range), curves: &[Curve]) -> Drawn<()> {
     // The legend has room of its own, as curves fill the plane.
     let (plane, legend) = area.split_vertically(410);
     let mut chart = axes!(&plane, x, y.clone());
@@ -110,11 +110,12 @@ fn draw(area: &Area, (x, y): (Range, Range), curves: &[&Curve]) -> Drawn<()> {
 
 fn draw_overview(area: &Area, (x, y): (Range, Range), part: &Part) -> Drawn<()> {
     let mut chart = axes!(area, x, y.clone());
-    for curve in &part.curves {
+    for curve in part.curves() {
         let points = curve.points.iter().map(|point| (point.ms().value, point.error().value.max(y.start)));
         chart.draw_series(points.map(|point| Circle::new(point, 2, COLOURS[0].mix(0.7).filled())))?;
     }
-    let front: Vec<(f64, f64)> = part.pareto_front().iter().map(|(_, point)| (point.ms().value, point.error().value.max(y.start))).collect();
+    let front: Vec<(f64, f64)> =
+        part.pareto_front().iter().map(|(_, point)| (point.ms().value, point.error().value.max(y.start))).collect();
     chart.draw_series(LineSeries::new(front.clone(), COLOURS[1].stroke_width(2)))?;
     chart.draw_series(front.into_iter().map(|point| Circle::new(point, 4, COLOURS[1].filled())))?;
     Ok(())

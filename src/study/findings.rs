@@ -2,8 +2,8 @@
 
 use super::axes::Axis;
 use super::point::{CONFIDENCE, Curve, Estimate, Point};
-use super::{Part, Study};
-use crate::output::words::{count, duration, number, times};
+use super::{Comparison, Part, Study};
+use crate::output::words::{count, duration, number};
 use crate::paper::published;
 
 /// Relative errors that people ask for, the largest first.
@@ -23,25 +23,18 @@ fn between(estimate: Estimate, show: impl Fn(f64) -> String) -> String {
 }
 
 impl Part {
-    /// What the others are compared with.
+    /// What the others are compared with, as it was measured first.
     pub fn base(&self) -> Option<&Curve> {
-        self.curves.iter().find(|curve| curve.is_base && !curve.points.is_empty())
+        self.comparisons.first().and_then(Comparison::base)
     }
 
-    pub fn axes(&self) -> Vec<Axis> {
-        let mut axes: Vec<Axis> = self.curves.iter().filter(|curve| !curve.is_base).map(|curve| curve.axis).collect();
-        axes.dedup();
-        axes
-    }
-
-    /// The base and the curves along an axis.
-    pub fn along(&self, axis: Axis) -> Vec<&Curve> {
-        self.curves.iter().filter(|curve| !curve.points.is_empty() && (curve.is_base || curve.axis == axis)).collect()
+    pub fn curves(&self) -> impl Iterator<Item = &Curve> {
+        self.comparisons.iter().flat_map(|comparison| &comparison.curves)
     }
 
     /// Points that no other beats in both error and time, the fastest first.
     pub fn pareto_front(&self) -> Vec<(&Curve, &Point)> {
-        let mut all: Vec<(&Curve, &Point)> = self.curves.iter().flat_map(|curve| curve.points.iter().map(move |point| (curve, point))).collect();
+        let mut all: Vec<(&Curve, &Point)> = self.curves().flat_map(|curve| curve.points.iter().map(move |point| (curve, point))).collect();
         all.sort_by(|(_, a), (_, b)| a.ms().value.total_cmp(&b.ms().value));
         let mut best = f64::INFINITY;
         all.retain(|(_, point)| {
@@ -52,52 +45,76 @@ impl Part {
         all
     }
 
-    /// The smallest asked error that two curves both reach.
-    fn common_error(one: &Curve, other: &Curve) -> Option<f64> {
-        ASKED.into_iter().rev().find(|error| one.time_to(*error).is_some() && other.time_to(*error).is_some())
-    }
-
     /// Sentences made of this part's numbers, the most asked for first.
     pub fn sentences(&self) -> Vec<String> {
         let Some(base) = self.base() else { return Vec::new() };
         let mut sentences: Vec<String> = [price(base), halving(base), law(base)].into_iter().flatten().collect();
-        sentences.extend(self.curves.iter().filter(|curve| !curve.is_base).filter_map(|curve| Part::choice(curve, base)));
-        sentences.extend(self.curves.iter().filter_map(floor));
-        sentences.extend(self.curves.iter().filter(|curve| curve.axis == Axis::Bounces || curve.is_base).filter_map(lost));
-        if self.curves.iter().any(|curve| curve.axis == Axis::Paper) {
+        for comparison in &self.comparisons {
+            let Some(base) = comparison.base() else { continue };
+            sentences.extend(comparison.others().filter_map(|curve| choice(comparison.axis, curve, base)));
+        }
+        for comparison in &self.comparisons {
+            sentences.extend(comparison.others().filter_map(|curve| floor(comparison.axis, curve)));
+        }
+        for comparison in self.comparisons.iter().filter(|comparison| comparison.axis == Axis::Bounces) {
+            sentences.extend(comparison.curves.iter().filter_map(lost));
+        }
+        if self.comparisons.iter().any(|comparison| comparison.axis == Axis::Paper) {
             sentences.extend(then_and_now(base));
         }
         sentences
     }
+}
 
-    /// What a choice buys or costs against the base.
-    fn choice(curve: &Curve, base: &Curve) -> Option<String> {
-        let name = format!("{}: {}", curve.axis.name(), curve.label);
-        let Some(error) = Part::common_error(curve, base) else {
-            let reached = (!curve.points.is_empty()).then(|| percent(curve.best_error()))?;
-            return Some(format!(
-                "{name} shares no error with the base that both were measured at; its smallest is {reached} after {}.",
-                duration(curve.longest())
-            ));
-        };
-        let longer = curve.times_longer(base, error)?;
-        let (at, interval) = (percent(error), between(longer, times));
-        Some(if longer.low > 1.0 {
-            format!("{name} costs {} the time to {at} ({interval}).", times(longer.value))
-        } else if longer.high < 1.0 {
-            let faster = Estimate { value: 1.0 / longer.value, low: 1.0 / longer.high, high: 1.0 / longer.low };
-            format!("{name} buys {} to {at} ({}).", times(faster.value), between(faster, times))
-        } else {
-            format!("{name} makes no difference to {at} that these runs could tell ({} the time, {interval}).", times(longer.value))
-        })
+impl Comparison {
+    pub fn base(&self) -> Option<&Curve> {
+        self.curves.first().filter(|curve| !curve.points.is_empty())
     }
+
+    pub fn others(&self) -> impl Iterator<Item = &Curve> {
+        self.curves.iter().skip(1).filter(|curve| !curve.points.is_empty())
+    }
+}
+
+/// The smallest error that two curves both reach on their way.
+fn common_error(one: &Curve, other: &Curve) -> Option<f64> {
+    let steps = (0..200).map(|step| 1e-5 * 1.08f64.powi(step));
+    steps.into_iter().find(|error| one.time_to(*error).is_some() && other.time_to(*error).is_some())
+}
+
+/// Clocks of shared machines drift by more than this.
+const NEXT_TO_NOTHING: f64 = 1.02;
+
+/// What a choice buys or costs against the base.
+fn choice(axis: Axis, curve: &Curve, base: &Curve) -> Option<String> {
+    let name = format!("{}: {}", axis.name(), curve.label);
+    let Some(error) = common_error(curve, base) else {
+        let reach = |curve: &Curve| format!("{} after {}", percent(curve.best_error()), duration(curve.longest()));
+        return Some(format!("{name} reaches {}, the base {}: they share no error that both crossed.", reach(curve), reach(base)));
+    };
+    let longer = curve.times_longer(base, error)?;
+    let (at, interval) = (percent(error), between(longer, ratio));
+    Some(if longer.low > 1.0 && longer.value > NEXT_TO_NOTHING {
+        format!("{name} costs {} the time to {at} ({interval}).", ratio(longer.value))
+    } else if longer.high < 1.0 && longer.value < 1.0 / NEXT_TO_NOTHING {
+        let faster = Estimate { value: 1.0 / longer.value, low: 1.0 / longer.high, high: 1.0 / longer.low };
+        format!("{name} buys {}: it is so much faster to {at} ({}).", ratio(faster.value), between(faster, ratio))
+    } else {
+        format!("{name} makes no difference to {at} that these runs could tell ({} the time, {interval}).", ratio(longer.value))
+    })
+}
+
+fn ratio(value: f64) -> String {
+    format!("{}\u{a0}\u{d7}", number(value))
 }
 
 /// Times to the errors that people ask for.
 fn price(base: &Curve) -> Option<String> {
     let prices: Vec<String> = ASKED
         .into_iter()
-        .filter_map(|error| Some(format!("{} takes {} ({})", percent(error), duration(base.time_to(error)?.value), between(base.time_to(error)?, duration))))
+        .filter_map(|error| {
+            Some(format!("{} takes {} ({})", percent(error), duration(base.time_to(error)?.value), between(base.time_to(error)?, duration)))
+        })
         .collect();
     if prices.is_empty() { None } else { Some(format!("A relative RMS error of {}.", prices.join(", "))) }
 }
@@ -106,23 +123,25 @@ fn price(base: &Curve) -> Option<String> {
 fn halving(base: &Curve) -> Option<String> {
     let error = ASKED.into_iter().rev().find(|error| base.time_to(*error).is_some() && base.time_to(0.5 * error).is_some())?;
     let (whole, half) = (base.time_to(error)?, base.time_to(0.5 * error)?);
-    Some(format!("Halving the error from {} costs {} the time.", percent(error), times(half.value / whole.value)))
+    Some(format!("Halving the error from {} costs {} the time.", percent(error), ratio(half.value / whole.value)))
 }
 
 /// The law of noise.
 fn law(base: &Curve) -> Option<String> {
     let slope = base.noise_slope()?;
-    Some(format!("Where noise is the error, it falls with the photons to the power {slope:.2}; independent photons make -0.50."))
+    Some(format!(
+        "Where noise is the error, it falls with the photons to the power {slope:.2}; at a fixed radius independent photons make -0.50, and a radius that shrinks slows that."
+    ))
 }
 
 /// Where bias ends the fall of the error.
-fn floor(curve: &Curve) -> Option<String> {
+fn floor(axis: Axis, curve: &Curve) -> Option<String> {
     let last = curve.points.last()?;
     let bias = last.bias();
     (bias.low > last.noise()).then(|| {
         format!(
             "{}: {} ends at {} after {}, of which {} is bias ({}) that no more photons take away.",
-            curve.axis.name(),
+            axis.name(),
             curve.label,
             percent(last.error().value),
             duration(last.ms().value),
@@ -156,40 +175,41 @@ fn then_and_now(base: &Curve) -> Vec<String> {
     });
     if let Some(ms) = ms {
         let error = base.error_after(ms).map_or_else(String::new, |error| format!(", with an error of {}", percent(error)));
-        sentences.push(format!("Those {} photons take {} here, {} less{error}.", count(photons), duration(ms), times(then / ms)));
+        sentences.push(format!("Those {} photons take {} here, {} less{error}.", count(photons), duration(ms), ratio(then / ms)));
     }
     sentences
 }
 
-/// A row of the tables of equal time and equal error: a curve, its value, and the value over the base's.
-pub type Row<'a> = (&'a Curve, Option<Estimate>, Option<f64>);
+/// A row of the tables of equal time and equal error: name, value, and the value over that of the base beside it.
+pub type Row = (String, Option<Estimate>, Option<f64>);
 
-/// Errors after the longest time that half of all curves were measured at.
-pub fn equal_time(part: &Part) -> Option<(f64, Vec<Row<'_>>)> {
-    let base = part.base()?;
-    let mut longest: Vec<f64> = part.curves.iter().filter(|curve| !curve.points.is_empty()).map(Curve::longest).collect();
-    longest.sort_by(f64::total_cmp);
-    let ms = longest[longest.len() / 2].min(base.longest());
-    let value = |curve: &Curve| curve.error_after(ms);
-    let of_base = value(base);
-    let rows = part.curves.iter().map(|curve| {
-        let error = value(curve);
-        (curve, error.map(|value| Estimate { value, low: value, high: value }), error.zip(of_base).map(|(error, base)| error / base))
-    });
-    Some((ms, rows.collect()))
+/// All curves and, in every comparison, what `value` says of them; the base stands first, once.
+fn rows(part: &Part, value: impl Fn(&Curve) -> Option<Estimate>) -> Vec<Row> {
+    let mut rows: Vec<Row> = part.base().map(|base| (format!("base: {}", base.label), value(base), None)).into_iter().collect();
+    for comparison in &part.comparisons {
+        let of_base = comparison.base().and_then(&value);
+        rows.extend(comparison.others().map(|curve| {
+            let own = value(curve);
+            (format!("{}: {}", comparison.axis.name(), curve.label), own, own.zip(of_base).map(|(own, base)| own.value / base.value))
+        }));
+    }
+    rows
 }
 
-/// Times to the smallest asked error that half of all curves reach.
-pub fn equal_error(part: &Part) -> Option<(f64, Vec<Row<'_>>)> {
+/// Errors after the longest time that half of all curves were measured at.
+pub fn equal_time(part: &Part) -> Option<(f64, Vec<Row>)> {
+    let mut longest: Vec<f64> = part.curves().filter(|curve| !curve.points.is_empty()).map(Curve::longest).collect();
+    longest.sort_by(f64::total_cmp);
+    let ms = longest.get(longest.len() / 2)?.min(part.base()?.longest());
+    Some((ms, rows(part, |curve| curve.error_after(ms).map(|value| Estimate { value, low: value, high: value }))))
+}
+
+/// Times to the smallest error that half of all curves reach.
+pub fn equal_error(part: &Part) -> Option<(f64, Vec<Row>)> {
     let base = part.base()?;
-    let reach = |error: f64| part.curves.iter().filter(|curve| curve.time_to(error).is_some()).count();
-    let error = ASKED.into_iter().rev().find(|error| base.time_to(*error).is_some() && 2 * reach(*error) >= part.curves.len())?;
-    let of_base = base.time_to(error)?.value;
-    let rows = part.curves.iter().map(|curve| {
-        let time = curve.time_to(error);
-        (curve, time, time.map(|time| time.value / of_base))
-    });
-    Some((error, rows.collect()))
+    let reach = |error: f64| part.curves().filter(|curve| curve.time_to(error).is_some()).count();
+    let error = ASKED.into_iter().rev().find(|error| base.time_to(*error).is_some() && 2 * reach(*error) >= part.curves().count())?;
+    Some((error, rows(part, |curve| curve.time_to(error))))
 }
 
 const COLUMNS: [&str; 18] = [
@@ -219,13 +239,13 @@ pub fn csv(study: &Study) -> Vec<u8> {
     let mut write = |row: &[String]| table.write_record(row).expect("memory takes what is written");
     write(&COLUMNS.map(str::to_owned));
     for part in &study.parts {
-        for curve in &part.curves {
+        for (axis, curve) in part.comparisons.iter().flat_map(|one| one.curves.iter().map(|curve| (one.axis, curve))) {
             for point in &curve.points {
                 let (ms, error) = (point.ms(), point.error());
                 let known = |value: f64| if value.is_finite() { value.to_string() } else { String::new() };
                 write(&[
                     part.quantity.clone(),
-                    curve.axis.name().to_owned(),
+                    axis.name().to_owned(),
                     curve.label.clone(),
                     point.rounds.to_string(),
                     point.photons.to_string(),

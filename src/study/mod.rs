@@ -14,7 +14,7 @@ pub mod reference;
 pub mod store;
 pub mod subject;
 
-use std::sync::atomic::{AtomicBool, Ordering};
+use std::sync::atomic::AtomicBool;
 use std::time::{Duration, Instant};
 
 use serde::Serialize;
@@ -23,7 +23,7 @@ use crate::error::Result;
 use crate::gpu::Gpu;
 use crate::output::destination::{Folder, write_all};
 use crate::scene::Scene;
-use axes::Configuration;
+use axes::{Axis, Group};
 use point::{Curve, Point};
 use store::Store;
 use subject::Subject;
@@ -69,6 +69,13 @@ pub struct Part {
     pub reference: String,
     /// Root mean square of the reference's own error over its root mean square.
     pub reference_error: f64,
+    pub comparisons: Vec<Comparison>,
+}
+
+/// Curves that were measured in turn: the base, then its alternatives along an axis.
+#[derive(Debug, Serialize)]
+pub struct Comparison {
+    pub axis: Axis,
     pub curves: Vec<Curve>,
 }
 
@@ -95,7 +102,7 @@ pub fn run(
     for points in subjects.iter().filter_map(Subject::points_file).take(1) {
         write_all([(folder.file(subject::POINTS), points.into_bytes())])?;
     }
-    let count: usize = subjects.iter().map(|subject| subject.configurations.len()).sum();
+    let count: usize = subjects.iter().flat_map(|subject| &subject.groups).map(|group| group.configurations.len()).sum();
     let share = study.request.budget / count.max(1) as u32;
     let mut begun = 0;
     for subject in &subjects {
@@ -103,14 +110,14 @@ pub fn run(
             quantity: subject.quantity.clone(),
             reference: subject.reference.method.clone(),
             reference_error: subject.reference.relative_error,
-            curves: Vec::new(),
+            comparisons: Vec::new(),
         });
-        for configuration in &subject.configurations {
-            begun += 1;
-            let Configuration { axis, label, .. } = configuration;
-            tell(&format!("[{begun}/{count}] {}: {}: {label}", subject.quantity, axis.name()));
-            let (curve, whole) = measure(gpu, subject, configuration, &study.request, share, cancelled, &mut store)?;
-            study.parts.last_mut().expect("pushed above").curves.push(curve);
+        for group in &subject.groups {
+            begun += group.configurations.len();
+            tell(&format!("[{begun}/{count}] {}: {}", subject.quantity, group.axis.name()));
+            let mut measuring = Measuring { gpu, subject, group, request: &study.request, share, cancelled, store: &mut store };
+            let (comparison, whole) = measuring.compare()?;
+            study.parts.last_mut().expect("pushed above").comparisons.push(comparison);
             if !whole {
                 return Ok(study);
             }
@@ -120,63 +127,81 @@ pub fn run(
     Ok(study)
 }
 
-/// Points of one configuration at numbers of rounds that double until its share of time is spent, and whether nobody
-/// ended it before.
-fn measure(
-    gpu: &Gpu,
-    subject: &Subject,
-    configuration: &Configuration,
-    request: &Request,
+/// A group under measurement.
+struct Measuring<'a> {
+    gpu: &'a Gpu,
+    subject: &'a Subject,
+    group: &'a Group,
+    request: &'a Request,
+    /// Time for each configuration.
     share: Duration,
-    cancelled: &AtomicBool,
-    store: &mut Store,
-) -> Result<(Curve, bool)> {
-    let mut points: Vec<Point> = Vec::new();
-    let (mut spent, mut warm) = (Duration::ZERO, false);
-    let mut whole = true;
-    for doublings in 0..20 {
-        let rounds = 1 << doublings;
-        if rounds > configuration.most_rounds() {
-            break;
-        }
-        let command = subject.command(configuration, rounds, request.seed);
-        if let Some(known) = store.find(&command) {
-            spent += known.spent();
-            points.push(known);
-            continue;
-        }
-        // Twice the photons take at most twice the time.
-        let next = points.last().map_or(Duration::ZERO, |last| 2 * last.spent());
-        if spent + next > share {
-            break;
-        }
-        if !warm {
-            // Pipelines are made, and a card that idled comes to its clock.
-            subject.run(gpu, configuration, 1, request.seed, cancelled)?;
-            warm = true;
-        }
-        let mut shots = Vec::new();
-        for repeat in 0..u64::from(request.repeats) {
-            let began = Instant::now();
-            let Some(shot) = subject.run(gpu, configuration, rounds, request.seed + repeat, cancelled)? else { break };
-            shots.push((shot, began.elapsed()));
-        }
-        if shots.len() < request.repeats as usize {
-            whole = false;
-            break;
-        }
-        let point = Point::of(&shots, &subject.reference, command, rounds);
-        spent += point.spent();
-        store.keep(&point)?;
-        points.push(point);
-        if cancelled.load(Ordering::Relaxed) {
-            whole = false;
-            break;
-        }
-    }
-    let Configuration { axis, label, .. } = configuration;
-    Ok((Curve { axis: *axis, label: label.clone(), is_base: configuration.is_base, points }, whole))
+    cancelled: &'a AtomicBool,
+    store: &'a mut Store,
 }
+
+impl Measuring<'_> {
+    /// Points of every configuration at numbers of rounds that double until its share of time is spent, and whether
+    /// nobody ended it before.
+    fn compare(&mut self) -> Result<(Comparison, bool)> {
+        let mut curves: Vec<Curve> = self
+            .group
+            .configurations
+            .iter()
+            .map(|configuration| Curve { label: configuration.label.clone(), points: Vec::new() })
+            .collect();
+        let mut whole = true;
+        for doublings in 0..=MOST_DOUBLINGS {
+            let rounds = 1 << doublings;
+            // Those that have time left for twice the photons of before, which take at most twice the time.
+            let going: Vec<usize> = (0..curves.len())
+                .filter(|which| {
+                    let points = &curves[*which].points;
+                    let spent: Duration = points.iter().map(Point::spent).sum();
+                    let next = points.last().map_or(Duration::ZERO, |last| 2 * last.spent());
+                    points.len() == doublings && rounds <= self.group.configurations[*which].most_rounds() && spent + next <= self.share
+                })
+                .collect();
+            let Some(points) = self.level(&going, rounds)? else {
+                whole = false;
+                break;
+            };
+            for (which, point) in going.into_iter().zip(points) {
+                curves[which].points.push(point);
+            }
+        }
+        Ok((Comparison { axis: self.group.axis, curves }, whole))
+    }
+
+    /// A point of each of these configurations, their runs in turn; `None` where somebody ended it.
+    fn level(&mut self, going: &[usize], rounds: u32) -> Result<Option<Vec<Point>>> {
+        let Measuring { gpu, subject, group, request, cancelled, .. } = *self;
+        let commands: Vec<String> =
+            going.iter().map(|which| subject.command(&group.configurations[*which], rounds, request.seed)).collect();
+        let known: Vec<Option<Point>> = commands.iter().map(|command| self.store.find(group.axis, command)).collect();
+        if known.iter().all(Option::is_some) {
+            return Ok(known.into_iter().collect());
+        }
+        let mut shots = vec![Vec::new(); going.len()];
+        // The first turn is dropped: it makes pipelines, and brings a card that idled to its clock.
+        for turn in 0..=u64::from(request.repeats) {
+            for (place, which) in going.iter().enumerate() {
+                let began = Instant::now();
+                let (rounds, seed) = if turn == 0 { (1, request.seed) } else { (rounds, request.seed + turn - 1) };
+                let Some(shot) = subject.run(gpu, &group.configurations[*which], rounds, seed, cancelled)? else { return Ok(None) };
+                if turn > 0 {
+                    shots[place].push((shot, began.elapsed()));
+                }
+            }
+        }
+        let points: Vec<Point> =
+            shots.iter().zip(commands).map(|(shots, command)| Point::of(shots, &subject.reference, command, rounds)).collect();
+        points.iter().try_for_each(|point| self.store.keep(group.axis, point))?;
+        Ok(Some(points))
+    }
+}
+
+/// Rounds of the longest point: a power of two.
+const MOST_DOUBLINGS: usize = 20;
 
 /// Writes the page and its data.
 pub fn write(folder: &Folder, study: &Study) -> Result<()> {

@@ -75,17 +75,12 @@ fn of_part(part: &Part) -> Markup {
             @if let Some((error, rows)) = equal_error(part) {
                 (table(&format!("Equal error: the time to {}", percent(error)), "time", &rows, duration))
             }
-            @for axis in part.axes() {
-                @let curves = part.along(axis);
-                h3 { (axis.name()) }
-                @if let Some(drawn) = chart::of_axis(&curves) {
+            @for comparison in &part.comparisons {
+                h3 { (comparison.axis.name()) }
+                @if let Some(drawn) = chart::of_axis(&comparison.curves) {
                     figure { div.scroll { (PreEscaped(drawn)) } }
                 }
-                @for curve in curves.iter().filter(|curve| !curve.is_base) { (points(curve)) }
-            }
-            @if let Some(base) = part.base() {
-                h3 { "base" }
-                (points(base))
+                @for curve in &comparison.curves { (points(curve)) }
             }
         }
     }
@@ -112,9 +107,9 @@ fn table(title: &str, what: &str, rows: &[Row], show: impl Fn(f64) -> String) ->
             table {
                 thead { tr { th.name { (title) } th { (what) } th { (findings::words_of_confidence()) } th { "over the base" } } }
                 tbody {
-                    @for (curve, value, ratio) in rows {
+                    @for (name, value, ratio) in rows {
                         tr {
-                            th scope="row" { (curve.axis.name()) ": " (curve.label) }
+                            th scope="row" { (name) }
                             td { (value.map_or_else(|| "not reached".to_owned(), |value| show(value.value))) }
                             td { @if let Some(value) = value.filter(|value| value.low > 0.0 && value.low < value.high && value.high.is_finite()) { (show(value.low)) " to " (show(value.high)) } }
                             td { (ratio.map_or_else(String::new, times)) }
@@ -168,7 +163,7 @@ fn how(study: &Study) -> Markup {
                 li { "Time: all rounds by the device's timestamps, without set-up; the host's clock for the CPU builder. The middle of the runs counts, and the least and the most show how the clock drifts." }
                 li { "Times to an error lie on straight lines between points on logarithmic scales, and are given only between errors that were measured." }
                 li { "Every command repeats the first run of its point; the others have the seeds that follow." }
-                li { "A picture leaves out pixels in which a light is seen straight. " (number(study.parts.iter().map(|part| part.curves.iter().map(|curve| curve.points.len()).sum::<usize>()).sum::<usize>() as f64)) " points in all." }
+                li { "A picture leaves out pixels in which a light is seen straight. " (number(study.parts.iter().map(|part| part.curves().map(|curve| curve.points.len()).sum::<usize>()).sum::<usize>() as f64)) " points in all." }
             }
         }
     }

@@ -5,7 +5,6 @@ use std::time::Duration;
 use serde::{Deserialize, Serialize};
 use statrs::distribution::{ContinuousCDF, StudentsT};
 
-use super::axes::Axis;
 use super::reference::Reference;
 
 /// What one run left.
@@ -118,10 +117,14 @@ impl Point {
 
     /// Of all rounds: on the device where it has a clock, else the host's. The middle one, the shortest and the longest.
     pub fn ms(&self) -> Estimate {
-        let device: Option<Vec<f64>> = self.gpu_ms.iter().copied().collect();
-        let mut all = device.unwrap_or_else(|| self.wall_ms.clone());
+        let mut all: Vec<f64> = (0..self.wall_ms.len()).map(|run| self.ms_of(run)).collect();
         all.sort_by(f64::total_cmp);
         Estimate { value: all[all.len() / 2], low: all[0], high: all[all.len() - 1] }
+    }
+
+    /// Of one run.
+    fn ms_of(&self, run: usize) -> f64 {
+        if self.gpu_ms.iter().all(Option::is_some) { self.gpu_ms[run].unwrap_or(0.0) } else { self.wall_ms[run] }
     }
 
     pub fn wall(&self) -> f64 {
@@ -134,10 +137,7 @@ impl Point {
 /// A configuration at all its numbers of rounds.
 #[derive(Debug, Clone, PartialEq, Serialize)]
 pub struct Curve {
-    pub axis: Axis,
     pub label: String,
-    /// What the others of its quantity are compared with.
-    pub is_base: bool,
     pub points: Vec<Point>,
 }
 
@@ -174,7 +174,7 @@ impl Curve {
         let runs = self.points.iter().map(|point| point.squared_errors.len()).min().unwrap_or(0);
         (0..runs)
             .map(|run| {
-                let points: Vec<_> = self.points.iter().map(|point| (point.ms().value, root(point.squared_errors[run]))).collect();
+                let points: Vec<_> = self.points.iter().map(|point| (point.ms_of(run), root(point.squared_errors[run]))).collect();
                 Curve::crossing(&points, error).map(f64::ln)
             })
             .collect()
@@ -184,8 +184,12 @@ impl Curve {
     pub fn times_longer(&self, other: &Curve, error: f64) -> Option<Estimate> {
         let (own, others) = (self.time_to(error)?, other.time_to(error)?);
         let value = own.value / others.value;
-        let each: Vec<f64> =
-            self.logs_of_time_to(error).into_iter().zip(other.logs_of_time_to(error)).filter_map(|(own, other)| Some(own? - other?)).collect();
+        let each: Vec<f64> = self
+            .logs_of_time_to(error)
+            .into_iter()
+            .zip(other.logs_of_time_to(error))
+            .filter_map(|(own, other)| Some(own? - other?))
+            .collect();
         if each.len() < 2 {
             return Some(Estimate { value, low: 0.0, high: f64::INFINITY });
         }
@@ -227,5 +231,74 @@ impl Curve {
         let (above, below) =
             noisy.iter().fold((0.0, 0.0), |(above, below), point| (above + (point.0 - x) * (point.1 - y), below + (point.0 - x).powi(2)));
         Some(above / below)
+    }
+}
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+    use crate::rng::philox;
+
+    /// Runs whose squared error is `noise`^2 / rounds plus that of a bias, all but equal.
+    fn curve(noise: f64, bias: f64, ms_a_round: f64) -> Curve {
+        let point = |rounds: u32| {
+            let square = noise * noise / f64::from(rounds);
+            Point {
+                command: String::new(),
+                rounds,
+                photons: u64::from(rounds),
+                cut_off: 0.0,
+                gpu_ms: (0..3).map(|run| Some(ms_a_round * f64::from(rounds) * (1.0 + 0.01 * f64::from(run)))).collect(),
+                wall_ms: vec![1.0; 3],
+                seconds: vec![1.0; 3],
+                squared_errors: (0..3).map(|run| square * (1.0 + 0.01 * f64::from(run)) + bias * bias).collect(),
+                squared_noise: square,
+            }
+        };
+        Curve { label: String::new(), points: (0..10).map(|doublings| point(1 << doublings)).collect() }
+    }
+
+    #[test]
+    fn curves_tell_the_prices_that_were_put_into_them() {
+        let base = curve(0.4, 0.0, 2.0);
+        // 0.4 / sqrt(16) = 0.1.
+        let time = base.time_to(0.1).unwrap();
+        assert!((time.value / 32.0 - 1.0).abs() < 0.03 && time.low < 32.6 && time.high > 32.0, "{time:?}");
+        assert!((base.noise_slope().unwrap() + 0.5).abs() < 1e-9);
+        assert_eq!(base.time_to(1e-3), None, "what was not measured is not guessed");
+        assert_eq!(base.time_to(0.9), None, "nor what was reached before the first point");
+        let ratio = curve(0.4, 0.0, 6.0).times_longer(&base, 0.1).unwrap();
+        assert!((ratio.value - 3.0).abs() < 1e-9 && ratio.low > 2.9 && ratio.high < 3.1, "{ratio:?}");
+        assert!((base.error_after(32.0).unwrap() / 0.1 - 1.0).abs() < 0.02);
+    }
+
+    #[test]
+    fn noise_and_bias_are_told_apart() {
+        let last = curve(0.4, 0.03, 1.0).points.pop().unwrap();
+        assert!((last.bias().value - 0.03).abs() < 1e-3, "{:?}", last.bias());
+        assert!(last.error().value > last.noise() && last.bias().low > 0.02);
+        let without = curve(0.4, 0.0, 1.0).points.pop().unwrap();
+        assert!(without.bias().value < 0.2 * without.noise());
+    }
+
+    /// Student's interval over few runs holds the truth as often as it says.
+    #[test]
+    fn intervals_cover() {
+        let normal = |run: u32, draw: u32| {
+            let uniform = philox([run, draw, 0, 0], [5, 9]).map(|word| (f64::from(word) + 0.5) / 4_294_967_296.0);
+            (-2.0 * uniform[0].ln()).sqrt() * (std::f64::consts::TAU * uniform[1]).cos()
+        };
+        for runs in [2, 3, 5] {
+            let held = (0..4000u32)
+                .filter(|trial| {
+                    let estimate = Estimate::of_mean(&(0..runs).map(|draw| 7.0 + normal(*trial, draw)).collect::<Vec<_>>());
+                    estimate.low <= 7.0 && 7.0 <= estimate.high
+                })
+                .count() as f64
+                / 4000.0;
+            // Three standard errors of a share of 0.95.
+            assert!((held - CONFIDENCE).abs() < 0.0104, "{runs} runs: {held}");
+        }
+        assert!(Estimate::of_mean(&[1.0]).high.is_infinite());
     }
 }

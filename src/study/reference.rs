@@ -107,7 +107,9 @@ const ORDERS: usize = 40;
 pub fn wall_points(mesh: u32) -> Vec<(usize, DVec3)> {
     let scene = crate::scene::open_box::open_box(&Settings::default());
     let walls = scene.walls().zip(0..WALL_NAMES.len());
-    walls.flat_map(|((face, _), wall)| scene.rectangle(face).texel_centres(mesh, mesh).map(move |point| (wall, point)).collect::<Vec<_>>()).collect()
+    walls
+        .flat_map(|((face, _), wall)| scene.rectangle(face).texel_centres(mesh, mesh).map(move |point| (wall, point)).collect::<Vec<_>>())
+        .collect()
 }
 
 struct Hash(Sha256);
@@ -173,7 +175,13 @@ mod tests {
     use super::*;
 
     fn reference() -> Reference {
-        Reference { method: "a method".into(), values: vec![1.0, 2.0, 30.0], standard_errors: vec![0.1, 0.2, 3.0], counts: vec![true, true, false], relative_error: 0.1 }
+        Reference {
+            method: "a method".into(),
+            values: vec![1.0, 2.0, 30.0],
+            standard_errors: vec![0.1, 0.2, 3.0],
+            counts: vec![true, true, false],
+            relative_error: 0.1,
+        }
     }
 
     #[test]

@@ -6,6 +6,7 @@ use std::io::Write;
 use serde::{Deserialize, Serialize};
 
 use super::Request;
+use super::axes::Axis;
 use super::point::Point;
 use crate::error::{Error, Result};
 use crate::gpu::DeviceFacts;
@@ -23,7 +24,7 @@ struct Head {
 pub struct Store {
     file: std::fs::File,
     path: std::path::PathBuf,
-    points: HashMap<String, Point>,
+    points: HashMap<(Axis, String), Point>,
 }
 
 /// A head, then a point a line.
@@ -49,14 +50,16 @@ impl Store {
                     return Err(Error::setting(
                         "--out",
                         folder.path().display(),
-                        format!("holds {NAME} of a study of something else, or on another device; name another folder, or delete that file"),
+                        format!(
+                            "holds {NAME} of a study of something else, or on another device; name another folder, or delete that file"
+                        ),
                     ));
                 }
                 // A last line that was cut off is measured again.
-                for (line, point) in lines.filter_map(|line| Some((line, serde_json::from_str::<Point>(line).ok()?))) {
+                for (line, (axis, point)) in lines.filter_map(|line| Some((line, serde_json::from_str::<(Axis, Point)>(line).ok()?))) {
                     kept.push_str(line);
                     kept.push('\n');
-                    points.insert(point.command.clone(), point);
+                    points.insert((axis, point.command.clone()), point);
                 }
             }
             Err(error) if error.kind() == std::io::ErrorKind::NotFound => {}
@@ -71,12 +74,13 @@ impl Store {
         Ok(Store { file, path, points })
     }
 
-    pub fn find(&self, command: &str) -> Option<Point> {
-        self.points.get(command).cloned()
+    /// The point of a command, as it was measured along an axis.
+    pub fn find(&self, axis: Axis, command: &str) -> Option<Point> {
+        self.points.get(&(axis, command.to_owned())).cloned()
     }
 
-    pub fn keep(&mut self, point: &Point) -> Result<()> {
-        let line = serde_json::to_string(point).expect("a point is plain data") + "\n";
+    pub fn keep(&mut self, axis: Axis, point: &Point) -> Result<()> {
+        let line = serde_json::to_string(&(axis, point)).expect("a point is plain data") + "\n";
         self.file.write_all(line.as_bytes()).and_then(|()| self.file.flush()).map_err(|error| Error::Output {
             option: "--out",
             path: self.path.clone(),

@@ -5,7 +5,7 @@ use std::sync::atomic::{AtomicBool, Ordering};
 use glam::DVec3;
 
 use super::Request;
-use super::axes::{self, Configuration, Line};
+use super::axes::{self, Configuration, Group, Line};
 use super::point::Shot;
 use super::reference::{Reference, wall_points};
 use crate::error::Result;
@@ -28,7 +28,7 @@ use crate::transport::{self, Lit, View};
 pub struct Subject {
     pub quantity: String,
     pub reference: Reference,
-    pub configurations: Vec<Configuration>,
+    pub groups: Vec<Group>,
     scene: Scene,
     camera: Option<Camera>,
     /// Points and normals, where no camera looks.
@@ -45,10 +45,10 @@ impl Subject {
     /// Quantities of a scene; making their references may take a while.
     pub fn all(gpu: &Gpu, scene: &Scene, request: &Request, tell: &mut dyn FnMut(&str)) -> Result<Vec<Subject>> {
         let Request { scene: name, size, photons, reference_samples, .. } = request.clone();
-        let subject = |quantity: &str, reference, configurations| Subject {
+        let subject = |quantity: &str, reference, groups| Subject {
             quantity: quantity.to_owned(),
             reference,
-            configurations,
+            groups,
             scene: scene.clone(),
             camera: None,
             receivers: Vec::new(),
@@ -61,7 +61,7 @@ impl Subject {
             let reference = Reference::walls(&usual, size);
             let points = wall_points(size);
             let receivers = || points.iter().map(|(wall, point)| (*point, inward(*wall))).collect();
-            let papers = axes::of_the_papers_rounds(size).into_iter().chain(axes::of_the_papers_rounds_that_shrink()).collect();
+            let papers = axes::of_the_papers_rounds(size);
             return Ok(vec![
                 subject("irradiance of the walls, the paper's line", reference.clone(), axes::of_paper(size, photons)),
                 Subject {
@@ -163,7 +163,7 @@ fn shot(values: Vec<f64>, timings: &Timings, ledger: Ledger) -> Shot {
     }
 }
 
-fn scene_axes(gpu: &Gpu, scene: &Scene, request: &Request) -> Result<Vec<Configuration>> {
+fn scene_axes(gpu: &Gpu, scene: &Scene, request: &Request) -> Result<Vec<Group>> {
     let geometry = Geometry::new(scene)?;
     let settings = TransportSettings { photons: request.photons, caustic_photons: request.photons, ..TransportSettings::default() };
     let sensor = Sensor::Picture { width: request.size, height: request.size };

@@ -1,0 +1,130 @@
+//! `photonmill study`: points against a reference of another method, a page that loads nothing, and a study that goes on
+//! where it was cut off.
+
+mod common;
+
+use std::path::Path;
+use std::sync::atomic::AtomicBool;
+use std::time::Duration;
+
+use common::{device, lit};
+use photonmill::gpu::Gpu;
+use photonmill::output::destination::Folder;
+use photonmill::study::axes::Axis;
+use photonmill::study::{self, Request, Study};
+
+fn request(scene: &str, budget: u64) -> Request {
+    Request {
+        scene: scene.to_owned(),
+        size: 6,
+        photons: 2048,
+        repeats: 3,
+        seed: 1,
+        reference_samples: 512,
+        budget: Duration::from_secs(budget),
+    }
+}
+
+fn run(gpu: &Gpu, folder: &Path, request: Request) -> photonmill::error::Result<Study> {
+    let never = AtomicBool::new(false);
+    let folder = Folder::open("--out", folder)?;
+    let scene = lit::scene(&request.scene);
+    let study = study::run(gpu, &scene, request, &folder, &never, &mut |_| {})?;
+    study::write(&folder, &study)?;
+    Ok(study)
+}
+
+fn axes_of(study: &Study) -> Vec<Axis> {
+    study.parts.iter().flat_map(|part| part.comparisons.iter().map(|comparison| comparison.axis)).collect()
+}
+
+#[test]
+fn the_open_box_is_studied_against_radiosity_and_goes_on_where_it_ended() {
+    let Some(gpu) = device() else { return };
+    let folder = tempfile::tempdir().unwrap();
+    let first = run(&gpu, folder.path(), request("open-box", 8)).unwrap();
+    assert!(first.complete);
+    let axes = axes_of(&first);
+    for axis in [Axis::Builder, Axis::Photons, Axis::Radius, Axis::Schedule, Axis::Kernel, Axis::Edges, Axis::Bounces, Axis::Randomness] {
+        assert!(axes.contains(&axis), "{axis:?} of {axes:?}");
+    }
+    for axis in [Axis::Arithmetic, Axis::Direct, Axis::Gather, Axis::Index, Axis::Effects, Axis::Paper] {
+        assert!(axes.contains(&axis), "{axis:?} of {axes:?}");
+    }
+    for part in &first.parts {
+        assert!(part.reference.contains("no photon in it") && part.reference_error < 0.01, "{} {}", part.reference, part.reference_error);
+        for curve in part.curves() {
+            assert!(!curve.points.is_empty(), "{}: {}", part.quantity, curve.label);
+            // Errors are those of this scene: photons neither miss the reference by half nor hit it by chance.
+            for point in &curve.points {
+                let error = point.error().value;
+                assert!(error > 1e-4 && error < 4.0, "{}: {}: {error}", part.quantity, curve.label);
+                assert_eq!(point.squared_errors.len(), 3);
+            }
+        }
+        // More photons, a smaller error.
+        let base = part.base().unwrap();
+        let (first, last) = (base.points.first().unwrap(), base.points.last().unwrap());
+        assert!(base.points.len() < 2 || last.error().value < first.error().value, "{}", part.quantity);
+    }
+    // The paper's two bounces lack a third of the light, whatever the noise.
+    let bounces = first.parts[0].comparisons.iter().find(|comparison| comparison.axis == Axis::Bounces).unwrap();
+    let two = bounces.curves.iter().find(|curve| curve.label == "2 bounces").unwrap().points.last().unwrap();
+    assert!(two.bias().value > 0.3 && (0.3..0.4).contains(&two.cut_off), "{:?}, {}", two.bias(), two.cut_off);
+
+    let read = |name: &str| std::fs::read_to_string(folder.path().join(name)).unwrap();
+    let page = read("index.html");
+    assert!(page.contains("What accuracy costs in time") && page.contains("<svg") && !page.contains("http"));
+    let count: usize = first.parts.iter().flat_map(|part| part.curves()).map(|curve| curve.points.len()).sum();
+    assert_eq!(read("points.csv").lines().count(), 1 + count);
+    assert_eq!(read("points.jsonl").lines().count(), 1 + count);
+
+    // Cut off in the middle of a line: what is whole is kept, and only the rest is measured.
+    let whole = read("points.jsonl");
+    let kept: Vec<&str> = whole.lines().take(1 + count / 2).collect();
+    std::fs::write(folder.path().join("points.jsonl"), kept.join("\n") + "\n[\"builder\",{\"comm").unwrap();
+    let second = run(&gpu, folder.path(), request("open-box", 8)).unwrap();
+    assert!(second.complete);
+    let points = |study: &Study| study.parts[0].comparisons[0].curves.clone();
+    assert_eq!(points(&second), points(&first), "measured again");
+
+    // Another study does not mix with it.
+    let error = run(&gpu, folder.path(), Request { photons: 4096, ..request("open-box", 8) }).unwrap_err().to_string();
+    assert!(error.starts_with("--out ") && error.contains("points.jsonl") && !error.contains('\n'), "{error}");
+}
+
+#[test]
+fn a_picture_is_studied_against_path_tracing() {
+    let Some(gpu) = device() else { return };
+    let folder = tempfile::tempdir().unwrap();
+    let study = run(&gpu, folder.path(), request("cornell-spheres", 6)).unwrap();
+    let part = &study.parts[0];
+    assert!(part.reference.contains("path tracing") && part.reference_error < 0.2, "{} {}", part.reference, part.reference_error);
+    let without = part.curves().find(|curve| curve.label == "without indirect").unwrap();
+    let base = part.base().unwrap();
+    assert!(without.best_error() > base.best_error(), "{} {}", without.best_error(), base.best_error());
+    assert!(part.sentences().len() > 10, "{:?}", part.sentences());
+}
+
+#[test]
+fn a_study_that_is_cancelled_keeps_what_it_has() {
+    let Some(gpu) = device() else { return };
+    let folder = tempfile::tempdir().unwrap();
+    let cancelled = AtomicBool::new(false);
+    let mut told = 0;
+    let scene = lit::scene("open-box");
+    let out = Folder::open("--out", folder.path()).unwrap();
+    let study = study::run(&gpu, &scene, request("open-box", 8), &out, &cancelled, &mut |_| {
+        told += 1;
+        // At the third comparison.
+        if told == 4 {
+            cancelled.store(true, std::sync::atomic::Ordering::Relaxed);
+        }
+    })
+    .unwrap();
+    assert!(!study.complete);
+    assert_eq!(study.parts[0].comparisons.len(), 3);
+    assert!(study.parts[0].comparisons[1].curves.iter().all(|curve| !curve.points.is_empty()));
+    study::write(&out, &study).unwrap();
+    assert!(std::fs::read_to_string(folder.path().join("index.html")).unwrap().contains("Incomplete"));
+}
