@@ -10,7 +10,7 @@ use std::sync::atomic::AtomicBool;
 use common::family::{FALSE_ALARM, Family, normal_p_value};
 use common::lit::{APPENDS, irradiances, level, matt, received, scene, scene_of, shining};
 use common::radiosity::{cells_of, form_factor_from, on_wall};
-use common::{assert_complains, assert_holds, device};
+use common::{assert_complains, assert_holds, device, known};
 use glam::{DVec3, Vec3};
 use photonmill::scene::closed_forms::NAMES;
 use photonmill::scene::light::LightKind;
@@ -207,4 +207,10 @@ fn a_point_light_falls_off_with_distance_and_cosine() {
         }
     }
     family.assert_tells_one_per_cent();
+}
+
+#[test]
+fn a_spot_falls_off_between_its_cones() {
+    let Some(gpu) = device() else { return };
+    assert_holds("the spot", known::spot(&gpu));
 }

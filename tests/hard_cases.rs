@@ -11,9 +11,9 @@
 //!
 //! | case | tests |
 //! | --- | --- |
-//! | G1 | photons_leave_a_surface_once_and_for_all, photons_on_edges_and_in_corners_stay_in_the_room |
+//! | G1 | photons_leave_a_surface_once_and_for_all, a_patch_in_a_plane_is_left_with_the_plane, photons_on_edges_and_in_corners_stay_in_the_room |
 //! | G2 | grazing_and_straight_directions_end_in_the_room |
-//! | G3 | thin_walls_and_sheets_let_no_light_through, small_lamps_shine_by_their_area |
+//! | G3 | thin_walls_and_sheets_let_no_light_through, a_lamp_in_a_flat_box_lights_nothing_outside, small_lamps_shine_by_their_area |
 //! | G4 | black_walls_absorb_the_first_flights_hits, a_light_flush_with_a_wall_shines_into_the_room, flat_lamps_light_nothing_of_their_own_plane |
 //! | G5 | rays_at_edges_and_corners_meet_a_wall |
 //! | G6 | every_operation_is_rounded_by_itself |
@@ -24,7 +24,7 @@
 //! | G11 | the_smallest_lamps_shine_into_the_room_or_are_left_out |
 //! | G12 | ten_thousand_sizes_away_the_light_is_the_same_to_the_bit, size_and_place_do_not_change_the_light |
 //! | G13 | every_power_of_two_is_the_same_light_to_the_bit, the_open_box_of_any_power_of_two_stores_the_same_photons |
-//! | G14 | flat_doubled_and_reordered_triangles_change_no_bit, two_sheets_at_one_place_show_each_its_own_side |
+//! | G14 | flat_doubled_and_reordered_triangles_change_no_bit, sheets_in_one_plane_are_met_alike_by_tree_and_list, two_sheets_at_one_place_show_each_its_own_side |
 //! | G15 | thin_walls_and_sheets_let_no_light_through, no_light_leaks_from_one_shelf_to_the_next |
 //! | S1 | unit_floats_stay_below_one |
 //! | S2 | grazing_and_straight_directions_end_in_the_room |
@@ -62,7 +62,7 @@
 //! | A11 | - no pair of floats: sums are integers |
 //! | E1 | edges_and_corners_are_dark_by_what_lies_beyond_them, edge_correction_divides_by_what_lies_on_the_wall |
 //! | E2 | edges_and_corners_are_dark_by_what_lies_beyond_them, disc_at_an_edge_and_in_a_corner |
-//! | E3 | a_lit_floor_does_not_light_the_foot_of_the_wall |
+//! | E3 | a_lit_floor_does_not_light_the_foot_of_the_wall, each_half_of_a_roof_keeps_its_own_light |
 //! | E4 | a_photon_on_the_rim_counts |
 //! | E5 | - no estimator by the nearest k photons |
 //! | E6 | - no estimator by the nearest k photons; fewer in reach, or none: E8, E11 |
@@ -114,7 +114,8 @@ mod common;
 use std::collections::HashSet;
 use std::f64::consts::PI;
 
-use common::lit::{flights, lamp, mean_red, received, same_light, scene, seen};
+use common::known::{self, none_returns};
+use common::lit::{BOTH, flights, lamp, mean_red, received, same_light, scene, seen};
 use common::{Check, assert_complains, assert_holds, device, relative_check, z_check};
 use glam::{DQuat, DVec2, DVec3, Vec3};
 use photonmill::plan::Plan;
@@ -423,16 +424,6 @@ fn photons_on_edges_and_in_corners_stay_in_the_room() {
     assert!(complaints.is_empty(), "{}", complaints.join("; "));
 }
 
-/// What a flat or convex surface scatters never meets it again: neither the triangle it left nor those beside it.
-fn none_returns(what: &str, lit: &Lit) -> Check {
-    let [first, second] = [lit.fates[0].bounces[0], lit.fates[0].bounces[1]];
-    assert!(first.stored > 10_000, "{what}: only {} photons were scattered", first.stored);
-    if second.stored + second.absorbed == 0 && second.escaped == first.stored {
-        return Ok(());
-    }
-    Err(format!("{what}: {} of {} scattered photons met the surface again", second.stored + second.absorbed, first.stored))
-}
-
 #[test]
 fn photons_leave_a_surface_once_and_for_all() {
     let Some(gpu) = device() else { return };
@@ -467,6 +458,26 @@ fn photons_leave_a_surface_once_and_for_all() {
         let lit = received(&gpu, &ball, &flights(100_000, 2), &[(DVec3::new(0.2, -0.2, -0.4), DVec3::Y)]);
         assert_complains("the inside of a ball", none_returns("bowl", &lit));
     }
+}
+
+#[test]
+fn a_patch_in_a_plane_is_left_with_the_plane() {
+    let Some(gpu) = device() else { return };
+    assert_holds("the patch", known::patch_in_a_plane(&gpu));
+}
+
+#[test]
+fn a_lamp_in_a_flat_box_lights_nothing_outside() {
+    let Some(gpu) = device() else { return };
+    for illumination in BOTH {
+        assert_holds(format!("{illumination:?}"), known::lamp_in_a_box(&gpu, illumination));
+    }
+}
+
+#[test]
+fn each_half_of_a_roof_keeps_its_own_light() {
+    let Some(gpu) = device() else { return };
+    assert_holds("the roof", known::ridge(&gpu));
 }
 
 /// Two rooms side by side, the left one lit. `wall` is what stands between.
@@ -682,6 +693,12 @@ fn axis_parallel_rays_meet_the_same_by_tree_and_list() {
     assert_holds("tree", same_sums("tree", &tree, &list));
     room.meshes.remove(6);
     assert_complains("a block less", same_sums("a block less", &lit(&[Effect::Bvh], &[], &room), &list));
+}
+
+#[test]
+fn sheets_in_one_plane_are_met_alike_by_tree_and_list() {
+    let Some(gpu) = device() else { return };
+    assert_holds("the sheets", known::sheets_in_one_plane(&gpu));
 }
 
 /// Triangles without area, triangles given twice, and the order in which triangles are given change no bit.

@@ -5,11 +5,12 @@ mod common;
 
 use std::f64::consts::PI;
 
-use common::lit::{flights, lamp, mean_red, received, same_light, scene, seen};
-use common::{assert_complains, assert_holds, device, relative_check, share_check, z_check};
+use common::lit::{BOTH, flights, lamp, mean_red, received, same_light, scene, seen};
+use common::{assert_complains, assert_holds, device, known, relative_check, share_check, z_check};
 use glam::{DVec3, Vec3};
 use photonmill::gpu::Gpu;
 use photonmill::scene::light::{Light, LightKind};
+use photonmill::scene::texture::Wrap;
 use photonmill::scene::{Camera, Material, Mesh, Scene, Surface};
 use photonmill::selfcheck::Estimate;
 use photonmill::selfcheck::measure::{irradiance, radiance};
@@ -317,4 +318,23 @@ fn diffuse_light_crosses_glass_by_its_mean_transmittance() {
         assert_holds(what, share_check(what, through, fates.emitted, expected));
         assert_complains("flux over n^2", share_check(what, through, fates.emitted, expected / 2.25));
     }
+}
+
+#[test]
+fn textures_go_on_beyond_their_edges_as_their_wrapping_says() {
+    let Some(gpu) = device() else { return };
+    for u in [Wrap::Repeat, Wrap::MirroredRepeat, Wrap::Clamp] {
+        for v in [Wrap::Repeat, Wrap::MirroredRepeat, Wrap::Clamp] {
+            assert_holds("the picture", known::wrapped_texture(&gpu, [u, v]));
+        }
+    }
+}
+
+#[test]
+fn shading_normals_turn_light_and_no_more() {
+    let Some(gpu) = device() else { return };
+    for illumination in BOTH {
+        assert_holds("the plane", known::leaning_plane(&gpu, illumination));
+    }
+    assert_holds("the scatterer", known::leaning_scatterer(&gpu));
 }

@@ -4,7 +4,7 @@
 mod common;
 
 use common::lit::{light, received, scene};
-use common::{Check, assert_complains, assert_holds, device, device_with, z_check};
+use common::{Check, assert_complains, assert_holds, device, device_with, known, z_check};
 use glam::{DVec3, Vec3};
 use photonmill::gpu::{Gpu, Options};
 use photonmill::judge::{Judge, Verdict};
@@ -331,23 +331,10 @@ fn no_light_leaks_through_thin_walls() {
     }
 }
 
-/// A second floor a hundredth of the radius above the first, facing as it does, seals it off: its photons are
-/// not the first one's.
 #[test]
 fn no_light_leaks_from_one_shelf_to_the_next() {
     let Some(gpu) = device() else { return };
-    let mut scene = scene("furnace");
-    scene.materials = vec![
-        Material::lambert("wall", Vec3::splat(0.7)),
-        Material { emission: Vec3::splat(10.0), ..Material::lambert("lamp", Vec3::splat(0.5)) },
-    ];
-    scene.meshes.push(Mesh::parallelogram("shelf", DVec3::Y * 0.001, DVec3::Z, DVec3::X, 0));
-    scene.meshes.push(Mesh::parallelogram("lamp", DVec3::new(0.4, 0.9, 0.4), DVec3::X * 0.2, DVec3::Z * 0.2, 1));
-    let settings = TransportSettings { radius: Some(0.1), photons: 20_000, rounds: 4, ..TransportSettings::default() };
-    let points = [(DVec3::new(0.3, 0.001, 0.3), DVec3::Y), (DVec3::new(0.3, 0.0, 0.3), DVec3::Y)];
-    let found = irradiance(&gpu, &scene, &settings, &points);
-    assert!(found[0].0.x > 0.1, "the shelf has {}", found[0].0);
-    assert_eq!(found[1].0, DVec3::ZERO, "below the shelf");
+    assert_holds("the shelf", known::shelf(&gpu));
 }
 
 /// The radii of Knaus and Zwicker's schedule, and their mean over a million passes where it is known.

@@ -5,9 +5,11 @@
 //! test fails, unless `PHOTONMILL_NO_GPU=1` says that there is none on purpose.
 #![allow(dead_code, reason = "every test file takes its part")]
 
+pub mod bits;
 pub mod chi_square;
 pub mod densities;
 pub mod family;
+pub mod known;
 pub mod lit;
 pub mod radiosity;
 pub mod reference;

@@ -1,0 +1,271 @@
+//! Small scenes whose light is known, each as a check of a device: a test holds it, and `tests/red.rs` shows that it
+//! complains.
+
+use std::f64::consts::{FRAC_PI_3, PI, TAU};
+
+use glam::{DQuat, DVec2, DVec3, Vec3};
+use photonmill::gpu::Gpu;
+use photonmill::scene::light::LightKind;
+use photonmill::scene::material::TextureUse;
+use photonmill::scene::texture::{Texture, Wrap};
+use photonmill::scene::{Camera, Material, Mesh};
+use photonmill::settings::transport::{Effect, Illumination, Part, TransportSettings};
+use photonmill::transport::Lit;
+
+use super::lit::{flights, level, matt, mean_red, means, received, scene, scene_of, seen};
+use super::{Check, equal_sums, z_check};
+
+/// The red channel of a point or pixel, sure to three parts in a hundred and right to its error.
+fn check_mean(what: &str, lit: &Lit, place: usize, expected: f64, tolerance: f64) -> Check {
+    let [found, error] = [lit.film.mean(place, &lit.plan).x, lit.film.standard_error(place, &lit.plan).x];
+    assert!(error < 0.03 * expected, "{what}: {found} +- {error}");
+    z_check(what, found, expected, error.max(tolerance * expected))
+}
+
+/// A lamp shut in by a flat box of a height of 2^-11: nothing lights the floor and the ceiling of the room around it.
+pub fn lamp_in_a_box(gpu: &Gpu, illumination: Illumination) -> Check {
+    let mut room = scene("furnace");
+    room.materials = vec![matt(0.7), Material { emission: Vec3::splat(10.0), ..matt(0.5) }];
+    // Numbers without rounding, so that the sides share their corners to the bit.
+    let (corner, height) = (DVec3::splat(0.375), DVec3::Y / 2048.0);
+    let (x, z) = (DVec3::X * 0.25, DVec3::Z * 0.25);
+    let mut side = |name: &str, origin: DVec3, u: DVec3, v: DVec3, material: usize| {
+        // Both faces, as light must not pass either way.
+        room.meshes.push(Mesh::parallelogram(name, origin, u, v, material));
+        room.meshes.push(Mesh::parallelogram(name, origin, v, u, 0));
+    };
+    side("lamp", corner, z, x, 1);
+    side("lid", corner + height, x, z, 0);
+    side("left", corner, z, height, 0);
+    side("right", corner + x, height, z, 0);
+    side("back", corner, height, x, 0);
+    side("front", corner + z, x, height, 0);
+    let settings = TransportSettings { photons: 20_000, rounds: 4, illumination, ..TransportSettings::default() };
+    let points = [(DVec3::new(0.5, 0.0, 0.5), DVec3::Y), (DVec3::new(0.5, 1.0, 0.5), DVec3::NEG_Y)];
+    match mean_red(&received(gpu, &room, &settings, &points)) {
+        0.0 => Ok(()),
+        leaked => Err(format!("{leaked} W/m2 leave the box")),
+    }
+}
+
+/// A second floor a hundredth of the radius above the first, facing as it does, seals it off: its photons are not the
+/// first one's.
+pub fn shelf(gpu: &Gpu) -> Check {
+    let mut room = scene("furnace");
+    room.materials = vec![matt(0.7), Material { emission: Vec3::splat(10.0), ..matt(0.5) }];
+    room.meshes.push(Mesh::parallelogram("shelf", DVec3::Y * 0.001, DVec3::Z, DVec3::X, 0));
+    room.meshes.push(Mesh::parallelogram("lamp", DVec3::new(0.4, 0.9, 0.4), DVec3::X * 0.2, DVec3::Z * 0.2, 1));
+    let settings = TransportSettings { radius: Some(0.1), photons: 20_000, rounds: 4, ..TransportSettings::default() };
+    let points = [(DVec3::new(0.3, 0.001, 0.3), DVec3::Y), (DVec3::new(0.3, 0.0, 0.3), DVec3::Y)];
+    let found = means(&received(gpu, &room, &settings, &points));
+    assert!(found[0].x > 0.1, "the shelf has {}", found[0]);
+    if found[1] == DVec3::ZERO { Ok(()) } else { Err(format!("{} W/m2 below the shelf", found[1])) }
+}
+
+/// The sun straight above a black roof, half of it level and half at 60 degrees: beside the ridge each half has the
+/// irradiance of its own slope, 1 and cos 60, from its own photons alone.
+pub fn ridge(gpu: &Gpu) -> Check {
+    let slope = DVec3::new(FRAC_PI_3.cos(), -FRAC_PI_3.sin(), 0.0);
+    let (ridge, z) = (DVec3::NEG_Z, DVec3::Z * 2.0);
+    let sun = LightKind::Directional { direction: DVec3::NEG_Y, irradiance: Vec3::ONE };
+    let halves = vec![Mesh::parallelogram("level", ridge, DVec3::NEG_X, z, 0), Mesh::parallelogram("slope", ridge, z, slope, 0)];
+    let roof = scene_of(halves, vec![matt(0.0)], vec![sun]);
+    let settings = TransportSettings {
+        photons: 40_000,
+        rounds: 64,
+        bounces: 1,
+        radius: Some(0.1),
+        alpha: 1.0,
+        illumination: Illumination::Photons,
+        ..TransportSettings::default()
+    };
+    let normal = DVec3::new(-slope.y, slope.x, 0.0);
+    let lit = received(gpu, &roof, &settings, &[(DVec3::NEG_X * 0.02, DVec3::Y), (slope * 0.02, normal)]);
+    check_mean("beside the ridge", &lit, 0, 1.0, 1e-3)?;
+    check_mean("below the ridge", &lit, 1, slope.x, 1e-3)
+}
+
+/// A spot between its cones, straight onto a plane 1 m off: I s^2 cos^3 where s is how far the cosine is from the outer
+/// cone's to the inner's. Shadow rays to it have nothing random.
+pub fn spot(gpu: &Gpu) -> Check {
+    let (inner_angle, outer_angle) = (0.3f32, 0.7f32);
+    let spot = LightKind::Spot { position: DVec3::Y, direction: DVec3::NEG_Y, intensity: Vec3::splat(2.0), inner_angle, outer_angle };
+    let floor = scene_of(vec![level(0.0, [4.0; 2], true, 0)], vec![matt(0.0)], vec![spot]);
+    let (inner, outer) = (f64::from(inner_angle).cos(), f64::from(outer_angle).cos());
+    let shares = [0.0, 0.1, 0.25, 0.5, 0.75, 1.0];
+    let cosines = shares.map(|share| outer + share * (inner - outer));
+    let points = cosines.map(|cosine| (DVec3::X * (1.0 - cosine * cosine).sqrt() / cosine, DVec3::Y));
+    let settings = TransportSettings { rounds: 1, part: Part::Direct, ..TransportSettings::default() };
+    let found = means(&received(gpu, &floor, &settings, &points));
+    for ((share, cosine), found) in shares.iter().zip(cosines).zip(found) {
+        let exact = 2.0 * share * share * cosine.powi(3);
+        if (found.x - exact).abs() > 2e-5 {
+            return Err(format!("{share} of the way into the cone: {} instead of {exact}", found.x));
+        }
+    }
+    Ok(())
+}
+
+/// Texel of an axis of `size` at a place beyond it, as glTF has it.
+fn texel_at(wrap: Wrap, place: i32, size: i32) -> i32 {
+    match wrap {
+        Wrap::Repeat => place.rem_euclid(size),
+        Wrap::Clamp => place.clamp(0, size - 1),
+        // There and back again, each end twice.
+        Wrap::MirroredRepeat => (0..size).chain((0..size).rev()).nth(place.rem_euclid(2 * size) as usize).unwrap(),
+    }
+}
+
+/// A lamp that wears a picture of 3 x 2 texels five times along each side, from -2 to 3: at the middle of every texel
+/// shines that texel.
+pub fn wrapped_texture(gpu: &Gpu, wrap: [Wrap; 2]) -> Check {
+    // Any two are 1 apart in some channel.
+    let texels = vec![Vec3::ZERO, Vec3::X, Vec3::Y, Vec3::Z, Vec3::new(1.0, 1.0, 0.0), Vec3::ONE];
+    let size = [3, 2];
+    let mut mesh = Mesh::parallelogram("lamp", DVec3::new(-7.5, -5.0, 0.0), DVec3::X * 15.0, DVec3::Y * 10.0, 0);
+    mesh.uvs[0].iter_mut().for_each(|uv| *uv = *uv * 5.0 - DVec2::splat(2.0));
+    let emission_texture = Some(TextureUse { texture: 0, uv_set: 0 });
+    let mut sign = scene_of(vec![mesh], vec![Material { emission: Vec3::ONE, emission_texture, ..matt(0.0) }], vec![]);
+    sign.textures = vec![Texture { name: "six".into(), width: 3, height: 2, texels: texels.clone(), wrap }];
+    // Five pixels a texel: the middle one of a row is within a tenth of the texel's middle.
+    let eye = DVec3::Z * 20.0;
+    let camera = Camera::looking_at("eye", eye, DVec3::ZERO, DVec3::Y, 2.0 * (5.0f64 / 20.0).atan());
+    let settings = TransportSettings { rounds: 1, part: Part::Direct, ..TransportSettings::default() };
+    let found = means(&seen(gpu, &sign, &settings, &camera, [75, 50]));
+    for j in 0..10 {
+        for i in 0..15 {
+            let [column, row] = [texel_at(wrap[0], i - 6, size[0]), texel_at(wrap[1], j - 4, size[1])];
+            let expected = texels[(row * size[0] + column) as usize].as_dvec3();
+            // Rows of pixels from the top, of texels from v = 0.
+            let pixel = (49 - (5 * j + 2)) * 75 + 5 * i + 2;
+            let found = found[pixel as usize];
+            if (found - expected).abs().max_element() > 0.2 {
+                return Err(format!("{wrap:?}, texel {i}, {j}: {found} instead of {expected}"));
+            }
+        }
+    }
+    Ok(())
+}
+
+/// A level plane whose shading normals lean by an angle towards x.
+fn leaning(angle: f64) -> Mesh {
+    Mesh { normals: vec![DVec3::new(angle.sin(), angle.cos(), 0.0); 4], ..level(0.0, [4.0; 2], true, 0) }
+}
+
+/// The sun straight above a plane whose shading normals lean by 40 degrees: rho E cos 40 / pi for an eye above them. An
+/// eye below them sees the plane as flat, rho E / pi.
+pub fn leaning_plane(gpu: &Gpu, illumination: Illumination) -> Check {
+    let lean = 40f64.to_radians();
+    let sun = LightKind::Directional { direction: DVec3::NEG_Y, irradiance: Vec3::ONE };
+    let plane = scene_of(vec![leaning(lean)], vec![matt(0.8)], vec![sun]);
+    let settings = TransportSettings {
+        photons: 20_000,
+        rounds: 32,
+        bounces: 1,
+        radius: Some(0.5),
+        alpha: 1.0,
+        illumination,
+        ..TransportSettings::default()
+    };
+    for (what, degrees, cosine) in [("above", 30f64, lean.cos()), ("below", -70.0, 1.0)] {
+        let eye = DVec3::new(degrees.to_radians().sin(), degrees.to_radians().cos(), 0.0);
+        let camera = Camera::looking_at("eye", eye, DVec3::ZERO, DVec3::Z, 2e-4);
+        let lit = seen(gpu, &plane, &settings, &camera, [1, 1]);
+        // Photons keep their direction in 30 bits.
+        check_mean(&format!("{illumination:?}, from {what} the shading normals"), &lit, 0, 0.8 / PI * cosine, 2e-4)?;
+    }
+    Ok(())
+}
+
+/// A narrow beam of W watts straight onto a plane whose shading normals lean by 40 degrees: it scatters
+/// W cos 40 rho cos / pi a steradian, whatever the shading normal says of where that goes (Veach 1997, section 5.3),
+/// onto a ceiling 1 m above, W cos 40 rho cos^4 / pi of irradiance.
+pub fn leaning_scatterer(gpu: &Gpu) -> Check {
+    let lean = 40f64.to_radians();
+    let angle = 3.5e-4f32;
+    let beam = LightKind::Spot {
+        position: DVec3::Y * 0.9,
+        direction: DVec3::NEG_Y,
+        intensity: Vec3::splat(1e7),
+        inner_angle: angle,
+        outer_angle: angle,
+    };
+    let watts = TAU * (1.0 - f64::from(angle.cos())) * 1e7;
+    let bench = scene_of(vec![leaning(lean), level(1.0, [6.0; 2], false, 1)], vec![matt(0.8), matt(0.0)], vec![beam]);
+    let radius = 0.3;
+    let settings = TransportSettings {
+        photons: 5000,
+        rounds: 32,
+        bounces: 2,
+        radius: Some(radius),
+        alpha: 1.0,
+        illumination: Illumination::Photons,
+        ..TransportSettings::default()
+    };
+    let middle = DVec3::new(lean.tan(), 1.0, 0.0);
+    let lit = received(gpu, &bench, &settings, &[(middle, DVec3::NEG_Y)]);
+    // The mean over the disc of the estimate, by parts of equal area.
+    let parts = 64;
+    let place = |k: i32| (f64::from(k) + 0.5) / f64::from(parts);
+    let samples = (0..parts * parts).map(|k| {
+        let (r, (sin, cos)) = (radius * place(k % parts).sqrt(), (TAU * place(k / parts)).sin_cos());
+        (middle + DVec3::new(r * cos, 0.0, r * sin)).length_squared().powi(-2)
+    });
+    let exact = watts * lean.cos() * 0.8 / PI * samples.sum::<f64>() / f64::from(parts * parts);
+    check_mean("a leaning scatterer", &lit, 0, exact, 1e-3)
+}
+
+/// A white patch that lies in a white plane a hundred times its size, turned so that neither is in its plane to the
+/// last bit: what they scatter meets neither again.
+pub fn patch_in_a_plane(gpu: &Gpu) -> Check {
+    let turn = DQuat::from_axis_angle(DVec3::new(0.3, 0.5, -0.8).normalize(), 1.1);
+    let mut meshes = vec![level(0.0, [4.0; 2], true, 0), level(0.0, [0.04; 2], true, 0)];
+    meshes.iter_mut().flat_map(|mesh| &mut mesh.positions).for_each(|at| *at = turn * *at);
+    let spot = LightKind::Spot {
+        position: turn * DVec3::new(0.1, 0.5, 0.2),
+        direction: turn * DVec3::new(-0.1, -0.5, -0.2).normalize(),
+        intensity: Vec3::ONE,
+        inner_angle: 0.04,
+        outer_angle: 0.04,
+    };
+    let lit = received(gpu, &scene_of(meshes, vec![matt(1.0)], vec![spot]), &flights(40_000, 2), &[(DVec3::ZERO, turn * DVec3::Y)]);
+    none_returns("a patch in a plane", &lit)
+}
+
+/// What a flat or convex surface scatters never meets it again: neither the triangle it left nor those beside it.
+pub fn none_returns(what: &str, lit: &Lit) -> Check {
+    let [first, second] = [lit.fates[0].bounces[0], lit.fates[0].bounces[1]];
+    assert!(first.stored > 10_000, "{what}: only {} photons were scattered", first.stored);
+    if second.stored + second.absorbed == 0 && second.escaped == first.stored {
+        return Ok(());
+    }
+    Err(format!("{what}: {} of {} scattered photons met the surface again", second.stored + second.absorbed, first.stored))
+}
+
+/// Sheets of other colours that lie in one plane without rounding, so that a ray is equally far from several: a tree
+/// takes the one that the list of all triangles does, though it meets them in another order.
+pub fn sheets_in_one_plane(gpu: &Gpu) -> Check {
+    let sheets = 24;
+    let sheet = |k: usize| {
+        let size = (4 + 5 * k % 29) as f64 / 16.0;
+        let corner = DVec3::new((3 * k % 17) as f64, 0.0, (7 * k % 13) as f64) / 16.0;
+        Mesh::parallelogram("sheet", corner, DVec3::Z * size, DVec3::X * size, k)
+    };
+    let materials = (0..sheets).map(|k| matt(0.04 * k as f32)).collect();
+    let sun = LightKind::Directional { direction: DVec3::NEG_Y, irradiance: Vec3::ONE };
+    let scene = scene_of((0..sheets).map(sheet).collect(), materials, vec![sun]);
+    let camera = Camera::looking_at("above", DVec3::new(1.0, 3.0, 1.0), DVec3::new(1.0, 0.0, 1.0), DVec3::Z, 1.0);
+    let of = |with: &[Effect], without: &[Effect]| {
+        let settings = TransportSettings {
+            with: with.to_vec(),
+            without: without.to_vec(),
+            rounds: 1,
+            part: Part::Direct,
+            ..TransportSettings::default()
+        };
+        seen(gpu, &scene, &settings, &camera, [48, 48])
+    };
+    let (tree, list) = (of(&[Effect::Bvh], &[]), of(&[], &[Effect::Bvh]));
+    assert!(tree.plan.keeps(Effect::Bvh) && !list.plan.keeps(Effect::Bvh));
+    equal_sums("tree and list", &tree.film.sums, &list.film.sums)
+}
