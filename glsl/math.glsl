@@ -1,7 +1,8 @@
 // Quotients, roots, and the functions of GLSL that Vulkan lets every device round as it likes. With STRICT_MATH
 // only sums, products and integers decide a result, and those are the same to the bit on every device that
 // rounds to nearest; else the device's own functions are as fast as it has them. They stand in native_*, and
-// build.rs lets them stand nowhere else. Twin of src/cpu/math.rs.
+// compile.rs lets them stand nowhere else. What lies closer to 0 than any normal number a device may keep or
+// take for 0; to quotients, roots and angles it is 0. Twin of src/cpu/math.rs.
 
 layout(constant_id = 30) const bool STRICT_MATH = false;
 
@@ -9,6 +10,7 @@ const uint SIGN_BIT = 0x80000000u;
 const uint INFINITY_BITS = 0x7f800000u;
 const uint NAN_BITS = 0x7fc00000u;
 const uint LEADING_BIT = 0x00800000u;
+const float LEAST_NORMAL = 1.17549435082228751e-38;
 
 float native_quotient(float a, float b) { return a / b; }
 float native_root(float x) { return sqrt(x); }
@@ -144,7 +146,10 @@ float angle_of(float y, float x)
 {
     if (STRICT_MATH) {
         float small = min(abs(x), abs(y)), large = max(abs(x), abs(y));
-        float t = large > 0.0 ? rounded_quotient(small, large) : 0.0;
+        if (large < LEAST_NORMAL) {
+            return 0.0;
+        }
+        float t = rounded_quotient(small, large);
         bool folded = t > 0.41421356;
         t = folded ? rounded_quotient(t - 1.0, t + 1.0) : t;
         float t2 = t * t;
@@ -152,7 +157,7 @@ float angle_of(float y, float x)
         angle = folded ? 0.78539816339744831 + angle : angle;
         angle = abs(y) > abs(x) ? 1.5707963267948966 - angle : angle;
         angle = x < 0.0 ? 3.14159265358979324 - angle : angle;
-        return y < 0.0 ? -angle : angle;
+        return y <= -LEAST_NORMAL ? -angle : angle;
     }
     return native_atan(y, x);
 }

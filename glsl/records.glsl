@@ -310,6 +310,7 @@ struct CheckPush {
 };
 
 struct MathResults {
+    float converted;
     float sum_of_product;
     float quotient;
     float root;

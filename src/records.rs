@@ -444,6 +444,8 @@ records! {
 
     /// Functions of `glsl/math.glsl` at (a, b).
     MathResults {
+        /// The bits of a, taken for an integer.
+        converted: f32,
         /// a b + a
         sum_of_product: f32,
         /// a / b

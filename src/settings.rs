@@ -72,7 +72,7 @@ impl EmissionLaw {
 pub enum Math {
     /// As the device has them.
     Fast,
-    /// The same bits on every device, and on the CPU builder.
+    /// The same bits on every device that rounds to nearest, and on the CPU builder.
     Strict,
 }
 

@@ -9,9 +9,9 @@ use std::sync::atomic::AtomicBool;
 
 use common::family::{FALSE_ALARM, Family, normal_p_value};
 use common::lit::{APPENDS, irradiances, level, matt, received, scene, scene_of, shining};
-use common::radiosity::{cells_of, form_factor_from, on_wall};
 use common::{assert_complains, assert_holds, device, known};
 use glam::{DVec3, Vec3};
+use photonmill::judge::radiosity::{cells_of, form_factor_from, on_wall};
 use photonmill::scene::closed_forms::NAMES;
 use photonmill::scene::light::LightKind;
 use photonmill::scene::{Mesh, Scene};

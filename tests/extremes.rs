@@ -123,8 +123,8 @@ fn light_is_linear_in_power_over_24_decades() {
     }
 }
 
-/// Weights and fluxes that differ by many decades, mixed in one texel: a sum is off by no more than half a unit of
-/// fixed point for each photon.
+/// Phong weights that differ by many decades, and fluxes of lamps as different as is allowed, mixed in one texel: a sum
+/// is off by no more than half a unit of fixed point for each photon.
 #[test]
 fn mixed_weights_are_summed_to_half_a_unit_each() {
     let settings = Settings {

@@ -8,10 +8,10 @@ use std::sync::OnceLock;
 
 use common::family::{Family, chi_squared_z};
 use common::lit::irradiances;
-use common::radiosity::{ByLamp, Law, Radiosity, WALLS, cells_of, exchange, form_factor_from, inward, on_wall};
 use common::{Device, device, photons, photons_on_cpu, run, run_on_cpu};
 use glam::DVec3;
 use photonmill::film::estimate_walls;
+use photonmill::judge::radiosity::{ByLamp, Law, Radiosity, WALLS, cells_of, exchange, form_factor_from, inward, on_wall};
 use photonmill::records::Photon;
 use photonmill::rng::Rng;
 use photonmill::scene::built_in;

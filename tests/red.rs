@@ -2,14 +2,12 @@
 //! complain. Checks of numbers on the host show it beside themselves (`assert_complains`).
 
 mod common;
-#[path = "../glsl/compile.rs"]
-mod compile;
+#[path = "common/planted.rs"]
+mod planted;
 
-use std::path::Path;
 use std::sync::atomic::AtomicBool;
 
 use common::{Check, assert_complains, assert_holds, bits, equal_sums, in_order, known, open, photons, photons_on_cpu, run_on_cpu};
-use photonmill::constants;
 use photonmill::gpu::{Gpu, Options, check};
 use photonmill::plan::transport::{Sensor, TransportPlan};
 use photonmill::render::{self, Control};
@@ -78,7 +76,7 @@ struct Fault {
     noticed_by: &'static [Question],
 }
 
-const FAULTS: [Fault; 35] = [
+const FAULTS: [Fault; 36] = [
     Fault {
         what: "every other lane of a subgroup writes over its neighbour",
         file: "append/ballot.glsl",
@@ -365,6 +363,14 @@ const FAULTS: [Fault; 35] = [
         kernels: &["view"],
         noticed_by: &[LeaningPlane(Illumination::Photons)],
     },
+    Fault {
+        what: "large integers are cut instead of rounded",
+        file: "kernels/check_math.comp",
+        from: "float(floatBitsToUint(a))",
+        to: "float(floatBitsToUint(a) & ~0xffu)",
+        kernels: &["check_math"],
+        noticed_by: &[StrictMath],
+    },
 ];
 
 /// Of `shading_gain`.
@@ -470,21 +476,7 @@ fn ask(gpu: &Gpu, question: Question) -> Check {
 
 /// The kernels with a fault in them.
 fn spoiled(fault: &Fault) -> Vec<(String, Vec<u32>)> {
-    let glsl = Path::new(env!("CARGO_MANIFEST_DIR")).join("glsl");
-    let edit = |file: &str, text: String| {
-        if file != fault.file {
-            return text;
-        }
-        assert_eq!(text.matches(fault.from).count(), 1, "{}: {} says no longer {:?}", fault.what, fault.file, fault.from);
-        text.replace(fault.from, fault.to)
-    };
-    let compile = |kernel: &&str| {
-        let name = format!("kernels/{kernel}.comp");
-        let compiled = compile::compile(&glsl, &name, constants::SHARED_WITH_GLSL, &edit).unwrap_or_else(|error| panic!("{error}"));
-        assert!(compiled.files.contains(&glsl.join(fault.file)), "{kernel} has nothing of {}", fault.file);
-        (kernel.to_string(), compiled.words)
-    };
-    fault.kernels.iter().map(compile).collect()
+    planted::kernels(fault.kernels, fault.file, &[(fault.from, fault.to)])
 }
 
 #[test]

@@ -11,7 +11,7 @@ use common::{device, lit};
 use photonmill::gpu::Gpu;
 use photonmill::output::destination::Folder;
 use photonmill::study::axes::Axis;
-use photonmill::study::{self, Request, Study};
+use photonmill::study::{self, Part, Request, Study};
 
 fn request(scene: &str, budget: u64) -> Request {
     Request {
@@ -75,7 +75,7 @@ fn the_open_box_is_studied_against_radiosity_and_goes_on_where_it_ended() {
     let read = |name: &str| std::fs::read_to_string(folder.path().join(name)).unwrap();
     let page = read("index.html");
     assert!(page.contains("What accuracy costs in time") && page.contains("<svg") && !page.contains("http"));
-    let count: usize = first.parts.iter().flat_map(|part| part.curves()).map(|curve| curve.points.len()).sum();
+    let count: usize = first.parts.iter().flat_map(Part::curves).map(|curve| curve.points.len()).sum();
     assert_eq!(read("points.csv").lines().count(), 1 + count);
     assert_eq!(read("points.jsonl").lines().count(), 1 + count);
 

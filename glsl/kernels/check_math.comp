@@ -19,5 +19,5 @@ void main()
         return;
     }
     float a = operands[index].x, b = operands[index].y;
-    results[index] = MathResults(a * b + a, divide(a, b), sqrt(a), inversesqrt(a), exp2(a), log2(a), atan(a, b), asinh(a));
+    results[index] = MathResults(float(floatBitsToUint(a)), a * b + a, divide(a, b), sqrt(a), inversesqrt(a), exp2(a), log2(a), atan(a, b), asinh(a));
 }

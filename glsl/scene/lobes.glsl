@@ -1,10 +1,6 @@
 // How surfaces weigh light that arrives.
 
-// max(cosine, 0)^exponent, 1 for exponent 0.
-float lobe(float cosine, float exponent)
-{
-    return cosine <= 0.0 ? 0.0 : (exponent == 0.0 ? 1.0 : exp2(exponent * log2(min(cosine, 1.0))));
-}
+#include "phong_lobe.glsl"
 
 vec3 mirrored(vec3 w, vec3 n)
 {
@@ -27,7 +23,13 @@ float lobe_weight(uint kind, float exponent, vec3 ns, vec3 wo, vec3 wi)
     if (HAS_PAPER_PHONG) {
         has_lobe = has_lobe || kind == SURFACE_PAPER_PHONG;
     }
-    return has_lobe ? lobe(dot(mirrored(wi, ns), wo), exponent) : 1.0;
+    if (!has_lobe) {
+        return 1.0;
+    }
+    vec3 mirror = mirrored(wi, ns);
+    // Half the squared distance of two unit vectors: 1 less the rounded cosine has no digits left in a narrow lobe.
+    vec3 apart = wo - mirror;
+    return phong_lobe(dot(mirror, wo), 0.5 * dot(apart, apart), exponent);
 }
 
 // What a shading normal changes about a photon's flux (Veach 1997, section 5.3): the ratio of the cosines

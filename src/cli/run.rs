@@ -59,7 +59,8 @@ pub(super) struct RunArgs {
     /// is the same to the bit [default: grid]
     #[arg(long, value_enum, help_heading = "Estimate")]
     gather: Option<GatherArg>,
-    /// Arithmetic: as fast as the device has it, or the same bits on every device and on the CPU [default: fast]
+    /// Arithmetic: as fast as the device has it, or the same bits on the CPU and on every device that rounds to nearest
+    /// [default: fast]
     #[arg(long, value_enum, help_heading = "Estimate")]
     math: Option<MathArg>,
     /// Texels along each side of a wall [default: 64]

@@ -78,7 +78,7 @@ pub(super) struct TransportArgs {
     /// How photons take places in their map; the result is the same to the bit [default: ballot]
     #[arg(long, value_enum, help_heading = "Transport")]
     variant: Option<AppendArg>,
-    /// Arithmetic: as fast as the device has it, or the same bits on every device [default: fast]
+    /// Arithmetic: as fast as the device has it, or the same bits on every device that rounds to nearest [default: fast]
     #[arg(long, value_enum, help_heading = "Transport")]
     math: Option<super::run::MathArg>,
     /// Most photons traced at once; the result is the same to the bit [default: what the device holds]

@@ -77,15 +77,15 @@ pub fn sampling(gpu: &Gpu, constants: &[(&'static str, u32)], cases: &[SamplingC
     commands.read(&results, cases.len())
 }
 
-/// Fails unless sums, products, and the quotients and roots made from them are rounded to nearest, each by itself:
-/// on that rests all of `--math strict`.
+/// Fails unless conversions of integers, sums, products, and the quotients and roots made from them are rounded to
+/// nearest, each by itself: on that rests all of `--math strict`, and Vulkan leaves the direction to the device.
 pub fn strict_math(gpu: &Gpu) -> Result<()> {
     let operands: Vec<Vec2> = (0..STRICT_SAMPLES).map(sample).collect();
     let results = math(gpu, &operands)?;
     let wrong = operands.iter().zip(&results).find_map(|(operand, result)| {
         let Vec2 { x: a, y: b } = *operand;
-        let found = [result.sum_of_product, result.quotient, result.root];
-        let expected = [a * b + a, a / b, a.sqrt()];
+        let found = [result.converted, result.sum_of_product, result.quotient, result.root];
+        let expected = [a.to_bits() as f32, a * b + a, a / b, a.sqrt()];
         (found.map(f32::to_bits) != expected.map(f32::to_bits))
             .then(|| format!("of {a:e} and {b:e} made {found:?} instead of {expected:?}"))
     });

@@ -148,7 +148,7 @@ impl Curve {
         let mut before: Option<(f64, f64)> = None;
         for &(ms, found) in points {
             if found <= error {
-                let Some((ms_before, found_before)) = before else { return None };
+                let (ms_before, found_before) = before?;
                 let share = (found_before / error).ln() / (found_before / found.max(1e-12)).ln();
                 return Some(ms_before * (ms / ms_before).powf(share));
             }

@@ -157,7 +157,7 @@ fn decode(bytes: &[u8]) -> Option<Reference> {
     if Sha256::digest(body).as_slice() != digest {
         return None;
     }
-    let word = |place: usize| Some(<[u8; 8]>::try_from(body.get(8 * place..8 * place + 8)?).ok()?);
+    let word = |place: usize| <[u8; 8]>::try_from(body.get(8 * place..8 * place + 8)?).ok();
     let places = u64::from_le_bytes(word(0)?) as usize;
     let numbers = |first: usize| (first..first + places).map(|place| Some(f64::from_le_bytes(word(place)?))).collect::<Option<Vec<f64>>>();
     let (counts, method) = body.get(24 + 16 * places..)?.split_at_checked(places)?;

@@ -12,7 +12,7 @@ use crate::error::Result;
 use crate::film::estimate_walls;
 use crate::gpu::Gpu;
 use crate::judge::radiosity::inward;
-use crate::ledger::Ledger;
+use crate::ledger::{Fates, Ledger};
 use crate::output::command;
 use crate::plan::transport::{Sensor, TransportPlan};
 use crate::records::Receiver;
@@ -123,7 +123,7 @@ impl Subject {
                 let values = (0..lit.film.pixels())
                     .flat_map(|pixel| lit.film.mean(pixel, &lit.plan).to_array().into_iter().take(channels))
                     .collect();
-                let [global, caustic] = lit.fates.each_ref().map(|fates| fates.ledger());
+                let [global, caustic] = lit.fates.each_ref().map(Fates::ledger);
                 let both = Ledger { emitted: global.emitted + caustic.emitted, cut_off: global.cut_off, ..global };
                 shot(values, &lit.timings, both)
             }

@@ -11,7 +11,6 @@ pub mod densities;
 pub mod family;
 pub mod known;
 pub mod lit;
-pub mod radiosity;
 pub mod reference;
 
 use std::ops::Deref;

@@ -1,0 +1,29 @@
+//! Kernels made from changed sources, to be run in place of a device's own.
+
+#[path = "../../glsl/compile.rs"]
+mod compile;
+
+use std::path::Path;
+
+use photonmill::constants;
+
+/// These kernels, with every `from` in a file under `glsl/` replaced by its `to`; each must stand there once.
+pub fn kernels(names: &[&str], file: &str, changes: &[(&str, &str)]) -> Vec<(String, Vec<u32>)> {
+    let glsl = Path::new(env!("CARGO_MANIFEST_DIR")).join("glsl");
+    let edit = |name: &str, text: String| {
+        if name != file {
+            return text;
+        }
+        changes.iter().fold(text, |text, (from, to)| {
+            assert_eq!(text.matches(from).count(), 1, "{file} says no longer {from:?}");
+            text.replace(from, to)
+        })
+    };
+    let compile = |kernel: &&str| {
+        let name = format!("kernels/{kernel}.comp");
+        let compiled = compile::compile(&glsl, &name, constants::SHARED_WITH_GLSL, &edit).unwrap_or_else(|error| panic!("{error}"));
+        assert!(compiled.files.contains(&glsl.join(file)), "{kernel} has nothing of {file}");
+        (kernel.to_string(), compiled.words)
+    };
+    names.iter().map(compile).collect()
+}

@@ -1,1 +1,0 @@
-pub use photonmill::judge::radiosity::*;
