@@ -79,6 +79,7 @@ struct EmitPush {
     uint first_photon;
     uint photon_count;
     uint path_offset;
+    uint first_sample;
     uvec2 jump_multiplier;
     uvec2 jump_increment;
 };

@@ -1,7 +1,7 @@
 // Random numbers of a photon, a function of (seed, round, photon, draw) alone. Twin of src/rng.rs.
 //
 // `stream` is what a path carries between bounces: the 48-bit state of rand48, the two state words
-// of MT19937 that the next output needs, nothing for Philox.
+// of MT19937 that the next output needs, nothing for Philox, (sample, key of its light) of Sobol' points.
 
 #include "philox.glsl"
 
@@ -70,16 +70,65 @@ vec4 philox_block(RandomKey key, uint photon, uint block)
     return philox_floats(uvec4(photon, key.round, block, DOMAIN_PHOTONS), key.seed);
 }
 
-// Opens a photon's stream; `rand48_state` is its first state, which only rand48 needs.
-uvec2 open_stream(RandomKey key, uint photon, uvec2 rand48_state)
+// Point `index` of the Sobol' sequence as fractions of 2^32: the first four dimensions of Joe and Kuo
+// (2008). Direction numbers follow from the recurrences of their polynomials, 1, x + 1, x^2 + x + 1
+// and x^3 + x + 1; those of the next bit stand first.
+uvec4 sobol(uint index)
+{
+    uvec4 point = uvec4(bitfieldReverse(index), 0, 0, 0);
+    uint second = 0x80000000u;
+    uvec2 third = uvec2(0x80000000u, 0xc0000000u);
+    uvec3 fourth = uvec3(0x80000000u, 0xc0000000u, 0x20000000u);
+    for (; index != 0; index >>= 1) {
+        if ((index & 1u) == 1) {
+            point.yzw ^= uvec3(second, third.x, fourth.x);
+        }
+        second ^= second >> 1;
+        third = uvec2(third.y, third.y ^ third.x ^ (third.x >> 2));
+        fourth = uvec3(fourth.y, fourth.z, fourth.y ^ fourth.x ^ (fourth.x >> 3));
+    }
+    return point;
+}
+
+// Owen's scrambling by a hash (Burley 2020, listing 3): each bit is flipped or not by the bits above
+// it and the seed. Of an index, it shuffles every aligned block of 2^k among such blocks.
+uint owen_scramble(uint x, uint seed)
+{
+    x = bitfieldReverse(x) + seed;
+    x ^= x * 0x6c50b47cu;
+    x ^= x * 0xb82f1e52u;
+    x ^= x * 0xc7afe638u;
+    x ^= x * 0x8d22f6e6u;
+    return bitfieldReverse(x);
+}
+
+// Four dimensions of a light's sample: shuffled and scrambled by block, so that no two blocks are alike.
+vec4 sobol_block(uvec2 stream, uint block)
+{
+    uint seed = mix32(stream.y + block);
+    uvec4 point = sobol(owen_scramble(stream.x, seed));
+    vec4 u;
+    for (uint k = 0; k < 4; k++) {
+        u[k] = unit_float(owen_scramble(point[k], mix32(seed + k + 1)) >> 8);
+    }
+    return u;
+}
+
+// Opens a photon's stream from its `start`: the first state of rand48, or for Sobol' points its number
+// among the light's photons of the run, and the light. The others need none.
+uvec2 open_stream(RandomKey key, uint photon, uvec2 start)
 {
     if (RNG == RNG_RAND48) {
-        return rand48_state;
+        return start;
     }
-    if (RNG == RNG_MT) {
-        return mt_open(mix32(key.photons_before + photon + mix32(key.seed.x + mix32(key.seed.y))));
+    if (RNG == RNG_PHILOX) {
+        return uvec2(0);
     }
-    return uvec2(0);
+    uint run = mix32(key.seed.x + mix32(key.seed.y));
+    if (RNG == RNG_SOBOL) {
+        return uvec2(start.x, mix32(run + start.y));
+    }
+    return mt_open(mix32(key.photons_before + photon + run));
 }
 
 // Emission: (disc radius, disc angle, cosine, azimuth).
@@ -87,6 +136,9 @@ vec4 draw_emission(RandomKey key, uint photon, inout uvec2 stream)
 {
     if (RNG == RNG_PHILOX) {
         return philox_block(key, photon, 0);
+    }
+    if (RNG == RNG_SOBOL) {
+        return sobol_block(stream, 0);
     }
     vec4 u;
     for (uint i = 0; i < EMISSION_DRAWS; i++) {
@@ -100,6 +152,9 @@ vec3 draw_bounce(RandomKey key, uint photon, uint bounce, inout uvec2 stream)
 {
     if (RNG == RNG_PHILOX) {
         return philox_block(key, photon, bounce + 1).xyz;
+    }
+    if (RNG == RNG_SOBOL) {
+        return sobol_block(stream, bounce + 1).xyz;
     }
     uint first = EMISSION_DRAWS + BOUNCE_DRAWS * bounce;
     vec3 u;

@@ -21,6 +21,8 @@ constants! {
     RNG_MT = 1;
     /// `RNG`: Philox4x32-10, a counter-based generator.
     RNG_PHILOX = 2;
+    /// `RNG`: Owen-scrambled Sobol' points.
+    RNG_SOBOL = 3;
     /// Draws of one emission: disc radius, disc angle, cosine, azimuth.
     EMISSION_DRAWS = 4;
     /// Draws of one bounce: roulette, cosine, azimuth.
@@ -108,6 +110,13 @@ constants! {
     ODD_ESTIMATE = 2;
     /// Odd values of which the owner is written down.
     MAX_ODDITIES = 64;
+
+    /// `SUMS`: 64-bit fixed point.
+    SUMS_INTEGER = 0;
+    /// `SUMS`: a 32-bit float in the low word.
+    SUMS_F32 = 1;
+    /// `SUMS`: a 32-bit float in the low word, what its rounding lost in the high word.
+    SUMS_COMPENSATED = 2;
 
     /// Bits after the binary point of the flux that a point gathers.
     FLUX_BITS = 24;

@@ -1,17 +1,36 @@
 //! Density estimation: adds to the film what each point receives from a chunk's photons.
 
 use crate::constants::GATHER_SLICE;
-use crate::error::Result;
+use crate::error::{Error, Result};
 use crate::gpu::kernels::{CandidateCount, GatherBruteTwoWords, GatherBruteU64, GatherGridTwoWords, GatherGridU64, SliceCount};
 use crate::gpu::{Commands, DeviceFacts, Extent, Kernel, Module};
 use crate::plan::Plan;
 use crate::records::{DispatchSizePush, GatherPush};
 use crate::resources::{IndexBuffers, Resources};
+use crate::settings::Sums;
 use crate::trace::photon_list_capacity;
+
+/// Refuses sums that a device cannot make.
+pub fn check_sums(plan: &Plan, facts: &DeviceFacts) -> Result<()> {
+    if plan.settings.sums == Sums::Compensated && !facts.int64_atomics {
+        let why = format!("needs 64-bit atomics, which {} lacks; use --sums integer or f32", facts.name);
+        return Err(Error::setting("--sums", "compensated", why));
+    }
+    Ok(())
+}
+
+/// Whether kernels see a film sum as one 64-bit word: a float has a 32-bit word of its own.
+fn adds_in_one_word(plan: &Plan, facts: &DeviceFacts) -> bool {
+    match plan.settings.sums {
+        Sums::Integer => facts.int64_atomics,
+        Sums::F32 => false,
+        Sums::Compensated => true,
+    }
+}
 
 /// Kernels that the estimate needs.
 pub fn modules(plan: &Plan, facts: &DeviceFacts) -> Vec<Module> {
-    match (plan.gathers_by_grid(), facts.int64_atomics) {
+    match (plan.gathers_by_grid(), adds_in_one_word(plan, facts)) {
         (false, true) => vec![GatherBruteU64::MODULE],
         (false, false) => vec![GatherBruteTwoWords::MODULE],
         (true, true) => vec![CandidateCount::MODULE, SliceCount::MODULE, GatherGridU64::MODULE],
@@ -76,7 +95,7 @@ fn gather_brute(commands: &mut Commands, resources: &Resources, plan: &Plan, pho
             let slices = slices_at_once.min(slice_count - first_slice);
             let push = GatherPush { first_point, end_point, first_slice, ..whole };
             let extent = Extent::Groups(point_count.div_ceil(plan.settings.group_size), slices);
-            if commands.facts().int64_atomics {
+            if adds_in_one_word(plan, commands.facts()) {
                 commands.dispatch(GatherBruteU64 { points, film, photons, counters }, &push, extent)?;
             } else {
                 commands.dispatch(GatherBruteTwoWords { points, film, photons, counters }, &push, extent)?;
@@ -105,7 +124,7 @@ fn gather_grid(commands: &mut Commands, resources: &Resources, index: &IndexBuff
         commands.dispatch(SliceCount { longest, dispatch_args }, &size, Extent::Groups(1, 1))?;
         let push = GatherPush { first_point, end_point, ..whole };
         let extent = Extent::Indirect(dispatch_args);
-        if commands.facts().int64_atomics {
+        if adds_in_one_word(plan, commands.facts()) {
             commands.dispatch(GatherGridU64 { points, film, cells, sorted_photons }, &push, extent)?;
         } else {
             commands.dispatch(GatherGridTwoWords { points, film, cells, sorted_photons }, &push, extent)?;

@@ -1,17 +1,20 @@
-//! The film: what every point has received, in integers, so that it does not matter in which order
-//! photons, chunks, rounds or devices add to it.
+//! The film: what every point has received, in integers unless the run asks otherwise, so that it does
+//! not matter in which order photons, chunks, rounds or devices add to it.
 
 use std::f64::consts::PI;
 
 use crate::plan::Plan;
 use crate::scene::room::RoomScene;
+use crate::settings::Sums;
 
 /// Sums of a run, point by point, and what they are worth.
 #[derive(Debug, Clone, PartialEq)]
 pub struct Film {
-    /// `channel_count` fixed-point sums a point: relative flux, then the paper's illumination power
-    /// (photons within the radius times their Phong weight). With one channel the two are the same.
+    /// `channel_count` sums a point, in fixed-point units: relative flux, then the paper's illumination
+    /// power (photons within the radius times their Phong weight). With one channel the two are the same.
     pub sums: Vec<u64>,
+    /// What the bits of a sum mean.
+    pub kind: Sums,
     pub channel_count: u32,
     /// Fixed-point units in 1.
     pub scale: f64,
@@ -21,22 +24,33 @@ pub struct Film {
 
 impl Film {
     pub fn new(plan: &Plan, sums: Vec<u64>, emitted: u64) -> Film {
-        Film { sums, channel_count: plan.channel_count, scale: plan.film_scale(), emitted }
+        Film { sums, kind: plan.settings.sums, channel_count: plan.channel_count, scale: plan.film_scale(), emitted }
     }
 
     pub fn point_count(&self) -> usize {
         self.sums.len() / self.channel_count as usize
     }
 
+    /// A sum in fixed-point units.
+    pub fn units(&self, sum: usize) -> f64 {
+        let bits = self.sums[sum];
+        let float = |word: u64| f64::from(f32::from_bits(word as u32));
+        match self.kind {
+            Sums::Integer => bits as f64,
+            Sums::F32 => float(bits),
+            Sums::Compensated => float(bits) + float(bits >> 32),
+        }
+    }
+
     /// Relative flux within the radius of a point.
     pub fn flux(&self, point: usize) -> f64 {
-        self.sums[point * self.channel_count as usize] as f64 / self.scale
+        self.units(point * self.channel_count as usize) / self.scale
     }
 
     /// The paper's photon power within the radius of a point.
     pub fn power(&self, point: usize) -> f64 {
         let last = self.channel_count as usize - 1;
-        self.sums[point * self.channel_count as usize + last] as f64 / self.scale
+        self.units(point * self.channel_count as usize + last) / self.scale
     }
 }
 

@@ -40,7 +40,8 @@
 //! - **A photon is (seed, round, number).** Its random numbers ([`rng`]) follow from these alone, so
 //!   every builder, thread count and split traces the same photons.
 //! - **Sums are integers.** The film ([`film`]) is 64-bit fixed point with a scale that cannot
-//!   overflow ([`plan`]), so the order of additions does not matter.
+//!   overflow ([`plan`]), so the order of additions does not matter. `--sums` takes floats instead, to
+//!   show what they cost.
 //! - **The ledger closes.** emitted = absorbed + escaped + cut off + dropped, and nothing is ever
 //!   dropped ([`ledger`]): the plan splits what does not fit.
 //! - **Nothing in world units.** A path leaves its own wall by the wall's number ([`cpu::room`]), and a

@@ -160,6 +160,8 @@ records! {
         first_photon: u32,
         photon_count: u32,
         path_offset: u32,
+        /// Number of `first_photon` among its light's photons of the run, mod 2^32.
+        first_sample: u32,
         /// rand48: from the prepared state of photon i to the first state of photon
         /// `first_photon` + i in this round.
         jump_multiplier: UVec2,

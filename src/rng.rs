@@ -19,6 +19,11 @@ pub enum Rng {
     Mt,
     /// Philox4x32-10 (Salmon et al. 2011), counter-based.
     Philox,
+    /// Owen-scrambled Sobol' points (Burley 2020). The photons of each light, over all rounds, are the
+    /// first points of a sequence of the light's own, so that any number of rounds covers its emission
+    /// and every bounce more evenly than chance; one sequence dealt out to two lights would leave each
+    /// of them a part with gaps.
+    Sobol,
 }
 
 impl Rng {
@@ -27,6 +32,7 @@ impl Rng {
             Rng::Rand48 => constants::RNG_RAND48,
             Rng::Mt => constants::RNG_MT,
             Rng::Philox => constants::RNG_PHILOX,
+            Rng::Sobol => constants::RNG_SOBOL,
         }
     }
 }
@@ -201,15 +207,53 @@ fn philox_block(key: &RandomKey, photon: u32, block: u32) -> [f32; 4] {
     philox([photon, key.round, block, 0], [key.seed.x, key.seed.y]).map(|bits| unit_float(bits >> 8))
 }
 
-/// Opens a photon's stream; `rand48_state` is its first state, which only rand48 needs.
-pub fn open_stream(rng: Rng, key: &RandomKey, photon: u32, rand48_state: UVec2) -> UVec2 {
-    match rng {
-        Rng::Rand48 => rand48_state,
-        Rng::Mt => {
-            let run = mix32(key.seed.x.wrapping_add(mix32(key.seed.y)));
-            mt_open(mix32(key.photons_before.wrapping_add(photon).wrapping_add(run)))
+/// Point `index` of the Sobol' sequence as fractions of 2^32: the first four dimensions of Joe and Kuo
+/// (2008). Direction numbers follow from the recurrences of their polynomials, 1, x + 1, x^2 + x + 1
+/// and x^3 + x + 1; those of the next bit stand first.
+pub fn sobol(mut index: u32) -> [u32; 4] {
+    let mut point = [index.reverse_bits(), 0, 0, 0];
+    let mut second = 0x8000_0000u32;
+    let mut third = [0x8000_0000u32, 0xc000_0000];
+    let mut fourth = [0x8000_0000u32, 0xc000_0000, 0x2000_0000];
+    while index != 0 {
+        if index & 1 == 1 {
+            point = [point[0], point[1] ^ second, point[2] ^ third[0], point[3] ^ fourth[0]];
         }
+        second ^= second >> 1;
+        third = [third[1], third[1] ^ third[0] ^ (third[0] >> 2)];
+        fourth = [fourth[1], fourth[2], fourth[1] ^ fourth[0] ^ (fourth[0] >> 3)];
+        index >>= 1;
+    }
+    point
+}
+
+/// Owen's scrambling by a hash (Burley 2020, listing 3): each bit is flipped or not by the bits above
+/// it and the seed. Of an index, it shuffles every aligned block of 2^k among such blocks.
+pub fn owen_scramble(x: u32, seed: u32) -> u32 {
+    let mut x = x.reverse_bits().wrapping_add(seed);
+    for factor in [0x6c50_b47cu32, 0xb82f_1e52, 0xc7af_e638, 0x8d22_f6e6] {
+        x ^= x.wrapping_mul(factor);
+    }
+    x.reverse_bits()
+}
+
+/// Four dimensions of a light's sample: shuffled and scrambled by block, so that no two blocks are alike.
+fn sobol_block(stream: UVec2, block: u32) -> [f32; 4] {
+    let UVec2 { x: sample, y: light_key } = stream;
+    let seed = mix32(light_key.wrapping_add(block));
+    let point = sobol(owen_scramble(sample, seed));
+    std::array::from_fn(|k| unit_float(owen_scramble(point[k], mix32(seed.wrapping_add(k as u32 + 1))) >> 8))
+}
+
+/// Opens a photon's stream from its `start`: the first state of rand48, or for Sobol' points its number
+/// among the light's photons of the run, and the light. The others need none.
+pub fn open_stream(rng: Rng, key: &RandomKey, photon: u32, start: UVec2) -> UVec2 {
+    let run = || mix32(key.seed.x.wrapping_add(mix32(key.seed.y)));
+    match rng {
+        Rng::Rand48 => start,
+        Rng::Mt => mt_open(mix32(key.photons_before.wrapping_add(photon).wrapping_add(run()))),
         Rng::Philox => UVec2::ZERO,
+        Rng::Sobol => UVec2::new(start.x, mix32(run().wrapping_add(start.y))),
     }
 }
 
@@ -219,6 +263,7 @@ pub fn draw_emission(rng: Rng, key: &RandomKey, photon: u32, stream: &mut UVec2)
         Rng::Rand48 => std::array::from_fn(|_| rand48_next(stream, key)),
         Rng::Mt => std::array::from_fn(|draw| unit_float(mt_next_word(stream, draw as u32) >> 8)),
         Rng::Philox => philox_block(key, photon, 0),
+        Rng::Sobol => sobol_block(*stream, 0),
     }
 }
 
@@ -230,6 +275,10 @@ pub fn draw_bounce(rng: Rng, key: &RandomKey, photon: u32, bounce: u32, stream: 
         Rng::Mt => std::array::from_fn(|draw| unit_float(mt_next_word(stream, first + draw as u32) >> 8)),
         Rng::Philox => {
             let [roulette, cosine, azimuth, _] = philox_block(key, photon, bounce + 1);
+            [roulette, cosine, azimuth]
+        }
+        Rng::Sobol => {
+            let [roulette, cosine, azimuth, _] = sobol_block(*stream, bounce + 1);
             [roulette, cosine, azimuth]
         }
     }
@@ -301,6 +350,22 @@ mod tests {
     fn philox_gives_the_known_answers() {
         assert_eq!(philox([0; 4], [0; 2]), [0x6627_e8d5, 0xe169_c58d, 0xbc57_ac4c, 0x9b00_dbd8]);
         assert_eq!(philox([u32::MAX; 4], [u32::MAX; 2]), [0x408f_276d, 0x41c8_3b0e, 0xa20b_c7c6, 0x6d54_51fd]);
+    }
+
+    /// Direction numbers as Joe and Kuo's generator prints them, from new-joe-kuo-6.21201.
+    #[test]
+    fn sobol_gives_the_published_direction_numbers() {
+        let of_bit = |bit: u32| sobol(1 << bit).map(|word| word >> 24);
+        let expected = [
+            [0x80, 0x80, 0x80, 0x80],
+            [0x40, 0xc0, 0xc0, 0xc0],
+            [0x20, 0xa0, 0x60, 0x20],
+            [0x10, 0xf0, 0x90, 0x50],
+            [0x08, 0x88, 0xe8, 0xf8],
+            [0x04, 0xcc, 0x5c, 0x74],
+        ];
+        assert_eq!([0, 1, 2, 3, 4, 5].map(of_bit), expected);
+        assert_eq!(sobol(0b101), std::array::from_fn(|k| sobol(1)[k] ^ sobol(4)[k]));
     }
 
     #[test]

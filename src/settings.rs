@@ -47,6 +47,30 @@ pub enum Gather {
     Grid,
 }
 
+/// How the film adds.
+#[derive(Debug, Clone, Copy, PartialEq, Eq, Serialize)]
+#[serde(rename_all = "lowercase")]
+pub enum Sums {
+    /// 64-bit fixed point: the same bits in whatever order photons come.
+    Integer,
+    /// 32-bit floats: a sum's last digits depend on the order of addition, and it stops growing once
+    /// what is added is less than half its last digit.
+    F32,
+    /// Pairs of 32-bit floats, the second what the first lost to rounding: some 48 bits, of which the
+    /// last depend on the order of addition.
+    Compensated,
+}
+
+impl Sums {
+    pub fn code(self) -> u32 {
+        match self {
+            Sums::Integer => constants::SUMS_INTEGER,
+            Sums::F32 => constants::SUMS_F32,
+            Sums::Compensated => constants::SUMS_COMPENSATED,
+        }
+    }
+}
+
 /// Radiant intensity of a light.
 #[derive(Debug, Clone, Copy, PartialEq, Eq, Serialize)]
 #[serde(rename_all = "lowercase")]
@@ -134,6 +158,7 @@ pub struct Settings {
     pub seed: u64,
     pub rng: Rng,
     pub gather: Gather,
+    pub sums: Sums,
     pub math: Math,
     pub emission: EmissionLaw,
     /// Phong exponent of each wall in the order of [`WALL_NAMES`]; `None` is Lambertian.
@@ -185,6 +210,7 @@ impl Settings {
             seed: 1,
             rng: Rng::Rand48,
             gather: Gather::Grid,
+            sums: Sums::Integer,
             math: Math::Fast,
             emission: EmissionLaw::Uniform,
             shininess: [None; 5],
@@ -330,6 +356,10 @@ impl Settings {
                 }
                 Ok(())
             }
+            Rng::Sobol if self.total_photons() > 1 << 32 => {
+                Err(Error::setting("--rng", "sobol", "numbers 2^32 points, and the run has more photons; use --rng philox"))
+            }
+            Rng::Sobol => Ok(()),
         }
     }
 

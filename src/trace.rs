@@ -85,6 +85,7 @@ pub fn emit(commands: &mut Commands, resources: &Resources, plan: &Plan, round: 
             first_photon: range.first_photon,
             photon_count: range.count,
             path_offset,
+            first_sample: plan.first_sample(round, range),
             jump_multiplier: words(jump.multiplier),
             jump_increment: words(jump.increment),
         };

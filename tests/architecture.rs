@@ -251,10 +251,15 @@ fn waits(source: &str) -> Vec<&'static str> {
         .collect()
 }
 
+/// Sums of floats, where bits are compared and swapped without a wait: a try fails only where another's addition
+/// went in, so that somebody moves on whatever the device promises.
+const LOCK_FREE: [&str; 2] = ["film/f32.glsl", "film/compensated.glsl"];
+
 #[test]
 fn no_kernel_waits_for_another_invocation() {
     for (path, source) in files(&root("glsl")) {
-        assert_eq!(waits(&source), [""; 0], "{}", path.display());
+        let allowed: &[&str] = if LOCK_FREE.iter().any(|file| path.ends_with(file)) { &["atomicCompSwap"] } else { &[] };
+        assert_eq!(waits(&source), allowed, "{}", path.display());
     }
     assert_eq!(waits("while (atomicCompSwap(lock, 0, 1) != 0) {}").len(), 2);
     assert!(waits("// atomicExchange would wait\natomicAdd(count, 1);").is_empty());

@@ -1,8 +1,10 @@
 //! Same bits: the film's integer sums do not depend on the builder, the gather, the work groups, the
-//! split into dispatches, the run or the device's abilities, and hold exactly what lies in reach.
+//! split into dispatches, the run or the device's abilities, and hold exactly what lies in reach. Sums
+//! of floats are held against them.
 
 mod common;
 
+use std::sync::atomic::AtomicBool;
 use std::time::Instant;
 
 use common::{
@@ -15,11 +17,11 @@ use photonmill::film::Film;
 use photonmill::gpu::{Commands, Gpu, Options};
 use photonmill::plan::Plan;
 use photonmill::records::Photon;
-use photonmill::render::constants;
+use photonmill::render::{self, Control, constants};
 use photonmill::resources::Resources;
 use photonmill::rng::Rng;
 use photonmill::scene::open_box::open_box;
-use photonmill::settings::{Gather, Preset, Settings, Variant};
+use photonmill::settings::{Gather, Preset, Settings, Sums, Variant};
 use photonmill::{estimate, index};
 
 /// What changes the film's channels and its fixed point. A smaller mesh than the paper's, and no
@@ -312,7 +314,7 @@ fn long_photon_lists_are_gathered_to_the_end_on_the_papers_mesh() {
 #[test]
 fn a_run_is_the_sum_of_rounds_that_differ() {
     let Some(gpu) = device() else { return };
-    for rng in [Rng::Rand48, Rng::Mt, Rng::Philox] {
+    for rng in [Rng::Rand48, Rng::Mt, Rng::Philox, Rng::Sobol] {
         let of = |rounds| film(&gpu, &Settings { rng, rounds, ..Settings::preset(Preset::Modified) });
         let (one, two, three) = (of(1), of(2), of(3));
         assert_eq!(three.emitted, 15_000);
@@ -377,4 +379,206 @@ fn a_gather_that_is_cut_into_parts_is_whole() {
     if gpu.facts().kind == "cpu" {
         assert!(submissions_needed > 2, "the test must cut: {submissions_needed}");
     }
+}
+
+/// Sums in fixed-point units against others, within `allowed`.
+fn near(found: &Film, expected: &Film, allowed: impl Fn(f64) -> f64) -> Check {
+    assert_eq!(found.sums.len(), expected.sums.len());
+    for sum in 0..found.sums.len() {
+        let (a, b) = (found.units(sum), expected.units(sum));
+        // Written so that NaN complains.
+        let is_near = (a - b).abs() <= allowed(b);
+        if !is_near {
+            return Err(format!("sum {sum} is {a} where {b} +- {} is right", allowed(b)));
+        }
+    }
+    Ok(())
+}
+
+/// Photons that one sum holds, at most.
+fn most_photons(film: &Film, settings: &Settings) -> f64 {
+    (film.emitted * u64::from(settings.bounces)) as f64
+}
+
+/// What floats may be off integers by: each of n photons rounds an integer sum by half a unit, and a float
+/// by 2^-24 of the sum; two floats lose 2^-44 between them.
+fn rounding(sums: Sums, photons: f64, is_whole: bool) -> impl Fn(f64) -> f64 {
+    let share = match sums {
+        Sums::Integer => 0.0,
+        Sums::F32 => photons / f64::from(1 << 24),
+        Sums::Compensated => 1.0 / f64::from(1 << 22).powi(2),
+    };
+    // Whole photons below 2^24 are exact in any order.
+    move |sum| if is_whole { 0.0 } else { 0.5 * photons + share * sum }
+}
+
+#[test]
+fn floats_and_integers_agree_within_rounding() {
+    let Some(gpu) = device() else { return };
+    for (what, settings) in effects() {
+        let expected = film(&gpu, &settings);
+        let photons = most_photons(&expected, &settings);
+        let is_whole = expected.channel_count == 1;
+        for sums in [Sums::F32, Sums::Compensated] {
+            let mut films = Vec::new();
+            for gather in [Gather::Grid, Gather::Brute] {
+                films.push((format!("{gather:?}"), film(&gpu, &Settings { sums, gather, ..settings.clone() })));
+            }
+            // The host's film is of its own photons, of which some lie on the other side of a rim.
+            let host = run_on_cpu(&settings).film;
+            let on_cpu = run_on_cpu(&Settings { sums, threads: 2, ..settings.clone() }).film;
+            assert_holds(format!("{what}, cpu, {sums:?}"), near(&on_cpu, &host, rounding(sums, photons, is_whole)));
+            for (how, found) in films {
+                assert_eq!((found.kind, found.scale), (sums, expected.scale));
+                assert_holds(format!("{what}, {how}, {sums:?}"), near(&found, &expected, rounding(sums, photons, is_whole)));
+                let mut spoiled = found.clone();
+                let brightest = (0..found.sums.len()).max_by(|a, b| found.units(*a).total_cmp(&found.units(*b))).unwrap();
+                spoiled.sums[brightest] = u64::from((1.01 * found.units(brightest) as f32).to_bits());
+                assert_complains("a sum 1 % too large", near(&spoiled, &expected, rounding(sums, photons, is_whole)));
+                let integers = Film { kind: Sums::Integer, ..found };
+                assert_complains("bits taken for integers", near(&integers, &expected, rounding(sums, photons, is_whole)));
+            }
+        }
+    }
+}
+
+/// Many invocations add to the same few sums at once, and none is lost.
+#[test]
+fn additions_of_floats_that_meet_are_all_counted() {
+    let Some(gpu) = device() else { return };
+    let settings = Settings { photons: 200_000, rng: Rng::Philox, mesh: 2, radius: 0.5, group_size: 32, ..Settings::default() };
+    let expected = film(&gpu, &settings);
+    assert!((0..expected.sums.len()).all(|sum| (10_000.0..1e7).contains(&expected.units(sum))));
+    for sums in [Sums::F32, Sums::Compensated] {
+        for gather in [Gather::Grid, Gather::Brute] {
+            let found = film(&gpu, &Settings { sums, gather, ..settings.clone() });
+            assert_holds(format!("{gather:?}, {sums:?}"), near(&found, &expected, |_| 0.0));
+        }
+    }
+}
+
+/// A film that already holds `start` photons on every texel, and what another `count` of them, gathered
+/// one by one, make of the back wall's.
+fn counted_on(gpu: Option<&Gpu>, settings: &Settings, start: f32, count: u32) -> f64 {
+    let bits = match settings.sums {
+        Sums::Integer => start as u64,
+        Sums::F32 | Sums::Compensated => u64::from(start.to_bits()),
+    };
+    let scene = open_box(settings);
+    let photon = [photon_at(0.0, 0.0)];
+    let plan = gpu.map_or_else(|| plan_for_host(settings), |gpu| plan_for(gpu, &scene, settings));
+    let mut sums = vec![bits; plan.points.len()];
+    match gpu {
+        None => (0..count).for_each(|_| cpu::estimate::gather_brute(&plan, &photon, &mut sums)),
+        Some(gpu) => {
+            let mut commands = Commands::new(gpu, constants(&plan), Instant::now()).unwrap();
+            let resources = Resources::new(gpu, &mut commands, &scene, &plan).unwrap();
+            commands.upload(&resources.photons, &photon).unwrap();
+            commands.upload(&resources.counters, &[1u32]).unwrap();
+            commands.upload(&resources.film, &sums).unwrap();
+            index::build(&mut commands, &resources, &plan, settings.photons).unwrap();
+            (0..count).for_each(|_| estimate::gather(&mut commands, &resources, &plan, settings.photons).unwrap());
+            sums = commands.read(&resources.film, sums.len()).unwrap();
+        }
+    }
+    Film::new(&plan, sums, 1).units(plan.points.len() - 1)
+}
+
+/// One photon more is nothing to an f32 of 2^24 of them; pairs and integers count on, pairs also where the
+/// lost part alone would have stopped.
+#[test]
+fn f32_stops_counting_where_integers_and_pairs_go_on() {
+    let gpu = device();
+    let full = 16_777_216.0f32;
+    for builder in [None, gpu.as_deref()].into_iter().take(if gpu.is_some() { 2 } else { 1 }) {
+        for gather in [Gather::Brute, Gather::Grid] {
+            let of = |sums, start: f32| {
+                let settings = Settings { sums, gather, mesh: 1, radius: 0.5, ..Settings::default() };
+                counted_on(builder, &settings, start, 10) - f64::from(start)
+            };
+            for start in [0.0, full - 4.0, full, 2.0 * full, 1024.0 * full] {
+                for sums in [Sums::Integer, Sums::Compensated] {
+                    assert_eq!(of(sums, start), 10.0, "{gather:?}, {sums:?} from {start}");
+                }
+            }
+            assert_eq!(of(Sums::F32, 0.0), 10.0);
+            assert_eq!(of(Sums::F32, full - 4.0), 4.0, "{gather:?}: f32 ends at 2^24");
+            assert_eq!(of(Sums::F32, 1024.0 * full), 0.0);
+        }
+    }
+}
+
+/// Largest relative error of a film against integers.
+fn relative_error(found: &Film, expected: &Film) -> f64 {
+    let error = |sum| (found.units(sum) / expected.units(sum) - 1.0).abs();
+    (0..found.sums.len()).filter(|sum| expected.units(*sum) > 0.0).map(error).fold(0.0, f64::max)
+}
+
+/// What f32 costs: 300 000 weights on each of five texels, added one by one and slice by slice.
+#[test]
+fn the_error_of_f32_sums_is_measured() {
+    let Some(gpu) = device() else { return };
+    let settings = Settings {
+        photons: 1_000_000,
+        rng: Rng::Philox,
+        mesh: 1,
+        radius: 0.5,
+        shininess: [Some(2.0); 5],
+        light_power: [3.0, 0.7],
+        threads: 2,
+        ..Settings::default()
+    };
+    let films = |sums| {
+        let settings = Settings { sums, ..settings.clone() };
+        [film(&gpu, &settings), run_on_cpu(&settings).film]
+    };
+    let [integer, f32, compensated] = [Sums::Integer, Sums::F32, Sums::Compensated].map(films);
+    for (k, builder) in ["device, slices first", "cpu, one by one"].into_iter().enumerate() {
+        let [f32_error, pair_error] = [&f32, &compensated].map(|film| relative_error(&film[k], &integer[k]));
+        println!("{builder}: f32 off by {f32_error:.1e}, pairs by {pair_error:.1e}");
+        // The integers round each photon to 2^-31, which is all that they and the pairs differ by.
+        assert!(pair_error < 1e-9, "{builder}: {pair_error}");
+        assert!(f32_error > 10.0 * pair_error && f32_error < 1e-2, "{builder}: {f32_error}");
+    }
+}
+
+#[test]
+#[ignore = "forty million photons three times take the CPU builder over two minutes"]
+fn twenty_million_photons_on_a_texel_are_too_many_for_f32() {
+    let settings = Settings {
+        photons: 20_000_000,
+        rounds: 2,
+        rng: Rng::Philox,
+        reflectance: 1.0,
+        mesh: 1,
+        radius: 0.5,
+        chunk: Some(1_000_000),
+        threads: 2,
+        ..Settings::default()
+    };
+    let of = |sums| run_on_cpu(&Settings { sums, ..settings.clone() }).film;
+    let [integer, f32, compensated] = [Sums::Integer, Sums::F32, Sums::Compensated].map(of);
+    assert_eq!(relative_error(&compensated, &integer), 0.0);
+    let full = f64::from(1 << 24);
+    for sum in 0..integer.sums.len() {
+        println!("texel {sum}: {} photons, f32 counts {}", integer.units(sum), f32.units(sum));
+        assert_eq!(f32.units(sum), integer.units(sum).min(full));
+    }
+    assert!(integer.units(integer.sums.len() - 1) > 1.2 * full);
+}
+
+#[test]
+fn pairs_are_refused_without_64_bit_atomics() {
+    let Some(lesser) = device_with(Options { without_int64_atomics: true, ..Options::default() }) else { return };
+    // An even number, so that both lights' photons are of the same flux and the sums whole.
+    let settings = Settings { photons: 1000, mesh: 8, ..Settings::default() };
+    let never = AtomicBool::new(false);
+    let mut control = Control { cancelled: &never, progress: &mut |_| {} };
+    let pairs = Settings { sums: Sums::Compensated, ..settings.clone() };
+    let error = render::on_gpu(&lesser, &open_box(&pairs), &pairs, &mut control).unwrap_err();
+    let line = error.to_string();
+    assert_eq!(error.exit_code(), 2, "{line}");
+    assert!(["--sums", "compensated", "64-bit atomics", "integer or f32"].iter().all(|word| line.contains(word)), "{line}");
+    let expected = film(&lesser, &settings);
+    assert_holds("f32", near(&film(&lesser, &Settings { sums: Sums::F32, ..settings }), &expected, |_| 0.0));
 }

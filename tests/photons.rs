@@ -11,7 +11,7 @@ use photonmill::records::Photon;
 use photonmill::rng::{self, Rng, Streams};
 use photonmill::settings::{EmissionLaw, PhongDirection, Settings, Variant};
 
-const GENERATORS: [Rng; 3] = [Rng::Rand48, Rng::Mt, Rng::Philox];
+const GENERATORS: [Rng; 4] = [Rng::Rand48, Rng::Mt, Rng::Philox, Rng::Sobol];
 /// Around subgroups of 8, 32 and 64, around the work group of 128, and two odd numbers of photons.
 const COUNTS: [u32; 12] = [2, 3, 7, 8, 9, 31, 63, 64, 65, 129, 1000, 5001];
 

@@ -7,7 +7,7 @@ use std::collections::HashSet;
 use std::time::Instant;
 
 use common::{Check, assert_complains, assert_holds, device, draws_of, evenness_check, plan_for, streams_of, z_check};
-use glam::{DVec3, Vec3};
+use glam::{DVec3, UVec2, Vec3};
 use photonmill::cpu::emission::emit_from_disc;
 use photonmill::cpu::room::intersect_room;
 use photonmill::cpu::sampling::{sample_cosine_hemisphere, sample_uniform_hemisphere};
@@ -17,11 +17,12 @@ use photonmill::plan::{EmissionRange, Plan};
 use photonmill::records::Path;
 use photonmill::render::constants;
 use photonmill::resources::Resources;
-use photonmill::rng::{Affine48, Rng, Streams, srand48};
+use photonmill::rng::{self, Affine48, Rng, Streams, owen_scramble, sobol, srand48};
 use photonmill::scene::open_box::open_box;
 use photonmill::settings::{EmissionLaw, Settings};
 use photonmill::trace;
 
+/// Those that imitate chance; Sobol' points are more even than that.
 const GENERATORS: [Rng; 3] = [Rng::Rand48, Rng::Mt, Rng::Philox];
 /// Half of an f32's spacing below 1.
 const U: f64 = 1.0 / 16_777_216.0;
@@ -189,7 +190,7 @@ fn same_start(found: &[Path], expected: &[Path]) -> Check {
 #[test]
 fn photons_of_the_largest_numbers_are_their_own() {
     let Some(gpu) = device() else { return };
-    for (rng, bounces, round) in [(Rng::Philox, 1, (1 << 16) - 1), (Rng::Rand48, 4, (1 << 13) - 1), (Rng::Mt, 1, 1)] {
+    for (rng, bounces, round) in [(Rng::Philox, 1, (1 << 16) - 1), (Rng::Rand48, 4, (1 << 13) - 1), (Rng::Mt, 1, 1), (Rng::Sobol, 1, 1)] {
         let settings = Settings { rng, bounces, photons: 1 << 31, rounds: round + 1, mesh: 1, chunk: Some(1 << 20), ..Settings::default() };
         let scene = open_box(&settings);
         let plan = plan_for(&gpu, &scene, &settings);
@@ -363,4 +364,162 @@ fn the_checks_of_chance_complain() {
     assert_holds("uniform numbers", mean_check("mean", even(1_000_000), 0.5, 0.288_675));
     assert_complains("numbers a hundredth too large", mean_check("mean", even(1_000_000).map(|u| 1.01 * u), 0.5, 0.288_675));
     assert_complains("no number", mean_check("mean", [f64::NAN].into_iter(), 0.5, 0.288_675));
+}
+
+/// Draws of a light's sample of Sobol' points: four of its emission, three of each bounce.
+fn sobol_draws(seed: u64, light: u32, sample: u32, bounces: u32) -> Vec<f32> {
+    let key = Streams { rng: Rng::Sobol, seed, photons: 1, draws_per_photon: 0 }.key(0);
+    let mut stream = rng::open_stream(Rng::Sobol, &key, 0, UVec2::new(sample, light));
+    let mut draws = rng::draw_emission(Rng::Sobol, &key, 0, &mut stream).to_vec();
+    for bounce in 0..bounces {
+        draws.extend(rng::draw_bounce(Rng::Sobol, &key, 0, bounce, &mut stream));
+    }
+    draws
+}
+
+/// One of 2^k numbers in each of 2^k equal intervals.
+fn one_in_each_interval(numbers: impl ExactSizeIterator<Item = f32>) -> Check {
+    let count = numbers.len();
+    let distinct: HashSet<usize> = numbers.map(|u| class(u, count)).collect();
+    if distinct.len() == count { Ok(()) } else { Err(format!("{} of {count} intervals are hit", distinct.len())) }
+}
+
+/// One of 2^k points in each of 2^k equal boxes, whatever their shape: a (0, k, 2)-net.
+fn one_in_each_box(points: &[(f32, f32)]) -> Check {
+    let count = points.len();
+    for columns in (0..=count.ilog2()).map(|log| 1usize << log) {
+        let rows = count / columns;
+        let distinct: HashSet<usize> = points.iter().map(|(x, y)| class(*x, columns) * rows + class(*y, rows)).collect();
+        if distinct.len() != count {
+            return Err(format!("{} of {columns} x {rows} boxes are hit", distinct.len()));
+        }
+    }
+    Ok(())
+}
+
+/// Every aligned run of 2^k samples has one in each interval in every dimension, and one in each box in the
+/// first two of every block, whatever seed and light.
+#[test]
+fn sobol_points_stratify_every_aligned_run() {
+    for (seed, light, k, first) in [
+        (1, 0, 0, 7),
+        (1, 1, 1, 6),
+        (2, 0, 4, 48),
+        (0, 0, 8, 0),
+        (u64::MAX, 1, 10, 5 << 10),
+        (3, 1, 13, 1 << 31),
+        (4, 0, 12, u32::MAX << 12),
+    ] {
+        let what = |of: String| format!("seed {seed}, light {light}, 2^{k} samples from {first}, {of}");
+        let draws: Vec<Vec<f32>> = (0..1 << k).map(|i| sobol_draws(seed, light, first + i, 4)).collect();
+        for draw in 0..draws[0].len() {
+            assert_holds(what(format!("draw {draw}")), one_in_each_interval(draws.iter().map(|u| u[draw])));
+        }
+        for block in [0, 4, 7, 10, 13] {
+            let points: Vec<(f32, f32)> = draws.iter().map(|u| (u[block], u[block + 1])).collect();
+            assert_holds(what(format!("draws from {block}")), one_in_each_box(&points));
+        }
+    }
+}
+
+/// Points by a spoiled generator: a scrambling of indices and of numbers, and of the Sobol' words between.
+fn spoiled_points(shuffle: fn(u32, u32) -> u32, words: fn(u32) -> [u32; 4], scramble: fn(u32, u32) -> u32) -> Vec<(f32, f32)> {
+    let unit = |word: u32| (word >> 8) as f32 / 16_777_216.0;
+    (0..1024)
+        .map(|i| words(shuffle(i, 0x9e37_79b9)))
+        .map(|word| (unit(scramble(word[0], 0x7f4a_7c15)), unit(scramble(word[1], 0xf39c_c060))))
+        .collect()
+}
+
+#[test]
+fn the_checks_complain_about_spoiled_sobol_points() {
+    let both = |points: &[(f32, f32)]| {
+        one_in_each_interval(points.iter().map(|point| point.0))?;
+        one_in_each_interval(points.iter().map(|point| point.1))?;
+        one_in_each_box(points)
+    };
+    assert_holds("the generator itself", both(&spoiled_points(owen_scramble, sobol, owen_scramble)));
+    // Low bits decide over high ones.
+    let upside_down: fn(u32, u32) -> u32 = |x, seed| owen_scramble(x.reverse_bits(), seed).reverse_bits();
+    assert_complains("a scrambling that is not nested", both(&spoiled_points(owen_scramble, sobol, upside_down)));
+    assert_complains("a shuffle that is not nested", both(&spoiled_points(u32::wrapping_mul, sobol, owen_scramble)));
+    assert_complains("two dimensions alike", both(&spoiled_points(owen_scramble, |i| [i.reverse_bits(); 4], owen_scramble)));
+    let swapped: fn(u32) -> [u32; 4] = |i| [sobol(i)[2], sobol(i)[3], 0, 0];
+    assert_complains("the dimensions that are no (0, 2)-sequence", both(&spoiled_points(owen_scramble, swapped, owen_scramble)));
+    let late: Vec<(f32, f32)> = (1..1025).map(|i| sobol_draws(1, 0, i, 0)).map(|u| (u[0], u[1])).collect();
+    assert_complains("a run that is not aligned", both(&late));
+    let chance: Vec<(f32, f32)> = (0..1024)
+        .map(|i| draws_of(streams_of(&Settings { rng: Rng::Philox, ..Settings::default() }), 0, i, 0))
+        .map(|u| (u[0], u[1]))
+        .collect();
+    assert_complains("chance", both(&chance));
+}
+
+/// Over seeds and over lights, each draw of one sample is any number, and any pair of draws any pair; blocks of a
+/// sample know nothing of each other.
+#[test]
+fn sobol_scrambles_are_uniform_and_independent() {
+    for (sample, light) in [(0, 0), (1, 1), (77, 0), (1 << 31, 1)] {
+        let draws: Vec<Vec<f32>> = (0..20_000).map(|seed| sobol_draws(seed, light, sample, 2)).collect();
+        for k in 0..10 {
+            let what = format!("sample {sample}, draw {k}");
+            assert_holds(&what, evenness_check("numbers", draws.iter().map(|u| class(u[k], 100))));
+            for other in 0..k {
+                let pair = |u: &Vec<f32>| 10 * class(u[k], 10) + class(u[other], 10);
+                assert_holds(format!("{what} with {other}"), evenness_check("pairs", draws.iter().map(pair)));
+            }
+        }
+    }
+    let samples = |seed, light| (0..20_000).map(move |sample| sobol_draws(seed, light, sample, 2)).collect::<Vec<_>>();
+    let (draws, other_seed, other_light) = (samples(1, 0), samples(2, 0), samples(1, 1));
+    // The same dimension of two blocks, seeds, lights. Shuffled runs may meet more evenly than chance would.
+    let pairs = |a: &[Vec<f32>], j: usize, b: &[Vec<f32>], k: usize| {
+        let mut counts = [0u32; 100];
+        a.iter().zip(b).for_each(|(a, b)| counts[10 * class(a[j], 10) + class(b[k], 10)] += 1);
+        let chi_square: f64 = counts.iter().map(|count| (f64::from(*count) - 200.0).powi(2) / 200.0).sum();
+        if chi_square > 183.7 {
+            return Err(format!("pairs: chi-square {chi_square:.1} of 99 degrees of freedom"));
+        }
+        correlation_check("draws", a.iter().zip(b).map(|(a, b)| (a[j], b[k])))
+    };
+    for dimension in 0..3 {
+        assert_holds("emission and bounce", pairs(&draws, dimension, &draws, 4 + dimension));
+        assert_holds("two bounces", pairs(&draws, 4 + dimension, &draws, 7 + dimension));
+        assert_holds("two seeds", pairs(&draws, dimension, &other_seed, dimension));
+        assert_holds("two lights", pairs(&draws, dimension, &other_light, dimension));
+    }
+    assert_complains("a block that repeats", pairs(&draws, 0, &draws, 0));
+    let mirrored: Vec<Vec<f32>> = draws.iter().map(|u| vec![1.0 - U as f32 - u[0]]).collect();
+    assert_complains("a scramble that only mirrors", pairs(&draws, 0, &mirrored, 0));
+}
+
+/// Mean of a function with kinks and products over the first `count` of some points.
+fn mean_of(count: u32, draws: impl Fn(u32) -> Vec<f32>) -> f64 {
+    let value = |u: Vec<f32>| f64::from(u[0] * u[1] * u[4]) + f64::from(u[2]).sqrt() + f64::from(u8::from(u[4] + u[5] < 0.5));
+    (0..count).map(|sample| value(draws(sample))).sum::<f64>() / f64::from(count)
+}
+
+/// Estimates from any number of points are right on the mean over seeds, and far closer than chance.
+#[test]
+fn sobol_estimates_are_unbiased_and_closer_than_chance() {
+    let expected = 0.125 + 2.0 / 3.0 + 0.125;
+    let by_seed = |count, draws: &dyn Fn(u64, u32) -> Vec<f32>| -> (f64, f64) {
+        let means: Vec<f64> = (0..2000).map(|seed| mean_of(count, |sample| draws(seed, sample))).collect();
+        let mean = means.iter().sum::<f64>() / 2000.0;
+        (mean, (means.iter().map(|value| (value - mean).powi(2)).sum::<f64>() / 1999.0).sqrt())
+    };
+    let philox = Settings { rng: Rng::Philox, ..Settings::default() };
+    for (count, gain) in [(1, 0.9), (13, 1.3), (200, 2.5), (256, 2.5)] {
+        let (mean, deviation) = by_seed(count, &|seed, sample| sobol_draws(seed, 0, sample, 1));
+        assert_holds(format!("{count} points"), z_check("mean", mean, expected, deviation / 2000f64.sqrt()));
+        let chance = by_seed(count, &|seed, sample| draws_of(Streams { seed, ..streams_of(&philox) }, 0, sample, 1)).1;
+        println!("{count} points: standard deviation {deviation:.2e}, by chance {chance:.2e}, {:.1} times", chance / deviation);
+        assert!(chance > gain * deviation, "{count} points: {deviation} against {chance} by chance");
+        let plain = |sample: u32| {
+            let point = sobol(sample).map(|word| (word >> 8) as f32 / 16_777_216.0);
+            [point, point].concat()
+        };
+        let unscrambled = mean_of(count, plain);
+        assert_complains("points without scrambling", z_check("mean", unscrambled, expected, deviation / 2000f64.sqrt()));
+    }
 }

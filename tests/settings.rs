@@ -93,7 +93,7 @@ fn judge<S: std::fmt::Debug>(make: impl Fn(&mut Random) -> S, rules: impl Fn(&S)
 
 fn any_settings(random: &mut Random) -> Settings {
     let mut settings = Settings::preset(random.pick(&[Preset::Naive, Preset::Modified, Preset::Phong, Preset::Rounds]));
-    settings.rng = random.pick(&[Rng::Rand48, Rng::Mt, Rng::Philox, Rng::Philox]);
+    settings.rng = random.pick(&[Rng::Rand48, Rng::Mt, Rng::Sobol, Rng::Philox, Rng::Philox]);
     for _ in 0..=random.below(3) {
         match random.below(15) {
             0 => settings.photons = random.count(2, 1 << 31),
@@ -133,6 +133,7 @@ fn settings_are_accepted_exactly_within_their_ranges() {
         let draws = all_photons * (4 + 3 * u128::from(bounces));
         let is_mt = settings.rng == Rng::Mt;
         let is_rand48 = settings.rng == Rng::Rand48;
+        let is_sobol = settings.rng == Rng::Sobol;
         vec![
             rule("--photons", photons, (2..=1 << 31).contains(&photons)),
             rule("--rounds", rounds, rounds >= 1),
@@ -158,6 +159,7 @@ fn settings_are_accepted_exactly_within_their_ranges() {
             rule("--rng", "rand48", !is_rand48 || draws <= 1 << 48),
             rule("--bounces", bounces, !is_mt || bounces <= photonmill::rng::MT_MAX_BOUNCES),
             rule("--rng", "mt", !is_mt || all_photons <= 1 << 32),
+            rule("--rng", "sobol", !is_sobol || all_photons <= 1 << 32),
             rule("--rounds", rounds, all_photons * u128::from(bounces) <= 1 << 47),
         ]
     };

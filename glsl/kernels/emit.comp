@@ -27,11 +27,11 @@ void main()
     }
     uint photon = push.first_photon + index;
     DiscLight light = lights[push.light];
-    uvec2 rand48_state = uvec2(0);
+    uvec2 start = uvec2(push.first_sample + index, push.light);
     if (RNG == RNG_RAND48) {
-        rand48_state = affine48(stream_seeds[index], push.jump_multiplier, push.jump_increment);
+        start = affine48(stream_seeds[index], push.jump_multiplier, push.jump_increment);
     }
-    uvec2 stream = open_stream(push.key, photon, rand48_state);
+    uvec2 stream = open_stream(push.key, photon, start);
     vec4 u = draw_emission(push.key, photon, stream);
     vec3 position;
     vec3 direction;

@@ -1,4 +1,5 @@
-// Density estimation at every point, photons found by stages/gather_brute.glsl, summed by film/two_words.glsl.
+// Density estimation at every point, photons found by stages/gather_brute.glsl, summed by film/two_words.glsl
+// and film/f32.glsl.
 // Dispatched by src/estimate.rs once a chunk. One thread = one point and one slice of its photons.
 #version 460
 #extension GL_GOOGLE_include_directive : require
@@ -10,6 +11,7 @@ layout(push_constant, scalar) uniform Push { GatherPush push; };
 
 #include "film/film.glsl"
 #include "film/two_words.glsl"
+#include "film/f32.glsl"
 #include "stages/estimate.glsl"
 #include "stages/gather_brute.glsl"
 

@@ -3,7 +3,7 @@
 
 layout(set = 0, binding = 0, scalar) readonly buffer Points { Point points[]; };
 
-// Sums of one invocation, each as (low word, high word).
+// Sums of one invocation, each as (low word, high word) of a film sum.
 struct Gathered {
     uvec2 sums[2];
 };
@@ -28,9 +28,9 @@ bool within_radius(Point point, vec3 position, uint wall)
 
 void gather_photon(inout Gathered gathered, float flux, float weight)
 {
-    gathered.sums[0] = add_words(gathered.sums[0], to_fixed_point(flux, push.film_scale));
+    gathered.sums[0] = add_value(gathered.sums[0], flux);
     if (CHANNEL_COUNT == 2) {
-        gathered.sums[1] = add_words(gathered.sums[1], to_fixed_point(weight, push.film_scale));
+        gathered.sums[1] = add_value(gathered.sums[1], weight);
     }
 }
 
@@ -38,7 +38,7 @@ void add_gathered(uint point, Gathered gathered)
 {
     for (uint channel = 0; channel < CHANNEL_COUNT; channel++) {
         if (gathered.sums[channel] != uvec2(0)) {
-            add_to_film(point * CHANNEL_COUNT + channel, gathered.sums[channel]);
+            add_sum(point * CHANNEL_COUNT + channel, gathered.sums[channel]);
         }
     }
 }

@@ -19,7 +19,7 @@ use crate::render::{self, Control, Outcome};
 use crate::rng::Rng;
 use crate::scene::open_box::open_box;
 use crate::scene::room::RoomScene;
-use crate::settings::{EmissionLaw, Gather, Math, PhongDirection, Preset, Settings, Variant, WALL_NAMES};
+use crate::settings::{EmissionLaw, Gather, Math, PhongDirection, Preset, Settings, Sums, Variant, WALL_NAMES};
 use crate::timings::{Clock, Span};
 use crate::transport::replay::PhotonName;
 
@@ -43,7 +43,8 @@ pub(super) struct RunArgs {
     /// Seed of the random numbers [default: 1]
     #[arg(long, value_parser = whole::<u64>, allow_negative_numbers = true, help_heading = "Experiment")]
     seed: Option<u64>,
-    /// Random numbers: the paper's drand48, its alternative the Mersenne Twister, or counter-based
+    /// Random numbers: the paper's drand48, its alternative the Mersenne Twister, counter-based, or
+    /// Owen-scrambled Sobol' points, which fall more evenly than chance
     /// [default: rand48 with the paper's 5000 photons a round, philox with any other number]
     #[arg(long, value_enum, help_heading = "Experiment")]
     rng: Option<RngArg>,
@@ -63,6 +64,10 @@ pub(super) struct RunArgs {
     /// [default: fast]
     #[arg(long, value_enum, help_heading = "Estimate")]
     math: Option<MathArg>,
+    /// How the film adds: 64-bit integers, 32-bit floats, or pairs of floats that keep what rounding
+    /// loses; only integers give the same bits in whatever order photons come [default: integer]
+    #[arg(long, value_enum, help_heading = "Estimate")]
+    sums: Option<SumsArg>,
     /// Texels along each side of a wall [default: 64]
     #[arg(long, value_parser = whole::<u32>, allow_negative_numbers = true, help_heading = "Estimate")]
     mesh: Option<u32>,
@@ -152,8 +157,9 @@ pub(super) use value_enum;
 
 value_enum!(PresetArg => Preset { Naive, Modified, Phong, Rounds });
 value_enum!(VariantArg => Variant { Naive, Atomic, Ballot, Cpu });
-value_enum!(RngArg => Rng { Rand48, Mt, Philox });
+value_enum!(RngArg => Rng { Rand48, Mt, Philox, Sobol });
 value_enum!(GatherArg => Gather { Brute, Grid });
+value_enum!(SumsArg => Sums { Integer, F32, Compensated });
 value_enum!(MathArg => Math { Fast, Strict });
 value_enum!(EmissionArg => EmissionLaw { Uniform, Cosine });
 value_enum!(PhongDirectionArg => PhongDirection { Mirror, Sampled });
@@ -211,6 +217,7 @@ impl RunArgs {
             seed: self.seed.unwrap_or(preset.seed),
             rng: self.rng.map_or(if photons == preset.photons { preset.rng } else { Rng::Philox }, Rng::from),
             gather: self.gather.map_or(preset.gather, Gather::from),
+            sums: self.sums.map_or(preset.sums, Sums::from),
             math: self.math.map_or(preset.math, Math::from),
             emission: self.emission.map_or(preset.emission, EmissionLaw::from),
             shininess: self.shininess.map_or(preset.shininess, |all| all.map(Some)),

@@ -5,6 +5,7 @@ use rayon::prelude::*;
 use super::index::Index;
 use crate::plan::Plan;
 use crate::records::{Photon, Point, SortedPhoton};
+use crate::settings::Sums;
 
 /// Adds to `sums` what each point receives from a list of photons, stepping through all of it.
 pub fn gather_brute(plan: &Plan, photons: &[Photon], sums: &mut [u64]) {
@@ -27,12 +28,13 @@ where
     let channels = plan.channel_count as usize;
     let radius_squared = (plan.settings.radius * plan.settings.radius) as f32;
     let scale = plan.film_scale() as f32;
+    let kind = plan.settings.sums;
     let one_point = |(point, sums): (&Point, &mut [u64])| {
         for photon in runs_near(point).flatten() {
             if photon.wall == point.wall && within_radius(point, photon, radius_squared) {
-                sums[0] += to_fixed_point(photon.flux, scale);
+                add_value(kind, &mut sums[0], photon.flux, scale);
                 if channels == 2 {
-                    sums[1] += to_fixed_point(photon.weight, scale);
+                    add_value(kind, &mut sums[1], photon.weight, scale);
                 }
             }
         }
@@ -48,6 +50,29 @@ fn within_radius(point: &Point, photon: &SortedPhoton, radius_squared: f32) -> b
     let offset = photon.position - point.position;
     let distance_squared = offset.x * offset.x + offset.y * offset.y + offset.z * offset.z;
     distance_squared <= radius_squared
+}
+
+/// Adds to one film sum. `scale` is a power of two, so that the product is exact.
+fn add_value(kind: Sums, sum: &mut u64, value: f32, scale: f32) {
+    let float = |word: u64| f32::from_bits(word as u32);
+    match kind {
+        Sums::Integer => *sum += to_fixed_point(value, scale),
+        Sums::F32 => *sum = u64::from((float(*sum) + value * scale).to_bits()),
+        Sums::Compensated => {
+            let [total, lost] = add_compensated([float(*sum), float(*sum >> 32)], value * scale);
+            *sum = u64::from(total.to_bits()) | (u64::from(lost.to_bits()) << 32);
+        }
+    }
+}
+
+/// (sum, what its rounding lost) and one number more: Knuth's exact sum of two, and what is lost goes
+/// back into the sum each time (Kahan 1965), as it would itself stop growing otherwise.
+fn add_compensated([sum, lost]: [f32; 2], value: f32) -> [f32; 2] {
+    let rounded = sum + value;
+    let part = rounded - sum;
+    let rest = lost + ((sum - (rounded - part)) + (value - part));
+    let total = rounded + rest;
+    [total, rest - (total - rounded)]
 }
 
 fn to_fixed_point(value: f32, scale: f32) -> u64 {

@@ -1,5 +1,6 @@
 //! Photons of a chunk on the CPU: the modified algorithm with its two arrays that swap.
 
+use glam::UVec2;
 use rayon::prelude::*;
 
 use super::bsdf::view_weight;
@@ -8,7 +9,7 @@ use super::room::intersect_room;
 use super::sampling::{sample_cosine_hemisphere, to_world};
 use crate::plan::{EmissionRange, Plan};
 use crate::records::{DiscLight, Path, Photon, RandomKey, Room, Tally, Wall};
-use crate::rng::{self, words};
+use crate::rng::{self, Rng, words};
 use crate::scene::room::RoomScene;
 
 /// The scene and settings as the tracing functions read them.
@@ -43,11 +44,16 @@ impl<'a> Tracer<'a> {
             let streams = self.plan.streams();
             let light = self.lights[range.light as usize];
             let first_state = words(streams.jump(round, range.first_photon + 1).apply(rng::srand48(streams.seed as u32)));
+            let first_sample = self.plan.first_sample(round, range);
             let mut rand48_state = first_state;
             (0..range.count)
                 .map(|k| {
                     let photon = range.first_photon + k;
-                    let path = self.emit_one(&key, &light, photon, rand48_state);
+                    let start = match streams.rng {
+                        Rng::Sobol => UVec2::new(first_sample.wrapping_add(k), range.light),
+                        _ => rand48_state,
+                    };
+                    let path = self.emit_one(&key, &light, photon, start);
                     rand48_state = rng::rand48_step(rand48_state);
                     path
                 })
@@ -56,9 +62,9 @@ impl<'a> Tracer<'a> {
         ranges.iter().flat_map(one_range).collect()
     }
 
-    fn emit_one(&self, key: &RandomKey, light: &DiscLight, photon: u32, rand48_state: glam::UVec2) -> Path {
+    fn emit_one(&self, key: &RandomKey, light: &DiscLight, photon: u32, start: UVec2) -> Path {
         let settings = &self.plan.settings;
-        let mut stream = rng::open_stream(settings.rng, key, photon, rand48_state);
+        let mut stream = rng::open_stream(settings.rng, key, photon, start);
         let u = rng::draw_emission(settings.rng, key, photon, &mut stream);
         let (position, direction) = emit_from_disc(light, &self.walls[light.wall as usize], settings.emission, u);
         Path { position, wall: light.wall, direction, photon, stream, flux: light.flux }

@@ -184,6 +184,13 @@ impl Plan {
             .ok_or_else(|| refuse(format!("a round has photons 0 to {}", settings.photons - 1)))
     }
 
+    /// Number of a range's first photon among its light's photons of the run, mod 2^32.
+    pub fn first_sample(&self, round: u32, range: &EmissionRange) -> u32 {
+        let light = range.light as usize;
+        let first_of_light: u32 = self.light_photons[..light].iter().sum();
+        round.wrapping_mul(self.light_photons[light]).wrapping_add(range.first_photon.wrapping_sub(first_of_light))
+    }
+
     pub fn streams(&self) -> Streams {
         Streams {
             rng: self.settings.rng,
@@ -291,6 +298,25 @@ mod tests {
                 }
             }
             assert!(seen.iter().all(|count| *count == 1), "{photons} photons, chunks of {chunk:?}");
+        }
+    }
+
+    /// Whatever the split, each light numbers its photons of all rounds without gaps.
+    #[test]
+    fn lights_number_their_photons_without_gaps() {
+        for chunk in [None, Some(64)] {
+            let settings = Settings { photons: 5001, chunk, rounds: 3, light_power: [2.0, 1.0], ..Settings::preset(Preset::Modified) };
+            let plan = Plan::new(&open_box(&settings), &settings, &Limits::of_host()).unwrap();
+            let mut samples = [Vec::new(), Vec::new()];
+            for (round, ranges) in (0..settings.rounds).flat_map(|round| plan.chunks().map(move |ranges| (round, ranges))) {
+                for range in ranges {
+                    let first = plan.first_sample(round, &range);
+                    samples[range.light as usize].extend(first..first + range.count);
+                }
+            }
+            for (samples, count) in samples.iter().zip(&plan.light_photons) {
+                assert!(samples.iter().copied().eq(0..settings.rounds * count), "chunks of {chunk:?}");
+            }
         }
     }
 }

@@ -22,6 +22,7 @@ use crate::{estimate, index, trace};
 pub fn on_gpu(gpu: &Gpu, scene: &RoomScene, settings: &Settings, control: &mut Control) -> Result<Outcome> {
     let started = Instant::now();
     let plan = Plan::new(scene, settings, &limits(gpu.facts()))?;
+    estimate::check_sums(&plan, gpu.facts())?;
     if settings.math == Math::Strict {
         strict_math(gpu)?;
     }
@@ -91,6 +92,7 @@ pub fn constants(plan: &Plan) -> Constants {
         .set("PHONG_DIRECTION", settings.phong_direction.code())
         .set("HAS_SLOTS", u32::from(plan.has_slots()))
         .set("CHANNEL_COUNT", plan.channel_count)
+        .set("SUMS", settings.sums.code())
 }
 
 /// Makes the pipelines of the plan, and only those.

@@ -16,11 +16,12 @@ pub mod reference;
 use std::ops::Deref;
 use std::sync::atomic::AtomicBool;
 
+use glam::UVec2;
 use photonmill::gpu::{Gpu, Options};
 use photonmill::plan::{Limits, Plan};
 use photonmill::records::Photon;
 use photonmill::render::{self, Control, Outcome};
-use photonmill::rng::{self, Streams};
+use photonmill::rng::{self, Rng, Streams};
 use photonmill::scene::open_box::open_box;
 use photonmill::scene::room::RoomScene;
 use photonmill::settings::Settings;
@@ -124,8 +125,12 @@ pub fn plan_for_host(settings: &Settings) -> Plan {
 /// Every draw of a photon: four of its emission, three of each bounce.
 pub fn draws_of(streams: Streams, round: u32, photon: u32, bounces: u32) -> Vec<f32> {
     let key = streams.key(round);
-    let state = rng::words(streams.jump(round, photon + 1).apply(rng::srand48(streams.seed as u32)));
-    let mut stream = rng::open_stream(streams.rng, &key, photon, state);
+    let start = match streams.rng {
+        // As if one light emitted every photon.
+        Rng::Sobol => UVec2::new(key.photons_before.wrapping_add(photon), 0),
+        _ => rng::words(streams.jump(round, photon + 1).apply(rng::srand48(streams.seed as u32))),
+    };
+    let mut stream = rng::open_stream(streams.rng, &key, photon, start);
     let mut draws = rng::draw_emission(streams.rng, &key, photon, &mut stream).to_vec();
     for bounce in 0..bounces {
         draws.extend(rng::draw_bounce(streams.rng, &key, photon, bounce, &mut stream));

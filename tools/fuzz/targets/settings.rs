@@ -13,7 +13,7 @@ use photonmill::scene::geometry::Geometry;
 use photonmill::scene::open_box::open_box;
 use photonmill::scene::{Scene, built_in};
 use photonmill::settings::transport::{Append, Effect, Filter, Illumination, Kernel, Part, TransportSettings};
-use photonmill::settings::{EmissionLaw, Gather, Math, PhongDirection, Preset, Settings, Variant};
+use photonmill::settings::{EmissionLaw, Gather, Math, PhongDirection, Preset, Settings, Sums, Variant};
 use photonmill_fuzz::{panics_are_caught, refused};
 
 static SCENES: LazyLock<Vec<(Scene, Geometry)>> = LazyLock::new(|| {
@@ -110,8 +110,9 @@ impl<'a> Arbitrary<'a> for Room {
             radius: number(u, usual.radius)?,
             full_light: number(u, usual.full_light)?,
             seed: u.arbitrary()?,
-            rng: *u.choose(&[Rng::Rand48, Rng::Mt, Rng::Philox])?,
+            rng: *u.choose(&[Rng::Rand48, Rng::Mt, Rng::Philox, Rng::Sobol])?,
             gather: *u.choose(&[Gather::Brute, Gather::Grid])?,
+            sums: *u.choose(&[Sums::Integer, Sums::F32, Sums::Compensated])?,
             math: *u.choose(&[Math::Fast, Math::Strict])?,
             paranoid: u.arbitrary()?,
             emission: *u.choose(&[EmissionLaw::Uniform, EmissionLaw::Cosine])?,
