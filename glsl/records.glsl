@@ -123,6 +123,28 @@ struct GatherPush {
     uvec3 cell_count;
 };
 
+struct TreePush {
+    uint photon_capacity;
+    uint axis;
+    uint digit;
+    uint height;
+};
+
+struct NearestPush {
+    uint first_point;
+    uint end_point;
+    uint nearest;
+    uint is_first;
+    float radius_squared;
+    uint film_shift;
+};
+
+struct Search {
+    uint next_leaf;
+    uint found;
+    float limit;
+};
+
 struct BvhNode {
     vec3 origin;
     uint spacing;

@@ -132,6 +132,22 @@ constants! {
     LOOP_LIMIT = 16_384;
     /// Photons that one invocation of a gather tests; a longer list is shared by several invocations.
     GATHER_SLICE = 4_096;
+    /// Photons of a leaf of the kd-tree.
+    TREE_LEAF = 8;
+    /// Photons that one invocation of the tree's radix sort counts or moves, in their order.
+    TREE_RUN = 16;
+    /// Values of a digit of that sort: 4 bits of a coordinate, or a wall.
+    TREE_RADIX = 16;
+    /// Digits of a coordinate, the lowest first; after them the wall.
+    TREE_DIGITS = 8;
+    /// Bits after the binary point of the flux of a point's nearest photons. With 10 bits of photons and the 24
+    /// of a factor they fit 62.
+    NEAREST_BITS = 28;
+    /// Most photons that `--nearest` may ask for.
+    MAX_NEAREST = 1_024;
+    /// log2 of the most by which the flux of the nearest photons is scaled up to the full radius: their disc is
+    /// taken for 1 / 1024 of the radius at least, and one in a corner loses three quarters.
+    NEAREST_GAIN_BITS = 22;
     /// Items that one invocation of the prefix sum handles.
     SCAN_ITEMS = 4;
     /// Subgroups that a work group can hold at most: 1024 invocations in subgroups of one.

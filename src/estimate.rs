@@ -1,9 +1,12 @@
 //! Density estimation: adds to the film what each point receives from a chunk's photons.
 
+pub mod tree;
+
 use crate::constants::GATHER_SLICE;
 use crate::error::{Error, Result};
 use crate::gpu::kernels::{CandidateCount, GatherBruteTwoWords, GatherBruteU64, GatherGridTwoWords, GatherGridU64, SliceCount};
 use crate::gpu::{Commands, DeviceFacts, Extent, Kernel, Module};
+use crate::index::add_work;
 use crate::plan::Plan;
 use crate::records::{DispatchSizePush, GatherPush};
 use crate::resources::{IndexBuffers, Resources};
@@ -30,6 +33,9 @@ fn adds_in_one_word(plan: &Plan, facts: &DeviceFacts) -> bool {
 
 /// Kernels that the estimate needs.
 pub fn modules(plan: &Plan, facts: &DeviceFacts) -> Vec<Module> {
+    if plan.gathers_by_tree() {
+        return tree::modules(plan, facts);
+    }
     match (plan.gathers_by_grid(), adds_in_one_word(plan, facts)) {
         (false, true) => vec![GatherBruteU64::MODULE],
         (false, false) => vec![GatherBruteTwoWords::MODULE],
@@ -67,17 +73,12 @@ fn point_ranges(commands: &Commands, plan: &Plan, tests_per_point: u64) -> impl 
     (0..points).step_by(step).map(move |first| (first as u32, points.min(first + step) as u32))
 }
 
-/// Counts work, and hands the commands over once they amount to a submission.
-fn add_work(commands: &mut Commands, plan: &Plan, pair_tests: u64) -> Result<()> {
-    commands.add_work(pair_tests);
-    if commands.work() >= plan.pair_tests_per_submission { commands.submit() } else { Ok(()) }
-}
-
 /// Adds a chunk to the film.
 pub fn gather(commands: &mut Commands, resources: &Resources, plan: &Plan, photon_count: u32) -> Result<()> {
-    commands.scope("gather", |commands| match &resources.index {
-        Some(index) => gather_grid(commands, resources, index, plan, photon_count),
-        None => gather_brute(commands, resources, plan, photon_count),
+    commands.scope("gather", |commands| match (&resources.tree, &resources.index) {
+        (Some(tree), _) => tree::gather(commands, resources, tree, plan, photon_count),
+        (None, Some(index)) => gather_grid(commands, resources, index, plan, photon_count),
+        (None, None) => gather_brute(commands, resources, plan, photon_count),
     })
 }
 

@@ -11,7 +11,8 @@ use crate::settings::Sums;
 #[derive(Debug, Clone, PartialEq)]
 pub struct Film {
     /// `channel_count` sums a point, in fixed-point units: relative flux, then the paper's illumination
-    /// power (photons within the radius times their Phong weight). With one channel the two are the same.
+    /// power (photons within the radius times their Phong weight). With one channel the two are the same. With
+    /// `--nearest` it is what the disc of the radius would hold at the density of the nearest photons.
     pub sums: Vec<u64>,
     /// What the bits of a sum mean.
     pub kind: Sums,

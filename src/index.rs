@@ -1,4 +1,6 @@
-//! The index of a chunk's photons: counted by grid cell, prefix sums, sorted into cell order.
+//! The index of a chunk's photons: counted by grid cell, prefix sums, sorted into cell order; or a kd-tree ([`tree`]).
+
+pub mod tree;
 
 use crate::constants::SCAN_ITEMS;
 use crate::error::Result;
@@ -11,16 +13,22 @@ use crate::trace::{INDIRECT_GROUPS_X, photon_list_capacity};
 
 /// Kernels that the index needs.
 pub fn modules(plan: &Plan) -> Vec<Module> {
+    if plan.gathers_by_tree() {
+        return tree::modules();
+    }
     if !plan.gathers_by_grid() {
         return Vec::new();
     }
     vec![CellCount::MODULE, ScanBlocks::MODULE, ScanAdd::MODULE, CellScatter::MODULE, DispatchSize::MODULE]
 }
 
-/// Sorts the photon map into cell order.
+/// Sorts the photon map into cell order, or into the leaves of a kd-tree.
 ///
 /// Does nothing where the plan has no index.
 pub fn build(commands: &mut Commands, resources: &Resources, plan: &Plan, photon_count: u32) -> Result<()> {
+    if let Some(buffers) = &resources.tree {
+        return commands.scope("index", |commands| tree::build(commands, resources, buffers, plan, photon_count));
+    }
     let Resources { photons, counters, dispatch_args, index: Some(index), .. } = resources else { return Ok(()) };
     let IndexBuffers { cells, block_sums, sorted_photons, .. } = index;
     let push = plan.grid.index_push(photon_list_capacity(plan, photon_count));
@@ -47,15 +55,33 @@ pub fn build(commands: &mut Commands, resources: &Resources, plan: &Plan, photon
 /// Turns `item_count` numbers into their exclusive prefix sums; `levels` as `resources::block_sums`
 /// makes them.
 pub fn scan(commands: &mut Commands, items: &Buffer, levels: &[Buffer], item_count: u32, group_size: u32) -> Result<()> {
+    let threads = || Extent::Items(u64::from(item_count.div_ceil(SCAN_ITEMS)));
+    scan_part(commands, items, levels, item_count, group_size, &threads)
+}
+
+/// The same of the first numbers alone, as many as `threads` read: sums before them do not depend on those behind,
+/// which are left in disorder.
+fn scan_part<'a>(
+    commands: &mut Commands,
+    items: &Buffer,
+    levels: &[Buffer],
+    item_count: u32,
+    group_size: u32,
+    threads: &dyn Fn() -> Extent<'a>,
+) -> Result<()> {
     let [block_sums, coarser @ ..] = levels else { panic!("a prefix sum has a level") };
-    let threads = Extent::Items(u64::from(item_count.div_ceil(SCAN_ITEMS)));
     let push = ScanPush { item_count };
-    commands.dispatch(ScanBlocks { items, block_sums }, &push, threads)?;
+    commands.dispatch(ScanBlocks { items, block_sums }, &push, threads())?;
     if coarser.is_empty() {
         return Ok(());
     }
     let block_count = item_count.div_ceil(group_size * SCAN_ITEMS);
     scan(commands, block_sums, coarser, block_count, group_size)?;
-    let threads = Extent::Items(u64::from(item_count.div_ceil(SCAN_ITEMS)));
-    commands.dispatch(ScanAdd { items, block_sums }, &push, threads)
+    commands.dispatch(ScanAdd { items, block_sums }, &push, threads())
+}
+
+/// Counts work, and hands the commands over once they amount to a submission.
+pub fn add_work(commands: &mut Commands, plan: &Plan, pair_tests: u64) -> Result<()> {
+    commands.add_work(pair_tests);
+    if commands.work() >= plan.pair_tests_per_submission { commands.submit() } else { Ok(()) }
 }

@@ -5,8 +5,8 @@
 //!
 //! ```text
 //! scene -> plan -> resources -> trace -> index -> estimate -> film -> output
-//! what     which   bytes on     photons  cells,   flux per    sums    images,
-//! is lit   effects the device   of hits  sorted   point               report
+//! what     which   bytes on     photons  cells or flux per    sums    images,
+//! is lit   effects the device   of hits  kd-tree  point               report
 //! ```
 //!
 //! [`render`] is that line on one page; each stage hands a value to the next and none calls back. A

@@ -211,6 +211,41 @@ records! {
         cell_count: UVec3,
     }
 
+    /// A step of building the kd-tree.
+    TreePush {
+        photon_capacity: u32,
+        /// 0: along the first axis of each wall, 1: along the second.
+        axis: u32,
+        /// Digit of the radix sort, `TREE_DIGITS`: the wall.
+        digit: u32,
+        /// Of the nodes that are split: they hold `TREE_LEAF` << `height` photons.
+        height: u32,
+    }
+
+    NearestPush {
+        /// Points `first_point` to `end_point` - 1.
+        first_point: u32,
+        end_point: u32,
+        /// How many photons are wanted.
+        nearest: u32,
+        /// 1: the searches begin.
+        is_first: u32,
+        /// Of the full radius: how far the nearest photons are looked for.
+        radius_squared: f32,
+        /// log2 of the film's units in 1.
+        film_shift: u32,
+    }
+
+    /// A search for a point's nearest photons, between two dispatches.
+    Search {
+        /// Leaves before it are done; `NONE`: all are.
+        next_leaf: u32,
+        /// Photons found.
+        found: u32,
+        /// Squared distance beyond which no photon is wanted.
+        limit: f32,
+    }
+
     /// Node of a compressed wide BVH (Ylitie, Karras and Laine 2017): eight children in boxes of 8-bit
     /// planes.
     BvhNode {

@@ -1,11 +1,11 @@
 //! Every buffer of a run on the device, named and sized by the plan.
 
-use crate::constants::SCAN_ITEMS;
+use crate::constants::{FACE_COUNT, SCAN_ITEMS, TREE_LEAF, TREE_RUN};
 use crate::error::Result;
 use crate::gpu::{Buffer, Commands, Gpu, Memory};
 use crate::oddities;
 use crate::plan::Plan;
-use crate::records::{self, DispatchArgs, Path, Photon, Point, SortedPhoton, Tally};
+use crate::records::{self, DispatchArgs, Path, Photon, Point, Search, SortedPhoton, Tally};
 use crate::scene::room::RoomScene;
 use glam::UVec2;
 
@@ -25,8 +25,10 @@ pub struct Resources {
     pub dispatch_args: Buffer,
     // Ledger of the submission under way, one tally a bounce.
     pub tallies: Buffer,
-    /// The index; `None` where the gather is brute.
+    /// The grid; `None` where the gather has another index or none.
     pub index: Option<IndexBuffers>,
+    /// The kd-tree; `None` where the gather has another index or none.
+    pub tree: Option<TreeBuffers>,
     pub film: Buffer,
     pub oddities: Buffer,
 }
@@ -40,6 +42,43 @@ pub struct IndexBuffers {
     /// Candidates of the busiest point.
     pub longest: Buffer,
 }
+
+/// The kd-tree of `glsl/tree.glsl`, and what it is built with.
+pub struct TreeBuffers {
+    /// (order key, entry of the photon map) in the order along the walls' first axis and along their second, and one
+    /// to write into, in changing roles.
+    pub lists: [Buffer; 3],
+    /// Place of each photon in the order along the axis that nodes are split along.
+    pub ranks: Buffer,
+    /// Photons of each digit and run, or that go to the left; then their prefix sums.
+    pub counts: Buffer,
+    pub block_sums: Vec<Buffer>,
+    /// Sizes of dispatches of an invocation a photon, a run of them, and a share of a prefix sum.
+    pub item_args: Buffer,
+    pub run_args: Buffer,
+    pub scan_args: Buffer,
+    /// First photon of each wall, and the number of all.
+    pub wall_begins: Buffer,
+    /// Photons of the fullest wall.
+    pub longest: Buffer,
+    pub planes: Buffer,
+    pub tree_photons: Buffer,
+    /// Searches for nearest photons; `None` where the radius alone decides.
+    pub searches: Option<SearchBuffers>,
+}
+
+pub struct SearchBuffers {
+    /// Points that are searched for at once.
+    pub point_count: u32,
+    /// Nearest photons of each.
+    pub nearest: Buffer,
+    pub searches: Buffer,
+    /// 1: some search has not ended.
+    pub unfinished: Buffer,
+}
+
+/// Photons that the searches under way may hold: 32 MiB, less than any device's largest buffer.
+const SEARCH_ENTRIES: u64 = 1 << 22;
 
 impl Resources {
     /// Makes the buffers and records the upload of what never changes.
@@ -62,6 +101,7 @@ impl Resources {
             dispatch_args: gpu.buffer::<DispatchArgs>("dispatch args", 1, device)?,
             tallies: gpu.buffer::<Tally>("tallies", bounces, device)?,
             index: if plan.gathers_by_grid() { Some(IndexBuffers::new(gpu, plan)?) } else { None },
+            tree: if plan.gathers_by_tree() { Some(TreeBuffers::new(gpu, plan)?) } else { None },
             film: gpu.buffer::<u64>("film", sums, device)?,
             oddities: oddities::buffer(gpu, commands)?,
         };
@@ -84,6 +124,50 @@ impl IndexBuffers {
             block_sums: block_sums(gpu, cells, plan.settings.group_size)?,
             sorted_photons: gpu.buffer::<SortedPhoton>("sorted photons", u64::from(plan.photon_capacity), Memory::Device)?,
             longest: gpu.buffer::<u32>("longest", 1, Memory::Device)?,
+        })
+    }
+}
+
+impl TreeBuffers {
+    /// Counts of a list: a word a photon, up to whole runs of the radix sort.
+    pub fn count_capacity(plan: &Plan) -> u32 {
+        plan.photon_capacity.next_multiple_of(TREE_RUN)
+    }
+
+    fn new(gpu: &Gpu, plan: &Plan) -> Result<TreeBuffers> {
+        let photons = u64::from(plan.photon_capacity);
+        let counts = u64::from(TreeBuffers::count_capacity(plan));
+        let device = Memory::Device;
+        let list = || gpu.buffer::<UVec2>("tree list", photons, device);
+        let args = || gpu.buffer::<DispatchArgs>("tree dispatch args", 1, device);
+        Ok(TreeBuffers {
+            lists: [list()?, list()?, list()?],
+            ranks: gpu.buffer::<u32>("tree ranks", photons, device)?,
+            counts: gpu.buffer::<u32>("tree counts", counts, device)?,
+            block_sums: block_sums(gpu, counts, plan.settings.group_size)?,
+            item_args: args()?,
+            run_args: args()?,
+            scan_args: args()?,
+            wall_begins: gpu.buffer::<u32>("wall begins", u64::from(FACE_COUNT) + 1, device)?,
+            longest: gpu.buffer::<u32>("longest", 1, device)?,
+            planes: gpu.buffer::<f32>("planes", photons / u64::from(TREE_LEAF) + 1, device)?,
+            tree_photons: gpu.buffer::<Photon>("tree photons", photons, device)?,
+            searches: plan.settings.nearest.map(|nearest| SearchBuffers::new(gpu, plan, nearest)).transpose()?,
+        })
+    }
+}
+
+impl SearchBuffers {
+    fn new(gpu: &Gpu, plan: &Plan, nearest: u32) -> Result<SearchBuffers> {
+        let group = u64::from(plan.settings.group_size);
+        let at_once =
+            (SEARCH_ENTRIES / u64::from(nearest) / group * group).clamp(group, (plan.points.len() as u64).next_multiple_of(group));
+        let device = Memory::Device;
+        Ok(SearchBuffers {
+            point_count: at_once as u32,
+            nearest: gpu.buffer::<UVec2>("nearest photons", at_once * u64::from(nearest), device)?,
+            searches: gpu.buffer::<Search>("searches", at_once, device)?,
+            unfinished: gpu.buffer::<u32>("unfinished", 1, device)?,
         })
     }
 }

@@ -45,6 +45,8 @@ pub enum Gather {
     Brute,
     /// Look into the cells of a sorted uniform grid.
     Grid,
+    /// Walk down a kd-tree.
+    KdTree,
 }
 
 /// How the film adds.
@@ -159,6 +161,8 @@ pub struct Settings {
     pub rng: Rng,
     pub gather: Gather,
     pub sums: Sums,
+    /// Estimate with this many nearest photons of a round within the radius; `None`: with all of them.
+    pub nearest: Option<u32>,
     pub math: Math,
     pub emission: EmissionLaw,
     /// Phong exponent of each wall in the order of [`WALL_NAMES`]; `None` is Lambertian.
@@ -211,6 +215,7 @@ impl Settings {
             rng: Rng::Rand48,
             gather: Gather::Grid,
             sums: Sums::Integer,
+            nearest: None,
             math: Math::Fast,
             emission: EmissionLaw::Uniform,
             shininess: [None; 5],
@@ -315,6 +320,7 @@ impl Settings {
         if let Some(chunk) = self.chunk {
             within("--chunk", chunk, 2..=MAX_PHOTONS, "photons traced at once, at least one for each of the two lights")?;
         }
+        self.validate_nearest()?;
         self.validate_random_numbers()?;
         let events = self.total_photons().saturating_mul(u64::from(self.bounces));
         if events > MAX_EVENTS {
@@ -323,6 +329,28 @@ impl Settings {
                 self.rounds,
                 format!("photons * rounds * bounces is {events}, and the film's 64-bit sums hold {MAX_EVENTS}; ask for fewer"),
             ));
+        }
+        Ok(())
+    }
+
+    fn validate_nearest(&self) -> Result<()> {
+        let Some(nearest) = self.nearest else { return Ok(()) };
+        within("--nearest", nearest, 2..=constants::MAX_NEAREST, "photons; the farthest of them only says how large the disc is")?;
+        if self.gather != Gather::KdTree {
+            return Err(Error::setting("--nearest", nearest, "needs --gather kdtree, which finds the nearest photons"));
+        }
+        if self.sums != Sums::Integer {
+            return Err(Error::setting("--nearest", nearest, "adds in integers; leave --sums out"));
+        }
+        if let Some(chunk) = self.chunk.filter(|chunk| *chunk < self.photons) {
+            let allowed = format!("must be --photons {} or more with --nearest, which looks at a round's photons together", self.photons);
+            return Err(Error::setting("--chunk", chunk, allowed));
+        }
+        let wanted = u64::from(self.rounds) * u64::from(nearest);
+        if wanted > MAX_NEAREST_SUMMED {
+            let allowed =
+                format!("rounds * nearest is {wanted}, and the film's 64-bit sums hold {MAX_NEAREST_SUMMED}; ask for fewer rounds");
+            return Err(Error::setting("--rounds", self.rounds, allowed));
         }
         Ok(())
     }
@@ -389,6 +417,9 @@ const MAX_MESH: u32 = 1024;
 const MIN_RADIUS_SHARE: f64 = 1.0 / 65_536.0;
 /// Photons * bounces that a film sum can hold with 16 bits after the binary point.
 pub const MAX_EVENTS: u64 = 1 << 47;
+/// Rounds * nearest photons that a film sum can hold, each scaled up by 2^`NEAREST_GAIN_BITS`, with 10 bits after
+/// the binary point.
+pub const MAX_NEAREST_SUMMED: u64 = 1 << 31;
 
 fn within<T>(option: &'static str, value: T, allowed: std::ops::RangeInclusive<T>, what: &str) -> Result<()>
 where

@@ -27,6 +27,8 @@ enum Question {
     Photons(Variant),
     /// So is the film.
     Film(Gather),
+    /// So is the film of the nearest photons.
+    Nearest,
     /// The ledger closes and nothing is dropped.
     Ledger(Variant),
     /// A closed form of `selfcheck`, by name.
@@ -57,7 +59,7 @@ impl Question {
     /// Whether another test, the same for every device, shows that a device without a fault answers it right.
     fn has_a_test_of_its_own(self) -> bool {
         match self {
-            Photons(_) | Film(_) | Ledger(_) | ClosedForm(_) | Appends | StrictMath | Finite => false,
+            Photons(_) | Film(_) | Ledger(_) | ClosedForm(_) | Appends | StrictMath | Finite | Nearest => false,
             Bits(_) | LampInBox(_) | Shelf | Ridge | Spot | Texture(_) => true,
             LeaningPlane(_) | LeaningScatterer | PatchInPlane | SheetsInOnePlane => true,
         }
@@ -76,7 +78,7 @@ struct Fault {
     noticed_by: &'static [Question],
 }
 
-const FAULTS: [Fault; 36] = [
+const FAULTS: [Fault; 41] = [
     Fault {
         what: "every other lane of a subgroup writes over its neighbour",
         file: "append/ballot.glsl",
@@ -184,6 +186,46 @@ const FAULTS: [Fault; 36] = [
         to: "(cell_number(cell, push.cell_count) ^ uint(index == 11u))",
         kernels: &["cell_scatter"],
         noticed_by: &[Film(Gather::Grid)],
+    },
+    Fault {
+        what: "nodes of the kd-tree are taken to be split along the wrong axis",
+        file: "tree.glsl",
+        from: "(wall / 2 + 1 + (height & 1)) % 3",
+        to: "(wall / 2 + 1 + (height >> 1 & 1)) % 3",
+        kernels: &["gather_tree_u64", "gather_tree_two_words", "nearest_u64", "nearest_two_words"],
+        noticed_by: &[Film(Gather::KdTree), Nearest],
+    },
+    Fault {
+        what: "one photon goes to the wrong half of its node",
+        file: "kernels/tree_sides.comp",
+        from: "ranks[keys[place].y] < node_at(place).middle",
+        to: "(ranks[keys[place].y] < node_at(place).middle) != (push.height == 3u && place == 100u)",
+        kernels: &["tree_sides"],
+        noticed_by: &[Film(Gather::KdTree)],
+    },
+    Fault {
+        what: "the sort along an axis leaves out a digit",
+        file: "stages/tree_digits.glsl",
+        from: "(key.x >> (4 * push.digit)) & (TREE_RADIX - 1)",
+        to: "push.digit == 6u ? 0 : (key.x >> (4 * push.digit)) & (TREE_RADIX - 1)",
+        kernels: &["tree_count", "tree_order"],
+        noticed_by: &[Film(Gather::KdTree), Nearest],
+    },
+    Fault {
+        what: "the farthest of the nearest photons counts",
+        file: "stages/nearest.glsl",
+        from: "is_full ? 1 : 0",
+        to: "0",
+        kernels: &["nearest_u64", "nearest_two_words"],
+        noticed_by: &[Nearest],
+    },
+    Fault {
+        what: "the disc of the nearest photons reaches over the edge",
+        file: "stages/nearest.glsl",
+        from: "covered_disc(point.position, point.wall, sqrt(farthest), rooms[0])",
+        to: "3.14159265",
+        kernels: &["nearest_u64", "nearest_two_words"],
+        noticed_by: &[Nearest],
     },
     Fault {
         what: "sums are kept in f32",
@@ -420,8 +462,11 @@ fn ask(gpu: &Gpu, question: Question) -> Check {
             let (found, expected) = (in_order(photons(gpu, &settings)), in_order(photons_on_cpu(&settings)));
             if found == expected { Ok(()) } else { Err(format!("{} photons, not the {} of the CPU builder", found.len(), expected.len())) }
         }
-        Film(gather) => {
-            let settings = Settings { gather, ..strict() };
+        Film(_) | Nearest => {
+            let settings = match question {
+                Film(gather) => Settings { gather, ..strict() },
+                _ => Settings { gather: Gather::KdTree, nearest: Some(20), ..strict() },
+            };
             let mut control = Control { cancelled: &never, progress: &mut |_| {} };
             let found = render::on_gpu(gpu, &open_box(&settings), &settings, &mut control).map_err(|error| error.to_string())?;
             equal_sums("the film", &found.film.sums, &run_on_cpu(&settings).film.sums)

@@ -6,7 +6,7 @@ use std::collections::BTreeMap;
 use photonmill::error::{Error, Result};
 use photonmill::rng::Rng;
 use photonmill::settings::transport::{Effect, TransportSettings};
-use photonmill::settings::{Preset, Settings};
+use photonmill::settings::{Gather, Preset, Settings};
 
 const CASES: usize = 40_000;
 
@@ -95,7 +95,17 @@ fn any_settings(random: &mut Random) -> Settings {
     let mut settings = Settings::preset(random.pick(&[Preset::Naive, Preset::Modified, Preset::Phong, Preset::Rounds]));
     settings.rng = random.pick(&[Rng::Rand48, Rng::Mt, Rng::Sobol, Rng::Philox, Rng::Philox]);
     for _ in 0..=random.below(3) {
-        match random.below(15) {
+        match random.below(17) {
+            15 => settings.nearest = Some(random.count(2, 1024)),
+            16 => {
+                settings.gather = Gather::KdTree;
+                settings.nearest = Some(random.count(2, 1024));
+                match random.below(3) {
+                    0 => settings.chunk = Some(random.count(2, settings.photons)),
+                    1 => settings.rounds = random.pick(&[1 << 21, (1 << 21) + 1, 1 << 30]),
+                    _ => {}
+                }
+            }
             0 => settings.photons = random.count(2, 1 << 31),
             1 => settings.rounds = random.count(1, u32::MAX),
             2 => settings.bounces = random.count(1, 10_000),
@@ -131,6 +141,8 @@ fn settings_are_accepted_exactly_within_their_ranges() {
         let all_photons = u128::from(photons) * u128::from(rounds);
         // Four for where a photon starts, three a bounce.
         let draws = all_photons * (4 + 3 * u128::from(bounces));
+        let nearest = settings.nearest.unwrap_or_default();
+        let chunk_or_all = settings.chunk.unwrap_or(photons);
         let is_mt = settings.rng == Rng::Mt;
         let is_rand48 = settings.rng == Rng::Rand48;
         let is_sobol = settings.rng == Rng::Sobol;
@@ -155,6 +167,10 @@ fn settings_are_accepted_exactly_within_their_ranges() {
             rule("--threads", settings.threads, (1..=1024).contains(&settings.threads)),
             rule("--group-size", settings.group_size, [32, 64, 128, 256, 512, 1024].contains(&settings.group_size)),
             rule("--chunk", settings.chunk.unwrap_or_default(), settings.chunk.is_none_or(|chunk| (2..=1 << 31).contains(&chunk))),
+            rule("--nearest", nearest, settings.nearest.is_none_or(|nearest| (2..=1024).contains(&nearest))),
+            rule("--nearest", nearest, settings.nearest.is_none() || settings.gather == Gather::KdTree),
+            rule("--chunk", chunk_or_all, settings.nearest.is_none() || chunk_or_all >= photons),
+            rule("--rounds", rounds, u64::from(nearest) * u64::from(rounds) <= 1 << 31),
             rule("--seed", settings.seed, !is_rand48 || settings.seed <= u64::from(u32::MAX)),
             rule("--rng", "rand48", !is_rand48 || draws <= 1 << 48),
             rule("--bounces", bounces, !is_mt || bounces <= photonmill::rng::MT_MAX_BOUNCES),

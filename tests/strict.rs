@@ -113,6 +113,7 @@ fn check_functions(operand: Vec2, found: &MathResults) -> Check {
     check_sum(operand, found.sum_of_product)?;
     if !(operand.x.is_infinite() && operand.y.is_infinite()) {
         check_angle(operand.x, operand.y, found.angle)?;
+        same_number("angle, against its twin", operand, found.angle, flushed(cpu::math::angle_of(operand.x, operand.y)))?;
     }
     let (a, b) = (flushed(operand.x), flushed(operand.y));
     same_number("a / b", operand, found.quotient, flushed(a / b))?;

@@ -45,7 +45,18 @@ fn the_open_box_is_studied_against_radiosity_and_goes_on_where_it_ended() {
     let first = run(&gpu, folder.path(), request("open-box", 8)).unwrap();
     assert!(first.complete);
     let axes = axes_of(&first);
-    for axis in [Axis::Builder, Axis::Photons, Axis::Radius, Axis::Schedule, Axis::Kernel, Axis::Edges, Axis::Bounces, Axis::Randomness] {
+    for axis in [
+        Axis::Builder,
+        Axis::Photons,
+        Axis::Radius,
+        Axis::Schedule,
+        Axis::Kernel,
+        Axis::Edges,
+        Axis::Bounces,
+        Axis::Randomness,
+        Axis::Nearest,
+        Axis::Sums,
+    ] {
         assert!(axes.contains(&axis), "{axis:?} of {axes:?}");
     }
     for axis in [Axis::Arithmetic, Axis::Direct, Axis::Gather, Axis::Index, Axis::Effects, Axis::Paper] {

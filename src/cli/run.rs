@@ -56,10 +56,14 @@ pub(super) struct RunArgs {
     /// 5000 photons of a round; 10 for every 5000 with --preset rounds]
     #[arg(long, value_parser = number::<f64>, allow_negative_numbers = true, help_heading = "Estimate")]
     full_light: Option<f64>,
-    /// How photons near a point are found: step through all, or look into a sorted grid; the result
-    /// is the same to the bit [default: grid]
+    /// How photons near a point are found: step through all, look into a sorted grid, or walk down a
+    /// kd-tree; the result is the same to the bit [default: grid]
     #[arg(long, value_enum, help_heading = "Estimate")]
     gather: Option<GatherArg>,
+    /// Estimate with the K photons nearest to a point, 2 to 1024 of each round, none farther than the
+    /// radius; needs --gather kdtree [default: all within the radius]
+    #[arg(long, value_name = "K", value_parser = whole::<u32>, allow_negative_numbers = true, help_heading = "Estimate")]
+    nearest: Option<u32>,
     /// Arithmetic: as fast as the device has it, or the same bits on the CPU and on every device that rounds to nearest
     /// [default: fast]
     #[arg(long, value_enum, help_heading = "Estimate")]
@@ -158,7 +162,7 @@ pub(super) use value_enum;
 value_enum!(PresetArg => Preset { Naive, Modified, Phong, Rounds });
 value_enum!(VariantArg => Variant { Naive, Atomic, Ballot, Cpu });
 value_enum!(RngArg => Rng { Rand48, Mt, Philox, Sobol });
-value_enum!(GatherArg => Gather { Brute, Grid });
+value_enum!(GatherArg => Gather { Brute, Grid, #[value(name = "kdtree")] KdTree });
 value_enum!(SumsArg => Sums { Integer, F32, Compensated });
 value_enum!(MathArg => Math { Fast, Strict });
 value_enum!(EmissionArg => EmissionLaw { Uniform, Cosine });
@@ -218,6 +222,7 @@ impl RunArgs {
             rng: self.rng.map_or(if photons == preset.photons { preset.rng } else { Rng::Philox }, Rng::from),
             gather: self.gather.map_or(preset.gather, Gather::from),
             sums: self.sums.map_or(preset.sums, Sums::from),
+            nearest: self.nearest.or(preset.nearest),
             math: self.math.map_or(preset.math, Math::from),
             emission: self.emission.map_or(preset.emission, EmissionLaw::from),
             shininess: self.shininess.map_or(preset.shininess, |all| all.map(Some)),

@@ -3,6 +3,7 @@
 use rayon::prelude::*;
 
 use super::index::Index;
+use super::tree::Tree;
 use crate::plan::Plan;
 use crate::records::{Photon, Point, SortedPhoton};
 use crate::settings::Sums;
@@ -19,6 +20,15 @@ pub fn gather_brute(plan: &Plan, photons: &[Photon], sums: &mut [u64]) {
 /// The same from the grid cells in reach of each point.
 pub fn gather_grid(plan: &Plan, index: &Index, sums: &mut [u64]) {
     gather(plan, sums, |point| index.runs(point.position));
+}
+
+/// The same from the leaves of a kd-tree in reach of each point.
+pub fn gather_tree(plan: &Plan, tree: &Tree, sums: &mut [u64]) {
+    let radius_squared = (plan.settings.radius * plan.settings.radius) as f32;
+    gather(plan, sums, |point| {
+        let mut walk = tree.walk(point);
+        std::iter::from_fn(move || walk.next_leaf(radius_squared)).map(|places| &tree.sorted_photons[places])
+    });
 }
 
 fn gather<'a, Runs>(plan: &Plan, sums: &mut [u64], runs_near: impl Fn(&Point) -> Runs + Sync)
@@ -47,9 +57,7 @@ where
 }
 
 fn within_radius(point: &Point, photon: &SortedPhoton, radius_squared: f32) -> bool {
-    let offset = photon.position - point.position;
-    let distance_squared = offset.x * offset.x + offset.y * offset.y + offset.z * offset.z;
-    distance_squared <= radius_squared
+    squared_distance(point, photon) <= radius_squared
 }
 
 /// Adds to one film sum. `scale` is a power of two, so that the product is exact.
@@ -75,6 +83,11 @@ fn add_compensated([sum, lost]: [f32; 2], value: f32) -> [f32; 2] {
     [total, rest - (total - rounded)]
 }
 
-fn to_fixed_point(value: f32, scale: f32) -> u64 {
+pub(super) fn squared_distance(point: &Point, photon: &SortedPhoton) -> f32 {
+    let offset = photon.position - point.position;
+    offset.x * offset.x + offset.y * offset.y + offset.z * offset.z
+}
+
+pub(super) fn to_fixed_point(value: f32, scale: f32) -> u64 {
     (value * scale).round_ties_even() as u64
 }

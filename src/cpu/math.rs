@@ -1,4 +1,4 @@
-//! Powers and logarithms that are the same to the bit on every machine. Twin of `glsl/math.glsl`, which explains
+//! Powers, logarithms and angles that are the same to the bit on every machine. Twin of `glsl/math.glsl`, which explains
 //! them; quotients and roots are rounded to nearest on a CPU anyway.
 
 /// 2^x to 2 units in the last place, 0 below 2^-125.
@@ -24,4 +24,25 @@ pub fn log2(x: f32) -> f32 {
     let s2 = s * s;
     let series = s * (1.0 + s2 * (1.0 / 3.0 + s2 * (1.0 / 5.0 + s2 * (1.0 / 7.0 + s2 * (1.0 / 9.0)))));
     (exponent + i32::from(above)) as f32 + 2.0 * std::f32::consts::LOG2_E * series
+}
+
+/// Angle of (x, y) in [-pi, pi], to 3 units in the last place; 0 for the origin.
+pub fn angle_of(y: f32, x: f32) -> f32 {
+    use std::f32::consts::{FRAC_PI_2, FRAC_PI_4, PI};
+    let (small, large) = (x.abs().min(y.abs()), x.abs().max(y.abs()));
+    if large < f32::MIN_POSITIVE {
+        return 0.0;
+    }
+    let t = small / large;
+    let folded = t > 0.414_213_56;
+    let t = if folded { (t - 1.0) / (t + 1.0) } else { t };
+    let t2 = t * t;
+    let series = -1.0 / 3.0
+        + t2 * (1.0 / 5.0
+            + t2 * (-1.0 / 7.0 + t2 * (1.0 / 9.0 + t2 * (-1.0 / 11.0 + t2 * (1.0 / 13.0 + t2 * (-1.0 / 15.0 + t2 * (1.0 / 17.0)))))));
+    let angle = t + t * t2 * series;
+    let angle = if folded { FRAC_PI_4 + angle } else { angle };
+    let angle = if y.abs() > x.abs() { FRAC_PI_2 - angle } else { angle };
+    let angle = if x < 0.0 { PI - angle } else { angle };
+    if y <= -f32::MIN_POSITIVE { -angle } else { angle }
 }

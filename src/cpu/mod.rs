@@ -7,6 +7,8 @@ pub mod emission;
 pub mod estimate;
 pub mod index;
 pub mod math;
+pub mod nearest;
 pub mod room;
 pub mod sampling;
 pub mod trace;
+pub mod tree;

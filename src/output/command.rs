@@ -54,6 +54,8 @@ pub fn main_job(preset: Preset, settings: &Settings) -> String {
         line.option("rng", lower_case(settings.rng));
     }
     line.named("gather", settings.gather, usual.gather);
+    settings.nearest.into_iter().for_each(|nearest| line.option("nearest", nearest));
+    line.named("sums", settings.sums, usual.sums);
     line.named("math", settings.math, usual.math);
     line.differing("mesh", settings.mesh, usual.mesh);
     line.differing("edge-correction", switch(settings.edge_correction), switch(usual.edge_correction));

@@ -114,13 +114,14 @@ pub fn text(outcome: &Outcome) -> String {
     writeln!(text, "{device}, {}", driver(outcome)).unwrap();
     writeln!(
         text,
-        "open-box, {}: {} round(s) of {} photons, {} bounces, radius {} m, {} gather, {} sums, {} seed {}",
+        "open-box, {}: {} round(s) of {} photons, {} bounces, radius {} m, {} gather{}, {} sums, {} seed {}",
         settings.variant.name(),
         settings.rounds,
         settings.photons,
         settings.bounces,
         settings.radius,
         format!("{:?}", settings.gather).to_lowercase(),
+        settings.nearest.map_or_else(String::new, |nearest| format!(" of the {nearest} nearest")),
         format!("{:?}", settings.sums).to_lowercase(),
         format!("{:?}", settings.rng).to_lowercase(),
         settings.seed

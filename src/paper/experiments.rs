@@ -202,7 +202,7 @@ fn running_time(case: &Case, pass: Pass, outcomes: &[Outcome], command: &str) ->
     let scopes: &[&str] = match (pass, case.gather) {
         (Pass::Map, _) => &["round/build"],
         (Pass::Rendering, Gather::Brute) => &["round/gather"],
-        (Pass::Rendering, Gather::Grid) => &["round/index", "round/gather"],
+        (Pass::Rendering, Gather::Grid | Gather::KdTree) => &["round/index", "round/gather"],
     };
     let sum = |outcome: &Outcome| scopes.iter().map(|scope| outcome.timings.best_ms(scope)).sum::<Option<f64>>();
     let first = outcomes.first()?;

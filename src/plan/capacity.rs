@@ -42,6 +42,13 @@ impl Limits {
 const SUBMISSIONS_PER_CHUNK: f64 = 10.0;
 /// Work of one flight of a photon, in pair tests.
 const PAIR_TESTS_PER_FLIGHT: f64 = 16.0;
+/// Work of a photon in one digit of the tree's sort or one height of its nodes, in pair tests.
+const PAIR_TESTS_PER_TREE_PASS: f64 = 16.0;
+/// Work of finding one of the nearest photons, in pair tests.
+const TESTS_PER_NEAREST: f64 = 64.0;
+/// Bytes that the kd-tree takes for an entry of the photon map: the photon again, three lists of (key, entry), a
+/// rank, a count, and a plane for each leaf.
+const TREE_BYTES: u64 = 32 + 3 * 8 + 4 + 4 + 1;
 
 /// Expected work of a chunk.
 #[derive(Debug, Clone, Copy, PartialEq)]
@@ -50,6 +57,10 @@ pub struct Work {
     /// Photons that a point tests for each photon emitted.
     tests_per_photon: f64,
     flights_per_photon: f64,
+    /// Most tests of one point, whatever the photons.
+    most_tests: f64,
+    /// Entries of the photon map that a photon takes.
+    entries_per_photon: f64,
 }
 
 impl Work {
@@ -60,20 +71,32 @@ impl Work {
         let tests_per_photon = match settings.gather {
             Gather::Brute if settings.variant == Variant::Naive => f64::from(settings.bounces),
             Gather::Brute => stored,
-            Gather::Grid => {
+            Gather::Grid | Gather::KdTree => {
                 // The cells in reach are three radii wide and may hold pieces of two walls; photons
-                // are taken as spread over all walls alike.
+                // are taken as spread over all walls alike. A tree has fewer photons in reach and planes to pass.
                 let areas = scene.walls().map(|(face, _)| scene.rectangle(face)).map(|wall| wall.u.length() * wall.v.length());
                 let in_reach = 2.0 * (3.0 * settings.radius).powi(2);
                 stored * (in_reach / areas.sum::<f64>()).min(1.0)
             }
         };
-        Work { points: point_count as f64, tests_per_photon, flights_per_photon: stored + 1.0 }
+        let slots = settings.variant == Variant::Naive;
+        Work {
+            points: point_count as f64,
+            tests_per_photon,
+            flights_per_photon: stored + 1.0,
+            most_tests: settings.nearest.map_or(f64::INFINITY, |nearest| TESTS_PER_NEAREST * f64::from(nearest)),
+            entries_per_photon: if slots { f64::from(settings.bounces) } else { stored },
+        }
     }
 
     /// Pair tests of one point for a chunk.
     pub fn tests_per_point(&self, photons: u32) -> u64 {
-        (self.tests_per_photon * f64::from(photons)).ceil() as u64
+        (self.tests_per_photon * f64::from(photons)).min(self.most_tests).ceil() as u64
+    }
+
+    /// A pass of building the kd-tree over a chunk's photons, as pair tests.
+    pub fn tree_pass(&self, photons: u32) -> u64 {
+        (self.entries_per_photon * PAIR_TESTS_PER_TREE_PASS * f64::from(photons)) as u64
     }
 
     /// Flights of a chunk, as pair tests.
@@ -91,7 +114,8 @@ pub fn chunk_photons(settings: &Settings, limits: &Limits, work: &Work) -> Resul
     let (path, photon) = (size_of::<Path>() as u64, size_of::<Photon>() as u64);
     let by_buffer = (limits.buffer_bytes / path).min(limits.buffer_bytes / (photon * bounces));
     // Two path arrays, the photon map, and the same again at most for its sorted copy.
-    let by_memory = limits.memory_bytes / (2 * path + 2 * photon * bounces);
+    let copy = if settings.gather == Gather::KdTree { TREE_BYTES } else { photon };
+    let by_memory = limits.memory_bytes / (2 * path + (photon + copy) * bounces);
     // Entries are numbered in 32 bits.
     let by_index = u64::from(u32::MAX) / bounces;
     let fits = by_buffer.min(by_memory).min(by_index);
@@ -114,6 +138,17 @@ pub fn chunk_photons(settings: &Settings, limits: &Limits, work: &Work) -> Resul
     let by_dispatch = budget / (f64::from(settings.group_size) * tests_per_photon);
     let by_chunk = SUBMISSIONS_PER_CHUNK * budget / (work.points * tests_per_photon + work.flights_per_photon * PAIR_TESTS_PER_FLIGHT);
     let by_time = by_dispatch.min(by_chunk) as u64;
+    if let Some(nearest) = settings.nearest {
+        // The nearest photons of parts of a round are not those of the round.
+        let (photons, room) = (u64::from(settings.photons), fits - spare);
+        if photons > room {
+            let allowed = format!(
+                "looks at a round's {photons} photons together, and the device holds {room}; ask for fewer photons and more rounds"
+            );
+            return Err(Error::setting("--nearest", nearest, allowed));
+        }
+        return Ok(settings.photons);
+    }
     let wanted = settings.chunk.map_or(by_time, u64::from);
     Ok((fits - spare).min(wanted).clamp(2, u64::from(settings.photons)) as u32)
 }

@@ -13,6 +13,7 @@ use serde::Serialize;
 pub use capacity::{Limits, Work};
 pub use effect::Decision;
 
+use crate::constants::{NEAREST_BITS, NEAREST_GAIN_BITS};
 use crate::error::{Error, Result};
 use crate::records::{IndexPush, Photon, Point};
 use crate::rng::Streams;
@@ -103,7 +104,7 @@ impl Plan {
         let equal_flux = relative_flux.iter().all(|flux| *flux == 1.0);
         let decisions = effect::decide(scene, settings, equal_flux);
         let channel_count = if settings.has_phong() || !equal_flux { 2 } else { 1 };
-        let film_shift = if channel_count == 1 { 0 } else { film_shift(settings) };
+        let film_shift = if channel_count == 1 && settings.nearest.is_none() { 0 } else { film_shift(settings) };
 
         let faintest = relative_flux.iter().fold(1.0f32, |a, b| a.min(*b));
         if channel_count == 2 && f64::from(faintest) * ((1u64 << film_shift) as f64) < MIN_FIXED_POINT {
@@ -217,6 +218,10 @@ impl Plan {
     pub fn gathers_by_grid(&self) -> bool {
         self.settings.gather == Gather::Grid
     }
+
+    pub fn gathers_by_tree(&self) -> bool {
+        self.settings.gather == Gather::KdTree
+    }
 }
 
 /// Photons of a list of ranges.
@@ -248,10 +253,16 @@ fn deal(photons: u32, powers: &[f64]) -> Vec<u32> {
 /// A stored photon adds at most 1 to a point's channel, and a run stores at most
 /// E = photons * rounds * bounces of them, so a sum is at most E * 2^shift <= 2^63: it cannot
 /// overflow 64 bits. No more than 31 bits, so that one photon's share fits a 32-bit word.
+///
+/// Of nearest photons a round adds fewer than K, each scaled up by 2^[`NEAREST_GAIN_BITS`] at most, and
+/// their flux has no more bits to give than [`NEAREST_BITS`].
 fn film_shift(settings: &Settings) -> u32 {
-    let events = settings.total_photons() * u64::from(settings.bounces);
+    let (events, most) = match settings.nearest {
+        Some(nearest) => ((u64::from(settings.rounds) * u64::from(nearest)) << NEAREST_GAIN_BITS, NEAREST_BITS),
+        None => (settings.total_photons() * u64::from(settings.bounces), 31),
+    };
     let bits = u64::BITS - (events - 1).leading_zeros();
-    (63 - bits).min(31)
+    (63 - bits).min(most)
 }
 
 #[cfg(test)]
@@ -277,6 +288,15 @@ mod tests {
             let shift = film_shift(&settings);
             assert!(events << shift <= 1 << 63, "{events} events, shift {shift}");
             assert!((16..=31).contains(&shift), "{events} events, shift {shift}");
+        }
+        for (rounds, nearest) in [(1, 2), (1, 1024), (100, 50), (1 << 21, 1024), (1 << 30, 2)] {
+            let settings = Settings { photons: 2, rounds, gather: Gather::KdTree, nearest: Some(nearest), ..Settings::default() };
+            assert!(u64::from(rounds) * u64::from(nearest) <= crate::settings::MAX_NEAREST_SUMMED);
+            let shift = film_shift(&settings);
+            // With half a unit of rounding each round.
+            let most = (u128::from(nearest - 1) << (NEAREST_GAIN_BITS + shift)) + 1;
+            assert!(u128::from(rounds) * most <= 1 << 63, "{rounds} rounds of {nearest}, shift {shift}");
+            assert!((10..=NEAREST_BITS).contains(&shift), "{rounds} rounds of {nearest}, shift {shift}");
         }
     }
 

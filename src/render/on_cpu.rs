@@ -5,7 +5,7 @@ use rayon::{ThreadPool, ThreadPoolBuilder};
 use super::book::Book;
 use super::{Control, Outcome, Replayed};
 use crate::cpu::trace::Tracer;
-use crate::cpu::{estimate, index::Index};
+use crate::cpu::{estimate, index::Index, nearest, tree::Tree};
 use crate::error::{Error, Result};
 use crate::film::Film;
 use crate::ledger::fate;
@@ -32,6 +32,14 @@ pub fn on_cpu(scene: &RoomScene, settings: &Settings, control: &mut Control) -> 
                 if plan.gathers_by_grid() {
                     let index = clock.time("index", |_| Index::build(plan.grid, &photons));
                     clock.time("gather", |_| pool.install(|| estimate::gather_grid(&plan, &index, &mut sums)));
+                } else if plan.gathers_by_tree() {
+                    let tree = clock.time("index", |_| Tree::build(&photons));
+                    clock.time("gather", |_| {
+                        pool.install(|| match settings.nearest {
+                            Some(count) => nearest::gather(&plan, scene, &tree, count, &mut sums),
+                            None => estimate::gather_tree(&plan, &tree, &mut sums),
+                        });
+                    });
                 } else {
                     clock.time("gather", |_| pool.install(|| estimate::gather_brute(&plan, &photons, &mut sums)));
                 }

@@ -4,7 +4,7 @@ use serde::{Deserialize, Serialize};
 
 use crate::rng::Rng;
 use crate::settings::transport::{Append, Effect, Illumination, Kernel, TransportSettings};
-use crate::settings::{Gather, Math, Settings, Variant};
+use crate::settings::{Gather, Math, Settings, Sums, Variant};
 
 #[derive(Debug, Clone, Copy, PartialEq, Eq, Hash, Serialize, Deserialize)]
 #[serde(rename_all = "snake_case")]
@@ -130,14 +130,23 @@ pub fn of_paper(mesh: u32, photons: u32) -> Vec<Group> {
     for radius in [0.1, 0.05, 0.0125, 0.00625] {
         sweep.add(Axis::Radius, format!("radius {radius} m"), |s| s.radius = radius);
     }
+    for nearest in [10, 50, 200] {
+        sweep.add(Axis::Nearest, format!("the {nearest} nearest photons within 0.1 m, kd-tree"), |s| {
+            (s.gather, s.nearest, s.radius) = (Gather::KdTree, Some(nearest), 0.1);
+        });
+    }
     sweep.add(Axis::Edges, "no edge correction", |s| s.edge_correction = false);
     for bounces in [2, 5, 15, 60] {
         sweep.add(Axis::Bounces, format!("{bounces} bounces"), |s| s.bounces = bounces);
     }
     sweep.add(Axis::Randomness, "rand48", |s| s.rng = Rng::Rand48);
     sweep.add(Axis::Randomness, "Mersenne Twister", |s| s.rng = Rng::Mt);
+    sweep.add(Axis::Randomness, "Owen-scrambled Sobol'", |s| s.rng = Rng::Sobol);
+    sweep.add(Axis::Sums, "32-bit floats", |s| s.sums = Sums::F32);
+    sweep.add(Axis::Sums, "compensated floats", |s| s.sums = Sums::Compensated);
     sweep.add(Axis::Arithmetic, "strict", |s| s.math = Math::Strict);
     sweep.add(Axis::Index, "brute force", |s| s.gather = Gather::Brute);
+    sweep.add(Axis::Index, "kd-tree", |s| s.gather = Gather::KdTree);
     sweep.groups
 }
 

@@ -52,6 +52,9 @@ impl Part {
         for comparison in &self.comparisons {
             let Some(base) = comparison.base() else { continue };
             sentences.extend(comparison.others().filter_map(|curve| choice(comparison.axis, curve, base)));
+            let left_out =
+                |curve: &Curve| Some(format!("{}: {} was left out: {}.", comparison.axis.name(), curve.label, curve.left_out.as_ref()?));
+            sentences.extend(comparison.curves.iter().filter_map(left_out));
         }
         for comparison in &self.comparisons {
             sentences.extend(comparison.others().filter_map(|curve| floor(comparison.axis, curve)));

@@ -19,7 +19,7 @@ use std::time::{Duration, Instant};
 
 use serde::Serialize;
 
-use crate::error::Result;
+use crate::error::{Error, Result};
 use crate::gpu::Gpu;
 use crate::output::destination::{Folder, write_all};
 use crate::scene::Scene;
@@ -147,58 +147,77 @@ impl Measuring<'_> {
             .group
             .configurations
             .iter()
-            .map(|configuration| Curve { label: configuration.label.clone(), points: Vec::new() })
+            .map(|configuration| Curve { label: configuration.label.clone(), points: Vec::new(), left_out: None })
             .collect();
-        let mut whole = true;
+        let whole = self.climb(&mut curves)?;
+        Ok((Comparison { axis: self.group.axis, curves }, whole))
+    }
+
+    fn climb(&mut self, curves: &mut [Curve]) -> Result<bool> {
         for doublings in 0..=MOST_DOUBLINGS {
             let rounds = 1 << doublings;
             // Those that have time left for twice the photons of before, which take at most twice the time.
             let going: Vec<usize> = (0..curves.len())
                 .filter(|which| {
-                    let points = &curves[*which].points;
+                    let Curve { points, left_out, .. } = &curves[*which];
                     let spent: Duration = points.iter().map(Point::spent).sum();
                     let next = points.last().map_or(Duration::ZERO, |last| 2 * last.spent());
-                    points.len() == doublings && rounds <= self.group.configurations[*which].most_rounds() && spent + next <= self.share
+                    let allowed = rounds <= self.group.configurations[*which].most_rounds();
+                    left_out.is_none() && points.len() == doublings && allowed && spent + next <= self.share
                 })
                 .collect();
-            let Some(points) = self.level(&going, rounds)? else {
-                whole = false;
-                break;
-            };
-            for (which, point) in going.into_iter().zip(points) {
-                curves[which].points.push(point);
+            if !self.level(&going, rounds, curves)? {
+                return Ok(false);
             }
         }
-        Ok((Comparison { axis: self.group.axis, curves }, whole))
+        Ok(true)
     }
 
-    /// A point of each of these configurations, their runs in turn; `None` where somebody ended it.
-    fn level(&mut self, going: &[usize], rounds: u32) -> Result<Option<Vec<Point>>> {
-        let Measuring { gpu, subject, group, request, cancelled, .. } = *self;
-        let commands: Vec<String> =
-            going.iter().map(|which| subject.command(&group.configurations[*which], rounds, request.seed)).collect();
-        let known: Vec<Option<Point>> = commands.iter().map(|command| self.store.find(group.axis, command)).collect();
-        if known.iter().all(Option::is_some) {
-            return Ok(known.into_iter().collect());
+    /// Adds a point to each of these curves, their runs in turn; false where somebody ended it.
+    fn level(&mut self, going: &[usize], rounds: u32, curves: &mut [Curve]) -> Result<bool> {
+        let Measuring { gpu, subject, group, request, cancelled, share, .. } = *self;
+        let command = |which: usize| subject.command(&group.configurations[which], rounds, request.seed);
+        let known: Option<Vec<Point>> = going.iter().map(|which| self.store.find(group.axis, &command(*which))).collect();
+        if let Some(known) = known {
+            going.iter().zip(known).for_each(|(which, point)| curves[*which].points.push(point));
+            return Ok(true);
         }
-        let mut shots = vec![Vec::new(); going.len()];
+        let mut shots = vec![Vec::new(); curves.len()];
         // The first turn is dropped: it makes pipelines, and brings a card that idled to its clock.
         for turn in 0..=u64::from(request.repeats) {
-            for (place, which) in going.iter().enumerate() {
+            for which in going.iter().copied() {
+                if curves[which].left_out.is_some() {
+                    continue;
+                }
                 let began = Instant::now();
                 let (rounds, seed) = if turn == 0 { (1, request.seed) } else { (rounds, request.seed + turn - 1) };
-                let Some(shot) = subject.run(gpu, &group.configurations[*which], rounds, seed, cancelled)? else { return Ok(None) };
-                if turn > 0 {
-                    shots[place].push((shot, began.elapsed()));
+                match subject.run(gpu, &group.configurations[which], rounds, seed, cancelled) {
+                    Ok(Some(_)) if turn == 0 => {
+                        if began.elapsed() > PATIENCE.max(2 * share) {
+                            let seconds = began.elapsed().as_secs_f64();
+                            curves[which].left_out = Some(format!("one round takes {seconds:.1} s, too long for this budget"));
+                        }
+                    }
+                    Ok(Some(shot)) => shots[which].push((shot, began.elapsed())),
+                    Ok(None) => return Ok(false),
+                    // What this device cannot do is no reason to end the study.
+                    Err(Error::Setting { option, allowed, .. }) => curves[which].left_out = Some(format!("{option} {allowed}")),
+                    Err(error) => return Err(error),
                 }
             }
         }
-        let points: Vec<Point> =
-            shots.iter().zip(commands).map(|(shots, command)| Point::of(shots, &subject.reference, command, rounds)).collect();
-        points.iter().try_for_each(|point| self.store.keep(group.axis, point))?;
-        Ok(Some(points))
+        for which in going.iter().copied().filter(|which| !shots[*which].is_empty()) {
+            let point = Point::of(&shots[which], &subject.reference, command(which), rounds);
+            self.store.keep(group.axis, &point)?;
+            curves[which].points.push(point);
+        }
+        Ok(true)
     }
 }
+
+/// How long the first round of a configuration may take, pipelines and all, before it is left out; or twice its share of
+/// time, where that is longer.
+const PATIENCE: Duration = Duration::from_secs(5);
 
 /// Rounds of the longest point: a power of two.
 const MOST_DOUBLINGS: usize = 20;

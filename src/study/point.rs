@@ -139,6 +139,8 @@ impl Point {
 pub struct Curve {
     pub label: String,
     pub points: Vec<Point>,
+    /// Why it was not measured.
+    pub left_out: Option<String>,
 }
 
 impl Curve {
@@ -255,7 +257,7 @@ mod tests {
                 squared_noise: square,
             }
         };
-        Curve { label: String::new(), points: (0..10).map(|doublings| point(1 << doublings)).collect() }
+        Curve { label: String::new(), left_out: None, points: (0..10).map(|doublings| point(1 << doublings)).collect() }
     }
 
     #[test]

@@ -1,0 +1,24 @@
+// What the kd-tree sorts its photons by along one axis of their walls.
+// Dispatched by src/index/tree.rs once an axis. One thread = one entry of the photon map.
+#version 460
+#extension GL_GOOGLE_include_directive : require
+#extension GL_EXT_scalar_block_layout : require
+#include "records.glsl"
+
+layout(local_size_x_id = 0) in;
+layout(push_constant, scalar) uniform Push { TreePush push; };
+#include "stages/photon_list.glsl"
+layout(set = 1, binding = 2, scalar) writeonly buffer Keys { uvec2 keys[]; };
+
+#include "dispatch.glsl"
+#include "tree.glsl"
+
+void main()
+{
+    uint index = invocation_index();
+    if (index >= photon_list_length(push.photon_capacity)) {
+        return;
+    }
+    uint axis = tree_axis(photons[index].wall, push.axis);
+    keys[index] = uvec2(order_key(photons[index].position[axis]), index);
+}

@@ -1,0 +1,35 @@
+// Moves photons to their places of a pass of the radix sort of stages/tree_digits.glsl.
+// Dispatched by src/index/tree.rs once a digit. One thread = a run of TREE_RUN photons.
+// counts[d * runs + r] = first place of the photons of run r with the digit d.
+#version 460
+#extension GL_GOOGLE_include_directive : require
+#extension GL_EXT_scalar_block_layout : require
+#include "records.glsl"
+
+layout(local_size_x_id = 0) in;
+layout(push_constant, scalar) uniform Push { TreePush push; };
+#include "stages/photon_list.glsl"
+#include "stages/tree_digits.glsl"
+layout(set = 1, binding = 3, scalar) readonly buffer Counts { uint counts[]; };
+layout(set = 1, binding = 4, scalar) writeonly buffer NextKeys { uvec2 next_keys[]; };
+
+#include "dispatch.glsl"
+
+void main()
+{
+    uint length = photon_list_length(push.photon_capacity);
+    uint runs = run_count(length);
+    uint run = invocation_index();
+    if (run >= runs) {
+        return;
+    }
+    uint place[TREE_RADIX];
+    for (uint digit = 0; digit < TREE_RADIX; digit++) {
+        place[digit] = counts[digit * runs + run];
+    }
+    uint end = min((run + 1) * TREE_RUN, length);
+    for (uint i = run * TREE_RUN; i < end; i++) {
+        uvec2 key = keys[i];
+        next_keys[place[digit_of(key)]++] = key;
+    }
+}

@@ -1,0 +1,30 @@
+// Splits the nodes of one height along one axis: notes the place of every photon in the order along it, and
+// the planes.
+// Dispatched by src/index/tree.rs once a height. One thread = one photon of a node.
+#version 460
+#extension GL_GOOGLE_include_directive : require
+#extension GL_EXT_scalar_block_layout : require
+#include "records.glsl"
+
+layout(local_size_x_id = 0) in;
+layout(push_constant, scalar) uniform Push { TreePush push; };
+#include "stages/tree_nodes.glsl"
+layout(set = 1, binding = 2, scalar) readonly buffer Keys { uvec2 keys[]; }; // in order along the axis
+layout(set = 1, binding = 3, scalar) writeonly buffer Ranks { uint ranks[]; };
+layout(set = 1, binding = 4, scalar) writeonly buffer Planes { float planes[]; };
+
+#include "dispatch.glsl"
+#include "tree.glsl"
+
+void main()
+{
+    uint place = invocation_index();
+    if (place >= wall_begins[FACE_COUNT] || !splits_some_node()) {
+        return;
+    }
+    uvec2 key = keys[place];
+    ranks[key.y] = place;
+    if (place == node_at(place).middle) {
+        planes[place / TREE_LEAF] = key_coordinate(key.x);
+    }
+}

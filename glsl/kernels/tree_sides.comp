@@ -1,0 +1,25 @@
+// Says which photons go to the left half of their node, in the order along the other axis.
+// Dispatched by src/index/tree.rs once a height. One thread = one photon of a node.
+// After it counts[i] = 1 where photon i goes left.
+#version 460
+#extension GL_GOOGLE_include_directive : require
+#extension GL_EXT_scalar_block_layout : require
+#include "records.glsl"
+
+layout(local_size_x_id = 0) in;
+layout(push_constant, scalar) uniform Push { TreePush push; };
+#include "stages/tree_nodes.glsl"
+layout(set = 1, binding = 2, scalar) readonly buffer Keys { uvec2 keys[]; }; // in order along the other axis
+layout(set = 1, binding = 3, scalar) readonly buffer Ranks { uint ranks[]; };
+layout(set = 1, binding = 4, scalar) writeonly buffer Counts { uint counts[]; };
+
+#include "dispatch.glsl"
+
+void main()
+{
+    uint place = invocation_index();
+    if (place >= wall_begins[FACE_COUNT] || !splits_some_node()) {
+        return;
+    }
+    counts[place] = ranks[keys[place].y] < node_at(place).middle ? 1 : 0;
+}

@@ -1,0 +1,34 @@
+// Moves photons to the half of their node that they belong to and keeps their order along the other axis, so
+// that no node is ever sorted again.
+// Dispatched by src/index/tree.rs once a height. One thread = one photon of a node.
+// counts[i] = photons before i that go left.
+#version 460
+#extension GL_GOOGLE_include_directive : require
+#extension GL_EXT_scalar_block_layout : require
+#include "records.glsl"
+
+layout(local_size_x_id = 0) in;
+layout(push_constant, scalar) uniform Push { TreePush push; };
+#include "stages/tree_nodes.glsl"
+layout(set = 1, binding = 2, scalar) readonly buffer Keys { uvec2 keys[]; };
+layout(set = 1, binding = 3, scalar) readonly buffer Ranks { uint ranks[]; };
+layout(set = 1, binding = 4, scalar) readonly buffer Counts { uint counts[]; };
+layout(set = 1, binding = 5, scalar) writeonly buffer NextKeys { uvec2 next_keys[]; };
+
+#include "dispatch.glsl"
+
+void main()
+{
+    uint place = invocation_index();
+    if (place >= wall_begins[FACE_COUNT]) {
+        return;
+    }
+    uvec2 key = keys[place];
+    uint next_place = place;
+    if (splits_some_node()) {
+        Node node = node_at(place);
+        uint lefts = counts[place] - counts[node.begin];
+        next_place = ranks[key.y] < node.middle ? node.begin + lefts : node.middle + (place - node.begin) - lefts;
+    }
+    next_keys[next_place] = key;
+}

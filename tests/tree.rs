@@ -1,0 +1,386 @@
+//! The kd-tree: the film that it gives is that of the grid and of brute force, to the bit; and `--nearest` takes the
+//! photons that f64 finds by looking at all of them, whatever order they come in.
+
+mod common;
+
+use std::time::Instant;
+
+use common::{
+    Check, assert_complains, assert_holds, device, device_with, equal_sums, photons, plan_for, plan_for_host, run, run_on_cpu, z_check,
+};
+use glam::{DVec3, Vec3};
+use photonmill::cpu;
+use photonmill::cpu::tree::Tree;
+use photonmill::film::{Film, estimate_walls};
+use photonmill::gpu::{Commands, Gpu, Options};
+use photonmill::plan::{Limits, Plan};
+use photonmill::records::Photon;
+use photonmill::render::constants;
+use photonmill::resources::Resources;
+use photonmill::rng::{Rng, philox};
+use photonmill::scene::open_box::open_box;
+use photonmill::settings::{Gather, Math, Settings, Variant};
+use photonmill::{estimate, index};
+
+fn by_tree(settings: &Settings) -> Settings {
+    Settings { gather: Gather::KdTree, ..settings.clone() }
+}
+
+/// Settings whose photon map holds a list of photons.
+fn room_for(photons: &[Photon], settings: &Settings) -> Settings {
+    let photons = (photons.len() as u32).max(2);
+    Settings { photons, bounces: 1, chunk: Some(photons), rng: Rng::Philox, ..settings.clone() }
+}
+
+/// The device's gather of photons that are handed to it.
+fn gathered_on_gpu(gpu: &Gpu, settings: &Settings, photons: &[Photon]) -> Vec<u64> {
+    let scene = open_box(settings);
+    let plan = plan_for(gpu, &scene, settings);
+    assert!(photons.len() <= plan.photon_capacity as usize && plan.chunks_per_round == 1);
+    let mut commands = Commands::new(gpu, constants(&plan), Instant::now()).unwrap();
+    let resources = Resources::new(gpu, &mut commands, &scene, &plan).unwrap();
+    commands.upload(&resources.photons, photons).unwrap();
+    commands.upload(&resources.counters, &[photons.len() as u32]).unwrap();
+    index::build(&mut commands, &resources, &plan, settings.photons).unwrap();
+    estimate::gather(&mut commands, &resources, &plan, settings.photons).unwrap();
+    commands.read(&resources.film, plan.points.len() * plan.channel_count as usize).unwrap()
+}
+
+fn gathered_on_cpu(plan: &Plan, photons: &[Photon]) -> Vec<u64> {
+    let mut sums = vec![0; plan.points.len() * plan.channel_count as usize];
+    match (plan.settings.gather, plan.settings.nearest) {
+        (Gather::KdTree, Some(count)) => {
+            cpu::nearest::gather(plan, &open_box(&plan.settings), &Tree::build(photons), count, &mut sums);
+        }
+        (Gather::KdTree, None) => cpu::estimate::gather_tree(plan, &Tree::build(photons), &mut sums),
+        _ => cpu::estimate::gather_brute(plan, photons, &mut sums),
+    }
+    sums
+}
+
+/// Photons at random places of all walls, and some on the same coordinate, the same place, and in corners.
+fn scattered(count: u32) -> Vec<Photon> {
+    (0..count)
+        .map(|photon| {
+            let words = philox([photon, 0, 0, 0], [1, 2]);
+            let along = |word: u32| (word >> 8) as f32 / (1 << 24) as f32 * 0.5 - 0.25;
+            let wall = words[0] % 5;
+            let axis = wall as usize / 2;
+            let mut position = Vec3::ZERO;
+            position[axis] = if wall % 2 == 1 { 0.25 } else { -0.25 };
+            position[(axis + 1) % 3] = if words[3].is_multiple_of(7) { 0.125 } else { along(words[1]) };
+            position[(axis + 2) % 3] = match words[3] % 11 {
+                0 => -0.25,
+                1 => 0.03,
+                _ => along(words[2]),
+            };
+            let (flux, weight) = (((words[3] >> 8) % 1000 + 1) as f32 / 1000.0, (words[3] >> 20) as f32 / 4096.0);
+            Photon { position, wall, flux, weight, photon, bounce: 0 }
+        })
+        .collect()
+}
+
+/// Two channels, so that flux and weight are both seen.
+fn two_channels() -> Settings {
+    Settings { mesh: 13, shininess: [Some(2.0); 5], ..Settings::default() }
+}
+
+#[test]
+fn the_tree_gives_the_films_of_brute_force_for_every_number_of_photons() {
+    let gpu = device();
+    for count in [0, 1, 2, 7, 8, 9, 40, 41, 640, 1000, 20_000] {
+        let map = scattered(count);
+        for radius in [0.5 / 65_536.0, 0.003, 0.05, 0.5] {
+            let settings = room_for(&map, &Settings { radius, ..two_channels() });
+            let expected = gathered_on_cpu(&plan_for_host(&Settings { gather: Gather::Brute, ..settings.clone() }), &map);
+            let settings = by_tree(&settings);
+            let what = format!("{count} photons, radius {radius}");
+            assert_holds(format!("CPU, {what}"), equal_sums("film", &gathered_on_cpu(&plan_for_host(&settings), &map), &expected));
+            if let Some(gpu) = &gpu {
+                assert_holds(format!("GPU, {what}"), equal_sums("film", &gathered_on_gpu(gpu, &settings, &map), &expected));
+            }
+        }
+    }
+}
+
+fn film(gpu: &Gpu, settings: &Settings) -> Film {
+    run(gpu, settings).film
+}
+
+#[test]
+fn builders_and_splits_give_the_bits_of_the_grid() {
+    let Some(gpu) = device() else { return };
+    let lesser = device_with(Options { without_int64_atomics: true, ..Options::default() }).unwrap();
+    let paper = Settings { mesh: 19, ..Settings::default() };
+    let glossy = [Some(2.0), None, Some(0.5), Some(0.01), Some(5.0)];
+    for (what, settings) in [
+        ("Lambertian walls", paper.clone()),
+        ("two channels, rounds", Settings { photons: 1201, rounds: 3, shininess: glossy, light_power: [3.0, 0.2], radius: 0.025, ..paper }),
+    ] {
+        let expected = film(&gpu, &settings);
+        assert!(expected.sums.iter().filter(|sum| **sum > 0).count() > expected.sums.len() / 2);
+        for (place, group_size) in [32, 128, 1024].into_iter().enumerate() {
+            for variant in Variant::ON_GPU {
+                let chunk = [None, Some(301), Some(1024)][place];
+                let other = Settings { variant, group_size: group_size.min(gpu.facts().work_group_size), chunk, ..by_tree(&settings) };
+                let found = film(&gpu, &other);
+                assert_eq!((found.channel_count, found.scale), (expected.channel_count, expected.scale));
+                assert_holds(format!("{what}, {variant:?}, groups of {group_size}"), equal_sums("film", &found.sums, &expected.sums));
+            }
+        }
+        assert_holds(format!("{what}, 32 bits"), equal_sums("film", &film(&lesser, &by_tree(&settings)).sums, &expected.sums));
+        let settings = Settings { threads: 2, ..settings };
+        let (tree, grid) = (run_on_cpu(&by_tree(&settings)).film, run_on_cpu(&settings).film);
+        assert_holds(format!("{what}, CPU"), equal_sums("film", &tree.sums, &grid.sums));
+    }
+    // Nothing is stored in a black box, and the whole line still runs.
+    for variant in Variant::ON_GPU {
+        let black = by_tree(&Settings { reflectance: 0.0, variant, mesh: 8, ..Settings::default() });
+        assert!(film(&gpu, &black).sums.iter().all(|sum| *sum == 0));
+        assert!(film(&gpu, &Settings { nearest: Some(5), ..black }).sums.iter().all(|sum| *sum == 0));
+    }
+}
+
+/// More photons in reach than lavapipe loops.
+#[test]
+fn long_lists_are_gathered_to_the_end() {
+    let Some(gpu) = device() else { return };
+    let map: Vec<Photon> =
+        scattered(80_000).into_iter().map(|photon| Photon { wall: 4, position: photon.position.with_z(-0.25), ..photon }).collect();
+    let settings = room_for(&map, &Settings { radius: 0.5, mesh: 3, ..by_tree(&two_channels()) });
+    let expected = gathered_on_cpu(&plan_for_host(&Settings { gather: Gather::Brute, ..settings.clone() }), &map);
+    let found = gathered_on_gpu(&gpu, &settings, &map);
+    assert_holds("80 000 photons", equal_sums("film", &found, &expected));
+    let cut_short = gathered_on_cpu(&plan_for_host(&settings), &map[..65_535]);
+    assert_complains("a list that ends early", equal_sums("film", &cut_short, &expected));
+}
+
+/// Flux of the nearest photons scaled to the disc of the radius, from the description alone: all photons of the wall
+/// sorted by their distance in f64.
+fn expected_flux(plan: &Plan, photons: &[Photon], nearest: usize, point: usize) -> [f64; 2] {
+    let settings = &plan.settings;
+    let scene = open_box(settings);
+    let (position, wall) = (plan.points[point].position.as_dvec3(), plan.points[point].wall);
+    let mut near: Vec<(f64, &Photon)> = photons
+        .iter()
+        .filter(|photon| photon.wall == wall)
+        .map(|photon| (photon.position.as_dvec3().distance(position), photon))
+        .filter(|(distance, _)| *distance <= settings.radius)
+        .collect();
+    near.sort_by(|a, b| a.0.total_cmp(&b.0).then((a.1.photon, a.1.bounce).cmp(&(b.1.photon, b.1.bounce))));
+    let mut factor = 1.0;
+    if near.len() >= nearest {
+        let rectangle = scene.rectangle(wall as usize);
+        let inside: DVec3 = position - rectangle.origin;
+        let (s, t) = (inside.dot(rectangle.u) / rectangle.u.length_squared(), inside.dot(rectangle.v) / rectangle.v.length_squared());
+        let farthest = near[nearest - 1].0.max(settings.radius / 1024.0);
+        factor = rectangle.covered_area(s, t, settings.radius) / rectangle.covered_area(s, t, farthest);
+        near.truncate(nearest - 1);
+    }
+    [near.iter().map(|(_, photon)| f64::from(photon.flux)).sum(), near.iter().map(|(_, photon)| f64::from(photon.weight)).sum::<f64>()]
+        .map(|sum| sum * factor)
+}
+
+fn nearest_check(plan: &Plan, photons: &[Photon], nearest: usize, sums: &[u64]) -> Check {
+    for point in 0..plan.points.len() {
+        for (channel, expected) in expected_flux(plan, photons, nearest, point).into_iter().enumerate() {
+            let found = sums[point * 2 + channel] as f64 / plan.film_scale();
+            let allowed = 1e-5 * expected + 1.0 / plan.film_scale();
+            // Written so that NaN complains.
+            if (found - expected).abs() <= allowed {
+                continue;
+            }
+            return Err(format!("point {point}, channel {channel}: {found} instead of {expected}"));
+        }
+    }
+    Ok(())
+}
+
+#[test]
+fn the_nearest_photons_are_those_that_f64_finds() {
+    let gpu = device();
+    for (count, radius) in [(0, 0.05), (1, 0.5), (3, 0.5), (30, 0.5), (1000, 0.05), (1000, 0.5), (6000, 0.2)] {
+        let map = scattered(count);
+        for nearest in [2, 3, 10, 64, 1000] {
+            let settings = Settings { nearest: Some(nearest), radius, mesh: 5, ..by_tree(&two_channels()) };
+            let settings = room_for(&map, &settings);
+            let plan = plan_for_host(&settings);
+            let what = format!("{nearest} of {count} photons, radius {radius}");
+            let on_cpu = gathered_on_cpu(&plan, &map);
+            assert_holds(format!("CPU, {what}"), nearest_check(&plan, &map, nearest as usize, &on_cpu));
+            if count == 1000 && radius == 0.5 && (10..100).contains(&nearest) {
+                assert_complains("one photon more", nearest_check(&plan, &map, nearest as usize + 1, &on_cpu));
+                assert_complains("photons missing", nearest_check(&plan, &map[10..], nearest as usize, &on_cpu));
+            }
+            if let Some(gpu) = &gpu {
+                for math in [Math::Fast, Math::Strict] {
+                    let found = gathered_on_gpu(gpu, &Settings { math, ..settings.clone() }, &map);
+                    assert_holds(format!("GPU, {math:?}, {what}"), nearest_check(&plan, &map, nearest as usize, &found));
+                    if math == Math::Strict {
+                        assert_holds(format!("GPU, {what}"), equal_sums("film", &found, &on_cpu));
+                    }
+                }
+            }
+        }
+    }
+}
+
+/// Photons on rings, so that many are equally far, and many at the same place; they differ in flux, so it matters
+/// which are taken.
+#[test]
+fn ties_are_broken_by_the_photons_number_in_any_order() {
+    let gpu = device();
+    let pitch = 0.5 / 8.0;
+    let map: Vec<Photon> = (0..900)
+        .map(|photon| {
+            // On the texels' own lattice every distance is exact.
+            let (x, y) = ((photon % 5) as f32 - 2.0, (photon / 5 % 5) as f32 - 2.0);
+            let position = Vec3::new((x + 0.5) * pitch, (y + 0.5) * pitch, -0.25);
+            Photon {
+                position,
+                wall: 4,
+                flux: (photon % 97 + 1) as f32 / 97.0,
+                weight: 1.0 / (photon % 13 + 1) as f32,
+                photon: photon / 3,
+                bounce: photon % 3,
+            }
+        })
+        .collect();
+    let mut reversed = map.clone();
+    reversed.reverse();
+    let mut shuffled = map.clone();
+    shuffled.sort_by_key(|photon| philox([photon.photon, photon.bounce, 0, 0], [3, 4])[0]);
+    for nearest in [2, 5, 37, 100, 901] {
+        let settings = Settings { nearest: Some(nearest), radius: 0.2, mesh: 8, math: Math::Strict, ..by_tree(&two_channels()) };
+        let settings = room_for(&map, &settings);
+        let plan = plan_for_host(&settings);
+        let expected = gathered_on_cpu(&plan, &map);
+        assert_holds(format!("nearest {nearest}"), nearest_check(&plan, &map, nearest as usize, &expected));
+        for order in [&map, &reversed, &shuffled] {
+            assert_holds("CPU", equal_sums("film", &gathered_on_cpu(&plan, order), &expected));
+            if let Some(gpu) = &gpu {
+                assert_holds("GPU", equal_sums("film", &gathered_on_gpu(gpu, &settings, order), &expected));
+            }
+        }
+    }
+    let renumbered: Vec<Photon> = map.iter().map(|photon| Photon { photon: 1000 - photon.photon, ..*photon }).collect();
+    let plan = plan_for_host(&room_for(&map, &Settings { nearest: Some(20), radius: 0.2, mesh: 8, ..by_tree(&two_channels()) }));
+    assert_complains("other numbers", equal_sums("film", &gathered_on_cpu(&plan, &renumbered), &gathered_on_cpu(&plan, &map)));
+}
+
+/// Photons that are all equally far cannot be passed over, and a search takes more steps than a dispatch may.
+#[test]
+fn a_search_goes_on_for_as_long_as_it_takes() {
+    let Some(gpu) = device() else { return };
+    let at = |photon: u32| Photon {
+        position: Vec3::new(0.01, 0.02, -0.25),
+        wall: 4,
+        flux: (photon % 7 + 1) as f32 / 7.0,
+        weight: 1.0,
+        photon,
+        bounce: 0,
+    };
+    let map: Vec<Photon> = (0..70_000).rev().map(at).collect();
+    for nearest in [2, 1024] {
+        let settings = Settings { nearest: Some(nearest), radius: 0.5, mesh: 2, math: Math::Strict, ..by_tree(&two_channels()) };
+        let settings = room_for(&map, &settings);
+        let expected = gathered_on_cpu(&plan_for_host(&settings), &map);
+        assert!(expected.iter().any(|sum| *sum > 0));
+        assert_holds(format!("nearest {nearest}"), equal_sums("film", &gathered_on_gpu(&gpu, &settings, &map), &expected));
+    }
+}
+
+#[test]
+fn builders_and_the_cpu_take_the_same_nearest_photons() {
+    let Some(gpu) = device() else { return };
+    let lesser = device_with(Options { without_int64_atomics: true, ..Options::default() }).unwrap();
+    let glossy = [Some(2.0), None, Some(0.5), Some(0.01), Some(5.0)];
+    for (nearest, rounds) in [(40, 1), (6, 3)] {
+        let settings = Settings {
+            nearest: Some(nearest),
+            rounds,
+            mesh: 33,
+            shininess: glossy,
+            light_power: [3.0, 0.2],
+            math: Math::Strict,
+            threads: 2,
+            ..by_tree(&Settings::default())
+        };
+        let expected = run_on_cpu(&settings).film;
+        for (place, variant) in Variant::ON_GPU.into_iter().enumerate() {
+            let other = Settings { variant, group_size: [128, 32, 64][place], ..settings.clone() };
+            let found = film(&gpu, &other);
+            assert_eq!((found.channel_count, found.scale), (expected.channel_count, expected.scale));
+            assert_holds(format!("{nearest} nearest, {variant:?}"), equal_sums("film", &found.sums, &expected.sums));
+        }
+        assert_holds("32 bits", equal_sums("film", &film(&lesser, &settings).sums, &expected.sums));
+        let one_channel = Settings { shininess: [None; 5], light_power: [1.0; 2], ..settings };
+        let (found, expected) = (film(&gpu, &one_channel), run_on_cpu(&one_channel).film);
+        assert_eq!(found.channel_count, 1);
+        assert_holds("one channel", equal_sums("film", &found.sums, &expected.sums));
+    }
+}
+
+/// Evenly spread photons of unknown number (Poisson): the estimate is right on average, near edges and where the
+/// radius ends the search too; the flux of all K would be K / (K - 1) times as much.
+#[test]
+fn the_estimate_has_no_bias() {
+    for (nearest, radius) in [(4, 0.5), (10, 0.06), (10, 0.5), (60, 0.2)] {
+        let settings = by_tree(&Settings { nearest: Some(nearest), radius, mesh: 3, photons: 4000, ..Settings::default() });
+        let plan = Plan { settings: Settings { bounces: 1, ..settings.clone() }, ..plan_for_host(&settings) };
+        let scene = open_box(&plan.settings);
+        let rounds = 400;
+        // By wall and round: mean of radiosity of its texels, corners, edges and middle.
+        let means: Vec<f64> = (0..rounds)
+            .map(|round| {
+                // Photons of a larger sheet, of which the wall is a random sample: 2000 of a wall on average.
+                let place = |photon: u32| {
+                    let words = philox([photon, round, 0, 0], [5, 6]);
+                    let along = |word: u32| (f64::from(word) / 2f64.powi(32) * 1.0 - 0.5) as f32;
+                    Photon {
+                        position: Vec3::new(along(words[0]), along(words[1]), -0.25),
+                        wall: 4,
+                        flux: 1.0,
+                        weight: 1.0,
+                        photon,
+                        bounce: 0,
+                    }
+                };
+                let map: Vec<Photon> =
+                    (0..4000).map(place).filter(|photon| photon.position.truncate().abs().max_element() <= 0.25).collect();
+                let film = Film::new(&plan, gathered_on_cpu(&plan, &map), u64::from(settings.photons));
+                let back = estimate_walls(&film, &scene, &plan).pop().unwrap();
+                // 4000 photons a square metre at 2 W in all.
+                back.radiosity.iter().sum::<f64>() / 9.0 / 2.0
+            })
+            .collect();
+        let mean = means.iter().sum::<f64>() / f64::from(rounds);
+        let variance = means.iter().map(|value| (value - mean).powi(2)).sum::<f64>() / f64::from(rounds - 1);
+        let error = (variance / f64::from(rounds)).sqrt();
+        assert!(error < 0.02, "{error}");
+        assert_holds(format!("{nearest} nearest, radius {radius}"), z_check("light", mean, 1.0, error));
+        assert_complains("the K-th photon counted", z_check("light", mean * f64::from(nearest) / f64::from(nearest - 1), 1.0, error));
+    }
+}
+
+#[test]
+fn plans_keep_a_round_together() {
+    let settings = Settings { photons: 300_000, rng: Rng::Philox, ..by_tree(&Settings::default()) };
+    let limits = Limits { pair_tests_per_submission: 1 << 25, ..Limits::of_host() };
+    let plan = Plan::new(&open_box(&settings), &settings, &limits).unwrap();
+    assert!(plan.chunks_per_round > 1);
+    let settings = Settings { nearest: Some(10), ..settings };
+    assert_eq!(Plan::new(&open_box(&settings), &settings, &limits).unwrap().chunks_per_round, 1);
+    let small = Limits { memory_bytes: 1 << 20, ..limits };
+    let error = Plan::new(&open_box(&settings), &settings, &small).unwrap_err().to_string();
+    assert!(error.starts_with("--nearest 10: looks at a round's 300000 photons together"), "{error}");
+}
+
+/// The photons of real rounds, against brute force over the host's list.
+#[test]
+fn traced_photons_are_found() {
+    let Some(gpu) = device() else { return };
+    let settings = Settings { nearest: Some(25), mesh: 9, shininess: [Some(2.0); 5], ..by_tree(&Settings::default()) };
+    let map = photons(&gpu, &settings);
+    assert_holds("25 nearest", nearest_check(&plan_for_host(&settings), &map, 25, &film(&gpu, &settings).sums));
+}
