@@ -33,7 +33,7 @@ pub fn angle_of(y: f32, x: f32) -> f32 {
     if large < f32::MIN_POSITIVE {
         return 0.0;
     }
-    let t = small / large;
+    let t = if small < f32::MIN_POSITIVE { 0.0 } else { small / large };
     let folded = t > 0.414_213_56;
     let t = if folded { (t - 1.0) / (t + 1.0) } else { t };
     let t2 = t * t;
