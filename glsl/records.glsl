@@ -325,6 +325,10 @@ struct ResolvePush {
     float caustic_flux;
 };
 
+struct EndRoundPush {
+    uint sum_count;
+};
+
 struct CheckPush {
     uint iteration_count;
     uint addend_low;

@@ -4,12 +4,12 @@ pub mod tree;
 
 use crate::constants::GATHER_SLICE;
 use crate::error::{Error, Result};
-use crate::gpu::kernels::{CandidateCount, GatherBruteTwoWords, GatherBruteU64, GatherGridTwoWords, GatherGridU64, SliceCount};
+use crate::gpu::kernels::{CandidateCount, EndRound, GatherBruteTwoWords, GatherBruteU64, GatherGridTwoWords, GatherGridU64, SliceCount};
 use crate::gpu::{Commands, DeviceFacts, Extent, Kernel, Module};
 use crate::index::add_work;
 use crate::plan::Plan;
-use crate::records::{DispatchSizePush, GatherPush};
-use crate::resources::{IndexBuffers, Resources};
+use crate::records::{DispatchSizePush, EndRoundPush, GatherPush};
+use crate::resources::{IndexBuffers, Resources, RoundBuffers};
 use crate::settings::Sums;
 use crate::trace::photon_list_capacity;
 
@@ -33,15 +33,17 @@ fn adds_in_one_word(plan: &Plan, facts: &DeviceFacts) -> bool {
 
 /// Kernels that the estimate needs.
 pub fn modules(plan: &Plan, facts: &DeviceFacts) -> Vec<Module> {
-    if plan.gathers_by_tree() {
-        return tree::modules(plan, facts);
+    let mut modules = match (plan.gathers_by_tree(), plan.gathers_by_grid(), adds_in_one_word(plan, facts)) {
+        (true, ..) => tree::modules(plan, facts),
+        (_, false, true) => vec![GatherBruteU64::MODULE],
+        (_, false, false) => vec![GatherBruteTwoWords::MODULE],
+        (_, true, true) => vec![CandidateCount::MODULE, SliceCount::MODULE, GatherGridU64::MODULE],
+        (_, true, false) => vec![CandidateCount::MODULE, SliceCount::MODULE, GatherGridTwoWords::MODULE],
+    };
+    if plan.keeps_squares() {
+        modules.push(EndRound::MODULE);
     }
-    match (plan.gathers_by_grid(), adds_in_one_word(plan, facts)) {
-        (false, true) => vec![GatherBruteU64::MODULE],
-        (false, false) => vec![GatherBruteTwoWords::MODULE],
-        (true, true) => vec![CandidateCount::MODULE, SliceCount::MODULE, GatherGridU64::MODULE],
-        (true, false) => vec![CandidateCount::MODULE, SliceCount::MODULE, GatherGridTwoWords::MODULE],
-    }
+    modules
 }
 
 /// Most groups along y that any device must allow.
@@ -133,4 +135,14 @@ fn gather_grid(commands: &mut Commands, resources: &Resources, index: &IndexBuff
         add_work(commands, plan, u64::from(end_point - first_point) * tests_per_point)?;
     }
     Ok(())
+}
+
+/// Moves what a round left on the film to the sums and squares of all rounds, of which there are several.
+pub fn end_round(commands: &mut Commands, resources: &Resources, plan: &Plan) -> Result<()> {
+    let Resources { film, rounds: Some(RoundBuffers { totals, low_squares, high_squares }), .. } = resources else {
+        return Ok(());
+    };
+    let sum_count = plan.points.len() as u32 * plan.channel_count;
+    let kernel = EndRound { film, film_totals: totals, low_squares, high_squares };
+    commands.scope("film", |commands| commands.dispatch(kernel, &EndRoundPush { sum_count }, Extent::Items(u64::from(sum_count))))
 }

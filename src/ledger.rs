@@ -25,6 +25,18 @@ impl Ledger {
     pub fn closes(&self) -> bool {
         self.emitted == self.absorbed + self.escaped + self.cut_off + self.dropped
     }
+
+    /// Of the photons of both.
+    pub fn plus(&self, other: &Ledger) -> Ledger {
+        Ledger {
+            emitted: self.emitted + other.emitted,
+            absorbed: self.absorbed + other.absorbed,
+            escaped: self.escaped + other.escaped,
+            cut_off: self.cut_off + other.cut_off,
+            dropped: self.dropped + other.dropped,
+            stored: self.stored + other.stored,
+        }
+    }
 }
 
 /// Fates bounce by bounce, from which the ledger follows.

@@ -13,7 +13,7 @@
 //! module uses only what stands to its left:
 //!
 //! ```text
-//! constants, records, error, ledger, rng, settings, timings < scene < plan < cpu
+//! constants, records, error, bias, ledger, rng, settings, timings < scene < plan < cpu
 //! scene < judge
 //! constants, records, error, ledger, timings < gpu
 //! gpu < oddities
@@ -42,6 +42,8 @@
 //! - **Sums are integers.** The film ([`film`]) is 64-bit fixed point with a scale that cannot
 //!   overflow ([`plan`]), so the order of additions does not matter. `--sums` takes floats instead, to
 //!   show what they cost.
+//! - **Errors are known.** Films keep sums of squares over rounds, so each texel and pixel has its standard error
+//!   ([`render::stop`] ends a run by it); what the radius adds is measured apart ([`bias`]).
 //! - **The ledger closes.** emitted = absorbed + escaped + cut off + dropped, and nothing is ever
 //!   dropped ([`ledger`]): the plan splits what does not fit.
 //! - **Nothing in world units.** A path leaves its own wall by the wall's number ([`cpu::room`]), and a
@@ -69,6 +71,7 @@
 //! [`cpu`]; that of triangles is judged by [`judge`].
 
 pub mod bake;
+pub mod bias;
 pub mod cli;
 pub mod constants;
 pub mod cpu;

@@ -472,6 +472,10 @@ records! {
         caustic_flux: f32,
     }
 
+    EndRoundPush {
+        sum_count: u32,
+    }
+
     CheckPush {
         iteration_count: u32,
         addend_low: u32,

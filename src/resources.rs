@@ -29,8 +29,19 @@ pub struct Resources {
     pub index: Option<IndexBuffers>,
     /// The kd-tree; `None` where the gather has another index or none.
     pub tree: Option<TreeBuffers>,
+    /// What the round under way has left so far; of a single round, the result.
     pub film: Buffer,
+    /// What all rounds left; `None` of a single one.
+    pub rounds: Option<RoundBuffers>,
     pub oddities: Buffer,
+}
+
+/// The rounds that have ended, sum by sum of the film.
+pub struct RoundBuffers {
+    pub totals: Buffer,
+    /// Lower and upper 64 bits of the sums of squares.
+    pub low_squares: Buffer,
+    pub high_squares: Buffer,
 }
 
 pub struct IndexBuffers {
@@ -103,6 +114,7 @@ impl Resources {
             index: if plan.gathers_by_grid() { Some(IndexBuffers::new(gpu, plan)?) } else { None },
             tree: if plan.gathers_by_tree() { Some(TreeBuffers::new(gpu, plan)?) } else { None },
             film: gpu.buffer::<u64>("film", sums, device)?,
+            rounds: if plan.keeps_squares() { Some(RoundBuffers::new(gpu, commands, sums)?) } else { None },
             oddities: oddities::buffer(gpu, commands)?,
         };
         commands.upload(&resources.rooms, &[scene.room_record()])?;
@@ -113,6 +125,20 @@ impl Resources {
         commands.fill(&resources.film, 0, 2 * sums, 0);
         commands.fill(&resources.tallies, 0, 4 * bounces, 0);
         Ok(resources)
+    }
+}
+
+impl RoundBuffers {
+    fn new(gpu: &Gpu, commands: &mut Commands, sums: u64) -> Result<RoundBuffers> {
+        let buffers = RoundBuffers {
+            totals: gpu.buffer::<u64>("film totals", sums, Memory::Device)?,
+            low_squares: gpu.buffer::<u64>("low squares", sums, Memory::Device)?,
+            high_squares: gpu.buffer::<u64>("high squares", sums, Memory::Device)?,
+        };
+        for buffer in [&buffers.totals, &buffers.low_squares, &buffers.high_squares] {
+            commands.fill(buffer, 0, 2 * sums, 0);
+        }
+        Ok(buffers)
     }
 }
 

@@ -2,6 +2,7 @@
 //! that the paper leaves open is a field here, and [`Settings::validate`] is the one place that
 //! judges values.
 
+pub mod stop;
 pub mod transport;
 
 use serde::Serialize;
@@ -9,6 +10,7 @@ use serde::Serialize;
 use crate::constants;
 use crate::error::{Error, Result};
 use crate::rng::{self, Rng};
+use stop::Stop;
 
 /// How the photon map is built.
 #[derive(Debug, Clone, Copy, PartialEq, Eq, Serialize)]
@@ -184,6 +186,7 @@ pub struct Settings {
     pub threads: usize,
     /// Look for values that are infinite or no number.
     pub paranoid: bool,
+    pub stop: Stop,
     /// Invocations of a work group.
     pub group_size: u32,
     /// Most photons traced at once; `None`: as many as the device's buffers hold.
@@ -228,6 +231,7 @@ impl Settings {
             edge_correction: true,
             threads: 1,
             paranoid: false,
+            stop: Stop::default(),
             group_size: 128,
             chunk: None,
         };
@@ -267,11 +271,11 @@ impl Settings {
         within("--rounds", self.rounds, 1..=u32::MAX, "rounds")?;
         within("--bounces", self.bounces, 1..=MAX_BOUNCES, "bounces")?;
         within("--mesh", self.mesh, 1..=MAX_MESH, "texels along a wall")?;
-        if !(self.radius >= width * MIN_RADIUS_SHARE && self.radius <= width) {
+        if !(self.radius >= MIN_RADIUS && self.radius <= width) {
             return Err(Error::setting(
                 "--radius",
                 self.radius,
-                format!("must be from {:e} to {width} metres (the box's width)", width * MIN_RADIUS_SHARE),
+                format!("must be from {MIN_RADIUS:e} to {width} metres (the box's width)"),
             ));
         }
         if !(self.full_light >= 1.0 / MAX_QUANTITY && self.full_light <= MAX_QUANTITY) {
@@ -321,6 +325,10 @@ impl Settings {
             within("--chunk", chunk, 2..=MAX_PHOTONS, "photons traced at once, at least one for each of the two lights")?;
         }
         self.validate_nearest()?;
+        self.stop.validate()?;
+        if let (Some(error), true) = (self.stop.error, self.sums != Sums::Integer) {
+            return Err(Error::setting("--error", error, "needs --sums integer: floats keep no sum of squares"));
+        }
         self.validate_random_numbers()?;
         let events = self.total_photons().saturating_mul(u64::from(self.bounces));
         if events > MAX_EVENTS {
@@ -353,6 +361,22 @@ impl Settings {
             return Err(Error::setting("--rounds", self.rounds, allowed));
         }
         Ok(())
+    }
+
+    /// Rounds of a run that ends by itself: as many as its photons take, or as film and random numbers allow, and no
+    /// more than [`MOST_ROUNDS`].
+    pub fn most_rounds(&self) -> u32 {
+        let photons = u64::from(self.photons).max(1);
+        let bounces = u64::from(self.bounces).max(1);
+        let by_random_numbers = match self.rng {
+            Rng::Rand48 => ((1 << 48) / u128::from(self.draws_per_photon())) as u64 / photons,
+            Rng::Mt | Rng::Sobol => (1 << 32) / photons,
+            Rng::Philox => u64::MAX,
+        };
+        let by_total = self.stop.photons.map_or(u64::MAX, |total| total.div_ceil(photons));
+        let by_nearest = self.nearest.map_or(u64::MAX, |nearest| MAX_NEAREST_SUMMED / u64::from(nearest).max(1));
+        let fits = (MAX_EVENTS / bounces / photons).min(by_random_numbers).min(by_total).min(by_nearest);
+        fits.clamp(1, u64::from(MOST_ROUNDS)) as u32
     }
 
     fn validate_random_numbers(&self) -> Result<()> {
@@ -415,6 +439,10 @@ const MAX_QUANTITY: f64 = 1e12;
 const MAX_MESH: u32 = 1024;
 /// Smallest radius relative to the box: below it the squares of f32 distances lose their meaning.
 const MIN_RADIUS_SHARE: f64 = 1.0 / 65_536.0;
+/// The same in metres.
+pub const MIN_RADIUS: f64 = 2.0 * HALF_WIDTH * MIN_RADIUS_SHARE;
+/// Rounds of a run that ends by itself.
+const MOST_ROUNDS: u32 = 1 << 24;
 /// Photons * bounces that a film sum can hold with 16 bits after the binary point.
 pub const MAX_EVENTS: u64 = 1 << 47;
 /// Rounds * nearest photons that a film sum can hold, each scaled up by 2^`NEAREST_GAIN_BITS`, with 10 bits after

@@ -104,6 +104,12 @@ fn bad_input_is_refused_in_one_line() {
         (&["--trace", "absent/a.json"], ["--trace", "absent/a.json", "folder"]),
         (&["--irradiance", "/dev/null/x"], ["--irradiance", "/dev/null/x", "cannot be written"]),
         (&["--irradiance", "i", "--reflectance", "0"], ["--reflectance", "0", "above 0"]),
+        (&["--error", "0%"], ["--error", "0", "0.0001 %"]),
+        (&["--error", "few"], ["--error", "few", "per cent"]),
+        (&["--confidence", "10%"], ["--confidence", "0.1", "50 %"]),
+        (&["--time", "0s"], ["--time", "0", "1ms"]),
+        (&["--total-photons", "0"], ["--total-photons", "0", "1 or more"]),
+        (&["--error", "2%", "--bias", "--radius", "0.2", "--mesh", "8", "--variant", "cpu"], ["--error", "2%", "a smaller --radius"]),
         (&["--colour"], ["--colour", "no such option", "--help"]),
         (&["bakery"], ["bakery", "no such subcommand", "--help"]),
         (&["paper"], ["--out", "required", ""]),
@@ -190,6 +196,30 @@ fn a_run_writes_everything_it_was_asked_for() {
     let mean = irradiance.iter().sum::<f32>() / irradiance.len() as f32;
     assert!((1.0..4.0).contains(&mean), "{mean}");
     assert!(image::open(at("a.exr")).is_ok());
+}
+
+/// How far and how wrong: progress as lines, why the run ended, noise, bias and error images.
+#[test]
+fn a_run_says_how_wrong_it_is() {
+    let folder = tempfile::tempdir().unwrap();
+    let arguments = ["--photons", "501", "--mesh", "8", "--error", "90%", "--bias", "--progress", "json", "--json", "a.json"];
+    let output = run_on_device(folder.path(), &[&arguments[..], &["--irradiance", "i"]].concat());
+    assert!(output.status.success(), "{}", text(&output.stderr));
+    let lines: Vec<Value> = text(&output.stderr).lines().filter_map(|line| serde_json::from_str(line).ok()).collect();
+    let last = lines.last().expect("progress is told");
+    assert_eq!(last["ledger"]["emitted"], last["photons"]);
+    assert!(last["error"].as_f64().unwrap() <= last["error_wanted"].as_f64().unwrap() && last["seconds_left"].is_number(), "{last}");
+    let report = json(&folder.path().join("a.json"));
+    assert_eq!((&report["end"], &report["rounds"], &report["cancelled"]), (&"error".into(), &30.into(), &false.into()));
+    let known = |value: &Value| value.as_f64().unwrap();
+    let (noise, bias) = (known(&report["error_bound"]), known(&report["bias"]["upper"]));
+    assert!((noise.hypot(bias) - known(&last["error"])).abs() < 1e-9 && noise > known(&report["relative_error"]), "{report}");
+    for word in ["ended at the error wanted", "noise: ", "bias of the radius: ", "both: "] {
+        assert!(text(&output.stdout).contains(word), "{word}: {}", text(&output.stdout));
+    }
+    let texels = |name: &str| image::open(folder.path().join(name)).unwrap().into_rgb32f().into_raw();
+    let (light, errors) = (texels("i/floor.exr"), texels("i/floor-error.exr"));
+    assert!(light.iter().zip(&errors).all(|(light, error)| *error > 0.0 && error < light), "{errors:?}");
 }
 
 #[test]

@@ -481,7 +481,7 @@ fn counted_on(gpu: Option<&Gpu>, settings: &Settings, start: f32, count: u32) ->
             sums = commands.read(&resources.film, sums.len()).unwrap();
         }
     }
-    Film::new(&plan, sums, 1).units(plan.points.len() - 1)
+    Film { sums, ..Film::new(&plan) }.units(plan.points.len() - 1)
 }
 
 /// One photon more is nothing to an f32 of 2^24 of them; pairs and integers count on, pairs also where the

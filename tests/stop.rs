@@ -9,12 +9,17 @@ use std::time::Instant;
 use common::lit::{scene, seen};
 use common::{Check, assert_complains, assert_holds, device};
 use glam::DVec3;
+use photonmill::film::{estimate_walls, irradiance_weights};
 use photonmill::gpu::Gpu;
 use photonmill::plan::transport::{Sensor, TransportPlan};
-use photonmill::render::{self, Control, Progress};
+use photonmill::render::{self, Control, Outcome, Progress, stop};
+use photonmill::rng::Rng;
 use photonmill::scene::geometry::Geometry;
+use photonmill::scene::open_box::open_box;
 use photonmill::scene::{Camera, Scene};
-use photonmill::settings::transport::{Stop, TransportSettings};
+use photonmill::settings::stop::Stop;
+use photonmill::settings::transport::TransportSettings;
+use photonmill::settings::{Math, Settings};
 use photonmill::transport::stop::error_bound;
 use photonmill::transport::{self, End, Lit, View};
 
@@ -48,7 +53,7 @@ fn settings(error: f64, seed: u64) -> TransportSettings {
         shadow_rays: 1,
         alpha: 1.0,
         seed,
-        stop: Stop { error: Some(error), confidence: CONFIDENCE, seconds: None },
+        stop: Stop { error: Some(error), confidence: CONFIDENCE, ..Stop::default() },
         ..TransportSettings::default()
     }
 }
@@ -111,6 +116,109 @@ fn errors_of_a_hundred_runs_lie_within_the_claim_as_often_as_claimed() {
     claims_hold(100);
 }
 
+/// The paper's box by a builder, with an error that is wanted.
+fn in_box(gpu: Option<&Gpu>, error: Option<f64>, rounds: u32, seed: u64) -> (Outcome, Vec<Progress>) {
+    let stop = Stop { error, confidence: CONFIDENCE, ..Stop::default() };
+    let settings = Settings { photons: 301, rounds, seed, mesh: 8, rng: Rng::Philox, stop, ..Settings::default() };
+    run_box(gpu, &settings)
+}
+
+fn run_box(gpu: Option<&Gpu>, settings: &Settings) -> (Outcome, Vec<Progress>) {
+    let (never, mut told) = (AtomicBool::new(false), Vec::new());
+    let mut tell = |progress: &Progress| told.push(progress.clone());
+    let mut control = Control { cancelled: &never, progress: &mut tell };
+    let outcome = match gpu {
+        Some(gpu) => render::on_gpu(gpu, &open_box(settings), settings, &mut control).unwrap(),
+        None => render::on_cpu(&open_box(settings), settings, &mut control).unwrap(),
+    };
+    (outcome, told)
+}
+
+fn irradiances(outcome: &Outcome) -> Vec<DVec3> {
+    let walls = estimate_walls(&outcome.film, &open_box(&outcome.plan.settings), &outcome.plan);
+    walls.into_iter().flat_map(|wall| wall.irradiance).map(|irradiance| DVec3::X * irradiance).collect()
+}
+
+/// The relative error that a film of the box has not more of.
+fn bound_in_box(outcome: &Outcome) -> f64 {
+    let weights = irradiance_weights(&open_box(&outcome.plan.settings), &outcome.plan);
+    stop::error_bound(outcome.film.rounds, outcome.film.relative_error(&weights), CONFIDENCE)
+}
+
+/// The same of the paper's line, whichever way it is built.
+#[test]
+fn errors_of_the_box_lie_within_the_claim_as_often_as_claimed() {
+    let gpu = device();
+    for gpu in [None, gpu.as_deref()] {
+        let wanted = bound_in_box(&in_box(gpu, None, 60, 1000).0);
+        let runs: Vec<(Vec<DVec3>, f64)> = (1..=20)
+            .map(|seed| {
+                let outcome = in_box(gpu, Some(wanted), 20_000, seed).0;
+                let bound = bound_in_box(&outcome);
+                assert_eq!(outcome.end, End::Error, "{bound}");
+                assert!(bound <= wanted && outcome.film.rounds >= 30, "{bound} of {wanted} after {} rounds", outcome.film.rounds);
+                (irradiances(&outcome), bound)
+            })
+            .collect();
+        println!("box: {wanted:.4} wanted, coverage {}, of half the claim {}", coverage(&runs, 1.0), coverage(&runs, 0.5));
+        assert_holds("the box", coverage_check("the box", coverage(&runs, 1.0)));
+        assert_complains("a third of the claim", coverage_check("the box", coverage(&runs, 1.0 / 3.0)));
+    }
+}
+
+/// Ends of the paper's line, and what an unfinished round leaves: it counts in the light, and in no error.
+#[test]
+fn a_run_of_the_box_ends_at_what_is_reached_first() {
+    let gpu = device();
+    for gpu in [None, gpu.as_deref()] {
+        let settings =
+            |stop| Settings { photons: 1001, rounds: 1000, mesh: 8, rng: Rng::Philox, chunk: Some(100), stop, ..Settings::default() };
+        let (outcome, told) = run_box(gpu, &settings(Stop { photons: Some(5100), error: Some(1e-6), ..Stop::default() }));
+        assert_eq!((outcome.end, outcome.film.rounds, outcome.cancelled), (End::Photons, 5, false));
+        let emitted = outcome.fates.emitted;
+        assert!((5100..6006).contains(&emitted) && outcome.film.emitted == emitted, "{emitted}");
+        let ledger = told.last().unwrap().ledger;
+        assert!(ledger.closes() && ledger == outcome.fates.ledger(), "{ledger:?}");
+        // Five whole rounds have the errors that they have alone, and the rest is light.
+        let whole = run_box(gpu, &Settings { rounds: 5, ..settings(Stop::default()) }).0;
+        assert_eq!((whole.end, &whole.film.squares), (End::Rounds, &outcome.film.squares));
+        let rest: u64 = outcome.film.unfinished.iter().sum();
+        assert_eq!(outcome.film.sums.iter().sum::<u64>(), whole.film.sums.iter().sum::<u64>() + rest);
+        assert!(rest > 0);
+
+        let (outcome, _) = run_box(gpu, &settings(Stop { seconds: Some(0.001), ..Stop::default() }));
+        assert_eq!(outcome.end, End::Time);
+        let (outcome, _) = run_box(gpu, &settings(Stop { error: Some(0.9), seconds: Some(1000.0), ..Stop::default() }));
+        assert_eq!((outcome.end, outcome.film.rounds), (End::Error, 30));
+    }
+}
+
+/// The device's sums and squares are the CPU's, to the bit, with one channel and with two.
+#[test]
+fn squares_of_rounds_are_the_same_on_device_and_cpu() {
+    let Some(gpu) = device() else { return };
+    for shininess in [[None; 5], [Some(3.0); 5]] {
+        let settings =
+            Settings { photons: 501, rounds: 7, mesh: 8, shininess, math: Math::Strict, rng: Rng::Philox, ..Settings::default() };
+        let (found, expected) = (run_box(Some(&gpu), &settings).0.film, run_box(None, &settings).0.film);
+        assert!(found == expected, "{shininess:?}");
+    }
+}
+
+/// A run that counts its radius's bias in the error goes on until both together are small enough, and is told beforehand.
+#[test]
+fn bias_counts_in_the_error_that_is_wanted() {
+    let gpu = device();
+    let stop = |bias| Stop { error: Some(0.2), confidence: CONFIDENCE, bias, ..Stop::default() };
+    let settings = |bias| Settings { photons: 301, rounds: 5000, mesh: 8, rng: Rng::Philox, stop: stop(bias), ..Settings::default() };
+    let (alone, with) = (run_box(gpu.as_deref(), &settings(None)).0, run_box(gpu.as_deref(), &settings(Some(0.15))).0);
+    assert_eq!((alone.end, with.end), (End::Error, End::Error));
+    assert!(bound_in_box(&with).hypot(0.15) <= 0.2 && with.film.rounds > alone.film.rounds);
+    let (without_end, told) = run_box(gpu.as_deref(), &Settings { rounds: 100, ..settings(Some(0.25)) });
+    assert_eq!(without_end.end, End::Rounds);
+    assert!(told.last().unwrap().error.unwrap() > 0.25);
+}
+
 fn watched(gpu: &Gpu, name: &str, settings: &TransportSettings) -> (Lit, Vec<Progress>) {
     let scene = scene(name);
     let geometry = Geometry::new(&scene).unwrap();
@@ -127,7 +235,11 @@ fn watched(gpu: &Gpu, name: &str, settings: &TransportSettings) -> (Lit, Vec<Pro
 #[test]
 fn a_run_ends_at_its_time_or_its_error_whichever_comes_first() {
     let Some(gpu) = device() else { return };
-    let stop = |error, seconds| TransportSettings { rounds: 1 << 20, stop: Stop { error, confidence: 0.95, seconds }, ..settings(1.0, 1) };
+    let stop = |error, seconds| TransportSettings {
+        rounds: 1 << 20,
+        stop: Stop { error, confidence: 0.95, seconds, ..Stop::default() },
+        ..settings(1.0, 1)
+    };
     let began = Instant::now();
     let (lit, told) = watched(&gpu, "cornell", &stop(Some(1e-6), Some(0.5)));
     assert_eq!(lit.end, End::Time);
@@ -162,6 +274,15 @@ fn the_end_is_predicted_at_a_tenth_of_the_run() {
         println!("{name}: {predicted:.0} rounds predicted after {}, {end} done", tenth.done);
         off.push((predicted / end - 1.0).abs());
     }
+    // The paper's line, of which progress is told in photons.
+    let wanted = bound_in_box(&in_box(Some(&gpu), None, 60, 1000).0) / 3.4;
+    let (outcome, told) = in_box(Some(&gpu), Some(wanted), 20_000, 5);
+    assert_eq!(outcome.end, End::Error);
+    let end = outcome.fates.emitted as f64;
+    let tenth = told.iter().find(|progress| progress.done as f64 >= 0.1 * end && progress.error.is_some()).unwrap();
+    let predicted = tenth.done as f64 * (1.0 + tenth.seconds_left.unwrap() / tenth.seconds);
+    println!("the box: {predicted:.0} photons predicted after {}, {end} done", tenth.done);
+    assert!((predicted / end - 1.0).abs() <= 0.2, "the box: {predicted} of {end}");
     off.sort_by(f64::total_cmp);
     assert!(off.len() >= 8, "{off:?}");
     assert!(off[off.len() * 9 / 10 - 1] <= 0.2, "{off:?}");

@@ -348,7 +348,7 @@ fn the_estimate_has_no_bias() {
                 };
                 let map: Vec<Photon> =
                     (0..4000).map(place).filter(|photon| photon.position.truncate().abs().max_element() <= 0.25).collect();
-                let film = Film::new(&plan, gathered_on_cpu(&plan, &map), u64::from(settings.photons));
+                let film = Film { sums: gathered_on_cpu(&plan, &map), emitted: u64::from(settings.photons), ..Film::new(&plan) };
                 let back = estimate_walls(&film, &scene, &plan).pop().unwrap();
                 // 4000 photons a square metre at 2 W in all.
                 back.radiosity.iter().sum::<f64>() / 9.0 / 2.0

@@ -29,6 +29,7 @@ layout(set = 0, binding = 8, scalar) readonly buffer Receivers { Receiver receiv
 #include "scene/direct.glsl"
 #include "scene/belongs.glsl"
 #include "scene/cover.glsl"
+#include "film/wide.glsl"
 #include "scene/film.glsl"
 #include "stages/visible_point.glsl"
 #include "stages/chain.glsl"

@@ -26,6 +26,7 @@ layout(set = 1, binding = 5, scalar) buffer FilmSquares { uvec4 film_squares[]; 
 #include "scene/surface.glsl"
 #include "scene/belongs.glsl"
 #include "scene/cover.glsl"
+#include "film/wide.glsl"
 #include "scene/film.glsl"
 
 vec3 gathered_flux(uint place)

@@ -27,6 +27,7 @@ layout(push_constant, scalar) uniform Push { ViewPush push; };
 #include "scene/areas.glsl"
 #include "scene/lights.glsl"
 #include "scene/direct.glsl"
+#include "film/wide.glsl"
 #include "scene/film.glsl"
 #include "stages/visible_point.glsl"
 #include "stages/chain.glsl"

@@ -62,7 +62,7 @@ pub(super) fn run(args: &BakeArgs, cancelled: &AtomicBool) -> Result<End> {
     let job = Job { scene: &scene, settings: &settings, sensor, camera: None, phases: &phases };
     let gpu = args.report.device(&args.device)?;
     let plan = plan(&gpu, &job, &geometry)?;
-    let lit = light(&gpu, &job, &geometry, plan, args.report.progress, cancelled)?;
+    let lit = light(&gpu, &job, &geometry, plan, (args.report.progress, args.transport.stop.bias), cancelled)?;
 
     let estimates = estimates(&lit);
     let stops = args.exposure.unwrap_or_else(|| usual_exposure(&estimates));

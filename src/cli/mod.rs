@@ -9,6 +9,7 @@ mod probe;
 mod render;
 mod run;
 mod selfcheck;
+mod stop;
 mod study;
 mod transport;
 

@@ -66,7 +66,7 @@ pub(super) fn run(args: &ProbeArgs, cancelled: &AtomicBool) -> Result<End> {
     let job = Job { scene: &scene, settings: &settings, sensor, camera: None, phases: &phases };
     let gpu = args.report.device(&args.device)?;
     let plan = plan(&gpu, &job, &geometry)?;
-    let lit = light(&gpu, &job, &geometry, plan, args.report.progress, cancelled)?;
+    let lit = light(&gpu, &job, &geometry, plan, (args.report.progress, args.transport.stop.bias), cancelled)?;
 
     let text = light_report::text(&scene.name, &lit, reports.explain);
     let mut files = vec![(output, table(&lit))];

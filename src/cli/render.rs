@@ -108,7 +108,7 @@ pub(super) fn run(args: &RenderArgs, cancelled: &AtomicBool) -> Result<End> {
     let geometry = geometry(&scene, &settings)?;
     let gpu = args.report.device(&args.device)?;
     let plan = plan(&gpu, &job, &geometry)?;
-    let lit = light(&gpu, &job, &geometry, plan, args.report.progress, cancelled)?;
+    let lit = light(&gpu, &job, &geometry, plan, (args.report.progress, args.transport.stop.bias), cancelled)?;
 
     let image = radiance(&lit, width, height);
     let stops = args.exposure.unwrap_or_else(|| image.usual_exposure());

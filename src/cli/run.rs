@@ -5,8 +5,8 @@ use std::sync::atomic::AtomicBool;
 use std::time::Instant;
 
 use clap::{Args, ValueEnum};
-use indicatif::{ProgressBar, ProgressStyle};
 
+use super::stop::{ProgressArg, StopArgs, Teller, bias_before, rounds_after};
 use super::transport::photon_name;
 use super::{DeviceArgs, End, complain, say};
 use crate::error::{Error, Result};
@@ -19,6 +19,7 @@ use crate::render::{self, Control, Outcome};
 use crate::rng::Rng;
 use crate::scene::open_box::open_box;
 use crate::scene::room::RoomScene;
+use crate::settings::stop::Stop;
 use crate::settings::{EmissionLaw, Gather, Math, PhongDirection, Preset, Settings, Sums, Variant, WALL_NAMES};
 use crate::timings::{Clock, Span};
 use crate::transport::replay::PhotonName;
@@ -34,7 +35,8 @@ pub(super) struct RunArgs {
     /// Photons of a round, all lights together [default: 5000]
     #[arg(long, value_parser = whole::<u32>, allow_negative_numbers = true, help_heading = "Experiment")]
     photons: Option<u32>,
-    /// Rounds whose photons add up [default: 1; 100 with --preset rounds]
+    /// Rounds whose photons add up [default: 1; 100 with --preset rounds; with --error, --time or --total-photons as
+    /// many as it takes, 16777216 at most]
     #[arg(long, value_parser = whole::<u32>, allow_negative_numbers = true, help_heading = "Experiment")]
     rounds: Option<u32>,
     /// Most bounces of a photon [default: 15; 2 with --preset naive]
@@ -105,6 +107,8 @@ pub(super) struct RunArgs {
     light_power: Option<[f64; 2]>,
 
     #[command(flatten)]
+    stop: StopArgs,
+    #[command(flatten)]
     device: DeviceArgs,
     /// Look for values that are infinite or no number, and say whose they are
     #[arg(long, help_heading = "Output")]
@@ -129,13 +133,17 @@ pub(super) struct RunArgs {
     /// Picture of the box: .png shows illumination 0 to 1, .exr keeps it unclamped
     #[arg(short, long, value_name = "FILE", default_value = "open-box.png", help_heading = "Output")]
     output: PathBuf,
-    /// Write each wall's irradiance in W/m2 as <wall>.exr, and layout.json, into this folder
+    /// Write each wall's irradiance in W/m2 as <wall>.exr, its standard error as <wall>-error.exr, and layout.json, into
+    /// this folder
     #[arg(long, value_name = "DIR", help_heading = "Output")]
     irradiance: Option<PathBuf>,
     /// The same for radiosity, the reflected flux
     #[arg(long, value_name = "DIR", help_heading = "Output")]
     radiosity: Option<PathBuf>,
-    /// Write settings, ledger and timings as JSON
+    /// How far the run has come: a bar on a terminal, or lines of JSON on stderr
+    #[arg(long, value_enum, default_value = "bar", help_heading = "Output")]
+    progress: ProgressArg,
+    /// Write settings, ledger, errors and timings as JSON
     #[arg(long, value_name = "FILE", help_heading = "Output")]
     json: Option<PathBuf>,
     /// Write the timings as a Chrome trace, for Perfetto or chrome://tracing
@@ -211,7 +219,7 @@ impl RunArgs {
     pub(super) fn settings(&self) -> Settings {
         let preset = Settings::preset(self.preset.map_or(Preset::Modified, Preset::from));
         let photons = self.photons.unwrap_or(preset.photons);
-        Settings {
+        let settings = Settings {
             variant: self.variant.map_or(preset.variant, Variant::from),
             photons,
             rounds: self.rounds.unwrap_or(preset.rounds),
@@ -237,6 +245,11 @@ impl RunArgs {
             paranoid: self.paranoid,
             group_size: self.group_size.unwrap_or(preset.group_size),
             chunk: self.chunk.or(preset.chunk),
+            stop: self.stop.stop(),
+        };
+        match self.rounds {
+            None if settings.stop.is_set() => Settings { rounds: settings.most_rounds(), ..settings },
+            _ => settings,
         }
     }
 }
@@ -269,13 +282,23 @@ pub(super) fn run(args: &RunArgs, cancelled: &AtomicBool) -> Result<End> {
         Variant::Cpu => None,
         _ => args.device.open(args.time_dispatches)?,
     };
-    let bar = progress_bar(settings.total_photons());
-    let mut control = Control { cancelled, progress: &mut |progress| bar.set_position(progress.done) };
-    let outcome = match &gpu {
+    let measure = |settings: &Settings, rounds| render::measure_bias(gpu.as_ref(), &scene, settings, rounds, cancelled);
+    let before = match settings.stop.error.filter(|_| args.stop.bias) {
+        Some(wanted) => bias_before(wanted, false, |rounds| measure(&settings, rounds))?,
+        None => None,
+    };
+    let settings = Settings { stop: Stop { bias: before.map(|bias| bias.upper), ..settings.stop }, ..settings };
+    let teller = Teller::new(args.progress, "photons");
+    let mut control = Control { cancelled, progress: &mut |progress| teller.tell(progress) };
+    let mut outcome = match &gpu {
         Some(gpu) => render::on_gpu(gpu, &scene, &settings, &mut control)?,
         None => render::on_cpu(&scene, &settings, &mut control)?,
     };
-    bar.finish_and_clear();
+    teller.finish();
+    outcome.bias = before;
+    if before.is_none() && args.stop.bias && !outcome.cancelled {
+        outcome.bias = measure(&settings, rounds_after(outcome.film.rounds))?;
+    }
     let end = if outcome.cancelled { End::Cancelled } else { End::Finished };
     if outcome.cancelled {
         let (emitted, total) = (outcome.fates.emitted, settings.total_photons());
@@ -311,12 +334,6 @@ fn show_photon(args: &RunArgs, settings: &Settings, scene: &RoomScene, name: Pho
         say(&oddities.text())?;
     }
     Ok(End::Finished)
-}
-
-fn progress_bar(photons: u64) -> ProgressBar {
-    let style =
-        ProgressStyle::with_template("{bar:32} {human_pos}/{human_len} photons, {per_sec}, {eta} left").expect("the template is valid");
-    ProgressBar::new(photons).with_style(style)
 }
 
 /// Everything that the run will write, checked before it starts.
@@ -368,6 +385,6 @@ impl Outputs {
             files.push((trace, trace_file::chrome_trace(&outcome.timings, device)));
         }
         write_all(files)?;
-        say(&format!("{}\nwrote {picture}", report::text(&outcome)))
+        say(&format!("{}\nwrote {picture}", report::text(&outcome, &walls)))
     }
 }

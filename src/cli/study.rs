@@ -7,7 +7,7 @@ use std::time::Duration;
 use clap::Args;
 
 use super::run::whole;
-use super::transport::seconds;
+use super::stop::seconds;
 use super::{DeviceArgs, End, complain, say};
 use crate::error::{Error, Result};
 use crate::gpu::{Gpu, Options};

@@ -1,13 +1,12 @@
 //! What the commands that light a scene of triangles share: options, the scene, the run.
 
-use std::io::Write;
 use std::path::PathBuf;
 use std::sync::atomic::AtomicBool;
 
 use clap::{Args, ValueEnum};
-use indicatif::{ProgressBar, ProgressStyle};
 
 use super::run::{number, numbers, whole};
+use super::stop::{ProgressArg, StopArgs, Teller, bias_before, rounds_after};
 use super::{DeviceArgs, complain, hearing};
 use crate::error::{Error, Result};
 use crate::gpu::{Gpu, Options};
@@ -16,12 +15,13 @@ use crate::output::light_report;
 use crate::output::trace_file;
 use crate::plan::transport::{Sensor, TransportPlan};
 use crate::records::Receiver;
+use crate::render::stop::mean_squared_radius;
 use crate::render::{self, Control, Progress};
 use crate::scene::geometry::Geometry;
 use crate::scene::light::{Light, LightKind};
 use crate::scene::{Camera, Scene};
 use crate::settings::Math;
-use crate::settings::transport::{Append, Effect, Filter, Illumination, Kernel, Part, Stop, TransportSettings};
+use crate::settings::transport::{Append, Effect, Filter, Illumination, Kernel, MAX_ROUNDS, Part, Stop, TransportSettings};
 use crate::transport::replay::PhotonName;
 use crate::transport::{self, Lit, View};
 
@@ -47,18 +47,10 @@ pub(super) struct TransportArgs {
     /// Photons of the caustic map, each round [default: as --photons]
     #[arg(long, value_parser = whole::<u32>, allow_negative_numbers = true, help_heading = "Transport")]
     caustic_photons: Option<u32>,
-    /// Independent rounds, of which the result is the mean [default: 16; 65536 at most with --error or --time]
+    /// Independent rounds, of which the result is the mean [default: 16; 65536 at most with --error or
+    /// --time, and as many as --total-photons takes]
     #[arg(long, value_parser = whole::<u32>, allow_negative_numbers = true, help_heading = "Transport")]
     rounds: Option<u32>,
-    /// End when the relative error is at most this, in per cent of the result's root mean square
-    #[arg(long, value_name = "PERCENT", value_parser = share, allow_negative_numbers = true, help_heading = "Transport")]
-    error: Option<f64>,
-    /// Chance that the error is no larger than stated [default: 95%]
-    #[arg(long, value_name = "PERCENT", value_parser = share, allow_negative_numbers = true, help_heading = "Transport")]
-    confidence: Option<f64>,
-    /// End after this time: 2s, 500ms, 3m
-    #[arg(long, value_name = "TIME", value_parser = seconds, allow_negative_numbers = true, help_heading = "Transport")]
-    time: Option<f64>,
     /// Most bounces of a photon [default: 32]
     #[arg(long, value_parser = whole::<u32>, allow_negative_numbers = true, help_heading = "Transport")]
     bounces: Option<u32>,
@@ -81,6 +73,8 @@ pub(super) struct TransportArgs {
     /// Arithmetic: as fast as the device has it, or the same bits on every device that rounds to nearest [default: fast]
     #[arg(long, value_enum, help_heading = "Transport")]
     math: Option<super::run::MathArg>,
+    #[command(flatten)]
+    pub(super) stop: StopArgs,
     /// Most photons traced at once; the result is the same to the bit [default: what the device holds]
     #[arg(long, value_parser = whole::<u32>, allow_negative_numbers = true, help_heading = "Transport")]
     chunk: Option<u32>,
@@ -152,26 +146,10 @@ super::run::value_enum!(EffectArg => Effect {
 /// Rounds of a run that ends by itself.
 const MOST_ROUNDS: u32 = 65_536;
 
-/// `1%` or `1`, per cent.
-fn share(text: &str) -> std::result::Result<f64, String> {
-    let number = text.strip_suffix('%').unwrap_or(text).trim();
-    number.parse().map(|percent: f64| percent / 100.0).map_err(|_| "must be a number of per cent, as 1%".to_owned())
-}
-
-/// `2s`, `500ms`, `3m`, or seconds.
-pub(super) fn seconds(text: &str) -> std::result::Result<f64, String> {
-    let units = [("ms", 1e-3), ("s", 1.0), ("m", 60.0), ("h", 3600.0)];
-    let (number, unit) = units.iter().find_map(|(name, unit)| Some((text.strip_suffix(name)?, *unit))).unwrap_or((text, 1.0));
-    number.trim().parse().map(|count: f64| count * unit).map_err(|_| "must be a time, as 2s, 500ms or 3m".to_owned())
-}
-
-/// How a run tells how far it has come.
-#[derive(Clone, Copy, PartialEq, Eq, ValueEnum)]
-pub(super) enum ProgressArg {
-    /// A bar, where stderr is a terminal.
-    Bar,
-    /// A line of JSON on stderr at every step.
-    Json,
+/// Rounds that a run may take which ends by itself; one map at least has so many photons a round.
+fn most_rounds(stop: &Stop, photons: u32) -> Option<u32> {
+    let by_total = |total: u64| total.div_ceil(u64::from(photons.max(1))).clamp(1, u64::from(MAX_ROUNDS)) as u32;
+    stop.is_set().then(|| stop.photons.map_or(MOST_ROUNDS, by_total))
 }
 
 /// `3:4711`, `3:4711:caustic`.
@@ -212,11 +190,13 @@ impl TransportArgs {
     pub(super) fn settings(&self) -> TransportSettings {
         let usual = TransportSettings::default();
         let photons = self.photons.unwrap_or(usual.photons);
+        let caustic_photons = self.caustic_photons.unwrap_or(photons);
+        let stop = self.stop.stop();
         TransportSettings {
             photons,
-            caustic_photons: self.caustic_photons.unwrap_or(photons),
-            rounds: self.rounds.unwrap_or(if self.error.is_some() || self.time.is_some() { MOST_ROUNDS } else { usual.rounds }),
-            stop: Stop { error: self.error, confidence: self.confidence.unwrap_or(usual.stop.confidence), seconds: self.time },
+            caustic_photons,
+            rounds: self.rounds.unwrap_or_else(|| most_rounds(&stop, photons.min(caustic_photons)).unwrap_or(usual.rounds)),
+            stop,
             bounces: self.bounces.unwrap_or(usual.bounces),
             seed: self.seed.unwrap_or(usual.seed),
             radius: self.radius,
@@ -302,50 +282,45 @@ pub(super) fn geometry(scene: &Scene, settings: &TransportSettings) -> Result<Ge
     Ok(geometry)
 }
 
-/// Runs all rounds, and tells how far it has come.
+/// Runs all rounds, and tells how far it has come; with `bias`, measures that too.
 pub(super) fn light(
     gpu: &Gpu,
     job: &Job,
     geometry: &Geometry,
-    plan: TransportPlan,
-    told: ProgressArg,
+    mut plan: TransportPlan,
+    (told, bias): (ProgressArg, bool),
     cancelled: &AtomicBool,
 ) -> Result<Lit> {
-    let style = ProgressStyle::with_template("{bar:32} {msg}").expect("the template is valid");
-    let bar = ProgressBar::new(u64::from(plan.settings.rounds)).with_style(style);
-    let mut tell = |progress: &Progress| match told {
-        ProgressArg::Bar => {
-            bar.set_position(((share_done(progress) * progress.total as f64) as u64).min(progress.total));
-            bar.set_message(progress_line(progress));
-        }
-        ProgressArg::Json => {
-            // Where nobody can read it, the run goes on.
-            let _ = writeln!(std::io::stderr(), "{}", serde_json::to_string(progress).expect("progress is plain data"));
-        }
-    };
-    let mut control = Control { cancelled, progress: &mut tell };
     let view = View { geometry, camera: job.camera, phases: job.phases };
-    let lit = hearing(|| transport::light(gpu, &view, plan, &mut control))?;
-    bar.finish_and_clear();
+    let of_first = |plan: &TransportPlan, factor_and_rounds| {
+        hearing(|| transport::bias::measure(gpu, job.scene, &view, plan, factor_and_rounds, cancelled))
+    };
+    let alpha = plan.settings.alpha;
+    let stop = plan.settings.stop;
+    // An error that is wanted is one of noise and bias together, so that the bias must be known beforehand.
+    let before = match stop.error.filter(|_| bias) {
+        Some(wanted) => bias_before(wanted, alpha < 1.0, |rounds| of_first(&plan, (1.0, rounds)))?,
+        None => None,
+    };
+    plan.settings.stop.bias = before.map(|bias| bias.upper);
+
+    let teller = Teller::new(told, "rounds");
+    let mut tell = |progress: &Progress| teller.tell(progress);
+    let mut control = Control { cancelled, progress: &mut tell };
+    let mut lit = hearing(|| transport::light(gpu, &view, plan, &mut control))?;
+    teller.finish();
     if lit.end == transport::End::Cancelled {
         complain(&format!("ended after {} of {} rounds; what is written is of these", lit.film.rounds, lit.plan.settings.rounds));
+        return Ok(lit);
     }
+    let shrunk = mean_squared_radius(alpha, lit.film.rounds);
+    lit.bias = match before {
+        Some(bias) => Some(bias.scaled(shrunk)),
+        // At the radius whose square is the mean of the rounds' squares.
+        None if bias => of_first(&lit.plan, (shrunk.sqrt(), rounds_after(lit.film.rounds)))?,
+        None => None,
+    };
     Ok(lit)
-}
-
-/// By the time that is predicted, as a run may end before its last round.
-fn share_done(progress: &Progress) -> f64 {
-    progress.seconds_left.map_or(0.0, |left| progress.seconds / (progress.seconds + left).max(1e-9))
-}
-
-/// Rounds, rate, error now and wanted, and the predicted end.
-fn progress_line(progress: &Progress) -> String {
-    let Progress { done, seconds, photons, .. } = progress;
-    let rate = *photons as f64 / seconds.max(1e-9);
-    let wanted = progress.error_wanted.map_or_else(String::new, |wanted| format!(" of {:.3} % wanted", 100.0 * wanted));
-    let error = progress.error.map_or_else(String::new, |error| format!(", error {:.3} %{wanted}", 100.0 * error));
-    let left = progress.seconds_left.map_or_else(String::new, |left| format!(", {left:.1} s left"));
-    format!("{done} rounds, {rate:.2e} photons/s{error}{left}")
 }
 
 /// Of a picture; numbers of its sums are 32-bit.

@@ -240,7 +240,9 @@ mod tests {
     fn numbered_walls(scene: &RoomScene) -> Vec<WallEstimate> {
         let wall = |face: usize, name| {
             let illumination = vec![0.1 * (face + 1) as f64; 16];
-            WallEstimate { name, face, radiosity: illumination.clone(), irradiance: illumination.clone(), illumination }
+            let none = vec![0.0; illumination.len()];
+            let (radiosity, irradiance) = (illumination.clone(), illumination.clone());
+            WallEstimate { name, face, illumination, radiosity, irradiance, radiosity_error: none.clone(), irradiance_error: none }
         };
         scene.walls().map(|(face, described)| wall(face, described.name)).collect()
     }

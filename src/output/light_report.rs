@@ -5,7 +5,8 @@ use std::fmt::Write;
 
 use serde::Serialize;
 
-use super::report::{ledger, timing_table};
+use super::report::{end_in_words, errors, ledger, timing_table};
+use crate::bias::Bias;
 use crate::ledger::Ledger;
 use crate::oddities::Oddities;
 use crate::plan::evidence::EffectDecision;
@@ -108,6 +109,8 @@ struct Report<'a> {
     relative_error: f64,
     /// What the relative error is not above, with the confidence of the settings; null from a single round.
     error_bound: Option<f64>,
+    /// Of the radius, relative to the result; null without `--bias`.
+    bias: Option<Bias>,
     anomalies: Anomalies,
     /// What `--paranoid` found; null where nobody looked.
     oddities: Option<&'a Oddities>,
@@ -154,6 +157,7 @@ pub fn json(scene: &str, lit: &Lit) -> Vec<u8> {
         ledgers: [lit.fates[0].ledger(), lit.fates[1].ledger()],
         relative_error: lit.film.relative_error(&lit.plan),
         error_bound: Some(error_bound(&lit.film, &lit.plan, lit.plan.settings.stop.confidence)).filter(|bound| bound.is_finite()),
+        bias: lit.bias,
         anomalies: Anomalies { not_a_number: lit.anomalies[0], cut_to_largest: lit.anomalies[1], too_dense: lit.anomalies[2] },
         oddities: lit.oddities.as_ref(),
         timings: lit.timings.rows(),
@@ -171,9 +175,7 @@ pub fn text(scene: &str, lit: &Lit, explain: bool) -> String {
     let maps: Vec<String> = lit.plan.maps().map(|map| format!("{} {} photons", map.photons, map.name)).collect();
     let maps = if maps.is_empty() { "no photons".to_owned() } else { maps.join(" and ") };
     writeln!(text, "{scene}: {} round(s) of {maps}, {} bounces, seed {}", lit.film.rounds, settings.bounces, settings.seed).unwrap();
-    if lit.end != End::Rounds && lit.end != End::Cancelled {
-        let seconds = settings.stop.seconds.unwrap_or_default();
-        let why = if lit.end == End::Time { format!("after {seconds} s") } else { "at the error wanted".to_owned() };
+    if let Some(why) = end_in_words(lit.end, &settings.stop) {
         writeln!(text, "ended {why}, {} of at most {} rounds", lit.film.rounds, settings.rounds).unwrap();
     }
     if explain {
@@ -200,20 +202,8 @@ pub fn text(scene: &str, lit: &Lit, explain: bool) -> String {
     if let Some(oddities) = &lit.oddities {
         writeln!(text, "{}", oddities.text()).unwrap();
     }
-    match lit.film.rounds {
-        1 => text.push_str("noise: unknown from a single round\n"),
-        _ => {
-            let confidence = settings.stop.confidence;
-            let bound = error_bound(&lit.film, &lit.plan, confidence);
-            let (noise, confidence) = (100.0 * lit.film.relative_error(&lit.plan), 100.0 * confidence);
-            writeln!(
-                text,
-                "noise: {noise:.2} % of the result's root mean square, at most {:.2} % ({confidence} % confidence)",
-                100.0 * bound
-            )
-            .unwrap();
-        }
-    }
+    let noise = (lit.film.rounds > 1).then(|| lit.film.relative_error(&lit.plan));
+    text.push_str(&errors(lit.film.rounds, noise, lit.bias.as_ref(), settings.stop.confidence));
     text.push('\n');
     text.push_str(&timing_table(&lit.timings, Some(&lit.device)));
     text

@@ -36,7 +36,7 @@ struct WallLayout<'a> {
 
 /// Files of a lightmap, before there is any content.
 pub fn destinations(folder: &Folder, scene: &RoomScene) -> Vec<Destination> {
-    let walls = scene.walls().map(|(_, wall)| folder.file(&image_name(wall.name)));
+    let walls = scene.walls().flat_map(|(_, wall)| [folder.file(&image_name(wall.name)), folder.file(&error_name(wall.name))]);
     walls.chain([folder.file(LAYOUT)]).collect()
 }
 
@@ -46,18 +46,25 @@ fn image_name(wall: &str) -> String {
     format!("{wall}.exr")
 }
 
-/// `<wall>.exr` for every wall, and `layout.json`.
+fn error_name(wall: &str) -> String {
+    format!("{wall}-error.exr")
+}
+
+/// `<wall>.exr` and `<wall>-error.exr` for every wall, and `layout.json`.
 pub fn files(folder: &Folder, quantity: Quantity, scene: &RoomScene, walls: &[WallEstimate]) -> Vec<(Destination, Vec<u8>)> {
     let mut layout = Layout { quantity, unit: "W/m2", walls: Vec::new() };
     let mut files = Vec::new();
     for wall in walls {
-        let values = match quantity {
-            Quantity::Irradiance => &wall.irradiance,
-            Quantity::Radiosity => &wall.radiosity,
+        let (values, errors) = match quantity {
+            Quantity::Irradiance => (&wall.irradiance, &wall.irradiance_error),
+            Quantity::Radiosity => (&wall.radiosity, &wall.radiosity_error),
         };
         let mesh = values.len().isqrt();
-        let picture = Picture { width: mesh, height: mesh, values: values.clone() };
-        files.push((folder.file(&image_name(wall.name)), picture.encode(Format::Exr)));
+        let picture = |values: Vec<f64>| Picture { width: mesh, height: mesh, values }.encode(Format::Exr);
+        // Of a single round no error is known; an image cannot say so but by a value that is no number.
+        let errors = errors.iter().map(|error| if error.is_finite() { *error } else { f64::NAN }).collect();
+        files.push((folder.file(&image_name(wall.name)), picture(values.clone())));
+        files.push((folder.file(&error_name(wall.name)), picture(errors)));
         let rectangle = scene.rectangle(wall.face);
         layout.walls.push(WallLayout {
             name: wall.name,

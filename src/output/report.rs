@@ -4,13 +4,16 @@ use std::fmt::Write;
 
 use serde::Serialize;
 
+use crate::bias::Bias;
 use crate::film::WallEstimate;
 use crate::gpu::DeviceFacts;
 use crate::ledger::{BounceFates, Ledger};
 use crate::oddities::Oddities;
 use crate::plan::Decision;
 use crate::render::Outcome;
+use crate::render::stop::{End, error_bound};
 use crate::settings::Settings;
+use crate::settings::stop::Stop;
 use crate::timings::{Row, Timings};
 
 /// The JSON report.
@@ -26,6 +29,16 @@ struct Report<'a> {
     plan: PlanReport<'a>,
     /// The run was ended before its last photon; all numbers are of the photons emitted.
     cancelled: bool,
+    /// Why it ended, and rounds that are whole.
+    end: End,
+    rounds: u32,
+    /// Root mean square over all texels of the standard error of irradiance, over that of irradiance; null where fewer
+    /// than two rounds leave it unknown.
+    relative_error: Option<f64>,
+    /// What it is not above, with the confidence of the settings.
+    error_bound: Option<f64>,
+    /// Of the radius, relative to the irradiance; null without `--bias`.
+    bias: Option<Bias>,
     ledger: Ledger,
     /// Fates of the paths that entered each bounce.
     bounces: &'a [BounceFates],
@@ -61,6 +74,7 @@ struct WallReport {
 /// The run as JSON.
 pub fn json(outcome: &Outcome, walls: &[WallEstimate]) -> Vec<u8> {
     let plan = &outcome.plan;
+    let noise = relative_error(walls);
     let mean = |values: &[f64]| values.iter().sum::<f64>() / values.len() as f64;
     let report = Report {
         photonmill: env!("CARGO_PKG_VERSION"),
@@ -80,6 +94,11 @@ pub fn json(outcome: &Outcome, walls: &[WallEstimate]) -> Vec<u8> {
             film_fixed_point_bits: plan.film_shift,
         },
         cancelled: outcome.cancelled,
+        end: outcome.end,
+        rounds: outcome.film.rounds,
+        relative_error: noise,
+        error_bound: noise.map(|noise| error_bound(outcome.film.rounds, noise, plan.settings.stop.confidence)),
+        bias: outcome.bias,
         ledger: outcome.fates.ledger(),
         bounces: &outcome.fates.bounces,
         timings: outcome.timings.rows(),
@@ -106,8 +125,62 @@ fn driver(outcome: &Outcome) -> String {
     }
 }
 
-/// The run in words: device, settings, ledger and timing table.
-pub fn text(outcome: &Outcome) -> String {
+/// Root mean square over all texels of the standard error of irradiance, over that of irradiance.
+fn relative_error(walls: &[WallEstimate]) -> Option<f64> {
+    // A wall that reflects nothing stores nothing, and its irradiance is no number.
+    let squares = |values: fn(&WallEstimate) -> &Vec<f64>| -> f64 {
+        walls.iter().flat_map(values).filter(|value| !value.is_nan()).map(|value| value * value).sum()
+    };
+    let (errors, means) = (squares(|wall| &wall.irradiance_error), squares(|wall| &wall.irradiance));
+    if means > 0.0 { Some((errors / means).sqrt()).filter(|error| error.is_finite()) } else { None }
+}
+
+/// Noise, bias, and both together, a line each, in per cent of the result's root mean square.
+pub(super) fn errors(rounds: u32, noise: Option<f64>, bias: Option<&Bias>, confidence: f64) -> String {
+    let mut text = String::new();
+    let (percent, sure) = (|share: f64| 100.0 * share, 100.0 * confidence);
+    let bound = noise.map(|noise| error_bound(rounds, noise, confidence));
+    match noise.zip(bound) {
+        Some((noise, bound)) => writeln!(
+            text,
+            "noise: {:.2} % of the result's root mean square, at most {:.2} % ({sure} % confidence)",
+            percent(noise),
+            percent(bound)
+        )
+        .unwrap(),
+        None if rounds == 1 => text.push_str("noise: unknown from a single round\n"),
+        None => text.push_str("noise: unknown\n"),
+    }
+    if bias.is_some_and(|bias| bias.batches == 0) {
+        text.push_str("bias of the radius: none, as no light comes from a photon map\n");
+    } else if let Some(Bias { relative, lower, upper, batches, rounds_per_batch, seconds, .. }) = bias {
+        writeln!(
+            text,
+            "bias of the radius: {:.2} %, from {:.2} % to {:.2} % ({sure} % confidence; {batches} batches of {rounds_per_batch} round(s) at two radii, {seconds:.2} s)",
+            percent(*relative),
+            percent(*lower),
+            percent(*upper)
+        )
+        .unwrap();
+        if let Some((noise, bound)) = noise.zip(bound) {
+            writeln!(text, "both: {:.2} %, at most {:.2} %", percent(noise.hypot(*relative)), percent(bound.hypot(*upper))).unwrap();
+        }
+    }
+    text
+}
+
+/// What ended a run before its last round, and no person.
+pub(super) fn end_in_words(end: End, stop: &Stop) -> Option<String> {
+    match end {
+        End::Rounds | End::Cancelled => None,
+        End::Error => Some("at the error wanted".to_owned()),
+        End::Time => Some(format!("after {} s", stop.seconds.unwrap_or_default())),
+        End::Photons => Some(format!("at the {} photons wanted", stop.photons.unwrap_or_default())),
+    }
+}
+
+/// The run in words: device, settings, ledger, errors and timing table.
+pub fn text(outcome: &Outcome, walls: &[WallEstimate]) -> String {
     let mut text = String::new();
     let settings = &outcome.plan.settings;
     let device = outcome.device.as_ref().map_or("CPU", |facts| &facts.name);
@@ -116,7 +189,7 @@ pub fn text(outcome: &Outcome) -> String {
         text,
         "open-box, {}: {} round(s) of {} photons, {} bounces, radius {} m, {} gather{}, {} sums, {} seed {}",
         settings.variant.name(),
-        settings.rounds,
+        outcome.film.rounds.max(1),
         settings.photons,
         settings.bounces,
         settings.radius,
@@ -127,6 +200,10 @@ pub fn text(outcome: &Outcome) -> String {
         settings.seed
     )
     .unwrap();
+    if let Some(why) = end_in_words(outcome.end, &settings.stop) {
+        let unfinished = if outcome.film.unfinished.is_empty() { "" } else { " and a part of one more" };
+        writeln!(text, "ended {why}, {}{unfinished} of at most {} rounds", outcome.film.rounds, settings.rounds).unwrap();
+    }
     for decision in &outcome.plan.decisions {
         let verb = if decision.kept { "with" } else { "without" };
         writeln!(text, "  {verb} {}: {}", decision.effect, decision.reason).unwrap();
@@ -136,6 +213,7 @@ pub fn text(outcome: &Outcome) -> String {
     if let Some(oddities) = &outcome.oddities {
         writeln!(text, "{}", oddities.text()).unwrap();
     }
+    text.push_str(&errors(outcome.film.rounds, relative_error(walls), outcome.bias.as_ref(), settings.stop.confidence));
     text.push('\n');
     text.push_str(&timing_table(&outcome.timings, outcome.device.as_ref()));
     text

@@ -18,7 +18,7 @@ use crate::error::{Error, Result};
 use crate::records::{IndexPush, Photon, Point};
 use crate::rng::Streams;
 use crate::scene::room::RoomScene;
-use crate::settings::{Gather, Settings, Variant};
+use crate::settings::{Gather, Settings, Sums, Variant};
 
 /// A run of photons of one light inside a chunk.
 #[derive(Debug, Clone, Copy, PartialEq, Eq)]
@@ -199,6 +199,11 @@ impl Plan {
             photons: self.settings.photons,
             draws_per_photon: self.settings.draws_per_photon(),
         }
+    }
+
+    /// Whether rounds are told apart, so that their spread tells the error: floats go on over all rounds.
+    pub fn keeps_squares(&self) -> bool {
+        self.settings.rounds > 1 && self.settings.sums == Sums::Integer
     }
 
     pub fn has_slots(&self) -> bool {

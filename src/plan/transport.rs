@@ -96,7 +96,7 @@ const PHOTONS_PER_ESTIMATE: f64 = 60.0;
 /// A caustic's photons lie closer: its radius over that of as many photons spread over everything.
 const CAUSTIC_RADIUS_SHARE: f64 = 0.25;
 /// Radii relative to the scene's normalised extent: from f32's resolution of positions up to all of it.
-const RADIUS_RANGE: (f64, f64) = (1.0 / 32_768.0, 2.0);
+pub const RADIUS_RANGE: (f64, f64) = (1.0 / 32_768.0, 2.0);
 /// Bits of a film unit below the scene's mean radiance: as many as leave so many above it, within these.
 const FILM_BITS: (i32, i32) = (24, 32);
 const FILM_HEADROOM_BITS: i32 = 24;

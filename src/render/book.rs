@@ -1,39 +1,75 @@
-//! Book-keeping of a run: photons emitted, their fates, and whether to go on.
+//! Book-keeping of a run: photons emitted, their fates, the error, and whether to go on.
 
 use std::sync::atomic::Ordering;
+use std::time::Instant;
 
+use super::stop::{End, Watch};
 use super::{Control, Progress};
 use crate::error::{Error, Result};
+use crate::film::{Film, irradiance_weights};
 use crate::ledger::Fates;
 use crate::plan::Plan;
 use crate::records::Tally;
+use crate::scene::room::RoomScene;
 
 pub(super) struct Book<'a, 'c> {
     control: &'a mut Control<'c>,
-    total: u64,
-    /// Photons handed out, of which `fates` may not know yet.
+    watch: Watch,
+    photons_per_round: u32,
+    most_rounds: u32,
+    /// What tells errors of irradiance; made at the first look.
+    weights: Option<Vec<f64>>,
+    /// Photons handed out, of which `fates` may not know yet, and rounds that are whole.
     pub(super) emitted: u64,
+    pub(super) rounds: u32,
     pub(super) fates: Fates,
     /// Submissions of which the fates are booked.
     pub(super) submissions_settled: u64,
-    pub(super) cancelled: bool,
+    /// Why the run ends, once it does.
+    pub(super) end: Option<End>,
 }
 
 impl<'a, 'c> Book<'a, 'c> {
-    pub(super) fn new(plan: &Plan, control: &'a mut Control<'c>) -> Book<'a, 'c> {
+    /// Of a run that began at `started`.
+    pub(super) fn new(plan: &Plan, control: &'a mut Control<'c>, started: Instant) -> Book<'a, 'c> {
         Book {
             control,
-            total: plan.settings.total_photons(),
+            // The paper's radius never shrinks.
+            watch: Watch::new(plan.settings.stop, 1.0, started),
+            photons_per_round: plan.settings.photons,
+            most_rounds: plan.settings.rounds,
+            weights: None,
             emitted: 0,
+            rounds: 0,
             fates: Fates::new(plan.settings.bounces),
             submissions_settled: 0,
-            cancelled: false,
+            end: None,
         }
     }
 
     /// Photons whose fates are not booked.
     pub(super) fn open(&self) -> u64 {
         self.emitted - self.fates.emitted
+    }
+
+    /// Whether the run is between two rounds.
+    pub(super) fn is_whole(&self) -> bool {
+        self.emitted == u64::from(self.rounds) * u64::from(self.photons_per_round)
+    }
+
+    /// Whether the run may have done enough, so that its fates must be booked.
+    pub(super) fn may_end(&self) -> bool {
+        self.watch.has_photons(self.emitted) || (self.is_whole() && self.watch.may_end(self.rounds, self.emitted))
+    }
+
+    /// Whether the error should be looked at.
+    pub(super) fn wants_film(&self) -> bool {
+        self.is_whole() && self.watch.is_due(self.rounds)
+    }
+
+    pub(super) fn look(&mut self, film: &Film, scene: &RoomScene, plan: &Plan) {
+        let weights = self.weights.get_or_insert_with(|| irradiance_weights(scene, plan));
+        self.watch.look(film.rounds, film.relative_error(weights));
     }
 
     /// Books the fates of all photons handed out, and says whether to stop.
@@ -43,9 +79,17 @@ impl<'a, 'c> Book<'a, 'c> {
         if !ledger.closes() || ledger.dropped != 0 {
             return Err(Error::LedgerOpen { ledger });
         }
-        let (done, total) = (self.emitted, self.total);
-        (self.control.progress)(&Progress { done, total, photons: done, ..Progress::default() });
-        self.cancelled = self.emitted < self.total && self.control.cancelled.load(Ordering::Relaxed);
-        Ok(self.cancelled)
+        let a_round = u64::from(self.photons_per_round);
+        let total = a_round * u64::from(self.most_rounds);
+        let rounds = self.emitted as f64 / a_round as f64;
+        let progress = self.watch.progress(rounds, self.most_rounds, a_round, ledger);
+        (self.control.progress)(&Progress { done: self.emitted, total, ..progress });
+        self.end = if self.emitted == total {
+            Some(if self.watch.has_photons(self.emitted) { End::Photons } else { End::Rounds })
+        } else {
+            let cancelled = self.control.cancelled.load(Ordering::Relaxed).then_some(End::Cancelled);
+            self.watch.end(self.rounds, self.emitted).or(cancelled)
+        };
+        Ok(self.end.is_some())
     }
 }

@@ -1,24 +1,29 @@
 //! The straight line: scene, plan, resources, then rounds of photons traced, indexed and estimated;
 //! [`on_gpu`] walks it with kernels, [`on_cpu`] with their twins.
 
+mod bias;
 mod book;
 mod on_cpu;
 mod on_gpu;
+pub mod stop;
 
 use std::sync::atomic::AtomicBool;
 
 use serde::Serialize;
 
+pub use bias::{bias_batch, measure_bias};
 pub use on_cpu::{on_cpu, photons_on_cpu, replay_on_cpu};
 pub use on_gpu::{constants, limits, on_gpu, photons_on_gpu, replay_on_gpu};
 
+use crate::bias::Bias;
 use crate::film::Film;
 use crate::gpu::DeviceFacts;
-use crate::ledger::Fates;
+use crate::ledger::{Fates, Ledger};
 use crate::oddities::Oddities;
 use crate::plan::Plan;
 use crate::records::{Path, Photon};
 use crate::timings::Timings;
+use stop::End;
 
 /// How a caller watches a run and ends it early.
 pub struct Control<'a> {
@@ -42,6 +47,8 @@ pub struct Progress {
     pub error_wanted: Option<f64>,
     /// Photons traced so far, of all maps.
     pub photons: u64,
+    /// Their fates so far.
+    pub ledger: Ledger,
 }
 
 /// What a run leaves behind.
@@ -53,8 +60,11 @@ pub struct Outcome {
     pub timings: Timings,
     /// `None` for the CPU builder.
     pub device: Option<DeviceFacts>,
-    /// The run was ended before its last photon.
+    pub end: End,
+    /// The run was ended from outside before its last photon.
     pub cancelled: bool,
+    /// What the radius adds to the error; `None` where nobody measured it.
+    pub bias: Option<Bias>,
     pub dispatches: u64,
     pub submissions: u64,
     /// What `--paranoid` found; `None` where nobody looked.

@@ -1,8 +1,11 @@
 //! The line on the CPU.
 
+use std::time::Instant;
+
 use rayon::{ThreadPool, ThreadPoolBuilder};
 
 use super::book::Book;
+use super::stop::End;
 use super::{Control, Outcome, Replayed};
 use crate::cpu::trace::Tracer;
 use crate::cpu::{estimate, index::Index, nearest, tree::Tree};
@@ -18,16 +21,20 @@ use crate::timings::HostClock;
 
 /// Runs on the CPU, on `settings.threads` threads.
 pub fn on_cpu(scene: &RoomScene, settings: &Settings, control: &mut Control) -> Result<Outcome> {
+    let started = Instant::now();
     let mut clock = HostClock::start("run");
     let plan = plan(scene, settings)?;
     let pool = thread_pool(settings)?;
     let tracer = Tracer::new(scene, &plan);
-    let mut sums = vec![0u64; plan.points.len() * plan.channel_count as usize];
-    let mut book = Book::new(&plan, control);
+    let mut film = Film::new(&plan);
+    // What the round under way has left so far.
+    let mut sums = vec![0u64; film.sums.len()];
+    let mut book = Book::new(&plan, control, started);
     let mut oddities = Oddities::default();
+    let last_chunk = plan.chunks_per_round as usize - 1;
     for round in 0..settings.rounds {
         clock.time("round", |clock| {
-            for ranges in plan.chunks() {
+            for (chunk, ranges) in plan.chunks().enumerate() {
                 let (photons, tallies) = clock.time("build", |clock| trace(&pool, &tracer, &plan, round, &ranges, clock, &mut oddities));
                 if plan.gathers_by_grid() {
                     let index = clock.time("index", |_| Index::build(plan.grid, &photons));
@@ -44,21 +51,35 @@ pub fn on_cpu(scene: &RoomScene, settings: &Settings, control: &mut Control) -> 
                     clock.time("gather", |_| pool.install(|| estimate::gather_brute(&plan, &photons, &mut sums)));
                 }
                 book.emitted += u64::from(photons_of(&ranges));
+                film.emitted = book.emitted;
+                if chunk == last_chunk {
+                    clock.time("film", |_| film.end_round(&mut sums));
+                    book.rounds += 1;
+                    if book.wants_film() {
+                        book.look(&film, scene, &plan);
+                    }
+                }
                 if book.settle(&tallies)? {
                     break;
                 }
             }
             Ok(())
         })?;
-        if book.cancelled {
+        if book.end.is_some() {
             break;
         }
     }
+    if !book.is_whole() {
+        film.add_unfinished(sums);
+    }
+    let end = book.end.unwrap_or(End::Rounds);
     Ok(Outcome {
         oddities: settings.paranoid.then_some(oddities),
-        film: Film::new(&plan, sums, book.fates.emitted),
+        film,
         fates: book.fates,
-        cancelled: book.cancelled,
+        end,
+        cancelled: end == End::Cancelled,
+        bias: None,
         timings: clock.finish(),
         device: None,
         dispatches: 0,

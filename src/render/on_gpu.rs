@@ -3,6 +3,7 @@
 use std::time::Instant;
 
 use super::book::Book;
+use super::stop::End;
 use super::{Control, Outcome, Replayed};
 use crate::constants::NO_WALL;
 use crate::error::Result;
@@ -13,7 +14,7 @@ use crate::ledger::fate;
 use crate::oddities::Oddities;
 use crate::plan::{EmissionRange, Limits, Plan, photons_of};
 use crate::records::{Path, Photon, Tally};
-use crate::resources::Resources;
+use crate::resources::{Resources, RoundBuffers};
 use crate::scene::room::RoomScene;
 use crate::settings::{Math, Settings};
 use crate::{estimate, index, trace};
@@ -32,35 +33,42 @@ pub fn on_gpu(gpu: &Gpu, scene: &RoomScene, settings: &Settings, control: &mut C
     prepare(gpu, &plan)?;
     commands.submit()?;
 
-    let mut book = Book::new(&plan, control);
+    let mut book = Book::new(&plan, control, started);
     book.submissions_settled = commands.submission_count();
     for round in 0..settings.rounds {
         commands.scope("round", |commands| {
-            for ranges in plan.chunks() {
+            for (chunk, ranges) in (1..).zip(plan.chunks()) {
                 trace::chunk(commands, &resources, &plan, round, &ranges)?;
                 index::build(commands, &resources, &plan, photons_of(&ranges))?;
                 estimate::gather(commands, &resources, &plan, photons_of(&ranges))?;
                 book.emitted += u64::from(photons_of(&ranges));
-                if is_due(commands, &plan, &book) && settle(commands, &resources, &mut book)? {
+                if chunk == plan.chunks_per_round {
+                    estimate::end_round(commands, &resources, &plan)?;
+                    book.rounds += 1;
+                }
+                if is_due(commands, &plan, &book) && settle(commands, &resources, scene, &plan, &mut book)? {
                     break;
                 }
             }
             Ok(())
         })?;
-        if book.cancelled {
+        if book.end.is_some() {
             break;
         }
     }
-    settle(&mut commands, &resources, &mut book)?;
-    let sums = commands.read::<u64>(&resources.film, plan.points.len() * plan.channel_count as usize)?;
+    settle(&mut commands, &resources, scene, &plan, &mut book)?;
+    let film = read_film(&mut commands, &resources, &plan, &book)?;
     let oddities = if settings.paranoid { Some(Oddities::read(&mut commands, &resources.oddities)?) } else { None };
     gpu.check_validation()?;
 
+    let end = book.end.unwrap_or(End::Rounds);
     Ok(Outcome {
         oddities,
-        film: Film::new(&plan, sums, book.fates.emitted),
+        film,
         fates: book.fates,
-        cancelled: book.cancelled,
+        end,
+        cancelled: end == End::Cancelled,
+        bias: None,
         dispatches: commands.dispatch_count(),
         submissions: commands.submission_count(),
         timings: commands.finish("run"),
@@ -108,19 +116,40 @@ fn is_due(commands: &Commands, plan: &Plan, book: &Book) -> bool {
     let timestamps_short = commands.timestamps_left() < trace::timestamps_per_chunk(plan);
     // A long gather hands commands over by itself, and nobody has looked at the result yet.
     let submitted = commands.submission_count() > book.submissions_settled;
-    commands.work() >= plan.pair_tests_per_submission || submitted || timestamps_short || tallies_full
+    commands.work() >= plan.pair_tests_per_submission || submitted || timestamps_short || tallies_full || book.may_end()
 }
 
-/// Runs what is recorded, books the fates of its photons, and says whether to stop.
-fn settle(commands: &mut Commands, resources: &Resources, book: &mut Book) -> Result<bool> {
+/// Runs what is recorded, looks at the error where that is due, books the fates, and says whether to stop.
+fn settle(commands: &mut Commands, resources: &Resources, scene: &RoomScene, plan: &Plan, book: &mut Book) -> Result<bool> {
     if book.open() == 0 {
-        return Ok(book.cancelled);
+        return Ok(book.end.is_some());
     }
     let bounces = book.fates.bounces.len();
     let tallies: Vec<Tally> = commands.read(&resources.tallies, bounces)?;
     commands.fill(&resources.tallies, 0, 4 * bounces as u64, 0);
+    if book.wants_film() {
+        let film = read_film(commands, resources, plan, book)?;
+        book.look(&film, scene, plan);
+    }
     book.submissions_settled = commands.submission_count();
     book.settle(&tallies)
+}
+
+/// What all photons handed out so far have left.
+fn read_film(commands: &mut Commands, resources: &Resources, plan: &Plan, book: &Book) -> Result<Film> {
+    let mut film = Film { emitted: book.emitted, rounds: book.rounds, ..Film::new(plan) };
+    let count = film.sums.len();
+    let Some(RoundBuffers { totals, low_squares, high_squares }) = &resources.rounds else {
+        film.sums = commands.read::<u64>(&resources.film, count)?;
+        return Ok(film);
+    };
+    film.sums = commands.read::<u64>(totals, count)?;
+    let (low, high) = (commands.read::<u64>(low_squares, count)?, commands.read::<u64>(high_squares, count)?);
+    film.squares = low.into_iter().zip(high).map(|(low, high)| u128::from(low) | u128::from(high) << 64).collect();
+    if !book.is_whole() {
+        film.add_unfinished(commands.read::<u64>(&resources.film, count)?);
+    }
+    Ok(film)
 }
 
 /// The photon map of round 0, for comparing builders.

@@ -2,6 +2,7 @@
 
 use serde::Serialize;
 
+pub use super::stop::Stop;
 use super::{Math, within};
 use crate::constants;
 use crate::error::{Error, Result};
@@ -159,23 +160,6 @@ impl Effect {
     }
 }
 
-/// What ends a run before its last round, whichever comes first.
-#[derive(Debug, Clone, Copy, PartialEq, Serialize)]
-pub struct Stop {
-    /// Relative error that is good enough: root mean square over that of the result.
-    pub error: Option<f64>,
-    /// Chance that the error is no larger than stated.
-    pub confidence: f64,
-    /// Wall time.
-    pub seconds: Option<f64>,
-}
-
-impl Default for Stop {
-    fn default() -> Stop {
-        Stop { error: None, confidence: 0.95, seconds: None }
-    }
-}
-
 #[derive(Debug, Clone, PartialEq, Serialize)]
 pub struct TransportSettings {
     /// Photons of the global map, each pass.
@@ -249,7 +233,7 @@ impl Default for TransportSettings {
 
 /// Photons of a pass: their numbers are 32-bit.
 const MAX_PHOTONS: u32 = 1 << 31;
-const MAX_ROUNDS: u32 = 1 << 20;
+pub const MAX_ROUNDS: u32 = 1 << 20;
 /// Random-number blocks of a bounce are numbered in 32 bits, and each is a dispatch.
 const MAX_BOUNCES: u32 = 10_000;
 /// A visible point draws one block of random numbers a ray.
@@ -272,16 +256,7 @@ impl TransportSettings {
         if !(self.alpha > 0.0 && self.alpha <= 1.0) {
             return Err(Error::setting("--alpha", self.alpha, "must be above 0 and at most 1, which keeps the radius"));
         }
-        let Stop { error, confidence, seconds } = self.stop;
-        if let Some(error) = error.filter(|error| !(1e-6..=1.0).contains(error)) {
-            return Err(Error::setting("--error", error, "must be from 0.0001 % to 100 %"));
-        }
-        if !(0.5..=0.9999).contains(&confidence) {
-            return Err(Error::setting("--confidence", confidence, "must be from 50 % to 99.99 %"));
-        }
-        if let Some(seconds) = seconds.filter(|seconds| !(1e-3..=1e6).contains(seconds)) {
-            return Err(Error::setting("--time", seconds, "must be from 1ms to 1000000s"));
-        }
+        self.stop.validate()?;
         if !(self.group_size.is_power_of_two() && (32..=1024).contains(&self.group_size)) {
             return Err(Error::setting("--group-size", self.group_size, "must be a power of two from 32 to 1024"));
         }

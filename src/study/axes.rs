@@ -76,11 +76,7 @@ impl Configuration {
     /// Rounds that sums and random numbers allow.
     pub fn most_rounds(&self) -> u32 {
         match &self.line {
-            Line::Paper(settings) => (0..31)
-                .map(|doublings| 1u32 << doublings)
-                .take_while(|rounds| Settings { rounds: *rounds, ..settings.clone() }.validate().is_ok())
-                .last()
-                .unwrap_or(0),
+            Line::Paper(settings) => settings.most_rounds(),
             Line::Scene(_) => 1 << 20,
         }
     }

@@ -11,6 +11,7 @@
 //! resolve   flux over area that really lies on the surface, times reflectance: to the film
 //! ```
 
+pub mod bias;
 pub mod film;
 pub mod photons;
 pub mod points;
@@ -23,9 +24,8 @@ use std::time::{Duration, Instant};
 
 pub use film::RoundFilm;
 use resources::{PhotonBuffers, TransportResources};
-pub use stop::End;
-use stop::Watch;
 
+use crate::bias::Bias;
 use crate::constants::PART_COUNT;
 use crate::error::{Error, Result};
 use crate::gpu::check::strict_math;
@@ -36,6 +36,8 @@ use crate::oddities::Oddities;
 use crate::plan::transport::{MapPlan, Sensor, TransportPlan};
 use crate::records::{Receiver, Tally};
 use crate::render::Control;
+pub use crate::render::stop::End;
+use crate::render::stop::Watch;
 use crate::scene::Camera;
 use crate::scene::geometry::Geometry;
 use crate::settings::Math;
@@ -72,6 +74,8 @@ pub struct Lit {
     pub timings: Timings,
     pub device: DeviceFacts,
     pub end: End,
+    /// What the radius adds to the error; `None` where nobody measured it.
+    pub bias: Option<Bias>,
     pub dispatches: u64,
     pub submissions: u64,
     pub pipelines: usize,
@@ -124,8 +128,9 @@ pub fn light(gpu: &Gpu, view: &View, plan: TransportPlan, control: &mut Control)
     commands.submit()?;
 
     let mut fates = [Fates::new(plan.settings.bounces), Fates::new(plan.settings.bounces)];
-    let mut watch = Watch::new(plan.settings.stop, started);
+    let mut watch = Watch::new(plan.settings.stop, plan.settings.alpha, started);
     let (mut done, mut settled, mut end) = (0, 0, End::Rounds);
+    let photons_per_round = plan.maps().map(|map| u64::from(map.photons)).sum::<u64>();
     for number in 0..plan.settings.rounds {
         commands.scope("round", |commands| {
             one_round(commands, view, Round { resources: &resources, geometry: view.geometry, plan: &plan, number })
@@ -135,15 +140,18 @@ pub fn light(gpu: &Gpu, view: &View, plan: TransportPlan, control: &mut Control)
         // Tallies are 32-bit on the device.
         let open = u64::from(done - settled + 1) * plan.maps().map(|map| u64::from(map.photons)).max().unwrap_or(0);
         let short = commands.timestamps_left() < TIMESTAMPS_PER_ROUND || open > u64::from(u32::MAX);
-        if last || short || watch.is_due(done) || commands.work() * 2 >= plan.work_per_submission {
+        let photons = u64::from(done) * photons_per_round;
+        if last || short || watch.is_due(done) || watch.may_end(done, photons) || commands.work() * 2 >= plan.work_per_submission {
             settle(&mut commands, &resources, &plan, u64::from(done - settled), &mut fates)?;
             settled = done;
             if watch.is_due(done) {
-                watch.look(&film(&mut commands, &resources, &plan, done)?, &plan);
+                watch.look(done, film(&mut commands, &resources, &plan, done)?.relative_error(&plan));
             }
-            (control.progress)(&watch.progress(done, &plan));
+            let ledger = fates[0].ledger().plus(&fates[1].ledger());
+            (control.progress)(&watch.progress(f64::from(done), plan.settings.rounds, photons_per_round, ledger));
             let cancelled = control.cancelled.load(Ordering::Relaxed).then_some(End::Cancelled);
-            if let Some(reason) = watch.end(done).or(cancelled).filter(|_| !last) {
+            let reason = if last { watch.has_photons(photons).then_some(End::Photons) } else { watch.end(done, photons).or(cancelled) };
+            if let Some(reason) = reason {
                 end = reason;
                 break;
             }
@@ -159,6 +167,7 @@ pub fn light(gpu: &Gpu, view: &View, plan: TransportPlan, control: &mut Control)
         part_totals,
         fates,
         end,
+        bias: None,
         dispatches: commands.dispatch_count(),
         submissions: commands.submission_count(),
         pipelines: gpu.pipeline_count() - pipelines_before,

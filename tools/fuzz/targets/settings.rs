@@ -12,6 +12,7 @@ use photonmill::rng::Rng;
 use photonmill::scene::geometry::Geometry;
 use photonmill::scene::open_box::open_box;
 use photonmill::scene::{Scene, built_in};
+use photonmill::settings::stop::Stop;
 use photonmill::settings::transport::{Append, Effect, Filter, Illumination, Kernel, Part, TransportSettings};
 use photonmill::settings::{EmissionLaw, Gather, Math, PhongDirection, Preset, Settings, Sums, Variant};
 use photonmill_fuzz::{panics_are_caught, refused};
@@ -98,6 +99,18 @@ fn check_map(plan: &TransportPlan, map: &MapPlan, limits: &Limits) {
     assert!(radii.iter().all(|radius| radius.is_finite() && *radius > 0.0), "{radii:?}");
 }
 
+/// What ends a run; no run is made here.
+fn stop(u: &mut Unstructured) -> Result<Stop> {
+    let usual = Stop::default();
+    Ok(Stop {
+        error: if u.arbitrary()? { Some(number(u, 0.01)?) } else { None },
+        confidence: number(u, usual.confidence)?,
+        seconds: if u.arbitrary()? { Some(number(u, 1.0)?) } else { None },
+        photons: if u.arbitrary()? { Some(u.arbitrary()?) } else { None },
+        ..usual
+    })
+}
+
 impl<'a> Arbitrary<'a> for Room {
     fn arbitrary(u: &mut Unstructured<'a>) -> Result<Room> {
         let preset = *u.choose(&[Preset::Naive, Preset::Modified, Preset::Phong, Preset::Rounds])?;
@@ -128,6 +141,7 @@ impl<'a> Arbitrary<'a> for Room {
             threads: count(u, 1)? as usize,
             group_size: count(u, usual.group_size)?,
             chunk: if u.arbitrary()? { Some(count(u, 64)?) } else { None },
+            stop: stop(u)?,
         }))
     }
 }
@@ -160,6 +174,7 @@ impl<'a> Arbitrary<'a> for Triangles {
             paranoid: u.arbitrary()?,
             group_size: count(u, usual.group_size)?,
             chunk: if u.arbitrary()? { Some(count(u, 64)?) } else { None },
+            stop: stop(u)?,
             with: effects(u)?,
             without: effects(u)?,
         };

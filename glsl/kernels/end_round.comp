@@ -1,0 +1,32 @@
+// Ends a round of the paper's line: what it left on the film joins the sums of all rounds, its square the sums of
+// squares, and the film is empty for the next round.
+// Dispatched by src/estimate.rs once a round. One thread = one film sum.
+// Squares lie in two buffers, 64 bits each, so that none is larger than twice the film.
+#version 460
+#extension GL_GOOGLE_include_directive : require
+#extension GL_EXT_scalar_block_layout : require
+#include "records.glsl"
+
+layout(local_size_x_id = 0) in;
+layout(push_constant, scalar) uniform Push { EndRoundPush push; };
+layout(set = 1, binding = 0, scalar) buffer Film { uvec2 film[]; };
+layout(set = 1, binding = 1, scalar) buffer FilmTotals { uvec2 film_totals[]; };
+layout(set = 1, binding = 2, scalar) buffer LowSquares { uvec2 low_squares[]; };
+layout(set = 1, binding = 3, scalar) buffer HighSquares { uvec2 high_squares[]; };
+
+#include "dispatch.glsl"
+#include "film/wide.glsl"
+
+void main()
+{
+    uint sum = invocation_index();
+    if (sum >= push.sum_count) {
+        return;
+    }
+    uvec2 of_round = film[sum];
+    film[sum] = uvec2(0);
+    film_totals[sum] = add64(film_totals[sum], of_round);
+    uvec4 square = add128(uvec4(low_squares[sum], high_squares[sum]), square64(of_round));
+    low_squares[sum] = square.xy;
+    high_squares[sum] = square.zw;
+}

@@ -1,0 +1,49 @@
+//! What ends a run before its last round, whichever comes first.
+
+use serde::Serialize;
+
+use crate::error::{Error, Result};
+
+#[derive(Debug, Clone, Copy, PartialEq, Serialize)]
+pub struct Stop {
+    /// Relative error that is good enough: root mean square over that of the result.
+    pub error: Option<f64>,
+    /// Chance that the error is no larger than stated.
+    pub confidence: f64,
+    /// Wall time.
+    pub seconds: Option<f64>,
+    /// Photons of all rounds and maps.
+    pub photons: Option<u64>,
+    /// Relative error that the first round's radius brings with it, at most; it counts in `error`, and shrinks as the
+    /// mean square of the radius does. `None`: noise alone counts.
+    pub bias: Option<f64>,
+}
+
+impl Default for Stop {
+    fn default() -> Stop {
+        Stop { error: None, confidence: 0.95, seconds: None, photons: None, bias: None }
+    }
+}
+
+impl Stop {
+    /// Whether anything but the number of rounds ends a run.
+    pub fn is_set(&self) -> bool {
+        self.error.is_some() || self.seconds.is_some() || self.photons.is_some()
+    }
+
+    pub fn validate(&self) -> Result<()> {
+        if let Some(error) = self.error.filter(|error| !(1e-6..=1.0).contains(error)) {
+            return Err(Error::setting("--error", error, "must be from 0.0001 % to 100 %"));
+        }
+        if !(0.5..=0.9999).contains(&self.confidence) {
+            return Err(Error::setting("--confidence", self.confidence, "must be from 50 % to 99.99 %"));
+        }
+        if let Some(seconds) = self.seconds.filter(|seconds| !(1e-3..=1e6).contains(seconds)) {
+            return Err(Error::setting("--time", seconds, "must be from 1ms to 1000000s"));
+        }
+        if self.photons == Some(0) {
+            return Err(Error::setting("--total-photons", 0, "must be 1 or more"));
+        }
+        Ok(())
+    }
+}

@@ -1,0 +1,303 @@
+//! The bias of a radius, as runs state it, against the truth: the stated interval holds it as often as it says.
+
+mod common;
+
+use std::sync::OnceLock;
+use std::sync::atomic::AtomicBool;
+
+use common::lit::scene;
+use common::radiosity::{Law, Radiosity, WALLS, on_wall};
+use common::{Check, assert_complains, assert_holds, device};
+use photonmill::bias::{self, Bias};
+use photonmill::film::estimate_walls;
+use photonmill::gpu::Gpu;
+use photonmill::plan::transport::{Sensor, TransportPlan};
+use photonmill::render::stop::mean_squared_radius;
+use photonmill::render::{self, Control};
+use photonmill::rng::Rng;
+use photonmill::scene::geometry::Geometry;
+use photonmill::scene::open_box::open_box;
+use photonmill::scene::{Camera, Scene};
+use photonmill::settings::Settings;
+use photonmill::settings::stop::Stop;
+use photonmill::settings::transport::{Illumination, TransportSettings};
+use photonmill::transport::{self, View};
+
+const CONFIDENCE: f64 = 0.9;
+static NEVER: AtomicBool = AtomicBool::new(false);
+
+fn stop() -> Stop {
+    Stop { confidence: CONFIDENCE, ..Stop::default() }
+}
+
+/// Texels along a wall of the box.
+const MESH: usize = 12;
+
+fn in_box(radius: f64, photons: u32, seed: u64) -> Settings {
+    Settings { mesh: MESH as u32, radius, photons, seed, rng: Rng::Philox, stop: stop(), threads: 2, ..Settings::default() }
+}
+
+/// Irradiance of the box at the middles of its texels, W/m2, by radiosity: what a radius of 0 would find.
+fn at_points() -> &'static [f64] {
+    static LIGHT: OnceLock<Vec<f64>> = OnceLock::new();
+    LIGHT.get_or_init(|| {
+        let solution = Radiosity::solve(Law::Uniform, 0.75, 24, 15);
+        let middle = |i: usize| (i as f64 + 0.5) / MESH as f64 * 0.5 - 0.25;
+        let light = |wall: usize, k: usize| {
+            let point = on_wall(wall, middle(k % MESH), middle(k / MESH));
+            solution.direct_at(wall, point) + solution.reflected_at(wall, point)
+        };
+        (0..WALLS).flat_map(|wall| (0..MESH * MESH).map(move |k| light(wall, k))).collect()
+    })
+}
+
+/// The relative bias of the box at a radius: a long run's mean squared distance from the truth, less its variance.
+fn true_bias_in_box(gpu: Option<&Gpu>, radius: f64) -> f64 {
+    let settings = Settings { rounds: 48, ..in_box(radius, 8191, 4711) };
+    let scene = open_box(&settings);
+    let mut control = Control { cancelled: &NEVER, progress: &mut |_| {} };
+    let outcome = match gpu {
+        Some(gpu) => render::on_gpu(gpu, &scene, &settings, &mut control).unwrap(),
+        None => render::on_cpu(&scene, &settings, &mut control).unwrap(),
+    };
+    let (mut off, mut light) = (0.0, 0.0);
+    let walls = estimate_walls(&outcome.film, &scene, &outcome.plan);
+    let found = walls.iter().flat_map(|wall| wall.irradiance.iter().zip(&wall.irradiance_error));
+    for ((found, error), expected) in found.zip(at_points()) {
+        off += (found - expected).powi(2) - error * error;
+        light += expected * expected;
+    }
+    (off / light).max(0.0).sqrt()
+}
+
+/// Whether the interval of a bias holds the truth.
+fn interval_check(bias: &Bias, truth: f64) -> Check {
+    if (bias.lower..=bias.upper).contains(&truth) {
+        return Ok(());
+    }
+    Err(format!("{truth:.5} where {:.5} to {:.5} is stated, {:.5} in the middle", bias.lower, bias.upper, bias.relative))
+}
+
+/// Whether intervals hold the truth as often as they say.
+fn coverage_check(biases: &[Bias], truth: f64) -> Check {
+    let within = biases.iter().filter(|bias| interval_check(bias, truth).is_ok()).count() as f64 / biases.len() as f64;
+    if within >= CONFIDENCE { Ok(()) } else { Err(format!("{:.0} % of the intervals hold {truth:.5}", 100.0 * within)) }
+}
+
+/// What would be stated if the difference of the two radii were taken for the bias.
+fn without_the_two(bias: &Bias) -> Bias {
+    bias.scaled(0.5)
+}
+
+fn report(what: &str, biases: &[Bias], truth: f64) {
+    let within = biases.iter().filter(|bias| interval_check(bias, truth).is_ok()).count();
+    let mean = |of: fn(&Bias) -> f64| biases.iter().map(of).sum::<f64>() / biases.len() as f64;
+    println!(
+        "{what}: bias {truth:.4}; stated {:.4}, {:.4} to {:.4}, on average; {within} of {} intervals hold it",
+        mean(|bias| bias.relative),
+        mean(|bias| bias.lower),
+        mean(|bias| bias.upper),
+        biases.len()
+    );
+}
+
+/// Light along x that does not change along y, as the mean over the discs of radius r around points of the x axis, where
+/// the surface is; and as it is. Midpoint rule over 400 strips of the disc.
+fn disc_means(light: impl Fn(f64) -> f64, has_surface: impl Fn(f64) -> bool, radius: f64, points: &[f64]) -> Vec<f64> {
+    const STRIPS: i32 = 400;
+    let mean = |x: f64| {
+        let (mut sum, mut area) = (0.0, 0.0);
+        for strip in 0..STRIPS {
+            let off = 2.0 * (f64::from(strip) + 0.5) / f64::from(STRIPS) - 1.0;
+            let at = x + radius * off;
+            if has_surface(at) {
+                let height = (1.0 - off * off).sqrt();
+                sum += height * light(at);
+                area += height;
+            }
+        }
+        sum / area
+    };
+    points.iter().map(|x| if radius == 0.0 { light(*x) } else { mean(*x) }).collect()
+}
+
+/// Where the law c r^2 fails, by how much: the stated interval of light without noise is the allowance alone.
+#[test]
+fn the_allowance_covers_edges_shadows_and_bumps() {
+    let everywhere = |_: f64| true;
+    let bump = |width: f64| move |x: f64| 1.0 + (-0.5 * (x / width).powi(2)).exp();
+    type OfX = Box<dyn Fn(f64) -> f64>;
+    let cases: [(&str, OfX, bool, f64); 7] = [
+        ("a parabola", Box::new(|x| x * x), false, 1.0),
+        ("the edge of a surface", Box::new(|x| 1.0 + x), true, 1.12),
+        ("the edge of a shadow", Box::new(|x| if x > 0.0 { 1.0 } else { 0.0 }), false, 1.82),
+        ("a bump of two radii", Box::new(bump(2.0)), false, 1.01),
+        ("a bump of one radius", Box::new(bump(1.0)), false, 1.05),
+        ("a bump of half a radius", Box::new(bump(0.5)), false, 1.2),
+        ("a bump of a quarter radius", Box::new(bump(0.25)), false, 1.6),
+    ];
+    for (what, light, at_edge, expected) in cases {
+        let points: Vec<f64> = (0..800).map(|k| (f64::from(k) + 0.5) / 100.0 - if at_edge { 0.0 } else { 4.0 }).collect();
+        let has_surface = |x: f64| if at_edge { x > 0.0 } else { everywhere(x) };
+        let at = |radius: f64| disc_means(&light, has_surface, radius, &points);
+        let bias = bias::extrapolate(CONFIDENCE, 1, |factor, _| Ok(Some(at(factor)))).unwrap().unwrap();
+        let (found, truth) = (at(1.0), at(0.0));
+        let square_sum = |values: &mut dyn Iterator<Item = f64>| values.map(|value| value * value).sum::<f64>();
+        let off = square_sum(&mut found.iter().zip(&truth).map(|(found, truth)| found - truth));
+        let relative = (off / square_sum(&mut found.iter().copied())).sqrt();
+        println!("{what}: {:.3} of what is extrapolated", relative / bias.relative);
+        assert!((relative / bias.relative - expected).abs() < 0.02, "{what}: {}", relative / bias.relative);
+        assert_holds(what, interval_check(&bias, relative));
+        assert_complains("a bias without its factor 2", interval_check(&without_the_two(&bias), relative));
+    }
+}
+
+/// Intervals of so many seeds in the paper's box.
+fn box_intervals_hold(seeds: u64, radii: &[f64]) {
+    let gpu = device();
+    let gpu = gpu.as_deref();
+    for &radius in radii {
+        let truth = true_bias_in_box(gpu, radius);
+        let measured = |seed, photons| {
+            let settings = in_box(radius, photons, seed);
+            render::measure_bias(gpu, &open_box(&settings), &settings, 1, &NEVER).unwrap().unwrap()
+        };
+        let biases: Vec<Bias> = (1..=seeds).map(|seed| measured(seed, 3001)).collect();
+        report(&format!("the paper's box, radius {radius} m"), &biases, truth);
+        assert_holds(radius, coverage_check(&biases, truth));
+        // A factor 2 shows where noise is less than that.
+        if radius >= 0.15 {
+            assert!(biases.iter().all(|bias| bias.upper < 4.0 * truth), "an interval that says nothing");
+            let spoiled: Vec<Bias> = biases.iter().map(without_the_two).collect();
+            assert_complains("biases without their factor 2", coverage_check(&spoiled, truth));
+        }
+    }
+}
+
+#[test]
+fn the_bias_of_the_box_lies_in_its_interval_as_often_as_stated() {
+    box_intervals_hold(20, &[0.2]);
+}
+
+#[test]
+#[ignore = "hundreds of runs: minutes on a software device"]
+fn the_bias_of_the_box_lies_in_its_interval_at_every_radius() {
+    box_intervals_hold(50, &[0.2, 0.15, 0.1, 0.07]);
+}
+
+/// The same of scenes of triangles: name, illumination, radius as a share of the scene. The truth is the difference from
+/// light at a fifth of the radius, at which a 25th of the bias is left.
+fn scene_intervals_hold(seeds: u64, cases: &[(&str, Illumination, f64)], rounds: u32) {
+    let Some(gpu) = device() else { return };
+    for &(name, illumination, radius) in cases {
+        let long = Lit::new(scene(name), illumination, radius, 20_000, 99, &gpu);
+        let [lower, middle, upper] = long.difference(&gpu, 0.2, rounds).map(|difference| difference / (1.0 - 0.04));
+        let biases: Vec<Bias> =
+            (1..=seeds).map(|seed| Lit::new(scene(name), illumination, radius, 4000, seed, &gpu).bias(&gpu, 1)).collect();
+        println!("{name}: {lower:.4} to {upper:.4}");
+        report(&format!("{name}, {illumination:?}, radius {radius}"), &biases, middle);
+        assert_holds(name, coverage_check(&biases, middle));
+    }
+}
+
+#[test]
+fn the_bias_of_scenes_lies_in_its_interval_as_often_as_stated() {
+    scene_intervals_hold(10, &[("cornell", Illumination::Photons, 0.15), ("disc-over-plane", Illumination::Photons, 0.1)], 2);
+}
+
+#[test]
+#[ignore = "hundreds of runs: minutes on a software device"]
+fn the_bias_of_many_scenes_lies_in_its_interval_as_often_as_stated() {
+    let both = [Illumination::Photons, Illumination::Split];
+    let names = ["open-box", "cornell", "cornell-spheres", "caustic-sphere"];
+    let cases: Vec<_> = names.into_iter().flat_map(|name| both.map(|illumination| (name, illumination, 0.15))).collect();
+    scene_intervals_hold(20, &cases, 16);
+    scene_intervals_hold(20, &[("disc-over-plane", Illumination::Photons, 0.1)], 16);
+}
+
+/// Of a run whose radius shrinks the bias is that of the first radius, scaled with the mean square of all.
+#[test]
+fn the_bias_of_a_shrinking_radius_lies_in_the_scaled_interval() {
+    let Some(gpu) = device() else { return };
+    const ROUNDS: u32 = 32;
+    let long = Lit::new(scene("disc-over-plane"), Illumination::Photons, 0.15, 4000, 99, &gpu);
+    let alpha = TransportSettings::default().alpha;
+    let batch = |factor: f64, number: u32| {
+        if factor < 1.0 {
+            return transport::bias::batch(&gpu, &long.scene, &long.view(), &long.plan, (factor, ROUNDS, number), &NEVER);
+        }
+        let seed = bias::seed(long.plan.settings.seed, number);
+        let settings = TransportSettings { rounds: ROUNDS, alpha, seed, ..long.plan.settings.clone() };
+        let plan = TransportPlan::new(&long.scene, &long.geometry, &settings, long.plan.sensor, &render::limits(gpu.facts()))?;
+        let lit = transport::light(&gpu, &long.view(), plan, &mut Control { cancelled: &NEVER, progress: &mut |_| {} })?;
+        Ok(Some((0..lit.film.pixels()).flat_map(|pixel| lit.film.mean(pixel, &lit.plan).to_array()).collect()))
+    };
+    let truth = bias::difference(CONFIDENCE, 0.2, batch).unwrap().unwrap()[1];
+    let of_seed = |seed| Lit::new(scene("disc-over-plane"), Illumination::Photons, 0.15, 4000, seed, &gpu).bias(&gpu, 2);
+    let first: Vec<Bias> = (1..=10).map(of_seed).collect();
+    let scaled: Vec<Bias> = first.iter().map(|bias| bias.scaled(mean_squared_radius(alpha, ROUNDS))).collect();
+    report("a shrinking radius", &scaled, truth);
+    assert_holds("a shrinking radius", coverage_check(&scaled, truth));
+    assert!(first.iter().all(|bias| bias.relative > 1.5 * truth), "the first radius's bias is no smaller: {first:?}");
+}
+
+/// Light that no map has, has no bias; what shrinks, has less.
+#[test]
+fn light_without_a_map_has_no_bias() {
+    let Some(gpu) = device() else { return };
+    let lit = Lit::new(scene("disc-over-plane"), Illumination::Split, 0.1, 100, 1, &gpu);
+    assert_eq!(lit.bias(&gpu, 1).upper, 0.0);
+    assert_eq!(mean_squared_radius(1.0, 1000), 1.0);
+    assert_eq!(mean_squared_radius(0.5, 1), 1.0);
+    // r_2^2 = r_1^2 (1 + alpha) / 2.
+    assert!((mean_squared_radius(0.5, 2) - 0.5 * (1.0 + 0.75)).abs() < 1e-15);
+    // As rounds^(alpha - 1) / (alpha Gamma(1 + alpha)) in the end, which is (2 / 3) Gamma(5 / 3) = 0.6018 for 2 / 3.
+    let far = mean_squared_radius(2.0 / 3.0, 100_000) * 100_000f64.cbrt();
+    assert!((far * 0.6018 - 1.0).abs() < 0.01, "{far}");
+}
+
+/// A picture of a scene.
+struct Lit {
+    scene: Scene,
+    camera: Camera,
+    geometry: Geometry,
+    plan: TransportPlan,
+}
+
+impl Lit {
+    /// `radius` as a share of the scene's extent.
+    fn new(scene: Scene, illumination: Illumination, radius: f64, photons: u32, seed: u64, gpu: &Gpu) -> Lit {
+        let camera = scene.cameras.first().cloned().unwrap_or_else(|| Camera::around(scene.bounds().0, scene.bounds().1));
+        let geometry = Geometry::new(&scene).unwrap();
+        let (min, max) = scene.bounds();
+        let radius = Some(radius * (max - min).max_element());
+        let settings = TransportSettings {
+            photons,
+            caustic_photons: photons,
+            illumination,
+            radius,
+            caustic_radius: radius,
+            shadow_rays: 1,
+            seed,
+            stop: stop(),
+            ..TransportSettings::default()
+        };
+        let sensor = Sensor::Picture { width: 16, height: 16 };
+        let plan = TransportPlan::new(&scene, &geometry, &settings, sensor, &render::limits(gpu.facts())).unwrap();
+        Lit { scene, camera, geometry, plan }
+    }
+
+    fn view(&self) -> View<'_> {
+        View { geometry: &self.geometry, camera: Some(&self.camera), phases: &[] }
+    }
+
+    fn bias(&self, gpu: &Gpu, rounds: u32) -> Bias {
+        transport::bias::measure(gpu, &self.scene, &self.view(), &self.plan, (1.0, rounds), &NEVER).unwrap().unwrap()
+    }
+
+    /// From light at a radius that is so many times smaller.
+    fn difference(&self, gpu: &Gpu, factor: f64, rounds: u32) -> [f64; 3] {
+        let batch = |factor, number| transport::bias::batch(gpu, &self.scene, &self.view(), &self.plan, (factor, rounds, number), &NEVER);
+        bias::difference(CONFIDENCE, factor, batch).unwrap().unwrap()
+    }
+}
