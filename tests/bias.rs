@@ -6,11 +6,11 @@ use std::sync::OnceLock;
 use std::sync::atomic::AtomicBool;
 
 use common::lit::scene;
-use common::radiosity::{Law, Radiosity, WALLS, on_wall};
 use common::{Check, assert_complains, assert_holds, device};
 use photonmill::bias::{self, Bias};
 use photonmill::film::estimate_walls;
 use photonmill::gpu::Gpu;
+use photonmill::judge::radiosity::{Law, Radiosity, WALLS, on_wall};
 use photonmill::plan::transport::{Sensor, TransportPlan};
 use photonmill::render::stop::mean_squared_radius;
 use photonmill::render::{self, Control};
