@@ -4,7 +4,6 @@ use plotters::coord::Shift;
 use plotters::prelude::*;
 
 use super::Part;
-use super::findings::percent;
 use super::point::Curve;
 use crate::output::svg::{Drawn, SCALE, TEXT, svg};
 use crate::output::words;
@@ -65,6 +64,12 @@ fn ranges<'a>(curves: impl Iterator<Item = &'a Curve>) -> Option<(Range, Range)>
     if points.is_empty() { None } else { Some((around(|point| point.0), around(|point| point.1))) }
 }
 
+/// Ones, twos and fives have a label: all nine of a decade would lie on each other.
+fn labelled(value: f64, show: impl Fn(f64) -> String) -> String {
+    let digit = (value / 10f64.powf(value.log10().floor() + 1e-9)).round();
+    if [1.0, 2.0, 5.0, 10.0].contains(&digit) { show(value) } else { String::new() }
+}
+
 macro_rules! axes {
     ($area:expr, $x:expr, $y:expr) => {{
         let mut chart = ChartBuilder::on($area)
@@ -82,8 +87,8 @@ macro_rules! axes {
             .axis_desc_style(("sans-serif", TEXT))
             .x_desc("time")
             .y_desc("relative RMS error")
-            .x_label_formatter(&|ms| words::tick(*ms))
-            .y_label_formatter(&|error| percent(*error))
+            .x_label_formatter(&|ms| labelled(*ms, words::tick))
+            .y_label_formatter(&|error| labelled(*error, |error| format!("{} %", (100.0 * error * 1e6).round() / 1e6)))
             .draw()?;
         chart
     }};

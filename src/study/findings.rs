@@ -57,7 +57,9 @@ impl Part {
             sentences.extend(comparison.curves.iter().filter_map(left_out));
         }
         for comparison in &self.comparisons {
-            sentences.extend(comparison.others().filter_map(|curve| floor(comparison.axis, curve)));
+            // The paper's rounds are all compared with the law of noise, not with each other alone.
+            let curves = comparison.curves.iter().skip(usize::from(comparison.axis != Axis::Paper));
+            sentences.extend(curves.filter_map(|curve| floor(comparison.axis, curve)));
         }
         for comparison in self.comparisons.iter().filter(|comparison| comparison.axis == Axis::Bounces) {
             sentences.extend(comparison.curves.iter().filter_map(lost));
@@ -79,11 +81,17 @@ impl Comparison {
     }
 }
 
-/// The smallest error that two curves both reach on their way.
+/// The smallest error that all runs of two curves reach on their way, else that their means do.
 fn common_error(one: &Curve, other: &Curve) -> Option<f64> {
-    let steps = (0..200).map(|step| 1e-5 * 1.08f64.powi(step));
-    steps.into_iter().find(|error| one.time_to(*error).is_some() && other.time_to(*error).is_some())
+    let mut steps = (0..200).map(|step| 1e-5 * 1.08f64.powi(step));
+    steps
+        .clone()
+        .find(|error| one.crosses(*error) && other.crosses(*error))
+        .or_else(|| steps.find(|error| one.time_to(*error).is_some() && other.time_to(*error).is_some()))
 }
+
+/// Ends of an interval as far apart as that tell nothing.
+const NOT_TOLD_APART: f64 = 1.2;
 
 /// Clocks of shared machines drift by more than this.
 const NEXT_TO_NOTHING: f64 = 1.02;
@@ -102,8 +110,10 @@ fn choice(axis: Axis, curve: &Curve, base: &Curve) -> Option<String> {
     } else if longer.high < 1.0 && longer.value < 1.0 / NEXT_TO_NOTHING {
         let faster = Estimate { value: 1.0 / longer.value, low: 1.0 / longer.high, high: 1.0 / longer.low };
         format!("{name} buys {}: it is so much faster to {at} ({}).", ratio(faster.value), between(faster, ratio))
+    } else if longer.low > 0.0 && longer.high < NOT_TOLD_APART * longer.low {
+        format!("{name} makes no difference worth its name to {at} ({} the time, {interval}).", ratio(longer.value))
     } else {
-        format!("{name} makes no difference to {at} that these runs could tell ({} the time, {interval}).", ratio(longer.value))
+        format!("{name} cannot be told from the base by these runs: {} the time to {at} ({interval}).", ratio(longer.value))
     })
 }
 
@@ -177,7 +187,7 @@ fn then_and_now(base: &Curve) -> Vec<String> {
         pair[0].ms().value * (pair[1].ms().value / pair[0].ms().value).powf(share)
     });
     if let Some(ms) = ms {
-        let error = base.error_after(ms).map_or_else(String::new, |error| format!(", with an error of {}", percent(error)));
+        let error = base.error_after(ms).map_or_else(String::new, |error| format!(", with an error of {}", percent(error.value)));
         sentences.push(format!("Those {} photons take {} here, {} less{error}.", count(photons), duration(ms), ratio(then / ms)));
     }
     sentences
@@ -204,7 +214,7 @@ pub fn equal_time(part: &Part) -> Option<(f64, Vec<Row>)> {
     let mut longest: Vec<f64> = part.curves().filter(|curve| !curve.points.is_empty()).map(Curve::longest).collect();
     longest.sort_by(f64::total_cmp);
     let ms = longest.get(longest.len() / 2)?.min(part.base()?.longest());
-    Some((ms, rows(part, |curve| curve.error_after(ms).map(|value| Estimate { value, low: value, high: value }))))
+    Some((ms, rows(part, |curve| curve.error_after(ms))))
 }
 
 /// Times to the smallest error that half of all curves reach.

@@ -23,7 +23,7 @@ use crate::error::{Error, Result};
 use crate::gpu::Gpu;
 use crate::output::destination::{Folder, write_all};
 use crate::scene::Scene;
-use axes::{Axis, Group};
+use axes::{Axis, Configuration, Group};
 use point::{Curve, Point};
 use store::Store;
 use subject::Subject;
@@ -104,7 +104,7 @@ pub fn run(
     }
     let count: usize = subjects.iter().flat_map(|subject| &subject.groups).map(|group| group.configurations.len()).sum();
     let share = study.request.budget / count.max(1) as u32;
-    let mut begun = 0;
+    let (mut begun, mut is_warm) = (0, false);
     for subject in &subjects {
         study.parts.push(Part {
             quantity: subject.quantity.clone(),
@@ -115,7 +115,8 @@ pub fn run(
         for group in &subject.groups {
             begun += group.configurations.len();
             tell(&format!("[{begun}/{count}] {}: {}", subject.quantity, group.axis.name()));
-            let mut measuring = Measuring { gpu, subject, group, request: &study.request, share, cancelled, store: &mut store };
+            let mut measuring =
+                Measuring { gpu, subject, group, request: &study.request, share, cancelled, store: &mut store, is_warm: &mut is_warm };
             let (comparison, whole) = measuring.compare()?;
             study.parts.last_mut().expect("pushed above").comparisons.push(comparison);
             if !whole {
@@ -137,6 +138,8 @@ struct Measuring<'a> {
     share: Duration,
     cancelled: &'a AtomicBool,
     store: &'a mut Store,
+    /// The card has worked already.
+    is_warm: &'a mut bool,
 }
 
 impl Measuring<'_> {
@@ -183,7 +186,8 @@ impl Measuring<'_> {
             return Ok(true);
         }
         let mut shots = vec![Vec::new(); curves.len()];
-        // The first turn is dropped: it makes pipelines, and brings a card that idled to its clock.
+        self.warm_up(&group.configurations[0])?;
+        // The first turn is dropped: it makes pipelines.
         for turn in 0..=u64::from(request.repeats) {
             for which in going.iter().copied() {
                 if curves[which].left_out.is_some() {
@@ -214,6 +218,23 @@ impl Measuring<'_> {
         Ok(true)
     }
 }
+
+impl Measuring<'_> {
+    /// A card that idled runs at a low clock: it gets work that is not measured.
+    fn warm_up(&mut self, configuration: &Configuration) -> Result<()> {
+        if self.gpu.facts().kind == "cpu" {
+            return Ok(());
+        }
+        let enough = if std::mem::replace(self.is_warm, true) { WARM_UP } else { FIRST_WARM_UP };
+        let began = Instant::now();
+        while began.elapsed() < enough && self.subject.run(self.gpu, configuration, 8, self.request.seed, self.cancelled)?.is_some() {}
+        Ok(())
+    }
+}
+
+/// Before the runs of a level, and before the very first.
+const WARM_UP: Duration = Duration::from_millis(150);
+const FIRST_WARM_UP: Duration = Duration::from_secs(3);
 
 /// How long the first round of a configuration may take, pipelines and all, before it is left out; or twice its share of
 /// time, where that is longer.

@@ -199,11 +199,23 @@ impl Curve {
         Some(Estimate { value, low: value * (spread.low - spread.value).exp(), high: value * (spread.high - spread.value).exp() })
     }
 
+    /// Whether every run by itself, and their mean, crossed an error.
+    pub fn crosses(&self, error: f64) -> bool {
+        self.time_to(error).is_some() && self.logs_of_time_to(error).iter().all(Option::is_some)
+    }
+
     /// Relative error after a time, where that lies between two points.
-    pub fn error_after(&self, ms: f64) -> Option<f64> {
+    pub fn error_after(&self, ms: f64) -> Option<Estimate> {
         self.points.windows(2).find_map(|pair| {
-            let ((t0, e0), (t1, e1)) = ((pair[0].ms().value, pair[0].error().value), (pair[1].ms().value, pair[1].error().value));
-            (t0 <= ms && ms <= t1 && t1 > t0).then(|| e0 * (e1 / e0).powf((ms / t0).ln() / (t1 / t0).ln()))
+            let (t0, t1) = (pair[0].ms().value, pair[1].ms().value);
+            let share = (ms / t0).ln() / (t1 / t0).ln();
+            let between = |from: f64, to: f64| if from > 0.0 && to > 0.0 { from * (to / from).powf(share) } else { 0.0 };
+            let (e0, e1) = (pair[0].error(), pair[1].error());
+            (t0 <= ms && ms <= t1 && t1 > t0).then(|| Estimate {
+                value: between(e0.value, e1.value),
+                low: between(e0.low, e1.low),
+                high: between(e0.high, e1.high),
+            })
         })
     }
 
@@ -271,7 +283,7 @@ mod tests {
         assert_eq!(base.time_to(0.9), None, "nor what was reached before the first point");
         let ratio = curve(0.4, 0.0, 6.0).times_longer(&base, 0.1).unwrap();
         assert!((ratio.value - 3.0).abs() < 1e-9 && ratio.low > 2.9 && ratio.high < 3.1, "{ratio:?}");
-        assert!((base.error_after(32.0).unwrap() / 0.1 - 1.0).abs() < 0.02);
+        assert!((base.error_after(32.0).unwrap().value / 0.1 - 1.0).abs() < 0.02);
     }
 
     #[test]

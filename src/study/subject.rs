@@ -1,5 +1,6 @@
 //! What is measured: a quantity with its reference, the configurations that find it, and how one of them runs.
 
+use std::rc::Rc;
 use std::sync::atomic::{AtomicBool, Ordering};
 
 use glam::DVec3;
@@ -30,6 +31,8 @@ pub struct Subject {
     pub reference: Reference,
     pub groups: Vec<Group>,
     scene: Scene,
+    /// Of the scene as it is.
+    geometry: Rc<Geometry>,
     camera: Option<Camera>,
     /// Points and normals, where no camera looks.
     receivers: Vec<(DVec3, DVec3)>,
@@ -45,11 +48,13 @@ impl Subject {
     /// Quantities of a scene; making their references may take a while.
     pub fn all(gpu: &Gpu, scene: &Scene, request: &Request, tell: &mut dyn FnMut(&str)) -> Result<Vec<Subject>> {
         let Request { scene: name, size, photons, reference_samples, .. } = request.clone();
+        let geometry = Rc::new(Geometry::new(scene)?);
         let subject = |quantity: &str, reference, groups| Subject {
             quantity: quantity.to_owned(),
             reference,
             groups,
             scene: scene.clone(),
+            geometry: geometry.clone(),
             camera: None,
             receivers: Vec::new(),
             size,
@@ -66,7 +71,7 @@ impl Subject {
                 subject("irradiance of the walls, the paper's line", reference.clone(), axes::of_paper(size, photons)),
                 Subject {
                     receivers: receivers(),
-                    ..subject("irradiance of the walls, triangles", reference.clone(), scene_axes(gpu, scene, request)?)
+                    ..subject("irradiance of the walls, triangles", reference.clone(), scene_axes(gpu, scene, &geometry, request)?)
                 },
                 Subject { receivers: receivers(), ..subject("the paper's own question: rounds of 5000 photons", reference, papers) },
             ]);
@@ -77,7 +82,7 @@ impl Subject {
         });
         tell(&format!("reference: path tracing of {size} x {size} pixels, {reference_samples} samples each, unless the cache has it"));
         let reference = Reference::picture(scene, &camera, size, reference_samples);
-        Ok(vec![Subject { camera: Some(camera), ..subject("picture", reference, scene_axes(gpu, scene, request)?) }])
+        Ok(vec![Subject { camera: Some(camera), ..subject("picture", reference, scene_axes(gpu, scene, &geometry, request)?) }])
     }
 
     /// What repeats a run.
@@ -132,8 +137,11 @@ impl Subject {
     }
 
     fn light(&self, gpu: &Gpu, settings: TransportSettings, control: &mut Control) -> Result<Lit> {
-        let scene = self.scene.without(&settings.without);
-        let geometry = Geometry::new(&scene)?;
+        // A card that waits for the host loses its clock.
+        let geometry = match settings.without.as_slice() {
+            [] => self.geometry.clone(),
+            without => Rc::new(Geometry::new(&self.scene.without(without))?),
+        };
         let sensor = match self.camera {
             Some(_) => Sensor::Picture { width: self.size, height: self.size },
             None => Sensor::Receivers { count: self.receivers.len() as u32 },
@@ -163,11 +171,10 @@ fn shot(values: Vec<f64>, timings: &Timings, ledger: Ledger) -> Shot {
     }
 }
 
-fn scene_axes(gpu: &Gpu, scene: &Scene, request: &Request) -> Result<Vec<Group>> {
-    let geometry = Geometry::new(scene)?;
+fn scene_axes(gpu: &Gpu, scene: &Scene, geometry: &Geometry, request: &Request) -> Result<Vec<Group>> {
     let settings = TransportSettings { photons: request.photons, caustic_photons: request.photons, ..TransportSettings::default() };
     let sensor = Sensor::Picture { width: request.size, height: request.size };
-    let plan = TransportPlan::new(scene, &geometry, &settings, sensor, &render::limits(gpu.facts()))?;
+    let plan = TransportPlan::new(scene, geometry, &settings, sensor, &render::limits(gpu.facts()))?;
     let kept: Vec<Effect> = plan.decisions.iter().filter(|decision| decision.kept).map(|decision| decision.effect).collect();
     let radius = plan.global.as_ref().map(|map| map.radius * geometry.unit);
     Ok(axes::of_scene(request.photons, &kept, radius, geometry.triangles.len() <= FEW_TRIANGLES))
