@@ -53,6 +53,10 @@ pub enum Error {
     )]
     SelfcheckFailed { device: String, failed: usize, of: usize, first: String },
 
+    /// Somebody ended it before there was anything to write.
+    #[error("ended before there was anything to write")]
+    Interrupted,
+
     /// The validation layer was asked for and is not installed.
     #[error(
         "--validate: the layer VK_LAYER_KHRONOS_validation is not installed; install the Vulkan validation layers, or leave --validate out"
@@ -69,6 +73,7 @@ impl Error {
     pub fn exit_code(&self) -> u8 {
         match self {
             Error::Setting { .. } | Error::Output { .. } | Error::Scene { .. } | Error::DeviceAbsent { .. } | Error::NoValidationLayer => 2,
+            Error::Interrupted => 130,
             _ => 1,
         }
     }

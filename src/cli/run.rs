@@ -282,6 +282,10 @@ pub(super) fn run(args: &RunArgs, cancelled: &AtomicBool) -> Result<End> {
         Variant::Cpu => None,
         _ => args.device.open(args.time_dispatches)?,
     };
+    if let (Some(nearest), true) = (settings.nearest, args.stop.bias) {
+        let why = "takes radii of its own, whose bias no other radius tells; leave --bias out";
+        return Err(Error::setting("--nearest", nearest, why));
+    }
     let measure = |settings: &Settings, rounds| render::measure_bias(gpu.as_ref(), &scene, settings, rounds, cancelled);
     let before = match settings.stop.error.filter(|_| args.stop.bias) {
         Some(wanted) => bias_before(wanted, false, |rounds| measure(&settings, rounds))?,

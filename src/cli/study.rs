@@ -79,6 +79,9 @@ pub(super) fn run(args: &StudyArgs, cancelled: &AtomicBool) -> Result<End> {
     Ok(if study.complete { End::Finished } else { End::Cancelled })
 }
 
+/// Of all runs of a choice, a gigabyte in all.
+const MAX_HELD: u64 = 1 << 27;
+
 impl StudyArgs {
     fn validate(&self) -> Result<()> {
         let within = |option, value: u64, allowed: std::ops::RangeInclusive<u64>, what: &str| {
@@ -92,6 +95,12 @@ impl StudyArgs {
         within("--repeats", u64::from(self.repeats), 2..=1000, "runs of a point, whose spread is its error")?;
         within("--seed", self.seed, 0..=u64::from(u32::MAX) - 1000, "as srand48 takes 32 bits")?;
         within("--reference-samples", u64::from(self.reference_samples), 16..=1 << 24, "samples a pixel")?;
+        let held = 3 * u64::from(self.size.unwrap_or(48)).pow(2) * u64::from(self.repeats);
+        if held > MAX_HELD {
+            let allowed =
+                format!("3 * size^2 * repeats is {held} numbers to be held for each choice, and {MAX_HELD} are allowed; ask for fewer");
+            return Err(Error::setting("--repeats", self.repeats, allowed));
+        }
         if !(1.0..=1e6).contains(&self.budget) {
             return Err(Error::setting("--budget", self.budget, "must be from 1s to 1000000s"));
         }

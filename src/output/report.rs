@@ -172,11 +172,16 @@ pub(super) fn errors(rounds: u32, noise: Option<f64>, bias: Option<&Bias>, confi
 /// What ended a run before its last round, and no person.
 pub(super) fn end_in_words(end: End, stop: &Stop) -> Option<String> {
     match end {
-        End::Rounds | End::Cancelled => None,
+        End::Cancelled => None,
+        End::Rounds => stop.error.map(|error| format!("before the error wanted, {} %, was reached", 100.0 * error)),
         End::Error => Some("at the error wanted".to_owned()),
-        End::Time => Some(format!("after {} s", stop.seconds.unwrap_or_default())),
-        End::Photons => Some(format!("at the {} photons wanted", stop.photons.unwrap_or_default())),
+        End::Time => Some(format!("after the {} s wanted{}", stop.seconds.unwrap_or_default(), unreached(stop))),
+        End::Photons => Some(format!("at the {} photons wanted{}", stop.photons.unwrap_or_default(), unreached(stop))),
     }
+}
+
+fn unreached(stop: &Stop) -> String {
+    stop.error.map_or_else(String::new, |error| format!(" before the error wanted, {} %, was reached", 100.0 * error))
 }
 
 /// The run in words: device, settings, ledger, errors and timing table.

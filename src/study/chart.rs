@@ -59,7 +59,9 @@ fn ranges<'a>(curves: impl Iterator<Item = &'a Curve>) -> Option<(Range, Range)>
         .collect();
     let around = |of: fn(&(f64, f64)) -> f64| {
         let (low, high) = points.iter().map(of).fold((f64::INFINITY, 0.0f64), |(low, high), value| (low.min(value), high.max(value)));
-        low / 1.3..high * 1.3
+        // Scales have marks around powers of ten only, so there must be one.
+        let power = 10f64.powf((low * high).sqrt().log10().round());
+        (low / 1.3).min(power / 1.05)..(high * 1.3).max(power * 1.05)
     };
     if points.is_empty() { None } else { Some((around(|point| point.0), around(|point| point.1))) }
 }

@@ -32,6 +32,11 @@ impl Part {
         self.comparisons.iter().flat_map(|comparison| &comparison.curves)
     }
 
+    /// Errors below this say more of the reference than of what it judges.
+    pub fn least_error(&self) -> f64 {
+        2.0 * self.reference_error
+    }
+
     /// Points that no other beats in both error and time, the fastest first.
     pub fn pareto_front(&self) -> Vec<(&Curve, &Point)> {
         let mut all: Vec<(&Curve, &Point)> = self.curves().flat_map(|curve| curve.points.iter().map(move |point| (curve, point))).collect();
@@ -48,23 +53,38 @@ impl Part {
     /// Sentences made of this part's numbers, the most asked for first.
     pub fn sentences(&self) -> Vec<String> {
         let Some(base) = self.base() else { return Vec::new() };
-        let mut sentences: Vec<String> = [price(base), halving(base), law(base)].into_iter().flatten().collect();
+        let least = self.least_error();
+        let mut sentences: Vec<String> =
+            [price(base, least), halving(base, least), law("the base", base, least)].into_iter().flatten().collect();
+        let choices: usize = self.comparisons.iter().map(|comparison| comparison.others().count()).sum();
+        // So that all of them together are as sure as one.
+        let confidence = 1.0 - (1.0 - CONFIDENCE) / choices.max(1) as f64;
+        let mut undecided = Vec::new();
         for comparison in &self.comparisons {
             let Some(base) = comparison.base() else { continue };
-            sentences.extend(comparison.others().filter_map(|curve| choice(comparison.axis, curve, base)));
+            for curve in comparison.others() {
+                match choice(comparison.axis, curve, base, least, confidence) {
+                    Choice::Told(sentence) => sentences.push(sentence),
+                    Choice::Undecided(what) => undecided.push(what),
+                }
+            }
             let left_out =
                 |curve: &Curve| Some(format!("{}: {} was left out: {}.", comparison.axis.name(), curve.label, curve.left_out.as_ref()?));
             sentences.extend(comparison.curves.iter().filter_map(left_out));
         }
+        if !undecided.is_empty() {
+            sentences.push(format!("Not told from the base by these runs (times the time, interval): {}.", undecided.join("; ")));
+        }
         for comparison in &self.comparisons {
             // The paper's rounds are all compared with the law of noise, not with each other alone.
             let curves = comparison.curves.iter().skip(usize::from(comparison.axis != Axis::Paper));
-            sentences.extend(curves.filter_map(|curve| floor(comparison.axis, curve)));
+            sentences.extend(curves.filter_map(|curve| floor(comparison.axis, curve, least)));
         }
         for comparison in self.comparisons.iter().filter(|comparison| comparison.axis == Axis::Bounces) {
             sentences.extend(comparison.curves.iter().filter_map(lost));
         }
-        if self.comparisons.iter().any(|comparison| comparison.axis == Axis::Paper) {
+        for comparison in self.comparisons.iter().filter(|comparison| comparison.axis == Axis::Paper) {
+            sentences.extend(comparison.others().filter_map(|curve| law(&curve.label, curve, least)));
             sentences.extend(then_and_now(base));
         }
         sentences
@@ -81,40 +101,44 @@ impl Comparison {
     }
 }
 
-/// The smallest error that all runs of two curves reach on their way, else that their means do.
-fn common_error(one: &Curve, other: &Curve) -> Option<f64> {
-    let mut steps = (0..200).map(|step| 1e-5 * 1.08f64.powi(step));
-    steps
-        .clone()
-        .find(|error| one.crosses(*error) && other.crosses(*error))
-        .or_else(|| steps.find(|error| one.time_to(*error).is_some() && other.time_to(*error).is_some()))
+/// Errors from `least` on, close together.
+fn steps(least: f64) -> impl Iterator<Item = f64> + Clone {
+    (0..160).map(move |step| least.max(1e-5) * 1.08f64.powi(step))
 }
 
-/// Ends of an interval as far apart as that tell nothing.
-const NOT_TOLD_APART: f64 = 1.2;
+/// The smallest error that all runs of two curves reach on their way, else that their means do.
+fn common_error(one: &Curve, other: &Curve, least: f64) -> Option<f64> {
+    let by_means = |error: &f64| one.time_to(*error).is_some() && other.time_to(*error).is_some();
+    steps(least).find(|error| one.crosses(*error) && other.crosses(*error)).or_else(|| steps(least).find(by_means))
+}
 
 /// Clocks of shared machines drift by more than this.
 const NEXT_TO_NOTHING: f64 = 1.02;
 
+enum Choice {
+    Told(String),
+    /// Name, ratio and interval.
+    Undecided(String),
+}
+
 /// What a choice buys or costs against the base.
-fn choice(axis: Axis, curve: &Curve, base: &Curve) -> Option<String> {
+fn choice(axis: Axis, curve: &Curve, base: &Curve, least: f64, confidence: f64) -> Choice {
     let name = format!("{}: {}", axis.name(), curve.label);
-    let Some(error) = common_error(curve, base) else {
+    let Some((error, longer)) =
+        common_error(curve, base, least).and_then(|error| Some((error, curve.times_longer(base, error, confidence)?)))
+    else {
         let reach = |curve: &Curve| format!("{} after {}", percent(curve.best_error()), duration(curve.longest()));
-        return Some(format!("{name} reaches {}, the base {}: they share no error that both crossed.", reach(curve), reach(base)));
+        return Choice::Told(format!("{name} reaches {}, the base {}: they share no error that both crossed.", reach(curve), reach(base)));
     };
-    let longer = curve.times_longer(base, error)?;
     let (at, interval) = (percent(error), between(longer, ratio));
-    Some(if longer.low > 1.0 && longer.value > NEXT_TO_NOTHING {
-        format!("{name} costs {} the time to {at} ({interval}).", ratio(longer.value))
+    if longer.low > 1.0 && longer.value > NEXT_TO_NOTHING {
+        Choice::Told(format!("{name} costs {} the time to {at} ({interval}).", ratio(longer.value)))
     } else if longer.high < 1.0 && longer.value < 1.0 / NEXT_TO_NOTHING {
         let faster = Estimate { value: 1.0 / longer.value, low: 1.0 / longer.high, high: 1.0 / longer.low };
-        format!("{name} buys {}: it is so much faster to {at} ({}).", ratio(faster.value), between(faster, ratio))
-    } else if longer.low > 0.0 && longer.high < NOT_TOLD_APART * longer.low {
-        format!("{name} makes no difference worth its name to {at} ({} the time, {interval}).", ratio(longer.value))
+        Choice::Told(format!("{name} buys {}: it reaches {at} so many times sooner ({}).", ratio(faster.value), between(faster, ratio)))
     } else {
-        format!("{name} cannot be told from the base by these runs: {} the time to {at} ({interval}).", ratio(longer.value))
-    })
+        Choice::Undecided(format!("{name}, {} to {at}, {interval}", ratio(longer.value)))
+    }
 }
 
 fn ratio(value: f64) -> String {
@@ -122,9 +146,10 @@ fn ratio(value: f64) -> String {
 }
 
 /// Times to the errors that people ask for.
-fn price(base: &Curve) -> Option<String> {
+fn price(base: &Curve, least: f64) -> Option<String> {
     let prices: Vec<String> = ASKED
         .into_iter()
+        .filter(|error| *error >= least)
         .filter_map(|error| {
             Some(format!("{} takes {} ({})", percent(error), duration(base.time_to(error)?.value), between(base.time_to(error)?, duration)))
         })
@@ -133,40 +158,43 @@ fn price(base: &Curve) -> Option<String> {
 }
 
 /// The cost of half the error, where it was measured at the smallest errors.
-fn halving(base: &Curve) -> Option<String> {
-    let error = ASKED.into_iter().rev().find(|error| base.time_to(*error).is_some() && base.time_to(0.5 * error).is_some())?;
-    let (whole, half) = (base.time_to(error)?, base.time_to(0.5 * error)?);
-    Some(format!("Halving the error from {} costs {} the time.", percent(error), ratio(half.value / whole.value)))
+fn halving(base: &Curve, least: f64) -> Option<String> {
+    let error = steps(2.0 * least).find(|error| base.crosses(*error) && base.crosses(0.5 * error))?;
+    let cost = base.halving(error)?;
+    Some(format!("Halving the error from {} costs {} the time ({}).", percent(error), ratio(cost.value), between(cost, ratio)))
 }
 
 /// The law of noise.
-fn law(base: &Curve) -> Option<String> {
-    let slope = base.noise_slope()?;
+fn law(name: &str, curve: &Curve, least: f64) -> Option<String> {
+    let slope = curve.noise_slope(least)?;
     Some(format!(
-        "Where noise is the error, it falls with the photons to the power {slope:.2}; at a fixed radius independent photons make -0.50, and a radius that shrinks slows that."
+        "Where noise is the error of {name}, it falls with the photons to the power {slope:.2}; at a fixed radius independent photons make -0.50, and a radius that shrinks slows that."
     ))
 }
 
 /// Where bias ends the fall of the error.
-fn floor(axis: Axis, curve: &Curve) -> Option<String> {
+fn floor(axis: Axis, curve: &Curve, least: f64) -> Option<String> {
     let last = curve.points.last()?;
     let bias = last.bias();
-    (bias.low > last.noise()).then(|| {
+    // Noise falls with the root of the rounds.
+    let rounds = f64::from(last.rounds) * (last.noise() / bias.value).powi(2);
+    (bias.low > least && bias.low > 0.5 * last.noise()).then(|| {
         format!(
-            "{}: {} ends at {} after {}, of which {} is bias ({}) that no more photons take away.",
+            "{}: {} is at {} after {} rounds, of which {} is bias ({}); noise is less than that from {} round(s) on.",
             axis.name(),
             curve.label,
             percent(last.error().value),
-            duration(last.ms().value),
+            last.rounds,
             percent(bias.value),
-            between(bias, percent)
+            between(bias, percent),
+            count(rounds.ceil().max(1.0) as u64)
         )
     })
 }
 
 /// What a cap on bounces leaves out.
 fn lost(curve: &Curve) -> Option<String> {
-    let last = curve.points.last()?;
+    let last = curve.points.last().filter(|last| last.cut_off > 0.0)?;
     Some(format!("bounces: {} ends with {} of the photons still flying; their light is lost.", curve.label, percent(last.cut_off)))
 }
 
@@ -203,17 +231,21 @@ fn rows(part: &Part, value: impl Fn(&Curve) -> Option<Estimate>) -> Vec<Row> {
         let of_base = comparison.base().and_then(&value);
         rows.extend(comparison.others().map(|curve| {
             let own = value(curve);
-            (format!("{}: {}", comparison.axis.name(), curve.label), own, own.zip(of_base).map(|(own, base)| own.value / base.value))
+            (
+                format!("{}: {}", comparison.axis.name(), curve.label),
+                own,
+                own.zip(of_base).filter(|(_, base)| base.value > 0.0).map(|(own, base)| own.value / base.value),
+            )
         }));
     }
     rows
 }
 
-/// Errors after the longest time that half of all curves were measured at.
+/// Errors after the longest time that nine in ten of all curves were measured at.
 pub fn equal_time(part: &Part) -> Option<(f64, Vec<Row>)> {
-    let mut longest: Vec<f64> = part.curves().filter(|curve| !curve.points.is_empty()).map(Curve::longest).collect();
+    let mut longest: Vec<f64> = part.curves().filter(|curve| curve.points.len() > 1).map(Curve::longest).collect();
     longest.sort_by(f64::total_cmp);
-    let ms = longest.get(longest.len() / 2)?.min(part.base()?.longest());
+    let ms = longest.get(longest.len() / 10)?.min(part.base()?.longest());
     Some((ms, rows(part, |curve| curve.error_after(ms))))
 }
 
@@ -221,16 +253,18 @@ pub fn equal_time(part: &Part) -> Option<(f64, Vec<Row>)> {
 pub fn equal_error(part: &Part) -> Option<(f64, Vec<Row>)> {
     let base = part.base()?;
     let reach = |error: f64| part.curves().filter(|curve| curve.time_to(error).is_some()).count();
-    let error = ASKED.into_iter().rev().find(|error| base.time_to(*error).is_some() && 2 * reach(*error) >= part.curves().count())?;
+    let most = part.curves().count();
+    let error = steps(part.least_error()).find(|error| base.time_to(*error).is_some() && 2 * reach(*error) >= most)?;
     Some((error, rows(part, |curve| curve.time_to(error))))
 }
 
-const COLUMNS: [&str; 18] = [
+const COLUMNS: [&str; 21] = [
     "quantity",
     "axis",
     "configuration",
     "rounds",
     "photons",
+    "seed",
     "runs",
     "ms",
     "ms_least",
@@ -242,6 +276,8 @@ const COLUMNS: [&str; 18] = [
     "error_high",
     "noise",
     "bias",
+    "bias_low",
+    "bias_high",
     "cut_off",
     "command",
 ];
@@ -262,6 +298,7 @@ pub fn csv(study: &Study) -> Vec<u8> {
                     curve.label.clone(),
                     point.rounds.to_string(),
                     point.photons.to_string(),
+                    study.request.seed.to_string(),
                     point.squared_errors.len().to_string(),
                     ms.value.to_string(),
                     ms.low.to_string(),
@@ -273,6 +310,8 @@ pub fn csv(study: &Study) -> Vec<u8> {
                     known(error.high),
                     point.noise().to_string(),
                     point.bias().value.to_string(),
+                    known(point.bias().low),
+                    known(point.bias().high),
                     point.cut_off.to_string(),
                     point.command.clone(),
                 ]);

@@ -88,7 +88,7 @@ pub fn run(
     cancelled: &AtomicBool,
     tell: &mut dyn FnMut(&str),
 ) -> Result<Study> {
-    let mut store = Store::open(folder, &request, gpu.facts())?;
+    let mut store = Store::open(folder, scene, &request, gpu.facts())?;
     let mut study = Study {
         photonmill: env!("CARGO_PKG_VERSION"),
         device: gpu.facts().name.clone(),
@@ -98,7 +98,7 @@ pub fn run(
         complete: false,
         request,
     };
-    let subjects = Subject::all(gpu, scene, &study.request, tell)?;
+    let subjects = Subject::all(gpu, scene, &study.request, cancelled, tell)?;
     for points in subjects.iter().filter_map(Subject::points_file).take(1) {
         write_all([(folder.file(subject::POINTS), points.into_bytes())])?;
     }
@@ -157,19 +157,21 @@ impl Measuring<'_> {
     }
 
     fn climb(&mut self, curves: &mut [Curve]) -> Result<bool> {
+        // Warm-up and first rounds, which no point holds.
+        let mut unmeasured = vec![Duration::ZERO; curves.len()];
         for doublings in 0..=MOST_DOUBLINGS {
             let rounds = 1 << doublings;
             // Those that have time left for twice the photons of before, which take at most twice the time.
             let going: Vec<usize> = (0..curves.len())
                 .filter(|which| {
                     let Curve { points, left_out, .. } = &curves[*which];
-                    let spent: Duration = points.iter().map(Point::spent).sum();
+                    let spent: Duration = unmeasured[*which] + points.iter().map(Point::spent).sum::<Duration>();
                     let next = points.last().map_or(Duration::ZERO, |last| 2 * last.spent());
                     let allowed = rounds <= self.group.configurations[*which].most_rounds();
                     left_out.is_none() && points.len() == doublings && allowed && spent + next <= self.share
                 })
                 .collect();
-            if !self.level(&going, rounds, curves)? {
+            if !self.level(&going, rounds, curves, &mut unmeasured)? {
                 return Ok(false);
             }
         }
@@ -177,7 +179,7 @@ impl Measuring<'_> {
     }
 
     /// Adds a point to each of these curves, their runs in turn; false where somebody ended it.
-    fn level(&mut self, going: &[usize], rounds: u32, curves: &mut [Curve]) -> Result<bool> {
+    fn level(&mut self, going: &[usize], rounds: u32, curves: &mut [Curve], unmeasured: &mut [Duration]) -> Result<bool> {
         let Measuring { gpu, subject, group, request, cancelled, share, .. } = *self;
         let command = |which: usize| subject.command(&group.configurations[which], rounds, request.seed);
         let known: Option<Vec<Point>> = going.iter().map(|which| self.store.find(group.axis, &command(*which))).collect();
@@ -187,8 +189,9 @@ impl Measuring<'_> {
         }
         let mut shots = vec![Vec::new(); curves.len()];
         self.warm_up(&group.configurations[0])?;
-        // The first turn is dropped: it makes pipelines.
-        for turn in 0..=u64::from(request.repeats) {
+        // The first turn of all is dropped: it makes pipelines.
+        let first_turn = u64::from(going.iter().any(|which| !curves[*which].points.is_empty()));
+        for turn in first_turn..=u64::from(request.repeats) {
             for which in going.iter().copied() {
                 if curves[which].left_out.is_some() {
                     continue;
@@ -197,6 +200,7 @@ impl Measuring<'_> {
                 let (rounds, seed) = if turn == 0 { (1, request.seed) } else { (rounds, request.seed + turn - 1) };
                 match subject.run(gpu, &group.configurations[which], rounds, seed, cancelled) {
                     Ok(Some(_)) if turn == 0 => {
+                        unmeasured[which] += began.elapsed();
                         if began.elapsed() > PATIENCE.max(2 * share) {
                             let seconds = began.elapsed().as_secs_f64();
                             curves[which].left_out = Some(format!("one round takes {seconds:.1} s, too long for this budget"));

@@ -17,7 +17,7 @@ pub struct Shot {
     /// All rounds on the host's clock.
     pub wall_ms: f64,
     pub photons: u64,
-    /// Photons still flying after the last bounce, over those emitted.
+    /// Photons of the global map still flying after the last bounce, over those emitted.
     pub cut_off: f64,
 }
 
@@ -35,6 +35,18 @@ pub struct Estimate {
 impl Estimate {
     /// The mean of independent values, by Student's distribution; of a single one nothing is known.
     pub fn of_mean(values: &[f64]) -> Estimate {
+        Estimate::of_mean_with(values, CONFIDENCE)
+    }
+
+    /// The same of values above 0 whose logarithm is more nearly normal than they, as squared errors are: the interval
+    /// reaches further up than down.
+    fn of_squares(values: &[f64]) -> Estimate {
+        let plain = Estimate::of_mean(values);
+        let half = (plain.high - plain.value) / plain.value.max(f64::MIN_POSITIVE);
+        Estimate { value: plain.value, low: plain.value * (-half).exp(), high: plain.value * half.exp() }
+    }
+
+    fn of_mean_with(values: &[f64], confidence: f64) -> Estimate {
         let count = values.len() as f64;
         let mean = values.iter().sum::<f64>() / count;
         if values.len() < 2 {
@@ -42,7 +54,7 @@ impl Estimate {
         }
         let variance = values.iter().map(|value| (value - mean).powi(2)).sum::<f64>() / (count - 1.0);
         let student = StudentsT::new(0.0, 1.0, count - 1.0).expect("there is a degree of freedom");
-        let half = student.inverse_cdf(0.5 + 0.5 * CONFIDENCE) * (variance / count).sqrt();
+        let half = student.inverse_cdf(0.5 + 0.5 * confidence) * (variance / count).sqrt();
         Estimate { value: mean, low: mean - half, high: mean + half }
     }
 
@@ -102,7 +114,7 @@ impl Point {
 
     /// Relative root mean square error.
     pub fn error(&self) -> Estimate {
-        Estimate::of_mean(&self.squared_errors).map(root)
+        Estimate::of_squares(&self.squared_errors).map(root)
     }
 
     /// What independent runs differ by, relative to the reference.
@@ -112,7 +124,7 @@ impl Point {
 
     /// What all runs have in common. Below its upper end nothing can be told from noise.
     pub fn bias(&self) -> Estimate {
-        Estimate::of_mean(&self.squared_errors).map(|square| root(square - self.squared_noise))
+        Estimate::of_squares(&self.squared_errors).map(|square| root(square - self.squared_noise))
     }
 
     /// Of all rounds: on the device where it has a clock, else the host's. The middle one, the shortest and the longest.
@@ -132,6 +144,17 @@ impl Point {
         all.sort_by(f64::total_cmp);
         all[all.len() / 2]
     }
+}
+
+/// A value with the interval that the spread of these logarithms makes. Where a run has none, as it never came so far,
+/// the others alone would say too much.
+fn around(value: f64, logs: &[Option<f64>], confidence: f64) -> Estimate {
+    let known: Option<Vec<f64>> = logs.iter().copied().collect();
+    let Some(known) = known.filter(|known| known.len() > 1) else {
+        return Estimate { value, low: 0.0, high: f64::INFINITY };
+    };
+    let spread = Estimate::of_mean_with(&known, confidence);
+    Estimate { value, low: value * (spread.low - spread.value).exp(), high: value * (spread.high - spread.value).exp() }
 }
 
 /// A configuration at all its numbers of rounds.
@@ -163,12 +186,7 @@ impl Curve {
     pub fn time_to(&self, error: f64) -> Option<Estimate> {
         let mean: Vec<(f64, f64)> = self.points.iter().map(|point| (point.ms().value, point.error().value)).collect();
         let value = Curve::crossing(&mean, error)?;
-        let each: Vec<f64> = self.logs_of_time_to(error).into_iter().flatten().collect();
-        if each.len() < 2 {
-            return Some(Estimate { value, low: 0.0, high: f64::INFINITY });
-        }
-        let spread = Estimate::of_mean(&each);
-        Some(Estimate { value, low: value * (spread.low - spread.value).exp(), high: value * (spread.high - spread.value).exp() })
+        Some(around(value, &self.logs_of_time_to(error), CONFIDENCE))
     }
 
     /// Logarithm of the time that each run by itself takes to an error.
@@ -182,21 +200,21 @@ impl Curve {
             .collect()
     }
 
-    /// How many times longer than `other` this takes to an error, run by run.
-    pub fn times_longer(&self, other: &Curve, error: f64) -> Option<Estimate> {
+    /// How many times longer than `other` this takes to an error, run by run, with an interval of this confidence.
+    pub fn times_longer(&self, other: &Curve, error: f64, confidence: f64) -> Option<Estimate> {
         let (own, others) = (self.time_to(error)?, other.time_to(error)?);
         let value = own.value / others.value;
-        let each: Vec<f64> = self
-            .logs_of_time_to(error)
-            .into_iter()
-            .zip(other.logs_of_time_to(error))
-            .filter_map(|(own, other)| Some(own? - other?))
-            .collect();
-        if each.len() < 2 {
-            return Some(Estimate { value, low: 0.0, high: f64::INFINITY });
-        }
-        let spread = Estimate::of_mean(&each);
-        Some(Estimate { value, low: value * (spread.low - spread.value).exp(), high: value * (spread.high - spread.value).exp() })
+        let logs = self.logs_of_time_to(error).into_iter().zip(other.logs_of_time_to(error));
+        let each: Vec<Option<f64>> = logs.map(|(own, other)| Some(own? - other?)).collect();
+        Some(around(value, &each, confidence))
+    }
+
+    /// How many times longer half an error takes.
+    pub fn halving(&self, error: f64) -> Option<Estimate> {
+        let value = self.time_to(0.5 * error)?.value / self.time_to(error)?.value;
+        let logs = self.logs_of_time_to(0.5 * error).into_iter().zip(self.logs_of_time_to(error));
+        let each: Vec<Option<f64>> = logs.map(|(half, whole)| Some(half? - whole?)).collect();
+        Some(around(value, &each, CONFIDENCE))
     }
 
     /// Whether every run by itself, and their mean, crossed an error.
@@ -228,13 +246,13 @@ impl Curve {
         self.points.iter().map(|point| point.ms().value).fold(0.0, f64::max)
     }
 
-    /// Slope of the error over time on logarithmic scales, by least squares through the points whose noise is at least
-    /// nine tenths of their error: -1/2 where only noise counts.
-    pub fn noise_slope(&self) -> Option<f64> {
+    /// Slope of the error over photons on logarithmic scales, by least squares through the points whose noise is above
+    /// `least` and at least nine tenths of their error: -1/2 where only noise counts.
+    pub fn noise_slope(&self, least: f64) -> Option<f64> {
         let noisy: Vec<(f64, f64)> = self
             .points
             .iter()
-            .filter(|point| point.noise() >= 0.9 * point.error().value && point.noise() > 0.0)
+            .filter(|point| point.noise() >= 0.9 * point.error().value && point.noise() > least)
             .map(|point| ((point.photons as f64).ln(), point.noise().ln()))
             .collect();
         if noisy.len() < 3 {
@@ -278,10 +296,10 @@ mod tests {
         // 0.4 / sqrt(16) = 0.1.
         let time = base.time_to(0.1).unwrap();
         assert!((time.value / 32.0 - 1.0).abs() < 0.03 && time.low < 32.6 && time.high > 32.0, "{time:?}");
-        assert!((base.noise_slope().unwrap() + 0.5).abs() < 1e-9);
+        assert!((base.noise_slope(0.0).unwrap() + 0.5).abs() < 1e-9);
         assert_eq!(base.time_to(1e-3), None, "what was not measured is not guessed");
         assert_eq!(base.time_to(0.9), None, "nor what was reached before the first point");
-        let ratio = curve(0.4, 0.0, 6.0).times_longer(&base, 0.1).unwrap();
+        let ratio = curve(0.4, 0.0, 6.0).times_longer(&base, 0.1, CONFIDENCE).unwrap();
         assert!((ratio.value - 3.0).abs() < 1e-9 && ratio.low > 2.9 && ratio.high < 3.1, "{ratio:?}");
         assert!((base.error_after(32.0).unwrap().value / 0.1 - 1.0).abs() < 0.02);
     }
@@ -295,7 +313,8 @@ mod tests {
         assert!(without.bias().value < 0.2 * without.noise());
     }
 
-    /// Student's interval over few runs holds the truth as often as it says.
+    /// Intervals over few runs hold the truth as often as they say, and of squared errors nearly so even where one pixel
+    /// in all carries the noise.
     #[test]
     fn intervals_cover() {
         let normal = |run: u32, draw: u32| {
@@ -314,5 +333,18 @@ mod tests {
             assert!((held - CONFIDENCE).abs() < 0.0104, "{runs} runs: {held}");
         }
         assert!(Estimate::of_mean(&[1.0]).high.is_infinite());
+        for (pixels, runs) in [(1, 3), (1, 5), (2, 3), (2, 5), (5, 3), (5, 5), (40, 5)] {
+            let square =
+                |trial: u32, run: u32| (0..pixels).map(|pixel| normal(trial, 64 * run + pixel).powi(2)).sum::<f64>() / f64::from(pixels);
+            let held = (0..4000u32)
+                .filter(|trial| {
+                    let estimate = Estimate::of_squares(&(0..runs).map(|run| square(*trial, run)).collect::<Vec<_>>());
+                    estimate.low <= 1.0 && 1.0 <= estimate.high
+                })
+                .count() as f64
+                / 4000.0;
+            println!("{pixels} pixels, {runs} runs: {held}");
+            assert!(held > 0.87, "{pixels} pixels, {runs} runs: {held}");
+        }
     }
 }

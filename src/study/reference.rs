@@ -2,12 +2,14 @@
 
 use std::fmt::Write;
 use std::path::PathBuf;
+use std::sync::atomic::{AtomicBool, Ordering};
 
 use bytemuck::cast_slice;
 use glam::DVec3;
 use rayon::prelude::*;
 use sha2::{Digest, Sha256};
 
+use crate::error::{Error, Result};
 use crate::judge::Judge;
 use crate::judge::radiosity::{Law, Radiosity};
 use crate::scene::{Camera, Scene};
@@ -45,7 +47,7 @@ impl Reference {
 
     /// Irradiance of the walls of the paper's box at the middle of each texel, of all reflections, W/m2, by radiosity in
     /// f64. Its error is taken to be the difference from half as many cells.
-    pub fn walls(settings: &Settings, mesh: u32) -> Reference {
+    pub fn walls(settings: &Settings, mesh: u32) -> Result<Reference> {
         let key = format!("walls {RADIOSITY_VERSION} {:?} {} {} {mesh}", settings.emission, settings.reflectance, settings.light_radius);
         cached(&key, || {
             let law = match settings.emission {
@@ -61,44 +63,68 @@ impl Reference {
             });
             let square = |values: &mut dyn Iterator<Item = f64>| values.map(|value| value * value).sum::<f64>();
             let difference = square(&mut fine.iter().zip(&coarse).map(|(fine, coarse)| fine - coarse));
-            Reference {
+            Ok(Reference {
                 method: format!("radiosity in float64 on {CELLS} x {CELLS} cells a wall and {ORDERS} reflections, no photon in it"),
                 standard_errors: vec![0.0; fine.len()],
                 counts: vec![true; fine.len()],
                 relative_error: (difference / square(&mut fine.iter().copied())).sqrt(),
                 values: fine,
-            }
+            })
         })
     }
 
     /// Radiance of a picture, three channels a pixel, W/m2/sr, by path tracing in f64. Pixels in which a light is seen
     /// straight are left out: their light is known beforehand and would drown the rest.
-    pub fn picture(scene: &Scene, camera: &Camera, size: u32, samples: u32) -> Reference {
+    pub fn picture(
+        scene: &Scene,
+        camera: &Camera,
+        size: u32,
+        samples: u32,
+        cancelled: &AtomicBool,
+        tell: &mut dyn FnMut(&str),
+    ) -> Result<Reference> {
         let mut key = Hash(Sha256::new());
         write!(key, "{JUDGE_VERSION} {scene:?} {camera:?} {size} {samples}").expect("hashing cannot fail");
         cached(&format!("picture {:x}", key.0.finalize()), || {
-            let image = Judge::new(scene, u32::MAX).image(camera, size, size, samples, SEED);
+            let (batch, batches) = (samples / BATCHES, BATCHES);
+            let judge = Judge::new(scene, u32::MAX);
+            let places = 3 * (size * size) as usize;
+            let (mut values, mut variances) = (vec![0.0; places], vec![0.0; places]);
+            for number in 0..batches {
+                if cancelled.load(Ordering::Relaxed) {
+                    return Err(Error::Interrupted);
+                }
+                tell(&format!("reference: {} of {samples} samples a pixel", number * batch));
+                let image = judge.image(camera, size, size, batch, SEED + u64::from(number));
+                for (place, (value, variance)) in values.iter_mut().zip(&mut variances).enumerate() {
+                    let pixel = &image.pixels[place / 3];
+                    *value += pixel.mean.total()[place % 3] / f64::from(batches);
+                    *variance += (pixel.total_standard_error[place % 3] / f64::from(batches)).powi(2);
+                }
+            }
             let shining = Judge::new(scene, 0).image(camera, size, size, 64, SEED);
-            let channels = |of: &dyn Fn(usize) -> DVec3| (0..image.pixels.len()).flat_map(|pixel| of(pixel).to_array()).collect();
             let mut reference = Reference {
-                method: format!("path tracing in float64 on the CPU, {samples} samples a pixel, no photon in it"),
-                values: channels(&|pixel| image.pixels[pixel].mean.total()),
-                standard_errors: channels(&|pixel| image.pixels[pixel].total_standard_error),
-                counts: (0..3 * image.pixels.len()).map(|place| shining.pixels[place / 3].mean.direct == DVec3::ZERO).collect(),
+                method: format!("path tracing in float64 on the CPU, {} samples a pixel, no photon in it", batch * batches),
+                values,
+                standard_errors: variances.into_iter().map(f64::sqrt).collect(),
+                counts: (0..places).map(|place| shining.pixels[place / 3].mean.direct == DVec3::ZERO).collect(),
                 relative_error: 0.0,
             };
             let noise = reference.mean_over(|place| reference.standard_errors[place].powi(2));
             reference.relative_error = (noise / reference.mean_square()).sqrt();
-            reference
+            Ok(reference)
         })
     }
 }
+
+/// Parts that a path-traced reference is made in; between them somebody may end it.
+const BATCHES: u32 = 8;
 
 /// Seed of references: no run that they judge has its random numbers, as those come from another generator.
 const SEED: u64 = 0x5eed;
 /// To be raised when a method's results change, so that nothing old is read.
 const RADIOSITY_VERSION: u32 = 1;
-const JUDGE_VERSION: u32 = 1;
+const JUDGE_VERSION: u32 = 2;
 const CELLS: usize = 16;
 /// Light that was reflected 40 times is less than 1e-6 of all in the paper's box.
 const ORDERS: usize = 40;
@@ -112,6 +138,13 @@ pub fn wall_points(mesh: u32) -> Vec<(usize, DVec3)> {
         .collect()
 }
 
+/// Of everything that a scene holds.
+pub fn digest(scene: &Scene) -> String {
+    let mut hash = Hash(Sha256::new());
+    write!(hash, "{scene:?}").expect("hashing cannot fail");
+    format!("{:x}", hash.0.finalize())
+}
+
 struct Hash(Sha256);
 
 impl Write for Hash {
@@ -122,12 +155,12 @@ impl Write for Hash {
 }
 
 /// A reference from the user's cache, else made and put there. A cache that cannot be read or written costs time only.
-fn cached(key: &str, make: impl FnOnce() -> Reference) -> Reference {
+fn cached(key: &str, make: impl FnOnce() -> Result<Reference>) -> Result<Reference> {
     let Some(path) = path_of(key) else { return make() };
     if let Some(known) = std::fs::read(&path).ok().and_then(|bytes| decode(&bytes)) {
-        return known;
+        return Ok(known);
     }
-    let made = make();
+    let made = make()?;
     let folder = path.parent().expect("the file lies in a folder");
     let written = std::fs::create_dir_all(folder)
         .and_then(|()| tempfile::NamedTempFile::new_in(folder))
@@ -135,7 +168,7 @@ fn cached(key: &str, make: impl FnOnce() -> Reference) -> Reference {
     if let Ok(file) = written {
         let _ = file.persist(path);
     }
-    made
+    Ok(made)
 }
 
 fn path_of(key: &str) -> Option<PathBuf> {

@@ -8,9 +8,11 @@ use serde::{Deserialize, Serialize};
 use super::Request;
 use super::axes::Axis;
 use super::point::Point;
+use super::reference;
 use crate::error::{Error, Result};
 use crate::gpu::DeviceFacts;
 use crate::output::destination::Folder;
+use crate::scene::Scene;
 
 /// What points are of; those of another study are no use.
 #[derive(Debug, PartialEq, Serialize, Deserialize)]
@@ -18,6 +20,8 @@ struct Head {
     photonmill: String,
     device: String,
     driver: String,
+    /// Digest of all that the scene holds.
+    scene: String,
     request: serde_json::Value,
 }
 
@@ -27,11 +31,18 @@ pub struct Store {
     points: HashMap<(Axis, String), Point>,
 }
 
+/// A point and its axis, if the line holds all runs of it.
+fn whole(line: &str, repeats: u32) -> Option<(Axis, Point)> {
+    let (axis, point) = serde_json::from_str::<(Axis, Point)>(line).ok()?;
+    let lengths = [point.gpu_ms.len(), point.wall_ms.len(), point.seconds.len(), point.squared_errors.len()];
+    lengths.iter().all(|length| *length == repeats as usize).then_some((axis, point))
+}
+
 /// A head, then a point a line.
 const NAME: &str = "points.jsonl";
 
 impl Store {
-    pub fn open(folder: &Folder, request: &Request, device: &DeviceFacts) -> Result<Store> {
+    pub fn open(folder: &Folder, scene: &Scene, request: &Request, device: &DeviceFacts) -> Result<Store> {
         let path = folder.path().join(NAME);
         let refuse = |reason: String| Error::Output { option: "--out", path: path.clone(), reason };
         std::fs::create_dir_all(folder.path()).map_err(|error| refuse(error.kind().to_string()))?;
@@ -39,6 +50,7 @@ impl Store {
             photonmill: env!("CARGO_PKG_VERSION").to_owned(),
             device: device.name.clone(),
             driver: device.driver.clone(),
+            scene: reference::digest(scene),
             request: serde_json::to_value(request).expect("a request is plain data"),
         };
         let mut points = HashMap::new();
@@ -56,14 +68,14 @@ impl Store {
                     ));
                 }
                 // A last line that was cut off is measured again.
-                for (line, (axis, point)) in lines.filter_map(|line| Some((line, serde_json::from_str::<(Axis, Point)>(line).ok()?))) {
+                for (line, (axis, point)) in lines.filter_map(|line| Some((line, whole(line, request.repeats)?))) {
                     kept.push_str(line);
                     kept.push('\n');
                     points.insert((axis, point.command.clone()), point);
                 }
             }
             Err(error) if error.kind() == std::io::ErrorKind::NotFound => {}
-            Err(error) => return Err(refuse(error.kind().to_string())),
+            Err(error) => return Err(refuse(format!("what is there cannot be read, {}", error.kind()))),
         }
         let head = serde_json::to_string(&head).expect("a head is plain data");
         // The file as it was stands until the new one is whole.

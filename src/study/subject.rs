@@ -9,7 +9,7 @@ use super::Request;
 use super::axes::{self, Configuration, Group, Line};
 use super::point::Shot;
 use super::reference::{Reference, wall_points};
-use crate::error::Result;
+use crate::error::{Error, Result};
 use crate::film::estimate_walls;
 use crate::gpu::Gpu;
 use crate::judge::radiosity::inward;
@@ -19,8 +19,9 @@ use crate::plan::transport::{Sensor, TransportPlan};
 use crate::records::Receiver;
 use crate::render::{self, Control};
 use crate::scene::geometry::Geometry;
+use crate::scene::light::LightKind;
 use crate::scene::open_box::open_box;
-use crate::scene::{Camera, Scene};
+use crate::scene::{Camera, Light, Mesh, Scene};
 use crate::settings::transport::{Effect, TransportSettings};
 use crate::settings::{Preset, Settings, Variant};
 use crate::timings::Timings;
@@ -46,7 +47,7 @@ const FEW_TRIANGLES: usize = 256;
 
 impl Subject {
     /// Quantities of a scene; making their references may take a while.
-    pub fn all(gpu: &Gpu, scene: &Scene, request: &Request, tell: &mut dyn FnMut(&str)) -> Result<Vec<Subject>> {
+    pub fn all(gpu: &Gpu, scene: &Scene, request: &Request, cancelled: &AtomicBool, tell: &mut dyn FnMut(&str)) -> Result<Vec<Subject>> {
         let Request { scene: name, size, photons, reference_samples, .. } = request.clone();
         let geometry = Rc::new(Geometry::new(scene)?);
         let subject = |quantity: &str, reference, groups| Subject {
@@ -63,7 +64,7 @@ impl Subject {
         if name == "open-box" {
             tell("reference: radiosity of the box");
             let usual = Settings::default();
-            let reference = Reference::walls(&usual, size);
+            let reference = Reference::walls(&usual, size)?;
             let points = wall_points(size);
             let receivers = || points.iter().map(|(wall, point)| (*point, inward(*wall))).collect();
             let papers = axes::of_the_papers_rounds(size);
@@ -80,20 +81,33 @@ impl Subject {
             let (min, max) = scene.bounds();
             Camera::around(min, max)
         });
+        if unknown_to_paths(scene) {
+            return Err(Error::setting(
+                "study",
+                &name,
+                "has a point, spot, directional or disc light and mirrors or glass: no path from the eye finds the caustics between them, so there is no reference",
+            ));
+        }
         tell(&format!("reference: path tracing of {size} x {size} pixels, {reference_samples} samples each, unless the cache has it"));
-        let reference = Reference::picture(scene, &camera, size, reference_samples);
+        let reference = Reference::picture(scene, &camera, size, reference_samples, cancelled, tell)?;
+        if reference.mean_square() <= f64::MIN_POSITIVE {
+            let why = "shows no light but lamps seen straight, or none at all: there is nothing that an error could be relative to";
+            return Err(Error::setting("study", &name, why));
+        }
         Ok(vec![Subject { camera: Some(camera), ..subject("picture", reference, scene_axes(gpu, scene, &geometry, request)?) }])
     }
 
     /// What repeats a run.
     pub fn command(&self, configuration: &Configuration, rounds: u32, seed: u64) -> String {
         match &configuration.line {
-            Line::Paper(settings) => command::main_job(Preset::Modified, &Settings { rounds, seed, ..settings.clone() }),
+            Line::Paper(settings) => {
+                command::main_job(Preset::Modified, &Settings { rounds, seed, ..settings.clone() }) + " --irradiance irradiance"
+            }
             Line::Scene(settings) => {
                 let settings = TransportSettings { rounds, seed, ..settings.clone() };
                 let job = match self.camera {
-                    Some(_) => format!("render {} --size {}x{} -o picture.exr", self.name, self.size, self.size),
-                    None => format!("probe {} --points {POINTS} -o irradiance.csv", self.name),
+                    Some(_) => format!("render {} --size {}x{} -o picture.exr", quoted(&self.name), self.size, self.size),
+                    None => format!("probe {} --points {POINTS} -o irradiance.csv", quoted(&self.name)),
                 };
                 command::on_scene(&job, &settings)
             }
@@ -129,8 +143,8 @@ impl Subject {
                     .flat_map(|pixel| lit.film.mean(pixel, &lit.plan).to_array().into_iter().take(channels))
                     .collect();
                 let [global, caustic] = lit.fates.each_ref().map(Fates::ledger);
-                let both = Ledger { emitted: global.emitted + caustic.emitted, cut_off: global.cut_off, ..global };
-                shot(values, &lit.timings, both)
+                // A caustic map's photons end at the first surface that scatters, so the cap is the global map's.
+                Shot { photons: global.emitted + caustic.emitted, ..shot(values, &lit.timings, global) }
             }
         };
         Ok((!cancelled.load(Ordering::Relaxed)).then_some(shot))
@@ -155,6 +169,19 @@ impl Subject {
         let plan = TransportPlan::new(&self.scene, &geometry, &settings, sensor, &render::limits(gpu.facts()))?;
         transport::light(gpu, &View { geometry: &geometry, camera: self.camera.as_ref(), phases: &phases }, plan, control)
     }
+}
+
+/// As a shell takes it for one word.
+fn quoted(name: &str) -> String {
+    let plain = |letter: char| letter.is_ascii_alphanumeric() || "-_./+,".contains(letter);
+    if name.chars().all(plain) { name.to_owned() } else { format!("'{}'", name.replace('\'', "'\\''")) }
+}
+
+/// Whether light goes from lamps that no path meets over mirrors or through glass.
+fn unknown_to_paths(scene: &Scene) -> bool {
+    let is_specular = |mesh: &Mesh| scene.materials[mesh.material].surface.is_specular();
+    let is_point_like = |light: &Light| !matches!(light.kind, LightKind::Environment { .. });
+    scene.lights.iter().any(is_point_like) && scene.meshes.iter().any(is_specular)
 }
 
 /// The file beside the page that the commands read points from.

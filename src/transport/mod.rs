@@ -130,6 +130,7 @@ pub fn light(gpu: &Gpu, view: &View, plan: TransportPlan, control: &mut Control)
     let mut fates = [Fates::new(plan.settings.bounces), Fates::new(plan.settings.bounces)];
     let mut watch = Watch::new(plan.settings.stop, plan.settings.alpha, started);
     let (mut done, mut settled, mut end) = (0, 0, End::Rounds);
+    let mut submissions_settled = commands.submission_count();
     let photons_per_round = plan.maps().map(|map| u64::from(map.photons)).sum::<u64>();
     for number in 0..plan.settings.rounds {
         commands.scope("round", |commands| {
@@ -141,9 +142,13 @@ pub fn light(gpu: &Gpu, view: &View, plan: TransportPlan, control: &mut Control)
         let open = u64::from(done - settled + 1) * plan.maps().map(|map| u64::from(map.photons)).max().unwrap_or(0);
         let short = commands.timestamps_left() < TIMESTAMPS_PER_ROUND || open > u64::from(u32::MAX);
         let photons = u64::from(done) * photons_per_round;
-        if last || short || watch.is_due(done) || watch.may_end(done, photons) || commands.work() * 2 >= plan.work_per_submission {
+        // A long round hands commands over by itself, and nobody has looked at the clock since.
+        let submitted = commands.submission_count() > submissions_settled;
+        let busy = submitted || commands.work() * 2 >= plan.work_per_submission;
+        if last || short || busy || watch.is_due(done) || watch.may_end(done, photons) {
             settle(&mut commands, &resources, &plan, u64::from(done - settled), &mut fates)?;
             settled = done;
+            submissions_settled = commands.submission_count();
             if watch.is_due(done) {
                 watch.look(done, film(&mut commands, &resources, &plan, done)?.relative_error(&plan));
             }
