@@ -121,6 +121,22 @@ fn a_picture_is_studied_against_path_tracing() {
     assert!(part.sentences().len() > 10, "{:?}", part.sentences());
 }
 
+/// Photons on a floor below a point and a disc; a factor forgotten would be no noise.
+#[test]
+fn floors_are_studied_against_their_closed_form() {
+    let Some(gpu) = device() else { return };
+    for name in ["disc-over-plane", "furnace"] {
+        let folder = tempfile::tempdir().unwrap();
+        let study = run(&gpu, folder.path(), request(name, 3)).unwrap();
+        let part = &study.parts[0];
+        assert!(part.reference.contains("closed form"), "{name}");
+        let photons = part.curves().find(|curve| curve.label == "direct light from photons").unwrap().points.last().unwrap();
+        assert!(photons.error().value < 0.5 && photons.bias().value < 0.2, "{name}: {:?}, bias {:?}", photons.error(), photons.bias());
+        let base = part.base().unwrap().points.last().unwrap();
+        assert!(base.error().value < 0.2, "{name}: {:?}", base.error());
+    }
+}
+
 #[test]
 fn a_study_that_is_cancelled_keeps_what_it_has() {
     let Some(gpu) = device() else { return };

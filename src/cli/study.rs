@@ -17,7 +17,8 @@ use crate::study::{self, Request};
 
 #[derive(Args)]
 pub(super) struct StudyArgs {
-    /// A built-in scene by name, or a .gltf or .glb file; `open-box` is held against radiosity, others against path tracing
+    /// A built-in scene by name, or a .gltf or .glb file; `open-box` is held against radiosity, scenes of one
+    /// floor against their closed form, others against path tracing
     #[arg(value_name = "SCENE")]
     scene: String,
     /// Folder for index.html, points.csv, study.json and SVG; a study that was cut off goes on from what is there

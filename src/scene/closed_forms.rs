@@ -47,6 +47,26 @@ pub const DISC_RADIUS: f64 = 0.25;
 /// Share of light that the furnace's and the integrating sphere's walls scatter.
 pub const WALL_ALBEDO: f32 = 0.5;
 
+/// Irradiance of the floor of a scene at (x, 0, z) in closed form, W/m2; `None` where there is none at every point.
+pub fn floor_irradiance(name: &str, x: f64, z: f64) -> Option<f64> {
+    let squared = x * x + z * z;
+    match name {
+        "furnace" => Some(PI / (1.0 - f64::from(WALL_ALBEDO))),
+        // 1 W/sr at a height of 1 m: cosine over squared distance.
+        "point-over-plane" => Some((1.0 + squared).powf(-1.5)),
+        // 1 W over the disc, times the factor of a parallel disc and a small surface beside its axis (Hamilton and Morgan
+        // 1952).
+        "disc-over-plane" => {
+            let disc = DISC_RADIUS * DISC_RADIUS;
+            let root = ((squared + 1.0 + disc).powi(2) - 4.0 * disc * squared).sqrt();
+            Some(0.5 * (1.0 - (squared + 1.0 - disc) / root) / (PI * disc))
+        }
+        "sun-over-plane" => Some(2.0 * 0.8),
+        "sky-over-plane" => Some(PI),
+        _ => None,
+    }
+}
+
 /// A closed cube of 1 m whose walls shine with 1 W/m2/sr and scatter [`WALL_ALBEDO`] of what arrives:
 /// radiance 1 / (1 - albedo) and irradiance pi / (1 - albedo) everywhere.
 fn furnace() -> Scene {

@@ -54,8 +54,15 @@ impl Part {
     pub fn sentences(&self) -> Vec<String> {
         let Some(base) = self.base() else { return Vec::new() };
         let least = self.least_error();
-        let mut sentences: Vec<String> =
-            [price(base, least), halving(base, least), law("the base", base, least)].into_iter().flatten().collect();
+        let mut sentences: Vec<String> = [
+            price(base, least),
+            halving(base, least),
+            law("the base", base, least),
+            self.comparisons.first().and_then(|one| floor(one.axis, base, least)),
+        ]
+        .into_iter()
+        .flatten()
+        .collect();
         let choices: usize = self.comparisons.iter().map(|comparison| comparison.others().count()).sum();
         // So that all of them together are as sure as one.
         let confidence = 1.0 - (1.0 - CONFIDENCE) / choices.max(1) as f64;
@@ -76,9 +83,10 @@ impl Part {
             sentences.push(format!("Not told from the base by these runs (times the time, interval): {}.", undecided.join("; ")));
         }
         for comparison in &self.comparisons {
-            // The paper's rounds are all compared with the law of noise, not with each other alone.
-            let curves = comparison.curves.iter().skip(usize::from(comparison.axis != Axis::Paper));
-            sentences.extend(curves.filter_map(|curve| floor(comparison.axis, curve, least)));
+            let Some(base) = comparison.base() else { continue };
+            let of_base = base.points.last().map_or(0.0, |last| last.bias().high);
+            // What differs from the base in nothing but time has its bias too.
+            sentences.extend(comparison.others().filter_map(|curve| floor(comparison.axis, curve, least.max(1.2 * of_base))));
         }
         for comparison in self.comparisons.iter().filter(|comparison| comparison.axis == Axis::Bounces) {
             sentences.extend(comparison.curves.iter().filter_map(lost));

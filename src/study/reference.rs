@@ -12,6 +12,7 @@ use sha2::{Digest, Sha256};
 use crate::error::{Error, Result};
 use crate::judge::Judge;
 use crate::judge::radiosity::{Law, Radiosity};
+use crate::scene::closed_forms::floor_irradiance;
 use crate::scene::{Camera, Scene};
 use crate::settings::{EmissionLaw, Settings, WALL_NAMES};
 
@@ -73,6 +74,22 @@ impl Reference {
         })
     }
 
+    /// Irradiance of a square of floor in closed form, and its points and normals, for scenes that have one.
+    pub fn floor(name: &str, size: u32) -> Option<(Vec<(DVec3, DVec3)>, Reference)> {
+        // The furnace's floor goes from 0 to 1 m; planes are around the origin.
+        let place = |i: u32| (f64::from(i) + 0.5) / f64::from(size) - if name == "furnace" { 0.0 } else { 0.5 };
+        let points: Vec<DVec3> = (0..size * size).map(|k| DVec3::new(place(k % size), 0.0, place(k / size))).collect();
+        let values: Option<Vec<f64>> = points.iter().map(|point| floor_irradiance(name, point.x, point.z)).collect();
+        let reference = Reference {
+            method: "closed form, no photon in it".to_owned(),
+            values: values?,
+            standard_errors: vec![0.0; points.len()],
+            counts: vec![true; points.len()],
+            relative_error: SINGLE_PRECISION,
+        };
+        Some((points.into_iter().map(|point| (point, DVec3::Y)).collect(), reference))
+    }
+
     /// Radiance of a picture, three channels a pixel, W/m2/sr, by path tracing in f64. Pixels in which a light is seen
     /// straight are left out: their light is known beforehand and would drown the rest.
     pub fn picture(
@@ -116,6 +133,9 @@ impl Reference {
         })
     }
 }
+
+/// What positions in f32 leave of a closed form.
+const SINGLE_PRECISION: f64 = 1e-6;
 
 /// Parts that a path-traced reference is made in; between them somebody may end it.
 const BATCHES: u32 = 8;

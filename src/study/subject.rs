@@ -77,6 +77,10 @@ impl Subject {
                 Subject { receivers: receivers(), ..subject("the paper's own question: rounds of 5000 photons", reference, papers) },
             ]);
         }
+        if let Some((receivers, reference)) = Reference::floor(&name, size) {
+            let axes = scene_axes(gpu, scene, &geometry, request)?;
+            return Ok(vec![Subject { receivers, ..subject("irradiance of the floor", reference, axes) }]);
+        }
         let camera = scene.cameras.first().cloned().unwrap_or_else(|| {
             let (min, max) = scene.bounds();
             Camera::around(min, max)
