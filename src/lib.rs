@@ -33,7 +33,8 @@
 //!
 //! [`plan::transport`] decides which effects a scene calls for; what it drops is in no buffer, no pass and, by
 //! specialization constants (`glsl/scene/effects.glsl`), in no pipeline. [`judge`] is a path tracer on the CPU
-//! that shares nothing with it but the scene; [`selfcheck`] holds a device against closed forms.
+//! that shares nothing with it but the scene; [`selfcheck`] holds a device against closed forms, and
+//! [`study`] measures what accuracy costs in time on it.
 //!
 //! # What never changes by accident
 //!

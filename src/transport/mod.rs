@@ -148,10 +148,10 @@ pub fn light(gpu: &Gpu, view: &View, plan: TransportPlan, control: &mut Control)
         if last || short || busy || watch.is_due(done) || watch.may_end(done, photons) {
             settle(&mut commands, &resources, &plan, u64::from(done - settled), &mut fates)?;
             settled = done;
-            submissions_settled = commands.submission_count();
             if watch.is_due(done) {
                 watch.look(done, film(&mut commands, &resources, &plan, done)?.relative_error(&plan));
             }
+            submissions_settled = commands.submission_count();
             let ledger = fates[0].ledger().plus(&fates[1].ledger());
             (control.progress)(&watch.progress(f64::from(done), plan.settings.rounds, photons_per_round, ledger));
             let cancelled = control.cancelled.load(Ordering::Relaxed).then_some(End::Cancelled);
