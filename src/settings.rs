@@ -364,7 +364,7 @@ impl Settings {
     }
 
     /// Rounds of a run that ends by itself: as many as its photons take, or as film and random numbers allow, and no
-    /// more than [`MOST_ROUNDS`].
+    /// more than `MOST_ROUNDS`.
     pub fn most_rounds(&self) -> u32 {
         let photons = u64::from(self.photons).max(1);
         let bounces = u64::from(self.bounces).max(1);

@@ -133,7 +133,8 @@ fn floors_are_studied_against_their_closed_form() {
         let photons = part.curves().find(|curve| curve.label == "direct light from photons").unwrap().points.last().unwrap();
         assert!(photons.error().value < 0.5 && photons.bias().value < 0.2, "{name}: {:?}, bias {:?}", photons.error(), photons.bias());
         let base = part.base().unwrap().points.last().unwrap();
-        assert!(base.error().value < 0.2, "{name}: {:?}", base.error());
+        // Few photons are noisy, and right on average.
+        assert!(base.error().value < 0.6 && base.bias().value < 0.2, "{name}: {:?}, bias {:?}", base.error(), base.bias());
     }
 }
 

@@ -1,7 +1,7 @@
 //! What accuracy costs in time: every choice that a user has, measured as error against time on this device.
 //!
 //! A study runs each configuration of each axis ([`axes`]) at numbers of rounds that double, several times with seeds of
-//! their own, holds the results against a reference that another method made ([`reference`]), and writes what it found
+//! their own, holds the results against a reference that another method made ([`mod@reference`]), and writes what it found
 //! as a page, CSV, JSON and SVG. Points that are finished are kept ([`store`]), so that a study that was cut off goes on
 //! where it ended.
 
