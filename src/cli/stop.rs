@@ -5,6 +5,7 @@ use std::io::Write;
 use clap::{Args, ValueEnum};
 use indicatif::{ProgressBar, ProgressStyle};
 
+use super::complain;
 use super::run::whole;
 use crate::bias::Bias;
 use crate::error::{Error, Result};
@@ -140,8 +141,10 @@ const REFINEMENTS: u32 = 4;
 pub(super) fn bias_before(wanted: f64, shrinks: bool, mut measure: impl FnMut(u32) -> Result<Option<Bias>>) -> Result<Option<Bias>> {
     let mut rounds = FIRST_ROUNDS;
     for refinement in 0..=REFINEMENTS {
+        complain(&format!("measuring the bias first: {} batches of {rounds} round(s) at two radii", crate::bias::BATCHES));
         let Some(bias) = measure(rounds)? else { return Ok(None) };
-        let is_decided = bias.upper <= 0.5 * wanted || bias.lower > wanted || refinement == REFINEMENTS;
+        // More than half of the error wanted is then left for noise.
+        let is_decided = bias.upper <= 0.85 * wanted || bias.lower > wanted || refinement == REFINEMENTS;
         // What shrinks need not be known as well: it will be small enough some day.
         if is_decided || shrinks {
             if !shrinks && bias.upper >= wanted {

@@ -27,6 +27,8 @@ struct Head {
 
 pub struct Store {
     file: std::fs::File,
+    /// Held for as long as this is.
+    _lock: std::fs::File,
     path: std::path::PathBuf,
     points: HashMap<(Axis, String), Point>,
 }
@@ -40,12 +42,18 @@ fn whole(line: &str, repeats: u32) -> Option<(Axis, Point)> {
 
 /// A head, then a point a line.
 const NAME: &str = "points.jsonl";
+/// Locked while a study runs, so that two do not write over each other.
+const LOCK: &str = "study.lock";
 
 impl Store {
     pub fn open(folder: &Folder, scene: &Scene, request: &Request, device: &DeviceFacts) -> Result<Store> {
         let path = folder.path().join(NAME);
         let refuse = |reason: String| Error::Output { option: "--out", path: path.clone(), reason };
         std::fs::create_dir_all(folder.path()).map_err(|error| refuse(error.kind().to_string()))?;
+        let lock = std::fs::File::create(folder.path().join(LOCK)).map_err(|error| refuse(error.kind().to_string()))?;
+        if lock.try_lock().is_err() {
+            return Err(Error::setting("--out", folder.path().display(), "is where another study writes just now; name another folder"));
+        }
         let head = Head {
             photonmill: env!("CARGO_PKG_VERSION").to_owned(),
             device: device.name.clone(),
@@ -83,7 +91,7 @@ impl Store {
             .and_then(|mut file| file.write_all(format!("{head}\n{kept}").as_bytes()).map(|()| file))
             .and_then(|file| file.persist(&path).map_err(|error| error.error))
             .map_err(|error| refuse(error.kind().to_string()))?;
-        Ok(Store { file, path, points })
+        Ok(Store { file, _lock: lock, path, points })
     }
 
     /// The point of a command, as it was measured along an axis.
