@@ -15,7 +15,8 @@ pub fn percent(share: f64) -> String {
 
 /// 'from a to b', or that nothing is known.
 fn between(estimate: Estimate, show: impl Fn(f64) -> String) -> String {
-    if estimate.high.is_finite() && estimate.low > 0.0 {
+    // Beyond that it is no knowledge.
+    if estimate.low > 0.0 && estimate.high < 100.0 * estimate.low {
         format!("{} to {}", show(estimate.low), show(estimate.high))
     } else {
         "unknown from so few runs".to_owned()
@@ -132,6 +133,9 @@ enum Choice {
 /// What a choice buys or costs against the base.
 fn choice(axis: Axis, curve: &Curve, base: &Curve, least: f64, confidence: f64) -> Choice {
     let name = format!("{}: {}", axis.name(), curve.label);
+    if curve.points.len() < 2 || base.points.len() < 2 {
+        return Choice::Undecided(format!("{name}, as there was time for a single point"));
+    }
     let Some((error, longer)) =
         common_error(curve, base, least).and_then(|error| Some((error, curve.times_longer(base, error, confidence)?)))
     else {
