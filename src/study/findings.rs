@@ -233,24 +233,46 @@ fn then_and_now(base: &Curve) -> Vec<String> {
     sentences
 }
 
-/// A row of the tables of equal time and equal error: name, value, and the value over that of the base beside it.
-pub type Row = (String, Option<Estimate>, Option<f64>);
+/// A row of the tables of equal time and equal error.
+pub struct Row {
+    pub name: String,
+    /// The value, or why there is none.
+    pub value: Result<Estimate, String>,
+    /// Over the value of the base that was measured in turn with it.
+    pub ratio: Option<f64>,
+}
 
 /// All curves and, in every comparison, what `value` says of them; the base stands first, once.
-fn rows(part: &Part, value: impl Fn(&Curve) -> Option<Estimate>) -> Vec<Row> {
-    let mut rows: Vec<Row> = part.base().map(|base| (format!("base: {}", base.label), value(base), None)).into_iter().collect();
+fn rows(part: &Part, value: impl Fn(&Curve) -> Result<Estimate, String>) -> Vec<Row> {
+    let of_base = |base: &Curve| Row { name: format!("base: {}", base.label), value: value(base), ratio: None };
+    let mut rows: Vec<Row> = part.base().map(of_base).into_iter().collect();
     for comparison in &part.comparisons {
-        let of_base = comparison.base().and_then(&value);
+        let base = comparison.base().and_then(|base| value(base).ok()).filter(|base| base.value > 0.0);
         rows.extend(comparison.others().map(|curve| {
-            let own = value(curve);
-            (
-                format!("{}: {}", comparison.axis.name(), curve.label),
-                own,
-                own.zip(of_base).filter(|(_, base)| base.value > 0.0).map(|(own, base)| own.value / base.value),
-            )
+            let value = value(curve);
+            let ratio = value.as_ref().ok().zip(base).map(|(own, base)| own.value / base.value);
+            Row { name: format!("{}: {}", comparison.axis.name(), curve.label), value, ratio }
         }));
     }
     rows
+}
+
+/// Why a curve has no error after a time.
+fn measured_to(curve: &Curve, ms: f64) -> String {
+    match (curve.points.first(), curve.points.last()) {
+        (Some(first), _) if first.ms().value > ms => format!("first {} after {}", percent(first.error().value), duration(first.ms().value)),
+        (_, Some(last)) => format!("last {} after {}", percent(last.error().value), duration(last.ms().value)),
+        _ => "not measured".to_owned(),
+    }
+}
+
+/// Why a curve has no time to an error.
+fn beyond(curve: &Curve, error: f64) -> String {
+    match curve.points.first() {
+        Some(first) if first.error().value <= error => format!("less than {}", duration(first.ms().value)),
+        Some(_) => format!("not within {}", duration(curve.longest())),
+        None => "not measured".to_owned(),
+    }
 }
 
 /// Errors after the longest time that nine in ten of all curves were measured at.
@@ -258,7 +280,7 @@ pub fn equal_time(part: &Part) -> Option<(f64, Vec<Row>)> {
     let mut longest: Vec<f64> = part.curves().filter(|curve| curve.points.len() > 1).map(Curve::longest).collect();
     longest.sort_by(f64::total_cmp);
     let ms = longest.get(longest.len() / 10)?.min(part.base()?.longest());
-    Some((ms, rows(part, |curve| curve.error_after(ms))))
+    Some((ms, rows(part, |curve| curve.error_after(ms).ok_or_else(|| measured_to(curve, ms)))))
 }
 
 /// Times to the smallest error that half of all curves reach.
@@ -267,7 +289,7 @@ pub fn equal_error(part: &Part) -> Option<(f64, Vec<Row>)> {
     let reach = |error: f64| part.curves().filter(|curve| curve.time_to(error).is_some()).count();
     let most = part.curves().count();
     let error = steps(part.least_error()).find(|error| base.time_to(*error).is_some() && 2 * reach(*error) >= most)?;
-    Some((error, rows(part, |curve| curve.time_to(error))))
+    Some((error, rows(part, |curve| curve.time_to(error).ok_or_else(|| beyond(curve, error)))))
 }
 
 const COLUMNS: [&str; 21] = [

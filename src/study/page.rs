@@ -107,17 +107,23 @@ fn table(title: &str, what: &str, rows: &[Row], show: impl Fn(f64) -> String) ->
             table {
                 thead { tr { th.name { (title) } th { (what) } th { (findings::words_of_confidence()) } th { "over the base" } } }
                 tbody {
-                    @for (name, value, ratio) in rows {
+                    @for Row { name, value, ratio } in rows {
                         tr {
                             th scope="row" { (name) }
-                            td { (value.map_or_else(|| "not reached".to_owned(), |value| show(value.value))) }
-                            td { @if let Some(value) = value.filter(|value| value.low > 0.0 && value.low < value.high && value.high.is_finite()) { (show(value.low)) " to " (show(value.high)) } }
+                            @match value {
+                                Ok(value) => {
+                                    td { (show(value.value)) }
+                                    td { @if value.low > 0.0 && value.low < value.high && value.high.is_finite() { (show(value.low)) " to " (show(value.high)) } }
+                                },
+                                Err(why) => { td { (why) } td {} },
+                            }
                             td { (ratio.map_or_else(String::new, times)) }
                         }
                     }
                 }
             }
         }
+        p { "Ratios are to the base that was measured in turn with the choice." }
     }
 }
 
