@@ -47,6 +47,20 @@ fn entries(folder: &Path) -> Vec<String> {
     std::fs::read_dir(folder).unwrap().map(|entry| entry.unwrap().file_name().to_string_lossy().into_owned()).collect()
 }
 
+/// The bias is measured before the run, so that one line says what is being done and the last one that it was in vain.
+#[test]
+fn an_error_below_the_bias_is_refused() {
+    let folder = tempfile::tempdir().unwrap();
+    let output = run(folder.path(), &["--error", "2%", "--bias", "--radius", "0.2", "--mesh", "8", "--variant", "cpu"]);
+    let stderr = text(&output.stderr);
+    assert_eq!(output.status.code(), Some(2), "{stderr}");
+    let [measuring, refused] = stderr.lines().collect::<Vec<_>>()[..] else { panic!("two lines expected: {stderr}") };
+    assert!(measuring.contains("measuring the bias"), "{stderr}");
+    assert!(refused.starts_with("photonmill: --error 2%") && refused.contains("a smaller --radius"), "{stderr}");
+    assert!(output.stdout.is_empty(), "{}", text(&output.stdout));
+    assert_eq!(entries(folder.path()), Vec::<String>::new());
+}
+
 #[test]
 fn bad_input_is_refused_in_one_line() {
     // Arguments, and what the line must name: option, value, what is allowed.
@@ -109,7 +123,6 @@ fn bad_input_is_refused_in_one_line() {
         (&["--confidence", "10%"], ["--confidence", "0.1", "50 %"]),
         (&["--time", "0s"], ["--time", "0", "1ms"]),
         (&["--total-photons", "0"], ["--total-photons", "0", "1 or more"]),
-        (&["--error", "2%", "--bias", "--radius", "0.2", "--mesh", "8", "--variant", "cpu"], ["--error", "2%", "a smaller --radius"]),
         (&["--colour"], ["--colour", "no such option", "--help"]),
         (&["bakery"], ["bakery", "no such subcommand", "--help"]),
         (&["paper"], ["--out", "required", ""]),
