@@ -1,8 +1,12 @@
 // Which item an invocation works on: its index in a dispatch that is folded into rows, because a
 // device may allow no more than 65 535 work groups along x.
 
+uint work_group_index()
+{
+    return gl_WorkGroupID.y * gl_NumWorkGroups.x + gl_WorkGroupID.x;
+}
+
 uint invocation_index()
 {
-    uint group = gl_WorkGroupID.y * gl_NumWorkGroups.x + gl_WorkGroupID.x;
-    return group * gl_WorkGroupSize.x + gl_LocalInvocationIndex;
+    return work_group_index() * gl_WorkGroupSize.x + gl_LocalInvocationIndex;
 }

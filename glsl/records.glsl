@@ -73,21 +73,40 @@ struct RandomKey {
     uvec2 leap_increment;
 };
 
-struct EmitPush {
-    RandomKey key;
+struct PhotonRange {
     uint light;
     uint first_photon;
-    uint photon_count;
-    uint path_offset;
+    uint count;
     uint first_sample;
     uvec2 jump_multiplier;
     uvec2 jump_increment;
+};
+
+struct EmitPush {
+    RandomKey key;
+    PhotonRange range;
+    uint path_offset;
 };
 
 struct TracePush {
     RandomKey key;
     uint bounce;
     uint path_capacity;
+    uint photon_capacity;
+    vec3 eye;
+};
+
+struct EndBouncePush {
+    uint bounce;
+    uint total;
+    uint photon_capacity;
+};
+
+struct TraceWholePush {
+    RandomKey key;
+    PhotonRange range;
+    uint stride;
+    uint bounces;
     uint photon_capacity;
     vec3 eye;
 };

@@ -154,12 +154,11 @@ records! {
         leap_increment: UVec2,
     }
 
-    EmitPush {
-        key: RandomKey,
+    /// Photons of one light, in the order of their numbers.
+    PhotonRange {
         light: u32,
         first_photon: u32,
-        photon_count: u32,
-        path_offset: u32,
+        count: u32,
         /// Number of `first_photon` among its light's photons of the run, mod 2^32.
         first_sample: u32,
         /// rand48: from the prepared state of photon i to the first state of photon
@@ -168,10 +167,33 @@ records! {
         jump_increment: UVec2,
     }
 
+    EmitPush {
+        key: RandomKey,
+        range: PhotonRange,
+        path_offset: u32,
+    }
+
     TracePush {
         key: RandomKey,
         bounce: u32,
         path_capacity: u32,
+        photon_capacity: u32,
+        eye: Vec3,
+    }
+
+    EndBouncePush {
+        bounce: u32,
+        /// Place of the number of all survivors, behind the prefix sums.
+        total: u32,
+        photon_capacity: u32,
+    }
+
+    TraceWholePush {
+        key: RandomKey,
+        range: PhotonRange,
+        /// Invocations that take photons: each every so many.
+        stride: u32,
+        bounces: u32,
         photon_capacity: u32,
         eye: Vec3,
     }

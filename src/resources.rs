@@ -7,6 +7,7 @@ use crate::oddities;
 use crate::plan::Plan;
 use crate::records::{self, DispatchArgs, Path, Photon, Point, Search, SortedPhoton, Tally};
 use crate::scene::room::RoomScene;
+use crate::settings::Variant;
 use glam::UVec2;
 
 pub struct Resources {
@@ -17,12 +18,14 @@ pub struct Resources {
     pub points: Buffer,
     pub stream_seeds: Buffer,
     // Photons of the chunk under way.
-    /// Paths entering even bounces and odd bounces.
+    /// Paths entering even bounces and odd bounces; one empty element where no bounce hands paths to the next.
     pub paths: [Buffer; 2],
     pub photons: Buffer,
     /// Length of the photon map, then the paths entering each bounce.
     pub counters: Buffer,
     pub dispatch_args: Buffer,
+    /// What keeps photons in order; `None` where they come as they do.
+    pub order: Option<OrderBuffers>,
     // Ledger of the submission under way, one tally a bounce.
     pub tallies: Buffer,
     /// The grid; `None` where the gather has another index or none.
@@ -34,6 +37,15 @@ pub struct Resources {
     /// What all rounds left; `None` of a single one.
     pub rounds: Option<RoundBuffers>,
     pub oddities: Buffer,
+}
+
+/// Survivors of a bounce, for prefix sums over them.
+pub struct OrderBuffers {
+    /// Survivors in each work group of paths, then their prefix sums, and the sum of all behind them.
+    pub survivors: Buffer,
+    pub block_sums: Vec<Buffer>,
+    /// Weight at the eye of each path's photon; one element where all weigh 1.
+    pub weights: Buffer,
 }
 
 /// The rounds that have ended, sum by sum of the film.
@@ -95,7 +107,7 @@ impl Resources {
     /// Makes the buffers and records the upload of what never changes.
     pub fn new(gpu: &Gpu, commands: &mut Commands, scene: &RoomScene, plan: &Plan) -> Result<Resources> {
         let bounces = u64::from(plan.settings.bounces);
-        let paths = u64::from(plan.path_capacity);
+        let paths = u64::from(plan.path_array_length());
         let photons = u64::from(plan.photon_capacity);
         let seeds = plan.streams().first_states(plan.path_capacity);
         let sums = plan.points.len() as u64 * u64::from(plan.channel_count);
@@ -110,6 +122,7 @@ impl Resources {
             photons: gpu.buffer::<Photon>("photons", photons, device)?,
             counters: gpu.buffer::<u32>("counters", bounces + 2, device)?,
             dispatch_args: gpu.buffer::<DispatchArgs>("dispatch args", 1, device)?,
+            order: if plan.settings.variant == Variant::Scan { Some(OrderBuffers::new(gpu, plan)?) } else { None },
             tallies: gpu.buffer::<Tally>("tallies", bounces, device)?,
             index: if plan.gathers_by_grid() { Some(IndexBuffers::new(gpu, plan)?) } else { None },
             tree: if plan.gathers_by_tree() { Some(TreeBuffers::new(gpu, plan)?) } else { None },
@@ -125,6 +138,23 @@ impl Resources {
         commands.fill(&resources.film, 0, 2 * sums, 0);
         commands.fill(&resources.tallies, 0, 4 * bounces, 0);
         Ok(resources)
+    }
+}
+
+impl OrderBuffers {
+    /// Work groups of the largest chunk's paths.
+    pub fn group_count(plan: &Plan) -> u32 {
+        plan.path_capacity.div_ceil(plan.settings.group_size)
+    }
+
+    fn new(gpu: &Gpu, plan: &Plan) -> Result<OrderBuffers> {
+        let sums = u64::from(OrderBuffers::group_count(plan)) + 1;
+        let weights = if plan.settings.has_phong() { u64::from(plan.path_capacity) } else { 1 };
+        Ok(OrderBuffers {
+            survivors: gpu.buffer::<u32>("survivors", sums, Memory::Device)?,
+            block_sums: block_sums(gpu, sums, plan.settings.group_size)?,
+            weights: gpu.buffer::<f32>("weights", weights, Memory::Device)?,
+        })
     }
 }
 

@@ -22,18 +22,32 @@ pub enum Variant {
     Atomic,
     /// Survivors only, one atomic a subgroup.
     Ballot,
+    /// Survivors only, one atomic a work group.
+    Group,
+    /// Survivors only, by prefix sums over all of them: photons keep their order.
+    Scan,
+    /// Each photon from its light to its end by one invocation, which keeps it in registers.
+    Persistent,
     /// The second one on the CPU.
     Cpu,
 }
 
 impl Variant {
-    pub const ON_GPU: [Variant; 3] = [Variant::Naive, Variant::Atomic, Variant::Ballot];
+    pub const ON_GPU: [Variant; 6] = [Variant::Naive, Variant::Atomic, Variant::Ballot, Variant::Group, Variant::Scan, Variant::Persistent];
+
+    /// Every way, the CPU's last.
+    pub fn all() -> impl Iterator<Item = Variant> {
+        Variant::ON_GPU.into_iter().chain([Variant::Cpu])
+    }
 
     pub fn name(self) -> &'static str {
         match self {
             Variant::Naive => "naive",
             Variant::Atomic => "atomic",
             Variant::Ballot => "ballot",
+            Variant::Group => "group",
+            Variant::Scan => "scan",
+            Variant::Persistent => "persistent",
             Variant::Cpu => "cpu",
         }
     }
@@ -270,6 +284,9 @@ impl Settings {
         within("--photons", self.photons, 2..=MAX_PHOTONS, "photons a round, at least one for each of the two lights")?;
         within("--rounds", self.rounds, 1..=u32::MAX, "rounds")?;
         within("--bounces", self.bounces, 1..=MAX_BOUNCES, "bounces")?;
+        if self.variant == Variant::Persistent {
+            within("--bounces", self.bounces, 1..=MAX_PERSISTENT_BOUNCES, "bounces with --variant persistent")?;
+        }
         within("--mesh", self.mesh, 1..=MAX_MESH, "texels along a wall")?;
         if !(self.radius >= MIN_RADIUS && self.radius <= width) {
             return Err(Error::setting(
@@ -431,6 +448,8 @@ impl Settings {
 /// Photons of a round: their numbers and the counters of a round are 32-bit.
 const MAX_PHOTONS: u32 = 1 << 31;
 const MAX_BOUNCES: u32 = 10_000;
+/// A photon's bounces are one loop there, which lavapipe would leave after 65 535 iterations of all loops in it.
+const MAX_PERSISTENT_BOUNCES: u32 = 1_000;
 /// Metres; the square of a larger one would come close to what f32 holds.
 const MAX_EYE: f32 = 1e15;
 /// Watts and photons: far from what f64 and f32 hold, either way.

@@ -1,53 +1,39 @@
-//! Photons of a chunk: emission, then bounce after bounce without a word from the host.
+//! Photons of a chunk, without a word from the host: emission, then bounce after bounce of all paths; or photon by photon.
 
+mod in_order;
+
+use crate::constants::LOOP_LIMIT;
 use crate::error::Result;
-use crate::gpu::kernels::{DispatchSize, Emit, TraceAtomic, TraceBallot, TraceSlots};
+use crate::gpu::kernels::{
+    DispatchSize, Emit, EndBounce, KeepOrder, ScanAdd, ScanBlocks, TraceAtomic, TraceBallot, TraceGroup, TraceInPlace, TraceSlots,
+    TraceWhole,
+};
 use crate::gpu::{Commands, Extent, Kernel, Module};
 use crate::plan::{EmissionRange, Plan, photons_of};
-use crate::records::{DispatchSizePush, EmitPush, TracePush};
+use crate::records::{DispatchSizePush, EmitPush, PhotonRange, TracePush, TraceWholePush};
 use crate::resources::Resources;
 use crate::rng::words;
 use crate::settings::Variant;
 
-/// How survivors are stored.
-#[derive(Debug, Clone, Copy, PartialEq, Eq)]
-pub enum Compaction {
-    /// A slot each, stored or not: no atomics, but every thread lives through every bounce and the
-    /// map holds `bounces` entries a photon.
-    Slots,
-    /// Two atomics a survivor: only living paths have threads, at the price of contention.
-    Atomic,
-    /// Two atomics a subgroup.
-    Ballot,
-}
-
-impl Compaction {
-    pub fn of(variant: Variant) -> Compaction {
-        match variant {
-            Variant::Naive => Compaction::Slots,
-            Variant::Atomic => Compaction::Atomic,
-            Variant::Ballot => Compaction::Ballot,
-            Variant::Cpu => panic!("the CPU builder has no kernels"),
-        }
-    }
-
-    fn module(self) -> Module {
-        match self {
-            Compaction::Slots => TraceSlots::MODULE,
-            Compaction::Atomic => TraceAtomic::MODULE,
-            Compaction::Ballot => TraceBallot::MODULE,
-        }
-    }
-}
-
 /// Kernels that tracing needs.
 pub fn modules(plan: &Plan) -> Vec<Module> {
-    let compaction = Compaction::of(plan.settings.variant);
-    let mut modules = vec![Emit::MODULE, compaction.module()];
-    if compaction != Compaction::Slots {
-        modules.push(DispatchSize::MODULE);
+    match plan.settings.variant {
+        Variant::Naive => vec![Emit::MODULE, TraceSlots::MODULE],
+        Variant::Atomic => vec![Emit::MODULE, TraceAtomic::MODULE, DispatchSize::MODULE],
+        Variant::Ballot => vec![Emit::MODULE, TraceBallot::MODULE, DispatchSize::MODULE],
+        Variant::Group => vec![Emit::MODULE, TraceGroup::MODULE, DispatchSize::MODULE],
+        Variant::Scan => vec![
+            Emit::MODULE,
+            TraceInPlace::MODULE,
+            ScanBlocks::MODULE,
+            ScanAdd::MODULE,
+            KeepOrder::MODULE,
+            EndBounce::MODULE,
+            DispatchSize::MODULE,
+        ],
+        Variant::Persistent => vec![TraceWhole::MODULE],
+        Variant::Cpu => panic!("the CPU builder has no kernels"),
     }
-    modules
 }
 
 /// Groups along x that an indirect dispatch may ask for: what every device allows.
@@ -60,6 +46,9 @@ pub fn chunk(commands: &mut Commands, resources: &Resources, plan: &Plan, round:
         commands.fill(&resources.counters, 0, u64::from(plan.settings.bounces) + 2, 0);
         commands.fill(&resources.counters, 1, 1, photon_count);
         commands.add_work(plan.work.tracing(photon_count));
+        if plan.settings.variant == Variant::Persistent {
+            return whole(commands, resources, plan, round, ranges);
+        }
         commands.scope("emit", |commands| emit(commands, resources, plan, round, ranges))?;
         for bounce in 0..plan.settings.bounces {
             if commands.timestamps_left() < TIMESTAMP_RESERVE {
@@ -75,24 +64,55 @@ pub fn chunk(commands: &mut Commands, resources: &Resources, plan: &Plan, round:
 /// Writes the paths of a chunk as they leave their lights, light after light.
 pub fn emit(commands: &mut Commands, resources: &Resources, plan: &Plan, round: u32, ranges: &[EmissionRange]) -> Result<()> {
     let Resources { lights, walls, stream_seeds, paths: [paths, _], oddities, .. } = resources;
-    let streams = plan.streams();
     let mut path_offset = 0;
     for range in ranges {
-        let jump = streams.jump(round, range.first_photon);
-        let push = EmitPush {
-            key: streams.key(round),
-            light: range.light,
-            first_photon: range.first_photon,
-            photon_count: range.count,
-            path_offset,
-            first_sample: plan.first_sample(round, range),
-            jump_multiplier: words(jump.multiplier),
-            jump_increment: words(jump.increment),
-        };
+        let push = EmitPush { key: plan.streams().key(round), range: photon_range(plan, round, range), path_offset };
         commands.dispatch(Emit { lights, walls, stream_seeds, paths, oddities }, &push, Extent::Items(u64::from(range.count)))?;
         path_offset += range.count;
     }
     Ok(())
+}
+
+fn photon_range(plan: &Plan, round: u32, range: &EmissionRange) -> PhotonRange {
+    let jump = plan.streams().jump(round, range.first_photon);
+    PhotonRange {
+        light: range.light,
+        first_photon: range.first_photon,
+        count: range.count,
+        first_sample: plan.first_sample(round, range),
+        jump_multiplier: words(jump.multiplier),
+        jump_increment: words(jump.increment),
+    }
+}
+
+/// Traces every photon from its light to its end.
+fn whole(commands: &mut Commands, resources: &Resources, plan: &Plan, round: u32, ranges: &[EmissionRange]) -> Result<()> {
+    let Resources { rooms, walls, lights, stream_seeds, photons, counters, tallies, oddities, .. } = resources;
+    for range in ranges {
+        let push = TraceWholePush {
+            key: plan.streams().key(round),
+            range: photon_range(plan, round, range),
+            stride: range.count.div_ceil(photons_per_invocation(plan, range.count)),
+            bounces: plan.settings.bounces,
+            photon_capacity: plan.photon_capacity,
+            eye: plan.settings.eye.into(),
+        };
+        let kernel = TraceWhole { rooms, walls, lights, stream_seeds, photons, counters, tallies, oddities };
+        commands.dispatch(kernel, &push, Extent::Items(u64::from(push.stride)))?;
+    }
+    Ok(())
+}
+
+/// Invocations that fill a large GPU: of fewer, none takes a second photon.
+const MANY_INVOCATIONS: u32 = 1 << 17;
+/// Photons of an invocation over which short and long paths even out.
+const MOST_PHOTONS: u32 = 16;
+/// Loop iterations of a bounce, those of its random numbers included, and most of opening a stream of them.
+const LOOPS_PER_BOUNCE: u32 = 48;
+
+fn photons_per_invocation(plan: &Plan, photon_count: u32) -> u32 {
+    let most = (LOOP_LIMIT / (LOOPS_PER_BOUNCE * (plan.settings.bounces + 8))).clamp(1, MOST_PHOTONS);
+    (photon_count / MANY_INVOCATIONS).clamp(1, most)
 }
 
 /// Timestamps that must be left for the scopes that are open and those that follow the bounces.
@@ -105,11 +125,11 @@ pub fn timestamps_per_chunk(plan: &Plan) -> u32 {
 
 /// Entries of the photon map that a chunk uses: all slots, or as many as there is room for.
 pub fn photon_list_capacity(plan: &Plan, photon_count: u32) -> u32 {
-    if plan.has_slots() { photon_count * plan.settings.bounces } else { plan.photon_capacity }
+    if plan.has_slots() { (photon_count * plan.settings.bounces).min(plan.photon_capacity) } else { plan.photon_capacity }
 }
 
 fn one_bounce(commands: &mut Commands, resources: &Resources, plan: &Plan, round: u32, bounce: u32, photon_count: u32) -> Result<()> {
-    let compaction = Compaction::of(plan.settings.variant);
+    let variant = plan.settings.variant;
     let push = TracePush {
         key: plan.streams().key(round),
         bounce,
@@ -119,31 +139,39 @@ fn one_bounce(commands: &mut Commands, resources: &Resources, plan: &Plan, round
     };
     // Every photon enters bounce 0, and the naive builder looks at every slot each time. After that
     // only the device knows how many paths are left.
-    let extent = if bounce == 0 || compaction == Compaction::Slots {
-        Extent::Items(u64::from(photon_count))
-    } else {
+    let extent = || {
+        if bounce == 0 || variant == Variant::Naive {
+            Extent::Items(u64::from(photon_count))
+        } else {
+            Extent::Indirect(&resources.dispatch_args)
+        }
+    };
+    if let Extent::Indirect(dispatch_args) = extent() {
         let size = DispatchSizePush {
             counter: 1 + bounce,
             capacity: plan.path_capacity,
             items_per_group: plan.settings.group_size,
             max_groups: INDIRECT_GROUPS_X,
         };
-        let kernel = DispatchSize { counters: &resources.counters, dispatch_args: &resources.dispatch_args };
-        commands.dispatch(kernel, &size, Extent::Groups(1, 1))?;
-        Extent::Indirect(&resources.dispatch_args)
-    };
+        commands.dispatch(DispatchSize { counters: &resources.counters, dispatch_args }, &size, Extent::Groups(1, 1))?;
+    }
     let [even, odd] = &resources.paths;
     let (paths, next_paths) = if bounce.is_multiple_of(2) { (even, odd) } else { (odd, even) };
     let Resources { rooms, walls, photons, counters, tallies, oddities, .. } = resources;
-    match compaction {
-        Compaction::Slots => {
-            commands.dispatch(TraceSlots { rooms, walls, paths, next_paths, photons, counters, tallies, oddities }, &push, extent)
+    match variant {
+        Variant::Naive => {
+            commands.dispatch(TraceSlots { rooms, walls, paths, next_paths, photons, counters, tallies, oddities }, &push, extent())
         }
-        Compaction::Atomic => {
-            commands.dispatch(TraceAtomic { rooms, walls, paths, next_paths, photons, counters, tallies, oddities }, &push, extent)
+        Variant::Atomic => {
+            commands.dispatch(TraceAtomic { rooms, walls, paths, next_paths, photons, counters, tallies, oddities }, &push, extent())
         }
-        Compaction::Ballot => {
-            commands.dispatch(TraceBallot { rooms, walls, paths, next_paths, photons, counters, tallies, oddities }, &push, extent)
+        Variant::Ballot => {
+            commands.dispatch(TraceBallot { rooms, walls, paths, next_paths, photons, counters, tallies, oddities }, &push, extent())
         }
+        Variant::Group => {
+            commands.dispatch(TraceGroup { rooms, walls, paths, next_paths, photons, counters, tallies, oddities }, &push, extent())
+        }
+        Variant::Scan => in_order::one_bounce(commands, resources, plan, &push, extent),
+        Variant::Persistent | Variant::Cpu => panic!("{} has no bounces of all paths", variant.name()),
     }
 }

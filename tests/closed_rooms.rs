@@ -202,7 +202,7 @@ fn bounces_in_a_closed_room_are_a_geometric_series() {
     let gpu = device();
     let mut family = Family::default();
     for rho in [0.5f32, 0.9, 0.99] {
-        for variant in [Variant::Naive, Variant::Atomic, Variant::Ballot, Variant::Cpu] {
+        for variant in Variant::all() {
             let settings = Settings {
                 variant,
                 reflectance: rho,

@@ -75,14 +75,14 @@ fn work_groups_and_chunks_give_the_same_bits() {
             if group_size > gpu.facts().work_group_size {
                 continue;
             }
-            let variant = Variant::ON_GPU[place % 3];
+            let variant = Variant::ON_GPU[place % Variant::ON_GPU.len()];
             for gather in [Gather::Grid, Gather::Brute] {
                 let other = Settings { group_size, variant, gather, ..settings.clone() };
                 assert_same(what, &format!("groups of {group_size}, {variant:?} {gather:?}"), &film(&gpu, &other), &expected);
             }
         }
         for (place, chunk) in [301, 1024, 4998].into_iter().enumerate() {
-            let other = Settings { chunk: Some(chunk), variant: Variant::ON_GPU[place % 3], ..settings.clone() };
+            let other = Settings { chunk: Some(chunk), variant: Variant::ON_GPU[place % Variant::ON_GPU.len()], ..settings.clone() };
             let outcome = run(&gpu, &other);
             assert_eq!(outcome.plan.chunks_per_round, settings.photons.div_ceil(chunk), "{what}");
             assert_same(what, &format!("chunks of {chunk}"), &outcome.film, &expected);

@@ -5,10 +5,13 @@ mod common;
 
 use std::collections::{HashMap, HashSet};
 
-use common::{Check, assert_complains, assert_holds, device, draws_of, in_order, photons, photons_on_cpu, streams_of};
+use common::{Check, MANY_PHOTONS, assert_complains, assert_holds, device, draws_of, in_order, photons, photons_on_cpu, streams_of};
 use photonmill::gpu::Gpu;
 use photonmill::records::Photon;
+use photonmill::render::photons_on_gpu;
 use photonmill::rng::{self, Rng, Streams};
+use photonmill::scene::open_box::open_box;
+use photonmill::scene::room::Wall;
 use photonmill::settings::{EmissionLaw, PhongDirection, Settings, Variant};
 
 const GENERATORS: [Rng; 4] = [Rng::Rand48, Rng::Mt, Rng::Philox, Rng::Sobol];
@@ -43,7 +46,7 @@ fn each_once(found: &[Photon], photon_count: u32, bounces: u32) -> Check {
     Ok(())
 }
 
-/// The three builders on the device store one set; returns it.
+/// The builders on the device store one set; returns it.
 fn builders_agree(gpu: &Gpu, settings: &Settings) -> Vec<Photon> {
     let of = |variant| photons(gpu, &Settings { variant, ..settings.clone() });
     let expected = of(Variant::Naive);
@@ -55,7 +58,7 @@ fn builders_agree(gpu: &Gpu, settings: &Settings) -> Vec<Photon> {
         )
     };
     assert_holds(what(Variant::Naive), each_once(&expected, settings.photons, settings.bounces));
-    for variant in [Variant::Atomic, Variant::Ballot] {
+    for variant in Variant::ON_GPU {
         let found = of(variant);
         assert_holds(what(variant), each_once(&found, settings.photons, settings.bounces));
         assert_holds(what(variant), same_set(&found, &expected));
@@ -71,6 +74,41 @@ fn builders_store_the_same_photons_at_every_count() {
             let stored = builders_agree(&gpu, &Settings { photons, rng, ..Settings::default() });
             // Empty maps would agree with each other; a handful of photons may all be absorbed.
             assert!(photons < 63 || stored.len() as u32 > photons, "{rng:?}, {photons} photons stored {}", stored.len());
+        }
+    }
+}
+
+/// So many that an invocation of the persistent builder takes several; and the longest paths that it takes, in a closed
+/// white room.
+#[test]
+fn a_persistent_invocation_takes_photon_after_photon() {
+    let Some(gpu) = device() else { return };
+    for rng in [Rng::Philox, Rng::Sobol] {
+        let many = Settings { photons: MANY_PHOTONS, chunk: Some(MANY_PHOTONS), rng, ..Settings::default() };
+        let endless = Settings { photons: 257, bounces: 1000, reflectance: 1.0, rng, ..Settings::default() };
+        let mut closed = open_box(&endless);
+        closed.faces[5] = Some(Wall { name: "front", albedo: 1.0, shininess: None });
+        for (scene, settings) in [(open_box(&many), &many), (closed, &endless)] {
+            let of = |variant| photons_on_gpu(&gpu, &scene, &Settings { variant, ..settings.clone() }).unwrap();
+            let found = of(Variant::Persistent);
+            assert_holds(format!("{rng:?}, {} bounces", settings.bounces), same_set(&found, &of(Variant::Atomic)));
+            assert!(settings.bounces == 15 || found.len() == 257 * 1000, "{} photons", found.len());
+        }
+    }
+    let longer = Settings { variant: Variant::Persistent, bounces: 1001, rng: Rng::Philox, ..Settings::default() };
+    assert!(longer.validate().is_err());
+}
+
+#[test]
+fn the_scanning_builder_keeps_photons_in_their_order() {
+    let Some(gpu) = device() else { return };
+    for (photon_count, group_size, chunk) in [(65, 64, None), (5001, 128, None), (5000, 32, Some(777))] {
+        let settings = Settings { variant: Variant::Scan, photons: photon_count, group_size, chunk, ..Settings::default() };
+        let map: Vec<(u32, u32)> = photons(&gpu, &settings).iter().map(|photon| (photon.bounce, photon.photon)).collect();
+        // Chunks come one after the other, and each begins with its first bounce.
+        let chunks = map.chunk_by(|before, after| before.0 <= after.0);
+        for (number, chunk) in chunks.enumerate() {
+            assert!(chunk.is_sorted(), "{photon_count} photons, groups of {group_size}, chunk {number}");
         }
     }
 }
@@ -113,7 +151,7 @@ fn group_sizes_and_chunks_change_no_photon() {
 #[test]
 fn the_order_of_appending_changes_no_photon() {
     let Some(gpu) = device() else { return };
-    for variant in [Variant::Atomic, Variant::Ballot] {
+    for variant in Variant::ON_GPU {
         let settings = Settings { variant, photons: 20_001, ..Settings::default() };
         let expected = photons(&gpu, &settings);
         for run in 1..10 {

@@ -9,10 +9,10 @@ use std::time::Instant;
 use bytemuck::Zeroable;
 use common::{Check, Device, assert_complains, assert_holds, device, equal_sums, in_order, photons, plan_for, run};
 use photonmill::constants::{NO_WALL, SCAN_ITEMS};
-use photonmill::gpu::kernels::{DispatchSize, TraceAtomic, TraceBallot, TraceSlots};
-use photonmill::gpu::{Commands, Constants, Extent, Memory};
+use photonmill::gpu::kernels::DispatchSize;
+use photonmill::gpu::{Buffer, Commands, Constants, Extent, Memory};
 use photonmill::plan::Plan;
-use photonmill::records::{DispatchArgs, DispatchSizePush, Path, Photon, SortedPhoton, Tally, TracePush};
+use photonmill::records::{DispatchArgs, DispatchSizePush, Path, Photon, SortedPhoton, Tally};
 use photonmill::render::constants;
 use photonmill::resources::{Resources, block_sums};
 use photonmill::rng::Rng;
@@ -228,53 +228,25 @@ struct Appended {
 const GUARD_ENTRIES: u64 = 64;
 
 fn append(gpu: &Device, scene: &RoomScene, settings: &Settings, capacity: u32) -> Appended {
-    let plan = plan_for(gpu, scene, settings);
-    let (path_count, bounces) = (settings.photons, settings.bounces);
+    let mut plan = plan_for(gpu, scene, settings);
+    let (path_count, bounces) = (u64::from(settings.photons), settings.bounces);
     let mut commands = Commands::new(gpu, constants(&plan), Instant::now()).unwrap();
-    let resources = Resources::new(gpu, &mut commands, scene, &plan).unwrap();
-    trace::emit(&mut commands, &resources, &plan, 0, &plan.chunk(0)).unwrap();
-    let paths = commands.read::<Path>(&resources.paths[0], path_count as usize).unwrap();
-    let photons = gpu.buffer::<Photon>("photons", u64::from(capacity) + GUARD_ENTRIES, Memory::Device).unwrap();
-    let path_entries = u64::from(path_count) + GUARD_ENTRIES;
-    let ends = [
-        gpu.buffer::<Path>("even paths", path_entries, Memory::Device).unwrap(),
-        gpu.buffer::<Path>("odd paths", path_entries, Memory::Device).unwrap(),
-    ];
-    commands.fill(&photons, 0, photons.size_bytes() / 4, GUARD);
-    ends.iter().for_each(|paths| commands.fill(paths, 0, paths.size_bytes() / 4, GUARD));
-    commands.upload(&ends[0], &paths).unwrap();
-    commands.fill(&resources.counters, 0, u64::from(bounces) + 2, 0);
-    commands.fill(&resources.counters, 1, 1, path_count);
-    for bounce in 0..bounces {
-        let push = TracePush {
-            key: plan.streams().key(0),
-            bounce,
-            path_capacity: path_count,
-            photon_capacity: capacity,
-            eye: settings.eye.into(),
-        };
-        let (paths, next_paths) = if bounce % 2 == 0 { (&ends[0], &ends[1]) } else { (&ends[1], &ends[0]) };
-        let Resources { rooms, walls, counters, tallies, oddities, .. } = &resources;
-        let (photons, extent) = (&photons, Extent::Items(u64::from(path_count)));
-        match settings.variant {
-            Variant::Naive => {
-                commands.dispatch(TraceSlots { rooms, walls, paths, next_paths, photons, counters, tallies, oddities }, &push, extent)
-            }
-            Variant::Atomic => {
-                commands.dispatch(TraceAtomic { rooms, walls, paths, next_paths, photons, counters, tallies, oddities }, &push, extent)
-            }
-            Variant::Ballot => {
-                commands.dispatch(TraceBallot { rooms, walls, paths, next_paths, photons, counters, tallies, oddities }, &push, extent)
-            }
-            Variant::Cpu => unreachable!("kernels only"),
-        }
-        .unwrap();
-    }
-    let map = commands.read::<Photon>(&photons, (u64::from(capacity) + GUARD_ENTRIES) as usize).unwrap();
+    let mut resources = Resources::new(gpu, &mut commands, scene, &plan).unwrap();
+    plan.photon_capacity = capacity;
+    let guarded = |commands: &mut Commands, buffer: Buffer| {
+        commands.fill(&buffer, 0, buffer.size_bytes() / 4, GUARD);
+        buffer
+    };
+    let paths = || gpu.buffer::<Path>("guarded paths", path_count + GUARD_ENTRIES, Memory::Device).unwrap();
+    let photons = gpu.buffer::<Photon>("guarded photons", u64::from(capacity) + GUARD_ENTRIES, Memory::Device).unwrap();
+    resources.photons = guarded(&mut commands, photons);
+    resources.paths = [guarded(&mut commands, paths()), guarded(&mut commands, paths())];
+    trace::chunk(&mut commands, &resources, &plan, 0, &plan.chunk(0)).unwrap();
+    let map = commands.read::<Photon>(&resources.photons, (u64::from(capacity) + GUARD_ENTRIES) as usize).unwrap();
     let (map, behind) = map.split_at(capacity as usize);
     let mut guards: Vec<u32> = bytemuck::cast_slice(behind).to_vec();
-    for paths in &ends {
-        let all = commands.read::<Path>(paths, path_entries as usize).unwrap();
+    for paths in &resources.paths {
+        let all = commands.read::<Path>(paths, (path_count + GUARD_ENTRIES) as usize).unwrap();
         guards.extend_from_slice(bytemuck::cast_slice(&all[path_count as usize..]));
     }
     Appended {
@@ -331,6 +303,10 @@ fn overflow_check(appended: &Appended, settings: &Settings, capacity: u32, all: 
     }
     if appended.counters[0] != survivors {
         return fail(format!("the counter says {} instead of the need, {survivors}", appended.counters[0]));
+    }
+    if settings.variant == Variant::Persistent {
+        // No bounce hands paths to the next.
+        return Ok(());
     }
     for (bounce, tally) in appended.tallies.iter().enumerate() {
         if appended.counters[2 + bounce] != tally.stored {

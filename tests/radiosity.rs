@@ -116,7 +116,6 @@ fn disc_middles() -> impl Iterator<Item = [f64; 2]> {
 /// Photons of a run and runs, each of another seed.
 const PHOTONS: u32 = 1 << 18;
 const SEEDS: u64 = 16;
-const BUILDERS: [Variant; 4] = [Variant::Naive, Variant::Atomic, Variant::Ballot, Variant::Cpu];
 
 fn settings(variant: Variant, emission: EmissionLaw) -> Settings {
     Settings {
@@ -140,7 +139,7 @@ fn photons_of(gpu: Option<&Device>, settings: &Settings) -> Vec<Photon> {
 
 /// Builders that can run here.
 fn builders(gpu: Option<&Device>) -> impl Iterator<Item = Variant> {
-    BUILDERS.into_iter().filter(move |variant| gpu.is_some() || *variant == Variant::Cpu)
+    Variant::all().filter(move |variant| gpu.is_some() || *variant == Variant::Cpu)
 }
 
 /// Mean of a quantity a photon, and the standard error of that mean, from sums over chains of a photon.

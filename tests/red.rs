@@ -7,7 +7,9 @@ mod planted;
 
 use std::sync::atomic::AtomicBool;
 
-use common::{Check, assert_complains, assert_holds, bits, equal_sums, in_order, known, open, photons, photons_on_cpu, run_on_cpu};
+use common::{
+    Check, MANY_PHOTONS, assert_complains, assert_holds, bits, equal_sums, in_order, known, open, photons, photons_on_cpu, run_on_cpu,
+};
 use photonmill::gpu::{Gpu, Options, check};
 use photonmill::plan::transport::{Sensor, TransportPlan};
 use photonmill::render::{self, Control};
@@ -78,7 +80,7 @@ struct Fault {
     noticed_by: &'static [Question],
 }
 
-const FAULTS: [Fault; 41] = [
+const FAULTS: [Fault; 45] = [
     Fault {
         what: "every other lane of a subgroup writes over its neighbour",
         file: "append/ballot.glsl",
@@ -94,6 +96,38 @@ const FAULTS: [Fault; 41] = [
         to: "bool stored = alive && gl_SubgroupInvocationID != 5u &&",
         kernels: &["trace_atomic"],
         noticed_by: &[Ledger(Variant::Atomic), Photons(Variant::Atomic)],
+    },
+    Fault {
+        what: "the last invocation of each work group finds no place of its own",
+        file: "append/group_prefix.glsl",
+        from: "prefix.before += s < gl_SubgroupID",
+        to: "prefix.before += s + 1 < gl_SubgroupID",
+        kernels: &["trace_group"],
+        noticed_by: &[Photons(Variant::Group)],
+    },
+    Fault {
+        what: "survivors of one work group are not counted",
+        file: "stages/trace_in_place.glsl",
+        from: "survivors[work_group_index()] = prefix.total;",
+        to: "survivors[work_group_index()] = work_group_index() == 3u ? 0u : prefix.total;",
+        kernels: &["trace_in_place"],
+        noticed_by: &[Photons(Variant::Scan), Ledger(Variant::Scan)],
+    },
+    Fault {
+        what: "an invocation that took a photon starts it at the bounce at which the last one ended",
+        file: "stages/trace_whole.glsl",
+        from: "            bounce = 0;\n",
+        to: "",
+        kernels: &["trace_whole"],
+        noticed_by: &[Photons(Variant::Persistent)],
+    },
+    Fault {
+        what: "a photon's last bounce is not counted",
+        file: "stages/trace_whole.glsl",
+        from: "if (flying) {\n            count_fate(",
+        to: "if (flying && !bounced.escaped) {\n            count_fate(",
+        kernels: &["trace_whole"],
+        noticed_by: &[Ledger(Variant::Persistent)],
     },
     Fault {
         what: "a survivor's path is forgotten",
@@ -309,7 +343,7 @@ const FAULTS: [Fault; 41] = [
     },
     Fault {
         what: "a reflected direction of the paper's box is no number",
-        file: "stages/trace.glsl",
+        file: "stages/bounce.glsl",
         from: "path.wall = hit.wall;",
         to: "path.wall = hit.wall;\n        if (u.x < 0.002) path.direction.y = uintBitsToFloat(0x7fc00000u);",
         kernels: &["trace_atomic"],
@@ -458,7 +492,10 @@ fn ask(gpu: &Gpu, question: Question) -> Check {
     let never = AtomicBool::new(false);
     match question {
         Photons(variant) => {
-            let settings = Settings { variant, ..strict() };
+            let settings = match variant {
+                Variant::Persistent => Settings { variant, photons: MANY_PHOTONS, chunk: Some(MANY_PHOTONS), ..strict() },
+                _ => Settings { variant, ..strict() },
+            };
             let (found, expected) = (in_order(photons(gpu, &settings)), in_order(photons_on_cpu(&settings)));
             if found == expected { Ok(()) } else { Err(format!("{} photons, not the {} of the CPU builder", found.len(), expected.len())) }
         }

@@ -1,5 +1,5 @@
-// Contract of the three ways to store a survivor; slots.glsl, and compact.glsl with atomic.glsl or
-// ballot.glsl, define
+// Contract of the ways to store a survivor; slots.glsl, and compact.glsl with atomic.glsl, ballot.glsl or
+// group.glsl, define
 //
 //   uint incoming_count(uint bounce)
 //       number of entries of `paths` that this bounce has to look at;

@@ -1,4 +1,4 @@
-// Survivors only, side by side; atomic.glsl and ballot.glsl each define
+// Survivors only, side by side; atomic.glsl, ballot.glsl and group.glsl each define
 //
 //   uint take_place(uint counter, bool wanted)
 //       called once by every invocation in uniform control flow; the next free place that `counter`

@@ -15,7 +15,7 @@ layout(set = 1, binding = 1, scalar) readonly buffer BlockSums { uint block_sums
 
 void main()
 {
-    uint block = gl_WorkGroupID.y * gl_NumWorkGroups.x + gl_WorkGroupID.x;
+    uint block = work_group_index();
     uint first = invocation_index() * SCAN_ITEMS;
     for (uint k = 0; k < SCAN_ITEMS; k++) {
         if (first + k < push.item_count) {

@@ -43,8 +43,7 @@ void main()
         }
         before += item[k];
     }
-    uint block = gl_WorkGroupID.y * gl_NumWorkGroups.x + gl_WorkGroupID.x;
     if (gl_LocalInvocationIndex == 0 && first < push.item_count) {
-        block_sums[block] = block_sum;
+        block_sums[work_group_index()] = block_sum;
     }
 }

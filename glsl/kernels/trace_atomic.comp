@@ -22,6 +22,7 @@ layout(set = 1, binding = 4, scalar) buffer Tallies { Tally tallies[]; };
 #include "append/append.glsl"
 #include "append/atomic.glsl"
 #include "append/compact.glsl"
+#include "stages/bounce.glsl"
 #include "stages/trace.glsl"
 
 void main()

@@ -21,6 +21,7 @@ layout(set = 1, binding = 4, scalar) buffer Tallies { Tally tallies[]; };
 #include "tally.glsl"
 #include "append/append.glsl"
 #include "append/slots.glsl"
+#include "stages/bounce.glsl"
 #include "stages/trace.glsl"
 
 void main()

@@ -168,7 +168,7 @@ macro_rules! value_enum {
 pub(super) use value_enum;
 
 value_enum!(PresetArg => Preset { Naive, Modified, Phong, Rounds });
-value_enum!(VariantArg => Variant { Naive, Atomic, Ballot, Cpu });
+value_enum!(VariantArg => Variant { Naive, Atomic, Ballot, Group, Scan, Persistent, Cpu });
 value_enum!(RngArg => Rng { Rand48, Mt, Philox, Sobol });
 value_enum!(GatherArg => Gather { Brute, Grid, #[value(name = "kdtree")] KdTree });
 value_enum!(SumsArg => Sums { Integer, F32, Compensated });

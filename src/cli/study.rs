@@ -27,6 +27,9 @@ pub(super) struct StudyArgs {
     /// Wall time of all measurements together, not of the reference: 90s, 10m
     #[arg(long, value_name = "TIME", value_parser = seconds, allow_negative_numbers = true, default_value = "2m")]
     budget: f64,
+    /// Rounds of the longest point, whatever time is left
+    #[arg(long, value_parser = whole::<u32>, allow_negative_numbers = true, default_value_t = study::MOST_ROUNDS)]
+    rounds: u32,
     /// Pixels along each side of the picture, or texels along each wall of the open box [default: 48; 12 on a CPU]
     #[arg(long, value_parser = whole::<u32>, allow_negative_numbers = true)]
     size: Option<u32>,
@@ -64,6 +67,7 @@ pub(super) fn run(args: &StudyArgs, cancelled: &AtomicBool) -> Result<End> {
         seed: args.seed,
         reference_samples: args.reference_samples,
         budget: Duration::from_secs_f64(args.budget),
+        most_rounds: args.rounds,
     };
     let study = study::run(&gpu, &scene, request, &folder, cancelled, &mut |line| complain(line))?;
     study::write(&folder, &study)?;
@@ -93,6 +97,7 @@ impl StudyArgs {
         };
         within("--size", u64::from(self.size.unwrap_or(48)), 2..=1024, "pixels or texels along a side")?;
         within("--photons", u64::from(self.photons.unwrap_or(8192)), 64..=1 << 28, "photons a round")?;
+        within("--rounds", u64::from(self.rounds), 1..=u64::from(study::MOST_ROUNDS), "rounds of the longest point")?;
         within("--repeats", u64::from(self.repeats), 2..=1000, "runs of a point, whose spread is its error")?;
         within("--seed", self.seed, 0..=u64::from(u32::MAX) - 1000, "as srand48 takes 32 bits")?;
         within("--reference-samples", u64::from(self.reference_samples), 16..=1 << 24, "samples a pixel")?;

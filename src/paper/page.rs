@@ -335,9 +335,9 @@ fn described(builder: Builder) -> String {
     match (builder.variant, builder.threads) {
         (Variant::Naive, _) => "naive (slots)".to_owned(),
         (Variant::Atomic, _) => "modified (atomic)".to_owned(),
-        (Variant::Ballot, _) => "ballot".to_owned(),
         (Variant::Cpu, 1) => "CPU, 1 thread".to_owned(),
         (Variant::Cpu, threads) => format!("CPU, {threads} threads"),
+        (variant, _) => variant.name().to_owned(),
     }
 }
 

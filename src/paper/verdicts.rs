@@ -393,6 +393,7 @@ mod tests {
                 Variant::Atomic => atomic,
                 Variant::Ballot => ballot,
                 Variant::Cpu => 15.0,
+                _ => unreachable!("not the paper's"),
             };
         }
         found

@@ -206,6 +206,11 @@ impl Plan {
         self.settings.rounds > 1 && self.settings.sums == Sums::Integer
     }
 
+    /// Paths that one bounce hands to the next: none where each photon has an invocation to its end.
+    pub fn path_array_length(&self) -> u32 {
+        if self.settings.variant == Variant::Persistent { 0 } else { self.path_capacity }
+    }
+
     pub fn has_slots(&self) -> bool {
         self.settings.variant == Variant::Naive
     }

@@ -17,9 +17,8 @@ const DEVIATION: f64 = 2.0;
 const PHOTONS: u32 = 1 << 20;
 
 pub(super) fn cases() -> Vec<Case> {
-    let variants = [Variant::Naive, Variant::Atomic, Variant::Ballot, Variant::Cpu];
     let laws = [(EmissionLaw::Uniform, STORED_UNIFORM), (EmissionLaw::Cosine, STORED_COSINE)];
-    variants.iter().flat_map(|variant| laws.map(|(law, expected)| case(*variant, law, expected))).collect()
+    Variant::all().flat_map(|variant| laws.map(|(law, expected)| case(variant, law, expected))).collect()
 }
 
 fn case(variant: Variant, emission: EmissionLaw, expected: f64) -> Case {

@@ -118,6 +118,9 @@ pub fn of_paper(mesh: u32, photons: u32) -> Vec<Group> {
     let mut sweep = Sweep::new(base, "atomic, grid, radius 0.025 m, 30 bounces, philox", Line::Paper);
     sweep.add(Axis::Builder, "naive slots", |s| s.variant = Variant::Naive);
     sweep.add(Axis::Builder, "subgroup ballot", |s| s.variant = Variant::Ballot);
+    sweep.add(Axis::Builder, "work-group aggregate", |s| s.variant = Variant::Group);
+    sweep.add(Axis::Builder, "prefix sums, in order", |s| s.variant = Variant::Scan);
+    sweep.add(Axis::Builder, "persistent", |s| s.variant = Variant::Persistent);
     sweep.add(Axis::Builder, "CPU, one thread", |s| s.variant = Variant::Cpu);
     for (factor, name) in [(16, "a sixteenth of the photons"), (4, "a quarter of the photons")] {
         sweep.add(Axis::Photons, name, |s| s.photons = (photons / factor).max(2));

@@ -45,6 +45,9 @@ pub struct Request {
     /// Wall time of all measurements together, shared out evenly; not of the reference.
     #[serde(skip)]
     pub budget: Duration,
+    /// Rounds of the longest point, whatever time is left.
+    #[serde(skip)]
+    pub most_rounds: u32,
 }
 
 /// Everything that was found.
@@ -159,7 +162,7 @@ impl Measuring<'_> {
     fn climb(&mut self, curves: &mut [Curve]) -> Result<bool> {
         // Warm-up and first rounds, which no point holds.
         let mut unmeasured = vec![Duration::ZERO; curves.len()];
-        for doublings in 0..=MOST_DOUBLINGS {
+        for doublings in 0..=self.request.most_rounds.ilog2() as usize {
             let rounds = 1 << doublings;
             // Those that have time left for twice the photons of before, which take at most twice the time.
             let going: Vec<usize> = (0..curves.len())
@@ -244,8 +247,8 @@ const FIRST_WARM_UP: Duration = Duration::from_secs(3);
 /// time, where that is longer.
 const PATIENCE: Duration = Duration::from_secs(5);
 
-/// Rounds of the longest point: a power of two.
-const MOST_DOUBLINGS: usize = 20;
+/// Most that [`Request::most_rounds`] may be.
+pub const MOST_ROUNDS: u32 = 1 << 20;
 
 /// Writes the page and its data.
 pub fn write(folder: &Folder, study: &Study) -> Result<()> {

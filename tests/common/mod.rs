@@ -107,6 +107,9 @@ pub fn photons(gpu: &Gpu, settings: &Settings) -> Vec<Photon> {
     render::photons_on_gpu(gpu, &open_box(settings), settings).unwrap_or_else(|error| panic!("{error}\n{settings:?}"))
 }
 
+/// Photons of a chunk of which an invocation of the persistent builder takes several.
+pub const MANY_PHOTONS: u32 = 600_001;
+
 /// The same from the CPU builder.
 pub fn photons_on_cpu(settings: &Settings) -> Vec<Photon> {
     render::photons_on_cpu(&open_box(settings), settings).unwrap_or_else(|error| panic!("{error}\n{settings:?}"))

@@ -1,0 +1,32 @@
+// One bounce, survivors stored by append/group.glsl.
+// Dispatched by src/trace.rs once a bounce. One thread = one incoming path.
+#version 460
+#extension GL_GOOGLE_include_directive : require
+#extension GL_EXT_scalar_block_layout : require
+#extension GL_KHR_shader_subgroup_basic : require
+#extension GL_KHR_shader_subgroup_ballot : require
+#include "records.glsl"
+
+layout(local_size_x_id = 0) in;
+layout(push_constant, scalar) uniform Push { TracePush push; };
+layout(set = 1, binding = 4, scalar) buffer Tallies { Tally tallies[]; };
+
+#include "math.glsl"
+#include "oddities.glsl"
+#include "dispatch.glsl"
+#include "rng.glsl"
+#include "sampling.glsl"
+#include "room.glsl"
+#include "bsdf.glsl"
+#include "tally.glsl"
+#include "append/append.glsl"
+#include "append/group_prefix.glsl"
+#include "append/group.glsl"
+#include "append/compact.glsl"
+#include "stages/bounce.glsl"
+#include "stages/trace.glsl"
+
+void main()
+{
+    trace_bounce();
+}

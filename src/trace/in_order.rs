@@ -1,0 +1,31 @@
+//! A bounce whose survivors keep their order, by prefix sums: reduce, then scan.
+
+use crate::error::Result;
+use crate::gpu::kernels::{EndBounce, KeepOrder, TraceInPlace};
+use crate::gpu::{Commands, Extent};
+use crate::index::scan;
+use crate::plan::Plan;
+use crate::records::{EndBouncePush, TracePush};
+use crate::resources::{OrderBuffers, Resources};
+
+/// Survivors are counted by work group, the counts summed, and the survivors moved to where they belong.
+pub fn one_bounce<'a>(
+    commands: &mut Commands,
+    resources: &Resources,
+    plan: &Plan,
+    push: &TracePush,
+    extent: impl Fn() -> Extent<'a>,
+) -> Result<()> {
+    let [even, odd] = &resources.paths;
+    let (paths, next_paths) = if push.bounce.is_multiple_of(2) { (even, odd) } else { (odd, even) };
+    let Resources { rooms, walls, photons, counters, tallies, oddities, order, .. } = resources;
+    let Some(OrderBuffers { survivors, block_sums, weights }) = order else { panic!("the plan has no order to keep") };
+    let group_count = OrderBuffers::group_count(plan);
+    // Groups that no path is left for count none, and so does the place behind the last, which becomes the sum of all.
+    commands.fill(survivors, 0, u64::from(group_count) + 1, 0);
+    commands.dispatch(TraceInPlace { rooms, walls, paths, weights, counters, tallies, survivors, oddities }, push, extent())?;
+    scan(commands, survivors, block_sums, group_count + 1, plan.settings.group_size)?;
+    commands.dispatch(KeepOrder { paths, next_paths, photons, counters, tallies, survivors, weights }, push, extent())?;
+    let end = EndBouncePush { bounce: push.bounce, total: group_count, photon_capacity: push.photon_capacity };
+    commands.dispatch(EndBounce { survivors, counters }, &end, Extent::Groups(1, 1))
+}
