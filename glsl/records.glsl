@@ -268,22 +268,38 @@ struct Draws {
     uint domain;
 };
 
-struct EmissionPush {
-    Draws draws;
+struct PhotonEmission {
     uint first_photon;
     uint photon_count;
     uint emitter_count;
     float scene_radius;
 };
 
-struct FlightPush {
-    Draws draws;
-    uint bounce;
-    uint path_capacity;
+struct PhotonStore {
     uint photon_capacity;
     uint stored;
     uint caustic_only;
     uint caustic_surfaces;
+};
+
+struct EmissionPush {
+    Draws draws;
+    PhotonEmission emission;
+};
+
+struct FlightPush {
+    Draws draws;
+    PhotonStore map;
+    uint bounce;
+    uint path_capacity;
+};
+
+struct FlyWholePush {
+    Draws draws;
+    PhotonEmission emission;
+    PhotonStore map;
+    uint bounces;
+    uint stride;
 };
 
 struct ViewPush {

@@ -1,6 +1,11 @@
 // The ledger of invocations that are not at the same bounce: fates are counted in the work group's memory and added
 // to the device's once. The including kernel declares the buffer `tallies`, one of push.bounces.
 
+const uint FATE_STORED = 0;
+const uint FATE_ABSORBED = 1;
+const uint FATE_ESCAPED = 2;
+const uint FATE_DROPPED = 3;
+
 shared uint group_tallies[4 * GROUP_TALLIES];
 
 // Called once by every invocation, in uniform control flow.
@@ -15,9 +20,9 @@ void open_tallies()
 void count_on_device(uint bounce, uint fate, uint count)
 {
     switch (fate) {
-        case 0: atomicAdd(tallies[bounce].stored, count); break;
-        case 1: atomicAdd(tallies[bounce].absorbed, count); break;
-        case 2: atomicAdd(tallies[bounce].escaped, count); break;
+        case FATE_STORED: atomicAdd(tallies[bounce].stored, count); break;
+        case FATE_ABSORBED: atomicAdd(tallies[bounce].absorbed, count); break;
+        case FATE_ESCAPED: atomicAdd(tallies[bounce].escaped, count); break;
         default: atomicAdd(tallies[bounce].dropped, count);
     }
 }
@@ -25,7 +30,7 @@ void count_on_device(uint bounce, uint fate, uint count)
 // The fate of one path that entered a bounce: dropped if none is named.
 void count_fate(uint bounce, bool stored, bool absorbed, bool escaped)
 {
-    uint fate = stored ? 0 : (absorbed ? 1 : (escaped ? 2 : 3));
+    uint fate = stored ? FATE_STORED : (absorbed ? FATE_ABSORBED : (escaped ? FATE_ESCAPED : FATE_DROPPED));
     if (bounce < GROUP_TALLIES) {
         atomicAdd(group_tallies[4 * bounce + fate], 1);
     } else {

@@ -2,12 +2,12 @@
 
 pub mod tree;
 
-use crate::constants::SCAN_ITEMS;
 use crate::error::Result;
 use crate::gpu::kernels::{CellCount, CellScatter, DispatchSize, ScanAdd, ScanBlocks};
-use crate::gpu::{Buffer, Commands, Extent, Kernel, Module};
+use crate::gpu::{Commands, Extent, Kernel, Module};
 use crate::plan::Plan;
-use crate::records::{DispatchSizePush, ScanPush};
+use crate::prefix_sum::scan;
+use crate::records::DispatchSizePush;
 use crate::resources::{IndexBuffers, Resources};
 use crate::trace::{INDIRECT_GROUPS_X, photon_list_capacity};
 
@@ -50,34 +50,6 @@ pub fn build(commands: &mut Commands, resources: &Resources, plan: &Plan, photon
         commands.scope("scan", |commands| scan(commands, cells, block_sums, plan.grid.cells(), plan.settings.group_size))?;
         commands.scope("sort", |commands| commands.dispatch(CellScatter { photons, counters, cells, sorted_photons }, &push, extent()))
     })
-}
-
-/// Turns `item_count` numbers into their exclusive prefix sums; `levels` as `resources::block_sums`
-/// makes them.
-pub fn scan(commands: &mut Commands, items: &Buffer, levels: &[Buffer], item_count: u32, group_size: u32) -> Result<()> {
-    let threads = || Extent::Items(u64::from(item_count.div_ceil(SCAN_ITEMS)));
-    scan_part(commands, items, levels, item_count, group_size, &threads)
-}
-
-/// The same of the first numbers alone, as many as `threads` read: sums before them do not depend on those behind,
-/// which are left in disorder.
-fn scan_part<'a>(
-    commands: &mut Commands,
-    items: &Buffer,
-    levels: &[Buffer],
-    item_count: u32,
-    group_size: u32,
-    threads: &dyn Fn() -> Extent<'a>,
-) -> Result<()> {
-    let [block_sums, coarser @ ..] = levels else { panic!("a prefix sum has a level") };
-    let push = ScanPush { item_count };
-    commands.dispatch(ScanBlocks { items, block_sums }, &push, threads())?;
-    if coarser.is_empty() {
-        return Ok(());
-    }
-    let block_count = item_count.div_ceil(group_size * SCAN_ITEMS);
-    scan(commands, block_sums, coarser, block_count, group_size)?;
-    commands.dispatch(ScanAdd { items, block_sums }, &push, threads())
 }
 
 /// Counts work, and hands the commands over once they amount to a submission.

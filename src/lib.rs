@@ -16,8 +16,8 @@
 //! constants, records, error, bias, ledger, rng, settings, timings < scene < plan < cpu
 //! scene < judge
 //! constants, records, error, ledger, timings < gpu
-//! gpu < oddities
-//! plan, oddities < resources < trace < index < estimate < film < render < transport < selfcheck < output
+//! gpu < oddities, prefix_sum
+//! plan, oddities, prefix_sum < resources < trace < index < estimate < film < render < transport < selfcheck < output
 //! output < bake < paper < study < cli
 //! ```
 //!
@@ -88,6 +88,7 @@ pub mod oddities;
 pub mod output;
 pub mod paper;
 pub mod plan;
+pub mod prefix_sum;
 pub mod records;
 pub mod render;
 pub mod resources;

@@ -406,8 +406,8 @@ records! {
         domain: u32,
     }
 
-    EmissionPush {
-        draws: Draws,
+    /// Photons that leave the lights of a scene.
+    PhotonEmission {
         first_photon: u32,
         photon_count: u32,
         emitter_count: u32,
@@ -415,10 +415,8 @@ records! {
         scene_radius: f32,
     }
 
-    FlightPush {
-        draws: Draws,
-        bounce: u32,
-        path_capacity: u32,
+    /// Which photons a map holds.
+    PhotonStore {
         photon_capacity: u32,
         /// Mask of the arrivals that are stored.
         stored: u32,
@@ -426,6 +424,27 @@ records! {
         caustic_only: u32,
         /// Mask of the surfaces (1 << `SURFACE_...`) whose caustics are wanted.
         caustic_surfaces: u32,
+    }
+
+    EmissionPush {
+        draws: Draws,
+        emission: PhotonEmission,
+    }
+
+    FlightPush {
+        draws: Draws,
+        map: PhotonStore,
+        bounce: u32,
+        path_capacity: u32,
+    }
+
+    FlyWholePush {
+        draws: Draws,
+        emission: PhotonEmission,
+        map: PhotonStore,
+        bounces: u32,
+        /// Invocations that take photons: each every so many.
+        stride: u32,
     }
 
     ViewPush {

@@ -1,10 +1,11 @@
 //! Every buffer of a run on the device, named and sized by the plan.
 
-use crate::constants::{FACE_COUNT, SCAN_ITEMS, TREE_LEAF, TREE_RUN};
+use crate::constants::{FACE_COUNT, TREE_LEAF, TREE_RUN};
 use crate::error::Result;
 use crate::gpu::{Buffer, Commands, Gpu, Memory};
 use crate::oddities;
 use crate::plan::Plan;
+use crate::prefix_sum::block_sums;
 use crate::records::{self, DispatchArgs, Path, Photon, Point, Search, SortedPhoton, Tally};
 use crate::scene::room::RoomScene;
 use crate::settings::Variant;
@@ -225,19 +226,5 @@ impl SearchBuffers {
             searches: gpu.buffer::<Search>("searches", at_once, device)?,
             unfinished: gpu.buffer::<u32>("unfinished", 1, device)?,
         })
-    }
-}
-
-/// One buffer a level of a prefix sum over `items`: block sums of the level below, down to one block.
-pub fn block_sums(gpu: &Gpu, items: u64, group_size: u32) -> Result<Vec<Buffer>> {
-    let block = u64::from(group_size * SCAN_ITEMS);
-    let mut levels = Vec::new();
-    let mut count = items;
-    loop {
-        count = count.div_ceil(block).max(1);
-        levels.push(gpu.buffer::<u32>("block sums", count, Memory::Device)?);
-        if count == 1 {
-            return Ok(levels);
-        }
     }
 }

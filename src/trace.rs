@@ -2,7 +2,6 @@
 
 mod in_order;
 
-use crate::constants::LOOP_LIMIT;
 use crate::error::Result;
 use crate::gpu::kernels::{
     DispatchSize, Emit, EndBounce, KeepOrder, ScanAdd, ScanBlocks, TraceAtomic, TraceBallot, TraceGroup, TraceInPlace, TraceSlots,
@@ -92,7 +91,7 @@ fn whole(commands: &mut Commands, resources: &Resources, plan: &Plan, round: u32
         let push = TraceWholePush {
             key: plan.streams().key(round),
             range: photon_range(plan, round, range),
-            stride: range.count.div_ceil(photons_per_invocation(plan, range.count)),
+            stride: range.count.div_ceil(plan.photons_per_invocation),
             bounces: plan.settings.bounces,
             photon_capacity: plan.photon_capacity,
             eye: plan.settings.eye.into(),
@@ -101,18 +100,6 @@ fn whole(commands: &mut Commands, resources: &Resources, plan: &Plan, round: u32
         commands.dispatch(kernel, &push, Extent::Items(u64::from(push.stride)))?;
     }
     Ok(())
-}
-
-/// Invocations that fill a large GPU: of fewer, none takes a second photon.
-const MANY_INVOCATIONS: u32 = 1 << 17;
-/// Photons of an invocation over which short and long paths even out.
-const MOST_PHOTONS: u32 = 16;
-/// Loop iterations of a bounce, those of its random numbers included, and most of opening a stream of them.
-const LOOPS_PER_BOUNCE: u32 = 48;
-
-fn photons_per_invocation(plan: &Plan, photon_count: u32) -> u32 {
-    let most = (LOOP_LIMIT / (LOOPS_PER_BOUNCE * (plan.settings.bounces + 8))).clamp(1, MOST_PHOTONS);
-    (photon_count / MANY_INVOCATIONS).clamp(1, most)
 }
 
 /// Timestamps that must be left for the scopes that are open and those that follow the bounces.

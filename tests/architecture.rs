@@ -8,12 +8,13 @@ use std::path::{Path, PathBuf};
 /// What everyone may use, and what among itself has no order.
 const GROUND: [&str; 8] = ["error", "bias", "constants", "records", "ledger", "rng", "settings", "timings"];
 /// From left to right.
-const LINE: [&str; 19] = [
+const LINE: [&str; 20] = [
     "scene",
     "judge",
     "plan",
     "gpu",
     "oddities",
+    "prefix_sum",
     "resources",
     "trace",
     "index",

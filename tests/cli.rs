@@ -88,7 +88,7 @@ fn bad_input_is_refused_in_one_line() {
         (&["--reflectance", "1.1"], ["--reflectance", "1.1", "0 to 1"]),
         (&["--light-power", "1,-1"], ["--light-power", "-1", "from 1e-12"]),
         (&["--light-radius", "0.3"], ["--light-radius", "0.3", "0.25"]),
-        (&["--variant", "atomik"], ["--variant", "atomik", "naive, atomic, ballot, cpu"]),
+        (&["--variant", "atomik"], ["--variant", "atomik", "naive, atomic, ballot, group, scan, persistent, cpu, auto"]),
         (&["--rng", "dice"], ["--rng", "dice", "rand48, mt, philox, sobol"]),
         (&["--rng", "mt", "--bounces", "75"], ["--bounces", "75", "74"]),
         (&["--rng", "sobol", "--photons", "2147483648", "--rounds", "3"], ["--rng", "sobol", "philox"]),
@@ -244,8 +244,41 @@ fn the_builders_write_the_same_picture() {
         std::fs::read(folder.path().join("a.png")).unwrap()
     };
     let naive = picture("naive");
-    assert_eq!(naive, picture("atomic"));
-    assert_eq!(naive, picture("ballot"));
+    for variant in ["atomic", "ballot", "group", "scan", "persistent", "auto"] {
+        assert!(naive == picture(variant), "{variant}");
+    }
+}
+
+/// Whoever asks for the fastest is told what each took, and gets the one that took least.
+#[test]
+fn the_fastest_builder_is_taken() {
+    let folder = tempfile::tempdir().unwrap();
+    let auto = |bounces: &'static str| {
+        let arguments = ["--variant", "auto", "--bounces", bounces, "--photons", "500", "--mesh", "4", "-o", "a.png", "--json", "a.json"];
+        let output = run_on_device(folder.path(), &arguments);
+        assert!(output.status.success(), "{}", text(&output.stderr));
+        let stderr = text(&output.stderr).to_owned();
+        let taken = json(&folder.path().join("a.json"))["settings"]["variant"].as_str().unwrap().to_owned();
+        if taken == "cpu" {
+            // There is no device here.
+            return Vec::new();
+        }
+        let (_, times) = stderr.split_once("in ms: ").expect(&stderr);
+        let times: Vec<(String, f64)> = times
+            .trim_end()
+            .split(", ")
+            .map(|candidate| candidate.split_once(' ').expect(&stderr))
+            .map(|(variant, ms)| (variant.to_owned(), ms.parse().expect(&stderr)))
+            .collect();
+        assert!(stderr.contains(&format!("auto takes {taken}:")) && times[0].0 == taken, "{stderr}");
+        assert!(times.is_sorted_by(|a, b| a.1 <= b.1) && times[0].1 > 0.0, "{stderr}");
+        times
+    };
+    let holds = |times: &[(String, f64)], variant: &str| times.iter().any(|(name, _)| name == variant);
+    let short = auto("15");
+    // A persistent invocation would loop too long.
+    let long = auto("1001");
+    assert!(short.is_empty() || (short.len() == 6 && long.len() == 5 && holds(&short, "persistent") && !holds(&long, "persistent")));
 }
 
 #[test]

@@ -498,7 +498,14 @@ fn radii_of_ten_thousand_rounds_follow_the_gamma_function() {
 
 /// What a device could hold at most: buffers are ranges of 32 bits.
 fn vast() -> Limits {
-    Limits { buffer_bytes: u64::MAX / 4, memory_bytes: u64::MAX / 4, pair_tests_per_submission: u64::MAX / 1024, group_size: 1024 }
+    Limits {
+        buffer_bytes: u64::MAX / 4,
+        memory_bytes: u64::MAX / 4,
+        pair_tests_per_submission: u64::MAX / 1024,
+        group_size: 1024,
+        busy_invocations: 1 << 17,
+        loop_iterations: 1 << 14,
+    }
 }
 
 /// photons * bounces beyond 2^32: every chunk's slots are numbered within 32 bits, whatever is asked, and the split

@@ -12,9 +12,10 @@ use photonmill::constants::{NO_WALL, SCAN_ITEMS};
 use photonmill::gpu::kernels::DispatchSize;
 use photonmill::gpu::{Buffer, Commands, Constants, Extent, Memory};
 use photonmill::plan::Plan;
+use photonmill::prefix_sum::{block_sums, scan};
 use photonmill::records::{DispatchArgs, DispatchSizePush, Path, Photon, SortedPhoton, Tally};
 use photonmill::render::constants;
-use photonmill::resources::{Resources, block_sums};
+use photonmill::resources::Resources;
 use photonmill::rng::Rng;
 use photonmill::scene::open_box::open_box;
 use photonmill::scene::room::{RoomScene, Wall};
@@ -43,7 +44,7 @@ fn prefix_sums(gpu: &Device, items: &[u32], group_size: u32) -> (Vec<u32>, Vec<u
     let levels = block_sums(gpu, items.len() as u64, group_size).unwrap();
     commands.fill(&buffer, 0, items.len() as u64 + guards, GUARD);
     commands.upload(&buffer, items).unwrap();
-    index::scan(&mut commands, &buffer, &levels, items.len() as u32, group_size).unwrap();
+    scan(&mut commands, &buffer, &levels, items.len() as u32, group_size).unwrap();
     let mut sums = commands.read::<u32>(&buffer, items.len() + guards as usize).unwrap();
     let behind = sums.split_off(items.len());
     (sums, behind)

@@ -59,6 +59,7 @@ fn no_split_and_no_builder_changes_a_bit() {
     let reference = picture(&gpu, &scene, &small());
     let variants = [
         ("atomic append", TransportSettings { append: Append::Atomic, ..small() }),
+        ("persistent photons", TransportSettings { append: Append::Persistent, ..small() }),
         ("chunks of 701", TransportSettings { chunk: Some(701), ..small() }),
         ("work groups of 32", TransportSettings { group_size: 32, ..small() }),
     ];

@@ -21,18 +21,13 @@ layout(set = 1, binding = 0, scalar) writeonly buffer LightPaths { LightPath lig
 #include "scene/surface.glsl"
 #include "scene/areas.glsl"
 #include "scene/lights.glsl"
+#include "stages/shine.glsl"
 
 void main()
 {
     uint index = invocation_index();
-    if (index >= push.photon_count) {
+    if (index >= push.emission.photon_count) {
         return;
     }
-    uint photon = push.first_photon + index;
-    vec4 u = philox_floats(uvec4(photon, push.draws.round, 0, push.draws.domain), push.draws.seed);
-    vec4 w = philox_floats(uvec4(photon, push.draws.round, 1, push.draws.domain), push.draws.seed);
-    Emission emission = sample_emission(push.emitter_count, push.scene_radius, u, w);
-    note_unless(is_finite(emission.position) && is_finite(emission.direction) && is_finite(emission.flux), ODD_PHOTON,
-                push.draws.domain, push.draws.round, photon);
-    light_paths[index] = LightPath(emission.position, photon, emission.direction, ARRIVED_DIRECT, emission.flux);
+    light_paths[index] = shine(push.emission.first_photon + index, push.draws, push.emission);
 }

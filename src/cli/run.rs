@@ -11,6 +11,7 @@ use super::transport::photon_name;
 use super::{DeviceArgs, End, complain, say};
 use crate::error::{Error, Result};
 use crate::film::estimate_walls;
+use crate::gpu::Gpu;
 use crate::output::destination::{Destination, Folder, check_distinct, write_all};
 use crate::output::image::{Format, overview};
 use crate::output::lightmap::{self, Quantity};
@@ -168,13 +169,48 @@ macro_rules! value_enum {
 pub(super) use value_enum;
 
 value_enum!(PresetArg => Preset { Naive, Modified, Phong, Rounds });
-value_enum!(VariantArg => Variant { Naive, Atomic, Ballot, Group, Scan, Persistent, Cpu });
 value_enum!(RngArg => Rng { Rand48, Mt, Philox, Sobol });
 value_enum!(GatherArg => Gather { Brute, Grid, #[value(name = "kdtree")] KdTree });
 value_enum!(SumsArg => Sums { Integer, F32, Compensated });
 value_enum!(MathArg => Math { Fast, Strict });
 value_enum!(EmissionArg => EmissionLaw { Uniform, Cosine });
 value_enum!(PhongDirectionArg => PhongDirection { Mirror, Sampled });
+
+#[derive(Clone, Copy, PartialEq, Eq, ValueEnum)]
+enum VariantArg {
+    /// The paper's first: a slot for every photon and bounce, empty ones included
+    Naive,
+    /// The paper's second: survivors only, one atomic a thread
+    Atomic,
+    /// Survivors only, one atomic a subgroup
+    Ballot,
+    /// Survivors only, one atomic a work group
+    Group,
+    /// Survivors only, in their order, by prefix sums
+    Scan,
+    /// Each photon in the registers of one thread until it ends
+    Persistent,
+    /// The paper's CPU implementation
+    Cpu,
+    /// The fastest on this device for so many photons: each traces the first of them
+    Auto,
+}
+
+impl VariantArg {
+    /// `None` until the device has been asked.
+    fn variant(self) -> Option<Variant> {
+        Some(match self {
+            VariantArg::Naive => Variant::Naive,
+            VariantArg::Atomic => Variant::Atomic,
+            VariantArg::Ballot => Variant::Ballot,
+            VariantArg::Group => Variant::Group,
+            VariantArg::Scan => Variant::Scan,
+            VariantArg::Persistent => Variant::Persistent,
+            VariantArg::Cpu => Variant::Cpu,
+            VariantArg::Auto => return None,
+        })
+    }
+}
 
 #[derive(Clone, Copy, PartialEq, Eq, ValueEnum)]
 pub(super) enum SwitchArg {
@@ -220,7 +256,7 @@ impl RunArgs {
         let preset = Settings::preset(self.preset.map_or(Preset::Modified, Preset::from));
         let photons = self.photons.unwrap_or(preset.photons);
         let settings = Settings {
-            variant: self.variant.map_or(preset.variant, Variant::from),
+            variant: self.variant.and_then(VariantArg::variant).unwrap_or(preset.variant),
             photons,
             rounds: self.rounds.unwrap_or(preset.rounds),
             bounces: self.bounces.unwrap_or(preset.bounces),
@@ -282,6 +318,10 @@ pub(super) fn run(args: &RunArgs, cancelled: &AtomicBool) -> Result<End> {
         Variant::Cpu => None,
         _ => args.device.open(args.time_dispatches)?,
     };
+    let settings = match &gpu {
+        Some(gpu) if args.variant == Some(VariantArg::Auto) => Settings { variant: fastest(gpu, &scene, &settings)?, ..settings },
+        _ => settings,
+    };
     if let (Some(nearest), true) = (settings.nearest, args.stop.bias) {
         let why = "takes radii of its own, whose bias no other radius tells; leave --bias out";
         return Err(Error::setting("--nearest", nearest, why));
@@ -310,6 +350,18 @@ pub(super) fn run(args: &RunArgs, cancelled: &AtomicBool) -> Result<End> {
     }
     outputs.write(outcome, &scene)?;
     Ok(end)
+}
+
+/// The builder that is fastest on this device, told with what each of them took.
+fn fastest(gpu: &Gpu, scene: &RoomScene, settings: &Settings) -> Result<Variant> {
+    let candidates = render::choose_variant(gpu, scene, settings)?;
+    let times: Vec<String> = candidates.iter().map(|candidate| format!("{} {:.3}", candidate.variant.name(), candidate.ms)).collect();
+    complain(&format!(
+        "--variant auto takes {}: trace and index the first photons in ms: {}",
+        candidates[0].variant.name(),
+        times.join(", ")
+    ));
+    Ok(candidates[0].variant)
 }
 
 /// Where one photon of the run is stored.

@@ -67,7 +67,7 @@ pub(super) struct TransportArgs {
     /// photon map, as in the paper [default: split]
     #[arg(long, value_enum, help_heading = "Transport")]
     illumination: Option<IlluminationArg>,
-    /// How photons take places in their map; the result is the same to the bit [default: ballot]
+    /// How photons fly and take places in their map; the result is the same to the bit [default: ballot]
     #[arg(long, value_enum, help_heading = "Transport")]
     variant: Option<AppendArg>,
     /// Arithmetic: as fast as the device has it, or the same bits on every device that rounds to nearest [default: fast]
@@ -134,7 +134,7 @@ pub(super) struct ReportArgs {
 }
 
 super::run::value_enum!(IlluminationArg => Illumination { Split, Photons });
-super::run::value_enum!(AppendArg => Append { Atomic, Ballot });
+super::run::value_enum!(AppendArg => Append { Atomic, Ballot, Persistent });
 super::run::value_enum!(KernelArg => Kernel { Box, Cone, Epanechnikov });
 super::run::value_enum!(FilterArg => Filter { Box, Tent, Gaussian });
 super::run::value_enum!(PartArg => Part { All, Direct, Specular, Caustic, Indirect });

@@ -6,7 +6,7 @@
 //! there are only the device knows, so dispatches are sized there, and heights that the tree does not reach are
 //! passed over there.
 
-use super::{add_work, scan_part};
+use super::add_work;
 use crate::constants::{TREE_DIGITS, TREE_LEAF};
 use crate::error::Result;
 use crate::gpu::kernels::{
@@ -14,6 +14,7 @@ use crate::gpu::kernels::{
 };
 use crate::gpu::{Buffer, Commands, Extent, Kernel, Module};
 use crate::plan::Plan;
+use crate::prefix_sum::scan_part;
 use crate::records::{DispatchSizePush, TreePush};
 use crate::resources::{Resources, TreeBuffers};
 use crate::trace::{INDIRECT_GROUPS_X, photon_list_capacity};

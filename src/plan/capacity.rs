@@ -3,6 +3,7 @@
 
 use serde::Serialize;
 
+use crate::constants::LOOP_LIMIT;
 use crate::error::{Error, Result};
 use crate::records::{Path, Photon};
 use crate::scene::room::RoomScene;
@@ -19,12 +20,23 @@ pub struct Limits {
     /// seconds after which a desktop driver takes the device away.
     pub pair_tests_per_submission: u64,
     pub group_size: u32,
+    /// Invocations that keep the device busy.
+    pub busy_invocations: u32,
+    /// Loop iterations that one of them may take.
+    pub loop_iterations: u32,
 }
 
 impl Limits {
     /// Limits of the CPU builder, which splits to keep its arrays small and to hear Ctrl-C.
     pub fn of_host() -> Limits {
-        Limits { buffer_bytes: 1 << 29, memory_bytes: 1 << 31, pair_tests_per_submission: 1 << 27, group_size: 1024 }
+        Limits {
+            buffer_bytes: 1 << 29,
+            memory_bytes: 1 << 31,
+            pair_tests_per_submission: 1 << 27,
+            group_size: 1024,
+            busy_invocations: 1,
+            loop_iterations: LOOP_LIMIT,
+        }
     }
 
     /// Pair tests a tenth of a second by kind of device: a slow one of its kind does 2^36 (discrete),
@@ -34,6 +46,20 @@ impl Limits {
             "discrete" => 1 << 33,
             "cpu" => 1 << 25,
             _ => 1 << 30,
+        }
+    }
+
+    /// Loop iterations by kind of device: lavapipe leaves loops early, others only after seconds.
+    pub fn loop_iterations_of(kind: &str) -> u32 {
+        if kind == "cpu" { LOOP_LIMIT } else { 1 << 20 }
+    }
+
+    /// Invocations that keep a device of a kind busy: a large GPU holds 2^18 at a time.
+    pub fn busy_invocations_of(kind: &str) -> u32 {
+        match kind {
+            "discrete" => 1 << 17,
+            "cpu" => 1 << 10,
+            _ => 1 << 14,
         }
     }
 }
@@ -103,6 +129,17 @@ impl Work {
     pub fn tracing(&self, photons: u32) -> u64 {
         (self.flights_per_photon * PAIR_TESTS_PER_FLIGHT * f64::from(photons)) as u64
     }
+}
+
+/// Photons of an invocation over which short and long paths even out.
+const MOST_PHOTONS_PER_INVOCATION: u32 = 16;
+/// Loop iterations of a bounce in the paper's room, those of its random numbers included; opening a stream of them takes as many as 8 bounces.
+pub(super) const LOOPS_PER_BOUNCE: u32 = 48;
+
+/// Photons that one invocation takes of a chunk, one after the other.
+pub fn photons_per_invocation(loops_per_bounce: u32, bounces: u32, chunk_photons: u32, limits: &Limits) -> u32 {
+    let most = (limits.loop_iterations / (loops_per_bounce * (bounces + 8))).clamp(1, MOST_PHOTONS_PER_INVOCATION);
+    (chunk_photons / limits.busy_invocations).clamp(1, most)
 }
 
 /// Photons traced at once.

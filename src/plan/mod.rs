@@ -55,6 +55,8 @@ pub struct Plan {
     pub work: Work,
     /// Pair tests (point, photon) after which commands are handed to the device.
     pub pair_tests_per_submission: u64,
+    /// Photons that an invocation takes one after the other where it keeps them to their end.
+    pub photons_per_invocation: u32,
 }
 
 /// The uniform grid that sorts photons.
@@ -139,10 +141,13 @@ impl Plan {
             grid,
             work,
             pair_tests_per_submission: limits.pair_tests_per_submission,
+            photons_per_invocation: 1,
         };
         // Of each light's photons the larger share: there may be a billion chunks, too many to look at each.
         plan.path_capacity = plan.light_photons.iter().map(|count| count.div_ceil(chunks_per_round)).sum();
         plan.photon_capacity = plan.path_capacity * settings.bounces;
+        plan.photons_per_invocation =
+            capacity::photons_per_invocation(capacity::LOOPS_PER_BOUNCE, settings.bounces, plan.path_capacity, limits);
         Ok(plan)
     }
 

@@ -7,13 +7,14 @@ use std::time::{Duration, Instant};
 use serde::Serialize;
 
 use super::Limits;
+use super::capacity::photons_per_invocation;
 use super::evidence::{EffectDecision, Facts};
 use crate::constants::*;
 use crate::error::{Error, Result};
 use crate::records::*;
 use crate::scene::geometry::Geometry;
 use crate::scene::{Scene, Surface};
-use crate::settings::transport::{Effect, Illumination, TransportSettings};
+use crate::settings::transport::{Append, Effect, Illumination, TransportSettings};
 
 /// What light is asked of.
 #[derive(Debug, Clone, Copy, PartialEq, Eq, Serialize)]
@@ -44,6 +45,10 @@ pub struct MapPlan {
     /// Photons traced at once, and entries that the map of those can have.
     pub chunk_photons: u32,
     pub capacity: u32,
+    /// Paths that one flight hands to the next: none where each photon has an invocation to its end.
+    pub path_array_length: u32,
+    /// Photons that an invocation takes one after the other where it keeps them to their end.
+    pub photons_per_invocation: u32,
     pub bounces: u32,
     /// Mask of the arrivals that are stored.
     pub stored: u32,
@@ -102,6 +107,8 @@ const FILM_BITS: (i32, i32) = (24, 32);
 const FILM_HEADROOM_BITS: i32 = 24;
 /// Bytes of a pixel on the film: sums and squares of three channels.
 const FILM_PIXEL_BYTES: u64 = 3 * 8 + 3 * 16;
+/// Loop iterations of a flight of a photon, mostly of its ray through the hierarchy.
+const LOOPS_PER_FLIGHT: u32 = 256;
 /// Work of a ray, in pair tests.
 const RAY_COST: u64 = 64;
 
@@ -134,6 +141,12 @@ impl TransportPlan {
         .map(|(kept, arrival)| if *kept { *arrival } else { 0 })
         .sum::<u32>();
 
+        let persistent = settings.append == Append::Persistent;
+        let most_bounces = limits.loop_iterations / LOOPS_PER_FLIGHT;
+        if persistent && settings.bounces > most_bounces {
+            let allowed = format!("must be at most {most_bounces} with --variant persistent on this device");
+            return Err(Error::setting("--bounces", settings.bounces, allowed));
+        }
         let map = |name, domain, photons: u32, stored, caustic_only: bool, radius: Option<f64>, option| -> Result<MapPlan> {
             let share = if caustic_only { CAUSTIC_RADIUS_SHARE } else { 1.0 };
             let usual = (PHOTONS_PER_ESTIMATE * geometry.area / (PI * 2.0 * f64::from(photons))).sqrt() * share;
@@ -157,6 +170,8 @@ impl TransportPlan {
                 photons,
                 chunk_photons,
                 capacity,
+                path_array_length: if persistent { 0 } else { chunk_photons },
+                photons_per_invocation: photons_per_invocation(LOOPS_PER_FLIGHT, settings.bounces, chunk_photons, limits),
                 bounces: settings.bounces,
                 stored,
                 caustic_only,
@@ -253,6 +268,16 @@ impl TransportPlan {
         self.global.iter().chain(&self.caustic)
     }
 
+    /// The same by a builder that stops after each flight.
+    pub fn by_flights(&self) -> TransportPlan {
+        let mut plan = self.clone();
+        if plan.settings.append == Append::Persistent {
+            plan.settings.append = Append::Ballot;
+            plan.global.iter_mut().chain(&mut plan.caustic).for_each(|map| map.path_array_length = map.chunk_photons);
+        }
+        plan
+    }
+
     /// Radius of a map in a round, normalised: r_(i+1)^2 = r_i^2 (i + alpha) / (i + 1) with i from 1
     /// (Knaus and Zwicker 2011, equation 15).
     pub fn radius(&self, map: &MapPlan, round: u32) -> f64 {
@@ -334,7 +359,7 @@ impl TransportPlan {
             .maps()
             .map(|map| {
                 u64::from(map.capacity) * 2 * size_of::<MapPhoton>() as u64
-                    + u64::from(map.chunk_photons) * 2 * size_of::<LightPath>() as u64
+                    + u64::from(map.path_array_length) * 2 * size_of::<LightPath>() as u64
                     + u64::from(map.bucket_count) * 4
             })
             .sum();

@@ -85,6 +85,8 @@ pub fn limits(facts: &DeviceFacts) -> Limits {
         memory_bytes: facts.device_memory_bytes / 2,
         pair_tests_per_submission: Limits::pair_tests_of(facts.kind),
         group_size: facts.work_group_size,
+        loop_iterations: Limits::loop_iterations_of(facts.kind),
+        busy_invocations: Limits::busy_invocations_of(facts.kind),
     }
 }
 
@@ -104,7 +106,7 @@ pub fn constants(plan: &Plan) -> Constants {
 }
 
 /// Makes the pipelines of the plan, and only those.
-fn prepare(gpu: &Gpu, plan: &Plan) -> Result<()> {
+pub(super) fn prepare(gpu: &Gpu, plan: &Plan) -> Result<()> {
     let modules = [trace::modules(plan), index::modules(plan), estimate::modules(plan, gpu.facts())].concat();
     gpu.prepare(&modules, &constants(plan))
 }

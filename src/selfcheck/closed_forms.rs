@@ -17,8 +17,12 @@ use crate::settings::transport::{Append, Illumination, TransportSettings};
 
 const BOTH: [Illumination; 2] = [Illumination::Split, Illumination::Photons];
 /// Each way of lighting, and photons by each builder.
-const WAYS: [(Illumination, Append); 3] =
-    [(Illumination::Split, Append::Ballot), (Illumination::Photons, Append::Ballot), (Illumination::Photons, Append::Atomic)];
+const WAYS: [(Illumination, Append); 4] = [
+    (Illumination::Split, Append::Ballot),
+    (Illumination::Photons, Append::Ballot),
+    (Illumination::Photons, Append::Atomic),
+    (Illumination::Photons, Append::Persistent),
+];
 
 fn scene(name: &str) -> Scene {
     by_name(name).unwrap_or_else(|| panic!("there is no scene {name}"))

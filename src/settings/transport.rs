@@ -88,12 +88,16 @@ impl Filter {
     }
 }
 
-/// How photons take places in their map.
+/// How photons fly and take places in their map.
 #[derive(Debug, Clone, Copy, PartialEq, Eq, Serialize)]
 #[serde(rename_all = "lowercase")]
 pub enum Append {
+    /// Flight by flight, an atomic a photon.
     Atomic,
+    /// Flight by flight, an atomic a subgroup.
     Ballot,
+    /// Each photon from its light to its end by one invocation, an atomic a subgroup.
+    Persistent,
 }
 
 /// What a scene may call for; each can be forced on or left out.

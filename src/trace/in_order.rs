@@ -3,8 +3,8 @@
 use crate::error::Result;
 use crate::gpu::kernels::{EndBounce, KeepOrder, TraceInPlace};
 use crate::gpu::{Commands, Extent};
-use crate::index::scan;
 use crate::plan::Plan;
+use crate::prefix_sum::scan;
 use crate::records::{EndBouncePush, TracePush};
 use crate::resources::{OrderBuffers, Resources};
 

@@ -94,11 +94,12 @@ pub fn modules(plan: &TransportPlan, facts: &DeviceFacts) -> Vec<Module> {
         Sensor::Receivers { .. } => Receive::MODULE,
     });
     if plan.maps().next().is_some() {
-        modules.extend([Shine::MODULE, MapCount::MODULE, MapScatter::MODULE, ScanBlocks::MODULE, ScanAdd::MODULE]);
+        modules.extend([MapCount::MODULE, MapScatter::MODULE, ScanBlocks::MODULE, ScanAdd::MODULE]);
         modules.extend([DispatchSize::MODULE, LookupCount::MODULE, SliceCount::MODULE]);
-        modules.push(match plan.settings.append {
-            Append::Atomic => FlyAtomic::MODULE,
-            Append::Ballot => FlyBallot::MODULE,
+        modules.extend(match plan.settings.append {
+            Append::Atomic => vec![Shine::MODULE, FlyAtomic::MODULE],
+            Append::Ballot => vec![Shine::MODULE, FlyBallot::MODULE],
+            Append::Persistent => vec![FlyWhole::MODULE],
         });
         modules.push(if facts.int64_atomics { LookupU64::MODULE } else { LookupTwoWords::MODULE });
     }

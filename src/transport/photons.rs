@@ -3,12 +3,13 @@
 use super::Round;
 use super::resources::{PhotonBuffers, TransportResources};
 use crate::error::Result;
-use crate::gpu::kernels::{DispatchSize, FlyAtomic, FlyBallot, MapCount, MapScatter, Shine};
+use crate::gpu::kernels::{DispatchSize, FlyAtomic, FlyBallot, FlyWhole, MapCount, MapScatter, Shine};
 use crate::gpu::{Commands, Extent};
-use crate::index::scan;
 use crate::plan::transport::{MapPlan, TransportPlan};
-use crate::records::{CellPush, DispatchSizePush, Draws, EmissionPush, FlightPush};
+use crate::prefix_sum::scan;
+use crate::records::{CellPush, DispatchSizePush, Draws, EmissionPush, FlightPush, FlyWholePush, PhotonEmission, PhotonStore};
 use crate::rng::words;
+use crate::scene::geometry::Geometry;
 use crate::settings::transport::Append;
 use crate::trace::INDIRECT_GROUPS_X;
 
@@ -28,6 +29,9 @@ const TIMESTAMP_RESERVE: u32 = 32;
 
 /// Traces the photons (first, count) of a chunk into the map and adds their fates to its tallies.
 pub fn trace(commands: &mut Commands, round: Round, photons: &PhotonBuffers, map: &MapPlan, chunk: (u32, u32)) -> Result<()> {
+    if round.plan.settings.append == Append::Persistent {
+        return whole(commands, round, photons, map, chunk);
+    }
     emit(commands, round, photons, map, chunk)?;
     for bounce in 0..map.bounces {
         if commands.timestamps_left() < TIMESTAMP_RESERVE {
@@ -49,26 +53,46 @@ fn draws(round: Round, map: &MapPlan) -> Draws {
     Draws { seed: words(round.plan.settings.seed), round: round.number, domain: map.domain }
 }
 
+fn emission(geometry: &Geometry, (first_photon, photon_count): (u32, u32)) -> PhotonEmission {
+    PhotonEmission { first_photon, photon_count, emitter_count: geometry.emitters.len() as u32, scene_radius: geometry.radius as f32 }
+}
+
+fn store(plan: &TransportPlan, map: &MapPlan) -> PhotonStore {
+    PhotonStore {
+        photon_capacity: map.capacity,
+        stored: map.stored,
+        caustic_only: u32::from(map.caustic_only),
+        caustic_surfaces: plan.caustic_surfaces,
+    }
+}
+
+/// Traces every photon from the lights to its end.
+fn whole(commands: &mut Commands, round: Round, photons: &PhotonBuffers, map: &MapPlan, chunk: (u32, u32)) -> Result<()> {
+    let Round { resources, geometry, plan, .. } = round;
+    let TransportResources { nodes, triangles, normals, uvs, materials, textures, texels, emitters, oddities, .. } = resources;
+    commands.fill(&photons.counters, 0, 1, 0);
+    let push = FlyWholePush {
+        draws: draws(round, map),
+        emission: emission(geometry, chunk),
+        map: store(plan, map),
+        bounces: map.bounces,
+        stride: chunk.1.div_ceil(map.photons_per_invocation),
+    };
+    let tallies = &photons.tallies[usize::from(map.caustic_only)];
+    let PhotonBuffers { counters, map, .. } = photons;
+    let kernel = FlyWhole { nodes, triangles, normals, uvs, materials, textures, texels, emitters, map, counters, tallies, oddities };
+    commands.dispatch(kernel, &push, Extent::Items(u64::from(push.stride)))
+}
+
 /// Writes the paths of a chunk as they leave the lights.
-pub fn emit(
-    commands: &mut Commands,
-    round: Round,
-    photons: &PhotonBuffers,
-    map: &MapPlan,
-    (first_photon, photon_count): (u32, u32),
-) -> Result<()> {
+pub fn emit(commands: &mut Commands, round: Round, photons: &PhotonBuffers, map: &MapPlan, chunk: (u32, u32)) -> Result<()> {
     let Round { resources, geometry, .. } = round;
+    let photon_count = chunk.1;
     let TransportResources { nodes, triangles, normals, uvs, materials, textures, texels, emitters, oddities, .. } = resources;
     let PhotonBuffers { paths: [light_paths, _], counters, .. } = photons;
     commands.fill(counters, 0, u64::from(map.bounces) + 2, 0);
     commands.fill(counters, 1, 1, photon_count);
-    let push = EmissionPush {
-        draws: draws(round, map),
-        first_photon,
-        photon_count,
-        emitter_count: geometry.emitters.len() as u32,
-        scene_radius: geometry.radius as f32,
-    };
+    let push = EmissionPush { draws: draws(round, map), emission: emission(geometry, chunk) };
     let kernel = Shine { nodes, triangles, normals, uvs, materials, textures, texels, emitters, light_paths, oddities };
     commands.dispatch(kernel, &push, Extent::Items(u64::from(photon_count)))
 }
@@ -77,15 +101,7 @@ pub fn emit(
 pub fn fly(commands: &mut Commands, round: Round, photons: &PhotonBuffers, map: &MapPlan, bounce: u32, extent: Extent) -> Result<()> {
     let Round { resources, plan, .. } = round;
     let TransportResources { nodes, triangles, normals, uvs, materials, textures, texels, oddities, .. } = resources;
-    let push = FlightPush {
-        draws: draws(round, map),
-        bounce,
-        path_capacity: map.chunk_photons,
-        photon_capacity: map.capacity,
-        stored: map.stored,
-        caustic_only: u32::from(map.caustic_only),
-        caustic_surfaces: plan.caustic_surfaces,
-    };
+    let push = FlightPush { draws: draws(round, map), map: store(plan, map), bounce, path_capacity: map.chunk_photons };
     let tallies = &photons.tallies[usize::from(map.caustic_only)];
     let PhotonBuffers { paths: [even, odd], counters, map, .. } = photons;
     let (light_paths, next_light_paths) = if bounce.is_multiple_of(2) { (even, odd) } else { (odd, even) };
@@ -109,6 +125,7 @@ pub fn fly(commands: &mut Commands, round: Round, photons: &PhotonBuffers, map: 
             &push,
             extent,
         ),
+        Append::Persistent => panic!("a persistent builder has no flights of all photons"),
         Append::Ballot => commands.dispatch(
             FlyBallot {
                 nodes,

@@ -85,6 +85,7 @@ pub fn light_paths(
     chunk: (u32, u32),
     flights: u32,
 ) -> Result<Flights> {
+    let plan = &plan.by_flights();
     assert!(chunk.1 <= map.chunk_photons && flights <= map.bounces, "{chunk:?}, {flights} flights of {map:?}");
     let mut commands = Commands::new(gpu, constants(plan), Instant::now())?;
     let resources = TransportResources::new(gpu, &mut commands, geometry, plan, &[])?;

@@ -8,8 +8,8 @@ use crate::error::Result;
 use crate::gpu::{Buffer, Commands, Gpu, Memory};
 use crate::oddities;
 use crate::plan::transport::{MapPlan, TransportPlan};
+use crate::prefix_sum::block_sums;
 use crate::records::*;
-use crate::resources::block_sums;
 use crate::scene::geometry::Geometry;
 use crate::settings::transport::Effect;
 
@@ -111,7 +111,7 @@ impl PhotonBuffers {
     fn new(gpu: &Gpu, commands: &mut Commands, plan: &TransportPlan) -> Result<PhotonBuffers> {
         let most = |size: fn(&MapPlan) -> u32| plan.maps().map(size).max().map_or(0, u64::from);
         let device = Memory::Device;
-        let (paths, capacity, buckets) = (most(|map| map.chunk_photons), most(|map| map.capacity), most(|map| map.bucket_count));
+        let (paths, capacity, buckets) = (most(|map| map.path_array_length), most(|map| map.capacity), most(|map| map.bucket_count));
         let bounces = u64::from(plan.settings.bounces);
         let buffers = PhotonBuffers {
             paths: [

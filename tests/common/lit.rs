@@ -18,7 +18,7 @@ use photonmill::transport::{self, Lit, View};
 use super::{Check, z_check};
 
 /// Builders of a map of a scene of triangles.
-pub const APPENDS: [Append; 2] = [Append::Atomic, Append::Ballot];
+pub const APPENDS: [Append; 3] = [Append::Atomic, Append::Ballot, Append::Persistent];
 pub const BOTH: [Illumination; 2] = [Illumination::Split, Illumination::Photons];
 
 /// Runs to the end, with nothing odd.

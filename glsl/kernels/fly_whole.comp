@@ -1,0 +1,38 @@
+// Photons from emission to their end.
+// Dispatched by src/transport/photons.rs once a chunk. One thread = every `stride`th photon.
+#version 460
+#extension GL_GOOGLE_include_directive : require
+#extension GL_EXT_scalar_block_layout : require
+#extension GL_EXT_control_flow_attributes : require
+#extension GL_KHR_shader_subgroup_basic : require
+#extension GL_KHR_shader_subgroup_ballot : require
+#include "records.glsl"
+
+layout(local_size_x_id = 0) in;
+layout(push_constant, scalar) uniform Push { FlyWholePush push; };
+layout(set = 1, binding = 3, scalar) buffer Counters { uint counters[]; };
+layout(set = 1, binding = 4, scalar) buffer Tallies { Tally tallies[]; };
+
+#include "math.glsl"
+#include "oddities.glsl"
+#include "dispatch.glsl"
+#include "philox.glsl"
+#include "sampling.glsl"
+#include "tallies.glsl"
+#include "append/ballot.glsl"
+#include "scene/effects.glsl"
+#include "scene/directions.glsl"
+#include "scene/bvh.glsl"
+#include "scene/surface.glsl"
+#include "scene/areas.glsl"
+#include "scene/lights.glsl"
+#include "scene/lobes.glsl"
+#include "scene/scatter.glsl"
+#include "stages/fly_once.glsl"
+#include "stages/shine.glsl"
+#include "stages/fly_whole.glsl"
+
+void main()
+{
+    fly_whole();
+}

@@ -1,0 +1,59 @@
+// One flight of a photon in a scene of triangles: nearest surface, Russian roulette, scatter.
+
+// What the surface made of the path. `photon` is to be stored if `stored`, whatever became of its path.
+struct Flown {
+    bool escaped;
+    bool absorbed;
+    bool stored;
+    bool alive;
+    MapPhoton photon;
+};
+
+Flown no_flight()
+{
+    return Flown(false, false, false, false, MapPhoton(vec3(0.0), 0, vec3(0.0), 0));
+}
+
+Flown fly_once(inout LightPath path, uint bounce)
+{
+    Flown flown = no_flight();
+    Hit hit = closest_hit(path.position, path.direction);
+    flown.escaped = hit.triangle == NONE;
+    if (!flown.escaped) {
+        vec3 wo = -path.direction;
+        Surface surface = surface_at(hit, wo);
+        bool specular = is_specular(surface);
+        flown.stored = !specular && (path.arrival & push.map.stored) != 0;
+        flown.photon = MapPhoton(surface.position, pack_normal(surface.ng), path.flux, pack_direction(wo, findLSB(path.arrival)));
+
+        vec4 u = philox_floats(uvec4(path.photon, push.draws.round, EMISSION_BLOCKS + bounce, push.draws.domain), push.draws.seed);
+        Scatter scatter = sample_scatter(surface, wo, u.yzw, false);
+        vec3 flux = path.flux * scatter.weight;
+        if (HAS_SMOOTH_NORMALS) {
+            if (surface.ns != surface.ng) {
+                float gain = shading_gain(dot(wo, surface.ns), dot(wo, surface.ng));
+                float back_gain = shading_gain(dot(scatter.direction, surface.ng), dot(scatter.direction, surface.ns));
+                flux *= min(gain * back_gain, float(MAX_SHADING_GAIN));
+            }
+        }
+        vec3 start = offset_origin(surface.position, surface.error, surface.ng, scatter.direction);
+        // Before the cuts below, which would hide what is no number.
+        note_unless(is_finite(flown.photon.position) && is_finite(flown.photon.flux) && is_finite(start) && is_finite(scatter.direction)
+                        && is_finite(flux), ODD_PHOTON, push.draws.domain, push.draws.round, path.photon);
+        float before = max(path.flux.x, max(path.flux.y, path.flux.z));
+        float after = max(flux.x, max(flux.y, flux.z));
+        // Survival in proportion to the flux that is left, so that survivors carry about what they did.
+        float survival = before > 0.0 ? min(divide(after, before), 1.0) : 0.0;
+        flown.alive = surface.scatters && scatter.alive && u.x < survival && (specular || push.map.caustic_only == 0);
+        flown.absorbed = !flown.alive;
+        flux = min(divide(flux, max(survival, 1e-12)), vec3(float(MAX_SHADING_GAIN)));
+
+        uint onward = ARRIVED_INDIRECT;
+        if (specular) {
+            bool wanted = ((push.map.caustic_surfaces >> surface.kind) & 1u) != 0;
+            onward = path.arrival >= ARRIVED_INDIRECT ? path.arrival : (wanted ? ARRIVED_CAUSTIC : ARRIVED_UNWANTED);
+        }
+        path = LightPath(start, path.photon, scatter.direction, onward, flux);
+    }
+    return flown;
+}

@@ -1,0 +1,49 @@
+//! Prefix sums on the device: sums of blocks, sums of those, and so on up, then down again.
+
+use crate::constants::SCAN_ITEMS;
+use crate::error::Result;
+use crate::gpu::kernels::{ScanAdd, ScanBlocks};
+use crate::gpu::{Buffer, Commands, Extent, Gpu, Memory};
+use crate::records::ScanPush;
+
+/// One buffer a level of a prefix sum over `items`: block sums of the level below, down to one block.
+pub fn block_sums(gpu: &Gpu, items: u64, group_size: u32) -> Result<Vec<Buffer>> {
+    let block = u64::from(group_size * SCAN_ITEMS);
+    let mut levels = Vec::new();
+    let mut count = items;
+    loop {
+        count = count.div_ceil(block).max(1);
+        levels.push(gpu.buffer::<u32>("block sums", count, Memory::Device)?);
+        if count == 1 {
+            return Ok(levels);
+        }
+    }
+}
+
+/// Turns `item_count` numbers into their exclusive prefix sums; `levels` as [`block_sums`]
+/// makes them.
+pub fn scan(commands: &mut Commands, items: &Buffer, levels: &[Buffer], item_count: u32, group_size: u32) -> Result<()> {
+    let threads = || Extent::Items(u64::from(item_count.div_ceil(SCAN_ITEMS)));
+    scan_part(commands, items, levels, item_count, group_size, &threads)
+}
+
+/// The same of the first numbers alone, as many as `threads` read: sums before them do not depend on those behind,
+/// which are left in disorder.
+pub fn scan_part<'a>(
+    commands: &mut Commands,
+    items: &Buffer,
+    levels: &[Buffer],
+    item_count: u32,
+    group_size: u32,
+    threads: &dyn Fn() -> Extent<'a>,
+) -> Result<()> {
+    let [block_sums, coarser @ ..] = levels else { panic!("a prefix sum has a level") };
+    let push = ScanPush { item_count };
+    commands.dispatch(ScanBlocks { items, block_sums }, &push, threads())?;
+    if coarser.is_empty() {
+        return Ok(());
+    }
+    let block_count = item_count.div_ceil(group_size * SCAN_ITEMS);
+    scan(commands, block_sums, coarser, block_count, group_size)?;
+    commands.dispatch(ScanAdd { items, block_sums }, &push, threads())
+}
