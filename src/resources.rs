@@ -58,8 +58,10 @@ pub struct RoundBuffers {
 }
 
 pub struct IndexBuffers {
-    /// Photons in each cell; after sorting, one past the last photon of each cell.
+    /// Photons in each cell; after their prefix sums the first photon of each, and behind the last the number of all.
     pub cells: Buffer,
+    /// Place of each entry of the photon map among those of its cell.
+    pub ranks: Buffer,
     /// Sums of blocks of cells, sums of blocks of those, ... down to one.
     pub block_sums: Vec<Buffer>,
     pub sorted_photons: Buffer,
@@ -175,9 +177,10 @@ impl RoundBuffers {
 
 impl IndexBuffers {
     fn new(gpu: &Gpu, plan: &Plan) -> Result<IndexBuffers> {
-        let cells = u64::from(plan.grid.cells());
+        let cells = u64::from(plan.grid.cells()) + 1;
         Ok(IndexBuffers {
             cells: gpu.buffer::<u32>("cells", cells, Memory::Device)?,
+            ranks: gpu.buffer::<u32>("ranks", u64::from(plan.photon_capacity), Memory::Device)?,
             block_sums: block_sums(gpu, cells, plan.settings.group_size)?,
             sorted_photons: gpu.buffer::<SortedPhoton>("sorted photons", u64::from(plan.photon_capacity), Memory::Device)?,
             longest: gpu.buffer::<u32>("longest", 1, Memory::Device)?,

@@ -195,7 +195,10 @@ fn the_index_holds_every_photon_in_its_cell() {
             trace::chunk(&mut commands, &resources, &plan, 0, &plan.chunk(0)).unwrap();
             index::build(&mut commands, &resources, &plan, photon_count).unwrap();
             let map = photons(&gpu, &settings);
-            let cells = commands.read::<u32>(&buffers.cells, plan.grid.cells() as usize).unwrap();
+            let begins = commands.read::<u32>(&buffers.cells, plan.grid.cells() as usize + 1).unwrap();
+            assert_eq!(begins[0], 0);
+            // A cell ends where the next one begins.
+            let cells = begins[1..].to_vec();
             let sorted = commands.read::<SortedPhoton>(&buffers.sorted_photons, map.len()).unwrap();
             assert_holds(format!("{variant:?}, {photon_count} photons, radius {radius}"), index_check(&plan, &cells, &sorted, &map));
 

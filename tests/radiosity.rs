@@ -8,7 +8,7 @@ use std::sync::OnceLock;
 
 use common::family::{Family, chi_squared_z};
 use common::lit::irradiances;
-use common::{Device, device, photons, photons_on_cpu, run, run_on_cpu};
+use common::{Device, JUDGED, device, photons, photons_on_cpu, run, run_on_cpu};
 use glam::DVec3;
 use photonmill::film::estimate_walls;
 use photonmill::judge::radiosity::{ByLamp, Law, Radiosity, WALLS, cells_of, exchange, form_factor_from, inward, on_wall};
@@ -139,7 +139,7 @@ fn photons_of(gpu: Option<&Device>, settings: &Settings) -> Vec<Photon> {
 
 /// Builders that can run here.
 fn builders(gpu: Option<&Device>) -> impl Iterator<Item = Variant> {
-    Variant::all().filter(move |variant| gpu.is_some() || *variant == Variant::Cpu)
+    JUDGED.into_iter().filter(move |variant| gpu.is_some() || *variant == Variant::Cpu)
 }
 
 /// Mean of a quantity a photon, and the standard error of that mean, from sums over chains of a photon.

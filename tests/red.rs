@@ -80,7 +80,7 @@ struct Fault {
     noticed_by: &'static [Question],
 }
 
-const FAULTS: [Fault; 45] = [
+const FAULTS: [Fault; 46] = [
     Fault {
         what: "every other lane of a subgroup writes over its neighbour",
         file: "append/ballot.glsl",
@@ -149,9 +149,17 @@ const FAULTS: [Fault; 45] = [
     Fault {
         what: "a photon in fifty is stored twice",
         file: "stages/flight.glsl",
-        from: "        map[place] = photon;",
-        to: "        map[place] = photon;\n        if (path.photon % 50u == 0u) map[atomicAdd(counters[0], 1)] = photon;",
+        from: "        map[place] = flown.photon;",
+        to: "        map[place] = flown.photon;\n        if (path.photon % 50u == 0u) map[atomicAdd(counters[0], 1)] = flown.photon;",
         kernels: &["fly_atomic"],
+        noticed_by: &[Appends],
+    },
+    Fault {
+        what: "a photon that flies to its end begins with its second bounce's random numbers",
+        file: "stages/fly_whole.glsl",
+        from: "            bounce = 0;",
+        to: "            bounce = 1;",
+        kernels: &["fly_whole"],
         noticed_by: &[Appends],
     },
     Fault {
@@ -311,7 +319,7 @@ const FAULTS: [Fault; 45] = [
     },
     Fault {
         what: "a photon in 500 starts nowhere",
-        file: "stages/flight.glsl",
+        file: "stages/fly_once.glsl",
         from: "surface.ng, scatter.direction);",
         to: "surface.ng, scatter.direction);\n            if (u.z < 0.002) start.y = uintBitsToFloat(0x7fc00000u);",
         kernels: &["fly_ballot"],
@@ -320,8 +328,8 @@ const FAULTS: [Fault; 45] = [
     Fault {
         what: "a photon in 500 carries no number into the map",
         file: "stages/flight.glsl",
-        from: "map[place] = photon;",
-        to: "if (path.photon % 500u == 7u) photon.flux.y = uintBitsToFloat(0x7fc00000u);\n        map[place] = photon;",
+        from: "map[place] = flown.photon;",
+        to: "if (path.photon % 500u == 7u) flown.photon.flux.y = uintBitsToFloat(0x7fc00000u);\n        map[place] = flown.photon;",
         kernels: &["fly_ballot"],
         noticed_by: &[Finite],
     },
@@ -520,7 +528,7 @@ fn ask(gpu: &Gpu, question: Question) -> Check {
         }
         Appends => {
             let of = |append| film(gpu, &cornell(), &TransportSettings { append, ..small() });
-            same_film(&of(Append::Ballot), &of(Append::Atomic))
+            same_film(&of(Append::Ballot), &of(Append::Atomic)).and_then(|()| same_film(&of(Append::Ballot), &of(Append::Persistent)))
         }
         StrictMath => check::strict_math(gpu).map_err(|error| error.to_string()),
         Finite => {

@@ -1,6 +1,7 @@
-// Counts the photons of each grid cell.
+// Counts the photons of each grid cell, and numbers them in it.
 // Dispatched by src/index.rs once a chunk. One thread = one entry of the photon map.
-// After it cells[c] = photons in cell c.
+// After it cells[c] = photons in cell c; ranks[i] = photons that came to the cell of entry i before it. That order
+// varies from run to run; the integer sums of the film do not see it.
 #version 460
 #extension GL_GOOGLE_include_directive : require
 #extension GL_EXT_scalar_block_layout : require
@@ -10,6 +11,7 @@ layout(local_size_x_id = 0) in;
 layout(push_constant, scalar) uniform Push { IndexPush push; };
 #include "stages/photon_list.glsl"
 layout(set = 1, binding = 2, scalar) buffer Cells { uint cells[]; };
+layout(set = 1, binding = 3, scalar) writeonly buffer Ranks { uint ranks[]; };
 
 #include "dispatch.glsl"
 #include "grid.glsl"
@@ -21,5 +23,5 @@ void main()
         return;
     }
     uvec3 cell = cell_of(photons[index].position, push.origin, push.cells_per_metre, push.cell_count);
-    atomicAdd(cells[cell_number(cell, push.cell_count)], 1);
+    ranks[index] = atomicAdd(cells[cell_number(cell, push.cell_count)], 1);
 }

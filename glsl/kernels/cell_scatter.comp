@@ -1,7 +1,6 @@
 // Writes each photon to its place in cell order.
 // Dispatched by src/index.rs once a chunk. One thread = one entry of the photon map.
-// Before it cells[c] = first place of cell c; after it, one past the last place of cell c. The order
-// inside a cell varies from run to run; the integer sums of the film do not see it.
+// cells[c] = first place of cell c; ranks from cell_count.comp.
 #version 460
 #extension GL_GOOGLE_include_directive : require
 #extension GL_EXT_scalar_block_layout : require
@@ -10,8 +9,9 @@
 layout(local_size_x_id = 0) in;
 layout(push_constant, scalar) uniform Push { IndexPush push; };
 #include "stages/photon_list.glsl"
-layout(set = 1, binding = 2, scalar) buffer Cells { uint cells[]; };
+layout(set = 1, binding = 2, scalar) readonly buffer Cells { uint cells[]; };
 layout(set = 1, binding = 3, scalar) writeonly buffer SortedPhotons { SortedPhoton sorted_photons[]; };
+layout(set = 1, binding = 4, scalar) readonly buffer Ranks { uint ranks[]; };
 
 #include "dispatch.glsl"
 #include "grid.glsl"
@@ -27,6 +27,6 @@ void main()
         return;
     }
     uvec3 cell = cell_of(photon.position, push.origin, push.cells_per_metre, push.cell_count);
-    uint place = atomicAdd(cells[cell_number(cell, push.cell_count)], 1);
+    uint place = cells[cell_number(cell, push.cell_count)] + ranks[index];
     sorted_photons[place] = SortedPhoton(photon.position, photon.wall, photon.flux, photon.weight);
 }

@@ -1,5 +1,5 @@
 // The longest candidate list of any visible point, which decides how many slices a lookup needs.
-// Dispatched by src/transport/lookup.rs once a map and chunk. One thread = one point.
+// Dispatched by src/transport/points.rs once a map and chunk. One thread = one point.
 // After it longest[0] = candidates of the busiest point.
 #version 460
 #extension GL_GOOGLE_include_directive : require

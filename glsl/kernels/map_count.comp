@@ -1,6 +1,7 @@
-// Counts the photons of each bucket of a map.
-// Dispatched by src/transport/maps.rs once a chunk. One thread = one photon.
-// After it cells[b] = photons in bucket b.
+// Counts the photons of each bucket of a map, and numbers them in it.
+// Dispatched by src/transport/photons.rs once a chunk. One thread = one photon.
+// After it cells[b] = photons in bucket b; ranks[i] = photons that came to the bucket of photon i before it. That order
+// varies from run to run; the integer sums of the lookup do not see it.
 #version 460
 #extension GL_GOOGLE_include_directive : require
 #extension GL_EXT_scalar_block_layout : require
@@ -12,6 +13,7 @@ layout(push_constant, scalar) uniform Push { CellPush push; };
 layout(set = 1, binding = 0, scalar) readonly buffer Map { MapPhoton map[]; };
 layout(set = 1, binding = 1, scalar) readonly buffer Counters { uint counters[]; };
 layout(set = 1, binding = 2, scalar) buffer Cells { uint cells[]; };
+layout(set = 1, binding = 3, scalar) writeonly buffer Ranks { uint ranks[]; };
 
 #include "dispatch.glsl"
 #include "scene/cells.glsl"
@@ -20,6 +22,6 @@ void main()
 {
     uint index = invocation_index();
     if (index < min(counters[0], push.photon_capacity)) {
-        atomicAdd(cells[bucket_of(cell_at(map[index].position, push), push)], 1);
+        ranks[index] = atomicAdd(cells[bucket_of(cell_at(map[index].position, push), push)], 1);
     }
 }

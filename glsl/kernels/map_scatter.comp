@@ -1,7 +1,6 @@
 // Writes each photon of a map to its place in bucket order.
-// Dispatched by src/transport/maps.rs once a chunk. One thread = one photon.
-// Before it cells[b] = first place of bucket b; after it, one past the last. The order inside a bucket
-// varies from run to run; the integer sums of the lookup do not see it.
+// Dispatched by src/transport/photons.rs once a chunk. One thread = one photon.
+// cells[b] = first place of bucket b; ranks from map_count.comp.
 #version 460
 #extension GL_GOOGLE_include_directive : require
 #extension GL_EXT_scalar_block_layout : require
@@ -12,8 +11,9 @@ layout(local_size_x_id = 0) in;
 layout(push_constant, scalar) uniform Push { CellPush push; };
 layout(set = 1, binding = 0, scalar) readonly buffer Map { MapPhoton map[]; };
 layout(set = 1, binding = 1, scalar) readonly buffer Counters { uint counters[]; };
-layout(set = 1, binding = 2, scalar) buffer Cells { uint cells[]; };
+layout(set = 1, binding = 2, scalar) readonly buffer Cells { uint cells[]; };
 layout(set = 1, binding = 3, scalar) writeonly buffer SortedMap { MapPhoton sorted_map[]; };
+layout(set = 1, binding = 4, scalar) readonly buffer Ranks { uint ranks[]; };
 
 #include "dispatch.glsl"
 #include "scene/cells.glsl"
@@ -23,6 +23,6 @@ void main()
     uint index = invocation_index();
     if (index < min(counters[0], push.photon_capacity)) {
         MapPhoton photon = map[index];
-        sorted_map[atomicAdd(cells[bucket_of(cell_at(photon.position, push), push)], 1)] = photon;
+        sorted_map[cells[bucket_of(cell_at(photon.position, push), push)] + ranks[index]] = photon;
     }
 }

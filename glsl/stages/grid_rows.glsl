@@ -1,5 +1,5 @@
 // The rows of grid cells that a point's query touches; each is one run of the sorted photons.
-// cells[c] = one past the last photon of cell c.
+// cells[c] = first photon of cell c; behind the last cell stands the number of all photons.
 
 layout(set = 1, binding = 1, scalar) readonly buffer Cells { uint cells[]; };
 
@@ -19,5 +19,5 @@ uvec2 row_run(CellBox box, uint y, uint z)
 {
     uint first = cell_number(uvec3(box.first.x, y, z), push.cell_count);
     uint last = cell_number(uvec3(box.last.x, y, z), push.cell_count);
-    return uvec2(first == 0 ? 0 : cells[first - 1], cells[last]);
+    return uvec2(cells[first], cells[last + 1]);
 }

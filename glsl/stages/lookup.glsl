@@ -19,7 +19,7 @@ void look_up()
     vec3 ns = unpack_normal(point.shading_normal);
     vec3 wo = unpack_direction(point.wo);
     CellRange range = cells_near(point.position);
-    uint photon_count = cells[push.cells.bucket_mask];
+    uint photon_count = map_length();
     uint slice_begin = gl_WorkGroupID.y * GATHER_SLICE;
     uint slice_end = slice_begin + GATHER_SLICE;
 

@@ -1,7 +1,12 @@
 // The runs of photons that a point's query touches, one a row of cells.
-// cells[b] = one past the last photon of bucket b.
+// cells[b] = first photon of bucket b; behind the last bucket stands the number of all photons.
 
 layout(set = 1, binding = 1, scalar) readonly buffer Cells { uint cells[]; };
+
+uint map_length()
+{
+    return cells[push.cells.bucket_mask + 1];
+}
 
 struct CellRange {
     ivec3 first;
@@ -21,7 +26,6 @@ uvec2 row_of_photons(CellRange range, ivec2 yz)
 {
     uint first = bucket_of(ivec3(range.first.x, yz), push.cells);
     uint last = bucket_of(ivec3(range.last.x, yz), push.cells);
-    uint begin = first == 0 ? 0 : cells[first - 1];
-    uint end = cells[last] + (last < first ? cells[push.cells.bucket_mask] : 0);
-    return uvec2(begin, end - begin);
+    uint end = cells[last + 1] + (last < first ? map_length() : 0);
+    return uvec2(cells[first], end - cells[first]);
 }

@@ -76,6 +76,9 @@ const TESTS_PER_NEAREST: f64 = 64.0;
 /// rank, a count, and a plane for each leaf.
 const TREE_BYTES: u64 = 32 + 3 * 8 + 4 + 4 + 1;
 
+/// Bytes of a photon's place in its cell.
+const RANK_BYTES: u64 = 4;
+
 /// Expected work of a chunk.
 #[derive(Debug, Clone, Copy, PartialEq)]
 pub struct Work {
@@ -151,7 +154,7 @@ pub fn chunk_photons(settings: &Settings, limits: &Limits, work: &Work) -> Resul
     let (path, photon) = (size_of::<Path>() as u64, size_of::<Photon>() as u64);
     let by_buffer = (limits.buffer_bytes / path).min(limits.buffer_bytes / (photon * bounces));
     // Two path arrays, the photon map, and the same again at most for its sorted copy.
-    let copy = if settings.gather == Gather::KdTree { TREE_BYTES } else { photon };
+    let copy = if settings.gather == Gather::KdTree { TREE_BYTES } else { photon + RANK_BYTES };
     let by_memory = limits.memory_bytes / (2 * path + (photon + copy) * bounces);
     // Entries are numbered in 32 bits.
     let by_index = u64::from(u32::MAX) / bounces;

@@ -109,6 +109,8 @@ const FILM_HEADROOM_BITS: i32 = 24;
 const FILM_PIXEL_BYTES: u64 = 3 * 8 + 3 * 16;
 /// Loop iterations of a flight of a photon, mostly of its ray through the hierarchy.
 const LOOPS_PER_FLIGHT: u32 = 256;
+/// A photon in its map, sorted and unsorted, and its place in its bucket.
+const MAP_ENTRY_BYTES: u64 = 2 * size_of::<MapPhoton>() as u64 + 4;
 /// Work of a ray, in pair tests.
 const RAY_COST: u64 = 64;
 
@@ -358,7 +360,7 @@ impl TransportPlan {
         let maps: u64 = self
             .maps()
             .map(|map| {
-                u64::from(map.capacity) * 2 * size_of::<MapPhoton>() as u64
+                u64::from(map.capacity) * MAP_ENTRY_BYTES
                     + u64::from(map.path_array_length) * 2 * size_of::<LightPath>() as u64
                     + u64::from(map.bucket_count) * 4
             })
@@ -382,7 +384,7 @@ impl TransportPlan {
         if !decision.kept {
             return;
         }
-        let map_bytes = |map: &MapPlan| u64::from(map.capacity) * 2 * size_of::<MapPhoton>() as u64 + u64::from(map.bucket_count) * 4;
+        let map_bytes = |map: &MapPlan| u64::from(map.capacity) * MAP_ENTRY_BYTES + u64::from(map.bucket_count) * 4;
         (decision.photons, decision.bytes) = match decision.effect {
             Effect::Indirect => self.global.as_ref().map_or((0, 0), |map| (u64::from(map.photons), map_bytes(map))),
             Effect::ReflectiveCaustics | Effect::RefractiveCaustics => {

@@ -48,8 +48,10 @@ pub struct PhotonBuffers {
     /// Length of the map, then the paths entering each bounce.
     pub counters: Buffer,
     pub dispatch_args: Buffer,
-    /// Photons in each bucket; after sorting, one past the last photon of each.
+    /// Photons in each bucket; after their prefix sums the first photon of each, and behind the last the number of all.
     pub cells: Buffer,
+    /// Place of each photon among those of its bucket.
+    pub ranks: Buffer,
     pub block_sums: Vec<Buffer>,
     /// Candidates of the busiest point.
     pub longest: Buffer,
@@ -122,8 +124,9 @@ impl PhotonBuffers {
             sorted_map: gpu.buffer::<MapPhoton>("sorted map", capacity, device)?,
             counters: gpu.buffer::<u32>("counters", bounces + 2, device)?,
             dispatch_args: gpu.buffer::<DispatchArgs>("dispatch args", 1, device)?,
-            cells: gpu.buffer::<u32>("cells", buckets, device)?,
-            block_sums: block_sums(gpu, buckets, plan.settings.group_size)?,
+            cells: gpu.buffer::<u32>("cells", buckets + 1, device)?,
+            ranks: gpu.buffer::<u32>("ranks", capacity, device)?,
+            block_sums: block_sums(gpu, buckets + 1, plan.settings.group_size)?,
             longest: gpu.buffer::<u32>("longest", 1, device)?,
             tallies: [gpu.buffer::<Tally>("global tallies", bounces, device)?, gpu.buffer::<Tally>("caustic tallies", bounces, device)?],
         };

@@ -17,8 +17,8 @@ use photonmill::transport::{self, Lit, View};
 
 use super::{Check, z_check};
 
-/// Builders of a map of a scene of triangles.
-pub const APPENDS: [Append; 3] = [Append::Atomic, Append::Ballot, Append::Persistent];
+/// Builders of a map of a scene of triangles that fly in ways of their own.
+pub const APPENDS: [Append; 2] = [Append::Ballot, Append::Persistent];
 pub const BOTH: [Illumination; 2] = [Illumination::Split, Illumination::Photons];
 
 /// Runs to the end, with nothing odd.

@@ -24,7 +24,7 @@ use photonmill::render::{self, Control, Outcome};
 use photonmill::rng::{self, Rng, Streams};
 use photonmill::scene::open_box::open_box;
 use photonmill::scene::room::RoomScene;
-use photonmill::settings::Settings;
+use photonmill::settings::{Settings, Variant};
 
 /// A device under the validation layer, which must not have said a word by the end of the test.
 pub struct Device(Gpu);
@@ -106,6 +106,10 @@ pub fn run_scene_on_cpu(scene: &RoomScene, settings: &Settings) -> Outcome {
 pub fn photons(gpu: &Gpu, settings: &Settings) -> Vec<Photon> {
     render::photons_on_gpu(gpu, &open_box(settings), settings).unwrap_or_else(|error| panic!("{error}\n{settings:?}"))
 }
+
+/// Builders that are held against closed forms: those that fly in ways of their own. The others store the same photons
+/// to the bit (tests/photons.rs).
+pub const JUDGED: [Variant; 4] = [Variant::Naive, Variant::Atomic, Variant::Persistent, Variant::Cpu];
 
 /// Photons of a chunk of which an invocation of the persistent builder takes several.
 pub const MANY_PHOTONS: u32 = 600_001;
