@@ -70,10 +70,10 @@ pub struct Grid {
 }
 
 impl Grid {
-    /// Cells of the radius or more, at most [`MAX_CELLS_PER_AXIS`] along an axis.
-    fn new(scene: &RoomScene, radius: f64) -> Grid {
+    /// Cells of `cell` metres or more, at most [`MAX_CELLS_PER_AXIS`] along an axis.
+    fn new(scene: &RoomScene, radius: f64, cell: f64) -> Grid {
         let extent = scene.max_corner - scene.min_corner;
-        let cell = radius.max(extent.max_element() / f64::from(MAX_CELLS_PER_AXIS));
+        let cell = cell.max(extent.max_element() / f64::from(MAX_CELLS_PER_AXIS));
         Grid {
             origin: scene.min_corner.as_vec3().to_array(),
             cells_per_metre: (1.0 / cell) as f32,
@@ -92,6 +92,9 @@ impl Grid {
 }
 
 const MAX_CELLS_PER_AXIS: u32 = 128;
+/// Tests of a point in cells of the radius, from which on cells of half of it pay: lavapipe gathers 1.4 x faster with 100
+/// times as many.
+const DENSE: u64 = 512;
 /// Fixed-point units that the faintest photon must be worth: a thousandth is lost to rounding at most.
 const MIN_FIXED_POINT: f64 = 512.0;
 
@@ -122,9 +125,11 @@ impl Plan {
                 centres.into_iter().map(move |centre| Point { position: centre.as_vec3(), wall: face as u32 })
             })
             .collect();
-        let grid = Grid::new(scene, settings.radius);
         let work = Work::new(scene, settings, points.len());
         let chunk_photons = capacity::chunk_photons(settings, limits, &work)?;
+        // Smaller cells leave fewer photons to be tested in vain, and more rows of cells to be looked up.
+        let is_dense = work.tests_per_point(chunk_photons) >= DENSE;
+        let grid = Grid::new(scene, settings.radius, settings.radius * if is_dense { 0.5 } else { 1.0 });
         let chunks_per_round = settings.photons.div_ceil(chunk_photons);
         let mut plan = Plan {
             settings: settings.clone(),
