@@ -341,6 +341,9 @@ struct LookupPush {
     uint points_per_pixel;
     uint arrival;
     uint round;
+    uint width;
+    uint height;
+    uint first_slice;
     float radius;
     CellPush cells;
 };

@@ -492,6 +492,11 @@ records! {
         /// Index of the arrival that the map holds, where it holds one only: where its sums stand.
         arrival: u32,
         round: u32,
+        /// Of the picture; 0 where points are receivers, in an order of their own.
+        width: u32,
+        height: u32,
+        /// 0: the first slice of candidates of every point; 1: all others of those that have more.
+        first_slice: u32,
         radius: f32,
         cells: CellPush,
     }

@@ -41,6 +41,8 @@ enum Question {
     StrictMath,
     /// `--paranoid` finds nothing that is infinite or no number.
     Finite,
+    /// Points with many photons near find all of them.
+    Crowds,
     /// The bits of a strict film are those written down.
     Bits(&'static str),
     // The checks of `common::known`.
@@ -61,7 +63,7 @@ impl Question {
     /// Whether another test, the same for every device, shows that a device without a fault answers it right.
     fn has_a_test_of_its_own(self) -> bool {
         match self {
-            Photons(_) | Film(_) | Ledger(_) | ClosedForm(_) | Appends | StrictMath | Finite | Nearest => false,
+            Photons(_) | Film(_) | Ledger(_) | ClosedForm(_) | Appends | StrictMath | Finite | Nearest | Crowds => false,
             Bits(_) | LampInBox(_) | Shelf | Ridge | Spot | Texture(_) => true,
             LeaningPlane(_) | LeaningScatterer | PatchInPlane | SheetsInOnePlane => true,
         }
@@ -80,7 +82,7 @@ struct Fault {
     noticed_by: &'static [Question],
 }
 
-const FAULTS: [Fault; 46] = [
+const FAULTS: [Fault; 47] = [
     Fault {
         what: "every other lane of a subgroup writes over its neighbour",
         file: "append/ballot.glsl",
@@ -161,6 +163,14 @@ const FAULTS: [Fault; 46] = [
         to: "            bounce = 1;",
         kernels: &["fly_whole"],
         noticed_by: &[Appends],
+    },
+    Fault {
+        what: "a point that others help keeps its first slice twice",
+        file: "stages/lookup.glsl",
+        from: "(push.first_slice + gl_WorkGroupID.y) * GATHER_SLICE",
+        to: "gl_WorkGroupID.y * GATHER_SLICE",
+        kernels: &["lookup_u64", "lookup_two_words"],
+        noticed_by: &[Crowds],
     },
     Fault {
         what: "the radius is 1 % too large over the grid",
@@ -529,6 +539,11 @@ fn ask(gpu: &Gpu, question: Question) -> Check {
         Appends => {
             let of = |append| film(gpu, &cornell(), &TransportSettings { append, ..small() });
             same_film(&of(Append::Ballot), &of(Append::Atomic)).and_then(|()| same_film(&of(Append::Ballot), &of(Append::Persistent)))
+        }
+        Crowds => {
+            let crowded = TransportSettings { photons: 20_000, radius: Some(1.0), rounds: 1, ..small() };
+            let of = |chunk| film(gpu, &cornell(), &TransportSettings { chunk, ..crowded.clone() });
+            same_film(&of(None), &of(Some(700)))
         }
         StrictMath => check::strict_math(gpu).map_err(|error| error.to_string()),
         Finite => {

@@ -6,6 +6,7 @@ mod common;
 use common::lit::{light, received, scene};
 use common::{Check, assert_complains, assert_holds, device, device_with, known, z_check};
 use glam::{DVec3, Vec3};
+use photonmill::constants::GATHER_SLICE;
 use photonmill::gpu::{Gpu, Options};
 use photonmill::judge::{Judge, Verdict};
 use photonmill::plan::transport::{Sensor, TransportPlan};
@@ -73,6 +74,20 @@ fn no_split_and_no_builder_changes_a_bit() {
 
     let Some(gpu) = device_with(Options { without_int64_atomics: true, ..Options::default() }) else { return };
     assert_holds("two words", same_film("two words", &picture(&gpu, &scene, &small()), &reference));
+}
+
+/// Points near which more photons lie than an invocation tests: others share them, as small chunks do.
+#[test]
+fn crowded_points_miss_no_photon() {
+    let Some(gpu) = device() else { return };
+    let scene = scene("cornell");
+    let crowded = TransportSettings { photons: 20_000, radius: Some(1.0), rounds: 1, ..small() };
+    let few = TransportSettings { chunk: Some(700), ..crowded.clone() };
+    let [whole, parts] = [&crowded, &few].map(|settings| picture(&gpu, &scene, settings));
+    // Few enough photons in a chunk that no point has more candidates than one slice.
+    let stored = whole.fates[0].ledger().stored;
+    assert!(stored > 3 * u64::from(GATHER_SLICE) && 2 * stored * 700 / 20_000 < u64::from(GATHER_SLICE), "{stored} stored");
+    assert_holds("crowded points", same_film("crowded points", &whole, &parts));
 }
 
 /// With the paper's way too, where one map holds everything, and with a final gather.

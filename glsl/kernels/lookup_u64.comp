@@ -1,5 +1,5 @@
 // Density estimation of a photon map, sums added by film/u64.glsl.
-// Dispatched by src/transport/lookup.rs once a map and chunk. One thread = one slice of a point's
+// Dispatched by src/transport/points.rs twice a map and chunk. One thread = one slice of a point's
 // candidates: points along x, slices along y.
 #version 460
 #extension GL_GOOGLE_include_directive : require
@@ -21,6 +21,7 @@ layout(push_constant, scalar) uniform Push { LookupPush push; };
 #include "scene/lobes.glsl"
 #include "scene/belongs.glsl"
 #include "scene/cells.glsl"
+#include "scene/tiles.glsl"
 #include "stages/map_rows.glsl"
 #include "stages/lookup.glsl"
 

@@ -29,15 +29,17 @@ layout(push_constant, scalar) uniform Push { ViewPush push; };
 #include "scene/direct.glsl"
 #include "film/wide.glsl"
 #include "scene/film.glsl"
+#include "scene/tiles.glsl"
 #include "stages/visible_point.glsl"
 #include "stages/chain.glsl"
 
 void main()
 {
-    uint pixel = push.first_pixel + invocation_index();
-    if (pixel >= push.end_pixel) {
+    uint place_in_order = push.first_pixel + invocation_index();
+    if (place_in_order >= push.end_pixel) {
         return;
     }
+    uint pixel = pixel_in_tiles(place_in_order, push.width, push.height);
     vec4 u = philox_floats(uvec4(pixel, push.draws.round, 0, push.draws.domain), push.draws.seed);
     vec2 place = vec2(pixel % push.width, pixel / push.width) + 0.5 + filter_offsets(u.xy);
     vec2 picture = vec2(divide(2.0 * place.x, push.width) - 1.0, 1.0 - divide(2.0 * place.y, push.height));

@@ -1,14 +1,33 @@
 // Density estimation of a photon map: each visible point sums the flux of the photons that belong to it.
-// A point's candidates are shared out in slices of GATHER_SLICE, so that no invocation loops long. The
-// including kernel chose how sums are added.
+// A point's candidates are shared out in slices of GATHER_SLICE, so that no invocation loops long: the first one of
+// every point at first, then those of the few points that have more. The including kernel chose how sums are added.
 
 layout(set = 0, binding = 0, scalar) readonly buffer VisiblePoints { VisiblePoint visible_points[]; };
 layout(set = 1, binding = 2, scalar) readonly buffer SortedMap { MapPhoton sorted_map[]; };
+// Points with more than one slice: how many, the longest one's candidates, which.
+layout(set = 1, binding = 3, scalar) buffer Crowded { uint crowded[]; };
+
+// The point of an invocation, or NONE.
+uint point_of(uint item)
+{
+    if (push.first_slice != 0) {
+        return item < crowded[0] ? crowded[2 + item] : NONE;
+    }
+    uint place = push.first_point + item;
+    if (place >= push.end_point) {
+        return NONE;
+    }
+    if (push.width == 0) {
+        return place;
+    }
+    uint pixel = pixel_in_tiles(place / push.points_per_pixel, push.width, push.height);
+    return push.points_per_pixel * pixel + place % push.points_per_pixel;
+}
 
 void look_up()
 {
-    uint index = push.first_point + gl_WorkGroupID.x * gl_WorkGroupSize.x + gl_LocalInvocationIndex;
-    if (index >= push.end_point) {
+    uint index = point_of(gl_WorkGroupID.x * gl_WorkGroupSize.x + gl_LocalInvocationIndex);
+    if (index == NONE) {
         return;
     }
     VisiblePoint point = visible_points[index];
@@ -20,7 +39,7 @@ void look_up()
     vec3 wo = unpack_direction(point.wo);
     CellRange range = cells_near(point.position);
     uint photon_count = map_length();
-    uint slice_begin = gl_WorkGroupID.y * GATHER_SLICE;
+    uint slice_begin = (push.first_slice + gl_WorkGroupID.y) * GATHER_SLICE;
     uint slice_end = slice_begin + GATHER_SLICE;
 
     // Three channels of each arrival; the first three of a map that holds one arrival only.
@@ -75,6 +94,10 @@ void look_up()
             }
             passed += run.y;
         }
+    }
+    if (push.first_slice == 0 && passed > GATHER_SLICE) {
+        crowded[2 + atomicAdd(crowded[0], 1)] = index;
+        atomicMax(crowded[1], passed);
     }
     if (found) {
         // Without direct light the first set of sums is that of caustics.

@@ -107,6 +107,10 @@ const FILM_BITS: (i32, i32) = (24, 32);
 const FILM_HEADROOM_BITS: i32 = 24;
 /// Bytes of a pixel on the film: sums and squares of three channels.
 const FILM_PIXEL_BYTES: u64 = 3 * 8 + 3 * 16;
+/// Candidates of a point, roughly: what a lookup counts as work.
+pub const TESTS_PER_POINT: u64 = 256;
+/// Work groups along x that every device allows.
+const MOST_GROUPS: u32 = 65_535;
 /// Loop iterations of a flight of a photon, mostly of its ray through the hierarchy.
 const LOOPS_PER_FLIGHT: u32 = 256;
 /// A photon in its map, sorted and unsorted, and its place in its bucket.
@@ -298,6 +302,12 @@ impl TransportPlan {
     /// Pixels of one dispatch that casts `rays` rays each.
     pub fn pixels_at_once(&self, rays: u32) -> u32 {
         (self.work_per_submission / (RAY_COST * u64::from(rays.max(1)))).clamp(1 << 12, 1 << 22) as u32
+    }
+
+    /// Visible points of one lookup, which has a work group of them along x.
+    pub fn points_at_once(&self) -> u32 {
+        let most = (self.work_per_submission / TESTS_PER_POINT).clamp(1 << 12, 1 << 22) as u32;
+        most.min(self.visible_points()).min(MOST_GROUPS * self.settings.group_size)
     }
 
     /// Rays of one pixel, roughly.

@@ -95,7 +95,7 @@ pub fn modules(plan: &TransportPlan, facts: &DeviceFacts) -> Vec<Module> {
     });
     if plan.maps().next().is_some() {
         modules.extend([MapCount::MODULE, MapScatter::MODULE, ScanBlocks::MODULE, ScanAdd::MODULE]);
-        modules.extend([DispatchSize::MODULE, LookupCount::MODULE, SliceCount::MODULE]);
+        modules.extend([DispatchSize::MODULE, CrowdSize::MODULE]);
         modules.extend(match plan.settings.append {
             Append::Atomic => vec![Shine::MODULE, FlyAtomic::MODULE],
             Append::Ballot => vec![Shine::MODULE, FlyBallot::MODULE],

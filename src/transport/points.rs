@@ -5,17 +5,15 @@ use super::Round;
 use super::resources::{PhotonBuffers, TransportResources};
 use crate::constants::{DOMAIN_CAMERA, DOMAIN_RECEIVERS};
 use crate::error::Result;
-use crate::gpu::kernels::{LookupCount, LookupTwoWords, LookupU64, Receive, Resolve, SliceCount, View};
+use crate::gpu::kernels::{CrowdSize, LookupTwoWords, LookupU64, Receive, Resolve, View};
 use crate::gpu::{Commands, Extent};
-use crate::plan::transport::{MapPlan, Sensor, TransportPlan};
+use crate::plan::transport::{MapPlan, Sensor, TESTS_PER_POINT, TransportPlan};
 use crate::records::{CellPush, DispatchSizePush, Draws, LookupPush, ReceivePush, ResolvePush, ViewPush};
 use crate::rng::words;
 use crate::scene::Camera;
 
 /// Most groups along y that any device must allow.
 const MAX_GROUPS_Y: u32 = 65_535;
-/// Candidates of a point, roughly: what a lookup counts as work.
-const TESTS_PER_POINT: u64 = 256;
 
 /// Runs of `count` items, `step` long.
 fn runs(count: u32, step: u32) -> impl Iterator<Item = (u32, u32)> {
@@ -112,10 +110,21 @@ pub fn see(commands: &mut Commands, round: Round, camera: Option<&Camera>) -> Re
 /// Adds a chunk of a map to the estimates of all visible points.
 pub fn look_up(commands: &mut Commands, round: Round, photons: &PhotonBuffers, map: &MapPlan, cells_push: CellPush) -> Result<()> {
     let Round { resources, plan, number: round, .. } = round;
-    let PhotonBuffers { cells, sorted_map, longest, dispatch_args, .. } = photons;
+    let PhotonBuffers { cells, sorted_map, crowded, dispatch_args, .. } = photons;
     let TransportResources { visible_points, estimates, oddities, .. } = resources;
     let point_count = plan.visible_points();
-    let step = (plan.work_per_submission / TESTS_PER_POINT).clamp(1 << 12, 1 << 22) as u32;
+    let step = plan.points_at_once();
+    let (width, height) = match plan.sensor {
+        Sensor::Picture { width, height } => (width, height),
+        Sensor::Receivers { .. } => (0, 0),
+    };
+    let dispatch = |commands: &mut Commands, push: &LookupPush, extent: Extent| {
+        if commands.facts().int64_atomics {
+            commands.dispatch(LookupU64 { visible_points, film: estimates, cells, sorted_map, crowded, oddities }, push, extent)
+        } else {
+            commands.dispatch(LookupTwoWords { visible_points, film: estimates, cells, sorted_map, crowded, oddities }, push, extent)
+        }
+    };
     for (first_point, end_point) in runs(point_count, step) {
         let push = LookupPush {
             first_point,
@@ -124,24 +133,23 @@ pub fn look_up(commands: &mut Commands, round: Round, photons: &PhotonBuffers, m
             points_per_pixel: plan.points_per_pixel,
             arrival: map.stored.trailing_zeros(),
             round,
+            width,
+            height,
+            first_slice: 0,
             radius: plan.radius(map, round) as f32,
             cells: cells_push,
         };
-        commands.fill(longest, 0, 1, 0);
-        commands.dispatch(LookupCount { visible_points, longest, cells }, &push, Extent::Items(u64::from(end_point - first_point)))?;
+        commands.fill(crowded, 0, 2, 0);
+        let groups = (end_point - first_point).div_ceil(plan.settings.group_size);
+        dispatch(commands, &push, Extent::Groups(groups, 1))?;
         let size = DispatchSizePush {
             counter: 0,
             capacity: end_point - first_point,
             items_per_group: plan.settings.group_size,
             max_groups: MAX_GROUPS_Y,
         };
-        commands.dispatch(SliceCount { longest, dispatch_args }, &size, Extent::Groups(1, 1))?;
-        let extent = Extent::Indirect(dispatch_args);
-        if commands.facts().int64_atomics {
-            commands.dispatch(LookupU64 { visible_points, film: estimates, cells, sorted_map, oddities }, &push, extent)?;
-        } else {
-            commands.dispatch(LookupTwoWords { visible_points, film: estimates, cells, sorted_map, oddities }, &push, extent)?;
-        }
+        commands.dispatch(CrowdSize { crowded, dispatch_args }, &size, Extent::Groups(1, 1))?;
+        dispatch(commands, &LookupPush { first_slice: 1, ..push }, Extent::Indirect(dispatch_args))?;
         add_work(commands, plan, TESTS_PER_POINT * u64::from(end_point - first_point))?;
     }
     Ok(())

@@ -1,0 +1,18 @@
+// Size of the second part of a lookup: points with more candidates than one slice along x, their other slices along y.
+// Dispatched by src/transport/points.rs as one thread.
+#version 460
+#extension GL_GOOGLE_include_directive : require
+#extension GL_EXT_scalar_block_layout : require
+#include "records.glsl"
+
+layout(local_size_x = 1) in;
+layout(push_constant, scalar) uniform Push { DispatchSizePush push; };
+layout(set = 1, binding = 0, scalar) readonly buffer Crowded { uint crowded[]; };
+layout(set = 1, binding = 1, scalar) writeonly buffer Sizes { DispatchArgs dispatch_args[]; };
+
+void main()
+{
+    uint slice_count = (crowded[1] + GATHER_SLICE - 1) / GATHER_SLICE;
+    uint point_groups = (crowded[0] + push.items_per_group - 1) / push.items_per_group;
+    dispatch_args[0] = DispatchArgs(point_groups, point_groups == 0 ? 0 : min(slice_count - 1, push.max_groups), 1);
+}
