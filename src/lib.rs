@@ -74,6 +74,7 @@
 pub mod bake;
 pub mod bias;
 pub mod cli;
+pub mod compaction;
 pub mod constants;
 pub mod cpu;
 pub mod error;

@@ -4,6 +4,8 @@
 use std::sync::atomic::{AtomicBool, Ordering};
 use std::time::{Duration, Instant};
 
+use serde::Serialize;
+
 use crate::error::{Error, Result};
 use crate::gpu::Gpu;
 use crate::render::{self, Control, Outcome};
@@ -150,7 +152,7 @@ impl<'a> Bench<'a> {
 }
 
 /// Median and extremes of repeated runs.
-#[derive(Debug, Clone, Copy, PartialEq)]
+#[derive(Debug, Clone, Copy, PartialEq, Serialize)]
 pub struct Spread {
     pub median: f64,
     pub min: f64,

@@ -1,0 +1,64 @@
+//! The map of who wins where: a field for every number of photons and survival, in the winner's colour.
+
+use plotters::prelude::*;
+use plotters::style::text_anchor::{HPos, Pos, VPos};
+
+use super::Map;
+use crate::output::svg::{SCALE, TEXT, svg};
+use crate::output::words::times;
+use crate::settings::Variant;
+
+/// Colours on which black letters are read, on a white and on a black page.
+fn colour(variant: Variant) -> RGBColor {
+    match variant {
+        Variant::Naive => RGBColor(0xb0, 0xb0, 0xb0),
+        Variant::Atomic => RGBColor(0xf2, 0x9a, 0x4a),
+        Variant::Ballot => RGBColor(0x62, 0xb8, 0xea),
+        Variant::Group => RGBColor(0x74, 0xc9, 0x8d),
+        Variant::Scan => RGBColor(0xcf, 0x92, 0xdf),
+        Variant::Persistent => RGBColor(0xe6, 0xc8, 0x4f),
+        Variant::Cpu => RGBColor(0xf0, 0x82, 0x96),
+    }
+}
+
+const FIELD: (i32, i32) = (92, 64);
+const LEFT: i32 = 110;
+const TOP: i32 = 16;
+
+/// Photons to the right, survival upwards; in each field the fastest builder, how much faster than one atomic a thread it
+/// is, and, in small letters, who cannot be told from it.
+pub fn draw(map: &Map) -> String {
+    let (sizes, survivals) = (map.sizes(), map.survivals());
+    let width = LEFT + FIELD.0 * sizes.len() as i32 + 16;
+    let height = TOP + FIELD.1 * survivals.len() as i32 + 56;
+    svg((width as u32, height as u32), |area| {
+        let bottom = TOP + FIELD.1 * survivals.len() as i32;
+        for (row, survival) in survivals.iter().enumerate() {
+            let top = bottom - FIELD.1 * (row as i32 + 1);
+            let label = format!("{:.0} % survive", 100.0 * survival);
+            area.draw(&Text::new(label, (LEFT - 8, top + FIELD.1 / 2), text(TEXT - 3, HPos::Right, &SCALE)))?;
+            for (column, photons) in sizes.iter().enumerate() {
+                let Some(cell) = map.cell(*photons, *survival) else { continue };
+                let (left, middle) = (LEFT + FIELD.0 * column as i32, LEFT + FIELD.0 * column as i32 + FIELD.0 / 2);
+                let winner = cell.builders[0].variant;
+                let corners = [(left + 1, top + 1), (left + FIELD.0 - 1, top + FIELD.1 - 1)];
+                area.draw(&Rectangle::new(corners, colour(winner).filled()))?;
+                let level: Vec<&str> = cell.winners().skip(1).map(Variant::name).collect();
+                let lines = [(TEXT - 2, winner.name().to_owned()), (TEXT - 3, times(cell.gain())), (TEXT - 7, level.join(" "))];
+                for (line, (size, words)) in lines.into_iter().enumerate() {
+                    area.draw(&Text::new(words, (middle, top + 14 + 19 * line as i32), text(size, HPos::Center, &BLACK)))?;
+                }
+            }
+        }
+        for (column, photons) in sizes.iter().enumerate() {
+            let middle = LEFT + FIELD.0 * column as i32 + FIELD.0 / 2;
+            area.draw(&Text::new(format!("2^{}", photons.ilog2()), (middle, bottom + 14), text(TEXT - 3, HPos::Center, &SCALE)))?;
+        }
+        let middle = LEFT + FIELD.0 * sizes.len() as i32 / 2;
+        area.draw(&Text::new("photons", (middle, bottom + 38), text(TEXT - 3, HPos::Center, &SCALE)))
+    })
+}
+
+fn text(size: u32, horizontal: HPos, colour: &RGBColor) -> TextStyle<'_> {
+    TextStyle::from(("sans-serif", size).into_font()).pos(Pos::new(horizontal, VPos::Center)).color(colour)
+}

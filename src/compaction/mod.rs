@@ -1,0 +1,263 @@
+//! The paper's question for today: which way of storing survivors is the fastest, for how many photons and how many of them
+//! surviving. All ways trace the same photons, which is checked, so that a difference in time has one cause.
+
+pub mod chart;
+
+use std::sync::atomic::{AtomicBool, Ordering};
+use std::time::{Duration, Instant};
+
+use serde::Serialize;
+
+use crate::error::{Error, Result};
+use crate::gpu::{Commands, Gpu};
+use crate::output::words::{count, number};
+use crate::paper::bench::Spread;
+use crate::plan::Plan;
+use crate::records::{Photon, Tally};
+use crate::render::{constants, limits, photons_on_gpu};
+use crate::resources::Resources;
+use crate::rng::Rng;
+use crate::scene::open_box::open_box;
+use crate::scene::room::{RoomScene, Wall};
+use crate::settings::{Gather, Settings, Variant};
+use crate::trace;
+
+/// What is asked for.
+#[derive(Debug, Clone, PartialEq)]
+pub struct Request {
+    /// Shares of the paths that every bounce lets go on.
+    pub survivals: Vec<f32>,
+    /// Photons, fewest first.
+    pub sizes: Vec<u32>,
+    pub bounces: u32,
+    /// Runs of each builder that count, in turn.
+    pub turns: usize,
+    /// No size is begun that would probably end later than this after the start.
+    pub budget: Duration,
+}
+
+impl Request {
+    /// Powers of four from 2^12 up to `most` photons, survival from 5 to 95 %.
+    pub fn up_to(most: u32, budget: Duration) -> Request {
+        let sizes = (6..=14).map(|power| 1 << (2 * power)).filter(|photons| *photons <= most.max(1 << 12)).collect();
+        Request { survivals: vec![0.05, 0.25, 0.5, 0.75, 0.95], sizes, bounces: 15, turns: 3, budget }
+    }
+}
+
+/// Who wins where.
+#[derive(Debug, Clone, PartialEq, Serialize)]
+pub struct Map {
+    pub device: String,
+    pub driver: String,
+    pub bounces: u32,
+    pub cells: Vec<Cell>,
+    /// Sizes that the budget left out.
+    pub left_out: Vec<u32>,
+}
+
+/// One number of photons at one survival.
+#[derive(Debug, Clone, PartialEq, Serialize)]
+pub struct Cell {
+    pub survival: f32,
+    pub photons: u32,
+    /// Stored over all bounces.
+    pub stored: u64,
+    /// What every builder agreed on with all others.
+    pub agreed: Agreed,
+    /// The fastest first.
+    pub builders: Vec<Timed>,
+}
+
+/// How far builders were compared.
+#[derive(Debug, Clone, Copy, PartialEq, Eq, Serialize)]
+#[serde(rename_all = "lowercase")]
+pub enum Agreed {
+    /// Every photon stored, to the bit.
+    Photons,
+    /// Fates of all photons, bounce by bounce; the photons themselves are too many to be brought together.
+    Fates,
+}
+
+/// What a builder took.
+#[derive(Debug, Clone, PartialEq, Serialize)]
+pub struct Timed {
+    pub variant: Variant,
+    /// Milliseconds of the device to trace and store all photons.
+    pub ms: Spread,
+}
+
+/// Stored photons up to which all of them are compared.
+const MOST_COMPARED: f64 = 1e6;
+
+/// A closed room, whose every wall lets the same share go on.
+fn room(settings: &Settings) -> RoomScene {
+    let mut room = open_box(settings);
+    room.faces.iter_mut().for_each(|face| *face = Some(Wall { name: "wall", albedo: settings.reflectance, shininess: None }));
+    room
+}
+
+/// Measures all builders at all sizes and survivals.
+pub fn measure(gpu: &Gpu, request: &Request, cancelled: &AtomicBool, tell: &mut dyn FnMut(&str)) -> Result<Map> {
+    let began = Instant::now();
+    let facts = gpu.facts();
+    let mut map =
+        Map { device: facts.name.clone(), driver: facts.driver.clone(), bounces: request.bounces, cells: Vec::new(), left_out: Vec::new() };
+    let mut last = (0u32, Duration::ZERO);
+    for &photons in &request.sizes {
+        // Time grows no faster than photons.
+        let growth = if last.0 == 0 { 0.0 } else { f64::from(photons) / f64::from(last.0) };
+        if began.elapsed() + last.1.mul_f64(growth) > request.budget {
+            map.left_out.push(photons);
+            continue;
+        }
+        let size_began = Instant::now();
+        for &survival in &request.survivals {
+            if cancelled.load(Ordering::Relaxed) {
+                return Err(Error::Interrupted);
+            }
+            tell(&format!("compaction: {} photons, survival {survival}", count(u64::from(photons))));
+            map.cells.push(cell(gpu, request, photons, survival)?);
+        }
+        last = (photons, size_began.elapsed());
+    }
+    Ok(map)
+}
+
+fn cell(gpu: &Gpu, request: &Request, photons: u32, survival: f32) -> Result<Cell> {
+    let base = Settings {
+        photons,
+        bounces: request.bounces,
+        reflectance: survival,
+        rng: Rng::Philox,
+        mesh: 1,
+        gather: Gather::Brute,
+        ..Settings::default()
+    };
+    let room = room(&base);
+    let of = |variant| Settings { variant, ..base.clone() };
+    let mut times = vec![Vec::new(); Variant::ON_GPU.len()];
+    let mut fates: Option<Vec<Tally>> = None;
+    for turn in 0..=request.turns {
+        for (variant, times) in Variant::ON_GPU.into_iter().zip(&mut times) {
+            let (ms, tallies) = run(gpu, &room, &of(variant))?;
+            let expected = fates.get_or_insert_with(|| tallies.clone());
+            agree(variant, photons, survival, *expected == tallies)?;
+            // The first turn makes pipelines and brings a card to its clock.
+            if turn > 0 {
+                times.push(ms);
+            }
+        }
+    }
+    let stored: u64 = fates.iter().flatten().map(|tally| u64::from(tally.stored)).sum();
+    let mut agreed = Agreed::Fates;
+    if stored as f64 <= MOST_COMPARED {
+        let in_order = |variant| -> Result<Vec<Photon>> {
+            let mut stored = photons_on_gpu(gpu, &room, &of(variant))?;
+            stored.sort_by_key(|photon| (photon.photon, photon.bounce));
+            Ok(stored)
+        };
+        let expected = in_order(Variant::Naive)?;
+        for variant in Variant::ON_GPU {
+            let found = in_order(variant)?;
+            agree(variant, photons, survival, bytemuck::cast_slice::<_, u8>(&found) == bytemuck::cast_slice::<_, u8>(&expected))?;
+        }
+        agreed = Agreed::Photons;
+    }
+    let mut builders: Vec<Timed> = Variant::ON_GPU
+        .into_iter()
+        .zip(times)
+        .map(|(variant, times)| Timed { variant, ms: Spread::of(times).expect("there is a turn that counts") })
+        .collect();
+    builders.sort_by(|a, b| a.ms.median.total_cmp(&b.ms.median));
+    Ok(Cell { survival, photons, stored, agreed, builders })
+}
+
+fn agree(variant: Variant, photons: u32, survival: f32, same: bool) -> Result<()> {
+    if same {
+        return Ok(());
+    }
+    let what = format!("{} stores other photons than the builders before it, of {photons} at survival {survival}", variant.name());
+    Err(Error::Device { call: "the compaction study", reason: what })
+}
+
+/// Milliseconds to trace and store all photons, on the device's clock where it has one, and their fates.
+fn run(gpu: &Gpu, room: &RoomScene, settings: &Settings) -> Result<(f64, Vec<Tally>)> {
+    let plan = Plan::new(room, settings, &limits(gpu.facts()))?;
+    gpu.prepare(&trace::modules(&plan), &constants(&plan))?;
+    let mut commands = Commands::new(gpu, constants(&plan), Instant::now())?;
+    let resources = Resources::new(gpu, &mut commands, room, &plan)?;
+    commands.submit()?;
+    for ranges in plan.chunks() {
+        commands.scope("chunk", |commands| trace::chunk(commands, &resources, &plan, 0, &ranges))?;
+        commands.submit()?;
+    }
+    let tallies = commands.read(&resources.tallies, settings.bounces as usize)?;
+    gpu.check_validation()?;
+    Ok((commands.finish("compaction").best_ms("chunk").expect("the scope has run"), tallies))
+}
+
+impl Cell {
+    pub fn of(&self, variant: Variant) -> &Timed {
+        self.builders.iter().find(|timed| timed.variant == variant).expect("every builder was timed")
+    }
+
+    /// Those whose fastest run is no slower than the winner's slowest: the winner, and who cannot be told from it.
+    pub fn winners(&self) -> impl Iterator<Item = Variant> {
+        let slowest = self.builders[0].ms.max;
+        self.builders.iter().filter(move |timed| timed.ms.min <= slowest).map(|timed| timed.variant)
+    }
+
+    /// How many times longer the paper's modified builder takes than the fastest.
+    pub fn gain(&self) -> f64 {
+        self.of(Variant::Atomic).ms.median / self.builders[0].ms.median
+    }
+}
+
+impl Map {
+    pub fn sizes(&self) -> Vec<u32> {
+        let mut sizes: Vec<u32> = self.cells.iter().map(|cell| cell.photons).collect();
+        sizes.dedup();
+        sizes
+    }
+
+    pub fn survivals(&self) -> Vec<f32> {
+        let first = self.cells.first().map_or(0, |cell| cell.photons);
+        self.cells.iter().take_while(|cell| cell.photons == first).map(|cell| cell.survival).collect()
+    }
+
+    pub fn cell(&self, photons: u32, survival: f32) -> Option<&Cell> {
+        self.cells.iter().find(|cell| cell.photons == photons && cell.survival == survival)
+    }
+
+    /// A line for each cell: its winner, who cannot be told from it, and what all others take in times of its time.
+    pub fn text(&self) -> String {
+        let mut text = format!("{:>12} {:>9} {:>14} {:>10}  {}\n", "photons", "survival", "stored", "best, ms", "builders, times the best");
+        for cell in &self.cells {
+            let best = cell.builders[0].ms.median;
+            let winners: Vec<Variant> = cell.winners().collect();
+            let all: Vec<String> = cell
+                .builders
+                .iter()
+                .map(|timed| {
+                    let mark = if winners.contains(&timed.variant) { "*" } else { "" };
+                    format!("{}{mark} {:.2}", timed.variant.name(), timed.ms.median / best)
+                })
+                .collect();
+            let line = format!(
+                "{:>12} {:>8}% {:>14} {:>10}  {}\n",
+                count(u64::from(cell.photons)),
+                number(100.0 * f64::from(cell.survival)),
+                count(cell.stored),
+                number(best),
+                all.join(", ")
+            );
+            text.push_str(&line);
+        }
+        if !self.left_out.is_empty() {
+            let sizes: Vec<String> = self.left_out.iter().map(|photons| count(u64::from(*photons))).collect();
+            text.push_str(&format!("left out, as no time was left: {} photons\n", sizes.join(", ")));
+        }
+        text.push_str("* cannot be told from the best: its fastest run is no slower than the best one's slowest\n");
+        text
+    }
+}
