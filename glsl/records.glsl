@@ -410,3 +410,9 @@ struct Samples {
     vec3 unpacked_normal;
     vec3 unpacked_direction;
 };
+
+struct MeasurePush {
+    uint item_count;
+    uint step_count;
+    uint mask;
+};

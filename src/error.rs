@@ -39,6 +39,10 @@ pub enum Error {
     )]
     DeviceWrong { device: String, what: String },
 
+    /// A measurement of a device's limits came out wrong.
+    #[error("{device}: {what} came out wrong, so nothing measured on it counts; update its driver, or choose another with --device")]
+    Miscalculated { device: String, what: String },
+
     /// A Vulkan call failed.
     #[error("{call} failed on the device: {reason}")]
     Device { call: &'static str, reason: String },

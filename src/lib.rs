@@ -18,7 +18,7 @@
 //! constants, records, error, ledger, timings < gpu
 //! gpu < oddities, prefix_sum
 //! plan, oddities, prefix_sum < resources < trace < index < estimate < film < render < transport < selfcheck < output
-//! output < bake < paper < study < cli
+//! output < bake < paper < compaction < study < bench < cli
 //! ```
 //!
 //! [`gpu`] knows no photon; [`scene`] and [`plan`] know no Vulkan; `tests/architecture.rs` checks it.
@@ -34,7 +34,7 @@
 //! [`plan::transport`] decides which effects a scene calls for; what it drops is in no buffer, no pass and, by
 //! specialization constants (`glsl/scene/effects.glsl`), in no pipeline. [`judge`] is a path tracer on the CPU
 //! that shares nothing with it but the scene; [`selfcheck`] holds a device against closed forms, and
-//! [`study`] measures what accuracy costs in time on it.
+//! [`study`] measures what accuracy costs in time on it, and [`mod@bench`] how near its limits every pass comes.
 //!
 //! # What never changes by accident
 //!
@@ -72,6 +72,7 @@
 //! [`cpu`]; that of triangles is judged by [`judge`].
 
 pub mod bake;
+pub mod bench;
 pub mod bias;
 pub mod cli;
 pub mod compaction;

@@ -4,20 +4,12 @@ use crate::constants::SCAN_ITEMS;
 use crate::error::Result;
 use crate::gpu::kernels::{ScanAdd, ScanBlocks};
 use crate::gpu::{Buffer, Commands, Extent, Gpu, Memory};
+use crate::plan::memory::block_sum_counts;
 use crate::records::ScanPush;
 
 /// One buffer a level of a prefix sum over `items`: block sums of the level below, down to one block.
 pub fn block_sums(gpu: &Gpu, items: u64, group_size: u32) -> Result<Vec<Buffer>> {
-    let block = u64::from(group_size * SCAN_ITEMS);
-    let mut levels = Vec::new();
-    let mut count = items;
-    loop {
-        count = count.div_ceil(block).max(1);
-        levels.push(gpu.buffer::<u32>("block sums", count, Memory::Device)?);
-        if count == 1 {
-            return Ok(levels);
-        }
-    }
+    block_sum_counts(items, group_size).into_iter().map(|count| gpu.buffer::<u32>("block sums", count, Memory::Device)).collect()
 }
 
 /// Turns `item_count` numbers into their exclusive prefix sums; `levels` as [`block_sums`]

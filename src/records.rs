@@ -582,4 +582,13 @@ records! {
         unpacked_normal: Vec3,
         unpacked_direction: Vec3,
     }
+
+    /// A measurement of a device's limits; see `glsl/kernels/measure_...`.
+    MeasurePush {
+        item_count: u32,
+        /// What one invocation does, times over.
+        step_count: u32,
+        /// Of random places, which are below a power of two.
+        mask: u32,
+    }
 }

@@ -1,10 +1,11 @@
 //! Every buffer of a run on the device, named and sized by the plan.
 
-use crate::constants::{FACE_COUNT, TREE_LEAF, TREE_RUN};
+use crate::constants::{FACE_COUNT, TREE_LEAF};
 use crate::error::Result;
 use crate::gpu::{Buffer, Commands, Gpu, Memory};
 use crate::oddities;
 use crate::plan::Plan;
+use crate::plan::memory::{group_count, searches_at_once, tree_count_capacity};
 use crate::prefix_sum::block_sums;
 use crate::records::{self, DispatchArgs, Path, Photon, Point, Search, SortedPhoton, Tally};
 use crate::scene::room::RoomScene;
@@ -103,9 +104,6 @@ pub struct SearchBuffers {
     pub unfinished: Buffer,
 }
 
-/// Photons that the searches under way may hold: 32 MiB, less than any device's largest buffer.
-const SEARCH_ENTRIES: u64 = 1 << 22;
-
 impl Resources {
     /// Makes the buffers and records the upload of what never changes.
     pub fn new(gpu: &Gpu, commands: &mut Commands, scene: &RoomScene, plan: &Plan) -> Result<Resources> {
@@ -145,13 +143,8 @@ impl Resources {
 }
 
 impl OrderBuffers {
-    /// Work groups of the largest chunk's paths.
-    pub fn group_count(plan: &Plan) -> u32 {
-        plan.path_capacity.div_ceil(plan.settings.group_size)
-    }
-
     fn new(gpu: &Gpu, plan: &Plan) -> Result<OrderBuffers> {
-        let sums = u64::from(OrderBuffers::group_count(plan)) + 1;
+        let sums = u64::from(group_count(plan)) + 1;
         let weights = if plan.settings.has_phong() { u64::from(plan.path_capacity) } else { 1 };
         Ok(OrderBuffers {
             survivors: gpu.buffer::<u32>("survivors", sums, Memory::Device)?,
@@ -189,14 +182,9 @@ impl IndexBuffers {
 }
 
 impl TreeBuffers {
-    /// Counts of a list: a word a photon, up to whole runs of the radix sort.
-    pub fn count_capacity(plan: &Plan) -> u32 {
-        plan.photon_capacity.next_multiple_of(TREE_RUN)
-    }
-
     fn new(gpu: &Gpu, plan: &Plan) -> Result<TreeBuffers> {
         let photons = u64::from(plan.photon_capacity);
-        let counts = u64::from(TreeBuffers::count_capacity(plan));
+        let counts = u64::from(tree_count_capacity(plan));
         let device = Memory::Device;
         let list = || gpu.buffer::<UVec2>("tree list", photons, device);
         let args = || gpu.buffer::<DispatchArgs>("tree dispatch args", 1, device);
@@ -219,9 +207,7 @@ impl TreeBuffers {
 
 impl SearchBuffers {
     fn new(gpu: &Gpu, plan: &Plan, nearest: u32) -> Result<SearchBuffers> {
-        let group = u64::from(plan.settings.group_size);
-        let at_once =
-            (SEARCH_ENTRIES / u64::from(nearest) / group * group).clamp(group, (plan.points.len() as u64).next_multiple_of(group));
+        let at_once = searches_at_once(plan, nearest);
         let device = Memory::Device;
         Ok(SearchBuffers {
             point_count: at_once as u32,

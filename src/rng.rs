@@ -134,7 +134,7 @@ impl Streams {
     /// rand48 needs any; the others get one unused entry.
     pub fn first_states(self, count: u32) -> Vec<UVec2> {
         if self.rng != Rng::Rand48 {
-            return vec![UVec2::ZERO];
+            return vec![UVec2::ZERO; self.first_state_count(count) as usize];
         }
         let mut state = srand48(self.seed as u32);
         (0..count)
@@ -143,6 +143,11 @@ impl Streams {
                 words(state)
             })
             .collect()
+    }
+
+    /// How many those are.
+    pub fn first_state_count(self, count: u32) -> u64 {
+        if self.rng == Rng::Rand48 { u64::from(count) } else { 1 }
     }
 }
 

@@ -8,7 +8,7 @@ use std::path::{Path, PathBuf};
 /// What everyone may use, and what among itself has no order.
 const GROUND: [&str; 8] = ["error", "bias", "constants", "records", "ledger", "rng", "settings", "timings"];
 /// From left to right.
-const LINE: [&str; 21] = [
+const LINE: [&str; 22] = [
     "scene",
     "judge",
     "plan",
@@ -28,6 +28,7 @@ const LINE: [&str; 21] = [
     "paper",
     "compaction",
     "study",
+    "bench",
     "cli",
     "main",
 ];

@@ -226,7 +226,8 @@ fn what_is_dropped_is_not_there() {
     assert_eq!(direct.dispatches, 2 * 3);
     let map = (needed.dispatches - direct.dispatches) / 3;
     assert_eq!((all.dispatches - needed.dispatches) / 3, map);
-    assert!(needed.plan.bytes < all.plan.bytes && direct.plan.bytes < needed.plan.bytes);
+    // Both maps of a round use the same buffers in turn, so that the second takes nothing.
+    assert!(needed.plan.bytes <= all.plan.bytes && direct.plan.bytes < needed.plan.bytes);
     // Of pipelines only those of the plan, each made once.
     let fresh = device().unwrap();
     let before = fresh.pipeline_count();

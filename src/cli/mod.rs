@@ -2,6 +2,7 @@
 //! clap.
 
 mod bake;
+mod bench;
 mod devices;
 mod paper;
 mod plan;
@@ -55,6 +56,8 @@ enum Command {
     Selfcheck(selfcheck::SelfcheckArgs),
     /// Measures what accuracy costs in time on this device, choice by choice, and writes a page of it
     Study(study::StudyArgs),
+    /// Measures how near every pass comes to what this device can do
+    Bench(bench::BenchArgs),
     /// Regenerates every figure and table of the paper as images, CSV and one HTML page
     Paper(paper::PaperArgs),
 }
@@ -125,6 +128,7 @@ pub fn main() -> u8 {
         Some(Command::Plan(args)) => plan::run(&args).map(|()| End::Finished),
         Some(Command::Selfcheck(args)) => hearing(|| selfcheck::run(&args, &cancelled)),
         Some(Command::Study(args)) => hearing(|| study::run(&args, &cancelled)),
+        Some(Command::Bench(args)) => hearing(|| bench::run(&args, &cancelled)),
         Some(Command::Paper(args)) => hearing(|| paper::run(&args, &cancelled)),
     };
     match result {

@@ -6,6 +6,7 @@ use ash::vk;
 use bytemuck::Pod;
 use gpu_allocator::MemoryLocation;
 use gpu_allocator::vulkan::{Allocation, AllocationCreateDesc, AllocationScheme};
+use serde::Serialize;
 
 use super::{Context, Gpu, call};
 use crate::error::{Error, Result};
@@ -21,8 +22,38 @@ pub enum Memory {
     ReadBack,
 }
 
+/// Bytes of buffers: of those that are alive, and the most that were alive together.
+#[derive(Debug, Clone, Copy, PartialEq, Eq, Default, Serialize)]
+pub struct HeldMemory {
+    /// Of [`Memory::Device`].
+    pub device_bytes: u64,
+    pub peak_device_bytes: u64,
+    /// Of the others, through which the host writes and reads.
+    pub staging_bytes: u64,
+    pub peak_staging_bytes: u64,
+}
+
+impl HeldMemory {
+    fn take(&mut self, memory: Memory, bytes: u64) {
+        let (now, peak) = match memory {
+            Memory::Device => (&mut self.device_bytes, &mut self.peak_device_bytes),
+            Memory::Upload | Memory::ReadBack => (&mut self.staging_bytes, &mut self.peak_staging_bytes),
+        };
+        *now += bytes;
+        *peak = (*peak).max(*now);
+    }
+
+    fn give_back(&mut self, memory: Memory, bytes: u64) {
+        match memory {
+            Memory::Device => self.device_bytes -= bytes,
+            Memory::Upload | Memory::ReadBack => self.staging_bytes -= bytes,
+        }
+    }
+}
+
 pub struct Buffer {
     name: String,
+    memory: Memory,
     size_bytes: u64,
     raw: vk::Buffer,
     allocation: Option<Allocation>,
@@ -45,7 +76,7 @@ impl Gpu {
         let device = &self.context.device;
         // SAFETY: `info` is complete; the buffer is destroyed in Drop.
         let raw = call("vkCreateBuffer", unsafe { device.create_buffer(&info, None) })?;
-        let mut buffer = Buffer { name: name.to_owned(), size_bytes, raw, allocation: None, context: self.context.clone() };
+        let mut buffer = Buffer { name: name.to_owned(), memory, size_bytes, raw, allocation: None, context: self.context.clone() };
         // SAFETY: the buffer was just made.
         let requirements = unsafe { device.get_buffer_memory_requirements(raw) };
         let allocation = self
@@ -73,8 +104,20 @@ impl Gpu {
         // freed after the buffer.
         call("vkBindBufferMemory", unsafe { device.bind_buffer_memory(raw, allocation.memory(), allocation.offset()) })?;
         buffer.allocation = Some(allocation);
+        self.context.held.borrow_mut().take(memory, size_bytes);
         self.context.set_name(raw, name);
         Ok(buffer)
+    }
+
+    /// What buffers take by the sizes that were asked for; an allocator rounds them up.
+    pub fn held_memory(&self) -> HeldMemory {
+        *self.context.held.borrow()
+    }
+
+    /// Peaks begin anew at what is held now.
+    pub fn forget_peaks(&self) {
+        let mut held = self.context.held.borrow_mut();
+        (held.peak_device_bytes, held.peak_staging_bytes) = (held.device_bytes, held.staging_bytes);
     }
 }
 
@@ -110,6 +153,7 @@ impl Drop for Buffer {
         if let (Some(allocation), Some(allocator)) = (self.allocation.take(), self.context.allocator.borrow_mut().as_mut()) {
             // Freeing fails only for memory of another allocator.
             let _ = allocator.free(allocation);
+            self.context.held.borrow_mut().give_back(self.memory, self.size_bytes);
         }
     }
 }

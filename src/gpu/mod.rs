@@ -16,7 +16,7 @@ use std::rc::Rc;
 use ash::vk;
 use gpu_allocator::vulkan::{Allocator, AllocatorCreateDesc};
 
-pub use buffer::{Buffer, Memory};
+pub use buffer::{Buffer, HeldMemory, Memory};
 pub use commands::{Commands, Extent};
 pub use device::DeviceFacts;
 pub use kernel::{Constants, Kernel, Module};
@@ -64,6 +64,7 @@ pub struct Gpu {
 /// What must outlive every object of the device; destroyed with the last of them.
 pub(crate) struct Context {
     allocator: RefCell<Option<Allocator>>,
+    held: RefCell<HeldMemory>,
     device: ash::Device,
     /// Names for tools and messages; only with the validation layer.
     debug: Option<ash::ext::debug_utils::Device>,
@@ -129,7 +130,15 @@ impl Gpu {
             allocation_sizes: Default::default(),
         })
         .map_err(|error| Error::Device { call: "the memory allocator", reason: error.to_string() })?;
-        let context = Rc::new(Context { allocator: RefCell::new(Some(allocator)), device, debug, messages, instance, _entry: entry });
+        let context = Rc::new(Context {
+            allocator: RefCell::new(Some(allocator)),
+            held: RefCell::default(),
+            device,
+            debug,
+            messages,
+            instance,
+            _entry: entry,
+        });
         let cache = kernel::DiskCache::open(&context, &facts)?;
         let gpu = Gpu {
             facts,

@@ -14,6 +14,7 @@ use crate::gpu::kernels::{
 };
 use crate::gpu::{Buffer, Commands, Extent, Kernel, Module};
 use crate::plan::Plan;
+use crate::plan::memory::tree_count_capacity;
 use crate::prefix_sum::scan_part;
 use crate::records::{DispatchSizePush, TreePush};
 use crate::resources::{Resources, TreeBuffers};
@@ -109,7 +110,7 @@ fn sort(
 
 fn sum_counts(commands: &mut Commands, tree: &TreeBuffers, plan: &Plan) -> Result<()> {
     let threads = || Extent::Indirect(&tree.scan_args);
-    scan_part(commands, &tree.counts, &tree.block_sums, TreeBuffers::count_capacity(plan), plan.settings.group_size, &threads)
+    scan_part(commands, &tree.counts, &tree.block_sums, tree_count_capacity(plan), plan.settings.group_size, &threads)
 }
 
 /// Splits the nodes of a height at the middle of the order along one axis; parts the order along the other into

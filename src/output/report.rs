@@ -57,6 +57,8 @@ struct PlanReport<'a> {
     chunks_per_round: u32,
     photon_map_entries: u32,
     photon_map_bytes: u64,
+    /// Of all buffers on the device.
+    bytes: u64,
     grid: Option<crate::plan::Grid>,
     film_channels: u32,
     film_fixed_point_bits: u32,
@@ -89,6 +91,7 @@ pub fn json(outcome: &Outcome, walls: &[WallEstimate]) -> Vec<u8> {
             chunks_per_round: plan.chunks_per_round,
             photon_map_entries: plan.photon_capacity,
             photon_map_bytes: plan.photon_map_bytes(),
+            bytes: plan.bytes(),
             grid: plan.gathers_by_grid().then_some(plan.grid),
             film_channels: plan.channel_count,
             film_fixed_point_bits: plan.film_shift,

@@ -4,6 +4,7 @@
 pub mod capacity;
 pub mod effect;
 pub mod evidence;
+pub mod memory;
 pub mod transport;
 
 use std::ops::Range;

@@ -6,9 +6,9 @@ use std::time::{Duration, Instant};
 
 use serde::Serialize;
 
-use super::Limits;
 use super::capacity::photons_per_invocation;
 use super::evidence::{EffectDecision, Facts};
+use super::{Limits, memory};
 use crate::constants::*;
 use crate::error::{Error, Result};
 use crate::records::*;
@@ -88,7 +88,7 @@ pub struct TransportPlan {
     pub film_limit: f64,
     /// Rays or pair tests after which commands are handed to the device.
     pub work_per_submission: u64,
-    /// Bytes of all buffers.
+    /// Bytes of all buffers, with one set of receivers; see [`TransportPlan::bytes_of`].
     pub bytes: u64,
     /// Time that planning took.
     pub planned_in: Duration,
@@ -105,8 +105,6 @@ pub const RADIUS_RANGE: (f64, f64) = (1.0 / 32_768.0, 2.0);
 /// Bits of a film unit below the scene's mean radiance: as many as leave so many above it, within these.
 const FILM_BITS: (i32, i32) = (24, 32);
 const FILM_HEADROOM_BITS: i32 = 24;
-/// Bytes of a pixel on the film: sums and squares of three channels.
-const FILM_PIXEL_BYTES: u64 = 3 * 8 + 3 * 16;
 /// Candidates of a point, roughly: what a lookup counts as work.
 pub const TESTS_PER_POINT: u64 = 256;
 /// Work groups along x that every device allows.
@@ -257,7 +255,7 @@ impl TransportPlan {
             planned_in: Duration::ZERO,
         };
         plan.set_film(geometry);
-        plan.check_sizes(geometry, limits)?;
+        plan.check_sizes(geometry, &keeps, limits)?;
         for decision in &mut decisions {
             plan.give(decision, geometry);
         }
@@ -333,7 +331,7 @@ impl TransportPlan {
         self.film_limit = limit;
     }
 
-    fn check_sizes(&mut self, geometry: &Geometry, limits: &Limits) -> Result<()> {
+    fn check_sizes(&mut self, geometry: &Geometry, keeps: &dyn Fn(Effect) -> bool, limits: &Limits) -> Result<()> {
         let pixels = u64::from(self.sensor.pixels());
         let points = u64::from(self.visible_points());
         let film = [
@@ -367,15 +365,7 @@ impl TransportPlan {
                 }
             });
         }
-        let maps: u64 = self
-            .maps()
-            .map(|map| {
-                u64::from(map.capacity) * MAP_ENTRY_BYTES
-                    + u64::from(map.path_array_length) * 2 * size_of::<LightPath>() as u64
-                    + u64::from(map.bucket_count) * 4
-            })
-            .sum();
-        self.bytes = maps + pixels * (FILM_PIXEL_BYTES + 24) + film[1].1 + film[2].1 + scene.iter().map(|(_, bytes)| bytes).sum::<u64>();
+        self.bytes = memory::of_transport(self, geometry, keeps).iter().map(|(_, bytes)| bytes).sum();
         if self.bytes > limits.memory_bytes {
             return Err(Error::setting(
                 "--chunk",

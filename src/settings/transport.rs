@@ -100,6 +100,16 @@ pub enum Append {
     Persistent,
 }
 
+impl Append {
+    pub fn name(self) -> &'static str {
+        match self {
+            Append::Atomic => "atomic",
+            Append::Ballot => "ballot",
+            Append::Persistent => "persistent",
+        }
+    }
+}
+
 /// What a scene may call for; each can be forced on or left out.
 #[derive(Debug, Clone, Copy, PartialEq, Eq, PartialOrd, Ord, Hash, Serialize)]
 #[serde(rename_all = "kebab-case")]

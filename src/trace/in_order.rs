@@ -4,6 +4,7 @@ use crate::error::Result;
 use crate::gpu::kernels::{EndBounce, KeepOrder, TraceInPlace};
 use crate::gpu::{Commands, Extent};
 use crate::plan::Plan;
+use crate::plan::memory::group_count;
 use crate::prefix_sum::scan;
 use crate::records::{EndBouncePush, TracePush};
 use crate::resources::{OrderBuffers, Resources};
@@ -20,7 +21,7 @@ pub fn one_bounce<'a>(
     let (paths, next_paths) = if push.bounce.is_multiple_of(2) { (even, odd) } else { (odd, even) };
     let Resources { rooms, walls, photons, counters, tallies, oddities, order, .. } = resources;
     let Some(OrderBuffers { survivors, block_sums, weights }) = order else { panic!("the plan has no order to keep") };
-    let group_count = OrderBuffers::group_count(plan);
+    let group_count = group_count(plan);
     // Groups that no path is left for count none, and so does the place behind the last, which becomes the sum of all.
     commands.fill(survivors, 0, u64::from(group_count) + 1, 0);
     commands.dispatch(TraceInPlace { rooms, walls, paths, weights, counters, tallies, survivors, oddities }, push, extent())?;

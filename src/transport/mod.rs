@@ -106,7 +106,8 @@ pub fn modules(plan: &TransportPlan, facts: &DeviceFacts) -> Vec<Module> {
     modules
 }
 
-fn constants(plan: &TransportPlan) -> Constants {
+/// Specialization constants of a plan.
+pub fn constants(plan: &TransportPlan) -> Constants {
     plan.constants.iter().fold(Constants::new(plan.settings.group_size), |constants, (name, value)| constants.set(name, *value))
 }
 

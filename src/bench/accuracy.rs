@@ -1,0 +1,167 @@
+//! Time on the device to a relative error. The reference is path-traced by the judge; where that is too noisy to tell so
+//! small an error, it is a long run of other photons, held against the judge by its light in all. Pixels in which a lamp
+//! is seen straight are left out.
+
+use std::time::{Duration, Instant};
+
+use super::Lab;
+use super::experiments::{Found, limit_of_round};
+use super::scene_line::{self, Job};
+use crate::error::Result;
+use crate::scene::built_in;
+use crate::scene::geometry::Geometry;
+use crate::settings::transport::TransportSettings;
+use crate::study::axes::{Configuration, Line};
+use crate::study::point::{Curve, Point};
+use crate::study::reference::Reference;
+use crate::study::subject::Subject;
+use crate::transport::Lit;
+
+/// Runs of a point, each with a seed of its own.
+const REPEATS: u32 = 3;
+/// Seed of the first of them, and that of a long run which they are held against.
+const FIRST_SEED: u64 = 1;
+const LONG_RUN_SEED: u64 = 1 << 20;
+const MOST_DOUBLINGS: u32 = 16;
+const MOST_ROUNDS: u32 = 1 << 18;
+const WARM_UP: Duration = Duration::from_secs(1);
+/// What a reference's own error may be, of the error that is looked for.
+const REFERENCE_SHARE: f64 = 0.25;
+
+struct Search<'a> {
+    subject: &'a Subject,
+    reference: Reference,
+    /// Relative error.
+    wanted: f64,
+    /// Time for the curve of one number of photons, and for a long run.
+    patience: Duration,
+}
+
+/// The shortest time to the error among several numbers of photons a round.
+pub fn measure(lab: &mut Lab, name: &str) -> Result<Found> {
+    let scene = built_in::by_name(name).expect("it is built in");
+    let geometry = Geometry::new(&scene)?;
+    let (size, samples, wanted, seconds) = lab.choose((8, 1024, 0.5, 2), (32, 1024, 0.05, 20), (256, 256, 0.01, 20));
+    let patience = Duration::from_secs(seconds);
+    let request = crate::study::Request {
+        scene: name.to_owned(),
+        size,
+        photons: 1 << 12,
+        repeats: REPEATS,
+        seed: FIRST_SEED,
+        reference_samples: samples,
+        budget: patience,
+        most_rounds: crate::study::MOST_ROUNDS,
+    };
+    let subjects = Subject::all(lab.gpu, &scene, &request, lab.cancelled, lab.tell)?;
+    let subject = &subjects[0];
+    let job = |photons: u32| Job { name, scene: &scene, geometry: &geometry, size: (size, size), settings: settings(photons) };
+    let numbers = lab.choose(vec![1 << 12], vec![1 << 12, 1 << 14], vec![1 << 12, 1 << 14, 1 << 16, 1 << 18]);
+    let mut search = Search { subject, reference: subject.reference.clone(), wanted, patience };
+    if search.reference.relative_error > REFERENCE_SHARE * wanted {
+        search.reference = long_run(lab, &job(numbers[numbers.len() / 2]), &search)?;
+    }
+    let mut best: Option<(f64, u32, u32)> = None;
+    let mut closest = f64::INFINITY;
+    for photons in numbers {
+        lab.go_on()?;
+        let curve = search.climb(lab, photons)?;
+        closest = closest.min(curve.best_error());
+        // A first point that is good enough already says that no less was tried, so it counts as it is.
+        let crossed = curve.time_to(wanted).map(|time| time.value);
+        let at_once = curve.points.first().filter(|point| point.error().value <= wanted).map(|point| point.ms().value);
+        if let Some(ms) = crossed.or(at_once).filter(|ms| best.is_none_or(|best| *ms < best.0)) {
+            best = Some((ms, photons, curve.points.last().map_or(0, |point| point.rounds)));
+        }
+    }
+    let timed = scene_line::time(lab.gpu, &lab.rates, &job(best.map_or(1 << 12, |best| best.1)), lab.cancelled)?;
+    let (seconds, how) = match best {
+        Some((ms, photons, rounds)) => {
+            (1e-3 * ms, format!("to {} % at {size} x {size}, {photons} photons a map and round, up to {rounds} round(s)", 100.0 * wanted))
+        }
+        None => (f64::NAN, format!("{} % at {size} x {size} was not reached, {:.2} % was", 100.0 * wanted, 100.0 * closest)),
+    };
+    let how = format!("{how}; against {}, known to {:.2} %", search.reference.method, 100.0 * search.reference.relative_error);
+    let limit = limit_of_round(&timed).map(|ms| seconds * ms / timed.round_ms);
+    Ok((timed.passes, vec![(seconds, limit, how)]))
+}
+
+fn settings(photons: u32) -> TransportSettings {
+    TransportSettings { photons, caustic_photons: photons, ..TransportSettings::default() }
+}
+
+/// A run long enough that its own noise is a small share of the error wanted, or as long as patience lasts.
+fn long_run(lab: &Lab, job: &Job, search: &Search) -> Result<Reference> {
+    let began = Instant::now();
+    let mut rounds = 16;
+    loop {
+        let settings = TransportSettings { rounds, seed: LONG_RUN_SEED, ..job.settings.clone() };
+        let mut reference = of_film(&job.light(lab.gpu, settings, lab.cancelled)?, &search.reference);
+        let is_good = reference.relative_error <= REFERENCE_SHARE * search.wanted;
+        // The next would take four times as long as all before it together.
+        if is_good || 5 * began.elapsed() > 4 * search.patience || rounds >= MOST_ROUNDS {
+            reference.method = format!("a run of {rounds} rounds of other photons, {}", beside(&reference, &search.reference));
+            return Ok(reference);
+        }
+        rounds *= 4;
+    }
+}
+
+/// What a run found, with its own standard errors, at the places that count for the judge.
+fn of_film(lit: &Lit, judge: &Reference) -> Reference {
+    let pixels = 0..lit.film.pixels();
+    let mut reference = Reference {
+        method: String::new(),
+        values: pixels.clone().flat_map(|pixel| lit.film.mean(pixel, &lit.plan).to_array()).collect(),
+        standard_errors: pixels.flat_map(|pixel| lit.film.standard_error(pixel, &lit.plan).to_array()).collect(),
+        counts: judge.counts.clone(),
+        relative_error: 0.0,
+    };
+    let noise = reference.mean_over(|place| reference.standard_errors[place].powi(2));
+    reference.relative_error = (noise / reference.mean_square()).sqrt();
+    reference
+}
+
+/// How a long run differs from the judge. Of caustics of small lamps, paths know their own error badly.
+fn beside(reference: &Reference, judge: &Reference) -> String {
+    let total = judge.mean_over(|place| judge.values[place]);
+    let places = judge.counts.iter().filter(|counts| **counts).count() as f64;
+    let noise = (judge.mean_over(|place| judge.standard_errors[place].powi(2)) / places).sqrt();
+    let both = |place: usize| judge.standard_errors[place].powi(2) + reference.standard_errors[place].powi(2);
+    let apart = judge.mean_over(|place| (reference.values[place] - judge.values[place]).powi(2) - both(place));
+    format!(
+        "{:.4} of the light that path tracing finds (+- {:.4}), pixels {:.2} % off beyond the noise of both",
+        reference.mean_over(|place| reference.values[place]) / total,
+        noise / total,
+        100.0 * (apart.max(0.0) / judge.mean_square()).sqrt()
+    )
+}
+
+impl Search<'_> {
+    /// Points at rounds that double, until the error is below what is wanted or patience ends.
+    fn climb(&self, lab: &Lab, photons: u32) -> Result<Curve> {
+        let configuration = Configuration { label: format!("{photons} photons a round"), line: Line::Scene(settings(photons)) };
+        let mut curve = Curve { label: configuration.label.clone(), points: Vec::new(), left_out: None };
+        let run = |rounds, seed| self.subject.run(lab.gpu, &configuration, rounds, seed, lab.cancelled);
+        // Runs that are dropped: they make pipelines, and bring a card that waited for the reference to its clock.
+        let warm_up = if lab.is_cpu() { Duration::ZERO } else { WARM_UP };
+        let began = Instant::now();
+        while run(8, FIRST_SEED)?.is_some() && began.elapsed() < warm_up {}
+        let began = Instant::now();
+        for rounds in (0..=MOST_DOUBLINGS).map(|doublings| 1 << doublings) {
+            let mut shots = Vec::new();
+            for seed in (FIRST_SEED..).take(REPEATS as usize) {
+                let began = Instant::now();
+                let Some(shot) = run(rounds, seed)? else { return Ok(curve) };
+                shots.push((shot, began.elapsed()));
+            }
+            let point = Point::of(&shots, &self.reference, self.subject.command(&configuration, rounds, FIRST_SEED), rounds);
+            let (is_good, next) = (point.error().value <= self.wanted, 2 * point.spent());
+            curve.points.push(point);
+            if is_good || began.elapsed() + next > self.patience || lab.is_late() {
+                break;
+            }
+        }
+        Ok(curve)
+    }
+}

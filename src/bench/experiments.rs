@@ -1,0 +1,314 @@
+//! The workloads that the targets name.
+
+use serde::Serialize;
+
+use super::Lab;
+use super::accuracy;
+use super::paper_line::{self, Timed};
+use super::pass::Pass;
+use super::scale::ball_room;
+use super::scene_line::{self, Job, radius_for, survey};
+use super::targets::{Finding, findings};
+use crate::error::Result;
+use crate::paper::bench::Spread;
+use crate::rng::Rng;
+use crate::scene::built_in;
+use crate::scene::geometry::Geometry;
+use crate::settings::transport::{Append, Effect, Illumination, TransportSettings};
+use crate::settings::{Preset, Settings, Variant};
+
+#[derive(Debug, Clone, Copy, PartialEq, Eq, Serialize)]
+pub enum Experiment {
+    OpenBox,
+    Builders,
+    Table1,
+    Index,
+    Gather,
+    Cornell,
+    CornellSpheres,
+    CausticSphere,
+    Mesh,
+    Effects,
+}
+
+impl Experiment {
+    pub const ALL: [Experiment; 10] = [
+        Experiment::OpenBox,
+        Experiment::Builders,
+        Experiment::Table1,
+        Experiment::Index,
+        Experiment::Gather,
+        Experiment::Cornell,
+        Experiment::CornellSpheres,
+        Experiment::CausticSphere,
+        Experiment::Mesh,
+        Experiment::Effects,
+    ];
+
+    pub fn name(self) -> &'static str {
+        match self {
+            Experiment::OpenBox => "open-box",
+            Experiment::Builders => "builders",
+            Experiment::Table1 => "table-1",
+            Experiment::Index => "index",
+            Experiment::Gather => "gather",
+            Experiment::Cornell => "cornell",
+            Experiment::CornellSpheres => "cornell-spheres",
+            Experiment::CausticSphere => "caustic-sphere",
+            Experiment::Mesh => "mesh",
+            Experiment::Effects => "effects",
+        }
+    }
+
+    pub fn title(self) -> &'static str {
+        match self {
+            Experiment::OpenBox => "open box, 15 bounces, every builder",
+            Experiment::Builders => "the paper's workload, 2 and 15 bounces, every builder",
+            Experiment::Table1 => "table 1's last row",
+            Experiment::Index => "index of many photons",
+            Experiment::Gather => "gather at the points of a picture",
+            Experiment::Cornell => "cornell, 16 bounces",
+            Experiment::CornellSpheres => "cornell-spheres to a relative error",
+            Experiment::CausticSphere => "caustic-sphere to a relative error",
+            Experiment::Mesh => "many triangles",
+            Experiment::Effects => "effects that a scene lacks",
+        }
+    }
+}
+
+/// What an experiment gives.
+pub struct Results {
+    pub passes: Vec<Pass>,
+    pub findings: Vec<Finding>,
+}
+
+pub fn run(lab: &mut Lab, experiment: Experiment) -> Result<Results> {
+    let (passes, found) = match experiment {
+        Experiment::OpenBox => open_box(lab)?,
+        Experiment::Builders => builders(lab)?,
+        Experiment::Table1 => table_1(lab)?,
+        Experiment::Index => index(lab)?,
+        Experiment::Gather => gather(lab)?,
+        Experiment::Cornell => cornell(lab)?,
+        Experiment::CornellSpheres | Experiment::CausticSphere => accuracy::measure(lab, experiment.name())?,
+        Experiment::Mesh => mesh(lab)?,
+        Experiment::Effects => effects(lab)?,
+    };
+    Ok(Results { findings: findings(lab, experiment, &found), passes })
+}
+
+/// Passes, and for each target (found, limit, how).
+pub type Found = (Vec<Pass>, Vec<(f64, Option<f64>, String)>);
+
+/// Milliseconds that a pass takes at least.
+fn limit_ms(pass: Option<&Pass>) -> Option<f64> {
+    pass.and_then(|pass| pass.limit).map(|limit| limit.ms)
+}
+
+/// The same of all outermost passes together.
+pub fn limit_of_round(timed: &Timed) -> Option<f64> {
+    timed.passes.iter().filter(|pass| !pass.name.contains('/')).map(|pass| limit_ms(Some(pass))).sum()
+}
+
+/// The paper's box at other sizes: cells of a centimetre, random numbers that fit any count, all photons at once.
+fn large_box(variant: Variant, photons: u32, mesh: u32) -> Settings {
+    Settings { variant, photons, mesh, radius: 0.01, rng: Rng::Philox, chunk: Some(photons), ..Settings::default() }
+}
+
+fn open_box(lab: &mut Lab) -> Result<Found> {
+    let photons = lab.choose(1 << 12, 1 << 16, 1 << 24);
+    let mut passes = Vec::new();
+    let mut best: Option<(f64, Option<f64>, String)> = None;
+    for variant in Variant::ON_GPU {
+        lab.go_on()?;
+        let timed = paper_line::time(lab.gpu, &lab.rates, &large_box(variant, photons, lab.choose(16, 64, 64)), lab.cancelled)?;
+        let rate = timed.counts.events / timed.ms("build") * 1e3;
+        if best.as_ref().is_none_or(|best| rate > best.0) {
+            let limit = limit_ms(timed.pass("build")).map(|ms| timed.counts.events / ms * 1e3);
+            best = Some((rate, limit, format!("{}, {photons} photons a round", variant.name())));
+        }
+        passes.extend(timed.passes);
+    }
+    Ok((passes, best.into_iter().collect()))
+}
+
+fn builders(lab: &mut Lab) -> Result<Found> {
+    let photons = lab.choose(1 << 12, 1 << 16, 1 << 22);
+    let mut passes = Vec::new();
+    let mut ratios = Vec::new();
+    for bounces in [2, 15] {
+        let mut builds = Vec::new();
+        for variant in Variant::ON_GPU {
+            lab.go_on()?;
+            let settings = Settings { bounces, radius: Settings::default().radius, ..large_box(variant, photons, lab.choose(16, 32, 64)) };
+            let timed = paper_line::time(lab.gpu, &lab.rates, &settings, lab.cancelled)?;
+            builds.push((variant, timed.ms("build"), limit_ms(timed.pass("build"))));
+            passes.extend(timed.passes);
+        }
+        let of = |wanted: Variant| *builds.iter().find(|(variant, ..)| *variant == wanted).expect("every builder was timed");
+        let ((_, naive, naive_limit), (_, atomic, atomic_limit)) = (of(Variant::Naive), of(Variant::Atomic));
+        let ratio = |over: f64, under: f64| if bounces == 2 { over / under } else { under / over };
+        let limit = atomic_limit.zip(naive_limit).map(|(atomic, naive)| ratio(atomic, naive));
+        ratios.push((ratio(atomic, naive), limit, format!("{photons} photons a round")));
+    }
+    Ok((passes, ratios))
+}
+
+fn table_1(lab: &mut Lab) -> Result<Found> {
+    let settings = Settings { rounds: lab.choose(5, 50, 50), ..Settings::preset(Preset::Rounds) };
+    let runs = paper_line::time_run(lab.gpu, &lab.rates, &settings, lab.cancelled)?;
+    let median = |value: &dyn Fn(&Timed) -> f64| Spread::of(runs.iter().map(value).collect()).map_or(f64::NAN, |spread| spread.median);
+    let seconds = 1e-3 * median(&|run| run.run_ms);
+    let limit = limit_of_round(&runs[0]).map(|ms| 1e-3 * ms * f64::from(settings.rounds));
+    let how = format!(
+        "{} rounds of {} photons, {}, set-up included; {:.4} s on the host's clock",
+        settings.rounds,
+        settings.photons,
+        settings.variant.name(),
+        1e-3 * median(&|run| run.wall_ms)
+    );
+    // The rounds of one run are as many samples as anybody needs.
+    let passes = runs.into_iter().last().map(|run| run.passes).unwrap_or_default();
+    Ok((passes, vec![(seconds, limit, how)]))
+}
+
+/// Entries of the map whose index a target names.
+const INDEXED: f64 = 1e7;
+
+fn index(lab: &mut Lab) -> Result<Found> {
+    let wanted = lab.choose(1e4, 2e5, INDEXED);
+    let scaled = |ms: f64, stored: f64| 1e-3 * ms * INDEXED / stored;
+
+    let room = |photons: u32| Settings { variant: Variant::Ballot, ..large_box(Variant::Ballot, photons, 16) };
+    let few = 1 << 12;
+    let share = paper_line::time(lab.gpu, &lab.rates, &room(few), lab.cancelled)?.counts.survivors / f64::from(few);
+    let of_room = paper_line::time(lab.gpu, &lab.rates, &room((wanted / share) as u32), lab.cancelled)?;
+    let mut found = Vec::new();
+    let stored = of_room.counts.survivors;
+    let how = |stored: f64| format!("{stored:.0} photons in the map, time in proportion");
+    found.push((scaled(of_room.ms("index"), stored), limit_ms(of_room.pass("index")).map(|ms| scaled(ms, stored)), how(stored)));
+
+    lab.go_on()?;
+    let scene = built_in::by_name("cornell").expect("it is built in");
+    let geometry = Geometry::new(&scene)?;
+    let job = |photons: u32| Job {
+        name: "cornell, all photons stored",
+        scene: &scene,
+        geometry: &geometry,
+        size: (64, 64),
+        settings: TransportSettings { photons, bounces: 16, illumination: Illumination::Photons, ..TransportSettings::default() },
+    };
+    let stored_of = |job: &Job| Ok(survey(lab.gpu, job, |plan| plan.global.as_ref())?.map_or(0.0, |survey| survey.stored));
+    let share = stored_of(&job(few))? / f64::from(few);
+    let job = job((wanted / share) as u32);
+    let of_scene = scene_line::time(lab.gpu, &lab.rates, &job, lab.cancelled)?;
+    let pass = of_scene.pass("global/index");
+    let stored = pass.and_then(|pass| pass.work).map_or(f64::NAN, |work| work.items);
+    found.push((scaled(of_scene.ms("global/index"), stored), limit_ms(pass).map(|ms| scaled(ms, stored)), how(stored)));
+    Ok(([of_room.passes, of_scene.passes].concat(), found))
+}
+
+/// Photons of an estimate that a target names.
+const PER_ESTIMATE: f64 = 50.0;
+
+fn gather(lab: &mut Lab) -> Result<Found> {
+    let wanted = lab.choose(1e4, 1e5, 1e6);
+    let size = lab.choose((96, 54), (480, 270), (1920, 1080));
+    let scene = built_in::by_name("cornell").expect("it is built in");
+    let geometry = Geometry::new(&scene)?;
+    let job = |photons: u32, radius: Option<f64>, size: (u32, u32)| Job {
+        name: "cornell, picture",
+        scene: &scene,
+        geometry: &geometry,
+        size,
+        settings: TransportSettings { photons, radius, ..TransportSettings::default() },
+    };
+    let survey = |job: &Job| survey(lab.gpu, job, |plan| plan.global.as_ref());
+    let few = 1 << 12;
+    let share = survey(&job(few, None, (64, 64)))?.map_or(1.0, |survey| survey.stored / f64::from(few));
+    let photons = (wanted / share) as u32;
+    let first = job(photons, None, (64, 64));
+    let radius = match (survey(&first)?, first.plan(lab.gpu, &first.settings)?.global) {
+        (Some(survey), Some(map)) => Some(radius_for(&geometry, &survey, map.radius * geometry.unit, PER_ESTIMATE)),
+        _ => None,
+    };
+    let job = job(photons, radius, size);
+    let per_estimate = survey(&job)?.map_or(f64::NAN, |survey| survey.per_estimate);
+    let timed = scene_line::time(lab.gpu, &lab.rates, &job, lab.cancelled)?;
+    let how = format!("{} x {} points, {photons} photons emitted, {per_estimate:.1} an estimate", size.0, size.1);
+    let found = (1e-3 * timed.ms("global/look up"), limit_ms(timed.pass("global/look up")).map(|ms| 1e-3 * ms), how);
+    Ok((timed.passes, vec![found]))
+}
+
+fn cornell(lab: &mut Lab) -> Result<Found> {
+    let scene = built_in::by_name("cornell").expect("it is built in");
+    let geometry = Geometry::new(&scene)?;
+    let photons = lab.choose(1 << 12, 1 << 16, 1 << 22);
+    let settings = TransportSettings { photons, bounces: 16, illumination: Illumination::Photons, ..TransportSettings::default() };
+    let size = lab.choose((32, 32), (128, 128), (512, 512));
+    let job = Job { name: "cornell, photons alone", scene: &scene, geometry: &geometry, size, settings };
+    best_builder(lab, &job, "global/trace", "every arrival stored")
+}
+
+fn mesh(lab: &mut Lab) -> Result<Found> {
+    let scene = ball_room(lab.choose(2_500, 25_000, 250_000));
+    let geometry = Geometry::new(&scene)?;
+    let photons = lab.choose(1 << 12, 1 << 16, 1 << 21);
+    let settings = TransportSettings { photons, ..TransportSettings::default() };
+    let size = lab.choose((32, 32), (128, 128), (512, 512));
+    let job = Job { name: "a ball in a room", scene: &scene, geometry: &geometry, size, settings };
+    best_builder(lab, &job, "global", &format!("{} triangles", geometry.triangles.len()))
+}
+
+/// Photons a second in a pass, by the builder that is fastest in it.
+fn best_builder(lab: &mut Lab, job: &Job, pass: &str, how: &str) -> Result<Found> {
+    let mut passes = Vec::new();
+    let mut best: Option<(f64, Option<f64>, String)> = None;
+    for append in [Append::Ballot, Append::Persistent] {
+        lab.go_on()?;
+        let settings = TransportSettings { append, ..job.settings.clone() };
+        let timed = scene_line::time(lab.gpu, &lab.rates, &Job { settings, ..*job }, lab.cancelled)?;
+        let rate = |ms: f64| timed.counts.emitted / ms * 1e3;
+        let found = rate(timed.ms(pass));
+        if best.as_ref().is_none_or(|best| found > best.0) {
+            let how = format!("{}, {} photons a round, {how}", append.name(), job.settings.photons);
+            best = Some((found, limit_ms(timed.pass(pass)).map(rate), how));
+        }
+        passes.extend(timed.passes);
+    }
+    Ok((passes, best.into_iter().collect()))
+}
+
+/// Times the same scene with what the plan drops, with that left out by hand, and with it forced on.
+fn effects(lab: &mut Lab) -> Result<Found> {
+    let scene = built_in::by_name("cornell").expect("it is built in");
+    let geometry = Geometry::new(&scene)?;
+    let photons = lab.choose(1 << 12, 1 << 16, 1 << 21);
+    let job = |with: &[Effect], without: &[Effect]| Job {
+        name: "cornell",
+        scene: &scene,
+        geometry: &geometry,
+        size: lab.choose((32, 32), (128, 128), (512, 512)),
+        settings: TransportSettings { photons, with: with.to_vec(), without: without.to_vec(), ..TransportSettings::default() },
+    };
+    let usual = job(&[], &[]);
+    let plan = usual.plan(lab.gpu, &usual.settings)?;
+    let lacking: Vec<Effect> = plan.decisions.iter().filter(|decision| !decision.kept).map(|decision| decision.effect).collect();
+    let jobs = [usual, job(&[], &lacking), job(&lacking, &[])];
+    let mut round_ms = [const { Vec::new() }; 3];
+    let mut passes = Vec::new();
+    // In turn, so that a clock that drifts touches all alike.
+    for _ in 0..lab.choose(1, 3, 3) {
+        for (job, round_ms) in jobs.iter().zip(&mut round_ms) {
+            lab.go_on()?;
+            let timed = scene_line::time(lab.gpu, &lab.rates, job, lab.cancelled)?;
+            round_ms.push(timed.round_ms);
+            if passes.is_empty() {
+                passes = timed.passes;
+            }
+        }
+    }
+    let [usual, without, forced] = round_ms.map(|values| Spread::of(values).map_or(f64::NAN, |spread| spread.median));
+    let how = format!("{} effects that it lacks; forced on they take {:.2} x the time", lacking.len(), forced / usual);
+    Ok((passes, vec![(usual / without, Some(1.0), how)]))
+}

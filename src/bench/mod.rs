@@ -1,0 +1,178 @@
+//! How near the device's limits every pass comes: the roofline.
+//!
+//! [`rates`] measures what the device can do, [`paper_line`] and [`scene_line`] time the passes of both lines beside what
+//! they cannot do without ([`pass`]), [`experiments`] runs the workloads that the targets name ([`targets`]), and [`scale`]
+//! follows cost and memory over photons and triangles.
+
+pub mod accuracy;
+pub mod chart;
+pub mod experiments;
+pub mod paper_line;
+pub mod pass;
+pub mod rates;
+pub mod scale;
+pub mod scene_line;
+pub mod table;
+pub mod targets;
+
+use std::sync::atomic::{AtomicBool, Ordering};
+use std::time::{Duration, Instant};
+
+use serde::Serialize;
+
+use crate::error::{Error, Result};
+use crate::gpu::Gpu;
+use crate::output::destination::{Folder, write_all};
+use experiments::Experiment;
+use pass::Pass;
+use rates::Rates;
+use scale::Scale;
+use targets::Finding;
+
+/// How large the workloads are.
+#[derive(Debug, Clone, Copy, PartialEq, Eq, Serialize)]
+#[serde(rename_all = "lowercase")]
+pub enum Size {
+    /// Seconds on a software device.
+    Small,
+    /// Those of the targets; on a software device smaller ones, minutes in all.
+    Full,
+}
+
+/// What is asked for.
+#[derive(Debug, Clone, Serialize)]
+pub struct Request {
+    /// What repeats it.
+    pub command: String,
+    pub size: Size,
+    #[serde(skip)]
+    pub experiments: Vec<Experiment>,
+    /// Follow cost over photons and triangles instead.
+    #[serde(skip)]
+    pub scale: bool,
+    /// Wall time after which no further experiment begins.
+    #[serde(skip)]
+    pub budget: Duration,
+}
+
+/// Everything that was found.
+#[derive(Debug, Serialize)]
+pub struct Bench {
+    pub photonmill: &'static str,
+    pub request: Request,
+    pub device: String,
+    pub driver: String,
+    pub vulkan: String,
+    pub rates: Rates,
+    pub passes: Vec<Pass>,
+    pub targets: Vec<Finding>,
+    pub scale: Option<Scale>,
+    /// What was not measured, and why.
+    pub left_out: Vec<String>,
+}
+
+/// What experiments share.
+pub struct Lab<'a> {
+    pub gpu: &'a Gpu,
+    pub rates: Rates,
+    pub size: Size,
+    pub deadline: Instant,
+    pub cancelled: &'a AtomicBool,
+    pub tell: &'a mut dyn FnMut(&str),
+}
+
+impl Lab<'_> {
+    /// Whether workloads are cut to what a processor does.
+    pub fn is_cpu(&self) -> bool {
+        self.gpu.facts().kind == "cpu"
+    }
+
+    /// The number for a small run, for a processor, and for a card.
+    pub fn choose<T>(&self, small: T, on_cpu: T, full: T) -> T {
+        match (self.size, self.is_cpu()) {
+            (Size::Small, _) => small,
+            (Size::Full, true) => on_cpu,
+            (Size::Full, false) => full,
+        }
+    }
+
+    /// Fails once somebody has ended it.
+    pub fn go_on(&self) -> Result<()> {
+        if self.cancelled.load(Ordering::Relaxed) { Err(Error::Interrupted) } else { Ok(()) }
+    }
+
+    pub fn is_late(&self) -> bool {
+        Instant::now() >= self.deadline
+    }
+}
+
+/// Measures the device, then the experiments that are asked for. What was finished when somebody ended it is kept.
+pub fn run(gpu: &Gpu, request: Request, cancelled: &AtomicBool, tell: &mut dyn FnMut(&str)) -> Result<Bench> {
+    paper_line::check_clock(gpu)?;
+    let deadline = Instant::now() + request.budget;
+    tell("limits of the device");
+    let rates = rates::measure(gpu, request.size)?;
+    let mut lab = Lab { gpu, rates, size: request.size, deadline, cancelled, tell };
+    let facts = gpu.facts();
+    let mut bench = Bench {
+        photonmill: env!("CARGO_PKG_VERSION"),
+        device: facts.name.clone(),
+        driver: facts.driver.clone(),
+        vulkan: facts.vulkan.clone(),
+        rates,
+        passes: Vec::new(),
+        targets: Vec::new(),
+        scale: None,
+        left_out: Vec::new(),
+        request,
+    };
+    match measure(&mut lab, &mut bench) {
+        Err(Error::Interrupted) => bench.left_out.push("what follows: ended by hand".to_owned()),
+        result => result?,
+    }
+    Ok(bench)
+}
+
+fn measure(lab: &mut Lab, bench: &mut Bench) -> Result<()> {
+    if bench.request.scale {
+        bench.scale = Some(scale::measure(lab)?);
+        return Ok(());
+    }
+    for (number, experiment) in bench.request.experiments.clone().into_iter().enumerate() {
+        lab.go_on()?;
+        if lab.is_late() {
+            bench.left_out.push(format!("{}: --time was spent", experiment.name()));
+            continue;
+        }
+        (lab.tell)(&format!("[{}/{}] {}", number + 1, bench.request.experiments.len(), experiment.title()));
+        match experiments::run(lab, experiment) {
+            Ok(mut results) => {
+                bench.passes.append(&mut results.passes);
+                bench.targets.append(&mut results.findings);
+            }
+            // What this device cannot do is no reason to end.
+            Err(Error::Setting { option, value, allowed }) => {
+                bench.left_out.push(format!("{}: {option} {value} {allowed}", experiment.name()));
+            }
+            Err(error) => return Err(error),
+        }
+    }
+    Ok(())
+}
+
+impl Bench {
+    pub fn json(&self) -> Vec<u8> {
+        let mut text = serde_json::to_vec_pretty(self).expect("a bench is plain data");
+        text.push(b'\n');
+        text
+    }
+}
+
+/// Writes the report and its charts.
+pub fn write(folder: &Folder, bench: &Bench) -> Result<()> {
+    let mut files = vec![(folder.file("bench.json"), bench.json()), (folder.file("bench.txt"), table::text(bench).into_bytes())];
+    if let Some(scale) = &bench.scale {
+        files.extend(chart::all(scale).into_iter().map(|(name, drawn)| (folder.file(&name), drawn.into_bytes())));
+    }
+    write_all(files)
+}

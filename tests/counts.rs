@@ -1,0 +1,107 @@
+//! What a run costs in counts, which no clock disturbs: dispatches, submissions, pipelines, events and bytes of a few
+//! small runs beside the numbers that they had. Whoever changes one of them on purpose writes the new one here.
+
+mod common;
+
+use common::{device, lit, run};
+use photonmill::bench::paper_line::{self, Counts};
+use photonmill::plan::transport::{Sensor, TransportPlan};
+use photonmill::records::{LightPath, MapPhoton, Path, Photon, SortedPhoton, VisiblePoint};
+use photonmill::render;
+use photonmill::rng::Rng;
+use photonmill::scene::built_in;
+use photonmill::scene::geometry::Geometry;
+use photonmill::settings::transport::TransportSettings;
+use photonmill::settings::{Math, Settings, Variant};
+use photonmill::transport::View;
+
+/// Counts of a run: dispatches, submissions, events of all photons, bytes on the device, and bytes that the build moves.
+#[derive(Debug, PartialEq)]
+struct Cost {
+    dispatches: u64,
+    submissions: u64,
+    events: u64,
+    device_bytes: u64,
+    /// Over the events, rounded.
+    build_bytes_per_event: u64,
+}
+
+/// 1000 photons, 4 bounces, 2 rounds, 5 x 8 x 8 texels over the grid.
+fn of_the_box(variant: Variant) -> Option<Cost> {
+    let cost =
+        |dispatches, build_bytes_per_event| Cost { dispatches, submissions: 6, events: 3530, device_bytes: 350_164, build_bytes_per_event };
+    Some(match variant {
+        // A round: two lights, four bounces, five of the index, three of the gather, the film.
+        Variant::Naive => cost(2 * 15, 297),
+        // And one before every dispatch whose size only the device knows: three bounces and the index.
+        Variant::Atomic | Variant::Ballot | Variant::Group => cost(2 * 19, 137),
+        // In place, a prefix sum of one level, moved together, counted: four a bounce.
+        Variant::Scan => Cost { device_bytes: 350_208, ..cost(2 * 31, 246) },
+        // The lights', and no path is stored.
+        Variant::Persistent => Cost { device_bytes: 262_252, ..cost(2 * 12, 24) },
+        Variant::Cpu => return None,
+    })
+}
+
+#[test]
+fn the_box_costs_what_it_did() {
+    let Some(gpu) = device() else { return };
+    for variant in Variant::ON_GPU {
+        // Strict, so that every device traces the same photons to the bit.
+        let settings = Settings {
+            variant,
+            photons: 1000,
+            bounces: 4,
+            rounds: 2,
+            mesh: 8,
+            rng: Rng::Philox,
+            math: Math::Strict,
+            ..Settings::default()
+        };
+        let outcome = run(&gpu, &settings);
+        let counts = Counts::of(&outcome.fates, settings.rounds);
+        let work = |pass| paper_line::work(pass, &outcome.plan, &counts, 0.0).unwrap();
+        let build = work("build");
+        // The roofline's own counts are those of the run.
+        let dispatches: f64 = ["build", "index", "gather", "film"].map(|pass| work(pass).dispatches).iter().sum();
+        assert_eq!(dispatches * f64::from(settings.rounds), outcome.dispatches as f64, "{}", variant.name());
+        let found = Cost {
+            dispatches: outcome.dispatches,
+            submissions: outcome.submissions,
+            events: (counts.events * f64::from(settings.rounds)).round() as u64,
+            device_bytes: outcome.plan.bytes(),
+            build_bytes_per_event: (build.cost.bytes / build.items).round() as u64,
+        };
+        let expected = of_the_box(variant).unwrap_or_else(|| panic!("{}: write here what it costs: {found:?}", variant.name()));
+        assert_eq!(found, expected, "{}", variant.name());
+    }
+}
+
+#[test]
+fn a_scene_costs_what_it_did() {
+    let Some(gpu) = device() else { return };
+    let scene = built_in::by_name("cornell-spheres").unwrap();
+    let geometry = Geometry::new(&scene).unwrap();
+    let settings = TransportSettings {
+        photons: 1000,
+        caustic_photons: 500,
+        bounces: 5,
+        rounds: 2,
+        math: Math::Strict,
+        ..TransportSettings::default()
+    };
+    let sensor = Sensor::Picture { width: 16, height: 12 };
+    let plan = TransportPlan::new(&scene, &geometry, &settings, sensor, &render::limits(gpu.facts())).unwrap();
+    let device_bytes = plan.bytes;
+    let lit = lit::light(&gpu, &View { geometry: &geometry, camera: scene.cameras.first(), phases: &[] }, plan);
+    let events = lit.fates.each_ref().map(|fates| Counts::of(fates, 1).events as u64);
+    assert_eq!((lit.dispatches, lit.submissions, lit.pipelines), (80, 7, 11));
+    assert_eq!((events, device_bytes), ([3458, 964], 1_557_300));
+}
+
+/// Records decide how many bytes an event moves.
+#[test]
+fn records_are_as_small_as_they_were() {
+    assert_eq!([size_of::<Path>(), size_of::<Photon>(), size_of::<SortedPhoton>()], [44, 32, 24]);
+    assert_eq!([size_of::<LightPath>(), size_of::<MapPhoton>(), size_of::<VisiblePoint>()], [44, 32, 48]);
+}

@@ -1,0 +1,99 @@
+//! Memory stays within what the plan says beforehand, and is that to the byte.
+
+mod common;
+
+use common::{device, lit, run};
+use photonmill::gpu::Gpu;
+use photonmill::plan::Plan;
+use photonmill::plan::transport::{Sensor, TransportPlan};
+use photonmill::render;
+use photonmill::rng::Rng;
+use photonmill::scene::geometry::Geometry;
+use photonmill::scene::{Scene, built_in};
+use photonmill::settings::transport::{Illumination, TransportSettings};
+use photonmill::settings::{Gather, Preset, Settings, Sums, Variant};
+use photonmill::transport::View;
+
+/// Device memory against what a plan lists.
+fn check(what: &str, taken: u64, stated: u64, buffers: &[(&'static str, u64)]) -> common::Check {
+    if taken == stated { Ok(()) } else { Err(format!("{what}: {taken} bytes taken, {stated} stated: {buffers:?}")) }
+}
+
+/// Bytes that buffers took at most while `body` ran.
+fn taken<T>(gpu: &Gpu, body: impl FnOnce() -> T) -> (u64, T) {
+    gpu.forget_peaks();
+    assert_eq!(gpu.held_memory().device_bytes, 0, "something is held between runs");
+    let result = body();
+    (gpu.held_memory().peak_device_bytes, result)
+}
+
+fn small() -> Settings {
+    Settings { photons: 999, mesh: 5, bounces: 4, ..Settings::default() }
+}
+
+#[test]
+fn the_papers_line_takes_what_its_plan_says() {
+    let Some(gpu) = device() else { return };
+    let mut cases = vec![
+        Settings { gather: Gather::Brute, ..small() },
+        Settings { gather: Gather::KdTree, ..small() },
+        Settings { gather: Gather::KdTree, nearest: Some(7), rng: Rng::Philox, ..small() },
+        Settings { rounds: 3, chunk: Some(100), ..small() },
+        Settings { rounds: 2, sums: Sums::F32, rng: Rng::Philox, ..small() },
+        Settings { radius: 0.004, ..small() },
+        Settings { photons: 999, mesh: 5, rounds: 2, ..Settings::preset(Preset::Rounds) },
+    ];
+    cases.extend(Variant::ON_GPU.map(|variant| Settings { variant, ..small() }));
+    for settings in cases {
+        let (bytes, outcome) = taken(&gpu, || run(&gpu, &settings));
+        let plan = &outcome.plan;
+        common::assert_holds(format!("{settings:?}"), check("the paper's line", bytes, plan.bytes(), &plan.buffers()));
+    }
+}
+
+#[test]
+fn scenes_take_what_their_plan_says() {
+    let Some(gpu) = device() else { return };
+    let limits = render::limits(gpu.facts());
+    for name in ["cornell-spheres", "open-box-phong", "sky-over-plane"] {
+        let scene: Scene = built_in::by_name(name).unwrap();
+        let geometry = Geometry::new(&scene).unwrap();
+        for illumination in lit::BOTH {
+            let settings = TransportSettings {
+                photons: 777,
+                caustic_photons: 555,
+                bounces: 5,
+                rounds: 2,
+                chunk: Some(500),
+                illumination,
+                final_gather: illumination == Illumination::Split,
+                ..TransportSettings::default()
+            };
+            let sensor = Sensor::Picture { width: 7, height: 5 };
+            let plan = TransportPlan::new(&scene, &geometry, &settings, sensor, &limits).unwrap();
+            let stated = plan.bytes;
+            let view = View { geometry: &geometry, camera: scene.cameras.first(), phases: &[] };
+            let (bytes, _) = taken(&gpu, || lit::light(&gpu, &view, plan));
+            common::assert_holds(name, check("a picture", bytes, stated, &[]));
+        }
+        let receivers = [vec![Default::default(); 9], vec![Default::default(); 9]];
+        let settings = TransportSettings { photons: 300, rounds: 2, ..TransportSettings::default() };
+        let plan = TransportPlan::new(&scene, &geometry, &settings, Sensor::Receivers { count: 9 }, &limits).unwrap();
+        let stated = plan.bytes_of(2);
+        let view = View { geometry: &geometry, camera: None, phases: &receivers };
+        let never = std::sync::atomic::AtomicBool::new(false);
+        let mut control = render::Control { cancelled: &never, progress: &mut |_| {} };
+        let (bytes, _) = taken(&gpu, || photonmill::transport::light(&gpu, &view, plan, &mut control).unwrap());
+        common::assert_holds(name, check("two sets of receivers", bytes, stated, &[]));
+    }
+}
+
+/// A plan of other settings says something else: the check could not hold by itself.
+#[test]
+fn the_check_complains_about_a_plan_that_forgets_a_buffer() {
+    let plan: Plan = common::plan_for_host(&small());
+    for (place, (name, _)) in plan.buffers().iter().enumerate() {
+        let others: u64 = plan.buffers().iter().enumerate().filter(|(k, _)| *k != place).map(|(_, (_, bytes))| bytes).sum();
+        common::assert_complains(name, check(name, plan.bytes(), others, &plan.buffers()));
+    }
+}
