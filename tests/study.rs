@@ -8,6 +8,7 @@ use std::sync::atomic::AtomicBool;
 use std::time::Duration;
 
 use common::{device, lit};
+use photonmill::compaction::Agreed;
 use photonmill::gpu::Gpu;
 use photonmill::output::destination::Folder;
 use photonmill::study::axes::Axis;
@@ -91,6 +92,19 @@ fn the_open_box_is_studied_against_radiosity_and_goes_on_where_it_ended() {
     let count: usize = first.parts.iter().flat_map(Part::curves).map(|curve| curve.points.len()).sum();
     assert_eq!(read("points.csv").lines().count(), 1 + count);
     assert_eq!(read("points.jsonl").lines().count(), 1 + count);
+
+    // Who wins where, of photons that all builders agree on.
+    let map = first.compaction.as_ref().unwrap();
+    assert!(map.cells.len() == 5 && page.contains("Who wins where") && read("compaction.svg").contains("persistent"));
+    for cell in &map.cells {
+        assert!(cell.agreed == Agreed::Photons && cell.builders.len() == 6, "{cell:?}");
+        // Of photons that all go on with the same chance: s + s^2 + ... of them are stored.
+        let s = f64::from(cell.survival);
+        let expected = f64::from(cell.photons) * s * (1.0 - s.powi(15)) / (1.0 - s);
+        let z = (cell.stored as f64 - expected) / (f64::from(cell.photons) * 10.0 * s).sqrt();
+        assert!(z.abs() < 5.0, "{} stored of {expected}", cell.stored);
+        assert!(cell.builders.is_sorted_by(|a, b| a.ms.median <= b.ms.median) && cell.gain() >= 1.0);
+    }
 
     // Cut off in the middle of a line: what is whole is kept, and only the rest is measured.
     let whole = read("points.jsonl");

@@ -1,14 +1,17 @@
 //! The workloads that the targets name.
 
+use std::time::Instant;
+
 use serde::Serialize;
 
-use super::Lab;
 use super::accuracy;
 use super::paper_line::{self, Timed};
 use super::pass::Pass;
 use super::scale::ball_room;
 use super::scene_line::{self, Job, radius_for, survey};
 use super::targets::{Finding, findings};
+use super::{Lab, Size};
+use crate::compaction::{self, Map};
 use crate::error::Result;
 use crate::paper::bench::Spread;
 use crate::rng::Rng;
@@ -21,6 +24,7 @@ use crate::settings::{Preset, Settings, Variant};
 pub enum Experiment {
     OpenBox,
     Builders,
+    Compaction,
     Table1,
     Index,
     Gather,
@@ -32,9 +36,10 @@ pub enum Experiment {
 }
 
 impl Experiment {
-    pub const ALL: [Experiment; 10] = [
+    pub const ALL: [Experiment; 11] = [
         Experiment::OpenBox,
         Experiment::Builders,
+        Experiment::Compaction,
         Experiment::Table1,
         Experiment::Index,
         Experiment::Gather,
@@ -49,6 +54,7 @@ impl Experiment {
         match self {
             Experiment::OpenBox => "open-box",
             Experiment::Builders => "builders",
+            Experiment::Compaction => "compaction",
             Experiment::Table1 => "table-1",
             Experiment::Index => "index",
             Experiment::Gather => "gather",
@@ -64,6 +70,7 @@ impl Experiment {
         match self {
             Experiment::OpenBox => "open box, 15 bounces, every builder",
             Experiment::Builders => "the paper's workload, 2 and 15 bounces, every builder",
+            Experiment::Compaction => "who wins where: every builder over photons and survival",
             Experiment::Table1 => "table 1's last row",
             Experiment::Index => "index of many photons",
             Experiment::Gather => "gather at the points of a picture",
@@ -80,12 +87,18 @@ impl Experiment {
 pub struct Results {
     pub passes: Vec<Pass>,
     pub findings: Vec<Finding>,
+    pub compaction: Option<Map>,
 }
 
 pub fn run(lab: &mut Lab, experiment: Experiment) -> Result<Results> {
+    let mut map = None;
     let (passes, found) = match experiment {
         Experiment::OpenBox => open_box(lab)?,
         Experiment::Builders => builders(lab)?,
+        Experiment::Compaction => {
+            map = Some(compaction(lab)?);
+            Found::default()
+        }
         Experiment::Table1 => table_1(lab)?,
         Experiment::Index => index(lab)?,
         Experiment::Gather => gather(lab)?,
@@ -94,7 +107,7 @@ pub fn run(lab: &mut Lab, experiment: Experiment) -> Result<Results> {
         Experiment::Mesh => mesh(lab)?,
         Experiment::Effects => effects(lab)?,
     };
-    Ok(Results { findings: findings(lab, experiment, &found), passes })
+    Ok(Results { findings: findings(lab, experiment, &found), passes, compaction: map })
 }
 
 /// Passes, and for each target (found, limit, how).
@@ -152,6 +165,19 @@ fn builders(lab: &mut Lab) -> Result<Found> {
         ratios.push((ratio(atomic, naive), limit, format!("{photons} photons a round")));
     }
     Ok((passes, ratios))
+}
+
+/// Photons that make a pass worth timing on a card: as many as the largest target's sixteenfold.
+const MOST_COMPACTED: u32 = 1 << 28;
+
+fn compaction(lab: &mut Lab) -> Result<Map> {
+    let left = lab.deadline.saturating_duration_since(Instant::now());
+    let all = compaction::Request::up_to(lab.choose(1 << 12, 1 << 16, MOST_COMPACTED), left / 2);
+    let request = match lab.size {
+        Size::Small => compaction::Request { survivals: vec![0.25, 0.75], turns: 1, ..all },
+        Size::Full => all,
+    };
+    compaction::measure(lab.gpu, &request, lab.cancelled, lab.tell)
 }
 
 fn table_1(lab: &mut Lab) -> Result<Found> {

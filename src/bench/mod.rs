@@ -20,9 +20,11 @@ use std::time::{Duration, Instant};
 
 use serde::Serialize;
 
+use crate::compaction::{self, Map};
 use crate::error::{Error, Result};
 use crate::gpu::Gpu;
 use crate::output::destination::{Folder, write_all};
+use crate::study::chart::alone;
 use experiments::Experiment;
 use pass::Pass;
 use rates::Rates;
@@ -66,6 +68,8 @@ pub struct Bench {
     pub rates: Rates,
     pub passes: Vec<Pass>,
     pub targets: Vec<Finding>,
+    /// Who wins where among the builders of the paper's line.
+    pub compaction: Option<Map>,
     pub scale: Option<Scale>,
     /// What was not measured, and why.
     pub left_out: Vec<String>,
@@ -122,6 +126,7 @@ pub fn run(gpu: &Gpu, request: Request, cancelled: &AtomicBool, tell: &mut dyn F
         rates,
         passes: Vec::new(),
         targets: Vec::new(),
+        compaction: None,
         scale: None,
         left_out: Vec::new(),
         request,
@@ -149,6 +154,7 @@ fn measure(lab: &mut Lab, bench: &mut Bench) -> Result<()> {
             Ok(mut results) => {
                 bench.passes.append(&mut results.passes);
                 bench.targets.append(&mut results.findings);
+                bench.compaction = bench.compaction.take().or(results.compaction);
             }
             // What this device cannot do is no reason to end.
             Err(Error::Setting { option, value, allowed }) => {
@@ -171,6 +177,9 @@ impl Bench {
 /// Writes the report and its charts.
 pub fn write(folder: &Folder, bench: &Bench) -> Result<()> {
     let mut files = vec![(folder.file("bench.json"), bench.json()), (folder.file("bench.txt"), table::text(bench).into_bytes())];
+    if let Some(map) = &bench.compaction {
+        files.push((folder.file("compaction.svg"), alone(&compaction::chart::draw(map)).into_bytes()));
+    }
     if let Some(scale) = &bench.scale {
         files.extend(chart::all(scale).into_iter().map(|(name, drawn)| (folder.file(&name), drawn.into_bytes())));
     }

@@ -15,6 +15,9 @@ pub fn text(bench: &Bench) -> String {
     if !bench.targets.is_empty() {
         targets(&mut text, bench);
     }
+    if let Some(map) = &bench.compaction {
+        write!(text, "\n{}", map.text()).unwrap();
+    }
     if let Some(scale) = &bench.scale {
         for series in &scale.series {
             writeln!(text, "\n{:<14} {:>14} {:>16} {:>16}", series.over, "", "bytes taken", "bytes stated").unwrap();

@@ -16,7 +16,7 @@ use crate::output::destination::{Destination, Folder, write_all};
 
 #[derive(Args)]
 pub(super) struct BenchArgs {
-    /// Only these experiments, by name and separated by commas: open-box, builders, table-1, index, gather, cornell,
+    /// Only these experiments, by name and separated by commas: open-box, builders, compaction, table-1, index, gather, cornell,
     /// cornell-spheres, caustic-sphere, mesh, effects [default: all]
     #[arg(long, value_name = "NAME", value_delimiter = ',', value_parser = experiment)]
     only: Vec<Experiment>,

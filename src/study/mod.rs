@@ -19,6 +19,7 @@ use std::time::{Duration, Instant};
 
 use serde::Serialize;
 
+use crate::compaction;
 use crate::error::{Error, Result};
 use crate::gpu::Gpu;
 use crate::output::destination::{Folder, write_all};
@@ -60,6 +61,8 @@ pub struct Study {
     /// A software device, whose 'GPU' is the CPU.
     pub is_cpu: bool,
     pub parts: Vec<Part>,
+    /// Who wins where among the builders; of the open box alone.
+    pub compaction: Option<compaction::Map>,
     /// False if it was ended before its last point.
     pub complete: bool,
 }
@@ -98,6 +101,7 @@ pub fn run(
         driver: gpu.facts().driver.clone(),
         is_cpu: gpu.facts().kind == "cpu",
         parts: Vec::new(),
+        compaction: None,
         complete: false,
         request,
     };
@@ -125,6 +129,16 @@ pub fn run(
             if !whole {
                 return Ok(study);
             }
+        }
+    }
+    if subjects.iter().any(|subject| subject.is_of_paper()) {
+        let request = &study.request;
+        let most = request.photons.saturating_mul(request.most_rounds).min(MOST_COMPACTED);
+        let wanted = compaction::Request::up_to(most, request.budget / COMPACTION_SHARE);
+        match compaction::measure(gpu, &wanted, cancelled, tell) {
+            Ok(map) => study.compaction = Some(map),
+            Err(Error::Interrupted) => return Ok(study),
+            Err(error) => return Err(error),
         }
     }
     study.complete = true;
@@ -247,6 +261,10 @@ const FIRST_WARM_UP: Duration = Duration::from_secs(3);
 /// time, where that is longer.
 const PATIENCE: Duration = Duration::from_secs(5);
 
+/// Of the budget, for the map of builders, and most photons in it.
+const COMPACTION_SHARE: u32 = 8;
+const MOST_COMPACTED: u32 = 1 << 26;
+
 /// Most that [`Request::most_rounds`] may be.
 pub const MOST_ROUNDS: u32 = 1 << 20;
 
@@ -261,6 +279,9 @@ pub fn write(folder: &Folder, study: &Study) -> Result<()> {
         for (name, drawn) in chart::all(part) {
             files.push((folder.file(&format!("{}-{name}.svg", number + 1)), chart::alone(&drawn).into_bytes()));
         }
+    }
+    if let Some(map) = &study.compaction {
+        files.push((folder.file("compaction.svg"), chart::alone(&compaction::chart::draw(map)).into_bytes()));
     }
     write_all(files)
 }

@@ -5,6 +5,7 @@ use maud::{DOCTYPE, Markup, PreEscaped, html};
 use super::findings::{self, Row, clock, equal_error, equal_time, percent};
 use super::point::{Curve, Point};
 use super::{Part, Study, chart};
+use crate::compaction::{self, Map};
 use crate::output::words::{count, duration, number, times};
 
 pub fn html(study: &Study) -> String {
@@ -23,6 +24,9 @@ pub fn html(study: &Study) -> String {
                     (head(study))
                     @for part in &study.parts {
                         (of_part(part))
+                    }
+                    @if let Some(map) = &study.compaction {
+                        (of_builders(map))
                     }
                     (how(study))
                 }
@@ -51,6 +55,24 @@ fn head(study: &Study) -> Markup {
                 dd { (count(u64::from(request.photons))) ", where the configuration says nothing else" }
                 dt { "Runs of a point" }
                 dd { (request.repeats) ", with the seeds " (request.seed) " to " (request.seed + u64::from(request.repeats) - 1) }
+            }
+        }
+    }
+}
+
+fn of_builders(map: &Map) -> Markup {
+    html! {
+        section {
+            h2 { "Who wins where" }
+            p {
+                "Time to trace and store photons of " (map.bounces) " bounces in a closed room that lets a share of them go on at every wall. "
+                "In each field the fastest builder, how many times sooner it is done than with one atomic a thread, and, below, "
+                "who cannot be told from it. All builders stored the same photons."
+            }
+            figure { (PreEscaped(compaction::chart::draw(map))) }
+            details {
+                summary { "All times" }
+                pre { (map.text()) }
             }
         }
     }
