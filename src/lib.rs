@@ -69,7 +69,8 @@
 //! are its buffers ([`gpu::kernels`]), so that a dispatch names every buffer. Records stand in
 //! [`records`] and `glsl/records.glsl`; `tests/layout.rs` compares them. Numbers that both languages
 //! need stand in [`constants`] only. Every GLSL function of the paper's line has a Rust twin under
-//! [`cpu`]; that of triangles is judged by [`judge`].
+//! [`cpu`], but for the grid, in whose place [`cpu::splat`] comes to the same sums; that of triangles is judged by
+//! [`judge`].
 
 pub mod bake;
 pub mod bench;

@@ -1,5 +1,8 @@
 //! Random numbers of a photon, a function of (seed, round, photon, draw) alone, so that every
 //! builder, split and thread traces the same photons. Twin of `glsl/rng.glsl`.
+//!
+//! What a photon draws from is always inlined, so that it is compiled for the vectors of the loops that call it
+//! ([`crate::cpu::trace`]).
 
 use glam::UVec2;
 use serde::Serialize;
@@ -55,6 +58,7 @@ impl Affine48 {
     /// One step of drand48.
     pub const STEP: Affine48 = Affine48 { multiplier: 0x5_DEEC_E66D, increment: 0xB };
 
+    #[inline(always)]
     pub fn apply(self, state: u64) -> u64 {
         self.multiplier.wrapping_mul(state).wrapping_add(self.increment) & MASK48
     }
@@ -81,15 +85,18 @@ impl Affine48 {
 }
 
 /// Low 32 bits and high bits of a 48- or 64-bit number, as GLSL takes them.
+#[inline(always)]
 pub fn words(value: u64) -> UVec2 {
     UVec2::new(value as u32, (value >> 32) as u32)
 }
 
+#[inline(always)]
 fn from_words(words: UVec2) -> u64 {
     u64::from(words.x) | (u64::from(words.y) << 32)
 }
 
 /// The state one draw on.
+#[inline(always)]
 pub fn rand48_step(state: UVec2) -> UVec2 {
     words(Affine48::STEP.apply(from_words(state)))
 }
@@ -151,10 +158,12 @@ impl Streams {
     }
 }
 
+#[inline(always)]
 fn unit_float(bits24: u32) -> f32 {
     bits24 as f32 * (1.0 / 16_777_216.0)
 }
 
+#[inline(always)]
 fn rand48_next(state: &mut UVec2, key: &RandomKey) -> f32 {
     let u = unit_float((state.y << 8) | (state.x >> 24));
     let leap = Affine48 { multiplier: from_words(key.leap_multiplier), increment: from_words(key.leap_increment) };
@@ -162,6 +171,7 @@ fn rand48_next(state: &mut UVec2, key: &RandomKey) -> f32 {
     u
 }
 
+#[inline(always)]
 fn mix32(mut x: u32) -> u32 {
     x ^= x >> 16;
     x = x.wrapping_mul(0x7feb_352d);
@@ -170,16 +180,25 @@ fn mix32(mut x: u32) -> u32 {
     x ^ (x >> 16)
 }
 
+#[inline(always)]
 fn mt_word(previous: u32, index: u32) -> u32 {
     1_812_433_253u32.wrapping_mul(previous ^ (previous >> 30)).wrapping_add(index)
 }
 
-/// State of the twister that `init_genrand(seed)` starts.
-pub fn mt_open(seed: u32) -> UVec2 {
-    UVec2::new(seed, (1..=MT_MIDDLE).fold(seed, mt_word))
+/// States of the twisters that `init_genrand(seed)` starts: seeds, and their words `MT_MIDDLE`.
+#[inline(always)]
+pub fn mt_open<const N: usize>(seeds: [u32; N]) -> [[u32; N]; 2] {
+    let mut words = seeds;
+    for index in 1..=MT_MIDDLE {
+        for word in &mut words {
+            *word = mt_word(*word, index);
+        }
+    }
+    [seeds, words]
 }
 
 /// The 32-bit output number `draw` of the twister.
+#[inline(always)]
 pub fn mt_next_word(words: &mut UVec2, draw: u32) -> u32 {
     let next = mt_word(words.x, draw + 1);
     let mixed = (words.x & 0x8000_0000) | (next & 0x7fff_ffff);
@@ -193,6 +212,7 @@ pub fn mt_next_word(words: &mut UVec2, draw: u32) -> u32 {
 }
 
 /// Philox4x32-10.
+#[inline(always)]
 pub fn philox(mut counter: [u32; 4], mut key: [u32; 2]) -> [u32; 4] {
     for _ in 0..10 {
         let product0 = u64::from(counter[0]) * 0xd251_1f53;
@@ -208,32 +228,48 @@ pub fn philox(mut counter: [u32; 4], mut key: [u32; 2]) -> [u32; 4] {
     counter
 }
 
+#[inline(always)]
 fn philox_block(key: &RandomKey, photon: u32, block: u32) -> [f32; 4] {
     philox([photon, key.round, block, 0], [key.seed.x, key.seed.y]).map(|bits| unit_float(bits >> 8))
 }
 
-/// Point `index` of the Sobol' sequence as fractions of 2^32: the first four dimensions of Joe and Kuo
-/// (2008). Direction numbers follow from the recurrences of their polynomials, 1, x + 1, x^2 + x + 1
-/// and x^3 + x + 1; those of the next bit stand first.
-pub fn sobol(mut index: u32) -> [u32; 4] {
-    let mut point = [index.reverse_bits(), 0, 0, 0];
+/// Direction numbers of the first four dimensions of Joe and Kuo (2008), bit by bit of the index. They follow from the
+/// recurrences of their polynomials, 1, x + 1, x^2 + x + 1 and x^3 + x + 1.
+const SOBOL_DIRECTIONS: [[u32; 4]; 32] = {
+    let mut directions = [[0; 4]; 32];
     let mut second = 0x8000_0000u32;
     let mut third = [0x8000_0000u32, 0xc000_0000];
     let mut fourth = [0x8000_0000u32, 0xc000_0000, 0x2000_0000];
-    while index != 0 {
-        if index & 1 == 1 {
-            point = [point[0], point[1] ^ second, point[2] ^ third[0], point[3] ^ fourth[0]];
-        }
+    let mut bit = 0;
+    while bit < 32 {
+        directions[bit] = [1 << (31 - bit), second, third[0], fourth[0]];
         second ^= second >> 1;
         third = [third[1], third[1] ^ third[0] ^ (third[0] >> 2)];
         fourth = [fourth[1], fourth[2], fourth[1] ^ fourth[0] ^ (fourth[0] >> 3)];
-        index >>= 1;
+        bit += 1;
     }
-    point
+    directions
+};
+
+/// Points of the Sobol' sequence, dimension by dimension, as fractions of 2^32.
+#[inline(always)]
+pub fn sobol<const N: usize>(indices: [u32; N]) -> [[u32; N]; 4] {
+    let mut points = [[0; N]; 4];
+    for (bit, directions) in SOBOL_DIRECTIONS.iter().enumerate() {
+        // All ones where the bit is set: no branch that random bits would mislead.
+        let taken = indices.map(|index| ((index >> bit) & 1).wrapping_neg());
+        for (words, direction) in points.iter_mut().zip(directions) {
+            for lane in 0..N {
+                words[lane] ^= direction & taken[lane];
+            }
+        }
+    }
+    points
 }
 
 /// Owen's scrambling by a hash (Burley 2020, listing 3): each bit is flipped or not by the bits above
 /// it and the seed. Of an index, it shuffles every aligned block of 2^k among such blocks.
+#[inline(always)]
 pub fn owen_scramble(x: u32, seed: u32) -> u32 {
     let mut x = x.reverse_bits().wrapping_add(seed);
     for factor in [0x6c50_b47cu32, 0xb82f_1e52, 0xc7af_e638, 0x8d22_f6e6] {
@@ -242,51 +278,107 @@ pub fn owen_scramble(x: u32, seed: u32) -> u32 {
     x.reverse_bits()
 }
 
-/// Four dimensions of a light's sample: shuffled and scrambled by block, so that no two blocks are alike.
-fn sobol_block(stream: UVec2, block: u32) -> [f32; 4] {
-    let UVec2 { x: sample, y: light_key } = stream;
-    let seed = mix32(light_key.wrapping_add(block));
-    let point = sobol(owen_scramble(sample, seed));
-    std::array::from_fn(|k| unit_float(owen_scramble(point[k], mix32(seed.wrapping_add(k as u32 + 1))) >> 8))
+/// Four dimensions of samples of a light: shuffled and scrambled by block, so that no two blocks are alike.
+#[inline(always)]
+fn sobol_block<const N: usize>([samples, light_keys]: &[[u32; N]; 2], block: u32) -> [[f32; N]; 4] {
+    let mut seeds = [0; N];
+    let mut indices = [0; N];
+    for lane in 0..N {
+        seeds[lane] = mix32(light_keys[lane].wrapping_add(block));
+        indices[lane] = owen_scramble(samples[lane], seeds[lane]);
+    }
+    let points = sobol(indices);
+    let mut u = [[0.0; N]; 4];
+    for (k, (u, words)) in u.iter_mut().zip(&points).enumerate() {
+        for lane in 0..N {
+            u[lane] = unit_float(owen_scramble(words[lane], mix32(seeds[lane].wrapping_add(k as u32 + 1))) >> 8);
+        }
+    }
+    u
 }
 
-/// Opens a photon's stream from its `start`: the first state of rand48, or for Sobol' points its number
+/// Opens the streams of some photons from their starts: the first states of rand48, or for Sobol' points their numbers
 /// among the light's photons of the run, and the light. The others need none.
-pub fn open_stream(rng: Rng, key: &RandomKey, photon: u32, start: UVec2) -> UVec2 {
-    let run = || mix32(key.seed.x.wrapping_add(mix32(key.seed.y)));
+#[inline(always)]
+pub fn open_streams<const N: usize>(rng: Rng, key: &RandomKey, photons: &[u32; N], starts: [[u32; N]; 2]) -> [[u32; N]; 2] {
+    let run = mix32(key.seed.x.wrapping_add(mix32(key.seed.y)));
     match rng {
-        Rng::Rand48 => start,
-        Rng::Mt => mt_open(mix32(key.photons_before.wrapping_add(photon).wrapping_add(run()))),
-        Rng::Philox => UVec2::ZERO,
-        Rng::Sobol => UVec2::new(start.x, mix32(run().wrapping_add(start.y))),
+        Rng::Rand48 => starts,
+        Rng::Mt => mt_open(photons.map(|photon| mix32(key.photons_before.wrapping_add(photon).wrapping_add(run)))),
+        Rng::Philox => [[0; N]; 2],
+        Rng::Sobol => [starts[0], starts[1].map(|light| mix32(run.wrapping_add(light)))],
     }
+}
+
+/// Their numbers of a block, which Philox and Sobol' points have for each emission and bounce, or from number `first`
+/// on: as many dimensions as are asked for.
+#[inline(always)]
+fn draw<const N: usize, const DRAWS: usize>(
+    rng: Rng,
+    key: &RandomKey,
+    photons: &[u32; N],
+    (block, first): (u32, u32),
+    streams: &mut [[u32; N]; 2],
+) -> [[f32; N]; DRAWS] {
+    let mut u = [[0.0; N]; DRAWS];
+    if rng == Rng::Sobol {
+        let drawn = sobol_block(streams, block);
+        u.copy_from_slice(&drawn[..DRAWS]);
+        return u;
+    }
+    for lane in 0..N {
+        let mut stream = UVec2::new(streams[0][lane], streams[1][lane]);
+        let drawn: [f32; DRAWS] = match rng {
+            Rng::Rand48 => std::array::from_fn(|_| rand48_next(&mut stream, key)),
+            Rng::Mt => std::array::from_fn(|k| unit_float(mt_next_word(&mut stream, first + k as u32) >> 8)),
+            Rng::Philox | Rng::Sobol => {
+                let drawn = philox_block(key, photons[lane], block);
+                std::array::from_fn(|k| drawn[k])
+            }
+        };
+        (streams[0][lane], streams[1][lane]) = (stream.x, stream.y);
+        (0..DRAWS).for_each(|k| u[k][lane] = drawn[k]);
+    }
+    u
 }
 
 /// Emission: disc radius, disc angle, cosine, azimuth.
-pub fn draw_emission(rng: Rng, key: &RandomKey, photon: u32, stream: &mut UVec2) -> [f32; 4] {
-    match rng {
-        Rng::Rand48 => std::array::from_fn(|_| rand48_next(stream, key)),
-        Rng::Mt => std::array::from_fn(|draw| unit_float(mt_next_word(stream, draw as u32) >> 8)),
-        Rng::Philox => philox_block(key, photon, 0),
-        Rng::Sobol => sobol_block(*stream, 0),
-    }
+#[inline(always)]
+pub fn draw_emissions<const N: usize>(rng: Rng, key: &RandomKey, photons: &[u32; N], streams: &mut [[u32; N]; 2]) -> [[f32; N]; 4] {
+    draw(rng, key, photons, (0, 0), streams)
 }
 
 /// Bounce: roulette, cosine, azimuth.
+#[inline(always)]
+pub fn draw_bounces<const N: usize>(
+    rng: Rng,
+    key: &RandomKey,
+    photons: &[u32; N],
+    bounce: u32,
+    streams: &mut [[u32; N]; 2],
+) -> [[f32; N]; 3] {
+    draw(rng, key, photons, (bounce + 1, EMISSION_DRAWS + BOUNCE_DRAWS * bounce), streams)
+}
+
+/// [`open_streams`] of one photon.
+pub fn open_stream(rng: Rng, key: &RandomKey, photon: u32, start: UVec2) -> UVec2 {
+    open_streams(rng, key, &[photon], start.to_array().map(|word| [word])).map(|[word]| word).into()
+}
+
+/// [`draw_emissions`] of one photon.
+pub fn draw_emission(rng: Rng, key: &RandomKey, photon: u32, stream: &mut UVec2) -> [f32; 4] {
+    let mut streams = stream.to_array().map(|word| [word]);
+    let u = draw_emissions(rng, key, &[photon], &mut streams);
+    *stream = streams.map(|[word]| word).into();
+    u.map(|[u]| u)
+}
+
+/// [`draw_bounces`] of one photon.
 pub fn draw_bounce(rng: Rng, key: &RandomKey, photon: u32, bounce: u32, stream: &mut UVec2) -> [f32; 3] {
-    let first = EMISSION_DRAWS + BOUNCE_DRAWS * bounce;
-    match rng {
-        Rng::Rand48 => std::array::from_fn(|_| rand48_next(stream, key)),
-        Rng::Mt => std::array::from_fn(|draw| unit_float(mt_next_word(stream, first + draw as u32) >> 8)),
-        Rng::Philox => {
-            let [roulette, cosine, azimuth, _] = philox_block(key, photon, bounce + 1);
-            [roulette, cosine, azimuth]
-        }
-        Rng::Sobol => {
-            let [roulette, cosine, azimuth, _] = sobol_block(*stream, bounce + 1);
-            [roulette, cosine, azimuth]
-        }
-    }
+    let mut streams = stream.to_array().map(|word| [word]);
+    let u = draw_bounces(rng, key, &[photon], bounce, &mut streams);
+    *stream = streams.map(|[word]| word).into();
+    u.map(|[u]| u)
 }
 
 #[cfg(test)]
@@ -343,7 +435,8 @@ mod tests {
         for i in 1..624 {
             reference[i] = mt_word(reference[i - 1], i as u32);
         }
-        let mut stream = mt_open(5489);
+        let [[seed], [middle]] = mt_open([5489]);
+        let mut stream = UVec2::new(seed, middle);
         let outputs: Vec<u32> = (0..227).map(|draw| mt_next_word(&mut stream, draw)).collect();
         assert_eq!(outputs[..5], [3_499_211_612, 581_869_302, 3_890_346_734, 3_586_334_585, 545_404_204]);
         assert_eq!(stream.x, reference[227]);
@@ -360,7 +453,8 @@ mod tests {
     /// Direction numbers as Joe and Kuo's generator prints them, from new-joe-kuo-6.21201.
     #[test]
     fn sobol_gives_the_published_direction_numbers() {
-        let of_bit = |bit: u32| sobol(1 << bit).map(|word| word >> 24);
+        let point = |index: u32| sobol([index]).map(|[word]| word);
+        let of_bit = |bit: u32| point(1 << bit).map(|word| word >> 24);
         let expected = [
             [0x80, 0x80, 0x80, 0x80],
             [0x40, 0xc0, 0xc0, 0xc0],
@@ -370,7 +464,7 @@ mod tests {
             [0x04, 0xcc, 0x5c, 0x74],
         ];
         assert_eq!([0, 1, 2, 3, 4, 5].map(of_bit), expected);
-        assert_eq!(sobol(0b101), std::array::from_fn(|k| sobol(1)[k] ^ sobol(4)[k]));
+        assert_eq!(point(0b101), std::array::from_fn(|k| point(1)[k] ^ point(4)[k]));
     }
 
     #[test]

@@ -59,8 +59,9 @@ pub(super) struct RunArgs {
     /// 5000 photons of a round; 10 for every 5000 with --preset rounds]
     #[arg(long, value_parser = number::<f64>, allow_negative_numbers = true, help_heading = "Estimate")]
     full_light: Option<f64>,
-    /// How photons near a point are found: step through all, look into a sorted grid, or walk down a
-    /// kd-tree; the result is the same to the bit [default: grid]
+    /// How photons near a point are found: step through all, look into a sorted grid (the CPU builder
+    /// hands photons to the grid of texels), or walk down a kd-tree; the result is the same to the bit
+    /// [default: grid]
     #[arg(long, value_enum, help_heading = "Estimate")]
     gather: Option<GatherArg>,
     /// Estimate with the K photons nearest to a point, 2 to 1024 of each round, none farther than the

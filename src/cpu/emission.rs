@@ -7,6 +7,7 @@ use crate::records::{DiscLight, Wall};
 use crate::settings::EmissionLaw;
 
 /// Position and direction of a photon; `u`: disc radius, disc angle, cosine, azimuth.
+#[inline(always)]
 pub fn emit_from_disc(light: &DiscLight, wall: &Wall, law: EmissionLaw, u: [f32; 4]) -> (Vec3, Vec3) {
     let sin_cos = sin_cos_turns(u[1]);
     let distance_from_centre = light.radius * u[0].sqrt();
@@ -16,5 +17,5 @@ pub fn emit_from_disc(light: &DiscLight, wall: &Wall, law: EmissionLaw, u: [f32;
         EmissionLaw::Cosine => sample_cosine_hemisphere(u[2], u[3]),
         EmissionLaw::Uniform => sample_uniform_hemisphere(u[2], u[3]),
     };
-    (position, to_world(local, wall))
+    (position, to_world(local, [wall.tangent, wall.bitangent, wall.normal]))
 }

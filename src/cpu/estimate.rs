@@ -1,8 +1,8 @@
 //! Density estimation on the CPU. Twin of `glsl/stages/estimate.glsl`.
 
+use glam::Vec3;
 use rayon::prelude::*;
 
-use super::index::Index;
 use super::tree::Tree;
 use crate::plan::Plan;
 use crate::records::{Photon, Point, SortedPhoton};
@@ -15,11 +15,6 @@ pub fn gather_brute(plan: &Plan, photons: &[Photon], sums: &mut [u64]) {
         .map(|photon| SortedPhoton { position: photon.position, wall: photon.wall, flux: photon.flux, weight: photon.weight })
         .collect();
     gather(plan, sums, |_| std::iter::once(list.as_slice()));
-}
-
-/// The same from the grid cells in reach of each point.
-pub fn gather_grid(plan: &Plan, index: &Index, sums: &mut [u64]) {
-    gather(plan, sums, |point| index.runs(point.position));
 }
 
 /// The same from the leaves of a kd-tree in reach of each point.
@@ -57,7 +52,7 @@ where
 }
 
 fn within_radius(point: &Point, photon: &SortedPhoton, radius_squared: f32) -> bool {
-    squared_distance(point, photon) <= radius_squared
+    squared_distance(point, photon.position) <= radius_squared
 }
 
 /// Adds to one film sum. `scale` is a power of two, so that the product is exact.
@@ -83,11 +78,13 @@ fn add_compensated([sum, lost]: [f32; 2], value: f32) -> [f32; 2] {
     [total, rest - (total - rounded)]
 }
 
-pub(super) fn squared_distance(point: &Point, photon: &SortedPhoton) -> f32 {
-    let offset = photon.position - point.position;
+#[inline(always)]
+pub(super) fn squared_distance(point: &Point, position: Vec3) -> f32 {
+    let offset = position - point.position;
     offset.x * offset.x + offset.y * offset.y + offset.z * offset.z
 }
 
+#[inline(always)]
 pub(super) fn to_fixed_point(value: f32, scale: f32) -> u64 {
     (value * scale).round_ties_even() as u64
 }

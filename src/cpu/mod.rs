@@ -1,14 +1,15 @@
 //! The builder that the paper calls the CPU implementation: the modified algorithm, on one thread as
 //! in the paper or on many, with the same stages as on the GPU. Its functions are the twins of the
-//! GLSL ones, operation by operation in f32, and judge them in tests.
+//! GLSL ones, operation by operation in f32, and judge them in tests. Two stages go their own way to the same
+//! bits: [`trace`] takes a block of photons from emission to their end, and [`splat`] needs no index.
 
 pub mod bsdf;
 pub mod emission;
 pub mod estimate;
-pub mod index;
 pub mod math;
 pub mod nearest;
 pub mod room;
 pub mod sampling;
+pub mod splat;
 pub mod trace;
 pub mod tree;

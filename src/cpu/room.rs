@@ -1,6 +1,6 @@
 //! Where a path leaves a convex room. Twin of `glsl/room.glsl`, which explains it.
 
-use glam::Vec3;
+use glam::{BVec3, Vec3};
 
 use crate::records::Room;
 
@@ -10,21 +10,31 @@ pub struct Hit {
     pub wall: u32,
 }
 
+/// Without a branch or an index that depends on the path, so that loops over paths become vectors.
+#[inline(always)]
 pub fn intersect_room(room: &Room, position: Vec3, direction: Vec3, on_wall: u32) -> Hit {
-    let mut distances = [f32::INFINITY; 3];
-    for axis in 0..3 {
-        let d = direction[axis];
-        let plane = if d > 0.0 { room.max_corner[axis] } else { room.min_corner[axis] };
-        let leaves_own_wall = on_wall == 2 * axis as u32 + u32::from(d > 0.0);
-        if d != 0.0 && !leaves_own_wall {
-            distances[axis] = (plane - position[axis]) / d;
-        }
-    }
-    let axis = if distances[1] < distances[0] { 1 } else { 0 };
-    let axis = if distances[2] < distances[axis] { 2 } else { axis };
-    let positive = direction[axis] > 0.0;
+    let forward = direction.cmpgt(Vec3::ZERO);
+    let planes = Vec3::select(forward, room.max_corner, room.min_corner);
+    let [x, y, z] = [u32::from(forward.x), 2 + u32::from(forward.y), 4 + u32::from(forward.z)];
+    let leaves_own_wall = BVec3::new(on_wall == x, on_wall == y, on_wall == z);
+    let meets = direction.cmpne(Vec3::ZERO) & !leaves_own_wall;
+    let distances = Vec3::select(meets, (planes - position) / direction, Vec3::INFINITY);
 
-    let mut end = (position + distances[axis] * direction).max(room.min_corner).min(room.max_corner);
-    end[axis] = if positive { room.max_corner[axis] } else { room.min_corner[axis] };
-    Hit { position: end, wall: 2 * axis as u32 + u32::from(positive) }
+    let y_is_nearer = distances.y < distances.x;
+    let (nearest, wall) = if y_is_nearer { (distances.y, y) } else { (distances.x, x) };
+    let z_is_nearest = distances.z < nearest;
+    let (nearest, wall) = if z_is_nearest { (distances.z, z) } else { (nearest, wall) };
+
+    let end = (position + nearest * direction).max(room.min_corner).min(room.max_corner);
+    let on_plane = BVec3::new(!y_is_nearer & !z_is_nearest, y_is_nearer & !z_is_nearest, z_is_nearest);
+    Hit { position: Vec3::select(on_plane, planes, end), wall }
+}
+
+/// Tangent, bitangent and normal of a wall, into the room: the two axes after its own, and that.
+#[inline(always)]
+pub fn wall_frame(wall: u32) -> [Vec3; 3] {
+    let is_own = [wall / 2 == 0, wall / 2 == 1, wall / 2 == 2].map(|own| if own { 1.0 } else { 0.0 });
+    let [x, y, z] = is_own;
+    let inward = if wall % 2 == 1 { -1.0 } else { 1.0 };
+    [Vec3::new(z, x, y), Vec3::new(y, z, x), Vec3::new(x, y, z) * inward]
 }

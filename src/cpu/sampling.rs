@@ -2,9 +2,8 @@
 
 use glam::{Vec2, Vec3};
 
-use crate::records::Wall;
-
 /// (sin, cos) of `turns` full turns, turns in [0, 1).
+#[inline(always)]
 pub fn sin_cos_turns(turns: f32) -> Vec2 {
     let quarter = (4.0 * turns).round_ties_even();
     let z = std::f32::consts::TAU * (turns - 0.25 * quarter);
@@ -16,6 +15,7 @@ pub fn sin_cos_turns(turns: f32) -> Vec2 {
     if quadrant & 2 == 0 { rotated } else { -rotated }
 }
 
+#[inline(always)]
 fn direction_at(cosine: f32, sine_squared: f32, azimuth: f32) -> Vec3 {
     let sin_cos = sin_cos_turns(azimuth);
     let sine = sine_squared.max(0.0).sqrt();
@@ -26,18 +26,21 @@ fn direction_at(cosine: f32, sine_squared: f32, azimuth: f32) -> Vec3 {
 const LEAST: f32 = 1.0 / 33_554_432.0;
 
 /// pdf = cosine / pi.
+#[inline(always)]
 pub fn sample_cosine_hemisphere(u: f32, azimuth: f32) -> Vec3 {
     let u = u.max(LEAST);
     direction_at(u.sqrt(), 1.0 - u, azimuth)
 }
 
 /// pdf = 1 / (2 pi).
+#[inline(always)]
 pub fn sample_uniform_hemisphere(u: f32, azimuth: f32) -> Vec3 {
     let u = u.max(LEAST);
     direction_at(u, (1.0 - u) * (1.0 + u), azimuth)
 }
 
-/// From a wall's frame to world axes.
-pub fn to_world(local: Vec3, wall: &Wall) -> Vec3 {
-    local.x * wall.tangent + local.y * wall.bitangent + local.z * wall.normal
+/// From the frame of a wall (tangent, bitangent, normal) to world axes.
+#[inline(always)]
+pub fn to_world(local: Vec3, [tangent, bitangent, normal]: [Vec3; 3]) -> Vec3 {
+    local.x * tangent + local.y * bitangent + local.z * normal
 }

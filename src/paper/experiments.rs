@@ -200,12 +200,15 @@ pub fn running_times(bench: &mut Bench, found: &mut Reproduction) -> Step<()> {
 
 /// `None` on a device without timestamps: passes inside a submission are not seen by the host.
 fn running_time(case: &Case, pass: Pass, outcomes: &[Outcome], command: &str) -> Option<RunningTime> {
-    let scopes: &[&str] = match (pass, case.gather) {
-        (Pass::Map, _) => &["round/build"],
-        (Pass::Rendering, Gather::Brute) => &["round/gather"],
-        (Pass::Rendering, Gather::Grid | Gather::KdTree) => &["round/index", "round/gather"],
+    let scopes: &[&str] = match pass {
+        Pass::Map => &["round/build"],
+        Pass::Rendering => &["round/index", "round/gather"],
     };
-    let sum = |outcome: &Outcome| scopes.iter().map(|scope| outcome.timings.best_ms(scope)).sum::<Option<f64>>();
+    // Brute force has no index, nor has the CPU builder's splatting.
+    let has_run = |outcome: &Outcome, scope: &str| outcome.timings.row(scope).is_some();
+    let sum = |outcome: &Outcome| {
+        scopes.iter().filter(|scope| has_run(outcome, scope)).map(|scope| outcome.timings.best_ms(scope)).sum::<Option<f64>>()
+    };
     let first = outcomes.first()?;
     Some(RunningTime {
         photons: case.photons,

@@ -2,21 +2,22 @@
 
 use std::time::Instant;
 
+use pulp::Arch;
 use rayon::{ThreadPool, ThreadPoolBuilder};
 
 use super::book::Book;
 use super::stop::End;
 use super::{Control, Outcome, Replayed};
-use crate::cpu::trace::Tracer;
-use crate::cpu::{estimate, index::Index, nearest, tree::Tree};
+use crate::cpu::trace::{Block, Tracer};
+use crate::cpu::{estimate, nearest, splat::Splats, tree::Tree};
 use crate::error::{Error, Result};
 use crate::film::Film;
 use crate::ledger::fate;
 use crate::oddities::{Oddities, What};
 use crate::plan::{EmissionRange, Limits, Plan, photons_of};
-use crate::records::{Path, Photon, Tally};
+use crate::records::{Photon, Tally};
 use crate::scene::room::RoomScene;
-use crate::settings::{Settings, Variant};
+use crate::settings::{Gather, Settings, Sums, Variant};
 use crate::timings::HostClock;
 
 /// Runs on the CPU, on `settings.threads` threads.
@@ -32,28 +33,26 @@ pub fn on_cpu(scene: &RoomScene, settings: &Settings, control: &mut Control) -> 
     let mut book = Book::new(&plan, control, started);
     let mut oddities = Oddities::default();
     let last_chunk = plan.chunks_per_round as usize - 1;
+    let mut splats = adds_by_splatting(&plan).then(|| pool.install(|| Splats::new(&plan, Arch::new())));
+    let mut blocks = Vec::new();
     for round in 0..settings.rounds {
         clock.time("round", |clock| {
             for (chunk, ranges) in plan.chunks().enumerate() {
-                let (photons, tallies) = clock.time("build", |clock| trace(&pool, &tracer, &plan, round, &ranges, clock, &mut oddities));
-                if plan.gathers_by_grid() {
-                    let index = clock.time("index", |_| Index::build(plan.grid, &photons));
-                    clock.time("gather", |_| pool.install(|| estimate::gather_grid(&plan, &index, &mut sums)));
-                } else if plan.gathers_by_tree() {
-                    let tree = clock.time("index", |_| Tree::build(&photons));
-                    clock.time("gather", |_| {
-                        pool.install(|| match settings.nearest {
-                            Some(count) => nearest::gather(&plan, scene, &tree, count, &mut sums),
-                            None => estimate::gather_tree(&plan, &tree, &mut sums),
-                        });
-                    });
-                } else {
-                    clock.time("gather", |_| pool.install(|| estimate::gather_brute(&plan, &photons, &mut sums)));
+                let tallies = clock.time("build", |_| {
+                    pool.install(|| tracer.trace(round, &ranges, &mut blocks));
+                    tallies_of(&blocks, round, &plan, &mut oddities)
+                });
+                match &mut splats {
+                    Some(splats) => clock.time("gather", |_| pool.install(|| splats.add(&blocks))),
+                    None => gather(&pool, scene, &plan, &photons_of_blocks(&blocks), &mut sums, clock),
                 }
                 book.emitted += u64::from(photons_of(&ranges));
                 film.emitted = book.emitted;
                 if chunk == last_chunk {
-                    clock.time("film", |_| film.end_round(&mut sums));
+                    clock.time("film", |_| {
+                        splats.iter_mut().for_each(|splats| pool.install(|| splats.flush(&mut sums)));
+                        film.end_round(&mut sums);
+                    });
                     book.rounds += 1;
                     if book.wants_film() {
                         book.look(&film, scene, &plan);
@@ -70,6 +69,7 @@ pub fn on_cpu(scene: &RoomScene, settings: &Settings, control: &mut Control) -> 
         }
     }
     if !book.is_whole() {
+        splats.iter_mut().for_each(|splats| pool.install(|| splats.flush(&mut sums)));
         film.add_unfinished(sums);
     }
     let end = book.end.unwrap_or(End::Rounds);
@@ -88,14 +88,24 @@ pub fn on_cpu(scene: &RoomScene, settings: &Settings, control: &mut Control) -> 
     })
 }
 
-/// Notes what no path and no photon may hold.
-fn look_at(paths: &[Path], photons: &[Photon], round: u32, oddities: &mut Oddities) {
-    let odd_paths = paths.iter().filter(|path| !(path.position.is_finite() && path.direction.is_finite() && path.flux.is_finite()));
-    let odd_photons =
-        photons.iter().filter(|photon| !(photon.position.is_finite() && photon.weight.is_finite() && photon.flux.is_finite()));
-    for photon in odd_paths.map(|path| path.photon).chain(odd_photons.map(|photon| photon.photon)) {
-        oddities.add(What::Photon, round, photon);
+/// Adds to `sums` what each point receives, point by point.
+fn gather(pool: &ThreadPool, scene: &RoomScene, plan: &Plan, photons: &[Photon], sums: &mut [u64], clock: &mut HostClock) {
+    if plan.settings.gather == Gather::Brute {
+        return clock.time("gather", |_| pool.install(|| estimate::gather_brute(plan, photons, sums)));
     }
+    let tree = clock.time("index", |_| Tree::build(photons));
+    clock.time("gather", |_| {
+        pool.install(|| match plan.settings.nearest {
+            Some(count) => nearest::gather(plan, scene, &tree, count, sums),
+            None => estimate::gather_tree(plan, &tree, sums),
+        });
+    });
+}
+
+/// Integers come to the same whichever way they are added. Floats are added one by one, since that is what they are
+/// asked for.
+fn adds_by_splatting(plan: &Plan) -> bool {
+    plan.gathers_by_grid() && plan.settings.sums == Sums::Integer
 }
 
 fn plan(scene: &RoomScene, settings: &Settings) -> Result<Plan> {
@@ -111,32 +121,23 @@ fn thread_pool(settings: &Settings) -> Result<ThreadPool> {
         .map_err(|error| Error::setting("--threads", threads, format!("cannot be started ({error}); ask for fewer")))
 }
 
-/// Photons of a chunk and the fates of its paths, bounce by bounce.
-fn trace(
-    pool: &ThreadPool,
-    tracer: &Tracer,
-    plan: &Plan,
-    round: u32,
-    ranges: &[EmissionRange],
-    clock: &mut HostClock,
-    oddities: &mut Oddities,
-) -> (Vec<Photon>, Vec<Tally>) {
-    let mut paths = clock.time("emit", |_| tracer.emit(round, ranges));
-    if plan.settings.paranoid {
-        look_at(&paths, &[], round, oddities);
-    }
-    let mut photons = Vec::new();
-    let mut tallies = Vec::new();
-    for bounce in 0..plan.settings.bounces {
-        let bounced = clock.time(&format!("bounce {}", bounce + 1), |_| pool.install(|| tracer.bounce(&paths, round, bounce)));
-        if plan.settings.paranoid {
-            look_at(&bounced.paths, &bounced.photons, round, oddities);
+/// Fates bounce by bounce. What `--paranoid` found is noted.
+fn tallies_of(blocks: &[Block], round: u32, plan: &Plan, oddities: &mut Oddities) -> Vec<Tally> {
+    let mut sums = vec![Tally::default(); plan.settings.bounces as usize];
+    for block in blocks {
+        for (sum, tally) in sums.iter_mut().zip(&block.tallies) {
+            sum.stored += tally.stored;
+            sum.absorbed += tally.absorbed;
+            sum.escaped += tally.escaped;
+            sum.dropped += tally.dropped;
         }
-        photons.extend(bounced.photons);
-        tallies.push(bounced.tally);
-        paths = bounced.paths;
+        block.odd.iter().for_each(|photon| oddities.add(What::Photon, round, *photon));
     }
-    (photons, tallies)
+    sums
+}
+
+fn photons_of_blocks(blocks: &[Block]) -> Vec<Photon> {
+    blocks.iter().flat_map(|block| block.photons.iter().copied()).collect()
 }
 
 /// One photon by itself.
@@ -146,15 +147,22 @@ pub fn replay_on_cpu(scene: &RoomScene, settings: &Settings, round: u32, photon:
     let ranges = [plan.range_of(round, photon)?];
     let start = tracer.emit(round, &ranges)[0];
     let mut oddities = Oddities::default();
-    let (stored, tallies) = trace(&thread_pool(settings)?, &tracer, &plan, round, &ranges, &mut HostClock::start("run"), &mut oddities);
+    let mut blocks = Vec::new();
+    tracer.trace(round, &ranges, &mut blocks);
+    let tallies = tallies_of(&blocks, round, &plan, &mut oddities);
+    let stored = photons_of_blocks(&blocks);
     Ok(Replayed { start, stored, fate: fate(&tallies), oddities: settings.paranoid.then_some(oddities) })
 }
 
 /// The photon map of round 0, for comparing builders.
 pub fn photons_on_cpu(scene: &RoomScene, settings: &Settings) -> Result<Vec<Photon>> {
-    let mut clock = HostClock::start("run");
     let plan = plan(scene, settings)?;
     let pool = thread_pool(settings)?;
     let tracer = Tracer::new(scene, &plan);
-    Ok(plan.chunks().flat_map(|ranges| trace(&pool, &tracer, &plan, 0, &ranges, &mut clock, &mut Oddities::default()).0).collect())
+    let mut blocks = Vec::new();
+    let of_chunk = |ranges: Vec<EmissionRange>| {
+        pool.install(|| tracer.trace(0, &ranges, &mut blocks));
+        photons_of_blocks(&blocks)
+    };
+    Ok(plan.chunks().flat_map(of_chunk).collect())
 }

@@ -10,22 +10,24 @@ from peers.run import Run, clocked
 
 # Everything that decides how fast and how right photonmill is, and what the report says of it. The radius shrinks with
 # the fifth root of the number of photons: squared bias is that of a strip along the edges, where light changes fastest
-# (radius^3), and so falls together with the variance (1 / (photons radius^2)); 0.03 m at 10^6 photons was the best of
-# 0.02, 0.03 and 0.05.
+# (radius^3), and so falls together with the variance (1 / (photons radius^2)).
 FIRST_PHOTONS = 62_500
-SETTINGS = "--variant cpu --rounds 1 --radius 0.03 (N / 10^6)^(-1/5), all else by default"
+ROUND_PHOTONS = 500_000
+SETTINGS = f"--variant cpu --rng sobol, {ROUND_PHOTONS} photons a round at most, --radius 0.025 (N / 5 10^6)^(-1/5), all else by default"
 
 
 def radius(photons):
-    return 0.03 * (photons / 1e6) ** (-1 / 5)
+    return 0.025 * (photons / 5e6) ** (-1 / 5)
 
 
 def options(photons):
-    return ["--variant", "cpu", "--photons", photons, "--rounds", 1, "--radius", f"{radius(photons):.5f}"]
+    rounds = max(1, photons // ROUND_PHOTONS)
+    chosen = ["--variant", "cpu", "--rng", "sobol", "--photons", photons // rounds, "--rounds", rounds]
+    return [*chosen, "--radius", f"{radius(photons):.5f}"]
 
 
 # Parts of a run and what photonmill's report calls them.
-PARTS = {"tracing": "round/build", "index": "round/index", "gather": "round/gather"}
+PARTS = {"tracing": "round/build", "gather": "round/gather"}
 
 
 class Photonmill:
