@@ -131,7 +131,7 @@ pub fn run(
             }
         }
     }
-    if subjects.iter().any(|subject| subject.is_of_paper()) {
+    if subjects.iter().any(Subject::is_of_paper) {
         let request = &study.request;
         let most = request.photons.saturating_mul(request.most_rounds).min(MOST_COMPACTED);
         let wanted = compaction::Request::up_to(most, request.budget / COMPACTION_SHARE);
