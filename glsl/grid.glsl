@@ -1,5 +1,5 @@
 // The uniform grid that sorts photons: cells numbered along x first, so that the cells of one row
-// that a query touches hold one run of the sorted photons. Twin of src/cpu/index.rs.
+// that a query touches hold one run of the sorted photons.
 
 // Monotone in `position`, for any rounding: a photon between two positions lies in a cell between
 // theirs. That is why a query that walks from cell_of(p - reach) to cell_of(p + reach) misses none.

@@ -118,6 +118,11 @@ struct DispatchSizePush {
     uint max_groups;
 };
 
+struct CrowdSizePush {
+    uint items_per_group;
+    uint max_groups;
+};
+
 struct IndexPush {
     vec3 origin;
     float cells_per_metre;

@@ -148,6 +148,8 @@ constants! {
     /// log2 of the most by which the flux of the nearest photons is scaled up to the full radius: their disc is
     /// taken for 1 / 1024 of the radius at least, and one in a corner loses three quarters.
     NEAREST_GAIN_BITS = 22;
+    /// Work groups along an axis that every device allows.
+    MAX_GROUPS = 65_535;
     /// Bounces whose fates a work group counts in its own memory.
     GROUP_TALLIES = 32;
     /// Items that one invocation of the prefix sum handles.

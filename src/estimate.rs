@@ -2,7 +2,7 @@
 
 pub mod tree;
 
-use crate::constants::GATHER_SLICE;
+use crate::constants::{GATHER_SLICE, MAX_GROUPS};
 use crate::error::{Error, Result};
 use crate::gpu::kernels::{CandidateCount, EndRound, GatherBruteTwoWords, GatherBruteU64, GatherGridTwoWords, GatherGridU64, SliceCount};
 use crate::gpu::{Commands, DeviceFacts, Extent, Kernel, Module};
@@ -45,9 +45,6 @@ pub fn modules(plan: &Plan, facts: &DeviceFacts) -> Vec<Module> {
     }
     modules
 }
-
-/// Most groups along y that any device must allow.
-const MAX_GROUPS_Y: u32 = 65_535;
 
 /// A gather of all points; its dispatches each cover a part.
 fn whole_push(plan: &Plan, photon_count: u32) -> GatherPush {
@@ -93,7 +90,7 @@ fn gather_brute(commands: &mut Commands, resources: &Resources, plan: &Plan, pho
     for (first_point, end_point) in point_ranges(commands, plan, tests_per_point) {
         let point_count = end_point - first_point;
         let tests_per_slice = u64::from(point_count) * tests_per_point;
-        let slices_at_once = (plan.pair_tests_per_submission / tests_per_slice).clamp(1, u64::from(MAX_GROUPS_Y)) as u32;
+        let slices_at_once = (plan.pair_tests_per_submission / tests_per_slice).clamp(1, u64::from(MAX_GROUPS)) as u32;
         for first_slice in (0..slice_count).step_by(slices_at_once as usize) {
             let slices = slices_at_once.min(slice_count - first_slice);
             let push = GatherPush { first_point, end_point, first_slice, ..whole };
@@ -122,7 +119,7 @@ fn gather_grid(commands: &mut Commands, resources: &Resources, index: &IndexBuff
             counter: 0,
             capacity: end_point - first_point,
             items_per_group: plan.settings.group_size,
-            max_groups: MAX_GROUPS_Y,
+            max_groups: MAX_GROUPS,
         };
         commands.dispatch(SliceCount { longest, dispatch_args }, &size, Extent::Groups(1, 1))?;
         let push = GatherPush { first_point, end_point, ..whole };

@@ -2,6 +2,7 @@
 
 pub mod tree;
 
+use crate::constants::MAX_GROUPS;
 use crate::error::Result;
 use crate::gpu::kernels::{CellCount, CellScatter, DispatchSize, ScanAdd, ScanBlocks};
 use crate::gpu::{Commands, Extent, Kernel, Module};
@@ -9,7 +10,7 @@ use crate::plan::Plan;
 use crate::prefix_sum::scan;
 use crate::records::DispatchSizePush;
 use crate::resources::{IndexBuffers, Resources};
-use crate::trace::{INDIRECT_GROUPS_X, photon_list_capacity};
+use crate::trace::photon_list_capacity;
 
 /// Kernels that the index needs.
 pub fn modules(plan: &Plan) -> Vec<Module> {
@@ -41,7 +42,7 @@ pub fn build(commands: &mut Commands, resources: &Resources, plan: &Plan, photon
                     counter: 0,
                     capacity: push.photon_capacity,
                     items_per_group: plan.settings.group_size,
-                    max_groups: INDIRECT_GROUPS_X,
+                    max_groups: MAX_GROUPS,
                 };
                 commands.dispatch(DispatchSize { counters, dispatch_args }, &size, Extent::Groups(1, 1))?;
             }

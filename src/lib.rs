@@ -16,7 +16,7 @@
 //! constants, records, error, bias, ledger, rng, settings, timings < scene < plan < cpu
 //! scene < judge
 //! constants, records, error, ledger, timings < gpu
-//! gpu < oddities, prefix_sum
+//! gpu < oddities; plan, gpu < prefix_sum
 //! plan, oddities, prefix_sum < resources < trace < index < estimate < film < render < transport < selfcheck < output
 //! output < bake < paper < compaction < study < bench < cli
 //! ```

@@ -205,6 +205,11 @@ records! {
         max_groups: u32,
     }
 
+    CrowdSizePush {
+        items_per_group: u32,
+        max_groups: u32,
+    }
+
     IndexPush {
         origin: Vec3,
         cells_per_metre: f32,

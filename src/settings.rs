@@ -28,7 +28,7 @@ pub enum Variant {
     Scan,
     /// Each photon from its light to its end by one invocation, which keeps it in registers.
     Persistent,
-    /// The second one on the CPU.
+    /// On the CPU, survivors only, photons side by side in vectors.
     Cpu,
 }
 
@@ -448,8 +448,8 @@ impl Settings {
 /// Photons of a round: their numbers and the counters of a round are 32-bit.
 const MAX_PHOTONS: u32 = 1 << 31;
 const MAX_BOUNCES: u32 = 10_000;
-/// A photon's bounces are one loop there, which lavapipe would leave after 65 535 iterations of all loops in it.
-const MAX_PERSISTENT_BOUNCES: u32 = 1_000;
+/// A photon's bounces are one loop there, of at most [`constants::LOOP_LIMIT`] iterations with those of its random numbers.
+const MAX_PERSISTENT_BOUNCES: u32 = 320;
 /// Metres; the square of a larger one would come close to what f32 holds.
 const MAX_EYE: f32 = 1e15;
 /// Watts and photons: far from what f64 and f32 hold, either way.

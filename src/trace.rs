@@ -2,6 +2,7 @@
 
 mod in_order;
 
+use crate::constants::MAX_GROUPS;
 use crate::error::Result;
 use crate::gpu::kernels::{
     DispatchSize, Emit, EndBounce, KeepOrder, ScanAdd, ScanBlocks, TraceAtomic, TraceBallot, TraceGroup, TraceInPlace, TraceSlots,
@@ -34,9 +35,6 @@ pub fn modules(plan: &Plan) -> Vec<Module> {
         Variant::Cpu => panic!("the CPU builder has no kernels"),
     }
 }
-
-/// Groups along x that an indirect dispatch may ask for: what every device allows.
-pub const INDIRECT_GROUPS_X: u32 = 65_535;
 
 /// Traces the photons of a chunk into the photon map and adds their fates to the tallies.
 pub fn chunk(commands: &mut Commands, resources: &Resources, plan: &Plan, round: u32, ranges: &[EmissionRange]) -> Result<()> {
@@ -87,11 +85,11 @@ fn photon_range(plan: &Plan, round: u32, range: &EmissionRange) -> PhotonRange {
 /// Traces every photon from its light to its end.
 fn whole(commands: &mut Commands, resources: &Resources, plan: &Plan, round: u32, ranges: &[EmissionRange]) -> Result<()> {
     let Resources { rooms, walls, lights, stream_seeds, photons, counters, tallies, oddities, .. } = resources;
-    for range in ranges {
+    for range in ranges.iter().flat_map(|range| range.parts(plan.photons_per_dispatch())) {
         let push = TraceWholePush {
             key: plan.streams().key(round),
-            range: photon_range(plan, round, range),
-            stride: range.count.div_ceil(plan.photons_per_invocation),
+            range: photon_range(plan, round, &range),
+            stride: plan.persistence.invocations(range.count),
             bounces: plan.settings.bounces,
             photon_capacity: plan.photon_capacity,
             eye: plan.settings.eye.into(),
@@ -138,7 +136,7 @@ fn one_bounce(commands: &mut Commands, resources: &Resources, plan: &Plan, round
             counter: 1 + bounce,
             capacity: plan.path_capacity,
             items_per_group: plan.settings.group_size,
-            max_groups: INDIRECT_GROUPS_X,
+            max_groups: MAX_GROUPS,
         };
         commands.dispatch(DispatchSize { counters: &resources.counters, dispatch_args }, &size, Extent::Groups(1, 1))?;
     }
@@ -158,7 +156,7 @@ fn one_bounce(commands: &mut Commands, resources: &Resources, plan: &Plan, round
         Variant::Group => {
             commands.dispatch(TraceGroup { rooms, walls, paths, next_paths, photons, counters, tallies, oddities }, &push, extent())
         }
-        Variant::Scan => in_order::one_bounce(commands, resources, plan, &push, extent),
+        Variant::Scan => in_order::one_bounce(commands, resources, plan, [paths, next_paths], &push, extent),
         Variant::Persistent | Variant::Cpu => panic!("{} has no bounces of all paths", variant.name()),
     }
 }

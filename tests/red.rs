@@ -82,7 +82,7 @@ struct Fault {
     noticed_by: &'static [Question],
 }
 
-const FAULTS: [Fault; 47] = [
+const FAULTS: [Fault; 50] = [
     Fault {
         what: "every other lane of a subgroup writes over its neighbour",
         file: "append/ballot.glsl",
@@ -167,10 +167,34 @@ const FAULTS: [Fault; 47] = [
     Fault {
         what: "a point that others help keeps its first slice twice",
         file: "stages/lookup.glsl",
-        from: "(push.first_slice + gl_WorkGroupID.y) * GATHER_SLICE",
-        to: "gl_WorkGroupID.y * GATHER_SLICE",
+        from: "slice_begin = slice * GATHER_SLICE",
+        to: "slice_begin = gl_WorkGroupID.y * GATHER_SLICE",
         kernels: &["lookup_u64", "lookup_two_words"],
         noticed_by: &[Crowds],
+    },
+    Fault {
+        what: "the last slice of crowded points is left out",
+        file: "kernels/crowd_size.comp",
+        from: "min(slice_count - 1, push.max_groups)",
+        to: "min(slice_count - 2, push.max_groups)",
+        kernels: &["crowd_size"],
+        noticed_by: &[Crowds],
+    },
+    Fault {
+        what: "survivors in order overwrite those of the bounce before",
+        file: "stages/keep_order.glsl",
+        from: "uint place = counters[0] + path_place;",
+        to: "uint place = path_place;",
+        kernels: &["keep_order"],
+        noticed_by: &[Photons(Variant::Scan)],
+    },
+    Fault {
+        what: "two photons share a place in their cell",
+        file: "kernels/cell_count.comp",
+        from: "ranks[index] = atomicAdd(cells[cell_number(cell, push.cell_count)], 1);",
+        to: "ranks[index] = atomicAdd(cells[cell_number(cell, push.cell_count)], 1) & 0xfffffffeu;",
+        kernels: &["cell_count"],
+        noticed_by: &[Film(Gather::Grid)],
     },
     Fault {
         what: "the radius is 1 % too large over the grid",

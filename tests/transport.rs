@@ -90,6 +90,16 @@ fn crowded_points_miss_no_photon() {
     assert_holds("crowded points", same_film("crowded points", &whole, &parts));
 }
 
+/// More photons than a dispatch flies to their end on a software device.
+#[test]
+fn persistent_photons_are_the_same_in_several_dispatches() {
+    let Some(gpu) = device() else { return };
+    let scene = scene("cornell");
+    let of = |append| picture(&gpu, &scene, &TransportSettings { append, photons: 70_001, rounds: 1, ..small() });
+    let what = "70 001 photons";
+    assert_holds(what, same_film(what, &of(Append::Persistent), &of(Append::Ballot)));
+}
+
 /// With the paper's way too, where one map holds everything, and with a final gather.
 #[test]
 fn the_four_parts_add_up_to_the_whole_to_the_bit() {

@@ -1,7 +1,8 @@
 // Survivors only, side by side; atomic.glsl, ballot.glsl and group.glsl each define
 //
 //   uint take_place(uint counter, bool wanted)
-//       called once by every invocation in uniform control flow; the next free place that `counter`
+//       called by all invocations of a work group together, or with atomic.glsl and ballot.glsl by those of a subgroup
+//       that are there (stages/trace_whole.glsl); the next free place that `counter`
 //       counts, for those that want one.
 
 uint incoming_count(uint bounce)

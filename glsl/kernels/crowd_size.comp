@@ -6,7 +6,7 @@
 #include "records.glsl"
 
 layout(local_size_x = 1) in;
-layout(push_constant, scalar) uniform Push { DispatchSizePush push; };
+layout(push_constant, scalar) uniform Push { CrowdSizePush push; };
 layout(set = 1, binding = 0, scalar) readonly buffer Crowded { uint crowded[]; };
 layout(set = 1, binding = 1, scalar) writeonly buffer Sizes { DispatchArgs dispatch_args[]; };
 

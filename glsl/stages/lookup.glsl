@@ -4,14 +4,15 @@
 
 layout(set = 0, binding = 0, scalar) readonly buffer VisiblePoints { VisiblePoint visible_points[]; };
 layout(set = 1, binding = 2, scalar) readonly buffer SortedMap { MapPhoton sorted_map[]; };
-// Points with more than one slice: how many, the longest one's candidates, which.
+// Points with more than one slice: how many, the longest one's candidates; then which, and each one's candidates.
 layout(set = 1, binding = 3, scalar) buffer Crowded { uint crowded[]; };
 
 // The point of an invocation, or NONE.
-uint point_of(uint item)
+uint point_of(uint item, uint slice)
 {
     if (push.first_slice != 0) {
-        return item < crowded[0] ? crowded[2 + item] : NONE;
+        bool has_slice = item < crowded[0] && crowded[3 + 2 * item] > slice * GATHER_SLICE;
+        return has_slice ? crowded[2 + 2 * item] : NONE;
     }
     uint place = push.first_point + item;
     if (place >= push.end_point) {
@@ -26,7 +27,8 @@ uint point_of(uint item)
 
 void look_up()
 {
-    uint index = point_of(gl_WorkGroupID.x * gl_WorkGroupSize.x + gl_LocalInvocationIndex);
+    uint slice = push.first_slice + gl_WorkGroupID.y;
+    uint index = point_of(gl_WorkGroupID.x * gl_WorkGroupSize.x + gl_LocalInvocationIndex, slice);
     if (index == NONE) {
         return;
     }
@@ -39,7 +41,7 @@ void look_up()
     vec3 wo = unpack_direction(point.wo);
     CellRange range = cells_near(point.position);
     uint photon_count = map_length();
-    uint slice_begin = (push.first_slice + gl_WorkGroupID.y) * GATHER_SLICE;
+    uint slice_begin = slice * GATHER_SLICE;
     uint slice_end = slice_begin + GATHER_SLICE;
 
     // Three channels of each arrival; the first three of a map that holds one arrival only.
@@ -96,7 +98,9 @@ void look_up()
         }
     }
     if (push.first_slice == 0 && passed > GATHER_SLICE) {
-        crowded[2 + atomicAdd(crowded[0], 1)] = index;
+        uint place = atomicAdd(crowded[0], 1);
+        crowded[2 + 2 * place] = index;
+        crowded[3 + 2 * place] = passed;
         atomicMax(crowded[1], passed);
     }
     if (found) {

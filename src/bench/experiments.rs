@@ -13,12 +13,12 @@ use super::targets::{Finding, findings};
 use super::{Lab, Size};
 use crate::compaction::{self, Map};
 use crate::error::Result;
-use crate::paper::bench::Spread;
 use crate::rng::Rng;
 use crate::scene::built_in;
 use crate::scene::geometry::Geometry;
 use crate::settings::transport::{Append, Effect, Illumination, TransportSettings};
 use crate::settings::{Preset, Settings, Variant};
+use crate::timings::Spread;
 
 #[derive(Debug, Clone, Copy, PartialEq, Eq, Serialize)]
 pub enum Experiment {

@@ -110,7 +110,8 @@ impl Lab<'_> {
     }
 }
 
-/// Measures the device, then the experiments that are asked for. What was finished when somebody ended it is kept.
+/// Measures the device, then the experiments that are asked for. Experiments that were finished when somebody ended it are
+/// kept.
 pub fn run(gpu: &Gpu, request: Request, cancelled: &AtomicBool, tell: &mut dyn FnMut(&str)) -> Result<Bench> {
     paper_line::check_clock(gpu)?;
     let deadline = Instant::now() + request.budget;
@@ -140,7 +141,7 @@ pub fn run(gpu: &Gpu, request: Request, cancelled: &AtomicBool, tell: &mut dyn F
 
 fn measure(lab: &mut Lab, bench: &mut Bench) -> Result<()> {
     if bench.request.scale {
-        bench.scale = Some(scale::measure(lab)?);
+        bench.scale = Some(scale::measure(lab, &mut bench.left_out)?);
         return Ok(());
     }
     for (number, experiment) in bench.request.experiments.clone().into_iter().enumerate() {

@@ -9,7 +9,6 @@ use super::rates::{PHILOX_PRODUCTS, Rates};
 use crate::error::{Error, Result};
 use crate::gpu::{Gpu, HeldMemory};
 use crate::ledger::Fates;
-use crate::paper::bench::Spread;
 use crate::plan::Plan;
 use crate::plan::memory::{block_sum_counts, group_count};
 use crate::records::{Path, Photon, Point, SortedPhoton};
@@ -17,6 +16,7 @@ use crate::render::{self, Control, Outcome};
 use crate::rng::Rng;
 use crate::scene::open_box::open_box;
 use crate::settings::{Settings, Variant};
+use crate::timings::Spread;
 
 /// What photons did in a round, on average over all.
 #[derive(Debug, Clone, Copy, PartialEq)]

@@ -6,7 +6,7 @@ use std::ops::{Add, Mul};
 use serde::Serialize;
 
 use super::rates::Rates;
-use crate::paper::bench::Spread;
+use crate::timings::Spread;
 use crate::timings::{Clock, Timings};
 
 /// What a pass cannot do without, whatever the code: the bytes that move when every record is read and written once and

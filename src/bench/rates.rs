@@ -9,10 +9,10 @@ use super::Size;
 use crate::error::{Error, Result};
 use crate::gpu::kernels::{MeasureAtomic, MeasureCopy, MeasureFloat, MeasureGather, MeasureInteger};
 use crate::gpu::{Buffer, Commands, Constants, Extent, Gpu, Memory};
-use crate::paper::bench::Spread;
 use crate::records::MeasurePush;
 use crate::rng::philox;
 use crate::timings::Clock;
+use crate::timings::Spread;
 
 /// Rates of a device, each a second.
 #[derive(Debug, Clone, Copy, PartialEq, Serialize)]
@@ -100,6 +100,9 @@ pub fn measure(gpu: &Gpu, size: Size) -> Result<Rates> {
     let copies = gpu.buffer::<[u32; 4]>("copies", u64::from(block_count), Memory::Device)?;
     let results = gpu.buffer::<u32>("results", u64::from(items.max(accesses)), Memory::Device)?;
     let counts = gpu.buffer::<u32>("counts", u64::from(COUNTERS), Memory::Device)?;
+    // What a run before this one left in the same memory must not pass for a result.
+    commands.fill(&copies, 0, 4 * u64::from(block_count), 0);
+    commands.fill(&results, 0, u64::from(items.max(accesses)), 0);
     let mut bench = Bench { gpu, commands: &mut commands };
 
     let float_push = push(items, STEPS, 0);

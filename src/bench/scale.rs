@@ -7,7 +7,6 @@ use serde::Serialize;
 use super::Lab;
 use super::scene_line::{self, Job};
 use crate::error::{Error, Result};
-use crate::paper::bench::Spread;
 use crate::render::{self, Control, Outcome};
 use crate::rng::Rng;
 use crate::scene::geometry::Geometry;
@@ -15,6 +14,7 @@ use crate::scene::open_box::open_box;
 use crate::scene::{Mesh, Scene, built_in};
 use crate::settings::transport::TransportSettings;
 use crate::settings::{Settings, Variant};
+use crate::timings::Spread;
 
 /// A size and what it cost.
 #[derive(Debug, Clone, PartialEq, Serialize)]
@@ -60,9 +60,10 @@ pub struct Scale {
     pub series: Vec<Series>,
 }
 
-pub fn measure(lab: &mut Lab) -> Result<Scale> {
-    let photons = over_photons(lab)?;
-    let triangles = over_triangles(lab)?;
+/// Sizes for which no time was left are named in `left_out`.
+pub fn measure(lab: &mut Lab, left_out: &mut Vec<String>) -> Result<Scale> {
+    let photons = over_photons(lab, left_out)?;
+    let triangles = over_triangles(lab, left_out)?;
     let series = vec![Series::new("photons", photons, LAUNCH_SHARE), Series::new("triangles", triangles, 0.0)];
     for step in series.iter().flat_map(|series| &series.steps) {
         assert!(step.peak_bytes <= step.stated_bytes, "{} bytes taken, {} stated", step.peak_bytes, step.stated_bytes);
@@ -110,14 +111,15 @@ const ROUND_ON_CPU: u64 = 1_000_000;
 const PATIENCE: Duration = Duration::from_secs(2);
 const REPEATS: usize = 5;
 
-fn over_photons(lab: &mut Lab) -> Result<Vec<Step>> {
+fn over_photons(lab: &mut Lab, left_out: &mut Vec<String>) -> Result<Vec<Step>> {
     let decades = if lab.is_cpu() { lab.choose(3..=6, 3..=7, 3..=7) } else { lab.choose(5..=8, 5..=8, 5..=10) };
     let most = if lab.is_cpu() { ROUND_ON_CPU } else { ROUND_ON_CARD };
     let mut steps = Vec::new();
     for size in decades.map(|decade| 10u64.pow(decade)) {
         lab.go_on()?;
         if lab.is_late() {
-            break;
+            left_out.push(format!("{size} photons: --time was spent"));
+            continue;
         }
         (lab.tell)(&format!("{size} photons"));
         let photons = size.min(most) as u32;
@@ -159,13 +161,14 @@ fn over_photons(lab: &mut Lab) -> Result<Vec<Step>> {
     Ok(steps)
 }
 
-fn over_triangles(lab: &mut Lab) -> Result<Vec<Step>> {
+fn over_triangles(lab: &mut Lab, left_out: &mut Vec<String>) -> Result<Vec<Step>> {
     let decades = if lab.is_cpu() { lab.choose(1..=4, 1..=6, 1..=6) } else { 1..=6 };
     let mut steps = Vec::new();
     for size in decades.map(|decade| 10u32.pow(decade)) {
         lab.go_on()?;
         if lab.is_late() {
-            break;
+            left_out.push(format!("{size} triangles: --time was spent"));
+            continue;
         }
         (lab.tell)(&format!("{size} triangles"));
         let scene = ball_room(size);

@@ -12,7 +12,6 @@ use super::rates::{PHILOX_PRODUCTS, Rates};
 use crate::error::{Error, Result};
 use crate::gpu::{Commands, Gpu};
 use crate::ledger::Fates;
-use crate::paper::bench::Spread;
 use crate::plan::memory::block_sum_counts;
 use crate::plan::transport::{MapPlan, Sensor, TransportPlan};
 use crate::records::{LightPath, MapPhoton, VisiblePoint};
@@ -20,6 +19,7 @@ use crate::render::{self, Control};
 use crate::scene::geometry::Geometry;
 use crate::scene::{Camera, Scene};
 use crate::settings::transport::{Append, Effect, TransportSettings};
+use crate::timings::Spread;
 use crate::transport::resources::TransportResources;
 use crate::transport::{self, End, Lit, Round, View, photons, points};
 

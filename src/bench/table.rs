@@ -4,7 +4,7 @@ use std::fmt::Write;
 
 use super::Bench;
 use super::targets::Wanted;
-use crate::paper::bench::Spread;
+use crate::timings::Spread;
 
 pub fn text(bench: &Bench) -> String {
     let mut text = format!("{}, {}, Vulkan {}\n{}\n\n", bench.device, bench.driver, bench.vulkan, bench.request.command);

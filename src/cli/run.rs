@@ -16,7 +16,7 @@ use crate::output::destination::{Destination, Folder, check_distinct, write_all}
 use crate::output::image::{Format, overview};
 use crate::output::lightmap::{self, Quantity};
 use crate::output::{report, trace_file};
-use crate::render::{self, Control, Outcome};
+use crate::render::{self, Choice, Control, Outcome};
 use crate::rng::Rng;
 use crate::scene::open_box::open_box;
 use crate::scene::room::RoomScene;
@@ -191,7 +191,7 @@ enum VariantArg {
     Scan,
     /// Each photon in the registers of one thread until it ends
     Persistent,
-    /// The paper's CPU implementation
+    /// What the paper calls the CPU implementation, on one thread or --threads
     Cpu,
     /// The fastest on this device for so many photons: each traces the first of them
     Auto,
@@ -355,14 +355,12 @@ pub(super) fn run(args: &RunArgs, cancelled: &AtomicBool) -> Result<End> {
 
 /// The builder that is fastest on this device, told with what each of them took.
 fn fastest(gpu: &Gpu, scene: &RoomScene, settings: &Settings) -> Result<Variant> {
-    let candidates = render::choose_variant(gpu, scene, settings)?;
-    let times: Vec<String> = candidates.iter().map(|candidate| format!("{} {:.3}", candidate.variant.name(), candidate.ms)).collect();
-    complain(&format!(
-        "--variant auto takes {}: trace and index the first photons in ms: {}",
-        candidates[0].variant.name(),
-        times.join(", ")
-    ));
-    Ok(candidates[0].variant)
+    let Choice { photons, candidates } = render::choose_variant(gpu, scene, settings)?;
+    let times: Vec<String> =
+        candidates.iter().map(|candidate| format!("{} {:.3}", candidate.variant.name(), candidate.ms.median)).collect();
+    let taken = candidates[0].variant;
+    complain(&format!("--variant auto takes {}; the first {photons} photons, in ms: {}", taken.name(), times.join(", ")));
+    Ok(taken)
 }
 
 /// Where one photon of the run is stored.

@@ -11,7 +11,6 @@ use serde::Serialize;
 use crate::error::{Error, Result};
 use crate::gpu::{Commands, Gpu};
 use crate::output::words::{count, number};
-use crate::paper::bench::Spread;
 use crate::plan::Plan;
 use crate::records::{Photon, Tally};
 use crate::render::{constants, limits, photons_on_gpu};
@@ -20,6 +19,7 @@ use crate::rng::Rng;
 use crate::scene::open_box::open_box;
 use crate::scene::room::{RoomScene, Wall};
 use crate::settings::{Gather, Settings, Variant};
+use crate::timings::Spread;
 use crate::trace;
 
 /// What is asked for.
@@ -78,6 +78,15 @@ pub enum Agreed {
     Fates,
 }
 
+impl Agreed {
+    fn name(self) -> &'static str {
+        match self {
+            Agreed::Photons => "photons",
+            Agreed::Fates => "fates",
+        }
+    }
+}
+
 /// What a builder took.
 #[derive(Debug, Clone, PartialEq, Serialize)]
 pub struct Timed {
@@ -111,9 +120,12 @@ pub fn measure(gpu: &Gpu, request: &Request, cancelled: &AtomicBool, tell: &mut 
             continue;
         }
         let size_began = Instant::now();
+        let whole = map.cells.len();
         for &survival in &request.survivals {
             if cancelled.load(Ordering::Relaxed) {
-                return Err(Error::Interrupted);
+                // Whole sizes are kept.
+                map.cells.truncate(whole);
+                return if whole == 0 { Err(Error::Interrupted) } else { Ok(map) };
             }
             tell(&format!("compaction: {} photons, survival {survival}", count(u64::from(photons))));
             map.cells.push(cell(gpu, request, photons, survival)?);
@@ -126,6 +138,8 @@ pub fn measure(gpu: &Gpu, request: &Request, cancelled: &AtomicBool, tell: &mut 
 fn cell(gpu: &Gpu, request: &Request, photons: u32, survival: f32) -> Result<Cell> {
     let base = Settings {
         photons,
+        // At once, as far as they fit, so that builders differ in nothing else.
+        chunk: Some(photons),
         bounces: request.bounces,
         reflectance: survival,
         rng: Rng::Philox,
@@ -231,7 +245,10 @@ impl Map {
 
     /// A line for each cell: its winner, who cannot be told from it, and what all others take in times of its time.
     pub fn text(&self) -> String {
-        let mut text = format!("{:>12} {:>9} {:>14} {:>10}  {}\n", "photons", "survival", "stored", "best, ms", "builders, times the best");
+        let mut text = format!(
+            "{:>12} {:>9} {:>14} {:>8} {:>10}  {}\n",
+            "photons", "survival", "stored", "alike in", "best, ms", "builders, times the best"
+        );
         for cell in &self.cells {
             let best = cell.builders[0].ms.median;
             let winners: Vec<Variant> = cell.winners().collect();
@@ -244,10 +261,12 @@ impl Map {
                 })
                 .collect();
             let line = format!(
-                "{:>12} {:>8}% {:>14} {:>10}  {}\n",
+                "{:>12} {:>8}% {:>14} {:>8} {:>10}  {}
+",
                 count(u64::from(cell.photons)),
                 number(100.0 * f64::from(cell.survival)),
                 count(cell.stored),
+                cell.agreed.name(),
                 number(best),
                 all.join(", ")
             );

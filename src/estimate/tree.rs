@@ -1,7 +1,7 @@
 //! Density estimation over the kd-tree: with all photons within the radius, or with the nearest of them.
 
-use super::{MAX_GROUPS_Y, adds_in_one_word, point_ranges, whole_push};
-use crate::constants::GATHER_SLICE;
+use super::{adds_in_one_word, point_ranges, whole_push};
+use crate::constants::{GATHER_SLICE, MAX_GROUPS};
 use crate::error::Result;
 use crate::gpu::kernels::{GatherTreeTwoWords, GatherTreeU64, NearestTwoWords, NearestU64, SliceCount};
 use crate::gpu::{Commands, DeviceFacts, Extent, Kernel, Module};
@@ -38,7 +38,7 @@ fn gather_radius(commands: &mut Commands, resources: &Resources, tree: &TreeBuff
             counter: 0,
             capacity: end_point - first_point,
             items_per_group: plan.settings.group_size,
-            max_groups: MAX_GROUPS_Y,
+            max_groups: MAX_GROUPS,
         };
         commands.dispatch(SliceCount { longest, dispatch_args }, &size, Extent::Groups(1, 1))?;
         let push = GatherPush { first_point, end_point, ..whole };

@@ -7,7 +7,7 @@
 //! passed over there.
 
 use super::add_work;
-use crate::constants::{TREE_DIGITS, TREE_LEAF};
+use crate::constants::{MAX_GROUPS, TREE_DIGITS, TREE_LEAF};
 use crate::error::Result;
 use crate::gpu::kernels::{
     ScanAdd, ScanBlocks, TreeCount, TreeKeys, TreeLeaves, TreeOrder, TreeRanks, TreeSides, TreeSizes, TreeSplit, TreeWalls,
@@ -18,7 +18,7 @@ use crate::plan::memory::tree_count_capacity;
 use crate::prefix_sum::scan_part;
 use crate::records::{DispatchSizePush, TreePush};
 use crate::resources::{Resources, TreeBuffers};
-use crate::trace::{INDIRECT_GROUPS_X, photon_list_capacity};
+use crate::trace::photon_list_capacity;
 
 /// Kernels that the tree needs.
 pub fn modules() -> Vec<Module> {
@@ -47,7 +47,7 @@ pub(super) fn build(commands: &mut Commands, resources: &Resources, tree: &TreeB
     let capacity = photon_list_capacity(plan, photon_count);
     let push = TreePush { photon_capacity: capacity, axis: 0, digit: 0, height: 0 };
     let one = Extent::Groups(1, 1);
-    let size = DispatchSizePush { counter: 0, capacity, items_per_group: plan.settings.group_size, max_groups: INDIRECT_GROUPS_X };
+    let size = DispatchSizePush { counter: 0, capacity, items_per_group: plan.settings.group_size, max_groups: MAX_GROUPS };
     commands.dispatch(TreeSizes { photons, counters, item_args, run_args, scan_args }, &size, one)?;
     let pass_work = plan.work.tree_pass(photon_count);
     commands.scope("sort", |commands| {

@@ -4,8 +4,6 @@
 use std::sync::atomic::{AtomicBool, Ordering};
 use std::time::{Duration, Instant};
 
-use serde::Serialize;
-
 use crate::error::{Error, Result};
 use crate::gpu::Gpu;
 use crate::render::{self, Control, Outcome};
@@ -151,26 +149,6 @@ impl<'a> Bench<'a> {
     }
 }
 
-/// Median and extremes of repeated runs.
-#[derive(Debug, Clone, Copy, PartialEq, Serialize)]
-pub struct Spread {
-    pub median: f64,
-    pub min: f64,
-    pub max: f64,
-    pub repeats: usize,
-}
-
-impl Spread {
-    /// `None` for no value at all.
-    pub fn of(mut values: Vec<f64>) -> Option<Spread> {
-        values.sort_by(f64::total_cmp);
-        let (min, max) = (*values.first()?, *values.last()?);
-        let middle = values.len() / 2;
-        let median = if values.len() % 2 == 1 { values[middle] } else { 0.5 * (values[middle - 1] + values[middle]) };
-        Some(Spread { median, min, max, repeats: values.len() })
-    }
-}
-
 /// The host's processor, as Linux calls it; elsewhere its architecture.
 fn processor() -> String {
     let threads = std::thread::available_parallelism().map_or(1, usize::from);
@@ -182,14 +160,6 @@ fn processor() -> String {
 #[cfg(test)]
 mod tests {
     use super::*;
-
-    #[test]
-    fn the_median_stands_between_the_extremes() {
-        let spread = |values: &[f64]| Spread::of(values.to_vec());
-        assert_eq!(spread(&[]), None);
-        assert_eq!(spread(&[3.0, 9.0, 1.0]), Some(Spread { median: 3.0, min: 1.0, max: 9.0, repeats: 3 }));
-        assert_eq!(spread(&[4.0, 2.0]), Some(Spread { median: 3.0, min: 2.0, max: 4.0, repeats: 2 }));
-    }
 
     #[test]
     fn a_cancelled_bench_begins_nothing() {

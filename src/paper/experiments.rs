@@ -1,7 +1,7 @@
 //! The paper's times, measured again: both passes by builder (section 4.3), and the whole run by
 //! photon count (table 1).
 
-use super::bench::{Bench, Spread, Step};
+use super::bench::{Bench, Step};
 use super::{Reproduction, Request, published};
 use crate::output::command;
 use crate::output::words;
@@ -9,6 +9,7 @@ use crate::render::Outcome;
 use crate::rng::Rng;
 use crate::settings::{Gather, Preset, Settings, Variant};
 use crate::timings::Clock;
+use crate::timings::Spread;
 
 /// Who builds the photon map.
 #[derive(Debug, Clone, Copy, PartialEq, Eq)]

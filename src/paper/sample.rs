@@ -1,12 +1,13 @@
 //! A reproduction with made-up times, for the tests of what is said of it.
 
-use super::bench::{Device, Machine, Spread};
+use super::bench::{Device, Machine};
 use super::experiments::{Builder, LeftOut, Pass, RunningTime, TotalTime};
 use super::figures::Figure;
 use super::{Reproduction, Request, published};
 use crate::output::command;
 use crate::settings::{Gather, Preset, Settings, Variant};
 use crate::timings::Clock;
+use crate::timings::Spread;
 
 const LARGE: u32 = 65_536;
 

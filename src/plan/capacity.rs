@@ -3,9 +3,10 @@
 
 use serde::Serialize;
 
-use crate::constants::LOOP_LIMIT;
+use crate::constants::{LOOP_LIMIT, MT_MIDDLE};
 use crate::error::{Error, Result};
 use crate::records::{Path, Photon};
+use crate::rng::Rng;
 use crate::scene::room::RoomScene;
 use crate::settings::{Gather, Settings, Variant};
 
@@ -54,7 +55,7 @@ impl Limits {
         if kind == "cpu" { LOOP_LIMIT } else { 1 << 20 }
     }
 
-    /// Invocations that keep a device of a kind busy: a large GPU holds 2^18 at a time.
+    /// Invocations that keep a device of a kind busy: half of what a large GPU holds at a time.
     pub fn busy_invocations_of(kind: &str) -> u32 {
         match kind {
             "discrete" => 1 << 17,
@@ -136,13 +137,39 @@ impl Work {
 
 /// Photons of an invocation over which short and long paths even out.
 const MOST_PHOTONS_PER_INVOCATION: u32 = 16;
-/// Loop iterations of a bounce in the paper's room, those of its random numbers included; opening a stream of them takes as many as 8 bounces.
+/// Lanes of a software device's vector: they begin photons at different times, and it counts the loops of all.
+const LANES: u32 = 16;
+
+/// How photons are dealt to invocations that keep them to their end.
+#[derive(Debug, Clone, Copy, PartialEq, Eq, Serialize)]
+pub struct Persistence {
+    /// Invocations that keep the device busy.
+    pub busy_invocations: u32,
+    /// Most photons of one, one after the other.
+    pub most_photons: u32,
+}
+
+impl Persistence {
+    /// Of photons that take so many loop iterations to begin and for each of their bounces.
+    pub fn new(loops_to_begin: u32, loops_per_bounce: u32, bounces: u32, limits: &Limits) -> Persistence {
+        let loops = LANES * loops_to_begin + loops_per_bounce * bounces;
+        Persistence {
+            busy_invocations: limits.busy_invocations,
+            most_photons: (limits.loop_iterations / loops).clamp(1, MOST_PHOTONS_PER_INVOCATION),
+        }
+    }
+
+    /// Invocations for the photons of a dispatch.
+    pub fn invocations(&self, photons: u32) -> u32 {
+        photons.div_ceil((photons / self.busy_invocations).clamp(1, self.most_photons))
+    }
+}
+
+/// Loop iterations of a bounce in the paper's room, those of its random numbers included, and of beginning a photon.
 pub(super) const LOOPS_PER_BOUNCE: u32 = 48;
 
-/// Photons that one invocation takes of a chunk, one after the other.
-pub fn photons_per_invocation(loops_per_bounce: u32, bounces: u32, chunk_photons: u32, limits: &Limits) -> u32 {
-    let most = (limits.loop_iterations / (loops_per_bounce * (bounces + 8))).clamp(1, MOST_PHOTONS_PER_INVOCATION);
-    (chunk_photons / limits.busy_invocations).clamp(1, most)
+pub(super) fn loops_to_begin(rng: Rng) -> u32 {
+    if rng == Rng::Mt { MT_MIDDLE } else { LOOPS_PER_BOUNCE }
 }
 
 /// Photons traced at once.

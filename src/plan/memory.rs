@@ -171,7 +171,7 @@ pub(super) fn of_transport(plan: &TransportPlan, geometry: &Geometry, keeps: &dy
             ("cells", array::<u32>(buckets + 1)),
             ("ranks", array::<u32>(capacity)),
             ("block sums", block_sum_bytes(buckets + 1, plan.settings.group_size)),
-            ("crowded points", array::<u32>(2 + u64::from(plan.points_at_once()))),
+            ("crowded points", array::<u32>(2 + 2 * u64::from(plan.points_at_once()))),
             ("tallies", 2 * array::<Tally>(bounces)),
         ]);
     }

@@ -11,7 +11,7 @@ use std::ops::Range;
 
 use serde::Serialize;
 
-pub use capacity::{Limits, Work};
+pub use capacity::{Limits, Persistence, Work};
 pub use effect::Decision;
 
 use crate::constants::{NEAREST_BITS, NEAREST_GAIN_BITS};
@@ -28,6 +28,18 @@ pub struct EmissionRange {
     /// Number within the round.
     pub first_photon: u32,
     pub count: u32,
+}
+
+impl EmissionRange {
+    /// The same photons in runs of at most so many.
+    pub fn parts(self, most: u32) -> impl Iterator<Item = EmissionRange> {
+        let EmissionRange { light, first_photon, count } = self;
+        (0..count).step_by(most.max(1) as usize).map(move |first| EmissionRange {
+            light,
+            first_photon: first_photon + first,
+            count: most.min(count - first),
+        })
+    }
 }
 
 #[derive(Debug, Clone, PartialEq)]
@@ -56,8 +68,8 @@ pub struct Plan {
     pub work: Work,
     /// Pair tests (point, photon) after which commands are handed to the device.
     pub pair_tests_per_submission: u64,
-    /// Photons that an invocation takes one after the other where it keeps them to their end.
-    pub photons_per_invocation: u32,
+    /// How photons are dealt to invocations that keep them to their end.
+    pub persistence: Persistence,
 }
 
 /// The uniform grid that sorts photons.
@@ -147,13 +159,11 @@ impl Plan {
             grid,
             work,
             pair_tests_per_submission: limits.pair_tests_per_submission,
-            photons_per_invocation: 1,
+            persistence: Persistence::new(capacity::loops_to_begin(settings.rng), capacity::LOOPS_PER_BOUNCE, settings.bounces, limits),
         };
         // Of each light's photons the larger share: there may be a billion chunks, too many to look at each.
         plan.path_capacity = plan.light_photons.iter().map(|count| count.div_ceil(chunks_per_round)).sum();
         plan.photon_capacity = plan.path_capacity * settings.bounces;
-        plan.photons_per_invocation =
-            capacity::photons_per_invocation(capacity::LOOPS_PER_BOUNCE, settings.bounces, plan.path_capacity, limits);
         Ok(plan)
     }
 
@@ -215,6 +225,12 @@ impl Plan {
     /// Whether rounds are told apart, so that their spread tells the error: floats go on over all rounds.
     pub fn keeps_squares(&self) -> bool {
         self.settings.rounds > 1 && self.settings.sums == Sums::Integer
+    }
+
+    /// Photons that one dispatch traces from their light to their end, in a fraction of a second.
+    pub fn photons_per_dispatch(&self) -> u32 {
+        let photons = self.pair_tests_per_submission / self.work.tracing(1).max(1);
+        photons.clamp(1, u64::from(u32::MAX)) as u32
     }
 
     /// Paths that one bounce hands to the next: none where each photon has an invocation to its end.

@@ -6,7 +6,7 @@ use std::time::{Duration, Instant};
 
 use serde::Serialize;
 
-use super::capacity::photons_per_invocation;
+use super::capacity::Persistence;
 use super::evidence::{EffectDecision, Facts};
 use super::{Limits, memory};
 use crate::constants::*;
@@ -47,8 +47,8 @@ pub struct MapPlan {
     pub capacity: u32,
     /// Paths that one flight hands to the next: none where each photon has an invocation to its end.
     pub path_array_length: u32,
-    /// Photons that an invocation takes one after the other where it keeps them to their end.
-    pub photons_per_invocation: u32,
+    /// How photons are dealt to invocations that keep them to their end.
+    pub persistence: Persistence,
     pub bounces: u32,
     /// Mask of the arrivals that are stored.
     pub stored: u32,
@@ -107,12 +107,14 @@ const FILM_BITS: (i32, i32) = (24, 32);
 const FILM_HEADROOM_BITS: i32 = 24;
 /// Candidates of a point, roughly: what a lookup counts as work.
 pub const TESTS_PER_POINT: u64 = 256;
-/// Work groups along x that every device allows.
-const MOST_GROUPS: u32 = 65_535;
+/// Loop iterations of choosing a light and of the random numbers with which a photon leaves it.
+const LOOPS_TO_SHINE: u32 = 64;
 /// Loop iterations of a flight of a photon, mostly of its ray through the hierarchy.
 const LOOPS_PER_FLIGHT: u32 = 256;
 /// A photon in its map, sorted and unsorted, and its place in its bucket.
 const MAP_ENTRY_BYTES: u64 = 2 * size_of::<MapPhoton>() as u64 + 4;
+/// Flights of a photon, generously.
+const FLIGHTS_PER_PHOTON: u64 = 8;
 /// Work of a ray, in pair tests.
 const RAY_COST: u64 = 64;
 
@@ -175,7 +177,7 @@ impl TransportPlan {
                 chunk_photons,
                 capacity,
                 path_array_length: if persistent { 0 } else { chunk_photons },
-                photons_per_invocation: photons_per_invocation(LOOPS_PER_FLIGHT, settings.bounces, chunk_photons, limits),
+                persistence: Persistence::new(LOOPS_TO_SHINE, LOOPS_PER_FLIGHT, settings.bounces, limits),
                 bounces: settings.bounces,
                 stored,
                 caustic_only,
@@ -272,7 +274,7 @@ impl TransportPlan {
         self.global.iter().chain(&self.caustic)
     }
 
-    /// The same by a builder that stops after each flight.
+    /// The same by a builder that stops after each flight; `bytes` stay those of the run.
     pub fn by_flights(&self) -> TransportPlan {
         let mut plan = self.clone();
         if plan.settings.append == Append::Persistent {
@@ -302,10 +304,15 @@ impl TransportPlan {
         (self.work_per_submission / (RAY_COST * u64::from(rays.max(1)))).clamp(1 << 12, 1 << 22) as u32
     }
 
+    /// Photons that one dispatch traces from their light to their end, in a fraction of a second.
+    pub fn photons_per_dispatch(&self) -> u32 {
+        (self.work_per_submission / (RAY_COST * FLIGHTS_PER_PHOTON)).clamp(1, u64::from(u32::MAX)) as u32
+    }
+
     /// Visible points of one lookup, which has a work group of them along x.
     pub fn points_at_once(&self) -> u32 {
         let most = (self.work_per_submission / TESTS_PER_POINT).clamp(1 << 12, 1 << 22) as u32;
-        most.min(self.visible_points()).min(MOST_GROUPS * self.settings.group_size)
+        most.min(self.visible_points()).min(MAX_GROUPS * self.settings.group_size)
     }
 
     /// Rays of one pixel, roughly.

@@ -1,5 +1,5 @@
-//! `--variant auto`: every builder traces the run's own first photons on the run's own device, and the fastest is taken.
-//! All of them store the same photons, so that the choice changes the time alone.
+//! `--variant auto`: every builder traces the same first photons of the run on the run's own device, and the fastest is
+//! taken. All of them store the same photons, so that the choice changes the time alone.
 
 use std::time::{Duration, Instant};
 
@@ -12,16 +12,26 @@ use crate::gpu::{Commands, Gpu};
 use crate::plan::{Plan, photons_of};
 use crate::resources::Resources;
 use crate::scene::room::RoomScene;
-use crate::settings::{Math, Settings, Variant};
-use crate::{index, trace};
+use crate::settings::{Gather, Math, Settings, Variant};
+use crate::timings::Spread;
+use crate::{estimate, index, trace};
+
+/// What the builders took.
+#[derive(Debug, Clone, PartialEq, Serialize)]
+pub struct Choice {
+    /// Photons that each of them traced.
+    pub photons: u32,
+    /// Every builder that can run the settings, the fastest first.
+    pub candidates: Vec<Candidate>,
+}
 
 /// What one builder took.
 #[derive(Debug, Clone, Copy, PartialEq, Serialize)]
 pub struct Candidate {
     pub variant: Variant,
-    /// Milliseconds to trace and index the photons, median of its turns: of the device's clock, or of the host's where the
-    /// device has none.
-    pub ms: f64,
+    /// Milliseconds to trace and index the photons, and to gather them by brute force where that steps through the
+    /// builder's list; of the device's clock, or of the host's where the device has none.
+    pub ms: Spread,
 }
 
 /// Photons that are enough to tell builders apart.
@@ -30,24 +40,11 @@ const MOST_PHOTONS: u32 = 1 << 20;
 const TURNS: usize = 5;
 const LONG: Duration = Duration::from_secs(1);
 
-/// Every builder that can run these settings, the fastest first.
-pub fn choose_variant(gpu: &Gpu, scene: &RoomScene, settings: &Settings) -> Result<Vec<Candidate>> {
+pub fn choose_variant(gpu: &Gpu, scene: &RoomScene, settings: &Settings) -> Result<Choice> {
     if settings.math == Math::Strict {
         strict_math(gpu)?;
     }
-    let (mut plans, mut refusal) = (Vec::new(), None);
-    for variant in Variant::ON_GPU {
-        let settings = Settings { variant, photons: settings.photons.min(MOST_PHOTONS), rounds: 1, ..settings.clone() };
-        match Plan::new(scene, &settings, &limits(gpu.facts())) {
-            Ok(plan) => plans.push(plan),
-            // Some builder has a limit of its own.
-            Err(error @ Error::Setting { .. }) => refusal = Some(error),
-            Err(error) => return Err(error),
-        }
-    }
-    if let (true, Some(refusal)) = (plans.is_empty(), refusal) {
-        return Err(refusal);
-    }
+    let plans = plans(gpu, scene, settings)?;
     let mut times = vec![Vec::new(); plans.len()];
     let began = Instant::now();
     for turn in 0..=TURNS {
@@ -61,15 +58,40 @@ pub fn choose_variant(gpu: &Gpu, scene: &RoomScene, settings: &Settings) -> Resu
             }
         }
     }
-    let mut candidates: Vec<Candidate> =
-        plans.iter().zip(times).map(|(plan, times)| Candidate { variant: plan.settings.variant, ms: median(times) }).collect();
-    candidates.sort_by(|a, b| a.ms.total_cmp(&b.ms));
-    Ok(candidates)
+    let mut candidates: Vec<Candidate> = plans
+        .iter()
+        .zip(times)
+        .map(|(plan, times)| Candidate { variant: plan.settings.variant, ms: Spread::of(times).expect("there is a turn that counts") })
+        .collect();
+    candidates.sort_by(|a, b| a.ms.median.total_cmp(&b.ms.median));
+    Ok(Choice { photons: photons_of(&plans[0].chunk(0)), candidates })
 }
 
-fn median(mut times: Vec<f64>) -> f64 {
-    times.sort_by(f64::total_cmp);
-    times[times.len() / 2]
+/// Plans of every builder that can run the settings, one at least, with first chunks of the same photons.
+fn plans(gpu: &Gpu, scene: &RoomScene, settings: &Settings) -> Result<Vec<Plan>> {
+    let with = |chunk: Option<u32>| -> Result<Vec<Plan>> {
+        let (mut plans, mut refusal) = (Vec::new(), None);
+        for variant in Variant::ON_GPU {
+            let settings = Settings { variant, chunk, rounds: 1, ..settings.clone() };
+            match Plan::new(scene, &settings, &limits(gpu.facts())) {
+                Ok(plan) => plans.push(plan),
+                // Some builder has a limit of its own.
+                Err(error @ Error::Setting { .. }) => refusal = Some(error),
+                Err(error) => return Err(error),
+            }
+        }
+        match refusal {
+            Some(refusal) if plans.is_empty() => Err(refusal),
+            _ => Ok(plans),
+        }
+    };
+    let plans = with(settings.chunk)?;
+    if settings.nearest.is_some() {
+        // These look at a round's photons together, whoever builds the map.
+        return Ok(plans);
+    }
+    let fewest = plans.iter().map(|plan| plan.path_capacity).min().map_or(2, |photons| photons.clamp(2, MOST_PHOTONS));
+    with(Some(fewest))
 }
 
 fn first_chunk_ms(gpu: &Gpu, scene: &RoomScene, plan: &Plan) -> Result<f64> {
@@ -80,7 +102,11 @@ fn first_chunk_ms(gpu: &Gpu, scene: &RoomScene, plan: &Plan) -> Result<f64> {
     let ranges = plan.chunk(0);
     commands.scope("chunk", |commands| {
         trace::chunk(commands, &resources, plan, 0, &ranges)?;
-        index::build(commands, &resources, plan, photons_of(&ranges))
+        index::build(commands, &resources, plan, photons_of(&ranges))?;
+        if plan.settings.gather == Gather::Brute {
+            estimate::gather(commands, &resources, plan, photons_of(&ranges))?;
+        }
+        Ok(())
     })?;
     commands.submit()?;
     gpu.check_validation()?;

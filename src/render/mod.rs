@@ -13,7 +13,7 @@ use std::sync::atomic::AtomicBool;
 use serde::Serialize;
 
 pub use bias::{bias_batch, measure_bias};
-pub use choice::{Candidate, choose_variant};
+pub use choice::{Candidate, Choice, choose_variant};
 pub use on_cpu::{on_cpu, photons_on_cpu, replay_on_cpu};
 pub use on_gpu::{constants, limits, on_gpu, photons_on_gpu, replay_on_gpu};
 

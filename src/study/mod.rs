@@ -14,7 +14,7 @@ pub mod reference;
 pub mod store;
 pub mod subject;
 
-use std::sync::atomic::AtomicBool;
+use std::sync::atomic::{AtomicBool, Ordering};
 use std::time::{Duration, Instant};
 
 use serde::Serialize;
@@ -110,7 +110,8 @@ pub fn run(
         write_all([(folder.file(subject::POINTS), points.into_bytes())])?;
     }
     let count: usize = subjects.iter().flat_map(|subject| &subject.groups).map(|group| group.configurations.len()).sum();
-    let share = study.request.budget / count.max(1) as u32;
+    let of_builders = if subjects.iter().any(Subject::is_of_paper) { study.request.budget / COMPACTION_SHARE } else { Duration::ZERO };
+    let share = (study.request.budget - of_builders) / count.max(1) as u32;
     let (mut begun, mut is_warm) = (0, false);
     for subject in &subjects {
         study.parts.push(Part {
@@ -131,14 +132,17 @@ pub fn run(
             }
         }
     }
-    if subjects.iter().any(Subject::is_of_paper) {
+    if !of_builders.is_zero() {
         let request = &study.request;
         let most = request.photons.saturating_mul(request.most_rounds).min(MOST_COMPACTED);
-        let wanted = compaction::Request::up_to(most, request.budget / COMPACTION_SHARE);
+        let wanted = compaction::Request::up_to(most, of_builders);
         match compaction::measure(gpu, &wanted, cancelled, tell) {
             Ok(map) => study.compaction = Some(map),
-            Err(Error::Interrupted) => return Ok(study),
-            Err(error) => return Err(error),
+            // What was measured before is worth its page.
+            Err(error) => tell(&format!("the map of builders is left out: {error}")),
+        }
+        if cancelled.load(Ordering::Relaxed) {
+            return Ok(study);
         }
     }
     study.complete = true;

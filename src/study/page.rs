@@ -67,7 +67,8 @@ fn of_builders(map: &Map) -> Markup {
             p {
                 "Time to trace and store photons of " (map.bounces) " bounces in a closed room that lets a share of them go on at every wall. "
                 "In each field the fastest builder, how many times sooner it is done than with one atomic a thread, and, below, "
-                "who cannot be told from it. All builders stored the same photons."
+                "who cannot be told from it. All builders stored the same photons to the bit, up to a million of them; of more the same "
+                "number met each fate at each bounce."
             }
             figure { (PreEscaped(compaction::chart::draw(map))) }
             details {

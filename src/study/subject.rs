@@ -124,12 +124,12 @@ impl Subject {
         if self.receivers.is_empty() { None } else { Some(self.receivers.iter().map(line).collect()) }
     }
 
-    /// One run; `None` where somebody ended it.
     /// Whether it is lit by the paper's line.
     pub fn is_of_paper(&self) -> bool {
         self.groups.iter().flat_map(|group| &group.configurations).any(|configuration| matches!(configuration.line, Line::Paper(_)))
     }
 
+    /// One run; `None` where somebody ended it.
     pub fn run(&self, gpu: &Gpu, configuration: &Configuration, rounds: u32, seed: u64, cancelled: &AtomicBool) -> Result<Option<Shot>> {
         let mut control = Control { cancelled, progress: &mut |_| {} };
         let shot = match &configuration.line {

@@ -2,7 +2,7 @@
 
 use crate::error::Result;
 use crate::gpu::kernels::{EndBounce, KeepOrder, TraceInPlace};
-use crate::gpu::{Commands, Extent};
+use crate::gpu::{Buffer, Commands, Extent};
 use crate::plan::Plan;
 use crate::plan::memory::group_count;
 use crate::prefix_sum::scan;
@@ -14,11 +14,10 @@ pub fn one_bounce<'a>(
     commands: &mut Commands,
     resources: &Resources,
     plan: &Plan,
+    [paths, next_paths]: [&Buffer; 2],
     push: &TracePush,
     extent: impl Fn() -> Extent<'a>,
 ) -> Result<()> {
-    let [even, odd] = &resources.paths;
-    let (paths, next_paths) = if push.bounce.is_multiple_of(2) { (even, odd) } else { (odd, even) };
     let Resources { rooms, walls, photons, counters, tallies, oddities, order, .. } = resources;
     let Some(OrderBuffers { survivors, block_sums, weights }) = order else { panic!("the plan has no order to keep") };
     let group_count = group_count(plan);

@@ -2,6 +2,7 @@
 
 use super::Round;
 use super::resources::{PhotonBuffers, TransportResources};
+use crate::constants::MAX_GROUPS;
 use crate::error::Result;
 use crate::gpu::kernels::{DispatchSize, FlyAtomic, FlyBallot, FlyWhole, MapCount, MapScatter, Shine};
 use crate::gpu::{Commands, Extent};
@@ -11,7 +12,6 @@ use crate::records::{CellPush, DispatchSizePush, Draws, EmissionPush, FlightPush
 use crate::rng::words;
 use crate::scene::geometry::Geometry;
 use crate::settings::transport::Append;
-use crate::trace::INDIRECT_GROUPS_X;
 
 /// The grid of a map in a round: cells as wide as the radius, its corner a little outside of the scene.
 pub fn cells(round: Round, map: &MapPlan) -> CellPush {
@@ -71,17 +71,23 @@ fn whole(commands: &mut Commands, round: Round, photons: &PhotonBuffers, map: &M
     let Round { resources, geometry, plan, .. } = round;
     let TransportResources { nodes, triangles, normals, uvs, materials, textures, texels, emitters, oddities, .. } = resources;
     commands.fill(&photons.counters, 0, 1, 0);
-    let push = FlyWholePush {
-        draws: draws(round, map),
-        emission: emission(geometry, chunk),
-        map: store(plan, map),
-        bounces: map.bounces,
-        stride: chunk.1.div_ceil(map.photons_per_invocation),
-    };
     let tallies = &photons.tallies[usize::from(map.caustic_only)];
-    let PhotonBuffers { counters, map, .. } = photons;
-    let kernel = FlyWhole { nodes, triangles, normals, uvs, materials, textures, texels, emitters, map, counters, tallies, oddities };
-    commands.dispatch(kernel, &push, Extent::Items(u64::from(push.stride)))
+    let (first_photon, end) = (chunk.0, chunk.0 + chunk.1);
+    let most = plan.photons_per_dispatch();
+    for first in (first_photon..end).step_by(most as usize) {
+        let count = most.min(end - first);
+        let push = FlyWholePush {
+            draws: draws(round, map),
+            emission: emission(geometry, (first, count)),
+            map: store(plan, map),
+            bounces: map.bounces,
+            stride: map.persistence.invocations(count),
+        };
+        let PhotonBuffers { counters, map, .. } = photons;
+        let kernel = FlyWhole { nodes, triangles, normals, uvs, materials, textures, texels, emitters, map, counters, tallies, oddities };
+        commands.dispatch(kernel, &push, Extent::Items(u64::from(push.stride)))?;
+    }
+    Ok(())
 }
 
 /// Writes the paths of a chunk as they leave the lights.
@@ -150,7 +156,7 @@ pub fn fly(commands: &mut Commands, round: Round, photons: &PhotonBuffers, map: 
 
 fn dispatch_size(commands: &mut Commands, photons: &PhotonBuffers, plan: &TransportPlan, counter: u32, capacity: u32) -> Result<()> {
     let PhotonBuffers { counters, dispatch_args, .. } = photons;
-    let push = DispatchSizePush { counter, capacity, items_per_group: plan.settings.group_size, max_groups: INDIRECT_GROUPS_X };
+    let push = DispatchSizePush { counter, capacity, items_per_group: plan.settings.group_size, max_groups: MAX_GROUPS };
     commands.dispatch(DispatchSize { counters, dispatch_args }, &push, Extent::Groups(1, 1))
 }
 

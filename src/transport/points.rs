@@ -3,17 +3,14 @@
 
 use super::Round;
 use super::resources::{PhotonBuffers, TransportResources};
-use crate::constants::{DOMAIN_CAMERA, DOMAIN_RECEIVERS};
+use crate::constants::{DOMAIN_CAMERA, DOMAIN_RECEIVERS, MAX_GROUPS};
 use crate::error::Result;
 use crate::gpu::kernels::{CrowdSize, LookupTwoWords, LookupU64, Receive, Resolve, View};
 use crate::gpu::{Commands, Extent};
 use crate::plan::transport::{MapPlan, Sensor, TESTS_PER_POINT, TransportPlan};
-use crate::records::{CellPush, DispatchSizePush, Draws, LookupPush, ReceivePush, ResolvePush, ViewPush};
+use crate::records::{CellPush, CrowdSizePush, Draws, LookupPush, ReceivePush, ResolvePush, ViewPush};
 use crate::rng::words;
 use crate::scene::Camera;
-
-/// Most groups along y that any device must allow.
-const MAX_GROUPS_Y: u32 = 65_535;
 
 /// Runs of `count` items, `step` long.
 fn runs(count: u32, step: u32) -> impl Iterator<Item = (u32, u32)> {
@@ -142,12 +139,7 @@ pub fn look_up(commands: &mut Commands, round: Round, photons: &PhotonBuffers, m
         commands.fill(crowded, 0, 2, 0);
         let groups = (end_point - first_point).div_ceil(plan.settings.group_size);
         dispatch(commands, &push, Extent::Groups(groups, 1))?;
-        let size = DispatchSizePush {
-            counter: 0,
-            capacity: end_point - first_point,
-            items_per_group: plan.settings.group_size,
-            max_groups: MAX_GROUPS_Y,
-        };
+        let size = CrowdSizePush { items_per_group: plan.settings.group_size, max_groups: MAX_GROUPS };
         commands.dispatch(CrowdSize { crowded, dispatch_args }, &size, Extent::Groups(1, 1))?;
         dispatch(commands, &LookupPush { first_slice: 1, ..push }, Extent::Indirect(dispatch_args))?;
         add_work(commands, plan, TESTS_PER_POINT * u64::from(end_point - first_point))?;

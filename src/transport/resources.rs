@@ -53,7 +53,7 @@ pub struct PhotonBuffers {
     /// Place of each photon among those of its bucket.
     pub ranks: Buffer,
     pub block_sums: Vec<Buffer>,
-    /// Points with so many candidates that several invocations share them: how many, the most candidates, which.
+    /// Points with so many candidates that several invocations share them: how many, the most candidates, and each one with its candidates.
     pub crowded: Buffer,
     /// Fates of the submission under way, one tally a bounce: of the global map's photons, and of the
     /// caustic map's.
@@ -127,7 +127,7 @@ impl PhotonBuffers {
             cells: gpu.buffer::<u32>("cells", buckets + 1, device)?,
             ranks: gpu.buffer::<u32>("ranks", capacity, device)?,
             block_sums: block_sums(gpu, buckets + 1, plan.settings.group_size)?,
-            crowded: gpu.buffer::<u32>("crowded points", 2 + u64::from(plan.points_at_once()), device)?,
+            crowded: gpu.buffer::<u32>("crowded points", 2 + 2 * u64::from(plan.points_at_once()), device)?,
             tallies: [gpu.buffer::<Tally>("global tallies", bounces, device)?, gpu.buffer::<Tally>("caustic tallies", bounces, device)?],
         };
         for tallies in &buffers.tallies {
