@@ -110,7 +110,7 @@ def measure(asked):
         "repeats": repeats,
         "limit_s": limit_s,
         "load_before": load,
-        "command": sys.argv,
+        "command": ["tools/bench_peers", *sys.argv[1:]],
         "contestants": [report.of_curve(curve, TARGETS) for curve in curves],
     }
     report.show(found, TARGETS)
