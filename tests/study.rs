@@ -45,7 +45,7 @@ fn axes_of(study: &Study) -> Vec<Axis> {
 fn the_open_box_is_studied_against_radiosity_and_goes_on_where_it_ended() {
     let Some(gpu) = device() else { return };
     let folder = tempfile::tempdir().unwrap();
-    let first = run(&gpu, folder.path(), request("open-box", 4)).unwrap();
+    let first = run(&gpu, folder.path(), request("open-box", 2)).unwrap();
     assert!(first.complete);
     let axes = axes_of(&first);
     for axis in [
@@ -110,7 +110,7 @@ fn the_open_box_is_studied_against_radiosity_and_goes_on_where_it_ended() {
     let whole = read("points.jsonl");
     let kept: Vec<&str> = whole.lines().take(1 + count / 2).collect();
     std::fs::write(folder.path().join("points.jsonl"), kept.join("\n") + "\n[\"builder\",{\"comm").unwrap();
-    let second = run(&gpu, folder.path(), request("open-box", 4)).unwrap();
+    let second = run(&gpu, folder.path(), request("open-box", 2)).unwrap();
     assert!(second.complete);
     let points = |study: &Study| study.parts[0].comparisons[0].curves.iter().flat_map(|curve| curve.points.clone()).collect::<Vec<_>>();
     for (kept, measured) in points(&second).iter().zip(&points(&first)) {
@@ -120,7 +120,7 @@ fn the_open_box_is_studied_against_radiosity_and_goes_on_where_it_ended() {
     }
 
     // Another study does not mix with it.
-    let error = run(&gpu, folder.path(), Request { photons: 4096, ..request("open-box", 4) }).unwrap_err().to_string();
+    let error = run(&gpu, folder.path(), Request { photons: 4096, ..request("open-box", 2) }).unwrap_err().to_string();
     assert!(error.starts_with("--out ") && error.contains("points.jsonl") && !error.contains('\n'), "{error}");
 }
 
@@ -145,7 +145,7 @@ fn floors_are_studied_against_their_closed_form() {
     let Some(gpu) = device() else { return };
     for name in ["disc-over-plane", "furnace"] {
         let folder = tempfile::tempdir().unwrap();
-        let study = run(&gpu, folder.path(), request(name, 4)).unwrap();
+        let study = run(&gpu, folder.path(), request(name, 2)).unwrap();
         let part = &study.parts[0];
         assert!(part.reference.contains("closed form"), "{name}");
         let photons = part.curves().find(|curve| curve.label == "direct light from photons").unwrap().points.last().unwrap();
@@ -164,7 +164,7 @@ fn a_study_that_is_cancelled_keeps_what_it_has() {
     let mut told = 0;
     let scene = lit::scene("open-box");
     let out = Folder::open("--out", folder.path()).unwrap();
-    let study = study::run(&gpu, &scene, request("open-box", 4), &out, &cancelled, &mut |_| {
+    let study = study::run(&gpu, &scene, request("open-box", 2), &out, &cancelled, &mut |_| {
         told += 1;
         // At the third comparison.
         if told == 4 {
