@@ -90,6 +90,24 @@ fn crowded_points_miss_no_photon() {
     assert_holds("crowded points", same_film("crowded points", &whole, &parts));
 }
 
+/// Cameras and lookups take pixels in tiles, which no picture need be a multiple of.
+#[test]
+fn every_pixel_is_lit_whatever_the_size_of_the_picture() {
+    let Some(gpu) = device() else { return };
+    let scene = scene("furnace");
+    for (width, height) in [(1, 1), (3, 2), (8, 4), (13, 7), (21, 9)] {
+        let (geometry, plan) = plan_of(&gpu, &scene, &small(), Sensor::Picture { width, height });
+        let camera = camera_of(&scene);
+        let lit = light(&gpu, &View { geometry: &geometry, camera: Some(&camera), phases: &[] }, plan);
+        let pixels: Vec<u64> = lit.film.sums.chunks(3).map(|sums| sums[0]).collect();
+        let mean = pixels.iter().sum::<u64>() as f64 / pixels.len() as f64;
+        for (pixel, sum) in pixels.iter().enumerate() {
+            let share = *sum as f64 / mean;
+            assert!((0.4..1.6).contains(&share), "{width} x {height}: pixel {pixel} has {share} of the mean");
+        }
+    }
+}
+
 /// More photons than a dispatch flies to their end on a software device.
 #[test]
 fn persistent_photons_are_the_same_in_several_dispatches() {

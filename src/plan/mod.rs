@@ -358,6 +358,21 @@ mod tests {
         }
     }
 
+    /// Runs of photons cut into dispatches hold each photon once; invocations are never more than photons.
+    #[test]
+    fn persistent_photons_are_dealt_without_loss() {
+        let range = EmissionRange { light: 1, first_photon: 100, count: 1001 };
+        for most in [1, 7, 1000, 1001, 5000] {
+            let parts: Vec<EmissionRange> = range.parts(most).collect();
+            let photons: Vec<u32> = parts.iter().flat_map(|part| part.first_photon..part.first_photon + part.count).collect();
+            assert!(photons.into_iter().eq(100..1101) && parts.iter().all(|part| part.light == 1 && part.count <= most), "{most}");
+        }
+        let dealing = Persistence { busy_invocations: 100, most_photons: 4 };
+        for (photons, invocations) in [(1, 1), (99, 99), (199, 199), (200, 100), (399, 133), (400, 100), (4000, 1000)] {
+            assert_eq!(dealing.invocations(photons), invocations, "{photons} photons");
+        }
+    }
+
     /// Whatever the split, each light numbers its photons of all rounds without gaps.
     #[test]
     fn lights_number_their_photons_without_gaps() {

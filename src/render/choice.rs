@@ -3,8 +3,6 @@
 
 use std::time::{Duration, Instant};
 
-use serde::Serialize;
-
 use super::on_gpu::{constants, limits, prepare};
 use crate::error::{Error, Result};
 use crate::gpu::check::strict_math;
@@ -17,7 +15,7 @@ use crate::timings::Spread;
 use crate::{estimate, index, trace};
 
 /// What the builders took.
-#[derive(Debug, Clone, PartialEq, Serialize)]
+#[derive(Debug, Clone, PartialEq)]
 pub struct Choice {
     /// Photons that each of them traced.
     pub photons: u32,
@@ -26,7 +24,7 @@ pub struct Choice {
 }
 
 /// What one builder took.
-#[derive(Debug, Clone, Copy, PartialEq, Serialize)]
+#[derive(Debug, Clone, Copy, PartialEq)]
 pub struct Candidate {
     pub variant: Variant,
     /// Milliseconds to trace and index the photons, and to gather them by brute force where that steps through the
