@@ -326,6 +326,7 @@ struct ReceivePush {
     Draws draws;
     uint first_point;
     uint end_point;
+    uint point_count;
     uint emitter_count;
     float film_scale;
     float film_limit;
@@ -343,7 +344,7 @@ struct LookupPush {
     uint first_point;
     uint end_point;
     uint point_count;
-    uint points_per_pixel;
+    uint pixel_count;
     uint arrival;
     uint round;
     uint width;
@@ -353,11 +354,13 @@ struct LookupPush {
     CellPush cells;
 };
 
-struct ResolvePush {
-    uint first_pixel;
-    uint end_pixel;
-    uint points_per_pixel;
+struct WeighPush {
+    uint first_point;
+    uint end_point;
     uint point_count;
+    uint pixel_count;
+    uint width;
+    uint height;
     uint arrivals;
     uint round;
     float film_scale;
@@ -366,6 +369,13 @@ struct ResolvePush {
     float caustic_radius;
     float global_flux;
     float caustic_flux;
+};
+
+struct ResolvePush {
+    uint first_pixel;
+    uint end_pixel;
+    uint pixel_count;
+    uint points_per_pixel;
 };
 
 struct EndRoundPush {

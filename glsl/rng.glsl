@@ -4,6 +4,7 @@
 // of MT19937 that the next output needs, nothing for Philox, (sample, key of its light) of Sobol' points.
 
 #include "philox.glsl"
+#include "sobol.glsl"
 
 layout(constant_id = 1) const uint RNG = RNG_PHILOX;
 
@@ -68,38 +69,6 @@ float mt_next(inout uvec2 words, uint draw)
 vec4 philox_block(RandomKey key, uint photon, uint block)
 {
     return philox_floats(uvec4(photon, key.round, block, DOMAIN_PHOTONS), key.seed);
-}
-
-// Point `index` of the Sobol' sequence as fractions of 2^32: the first four dimensions of Joe and Kuo
-// (2008). Direction numbers follow from the recurrences of their polynomials, 1, x + 1, x^2 + x + 1
-// and x^3 + x + 1; those of the next bit stand first.
-uvec4 sobol(uint index)
-{
-    uvec4 point = uvec4(bitfieldReverse(index), 0, 0, 0);
-    uint second = 0x80000000u;
-    uvec2 third = uvec2(0x80000000u, 0xc0000000u);
-    uvec3 fourth = uvec3(0x80000000u, 0xc0000000u, 0x20000000u);
-    for (; index != 0; index >>= 1) {
-        if ((index & 1u) == 1) {
-            point.yzw ^= uvec3(second, third.x, fourth.x);
-        }
-        second ^= second >> 1;
-        third = uvec2(third.y, third.y ^ third.x ^ (third.x >> 2));
-        fourth = uvec3(fourth.y, fourth.z, fourth.y ^ fourth.x ^ (fourth.x >> 3));
-    }
-    return point;
-}
-
-// Owen's scrambling by a hash (Burley 2020, listing 3): each bit is flipped or not by the bits above
-// it and the seed. Of an index, it shuffles every aligned block of 2^k among such blocks.
-uint owen_scramble(uint x, uint seed)
-{
-    x = bitfieldReverse(x) + seed;
-    x ^= x * 0x6c50b47cu;
-    x ^= x * 0xb82f1e52u;
-    x ^= x * 0xc7afe638u;
-    x ^= x * 0x8d22f6e6u;
-    return bitfieldReverse(x);
 }
 
 // Four dimensions of a light's sample: shuffled and scrambled by block, so that no two blocks are alike.

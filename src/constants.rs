@@ -35,8 +35,8 @@ constants! {
     DOMAIN_RECEIVERS = 3;
     /// Philox blocks of an emission in a scene of triangles; bounce b has block `EMISSION_BLOCKS` + b.
     EMISSION_BLOCKS = 2;
-    /// Philox blocks of one vertex of a path from the camera: one to go on, the others for light.
-    VERTEX_BLOCKS = 64;
+    /// Philox blocks of one vertex of a path from the camera: one to go on, the other for light.
+    VERTEX_BLOCKS = 2;
     /// Distance between the two state words that one output of MT19937 combines.
     MT_MIDDLE = 397;
 
@@ -85,9 +85,11 @@ constants! {
     PART_INDIRECT = 8;
     PART_COUNT = 4;
 
-    /// Bits of a visible point's arrivals: it lies behind a mirror or glass, or behind a gather ray.
+    /// Bits of a visible point's arrivals: it lies behind a mirror or glass, or behind a gather ray; or neither, so that
+    /// one of a pixel's samples looks the global map up for all.
     SEEN_OVER_SPECULAR = 256;
     SEEN_BY_GATHER = 512;
+    SEEN_FOR_ALL = 1024;
 
     /// `GATHER_RAYS`: which visible points take their indirect light from a ray of a final gather.
     GATHER_NONE = 0;

@@ -474,6 +474,7 @@ records! {
         draws: Draws,
         first_point: u32,
         end_point: u32,
+        point_count: u32,
         emitter_count: u32,
         film_scale: f32,
         film_limit: f32,
@@ -493,7 +494,7 @@ records! {
         first_point: u32,
         end_point: u32,
         point_count: u32,
-        points_per_pixel: u32,
+        pixel_count: u32,
         /// Index of the arrival that the map holds, where it holds one only: where its sums stand.
         arrival: u32,
         round: u32,
@@ -506,11 +507,14 @@ records! {
         cells: CellPush,
     }
 
-    ResolvePush {
-        first_pixel: u32,
-        end_pixel: u32,
-        points_per_pixel: u32,
+    WeighPush {
+        first_point: u32,
+        end_point: u32,
         point_count: u32,
+        pixel_count: u32,
+        /// Of the picture; 0 where points are receivers, in an order of their own.
+        width: u32,
+        height: u32,
         /// Mask of the arrivals that some map holds.
         arrivals: u32,
         round: u32,
@@ -521,6 +525,14 @@ records! {
         /// Flux of a photon of relative flux 1, over the photons of the round.
         global_flux: f32,
         caustic_flux: f32,
+    }
+
+    ResolvePush {
+        first_pixel: u32,
+        end_pixel: u32,
+        pixel_count: u32,
+        /// Visible points that photons may have lit.
+        points_per_pixel: u32,
     }
 
     EndRoundPush {

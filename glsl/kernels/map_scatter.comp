@@ -6,13 +6,14 @@
 #extension GL_EXT_scalar_block_layout : require
 #extension GL_EXT_control_flow_attributes : require
 #include "records.glsl"
+#include "scene/map_photon.glsl"
 
 layout(local_size_x_id = 0) in;
 layout(push_constant, scalar) uniform Push { CellPush push; };
-layout(set = 1, binding = 0, scalar) readonly buffer Map { MapPhoton map[]; };
+layout(set = 1, binding = 0, scalar) readonly buffer Map { PackedMapPhoton map[]; };
 layout(set = 1, binding = 1, scalar) readonly buffer Counters { uint counters[]; };
 layout(set = 1, binding = 2, scalar) readonly buffer Cells { uint cells[]; };
-layout(set = 1, binding = 3, scalar) writeonly buffer SortedMap { MapPhoton sorted_map[]; };
+layout(set = 1, binding = 3, scalar) writeonly buffer SortedMap { PackedMapPhoton sorted_map[]; };
 layout(set = 1, binding = 4, scalar) readonly buffer Ranks { uint ranks[]; };
 
 #include "dispatch.glsl"
@@ -22,7 +23,8 @@ void main()
 {
     uint index = invocation_index();
     if (index < min(counters[0], push.photon_capacity)) {
-        MapPhoton photon = map[index];
-        sorted_map[cells[bucket_of(cell_at(photon.position, push), push)] + ranks[index]] = photon;
+        PackedMapPhoton photon = map[index];
+        uint bucket = bucket_of(cell_at(uintBitsToFloat(photon.place.xyz), push), push);
+        sorted_map[cells[bucket] + ranks[index]] = photon;
     }
 }

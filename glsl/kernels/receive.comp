@@ -17,8 +17,10 @@ layout(set = 0, binding = 8, scalar) readonly buffer Receivers { Receiver receiv
 #include "oddities.glsl"
 #include "dispatch.glsl"
 #include "philox.glsl"
+#include "sobol.glsl"
 #include "sampling.glsl"
 #include "scene/effects.glsl"
+#include "scene/samples.glsl"
 #include "scene/directions.glsl"
 #include "scene/bvh.glsl"
 #include "scene/surface.glsl"
@@ -31,6 +33,7 @@ layout(set = 0, binding = 8, scalar) readonly buffer Receivers { Receiver receiv
 #include "scene/cover.glsl"
 #include "film/wide.glsl"
 #include "scene/film.glsl"
+#include "scene/no_point.glsl"
 #include "stages/visible_point.glsl"
 #include "stages/chain.glsl"
 
@@ -49,7 +52,7 @@ void main()
     Target here = Target(receiver.position, position_error(receiver.position), ng, ns, ns, SURFACE_RECEIVER, 0.0);
     Chain chain = new_chain(receiver.position, ns, vec3(1.0));
     if (SHADOW_RAYS != 0) {
-        add_light(chain, direct_light(here, push.emitter_count, push.draws, index, 1 + VERTEX_BLOCKS * MAX_CHAIN));
+        add_light(chain, direct_light(here, push.emitter_count, push.draws, index, 0, 1 + VERTEX_BLOCKS * MAX_CHAIN));
     }
     // Photons only ever land on surfaces, and tell the irradiance of those: any other point, or direction, looks
     // around.
@@ -76,10 +79,10 @@ void main()
         if (HAS_ALL_ARRIVALS) {
             chain.sees_emission = !on_surface;
         }
-        follow(chain, index, push.draws, push.emitter_count);
+        follow(chain, index, 0, push.draws, push.emitter_count);
     }
     note_unless(is_finite(chain.light[0]) && is_finite(chain.light[1]) && is_finite(chain.light[2]), ODD_LIGHT, push.draws.domain,
                 push.draws.round, index);
     write_pass_sum(index, chain.light, push.film_scale, push.film_limit);
-    write_points(chain, index);
+    write_points(chain, index, 0, push.point_count);
 }

@@ -1,123 +1,38 @@
-// Ends a pass: what the photon maps give each pixel's points joins the light that is known, and the
-// film takes the sum and its square.
+// Ends a pass: what the paths of each pixel found and what their points were lit by is added up, and the film takes the
+// sum and its square.
 // Dispatched by src/transport/points.rs once a pass. One thread = one pixel or receiver.
 #version 460
 #extension GL_GOOGLE_include_directive : require
 #extension GL_EXT_scalar_block_layout : require
-#extension GL_EXT_control_flow_attributes : require
-#extension GL_KHR_shader_subgroup_basic : require
-#extension GL_KHR_shader_subgroup_arithmetic : require
 #include "records.glsl"
 
 layout(local_size_x_id = 0) in;
 layout(push_constant, scalar) uniform Push { ResolvePush push; };
-layout(set = 1, binding = 1, scalar) readonly buffer VisiblePoints { VisiblePoint visible_points[]; };
-layout(set = 1, binding = 2, scalar) readonly buffer PassSums { uvec2 pass_sums[]; };
-layout(set = 1, binding = 3, scalar) readonly buffer Estimates { uvec2 estimates[]; };
-layout(set = 1, binding = 4, scalar) buffer FilmSums { uvec2 film_sums[]; };
-layout(set = 1, binding = 5, scalar) buffer FilmSquares { uvec4 film_squares[]; };
+layout(set = 1, binding = 0, scalar) readonly buffer PassSums { uvec2 pass_sums[]; };
+layout(set = 1, binding = 1, scalar) readonly buffer Estimates { uvec2 estimates[]; };
+layout(set = 1, binding = 2, scalar) buffer FilmSums { uvec2 film_sums[]; };
+layout(set = 1, binding = 3, scalar) buffer FilmSquares { uvec4 film_squares[]; };
 
-#include "math.glsl"
-#include "oddities.glsl"
 #include "dispatch.glsl"
 #include "scene/effects.glsl"
-#include "scene/directions.glsl"
-#include "scene/bvh.glsl"
-#include "scene/surface.glsl"
-#include "scene/belongs.glsl"
-#include "scene/cover.glsl"
 #include "film/wide.glsl"
-#include "scene/film.glsl"
-
-vec3 gathered_flux(uint place)
-{
-    vec3 flux;
-    for (uint channel = 0; channel < 3; channel++) {
-        uvec2 sum = estimates[3 * place + channel];
-        flux[channel] = (float(sum.y) * 4294967296.0 + float(sum.x)) * (1.0 / float(1u << FLUX_BITS));
-    }
-    return flux;
-}
-
-// Area in which photons were looked for, weighted by the kernel.
-float estimate_area(VisiblePoint point, uint pixel, float radius)
-{
-    float area = 3.14159265358979324 * kernel_norm() * radius * radius;
-    if (HAS_EDGE_CORRECTION) {
-        bool whole;
-        float covered = covered_area(point.position, unpack_normal(point.normal), radius, MIN_NORMAL_COSINE, whole);
-        note_unless(is_finite(covered), ODD_ESTIMATE, 0, push.round, pixel);
-        if (whole) {
-            atomicAdd(anomalies[2], 1);
-        }
-        // Photons were found, so some surface is there; rounding may call a sliver nothing.
-        return max(covered, area * (1.0 / 4096.0));
-    }
-    return area;
-}
-
-// Part of the picture (direct, specular, caustic, indirect) that an arrival adds to.
-uint part_number(uint seen, uint arrival)
-{
-    return (seen & SEEN_OVER_SPECULAR) != 0 ? 1 : ((seen & SEEN_BY_GATHER) != 0 ? 3 : (arrival == 0 ? 0 : arrival + 1));
-}
 
 void main()
 {
     uint pixel = push.first_pixel + invocation_index();
-    bool exists = pixel < push.end_pixel;
-    uvec2 sums[3];
-    uvec2 totals[PART_COUNT];
-    for (uint part = 0; part < PART_COUNT; part++) {
-        totals[part] = uvec2(0);
-    }
-    for (uint channel = 0; channel < 3; channel++) {
-        sums[channel] = exists ? pass_sums[3 * pixel + channel] : uvec2(0);
-    }
-    uint first_arrival = 1;
-    if (HAS_ALL_ARRIVALS) {
-        first_arrival = 0;
-    }
-    for (uint k = 0; k < (exists ? push.points_per_pixel : 0); k++) {
-        uint place = push.points_per_pixel * pixel + k;
-        VisiblePoint point = visible_points[place];
-        float global_area = 0.0; // 0: not known yet
-        for (uint arrival = first_arrival; arrival < 3; arrival++) {
-            if ((point.arrivals & push.arrivals & (1u << arrival)) == 0) {
-                continue;
-            }
-            vec3 flux = gathered_flux((arrival - first_arrival) * push.point_count + place);
-            if (flux == vec3(0.0)) {
-                continue;
-            }
-            bool is_caustic = false;
-            if (HAS_CAUSTIC_MAP) {
-                is_caustic = arrival == 1;
-            }
-            float area = is_caustic ? 0.0 : global_area;
-            if (area == 0.0) {
-                area = estimate_area(point, pixel, is_caustic ? push.caustic_radius : push.global_radius);
-            }
-            global_area = is_caustic ? global_area : area;
-            vec3 radiance = point.weight * (flux * divide(is_caustic ? push.caustic_flux : push.global_flux, area));
-            note_unless(is_finite(radiance), ODD_ESTIMATE, 0, push.round, pixel);
-            uint part = part_number(point.arrivals, arrival);
-            for (uint channel = 0; channel < 3; channel++) {
-                uvec2 units = to_film_units(radiance[channel], push.film_scale, push.film_limit);
-                sums[channel] = add64(sums[channel], units);
-                totals[part] = add64(totals[part], units);
-            }
-        }
-    }
-    for (uint part = 0; part < PART_COUNT; part++) {
-        add_part_total(part, totals[part]);
-    }
-    if (!exists) {
+    if (pixel >= push.end_pixel) {
         return;
     }
     for (uint channel = 0; channel < 3; channel++) {
+        uvec2 sum = uvec2(0);
+        for (uint number = 0; number < SAMPLES; number++) {
+            sum = add64(sum, pass_sums[3 * (SAMPLES * pixel + number) + channel]);
+        }
+        for (uint k = 0; k < push.points_per_pixel; k++) {
+            sum = add64(sum, estimates[3 * (k * push.pixel_count + pixel) + channel]);
+        }
         uint place = 3 * pixel + channel;
-        film_sums[place] = add64(film_sums[place], sums[channel]);
-        film_squares[place] = add128(film_squares[place], square64(sums[channel]));
+        film_sums[place] = add64(film_sums[place], sum);
+        film_squares[place] = add128(film_squares[place], square64(sum));
     }
 }

@@ -1,6 +1,6 @@
 // What each pixel sees: a path from the camera over mirrors and glass to the first surface that
 // scatters, its emission and direct light, and where asked one ray further for a final gather.
-// Dispatched by src/transport/points.rs once a pass. One thread = one pixel.
+// Dispatched by src/transport/points.rs once a pass. One thread = one sample of a pixel.
 #version 460
 #extension GL_GOOGLE_include_directive : require
 #extension GL_EXT_scalar_block_layout : require
@@ -16,8 +16,10 @@ layout(push_constant, scalar) uniform Push { ViewPush push; };
 #include "oddities.glsl"
 #include "dispatch.glsl"
 #include "philox.glsl"
+#include "sobol.glsl"
 #include "sampling.glsl"
 #include "scene/effects.glsl"
+#include "scene/samples.glsl"
 #include "filter.glsl"
 #include "scene/directions.glsl"
 #include "scene/bvh.glsl"
@@ -30,25 +32,28 @@ layout(push_constant, scalar) uniform Push { ViewPush push; };
 #include "film/wide.glsl"
 #include "scene/film.glsl"
 #include "scene/tiles.glsl"
+#include "scene/no_point.glsl"
 #include "stages/visible_point.glsl"
 #include "stages/chain.glsl"
 
 void main()
 {
-    uint place_in_order = push.first_pixel + invocation_index();
+    uint item = invocation_index();
+    uint place_in_order = push.first_pixel + item / SAMPLES;
     if (place_in_order >= push.end_pixel) {
         return;
     }
     uint pixel = pixel_in_tiles(place_in_order, push.width, push.height);
-    vec4 u = philox_floats(uvec4(pixel, push.draws.round, 0, push.draws.domain), push.draws.seed);
-    vec2 place = vec2(pixel % push.width, pixel / push.width) + 0.5 + filter_offsets(u.xy);
+    uint number = item % SAMPLES;
+    vec2 u = stratified(number, SAMPLES, pixel, 0, push.draws).xy;
+    vec2 place = vec2(pixel % push.width, pixel / push.width) + 0.5 + filter_offsets(u);
     vec2 picture = vec2(divide(2.0 * place.x, push.width) - 1.0, 1.0 - divide(2.0 * place.y, push.height));
     vec3 direction = normalize(push.forward + picture.x * push.right + picture.y * push.up);
 
     Chain chain = new_chain(push.eye, direction, vec3(1.0));
-    follow(chain, pixel, push.draws, push.emitter_count);
+    follow(chain, pixel, number, push.draws, push.emitter_count);
     note_unless(is_finite(chain.light[0]) && is_finite(chain.light[1]) && is_finite(chain.light[2]), ODD_LIGHT, push.draws.domain,
                 push.draws.round, pixel);
-    write_pass_sum(pixel, chain.light, push.film_scale, push.film_limit);
-    write_points(chain, pixel);
+    write_pass_sum(SAMPLES * pixel + number, chain.light, push.film_scale, push.film_limit);
+    write_points(chain, pixel, number, push.width * push.height);
 }

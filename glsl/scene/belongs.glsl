@@ -13,6 +13,12 @@ bool belongs(vec3 normal, vec3 other, float height, float radius, float least_co
     return cosine >= least_cosine && abs(height) <= radius * (sine + 1.0 / 1024.0);
 }
 
+// The same of equal normals, whose angle is 0.
+bool belongs_to_plane(float height, float radius)
+{
+    return abs(height) <= radius * (1.0 / 1024.0);
+}
+
 // Weight of a photon at the squared share `s` of the radius.
 float kernel_weight(float s)
 {

@@ -11,18 +11,16 @@ struct Target {
     float exponent;
 };
 
-// What arrives straight from lights, times lobe and cosine: irradiance where there is no lobe. Its random
-// numbers are blocks `first_block` and on of this invocation.
-vec3 direct_light(Target point, uint emitter_count, Draws draws, uint index, uint first_block)
+// What arrives straight from lights, times lobe and cosine: irradiance where there is no lobe. The rays of all samples of
+// the place `index` share a block of random numbers.
+vec3 direct_light(Target point, uint emitter_count, Draws draws, uint index, uint number, uint block)
 {
     vec3 sum = vec3(0.0);
     if (emitter_count == 0) {
         return sum;
     }
     for (uint ray = 0; ray < SHADOW_RAYS; ray++) {
-        vec4 u = philox_floats(uvec4(index, draws.round, first_block + ray, draws.domain), draws.seed);
-        // The choice of a light is stratified over the rays.
-        u.x = min(divide(float(ray) + u.x, float(SHADOW_RAYS)), 1.0 - 1.0 / 16777216.0);
+        vec3 u = stratified(number * SHADOW_RAYS + ray, SAMPLES * SHADOW_RAYS, index, block, draws);
         Arriving arriving = sample_light(emitter_count, point.position, point.ns, u);
         float cosine = dot(arriving.wi, point.ns);
         // Before the guards below, which would drop what is no number.

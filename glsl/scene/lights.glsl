@@ -128,10 +128,10 @@ struct Arriving {
     bool is_far;
 };
 
-// u = (light, two for its area, spare).
-Arriving sample_light(uint emitter_count, vec3 position, vec3 ns, vec4 u)
+// u = (two for its area, light).
+Arriving sample_light(uint emitter_count, vec3 position, vec3 ns, vec3 u)
 {
-    Emitter light = emitters[pick_emitter(emitter_count, u.x)];
+    Emitter light = emitters[pick_emitter(emitter_count, u.z)];
     Arriving arriving = Arriving(vec3(0.0), divide(light.strength, light.probability), light.position, false);
     float cos_light = 1.0;
     bool by_direction = false;
@@ -139,7 +139,7 @@ Arriving sample_light(uint emitter_count, vec3 position, vec3 ns, vec4 u)
         if (light.kind == EMITTER_TRIANGLE) {
             Triangle triangle = triangles[light.triangle];
             SurfaceMaterial material = materials[triangle.material];
-            vec2 at = sample_triangle(u.yz);
+            vec2 at = sample_triangle(u.xy);
             vec3 normal = triangle_normal(triangle);
             vec3 point = triangle_point(triangle, at.x, at.y);
             float side = dot(normal, position - point);
@@ -151,7 +151,7 @@ Arriving sample_light(uint emitter_count, vec3 position, vec3 ns, vec4 u)
             cos_light = is_before(side, position, triangle_error(triangle)) ? max(dot(normal, normalize(position - point)), 0.0) : 0.0;
             if (cos_light > 0.0 && material.emission_texture == NONE) {
                 vec4 direction = sample_spherical_triangle(normalize(triangle.a - position), normalize(triangle.b - position),
-                                                           normalize(triangle.c - position), u.yz);
+                                                           normalize(triangle.c - position), u.xy);
                 float approach = -dot(direction.xyz, normal);
                 if (direction.w > 0.0 && approach > 0.0) {
                     by_direction = true;
@@ -170,7 +170,7 @@ Arriving sample_light(uint emitter_count, vec3 position, vec3 ns, vec4 u)
     }
     if (HAS_DISC_LIGHTS) {
         if (light.kind == EMITTER_DISC_COSINE || light.kind == EMITTER_DISC_UNIFORM) {
-            vec3 point = sample_disc(light.position, light.direction, light.size, u.yz);
+            vec3 point = sample_disc(light.position, light.direction, light.size, u.xy);
             arriving.target = offset_origin(point, position_error(point), light.direction, light.direction);
             arriving.radiance *= 3.14159265358979324 * light.size * light.size;
             float cosine = dot(light.direction, normalize(position - point));
@@ -185,7 +185,7 @@ Arriving sample_light(uint emitter_count, vec3 position, vec3 ns, vec4 u)
     if (HAS_ENVIRONMENT) {
         if (light.kind == EMITTER_ENVIRONMENT) {
             arriving.is_far = true;
-            vec3 local = sample_cosine_hemisphere(u.y, u.z);
+            vec3 local = sample_cosine_hemisphere(u.x, u.y);
             arriving.wi = to_frame(local, ns);
             arriving.radiance *= divide(3.14159265358979324, max(local.z, 1e-6));
         }

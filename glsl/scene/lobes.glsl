@@ -13,17 +13,23 @@ float scatter_scale(uint kind, float exponent)
     return kind == SURFACE_GLOSSY ? (exponent + 2.0) * 0.15915494309189535 : 0.31830988618379067;
 }
 
+// Whether a surface weighs light by its direction.
+bool has_lobe(uint kind)
+{
+    bool has = false;
+    if (HAS_GLOSSY) {
+        has = has || kind == SURFACE_GLOSSY;
+    }
+    if (HAS_PAPER_PHONG) {
+        has = has || kind == SURFACE_PAPER_PHONG;
+    }
+    return has;
+}
+
 // How a lobe weighs light from wi towards wo; 1 on a Lambertian surface.
 float lobe_weight(uint kind, float exponent, vec3 ns, vec3 wo, vec3 wi)
 {
-    bool has_lobe = false;
-    if (HAS_GLOSSY) {
-        has_lobe = has_lobe || kind == SURFACE_GLOSSY;
-    }
-    if (HAS_PAPER_PHONG) {
-        has_lobe = has_lobe || kind == SURFACE_PAPER_PHONG;
-    }
-    if (!has_lobe) {
+    if (!has_lobe(kind)) {
         return 1.0;
     }
     vec3 mirror = mirrored(wi, ns);

@@ -15,8 +15,9 @@ float fresnel(float cos_i, float cos_t, float eta)
 }
 
 // Samples where a path goes on that came from wo; u = (choice, two for the direction). A camera path
-// carries radiance, which refraction compresses; a photon carries flux.
-Scatter sample_scatter(Surface surface, vec3 wo, vec3 u, bool carries_radiance)
+// carries radiance, which refraction compresses; a photon carries flux. Glass that reflects some light and refracts some
+// does the first with the chance `mirror_chance`; 0: as much as it reflects.
+Scatter sample_scatter(Surface surface, vec3 wo, vec3 u, bool carries_radiance, float mirror_chance)
 {
     vec3 ns = surface.ns;
     if (HAS_MIRROR) {
@@ -33,13 +34,17 @@ Scatter sample_scatter(Surface surface, vec3 wo, vec3 u, bool carries_radiance)
             float cos_t_squared = eta * eta * cos_i * cos_i + (1.0 - eta) * (1.0 + eta);
             float cos_t = sqrt(max(cos_t_squared, 0.0));
             float reflectance = cos_t_squared > 0.0 ? fresnel(cos_i, cos_t, eta) : 1.0;
-            if (u.x < reflectance) {
+            bool as_much = mirror_chance == 0.0 || reflectance == 0.0 || reflectance == 1.0;
+            float chance = as_much ? reflectance : mirror_chance;
+            if (u.x < chance) {
                 vec3 wi = mirrored(wo, ns);
-                return Scatter(wi, surface.base_colour, dot(wi, surface.ng) > 0.0);
+                float weight = as_much ? 1.0 : divide(reflectance, chance);
+                return Scatter(wi, weight * surface.base_colour, dot(wi, surface.ng) > 0.0);
             }
             vec3 wi = normalize((eta * cos_i - cos_t) * ns - eta * wo);
-            float compression = carries_radiance ? eta * eta : 1.0;
-            return Scatter(wi, compression * surface.base_colour, dot(wi, surface.ng) < 0.0);
+            float weight = as_much ? 1.0 : divide(1.0 - reflectance, 1.0 - chance);
+            weight *= carries_radiance ? eta * eta : 1.0;
+            return Scatter(wi, weight * surface.base_colour, dot(wi, surface.ng) < 0.0);
         }
     }
     if (HAS_GLOSSY) {

@@ -12,3 +12,10 @@ uint pixel_in_tiles(uint place, uint width, uint height)
     uint in_tile = within - 8 * rows * tile;
     return (4 * band + in_tile / columns) * width + 8 * tile + in_tile % columns;
 }
+
+// The same of visible points: sets of one a pixel, set after set. Receivers have an order of their own: their width is 0.
+uint point_in_tiles(uint place, uint width, uint height, uint pixel_count)
+{
+    uint pixel = place % pixel_count;
+    return width == 0 ? place : place - pixel + pixel_in_tiles(pixel, width, height);
+}

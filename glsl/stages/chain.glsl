@@ -62,9 +62,13 @@ bool gathers_here(Surface surface)
     return GATHER_RAYS == GATHER_ALL;
 }
 
-// Follows the chain to its end. Random numbers: block 1 + VERTEX_BLOCKS * depth goes on, the blocks after
-// it are for direct light.
-void follow(inout Chain chain, uint index, Draws draws, uint emitter_count)
+// Of samples enough, so many see what the first glass mirrors, however faint that is: a lamp in it may be all there is.
+const float MIRROR_CHANCE = 0.5;
+const uint MIRROR_SAMPLES = 4;
+
+// Follows the chain of sample `number` of a place to its end. Random numbers: block 1 + VERTEX_BLOCKS * depth goes on, the
+// one after it is for direct light.
+void follow(inout Chain chain, uint index, uint number, Draws draws, uint emitter_count)
 {
     for (uint depth = 0; depth < MAX_CHAIN; depth++) {
         note_unless(is_finite(chain.position) && is_finite(chain.direction) && is_finite(chain.weight), ODD_LIGHT, draws.domain,
@@ -85,26 +89,33 @@ void follow(inout Chain chain, uint index, Draws draws, uint emitter_count)
             return;
         }
         uint block = 1 + VERTEX_BLOCKS * depth;
-        vec3 u = philox_floats(uvec4(index, draws.round, block, draws.domain), draws.seed).xyz;
         bool specular = is_specular(surface);
         if (!specular) {
             vec3 scale = surface.base_colour * scatter_scale(surface.kind, surface.parameter);
             if (SHADOW_RAYS != 0) {
                 if ((PARTS & part_of(chain, ARRIVED_DIRECT)) != 0) {
                     Target here = Target(surface.position, surface.error, surface.ng, surface.ns, wo, surface.kind, surface.parameter);
-                    add_light(chain, scale * direct_light(here, emitter_count, draws, index, block + 1));
+                    add_light(chain, scale * direct_light(here, emitter_count, draws, index, number, block + 1));
                 }
             }
-            bool gathers = !chain.gathers && gathers_here(surface) && (PARTS & part_of(chain, ARRIVED_INDIRECT)) != 0;
+            bool for_all = !chain.saw_specular && !chain.gathers;
+            bool leads = !for_all || number == 0;
+            bool gathers = leads && !chain.gathers && gathers_here(surface) && (PARTS & part_of(chain, ARRIVED_INDIRECT)) != 0;
             uint arrivals = arrivals_wanted(chain, gathers);
-            arrivals |= arrivals == 0 ? 0 : (chain.saw_specular ? SEEN_OVER_SPECULAR : 0) | (chain.gathers ? SEEN_BY_GATHER : 0);
-            chain.points[chain.point_count++] = VisiblePoint(surface.position, pack_normal(surface.ng), chain.weight * scale,
+            if (HAS_CAUSTIC_MAP) {
+                arrivals &= leads ? arrivals : ARRIVED_CAUSTIC;
+            } else {
+                arrivals = leads ? arrivals : 0;
+            }
+            arrivals |= arrivals == 0 ? 0 : (chain.saw_specular ? SEEN_OVER_SPECULAR : 0) | (chain.gathers ? SEEN_BY_GATHER : 0) | (for_all ? SEEN_FOR_ALL : 0);
+            chain.points[chain.point_count++] = VisiblePoint(surface.position, pack_normal(surface.ng), divide(chain.weight * scale, float(SAMPLES)),
                                                              pack_normal(surface.ns), pack_direction(wo, 0), surface.parameter,
                                                              surface.kind, arrivals);
             if (!gathers) {
                 return;
             }
             chain.gathers = true;
+            chain.weight *= for_all ? float(SAMPLES) : 1.0;
             // Shadow rays and the caustic map have counted what shines from here on.
             chain.sees_emission = false;
         }
@@ -115,7 +126,10 @@ void follow(inout Chain chain, uint index, Draws draws, uint emitter_count)
         if (ends) {
             return;
         }
-        Scatter scatter = sample_scatter(surface, wo, u, true);
+        uint count = SAMPLES;
+        float mirror_chance = depth == 0 && count >= MIRROR_SAMPLES ? MIRROR_CHANCE : 0.0;
+        vec3 u = stratified(number, count, index, block, draws).zxy;
+        Scatter scatter = sample_scatter(surface, wo, u, true, mirror_chance);
         if (!scatter.alive) {
             return;
         }
@@ -131,13 +145,14 @@ void follow(inout Chain chain, uint index, Draws draws, uint emitter_count)
     }
 }
 
-void write_points(Chain chain, uint pixel)
+// All pixels' first points stand first, so that neighbours in memory are neighbours in the picture.
+void write_points(Chain chain, uint pixel, uint number, uint pixel_count)
 {
-    uint per_pixel = 1;
+    uint per_path = 1;
     if (GATHER_RAYS != GATHER_NONE) {
-        per_pixel = 2;
+        per_path = 2;
     }
-    for (uint k = 0; k < per_pixel; k++) {
-        visible_points[per_pixel * pixel + k] = chain.points[k];
+    for (uint k = 0; k < per_path; k++) {
+        visible_points[(per_path * number + k) * pixel_count + pixel] = chain.points[k];
     }
 }

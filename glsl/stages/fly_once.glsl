@@ -27,7 +27,7 @@ Flown fly_once(inout LightPath path, uint bounce)
         flown.photon = MapPhoton(surface.position, pack_normal(surface.ng), path.flux, pack_direction(wo, findLSB(path.arrival)));
 
         vec4 u = philox_floats(uvec4(path.photon, push.draws.round, EMISSION_BLOCKS + bounce, push.draws.domain), push.draws.seed);
-        Scatter scatter = sample_scatter(surface, wo, u.yzw, false);
+        Scatter scatter = sample_scatter(surface, wo, u.yzw, false, 0.0);
         vec3 flux = path.flux * scatter.weight;
         if (HAS_SMOOTH_NORMALS) {
             if (surface.ns != surface.ng) {

@@ -1,9 +1,10 @@
 // Density estimation of a photon map: each visible point sums the flux of the photons that belong to it.
 // A point's candidates are shared out in slices of GATHER_SLICE, so that no invocation loops long: the first one of
-// every point at first, then those of the few points that have more. The including kernel chose how sums are added.
+// every point at first, then those of the few points that have more. Of a slice, neighbouring invocations take every
+// LOOKUP_LANES-th candidate. The including kernel chose how sums are added.
 
 layout(set = 0, binding = 0, scalar) readonly buffer VisiblePoints { VisiblePoint visible_points[]; };
-layout(set = 1, binding = 2, scalar) readonly buffer SortedMap { MapPhoton sorted_map[]; };
+layout(set = 1, binding = 2, scalar) readonly buffer SortedMap { PackedMapPhoton sorted_map[]; };
 // Points with more than one slice: how many, the longest one's candidates; then which, and each one's candidates.
 layout(set = 1, binding = 3, scalar) buffer Crowded { uint crowded[]; };
 
@@ -18,27 +19,30 @@ uint point_of(uint item, uint slice)
     if (place >= push.end_point) {
         return NONE;
     }
-    if (push.width == 0) {
-        return place;
-    }
-    uint pixel = pixel_in_tiles(place / push.points_per_pixel, push.width, push.height);
-    return push.points_per_pixel * pixel + place % push.points_per_pixel;
+    return point_in_tiles(place, push.width, push.height, push.pixel_count);
 }
 
 void look_up()
 {
     uint slice = push.first_slice + gl_WorkGroupID.y;
-    uint index = point_of(gl_WorkGroupID.x * gl_WorkGroupSize.x + gl_LocalInvocationIndex, slice);
+    uint invocation = gl_WorkGroupID.x * gl_WorkGroupSize.x + gl_LocalInvocationIndex;
+    uint lane = invocation % LOOKUP_LANES;
+    uint index = point_of(invocation / LOOKUP_LANES, slice);
     if (index == NONE) {
         return;
     }
     VisiblePoint point = visible_points[index];
-    if (point.arrivals == 0) {
+    uint wanted = 1u << push.arrival;
+    if (HAS_ALL_ARRIVALS) {
+        wanted = ARRIVED_DIRECT | ARRIVED_CAUSTIC | ARRIVED_INDIRECT;
+    }
+    if ((point.arrivals & wanted) == 0) {
         return;
     }
     vec3 normal = unpack_normal(point.normal);
     vec3 ns = unpack_normal(point.shading_normal);
     vec3 wo = unpack_direction(point.wo);
+    bool is_even = point.normal == point.shading_normal && !has_lobe(point.surface);
     CellRange range = cells_near(point.position);
     uint photon_count = map_length();
     uint slice_begin = slice * GATHER_SLICE;
@@ -56,19 +60,31 @@ void look_up()
             uvec2 run = row_of_photons(range, ivec2(y, z));
             uint begin = clamp(slice_begin, passed, passed + run.y) - passed;
             uint end = clamp(slice_end, passed, passed + run.y) - passed;
-            for (uint k = begin; k < end; k++) {
+            for (uint k = begin + lane; k < end; k += LOOKUP_LANES) {
                 uint place = run.x + k;
                 place = place >= photon_count ? place - photon_count : place;
-                vec3 position = sorted_map[place].position;
+                uvec4 words = sorted_map[place].place;
+                vec3 position = uintBitsToFloat(words.xyz);
                 precise vec3 way = position - point.position;
                 precise float distance_squared = way.x * way.x + way.y * way.y + way.z * way.z;
                 if (distance_squared <= push.radius * push.radius && cell_at(position, push.cells).yz == ivec2(y, z)) {
-                    MapPhoton photon = sorted_map[place];
-                    vec3 photon_normal = unpack_normal(photon.normal);
+                    uvec4 light = sorted_map[place].light;
+                    // Most photons lie on a surface as flat as the point's: nothing of theirs is to be unpacked but their flux.
+                    bool is_alike = words.w == point.normal;
+                    vec3 photon_normal = normal;
+                    if (!is_alike) {
+                        photon_normal = unpack_normal(words.w);
+                    }
                     precise float height = -(way.x * photon_normal.x + way.y * photon_normal.y + way.z * photon_normal.z);
-                    bool counts = belongs(normal, photon_normal, height, push.radius, MIN_NORMAL_COSINE) && ((point.arrivals >> (photon.wi >> 30)) & 1u) != 0;
-                    vec3 wi = unpack_direction(photon.wi);
-                    float cosine = dot(wi, ns);
+                    bool counts = (is_alike ? belongs_to_plane(height, push.radius)
+                                            : belongs(normal, photon_normal, height, push.radius, MIN_NORMAL_COSINE))
+                                  && ((point.arrivals >> (light.w >> 30)) & 1u) != 0;
+                    vec3 wi = ns;
+                    float cosine = 1.0;
+                    if (!(is_alike && is_even)) {
+                        wi = unpack_direction(light.w);
+                        cosine = dot(wi, ns);
+                    }
                     if (counts && cosine > 0.0) {
                         float weight = lobe_weight(point.surface, point.exponent, ns, wo, wi);
                         if (KERNEL != KERNEL_BOX) {
@@ -78,13 +94,13 @@ void look_up()
                         if (HAS_SMOOTH_NORMALS) {
                             weight *= point.normal == point.shading_normal ? 1.0 : shading_gain(cosine, dot(wi, photon_normal));
                         }
-                        precise vec3 flux = photon.flux * weight;
-                        note_unless(is_finite(flux), ODD_ESTIMATE, 0, push.round, index / push.points_per_pixel);
+                        precise vec3 flux = uintBitsToFloat(light.xyz) * weight;
+                        note_unless(is_finite(flux), ODD_ESTIMATE, 0, push.round, index % push.pixel_count);
                         [[unroll]] for (uint channel = 0; channel < 3; channel++) {
                             uint amount = to_fixed_point(flux[channel], float(1u << FLUX_BITS));
                             if (HAS_ALL_ARRIVALS) {
                                 [[unroll]] for (uint arrival = 0; arrival < 3; arrival++) {
-                                    sums[3 * arrival + channel] = add_words(sums[3 * arrival + channel], arrival == photon.wi >> 30 ? amount : 0);
+                                    sums[3 * arrival + channel] = add_words(sums[3 * arrival + channel], arrival == light.w >> 30 ? amount : 0);
                                 }
                             } else {
                                 sums[channel] = add_words(sums[channel], amount);
@@ -97,7 +113,7 @@ void look_up()
             passed += run.y;
         }
     }
-    if (push.first_slice == 0 && passed > GATHER_SLICE) {
+    if (push.first_slice == 0 && passed > GATHER_SLICE && lane == 0) {
         uint place = atomicAdd(crowded[0], 1);
         crowded[2 + 2 * place] = index;
         crowded[3 + 2 * place] = passed;

@@ -2,10 +2,11 @@
 // they know already.
 
 layout(set = 1, binding = 1, scalar) writeonly buffer VisiblePoints { VisiblePoint visible_points[]; };
-// For each pixel and channel, film units of this pass so far.
+// For each sample of a pixel, or receiver, and each channel, film units of this pass so far.
 layout(set = 1, binding = 2, scalar) writeonly buffer PassSums { uvec2 pass_sums[]; };
 
-void write_pass_sum(uint pixel, vec3 light[3], float scale, float limit)
+// `scale` and `limit` are those of a share of the pixel's light.
+void write_pass_sum(uint place, vec3 light[3], float scale, float limit)
 {
     // Each part is rounded by itself, so that the parts of a picture add up to the whole to the bit.
     uvec2 totals[3];
@@ -19,14 +20,9 @@ void write_pass_sum(uint pixel, vec3 light[3], float scale, float limit)
             sum = add64(sum, units);
             totals[part] = add64(totals[part], units);
         }
-        pass_sums[3 * pixel + channel] = sum;
+        pass_sums[3 * place + channel] = sum;
     }
     add_part_total(0, totals[0]);
     add_part_total(1, totals[1]);
     add_part_total(3, totals[2]);
-}
-
-VisiblePoint no_point()
-{
-    return VisiblePoint(vec3(0.0), 0, vec3(0.0), 0, 0, 0.0, SURFACE_RECEIVER, 0);
 }

@@ -170,22 +170,24 @@ impl Model<'_> {
     fn work(&self, pass: &str) -> Option<Work> {
         let work = |item, items, cost| Some(Work { item, items, dispatches: 1.0, cost });
         let pixels = f64::from(self.plan.sensor.pixels());
+        let samples = pixels * f64::from(self.plan.samples());
         let points = f64::from(self.plan.visible_points());
         let sums = 24.0 * points * f64::from(self.plan.arrival_sets);
         match pass {
             "see" => {
-                let shadow_rays = f64::from(self.plan.constants.iter().find(|(name, _)| *name == "SHADOW_RAYS").map_or(0, |found| found.1));
+                let shadow_rays = f64::from(self.plan.constant("SHADOW_RAYS"));
                 let cost = Cost {
-                    bytes: pixels * 24.0 + points * bytes::<VisiblePoint>(),
-                    float_operations: pixels * ((1.0 + shadow_rays) * self.ray_operations() + shadow_rays * LIGHT_OPERATIONS),
-                    integer_products: pixels * (2.0 + shadow_rays) * PHILOX_PRODUCTS as f64,
+                    bytes: samples * 24.0 + points * bytes::<VisiblePoint>(),
+                    float_operations: samples * ((1.0 + shadow_rays) * self.ray_operations() + shadow_rays * LIGHT_OPERATIONS),
+                    // Where a path starts, and where its shadow rays end.
+                    integer_products: samples * 2.0 * PHILOX_PRODUCTS as f64,
                 };
-                work("pixels", pixels, cost)
+                work("samples", samples, cost)
             }
             "resolve" => {
                 let cost = Cost {
                     // Sums and squares are read and written.
-                    bytes: points * bytes::<VisiblePoint>() + sums + pixels * (24.0 + 2.0 * 72.0),
+                    bytes: points * bytes::<VisiblePoint>() + sums + samples * 24.0 + pixels * 2.0 * 72.0,
                     float_operations: pixels * RESOLVE_OPERATIONS,
                     ..Cost::default()
                 };

@@ -147,7 +147,7 @@ pub(super) fn of_transport(plan: &TransportPlan, geometry: &Geometry, keeps: &dy
         ("texels", kept(&geometry.texels, textured)),
         ("emitters", kept(&geometry.emitters, true)),
         ("visible points", array::<VisiblePoint>(points)),
-        ("pass sums", array::<u64>(3 * pixels)),
+        ("pass sums", array::<u64>(3 * pixels * u64::from(plan.samples()))),
         ("estimates", array::<u64>(3 * points * u64::from(plan.arrival_sets))),
         ("film", pixels.max(1) * FILM_PIXEL_BYTES),
         ("part totals", array::<u64>(u64::from(PART_COUNT))),

@@ -33,6 +33,14 @@ impl Sensor {
             Sensor::Receivers { count } => count,
         }
     }
+
+    /// Width and height of a picture; receivers have none.
+    pub fn size(self) -> (u32, u32) {
+        match self {
+            Sensor::Picture { width, height } => (width, height),
+            Sensor::Receivers { .. } => (0, 0),
+        }
+    }
 }
 
 /// A photon map of each round.
@@ -204,7 +212,8 @@ impl TransportPlan {
             (true, false, true) if split => GATHER_GLOSSY,
             _ => GATHER_NONE,
         };
-        let points_per_pixel = if gather_rays == GATHER_NONE { 1 } else { 2 };
+        let samples = if matches!(sensor, Sensor::Picture { .. }) { settings.samples } else { 1 };
+        let points_per_pixel = samples * if gather_rays == GATHER_NONE { 1 } else { 2 };
         let arrival_sets = if split { 2 } else { 3 };
         let flag = |effect: Effect| u32::from(keeps(effect));
         let shadow_rays = if split && keeps(Effect::Direct) { settings.shadow_rays } else { 0 };
@@ -229,6 +238,8 @@ impl TransportPlan {
             ("PARANOID", u32::from(settings.paranoid)),
             ("STRICT_MATH", settings.math.code()),
             ("SHADOW_RAYS", shadow_rays),
+            ("SAMPLES", samples),
+            ("LOOKUP_LANES", std::env::var("PM_LANES").map_or(1, |lanes| lanes.parse().unwrap())),
             ("KERNEL", settings.kernel.code()),
             ("HAS_EDGE_CORRECTION", u32::from(settings.edge_correction)),
             ("HAS_CAUSTIC_MAP", u32::from(caustic.is_some())),
@@ -312,13 +323,17 @@ impl TransportPlan {
     /// Visible points of one lookup, which has a work group of them along x.
     pub fn points_at_once(&self) -> u32 {
         let most = (self.work_per_submission / TESTS_PER_POINT).clamp(1 << 12, 1 << 22) as u32;
-        most.min(self.visible_points()).min(MAX_GROUPS * self.settings.group_size)
+        most.min(self.visible_points()).min(MAX_GROUPS * self.settings.group_size / self.constant("LOOKUP_LANES"))
     }
 
     /// Rays of one pixel, roughly.
     pub fn rays_per_pixel(&self) -> u32 {
-        let vertices = self.points_per_pixel;
-        vertices * (1 + self.constant("SHADOW_RAYS"))
+        self.points_per_pixel * (1 + self.constant("SHADOW_RAYS"))
+    }
+
+    /// Paths from the camera through a pixel, or from a receiver, in a round.
+    pub fn samples(&self) -> u32 {
+        self.constant("SAMPLES")
     }
 
     pub fn constant(&self, name: &str) -> u32 {
@@ -343,6 +358,7 @@ impl TransportPlan {
         let points = u64::from(self.visible_points());
         let film = [
             ("the film", 48 * pixels),
+            ("the samples of pixels", 24 * pixels * u64::from(self.samples())),
             ("visible points", points * size_of::<VisiblePoint>() as u64),
             ("estimates", points * u64::from(self.arrival_sets) * 24),
         ];

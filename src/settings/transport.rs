@@ -195,6 +195,8 @@ pub struct TransportSettings {
     pub alpha: f64,
     pub kernel: Kernel,
     pub edge_correction: bool,
+    /// Paths from the camera through each pixel, each pass, a power of two; of a picture.
+    pub samples: u32,
     /// Shadow rays from each visible point, each pass.
     pub shadow_rays: u32,
     /// Indirect light by a ray to the next surface instead of the map where the camera looks.
@@ -228,6 +230,7 @@ impl Default for TransportSettings {
             alpha: 2.0 / 3.0,
             kernel: Kernel::Box,
             edge_correction: true,
+            samples: 1,
             shadow_rays: 4,
             final_gather: false,
             illumination: Illumination::Split,
@@ -250,8 +253,10 @@ const MAX_PHOTONS: u32 = 1 << 31;
 pub const MAX_ROUNDS: u32 = 1 << 20;
 /// Random-number blocks of a bounce are numbered in 32 bits, and each is a dispatch.
 const MAX_BOUNCES: u32 = 10_000;
-/// A visible point draws one block of random numbers a ray.
-const MAX_SHADOW_RAYS: u32 = constants::VERTEX_BLOCKS - 2;
+/// A visible point's rays are one loop.
+const MAX_SHADOW_RAYS: u32 = 64;
+/// A pixel's paths are summed by one invocation.
+const MAX_SAMPLES: u32 = 1024;
 
 impl TransportSettings {
     pub fn validate(&self) -> Result<()> {
@@ -260,6 +265,9 @@ impl TransportSettings {
         within("--rounds", self.rounds, 1..=MAX_ROUNDS, "rounds")?;
         within("--bounces", self.bounces, 1..=MAX_BOUNCES, "bounces")?;
         within("--shadow-rays", self.shadow_rays, 1..=MAX_SHADOW_RAYS, "shadow rays from each visible point, each round")?;
+        if !(self.samples.is_power_of_two() && self.samples <= MAX_SAMPLES) {
+            return Err(Error::setting("--samples", self.samples, format!("must be a power of two up to {MAX_SAMPLES}")));
+        }
         for (option, radius) in [("--radius", self.radius), ("--caustic-radius", self.caustic_radius)] {
             if let Some(radius) = radius
                 && !(radius.is_finite() && radius > 0.0)

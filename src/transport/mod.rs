@@ -8,7 +8,8 @@
 //! see       paths from the camera over mirrors and glass: visible points, direct light by shadow rays
 //! photons   of the global map: traced, sorted, looked up at every visible point
 //! caustics  the same with photons that took mirrors and glass only
-//! resolve   flux over area that really lies on the surface, times reflectance: to the film
+//! weigh     flux over area that really lies on the surface, times reflectance: light
+//! resolve   all light of a pixel: to the film
 //! ```
 
 pub mod bias;
@@ -95,7 +96,7 @@ pub fn modules(plan: &TransportPlan, facts: &DeviceFacts) -> Vec<Module> {
     });
     if plan.maps().next().is_some() {
         modules.extend([MapCount::MODULE, MapScatter::MODULE, ScanBlocks::MODULE, ScanAdd::MODULE]);
-        modules.extend([DispatchSize::MODULE, CrowdSize::MODULE]);
+        modules.extend([DispatchSize::MODULE, CrowdSize::MODULE, Weigh::MODULE]);
         modules.extend(match plan.settings.append {
             Append::Atomic => vec![Shine::MODULE, FlyAtomic::MODULE],
             Append::Ballot => vec![Shine::MODULE, FlyBallot::MODULE],
@@ -202,6 +203,7 @@ fn one_round(commands: &mut Commands, view: &View, round: Round) -> Result<()> {
         for map in plan.maps() {
             commands.scope(map.name, |commands| one_map(commands, round, photons, map))?;
         }
+        commands.scope("weigh", |commands| points::weigh(commands, round))?;
     }
     commands.scope("resolve", |commands| points::resolve(commands, round))
 }

@@ -5,10 +5,10 @@ use super::Round;
 use super::resources::{PhotonBuffers, TransportResources};
 use crate::constants::{DOMAIN_CAMERA, DOMAIN_RECEIVERS, MAX_GROUPS};
 use crate::error::Result;
-use crate::gpu::kernels::{CrowdSize, LookupTwoWords, LookupU64, Receive, Resolve, View};
+use crate::gpu::kernels::{CrowdSize, LookupTwoWords, LookupU64, Receive, Resolve, View, Weigh};
 use crate::gpu::{Commands, Extent};
 use crate::plan::transport::{MapPlan, Sensor, TESTS_PER_POINT, TransportPlan};
-use crate::records::{CellPush, CrowdSizePush, Draws, LookupPush, ReceivePush, ResolvePush, ViewPush};
+use crate::records::{CellPush, CrowdSizePush, Draws, LookupPush, ReceivePush, ResolvePush, ViewPush, WeighPush};
 use crate::rng::words;
 use crate::scene::Camera;
 
@@ -48,8 +48,9 @@ pub fn see(commands: &mut Commands, round: Round, camera: Option<&Camera>) -> Re
                     right: (half_width * camera.right).as_vec3(),
                     up: (half_height * camera.up).as_vec3(),
                     emitter_count,
-                    film_scale: plan.film_scale as f32,
-                    film_limit: plan.film_limit as f32,
+                    // Each sample has its share of the pixel's light; exact, as their number is a power of two.
+                    film_scale: (plan.film_scale / f64::from(plan.samples())) as f32,
+                    film_limit: (plan.film_limit / f64::from(plan.samples())) as f32,
                 };
                 let kernel = View {
                     nodes,
@@ -66,7 +67,7 @@ pub fn see(commands: &mut Commands, round: Round, camera: Option<&Camera>) -> Re
                     part_totals,
                     oddities,
                 };
-                commands.dispatch(kernel, &push, Extent::Items(u64::from(end - first)))?;
+                commands.dispatch(kernel, &push, Extent::Items(u64::from(end - first) * u64::from(plan.samples())))?;
             }
             Sensor::Receivers { .. } => {
                 let receivers = &resources.receivers[round as usize % resources.receivers.len()];
@@ -75,6 +76,7 @@ pub fn see(commands: &mut Commands, round: Round, camera: Option<&Camera>) -> Re
                     draws: draws(DOMAIN_RECEIVERS),
                     first_point: first,
                     end_point: end,
+                    point_count: plan.sensor.pixels(),
                     emitter_count,
                     film_scale: plan.film_scale as f32,
                     film_limit: plan.film_limit as f32,
@@ -111,10 +113,8 @@ pub fn look_up(commands: &mut Commands, round: Round, photons: &PhotonBuffers, m
     let TransportResources { visible_points, estimates, oddities, .. } = resources;
     let point_count = plan.visible_points();
     let step = plan.points_at_once();
-    let (width, height) = match plan.sensor {
-        Sensor::Picture { width, height } => (width, height),
-        Sensor::Receivers { .. } => (0, 0),
-    };
+    let lanes = plan.constant("LOOKUP_LANES");
+    let (width, height) = plan.sensor.size();
     let dispatch = |commands: &mut Commands, push: &LookupPush, extent: Extent| {
         if commands.facts().int64_atomics {
             commands.dispatch(LookupU64 { visible_points, film: estimates, cells, sorted_map, crowded, oddities }, push, extent)
@@ -127,7 +127,7 @@ pub fn look_up(commands: &mut Commands, round: Round, photons: &PhotonBuffers, m
             first_point,
             end_point,
             point_count,
-            points_per_pixel: plan.points_per_pixel,
+            pixel_count: plan.sensor.pixels(),
             arrival: map.stored.trailing_zeros(),
             round,
             width,
@@ -137,9 +137,9 @@ pub fn look_up(commands: &mut Commands, round: Round, photons: &PhotonBuffers, m
             cells: cells_push,
         };
         commands.fill(crowded, 0, 2, 0);
-        let groups = (end_point - first_point).div_ceil(plan.settings.group_size);
+        let groups = ((end_point - first_point) * lanes).div_ceil(plan.settings.group_size);
         dispatch(commands, &push, Extent::Groups(groups, 1))?;
-        let size = CrowdSizePush { items_per_group: plan.settings.group_size, max_groups: MAX_GROUPS };
+        let size = CrowdSizePush { items_per_group: plan.settings.group_size / lanes, max_groups: MAX_GROUPS };
         commands.dispatch(CrowdSize { crowded, dispatch_args }, &size, Extent::Groups(1, 1))?;
         dispatch(commands, &LookupPush { first_slice: 1, ..push }, Extent::Indirect(dispatch_args))?;
         add_work(commands, plan, TESTS_PER_POINT * u64::from(end_point - first_point))?;
@@ -147,19 +147,22 @@ pub fn look_up(commands: &mut Commands, round: Round, photons: &PhotonBuffers, m
     Ok(())
 }
 
-/// Ends a round: estimates and known light go to the film.
-pub fn resolve(commands: &mut Commands, round: Round) -> Result<()> {
+/// Turns what the maps found at all visible points into light.
+pub fn weigh(commands: &mut Commands, round: Round) -> Result<()> {
     let Round { resources, geometry, plan, number: round } = round;
     let TransportResources { nodes, triangles, normals, uvs, materials, textures, texels, visible_points, .. } = resources;
-    let TransportResources { pass_sums, estimates, film_sums, film_squares, part_totals, anomalies, oddities, .. } = resources;
+    let TransportResources { estimates, part_totals, anomalies, oddities, .. } = resources;
     let radius = |map: &Option<MapPlan>| map.as_ref().map_or(1.0, |map| plan.radius(map, round)) as f32;
     let flux = |map: &Option<MapPlan>| map.as_ref().map_or(0.0, |map| geometry.flux_unit / f64::from(map.photons)) as f32;
-    for (first_pixel, end_pixel) in runs(plan.sensor.pixels(), plan.pixels_at_once(4)) {
-        let push = ResolvePush {
-            first_pixel,
-            end_pixel,
-            points_per_pixel: plan.points_per_pixel,
+    let (width, height) = plan.sensor.size();
+    for (first_point, end_point) in runs(plan.visible_points(), plan.pixels_at_once(4)) {
+        let push = WeighPush {
+            first_point,
+            end_point,
             point_count: plan.visible_points(),
+            pixel_count: plan.sensor.pixels(),
+            width,
+            height,
             arrivals: plan.arrivals,
             round,
             film_scale: plan.film_scale as f32,
@@ -169,7 +172,7 @@ pub fn resolve(commands: &mut Commands, round: Round) -> Result<()> {
             global_flux: flux(&plan.global),
             caustic_flux: flux(&plan.caustic),
         };
-        let kernel = Resolve {
+        let kernel = Weigh {
             nodes,
             triangles,
             normals,
@@ -179,15 +182,26 @@ pub fn resolve(commands: &mut Commands, round: Round) -> Result<()> {
             texels,
             anomalies,
             visible_points,
-            pass_sums,
             estimates,
-            film_sums,
-            film_squares,
             part_totals,
             oddities,
         };
+        commands.dispatch(kernel, &push, Extent::Items(u64::from(end_point - first_point)))?;
+        add_work(commands, plan, 256 * u64::from(end_point - first_point))?;
+    }
+    Ok(())
+}
+
+/// Ends a round: light that was found goes to the film.
+pub fn resolve(commands: &mut Commands, round: Round) -> Result<()> {
+    let Round { resources, plan, .. } = round;
+    let TransportResources { pass_sums, estimates, film_sums, film_squares, .. } = resources;
+    let pixel_count = plan.sensor.pixels();
+    let points_per_pixel = if resources.photons.is_some() { plan.points_per_pixel } else { 0 };
+    for (first_pixel, end_pixel) in runs(pixel_count, plan.pixels_at_once(1)) {
+        let push = ResolvePush { first_pixel, end_pixel, pixel_count, points_per_pixel };
+        let kernel = Resolve { pass_sums, estimates, film_sums, film_squares };
         commands.dispatch(kernel, &push, Extent::Items(u64::from(end_pixel - first_pixel)))?;
-        add_work(commands, plan, 256 * u64::from(end_pixel - first_pixel))?;
     }
     Ok(())
 }

@@ -93,7 +93,7 @@ impl TransportResources {
             receivers: phases.iter().map(|phase| filled(gpu, commands, "receivers", phase, true)).collect::<Result<_>>()?,
             photons: if plan.maps().next().is_some() { Some(PhotonBuffers::new(gpu, commands, plan)?) } else { None },
             visible_points: gpu.buffer::<VisiblePoint>("visible points", points, device)?,
-            pass_sums: gpu.buffer::<u64>("pass sums", 3 * pixels, device)?,
+            pass_sums: gpu.buffer::<u64>("pass sums", 3 * pixels * u64::from(plan.samples()), device)?,
             estimates: gpu.buffer::<u64>("estimates", estimates, device)?,
             film_sums: gpu.buffer::<u64>("film sums", 3 * pixels, device)?,
             film_squares: gpu.buffer::<u64>("film squares", 6 * pixels, device)?,
