@@ -151,8 +151,8 @@ const FAULTS: [Fault; 50] = [
     Fault {
         what: "a photon in fifty is stored twice",
         file: "stages/flight.glsl",
-        from: "        map[place] = flown.photon;",
-        to: "        map[place] = flown.photon;\n        if (path.photon % 50u == 0u) map[atomicAdd(counters[0], 1)] = flown.photon;",
+        from: "        map[place] = pack(flown.photon);",
+        to: "        map[place] = pack(flown.photon);\n        if (path.photon % 50u == 0u) map[atomicAdd(counters[0], 1)] = pack(flown.photon);",
         kernels: &["fly_atomic"],
         noticed_by: &[Appends],
     },
@@ -250,8 +250,8 @@ const FAULTS: [Fault; 50] = [
     Fault {
         what: "photons are sorted into the cell beside theirs",
         file: "kernels/map_scatter.comp",
-        from: "bucket_of(cell_at(photon.position, push), push)",
-        to: "((bucket_of(cell_at(photon.position, push), push) + uint(index % 3u == 0u)) & push.bucket_mask)",
+        from: "bucket_of(cell_at(uintBitsToFloat(photon.place.xyz), push), push)",
+        to: "((bucket_of(cell_at(uintBitsToFloat(photon.place.xyz), push), push) + uint(index % 3u == 0u)) & push.bucket_mask)",
         kernels: &["map_scatter"],
         noticed_by: &[ClosedForm("furnace, Photons, Ballot: irradiance")],
     },
@@ -313,10 +313,10 @@ const FAULTS: [Fault; 50] = [
     },
     Fault {
         what: "edges are not corrected",
-        file: "kernels/resolve.comp",
+        file: "kernels/weigh.comp",
         from: "if (HAS_EDGE_CORRECTION) {",
         to: "if (false) {",
-        kernels: &["resolve"],
+        kernels: &["weigh"],
         noticed_by: &[ClosedForm("furnace, Photons, Ballot: irradiance"), ClosedForm("sun-over-plane, Photons: irradiance")],
     },
     Fault {
@@ -330,8 +330,8 @@ const FAULTS: [Fault; 50] = [
     Fault {
         what: "glass reflects one and a half times as much",
         file: "scene/scatter.glsl",
-        from: "if (u.x < reflectance) {",
-        to: "if (u.x < 1.5 * reflectance) {",
+        from: "if (u.x < chance) {",
+        to: "if (u.x < 1.5 * chance) {",
         kernels: &["view"],
         noticed_by: &[ClosedForm("glass slab, at 60 degrees: radiance")],
     },
@@ -362,8 +362,8 @@ const FAULTS: [Fault; 50] = [
     Fault {
         what: "a photon in 500 carries no number into the map",
         file: "stages/flight.glsl",
-        from: "map[place] = flown.photon;",
-        to: "if (path.photon % 500u == 7u) flown.photon.flux.y = uintBitsToFloat(0x7fc00000u);\n        map[place] = flown.photon;",
+        from: "map[place] = pack(flown.photon);",
+        to: "if (path.photon % 500u == 7u) flown.photon.flux.y = uintBitsToFloat(0x7fc00000u);\n        map[place] = pack(flown.photon);",
         kernels: &["fly_ballot"],
         noticed_by: &[Finite],
     },
@@ -428,8 +428,8 @@ const FAULTS: [Fault; 50] = [
     Fault {
         what: "what lies a sixteenth of the radius below belongs to an estimate",
         file: "scene/belongs.glsl",
-        from: "(sine + 1.0 / 1024.0)",
-        to: "(sine + 1.0 / 16.0)",
+        from: "return abs(height) <= radius * (1.0 / 1024.0);",
+        to: "return abs(height) <= radius * (1.0 / 16.0);",
         kernels: &["lookup_u64", "lookup_two_words"],
         noticed_by: &[Shelf],
     },
@@ -438,7 +438,7 @@ const FAULTS: [Fault; 50] = [
         file: "scene/belongs.glsl",
         from: "MIN_NORMAL_COSINE = 0.75",
         to: "MIN_NORMAL_COSINE = 0.2",
-        kernels: &["lookup_u64", "lookup_two_words", "resolve"],
+        kernels: &["lookup_u64", "lookup_two_words", "weigh"],
         noticed_by: &[Ridge],
     },
     Fault {

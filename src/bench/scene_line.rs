@@ -141,8 +141,8 @@ const SCATTER_OPERATIONS: f64 = 5.0 * SLOW_OPERATION + 40.0;
 const PAIR_OPERATIONS: f64 = 24.0;
 /// Of a shadow ray: a point on a lamp, its distance, two cosines.
 const LIGHT_OPERATIONS: f64 = 3.0 * SLOW_OPERATION + 20.0;
-/// Of a pixel's film at the end of a round: area of the disc and three channels.
-const RESOLVE_OPERATIONS: f64 = 4.0 * SLOW_OPERATION + 20.0;
+/// Of a visible point's light at the end of a round: area of the disc and three channels.
+const WEIGH_OPERATIONS: f64 = 4.0 * SLOW_OPERATION + 20.0;
 
 struct Model<'a> {
     job: &'a Job<'a>,
@@ -184,14 +184,18 @@ impl Model<'_> {
                 };
                 work("samples", samples, cost)
             }
-            "resolve" => {
+            "weigh" => {
                 let cost = Cost {
-                    // Sums and squares are read and written.
-                    bytes: points * bytes::<VisiblePoint>() + sums + samples * 24.0 + pixels * 2.0 * 72.0,
-                    float_operations: pixels * RESOLVE_OPERATIONS,
+                    bytes: points * (bytes::<VisiblePoint>() + 24.0) + sums,
+                    float_operations: points * WEIGH_OPERATIONS,
                     ..Cost::default()
                 };
-                work("pixels", pixels, cost)
+                work("points", points, cost)
+            }
+            // Sums and squares are read and written.
+            "resolve" => {
+                let read = if self.plan.maps().next().is_some() { points + samples } else { samples };
+                work("pixels", pixels, Cost { bytes: 24.0 * read + pixels * 2.0 * 72.0, ..Cost::default() })
             }
             _ => {
                 let (map, stage) = pass.split_once('/').unwrap_or((pass, ""));
