@@ -31,22 +31,6 @@ struct Path {
     float flux;
 };
 
-struct Photon {
-    vec3 position;
-    uint wall;
-    float flux;
-    float weight;
-    uint photon;
-    uint bounce;
-};
-
-struct SortedPhoton {
-    vec3 position;
-    uint wall;
-    float flux;
-    float weight;
-};
-
 struct Point {
     vec3 position;
     uint wall;

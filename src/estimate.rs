@@ -37,9 +37,12 @@ pub fn modules(plan: &Plan, facts: &DeviceFacts) -> Vec<Module> {
         (true, ..) => tree::modules(plan, facts),
         (_, false, true) => vec![GatherBruteU64::MODULE],
         (_, false, false) => vec![GatherBruteTwoWords::MODULE],
-        (_, true, true) => vec![CandidateCount::MODULE, SliceCount::MODULE, GatherGridU64::MODULE],
-        (_, true, false) => vec![CandidateCount::MODULE, SliceCount::MODULE, GatherGridTwoWords::MODULE],
+        (_, true, true) => vec![GatherGridU64::MODULE],
+        (_, true, false) => vec![GatherGridTwoWords::MODULE],
     };
+    if plan.gathers_by_grid() && plan.slices_candidates {
+        modules.extend([CandidateCount::MODULE, SliceCount::MODULE]);
+    }
     if plan.keeps_squares() {
         modules.push(EndRound::MODULE);
     }
@@ -63,12 +66,13 @@ fn whole_push(plan: &Plan, photon_count: u32) -> GatherPush {
 }
 
 /// Runs of points, none so long that its dispatch would exceed a submission's work or the groups that
-/// the device allows along x.
-fn point_ranges(commands: &Commands, plan: &Plan, tests_per_point: u64) -> impl Iterator<Item = (u32, u32)> + use<> {
-    let group_size = u64::from(plan.settings.group_size);
-    let most_groups = u64::from(commands.facts().work_group_count_x);
-    let groups = (plan.pair_tests_per_submission / tests_per_point.max(1) / group_size).clamp(1, most_groups);
-    let (points, step) = (plan.points.len(), (groups * group_size) as usize);
+/// the device allows along x. `lanes` invocations share a point.
+fn point_ranges(commands: &Commands, plan: &Plan, tests_per_point: u64, lanes: u32) -> impl Iterator<Item = (u32, u32)> + use<> {
+    let (group_size, lanes) = (u64::from(plan.settings.group_size), u64::from(lanes));
+    // Invocations are numbered in 32 bits.
+    let most_groups = u64::from(commands.facts().work_group_count_x).min(u64::from(u32::MAX) / group_size);
+    let groups = (plan.pair_tests_per_submission / tests_per_point.max(1) * lanes / group_size).clamp(1, most_groups);
+    let (points, step) = (plan.points.len(), (groups * group_size / lanes).max(1) as usize);
     (0..points).step_by(step).map(move |first| (first as u32, points.min(first + step) as u32))
 }
 
@@ -87,7 +91,7 @@ fn gather_brute(commands: &mut Commands, resources: &Resources, plan: &Plan, pho
     let whole = whole_push(plan, photon_count);
     let slice_count = whole.photon_capacity.div_ceil(GATHER_SLICE);
     let tests_per_point = u64::from(GATHER_SLICE);
-    for (first_point, end_point) in point_ranges(commands, plan, tests_per_point) {
+    for (first_point, end_point) in point_ranges(commands, plan, tests_per_point, 1) {
         let point_count = end_point - first_point;
         let tests_per_slice = u64::from(point_count) * tests_per_point;
         let slices_at_once = (plan.pair_tests_per_submission / tests_per_slice).clamp(1, u64::from(MAX_GROUPS)) as u32;
@@ -111,19 +115,22 @@ fn gather_grid(commands: &mut Commands, resources: &Resources, index: &IndexBuff
     let Resources { film, points, dispatch_args, .. } = resources;
     let IndexBuffers { cells, sorted_photons, longest, .. } = index;
     let whole = whole_push(plan, photon_count);
-    commands.fill(longest, 0, 1, 0);
-    commands.dispatch(CandidateCount { points, longest, cells }, &whole, Extent::Items(u64::from(whole.end_point)))?;
+    if plan.slices_candidates {
+        commands.fill(longest, 0, 1, 0);
+        commands.dispatch(CandidateCount { points, longest, cells }, &whole, Extent::Items(u64::from(whole.end_point)))?;
+    }
     let tests_per_point = plan.work.tests_per_point(photon_count);
-    for (first_point, end_point) in point_ranges(commands, plan, tests_per_point) {
-        let size = DispatchSizePush {
-            counter: 0,
-            capacity: end_point - first_point,
-            items_per_group: plan.settings.group_size,
-            max_groups: MAX_GROUPS,
+    let group_size = plan.settings.group_size;
+    for (first_point, end_point) in point_ranges(commands, plan, tests_per_point, plan.lanes) {
+        let capacity = (end_point - first_point) * plan.lanes;
+        let extent = if plan.slices_candidates {
+            let size = DispatchSizePush { counter: 0, capacity, items_per_group: group_size, max_groups: MAX_GROUPS };
+            commands.dispatch(SliceCount { longest, dispatch_args }, &size, Extent::Groups(1, 1))?;
+            Extent::Indirect(dispatch_args)
+        } else {
+            Extent::Groups(capacity.div_ceil(group_size), 1)
         };
-        commands.dispatch(SliceCount { longest, dispatch_args }, &size, Extent::Groups(1, 1))?;
         let push = GatherPush { first_point, end_point, ..whole };
-        let extent = Extent::Indirect(dispatch_args);
         if adds_in_one_word(plan, commands.facts()) {
             commands.dispatch(GatherGridU64 { points, film, cells, sorted_photons }, &push, extent)?;
         } else {

@@ -30,7 +30,7 @@ pub fn build(commands: &mut Commands, resources: &Resources, plan: &Plan, photon
     if let Some(buffers) = &resources.tree {
         return commands.scope("index", |commands| tree::build(commands, resources, buffers, plan, photon_count));
     }
-    let Resources { photons, counters, dispatch_args, index: Some(index), .. } = resources else { return Ok(()) };
+    let Resources { rooms, photons, counters, dispatch_args, index: Some(index), .. } = resources else { return Ok(()) };
     let IndexBuffers { cells, ranks, block_sums, sorted_photons, .. } = index;
     let push = plan.grid.index_push(photon_list_capacity(plan, photon_count));
     let extent = || if plan.has_slots() { Extent::Items(u64::from(push.photon_capacity)) } else { Extent::Indirect(dispatch_args) };
@@ -46,11 +46,12 @@ pub fn build(commands: &mut Commands, resources: &Resources, plan: &Plan, photon
                 };
                 commands.dispatch(DispatchSize { counters, dispatch_args }, &size, Extent::Groups(1, 1))?;
             }
-            commands.dispatch(CellCount { photons, counters, cells, ranks }, &push, extent())
+            commands.dispatch(CellCount { rooms, photons, counters, cells, ranks }, &push, extent())
         })?;
         commands.scope("scan", |commands| scan(commands, cells, block_sums, plan.grid.cells() + 1, plan.settings.group_size))?;
-        commands
-            .scope("sort", |commands| commands.dispatch(CellScatter { photons, counters, cells, sorted_photons, ranks }, &push, extent()))
+        commands.scope("sort", |commands| {
+            commands.dispatch(CellScatter { rooms, photons, counters, cells, sorted_photons, ranks }, &push, extent())
+        })
     })
 }
 

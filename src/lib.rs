@@ -13,7 +13,7 @@
 //! module uses only what stands to its left:
 //!
 //! ```text
-//! constants, records, error, bias, ledger, rng, settings, timings < scene < plan < cpu
+//! constants, records, photon, error, bias, ledger, rng, settings, timings < scene < plan < cpu
 //! scene < judge
 //! constants, records, error, ledger, timings < gpu
 //! gpu < oddities; plan, gpu < prefix_sum
@@ -90,6 +90,7 @@ pub mod ledger;
 pub mod oddities;
 pub mod output;
 pub mod paper;
+pub mod photon;
 pub mod plan;
 pub mod prefix_sum;
 pub mod records;

@@ -101,26 +101,6 @@ records! {
         flux: f32,
     }
 
-    /// A photon where a wall reflected it: one entry of the photon map.
-    Photon {
-        position: Vec3,
-        /// Wall, or `NO_WALL` in an empty slot.
-        wall: u32,
-        flux: f32,
-        /// Phong weight towards the eye, in [0, 1]; 1 on Lambertian walls.
-        weight: f32,
-        photon: u32,
-        bounce: u32,
-    }
-
-    /// A photon in grid order: what the gather reads.
-    SortedPhoton {
-        position: Vec3,
-        wall: u32,
-        flux: f32,
-        weight: f32,
-    }
-
     /// A point at which light is estimated.
     Point {
         position: Vec3,

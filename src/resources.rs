@@ -4,10 +4,11 @@ use crate::constants::{FACE_COUNT, TREE_LEAF};
 use crate::error::Result;
 use crate::gpu::{Buffer, Commands, Gpu, Memory};
 use crate::oddities;
+use crate::photon::{Origin, StoredPhoton};
 use crate::plan::Plan;
 use crate::plan::memory::{group_count, searches_at_once, tree_count_capacity};
 use crate::prefix_sum::block_sums;
-use crate::records::{self, DispatchArgs, Path, Photon, Point, Search, SortedPhoton, Tally};
+use crate::records::{self, DispatchArgs, Path, Point, Search, Tally};
 use crate::scene::room::RoomScene;
 use crate::settings::Variant;
 use glam::UVec2;
@@ -23,6 +24,8 @@ pub struct Resources {
     /// Paths entering even bounces and odd bounces; one empty element where no bounce hands paths to the next.
     pub paths: [Buffer; 2],
     pub photons: Buffer,
+    /// Which photon each entry of the photon map is; one empty element where nobody asks.
+    pub origins: Buffer,
     /// Length of the photon map, then the paths entering each bounce.
     pub counters: Buffer,
     pub dispatch_args: Buffer,
@@ -90,6 +93,8 @@ pub struct TreeBuffers {
     pub longest: Buffer,
     pub planes: Buffer,
     pub tree_photons: Buffer,
+    /// Which photon each of them is; one empty element where nobody asks.
+    pub tree_origins: Buffer,
     /// Searches for nearest photons; `None` where the radius alone decides.
     pub searches: Option<SearchBuffers>,
 }
@@ -120,7 +125,8 @@ impl Resources {
             points: gpu.buffer::<Point>("points", plan.points.len() as u64, device)?,
             stream_seeds: gpu.buffer::<UVec2>("stream seeds", seeds.len() as u64, device)?,
             paths: [gpu.buffer::<Path>("even paths", paths, device)?, gpu.buffer::<Path>("odd paths", paths, device)?],
-            photons: gpu.buffer::<Photon>("photons", photons, device)?,
+            photons: gpu.buffer::<StoredPhoton>("photons", photons, device)?,
+            origins: gpu.buffer::<Origin>("origins", u64::from(plan.origin_array_length()), device)?,
             counters: gpu.buffer::<u32>("counters", bounces + 2, device)?,
             dispatch_args: gpu.buffer::<DispatchArgs>("dispatch args", 1, device)?,
             order: if plan.settings.variant == Variant::Scan { Some(OrderBuffers::new(gpu, plan)?) } else { None },
@@ -175,7 +181,7 @@ impl IndexBuffers {
             cells: gpu.buffer::<u32>("cells", cells, Memory::Device)?,
             ranks: gpu.buffer::<u32>("ranks", u64::from(plan.photon_capacity), Memory::Device)?,
             block_sums: block_sums(gpu, cells, plan.settings.group_size)?,
-            sorted_photons: gpu.buffer::<SortedPhoton>("sorted photons", u64::from(plan.photon_capacity), Memory::Device)?,
+            sorted_photons: gpu.buffer::<StoredPhoton>("sorted photons", u64::from(plan.photon_capacity), Memory::Device)?,
             longest: gpu.buffer::<u32>("longest", 1, Memory::Device)?,
         })
     }
@@ -199,7 +205,8 @@ impl TreeBuffers {
             wall_begins: gpu.buffer::<u32>("wall begins", u64::from(FACE_COUNT) + 1, device)?,
             longest: gpu.buffer::<u32>("longest", 1, device)?,
             planes: gpu.buffer::<f32>("planes", photons / u64::from(TREE_LEAF) + 1, device)?,
-            tree_photons: gpu.buffer::<Photon>("tree photons", photons, device)?,
+            tree_photons: gpu.buffer::<StoredPhoton>("tree photons", photons, device)?,
+            tree_origins: gpu.buffer::<Origin>("tree origins", u64::from(plan.origin_array_length()), device)?,
             searches: plan.settings.nearest.map(|nearest| SearchBuffers::new(gpu, plan, nearest)).transpose()?,
         })
     }

@@ -84,7 +84,7 @@ fn photon_range(plan: &Plan, round: u32, range: &EmissionRange) -> PhotonRange {
 
 /// Traces every photon from its light to its end.
 fn whole(commands: &mut Commands, resources: &Resources, plan: &Plan, round: u32, ranges: &[EmissionRange]) -> Result<()> {
-    let Resources { rooms, walls, lights, stream_seeds, photons, counters, tallies, oddities, .. } = resources;
+    let Resources { rooms, walls, lights, stream_seeds, photons, origins, counters, tallies, oddities, .. } = resources;
     for range in ranges.iter().flat_map(|range| range.parts(plan.photons_per_dispatch())) {
         let push = TraceWholePush {
             key: plan.streams().key(round),
@@ -94,7 +94,7 @@ fn whole(commands: &mut Commands, resources: &Resources, plan: &Plan, round: u32
             photon_capacity: plan.photon_capacity,
             eye: plan.settings.eye.into(),
         };
-        let kernel = TraceWhole { rooms, walls, lights, stream_seeds, photons, counters, tallies, oddities };
+        let kernel = TraceWhole { rooms, walls, lights, stream_seeds, photons, origins, counters, tallies, oddities };
         commands.dispatch(kernel, &push, Extent::Items(u64::from(push.stride)))?;
     }
     Ok(())
@@ -142,20 +142,28 @@ fn one_bounce(commands: &mut Commands, resources: &Resources, plan: &Plan, round
     }
     let [even, odd] = &resources.paths;
     let (paths, next_paths) = if bounce.is_multiple_of(2) { (even, odd) } else { (odd, even) };
-    let Resources { rooms, walls, photons, counters, tallies, oddities, .. } = resources;
+    let Resources { rooms, walls, photons, origins, counters, tallies, oddities, .. } = resources;
     match variant {
-        Variant::Naive => {
-            commands.dispatch(TraceSlots { rooms, walls, paths, next_paths, photons, counters, tallies, oddities }, &push, extent())
-        }
-        Variant::Atomic => {
-            commands.dispatch(TraceAtomic { rooms, walls, paths, next_paths, photons, counters, tallies, oddities }, &push, extent())
-        }
-        Variant::Ballot => {
-            commands.dispatch(TraceBallot { rooms, walls, paths, next_paths, photons, counters, tallies, oddities }, &push, extent())
-        }
-        Variant::Group => {
-            commands.dispatch(TraceGroup { rooms, walls, paths, next_paths, photons, counters, tallies, oddities }, &push, extent())
-        }
+        Variant::Naive => commands.dispatch(
+            TraceSlots { rooms, walls, paths, next_paths, photons, origins, counters, tallies, oddities },
+            &push,
+            extent(),
+        ),
+        Variant::Atomic => commands.dispatch(
+            TraceAtomic { rooms, walls, paths, next_paths, photons, origins, counters, tallies, oddities },
+            &push,
+            extent(),
+        ),
+        Variant::Ballot => commands.dispatch(
+            TraceBallot { rooms, walls, paths, next_paths, photons, origins, counters, tallies, oddities },
+            &push,
+            extent(),
+        ),
+        Variant::Group => commands.dispatch(
+            TraceGroup { rooms, walls, paths, next_paths, photons, origins, counters, tallies, oddities },
+            &push,
+            extent(),
+        ),
         Variant::Scan => in_order::one_bounce(commands, resources, plan, [paths, next_paths], &push, extent),
         Variant::Persistent | Variant::Cpu => panic!("{} has no bounces of all paths", variant.name()),
     }

@@ -6,7 +6,7 @@ use std::fs;
 use std::path::{Path, PathBuf};
 
 /// What everyone may use, and what among itself has no order.
-const GROUND: [&str; 8] = ["error", "bias", "constants", "records", "ledger", "rng", "settings", "timings"];
+const GROUND: [&str; 9] = ["error", "bias", "constants", "records", "photon", "ledger", "rng", "settings", "timings"];
 /// From left to right.
 const LINE: [&str; 22] = [
     "scene",

@@ -5,8 +5,9 @@ mod common;
 
 use common::{device, lit, run};
 use photonmill::bench::paper_line::{self, Counts};
+use photonmill::photon::{Origin, StoredPhoton};
 use photonmill::plan::transport::{Sensor, TransportPlan};
-use photonmill::records::{LightPath, MapPhoton, Path, Photon, SortedPhoton, VisiblePoint};
+use photonmill::records::{LightPath, MapPhoton, Path, VisiblePoint};
 use photonmill::render;
 use photonmill::rng::Rng;
 use photonmill::scene::built_in;
@@ -29,16 +30,16 @@ struct Cost {
 /// 1000 photons, 4 bounces, 2 rounds, 5 x 8 x 8 texels over the grid.
 fn of_the_box(variant: Variant) -> Option<Cost> {
     let cost =
-        |dispatches, build_bytes_per_event| Cost { dispatches, submissions: 6, events: 3530, device_bytes: 350_164, build_bytes_per_event };
+        |dispatches, build_bytes_per_event| Cost { dispatches, submissions: 6, events: 3530, device_bytes: 254_172, build_bytes_per_event };
     Some(match variant {
-        // A round: two lights, four bounces, five of the index, three of the gather, the film.
-        Variant::Naive => cost(2 * 15, 297),
+        // A round: two lights, four bounces, five of the index, the gather, the film.
+        Variant::Naive => cost(2 * 13, 261),
         // And one before every dispatch whose size only the device knows: three bounces and the index.
-        Variant::Atomic | Variant::Ballot | Variant::Group => cost(2 * 19, 137),
+        Variant::Atomic | Variant::Ballot | Variant::Group => cost(2 * 17, 125),
         // In place, a prefix sum of one level, moved together, counted: four a bounce.
-        Variant::Scan => Cost { device_bytes: 350_208, ..cost(2 * 31, 246) },
+        Variant::Scan => Cost { device_bytes: 254_216, ..cost(2 * 29, 234) },
         // The lights', and no path is stored.
-        Variant::Persistent => Cost { device_bytes: 262_252, ..cost(2 * 12, 24) },
+        Variant::Persistent => Cost { device_bytes: 166_260, ..cost(2 * 10, 12) },
         Variant::Cpu => return None,
     })
 }
@@ -102,6 +103,6 @@ fn a_scene_costs_what_it_did() {
 /// Records decide how many bytes an event moves.
 #[test]
 fn records_are_as_small_as_they_were() {
-    assert_eq!([size_of::<Path>(), size_of::<Photon>(), size_of::<SortedPhoton>()], [44, 32, 24]);
+    assert_eq!([size_of::<Path>(), size_of::<StoredPhoton>(), size_of::<Origin>()], [44, 16, 8]);
     assert_eq!([size_of::<LightPath>(), size_of::<MapPhoton>(), size_of::<VisiblePoint>()], [44, 32, 48]);
 }

@@ -9,16 +9,17 @@ use std::time::Instant;
 use common::lit::{mean_red, received, received_within, scene, seen};
 use common::{
     Check, Device, assert_complains, assert_holds, device, device_with, equal_sums, photons_on_cpu, plan_for, plan_for_host,
-    relative_check, run, run_on_cpu, run_scene, run_scene_on_cpu, share_check, z_check,
+    relative_check, run, run_on_cpu, run_scene, run_scene_on_cpu, share_check, upload_photons, z_check,
 };
 use glam::{DVec3, Vec3};
 use photonmill::cpu::bsdf::phong_lobe;
 use photonmill::film::{Film, estimate_walls};
 use photonmill::gpu::{Commands, Options};
 use photonmill::ledger::Fates;
+use photonmill::photon::{Photon, StoredPhoton};
 use photonmill::plan::transport::{Sensor, TransportPlan};
 use photonmill::plan::{Limits, Plan};
-use photonmill::records::{MapPhoton, Photon, Tally};
+use photonmill::records::{MapPhoton, Tally};
 use photonmill::render::constants;
 use photonmill::resources::Resources;
 use photonmill::rng::Rng;
@@ -44,8 +45,7 @@ fn gathered(gpu: &Device, settings: &Settings, photons: &[Photon], times: u32) -
     assert!(photons.len() <= plan.photon_capacity as usize);
     let mut commands = Commands::new(gpu, constants(&plan), Instant::now()).unwrap();
     let resources = Resources::new(gpu, &mut commands, &scene, &plan).unwrap();
-    commands.upload(&resources.photons, photons).unwrap();
-    commands.upload(&resources.counters, &[photons.len() as u32]).unwrap();
+    upload_photons(&mut commands, &resources, &plan, photons);
     index::build(&mut commands, &resources, &plan, settings.photons).unwrap();
     for _ in 0..times {
         estimate::gather(&mut commands, &resources, &plan, settings.photons).unwrap();
@@ -505,6 +505,7 @@ fn vast() -> Limits {
         group_size: 1024,
         busy_invocations: 1 << 17,
         loop_iterations: 1 << 14,
+        lanes: 32,
     }
 }
 
@@ -520,7 +521,7 @@ fn slots_of_a_chunk_are_numbered_in_32_bits() {
     let check = |plan: &Plan, limits: &Limits| {
         let slots = u64::from(plan.path_capacity) * u64::from(plan.settings.bounces);
         assert!(slots <= u64::from(u32::MAX) && u64::from(plan.photon_capacity) == slots, "{slots} slots");
-        assert!(slots * size_of::<Photon>() as u64 <= limits.buffer_bytes);
+        assert!(slots * size_of::<StoredPhoton>() as u64 <= limits.buffer_bytes);
         assert!(u64::from(plan.path_capacity) * u64::from(plan.chunks_per_round) >= u64::from(plan.settings.photons));
     };
     for bounces in [1, 2, 15, 1000, 10_000] {
@@ -532,14 +533,14 @@ fn slots_of_a_chunk_are_numbered_in_32_bits() {
     let most = u32::MAX / 15 - 2;
     assert_eq!((most, plan(most, 15, &vast()).chunks_per_round), (286_331_151, 1));
     assert_eq!(plan(most + 1, 15, &vast()).chunks_per_round, 2);
-    // And where a buffer of 2^27 bytes ends: 279 620 photons of 15 slots of 32 bytes.
+    // And where a buffer of 2^27 bytes ends: 559 240 photons of 15 slots of 16 bytes.
     let small = Limits { buffer_bytes: 1 << 27, ..vast() };
-    let most = (1 << 27) / 32 / 15 - 2;
-    assert_eq!((most, plan(most, 15, &small).chunks_per_round), (279_618, 1));
+    let most = (1 << 27) / 16 / 15 - 2;
+    assert_eq!((most, plan(most, 15, &small).chunks_per_round), (559_238, 1));
     assert_eq!(plan(most + 1, 15, &small).chunks_per_round, 2);
     check(&plan(1 << 31, 15, &small), &small);
     // Room for fewer than two photons is an error that names the bounces.
-    let none = Limits { buffer_bytes: 3 * 32 * 15, ..vast() };
+    let none = Limits { buffer_bytes: 3 * 16 * 15, ..vast() };
     let settings = Settings { mesh: 1, ..Settings::default() };
     assert!(Plan::new(&open_box(&settings), &settings, &none).unwrap_err().to_string().starts_with("--bounces"));
 }

@@ -9,7 +9,7 @@ use std::time::Instant;
 
 use common::{
     Check, assert_complains, assert_holds, device, device_with, equal_sums, photons, photons_on_cpu, plan_for, plan_for_host, run,
-    run_on_cpu,
+    run_on_cpu, upload_photons,
 };
 use glam::Vec3;
 use photonmill::cpu;
@@ -17,8 +17,9 @@ use photonmill::cpu::splat::Splats;
 use photonmill::cpu::trace::Block;
 use photonmill::film::Film;
 use photonmill::gpu::{Commands, Gpu, Options};
+use photonmill::photon::Photon;
 use photonmill::plan::Plan;
-use photonmill::records::Photon;
+
 use photonmill::render::{self, Control, constants};
 use photonmill::resources::Resources;
 use photonmill::rng::Rng;
@@ -134,15 +135,17 @@ fn gathered_on_cpu(plan: &Plan, photons: &[Photon]) -> Vec<u64> {
 
 /// The device's gather of photons that are handed to it.
 fn gathered_on_gpu(gpu: &Gpu, settings: &Settings, photons: &[Photon]) -> Vec<u64> {
-    let scene = open_box(settings);
-    let plan = plan_for(gpu, &scene, settings);
+    gathered_by(gpu, &plan_for(gpu, &open_box(settings), settings), photons)
+}
+
+fn gathered_by(gpu: &Gpu, plan: &Plan, photons: &[Photon]) -> Vec<u64> {
+    let settings = &plan.settings;
     assert!(photons.len() <= plan.photon_capacity as usize);
-    let mut commands = Commands::new(gpu, constants(&plan), Instant::now()).unwrap();
-    let resources = Resources::new(gpu, &mut commands, &scene, &plan).unwrap();
-    commands.upload(&resources.photons, photons).unwrap();
-    commands.upload(&resources.counters, &[photons.len() as u32]).unwrap();
-    index::build(&mut commands, &resources, &plan, settings.photons).unwrap();
-    estimate::gather(&mut commands, &resources, &plan, settings.photons).unwrap();
+    let mut commands = Commands::new(gpu, constants(plan), Instant::now()).unwrap();
+    let resources = Resources::new(gpu, &mut commands, &open_box(settings), plan).unwrap();
+    upload_photons(&mut commands, &resources, plan, photons);
+    index::build(&mut commands, &resources, plan, settings.photons).unwrap();
+    estimate::gather(&mut commands, &resources, plan, settings.photons).unwrap();
     commands.read(&resources.film, plan.points.len() * plan.channel_count as usize).unwrap()
 }
 
@@ -160,6 +163,26 @@ fn device_and_cpu_gather_the_same_photons_to_the_same_bits() {
                 equal_sums("the device's film", &film(&gpu, &settings).sums, &gathered_on_cpu(&plan, &map)),
             );
         }
+    }
+}
+
+/// However many invocations share a point, and whether they share its candidates in slices: every photon counts once.
+#[test]
+fn lanes_and_slices_change_no_bit() {
+    let Some(gpu) = device() else { return };
+    for (group_size, radius, mesh) in [(32, 0.05, 13), (128, 0.5, 3), (64, 0.003, 31)] {
+        let settings = Settings { group_size, radius, mesh, shininess: [Some(2.0); 5], ..Settings::default() };
+        let plan = plan_for(&gpu, &open_box(&settings), &settings);
+        let map = photons(&gpu, &settings);
+        let expected = gathered_on_cpu(&plan, &map);
+        for (lanes, slices_candidates) in [1, 2, 8, 32].into_iter().flat_map(|lanes| [(lanes, false), (lanes, true)]) {
+            let plan = Plan { lanes, slices_candidates, ..plan.clone() };
+            let what = format!("{lanes} lanes, slices {slices_candidates}, groups of {group_size}, radius {radius}");
+            assert_holds(what, equal_sums("film", &gathered_by(&gpu, &plan, &map), &expected));
+        }
+        // One submission's work a point, so that dispatches are many.
+        let plan = Plan { lanes: 32, pair_tests_per_submission: 1, ..plan.clone() };
+        assert_holds("a dispatch for every few points", equal_sums("film", &gathered_by(&gpu, &plan, &map), &expected));
     }
 }
 
@@ -480,8 +503,7 @@ fn counted_on(gpu: Option<&Gpu>, settings: &Settings, start: f32, count: u32) ->
         Some(gpu) => {
             let mut commands = Commands::new(gpu, constants(&plan), Instant::now()).unwrap();
             let resources = Resources::new(gpu, &mut commands, &scene, &plan).unwrap();
-            commands.upload(&resources.photons, &photon).unwrap();
-            commands.upload(&resources.counters, &[1u32]).unwrap();
+            upload_photons(&mut commands, &resources, &plan, &photon);
             commands.upload(&resources.film, &sums).unwrap();
             index::build(&mut commands, &resources, &plan, settings.photons).unwrap();
             (0..count).for_each(|_| estimate::gather(&mut commands, &resources, &plan, settings.photons).unwrap());

@@ -6,6 +6,7 @@ mod common;
 use common::{Check, assert_complains, assert_holds, device, run, run_on_cpu, run_scene, run_scene_on_cpu, share_check};
 use photonmill::gpu::Gpu;
 use photonmill::ledger::{BounceFates, Fates};
+use photonmill::photon::StoredPhoton;
 use photonmill::rng::Rng;
 use photonmill::scene::open_box::open_box;
 use photonmill::scene::room::{RoomScene, Wall};
@@ -133,12 +134,12 @@ fn a_round_larger_than_a_buffer_splits_and_drops_nothing() {
     let Some(gpu) = device() else { return };
     let largest = gpu.facts().storage_buffer_range_bytes.min(gpu.facts().allocation_bytes);
     // Photons whose map with all bounces is just larger than one buffer of lavapipe, 128 MiB.
-    let photons = 300_001;
+    let photons = 600_001;
     let settings = Settings { photons, rng: Rng::Philox, ..small() };
     let expected = run_on_cpu(&Settings { threads: 2, ..settings.clone() }).fates;
     for variant in Variant::ON_GPU {
         let outcome = run(&gpu, &Settings { variant, ..settings.clone() });
-        if largest < 32 * 15 * u64::from(photons) {
+        if largest < size_of::<StoredPhoton>() as u64 * 15 * u64::from(photons) {
             assert!(outcome.plan.chunks_per_round > 1, "{variant:?}");
         }
         assert_holds(format!("{variant:?}"), closes(&outcome.fates, u64::from(photons)));

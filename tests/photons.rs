@@ -9,7 +9,7 @@ use common::{
     Check, MANY_PHOTONS, assert_complains, assert_holds, device, draws_of, in_order, photons, photons_on_cpu, plan_for, streams_of,
 };
 use photonmill::gpu::Gpu;
-use photonmill::records::Photon;
+use photonmill::photon::Photon;
 use photonmill::render::photons_on_gpu;
 use photonmill::rng::{self, Rng, Streams};
 use photonmill::scene::open_box::open_box;

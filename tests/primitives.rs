@@ -11,9 +11,10 @@ use common::{Check, Device, assert_complains, assert_holds, device, equal_sums, 
 use photonmill::constants::{NO_WALL, SCAN_ITEMS};
 use photonmill::gpu::kernels::DispatchSize;
 use photonmill::gpu::{Buffer, Commands, Constants, Extent, Memory};
+use photonmill::photon::{Origin, Photon, StoredPhoton};
 use photonmill::plan::Plan;
 use photonmill::prefix_sum::{block_sums, scan};
-use photonmill::records::{DispatchArgs, DispatchSizePush, Path, Photon, SortedPhoton, Tally};
+use photonmill::records::{DispatchArgs, DispatchSizePush, Path, Tally};
 use photonmill::render::constants;
 use photonmill::resources::Resources;
 use photonmill::rng::Rng;
@@ -22,7 +23,7 @@ use photonmill::scene::room::{RoomScene, Wall};
 use photonmill::settings::{Settings, Variant};
 use photonmill::{index, trace};
 
-/// Words that nothing may touch.
+/// Words that nothing may touch. As an entry of the photon map they are an empty slot.
 const GUARD: u32 = 0xDEAD_BEEF;
 
 /// Numbers of a linear congruential generator, 0 to `below` - 1.
@@ -136,18 +137,15 @@ fn the_check_of_sums_complains() {
 }
 
 /// Bits of a photon in grid order, so that sets can be compared.
-fn sorted_bits(photon: &SortedPhoton) -> [u32; 6] {
-    let SortedPhoton { position, wall, flux, weight } = *photon;
+fn sorted_bits(photon: &Photon) -> [u32; 6] {
+    let Photon { position, wall, flux, weight, .. } = *photon;
     [position.x.to_bits(), position.y.to_bits(), position.z.to_bits(), wall, flux.to_bits(), weight.to_bits()]
 }
 
 /// The index holds each photon once, in the run of its own cell.
-fn index_check(plan: &Plan, cells: &[u32], sorted: &[SortedPhoton], map: &[Photon]) -> Check {
+fn index_check(plan: &Plan, cells: &[u32], sorted: &[Photon], map: &[Photon]) -> Check {
     let grid = &plan.grid;
-    let mut expected: Vec<[u32; 6]> = map
-        .iter()
-        .map(|photon| sorted_bits(&SortedPhoton { position: photon.position, wall: photon.wall, flux: photon.flux, weight: photon.weight }))
-        .collect();
+    let mut expected: Vec<[u32; 6]> = map.iter().map(sorted_bits).collect();
     let mut found: Vec<[u32; 6]> = sorted.iter().map(sorted_bits).collect();
     expected.sort_unstable();
     found.sort_unstable();
@@ -199,7 +197,8 @@ fn the_index_holds_every_photon_in_its_cell() {
             assert_eq!(begins[0], 0);
             // A cell ends where the next one begins.
             let cells = begins[1..].to_vec();
-            let sorted = commands.read::<SortedPhoton>(&buffers.sorted_photons, map.len()).unwrap();
+            let sorted = commands.read::<StoredPhoton>(&buffers.sorted_photons, map.len()).unwrap();
+            let sorted: Vec<Photon> = sorted.into_iter().map(|photon| photon.photon(Origin::default(), &scene.room_record())).collect();
             assert_holds(format!("{variant:?}, {photon_count} photons, radius {radius}"), index_check(&plan, &cells, &sorted, &map));
 
             if photon_count == 5000 {
@@ -232,7 +231,7 @@ struct Appended {
 const GUARD_ENTRIES: u64 = 64;
 
 fn append(gpu: &Device, scene: &RoomScene, settings: &Settings, capacity: u32) -> Appended {
-    let mut plan = plan_for(gpu, scene, settings);
+    let mut plan = Plan { keeps_origins: true, ..plan_for(gpu, scene, settings) };
     let (path_count, bounces) = (u64::from(settings.photons), settings.bounces);
     let mut commands = Commands::new(gpu, constants(&plan), Instant::now()).unwrap();
     let mut resources = Resources::new(gpu, &mut commands, scene, &plan).unwrap();
@@ -242,19 +241,22 @@ fn append(gpu: &Device, scene: &RoomScene, settings: &Settings, capacity: u32) -
         buffer
     };
     let paths = || gpu.buffer::<Path>("guarded paths", path_count + GUARD_ENTRIES, Memory::Device).unwrap();
-    let photons = gpu.buffer::<Photon>("guarded photons", u64::from(capacity) + GUARD_ENTRIES, Memory::Device).unwrap();
-    resources.photons = guarded(&mut commands, photons);
+    let entries = u64::from(capacity) + GUARD_ENTRIES;
+    resources.photons = guarded(&mut commands, gpu.buffer::<StoredPhoton>("guarded photons", entries, Memory::Device).unwrap());
+    resources.origins = guarded(&mut commands, gpu.buffer::<Origin>("guarded origins", entries, Memory::Device).unwrap());
     resources.paths = [guarded(&mut commands, paths()), guarded(&mut commands, paths())];
     trace::chunk(&mut commands, &resources, &plan, 0, &plan.chunk(0)).unwrap();
-    let map = commands.read::<Photon>(&resources.photons, (u64::from(capacity) + GUARD_ENTRIES) as usize).unwrap();
+    let map = commands.read::<StoredPhoton>(&resources.photons, entries as usize).unwrap();
     let (map, behind) = map.split_at(capacity as usize);
-    let mut guards: Vec<u32> = bytemuck::cast_slice(behind).to_vec();
+    let origins = commands.read::<Origin>(&resources.origins, entries as usize).unwrap();
+    let (origins, origins_behind) = origins.split_at(capacity as usize);
+    let mut guards: Vec<u32> = [bytemuck::cast_slice(behind), bytemuck::cast_slice(origins_behind)].concat();
     for paths in &resources.paths {
         let all = commands.read::<Path>(paths, (path_count + GUARD_ENTRIES) as usize).unwrap();
         guards.extend_from_slice(bytemuck::cast_slice(&all[path_count as usize..]));
     }
     Appended {
-        photons: map.to_vec(),
+        photons: map.iter().zip(origins).map(|(photon, origin)| photon.photon(*origin, &scene.room_record())).collect(),
         guards,
         counters: commands.read(&resources.counters, bounces as usize + 2).unwrap(),
         tallies: commands.read(&resources.tallies, bounces as usize).unwrap(),
@@ -267,7 +269,7 @@ fn overflow_check(appended: &Appended, settings: &Settings, capacity: u32, all: 
     if let Some(word) = appended.guards.iter().find(|word| **word != GUARD) {
         return fail(format!("a guard word became {word:#x}"));
     }
-    let stored: Vec<Photon> = appended.photons.iter().filter(|photon| photon.wall != NO_WALL && photon.wall != GUARD).copied().collect();
+    let stored: Vec<Photon> = appended.photons.iter().filter(|photon| photon.wall != NO_WALL).copied().collect();
     let told: u32 = appended.tallies.iter().map(|tally| tally.stored).sum();
     if stored.len() as u32 != told {
         return fail(format!("{} photons are in the map, {told} were counted", stored.len()));
@@ -359,12 +361,8 @@ fn appending_at_survival_none_and_all() {
                 let appended = append(&gpu, &scene, &settings, capacity);
                 let what = format!("{variant:?}, {photon_count} photons, albedo {albedo}");
                 assert!(appended.guards.iter().all(|word| *word == GUARD), "{what}");
-                let stored: HashSet<(u32, u32)> = appended
-                    .photons
-                    .iter()
-                    .filter(|photon| photon.wall != NO_WALL && photon.wall != GUARD)
-                    .map(|photon| (photon.photon, photon.bounce))
-                    .collect();
+                let stored: HashSet<(u32, u32)> =
+                    appended.photons.iter().filter(|photon| photon.wall != NO_WALL).map(|photon| (photon.photon, photon.bounce)).collect();
                 assert_eq!(stored.len() as u32, photon_count * stored_each, "{what}");
                 assert_eq!(appended.tallies.iter().map(|tally| tally.stored).sum::<u32>(), photon_count * stored_each, "{what}");
             }

@@ -12,7 +12,7 @@ use common::{Device, JUDGED, device, photons, photons_on_cpu, run, run_on_cpu};
 use glam::DVec3;
 use photonmill::film::estimate_walls;
 use photonmill::judge::radiosity::{ByLamp, Law, Radiosity, WALLS, cells_of, exchange, form_factor_from, inward, on_wall};
-use photonmill::records::Photon;
+use photonmill::photon::Photon;
 use photonmill::rng::Rng;
 use photonmill::scene::built_in;
 use photonmill::scene::light::LightKind;

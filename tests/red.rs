@@ -82,7 +82,7 @@ struct Fault {
     noticed_by: &'static [Question],
 }
 
-const FAULTS: [Fault; 50] = [
+const FAULTS: [Fault; 52] = [
     Fault {
         what: "every other lane of a subgroup writes over its neighbour",
         file: "append/ballot.glsl",
@@ -142,9 +142,8 @@ const FAULTS: [Fault; 50] = [
     Fault {
         what: "a photon is gathered twice",
         file: "stages/gather_grid.glsl",
-        from: "gather_photon(gathered, sorted_photons[i].flux, sorted_photons[i].weight);",
-        to: "gather_photon(gathered, sorted_photons[i].flux, sorted_photons[i].weight);\n\
-             if (i == 100u) gather_photon(gathered, sorted_photons[i].flux, sorted_photons[i].weight);",
+        from: "gather_photon(gathered, photon);",
+        to: "gather_photon(gathered, photon);\n if (i == 100u) gather_photon(gathered, photon);",
         kernels: &["gather_grid_u64", "gather_grid_two_words"],
         noticed_by: &[Film(Gather::Grid)],
     },
@@ -187,6 +186,22 @@ const FAULTS: [Fault; 50] = [
         to: "uint place = path_place;",
         kernels: &["keep_order"],
         noticed_by: &[Photons(Variant::Scan)],
+    },
+    Fault {
+        what: "stored photons forget which of two walls that face each other is theirs",
+        file: "photon.glsl",
+        from: " | photon.wall << 31",
+        to: "",
+        kernels: &["trace_atomic"],
+        noticed_by: &[Photons(Variant::Atomic)],
+    },
+    Fault {
+        what: "points look for photons in the first layer of cells, whatever their wall",
+        file: "stages/grid_rows.glsl",
+        from: "box.first[axis] = layer;\n    box.last[axis] = layer;",
+        to: "box.first[axis] = 0u;\n    box.last[axis] = 0u;",
+        kernels: &["gather_grid_u64", "gather_grid_two_words"],
+        noticed_by: &[Film(Gather::Grid)],
     },
     Fault {
         what: "two photons share a place in their cell",

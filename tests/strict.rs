@@ -12,7 +12,8 @@ use common::{Check, assert_complains, assert_holds, device, equal_sums, in_order
 use glam::Vec2;
 use photonmill::cpu;
 use photonmill::gpu::{Options, check};
-use photonmill::records::{MathResults, Photon};
+use photonmill::photon::Photon;
+use photonmill::records::MathResults;
 use photonmill::rng::Rng;
 use photonmill::rng::philox;
 use photonmill::scene::built_in;

@@ -6,15 +6,17 @@ mod common;
 use std::time::Instant;
 
 use common::{
-    Check, assert_complains, assert_holds, device, device_with, equal_sums, photons, plan_for, plan_for_host, run, run_on_cpu, z_check,
+    Check, assert_complains, assert_holds, device, device_with, equal_sums, photons, plan_for, plan_for_host, run, run_on_cpu,
+    upload_photons, z_check,
 };
 use glam::{DVec3, Vec3};
 use photonmill::cpu;
 use photonmill::cpu::tree::Tree;
 use photonmill::film::{Film, estimate_walls};
 use photonmill::gpu::{Commands, Gpu, Options};
+use photonmill::photon::Photon;
 use photonmill::plan::{Limits, Plan};
-use photonmill::records::Photon;
+
 use photonmill::render::constants;
 use photonmill::resources::Resources;
 use photonmill::rng::{Rng, philox};
@@ -39,8 +41,7 @@ fn gathered_on_gpu(gpu: &Gpu, settings: &Settings, photons: &[Photon]) -> Vec<u6
     assert!(photons.len() <= plan.photon_capacity as usize && plan.chunks_per_round == 1);
     let mut commands = Commands::new(gpu, constants(&plan), Instant::now()).unwrap();
     let resources = Resources::new(gpu, &mut commands, &scene, &plan).unwrap();
-    commands.upload(&resources.photons, photons).unwrap();
-    commands.upload(&resources.counters, &[photons.len() as u32]).unwrap();
+    upload_photons(&mut commands, &resources, &plan, photons);
     index::build(&mut commands, &resources, &plan, settings.photons).unwrap();
     estimate::gather(&mut commands, &resources, &plan, settings.photons).unwrap();
     commands.read(&resources.film, plan.points.len() * plan.channel_count as usize).unwrap()

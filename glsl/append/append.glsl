@@ -14,5 +14,4 @@
 
 layout(set = 1, binding = 0, scalar) readonly buffer Paths { Path paths[]; };
 layout(set = 1, binding = 1, scalar) writeonly buffer NextPaths { Path next_paths[]; };
-layout(set = 1, binding = 2, scalar) writeonly buffer Photons { Photon photons[]; };
 layout(set = 1, binding = 3, scalar) buffer Counters { uint counters[]; };

@@ -17,7 +17,7 @@ bool append_survivor(uint index, Photon photon, Path path, bool alive)
     // Survivors are never more than the incoming paths, so this one always fits.
     uint path_slot = take_place(2 + push.bounce, stored);
     if (stored) {
-        photons[photon_slot] = photon;
+        store_photon(photon_slot, photon);
         next_paths[path_slot] = path;
     }
     return stored;

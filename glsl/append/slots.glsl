@@ -18,7 +18,7 @@ bool append_survivor(uint index, Photon photon, Path path, bool alive)
         path.wall = NO_WALL;
     }
     if (slot < push.photon_capacity) {
-        photons[slot] = photon;
+        store_photon(slot, photon);
     }
     next_paths[index] = path;
     return stored;

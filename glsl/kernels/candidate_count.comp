@@ -22,7 +22,7 @@ void main()
     uint index = invocation_index();
     uint candidate_count = 0;
     if (index < push.end_point) {
-        CellBox box = cells_in_reach(points[index].position);
+        CellBox box = cells_in_reach(points[index]);
         for (uint z = box.first.z; z <= box.last.z; z++) {
             for (uint y = box.first.y; y <= box.last.y; y++) {
                 uvec2 run = row_run(box, y, z);

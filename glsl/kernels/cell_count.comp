@@ -9,19 +9,25 @@
 
 layout(local_size_x_id = 0) in;
 layout(push_constant, scalar) uniform Push { IndexPush push; };
+layout(set = 0, binding = 0, scalar) readonly buffer Rooms { Room rooms[]; };
 #include "stages/photon_list.glsl"
 layout(set = 1, binding = 2, scalar) buffer Cells { uint cells[]; };
 layout(set = 1, binding = 3, scalar) writeonly buffer Ranks { uint ranks[]; };
 
 #include "dispatch.glsl"
+#include "photon.glsl"
 #include "grid.glsl"
 
 void main()
 {
     uint index = invocation_index();
-    if (index >= photon_list_length(push.photon_capacity) || photons[index].wall == NO_WALL) {
+    if (index >= photon_list_length(push.photon_capacity)) {
         return;
     }
-    uvec3 cell = cell_of(photons[index].position, push.origin, push.cells_per_metre, push.cell_count);
+    uvec4 photon = photons[index];
+    if (is_empty(photon)) {
+        return;
+    }
+    uvec3 cell = cell_of(position_of(photon, rooms[0]), push.origin, push.cells_per_metre, push.cell_count);
     ranks[index] = atomicAdd(cells[cell_number(cell, push.cell_count)], 1);
 }

@@ -8,12 +8,14 @@
 
 layout(local_size_x_id = 0) in;
 layout(push_constant, scalar) uniform Push { IndexPush push; };
+layout(set = 0, binding = 0, scalar) readonly buffer Rooms { Room rooms[]; };
 #include "stages/photon_list.glsl"
 layout(set = 1, binding = 2, scalar) readonly buffer Cells { uint cells[]; };
-layout(set = 1, binding = 3, scalar) writeonly buffer SortedPhotons { SortedPhoton sorted_photons[]; };
+layout(set = 1, binding = 3, scalar) writeonly buffer SortedPhotons { uvec4 sorted_photons[]; };
 layout(set = 1, binding = 4, scalar) readonly buffer Ranks { uint ranks[]; };
 
 #include "dispatch.glsl"
+#include "photon.glsl"
 #include "grid.glsl"
 
 void main()
@@ -22,11 +24,10 @@ void main()
     if (index >= photon_list_length(push.photon_capacity)) {
         return;
     }
-    Photon photon = photons[index];
-    if (photon.wall == NO_WALL) {
+    uvec4 photon = photons[index];
+    if (is_empty(photon)) {
         return;
     }
-    uvec3 cell = cell_of(photon.position, push.origin, push.cells_per_metre, push.cell_count);
-    uint place = cells[cell_number(cell, push.cell_count)] + ranks[index];
-    sorted_photons[place] = SortedPhoton(photon.position, photon.wall, photon.flux, photon.weight);
+    uvec3 cell = cell_of(position_of(photon, rooms[0]), push.origin, push.cells_per_metre, push.cell_count);
+    sorted_photons[cells[cell_number(cell, push.cell_count)] + ranks[index]] = photon;
 }

@@ -12,6 +12,7 @@ layout(push_constant, scalar) uniform Push { GatherPush push; };
 #include "film/film.glsl"
 #include "film/two_words.glsl"
 #include "film/f32.glsl"
+#include "photon.glsl"
 #include "stages/estimate.glsl"
 #include "stages/gather_brute.glsl"
 

@@ -14,6 +14,7 @@ layout(push_constant, scalar) uniform Push { GatherPush push; };
 #include "film/film.glsl"
 #include "film/u64.glsl"
 #include "film/compensated.glsl"
+#include "photon.glsl"
 #include "stages/estimate.glsl"
 #include "stages/gather_brute.glsl"
 

@@ -1,6 +1,6 @@
 // Density estimation at every point, photons found by stages/gather_grid.glsl, summed by film/two_words.glsl
 // and film/f32.glsl.
-// Dispatched by src/estimate.rs once a chunk. One thread = one point and one slice of its photons.
+// Dispatched by src/estimate.rs once a chunk. LANES threads = one point, or one slice of its photons.
 #version 460
 #extension GL_GOOGLE_include_directive : require
 #extension GL_EXT_scalar_block_layout : require
@@ -12,6 +12,7 @@ layout(push_constant, scalar) uniform Push { GatherPush push; };
 #include "film/film.glsl"
 #include "film/two_words.glsl"
 #include "film/f32.glsl"
+#include "photon.glsl"
 #include "grid.glsl"
 #include "stages/grid_rows.glsl"
 #include "stages/estimate.glsl"

@@ -11,6 +11,7 @@ layout(push_constant, scalar) uniform Push { GatherPush push; };
 #include "film/film.glsl"
 #include "film/two_words.glsl"
 #include "film/f32.glsl"
+#include "photon.glsl"
 #include "tree.glsl"
 #include "stages/tree_walk.glsl"
 #include "stages/estimate.glsl"

@@ -13,6 +13,7 @@ layout(push_constant, scalar) uniform Push { GatherPush push; };
 #include "film/film.glsl"
 #include "film/u64.glsl"
 #include "film/compensated.glsl"
+#include "photon.glsl"
 #include "tree.glsl"
 #include "stages/tree_walk.glsl"
 #include "stages/estimate.glsl"

@@ -15,7 +15,9 @@ layout(set = 1, binding = 4, scalar) buffer Tallies { Tally tallies[]; };
 #include "dispatch.glsl"
 #include "bsdf.glsl"
 #include "tally.glsl"
+#include "photon.glsl"
 #include "append/group_prefix.glsl"
+#include "append/store.glsl"
 #include "stages/keep_order.glsl"
 
 void main()

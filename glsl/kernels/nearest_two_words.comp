@@ -13,6 +13,7 @@ layout(push_constant, scalar) uniform Push { NearestPush push; };
 #include "covered_disc.glsl"
 #include "film/film.glsl"
 #include "film/two_words.glsl"
+#include "photon.glsl"
 #include "tree.glsl"
 #include "stages/tree_walk.glsl"
 #include "stages/nearest.glsl"

@@ -15,6 +15,7 @@ layout(push_constant, scalar) uniform Push { NearestPush push; };
 #include "covered_disc.glsl"
 #include "film/film.glsl"
 #include "film/u64.glsl"
+#include "photon.glsl"
 #include "tree.glsl"
 #include "stages/tree_walk.glsl"
 #include "stages/nearest.glsl"

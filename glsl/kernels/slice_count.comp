@@ -1,4 +1,4 @@
-// Size of the grid gather: points along x, slices of their candidates along y.
+// Size of a gather in slices: invocations for the points along x, slices of their candidates along y.
 // Dispatched by src/estimate.rs as one thread.
 #version 460
 #extension GL_GOOGLE_include_directive : require

@@ -19,6 +19,7 @@ layout(set = 1, binding = 4, scalar) buffer Tallies { Tally tallies[]; };
 #include "room.glsl"
 #include "bsdf.glsl"
 #include "tally.glsl"
+#include "photon.glsl"
 #include "append/group_prefix.glsl"
 #include "stages/bounce.glsl"
 #include "stages/trace_in_place.glsl"

@@ -11,6 +11,7 @@ layout(push_constant, scalar) uniform Push { TreePush push; };
 layout(set = 1, binding = 2, scalar) writeonly buffer Keys { uvec2 keys[]; };
 
 #include "dispatch.glsl"
+#include "photon.glsl"
 #include "tree.glsl"
 
 void main()
@@ -19,6 +20,5 @@ void main()
     if (index >= photon_list_length(push.photon_capacity)) {
         return;
     }
-    uint axis = tree_axis(photons[index].wall, push.axis);
-    keys[index] = uvec2(order_key(photons[index].position[axis]), index);
+    keys[index] = uvec2(order_key(place_of(photons[index])[push.axis]), index);
 }

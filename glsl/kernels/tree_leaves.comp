@@ -6,10 +6,14 @@
 #include "records.glsl"
 
 layout(local_size_x_id = 0) in;
-layout(set = 1, binding = 0, scalar) readonly buffer Photons { Photon photons[]; };
+layout(set = 1, binding = 0, scalar) readonly buffer Photons { uvec4 photons[]; };
 layout(set = 1, binding = 1, scalar) readonly buffer WallBegins { uint wall_begins[]; };
 layout(set = 1, binding = 2, scalar) readonly buffer Keys { uvec2 keys[]; };
-layout(set = 1, binding = 3, scalar) writeonly buffer TreePhotons { Photon tree_photons[]; };
+layout(set = 1, binding = 3, scalar) writeonly buffer TreePhotons { uvec4 tree_photons[]; };
+layout(set = 1, binding = 4, scalar) readonly buffer Origins { uvec2 origins[]; };
+layout(set = 1, binding = 5, scalar) writeonly buffer TreeOrigins { uvec2 tree_origins[]; };
+
+layout(constant_id = 37) const bool HAS_ORIGINS = false;
 
 #include "dispatch.glsl"
 
@@ -17,6 +21,10 @@ void main()
 {
     uint place = invocation_index();
     if (place < wall_begins[FACE_COUNT]) {
-        tree_photons[place] = photons[keys[place].y];
+        uint entry = keys[place].y;
+        tree_photons[place] = photons[entry];
+        if (HAS_ORIGINS) {
+            tree_origins[place] = origins[entry];
+        }
     }
 }

@@ -8,6 +8,7 @@
 
 layout(local_size_x_id = 0) in;
 layout(push_constant, scalar) uniform Push { TreePush push; };
+#include "photon.glsl"
 #include "stages/photon_list.glsl"
 #include "stages/tree_digits.glsl"
 layout(set = 1, binding = 3, scalar) readonly buffer Counts { uint counts[]; };

@@ -7,6 +7,7 @@
 
 layout(local_size_x = 1) in;
 layout(push_constant, scalar) uniform Push { TreePush push; };
+#include "photon.glsl"
 #include "stages/photon_list.glsl"
 #include "stages/tree_digits.glsl"
 layout(set = 1, binding = 3, scalar) readonly buffer Counts { uint counts[]; };

@@ -16,21 +16,31 @@ Gathered nothing_gathered()
     return gathered;
 }
 
+// A point as photons of its wall see it.
+struct Site {
+    vec2 place;
+    uint wall;
+};
+
+Site site_of(Point point)
+{
+    return Site(along_wall(point.position, point.wall / 2), point.wall);
+}
+
 // Inclusive at the rim, and only photons of the same wall: at an edge the other wall's light is not
 // this one's. One test of both costs less than a branch around the distance (an NVIDIA H200 gathers
 // over the grid 1.3 x faster).
-bool within_radius(Point point, vec3 position, uint wall)
+bool within_radius(Site site, uvec4 photon)
 {
-    precise vec3 offset = position - point.position;
-    precise float distance_squared = offset.x * offset.x + offset.y * offset.y + offset.z * offset.z;
-    return wall == point.wall && distance_squared <= push.radius_squared;
+    float distance_squared = squared_distance(site.place, photon);
+    return wall_of(photon) == site.wall && distance_squared <= push.radius_squared;
 }
 
-void gather_photon(inout Gathered gathered, float flux, float weight)
+void gather_photon(inout Gathered gathered, uvec4 photon)
 {
-    gathered.sums[0] = add_value(gathered.sums[0], flux);
+    gathered.sums[0] = add_value(gathered.sums[0], flux_of(photon));
     if (CHANNEL_COUNT == 2) {
-        gathered.sums[1] = add_value(gathered.sums[1], weight);
+        gathered.sums[1] = add_value(gathered.sums[1], weight_of(photon));
     }
 }
 

@@ -32,14 +32,16 @@ void gather()
     if (first_leaf >= leaf_count || !slice_in_reach(point, begin, first_leaf, leaf_count)) {
         return;
     }
+    Site site = site_of(point);
     Gathered gathered = nothing_gathered();
     Walk walk = Walk(begin, first_leaf, min(first_leaf + SLICE_LEAVES, leaf_count), findLSB(SLICE_LEAVES), false, 0);
     uint leaf;
     while (next_leaf(walk, point, push.radius_squared, leaf)) {
         uint end = min(begin + (leaf + 1) * TREE_LEAF, wall_begins[point.wall + 1]);
         for (uint i = begin + leaf * TREE_LEAF; i < end; i++) {
-            if (within_radius(point, tree_photons[i].position, tree_photons[i].wall)) {
-                gather_photon(gathered, tree_photons[i].flux, tree_photons[i].weight);
+            uvec4 photon = tree_photons[i];
+            if (within_radius(site, photon)) {
+                gather_photon(gathered, photon);
             }
         }
     }

@@ -8,10 +8,16 @@ struct CellBox {
     uvec3 last;
 };
 
-CellBox cells_in_reach(vec3 position)
+// Photons of the point's wall share its coordinate across the wall to the bit, and so its cell.
+CellBox cells_in_reach(Point point)
 {
-    return CellBox(cell_of(position - push.reach, push.origin, push.cells_per_metre, push.cell_count),
-                   cell_of(position + push.reach, push.origin, push.cells_per_metre, push.cell_count));
+    CellBox box = CellBox(cell_of(point.position - push.reach, push.origin, push.cells_per_metre, push.cell_count),
+                          cell_of(point.position + push.reach, push.origin, push.cells_per_metre, push.cell_count));
+    uint axis = point.wall / 2;
+    uint layer = cell_of(point.position, push.origin, push.cells_per_metre, push.cell_count)[axis];
+    box.first[axis] = layer;
+    box.last[axis] = layer;
+    return box;
 }
 
 // [begin, end) of row (y, z) of the box.

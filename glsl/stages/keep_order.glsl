@@ -3,7 +3,6 @@
 
 layout(set = 1, binding = 0, scalar) readonly buffer Paths { Path paths[]; };
 layout(set = 1, binding = 1, scalar) writeonly buffer NextPaths { Path next_paths[]; };
-layout(set = 1, binding = 2, scalar) writeonly buffer Photons { Photon photons[]; };
 layout(set = 1, binding = 3, scalar) readonly buffer Counters { uint counters[]; };
 layout(set = 1, binding = 5, scalar) readonly buffer Survivors { uint survivors[]; };
 layout(set = 1, binding = 6, scalar) readonly buffer Weights { float weights[]; };
@@ -28,7 +27,7 @@ void keep_order()
             if (HAS_PHONG) {
                 weight = weights[index];
             }
-            photons[place] = Photon(path.position, path.wall, path.flux, weight, path.photon, push.bounce);
+            store_photon(place, Photon(path.position, path.wall, path.flux, weight, path.photon, push.bounce));
             // Those that find no room are the last, so that no gap arises.
             next_paths[path_place] = path;
         }

@@ -16,20 +16,13 @@ layout(set = 0, binding = 1, scalar) readonly buffer Rooms { Room rooms[]; };
 layout(set = 1, binding = 4, scalar) buffer Nearest { uvec2 nearest[]; };
 layout(set = 1, binding = 5, scalar) buffer Searches { Search searches[]; };
 layout(set = 1, binding = 6, scalar) buffer Unfinished { uint unfinished[]; };
+layout(set = 1, binding = 7, scalar) readonly buffer TreeOrigins { uvec2 tree_origins[]; };
 
 // Steps after which a search makes room: eight lanes that wait for each other, as lavapipe's do, loop 65 535 times
 // at most.
 const uint SEARCH_STEPS = GATHER_SLICE;
 // (1 / 1024)^2: the least disc, relative to that of the radius.
 const float LEAST_DISC = 1.0 / 1048576.0;
-
-// The operations of within_radius in stages/estimate.glsl.
-float squared_distance(Point point, vec3 position)
-{
-    precise vec3 offset = position - point.position;
-    precise float distance_squared = offset.x * offset.x + offset.y * offset.y + offset.z * offset.z;
-    return distance_squared;
-}
 
 uint heap_place(uint lane, uint entry)
 {
@@ -42,8 +35,8 @@ bool nearer(uvec2 a, uvec2 b)
     if (a.x != b.x) {
         return a.x < b.x;
     }
-    uint photon_a = tree_photons[a.y].photon, photon_b = tree_photons[b.y].photon;
-    return photon_a != photon_b ? photon_a < photon_b : tree_photons[a.y].bounce < tree_photons[b.y].bounce;
+    uvec2 origin_a = tree_origins[a.y], origin_b = tree_origins[b.y];
+    return origin_a.x != origin_b.x ? origin_a.x < origin_b.x : origin_a.y < origin_b.y;
 }
 
 // Keeps a photon if it is one of the nearest so far.
@@ -114,9 +107,10 @@ float first_limit(Point point, uint begin, uint leaf_count)
         end = node_end;
     }
     // A wall whose last node is nearly empty has the next larger one filled; MAX_NEAREST bounds both.
+    vec2 place = along_wall(point.position, point.wall / 2);
     float farthest = 0.0;
     for (uint i = first; i < min(end, first + 2 * MAX_NEAREST); i++) {
-        farthest = max(farthest, squared_distance(point, tree_photons[begin + i].position));
+        farthest = max(farthest, squared_distance(place, tree_photons[begin + i]));
     }
     return min(farthest, push.radius_squared);
 }
@@ -151,8 +145,8 @@ void add_nearest(uint index, uint lane, Point point, uint found)
     sums[1] = uvec2(0);
     for (uint entry = is_full ? 1 : 0; entry < found; entry++) {
         uint place = nearest[heap_place(lane, entry)].y;
-        sums[0] = add_words(sums[0], to_fixed_point(tree_photons[place].flux, float(1u << NEAREST_BITS)));
-        sums[1] = add_words(sums[1], to_fixed_point(tree_photons[place].weight, float(1u << NEAREST_BITS)));
+        sums[0] = add_words(sums[0], to_fixed_point(flux_of(tree_photons[place]), float(1u << NEAREST_BITS)));
+        sums[1] = add_words(sums[1], to_fixed_point(weight_of(tree_photons[place]), float(1u << NEAREST_BITS)));
     }
     float factor = 1.0;
     if (is_full) {
@@ -188,12 +182,13 @@ void gather()
     }
     uint height = leaf_count <= 1 ? 0 : findMSB(leaf_count - 1) + 1;
     Walk walk = Walk(begin, search.next_leaf, leaf_count, height, search.next_leaf != 0, 0);
+    vec2 place = along_wall(point.position, point.wall / 2);
     uint leaf;
     while (walk.steps < SEARCH_STEPS && next_leaf(walk, point, search.limit, leaf)) {
         uint end = min(begin + (leaf + 1) * TREE_LEAF, wall_begins[point.wall + 1]);
         for (uint i = begin + leaf * TREE_LEAF; i < end; i++) {
             walk.steps++;
-            float distance_squared = squared_distance(point, tree_photons[i].position);
+            float distance_squared = squared_distance(place, tree_photons[i]);
             if (distance_squared <= search.limit) {
                 keep(lane, uvec2(floatBitsToUint(distance_squared), i), search.found, walk.steps);
             }

@@ -1,7 +1,7 @@
 // The stored photons as the index reads them: a list, or the naive builder's slots with empty ones
 // among them.
 
-layout(set = 1, binding = 0, scalar) readonly buffer Photons { Photon photons[]; };
+layout(set = 1, binding = 0, scalar) readonly buffer Photons { uvec4 photons[]; };
 layout(set = 1, binding = 1, scalar) readonly buffer Counters { uint counters[]; };
 
 layout(constant_id = 5) const bool HAS_SLOTS = false;

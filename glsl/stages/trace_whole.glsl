@@ -2,8 +2,6 @@
 // written between bounces. An invocation whose photon has ended takes its next one in the same step in which its
 // neighbours fly on (persistent threads, Aila and Laine 2009), so that a subgroup stays full.
 
-layout(set = 1, binding = 2, scalar) writeonly buffer Photons { Photon photons[]; };
-
 void trace_whole()
 {
     open_tallies();
@@ -31,7 +29,7 @@ void trace_whole()
         uint place = take_place(0, bounced.alive);
         bool stored = bounced.alive && place < push.photon_capacity;
         if (stored) {
-            photons[place] = bounced.photon;
+            store_photon(place, bounced.photon);
         }
         if (flying) {
             count_fate(bounce, stored, bounced.absorbed, bounced.escaped);

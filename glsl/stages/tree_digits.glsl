@@ -7,7 +7,7 @@ layout(set = 1, binding = 2, scalar) readonly buffer Keys { uvec2 keys[]; }; // 
 uint digit_of(uvec2 key)
 {
     if (push.digit == TREE_DIGITS) {
-        return min(photons[key.y].wall, FACE_COUNT);
+        return min(wall_of(photons[key.y]), FACE_COUNT);
     }
     return (key.x >> (4 * push.digit)) & (TREE_RADIX - 1);
 }

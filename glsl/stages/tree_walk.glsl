@@ -3,7 +3,7 @@
 
 layout(set = 1, binding = 1, scalar) readonly buffer WallBegins { uint wall_begins[]; };
 layout(set = 1, binding = 2, scalar) readonly buffer Planes { float planes[]; };
-layout(set = 1, binding = 3, scalar) readonly buffer TreePhotons { Photon tree_photons[]; };
+layout(set = 1, binding = 3, scalar) readonly buffer TreePhotons { uvec4 tree_photons[]; };
 
 struct Walk {
     uint begin;     // the wall's first photon

@@ -9,9 +9,10 @@ use super::rates::{PHILOX_PRODUCTS, Rates};
 use crate::error::{Error, Result};
 use crate::gpu::{Gpu, HeldMemory};
 use crate::ledger::Fates;
+use crate::photon::StoredPhoton;
 use crate::plan::Plan;
 use crate::plan::memory::{block_sum_counts, group_count};
-use crate::records::{Path, Photon, Point, SortedPhoton};
+use crate::records::{Path, Point};
 use crate::render::{self, Control, Outcome};
 use crate::rng::Rng;
 use crate::scene::open_box::open_box;
@@ -201,21 +202,22 @@ pub fn work(pass: &str, plan: &Plan, counts: &Counts, found: f64) -> Option<Work
     let bounces = Cost {
         bytes: match settings.variant {
             // Every slot is read and written at every bounce, alive or not.
-            Variant::Naive => slots * (2.0 * bytes::<Path>() + bytes::<Photon>()),
+            Variant::Naive => slots * (2.0 * bytes::<Path>() + bytes::<StoredPhoton>()),
             // Paths are written where they were read, and read again once their places are known.
-            Variant::Scan => counts.flights * 3.0 * path + counts.survivors * (path + bytes::<Photon>()),
-            _ => counts.flights * path + counts.survivors * (path + bytes::<Photon>()),
+            Variant::Scan => counts.flights * 3.0 * path + counts.survivors * (path + bytes::<StoredPhoton>()),
+            _ => counts.flights * path + counts.survivors * (path + bytes::<StoredPhoton>()),
         },
         float_operations: counts.flights * FLIGHT_OPERATIONS,
         integer_products: counts.flights * products(settings.rng, 3.0),
     };
     // Each entry's place in its cell is written, and read for sorting.
-    let count = Cost { bytes: entries * (bytes::<Photon>() + RANK_BYTES) + cells * 4.0, ..Cost::default() };
+    let count = Cost { bytes: entries * (bytes::<StoredPhoton>() + RANK_BYTES) + cells * 4.0, ..Cost::default() };
     // Each level is read and written, and once more with the sums of the level above; the upper levels are small.
     let scan = Cost { bytes: cells * 16.0, ..Cost::default() };
-    let sort = Cost { bytes: entries * (bytes::<Photon>() + RANK_BYTES) + counts.survivors * bytes::<SortedPhoton>(), ..Cost::default() };
+    let sort =
+        Cost { bytes: entries * (bytes::<StoredPhoton>() + RANK_BYTES) + counts.survivors * bytes::<StoredPhoton>(), ..Cost::default() };
     let gather = Cost {
-        bytes: counts.survivors * bytes::<SortedPhoton>() + points * (bytes::<Point>() + 16.0 * f64::from(plan.channel_count)),
+        bytes: counts.survivors * bytes::<StoredPhoton>() + points * (bytes::<Point>() + 16.0 * f64::from(plan.channel_count)),
         float_operations: points * found * PAIR_OPERATIONS,
         ..Cost::default()
     };
@@ -236,6 +238,7 @@ pub fn work(pass: &str, plan: &Plan, counts: &Counts, found: f64) -> Option<Work
     };
     let scans = chunks * scans_of(plan.grid.cells());
     let counting = chunks * (1.0 + sized(1.0));
+    let slicing = if plan.slices_candidates { 2.0 } else { 0.0 };
     match pass {
         "build" => work("events", counts.events, emits + flights, emit + bounces),
         "build/emit" => work("photons", counts.emitted, emits, emit),
@@ -244,7 +247,7 @@ pub fn work(pass: &str, plan: &Plan, counts: &Counts, found: f64) -> Option<Work
         "index/count" => work("photons", counts.survivors, counting, count),
         "index/scan" => work("cells", cells, scans, scan),
         "index/sort" if plan.gathers_by_grid() => work("photons", counts.survivors, chunks, sort),
-        "gather" => work("photons found", points * found, 3.0 * chunks, gather),
+        "gather" => work("photons found", points * found, chunks * (1.0 + slicing), gather),
         "film" => work("sums", points * f64::from(plan.channel_count), 1.0, film),
         _ => None,
     }

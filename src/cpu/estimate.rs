@@ -4,17 +4,14 @@ use glam::Vec3;
 use rayon::prelude::*;
 
 use super::tree::Tree;
+use crate::photon::Photon;
 use crate::plan::Plan;
-use crate::records::{Photon, Point, SortedPhoton};
+use crate::records::Point;
 use crate::settings::Sums;
 
 /// Adds to `sums` what each point receives from a list of photons, stepping through all of it.
 pub fn gather_brute(plan: &Plan, photons: &[Photon], sums: &mut [u64]) {
-    let list: Vec<SortedPhoton> = photons
-        .iter()
-        .map(|photon| SortedPhoton { position: photon.position, wall: photon.wall, flux: photon.flux, weight: photon.weight })
-        .collect();
-    gather(plan, sums, |_| std::iter::once(list.as_slice()));
+    gather(plan, sums, |_| std::iter::once(photons));
 }
 
 /// The same from the leaves of a kd-tree in reach of each point.
@@ -28,7 +25,7 @@ pub fn gather_tree(plan: &Plan, tree: &Tree, sums: &mut [u64]) {
 
 fn gather<'a, Runs>(plan: &Plan, sums: &mut [u64], runs_near: impl Fn(&Point) -> Runs + Sync)
 where
-    Runs: Iterator<Item = &'a [SortedPhoton]>,
+    Runs: Iterator<Item = &'a [Photon]>,
 {
     let channels = plan.channel_count as usize;
     let radius_squared = (plan.settings.radius * plan.settings.radius) as f32;
@@ -51,7 +48,7 @@ where
     }
 }
 
-fn within_radius(point: &Point, photon: &SortedPhoton, radius_squared: f32) -> bool {
+fn within_radius(point: &Point, photon: &Photon, radius_squared: f32) -> bool {
     squared_distance(point, photon.position) <= radius_squared
 }
 

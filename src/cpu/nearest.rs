@@ -39,9 +39,10 @@ fn of_point(plan: &Plan, room: &Room, tree: &Tree, count: usize, point: &Point) 
     let mut walk = tree.walk(point);
     while let Some(places) = walk.next_leaf(limit) {
         for place in places {
-            let distance_squared = squared_distance(point, tree.sorted_photons[place].position);
+            let photon = &tree.sorted_photons[place];
+            let distance_squared = squared_distance(point, photon.position);
             if distance_squared <= limit {
-                nearest.push((distance_squared.to_bits(), tree.names[place], place));
+                nearest.push((distance_squared.to_bits(), (photon.photon, photon.bounce), place));
                 if nearest.len() > count {
                     nearest.pop();
                 }

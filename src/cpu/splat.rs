@@ -12,8 +12,9 @@ use rayon::prelude::*;
 use super::estimate::{squared_distance, to_fixed_point};
 use super::trace::Block;
 use crate::constants::FACE_COUNT;
+use crate::photon::Photon;
 use crate::plan::Plan;
-use crate::records::{Photon, Point};
+use crate::records::Point;
 use crate::scene::room::face_axis;
 
 /// What photons add to the texels of all walls.

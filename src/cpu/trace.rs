@@ -17,8 +17,9 @@ use super::emission::emit_from_disc;
 use super::room::{intersect_room, wall_frame};
 use super::sampling::{sample_cosine_hemisphere, to_world};
 use crate::constants::FACE_COUNT;
+use crate::photon::Photon;
 use crate::plan::{EmissionRange, Plan};
-use crate::records::{DiscLight, Path, Photon, RandomKey, Room, Tally, Wall};
+use crate::records::{DiscLight, Path, RandomKey, Room, Tally, Wall};
 use crate::rng::{self, Rng, words};
 use crate::scene::room::RoomScene;
 

@@ -4,7 +4,8 @@
 use std::ops::Range;
 
 use crate::constants::{FACE_COUNT, TREE_LEAF};
-use crate::records::{Photon, Point, SortedPhoton};
+use crate::photon::Photon;
+use crate::records::Point;
 
 const LEAF: usize = TREE_LEAF as usize;
 const WALLS: usize = FACE_COUNT as usize;
@@ -14,9 +15,7 @@ pub struct Tree {
     /// First photon of each wall, and the number of all.
     wall_begins: [usize; WALLS + 1],
     planes: Vec<f32>,
-    pub sorted_photons: Vec<SortedPhoton>,
-    /// (photon, bounce) of each.
-    pub names: Vec<(u32, u32)>,
+    pub sorted_photons: Vec<Photon>,
 }
 
 /// Axis that nodes of a height are split along: one of the wall's two.
@@ -39,14 +38,7 @@ impl Tree {
             let height = (end - begin).div_ceil(LEAF).max(1).next_power_of_two().ilog2();
             split(&mut photons[begin..end], wall, height, begin, &mut planes);
         }
-        let sorted =
-            |photon: &Photon| SortedPhoton { position: photon.position, wall: photon.wall, flux: photon.flux, weight: photon.weight };
-        Tree {
-            wall_begins,
-            planes,
-            sorted_photons: photons.iter().map(sorted).collect(),
-            names: photons.iter().map(|photon| (photon.photon, photon.bounce)).collect(),
-        }
+        Tree { wall_begins, planes, sorted_photons: photons }
     }
 
     /// The leaves of a point's wall.

@@ -33,7 +33,7 @@ fn gather_radius(commands: &mut Commands, resources: &Resources, tree: &TreeBuff
     let TreeBuffers { wall_begins, planes, tree_photons, longest, .. } = tree;
     let whole = whole_push(plan, photon_count);
     let tests_per_point = plan.work.tests_per_point(photon_count);
-    for (first_point, end_point) in point_ranges(commands, plan, tests_per_point) {
+    for (first_point, end_point) in point_ranges(commands, plan, tests_per_point, 1) {
         let size = DispatchSizePush {
             counter: 0,
             capacity: end_point - first_point,
@@ -65,10 +65,10 @@ fn gather_nearest(
     photon_count: u32,
 ) -> Result<()> {
     let Resources { film, points, rooms, .. } = resources;
-    let TreeBuffers { wall_begins, planes, tree_photons, .. } = tree;
+    let TreeBuffers { wall_begins, planes, tree_photons, tree_origins, .. } = tree;
     let SearchBuffers { nearest, searches, unfinished, .. } = buffers;
     let tests_per_point = plan.work.tests_per_point(photon_count).min(u64::from(GATHER_SLICE));
-    for (first, last) in point_ranges(commands, plan, tests_per_point) {
+    for (first, last) in point_ranges(commands, plan, tests_per_point, 1) {
         for first_point in (first..last).step_by(buffers.point_count as usize) {
             let end_point = last.min(first_point + buffers.point_count);
             let mut push = NearestPush {
@@ -83,10 +83,22 @@ fn gather_nearest(
                 commands.fill(unfinished, 0, 1, 0);
                 let extent = Extent::Items(u64::from(end_point - first_point));
                 if adds_in_one_word(plan, commands.facts()) {
-                    let kernel = NearestU64 { points, rooms, film, wall_begins, planes, tree_photons, nearest, searches, unfinished };
+                    let kernel =
+                        NearestU64 { points, rooms, film, wall_begins, planes, tree_photons, tree_origins, nearest, searches, unfinished };
                     commands.dispatch(kernel, &push, extent)?;
                 } else {
-                    let kernel = NearestTwoWords { points, rooms, film, wall_begins, planes, tree_photons, nearest, searches, unfinished };
+                    let kernel = NearestTwoWords {
+                        points,
+                        rooms,
+                        film,
+                        wall_begins,
+                        planes,
+                        tree_photons,
+                        tree_origins,
+                        nearest,
+                        searches,
+                        unfinished,
+                    };
                     commands.dispatch(kernel, &push, extent)?;
                 }
                 if commands.read::<u32>(unfinished, 1)? == [0] {

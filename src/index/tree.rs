@@ -42,8 +42,8 @@ const TIMESTAMP_RESERVE: u32 = 64;
 
 /// Builds the tree of a chunk's photons.
 pub(super) fn build(commands: &mut Commands, resources: &Resources, tree: &TreeBuffers, plan: &Plan, photon_count: u32) -> Result<()> {
-    let Resources { photons, counters, .. } = resources;
-    let TreeBuffers { lists, wall_begins, item_args, run_args, scan_args, tree_photons, .. } = tree;
+    let Resources { photons, origins, counters, .. } = resources;
+    let TreeBuffers { lists, wall_begins, item_args, run_args, scan_args, tree_photons, tree_origins, .. } = tree;
     let capacity = photon_list_capacity(plan, photon_count);
     let push = TreePush { photon_capacity: capacity, axis: 0, digit: 0, height: 0 };
     let one = Extent::Groups(1, 1);
@@ -64,7 +64,8 @@ pub(super) fn build(commands: &mut Commands, resources: &Resources, tree: &TreeB
             std::mem::swap(&mut along[1 - axis], &mut spare);
             make_room(commands, plan, pass_work)?;
         }
-        commands.dispatch(TreeLeaves { photons, wall_begins, keys: along[0], tree_photons }, &(), Extent::Indirect(item_args))
+        let leaves = TreeLeaves { photons, origins, wall_begins, keys: along[0], tree_photons, tree_origins };
+        commands.dispatch(leaves, &(), Extent::Indirect(item_args))
     })
 }
 

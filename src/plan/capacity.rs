@@ -5,10 +5,11 @@ use serde::Serialize;
 
 use crate::constants::{LOOP_LIMIT, MT_MIDDLE};
 use crate::error::{Error, Result};
-use crate::records::{Path, Photon};
+use crate::photon::{Origin, StoredPhoton};
+use crate::records::Path;
 use crate::rng::Rng;
 use crate::scene::room::RoomScene;
-use crate::settings::{Gather, Settings, Variant};
+use crate::settings::{Gather, Settings, Sums, Variant};
 
 /// What a device allows.
 #[derive(Debug, Clone, Copy, PartialEq, Eq, Serialize)]
@@ -25,6 +26,8 @@ pub struct Limits {
     pub busy_invocations: u32,
     /// Loop iterations that one of them may take.
     pub loop_iterations: u32,
+    /// Neighbouring invocations whose reads of neighbouring records are one.
+    pub lanes: u32,
 }
 
 impl Limits {
@@ -37,6 +40,7 @@ impl Limits {
             group_size: 1024,
             busy_invocations: 1,
             loop_iterations: LOOP_LIMIT,
+            lanes: 1,
         }
     }
 
@@ -53,6 +57,11 @@ impl Limits {
     /// Loop iterations by kind of device: lavapipe leaves loops early, others only after seconds.
     pub fn loop_iterations_of(kind: &str) -> u32 {
         if kind == "cpu" { LOOP_LIMIT } else { 1 << 20 }
+    }
+
+    /// Invocations that read together by kind of device: a software device's lanes each read on their own.
+    pub fn lanes_of(kind: &str) -> u32 {
+        if kind == "cpu" { 1 } else { 32 }
     }
 
     /// Invocations that keep a device of a kind busy: half of what a large GPU holds at a time.
@@ -73,9 +82,12 @@ const PAIR_TESTS_PER_FLIGHT: f64 = 16.0;
 const PAIR_TESTS_PER_TREE_PASS: f64 = 16.0;
 /// Work of finding one of the nearest photons, in pair tests.
 const TESTS_PER_NEAREST: f64 = 64.0;
-/// Bytes that the kd-tree takes for an entry of the photon map: the photon again, three lists of (key, entry), a
-/// rank, a count, and a plane for each leaf.
-const TREE_BYTES: u64 = 32 + 3 * 8 + 4 + 4 + 1;
+/// Bytes of an entry of the photon map, and of its name where one is kept.
+const PHOTON_BYTES: u64 = size_of::<StoredPhoton>() as u64;
+const ORIGIN_BYTES: u64 = size_of::<Origin>() as u64;
+/// Bytes that the kd-tree takes for an entry of the photon map: the photon and its name again, three lists of (key,
+/// entry), a rank, a count, and a plane for each leaf.
+const TREE_BYTES: u64 = PHOTON_BYTES + ORIGIN_BYTES + 3 * 8 + 4 + 4 + 1;
 
 /// Bytes of a photon's place in its cell.
 const RANK_BYTES: u64 = 4;
@@ -135,6 +147,25 @@ impl Work {
     }
 }
 
+/// Candidates of a point for each invocation that shares them.
+const TESTS_PER_LANE: u64 = 16;
+
+/// Invocations that share a point of a gather over the grid, where it is expected to test so many photons.
+pub(super) fn lanes(settings: &Settings, limits: &Limits, tests_per_point: u64) -> u32 {
+    // Sums of floats depend on who adds what.
+    if settings.sums != Sums::Integer {
+        return 1;
+    }
+    let wanted = (tests_per_point / TESTS_PER_LANE).clamp(1, u64::from(limits.lanes)) as u32;
+    wanted.next_power_of_two()
+}
+
+/// Candidates that one invocation of a gather may have to test. A software device's lanes wait for each other, row by row
+/// of cells: a quarter leaves room for that.
+pub(super) fn most_candidates(limits: &Limits) -> u32 {
+    limits.loop_iterations / 4
+}
+
 /// Photons of an invocation over which short and long paths even out.
 const MOST_PHOTONS_PER_INVOCATION: u32 = 16;
 /// Lanes of a software device's vector: they begin photons at different times, and it counts the loops of all.
@@ -178,11 +209,11 @@ pub(super) fn loops_to_begin(rng: Rng) -> u32 {
 /// can never be full: a round that does not fit is split here, and nothing is dropped there.
 pub fn chunk_photons(settings: &Settings, limits: &Limits, work: &Work) -> Result<u32> {
     let bounces = u64::from(settings.bounces);
-    let (path, photon) = (size_of::<Path>() as u64, size_of::<Photon>() as u64);
-    let by_buffer = (limits.buffer_bytes / path).min(limits.buffer_bytes / (photon * bounces));
-    // Two path arrays, the photon map, and the same again at most for its sorted copy.
-    let copy = if settings.gather == Gather::KdTree { TREE_BYTES } else { photon + RANK_BYTES };
-    let by_memory = limits.memory_bytes / (2 * path + (photon + copy) * bounces);
+    let path = size_of::<Path>() as u64;
+    let by_buffer = (limits.buffer_bytes / path).min(limits.buffer_bytes / (PHOTON_BYTES * bounces));
+    // Two path arrays, the photon map with the names that somebody may ask for, and its sorted copy.
+    let copy = if settings.gather == Gather::KdTree { TREE_BYTES } else { PHOTON_BYTES + RANK_BYTES };
+    let by_memory = limits.memory_bytes / (2 * path + (PHOTON_BYTES + ORIGIN_BYTES + copy) * bounces);
     // Entries are numbered in 32 bits.
     let by_index = u64::from(u32::MAX) / bounces;
     let fits = by_buffer.min(by_memory).min(by_index);

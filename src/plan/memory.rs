@@ -7,6 +7,7 @@ use glam::UVec2;
 use super::Plan;
 use super::transport::{MapPlan, Sensor, TransportPlan};
 use crate::constants::{FACE_COUNT, MAX_ODDITIES, ODD_ESTIMATE, PART_COUNT, SCAN_ITEMS, TREE_LEAF, TREE_RUN};
+use crate::photon::{Origin, StoredPhoton};
 use crate::records::*;
 use crate::scene::geometry::Geometry;
 use crate::settings::Variant;
@@ -58,6 +59,7 @@ impl Plan {
     pub fn buffers(&self) -> Vec<Stated> {
         let bounces = u64::from(self.settings.bounces);
         let (paths, photons) = (u64::from(self.path_array_length()), u64::from(self.photon_capacity));
+        let origins = u64::from(self.origin_array_length());
         let points = self.points.len() as u64;
         let sums = points * u64::from(self.channel_count);
         let mut buffers = vec![
@@ -67,7 +69,8 @@ impl Plan {
             ("points", array::<Point>(points)),
             ("stream seeds", array::<UVec2>(self.streams().first_state_count(self.path_capacity))),
             ("paths", 2 * array::<Path>(paths)),
-            ("photons", array::<Photon>(photons)),
+            ("photons", array::<StoredPhoton>(photons)),
+            ("origins", array::<Origin>(origins)),
             ("counters", array::<u32>(bounces + 2)),
             ("dispatch args", array::<DispatchArgs>(1)),
             ("tallies", array::<Tally>(bounces)),
@@ -88,7 +91,7 @@ impl Plan {
                 ("cells", array::<u32>(cells)),
                 ("ranks", array::<u32>(photons)),
                 ("block sums", block_sum_bytes(cells, self.settings.group_size)),
-                ("sorted photons", array::<SortedPhoton>(photons)),
+                ("sorted photons", array::<StoredPhoton>(photons)),
                 ("longest", array::<u32>(1)),
             ]);
         }
@@ -103,7 +106,8 @@ impl Plan {
                 ("wall begins", array::<u32>(u64::from(FACE_COUNT) + 1)),
                 ("longest", array::<u32>(1)),
                 ("planes", array::<f32>(photons / u64::from(TREE_LEAF) + 1)),
-                ("tree photons", array::<Photon>(photons)),
+                ("tree photons", array::<StoredPhoton>(photons)),
+                ("tree origins", array::<Origin>(origins)),
             ]);
             if let Some(nearest) = self.settings.nearest {
                 let at_once = searches_at_once(self, nearest);

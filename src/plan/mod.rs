@@ -16,7 +16,8 @@ pub use effect::Decision;
 
 use crate::constants::{NEAREST_BITS, NEAREST_GAIN_BITS};
 use crate::error::{Error, Result};
-use crate::records::{IndexPush, Photon, Point};
+use crate::photon::StoredPhoton;
+use crate::records::{IndexPush, Point};
 use crate::rng::Streams;
 use crate::scene::room::RoomScene;
 use crate::settings::{Gather, Settings, Sums, Variant};
@@ -70,6 +71,13 @@ pub struct Plan {
     pub pair_tests_per_submission: u64,
     /// How photons are dealt to invocations that keep them to their end.
     pub persistence: Persistence,
+    /// Whether entries of the photon map say which photon they are: the nearest photons are told apart by it, and so are
+    /// photons that somebody lists.
+    pub keeps_origins: bool,
+    /// Invocations that share a point of a gather over the grid.
+    pub lanes: u32,
+    /// Whether they test a slice of its candidates only, lest they loop for too long.
+    pub slices_candidates: bool,
 }
 
 /// The uniform grid that sorts photons.
@@ -160,10 +168,15 @@ impl Plan {
             work,
             pair_tests_per_submission: limits.pair_tests_per_submission,
             persistence: Persistence::new(capacity::loops_to_begin(settings.rng), capacity::LOOPS_PER_BOUNCE, settings.bounces, limits),
+            keeps_origins: settings.nearest.is_some(),
+            lanes: capacity::lanes(settings, limits, work.tests_per_point(chunk_photons)),
+            slices_candidates: false,
         };
         // Of each light's photons the larger share: there may be a billion chunks, too many to look at each.
         plan.path_capacity = plan.light_photons.iter().map(|count| count.div_ceil(chunks_per_round)).sum();
         plan.photon_capacity = plan.path_capacity * settings.bounces;
+        // Even if a point has every photon in reach.
+        plan.slices_candidates = plan.photon_capacity.div_ceil(plan.lanes) > capacity::most_candidates(limits);
         Ok(plan)
     }
 
@@ -238,6 +251,11 @@ impl Plan {
         if self.settings.variant == Variant::Persistent { 0 } else { self.path_capacity }
     }
 
+    /// Entries of the photon map that say which photon they are.
+    pub fn origin_array_length(&self) -> u32 {
+        if self.keeps_origins { self.photon_capacity } else { 0 }
+    }
+
     pub fn has_slots(&self) -> bool {
         self.settings.variant == Variant::Naive
     }
@@ -249,7 +267,7 @@ impl Plan {
 
     /// Bytes of the photon map.
     pub fn photon_map_bytes(&self) -> u64 {
-        u64::from(self.photon_capacity) * size_of::<Photon>() as u64
+        u64::from(self.photon_capacity) * size_of::<StoredPhoton>() as u64
     }
 
     pub fn gathers_by_grid(&self) -> bool {
@@ -355,6 +373,24 @@ mod tests {
                 }
             }
             assert!(seen.iter().all(|count| *count == 1), "{photons} photons, chunks of {chunk:?}");
+        }
+    }
+
+    /// Photons and points of a wall share its coordinate across it to the bit: the grid's gather counts on it, and stored
+    /// photons do without it.
+    #[test]
+    fn points_lie_in_the_planes_of_their_walls() {
+        for size in [0.5, 1e-7, 0.1, 3e9] {
+            let settings = Settings { mesh: 7, ..Settings::default() };
+            let mut scene = open_box(&settings);
+            scene.min_corner *= size / 3.0;
+            scene.max_corner *= size;
+            let room = scene.room_record();
+            for point in Plan::new(&scene, &settings, &Limits::of_host()).unwrap().points {
+                let axis = point.wall as usize / 2;
+                let plane = if point.wall % 2 == 1 { room.max_corner } else { room.min_corner }[axis];
+                assert_eq!(point.position[axis].to_bits(), plane.to_bits(), "{point:?}");
+            }
         }
     }
 

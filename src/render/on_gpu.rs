@@ -12,8 +12,9 @@ use crate::gpu::check::strict_math;
 use crate::gpu::{Commands, Constants, DeviceFacts, Gpu};
 use crate::ledger::fate;
 use crate::oddities::Oddities;
+use crate::photon::{Origin, Photon, StoredPhoton};
 use crate::plan::{EmissionRange, Limits, Plan, photons_of};
-use crate::records::{Path, Photon, Tally};
+use crate::records::{Path, Tally};
 use crate::resources::{Resources, RoundBuffers};
 use crate::scene::room::RoomScene;
 use crate::settings::{Math, Settings};
@@ -87,6 +88,7 @@ pub fn limits(facts: &DeviceFacts) -> Limits {
         group_size: facts.work_group_size,
         loop_iterations: Limits::loop_iterations_of(facts.kind),
         busy_invocations: Limits::busy_invocations_of(facts.kind),
+        lanes: Limits::lanes_of(facts.kind),
     }
 }
 
@@ -101,6 +103,9 @@ pub fn constants(plan: &Plan) -> Constants {
         .set("HAS_PHONG", u32::from(settings.has_phong()))
         .set("PHONG_DIRECTION", settings.phong_direction.code())
         .set("HAS_SLOTS", u32::from(plan.has_slots()))
+        .set("HAS_ORIGINS", u32::from(plan.keeps_origins))
+        .set("LANES", plan.lanes)
+        .set("HAS_SLICES", u32::from(plan.slices_candidates))
         .set("CHANNEL_COUNT", plan.channel_count)
         .set("SUMS", settings.sums.code())
 }
@@ -156,12 +161,12 @@ fn read_film(commands: &mut Commands, resources: &Resources, plan: &Plan, book: 
 
 /// The photon map of round 0, for comparing builders.
 pub fn photons_on_gpu(gpu: &Gpu, scene: &RoomScene, settings: &Settings) -> Result<Vec<Photon>> {
-    let plan = Plan::new(scene, settings, &limits(gpu.facts()))?;
+    let plan = Plan { keeps_origins: true, ..Plan::new(scene, settings, &limits(gpu.facts()))? };
     let mut commands = Commands::new(gpu, constants(&plan), Instant::now())?;
     let resources = Resources::new(gpu, &mut commands, scene, &plan)?;
     let mut photons = Vec::new();
     for ranges in plan.chunks() {
-        photons.extend(stored(&mut commands, &resources, &plan, 0, &ranges)?);
+        photons.extend(stored(&mut commands, &resources, scene, &plan, 0, &ranges)?);
     }
     gpu.check_validation()?;
     Ok(photons)
@@ -169,7 +174,7 @@ pub fn photons_on_gpu(gpu: &Gpu, scene: &RoomScene, settings: &Settings) -> Resu
 
 /// One photon by itself. A photon is (seed, round, number), so it takes the same path alone as among millions.
 pub fn replay_on_gpu(gpu: &Gpu, scene: &RoomScene, settings: &Settings, round: u32, photon: u32) -> Result<Replayed> {
-    let plan = Plan::new(scene, settings, &limits(gpu.facts()))?;
+    let plan = Plan { keeps_origins: true, ..Plan::new(scene, settings, &limits(gpu.facts()))? };
     if settings.math == Math::Strict {
         strict_math(gpu)?;
     }
@@ -178,7 +183,7 @@ pub fn replay_on_gpu(gpu: &Gpu, scene: &RoomScene, settings: &Settings, round: u
     let resources = Resources::new(gpu, &mut commands, scene, &plan)?;
     trace::emit(&mut commands, &resources, &plan, round, &ranges)?;
     let start = commands.read::<Path>(&resources.paths[0], 1)?[0];
-    let stored = stored(&mut commands, &resources, &plan, round, &ranges)?;
+    let stored = stored(&mut commands, &resources, scene, &plan, round, &ranges)?;
     let tallies: Vec<Tally> = commands.read(&resources.tallies, settings.bounces as usize)?;
     let oddities = if settings.paranoid { Some(Oddities::read(&mut commands, &resources.oddities)?) } else { None };
     gpu.check_validation()?;
@@ -186,10 +191,20 @@ pub fn replay_on_gpu(gpu: &Gpu, scene: &RoomScene, settings: &Settings, round: u
 }
 
 /// What a chunk leaves in the photon map.
-fn stored(commands: &mut Commands, resources: &Resources, plan: &Plan, round: u32, ranges: &[EmissionRange]) -> Result<Vec<Photon>> {
+fn stored(
+    commands: &mut Commands,
+    resources: &Resources,
+    scene: &RoomScene,
+    plan: &Plan,
+    round: u32,
+    ranges: &[EmissionRange],
+) -> Result<Vec<Photon>> {
     trace::chunk(commands, resources, plan, round, ranges)?;
     let capacity = trace::photon_list_capacity(plan, photons_of(ranges));
     let length = if plan.has_slots() { capacity } else { commands.read::<u32>(&resources.counters, 1)?[0].min(capacity) };
-    let stored = commands.read::<Photon>(&resources.photons, length as usize)?;
-    Ok(stored.into_iter().filter(|photon| photon.wall != NO_WALL).collect())
+    let photons = commands.read::<StoredPhoton>(&resources.photons, length as usize)?;
+    let origins = commands.read::<Origin>(&resources.origins, length as usize)?;
+    let room = scene.room_record();
+    let stored = photons.into_iter().zip(origins).map(|(photon, origin)| photon.photon(origin, &room));
+    Ok(stored.filter(|photon| photon.wall != NO_WALL).collect())
 }

@@ -17,10 +17,11 @@ use std::ops::Deref;
 use std::sync::atomic::AtomicBool;
 
 use glam::UVec2;
-use photonmill::gpu::{Gpu, Options};
+use photonmill::gpu::{Commands, Gpu, Options};
+use photonmill::photon::{Origin, Photon, StoredPhoton};
 use photonmill::plan::{Limits, Plan};
-use photonmill::records::Photon;
 use photonmill::render::{self, Control, Outcome};
+use photonmill::resources::Resources;
 use photonmill::rng::{self, Rng, Streams};
 use photonmill::scene::open_box::open_box;
 use photonmill::scene::room::RoomScene;
@@ -117,6 +118,17 @@ pub const MANY_PHOTONS: u32 = 600_001;
 /// The same from the CPU builder.
 pub fn photons_on_cpu(settings: &Settings) -> Vec<Photon> {
     render::photons_on_cpu(&open_box(settings), settings).unwrap_or_else(|error| panic!("{error}\n{settings:?}"))
+}
+
+/// Puts photons into the photon map as if they had been traced.
+pub fn upload_photons(commands: &mut Commands, resources: &Resources, plan: &Plan, photons: &[Photon]) {
+    let stored: Vec<StoredPhoton> = photons.iter().map(Photon::stored).collect();
+    commands.upload(&resources.photons, &stored).unwrap();
+    if plan.keeps_origins {
+        let origins: Vec<Origin> = photons.iter().map(Photon::origin).collect();
+        commands.upload(&resources.origins, &origins).unwrap();
+    }
+    commands.upload(&resources.counters, &[photons.len() as u32]).unwrap();
 }
 
 /// What a device would do with these settings.
