@@ -334,6 +334,7 @@ struct LookupPush {
     uint width;
     uint height;
     uint first_slice;
+    uint lanes;
     float radius;
     CellPush cells;
 };

@@ -483,6 +483,8 @@ records! {
         height: u32,
         /// 0: the first slice of candidates of every point; 1: all others of those that have more.
         first_slice: u32,
+        /// Invocations that share a point.
+        lanes: u32,
         radius: f32,
         cells: CellPush,
     }

@@ -50,7 +50,7 @@ void main()
     vec3 ng = receiver.normal;
     vec3 ns = receiver.shading_normal;
     Target here = Target(receiver.position, position_error(receiver.position), ng, ns, ns, SURFACE_RECEIVER, 0.0);
-    Chain chain = new_chain(receiver.position, ns, vec3(1.0));
+    Chain chain = new_chain(receiver.position, ns, vec3(1.0), vec2(0.0));
     if (SHADOW_RAYS != 0) {
         add_light(chain, direct_light(here, push.emitter_count, push.draws, index, 0, 1 + VERTEX_BLOCKS * MAX_CHAIN));
     }

@@ -45,12 +45,12 @@ void main()
     }
     uint pixel = pixel_in_tiles(place_in_order, push.width, push.height);
     uint number = item % SAMPLES;
-    vec2 u = stratified(number, SAMPLES, pixel, 0, push.draws).xy;
-    vec2 place = vec2(pixel % push.width, pixel / push.width) + 0.5 + filter_offsets(u);
+    vec4 u = stratified_start(number, pixel, push.draws);
+    vec2 place = vec2(pixel % push.width, pixel / push.width) + 0.5 + filter_offsets(u.xy);
     vec2 picture = vec2(divide(2.0 * place.x, push.width) - 1.0, 1.0 - divide(2.0 * place.y, push.height));
     vec3 direction = normalize(push.forward + picture.x * push.right + picture.y * push.up);
 
-    Chain chain = new_chain(push.eye, direction, vec3(1.0));
+    Chain chain = new_chain(push.eye, direction, vec3(1.0), u.zw);
     follow(chain, pixel, number, push.draws, push.emitter_count);
     note_unless(is_finite(chain.light[0]) && is_finite(chain.light[1]) && is_finite(chain.light[2]), ODD_LIGHT, push.draws.domain,
                 push.draws.round, pixel);

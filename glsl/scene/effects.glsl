@@ -22,8 +22,6 @@ layout(constant_id = 21) const uint SHADOW_RAYS = 1;
 // Paths from the eye through a pixel in a round, a power of two. Each looks caustics up, and what it sees in mirrors or
 // glass; of a surface that is seen straight, the first one looks up the global map and gathers for all.
 layout(constant_id = 37) const uint SAMPLES = 1;
-// Invocations that share the candidates of a visible point, a power of two.
-layout(constant_id = 38) const uint LOOKUP_LANES = 1;
 layout(constant_id = 22) const uint KERNEL = KERNEL_BOX;
 layout(constant_id = 23) const bool HAS_EDGE_CORRECTION = true;
 // Photons of a caustic map of its own; without one the global map holds caustics too.

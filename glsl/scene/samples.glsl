@@ -1,17 +1,28 @@
 // Random numbers of the paths that start at one place in a round, a pixel's or a receiver's.
 
-// Sample `number` of `count` of a block of random numbers: points of the Sobol' sequence, shuffled and scrambled for the
-// block (Burley 2020). Each is as likely anywhere, all together lie evenly, and no block knows of another, so rounds
-// are as independent as by chance alone. The first two numbers lie most evenly together.
+// Samples of a block are points of the Sobol' sequence, scrambled for the place, the round and the block (Burley 2020): each
+// is as likely anywhere and all together lie evenly, the first two numbers most of all. No block knows of another, so rounds
+// are as independent as by chance alone.
+
+vec4 scrambled(uint number, uvec4 words)
+{
+    uvec4 point = sobol(number);
+    for (uint k = 0; k < 4; k++) {
+        point[k] = owen_scramble(point[k], words[k]) >> 8;
+    }
+    return vec4(unit_float(point.x), unit_float(point.y), unit_float(point.z), unit_float(point.w));
+}
+
+// Where sample `number` of a place starts: four numbers of block 0.
+vec4 stratified_start(uint number, uint index, Draws draws)
+{
+    return scrambled(number, philox(uvec4(index, draws.round, 0, draws.domain), draws.seed));
+}
+
+// Three numbers of any other block for sample `number` of `count`, shuffled, so that two blocks meet as by chance.
 vec3 stratified(uint number, uint count, uint index, uint block, Draws draws)
 {
     uvec4 words = philox(uvec4(index, draws.round, block, draws.domain), draws.seed);
-    if (count > 1) {
-        uint mask = (2u << findMSB(count - 1)) - 1;
-        uvec4 point = sobol(owen_scramble(number, words.w) & mask);
-        for (uint k = 0; k < 3; k++) {
-            words[k] = owen_scramble(point[k], words[k]);
-        }
-    }
-    return vec3(unit_float(words.x >> 8), unit_float(words.y >> 8), unit_float(words.z >> 8));
+    uint mask = count > 1 ? (2u << findMSB(count - 1)) - 1 : 0;
+    return scrambled(owen_scramble(number, words.w) & mask, words).xyz;
 }

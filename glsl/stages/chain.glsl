@@ -5,6 +5,7 @@ struct Chain {
     vec3 position;
     vec3 direction;
     vec3 weight; // radiance at the eye for radiance that arrives along the ray
+    vec2 choices; // of a path from the eye: whether the first two panes of glass mirror, as even as where it starts
     bool saw_specular; // before the first visible point
     bool gathers; // the first visible point, or a receiver, lies behind
     bool starts_nowhere; // at a receiver that no photon can reach
@@ -14,9 +15,9 @@ struct Chain {
     vec3 light[3]; // direct, specular, indirect
 };
 
-Chain new_chain(vec3 position, vec3 direction, vec3 weight)
+Chain new_chain(vec3 position, vec3 direction, vec3 weight, vec2 choices)
 {
-    Chain chain = Chain(position, direction, weight, false, false, false, true, 0, VisiblePoint[](no_point(), no_point()),
+    Chain chain = Chain(position, direction, weight, choices, false, false, false, true, 0, VisiblePoint[](no_point(), no_point()),
                         vec3[](vec3(0.0), vec3(0.0), vec3(0.0)));
     return chain;
 }
@@ -62,8 +63,9 @@ bool gathers_here(Surface surface)
     return GATHER_RAYS == GATHER_ALL;
 }
 
-// Of samples enough, so many see what the first glass mirrors, however faint that is: a lamp in it may be all there is.
-const float MIRROR_CHANCE = 0.5;
+// Of samples enough, so many see what the first two panes of glass mirror, however faint that is: a lamp in them may be
+// brighter than all else.
+const float MIRROR_CHANCES[2] = float[](0.5, 0.25);
 const uint MIRROR_SAMPLES = 4;
 
 // Follows the chain of sample `number` of a place to its end. Random numbers: block 1 + VERTEX_BLOCKS * depth goes on, the
@@ -127,8 +129,12 @@ void follow(inout Chain chain, uint index, uint number, Draws draws, uint emitte
             return;
         }
         uint count = SAMPLES;
-        float mirror_chance = depth == 0 && count >= MIRROR_SAMPLES ? MIRROR_CHANCE : 0.0;
         vec3 u = stratified(number, count, index, block, draws).zxy;
+        float mirror_chance = 0.0;
+        if (count >= MIRROR_SAMPLES && specular && depth < 2 && !chain.gathers) {
+            mirror_chance = MIRROR_CHANCES[depth];
+            u.x = chain.choices[depth];
+        }
         Scatter scatter = sample_scatter(surface, wo, u, true, mirror_chance);
         if (!scatter.alive) {
             return;

@@ -1,7 +1,7 @@
 // Density estimation of a photon map: each visible point sums the flux of the photons that belong to it.
 // A point's candidates are shared out in slices of GATHER_SLICE, so that no invocation loops long: the first one of
-// every point at first, then those of the few points that have more. Of a slice, neighbouring invocations take every
-// LOOKUP_LANES-th candidate. The including kernel chose how sums are added.
+// every point at first, then those of the few points that have more. Of a slice, as many invocations as there are
+// lanes take every so many-th candidate. The including kernel chose how sums are added.
 
 layout(set = 0, binding = 0, scalar) readonly buffer VisiblePoints { VisiblePoint visible_points[]; };
 layout(set = 1, binding = 2, scalar) readonly buffer SortedMap { PackedMapPhoton sorted_map[]; };
@@ -26,8 +26,8 @@ void look_up()
 {
     uint slice = push.first_slice + gl_WorkGroupID.y;
     uint invocation = gl_WorkGroupID.x * gl_WorkGroupSize.x + gl_LocalInvocationIndex;
-    uint lane = invocation % LOOKUP_LANES;
-    uint index = point_of(invocation / LOOKUP_LANES, slice);
+    uint lane = invocation % push.lanes;
+    uint index = point_of(invocation / push.lanes, slice);
     if (index == NONE) {
         return;
     }
@@ -60,7 +60,7 @@ void look_up()
             uvec2 run = row_of_photons(range, ivec2(y, z));
             uint begin = clamp(slice_begin, passed, passed + run.y) - passed;
             uint end = clamp(slice_end, passed, passed + run.y) - passed;
-            for (uint k = begin + lane; k < end; k += LOOKUP_LANES) {
+            for (uint k = begin + lane; k < end; k += push.lanes) {
                 uint place = run.x + k;
                 place = place >= photon_count ? place - photon_count : place;
                 uvec4 words = sorted_map[place].place;

@@ -65,6 +65,8 @@ pub struct MapPlan {
     pub bucket_count: u32,
     /// Of the first round, normalised.
     pub radius: f64,
+    /// Invocations that share the candidates of a visible point.
+    pub lanes: u32,
 }
 
 impl MapPlan {
@@ -113,6 +115,8 @@ pub const RADIUS_RANGE: (f64, f64) = (1.0 / 32_768.0, 2.0);
 /// Bits of a film unit below the scene's mean radiance: as many as leave so many above it, within these.
 const FILM_BITS: (i32, i32) = (24, 32);
 const FILM_HEADROOM_BITS: i32 = 24;
+/// Photons that one invocation finds of those of a point's estimate.
+const FOUND_BY_LANE: f64 = 60.0;
 /// Candidates of a point, roughly: what a lookup counts as work.
 pub const TESTS_PER_POINT: u64 = 256;
 /// Loop iterations of choosing a light and of the random numbers with which a photon leaves it.
@@ -189,8 +193,9 @@ impl TransportPlan {
                 bounces: settings.bounces,
                 stored,
                 caustic_only,
-                bucket_count: (chunk_photons * 2).clamp(1 << 10, 1 << 24).next_power_of_two().min(1 << 24),
+                bucket_count: (chunk_photons * 2 >> std::env::var("PM_BUCKETS").map_or(0, |shift| shift.parse::<u32>().unwrap())).clamp(1 << 10, 1 << 24).next_power_of_two().min(1 << 24),
                 radius,
+                lanes: lanes(PHOTONS_PER_ESTIMATE * (radius / usual).powi(2), limits),
             })
         };
         // Without a light there is nothing to trace.
@@ -239,7 +244,6 @@ impl TransportPlan {
             ("STRICT_MATH", settings.math.code()),
             ("SHADOW_RAYS", shadow_rays),
             ("SAMPLES", samples),
-            ("LOOKUP_LANES", std::env::var("PM_LANES").map_or(1, |lanes| lanes.parse().unwrap())),
             ("KERNEL", settings.kernel.code()),
             ("HAS_EDGE_CORRECTION", u32::from(settings.edge_correction)),
             ("HAS_CAUSTIC_MAP", u32::from(caustic.is_some())),
@@ -322,8 +326,9 @@ impl TransportPlan {
 
     /// Visible points of one lookup, which has a work group of them along x.
     pub fn points_at_once(&self) -> u32 {
+        let lanes = self.maps().map(|map| map.lanes).max().unwrap_or(1);
         let most = (self.work_per_submission / TESTS_PER_POINT).clamp(1 << 12, 1 << 22) as u32;
-        most.min(self.visible_points()).min(MAX_GROUPS * self.settings.group_size / self.constant("LOOKUP_LANES"))
+        most.min(self.visible_points()).min(MAX_GROUPS * self.settings.group_size / lanes)
     }
 
     /// Rays of one pixel, roughly.
@@ -424,6 +429,13 @@ impl TransportPlan {
     pub fn missing(&self) -> Vec<Effect> {
         self.decisions.iter().filter(|decision| decision.needed && !decision.kept).map(|decision| decision.effect).collect()
     }
+}
+
+/// Invocations that share a point, of so many photons to find: as few as a card is busy with, since what lies off their
+/// surfaces is looked at by each.
+fn lanes(found: f64, limits: &Limits) -> u32 {
+    let wanted = (found / FOUND_BY_LANE).clamp(1.0, f64::from(limits.lanes)) as u32;
+    1 << wanted.ilog2()
 }
 
 /// Photons traced at once, so that their map can never be full.

@@ -164,9 +164,13 @@ fn dispatch_size(commands: &mut Commands, photons: &PhotonBuffers, plan: &Transp
 pub fn index(commands: &mut Commands, photons: &PhotonBuffers, plan: &TransportPlan, cells_push: &CellPush) -> Result<()> {
     let PhotonBuffers { map, sorted_map, counters, cells, ranks, block_sums, dispatch_args, .. } = photons;
     let buckets = cells_push.bucket_mask + 1;
-    commands.fill(cells, 0, u64::from(buckets) + 1, 0);
-    dispatch_size(commands, photons, plan, 0, cells_push.photon_capacity)?;
-    commands.dispatch(MapCount { map, counters, cells, ranks }, cells_push, Extent::Indirect(dispatch_args))?;
-    scan(commands, cells, block_sums, buckets + 1, plan.settings.group_size)?;
-    commands.dispatch(MapScatter { map, counters, cells, sorted_map, ranks }, cells_push, Extent::Indirect(dispatch_args))
+    commands.scope("count", |commands| {
+        commands.fill(cells, 0, u64::from(buckets) + 1, 0);
+        dispatch_size(commands, photons, plan, 0, cells_push.photon_capacity)?;
+        commands.dispatch(MapCount { map, counters, cells, ranks }, cells_push, Extent::Indirect(dispatch_args))
+    })?;
+    commands.scope("scan", |commands| scan(commands, cells, block_sums, buckets + 1, plan.settings.group_size))?;
+    commands.scope("sort", |commands| {
+        commands.dispatch(MapScatter { map, counters, cells, sorted_map, ranks }, cells_push, Extent::Indirect(dispatch_args))
+    })
 }

@@ -112,8 +112,7 @@ pub fn look_up(commands: &mut Commands, round: Round, photons: &PhotonBuffers, m
     let PhotonBuffers { cells, sorted_map, crowded, dispatch_args, .. } = photons;
     let TransportResources { visible_points, estimates, oddities, .. } = resources;
     let point_count = plan.visible_points();
-    let step = plan.points_at_once();
-    let lanes = plan.constant("LOOKUP_LANES");
+    let (lanes, step) = (map.lanes, plan.points_at_once());
     let (width, height) = plan.sensor.size();
     let dispatch = |commands: &mut Commands, push: &LookupPush, extent: Extent| {
         if commands.facts().int64_atomics {
@@ -133,6 +132,7 @@ pub fn look_up(commands: &mut Commands, round: Round, photons: &PhotonBuffers, m
             width,
             height,
             first_slice: 0,
+            lanes,
             radius: plan.radius(map, round) as f32,
             cells: cells_push,
         };
