@@ -219,6 +219,11 @@ struct Emitter {
     float cos_outer;
 };
 
+struct CausticTarget {
+    vec3 centre;
+    float radius;
+};
+
 struct LightPath {
     vec3 position;
     uint photon;
@@ -262,6 +267,8 @@ struct PhotonEmission {
     uint photon_count;
     uint emitter_count;
     float scene_radius;
+    uint target_count;
+    float flux_gain;
 };
 
 struct PhotonStore {

@@ -340,6 +340,12 @@ records! {
         cos_outer: f32,
     }
 
+    /// A sphere around surfaces that make caustics, which photons are aimed at.
+    CausticTarget {
+        centre: Vec3,
+        radius: f32,
+    }
+
     /// A photon in flight through a scene of triangles.
     LightPath {
         position: Vec3,
@@ -398,6 +404,10 @@ records! {
         emitter_count: u32,
         /// Of a sphere around the scene.
         scene_radius: f32,
+        /// Spheres that they are aimed at; 0: at none.
+        target_count: u32,
+        /// What aimed photons' flux is multiplied by; see [`crate::plan::transport::MapPlan::flux_gain`].
+        flux_gain: f32,
     }
 
     /// Which photons a map holds.

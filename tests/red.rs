@@ -8,7 +8,8 @@ mod planted;
 use std::sync::atomic::AtomicBool;
 
 use common::{
-    Check, MANY_PHOTONS, assert_complains, assert_holds, bits, equal_sums, in_order, known, open, photons, photons_on_cpu, run_on_cpu,
+    Check, MANY_PHOTONS, aimed, assert_complains, assert_holds, bits, equal_sums, in_order, known, open, photons, photons_on_cpu,
+    run_on_cpu,
 };
 use photonmill::gpu::{Gpu, Options, check};
 use photonmill::plan::transport::{Sensor, TransportPlan};
@@ -55,6 +56,8 @@ enum Question {
     LeaningScatterer,
     PatchInPlane,
     SheetsInOnePlane,
+    /// Aimed photons bring as much light as others: a scene of `common::aimed`.
+    AimedLight(&'static str),
 }
 
 use Question::*;
@@ -63,7 +66,7 @@ impl Question {
     /// Whether another test, the same for every device, shows that a device without a fault answers it right.
     fn has_a_test_of_its_own(self) -> bool {
         match self {
-            Photons(_) | Film(_) | Ledger(_) | ClosedForm(_) | Appends | StrictMath | Finite | Nearest | Crowds => false,
+            Photons(_) | Film(_) | Ledger(_) | ClosedForm(_) | Appends | StrictMath | Finite | Nearest | Crowds | AimedLight(_) => false,
             Bits(_) | LampInBox(_) | Shelf | Ridge | Spot | Texture(_) => true,
             LeaningPlane(_) | LeaningScatterer | PatchInPlane | SheetsInOnePlane => true,
         }
@@ -82,7 +85,7 @@ struct Fault {
     noticed_by: &'static [Question],
 }
 
-const FAULTS: [Fault; 52] = [
+const FAULTS: [Fault; 56] = [
     Fault {
         what: "every other lane of a subgroup writes over its neighbour",
         file: "append/ballot.glsl",
@@ -504,6 +507,38 @@ const FAULTS: [Fault; 52] = [
         kernels: &["check_math"],
         noticed_by: &[StrictMath],
     },
+    Fault {
+        what: "directions within two cones are weighed as if only one could have chosen them",
+        file: "scene/aim.glsl",
+        from: "k == chosen || versine_between(emission.direction, other.axis) <= other.versine",
+        to: "k == chosen",
+        kernels: &["shine"],
+        noticed_by: &[AimedLight("overlapping cones")],
+    },
+    Fault {
+        what: "places on two discs are weighed as if only one could have chosen them",
+        file: "scene/aim.glsl",
+        from: "k == chosen || dot(off, off) <= radius * radius",
+        to: "k == chosen",
+        kernels: &["shine"],
+        noticed_by: &[AimedLight("overlapping discs")],
+    },
+    Fault {
+        what: "aimed photons forget the cosine of their lamp",
+        file: "scene/aim.glsl",
+        from: "return max(cosine, 0.0) * 0.31830988618379067;",
+        to: "return cosine > 0.0 ? 0.31830988618379067 : 0.0;",
+        kernels: &["shine"],
+        noticed_by: &[AimedLight("cosine disc"), AimedLight("two-sided triangles")],
+    },
+    Fault {
+        what: "photons that start within a sphere are aimed at its middle",
+        file: "scene/aim.glsl",
+        from: "distance_to_centre <= target.radius * (1.0 + AIM_MARGIN)",
+        to: "distance_to_centre <= 0.0",
+        kernels: &["shine"],
+        noticed_by: &[AimedLight("lamps in and out of a bowl")],
+    },
 ];
 
 /// Of `shading_gain`.
@@ -615,6 +650,7 @@ fn ask(gpu: &Gpu, question: Question) -> Check {
         LeaningScatterer => known::leaning_scatterer(gpu),
         PatchInPlane => known::patch_in_a_plane(gpu),
         SheetsInOnePlane => known::sheets_in_one_plane(gpu),
+        AimedLight(kind) => aimed::same_light(gpu, kind),
     }
 }
 

@@ -21,6 +21,7 @@ layout(set = 1, binding = 0, scalar) writeonly buffer LightPaths { LightPath lig
 #include "scene/surface.glsl"
 #include "scene/areas.glsl"
 #include "scene/lights.glsl"
+#include "scene/aim.glsl"
 #include "stages/shine.glsl"
 
 void main()

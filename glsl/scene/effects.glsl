@@ -21,7 +21,7 @@ layout(constant_id = 20) const bool HAS_ENVIRONMENT = true;
 layout(constant_id = 21) const uint SHADOW_RAYS = 1;
 // Paths from the eye through a pixel in a round, a power of two. Each looks caustics up, and what it sees in mirrors or
 // glass; of a surface that is seen straight, the first one looks up the global map and gathers for all.
-layout(constant_id = 37) const uint SAMPLES = 1;
+layout(constant_id = 41) const uint SAMPLES = 1;
 layout(constant_id = 22) const uint KERNEL = KERNEL_BOX;
 layout(constant_id = 23) const bool HAS_EDGE_CORRECTION = true;
 // Photons of a caustic map of its own; without one the global map holds caustics too.
@@ -33,3 +33,4 @@ layout(constant_id = 26) const uint GATHER_RAYS = GATHER_NONE;
 layout(constant_id = 27) const uint PARTS = 15;
 layout(constant_id = 28) const uint FILTER = FILTER_BOX;
 layout(constant_id = 29) const bool HAS_SPECULAR_CHAINS = true;
+layout(constant_id = 40) const bool HAS_AIMED_PHOTONS = true;

@@ -41,14 +41,15 @@ float spot_falloff(Emitter light, float cosine)
 struct Emission {
     vec3 position;
     vec3 direction;
+    vec3 axis; // of the light's law: its normal where it has one
     vec3 flux;
+    bool is_far; // from beyond the scene
 };
 
-// A photon's start; u and w = eight uniform numbers.
-Emission sample_emission(uint emitter_count, float scene_radius, vec4 u, vec4 w)
+// A photon's start. u and w = eight uniform numbers: the light was chosen by u.x, and w.z and w.w are left.
+Emission sample_emission(Emitter light, float scene_radius, vec4 u, vec4 w)
 {
-    Emitter light = emitters[pick_emitter(emitter_count, u.x)];
-    Emission emission = Emission(light.position, light.direction, light.flux);
+    Emission emission = Emission(light.position, light.direction, light.direction, light.flux, false);
     if (HAS_TRIANGLE_LIGHTS) {
         if (light.kind == EMITTER_TRIANGLE) {
             Triangle triangle = triangles[light.triangle];
@@ -58,6 +59,7 @@ Emission sample_emission(uint emitter_count, float scene_radius, vec4 u, vec4 w)
             if (HAS_TWO_SIDED) {
                 normal = material.two_sided != 0 && u.w < 0.5 ? -normal : normal;
             }
+            emission.axis = normal;
             emission.direction = to_frame(sample_cosine_hemisphere(w.x, w.y), normal);
             float error = triangle_error(triangle);
             vec2 inside = off_the_edges(triangle, at, error);
@@ -96,17 +98,16 @@ Emission sample_emission(uint emitter_count, float scene_radius, vec4 u, vec4 w)
         }
     }
     // What comes from beyond the scene starts on a disc that covers it.
-    bool is_far = false;
     if (HAS_DIRECTIONAL_LIGHTS) {
-        is_far = is_far || light.kind == EMITTER_DIRECTIONAL;
+        emission.is_far = light.kind == EMITTER_DIRECTIONAL;
     }
     if (HAS_ENVIRONMENT) {
         if (light.kind == EMITTER_ENVIRONMENT) {
-            is_far = true;
+            emission.is_far = true;
             emission.direction = sample_sphere(w.x, w.y);
         }
     }
-    if (is_far) {
+    if (emission.is_far) {
         emission.position = sample_disc(-2.0 * scene_radius * emission.direction, emission.direction, scene_radius, u.yz);
     }
     return emission;

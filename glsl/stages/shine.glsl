@@ -4,7 +4,18 @@ LightPath shine(uint photon, Draws draws, PhotonEmission emission)
 {
     vec4 u = philox_floats(uvec4(photon, draws.round, 0, draws.domain), draws.seed);
     vec4 w = philox_floats(uvec4(photon, draws.round, 1, draws.domain), draws.seed);
-    Emission emitted = sample_emission(emission.emitter_count, emission.scene_radius, u, w);
+    Emitter light = emitters[pick_emitter(emission.emitter_count, u.x)];
+    Emission emitted = sample_emission(light, emission.scene_radius, u, w);
+    if (HAS_AIMED_PHOTONS) {
+        if (emission.target_count != 0) {
+            if (emitted.is_far) {
+                aim_far(emitted, emission.scene_radius, emission.target_count, vec3(w.z, u.yz));
+            } else {
+                aim_near(emitted, light, emission.target_count, w.zxy);
+            }
+            emitted.flux *= emission.flux_gain;
+        }
+    }
     note_unless(is_finite(emitted.position) && is_finite(emitted.direction) && is_finite(emitted.flux), ODD_PHOTON, draws.domain,
                 draws.round, photon);
     return LightPath(emitted.position, photon, emitted.direction, ARRIVED_DIRECT, emitted.flux);

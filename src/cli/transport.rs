@@ -66,6 +66,9 @@ pub(super) struct TransportArgs {
     /// Take indirect light from a ray to the next surface instead of the map where the camera looks
     #[arg(long, help_heading = "Transport")]
     final_gather: bool,
+    /// Send photons of the caustic map only towards mirrors and glass [default: on]
+    #[arg(long, value_enum, help_heading = "Transport")]
+    aim: Option<super::run::SwitchArg>,
     /// Where direct light and caustics come from: shadow rays and a map of their own, or all of it from one
     /// photon map, as in the paper [default: split]
     #[arg(long, value_enum, help_heading = "Transport")]
@@ -210,6 +213,7 @@ impl TransportArgs {
             samples: self.samples.unwrap_or(usual.samples),
             shadow_rays: self.shadow_rays.unwrap_or(usual.shadow_rays),
             final_gather: self.final_gather,
+            aim: self.aim.map_or(usual.aim, |switch| switch == super::run::SwitchArg::On),
             illumination: self.illumination.map_or(usual.illumination, Illumination::from),
             append: self.variant.map_or(usual.append, Append::from),
             math: self.math.map_or(usual.math, Math::from),

@@ -84,6 +84,7 @@ pub fn on_scene(subcommand: &str, settings: &TransportSettings) -> String {
     if settings.final_gather {
         line.0.push_str(" --final-gather");
     }
+    line.differing("aim", switch(settings.aim), switch(usual.aim));
     line.named("illumination", settings.illumination, usual.illumination);
     line.named("variant", settings.append, usual.append);
     line.named("math", settings.math, usual.math);

@@ -44,7 +44,7 @@ pub fn rows<'a>(plan: &'a TransportPlan, run: Option<(&Timings, &[u64])>) -> Vec
                 _ if !decision.kept => (None, None),
                 Effect::Direct => (pass("round/see"), share(0)),
                 Effect::SpecularChains => (None, share(1)),
-                Effect::ReflectiveCaustics | Effect::RefractiveCaustics => (pass("round/caustic"), share(2)),
+                effect if effect.is_caustic() => (pass("round/caustic"), share(2)),
                 Effect::Indirect => (pass("round/global"), share(3)),
                 _ => (None, None),
             };

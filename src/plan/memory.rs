@@ -150,6 +150,7 @@ pub(super) fn of_transport(plan: &TransportPlan, geometry: &Geometry, keeps: &dy
         ("textures", kept(&geometry.textures, textured)),
         ("texels", kept(&geometry.texels, textured)),
         ("emitters", kept(&geometry.emitters, true)),
+        ("caustic targets", kept(&plan.targets, true)),
         ("visible points", array::<VisiblePoint>(points)),
         ("pass sums", array::<u64>(3 * pixels * u64::from(plan.samples()))),
         ("estimates", array::<u64>(3 * points * u64::from(plan.arrival_sets))),

@@ -13,6 +13,7 @@ use crate::constants::*;
 use crate::error::{Error, Result};
 use crate::records::*;
 use crate::scene::geometry::Geometry;
+use crate::scene::targets::{aimed_shares, caustic_targets};
 use crate::scene::{Scene, Surface};
 use crate::settings::transport::{Append, Effect, Illumination, TransportSettings};
 
@@ -67,9 +68,19 @@ pub struct MapPlan {
     pub radius: f64,
     /// Invocations that share the candidates of a visible point.
     pub lanes: u32,
+    /// Spheres that its photons are aimed at; 0: they leave their lights in all directions.
+    pub target_count: u32,
+    /// A power of two by which its photons carry more than they stand for: aimed ones stand for a share of their
+    /// light's, and their sums have a fixed point.
+    pub flux_gain: f64,
 }
 
 impl MapPlan {
+    /// W of a photon of relative flux 1, over the square of the scene's unit.
+    pub fn photon_flux(&self, geometry: &Geometry) -> f64 {
+        geometry.flux_unit / (f64::from(self.photons) * self.flux_gain)
+    }
+
     /// (first photon, count) of each chunk.
     pub fn chunks(&self) -> impl Iterator<Item = (u32, u32)> + use<> {
         let (photons, step) = (self.photons, self.chunk_photons);
@@ -88,6 +99,8 @@ pub struct TransportPlan {
     pub caustic: Option<MapPlan>,
     /// Mask of `SURFACE_...` whose caustics are wanted.
     pub caustic_surfaces: u32,
+    /// What photons of the caustic map are aimed at.
+    pub targets: Vec<CausticTarget>,
     pub points_per_pixel: u32,
     /// Sets of sums a visible point has, one an arrival.
     pub arrival_sets: u32,
@@ -119,12 +132,14 @@ const FILM_HEADROOM_BITS: i32 = 24;
 const FOUND_BY_LANE: f64 = 60.0;
 /// Candidates of a point, roughly: what a lookup counts as work.
 pub const TESTS_PER_POINT: u64 = 256;
-/// Loop iterations of choosing a light and of the random numbers with which a photon leaves it.
-const LOOPS_TO_SHINE: u32 = 64;
+/// Loop iterations of choosing a light, of the random numbers with which a photon leaves it, and of aiming it.
+const LOOPS_TO_SHINE: u32 = 128;
 /// Loop iterations of a flight of a photon, mostly of its ray through the hierarchy.
 const LOOPS_PER_FLIGHT: u32 = 256;
 /// A photon in its map, sorted and unsorted, and its place in its bucket.
 const MAP_ENTRY_BYTES: u64 = 2 * size_of::<MapPhoton>() as u64 + 4;
+/// Most bits of the gain of aimed photons: of lights that send less than a billionth towards what makes caustics.
+const MAX_GAIN_BITS: f64 = 30.0;
 /// Flights of a photon, generously.
 const FLIGHTS_PER_PHOTON: u64 = 8;
 /// Work of a ray, in pair tests.
@@ -196,6 +211,8 @@ impl TransportPlan {
                 bucket_count: (chunk_photons * 2 >> std::env::var("PM_BUCKETS").map_or(0, |shift| shift.parse::<u32>().unwrap())).clamp(1 << 10, 1 << 24).next_power_of_two().min(1 << 24),
                 radius,
                 lanes: lanes(PHOTONS_PER_ESTIMATE * (radius / usual).powi(2), limits),
+                target_count: 0,
+                flux_gain: 1.0,
             })
         };
         // Without a light there is nothing to trace.
@@ -203,12 +220,24 @@ impl TransportPlan {
         let global = (shines && stored != 0)
             .then(|| map("global", DOMAIN_PHOTONS, settings.photons, stored, false, settings.radius, "--radius"))
             .transpose()?;
-        let caustic = (shines && split && caustics)
+        let mut caustic = (shines && split && caustics)
             .then(|| {
                 let radius = settings.caustic_radius;
                 map("caustic", DOMAIN_CAUSTIC_PHOTONS, settings.caustic_photons, ARRIVED_CAUSTIC, true, radius, "--caustic-radius")
             })
             .transpose()?;
+        let mut targets = Vec::new();
+        if let Some(map) = caustic.as_mut().filter(|_| settings.aim) {
+            targets = caustic_targets(geometry, caustic_surfaces);
+            let (least, most) = aimed_shares(geometry, &targets);
+            if least < 1.0 && most > 0.0 {
+                map.target_count = targets.len() as u32;
+                // No photon carries more than 1, but for rounding.
+                map.flux_gain = 2f64.powi((-most.log2()).floor().min(MAX_GAIN_BITS) as i32);
+            } else {
+                targets.clear();
+            }
+        }
         let arrivals = stored | if caustic.is_some() { ARRIVED_CAUSTIC } else { 0 };
 
         let indirect = keeps(Effect::Indirect);
@@ -252,6 +281,7 @@ impl TransportPlan {
             ("PARTS", settings.part.mask()),
             ("FILTER", settings.filter.code()),
             ("HAS_SPECULAR_CHAINS", flag(Effect::SpecularChains)),
+            ("HAS_AIMED_PHOTONS", u32::from(!targets.is_empty())),
         ];
 
         let mut plan = TransportPlan {
@@ -262,6 +292,7 @@ impl TransportPlan {
             global,
             caustic,
             caustic_surfaces,
+            targets,
             points_per_pixel,
             arrival_sets,
             arrivals,
@@ -407,7 +438,16 @@ impl TransportPlan {
         Ok(())
     }
 
-    /// Photons and bytes that exist for one effect.
+    fn aim_in_words(&self) -> String {
+        match (&self.caustic, self.targets.len()) {
+            (None, _) => String::new(),
+            (_, 0) => "; photons leave in all directions".into(),
+            (_, 1) => "; photons aimed at 1 bounding sphere".into(),
+            (_, count) => format!("; photons aimed at {count} bounding spheres"),
+        }
+    }
+
+    /// Photons and bytes that exist for one effect, and what became of it.
     fn give(&self, decision: &mut EffectDecision, geometry: &Geometry) {
         if !decision.kept {
             return;
@@ -415,7 +455,8 @@ impl TransportPlan {
         let map_bytes = |map: &MapPlan| u64::from(map.capacity) * MAP_ENTRY_BYTES + u64::from(map.bucket_count) * 4;
         (decision.photons, decision.bytes) = match decision.effect {
             Effect::Indirect => self.global.as_ref().map_or((0, 0), |map| (u64::from(map.photons), map_bytes(map))),
-            Effect::ReflectiveCaustics | Effect::RefractiveCaustics => {
+            effect if effect.is_caustic() => {
+                decision.evidence.push_str(&self.aim_in_words());
                 self.caustic.as_ref().map_or((0, 0), |map| (u64::from(map.photons), map_bytes(map)))
             }
             Effect::Textures => (0, size_of_val(geometry.uvs.as_slice()) as u64 + size_of_val(geometry.texels.as_slice()) as u64),

@@ -13,6 +13,7 @@ pub mod mesh;
 pub mod open_box;
 pub mod rectangle;
 pub mod room;
+pub mod targets;
 pub mod texture;
 
 use std::path::Path;

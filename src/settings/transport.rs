@@ -172,6 +172,10 @@ impl Effect {
             Effect::SmoothNormals => "smooth-normals",
         }
     }
+
+    pub fn is_caustic(self) -> bool {
+        matches!(self, Effect::ReflectiveCaustics | Effect::RefractiveCaustics)
+    }
 }
 
 #[derive(Debug, Clone, PartialEq, Serialize)]
@@ -201,6 +205,8 @@ pub struct TransportSettings {
     pub shadow_rays: u32,
     /// Indirect light by a ray to the next surface instead of the map where the camera looks.
     pub final_gather: bool,
+    /// Photons of the caustic map leave their lights only towards mirrors and glass (projection maps, Jensen 1996).
+    pub aim: bool,
     pub illumination: Illumination,
     pub part: Part,
     pub filter: Filter,
@@ -233,6 +239,7 @@ impl Default for TransportSettings {
             samples: 1,
             shadow_rays: 4,
             final_gather: false,
+            aim: true,
             illumination: Illumination::Split,
             part: Part::All,
             filter: Filter::Box,

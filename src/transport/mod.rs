@@ -7,7 +7,7 @@
 //! ```text
 //! see       paths from the camera over mirrors and glass: visible points, direct light by shadow rays
 //! photons   of the global map: traced, sorted, looked up at every visible point
-//! caustics  the same with photons that took mirrors and glass only
+//! caustics  the same with photons that took mirrors and glass only, and were aimed at these
 //! weigh     flux over area that really lies on the surface, times reflectance: light
 //! resolve   all light of a pixel: to the film
 //! ```

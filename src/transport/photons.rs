@@ -53,8 +53,15 @@ fn draws(round: Round, map: &MapPlan) -> Draws {
     Draws { seed: words(round.plan.settings.seed), round: round.number, domain: map.domain }
 }
 
-fn emission(geometry: &Geometry, (first_photon, photon_count): (u32, u32)) -> PhotonEmission {
-    PhotonEmission { first_photon, photon_count, emitter_count: geometry.emitters.len() as u32, scene_radius: geometry.radius as f32 }
+fn emission(geometry: &Geometry, map: &MapPlan, (first_photon, photon_count): (u32, u32)) -> PhotonEmission {
+    PhotonEmission {
+        first_photon,
+        photon_count,
+        emitter_count: geometry.emitters.len() as u32,
+        scene_radius: geometry.radius as f32,
+        target_count: map.target_count,
+        flux_gain: map.flux_gain as f32,
+    }
 }
 
 fn store(plan: &TransportPlan, map: &MapPlan) -> PhotonStore {
@@ -69,7 +76,8 @@ fn store(plan: &TransportPlan, map: &MapPlan) -> PhotonStore {
 /// Traces every photon from the lights to its end.
 fn whole(commands: &mut Commands, round: Round, photons: &PhotonBuffers, map: &MapPlan, chunk: (u32, u32)) -> Result<()> {
     let Round { resources, geometry, plan, .. } = round;
-    let TransportResources { nodes, triangles, normals, uvs, materials, textures, texels, emitters, oddities, .. } = resources;
+    let TransportResources { nodes, triangles, normals, uvs, materials, textures, texels, emitters, caustic_targets, oddities, .. } =
+        resources;
     commands.fill(&photons.counters, 0, 1, 0);
     let tallies = &photons.tallies[usize::from(map.caustic_only)];
     let (first_photon, end) = (chunk.0, chunk.0 + chunk.1);
@@ -78,13 +86,27 @@ fn whole(commands: &mut Commands, round: Round, photons: &PhotonBuffers, map: &M
         let count = most.min(end - first);
         let push = FlyWholePush {
             draws: draws(round, map),
-            emission: emission(geometry, (first, count)),
+            emission: emission(geometry, map, (first, count)),
             map: store(plan, map),
             bounces: map.bounces,
             stride: map.persistence.invocations(count),
         };
         let PhotonBuffers { counters, map, .. } = photons;
-        let kernel = FlyWhole { nodes, triangles, normals, uvs, materials, textures, texels, emitters, map, counters, tallies, oddities };
+        let kernel = FlyWhole {
+            nodes,
+            triangles,
+            normals,
+            uvs,
+            materials,
+            textures,
+            texels,
+            emitters,
+            caustic_targets,
+            map,
+            counters,
+            tallies,
+            oddities,
+        };
         commands.dispatch(kernel, &push, Extent::Items(u64::from(push.stride)))?;
     }
     Ok(())
@@ -94,12 +116,13 @@ fn whole(commands: &mut Commands, round: Round, photons: &PhotonBuffers, map: &M
 pub fn emit(commands: &mut Commands, round: Round, photons: &PhotonBuffers, map: &MapPlan, chunk: (u32, u32)) -> Result<()> {
     let Round { resources, geometry, .. } = round;
     let photon_count = chunk.1;
-    let TransportResources { nodes, triangles, normals, uvs, materials, textures, texels, emitters, oddities, .. } = resources;
+    let TransportResources { nodes, triangles, normals, uvs, materials, textures, texels, emitters, caustic_targets, oddities, .. } =
+        resources;
     let PhotonBuffers { paths: [light_paths, _], counters, .. } = photons;
     commands.fill(counters, 0, u64::from(map.bounces) + 2, 0);
     commands.fill(counters, 1, 1, photon_count);
-    let push = EmissionPush { draws: draws(round, map), emission: emission(geometry, chunk) };
-    let kernel = Shine { nodes, triangles, normals, uvs, materials, textures, texels, emitters, light_paths, oddities };
+    let push = EmissionPush { draws: draws(round, map), emission: emission(geometry, map, chunk) };
+    let kernel = Shine { nodes, triangles, normals, uvs, materials, textures, texels, emitters, caustic_targets, light_paths, oddities };
     commands.dispatch(kernel, &push, Extent::Items(u64::from(photon_count)))
 }
 

@@ -153,7 +153,7 @@ pub fn weigh(commands: &mut Commands, round: Round) -> Result<()> {
     let TransportResources { nodes, triangles, normals, uvs, materials, textures, texels, visible_points, .. } = resources;
     let TransportResources { estimates, part_totals, anomalies, oddities, .. } = resources;
     let radius = |map: &Option<MapPlan>| map.as_ref().map_or(1.0, |map| plan.radius(map, round)) as f32;
-    let flux = |map: &Option<MapPlan>| map.as_ref().map_or(0.0, |map| geometry.flux_unit / f64::from(map.photons)) as f32;
+    let flux = |map: &Option<MapPlan>| map.as_ref().map_or(0.0, |map| map.photon_flux(geometry)) as f32;
     let (width, height) = plan.sensor.size();
     for (first_point, end_point) in runs(plan.visible_points(), plan.pixels_at_once(4)) {
         let push = WeighPush {

@@ -111,8 +111,8 @@ pub fn light_paths(
 impl Path {
     /// A line a vertex: where, whither, and the power that it carries on.
     pub fn table(&self, geometry: &Geometry, plan: &TransportPlan) -> String {
-        let photons = plan.maps().find(|map| map.caustic_only == self.name.caustic).map_or(1, |map| map.photons);
-        let watts = geometry.flux_unit * geometry.unit * geometry.unit / f64::from(photons);
+        let flux = plan.maps().find(|map| map.caustic_only == self.name.caustic).map_or(0.0, |map| map.photon_flux(geometry));
+        let watts = flux * geometry.unit * geometry.unit;
         let row = |(bounce, vertex): (usize, &LightPath)| {
             let p = geometry.to_world(vertex.position);
             let (d, flux) = (vertex.direction, vertex.flux.as_dvec3() * watts);

@@ -23,6 +23,7 @@ pub struct TransportResources {
     pub textures: Buffer,
     pub texels: Buffer,
     pub emitters: Buffer,
+    pub caustic_targets: Buffer,
     /// Points of all phases; empty for a picture.
     pub receivers: Vec<Buffer>,
     // Photons of the chunk under way.
@@ -90,6 +91,7 @@ impl TransportResources {
             textures: filled(gpu, commands, "textures", &geometry.textures, textured)?,
             texels: filled::<UVec2>(gpu, commands, "texels", &geometry.texels, textured)?,
             emitters: filled(gpu, commands, "emitters", &geometry.emitters, true)?,
+            caustic_targets: filled(gpu, commands, "caustic targets", &plan.targets, true)?,
             receivers: phases.iter().map(|phase| filled(gpu, commands, "receivers", phase, true)).collect::<Result<_>>()?,
             photons: if plan.maps().next().is_some() { Some(PhotonBuffers::new(gpu, commands, plan)?) } else { None },
             visible_points: gpu.buffer::<VisiblePoint>("visible points", points, device)?,

@@ -5,6 +5,7 @@
 //! test fails, unless `PHOTONMILL_NO_GPU=1` says that there is none on purpose.
 #![allow(dead_code, reason = "every test file takes its part")]
 
+pub mod aimed;
 pub mod bits;
 pub mod chi_square;
 pub mod densities;

@@ -166,6 +166,7 @@ impl<'a> Arbitrary<'a> for Triangles {
             edge_correction: u.arbitrary()?,
             shadow_rays: count(u, usual.shadow_rays)?,
             final_gather: u.arbitrary()?,
+            aim: u.arbitrary()?,
             illumination: *u.choose(&[Illumination::Split, Illumination::Photons])?,
             part: *u.choose(&[Part::All, Part::Direct, Part::Specular, Part::Caustic, Part::Indirect])?,
             filter: *u.choose(&[Filter::Box, Filter::Tent, Filter::Gaussian])?,

@@ -1,0 +1,181 @@
+//! Photons of a caustic map that are aimed at what makes caustics bring the same light with less noise.
+
+mod common;
+
+use common::aimed::{KINDS, compare, far_lamp, mean_and_error, scene, settings};
+use common::family::Family;
+use common::lit::{self, grid, irradiances, received};
+use common::{assert_complains, assert_holds, device, equal_sums};
+use glam::DVec3;
+use photonmill::gpu::Gpu;
+use photonmill::plan::transport::{Sensor, TransportPlan};
+use photonmill::render;
+use photonmill::scene::Scene;
+use photonmill::scene::geometry::Geometry;
+use photonmill::settings::Math;
+use photonmill::settings::transport::{Append, Illumination, Part, TransportSettings};
+use photonmill::transport::Lit;
+use photonmill::transport::replay::{Flights, light_paths};
+
+fn plan_of(gpu: &Gpu, scene: &Scene, settings: &TransportSettings) -> (Geometry, TransportPlan) {
+    let geometry = Geometry::new(scene).unwrap();
+    let sensor = Sensor::Receivers { count: 1 };
+    let plan = TransportPlan::new(scene, &geometry, settings, sensor, &render::limits(gpu.facts())).unwrap();
+    (geometry, plan)
+}
+
+/// Photons of round 0 of the caustic map as they leave their lights, and after their first flight.
+fn first_flight(gpu: &Gpu, scene: &Scene, settings: &TransportSettings) -> (TransportPlan, Flights) {
+    let (geometry, plan) = plan_of(gpu, scene, settings);
+    let map = plan.caustic.clone().unwrap();
+    let flights = light_paths(gpu, &geometry, &plan, &map, 0, (0, map.photons), 1).unwrap();
+    (plan, flights)
+}
+
+/// Under every kind of light.
+#[test]
+fn aimed_photons_bring_the_same_light() {
+    let Some(gpu) = device() else { return };
+    let mut family = Family::default();
+    for kind in KINDS {
+        compare(&gpu, kind, [200_000, 20_000], &mut family);
+    }
+    family.assert_tells(0.05, |what| what.ends_with("whole"));
+    let precise = ["point", "spot", "cosine disc", "sun", "overlapping discs", "a ball before a mirror wall"];
+    family.assert_tells(0.025, |what| precise.iter().any(|kind| what == format!("{kind}: whole")));
+}
+
+#[test]
+fn aimed_photons_have_less_noise() {
+    let Some(gpu) = device() else { return };
+    for (kind, at_least) in [("point", 6.0), ("sun", 4.0), ("cosine disc", 4.0), ("overlapping cones", 4.0)] {
+        let points = grid(0.0, DVec3::Y, 4);
+        let error = |aim| {
+            let runs = irradiances(&gpu, &scene(kind), &settings(10_000, aim), &points, 1..25);
+            let (mean, error) = mean_and_error(&runs.iter().map(|run| run.iter().map(|light| light.x).sum()).collect::<Vec<f64>>());
+            error / mean
+        };
+        let (all, aimed) = (error(false), error(true));
+        println!("{kind}: {:.2} % of error, aimed {:.2} %", 100.0 * all, 100.0 * aimed);
+        assert!(all > at_least * aimed, "{kind}: {all} and {aimed}");
+    }
+}
+
+#[test]
+fn a_millionth_of_a_lamps_light_lights_as_the_sun_does() {
+    let Some(gpu) = device() else { return };
+    let points = grid(0.0, DVec3::Y, 4);
+    let [far, sun] = far_lamp().map(|scene| {
+        let (_, plan) = plan_of(&gpu, &scene, &settings(1, true));
+        let runs = irradiances(&gpu, &scene, &settings(20_000, true), &points, 1..17);
+        (runs.iter().map(|run| run.iter().map(|light| light.x).sum::<f64>()).collect::<Vec<_>>(), plan.caustic.unwrap().flux_gain)
+    });
+    assert!(far.1 >= f64::from(1 << 18) && sun.1 < 256.0, "gains of {} and {}", far.1, sun.1);
+    let expected = sun.0.iter().sum::<f64>() / sun.0.len() as f64;
+    let mut family = Family::default();
+    family.expect_mean("a lamp far off", &far.0, expected);
+    family.assert_tells_one_per_cent();
+}
+
+/// Nearly all that is aimed at a ball meets it, with about equal flux, and none carries more than it did.
+#[test]
+fn aimed_photons_meet_what_they_are_aimed_at() {
+    let Some(gpu) = device() else { return };
+    for kind in ["caustic-sphere", "point", "sun", "sky", "cosine disc", "overlapping cones"] {
+        let scene = if kind == "caustic-sphere" { lit::scene(kind) } else { scene(kind) };
+        let [all, aimed] = [false, true].map(|aim| first_flight(&gpu, &scene, &settings(4000, aim)));
+        // A ray at the rim of the sphere around a ball of few triangles may pass it, and the floor hides it from below.
+        let least = if kind == "sky" { 0.6 } else { 0.85 };
+        let met = |flights: &Flights| f64::from(flights.tallies[0].stored) / 4000.0;
+        println!("{kind}: {} and {} meet a ball", met(&all.1), met(&aimed.1));
+        assert!(met(&all.1) < 0.08 && met(&aimed.1) > least, "{kind}: {} and {} meet a ball", met(&all.1), met(&aimed.1));
+        let map = aimed.0.caustic.as_ref().unwrap();
+        assert_eq!(map.target_count as usize, aimed.0.targets.len());
+        let most = aimed.1.paths[0].iter().map(|path| path.flux.max_element()).fold(0.0, f32::max);
+        assert!((0.2..=1.0001).contains(&most), "{kind}: {most} with a gain of {}", map.flux_gain);
+        let sum = |flights: &Flights| flights.paths[0].iter().map(|path| f64::from(path.flux.x)).sum::<f64>();
+        assert!(sum(&aimed.1) / map.flux_gain < 0.2 * sum(&all.1), "{kind}: what meets no ball was sent");
+    }
+}
+
+/// Where every lamp is within what it would be aimed at, or nobody asks for it, photons are the same to the bit.
+#[test]
+fn lamps_within_a_target_shine_in_all_directions() {
+    let Some(gpu) = device() else { return };
+    let mut room = lit::scene("furnace");
+    room.materials = vec![lit::mirror(0.5), lit::matt(0.5), lit::glass(1.5)];
+    room.meshes[0].material = 1;
+    room.meshes.push(photonmill::scene::Mesh::sphere("ball", DVec3::new(0.5, 0.2, 0.5), 0.1, 16, 2));
+    let kind = photonmill::scene::light::LightKind::Point { position: DVec3::new(0.4, 0.6, 0.5), intensity: glam::Vec3::ONE };
+    room.lights = vec![lit::lamp(kind)];
+    let found = |aim| received(&gpu, &room, &settings(5000, aim), &[(DVec3::new(0.5, 0.0, 0.5), DVec3::Y)]);
+    let [all, aimed] = [false, true].map(found);
+    assert!(all.plan.targets.is_empty() && aimed.plan.targets.is_empty());
+    assert!(all.film.sums[0] > 0);
+    assert_eq!(all.film, aimed.film);
+
+    let ball = scene("point");
+    let off = first_flight(&gpu, &ball, &settings(300, false));
+    let on = first_flight(&gpu, &ball, &settings(300, true));
+    assert!(off.0.targets.is_empty() && on.0.targets.len() == 1 && off.1 != on.1);
+}
+
+fn film(gpu: &Gpu, kind: &str, settings: &TransportSettings) -> Lit {
+    received(gpu, &scene(kind), settings, &grid(0.0, DVec3::Y, 4))
+}
+
+/// Aimed photons too are the same by every builder and in every split, with either arithmetic.
+#[test]
+fn no_builder_and_no_split_changes_a_bit() {
+    let Some(gpu) = device() else { return };
+    for kind in ["overlapping cones", "two-sided triangles", "sky"] {
+        for math in [Math::Fast, Math::Strict] {
+            let usual = TransportSettings { math, rounds: 2, ..settings(3001, true) };
+            let reference = film(&gpu, kind, &usual);
+            for (what, settings) in [
+                ("atomic", TransportSettings { append: Append::Atomic, ..usual.clone() }),
+                ("persistent", TransportSettings { append: Append::Persistent, ..usual.clone() }),
+                ("chunks", TransportSettings { chunk: Some(701), ..usual.clone() }),
+            ] {
+                let found = film(&gpu, kind, &settings);
+                assert_holds(format!("{kind}, {what}, {math:?}"), equal_sums(what, &found.film.sums, &reference.film.sums));
+                assert_eq!(found.fates, reference.fates);
+            }
+            let off = film(&gpu, kind, &TransportSettings { aim: false, ..usual });
+            assert_complains("photons in all directions", equal_sums("off", &off.film.sums, &reference.film.sums));
+        }
+    }
+}
+
+/// The built-in scenes with caustics: what a picture's caustic part sums up to. With the same seed both see it along the
+/// same rays, so that their difference has the photons' noise alone.
+#[test]
+fn pictures_have_the_same_caustics() {
+    let Some(gpu) = device() else { return };
+    let mut family = Family::default();
+    for name in ["caustic-sphere", "cornell-spheres"] {
+        let scene = lit::scene(name);
+        let total = |aim, photons, seed| {
+            let settings = TransportSettings { seed, caustic_radius: Some(0.05), bounces: 32, ..settings(photons, aim) };
+            let lit = lit::seen(&gpu, &scene, &settings, &scene.cameras[0], [48, 48]);
+            lit.part_totals[2] as f64 / lit.plan.film_scale
+        };
+        let pairs: Vec<[f64; 2]> = (1..49).map(|seed| [total(false, 100_000, seed), total(true, 10_000, seed)]).collect();
+        let (all, _) = mean_and_error(&pairs.iter().map(|[all, _]| *all).collect::<Vec<_>>());
+        let (difference, error) = mean_and_error(&pairs.iter().map(|[all, aimed]| aimed - all).collect::<Vec<_>>());
+        family.expect_estimate(format!("{name}: whole"), all + difference, error, pairs.len() as u32, all);
+    }
+    family.assert_tells(0.025, |_| true);
+}
+
+/// One map of everything has photons in all directions.
+#[test]
+fn only_caustic_maps_are_aimed() {
+    let Some(gpu) = device() else { return };
+    for (illumination, part) in [(Illumination::Photons, Part::All), (Illumination::Split, Part::Indirect)] {
+        let settings = TransportSettings { illumination, part, ..settings(100, true) };
+        let (_, plan) = plan_of(&gpu, &scene("point"), &settings);
+        assert!(plan.caustic.is_none() && plan.targets.is_empty());
+        assert!(plan.maps().all(|map| map.target_count == 0 && map.flux_gain == 1.0));
+    }
+}

@@ -1,0 +1,169 @@
+//! Small scenes with a caustic under each kind of light, and whether aimed photons light them as others do.
+
+use glam::{DVec3, Vec3};
+use photonmill::gpu::Gpu;
+use photonmill::scene::light::LightKind;
+use photonmill::scene::material::TextureUse;
+use photonmill::scene::texture::{Texture, Wrap};
+use photonmill::scene::{Material, Mesh, Scene};
+use photonmill::settings::EmissionLaw;
+use photonmill::settings::transport::{Part, TransportSettings};
+
+use super::family::Family;
+use super::lit::{glass, grid, irradiances, lamp, level, matt, mirror, scene_of, shining};
+
+/// What [`scene`] knows.
+pub const KINDS: [&str; 11] = [
+    "point",
+    "spot",
+    "cosine disc",
+    "grazing disc",
+    "sun",
+    "sky",
+    "two-sided triangles",
+    "overlapping cones",
+    "overlapping discs",
+    "lamps in and out of a bowl",
+    "a ball before a mirror wall",
+];
+
+const BALL: DVec3 = DVec3::new(0.0, 0.5, 0.0);
+
+/// A ball of glass over a black floor.
+fn bench(lights: Vec<LightKind>) -> Scene {
+    let ball = Mesh::sphere("ball", BALL, 0.25, 24, 1);
+    scene_of(vec![level(0.0, [2.0; 2], true, 0), ball], vec![matt(0.0), glass(1.5), mirror(0.9)], lights)
+}
+
+fn point(position: DVec3) -> LightKind {
+    LightKind::Point { position, intensity: Vec3::new(1.0, 0.5, 0.2) }
+}
+
+/// A half sphere, open upwards, that reflects on both sides.
+fn bowl(centre: DVec3, radius: f64) -> Mesh {
+    let mut bowl = Mesh::sphere("bowl", centre, radius, 24, 3);
+    let below = |vertex: &u32| bowl.positions[*vertex as usize].y < centre.y + 1e-9;
+    bowl.triangles = bowl.triangles.iter().filter(|triangle| triangle.iter().all(below)).copied().collect();
+    bowl
+}
+
+pub fn scene(kind: &str) -> Scene {
+    let disc = |normal: DVec3, law| LightKind::Disc {
+        centre: DVec3::new(0.3, 1.5, 0.1),
+        normal: normal.normalize(),
+        radius: 0.1,
+        power: Vec3::ONE,
+        law,
+    };
+    match kind {
+        "point" => bench(vec![point(DVec3::new(0.5, 1.4, 0.2))]),
+        // Its falloff crosses the ball.
+        "spot" => bench(vec![LightKind::Spot {
+            position: DVec3::new(0.4, 1.5, 0.0),
+            direction: (DVec3::X * 0.2 + BALL - DVec3::new(0.4, 1.5, 0.0)).normalize(),
+            intensity: Vec3::ONE,
+            inner_angle: 0.1,
+            outer_angle: 0.35,
+        }]),
+        "cosine disc" => bench(vec![disc(DVec3::new(0.3, -1.0, 0.0), EmissionLaw::Cosine)]),
+        // Its plane cuts the ball.
+        "grazing disc" => bench(vec![disc(DVec3::new(0.9, -0.25, 0.0), EmissionLaw::Uniform)]),
+        "sun" => bench(vec![LightKind::Directional { direction: DVec3::new(-0.3, -1.0, 0.2).normalize(), irradiance: Vec3::ONE }]),
+        "sky" => bench(vec![LightKind::Environment { radiance: Vec3::ONE }]),
+        // A textured panel that faces the ball with one side, and two panels that only one side or none shines of.
+        "two-sided triangles" => {
+            let mut scene = bench(vec![]);
+            let emission_texture = Some(TextureUse { texture: 0, uv_set: 0 });
+            scene.materials.push(Material { two_sided: true, emission_texture, ..shining(0.0) });
+            scene.materials.push(shining(0.0));
+            let texels = vec![Vec3::ONE, Vec3::new(0.1, 0.4, 0.2)];
+            scene.textures = vec![Texture { name: "two".into(), width: 2, height: 1, texels, wrap: [Wrap::Clamp; 2] }];
+            let (y, z) = (DVec3::Y * 0.4, DVec3::Z * 0.4);
+            scene.meshes.push(Mesh::parallelogram("panel", DVec3::new(0.6, 0.8, -0.2), y, z, 3));
+            scene.meshes.push(Mesh::parallelogram("towards", DVec3::new(-0.7, 0.8, -0.2), y, z, 4));
+            scene.meshes.push(Mesh::parallelogram("away", DVec3::new(-0.2, 0.8, -0.7), DVec3::X * 0.4, y, 4));
+            scene
+        }
+        "overlapping cones" | "overlapping discs" => {
+            let sun = LightKind::Directional { direction: DVec3::new(-0.2, -1.0, 0.0).normalize(), irradiance: Vec3::ONE };
+            let mut scene = bench(vec![if kind == "overlapping cones" { point(DVec3::new(0.2, 1.5, 0.0)) } else { sun }]);
+            scene.meshes.push(Mesh::sphere("small ball", DVec3::new(0.1, 0.95, 0.02), 0.1, 24, 2));
+            scene.meshes.push(Mesh::sphere("smaller ball", DVec3::new(0.35, 0.8, 0.0), 0.08, 24, 1));
+            scene
+        }
+        // Of the light of one, all directions are kept.
+        "lamps in and out of a bowl" => {
+            let mut scene = bench(vec![point(DVec3::new(-0.5, 1.4, 0.0)), point(DVec3::new(0.45, 1.38, 0.1))]);
+            scene.materials.push(Material { two_sided: true, ..mirror(0.9) });
+            scene.meshes.push(bowl(DVec3::new(0.5, 1.4, 0.1), 0.12));
+            scene
+        }
+        // The wall's sphere is so large that it holds the ball and nearly the lamp.
+        "a ball before a mirror wall" => {
+            let mut scene = bench(vec![point(DVec3::new(0.4, 1.6, 0.0))]);
+            let wall = Mesh::parallelogram("wall", DVec3::new(-0.4, 0.0, -0.4), DVec3::Y * 0.9, DVec3::Z * 0.8, 2);
+            scene.meshes.push(wall);
+            scene
+        }
+        _ => panic!("there is no {kind}"),
+    }
+}
+
+pub fn settings(photons: u32, aim: bool) -> TransportSettings {
+    TransportSettings {
+        caustic_photons: photons,
+        aim,
+        part: Part::Caustic,
+        caustic_radius: Some(0.2),
+        alpha: 1.0,
+        bounces: 12,
+        rounds: 1,
+        ..TransportSettings::default()
+    }
+}
+
+/// Runs of other seeds on either side.
+const RUNS: u64 = 32;
+
+/// Mean of independent values and its standard error.
+pub fn mean_and_error(values: &[f64]) -> (f64, f64) {
+    let count = values.len() as f64;
+    let mean = values.iter().sum::<f64>() / count;
+    let variance = values.iter().map(|value| (value - mean).powi(2)).sum::<f64>() / (count - 1.0);
+    (mean, (variance / count).sqrt())
+}
+
+/// Adds the light of all photons and that of aimed ones: over the floor, in each channel that differs, and at each point
+/// that has more than a fifth of the brightest. The runs have `photons` and `aimed` ones each.
+pub fn compare(gpu: &Gpu, kind: &str, [photons, aimed]: [u32; 2], family: &mut Family) {
+    let (scene, points) = (scene(kind), grid(0.0, DVec3::Y, 4));
+    let of = |photons, aim, first| irradiances(gpu, &scene, &settings(photons, aim), &points, first..first + RUNS);
+    let (all, aimed) = (of(photons, false, 1), of(aimed, true, 100));
+    let mut expect = |what: String, value: &dyn Fn(&[DVec3]) -> f64| {
+        let [(expected, expected_error), (found, error)] =
+            [&all, &aimed].map(|runs| mean_and_error(&runs.iter().map(|run| value(run)).collect::<Vec<_>>()));
+        family.expect_estimate(what, found, error.hypot(expected_error), RUNS as u32, expected);
+    };
+    expect(format!("{kind}: whole"), &|run| run.iter().map(|light| light.x).sum());
+    expect(format!("{kind}: blue"), &|run| run.iter().map(|light| light.z).sum());
+    let brightness = |place: usize| all.iter().map(|run| run[place].x).sum::<f64>();
+    let brightest = (0..points.len()).map(brightness).fold(0.0, f64::max);
+    for place in (0..points.len()).filter(|place| brightness(*place) > 0.2 * brightest) {
+        expect(format!("{kind}: point {place}"), &|run| run[place].x);
+    }
+}
+
+/// Whether aimed photons bring as much light, to some per cent.
+pub fn same_light(gpu: &Gpu, kind: &str) -> super::Check {
+    let mut family = Family::default();
+    compare(gpu, kind, [40_000, 10_000], &mut family);
+    family.check()
+}
+
+/// A light beyond everything, of which a millionth meets the ball, lights as a sun does that is as strong at the ball.
+pub fn far_lamp() -> [Scene; 2] {
+    let way = DVec3::new(30.0, 100.0, 20.0);
+    let far = LightKind::Point { position: BALL + way, intensity: Vec3::splat(way.length_squared() as f32) };
+    let sun = LightKind::Directional { direction: -way.normalize(), irradiance: Vec3::ONE };
+    [far, sun].map(|kind| Scene { lights: vec![lamp(kind)], ..bench(vec![]) })
+}
