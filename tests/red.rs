@@ -268,8 +268,8 @@ const FAULTS: [Fault; 56] = [
     Fault {
         what: "photons are sorted into the cell beside theirs",
         file: "kernels/map_scatter.comp",
-        from: "bucket_of(cell_at(uintBitsToFloat(photon.place.xyz), push), push)",
-        to: "((bucket_of(cell_at(uintBitsToFloat(photon.place.xyz), push), push) + uint(index % 3u == 0u)) & push.bucket_mask)",
+        from: "bucket_of(cell_at(uintBitsToFloat(map[2 * index].xyz), push), push)",
+        to: "((bucket_of(cell_at(uintBitsToFloat(map[2 * index].xyz), push), push) + uint(index % 3u == 0u)) & push.bucket_mask)",
         kernels: &["map_scatter"],
         noticed_by: &[ClosedForm("furnace, Photons, Ballot: irradiance")],
     },

@@ -182,7 +182,7 @@ impl TransportPlan {
         }
         let map = |name, domain, photons: u32, stored, caustic_only: bool, radius: Option<f64>, option| -> Result<MapPlan> {
             let share = if caustic_only { CAUSTIC_RADIUS_SHARE } else { 1.0 };
-            let usual = (PHOTONS_PER_ESTIMATE * geometry.area / (PI * 2.0 * f64::from(photons))).sqrt() * share;
+            let usual = usual_radius(geometry, f64::from(photons)) * share;
             let radius = match radius {
                 None => usual.clamp(RADIUS_RANGE.0, 0.125),
                 Some(metres) => {
@@ -208,7 +208,7 @@ impl TransportPlan {
                 bounces: settings.bounces,
                 stored,
                 caustic_only,
-                bucket_count: (chunk_photons * 2 >> std::env::var("PM_BUCKETS").map_or(0, |shift| shift.parse::<u32>().unwrap())).clamp(1 << 10, 1 << 24).next_power_of_two().min(1 << 24),
+                bucket_count: chunk_photons.clamp(1 << 10, 1 << 24).next_power_of_two(),
                 radius,
                 lanes: lanes(PHOTONS_PER_ESTIMATE * (radius / usual).powi(2), limits),
                 target_count: 0,
@@ -470,6 +470,11 @@ impl TransportPlan {
     pub fn missing(&self) -> Vec<Effect> {
         self.decisions.iter().filter(|decision| decision.needed && !decision.kept).map(|decision| decision.effect).collect()
     }
+}
+
+/// Radius, normalised, in which so many photons from lamps leave [`PHOTONS_PER_ESTIMATE`] on average: each lands about twice.
+pub fn usual_radius(geometry: &Geometry, photons: f64) -> f64 {
+    (PHOTONS_PER_ESTIMATE * geometry.area / (PI * 2.0 * photons)).sqrt()
 }
 
 /// Invocations that share a point, of so many photons to find: as few as a card is busy with, since what lies off their

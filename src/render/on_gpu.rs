@@ -88,7 +88,7 @@ pub fn limits(facts: &DeviceFacts) -> Limits {
         group_size: facts.work_group_size,
         loop_iterations: Limits::loop_iterations_of(facts.kind),
         busy_invocations: Limits::busy_invocations_of(facts.kind),
-        lanes: std::env::var("PM_LANES").map_or(Limits::lanes_of(facts.kind), |lanes| lanes.parse().unwrap()),
+        lanes: Limits::lanes_of(facts.kind),
     }
 }
 
