@@ -232,13 +232,6 @@ struct LightPath {
     vec3 flux;
 };
 
-struct MapPhoton {
-    vec3 position;
-    uint normal;
-    vec3 flux;
-    uint wi;
-};
-
 struct VisiblePoint {
     vec3 position;
     uint normal;

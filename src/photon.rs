@@ -1,4 +1,5 @@
-//! A photon where a wall reflected it, and how the photon map holds it: in 16 bytes. Twin of `glsl/photon.glsl`.
+//! Photons as the maps of both lines hold them: in the room 16 bytes, twin of `glsl/photon.glsl`; in a scene of triangles 32,
+//! twin of `glsl/scene/map_photon.glsl`.
 
 use bytemuck::{Pod, Zeroable};
 use glam::Vec3;
@@ -32,6 +33,18 @@ pub struct StoredPhoton(pub [u32; 4]);
 pub struct Origin {
     pub photon: u32,
     pub bounce: u32,
+}
+
+/// A photon where it arrived at a surface that scatters: one entry of the map of a scene of triangles.
+#[repr(C)]
+#[derive(Debug, Clone, Copy, PartialEq, Default, Pod, Zeroable)]
+pub struct MapPhoton {
+    pub position: Vec3,
+    /// Geometric normal on the side of its arrival, octahedral.
+    pub normal: u32,
+    pub flux: Vec3,
+    /// Where it came from, octahedral in 2 x 15 bits, and log2 of `ARRIVED_...` above.
+    pub wi: u32,
 }
 
 impl Photon {

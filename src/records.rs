@@ -357,16 +357,6 @@ records! {
         flux: Vec3,
     }
 
-    /// A photon where it arrived at a surface that scatters: one entry of a photon map.
-    MapPhoton {
-        position: Vec3,
-        /// Geometric normal on the side of its arrival, octahedral.
-        normal: u32,
-        flux: Vec3,
-        /// Where it came from, octahedral in 2 x 15 bits, and log2 of `ARRIVED_...` above.
-        wi: u32,
-    }
-
     /// A point whose light the photon maps are asked for.
     VisiblePoint {
         position: Vec3,

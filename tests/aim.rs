@@ -165,7 +165,7 @@ fn pictures_have_the_same_caustics() {
         let (difference, error) = mean_and_error(&pairs.iter().map(|[all, aimed]| aimed - all).collect::<Vec<_>>());
         family.expect_estimate(format!("{name}: whole"), all + difference, error, pairs.len() as u32, all);
     }
-    family.assert_tells(0.025, |_| true);
+    family.assert_tells(0.0125, |_| true);
 }
 
 /// One map of everything has photons in all directions.

@@ -7,11 +7,10 @@
 #extension GL_EXT_scalar_block_layout : require
 #extension GL_EXT_control_flow_attributes : require
 #include "records.glsl"
-#include "scene/map_photon.glsl"
 
 layout(local_size_x_id = 0) in;
 layout(push_constant, scalar) uniform Push { CellPush push; };
-layout(set = 1, binding = 0, scalar) readonly buffer Map { PackedMapPhoton map[]; };
+layout(set = 1, binding = 0, scalar) readonly buffer Map { uvec4 map[]; };
 layout(set = 1, binding = 1, scalar) readonly buffer Counters { uint counters[]; };
 layout(set = 1, binding = 2, scalar) buffer Cells { uint cells[]; };
 layout(set = 1, binding = 3, scalar) writeonly buffer Ranks { uint ranks[]; };
@@ -23,6 +22,6 @@ void main()
 {
     uint index = invocation_index();
     if (index < min(counters[0], push.photon_capacity)) {
-        ranks[index] = atomicAdd(cells[bucket_of(cell_at(uintBitsToFloat(map[index].place.xyz), push), push)], 1);
+        ranks[index] = atomicAdd(cells[bucket_of(cell_at(uintBitsToFloat(map[2 * index].xyz), push), push)], 1);
     }
 }

@@ -1,12 +1,20 @@
-// A photon of a map as memory holds it: two aligned words of 16 bytes, each read and written at once. A candidate is
-// told by the first alone.
+// A photon where it arrived at a surface that scatters: one entry of the map of a scene of triangles. In memory it is two
+// aligned words of 16 bytes, each read and written at once; the first alone tells whether a photon is near. Twin of
+// src/photon.rs.
 
-struct PackedMapPhoton {
-    uvec4 place;
-    uvec4 light;
+struct MapPhoton {
+    vec3 position;
+    uint normal;
+    vec3 flux;
+    uint wi;
 };
 
-PackedMapPhoton pack(MapPhoton photon)
+uvec4 place_word(MapPhoton photon)
 {
-    return PackedMapPhoton(uvec4(floatBitsToUint(photon.position), photon.normal), uvec4(floatBitsToUint(photon.flux), photon.wi));
+    return uvec4(floatBitsToUint(photon.position), photon.normal);
+}
+
+uvec4 light_word(MapPhoton photon)
+{
+    return uvec4(floatBitsToUint(photon.flux), photon.wi);
 }

@@ -4,7 +4,7 @@
 // lanes take every so many-th candidate. The including kernel chose how sums are added.
 
 layout(set = 0, binding = 0, scalar) readonly buffer VisiblePoints { VisiblePoint visible_points[]; };
-layout(set = 1, binding = 2, scalar) readonly buffer SortedMap { PackedMapPhoton sorted_map[]; };
+layout(set = 1, binding = 2, scalar) readonly buffer SortedMap { uvec4 sorted_map[]; };
 // Points with more than one slice: how many, the longest one's candidates; then which, and each one's candidates.
 layout(set = 1, binding = 3, scalar) buffer Crowded { uint crowded[]; };
 
@@ -63,12 +63,12 @@ void look_up()
             for (uint k = begin + lane; k < end; k += push.lanes) {
                 uint place = run.x + k;
                 place = place >= photon_count ? place - photon_count : place;
-                uvec4 words = sorted_map[place].place;
+                uvec4 words = sorted_map[2 * place];
                 vec3 position = uintBitsToFloat(words.xyz);
                 precise vec3 way = position - point.position;
                 precise float distance_squared = way.x * way.x + way.y * way.y + way.z * way.z;
                 if (distance_squared <= push.radius * push.radius && cell_at(position, push.cells).yz == ivec2(y, z)) {
-                    uvec4 light = sorted_map[place].light;
+                    uvec4 light = sorted_map[2 * place + 1];
                     // Most photons lie on a surface as flat as the point's: nothing of theirs is to be unpacked but their flux.
                     bool is_alike = words.w == point.normal;
                     vec3 photon_normal = normal;

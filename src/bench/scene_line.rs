@@ -14,7 +14,8 @@ use crate::gpu::{Commands, Gpu};
 use crate::ledger::Fates;
 use crate::plan::memory::block_sum_counts;
 use crate::plan::transport::{MapPlan, Sensor, TransportPlan};
-use crate::records::{LightPath, MapPhoton, VisiblePoint};
+use crate::photon::MapPhoton;
+use crate::records::{LightPath, VisiblePoint};
 use crate::render::{self, Control};
 use crate::scene::geometry::Geometry;
 use crate::scene::{Camera, Scene};
@@ -115,7 +116,7 @@ pub fn time(gpu: &Gpu, rates: &Rates, job: &Job, cancelled: &AtomicBool) -> Resu
     let counts = lit.fates.each_ref().map(|fates: &Fates| Counts::of(fates, rounds));
     let model = Model { job, plan: &lit.plan, counts, surveys };
     let scopes = rounds_of(&lit.timings, rounds, warm_up);
-    let workload = format!("{}, {}, {} triangles", job.name, job.settings.append.name(), job.geometry.triangles.len());
+    let workload = format!("{}, {}, {} triangles", job.name, lit.plan.settings.append.name(), job.geometry.triangles.len());
     let passes =
         scopes.iter().filter_map(|(name, ms)| Some(Pass::new(&workload, name, Spread::of(ms.clone())?, model.work(name), rates))).collect();
     let sum = |scope: &str| lit.timings.row(scope).and_then(|row| row.gpu_ms).unwrap_or(0.0);

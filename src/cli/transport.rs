@@ -73,7 +73,8 @@ pub(super) struct TransportArgs {
     /// photon map, as in the paper [default: split]
     #[arg(long, value_enum, help_heading = "Transport")]
     illumination: Option<IlluminationArg>,
-    /// How photons fly and take places in their map; the result is the same to the bit [default: ballot]
+    /// How photons fly and take places in their map; the result is the same to the bit; auto: persistent, or ballot
+    /// where photons may bounce more often than the device lets a loop go on [default: auto]
     #[arg(long, value_enum, help_heading = "Transport")]
     variant: Option<AppendArg>,
     /// Arithmetic: as fast as the device has it, or the same bits on every device that rounds to nearest [default: fast]
@@ -140,7 +141,7 @@ pub(super) struct ReportArgs {
 }
 
 super::run::value_enum!(IlluminationArg => Illumination { Split, Photons });
-super::run::value_enum!(AppendArg => Append { Atomic, Ballot, Persistent });
+super::run::value_enum!(AppendArg => Append { Auto, Atomic, Ballot, Persistent });
 super::run::value_enum!(KernelArg => Kernel { Box, Cone, Epanechnikov });
 super::run::value_enum!(FilterArg => Filter { Box, Tent, Gaussian });
 super::run::value_enum!(PartArg => Part { All, Direct, Specular, Caustic, Indirect });

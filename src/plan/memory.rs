@@ -7,7 +7,7 @@ use glam::UVec2;
 use super::Plan;
 use super::transport::{MapPlan, Sensor, TransportPlan};
 use crate::constants::{FACE_COUNT, MAX_ODDITIES, ODD_ESTIMATE, PART_COUNT, SCAN_ITEMS, TREE_LEAF, TREE_RUN};
-use crate::photon::{Origin, StoredPhoton};
+use crate::photon::{MapPhoton, Origin, StoredPhoton};
 use crate::records::*;
 use crate::scene::geometry::Geometry;
 use crate::settings::Variant;

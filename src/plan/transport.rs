@@ -11,6 +11,7 @@ use super::evidence::{EffectDecision, Facts};
 use super::{Limits, memory};
 use crate::constants::*;
 use crate::error::{Error, Result};
+use crate::photon::MapPhoton;
 use crate::records::*;
 use crate::scene::geometry::Geometry;
 use crate::scene::targets::{aimed_shares, caustic_targets};
@@ -174,8 +175,13 @@ impl TransportPlan {
         .map(|(kept, arrival)| if *kept { *arrival } else { 0 })
         .sum::<u32>();
 
-        let persistent = settings.append == Append::Persistent;
         let most_bounces = limits.loop_iterations / LOOPS_PER_FLIGHT;
+        let append = match settings.append {
+            Append::Auto if settings.bounces > most_bounces => Append::Ballot,
+            Append::Auto => Append::Persistent,
+            named => named,
+        };
+        let persistent = append == Append::Persistent;
         if persistent && settings.bounces > most_bounces {
             let allowed = format!("must be at most {most_bounces} with --variant persistent on this device");
             return Err(Error::setting("--bounces", settings.bounces, allowed));
@@ -285,7 +291,7 @@ impl TransportPlan {
         ];
 
         let mut plan = TransportPlan {
-            settings: settings.clone(),
+            settings: TransportSettings { append, ..settings.clone() },
             sensor,
             decisions: Vec::new(),
             constants,

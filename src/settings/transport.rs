@@ -92,6 +92,8 @@ impl Filter {
 #[derive(Debug, Clone, Copy, PartialEq, Eq, Serialize)]
 #[serde(rename_all = "lowercase")]
 pub enum Append {
+    /// Persistent; ballot where photons may bounce more often than the device lets a loop go on.
+    Auto,
     /// Flight by flight, an atomic a photon.
     Atomic,
     /// Flight by flight, an atomic a subgroup.
@@ -103,6 +105,7 @@ pub enum Append {
 impl Append {
     pub fn name(self) -> &'static str {
         match self {
+            Append::Auto => "auto",
             Append::Atomic => "atomic",
             Append::Ballot => "ballot",
             Append::Persistent => "persistent",
@@ -243,7 +246,7 @@ impl Default for TransportSettings {
             illumination: Illumination::Split,
             part: Part::All,
             filter: Filter::Box,
-            append: Append::Ballot,
+            append: Append::Auto,
             math: Math::Fast,
             paranoid: false,
             stop: Stop::default(),

@@ -100,7 +100,7 @@ pub fn modules(plan: &TransportPlan, facts: &DeviceFacts) -> Vec<Module> {
         modules.extend(match plan.settings.append {
             Append::Atomic => vec![Shine::MODULE, FlyAtomic::MODULE],
             Append::Ballot => vec![Shine::MODULE, FlyBallot::MODULE],
-            Append::Persistent => vec![FlyWhole::MODULE],
+            Append::Persistent | Append::Auto => vec![FlyWhole::MODULE],
         });
         modules.push(if facts.int64_atomics { LookupU64::MODULE } else { LookupTwoWords::MODULE });
     }

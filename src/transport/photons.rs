@@ -154,7 +154,7 @@ pub fn fly(commands: &mut Commands, round: Round, photons: &PhotonBuffers, map: 
             &push,
             extent,
         ),
-        Append::Persistent => panic!("a persistent builder has no flights of all photons"),
+        Append::Persistent | Append::Auto => panic!("{} has no flights of all photons", plan.settings.append.name()),
         Append::Ballot => commands.dispatch(
             FlyBallot {
                 nodes,

@@ -9,6 +9,7 @@ use crate::gpu::{Buffer, Commands, Gpu, Memory};
 use crate::oddities;
 use crate::plan::transport::{MapPlan, TransportPlan};
 use crate::prefix_sum::block_sums;
+use crate::photon::MapPhoton;
 use crate::records::*;
 use crate::scene::geometry::Geometry;
 use crate::settings::transport::Effect;

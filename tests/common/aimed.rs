@@ -39,11 +39,11 @@ fn point(position: DVec3) -> LightKind {
     LightKind::Point { position, intensity: Vec3::new(1.0, 0.5, 0.2) }
 }
 
-/// A half sphere, open upwards, that reflects on both sides.
+/// A half sphere, open downwards, that reflects on both sides.
 fn bowl(centre: DVec3, radius: f64) -> Mesh {
     let mut bowl = Mesh::sphere("bowl", centre, radius, 24, 3);
-    let below = |vertex: &u32| bowl.positions[*vertex as usize].y < centre.y + 1e-9;
-    bowl.triangles = bowl.triangles.iter().filter(|triangle| triangle.iter().all(below)).copied().collect();
+    let above = |vertex: &u32| bowl.positions[*vertex as usize].y > centre.y - 1e-9;
+    bowl.triangles = bowl.triangles.iter().filter(|triangle| triangle.iter().all(above)).copied().collect();
     bowl
 }
 
@@ -87,13 +87,13 @@ pub fn scene(kind: &str) -> Scene {
         "overlapping cones" | "overlapping discs" => {
             let sun = LightKind::Directional { direction: DVec3::new(-0.2, -1.0, 0.0).normalize(), irradiance: Vec3::ONE };
             let mut scene = bench(vec![if kind == "overlapping cones" { point(DVec3::new(0.2, 1.5, 0.0)) } else { sun }]);
-            scene.meshes.push(Mesh::sphere("small ball", DVec3::new(0.1, 0.95, 0.02), 0.1, 24, 2));
+            scene.meshes.push(Mesh::sphere("small ball", DVec3::new(0.1, 0.95, 0.02), 0.12, 24, 1));
             scene.meshes.push(Mesh::sphere("smaller ball", DVec3::new(0.35, 0.8, 0.0), 0.08, 24, 1));
             scene
         }
         // Of the light of one, all directions are kept.
         "lamps in and out of a bowl" => {
-            let mut scene = bench(vec![point(DVec3::new(-0.5, 1.4, 0.0)), point(DVec3::new(0.45, 1.38, 0.1))]);
+            let mut scene = bench(vec![point(DVec3::new(-0.5, 1.4, 0.0)), point(DVec3::new(0.45, 1.42, 0.1))]);
             scene.materials.push(Material { two_sided: true, ..mirror(0.9) });
             scene.meshes.push(bowl(DVec3::new(0.5, 1.4, 0.1), 0.12));
             scene

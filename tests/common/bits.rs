@@ -38,8 +38,8 @@ pub const BITS: [(&str, u64); 17] = [
     ("open-box", 0x9bb9_f0b3_675a_cbc9),
     ("open-box-phong", 0xceb8_138a_5c4b_9944),
     ("cornell", 0x432b_4da1_da79_00e3),
-    ("cornell-spheres", 0x0fff_d77c_2e72_d890),
-    ("caustic-sphere", 0x6c2d_1adc_953f_335d),
+    ("cornell-spheres", 0x1e92_16d5_b101_ded2),
+    ("caustic-sphere", 0x5c8d_b563_d6d7_b179),
     ("furnace", 0xa172_51b4_26c3_f9c4),
     ("integrating-sphere", 0xe15c_c174_2e1b_83ce),
     ("point-over-plane", 0x1da1_bd21_c95a_a475),
@@ -49,8 +49,8 @@ pub const BITS: [(&str, u64); 17] = [
     ("mirror-corridor", 0x62a0_a2ab_40b6_b3ed),
     ("glass-slab", 0x7f92_1919_ec03_a7cd),
     ("cornell-spheres from photons", 0x45ae_1ec9_e3fb_5d65),
-    ("cornell-spheres gathered", 0x724d_a355_5cd9_a891),
-    ("blender.glb", 0x250a_2fa6_52a1_0e10),
+    ("cornell-spheres gathered", 0x1294_8aa1_a0d5_d096),
+    ("blender.glb", 0x032d_8e35_dc7e_b124),
     ("the paper's box", 0x52ea_c413_af81_4929),
 ];
 
