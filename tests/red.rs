@@ -56,6 +56,8 @@ enum Question {
     LeaningScatterer,
     PatchInPlane,
     SheetsInOnePlane,
+    /// With so many samples a pixel, and with a final gather or not.
+    GlassInFurnace(u32, bool),
     /// Aimed photons bring as much light as others: a scene of `common::aimed`.
     AimedLight(&'static str),
 }
@@ -68,7 +70,7 @@ impl Question {
         match self {
             Photons(_) | Film(_) | Ledger(_) | ClosedForm(_) | Appends | StrictMath | Finite | Nearest | Crowds | AimedLight(_) => false,
             Bits(_) | LampInBox(_) | Shelf | Ridge | Spot | Texture(_) => true,
-            LeaningPlane(_) | LeaningScatterer | PatchInPlane | SheetsInOnePlane => true,
+            LeaningPlane(_) | LeaningScatterer | PatchInPlane | SheetsInOnePlane | GlassInFurnace(..) => true,
         }
     }
 }
@@ -85,7 +87,31 @@ struct Fault {
     noticed_by: &'static [Question],
 }
 
-const FAULTS: [Fault; 55] = [
+const FAULTS: [Fault; 58] = [
+    Fault {
+        what: "what one sample looks up for all counts for itself alone",
+        file: "kernels/weigh.comp",
+        from: "(point.arrivals & SEEN_FOR_ALL) != 0 ? float(SAMPLES) : 1.0;",
+        to: "(point.arrivals & SEEN_FOR_ALL) != 0 ? 1.0 : 1.0;",
+        kernels: &["weigh"],
+        noticed_by: &[GlassInFurnace(4, false)],
+    },
+    Fault {
+        what: "what one sample gathers for all counts for itself alone",
+        file: "stages/chain.glsl",
+        from: "chain.weight *= for_all ? float(SAMPLES) : 1.0;",
+        to: "",
+        kernels: &["view"],
+        noticed_by: &[GlassInFurnace(4, true)],
+    },
+    Fault {
+        what: "what glass mirrors weighs as much as it is looked at",
+        file: "scene/scatter.glsl",
+        from: "float weight = as_much ? 1.0 : divide(reflectance, chance);",
+        to: "float weight = 1.0;",
+        kernels: &["view"],
+        noticed_by: &[GlassInFurnace(4, false)],
+    },
     Fault {
         what: "every other lane of a subgroup writes over its neighbour",
         file: "append/ballot.glsl",
@@ -636,6 +662,7 @@ fn ask(gpu: &Gpu, question: Question) -> Check {
         LampInBox(illumination) => known::lamp_in_a_box(gpu, illumination),
         Shelf => known::shelf(gpu),
         Ridge => known::ridge(gpu),
+        GlassInFurnace(samples, gather) => known::glass_in_a_furnace(gpu, samples, gather),
         Spot => known::spot(gpu),
         Texture(wrap) => known::wrapped_texture(gpu, wrap),
         LeaningPlane(illumination) => known::leaning_plane(gpu, illumination),

@@ -185,7 +185,7 @@ fn settings_are_accepted_exactly_within_their_ranges() {
 fn any_transport_settings(random: &mut Random) -> TransportSettings {
     let mut settings = TransportSettings::default();
     for _ in 0..=random.below(3) {
-        match random.below(11) {
+        match random.below(12) {
             0 => settings.photons = random.count(1, 1 << 31),
             1 => settings.caustic_photons = random.count(1, 1 << 31),
             2 => settings.rounds = random.count(1, 1 << 20),
@@ -196,6 +196,7 @@ fn any_transport_settings(random: &mut Random) -> TransportSettings {
             7 => settings.alpha = random.number(f64::MIN_POSITIVE, 1.0),
             8 => settings.group_size = if random.below(2) == 0 { 1 << random.below(12) } else { random.count(32, 1024) },
             9 => settings.chunk = Some(random.count(1, 1 << 31)),
+            10 => settings.samples = if random.below(2) == 0 { 1 << random.below(12) } else { random.count(1, 1024) },
             _ => {
                 settings.with = (0..random.below(4)).map(|_| random.pick(&Effect::ALL)).collect();
                 settings.without = (0..random.below(4)).map(|_| random.pick(&Effect::ALL)).collect();
@@ -205,8 +206,7 @@ fn any_transport_settings(random: &mut Random) -> TransportSettings {
     settings
 }
 
-/// One block of random numbers a ray, but for two.
-const MAX_SHADOW_RAYS: u32 = photonmill::constants::VERTEX_BLOCKS - 2;
+const MAX_SHADOW_RAYS: u32 = 64;
 
 /// Scenes of triangles: `photonmill render --help`, and what refusals say.
 #[test]
@@ -220,6 +220,7 @@ fn transport_settings_are_accepted_exactly_within_their_ranges() {
             rule("--rounds", settings.rounds, (1..=1 << 20).contains(&settings.rounds)),
             rule("--bounces", settings.bounces, (1..=10_000).contains(&settings.bounces)),
             rule("--shadow-rays", settings.shadow_rays, (1..=MAX_SHADOW_RAYS).contains(&settings.shadow_rays)),
+            rule("--samples", settings.samples, (0..=10).any(|k| settings.samples == 1 << k)),
             rule("--radius", settings.radius.unwrap_or_default(), is_radius(settings.radius)),
             rule("--caustic-radius", settings.caustic_radius.unwrap_or_default(), is_radius(settings.caustic_radius)),
             rule("--alpha", settings.alpha, settings.alpha > 0.0 && settings.alpha <= 1.0),

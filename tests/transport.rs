@@ -57,23 +57,24 @@ fn same_film(what: &str, found: &Lit, expected: &Lit) -> Check {
 fn no_split_and_no_builder_changes_a_bit() {
     let Some(gpu) = device() else { return };
     let scene = scene("cornell-spheres");
-    let reference = picture(&gpu, &scene, &small());
+    let usual = || TransportSettings { samples: 2, ..small() };
+    let reference = picture(&gpu, &scene, &usual());
     let variants = [
-        ("atomic append", TransportSettings { append: Append::Atomic, ..small() }),
-        ("persistent photons", TransportSettings { append: Append::Persistent, ..small() }),
-        ("chunks of 701", TransportSettings { chunk: Some(701), ..small() }),
-        ("work groups of 32", TransportSettings { group_size: 32, ..small() }),
+        ("atomic append", TransportSettings { append: Append::Atomic, ..usual() }),
+        ("ballot append", TransportSettings { append: Append::Ballot, ..usual() }),
+        ("chunks of 701", TransportSettings { chunk: Some(701), ..usual() }),
+        ("work groups of 32", TransportSettings { group_size: 32, ..usual() }),
     ];
     for (what, settings) in variants {
         assert_holds(what, same_film(what, &picture(&gpu, &scene, &settings), &reference));
     }
-    assert_holds("again", same_film("again", &picture(&gpu, &scene, &small()), &reference));
-    let other = picture(&gpu, &scene, &TransportSettings { seed: 2, ..small() });
+    assert_holds("again", same_film("again", &picture(&gpu, &scene, &usual()), &reference));
+    let other = picture(&gpu, &scene, &TransportSettings { seed: 2, ..usual() });
     assert_complains("another seed", same_film("another seed", &other, &reference));
     drop(gpu);
 
     let Some(gpu) = device_with(Options { without_int64_atomics: true, ..Options::default() }) else { return };
-    assert_holds("two words", same_film("two words", &picture(&gpu, &scene, &small()), &reference));
+    assert_holds("two words", same_film("two words", &picture(&gpu, &scene, &usual()), &reference));
 }
 
 /// Points near which more photons lie than an invocation tests: others share them, as small chunks do.
@@ -123,9 +124,12 @@ fn persistent_photons_are_the_same_in_several_dispatches() {
 fn the_four_parts_add_up_to_the_whole_to_the_bit() {
     let Some(gpu) = device() else { return };
     let scene = scene("cornell-spheres");
-    for settings in
-        [small(), TransportSettings { final_gather: true, ..small() }, TransportSettings { illumination: Illumination::Photons, ..small() }]
-    {
+    for settings in [
+        small(),
+        TransportSettings { samples: 4, ..small() },
+        TransportSettings { samples: 4, final_gather: true, ..small() },
+        TransportSettings { illumination: Illumination::Photons, ..small() },
+    ] {
         let whole = picture(&gpu, &scene, &settings);
         let parts: Vec<Lit> = Part::EACH.map(|part| picture(&gpu, &scene, &TransportSettings { part, ..settings.clone() })).into();
         for (sum, place) in whole.film.sums.iter().zip(0..) {
@@ -278,6 +282,28 @@ fn scaling_by_a_power_of_two_changes_no_bit() {
         let found = picture(&gpu, &scaled, &small());
         assert_holds(k, same_film(&format!("scaled by 2^{k}"), &found, &reference));
     }
+}
+
+#[test]
+fn no_number_of_samples_changes_the_light() {
+    let Some(gpu) = device() else { return };
+    for (samples, final_gather) in [(1, false), (4, false), (16, false), (4, true)] {
+        assert_holds("a furnace with glass", known::glass_in_a_furnace(&gpu, samples, final_gather));
+    }
+}
+
+/// Samples of a pixel are strata of it, of the lamps and of what glass mirrors: noise falls faster than by their number.
+#[test]
+fn samples_of_a_pixel_leave_little_noise() {
+    let Some(gpu) = device() else { return };
+    let error = |samples, shadow_rays, rounds| {
+        let settings = TransportSettings { part: Part::Direct, samples, shadow_rays, rounds, ..small() };
+        let lit = picture(&gpu, &scene("cornell"), &settings);
+        lit.film.relative_error(&lit.plan)
+    };
+    let (by_chance, even) = (error(1, 1, 64), error(16, 1, 4));
+    println!("64 paths a pixel: {:.2} % of error by rounds, {:.2} % by samples", 100.0 * by_chance, 100.0 * even);
+    assert!(2.0 * even < by_chance, "{even} and {by_chance}");
 }
 
 #[test]

@@ -220,8 +220,11 @@ impl Model<'_> {
                 + counts.events * SCATTER_OPERATIONS,
             integer_products: (2.0 * counts.emitted + counts.events) * PHILOX_PRODUCTS as f64,
         };
-        // Counted and numbered, then read again and written in order; counts of buckets are cleared, and twice read and written.
-        let index = Cost { bytes: survey.stored * (3.0 * bytes::<MapPhoton>() + 2.0 * RANK_BYTES) + 20.0 * buckets, ..Cost::default() };
+        // Photons are counted by their first half and numbered; counts of buckets are cleared, and twice read and written; then
+        // photons are read again and written in order.
+        let count = Cost { bytes: survey.stored * (0.5 * bytes::<MapPhoton>() + RANK_BYTES) + 4.0 * buckets, ..Cost::default() };
+        let scan = Cost { bytes: 16.0 * buckets, ..Cost::default() };
+        let sort = Cost { bytes: survey.stored * (2.0 * bytes::<MapPhoton>() + RANK_BYTES), ..Cost::default() };
         let found = survey.asking_points * survey.per_estimate;
         let look_up = Cost {
             bytes: survey.stored * bytes::<MapPhoton>() + survey.asking_points * (bytes::<VisiblePoint>() + 48.0),
@@ -231,13 +234,17 @@ impl Model<'_> {
         let chunks = map.chunks().count() as f64;
         // Emission, and flights with what works out the sizes of all but the first.
         let flights = chunks * if persistent { 1.0 } else { 2.0 * f64::from(map.bounces) };
-        // A size, a count, a prefix sum down its levels and up again, a sort.
-        let sorts = chunks * (2.0 * block_sum_counts(u64::from(map.bucket_count) + 1, self.plan.settings.group_size).len() as f64 + 2.0);
+        // A prefix sum goes down its levels and up again.
+        let scans = chunks * (2.0 * block_sum_counts(u64::from(map.bucket_count) + 1, self.plan.settings.group_size).len() as f64 - 1.0);
+        let sorts = 3.0 * chunks + scans;
         let look_ups = chunks * 3.0;
         let (item, items, dispatches, cost) = match stage {
-            "" => ("photons", counts.emitted, flights + sorts + look_ups, trace + index + look_up),
+            "" => ("photons", counts.emitted, flights + sorts + look_ups, trace + count + scan + sort + look_up),
             "trace" => ("events", counts.events, flights, trace),
-            "index" => ("photons", survey.stored, sorts, index),
+            "index" => ("photons", survey.stored, sorts, count + scan + sort),
+            "index/count" => ("photons", survey.stored, 2.0 * chunks, count),
+            "index/scan" => ("cells", buckets, scans, scan),
+            "index/sort" => ("photons", survey.stored, chunks, sort),
             "look up" => ("photons found", found, look_ups, look_up),
             _ => return None,
         };

@@ -80,6 +80,7 @@ pub fn on_scene(subcommand: &str, settings: &TransportSettings) -> String {
     line.differing("alpha", settings.alpha, usual.alpha);
     line.named("kernel", settings.kernel, usual.kernel);
     line.differing("edge-correction", switch(settings.edge_correction), switch(usual.edge_correction));
+    line.differing("samples", settings.samples, usual.samples);
     line.differing("shadow-rays", settings.shadow_rays, usual.shadow_rays);
     if settings.final_gather {
         line.0.push_str(" --final-gather");

@@ -12,7 +12,7 @@ use photonmill::scene::{Camera, Material, Mesh};
 use photonmill::settings::transport::{Effect, Illumination, Part, TransportSettings};
 use photonmill::transport::Lit;
 
-use super::lit::{flights, level, matt, mean_red, means, received, scene, scene_of, seen};
+use super::lit::{flights, glass, level, matt, mean_red, means, mirror, received, scene, scene_of, seen};
 use super::{Check, equal_sums, z_check};
 
 /// The red channel of a point or pixel, sure to three parts in a hundred and right to its error.
@@ -268,4 +268,26 @@ pub fn sheets_in_one_plane(gpu: &Gpu) -> Check {
     let (tree, list) = (of(&[Effect::Bvh], &[]), of(&[], &[Effect::Bvh]));
     assert!(tree.plan.keeps(Effect::Bvh) && !list.plan.keeps(Effect::Bvh));
     equal_sums("tree and list", &tree.film.sums, &list.film.sums)
+}
+
+/// A block of glass and a mirror in a furnace are not to be seen: all directions are equally bright, whatever way a path
+/// takes, and however many paths a pixel has.
+pub fn glass_in_a_furnace(gpu: &Gpu, samples: u32, final_gather: bool) -> Check {
+    let mut room = scene("furnace");
+    room.materials.extend([glass(1.5), mirror(1.0)]);
+    let (corner, x, y, z) = (DVec3::new(0.1, 0.3, 0.1), DVec3::X * 0.25, DVec3::Y * 0.25, DVec3::Z * 0.25);
+    let far = corner + x + y + z;
+    let faces = [(corner, x, z), (corner, y, x), (corner, z, y), (far, -z, -x), (far, -x, -y), (far, -y, -z)];
+    room.meshes.extend(faces.map(|(origin, u, v)| Mesh::parallelogram("block", origin, u, v, 1)));
+    room.meshes.push(Mesh::parallelogram("mirror", DVec3::new(0.4, 0.1, 0.2), x, y, 2));
+    let settings =
+        TransportSettings { samples, final_gather, shadow_rays: 2, photons: 20_000, rounds: 8, ..TransportSettings::default() };
+    let lit = seen(gpu, &room, &settings, &room.cameras[0], [24, 24]);
+    // Emission over what a wall absorbs.
+    let expected = 1.0 / (1.0 - 0.5);
+    let errors = (0..lit.film.pixels()).map(|pixel| lit.film.standard_error(pixel, &lit.plan).x.powi(2)).sum::<f64>();
+    let error = errors.sqrt() / lit.film.pixels() as f64;
+    println!("{samples} samples, gather {final_gather}: {} +- {error}, {expected} expected", mean_red(&lit));
+    assert!(error < 0.005 * expected, "{error}");
+    z_check("a furnace with glass", mean_red(&lit), expected, error.max(0.003 * expected))
 }

@@ -164,6 +164,7 @@ impl<'a> Arbitrary<'a> for Triangles {
             alpha: number(u, usual.alpha)?,
             kernel: *u.choose(&[Kernel::Box, Kernel::Cone, Kernel::Epanechnikov])?,
             edge_correction: u.arbitrary()?,
+            samples: count(u, usual.samples)?,
             shadow_rays: count(u, usual.shadow_rays)?,
             final_gather: u.arbitrary()?,
             aim: u.arbitrary()?,
