@@ -24,7 +24,8 @@ uvec4 pack_photon(Photon photon)
 {
     uint axis = (photon.wall >> 1) & 3u; // NO_WALL has all bits set
     uvec2 place = floatBitsToUint(along_wall(photon.position, axis));
-    return uvec4(place, floatBitsToUint(photon.flux) | axis << 30, floatBitsToUint(photon.weight) | photon.wall << 31);
+    return uvec4(place, (floatBitsToUint(photon.flux) & 0x3fffffffu) | axis << 30,
+                 (floatBitsToUint(photon.weight) & 0x7fffffffu) | photon.wall << 31);
 }
 
 bool is_empty(uvec4 stored)

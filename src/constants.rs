@@ -86,7 +86,7 @@ constants! {
     PART_COUNT = 4;
 
     /// Bits of a visible point's arrivals: it lies behind a mirror or glass, or behind a gather ray; or neither, so that
-    /// one of a pixel's samples looks the global map up for all.
+    /// one of a pixel's samples looks the global map up for all (each looks caustics up for itself).
     SEEN_OVER_SPECULAR = 256;
     SEEN_BY_GATHER = 512;
     SEEN_FOR_ALL = 1024;

@@ -52,7 +52,12 @@ impl Photon {
     pub fn stored(&self) -> StoredPhoton {
         let axis = (self.wall / 2) & 3;
         let place = [1, 2].map(|after| self.position[(axis as usize + after) % 3].to_bits());
-        StoredPhoton([place[0], place[1], self.flux.to_bits() | axis << 30, self.weight.to_bits() | self.wall << 31])
+        StoredPhoton([
+            place[0],
+            place[1],
+            self.flux.to_bits() & 0x3fff_ffff | axis << 30,
+            self.weight.to_bits() & 0x7fff_ffff | self.wall << 31,
+        ])
     }
 
     pub fn origin(&self) -> Origin {

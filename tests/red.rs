@@ -117,7 +117,7 @@ const FAULTS: [Fault; 58] = [
         file: "append/ballot.glsl",
         from: "subgroupBallotExclusiveBitCount(survivors);",
         to: "(subgroupBallotExclusiveBitCount(survivors) & 0xfffffffeu);",
-        kernels: &["trace_ballot", "fly_ballot"],
+        kernels: &["fly_whole", "trace_ballot", "fly_ballot"],
         noticed_by: &[Photons(Variant::Ballot), Appends],
     },
     Fault {
@@ -179,8 +179,8 @@ const FAULTS: [Fault; 58] = [
     Fault {
         what: "a photon in fifty is stored twice",
         file: "stages/flight.glsl",
-        from: "        map[2 * place + 1] = light_word(flown.photon);",
-        to: "        map[2 * place + 1] = light_word(flown.photon);\n        if (path.photon % 50u == 0u) {\n            uint again = atomicAdd(counters[0], 1);\n            map[2 * again] = place_word(flown.photon);\n            map[2 * again + 1] = light_word(flown.photon);\n        }",
+        from: "        store(place, flown.photon);",
+        to: "        store(place, flown.photon);\n        if (path.photon % 50u == 0u) store(atomicAdd(counters[0], 1), flown.photon);",
         kernels: &["fly_atomic"],
         noticed_by: &[Appends],
     },
@@ -277,7 +277,7 @@ const FAULTS: [Fault; 58] = [
         file: "sampling.glsl",
         from: "direction_at(sqrt(u), 1.0 - u, azimuth)",
         to: "direction_at(sqrt(sqrt(u)), 1.0 - sqrt(u), azimuth)",
-        kernels: &["trace_ballot", "shine", "fly_ballot"],
+        kernels: &["fly_whole", "trace_ballot", "shine", "fly_ballot"],
         noticed_by: &[
             ClosedForm("open box, ballot builder, uniform lamps: stored a photon"),
             ClosedForm("disc light, photons: irradiance"),
@@ -368,7 +368,7 @@ const FAULTS: [Fault; 58] = [
         file: "scene/bvh.glsl",
         from: "precise vec3 start = position + way;",
         to: "precise vec3 start = position + 1e-3 * normal * (dot(direction, normal) < 0.0 ? -1.0 : 1.0);",
-        kernels: &["shine", "fly_ballot", "fly_atomic", "receive", "view"],
+        kernels: &["fly_whole", "shine", "fly_ballot", "fly_atomic", "receive", "view"],
         noticed_by: &[LampInBox(Illumination::Photons)],
     },
     Fault {
@@ -400,14 +400,14 @@ const FAULTS: [Fault; 58] = [
         file: "stages/fly_once.glsl",
         from: "surface.ng, scatter.direction);",
         to: "surface.ng, scatter.direction);\n            if (u.z < 0.002) start.y = uintBitsToFloat(0x7fc00000u);",
-        kernels: &["fly_ballot"],
+        kernels: &["fly_whole", "fly_ballot"],
         noticed_by: &[Finite],
     },
     Fault {
         what: "a photon in 500 carries no number into the map",
         file: "stages/flight.glsl",
-        from: "map[2 * place] = place_word(flown.photon);",
-        to: "if (path.photon % 500u == 7u) flown.photon.flux.y = uintBitsToFloat(0x7fc00000u);\n        map[2 * place] = place_word(flown.photon);",
+        from: "store(place, flown.photon);",
+        to: "if (path.photon % 500u == 7u) flown.photon.flux.y = uintBitsToFloat(0x7fc00000u);\n        store(place, flown.photon);",
         kernels: &["fly_ballot"],
         noticed_by: &[Finite],
     },
@@ -440,7 +440,7 @@ const FAULTS: [Fault; 58] = [
         file: "scene/bvh.glsl",
         from: "return mix(intBitsToFloat(bits + away), start, equal(start, vec3(0.0)));",
         to: "return start;",
-        kernels: &["shine", "fly_ballot", "view"],
+        kernels: &["fly_whole", "shine", "fly_ballot", "view"],
         // The error alone is 16 times what the rounding of the start may take from it: no answer is wrong for it.
         noticed_by: &[Bits("cornell")],
     },
@@ -449,7 +449,7 @@ const FAULTS: [Fault; 58] = [
         file: "scene/bvh.glsl",
         from: "height * height > 0.0625 * error * error * dot(normal, normal) && ",
         to: "",
-        kernels: &["fly_ballot"],
+        kernels: &["fly_whole", "fly_ballot"],
         noticed_by: &[PatchInPlane],
     },
     Fault {
@@ -498,7 +498,7 @@ const FAULTS: [Fault; 58] = [
         file: "scene/lobes.glsl",
         from: SHADING_GAIN,
         to: "return 1.0;",
-        kernels: &["fly_ballot"],
+        kernels: &["fly_whole", "fly_ballot"],
         noticed_by: &[LeaningScatterer],
     },
     Fault {
@@ -538,7 +538,7 @@ const FAULTS: [Fault; 58] = [
         file: "scene/aim.glsl",
         from: "k == chosen || versine_between(emission.direction, other.axis) <= other.versine",
         to: "k == chosen",
-        kernels: &["shine"],
+        kernels: &["fly_whole", "shine"],
         noticed_by: &[AimedLight("overlapping cones")],
     },
     Fault {
@@ -546,7 +546,7 @@ const FAULTS: [Fault; 58] = [
         file: "scene/aim.glsl",
         from: "k == chosen || dot(off, off) <= radius * radius",
         to: "k == chosen",
-        kernels: &["shine"],
+        kernels: &["fly_whole", "shine"],
         noticed_by: &[AimedLight("overlapping discs")],
     },
     Fault {
@@ -554,7 +554,7 @@ const FAULTS: [Fault; 58] = [
         file: "scene/aim.glsl",
         from: "return max(cosine, 0.0) * 0.31830988618379067;",
         to: "return cosine > 0.0 ? 0.31830988618379067 : 0.0;",
-        kernels: &["shine"],
+        kernels: &["fly_whole", "shine"],
         noticed_by: &[AimedLight("cosine disc"), AimedLight("two-sided triangles")],
     },
 ];
@@ -642,7 +642,7 @@ fn ask(gpu: &Gpu, question: Question) -> Check {
             let scene = built_in::by_name("cornell-spheres").unwrap();
             let (count, text) = [Illumination::Split, Illumination::Photons]
                 .map(|illumination| {
-                    let settings = TransportSettings { illumination, paranoid: true, rounds: 1, ..small() };
+                    let settings = TransportSettings { illumination, paranoid: true, rounds: 1, append: Append::Ballot, ..small() };
                     lit(gpu, &scene, &settings).oddities.unwrap()
                 })
                 .into_iter()

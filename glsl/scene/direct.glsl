@@ -19,8 +19,9 @@ vec3 direct_light(Target point, uint emitter_count, Draws draws, uint index, uin
     if (emitter_count == 0) {
         return sum;
     }
+    uvec4 words = words_of(index, block, draws);
     for (uint ray = 0; ray < SHADOW_RAYS; ray++) {
-        vec3 u = stratified(number * SHADOW_RAYS + ray, SAMPLES * SHADOW_RAYS, index, block, draws);
+        vec3 u = stratified(number * SHADOW_RAYS + ray, SAMPLES * SHADOW_RAYS, words);
         Arriving arriving = sample_light(emitter_count, point.position, point.ns, u);
         float cosine = dot(arriving.wi, point.ns);
         // Before the guards below, which would drop what is no number.

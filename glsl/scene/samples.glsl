@@ -13,16 +13,21 @@ vec4 scrambled(uint number, uvec4 words)
     return vec4(unit_float(point.x), unit_float(point.y), unit_float(point.z), unit_float(point.w));
 }
 
+// Whose bits scramble a block of a place.
+uvec4 words_of(uint index, uint block, Draws draws)
+{
+    return philox(uvec4(index, draws.round, block, draws.domain), draws.seed);
+}
+
 // Where sample `number` of a place starts: four numbers of block 0.
 vec4 stratified_start(uint number, uint index, Draws draws)
 {
-    return scrambled(number, philox(uvec4(index, draws.round, 0, draws.domain), draws.seed));
+    return scrambled(number, words_of(index, 0, draws));
 }
 
 // Three numbers of any other block for sample `number` of `count`, shuffled, so that two blocks meet as by chance.
-vec3 stratified(uint number, uint count, uint index, uint block, Draws draws)
+vec3 stratified(uint number, uint count, uvec4 words)
 {
-    uvec4 words = philox(uvec4(index, draws.round, block, draws.domain), draws.seed);
     uint mask = count > 1 ? (2u << findMSB(count - 1)) - 1 : 0;
     return scrambled(owen_scramble(number, words.w) & mask, words).xyz;
 }

@@ -104,12 +104,14 @@ void follow(inout Chain chain, uint index, uint number, Draws draws, uint emitte
             bool leads = !for_all || number == 0;
             bool gathers = leads && !chain.gathers && gathers_here(surface) && (PARTS & part_of(chain, ARRIVED_INDIRECT)) != 0;
             uint arrivals = arrivals_wanted(chain, gathers);
+            uint for_others = 0;
             if (HAS_CAUSTIC_MAP) {
-                arrivals &= leads ? arrivals : ARRIVED_CAUSTIC;
-            } else {
-                arrivals = leads ? arrivals : 0;
+                for_others = ARRIVED_CAUSTIC;
             }
-            arrivals |= arrivals == 0 ? 0 : (chain.saw_specular ? SEEN_OVER_SPECULAR : 0) | (chain.gathers ? SEEN_BY_GATHER : 0) | (for_all ? SEEN_FOR_ALL : 0);
+            arrivals = leads ? arrivals : arrivals & for_others;
+            arrivals |= arrivals == 0 ? 0
+                                      : (chain.saw_specular ? SEEN_OVER_SPECULAR : 0) | (chain.gathers ? SEEN_BY_GATHER : 0)
+                                            | (for_all ? SEEN_FOR_ALL : 0);
             chain.points[chain.point_count++] = VisiblePoint(surface.position, pack_normal(surface.ng), divide(chain.weight * scale, float(SAMPLES)),
                                                              pack_normal(surface.ns), pack_direction(wo, 0), surface.parameter,
                                                              surface.kind, arrivals);
@@ -128,8 +130,8 @@ void follow(inout Chain chain, uint index, uint number, Draws draws, uint emitte
         if (ends) {
             return;
         }
-        uint count = SAMPLES;
-        vec3 u = stratified(number, count, index, block, draws).zxy;
+        uint count = SAMPLES; // what reflects the kernels cannot compare a specialization constant to less or more
+        vec3 u = stratified(number, count, words_of(index, block, draws)).zxy;
         float mirror_chance = 0.0;
         if (count >= MIRROR_SAMPLES && specular && depth < 2 && !chain.gathers) {
             mirror_chance = MIRROR_CHANCES[depth];

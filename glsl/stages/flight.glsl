@@ -2,7 +2,6 @@
 
 layout(set = 1, binding = 0, scalar) readonly buffer LightPaths { LightPath light_paths[]; };
 layout(set = 1, binding = 1, scalar) writeonly buffer NextLightPaths { LightPath next_light_paths[]; };
-layout(set = 1, binding = 2, scalar) writeonly buffer Map { uvec4 map[]; };
 
 void fly()
 {
@@ -17,8 +16,7 @@ void fly()
     uint place = take_place(0, flown.stored);
     bool dropped = flown.stored && place >= push.map.photon_capacity;
     if (flown.stored && !dropped) {
-        map[2 * place] = place_word(flown.photon);
-        map[2 * place + 1] = light_word(flown.photon);
+        store(place, flown.photon);
     }
     uint path_place = take_place(2 + push.bounce, flown.alive);
     if (flown.alive) {

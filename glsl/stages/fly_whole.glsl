@@ -1,8 +1,6 @@
 // Photons from their light to their end, each in the registers of one invocation, which then takes its next one; see
 // stages/trace_whole.glsl.
 
-layout(set = 1, binding = 2, scalar) writeonly buffer Map { uvec4 map[]; };
-
 void fly_whole()
 {
     open_tallies();
@@ -30,8 +28,7 @@ void fly_whole()
         uint place = take_place(0, flown.stored);
         bool dropped = flown.stored && place >= push.map.photon_capacity;
         if (flown.stored && !dropped) {
-            map[2 * place] = place_word(flown.photon);
-        map[2 * place + 1] = light_word(flown.photon);
+            store(place, flown.photon);
         }
         if (flying) {
             count_fate(bounce, flown.alive, flown.absorbed, flown.escaped);

@@ -52,6 +52,11 @@ pub(super) struct RenderArgs {
     /// Only this part of the light; the four add up to the whole to the bit
     #[arg(long, value_enum, help_heading = "Transport")]
     part: Option<PartArg>,
+    /// Paths from the camera through each pixel, each round, a power of two: even strata of the pixel, of the lamps and of what
+    /// glass mirrors. All look caustics up, and what they see in mirrors and glass; one looks up the global map for all
+    /// [default: 1]
+    #[arg(long, value_parser = whole::<u32>, allow_negative_numbers = true, help_heading = "Transport")]
+    samples: Option<u32>,
     /// How a pixel weighs the picture around its centre [default: box]
     #[arg(long, value_enum, help_heading = "Estimate")]
     filter: Option<FilterArg>,
@@ -68,6 +73,7 @@ pub(super) fn run(args: &RenderArgs, cancelled: &AtomicBool) -> Result<End> {
     let settings = TransportSettings {
         part: args.part.map_or(usual.part, Part::from),
         filter: args.filter.map_or(usual.filter, Filter::from),
+        samples: args.samples.unwrap_or(usual.samples),
         ..usual
     };
     settings.validate()?;

@@ -57,9 +57,6 @@ pub(super) struct TransportArgs {
     /// Seed of the random numbers [default: 1]
     #[arg(long, value_parser = whole::<u64>, allow_negative_numbers = true, help_heading = "Transport")]
     seed: Option<u64>,
-    /// Paths from the camera through each pixel, each round, a power of two; one of them looks photons up [default: 1]
-    #[arg(long, value_parser = whole::<u32>, allow_negative_numbers = true, help_heading = "Transport")]
-    samples: Option<u32>,
     /// Shadow rays from each visible point, each round [default: 4]
     #[arg(long, value_parser = whole::<u32>, allow_negative_numbers = true, help_heading = "Transport")]
     shadow_rays: Option<u32>,
@@ -211,7 +208,6 @@ impl TransportArgs {
             alpha: if self.fixed_radius { 1.0 } else { self.alpha.unwrap_or(usual.alpha) },
             kernel: self.kernel.map_or(usual.kernel, Kernel::from),
             edge_correction: self.edge_correction.map_or(usual.edge_correction, |switch| switch == super::run::SwitchArg::On),
-            samples: self.samples.unwrap_or(usual.samples),
             shadow_rays: self.shadow_rays.unwrap_or(usual.shadow_rays),
             final_gather: self.final_gather,
             aim: self.aim.map_or(usual.aim, |switch| switch == super::run::SwitchArg::On),

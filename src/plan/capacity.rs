@@ -148,7 +148,7 @@ impl Work {
 }
 
 /// Candidates of a point for each invocation that shares them.
-const TESTS_PER_LANE: u64 = 16;
+const TESTS_PER_LANE: f64 = 8.0;
 
 /// Invocations that share a point of a gather over the grid, where it is expected to test so many photons.
 pub(super) fn lanes(settings: &Settings, limits: &Limits, tests_per_point: u64) -> u32 {
@@ -156,8 +156,12 @@ pub(super) fn lanes(settings: &Settings, limits: &Limits, tests_per_point: u64) 
     if settings.sums != Sums::Integer {
         return 1;
     }
-    let wanted = (tests_per_point / TESTS_PER_LANE).clamp(1, u64::from(limits.lanes)) as u32;
-    wanted.next_power_of_two()
+    lanes_of(tests_per_point as f64 / TESTS_PER_LANE, limits)
+}
+
+/// Invocations that share a point which would keep so many of them busy: a power of two.
+pub(super) fn lanes_of(busy: f64, limits: &Limits) -> u32 {
+    1 << (busy.clamp(1.0, f64::from(limits.lanes)) as u32).ilog2()
 }
 
 /// Candidates that one invocation of a gather may have to test. A software device's lanes wait for each other, row by row

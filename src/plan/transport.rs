@@ -6,7 +6,7 @@ use std::time::{Duration, Instant};
 
 use serde::Serialize;
 
-use super::capacity::Persistence;
+use super::capacity::{self, Persistence};
 use super::evidence::{EffectDecision, Facts};
 use super::{Limits, memory};
 use crate::constants::*;
@@ -216,7 +216,7 @@ impl TransportPlan {
                 caustic_only,
                 bucket_count: chunk_photons.clamp(1 << 10, 1 << 24).next_power_of_two(),
                 radius,
-                lanes: lanes(PHOTONS_PER_ESTIMATE * (radius / usual).powi(2), limits),
+                lanes: capacity::lanes_of(PHOTONS_PER_ESTIMATE * (radius / usual).powi(2) / FOUND_BY_LANE, limits),
                 target_count: 0,
                 flux_gain: 1.0,
             })
@@ -353,12 +353,18 @@ impl TransportPlan {
 
     /// Pixels of one dispatch that casts `rays` rays each.
     pub fn pixels_at_once(&self, rays: u32) -> u32 {
-        (self.work_per_submission / (RAY_COST * u64::from(rays.max(1)))).clamp(1 << 12, 1 << 22) as u32
+        let least = ((1 << 12) / self.samples()).max(1);
+        (self.work_per_submission / (RAY_COST * u64::from(rays.max(1)))).clamp(u64::from(least), 1 << 22) as u32
     }
 
     /// Photons that one dispatch traces from their light to their end, in a fraction of a second.
     pub fn photons_per_dispatch(&self) -> u32 {
         (self.work_per_submission / (RAY_COST * FLIGHTS_PER_PHOTON)).clamp(1, u64::from(u32::MAX)) as u32
+    }
+
+    /// What each arrival at a visible point may add, so that all of a pixel's stay below the film's limit together.
+    pub fn point_limit(&self) -> f64 {
+        self.film_limit / f64::from((self.points_per_pixel * self.arrival_sets).next_power_of_two())
     }
 
     /// Visible points of one lookup, which has a work group of them along x.
@@ -391,7 +397,7 @@ impl TransportPlan {
         // A picture of a lamp may be far above the mean.
         let brightest = 4.0 * geometry.brightest().max(mean);
         let by_brightest = (limit / brightest).log2().floor() as i32;
-        self.film_scale = 2f64.powi(by_mean.min(by_brightest).clamp(-126, 126));
+        self.film_scale = 2f64.powi(by_mean.min(by_brightest).clamp(-112, 126));
         self.film_limit = limit;
     }
 
@@ -423,7 +429,12 @@ impl TransportPlan {
                 Sensor::Picture { width, height } => Error::setting(
                     "--size",
                     format!("{width}x{height}"),
-                    format!("has {pixels} pixels, the device's buffers hold {most}; ask for a smaller picture"),
+                    match self.samples() {
+                        1 => format!("has {pixels} pixels, the device's buffers hold {most}; ask for a smaller picture"),
+                        samples => format!(
+                            "has {pixels} pixels, the device's buffers hold {most} with --samples {samples}; ask for fewer samples or a smaller picture"
+                        ),
+                    },
                 ),
                 Sensor::Receivers { count } => {
                     Error::setting("--points", count, format!("are too many, the device's buffers hold {most} at once; ask for fewer"))
@@ -481,13 +492,6 @@ impl TransportPlan {
 /// Radius, normalised, in which so many photons from lamps leave [`PHOTONS_PER_ESTIMATE`] on average: each lands about twice.
 pub fn usual_radius(geometry: &Geometry, photons: f64) -> f64 {
     (PHOTONS_PER_ESTIMATE * geometry.area / (PI * 2.0 * photons)).sqrt()
-}
-
-/// Invocations that share a point, of so many photons to find: as few as a card is busy with, since what lies off their
-/// surfaces is looked at by each.
-fn lanes(found: f64, limits: &Limits) -> u32 {
-    let wanted = (found / FOUND_BY_LANE).clamp(1.0, f64::from(limits.lanes)) as u32;
-    1 << wanted.ilog2()
 }
 
 /// Photons traced at once, so that their map can never be full.

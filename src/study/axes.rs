@@ -179,9 +179,9 @@ const REMOVABLE: [Effect; 5] =
 /// map in metres, if it has one, and `has_few_triangles` says whether a list of them may be tested from end to end.
 pub fn of_scene(photons: u32, kept: &[Effect], radius: Option<f64>, has_few_triangles: bool) -> Vec<Group> {
     let base = TransportSettings { photons, caustic_photons: photons, ..TransportSettings::default() };
-    let mut sweep = Sweep::new(base, "ballot, shrinking radius, shadow rays", Line::Scene);
+    let mut sweep = Sweep::new(base, "persistent, shrinking radius, shadow rays", Line::Scene);
     sweep.add(Axis::Builder, "atomic", |s| s.append = Append::Atomic);
-    sweep.add(Axis::Builder, "persistent", |s| s.append = Append::Persistent);
+    sweep.add(Axis::Builder, "subgroup ballot", |s| s.append = Append::Ballot);
     let of_photons = |s: &mut TransportSettings, photons: u32| (s.photons, s.caustic_photons) = (photons, photons);
     sweep.add(Axis::Photons, "a sixteenth of the photons", |s| of_photons(s, (photons / 16).max(1)));
     sweep.add(Axis::Photons, "a quarter of the photons", |s| of_photons(s, (photons / 4).max(1)));

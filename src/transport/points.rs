@@ -166,7 +166,7 @@ pub fn weigh(commands: &mut Commands, round: Round) -> Result<()> {
             arrivals: plan.arrivals,
             round,
             film_scale: plan.film_scale as f32,
-            film_limit: plan.film_limit as f32,
+            film_limit: plan.point_limit() as f32,
             global_radius: radius(&plan.global),
             caustic_radius: radius(&plan.caustic),
             global_flux: flux(&plan.global),
@@ -202,6 +202,7 @@ pub fn resolve(commands: &mut Commands, round: Round) -> Result<()> {
         let push = ResolvePush { first_pixel, end_pixel, pixel_count, points_per_pixel };
         let kernel = Resolve { pass_sums, estimates, film_sums, film_squares };
         commands.dispatch(kernel, &push, Extent::Items(u64::from(end_pixel - first_pixel)))?;
+        add_work(commands, plan, u64::from(end_pixel - first_pixel) * u64::from(plan.samples() + points_per_pixel))?;
     }
     Ok(())
 }

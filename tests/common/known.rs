@@ -274,14 +274,13 @@ pub fn sheets_in_one_plane(gpu: &Gpu) -> Check {
 /// takes, and however many paths a pixel has.
 pub fn glass_in_a_furnace(gpu: &Gpu, samples: u32, final_gather: bool) -> Check {
     let mut room = scene("furnace");
-    room.materials.extend([glass(1.5), mirror(1.0)]);
+    room.materials.extend([glass(1.5), Material { two_sided: true, ..mirror(1.0) }]);
     let (corner, x, y, z) = (DVec3::new(0.1, 0.3, 0.1), DVec3::X * 0.25, DVec3::Y * 0.25, DVec3::Z * 0.25);
     let far = corner + x + y + z;
     let faces = [(corner, x, z), (corner, y, x), (corner, z, y), (far, -z, -x), (far, -x, -y), (far, -y, -z)];
     room.meshes.extend(faces.map(|(origin, u, v)| Mesh::parallelogram("block", origin, u, v, 1)));
     room.meshes.push(Mesh::parallelogram("mirror", DVec3::new(0.4, 0.1, 0.2), x, y, 2));
-    let settings =
-        TransportSettings { samples, final_gather, shadow_rays: 2, photons: 20_000, rounds: 8, ..TransportSettings::default() };
+    let settings = TransportSettings { samples, final_gather, shadow_rays: 2, photons: 20_000, rounds: 8, ..TransportSettings::default() };
     let lit = seen(gpu, &room, &settings, &room.cameras[0], [24, 24]);
     // Emission over what a wall absorbs.
     let expected = 1.0 / (1.0 - 0.5);

@@ -171,7 +171,7 @@ impl<'a> Arbitrary<'a> for Triangles {
             illumination: *u.choose(&[Illumination::Split, Illumination::Photons])?,
             part: *u.choose(&[Part::All, Part::Direct, Part::Specular, Part::Caustic, Part::Indirect])?,
             filter: *u.choose(&[Filter::Box, Filter::Tent, Filter::Gaussian])?,
-            append: *u.choose(&[Append::Atomic, Append::Ballot])?,
+            append: *u.choose(&[Append::Auto, Append::Atomic, Append::Ballot, Append::Persistent])?,
             math: *u.choose(&[Math::Fast, Math::Strict])?,
             paranoid: u.arbitrary()?,
             group_size: count(u, usual.group_size)?,
