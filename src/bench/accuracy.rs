@@ -9,6 +9,8 @@ use glam::{DVec3, Vec3};
 
 use super::Lab;
 use super::experiments::{Found, limit_of_round};
+use super::paper_line::WARM_UP;
+use super::rates;
 use super::scene_line::{self, Job};
 use crate::error::Result;
 use crate::plan::transport::usual_radius;
@@ -28,7 +30,6 @@ const FIRST_SEED: u64 = 1;
 const LONG_RUN_SEED: u64 = 1 << 20;
 const MOST_DOUBLINGS: u32 = 16;
 const MOST_ROUNDS: u32 = 1 << 18;
-const WARM_UP: Duration = Duration::from_secs(1);
 /// What a reference's own error may be, of the error that is looked for.
 const REFERENCE_SHARE: f64 = 0.25;
 
@@ -224,14 +225,13 @@ impl Search<'_> {
         let configuration = configuration(settings);
         let mut curve = Curve { label: configuration.label.clone(), points: Vec::new(), left_out: None };
         let run = |rounds, seed| self.subject.run(lab.gpu, &configuration, rounds, seed, lab.cancelled);
-        // Runs that are dropped: they make pipelines, and bring a card that waited for the reference to its clock.
-        let warm_up = if lab.is_cpu() { Duration::ZERO } else { WARM_UP };
-        let began = Instant::now();
-        while run(8, FIRST_SEED)?.is_some() && began.elapsed() < warm_up {}
+        // A run that is dropped: it makes pipelines.
+        run(8, FIRST_SEED)?;
         let began = Instant::now();
         for rounds in (0..=MOST_DOUBLINGS).map(|doublings| 1 << doublings) {
             let mut shots = Vec::new();
             for seed in (FIRST_SEED..).take(REPEATS as usize) {
+                rates::warm_up(lab.gpu, WARM_UP)?;
                 let began = Instant::now();
                 let Some(shot) = run(rounds, seed)? else { return Ok(curve) };
                 shots.push((shot, began.elapsed()));

@@ -154,6 +154,23 @@ pub fn measure(gpu: &Gpu, size: Size) -> Result<Rates> {
     Ok(Rates { dispatches, copies: copy_rates, float_operations, integer_products, random_reads, spread_atomics, single_atomics })
 }
 
+/// Keeps a card busy for a while, so that what follows at once runs at the clock of work; between experiments it falls to
+/// less than half. Does nothing on a software device, which has no clock of its own.
+pub fn warm_up(gpu: &Gpu, time: Duration) -> Result<()> {
+    if gpu.facts().kind == "cpu" {
+        return Ok(());
+    }
+    let Amounts { items, .. } = Amounts::of(gpu, Size::Small);
+    let mut commands = Commands::new(gpu, Constants::new(GROUP_SIZE), Instant::now())?;
+    let results = gpu.buffer::<u32>("results", u64::from(items), Memory::Device)?;
+    let began = Instant::now();
+    while began.elapsed() < time {
+        commands.dispatch(MeasureFloat { results: &results }, &push(items, STEPS, 0), Extent::Items(u64::from(items)))?;
+        commands.submit()?;
+    }
+    Ok(())
+}
+
 fn push(item_count: u32, step_count: u32, mask: u32) -> MeasurePush {
     MeasurePush { item_count, step_count, mask }
 }

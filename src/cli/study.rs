@@ -131,7 +131,7 @@ mod tests {
     #[test]
     fn printed_commands_give_the_settings_they_stand_for() {
         let groups: Vec<Group> =
-            [axes::of_paper(12, 8192), axes::of_the_papers_rounds(12), axes::of_scene(8192, &Effect::ALL, Some(0.1), true)].concat();
+            [axes::of_paper(12, 8192), axes::of_the_papers_rounds(12), axes::of_scene(8192, &Effect::ALL, Some(0.1), true, true)].concat();
         let configurations: Vec<_> = groups.iter().flat_map(|group| &group.configurations).collect();
         assert!(configurations.len() > 50);
         for configuration in configurations {

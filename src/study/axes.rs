@@ -21,6 +21,7 @@ pub enum Axis {
     Sums,
     Arithmetic,
     Direct,
+    Paths,
     Gather,
     Index,
     Effects,
@@ -42,6 +43,7 @@ impl Axis {
             Axis::Sums => "sums",
             Axis::Arithmetic => "arithmetic",
             Axis::Direct => "direct light",
+            Axis::Paths => "paths a pixel",
             Axis::Gather => "final gather",
             Axis::Index => "index",
             Axis::Effects => "effects",
@@ -176,8 +178,9 @@ const REMOVABLE: [Effect; 5] =
     [Effect::Indirect, Effect::Glossy, Effect::ReflectiveCaustics, Effect::RefractiveCaustics, Effect::SmoothNormals];
 
 /// Whatever a scene of triangles may be lit by: `kept` are the effects that it calls for, `radius` that of its global
-/// map in metres, if it has one, and `has_few_triangles` says whether a list of them may be tested from end to end.
-pub fn of_scene(photons: u32, kept: &[Effect], radius: Option<f64>, has_few_triangles: bool) -> Vec<Group> {
+/// map in metres, if it has one, `has_few_triangles` says whether a list of them may be tested from end to end, and
+/// `is_picture` whether a camera looks.
+pub fn of_scene(photons: u32, kept: &[Effect], radius: Option<f64>, has_few_triangles: bool, is_picture: bool) -> Vec<Group> {
     let base = TransportSettings { photons, caustic_photons: photons, ..TransportSettings::default() };
     let mut sweep = Sweep::new(base, "persistent, shrinking radius, shadow rays", Line::Scene);
     sweep.add(Axis::Builder, "atomic", |s| s.append = Append::Atomic);
@@ -205,6 +208,11 @@ pub fn of_scene(photons: u32, kept: &[Effect], radius: Option<f64>, has_few_tria
     sweep.add(Axis::Direct, "one shadow ray", |s| s.shadow_rays = 1);
     sweep.add(Axis::Direct, "sixteen shadow rays", |s| s.shadow_rays = 16);
     sweep.add(Axis::Direct, "direct light from photons", |s| s.illumination = Illumination::Photons);
+    if is_picture {
+        for samples in [4, 16] {
+            sweep.add(Axis::Paths, format!("{samples} paths a pixel, a shadow ray each"), |s| (s.samples, s.shadow_rays) = (samples, 1));
+        }
+    }
     sweep.add(Axis::Gather, "final gather", |s| s.final_gather = true);
     if has_few_triangles {
         sweep.add(Axis::Index, "a list of triangles, no tree", |s| s.without = vec![Effect::Bvh]);

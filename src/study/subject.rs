@@ -72,13 +72,13 @@ impl Subject {
                 subject("irradiance of the walls, the paper's line", reference.clone(), axes::of_paper(size, photons)),
                 Subject {
                     receivers: receivers(),
-                    ..subject("irradiance of the walls, triangles", reference.clone(), scene_axes(gpu, scene, &geometry, request)?)
+                    ..subject("irradiance of the walls, triangles", reference.clone(), scene_axes(gpu, scene, &geometry, request, false)?)
                 },
                 Subject { receivers: receivers(), ..subject("the paper's own question: rounds of 5000 photons", reference, papers) },
             ]);
         }
         if let Some((receivers, reference)) = Reference::floor(&name, size) {
-            let axes = scene_axes(gpu, scene, &geometry, request)?;
+            let axes = scene_axes(gpu, scene, &geometry, request, false)?;
             return Ok(vec![Subject { receivers, ..subject("irradiance of the floor", reference, axes) }]);
         }
         let camera = scene.cameras.first().cloned().unwrap_or_else(|| {
@@ -98,7 +98,7 @@ impl Subject {
             let why = "shows no light but lamps seen straight, or none at all: there is nothing that an error could be relative to";
             return Err(Error::setting("study", &name, why));
         }
-        Ok(vec![Subject { camera: Some(camera), ..subject("picture", reference, scene_axes(gpu, scene, &geometry, request)?) }])
+        Ok(vec![Subject { camera: Some(camera), ..subject("picture", reference, scene_axes(gpu, scene, &geometry, request, true)?) }])
     }
 
     /// What repeats a run.
@@ -207,11 +207,11 @@ fn shot(values: Vec<f64>, timings: &Timings, ledger: Ledger) -> Shot {
     }
 }
 
-fn scene_axes(gpu: &Gpu, scene: &Scene, geometry: &Geometry, request: &Request) -> Result<Vec<Group>> {
+fn scene_axes(gpu: &Gpu, scene: &Scene, geometry: &Geometry, request: &Request, is_picture: bool) -> Result<Vec<Group>> {
     let settings = TransportSettings { photons: request.photons, caustic_photons: request.photons, ..TransportSettings::default() };
     let sensor = Sensor::Picture { width: request.size, height: request.size };
     let plan = TransportPlan::new(scene, geometry, &settings, sensor, &render::limits(gpu.facts()))?;
     let kept: Vec<Effect> = plan.decisions.iter().filter(|decision| decision.kept).map(|decision| decision.effect).collect();
     let radius = plan.global.as_ref().map(|map| map.radius * geometry.unit);
-    Ok(axes::of_scene(request.photons, &kept, radius, geometry.triangles.len() <= FEW_TRIANGLES))
+    Ok(axes::of_scene(request.photons, &kept, radius, geometry.triangles.len() <= FEW_TRIANGLES, is_picture))
 }
