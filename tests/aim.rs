@@ -38,11 +38,11 @@ fn aimed_photons_bring_the_same_light() {
     let Some(gpu) = device() else { return };
     let mut family = Family::default();
     for kind in KINDS {
-        compare(&gpu, kind, [40_000, 4_000], &mut family);
+        compare(&gpu, kind, [80_000, 8_000], &mut family);
     }
     family.assert_tells(0.1, |what| what.ends_with("whole"));
     let precise = ["point", "spot", "cosine disc", "sun", "overlapping discs", "a ball before a mirror wall"];
-    family.assert_tells(0.06, |what| precise.iter().any(|kind| what == format!("{kind}: whole")));
+    family.assert_tells(0.05, |what| precise.iter().any(|kind| what == format!("{kind}: whole")));
 }
 
 #[test]

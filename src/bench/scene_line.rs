@@ -104,8 +104,23 @@ pub fn survey(gpu: &Gpu, job: &Job, map: impl Fn(&TransportPlan) -> Option<&MapP
 /// Visible points of a survey.
 const SAMPLES: usize = 256;
 
-/// Times the passes of a scene: [`REPEATS`] rounds of one run, after rounds that bring a card to its clock. Radii stay.
+/// Times the passes of a scene: [`REPEATS`] rounds of one run, after rounds that bring a card to its clock. Radii stay. On a
+/// card the fastest of [`RUNS`] counts: its clock may fall for a second or so by what others do on the same machine.
 pub fn time(gpu: &Gpu, rates: &Rates, job: &Job, cancelled: &AtomicBool) -> Result<Timed> {
+    let runs = if gpu.facts().kind == "cpu" { 1 } else { RUNS };
+    let mut best: Option<Timed> = None;
+    for _ in 0..runs {
+        let timed = time_once(gpu, rates, job, cancelled)?;
+        if best.as_ref().is_none_or(|best| timed.round_ms < best.round_ms) {
+            best = Some(timed);
+        }
+    }
+    Ok(best.expect("there was a run"))
+}
+
+const RUNS: u32 = 3;
+
+fn time_once(gpu: &Gpu, rates: &Rates, job: &Job, cancelled: &AtomicBool) -> Result<Timed> {
     let run = |rounds: u32| job.light(gpu, TransportSettings { alpha: 1.0, rounds, ..job.settings.clone() }, cancelled);
     let warm_up = warm_up_rounds(gpu, || Ok(whole(&rounds_of(&run(2)?.timings, 2, 1))))?;
     let rounds = warm_up + REPEATS;

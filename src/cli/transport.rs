@@ -70,8 +70,8 @@ pub(super) struct TransportArgs {
     /// photon map, as in the paper [default: split]
     #[arg(long, value_enum, help_heading = "Transport")]
     illumination: Option<IlluminationArg>,
-    /// How photons fly and take places in their map; the result is the same to the bit; auto: persistent, or ballot
-    /// where photons may bounce more often than the device lets a loop go on [default: auto]
+    /// How photons fly and take places in their map; the result is the same to the bit. auto: persistent, or ballot with
+    /// --math strict, or where photons may bounce more often than the device lets a loop go on [default: auto]
     #[arg(long, value_enum, help_heading = "Transport")]
     variant: Option<AppendArg>,
     /// Arithmetic: as fast as the device has it, or the same bits on every device that rounds to nearest [default: fast]

@@ -16,6 +16,7 @@ use crate::records::*;
 use crate::scene::geometry::Geometry;
 use crate::scene::targets::{aimed_shares, caustic_targets};
 use crate::scene::{Scene, Surface};
+use crate::settings::Math;
 use crate::settings::transport::{Append, Effect, Illumination, TransportSettings};
 
 /// What light is asked of.
@@ -177,7 +178,7 @@ impl TransportPlan {
 
         let most_bounces = limits.loop_iterations / LOOPS_PER_FLIGHT;
         let append = match settings.append {
-            Append::Auto if settings.bounces > most_bounces => Append::Ballot,
+            Append::Auto if settings.bounces > most_bounces || settings.math == Math::Strict => Append::Ballot,
             Append::Auto => Append::Persistent,
             named => named,
         };

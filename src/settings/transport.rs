@@ -92,7 +92,8 @@ impl Filter {
 #[derive(Debug, Clone, Copy, PartialEq, Eq, Serialize)]
 #[serde(rename_all = "lowercase")]
 pub enum Append {
-    /// Persistent; ballot where photons may bounce more often than the device lets a loop go on.
+    /// Persistent; ballot where photons may bounce more often than the device lets a loop go on, and with strict
+    /// arithmetic, which needs so many registers that few photons would be under way.
     Auto,
     /// Flight by flight, an atomic a photon.
     Atomic,
