@@ -68,14 +68,20 @@ pub(super) struct RenderArgs {
     device: DeviceArgs,
 }
 
+impl RenderArgs {
+    pub(super) fn settings(&self) -> TransportSettings {
+        let usual = self.transport.settings();
+        TransportSettings {
+            part: self.part.map_or(usual.part, Part::from),
+            filter: self.filter.map_or(usual.filter, Filter::from),
+            samples: self.samples.unwrap_or(usual.samples),
+            ..usual
+        }
+    }
+}
+
 pub(super) fn run(args: &RenderArgs, cancelled: &AtomicBool) -> Result<End> {
-    let usual = args.transport.settings();
-    let settings = TransportSettings {
-        part: args.part.map_or(usual.part, Part::from),
-        filter: args.filter.map_or(usual.filter, Filter::from),
-        samples: args.samples.unwrap_or(usual.samples),
-        ..usual
-    };
+    let settings = args.settings();
     settings.validate()?;
     if let Some(name) = args.replay {
         return show_photon(args, &settings, name);

@@ -143,9 +143,9 @@ mod tests {
                     assert_eq!(crate::settings::Settings { full_light: settings.full_light, ..parsed }, *settings, "{line}");
                 }
                 Line::Scene(settings) => {
-                    let line = command::on_scene("probe open-box --points points.txt -o irradiance.csv", settings);
-                    let Some(Command::Probe(probe)) = parse(&line).command else { panic!("{line}") };
-                    assert_eq!(probe.settings(), *settings, "{line}");
+                    let line = command::on_scene("render open-box -o picture.exr", settings);
+                    let Some(Command::Render(render)) = parse(&line).command else { panic!("{line}") };
+                    assert_eq!(render.settings(), *settings, "{line}");
                 }
             }
         }
