@@ -22,15 +22,6 @@ struct DiscLight {
     float flux;
 };
 
-struct Path {
-    vec3 position;
-    uint wall;
-    vec3 direction;
-    uint photon;
-    uvec2 stream;
-    float flux;
-};
-
 struct Point {
     vec3 position;
     uint wall;
@@ -70,6 +61,7 @@ struct EmitPush {
     RandomKey key;
     PhotonRange range;
     uint path_offset;
+    uint path_capacity;
 };
 
 struct TracePush {
@@ -82,8 +74,9 @@ struct TracePush {
 
 struct EndBouncePush {
     uint bounce;
-    uint total;
     uint photon_capacity;
+    uint items_per_group;
+    uint max_groups;
 };
 
 struct TraceWholePush {

@@ -90,6 +90,7 @@ pub mod ledger;
 pub mod oddities;
 pub mod output;
 pub mod paper;
+pub mod path;
 pub mod photon;
 pub mod plan;
 pub mod prefix_sum;

@@ -88,19 +88,6 @@ records! {
         flux: f32,
     }
 
-    /// A photon in flight.
-    Path {
-        position: Vec3,
-        /// Wall it stands on, or `NO_WALL` once it has died in its slot.
-        wall: u32,
-        direction: Vec3,
-        /// Number within its round.
-        photon: u32,
-        /// State of its random stream.
-        stream: UVec2,
-        flux: f32,
-    }
-
     /// A point at which light is estimated.
     Point {
         position: Vec3,
@@ -151,6 +138,7 @@ records! {
         key: RandomKey,
         range: PhotonRange,
         path_offset: u32,
+        path_capacity: u32,
     }
 
     TracePush {
@@ -163,9 +151,9 @@ records! {
 
     EndBouncePush {
         bounce: u32,
-        /// Place of the number of all survivors, behind the prefix sums.
-        total: u32,
         photon_capacity: u32,
+        items_per_group: u32,
+        max_groups: u32,
     }
 
     TraceWholePush {

@@ -4,11 +4,12 @@ use crate::constants::{FACE_COUNT, TREE_LEAF};
 use crate::error::Result;
 use crate::gpu::{Buffer, Commands, Gpu, Memory};
 use crate::oddities;
+use crate::path::StoredPath;
 use crate::photon::{Origin, StoredPhoton};
 use crate::plan::Plan;
 use crate::plan::memory::{group_count, searches_at_once, tree_count_capacity};
 use crate::prefix_sum::block_sums;
-use crate::records::{self, DispatchArgs, Path, Point, Search, Tally};
+use crate::records::{self, DispatchArgs, Point, Search, Tally};
 use crate::scene::room::RoomScene;
 use crate::settings::Variant;
 use glam::UVec2;
@@ -124,7 +125,7 @@ impl Resources {
             lights: gpu.buffer::<records::DiscLight>("lights", scene.lights.len() as u64, device)?,
             points: gpu.buffer::<Point>("points", plan.points.len() as u64, device)?,
             stream_seeds: gpu.buffer::<UVec2>("stream seeds", seeds.len() as u64, device)?,
-            paths: [gpu.buffer::<Path>("even paths", paths, device)?, gpu.buffer::<Path>("odd paths", paths, device)?],
+            paths: [gpu.buffer::<StoredPath>("even paths", paths, device)?, gpu.buffer::<StoredPath>("odd paths", paths, device)?],
             photons: gpu.buffer::<StoredPhoton>("photons", photons, device)?,
             origins: gpu.buffer::<Origin>("origins", u64::from(plan.origin_array_length()), device)?,
             counters: gpu.buffer::<u32>("counters", bounces + 2, device)?,

@@ -5,12 +5,11 @@ mod in_order;
 use crate::constants::MAX_GROUPS;
 use crate::error::Result;
 use crate::gpu::kernels::{
-    DispatchSize, Emit, EndBounce, KeepOrder, ScanAdd, ScanBlocks, TraceAtomic, TraceBallot, TraceGroup, TraceInPlace, TraceSlots,
-    TraceWhole,
+    Emit, EndBounce, KeepOrder, ScanAdd, ScanBlocks, TraceAtomic, TraceBallot, TraceGroup, TraceInPlace, TraceSlots, TraceWhole,
 };
 use crate::gpu::{Commands, Extent, Kernel, Module};
 use crate::plan::{EmissionRange, Plan, photons_of};
-use crate::records::{DispatchSizePush, EmitPush, PhotonRange, TracePush, TraceWholePush};
+use crate::records::{EmitPush, EndBouncePush, PhotonRange, TracePush, TraceWholePush};
 use crate::resources::Resources;
 use crate::rng::words;
 use crate::settings::Variant;
@@ -19,18 +18,12 @@ use crate::settings::Variant;
 pub fn modules(plan: &Plan) -> Vec<Module> {
     match plan.settings.variant {
         Variant::Naive => vec![Emit::MODULE, TraceSlots::MODULE],
-        Variant::Atomic => vec![Emit::MODULE, TraceAtomic::MODULE, DispatchSize::MODULE],
-        Variant::Ballot => vec![Emit::MODULE, TraceBallot::MODULE, DispatchSize::MODULE],
-        Variant::Group => vec![Emit::MODULE, TraceGroup::MODULE, DispatchSize::MODULE],
-        Variant::Scan => vec![
-            Emit::MODULE,
-            TraceInPlace::MODULE,
-            ScanBlocks::MODULE,
-            ScanAdd::MODULE,
-            KeepOrder::MODULE,
-            EndBounce::MODULE,
-            DispatchSize::MODULE,
-        ],
+        Variant::Atomic => vec![Emit::MODULE, TraceAtomic::MODULE, EndBounce::MODULE],
+        Variant::Ballot => vec![Emit::MODULE, TraceBallot::MODULE, EndBounce::MODULE],
+        Variant::Group => vec![Emit::MODULE, TraceGroup::MODULE, EndBounce::MODULE],
+        Variant::Scan => {
+            vec![Emit::MODULE, TraceInPlace::MODULE, ScanBlocks::MODULE, ScanAdd::MODULE, KeepOrder::MODULE, EndBounce::MODULE]
+        }
         Variant::Persistent => vec![TraceWhole::MODULE],
         Variant::Cpu => panic!("the CPU builder has no kernels"),
     }
@@ -63,7 +56,12 @@ pub fn emit(commands: &mut Commands, resources: &Resources, plan: &Plan, round: 
     let Resources { lights, walls, stream_seeds, paths: [paths, _], oddities, .. } = resources;
     let mut path_offset = 0;
     for range in ranges {
-        let push = EmitPush { key: plan.streams().key(round), range: photon_range(plan, round, range), path_offset };
+        let push = EmitPush {
+            key: plan.streams().key(round),
+            range: photon_range(plan, round, range),
+            path_offset,
+            path_capacity: plan.path_array_length(),
+        };
         commands.dispatch(Emit { lights, walls, stream_seeds, paths, oddities }, &push, Extent::Items(u64::from(range.count)))?;
         path_offset += range.count;
     }
@@ -131,15 +129,6 @@ fn one_bounce(commands: &mut Commands, resources: &Resources, plan: &Plan, round
             Extent::Indirect(&resources.dispatch_args)
         }
     };
-    if let Extent::Indirect(dispatch_args) = extent() {
-        let size = DispatchSizePush {
-            counter: 1 + bounce,
-            capacity: plan.path_capacity,
-            items_per_group: plan.settings.group_size,
-            max_groups: MAX_GROUPS,
-        };
-        commands.dispatch(DispatchSize { counters: &resources.counters, dispatch_args }, &size, Extent::Groups(1, 1))?;
-    }
     let [even, odd] = &resources.paths;
     let (paths, next_paths) = if bounce.is_multiple_of(2) { (even, odd) } else { (odd, even) };
     let Resources { rooms, walls, photons, origins, counters, tallies, oddities, .. } = resources;
@@ -166,5 +155,11 @@ fn one_bounce(commands: &mut Commands, resources: &Resources, plan: &Plan, round
         ),
         Variant::Scan => in_order::one_bounce(commands, resources, plan, [paths, next_paths], &push, extent),
         Variant::Persistent | Variant::Cpu => panic!("{} has no bounces of all paths", variant.name()),
+    }?;
+    if variant == Variant::Naive {
+        return Ok(());
     }
+    let end =
+        EndBouncePush { bounce, photon_capacity: push.photon_capacity, items_per_group: plan.settings.group_size, max_groups: MAX_GROUPS };
+    commands.dispatch(EndBounce { counters, dispatch_args: &resources.dispatch_args }, &end, Extent::Groups(1, 1))
 }

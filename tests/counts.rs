@@ -5,9 +5,10 @@ mod common;
 
 use common::{device, lit, run};
 use photonmill::bench::paper_line::{self, Counts};
+use photonmill::path::StoredPath;
 use photonmill::photon::{MapPhoton, Origin, StoredPhoton};
 use photonmill::plan::transport::{Sensor, TransportPlan};
-use photonmill::records::{LightPath, Path, VisiblePoint};
+use photonmill::records::{LightPath, VisiblePoint};
 use photonmill::render;
 use photonmill::rng::Rng;
 use photonmill::scene::built_in;
@@ -103,6 +104,6 @@ fn a_scene_costs_what_it_did() {
 /// Records decide how many bytes an event moves.
 #[test]
 fn records_are_as_small_as_they_were() {
-    assert_eq!([size_of::<Path>(), size_of::<StoredPhoton>(), size_of::<Origin>()], [44, 16, 8]);
+    assert_eq!([size_of::<StoredPath>(), size_of::<StoredPhoton>(), size_of::<Origin>()], [48, 16, 8]);
     assert_eq!([size_of::<LightPath>(), size_of::<MapPhoton>(), size_of::<VisiblePoint>()], [44, 32, 48]);
 }

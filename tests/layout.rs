@@ -48,7 +48,7 @@ fn rust_and_glsl_lay_out_every_record_alike() {
 /// Only arrays have a stride, so only there is a Rust record's tail padding judged.
 #[test]
 fn records_that_lie_in_arrays_are_seen_there() {
-    for name in ["Room", "Wall", "DiscLight", "Path", "Point", "Tally", "DispatchArgs"] {
+    for name in ["Room", "Wall", "DiscLight", "LightPath", "Point", "Tally", "DispatchArgs"] {
         assert!(STRUCTS.iter().any(|(_, found)| found.name == name && found.stride_bytes.is_some()), "{name}");
     }
 }
@@ -68,9 +68,9 @@ fn leaked(fields: Vec<Field>) -> &'static [Field] {
 
 #[test]
 fn the_check_complains_about_swapped_fields() {
-    let mut fields = layout("Path").fields.to_vec();
+    let mut fields = layout("LightPath").fields.to_vec();
     fields.swap(2, 3);
-    let spoiled = Layout { fields: leaked(fields), ..layout("Path") };
+    let spoiled = Layout { fields: leaked(fields), ..layout("LightPath") };
     assert!(!complaints(STRUCTS, &with(spoiled)).is_empty());
 }
 
@@ -86,13 +86,13 @@ fn the_check_complains_about_names_swapped_in_place() {
 #[test]
 fn the_check_complains_about_an_offset_a_kind_and_a_stride() {
     // Offset 16 is where std430 would put what follows a vec3 in scalar layout.
-    let mut fields = layout("Path").fields.to_vec();
+    let mut fields = layout("LightPath").fields.to_vec();
     fields[1].offset = 16;
-    let moved = Layout { fields: leaked(fields), ..layout("Path") };
-    let mut fields = layout("Path").fields.to_vec();
+    let moved = Layout { fields: leaked(fields), ..layout("LightPath") };
+    let mut fields = layout("LightPath").fields.to_vec();
     fields[3].kind = "f32";
-    let retyped = Layout { fields: leaked(fields), ..layout("Path") };
-    let padded = Layout { size_bytes: layout("Path").size_bytes + 4, ..layout("Path") };
+    let retyped = Layout { fields: leaked(fields), ..layout("LightPath") };
+    let padded = Layout { size_bytes: layout("LightPath").size_bytes + 4, ..layout("LightPath") };
     for (what, spoiled) in [("offset", moved), ("kind", retyped), ("stride", padded)] {
         assert!(!complaints(STRUCTS, &with(spoiled)).is_empty(), "{what}");
     }

@@ -11,10 +11,11 @@ use common::{Check, Device, assert_complains, assert_holds, device, equal_sums, 
 use photonmill::constants::{NO_WALL, SCAN_ITEMS};
 use photonmill::gpu::kernels::DispatchSize;
 use photonmill::gpu::{Buffer, Commands, Constants, Extent, Memory};
+use photonmill::path::StoredPath;
 use photonmill::photon::{Origin, Photon, StoredPhoton};
 use photonmill::plan::Plan;
 use photonmill::prefix_sum::{block_sums, scan};
-use photonmill::records::{DispatchArgs, DispatchSizePush, Path, Tally};
+use photonmill::records::{DispatchArgs, DispatchSizePush, Tally};
 use photonmill::render::constants;
 use photonmill::resources::Resources;
 use photonmill::rng::Rng;
@@ -240,7 +241,7 @@ fn append(gpu: &Device, scene: &RoomScene, settings: &Settings, capacity: u32) -
         commands.fill(&buffer, 0, buffer.size_bytes() / 4, GUARD);
         buffer
     };
-    let paths = || gpu.buffer::<Path>("guarded paths", path_count + GUARD_ENTRIES, Memory::Device).unwrap();
+    let paths = || gpu.buffer::<StoredPath>("guarded paths", path_count + GUARD_ENTRIES, Memory::Device).unwrap();
     let entries = u64::from(capacity) + GUARD_ENTRIES;
     resources.photons = guarded(&mut commands, gpu.buffer::<StoredPhoton>("guarded photons", entries, Memory::Device).unwrap());
     resources.origins = guarded(&mut commands, gpu.buffer::<Origin>("guarded origins", entries, Memory::Device).unwrap());
@@ -252,7 +253,7 @@ fn append(gpu: &Device, scene: &RoomScene, settings: &Settings, capacity: u32) -
     let (origins, origins_behind) = origins.split_at(capacity as usize);
     let mut guards: Vec<u32> = [bytemuck::cast_slice(behind), bytemuck::cast_slice(origins_behind)].concat();
     for paths in &resources.paths {
-        let all = commands.read::<Path>(paths, (path_count + GUARD_ENTRIES) as usize).unwrap();
+        let all = commands.read::<StoredPath>(paths, (path_count + GUARD_ENTRIES) as usize).unwrap();
         guards.extend_from_slice(bytemuck::cast_slice(&all[path_count as usize..]));
     }
     Appended {

@@ -13,8 +13,8 @@ use photonmill::cpu::room::intersect_room;
 use photonmill::cpu::sampling::{sample_cosine_hemisphere, sample_uniform_hemisphere};
 use photonmill::cpu::trace::Tracer;
 use photonmill::gpu::Commands;
+use photonmill::path::{self, Path};
 use photonmill::plan::{EmissionRange, Plan};
-use photonmill::records::Path;
 use photonmill::render::constants;
 use photonmill::resources::Resources;
 use photonmill::rng::{self, Affine48, Rng, Streams, owen_scramble, sobol, srand48};
@@ -166,7 +166,8 @@ fn emitted(gpu: &common::Device, plan: &Plan, round: u32, range: EmissionRange) 
     let mut commands = Commands::new(gpu, constants(plan), Instant::now()).unwrap();
     let resources = Resources::new(gpu, &mut commands, &scene, plan).unwrap();
     trace::emit(&mut commands, &resources, plan, round, &[range]).unwrap();
-    commands.read(&resources.paths[0], range.count as usize).unwrap()
+    let array = commands.read(&resources.paths[0], plan.path_array_length() as usize).unwrap();
+    (0..range.count as usize).map(|index| path::unpack(&array, index)).collect()
 }
 
 /// The same photons by another builder: the same streams, bit for bit, and places and directions within a few

@@ -6,11 +6,13 @@ mod common;
 mod planted;
 
 use std::sync::atomic::AtomicBool;
+use std::time::Duration;
 
 use common::{
     Check, MANY_PHOTONS, aimed, assert_complains, assert_holds, bits, equal_sums, in_order, known, open, photons, photons_on_cpu,
     run_on_cpu,
 };
+use photonmill::compaction;
 use photonmill::gpu::{Gpu, Options, check};
 use photonmill::plan::transport::{Sensor, TransportPlan};
 use photonmill::render::{self, Control};
@@ -38,6 +40,8 @@ enum Question {
     ClosedForm(&'static str),
     /// Lists of survivors in any order give the same picture.
     Appends,
+    /// Builders under the clock store the same photons.
+    Builders,
     /// Strict quotients and roots are IEEE 754's.
     StrictMath,
     /// `--paranoid` finds nothing that is infinite or no number.
@@ -68,7 +72,8 @@ impl Question {
     /// Whether another test, the same for every device, shows that a device without a fault answers it right.
     fn has_a_test_of_its_own(self) -> bool {
         match self {
-            Photons(_) | Film(_) | Ledger(_) | ClosedForm(_) | Appends | StrictMath | Finite | Nearest | Crowds | AimedLight(_) => false,
+            Photons(_) | Film(_) | Ledger(_) | ClosedForm(_) | Appends | Builders | StrictMath | Finite | Nearest | Crowds
+            | AimedLight(_) => false,
             Bits(_) | LampInBox(_) | Shelf | Ridge | Spot | Texture(_) => true,
             LeaningPlane(_) | LeaningScatterer | PatchInPlane | SheetsInOnePlane | GlassInFurnace(..) => true,
         }
@@ -134,7 +139,7 @@ const FAULTS: [Fault; 58] = [
         from: "prefix.before += s < gl_SubgroupID",
         to: "prefix.before += s + 1 < gl_SubgroupID",
         kernels: &["trace_group"],
-        noticed_by: &[Photons(Variant::Group)],
+        noticed_by: &[Photons(Variant::Group), Builders],
     },
     Fault {
         what: "survivors of one work group are not counted",
@@ -562,6 +567,8 @@ const FAULTS: [Fault; 58] = [
 /// Of `shading_gain`.
 const SHADING_GAIN: &str = "return min(divide(abs(shading_cosine), max(abs(geometric_cosine), 1e-6)), float(MAX_SHADING_GAIN));";
 
+const FOREVER: Duration = Duration::from_secs(3600);
+
 fn strict() -> Settings {
     Settings { math: Math::Strict, shininess: [Some(2.0); 5], mesh: 16, ..Settings::default() }
 }
@@ -631,6 +638,11 @@ fn ask(gpu: &Gpu, question: Question) -> Check {
         Appends => {
             let of = |append| film(gpu, &cornell(), &TransportSettings { append, ..small() });
             same_film(&of(Append::Ballot), &of(Append::Atomic)).and_then(|()| same_film(&of(Append::Ballot), &of(Append::Persistent)))
+        }
+        Builders => {
+            let request =
+                compaction::Request { survivals: vec![0.75], bounces: 4, turns: 1, ..compaction::Request::up_to(1 << 12, FOREVER) };
+            compaction::measure(gpu, &request, &never, &mut |_| {}).map_or_else(|error| Err(error.to_string()), |_| Ok(()))
         }
         Crowds => {
             let crowded = TransportSettings { photons: 20_000, radius: Some(1.0), rounds: 1, ..small() };

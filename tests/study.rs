@@ -128,7 +128,7 @@ fn the_open_box_is_studied_against_radiosity_and_goes_on_where_it_ended() {
 fn a_picture_is_studied_against_path_tracing() {
     let Some(gpu) = device() else { return };
     let folder = tempfile::tempdir().unwrap();
-    let study = run(&gpu, folder.path(), request("cornell-spheres", 2)).unwrap();
+    let study = run(&gpu, folder.path(), request("cornell", 4)).unwrap();
     let part = &study.parts[0];
     assert!(part.reference.contains("path tracing") && part.reference_error < 0.2, "{} {}", part.reference, part.reference_error);
     let without = part.curves().find(|curve| curve.label == "without indirect").unwrap();
@@ -136,7 +136,7 @@ fn a_picture_is_studied_against_path_tracing() {
     assert!(without.best_error() > base.best_error(), "{} {}", without.best_error(), base.best_error());
     let sentences = part.sentences();
     let told = |what: &str| sentences.iter().any(|sentence| sentence.contains(what));
-    assert!(told("of the photons still flying") && told("the base"), "{sentences:?}");
+    assert!(told("of the photons still flying") && told("is bias") && told("the base"), "{sentences:?}");
 }
 
 /// Photons on a floor below a point and a disc; a factor forgotten would be no noise.

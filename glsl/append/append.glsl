@@ -10,8 +10,6 @@
 //       written, and the caller counts it as dropped.
 //
 // counters[0] is the length of the photon map, counters[1 + k] the number of paths entering bounce k.
-// Counters run on when an array is full: readers take the smaller of counter and capacity.
+// The first runs on when the map is full: readers take the smaller of counter and capacity.
 
-layout(set = 1, binding = 0, scalar) readonly buffer Paths { Path paths[]; };
-layout(set = 1, binding = 1, scalar) writeonly buffer NextPaths { Path next_paths[]; };
 layout(set = 1, binding = 3, scalar) buffer Counters { uint counters[]; };

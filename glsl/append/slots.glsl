@@ -20,6 +20,6 @@ bool append_survivor(uint index, Photon photon, Path path, bool alive)
     if (slot < push.photon_capacity) {
         store_photon(slot, photon);
     }
-    next_paths[index] = path;
+    store_path(index, path);
     return stored;
 }

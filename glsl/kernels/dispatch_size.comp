@@ -1,6 +1,6 @@
 // Turns a counter on the device into the size of the next indirect dispatch, so that the host need
 // not wait for it.
-// Dispatched by src/trace.rs, src/index.rs and src/transport/photons.rs as one thread.
+// Dispatched by src/index.rs and src/transport/photons.rs as one thread.
 #version 460
 #extension GL_GOOGLE_include_directive : require
 #extension GL_EXT_scalar_block_layout : require
@@ -11,11 +11,10 @@ layout(push_constant, scalar) uniform Push { DispatchSizePush push; };
 layout(set = 1, binding = 0, scalar) readonly buffer Counters { uint counters[]; };
 layout(set = 1, binding = 1, scalar) writeonly buffer Sizes { DispatchArgs dispatch_args[]; };
 
+#include "dispatch_size.glsl"
+
 void main()
 {
     uint item_count = min(counters[push.counter], push.capacity);
-    uint group_count = item_count / push.items_per_group + (item_count % push.items_per_group == 0 ? 0 : 1);
-    uint columns = min(group_count, push.max_groups);
-    uint rows = columns == 0 ? 0 : (group_count + columns - 1) / columns;
-    dispatch_args[0] = DispatchArgs(columns, rows, 1);
+    dispatch_args[0] = dispatch_size(item_count, push.items_per_group, push.max_groups);
 }

@@ -8,7 +8,7 @@
 layout(local_size_x_id = 0) in;
 layout(push_constant, scalar) uniform Push { EmitPush push; };
 layout(set = 0, binding = 1, scalar) readonly buffer Walls { Wall walls[]; };
-layout(set = 1, binding = 1, scalar) writeonly buffer Paths { Path paths[]; };
+layout(set = 1, binding = 1, scalar) writeonly buffer Paths { uvec4 paths[]; };
 
 #include "math.glsl"
 #include "oddities.glsl"
@@ -16,12 +16,16 @@ layout(set = 1, binding = 1, scalar) writeonly buffer Paths { Path paths[]; };
 #include "rng.glsl"
 #include "sampling.glsl"
 #include "emission.glsl"
+#include "path.glsl"
 #include "stages/leave_light.glsl"
 
 void main()
 {
     uint index = invocation_index();
     if (index < push.range.count) {
-        paths[push.path_offset + index] = leave_light(index, push.range);
+        uvec4[PATH_WORDS] words = pack_path(leave_light(index, push.range));
+        for (uint k = 0; k < PATH_WORDS; k++) {
+            paths[path_word(k, push.path_offset + index, push.path_capacity)] = words[k];
+        }
     }
 }

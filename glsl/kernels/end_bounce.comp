@@ -1,5 +1,6 @@
-// Counts the survivors that keep_order.comp has moved: length of the photon map, and paths entering the next bounce.
-// Dispatched by src/trace/in_order.rs once a bounce, as one thread.
+// Counts the survivors of a bounce once all have their places: length of the photon map, paths entering the next bounce,
+// and the size of its dispatch.
+// Dispatched by src/trace.rs once a bounce, as one thread.
 #version 460
 #extension GL_GOOGLE_include_directive : require
 #extension GL_EXT_scalar_block_layout : require
@@ -7,13 +8,18 @@
 
 layout(local_size_x = 1) in;
 layout(push_constant, scalar) uniform Push { EndBouncePush push; };
-layout(set = 1, binding = 0, scalar) readonly buffer Survivors { uint survivors[]; };
-layout(set = 1, binding = 1, scalar) buffer Counters { uint counters[]; };
+layout(set = 1, binding = 0, scalar) buffer Counters { uint counters[]; };
+layout(set = 1, binding = 1, scalar) writeonly buffer Sizes { DispatchArgs dispatch_args[]; };
+
+#include "dispatch_size.glsl"
 
 void main()
 {
-    uint survivor_count = survivors[push.total];
+    uint survivor_count = counters[2 + push.bounce];
     uint room = push.photon_capacity - min(counters[0], push.photon_capacity);
+    // Those that found no room took the last places, so that no gap arose.
+    uint path_count = min(survivor_count, room);
     counters[0] += survivor_count;
-    counters[2 + push.bounce] = min(survivor_count, room);
+    counters[2 + push.bounce] = path_count;
+    dispatch_args[0] = dispatch_size(path_count, push.items_per_group, push.max_groups);
 }

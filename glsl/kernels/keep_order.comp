@@ -16,6 +16,8 @@ layout(set = 1, binding = 4, scalar) buffer Tallies { Tally tallies[]; };
 #include "bsdf.glsl"
 #include "tally.glsl"
 #include "photon.glsl"
+#include "path.glsl"
+#include "append/paths.glsl"
 #include "append/group_prefix.glsl"
 #include "append/store.glsl"
 #include "stages/keep_order.glsl"

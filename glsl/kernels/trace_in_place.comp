@@ -20,6 +20,8 @@ layout(set = 1, binding = 4, scalar) buffer Tallies { Tally tallies[]; };
 #include "bsdf.glsl"
 #include "tally.glsl"
 #include "photon.glsl"
+#include "path.glsl"
+#include "append/paths.glsl"
 #include "append/group_prefix.glsl"
 #include "stages/bounce.glsl"
 #include "stages/trace_in_place.glsl"

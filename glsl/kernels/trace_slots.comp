@@ -20,6 +20,8 @@ layout(set = 1, binding = 4, scalar) buffer Tallies { Tally tallies[]; };
 #include "bsdf.glsl"
 #include "tally.glsl"
 #include "photon.glsl"
+#include "path.glsl"
+#include "append/paths.glsl"
 #include "append/append.glsl"
 #include "append/store.glsl"
 #include "append/slots.glsl"

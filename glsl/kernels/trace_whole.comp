@@ -22,6 +22,7 @@ layout(set = 1, binding = 4, scalar) buffer Tallies { Tally tallies[]; };
 #include "emission.glsl"
 #include "tallies.glsl"
 #include "photon.glsl"
+#include "path.glsl"
 #include "append/ballot.glsl"
 #include "append/store.glsl"
 #include "stages/bounce.glsl"

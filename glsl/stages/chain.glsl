@@ -130,7 +130,7 @@ void follow(inout Chain chain, uint index, uint number, Draws draws, uint emitte
         if (ends) {
             return;
         }
-        uint count = SAMPLES; // what reflects the kernels cannot compare a specialization constant to less or more
+        uint count = SAMPLES; // build.rs cannot reflect a constant that is compared with `>=`
         vec3 u = stratified(number, count, words_of(index, block, draws)).zxy;
         float mirror_chance = 0.0;
         if (count >= MIRROR_SAMPLES && specular && depth < 2 && !chain.gathers) {

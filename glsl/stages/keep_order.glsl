@@ -1,21 +1,15 @@
 // Moves the survivors of a bounce together, in the order of their paths, into the photon map and the outgoing paths.
-// survivors[g] = survivors in the work groups before g, which are those of stages/trace_in_place.glsl.
+// survivors[g] = survivors in the work groups before g, which are those of stages/trace_in_place.glsl; behind the last
+// group stands the number of all.
 
-layout(set = 1, binding = 0, scalar) readonly buffer Paths { Path paths[]; };
-layout(set = 1, binding = 1, scalar) writeonly buffer NextPaths { Path next_paths[]; };
-layout(set = 1, binding = 3, scalar) readonly buffer Counters { uint counters[]; };
+layout(set = 1, binding = 3, scalar) buffer Counters { uint counters[]; };
 layout(set = 1, binding = 5, scalar) readonly buffer Survivors { uint survivors[]; };
 layout(set = 1, binding = 6, scalar) readonly buffer Weights { float weights[]; };
 
 void keep_order()
 {
     uint index = invocation_index();
-    Path path;
-    path.wall = NO_WALL;
-    if (index < min(counters[1 + push.bounce], push.path_capacity)) {
-        path = paths[index];
-    }
-    bool alive = path.wall != NO_WALL;
+    bool alive = index < min(counters[1 + push.bounce], push.path_capacity) && has_path(index);
     GroupPrefix prefix = prefix_in_group(alive);
     bool stored = false;
     if (alive) {
@@ -23,14 +17,18 @@ void keep_order()
         uint place = counters[0] + path_place;
         stored = place < push.photon_capacity;
         if (stored) {
+            Path path = incoming_path(index);
             float weight = 1.0;
             if (HAS_PHONG) {
                 weight = weights[index];
             }
             store_photon(place, Photon(path.position, path.wall, path.flux, weight, path.photon, push.bounce));
-            // Those that find no room are the last, so that no gap arises.
-            next_paths[path_place] = path;
+            store_path(path_place, path);
         }
+    }
+    if (index == 0) {
+        uint group_count = (push.path_capacity + gl_WorkGroupSize.x - 1) / gl_WorkGroupSize.x;
+        counters[2 + push.bounce] = survivors[group_count];
     }
     tally(push.bounce, stored, false, false, alive && !stored);
 }

@@ -6,7 +6,7 @@ void trace_bounce()
     Path path;
     Bounced bounced = no_bounce();
     if (index < incoming_count(push.bounce)) {
-        path = paths[index];
+        path = incoming_path(index);
         if (path.wall != NO_WALL) {
             bounced = bounce_path(path, push.bounce);
         }

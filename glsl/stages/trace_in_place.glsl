@@ -1,7 +1,6 @@
-// One bounce of every path, which stays where it is: the dead leave gaps, and each work group counts its survivors.
+// One bounce of every path, which stays where it is (both arrays are one): the dead leave gaps, and each work group counts its survivors.
 // After a prefix sum over these counts stages/keep_order.glsl moves the survivors together.
 
-layout(set = 1, binding = 0, scalar) buffer Paths { Path paths[]; };
 layout(set = 1, binding = 6, scalar) writeonly buffer Weights { float weights[]; };
 layout(set = 1, binding = 3, scalar) readonly buffer Counters { uint counters[]; };
 layout(set = 1, binding = 5, scalar) writeonly buffer Survivors { uint survivors[]; };
@@ -12,12 +11,13 @@ void trace_in_place()
     bool entered = index < min(counters[1 + push.bounce], push.path_capacity);
     Bounced bounced = no_bounce();
     if (entered) {
-        Path path = paths[index];
+        Path path = incoming_path(index);
         bounced = bounce_path(path, push.bounce);
-        if (!bounced.alive) {
-            path.wall = NO_WALL;
+        if (bounced.alive) {
+            store_path(index, path);
+        } else {
+            store_dead_path(index);
         }
-        paths[index] = path;
         // All else of a photon is in its path.
         if (HAS_PHONG) {
             weights[index] = bounced.photon.weight;

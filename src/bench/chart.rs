@@ -25,7 +25,7 @@ fn draw(area: &DrawingArea<SVGBackend, Shift>, series: &Series) -> Drawn<()> {
     let y = decades(series.steps.iter().flat_map(|step| step.passes.iter().map(|pass| pass.ms.median.max(1e-6))));
     let mut chart = ChartBuilder::on(&plane)
         .margin(14)
-        .margin_right(40)
+        .margin_right(64)
         .x_label_area_size(52)
         .y_label_area_size(84)
         .build_cartesian_2d(x.log_scale(), y.log_scale())?;

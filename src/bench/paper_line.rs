@@ -9,10 +9,11 @@ use super::rates::{self, PHILOX_PRODUCTS, Rates};
 use crate::error::{Error, Result};
 use crate::gpu::{Gpu, HeldMemory};
 use crate::ledger::Fates;
+use crate::path::StoredPath;
 use crate::photon::StoredPhoton;
 use crate::plan::Plan;
 use crate::plan::memory::{block_sum_counts, group_count};
-use crate::records::{Path, Point};
+use crate::records::Point;
 use crate::render::{self, Control, Outcome};
 use crate::rng::Rng;
 use crate::scene::open_box::open_box;
@@ -195,7 +196,7 @@ pub fn work(pass: &str, plan: &Plan, counts: &Counts, found: f64) -> Option<Work
     // Entries of the map that the index reads: the naive builder's with the empty ones.
     let entries = if plan.has_slots() { slots } else { counts.survivors };
     // Where an invocation keeps a photon to its end, no path is written and read again.
-    let path = if settings.variant == Variant::Persistent { 0.0 } else { bytes::<Path>() };
+    let path = if settings.variant == Variant::Persistent { 0.0 } else { bytes::<StoredPath>() };
     let emit = Cost {
         bytes: counts.emitted * (path + if settings.rng == Rng::Rand48 { 8.0 } else { 0.0 }),
         float_operations: counts.emitted * EMISSION_OPERATIONS,
@@ -204,9 +205,10 @@ pub fn work(pass: &str, plan: &Plan, counts: &Counts, found: f64) -> Option<Work
     let bounces = Cost {
         bytes: match settings.variant {
             // Every slot is read and written at every bounce, alive or not.
-            Variant::Naive => slots * (2.0 * bytes::<Path>() + bytes::<StoredPhoton>()),
-            // Paths are written where they were read, and read again once their places are known.
-            Variant::Scan => counts.flights * 3.0 * path + counts.survivors * (path + bytes::<StoredPhoton>()),
+            Variant::Naive => slots * (2.0 * bytes::<StoredPath>() + bytes::<StoredPhoton>()),
+            // Survivors' paths are written where they were read, and read again once their places are known; of the dead
+            // only the word is read that says so.
+            Variant::Scan => counts.flights * (path + 16.0) + counts.survivors * (3.0 * path - 16.0 + bytes::<StoredPhoton>()),
             _ => counts.flights * path + counts.survivors * (path + bytes::<StoredPhoton>()),
         },
         float_operations: counts.flights * FLIGHT_OPERATIONS,
@@ -234,9 +236,11 @@ pub fn work(pass: &str, plan: &Plan, counts: &Counts, found: f64) -> Option<Work
     let scans_of = |items: u32| 2.0 * block_sum_counts(u64::from(items) + 1, settings.group_size).len() as f64 - 1.0;
     let flights = match settings.variant {
         Variant::Persistent => 0.0,
+        Variant::Naive => chunks * bounce_count,
         // In place, moved together in order, and counted.
-        Variant::Scan => chunks * (bounce_count * (3.0 + scans_of(group_count(plan))) + sized(bounce_count - 1.0)),
-        _ => chunks * (bounce_count + sized(bounce_count - 1.0)),
+        Variant::Scan => chunks * bounce_count * (3.0 + scans_of(group_count(plan))),
+        // Stored where they belong, and counted.
+        _ => chunks * bounce_count * 2.0,
     };
     let scans = chunks * scans_of(plan.grid.cells());
     let counting = chunks * (1.0 + sized(1.0));

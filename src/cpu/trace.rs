@@ -17,9 +17,10 @@ use super::emission::emit_from_disc;
 use super::room::{intersect_room, wall_frame};
 use super::sampling::{sample_cosine_hemisphere, to_world};
 use crate::constants::FACE_COUNT;
+use crate::path::Path;
 use crate::photon::Photon;
 use crate::plan::{EmissionRange, Plan};
-use crate::records::{DiscLight, Path, RandomKey, Room, Tally, Wall};
+use crate::records::{DiscLight, RandomKey, Room, Tally, Wall};
 use crate::rng::{self, Rng, words};
 use crate::scene::room::RoomScene;
 

@@ -5,8 +5,8 @@ use serde::Serialize;
 
 use crate::constants::{LOOP_LIMIT, MT_MIDDLE};
 use crate::error::{Error, Result};
+use crate::path::StoredPath;
 use crate::photon::{Origin, StoredPhoton};
-use crate::records::Path;
 use crate::rng::Rng;
 use crate::scene::room::RoomScene;
 use crate::settings::{Gather, Settings, Sums, Variant};
@@ -213,7 +213,7 @@ pub(super) fn loops_to_begin(rng: Rng) -> u32 {
 /// can never be full: a round that does not fit is split here, and nothing is dropped there.
 pub fn chunk_photons(settings: &Settings, limits: &Limits, work: &Work) -> Result<u32> {
     let bounces = u64::from(settings.bounces);
-    let path = size_of::<Path>() as u64;
+    let path = size_of::<StoredPath>() as u64;
     let by_buffer = (limits.buffer_bytes / path).min(limits.buffer_bytes / (PHOTON_BYTES * bounces));
     // Two path arrays, the photon map with the names that somebody may ask for, and its sorted copy.
     let copy = if settings.gather == Gather::KdTree { TREE_BYTES } else { PHOTON_BYTES + RANK_BYTES };

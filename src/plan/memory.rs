@@ -7,6 +7,7 @@ use glam::UVec2;
 use super::Plan;
 use super::transport::{MapPlan, Sensor, TransportPlan};
 use crate::constants::{FACE_COUNT, MAX_ODDITIES, ODD_ESTIMATE, PART_COUNT, SCAN_ITEMS, TREE_LEAF, TREE_RUN};
+use crate::path::StoredPath;
 use crate::photon::{MapPhoton, Origin, StoredPhoton};
 use crate::records::*;
 use crate::scene::geometry::Geometry;
@@ -68,7 +69,7 @@ impl Plan {
             ("lights", array::<DiscLight>(self.light_photons.len() as u64)),
             ("points", array::<Point>(points)),
             ("stream seeds", array::<UVec2>(self.streams().first_state_count(self.path_capacity))),
-            ("paths", 2 * array::<Path>(paths)),
+            ("paths", 2 * array::<StoredPath>(paths)),
             ("photons", array::<StoredPhoton>(photons)),
             ("origins", array::<Origin>(origins)),
             ("counters", array::<u32>(bounces + 2)),

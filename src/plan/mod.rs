@@ -246,9 +246,9 @@ impl Plan {
         photons.clamp(1, u64::from(u32::MAX)) as u32
     }
 
-    /// Paths that one bounce hands to the next: none where each photon has an invocation to its end.
+    /// Paths that one bounce hands to the next; where each photon has an invocation to its end, the one that a replay starts.
     pub fn path_array_length(&self) -> u32 {
-        if self.settings.variant == Variant::Persistent { 0 } else { self.path_capacity }
+        if self.settings.variant == Variant::Persistent { 1 } else { self.path_capacity }
     }
 
     /// Entries of the photon map that say which photon they are.

@@ -22,9 +22,9 @@ use crate::film::Film;
 use crate::gpu::DeviceFacts;
 use crate::ledger::{Fates, Ledger};
 use crate::oddities::Oddities;
+use crate::path::Path;
 use crate::photon::Photon;
 use crate::plan::Plan;
-use crate::records::Path;
 use crate::timings::Timings;
 use stop::End;
 

@@ -12,13 +12,14 @@ use crate::gpu::check::strict_math;
 use crate::gpu::{Commands, Constants, DeviceFacts, Gpu};
 use crate::ledger::fate;
 use crate::oddities::Oddities;
+use crate::path::StoredPath;
 use crate::photon::{Origin, Photon, StoredPhoton};
 use crate::plan::{EmissionRange, Limits, Plan, photons_of};
-use crate::records::{Path, Tally};
+use crate::records::Tally;
 use crate::resources::{Resources, RoundBuffers};
 use crate::scene::room::RoomScene;
 use crate::settings::{Math, Settings};
-use crate::{estimate, index, trace};
+use crate::{estimate, index, path, trace};
 
 /// Runs on the GPU.
 pub fn on_gpu(gpu: &Gpu, scene: &RoomScene, settings: &Settings, control: &mut Control) -> Result<Outcome> {
@@ -182,7 +183,7 @@ pub fn replay_on_gpu(gpu: &Gpu, scene: &RoomScene, settings: &Settings, round: u
     let mut commands = Commands::new(gpu, constants(&plan), Instant::now())?;
     let resources = Resources::new(gpu, &mut commands, scene, &plan)?;
     trace::emit(&mut commands, &resources, &plan, round, &ranges)?;
-    let start = commands.read::<Path>(&resources.paths[0], 1)?[0];
+    let start = path::unpack(&commands.read::<StoredPath>(&resources.paths[0], plan.path_array_length() as usize)?, 0);
     let stored = stored(&mut commands, &resources, scene, &plan, round, &ranges)?;
     let tallies: Vec<Tally> = commands.read(&resources.tallies, settings.bounces as usize)?;
     let oddities = if settings.paranoid { Some(Oddities::read(&mut commands, &resources.oddities)?) } else { None };

@@ -1,12 +1,12 @@
 //! A bounce whose survivors keep their order, by prefix sums: reduce, then scan.
 
 use crate::error::Result;
-use crate::gpu::kernels::{EndBounce, KeepOrder, TraceInPlace};
+use crate::gpu::kernels::{KeepOrder, TraceInPlace};
 use crate::gpu::{Buffer, Commands, Extent};
 use crate::plan::Plan;
 use crate::plan::memory::group_count;
 use crate::prefix_sum::scan;
-use crate::records::{EndBouncePush, TracePush};
+use crate::records::TracePush;
 use crate::resources::{OrderBuffers, Resources};
 
 /// Survivors are counted by work group, the counts summed, and the survivors moved to where they belong.
@@ -23,9 +23,11 @@ pub fn one_bounce<'a>(
     let group_count = group_count(plan);
     // Groups that no path is left for count none, and so does the place behind the last, which becomes the sum of all.
     commands.fill(survivors, 0, u64::from(group_count) + 1, 0);
-    commands.dispatch(TraceInPlace { rooms, walls, paths, weights, counters, tallies, survivors, oddities }, push, extent())?;
+    commands.dispatch(
+        TraceInPlace { rooms, walls, paths, next_paths: paths, weights, counters, tallies, survivors, oddities },
+        push,
+        extent(),
+    )?;
     scan(commands, survivors, block_sums, group_count + 1, plan.settings.group_size)?;
-    commands.dispatch(KeepOrder { paths, next_paths, photons, origins, counters, tallies, survivors, weights }, push, extent())?;
-    let end = EndBouncePush { bounce: push.bounce, total: group_count, photon_capacity: push.photon_capacity };
-    commands.dispatch(EndBounce { survivors, counters }, &end, Extent::Groups(1, 1))
+    commands.dispatch(KeepOrder { paths, next_paths, photons, origins, counters, tallies, survivors, weights }, push, extent())
 }
