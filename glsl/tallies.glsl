@@ -20,10 +20,10 @@ void open_tallies()
 void count_on_device(uint bounce, uint fate, uint count)
 {
     switch (fate) {
-        case FATE_STORED: atomicAdd(tallies[bounce].stored, count); break;
-        case FATE_ABSORBED: atomicAdd(tallies[bounce].absorbed, count); break;
-        case FATE_ESCAPED: atomicAdd(tallies[bounce].escaped, count); break;
-        default: atomicAdd(tallies[bounce].dropped, count);
+        case FATE_STORED: atomicAdd(tallies[tally_copy(bounce)].stored, count); break;
+        case FATE_ABSORBED: atomicAdd(tallies[tally_copy(bounce)].absorbed, count); break;
+        case FATE_ESCAPED: atomicAdd(tallies[tally_copy(bounce)].escaped, count); break;
+        default: atomicAdd(tallies[tally_copy(bounce)].dropped, count);
     }
 }
 

@@ -22,9 +22,10 @@ void tally(uint bounce, bool stored, bool absorbed, bool escaped, bool dropped)
     }
     barrier();
     if (gl_LocalInvocationIndex == 0) {
-        if (group_tally[0] != 0) atomicAdd(tallies[bounce].stored, group_tally[0]);
-        if (group_tally[1] != 0) atomicAdd(tallies[bounce].absorbed, group_tally[1]);
-        if (group_tally[2] != 0) atomicAdd(tallies[bounce].escaped, group_tally[2]);
-        if (group_tally[3] != 0) atomicAdd(tallies[bounce].dropped, group_tally[3]);
+        uint copy = tally_copy(bounce);
+        if (group_tally[0] != 0) atomicAdd(tallies[copy].stored, group_tally[0]);
+        if (group_tally[1] != 0) atomicAdd(tallies[copy].absorbed, group_tally[1]);
+        if (group_tally[2] != 0) atomicAdd(tallies[copy].escaped, group_tally[2]);
+        if (group_tally[3] != 0) atomicAdd(tallies[copy].dropped, group_tally[3]);
     }
 }

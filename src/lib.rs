@@ -102,6 +102,7 @@ pub mod scene;
 pub mod selfcheck;
 pub mod settings;
 pub mod study;
+pub mod tallies;
 pub mod timings;
 pub mod trace;
 pub mod transport;

@@ -9,9 +9,10 @@ use crate::photon::{Origin, StoredPhoton};
 use crate::plan::Plan;
 use crate::plan::memory::{group_count, searches_at_once, tree_count_capacity};
 use crate::prefix_sum::block_sums;
-use crate::records::{self, DispatchArgs, Point, Search, Tally};
+use crate::records::{self, DispatchArgs, Point, Search};
 use crate::scene::room::RoomScene;
 use crate::settings::Variant;
+use crate::tallies;
 use glam::UVec2;
 
 pub struct Resources {
@@ -29,10 +30,12 @@ pub struct Resources {
     pub origins: Buffer,
     /// Length of the photon map, then the paths entering each bounce.
     pub counters: Buffer,
+    /// Photons stored by the bounces so far, and paths that enter the next.
+    pub progress: Buffer,
     pub dispatch_args: Buffer,
     /// What keeps photons in order; `None` where they come as they do.
     pub order: Option<OrderBuffers>,
-    // Ledger of the submission under way, one tally a bounce.
+    /// Ledger of the submission under way; see `tallies`.
     pub tallies: Buffer,
     /// The grid; `None` where the gather has another index or none.
     pub index: Option<IndexBuffers>,
@@ -129,9 +132,10 @@ impl Resources {
             photons: gpu.buffer::<StoredPhoton>("photons", photons, device)?,
             origins: gpu.buffer::<Origin>("origins", u64::from(plan.origin_array_length()), device)?,
             counters: gpu.buffer::<u32>("counters", bounces + 2, device)?,
+            progress: gpu.buffer::<u32>("progress", 2, device)?,
             dispatch_args: gpu.buffer::<DispatchArgs>("dispatch args", 1, device)?,
             order: if plan.settings.variant == Variant::Scan { Some(OrderBuffers::new(gpu, plan)?) } else { None },
-            tallies: gpu.buffer::<Tally>("tallies", bounces, device)?,
+            tallies: tallies::buffer(gpu, "tallies", plan.settings.bounces)?,
             index: if plan.gathers_by_grid() { Some(IndexBuffers::new(gpu, plan)?) } else { None },
             tree: if plan.gathers_by_tree() { Some(TreeBuffers::new(gpu, plan)?) } else { None },
             film: gpu.buffer::<u64>("film", sums, device)?,
@@ -144,7 +148,7 @@ impl Resources {
         commands.upload(&resources.points, &plan.points)?;
         commands.upload(&resources.stream_seeds, &seeds)?;
         commands.fill(&resources.film, 0, 2 * sums, 0);
-        commands.fill(&resources.tallies, 0, 4 * bounces, 0);
+        tallies::clear(commands, &resources.tallies);
         Ok(resources)
     }
 }

@@ -35,6 +35,8 @@ pub fn chunk(commands: &mut Commands, resources: &Resources, plan: &Plan, round:
     commands.scope("build", |commands| {
         commands.fill(&resources.counters, 0, u64::from(plan.settings.bounces) + 2, 0);
         commands.fill(&resources.counters, 1, 1, photon_count);
+        commands.fill(&resources.progress, 0, 1, 0);
+        commands.fill(&resources.progress, 1, 1, photon_count);
         commands.add_work(plan.work.tracing(photon_count));
         if plan.settings.variant == Variant::Persistent {
             return whole(commands, resources, plan, round, ranges);
@@ -131,7 +133,7 @@ fn one_bounce(commands: &mut Commands, resources: &Resources, plan: &Plan, round
     };
     let [even, odd] = &resources.paths;
     let (paths, next_paths) = if bounce.is_multiple_of(2) { (even, odd) } else { (odd, even) };
-    let Resources { rooms, walls, photons, origins, counters, tallies, oddities, .. } = resources;
+    let Resources { rooms, walls, photons, origins, counters, progress, tallies, oddities, .. } = resources;
     match variant {
         Variant::Naive => commands.dispatch(
             TraceSlots { rooms, walls, paths, next_paths, photons, origins, counters, tallies, oddities },
@@ -139,17 +141,17 @@ fn one_bounce(commands: &mut Commands, resources: &Resources, plan: &Plan, round
             extent(),
         ),
         Variant::Atomic => commands.dispatch(
-            TraceAtomic { rooms, walls, paths, next_paths, photons, origins, counters, tallies, oddities },
+            TraceAtomic { rooms, walls, paths, next_paths, photons, origins, counters, progress, tallies, oddities },
             &push,
             extent(),
         ),
         Variant::Ballot => commands.dispatch(
-            TraceBallot { rooms, walls, paths, next_paths, photons, origins, counters, tallies, oddities },
+            TraceBallot { rooms, walls, paths, next_paths, photons, origins, counters, progress, tallies, oddities },
             &push,
             extent(),
         ),
         Variant::Group => commands.dispatch(
-            TraceGroup { rooms, walls, paths, next_paths, photons, origins, counters, tallies, oddities },
+            TraceGroup { rooms, walls, paths, next_paths, photons, origins, counters, progress, tallies, oddities },
             &push,
             extent(),
         ),
@@ -161,5 +163,5 @@ fn one_bounce(commands: &mut Commands, resources: &Resources, plan: &Plan, round
     }
     let end =
         EndBouncePush { bounce, photon_capacity: push.photon_capacity, items_per_group: plan.settings.group_size, max_groups: MAX_GROUPS };
-    commands.dispatch(EndBounce { counters, dispatch_args: &resources.dispatch_args }, &end, Extent::Groups(1, 1))
+    commands.dispatch(EndBounce { counters, progress, dispatch_args: &resources.dispatch_args }, &end, Extent::Groups(1, 1))
 }

@@ -22,7 +22,7 @@ use photonmill::rng::Rng;
 use photonmill::scene::open_box::open_box;
 use photonmill::scene::room::{RoomScene, Wall};
 use photonmill::settings::{Settings, Variant};
-use photonmill::{index, trace};
+use photonmill::{index, tallies, trace};
 
 /// Words that nothing may touch. As an entry of the photon map they are an empty slot.
 const GUARD: u32 = 0xDEAD_BEEF;
@@ -260,7 +260,7 @@ fn append(gpu: &Device, scene: &RoomScene, settings: &Settings, capacity: u32) -
         photons: map.iter().zip(origins).map(|(photon, origin)| photon.photon(*origin, &scene.room_record())).collect(),
         guards,
         counters: commands.read(&resources.counters, bounces as usize + 2).unwrap(),
-        tallies: commands.read(&resources.tallies, bounces as usize).unwrap(),
+        tallies: tallies::read(&mut commands, &resources.tallies, bounces).unwrap(),
     }
 }
 

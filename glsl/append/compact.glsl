@@ -6,16 +6,19 @@
 //       that are there (stages/trace_whole.glsl); the next free place that `counter`
 //       counts, for those that want one.
 
+// Apart from the counters, so that what every invocation reads lies in no cache line that atomics change: photons that the
+// bounces before this one stored, and paths that enter it.
+layout(set = 1, binding = 8, scalar) readonly buffer Progress { uint progress[]; };
+
 uint incoming_count(uint bounce)
 {
-    return min(counters[1 + bounce], push.path_capacity);
+    return progress[1];
 }
 
 bool append_survivor(uint index, Photon photon, Path path, bool alive)
 {
     uint path_place = take_place(2 + push.bounce, alive);
-    // The photons of earlier bounces come first; kernels/end_bounce.comp counts this one's once all are there.
-    uint photon_place = counters[0] + path_place;
+    uint photon_place = progress[0] + path_place;
     bool stored = alive && photon_place < push.photon_capacity;
     if (stored) {
         store_photon(photon_place, photon);

@@ -19,6 +19,7 @@ layout(set = 1, binding = 4, scalar) buffer Tallies { Tally tallies[]; };
 #include "dispatch.glsl"
 #include "philox.glsl"
 #include "sampling.glsl"
+#include "tally_copy.glsl"
 #include "tally.glsl"
 #include "append/ballot.glsl"
 #include "scene/effects.glsl"

@@ -14,6 +14,7 @@ layout(set = 1, binding = 4, scalar) buffer Tallies { Tally tallies[]; };
 #include "math.glsl"
 #include "dispatch.glsl"
 #include "bsdf.glsl"
+#include "tally_copy.glsl"
 #include "tally.glsl"
 #include "photon.glsl"
 #include "path.glsl"

@@ -18,6 +18,7 @@ layout(set = 1, binding = 4, scalar) buffer Tallies { Tally tallies[]; };
 #include "sampling.glsl"
 #include "room.glsl"
 #include "bsdf.glsl"
+#include "tally_copy.glsl"
 #include "tally.glsl"
 #include "photon.glsl"
 #include "path.glsl"

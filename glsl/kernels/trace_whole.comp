@@ -20,6 +20,7 @@ layout(set = 1, binding = 4, scalar) buffer Tallies { Tally tallies[]; };
 #include "room.glsl"
 #include "bsdf.glsl"
 #include "emission.glsl"
+#include "tally_copy.glsl"
 #include "tallies.glsl"
 #include "photon.glsl"
 #include "path.glsl"

@@ -24,6 +24,6 @@ void fly()
     }
     tally(push.bounce, flown.alive, flown.absorbed, flown.escaped, false);
     if (dropped) {
-        atomicAdd(tallies[push.bounce].dropped, 1);
+        atomicAdd(tallies[tally_copy(push.bounce)].dropped, 1);
     }
 }

@@ -21,7 +21,7 @@ use crate::scene::open_box::open_box;
 use crate::scene::room::{RoomScene, Wall};
 use crate::settings::{Gather, Settings, Variant};
 use crate::timings::Spread;
-use crate::trace;
+use crate::{tallies, trace};
 
 /// What is asked for.
 #[derive(Debug, Clone, PartialEq)]
@@ -206,7 +206,7 @@ fn run(gpu: &Gpu, room: &RoomScene, settings: &Settings) -> Result<(f64, Vec<Tal
         commands.scope("chunk", |commands| trace::chunk(commands, &resources, &plan, 0, &ranges))?;
         commands.submit()?;
     }
-    let tallies = commands.read(&resources.tallies, settings.bounces as usize)?;
+    let tallies = tallies::read(&mut commands, &resources.tallies, settings.bounces)?;
     gpu.check_validation()?;
     Ok((commands.finish("compaction").best_ms("chunk").expect("the scope has run"), tallies))
 }

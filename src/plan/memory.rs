@@ -13,6 +13,7 @@ use crate::records::*;
 use crate::scene::geometry::Geometry;
 use crate::settings::Variant;
 use crate::settings::transport::Effect;
+use crate::tallies;
 
 /// A buffer, or several of one name, and all their bytes.
 pub type Stated = (&'static str, u64);
@@ -73,8 +74,9 @@ impl Plan {
             ("photons", array::<StoredPhoton>(photons)),
             ("origins", array::<Origin>(origins)),
             ("counters", array::<u32>(bounces + 2)),
+            ("progress", array::<u32>(2)),
             ("dispatch args", array::<DispatchArgs>(1)),
-            ("tallies", array::<Tally>(bounces)),
+            ("tallies", tallies::bytes(self.settings.bounces)),
             ("film", array::<u64>(sums)),
             ("oddities", array::<u32>(ODDITY_WORDS)),
         ];
@@ -178,7 +180,7 @@ pub(super) fn of_transport(plan: &TransportPlan, geometry: &Geometry, keeps: &dy
             ("ranks", array::<u32>(capacity)),
             ("block sums", block_sum_bytes(buckets + 1, plan.settings.group_size)),
             ("crowded points", array::<u32>(2 + 2 * u64::from(plan.points_at_once()))),
-            ("tallies", 2 * array::<Tally>(bounces)),
+            ("tallies", 2 * tallies::bytes(plan.settings.bounces)),
         ]);
     }
     buffers

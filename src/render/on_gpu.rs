@@ -15,11 +15,10 @@ use crate::oddities::Oddities;
 use crate::path::StoredPath;
 use crate::photon::{Origin, Photon, StoredPhoton};
 use crate::plan::{EmissionRange, Limits, Plan, photons_of};
-use crate::records::Tally;
 use crate::resources::{Resources, RoundBuffers};
 use crate::scene::room::RoomScene;
 use crate::settings::{Math, Settings};
-use crate::{estimate, index, path, trace};
+use crate::{estimate, index, path, tallies, trace};
 
 /// Runs on the GPU.
 pub fn on_gpu(gpu: &Gpu, scene: &RoomScene, settings: &Settings, control: &mut Control) -> Result<Outcome> {
@@ -132,9 +131,8 @@ fn settle(commands: &mut Commands, resources: &Resources, scene: &RoomScene, pla
     if book.open() == 0 {
         return Ok(book.end.is_some());
     }
-    let bounces = book.fates.bounces.len();
-    let tallies: Vec<Tally> = commands.read(&resources.tallies, bounces)?;
-    commands.fill(&resources.tallies, 0, 4 * bounces as u64, 0);
+    let tallies = tallies::read(commands, &resources.tallies, plan.settings.bounces)?;
+    tallies::clear(commands, &resources.tallies);
     if book.wants_film() {
         let film = read_film(commands, resources, plan, book)?;
         book.look(&film, scene, plan);
@@ -185,7 +183,7 @@ pub fn replay_on_gpu(gpu: &Gpu, scene: &RoomScene, settings: &Settings, round: u
     trace::emit(&mut commands, &resources, &plan, round, &ranges)?;
     let start = path::unpack(&commands.read::<StoredPath>(&resources.paths[0], plan.path_array_length() as usize)?, 0);
     let stored = stored(&mut commands, &resources, scene, &plan, round, &ranges)?;
-    let tallies: Vec<Tally> = commands.read(&resources.tallies, settings.bounces as usize)?;
+    let tallies = tallies::read(&mut commands, &resources.tallies, settings.bounces)?;
     let oddities = if settings.paranoid { Some(Oddities::read(&mut commands, &resources.oddities)?) } else { None };
     gpu.check_validation()?;
     Ok(Replayed { start, stored, fate: fate(&tallies), oddities })

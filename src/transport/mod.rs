@@ -35,7 +35,7 @@ use crate::gpu::{Commands, Constants, DeviceFacts, Gpu, Kernel, Module};
 use crate::ledger::Fates;
 use crate::oddities::Oddities;
 use crate::plan::transport::{MapPlan, Sensor, TransportPlan};
-use crate::records::{Receiver, Tally};
+use crate::records::Receiver;
 use crate::render::Control;
 pub use crate::render::stop::End;
 use crate::render::stop::Watch;
@@ -43,6 +43,7 @@ use crate::scene::Camera;
 use crate::scene::geometry::Geometry;
 use crate::settings::Math;
 use crate::settings::transport::Append;
+use crate::tallies;
 use crate::timings::{Clock, Span, Timings};
 
 /// What is lit and what looks at it.
@@ -233,12 +234,11 @@ fn settle(
     rounds: u64,
     fates: &mut [Fates; 2],
 ) -> Result<()> {
-    let bounces = plan.settings.bounces as usize;
     for map in plan.maps() {
         let which = usize::from(map.caustic_only);
         let tallies = &resources.photons.as_ref().expect("a map has photons").tallies[which];
-        let counts: Vec<Tally> = commands.read(tallies, bounces)?;
-        commands.fill(tallies, 0, 4 * bounces as u64, 0);
+        let counts = tallies::read(commands, tallies, plan.settings.bounces)?;
+        tallies::clear(commands, tallies);
         fates[which].add(rounds * u64::from(map.photons), &counts);
         let ledger = fates[which].ledger();
         if !ledger.closes() || ledger.dropped != 0 {

@@ -15,6 +15,7 @@ use crate::plan::transport::{MapPlan, TransportPlan};
 use crate::records::{LightPath, Tally};
 use crate::scene::geometry::Geometry;
 use crate::settings::Math;
+use crate::tallies;
 
 /// Which photon.
 #[derive(Debug, Clone, Copy, PartialEq, Eq)]
@@ -97,7 +98,7 @@ pub fn light_paths(
     let mut left = chunk.1;
     for bounce in 0..flights {
         photons::fly(&mut commands, round, buffers, map, bounce, Extent::Items(u64::from(left)))?;
-        tallies = commands.read(&buffers.tallies[usize::from(map.caustic_only)], bounce as usize + 1)?;
+        tallies = tallies::read(&mut commands, &buffers.tallies[usize::from(map.caustic_only)], bounce + 1)?;
         left = tallies[bounce as usize].stored;
         if left == 0 {
             break;

@@ -13,6 +13,7 @@ use crate::prefix_sum::block_sums;
 use crate::records::*;
 use crate::scene::geometry::Geometry;
 use crate::settings::transport::Effect;
+use crate::tallies;
 
 pub struct TransportResources {
     // The scene, written once; what the plan dropped has one empty element.
@@ -131,10 +132,13 @@ impl PhotonBuffers {
             ranks: gpu.buffer::<u32>("ranks", capacity, device)?,
             block_sums: block_sums(gpu, buckets + 1, plan.settings.group_size)?,
             crowded: gpu.buffer::<u32>("crowded points", 2 + 2 * u64::from(plan.points_at_once()), device)?,
-            tallies: [gpu.buffer::<Tally>("global tallies", bounces, device)?, gpu.buffer::<Tally>("caustic tallies", bounces, device)?],
+            tallies: [
+                tallies::buffer(gpu, "global tallies", plan.settings.bounces)?,
+                tallies::buffer(gpu, "caustic tallies", plan.settings.bounces)?,
+            ],
         };
         for tallies in &buffers.tallies {
-            commands.fill(tallies, 0, 4 * bounces, 0);
+            tallies::clear(commands, tallies);
         }
         Ok(buffers)
     }

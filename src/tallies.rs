@@ -1,0 +1,35 @@
+//! Fates of paths while kernels count them: a tally for each bounce in `TALLY_COPIES` copies, a work group's choice of them.
+
+use crate::constants::TALLY_COPIES;
+use crate::error::Result;
+use crate::gpu::{Buffer, Commands, Gpu, Memory};
+use crate::records::Tally;
+
+/// Bytes of the tallies of so many bounces.
+pub fn bytes(bounces: u32) -> u64 {
+    u64::from(bounces) * u64::from(TALLY_COPIES) * size_of::<Tally>() as u64
+}
+
+pub fn buffer(gpu: &Gpu, name: &'static str, bounces: u32) -> Result<Buffer> {
+    gpu.buffer::<Tally>(name, u64::from(bounces) * u64::from(TALLY_COPIES), Memory::Device)
+}
+
+pub fn clear(commands: &mut Commands, tallies: &Buffer) {
+    commands.fill(tallies, 0, tallies.size_bytes() / 4, 0);
+}
+
+/// Fates of the first bounces, copies added up.
+pub fn read(commands: &mut Commands, tallies: &Buffer, bounces: u32) -> Result<Vec<Tally>> {
+    let copies = commands.read::<Tally>(tallies, (bounces * TALLY_COPIES) as usize)?;
+    Ok(copies.chunks_exact(TALLY_COPIES as usize).map(sum).collect())
+}
+
+fn sum(copies: &[Tally]) -> Tally {
+    let all = |fate: fn(&Tally) -> u32| copies.iter().map(fate).sum();
+    Tally {
+        stored: all(|tally| tally.stored),
+        absorbed: all(|tally| tally.absorbed),
+        escaped: all(|tally| tally.escaped),
+        dropped: all(|tally| tally.dropped),
+    }
+}
