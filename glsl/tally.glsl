@@ -4,15 +4,20 @@
 
 shared uint group_tally[4];
 
-// Called once by every invocation, in uniform control flow.
-void tally(uint bounce, bool stored, bool absorbed, bool escaped, bool dropped)
+// Called by the invocations of a subgroup together: of how many of their paths each is true.
+uvec4 fates(bool stored, bool absorbed, bool escaped, bool dropped)
+{
+    return uvec4(subgroupBallotBitCount(subgroupBallot(stored)), subgroupBallotBitCount(subgroupBallot(absorbed)),
+                 subgroupBallotBitCount(subgroupBallot(escaped)), subgroupBallotBitCount(subgroupBallot(dropped)));
+}
+
+// Called once by every invocation, in uniform control flow, with the counts of its subgroup.
+void tally(uint bounce, uvec4 counts)
 {
     if (gl_LocalInvocationIndex < 4) {
         group_tally[gl_LocalInvocationIndex] = 0;
     }
     barrier();
-    uvec4 counts = uvec4(subgroupBallotBitCount(subgroupBallot(stored)), subgroupBallotBitCount(subgroupBallot(absorbed)),
-                         subgroupBallotBitCount(subgroupBallot(escaped)), subgroupBallotBitCount(subgroupBallot(dropped)));
     if (subgroupElect()) {
         for (uint fate = 0; fate < 4; fate++) {
             if (counts[fate] != 0) {

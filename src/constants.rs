@@ -154,6 +154,8 @@ constants! {
     MAX_GROUPS = 65_535;
     /// Bounces whose fates a work group counts in its own memory.
     GROUP_TALLIES = 32;
+    /// Paths that an invocation takes through a bounce where subgroups or work groups take places for them together.
+    PATHS_TOGETHER = 2;
     /// Copies of each tally on the device, so that work groups do not wait for each other at one.
     TALLY_COPIES = 64;
     /// Items that one invocation of the prefix sum handles.

@@ -30,8 +30,6 @@ pub struct Resources {
     pub origins: Buffer,
     /// Length of the photon map, then the paths entering each bounce.
     pub counters: Buffer,
-    /// Photons stored by the bounces so far, and paths that enter the next.
-    pub progress: Buffer,
     pub dispatch_args: Buffer,
     /// What keeps photons in order; `None` where they come as they do.
     pub order: Option<OrderBuffers>,
@@ -132,7 +130,6 @@ impl Resources {
             photons: gpu.buffer::<StoredPhoton>("photons", photons, device)?,
             origins: gpu.buffer::<Origin>("origins", u64::from(plan.origin_array_length()), device)?,
             counters: gpu.buffer::<u32>("counters", bounces + 2, device)?,
-            progress: gpu.buffer::<u32>("progress", 2, device)?,
             dispatch_args: gpu.buffer::<DispatchArgs>("dispatch args", 1, device)?,
             order: if plan.settings.variant == Variant::Scan { Some(OrderBuffers::new(gpu, plan)?) } else { None },
             tallies: tallies::buffer(gpu, "tallies", plan.settings.bounces)?,

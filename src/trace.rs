@@ -2,7 +2,7 @@
 
 mod in_order;
 
-use crate::constants::MAX_GROUPS;
+use crate::constants::{MAX_GROUPS, PATHS_TOGETHER};
 use crate::error::Result;
 use crate::gpu::kernels::{
     Emit, EndBounce, KeepOrder, ScanAdd, ScanBlocks, TraceAtomic, TraceBallot, TraceGroup, TraceInPlace, TraceSlots, TraceWhole,
@@ -35,8 +35,6 @@ pub fn chunk(commands: &mut Commands, resources: &Resources, plan: &Plan, round:
     commands.scope("build", |commands| {
         commands.fill(&resources.counters, 0, u64::from(plan.settings.bounces) + 2, 0);
         commands.fill(&resources.counters, 1, 1, photon_count);
-        commands.fill(&resources.progress, 0, 1, 0);
-        commands.fill(&resources.progress, 1, 1, photon_count);
         commands.add_work(plan.work.tracing(photon_count));
         if plan.settings.variant == Variant::Persistent {
             return whole(commands, resources, plan, round, ranges);
@@ -113,6 +111,14 @@ pub fn photon_list_capacity(plan: &Plan, photon_count: u32) -> u32 {
     if plan.has_slots() { (photon_count * plan.settings.bounces).min(plan.photon_capacity) } else { plan.photon_capacity }
 }
 
+/// Paths that an invocation takes through a bounce.
+fn paths_each(variant: Variant) -> u32 {
+    match variant {
+        Variant::Ballot | Variant::Group => PATHS_TOGETHER,
+        _ => 1,
+    }
+}
+
 fn one_bounce(commands: &mut Commands, resources: &Resources, plan: &Plan, round: u32, bounce: u32, photon_count: u32) -> Result<()> {
     let variant = plan.settings.variant;
     let push = TracePush {
@@ -126,14 +132,14 @@ fn one_bounce(commands: &mut Commands, resources: &Resources, plan: &Plan, round
     // only the device knows how many paths are left.
     let extent = || {
         if bounce == 0 || variant == Variant::Naive {
-            Extent::Items(u64::from(photon_count))
+            Extent::Items(u64::from(photon_count.div_ceil(paths_each(variant))))
         } else {
             Extent::Indirect(&resources.dispatch_args)
         }
     };
     let [even, odd] = &resources.paths;
     let (paths, next_paths) = if bounce.is_multiple_of(2) { (even, odd) } else { (odd, even) };
-    let Resources { rooms, walls, photons, origins, counters, progress, tallies, oddities, .. } = resources;
+    let Resources { rooms, walls, photons, origins, counters, tallies, oddities, .. } = resources;
     match variant {
         Variant::Naive => commands.dispatch(
             TraceSlots { rooms, walls, paths, next_paths, photons, origins, counters, tallies, oddities },
@@ -141,17 +147,17 @@ fn one_bounce(commands: &mut Commands, resources: &Resources, plan: &Plan, round
             extent(),
         ),
         Variant::Atomic => commands.dispatch(
-            TraceAtomic { rooms, walls, paths, next_paths, photons, origins, counters, progress, tallies, oddities },
+            TraceAtomic { rooms, walls, paths, next_paths, photons, origins, counters, tallies, oddities },
             &push,
             extent(),
         ),
         Variant::Ballot => commands.dispatch(
-            TraceBallot { rooms, walls, paths, next_paths, photons, origins, counters, progress, tallies, oddities },
+            TraceBallot { rooms, walls, paths, next_paths, photons, origins, counters, tallies, oddities },
             &push,
             extent(),
         ),
         Variant::Group => commands.dispatch(
-            TraceGroup { rooms, walls, paths, next_paths, photons, origins, counters, progress, tallies, oddities },
+            TraceGroup { rooms, walls, paths, next_paths, photons, origins, counters, tallies, oddities },
             &push,
             extent(),
         ),
@@ -161,7 +167,11 @@ fn one_bounce(commands: &mut Commands, resources: &Resources, plan: &Plan, round
     if variant == Variant::Naive {
         return Ok(());
     }
-    let end =
-        EndBouncePush { bounce, photon_capacity: push.photon_capacity, items_per_group: plan.settings.group_size, max_groups: MAX_GROUPS };
-    commands.dispatch(EndBounce { counters, progress, dispatch_args: &resources.dispatch_args }, &end, Extent::Groups(1, 1))
+    let end = EndBouncePush {
+        bounce,
+        photon_capacity: push.photon_capacity,
+        items_per_group: plan.settings.group_size * paths_each(variant),
+        max_groups: MAX_GROUPS,
+    };
+    commands.dispatch(EndBounce { counters, dispatch_args: &resources.dispatch_args }, &end, Extent::Groups(1, 1))
 }

@@ -59,7 +59,9 @@ fn a_small_bench_reports_every_pass_and_target() {
     let report: Value = serde_json::from_slice(&found.json()).unwrap();
     assert_eq!(report["device"], gpu.facts().name.as_str());
     assert!(!report["driver"].as_str().unwrap().is_empty() && report["left_out"].as_array().unwrap().is_empty(), "{}", report["left_out"]);
-    for rate in ["dispatches", "float_operations", "integer_products", "random_reads", "spread_atomics", "single_atomics"] {
+    for rate in
+        ["dispatches", "float_operations", "integer_products", "random_reads", "spread_atomics", "single_atomics", "counter_additions"]
+    {
         let rate = &report["rates"][rate];
         let [least, median, most] = ["min", "median", "max"].map(|which| rate[which].as_f64().unwrap());
         assert!(0.0 < least && least <= median && median <= most && most < 1e15, "{rate}");

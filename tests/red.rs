@@ -92,7 +92,7 @@ struct Fault {
     noticed_by: &'static [Question],
 }
 
-const FAULTS: [Fault; 58] = [
+const FAULTS: [Fault; 60] = [
     Fault {
         what: "what one sample looks up for all counts for itself alone",
         file: "kernels/weigh.comp",
@@ -122,22 +122,38 @@ const FAULTS: [Fault; 58] = [
         file: "append/ballot.glsl",
         from: "subgroupBallotExclusiveBitCount(survivors);",
         to: "(subgroupBallotExclusiveBitCount(survivors) & 0xfffffffeu);",
-        kernels: &["fly_whole", "trace_ballot", "fly_ballot"],
-        noticed_by: &[Photons(Variant::Ballot), Appends],
+        kernels: &["fly_whole", "trace_whole", "fly_ballot"],
+        noticed_by: &[Photons(Variant::Persistent), Appends],
+    },
+    Fault {
+        what: "a subgroup's second paths write over its first ones'",
+        file: "append/block.glsl",
+        from: "count + subgroupBallotExclusiveBitCount(survivors);",
+        to: "subgroupBallotExclusiveBitCount(survivors);",
+        kernels: &["trace_ballot"],
+        noticed_by: &[Photons(Variant::Ballot), Builders],
+    },
+    Fault {
+        what: "the path in the middle of an odd number is left out",
+        file: "stages/trace_compact.glsl",
+        from: "(path_count + PLACES - 1) / PLACES",
+        to: "path_count / PLACES",
+        kernels: &["trace_ballot"],
+        noticed_by: &[Ledger(Variant::Ballot), Photons(Variant::Ballot)],
     },
     Fault {
         what: "a lane is lost",
-        file: "append/compact.glsl",
-        from: "bool stored = alive &&",
-        to: "bool stored = alive && gl_SubgroupInvocationID != 5u &&",
+        file: "stages/trace_compact.glsl",
+        from: "bool stored = alive[k] &&",
+        to: "bool stored = alive[k] && gl_SubgroupInvocationID != 5u &&",
         kernels: &["trace_atomic"],
         noticed_by: &[Ledger(Variant::Atomic), Photons(Variant::Atomic)],
     },
     Fault {
         what: "the last invocation of each work group finds no place of its own",
         file: "append/group_prefix.glsl",
-        from: "prefix.before += s < gl_SubgroupID",
-        to: "prefix.before += s + 1 < gl_SubgroupID",
+        from: "before += s < gl_SubgroupID",
+        to: "before += s + 1 < gl_SubgroupID",
         kernels: &["trace_group"],
         noticed_by: &[Photons(Variant::Group), Builders],
     },
@@ -167,9 +183,9 @@ const FAULTS: [Fault; 58] = [
     },
     Fault {
         what: "a survivor's path is forgotten",
-        file: "append/slots.glsl",
-        from: "next_paths[index] = path;",
-        to: "if (index % 10u != 7u) next_paths[index] = path;",
+        file: "stages/trace_slots.glsl",
+        from: "store_path(index, path);",
+        to: "if (index % 10u != 7u) store_path(index, path);",
         kernels: &["trace_slots"],
         noticed_by: &[Ledger(Variant::Naive), Photons(Variant::Naive)],
     },

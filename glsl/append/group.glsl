@@ -3,12 +3,15 @@
 
 shared uint group_base;
 
-uint take_place(uint counter, bool wanted)
+uint[PLACES] take_places(uint counter, bool[PLACES] wanted)
 {
     GroupPrefix prefix = prefix_in_group(wanted);
     if (gl_LocalInvocationIndex == 0) {
         group_base = prefix.total == 0 ? 0 : atomicAdd(counters[counter], prefix.total);
     }
     barrier();
-    return group_base + prefix.before;
+    for (uint k = 0; k < PLACES; k++) {
+        prefix.before[k] += group_base;
+    }
+    return prefix.before;
 }

@@ -1,25 +1,35 @@
-// How many invocations of a work group want something, and how many of them stand before this one.
+// How many things the invocations of a work group want, and how many of them come before each.
 
 struct GroupPrefix {
-    uint before;
+    uint before[PLACES];
     uint total;
 };
 
 shared uint subgroup_counts[MAX_SUBGROUPS];
 
 // Called by every invocation, in uniform control flow.
-GroupPrefix prefix_in_group(bool wanted)
+GroupPrefix prefix_in_group(bool[PLACES] wanted)
 {
-    uvec4 votes = subgroupBallot(wanted);
+    GroupPrefix prefix;
+    uint count = 0;
+    for (uint k = 0; k < PLACES; k++) {
+        uvec4 votes = subgroupBallot(wanted[k]);
+        prefix.before[k] = count + subgroupBallotExclusiveBitCount(votes);
+        count += subgroupBallotBitCount(votes);
+    }
     barrier(); // what an earlier call left has been read
     if (subgroupElect()) {
-        subgroup_counts[gl_SubgroupID] = subgroupBallotBitCount(votes);
+        subgroup_counts[gl_SubgroupID] = count;
     }
     barrier();
-    GroupPrefix prefix = GroupPrefix(subgroupBallotExclusiveBitCount(votes), 0);
+    prefix.total = 0;
+    uint before = 0;
     for (uint s = 0; s < gl_NumSubgroups; s++) {
-        prefix.before += s < gl_SubgroupID ? subgroup_counts[s] : 0;
+        before += s < gl_SubgroupID ? subgroup_counts[s] : 0;
         prefix.total += subgroup_counts[s];
+    }
+    for (uint k = 0; k < PLACES; k++) {
+        prefix.before[k] += before;
     }
     return prefix;
 }

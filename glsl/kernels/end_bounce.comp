@@ -9,8 +9,7 @@
 layout(local_size_x = 1) in;
 layout(push_constant, scalar) uniform Push { EndBouncePush push; };
 layout(set = 1, binding = 0, scalar) buffer Counters { uint counters[]; };
-layout(set = 1, binding = 1, scalar) writeonly buffer Progress { uint progress[]; };
-layout(set = 1, binding = 2, scalar) writeonly buffer Sizes { DispatchArgs dispatch_args[]; };
+layout(set = 1, binding = 1, scalar) writeonly buffer Sizes { DispatchArgs dispatch_args[]; };
 
 #include "dispatch_size.glsl"
 
@@ -22,7 +21,5 @@ void main()
     uint path_count = min(survivor_count, room);
     counters[0] += survivor_count;
     counters[2 + push.bounce] = path_count;
-    progress[0] = counters[0];
-    progress[1] = path_count;
     dispatch_args[0] = dispatch_size(path_count, push.items_per_group, push.max_groups);
 }

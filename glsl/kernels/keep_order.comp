@@ -19,6 +19,7 @@ layout(set = 1, binding = 4, scalar) buffer Tallies { Tally tallies[]; };
 #include "photon.glsl"
 #include "path.glsl"
 #include "append/paths.glsl"
+const uint PLACES = 1;
 #include "append/group_prefix.glsl"
 #include "append/store.glsl"
 #include "stages/keep_order.glsl"

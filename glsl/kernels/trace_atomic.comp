@@ -3,12 +3,14 @@
 #version 460
 #extension GL_GOOGLE_include_directive : require
 #extension GL_EXT_scalar_block_layout : require
+#extension GL_EXT_control_flow_attributes : require
 #extension GL_KHR_shader_subgroup_basic : require
 #extension GL_KHR_shader_subgroup_ballot : require
 #include "records.glsl"
 
 layout(local_size_x_id = 0) in;
 layout(push_constant, scalar) uniform Push { TracePush push; };
+layout(set = 1, binding = 3, scalar) buffer Counters { uint counters[]; };
 layout(set = 1, binding = 4, scalar) buffer Tallies { Tally tallies[]; };
 
 #include "math.glsl"
@@ -22,15 +24,15 @@ layout(set = 1, binding = 4, scalar) buffer Tallies { Tally tallies[]; };
 #include "tally.glsl"
 #include "photon.glsl"
 #include "path.glsl"
+const uint PLACES = 1;
 #include "append/paths.glsl"
-#include "append/append.glsl"
 #include "append/store.glsl"
 #include "append/atomic.glsl"
-#include "append/compact.glsl"
+#include "append/each.glsl"
 #include "stages/bounce.glsl"
-#include "stages/trace.glsl"
+#include "stages/trace_compact.glsl"
 
 void main()
 {
-    trace_bounce();
+    trace_compact();
 }

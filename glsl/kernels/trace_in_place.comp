@@ -23,6 +23,7 @@ layout(set = 1, binding = 4, scalar) buffer Tallies { Tally tallies[]; };
 #include "photon.glsl"
 #include "path.glsl"
 #include "append/paths.glsl"
+const uint PLACES = 1;
 #include "append/group_prefix.glsl"
 #include "stages/bounce.glsl"
 #include "stages/trace_in_place.glsl"

@@ -1,4 +1,4 @@
-// One bounce, survivors stored by append/slots.glsl.
+// One bounce, every path has a slot of its own.
 // Dispatched by src/trace.rs once a bounce. One thread = one incoming path.
 #version 460
 #extension GL_GOOGLE_include_directive : require
@@ -23,13 +23,11 @@ layout(set = 1, binding = 4, scalar) buffer Tallies { Tally tallies[]; };
 #include "photon.glsl"
 #include "path.glsl"
 #include "append/paths.glsl"
-#include "append/append.glsl"
 #include "append/store.glsl"
-#include "append/slots.glsl"
 #include "stages/bounce.glsl"
-#include "stages/trace.glsl"
+#include "stages/trace_slots.glsl"
 
 void main()
 {
-    trace_bounce();
+    trace_slots();
 }

@@ -22,7 +22,7 @@ void fly()
     if (flown.alive) {
         next_light_paths[path_place] = path;
     }
-    tally(push.bounce, flown.alive, flown.absorbed, flown.escaped, false);
+    tally(push.bounce, fates(flown.alive, flown.absorbed, flown.escaped, false));
     if (dropped) {
         atomicAdd(tallies[tally_copy(push.bounce)].dropped, 1);
     }

@@ -10,10 +10,10 @@ void keep_order()
 {
     uint index = invocation_index();
     bool alive = index < min(counters[1 + push.bounce], push.path_capacity) && has_path(index);
-    GroupPrefix prefix = prefix_in_group(alive);
+    GroupPrefix prefix = prefix_in_group(bool[](alive));
     bool stored = false;
     if (alive) {
-        uint path_place = survivors[work_group_index()] + prefix.before;
+        uint path_place = survivors[work_group_index()] + prefix.before[0];
         uint place = counters[0] + path_place;
         stored = place < push.photon_capacity;
         if (stored) {
@@ -30,5 +30,5 @@ void keep_order()
         uint group_count = (push.path_capacity + gl_WorkGroupSize.x - 1) / gl_WorkGroupSize.x;
         counters[2 + push.bounce] = survivors[group_count];
     }
-    tally(push.bounce, stored, false, false, alive && !stored);
+    tally(push.bounce, fates(stored, false, false, alive && !stored));
 }

@@ -23,10 +23,10 @@ void trace_in_place()
             weights[index] = bounced.photon.weight;
         }
     }
-    GroupPrefix prefix = prefix_in_group(bounced.alive);
+    GroupPrefix prefix = prefix_in_group(bool[](bounced.alive));
     // The last row of groups may be longer than the paths.
     if (gl_LocalInvocationIndex == 0 && entered) {
         survivors[work_group_index()] = prefix.total;
     }
-    tally(push.bounce, false, bounced.absorbed, bounced.escaped, false);
+    tally(push.bounce, fates(false, bounced.absorbed, bounced.escaped, false));
 }

@@ -252,6 +252,7 @@ mod tests {
             random_reads: spread(1.0),
             spread_atomics: spread(1.0),
             single_atomics: spread(1.0),
+            counter_additions: spread(1.0),
         };
         // What fits a cache may go faster; a copy that is all launch says nothing.
         assert_eq!([1e3, 1e8, 1e9, 1e12].map(|moved| rates.most_bytes(moved)), [2e12, 2e12, 1e12, 1e12]);

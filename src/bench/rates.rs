@@ -7,7 +7,7 @@ use serde::Serialize;
 
 use super::Size;
 use crate::error::{Error, Result};
-use crate::gpu::kernels::{MeasureAtomic, MeasureCopy, MeasureFloat, MeasureGather, MeasureInteger};
+use crate::gpu::kernels::{MeasureAtomic, MeasureCopy, MeasureCounter, MeasureFloat, MeasureGather, MeasureInteger};
 use crate::gpu::{Buffer, Commands, Constants, Extent, Gpu, Memory};
 use crate::records::MeasurePush;
 use crate::rng::philox;
@@ -31,6 +31,8 @@ pub struct Rates {
     pub spread_atomics: Spread,
     /// The same at one counter.
     pub single_atomics: Spread,
+    /// Additions to one counter, one a subgroup for all its invocations.
+    pub counter_additions: Spread,
 }
 
 /// Bytes a second, read and written, of a copy that moves so many in all.
@@ -150,8 +152,18 @@ pub fn measure(gpu: &Gpu, size: Size) -> Result<Rates> {
 
     let spread_atomics = bench.atomics(&counts, &results, accesses, COUNTERS - 1)?;
     let single_atomics = bench.atomics(&counts, &results, accesses, 0)?;
+    let counter_additions = bench.counter(&counts, &results, accesses)?;
     gpu.check_validation()?;
-    Ok(Rates { dispatches, copies: copy_rates, float_operations, integer_products, random_reads, spread_atomics, single_atomics })
+    Ok(Rates {
+        dispatches,
+        copies: copy_rates,
+        float_operations,
+        integer_products,
+        random_reads,
+        spread_atomics,
+        single_atomics,
+        counter_additions,
+    })
 }
 
 /// Keeps a card busy for a while, so that what follows at once runs at the clock of work; between experiments it falls to
@@ -226,6 +238,22 @@ impl<'gpu> Bench<'_, 'gpu> {
             return Err(self.wrong("atomic additions"));
         }
         Ok(rate(&seconds, u64::from(items) * u64::from(ACCESSES)))
+    }
+
+    /// Every invocation of `items` gets places of its own, so that those of n are 0 to n - 1.
+    fn counter(&mut self, counters: &Buffer, sums: &Buffer, items: u32) -> Result<Spread> {
+        let push = push(items, ACCESSES, 0);
+        let seconds = self.seconds("counter", REPEATS, &mut |commands| {
+            commands.dispatch(MeasureCounter { counters, sums }, &push, Extent::Items(u64::from(items)))
+        })?;
+        self.commands.fill(counters, 0, 1, 0);
+        self.commands.dispatch(MeasureCounter { counters, sums }, &push, Extent::Items(u64::from(items)))?;
+        let found = self.commands.read::<u32>(sums, items as usize)?.into_iter().fold(0, u32::wrapping_add);
+        let places = u64::from(items) * u64::from(ACCESSES);
+        if self.commands.read::<u32>(counters, 1)? != [places as u32] || found != (places * (places - 1) / 2) as u32 {
+            return Err(self.wrong("additions to one counter"));
+        }
+        Ok(rate(&seconds, places / u64::from(self.gpu.facts().subgroup_size)))
     }
 
     /// Fails unless all that are looked at are right: a few, from the first to the last.

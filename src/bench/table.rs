@@ -93,6 +93,7 @@ fn rates(text: &mut String, bench: &Bench) {
         ("random reads of 32 bytes", &rates.random_reads, "/s"),
         ("atomics at many counters", &rates.spread_atomics, "/s"),
         ("atomics at one counter", &rates.single_atomics, "/s"),
+        ("the same, one a subgroup", &rates.counter_additions, "/s"),
     ] {
         writeln!(text, "{name:<34} {:>9}{unit}  ({} to {})", scaled(rate.median), scaled(rate.min), scaled(rate.max)).unwrap();
     }

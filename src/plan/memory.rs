@@ -74,7 +74,6 @@ impl Plan {
             ("photons", array::<StoredPhoton>(photons)),
             ("origins", array::<Origin>(origins)),
             ("counters", array::<u32>(bounces + 2)),
-            ("progress", array::<u32>(2)),
             ("dispatch args", array::<DispatchArgs>(1)),
             ("tallies", tallies::bytes(self.settings.bounces)),
             ("film", array::<u64>(sums)),
