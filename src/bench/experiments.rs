@@ -39,7 +39,6 @@ impl Experiment {
     pub const ALL: [Experiment; 11] = [
         Experiment::OpenBox,
         Experiment::Builders,
-        Experiment::Compaction,
         Experiment::Table1,
         Experiment::Index,
         Experiment::Gather,
@@ -48,6 +47,8 @@ impl Experiment {
         Experiment::CausticSphere,
         Experiment::Mesh,
         Experiment::Effects,
+        // Takes all the time that is left.
+        Experiment::Compaction,
     ];
 
     pub fn name(self) -> &'static str {
@@ -172,7 +173,7 @@ const MOST_COMPACTED: u32 = 1 << 28;
 
 fn compaction(lab: &mut Lab) -> Result<Map> {
     let left = lab.deadline.saturating_duration_since(Instant::now());
-    let all = compaction::Request::up_to(lab.choose(1 << 12, 1 << 16, MOST_COMPACTED), left / 2);
+    let all = compaction::Request::up_to(lab.choose(1 << 12, 1 << 16, MOST_COMPACTED), left);
     let request = match lab.size {
         Size::Small => compaction::Request { survivals: vec![0.25, 0.75], turns: 1, ..all },
         Size::Full => all,
