@@ -1,16 +1,30 @@
-// The order in which neighbouring invocations take pixels: tiles of 8 x 4, so that a subgroup's rays and lookups lie close
-// together in both directions. A picture's last rows and columns, where no tile fits, are taken as they are.
+// The order in which neighbouring invocations take pixels: blocks of 64 x 64, and in them tiles of 8 x 4, so that the rays and
+// lookups of a subgroup and of its neighbours lie close together in both directions.
+
+// A tile of a rectangle that is taken tile after tile: at the right and at the bottom they may be smaller.
+struct Tile {
+    uvec2 corner;
+    uvec2 size;
+    uint place; // within it
+};
+
+Tile tile_at(uint place, uvec2 size, uvec2 tile_size)
+{
+    uint band = place / (tile_size.y * size.x);
+    uint rows = min(tile_size.y, size.y - tile_size.y * band);
+    uint within = place - tile_size.y * band * size.x;
+    uint number = within / (tile_size.x * rows);
+    uint columns = min(tile_size.x, size.x - tile_size.x * number);
+    return Tile(tile_size * uvec2(number, band), uvec2(columns, rows), within - tile_size.x * rows * number);
+}
 
 // Pixel at `place` in that order; all places below width * height are all pixels.
 uint pixel_in_tiles(uint place, uint width, uint height)
 {
-    uint band = place / (4 * width);
-    uint rows = min(4, height - 4 * band);
-    uint within = place - 4 * band * width;
-    uint tile = within / (8 * rows);
-    uint columns = min(8, width - 8 * tile);
-    uint in_tile = within - 8 * rows * tile;
-    return (4 * band + in_tile / columns) * width + 8 * tile + in_tile % columns;
+    Tile block = tile_at(place, uvec2(width, height), uvec2(64));
+    Tile tile = tile_at(block.place, block.size, uvec2(8, 4));
+    uvec2 pixel = block.corner + tile.corner + uvec2(tile.place % tile.size.x, tile.place / tile.size.x);
+    return pixel.y * width + pixel.x;
 }
 
 // The same of visible points: sets of one a pixel, set after set. Receivers have an order of their own: their width is 0.

@@ -8,6 +8,7 @@ use std::time::{Duration, Instant};
 
 use serde::Serialize;
 
+use crate::bench::paper_line::WARM_UP;
 use crate::bench::rates;
 use crate::error::{Error, Result};
 use crate::gpu::{Commands, Gpu};
@@ -32,7 +33,7 @@ pub struct Request {
     /// Photons, fewest first.
     pub sizes: Vec<u32>,
     pub bounces: u32,
-    /// Runs of each builder that count, in turn.
+    /// Runs of each builder that count.
     pub turns: usize,
     /// No size is begun that would probably end later than this after the start.
     pub budget: Duration,
@@ -97,8 +98,6 @@ pub struct Timed {
     pub ms: Spread,
 }
 
-/// A card whose clock has fallen while buffers were made favours builders that wait for memory.
-const WARM_UP: Duration = Duration::from_millis(20);
 /// Stored photons up to which all of them are compared.
 const MOST_COMPARED: f64 = 1e6;
 
@@ -153,18 +152,13 @@ fn cell(gpu: &Gpu, request: &Request, photons: u32, survival: f32) -> Result<Cel
     };
     let room = room(&base);
     let of = |variant| Settings { variant, ..base.clone() };
-    let mut times = vec![Vec::new(); Variant::ON_GPU.len()];
+    let mut builders = Vec::new();
     let mut fates: Option<Vec<Tally>> = None;
-    for turn in 0..=request.turns {
-        for (variant, times) in Variant::ON_GPU.into_iter().zip(&mut times) {
-            let (ms, tallies) = run(gpu, &room, &of(variant))?;
-            let expected = fates.get_or_insert_with(|| tallies.clone());
-            agree(variant, photons, survival, *expected == tallies)?;
-            // The first turn makes pipelines and brings a card to its clock.
-            if turn > 0 {
-                times.push(ms);
-            }
-        }
+    for variant in Variant::ON_GPU {
+        let (ms, tallies) = run(gpu, &room, &of(variant), request.turns)?;
+        let expected = fates.get_or_insert_with(|| tallies.clone());
+        agree(variant, photons, survival, *expected == tallies)?;
+        builders.push(Timed { variant, ms });
     }
     let stored: u64 = fates.iter().flatten().map(|tally| u64::from(tally.stored)).sum();
     let mut agreed = Agreed::Fates;
@@ -181,11 +175,6 @@ fn cell(gpu: &Gpu, request: &Request, photons: u32, survival: f32) -> Result<Cel
         }
         agreed = Agreed::Photons;
     }
-    let mut builders: Vec<Timed> = Variant::ON_GPU
-        .into_iter()
-        .zip(times)
-        .map(|(variant, times)| Timed { variant, ms: Spread::of(times).expect("there is a turn that counts") })
-        .collect();
     builders.sort_by(|a, b| a.ms.median.total_cmp(&b.ms.median));
     Ok(Cell { survival, photons, stored, agreed, builders })
 }
@@ -199,20 +188,32 @@ fn agree(variant: Variant, photons: u32, survival: f32, same: bool) -> Result<()
 }
 
 /// Milliseconds to trace and store all photons, on the device's clock where it has one, and their fates.
-fn run(gpu: &Gpu, room: &RoomScene, settings: &Settings) -> Result<(f64, Vec<Tally>)> {
+fn run(gpu: &Gpu, room: &RoomScene, settings: &Settings, turns: usize) -> Result<(Spread, Vec<Tally>)> {
     let plan = Plan::new(room, settings, &limits(gpu.facts()))?;
     gpu.prepare(&trace::modules(&plan), &constants(&plan))?;
     let mut commands = Commands::new(gpu, constants(&plan), Instant::now())?;
     let resources = Resources::new(gpu, &mut commands, room, &plan)?;
     commands.submit()?;
+    // While buffers are made a card's clock falls, by up to 5 times, but not its memory's.
     rates::warm_up(gpu, WARM_UP)?;
-    for ranges in plan.chunks() {
-        commands.scope("chunk", |commands| trace::chunk(commands, &resources, &plan, 0, &ranges))?;
-        commands.submit()?;
+    let mut fates = Vec::new();
+    // The first turn makes the pipelines.
+    for turn in 0..=turns {
+        tallies::clear(&mut commands, &resources.tallies);
+        for ranges in plan.chunks() {
+            commands.scope(&turn_name(turn), |commands| trace::chunk(commands, &resources, &plan, 0, &ranges))?;
+            commands.submit()?;
+        }
+        fates = tallies::read(&mut commands, &resources.tallies, settings.bounces)?;
     }
-    let tallies = tallies::read(&mut commands, &resources.tallies, settings.bounces)?;
     gpu.check_validation()?;
-    Ok((commands.finish("compaction").best_ms("chunk").expect("the scope has run"), tallies))
+    let timings = commands.finish("compaction");
+    let times = (1..=turns).map(|turn| timings.best_ms(&turn_name(turn)).expect("the turn has run"));
+    Ok((Spread::of(times.collect()).expect("there is a turn that counts"), fates))
+}
+
+fn turn_name(turn: usize) -> String {
+    format!("turn {turn}")
 }
 
 impl Cell {
