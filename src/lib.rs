@@ -13,11 +13,11 @@
 //! module uses only what stands to its left:
 //!
 //! ```text
-//! constants, records, photon, error, bias, ledger, rng, settings, timings < scene < plan < cpu
+//! constants, records, path, photon, error, bias, ledger, rng, settings, timings < scene < plan < cpu
 //! scene < judge
 //! constants, records, error, ledger, timings < gpu
-//! gpu < oddities; plan, gpu < prefix_sum
-//! plan, oddities, prefix_sum < resources < trace < index < estimate < film < render < transport < selfcheck < output
+//! gpu < oddities, tallies; plan, gpu < prefix_sum
+//! plan, oddities, tallies, prefix_sum < resources < trace < index < estimate < film < render < transport < selfcheck < output
 //! output < bake < paper < compaction < study < bench < cli
 //! ```
 //!

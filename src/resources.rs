@@ -23,7 +23,7 @@ pub struct Resources {
     pub points: Buffer,
     pub stream_seeds: Buffer,
     // Photons of the chunk under way.
-    /// Paths entering even bounces and odd bounces; one empty element where no bounce hands paths to the next.
+    /// Paths entering even bounces and odd bounces; one element, for a replay, where no bounce hands paths to the next.
     pub paths: [Buffer; 2],
     pub photons: Buffer,
     /// Which photon each entry of the photon map is; one empty element where nobody asks.

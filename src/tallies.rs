@@ -1,14 +1,10 @@
-//! Fates of paths while kernels count them: a tally for each bounce in `TALLY_COPIES` copies, a work group's choice of them.
+//! Fates of paths while kernels count them: a tally for each bounce in `TALLY_COPIES` copies, which work
+//! groups take in turn.
 
 use crate::constants::TALLY_COPIES;
 use crate::error::Result;
 use crate::gpu::{Buffer, Commands, Gpu, Memory};
 use crate::records::Tally;
-
-/// Bytes of the tallies of so many bounces.
-pub fn bytes(bounces: u32) -> u64 {
-    u64::from(bounces) * u64::from(TALLY_COPIES) * size_of::<Tally>() as u64
-}
 
 pub fn buffer(gpu: &Gpu, name: &'static str, bounces: u32) -> Result<Buffer> {
     gpu.buffer::<Tally>(name, u64::from(bounces) * u64::from(TALLY_COPIES), Memory::Device)

@@ -6,14 +6,15 @@ use std::fs;
 use std::path::{Path, PathBuf};
 
 /// What everyone may use, and what among itself has no order.
-const GROUND: [&str; 9] = ["error", "bias", "constants", "records", "photon", "ledger", "rng", "settings", "timings"];
+const GROUND: [&str; 10] = ["error", "bias", "constants", "records", "path", "photon", "ledger", "rng", "settings", "timings"];
 /// From left to right.
-const LINE: [&str; 22] = [
+const LINE: [&str; 23] = [
     "scene",
     "judge",
     "plan",
     "gpu",
     "oddities",
+    "tallies",
     "prefix_sum",
     "resources",
     "trace",

@@ -1,7 +1,5 @@
-// The paths that a bounce reads and those that it hands to the next.
-
-layout(set = 1, binding = 0, scalar) readonly buffer Paths { uvec4 paths[]; };
-layout(set = 1, binding = 1, scalar) writeonly buffer NextPaths { uvec4 next_paths[]; };
+// The paths that a bounce reads, `paths`, and those that it hands to the next, `next_paths`, which the including kernel
+// declares.
 
 Path incoming_path(uint index)
 {

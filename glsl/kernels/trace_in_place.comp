@@ -9,6 +9,8 @@
 
 layout(local_size_x_id = 0) in;
 layout(push_constant, scalar) uniform Push { TracePush push; };
+layout(set = 1, binding = 0, scalar) buffer Paths { uvec4 paths[]; };
+#define next_paths paths // each stays where it is
 layout(set = 1, binding = 4, scalar) buffer Tallies { Tally tallies[]; };
 
 #include "math.glsl"

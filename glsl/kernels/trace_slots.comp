@@ -9,6 +9,8 @@
 
 layout(local_size_x_id = 0) in;
 layout(push_constant, scalar) uniform Push { TracePush push; };
+layout(set = 1, binding = 0, scalar) readonly buffer Paths { uvec4 paths[]; };
+layout(set = 1, binding = 1, scalar) writeonly buffer NextPaths { uvec4 next_paths[]; };
 layout(set = 1, binding = 4, scalar) buffer Tallies { Tally tallies[]; };
 
 #include "math.glsl"

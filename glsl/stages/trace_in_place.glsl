@@ -1,4 +1,4 @@
-// One bounce of every path, which stays where it is (both arrays are one): the dead leave gaps, and each work group counts its survivors.
+// One bounce of every path, which stays where it is: the dead leave gaps, and each work group counts its survivors.
 // After a prefix sum over these counts stages/keep_order.glsl moves the survivors together.
 
 layout(set = 1, binding = 6, scalar) writeonly buffer Weights { float weights[]; };

@@ -2,11 +2,12 @@
 //! do without.
 
 use std::sync::atomic::AtomicBool;
-use std::time::{Duration, Instant};
+use std::time::Instant;
 
 use super::pass::{Cost, Pass, SLOW_OPERATION, Work, rounds_of, whole};
-use super::rates::{self, PHILOX_PRODUCTS, Rates};
+use super::rates::{PHILOX_PRODUCTS, Rates};
 use crate::error::{Error, Result};
+use crate::gpu::clock::{self, WARM_UP};
 use crate::gpu::{Gpu, HeldMemory};
 use crate::ledger::Fates;
 use crate::path::StoredPath;
@@ -71,9 +72,8 @@ impl Timed {
     }
 }
 
-/// Rounds that count, and how long the rounds before them warm up a card.
+/// Rounds that count.
 pub const REPEATS: u32 = 7;
-pub const WARM_UP: Duration = Duration::from_millis(300);
 /// Rounds of a warm-up, however short they are.
 const MOST_WARM_UP: f64 = 256.0;
 
@@ -108,7 +108,7 @@ pub fn time(gpu: &Gpu, rates: &Rates, settings: &Settings, cancelled: &AtomicBoo
     let probe = || run_once(gpu, &Settings { rounds: 2, ..settings.clone() }, cancelled);
     let warm_up = warm_up_rounds(gpu, || Ok(whole(&rounds_of(&probe()?.timings, 2, 1))))?;
     let rounds = warm_up + REPEATS;
-    rates::warm_up(gpu, WARM_UP)?;
+    clock::warm_up(gpu, WARM_UP)?;
     gpu.forget_peaks();
     let outcome = run_once(gpu, &Settings { rounds, ..settings.clone() }, cancelled)?;
     Ok(timed(gpu, rates, &outcome, rounds, warm_up))
@@ -118,7 +118,7 @@ pub fn time(gpu: &Gpu, rates: &Rates, settings: &Settings, cancelled: &AtomicBoo
 pub fn time_run(gpu: &Gpu, rates: &Rates, settings: &Settings, cancelled: &AtomicBool) -> Result<Vec<Timed>> {
     let mut runs = Vec::new();
     for _ in 0..=REPEATS {
-        rates::warm_up(gpu, WARM_UP)?;
+        clock::warm_up(gpu, WARM_UP)?;
         gpu.forget_peaks();
         let outcome = run_once(gpu, settings, cancelled)?;
         runs.push(timed(gpu, rates, &outcome, settings.rounds, 0));

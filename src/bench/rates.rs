@@ -8,7 +8,7 @@ use serde::Serialize;
 use super::Size;
 use crate::error::{Error, Result};
 use crate::gpu::kernels::{MeasureAtomic, MeasureCopy, MeasureCounter, MeasureFloat, MeasureGather, MeasureInteger};
-use crate::gpu::{Buffer, Commands, Constants, Extent, Gpu, Memory};
+use crate::gpu::{Buffer, Commands, Constants, Extent, Gpu, Memory, clock};
 use crate::records::MeasurePush;
 use crate::rng::philox;
 use crate::timings::Clock;
@@ -106,14 +106,11 @@ pub fn measure(gpu: &Gpu, size: Size) -> Result<Rates> {
     commands.fill(&copies, 0, 4 * u64::from(block_count), 0);
     commands.fill(&results, 0, u64::from(items.max(accesses)), 0);
     let mut bench = Bench { gpu, commands: &mut commands };
+    clock::warm_up(gpu, warm_up)?;
 
     let float_push = push(items, STEPS, 0);
     let mut float =
         |commands: &mut Commands| commands.dispatch(MeasureFloat { results: &results }, &float_push, Extent::Items(u64::from(items)));
-    let began = Instant::now();
-    while began.elapsed() < warm_up {
-        bench.seconds("warm-up", 1, &mut float)?;
-    }
     let seconds = bench.seconds("float", REPEATS, &mut float)?;
     let float_operations = rate(&seconds, u64::from(items) * u64::from(STEPS) * FLOAT_OPERATIONS);
     let found = bench.commands.read::<f32>(&results, items as usize)?;
@@ -164,23 +161,6 @@ pub fn measure(gpu: &Gpu, size: Size) -> Result<Rates> {
         single_atomics,
         counter_additions,
     })
-}
-
-/// Keeps a card busy for a while, so that what follows at once runs at the clock of work; between experiments it falls to
-/// less than half. Does nothing on a software device, which has no clock of its own.
-pub fn warm_up(gpu: &Gpu, time: Duration) -> Result<()> {
-    if gpu.facts().kind == "cpu" {
-        return Ok(());
-    }
-    let Amounts { items, .. } = Amounts::of(gpu, Size::Small);
-    let mut commands = Commands::new(gpu, Constants::new(GROUP_SIZE), Instant::now())?;
-    let results = gpu.buffer::<u32>("results", u64::from(items), Memory::Device)?;
-    let began = Instant::now();
-    while began.elapsed() < time {
-        commands.dispatch(MeasureFloat { results: &results }, &push(items, STEPS, 0), Extent::Items(u64::from(items)))?;
-        commands.submit()?;
-    }
-    Ok(())
 }
 
 fn push(item_count: u32, step_count: u32, mask: u32) -> MeasurePush {

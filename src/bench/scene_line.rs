@@ -6,10 +6,11 @@ use std::time::Instant;
 
 use rayon::prelude::*;
 
-use super::paper_line::{Counts, RANK_BYTES, REPEATS, Timed, WARM_UP, warm_up_rounds};
+use super::paper_line::{Counts, RANK_BYTES, REPEATS, Timed, warm_up_rounds};
 use super::pass::{Cost, Pass, SLOW_OPERATION, Work, rounds_of, whole};
-use super::rates::{self, PHILOX_PRODUCTS, Rates};
+use super::rates::{PHILOX_PRODUCTS, Rates};
 use crate::error::{Error, Result};
+use crate::gpu::clock::{self, WARM_UP};
 use crate::gpu::{Commands, Gpu};
 use crate::ledger::Fates;
 use crate::photon::MapPhoton;
@@ -124,7 +125,7 @@ fn time_once(gpu: &Gpu, rates: &Rates, job: &Job, cancelled: &AtomicBool) -> Res
     let run = |rounds: u32| job.light(gpu, TransportSettings { alpha: 1.0, rounds, ..job.settings.clone() }, cancelled);
     let warm_up = warm_up_rounds(gpu, || Ok(whole(&rounds_of(&run(2)?.timings, 2, 1))))?;
     let rounds = warm_up + REPEATS;
-    rates::warm_up(gpu, WARM_UP)?;
+    clock::warm_up(gpu, WARM_UP)?;
     gpu.forget_peaks();
     let lit = run(rounds)?;
     let memory = gpu.held_memory();

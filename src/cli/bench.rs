@@ -16,8 +16,8 @@ use crate::output::destination::{Destination, Folder, write_all};
 
 #[derive(Args)]
 pub(super) struct BenchArgs {
-    /// Only these experiments, by name and separated by commas: open-box, builders, compaction, table-1, index, gather, cornell,
-    /// cornell-spheres, caustic-sphere, mesh, effects [default: all]
+    /// Only these experiments, by name and separated by commas: open-box, builders, table-1, index, gather, cornell,
+    /// cornell-spheres, caustic-sphere, mesh, effects, compaction [default: all]
     #[arg(long, value_name = "NAME", value_delimiter = ',', value_parser = experiment)]
     only: Vec<Experiment>,
     /// Workloads of the targets, or small ones that take seconds [default: full on a GPU, small on a CPU]

@@ -8,9 +8,8 @@ use std::time::{Duration, Instant};
 
 use serde::Serialize;
 
-use crate::bench::paper_line::WARM_UP;
-use crate::bench::rates;
 use crate::error::{Error, Result};
+use crate::gpu::clock::{self, WARM_UP};
 use crate::gpu::{Commands, Gpu};
 use crate::output::words::{count, number};
 use crate::photon::Photon;
@@ -114,11 +113,12 @@ pub fn measure(gpu: &Gpu, request: &Request, cancelled: &AtomicBool, tell: &mut 
     let facts = gpu.facts();
     let mut map =
         Map { device: facts.name.clone(), driver: facts.driver.clone(), bounces: request.bounces, cells: Vec::new(), left_out: Vec::new() };
-    let mut last = (0u32, Duration::ZERO);
+    // Sizes and what they took, the last two: time goes with photons, and some of it with none.
+    let (mut before, mut last) = ((0u32, Duration::ZERO), (0u32, Duration::ZERO));
     for &photons in &request.sizes {
-        // Time grows no faster than photons.
-        let growth = if last.0 == 0 { 0.0 } else { f64::from(photons) / f64::from(last.0) };
-        if began.elapsed() + last.1.mul_f64(growth) > request.budget {
+        let per_photon = last.1.saturating_sub(before.1).div_f64(f64::from((last.0 - before.0).max(1)));
+        let expected = if before.0 == 0 { last.1 } else { last.1 + per_photon.mul_f64(f64::from(photons - last.0)) };
+        if began.elapsed() + expected > request.budget {
             map.left_out.push(photons);
             continue;
         }
@@ -133,7 +133,7 @@ pub fn measure(gpu: &Gpu, request: &Request, cancelled: &AtomicBool, tell: &mut 
             tell(&format!("compaction: {} photons, survival {survival}", count(u64::from(photons))));
             map.cells.push(cell(gpu, request, photons, survival)?);
         }
-        last = (photons, size_began.elapsed());
+        (before, last) = (last, (photons, size_began.elapsed()));
     }
     Ok(map)
 }
@@ -189,15 +189,16 @@ fn agree(variant: Variant, photons: u32, survival: f32, same: bool) -> Result<()
 
 /// Milliseconds to trace and store all photons, on the device's clock where it has one, and their fates.
 fn run(gpu: &Gpu, room: &RoomScene, settings: &Settings, turns: usize) -> Result<(Spread, Vec<Tally>)> {
+    let idle_since = Instant::now();
     let plan = Plan::new(room, settings, &limits(gpu.facts()))?;
     gpu.prepare(&trace::modules(&plan), &constants(&plan))?;
     let mut commands = Commands::new(gpu, constants(&plan), Instant::now())?;
     let resources = Resources::new(gpu, &mut commands, room, &plan)?;
     commands.submit()?;
-    // While buffers are made a card's clock falls, by up to 5 times, but not its memory's.
-    rates::warm_up(gpu, WARM_UP)?;
+    // While buffers are made a card's clock falls, but not its memory's, which favours builders that wait for memory.
+    clock::warm_up(gpu, idle_since.elapsed().clamp(WARM_UP / 10, WARM_UP))?;
     let mut fates = Vec::new();
-    // The first turn makes the pipelines.
+    // The first turn fills caches.
     for turn in 0..=turns {
         tallies::clear(&mut commands, &resources.tallies);
         for ranges in plan.chunks() {

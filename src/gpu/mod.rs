@@ -3,6 +3,7 @@
 
 pub mod buffer;
 pub mod check;
+pub mod clock;
 pub mod commands;
 pub mod device;
 pub mod kernel;

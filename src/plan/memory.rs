@@ -6,14 +6,13 @@ use glam::UVec2;
 
 use super::Plan;
 use super::transport::{MapPlan, Sensor, TransportPlan};
-use crate::constants::{FACE_COUNT, MAX_ODDITIES, ODD_ESTIMATE, PART_COUNT, SCAN_ITEMS, TREE_LEAF, TREE_RUN};
+use crate::constants::{FACE_COUNT, MAX_ODDITIES, ODD_ESTIMATE, PART_COUNT, SCAN_ITEMS, TALLY_COPIES, TREE_LEAF, TREE_RUN};
 use crate::path::StoredPath;
 use crate::photon::{MapPhoton, Origin, StoredPhoton};
 use crate::records::*;
 use crate::scene::geometry::Geometry;
 use crate::settings::Variant;
 use crate::settings::transport::Effect;
-use crate::tallies;
 
 /// A buffer, or several of one name, and all their bytes.
 pub type Stated = (&'static str, u64);
@@ -75,7 +74,7 @@ impl Plan {
             ("origins", array::<Origin>(origins)),
             ("counters", array::<u32>(bounces + 2)),
             ("dispatch args", array::<DispatchArgs>(1)),
-            ("tallies", tallies::bytes(self.settings.bounces)),
+            ("tallies", array::<Tally>(bounces * u64::from(TALLY_COPIES))),
             ("film", array::<u64>(sums)),
             ("oddities", array::<u32>(ODDITY_WORDS)),
         ];
@@ -179,7 +178,7 @@ pub(super) fn of_transport(plan: &TransportPlan, geometry: &Geometry, keeps: &dy
             ("ranks", array::<u32>(capacity)),
             ("block sums", block_sum_bytes(buckets + 1, plan.settings.group_size)),
             ("crowded points", array::<u32>(2 + 2 * u64::from(plan.points_at_once()))),
-            ("tallies", 2 * tallies::bytes(plan.settings.bounces)),
+            ("tallies", 2 * array::<Tally>(bounces * u64::from(TALLY_COPIES))),
         ]);
     }
     buffers

@@ -173,7 +173,8 @@ pub fn photons_on_gpu(gpu: &Gpu, scene: &RoomScene, settings: &Settings) -> Resu
 
 /// One photon by itself. A photon is (seed, round, number), so it takes the same path alone as among millions.
 pub fn replay_on_gpu(gpu: &Gpu, scene: &RoomScene, settings: &Settings, round: u32, photon: u32) -> Result<Replayed> {
-    let plan = Plan { keeps_origins: true, ..Plan::new(scene, settings, &limits(gpu.facts()))? };
+    let whole = Plan::new(scene, settings, &limits(gpu.facts()))?;
+    let plan = Plan { keeps_origins: true, path_capacity: 1, photon_capacity: settings.bounces, ..whole };
     if settings.math == Math::Strict {
         strict_math(gpu)?;
     }
@@ -181,7 +182,7 @@ pub fn replay_on_gpu(gpu: &Gpu, scene: &RoomScene, settings: &Settings, round: u
     let mut commands = Commands::new(gpu, constants(&plan), Instant::now())?;
     let resources = Resources::new(gpu, &mut commands, scene, &plan)?;
     trace::emit(&mut commands, &resources, &plan, round, &ranges)?;
-    let start = path::unpack(&commands.read::<StoredPath>(&resources.paths[0], plan.path_array_length() as usize)?, 0);
+    let start = path::unpack(&commands.read::<StoredPath>(&resources.paths[0], 1)?, 0);
     let stored = stored(&mut commands, &resources, scene, &plan, round, &ranges)?;
     let tallies = tallies::read(&mut commands, &resources.tallies, settings.bounces)?;
     let oddities = if settings.paranoid { Some(Oddities::read(&mut commands, &resources.oddities)?) } else { None };

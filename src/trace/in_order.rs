@@ -23,11 +23,7 @@ pub fn one_bounce<'a>(
     let group_count = group_count(plan);
     // Groups that no path is left for count none, and so does the place behind the last, which becomes the sum of all.
     commands.fill(survivors, 0, u64::from(group_count) + 1, 0);
-    commands.dispatch(
-        TraceInPlace { rooms, walls, paths, next_paths: paths, weights, counters, tallies, survivors, oddities },
-        push,
-        extent(),
-    )?;
+    commands.dispatch(TraceInPlace { rooms, walls, paths, weights, counters, tallies, survivors, oddities }, push, extent())?;
     scan(commands, survivors, block_sums, group_count + 1, plan.settings.group_size)?;
     commands.dispatch(KeepOrder { paths, next_paths, photons, origins, counters, tallies, survivors, weights }, push, extent())
 }

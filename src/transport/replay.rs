@@ -94,17 +94,18 @@ pub fn light_paths(
     let round = Round { resources: &resources, geometry, plan, number };
     photons::emit(&mut commands, round, buffers, map, chunk)?;
     let mut paths = vec![commands.read::<LightPath>(&buffers.paths[0], chunk.1 as usize)?];
-    let mut tallies: Vec<Tally> = Vec::new();
+    let mut flown = 0;
     let mut left = chunk.1;
     for bounce in 0..flights {
         photons::fly(&mut commands, round, buffers, map, bounce, Extent::Items(u64::from(left)))?;
-        tallies = tallies::read(&mut commands, &buffers.tallies[usize::from(map.caustic_only)], bounce + 1)?;
-        left = tallies[bounce as usize].stored;
+        flown += 1;
+        left = *commands.read::<u32>(&buffers.counters, bounce as usize + 3)?.last().expect("a counter is read");
         if left == 0 {
             break;
         }
         paths.push(commands.read(&buffers.paths[(bounce as usize + 1) % 2], left as usize)?);
     }
+    let tallies = tallies::read(&mut commands, &buffers.tallies[usize::from(map.caustic_only)], flown)?;
     let oddities = if plan.settings.paranoid { Some(Oddities::read(&mut commands, &resources.oddities)?) } else { None };
     Ok(Flights { paths, tallies, oddities })
 }
