@@ -67,6 +67,7 @@ struct EmitPush {
 struct TracePush {
     RandomKey key;
     uint bounce;
+    uint bounces;
     uint path_capacity;
     uint photon_capacity;
     vec3 eye;

@@ -144,6 +144,7 @@ records! {
     TracePush {
         key: RandomKey,
         bounce: u32,
+        bounces: u32,
         path_capacity: u32,
         photon_capacity: u32,
         eye: Vec3,

@@ -124,6 +124,7 @@ fn one_bounce(commands: &mut Commands, resources: &Resources, plan: &Plan, round
     let push = TracePush {
         key: plan.streams().key(round),
         bounce,
+        bounces: plan.settings.bounces,
         path_capacity: plan.path_capacity,
         photon_capacity: photon_list_capacity(plan, photon_count),
         eye: plan.settings.eye.into(),

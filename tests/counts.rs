@@ -34,11 +34,11 @@ fn of_the_box(variant: Variant) -> Option<Cost> {
         |dispatches, build_bytes_per_event| Cost { dispatches, submissions: 6, events: 3530, device_bytes: 266_204, build_bytes_per_event };
     Some(match variant {
         // A round: two lights, four bounces, five of the index, the gather, the film.
-        Variant::Naive => cost(2 * 13, 281),
+        Variant::Naive => cost(2 * 13, 254),
         // And one after each bounce, which counts it, and one before the index, whose size only the device knows.
-        Variant::Atomic | Variant::Ballot | Variant::Group => cost(2 * 18, 135),
+        Variant::Atomic | Variant::Ballot | Variant::Group => cost(2 * 18, 131),
         // In place, a prefix sum of one level, moved together, counted: four a bounce.
-        Variant::Scan => Cost { device_bytes: 266_248, ..cost(2 * 26, 216) },
+        Variant::Scan => Cost { device_bytes: 266_248, ..cost(2 * 26, 212) },
         // The lights', and no path is stored.
         Variant::Persistent => Cost { device_bytes: 170_300, ..cost(2 * 10, 12) },
         Variant::Cpu => return None,

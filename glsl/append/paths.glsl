@@ -10,7 +10,13 @@ Path incoming_path(uint index)
     return unpack_path(words);
 }
 
-// Whether one has not died there.
+// Whether another bounce will read what this one hands on.
+bool has_next_bounce()
+{
+    return push.bounce + 1 < push.bounces;
+}
+
+// Whether a path has not died there.
 bool has_path(uint index)
 {
     return paths[path_word(0, index, push.path_capacity)].w != NO_WALL;

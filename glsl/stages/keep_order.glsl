@@ -23,7 +23,9 @@ void keep_order()
                 weight = weights[index];
             }
             store_photon(place, Photon(path.position, path.wall, path.flux, weight, path.photon, push.bounce));
-            store_path(path_place, path);
+            if (has_next_bounce()) {
+                store_path(path_place, path);
+            }
         }
     }
     if (index == 0) {

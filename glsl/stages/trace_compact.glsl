@@ -35,7 +35,9 @@ void trace_compact()
         if (stored) {
             store_photon(photon_place, bounced[k].photon);
             // Survivors are never more than the incoming paths, so this one always fits.
-            store_path(places[k], path[k]);
+            if (has_next_bounce()) {
+                store_path(places[k], path[k]);
+            }
         }
         counts += fates(stored, bounced[k].absorbed, bounced[k].escaped, alive[k] && !stored);
     }

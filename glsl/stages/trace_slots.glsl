@@ -24,7 +24,9 @@ void trace_slots()
         if (slot < push.photon_capacity) {
             store_photon(slot, photon);
         }
-        store_path(index, path);
+        if (has_next_bounce()) {
+            store_path(index, path);
+        }
     }
     tally(push.bounce, fates(stored, bounced.absorbed, bounced.escaped, bounced.alive && !stored));
 }

@@ -204,12 +204,16 @@ pub fn work(pass: &str, plan: &Plan, counts: &Counts, found: f64) -> Option<Work
     };
     let bounces = Cost {
         bytes: match settings.variant {
-            // Every slot is read and written at every bounce, alive or not.
-            Variant::Naive => slots * (2.0 * bytes::<StoredPath>() + bytes::<StoredPhoton>()),
+            // Every slot is read and written at every bounce, alive or not; after the last one nobody asks for paths.
+            Variant::Naive => slots * (path + bytes::<StoredPhoton>()) + (slots - counts.emitted) * path,
             // Survivors' paths are written where they were read, and read again once their places are known; of the dead
             // only the word is read that says so.
-            Variant::Scan => counts.flights * (path + 16.0) + counts.survivors * (3.0 * path - 16.0 + bytes::<StoredPhoton>()),
-            _ => counts.flights * path + counts.survivors * (path + bytes::<StoredPhoton>()),
+            Variant::Scan => {
+                counts.flights * (path + 16.0)
+                    + counts.survivors * (2.0 * path - 16.0 + bytes::<StoredPhoton>())
+                    + (counts.flights - counts.emitted) * path
+            }
+            _ => counts.flights * path + counts.survivors * bytes::<StoredPhoton>() + (counts.flights - counts.emitted) * path,
         },
         float_operations: counts.flights * FLIGHT_OPERATIONS,
         integer_products: counts.flights * products(settings.rng, 3.0),

@@ -1,10 +1,10 @@
 //! Cost and memory over the number of photons and of triangles.
 
-use std::time::{Duration, Instant};
-
 use serde::Serialize;
 
 use super::Lab;
+use super::paper_line::warm_up_rounds;
+use super::pass::{rounds_of, whole};
 use super::scene_line::{self, Job};
 use crate::error::{Error, Result};
 use crate::render::{self, Control, Outcome};
@@ -107,13 +107,14 @@ impl Series {
 /// Photons of a round, at most.
 const ROUND_ON_CARD: u64 = 10_000_000;
 const ROUND_ON_CPU: u64 = 1_000_000;
-/// A size is not repeated once its runs have taken this long.
-const PATIENCE: Duration = Duration::from_secs(2);
-const REPEATS: usize = 5;
+/// Repetitions of a size, as long as they have no more rounds in all.
+const REPEATS: u32 = 5;
+const MOST_ROUNDS_ON_CARD: u32 = 500;
+const MOST_ROUNDS_ON_CPU: u32 = 5;
 
 fn over_photons(lab: &mut Lab, left_out: &mut Vec<String>) -> Result<Vec<Step>> {
     let decades = if lab.is_cpu() { lab.choose(3..=6, 3..=7, 3..=7) } else { lab.choose(5..=8, 5..=8, 5..=10) };
-    let most = if lab.is_cpu() { ROUND_ON_CPU } else { ROUND_ON_CARD };
+    let (most, most_rounds) = if lab.is_cpu() { (ROUND_ON_CPU, MOST_ROUNDS_ON_CPU) } else { (ROUND_ON_CARD, MOST_ROUNDS_ON_CARD) };
     let mut steps = Vec::new();
     for size in decades.map(|decade| 10u64.pow(decade)) {
         lab.go_on()?;
@@ -123,39 +124,29 @@ fn over_photons(lab: &mut Lab, left_out: &mut Vec<String>) -> Result<Vec<Step>> 
         }
         (lab.tell)(&format!("{size} photons"));
         let photons = size.min(most) as u32;
-        let settings = Settings {
-            variant: Variant::Ballot,
-            photons,
-            rounds: (size / u64::from(photons)) as u32,
-            rng: Rng::Philox,
-            radius: 0.01,
-            mesh: 16,
-            ..Settings::default()
-        };
-        let run = || -> Result<Outcome> {
+        let settings = Settings { variant: Variant::Ballot, photons, rng: Rng::Philox, radius: 0.01, mesh: 16, ..Settings::default() };
+        let run = |rounds: u32| -> Result<Outcome> {
             let control = &mut Control { cancelled: lab.cancelled, progress: &mut |_| {} };
-            let outcome = render::on_gpu(lab.gpu, &open_box(&settings), &settings, control)?;
+            let outcome = render::on_gpu(lab.gpu, &open_box(&settings), &Settings { rounds, ..settings.clone() }, control)?;
             if outcome.cancelled { Err(Error::Interrupted) } else { Ok(outcome) }
         };
-        let began = Instant::now();
+        // In one run, as a card's clock falls while a run is set up.
+        let warm_up = warm_up_rounds(lab.gpu, || Ok(whole(&rounds_of(&run(2)?.timings, 2, 1))))?;
+        let rounds = (size / u64::from(photons)) as u32;
+        let all = warm_up + rounds * (most_rounds / rounds).clamp(1, REPEATS);
         lab.gpu.forget_peaks();
-        let mut outcomes = vec![run()?];
-        let peak_bytes = lab.gpu.held_memory().peak_device_bytes;
-        while outcomes.len() <= REPEATS && began.elapsed() < PATIENCE {
-            outcomes.push(run()?);
-        }
-        // The first made pipelines and woke the card.
-        let counted = if outcomes.len() > 1 { &outcomes[1..] } else { &outcomes[..] };
+        let outcome = run(all)?;
+        let scopes = rounds_of(&outcome.timings, all, warm_up);
         let pass = |name: &str| {
-            let path = format!("round/{name}");
-            let ms = counted.iter().filter_map(|outcome| outcome.timings.row(&path)?.gpu_ms).collect();
-            Spread::of(ms).map(|ms| PassTime { pass: name.to_owned(), ms })
+            let (_, ms) = scopes.iter().find(|(scope, _)| scope == name)?;
+            let sums = ms.chunks_exact(rounds as usize).map(|rounds| rounds.iter().sum()).collect();
+            Spread::of(sums).map(|ms| PassTime { pass: name.to_owned(), ms })
         };
         steps.push(Step {
             size,
             passes: ["build", "index", "gather"].into_iter().filter_map(pass).collect(),
-            peak_bytes,
-            stated_bytes: outcomes[0].plan.bytes(),
+            peak_bytes: lab.gpu.held_memory().peak_device_bytes,
+            stated_bytes: outcome.plan.bytes(),
         });
     }
     Ok(steps)
