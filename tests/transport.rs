@@ -96,7 +96,7 @@ fn crowded_points_miss_no_photon() {
 fn every_pixel_is_lit_whatever_the_size_of_the_picture() {
     let Some(gpu) = device() else { return };
     let scene = scene("furnace");
-    for (width, height) in [(1, 1), (3, 2), (8, 4), (13, 7), (67, 65)] {
+    for (width, height) in [(1, 1), (3, 2), (8, 4), (13, 7), (67, 5), (5, 67)] {
         let (geometry, plan) = plan_of(&gpu, &scene, &small(), Sensor::Picture { width, height });
         let camera = camera_of(&scene);
         let lit = light(&gpu, &View { geometry: &geometry, camera: Some(&camera), phases: &[] }, plan);
