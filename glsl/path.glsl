@@ -1,6 +1,6 @@
-// Photons in flight, and their paths between bounces as three words of four: place, direction and random stream. The first words of all paths stand
-// side by side, then the second and the third ones, so that neighbouring invocations move neighbouring words. Twin of
-// src/path.rs.
+// Photons in flight, and their paths between bounces as three words of four: place, direction and random stream. The first
+// words of all paths stand side by side, then the second and the third ones, so that neighbouring invocations move
+// neighbouring words. Twin of src/path.rs.
 
 struct Path {
     vec3 position;

@@ -141,27 +141,16 @@ fn one_bounce(commands: &mut Commands, resources: &Resources, plan: &Plan, round
     let [even, odd] = &resources.paths;
     let (paths, next_paths) = if bounce.is_multiple_of(2) { (even, odd) } else { (odd, even) };
     let Resources { rooms, walls, photons, origins, counters, tallies, oddities, .. } = resources;
+    macro_rules! trace {
+        ($kernel:ident) => {
+            commands.dispatch($kernel { rooms, walls, paths, next_paths, photons, origins, counters, tallies, oddities }, &push, extent())
+        };
+    }
     match variant {
-        Variant::Naive => commands.dispatch(
-            TraceSlots { rooms, walls, paths, next_paths, photons, origins, counters, tallies, oddities },
-            &push,
-            extent(),
-        ),
-        Variant::Atomic => commands.dispatch(
-            TraceAtomic { rooms, walls, paths, next_paths, photons, origins, counters, tallies, oddities },
-            &push,
-            extent(),
-        ),
-        Variant::Ballot => commands.dispatch(
-            TraceBallot { rooms, walls, paths, next_paths, photons, origins, counters, tallies, oddities },
-            &push,
-            extent(),
-        ),
-        Variant::Group => commands.dispatch(
-            TraceGroup { rooms, walls, paths, next_paths, photons, origins, counters, tallies, oddities },
-            &push,
-            extent(),
-        ),
+        Variant::Naive => trace!(TraceSlots),
+        Variant::Atomic => trace!(TraceAtomic),
+        Variant::Ballot => trace!(TraceBallot),
+        Variant::Group => trace!(TraceGroup),
         Variant::Scan => in_order::one_bounce(commands, resources, plan, [paths, next_paths], &push, extent),
         Variant::Persistent | Variant::Cpu => panic!("{} has no bounces of all paths", variant.name()),
     }?;

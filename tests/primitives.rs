@@ -233,7 +233,10 @@ const GUARD_ENTRIES: u64 = 64;
 
 fn append(gpu: &Device, scene: &RoomScene, settings: &Settings, capacity: u32) -> Appended {
     let mut plan = Plan { keeps_origins: true, ..plan_for(gpu, scene, settings) };
-    let (path_count, bounces) = (u64::from(settings.photons), settings.bounces);
+    let bounces = settings.bounces;
+    // Behind each of the arrays that paths lie in.
+    plan.path_capacity += GUARD_ENTRIES as u32;
+    let path_count = u64::from(plan.path_capacity);
     let mut commands = Commands::new(gpu, constants(&plan), Instant::now()).unwrap();
     let mut resources = Resources::new(gpu, &mut commands, scene, &plan).unwrap();
     plan.photon_capacity = capacity;
@@ -241,7 +244,7 @@ fn append(gpu: &Device, scene: &RoomScene, settings: &Settings, capacity: u32) -
         commands.fill(&buffer, 0, buffer.size_bytes() / 4, GUARD);
         buffer
     };
-    let paths = || gpu.buffer::<StoredPath>("guarded paths", path_count + GUARD_ENTRIES, Memory::Device).unwrap();
+    let paths = || gpu.buffer::<StoredPath>("guarded paths", path_count, Memory::Device).unwrap();
     let entries = u64::from(capacity) + GUARD_ENTRIES;
     resources.photons = guarded(&mut commands, gpu.buffer::<StoredPhoton>("guarded photons", entries, Memory::Device).unwrap());
     resources.origins = guarded(&mut commands, gpu.buffer::<Origin>("guarded origins", entries, Memory::Device).unwrap());
@@ -253,8 +256,10 @@ fn append(gpu: &Device, scene: &RoomScene, settings: &Settings, capacity: u32) -
     let (origins, origins_behind) = origins.split_at(capacity as usize);
     let mut guards: Vec<u32> = [bytemuck::cast_slice(behind), bytemuck::cast_slice(origins_behind)].concat();
     for paths in &resources.paths {
-        let all = commands.read::<StoredPath>(paths, (path_count + GUARD_ENTRIES) as usize).unwrap();
-        guards.extend_from_slice(bytemuck::cast_slice(&all[path_count as usize..]));
+        let words = commands.read::<[u32; 4]>(paths, 3 * path_count as usize).unwrap();
+        for array in words.chunks_exact(path_count as usize) {
+            guards.extend(array[settings.photons as usize..].as_flattened());
+        }
     }
     Appended {
         photons: map.iter().zip(origins).map(|(photon, origin)| photon.photon(*origin, &scene.room_record())).collect(),

@@ -156,7 +156,7 @@ pub fn compare(gpu: &Gpu, kind: &str, [photons, aimed]: [u32; 2], family: &mut F
 /// Whether aimed photons bring as much light, to some per cent.
 pub fn same_light(gpu: &Gpu, kind: &str) -> super::Check {
     let mut family = Family::default();
-    compare(gpu, kind, [8_000, 2_000], &mut family);
+    compare(gpu, kind, [16_000, 4_000], &mut family);
     family.check()
 }
 
