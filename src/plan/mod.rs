@@ -404,7 +404,9 @@ mod tests {
             assert!(photons.into_iter().eq(100..1101) && parts.iter().all(|part| part.light == 1 && part.count <= most), "{most}");
         }
         let dealing = Persistence { busy_invocations: 100, most_photons: 4 };
-        for (photons, invocations) in [(1, 1), (99, 99), (199, 199), (200, 100), (399, 133), (400, 100), (4000, 1000)] {
+        for (photons, invocations) in
+            [(1, 1), (99, 99), (199, 199), (200, 100), (398, 133), (399, 133), (400, 100), (401, 101), (4000, 1000)]
+        {
             assert_eq!(dealing.invocations(photons), invocations, "{photons} photons");
         }
     }
