@@ -73,6 +73,13 @@ struct TracePush {
     vec3 eye;
 };
 
+struct FillGapsPush {
+    uint bounce;
+    uint bounces;
+    uint path_capacity;
+    uint photon_capacity;
+};
+
 struct EndBouncePush {
     uint bounce;
     uint photon_capacity;

@@ -157,6 +157,13 @@ records! {
         max_groups: u32,
     }
 
+    FillGapsPush {
+        bounce: u32,
+        bounces: u32,
+        path_capacity: u32,
+        photon_capacity: u32,
+    }
+
     TraceWholePush {
         key: RandomKey,
         range: PhotonRange,

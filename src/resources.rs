@@ -28,7 +28,7 @@ pub struct Resources {
     pub photons: Buffer,
     /// Which photon each entry of the photon map is; one empty element where nobody asks.
     pub origins: Buffer,
-    /// Length of the photon map, then the paths entering each bounce.
+    /// Length of the photon map, the paths entering each bounce, and the counters that are taken in turn.
     pub counters: Buffer,
     pub dispatch_args: Buffer,
     /// What keeps photons in order; `None` where they come as they do.
@@ -114,7 +114,6 @@ pub struct SearchBuffers {
 impl Resources {
     /// Makes the buffers and records the upload of what never changes.
     pub fn new(gpu: &Gpu, commands: &mut Commands, scene: &RoomScene, plan: &Plan) -> Result<Resources> {
-        let bounces = u64::from(plan.settings.bounces);
         let paths = u64::from(plan.path_array_length());
         let photons = u64::from(plan.photon_capacity);
         let seeds = plan.streams().first_states(plan.path_capacity);
@@ -129,7 +128,7 @@ impl Resources {
             paths: [gpu.buffer::<StoredPath>("even paths", paths, device)?, gpu.buffer::<StoredPath>("odd paths", paths, device)?],
             photons: gpu.buffer::<StoredPhoton>("photons", photons, device)?,
             origins: gpu.buffer::<Origin>("origins", u64::from(plan.origin_array_length()), device)?,
-            counters: gpu.buffer::<u32>("counters", bounces + 2, device)?,
+            counters: gpu.buffer::<u32>("counters", plan.counter_array_length(), device)?,
             dispatch_args: gpu.buffer::<DispatchArgs>("dispatch args", 1, device)?,
             order: if plan.settings.variant == Variant::Scan { Some(OrderBuffers::new(gpu, plan)?) } else { None },
             tallies: tallies::buffer(gpu, "tallies", plan.settings.bounces)?,

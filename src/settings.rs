@@ -203,12 +203,17 @@ pub struct Settings {
     pub stop: Stop,
     /// Invocations of a work group.
     pub group_size: u32,
+    /// Counters that the atomic builder's work groups take turns at; `None`: as many as serve the device.
+    pub counters: Option<u32>,
     /// Most photons traced at once; `None`: as many as the device's buffers hold.
     pub chunk: Option<u32>,
 }
 
 /// Half the edge of the open box, metres.
 pub const HALF_WIDTH: f64 = 0.25;
+
+/// Most counters that photons are appended by.
+pub const MAX_COUNTERS: u32 = 64;
 
 /// Photons of the paper's round, to which its `full_light` refers.
 pub const PAPER_PHOTONS: u32 = 5000;
@@ -247,6 +252,7 @@ impl Settings {
             paranoid: false,
             stop: Stop::default(),
             group_size: 128,
+            counters: None,
             chunk: None,
         };
         match preset {
@@ -337,6 +343,9 @@ impl Settings {
         within("--threads", self.threads as u64, 1..=1024, "threads")?;
         if !(self.group_size.is_power_of_two() && (32..=1024).contains(&self.group_size)) {
             return Err(Error::setting("--group-size", self.group_size, "must be a power of two from 32 to 1024"));
+        }
+        if self.counters.is_some_and(|counters| !(counters.is_power_of_two() && counters <= MAX_COUNTERS)) {
+            return Err(Error::setting("--counters", self.counters.unwrap_or(0), format!("must be a power of two up to {MAX_COUNTERS}")));
         }
         if let Some(chunk) = self.chunk {
             within("--chunk", chunk, 2..=MAX_PHOTONS, "photons traced at once, at least one for each of the two lights")?;

@@ -5,11 +5,11 @@ mod in_order;
 use crate::constants::{MAX_GROUPS, PATHS_TOGETHER};
 use crate::error::Result;
 use crate::gpu::kernels::{
-    Emit, EndBounce, KeepOrder, ScanAdd, ScanBlocks, TraceAtomic, TraceBallot, TraceGroup, TraceInPlace, TraceSlots, TraceWhole,
+    Emit, EndBounce, FillGaps, KeepOrder, ScanAdd, ScanBlocks, TraceAtomic, TraceBallot, TraceGroup, TraceInPlace, TraceSlots, TraceWhole,
 };
 use crate::gpu::{Commands, Extent, Kernel, Module};
 use crate::plan::{EmissionRange, Plan, photons_of};
-use crate::records::{EmitPush, EndBouncePush, PhotonRange, TracePush, TraceWholePush};
+use crate::records::{EmitPush, EndBouncePush, FillGapsPush, PhotonRange, TracePush, TraceWholePush};
 use crate::resources::Resources;
 use crate::rng::words;
 use crate::settings::Variant;
@@ -18,7 +18,7 @@ use crate::settings::Variant;
 pub fn modules(plan: &Plan) -> Vec<Module> {
     match plan.settings.variant {
         Variant::Naive => vec![Emit::MODULE, TraceSlots::MODULE],
-        Variant::Atomic => vec![Emit::MODULE, TraceAtomic::MODULE, EndBounce::MODULE],
+        Variant::Atomic => vec![Emit::MODULE, TraceAtomic::MODULE, FillGaps::MODULE, EndBounce::MODULE],
         Variant::Ballot => vec![Emit::MODULE, TraceBallot::MODULE, EndBounce::MODULE],
         Variant::Group => vec![Emit::MODULE, TraceGroup::MODULE, EndBounce::MODULE],
         Variant::Scan => {
@@ -33,7 +33,7 @@ pub fn modules(plan: &Plan) -> Vec<Module> {
 pub fn chunk(commands: &mut Commands, resources: &Resources, plan: &Plan, round: u32, ranges: &[EmissionRange]) -> Result<()> {
     let photon_count = photons_of(ranges);
     commands.scope("build", |commands| {
-        commands.fill(&resources.counters, 0, u64::from(plan.settings.bounces) + 2, 0);
+        commands.fill(&resources.counters, 0, plan.counter_array_length(), 0);
         commands.fill(&resources.counters, 1, 1, photon_count);
         commands.add_work(plan.work.tracing(photon_count));
         if plan.settings.variant == Variant::Persistent {
@@ -156,6 +156,11 @@ fn one_bounce(commands: &mut Commands, resources: &Resources, plan: &Plan, round
     }?;
     if variant == Variant::Naive {
         return Ok(());
+    }
+    if plan.counters > 1 {
+        let TracePush { bounces, path_capacity, photon_capacity, .. } = push;
+        let gaps = FillGapsPush { bounce, bounces, path_capacity, photon_capacity };
+        commands.dispatch(FillGaps { counters, photons, next_paths }, &gaps, Extent::Groups(1, 1))?;
     }
     let end = EndBouncePush {
         bounce,

@@ -95,6 +95,7 @@ fn bad_input_is_refused_in_one_line() {
         (&["--sums", "double"], ["--sums", "double", "integer, f32, compensated"]),
         (&["--seed", "4294967296"], ["--seed", "4294967296", "4294967295"]),
         (&["--group-size", "48"], ["--group-size", "48", "power of two"]),
+        (&["--counters", "3"], ["--counters", "3", "power of two up to 64"]),
         (&["--threads", "0"], ["--threads", "0", "from 1"]),
         (&["--chunk", "1"], ["--chunk", "1", "from 2"]),
         (&["--photons", "2147483648", "--rounds", "100000", "--rng", "rand48"], ["--rng", "rand48", "philox"]),

@@ -506,6 +506,7 @@ fn vast() -> Limits {
         busy_invocations: 1 << 17,
         loop_iterations: 1 << 14,
         lanes: 32,
+        counters: 1,
     }
 }
 

@@ -81,7 +81,7 @@ fn work_groups_and_chunks_give_the_same_bits() {
             }
             let variant = Variant::ON_GPU[place % Variant::ON_GPU.len()];
             for gather in [Gather::Grid, Gather::Brute] {
-                let other = Settings { group_size, variant, gather, ..settings.clone() };
+                let other = Settings { group_size, variant, gather, counters: Some(2 << place), ..settings.clone() };
                 assert_same(what, &format!("groups of {group_size}, {variant:?} {gather:?}"), &film(&gpu, &other), &expected);
             }
         }

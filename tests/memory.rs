@@ -42,6 +42,7 @@ fn the_papers_line_takes_what_its_plan_says() {
         Settings { radius: 0.004, ..small() },
         Settings { photons: 999, mesh: 5, rounds: 2, ..Settings::preset(Preset::Rounds) },
     ];
+    cases.push(Settings { counters: Some(4), ..small() });
     cases.extend(Variant::ON_GPU.map(|variant| Settings { variant, ..small() }));
     // Weights at the eye, which only the builder that keeps order holds apart from their photons.
     cases.push(Settings { variant: Variant::Scan, shininess: [Some(2.0); 5], ..small() });

@@ -146,6 +146,13 @@ fn group_sizes_and_chunks_change_no_photon() {
             let found = builders_agree(&gpu, &Settings { group_size, ..settings.clone() });
             assert_holds(format!("{rng:?}, groups of {group_size}"), same_set(&found, &expected));
         }
+        for (counters, group_size) in [(2, 32), (8, 64), (8, 128), (64, 32)] {
+            let settings = Settings { counters: Some(counters), group_size, variant: Variant::Atomic, ..settings.clone() };
+            for chunk in [None, Some(500)] {
+                let found = photons(&gpu, &Settings { chunk, ..settings.clone() });
+                assert_holds(format!("{rng:?}, {counters} counters, groups of {group_size}, {chunk:?}"), same_set(&found, &expected));
+            }
+        }
         for chunk in [65, 500, 1000, 1001, 5000] {
             let found = builders_agree(&gpu, &Settings { chunk: Some(chunk), ..settings.clone() });
             assert_holds(format!("{rng:?}, chunks of {chunk}"), same_set(&found, &expected));

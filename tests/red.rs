@@ -34,6 +34,8 @@ enum Question {
     Film(Gather),
     /// So is the film of the nearest photons.
     Nearest,
+    /// So is the photon map of the atomic builder with several counters.
+    InTurn,
     /// The ledger closes and nothing is dropped.
     Ledger(Variant),
     /// A closed form of `selfcheck`, by name.
@@ -72,7 +74,7 @@ impl Question {
     /// Whether another test, the same for every device, shows that a device without a fault answers it right.
     fn has_a_test_of_its_own(self) -> bool {
         match self {
-            Photons(_) | Film(_) | Ledger(_) | ClosedForm(_) | Appends | Builders | StrictMath | Finite | Nearest | Crowds
+            Photons(_) | InTurn | Film(_) | Ledger(_) | ClosedForm(_) | Appends | Builders | StrictMath | Finite | Nearest | Crowds
             | AimedLight(_) => false,
             Bits(_) | LampInBox(_) | Shelf | Ridge | Spot | Texture(_) => true,
             LeaningPlane(_) | LeaningScatterer | PatchInPlane | SheetsInOnePlane | GlassInFurnace(..) => true,
@@ -92,7 +94,7 @@ struct Fault {
     noticed_by: &'static [Question],
 }
 
-const FAULTS: [Fault; 60] = [
+const FAULTS: [Fault; 63] = [
     Fault {
         what: "what one sample looks up for all counts for itself alone",
         file: "kernels/weigh.comp",
@@ -140,6 +142,30 @@ const FAULTS: [Fault; 60] = [
         to: "path_count / PLACES",
         kernels: &["trace_ballot"],
         noticed_by: &[Ledger(Variant::Ballot), Photons(Variant::Ballot)],
+    },
+    Fault {
+        what: "a gap of several counters is taken for a photon",
+        file: "kernels/fill_gaps.comp",
+        from: "photons[first_photon + place] = pack_photon(Photon(vec3(0.0), NO_WALL, 0.0, 0.0, 0, 0));",
+        to: "",
+        kernels: &["fill_gaps"],
+        noticed_by: &[InTurn],
+    },
+    Fault {
+        what: "a gap of several counters is taken for a path",
+        file: "kernels/fill_gaps.comp",
+        from: "next_paths[path_word(0, place, push.path_capacity)].w = NO_WALL;",
+        to: "",
+        kernels: &["fill_gaps"],
+        noticed_by: &[InTurn],
+    },
+    Fault {
+        what: "the last block of the counter that is ahead is left out",
+        file: "kernels/fill_gaps.comp",
+        from: "end = max(end, taken == 0 ? 0 : place_in_turn(turn, taken - 1) + 1);",
+        to: "end = max(end, taken == 0 ? 0 : place_in_turn(0, taken - 1) + 1);",
+        kernels: &["fill_gaps"],
+        noticed_by: &[InTurn],
     },
     Fault {
         what: "a lane is lost",
@@ -624,10 +650,14 @@ fn cornell() -> Scene {
 fn ask(gpu: &Gpu, question: Question) -> Check {
     let never = AtomicBool::new(false);
     match question {
-        Photons(variant) => {
-            let settings = match variant {
-                Variant::Persistent => Settings { variant, photons: MANY_PHOTONS, chunk: Some(MANY_PHOTONS), ..strict() },
-                _ => Settings { variant, ..strict() },
+        Photons(_) | InTurn => {
+            let settings = match question {
+                InTurn => Settings { variant: Variant::Atomic, counters: Some(8), ..strict() },
+                Photons(variant @ Variant::Persistent) => {
+                    Settings { variant, photons: MANY_PHOTONS, chunk: Some(MANY_PHOTONS), ..strict() }
+                }
+                Photons(variant) => Settings { variant, ..strict() },
+                _ => unreachable!(),
             };
             let (found, expected) = (in_order(photons(gpu, &settings)), in_order(photons_on_cpu(&settings)));
             if found == expected { Ok(()) } else { Err(format!("{} photons, not the {} of the CPU builder", found.len(), expected.len())) }

@@ -95,9 +95,9 @@ fn any_settings(random: &mut Random) -> Settings {
     let mut settings = Settings::preset(random.pick(&[Preset::Naive, Preset::Modified, Preset::Phong, Preset::Rounds]));
     settings.rng = random.pick(&[Rng::Rand48, Rng::Mt, Rng::Sobol, Rng::Philox, Rng::Philox]);
     for _ in 0..=random.below(3) {
-        match random.below(17) {
-            15 => settings.nearest = Some(random.count(2, 1024)),
-            16 => {
+        match random.below(18) {
+            16 => settings.nearest = Some(random.count(2, 1024)),
+            17 => {
                 settings.gather = Gather::KdTree;
                 settings.nearest = Some(random.count(2, 1024));
                 match random.below(3) {
@@ -119,7 +119,8 @@ fn any_settings(random: &mut Random) -> Settings {
             10 => settings.eye[random.below(3)] = random.number_f32(-1e15, 1e15),
             11 => settings.threads = random.count(1, 1024) as usize,
             12 => settings.group_size = if random.below(2) == 0 { 1 << random.below(12) } else { random.count(32, 1024) },
-            13 => settings.chunk = Some(random.count(2, 1 << 31)),
+            13 => settings.counters = Some(if random.below(2) == 0 { 1 << random.below(8) } else { random.count(1, 64) }),
+            14 => settings.chunk = Some(random.count(2, 1 << 31)),
             _ => settings.seed = random.pick(&[0, u64::from(u32::MAX), 1 << 32, u64::MAX]),
         }
     }
@@ -166,6 +167,11 @@ fn settings_are_accepted_exactly_within_their_ranges() {
             rule("--eye", format!("{x},{y},{z}"), settings.eye.iter().all(is_coordinate)),
             rule("--threads", settings.threads, (1..=1024).contains(&settings.threads)),
             rule("--group-size", settings.group_size, [32, 64, 128, 256, 512, 1024].contains(&settings.group_size)),
+            rule(
+                "--counters",
+                settings.counters.unwrap_or_default(),
+                settings.counters.is_none_or(|counters| [1, 2, 4, 8, 16, 32, 64].contains(&counters)),
+            ),
             rule("--chunk", settings.chunk.unwrap_or_default(), settings.chunk.is_none_or(|chunk| (2..=1 << 31).contains(&chunk))),
             rule("--nearest", nearest, settings.nearest.is_none_or(|nearest| (2..=1024).contains(&nearest))),
             rule("--nearest", nearest, settings.nearest.is_none() || settings.gather == Gather::KdTree),

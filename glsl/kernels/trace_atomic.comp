@@ -1,4 +1,4 @@
-// One bounce, survivors stored by append/atomic.glsl.
+// One bounce, survivors stored by append/atomic_in_turn.glsl.
 // Dispatched by src/trace.rs once a bounce. One thread = one incoming path.
 #version 460
 #extension GL_GOOGLE_include_directive : require
@@ -29,7 +29,8 @@ layout(set = 1, binding = 4, scalar) buffer Tallies { Tally tallies[]; };
 const uint PLACES = 1;
 #include "append/paths.glsl"
 #include "append/store.glsl"
-#include "append/atomic.glsl"
+#include "append/in_turn.glsl"
+#include "append/atomic_in_turn.glsl"
 #include "append/each.glsl"
 #include "stages/bounce.glsl"
 #include "stages/trace_compact.glsl"

@@ -22,7 +22,10 @@ void trace_compact()
         bounced[k] = no_bounce();
         if (column < row && index < path_count) {
             path[k] = incoming_path(index);
-            bounced[k] = bounce_path(path[k], push.bounce);
+            // Gaps of several counters; nobody else leaves any.
+            if (path[k].wall != NO_WALL) {
+                bounced[k] = bounce_path(path[k], push.bounce);
+            }
         }
         alive[k] = bounced[k].alive;
     }

@@ -13,9 +13,12 @@ use super::targets::{Finding, findings};
 use super::{Lab, Size};
 use crate::compaction::{self, Map};
 use crate::error::Result;
+use crate::plan::Plan;
+use crate::render::limits;
 use crate::rng::Rng;
 use crate::scene::built_in;
 use crate::scene::geometry::Geometry;
+use crate::scene::open_box::open_box as open_box_scene;
 use crate::settings::transport::{Append, Effect, Illumination, TransportSettings};
 use crate::settings::{Preset, Settings, Variant};
 use crate::timings::Spread;
@@ -151,19 +154,26 @@ fn builders(lab: &mut Lab) -> Result<Found> {
     let mut passes = Vec::new();
     let mut ratios = Vec::new();
     for bounces in [2, 15] {
-        let mut builds = Vec::new();
+        let (mut builds, mut one_counter) = (Vec::new(), None);
         for variant in Variant::ON_GPU {
             lab.go_on()?;
             let settings = Settings { bounces, radius: Settings::default().radius, ..large_box(variant, photons, lab.choose(16, 32, 64)) };
             let timed = paper_line::time(lab.gpu, &lab.rates, &settings, lab.cancelled)?;
             builds.push((variant, timed.ms("build"), limit_ms(timed.pass("build"))));
             passes.extend(timed.passes);
+            // The paper's atomics literally, where more counters serve the device better.
+            if variant == Variant::Atomic && Plan::new(&open_box_scene(&settings), &settings, &limits(lab.gpu.facts()))?.counters > 1 {
+                let timed = paper_line::time(lab.gpu, &lab.rates, &Settings { counters: Some(1), ..settings }, lab.cancelled)?;
+                one_counter = Some(timed.ms("build"));
+                passes.extend(timed.passes);
+            }
         }
         let of = |wanted: Variant| *builds.iter().find(|(variant, ..)| *variant == wanted).expect("every builder was timed");
         let ((_, naive, naive_limit), (_, atomic, atomic_limit)) = (of(Variant::Naive), of(Variant::Atomic));
         let ratio = |over: f64, under: f64| if bounces == 2 { over / under } else { under / over };
         let limit = atomic_limit.zip(naive_limit).map(|(atomic, naive)| ratio(atomic, naive));
-        ratios.push((ratio(atomic, naive), limit, format!("{photons} photons a round")));
+        let of_one = one_counter.map_or_else(String::new, |one| format!("; all from one counter: {:.2} x", ratio(one, naive)));
+        ratios.push((ratio(atomic, naive), limit, format!("{photons} photons a round{of_one}")));
     }
     Ok((passes, ratios))
 }

@@ -150,8 +150,9 @@ fn timed(gpu: &Gpu, rates: &Rates, outcome: &Outcome, rounds: u32, first: u32) -
 }
 
 fn workload(settings: &Settings) -> String {
-    let Settings { variant, photons, bounces, radius, .. } = settings;
-    format!("open box, {}, {photons} photons, {bounces} bounces, radius {radius} m", variant.name())
+    let Settings { variant, photons, bounces, radius, counters, .. } = settings;
+    let counters = counters.map_or_else(String::new, |counters| format!(" by {counters} counter(s)"));
+    format!("open box, {}{counters}, {photons} photons, {bounces} bounces, radius {radius} m", variant.name())
 }
 
 /// Photons within the radius of a point, of all rounds: without Phong weights the first sum of a point counts them.
@@ -243,8 +244,8 @@ pub fn work(pass: &str, plan: &Plan, counts: &Counts, found: f64) -> Option<Work
         Variant::Naive => chunks * bounce_count,
         // In place, moved together in order, and counted.
         Variant::Scan => chunks * bounce_count * (3.0 + scans_of(group_count(plan))),
-        // Stored where they belong, and counted.
-        _ => chunks * bounce_count * 2.0,
+        // Stored where they belong, gaps marked where there are any, and counted.
+        _ => chunks * bounce_count * if plan.counters > 1 { 3.0 } else { 2.0 },
     };
     let scans = chunks * scans_of(plan.grid.cells());
     let counting = chunks * (1.0 + sized(1.0));

@@ -128,6 +128,10 @@ pub(super) struct RunArgs {
     /// Invocations of a work group [default: 128]
     #[arg(long, value_parser = whole::<u32>, allow_negative_numbers = true, help_heading = "Device")]
     group_size: Option<u32>,
+    /// Counters that work groups of `--variant atomic` take turns at, a power of two; the result is the same to the bit
+    /// [default: 1, on a GPU 8 where two million photons and more are traced at once]
+    #[arg(long, value_parser = whole::<u32>, allow_negative_numbers = true, help_heading = "Device")]
+    counters: Option<u32>,
     /// Most photons traced at once; the result is the same to the bit [default: what the device holds]
     #[arg(long, value_parser = whole::<u32>, allow_negative_numbers = true, help_heading = "Device")]
     chunk: Option<u32>,
@@ -281,6 +285,7 @@ impl RunArgs {
             threads: self.threads.unwrap_or(preset.threads),
             paranoid: self.paranoid,
             group_size: self.group_size.unwrap_or(preset.group_size),
+            counters: self.counters.or(preset.counters),
             chunk: self.chunk.or(preset.chunk),
             stop: self.stop.stop(),
         };

@@ -72,7 +72,7 @@ impl Plan {
             ("paths", 2 * array::<StoredPath>(paths)),
             ("photons", array::<StoredPhoton>(photons)),
             ("origins", array::<Origin>(origins)),
-            ("counters", array::<u32>(bounces + 2)),
+            ("counters", array::<u32>(self.counter_array_length())),
             ("dispatch args", array::<DispatchArgs>(1)),
             ("tallies", array::<Tally>(bounces * u64::from(TALLY_COPIES))),
             ("film", array::<u64>(sums)),

@@ -14,7 +14,7 @@ use serde::Serialize;
 pub use capacity::{Limits, Persistence, Work};
 pub use effect::Decision;
 
-use crate::constants::{NEAREST_BITS, NEAREST_GAIN_BITS};
+use crate::constants::{COUNTER_STRIDE, NEAREST_BITS, NEAREST_GAIN_BITS};
 use crate::error::{Error, Result};
 use crate::photon::StoredPhoton;
 use crate::records::{IndexPush, Point};
@@ -59,7 +59,9 @@ pub struct Plan {
     /// lights' power among them, so that each carries `flux_unit` / n.
     pub flux_unit: f64,
     pub chunks_per_round: u32,
-    /// Photons of the largest chunk: what the path arrays hold.
+    /// Counters that the atomic builder's work groups take turns at.
+    pub counters: u32,
+    /// What the path arrays hold: photons of the largest chunk, and the gaps that several counters leave.
     pub path_capacity: u32,
     /// Entries of the photon map.
     pub photon_capacity: u32,
@@ -161,6 +163,7 @@ impl Plan {
             relative_flux,
             flux_unit: strongest * f64::from(settings.photons),
             chunks_per_round,
+            counters: capacity::counters(settings, limits, chunk_photons),
             path_capacity: 0,
             photon_capacity: 0,
             points,
@@ -174,6 +177,9 @@ impl Plan {
         };
         // Of each light's photons the larger share: there may be a billion chunks, too many to look at each.
         plan.path_capacity = plan.light_photons.iter().map(|count| count.div_ceil(chunks_per_round)).sum();
+        if plan.counters > 1 {
+            plan.path_capacity = plan.path_capacity.next_multiple_of(plan.counters * settings.group_size);
+        }
         plan.photon_capacity = plan.path_capacity * settings.bounces;
         // Even if a point has every photon in reach.
         plan.slices_candidates = plan.photon_capacity.div_ceil(plan.lanes) > capacity::most_candidates(limits);
@@ -249,6 +255,12 @@ impl Plan {
     /// Paths that one bounce hands to the next; where each photon has an invocation to its end, the one that a replay starts.
     pub fn path_array_length(&self) -> u32 {
         if self.settings.variant == Variant::Persistent { 1 } else { self.path_capacity }
+    }
+
+    /// Length of the photon map, paths entering each bounce, and what is counted in turn.
+    pub fn counter_array_length(&self) -> u64 {
+        let in_turn = if self.counters > 1 { self.counters * COUNTER_STRIDE } else { 0 };
+        u64::from(self.settings.bounces) + 2 + u64::from(in_turn)
     }
 
     /// Entries of the photon map that say which photon they are.

@@ -89,6 +89,7 @@ pub fn limits(facts: &DeviceFacts) -> Limits {
         loop_iterations: Limits::loop_iterations_of(facts.kind),
         busy_invocations: Limits::busy_invocations_of(facts.kind),
         lanes: Limits::lanes_of(facts.kind),
+        counters: Limits::counters_of(facts.kind),
     }
 }
 
@@ -104,6 +105,7 @@ pub fn constants(plan: &Plan) -> Constants {
         .set("PHONG_DIRECTION", settings.phong_direction.code())
         .set("HAS_SLOTS", u32::from(plan.has_slots()))
         .set("HAS_ORIGINS", u32::from(plan.keeps_origins))
+        .set("COUNTERS", plan.counters)
         .set("LANES", plan.lanes)
         .set("HAS_SLICES", u32::from(plan.slices_candidates))
         .set("CHANNEL_COUNT", plan.channel_count)
@@ -174,7 +176,7 @@ pub fn photons_on_gpu(gpu: &Gpu, scene: &RoomScene, settings: &Settings) -> Resu
 /// One photon by itself. A photon is (seed, round, number), so it takes the same path alone as among millions.
 pub fn replay_on_gpu(gpu: &Gpu, scene: &RoomScene, settings: &Settings, round: u32, photon: u32) -> Result<Replayed> {
     let whole = Plan::new(scene, settings, &limits(gpu.facts()))?;
-    let plan = Plan { keeps_origins: true, path_capacity: 1, photon_capacity: settings.bounces, ..whole };
+    let plan = Plan { keeps_origins: true, counters: 1, path_capacity: 1, photon_capacity: settings.bounces, ..whole };
     if settings.math == Math::Strict {
         strict_math(gpu)?;
     }

@@ -1,0 +1,10 @@
+// append/atomic.glsl, from one counter of several where there are.
+
+uint take_place(uint counter, bool wanted)
+{
+    if (COUNTERS == 1) {
+        return wanted ? atomicAdd(counters[counter], 1) : 0;
+    }
+    uint turn = work_group_index() % COUNTERS;
+    return wanted ? place_in_turn(turn, atomicAdd(counters[counter_in_turn(turn)], 1)) : 0;
+}
