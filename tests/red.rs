@@ -94,7 +94,7 @@ struct Fault {
     noticed_by: &'static [Question],
 }
 
-const FAULTS: [Fault; 63] = [
+const FAULTS: [Fault; 64] = [
     Fault {
         what: "what one sample looks up for all counts for itself alone",
         file: "kernels/weigh.comp",
@@ -166,6 +166,14 @@ const FAULTS: [Fault; 63] = [
         to: "end = max(end, taken == 0 ? 0 : place_in_turn(0, taken - 1) + 1);",
         kernels: &["fill_gaps"],
         noticed_by: &[InTurn],
+    },
+    Fault {
+        what: "a row of cells is taken for narrower than the disc",
+        file: "stages/map_rows.glsl",
+        from: "range.reach * range.reach - dot(off, off);",
+        to: "0.9 * range.reach * range.reach - dot(off, off);",
+        kernels: &["lookup_u64"],
+        noticed_by: &[Bits("cornell")],
     },
     Fault {
         what: "a lane is lost",

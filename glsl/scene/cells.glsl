@@ -2,12 +2,17 @@
 // and the cells of a row lie side by side, so that a query reads one run of photons a row. Different rows
 // may share buckets: a query asks each photon for its row.
 
-// Monotone in `position`, for any rounding (see grid.glsl); queries stay on the positive side, as the
+// In cells. Monotone in `position`, for any rounding (see grid.glsl); queries stay on the positive side, as the
 // origin lies a reach outside of the scene.
+vec3 place_in_grid(vec3 position, CellPush grid)
+{
+    precise vec3 place = (position - grid.origin) * grid.cells_per_unit;
+    return place;
+}
+
 ivec3 cell_at(vec3 position, CellPush grid)
 {
-    precise vec3 cell = floor((position - grid.origin) * grid.cells_per_unit);
-    return ivec3(cell);
+    return ivec3(floor(place_in_grid(position, grid)));
 }
 
 uint row_hash(ivec2 yz)

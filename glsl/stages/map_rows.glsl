@@ -11,21 +11,39 @@ uint map_length()
 struct CellRange {
     ivec3 first;
     ivec3 last;
+    // The point and how far it reaches, in cells.
+    vec3 place;
+    float reach;
 };
 
 CellRange cells_near(vec3 position)
 {
     // A little over the radius, so that rounding never costs a photon at the rim.
     float reach = push.radius * (1.0 + 1.0 / 1024.0);
-    return CellRange(cell_at(position - reach, push.cells), cell_at(position + reach, push.cells));
+    vec3 place = place_in_grid(position, push.cells);
+    // What places of point and photon, their cells and distances may be off: ten times half a unit in the last digit.
+    float rounding = max(place.x, max(place.y, place.z)) * (1.0 / 1048576.0);
+    return CellRange(cell_at(position - reach, push.cells), cell_at(position + reach, push.cells), place,
+                     reach * push.cells.cells_per_unit + rounding);
 }
 
-// (first photon, number of photons) of row yz. A row that runs over the last bucket goes on at the first:
-// photon numbers are to be taken modulo the number of photons.
+// (first photon, number of photons) of the cells of row yz within reach: the disc of the radius is narrower there than across
+// its middle. A row that runs over the last bucket goes on at the first: photon numbers are to be taken modulo the number
+// of photons.
 uvec2 row_of_photons(CellRange range, ivec2 yz)
 {
-    uint first = bucket_of(ivec3(range.first.x, yz), push.cells);
-    uint last = bucket_of(ivec3(range.last.x, yz), push.cells);
+    vec2 row = vec2(yz);
+    vec2 off = max(max(row - range.place.yz, range.place.yz - row - 1.0), 0.0);
+    float half_chord_squared = range.reach * range.reach - dot(off, off);
+    if (half_chord_squared <= 0.0) {
+        return uvec2(0);
+    }
+    // The last digits do not matter.
+    float half_chord = native_root(half_chord_squared);
+    int first_x = max(int(floor(range.place.x - half_chord)), range.first.x);
+    int last_x = min(int(floor(range.place.x + half_chord)), range.last.x);
+    uint first = bucket_of(ivec3(first_x, yz), push.cells);
+    uint last = bucket_of(ivec3(last_x, yz), push.cells);
     uint end = cells[last + 1] + (last < first ? map_length() : 0);
     return uvec2(cells[first], end - cells[first]);
 }

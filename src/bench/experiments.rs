@@ -273,11 +273,15 @@ fn gather(lab: &mut Lab) -> Result<Found> {
     let few = 1 << 12;
     let share = survey(&job(few, None, (64, 64)))?.map_or(1.0, |survey| survey.stored / f64::from(few));
     let photons = (wanted / share) as u32;
-    let first = job(photons, None, (64, 64));
-    let radius = match (survey(&first)?, first.plan(lab.gpu, &first.settings)?.global) {
-        (Some(survey), Some(map)) => Some(radius_for(&geometry, &survey, map.radius * geometry.unit, PER_ESTIMATE)),
-        _ => None,
-    };
+    // Twice, as larger discs reach over more edges.
+    let mut radius = None;
+    for _ in 0..2 {
+        let job = job(photons, radius, size);
+        radius = match (survey(&job)?, job.plan(lab.gpu, &job.settings)?.global) {
+            (Some(survey), Some(map)) => Some(radius_for(&geometry, &survey, map.radius * geometry.unit, PER_ESTIMATE)),
+            _ => None,
+        };
+    }
     let job = job(photons, radius, size);
     let per_estimate = survey(&job)?.map_or(f64::NAN, |survey| survey.per_estimate);
     let timed = scene_line::time(lab.gpu, &lab.rates, &job, lab.cancelled)?;
