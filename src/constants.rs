@@ -10,9 +10,9 @@ macro_rules! constants {
 }
 
 constants! {
-    /// Wall id that means "no wall": a dead path, an empty slot of the naive photon map.
+    /// Wall id that means "no wall": a dead path, an empty slot of the naive photon map, a gap that several counters left.
     NO_WALL = 0xffff_ffff;
-    /// Words between the counters that work groups of the atomic builder take turns at: a cache line or two.
+    /// Words between the counters that work groups of the atomic builder take turns at.
     COUNTER_STRIDE = 64;
     /// Faces of a room, numbered 2 * axis + (1 on the positive side).
     FACE_COUNT = 6;

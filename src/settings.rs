@@ -212,9 +212,6 @@ pub struct Settings {
 /// Half the edge of the open box, metres.
 pub const HALF_WIDTH: f64 = 0.25;
 
-/// Most counters that photons are appended by.
-pub const MAX_COUNTERS: u32 = 64;
-
 /// Photons of the paper's round, to which its `full_light` refers.
 pub const PAPER_PHOTONS: u32 = 5000;
 
@@ -344,8 +341,8 @@ impl Settings {
         if !(self.group_size.is_power_of_two() && (32..=1024).contains(&self.group_size)) {
             return Err(Error::setting("--group-size", self.group_size, "must be a power of two from 32 to 1024"));
         }
-        if self.counters.is_some_and(|counters| !(counters.is_power_of_two() && counters <= MAX_COUNTERS)) {
-            return Err(Error::setting("--counters", self.counters.unwrap_or(0), format!("must be a power of two up to {MAX_COUNTERS}")));
+        if let Some(counters) = self.counters.filter(|counters| !counters.is_power_of_two() || *counters > MAX_COUNTERS) {
+            return Err(Error::setting("--counters", counters, format!("must be a power of two up to {MAX_COUNTERS}")));
         }
         if let Some(chunk) = self.chunk {
             within("--chunk", chunk, 2..=MAX_PHOTONS, "photons traced at once, at least one for each of the two lights")?;
@@ -454,6 +451,8 @@ impl Settings {
     }
 }
 
+/// Most counters that photons are appended by.
+const MAX_COUNTERS: u32 = 64;
 /// Photons of a round: their numbers and the counters of a round are 32-bit.
 const MAX_PHOTONS: u32 = 1 << 31;
 const MAX_BOUNCES: u32 = 10_000;

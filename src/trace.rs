@@ -18,7 +18,8 @@ use crate::settings::Variant;
 pub fn modules(plan: &Plan) -> Vec<Module> {
     match plan.settings.variant {
         Variant::Naive => vec![Emit::MODULE, TraceSlots::MODULE],
-        Variant::Atomic => vec![Emit::MODULE, TraceAtomic::MODULE, FillGaps::MODULE, EndBounce::MODULE],
+        Variant::Atomic if plan.counters > 1 => vec![Emit::MODULE, TraceAtomic::MODULE, FillGaps::MODULE, EndBounce::MODULE],
+        Variant::Atomic => vec![Emit::MODULE, TraceAtomic::MODULE, EndBounce::MODULE],
         Variant::Ballot => vec![Emit::MODULE, TraceBallot::MODULE, EndBounce::MODULE],
         Variant::Group => vec![Emit::MODULE, TraceGroup::MODULE, EndBounce::MODULE],
         Variant::Scan => {

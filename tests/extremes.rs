@@ -530,6 +530,19 @@ fn slots_of_a_chunk_are_numbered_in_32_bits() {
             check(&plan(photons, bounces, &vast()), &vast());
         }
     }
+    // Gaps of several counters reach up to the end of a work group.
+    for (counters, group_size) in [(None, 32), (None, 1024), (Some(64), 1024), (Some(2), 128)] {
+        for (bounces, limits) in [(1, vast()), (15, vast()), (10_000, vast()), (15, Limits { buffer_bytes: 1 << 32, ..vast() })] {
+            let limits = Limits { counters: 8, ..limits };
+            let atomic =
+                Settings { photons: 1 << 31, bounces, group_size, counters, chunk: Some(1 << 31), rng: Rng::Philox, ..Settings::default() };
+            let plan = Plan::new(&open_box(&atomic), &atomic, &limits).unwrap();
+            check(&plan, &limits);
+            let is_wanted = counters.is_some() || plan.path_capacity >= 1 << 21;
+            assert_eq!(plan.counters > 1, is_wanted, "{bounces} bounces, {counters:?} counters");
+            assert!(!is_wanted || plan.path_capacity.is_multiple_of(group_size), "{bounces} bounces, groups of {group_size}");
+        }
+    }
     // 2^32 - 1 slots of 15 bounces; a chunk keeps room for a photon more of each of the two lights.
     let most = u32::MAX / 15 - 2;
     assert_eq!((most, plan(most, 15, &vast()).chunks_per_round), (286_331_151, 1));

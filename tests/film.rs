@@ -81,9 +81,13 @@ fn work_groups_and_chunks_give_the_same_bits() {
             }
             let variant = Variant::ON_GPU[place % Variant::ON_GPU.len()];
             for gather in [Gather::Grid, Gather::Brute] {
-                let other = Settings { group_size, variant, gather, counters: Some(2 << place), ..settings.clone() };
+                let other = Settings { group_size, variant, gather, ..settings.clone() };
                 assert_same(what, &format!("groups of {group_size}, {variant:?} {gather:?}"), &film(&gpu, &other), &expected);
             }
+        }
+        for (counters, group_size, gather) in [(2, 128, Gather::Grid), (8, 32, Gather::Brute), (64, 64, Gather::Grid)] {
+            let other = Settings { variant: Variant::Atomic, counters: Some(counters), group_size, gather, ..settings.clone() };
+            assert_same(what, &format!("{counters} counters, {gather:?}"), &film(&gpu, &other), &expected);
         }
         for (place, chunk) in [301, 1024, 4998].into_iter().enumerate() {
             let other = Settings { chunk: Some(chunk), variant: Variant::ON_GPU[place % Variant::ON_GPU.len()], ..settings.clone() };

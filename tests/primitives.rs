@@ -24,8 +24,8 @@ use photonmill::scene::room::{RoomScene, Wall};
 use photonmill::settings::{Settings, Variant};
 use photonmill::{index, tallies, trace};
 
-/// Words that nothing may touch. As an entry of the photon map they are an empty slot.
-const GUARD: u32 = 0xDEAD_BEEF;
+/// Words that nothing may touch. As an entry of the photon map they are a photon on some wall.
+const GUARD: u32 = 0x5EAD_BEEF;
 
 /// Numbers of a linear congruential generator, 0 to `below` - 1.
 fn numbers(count: usize, below: u32) -> Vec<u32> {
@@ -226,6 +226,20 @@ struct Appended {
     guards: Vec<u32>,
     counters: Vec<u32>,
     tallies: Vec<Tally>,
+    /// Whether places may be left empty.
+    has_gaps: bool,
+}
+
+impl Appended {
+    /// Entries of the photon map that anybody looks at.
+    fn entries(&self, settings: &Settings) -> u32 {
+        let slots = settings.photons * settings.bounces;
+        if settings.variant == Variant::Naive { slots } else { self.counters[0] }.min(self.photons.len() as u32)
+    }
+
+    fn stored(&self, settings: &Settings) -> impl Iterator<Item = &Photon> {
+        self.photons[..self.entries(settings) as usize].iter().filter(|photon| photon.wall != NO_WALL)
+    }
 }
 
 /// Entries of each array that stand behind its capacity.
@@ -267,6 +281,7 @@ fn append(gpu: &Device, scene: &RoomScene, settings: &Settings, capacity: u32) -
         guards,
         counters: commands.read(&resources.counters, bounces as usize + 2).unwrap(),
         tallies: tallies::read(&mut commands, &resources.tallies, bounces).unwrap(),
+        has_gaps: plan.counters > 1,
     }
 }
 
@@ -276,7 +291,8 @@ fn overflow_check(appended: &Appended, settings: &Settings, capacity: u32, all: 
     if let Some(word) = appended.guards.iter().find(|word| **word != GUARD) {
         return fail(format!("a guard word became {word:#x}"));
     }
-    let stored: Vec<Photon> = appended.photons.iter().filter(|photon| photon.wall != NO_WALL).copied().collect();
+    let entries = appended.entries(settings);
+    let stored: Vec<Photon> = appended.stored(settings).copied().collect();
     let told: u32 = appended.tallies.iter().map(|tally| tally.stored).sum();
     if stored.len() as u32 != told {
         return fail(format!("{} photons are in the map, {told} were counted", stored.len()));
@@ -311,10 +327,13 @@ fn overflow_check(appended: &Appended, settings: &Settings, capacity: u32, all: 
         }
         return Ok(());
     }
-    // Several counters leave gaps, which take places too.
-    let has_gaps = settings.counters.is_some();
-    if told > capacity.min(survivors) || told < capacity.min(survivors) && !has_gaps {
+    // Gaps take places, too.
+    let has_gaps = appended.has_gaps;
+    if told != capacity.min(survivors) && !has_gaps {
         return fail(format!("{told} of {capacity} places taken by {survivors} survivors"));
+    }
+    if told < survivors && appended.counters[0] <= capacity {
+        return fail(format!("{survivors} survivors, {told} of them stored, and room was left"));
     }
     if appended.counters[0] < survivors || appended.counters[0] > survivors && !has_gaps {
         return fail(format!("the counter says {} instead of the need, {survivors}", appended.counters[0]));
@@ -323,9 +342,14 @@ fn overflow_check(appended: &Appended, settings: &Settings, capacity: u32, all: 
         // No bounce hands paths to the next.
         return Ok(());
     }
+    let places: u32 = appended.counters[2..].iter().sum();
+    if places != entries {
+        return fail(format!("{places} places of paths, {entries} of photons"));
+    }
     for (bounce, tally) in appended.tallies.iter().enumerate() {
         let paths = appended.counters[2 + bounce];
-        if paths < tally.stored || paths > tally.stored && !has_gaps {
+        let most = if has_gaps { appended.counters[1 + bounce].next_multiple_of(settings.group_size) } else { tally.stored };
+        if !(tally.stored..=most).contains(&paths) {
             return fail(format!("{} paths leave bounce {}, {} were stored", appended.counters[2 + bounce], bounce + 1, tally.stored));
         }
     }
@@ -375,8 +399,7 @@ fn appending_at_survival_none_and_all() {
                 let appended = append(&gpu, &scene, &settings, capacity);
                 let what = format!("{variant:?}, {photon_count} photons, albedo {albedo}");
                 assert!(appended.guards.iter().all(|word| *word == GUARD), "{what}");
-                let stored: HashSet<(u32, u32)> =
-                    appended.photons.iter().filter(|photon| photon.wall != NO_WALL).map(|photon| (photon.photon, photon.bounce)).collect();
+                let stored: HashSet<(u32, u32)> = appended.stored(&settings).map(|photon| (photon.photon, photon.bounce)).collect();
                 assert_eq!(stored.len() as u32, photon_count * stored_each, "{what}");
                 assert_eq!(appended.tallies.iter().map(|tally| tally.stored).sum::<u32>(), photon_count * stored_each, "{what}");
             }
@@ -390,9 +413,6 @@ type Spoil = (&'static str, fn(&mut Appended));
 #[test]
 fn the_check_of_a_full_map_complains() {
     let Some(gpu) = device() else { return };
-    let settings = Settings { photons: 1000, bounces: 3, ..Settings::default() };
-    let all = photons(&gpu, &settings);
-    let capacity = all.len() as u32 / 2;
     let spoils: [Spoil; 7] = [
         ("a write behind the end", |appended| appended.guards[5] = 0),
         ("a photon lost", |appended| appended.photons[5] = Photon { wall: NO_WALL, ..Photon::zeroed() }),
@@ -402,12 +422,17 @@ fn the_check_of_a_full_map_complains() {
         ("a counter that stops at the end", |appended| appended.counters[0] = appended.photons.len() as u32),
         ("a path without a photon", |appended| appended.counters[2] += 1),
     ];
-    let scene = open_box(&settings);
-    assert_holds("the map itself", overflow_check(&append(&gpu, &scene, &settings, capacity), &settings, capacity, &all));
-    for (what, spoil) in spoils {
-        let mut spoiled = append(&gpu, &scene, &settings, capacity);
-        spoil(&mut spoiled);
-        assert_complains(what, overflow_check(&spoiled, &settings, capacity, &all));
+    for counters in [None, Some(4)] {
+        let settings = Settings { photons: 1000, bounces: 3, counters, ..Settings::default() };
+        let all = photons(&gpu, &settings);
+        let capacity = all.len() as u32 / 2;
+        let scene = open_box(&settings);
+        assert_holds("the map itself", overflow_check(&append(&gpu, &scene, &settings, capacity), &settings, capacity, &all));
+        for (what, spoil) in spoils {
+            let mut spoiled = append(&gpu, &scene, &settings, capacity);
+            spoil(&mut spoiled);
+            assert_complains(what, overflow_check(&spoiled, &settings, capacity, &all));
+        }
     }
 }
 

@@ -1,4 +1,4 @@
-// append/atomic.glsl, from one counter of several where there are.
+// As append/atomic.glsl, but from several counters in turn where COUNTERS is above 1.
 
 uint take_place(uint counter, bool wanted)
 {

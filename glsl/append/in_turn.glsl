@@ -1,10 +1,11 @@
 // Places from one counter of several, so that no single one has to serve all work groups of a device: they take turns at
 // the counters, and the counters at blocks of places as long as a work group. The last blocks of some counters then have
-// gaps, which kernels/fill_gaps.comp marks as empty.
+// gaps, which kernels/fill_gaps.comp marks as empty. Kernels that include this have work groups of the same length, and the
+// number of bounces in `push`.
 
 layout(constant_id = 42) const uint COUNTERS = 1;
 
-// Behind the lengths of the photon map and of each bounce's paths, far enough apart not to be served together.
+// Behind the lengths of the photon map and of each bounce's paths, and far enough from each other not to be served together.
 uint counter_in_turn(uint turn)
 {
     return push.bounces + 2 + turn * COUNTER_STRIDE;

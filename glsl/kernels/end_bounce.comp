@@ -1,4 +1,4 @@
-// Counts the survivors of a bounce once all have their places: length of the photon map, paths entering the next bounce,
+// Counts the places that the survivors of a bounce have taken: length of the photon map, paths entering the next bounce,
 // and the size of its dispatch.
 // Dispatched by src/trace.rs once a bounce, as one thread.
 #version 460
@@ -15,11 +15,11 @@ layout(set = 1, binding = 1, scalar) writeonly buffer Sizes { DispatchArgs dispa
 
 void main()
 {
-    uint survivor_count = counters[2 + push.bounce];
+    uint place_count = counters[2 + push.bounce];
     uint room = push.photon_capacity - min(counters[0], push.photon_capacity);
-    // Those that found no room took the last places, so that no gap arose.
-    uint path_count = min(survivor_count, room);
-    counters[0] += survivor_count;
+    // Those that found no room took the last places, so that no further gap arose.
+    uint path_count = min(place_count, room);
+    counters[0] += place_count;
     counters[2 + push.bounce] = path_count;
     dispatch_args[0] = dispatch_size(path_count, push.items_per_group, push.max_groups);
 }

@@ -21,7 +21,8 @@ CellRange cells_near(vec3 position)
     // A little over the radius, so that rounding never costs a photon at the rim.
     float reach = push.radius * (1.0 + 1.0 / 1024.0);
     vec3 place = place_in_grid(position, push.cells);
-    // What places of point and photon, their cells and distances may be off: ten times half a unit in the last digit.
+    // What places of point and photon, and cells and distances made of them, may be off: at most ten times half a unit in
+    // the last digit; here sixteen.
     float rounding = max(place.x, max(place.y, place.z)) * (1.0 / 1048576.0);
     return CellRange(cell_at(position - reach, push.cells), cell_at(position + reach, push.cells), place,
                      reach * push.cells.cells_per_unit + rounding);

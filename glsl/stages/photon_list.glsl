@@ -1,5 +1,4 @@
-// The stored photons as the index reads them: a list, or the naive builder's slots with empty ones
-// among them.
+// The stored photons as the index reads them: a list, or the naive builder's slots. Some of either may be empty.
 
 layout(set = 1, binding = 0, scalar) readonly buffer Photons { uvec4 photons[]; };
 layout(set = 1, binding = 1, scalar) readonly buffer Counters { uint counters[]; };

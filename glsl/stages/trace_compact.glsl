@@ -37,7 +37,7 @@ void trace_compact()
         bool stored = alive[k] && photon_place < push.photon_capacity;
         if (stored) {
             store_photon(photon_place, bounced[k].photon);
-            // Survivors are never more than the incoming paths, so this one always fits.
+            // Places are never more than the incoming paths, up to a whole work group, so this one always fits.
             if (has_next_bounce()) {
                 store_path(places[k], path[k]);
             }

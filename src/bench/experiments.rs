@@ -273,7 +273,7 @@ fn gather(lab: &mut Lab) -> Result<Found> {
     let few = 1 << 12;
     let share = survey(&job(few, None, (64, 64)))?.map_or(1.0, |survey| survey.stored / f64::from(few));
     let photons = (wanted / share) as u32;
-    // Twice, as larger discs reach over more edges.
+    // The second time corrects the first, as discs of another size reach over more or fewer edges.
     let mut radius = None;
     for _ in 0..2 {
         let job = job(photons, radius, size);

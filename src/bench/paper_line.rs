@@ -131,7 +131,7 @@ fn timed(gpu: &Gpu, rates: &Rates, outcome: &Outcome, rounds: u32, first: u32) -
     let counts = Counts::of(&outcome.fates, rounds);
     let found = photons_per_point(outcome) / f64::from(rounds);
     let scopes = rounds_of(&outcome.timings, rounds, first);
-    let workload = workload(&plan.settings);
+    let workload = workload(plan);
     let passes = scopes
         .iter()
         .filter_map(|(name, ms)| Some(Pass::new(&workload, name, Spread::of(ms.clone())?, work(name, plan, &counts, found), rates)))
@@ -149,9 +149,9 @@ fn timed(gpu: &Gpu, rates: &Rates, outcome: &Outcome, rounds: u32, first: u32) -
     }
 }
 
-fn workload(settings: &Settings) -> String {
-    let Settings { variant, photons, bounces, radius, counters, .. } = settings;
-    let counters = counters.map_or_else(String::new, |counters| format!(" by {counters} counter(s)"));
+fn workload(plan: &Plan) -> String {
+    let Settings { variant, photons, bounces, radius, .. } = &plan.settings;
+    let counters = if plan.counters > 1 { format!(" by {} counters", plan.counters) } else { String::new() };
     format!("open box, {}{counters}, {photons} photons, {bounces} bounces, radius {radius} m", variant.name())
 }
 

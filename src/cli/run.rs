@@ -128,8 +128,8 @@ pub(super) struct RunArgs {
     /// Invocations of a work group [default: 128]
     #[arg(long, value_parser = whole::<u32>, allow_negative_numbers = true, help_heading = "Device")]
     group_size: Option<u32>,
-    /// Counters that work groups of `--variant atomic` take turns at, a power of two; the result is the same to the bit
-    /// [default: 1, on a GPU 8 where two million photons and more are traced at once]
+    /// Counters that work groups of --variant atomic take turns at, a power of two up to 64; the result is the same to the
+    /// bit [default: 1, on a GPU 8 where two million photons and more are traced at once]
     #[arg(long, value_parser = whole::<u32>, allow_negative_numbers = true, help_heading = "Device")]
     counters: Option<u32>,
     /// Most photons traced at once; the result is the same to the bit [default: what the device holds]

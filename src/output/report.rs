@@ -54,6 +54,8 @@ struct Report<'a> {
 struct PlanReport<'a> {
     decisions: &'a [Decision],
     light_photons: &'a [u32],
+    /// That the atomic builder's work groups take turns at.
+    counters: u32,
     chunks_per_round: u32,
     photon_map_entries: u32,
     photon_map_bytes: u64,
@@ -88,6 +90,7 @@ pub fn json(outcome: &Outcome, walls: &[WallEstimate]) -> Vec<u8> {
         plan: PlanReport {
             decisions: &plan.decisions,
             light_photons: &plan.light_photons,
+            counters: plan.counters,
             chunks_per_round: plan.chunks_per_round,
             photon_map_entries: plan.photon_capacity,
             photon_map_bytes: plan.photon_map_bytes(),

@@ -179,7 +179,7 @@ pub(super) fn most_candidates(limits: &Limits) -> u32 {
 }
 
 /// Photons of a chunk from which on one counter keeps the atomic builder waiting: on an NVIDIA H200 8 of them make it 1.7 to
-/// 1.8 times as fast from 2^22 photons on, and at 2^20 photons, where gaps cost a launch a bounce, 0.9 times.
+/// 1.8 times as fast from 2^22 photons on, and 0.9 times at 2^20, where gaps cost a launch a bounce; this lies between.
 const MANY_PHOTONS: u32 = 1 << 21;
 
 /// Counters that the atomic builder's work groups take turns at.
@@ -241,18 +241,14 @@ pub fn chunk_photons(settings: &Settings, limits: &Limits, work: &Work) -> Resul
     // Entries are numbered in 32 bits.
     let by_index = u64::from(u32::MAX) / bounces;
     let fits = by_buffer.min(by_memory).min(by_index);
-    // A chunk may hold one photon more than its share of each of the two lights, and gaps up to a work group a counter.
-    let counters = counters(settings, limits, fits.min(u64::from(settings.photons)) as u32);
-    let spare = 2 + if counters > 1 { u64::from(counters * settings.group_size) } else { 0 };
+    // A chunk may hold one photon more than its share of each of the two lights, and gaps up to the end of a work group.
+    let has_gaps = counters(settings, limits, fits.min(u64::from(settings.photons)) as u32) > 1;
+    let spare = 2 + if has_gaps { u64::from(settings.group_size) } else { 0 };
     if fits < 2 + spare {
         return Err(Error::setting(
             "--bounces",
             settings.bounces,
-            format!(
-                "two photons' maps do not fit the device's buffers of {} bytes; ask for fewer bounces{}",
-                limits.buffer_bytes,
-                if counters > 1 { " or --counters" } else { "" }
-            ),
+            format!("two photons' maps do not fit the device's buffers of {} bytes; ask for fewer bounces", limits.buffer_bytes),
         ));
     }
     if settings.group_size > limits.group_size {

@@ -178,7 +178,9 @@ impl Plan {
         // Of each light's photons the larger share: there may be a billion chunks, too many to look at each.
         plan.path_capacity = plan.light_photons.iter().map(|count| count.div_ceil(chunks_per_round)).sum();
         if plan.counters > 1 {
-            plan.path_capacity = plan.path_capacity.next_multiple_of(plan.counters * settings.group_size);
+            // The n-th work group of a counter's turn hands out no more than its n-th block, whose number is the group's own, so
+            // places end where the last group does.
+            plan.path_capacity = plan.path_capacity.next_multiple_of(settings.group_size);
         }
         plan.photon_capacity = plan.path_capacity * settings.bounces;
         // Even if a point has every photon in reach.
@@ -335,8 +337,24 @@ fn film_shift(settings: &Settings) -> u32 {
 #[cfg(test)]
 mod tests {
     use super::*;
+    use crate::rng::Rng;
     use crate::scene::open_box::open_box;
     use crate::settings::Preset;
+
+    #[test]
+    fn several_counters_serve_many_photons_of_the_atomic_builder() {
+        let limits = Limits { buffer_bytes: 1 << 32, memory_bytes: 1 << 36, counters: 8, ..Limits::of_host() };
+        let counters = |photons, variant, counters| {
+            let settings =
+                Settings { photons, variant, counters, bounces: 2, chunk: Some(photons), mesh: 1, rng: Rng::Philox, ..Settings::default() };
+            Plan::new(&open_box(&settings), &settings, &limits).unwrap().counters
+        };
+        assert_eq!([1000, (1 << 21) - 1, 1 << 21, 1 << 24].map(|photons| counters(photons, Variant::Atomic, None)), [1, 1, 8, 8]);
+        assert_eq!([1, 4, 64].map(|number| counters(1000, Variant::Atomic, Some(number))), [1, 4, 64]);
+        for variant in Variant::all().filter(|variant| *variant != Variant::Atomic) {
+            assert_eq!([None, Some(4)].map(|number| counters(1 << 21, variant, number)), [1, 1], "{variant:?}");
+        }
+    }
 
     #[test]
     fn photons_are_dealt_by_power_and_none_is_lost() {

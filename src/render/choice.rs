@@ -32,8 +32,11 @@ pub struct Candidate {
     pub ms: Spread,
 }
 
-/// Photons that are enough to tell builders apart.
-const MOST_PHOTONS: u32 = 1 << 20;
+/// Photons that are enough to tell builders apart: a card's change places up to there.
+fn most_photons(gpu: &Gpu) -> u32 {
+    if gpu.facts().kind == "cpu" { 1 << 20 } else { 1 << 22 }
+}
+
 /// Turns of each builder that count, after one that makes its pipelines; fewer where they take long.
 const TURNS: usize = 5;
 const LONG: Duration = Duration::from_secs(1);
@@ -88,7 +91,8 @@ fn plans(gpu: &Gpu, scene: &RoomScene, settings: &Settings) -> Result<Vec<Plan>>
         // These look at a round's photons together, whoever builds the map.
         return Ok(plans);
     }
-    let fewest = plans.iter().map(|plan| plan.path_capacity).min().map_or(2, |photons| photons.clamp(2, MOST_PHOTONS));
+    let first_chunks = plans.iter().map(|plan| photons_of(&plan.chunk(0)));
+    let fewest = first_chunks.min().map_or(2, |photons| photons.clamp(2, most_photons(gpu)));
     with(Some(fewest))
 }
 
