@@ -362,7 +362,7 @@ fn output_that_nobody_takes_is_no_panic() {
 #[test]
 fn the_paper_is_regenerated() {
     let folder = tempfile::tempdir().unwrap();
-    let output = run_on_device(folder.path(), &["paper", "--out", "paper", "--large", "5001", "--repeats", "1"]);
+    let output = run_on_device(folder.path(), &["paper", "--out", "paper", "--large", "5001", "--repeats", "1", "--longest", "9s"]);
     assert!(output.status.success(), "{}", text(&output.stderr));
     let mut names = entries(&folder.path().join("paper"));
     names.sort();
@@ -377,6 +377,6 @@ fn the_paper_is_regenerated() {
     assert!(!page.contains("http://") && !page.contains("src=\"/"), "the page opens without a network");
     let table = std::fs::read_to_string(folder.path().join("paper/table1.csv")).unwrap();
     let published: Vec<&str> = table.lines().skip(1).filter_map(|line| line.rsplit(',').next()).collect();
-    // A busy machine leaves the longest runs by brute force out, and says so; the grid's are short.
+    // By brute force the longest rows are left out on a slow device; the grid's are short.
     assert!(published.windows(5).any(|rows| rows == ["2130", "10670", "20850", "53280", "105640"]), "{published:?}");
 }

@@ -6,6 +6,7 @@ use std::sync::atomic::AtomicBool;
 use clap::Args;
 
 use super::run::{threads, whole};
+use super::stop::seconds;
 use super::{DeviceArgs, End, complain, say};
 use crate::error::{Error, Result};
 use crate::output::destination::Folder;
@@ -27,6 +28,9 @@ pub(super) struct PaperArgs {
     /// Measure the CPU builder on this many threads too, or on `all` [default: 1 thread only]
     #[arg(long, value_name = "N|all", value_parser = threads)]
     threads: Option<usize>,
+    /// Leave out rows of table 1 that are predicted to take longer
+    #[arg(long, value_name = "TIME", value_parser = seconds, allow_negative_numbers = true, default_value = "90s")]
+    longest: f64,
     #[command(flatten)]
     device: DeviceArgs,
 }
@@ -43,6 +47,7 @@ pub(super) fn run(args: &PaperArgs, cancelled: &AtomicBool) -> Result<End> {
         large: args.large.unwrap_or(if is_cpu { LARGE_ON_CPU } else { LARGE_ON_GPU }),
         repeats: args.repeats as usize,
         threads: args.threads.unwrap_or(1),
+        longest_ms: 1e3 * args.longest,
     };
     let mut progress = |line: &str| complain(line);
     let found = paper::reproduce(&mut Bench::new(gpu.as_ref(), cancelled, &mut progress), request)?;
@@ -63,6 +68,9 @@ impl PaperArgs {
         }
         if !(1..=MAX_REPEATS).contains(&self.repeats) {
             return Err(Error::setting("--repeats", self.repeats, format!("must be from 1 to {MAX_REPEATS}")));
+        }
+        if !(self.longest.is_finite() && self.longest > 0.0) {
+            return Err(Error::setting("--longest", format!("{}s", self.longest), "must be a time above 0, as 90s"));
         }
         let threads = self.threads.unwrap_or(1);
         if !(1..=MAX_THREADS).contains(&threads) {

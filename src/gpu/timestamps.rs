@@ -24,6 +24,8 @@ pub(super) struct Timestamps {
     valid_bits: u32,
     period_ns: f64,
     used: u32,
+    /// Queries from the first on that are to be reset before they are written: at first all.
+    stale: u32,
     context: Rc<Context>,
 }
 
@@ -37,7 +39,14 @@ impl Timestamps {
             // SAFETY: `info` is complete; destroyed in Drop.
             call("vkCreateQueryPool", unsafe { gpu.context.device.create_query_pool(&info, None) })?
         };
-        Ok(Timestamps { pool, valid_bits, period_ns: f64::from(gpu.facts.timestamp_period_ns), used: 0, context: gpu.context.clone() })
+        Ok(Timestamps {
+            pool,
+            valid_bits,
+            period_ns: f64::from(gpu.facts.timestamp_period_ns),
+            used: 0,
+            stale: QUERY_COUNT,
+            context: gpu.context.clone(),
+        })
     }
 
     /// Queries left in this submission.
@@ -47,11 +56,13 @@ impl Timestamps {
 
     /// Forgets the queries of the last submission.
     pub(super) fn reset(&mut self, command_buffer: vk::CommandBuffer) {
+        self.stale = self.stale.max(self.used);
         self.used = 0;
-        if self.valid_bits != 0 {
+        if self.valid_bits != 0 && self.stale != 0 {
             // SAFETY: the command buffer is recording, and the last submission has ended.
-            unsafe { self.context.device.cmd_reset_query_pool(command_buffer, self.pool, 0, QUERY_COUNT) };
+            unsafe { self.context.device.cmd_reset_query_pool(command_buffer, self.pool, 0, self.stale) };
         }
+        self.stale = 0;
     }
 
     /// Records the time at which everything before has ended.

@@ -97,8 +97,6 @@ pub struct LeftOut {
 
 /// A rendering pass that is predicted to take longer is left out.
 pub const LONGEST_PASS_MS: f64 = 20_000.0;
-/// The same for a row of table 1, the last of which is the paper's longest run.
-pub const LONGEST_TOTAL_MS: f64 = 90_000.0;
 /// A row that is shorter is run once before it counts, as its device may have idled.
 const SHORT_TOTAL_MS: f64 = 1_000.0;
 /// Runs whose median counts at the large size, at most.
@@ -251,7 +249,7 @@ pub fn totals(bench: &mut Bench, found: &mut Reproduction) -> Step<()> {
                 command::gather_name(gather)
             );
             bench.begin(&title)?;
-            if let Some(predicted_ms) = a_round.map(|ms| ms * f64::from(rounds)).filter(|ms| *ms > LONGEST_TOTAL_MS) {
+            if let Some(predicted_ms) = a_round.map(|ms| ms * f64::from(rounds)).filter(|ms| *ms > found.request.longest_ms) {
                 found.totals_left_out.push(LeftOut { what: title, predicted_ms });
                 continue;
             }

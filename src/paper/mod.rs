@@ -27,6 +27,8 @@ pub struct Request {
     pub repeats: usize,
     /// Threads of a second CPU builder; 1: there is none.
     pub threads: usize,
+    /// A row of table 1 that is predicted to take longer is left out.
+    pub longest_ms: f64,
 }
 
 /// Everything that was found.

@@ -5,7 +5,7 @@ use base64::engine::general_purpose::STANDARD;
 use maud::{DOCTYPE, Markup, PreEscaped, html};
 
 use super::bench::PATIENCE;
-use super::experiments::{Builder, LONGEST_PASS_MS, LONGEST_TOTAL_MS, LeftOut, Pass, RunningTime, TotalTime};
+use super::experiments::{Builder, LONGEST_PASS_MS, LeftOut, Pass, RunningTime, TotalTime};
 use super::figures::Figure;
 use super::verdicts::{self, Standing};
 use super::{Reproduction, chart, published};
@@ -268,7 +268,7 @@ fn table_1(found: &Reproduction) -> Markup {
             (totals_of(found, small, Gather::Brute, "Brute force, as in the paper"))
             (totals_of(found, small, Gather::Grid, "The same photons, sorted into a grid"))
             (totals_of(found, large, Gather::Grid, &format!("Grid, {} photons a round (philox)", count(u64::from(large)))))
-            (left_out(&found.totals_left_out, LONGEST_TOTAL_MS, "a round of the row before"))
+            (left_out(&found.totals_left_out, found.request.longest_ms, "a round of the row before"))
             @if let Some(chart) = chart::totals(found) {
                 figure.chart {
                     div.scroll { (PreEscaped(chart)) }

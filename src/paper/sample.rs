@@ -17,7 +17,7 @@ pub fn reproduction() -> Reproduction {
             device: Some(Device { name: "a device".to_owned(), driver: "its driver".to_owned(), has_timestamps: true, is_cpu: true }),
             cpu: "a processor".to_owned(),
         },
-        request: Request { large: LARGE, repeats: 7, threads: 1 },
+        request: Request { large: LARGE, repeats: 7, threads: 1, longest_ms: 90e3 },
         figures: vec![Figure {
             number: 1,
             title: "a figure",

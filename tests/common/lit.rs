@@ -44,7 +44,16 @@ pub fn received(gpu: &Gpu, scene: &Scene, settings: &TransportSettings, points: 
 
 /// The same within other limits than the device's own.
 pub fn received_within(gpu: &Gpu, scene: &Scene, settings: &TransportSettings, points: &[(DVec3, DVec3)], limits: &Limits) -> Lit {
-    let geometry = Geometry::new(scene).unwrap();
+    received_in(gpu, (scene, &Geometry::new(scene).unwrap()), settings, points, limits)
+}
+
+fn received_in(
+    gpu: &Gpu,
+    (scene, geometry): (&Scene, &Geometry),
+    settings: &TransportSettings,
+    points: &[(DVec3, DVec3)],
+    limits: &Limits,
+) -> Lit {
     let receiver = |(position, normal): &(DVec3, DVec3)| Receiver {
         position: geometry.to_local(*position),
         normal: normal.as_vec3(),
@@ -52,8 +61,8 @@ pub fn received_within(gpu: &Gpu, scene: &Scene, settings: &TransportSettings, p
     };
     let receivers = points.iter().map(receiver).collect();
     let sensor = Sensor::Receivers { count: points.len() as u32 };
-    let plan = TransportPlan::new(scene, &geometry, &watched(settings), sensor, limits).unwrap();
-    light(gpu, &View { geometry: &geometry, camera: None, phases: &[receivers] }, plan)
+    let plan = TransportPlan::new(scene, geometry, &watched(settings), sensor, limits).unwrap();
+    light(gpu, &View { geometry, camera: None, phases: &[receivers] }, plan)
 }
 
 /// What a camera sees of a scene of triangles.
@@ -83,7 +92,9 @@ pub fn irradiances(
     points: &[(DVec3, DVec3)],
     seeds: std::ops::Range<u64>,
 ) -> Vec<Vec<DVec3>> {
-    seeds.map(|seed| means(&received(gpu, scene, &TransportSettings { seed, ..settings.clone() }, points))).collect()
+    let (geometry, limits) = (Geometry::new(scene).unwrap(), render::limits(gpu.facts()));
+    let settings_of = |seed| TransportSettings { seed, ..settings.clone() };
+    seeds.map(|seed| means(&received_in(gpu, (scene, &geometry), &settings_of(seed), points, &limits))).collect()
 }
 
 /// Radiance along one ray, W/m2/sr, once for each pixel of a picture so narrow that they are all but the same ray;
