@@ -7,6 +7,7 @@ use std::rc::Rc;
 
 use ash::vk;
 use bytemuck::Pod;
+use rayon::prelude::*;
 
 use super::{Buffer, Context, DeviceFacts, Gpu, call};
 use crate::error::Result;
@@ -71,10 +72,18 @@ impl Constants {
     }
 }
 
+/// A kernel and the constants that it declares: id and value, the work-group size first.
 #[derive(Debug, Clone, PartialEq, Eq, Hash)]
 pub(super) struct PipelineKey {
     kernel: &'static str,
-    constants: Constants,
+    constants: Vec<(u32, u32)>,
+}
+
+impl PipelineKey {
+    fn new(module: &Module, constants: &Constants) -> PipelineKey {
+        let declared = module.constants.iter().filter_map(|(name, id)| Some((*id, *constants.values.get(name)?)));
+        PipelineKey { kernel: module.name, constants: [(0, constants.group_size)].into_iter().chain(declared).collect() }
+    }
 }
 
 pub(super) struct Pipeline {
@@ -101,18 +110,31 @@ impl Drop for Pipeline {
 impl Gpu {
     /// The pipeline of a kernel for these constants, made at first use.
     pub(super) fn pipeline(&self, module: &Module, constants: &Constants) -> Result<Rc<Pipeline>> {
-        let key = PipelineKey { kernel: module.name, constants: constants.clone() };
-        if let Some(pipeline) = self.pipelines.borrow().get(&key) {
-            return Ok(pipeline.clone());
+        let key = PipelineKey::new(module, constants);
+        if !self.pipelines.borrow().contains_key(&key) {
+            self.prepare(&[*module], constants)?;
         }
-        let pipeline = Rc::new(self.create_pipeline(module, constants)?);
-        self.pipelines.borrow_mut().insert(key, pipeline.clone());
-        Ok(pipeline)
+        Ok(self.pipelines.borrow()[&key].clone())
     }
 
-    /// Makes the pipelines of these kernels now, so that no run pays for them later.
+    /// Makes the pipelines of these kernels now, as many at a time as there are cores, so that no run pays for them later.
     pub fn prepare(&self, modules: &[Module], constants: &Constants) -> Result<()> {
-        modules.iter().try_for_each(|module| self.pipeline(module, constants).map(drop))
+        let mut missing: Vec<(PipelineKey, Pipeline, Vec<u32>)> = Vec::new();
+        for module in modules {
+            let key = PipelineKey::new(module, constants);
+            if !self.pipelines.borrow().contains_key(&key) && missing.iter().all(|(other, ..)| *other != key) {
+                missing.push((key, self.pipeline_layout(module)?, self.words_of(module)));
+            }
+        }
+        let (device, cache) = (&self.context.device, self.cache.raw);
+        let jobs: Vec<_> = missing.iter().map(|(key, pipeline, words)| (key, pipeline.layout, words)).collect();
+        let made: Vec<_> = jobs.par_iter().map(|(key, layout, words)| compile(device, cache, *layout, words, &key.constants)).collect();
+        for ((key, mut pipeline, _), raw) in missing.into_iter().zip(made) {
+            pipeline.raw = raw?;
+            self.context.set_name(pipeline.raw, key.kernel);
+            self.pipelines.borrow_mut().insert(key, Rc::new(pipeline));
+        }
+        Ok(())
     }
 
     /// Pipelines made so far.
@@ -120,7 +142,14 @@ impl Gpu {
         self.pipelines.borrow().len()
     }
 
-    fn create_pipeline(&self, module: &Module, constants: &Constants) -> Result<Pipeline> {
+    /// SPIR-V of a kernel, or what stands for it in this device.
+    fn words_of(&self, module: &Module) -> Vec<u32> {
+        let own = || ash::util::read_spv(&mut Cursor::new(module.spirv)).expect("build.rs wrote whole SPIR-V words");
+        self.replaced.iter().find(|(name, _)| name == module.name).map_or_else(own, |(_, words)| words.clone())
+    }
+
+    /// A pipeline that is still to be compiled.
+    fn pipeline_layout(&self, module: &Module) -> Result<Pipeline> {
         let device = &self.context.device;
         let set_count = module.bindings.iter().map(|binding| binding.set + 1).max().unwrap_or(0);
         let mut pipeline = Pipeline {
@@ -152,37 +181,41 @@ impl Gpu {
             .push_constant_ranges(if module.push_bytes == 0 { &[] } else { &push });
         // SAFETY: as above.
         pipeline.layout = call("vkCreatePipelineLayout", unsafe { device.create_pipeline_layout(&info, None) })?;
-
-        let own = || ash::util::read_spv(&mut Cursor::new(module.spirv)).expect("build.rs wrote whole SPIR-V words");
-        let words = self.replaced.iter().find(|(name, _)| name == module.name).map_or_else(own, |(_, words)| words.clone());
-        let info = vk::ShaderModuleCreateInfo::default().code(&words);
-        // SAFETY: the code comes from the GLSL compiler.
-        let shader = call("vkCreateShaderModule", unsafe { device.create_shader_module(&info, None) })?;
-        let mut entries = vec![vk::SpecializationMapEntry { constant_id: 0, offset: 0, size: 4 }];
-        let mut values = vec![constants.group_size];
-        for (name, id) in module.constants {
-            if let Some(value) = constants.values.get(name) {
-                entries.push(vk::SpecializationMapEntry { constant_id: *id, offset: 4 * values.len() as u32, size: 4 });
-                values.push(*value);
-            }
-        }
-        let specialization = vk::SpecializationInfo::default().map_entries(&entries).data(bytemuck::cast_slice(&values));
-        let stage = vk::PipelineShaderStageCreateInfo::default()
-            .stage(vk::ShaderStageFlags::COMPUTE)
-            .module(shader)
-            .name(c"main")
-            .specialization_info(&specialization);
-        let info = vk::ComputePipelineCreateInfo::default().stage(stage).layout(pipeline.layout);
-        // SAFETY: layout and module are alive; the module is no longer needed afterwards.
-        let made = unsafe {
-            let made = device.create_compute_pipelines(self.cache.raw, &[info], None).map_err(|(_, code)| code);
-            device.destroy_shader_module(shader, None);
-            made
-        };
-        pipeline.raw = call("vkCreateComputePipelines", made)?[0];
-        self.context.set_name(pipeline.raw, module.name);
         Ok(pipeline)
     }
+}
+
+fn compile(
+    device: &ash::Device,
+    cache: vk::PipelineCache,
+    layout: vk::PipelineLayout,
+    words: &[u32],
+    constants: &[(u32, u32)],
+) -> Result<vk::Pipeline> {
+    let info = vk::ShaderModuleCreateInfo::default().code(words);
+    // SAFETY: the code comes from the GLSL compiler.
+    let shader = call("vkCreateShaderModule", unsafe { device.create_shader_module(&info, None) })?;
+    let offsets = (0..).step_by(size_of::<u32>());
+    let entries: Vec<_> = constants
+        .iter()
+        .zip(offsets)
+        .map(|((id, _), offset)| vk::SpecializationMapEntry { constant_id: *id, offset, size: size_of::<u32>() })
+        .collect();
+    let values: Vec<u32> = constants.iter().map(|(_, value)| *value).collect();
+    let specialization = vk::SpecializationInfo::default().map_entries(&entries).data(bytemuck::cast_slice(&values));
+    let stage = vk::PipelineShaderStageCreateInfo::default()
+        .stage(vk::ShaderStageFlags::COMPUTE)
+        .module(shader)
+        .name(c"main")
+        .specialization_info(&specialization);
+    let info = vk::ComputePipelineCreateInfo::default().stage(stage).layout(layout);
+    // SAFETY: layout and module are alive; the module is no longer needed afterwards. Vulkan guards the cache itself.
+    let made = unsafe {
+        let made = device.create_compute_pipelines(cache, &[info], None).map_err(|(_, code)| code);
+        device.destroy_shader_module(shader, None);
+        made
+    };
+    Ok(call("vkCreateComputePipelines", made)?[0])
 }
 
 /// Vulkan's pipeline cache, kept in the user's cache folder from run to run.
