@@ -127,6 +127,7 @@ fn bad_input_is_refused_in_one_line() {
         (&["--colour"], ["--colour", "no such option", "--help"]),
         (&["bakery"], ["bakery", "no such subcommand", "--help"]),
         (&["paper"], ["--out", "required", ""]),
+        (&["paper", "--out", "p", "--longest", "0s"], ["--longest", "0s", "above 0"]),
         (&["paper", "--out", "/dev/null/x"], ["--out", "/dev/null/x", "cannot be written"]),
     ];
     let folder = tempfile::tempdir().unwrap();

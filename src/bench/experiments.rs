@@ -13,12 +13,9 @@ use super::targets::{Finding, findings};
 use super::{Lab, Size};
 use crate::compaction::{self, Map};
 use crate::error::Result;
-use crate::plan::Plan;
-use crate::render::limits;
 use crate::rng::Rng;
 use crate::scene::built_in;
 use crate::scene::geometry::Geometry;
-use crate::scene::open_box::open_box as open_box_scene;
 use crate::settings::transport::{Append, Effect, Illumination, TransportSettings};
 use crate::settings::{Preset, Settings, Variant};
 use crate::timings::Spread;
@@ -162,7 +159,7 @@ fn builders(lab: &mut Lab) -> Result<Found> {
             builds.push((variant, timed.ms("build"), limit_ms(timed.pass("build"))));
             passes.extend(timed.passes);
             // The paper's atomics literally, where more counters serve the device better.
-            if variant == Variant::Atomic && Plan::new(&open_box_scene(&settings), &settings, &limits(lab.gpu.facts()))?.counters > 1 {
+            if timed.counters > 1 {
                 let timed = paper_line::time(lab.gpu, &lab.rates, &Settings { counters: Some(1), ..settings }, lab.cancelled)?;
                 one_counter = Some(timed.ms("build"));
                 passes.extend(timed.passes);

@@ -60,6 +60,8 @@ pub struct Timed {
     pub dispatches: f64,
     pub memory: HeldMemory,
     pub stated_bytes: u64,
+    /// Counters that places were taken from in turn; 1 but in the paper's atomic builder.
+    pub counters: u32,
 }
 
 impl Timed {
@@ -146,6 +148,7 @@ fn timed(gpu: &Gpu, rates: &Rates, outcome: &Outcome, rounds: u32, first: u32) -
         dispatches: outcome.dispatches as f64 / f64::from(rounds),
         memory: gpu.held_memory(),
         stated_bytes: plan.bytes(),
+        counters: plan.counters,
     }
 }
 

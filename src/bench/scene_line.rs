@@ -146,6 +146,7 @@ fn time_once(gpu: &Gpu, rates: &Rates, job: &Job, cancelled: &AtomicBool) -> Res
         dispatches: lit.dispatches as f64 / f64::from(rounds),
         memory,
         stated_bytes: lit.plan.bytes,
+        counters: 1,
     })
 }
 
