@@ -7,6 +7,7 @@ use std::time::Instant;
 use common::{Check, assert_complains, assert_holds, device, device_with, open, run, run_on_cpu};
 use photonmill::constants::LOOP_LIMIT;
 use photonmill::error::Error;
+use photonmill::gpu::clock::WARM_UP;
 use photonmill::gpu::kernels::ScanAdd;
 use photonmill::gpu::{Commands, Constants, Extent, Gpu, Memory, Options, check};
 use photonmill::records::ScanPush;
@@ -39,6 +40,25 @@ fn loops_count_right_up_to_the_limit() {
     println!("{}: {} of {} iterations", gpu.facts().name, long.done, long.wanted);
     assert_eq!(long.wanted, 200_000);
     assert!(long.done >= LOOP_LIMIT && long.done <= long.wanted);
+}
+
+/// Keeping a card busy before the first round changes no result, is held against no run's memory and counts in no run's time.
+#[test]
+fn a_warm_up_is_no_part_of_the_run() {
+    let Some(plain) = device() else { return };
+    let settings = Settings { photons: 999, mesh: 5, bounces: 4, ..Settings::default() };
+    let expected = run(&plain, &settings);
+    let gpu = device_with(Options { warm_up: true, ..Options::default() }).unwrap();
+    gpu.forget_peaks();
+    let began = Instant::now();
+    let found = run(&gpu, &settings);
+    let seconds = began.elapsed().as_secs_f64();
+    assert_eq!(found.film.sums, expected.film.sums);
+    assert_eq!(gpu.held_memory().peak_device_bytes, found.plan.bytes());
+    let of_the_run = found.timings.row("run").and_then(|row| row.wall_ms).unwrap() / 1e3;
+    println!("{}: {of_the_run:.4} s of {seconds:.4} s", gpu.facts().name);
+    // A software device has no clock that falls.
+    assert!(gpu.facts().kind == "cpu" || seconds - of_the_run >= WARM_UP.as_secs_f64() / 10.0);
 }
 
 #[test]

@@ -11,7 +11,6 @@ use super::Lab;
 use super::experiments::{Found, limit_of_round};
 use super::scene_line::{self, Job};
 use crate::error::Result;
-use crate::gpu::clock::{self, WARM_UP};
 use crate::plan::transport::usual_radius;
 use crate::scene::geometry::Geometry;
 use crate::scene::{Scene, Surface, built_in};
@@ -230,7 +229,6 @@ impl Search<'_> {
         for rounds in (0..=MOST_DOUBLINGS).map(|doublings| 1 << doublings) {
             let mut shots = Vec::new();
             for seed in (FIRST_SEED..).take(REPEATS as usize) {
-                clock::warm_up(lab.gpu, WARM_UP)?;
                 let began = Instant::now();
                 let Some(shot) = run(rounds, seed)? else { return Ok(curve) };
                 shots.push((shot, began.elapsed()));

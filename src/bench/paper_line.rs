@@ -2,12 +2,10 @@
 //! do without.
 
 use std::sync::atomic::AtomicBool;
-use std::time::Instant;
 
 use super::pass::{Cost, Pass, SLOW_OPERATION, Work, rounds_of, whole};
 use super::rates::{PHILOX_PRODUCTS, Rates};
 use crate::error::{Error, Result};
-use crate::gpu::clock::{self, WARM_UP};
 use crate::gpu::{Gpu, HeldMemory};
 use crate::ledger::Fates;
 use crate::path::StoredPath;
@@ -76,21 +74,8 @@ impl Timed {
 
 /// Rounds that count.
 pub const REPEATS: u32 = 7;
-/// Rounds of a warm-up, however short they are.
-const MOST_WARM_UP: f64 = 256.0;
-
-/// Rounds to be dropped at the start of a run; `probe` tells how many milliseconds a round takes, and is asked until a card
-/// has come to its clock.
-pub fn warm_up_rounds(gpu: &Gpu, probe: impl Fn() -> Result<f64>) -> Result<u32> {
-    let is_cpu = gpu.facts().kind == "cpu";
-    let began = Instant::now();
-    let mut round_ms = probe()?;
-    while !is_cpu && began.elapsed() < WARM_UP {
-        round_ms = probe()?;
-    }
-    let rounds = 1e3 * WARM_UP.as_secs_f64() / round_ms.max(1e-3);
-    Ok(if is_cpu { 1 } else { rounds.clamp(1.0, MOST_WARM_UP) as u32 })
-}
+/// Rounds before them: the first fills caches.
+pub const DROPPED: u32 = 1;
 
 /// Fails where nothing can be timed, or somebody ended the run.
 pub fn check_clock(gpu: &Gpu) -> Result<()> {
@@ -105,22 +90,18 @@ fn run_once(gpu: &Gpu, settings: &Settings, cancelled: &AtomicBool) -> Result<Ou
     if outcome.cancelled { Err(Error::Interrupted) } else { Ok(outcome) }
 }
 
-/// Times the passes of a builder: [`REPEATS`] rounds of one run, after rounds that bring a card to its clock.
+/// Times the passes of a builder: [`REPEATS`] rounds of one run, after [`DROPPED`] others.
 pub fn time(gpu: &Gpu, rates: &Rates, settings: &Settings, cancelled: &AtomicBool) -> Result<Timed> {
-    let probe = || run_once(gpu, &Settings { rounds: 2, ..settings.clone() }, cancelled);
-    let warm_up = warm_up_rounds(gpu, || Ok(whole(&rounds_of(&probe()?.timings, 2, 1))))?;
-    let rounds = warm_up + REPEATS;
-    clock::warm_up(gpu, WARM_UP)?;
+    let rounds = DROPPED + REPEATS;
     gpu.forget_peaks();
     let outcome = run_once(gpu, &Settings { rounds, ..settings.clone() }, cancelled)?;
-    Ok(timed(gpu, rates, &outcome, rounds, warm_up))
+    Ok(timed(gpu, rates, &outcome, rounds, DROPPED))
 }
 
 /// Times a run as it is, all rounds; a first one is dropped.
 pub fn time_run(gpu: &Gpu, rates: &Rates, settings: &Settings, cancelled: &AtomicBool) -> Result<Vec<Timed>> {
     let mut runs = Vec::new();
     for _ in 0..=REPEATS {
-        clock::warm_up(gpu, WARM_UP)?;
         gpu.forget_peaks();
         let outcome = run_once(gpu, settings, cancelled)?;
         runs.push(timed(gpu, rates, &outcome, settings.rounds, 0));

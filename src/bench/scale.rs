@@ -3,8 +3,8 @@
 use serde::Serialize;
 
 use super::Lab;
-use super::paper_line::warm_up_rounds;
-use super::pass::{rounds_of, whole};
+use super::paper_line::DROPPED;
+use super::pass::rounds_of;
 use super::scene_line::{self, Job};
 use crate::error::{Error, Result};
 use crate::render::{self, Control, Outcome};
@@ -130,13 +130,11 @@ fn over_photons(lab: &mut Lab, left_out: &mut Vec<String>) -> Result<Vec<Step>> 
             let outcome = render::on_gpu(lab.gpu, &open_box(&settings), &Settings { rounds, ..settings.clone() }, control)?;
             if outcome.cancelled { Err(Error::Interrupted) } else { Ok(outcome) }
         };
-        // In one run, as a card's clock falls while a run is set up.
-        let warm_up = warm_up_rounds(lab.gpu, || Ok(whole(&rounds_of(&run(2)?.timings, 2, 1))))?;
         let rounds = (size / u64::from(photons)) as u32;
-        let all = warm_up + rounds * (most_rounds / rounds).clamp(1, REPEATS);
+        let all = DROPPED + rounds * (most_rounds / rounds).clamp(1, REPEATS);
         lab.gpu.forget_peaks();
         let outcome = run(all)?;
-        let scopes = rounds_of(&outcome.timings, all, warm_up);
+        let scopes = rounds_of(&outcome.timings, all, DROPPED);
         let pass = |name: &str| {
             let (_, ms) = scopes.iter().find(|(scope, _)| scope == name)?;
             let sums = ms.chunks_exact(rounds as usize).map(|rounds| rounds.iter().sum()).collect();

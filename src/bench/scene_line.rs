@@ -6,11 +6,10 @@ use std::time::Instant;
 
 use rayon::prelude::*;
 
-use super::paper_line::{Counts, RANK_BYTES, REPEATS, Timed, warm_up_rounds};
+use super::paper_line::{Counts, DROPPED, RANK_BYTES, REPEATS, Timed};
 use super::pass::{Cost, Pass, SLOW_OPERATION, Work, rounds_of, whole};
 use super::rates::{PHILOX_PRODUCTS, Rates};
 use crate::error::{Error, Result};
-use crate::gpu::clock::{self, WARM_UP};
 use crate::gpu::{Commands, Gpu};
 use crate::ledger::Fates;
 use crate::photon::MapPhoton;
@@ -105,7 +104,7 @@ pub fn survey(gpu: &Gpu, job: &Job, map: impl Fn(&TransportPlan) -> Option<&MapP
 /// Visible points of a survey.
 const SAMPLES: usize = 256;
 
-/// Times the passes of a scene: [`REPEATS`] rounds of one run, after rounds that bring a card to its clock. Radii stay. On a
+/// Times the passes of a scene: [`REPEATS`] rounds of one run, after [`DROPPED`] others. Radii stay. On a
 /// card the fastest of [`RUNS`] counts: its clock may fall for a second or so by what others do on the same machine.
 pub fn time(gpu: &Gpu, rates: &Rates, job: &Job, cancelled: &AtomicBool) -> Result<Timed> {
     let runs = if gpu.facts().kind == "cpu" { 1 } else { RUNS };
@@ -123,16 +122,14 @@ const RUNS: u32 = 3;
 
 fn time_once(gpu: &Gpu, rates: &Rates, job: &Job, cancelled: &AtomicBool) -> Result<Timed> {
     let run = |rounds: u32| job.light(gpu, TransportSettings { alpha: 1.0, rounds, ..job.settings.clone() }, cancelled);
-    let warm_up = warm_up_rounds(gpu, || Ok(whole(&rounds_of(&run(2)?.timings, 2, 1))))?;
-    let rounds = warm_up + REPEATS;
-    clock::warm_up(gpu, WARM_UP)?;
+    let rounds = DROPPED + REPEATS;
     gpu.forget_peaks();
     let lit = run(rounds)?;
     let memory = gpu.held_memory();
     let surveys = [survey(gpu, job, |plan| plan.global.as_ref())?, survey(gpu, job, |plan| plan.caustic.as_ref())?];
     let counts = lit.fates.each_ref().map(|fates: &Fates| Counts::of(fates, rounds));
     let model = Model { job, plan: &lit.plan, counts, surveys };
-    let scopes = rounds_of(&lit.timings, rounds, warm_up);
+    let scopes = rounds_of(&lit.timings, rounds, DROPPED);
     let workload = format!("{}, {}, {} triangles", job.name, lit.plan.settings.append.name(), job.geometry.triangles.len());
     let passes =
         scopes.iter().filter_map(|(name, ms)| Some(Pass::new(&workload, name, Spread::of(ms.clone())?, model.work(name), rates))).collect();

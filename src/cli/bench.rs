@@ -11,7 +11,7 @@ use super::{DeviceArgs, End, complain, say};
 use crate::bench::experiments::Experiment;
 use crate::bench::{self, Request, Size, table};
 use crate::error::{Error, Result};
-use crate::gpu::{Gpu, Options};
+use crate::gpu::Gpu;
 use crate::output::destination::{Destination, Folder, write_all};
 
 #[derive(Args)]
@@ -58,7 +58,7 @@ pub(super) fn run(args: &BenchArgs, cancelled: &AtomicBool) -> Result<End> {
     }
     let json = args.json.as_ref().map(|path| Destination::open("--json", path)).transpose()?;
     let folder = args.out.as_ref().map(|path| Folder::open("--out", path)).transpose()?;
-    let gpu = Gpu::open(&Options { device: args.device.device.clone(), validate: args.device.validate, ..Options::default() })?;
+    let gpu = Gpu::open(&args.device.steady())?;
     let usual = if gpu.facts().kind == "cpu" { SizeArg::Small } else { SizeArg::Full };
     let request = Request {
         command: std::iter::once("photonmill".to_owned()).chain(std::env::args().skip(1)).collect::<Vec<_>>().join(" "),

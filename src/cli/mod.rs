@@ -76,10 +76,18 @@ struct DeviceArgs {
 }
 
 impl DeviceArgs {
+    fn options(&self) -> Options {
+        Options { device: self.device.clone(), validate: self.validate, ..Options::default() }
+    }
+
+    /// The same for a command that measures.
+    fn steady(&self) -> Options {
+        Options { warm_up: true, ..self.options() }
+    }
+
     /// The device, or `None` after one line on stderr if there is no Vulkan and none was asked for.
-    fn open(&self, time_dispatches: bool) -> Result<Option<Gpu>> {
-        let options = Options { device: self.device.clone(), validate: self.validate, time_dispatches, ..Options::default() };
-        match Gpu::open(&options) {
+    fn open(&self, options: &Options) -> Result<Option<Gpu>> {
+        match Gpu::open(options) {
             Ok(gpu) => Ok(Some(gpu)),
             Err(error @ (Error::NoVulkan { .. } | Error::DeviceLacks { .. })) if self.device.is_none() => {
                 complain(&format!("{error}; running the CPU builder instead"));
@@ -87,6 +95,25 @@ impl DeviceArgs {
             }
             Err(error) => Err(error),
         }
+    }
+}
+
+/// How a run is timed.
+#[derive(Args)]
+#[command(next_help_heading = "Timing")]
+struct TimingArgs {
+    /// Time every dispatch on the device, not only every pass
+    #[arg(long)]
+    time_dispatches: bool,
+    /// Keep the device busy before the first round, so that GPU times are those at the clock of work, to which a card that
+    /// idled takes 0.3 s to come; in no time of the report
+    #[arg(long)]
+    warm_up: bool,
+}
+
+impl TimingArgs {
+    fn options(&self, device: &DeviceArgs) -> Options {
+        Options { time_dispatches: self.time_dispatches, warm_up: self.warm_up, ..device.options() }
     }
 }
 

@@ -41,7 +41,7 @@ const LARGE_ON_CPU: u32 = 1 << 16;
 pub(super) fn run(args: &PaperArgs, cancelled: &AtomicBool) -> Result<End> {
     args.validate()?;
     let folder = Folder::open("--out", &args.out)?;
-    let gpu = args.device.open(false)?;
+    let gpu = args.device.open(&args.device.steady())?;
     let is_cpu = gpu.as_ref().is_none_or(|gpu| gpu.facts().kind == "cpu");
     let request = Request {
         large: args.large.unwrap_or(if is_cpu { LARGE_ON_CPU } else { LARGE_ON_GPU }),

@@ -5,7 +5,7 @@ use clap::Args;
 use super::transport::{Job, PartArg, SceneArgs, TransportArgs, camera, geometry, size};
 use super::{DeviceArgs, say};
 use crate::error::Result;
-use crate::gpu::{Gpu, Options};
+use crate::gpu::Gpu;
 use crate::output::light_report;
 use crate::plan::Limits;
 use crate::plan::transport::{Sensor, TransportPlan};
@@ -41,8 +41,7 @@ pub(super) fn run(args: &PlanArgs) -> Result<()> {
     let job = Job { scene: &scene, settings: &settings, sensor: Sensor::Picture { width, height }, camera: Some(&camera), phases: &[] };
     let geometry = geometry(&scene, &settings)?;
     // A plan is data: it needs a device's limits, not the device.
-    let options = Options { device: args.device.device.clone(), validate: args.device.validate, ..Options::default() };
-    let limits = match Gpu::open(&options) {
+    let limits = match Gpu::open(&args.device.options()) {
         Ok(gpu) => render::limits(gpu.facts()),
         Err(error) if args.device.device.is_some() => return Err(error),
         Err(_) => Limits::of_host(),

@@ -8,7 +8,7 @@ use clap::{Args, ValueEnum};
 
 use super::stop::{ProgressArg, StopArgs, Teller, bias_before, rounds_after};
 use super::transport::photon_name;
-use super::{DeviceArgs, End, complain, say};
+use super::{DeviceArgs, End, TimingArgs, complain, say};
 use crate::error::{Error, Result};
 use crate::film::estimate_walls;
 use crate::gpu::Gpu;
@@ -119,9 +119,8 @@ pub(super) struct RunArgs {
     #[arg(long, value_name = "ROUND:PHOTON", value_parser = photon_name, help_heading = "Output",
         conflicts_with_all = ["output", "irradiance", "radiosity", "json", "trace", "time_dispatches"])]
     replay: Option<PhotonName>,
-    /// Time every dispatch on the device, not only every pass
-    #[arg(long, help_heading = "Device")]
-    time_dispatches: bool,
+    #[command(flatten)]
+    timing: TimingArgs,
     /// Threads of --variant cpu, or `all` [default: 1, as in the paper]
     #[arg(long, value_name = "N|all", value_parser = threads, help_heading = "Device")]
     threads: Option<usize>,
@@ -322,7 +321,7 @@ pub(super) fn run(args: &RunArgs, cancelled: &AtomicBool) -> Result<End> {
     }
     let gpu = match settings.variant {
         Variant::Cpu => None,
-        _ => args.device.open(args.time_dispatches)?,
+        _ => args.device.open(&args.timing.options(&args.device))?,
     };
     let settings = match &gpu {
         Some(gpu) if args.variant == Some(VariantArg::Auto) => Settings { variant: fastest(gpu, &scene, &settings)?, ..settings },
@@ -374,7 +373,7 @@ fn show_photon(args: &RunArgs, settings: &Settings, scene: &RoomScene, name: Pho
     if caustic {
         return Err(Error::setting("--replay", name, "the paper's box has one map; leave :caustic out"));
     }
-    let gpu = if settings.variant == Variant::Cpu { None } else { args.device.open(false)? };
+    let gpu = if settings.variant == Variant::Cpu { None } else { args.device.open(&args.device.options())? };
     let path = match &gpu {
         Some(gpu) => render::replay_on_gpu(gpu, scene, settings, round, photon)?,
         None => render::replay_on_cpu(scene, settings, round, photon)?,

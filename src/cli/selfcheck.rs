@@ -19,7 +19,7 @@ pub(super) struct SelfcheckArgs {
 }
 
 pub(super) fn run(args: &SelfcheckArgs, cancelled: &AtomicBool) -> Result<End> {
-    let gpu = args.device.open(false)?;
+    let gpu = args.device.open(&args.device.options())?;
     let device = gpu.as_ref().map_or("CPU".to_owned(), |gpu| format!("{}, {}", gpu.facts().name, gpu.facts().driver));
     let began = Instant::now();
     if !args.json {

@@ -10,7 +10,7 @@ use super::run::whole;
 use super::stop::seconds;
 use super::{DeviceArgs, End, complain, say};
 use crate::error::{Error, Result};
-use crate::gpu::{Gpu, Options};
+use crate::gpu::Gpu;
 use crate::output::destination::Folder;
 use crate::scene::Scene;
 use crate::study::{self, Request};
@@ -56,8 +56,7 @@ pub(super) fn run(args: &StudyArgs, cancelled: &AtomicBool) -> Result<End> {
     for warning in &scene.warnings {
         complain(&format!("warning: {warning}"));
     }
-    let options = Options { device: args.device.device.clone(), validate: args.device.validate, ..Options::default() };
-    let gpu = Gpu::open(&options)?;
+    let gpu = Gpu::open(&args.device.steady())?;
     let is_cpu = gpu.facts().kind == "cpu";
     let request = Request {
         scene: args.scene.clone(),

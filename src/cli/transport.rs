@@ -7,9 +7,9 @@ use clap::{Args, ValueEnum};
 
 use super::run::{number, numbers, whole};
 use super::stop::{ProgressArg, StopArgs, Teller, bias_before, rounds_after};
-use super::{DeviceArgs, complain, hearing};
+use super::{DeviceArgs, TimingArgs, complain, hearing};
 use crate::error::{Error, Result};
-use crate::gpu::{Gpu, Options};
+use crate::gpu::Gpu;
 use crate::output::destination::Destination;
 use crate::output::light_report;
 use crate::output::trace_file;
@@ -132,9 +132,8 @@ pub(super) struct ReportArgs {
     /// Chrome trace of all passes, for Perfetto
     #[arg(long, value_name = "FILE", help_heading = "Output")]
     trace: Option<PathBuf>,
-    /// Time every single dispatch
-    #[arg(long, help_heading = "Output")]
-    time_dispatches: bool,
+    #[command(flatten)]
+    timing: TimingArgs,
 }
 
 super::run::value_enum!(IlluminationArg => Illumination { Split, Photons });
@@ -239,13 +238,7 @@ impl ReportArgs {
 
     /// The device; a scene of triangles needs one.
     pub(super) fn device(&self, device: &DeviceArgs) -> Result<Gpu> {
-        let options = Options {
-            device: device.device.clone(),
-            validate: device.validate,
-            time_dispatches: self.time_dispatches,
-            ..Options::default()
-        };
-        Gpu::open(&options)
+        Gpu::open(&self.timing.options(device))
     }
 }
 

@@ -191,14 +191,13 @@ fn agree(variant: Variant, photons: u32, survival: f32, same: bool) -> Result<()
 
 /// Milliseconds to trace and store all photons, on the device's clock where it has one, and their fates.
 fn run(gpu: &Gpu, room: &RoomScene, settings: &Settings, turns: usize) -> Result<(Spread, Vec<Tally>)> {
-    let idle_since = Instant::now();
+    let began = Instant::now();
     let plan = Plan::new(room, settings, &limits(gpu.facts()))?;
     gpu.prepare(&trace::modules(&plan), &constants(&plan))?;
-    let mut commands = Commands::new(gpu, constants(&plan), Instant::now())?;
+    let mut commands = Commands::new(gpu, constants(&plan), began)?;
     let resources = Resources::new(gpu, &mut commands, room, &plan)?;
+    commands.warm_up()?;
     commands.submit()?;
-    // While buffers are made a card's clock falls, but not its memory's, which favours builders that wait for memory.
-    clock::warm_up(gpu, idle_since.elapsed().clamp(WARM_UP / 10, WARM_UP))?;
     let mut fates = Vec::new();
     // The first turn fills caches.
     for turn in 0..=turns {

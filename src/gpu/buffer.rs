@@ -119,6 +119,15 @@ impl Gpu {
         let mut held = self.context.held.borrow_mut();
         (held.peak_device_bytes, held.peak_staging_bytes) = (held.device_bytes, held.staging_bytes);
     }
+
+    /// Work whose memory is no run's: peaks stay what they were.
+    pub(super) fn without_peaks<T>(&self, work: impl FnOnce() -> T) -> T {
+        let HeldMemory { peak_device_bytes, peak_staging_bytes, .. } = self.held_memory();
+        let result = work();
+        let mut held = self.context.held.borrow_mut();
+        (held.peak_device_bytes, held.peak_staging_bytes) = (peak_device_bytes, peak_staging_bytes);
+        result
+    }
 }
 
 impl Buffer {

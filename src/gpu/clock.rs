@@ -19,13 +19,15 @@ pub fn warm_up(gpu: &Gpu, time: Duration) -> Result<()> {
     if gpu.facts().kind == "cpu" {
         return Ok(());
     }
-    let mut commands = Commands::new(gpu, Constants::new(GROUP_SIZE), Instant::now())?;
-    let results = gpu.buffer::<u32>("results", u64::from(ITEMS), Memory::Device)?;
-    let push = MeasurePush { item_count: ITEMS, step_count: STEPS, mask: 0 };
-    let began = Instant::now();
-    while began.elapsed() < time {
-        commands.dispatch(MeasureFloat { results: &results }, &push, Extent::Items(u64::from(ITEMS)))?;
-        commands.submit()?;
-    }
-    Ok(())
+    gpu.without_peaks(|| {
+        let mut commands = Commands::new(gpu, Constants::new(GROUP_SIZE), Instant::now())?;
+        let results = gpu.buffer::<u32>("results", u64::from(ITEMS), Memory::Device)?;
+        let push = MeasurePush { item_count: ITEMS, step_count: STEPS, mask: 0 };
+        let began = Instant::now();
+        while began.elapsed() < time {
+            commands.dispatch(MeasureFloat { results: &results }, &push, Extent::Items(u64::from(ITEMS)))?;
+            commands.submit()?;
+        }
+        Ok(())
+    })
 }

@@ -43,6 +43,8 @@ pub struct Options {
     pub validate: bool,
     /// Time every dispatch beside every pass; each costs two more timestamps.
     pub time_dispatches: bool,
+    /// Keep a card busy before the first round of every run, so that its times are those of a card at work.
+    pub warm_up: bool,
     /// Behave as on a device without timestamps.
     pub without_timestamps: bool,
     /// Behave as on a device without 64-bit atomics.
@@ -55,6 +57,7 @@ pub struct Options {
 pub struct Gpu {
     facts: DeviceFacts,
     time_dispatches: bool,
+    warms_up: bool,
     replaced: Vec<(String, Vec<u32>)>,
     queue: vk::Queue,
     pipelines: RefCell<HashMap<kernel::PipelineKey, Rc<kernel::Pipeline>>>,
@@ -144,6 +147,7 @@ impl Gpu {
         let gpu = Gpu {
             facts,
             time_dispatches: options.time_dispatches,
+            warms_up: options.warm_up,
             replaced: options.replaced.clone(),
             queue,
             pipelines: RefCell::default(),

@@ -51,9 +51,6 @@ pub struct Bench<'a> {
     expected: usize,
 }
 
-/// A card that idled runs at a low clock; this much work of a case is dropped, so that what counts is
-/// measured at the clock of work.
-const WARM_UP: Duration = Duration::from_millis(400);
 /// A case is not repeated once its runs have taken this long.
 pub const PATIENCE: Duration = Duration::from_secs(6);
 
@@ -111,25 +108,15 @@ impl<'a> Bench<'a> {
         }
     }
 
-    /// Runs that are dropped: they make pipelines, fill caches and bring a GPU to its clock. Returns
-    /// the last one.
-    pub fn warm_up(&self, settings: &Settings) -> Step<Outcome> {
-        let began = Instant::now();
-        let mut outcome = self.run(settings)?;
-        while self.has_gpu() && settings.variant != Variant::Cpu && began.elapsed() < WARM_UP {
-            outcome = self.run(settings)?;
-        }
-        Ok(outcome)
-    }
-
-    /// `repeats` runs of every case after its warm-up, in turn, so that a clock that drifts touches all
-    /// alike. A case that is slow is repeated less, and one whose warm-up alone is slow keeps that.
+    /// `repeats` runs of every case after one that is dropped, as it makes pipelines and fills caches; in turn, so that a
+    /// clock that drifts touches all alike. A case that is slow is repeated less, and one whose first run alone is slow
+    /// keeps that.
     pub fn repeat_in_turn(&self, cases: &[Settings], repeats: usize) -> Step<Vec<Vec<Outcome>>> {
-        let mut warm = Vec::new();
+        let mut first = Vec::new();
         let mut spent = Vec::new();
         for settings in cases {
             let began = Instant::now();
-            warm.push(self.warm_up(settings)?);
+            first.push(self.run(settings)?);
             spent.push(began.elapsed());
         }
         let mut outcomes = vec![Vec::new(); cases.len()];
@@ -140,9 +127,9 @@ impl<'a> Bench<'a> {
                 spent[case] += began.elapsed();
             }
         }
-        for (outcomes, warm) in outcomes.iter_mut().zip(warm) {
+        for (outcomes, first) in outcomes.iter_mut().zip(first) {
             if outcomes.is_empty() {
-                outcomes.push(warm);
+                outcomes.push(first);
             }
         }
         Ok(outcomes)

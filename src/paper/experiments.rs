@@ -254,7 +254,8 @@ pub fn totals(bench: &mut Bench, found: &mut Reproduction) -> Step<()> {
                 continue;
             }
             if a_round.is_none_or(|ms| ms * f64::from(rounds) < SHORT_TOTAL_MS) {
-                bench.warm_up(&settings)?;
+                // It makes pipelines.
+                bench.run(&settings)?;
             }
             let outcome = bench.run(&settings)?;
             let row = |name: &str| outcome.timings.row(name);

@@ -32,6 +32,7 @@ pub fn on_gpu(gpu: &Gpu, scene: &RoomScene, settings: &Settings, control: &mut C
     commands.timings().count("run");
     let resources = commands.scope("set-up", |commands| Resources::new(gpu, commands, scene, &plan))?;
     prepare(gpu, &plan)?;
+    commands.warm_up()?;
     commands.submit()?;
 
     let mut book = Book::new(&plan, control, started);

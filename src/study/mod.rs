@@ -21,10 +21,10 @@ use serde::Serialize;
 
 use crate::compaction;
 use crate::error::{Error, Result};
-use crate::gpu::Gpu;
+use crate::gpu::{Gpu, clock};
 use crate::output::destination::{Folder, write_all};
 use crate::scene::Scene;
-use axes::{Axis, Configuration, Group};
+use axes::{Axis, Group};
 use point::{Curve, Point};
 use store::Store;
 use subject::Subject;
@@ -112,7 +112,8 @@ pub fn run(
     let count: usize = subjects.iter().flat_map(|subject| &subject.groups).map(|group| group.configurations.len()).sum();
     let of_builders = if subjects.iter().any(Subject::is_of_paper) { study.request.budget / COMPACTION_SHARE } else { Duration::ZERO };
     let share = (study.request.budget - of_builders) / count.max(1) as u32;
-    let (mut begun, mut is_warm) = (0, false);
+    clock::warm_up(gpu, FIRST_WARM_UP)?;
+    let mut begun = 0;
     for subject in &subjects {
         study.parts.push(Part {
             quantity: subject.quantity.clone(),
@@ -123,8 +124,7 @@ pub fn run(
         for group in &subject.groups {
             begun += group.configurations.len();
             tell(&format!("[{begun}/{count}] {}: {}", subject.quantity, group.axis.name()));
-            let mut measuring =
-                Measuring { gpu, subject, group, request: &study.request, share, cancelled, store: &mut store, is_warm: &mut is_warm };
+            let mut measuring = Measuring { gpu, subject, group, request: &study.request, share, cancelled, store: &mut store };
             let (comparison, whole) = measuring.compare()?;
             study.parts.last_mut().expect("pushed above").comparisons.push(comparison);
             if !whole {
@@ -159,8 +159,6 @@ struct Measuring<'a> {
     share: Duration,
     cancelled: &'a AtomicBool,
     store: &'a mut Store,
-    /// The card has worked already.
-    is_warm: &'a mut bool,
 }
 
 impl Measuring<'_> {
@@ -209,7 +207,6 @@ impl Measuring<'_> {
             return Ok(true);
         }
         let mut shots = vec![Vec::new(); curves.len()];
-        self.warm_up(&group.configurations[0])?;
         // The first turn of all is dropped: it makes pipelines.
         let first_turn = u64::from(going.iter().any(|which| !curves[*which].points.is_empty()));
         for turn in first_turn..=u64::from(request.repeats) {
@@ -244,21 +241,7 @@ impl Measuring<'_> {
     }
 }
 
-impl Measuring<'_> {
-    /// A card that idled runs at a low clock: it gets work that is not measured.
-    fn warm_up(&mut self, configuration: &Configuration) -> Result<()> {
-        if self.gpu.facts().kind == "cpu" {
-            return Ok(());
-        }
-        let enough = if std::mem::replace(self.is_warm, true) { WARM_UP } else { FIRST_WARM_UP };
-        let began = Instant::now();
-        while began.elapsed() < enough && self.subject.run(self.gpu, configuration, 8, self.request.seed, self.cancelled)?.is_some() {}
-        Ok(())
-    }
-}
-
-/// Before the runs of a level, and before the very first.
-const WARM_UP: Duration = Duration::from_millis(150);
+/// A card that idled while references were made takes longer to come to its clock than each run gives it.
 const FIRST_WARM_UP: Duration = Duration::from_secs(3);
 
 /// How long the first round of a configuration may take, pipelines and all, before it is left out; or twice its share of

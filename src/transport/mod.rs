@@ -129,6 +129,7 @@ pub fn light(gpu: &Gpu, view: &View, plan: TransportPlan, control: &mut Control)
     commands.timings().count("plan");
     commands.timings().add(Span { name: "plan".into(), clock: Clock::Wall, start: Duration::ZERO, duration: plan.planned_in });
     let resources = commands.scope("set-up", |commands| TransportResources::new(gpu, commands, view.geometry, &plan, view.phases))?;
+    commands.warm_up()?;
     commands.submit()?;
 
     let mut fates = [Fates::new(plan.settings.bounces), Fates::new(plan.settings.bounces)];
