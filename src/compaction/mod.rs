@@ -9,7 +9,6 @@ use std::time::{Duration, Instant};
 use serde::Serialize;
 
 use crate::error::{Error, Result};
-use crate::gpu::clock::{self, WARM_UP};
 use crate::gpu::{Commands, Gpu};
 use crate::output::words::{count, number};
 use crate::photon::Photon;
@@ -174,8 +173,6 @@ fn cell(gpu: &Gpu, request: &Request, photons: u32, survival: f32) -> Result<Cel
             agree(variant, photons, survival, bytemuck::cast_slice::<_, u8>(&found) == bytemuck::cast_slice::<_, u8>(&expected))?;
         }
         agreed = Agreed::Photons;
-        // The card idled while the host compared.
-        clock::warm_up(gpu, WARM_UP)?;
     }
     builders.sort_by(|a, b| a.ms.median.total_cmp(&b.ms.median));
     Ok(Cell { survival, photons, stored, agreed, builders })

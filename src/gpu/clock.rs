@@ -9,6 +9,33 @@ use crate::records::MeasurePush;
 
 /// Work after which a card runs at its clock.
 pub const WARM_UP: Duration = Duration::from_millis(300);
+/// What is done of it in any case.
+pub const LEAST_WARM_UP: Duration = Duration::from_millis(30);
+
+/// How long a card has idled and not worked since, at most [`WARM_UP`].
+#[derive(Debug, Clone, Copy)]
+pub(super) struct Idleness {
+    owed: Duration,
+    since: Instant,
+}
+
+impl Idleness {
+    /// Of a card that nobody used before.
+    pub(super) fn new(now: Instant) -> Idleness {
+        Idleness { owed: WARM_UP, since: now }
+    }
+
+    /// It idled until `began`, and worked until `ended`.
+    #[must_use]
+    pub(super) fn after(self, began: Instant, ended: Instant) -> Idleness {
+        Idleness { owed: self.at(began).saturating_sub(ended - began), since: ended }
+    }
+
+    pub(super) fn at(self, now: Instant) -> Duration {
+        (self.owed + now.saturating_duration_since(self.since)).min(WARM_UP)
+    }
+}
+
 const ITEMS: u32 = 1 << 20;
 const STEPS: u32 = 1024;
 const GROUP_SIZE: u32 = 256;
@@ -30,4 +57,25 @@ pub fn warm_up(gpu: &Gpu, time: Duration) -> Result<()> {
         }
         Ok(())
     })
+}
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+
+    #[test]
+    fn work_pays_for_idle_time() {
+        let start = Instant::now();
+        let at = |ms: u64| start + Duration::from_millis(ms);
+        let ms = Duration::from_millis;
+        let idleness = Idleness::new(start);
+        assert_eq!(idleness.at(at(1000)), WARM_UP);
+        let idleness = idleness.after(at(1000), at(1100));
+        assert_eq!(idleness.at(at(1100)), WARM_UP - ms(100));
+        let idleness = idleness.after(at(1150), at(2000));
+        assert_eq!(idleness.at(at(2000)), Duration::ZERO);
+        assert_eq!(idleness.at(at(2007)), ms(7));
+        // Other commands of the same device may have ended later than these began.
+        assert_eq!(idleness.after(at(1990), at(2001)).at(at(2001)), Duration::ZERO);
+    }
 }

@@ -8,7 +8,7 @@ use std::time::{Duration, Instant};
 use ash::vk;
 use bytemuck::Pod;
 
-use super::clock::{self, WARM_UP};
+use super::clock::{self, LEAST_WARM_UP};
 use super::timestamps::{TimedScope, Timestamps};
 use super::{Buffer, Constants, Context, DeviceFacts, Gpu, Kernel, Memory, call};
 use crate::error::Result;
@@ -290,6 +290,7 @@ impl<'gpu> Commands<'gpu> {
             call("vkResetFences", device.reset_fences(&[self.fence]))?;
         }
         let wall = submitted.elapsed();
+        self.gpu.idleness.set(self.gpu.idleness.get().after(submitted, submitted + wall));
         self.submission_count += 1;
         self.collect_timings(submitted, wall)?;
 
@@ -345,13 +346,13 @@ impl<'gpu> Commands<'gpu> {
         timings
     }
 
-    /// Where the device was opened for it, keeps a card busy that idled since the recording began: while the host makes
-    /// buffers, its clock falls, but not its memory's, which favours passes that wait for memory.
+    /// Where the device was opened for it, keeps a card busy for as long as it idled: while the host makes buffers, its clock
+    /// falls, but not its memory's, which favours passes that wait for memory.
     pub fn warm_up(&mut self) -> Result<()> {
         if self.gpu.warms_up {
-            let idle = self.started.elapsed();
-            clock::warm_up(self.gpu, idle.clamp(WARM_UP / 10, WARM_UP))?;
-            self.warming += self.started.elapsed() - idle;
+            let began = Instant::now();
+            clock::warm_up(self.gpu, self.gpu.idleness.get().at(began).max(LEAST_WARM_UP))?;
+            self.warming += began.elapsed();
         }
         Ok(())
     }

@@ -10,9 +10,10 @@ pub mod kernel;
 pub mod timestamps;
 mod validation;
 
-use std::cell::RefCell;
+use std::cell::{Cell, RefCell};
 use std::collections::HashMap;
 use std::rc::Rc;
+use std::time::Instant;
 
 use ash::vk;
 use gpu_allocator::vulkan::{Allocator, AllocatorCreateDesc};
@@ -23,6 +24,7 @@ pub use device::DeviceFacts;
 pub use kernel::{Constants, Kernel, Module};
 
 use crate::error::{Error, Result};
+use clock::Idleness;
 use validation::Messages;
 
 /// The kernels that `build.rs` found, one struct each.
@@ -58,6 +60,7 @@ pub struct Gpu {
     facts: DeviceFacts,
     time_dispatches: bool,
     warms_up: bool,
+    idleness: Cell<Idleness>,
     replaced: Vec<(String, Vec<u32>)>,
     queue: vk::Queue,
     pipelines: RefCell<HashMap<kernel::PipelineKey, Rc<kernel::Pipeline>>>,
@@ -148,6 +151,7 @@ impl Gpu {
             facts,
             time_dispatches: options.time_dispatches,
             warms_up: options.warm_up,
+            idleness: Cell::new(Idleness::new(Instant::now())),
             replaced: options.replaced.clone(),
             queue,
             pipelines: RefCell::default(),
