@@ -9,6 +9,7 @@ use ash::vk;
 use bytemuck::Pod;
 use rayon::prelude::*;
 
+use super::specialize::decided;
 use super::{Buffer, Context, DeviceFacts, Gpu, call};
 use crate::error::Result;
 use crate::records::Field;
@@ -123,7 +124,8 @@ impl Gpu {
         for module in modules {
             let key = PipelineKey::new(module, constants);
             if !self.pipelines.borrow().contains_key(&key) && missing.iter().all(|(other, ..)| *other != key) {
-                missing.push((key, self.pipeline_layout(module)?, self.words_of(module)));
+                let words = decided(&self.words_of(module), &key.constants);
+                missing.push((key, self.pipeline_layout(module)?, words));
             }
         }
         let (device, cache) = (&self.context.device, self.cache.raw);

@@ -7,6 +7,7 @@ pub mod clock;
 pub mod commands;
 pub mod device;
 pub mod kernel;
+mod specialize;
 pub mod timestamps;
 mod validation;
 

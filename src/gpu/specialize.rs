@@ -1,0 +1,235 @@
+//! Branches on specialization constants are decided before a driver sees a module.
+//!
+//! A driver specializes a module too, but some inline every function first: what a run leaves out, strict arithmetic in
+//! every quotient above all, then costs them more time to compile than what it needs. Only the way through the code
+//! changes; blocks that no way leads to stay, and are passed over.
+
+use std::collections::{HashMap, HashSet};
+
+mod op {
+    pub const CONSTANT_TRUE: u32 = 41;
+    pub const CONSTANT_FALSE: u32 = 42;
+    pub const CONSTANT: u32 = 43;
+    pub const SPEC_CONSTANT_TRUE: u32 = 48;
+    pub const SPEC_CONSTANT_FALSE: u32 = 49;
+    pub const SPEC_CONSTANT: u32 = 50;
+    pub const SPEC_CONSTANT_OP: u32 = 52;
+    pub const DECORATE: u32 = 71;
+    pub const PHI: u32 = 245;
+    pub const SELECTION_MERGE: u32 = 247;
+    pub const LABEL: u32 = 248;
+    pub const BRANCH: u32 = 249;
+    pub const BRANCH_CONDITIONAL: u32 = 250;
+}
+
+const HEADER_WORDS: usize = 5;
+/// Of the decoration that gives a constant the number by which it is specialized.
+const SPEC_ID: u32 = 1;
+
+/// The module with its branches on these constants (number and value; others keep their defaults) decided.
+///
+/// Numbers and names are those of the SPIR-V specification, version 1.6, section 3.
+pub(super) fn decided(words: &[u32], constants: &[(u32, u32)]) -> Vec<u32> {
+    let values = values(words, constants);
+    // Ways that are no longer taken: from block to block.
+    let mut closed: HashSet<(u32, u32)> = HashSet::new();
+    let mut result = words[..HEADER_WORDS].to_vec();
+    let mut block = 0;
+    let mut rest = instructions(words).peekable();
+    while let Some(instruction) = rest.next() {
+        if opcode(instruction) == op::LABEL {
+            block = instruction[1];
+        }
+        let branch = rest.peek().filter(|next| opcode(instruction) == op::SELECTION_MERGE && opcode(next) == op::BRANCH_CONDITIONAL);
+        let known = branch.and_then(|branch| Some((*branch, *values.get(&branch[1])?)));
+        let Some((branch, condition)) = known else {
+            result.extend_from_slice(instruction);
+            continue;
+        };
+        let (taken, other) = if condition == 0 { (branch[3], branch[2]) } else { (branch[2], branch[3]) };
+        if taken != other {
+            closed.insert((block, other));
+        }
+        result.extend([first_word(op::BRANCH, 2), taken]);
+        rest.next();
+    }
+    without_ways(&result, &closed)
+}
+
+/// Values of constants, by the id of their result: of integers and truth values of 32 bits, as far as they are known.
+fn values(words: &[u32], constants: &[(u32, u32)]) -> HashMap<u32, u32> {
+    let given: HashMap<u32, u32> = constants.iter().copied().collect();
+    let mut numbers = HashMap::new();
+    let mut values = HashMap::new();
+    for instruction in instructions(words) {
+        let specialized = |default| {
+            let number: Option<&u32> = numbers.get(&instruction[2]);
+            number.and_then(|number| given.get(number)).copied().unwrap_or(default)
+        };
+        match (opcode(instruction), instruction) {
+            (op::DECORATE, [_, target, SPEC_ID, number]) => drop(numbers.insert(*target, *number)),
+            (op::CONSTANT_TRUE, [_, _, result]) => drop(values.insert(*result, 1)),
+            (op::CONSTANT_FALSE, [_, _, result]) => drop(values.insert(*result, 0)),
+            (op::CONSTANT, [_, _, result, value]) => drop(values.insert(*result, *value)),
+            (op::SPEC_CONSTANT_TRUE, [_, _, result]) => drop(values.insert(*result, specialized(1))),
+            (op::SPEC_CONSTANT_FALSE, [_, _, result]) => drop(values.insert(*result, specialized(0))),
+            (op::SPEC_CONSTANT, [_, _, result, default]) => drop(values.insert(*result, specialized(*default))),
+            (op::SPEC_CONSTANT_OP, [_, _, result, operation, operands @ ..]) => {
+                let operands: Option<Vec<u32>> = operands.iter().map(|operand| values.get(operand).copied()).collect();
+                if let Some(value) = operands.and_then(|operands| value_of(*operation, &operands)) {
+                    values.insert(*result, value);
+                }
+            }
+            _ => {}
+        }
+    }
+    values
+}
+
+/// What an operation makes of known operands; `None` for one that is not known here.
+fn value_of(operation: u32, operands: &[u32]) -> Option<u32> {
+    let value = match (operation, operands) {
+        // LogicalEqual and IEqual, LogicalNotEqual and INotEqual.
+        (164 | 170, [a, b]) => u32::from(a == b),
+        (165 | 171, [a, b]) => u32::from(a != b),
+        // LogicalOr, LogicalAnd, LogicalNot.
+        (166, [a, b]) => a | b,
+        (167, [a, b]) => a & b,
+        (168, [a]) => u32::from(*a == 0),
+        // UGreaterThan, UGreaterThanEqual, ULessThan, ULessThanEqual.
+        (172, [a, b]) => u32::from(a > b),
+        (174, [a, b]) => u32::from(a >= b),
+        (176, [a, b]) => u32::from(a < b),
+        (178, [a, b]) => u32::from(a <= b),
+        // BitwiseAnd.
+        (199, [a, b]) => a & b,
+        _ => return None,
+    };
+    Some(value)
+}
+
+/// Values that a block takes by the way to it: not by ways that are closed.
+fn without_ways(words: &[u32], closed: &HashSet<(u32, u32)>) -> Vec<u32> {
+    let mut result = words[..HEADER_WORDS].to_vec();
+    let mut block = 0;
+    for instruction in instructions(words) {
+        match (opcode(instruction), instruction) {
+            (op::PHI, [_, kind, id, choices @ ..]) => {
+                let open: Vec<u32> =
+                    choices.chunks_exact(2).filter(|choice| !closed.contains(&(choice[1], block))).flatten().copied().collect();
+                result.extend([first_word(op::PHI, 3 + open.len()), *kind, *id]);
+                result.extend(open);
+                continue;
+            }
+            (op::LABEL, [_, label]) => block = *label,
+            _ => {}
+        }
+        result.extend_from_slice(instruction);
+    }
+    result
+}
+
+fn instructions(words: &[u32]) -> impl Iterator<Item = &[u32]> {
+    let mut rest = &words[HEADER_WORDS..];
+    std::iter::from_fn(move || {
+        let length = (rest.first()? >> 16) as usize;
+        let (instruction, others) = rest.split_at(length);
+        rest = others;
+        Some(instruction)
+    })
+}
+
+fn opcode(instruction: &[u32]) -> u32 {
+    instruction[0] & 0xffff
+}
+
+fn first_word(opcode: u32, length: usize) -> u32 {
+    opcode | (length as u32) << 16
+}
+
+#[cfg(test)]
+mod tests {
+    use shaderc::Compiler;
+
+    use super::*;
+
+    /// Returns 1 or 2 by the branch, then a number by the way to the last block; %condition is what each test says.
+    fn module(condition: &str) -> Vec<u32> {
+        let text = format!(
+            "OpCapability Shader
+             OpMemoryModel Logical GLSL450
+             OpDecorate %number SpecId 3
+             OpDecorate %flag SpecId 7
+             %bool = OpTypeBool
+             %uint = OpTypeInt 32 0
+             %float = OpTypeFloat 32
+             %function = OpTypeFunction %uint
+             %one = OpConstant %uint 1
+             %two = OpConstant %uint 2
+             %half = OpConstant %float 0.5
+             %number = OpSpecConstant %uint 2
+             %flag = OpSpecConstantFalse %bool
+             {condition}
+             %main = OpFunction %uint None %function
+             %start = OpLabel
+             OpSelectionMerge %end None
+             OpBranchConditional %condition %then %end
+             %then = OpLabel
+             OpBranch %end
+             %end = OpLabel
+             %chosen = OpPhi %uint %one %then %two %start
+             OpReturnValue %chosen
+             OpFunctionEnd"
+        );
+        Compiler::new().unwrap().assemble(&text, None).unwrap().as_binary().to_vec()
+    }
+
+    /// The blocks that branches lead to without a condition, in the order of the text, and the choices of the last block.
+    fn ways(words: &[u32]) -> (Vec<u32>, usize) {
+        let branches = instructions(words).filter(|instruction| opcode(instruction) == op::BRANCH).map(|branch| branch[1]);
+        let phi = instructions(words).find(|instruction| opcode(instruction) == op::PHI).unwrap();
+        (branches.collect(), (phi.len() - 3) / 2)
+    }
+
+    fn labels(words: &[u32]) -> Vec<u32> {
+        instructions(words).filter(|instruction| opcode(instruction) == op::LABEL).map(|label| label[1]).collect()
+    }
+
+    #[test]
+    fn branches_go_where_their_constants_say() {
+        let equal = "%condition = OpSpecConstantOp %bool IEqual %number %two";
+        let both = "%other = OpSpecConstantOp %bool LogicalNot %flag
+                    %large = OpSpecConstantOp %bool UGreaterThan %number %two
+                    %condition = OpSpecConstantOp %bool LogicalAnd %large %other";
+        for (condition, constants, expected) in [
+            (equal, &[][..], true),
+            (equal, &[(3, 2)][..], true),
+            (equal, &[(3, 1)][..], false),
+            (equal, &[(7, 1)][..], true),
+            (both, &[][..], false),
+            (both, &[(3, 3)][..], true),
+            (both, &[(3, 3), (7, 1)][..], false),
+        ] {
+            let words = module(condition);
+            let found = decided(&words, constants);
+            let [_, then, end] = labels(&found)[..] else { panic!("blocks are lost") };
+            // The way past %then is closed with it, or the way through it.
+            assert_eq!(
+                ways(&found),
+                (if expected { vec![then, end] } else { vec![end, end] }, if expected { 1 } else { 2 }),
+                "{condition}"
+            );
+            assert!(instructions(&found).all(|instruction| !matches!(opcode(instruction), op::SELECTION_MERGE | op::BRANCH_CONDITIONAL)));
+        }
+    }
+
+    #[test]
+    fn what_is_not_known_stays_open() {
+        let compared = "%undefined = OpUndef %bool\n%condition = OpSpecConstantOp %bool LogicalEqual %undefined %flag";
+        let unusual = "%condition = OpSpecConstantOp %bool Select %flag %flag %flag";
+        for condition in [compared, unusual] {
+            let words = module(condition);
+            assert_eq!(decided(&words, &[(3, 1), (7, 1)]), words);
+        }
+    }
+}
