@@ -1,11 +1,9 @@
 //! Photons of a caustic map that are aimed at what makes caustics bring the same light with less noise.
 
-mod common;
-
-use common::aimed::{KINDS, compare, far_lamp, mean_and_error, scene, settings};
-use common::family::Family;
-use common::lit::{self, grid, irradiances, received};
-use common::{assert_complains, assert_holds, device, equal_sums};
+use crate::common::aimed::{KINDS, compare, far_lamp, mean_and_error, scene, settings};
+use crate::common::family::Family;
+use crate::common::lit::{self, grid, irradiances, received};
+use crate::common::{assert_complains, assert_holds, device, equal_sums};
 use glam::DVec3;
 use photonmill::gpu::Gpu;
 use photonmill::plan::transport::{Sensor, TransportPlan};

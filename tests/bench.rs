@@ -1,15 +1,11 @@
 //! `photonmill bench`: its measurements on the device under test, its report, its refusals.
 
-mod common;
-#[path = "common/planted.rs"]
-mod planted;
-
 use std::process::Command;
 use std::sync::atomic::AtomicBool;
 use std::sync::{Mutex, MutexGuard, PoisonError};
 use std::time::Duration;
 
-use common::{device, device_with, lit};
+use crate::common::{device, device_with, lit, planted};
 use photonmill::bench::experiments::Experiment;
 use photonmill::bench::paper_line::{self, Timed};
 use photonmill::bench::scene_line::{self, Job};

@@ -1,12 +1,10 @@
 //! The bias of a radius, as runs state it, against the truth: the stated interval holds it as often as it says.
 
-mod common;
-
 use std::sync::OnceLock;
 use std::sync::atomic::AtomicBool;
 
-use common::lit::scene;
-use common::{Check, assert_complains, assert_holds, device};
+use crate::common::lit::scene;
+use crate::common::{Check, assert_complains, assert_holds, device};
 use photonmill::bias::{self, Bias};
 use photonmill::film::estimate_walls;
 use photonmill::gpu::Gpu;

@@ -1,12 +1,10 @@
 //! Physical units: what the film says in W/m2 against closed forms of the direct light, against the
 //! arrivals of the independent f64 model, and against its own photon counts.
 
-mod common;
-
 use std::f64::consts::{PI, TAU};
 
-use common::reference::{Arrival, Emission, HALF_EDGE, MESH, Model, texels_in_reach};
-use common::{Check, assert_complains, assert_holds, device, run, run_on_cpu, z_check};
+use crate::common::reference::{Arrival, Emission, HALF_EDGE, MESH, Model, texels_in_reach};
+use crate::common::{Check, assert_complains, assert_holds, device, run, run_on_cpu, z_check};
 use photonmill::film::{WallEstimate, estimate_walls};
 use photonmill::render::Outcome;
 use photonmill::rng::Rng;

@@ -2,14 +2,12 @@
 //! `tests/closed_rooms.rs` has light that is scattered to and fro, `tests/optics.rs` mirrors and glass,
 //! `tests/radiosity.rs` the paper's box.
 
-mod common;
-
 use std::f64::consts::PI;
 use std::sync::atomic::AtomicBool;
 
-use common::family::{FALSE_ALARM, Family, normal_p_value};
-use common::lit::{APPENDS, irradiances, level, matt, received, scene, scene_of, shining};
-use common::{assert_complains, assert_holds, device, known};
+use crate::common::family::{FALSE_ALARM, Family, normal_p_value};
+use crate::common::lit::{APPENDS, irradiances, level, matt, received, scene, scene_of, shining};
+use crate::common::{assert_complains, assert_holds, device, known};
 use glam::{DVec3, Vec3};
 use photonmill::judge::radiosity::{cells_of, form_factor_from, on_wall};
 use photonmill::scene::closed_forms::NAMES;

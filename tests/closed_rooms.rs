@@ -1,13 +1,11 @@
 //! Light that is scattered to and fro and cannot leave, against closed forms: an integrating sphere, a furnace, parallel
 //! plates, the geometric series of bounces. `photonmill::selfcheck` has the furnace that is a box.
 
-mod common;
-
 use std::f64::consts::PI;
 
-use common::family::Family;
-use common::lit::{APPENDS, BOTH, grid, irradiances, level, matt, mirror, received, scene_of, shaft, shining};
-use common::{JUDGED, device, run_scene, run_scene_on_cpu};
+use crate::common::family::Family;
+use crate::common::lit::{APPENDS, BOTH, grid, irradiances, level, matt, mirror, received, scene_of, shaft, shining};
+use crate::common::{JUDGED, device, run_scene, run_scene_on_cpu};
 use glam::{DVec3, Vec3};
 use photonmill::ledger::Fates;
 use photonmill::rng::Rng;

@@ -1,9 +1,7 @@
 //! What a run costs in counts, which no clock disturbs: dispatches, submissions, pipelines, events and bytes of a few
 //! small runs beside the numbers that they had. Whoever changes one of them on purpose writes the new one here.
 
-mod common;
-
-use common::{device, lit, run};
+use crate::common::{device, lit, run};
 use photonmill::bench::paper_line::{self, Counts};
 use photonmill::path::StoredPath;
 use photonmill::photon::{MapPhoton, Origin, StoredPhoton};

@@ -1,9 +1,7 @@
 //! The CPU builder: the same photons and the same film whatever the threads and whatever the vectors; and splatting adds
 //! to each texel what brute force finds there, to the bit.
 
-mod common;
-
-use common::{Check, assert_complains, assert_holds, equal_sums, plan_for_host, run_on_cpu};
+use crate::common::{Check, assert_complains, assert_holds, equal_sums, plan_for_host, run_on_cpu};
 use glam::{DVec3, Vec3};
 use photonmill::constants::NO_WALL;
 use photonmill::cpu::estimate::gather_brute;

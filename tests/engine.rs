@@ -1,10 +1,8 @@
 //! The engine: devices and their choice, the start-up check, validation messages, timings.
 
-mod common;
-
 use std::time::Instant;
 
-use common::{Check, assert_complains, assert_holds, device, device_with, open, run, run_on_cpu};
+use crate::common::{Check, assert_complains, assert_holds, device, device_with, open, run, run_on_cpu};
 use photonmill::constants::LOOP_LIMIT;
 use photonmill::error::Error;
 use photonmill::gpu::clock::LEAST_WARM_UP;

@@ -1,13 +1,11 @@
 //! Sums, estimates and sizes at their ends: more photons than f32 or 32 bits count, light over many decades, the
 //! least and the largest radius, one photon and none, and plans around every limit.
 
-mod common;
-
 use std::f64::consts::PI;
 use std::time::Instant;
 
-use common::lit::{mean_red, received, received_within, scene, seen};
-use common::{
+use crate::common::lit::{mean_red, received, received_within, scene, seen};
+use crate::common::{
     Check, Device, assert_complains, assert_holds, device, device_with, equal_sums, photons_on_cpu, plan_for, plan_for_host,
     relative_check, run, run_on_cpu, run_scene, run_scene_on_cpu, share_check, upload_photons, z_check,
 };
@@ -269,7 +267,7 @@ fn phong_weights_have_their_mean_and_vanish_behind() {
     let Some(gpu) = device() else { return };
     let weights = |shininess: f32| {
         let settings = Settings { shininess: [Some(shininess); 5], photons: 20_001, ..Settings::default() };
-        let map = common::in_order(common::photons(&gpu, &settings));
+        let map = crate::common::in_order(crate::common::photons(&gpu, &settings));
         assert!(map.iter().all(|photon| (0.0..=1.0).contains(&photon.weight)), "shininess {shininess}");
         map.iter().map(|photon| photon.weight).collect::<Vec<f32>>()
     };
@@ -288,7 +286,7 @@ fn phong_weights_have_their_mean_and_vanish_behind() {
 /// Numbers in [0, 1), drawn as photons draw them.
 fn first_draws(count: u32) -> Vec<f32> {
     let settings = Settings { rng: Rng::Philox, photons: count, ..Settings::default() };
-    (0..count).map(|photon| common::draws_of(common::streams_of(&settings), 0, photon, 0)[0]).collect()
+    (0..count).map(|photon| crate::common::draws_of(crate::common::streams_of(&settings), 0, photon, 0)[0]).collect()
 }
 
 /// From a photon's own place there is no direction to the eye, and from an eye in the wall's plane none but along it.
@@ -303,7 +301,7 @@ fn an_eye_on_a_photon_sees_no_weight_and_no_nan() {
         assert_eq!(map[place].weight, 0.0);
         assert!(map.iter().all(|photon| (0.0..=1.0).contains(&photon.weight)));
         let Some(gpu) = device() else { continue };
-        let on_device = common::in_order(common::photons(&gpu, &settings));
+        let on_device = crate::common::in_order(crate::common::photons(&gpu, &settings));
         assert!(on_device.iter().all(|photon| (0.0..=1.0).contains(&photon.weight)));
     }
 }

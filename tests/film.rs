@@ -2,12 +2,10 @@
 //! split into dispatches, the run or the device's abilities, and hold exactly what lies in reach. Sums
 //! of floats are held against them.
 
-mod common;
-
 use std::sync::atomic::AtomicBool;
 use std::time::Instant;
 
-use common::{
+use crate::common::{
     Check, assert_complains, assert_holds, device, device_with, equal_sums, photons, photons_on_cpu, plan_for, plan_for_host, run,
     run_on_cpu, upload_photons,
 };

@@ -109,14 +109,12 @@
 //! | M2 | - no results of several runs are read and merged |
 //! | M3 | photons_of_the_largest_numbers_are_their_own, a_billion_photons_have_the_exact_share |
 
-mod common;
-
 use std::collections::HashSet;
 use std::f64::consts::PI;
 
-use common::known::{self, none_returns};
-use common::lit::{BOTH, flights, lamp, mean_red, received, same_light, scene, seen};
-use common::{Check, assert_complains, assert_holds, device, relative_check, z_check};
+use crate::common::known::{self, none_returns};
+use crate::common::lit::{BOTH, flights, lamp, mean_red, received, same_light, scene, seen};
+use crate::common::{Check, assert_complains, assert_holds, device, relative_check, z_check};
 use glam::{DQuat, DVec2, DVec3, Vec3};
 use photonmill::plan::Plan;
 use photonmill::plan::transport::{Sensor, TransportPlan};
@@ -633,7 +631,7 @@ fn the_open_box_of_any_power_of_two_stores_the_same_photons() {
                 (_, Some(gpu)) => photonmill::render::photons_on_gpu(gpu, &scene, &settings),
                 (_, None) => return Vec::new(),
             };
-            let mut photons = common::in_order(photons.unwrap());
+            let mut photons = crate::common::in_order(photons.unwrap());
             photons.iter_mut().for_each(|photon| photon.position /= factor as f32);
             photons
         };

@@ -1,12 +1,10 @@
 //! Hard cases of materials: ends of reflectance and of bounces, colours, lobes of any width, glass of any index. The
 //! table in `tests/hard_cases.rs` names them by case.
 
-mod common;
-
 use std::f64::consts::PI;
 
-use common::lit::{BOTH, flights, lamp, mean_red, received, same_light, scene, seen};
-use common::{assert_complains, assert_holds, device, known, relative_check, share_check, z_check};
+use crate::common::lit::{BOTH, flights, lamp, mean_red, received, same_light, scene, seen};
+use crate::common::{assert_complains, assert_holds, device, known, relative_check, share_check, z_check};
 use glam::{DVec3, Vec3};
 use photonmill::gpu::Gpu;
 use photonmill::scene::light::{Light, LightKind};

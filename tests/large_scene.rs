@@ -1,11 +1,9 @@
 //! A million triangles: written as a file, loaded, rendered. Large, so it waits for `--ignored`.
 
-mod common;
-
 use std::sync::atomic::AtomicBool;
 use std::time::Instant;
 
-use common::device;
+use crate::common::device;
 use glam::{DVec3, Vec3};
 use photonmill::bake::{self, Layout};
 use photonmill::output::destination::Folder;

@@ -1,9 +1,7 @@
 //! The photon ledger: emitted = absorbed + escaped + cut off + dropped, in integers, with nothing
 //! dropped, and the same for every builder.
 
-mod common;
-
-use common::{Check, assert_complains, assert_holds, device, run, run_on_cpu, run_scene, run_scene_on_cpu, share_check};
+use crate::common::{Check, assert_complains, assert_holds, device, run, run_on_cpu, run_scene, run_scene_on_cpu, share_check};
 use photonmill::gpu::Gpu;
 use photonmill::ledger::{BounceFates, Fates};
 use photonmill::photon::StoredPhoton;

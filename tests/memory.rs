@@ -1,8 +1,6 @@
 //! Memory stays within what the plan says beforehand, and is that to the byte.
 
-mod common;
-
-use common::{device, lit, run};
+use crate::common::{device, lit, run};
 use photonmill::gpu::Gpu;
 use photonmill::plan::transport::{Sensor, TransportPlan};
 use photonmill::render;
@@ -14,7 +12,7 @@ use photonmill::settings::{Gather, Preset, Settings, Sums, Variant};
 use photonmill::transport::View;
 
 /// Device memory against what a plan lists.
-fn check(what: &str, taken: u64, stated: u64, buffers: &[(&'static str, u64)]) -> common::Check {
+fn check(what: &str, taken: u64, stated: u64, buffers: &[(&'static str, u64)]) -> crate::common::Check {
     if taken == stated { Ok(()) } else { Err(format!("{what}: {taken} bytes taken, {stated} stated: {buffers:?}")) }
 }
 
@@ -49,7 +47,7 @@ fn the_papers_line_takes_what_its_plan_says() {
     for settings in cases {
         let (bytes, outcome) = taken(&gpu, || run(&gpu, &settings));
         let plan = &outcome.plan;
-        common::assert_holds(format!("{settings:?}"), check("the paper's line", bytes, plan.bytes(), &plan.buffers()));
+        crate::common::assert_holds(format!("{settings:?}"), check("the paper's line", bytes, plan.bytes(), &plan.buffers()));
     }
 }
 
@@ -76,7 +74,7 @@ fn scenes_take_what_their_plan_says() {
             let stated = plan.bytes;
             let view = View { geometry: &geometry, camera: scene.cameras.first(), phases: &[] };
             let (bytes, _) = taken(&gpu, || lit::light(&gpu, &view, plan));
-            common::assert_holds(name, check("a picture", bytes, stated, &[]));
+            crate::common::assert_holds(name, check("a picture", bytes, stated, &[]));
         }
         let receivers = [vec![Default::default(); 9], vec![Default::default(); 9]];
         let settings = TransportSettings { photons: 300, rounds: 2, ..TransportSettings::default() };
@@ -86,7 +84,7 @@ fn scenes_take_what_their_plan_says() {
         let never = std::sync::atomic::AtomicBool::new(false);
         let mut control = render::Control { cancelled: &never, progress: &mut |_| {} };
         let (bytes, _) = taken(&gpu, || photonmill::transport::light(&gpu, &view, plan, &mut control).unwrap());
-        common::assert_holds(name, check("two sets of receivers", bytes, stated, &[]));
+        crate::common::assert_holds(name, check("two sets of receivers", bytes, stated, &[]));
     }
 }
 
@@ -100,6 +98,6 @@ fn the_check_complains_about_a_forgotten_buffer() {
         let mut others = buffers.clone();
         let (name, _) = others.remove(forgotten);
         let stated = others.iter().map(|(_, bytes)| bytes).sum();
-        common::assert_complains(name, check("the paper's line", bytes, stated, &others));
+        crate::common::assert_complains(name, check("the paper's line", bytes, stated, &others));
     }
 }

@@ -1,13 +1,11 @@
 //! Mirrors and glass against closed forms: Snell's and Fresnel's laws along rays from the eye and by photons, total
 //! reflection, a corridor of mirrors, a paraboloid and its focus.
 
-mod common;
-
 use std::f64::consts::{FRAC_PI_2, PI, TAU};
 
-use common::device;
-use common::family::Family;
-use common::lit::{APPENDS, BOTH, glass, grid, irradiances, level, matt, mirror, radiances, received, scene_of, shaft, shining};
+use crate::common::device;
+use crate::common::family::Family;
+use crate::common::lit::{APPENDS, BOTH, glass, grid, irradiances, level, matt, mirror, radiances, received, scene_of, shaft, shining};
 use glam::{DVec3, Vec3};
 use photonmill::scene::light::LightKind;
 use photonmill::scene::{Mesh, Scene};

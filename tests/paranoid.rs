@@ -1,12 +1,10 @@
 //! `--paranoid` and `--replay`: no run has a value that is infinite or no number; one that is planted is counted and
 //! its photon named; and that photon takes the same path alone as among all others.
 
-mod common;
-
 use std::collections::BTreeSet;
 use std::sync::atomic::AtomicBool;
 
-use common::{device, in_order, photons, photons_on_cpu, run, run_on_cpu};
+use crate::common::{device, in_order, photons, photons_on_cpu, run, run_on_cpu};
 use glam::Vec3;
 use photonmill::gpu::Gpu;
 use photonmill::oddities::{Oddities, What};

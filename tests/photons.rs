@@ -1,11 +1,9 @@
 //! Same photons: whatever stores them, in whatever groups and chunks, the photon map of a seed is the
 //! same set, bit for bit on one device, and the CPU builder agrees photon by photon.
 
-mod common;
-
 use std::collections::{HashMap, HashSet};
 
-use common::{
+use crate::common::{
     Check, MANY_PHOTONS, assert_complains, assert_holds, device, draws_of, in_order, photons, photons_on_cpu, plan_for, streams_of,
 };
 use photonmill::gpu::Gpu;

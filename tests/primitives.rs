@@ -1,13 +1,11 @@
 //! Prefix sum, grid index, appending to a full map and the size of an indirect dispatch, each against
 //! the plain way to do it on the host.
 
-mod common;
-
 use std::collections::HashSet;
 use std::time::Instant;
 
+use crate::common::{Check, Device, assert_complains, assert_holds, device, equal_sums, in_order, photons, plan_for, run};
 use bytemuck::Zeroable;
-use common::{Check, Device, assert_complains, assert_holds, device, equal_sums, in_order, photons, plan_for, run};
 use photonmill::constants::{NO_WALL, SCAN_ITEMS};
 use photonmill::gpu::kernels::DispatchSize;
 use photonmill::gpu::{Buffer, Commands, Constants, Extent, Memory};

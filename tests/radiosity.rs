@@ -1,14 +1,12 @@
 //! The paper's box against a radiosity solution of its own (`common::radiosity`): photons an order of reflection, wall
 //! by wall and cell by cell, and irradiance in W/m2, for every builder and both laws of emission.
 
-mod common;
-
 use std::ops::Range;
 use std::sync::OnceLock;
 
-use common::family::{Family, chi_squared_z};
-use common::lit::irradiances;
-use common::{Device, JUDGED, device, photons, photons_on_cpu, run, run_on_cpu};
+use crate::common::family::{Family, chi_squared_z};
+use crate::common::lit::irradiances;
+use crate::common::{Device, JUDGED, device, photons, photons_on_cpu, run, run_on_cpu};
 use glam::DVec3;
 use photonmill::film::estimate_walls;
 use photonmill::judge::radiosity::{ByLamp, Law, Radiosity, WALLS, cells_of, exchange, form_factor_from, inward, on_wall};

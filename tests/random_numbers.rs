@@ -1,12 +1,10 @@
 //! Random numbers at their ends: around the generators' periods and the largest photon numbers, neighbours that
 //! must not resemble each other, and directions drawn from the least and the greatest numbers.
 
-mod common;
-
 use std::collections::HashSet;
 use std::time::Instant;
 
-use common::{Check, assert_complains, assert_holds, device, draws_of, evenness_check, plan_for, streams_of, z_check};
+use crate::common::{Check, assert_complains, assert_holds, device, draws_of, evenness_check, plan_for, streams_of, z_check};
 use glam::{DVec3, UVec2, Vec3};
 use photonmill::cpu::emission::emit_from_disc;
 use photonmill::cpu::room::intersect_room;
@@ -161,7 +159,7 @@ fn neighbouring_photons_do_not_resemble_each_other() {
 }
 
 /// The paths of some photons as they leave their light, by the device.
-fn emitted(gpu: &common::Device, plan: &Plan, round: u32, range: EmissionRange) -> Vec<Path> {
+fn emitted(gpu: &crate::common::Device, plan: &Plan, round: u32, range: EmissionRange) -> Vec<Path> {
     let scene = open_box(&plan.settings);
     let mut commands = Commands::new(gpu, constants(plan), Instant::now()).unwrap();
     let resources = Resources::new(gpu, &mut commands, &scene, plan).unwrap();
@@ -262,7 +260,7 @@ fn discs_and_hemispheres_have_their_moments() {
             ..Settings::default()
         };
         let scene = open_box(&settings);
-        let host = common::plan_for_host(&settings);
+        let host = crate::common::plan_for_host(&settings);
         let range = EmissionRange { light: 0, first_photon: 0, count: 200_000 };
         let local = |paths: Vec<Path>| -> Vec<(DVec3, DVec3)> {
             // The floor's light: the axes after its own, then its normal.

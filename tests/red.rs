@@ -1,15 +1,11 @@
 //! Checks that can fail: faults are planted in the kernels' sources, and the checks of the other tests must
 //! complain. Checks of numbers on the host show it beside themselves (`assert_complains`).
 
-mod common;
-#[path = "common/planted.rs"]
-mod planted;
-
 use std::sync::atomic::AtomicBool;
 use std::time::Duration;
 
-use common::{
-    Check, MANY_PHOTONS, aimed, assert_complains, assert_holds, bits, equal_sums, in_order, known, open, photons, photons_on_cpu,
+use crate::common::{
+    Check, MANY_PHOTONS, aimed, assert_complains, assert_holds, bits, equal_sums, in_order, known, open, photons, photons_on_cpu, planted,
     run_on_cpu,
 };
 use photonmill::compaction;

@@ -1,10 +1,8 @@
 //! Every builder against the independent f64 model, draw by draw with the paper's generator, and
 //! against the exact shares of stored photons with the others.
 
-mod common;
-
-use common::reference::{self, Emission, Model, add_power, power_table};
-use common::{Check, assert_complains, assert_holds, device, run, run_on_cpu, share_check};
+use crate::common::reference::{self, Emission, Model, add_power, power_table};
+use crate::common::{Check, assert_complains, assert_holds, device, run, run_on_cpu, share_check};
 use photonmill::film::{Film, estimate_walls};
 use photonmill::gpu::Gpu;
 use photonmill::ledger::Fates;

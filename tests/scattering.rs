@@ -1,16 +1,14 @@
 //! Photons as they leave every kind of light, and every kind of surface, against the densities, shares and weights
 //! that they should have.
 
-mod common;
-
 use std::f64::consts::{FRAC_PI_2, PI, TAU};
 
-use common::chi_square::{ONE, counts_check, density_check, even};
-use common::densities::{
+use crate::common::chi_square::{ONE, counts_check, density_check, even};
+use crate::common::densities::{
     AXIS, ULP, angles, disc_check, frame, hemisphere_check, independence_check, is_unit, lobe, lobe_angles, on_sphere, polar, sphere_check,
     triangle_check,
 };
-use common::{Check, assert_complains, assert_holds, device, share_check, z_check};
+use crate::common::{Check, assert_complains, assert_holds, device, share_check, z_check};
 use glam::{DMat3, DVec2, DVec3, Vec3};
 use photonmill::constants::EMISSION_BLOCKS;
 use photonmill::gpu::Gpu;

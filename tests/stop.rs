@@ -1,13 +1,11 @@
 //! Runs that end by themselves: at an error with a stated confidence, which holds at least as often as it says, or at a
 //! time; and predictions of the end.
 
-mod common;
-
 use std::sync::atomic::AtomicBool;
 use std::time::Instant;
 
-use common::lit::{scene, seen};
-use common::{Check, assert_complains, assert_holds, device};
+use crate::common::lit::{scene, seen};
+use crate::common::{Check, assert_complains, assert_holds, device};
 use glam::DVec3;
 use photonmill::film::{estimate_walls, irradiance_weights};
 use photonmill::gpu::Gpu;

@@ -1,14 +1,12 @@
 //! `--math strict`: functions that are right and the same on every device, photons that the CPU builder traces to
 //! the bit, and films whose bits are written down in `tests/common/bits.rs`.
 
-mod common;
-#[path = "common/planted.rs"]
-mod planted;
-
 use std::f32::consts::{FRAC_PI_2, PI};
 
-use common::bits::{self, BITS, picture, small};
-use common::{Check, assert_complains, assert_holds, device, equal_sums, in_order, open, photons, photons_on_cpu, run, run_on_cpu};
+use crate::common::bits::{self, BITS, picture, small};
+use crate::common::{
+    Check, assert_complains, assert_holds, device, equal_sums, in_order, open, photons, photons_on_cpu, planted, run, run_on_cpu,
+};
 use glam::Vec2;
 use photonmill::cpu;
 use photonmill::gpu::{Options, check};

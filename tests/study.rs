@@ -1,13 +1,11 @@
 //! `photonmill study`: points against a reference of another method, a page that loads nothing, and a study that goes on
 //! where it was cut off.
 
-mod common;
-
 use std::path::Path;
 use std::sync::atomic::AtomicBool;
 use std::time::Duration;
 
-use common::{device, lit};
+use crate::common::{device, lit};
 use photonmill::compaction::Agreed;
 use photonmill::gpu::Gpu;
 use photonmill::output::destination::Folder;

@@ -1,10 +1,8 @@
 //! Lighting scenes of triangles: bits that no split, builder or unused effect may change, parts that add
 //! up, radiometry, leaks, and plans that the device's work is counted against.
 
-mod common;
-
-use common::lit::{light, received, scene};
-use common::{Check, assert_complains, assert_holds, device, device_with, known, z_check};
+use crate::common::lit::{light, received, scene};
+use crate::common::{Check, assert_complains, assert_holds, device, device_with, known, z_check};
 use glam::{DVec3, Vec3};
 use photonmill::constants::GATHER_SLICE;
 use photonmill::gpu::{Gpu, Options};

@@ -1,11 +1,9 @@
 //! The kd-tree: the film that it gives is that of the grid and of brute force, to the bit; and `--nearest` takes the
 //! photons that f64 finds by looking at all of them, whatever order they come in.
 
-mod common;
-
 use std::time::Instant;
 
-use common::{
+use crate::common::{
     Check, assert_complains, assert_holds, device, device_with, equal_sums, photons, plan_for, plan_for_host, run, run_on_cpu,
     upload_photons, z_check,
 };

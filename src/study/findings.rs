@@ -24,9 +24,12 @@ fn between(estimate: Estimate, show: impl Fn(f64) -> String) -> String {
 }
 
 impl Part {
-    /// What the others are compared with, as it was measured first.
+    /// What the others are compared with: of the comparisons that it was measured in, the one that took it furthest.
     pub fn base(&self) -> Option<&Curve> {
-        self.comparisons.first().and_then(Comparison::base)
+        let mut bases = self.comparisons.iter().filter_map(Comparison::base);
+        let first = bases.next()?;
+        let further = |best: &'_ Curve, next: &'_ Curve| next.label == best.label && next.points.len() > best.points.len();
+        Some(bases.fold(first, |best, next| if further(best, next) { next } else { best }))
     }
 
     pub fn curves(&self) -> impl Iterator<Item = &Curve> {

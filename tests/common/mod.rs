@@ -3,7 +3,6 @@
 //!
 //! `PHOTONMILL_DEVICE` names the device by index or part of its name. Without any Vulkan device a
 //! test fails, unless `PHOTONMILL_NO_GPU=1` says that there is none on purpose.
-#![allow(dead_code, reason = "every test file takes its part")]
 
 pub mod aimed;
 pub mod bits;
@@ -12,6 +11,7 @@ pub mod densities;
 pub mod family;
 pub mod known;
 pub mod lit;
+pub mod planted;
 pub mod reference;
 
 use std::ops::Deref;
