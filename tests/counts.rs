@@ -1,8 +1,9 @@
 //! What a run costs in counts, which no clock disturbs: dispatches, submissions, pipelines, events and bytes of a few
 //! small runs beside the numbers that they had. Whoever changes one of them on purpose writes the new one here.
 
-use crate::common::{device, lit, run};
+use crate::common::{device, device_with, lit, run};
 use photonmill::bench::paper_line::{self, Counts};
+use photonmill::gpu::Options;
 use photonmill::path::StoredPath;
 use photonmill::photon::{MapPhoton, Origin, StoredPhoton};
 use photonmill::plan::transport::{Sensor, TransportPlan};
@@ -82,7 +83,7 @@ fn the_box_costs_what_it_did() {
 
 #[test]
 fn a_scene_costs_what_it_did() {
-    let Some(gpu) = device() else { return };
+    let Some(gpu) = device_with(Options::default()) else { return };
     let scene = built_in::by_name("cornell-spheres").unwrap();
     let geometry = Geometry::new(&scene).unwrap();
     let settings = TransportSettings {

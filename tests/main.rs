@@ -17,7 +17,6 @@ mod cpu;
 mod engine;
 mod extremes;
 mod film;
-mod fuzz;
 mod gltf;
 mod hard_cases;
 mod hard_materials;

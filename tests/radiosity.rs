@@ -1,4 +1,4 @@
-//! The paper's box against a radiosity solution of its own (`common::radiosity`): photons an order of reflection, wall
+//! The paper's box against a radiosity solution of its own (`photonmill::judge::radiosity`): photons an order of reflection, wall
 //! by wall and cell by cell, and irradiance in W/m2, for every builder and both laws of emission.
 
 use std::ops::Range;

@@ -1,6 +1,6 @@
 //! Storage buffers.
 
-use std::rc::Rc;
+use std::sync::Arc;
 
 use ash::vk;
 use bytemuck::Pod;
@@ -57,7 +57,7 @@ pub struct Buffer {
     size_bytes: u64,
     raw: vk::Buffer,
     allocation: Option<Allocation>,
-    context: Rc<Context>,
+    context: Arc<Context>,
 }
 
 impl Gpu {
@@ -81,8 +81,7 @@ impl Gpu {
         let requirements = unsafe { device.get_buffer_memory_requirements(raw) };
         let allocation = self
             .context
-            .allocator
-            .borrow_mut()
+            .allocator()
             .as_mut()
             .expect("the allocator lives as long as the device")
             .allocate(&AllocationCreateDesc {
@@ -104,19 +103,19 @@ impl Gpu {
         // freed after the buffer.
         call("vkBindBufferMemory", unsafe { device.bind_buffer_memory(raw, allocation.memory(), allocation.offset()) })?;
         buffer.allocation = Some(allocation);
-        self.context.held.borrow_mut().take(memory, size_bytes);
+        self.context.held().take(memory, size_bytes);
         self.context.set_name(raw, name);
         Ok(buffer)
     }
 
     /// What buffers take by the sizes that were asked for; an allocator rounds them up.
     pub fn held_memory(&self) -> HeldMemory {
-        *self.context.held.borrow()
+        *self.context.held()
     }
 
     /// Peaks begin anew at what is held now.
     pub fn forget_peaks(&self) {
-        let mut held = self.context.held.borrow_mut();
+        let mut held = self.context.held();
         (held.peak_device_bytes, held.peak_staging_bytes) = (held.device_bytes, held.staging_bytes);
     }
 
@@ -124,7 +123,7 @@ impl Gpu {
     pub(super) fn without_peaks<T>(&self, work: impl FnOnce() -> T) -> T {
         let HeldMemory { peak_device_bytes, peak_staging_bytes, .. } = self.held_memory();
         let result = work();
-        let mut held = self.context.held.borrow_mut();
+        let mut held = self.context.held();
         (held.peak_device_bytes, held.peak_staging_bytes) = (peak_device_bytes, peak_staging_bytes);
         result
     }
@@ -159,10 +158,10 @@ impl Drop for Buffer {
     fn drop(&mut self) {
         // SAFETY: commands wait for the device before they return, so nothing uses the buffer.
         unsafe { self.context.device.destroy_buffer(self.raw, None) };
-        if let (Some(allocation), Some(allocator)) = (self.allocation.take(), self.context.allocator.borrow_mut().as_mut()) {
+        if let (Some(allocation), Some(allocator)) = (self.allocation.take(), self.context.allocator().as_mut()) {
             // Freeing fails only for memory of another allocator.
             let _ = allocator.free(allocation);
-            self.context.held.borrow_mut().give_back(self.memory, self.size_bytes);
+            self.context.held().give_back(self.memory, self.size_bytes);
         }
     }
 }

@@ -3,7 +3,7 @@
 use std::time::{Duration, Instant};
 
 use super::kernels::MeasureFloat;
-use super::{Commands, Constants, Extent, Gpu, Memory};
+use super::{Commands, Constants, Extent, Gpu, Kernel, Memory};
 use crate::error::Result;
 use crate::records::MeasurePush;
 
@@ -47,6 +47,7 @@ pub fn warm_up(gpu: &Gpu, time: Duration) -> Result<()> {
         return Ok(());
     }
     gpu.without_peaks(|| {
+        gpu.prepare(&[MeasureFloat::MODULE], &Constants::new(GROUP_SIZE))?;
         let mut commands = Commands::new(gpu, Constants::new(GROUP_SIZE), Instant::now())?;
         let results = gpu.buffer::<u32>("results", u64::from(ITEMS), Memory::Device)?;
         let push = MeasurePush { item_count: ITEMS, step_count: STEPS, mask: 0 };

@@ -2,7 +2,7 @@
 //! reads and writes, times every scope, and stays within the device's limits.
 
 use std::collections::{HashMap, HashSet};
-use std::rc::Rc;
+use std::sync::Arc;
 use std::time::{Duration, Instant};
 
 use ash::vk;
@@ -42,8 +42,6 @@ pub struct Commands<'gpu> {
     gpu: &'gpu Gpu,
     constants: Constants,
     started: Instant,
-    /// Spent on work that counts in no time.
-    warming: Duration,
     pool: vk::CommandPool,
     command_buffer: vk::CommandBuffer,
     fence: vk::Fence,
@@ -60,7 +58,7 @@ pub struct Commands<'gpu> {
     dispatch_count: u64,
     submission_count: u64,
     timings: Timings,
-    context: Rc<Context>,
+    context: Arc<Context>,
 }
 
 /// Descriptor sets and storage buffers of one descriptor pool.
@@ -87,7 +85,6 @@ impl<'gpu> Commands<'gpu> {
             gpu,
             constants,
             started,
-            warming: Duration::ZERO,
             pool,
             command_buffer,
             fence,
@@ -337,24 +334,25 @@ impl<'gpu> Commands<'gpu> {
     /// Ends the recording; `whole` names the row that spans all of it on the host's clock.
     pub fn finish(mut self, whole: &str) -> Timings {
         let mut timings = std::mem::take(&mut self.timings);
-        timings.add(Span {
-            name: whole.to_owned(),
-            clock: Clock::Wall,
-            start: Duration::ZERO,
-            duration: self.started.elapsed() - self.warming,
-        });
+        timings.add(Span { name: whole.to_owned(), clock: Clock::Wall, start: Duration::ZERO, duration: self.started.elapsed() });
         timings
     }
 
     /// Where the device was opened for it, keeps a card busy for as long as it idled: while the host makes buffers, its clock
-    /// falls, but not its memory's, which favours passes that wait for memory.
+    /// falls, but not its memory's, which favours passes that wait for memory. The zero of all times moves by as much, so that
+    /// it counts in none.
     pub fn warm_up(&mut self) -> Result<()> {
         if self.gpu.warms_up {
             let began = Instant::now();
             clock::warm_up(self.gpu, self.gpu.idleness.get().at(began).max(LEAST_WARM_UP))?;
-            self.warming += began.elapsed();
+            self.started += began.elapsed();
         }
         Ok(())
+    }
+
+    /// The zero of all times.
+    pub fn started(&self) -> Instant {
+        self.started
     }
 
     pub fn facts(&self) -> &DeviceFacts {

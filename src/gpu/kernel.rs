@@ -3,7 +3,7 @@
 use std::collections::BTreeMap;
 use std::io::{Cursor, Write};
 use std::path::PathBuf;
-use std::rc::Rc;
+use std::sync::Arc;
 
 use ash::vk;
 use bytemuck::Pod;
@@ -91,7 +91,7 @@ pub(super) struct Pipeline {
     pub(super) raw: vk::Pipeline,
     pub(super) layout: vk::PipelineLayout,
     pub(super) set_layouts: Vec<vk::DescriptorSetLayout>,
-    context: Rc<Context>,
+    context: Arc<Context>,
 }
 
 impl Drop for Pipeline {
@@ -110,7 +110,7 @@ impl Drop for Pipeline {
 
 impl Gpu {
     /// The pipeline of a kernel for these constants, made at first use.
-    pub(super) fn pipeline(&self, module: &Module, constants: &Constants) -> Result<Rc<Pipeline>> {
+    pub(super) fn pipeline(&self, module: &Module, constants: &Constants) -> Result<Arc<Pipeline>> {
         let key = PipelineKey::new(module, constants);
         if !self.pipelines.borrow().contains_key(&key) {
             self.prepare(&[*module], constants)?;
@@ -134,7 +134,7 @@ impl Gpu {
         for ((key, mut pipeline, _), raw) in missing.into_iter().zip(made) {
             pipeline.raw = raw?;
             self.context.set_name(pipeline.raw, key.kernel);
-            self.pipelines.borrow_mut().insert(key, Rc::new(pipeline));
+            self.pipelines.borrow_mut().insert(key, Arc::new(pipeline));
         }
         Ok(())
     }
@@ -226,11 +226,11 @@ pub(super) struct DiskCache {
     /// `None` where the system names no cache folder.
     path: Option<PathBuf>,
     loaded_bytes: usize,
-    context: Rc<Context>,
+    context: Arc<Context>,
 }
 
 impl DiskCache {
-    pub(super) fn open(context: &Rc<Context>, facts: &DeviceFacts) -> Result<DiskCache> {
+    pub(super) fn open(context: &Arc<Context>, facts: &DeviceFacts) -> Result<DiskCache> {
         let path = directories::ProjectDirs::from("", "", "photonmill")
             .map(|folders| folders.cache_dir().join(format!("pipelines-{}.bin", facts.pipeline_cache_id)));
         // A cache that cannot be read is as good as none; the driver checks what it is given.

@@ -13,7 +13,7 @@ mod validation;
 
 use std::cell::{Cell, RefCell};
 use std::collections::HashMap;
-use std::rc::Rc;
+use std::sync::{Arc, Mutex, MutexGuard, PoisonError};
 use std::time::Instant;
 
 use ash::vk;
@@ -56,7 +56,7 @@ pub struct Options {
     pub replaced: Vec<(String, Vec<u32>)>,
 }
 
-/// An open device.
+/// An open device, of one thread at a time.
 pub struct Gpu {
     facts: DeviceFacts,
     time_dispatches: bool,
@@ -64,15 +64,15 @@ pub struct Gpu {
     idleness: Cell<Idleness>,
     replaced: Vec<(String, Vec<u32>)>,
     queue: vk::Queue,
-    pipelines: RefCell<HashMap<kernel::PipelineKey, Rc<kernel::Pipeline>>>,
+    pipelines: RefCell<HashMap<kernel::PipelineKey, Arc<kernel::Pipeline>>>,
     cache: kernel::DiskCache,
-    context: Rc<Context>,
+    context: Arc<Context>,
 }
 
 /// What must outlive every object of the device; destroyed with the last of them.
 pub(crate) struct Context {
-    allocator: RefCell<Option<Allocator>>,
-    held: RefCell<HeldMemory>,
+    allocator: Mutex<Option<Allocator>>,
+    held: Mutex<HeldMemory>,
     device: ash::Device,
     /// Names for tools and messages; only with the validation layer.
     debug: Option<ash::ext::debug_utils::Device>,
@@ -81,12 +81,23 @@ pub(crate) struct Context {
     _entry: ash::Entry,
 }
 
+impl Context {
+    /// `None` once the device goes.
+    fn allocator(&self) -> MutexGuard<'_, Option<Allocator>> {
+        self.allocator.lock().unwrap_or_else(PoisonError::into_inner)
+    }
+
+    fn held(&self) -> MutexGuard<'_, HeldMemory> {
+        self.held.lock().unwrap_or_else(PoisonError::into_inner)
+    }
+}
+
 impl Drop for Context {
     fn drop(&mut self) {
-        // SAFETY: every object of the device holds an Rc of this context, so all are gone; the
+        // SAFETY: every object of the device holds an Arc of this context, so all are gone; the
         // allocator frees its memory before the device goes.
         unsafe {
-            self.allocator.borrow_mut().take();
+            self.allocator().take();
             self.device.destroy_device(None);
             if let Some(messages) = self.messages.take() {
                 messages.destroy();
@@ -138,9 +149,9 @@ impl Gpu {
             allocation_sizes: Default::default(),
         })
         .map_err(|error| Error::Device { call: "the memory allocator", reason: error.to_string() })?;
-        let context = Rc::new(Context {
-            allocator: RefCell::new(Some(allocator)),
-            held: RefCell::default(),
+        let context = Arc::new(Context {
+            allocator: Mutex::new(Some(allocator)),
+            held: Mutex::default(),
             device,
             debug,
             messages,

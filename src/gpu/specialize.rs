@@ -71,8 +71,8 @@ fn values(words: &[u32], constants: &[(u32, u32)]) -> HashMap<u32, u32> {
             (op::CONSTANT_TRUE, [_, _, result]) => drop(values.insert(*result, 1)),
             (op::CONSTANT_FALSE, [_, _, result]) => drop(values.insert(*result, 0)),
             (op::CONSTANT, [_, _, result, value]) => drop(values.insert(*result, *value)),
-            (op::SPEC_CONSTANT_TRUE, [_, _, result]) => drop(values.insert(*result, specialized(1))),
-            (op::SPEC_CONSTANT_FALSE, [_, _, result]) => drop(values.insert(*result, specialized(0))),
+            (op::SPEC_CONSTANT_TRUE, [_, _, result]) => drop(values.insert(*result, u32::from(specialized(1) != 0))),
+            (op::SPEC_CONSTANT_FALSE, [_, _, result]) => drop(values.insert(*result, u32::from(specialized(0) != 0))),
             (op::SPEC_CONSTANT, [_, _, result, default]) => drop(values.insert(*result, specialized(*default))),
             (op::SPEC_CONSTANT_OP, [_, _, result, operation, operands @ ..]) => {
                 let operands: Option<Vec<u32>> = operands.iter().map(|operand| values.get(operand).copied()).collect();
@@ -153,7 +153,7 @@ mod tests {
 
     use super::*;
 
-    /// Returns 1 or 2 by the branch, then a number by the way to the last block; %condition is what each test says.
+    /// A function that returns 1 if `%condition` holds, which the text defines, and else 2.
     fn module(condition: &str) -> Vec<u32> {
         let text = format!(
             "OpCapability Shader
@@ -162,11 +162,9 @@ mod tests {
              OpDecorate %flag SpecId 7
              %bool = OpTypeBool
              %uint = OpTypeInt 32 0
-             %float = OpTypeFloat 32
              %function = OpTypeFunction %uint
              %one = OpConstant %uint 1
              %two = OpConstant %uint 2
-             %half = OpConstant %float 0.5
              %number = OpSpecConstant %uint 2
              %flag = OpSpecConstantFalse %bool
              {condition}
@@ -209,11 +207,13 @@ mod tests {
             (both, &[][..], false),
             (both, &[(3, 3)][..], true),
             (both, &[(3, 3), (7, 1)][..], false),
+            // Any number but 0 is true.
+            (both, &[(3, 3), (7, 2)][..], false),
         ] {
             let words = module(condition);
             let found = decided(&words, constants);
             let [_, then, end] = labels(&found)[..] else { panic!("blocks are lost") };
-            // The way past %then is closed with it, or the way through it.
+            // Past %then, whose way to %end stays, or through it, so that the way past it is no choice of %end.
             assert_eq!(
                 ways(&found),
                 (if expected { vec![then, end] } else { vec![end, end] }, if expected { 1 } else { 2 }),

@@ -1,6 +1,6 @@
 //! Timestamp queries of one submission, as nested scopes.
 
-use std::rc::Rc;
+use std::sync::Arc;
 use std::time::Duration;
 
 use ash::vk;
@@ -26,7 +26,7 @@ pub(super) struct Timestamps {
     used: u32,
     /// Queries from the first on that are to be reset before they are written: at first all.
     stale: u32,
-    context: Rc<Context>,
+    context: Arc<Context>,
 }
 
 impl Timestamps {

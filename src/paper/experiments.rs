@@ -97,7 +97,7 @@ pub struct LeftOut {
 
 /// A rendering pass that is predicted to take longer is left out.
 pub const LONGEST_PASS_MS: f64 = 20_000.0;
-/// A row that is shorter is run once before it counts, as its device may have idled.
+/// A row that is shorter is run once before it counts, as it makes pipelines.
 const SHORT_TOTAL_MS: f64 = 1_000.0;
 /// Runs whose median counts at the large size, at most.
 const LARGE_REPEATS: usize = 3;
@@ -164,8 +164,7 @@ fn cases(bench: &Bench, request: &Request) -> Vec<Case> {
     cases
 }
 
-/// Both passes of every case. Builders are measured in turn, the GPU's apart from the CPU's, while
-/// which a GPU would idle.
+/// Both passes of every case. Builders are measured in turn, the GPU's apart from the CPU's, during which a card idles.
 pub fn running_times(bench: &mut Bench, found: &mut Reproduction) -> Step<()> {
     let all = cases(bench, &found.request);
     let alike = |a: &Case, b: &Case| {

@@ -148,8 +148,8 @@ fn running_times(found: &Reproduction) -> Markup {
             p {
                 "The map pass emits photons and bounces them; the rendering pass estimates the light at 5 × 64 × 64 points. "
                 "Times of the device are its own timestamps, those of the CPU builder are wall time. "
-                "The first run of each case is dropped, as it makes pipelines, and on a GPU so are the runs of its first "
-                "0.4 s, as an idle card runs at a low clock; then the median of " (found.request.repeats) " runs, at the large size of at most 3, the builders in turn, with the shortest and longest run below it. "
+                "The first run of each case is dropped, as it makes pipelines; then the median of " (found.request.repeats) " runs, at the large size of at most 3, the builders in turn, with the shortest and longest run below it. "
+                "A card that idled runs at a low clock, so it is kept busy before each run (--warm-up). "
                 "A case whose runs take longer than " (PATIENCE.as_secs()) " s together is repeated less, and one whose first run alone does keeps that run; " a href="#all-times" { "the table of all times" } " says how often."
             }
             h3 { "At the paper's size" }

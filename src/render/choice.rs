@@ -100,6 +100,7 @@ fn first_chunk_ms(gpu: &Gpu, scene: &RoomScene, plan: &Plan) -> Result<f64> {
     prepare(gpu, plan)?;
     let mut commands = Commands::new(gpu, constants(plan), Instant::now())?;
     let resources = Resources::new(gpu, &mut commands, scene, plan)?;
+    commands.warm_up()?;
     commands.submit()?;
     let ranges = plan.chunk(0);
     commands.scope("chunk", |commands| {

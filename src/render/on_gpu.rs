@@ -35,7 +35,7 @@ pub fn on_gpu(gpu: &Gpu, scene: &RoomScene, settings: &Settings, control: &mut C
     commands.warm_up()?;
     commands.submit()?;
 
-    let mut book = Book::new(&plan, control, started);
+    let mut book = Book::new(&plan, control, commands.started());
     book.submissions_settled = commands.submission_count();
     for round in 0..settings.rounds {
         commands.scope("round", |commands| {

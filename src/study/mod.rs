@@ -176,7 +176,7 @@ impl Measuring<'_> {
     }
 
     fn climb(&mut self, curves: &mut [Curve]) -> Result<bool> {
-        // Warm-up and first rounds, which no point holds.
+        // First rounds, which no point holds.
         let mut unmeasured = vec![Duration::ZERO; curves.len()];
         for doublings in 0..=self.request.most_rounds.ilog2() as usize {
             let rounds = 1 << doublings;

@@ -189,7 +189,7 @@ fn how(study: &Study) -> Markup {
             ul {
                 li { "Error: root of the mean squared difference from the reference over the reference's root mean square. What the reference's own noise adds is taken off." }
                 li { "Noise is what runs with different seeds differ by, and bias what they have in common; both come from the " (study.request.repeats) " runs of a point. Intervals and bands hold the truth with " (findings::words_of_confidence()) " by Student's distribution over those runs; few runs make wide bands." }
-                li { "Time: all rounds by the device's timestamps, without set-up; the host's clock for the CPU builder. The middle of the runs counts, and the least and the most show how the clock drifts." }
+                li { "Time: all rounds by the device's timestamps, without set-up; the host's clock for the CPU builder. A card that idled runs at a low clock, so it is kept busy before each run. The middle of the runs counts, and the least and the most show how the clock drifts." }
                 li { "Times to an error lie on straight lines between points on logarithmic scales, and are given only between errors that were measured." }
                 li { "Every command repeats the first run of its point; the others have the seeds that follow." }
                 li { "A picture leaves out pixels in which a light is seen straight. " (number(study.parts.iter().map(|part| part.curves().map(|curve| curve.points.len()).sum::<usize>()).sum::<usize>() as f64)) " points in all." }

@@ -105,7 +105,9 @@ impl Subject {
     pub fn command(&self, configuration: &Configuration, rounds: u32, seed: u64) -> String {
         match &configuration.line {
             Line::Paper(settings) => {
-                command::main_job(Preset::Modified, &Settings { rounds, seed, ..settings.clone() }) + " --irradiance irradiance"
+                let job = command::main_job(Preset::Modified, &Settings { rounds, seed, ..settings.clone() });
+                let warm_up = if settings.variant == Variant::Cpu { "" } else { WARM_UP };
+                format!("{job} --irradiance irradiance{warm_up}")
             }
             Line::Scene(settings) => {
                 let settings = TransportSettings { rounds, seed, ..settings.clone() };
@@ -113,7 +115,7 @@ impl Subject {
                     Some(_) => format!("render {} --size {}x{} -o picture.exr", quoted(&self.name), self.size, self.size),
                     None => format!("probe {} --points {POINTS} -o irradiance.csv", quoted(&self.name)),
                 };
-                command::on_scene(&job, &settings)
+                command::on_scene(&job, &settings) + WARM_UP
             }
         }
     }
@@ -160,7 +162,6 @@ impl Subject {
     }
 
     fn light(&self, gpu: &Gpu, settings: TransportSettings, control: &mut Control) -> Result<Lit> {
-        // A card that waits for the host loses its clock.
         let geometry = match settings.without.as_slice() {
             [] => self.geometry.clone(),
             without => Rc::new(Geometry::new(&self.scene.without(without))?),
@@ -192,6 +193,9 @@ fn unknown_to_paths(scene: &Scene) -> bool {
     let is_point_like = |light: &Light| !matches!(light.kind, LightKind::Environment { .. });
     scene.lights.iter().any(is_point_like) && scene.meshes.iter().any(is_specular)
 }
+
+/// Runs of a study are timed at the clock of work.
+const WARM_UP: &str = " --warm-up";
 
 /// The file beside the page that the commands read points from.
 pub const POINTS: &str = "points.txt";

@@ -133,7 +133,7 @@ pub fn light(gpu: &Gpu, view: &View, plan: TransportPlan, control: &mut Control)
     commands.submit()?;
 
     let mut fates = [Fates::new(plan.settings.bounces), Fates::new(plan.settings.bounces)];
-    let mut watch = Watch::new(plan.settings.stop, plan.settings.alpha, started);
+    let mut watch = Watch::new(plan.settings.stop, plan.settings.alpha, commands.started());
     let (mut done, mut settled, mut end) = (0, 0, End::Rounds);
     let mut submissions_settled = commands.submission_count();
     let photons_per_round = plan.maps().map(|map| u64::from(map.photons)).sum::<u64>();

@@ -15,6 +15,7 @@ pub mod planted;
 pub mod reference;
 
 use std::ops::Deref;
+use std::sync::Mutex;
 use std::sync::atomic::AtomicBool;
 
 use glam::UVec2;
@@ -28,34 +29,49 @@ use photonmill::scene::open_box::open_box;
 use photonmill::scene::room::RoomScene;
 use photonmill::settings::{Settings, Variant};
 
-/// A device under the validation layer, which must not have said a word by the end of the test.
-pub struct Device(Gpu);
+/// Devices that no test has at the moment: what one test compiled serves the next.
+static IDLE: Mutex<Vec<Gpu>> = Mutex::new(Vec::new());
+
+/// A device under the validation layer, which must not have said a word by the end of the test, nor may anything be held.
+pub struct Device {
+    /// `None` at the very end.
+    gpu: Option<Gpu>,
+    serves_others: bool,
+}
 
 impl Deref for Device {
     type Target = Gpu;
 
     fn deref(&self) -> &Gpu {
-        &self.0
+        self.gpu.as_ref().expect("it is taken at the very end")
     }
 }
 
 impl Drop for Device {
     fn drop(&mut self) {
         // A test that fails already says why.
-        if !std::thread::panicking() {
-            self.0.check_validation().unwrap();
+        if std::thread::panicking() {
+            return;
+        }
+        self.check_validation().unwrap();
+        assert_eq!((self.held_memory().device_bytes, self.held_memory().staging_bytes), (0, 0), "buffers are left");
+        if let Some(gpu) = self.gpu.take().filter(|_| self.serves_others) {
+            IDLE.lock().unwrap().push(gpu);
         }
     }
 }
 
 /// The device of the tests; `None` where `PHOTONMILL_NO_GPU=1` asks to go without.
 pub fn device() -> Option<Device> {
-    device_with(Options::default())
+    let idle = IDLE.lock().unwrap().pop();
+    let gpu = idle.or_else(|| open(Options::default()))?;
+    gpu.forget_peaks();
+    Some(Device { gpu: Some(gpu), serves_others: true })
 }
 
-/// The same with some of its abilities masked off.
+/// One of its own that nothing was compiled for, with some of its abilities masked off or not.
 pub fn device_with(options: Options) -> Option<Device> {
-    open(options).map(Device)
+    open(options).map(|gpu| Device { gpu: Some(gpu), serves_others: false })
 }
 
 /// The same without the promise that validation stays silent, for tests that make it speak.
