@@ -224,6 +224,20 @@ fn every_module_has_its_place() {
     }
 }
 
+/// A file of tests that no program names would never run.
+#[test]
+fn every_file_of_tests_is_run() {
+    let folder = Path::new(env!("CARGO_MANIFEST_DIR"));
+    let [modules, programs] = ["tests/main.rs", "Cargo.toml"].map(|file| fs::read_to_string(folder.join(file)).unwrap());
+    let found = fs::read_dir(folder.join("tests")).unwrap().map(|entry| entry.unwrap().file_name().into_string().unwrap());
+    let names: Vec<String> = found.filter_map(|file| Some(file.strip_suffix(".rs")?.to_owned())).collect();
+    assert!(names.len() > 30, "{names:?}");
+    for name in names {
+        let is_run = modules.contains(&format!("\nmod {name};\n")) || programs.contains(&format!("path = \"tests/{name}.rs\""));
+        assert!(is_run, "tests/{name}.rs is in neither tests/main.rs nor Cargo.toml");
+    }
+}
+
 #[test]
 fn vulkan_and_unsafe_stay_in_the_engine() {
     for (path, source) in files(&root("src")) {

@@ -106,7 +106,7 @@ struct TimingArgs {
     #[arg(long)]
     time_dispatches: bool,
     /// Keep the device busy before the first round, so that GPU times are those at the clock of work, to which a card that
-    /// idled takes 0.3 s to come; in no time of the report
+    /// idled takes 0.3 s to come; in no time of the report but that of --bias
     #[arg(long)]
     warm_up: bool,
 }

@@ -40,6 +40,11 @@ const ITEMS: u32 = 1 << 20;
 const STEPS: u32 = 1024;
 const GROUP_SIZE: u32 = 256;
 
+/// Makes the pipeline of [`warm_up`], so that no run does.
+pub(super) fn prepare(gpu: &Gpu) -> Result<()> {
+    gpu.prepare(&[MeasureFloat::MODULE], &Constants::new(GROUP_SIZE))
+}
+
 /// Keeps a card busy for a while, so that what follows at once runs at the clock of work. Does nothing on a software device,
 /// which has no clock of its own.
 pub fn warm_up(gpu: &Gpu, time: Duration) -> Result<()> {
@@ -47,7 +52,7 @@ pub fn warm_up(gpu: &Gpu, time: Duration) -> Result<()> {
         return Ok(());
     }
     gpu.without_peaks(|| {
-        gpu.prepare(&[MeasureFloat::MODULE], &Constants::new(GROUP_SIZE))?;
+        prepare(gpu)?;
         let mut commands = Commands::new(gpu, Constants::new(GROUP_SIZE), Instant::now())?;
         let results = gpu.buffer::<u32>("results", u64::from(ITEMS), Memory::Device)?;
         let push = MeasurePush { item_count: ITEMS, step_count: STEPS, mask: 0 };

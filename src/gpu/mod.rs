@@ -171,6 +171,9 @@ impl Gpu {
             context,
         };
         check::run(&gpu)?;
+        if gpu.warms_up {
+            clock::prepare(&gpu)?;
+        }
         Ok(gpu)
     }
 

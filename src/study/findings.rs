@@ -366,3 +366,32 @@ pub fn clock(point: &Point) -> &'static str {
 pub fn words_of_confidence() -> String {
     format!("{} %", 100.0 * CONFIDENCE)
 }
+
+#[cfg(test)]
+mod tests {
+    use super::super::point::tests::curve;
+    use super::*;
+
+    #[test]
+    fn the_base_is_summed_up_where_it_was_measured_furthest() {
+        let to = |label: &str, points: usize| {
+            let mut curve = curve(0.4, 0.0, 1.0);
+            curve.points.truncate(points);
+            Curve { label: label.to_owned(), ..curve }
+        };
+        let comparison = |axis, base, other| Comparison { axis, curves: vec![base, other] };
+        let part = Part {
+            quantity: String::new(),
+            reference: String::new(),
+            reference_error: 0.0,
+            comparisons: vec![
+                comparison(Axis::Builder, to("base", 2), to("naive", 9)),
+                comparison(Axis::Radius, to("base", 7), to("twice", 8)),
+                comparison(Axis::Sums, to("base", 5), to("floats", 5)),
+                // Of another line.
+                comparison(Axis::Index, to("kd-tree", 8), to("brute", 9)),
+            ],
+        };
+        assert_eq!(part.base().map(|base| (base.label.as_str(), base.points.len())), Some(("base", 7)));
+    }
+}

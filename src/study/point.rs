@@ -267,12 +267,12 @@ impl Curve {
 }
 
 #[cfg(test)]
-mod tests {
+pub(super) mod tests {
     use super::*;
     use crate::rng::philox;
 
     /// Runs whose squared error is `noise`^2 / rounds plus that of a bias, all but equal.
-    fn curve(noise: f64, bias: f64, ms_a_round: f64) -> Curve {
+    pub fn curve(noise: f64, bias: f64, ms_a_round: f64) -> Curve {
         let point = |rounds: u32| {
             let square = noise * noise / f64::from(rounds);
             Point {
