@@ -233,6 +233,14 @@ struct LightPath {
     vec3 flux;
 };
 
+struct CameraPath {
+    vec3 position;
+    uint place;
+    vec3 direction;
+    uint state;
+    vec3 weight;
+};
+
 struct VisiblePoint {
     vec3 position;
     uint normal;
@@ -281,6 +289,8 @@ struct FlightPush {
     Draws draws;
     PhotonStore map;
     uint bounce;
+    uint list;
+    uint is_last;
     uint path_capacity;
 };
 
@@ -289,7 +299,18 @@ struct FlyWholePush {
     PhotonEmission emission;
     PhotonStore map;
     uint bounces;
+    uint first_bounce;
+    uint flights;
     uint stride;
+};
+
+struct GoOnPush {
+    Draws draws;
+    uint path_count;
+    uint pixel_count;
+    uint emitter_count;
+    float film_scale;
+    float film_limit;
 };
 
 struct ViewPush {

@@ -126,8 +126,16 @@ constants! {
     FLUX_BITS = 24;
     /// Most that a shading normal may change a photon's flux by, all bounces together.
     MAX_SHADING_GAIN = 8;
-    /// Mirrors and panes of glass that a path from the camera passes at most.
-    MAX_CHAIN = 32;
+    /// Bounces after which any path ends: of a photon, and of a camera path over mirrors and glass. Roulette ends nearly all of
+    /// them long before; what it leaves is counted as cut off.
+    MAX_BOUNCES = 10_000;
+    /// Mirrors and panes of glass after which roulette may end a camera path.
+    ROULETTE_DEPTH = 32;
+    /// Bounces of a scene's photons of which fates are counted apart; the last count takes in all later ones.
+    TALLY_ROWS = 64;
+    /// Words of one copy of a map's totals (`glsl/totals.glsl`), and the bits of flux after the binary point.
+    TOTAL_WORDS = 16;
+    TOTAL_FLUX_BITS = 20;
     /// Entries of the stack that traverses the bounding volume hierarchy.
     BVH_STACK = 32;
 

@@ -2,6 +2,7 @@
 
 use serde::Serialize;
 
+use crate::constants::TALLY_ROWS;
 use crate::records::Tally;
 
 /// Fates of a run's photons.
@@ -12,11 +13,12 @@ pub struct Ledger {
     pub absorbed: u64,
     /// Left through an opening.
     pub escaped: u64,
-    /// Still flying after the last bounce that was allowed.
+    /// Still under way after the last bounce that is allowed, or when the run was interrupted.
     pub cut_off: u64,
     /// Lost for want of room; the plan makes that impossible, and this counter would show it.
     pub dropped: u64,
-    /// Entries of the photon map over the run: a photon is stored at every bounce that reflects it.
+    /// Entries of the photon map over the run. In the room a photon is stored at every bounce that reflects it, in a scene
+    /// where it arrives at a surface that scatters, if the map holds light that arrived in its way.
     pub stored: u64,
 }
 
@@ -39,12 +41,43 @@ impl Ledger {
     }
 }
 
+/// Relative flux per channel; [`crate::plan::transport::MapPlan::photon_flux`] makes watts of it.
+pub type RelativeFlux = [f64; 3];
+
+/// What the photons of a scene's map lose to limits, and how many photons the map has held.
+#[derive(Debug, Clone, Copy, PartialEq, Default)]
+pub struct Totals {
+    /// Entries of the map over all chunks.
+    pub stored: u64,
+    /// Photons still under way after the last bounce that is allowed, and their flux.
+    pub cut_off: u64,
+    pub cut_flux: RelativeFlux,
+    /// Photons whose flux a shading normal would have raised beyond `MAX_SHADING_GAIN`, and what they lost.
+    pub clamped: u64,
+    pub clamped_flux: RelativeFlux,
+}
+
+impl Totals {
+    pub fn add(&mut self, other: &Totals) {
+        self.stored += other.stored;
+        self.cut_off += other.cut_off;
+        self.clamped += other.clamped;
+        for channel in 0..3 {
+            self.cut_flux[channel] += other.cut_flux[channel];
+            self.clamped_flux[channel] += other.clamped_flux[channel];
+        }
+    }
+}
+
 /// Fates bounce by bounce, from which the ledger follows.
-#[derive(Debug, Clone, PartialEq, Eq, Default)]
+#[derive(Debug, Clone, PartialEq, Default)]
 pub struct Fates {
     pub emitted: u64,
-    /// Photons stored, absorbed, escaped and dropped at each bounce.
+    /// Photons that survived each bounce, which stores them in the room, and that were absorbed, escaped and dropped there.
+    /// The last count of a scene takes in all later bounces.
     pub bounces: Vec<BounceFates>,
+    /// Of a scene, where a photon that survives need not be stored.
+    pub totals: Option<Totals>,
 }
 
 #[derive(Debug, Clone, Copy, PartialEq, Eq, Default, Serialize)]
@@ -57,7 +90,22 @@ pub struct BounceFates {
 
 impl Fates {
     pub fn new(bounces: u32) -> Fates {
-        Fates { emitted: 0, bounces: vec![BounceFates::default(); bounces as usize] }
+        Fates { emitted: 0, bounces: vec![BounceFates::default(); bounces as usize], totals: None }
+    }
+
+    /// Of the photons of a scene's map.
+    pub fn of_scene(bounces: u32) -> Fates {
+        Fates { totals: Some(Totals::default()), ..Fates::new(bounces.min(TALLY_ROWS)) }
+    }
+
+    pub fn add_totals(&mut self, totals: &Totals) {
+        self.totals.get_or_insert_default().add(totals);
+    }
+
+    /// Counts photons as cut off that were under way when a run was interrupted.
+    pub fn interrupt(&mut self) {
+        let Ledger { emitted, absorbed, escaped, cut_off, dropped, .. } = self.ledger();
+        self.totals.get_or_insert_default().cut_off += emitted.saturating_sub(absorbed + escaped + cut_off + dropped);
     }
 
     pub fn add(&mut self, emitted: u64, tallies: &[Tally]) {
@@ -77,10 +125,62 @@ impl Fates {
             emitted: self.emitted,
             absorbed: sum(|bounce| bounce.absorbed),
             escaped: sum(|bounce| bounce.escaped),
-            cut_off: self.bounces.last().map_or(self.emitted, |last| last.stored),
+            cut_off: self.totals.map_or_else(|| self.bounces.last().map_or(self.emitted, |last| last.stored), |totals| totals.cut_off),
             dropped: sum(|bounce| bounce.dropped),
-            stored: sum(|bounce| bounce.stored),
+            stored: self.totals.map_or_else(|| sum(|bounce| bounce.stored), |totals| totals.stored),
         }
+    }
+}
+
+/// Light that limits kept from a result. Mean over rounds, W in all channels together.
+#[derive(Debug, Clone, Copy, PartialEq, Default, Serialize)]
+pub struct Losses {
+    /// W of all lights.
+    pub emitted: f64,
+    /// W of photons that were cut off after the last bounce that is allowed.
+    pub cut_off: f64,
+    /// W that shading normals would have added to photons beyond the limit of each.
+    pub clamped: f64,
+    /// Camera paths that were cut off among mirrors and glass, all rounds.
+    pub camera_paths: u32,
+    /// Values larger than the film holds, all rounds.
+    pub clamped_values: u32,
+    /// Bound of what all of these would add to the result, relative to its root mean square.
+    pub relative: f64,
+}
+
+/// Further landings that a photon which was cut off is taken to miss at most.
+const MOST_LANDINGS: f64 = 1e4;
+
+impl Losses {
+    /// What is lost may fall where less light is: the bound is so many times its share of all light.
+    pub const SAFETY: f64 = 2.0;
+
+    /// Of the paper's room, whose lights have so many watts and whose photons all carry alike.
+    pub fn of_room(fates: &Fates, watts: f64) -> Losses {
+        let Ledger { emitted, cut_off, stored, .. } = fates.ledger();
+        if emitted == 0 {
+            return Losses::default();
+        }
+        let missed = cut_off as f64 * (fates.further_landings() - 1.0);
+        let relative = if missed > 0.0 { Losses::SAFETY * missed / (stored as f64 + missed) } else { 0.0 };
+        Losses { emitted: watts, cut_off: watts * cut_off as f64 / emitted as f64, relative, ..Losses::default() }
+    }
+
+    /// Share of all light that is emitted.
+    pub fn share(&self) -> f64 {
+        if self.emitted > 0.0 { (self.cut_off + self.clamped) / self.emitted } else { 0.0 }
+    }
+}
+
+impl Fates {
+    /// Landings that a photon which was cut off would still have had, from the chance with which photons survived their latest
+    /// bounces.
+    pub fn further_landings(&self) -> f64 {
+        let entered = |bounce: &BounceFates| bounce.stored + bounce.absorbed + bounce.escaped;
+        let latest = self.bounces.iter().rev().take(self.bounces.len().div_ceil(2));
+        let (survived, all) = latest.fold((0, 0), |(survived, all), bounce| (survived + bounce.stored, all + entered(bounce)));
+        if all == 0 { 1.0 } else { (1.0 / (1.0 - survived as f64 / all as f64).max(1.0 / MOST_LANDINGS)).min(MOST_LANDINGS) }
     }
 }
 

@@ -16,8 +16,8 @@
 //! constants, records, path, photon, error, bias, ledger, rng, settings, timings < scene < plan < cpu
 //! scene < judge
 //! constants, records, error, ledger, timings < gpu
-//! gpu < oddities, tallies; plan, gpu < prefix_sum
-//! plan, oddities, tallies, prefix_sum < resources < trace < index < estimate < film < render < transport < selfcheck < output
+//! gpu < oddities, tallies, totals; plan, gpu < prefix_sum
+//! plan, oddities, tallies, totals, prefix_sum < resources < trace < index < estimate < film < render < transport < selfcheck < output
 //! output < bake < paper < compaction < study < bench < cli
 //! ```
 //!
@@ -104,5 +104,6 @@ pub mod settings;
 pub mod study;
 pub mod tallies;
 pub mod timings;
+pub mod totals;
 pub mod trace;
 pub mod transport;

@@ -353,6 +353,18 @@ records! {
         flux: Vec3,
     }
 
+    /// A path from the camera or a receiver, under way over mirrors and glass.
+    CameraPath {
+        position: Vec3,
+        /// Of its sample among all of all pixels.
+        place: u32,
+        direction: Vec3,
+        /// Bits 0 to 3: it saw a specular surface, it gathers, it starts at no surface, emission counts at its next one; bits 4
+        /// and 5: visible points found; from bit 8 on: surfaces that it has met.
+        state: u32,
+        weight: Vec3,
+    }
+
     /// A point whose light the photon maps are asked for.
     VisiblePoint {
         position: Vec3,
@@ -416,6 +428,10 @@ records! {
         draws: Draws,
         map: PhotonStore,
         bounce: u32,
+        /// Number of the list that its paths come from: [`crate::transport::photons`] counts them from 0 in each segment.
+        list: u32,
+        /// 1: no path goes on after it.
+        is_last: u32,
         path_capacity: u32,
     }
 
@@ -423,9 +439,23 @@ records! {
         draws: Draws,
         emission: PhotonEmission,
         map: PhotonStore,
+        /// Bounces after which photons are cut off.
         bounces: u32,
+        /// Bounces that its photons have behind them; 0: they come from their lights.
+        first_bounce: u32,
+        /// Most flights of a photon in this dispatch.
+        flights: u32,
         /// Invocations that take photons: each every so many.
         stride: u32,
+    }
+
+    GoOnPush {
+        draws: Draws,
+        path_count: u32,
+        pixel_count: u32,
+        emitter_count: u32,
+        film_scale: f32,
+        film_limit: f32,
     }
 
     ViewPush {

@@ -16,8 +16,12 @@ pub fn clear(commands: &mut Commands, tallies: &Buffer) {
 
 /// Fates of the first bounces, copies added up.
 pub fn read(commands: &mut Commands, tallies: &Buffer, bounces: u32) -> Result<Vec<Tally>> {
-    let copies = commands.read::<Tally>(tallies, (bounces * TALLY_COPIES) as usize)?;
-    Ok(copies.chunks_exact(TALLY_COPIES as usize).map(sum).collect())
+    Ok(sums(&commands.read::<Tally>(tallies, (bounces * TALLY_COPIES) as usize)?))
+}
+
+/// Fates of bounces, the copies of each added up.
+pub fn sums(copies: &[Tally]) -> Vec<Tally> {
+    copies.chunks_exact(TALLY_COPIES as usize).map(sum).collect()
 }
 
 fn sum(copies: &[Tally]) -> Tally {

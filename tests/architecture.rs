@@ -8,13 +8,14 @@ use std::path::{Path, PathBuf};
 /// What everyone may use, and what among itself has no order.
 const GROUND: [&str; 10] = ["error", "bias", "constants", "records", "path", "photon", "ledger", "rng", "settings", "timings"];
 /// From left to right.
-const LINE: [&str; 23] = [
+const LINE: [&str; 24] = [
     "scene",
     "judge",
     "plan",
     "gpu",
     "oddities",
     "tallies",
+    "totals",
     "prefix_sum",
     "resources",
     "trace",

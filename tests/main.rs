@@ -24,6 +24,7 @@ mod judge;
 mod large_scene;
 mod layout;
 mod ledger;
+mod limits;
 mod memory;
 mod optics;
 mod paranoid;

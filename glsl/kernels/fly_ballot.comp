@@ -28,6 +28,7 @@ layout(set = 1, binding = 4, scalar) buffer Tallies { Tally tallies[]; };
 #include "scene/surface.glsl"
 #include "scene/lobes.glsl"
 #include "scene/scatter.glsl"
+#include "totals.glsl"
 #include "stages/map_store.glsl"
 #include "stages/fly_once.glsl"
 #include "stages/flight.glsl"

@@ -52,7 +52,7 @@ void main()
     Target here = Target(receiver.position, position_error(receiver.position), ng, ns, ns, SURFACE_RECEIVER, 0.0);
     Chain chain = new_chain(receiver.position, ns, vec3(1.0), vec2(0.0));
     if (SHADOW_RAYS != 0) {
-        add_light(chain, direct_light(here, push.emitter_count, push.draws, index, 0, 1 + VERTEX_BLOCKS * MAX_CHAIN));
+        add_light(chain, direct_light(here, push.emitter_count, push.draws, index, 0, RECEIVER_BLOCK));
     }
     // Photons only ever land on surfaces, and tell the irradiance of those: any other point, or direction, looks
     // around.
@@ -79,10 +79,12 @@ void main()
         if (HAS_ALL_ARRIVALS) {
             chain.sees_emission = !on_surface;
         }
-        follow(chain, index, 0, push.draws, push.emitter_count);
+        if (follow(chain, index, 0, push.draws, push.emitter_count, 0)) {
+            put_off(chain, index, CHAIN_STEPS);
+        }
     }
     note_unless(is_finite(chain.light[0]) && is_finite(chain.light[1]) && is_finite(chain.light[2]), ODD_LIGHT, push.draws.domain,
                 push.draws.round, index);
-    write_pass_sum(index, chain.light, push.film_scale, push.film_limit);
-    write_points(chain, index, 0, push.point_count);
+    write_pass_sum(index, chain.light, push.film_scale, push.film_limit, false);
+    write_points(chain, index, 0, push.point_count, 0);
 }

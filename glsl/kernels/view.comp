@@ -51,9 +51,11 @@ void main()
     vec3 direction = normalize(push.forward + picture.x * push.right + picture.y * push.up);
 
     Chain chain = new_chain(push.eye, direction, vec3(1.0), u.zw);
-    follow(chain, pixel, number, push.draws, push.emitter_count);
+    if (follow(chain, pixel, number, push.draws, push.emitter_count, 0)) {
+        put_off(chain, SAMPLES * pixel + number, CHAIN_STEPS);
+    }
     note_unless(is_finite(chain.light[0]) && is_finite(chain.light[1]) && is_finite(chain.light[2]), ODD_LIGHT, push.draws.domain,
                 push.draws.round, pixel);
-    write_pass_sum(SAMPLES * pixel + number, chain.light, push.film_scale, push.film_limit);
-    write_points(chain, pixel, number, push.width * push.height);
+    write_pass_sum(SAMPLES * pixel + number, chain.light, push.film_scale, push.film_limit, false);
+    write_points(chain, pixel, number, push.width * push.height, 0);
 }

@@ -1,9 +1,23 @@
 // The film of a picture: for each pixel and channel the sum of all passes and the sum of their squares,
 // exact integers (64 and 128 bits), so that passes add up in any order. One invocation owns a pixel.
 
-// Counts: [0] values that are no number, [1] values cut to the film's largest, [2] estimates on a mesh too dense
-// for its area to be found.
+// Counts: [0] values that are no number, [1] values clamped to the film's largest, [2] estimates on a mesh too dense
+// for its area to be found, [3] camera paths cut off after MAX_BOUNCES; sums of two words, low word first: [4] what clamped
+// values lost, in 1/1024 of the film's largest, [6] the weights of cut paths, in 2^-20.
 layout(set = 1, binding = 0, scalar) buffer Anomalies { uint anomalies[]; };
+
+void add_to_anomaly(uint word, uint amount)
+{
+    if (atomicAdd(anomalies[word], amount) > 0xffffffffu - amount) {
+        atomicAdd(anomalies[word + 1], 1);
+    }
+}
+
+void note_cut_path(float weight)
+{
+    atomicAdd(anomalies[3], 1);
+    add_to_anomaly(6, uint(min(weight * 1048576.0, 2147483648.0)));
+}
 
 // A value in film units as a 64-bit integer (low word, high word), at most `limit` units.
 uvec2 to_film_units(float value, float scale, float limit)
@@ -15,6 +29,7 @@ uvec2 to_film_units(float value, float scale, float limit)
     }
     if (units > limit) {
         atomicAdd(anomalies[1], 1);
+        add_to_anomaly(4, uint(min(divide(units - limit, limit) * 1024.0 + 1.0, 2147483648.0)));
     }
     units = clamp(units, 0.0, limit);
     // Exact: a float is a 24-bit integer times a power of two.

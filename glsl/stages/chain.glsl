@@ -1,4 +1,4 @@
-// A path from the eye: mirrors and glass, the first surface that scatters (a visible point), and where a
+// A camera path: mirrors and glass, the first surface that scatters (a visible point), and where a
 // final gather is asked for, a sampled ray and a second chain to a second visible point.
 
 struct Chain {
@@ -68,11 +68,19 @@ bool gathers_here(Surface surface)
 const float MIRROR_CHANCES[2] = float[](0.5, 0.25);
 const uint MIRROR_SAMPLES = 4;
 
-// Follows the chain of sample `number` of a place to its end. Random numbers: block 1 + VERTEX_BLOCKS * depth goes on, the
-// one after it is for direct light.
-void follow(inout Chain chain, uint index, uint number, Draws draws, uint emitter_count)
+// Surfaces that one dispatch follows a chain over; what is still under way then goes on in another (kernels/go_on.comp).
+layout(constant_id = 46) const uint CHAIN_STEPS = MAX_BOUNCES;
+
+// Random numbers of a place that are no vertex's: light at a receiver, then roulette at each depth.
+const uint RECEIVER_BLOCK = 1 + VERTEX_BLOCKS * MAX_BOUNCES;
+const uint ROULETTE_BLOCK = RECEIVER_BLOCK + 1;
+
+// Follows the chain of sample `number` of a place, which is over `first_depth` surfaces already. Says whether it is still under
+// way. Random numbers: block 1 + VERTEX_BLOCKS * depth goes on, the one after it is for direct light.
+bool follow(inout Chain chain, uint index, uint number, Draws draws, uint emitter_count, uint first_depth)
 {
-    for (uint depth = 0; depth < MAX_CHAIN; depth++) {
+    uint end_depth = min(first_depth + CHAIN_STEPS, MAX_BOUNCES);
+    for (uint depth = first_depth; depth < end_depth; depth++) {
         note_unless(is_finite(chain.position) && is_finite(chain.direction) && is_finite(chain.weight), ODD_LIGHT, draws.domain,
                     draws.round, index);
         vec3 wo = -chain.direction;
@@ -81,14 +89,14 @@ void follow(inout Chain chain, uint index, uint number, Draws draws, uint emitte
             if (chain.sees_emission) {
                 add_light(chain, environment_radiance(emitter_count));
             }
-            return;
+            return false;
         }
         Surface surface = surface_at(hit, wo);
         if (chain.sees_emission) {
             add_light(chain, surface.emission);
         }
         if (!surface.scatters) {
-            return;
+            return false;
         }
         uint block = 1 + VERTEX_BLOCKS * depth;
         bool specular = is_specular(surface);
@@ -116,7 +124,7 @@ void follow(inout Chain chain, uint index, uint number, Draws draws, uint emitte
                                                              pack_normal(surface.ns), pack_direction(wo, 0), surface.parameter,
                                                              surface.kind, arrivals);
             if (!gathers) {
-                return;
+                return false;
             }
             chain.gathers = true;
             chain.weight *= for_all ? float(SAMPLES) : 1.0;
@@ -128,7 +136,7 @@ void follow(inout Chain chain, uint index, uint number, Draws draws, uint emitte
             ends = false;
         }
         if (ends) {
-            return;
+            return false;
         }
         uint count = SAMPLES; // build.rs cannot reflect a constant that is compared with `>=`
         vec3 u = stratified(number, count, words_of(index, block, draws)).zxy;
@@ -139,7 +147,14 @@ void follow(inout Chain chain, uint index, uint number, Draws draws, uint emitte
         }
         Scatter scatter = sample_scatter(surface, wo, u, true, mirror_chance);
         if (!scatter.alive) {
-            return;
+            return false;
+        }
+        if (depth >= ROULETTE_DEPTH) {
+            float survival = min(max(scatter.weight.x, max(scatter.weight.y, scatter.weight.z)), 1.0);
+            if (stratified(number, count, words_of(index, ROULETTE_BLOCK + depth, draws)).x >= survival) {
+                return false;
+            }
+            scatter.weight = divide(scatter.weight, survival);
         }
         if (surface.kind == SURFACE_PAPER_PHONG) {
             scatter.weight *= lobe_weight(surface.kind, surface.parameter, surface.ns, wo, scatter.direction);
@@ -151,16 +166,34 @@ void follow(inout Chain chain, uint index, uint number, Draws draws, uint emitte
         chain.position = offset_origin(surface.position, surface.error, surface.ng, scatter.direction);
         chain.direction = scatter.direction;
     }
+    if (end_depth == MAX_BOUNCES) {
+        note_cut_path(max(chain.weight.x, max(chain.weight.y, chain.weight.z)));
+        return false;
+    }
+    return true;
 }
 
-// All pixels' first points stand first, so that neighbours in memory are neighbours in the picture.
-void write_points(Chain chain, uint pixel, uint number, uint pixel_count)
+// Camera paths that are under way when their dispatch ends.
+layout(set = 1, binding = 9, scalar) writeonly buffer NextCameraPaths { CameraPath next_camera_paths[]; };
+// [0]: how many.
+layout(set = 1, binding = 10, scalar) buffer CameraPathCounts { uint camera_path_counts[]; };
+
+// `place` is that of the sample among all samples.
+void put_off(Chain chain, uint place, uint depth)
+{
+    uint flags = uint(chain.saw_specular) | uint(chain.gathers) << 1 | uint(chain.starts_nowhere) << 2 | uint(chain.sees_emission) << 3;
+    next_camera_paths[atomicAdd(camera_path_counts[0], 1)] =
+        CameraPath(chain.position, place, chain.direction, flags | chain.point_count << 4 | depth << 8, chain.weight);
+}
+
+// All pixels' first points stand first, so that neighbours in memory are neighbours in the picture. Points before `first` stay.
+void write_points(Chain chain, uint pixel, uint number, uint pixel_count, uint first)
 {
     uint per_path = 1;
     if (GATHER_RAYS != GATHER_NONE) {
         per_path = 2;
     }
-    for (uint k = 0; k < per_path; k++) {
+    for (uint k = first; k < per_path; k++) {
         visible_points[(per_path * number + k) * pixel_count + pixel] = chain.points[k];
     }
 }

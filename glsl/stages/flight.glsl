@@ -1,4 +1,5 @@
 // One flight of every photon, stored where it lands. The including kernel chose how places are taken.
+// counters[1 + push.list] = paths that enter, counters[2 + push.list] = those that go on.
 
 layout(set = 1, binding = 0, scalar) readonly buffer LightPaths { LightPath light_paths[]; };
 layout(set = 1, binding = 1, scalar) writeonly buffer NextLightPaths { LightPath next_light_paths[]; };
@@ -8,9 +9,16 @@ void fly()
     uint index = invocation_index();
     Flown flown = no_flight();
     LightPath path;
-    if (index < min(counters[1 + push.bounce], push.path_capacity)) {
+    if (index < min(counters[1 + push.list], push.path_capacity)) {
         path = light_paths[index];
         flown = fly_once(path, push.bounce);
+    }
+    bool goes_on = flown.alive;
+    if (push.is_last != 0) {
+        goes_on = false;
+        if (flown.alive) {
+            count_loss(TOTAL_CUT_OFF, path.flux);
+        }
     }
     // Full maps drop nothing: the plan gives room for every photon at every bounce.
     uint place = take_place(0, flown.stored);
@@ -18,12 +26,13 @@ void fly()
     if (flown.stored && !dropped) {
         store(place, flown.photon);
     }
-    uint path_place = take_place(2 + push.bounce, flown.alive);
-    if (flown.alive) {
+    uint path_place = take_place(2 + push.list, goes_on);
+    if (goes_on) {
         next_light_paths[path_place] = path;
     }
-    tally(push.bounce, fates(flown.alive, flown.absorbed, flown.escaped, false));
+    uint row = min(push.bounce, TALLY_ROWS - 1);
+    tally(row, fates(flown.alive, flown.absorbed, flown.escaped, false));
     if (dropped) {
-        atomicAdd(tallies[tally_copy(push.bounce)].dropped, 1);
+        atomicAdd(tallies[tally_copy(row)].dropped, 1);
     }
 }

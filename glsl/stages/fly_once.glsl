@@ -46,7 +46,14 @@ Flown fly_once(inout LightPath path, uint bounce)
         float survival = before > 0.0 ? min(divide(after, before), 1.0) : 0.0;
         flown.alive = surface.scatters && scatter.alive && u.x < survival && (specular || push.map.caustic_only == 0);
         flown.absorbed = !flown.alive;
-        flux = min(divide(flux, max(survival, 1e-12)), vec3(float(MAX_SHADING_GAIN)));
+        flux = divide(flux, max(survival, 1e-12));
+        if (HAS_SMOOTH_NORMALS) {
+            vec3 clamped = min(flux, vec3(float(MAX_SHADING_GAIN)));
+            if (flown.alive && clamped != flux) {
+                count_loss(TOTAL_CLAMPED, flux - clamped);
+            }
+            flux = clamped;
+        }
 
         uint onward = ARRIVED_INDIRECT;
         if (specular) {

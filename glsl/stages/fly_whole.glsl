@@ -1,27 +1,36 @@
-// Photons from their light to their end, each in the registers of one invocation, which then takes its next one; see
-// stages/trace_whole.glsl.
+// Photons in the registers of one invocation, which takes its next one when one ends; see stages/trace_whole.glsl. They come
+// from their lights, or from the list of those that an earlier dispatch left under way. Those that are still under way after
+// push.flights flights go to the next list; after push.bounces bounces in all they are cut off.
+
+layout(set = 1, binding = 0, scalar) readonly buffer LightPaths { LightPath light_paths[]; };
+layout(set = 1, binding = 1, scalar) writeonly buffer NextLightPaths { LightPath next_light_paths[]; };
 
 void fly_whole()
 {
     open_tallies();
-    uint next = invocation_index(); // photon of the chunk to start with, then every `stride`th
+    uint next = invocation_index(); // photon of the dispatch to start with, then every `stride`th
     if (next >= push.stride) {
         next = push.emission.photon_count;
     }
     bool flying = false;
-    uint bounce = 0;
+    uint flights = 0; // of the photon in this dispatch
     LightPath path;
     for (;;) {
         if (!flying && next < push.emission.photon_count) {
-            path = shine(push.emission.first_photon + next, push.draws, push.emission);
+            if (push.first_bounce == 0) {
+                path = shine(push.emission.first_photon + next, push.draws, push.emission);
+            } else {
+                path = light_paths[push.emission.first_photon + next];
+            }
             next += push.stride;
-            bounce = 0;
+            flights = 0;
             flying = true;
         }
         if (subgroupBallot(flying) == uvec4(0)) {
             break;
         }
         Flown flown = no_flight();
+        uint bounce = push.first_bounce + flights;
         if (flying) {
             flown = fly_once(path, bounce);
         }
@@ -30,14 +39,22 @@ void fly_whole()
         if (flown.stored && !dropped) {
             store(place, flown.photon);
         }
+        uint row = min(bounce, TALLY_ROWS - 1);
         if (flying) {
-            count_fate(bounce, flown.alive, flown.absorbed, flown.escaped);
+            count_fate(row, flown.alive, flown.absorbed, flown.escaped);
         }
         if (dropped) {
-            count_on_device(bounce, FATE_DROPPED, 1);
+            count_on_device(row, FATE_DROPPED, 1);
         }
-        bounce++;
-        flying = flown.alive && bounce < push.bounces;
+        flights++;
+        flying = flown.alive && flights < push.flights;
+        if (flown.alive && !flying) {
+            if (bounce + 1 < push.bounces) {
+                next_light_paths[atomicAdd(counters[1], 1)] = path;
+            } else {
+                count_loss(TOTAL_CUT_OFF, path.flux);
+            }
+        }
     }
     close_tallies();
 }

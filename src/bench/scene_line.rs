@@ -81,8 +81,7 @@ pub fn survey(gpu: &Gpu, job: &Job, map: impl Fn(&TransportPlan) -> Option<&MapP
     let step = (asking.len() / SAMPLES).max(1);
     let radius_squared = plan.radius(map, 0).powi(2) as f32;
     let (mut stored, mut found) = (0u64, 0u64);
-    for chunk in map.chunks() {
-        photons::trace(&mut commands, round, buffers, map, chunk)?;
+    let mut look = |commands: &mut Commands| {
         let length = commands.read::<u32>(&buffers.counters, 1)?[0];
         let photons = commands.read::<MapPhoton>(&buffers.map, length as usize)?;
         stored += u64::from(length);
@@ -96,6 +95,10 @@ pub fn survey(gpu: &Gpu, job: &Job, map: impl Fn(&TransportPlan) -> Option<&MapP
                 photons.iter().filter(near).count() as u64
             })
             .sum::<u64>();
+        Ok(())
+    };
+    for chunk in map.chunks() {
+        photons::trace(&mut commands, round, buffers, map, chunk, &mut look)?;
     }
     let samples = asking.len().div_ceil(step).max(1);
     Ok(Some(Survey { stored: stored as f64, per_estimate: found as f64 / samples as f64, asking_points: asking.len() as f64 }))

@@ -2,7 +2,9 @@
 //! reads and writes, times every scope, and stays within the device's limits.
 
 use std::collections::{HashMap, HashSet};
+use std::marker::PhantomData;
 use std::sync::Arc;
+use std::sync::atomic::{AtomicBool, Ordering};
 use std::time::{Duration, Instant};
 
 use ash::vk;
@@ -11,7 +13,7 @@ use bytemuck::Pod;
 use super::clock::{self, LEAST_WARM_UP};
 use super::timestamps::{TimedScope, Timestamps};
 use super::{Buffer, Constants, Context, DeviceFacts, Gpu, Kernel, Memory, call};
-use crate::error::Result;
+use crate::error::{Error, Result};
 use crate::records::DispatchArgs;
 use crate::timings::{Clock, Span, Timings};
 
@@ -55,11 +57,46 @@ pub struct Commands<'gpu> {
     /// Buffers that only this submission needs.
     staging: Vec<Buffer>,
     work: u64,
+    /// Share of a plan's work per submission that keeps submissions short on this device and in this scene.
+    pace: f64,
+    interrupt: Option<Interrupt<'gpu>>,
     dispatch_count: u64,
     submission_count: u64,
     timings: Timings,
     context: Arc<Context>,
 }
+
+/// Elements on their way to the host.
+#[must_use]
+pub struct ReadBack<T> {
+    buffer: Option<Buffer>,
+    element: PhantomData<T>,
+}
+
+impl<T: Pod> ReadBack<T> {
+    /// The elements, once the commands that copy them have run.
+    pub fn take(self) -> Vec<T> {
+        self.buffer.map_or_else(Vec::new, |buffer| bytemuck::pod_collect_to_vec(buffer.mapped()))
+    }
+}
+
+/// When a run that is interrupted ends: looked at after every submission.
+#[derive(Debug, Clone, Copy)]
+pub struct Interrupt<'a> {
+    pub cancelled: &'a AtomicBool,
+    pub deadline: Option<Instant>,
+}
+
+impl Interrupt<'_> {
+    pub fn is_up(&self) -> bool {
+        self.cancelled.load(Ordering::Relaxed) || self.deadline.is_some_and(|deadline| Instant::now() >= deadline)
+    }
+}
+
+/// Wall time that a submission should take: short enough that a run ends soon after it is asked to.
+const SUBMISSION_TIME: Duration = Duration::from_millis(100);
+/// Least share of a plan's work that a submission is cut down to where a device is slow.
+const LEAST_PACE: f64 = 1.0 / 256.0;
 
 /// Descriptor sets and storage buffers of one descriptor pool.
 const SETS_PER_POOL: u32 = 256;
@@ -97,6 +134,8 @@ impl<'gpu> Commands<'gpu> {
             hazards: Hazards::default(),
             staging: Vec::new(),
             work: 0,
+            pace: 1.0,
+            interrupt: None,
             dispatch_count: 0,
             submission_count: 0,
             timings: Timings::default(),
@@ -237,16 +276,21 @@ impl<'gpu> Commands<'gpu> {
 
     /// Runs everything recorded so far and returns the first `count` elements of a buffer.
     pub fn read<T: Pod>(&mut self, buffer: &Buffer, count: usize) -> Result<Vec<T>> {
+        let read_back = self.copy_out::<T>(buffer, count)?;
+        self.submit()?;
+        Ok(read_back.take())
+    }
+
+    /// Records a copy of the first `count` elements of a buffer to the host; after the next submission they can be taken.
+    pub fn copy_out<T: Pod>(&mut self, buffer: &Buffer, count: usize) -> Result<ReadBack<T>> {
         let bytes = (count * size_of::<T>()) as u64;
         assert!(bytes <= buffer.size_bytes(), "{}: {bytes} bytes of {}", buffer.name(), buffer.size_bytes());
         if count == 0 {
-            self.submit()?;
-            return Ok(Vec::new());
+            return Ok(ReadBack { buffer: None, element: PhantomData });
         }
         let read_back = self.gpu.buffer::<u8>("read back", bytes, Memory::ReadBack)?;
         self.copy(buffer, &read_back, bytes);
-        self.submit()?;
-        Ok(bytemuck::pod_collect_to_vec(read_back.mapped()))
+        Ok(ReadBack { buffer: Some(read_back), element: PhantomData })
     }
 
     /// Counts work of any unit towards [`Commands::work`].
@@ -257,6 +301,17 @@ impl<'gpu> Commands<'gpu> {
     /// Work counted since the last submission.
     pub fn work(&self) -> u64 {
         self.work
+    }
+
+    /// What a plan's work per submission comes to, so that none takes long. It decides how work is split, which changes no
+    /// result.
+    pub fn paced(&self, work_per_submission: u64) -> u64 {
+        ((work_per_submission as f64 * self.pace) as u64).max(1)
+    }
+
+    /// From now on every submission fails with [`Error::Interrupted`] once it has ended, if the interrupt is up by then.
+    pub fn set_interrupt(&mut self, interrupt: Option<Interrupt<'gpu>>) {
+        self.interrupt = interrupt;
     }
 
     /// Runs everything recorded so far and waits for it. Scopes that are open go on in the next
@@ -289,6 +344,11 @@ impl<'gpu> Commands<'gpu> {
         let wall = submitted.elapsed();
         self.gpu.idleness.set(self.gpu.idleness.get().after(submitted, submitted + wall));
         self.submission_count += 1;
+        if wall > SUBMISSION_TIME.mul_f64(1.5) && self.work > 0 {
+            self.pace = (self.pace * 0.5).max(LEAST_PACE);
+        } else if wall < SUBMISSION_TIME / 2 {
+            self.pace = (self.pace * 2.0).min(1.0);
+        }
         self.collect_timings(submitted, wall)?;
 
         // SAFETY: the submission has ended, so its descriptor sets are free.
@@ -307,7 +367,7 @@ impl<'gpu> Commands<'gpu> {
             let begin = self.timestamps.write(self.command_buffer);
             self.open_scopes.push(OpenScope { name, begin });
         }
-        Ok(())
+        if self.interrupt.is_some_and(|interrupt| interrupt.is_up()) { Err(Error::Interrupted) } else { Ok(()) }
     }
 
     /// Books the submission: each scope with its device time, and the host's time of the whole under

@@ -20,7 +20,7 @@ use ash::vk;
 use gpu_allocator::vulkan::{Allocator, AllocatorCreateDesc};
 
 pub use buffer::{Buffer, HeldMemory, Memory};
-pub use commands::{Commands, Extent};
+pub use commands::{Commands, Extent, Interrupt};
 pub use device::DeviceFacts;
 pub use kernel::{Constants, Kernel, Module};
 

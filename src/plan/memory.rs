@@ -5,8 +5,8 @@ use bytemuck::Pod;
 use glam::UVec2;
 
 use super::Plan;
-use super::transport::{MapPlan, Sensor, TransportPlan};
-use crate::constants::{FACE_COUNT, MAX_ODDITIES, ODD_ESTIMATE, PART_COUNT, SCAN_ITEMS, TALLY_COPIES, TREE_LEAF, TREE_RUN};
+use super::transport::{MapPlan, SEGMENT_BOUNCES, Sensor, TransportPlan};
+use crate::constants::{FACE_COUNT, MAX_ODDITIES, ODD_ESTIMATE, PART_COUNT, SCAN_ITEMS, TALLY_COPIES, TOTAL_WORDS, TREE_LEAF, TREE_RUN};
 use crate::path::StoredPath;
 use crate::photon::{MapPhoton, Origin, StoredPhoton};
 use crate::records::*;
@@ -154,10 +154,12 @@ pub(super) fn of_transport(plan: &TransportPlan, geometry: &Geometry, keeps: &dy
         ("caustic targets", kept(&plan.targets, true)),
         ("visible points", array::<VisiblePoint>(points)),
         ("pass sums", array::<u64>(3 * pixels * u64::from(plan.samples()))),
+        ("camera paths", 2 * array::<CameraPath>(plan.camera_path_capacity())),
+        ("camera path counts", array::<u32>(1)),
         ("estimates", array::<u64>(3 * points * u64::from(plan.arrival_sets))),
         ("film", pixels.max(1) * FILM_PIXEL_BYTES),
         ("part totals", array::<u64>(u64::from(PART_COUNT))),
-        ("anomalies", array::<u32>(3)),
+        ("anomalies", array::<u32>(8)),
         ("oddities", array::<u32>(ODDITY_WORDS)),
     ];
     if let Sensor::Receivers { count } = plan.sensor {
@@ -167,18 +169,19 @@ pub(super) fn of_transport(plan: &TransportPlan, geometry: &Geometry, keeps: &dy
         // Both maps of a round use the same buffers in turn.
         let most = |size: fn(&MapPlan) -> u32| plan.maps().map(size).max().map_or(0, u64::from);
         let (paths, capacity, buckets) = (most(|map| map.path_array_length), most(|map| map.capacity), most(|map| map.bucket_count));
-        let bounces = u64::from(plan.settings.bounces);
+        let counters = plan.maps().map(|map| u64::from(map.segment_bounces.min(SEGMENT_BOUNCES)) + 2).max().unwrap_or(2);
         buffers.extend([
             ("light paths", 2 * array::<LightPath>(paths)),
             ("map", array::<MapPhoton>(capacity)),
             ("sorted map", array::<MapPhoton>(capacity)),
-            ("counters", array::<u32>(bounces + 2)),
+            ("counters", array::<u32>(counters)),
             ("dispatch args", array::<DispatchArgs>(1)),
             ("cells", array::<u32>(buckets + 1)),
             ("ranks", array::<u32>(capacity)),
             ("block sums", block_sum_bytes(buckets + 1, plan.settings.group_size)),
             ("crowded points", array::<u32>(2 + 2 * u64::from(plan.points_at_once()))),
-            ("tallies", 2 * array::<Tally>(bounces * u64::from(TALLY_COPIES))),
+            ("tallies", 2 * array::<Tally>(u64::from(plan.tally_rows()) * u64::from(TALLY_COPIES))),
+            ("totals", 2 * array::<u32>(u64::from(TOTAL_WORDS) * u64::from(TALLY_COPIES))),
         ]);
     }
     buffers

@@ -17,6 +17,7 @@ use crate::scene::geometry::Geometry;
 use crate::scene::targets::{aimed_shares, caustic_targets};
 use crate::scene::{Scene, Surface};
 use crate::settings::Math;
+use crate::settings::stop::squared_radius;
 use crate::settings::transport::{Append, Effect, Illumination, TransportSettings};
 
 /// What light is asked of.
@@ -60,7 +61,11 @@ pub struct MapPlan {
     pub path_array_length: u32,
     /// How photons are dealt to invocations that keep them to their end.
     pub persistence: Persistence,
+    /// Bounces after which photons are cut off.
     pub bounces: u32,
+    /// Bounces that photons take before the host looks how many are left: all, where few enough land in the map for certain and
+    /// the device runs loops so long.
+    pub segment_bounces: u32,
     /// Mask of the arrivals that are stored.
     pub stored: u32,
     /// Photons end where they scatter.
@@ -80,7 +85,12 @@ pub struct MapPlan {
 impl MapPlan {
     /// W of a photon of relative flux 1, over the square of the scene's unit.
     pub fn photon_flux(&self, geometry: &Geometry) -> f64 {
-        geometry.flux_unit / (f64::from(self.photons) * self.flux_gain)
+        self.photon_flux_of(geometry, self.photons)
+    }
+
+    /// The same in a round of so many photons.
+    pub fn photon_flux_of(&self, geometry: &Geometry, photons: u32) -> f64 {
+        geometry.flux_unit / (f64::from(photons.max(1)) * self.flux_gain)
     }
 
     /// (first photon, count) of each chunk.
@@ -108,6 +118,8 @@ pub struct TransportPlan {
     pub arrival_sets: u32,
     /// Mask of the arrivals that some map holds.
     pub arrivals: u32,
+    /// Surfaces that one dispatch follows a camera path over.
+    pub chain_steps: u32,
     /// Film units in 1 W/m2/sr or W/m2, a power of two, and the most that one round may add.
     pub film_scale: f64,
     pub film_limit: f64,
@@ -138,6 +150,8 @@ pub const TESTS_PER_POINT: u64 = 256;
 const LOOPS_TO_SHINE: u32 = 128;
 /// Loop iterations of a flight of a photon, mostly of its ray through the hierarchy.
 const LOOPS_PER_FLIGHT: u32 = 256;
+/// Landings of each photon of a chunk that a map has room for.
+pub const SEGMENT_BOUNCES: u32 = 16;
 /// A photon in its map, sorted and unsorted, and its place in its bucket.
 const MAP_ENTRY_BYTES: u64 = 2 * size_of::<MapPhoton>() as u64 + 4;
 /// Most bits of the gain of aimed photons: of lights that send less than a billionth towards what makes caustics.
@@ -176,17 +190,13 @@ impl TransportPlan {
         .map(|(kept, arrival)| if *kept { *arrival } else { 0 })
         .sum::<u32>();
 
-        let most_bounces = limits.loop_iterations / LOOPS_PER_FLIGHT;
         let append = match settings.append {
-            Append::Auto if settings.bounces > most_bounces || settings.math == Math::Strict => Append::Ballot,
+            Append::Auto if settings.math == Math::Strict => Append::Ballot,
             Append::Auto => Append::Persistent,
             named => named,
         };
         let persistent = append == Append::Persistent;
-        if persistent && settings.bounces > most_bounces {
-            let allowed = format!("must be at most {most_bounces} with --variant persistent on this device");
-            return Err(Error::setting("--bounces", settings.bounces, allowed));
-        }
+        let landings_of_each = expected_landings(scene, settings.bounces);
         let map = |name, domain, photons: u32, stored, caustic_only: bool, radius: Option<f64>, option| -> Result<MapPlan> {
             let share = if caustic_only { CAUSTIC_RADIUS_SHARE } else { 1.0 };
             let usual = usual_radius(geometry, f64::from(photons)) * share;
@@ -201,18 +211,26 @@ impl TransportPlan {
                 }
             };
             // Photons of a pass land once at every bounce at most; a caustic's only once.
-            let landings = if caustic_only { 1 } else { u64::from(settings.bounces) };
+            let landings = if caustic_only { 1 } else { u64::from(settings.bounces.min(SEGMENT_BOUNCES)) };
             let chunk_photons = chunk_photons(photons, landings, settings, limits)?;
             let capacity = chunk_photons * landings as u32;
+            let fits = caustic_only || settings.bounces <= SEGMENT_BOUNCES || {
+                // Ten deviations above what is expected, twice.
+                let photons = f64::from(chunk_photons);
+                2.0 * landings_of_each * (photons + 10.0 * photons.sqrt()) <= f64::from(capacity)
+            };
+            let in_one = persistent && fits && settings.bounces <= flights_of_an_invocation(limits);
+            let segment_bounces = if in_one { settings.bounces } else { settings.bounces.min(SEGMENT_BOUNCES) };
             Ok(MapPlan {
                 name,
                 domain,
                 photons,
                 chunk_photons,
                 capacity,
-                path_array_length: if persistent { 0 } else { chunk_photons },
-                persistence: Persistence::new(LOOPS_TO_SHINE, LOOPS_PER_FLIGHT, settings.bounces, limits),
+                path_array_length: if in_one { 0 } else { chunk_photons },
+                persistence: Persistence::new(LOOPS_TO_SHINE, LOOPS_PER_FLIGHT, segment_bounces.min(2 * SEGMENT_BOUNCES), limits),
                 bounces: settings.bounces,
+                segment_bounces,
                 stored,
                 caustic_only,
                 bucket_count: chunk_photons.clamp(1 << 10, 1 << 24).next_power_of_two(),
@@ -256,6 +274,8 @@ impl TransportPlan {
         let samples = if matches!(sensor, Sensor::Picture { .. }) { settings.samples } else { 1 };
         let points_per_pixel = samples * if gather_rays == GATHER_NONE { 1 } else { 2 };
         let arrival_sets = if split { 2 } else { 3 };
+        // A software device counts loop iterations.
+        let chain_steps = if limits.loop_iterations > LOOP_LIMIT { MAX_BOUNCES } else { SEGMENT_BOUNCES };
         let flag = |effect: Effect| u32::from(keeps(effect));
         let shadow_rays = if split && keeps(Effect::Direct) { settings.shadow_rays } else { 0 };
         let constants = vec![
@@ -288,6 +308,7 @@ impl TransportPlan {
             ("PARTS", settings.part.mask()),
             ("FILTER", settings.filter.code()),
             ("HAS_SPECULAR_CHAINS", flag(Effect::SpecularChains)),
+            ("CHAIN_STEPS", chain_steps),
             ("HAS_AIMED_PHOTONS", u32::from(!targets.is_empty())),
         ];
 
@@ -303,6 +324,7 @@ impl TransportPlan {
             points_per_pixel,
             arrival_sets,
             arrivals,
+            chain_steps,
             film_scale: 1.0,
             film_limit: 1.0,
             work_per_submission: limits.pair_tests_per_submission,
@@ -332,7 +354,10 @@ impl TransportPlan {
         let mut plan = self.clone();
         if plan.settings.append == Append::Persistent {
             plan.settings.append = Append::Ballot;
-            plan.global.iter_mut().chain(&mut plan.caustic).for_each(|map| map.path_array_length = map.chunk_photons);
+            for map in plan.global.iter_mut().chain(&mut plan.caustic) {
+                map.path_array_length = map.chunk_photons;
+                map.segment_bounces = map.bounces.min(SEGMENT_BOUNCES);
+            }
         }
         plan
     }
@@ -340,12 +365,12 @@ impl TransportPlan {
     /// Radius of a map in a round, normalised: r_(i+1)^2 = r_i^2 (i + alpha) / (i + 1) with i from 1
     /// (Knaus and Zwicker 2011, equation 15).
     pub fn radius(&self, map: &MapPlan, round: u32) -> f64 {
-        let alpha = self.settings.alpha;
-        if alpha == 1.0 {
-            return map.radius;
-        }
-        let log: f64 = (1..=round).map(|i| ((f64::from(i) + alpha) / (f64::from(i) + 1.0)).ln()).sum();
-        (map.radius * (0.5 * log).exp()).max(RADIUS_RANGE.0)
+        (map.radius * squared_radius(self.settings.alpha, round).sqrt()).max(RADIUS_RANGE.0)
+    }
+
+    /// Bounces whose fates are counted apart.
+    pub fn tally_rows(&self) -> u32 {
+        self.settings.bounces.min(TALLY_ROWS)
     }
 
     pub fn visible_points(&self) -> u32 {
@@ -373,6 +398,17 @@ impl TransportPlan {
         let lanes = self.maps().map(|map| map.lanes).max().unwrap_or(1);
         let most = (self.work_per_submission / TESTS_PER_POINT).clamp(1 << 12, 1 << 22) as u32;
         most.min(self.visible_points()).min(MAX_GROUPS * self.settings.group_size / lanes)
+    }
+
+    /// Whether a camera path may be under way when its dispatch ends.
+    pub fn chains_go_on(&self) -> bool {
+        self.chain_steps < MAX_BOUNCES && (self.constant("HAS_MIRROR") | self.constant("HAS_DIELECTRIC")) != 0
+    }
+
+    /// Camera paths that one dispatch may leave.
+    pub fn camera_path_capacity(&self) -> u64 {
+        let pixels = self.pixels_at_once(self.rays_per_pixel()).min(self.sensor.pixels());
+        if self.chains_go_on() { u64::from(pixels) * u64::from(self.samples()) } else { 0 }
     }
 
     /// Rays of one pixel, roughly.
@@ -488,6 +524,20 @@ impl TransportPlan {
     pub fn missing(&self) -> Vec<Effect> {
         self.decisions.iter().filter(|decision| decision.needed && !decision.kept).map(|decision| decision.effect).collect()
     }
+}
+
+/// Landings of a photon in a map, at most on average: roulette keeps as large a share of photons as the brightest channel of the
+/// brightest surface that scatters; shading normals and rounding have room in what the plan makes of it.
+fn expected_landings(scene: &Scene, bounces: u32) -> f64 {
+    let is_specular = |surface: &Surface| matches!(surface, Surface::Mirror | Surface::Dielectric { .. });
+    let scatterers = scene.materials.iter().filter(|material| !is_specular(&material.surface));
+    let most = scatterers.map(|material| f64::from(material.base_colour.max_element())).fold(0.0, f64::max);
+    (1.0 / (1.0 - most).max(1e-9)).min(f64::from(bounces))
+}
+
+/// Flights that one invocation may take: software devices count loops, others only time, of which so many take milliseconds.
+fn flights_of_an_invocation(limits: &Limits) -> u32 {
+    if limits.loop_iterations > LOOP_LIMIT { MAX_BOUNCES } else { limits.loop_iterations / LOOPS_PER_FLIGHT }
 }
 
 /// Radius, normalised, in which so many photons from lamps leave [`PHOTONS_PER_ESTIMATE`] on average: each lands about twice.

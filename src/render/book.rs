@@ -7,7 +7,7 @@ use super::stop::{End, Watch};
 use super::{Control, Progress};
 use crate::error::{Error, Result};
 use crate::film::{Film, irradiance_weights};
-use crate::ledger::Fates;
+use crate::ledger::{Fates, Losses};
 use crate::plan::Plan;
 use crate::records::Tally;
 use crate::scene::room::RoomScene;
@@ -16,6 +16,8 @@ pub(super) struct Book<'a, 'c> {
     control: &'a mut Control<'c>,
     watch: Watch,
     photons_per_round: u32,
+    /// Of all lights.
+    watts: f64,
     most_rounds: u32,
     /// What tells errors of irradiance; made at the first look.
     weights: Option<Vec<f64>>,
@@ -37,6 +39,7 @@ impl<'a, 'c> Book<'a, 'c> {
             // The paper's radius never shrinks.
             watch: Watch::new(plan.settings.stop, 1.0, started),
             photons_per_round: plan.settings.photons,
+            watts: plan.settings.light_power.iter().sum(),
             most_rounds: plan.settings.rounds,
             weights: None,
             emitted: 0,
@@ -67,9 +70,14 @@ impl<'a, 'c> Book<'a, 'c> {
         self.is_whole() && self.watch.is_due(self.rounds)
     }
 
+    /// Light that the cap on bounces kept from the result so far.
+    pub(super) fn losses(&self) -> Losses {
+        Losses::of_room(&self.fates, self.watts)
+    }
+
     pub(super) fn look(&mut self, film: &Film, scene: &RoomScene, plan: &Plan) {
         let weights = self.weights.get_or_insert_with(|| irradiance_weights(scene, plan));
-        self.watch.look(film.rounds, film.relative_error(weights));
+        self.watch.look(film.rounds, film.relative_error(weights), Losses::of_room(&self.fates, self.watts).relative);
     }
 
     /// Books the fates of all photons handed out, and says whether to stop.

@@ -20,7 +20,7 @@ pub use on_gpu::{constants, limits, on_gpu, photons_on_gpu, replay_on_gpu};
 use crate::bias::Bias;
 use crate::film::Film;
 use crate::gpu::DeviceFacts;
-use crate::ledger::{Fates, Ledger};
+use crate::ledger::{Fates, Ledger, Losses};
 use crate::oddities::Oddities;
 use crate::path::Path;
 use crate::photon::Photon;
@@ -68,6 +68,8 @@ pub struct Outcome {
     pub cancelled: bool,
     /// What the radius adds to the error; `None` where nobody measured it.
     pub bias: Option<Bias>,
+    /// Light that limits kept from the result.
+    pub losses: Losses,
     pub dispatches: u64,
     pub submissions: u64,
     /// What `--paranoid` found; `None` where nobody looked.

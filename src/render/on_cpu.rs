@@ -77,6 +77,7 @@ pub fn on_cpu(scene: &RoomScene, settings: &Settings, control: &mut Control) -> 
     Ok(Outcome {
         oddities: settings.paranoid.then_some(oddities),
         film,
+        losses: book.losses(),
         fates: book.fates,
         end,
         cancelled: end == End::Cancelled,

@@ -67,6 +67,7 @@ pub fn on_gpu(gpu: &Gpu, scene: &RoomScene, settings: &Settings, control: &mut C
     Ok(Outcome {
         oddities,
         film,
+        losses: book.losses(),
         fates: book.fates,
         end,
         cancelled: end == End::Cancelled,

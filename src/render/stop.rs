@@ -7,8 +7,9 @@ use serde::Serialize;
 use statrs::distribution::{ContinuousCDF, StudentsT};
 
 use super::Progress;
+use crate::error::{Error, Result};
 use crate::ledger::Ledger;
-use crate::settings::stop::Stop;
+use crate::settings::stop::{Stop, squared_radius};
 
 /// Why a run ended.
 #[derive(Debug, Clone, Copy, PartialEq, Eq, Serialize)]
@@ -34,12 +35,14 @@ pub struct Watch {
     next_look: u32,
     /// At the latest look: rounds, and the bound of the noise.
     noise: Option<(u32, f64)>,
+    /// What limits have kept from the result, relative to it.
+    lost: f64,
 }
 
 impl Watch {
     /// Of a run that began at `started`.
     pub fn new(stop: Stop, alpha: f64, started: Instant) -> Watch {
-        Watch { stop, alpha, started, next_look: FIRST_LOOK, noise: None }
+        Watch { stop, alpha, started, next_look: FIRST_LOOK, noise: None, lost: 0.0 }
     }
 
     /// Whether the film should be read after so many rounds.
@@ -52,15 +55,31 @@ impl Watch {
         (self.stop.error.is_some() && self.is_due(rounds)) || self.has_photons(photons)
     }
 
-    /// Takes the relative standard error of a film of so many rounds.
-    pub fn look(&mut self, rounds: u32, relative_error: f64) {
+    /// When the run's time is up.
+    pub fn deadline(&self) -> Option<Instant> {
+        self.stop.seconds.map(|seconds| self.started + Duration::from_secs_f64(seconds))
+    }
+
+    /// Takes the relative standard error of a film of so many rounds, and what limits kept from it, relative to it too.
+    pub fn look(&mut self, rounds: u32, relative_error: f64, lost: f64) {
+        self.lost = lost;
         self.noise = Some((rounds, error_bound(rounds, relative_error, self.stop.confidence)));
         self.next_look = rounds + (rounds / 4).max(1);
     }
 
     /// Noise and bias together at the latest look.
     fn error(&self) -> Option<(u32, f64)> {
-        self.noise.map(|(rounds, noise)| (rounds, noise.hypot(self.bias(rounds))))
+        self.noise.map(|(rounds, noise)| (rounds, noise.hypot(self.bias(rounds) + self.lost)))
+    }
+
+    /// Refuses an error that cannot be reached, as limits alone keep more light from the result.
+    pub fn check_losses(&self, bounces: u32) -> Result<()> {
+        let Some(wanted) = self.stop.error.filter(|wanted| self.lost > *wanted) else { return Ok(()) };
+        let allowed = format!(
+            "cannot be reached, as what photons cut off after {bounces} bounces would bring may be {:.2} % of the result; allow more --bounces",
+            100.0 * self.lost
+        );
+        Err(Error::setting("--error", format!("{}%", 100.0 * wanted), allowed))
     }
 
     fn bias(&self, rounds: u32) -> f64 {
@@ -113,7 +132,7 @@ impl Watch {
     /// rounds^(alpha - 1).
     fn rounds_wanted(&self, wanted: f64, (rounds, noise): (u32, f64), most: f64) -> f64 {
         let (at, bias) = (f64::from(rounds), self.bias(rounds));
-        let error = |rounds: f64| (noise * (at / rounds).sqrt()).hypot(bias * (at / rounds).powf(1.0 - self.alpha));
+        let error = |rounds: f64| (noise * (at / rounds).sqrt()).hypot(bias * (at / rounds).powf(1.0 - self.alpha) + self.lost);
         let (mut less, mut more) = (at.min(most), most);
         if error(less) <= wanted {
             return less;
@@ -130,15 +149,10 @@ impl Watch {
 /// Mean over rounds of the squared radius, relative to the first one's: r_(i+1)^2 = r_i^2 (i + alpha) / (i + 1)
 /// (Knaus and Zwicker 2011).
 pub fn mean_squared_radius(alpha: f64, rounds: u32) -> f64 {
-    if alpha == 1.0 {
-        return 1.0;
-    }
-    let (mut squared, mut sum) = (1.0, 0.0);
-    for i in 1..=rounds.max(1) {
-        sum += squared;
-        squared *= (f64::from(i) + alpha) / (f64::from(i) + 1.0);
-    }
-    sum / f64::from(rounds.max(1))
+    // Terms Gamma(k + alpha) / Gamma(k + 1), k from 1, have the sum (Gamma(n + 1 + alpha) / n! - Gamma(1 + alpha)) / alpha.
+    let rounds = rounds.max(1);
+    let next = squared_radius(alpha, rounds) * (f64::from(rounds) + 1.0);
+    (next - 1.0) / (alpha * f64::from(rounds))
 }
 
 /// The relative error that the mean of so many rounds has not more of, with this confidence: Student's quantile times

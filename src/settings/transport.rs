@@ -5,6 +5,7 @@ use serde::Serialize;
 pub use super::stop::Stop;
 use super::{Math, within};
 use crate::constants;
+use crate::constants::MAX_BOUNCES;
 use crate::error::{Error, Result};
 
 /// Where direct light and caustics come from.
@@ -190,7 +191,7 @@ pub struct TransportSettings {
     pub caustic_photons: u32,
     /// Independent passes, of which the result is the mean.
     pub rounds: u32,
-    /// Most bounces of a photon.
+    /// Bounces after which a photon is cut off; by default roulette ends it long before.
     pub bounces: u32,
     pub seed: u64,
     /// Radius of the first pass's density estimate, metres; `None`: by the scene's area and the
@@ -233,7 +234,7 @@ impl Default for TransportSettings {
             photons: 1 << 17,
             caustic_photons: 1 << 17,
             rounds: 16,
-            bounces: 32,
+            bounces: MAX_BOUNCES,
             seed: 1,
             radius: None,
             caustic_radius: None,
@@ -262,8 +263,6 @@ impl Default for TransportSettings {
 /// Photons of a pass: their numbers are 32-bit.
 const MAX_PHOTONS: u32 = 1 << 31;
 pub const MAX_ROUNDS: u32 = 1 << 20;
-/// Random-number blocks of a bounce are numbered in 32 bits, and each is a dispatch.
-const MAX_BOUNCES: u32 = 10_000;
 /// A visible point's rays are one loop.
 const MAX_SHADOW_RAYS: u32 = 64;
 /// A pixel's paths are summed by one invocation.

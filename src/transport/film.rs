@@ -44,6 +44,12 @@ impl RoundFilm {
         }))
     }
 
+    /// Of all pixels and channels.
+    pub fn root_mean_square(&self, plan: &TransportPlan) -> f64 {
+        let squares: f64 = (0..self.pixels()).map(|pixel| self.mean(pixel, plan).length_squared()).sum();
+        (squares / (3 * self.pixels()).max(1) as f64).sqrt()
+    }
+
     /// Root mean square over pixels and channels of standard error and of the mean.
     pub fn relative_error(&self, plan: &TransportPlan) -> f64 {
         let (mut errors, mut means) = (0.0, 0.0);

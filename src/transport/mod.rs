@@ -14,6 +14,7 @@
 
 pub mod bias;
 pub mod film;
+pub mod losses;
 pub mod photons;
 pub mod points;
 pub mod replay;
@@ -23,19 +24,20 @@ pub mod stop;
 use std::sync::atomic::Ordering;
 use std::time::{Duration, Instant};
 
+pub use crate::ledger::Losses;
 pub use film::RoundFilm;
 use resources::{PhotonBuffers, TransportResources};
 
 use crate::bias::Bias;
-use crate::constants::PART_COUNT;
+use crate::constants::{PART_COUNT, TALLY_COPIES};
 use crate::error::{Error, Result};
 use crate::gpu::check::strict_math;
 use crate::gpu::kernels::*;
-use crate::gpu::{Commands, Constants, DeviceFacts, Gpu, Kernel, Module};
-use crate::ledger::Fates;
+use crate::gpu::{Commands, Constants, DeviceFacts, Gpu, Interrupt, Kernel, Module};
+use crate::ledger::{Fates, Ledger};
 use crate::oddities::Oddities;
 use crate::plan::transport::{MapPlan, Sensor, TransportPlan};
-use crate::records::Receiver;
+use crate::records::{Receiver, Tally};
 use crate::render::Control;
 pub use crate::render::stop::End;
 use crate::render::stop::Watch;
@@ -43,8 +45,8 @@ use crate::scene::Camera;
 use crate::scene::geometry::Geometry;
 use crate::settings::Math;
 use crate::settings::transport::Append;
-use crate::tallies;
 use crate::timings::{Clock, Span, Timings};
+use crate::{tallies, totals};
 
 /// What is lit and what looks at it.
 pub struct View<'a> {
@@ -81,9 +83,11 @@ pub struct Lit {
     pub dispatches: u64,
     pub submissions: u64,
     pub pipelines: usize,
-    /// Values that were no number, values cut to the film's largest, and estimates on a mesh too dense for the
+    /// Values that were no number, values clamped to the film's largest, and estimates on a mesh too dense for the
     /// area within the radius to be found.
     pub anomalies: [u32; 3],
+    /// Light that limits kept from the result.
+    pub losses: Losses,
     /// What `--paranoid` found; `None` where nobody looked.
     pub oddities: Option<Oddities>,
 }
@@ -95,9 +99,12 @@ pub fn modules(plan: &TransportPlan, facts: &DeviceFacts) -> Vec<Module> {
         Sensor::Picture { .. } => crate::gpu::kernels::View::MODULE,
         Sensor::Receivers { .. } => Receive::MODULE,
     });
+    if plan.chains_go_on() {
+        modules.push(GoOn::MODULE);
+    }
     if plan.maps().next().is_some() {
         modules.extend([MapCount::MODULE, MapScatter::MODULE, ScanBlocks::MODULE, ScanAdd::MODULE]);
-        modules.extend([DispatchSize::MODULE, CrowdSize::MODULE, Weigh::MODULE]);
+        modules.extend([DispatchSize::MODULE, MapSize::MODULE, CrowdSize::MODULE, Weigh::MODULE]);
         modules.extend(match plan.settings.append {
             Append::Atomic => vec![Shine::MODULE, FlyAtomic::MODULE],
             Append::Ballot => vec![Shine::MODULE, FlyBallot::MODULE],
@@ -116,7 +123,7 @@ pub fn constants(plan: &TransportPlan) -> Constants {
 /// Timestamps that a round may need.
 const TIMESTAMPS_PER_ROUND: u32 = 64;
 
-/// Runs all rounds of a plan; progress is told in rounds.
+/// Runs all rounds of a plan; progress is reported in rounds.
 pub fn light(gpu: &Gpu, view: &View, plan: TransportPlan, control: &mut Control) -> Result<Lit> {
     let started = Instant::now();
     if plan.settings.math == Math::Strict {
@@ -132,42 +139,59 @@ pub fn light(gpu: &Gpu, view: &View, plan: TransportPlan, control: &mut Control)
     commands.warm_up()?;
     commands.submit()?;
 
-    let mut fates = [Fates::new(plan.settings.bounces), Fates::new(plan.settings.bounces)];
+    let mut book = Book::new(&plan);
     let mut watch = Watch::new(plan.settings.stop, plan.settings.alpha, commands.started());
-    let (mut done, mut settled, mut end) = (0, 0, End::Rounds);
-    let mut submissions_settled = commands.submission_count();
+    let (mut done, mut end) = (0, None);
     let photons_per_round = plan.maps().map(|map| u64::from(map.photons)).sum::<u64>();
-    for number in 0..plan.settings.rounds {
-        commands.scope("round", |commands| {
-            one_round(commands, view, Round { resources: &resources, geometry: view.geometry, plan: &plan, number })
-        })?;
-        done = number + 1;
-        let last = done == plan.settings.rounds;
-        // Tallies are 32-bit on the device.
-        let open = u64::from(done - settled + 1) * plan.maps().map(|map| u64::from(map.photons)).max().unwrap_or(0);
-        let short = commands.timestamps_left() < TIMESTAMPS_PER_ROUND || open > u64::from(u32::MAX);
-        let photons = u64::from(done) * photons_per_round;
-        // A long round hands commands over by itself, and nobody has looked at the clock since.
-        let submitted = commands.submission_count() > submissions_settled;
-        let busy = submitted || commands.work() * 2 >= plan.work_per_submission;
-        if last || short || busy || watch.is_due(done) || watch.may_end(done, photons) {
-            settle(&mut commands, &resources, &plan, u64::from(done - settled), &mut fates)?;
-            settled = done;
-            if watch.is_due(done) {
-                watch.look(done, film(&mut commands, &resources, &plan, done)?.relative_error(&plan));
-            }
-            submissions_settled = commands.submission_count();
-            let ledger = fates[0].ledger().plus(&fates[1].ledger());
-            (control.progress)(&watch.progress(f64::from(done), plan.settings.rounds, photons_per_round, ledger));
-            let cancelled = control.cancelled.load(Ordering::Relaxed).then_some(End::Cancelled);
-            let reason = if last { watch.has_photons(photons).then_some(End::Photons) } else { watch.end(done, photons).or(cancelled) };
-            if let Some(reason) = reason {
-                end = reason;
+    while end.is_none() {
+        let number = done;
+        // There must be a first round: when the time is up in it, it ends with the photons that it has by then.
+        let deadline = watch.deadline();
+        commands.set_interrupt(Some(Interrupt { cancelled: control.cancelled, deadline: deadline.filter(|_| number > 0) }));
+        let round = Round { resources: &resources, geometry: view.geometry, plan: &plan, number };
+        let traced = match commands.scope("round", |commands| one_round(commands, view, round, deadline.filter(|_| number == 0), &mut book))
+        {
+            Ok(traced) => traced,
+            Err(Error::Interrupted) => {
+                commands.set_interrupt(None);
+                if number == 0 {
+                    return Err(Error::Interrupted);
+                }
+                // A round cut short is no part of the film.
+                book.settle(&mut commands, &resources, &plan, true)?;
+                end = Some(if control.cancelled.load(Ordering::Relaxed) { End::Cancelled } else { End::Time });
                 break;
             }
+            Err(error) => return Err(error),
+        };
+        commands.set_interrupt(None);
+        done = number + 1;
+        let last = done == plan.settings.rounds || traced < photons_per_round;
+        let short = commands.timestamps_left() < TIMESTAMPS_PER_ROUND || book.open() + photons_per_round > u64::from(u32::MAX);
+        let photons = u64::from(done) * photons_per_round;
+        // A long round hands commands over by itself, and nobody has looked at the clock since.
+        let submitted = commands.submission_count() > book.submissions;
+        let busy = submitted || commands.work() * 2 >= commands.paced(plan.work_per_submission);
+        if last || short || busy || watch.is_due(done) || watch.may_end(done, photons) {
+            book.settle(&mut commands, &resources, &plan, false)?;
+            if watch.is_due(done) {
+                let film = film(&mut commands, &resources, &plan, done)?;
+                let losses = losses(&mut commands, &resources, view, &plan, &book, &film)?;
+                watch.look(done, film.relative_error(&plan), losses.relative);
+                watch.check_losses(plan.settings.bounces)?;
+            }
+            book.submissions = commands.submission_count();
+            (control.progress)(&watch.progress(f64::from(done), plan.settings.rounds, photons_per_round, book.ledger()));
+            let cancelled = control.cancelled.load(Ordering::Relaxed).then_some(End::Cancelled);
+            end = match (traced < photons_per_round, done == plan.settings.rounds) {
+                (true, _) => Some(End::Time),
+                (_, true) => Some(if watch.has_photons(photons) { End::Photons } else { End::Rounds }),
+                _ => watch.end(done, photons).or(cancelled),
+            };
         }
     }
     let film = film(&mut commands, &resources, &plan, done)?;
+    let losses = losses(&mut commands, &resources, view, &plan, &book, &film)?;
     let part_totals = commands.read::<u64>(&resources.part_totals, PART_COUNT as usize)?;
     let anomalies = commands.read::<u32>(&resources.anomalies, 3)?;
     let oddities = if plan.settings.paranoid { Some(Oddities::read(&mut commands, &resources.oddities)?) } else { None };
@@ -175,8 +199,8 @@ pub fn light(gpu: &Gpu, view: &View, plan: TransportPlan, control: &mut Control)
     Ok(Lit {
         film,
         part_totals,
-        fates,
-        end,
+        fates: book.fates,
+        end: end.unwrap_or(End::Rounds),
         bias: None,
         dispatches: commands.dispatch_count(),
         submissions: commands.submission_count(),
@@ -184,6 +208,7 @@ pub fn light(gpu: &Gpu, view: &View, plan: TransportPlan, control: &mut Control)
         timings: commands.finish("run"),
         device: gpu.facts().clone(),
         anomalies: [anomalies[0], anomalies[1], anomalies[2]],
+        losses,
         oddities,
         plan,
     })
@@ -196,58 +221,124 @@ fn film(commands: &mut Commands, resources: &TransportResources, plan: &Transpor
     Ok(RoundFilm::new(rounds, sums, squares))
 }
 
-fn one_round(commands: &mut Commands, view: &View, round: Round) -> Result<()> {
+/// Photons and their fates, as far as the host has looked.
+struct Book {
+    /// Of the global map's photons and of the caustic map's.
+    fates: [Fates; 2],
+    /// Photons traced since the last look, of each.
+    open: [u64; 2],
+    /// Submissions at the last look.
+    submissions: u64,
+}
+
+impl Book {
+    fn new(plan: &TransportPlan) -> Book {
+        Book { fates: [0, 1].map(|_| Fates::of_scene(plan.settings.bounces)), open: [0; 2], submissions: 0 }
+    }
+
+    /// Most photons of a map of which the host does not know the fates; the device counts them in 32 bits.
+    fn open(&self) -> u64 {
+        self.open[0].max(self.open[1])
+    }
+
+    fn ledger(&self) -> Ledger {
+        self.fates[0].ledger().plus(&self.fates[1].ledger())
+    }
+
+    /// Runs what is recorded and adds up the fates of its photons. Those of a run that was interrupted may still be under way.
+    fn settle(&mut self, commands: &mut Commands, resources: &TransportResources, plan: &TransportPlan, interrupted: bool) -> Result<()> {
+        let Some(photons) = &resources.photons else { return commands.submit() };
+        let copies = (plan.tally_rows() * TALLY_COPIES) as usize;
+        let mut read_backs = Vec::new();
+        for map in plan.maps() {
+            let which = usize::from(map.caustic_only);
+            let (tallies, totals) = (&photons.tallies[which], &photons.totals[which]);
+            read_backs.push((
+                which,
+                commands.copy_out::<Tally>(tallies, copies)?,
+                commands.copy_out::<u32>(totals, totals::WORDS as usize)?,
+            ));
+            tallies::clear(commands, tallies);
+            totals::clear(commands, totals);
+        }
+        commands.submit()?;
+        for (which, tallies, totals) in read_backs {
+            let fates = &mut self.fates[which];
+            fates.add(std::mem::take(&mut self.open[which]), &tallies::sums(&tallies.take()));
+            fates.add_totals(&totals::sum(&totals.take()));
+            if interrupted {
+                fates.interrupt();
+            }
+            let ledger = fates.ledger();
+            if !ledger.closes() || ledger.dropped != 0 {
+                return Err(Error::LedgerOpen { ledger });
+            }
+        }
+        Ok(())
+    }
+}
+
+/// Light that limits have kept from the film so far.
+fn losses(
+    commands: &mut Commands,
+    resources: &TransportResources,
+    view: &View,
+    plan: &TransportPlan,
+    book: &Book,
+    film: &RoundFilm,
+) -> Result<Losses> {
+    let anomalies = commands.read::<u32>(&resources.anomalies, losses::ANOMALY_WORDS)?;
+    let part_totals = commands.read::<u64>(&resources.part_totals, PART_COUNT as usize)?;
+    Ok(losses::losses(view.geometry, plan, &book.fates, &anomalies, &part_totals, film))
+}
+
+/// Photons of the first chunk of a round in which the time may be up, and how long a chunk may take that the next one doubles.
+const FIRST_TIMED_CHUNK: u32 = 1 << 12;
+const TIMED_CHUNK: Duration = Duration::from_millis(40);
+
+/// One round; says how many photons it traced. When its time is up, it takes no further chunk of photons.
+fn one_round(commands: &mut Commands, view: &View, round: Round, deadline: Option<Instant>, book: &mut Book) -> Result<u64> {
     let Round { resources, plan, .. } = round;
     commands.scope("see", |commands| points::see(commands, round, view.camera))?;
     let sums = 3 * u64::from(plan.visible_points()) * u64::from(plan.arrival_sets);
+    let mut traced = [0u32; 2];
     if let Some(photons) = &resources.photons {
         commands.fill(&resources.estimates, 0, 2 * sums, 0);
         for map in plan.maps() {
-            commands.scope(map.name, |commands| one_map(commands, round, photons, map))?;
+            let which = usize::from(map.caustic_only);
+            commands.scope(map.name, |commands| {
+                // Where the time may be up, chunks grow only as long as they take little of it.
+                let mut most = if deadline.is_some() { FIRST_TIMED_CHUNK } else { map.chunk_photons };
+                while traced[which] < map.photons {
+                    let began = Instant::now();
+                    if traced[which] > 0 && deadline.is_some_and(|deadline| began >= deadline) {
+                        break;
+                    }
+                    let count = most.min(map.chunk_photons).min(map.photons - traced[which]);
+                    book.open[which] += u64::from(count);
+                    one_chunk(commands, round, photons, map, (traced[which], count))?;
+                    traced[which] += count;
+                    if deadline.is_some() {
+                        commands.submit()?;
+                        most = if began.elapsed() < TIMED_CHUNK { most.saturating_mul(2) } else { most };
+                    }
+                }
+                Ok(())
+            })?;
         }
-        commands.scope("weigh", |commands| points::weigh(commands, round))?;
+        commands.scope("weigh", |commands| points::weigh(commands, round, traced))?;
     }
-    commands.scope("resolve", |commands| points::resolve(commands, round))
+    commands.scope("resolve", |commands| points::resolve(commands, round))?;
+    Ok(traced.iter().map(|count| u64::from(*count)).sum())
 }
 
-/// Work of one flight of a photon, in the plan's units.
-const WORK_PER_PHOTON: u64 = 256;
-
-fn one_map(commands: &mut Commands, round: Round, photons: &PhotonBuffers, map: &MapPlan) -> Result<()> {
-    for chunk in map.chunks() {
-        if commands.timestamps_left() < TIMESTAMPS_PER_ROUND || commands.work() >= round.plan.work_per_submission {
-            commands.submit()?;
-        }
-        let cells = photons::cells(round, map);
-        commands.scope("trace", |commands| photons::trace(commands, round, photons, map, chunk))?;
-        commands.add_work(WORK_PER_PHOTON * u64::from(chunk.1));
-        commands.scope("index", |commands| photons::index(commands, photons, round.plan, &cells))?;
-        commands.scope("look up", |commands| points::look_up(commands, round, photons, map, cells))?;
-    }
-    Ok(())
-}
-
-/// Runs what is recorded and books the fates of its photons.
-fn settle(
-    commands: &mut Commands,
-    resources: &TransportResources,
-    plan: &TransportPlan,
-    rounds: u64,
-    fates: &mut [Fates; 2],
-) -> Result<()> {
-    for map in plan.maps() {
-        let which = usize::from(map.caustic_only);
-        let tallies = &resources.photons.as_ref().expect("a map has photons").tallies[which];
-        let counts = tallies::read(commands, tallies, plan.settings.bounces)?;
-        tallies::clear(commands, tallies);
-        fates[which].add(rounds * u64::from(map.photons), &counts);
-        let ledger = fates[which].ledger();
-        if !ledger.closes() || ledger.dropped != 0 {
-            return Err(Error::LedgerOpen { ledger });
-        }
-    }
-    if plan.maps().next().is_none() {
+fn one_chunk(commands: &mut Commands, round: Round, photons: &PhotonBuffers, map: &MapPlan, chunk: (u32, u32)) -> Result<()> {
+    if commands.timestamps_left() < TIMESTAMPS_PER_ROUND || commands.work() >= commands.paced(round.plan.work_per_submission) {
         commands.submit()?;
     }
-    Ok(())
+    let cells = photons::cells(round, map);
+    photons::trace(commands, round, photons, map, chunk, &mut |commands| {
+        commands.scope("index", |commands| photons::index(commands, round, photons, map, &cells))?;
+        commands.scope("look up", |commands| points::look_up(commands, round, photons, map, cells))
+    })
 }

@@ -4,9 +4,9 @@ use super::Round;
 use super::resources::{PhotonBuffers, TransportResources};
 use crate::constants::MAX_GROUPS;
 use crate::error::Result;
-use crate::gpu::kernels::{DispatchSize, FlyAtomic, FlyBallot, FlyWhole, MapCount, MapScatter, Shine};
+use crate::gpu::kernels::{DispatchSize, FlyAtomic, FlyBallot, FlyWhole, MapCount, MapScatter, MapSize, Shine};
 use crate::gpu::{Commands, Extent};
-use crate::plan::transport::{MapPlan, TransportPlan};
+use crate::plan::transport::{MapPlan, SEGMENT_BOUNCES, TransportPlan};
 use crate::prefix_sum::scan;
 use crate::records::{CellPush, DispatchSizePush, Draws, EmissionPush, FlightPush, FlyWholePush, PhotonEmission, PhotonStore};
 use crate::rng::words;
@@ -26,27 +26,96 @@ pub fn cells(round: Round, map: &MapPlan) -> CellPush {
 
 /// Timestamps that must be left for the scopes that are open and for a bounce.
 const TIMESTAMP_RESERVE: u32 = 32;
+/// Work of one flight of a photon, in the plan's units.
+const WORK_PER_PHOTON: u64 = 256;
 
-/// Traces the photons (first, count) of a chunk into the map and adds their fates to its tallies.
-pub fn trace(commands: &mut Commands, round: Round, photons: &PhotonBuffers, map: &MapPlan, chunk: (u32, u32)) -> Result<()> {
-    if round.plan.settings.append == Append::Persistent {
-        return whole(commands, round, photons, map, chunk);
+/// Photons that a segment begins with.
+#[derive(Debug, Clone, Copy)]
+enum Start {
+    /// Photons (first, count) of the round, at their lights.
+    Lights((u32, u32)),
+    /// So many in the list of this parity, with so many bounces behind them.
+    List { count: u32, parity: usize, first_bounce: u32 },
+}
+
+/// Traces the photons (first, count) of a chunk to their end and adds their fates to the map's tallies. They go in segments of
+/// bounces where more would not fit one dispatch or one map; survivors go on in the next. `gather` is called with the photons in
+/// the map: at the end, and before a segment for which the map might have no room.
+pub fn trace(
+    commands: &mut Commands,
+    round: Round,
+    photons: &PhotonBuffers,
+    map: &MapPlan,
+    chunk: (u32, u32),
+    gather: &mut dyn FnMut(&mut Commands) -> Result<()>,
+) -> Result<()> {
+    commands.fill(&photons.counters, 0, counter_count(map), 0);
+    let mut start = Start::Lights(chunk);
+    let mut first_bounce = 0;
+    loop {
+        let flights = map.segment_bounces.min(map.bounces - first_bounce);
+        let parity = commands.scope("trace", |commands| segment(commands, round, photons, map, start, flights))?;
+        first_bounce += flights;
+        if first_bounce == map.bounces {
+            return gather(commands);
+        }
+        let counters = commands.read::<u32>(&photons.counters, counter_count(map) as usize)?;
+        let left = counters[if is_persistent(round.plan) { 1 } else { 1 + flights as usize }];
+        let stored = counters[0];
+        if left == 0 {
+            return if stored > 0 { gather(commands) } else { Ok(()) };
+        }
+        let landings = u64::from(map.capacity / map.chunk_photons);
+        let is_full = u64::from(stored) + u64::from(left) * landings > u64::from(map.capacity);
+        if is_full {
+            gather(commands)?;
+        }
+        commands.fill(&photons.counters, 0, counter_count(map), 0);
+        if !is_full {
+            commands.fill(&photons.counters, 0, 1, stored);
+        }
+        start = Start::List { count: left, parity, first_bounce };
     }
-    emit(commands, round, photons, map, chunk)?;
-    for bounce in 0..map.bounces {
+}
+
+fn is_persistent(plan: &TransportPlan) -> bool {
+    plan.settings.append == Append::Persistent
+}
+
+/// Words of the counters: length of the map, then of the lists of a segment.
+pub fn counter_count(map: &MapPlan) -> u64 {
+    2 + u64::from(map.segment_bounces.min(SEGMENT_BOUNCES))
+}
+
+/// So many flights of each photon; says where those are that are left.
+fn segment(commands: &mut Commands, round: Round, photons: &PhotonBuffers, map: &MapPlan, start: Start, flights: u32) -> Result<usize> {
+    if is_persistent(round.plan) {
+        return whole(commands, round, photons, map, start, flights);
+    }
+    let (count, mut parity, first_bounce) = match start {
+        Start::Lights(chunk) => {
+            emit(commands, round, photons, map, chunk)?;
+            (chunk.1, 0, 0)
+        }
+        Start::List { count, parity, first_bounce } => (count, parity, first_bounce),
+    };
+    commands.fill(&photons.counters, 1, 1, count);
+    for list in 0..flights {
         if commands.timestamps_left() < TIMESTAMP_RESERVE {
             commands.submit()?;
         }
-        // Every photon enters bounce 0; after that only the device knows how many paths are left.
-        let extent = if bounce == 0 {
-            Extent::Items(u64::from(chunk.1))
+        // After the first flight only the device knows how many paths are left.
+        let extent = if list == 0 {
+            Extent::Items(u64::from(count))
         } else {
-            dispatch_size(commands, photons, round.plan, 1 + bounce, map.chunk_photons)?;
+            dispatch_size(commands, photons, round.plan, 1 + list, map.chunk_photons)?;
             Extent::Indirect(&photons.dispatch_args)
         };
-        fly(commands, round, photons, map, bounce, extent)?;
+        fly(commands, round, photons, map, Flight { bounce: first_bounce + list, list, parity }, extent)?;
+        parity = 1 - parity;
     }
-    Ok(())
+    commands.add_work(WORK_PER_PHOTON * u64::from(count));
+    Ok(parity)
 }
 
 fn draws(round: Round, map: &MapPlan) -> Draws {
@@ -73,25 +142,29 @@ fn store(plan: &TransportPlan, map: &MapPlan) -> PhotonStore {
     }
 }
 
-/// Traces every photon from the lights to its end.
-fn whole(commands: &mut Commands, round: Round, photons: &PhotonBuffers, map: &MapPlan, chunk: (u32, u32)) -> Result<()> {
+/// So many flights of each photon, which keeps its invocation; says where those are that are left.
+fn whole(commands: &mut Commands, round: Round, photons: &PhotonBuffers, map: &MapPlan, start: Start, flights: u32) -> Result<usize> {
     let Round { resources, geometry, plan, .. } = round;
     let TransportResources { nodes, triangles, normals, uvs, materials, textures, texels, emitters, caustic_targets, oddities, .. } =
         resources;
-    commands.fill(&photons.counters, 0, 1, 0);
-    let tallies = &photons.tallies[usize::from(map.caustic_only)];
-    let (first_photon, end) = (chunk.0, chunk.0 + chunk.1);
-    let most = plan.photons_per_dispatch();
-    for first in (first_photon..end).step_by(most as usize) {
-        let count = most.min(end - first);
+    let PhotonBuffers { paths, counters, map: map_buffer, .. } = photons;
+    let which = usize::from(map.caustic_only);
+    let (tallies, totals) = (&photons.tallies[which], &photons.totals[which]);
+    let (mut first, end, parity, first_bounce) = match start {
+        Start::Lights((first, count)) => (first, first + count, 0, 0),
+        Start::List { count, parity, first_bounce } => (0, count, parity, first_bounce),
+    };
+    while first < end {
+        let count = photons_at_once(commands, plan).min(end - first);
         let push = FlyWholePush {
             draws: draws(round, map),
             emission: emission(geometry, map, (first, count)),
             map: store(plan, map),
             bounces: map.bounces,
+            first_bounce,
+            flights,
             stride: map.persistence.invocations(count),
         };
-        let PhotonBuffers { counters, map, .. } = photons;
         let kernel = FlyWhole {
             nodes,
             triangles,
@@ -102,38 +175,62 @@ fn whole(commands: &mut Commands, round: Round, photons: &PhotonBuffers, map: &M
             texels,
             emitters,
             caustic_targets,
-            map,
+            light_paths: &paths[parity],
+            next_light_paths: &paths[1 - parity],
+            map: map_buffer,
             counters,
             tallies,
+            totals,
             oddities,
         };
         commands.dispatch(kernel, &push, Extent::Items(u64::from(push.stride)))?;
+        commands.add_work(WORK_PER_PHOTON * u64::from(count));
+        first += count;
+        if first < end && commands.work() >= commands.paced(plan.work_per_submission) {
+            commands.submit()?;
+        }
     }
-    Ok(())
+    Ok(1 - parity)
 }
+
+/// Photons of one dispatch.
+fn photons_at_once(commands: &Commands, plan: &TransportPlan) -> u32 {
+    let paced = commands.paced(u64::from(plan.photons_per_dispatch()));
+    (paced as u32).max(LEAST_PHOTONS).min(plan.photons_per_dispatch())
+}
+
+/// Fewer photons in a dispatch would leave a device idle.
+const LEAST_PHOTONS: u32 = 1 << 12;
 
 /// Writes the paths of a chunk as they leave the lights.
 pub fn emit(commands: &mut Commands, round: Round, photons: &PhotonBuffers, map: &MapPlan, chunk: (u32, u32)) -> Result<()> {
     let Round { resources, geometry, .. } = round;
-    let photon_count = chunk.1;
     let TransportResources { nodes, triangles, normals, uvs, materials, textures, texels, emitters, caustic_targets, oddities, .. } =
         resources;
-    let PhotonBuffers { paths: [light_paths, _], counters, .. } = photons;
-    commands.fill(counters, 0, u64::from(map.bounces) + 2, 0);
-    commands.fill(counters, 1, 1, photon_count);
+    let light_paths = &photons.paths[0];
     let push = EmissionPush { draws: draws(round, map), emission: emission(geometry, map, chunk) };
     let kernel = Shine { nodes, triangles, normals, uvs, materials, textures, texels, emitters, caustic_targets, light_paths, oddities };
-    commands.dispatch(kernel, &push, Extent::Items(u64::from(photon_count)))
+    commands.dispatch(kernel, &push, Extent::Items(u64::from(chunk.1)))
 }
 
-/// One flight of every path that is left.
-pub fn fly(commands: &mut Commands, round: Round, photons: &PhotonBuffers, map: &MapPlan, bounce: u32, extent: Extent) -> Result<()> {
+/// One flight of the paths in list `list` of a segment, which the buffer of this parity holds.
+#[derive(Debug, Clone, Copy)]
+pub struct Flight {
+    pub bounce: u32,
+    pub list: u32,
+    pub parity: usize,
+}
+
+pub fn fly(commands: &mut Commands, round: Round, photons: &PhotonBuffers, map: &MapPlan, flight: Flight, extent: Extent) -> Result<()> {
     let Round { resources, plan, .. } = round;
     let TransportResources { nodes, triangles, normals, uvs, materials, textures, texels, oddities, .. } = resources;
-    let push = FlightPush { draws: draws(round, map), map: store(plan, map), bounce, path_capacity: map.chunk_photons };
-    let tallies = &photons.tallies[usize::from(map.caustic_only)];
-    let PhotonBuffers { paths: [even, odd], counters, map, .. } = photons;
-    let (light_paths, next_light_paths) = if bounce.is_multiple_of(2) { (even, odd) } else { (odd, even) };
+    let Flight { bounce, list, parity } = flight;
+    let is_last = u32::from(bounce + 1 == map.bounces);
+    let push = FlightPush { draws: draws(round, map), map: store(plan, map), bounce, list, is_last, path_capacity: map.chunk_photons };
+    let which = usize::from(map.caustic_only);
+    let (tallies, totals) = (&photons.tallies[which], &photons.totals[which]);
+    let PhotonBuffers { paths, counters, map, .. } = photons;
+    let (light_paths, next_light_paths) = (&paths[parity], &paths[1 - parity]);
     match plan.settings.append {
         Append::Atomic => commands.dispatch(
             FlyAtomic {
@@ -149,6 +246,7 @@ pub fn fly(commands: &mut Commands, round: Round, photons: &PhotonBuffers, map: 
                 map,
                 counters,
                 tallies,
+                totals,
                 oddities,
             },
             &push,
@@ -169,6 +267,7 @@ pub fn fly(commands: &mut Commands, round: Round, photons: &PhotonBuffers, map: 
                 map,
                 counters,
                 tallies,
+                totals,
                 oddities,
             },
             &push,
@@ -184,12 +283,20 @@ fn dispatch_size(commands: &mut Commands, photons: &PhotonBuffers, plan: &Transp
 }
 
 /// Sorts the map by the buckets of its cells.
-pub fn index(commands: &mut Commands, photons: &PhotonBuffers, plan: &TransportPlan, cells_push: &CellPush) -> Result<()> {
+pub fn index(commands: &mut Commands, round: Round, photons: &PhotonBuffers, map_plan: &MapPlan, cells_push: &CellPush) -> Result<()> {
+    let plan = round.plan;
+    let totals = &photons.totals[usize::from(map_plan.caustic_only)];
     let PhotonBuffers { map, sorted_map, counters, cells, ranks, block_sums, dispatch_args, .. } = photons;
     let buckets = cells_push.bucket_mask + 1;
     commands.scope("count", |commands| {
         commands.fill(cells, 0, u64::from(buckets) + 1, 0);
-        dispatch_size(commands, photons, plan, 0, cells_push.photon_capacity)?;
+        let push = DispatchSizePush {
+            counter: 0,
+            capacity: cells_push.photon_capacity,
+            items_per_group: plan.settings.group_size,
+            max_groups: MAX_GROUPS,
+        };
+        commands.dispatch(MapSize { counters, dispatch_args, totals }, &push, Extent::Groups(1, 1))?;
         commands.dispatch(MapCount { map, counters, cells, ranks }, cells_push, Extent::Indirect(dispatch_args))
     })?;
     commands.scope("scan", |commands| scan(commands, cells, block_sums, buckets + 1, plan.settings.group_size))?;

@@ -5,12 +5,13 @@ use super::Round;
 use super::resources::{PhotonBuffers, TransportResources};
 use crate::constants::{DOMAIN_CAMERA, DOMAIN_RECEIVERS, MAX_GROUPS};
 use crate::error::Result;
-use crate::gpu::kernels::{CrowdSize, LookupTwoWords, LookupU64, Receive, Resolve, View, Weigh};
+use crate::gpu::kernels::{CrowdSize, GoOn, LookupTwoWords, LookupU64, Receive, Resolve, View, Weigh};
 use crate::gpu::{Commands, Extent};
 use crate::plan::transport::{MapPlan, Sensor, TESTS_PER_POINT, TransportPlan};
-use crate::records::{CellPush, CrowdSizePush, Draws, LookupPush, ReceivePush, ResolvePush, ViewPush, WeighPush};
+use crate::records::{CellPush, CrowdSizePush, Draws, GoOnPush, LookupPush, ReceivePush, ResolvePush, ViewPush, WeighPush};
 use crate::rng::words;
 use crate::scene::Camera;
+use crate::scene::geometry::Geometry;
 
 /// Runs of `count` items, `step` long.
 fn runs(count: u32, step: u32) -> impl Iterator<Item = (u32, u32)> {
@@ -20,7 +21,7 @@ fn runs(count: u32, step: u32) -> impl Iterator<Item = (u32, u32)> {
 /// Hands the commands over once they amount to a submission.
 fn add_work(commands: &mut Commands, plan: &TransportPlan, work: u64) -> Result<()> {
     commands.add_work(work);
-    if commands.work() >= plan.work_per_submission { commands.submit() } else { Ok(()) }
+    if commands.work() >= commands.paced(plan.work_per_submission) { commands.submit() } else { Ok(()) }
 }
 
 /// Finds the visible points of a round and writes the light that needs no photons.
@@ -28,10 +29,15 @@ pub fn see(commands: &mut Commands, round: Round, camera: Option<&Camera>) -> Re
     let Round { resources, geometry, plan, number: round } = round;
     let TransportResources { nodes, triangles, normals, uvs, materials, textures, texels, emitters, .. } = resources;
     let TransportResources { visible_points, pass_sums, part_totals, anomalies, oddities, .. } = resources;
+    let TransportResources { camera_paths: [camera_paths, _], camera_path_counts, .. } = resources;
     let step = plan.pixels_at_once(plan.rays_per_pixel());
+    let goes_on = plan.chains_go_on();
     let emitter_count = geometry.emitters.len() as u32;
     let draws = |domain| Draws { seed: words(plan.settings.seed), round, domain };
     for (first, end) in runs(plan.sensor.pixels(), step) {
+        if goes_on {
+            commands.fill(camera_path_counts, 0, 1, 0);
+        }
         match plan.sensor {
             Sensor::Picture { width, height } => {
                 let camera = camera.expect("a picture has a camera");
@@ -65,6 +71,8 @@ pub fn see(commands: &mut Commands, round: Round, camera: Option<&Camera>) -> Re
                     visible_points,
                     pass_sums,
                     part_totals,
+                    next_camera_paths: camera_paths,
+                    camera_path_counts,
                     oddities,
                 };
                 commands.dispatch(kernel, &push, Extent::Items(u64::from(end - first) * u64::from(plan.samples())))?;
@@ -96,12 +104,59 @@ pub fn see(commands: &mut Commands, round: Round, camera: Option<&Camera>) -> Re
                     visible_points,
                     pass_sums,
                     part_totals,
+                    next_camera_paths: camera_paths,
+                    camera_path_counts,
                     oddities,
                 };
                 commands.dispatch(kernel, &push, Extent::Items(u64::from(end - first)))?;
             }
         }
+        if goes_on {
+            go_on(commands, resources, geometry, plan, round)?;
+        }
         add_work(commands, plan, 64 * u64::from(end - first) * u64::from(plan.rays_per_pixel()))?;
+    }
+    Ok(())
+}
+
+/// Follows camera paths that are still under way over mirrors and glass, until none is left.
+fn go_on(commands: &mut Commands, resources: &TransportResources, geometry: &Geometry, plan: &TransportPlan, round: u32) -> Result<()> {
+    let TransportResources { nodes, triangles, normals, uvs, materials, textures, texels, emitters, .. } = resources;
+    let TransportResources { visible_points, pass_sums, part_totals, anomalies, oddities, camera_path_counts, .. } = resources;
+    let domain = if matches!(plan.sensor, Sensor::Picture { .. }) { DOMAIN_CAMERA } else { DOMAIN_RECEIVERS };
+    for parity in [0, 1].into_iter().cycle() {
+        let path_count = commands.read::<u32>(camera_path_counts, 1)?[0];
+        if path_count == 0 {
+            break;
+        }
+        commands.fill(camera_path_counts, 0, 1, 0);
+        let push = GoOnPush {
+            draws: Draws { seed: words(plan.settings.seed), round, domain },
+            path_count,
+            pixel_count: plan.sensor.pixels(),
+            emitter_count: geometry.emitters.len() as u32,
+            film_scale: (plan.film_scale / f64::from(plan.samples())) as f32,
+            film_limit: (plan.film_limit / f64::from(plan.samples())) as f32,
+        };
+        let kernel = GoOn {
+            nodes,
+            triangles,
+            normals,
+            uvs,
+            materials,
+            textures,
+            texels,
+            emitters,
+            anomalies,
+            visible_points,
+            pass_sums,
+            part_totals,
+            camera_paths: &resources.camera_paths[parity],
+            next_camera_paths: &resources.camera_paths[1 - parity],
+            camera_path_counts,
+            oddities,
+        };
+        commands.dispatch(kernel, &push, Extent::Items(u64::from(path_count)))?;
     }
     Ok(())
 }
@@ -147,13 +202,14 @@ pub fn look_up(commands: &mut Commands, round: Round, photons: &PhotonBuffers, m
     Ok(())
 }
 
-/// Turns what the maps found at all visible points into light.
-pub fn weigh(commands: &mut Commands, round: Round) -> Result<()> {
+/// Turns what the maps found at all visible points into light; so many photons of the global and of the caustic map were traced.
+pub fn weigh(commands: &mut Commands, round: Round, traced: [u32; 2]) -> Result<()> {
     let Round { resources, geometry, plan, number: round } = round;
     let TransportResources { nodes, triangles, normals, uvs, materials, textures, texels, visible_points, .. } = resources;
     let TransportResources { estimates, part_totals, anomalies, oddities, .. } = resources;
     let radius = |map: &Option<MapPlan>| map.as_ref().map_or(1.0, |map| plan.radius(map, round)) as f32;
-    let flux = |map: &Option<MapPlan>| map.as_ref().map_or(0.0, |map| map.photon_flux(geometry)) as f32;
+    let flux =
+        |map: &Option<MapPlan>| map.as_ref().map_or(0.0, |map| map.photon_flux_of(geometry, traced[usize::from(map.caustic_only)])) as f32;
     let (width, height) = plan.sensor.size();
     for (first_point, end_point) in runs(plan.visible_points(), plan.pixels_at_once(4)) {
         let push = WeighPush {

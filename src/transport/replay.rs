@@ -3,9 +3,10 @@
 
 use std::time::Instant;
 
+use super::photons::Flight;
 use super::resources::TransportResources;
 use super::{Round, constants, photons};
-use crate::constants::{DOMAIN_CAUSTIC_PHOTONS, DOMAIN_PHOTONS};
+use crate::constants::{DOMAIN_CAUSTIC_PHOTONS, DOMAIN_PHOTONS, TALLY_ROWS};
 use crate::error::{Error, Result};
 use crate::gpu::check::strict_math;
 use crate::gpu::{Commands, Extent, Gpu};
@@ -97,15 +98,19 @@ pub fn light_paths(
     let mut flown = 0;
     let mut left = chunk.1;
     for bounce in 0..flights {
-        photons::fly(&mut commands, round, buffers, map, bounce, Extent::Items(u64::from(left)))?;
+        let parity = bounce as usize % 2;
+        // Each flight starts with an empty map, so that there is always room.
+        commands.fill(&buffers.counters, 0, 3, 0);
+        commands.fill(&buffers.counters, 1, 1, left);
+        photons::fly(&mut commands, round, buffers, map, Flight { bounce, list: 0, parity }, Extent::Items(u64::from(left)))?;
         flown += 1;
-        left = *commands.read::<u32>(&buffers.counters, bounce as usize + 3)?.last().expect("a counter is read");
+        left = commands.read::<u32>(&buffers.counters, 3)?[2];
         if left == 0 {
             break;
         }
-        paths.push(commands.read(&buffers.paths[(bounce as usize + 1) % 2], left as usize)?);
+        paths.push(commands.read(&buffers.paths[1 - parity], left as usize)?);
     }
-    let tallies = tallies::read(&mut commands, &buffers.tallies[usize::from(map.caustic_only)], flown)?;
+    let tallies = tallies::read(&mut commands, &buffers.tallies[usize::from(map.caustic_only)], flown.min(TALLY_ROWS))?;
     let oddities = if plan.settings.paranoid { Some(Oddities::read(&mut commands, &resources.oddities)?) } else { None };
     Ok(Flights { paths, tallies, oddities })
 }

@@ -3,6 +3,8 @@
 use bytemuck::Pod;
 use glam::UVec2;
 
+use super::losses::ANOMALY_WORDS;
+use super::photons::counter_count;
 use crate::constants::PART_COUNT;
 use crate::error::Result;
 use crate::gpu::{Buffer, Commands, Gpu, Memory};
@@ -13,7 +15,7 @@ use crate::prefix_sum::block_sums;
 use crate::records::*;
 use crate::scene::geometry::Geometry;
 use crate::settings::transport::Effect;
-use crate::tallies;
+use crate::{tallies, totals};
 
 pub struct TransportResources {
     // The scene, written once; what the plan dropped has one empty element.
@@ -33,6 +35,9 @@ pub struct TransportResources {
     // What the sensor sees in the round under way.
     pub visible_points: Buffer,
     pub pass_sums: Buffer,
+    /// Camera paths that one dispatch leaves to the next, which leaves its own in the other; and how many.
+    pub camera_paths: [Buffer; 2],
+    pub camera_path_counts: Buffer,
     pub estimates: Buffer,
     // All rounds.
     pub film_sums: Buffer,
@@ -61,6 +66,8 @@ pub struct PhotonBuffers {
     /// Fates of the submission under way, one tally a bounce: of the global map's photons, and of the
     /// caustic map's.
     pub tallies: [Buffer; 2],
+    /// Photons stored and what limits cost, of each map.
+    pub totals: [Buffer; 2],
 }
 
 impl TransportResources {
@@ -98,17 +105,22 @@ impl TransportResources {
             photons: if plan.maps().next().is_some() { Some(PhotonBuffers::new(gpu, commands, plan)?) } else { None },
             visible_points: gpu.buffer::<VisiblePoint>("visible points", points, device)?,
             pass_sums: gpu.buffer::<u64>("pass sums", 3 * pixels * u64::from(plan.samples()), device)?,
+            camera_paths: [
+                gpu.buffer::<CameraPath>("even camera paths", plan.camera_path_capacity(), device)?,
+                gpu.buffer::<CameraPath>("odd camera paths", plan.camera_path_capacity(), device)?,
+            ],
+            camera_path_counts: gpu.buffer::<u32>("camera path counts", 1, device)?,
             estimates: gpu.buffer::<u64>("estimates", estimates, device)?,
             film_sums: gpu.buffer::<u64>("film sums", 3 * pixels, device)?,
             film_squares: gpu.buffer::<u64>("film squares", 6 * pixels, device)?,
             part_totals: gpu.buffer::<u64>("part totals", u64::from(PART_COUNT), device)?,
-            anomalies: gpu.buffer::<u32>("anomalies", 3, device)?,
+            anomalies: gpu.buffer::<u32>("anomalies", ANOMALY_WORDS as u64, device)?,
             oddities: oddities::buffer(gpu, commands)?,
         };
         commands.fill(&resources.film_sums, 0, 6 * pixels, 0);
         commands.fill(&resources.film_squares, 0, 12 * pixels, 0);
         commands.fill(&resources.part_totals, 0, 2 * u64::from(PART_COUNT), 0);
-        commands.fill(&resources.anomalies, 0, 3, 0);
+        commands.fill(&resources.anomalies, 0, ANOMALY_WORDS as u64, 0);
         Ok(resources)
     }
 }
@@ -118,7 +130,8 @@ impl PhotonBuffers {
         let most = |size: fn(&MapPlan) -> u32| plan.maps().map(size).max().map_or(0, u64::from);
         let device = Memory::Device;
         let (paths, capacity, buckets) = (most(|map| map.path_array_length), most(|map| map.capacity), most(|map| map.bucket_count));
-        let bounces = u64::from(plan.settings.bounces);
+        let counters = plan.maps().map(counter_count).max().unwrap_or(2);
+        let rows = plan.tally_rows();
         let buffers = PhotonBuffers {
             paths: [
                 gpu.buffer::<LightPath>("even light paths", paths, device)?,
@@ -126,20 +139,17 @@ impl PhotonBuffers {
             ],
             map: gpu.buffer::<MapPhoton>("map", capacity, device)?,
             sorted_map: gpu.buffer::<MapPhoton>("sorted map", capacity, device)?,
-            counters: gpu.buffer::<u32>("counters", bounces + 2, device)?,
+            counters: gpu.buffer::<u32>("counters", counters, device)?,
             dispatch_args: gpu.buffer::<DispatchArgs>("dispatch args", 1, device)?,
             cells: gpu.buffer::<u32>("cells", buckets + 1, device)?,
             ranks: gpu.buffer::<u32>("ranks", capacity, device)?,
             block_sums: block_sums(gpu, buckets + 1, plan.settings.group_size)?,
             crowded: gpu.buffer::<u32>("crowded points", 2 + 2 * u64::from(plan.points_at_once()), device)?,
-            tallies: [
-                tallies::buffer(gpu, "global tallies", plan.settings.bounces)?,
-                tallies::buffer(gpu, "caustic tallies", plan.settings.bounces)?,
-            ],
+            tallies: [tallies::buffer(gpu, "global tallies", rows)?, tallies::buffer(gpu, "caustic tallies", rows)?],
+            totals: [totals::buffer(gpu, "global totals")?, totals::buffer(gpu, "caustic totals")?],
         };
-        for tallies in &buffers.tallies {
-            tallies::clear(commands, tallies);
-        }
+        buffers.tallies.iter().for_each(|tallies| tallies::clear(commands, tallies));
+        buffers.totals.iter().for_each(|totals| totals::clear(commands, totals));
         Ok(buffers)
     }
 }

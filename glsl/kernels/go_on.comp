@@ -1,0 +1,61 @@
+// Camera paths, or paths from receivers, that an earlier dispatch left on their way over mirrors and glass.
+// Dispatched by src/transport/points.rs until none is left. One thread = one path.
+#version 460
+#extension GL_GOOGLE_include_directive : require
+#extension GL_EXT_scalar_block_layout : require
+#extension GL_EXT_control_flow_attributes : require
+#extension GL_KHR_shader_subgroup_basic : require
+#extension GL_KHR_shader_subgroup_arithmetic : require
+#include "records.glsl"
+
+layout(local_size_x_id = 0) in;
+layout(push_constant, scalar) uniform Push { GoOnPush push; };
+layout(set = 1, binding = 11, scalar) readonly buffer CameraPaths { CameraPath camera_paths[]; };
+
+#include "math.glsl"
+#include "oddities.glsl"
+#include "dispatch.glsl"
+#include "philox.glsl"
+#include "sobol.glsl"
+#include "sampling.glsl"
+#include "scene/effects.glsl"
+#include "scene/samples.glsl"
+#include "scene/directions.glsl"
+#include "scene/bvh.glsl"
+#include "scene/surface.glsl"
+#include "scene/lobes.glsl"
+#include "scene/scatter.glsl"
+#include "scene/areas.glsl"
+#include "scene/lights.glsl"
+#include "scene/direct.glsl"
+#include "film/wide.glsl"
+#include "scene/film.glsl"
+#include "scene/no_point.glsl"
+#include "stages/visible_point.glsl"
+#include "stages/chain.glsl"
+
+void main()
+{
+    uint item = invocation_index();
+    if (item >= push.path_count) {
+        return;
+    }
+    CameraPath path = camera_paths[item];
+    uint index = path.place / SAMPLES;
+    uint number = path.place % SAMPLES;
+    uint depth = path.state >> 8;
+    Chain chain = new_chain(path.position, path.direction, path.weight, vec2(0.0));
+    chain.saw_specular = (path.state & 1u) != 0;
+    chain.gathers = (path.state & 2u) != 0;
+    chain.starts_nowhere = (path.state & 4u) != 0;
+    chain.sees_emission = (path.state & 8u) != 0;
+    chain.point_count = (path.state >> 4) & 3u;
+    uint first_point = chain.point_count;
+    if (follow(chain, index, number, push.draws, push.emitter_count, depth)) {
+        put_off(chain, path.place, depth + CHAIN_STEPS);
+    }
+    note_unless(is_finite(chain.light[0]) && is_finite(chain.light[1]) && is_finite(chain.light[2]), ODD_LIGHT, push.draws.domain,
+                push.draws.round, index);
+    write_pass_sum(path.place, chain.light, push.film_scale, push.film_limit, true);
+    write_points(chain, index, number, push.pixel_count, first_point);
+}

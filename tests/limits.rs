@@ -1,0 +1,225 @@
+//! Limits of a run: no light is lost to them without being counted, and a run ends soon after it is asked to.
+
+use std::sync::atomic::{AtomicBool, Ordering};
+use std::time::{Duration, Instant};
+
+use crate::common::lit::{BOTH, glass, level, matt, mean_red, mirror, received, scene, scene_of, seen, shaft, shining};
+use crate::common::{assert_complains, assert_holds, device, z_check};
+use glam::{DVec3, Vec3};
+use photonmill::error::Error;
+use photonmill::gpu::{Commands, Gpu};
+use photonmill::plan::transport::{Sensor, TransportPlan};
+use photonmill::render::{self, Control};
+use photonmill::scene::geometry::Geometry;
+use photonmill::scene::light::LightKind;
+use photonmill::scene::{Camera, Scene};
+use photonmill::settings::stop::{Stop, squared_radius};
+use photonmill::settings::transport::{Append, Illumination, TransportSettings};
+use photonmill::transport::resources::TransportResources;
+use photonmill::transport::{self, End, Lit, Round, View, photons};
+
+fn settings() -> TransportSettings {
+    TransportSettings { photons: 8000, caustic_photons: 8000, rounds: 8, shadow_rays: 1, ..TransportSettings::default() }
+}
+
+/// A closed room whose walls all shine.
+fn furnace(albedo: f32) -> Scene {
+    let mut scene = scene("furnace");
+    scene.materials[0].base_colour = Vec3::splat(albedo);
+    scene
+}
+
+const POINT: [(DVec3, DVec3); 1] = [(DVec3::new(0.5, 0.0, 0.5), DVec3::Y)];
+
+/// Roulette ends paths, and takes nothing: irradiance is pi / (1 - albedo) by every builder.
+#[test]
+fn bright_rooms_lose_no_light() {
+    let Some(gpu) = device() else { return };
+    for albedo in [0.95f32, 0.99] {
+        let exact = std::f64::consts::PI / (1.0 - f64::from(albedo));
+        for append in [Append::Atomic, Append::Ballot, Append::Persistent] {
+            let what = format!("albedo {albedo}, {}", append.name());
+            let settings = TransportSettings { append, radius: Some(0.4), alpha: 1.0, ..settings() };
+            let lit = received(&gpu, &furnace(albedo), &settings, &POINT);
+            let (mean, error) = (lit.film.mean(0, &lit.plan).x, lit.film.standard_error(0, &lit.plan).x);
+            assert!(error < 0.04 * exact, "{what}: {mean} +- {error}");
+            assert_holds(&what, z_check(&what, mean, exact, error));
+            assert_eq!((lit.fates[0].ledger().cut_off, lit.losses.cut_off), (0, 0.0), "{what}");
+
+            // With the cap that was the default.
+            let capped = received(&gpu, &furnace(albedo), &TransportSettings { bounces: 32, ..settings }, &POINT);
+            let (mean, error) = (capped.film.mean(0, &capped.plan).x, capped.film.standard_error(0, &capped.plan).x);
+            assert_complains("32 bounces", z_check(&what, mean, exact, error));
+            assert!(capped.losses.relative >= 1.0 - mean / exact - 3.0 * error / exact, "{what}: {mean}, {:?}", capped.losses);
+        }
+    }
+}
+
+/// What a cap cuts off is counted in watts, and bounds what it takes from the result.
+#[test]
+fn what_a_cap_cuts_off_is_counted() {
+    let Some(gpu) = device() else { return };
+    for (illumination, albedo, bounces) in
+        BOTH.into_iter().flat_map(|illumination| [(illumination, 0.5f32, 1), (illumination, 0.5, 6), (illumination, 0.9, 6)])
+    {
+        let what = format!("{illumination:?}, albedo {albedo}, {bounces} bounces");
+        let settings = TransportSettings { illumination, bounces, radius: Some(0.4), alpha: 1.0, ..settings() };
+        let lit = received(&gpu, &furnace(albedo), &settings, &POINT);
+        let Lit { losses, fates, .. } = &lit;
+        let survivors = f64::from(albedo).powi(bounces as i32);
+        let emitted = fates[0].emitted as f64;
+        // A binomial deviation of the photons that survive.
+        let error = (survivors * (1.0 - survivors) / emitted).sqrt();
+        assert_holds(&what, z_check(&what, losses.share(), survivors, error));
+        assert_holds(&what, z_check(&what, fates[0].ledger().cut_off as f64 / emitted, survivors, error));
+        let exact = std::f64::consts::PI / (1.0 - f64::from(albedo));
+        let lost = 1.0 - mean_red(&lit) / exact;
+        assert!(losses.relative >= lost, "{what}: {lost} is lost, at most {} is stated", losses.relative);
+    }
+}
+
+/// An error that a cap makes impossible is refused, when the run first looks.
+#[test]
+fn an_error_beyond_a_cap_is_refused() {
+    let Some(gpu) = device() else { return };
+    let stop = Stop { error: Some(0.01), ..Stop::default() };
+    let settings = TransportSettings { bounces: 4, photons: 500, rounds: 20_000, stop, ..settings() };
+    let refused = run(&gpu, &furnace(0.9), &settings, &AtomicBool::new(false)).unwrap_err();
+    assert!(refused.to_string().starts_with("--error 1%: cannot be reached"), "{refused}");
+}
+
+/// Perfect mirrors, a hundred of them before the lamp at the end of the shaft.
+#[test]
+fn long_chains_of_mirrors_end_at_what_they_show() {
+    let Some(gpu) = device() else { return };
+    let length = 50.0;
+    let mut meshes = shaft(0.0, length, 0);
+    meshes.push(level(length, [1.0; 2], false, 1));
+    let scene = scene_of(meshes, vec![mirror(1.0), shining(0.0)], vec![]);
+    // Two metres across for each one along: a hundred reflections.
+    let camera = Camera::looking_at("ray", DVec3::new(0.0, 0.01, 0.1), DVec3::new(0.49, 0.255, 0.1), DVec3::Y, 1e-4);
+    let lit = seen(&gpu, &scene, &TransportSettings { rounds: 2, photons: 10, caustic_photons: 10, ..settings() }, &camera, [4, 4]);
+    let mean = mean_red(&lit);
+    assert!((mean - 1.0).abs() < 1e-5, "{mean}");
+    assert_eq!(lit.losses.camera_paths, 0);
+}
+
+/// Where nothing ends a path, the hard end does, and counts everything.
+#[test]
+fn light_trapped_for_ever_is_counted() {
+    let Some(gpu) = device() else { return };
+    let mut meshes = shaft(0.0, 1.0, 0);
+    meshes.extend([level(0.0, [1.0; 2], true, 0), level(1.0, [1.0; 2], false, 0)]);
+    let lamp = LightKind::Point { position: DVec3::new(0.1, 0.4, 0.2), intensity: Vec3::ONE };
+    let scene = scene_of(meshes, vec![mirror(1.0), matt(0.5), glass(1.5)], vec![lamp]);
+    let settings = TransportSettings { rounds: 1, photons: 40, illumination: Illumination::Photons, ..settings() };
+    let camera = Camera::looking_at("ray", DVec3::new(0.0, 0.5, 0.1), DVec3::new(0.4, 0.8, 0.2), DVec3::Y, 0.5);
+    let lit = seen(
+        &gpu,
+        &scene,
+        &TransportSettings { with: vec![photonmill::settings::transport::Effect::Indirect], ..settings },
+        &camera,
+        [2, 1],
+    );
+    assert_eq!(lit.losses.camera_paths, 2);
+    let ledger = lit.fates[0].ledger();
+    assert_eq!((ledger.emitted, ledger.cut_off), (40, 40));
+    assert!((lit.losses.cut_off / lit.losses.emitted - 1.0).abs() < 1e-5, "{:?}", lit.losses);
+}
+
+/// The ledger's photons stored are those that lie in the map.
+#[test]
+fn photons_stored_are_the_length_of_the_map() {
+    let Some(gpu) = device() else { return };
+    let scene = scene("cornell-spheres");
+    for (append, illumination) in [Append::Ballot, Append::Persistent].into_iter().flat_map(|append| BOTH.map(|light| (append, light))) {
+        let settings = TransportSettings { append, illumination, photons: 3000, rounds: 1, chunk: Some(700), ..settings() };
+        let lit = run(&gpu, &scene, &settings, &AtomicBool::new(false)).unwrap();
+        let geometry = Geometry::new(&scene).unwrap();
+        let mut commands = Commands::new(&gpu, transport::constants(&lit.plan), Instant::now()).unwrap();
+        let resources = TransportResources::new(&gpu, &mut commands, &geometry, &lit.plan, &[]).unwrap();
+        let buffers = resources.photons.as_ref().unwrap();
+        let round = Round { resources: &resources, geometry: &geometry, plan: &lit.plan, number: 0 };
+        for map in lit.plan.maps() {
+            let mut stored = 0;
+            for chunk in map.chunks() {
+                let mut count = |commands: &mut Commands| {
+                    stored += u64::from(commands.read::<u32>(&buffers.counters, 1)?[0]);
+                    Ok(())
+                };
+                photons::trace(&mut commands, round, buffers, map, chunk, &mut count).unwrap();
+            }
+            let fates = &lit.fates[usize::from(map.caustic_only)];
+            assert!(stored > 100, "{append:?}, {illumination:?}, {}: {stored}", map.name);
+            assert_eq!(fates.ledger().stored, stored, "{append:?}, {illumination:?}, {}", map.name);
+        }
+    }
+}
+
+/// Radii by their closed form are those of the recurrence, at once for any round.
+#[test]
+fn radii_take_no_sum_over_earlier_rounds() {
+    for alpha in [0.1, 0.5, 2.0 / 3.0, 0.99, 1.0] {
+        let (mut squared, mut sum) = (1.0, 0.0);
+        for round in 0..5000u32 {
+            let found = squared_radius(alpha, round);
+            assert!((found / squared - 1.0).abs() < 1e-9, "alpha {alpha}, round {round}: {found}, {squared}");
+            sum += squared;
+            let mean = render::stop::mean_squared_radius(alpha, round + 1);
+            assert!((mean * f64::from(round + 1) / sum - 1.0).abs() < 1e-9, "alpha {alpha}, mean of {}", round + 1);
+            squared *= (f64::from(round + 1) + alpha) / (f64::from(round + 1) + 1.0);
+        }
+    }
+    let began = Instant::now();
+    assert!((0..100_000).map(|k| squared_radius(0.5, (1 << 20) - k)).sum::<f64>() > 0.0);
+    assert!(began.elapsed() < Duration::from_secs(2), "{:?}", began.elapsed());
+}
+
+fn run(gpu: &Gpu, scene: &Scene, settings: &TransportSettings, cancelled: &AtomicBool) -> Result<Lit, Error> {
+    let geometry = Geometry::new(scene)?;
+    let camera = scene.cameras.first().cloned().unwrap_or_else(|| Camera::around(scene.bounds().0, scene.bounds().1));
+    let sensor = Sensor::Picture { width: 64, height: 64 };
+    let plan = TransportPlan::new(scene, &geometry, settings, sensor, &render::limits(gpu.facts()))?;
+    let view = View { geometry: &geometry, camera: Some(&camera), phases: &[] };
+    transport::light(gpu, &view, plan, &mut Control { cancelled, progress: &mut |_| {} })
+}
+
+/// Rounds that would take minutes end within half a second of being asked to.
+#[test]
+fn long_rounds_end_soon_after_they_are_asked_to() {
+    let Some(gpu) = device() else { return };
+    let scene = scene("cornell-spheres");
+    let long = TransportSettings { photons: 1 << 26, caustic_photons: 1 << 20, rounds: 4, ..settings() };
+    let soon = Duration::from_millis(500);
+
+    // Pipelines are made before the time is taken.
+    run(&gpu, &scene, &TransportSettings { photons: 1000, caustic_photons: 1000, rounds: 1, ..long.clone() }, &AtomicBool::new(false))
+        .unwrap();
+    let cancelled = AtomicBool::new(false);
+    std::thread::scope(|scope| {
+        let asker = scope.spawn(|| {
+            std::thread::sleep(Duration::from_millis(700));
+            cancelled.store(true, Ordering::Relaxed);
+            Instant::now()
+        });
+        let refused = run(&gpu, &scene, &long, &cancelled).unwrap_err();
+        let ended = Instant::now();
+        assert!(matches!(refused, Error::Interrupted), "{refused}");
+        let late = ended - asker.join().unwrap();
+        assert!(late < soon, "{late:?} after it was cancelled");
+    });
+
+    // In its first round a run ends with the photons that it has.
+    let wanted = Duration::from_millis(1500);
+    let stop = Stop { seconds: Some(wanted.as_secs_f64()), ..Stop::default() };
+    let began = Instant::now();
+    let lit = run(&gpu, &scene, &TransportSettings { stop, ..long.clone() }, &AtomicBool::new(false)).unwrap();
+    let over = began.elapsed().saturating_sub(wanted);
+    assert_eq!((lit.end, lit.film.rounds), (End::Time, 1));
+    assert!(lit.fates[0].emitted < u64::from(long.photons) && lit.fates[1].emitted > 0);
+    assert!(over < soon, "{over:?} after its time was up");
+    // Fewer photons are no less light.
+    let reference = run(&gpu, &scene, &TransportSettings { photons: 50_000, rounds: 2, ..settings() }, &AtomicBool::new(false)).unwrap();
+    let (found, expected) = (mean_red(&lit), mean_red(&reference));
+    assert!((found / expected - 1.0).abs() < 0.05, "{found}, {expected}");
+}
