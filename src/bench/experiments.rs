@@ -283,7 +283,7 @@ fn gather(lab: &mut Lab) -> Result<Found> {
     let per_estimate = survey(&job)?.map_or(f64::NAN, |survey| survey.per_estimate);
     let timed = scene_line::time(lab.gpu, &lab.rates, &job, lab.cancelled)?;
     let how = format!("{} x {} points, {photons} photons emitted, {per_estimate:.1} an estimate", size.0, size.1);
-    let found = (1e-3 * timed.ms("global/look up"), limit_ms(timed.pass("global/look up")).map(|ms| 1e-3 * ms), how);
+    let found = (1e-3 * timed.ms("global/gather"), limit_ms(timed.pass("global/gather")).map(|ms| 1e-3 * ms), how);
     Ok((timed.passes, vec![found]))
 }
 

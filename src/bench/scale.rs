@@ -171,7 +171,7 @@ fn over_triangles(lab: &mut Lab, left_out: &mut Vec<String>) -> Result<Vec<Step>
             passes: timed
                 .passes
                 .iter()
-                .filter(|pass| ["see", "global/trace", "global/index", "global/look up"].contains(&pass.name.as_str()))
+                .filter(|pass| ["visible points", "global/trace", "global/index", "global/gather"].contains(&pass.name.as_str()))
                 .map(|pass| PassTime { pass: pass.name.clone(), ms: pass.ms })
                 .collect(),
             peak_bytes: timed.memory.peak_device_bytes,

@@ -190,7 +190,7 @@ impl Model<'_> {
         let points = f64::from(self.plan.visible_points());
         let sums = 24.0 * points * f64::from(self.plan.arrival_sets);
         match pass {
-            "see" => {
+            "visible points" => {
                 let shadow_rays = f64::from(self.plan.constant("SHADOW_RAYS"));
                 let cost = Cost {
                     bytes: samples * 24.0 + points * bytes::<VisiblePoint>(),
@@ -200,7 +200,7 @@ impl Model<'_> {
                 };
                 work("samples", samples, cost)
             }
-            "weigh" => {
+            "flux to radiance" => {
                 let cost = Cost {
                     bytes: points * (bytes::<VisiblePoint>() + 24.0) + sums,
                     float_operations: points * WEIGH_OPERATIONS,
@@ -260,7 +260,7 @@ impl Model<'_> {
             "index/count" => ("photons", survey.stored, 2.0 * chunks, count),
             "index/scan" => ("cells", buckets, scans, scan),
             "index/sort" => ("photons", survey.stored, chunks, sort),
-            "look up" => ("photons found", found, look_ups, look_up),
+            "gather" => ("photons found", found, look_ups, look_up),
             _ => return None,
         };
         Some(Work { item, items, dispatches, cost })

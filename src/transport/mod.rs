@@ -198,14 +198,14 @@ fn film(commands: &mut Commands, resources: &TransportResources, plan: &Transpor
 
 fn one_round(commands: &mut Commands, view: &View, round: Round) -> Result<()> {
     let Round { resources, plan, .. } = round;
-    commands.scope("see", |commands| points::see(commands, round, view.camera))?;
+    commands.scope("visible points", |commands| points::see(commands, round, view.camera))?;
     let sums = 3 * u64::from(plan.visible_points()) * u64::from(plan.arrival_sets);
     if let Some(photons) = &resources.photons {
         commands.fill(&resources.estimates, 0, 2 * sums, 0);
         for map in plan.maps() {
             commands.scope(map.name, |commands| one_map(commands, round, photons, map))?;
         }
-        commands.scope("weigh", |commands| points::weigh(commands, round))?;
+        commands.scope("flux to radiance", |commands| points::weigh(commands, round))?;
     }
     commands.scope("resolve", |commands| points::resolve(commands, round))
 }
@@ -222,7 +222,7 @@ fn one_map(commands: &mut Commands, round: Round, photons: &PhotonBuffers, map: 
         commands.scope("trace", |commands| photons::trace(commands, round, photons, map, chunk))?;
         commands.add_work(WORK_PER_PHOTON * u64::from(chunk.1));
         commands.scope("index", |commands| photons::index(commands, photons, round.plan, &cells))?;
-        commands.scope("look up", |commands| points::look_up(commands, round, photons, map, cells))?;
+        commands.scope("gather", |commands| points::look_up(commands, round, photons, map, cells))?;
     }
     Ok(())
 }
