@@ -29,7 +29,9 @@ pub enum Error {
     DeviceAbsent { wanted: String, present: String },
 
     /// A device lacks something that every kernel needs.
-    #[error("{device}: does not support {what}, which photonmill needs; choose another device with --device, or trace the paper's box with --variant cpu")]
+    #[error(
+        "{device}: does not support {what}, which photonmill needs; choose another device with --device, or trace the paper's box with --variant cpu"
+    )]
     DeviceLacks { device: String, what: String },
 
     /// A device fails the start-up check.
@@ -39,7 +41,9 @@ pub enum Error {
     DeviceWrong { device: String, what: String },
 
     /// A measurement of a device's limits came out wrong.
-    #[error("{device}: computes {what} wrongly, so its measurements are not valid; update its driver, or choose another device with --device")]
+    #[error(
+        "{device}: computes {what} wrongly, so its measurements are not valid; update its driver, or choose another device with --device"
+    )]
     Miscalculated { device: String, what: String },
 
     /// A Vulkan call failed.
@@ -47,7 +51,9 @@ pub enum Error {
     Device { call: &'static str, reason: String },
 
     /// The device lost photons or counted them twice.
-    #[error("the photon ledger does not close: {ledger}; the device or its driver loses work: update the driver, or choose another device with --device")]
+    #[error(
+        "the photon ledger does not close: {ledger}; the device or its driver loses work: update the driver, or choose another device with --device"
+    )]
     LedgerOpen { ledger: Ledger },
 
     /// Results differ from closed forms.
@@ -61,9 +67,7 @@ pub enum Error {
     Interrupted,
 
     /// The validation layer was asked for and is not installed.
-    #[error(
-        "--validate: the layer VK_LAYER_KHRONOS_validation is not installed; install the Vulkan validation layers, or omit --validate"
-    )]
+    #[error("--validate: the layer VK_LAYER_KHRONOS_validation is not installed; install the Vulkan validation layers, or omit --validate")]
     NoValidationLayer,
 
     /// The validation layer reported errors.

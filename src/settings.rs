@@ -284,7 +284,7 @@ impl Settings {
     /// Refuses settings that no run can satisfy; each error names the option, its value and the remedy.
     pub fn validate(&self) -> Result<()> {
         let width = 2.0 * HALF_WIDTH;
-        within("--photons", self.photons, 2..=MAX_PHOTONS, "photons a round, at least one for each of the two lights")?;
+        within("--photons", self.photons, 2..=MAX_PHOTONS, "photons per round, at least one for each of the two lights")?;
         within("--rounds", self.rounds, 1..=u32::MAX, "rounds")?;
         within("--bounces", self.bounces, 1..=MAX_BOUNCES, "bounces")?;
         if self.variant == Variant::Persistent {
@@ -374,7 +374,8 @@ impl Settings {
             return Err(Error::setting("--nearest", nearest, "always uses integer sums; omit --sums"));
         }
         if let Some(chunk) = self.chunk.filter(|chunk| *chunk < self.photons) {
-            let allowed = format!("must be --photons {} or more with --nearest, which searches all photons of a round at once", self.photons);
+            let allowed =
+                format!("must be --photons {} or more with --nearest, which searches all photons of a round at once", self.photons);
             return Err(Error::setting("--chunk", chunk, allowed));
         }
         let wanted = u64::from(self.rounds) * u64::from(nearest);
@@ -412,7 +413,9 @@ impl Settings {
                     return Err(Error::setting(
                         "--rng",
                         "rand48",
-                        format!("the run draws {draws} numbers, but the generator has a period of 2^48, so its streams would overlap; use --rng philox"),
+                        format!(
+                            "the run draws {draws} numbers, but the generator has a period of 2^48, so its streams would overlap; use --rng philox"
+                        ),
                     ));
                 }
                 Ok(())
@@ -443,7 +446,7 @@ impl Settings {
         let twos = self.photons.trailing_zeros();
         (self.rng == Rng::Rand48 && twos >= 10).then(|| {
             format!(
-                "rand48 gives correlated streams for {} = {} * 2^{twos} photons a round, a multiple of a large power of two; use an odd --photons or --rng philox",
+                "rand48 gives correlated streams for {} = {} * 2^{twos} photons per round, a multiple of a large power of two; use an odd --photons or --rng philox",
                 self.photons,
                 self.photons >> twos
             )

@@ -1,4 +1,4 @@
-//! How near the device's limits every pass comes: the roofline.
+//! How close every pass comes to the device's limits (roofline).
 //!
 //! [`rates`] measures what the device can do, [`paper_line`] and [`scene_line`] time the passes of both lines beside what
 //! they cannot do without ([`pass`]), [`experiments`] runs the workloads that the targets name ([`targets`]), and [`scale`]
@@ -133,7 +133,7 @@ pub fn run(gpu: &Gpu, request: Request, cancelled: &AtomicBool, tell: &mut dyn F
         request,
     };
     match measure(&mut lab, &mut bench) {
-        Err(Error::Interrupted) => bench.left_out.push("what follows: ended by hand".to_owned()),
+        Err(Error::Interrupted) => bench.left_out.push("the remaining experiments: interrupted".to_owned()),
         result => result?,
     }
     Ok(bench)
@@ -147,7 +147,7 @@ fn measure(lab: &mut Lab, bench: &mut Bench) -> Result<()> {
     for (number, experiment) in bench.request.experiments.clone().into_iter().enumerate() {
         lab.go_on()?;
         if lab.is_late() {
-            bench.left_out.push(format!("{}: --time was spent", experiment.name()));
+            bench.left_out.push(format!("{}: no --time left", experiment.name()));
             continue;
         }
         (lab.tell)(&format!("[{}/{}] {}", number + 1, bench.request.experiments.len(), experiment.title()));

@@ -182,7 +182,8 @@ fn agree(variant: Variant, photons: u32, survival: f32, same: bool) -> Result<()
     if same {
         return Ok(());
     }
-    let what = format!("{} stored different photons from the builders before it, with {photons} photons at survival {survival}", variant.name());
+    let what =
+        format!("{} stored different photons from the builders before it, with {photons} photons at survival {survival}", variant.name());
     Err(Error::Device { call: "the compaction study", reason: what })
 }
 

@@ -147,13 +147,10 @@ pub(super) fn errors(rounds: u32, noise: Option<f64>, bias: Option<&Bias>, confi
     let (percent, sure) = (|share: f64| 100.0 * share, 100.0 * confidence);
     let bound = noise.map(|noise| error_bound(rounds, noise, confidence));
     match noise.zip(bound) {
-        Some((noise, bound)) => writeln!(
-            text,
-            "noise: {:.2} % relative RMS error, at most {:.2} % ({sure} % confidence)",
-            percent(noise),
-            percent(bound)
-        )
-        .unwrap(),
+        Some((noise, bound)) => {
+            writeln!(text, "noise: {:.2} % relative RMS error, at most {:.2} % ({sure} % confidence)", percent(noise), percent(bound))
+                .unwrap()
+        }
         None if rounds == 1 => text.push_str("noise: unknown after a single round\n"),
         None => text.push_str("noise: unknown\n"),
     }
@@ -169,7 +166,8 @@ pub(super) fn errors(rounds: u32, noise: Option<f64>, bias: Option<&Bias>, confi
         )
         .unwrap();
         if let Some((noise, bound)) = noise.zip(bound) {
-            writeln!(text, "noise and bias: {:.2} %, at most {:.2} %", percent(noise.hypot(*relative)), percent(bound.hypot(*upper))).unwrap();
+            writeln!(text, "noise and bias: {:.2} %, at most {:.2} %", percent(noise.hypot(*relative)), percent(bound.hypot(*upper)))
+                .unwrap();
         }
     }
     text

@@ -152,7 +152,9 @@ impl<'a> Facts<'a> {
                 0 => (false, "no disc light".into()),
                 count => (true, format!("{count} disc light(s)")),
             },
-            Effect::Bvh if self.triangles <= LIST_TRIANGLES => (false, format!("only {} triangles: testing each of them is as fast", self.triangles)),
+            Effect::Bvh if self.triangles <= LIST_TRIANGLES => {
+                (false, format!("only {} triangles: testing each of them is as fast", self.triangles))
+            }
             Effect::Bvh => (true, format!("{} triangles", self.triangles)),
             Effect::TwoSided => match self.named(|material| material.two_sided) {
                 Some(names) => (true, format!("two-sided: {names}")),

@@ -420,7 +420,10 @@ impl TransportPlan {
         ];
         let too_large = |(_, bytes): &&(&'static str, u64)| *bytes > limits.buffer_bytes;
         if let Some((what, bytes)) = scene.iter().find(too_large) {
-            let allowed = format!("{what} take {bytes} bytes, but a buffer on this device holds at most {}; choose another --device", limits.buffer_bytes);
+            let allowed = format!(
+                "{what} take {bytes} bytes, but a buffer on this device holds at most {}; choose another --device",
+                limits.buffer_bytes
+            );
             return Err(Error::setting("SCENE", format!("({} triangles)", geometry.triangles.len()), allowed));
         }
         if film.iter().any(|(_, bytes)| *bytes > limits.buffer_bytes) {
