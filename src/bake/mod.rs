@@ -236,7 +236,10 @@ fn warnings(scene: &Scene, unwrapped: &[Option<unwrap::Unwrapped>]) -> Vec<Strin
         warnings.push(format!("new lightmap UVs for {}: the second UV set {reason}", listed(&names)));
     }
     if !coarse.is_empty() {
-        warnings.push(format!("lightmaps are limited to {MAX_SIDE} texels per side: fewer texels per metre than requested on {}", listed(&coarse)));
+        warnings.push(format!(
+            "lightmaps are limited to {MAX_SIDE} texels per side: fewer texels per metre than requested on {}",
+            listed(&coarse)
+        ));
     }
     if unwrapped.iter().all(Option::is_none) {
         warnings.push("every surface is a mirror or a dielectric: there is nothing to bake".into());

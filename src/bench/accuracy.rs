@@ -1,7 +1,8 @@
-//! Time on the device to a relative error. The reference is path-traced by the judge; where that is too noisy to tell so
-//! small an error, it is a long run of other photons, held against the judge by its light in all. Pixels in which a lamp
-//! is seen straight are left out; of `caustic-sphere`, those too that show it in the glass, as a few hairlines hundreds of
-//! times brighter than all else would be most of the error. What the error is with them is told too.
+//! Device time to reach a relative error. The reference comes from the path tracer ([`crate::judge`]). Where that is too
+//! noisy for so small an error, the reference is a long run with another seed, whose total light is checked against the
+//! path tracer. Pixels that show a light source directly are excluded. In `caustic-sphere` so are pixels that show it
+//! through the glass: a few thin lines hundreds of times brighter than the rest would dominate the error. The report also
+//! gives the error with those pixels included.
 
 use std::time::{Duration, Instant};
 
@@ -23,7 +24,7 @@ use crate::transport::Lit;
 
 /// Runs of a point, each with a seed of its own.
 const REPEATS: u32 = 3;
-/// Seed of the first of them, and that of a long run which they are held against.
+/// Seed of the first of them, and of the long run that is their reference.
 const FIRST_SEED: u64 = 1;
 const LONG_RUN_SEED: u64 = 1 << 20;
 const MOST_DOUBLINGS: u32 = 16;

@@ -68,7 +68,7 @@ pub struct Bench {
     pub rates: Rates,
     pub passes: Vec<Pass>,
     pub targets: Vec<Finding>,
-    /// Who wins where among the builders of the paper's line.
+    /// The fastest builder of the paper's box by photon count and survival.
     pub compaction: Option<Map>,
     pub scale: Option<Scale>,
     /// What was not measured, and why.
@@ -100,7 +100,7 @@ impl Lab<'_> {
         }
     }
 
-    /// Fails once somebody has ended it.
+    /// Fails once the bench is interrupted.
     pub fn go_on(&self) -> Result<()> {
         if self.cancelled.load(Ordering::Relaxed) { Err(Error::Interrupted) } else { Ok(()) }
     }
@@ -110,8 +110,8 @@ impl Lab<'_> {
     }
 }
 
-/// Measures the device, then the experiments that are asked for. Experiments that were finished when somebody ended it are
-/// kept.
+/// Measures the device, then the experiments that are asked for. Experiments that were complete when it was
+/// interrupted are kept.
 pub fn run(gpu: &Gpu, request: Request, cancelled: &AtomicBool, tell: &mut dyn FnMut(&str)) -> Result<Bench> {
     paper_line::check_clock(gpu)?;
     let deadline = Instant::now() + request.budget;

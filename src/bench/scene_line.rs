@@ -1,4 +1,4 @@
-//! The line of triangles under the clock: rounds of a scene, pass by pass, beside what each pass cannot do without.
+//! Times of a scene of triangles: rounds, pass by pass, beside the least work that each pass needs.
 
 use std::f64::consts::PI;
 use std::sync::atomic::AtomicBool;

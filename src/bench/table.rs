@@ -1,4 +1,4 @@
-//! A bench as text: what the device can do, every pass beside its limit, and the targets.
+//! A bench as text: the device's rates, every pass with its limit, and the targets.
 
 use std::fmt::Write;
 

@@ -1,7 +1,6 @@
-//! The start-up check: what every run relies on, asked of the device before it is trusted.
+//! The start-up check: tests on the device what every run relies on.
 //!
-//! Software and young drivers get such things wrong without a word: lavapipe, for one, leaves the
-//! loops of an invocation after 65 535 iterations.
+//! Some drivers fail silently: lavapipe ends the loops of an invocation after 65 535 iterations.
 
 use std::time::Instant;
 

@@ -228,7 +228,7 @@ pub fn text(outcome: &Outcome, walls: &[WallEstimate]) -> String {
     text
 }
 
-/// One line that anybody can add up.
+/// The ledger as one equation.
 pub(super) fn ledger(ledger: &Ledger) -> String {
     let Ledger { emitted, absorbed, escaped, cut_off, dropped, stored } = ledger;
     format!(

@@ -1,4 +1,4 @@
-//! What a scene of triangles calls for: each effect with the evidence for keeping or dropping it.
+//! The effects that a scene of triangles needs: each with the evidence for keeping or dropping it.
 
 use serde::Serialize;
 

@@ -1,4 +1,4 @@
-//! The scenes of [`crate::scene::closed_forms`], asked by receivers and cameras, by shadow rays and by photons
+//! Cases for the scenes of [`crate::scene::closed_forms`]: with receivers and cameras, with shadow rays and with photons
 //! alone.
 
 use std::f64::consts::PI;

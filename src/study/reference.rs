@@ -1,4 +1,5 @@
-//! What is right, by a method that is not judged: radiosity for the paper's box, path tracing for pictures.
+//! References from methods other than photon mapping: radiosity for the paper's box, closed forms for floors, path tracing
+//! for images.
 
 use std::fmt::Write;
 use std::path::PathBuf;
@@ -144,7 +145,7 @@ impl Reference {
 /// What positions in f32 leave of a closed form.
 const SINGLE_PRECISION: f64 = 1e-6;
 
-/// Parts that a path-traced reference is made in; between them somebody may end it.
+/// Parts of a path-traced reference; it can be interrupted between them.
 const BATCHES: u32 = 8;
 
 /// Seed of references: no run that they judge has its random numbers, as those come from another generator.

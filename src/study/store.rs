@@ -1,4 +1,4 @@
-//! Points that are finished, on disk: a study that was cut off goes on where it ended.
+//! Finished points on disk, so that an interrupted study can be continued.
 
 use std::collections::HashMap;
 use std::io::Write;

@@ -1,4 +1,4 @@
-//! What is measured: a quantity with its reference, the configurations that find it, and how one of them runs.
+//! A measured quantity: its reference, the configurations that estimate it, and how one of them runs.
 
 use std::rc::Rc;
 use std::sync::atomic::{AtomicBool, Ordering};
@@ -141,7 +141,7 @@ impl Subject {
         self.groups.iter().flat_map(|group| &group.configurations).any(|configuration| matches!(configuration.line, Line::Paper(_)))
     }
 
-    /// One run; `None` where somebody ended it.
+    /// One run; `None` if it was interrupted.
     pub fn run(&self, gpu: &Gpu, configuration: &Configuration, rounds: u32, seed: u64, cancelled: &AtomicBool) -> Result<Option<Shot>> {
         let mut control = Control { cancelled, progress: &mut |_| {} };
         let shot = match &configuration.line {

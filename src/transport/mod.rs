@@ -76,7 +76,7 @@ pub struct Lit {
     pub timings: Timings,
     pub device: DeviceFacts,
     pub end: End,
-    /// What the radius adds to the error; `None` where nobody measured it.
+    /// The bias of the radius; `None` where it was not measured.
     pub bias: Option<Bias>,
     pub dispatches: u64,
     pub submissions: u64,
@@ -84,7 +84,7 @@ pub struct Lit {
     /// Values that were no number, values cut to the film's largest, and estimates on a mesh too dense for the
     /// area within the radius to be found.
     pub anomalies: [u32; 3],
-    /// What `--paranoid` found; `None` where nobody looked.
+    /// Nonfinite values that `--paranoid` found; `None` without it.
     pub oddities: Option<Oddities>,
 }
 
@@ -116,7 +116,7 @@ pub fn constants(plan: &TransportPlan) -> Constants {
 /// Timestamps that a round may need.
 const TIMESTAMPS_PER_ROUND: u32 = 64;
 
-/// Runs all rounds of a plan; progress is told in rounds.
+/// Runs all rounds of a plan; progress is reported in rounds.
 pub fn light(gpu: &Gpu, view: &View, plan: TransportPlan, control: &mut Control) -> Result<Lit> {
     let started = Instant::now();
     if plan.settings.math == Math::Strict {
