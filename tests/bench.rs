@@ -169,7 +169,7 @@ fn a_cancelled_bench_says_so() {
     let Some(gpu) = device() else { return };
     let cancelled = AtomicBool::new(true);
     let found = bench::run(&gpu, request(&[Experiment::OpenBox], false), &cancelled, &mut |_| {}).unwrap();
-    assert!(found.passes.is_empty() && found.left_out.iter().any(|line| line.contains("ended by hand")), "{:?}", found.left_out);
+    assert!(found.passes.is_empty() && found.left_out.iter().any(|line| line.contains("interrupted")), "{:?}", found.left_out);
 }
 
 #[test]
