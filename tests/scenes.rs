@@ -184,8 +184,8 @@ fn bad_options_are_refused_in_one_line() {
         on(&["cornell", "-o", "a.exr", "--environment", "1,2"], &["--environment 1,2"]),
         on(&["cornell", "-o", "a.exr", "--environment", "nan"], &["--environment nan"]),
         on(&["cornell", "-o", "a.exr", "--environment", "-1"], &["--environment -1", "0 or more"]),
-        on(&["cornell", "-o", "a.exr", "--device", "nonsense"], &["--device nonsense", "there is"]),
-        place.refuse(&["plan", "cornell", "--device", "nonsense"], &["--device nonsense", "there is"]),
+        on(&["cornell", "-o", "a.exr", "--device", "nonsense"], &["--device nonsense", "available: "]),
+        place.refuse(&["plan", "cornell", "--device", "nonsense"], &["--device nonsense", "available: "]),
     ]);
     assert_none(faults);
 }
