@@ -2,7 +2,6 @@
 
 use std::path::PathBuf;
 
-use crate::constants::LOOP_LIMIT;
 use crate::ledger::Ledger;
 
 pub type Result<T> = std::result::Result<T, Error>;
@@ -14,7 +13,7 @@ pub enum Error {
     Setting { option: &'static str, value: String, allowed: String },
 
     /// A file or folder that an option names cannot be written.
-    #[error("{option} {}: cannot be written ({reason}); name a file or folder that can", path.display())]
+    #[error("{option} {}: cannot be written ({reason}); choose a place that can be written", path.display())]
     Output { option: &'static str, path: PathBuf, reason: String },
 
     /// A scene file, or something in it, cannot be used.
@@ -26,21 +25,25 @@ pub enum Error {
     NoVulkan { reason: String },
 
     /// `--device` names a device that is not there, or several.
-    #[error("--device {wanted}: names no one Vulkan device; there is {present}")]
+    #[error("--device {wanted}: must match exactly one Vulkan device; available: {present}")]
     DeviceAbsent { wanted: String, present: String },
 
     /// A device lacks something that every kernel needs.
-    #[error("{device}: lacks {what}, which photonmill needs; choose another with --device, or --variant cpu")]
+    #[error(
+        "{device}: does not support {what}, which photonmill needs; choose another device with --device, or trace the paper's box with --variant cpu"
+    )]
     DeviceLacks { device: String, what: String },
 
     /// A device fails the start-up check.
     #[error(
-        "{device}: fails the start-up check, so its results could not be trusted: {what} (loops are kept to {LOOP_LIMIT} iterations); update its driver, or choose another with --device"
+        "{device}: failed the start-up check, so its results cannot be trusted: {what}; update its driver, or choose another device with --device"
     )]
     DeviceWrong { device: String, what: String },
 
     /// A measurement of a device's limits came out wrong.
-    #[error("{device}: {what} came out wrong, so nothing measured on it counts; update its driver, or choose another with --device")]
+    #[error(
+        "{device}: computes {what} wrongly, so its measurements are not valid; update its driver, or choose another device with --device"
+    )]
     Miscalculated { device: String, what: String },
 
     /// A Vulkan call failed.
@@ -48,26 +51,26 @@ pub enum Error {
     Device { call: &'static str, reason: String },
 
     /// The device lost photons or counted them twice.
-    #[error("the photon ledger does not close: {ledger:?}; the device or its driver loses work, try --variant cpu or another --device")]
+    #[error(
+        "the photon ledger does not close: {ledger}; the device or its driver loses work: update the driver, or choose another device with --device"
+    )]
     LedgerOpen { ledger: Ledger },
 
-    /// A closed form came out wrong.
+    /// Results differ from closed forms.
     #[error(
-        "{device}: {failed} of {of} closed forms are wrong, the first: {first}; its results cannot be trusted: update its driver, or choose another with --device"
+        "{device}: {failed} of {of} checks failed, the first: {first}; its results cannot be trusted: update its driver, or choose another device with --device"
     )]
     SelfcheckFailed { device: String, failed: usize, of: usize, first: String },
 
-    /// Somebody ended it before there was anything to write.
-    #[error("ended before there was anything to write")]
+    /// The user interrupted it before there was anything to write.
+    #[error("interrupted before the first result; nothing was written")]
     Interrupted,
 
     /// The validation layer was asked for and is not installed.
-    #[error(
-        "--validate: the layer VK_LAYER_KHRONOS_validation is not installed; install the Vulkan validation layers, or leave --validate out"
-    )]
+    #[error("--validate: the layer VK_LAYER_KHRONOS_validation is not installed; install the Vulkan validation layers, or omit --validate")]
     NoValidationLayer,
 
-    /// The validation layer complained.
+    /// The validation layer reported errors.
     #[error("--validate: {count} message(s) from the validation layer, the first: {first}")]
     Validation { count: usize, first: String },
 }

@@ -1,4 +1,4 @@
-//! The photon ledger: what became of every photon that was emitted, in integers that close.
+//! The photon ledger: integer counts of how every emitted photon ended, whose sum equals the photons emitted.
 
 use serde::Serialize;
 
@@ -13,9 +13,9 @@ pub struct Ledger {
     pub absorbed: u64,
     /// Left through an opening.
     pub escaped: u64,
-    /// Still under way after the last bounce that is allowed, or when the run was interrupted.
+    /// Still alive after the last bounce allowed, or when the run was interrupted.
     pub cut_off: u64,
-    /// Lost for want of room; the plan makes that impossible, and this counter would show it.
+    /// Lost because a buffer was full; the plan prevents that, and this counter would show it.
     pub dropped: u64,
     /// Entries of the photon map over the run. In the room a photon is stored at every bounce that reflects it, in a scene
     /// where it arrives at a surface that scatters, if the map holds light that arrived in its way.
@@ -38,6 +38,15 @@ impl Ledger {
             dropped: self.dropped + other.dropped,
             stored: self.stored + other.stored,
         }
+    }
+}
+
+/// The equation that does or does not close.
+impl std::fmt::Display for Ledger {
+    fn fmt(&self, f: &mut std::fmt::Formatter) -> std::fmt::Result {
+        let Ledger { emitted, absorbed, escaped, cut_off, dropped, .. } = self;
+        let equals = if self.closes() { "=" } else { "is not" };
+        write!(f, "{emitted} emitted {equals} {absorbed} absorbed + {escaped} escaped + {cut_off} cut off + {dropped} dropped")
     }
 }
 
@@ -187,11 +196,11 @@ impl Fates {
 /// How the one photon of these tallies ended.
 pub fn fate(tallies: &[Tally]) -> &'static str {
     if tallies.iter().any(|tally| tally.escaped > 0) {
-        "leaves the scene"
+        "escaped"
     } else if tallies.iter().any(|tally| tally.absorbed > 0) {
-        "is absorbed"
+        "was absorbed"
     } else {
-        "is cut off at the last bounce"
+        "reached the bounce limit"
     }
 }
 

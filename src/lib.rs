@@ -33,8 +33,8 @@
 //!
 //! [`plan::transport`] decides which effects a scene calls for; what it drops is in no buffer, no pass and, by
 //! specialization constants (`glsl/scene/effects.glsl`), in no pipeline. [`judge`] is a path tracer on the CPU
-//! that shares nothing with it but the scene; [`selfcheck`] holds a device against closed forms, and
-//! [`study`] measures what accuracy costs in time on it, and [`mod@bench`] how near its limits every pass comes.
+//! that shares nothing with it but the scene; [`selfcheck`] checks a device against closed forms,
+//! [`study`] measures what accuracy costs in time, and [`mod@bench`] how close every pass comes to the device's limits.
 //!
 //! # What never changes by accident
 //!
@@ -54,8 +54,8 @@
 //!   not in another, so an effect that is forced on changes no bit of a scene that lacks it.
 //! - **What devices round as they like stands in one file** (`glsl/math.glsl`), beside functions that are the same to
 //!   the bit everywhere: `--math strict` takes those.
-//! - **Nothing that is no number passes unseen**: `--paranoid` names its photon ([`oddities`]), and
-//!   [`transport::replay`] traces that one alone.
+//! - **NaN and infinity are detected**: `--paranoid` reports the photon that they come from ([`oddities`]), and
+//!   [`transport::replay`] traces that photon alone.
 //!
 //! # What is estimated
 //!

@@ -1,4 +1,4 @@
-//! `--paranoid`: values that are infinite or no number, as the kernels noted them (`glsl/oddities.glsl`).
+//! `--paranoid`: nonfinite values (NaN and infinity) that kernels recorded (`glsl/oddities.glsl`).
 
 use serde::Serialize;
 
@@ -6,7 +6,7 @@ use crate::constants::*;
 use crate::error::Result;
 use crate::gpu::{Buffer, Commands, Gpu, Memory};
 
-/// One value that is no finite number, and whose it is.
+/// One nonfinite value, and the photon or pixel it belongs to.
 #[derive(Debug, Clone, Copy, PartialEq, Eq, Serialize)]
 pub struct Oddity {
     pub what: What,
@@ -27,8 +27,8 @@ pub enum What {
     Estimate,
 }
 
-/// How many there were, about 2^32 at most, and the first of them, photons before all else: what follows from
-/// them is no news.
+/// Their number, about 2^32 at most, and the first of them: photons first, because other nonfinite values may follow
+/// from those.
 #[derive(Debug, Clone, PartialEq, Eq, Default, Serialize)]
 pub struct Oddities {
     pub count: u32,
@@ -39,7 +39,7 @@ pub struct Oddities {
 const KINDS: usize = 3;
 const WORDS: usize = 1 + 3 * MAX_ODDITIES as usize;
 
-/// The buffer in which kernels note what is odd.
+/// The buffer in which kernels record nonfinite values.
 pub fn buffer(gpu: &Gpu, commands: &mut Commands) -> Result<Buffer> {
     let buffer = gpu.buffer::<u32>("oddities", (KINDS * WORDS) as u64, Memory::Device)?;
     commands.fill(&buffer, 0, (KINDS * WORDS) as u64, 0);
@@ -75,20 +75,20 @@ impl Oddities {
         }
     }
 
-    /// What a run says of them: one line.
+    /// One line of the report.
     pub fn text(&self) -> String {
         let Some(first) = self.first.first() else {
-            return "paranoid: no position, direction, flux or radiance is infinite or no number".to_owned();
+            return "nonfinite values: none; --paranoid checked all positions, directions, flux and radiance".to_owned();
         };
         let Oddity { round, item, .. } = first;
         let whose = match first.what {
-            What::Photon => format!("photon {item} of round {round}; --replay {round}:{item}, of render or the main job, traces it alone"),
+            What::Photon => format!("photon {item} of round {round}; trace it alone with --replay {round}:{item} (render or the main job)"),
             What::CausticPhoton => {
-                format!("caustic photon {item} of round {round}; --replay {round}:{item}:caustic, of render, traces it alone")
+                format!("caustic photon {item} of round {round}; trace it alone with render --replay {round}:{item}:caustic")
             }
-            What::SeenLight => format!("light at pixel or point {item} in round {round}"),
-            What::Estimate => format!("the estimate at pixel or point {item} in round {round}"),
+            What::SeenLight => format!("directly sampled light at pixel or point {item} in round {round}"),
+            What::Estimate => format!("the density estimate at pixel or point {item} in round {round}"),
         };
-        format!("paranoid: {} value(s) are infinite or no number, the first: {whose}", self.count)
+        format!("nonfinite values: {} (NaN or infinity), the first: {whose}", self.count)
     }
 }

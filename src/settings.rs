@@ -281,10 +281,10 @@ impl Settings {
         self.shininess.iter().any(Option::is_some)
     }
 
-    /// Refuses what no run could do right; every refusal names option, value and remedy.
+    /// Refuses settings that no run can satisfy; each error names the option, its value and the remedy.
     pub fn validate(&self) -> Result<()> {
         let width = 2.0 * HALF_WIDTH;
-        within("--photons", self.photons, 2..=MAX_PHOTONS, "photons a round, at least one for each of the two lights")?;
+        within("--photons", self.photons, 2..=MAX_PHOTONS, "photons per round, at least one for each of the two lights")?;
         within("--rounds", self.rounds, 1..=u32::MAX, "rounds")?;
         within("--bounces", self.bounces, 1..=MAX_BOUNCES, "bounces")?;
         if self.variant == Variant::Persistent {
@@ -315,7 +315,7 @@ impl Settings {
             return Err(Error::setting(
                 "--light-power",
                 format!("{floor},{left}"),
-                "the weaker light must have a millionth of all power or more",
+                "the weaker light must have at least a millionth of the total power",
             ));
         }
         if !(self.light_radius > 0.0 && self.light_radius <= HALF_WIDTH) {
@@ -330,7 +330,7 @@ impl Settings {
         }
         for shininess in self.shininess.iter().flatten() {
             if !(shininess.is_finite() && *shininess >= 0.0) {
-                return Err(Error::setting("--shininess", shininess, "must be a number from 0 up; leave it out for Lambertian walls"));
+                return Err(Error::setting("--shininess", shininess, "must be 0 or more; omit it for Lambertian walls"));
             }
         }
         if !self.eye.iter().all(|coordinate| coordinate.abs() <= MAX_EYE) {
@@ -350,7 +350,7 @@ impl Settings {
         self.validate_nearest()?;
         self.stop.validate()?;
         if let (Some(error), true) = (self.stop.error, self.sums != Sums::Integer) {
-            return Err(Error::setting("--error", error, "needs --sums integer: floats keep no sum of squares"));
+            return Err(Error::setting("--error", error, "needs --sums integer, because float sums have no error estimate"));
         }
         self.validate_random_numbers()?;
         let events = self.total_photons().saturating_mul(u64::from(self.bounces));
@@ -358,7 +358,7 @@ impl Settings {
             return Err(Error::setting(
                 "--rounds",
                 self.rounds,
-                format!("photons * rounds * bounces is {events}, and the film's 64-bit sums hold {MAX_EVENTS}; ask for fewer"),
+                format!("photons * rounds * bounces is {events}, but the film's 64-bit sums hold at most {MAX_EVENTS}; ask for fewer"),
             ));
         }
         Ok(())
@@ -366,21 +366,22 @@ impl Settings {
 
     fn validate_nearest(&self) -> Result<()> {
         let Some(nearest) = self.nearest else { return Ok(()) };
-        within("--nearest", nearest, 2..=constants::MAX_NEAREST, "photons; the farthest of them only says how large the disc is")?;
+        within("--nearest", nearest, 2..=constants::MAX_NEAREST, "photons; the farthest of them sets the radius of the disc")?;
         if self.gather != Gather::KdTree {
             return Err(Error::setting("--nearest", nearest, "needs --gather kdtree, which finds the nearest photons"));
         }
         if self.sums != Sums::Integer {
-            return Err(Error::setting("--nearest", nearest, "adds in integers; leave --sums out"));
+            return Err(Error::setting("--nearest", nearest, "always uses integer sums; omit --sums"));
         }
         if let Some(chunk) = self.chunk.filter(|chunk| *chunk < self.photons) {
-            let allowed = format!("must be --photons {} or more with --nearest, which looks at a round's photons together", self.photons);
+            let allowed =
+                format!("must be --photons {} or more with --nearest, which searches all photons of a round at once", self.photons);
             return Err(Error::setting("--chunk", chunk, allowed));
         }
         let wanted = u64::from(self.rounds) * u64::from(nearest);
         if wanted > MAX_NEAREST_SUMMED {
             let allowed =
-                format!("rounds * nearest is {wanted}, and the film's 64-bit sums hold {MAX_NEAREST_SUMMED}; ask for fewer rounds");
+                format!("rounds * nearest is {wanted}, but the film's 64-bit sums hold at most {MAX_NEAREST_SUMMED}; ask for fewer rounds");
             return Err(Error::setting("--rounds", self.rounds, allowed));
         }
         Ok(())
@@ -406,13 +407,15 @@ impl Settings {
         match self.rng {
             Rng::Philox => Ok(()),
             Rng::Rand48 => {
-                within("--seed", self.seed, 0..=u64::from(u32::MAX), "with --rng rand48, as srand48 takes 32 bits")?;
+                within("--seed", self.seed, 0..=u64::from(u32::MAX), "with --rng rand48, whose seed has 32 bits")?;
                 let draws = u128::from(self.total_photons()) * u128::from(self.draws_per_photon());
                 if draws > 1 << 48 {
                     return Err(Error::setting(
                         "--rng",
                         "rand48",
-                        format!("the run draws {draws} numbers and the generator has 2^48, so streams would overlap; use --rng philox"),
+                        format!(
+                            "the run draws {draws} numbers, but the generator has a period of 2^48, so its streams would overlap; use --rng philox"
+                        ),
                     ));
                 }
                 Ok(())
@@ -427,12 +430,12 @@ impl Settings {
                     ));
                 }
                 if self.total_photons() > 1 << 32 {
-                    return Err(Error::setting("--rng", "mt", "seeds 2^32 streams, and the run has more photons; use --rng philox"));
+                    return Err(Error::setting("--rng", "mt", "has 2^32 streams, but the run has more photons; use --rng philox"));
                 }
                 Ok(())
             }
             Rng::Sobol if self.total_photons() > 1 << 32 => {
-                Err(Error::setting("--rng", "sobol", "numbers 2^32 points, and the run has more photons; use --rng philox"))
+                Err(Error::setting("--rng", "sobol", "has 2^32 points, but the run has more photons; use --rng philox"))
             }
             Rng::Sobol => Ok(()),
         }
@@ -443,7 +446,7 @@ impl Settings {
         let twos = self.photons.trailing_zeros();
         (self.rng == Rng::Rand48 && twos >= 10).then(|| {
             format!(
-                "rand48 leap-frogged by {} = {} * 2^{twos} gives streams that are almost regular; use an odd --photons or --rng philox",
+                "rand48 gives correlated streams for {} = {} * 2^{twos} photons per round, a multiple of a large power of two; use an odd --photons or --rng philox",
                 self.photons,
                 self.photons >> twos
             )

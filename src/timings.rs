@@ -1,4 +1,4 @@
-//! Where time goes: nested scopes, each with its time on the device, on the host, or both.
+//! Timings as nested scopes, each with its time on the device, on the host, or both.
 
 use std::collections::HashMap;
 use std::time::{Duration, Instant};

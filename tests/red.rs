@@ -340,7 +340,7 @@ const FAULTS: [Fault; 64] = [
         from: "(cosine * lobe_weight",
         to: "(cosine * cosine * lobe_weight",
         kernels: &["receive", "view"],
-        noticed_by: &[ClosedForm("point light, 0.5 m aside: irradiance"), ClosedForm("point light: radiance of the plane")],
+        noticed_by: &[ClosedForm("point light, 0.5 m off axis: irradiance"), ClosedForm("point light: radiance of the plane")],
     },
     Fault {
         what: "reflected directions have the cosine thrice",
@@ -349,7 +349,7 @@ const FAULTS: [Fault; 64] = [
         to: "direction_at(sqrt(sqrt(u)), 1.0 - sqrt(u), azimuth)",
         kernels: &["fly_whole", "trace_ballot", "shine", "fly_ballot"],
         noticed_by: &[
-            ClosedForm("open box, ballot builder, uniform lamps: stored a photon"),
+            ClosedForm("open box, ballot builder, uniform lights: hits stored per photon"),
             ClosedForm("disc light, photons: irradiance"),
         ],
     },

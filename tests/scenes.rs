@@ -184,8 +184,8 @@ fn bad_options_are_refused_in_one_line() {
         on(&["cornell", "-o", "a.exr", "--environment", "1,2"], &["--environment 1,2"]),
         on(&["cornell", "-o", "a.exr", "--environment", "nan"], &["--environment nan"]),
         on(&["cornell", "-o", "a.exr", "--environment", "-1"], &["--environment -1", "0 or more"]),
-        on(&["cornell", "-o", "a.exr", "--device", "nonsense"], &["--device nonsense", "there is"]),
-        place.refuse(&["plan", "cornell", "--device", "nonsense"], &["--device nonsense", "there is"]),
+        on(&["cornell", "-o", "a.exr", "--device", "nonsense"], &["--device nonsense", "available: "]),
+        place.refuse(&["plan", "cornell", "--device", "nonsense"], &["--device nonsense", "available: "]),
     ]);
     assert_none(faults);
 }
@@ -406,7 +406,7 @@ fn a_run_explains_itself_and_its_report_closes() {
     assert_eq!((ledgers.len(), &report["rounds"], &report["end"]), (2, &json!(2), &json!("rounds")));
     assert_eq!(report["anomalies"], json!({"not_a_number": 0, "cut_to_largest": 0, "too_dense": 0}));
     let timings = report["timings"].as_array().unwrap();
-    for name in ["round", "round/see", "round/global", "round/caustic", "round/resolve"] {
+    for name in ["round", "round/visible points", "round/global", "round/caustic", "round/resolve"] {
         let row = timings.iter().find(|row| row["name"] == name).unwrap_or_else(|| panic!("no {name}: {timings:?}"));
         assert!(row["count"] == 2 && row["gpu_ms"].as_f64().unwrap() > 0.0, "{row}");
     }
@@ -419,7 +419,7 @@ fn a_run_explains_itself_and_its_report_closes() {
     // What is not asked for is not told; one round knows no error and still is JSON.
     let (stdout, _) =
         place.succeed(&["render", "cornell", "--size", "4x4", "--photons", "10", "--rounds", "1", "-o", "a.png", "--json", "b.json"]);
-    assert!(rows_of(&stdout).is_empty() && stdout.contains("unknown from a single round"), "{stdout}");
+    assert!(rows_of(&stdout).is_empty() && stdout.contains("unknown after a single round"), "{stdout}");
     assert!(place.json("b.json")["relative_error"].is_null());
 }
 

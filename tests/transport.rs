@@ -267,7 +267,7 @@ fn what_is_dropped_is_not_there() {
     for (lit, global, caustic) in [(&all, 3, 3), (&needed, 3, 0), (&direct, 0, 0)] {
         assert_eq!(count(lit, "round/global"), global);
         assert_eq!(count(lit, "round/caustic"), caustic);
-        assert_eq!(count(lit, "round/see"), 3);
+        assert_eq!(count(lit, "round/visible points"), 3);
     }
     // Two dispatches a round to see and resolve, one to weigh what maps hold; a map has one to shine, flights with their
     // sizes, the index and the lookup.

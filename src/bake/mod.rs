@@ -152,7 +152,7 @@ impl Layout {
             .collect::<Result<_>>()?;
         let texel_count: u64 = unwrapped.iter().flatten().map(|mesh| u64::from(mesh.width) * u64::from(mesh.height)).sum();
         if texel_count > MAX_TEXELS {
-            let allowed = format!("gives maps of {texel_count} texels in all, and at most {MAX_TEXELS} are baked; ask for fewer");
+            let allowed = format!("needs {texel_count} texels in all, but at most {MAX_TEXELS} can be baked; choose a smaller value");
             return Err(Error::setting(OPTION, texels_per_metre, allowed));
         }
         let warnings = warnings(scene, &unwrapped);
@@ -233,16 +233,19 @@ fn warnings(scene: &Scene, unwrapped: &[Option<unwrap::Unwrapped>]) -> Vec<Strin
         }
     }
     for (reason, names) in refused {
-        warnings.push(format!("{} unwrapped anew: the second UV set {reason}", listed(&names)));
+        warnings.push(format!("new lightmap UVs for {}: the second UV set {reason}", listed(&names)));
     }
     if !coarse.is_empty() {
-        warnings.push(format!("maps have at most {MAX_SIDE} texels a side: fewer texels per metre than asked for on {}", listed(&coarse)));
+        warnings.push(format!(
+            "lightmaps are limited to {MAX_SIDE} texels per side: fewer texels per metre than requested on {}",
+            listed(&coarse)
+        ));
     }
     if unwrapped.iter().all(Option::is_none) {
         warnings.push("every surface is a mirror or a dielectric: there is nothing to bake".into());
     }
     if scene.lights.iter().any(|light| matches!(light.kind, LightKind::Disc { .. } | LightKind::Environment { .. })) {
-        warnings.push("glTF knows no disc or environment lights: the maps hold their light, scene.gltf does not hold them".into());
+        warnings.push("glTF has no disc or environment lights: the lightmaps contain their light, but scene.gltf omits them".into());
     }
     warnings
 }

@@ -155,7 +155,10 @@ fn charts(mesh: &Mesh, texels_per_metre: f64) -> Result<Unwrapped, String> {
         false => (generate(largest)?, true),
     };
     if atlas.page_count > 1 {
-        return Err(format!("falls into {} pieces, too many for a map of {MAX_SIDE} texels a side; split it", atlas.chart_count));
+        return Err(format!(
+            "unwraps into {} pieces, too many for a lightmap of {MAX_SIDE} texels per side; split the mesh",
+            atlas.chart_count
+        ));
     }
     // Texels that a map gains on its way to the smallest one allowed lie beyond its charts.
     let (width, height) = (atlas.width.max(MIN_SIDE), atlas.height.max(MIN_SIDE));

@@ -1,7 +1,8 @@
-//! Time on the device to a relative error. The reference is path-traced by the judge; where that is too noisy to tell so
-//! small an error, it is a long run of other photons, held against the judge by its light in all. Pixels in which a lamp
-//! is seen straight are left out; of `caustic-sphere`, those too that show it in the glass, as a few hairlines hundreds of
-//! times brighter than all else would be most of the error. What the error is with them is told too.
+//! Device time to reach a relative error. The reference comes from the path tracer ([`crate::judge`]). Where that is too
+//! noisy for so small an error, the reference is a long run with another seed, whose total light is checked against the
+//! path tracer. Pixels that show a light source directly are excluded. In `caustic-sphere` so are pixels that show it
+//! through the glass: a few thin lines hundreds of times brighter than the rest would dominate the error. The report also
+//! gives the error with those pixels included.
 
 use std::time::{Duration, Instant};
 
@@ -23,7 +24,7 @@ use crate::transport::Lit;
 
 /// Runs of a point, each with a seed of its own.
 const REPEATS: u32 = 3;
-/// Seed of the first of them, and that of a long run which they are held against.
+/// Seed of the first of them, and of the long run that is their reference.
 const FIRST_SEED: u64 = 1;
 const LONG_RUN_SEED: u64 = 1 << 20;
 const MOST_DOUBLINGS: u32 = 16;
@@ -87,23 +88,23 @@ pub fn measure(lab: &mut Lab, name: &str) -> Result<Found> {
     let timed = scene_line::time(lab.gpu, &lab.rates, &job(used), lab.cancelled)?;
     let (seconds, how) = match best {
         Some((ms, settings, rounds)) => {
-            let mut how = format!("to {} % in up to {rounds} round(s) of {}", 100.0 * wanted, search.command(&settings, rounds));
+            let mut how = format!("{} % within {rounds} round(s): {}", 100.0 * wanted, search.command(&settings, rounds));
             if leaves_out_images {
                 let lit = job(settings.clone()).light(lab.gpu, TransportSettings { rounds, ..settings }, lab.cancelled)?;
                 let all = Reference { counts: not_straight, ..search.reference.clone() };
                 let shown = all.mean_over(|place| f64::from(u8::from(!search.reference.counts[place])));
                 let error = (all.squared_error(&values(&lit)).max(0.0) / all.mean_square()).sqrt();
                 how += &format!(
-                    "; {:.2} % of the pixels show the lamp in glass and are left out, with them the error of so many rounds is {:.2} %",
+                    "; excludes the {:.2} % of pixels that show the light source through glass (error with them: {:.2} %)",
                     100.0 * shown,
                     100.0 * error
                 );
             }
             (1e-3 * ms, how)
         }
-        None => (f64::NAN, format!("{} % at {size} x {size} was not reached, {:.2} % was", 100.0 * wanted, 100.0 * closest)),
+        None => (f64::NAN, format!("{} % at {size} x {size} was not reached; the best was {:.2} %", 100.0 * wanted, 100.0 * closest)),
     };
-    let how = format!("{how}; against {}, known to {:.2} %", search.reference.method, 100.0 * search.reference.relative_error);
+    let how = format!("{how}; reference: {}, own error {:.2} %", search.reference.method, 100.0 * search.reference.relative_error);
     let limit = limit_of_round(&timed).map(|ms| seconds * ms / timed.round_ms);
     Ok((timed.passes, vec![(seconds, limit, how)]))
 }
@@ -167,7 +168,7 @@ fn long_run(lab: &Lab, job: &Job, search: &Search) -> Result<Reference> {
         let is_good = reference.relative_error <= REFERENCE_SHARE * search.wanted;
         // The next would take four times as long as all before it together.
         if is_good || 5 * began.elapsed() > 4 * search.patience || rounds >= MOST_ROUNDS {
-            reference.method = format!("a run of {rounds} rounds of other photons, {}", beside(&reference, &search.reference));
+            reference.method = format!("a run of {rounds} rounds with another seed, {}", beside(&reference, &search.reference));
             return Ok(reference);
         }
         rounds *= 4;
@@ -201,7 +202,7 @@ fn beside(reference: &Reference, judge: &Reference) -> String {
     let both = |place: usize| judge.standard_errors[place].powi(2) + reference.standard_errors[place].powi(2);
     let apart = judge.mean_over(|place| (reference.values[place] - judge.values[place]).powi(2) - both(place));
     format!(
-        "{:.4} of the light that path tracing finds (+- {:.4}), pixels {:.2} % off beyond the noise of both",
+        "total light {:.4} of path tracing's (+- {:.4}), pixels differ by {:.2} % beyond noise",
         reference.mean_over(|place| reference.values[place]) / total,
         noise / total,
         100.0 * (apart.max(0.0) / judge.mean_square()).sqrt()
@@ -209,7 +210,7 @@ fn beside(reference: &Reference, judge: &Reference) -> String {
 }
 
 fn configuration(settings: &TransportSettings) -> Configuration {
-    Configuration { label: format!("{} photons a round", settings.photons), line: Line::Scene(settings.clone()) }
+    Configuration { label: format!("{} photons per round", settings.photons), line: Line::Scene(settings.clone()) }
 }
 
 impl Search<'_> {

@@ -1,4 +1,4 @@
-//! Time over size, both logarithmic, a line a pass, as SVG.
+//! Time over size, both logarithmic, one line per pass, as SVG.
 
 use plotters::coord::Shift;
 use plotters::prelude::*;

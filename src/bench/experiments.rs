@@ -71,13 +71,13 @@ impl Experiment {
         match self {
             Experiment::OpenBox => "open box, 15 bounces, every builder",
             Experiment::Builders => "the paper's workload, 2 and 15 bounces, every builder",
-            Experiment::Compaction => "who wins where: every builder over photons and survival",
-            Experiment::Table1 => "table 1's last row",
-            Experiment::Index => "index of many photons",
+            Experiment::Compaction => "fastest builder by photon count and survival",
+            Experiment::Table1 => "last row of table 1",
+            Experiment::Index => "index of a large photon map",
             Experiment::Gather => "gather at the points of a picture",
             Experiment::Cornell => "cornell, 16 bounces",
-            Experiment::CornellSpheres => "cornell-spheres to a relative error",
-            Experiment::CausticSphere => "caustic-sphere to a relative error",
+            Experiment::CornellSpheres => "cornell-spheres: time to an error",
+            Experiment::CausticSphere => "caustic-sphere: time to an error",
             Experiment::Mesh => "many triangles",
             Experiment::Effects => "effects that a scene lacks",
         }
@@ -139,7 +139,7 @@ fn open_box(lab: &mut Lab) -> Result<Found> {
         let rate = timed.counts.events / timed.ms("build") * 1e3;
         if best.as_ref().is_none_or(|best| rate > best.0) {
             let limit = limit_ms(timed.pass("build")).map(|ms| timed.counts.events / ms * 1e3);
-            best = Some((rate, limit, format!("{}, {photons} photons a round", variant.name())));
+            best = Some((rate, limit, format!("{}, {photons} photons per round", variant.name())));
         }
         passes.extend(timed.passes);
     }
@@ -169,8 +169,8 @@ fn builders(lab: &mut Lab) -> Result<Found> {
         let ((_, naive, naive_limit), (_, atomic, atomic_limit)) = (of(Variant::Naive), of(Variant::Atomic));
         let ratio = |over: f64, under: f64| if bounces == 2 { over / under } else { under / over };
         let limit = atomic_limit.zip(naive_limit).map(|(atomic, naive)| ratio(atomic, naive));
-        let of_one = one_counter.map_or_else(String::new, |one| format!("; all from one counter: {:.2} x", ratio(one, naive)));
-        ratios.push((ratio(atomic, naive), limit, format!("{photons} photons a round{of_one}")));
+        let of_one = one_counter.map_or_else(String::new, |one| format!("; with a single counter: {:.2} x", ratio(one, naive)));
+        ratios.push((ratio(atomic, naive), limit, format!("{photons} photons per round{of_one}")));
     }
     Ok((passes, ratios))
 }
@@ -201,7 +201,7 @@ fn table_1(lab: &mut Lab) -> Result<Found> {
         if best.as_ref().is_none_or(|best| seconds < best.0) {
             let limit = limit_of_round(&runs[0]).map(|ms| 1e-3 * ms * f64::from(settings.rounds));
             let how = format!(
-                "{} rounds of {} photons, {}, set-up included; {:.4} s on the host's clock",
+                "{} rounds of {} photons, {}, set-up included; {:.4} s wall time",
                 settings.rounds,
                 settings.photons,
                 variant.name(),
@@ -228,7 +228,7 @@ fn index(lab: &mut Lab) -> Result<Found> {
     let of_room = paper_line::time(lab.gpu, &lab.rates, &room((wanted / share) as u32), lab.cancelled)?;
     let mut found = Vec::new();
     let stored = of_room.counts.survivors;
-    let how = |stored: f64| format!("{stored:.0} photons in the map, time in proportion");
+    let how = |stored: f64| format!("measured with {stored:.0} photons in the map, time scaled in proportion");
     found.push((scaled(of_room.ms("index"), stored), limit_ms(of_room.pass("index")).map(|ms| scaled(ms, stored)), how(stored)));
 
     lab.go_on()?;
@@ -282,8 +282,8 @@ fn gather(lab: &mut Lab) -> Result<Found> {
     let job = job(photons, radius, size);
     let per_estimate = survey(&job)?.map_or(f64::NAN, |survey| survey.per_estimate);
     let timed = scene_line::time(lab.gpu, &lab.rates, &job, lab.cancelled)?;
-    let how = format!("{} x {} points, {photons} photons emitted, {per_estimate:.1} an estimate", size.0, size.1);
-    let found = (1e-3 * timed.ms("global/look up"), limit_ms(timed.pass("global/look up")).map(|ms| 1e-3 * ms), how);
+    let how = format!("{} x {} points, {photons} photons emitted, {per_estimate:.1} per estimate", size.0, size.1);
+    let found = (1e-3 * timed.ms("global/gather"), limit_ms(timed.pass("global/gather")).map(|ms| 1e-3 * ms), how);
     Ok((timed.passes, vec![found]))
 }
 
@@ -294,7 +294,7 @@ fn cornell(lab: &mut Lab) -> Result<Found> {
     let settings = TransportSettings { photons, bounces: 16, illumination: Illumination::Photons, ..TransportSettings::default() };
     let size = lab.choose((32, 32), (128, 128), (512, 512));
     let job = Job { name: "cornell, photons alone", scene: &scene, geometry: &geometry, size, settings };
-    best_builder(lab, &job, "global/trace", "every arrival stored")
+    best_builder(lab, &job, "global/trace", "every hit stored")
 }
 
 fn mesh(lab: &mut Lab) -> Result<Found> {
@@ -318,7 +318,7 @@ fn best_builder(lab: &mut Lab, job: &Job, pass: &str, how: &str) -> Result<Found
         let rate = |ms: f64| timed.counts.emitted / ms * 1e3;
         let found = rate(timed.ms(pass));
         if best.as_ref().is_none_or(|best| found > best.0) {
-            let how = format!("{}, {} photons a round, {how}", append.name(), job.settings.photons);
+            let how = format!("{}, {} photons per round, {how}", append.name(), job.settings.photons);
             best = Some((found, limit_ms(timed.pass(pass)).map(rate), how));
         }
         passes.extend(timed.passes);
@@ -356,6 +356,6 @@ fn effects(lab: &mut Lab) -> Result<Found> {
         }
     }
     let [usual, without, forced] = round_ms.map(|values| Spread::of(values).map_or(f64::NAN, |spread| spread.median));
-    let how = format!("{} effects that it lacks; forced on they take {:.2} x the time", lacking.len(), forced / usual);
+    let how = format!("{} unneeded effects; forcing them on takes {:.2} x the time", lacking.len(), forced / usual);
     Ok((passes, vec![(usual / without, Some(1.0), how)]))
 }

@@ -1,4 +1,4 @@
-//! How near the device's limits every pass comes: the roofline.
+//! How close every pass comes to the device's limits (roofline).
 //!
 //! [`rates`] measures what the device can do, [`paper_line`] and [`scene_line`] time the passes of both lines beside what
 //! they cannot do without ([`pass`]), [`experiments`] runs the workloads that the targets name ([`targets`]), and [`scale`]
@@ -68,7 +68,7 @@ pub struct Bench {
     pub rates: Rates,
     pub passes: Vec<Pass>,
     pub targets: Vec<Finding>,
-    /// Who wins where among the builders of the paper's line.
+    /// The fastest builder of the paper's box by photon count and survival.
     pub compaction: Option<Map>,
     pub scale: Option<Scale>,
     /// What was not measured, and why.
@@ -100,7 +100,7 @@ impl Lab<'_> {
         }
     }
 
-    /// Fails once somebody has ended it.
+    /// Fails once the bench is interrupted.
     pub fn go_on(&self) -> Result<()> {
         if self.cancelled.load(Ordering::Relaxed) { Err(Error::Interrupted) } else { Ok(()) }
     }
@@ -110,8 +110,8 @@ impl Lab<'_> {
     }
 }
 
-/// Measures the device, then the experiments that are asked for. Experiments that were finished when somebody ended it are
-/// kept.
+/// Measures the device, then the experiments that are asked for. Experiments that were complete when it was
+/// interrupted are kept.
 pub fn run(gpu: &Gpu, request: Request, cancelled: &AtomicBool, tell: &mut dyn FnMut(&str)) -> Result<Bench> {
     paper_line::check_clock(gpu)?;
     let deadline = Instant::now() + request.budget;
@@ -133,7 +133,7 @@ pub fn run(gpu: &Gpu, request: Request, cancelled: &AtomicBool, tell: &mut dyn F
         request,
     };
     match measure(&mut lab, &mut bench) {
-        Err(Error::Interrupted) => bench.left_out.push("what follows: ended by hand".to_owned()),
+        Err(Error::Interrupted) => bench.left_out.push("the remaining experiments: interrupted".to_owned()),
         result => result?,
     }
     Ok(bench)
@@ -147,7 +147,7 @@ fn measure(lab: &mut Lab, bench: &mut Bench) -> Result<()> {
     for (number, experiment) in bench.request.experiments.clone().into_iter().enumerate() {
         lab.go_on()?;
         if lab.is_late() {
-            bench.left_out.push(format!("{}: --time was spent", experiment.name()));
+            bench.left_out.push(format!("{}: no --time left", experiment.name()));
             continue;
         }
         (lab.tell)(&format!("[{}/{}] {}", number + 1, bench.request.experiments.len(), experiment.title()));

@@ -1,5 +1,4 @@
-//! The paper's line under the clock: rounds of the open box by one builder, pass by pass, beside what each pass cannot
-//! do without.
+//! Times of the paper's box: rounds of one builder, pass by pass, beside the least work that each pass needs.
 
 use std::sync::atomic::AtomicBool;
 
@@ -77,7 +76,7 @@ pub const REPEATS: u32 = 7;
 /// Rounds before them: the first fills caches.
 pub const DROPPED: u32 = 1;
 
-/// Fails where nothing can be timed, or somebody ended the run.
+/// Fails where nothing can be timed, or the run was interrupted.
 pub fn check_clock(gpu: &Gpu) -> Result<()> {
     if gpu.facts().timestamp_bits == 0 {
         return Err(Error::setting("--device", &gpu.facts().name, "has no timestamps, so its passes cannot be timed; choose another"));

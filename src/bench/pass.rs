@@ -1,4 +1,4 @@
-//! One pass of a workload: how long it takes, what it does, and how near that comes to what the device can do.
+//! One pass of a workload: its time, its work, and how close it comes to the device's limits.
 
 use std::collections::BTreeMap;
 use std::ops::{Add, Mul};
@@ -109,7 +109,7 @@ pub struct Pass {
     pub name: String,
     /// On the device, of a round.
     pub ms: Spread,
-    /// `None` where nobody has counted what the pass does.
+    /// `None` where the work of the pass has not been counted.
     pub work: Option<Work>,
     pub items_per_second: Option<f64>,
     pub bytes_per_second: Option<f64>,

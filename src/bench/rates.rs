@@ -1,5 +1,5 @@
-//! What a device can do at most, measured through the same engine as everything else: bandwidth, arithmetic, random
-//! reads, atomics. Every measurement is checked for its result, so that no driver can leave the work out.
+//! The device's peak rates, measured with the same engine as everything else: bandwidth, arithmetic, random reads,
+//! atomics. The result of every measurement is checked, so that a driver cannot skip the work.
 
 use std::time::{Duration, Instant};
 

@@ -119,7 +119,7 @@ fn over_photons(lab: &mut Lab, left_out: &mut Vec<String>) -> Result<Vec<Step>> 
     for size in decades.map(|decade| 10u64.pow(decade)) {
         lab.go_on()?;
         if lab.is_late() {
-            left_out.push(format!("{size} photons: --time was spent"));
+            left_out.push(format!("{size} photons: no --time left"));
             continue;
         }
         (lab.tell)(&format!("{size} photons"));
@@ -156,7 +156,7 @@ fn over_triangles(lab: &mut Lab, left_out: &mut Vec<String>) -> Result<Vec<Step>
     for size in decades.map(|decade| 10u32.pow(decade)) {
         lab.go_on()?;
         if lab.is_late() {
-            left_out.push(format!("{size} triangles: --time was spent"));
+            left_out.push(format!("{size} triangles: no --time left"));
             continue;
         }
         (lab.tell)(&format!("{size} triangles"));
@@ -171,7 +171,7 @@ fn over_triangles(lab: &mut Lab, left_out: &mut Vec<String>) -> Result<Vec<Step>
             passes: timed
                 .passes
                 .iter()
-                .filter(|pass| ["see", "global/trace", "global/index", "global/look up"].contains(&pass.name.as_str()))
+                .filter(|pass| ["visible points", "global/trace", "global/index", "global/gather"].contains(&pass.name.as_str()))
                 .map(|pass| PassTime { pass: pass.name.clone(), ms: pass.ms })
                 .collect(),
             peak_bytes: timed.memory.peak_device_bytes,

@@ -1,4 +1,4 @@
-//! The line of triangles under the clock: rounds of a scene, pass by pass, beside what each pass cannot do without.
+//! Times of a scene of triangles: rounds, pass by pass, beside the least work that each pass needs.
 
 use std::f64::consts::PI;
 use std::sync::atomic::AtomicBool;
@@ -193,7 +193,7 @@ impl Model<'_> {
         let points = f64::from(self.plan.visible_points());
         let sums = 24.0 * points * f64::from(self.plan.arrival_sets);
         match pass {
-            "see" => {
+            "visible points" => {
                 let shadow_rays = f64::from(self.plan.constant("SHADOW_RAYS"));
                 let cost = Cost {
                     bytes: samples * 24.0 + points * bytes::<VisiblePoint>(),
@@ -203,7 +203,7 @@ impl Model<'_> {
                 };
                 work("samples", samples, cost)
             }
-            "weigh" => {
+            "flux to radiance" => {
                 let cost = Cost {
                     bytes: points * (bytes::<VisiblePoint>() + 24.0) + sums,
                     float_operations: points * WEIGH_OPERATIONS,
@@ -263,7 +263,7 @@ impl Model<'_> {
             "index/count" => ("photons", survey.stored, 2.0 * chunks, count),
             "index/scan" => ("cells", buckets, scans, scan),
             "index/sort" => ("photons", survey.stored, chunks, sort),
-            "look up" => ("photons found", found, look_ups, look_up),
+            "gather" => ("photons found", found, look_ups, look_up),
             _ => return None,
         };
         Some(Work { item, items, dispatches, cost })

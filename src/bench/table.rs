@@ -1,4 +1,4 @@
-//! A bench as text: what the device can do, every pass beside its limit, and the targets.
+//! A bench as text: the device's rates, every pass with its limit, and the targets.
 
 use std::fmt::Write;
 
@@ -20,7 +20,7 @@ pub fn text(bench: &Bench) -> String {
     }
     if let Some(scale) = &bench.scale {
         for series in &scale.series {
-            writeln!(text, "\n{:<14} {:>14} {:>16} {:>16}", series.over, "", "bytes taken", "bytes stated").unwrap();
+            writeln!(text, "\n{:<14} {:>14} {:>16} {:>16}", series.over, "", "bytes used", "bytes planned").unwrap();
             for step in &series.steps {
                 writeln!(text, "{:<14} {:>14} {:>16} {:>16}", step.size, "", step.peak_bytes, step.stated_bytes).unwrap();
                 for pass in &step.passes {
@@ -31,7 +31,7 @@ pub fn text(bench: &Bench) -> String {
                 let (power, from, over) = (growth.power, growth.from, series.over);
                 writeln!(
                     text,
-                    "{}: time goes with {over} to the power {:.3} +- {:.3} from {from} on; that is off by {:.1} %, a logarithm by {:.1} %",
+                    "{}: time grows as {over} to the power {:.3} +- {:.3} from {from} {over} on (RMS error of this fit {:.1} %, of a logarithmic fit {:.1} %)",
                     growth.pass,
                     power.value,
                     power.error,
@@ -43,7 +43,7 @@ pub fn text(bench: &Bench) -> String {
         }
     }
     for line in &bench.left_out {
-        writeln!(text, "left out: {line}").unwrap();
+        writeln!(text, "not measured: {line}").unwrap();
     }
     text
 }
@@ -77,7 +77,7 @@ fn quantity(value: f64, unit: &str) -> String {
 }
 
 fn spread_ms(spread: &Spread) -> String {
-    format!("{:>10.4} ms ({:.4} to {:.4}, {} times)", spread.median, spread.min, spread.max, spread.repeats)
+    format!("{:>10.4} ms ({:.4} to {:.4}, {} runs)", spread.median, spread.min, spread.max, spread.repeats)
 }
 
 fn rates(text: &mut String, bench: &Bench) {
@@ -87,13 +87,13 @@ fn rates(text: &mut String, bench: &Bench) {
         writeln!(text, "{name:<34} {:>9}B/s  ({} to {})", scaled(rate.median), scaled(rate.min), scaled(rate.max)).unwrap();
     }
     for (name, rate, unit) in [
-        ("dispatches, one after another", &rates.dispatches, "/s"),
-        ("float sums and products", &rates.float_operations, "/s"),
-        ("integer products to 64 bits", &rates.integer_products, "/s"),
+        ("dependent dispatches", &rates.dispatches, "/s"),
+        ("float additions, multiplications", &rates.float_operations, "/s"),
+        ("integer products (32 x 32 bits)", &rates.integer_products, "/s"),
         ("random reads of 32 bytes", &rates.random_reads, "/s"),
-        ("atomics at many counters", &rates.spread_atomics, "/s"),
-        ("atomics at one counter", &rates.single_atomics, "/s"),
-        ("the same, one a subgroup", &rates.counter_additions, "/s"),
+        ("atomics on many counters", &rates.spread_atomics, "/s"),
+        ("atomics on one counter", &rates.single_atomics, "/s"),
+        ("one counter, atomic per subgroup", &rates.counter_additions, "/s"),
     ] {
         writeln!(text, "{name:<34} {:>9}{unit}  ({} to {})", scaled(rate.median), scaled(rate.min), scaled(rate.max)).unwrap();
     }
@@ -106,8 +106,8 @@ fn passes(text: &mut String, bench: &Bench) {
             workload = &pass.workload;
             writeln!(
                 text,
-                "\n{workload}\n  {:<18} {:>10} {:>19} {:>11} {:>11} {:>10} {:>7}",
-                "pass", "ms", "least to most", "items/s", "bytes/s", "limit ms", "share"
+                "\n{workload}\n  {:<18} {:>10} {:>19} {:>11} {:>11} {:>10} {:>8} {:<8} items",
+                "pass", "ms", "min to max", "items/s", "bytes/s", "limit ms", "of limit", "bound by"
             )
             .unwrap();
         }
@@ -116,7 +116,7 @@ fn passes(text: &mut String, bench: &Bench) {
         let (limit, by) = pass.limit.map_or(("-".to_owned(), ""), |limit| (format!("{:.4}", limit.ms), limit.by.name()));
         writeln!(
             text,
-            "  {:<18} {:>10.4} {range:>19} {:>11} {:>11} {limit:>10} {:>7} {by:<8} {}",
+            "  {:<18} {:>10.4} {range:>19} {:>11} {:>11} {limit:>10} {:>8} {by:<8} {}",
             pass.name,
             pass.ms.median,
             optional(pass.items_per_second),
@@ -140,7 +140,7 @@ fn targets(text: &mut String, bench: &Bench) {
         let met = match finding.met {
             Some(true) => "yes",
             Some(false) => "no",
-            None => "(of H200)",
+            None => "H200 only",
         };
         let limit = finding.limit.map_or("-".to_owned(), value);
         writeln!(text, "{wanted:<14} {:>11} {limit:>11} {met:>9}  {}", value(finding.found), target.work).unwrap();

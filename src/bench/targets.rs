@@ -1,4 +1,4 @@
-//! What is wanted of an NVIDIA H200, and what was found.
+//! Performance targets for an NVIDIA H200, and the measured values.
 
 use serde::Serialize;
 
@@ -20,7 +20,7 @@ pub struct Target {
     pub work: &'static str,
     pub wanted: Wanted,
     pub unit: &'static str,
-    /// What others reach, and where that is known from.
+    /// What other programs reach, with the source.
     pub peer: &'static str,
 }
 
@@ -31,28 +31,28 @@ const REFERENCE_DEVICE: &str = "H200";
 pub const TARGETS: [Target; 12] = [
     Target {
         experiment: Experiment::OpenBox,
-        work: "open box, 15 bounces, 2^24 photons a round, best builder: photon-wall events",
+        work: "open box, 15 bounces, 2^24 photons per round, best builder: photon-wall events",
         wanted: Wanted::AtLeast(20e9),
         unit: "/s",
         peer: "-",
     },
     Target {
         experiment: Experiment::Builders,
-        work: "atomic over naive, 2^22 photons, 2 bounces: time of the build",
+        work: "map pass, 2^22 photons, 2 bounces: time of atomic over naive",
         wanted: Wanted::AtMost(1.1),
         unit: "x",
         peer: "the paper: 6.5 x",
     },
     Target {
         experiment: Experiment::Builders,
-        work: "naive over atomic, 2^22 photons, 15 bounces: time of the build",
+        work: "map pass, 2^22 photons, 15 bounces: time of naive over atomic",
         wanted: Wanted::AtLeast(2.0),
         unit: "x",
         peer: "-",
     },
     Target {
         experiment: Experiment::Table1,
-        work: "table 1's last row, 50 rounds of 5000 photons: the whole run on the device",
+        work: "last row of table 1, 50 rounds of 5000 photons: device time of the run",
         wanted: Wanted::AtMost(0.010),
         unit: "s",
         peer: "the paper: 105.64 s",
@@ -73,7 +73,7 @@ pub const TARGETS: [Target; 12] = [
     },
     Target {
         experiment: Experiment::Gather,
-        work: "gather at 1920 x 1080 visible points, 1 M photons, 50 an estimate",
+        work: "gather at 1920 x 1080 visible points, 1 M photons, 50 per estimate",
         wanted: Wanted::AtMost(0.001),
         unit: "s",
         peer: "-",
@@ -87,14 +87,14 @@ pub const TARGETS: [Target; 12] = [
     },
     Target {
         experiment: Experiment::CornellSpheres,
-        work: "cornell-spheres, 256 x 256, to 1 % relative RMSE",
+        work: "cornell-spheres, 256 x 256: time to 1 % relative RMSE",
         wanted: Wanted::AtMost(0.3),
         unit: "s",
         peer: "Mitsuba 3, same device: path 31 s, light tracing 4.5 s",
     },
     Target {
         experiment: Experiment::CausticSphere,
-        work: "caustic-sphere, 256 x 256, to 1 % relative RMSE",
+        work: "caustic-sphere, 256 x 256: time to 1 % relative RMSE",
         wanted: Wanted::AtMost(0.2),
         unit: "s",
         peer: "Mitsuba 3, same device: path 58 s, light tracing 19 s",
@@ -108,7 +108,7 @@ pub const TARGETS: [Target; 12] = [
     },
     Target {
         experiment: Experiment::Effects,
-        work: "effects that cornell lacks: time with them left to the plan over left out by hand",
+        work: "effects that cornell lacks: time when the plan drops them over time with --without",
         wanted: Wanted::AtMost(1.02),
         unit: "x",
         peer: "-",

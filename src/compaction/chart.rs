@@ -1,4 +1,4 @@
-//! The map of who wins where: a field for every number of photons and survival, in the winner's colour.
+//! The fastest builder by photon count and survival: a cell for each pair, in the builder's colour.
 
 use plotters::prelude::*;
 use plotters::style::text_anchor::{HPos, Pos, VPos};
@@ -25,8 +25,8 @@ const FIELD: (i32, i32) = (92, 64);
 const LEFT: i32 = 110;
 const TOP: i32 = 16;
 
-/// Photons to the right, survival upwards; in each field the fastest builder, how much faster than one atomic a thread it
-/// is, and, in small letters, who cannot be told from it.
+/// Photons to the right, survival upwards; in each cell the fastest builder, its speed-up over one atomic per thread, and,
+/// in small letters, the builders that are not significantly slower.
 pub fn draw(map: &Map) -> String {
     let (sizes, survivals) = (map.sizes(), map.survivals());
     let width = LEFT + FIELD.0 * sizes.len() as i32 + 16;

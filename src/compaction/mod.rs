@@ -1,5 +1,5 @@
-//! The paper's question for today: which way of storing survivors is the fastest, for how many photons and how many of them
-//! surviving. All ways trace the same photons, which is checked, so that a difference in time has one cause.
+//! The paper's question on today's devices: which builder stores survivors fastest, by photon count and survival. All
+//! builders trace the same photons, which is checked, so that a difference in time has one cause.
 
 pub mod chart;
 
@@ -33,7 +33,7 @@ pub struct Request {
     pub bounces: u32,
     /// Runs of each builder that count.
     pub turns: usize,
-    /// No size is begun that would probably end later than this after the start.
+    /// No size is begun that would probably exceed this time.
     pub budget: Duration,
 }
 
@@ -45,7 +45,7 @@ impl Request {
     }
 }
 
-/// Who wins where.
+/// The fastest builder by photon count and survival.
 #[derive(Debug, Clone, PartialEq, Serialize)]
 pub struct Map {
     pub device: String,
@@ -182,7 +182,8 @@ fn agree(variant: Variant, photons: u32, survival: f32, same: bool) -> Result<()
     if same {
         return Ok(());
     }
-    let what = format!("{} stores other photons than the builders before it, of {photons} at survival {survival}", variant.name());
+    let what =
+        format!("{} stored different photons from the builders before it, with {photons} photons at survival {survival}", variant.name());
     Err(Error::Device { call: "the compaction study", reason: what })
 }
 
@@ -220,7 +221,7 @@ impl Cell {
         self.builders.iter().find(|timed| timed.variant == variant).expect("every builder was timed")
     }
 
-    /// Those whose fastest run is no slower than the winner's slowest: the winner, and who cannot be told from it.
+    /// The fastest builder, and those not significantly slower: their fastest run is no slower than its slowest.
     pub fn winners(&self) -> impl Iterator<Item = Variant> {
         let slowest = self.builders[0].ms.max;
         self.builders.iter().filter(move |timed| timed.ms.min <= slowest).map(|timed| timed.variant)
@@ -248,11 +249,11 @@ impl Map {
         self.cells.iter().find(|cell| cell.photons == photons && cell.survival == survival)
     }
 
-    /// A line for each cell: its winner, who cannot be told from it, and what all others take in times of its time.
+    /// A line for each cell: the fastest builder, those not significantly slower, and every builder's time relative to it.
     pub fn text(&self) -> String {
         let mut text = format!(
             "{:>12} {:>9} {:>14} {:>8} {:>10}  {}\n",
-            "photons", "survival", "stored", "alike in", "best, ms", "builders, times the best"
+            "photons", "survival", "stored", "compared", "best, ms", "time relative to the best"
         );
         for cell in &self.cells {
             let best = cell.builders[0].ms.median;
@@ -279,9 +280,9 @@ impl Map {
         }
         if !self.left_out.is_empty() {
             let sizes: Vec<String> = self.left_out.iter().map(|photons| count(u64::from(*photons))).collect();
-            text.push_str(&format!("left out, as no time was left: {} photons\n", sizes.join(", ")));
+            text.push_str(&format!("not measured, for lack of time: {} photons\n", sizes.join(", ")));
         }
-        text.push_str("* cannot be told from the best: its fastest run is no slower than the best one's slowest\n");
+        text.push_str("* not significantly slower than the best: its fastest run is no slower than the best builder's slowest run\n");
         text
     }
 }

@@ -97,7 +97,7 @@ impl Gpu {
             })
             .map_err(|error| Error::Device {
                 call: "memory allocation",
-                reason: format!("{size_bytes} bytes for {name}: {error}; ask for fewer --photons at once with --chunk"),
+                reason: format!("{size_bytes} bytes for {name}: {error}; trace fewer photons at once with --chunk"),
             })?;
         // SAFETY: memory and offset come from the allocator for these requirements, and the allocation is
         // freed after the buffer.

@@ -1,7 +1,6 @@
-//! The start-up check: what every run relies on, asked of the device before it is trusted.
+//! The start-up check: tests on the device what every run relies on.
 //!
-//! Software and young drivers get such things wrong without a word: lavapipe, for one, leaves the
-//! loops of an invocation after 65 535 iterations.
+//! Some drivers fail silently: lavapipe ends the loops of an invocation after 65 535 iterations.
 
 use std::time::Instant;
 
@@ -35,7 +34,7 @@ pub(super) fn run(gpu: &Gpu) -> Result<()> {
     let order_sum = answers.subgroups * (odd_lanes * odd_lanes.saturating_sub(1) / 2);
     if answers.survivors != GROUP_SIZE / 2 || answers.order_sum != order_sum {
         return Err(wrong(format!(
-            "a ballot of {} odd lanes found {} of them and ordered them to {} instead of {order_sum}",
+            "a subgroup ballot of {} lanes counted {}, with prefix sums that total {} instead of {order_sum}",
             GROUP_SIZE / 2,
             answers.survivors,
             answers.order_sum
@@ -44,7 +43,7 @@ pub(super) fn run(gpu: &Gpu) -> Result<()> {
     let addend = u64::from(push.addend_low) | u64::from(push.addend_high) << 32;
     let expected_sum = addend * u64::from(push.add_count) * u64::from(GROUP_SIZE);
     if answers.film_sum != expected_sum {
-        return Err(wrong(format!("64-bit sums came to {} instead of {expected_sum}", answers.film_sum)));
+        return Err(wrong(format!("64-bit sums gave {} instead of {expected_sum}", answers.film_sum)));
     }
     Ok(())
 }
@@ -87,7 +86,7 @@ pub fn strict_math(gpu: &Gpu) -> Result<()> {
         let found = [result.converted, result.sum_of_product, result.quotient, result.root];
         let expected = [a.to_bits() as f32, a * b + a, a / b, a.sqrt()];
         (found.map(f32::to_bits) != expected.map(f32::to_bits))
-            .then(|| format!("of {a:e} and {b:e} made {found:?} instead of {expected:?}"))
+            .then(|| format!("conversion, product plus sum, quotient and root of {a:e} and {b:e} gave {found:?} instead of {expected:?}"))
     });
     wrong.map_or(Ok(()), |what| Err(Error::DeviceWrong { device: gpu.facts.name.clone(), what: format!("{what}; use --math fast") }))
 }

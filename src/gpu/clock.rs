@@ -1,4 +1,4 @@
-//! The clock at which a card runs: it falls, by up to five times, while the card idles, and rises again with work.
+//! Warm-up: the clock of an idle GPU falls to as little as a fifth, and rises again with work.
 
 use std::time::{Duration, Instant};
 

@@ -177,7 +177,7 @@ fn facts(instance: &ash::Instance, device: vk::PhysicalDevice, index: usize) -> 
     need(f12.scalar_block_layout == vk::TRUE, "scalarBlockLayout");
     need(f13.synchronization2 == vk::TRUE, "synchronization2");
     need(f13.maintenance4 == vk::TRUE, "maintenance4");
-    need(limits.max_per_stage_descriptor_storage_buffers >= MAX_BUFFERS, &format!("room for {MAX_BUFFERS} storage buffers in a kernel"));
+    need(limits.max_per_stage_descriptor_storage_buffers >= MAX_BUFFERS, &format!("{MAX_BUFFERS} storage buffers in a shader stage"));
     need(
         v11.subgroup_supported_operations.contains(subgroup_needs) && v11.subgroup_supported_stages.contains(vk::ShaderStageFlags::COMPUTE),
         "subgroup ballots and arithmetic in compute shaders",

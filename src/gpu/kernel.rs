@@ -1,4 +1,4 @@
-//! Kernels: what reflection knows of them, and the pipelines made from them.
+//! Kernels: their reflected interfaces, and the pipelines made from them.
 
 use std::collections::BTreeMap;
 use std::io::{Cursor, Write};

@@ -1,4 +1,4 @@
-//! The Khronos validation layer: what it says is kept, and any message is an error in the end.
+//! The Khronos validation layer: its messages are collected, and any message is an error at the end of the run.
 
 use std::ffi::{CStr, c_void};
 use std::sync::Mutex;

@@ -1,4 +1,4 @@
-//! Rays against all triangles of a scene, and what a ray meets there.
+//! Intersection of rays with all triangles of a scene.
 
 use std::time::Duration;
 

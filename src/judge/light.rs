@@ -1,4 +1,4 @@
-//! Where light comes from: shining triangles and the lights that are no mesh.
+//! Light sources: emissive triangles and lights without geometry.
 
 use std::f64::consts::PI;
 

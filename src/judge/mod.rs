@@ -1,4 +1,4 @@
-//! What is right: a path tracer that shares no code with the photon maps it judges.
+//! A reference path tracer that shares no code with the photon maps that it checks.
 //!
 //! A scene goes in; estimates of radiance and irradiance come out, each with its standard error. It is
 //! unidirectional (from the eye, with light sampling at every surface that is not specular), in f64,

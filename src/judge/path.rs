@@ -1,4 +1,4 @@
-//! Paths from the eye.
+//! Camera paths.
 
 use std::f64::consts::PI;
 

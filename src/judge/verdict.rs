@@ -1,4 +1,4 @@
-//! Whether a picture agrees with the judge's, within the errors that both state.
+//! Whether an image agrees with the path tracer's, within the errors that both state.
 
 use glam::DVec3;
 
@@ -16,7 +16,7 @@ const ROUNDING: f64 = 1e-5;
 #[derive(Debug, Clone, PartialEq)]
 pub struct Verdict {
     pub blocks: usize,
-    /// Blocks and channels further apart than four standard errors.
+    /// Blocks and channels that differ by more than four standard errors.
     pub apart: usize,
     /// Largest distance, standard errors.
     pub worst: f64,
@@ -97,10 +97,10 @@ impl Verdict {
 
 impl std::fmt::Display for Verdict {
     fn fmt(&self, f: &mut std::fmt::Formatter<'_>) -> std::fmt::Result {
-        let verdict = if self.agrees() { "agrees" } else { "DISAGREES" };
+        let verdict = if self.agrees() { "agrees with the path tracer within" } else { "DISAGREES with the path tracer beyond" };
         write!(
             f,
-            "{verdict} within the stated errors: {} of {} blocks' channels further apart than {Z_LIMIT} standard errors (worst {:.2}), light {:.4} of the judge's (+- {:.4}), blocks differ by {:.2} %",
+            "{verdict} the stated errors: {} of {} block channels differ by more than {Z_LIMIT} standard errors (largest {:.2}); total light {:.4} of the path tracer's (+- {:.4}); RMS difference of blocks {:.2} %",
             self.apart,
             3 * self.blocks,
             self.worst,

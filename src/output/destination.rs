@@ -66,14 +66,14 @@ impl Folder {
         let folder = Folder { option, path: path.to_owned() };
         let refuse = |reason: String| Error::Output { option, path: path.to_owned(), reason };
         if path.exists() && !path.is_dir() {
-            return Err(refuse("it is no folder".into()));
+            return Err(refuse("it is not a folder".into()));
         }
         if path.as_os_str().is_empty() {
             return Err(refuse("it names no folder".into()));
         }
         let nearest = path.ancestors().find(|ancestor| ancestor.is_dir()).unwrap_or(Path::new("."));
         if path.ancestors().any(|ancestor| ancestor.exists() && !ancestor.is_dir()) {
-            return Err(refuse("it lies within a file".into()));
+            return Err(refuse("a part of its path is a file".into()));
         }
         // Making a folder asks for the same right as making a file.
         temporary_in(nearest).map_err(|error| refuse(error.kind().to_string()))?;

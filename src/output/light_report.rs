@@ -42,7 +42,7 @@ pub fn rows<'a>(plan: &'a TransportPlan, run: Option<(&Timings, &[u64])>) -> Vec
         .map(|decision| {
             let (gpu_ms, share) = match decision.effect {
                 _ if !decision.kept => (None, None),
-                Effect::Direct => (pass("round/see"), share(0)),
+                Effect::Direct => (pass("round/visible points"), share(0)),
                 Effect::SpecularChains => (None, share(1)),
                 effect if effect.is_caustic() => (pass("round/caustic"), share(2)),
                 Effect::Indirect => (pass("round/global"), share(3)),

@@ -1,4 +1,4 @@
-//! What a run says of itself: the timing table and ledger for people, JSON for programs.
+//! The report of a run: timing table, ledger and errors as text, and everything as JSON.
 
 use std::fmt::Write;
 
@@ -46,7 +46,7 @@ struct Report<'a> {
     dispatches: u64,
     submissions: u64,
     walls: Vec<WallReport>,
-    /// What `--paranoid` found; null where nobody looked.
+    /// Nonfinite values that `--paranoid` found; null without it.
     oddities: Option<&'a Oddities>,
 }
 
@@ -141,53 +141,51 @@ fn relative_error(walls: &[WallEstimate]) -> Option<f64> {
     if means > 0.0 { Some((errors / means).sqrt()).filter(|error| error.is_finite()) } else { None }
 }
 
-/// Noise, bias, and both together, a line each, in per cent of the result's root mean square.
+/// Noise, bias, and both together, a line each, in per cent of the result's RMS.
 pub(super) fn errors(rounds: u32, noise: Option<f64>, bias: Option<&Bias>, confidence: f64) -> String {
     let mut text = String::new();
     let (percent, sure) = (|share: f64| 100.0 * share, 100.0 * confidence);
     let bound = noise.map(|noise| error_bound(rounds, noise, confidence));
     match noise.zip(bound) {
-        Some((noise, bound)) => writeln!(
-            text,
-            "noise: {:.2} % of the result's root mean square, at most {:.2} % ({sure} % confidence)",
-            percent(noise),
-            percent(bound)
-        )
-        .unwrap(),
-        None if rounds == 1 => text.push_str("noise: unknown from a single round\n"),
+        Some((noise, bound)) => {
+            writeln!(text, "noise: {:.2} % relative RMS error, at most {:.2} % ({sure} % confidence)", percent(noise), percent(bound))
+                .unwrap()
+        }
+        None if rounds == 1 => text.push_str("noise: unknown after a single round\n"),
         None => text.push_str("noise: unknown\n"),
     }
     if bias.is_some_and(|bias| bias.batches == 0) {
-        text.push_str("bias of the radius: none, as no light comes from a photon map\n");
+        text.push_str("bias of the radius: none, because no light comes from a photon map\n");
     } else if let Some(Bias { relative, lower, upper, batches, rounds_per_batch, seconds, .. }) = bias {
         writeln!(
             text,
-            "bias of the radius: {:.2} %, from {:.2} % to {:.2} % ({sure} % confidence; {batches} batches of {rounds_per_batch} round(s) at two radii, {seconds:.2} s)",
+            "bias of the radius: {:.2} %, from {:.2} % to {:.2} % ({sure} % confidence; measured in {seconds:.2} s from {batches} batches of {rounds_per_batch} round(s) at two radii)",
             percent(*relative),
             percent(*lower),
             percent(*upper)
         )
         .unwrap();
         if let Some((noise, bound)) = noise.zip(bound) {
-            writeln!(text, "both: {:.2} %, at most {:.2} %", percent(noise.hypot(*relative)), percent(bound.hypot(*upper))).unwrap();
+            writeln!(text, "noise and bias: {:.2} %, at most {:.2} %", percent(noise.hypot(*relative)), percent(bound.hypot(*upper)))
+                .unwrap();
         }
     }
     text
 }
 
-/// What ended a run before its last round, and no person.
+/// Why a run ended before its last round, unless the user interrupted it.
 pub(super) fn end_in_words(end: End, stop: &Stop) -> Option<String> {
     match end {
         End::Cancelled => None,
-        End::Rounds => stop.error.map(|error| format!("before the error wanted, {} %, was reached", 100.0 * error)),
-        End::Error => Some("at the error wanted".to_owned()),
-        End::Time => Some(format!("after the {} s wanted{}", stop.seconds.unwrap_or_default(), unreached(stop))),
-        End::Photons => Some(format!("at the {} photons wanted{}", stop.photons.unwrap_or_default(), unreached(stop))),
+        End::Rounds => stop.error.map(|error| format!("before the requested error of {} % was reached", 100.0 * error)),
+        End::Error => Some("at the requested error".to_owned()),
+        End::Time => Some(format!("after the requested {} s{}", stop.seconds.unwrap_or_default(), unreached(stop))),
+        End::Photons => Some(format!("at the requested {} photons{}", stop.photons.unwrap_or_default(), unreached(stop))),
     }
 }
 
 fn unreached(stop: &Stop) -> String {
-    stop.error.map_or_else(String::new, |error| format!(" before the error wanted, {} %, was reached", 100.0 * error))
+    stop.error.map_or_else(String::new, |error| format!(" before the requested error of {} % was reached", 100.0 * error))
 }
 
 /// The run in words: device, settings, ledger, errors and timing table.
@@ -212,8 +210,8 @@ pub fn text(outcome: &Outcome, walls: &[WallEstimate]) -> String {
     )
     .unwrap();
     if let Some(why) = end_in_words(outcome.end, &settings.stop) {
-        let unfinished = if outcome.film.unfinished.is_empty() { "" } else { " and a part of one more" };
-        writeln!(text, "ended {why}, {}{unfinished} of at most {} rounds", outcome.film.rounds, settings.rounds).unwrap();
+        let unfinished = if outcome.film.unfinished.is_empty() { "" } else { " and part of another" };
+        writeln!(text, "ended {why}: {} round(s){unfinished} of at most {}", outcome.film.rounds, settings.rounds).unwrap();
     }
     for decision in &outcome.plan.decisions {
         let verb = if decision.kept { "with" } else { "without" };
@@ -230,7 +228,7 @@ pub fn text(outcome: &Outcome, walls: &[WallEstimate]) -> String {
     text
 }
 
-/// One line that anybody can add up.
+/// The ledger as one equation.
 pub(super) fn ledger(ledger: &Ledger) -> String {
     let Ledger { emitted, absorbed, escaped, cut_off, dropped, stored } = ledger;
     format!(
@@ -250,7 +248,7 @@ pub(super) fn timing_table(timings: &Timings, device: Option<&DeviceFacts>) -> S
         writeln!(text, "{indented:<28} {:>9} {:>12} {:>12}", row.count, cell(row.gpu_ms), cell(row.wall_ms)).unwrap();
     }
     if device.is_some_and(|facts| facts.timestamp_bits == 0) {
-        text.push_str("This device has no timestamps: GPU times are not known.\n");
+        text.push_str("This device has no timestamps: GPU times are unknown.\n");
     }
     text
 }

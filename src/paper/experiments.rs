@@ -88,7 +88,7 @@ pub struct TotalTime {
     pub command: String,
 }
 
-/// An experiment that would have taken too long, and how long.
+/// An experiment that was not run because it would take too long, and its predicted time.
 #[derive(Debug, Clone)]
 pub struct LeftOut {
     pub what: String,
@@ -100,7 +100,7 @@ pub const LONGEST_PASS_MS: f64 = 20_000.0;
 /// A row that is shorter is run once before it counts, as it makes pipelines.
 const SHORT_TOTAL_MS: f64 = 1_000.0;
 /// Runs whose median counts at the large size, at most.
-const LARGE_REPEATS: usize = 3;
+pub const LARGE_REPEATS: usize = 3;
 const BOUNCES: [u32; 2] = [published::BOUNCES, 15];
 
 /// Experiments that [`running_times`] and [`totals`] will announce, unless some are left out.
@@ -242,7 +242,7 @@ pub fn totals(bench: &mut Bench, found: &mut Reproduction) -> Step<()> {
             let variant = bench.available(Variant::Atomic);
             let settings = Settings { variant, rounds, gather, ..at_size(Preset::Rounds, photons) };
             let title = format!(
-                "{} photons as {rounds} x {}, {} gather",
+                "{} photons as {rounds} round(s) of {}, {} gather",
                 words::count(settings.total_photons()),
                 words::count(u64::from(photons)),
                 command::gather_name(gather)

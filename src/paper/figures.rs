@@ -72,18 +72,18 @@ fn exhibits() -> [Exhibit; COUNT] {
     [
         Exhibit {
             title: "the naive implementation, 2 bounces",
-            caption: "On the left the box folded open around its back wall, on the right seen from four points in front of its opening. \
-                A light shines along its own wall and not onto it, so the glow is on the walls next to it: \
-                low on the walls around the floor's light, and at the left of those around the left wall's. \
-                Places that no light reaches well are dim but not black. \
-                The blotches are noise: 5000 photons are few, and each is spread over a disc of radius 0.05 m.",
+            caption: "Left: the box unfolded around its back wall. Right: four views from in front of its opening. \
+                A light emits away from its own wall, so the adjacent walls are brightest near it: \
+                low on the walls around the floor's light, and at the left of the walls around the left wall's light. \
+                Shaded places are dim but not black. \
+                The blotches are noise: there are only 5000 photons, each spread over a disc of radius 0.05 m.",
             frames: vec![("2 bounces".to_owned(), Preset::Naive, naive.clone())],
             columns: 1,
         },
         Exhibit {
-            title: "15 bounces (left) against 2 bounces (right)",
-            caption: "Both show the same photons for two bounces; the thirteen after them brighten every wall, its shaded places too. \
-                The paper's text puts the two in this order, its caption in the other; this page follows the text.",
+            title: "15 bounces (left) and 2 bounces (right)",
+            caption: "Both images contain the same photons for the first two bounces. The next thirteen bounces brighten every wall, including its shaded places. \
+                The paper's text and its caption disagree about the order of the two images; this page follows the text.",
             frames: vec![
                 ("15 bounces, modified".to_owned(), Preset::Modified, modified),
                 ("2 bounces, naive".to_owned(), Preset::Naive, naive),
@@ -92,9 +92,9 @@ fn exhibits() -> [Exhibit; COUNT] {
         },
         Exhibit {
             title: "Phong walls, shininess 2.0, 0.5 and 0.01",
-            caption: "A photon counts by the cosine between its mirror direction and the direction to the eye, to the power of the shininess. \
-                At 2.0 the back wall, which faces the eye, is the brightest and the walls along the line of sight are dark; \
-                towards 0 every photon mirrored to the eye's side counts as 1, and the picture approaches figure 2's left one.",
+            caption: "The weight of a photon is the cosine between its mirror direction and the direction to the eye, raised to the shininess. \
+                At 2.0 the back wall, which faces the eye, is brightest, and the walls along the line of sight are dark. \
+                As the shininess approaches 0, every photon reflected towards the eye's side has weight 1, and the image approaches the left image of figure 2.",
             frames: published::FIGURE_3_SHININESS
                 .map(|shininess| (format!("shininess {shininess}"), Preset::Phong, phong(shininess)))
                 .into(),
@@ -102,8 +102,8 @@ fn exhibits() -> [Exhibit; COUNT] {
         },
         Exhibit {
             title: "1, 5, 10, 25, 50 and 100 rounds",
-            caption: "From top left to bottom right, 5000 photons more with every round. The grain fades, while the radius, now 0.025 m, \
-                stays: dark rims along the edges, where part of each disc lies beyond the wall, remain at 100 rounds.",
+            caption: "From top left to bottom right. Every round adds 5000 photons. Noise decreases, but the radius (here 0.025 m) is fixed: \
+                the dark rims along the edges, where part of each disc lies beyond the wall, remain after 100 rounds.",
             frames: published::FIGURE_4_ROUNDS
                 .map(|count| (format!("{count} {}", if count == 1 { "round" } else { "rounds" }), Preset::Rounds, rounds(count)))
                 .into(),

@@ -1,5 +1,5 @@
-//! The paper's figures, running times and table, measured again on this machine and set beside the
-//! published numbers; out come pictures, CSV and one page.
+//! The paper's figures, running times and table, measured on this machine and compared with the published numbers, as
+//! images, CSV and one page.
 
 pub mod bench;
 pub mod chart;

@@ -1,11 +1,11 @@
-//! The page: everything that was found, in one file that loads nothing.
+//! The page: all results in one file that loads nothing.
 
 use base64::Engine;
 use base64::engine::general_purpose::STANDARD;
 use maud::{DOCTYPE, Markup, PreEscaped, html};
 
 use super::bench::PATIENCE;
-use super::experiments::{Builder, LONGEST_PASS_MS, LeftOut, Pass, RunningTime, TotalTime};
+use super::experiments::{Builder, LARGE_REPEATS, LONGEST_PASS_MS, LeftOut, Pass, RunningTime, TotalTime};
 use super::figures::Figure;
 use super::verdicts::{self, Standing};
 use super::{Reproduction, chart, published};
@@ -42,14 +42,14 @@ fn head(found: &Reproduction) -> Markup {
     html! {
         header {
             h1 { "Photon Mapping On The GPU, measured again" }
-            p { "Every figure and table of Scott Grauer-Gray's paper, made anew with photonmill " (env!("CARGO_PKG_VERSION")) " and set beside the published numbers." }
+            p { "Every figure and table of Scott Grauer-Gray's paper, reproduced with photonmill " (env!("CARGO_PKG_VERSION")) " and compared with the published numbers." }
             @if !found.complete {
-                p.notice { strong { "Incomplete." } " The run was ended before its last experiment; what is here was finished before that." }
+                p.notice { strong { "Incomplete." } " The run was interrupted; this page shows the experiments that were complete." }
             }
             dl {
-                dt { "Then" }
+                dt { "Hardware in 2008" }
                 dd { (published::HARDWARE) }
-                dt { "Here" }
+                dt { "Hardware here" }
                 @match &found.machine.device {
                     Some(device) => dd { (device.name) "; driver " (device.driver) },
                     None => dd { "no Vulkan device" },
@@ -57,9 +57,9 @@ fn head(found: &Reproduction) -> Markup {
                 dt { "CPU builder" }
                 dd { (found.machine.cpu) }
                 dt { "Seed" }
-                dd { "1 throughout; rand48, the paper's generator, at the paper's size, and philox at the large size" }
+                dd { "1 for all runs; generator rand48 (the paper's) at the paper's size, philox at the large size" }
                 dt { "Sizes" }
-                dd { (count(u64::from(published::PHOTONS))) " photons as in the paper, and " (count(u64::from(found.request.large))) " photons a round" }
+                dd { (count(u64::from(published::PHOTONS))) " photons per round (the paper's size) and " (count(u64::from(found.request.large))) " photons per round (the large size)" }
             }
             (device_notice(found))
         }
@@ -69,13 +69,13 @@ fn head(found: &Reproduction) -> Markup {
 fn device_notice(found: &Reproduction) -> Markup {
     html! {
         @match &found.machine.device {
-            None => p.notice { "Vulkan was not found here. Figures come from the CPU builder, and only its times are known." },
+            None => p.notice { "No Vulkan device was found. Figures and times come from the CPU builder only." },
             Some(device) => {
                 @if device.is_cpu {
-                    p.notice { strong { "This device is software." } " It runs Vulkan on the CPU, so every 'GPU' time on this page is the time of a CPU, and comparing GPU with CPU compares two programs on one processor." }
+                    p.notice { strong { "This device is software." } " It runs Vulkan on the CPU: 'GPU' times on this page are CPU times, and a comparison of GPU with CPU compares two programs on one processor." }
                 }
                 @if !device.has_timestamps {
-                    p.notice { "This device has no timestamps. Times of single passes on it are not known, and whole runs are timed by the host's clock." }
+                    p.notice { "This device has no timestamps. Times of single passes are unknown, and whole runs are timed by the host's clock." }
                 }
             }
         }
@@ -88,9 +88,9 @@ fn standing(found: &Reproduction) -> Markup {
         section id="standing" {
             h2 { "What still holds from 2008, and what does not" }
             @if verdicts.is_empty() {
-                p { "Too little was measured to say." }
+                p { "Too few experiments were completed to say." }
             }
-            p { "Every sentence is made of this run's numbers. The paper's size is 5000 photons and 2 bounces; the other sizes have 15 bounces, more photons, or both. Times within " (((verdicts::MARGIN - 1.0) * 100.0).round()) " % of each other count as equal." }
+            p { "These statements are computed from this run's measurements. The paper's size is 5000 photons and 2 bounces; the other sizes have 15 bounces, more photons, or both. Times within " (((verdicts::MARGIN - 1.0) * 100.0).round()) " % of each other count as equal." }
             @for verdict in &verdicts {
                 h3 {
                     (verdict.topic)
@@ -116,7 +116,7 @@ fn figures(found: &Reproduction) -> Markup {
     html! {
         section id="figures" {
             h2 { "Figures 1 to 4" }
-            p { "All with 5000 photons a round, rand48 and seed 1. Photons near a point are found through the sorted grid, which gives the same sums as the paper's step through the whole list, to the bit." }
+            p { "All figures use 5000 photons per round, rand48 and seed 1. A sorted grid finds the photons near a point; its sums are bit-identical to those of the paper's scan of the whole list." }
             @for figure in &found.figures {
                 (self::figure(figure))
             }
@@ -131,7 +131,7 @@ fn figure(figure: &Figure) -> Markup {
             figcaption {
                 p { strong { "Figure " (figure.number) ": " (figure.title) "." } " " (figure.caption) }
                 details {
-                    summary { "Repeat it" }
+                    summary { "Commands" }
                     @for frame in &figure.frames {
                         p { (frame.label) ": " code { (frame.command) } }
                     }
@@ -146,26 +146,28 @@ fn running_times(found: &Reproduction) -> Markup {
         section id="running-times" {
             h2 { "Running times (section 4.3)" }
             p {
-                "The map pass emits photons and bounces them; the rendering pass estimates the light at 5 × 64 × 64 points. "
-                "Times of the device are its own timestamps, those of the CPU builder are wall time. "
-                "The first run of each case is dropped, as it makes pipelines; then the median of " (found.request.repeats) " runs, at the large size of at most 3, the builders in turn, with the shortest and longest run below it. "
-                "A card that idled runs at a low clock, so it is kept busy before each run (--warm-up). "
-                "A case whose runs take longer than " (PATIENCE.as_secs()) " s together is repeated less, and one whose first run alone does keeps that run; " a href="#all-times" { "the table of all times" } " says how often."
+                "The map pass emits and traces photons; the rendering pass estimates the light at 5 × 64 × 64 points. "
+                "GPU times come from the device's timestamps, CPU times from the host's clock. "
+                "Each time is the median of up to " (found.request.repeats) " runs (up to " (found.request.repeats.min(LARGE_REPEATS)) " at the large size); the fastest and slowest run stand below it. "
+                "The builders run alternately. The first run of each case creates pipelines and is not counted. "
+                "Warm-up work before each run brings the device to its full clock (" code { "--warm-up" } "). "
+                "A case that takes longer than " (PATIENCE.as_secs()) " s in all is repeated less often; if its first run alone takes that long, that run is shown. "
+                a href="#all-times" { "The table of all times" } " gives the number of runs."
             }
             h3 { "At the paper's size" }
-            p { (count(u64::from(published::PHOTONS))) " photons, " (published::BOUNCES) " bounces, brute force: every point steps through the whole photon list, empty slots included." }
+            p { (count(u64::from(published::PHOTONS))) " photons, " (published::BOUNCES) " bounces, brute force: every point tests the whole photon list, including empty slots." }
             (beside_published(found))
             @if let Some(chart) = chart::running_times(found) {
                 figure.chart {
                     div.scroll { (PreEscaped(chart)) }
-                    figcaption { p { "Both passes at the paper's size, on a logarithmic scale: grey as published, orange here. The grid has no counterpart in the paper." } }
+                    figcaption { p { "Both passes at the paper's size on a logarithmic scale. Grey: published in 2008. Orange: measured here. The paper has no grid." } }
                 }
             }
             h3 id="all-times" { "All sizes" }
             p {
-                "At the large size the random numbers are philox's. Rand48 is dealt out to photons by leap-frogging, each taking every Nth number; "
-                "with a power of two as N those streams are almost regular, and the paper's size is the only one that needs the paper's generator. "
-                "The grid's time includes sorting the photons into it."
+                "The large size uses philox. Rand48 gives each of N photons every Nth number (leap-frogging); "
+                "these streams are strongly correlated when N is a power of two. "
+                "Grid times include sorting the photons into the grid."
             }
             (all_times(found))
             (left_out(&found.passes_left_out, LONGEST_PASS_MS, "the same rendering pass at the paper's size"))
@@ -231,7 +233,7 @@ fn all_times(found: &Reproduction) -> Markup {
             }
         } }
         details {
-            summary { "Repeat them" }
+            summary { "Commands" }
             @for time in found.running_times.iter().filter(|time| time.pass == Pass::Rendering) {
                 p { code { (time.command) } }
             }
@@ -249,7 +251,7 @@ fn runs(times: [Option<&RunningTime>; 2]) -> String {
 fn left_out(experiments: &[LeftOut], limit_ms: f64, known: &str) -> Markup {
     html! {
         @if !experiments.is_empty() {
-            p { "Left out, as " (known) " predicts more than " (duration(limit_ms)) ":" }
+            p { "Not measured, because " (known) " predicts more than " (duration(limit_ms)) " each:" }
             ul {
                 @for left_out in experiments {
                     li { (left_out.what) ": about " (duration(left_out.predicted_ms)) }
@@ -264,15 +266,15 @@ fn table_1(found: &Reproduction) -> Markup {
     html! {
         section id="table-1" {
             h2 { "Table 1: time against photons" }
-            p { "Rounds of 5000 photons, 15 bounces, radius 0.025 m, Phong walls of shininess 5; the modified implementation. Each row is one run, after one that is dropped. 'GPU' is the device's time in rounds, 'wall' the whole run with its buffers." }
+            p { "The modified implementation with rounds of 5000 photons, 15 bounces, radius 0.025 m and Phong walls of shininess 5. Each row is one run. A short row follows an uncounted run that creates the pipelines. 'GPU' is the device time of all rounds; 'wall' is the time of the whole run, including the creation of buffers." }
             (totals_of(found, small, Gather::Brute, "Brute force, as in the paper"))
             (totals_of(found, small, Gather::Grid, "The same photons, sorted into a grid"))
-            (totals_of(found, large, Gather::Grid, &format!("Grid, {} photons a round (philox)", count(u64::from(large)))))
-            (left_out(&found.totals_left_out, found.request.longest_ms, "a round of the row before"))
+            (totals_of(found, large, Gather::Grid, &format!("Grid, {} photons per round (philox)", count(u64::from(large)))))
+            (left_out(&found.totals_left_out, found.request.longest_ms, "the time per round of the previous row"))
             @if let Some(chart) = chart::totals(found) {
                 figure.chart {
                     div.scroll { (PreEscaped(chart)) }
-                    figcaption { p { "Time of the whole implementation against photons, both scales logarithmic: a line that climbs one decade of time with each decade of photons is time in proportion to them." } }
+                    figcaption { p { "Run time against photons, both scales logarithmic. A slope of 1 means that time is proportional to photons." } }
                 }
             }
         }
@@ -291,7 +293,7 @@ fn totals_of(found: &Reproduction, photons_per_round: u32, gather: Gather, title
                     @if has_published { th { "2008, ms" } }
                     th { "GPU, ms" } th { "wall, ms" }
                     @if has_published { th { "2008 / wall" } }
-                    th { "photons a second" }
+                    th { "photons/s" }
                 } }
                 tbody {
                     @for total in &totals {
@@ -306,7 +308,7 @@ fn totals_of(found: &Reproduction, photons_per_round: u32, gather: Gather, title
                 }
             } }
             details {
-                summary { "Repeat it" }
+                summary { "Commands" }
                 @for total in &totals {
                     p { code { (total.command) } }
                 }
@@ -319,13 +321,13 @@ fn choices() -> Markup {
     html! {
         section id="choices" {
             h2 { "What the paper leaves open" }
-            p { "Each of these is an option of photonmill; here they are its defaults." }
+            p { "photonmill has an option for each of these choices. This page uses the defaults:" }
             ul {
-                li { "The lights are discs of radius 0.05 m and 1 W each, flush in the centres of the floor and the left wall; a disc neither blocks its wall nor changes it." }
-                li { "'Uniform in all directions' is read as the same intensity over the whole hemisphere, not Lambertian." }
-                li { "The 64 × 64 points of a wall lie at the centres of its texels." }
-                li { "The eye of the Phong weight is at (0, 0, 1) m, in front of the opening; the reflected direction is the mirrored one; negative cosines count nothing." }
-                li { "A photon is stored where it is reflected, at most once a bounce; the illumination is the photons within the radius over 90 (over 10 a round in figure 4 and table 1), and 1 and more is shown as full." }
+                li { "The lights are discs of radius 0.05 m and 1 W each, flush with the floor and the left wall at their centres. They neither block photons nor change the reflectance of their wall." }
+                li { "'Uniform in all directions' is taken as equal intensity over the hemisphere, not as Lambertian emission." }
+                li { "The 64 × 64 points of a wall are the centres of its texels." }
+                li { "The eye for the Phong weight is at (0, 0, 1) m, in front of the opening. The weight uses the mirror direction; negative cosines count as 0." }
+                li { "A photon is stored where it is reflected, at most once per bounce. The illumination of a point is the number of photons within the radius divided by 90 (by 10 per round in figure 4 and table 1); values of 1 and more are shown as white." }
             }
         }
     }
@@ -399,7 +401,7 @@ mod tests {
         found.complete = false;
         found.machine.device = None;
         let page = html(&found);
-        assert!(page.contains("Incomplete") && page.contains("Vulkan was not found here"));
+        assert!(page.contains("Incomplete") && page.contains("No Vulkan device was found"));
     }
 
     #[test]

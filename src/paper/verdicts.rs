@@ -1,4 +1,4 @@
-//! What still holds from 2008, and what does not: sentences made of this run's numbers.
+//! Which of the paper's findings still hold: sentences computed from this run's measurements.
 
 use super::experiments::{Builder, Pass, TotalTime};
 use super::figures::Frame;
@@ -45,9 +45,9 @@ pub struct Verdict {
 }
 
 impl Verdict {
-    /// Ends `text` with what it comes to.
+    /// Ends `text` with the standing.
     fn new(topic: &'static str, text: String, standing: Standing) -> Verdict {
-        Verdict { topic, text: format!("{text}: this {}.", standing.words()), standing: Some(standing) }
+        Verdict { topic, text: format!("{text}. This {}.", standing.words()), standing: Some(standing) }
     }
 }
 
@@ -95,7 +95,7 @@ fn ratios(found: &Reproduction, over: Variant, under: Variant, pass: Pass, gathe
         .collect()
 }
 
-/// '1.1 × at the paper's size, and 0.5 × to 0.9 × at the others'; the page has them all in a table.
+/// '1.1 × at the paper's size and 0.5 × to 0.9 × at the other sizes'; the page has them all in a table.
 fn listed(ratios: &[Ratio]) -> String {
     let (paper, others): (Vec<&Ratio>, Vec<&Ratio>) =
         ratios.iter().partition(|ratio| (ratio.photons, ratio.bounces) == (published::PHOTONS, published::BOUNCES));
@@ -104,10 +104,10 @@ fn listed(ratios: &[Ratio]) -> String {
     let at_others = match others.as_slice() {
         [] => None,
         [only] => Some(format!("{} with {} photons and {} bounces", times(only.value), count(u64::from(only.photons)), only.bounces)),
-        _ if times(low) == times(high) => Some(format!("{} at the others", times(low))),
-        _ => Some(format!("{} to {} at the others", times(low), times(high))),
+        _ if times(low) == times(high) => Some(format!("{} at the other sizes", times(low))),
+        _ => Some(format!("{} to {} at the other sizes", times(low), times(high))),
     };
-    at_paper.into_iter().chain(at_others).collect::<Vec<_>>().join(", and ")
+    at_paper.into_iter().chain(at_others).collect::<Vec<_>>().join(" and ")
 }
 
 fn held(ratios: &[Ratio], holds: impl Fn(f64) -> bool) -> Option<Standing> {
@@ -118,7 +118,7 @@ fn append(found: &Reproduction) -> Option<Verdict> {
     let ratios = ratios(found, Variant::Atomic, Variant::Naive, Pass::Map, None);
     let standing = held(&ratios, |ratio| ratio > MARGIN)?;
     let text = format!(
-        "In 2008 the atomic append made the map pass take {} the time of naive slots. Here it takes {}",
+        "In 2008 the map pass took {} as long with atomics as with naive slots. Here the factor is {}",
         times(published::MAP_MS.modified / published::MAP_MS.naive),
         listed(&ratios)
     );
@@ -133,17 +133,17 @@ fn ballot(found: &Reproduction) -> Option<Verdict> {
     let pays = |ratio: &Ratio| ratio.value < 1.0 / MARGIN;
     let costs = |ratio: &Ratio| ratio.value > MARGIN;
     let end = match (ratios.iter().any(pays), ratios.iter().any(costs)) {
-        _ if ratios.iter().all(pays) => "it pays",
-        (true, true) => "it pays at some sizes and costs at others",
-        (true, false) => "it pays at some sizes",
-        (false, true) => "it does not pay, and costs at some sizes",
-        (false, false) => "it makes no difference beyond the noise of the clock",
+        _ if ratios.iter().all(pays) => "this is faster",
+        (true, true) => "this is faster at some sizes and slower at others",
+        (true, false) => "this is faster at some sizes",
+        (false, true) => "this is not faster, and slower at some sizes",
+        (false, false) => "there is no significant difference",
     };
     let text = format!(
-        "The paper's device had no subgroup operations. With them, one atomic serves a whole subgroup; its map pass, relative to one atomic a thread, takes {}: {end}.",
+        "The paper's device had no subgroup operations. With a ballot, a whole subgroup needs one atomic. Relative to one atomic per thread, the map pass takes {}: {end}.",
         listed(&ratios)
     );
-    Some(Verdict { topic: "One atomic a subgroup", text, standing: None })
+    Some(Verdict { topic: "One atomic per subgroup", text, standing: None })
 }
 
 fn empty_slots(found: &Reproduction) -> Option<Verdict> {
@@ -157,7 +157,7 @@ fn empty_slots(found: &Reproduction) -> Option<Verdict> {
     let standing = Standing::of(&filled.iter().map(|(_, share)| *share < 0.5).collect::<Vec<_>>())?;
     let shares: Vec<String> =
         filled.iter().map(|(bounces, share)| format!("{} % of them with {bounces} bounces", number(share * 100.0))).collect();
-    let text = format!("Most of the naive map's slots stay empty, said the paper. Photons fill {}", list(&shares));
+    let text = format!("The paper found that most slots of the naive map stay empty. Here photons fill {}", list(&shares));
     Some(Verdict::new("Slots waste memory", text, standing))
 }
 
@@ -165,19 +165,19 @@ fn packed(found: &Reproduction) -> Option<Verdict> {
     let ratios = ratios(found, Variant::Naive, Variant::Atomic, Pass::Rendering, Some(Gather::Brute));
     let standing = held(&ratios, |ratio| ratio > MARGIN)?;
     let text = format!(
-        "In 2008 stepping through slots, empty ones included, took {} the time of a packed list. Here it takes {}",
+        "In 2008 the rendering pass took {} as long over all slots, including empty ones, as over a compact list. Here the factor is {}",
         times(published::RENDERING_MS.naive / published::RENDERING_MS.modified),
         listed(&ratios)
     );
-    Some(Verdict::new("A packed list renders faster", text, standing))
+    Some(Verdict::new("A compact list renders faster", text, standing))
 }
 
 fn map_on_gpu(found: &Reproduction) -> Option<Verdict> {
     let [naive, modified] = [Variant::Naive, Variant::Atomic].map(|variant| ratios(found, Variant::Cpu, variant, Pass::Map, None));
     let published = published::MAP_MS;
     let text = format!(
-        "In 2008 the CPU's map pass took {} the time of the naive GPU one and {} that of the modified one. \
-         Here, on one thread, it takes, relative to the naive one, {}; and relative to the modified one, {}",
+        "In 2008 the CPU's map pass took {} as long as the naive one on the GPU and {} as long as the modified one. \
+         Here the CPU uses one thread. Relative to the naive GPU version it takes {}. Relative to the modified version it takes {}",
         times(published.cpu / published.naive),
         times(published.cpu / published.modified),
         listed(&naive),
@@ -191,10 +191,10 @@ fn rendering_on_gpu(found: &Reproduction) -> Option<Verdict> {
     let [naive, modified] = [Variant::Naive, Variant::Atomic].map(|variant| against(variant, Gather::Brute));
     let published = published::RENDERING_MS;
     let grid = against(Variant::Atomic, Gather::Grid);
-    let with_grid = if grid.is_empty() { String::new() } else { format!("; with a grid on both sides, {}", listed(&grid)) };
+    let with_grid = if grid.is_empty() { String::new() } else { format!(". With a grid on both CPU and GPU it takes {}", listed(&grid)) };
     let text = format!(
-        "In 2008 the CPU's rendering pass took {} the time of the naive GPU one and {} that of the modified one. \
-         Here, on one thread and by the same brute force, it takes, relative to the naive one, {}; and relative to the modified one, {}{with_grid}",
+        "In 2008 the CPU's rendering pass took {} as long as the naive one on the GPU and {} as long as the modified one. \
+         Here the CPU uses one thread and the same brute force. Relative to the naive GPU version it takes {}. Relative to the modified version it takes {}{with_grid}",
         times(published.cpu / published.naive),
         times(published.cpu / published.modified),
         listed(&naive),
@@ -206,7 +206,7 @@ fn rendering_on_gpu(found: &Reproduction) -> Option<Verdict> {
 fn on_gpu(found: &Reproduction, topic: &'static str, text: String, naive: &[Ratio], modified: &[Ratio]) -> Option<Verdict> {
     let faster: Vec<bool> = naive.iter().chain(modified).map(|ratio| ratio.value > MARGIN).collect();
     let device = found.machine.device.as_ref()?;
-    let text = if device.is_cpu { format!("{text} (the 'GPU' being a software device on the same CPU)") } else { text };
+    let text = if device.is_cpu { format!("{text}. The 'GPU' is a software device on the same CPU") } else { text };
     Some(Verdict::new(topic, text, Standing::of(&faster)?))
 }
 
@@ -222,7 +222,7 @@ fn linear(found: &Reproduction) -> Option<Verdict> {
     let standing = Standing::of(&fits.iter().map(|(exponent, _)| (exponent - 1.0).abs() <= LINEAR_WITHIN).collect::<Vec<_>>())?;
     let described: Vec<String> = fits.iter().map(|(exponent, name)| format!("{exponent:.2} {name}")).collect();
     let text = format!(
-        "In 2008 time grew as photons to the power {:.2}, which is in proportion to them. Here the fitted power is {}",
+        "In 2008 the run time was proportional to the number of photons (fitted exponent {:.2}). Here the fitted exponent is {}",
         exponent(&paper)?,
         list(&described)
     );
@@ -233,9 +233,9 @@ fn linear(found: &Reproduction) -> Option<Verdict> {
 fn series(found: &Reproduction) -> Vec<(String, Vec<&TotalTime>)> {
     let (small, large) = (published::PHOTONS, found.request.large);
     [
-        ("brute force".to_owned(), small, Gather::Brute),
+        ("with brute force".to_owned(), small, Gather::Brute),
         ("with the grid".to_owned(), small, Gather::Grid),
-        (format!("with the grid and {} photons a round", count(u64::from(large))), large, Gather::Grid),
+        (format!("with the grid and {} photons per round", count(u64::from(large))), large, Gather::Grid),
     ]
     .into_iter()
     .map(|(name, photons, gather)| (name, found.totals_of(photons, gather).collect()))
@@ -255,16 +255,14 @@ fn exponent(points: &[(f64, f64)]) -> Option<f64> {
 fn table_1(found: &Reproduction) -> Option<Verdict> {
     let (rounds, then_ms) = published::TABLE_1[published::TABLE_1.len() - 1];
     let row = |gather| found.totals_of(published::PHOTONS, gather).find(|total| total.rounds == rounds);
-    let described: Vec<String> = [
-        ("the paper's step through the whole list", Gather::Brute),
-        ("a sorted grid, which gives the same picture to the bit,", Gather::Grid),
-    ]
-    .into_iter()
-    .filter_map(|(name, gather)| {
-        let total = row(gather)?;
-        Some(format!("{name} takes {} ({} the speed of 2008)", duration(total.best_ms()), times(then_ms / total.best_ms())))
-    })
-    .collect();
+    let described: Vec<String> =
+        [("the paper's scan of the whole list", Gather::Brute), ("a sorted grid, with a bit-identical image,", Gather::Grid)]
+            .into_iter()
+            .filter_map(|(name, gather)| {
+                let total = row(gather)?;
+                Some(format!("{name} takes {} ({} as fast as in 2008)", duration(total.best_ms()), times(then_ms / total.best_ms())))
+            })
+            .collect();
     if described.is_empty() {
         return None;
     }
@@ -277,7 +275,7 @@ fn memory(found: &Reproduction) -> Option<Verdict> {
     let most = found.running_times.iter().filter(|time| time.builder.variant != Variant::Cpu).max_by_key(|time| time.photons)?;
     let standing = if most.photons > published::PHOTONS { Standing::NoLonger } else { return None };
     let text = format!(
-        "In 2008 memory allowed not many more than {} photons at a time. Here a round of {} photons and {} bounces runs, and is split by itself where a buffer would not hold it",
+        "In 2008 memory limited a round to about {} photons. Here a round of {} photons and {} bounces was run, and a round that exceeds a buffer is split automatically",
         count(u64::from(published::PHOTONS)),
         count(u64::from(most.photons)),
         most.bounces
@@ -300,7 +298,7 @@ fn indirect_light(found: &Reproduction) -> Option<Verdict> {
     let gain = |lit: bool| unlit(many, lit) / unlit(few, lit);
     let standing = Standing::of(&[gain(false) > MARGIN, gain(true) > MARGIN])?;
     let text = format!(
-        "The paper found areas of indirect light better lit with 15 bounces than with 2. The three walls without a light gain {} in mean illumination here, the two with one {}",
+        "The paper found areas of indirect light brighter with 15 bounces than with 2. Here the mean illumination of the three walls without a light is {} as high, and that of the two walls with a light {}",
         times(gain(false)),
         times(gain(true))
     );
@@ -327,9 +325,9 @@ fn noise(found: &Reproduction) -> Option<Verdict> {
     let measured = distance(first) / distance(next_to_last);
     let independent = expected(first) / expected(next_to_last);
     let within = (1.0 / NOISE_WITHIN..=NOISE_WITHIN).contains(&(measured / independent));
-    let falls = if within { "as independent rounds should" } else { "not as independent rounds should" };
+    let falls = if within { "consistent with independent rounds" } else { "not consistent with independent rounds" };
     let text = format!(
-        "The paper saw the noise decrease with the rounds. From {} to {} rounds the root-mean-square distance to the picture of {} rounds falls {}, where independent rounds predict {} ({falls})",
+        "The paper found that noise decreases with rounds. Here, from {} to {} rounds, the RMS difference from the image of {} rounds becomes {} smaller. Independent rounds predict {}, so this is {falls}",
         first.settings.rounds,
         next_to_last.settings.rounds,
         last.settings.rounds,
@@ -348,9 +346,9 @@ fn bias(found: &Reproduction) -> Option<Verdict> {
     let [first, .., last] = frames(found, 4) else { return None };
     let [before, after] = [first, last].map(rim_share);
     let stays = (1.0 / BIAS_WITHIN..=BIAS_WITHIN).contains(&(after / before));
-    let end = if stays { "it stays, however many photons there are; only a radius that shrinks takes it away" } else { "it changes" };
+    let end = if stays { "more photons do not reduce it; a shrinking radius or edge correction would" } else { "it changes" };
     let text = format!(
-        "The fixed radius leaves a bias that the paper does not mention. The outermost texels of each wall show {} % of what the part of their disc on the wall would give after {}, and {} % after {}: {end}.",
+        "The fixed radius causes a bias that the paper does not mention. At the outermost texels of each wall, part of the disc lies beyond the wall. Their illumination is {} % of the value corrected for this after {}, and {} % after {}: {end}.",
         number(before * 100.0),
         first.label,
         number(after * 100.0),
@@ -404,7 +402,7 @@ mod tests {
         for (atomic, standing) in [(2.0, Standing::Holds), (1.05, Standing::NoLonger), (0.5, Standing::NoLonger)] {
             let verdict = append(&with_map_ms(1.0, atomic, 1.0)).unwrap();
             assert_eq!(verdict.standing, Some(standing), "{}", verdict.text);
-            assert!(verdict.text.ends_with(&format!("this {}.", standing.words())), "{}", verdict.text);
+            assert!(verdict.text.ends_with(&format!(". This {}.", standing.words())), "{}", verdict.text);
             assert!(verdict.text.contains(&times(atomic)) && verdict.text.contains(&times(11.0 / 1.7)), "{}", verdict.text);
         }
         let mut mixed = with_map_ms(1.0, 2.0, 1.0);
@@ -416,13 +414,13 @@ mod tests {
     #[test]
     fn the_ballot_pays_or_not() {
         let text = |ballot_ms: f64| ballot(&with_map_ms(1.0, 1.0, ballot_ms)).unwrap().text;
-        assert!(text(0.5).ends_with("it pays."));
-        assert!(text(1.0).contains("no difference"));
-        assert!(text(2.0).contains("does not pay"));
+        assert!(text(0.5).ends_with("this is faster."));
+        assert!(text(1.0).contains("no significant difference"));
+        assert!(text(2.0).contains("not faster, and slower"));
         let mut mixed = with_map_ms(1.0, 1.0, 0.5);
         let slow = mixed.running_times.iter_mut().find(|time| time.pass == Pass::Map && time.builder.variant == Variant::Ballot);
         slow.unwrap().ms.median = 2.0;
-        assert!(ballot(&mixed).unwrap().text.ends_with("pays at some sizes and costs at others."));
+        assert!(ballot(&mixed).unwrap().text.ends_with("faster at some sizes and slower at others."));
     }
 
     #[test]

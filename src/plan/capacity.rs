@@ -248,7 +248,7 @@ pub fn chunk_photons(settings: &Settings, limits: &Limits, work: &Work) -> Resul
         return Err(Error::setting(
             "--bounces",
             settings.bounces,
-            format!("two photons' maps do not fit the device's buffers of {} bytes; ask for fewer bounces", limits.buffer_bytes),
+            format!("the hits of two photons exceed the device's largest buffer, {} bytes; ask for fewer bounces", limits.buffer_bytes),
         ));
     }
     if settings.group_size > limits.group_size {
@@ -266,7 +266,7 @@ pub fn chunk_photons(settings: &Settings, limits: &Limits, work: &Work) -> Resul
         let (photons, room) = (u64::from(settings.photons), fits - spare);
         if photons > room {
             let allowed = format!(
-                "looks at a round's {photons} photons together, and the device holds {room}; ask for fewer photons and more rounds"
+                "searches the {photons} photons of a round at once, but the device holds at most {room}; ask for fewer photons and more rounds"
             );
             return Err(Error::setting("--nearest", nearest, allowed));
         }

@@ -25,10 +25,10 @@ pub fn decide(scene: &RoomScene, settings: &Settings, equal_flux: bool) -> Vec<D
             },
         },
         Decision {
-            effect: "a sum of flux beside the sum of illumination",
+            effect: "a separate sum of flux",
             kept: !glossy.is_empty() || !equal_flux,
             reason: match (glossy.is_empty(), equal_flux) {
-                (false, _) => "Phong weights are no flux".to_owned(),
+                (false, _) => "Phong weights are not flux".to_owned(),
                 (true, false) => "photons of different lights carry different flux".to_owned(),
                 (true, true) => "every photon carries the same flux and counts as one".to_owned(),
             },

@@ -1,4 +1,4 @@
-//! What a scene of triangles calls for: each effect with the evidence for keeping or dropping it.
+//! The effects that a scene of triangles needs: each with the evidence for keeping or dropping it.
 
 use serde::Serialize;
 
@@ -74,7 +74,7 @@ impl<'a> Facts<'a> {
         let (needed, evidence) = self.evidence(effect);
         let kept = (needed || settings.forces(effect)) && !settings.leaves_out(effect);
         let evidence = match (needed, kept) {
-            (true, false) => format!("left out by --without, though needed: {evidence}"),
+            (true, false) => format!("left out by --without, although the scene needs it: {evidence}"),
             (false, true) => format!("forced by --with: {evidence}"),
             _ => evidence,
         };
@@ -93,27 +93,27 @@ impl<'a> Facts<'a> {
             count => (true, format!("{count} {what} light(s)")),
         };
         let caustic = |found: &Option<String>, what: &str| match found {
-            None => (false, format!("no {what} material: no such caustic")),
-            Some(_) if !lit => (false, "nothing shines".into()),
-            Some(_) if !receives => (false, "no surface scatters light: nothing to see a caustic on".into()),
+            None => (false, format!("no {what} material")),
+            Some(_) if !lit => (false, "no light source".into()),
+            Some(_) if !receives => (false, "no diffuse or glossy surface to show a caustic".into()),
             Some(_) if !(wants(Part::Caustic) || (self.part == Part::Indirect && self.gathers)) => {
                 (false, format!("only {:?} light was asked for", self.part).to_lowercase())
             }
             Some(names) => (true, format!("{what}: {names}")),
         };
         match effect {
-            Effect::Direct if !lit => (false, "nothing shines".into()),
-            Effect::Direct if !receives => (false, "no surface scatters light".into()),
+            Effect::Direct if !lit => (false, "no light source".into()),
+            Effect::Direct if !receives => (false, "no diffuse or glossy surface".into()),
             Effect::Direct if self.part == Part::Caustic => (false, "only caustics were asked for".into()),
             Effect::Direct if self.part == Part::Indirect && !self.gathers => (false, "only indirect light was asked for".into()),
-            Effect::Direct if self.part == Part::Indirect => (true, "a gather ray ends in direct light".into()),
-            Effect::Direct => (true, format!("{} light(s) reach surfaces that scatter", self.emitters.iter().sum::<usize>())),
-            Effect::Indirect if !lit => (false, "nothing shines".into()),
-            Effect::Indirect if !receives => (false, "no surface scatters light".into()),
+            Effect::Direct if self.part == Part::Indirect => (true, "final-gather rays need direct light where they end".into()),
+            Effect::Direct => (true, format!("{} light source(s), and diffuse or glossy surfaces", self.emitters.iter().sum::<usize>())),
+            Effect::Indirect if !lit => (false, "no light source".into()),
+            Effect::Indirect if !receives => (false, "no diffuse or glossy surface".into()),
             Effect::Indirect if !wants(Part::Indirect) => (false, format!("only {:?} light was asked for", self.part).to_lowercase()),
             Effect::Indirect => match self.named(|material| !material.surface.is_specular() && material.base_colour.max_element() > 0.0) {
-                Some(names) => (true, format!("scatter light: {names}")),
-                None => (false, "every surface that scatters is black".into()),
+                Some(names) => (true, format!("diffuse or glossy: {names}")),
+                None => (false, "every diffuse or glossy surface is black".into()),
             },
             Effect::Glossy => match self.named(|material| matches!(material.surface, Surface::Glossy { .. })) {
                 Some(names) => (true, format!("glossy: {names}")),
@@ -131,7 +131,7 @@ impl<'a> Facts<'a> {
                 let found = self.named(|material| material.surface.is_specular());
                 match found {
                     None => (false, "no mirror and no dielectric material".into()),
-                    Some(names) => (true, format!("followed through: {names}")),
+                    Some(names) => (true, format!("specular: {names}")),
                 }
             }
             Effect::Textures => {
@@ -142,8 +142,8 @@ impl<'a> Facts<'a> {
             }
             Effect::Environment => lights(EMITTER_ENVIRONMENT, "environment"),
             Effect::MeshLights => match self.emitters[EMITTER_TRIANGLE as usize] {
-                0 => (false, "no triangle shines".into()),
-                count => (true, format!("{count} triangle(s) shine")),
+                0 => (false, "no emissive triangle".into()),
+                count => (true, format!("{count} emissive triangle(s)")),
             },
             Effect::PointLights => lights(EMITTER_POINT, "point"),
             Effect::SpotLights => lights(EMITTER_SPOT, "spot"),
@@ -152,13 +152,15 @@ impl<'a> Facts<'a> {
                 0 => (false, "no disc light".into()),
                 count => (true, format!("{count} disc light(s)")),
             },
-            Effect::Bvh if self.triangles <= LIST_TRIANGLES => (false, format!("{} triangles: a list is as fast", self.triangles)),
+            Effect::Bvh if self.triangles <= LIST_TRIANGLES => {
+                (false, format!("only {} triangles: testing each of them is as fast", self.triangles))
+            }
             Effect::Bvh => (true, format!("{} triangles", self.triangles)),
             Effect::TwoSided => match self.named(|material| material.two_sided) {
                 Some(names) => (true, format!("two-sided: {names}")),
-                None => (false, "every surface has one side".into()),
+                None => (false, "no two-sided material".into()),
             },
-            Effect::SmoothNormals if self.smooth == 0 => (false, "every triangle is flat".into()),
+            Effect::SmoothNormals if self.smooth == 0 => (false, "no smooth normals".into()),
             Effect::SmoothNormals => (true, format!("{} triangle(s) have smooth normals", self.smooth)),
         }
     }

@@ -137,7 +137,7 @@ impl Plan {
         let faintest = relative_flux.iter().fold(1.0f32, |a, b| a.min(*b));
         if channel_count == 2 && f64::from(faintest) * ((1u64 << film_shift) as f64) < MIN_FIXED_POINT {
             let [floor, left] = settings.light_power;
-            let allowed = "are too far apart for the film's sums over so many photons; bring them closer, or ask for fewer photons * rounds * bounces";
+            let allowed = "differ too much for the film's integer sums over so many photons; choose closer values, or ask for fewer photons * rounds * bounces";
             return Err(Error::setting("--light-power", format!("{floor},{left}"), allowed));
         }
 

@@ -456,7 +456,10 @@ impl TransportPlan {
         ];
         let too_large = |(_, bytes): &&(&'static str, u64)| *bytes > limits.buffer_bytes;
         if let Some((what, bytes)) = scene.iter().find(too_large) {
-            let allowed = format!("{what} take {bytes} bytes, the device's buffers hold {}; choose another --device", limits.buffer_bytes);
+            let allowed = format!(
+                "{what} take {bytes} bytes, but a buffer on this device holds at most {}; choose another --device",
+                limits.buffer_bytes
+            );
             return Err(Error::setting("SCENE", format!("({} triangles)", geometry.triangles.len()), allowed));
         }
         if film.iter().any(|(_, bytes)| *bytes > limits.buffer_bytes) {
@@ -467,14 +470,14 @@ impl TransportPlan {
                     "--size",
                     format!("{width}x{height}"),
                     match self.samples() {
-                        1 => format!("has {pixels} pixels, the device's buffers hold {most}; ask for a smaller picture"),
+                        1 => format!("has {pixels} pixels, but the device's buffers hold at most {most}; ask for a smaller picture"),
                         samples => format!(
-                            "has {pixels} pixels, the device's buffers hold {most} with --samples {samples}; ask for fewer samples or a smaller picture"
+                            "has {pixels} pixels, but the device's buffers hold at most {most} with --samples {samples}; ask for fewer samples or a smaller picture"
                         ),
                     },
                 ),
                 Sensor::Receivers { count } => {
-                    Error::setting("--points", count, format!("are too many, the device's buffers hold {most} at once; ask for fewer"))
+                    Error::setting("--points", count, format!("exceed the device's buffers, which hold at most {most}; ask for fewer"))
                 }
             });
         }
@@ -484,7 +487,7 @@ impl TransportPlan {
                 "--chunk",
                 self.settings.chunk.map_or("(default)".into(), |chunk| chunk.to_string()),
                 format!(
-                    "the run takes {} bytes of memory and the device has {}; ask for smaller chunks or a smaller picture",
+                    "the run needs {} bytes of device memory, but the device has {}; ask for smaller chunks or a smaller picture",
                     self.bytes, limits.memory_bytes
                 ),
             ));
@@ -495,7 +498,7 @@ impl TransportPlan {
     fn aim_in_words(&self) -> String {
         match (&self.caustic, self.targets.len()) {
             (None, _) => String::new(),
-            (_, 0) => "; photons leave in all directions".into(),
+            (_, 0) => "; photons emitted in all directions".into(),
             (_, 1) => "; photons aimed at 1 bounding sphere".into(),
             (_, count) => format!("; photons aimed at {count} bounding spheres"),
         }
@@ -556,7 +559,7 @@ fn chunk_photons(photons: u32, landings: u64, settings: &TransportSettings, limi
         return Err(Error::setting(
             "--bounces",
             settings.bounces,
-            format!("one photon's map does not fit the device's buffers of {} bytes; ask for fewer bounces", limits.buffer_bytes),
+            format!("the hits of one photon exceed the device's largest buffer, {} bytes; ask for fewer bounces", limits.buffer_bytes),
         ));
     }
     Ok(fits.min(settings.chunk.map_or(u64::MAX, u64::from)).min(u64::from(photons)) as u32)

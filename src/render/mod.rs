@@ -66,13 +66,13 @@ pub struct Outcome {
     pub end: End,
     /// The run was ended from outside before its last photon.
     pub cancelled: bool,
-    /// What the radius adds to the error; `None` where nobody measured it.
+    /// The bias of the radius; `None` where it was not measured.
     pub bias: Option<Bias>,
     /// Light that limits kept from the result.
     pub losses: Losses,
     pub dispatches: u64,
     pub submissions: u64,
-    /// What `--paranoid` found; `None` where nobody looked.
+    /// Nonfinite values that `--paranoid` found; `None` without it.
     pub oddities: Option<Oddities>,
 }
 
@@ -83,6 +83,6 @@ pub struct Replayed {
     pub start: Path,
     pub stored: Vec<Photon>,
     pub fate: &'static str,
-    /// What `--paranoid` found; `None` where nobody looked.
+    /// Nonfinite values that `--paranoid` found; `None` without it.
     pub oddities: Option<Oddities>,
 }

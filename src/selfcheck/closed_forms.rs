@@ -1,4 +1,4 @@
-//! The scenes of [`crate::scene::closed_forms`], asked by receivers and cameras, by shadow rays and by photons
+//! Cases for the scenes of [`crate::scene::closed_forms`]: with receivers and cameras, with shadow rays and with photons
 //! alone.
 
 use std::f64::consts::PI;
@@ -120,7 +120,7 @@ fn point() -> Vec<Case> {
     let mut cases: Vec<Case> = [0.0, 0.5, 1.7]
         .into_iter()
         .map(|r: f64| {
-            case(format!("point light, {r} m aside: irradiance"), (1.0 + r * r).powf(-1.5), move |gpu| {
+            case(format!("point light, {r} m off axis: irradiance"), (1.0 + r * r).powf(-1.5), move |gpu| {
                 irradiance(gpu, &scene("point-over-plane"), &settings(Illumination::Split, 0.1), &at(r))
             })
         })
@@ -149,7 +149,7 @@ fn disc() -> Vec<Case> {
     let mean = 0.5 * (x - (x * x - 4.0 * (h / r).powi(2)).sqrt()) / (PI * h * h);
     let by_intensity = (1.0 - 1.0 / (1.0 + r * r).sqrt()) / (PI * r * r);
     vec![
-        case("disc light of equal intensity: irradiance".into(), by_intensity, move |gpu| {
+        case("disc light, uniform intensity: irradiance".into(), by_intensity, move |gpu| {
             let mut scene = scene("disc-over-plane");
             for light in &mut scene.lights {
                 if let LightKind::Disc { law, .. } = &mut light.kind {
@@ -210,7 +210,7 @@ fn glass() -> Vec<Case> {
             radiance(gpu, scene("glass-slab"), &rays, 2.0 * DVec3::new(sin, 0.0, cos), DVec3::ZERO)
         })
     };
-    vec![of("straight on", 0.0), of("at 60 degrees", 60.0)]
+    vec![of("normal incidence", 0.0), of("at 60 degrees", 60.0)]
 }
 
 /// What a smooth surface reflects of unpolarised light (Fresnel; Born and Wolf 1.5.2).

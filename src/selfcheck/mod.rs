@@ -1,5 +1,5 @@
-//! Closed forms on the user's own device: each case is a light whose value is known, asked of the same
-//! kernels that render and bake. A driver that miscompiles one of them is found here, not in a picture.
+//! Checks against closed forms on the user's device. Each case computes a known value with the same kernels that
+//! render and bake, so that a driver that miscompiles a kernel is found here and not in an image.
 
 pub mod closed_forms;
 pub mod measure;

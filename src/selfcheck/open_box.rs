@@ -25,7 +25,7 @@ fn case(variant: Variant, emission: EmissionLaw, expected: f64) -> Case {
     let settings = Settings { variant, emission, photons: PHOTONS, rng: Rng::Philox, mesh: 1, ..Settings::default() };
     let law = format!("{emission:?}").to_lowercase();
     Case {
-        name: format!("open box, {} builder, {law} lamps: stored a photon", variant.name()),
+        name: format!("open box, {} builder, {law} lights: hits stored per photon", variant.name()),
         expected,
         on_gpu: variant != Variant::Cpu,
         measure: Box::new(move |gpu| {

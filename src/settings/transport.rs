@@ -286,7 +286,7 @@ impl TransportSettings {
             }
         }
         if !(self.alpha > 0.0 && self.alpha <= 1.0) {
-            return Err(Error::setting("--alpha", self.alpha, "must be above 0 and at most 1, which keeps the radius"));
+            return Err(Error::setting("--alpha", self.alpha, "must be above 0 and at most 1 (1 keeps the radius fixed)"));
         }
         self.stop.validate()?;
         if !(self.group_size.is_power_of_two() && (32..=1024).contains(&self.group_size)) {
@@ -296,7 +296,7 @@ impl TransportSettings {
             within("--chunk", chunk, 1..=MAX_PHOTONS, "photons traced at once")?;
         }
         if let Some(both) = self.with.iter().find(|effect| self.without.contains(effect)) {
-            return Err(Error::setting("--without", both.name(), "stands in --with too; choose one"));
+            return Err(Error::setting("--without", both.name(), "is also in --with; choose one of the two"));
         }
         Ok(())
     }

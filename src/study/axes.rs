@@ -1,4 +1,4 @@
-//! What a user may choose: axes, and the configurations along each.
+//! The options that a study compares: axes, and the configurations along each.
 
 use serde::{Deserialize, Serialize};
 
@@ -32,7 +32,7 @@ impl Axis {
     pub fn name(self) -> &'static str {
         match self {
             Axis::Builder => "builder",
-            Axis::Photons => "photons a round",
+            Axis::Photons => "photons per round",
             Axis::Radius => "radius",
             Axis::Schedule => "radius schedule",
             Axis::Kernel => "kernel",
@@ -43,7 +43,7 @@ impl Axis {
             Axis::Sums => "sums",
             Axis::Arithmetic => "arithmetic",
             Axis::Direct => "direct light",
-            Axis::Paths => "paths a pixel",
+            Axis::Paths => "paths per pixel",
             Axis::Gather => "final gather",
             Axis::Index => "index",
             Axis::Effects => "effects",
@@ -121,13 +121,13 @@ pub fn of_paper(mesh: u32, photons: u32) -> Vec<Group> {
     sweep.add(Axis::Builder, "naive slots", |s| s.variant = Variant::Naive);
     sweep.add(Axis::Builder, "subgroup ballot", |s| s.variant = Variant::Ballot);
     sweep.add(Axis::Builder, "work-group aggregate", |s| s.variant = Variant::Group);
-    sweep.add(Axis::Builder, "prefix sums, in order", |s| s.variant = Variant::Scan);
+    sweep.add(Axis::Builder, "prefix sums, order kept", |s| s.variant = Variant::Scan);
     sweep.add(Axis::Builder, "persistent", |s| s.variant = Variant::Persistent);
     sweep.add(Axis::Builder, "CPU, one thread", |s| s.variant = Variant::Cpu);
-    for (factor, name) in [(16, "a sixteenth of the photons"), (4, "a quarter of the photons")] {
+    for (factor, name) in [(16, "1/16 of the photons"), (4, "1/4 of the photons")] {
         sweep.add(Axis::Photons, name, |s| s.photons = (photons / factor).max(2));
     }
-    sweep.add(Axis::Photons, "four times the photons", |s| s.photons = photons * 4);
+    sweep.add(Axis::Photons, "4 times the photons", |s| s.photons = photons * 4);
     for radius in [0.1, 0.05, 0.0125, 0.00625] {
         sweep.add(Axis::Radius, format!("radius {radius} m"), |s| s.radius = radius);
     }
@@ -167,7 +167,7 @@ pub fn of_the_papers_rounds(mesh: u32) -> Vec<Group> {
         alpha,
         ..TransportSettings::default()
     };
-    let shrinking = [(1.0, "radius 0.05 m, as triangles"), (2.0 / 3.0, "radius from 0.05 m that shrinks (alpha 2/3), as triangles")]
+    let shrinking = [(1.0, "radius 0.05 m, box as triangles"), (2.0 / 3.0, "radius shrinking from 0.05 m (alpha 2/3), box as triangles")]
         .map(|(alpha, label)| Configuration { label: label.to_owned(), line: Line::Scene(triangles(alpha)) });
     sweep.groups[0].configurations.extend(shrinking);
     sweep.groups
@@ -186,9 +186,9 @@ pub fn of_scene(photons: u32, kept: &[Effect], radius: Option<f64>, has_few_tria
     sweep.add(Axis::Builder, "atomic", |s| s.append = Append::Atomic);
     sweep.add(Axis::Builder, "subgroup ballot", |s| s.append = Append::Ballot);
     let of_photons = |s: &mut TransportSettings, photons: u32| (s.photons, s.caustic_photons) = (photons, photons);
-    sweep.add(Axis::Photons, "a sixteenth of the photons", |s| of_photons(s, (photons / 16).max(1)));
-    sweep.add(Axis::Photons, "a quarter of the photons", |s| of_photons(s, (photons / 4).max(1)));
-    sweep.add(Axis::Photons, "four times the photons", |s| of_photons(s, photons * 4));
+    sweep.add(Axis::Photons, "1/16 of the photons", |s| of_photons(s, (photons / 16).max(1)));
+    sweep.add(Axis::Photons, "1/4 of the photons", |s| of_photons(s, (photons / 4).max(1)));
+    sweep.add(Axis::Photons, "4 times the photons", |s| of_photons(s, photons * 4));
     for (factor, name) in [(2.0, "twice the radius"), (0.5, "half the radius")] {
         if let Some(radius) = radius {
             sweep.add(Axis::Radius, name, |s| s.radius = Some(significant(factor * radius)));
@@ -206,18 +206,19 @@ pub fn of_scene(photons: u32, kept: &[Effect], radius: Option<f64>, has_few_tria
     }
     sweep.add(Axis::Arithmetic, "strict", |s| s.math = Math::Strict);
     sweep.add(Axis::Direct, "one shadow ray", |s| s.shadow_rays = 1);
-    sweep.add(Axis::Direct, "sixteen shadow rays", |s| s.shadow_rays = 16);
+    sweep.add(Axis::Direct, "16 shadow rays", |s| s.shadow_rays = 16);
     sweep.add(Axis::Direct, "direct light from photons", |s| s.illumination = Illumination::Photons);
     if is_picture {
         for samples in [4, 16] {
-            sweep.add(Axis::Paths, format!("{samples} paths a pixel, a shadow ray each"), |s| (s.samples, s.shadow_rays) = (samples, 1));
+            sweep
+                .add(Axis::Paths, format!("{samples} paths per pixel, one shadow ray each"), |s| (s.samples, s.shadow_rays) = (samples, 1));
         }
     }
     sweep.add(Axis::Gather, "final gather", |s| s.final_gather = true);
     if has_few_triangles {
-        sweep.add(Axis::Index, "a list of triangles, no tree", |s| s.without = vec![Effect::Bvh]);
+        sweep.add(Axis::Index, "no BVH", |s| s.without = vec![Effect::Bvh]);
     }
-    sweep.add(Axis::Effects, "every effect forced on", |s| s.with = Effect::ALL.to_vec());
+    sweep.add(Axis::Effects, "all effects forced on", |s| s.with = Effect::ALL.to_vec());
     for effect in REMOVABLE.into_iter().filter(|effect| kept.contains(effect)) {
         sweep.add(Axis::Effects, format!("without {}", effect.name()), |s| s.without = vec![effect]);
     }

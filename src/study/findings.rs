@@ -1,4 +1,4 @@
-//! What the points say: the price of an error, what each choice buys or costs, the Pareto front, tables, CSV.
+//! Conclusions from the points: time to reach an error, cost and gain of each option, the Pareto front, tables, CSV.
 
 use super::axes::Axis;
 use super::point::{CONFIDENCE, Curve, Estimate, Point};
@@ -19,7 +19,7 @@ fn between(estimate: Estimate, show: impl Fn(f64) -> String) -> String {
     if estimate.low > 0.0 && estimate.high < 100.0 * estimate.low {
         format!("{} to {}", show(estimate.low), show(estimate.high))
     } else {
-        "unknown from so few runs".to_owned()
+        "interval unknown: too few runs".to_owned()
     }
 }
 
@@ -58,39 +58,41 @@ impl Part {
     pub fn sentences(&self) -> Vec<String> {
         let Some(base) = self.base() else { return Vec::new() };
         let least = self.least_error();
-        let mut sentences: Vec<String> = [
-            price(base, least),
-            halving(base, least),
-            law("the base", base, least),
-            self.comparisons.first().and_then(|one| floor(one.axis, base, least)),
-        ]
-        .into_iter()
-        .flatten()
-        .collect();
+        let mut sentences: Vec<String> =
+            [price(base, least), halving(base, least), law("the base", base, least), floor("the base", base, least)]
+                .into_iter()
+                .flatten()
+                .collect();
         let choices: usize = self.comparisons.iter().map(|comparison| comparison.others().count()).sum();
         // So that all of them together are as sure as one.
         let confidence = 1.0 - (1.0 - CONFIDENCE) / choices.max(1) as f64;
-        let mut undecided = Vec::new();
+        let (mut undecided, mut single) = (Vec::new(), Vec::new());
         for comparison in &self.comparisons {
             let Some(base) = comparison.base() else { continue };
             for curve in comparison.others() {
                 match choice(comparison.axis, curve, base, least, confidence) {
-                    Choice::Told(sentence) => sentences.push(sentence),
+                    Choice::Differs(sentence) => sentences.push(sentence),
                     Choice::Undecided(what) => undecided.push(what),
+                    Choice::SinglePoint => single.push(named(comparison.axis, &curve.label)),
                 }
             }
             let left_out =
-                |curve: &Curve| Some(format!("{}: {} was left out: {}.", comparison.axis.name(), curve.label, curve.left_out.as_ref()?));
+                |curve: &Curve| Some(format!("{} was not measured: {}.", named(comparison.axis, &curve.label), curve.left_out.as_ref()?));
             sentences.extend(comparison.curves.iter().filter_map(left_out));
         }
         if !undecided.is_empty() {
-            sentences.push(format!("Not told from the base by these runs (times the time, interval): {}.", undecided.join("; ")));
+            sentences.push(format!("Not significantly faster or slower than the base: {}.", undecided.join("; ")));
+        }
+        if !single.is_empty() {
+            sentences.push(format!("Not compared, because the budget allowed a single point only: {}.", single.join("; ")));
         }
         for comparison in &self.comparisons {
             let Some(base) = comparison.base() else { continue };
             let of_base = base.points.last().map_or(0.0, |last| last.bias().high);
             // What differs from the base in nothing but time has its bias too.
-            sentences.extend(comparison.others().filter_map(|curve| floor(comparison.axis, curve, least.max(1.2 * of_base))));
+            sentences.extend(
+                comparison.others().filter_map(|curve| floor(&named(comparison.axis, &curve.label), curve, least.max(1.2 * of_base))),
+            );
         }
         for comparison in self.comparisons.iter().filter(|comparison| comparison.axis == Axis::Bounces) {
             sentences.extend(comparison.curves.iter().filter_map(lost));
@@ -128,31 +130,41 @@ fn common_error(one: &Curve, other: &Curve, least: f64) -> Option<f64> {
 const NEXT_TO_NOTHING: f64 = 1.02;
 
 enum Choice {
-    Told(String),
+    Differs(String),
     /// Name, ratio and interval.
     Undecided(String),
+    SinglePoint,
 }
 
-/// What a choice buys or costs against the base.
+/// A configuration with its axis, unless its label names that already.
+fn named(axis: Axis, label: &str) -> String {
+    if label.contains(axis.name()) { label.to_owned() } else { format!("{}: {label}", axis.name()) }
+}
+
+/// How much faster or slower a choice is than the base.
 fn choice(axis: Axis, curve: &Curve, base: &Curve, least: f64, confidence: f64) -> Choice {
-    let name = format!("{}: {}", axis.name(), curve.label);
+    let name = named(axis, &curve.label);
     if curve.points.len() < 2 || base.points.len() < 2 {
-        return Choice::Undecided(format!("{name}, as there was time for a single point"));
+        return Choice::SinglePoint;
     }
     let Some((error, longer)) =
         common_error(curve, base, least).and_then(|error| Some((error, curve.times_longer(base, error, confidence)?)))
     else {
         let reach = |curve: &Curve| format!("{} after {}", percent(curve.best_error()), duration(curve.longest()));
-        return Choice::Told(format!("{name} reaches {}, the base {}: they share no error that both crossed.", reach(curve), reach(base)));
+        return Choice::Differs(format!(
+            "{name} reaches {}, the base {}; the two ranges of error do not overlap.",
+            reach(curve),
+            reach(base)
+        ));
     };
     let (at, interval) = (percent(error), between(longer, ratio));
     if longer.low > 1.0 && longer.value > NEXT_TO_NOTHING {
-        Choice::Told(format!("{name} costs {} the time to {at} ({interval}).", ratio(longer.value)))
+        Choice::Differs(format!("{name} takes {} as long as the base to reach {at} ({interval}).", ratio(longer.value)))
     } else if longer.high < 1.0 && longer.value < 1.0 / NEXT_TO_NOTHING {
         let faster = Estimate { value: 1.0 / longer.value, low: 1.0 / longer.high, high: 1.0 / longer.low };
-        Choice::Told(format!("{name} buys {}: it reaches {at} so many times sooner ({}).", ratio(faster.value), between(faster, ratio)))
+        Choice::Differs(format!("{name} is {} as fast as the base in reaching {at} ({}).", ratio(faster.value), between(faster, ratio)))
     } else {
-        Choice::Undecided(format!("{name}, {} to {at}, {interval}", ratio(longer.value)))
+        Choice::Undecided(format!("{name} takes {} as long to reach {at} ({interval})", ratio(longer.value)))
     }
 }
 
@@ -166,38 +178,36 @@ fn price(base: &Curve, least: f64) -> Option<String> {
         .into_iter()
         .filter(|error| *error >= least)
         .filter_map(|error| {
-            Some(format!("{} takes {} ({})", percent(error), duration(base.time_to(error)?.value), between(base.time_to(error)?, duration)))
+            Some(format!("{} in {} ({})", percent(error), duration(base.time_to(error)?.value), between(base.time_to(error)?, duration)))
         })
         .collect();
-    if prices.is_empty() { None } else { Some(format!("A relative RMS error of {}.", prices.join(", "))) }
+    if prices.is_empty() { None } else { Some(format!("The base reaches a relative RMS error of {}.", prices.join(", "))) }
 }
 
 /// The cost of half the error, where it was measured at the smallest errors.
 fn halving(base: &Curve, least: f64) -> Option<String> {
     let error = steps(2.0 * least).find(|error| base.crosses(*error) && base.crosses(0.5 * error))?;
     let cost = base.halving(error)?;
-    Some(format!("Halving the error from {} costs {} the time ({}).", percent(error), ratio(cost.value), between(cost, ratio)))
+    Some(format!("Halving the error from {} takes {} the time ({}).", percent(error), ratio(cost.value), between(cost, ratio)))
 }
 
 /// The law of noise.
 fn law(name: &str, curve: &Curve, least: f64) -> Option<String> {
     let slope = curve.noise_slope(least)?;
     Some(format!(
-        "Where noise is the error of {name}, it falls with the photons to the power {slope:.2}; at a fixed radius independent photons make -0.50, and a radius that shrinks slows that."
+        "The noise of {name} falls as the number of photons to the power {slope:.2}. Independent photons give -0.50 at a fixed radius; a shrinking radius gives a slower fall."
     ))
 }
 
 /// Where bias ends the fall of the error.
-fn floor(axis: Axis, curve: &Curve, least: f64) -> Option<String> {
+fn floor(name: &str, curve: &Curve, least: f64) -> Option<String> {
     let last = curve.points.last()?;
     let bias = last.bias();
     // Noise falls with the root of the rounds.
     let rounds = f64::from(last.rounds) * (last.noise() / bias.value).powi(2);
     (bias.low > least && bias.low > 0.5 * last.noise()).then(|| {
         format!(
-            "{}: {} is at {} after {} rounds, of which {} is bias ({}); noise is less than that from {} round(s) on.",
-            axis.name(),
-            curve.label,
+            "{name}: an error of {} after {} round(s), with a bias of {} ({}); noise is below this bias from {} round(s) on.",
             percent(last.error().value),
             last.rounds,
             percent(bias.value),
@@ -210,7 +220,7 @@ fn floor(axis: Axis, curve: &Curve, least: f64) -> Option<String> {
 /// What a cap on bounces leaves out.
 fn lost(curve: &Curve) -> Option<String> {
     let last = curve.points.last().filter(|last| last.cut_off > 0.0)?;
-    Some(format!("bounces: {} ends with {} of the photons still flying; their light is lost.", curve.label, percent(last.cut_off)))
+    Some(format!("{}: the bounce limit ends {} of the photons, and their remaining light is lost.", curve.label, percent(last.cut_off)))
 }
 
 /// Table 1's last row, and its time, on this device.
@@ -219,9 +229,9 @@ fn then_and_now(base: &Curve) -> Vec<String> {
     let photons = u64::from(rounds * published::PHOTONS);
     let rate = last.photons as f64 / last.ms().value;
     let mut sentences = vec![format!(
-        "2008 took {} for {} photons; at the {} photons a second measured here the same time buys {} photons.",
-        duration(*then),
+        "In 2008, {} photons took {}. This device traces {} photons/s, or {} photons in that time.",
         count(photons),
+        duration(*then),
         number(1000.0 * rate),
         number(rate * then)
     )];
@@ -231,7 +241,7 @@ fn then_and_now(base: &Curve) -> Vec<String> {
     });
     if let Some(ms) = ms {
         let error = base.error_after(ms).map_or_else(String::new, |error| format!(", with an error of {}", percent(error.value)));
-        sentences.push(format!("Those {} photons take {} here, {} less{error}.", count(photons), duration(ms), ratio(then / ms)));
+        sentences.push(format!("Here {} photons take {}, {} as fast as in 2008{error}.", count(photons), duration(ms), ratio(then / ms)));
     }
     sentences
 }
@@ -254,7 +264,7 @@ fn rows(part: &Part, value: impl Fn(&Curve) -> Result<Estimate, String>) -> Vec<
         rows.extend(comparison.others().map(|curve| {
             let value = value(curve);
             let ratio = value.as_ref().ok().zip(base).map(|(own, base)| own.value / base.value);
-            Row { name: format!("{}: {}", comparison.axis.name(), curve.label), value, ratio }
+            Row { name: named(comparison.axis, &curve.label), value, ratio }
         }));
     }
     rows
@@ -263,8 +273,10 @@ fn rows(part: &Part, value: impl Fn(&Curve) -> Result<Estimate, String>) -> Vec<
 /// Why a curve has no error after a time.
 fn measured_to(curve: &Curve, ms: f64) -> String {
     match (curve.points.first(), curve.points.last()) {
-        (Some(first), _) if first.ms().value > ms => format!("first {} after {}", percent(first.error().value), duration(first.ms().value)),
-        (_, Some(last)) => format!("last {} after {}", percent(last.error().value), duration(last.ms().value)),
+        (Some(first), _) if first.ms().value > ms => {
+            format!("first point: {} after {}", percent(first.error().value), duration(first.ms().value))
+        }
+        (_, Some(last)) => format!("last point: {} after {}", percent(last.error().value), duration(last.ms().value)),
         _ => "not measured".to_owned(),
     }
 }
@@ -273,7 +285,7 @@ fn measured_to(curve: &Curve, ms: f64) -> String {
 fn beyond(curve: &Curve, error: f64) -> String {
     match curve.points.first() {
         Some(first) if first.error().value <= error => format!("less than {}", duration(first.ms().value)),
-        Some(_) => format!("not within {}", duration(curve.longest())),
+        Some(_) => format!("not reached in {}", duration(curve.longest())),
         None => "not measured".to_owned(),
     }
 }

@@ -1,7 +1,7 @@
-//! What accuracy costs in time: every choice that a user has, measured as error against time on this device.
+//! What accuracy costs in time: error against time on this device, for every option.
 //!
 //! A study runs each configuration of each axis ([`axes`]) at numbers of rounds that double, several times with seeds of
-//! their own, holds the results against a reference that another method made ([`mod@reference`]), and writes what it found
+//! their own, compares the results with a reference from another method ([`mod@reference`]), and writes what it found
 //! as a page, CSV, JSON and SVG. Points that are finished are kept ([`store`]), so that a study that was cut off goes on
 //! where it ended.
 
@@ -61,7 +61,7 @@ pub struct Study {
     /// A software device, whose 'GPU' is the CPU.
     pub is_cpu: bool,
     pub parts: Vec<Part>,
-    /// Who wins where among the builders; of the open box alone.
+    /// The fastest builder by photon count and survival; for the open box only.
     pub compaction: Option<compaction::Map>,
     /// False if it was ended before its last point.
     pub complete: bool,
@@ -85,7 +85,7 @@ pub struct Comparison {
     pub curves: Vec<Curve>,
 }
 
-/// Runs a study, and tells a line for each configuration.
+/// Runs a study, and reports a line for each axis.
 pub fn run(
     gpu: &Gpu,
     scene: &Scene,
@@ -139,7 +139,7 @@ pub fn run(
         match compaction::measure(gpu, &wanted, cancelled, tell) {
             Ok(map) => study.compaction = Some(map),
             // What was measured before is worth its page.
-            Err(error) => tell(&format!("the map of builders is left out: {error}")),
+            Err(error) => tell(&format!("the comparison of builders was not measured: {error}")),
         }
         if cancelled.load(Ordering::Relaxed) {
             return Ok(study);
@@ -197,7 +197,7 @@ impl Measuring<'_> {
         Ok(true)
     }
 
-    /// Adds a point to each of these curves, their runs in turn; false where somebody ended it.
+    /// Adds a point to each of these curves, their runs in turn; false if it was interrupted.
     fn level(&mut self, going: &[usize], rounds: u32, curves: &mut [Curve], unmeasured: &mut [Duration]) -> Result<bool> {
         let Measuring { gpu, subject, group, request, cancelled, share, .. } = *self;
         let command = |which: usize| subject.command(&group.configurations[which], rounds, request.seed);
@@ -221,7 +221,7 @@ impl Measuring<'_> {
                         unmeasured[which] += began.elapsed();
                         if began.elapsed() > PATIENCE.max(2 * share) {
                             let seconds = began.elapsed().as_secs_f64();
-                            curves[which].left_out = Some(format!("one round takes {seconds:.1} s, too long for this budget"));
+                            curves[which].left_out = Some(format!("one round takes {seconds:.1} s, too long for the budget"));
                         }
                     }
                     Ok(Some(shot)) => shots[which].push((shot, began.elapsed())),

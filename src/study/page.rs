@@ -1,4 +1,4 @@
-//! The page: everything that was found, in one file that loads nothing.
+//! The page: all results in one file that loads nothing.
 
 use maud::{DOCTYPE, Markup, PreEscaped, html};
 
@@ -41,20 +41,20 @@ fn head(study: &Study) -> Markup {
     html! {
         header {
             h1 { "What accuracy costs in time: " (request.scene) }
-            p { "Relative root mean square error against time, for every choice that photonmill " (study.photonmill) " offers on this scene." }
+            p { "Relative RMS error against time, for every option of photonmill " (study.photonmill) " that applies to this scene." }
             @if !study.complete {
-                p.notice { strong { "Incomplete." } " The study was ended before its last point. The same command goes on from here." }
+                p.notice { strong { "Incomplete." } " The study was interrupted. The same command continues it." }
             }
             @if study.is_cpu {
-                p.notice { strong { "This device is software." } " It runs Vulkan on the CPU, so every 'GPU' time on this page is the time of a CPU." }
+                p.notice { strong { "This device is software." } " It runs Vulkan on the CPU, so 'GPU' times on this page are CPU times." }
             }
             dl {
                 dt { "Device" }
                 dd { (study.device) "; driver " (study.driver) }
-                dt { "Photons a round" }
-                dd { (count(u64::from(request.photons))) ", where the configuration says nothing else" }
-                dt { "Runs of a point" }
-                dd { (request.repeats) ", with the seeds " (request.seed) " to " (request.seed + u64::from(request.repeats) - 1) }
+                dt { "Photons per round" }
+                dd { (count(u64::from(request.photons))) ", unless the configuration says otherwise" }
+                dt { "Runs per point" }
+                dd { (request.repeats) ", with seeds " (request.seed) " to " (request.seed + u64::from(request.repeats) - 1) }
             }
         }
     }
@@ -63,12 +63,11 @@ fn head(study: &Study) -> Markup {
 fn of_builders(map: &Map) -> Markup {
     html! {
         section {
-            h2 { "Who wins where" }
+            h2 { "Fastest builder by photon count and survival" }
             p {
-                "Time to trace and store photons of " (map.bounces) " bounces in a closed room that lets a share of them go on at every wall. "
-                "In each field the fastest builder, how many times sooner it is done than with one atomic a thread, and, below, "
-                "who cannot be told from it. All builders stored the same photons to the bit, up to a million of them; of more the same "
-                "number met each fate at each bounce."
+                "Time to trace and store photons over " (map.bounces) " bounces in a closed room. At every wall a given share of the photons survives. "
+                "Each cell shows the fastest builder, its speed relative to one atomic per thread, and, below, the builders that are not significantly slower. "
+                "All builders gave the same result: bit-identical stored photons up to a million, and above that the same numbers of photons stored and absorbed at each bounce."
             }
             figure { (PreEscaped(compaction::chart::draw(map))) }
             details {
@@ -83,20 +82,20 @@ fn of_part(part: &Part) -> Markup {
     html! {
         section {
             h2 { (part.quantity) }
-            p { "Reference: " (part.reference) "; known to " (percent(part.reference_error)) ". Errors below that are not to be trusted." }
+            p { "Reference: " (part.reference) ". Its own error is " (percent(part.reference_error)) "; smaller errors in this section are not reliable." }
             ul { @for sentence in part.sentences() { li { (sentence) } } }
             @if let Some(drawn) = chart::overview(part) {
                 figure {
                     div.scroll { (PreEscaped(drawn)) }
-                    figcaption { "All points; the line joins those that no other beats in both time and error." }
+                    figcaption { "All points. The line is the Pareto front: the points that no other point beats in both time and error." }
                 }
             }
             (front(part))
             @if let Some((ms, rows)) = equal_time(part) {
-                (table(&format!("Equal time: the error after {}", duration(ms)), "error", &rows, percent))
+                (table(&format!("Error after {}", duration(ms)), "error", &rows, percent))
             }
             @if let Some((error, rows)) = equal_error(part) {
-                (table(&format!("Equal error: the time to {}", percent(error)), "time", &rows, duration))
+                (table(&format!("Time to reach {}", percent(error)), "time", &rows, duration))
             }
             @for comparison in &part.comparisons {
                 h3 { (comparison.axis.name()) }
@@ -113,7 +112,7 @@ fn front(part: &Part) -> Markup {
     html! {
         div.scroll {
             table {
-                thead { tr { th.name { "On the Pareto front" } th { "rounds" } th { "time" } th { "error" } } }
+                thead { tr { th.name { "Pareto front" } th { "rounds" } th { "time" } th { "error" } } }
                 tbody {
                     @for (curve, point) in part.pareto_front() {
                         tr { th scope="row" { (curve.label) } td { (point.rounds) } td { (duration(point.ms().value)) } td { (percent(point.error().value)) } }
@@ -128,7 +127,7 @@ fn table(title: &str, what: &str, rows: &[Row], show: impl Fn(f64) -> String) ->
     html! {
         div.scroll {
             table {
-                thead { tr { th.name { (title) } th { (what) } th { (findings::words_of_confidence()) } th { "over the base" } } }
+                thead { tr { th.name { (title) } th { (what) } th { (findings::words_of_confidence()) " interval" } th { "relative to base" } } }
                 tbody {
                     @for Row { name, value, ratio } in rows {
                         tr {
@@ -146,17 +145,17 @@ fn table(title: &str, what: &str, rows: &[Row], show: impl Fn(f64) -> String) ->
                 }
             }
         }
-        p { "Ratios are to the base that was measured in turn with the choice." }
+        p { "Each option was measured alternately with the base; ratios compare these runs." }
     }
 }
 
 fn points(curve: &Curve) -> Markup {
     html! {
         details {
-            summary { (curve.label) ": every point" }
+            summary { (curve.label) ": all points" }
             div.scroll {
                 table {
-                    thead { tr { th { "rounds" } th { "photons" } th { "time (median)" } th { "least to most" } th { "wall" } th { "error" } th { (findings::words_of_confidence()) } th { "noise" } th { "bias" } } }
+                    thead { tr { th { "rounds" } th { "photons" } th { "time (median)" } th { "fastest to slowest" } th { "wall" } th { "error" } th { (findings::words_of_confidence()) " interval" } th { "noise" } th { "bias" } } }
                     tbody { @for point in &curve.points { (row(point)) } }
                 }
             }
@@ -177,7 +176,7 @@ fn row(point: &Point) -> Markup {
             td { (percent(error.value)) }
             td { @if error.high.is_finite() { (percent(error.low)) " to " (percent(error.high)) } @else { "unknown" } }
             td { (percent(point.noise())) }
-            td { @if bias.low > 0.0 { (percent(bias.value)) } @else { "at most " (if bias.high.is_finite() { percent(bias.high) } else { "unknown".to_owned() }) } }
+            td { @if bias.low > 0.0 { (percent(bias.value)) } @else if bias.high.is_finite() { "at most " (percent(bias.high)) } @else { "unknown" } }
         }
     }
 }
@@ -187,12 +186,12 @@ fn how(study: &Study) -> Markup {
         section {
             h2 { "How this was measured" }
             ul {
-                li { "Error: root of the mean squared difference from the reference over the reference's root mean square. What the reference's own noise adds is taken off." }
-                li { "Noise is what runs with different seeds differ by, and bias what they have in common; both come from the " (study.request.repeats) " runs of a point. Intervals and bands hold the truth with " (findings::words_of_confidence()) " by Student's distribution over those runs; few runs make wide bands." }
-                li { "Time: all rounds by the device's timestamps, without set-up; the host's clock for the CPU builder. A card that idled runs at a low clock, so it is kept busy before each run. The middle of the runs counts, and the least and the most show how the clock drifts." }
-                li { "Times to an error lie on straight lines between points on logarithmic scales, and are given only between errors that were measured." }
-                li { "Every command repeats the first run of its point; the others have the seeds that follow." }
-                li { "A picture leaves out pixels in which a light is seen straight. " (number(study.parts.iter().map(|part| part.curves().map(|curve| curve.points.len()).sum::<usize>()).sum::<usize>() as f64)) " points in all." }
+                li { "Error: RMS difference from the reference, relative to the RMS of the reference. The contribution of the reference's own noise is subtracted." }
+                li { "Noise is the error that differs between runs with different seeds. Bias is the error that they share. Both are computed from the " (study.request.repeats) " runs of a point. Intervals and bands are " (findings::words_of_confidence()) " confidence intervals (Student's t over those runs); few runs give wide bands." }
+                li { "Time: device time of all rounds by timestamps, without set-up; the CPU builder uses the host's clock. Warm-up work before each run brings the device to its full clock. The time of a point is the median of its runs; the fastest and the slowest run show the drift of the clock." }
+                li { "Times to reach an error are interpolated linearly between points on logarithmic scales, and never extrapolated." }
+                li { "Each command repeats the first run of its point. The other runs use the seeds that follow." }
+                li { "Pixels that show a light source directly are excluded from the error of images. This page has " (number(study.parts.iter().map(|part| part.curves().map(|curve| curve.points.len()).sum::<usize>()).sum::<usize>() as f64)) " points." }
             }
         }
     }

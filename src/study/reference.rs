@@ -1,4 +1,5 @@
-//! What is right, by a method that is not judged: radiosity for the paper's box, path tracing for pictures.
+//! References from methods other than photon mapping: radiosity for the paper's box, closed forms for floors, path tracing
+//! for images.
 
 use std::fmt::Write;
 use std::path::PathBuf;
@@ -65,13 +66,14 @@ impl Reference {
             let square = |values: &mut dyn Iterator<Item = f64>| values.map(|value| value * value).sum::<f64>();
             let difference = square(&mut fine.iter().zip(&coarse).map(|(fine, coarse)| fine - coarse));
             Ok(Reference {
-                method: format!("radiosity in float64 on {CELLS} x {CELLS} cells a wall and {ORDERS} reflections, no photon in it"),
+                method: String::new(),
                 standard_errors: vec![0.0; fine.len()],
                 counts: vec![true; fine.len()],
                 relative_error: (difference / square(&mut fine.iter().copied())).sqrt(),
                 values: fine,
             })
         })
+        .map(|reference| reference.by(format!("radiosity in float64 with {CELLS} x {CELLS} cells per wall and {ORDERS} reflections")))
     }
 
     /// Irradiance of a square of floor in closed form, and its points and normals, for scenes that have one.
@@ -81,7 +83,7 @@ impl Reference {
         let points: Vec<DVec3> = (0..size * size).map(|k| DVec3::new(place(k % size), 0.0, place(k / size))).collect();
         let values: Option<Vec<f64>> = points.iter().map(|point| floor_irradiance(name, point.x, point.z)).collect();
         let reference = Reference {
-            method: "closed form, no photon in it".to_owned(),
+            method: "closed form".to_owned(),
             values: values?,
             standard_errors: vec![0.0; points.len()],
             counts: vec![true; points.len()],
@@ -111,7 +113,7 @@ impl Reference {
                 if cancelled.load(Ordering::Relaxed) {
                     return Err(Error::Interrupted);
                 }
-                tell(&format!("reference: {} of {samples} samples a pixel", number * batch));
+                tell(&format!("reference: {} of {samples} samples per pixel", number * batch));
                 let image = judge.image(camera, size, size, batch, SEED + u64::from(number));
                 for (place, (value, variance)) in values.iter_mut().zip(&mut variances).enumerate() {
                     let pixel = &image.pixels[place / 3];
@@ -121,7 +123,7 @@ impl Reference {
             }
             let shining = Judge::new(scene, 0).image(camera, size, size, 64, SEED);
             let mut reference = Reference {
-                method: format!("path tracing in float64 on the CPU, {} samples a pixel, no photon in it", batch * batches),
+                method: String::new(),
                 values,
                 standard_errors: variances.into_iter().map(f64::sqrt).collect(),
                 counts: (0..places).map(|place| shining.pixels[place / 3].mean.direct == DVec3::ZERO).collect(),
@@ -131,13 +133,19 @@ impl Reference {
             reference.relative_error = (noise / reference.mean_square()).sqrt();
             Ok(reference)
         })
+        .map(|reference| reference.by(format!("path tracing in float64 on the CPU with {} samples per pixel", samples / BATCHES * BATCHES)))
+    }
+
+    /// Named anew on every run: a cached file may have been written with other words.
+    fn by(self, method: String) -> Reference {
+        Reference { method, ..self }
     }
 }
 
 /// What positions in f32 leave of a closed form.
 const SINGLE_PRECISION: f64 = 1e-6;
 
-/// Parts that a path-traced reference is made in; between them somebody may end it.
+/// Parts of a path-traced reference; it can be interrupted between them.
 const BATCHES: u32 = 8;
 
 /// Seed of references: no run that they judge has its random numbers, as those come from another generator.

@@ -1,4 +1,4 @@
-//! Points that are finished, on disk: a study that was cut off goes on where it ended.
+//! Finished points on disk, so that an interrupted study can be continued.
 
 use std::collections::HashMap;
 use std::io::Write;
@@ -52,7 +52,7 @@ impl Store {
         std::fs::create_dir_all(folder.path()).map_err(|error| refuse(error.kind().to_string()))?;
         let lock = std::fs::File::create(folder.path().join(LOCK)).map_err(|error| refuse(error.kind().to_string()))?;
         if lock.try_lock().is_err() {
-            return Err(Error::setting("--out", folder.path().display(), "is where another study writes just now; name another folder"));
+            return Err(Error::setting("--out", folder.path().display(), "is in use by another study; choose another folder"));
         }
         let head = Head {
             photonmill: env!("CARGO_PKG_VERSION").to_owned(),
@@ -70,9 +70,7 @@ impl Store {
                     return Err(Error::setting(
                         "--out",
                         folder.path().display(),
-                        format!(
-                            "holds {NAME} of a study of something else, or on another device; name another folder, or delete that file"
-                        ),
+                        format!("holds the {NAME} of a different study or device; choose another folder, or delete that file"),
                     ));
                 }
                 // A last line that was cut off is measured again.
@@ -83,7 +81,7 @@ impl Store {
                 }
             }
             Err(error) if error.kind() == std::io::ErrorKind::NotFound => {}
-            Err(error) => return Err(refuse(format!("what is there cannot be read, {}", error.kind()))),
+            Err(error) => return Err(refuse(format!("the existing file cannot be read: {}", error.kind()))),
         }
         let head = serde_json::to_string(&head).expect("a head is plain data");
         // The file as it was stands until the new one is whole.

@@ -1,4 +1,4 @@
-//! What is measured: a quantity with its reference, the configurations that find it, and how one of them runs.
+//! A measured quantity: its reference, the configurations that estimate it, and how one of them runs.
 
 use std::rc::Rc;
 use std::sync::atomic::{AtomicBool, Ordering};
@@ -69,17 +69,21 @@ impl Subject {
             let receivers = || points.iter().map(|(wall, point)| (*point, inward(*wall))).collect();
             let papers = axes::of_the_papers_rounds(size);
             return Ok(vec![
-                subject("irradiance of the walls, the paper's line", reference.clone(), axes::of_paper(size, photons)),
+                subject("Irradiance of the walls: the paper's box", reference.clone(), axes::of_paper(size, photons)),
                 Subject {
                     receivers: receivers(),
-                    ..subject("irradiance of the walls, triangles", reference.clone(), scene_axes(gpu, scene, &geometry, request, false)?)
+                    ..subject(
+                        "Irradiance of the walls: the box as triangles",
+                        reference.clone(),
+                        scene_axes(gpu, scene, &geometry, request, false)?,
+                    )
                 },
-                Subject { receivers: receivers(), ..subject("the paper's own question: rounds of 5000 photons", reference, papers) },
+                Subject { receivers: receivers(), ..subject("The paper's experiment: rounds of 5000 photons", reference, papers) },
             ]);
         }
         if let Some((receivers, reference)) = Reference::floor(&name, size) {
             let axes = scene_axes(gpu, scene, &geometry, request, false)?;
-            return Ok(vec![Subject { receivers, ..subject("irradiance of the floor", reference, axes) }]);
+            return Ok(vec![Subject { receivers, ..subject("Irradiance of the floor", reference, axes) }]);
         }
         let camera = scene.cameras.first().cloned().unwrap_or_else(|| {
             let (min, max) = scene.bounds();
@@ -89,16 +93,22 @@ impl Subject {
             return Err(Error::setting(
                 "study",
                 &name,
-                "has a point, spot, directional or disc light and mirrors or glass: no path from the eye finds the caustics between them, so there is no reference",
+                "has a point, spot, directional or disc light with mirrors or glass. Path tracing, the reference, cannot find the caustics of such lights; choose another scene",
             ));
         }
-        tell(&format!("reference: path tracing of {size} x {size} pixels, {reference_samples} samples each, unless the cache has it"));
+        tell(&format!(
+            "reference: path tracing of {size} x {size} pixels, {reference_samples} samples per pixel, unless it is in the cache"
+        ));
         let reference = Reference::picture(scene, &camera, size, reference_samples, cancelled, tell)?;
         if reference.mean_square() <= f64::MIN_POSITIVE {
-            let why = "shows no light but lamps seen straight, or none at all: there is nothing that an error could be relative to";
+            let why =
+                "shows no light except light sources seen directly, so a relative error is not defined; choose another scene or camera";
             return Err(Error::setting("study", &name, why));
         }
-        Ok(vec![Subject { camera: Some(camera), ..subject("picture", reference, scene_axes(gpu, scene, &geometry, request, true)?) }])
+        Ok(vec![Subject {
+            camera: Some(camera),
+            ..subject("Radiance of the image", reference, scene_axes(gpu, scene, &geometry, request, true)?)
+        }])
     }
 
     /// What repeats a run.
@@ -131,7 +141,7 @@ impl Subject {
         self.groups.iter().flat_map(|group| &group.configurations).any(|configuration| matches!(configuration.line, Line::Paper(_)))
     }
 
-    /// One run; `None` where somebody ended it.
+    /// One run; `None` if it was interrupted.
     pub fn run(&self, gpu: &Gpu, configuration: &Configuration, rounds: u32, seed: u64, cancelled: &AtomicBool) -> Result<Option<Shot>> {
         let mut control = Control { cancelled, progress: &mut |_| {} };
         let shot = match &configuration.line {

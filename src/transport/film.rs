@@ -1,4 +1,4 @@
-//! What all rounds left for each pixel: the mean and its standard error, from integer sums.
+//! The film of all rounds: the mean of each pixel and its standard error, from integer sums.
 
 use glam::DVec3;
 

@@ -78,7 +78,7 @@ pub struct Lit {
     pub timings: Timings,
     pub device: DeviceFacts,
     pub end: End,
-    /// What the radius adds to the error; `None` where nobody measured it.
+    /// The bias of the radius; `None` where it was not measured.
     pub bias: Option<Bias>,
     pub dispatches: u64,
     pub submissions: u64,
@@ -88,7 +88,7 @@ pub struct Lit {
     pub anomalies: [u32; 3],
     /// Light that limits kept from the result.
     pub losses: Losses,
-    /// What `--paranoid` found; `None` where nobody looked.
+    /// Nonfinite values that `--paranoid` found; `None` without it.
     pub oddities: Option<Oddities>,
 }
 
@@ -299,7 +299,7 @@ const TIMED_CHUNK: Duration = Duration::from_millis(40);
 /// One round; says how many photons it traced. When its time is up, it takes no further chunk of photons.
 fn one_round(commands: &mut Commands, view: &View, round: Round, deadline: Option<Instant>, book: &mut Book) -> Result<u64> {
     let Round { resources, plan, .. } = round;
-    commands.scope("see", |commands| points::see(commands, round, view.camera))?;
+    commands.scope("visible points", |commands| points::see(commands, round, view.camera))?;
     let sums = 3 * u64::from(plan.visible_points()) * u64::from(plan.arrival_sets);
     let mut traced = [0u32; 2];
     if let Some(photons) = &resources.photons {
@@ -326,7 +326,7 @@ fn one_round(commands: &mut Commands, view: &View, round: Round, deadline: Optio
                 Ok(())
             })?;
         }
-        commands.scope("weigh", |commands| points::weigh(commands, round, traced))?;
+        commands.scope("flux to radiance", |commands| points::weigh(commands, round, traced))?;
     }
     commands.scope("resolve", |commands| points::resolve(commands, round))?;
     Ok(traced.iter().map(|count| u64::from(*count)).sum())
@@ -339,6 +339,6 @@ fn one_chunk(commands: &mut Commands, round: Round, photons: &PhotonBuffers, map
     let cells = photons::cells(round, map);
     photons::trace(commands, round, photons, map, chunk, &mut |commands| {
         commands.scope("index", |commands| photons::index(commands, round, photons, map, &cells))?;
-        commands.scope("look up", |commands| points::look_up(commands, round, photons, map, cells))
+        commands.scope("gather", |commands| points::look_up(commands, round, photons, map, cells))
     })
 }

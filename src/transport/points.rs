@@ -1,5 +1,4 @@
-//! What the sensor sees: visible points and known light at the start of a round, density estimates of the
-//! maps, and the film at its end.
+//! Visible points and direct light at the start of a round, density estimates from the maps, and the film at its end.
 
 use super::Round;
 use super::resources::{PhotonBuffers, TransportResources};

@@ -1,5 +1,4 @@
-//! Photons of a run by themselves: a photon is (seed, round, number), so it takes the same path alone as among
-//! millions.
+//! Traces single photons of a run: a photon is (seed, round, number), so its path alone is the same as in the run.
 
 use std::time::Instant;
 
@@ -33,13 +32,13 @@ impl std::fmt::Display for PhotonName {
     }
 }
 
-/// The photon as it left its light and each surface, normalised as in the kernels, and how it ended.
+/// The photon as it left its light source and each surface, normalised as in the kernels, and how it ended.
 #[derive(Debug, Clone, PartialEq)]
 pub struct Path {
     pub name: PhotonName,
     pub vertices: Vec<LightPath>,
     pub fate: &'static str,
-    /// What `--paranoid` found on this path; `None` where nobody looked.
+    /// Nonfinite values that `--paranoid` found on this path; `None` without it.
     pub oddities: Option<Oddities>,
 }
 
@@ -72,7 +71,7 @@ pub struct Flights {
     pub paths: Vec<Vec<LightPath>>,
     /// Their fates in each flight.
     pub tallies: Vec<Tally>,
-    /// What `--paranoid` found; `None` where nobody looked.
+    /// Nonfinite values that `--paranoid` found; `None` without it.
     pub oddities: Option<Oddities>,
 }
 
@@ -116,7 +115,7 @@ pub fn light_paths(
 }
 
 impl Path {
-    /// A line a vertex: where, whither, and the power that it carries on.
+    /// A line per vertex: position, direction and flux after the vertex.
     pub fn table(&self, geometry: &Geometry, plan: &TransportPlan) -> String {
         let flux = plan.maps().find(|map| map.caustic_only == self.name.caustic).map_or(0.0, |map| map.photon_flux(geometry));
         let watts = flux * geometry.unit * geometry.unit;
@@ -132,7 +131,7 @@ impl Path {
         let head = format!("{}photon {photon} of round {round}, seed {}", if caustic { "caustic " } else { "" }, plan.settings.seed);
         let columns = format!(
             "{:>6} {:>11} {:>11} {:>11} {:>9} {:>9} {:>9} {:>11} {:>11} {:>11}",
-            "bounce", "x, m", "y", "z", "towards x", "y", "z", "red, W", "green", "blue"
+            "bounce", "x, m", "y", "z", "dir x", "y", "z", "red, W", "green", "blue"
         );
         let rows: Vec<String> = self.vertices.iter().enumerate().map(row).collect();
         let oddities = self.oddities.as_ref().map_or_else(String::new, |oddities| format!("\n{}", oddities.text()));
