@@ -51,7 +51,7 @@ pub(super) struct TransportArgs {
     /// --time, and as many as --total-photons takes]
     #[arg(long, value_parser = whole::<u32>, allow_negative_numbers = true, help_heading = "Transport")]
     rounds: Option<u32>,
-    /// Most bounces of a photon [default: 32]
+    /// Cut photons off after this many bounces [default: none; Russian roulette ends paths]
     #[arg(long, value_parser = whole::<u32>, allow_negative_numbers = true, help_heading = "Transport")]
     bounces: Option<u32>,
     /// Seed of the random numbers [default: 1]

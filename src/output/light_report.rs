@@ -5,9 +5,10 @@ use std::fmt::Write;
 
 use serde::Serialize;
 
-use super::report::{end_in_words, errors, ledger, timing_table};
+use super::report::{end_in_words, errors, ledger, losses, timing_table};
 use crate::bias::Bias;
-use crate::ledger::Ledger;
+use crate::constants::MAX_BOUNCES;
+use crate::ledger::{Ledger, Losses};
 use crate::oddities::Oddities;
 use crate::plan::evidence::EffectDecision;
 use crate::plan::transport::{MapPlan, TransportPlan};
@@ -105,6 +106,8 @@ struct Report<'a> {
     rounds: u32,
     /// Of the global map's photons and of the caustic map's.
     ledgers: [Ledger; 2],
+    /// Light that limits kept from the result.
+    losses: Losses,
     /// Root mean square of the standard errors over that of the values.
     relative_error: f64,
     /// What the relative error is not above, with the confidence of the settings; null from a single round.
@@ -155,6 +158,7 @@ pub fn json(scene: &str, lit: &Lit) -> Vec<u8> {
         end: lit.end,
         rounds: lit.film.rounds,
         ledgers: [lit.fates[0].ledger(), lit.fates[1].ledger()],
+        losses: lit.losses,
         relative_error: lit.film.relative_error(&lit.plan),
         error_bound: Some(error_bound(&lit.film, &lit.plan, lit.plan.settings.stop.confidence)).filter(|bound| bound.is_finite()),
         bias: lit.bias,
@@ -174,7 +178,15 @@ pub fn text(scene: &str, lit: &Lit, explain: bool) -> String {
     writeln!(text, "{}, {}", lit.device.name, lit.device.driver).unwrap();
     let maps: Vec<String> = lit.plan.maps().map(|map| format!("{} {} photons", map.photons, map.name)).collect();
     let maps = if maps.is_empty() { "no photons".to_owned() } else { maps.join(" and ") };
-    writeln!(text, "{scene}: {} round(s) of {maps}, {} bounces, seed {}", lit.film.rounds, settings.bounces, settings.seed).unwrap();
+    let capped = if settings.bounces < MAX_BOUNCES { format!(", at most {} bounces", settings.bounces) } else { String::new() };
+    writeln!(text, "{scene}: {} round(s) of {maps}{capped}, seed {}", lit.film.rounds, settings.seed).unwrap();
+    if lit.film.rounds == 1 && lit.end == End::Time {
+        let traced: u64 = lit.fates.iter().map(|fates| fates.emitted).sum();
+        let planned: u64 = lit.plan.maps().map(|map| u64::from(map.photons)).sum();
+        if traced < planned {
+            writeln!(text, "time was up in the first round: it has {traced} of {planned} photons").unwrap();
+        }
+    }
     if let Some(why) = end_in_words(lit.end, &settings.stop) {
         writeln!(text, "ended {why}, {} of at most {} rounds", lit.film.rounds, settings.rounds).unwrap();
     }
@@ -188,11 +200,9 @@ pub fn text(scene: &str, lit: &Lit, explain: bool) -> String {
         let fates = &lit.fates[usize::from(map.caustic_only)];
         write!(text, "{} {}", map.name, ledger(&fates.ledger())).unwrap();
     }
+    text.push_str(&losses(&lit.losses, settings.bounces));
     if lit.anomalies[0] > 0 {
         writeln!(text, "warning: {} value(s) were no number and count as 0", lit.anomalies[0]).unwrap();
-    }
-    if lit.anomalies[1] > 0 {
-        writeln!(text, "warning: {} value(s) were larger than a pixel can hold and were cut", lit.anomalies[1]).unwrap();
     }
     if lit.anomalies[2] > 0 {
         let count = lit.anomalies[2];
@@ -203,7 +213,7 @@ pub fn text(scene: &str, lit: &Lit, explain: bool) -> String {
         writeln!(text, "{}", oddities.text()).unwrap();
     }
     let noise = (lit.film.rounds > 1).then(|| lit.film.relative_error(&lit.plan));
-    text.push_str(&errors(lit.film.rounds, noise, lit.bias.as_ref(), settings.stop.confidence));
+    text.push_str(&errors(lit.film.rounds, noise, lit.bias.as_ref(), lit.losses.relative, settings.stop.confidence));
     text.push('\n');
     text.push_str(&timing_table(&lit.timings, Some(&lit.device)));
     text

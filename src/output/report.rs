@@ -5,9 +5,10 @@ use std::fmt::Write;
 use serde::Serialize;
 
 use crate::bias::Bias;
+use crate::constants::MAX_BOUNCES;
 use crate::film::WallEstimate;
 use crate::gpu::DeviceFacts;
-use crate::ledger::{BounceFates, Ledger};
+use crate::ledger::{BounceFates, Ledger, Losses};
 use crate::oddities::Oddities;
 use crate::plan::Decision;
 use crate::render::Outcome;
@@ -40,6 +41,8 @@ struct Report<'a> {
     /// Of the radius, relative to the irradiance; null without `--bias`.
     bias: Option<Bias>,
     ledger: Ledger,
+    /// Light that the cap on bounces kept from the result.
+    losses: Losses,
     /// Fates of the paths that entered each bounce.
     bounces: &'a [BounceFates],
     timings: &'a [Row],
@@ -106,6 +109,7 @@ pub fn json(outcome: &Outcome, walls: &[WallEstimate]) -> Vec<u8> {
         error_bound: noise.map(|noise| error_bound(outcome.film.rounds, noise, plan.settings.stop.confidence)),
         bias: outcome.bias,
         ledger: outcome.fates.ledger(),
+        losses: outcome.losses,
         bounces: &outcome.fates.bounces,
         timings: outcome.timings.rows(),
         dispatches: outcome.dispatches,
@@ -142,7 +146,7 @@ fn relative_error(walls: &[WallEstimate]) -> Option<f64> {
 }
 
 /// Noise, bias, and both together, a line each, in per cent of the result's RMS.
-pub(super) fn errors(rounds: u32, noise: Option<f64>, bias: Option<&Bias>, confidence: f64) -> String {
+pub(super) fn errors(rounds: u32, noise: Option<f64>, bias: Option<&Bias>, lost: f64, confidence: f64) -> String {
     let mut text = String::new();
     let (percent, sure) = (|share: f64| 100.0 * share, 100.0 * confidence);
     let bound = noise.map(|noise| error_bound(rounds, noise, confidence));
@@ -165,12 +169,41 @@ pub(super) fn errors(rounds: u32, noise: Option<f64>, bias: Option<&Bias>, confi
             percent(*upper)
         )
         .unwrap();
-        if let Some((noise, bound)) = noise.zip(bound) {
-            writeln!(text, "noise and bias: {:.2} %, at most {:.2} %", percent(noise.hypot(*relative)), percent(bound.hypot(*upper)))
-                .unwrap();
-        }
+    }
+    let (relative, upper) = bias.map_or((0.0, 0.0), |bias| (bias.relative, bias.upper));
+    let what = match (bias.is_some(), lost > 0.0) {
+        (true, true) => "noise, bias and light cut off",
+        (true, false) => "noise and bias",
+        (false, true) => "noise and light cut off",
+        (false, false) => return text,
+    };
+    if let Some((noise, bound)) = noise.zip(bound) {
+        let (error, most) = (noise.hypot(relative + lost / Losses::SAFETY), bound.hypot(upper + lost));
+        writeln!(text, "{what}: {:.2} %, at most {:.2} %", percent(error), percent(most)).unwrap();
     }
     text
+}
+
+/// Light that limits kept from the result; `bounces` is the cap.
+pub(super) fn losses(losses: &Losses, bounces: u32) -> String {
+    let mut text = format!("cut off after {bounces} bounces: {} of {:.4} W emitted", watts(losses.cut_off), losses.emitted);
+    if losses.clamped > 0.0 {
+        write!(text, "; clamped at shading normals: {}", watts(losses.clamped)).unwrap();
+    }
+    if losses.clamped_values > 0 {
+        write!(text, "; {} value(s) clamped to the largest that the film holds", losses.clamped_values).unwrap();
+    }
+    if losses.camera_paths > 0 {
+        write!(text, "; {} camera path(s) cut off after {MAX_BOUNCES} mirrors and panes", losses.camera_paths).unwrap();
+    }
+    if losses.relative > 0.0 {
+        write!(text, "; together at most {:.2} % of the result", 100.0 * losses.relative).unwrap();
+    }
+    text + "\n"
+}
+
+fn watts(watts: f64) -> String {
+    if watts == 0.0 { "0".to_owned() } else { format!("{watts:.3e}") }
 }
 
 /// Why a run ended before its last round, unless the user interrupted it.
@@ -219,10 +252,17 @@ pub fn text(outcome: &Outcome, walls: &[WallEstimate]) -> String {
     }
     text.push('\n');
     text.push_str(&ledger(&outcome.fates.ledger()));
+    text.push_str(&losses(&outcome.losses, settings.bounces));
     if let Some(oddities) = &outcome.oddities {
         writeln!(text, "{}", oddities.text()).unwrap();
     }
-    text.push_str(&errors(outcome.film.rounds, relative_error(walls), outcome.bias.as_ref(), settings.stop.confidence));
+    text.push_str(&errors(
+        outcome.film.rounds,
+        relative_error(walls),
+        outcome.bias.as_ref(),
+        outcome.losses.relative,
+        settings.stop.confidence,
+    ));
     text.push('\n');
     text.push_str(&timing_table(&outcome.timings, outcome.device.as_ref()));
     text
