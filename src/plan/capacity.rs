@@ -83,7 +83,7 @@ impl Limits {
 }
 
 /// Submissions that a chunk may take: between chunks a run can be ended.
-const SUBMISSIONS_PER_CHUNK: f64 = 10.0;
+const SUBMISSIONS_PER_CHUNK: f64 = 4.0;
 /// Work of one flight of a photon, in pair tests.
 const PAIR_TESTS_PER_FLIGHT: f64 = 16.0;
 /// Work of a photon in one digit of the tree's sort or one height of its nodes, in pair tests.
