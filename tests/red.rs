@@ -289,7 +289,7 @@ const FAULTS: [Fault; 65] = [
         from: "slice_begin = slice * GATHER_SLICE",
         to: "slice_begin = gl_WorkGroupID.y * GATHER_SLICE",
         kernels: &["lookup_u64", "lookup_two_words"],
-        noticed_by: &[(Crowds, SumsTooLarge)],
+        noticed_by: &[(Crowds, OtherSums)],
     },
     Fault {
         what: "the last slice of crowded points is left out",
