@@ -4,7 +4,7 @@ use std::sync::OnceLock;
 use std::sync::atomic::AtomicBool;
 
 use crate::common::lit::scene;
-use crate::common::{Check, assert_complains, assert_holds, device};
+use crate::common::{Check, assert_complains, assert_holds, device, pairs};
 use photonmill::bias::{self, Bias};
 use photonmill::film::estimate_walls;
 use photonmill::gpu::Gpu;
@@ -60,8 +60,8 @@ fn true_bias_in_box(gpu: Option<&Gpu>, radius: f64) -> f64 {
     };
     let (mut off, mut light) = (0.0, 0.0);
     let walls = estimate_walls(&outcome.film, &scene, &outcome.plan);
-    let found = walls.iter().flat_map(|wall| wall.irradiance.iter().zip(&wall.irradiance_error));
-    for ((found, error), expected) in found.zip(at_points()) {
+    let found = walls.iter().flat_map(|wall| pairs(&wall.irradiance, &wall.irradiance_error));
+    for ((found, error), expected) in pairs(found, at_points()) {
         off += (found - expected).powi(2) - error * error;
         light += expected * expected;
     }
@@ -141,7 +141,7 @@ fn the_allowance_covers_edges_shadows_and_bumps() {
         let bias = bias::extrapolate(CONFIDENCE, 1, |factor, _| Ok(Some(at(factor)))).unwrap().unwrap();
         let (found, truth) = (at(1.0), at(0.0));
         let square_sum = |values: &mut dyn Iterator<Item = f64>| values.map(|value| value * value).sum::<f64>();
-        let off = square_sum(&mut found.iter().zip(&truth).map(|(found, truth)| found - truth));
+        let off = square_sum(&mut pairs(&found, &truth).map(|(found, truth)| found - truth));
         let relative = (off / square_sum(&mut found.iter().copied())).sqrt();
         println!("{what}: {:.3} of what is extrapolated", relative / bias.relative);
         assert!((relative / bias.relative - expected).abs() < 0.02, "{what}: {}", relative / bias.relative);

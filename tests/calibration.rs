@@ -4,7 +4,7 @@
 use std::f64::consts::{PI, TAU};
 
 use crate::common::reference::{Arrival, Emission, HALF_EDGE, MESH, Model, texels_in_reach};
-use crate::common::{Check, assert_complains, assert_holds, device, run, run_on_cpu, z_check};
+use crate::common::{Check, assert_complains, assert_holds, device, pairs, run, run_on_cpu, z_check};
 use photonmill::film::{WallEstimate, estimate_walls};
 use photonmill::render::Outcome;
 use photonmill::rng::Rng;
@@ -145,7 +145,7 @@ fn direct_check(irradiance: &[f64], expected: &[(f64, f64)]) -> Check {
         total(&mut expected.iter().map(|(mean, _)| *mean)),
         total(&mut expected.iter().map(|(_, error)| error * error)).sqrt(),
     )?;
-    for (texel, (found, (mean, error))) in irradiance.iter().zip(expected).enumerate() {
+    for (texel, (found, (mean, error))) in pairs(irradiance, expected).enumerate() {
         z_check(&format!("texel {texel}"), *found, *mean, *error)?;
     }
     Ok(())
@@ -309,7 +309,7 @@ fn radiosity_is_albedo_times_irradiance() {
         let settings = Settings { reflectance, ..Settings::default() };
         for wall in walls(&run_on_cpu(&settings)) {
             assert!(wall.radiosity.iter().any(|value| *value > 0.0));
-            for (radiosity, irradiance) in wall.radiosity.iter().zip(&wall.irradiance) {
+            for (radiosity, irradiance) in pairs(&wall.radiosity, &wall.irradiance) {
                 let expected = f64::from(reflectance) * irradiance;
                 assert!((radiosity - expected).abs() <= 1e-12 * expected, "{}: {radiosity} and {irradiance}", wall.name);
             }

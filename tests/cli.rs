@@ -5,6 +5,7 @@ use std::path::Path;
 use std::process::{Command, Output, Stdio};
 use std::time::{Duration, Instant};
 
+use crate::common::pairs;
 use serde_json::Value;
 
 /// The program, run in a folder of its own.
@@ -208,7 +209,7 @@ fn a_run_writes_everything_it_was_asked_for() {
     let texels = |path: &str| image::open(at(path)).unwrap().into_rgb32f().into_raw();
     let (irradiance, radiosity) = (texels("irradiance/floor.exr"), texels("radiosity/floor.exr"));
     assert_eq!(irradiance.len(), 3 * 64 * 64);
-    for (irradiance, radiosity) in irradiance.iter().zip(&radiosity) {
+    for (irradiance, radiosity) in pairs(&irradiance, &radiosity) {
         assert!((radiosity - 0.75 * irradiance).abs() <= 1e-6 * irradiance, "{radiosity} {irradiance}");
     }
     // 2 W in a box of 1.25 m2 of walls: some watts a square metre.
@@ -238,7 +239,7 @@ fn a_run_says_how_wrong_it_is() {
     }
     let texels = |name: &str| image::open(folder.path().join(name)).unwrap().into_rgb32f().into_raw();
     let (light, errors) = (texels("i/floor.exr"), texels("i/floor-error.exr"));
-    assert!(light.iter().zip(&errors).all(|(light, error)| *error > 0.0 && error < light), "{errors:?}");
+    assert!(pairs(&light, &errors).all(|(light, error)| *error > 0.0 && error < light), "{errors:?}");
 }
 
 #[test]

@@ -7,8 +7,9 @@ use std::sync::atomic::AtomicBool;
 
 use crate::common::family::{FALSE_ALARM, Family, normal_p_value};
 use crate::common::lit::{APPENDS, irradiances, level, matt, received, scene, scene_of, shining};
-use crate::common::{assert_complains, assert_holds, device, known};
+use crate::common::{Check, Complaint, Kind, assert_complains, assert_holds, device, known, pairs};
 use glam::{DVec3, Vec3};
+use photonmill::gpu::Gpu;
 use photonmill::judge::radiosity::{cells_of, form_factor_from, on_wall};
 use photonmill::scene::closed_forms::NAMES;
 use photonmill::scene::light::LightKind;
@@ -18,9 +19,29 @@ use photonmill::selfcheck::{self, Estimate, Finding};
 use photonmill::settings::EmissionLaw;
 use photonmill::settings::transport::{Illumination, TransportSettings};
 
+/// Right within the error.
+fn right(finding: &Finding) -> Check<Complaint> {
+    if finding.passed {
+        return Ok(());
+    }
+    let kind = match finding.z {
+        _ if finding.found == 0.0 => Kind::Broken,
+        z if z < 0.0 => Kind::TooDark,
+        z if z > 0.0 => Kind::TooBright,
+        _ => Kind::NoNumber,
+    };
+    Err(Complaint::new(kind, format!("{finding:?}")))
+}
+
+/// One closed form by its name.
+pub fn closed_form_check(gpu: &Gpu, name: &str) -> Check<Complaint> {
+    let case = selfcheck::cases().into_iter().find(|case| case.name == name).unwrap_or_else(|| panic!("there is no case {name}"));
+    right(&Finding::new(name, case.expected, (case.measure)(Some(gpu))?))
+}
+
 /// Right within the error, and the error small enough for 1 % to be seen.
 fn check(finding: &Finding) {
-    assert!(finding.passed, "{finding:?}");
+    assert_holds(&finding.name, right(finding));
     for wrong in [0.99, 1.01] {
         let estimate = Estimate { mean: finding.found, standard_error: finding.standard_error };
         let spoiled = Finding::new(&finding.name, wrong * finding.expected, estimate);
@@ -124,7 +145,7 @@ fn a_disc_lights_points_and_a_wall_by_either_law() {
     for law in [EmissionLaw::Cosine, EmissionLaw::Uniform] {
         let settings = TransportSettings { rounds: 8, ..settings() };
         let found = irradiances(&gpu, &lamp_in_a_black_box(law), &settings, &points, 1..2).remove(0);
-        for ((what, _, cosine, uniform), found) in known.iter().zip(found.chunks(times)) {
+        for ((what, _, cosine, uniform), found) in pairs(&known, found.chunks(times)) {
             let found: Vec<f64> = found.iter().map(|light| light.x).collect();
             family.expect_mean(format!("{law:?}, {what}"), &found, if law == EmissionLaw::Cosine { *cosine } else { *uniform });
         }

@@ -6,7 +6,7 @@ use std::time::Instant;
 
 use crate::common::lit::{mean_red, received, received_within, scene, seen};
 use crate::common::{
-    Check, Device, assert_complains, assert_holds, device, device_with, equal_sums, photons_on_cpu, plan_for, plan_for_host,
+    Check, Device, assert_complains, assert_holds, device, device_with, equal_sums, pairs, photons_on_cpu, plan_for, plan_for_host,
     relative_check, run, run_on_cpu, run_scene, run_scene_on_cpu, share_check, upload_photons, z_check,
 };
 use glam::{DVec3, Vec3};
@@ -80,8 +80,8 @@ fn a_trillion_photons_merge_into_the_same_light() {
             emitted: outcome.film.emitted * times,
             ..outcome.film.clone()
         };
-        for (found, expected) in estimate_walls(&merged, &scene, &outcome.plan).iter().zip(&one) {
-            for (found, expected) in found.irradiance.iter().zip(&expected.irradiance).filter(|(_, expected)| **expected > 0.0) {
+        for (found, expected) in pairs(estimate_walls(&merged, &scene, &outcome.plan), &one) {
+            for (found, expected) in pairs(&found.irradiance, &expected.irradiance).filter(|(_, expected)| **expected > 0.0) {
                 assert_holds(times, relative_check("irradiance", *found, *expected, 8.0 * f64::EPSILON));
                 let less = found * (1.0 - U);
                 assert_complains("a count kept in f32", relative_check("irradiance", less, *expected, 8.0 * f64::EPSILON));
@@ -112,12 +112,13 @@ fn light_is_linear_in_power_over_24_decades() {
         let watts = 10f64.powi(exponent);
         let (found, irradiance) = of([watts, watts]);
         assert_holds(exponent, equal_sums("the film", &found, &sums));
-        for (found, one) in irradiance.iter().zip(&one_watt) {
+        for (found, one) in pairs(&irradiance, &one_watt) {
             assert_holds(exponent, relative_check("irradiance", *found, one * watts, 8.0 * f64::EPSILON));
         }
     }
     for refused in [[1e-13, 1.0], [1.0, 1e13], [1.0, 0.999e-6]] {
-        assert!(Settings { light_power: refused, ..Settings::default() }.validate().is_err(), "{refused:?}");
+        let error = Settings { light_power: refused, ..Settings::default() }.validate().unwrap_err().to_string();
+        assert!(error.starts_with("--light-power "), "{refused:?}: {error}");
     }
 }
 
@@ -213,8 +214,10 @@ fn film_sums_are_refused_before_they_could_overflow() {
     let plan = Plan::new(&open_box(&most), &Settings { mesh: 1, shininess: [Some(2.0); 5], ..most.clone() }, &host).unwrap();
     // Photons of weight 1 only, in every texel at every bounce.
     assert!(u128::from(MAX_EVENTS) << plan.film_shift <= 1 << 63);
-    assert!(Settings { rounds: most.rounds + 1, ..most.clone() }.validate().is_err());
-    assert!(Settings { bounces: most.bounces + 1, ..most }.validate().is_err());
+    for settings in [Settings { rounds: most.rounds + 1, ..most.clone() }, Settings { bounces: most.bounces + 1, ..most }] {
+        let error = settings.validate().unwrap_err().to_string();
+        assert!(error.contains("film"), "{error}");
+    }
 }
 
 /// max(cosine, 0)^shininess at the paper's exponents and beyond, from the last number below 1 down to 0.
@@ -276,11 +279,11 @@ fn phong_weights_have_their_mean_and_vanish_behind() {
     let dark = ones.iter().filter(|weight| **weight == 0.0).count();
     assert!(dark > 1000, "only {dark} photons point away");
     for shininess in [0.01, 0.5, 2.0, 5.0] {
-        let same = ones.iter().zip(weights(shininess)).all(|(one, weight)| (*one == 0.0) == (weight == 0.0));
+        let same = pairs(&ones, weights(shininess)).all(|(one, weight)| (*one == 0.0) == (weight == 0.0));
         assert!(same, "shininess {shininess} has other photons without weight");
     }
     let narrow = weights(1e4);
-    assert!(ones.iter().zip(&narrow).all(|(one, weight)| weight <= one) && narrow.iter().any(|weight| *weight > 0.0));
+    assert!(pairs(&ones, &narrow).all(|(one, weight)| weight <= one) && narrow.iter().any(|weight| *weight > 0.0));
 }
 
 /// Numbers in [0, 1), drawn as photons draw them.
@@ -425,7 +428,8 @@ fn radii_from_the_whole_scene_to_below_the_photons_spacing_are_right() {
         Settings { radius, ..Settings::default() }.validate().unwrap();
     }
     for radius in [0.5f64.next_up(), (0.5f64 / 65_536.0).next_down(), f64::NAN] {
-        assert!(Settings { radius, ..Settings::default() }.validate().is_err(), "{radius}");
+        let error = Settings { radius, ..Settings::default() }.validate().unwrap_err().to_string();
+        assert!(error.starts_with("--radius "), "{radius}: {error}");
     }
 }
 

@@ -6,8 +6,8 @@ use std::sync::atomic::AtomicBool;
 use std::time::Instant;
 
 use crate::common::{
-    Check, assert_complains, assert_holds, device, device_with, equal_sums, photons, photons_on_cpu, plan_for, plan_for_host, run,
-    run_on_cpu, upload_photons,
+    Check, Complaint, Kind, assert_complains, assert_holds, device, device_with, equal_sums, pairs, photons, photons_on_cpu, plan_for,
+    plan_for_host, run, run_on_cpu, upload_photons,
 };
 use glam::Vec3;
 use photonmill::cpu;
@@ -234,10 +234,10 @@ fn the_cpu_builders_film_agrees_to_single_counts() {
     let settings = Settings::default();
     let (device, host) = (film(&gpu, &settings), run_on_cpu(&settings).film);
     assert_eq!((device.channel_count, device.scale), (host.channel_count, host.scale));
-    let differences: Vec<u64> = device.sums.iter().zip(&host.sums).map(|(a, b)| a.abs_diff(*b)).collect();
-    let pairs: u64 = host.sums.iter().sum();
+    let differences: Vec<u64> = pairs(&device.sums, &host.sums).map(|(a, b)| a.abs_diff(*b)).collect();
+    let in_reach: u64 = host.sums.iter().sum();
     assert!(differences.iter().all(|difference| *difference <= 1));
-    assert!(differences.iter().sum::<u64>() as f64 <= 2e-5 * pairs as f64, "{} of {pairs}", differences.iter().sum::<u64>());
+    assert!(differences.iter().sum::<u64>() as f64 <= 2e-5 * in_reach as f64, "{} of {in_reach}", differences.iter().sum::<u64>());
 
     // The CPU's own choices change no bit at all.
     for (threads, gather, chunk) in
@@ -351,7 +351,7 @@ fn a_run_is_the_sum_of_rounds_that_differ() {
         let (one, two, three) = (of(1), of(2), of(3));
         assert_eq!(three.emitted, 15_000);
         let added = |more: &Film, less: &Film| {
-            more.sums.iter().zip(&less.sums).map(|(more, less)| more.checked_sub(*less).unwrap()).collect::<Vec<u64>>()
+            pairs(&more.sums, &less.sums).map(|(more, less)| more.checked_sub(*less).unwrap()).collect::<Vec<u64>>()
         };
         let (second, third) = (added(&two, &one), added(&three, &two));
         for (what, found, other) in [
@@ -515,11 +515,31 @@ fn counted_on(gpu: Option<&Gpu>, settings: &Settings, start: f32, count: u32) ->
     Film { sums, ..Film::new(&plan) }.units(plan.points.len() - 1)
 }
 
+/// Ten photons more than 2^24, and than so many that the lost part alone would have stopped, are ten more in a pair.
+pub fn pairs_count_on(gpu: &Gpu) -> Check<Complaint> {
+    for gather in [Gather::Brute, Gather::Grid] {
+        for start in [16_777_216.0, 1024.0 * 16_777_216.0] {
+            let settings = Settings { sums: Sums::Compensated, gather, mesh: 1, radius: 0.5, ..Settings::default() };
+            let counted = counted_on(Some(gpu), &settings, start, 10) - f64::from(start);
+            let kind = match counted {
+                10.0 => continue,
+                less if less < 10.0 => Kind::SumsTooSmall,
+                _ => Kind::SumsTooLarge,
+            };
+            return Err(Complaint::new(kind, format!("{gather:?}: {counted} photons instead of 10 from {start} on")));
+        }
+    }
+    Ok(())
+}
+
 /// One photon more is nothing to an f32 of 2^24 of them; pairs and integers count on, pairs also where the
 /// lost part alone would have stopped.
 #[test]
 fn f32_stops_counting_where_integers_and_pairs_go_on() {
     let gpu = device();
+    if let Some(gpu) = &gpu {
+        assert_holds("pairs", pairs_count_on(gpu));
+    }
     let full = 16_777_216.0f32;
     for builder in [None, gpu.as_deref()].into_iter().take(if gpu.is_some() { 2 } else { 1 }) {
         for gather in [Gather::Brute, Gather::Grid] {

@@ -2,116 +2,12 @@
 //! or leaks. `tests/hard_materials.rs`, `tests/random_numbers.rs` and `tests/extremes.rs` do the same for materials,
 //! random numbers, and for sums, estimates and sizes.
 //!
-//! # Which test shows what
-//!
-//! Known failures of renderers by their number in a catalogue, and the tests that show that they do not happen here,
-//! or why they cannot: rays and triangles (G), sampling (S), random numbers (R), accumulation (A), density
-//! estimation (E), lobes (B), indices (I), scheduling (D), cameras (C), glass (L), many photons (M). The last test
-//! of this file holds the table against the sources.
-//!
-//! | case | tests |
-//! | --- | --- |
-//! | G1 | photons_leave_a_surface_once_and_for_all, a_patch_in_a_plane_is_left_with_the_plane, photons_on_edges_and_in_corners_stay_in_the_room |
-//! | G2 | grazing_and_straight_directions_end_in_the_room |
-//! | G3 | thin_walls_and_sheets_let_no_light_through, a_lamp_in_a_flat_box_lights_nothing_outside, small_lamps_shine_by_their_area |
-//! | G4 | black_walls_absorb_the_first_flights_hits, a_light_flush_with_a_wall_shines_into_the_room, flat_lamps_light_nothing_of_their_own_plane |
-//! | G5 | rays_at_edges_and_corners_meet_a_wall |
-//! | G6 | every_operation_is_rounded_by_itself |
-//! | G7 | axis_parallel_rays_meet_the_same_by_tree_and_list |
-//! | G8 | flat_doubled_and_reordered_triangles_change_no_bit, triangles_without_area_go |
-//! | G9 | - no sphere is intersected: spheres are meshes |
-//! | G10 | a_furnace_glows_alike_however_it_is_turned |
-//! | G11 | the_smallest_lamps_shine_into_the_room_or_are_left_out |
-//! | G12 | ten_thousand_sizes_away_the_light_is_the_same_to_the_bit, size_and_place_do_not_change_the_light |
-//! | G13 | every_power_of_two_is_the_same_light_to_the_bit, the_open_box_of_any_power_of_two_stores_the_same_photons |
-//! | G14 | flat_doubled_and_reordered_triangles_change_no_bit, sheets_in_one_plane_are_met_alike_by_tree_and_list, two_sheets_at_one_place_show_each_its_own_side |
-//! | G15 | thin_walls_and_sheets_let_no_light_through, no_light_leaks_from_one_shelf_to_the_next |
-//! | S1 | unit_floats_stay_below_one |
-//! | S2 | grazing_and_straight_directions_end_in_the_room |
-//! | S3 | discs_and_hemispheres_have_their_moments |
-//! | S4 | discs_and_hemispheres_have_their_moments |
-//! | S5 | discs_and_hemispheres_have_their_moments |
-//! | S6 | choices_follow_the_shares_and_leave_none_out |
-//! | S7 | photons_are_dealt_by_power_and_none_is_lost |
-//! | S8 | a_closed_white_room_stores_everything, appending_at_survival_none_and_all |
-//! | S9 | each_channel_has_its_own_reflectance |
-//! | S10 | a_thousand_bounces_store_a_geometric_series, reflectances_and_bounces_at_their_ends_are_right |
-//! | S11 | a_million_photons_have_the_exact_shares |
-//! | S12 | lobes_reflect_what_lies_above_the_horizon |
-//! | S13 | lobes_of_any_width_throw_their_share |
-//! | S14 | - no quasi-Monte Carlo numbers |
-//! | R1 | rand48_gives_the_c_librarys_numbers, rand48_jumps_and_steps_meet_across_2_to_the_48 |
-//! | R2 | draws_are_even_alone_in_pairs_and_in_triples |
-//! | R3 | neighbouring_photons_do_not_resemble_each_other |
-//! | R4 | neighbouring_photons_do_not_resemble_each_other |
-//! | R5 | no_two_bounces_draw_the_same_numbers |
-//! | R6 | no_two_photons_draw_the_same_numbers, sixteen_million_photons_are_all_different |
-//! | R7 | two_naive_bounces_are_the_first_two_of_fifteen |
-//! | R8 | philox_gives_the_known_answers |
-//! | R9 | a_run_draws_the_whole_period_and_no_number_twice |
-//! | A1 | a_texel_counts_beyond_2_to_the_24 |
-//! | A2 | mixed_weights_are_summed_to_half_a_unit_each |
-//! | A3 | - no compensated sum: sums are integers |
-//! | A4 | runs_and_builders_and_gathers_give_the_same_bits |
-//! | A5 | film_sums_cannot_overflow, film_sums_are_refused_before_they_could_overflow |
-//! | A6 | the_start_up_check_passes, a_texel_counts_beyond_2_to_the_24 |
-//! | A7 | a_device_without_abilities_gives_the_same_bits |
-//! | A8 | standard_errors_survive_a_mean_far_above_them |
-//! | A9 | a_run_is_the_sum_of_rounds_that_differ |
-//! | A10 | faint_light_is_right_to_half_a_film_unit, light_is_linear_in_power_over_24_decades |
-//! | A11 | - no pair of floats: sums are integers |
-//! | E1 | edges_and_corners_are_dark_by_what_lies_beyond_them, edge_correction_divides_by_what_lies_on_the_wall |
-//! | E2 | edges_and_corners_are_dark_by_what_lies_beyond_them, disc_at_an_edge_and_in_a_corner |
-//! | E3 | a_lit_floor_does_not_light_the_foot_of_the_wall, each_half_of_a_roof_keeps_its_own_light |
-//! | E4 | a_photon_on_the_rim_counts |
-//! | E5 | - no estimator by the nearest k photons |
-//! | E6 | - no estimator by the nearest k photons; fewer in reach, or none: E8, E11 |
-//! | E7 | every_kernel_of_every_radius_integrates_to_one |
-//! | E8 | an_empty_map_and_a_map_of_one, a_map_of_one_photon_is_one_disc |
-//! | E9 | the_index_holds_every_photon_in_its_cell, device_and_cpu_gather_the_same_photons_to_the_same_bits |
-//! | E10 | no_split_and_no_builder_changes_a_bit |
-//! | E11 | radii_from_the_whole_scene_to_below_the_photons_spacing_are_right |
-//! | E12 | radii_of_ten_thousand_rounds_follow_the_gamma_function |
-//! | E13 | stated_errors_are_the_spread_over_seeds |
-//! | E14 | the_film_holds_every_photon_once_for_each_texel_in_reach |
-//! | B1 | phong_weights_have_their_mean_and_vanish_behind, a_sun_in_a_plate_is_a_power_of_the_cosine |
-//! | B2 | phong_weights_have_their_mean_and_vanish_behind |
-//! | B3 | phong_weights_have_their_mean_and_vanish_behind |
-//! | B4 | lobes_reflect_what_lies_above_the_horizon |
-//! | B5 | phong_weights_are_powers_of_the_cosine, a_sun_in_a_plate_is_a_power_of_the_cosine |
-//! | B6 | lobes_reflect_what_lies_above_the_horizon |
-//! | I1 | slots_of_a_chunk_are_numbered_in_32_bits, maps_of_a_chunk_are_numbered_in_32_bits |
-//! | I2 | rounds_around_a_full_row_of_groups_lose_no_photon, photons_of_a_second_row_of_groups_reach_the_map |
-//! | I3 | slots_of_a_chunk_are_numbered_in_32_bits, a_round_larger_than_a_buffer_splits_and_drops_nothing |
-//! | I4 | a_full_map_drops_counts_and_keeps_to_its_room |
-//! | I5 | builders_store_the_same_photons_at_every_count, pictures_of_any_shape_are_whole |
-//! | I6 | photons_of_the_largest_numbers_are_their_own |
-//! | I7 | group_sizes_and_chunks_change_no_photon, the_prefix_sum_is_the_running_sum |
-//! | I8 | totals_exceed_32_bits, a_trillion_photons_merge_into_the_same_light |
-//! | D1 | long_photon_lists_are_gathered_to_the_end, loops_count_right_up_to_the_limit |
-//! | D2 | a_gather_that_is_cut_into_parts_is_whole |
-//! | D3 | the_order_of_appending_changes_no_photon |
-//! | D4 | a_validation_message_is_an_error, runs_and_builders_and_gathers_give_the_same_bits |
-//! | D5 | no_kernel_waits_for_another_invocation |
-//! | D6 | - no run is taken up again: what an interrupt leaves is whole (tests/cli.rs) |
-//! | D7 | tick_counts_wrap_at_their_valid_bits, timings_nest_and_count |
-//! | C1 | views_too_wide_or_too_narrow_are_left_out_by_name |
-//! | C2 | frames_are_orthonormal_even_straight_down |
-//! | C3 | an_eye_on_a_photon_sees_no_weight_and_no_nan, an_eye_on_a_surface_sees_numbers |
-//! | L1 | total_reflection_begins_at_the_critical_angle |
-//! | L2 | glass_reflects_by_fresnel_up_to_the_horizon |
-//! | L3 | an_index_of_one_reflects_nothing_at_any_angle, glass_of_the_air_s_own_index_is_not_there |
-//! | L4 | total_reflection_begins_at_the_critical_angle |
-//! | L5 | every_closed_form_holds |
-//! | L6 | diffuse_light_crosses_glass_by_its_mean_transmittance |
-//! | L7 | - no medium absorbs and no glass disperses |
-//! | M1 | work_groups_and_chunks_give_the_same_bits |
-//! | M2 | - no results of several runs are read and merged |
-//! | M3 | photons_of_the_largest_numbers_are_their_own, a_billion_photons_have_the_exact_share |
+//! The tests at the end hold the table of all hard cases (`tests/common/cases.rs`) against the sources, README and the guide.
 
 use std::collections::HashSet;
 use std::f64::consts::PI;
 
+use crate::common::cases::{self, CASES, COUNTS, Case, Shown};
 use crate::common::known::{self, none_returns};
 use crate::common::lit::{BOTH, flights, lamp, mean_red, received, same_light, scene, seen};
 use crate::common::{Check, assert_complains, assert_holds, device, relative_check, z_check};
@@ -859,44 +755,56 @@ fn an_eye_on_a_surface_sees_numbers() {
     }
 }
 
-/// Rows (case, what shows it) of the table above.
-fn cases(source: &str) -> Vec<(String, String)> {
-    let rows = source.lines().filter_map(|line| line.strip_prefix("//! | ")?.strip_suffix(" |"));
-    let cells = rows.filter_map(|row| row.split_once(" | ")).map(|(case, shown)| (case.to_owned(), shown.to_owned()));
-    cells.filter(|(case, _)| case.chars().any(|symbol| symbol.is_ascii_digit())).collect()
-}
-
-/// Every source of the crate and of its tests.
-fn sources(folder: &str) -> Vec<String> {
-    let entries = std::fs::read_dir(folder).unwrap().map(|entry| entry.unwrap().path());
+/// Texts of every file of these kinds, of the crate and of its tests.
+fn texts(folder: &str, kinds: &[&str]) -> Vec<String> {
+    let Ok(entries) = std::fs::read_dir(format!("{}/{folder}", env!("CARGO_MANIFEST_DIR"))) else { return Vec::new() };
     entries
-        .flat_map(|path| match path.is_dir() {
-            true => sources(path.to_str().unwrap()),
-            false if path.extension().is_some_and(|kind| kind == "rs") => vec![std::fs::read_to_string(path).unwrap()],
-            false => Vec::new(),
+        .map(|entry| entry.unwrap())
+        .flat_map(|entry| {
+            let path = format!("{folder}/{}", entry.file_name().to_str().unwrap());
+            match entry.path().extension() {
+                _ if entry.path().is_dir() => texts(&path, kinds),
+                Some(kind) if kinds.iter().any(|wanted| kind == *wanted) => vec![std::fs::read_to_string(entry.path()).unwrap()],
+                _ => Vec::new(),
+            }
         })
         .collect()
 }
 
-/// Every case of the catalogue stands in the table once, and every test that it names is a test.
-fn table_check(cases: &[(String, String)], sources: &[String]) -> Check {
-    let counts = [('G', 15), ('S', 14), ('R', 9), ('A', 11), ('E', 14), ('B', 6), ('I', 8), ('D', 7), ('C', 3), ('L', 7), ('M', 3)];
-    let all: Vec<String> = counts.iter().flat_map(|(group, count)| (1..=*count).map(move |number| format!("{group}{number}"))).collect();
-    if let Some(case) = all.iter().find(|case| cases.iter().filter(|(named, _)| named == *case).count() != 1) {
+/// README and the pages of the guide.
+pub fn readme_and_guide() -> Vec<String> {
+    let readme = std::fs::read_to_string(concat!(env!("CARGO_MANIFEST_DIR"), "/README.md")).unwrap();
+    [vec![readme], texts("src/guide", &["md"])].concat()
+}
+
+/// Every case of the catalogue stands in the table once; every test that it names is a test; and nothing of what a case
+/// that cannot occur would need stands in the program.
+fn table_check(cases: &[Case], tests: &[String], program: &[String]) -> Check {
+    let all: Vec<String> = COUNTS.iter().flat_map(|(group, count)| (1..=*count).map(move |number| format!("{group}{number}"))).collect();
+    if let Some(case) = all.iter().find(|number| cases.iter().filter(|case| case.number == **number).count() != 1) {
         return Err(format!("{case} does not stand in the table once"));
     }
     if cases.len() != all.len() {
         return Err(format!("{} cases instead of {}", cases.len(), all.len()));
     }
-    for (case, shown) in cases.iter().filter(|(_, shown)| !shown.starts_with("- ")) {
-        for name in shown.split(", ") {
-            let head = format!("fn {name}()");
-            let has_test = |source: &String| {
-                let mut places = source.match_indices(&head);
-                places.any(|(at, _)| source[..at].trim_end().lines().rev().take(2).any(|line| line.trim() == "#[test]"))
-            };
-            if !sources.iter().any(has_test) {
-                return Err(format!("{case}: {name} is no test"));
+    let is_test = |name: &&str| {
+        let head = format!("fn {name}()");
+        tests.iter().any(|source| {
+            let mut places = source.match_indices(&head);
+            places.any(|(at, _)| source[..at].trim_end().lines().rev().take(2).any(|line| line.trim() == "#[test]"))
+        })
+    };
+    for Case { number, shown, .. } in cases {
+        match shown {
+            Shown::Tests(names) => match names.iter().find(|name| !is_test(name)) {
+                Some(name) => return Err(format!("{number}: {name} is no test")),
+                None if names.is_empty() => return Err(format!("{number}: nothing shows it")),
+                None => {}
+            },
+            Shown::Absent { words, .. } => {
+                if let Some(word) = words.iter().find(|word| program.iter().any(|text| text.to_lowercase().contains(**word))) {
+                    return Err(format!("{number} is said not to occur here, and a source has {word:?}: it needs a test"));
+                }
             }
         }
     }
@@ -905,15 +813,85 @@ fn table_check(cases: &[(String, String)], sources: &[String]) -> Check {
 
 #[test]
 fn the_table_names_every_case_and_tests_that_exist() {
-    let root = env!("CARGO_MANIFEST_DIR");
-    let sources = ["src", "tests"].iter().flat_map(|folder| sources(&format!("{root}/{folder}"))).collect::<Vec<_>>();
-    let cases = cases(include_str!("hard_cases.rs"));
-    assert_holds("the table", table_check(&cases, &sources));
-    let absent = cases.iter().filter(|(_, shown)| shown.starts_with("- ")).count();
-    println!("{} cases, {absent} of them cannot occur here", cases.len());
-    assert_complains("a case less", table_check(&cases[1..], &sources));
-    assert_complains("a case twice", table_check(&[&cases[..], &cases[..1]].concat(), &sources));
-    let renamed = |name: &str| [&[("G1".to_owned(), name.to_owned())], &cases[1..]].concat();
-    assert_complains("a test that is none", table_check(&renamed("table_check"), &sources));
-    assert_complains("a test that was renamed", table_check(&renamed("photons_leave_a_surface_for_good"), &sources));
+    let tests = [texts("src", &["rs"]), texts("tests", &["rs"])].concat();
+    let program = [texts("src", &["rs"]), texts("glsl", &["glsl", "comp"])].concat();
+    let check = |cases: &[Case]| table_check(cases, &tests, &program);
+    assert_holds("the table", check(&CASES));
+    assert_complains("a case less", check(&CASES[1..]));
+    assert_complains("a case twice", check(&[&CASES[..], &CASES[..1]].concat()));
+    let shown = |shown| [&[Case { shown, ..CASES[0] }], &CASES[1..]].concat();
+    assert_complains("a test that is none", check(&shown(Shown::Tests(&["table_check"]))));
+    assert_complains("a test that was renamed", check(&shown(Shown::Tests(&["photons_leave_a_surface_for_good"]))));
+    assert_complains("no test", check(&shown(Shown::Tests(&[]))));
+    assert_complains("what has come to be there", check(&shown(Shown::Absent { why: "no quasi-Monte Carlo numbers", words: &["sobol"] })));
+}
+
+/// Every sentence of README and of the guide that counts the cases has the numbers of the table, and no others.
+fn counts_check(texts: &[String], cases: &[Case]) -> Check {
+    let (shown, absent) = cases::counts(cases);
+    let mut counted = 0;
+    for paragraph in texts.iter().flat_map(|text| text.split("\n\n")) {
+        let paragraph = paragraph.split_whitespace().collect::<Vec<_>>().join(" ");
+        for sentence in paragraph.split(". ") {
+            // What stands in brackets counts something else.
+            let plain: String = sentence.split('(').map(|part| part.split_once(')').map_or(part, |(_, after)| after)).collect();
+            let words: Vec<&str> = plain.split(' ').collect();
+            let number = |word: &&str| word.trim_matches(|symbol: char| symbol.is_ascii_punctuation()).parse::<usize>().ok();
+            let counts_cases = words.windows(3).any(|three| {
+                number(&three[0]).is_some()
+                    && ["known failures", "hard cases", "known faults"].iter().any(|what| three[1..].join(" ").starts_with(what))
+            });
+            if !counts_cases {
+                continue;
+            }
+            counted += 1;
+            let wrong = words.iter().filter_map(number).find(|found| ![cases.len(), shown, absent].contains(found));
+            if let Some(wrong) = wrong {
+                let right = format!("{} cases, {shown} with tests, {absent} that cannot occur", cases.len());
+                return Err(format!("{wrong} in \"{sentence}\" is none of: {right}"));
+            }
+        }
+    }
+    if counted == 0 { Err("nothing says how many hard cases there are".into()) } else { Ok(()) }
+}
+
+#[test]
+fn readme_and_guide_count_the_hard_cases() {
+    let written = readme_and_guide();
+    assert_holds("README and the guide", counts_check(&written, &CASES));
+    assert_complains("a table of one case less", counts_check(&written, &CASES[1..]));
+    assert_complains("no sentence at all", counts_check(&["Hard cases are many.".to_owned()], &CASES));
+    assert_complains(
+        "a number of old",
+        counts_check(&["It lists 97 known failures: 88 with tests, and 9 that cannot apply.".to_owned()], &CASES),
+    );
+}
+
+/// The guide's page of hard cases, where there is one, has the rows of the table, in their order.
+fn page_check(page: &str) -> Check {
+    let is_row = |line: &&str| {
+        let number = line.strip_prefix("| ").and_then(|line| line.split(' ').next()).unwrap_or_default();
+        COUNTS.iter().any(|(group, _)| number.strip_prefix(*group).is_some_and(|rest| rest.parse::<usize>().is_ok()))
+    };
+    let (table, mut found) = (cases::table(), page.lines().filter(is_row));
+    for expected in table.lines().filter(is_row) {
+        match found.next() {
+            Some(row) if row == expected => {}
+            row => return Err(format!("{row:?} instead of {expected:?}; the table is:\n{table}")),
+        }
+    }
+    found.next().map_or(Ok(()), |row| Err(format!("{row:?} is no row of the table")))
+}
+
+#[test]
+fn the_guides_page_has_the_table() {
+    let table = cases::table();
+    assert_holds("the table itself", page_check(&table));
+    assert_complains("a row less", page_check(&table.replacen("| G1 |", "| G |", 1)));
+    assert_complains("a row more", page_check(&(table.clone() + "| M3 | twice | `page_check` |\n")));
+    assert_complains("another test", page_check(&table.replacen("`rays_at", "`rays_near", 1)));
+    let page = concat!(env!("CARGO_MANIFEST_DIR"), "/src/guide/hard_cases.md");
+    if let Ok(page) = std::fs::read_to_string(page) {
+        assert_holds("src/guide/hard_cases.md", page_check(&page));
+    }
 }

@@ -1,5 +1,5 @@
 //! Hard cases of materials: ends of reflectance and of bounces, colours, lobes of any width, glass of any index. The
-//! table in `tests/hard_cases.rs` names them by case.
+//! table in `tests/common/cases.rs` names them by case.
 
 use std::f64::consts::PI;
 

@@ -4,7 +4,8 @@
 use std::collections::{HashMap, HashSet};
 
 use crate::common::{
-    Check, MANY_PHOTONS, assert_complains, assert_holds, device, draws_of, in_order, photons, photons_on_cpu, plan_for, streams_of,
+    Check, Kind, MANY_PHOTONS, assert_complains, assert_complains_of, assert_holds, device, draws_of, photons, photons_on_cpu, plan_for,
+    same_photons, streams_of,
 };
 use photonmill::gpu::Gpu;
 use photonmill::photon::Photon;
@@ -17,16 +18,6 @@ use photonmill::settings::{EmissionLaw, PhongDirection, Settings, Variant};
 const GENERATORS: [Rng; 4] = [Rng::Rand48, Rng::Mt, Rng::Philox, Rng::Sobol];
 /// Around subgroups of 8, 32 and 64, around the work group of 128, and two odd numbers of photons.
 const COUNTS: [u32; 12] = [2, 3, 7, 8, 9, 31, 63, 64, 65, 129, 1000, 5001];
-
-/// Two photon maps as sets, bit for bit.
-fn same_set(found: &[Photon], expected: &[Photon]) -> Check {
-    let (found, expected) = (in_order(found.to_vec()), in_order(expected.to_vec()));
-    if found.len() != expected.len() {
-        return Err(format!("{} photons instead of {}", found.len(), expected.len()));
-    }
-    let differing = found.iter().zip(&expected).find(|(a, b)| bytemuck::bytes_of(*a) != bytemuck::bytes_of(*b));
-    differing.map_or(Ok(()), |(a, b)| Err(format!("{a:?} instead of {b:?}")))
-}
 
 /// No photon is stored twice at a bounce, none at a bounce before which it was not stored, none
 /// outside the numbers of the round.
@@ -61,7 +52,7 @@ fn builders_agree(gpu: &Gpu, settings: &Settings) -> Vec<Photon> {
     for variant in Variant::ON_GPU {
         let found = of(variant);
         assert_holds(what(variant), each_once(&found, settings.photons, settings.bounces));
-        assert_holds(what(variant), same_set(&found, &expected));
+        assert_holds(what(variant), same_photons(&found, &expected));
     }
     expected
 }
@@ -92,12 +83,13 @@ fn a_persistent_invocation_takes_photon_after_photon() {
         for (scene, settings) in [(open_box(&many), &many), (closed, &endless)] {
             let of = |variant| photons_on_gpu(&gpu, &scene, &Settings { variant, ..settings.clone() }).unwrap();
             let found = of(Variant::Persistent);
-            assert_holds(format!("{rng:?}, {} bounces", settings.bounces), same_set(&found, &of(Variant::Atomic)));
+            assert_holds(format!("{rng:?}, {} bounces", settings.bounces), same_photons(&found, &of(Variant::Atomic)));
             assert!(settings.bounces == 15 || found.len() == 257 * settings.bounces as usize, "{} photons", found.len());
         }
     }
     let longer = Settings { variant: Variant::Persistent, bounces: 321, rng: Rng::Philox, ..Settings::default() };
-    assert!(longer.validate().is_err());
+    let refused = longer.validate().unwrap_err().to_string();
+    assert!(refused.starts_with("--bounces 321: "), "{refused}");
 }
 
 #[test]
@@ -142,18 +134,18 @@ fn group_sizes_and_chunks_change_no_photon() {
         let expected = photons(&gpu, &settings);
         for group_size in [32, 64, 128, 256, 512, 1024].into_iter().filter(|size| *size <= gpu.facts().work_group_size) {
             let found = builders_agree(&gpu, &Settings { group_size, ..settings.clone() });
-            assert_holds(format!("{rng:?}, groups of {group_size}"), same_set(&found, &expected));
+            assert_holds(format!("{rng:?}, groups of {group_size}"), same_photons(&found, &expected));
         }
         for (counters, group_size) in [(2, 32), (8, 64), (8, 128), (64, 32)] {
             let settings = Settings { counters: Some(counters), group_size, variant: Variant::Atomic, ..settings.clone() };
             for chunk in [None, Some(500)] {
                 let found = photons(&gpu, &Settings { chunk, ..settings.clone() });
-                assert_holds(format!("{rng:?}, {counters} counters, groups of {group_size}, {chunk:?}"), same_set(&found, &expected));
+                assert_holds(format!("{rng:?}, {counters} counters, groups of {group_size}, {chunk:?}"), same_photons(&found, &expected));
             }
         }
         for chunk in [65, 500, 1000, 1001, 5000] {
             let found = builders_agree(&gpu, &Settings { chunk: Some(chunk), ..settings.clone() });
-            assert_holds(format!("{rng:?}, chunks of {chunk}"), same_set(&found, &expected));
+            assert_holds(format!("{rng:?}, chunks of {chunk}"), same_photons(&found, &expected));
         }
     }
 }
@@ -165,7 +157,7 @@ fn the_order_of_appending_changes_no_photon() {
         let settings = Settings { variant, photons: 20_001, ..Settings::default() };
         let expected = photons(&gpu, &settings);
         for run in 1..10 {
-            assert_holds(format!("{variant:?}, run {run}"), same_set(&photons(&gpu, &settings), &expected));
+            assert_holds(format!("{variant:?}, run {run}"), same_photons(&photons(&gpu, &settings), &expected));
         }
     }
 }
@@ -179,7 +171,7 @@ fn two_naive_bounces_are_the_first_two_of_fifteen() {
         let mut modified = photons(&gpu, &settings);
         assert!(modified.iter().any(|photon| photon.bounce >= 10), "{rng:?}");
         modified.retain(|photon| photon.bounce < 2);
-        assert_holds(format!("{rng:?}"), same_set(&naive, &modified));
+        assert_holds(format!("{rng:?}"), same_photons(&naive, &modified));
     }
 }
 
@@ -267,10 +259,10 @@ fn threads_change_no_photon_of_the_cpu_builder() {
             assert_holds("one thread", each_once(&expected, photons, settings.bounces));
             for threads in [2, 3, 8] {
                 let found = photons_on_cpu(&Settings { threads, ..settings.clone() });
-                assert_holds(format!("{rng:?}, {photons} photons, {threads} threads"), same_set(&found, &expected));
+                assert_holds(format!("{rng:?}, {photons} photons, {threads} threads"), same_photons(&found, &expected));
             }
             let found = photons_on_cpu(&Settings { chunk: Some(64), threads: 3, ..settings.clone() });
-            assert_holds(format!("{rng:?}, {photons} photons in chunks"), same_set(&found, &expected));
+            assert_holds(format!("{rng:?}, {photons} photons in chunks"), same_photons(&found, &expected));
         }
     }
 }
@@ -355,7 +347,7 @@ fn a_photons_draws_are_its_twisters_outputs_in_order() {
 fn the_checks_complain_about_spoiled_maps() {
     let settings = Settings::default();
     let map = photons_on_cpu(&settings);
-    assert_holds("the map itself", same_set(&map, &map));
+    assert_holds("the map itself", same_photons(&map, &map));
     let spoiled = |spoil: fn(&mut Vec<Photon>)| {
         let mut spoiled = map.clone();
         spoil(&mut spoiled);
@@ -366,14 +358,14 @@ fn the_checks_complain_about_spoiled_maps() {
     let replaced = spoiled(|map| map[100] = map[101]);
     let nudged = spoiled(|map| map[100].position.x = f32::from_bits(map[100].position.x.to_bits() + 1));
     let heavier = spoiled(|map| map[100].weight *= 1.01);
-    for (what, map_now) in [
-        ("a lost photon", &lost),
-        ("a doubled one", &doubled),
-        ("one in place of another", &replaced),
-        ("one ulp", &nudged),
-        ("a weight", &heavier),
+    for (what, map_now, kind) in [
+        ("a lost photon", &lost, Kind::PhotonsLost),
+        ("a doubled one", &doubled, Kind::PhotonsAdded),
+        ("one in place of another", &replaced, Kind::OtherPhotons),
+        ("one ulp", &nudged, Kind::OtherPhotons),
+        ("a weight", &heavier, Kind::OtherPhotons),
     ] {
-        assert_complains(what, same_set(map_now, &map));
+        assert_complains_of(kind, what, same_photons(map_now, &map));
     }
     for (what, map_now) in [("a doubled photon", &doubled), ("one in place of another", &replaced)] {
         assert_complains(what, each_once(map_now, settings.photons, settings.bounces));

@@ -1,25 +1,33 @@
-//! Checks that can fail: faults are planted in the kernels' sources, and the checks of the other tests must
-//! complain. Checks of numbers on the host show it beside themselves (`assert_complains`).
+//! Checks that can fail: faults are planted in the kernels' sources, and the checks of the other tests must complain,
+//! each of what the fault does. Checks of numbers on the host show it beside themselves (`assert_complains`).
 
+use std::collections::HashMap;
 use std::sync::atomic::AtomicBool;
+use std::sync::{Arc, LazyLock, Mutex};
 use std::time::Duration;
 
+use crate::closed_form::closed_form_check;
+use crate::common::Kind::*;
 use crate::common::{
-    Check, MANY_PHOTONS, aimed, assert_complains, assert_holds, bits, equal_sums, in_order, known, open, photons, photons_on_cpu, planted,
-    run_on_cpu,
+    Check, Complaint, Kind, MANY_PHOTONS, aimed, assert_complains, assert_complains_of, assert_holds, bits, estimate_check, known,
+    noticed_as, open, photons_on_cpu, planted, run_on_cpu, same_photons, same_sums,
 };
+use crate::film::pairs_count_on;
+use crate::hard_cases::readme_and_guide;
+use crate::ledger::closed_fates;
+use crate::paranoid::{box_is_finite, scene_is_finite};
+use crate::strict::{film_agrees, photons_agree, rounding_check};
+use crate::transport::{appends_agree, crowd_check};
 use photonmill::compaction;
-use photonmill::gpu::{Gpu, Options, check};
-use photonmill::plan::transport::{Sensor, TransportPlan};
-use photonmill::render::{self, Control};
-use photonmill::scene::geometry::Geometry;
+use photonmill::error::Error;
+use photonmill::film;
+use photonmill::gpu::{Gpu, Options};
+use photonmill::photon::Photon;
+use photonmill::scene::built_in;
 use photonmill::scene::open_box::open_box;
 use photonmill::scene::texture::Wrap;
-use photonmill::scene::{Scene, built_in};
-use photonmill::selfcheck::{self, Finding};
 use photonmill::settings::transport::{Append, Illumination, TransportSettings};
 use photonmill::settings::{Gather, Math, Settings, Variant};
-use photonmill::transport::{self, Lit, RoundFilm, View};
 
 /// What is asked of a device.
 #[derive(Debug, Clone, Copy)]
@@ -42,8 +50,11 @@ enum Question {
     Builders,
     /// Strict quotients and roots are IEEE 754's.
     StrictMath,
-    /// `--paranoid` finds nothing that is infinite or no number.
+    /// `--paranoid` finds nothing that is infinite or no number: in a scene, in the paper's box.
     Finite,
+    FiniteBox,
+    /// Pairs of floats count where one float has stopped.
+    Pairs,
     /// Points with many photons near find all of them.
     Crowds,
     /// The bits of a strict film are those written down.
@@ -70,8 +81,8 @@ impl Question {
     /// Whether another test, the same for every device, shows that a device without a fault answers it right.
     fn has_a_test_of_its_own(self) -> bool {
         match self {
-            Photons(_) | InTurn | Film(_) | Ledger(_) | ClosedForm(_) | Appends | Builders | StrictMath | Finite | Nearest | Crowds
-            | AimedLight(_) => false,
+            Photons(_) | InTurn | Film(_) | Ledger(_) | ClosedForm(_) | Appends | Builders | StrictMath | Finite | FiniteBox | Nearest
+            | Pairs | Crowds | AimedLight(_) => false,
             Bits(_) | LampInBox(_) | Shelf | Ridge | Spot | Texture(_) => true,
             LeaningPlane(_) | LeaningScatterer | PatchInPlane | SheetsInOnePlane | GlassInFurnace(..) => true,
         }
@@ -89,7 +100,9 @@ enum Subject {
 impl Question {
     fn subject(self) -> Subject {
         match self {
-            Photons(_) | InTurn | Film(_) | Ledger(_) | ClosedForm(_) | Builders | StrictMath | Nearest => Subject::PapersLine,
+            Photons(_) | InTurn | Film(_) | Ledger(_) | ClosedForm(_) | Builders | StrictMath | Nearest | Pairs | FiniteBox => {
+                Subject::PapersLine
+            }
             AimedLight(_) => Subject::Aiming,
             Appends | Finite | Crowds | Bits(_) | LampInBox(_) | Shelf | Ridge | Spot | Texture(_) => Subject::Scenes,
             LeaningPlane(_) | LeaningScatterer | PatchInPlane | SheetsInOnePlane | GlassInFurnace(..) => Subject::Scenes,
@@ -105,18 +118,26 @@ struct Fault {
     to: &'static str,
     /// Kernels that run the spoiled source.
     kernels: &'static [&'static str],
-    /// Questions that must be answered wrong.
-    noticed_by: &'static [Question],
+    /// Questions that must be answered wrong, and in which way.
+    noticed_by: &'static [(Question, Kind)],
 }
 
-const FAULTS: [Fault; 64] = [
+const FAULTS: [Fault; 65] = [
+    Fault {
+        what: "what rounding takes from a pair of floats is forgotten",
+        file: "film/compensated.glsl",
+        from: "precise float rest = sum.y + (",
+        to: "precise float rest = 0.0 * (",
+        kernels: &["gather_brute_u64", "gather_grid_u64"],
+        noticed_by: &[(Pairs, SumsTooSmall)],
+    },
     Fault {
         what: "what one sample looks up for all counts for itself alone",
         file: "kernels/weigh.comp",
         from: "(point.arrivals & SEEN_FOR_ALL) != 0 ? float(SAMPLES) : 1.0;",
         to: "(point.arrivals & SEEN_FOR_ALL) != 0 ? 1.0 : 1.0;",
         kernels: &["weigh"],
-        noticed_by: &[GlassInFurnace(4, false)],
+        noticed_by: &[(GlassInFurnace(4, false), TooDark)],
     },
     Fault {
         what: "what one sample gathers for all counts for itself alone",
@@ -124,7 +145,7 @@ const FAULTS: [Fault; 64] = [
         from: "chain.weight *= for_all ? float(SAMPLES) : 1.0;",
         to: "",
         kernels: &["view"],
-        noticed_by: &[GlassInFurnace(4, true)],
+        noticed_by: &[(GlassInFurnace(4, true), TooDark)],
     },
     Fault {
         what: "what glass mirrors weighs as much as it is looked at",
@@ -132,7 +153,7 @@ const FAULTS: [Fault; 64] = [
         from: "float weight = as_much ? 1.0 : divide(reflectance, chance);",
         to: "float weight = 1.0;",
         kernels: &["view"],
-        noticed_by: &[GlassInFurnace(4, false)],
+        noticed_by: &[(GlassInFurnace(4, false), TooBright)],
     },
     Fault {
         what: "every other lane of a subgroup writes over its neighbour",
@@ -140,7 +161,7 @@ const FAULTS: [Fault; 64] = [
         from: "subgroupBallotExclusiveBitCount(survivors);",
         to: "(subgroupBallotExclusiveBitCount(survivors) & 0xfffffffeu);",
         kernels: &["fly_whole", "trace_whole", "fly_ballot"],
-        noticed_by: &[Photons(Variant::Persistent), Appends],
+        noticed_by: &[(Photons(Variant::Persistent), OtherPhotons), (Appends, OtherSums)],
     },
     Fault {
         what: "a subgroup's second paths write over its first ones'",
@@ -148,7 +169,7 @@ const FAULTS: [Fault; 64] = [
         from: "count + subgroupBallotExclusiveBitCount(survivors);",
         to: "subgroupBallotExclusiveBitCount(survivors);",
         kernels: &["trace_ballot"],
-        noticed_by: &[Photons(Variant::Ballot), Builders],
+        noticed_by: &[(Photons(Variant::Ballot), OtherPhotons), (Builders, BuildersDisagree)],
     },
     Fault {
         what: "the path in the middle of an odd number is left out",
@@ -156,7 +177,7 @@ const FAULTS: [Fault; 64] = [
         from: "(path_count + PLACES - 1) / PLACES",
         to: "path_count / PLACES",
         kernels: &["trace_ballot"],
-        noticed_by: &[Ledger(Variant::Ballot), Photons(Variant::Ballot)],
+        noticed_by: &[(Ledger(Variant::Ballot), LedgerOpen), (Photons(Variant::Ballot), PhotonsLost)],
     },
     Fault {
         what: "a gap of several counters is taken for a photon",
@@ -164,7 +185,7 @@ const FAULTS: [Fault; 64] = [
         from: "photons[first_photon + place] = pack_photon(Photon(vec3(0.0), NO_WALL, 0.0, 0.0, 0, 0));",
         to: "",
         kernels: &["fill_gaps"],
-        noticed_by: &[InTurn],
+        noticed_by: &[(InTurn, PhotonsAdded)],
     },
     Fault {
         what: "a gap of several counters is taken for a path",
@@ -172,7 +193,7 @@ const FAULTS: [Fault; 64] = [
         from: "next_paths[path_word(0, place, push.path_capacity)].w = NO_WALL;",
         to: "",
         kernels: &["fill_gaps"],
-        noticed_by: &[InTurn],
+        noticed_by: &[(InTurn, OtherPhotons)],
     },
     Fault {
         what: "the last block of the counter that is ahead is left out",
@@ -180,7 +201,7 @@ const FAULTS: [Fault; 64] = [
         from: "end = max(end, taken == 0 ? 0 : place_in_turn(turn, taken - 1) + 1);",
         to: "end = max(end, taken == 0 ? 0 : place_in_turn(0, taken - 1) + 1);",
         kernels: &["fill_gaps"],
-        noticed_by: &[InTurn],
+        noticed_by: &[(InTurn, PhotonsLost)],
     },
     Fault {
         what: "a row of cells is taken for narrower than the disc",
@@ -188,7 +209,7 @@ const FAULTS: [Fault; 64] = [
         from: "range.reach * range.reach - dot(off, off);",
         to: "0.9 * range.reach * range.reach - dot(off, off);",
         kernels: &["lookup_u64"],
-        noticed_by: &[Bits("cornell")],
+        noticed_by: &[(Bits("cornell"), OtherBits)],
     },
     Fault {
         what: "a lane is lost",
@@ -196,7 +217,7 @@ const FAULTS: [Fault; 64] = [
         from: "bool stored = alive[k] &&",
         to: "bool stored = alive[k] && gl_SubgroupInvocationID != 5u &&",
         kernels: &["trace_atomic"],
-        noticed_by: &[Ledger(Variant::Atomic), Photons(Variant::Atomic)],
+        noticed_by: &[(Ledger(Variant::Atomic), LedgerOpen), (Photons(Variant::Atomic), OtherPhotons)],
     },
     Fault {
         what: "the last invocation of each work group finds no place of its own",
@@ -204,7 +225,7 @@ const FAULTS: [Fault; 64] = [
         from: "before += s < gl_SubgroupID",
         to: "before += s + 1 < gl_SubgroupID",
         kernels: &["trace_group"],
-        noticed_by: &[Photons(Variant::Group), Builders],
+        noticed_by: &[(Photons(Variant::Group), OtherPhotons), (Builders, BuildersDisagree)],
     },
     Fault {
         what: "survivors of one work group are not counted",
@@ -212,7 +233,7 @@ const FAULTS: [Fault; 64] = [
         from: "survivors[work_group_index()] = prefix.total;",
         to: "survivors[work_group_index()] = work_group_index() == 3u ? 0u : prefix.total;",
         kernels: &["trace_in_place"],
-        noticed_by: &[Photons(Variant::Scan), Ledger(Variant::Scan)],
+        noticed_by: &[(Photons(Variant::Scan), PhotonsLost), (Ledger(Variant::Scan), LedgerOpen)],
     },
     Fault {
         what: "an invocation that took a photon starts it at the bounce at which the last one ended",
@@ -220,7 +241,7 @@ const FAULTS: [Fault; 64] = [
         from: "            bounce = 0;\n",
         to: "",
         kernels: &["trace_whole"],
-        noticed_by: &[Photons(Variant::Persistent)],
+        noticed_by: &[(Photons(Variant::Persistent), PhotonsLost)],
     },
     Fault {
         what: "a photon's last bounce is not counted",
@@ -228,7 +249,7 @@ const FAULTS: [Fault; 64] = [
         from: "if (flying) {\n            count_fate(",
         to: "if (flying && !bounced.escaped) {\n            count_fate(",
         kernels: &["trace_whole"],
-        noticed_by: &[Ledger(Variant::Persistent)],
+        noticed_by: &[(Ledger(Variant::Persistent), LedgerOpen)],
     },
     Fault {
         what: "a survivor's path is forgotten",
@@ -236,7 +257,7 @@ const FAULTS: [Fault; 64] = [
         from: "store_path(index, path);",
         to: "if (index % 10u != 7u) store_path(index, path);",
         kernels: &["trace_slots"],
-        noticed_by: &[Ledger(Variant::Naive), Photons(Variant::Naive)],
+        noticed_by: &[(Ledger(Variant::Naive), LedgerOpen), (Photons(Variant::Naive), OtherPhotons)],
     },
     Fault {
         what: "a photon is gathered twice",
@@ -244,7 +265,7 @@ const FAULTS: [Fault; 64] = [
         from: "gather_photon(gathered, photon);",
         to: "gather_photon(gathered, photon);\n if (i == 100u) gather_photon(gathered, photon);",
         kernels: &["gather_grid_u64", "gather_grid_two_words"],
-        noticed_by: &[Film(Gather::Grid)],
+        noticed_by: &[(Film(Gather::Grid), SumsTooLarge)],
     },
     Fault {
         what: "a photon in fifty is stored twice",
@@ -252,7 +273,7 @@ const FAULTS: [Fault; 64] = [
         from: "        store(place, flown.photon);",
         to: "        store(place, flown.photon);\n        if (path.photon % 50u == 0u) store(atomicAdd(counters[0], 1), flown.photon);",
         kernels: &["fly_atomic"],
-        noticed_by: &[Appends],
+        noticed_by: &[(Appends, SumsTooLarge)],
     },
     Fault {
         what: "a photon that flies to its end begins with its second bounce's random numbers",
@@ -260,7 +281,7 @@ const FAULTS: [Fault; 64] = [
         from: "            bounce = 0;",
         to: "            bounce = 1;",
         kernels: &["fly_whole"],
-        noticed_by: &[Appends],
+        noticed_by: &[(Appends, OtherSums)],
     },
     Fault {
         what: "a point that others help keeps its first slice twice",
@@ -268,7 +289,7 @@ const FAULTS: [Fault; 64] = [
         from: "slice_begin = slice * GATHER_SLICE",
         to: "slice_begin = gl_WorkGroupID.y * GATHER_SLICE",
         kernels: &["lookup_u64", "lookup_two_words"],
-        noticed_by: &[Crowds],
+        noticed_by: &[(Crowds, OtherSums)],
     },
     Fault {
         what: "the last slice of crowded points is left out",
@@ -276,7 +297,7 @@ const FAULTS: [Fault; 64] = [
         from: "min(slice_count - 1, push.max_groups)",
         to: "min(slice_count - 2, push.max_groups)",
         kernels: &["crowd_size"],
-        noticed_by: &[Crowds],
+        noticed_by: &[(Crowds, SumsTooSmall)],
     },
     Fault {
         what: "survivors in order overwrite those of the bounce before",
@@ -284,7 +305,7 @@ const FAULTS: [Fault; 64] = [
         from: "uint place = counters[0] + path_place;",
         to: "uint place = path_place;",
         kernels: &["keep_order"],
-        noticed_by: &[Photons(Variant::Scan)],
+        noticed_by: &[(Photons(Variant::Scan), OtherPhotons)],
     },
     Fault {
         what: "stored photons forget which of two walls that face each other is theirs",
@@ -292,7 +313,7 @@ const FAULTS: [Fault; 64] = [
         from: " | photon.wall << 31",
         to: "",
         kernels: &["trace_atomic"],
-        noticed_by: &[Photons(Variant::Atomic)],
+        noticed_by: &[(Photons(Variant::Atomic), OtherPhotons)],
     },
     Fault {
         what: "points look for photons in the first layer of cells, whatever their wall",
@@ -300,7 +321,7 @@ const FAULTS: [Fault; 64] = [
         from: "box.first[axis] = layer;\n    box.last[axis] = layer;",
         to: "box.first[axis] = 0u;\n    box.last[axis] = 0u;",
         kernels: &["gather_grid_u64", "gather_grid_two_words"],
-        noticed_by: &[Film(Gather::Grid)],
+        noticed_by: &[(Film(Gather::Grid), SumsTooSmall)],
     },
     Fault {
         what: "two photons share a place in their cell",
@@ -308,7 +329,7 @@ const FAULTS: [Fault; 64] = [
         from: "ranks[index] = atomicAdd(cells[cell_number(cell, push.cell_count)], 1);",
         to: "ranks[index] = atomicAdd(cells[cell_number(cell, push.cell_count)], 1) & 0xfffffffeu;",
         kernels: &["cell_count"],
-        noticed_by: &[Film(Gather::Grid)],
+        noticed_by: &[(Film(Gather::Grid), OtherSums)],
     },
     Fault {
         what: "the radius is 1 % too large over the grid",
@@ -316,7 +337,7 @@ const FAULTS: [Fault; 64] = [
         from: "distance_squared <= push.radius_squared",
         to: "distance_squared <= 1.0201 * push.radius_squared",
         kernels: &["gather_grid_u64", "gather_grid_two_words"],
-        noticed_by: &[Film(Gather::Grid)],
+        noticed_by: &[(Film(Gather::Grid), SumsTooLarge)],
     },
     Fault {
         what: "the radius is 1 % too small by brute force",
@@ -324,7 +345,7 @@ const FAULTS: [Fault; 64] = [
         from: "distance_squared <= push.radius_squared",
         to: "distance_squared <= 0.9801 * push.radius_squared",
         kernels: &["gather_brute_u64", "gather_brute_two_words"],
-        noticed_by: &[Film(Gather::Brute)],
+        noticed_by: &[(Film(Gather::Brute), SumsTooSmall)],
     },
     Fault {
         what: "the radius of a lookup is 1 % too small",
@@ -332,7 +353,7 @@ const FAULTS: [Fault; 64] = [
         from: "distance_squared <= push.radius * push.radius &&",
         to: "distance_squared <= 0.9801 * push.radius * push.radius &&",
         kernels: &["lookup_u64", "lookup_two_words"],
-        noticed_by: &[ClosedForm("furnace, Photons, Ballot: irradiance")],
+        noticed_by: &[(ClosedForm("furnace, Photons, Ballot: irradiance"), TooDark)],
     },
     Fault {
         what: "shadow rays count the cosine twice",
@@ -340,7 +361,10 @@ const FAULTS: [Fault; 64] = [
         from: "(cosine * lobe_weight",
         to: "(cosine * cosine * lobe_weight",
         kernels: &["receive", "view"],
-        noticed_by: &[ClosedForm("point light, 0.5 m off axis: irradiance"), ClosedForm("point light: radiance of the plane")],
+        noticed_by: &[
+            (ClosedForm("point light, 0.5 m off axis: irradiance"), TooDark),
+            (ClosedForm("point light: radiance of the plane"), TooDark),
+        ],
     },
     Fault {
         what: "reflected directions have the cosine thrice",
@@ -349,8 +373,8 @@ const FAULTS: [Fault; 64] = [
         to: "direction_at(sqrt(sqrt(u)), 1.0 - sqrt(u), azimuth)",
         kernels: &["fly_whole", "trace_ballot", "shine", "fly_ballot"],
         noticed_by: &[
-            ClosedForm("open box, ballot builder, uniform lights: hits stored per photon"),
-            ClosedForm("disc light, photons: irradiance"),
+            (ClosedForm("open box, ballot builder, uniform lights: hits stored per photon"), TooDark),
+            (ClosedForm("disc light, photons: irradiance"), TooBright),
         ],
     },
     Fault {
@@ -359,7 +383,7 @@ const FAULTS: [Fault; 64] = [
         from: "divide(light.strength, light.probability)",
         to: "divide(light.strength, 2.0 * light.probability)",
         kernels: &["receive"],
-        noticed_by: &[ClosedForm("disc light: irradiance")],
+        noticed_by: &[(ClosedForm("disc light: irradiance"), TooDark)],
     },
     Fault {
         what: "photons are sorted into the cell beside theirs",
@@ -367,7 +391,7 @@ const FAULTS: [Fault; 64] = [
         from: "bucket_of(cell_at(uintBitsToFloat(map[2 * index].xyz), push), push)",
         to: "((bucket_of(cell_at(uintBitsToFloat(map[2 * index].xyz), push), push) + uint(index % 3u == 0u)) & push.bucket_mask)",
         kernels: &["map_scatter"],
-        noticed_by: &[ClosedForm("furnace, Photons, Ballot: irradiance")],
+        noticed_by: &[(ClosedForm("furnace, Photons, Ballot: irradiance"), TooDark)],
     },
     Fault {
         what: "one photon is sorted into the cell beside its own",
@@ -375,7 +399,7 @@ const FAULTS: [Fault; 64] = [
         from: "cell_number(cell, push.cell_count)",
         to: "(cell_number(cell, push.cell_count) ^ uint(index == 11u))",
         kernels: &["cell_scatter"],
-        noticed_by: &[Film(Gather::Grid)],
+        noticed_by: &[(Film(Gather::Grid), SumsTooSmall)],
     },
     Fault {
         what: "nodes of the kd-tree are taken to be split along the wrong axis",
@@ -383,7 +407,7 @@ const FAULTS: [Fault; 64] = [
         from: "(wall / 2 + 1 + (height & 1)) % 3",
         to: "(wall / 2 + 1 + (height >> 1 & 1)) % 3",
         kernels: &["gather_tree_u64", "gather_tree_two_words", "nearest_u64", "nearest_two_words"],
-        noticed_by: &[Film(Gather::KdTree), Nearest],
+        noticed_by: &[(Film(Gather::KdTree), SumsTooSmall), (Nearest, OtherSums)],
     },
     Fault {
         what: "one photon goes to the wrong half of its node",
@@ -391,7 +415,7 @@ const FAULTS: [Fault; 64] = [
         from: "ranks[keys[place].y] < node_at(place).middle",
         to: "(ranks[keys[place].y] < node_at(place).middle) != (push.height == 3u && place == 100u)",
         kernels: &["tree_sides"],
-        noticed_by: &[Film(Gather::KdTree)],
+        noticed_by: &[(Film(Gather::KdTree), OtherSums)],
     },
     Fault {
         what: "the sort along an axis leaves out a digit",
@@ -399,7 +423,7 @@ const FAULTS: [Fault; 64] = [
         from: "(key.x >> (4 * push.digit)) & (TREE_RADIX - 1)",
         to: "push.digit == 6u ? 0 : (key.x >> (4 * push.digit)) & (TREE_RADIX - 1)",
         kernels: &["tree_count", "tree_order"],
-        noticed_by: &[Film(Gather::KdTree), Nearest],
+        noticed_by: &[(Film(Gather::KdTree), SumsTooSmall), (Nearest, OtherSums)],
     },
     Fault {
         what: "the farthest of the nearest photons counts",
@@ -407,7 +431,7 @@ const FAULTS: [Fault; 64] = [
         from: "is_full ? 1 : 0",
         to: "0",
         kernels: &["nearest_u64", "nearest_two_words"],
-        noticed_by: &[Nearest],
+        noticed_by: &[(Nearest, SumsTooLarge)],
     },
     Fault {
         what: "the disc of the nearest photons reaches over the edge",
@@ -415,7 +439,7 @@ const FAULTS: [Fault; 64] = [
         from: "covered_disc(point.position, point.wall, sqrt(farthest), rooms[0])",
         to: "3.14159265",
         kernels: &["nearest_u64", "nearest_two_words"],
-        noticed_by: &[Nearest],
+        noticed_by: &[(Nearest, SumsTooSmall)],
     },
     Fault {
         what: "sums are kept in f32",
@@ -423,7 +447,7 @@ const FAULTS: [Fault; 64] = [
         from: "sum.x = uaddCarry(sum.x, amount, carry);",
         to: "sum.x = uint(float(sum.x) + float(amount)); carry = 0;",
         kernels: &["gather_grid_u64", "gather_grid_two_words"],
-        noticed_by: &[Film(Gather::Grid)],
+        noticed_by: &[(Film(Gather::Grid), OtherSums)],
     },
     Fault {
         what: "edges are not corrected",
@@ -431,7 +455,10 @@ const FAULTS: [Fault; 64] = [
         from: "if (HAS_EDGE_CORRECTION) {",
         to: "if (false) {",
         kernels: &["weigh"],
-        noticed_by: &[ClosedForm("furnace, Photons, Ballot: irradiance"), ClosedForm("sun-over-plane, Photons: irradiance")],
+        noticed_by: &[
+            (ClosedForm("furnace, Photons, Ballot: irradiance"), TooDark),
+            (ClosedForm("sun-over-plane, Photons: irradiance"), TooDark),
+        ],
     },
     Fault {
         what: "rays start a fixed length off their surface",
@@ -439,7 +466,7 @@ const FAULTS: [Fault; 64] = [
         from: "precise vec3 start = position + way;",
         to: "precise vec3 start = position + 1e-3 * normal * (dot(direction, normal) < 0.0 ? -1.0 : 1.0);",
         kernels: &["fly_whole", "shine", "fly_ballot", "fly_atomic", "receive", "view"],
-        noticed_by: &[LampInBox(Illumination::Photons)],
+        noticed_by: &[(LampInBox(Illumination::Photons), Leak)],
     },
     Fault {
         what: "glass reflects one and a half times as much",
@@ -447,7 +474,7 @@ const FAULTS: [Fault; 64] = [
         from: "if (u.x < chance) {",
         to: "if (u.x < 1.5 * chance) {",
         kernels: &["view"],
-        noticed_by: &[ClosedForm("glass slab, at 60 degrees: radiance")],
+        noticed_by: &[(ClosedForm("glass slab, at 60 degrees: radiance"), TooDark)],
     },
     Fault {
         what: "strict quotients are cut instead of rounded",
@@ -455,7 +482,7 @@ const FAULTS: [Fault; 64] = [
         from: "quotient += uint(off) + uint(2 * remainder > d);",
         to: "quotient += uint(off);",
         kernels: &["check_math"],
-        noticed_by: &[StrictMath],
+        noticed_by: &[(StrictMath, Misrounded)],
     },
     Fault {
         what: "a light in 50 shines with no number",
@@ -463,7 +490,7 @@ const FAULTS: [Fault; 64] = [
         from: "float cosine = dot(arriving.wi, point.ns);",
         to: "if (u.y < 0.02) arriving.radiance.x = uintBitsToFloat(0x7fc00000u);\n        float cosine = dot(arriving.wi, point.ns);",
         kernels: &["view"],
-        noticed_by: &[Finite],
+        noticed_by: &[(Finite, NoNumber)],
     },
     Fault {
         what: "a photon in 500 starts nowhere",
@@ -471,7 +498,7 @@ const FAULTS: [Fault; 64] = [
         from: "surface.ng, scatter.direction);",
         to: "surface.ng, scatter.direction);\n            if (u.z < 0.002) start.y = uintBitsToFloat(0x7fc00000u);",
         kernels: &["fly_whole", "fly_ballot"],
-        noticed_by: &[Finite],
+        noticed_by: &[(Finite, NoNumber)],
     },
     Fault {
         what: "a photon in 500 carries no number into the map",
@@ -479,7 +506,7 @@ const FAULTS: [Fault; 64] = [
         from: "store(place, flown.photon);",
         to: "if (path.photon % 500u == 7u) flown.photon.flux.y = uintBitsToFloat(0x7fc00000u);\n        store(place, flown.photon);",
         kernels: &["fly_ballot"],
-        noticed_by: &[Finite],
+        noticed_by: &[(Finite, NoNumber)],
     },
     Fault {
         what: "a path from the eye goes on nowhere",
@@ -487,7 +514,7 @@ const FAULTS: [Fault; 64] = [
         from: "chain.direction = scatter.direction;",
         to: "chain.direction = scatter.direction;\n        if (u.x < 0.2) chain.direction.z = uintBitsToFloat(0x7fc00000u);",
         kernels: &["view"],
-        noticed_by: &[Finite],
+        noticed_by: &[(Finite, NoNumber)],
     },
     Fault {
         what: "a path from the eye goes on from nowhere",
@@ -495,7 +522,7 @@ const FAULTS: [Fault; 64] = [
         from: "chain.direction = scatter.direction;",
         to: "chain.direction = scatter.direction;\n        if (u.x < 0.2) chain.position.z = uintBitsToFloat(0x7fc00000u);",
         kernels: &["view"],
-        noticed_by: &[Finite],
+        noticed_by: &[(Finite, NoNumber)],
     },
     Fault {
         what: "a reflected direction of the paper's box is no number",
@@ -503,7 +530,7 @@ const FAULTS: [Fault; 64] = [
         from: "path.wall = hit.wall;",
         to: "path.wall = hit.wall;\n        if (u.x < 0.002) path.direction.y = uintBitsToFloat(0x7fc00000u);",
         kernels: &["trace_atomic"],
-        noticed_by: &[Finite],
+        noticed_by: &[(FiniteBox, NoNumber)],
     },
     Fault {
         what: "rays do not start one float further than their surface's error",
@@ -512,7 +539,7 @@ const FAULTS: [Fault; 64] = [
         to: "return start;",
         kernels: &["fly_whole", "shine", "fly_ballot", "view"],
         // The error alone is 16 times what the rounding of the start may take from it: no answer is wrong for it.
-        noticed_by: &[Bits("cornell")],
+        noticed_by: &[(Bits("cornell"), OtherBits)],
     },
     Fault {
         what: "rays meet what they leave, where its height is lost in rounding",
@@ -520,7 +547,7 @@ const FAULTS: [Fault; 64] = [
         from: "height * height > 0.0625 * error * error * dot(normal, normal) && ",
         to: "",
         kernels: &["fly_whole", "fly_ballot"],
-        noticed_by: &[PatchInPlane],
+        noticed_by: &[(PatchInPlane, PhotonsAdded)],
     },
     Fault {
         what: "of triangles equally near, the first that is tested is met",
@@ -529,7 +556,7 @@ const FAULTS: [Fault; 64] = [
         to: "t < hit.t",
         kernels: &["view"],
         // Which of them is met is no matter, as long as it is always the same.
-        noticed_by: &[SheetsInOnePlane],
+        noticed_by: &[(SheetsInOnePlane, OtherSums)],
     },
     Fault {
         what: "shadow rays end 0.5 % before their lamp",
@@ -537,7 +564,7 @@ const FAULTS: [Fault; 64] = [
         from: "arriving.target - start)",
         to: "0.995 * (arriving.target - start))",
         kernels: &["receive"],
-        noticed_by: &[LampInBox(Illumination::Split)],
+        noticed_by: &[(LampInBox(Illumination::Split), Leak)],
     },
     Fault {
         what: "what lies a sixteenth of the radius below belongs to an estimate",
@@ -545,7 +572,7 @@ const FAULTS: [Fault; 64] = [
         from: "return abs(height) <= radius * (1.0 / 1024.0);",
         to: "return abs(height) <= radius * (1.0 / 16.0);",
         kernels: &["lookup_u64", "lookup_two_words"],
-        noticed_by: &[Shelf],
+        noticed_by: &[(Shelf, Leak)],
     },
     Fault {
         what: "normals 78 degrees apart belong together",
@@ -553,7 +580,7 @@ const FAULTS: [Fault; 64] = [
         from: "MIN_NORMAL_COSINE = 0.75",
         to: "MIN_NORMAL_COSINE = 0.2",
         kernels: &["lookup_u64", "lookup_two_words", "weigh"],
-        noticed_by: &[Ridge],
+        noticed_by: &[(Ridge, TooDark)],
     },
     Fault {
         what: "a photon's weight knows no shading normal",
@@ -561,7 +588,7 @@ const FAULTS: [Fault; 64] = [
         from: SHADING_GAIN,
         to: "return 1.0;",
         kernels: &["lookup_u64", "lookup_two_words"],
-        noticed_by: &[LeaningPlane(Illumination::Photons)],
+        noticed_by: &[(LeaningPlane(Illumination::Photons), TooBright)],
     },
     Fault {
         what: "a scattered photon knows no shading normal",
@@ -569,7 +596,7 @@ const FAULTS: [Fault; 64] = [
         from: SHADING_GAIN,
         to: "return 1.0;",
         kernels: &["fly_whole", "fly_ballot"],
-        noticed_by: &[LeaningScatterer],
+        noticed_by: &[(LeaningScatterer, TooBright)],
     },
     Fault {
         what: "a spot falls off by its share, not by the square of it",
@@ -577,7 +604,7 @@ const FAULTS: [Fault; 64] = [
         from: "return share * share;",
         to: "return share;",
         kernels: &["receive"],
-        noticed_by: &[Spot],
+        noticed_by: &[(Spot, TooBright)],
     },
     Fault {
         what: "a mirrored texture is a texel off",
@@ -585,7 +612,10 @@ const FAULTS: [Fault; 64] = [
         from: "period - 1 - folded",
         to: "period - folded",
         kernels: &["view"],
-        noticed_by: &[Texture([Wrap::MirroredRepeat, Wrap::Repeat]), Texture([Wrap::Clamp, Wrap::MirroredRepeat])],
+        noticed_by: &[
+            (Texture([Wrap::MirroredRepeat, Wrap::Repeat]), WrongTexel),
+            (Texture([Wrap::Clamp, Wrap::MirroredRepeat]), WrongTexel),
+        ],
     },
     Fault {
         what: "a shading normal is kept where it is seen from below",
@@ -593,7 +623,7 @@ const FAULTS: [Fault; 64] = [
         from: "dot(smooth_normal, wo) > 0.0 ? smooth_normal : surface.ng",
         to: "smooth_normal",
         kernels: &["view"],
-        noticed_by: &[LeaningPlane(Illumination::Photons)],
+        noticed_by: &[(LeaningPlane(Illumination::Photons), TooDark)],
     },
     Fault {
         what: "large integers are cut instead of rounded",
@@ -601,7 +631,7 @@ const FAULTS: [Fault; 64] = [
         from: "float(floatBitsToUint(a))",
         to: "float(floatBitsToUint(a) & ~0xffu)",
         kernels: &["check_math"],
-        noticed_by: &[StrictMath],
+        noticed_by: &[(StrictMath, Misrounded)],
     },
     Fault {
         what: "directions within two cones are weighed as if only one could have chosen them",
@@ -609,7 +639,7 @@ const FAULTS: [Fault; 64] = [
         from: "k == chosen || versine_between(emission.direction, other.axis) <= other.versine",
         to: "k == chosen",
         kernels: &["fly_whole", "shine"],
-        noticed_by: &[AimedLight("overlapping cones")],
+        noticed_by: &[(AimedLight("overlapping cones"), TooBright)],
     },
     Fault {
         what: "places on two discs are weighed as if only one could have chosen them",
@@ -617,7 +647,7 @@ const FAULTS: [Fault; 64] = [
         from: "k == chosen || dot(off, off) <= radius * radius",
         to: "k == chosen",
         kernels: &["fly_whole", "shine"],
-        noticed_by: &[AimedLight("overlapping discs")],
+        noticed_by: &[(AimedLight("overlapping discs"), TooBright)],
     },
     Fault {
         what: "aimed photons forget the cosine of their lamp",
@@ -625,7 +655,7 @@ const FAULTS: [Fault; 64] = [
         from: "return max(cosine, 0.0) * 0.31830988618379067;",
         to: "return cosine > 0.0 ? 0.31830988618379067 : 0.0;",
         kernels: &["fly_whole", "shine"],
-        noticed_by: &[AimedLight("cosine disc"), AimedLight("two-sided triangles")],
+        noticed_by: &[(AimedLight("cosine disc"), TooBright), (AimedLight("two-sided triangles"), TooBright)],
     },
 ];
 
@@ -649,96 +679,50 @@ fn small() -> TransportSettings {
     }
 }
 
-fn lit(gpu: &Gpu, scene: &Scene, settings: &TransportSettings) -> Lit {
-    let geometry = Geometry::new(scene).unwrap();
-    let plan =
-        TransportPlan::new(scene, &geometry, settings, Sensor::Picture { width: 16, height: 16 }, &render::limits(gpu.facts())).unwrap();
-    let never = AtomicBool::new(false);
-    let view = View { geometry: &geometry, camera: scene.cameras.first(), phases: &[] };
-    transport::light(gpu, &view, plan, &mut Control { cancelled: &never, progress: &mut |_| {} }).unwrap()
+/// Photons of the CPU builder, by their number: of builders that are asked for, nothing else differs.
+fn expected_photons(settings: &Settings) -> Arc<Vec<Photon>> {
+    static KNOWN: LazyLock<Mutex<HashMap<u32, Arc<Vec<Photon>>>>> = LazyLock::new(Mutex::default);
+    let mut known = KNOWN.lock().unwrap();
+    known.entry(settings.photons).or_insert_with(|| Arc::new(photons_on_cpu(&Settings { chunk: None, ..settings.clone() }))).clone()
 }
 
-fn film(gpu: &Gpu, scene: &Scene, settings: &TransportSettings) -> RoundFilm {
-    lit(gpu, scene, settings).film
+/// Films of the CPU builder, by the number of nearest photons.
+fn expected_film(settings: &Settings) -> Arc<film::Film> {
+    static KNOWN: LazyLock<Mutex<HashMap<Option<u32>, Arc<film::Film>>>> = LazyLock::new(Mutex::default);
+    KNOWN.lock().unwrap().entry(settings.nearest).or_insert_with(|| Arc::new(run_on_cpu(settings).film)).clone()
 }
 
-fn same_film(found: &RoundFilm, expected: &RoundFilm) -> Check {
-    equal_sums("the film", &found.sums, &expected.sums)
-}
-
-fn cornell() -> Scene {
-    built_in::by_name("cornell").unwrap()
-}
-
-fn ask(gpu: &Gpu, question: Question) -> Check {
-    let never = AtomicBool::new(false);
+/// The checks of the other tests, on any device.
+fn ask(gpu: &Gpu, question: Question) -> Check<Complaint> {
+    let builds = |settings: Settings| photons_agree(gpu, &settings, &expected_photons(&settings));
+    let gathers = |settings: Settings| film_agrees(gpu, &settings, &expected_film(&settings));
     match question {
-        Photons(_) | InTurn => {
-            let settings = match question {
-                InTurn => Settings { variant: Variant::Atomic, counters: Some(8), ..strict() },
-                Photons(variant @ Variant::Persistent) => {
-                    Settings { variant, photons: MANY_PHOTONS, chunk: Some(MANY_PHOTONS), ..strict() }
-                }
-                Photons(variant) => Settings { variant, ..strict() },
-                _ => unreachable!(),
-            };
-            let (found, expected) = (in_order(photons(gpu, &settings)), in_order(photons_on_cpu(&settings)));
-            if found == expected { Ok(()) } else { Err(format!("{} photons, not the {} of the CPU builder", found.len(), expected.len())) }
+        Photons(variant @ Variant::Persistent) => {
+            builds(Settings { variant, photons: MANY_PHOTONS, chunk: Some(MANY_PHOTONS), ..strict() })
         }
-        Film(_) | Nearest => {
-            let settings = match question {
-                Film(gather) => Settings { gather, ..strict() },
-                _ => Settings { gather: Gather::KdTree, nearest: Some(20), ..strict() },
-            };
-            let mut control = Control { cancelled: &never, progress: &mut |_| {} };
-            let found = render::on_gpu(gpu, &open_box(&settings), &settings, &mut control).map_err(|error| error.to_string())?;
-            equal_sums("the film", &found.film.sums, &run_on_cpu(&settings).film.sums)
-        }
+        Photons(variant) => builds(Settings { variant, ..strict() }),
+        InTurn => builds(Settings { variant: Variant::Atomic, counters: Some(8), ..strict() }),
+        Film(gather) => gathers(Settings { gather, ..strict() }),
+        Nearest => gathers(Settings { gather: Gather::KdTree, nearest: Some(20), ..strict() }),
+        Pairs => pairs_count_on(gpu),
         Ledger(variant) => {
             let settings = Settings { variant, mesh: 1, ..strict() };
-            let mut control = Control { cancelled: &never, progress: &mut |_| {} };
-            render::on_gpu(gpu, &open_box(&settings), &settings, &mut control).map_or_else(|error| Err(error.to_string()), |_| Ok(()))
+            closed_fates(gpu, &open_box(&settings), &settings).map(|_| ())
         }
-        ClosedForm(name) => {
-            let case = selfcheck::cases().into_iter().find(|case| case.name == name).unwrap_or_else(|| panic!("there is no case {name}"));
-            let finding = Finding::new(name, case.expected, (case.measure)(Some(gpu)).map_err(|error| error.to_string())?);
-            if finding.passed { Ok(()) } else { Err(format!("{finding:?}")) }
-        }
-        Appends => {
-            let of = |append| film(gpu, &cornell(), &TransportSettings { append, ..small() });
-            same_film(&of(Append::Ballot), &of(Append::Atomic)).and_then(|()| same_film(&of(Append::Ballot), &of(Append::Persistent)))
-        }
+        ClosedForm(name) => closed_form_check(gpu, name),
+        Appends => appends_agree(gpu, &built_in::by_name("cornell").unwrap(), &small()),
         Builders => {
             let request =
                 compaction::Request { survivals: vec![0.75], bounces: 4, turns: 1, ..compaction::Request::up_to(1 << 12, FOREVER) };
-            compaction::measure(gpu, &request, &never, &mut |_| {}).map_or_else(|error| Err(error.to_string()), |_| Ok(()))
+            compaction::measure(gpu, &request, &AtomicBool::new(false), &mut |_| {}).map(|_| ()).map_err(|error| match error {
+                Error::Miscalculated { what, .. } => Complaint::new(BuildersDisagree, what),
+                error => error.into(),
+            })
         }
-        Crowds => {
-            let crowded = TransportSettings { photons: 20_000, radius: Some(1.0), rounds: 1, ..small() };
-            let of = |chunk| film(gpu, &cornell(), &TransportSettings { chunk, ..crowded.clone() });
-            same_film(&of(None), &of(Some(700)))
-        }
-        StrictMath => check::strict_math(gpu).map_err(|error| error.to_string()),
-        Finite => {
-            let scene = built_in::by_name("cornell-spheres").unwrap();
-            let (count, text) = [Illumination::Split, Illumination::Photons]
-                .map(|illumination| {
-                    let settings = TransportSettings { illumination, paranoid: true, rounds: 1, append: Append::Ballot, ..small() };
-                    lit(gpu, &scene, &settings).oddities.unwrap()
-                })
-                .into_iter()
-                .chain([render::on_gpu(
-                    gpu,
-                    &open_box(&strict()),
-                    &Settings { paranoid: true, ..strict() },
-                    &mut Control { cancelled: &never, progress: &mut |_| {} },
-                )
-                .unwrap()
-                .oddities
-                .unwrap()])
-                .fold((0, String::new()), |(count, _), oddities| (count + oddities.count, oddities.text()));
-            if count == 0 { Ok(()) } else { Err(text) }
-        }
+        Crowds => crowd_check(gpu),
+        StrictMath => rounding_check(gpu),
+        Finite => scene_is_finite(gpu, &TransportSettings { rounds: 1, append: Append::Ballot, ..small() }),
+        FiniteBox => box_is_finite(gpu, &strict()),
         Bits(name) => bits::check(gpu, name),
         LampInBox(illumination) => known::lamp_in_a_box(gpu, illumination),
         Shelf => known::shelf(gpu),
@@ -762,16 +746,18 @@ fn spoiled(fault: &Fault) -> Vec<(String, Vec<u32>)> {
 fn faults_are_noticed(subject: Subject) {
     let Some(healthy) = open(Options::default()) else { return };
     let mut asked: Vec<Question> = Vec::new();
-    for fault in FAULTS.iter().filter(|fault| fault.noticed_by[0].subject() == subject) {
+    for fault in FAULTS.iter().filter(|fault| fault.noticed_by[0].0.subject() == subject) {
         let faulty = open(Options { replaced: spoiled(fault), ..Options::default() }).unwrap();
-        for question in fault.noticed_by {
+        for (question, kind) in fault.noticed_by {
             let was_asked = asked.iter().any(|before| format!("{before:?}") == format!("{question:?}"));
             if !was_asked && !question.has_a_test_of_its_own() {
                 assert_holds(format!("{question:?} of a device without a fault"), ask(&healthy, *question));
                 asked.push(*question);
             }
-            assert_complains(&format!("{}, asked for {question:?}", fault.what), ask(&faulty, *question));
+            assert_complains_of(*kind, &format!("{}, asked for {question:?},", fault.what), ask(&faulty, *question));
         }
+        // A fault is wrong in what it computes, and not in its use of Vulkan.
+        assert_holds(fault.what, faulty.check_validation());
     }
 }
 
@@ -788,4 +774,58 @@ fn faults_of_scenes_are_noticed() {
 #[test]
 fn faults_of_aiming_are_noticed() {
     faults_are_noticed(Subject::Aiming);
+}
+
+/// Whoever says how many faults are planted has the number.
+fn count_check(texts: &[String], count: usize) -> Check {
+    for text in texts {
+        let words: Vec<&str> = text.split_whitespace().collect();
+        let counted = words.windows(3).filter(|three| three[0] == "plants" && three[2].starts_with("fault"));
+        if let Some(wrong) = counted.map(|three| three[1]).find(|number| *number != count.to_string()) {
+            return Err(format!("{wrong} faults are said to be planted, and {count} are"));
+        }
+    }
+    Ok(())
+}
+
+#[test]
+fn readme_and_guide_count_the_faults() {
+    let written = readme_and_guide();
+    assert_holds("README and the guide", count_check(&written, FAULTS.len()));
+    assert_complains("another number", count_check(&["It plants 64\nfaults in kernels".to_owned()], 65));
+}
+
+/// A run that ends with an error answers no question, and a complaint of another kind is not the one that was wanted.
+#[test]
+fn what_only_breaks_is_not_noticed() {
+    let is_noticed = |kind, check| noticed_as(kind, "a fault", check).is_ok();
+    let complaint = |kind| Err(Complaint::new(kind, "what was found"));
+    assert!(is_noticed(PhotonsLost, complaint(PhotonsLost)));
+    assert!(is_noticed(OtherPhotons, complaint(PhotonsLost)) && is_noticed(OtherSums, complaint(SumsTooLarge)));
+    for (wanted, found) in [(PhotonsLost, SumsTooSmall), (PhotonsLost, PhotonsAdded), (SumsTooLarge, OtherSums), (OtherSums, OtherPhotons)]
+    {
+        assert!(!is_noticed(wanted, complaint(found)), "{found:?} for {wanted:?}");
+    }
+    assert!(!is_noticed(PhotonsLost, Ok(())));
+    let lost = Error::Device { call: "vkQueueSubmit", reason: "device lost".into() };
+    assert_eq!(Complaint::from(lost).kind, Broken);
+    for kind in [Broken, LedgerOpen, PhotonsLost] {
+        assert!(!is_noticed(kind, complaint(Broken)), "{kind:?}");
+    }
+
+    // A run that leaves nothing is no sign either.
+    for check in [
+        same_sums("a film", &[0, 0], &[0, 7]),
+        same_photons(&[], &photons_on_cpu(&Settings { photons: 2, reflectance: 1.0, ..strict() })),
+        estimate_check("light", 0.0, 1.0, 0.1),
+    ] {
+        assert_eq!(check.unwrap_err().kind, Broken);
+    }
+
+    let Some(gpu) = open(Options::default()) else { return };
+    // More bounces than the persistent builder has: refused before anything is traced.
+    let settings = Settings { variant: Variant::Persistent, bounces: 321, ..strict() };
+    for check in [closed_fates(&gpu, &open_box(&settings), &settings).map(|_| ()), photons_agree(&gpu, &settings, &[])] {
+        assert_eq!(check.unwrap_err().kind, Broken);
+    }
 }

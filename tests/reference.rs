@@ -2,7 +2,7 @@
 //! against the exact shares of stored photons with the others.
 
 use crate::common::reference::{self, Emission, Model, add_power, power_table};
-use crate::common::{Check, assert_complains, assert_holds, device, run, run_on_cpu, share_check};
+use crate::common::{Check, assert_complains, assert_holds, device, pairs, run, run_on_cpu, share_check};
 use photonmill::film::{Film, estimate_walls};
 use photonmill::gpu::Gpu;
 use photonmill::ledger::Fates;
@@ -31,7 +31,7 @@ fn printed_powers(table: &[f64]) -> Vec<(f64, f64, f64)> {
 
 /// As printed: means to four digits after the point, extremes to three.
 fn assert_printed(table: &[f64], expected: WallPowers) {
-    for (wall, (found, expected)) in printed_powers(table).into_iter().zip(expected).enumerate() {
+    for (wall, (found, expected)) in pairs(printed_powers(table), expected).enumerate() {
         let close = |a: f64, b: f64, digits: i32| (a - b).abs() <= 0.51 * 10f64.powi(-digits);
         assert!(
             close(found.0, expected.0, 4) && close(found.1, expected.1, 3) && close(found.2, expected.2, 3),
@@ -133,7 +133,7 @@ fn same_power(film: &Film, expected: &[f64], counts: &[f64], tolerance: f64) -> 
         return Err(format!("{} points instead of {}", film.point_count(), expected.len()));
     }
     let mut flipped = 0;
-    for (texel, (&expected, &count)) in expected.iter().zip(counts).enumerate() {
+    for (texel, (&expected, &count)) in pairs(expected, counts).enumerate() {
         let difference = (film.power(texel) - expected).abs();
         // Every photon in reach may be off by the tolerance.
         let rounding = tolerance * count;
@@ -175,7 +175,7 @@ fn illumination_is_the_papers() {
     for (shininess, expected) in printed {
         let settings = Settings { shininess, ..Settings::default() };
         for (variant, outcome) in every_builder(gpu.as_deref(), &settings) {
-            for (estimate, expected) in estimate_walls(&outcome.film, &open_box(&settings), &outcome.plan).iter().zip(expected) {
+            for (estimate, expected) in pairs(estimate_walls(&outcome.film, &open_box(&settings), &outcome.plan), expected) {
                 let clamped: f64 = estimate.illumination.iter().map(|illumination| illumination.min(1.0)).sum();
                 let mean = clamped / estimate.illumination.len() as f64;
                 // Half a digit of the print, and a few flipped counts of 1/90 among 4096 texels.
@@ -215,7 +215,7 @@ fn rounds_agree() {
         add_power(&mut expected, &arrivals, 0.025);
         let unweighted: Vec<_> = arrivals.iter().map(|arrival| reference::Arrival { weight: 1.0, ..*arrival }).collect();
         add_power(&mut counts, &unweighted, 0.025);
-        per_bounce.iter_mut().zip(model.stored_per_bounce(&arrivals)).for_each(|(sum, stored)| *sum += stored);
+        pairs(&mut per_bounce, model.stored_per_bounce(&arrivals)).for_each(|(sum, stored)| *sum += stored);
     }
     for (variant, outcome) in every_builder(gpu.as_deref(), &settings) {
         assert_eq!(stored(&outcome.fates), per_bounce, "{variant:?}");

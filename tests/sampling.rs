@@ -5,7 +5,7 @@ use std::f64::consts::{PI, TAU};
 
 use crate::common::chi_square::{Grid, ONE, counts_check, density_check, even};
 use crate::common::densities::{AXIS, ULP, disc_check, frame, hemisphere_check, is_unit, lobe_check, sphere_check, triangle_check};
-use crate::common::{Check, assert_complains, assert_holds, device, z_check};
+use crate::common::{Check, assert_complains, assert_holds, device, pairs, z_check};
 use glam::{DMat3, DVec2, DVec3, UVec2, Vec3};
 use photonmill::gpu::{Gpu, check};
 use photonmill::records::{Samples, SamplingCase};
@@ -140,7 +140,7 @@ fn frames_are_orthonormal_and_packed_directions_near() {
     };
     for math in BOTH {
         let mut worst = [0.0f64; 3];
-        for (case, samples) in cases.iter().zip(ask(&gpu, math, Filter::Box, &cases)) {
+        for (case, samples) in pairs(&cases, ask(&gpu, math, Filter::Box, &cases)) {
             let found = [
                 frame_check(case.normal, samples.tangent, samples.bitangent),
                 angle_check(case.normal, samples.unpacked_normal, 7e-5),
@@ -270,7 +270,7 @@ fn solid_angles_are_right_for_every_triangle() {
     for math in BOTH {
         let samples = ask(&gpu, math, Filter::Box, &cases);
         let (mut worst, mut sampled) = (0.0f64, 0);
-        for (case, at) in cases.iter().zip(samples) {
+        for (case, at) in pairs(&cases, samples) {
             let exact = [case.a, case.b, case.c].map(|corner| corner.as_dvec3().normalize());
             let expected = solid_angle(exact);
             if at.solid_angle == 0.0 {
@@ -337,7 +337,7 @@ fn random_words_at_their_ends_give_directions() {
     let cases: Vec<SamplingCase> =
         edge_words().flat_map(|words| exponents.map(|exponent| SamplingCase { exponent, ..case(words) })).collect();
     for math in BOTH {
-        for (case, at) in cases.iter().zip(ask(&gpu, math, Filter::Box, &cases)) {
+        for (case, at) in pairs(&cases, ask(&gpu, math, Filter::Box, &cases)) {
             for (what, direction) in [("cosine", at.cosine_hemisphere), ("uniform", at.uniform_hemisphere), ("lobe", at.lobe)] {
                 assert_holds(format!("{math:?}, {case:?}"), is_unit(what, direction, 4.0 * ULP));
                 assert!(direction.z > 0.0, "{math:?}, {what} of {case:?}: {direction:?} lies in the surface");

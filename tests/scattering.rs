@@ -8,7 +8,7 @@ use crate::common::densities::{
     AXIS, ULP, angles, disc_check, frame, hemisphere_check, independence_check, is_unit, lobe, lobe_angles, on_sphere, polar, sphere_check,
     triangle_check,
 };
-use crate::common::{Check, assert_complains, assert_holds, device, share_check, z_check};
+use crate::common::{Check, assert_complains, assert_holds, device, pairs, share_check, z_check};
 use glam::{DMat3, DVec2, DVec3, Vec3};
 use photonmill::constants::EMISSION_BLOCKS;
 use photonmill::gpu::Gpu;
@@ -120,7 +120,7 @@ fn triangles_shine_by_the_cosine_from_all_of_their_area() {
         let to_weights = DMat3::from_cols(u, v, normal).inverse();
         let weights: Vec<DVec3> = traced.emitted.iter().map(|path| to_weights * (path.position.as_dvec3() - a)).collect();
         // On the side to which the photon flies, by no more than rounding asks for.
-        for (path, at) in traced.emitted.iter().zip(&weights) {
+        for (path, at) in pairs(&traced.emitted, &weights) {
             let height = at.z * path.direction.as_dvec3().dot(normal).signum();
             assert!(height > 0.0 && height < 1e-5, "{what}: {path:?} starts {height:e} above its side");
         }
@@ -142,12 +142,12 @@ fn triangles_shine_by_the_cosine_from_all_of_their_area() {
         }
         let cosine_squared = |path: &LightPath| path.direction.as_dvec3().dot(normal).powi(2);
         let joint: Vec<(f64, f64)> =
-            weights.iter().zip(&traced.emitted).map(|(at, path)| ((at.x + at.y).powi(2), cosine_squared(path))).collect();
+            pairs(&weights, &traced.emitted).map(|(at, path)| ((at.x + at.y).powi(2), cosine_squared(path))).collect();
         assert_holds("place and direction", independence_check(what, &joint));
         assert_complains("a number drawn twice", independence_check("fault", &joint.iter().map(|(x, _)| (*x, *x)).collect::<Vec<_>>()));
 
         let base = traced.geometry.emitters[0].flux.as_dvec3();
-        for (path, at) in traced.emitted.iter().zip(&weights) {
+        for (path, at) in pairs(&traced.emitted, &weights) {
             let uv = DVec2::new(at.x + at.y, at.y);
             let expected = if textured { base * texture.sample(uv).as_dvec3() } else { base };
             let off = (path.flux.as_dvec3() - expected).abs().max_element();

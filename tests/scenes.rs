@@ -4,6 +4,7 @@ use std::io::Write;
 use std::path::Path;
 use std::process::{Command, Output, Stdio};
 
+use crate::common::pairs;
 use base64::Engine;
 use base64::engine::general_purpose::STANDARD as BASE64;
 use serde_json::{Value, json};
@@ -304,7 +305,7 @@ fn an_exr_is_linear_and_a_png_obeys_its_exposure() {
         place.succeed(&[&["render", "cornell"], &TINY[..], &["-o", "a.png", "--exposure", stops]].concat());
         let png = image::open(place.0.path().join("a.png")).unwrap().into_rgb8().into_raw();
         let factor = stops.parse::<f32>().unwrap().exp2();
-        for (code, value) in png.iter().zip(&linear) {
+        for (code, value) in pairs(&png, &linear) {
             assert!((f32::from(*code) - srgb(value * factor)).abs() <= 0.51, "{stops} stops: {code} for {value}");
         }
     }
@@ -369,7 +370,7 @@ fn tables_and_json_tell_one_plan_with_a_row_an_effect() {
             let json: Value = serde_json::from_str(&json).unwrap();
             let rows = rows_of(&table);
             assert_eq!(rows.iter().map(|(name, _)| name.as_str()).collect::<Vec<_>>(), EFFECTS, "{table}");
-            for (row, (name, kept)) in json["effects"].as_array().unwrap().iter().zip(&rows) {
+            for (row, (name, kept)) in pairs(json["effects"].as_array().unwrap(), &rows) {
                 assert_eq!((&row["effect"], &row["kept"]), (&json!(name), &json!(kept)), "{table}");
                 let evidence = row["evidence"].as_str().unwrap();
                 let line = table.lines().find(|line| line.starts_with(&format!("{name} "))).unwrap();
@@ -452,7 +453,7 @@ fn punctual_lights_are_photometric_unless_told() {
     let lumens = place.exr(&direct);
     let watts = place.exr(&[&direct[..], &["--radiometric"]].concat());
     assert!(lumens.iter().any(|value| *value > 0.1));
-    for (watt, lumen) in watts.iter().zip(&lumens) {
+    for (watt, lumen) in pairs(&watts, &lumens) {
         assert!((watt - 683.0 * lumen).abs() <= 1e-4 * watt, "{watt} W, {lumen} lm");
     }
     // 1 W/sr from 1 m on a white wall, seen in the middle: 1 / pi.

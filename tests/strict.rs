@@ -5,16 +5,21 @@ use std::f32::consts::{FRAC_PI_2, PI};
 
 use crate::common::bits::{self, BITS, picture, small};
 use crate::common::{
-    Check, assert_complains, assert_holds, device, equal_sums, in_order, open, photons, photons_on_cpu, planted, run, run_on_cpu,
+    Check, Complaint, Kind, assert_complains, assert_complains_of, assert_holds, device, open, outcome_of, pairs, photons_on_cpu, planted,
+    run_on_cpu, same_photons, same_sums,
 };
 use glam::Vec2;
 use photonmill::cpu;
-use photonmill::gpu::{Options, check};
+use photonmill::error::Error;
+use photonmill::film::Film;
+use photonmill::gpu::{Gpu, Options, check};
 use photonmill::photon::Photon;
 use photonmill::records::MathResults;
+use photonmill::render;
 use photonmill::rng::Rng;
 use photonmill::rng::philox;
 use photonmill::scene::built_in;
+use photonmill::scene::open_box::open_box;
 use photonmill::settings::transport::TransportSettings;
 use photonmill::settings::{EmissionLaw, Math, Settings, Variant};
 
@@ -142,7 +147,7 @@ fn functions_are_right_to_the_bit() {
     let Some(gpu) = device() else { return };
     let operands = operands();
     let results = check::math(&gpu, &operands).unwrap();
-    for (operand, found) in operands.iter().zip(&results) {
+    for (operand, found) in pairs(&operands, &results) {
         assert_holds("strict", check_functions(*operand, found));
     }
     let (operand, found) = (Vec2::new(3.0, 7.0), check::math(&gpu, &[Vec2::new(3.0, 7.0)]).unwrap()[0]);
@@ -218,7 +223,7 @@ fn guesses_as_far_off_as_vulkan_allows_change_no_bit() {
         check::math(&gpu, &operands).unwrap()
     };
     let same = |found: &[MathResults]| {
-        let differing = operands.iter().zip(found.iter().zip(&expected)).find(|(_, (a, b))| {
+        let differing = pairs(&operands, pairs(found, &expected)).find(|(_, (a, b))| {
             bytemuck::cast_slice::<_, u32>(std::slice::from_ref(*a)) != bytemuck::cast_slice::<_, u32>(std::slice::from_ref(*b))
         });
         differing.map_or(Ok(()), |(operand, (a, b))| Err(format!("of {operand:?}: {a:?} instead of {b:?}")))
@@ -226,7 +231,7 @@ fn guesses_as_far_off_as_vulkan_allows_change_no_bit() {
     for (quotient, root) in [(-3, -7), (-2, -3), (-1, -1), (0, 7), (1, 1), (2, -7), (3, 3), (3, 7), (-3, 7)] {
         let found = results_of(quotient, root);
         assert_holds(format!("guesses {quotient} and {root} off"), same(&found));
-        for (operand, found) in operands.iter().zip(&found) {
+        for (operand, found) in pairs(&operands, &found) {
             assert_holds("strict", check_functions(*operand, found));
         }
     }
@@ -237,20 +242,29 @@ fn guesses_as_far_off_as_vulkan_allows_change_no_bit() {
 #[test]
 fn a_device_that_rounds_to_nearest_is_let_in() {
     let Some(gpu) = device() else { return };
-    check::strict_math(&gpu).unwrap();
+    assert_holds("quotients and roots", rounding_check(&gpu));
+}
+
+/// The check at the start of every strict run.
+pub fn rounding_check(gpu: &Gpu) -> Check<Complaint> {
+    check::strict_math(gpu).map_err(|error| match error {
+        Error::DeviceWrong { what, .. } => Complaint::new(Kind::Misrounded, what),
+        error => error.into(),
+    })
 }
 
 fn strict(settings: &Settings) -> Settings {
     Settings { math: Math::Strict, ..settings.clone() }
 }
 
-fn same_photons(found: Vec<Photon>, expected: Vec<Photon>) -> Check {
-    let (found, expected) = (in_order(found), in_order(expected));
-    if found.len() != expected.len() {
-        return Err(format!("{} photons instead of {}", found.len(), expected.len()));
-    }
-    let differing: Vec<_> = found.iter().zip(&expected).filter(|(a, b)| bytemuck::bytes_of(*a) != bytemuck::bytes_of(*b)).collect();
-    differing.first().map_or(Ok(()), |(a, b)| Err(format!("{} photons differ, the first {a:?} instead of {b:?}", differing.len())))
+/// A builder of the device stores the photons that are expected, bit for bit.
+pub fn photons_agree(gpu: &Gpu, settings: &Settings, expected: &[Photon]) -> Check<Complaint> {
+    same_photons(&render::photons_on_gpu(gpu, &open_box(settings), settings)?, expected)
+}
+
+/// A run on the device leaves the film that is expected, bit for bit.
+pub fn film_agrees(gpu: &Gpu, settings: &Settings, expected: &Film) -> Check<Complaint> {
+    same_sums("the film", &outcome_of(gpu, &open_box(settings), settings)?.film.sums, &expected.sums)
 }
 
 /// The paper's box: the device's photons and films are the CPU builder's, bit for bit.
@@ -263,16 +277,18 @@ fn the_cpu_builder_agrees_to_the_bit() {
         (EmissionLaw::Uniform, [None; 5], Rng::Sobol),
     ] {
         let settings = strict(&Settings { photons: 50_001, emission, shininess, rng, threads: 2, mesh: 32, ..Settings::default() });
-        let (found, expected) = (photons(&gpu, &settings), photons_on_cpu(&settings));
-        assert_holds(format!("{emission:?}"), same_photons(found.clone(), expected.clone()));
-        let mut spoiled = found;
+        let expected = photons_on_cpu(&settings);
+        assert_holds(format!("{emission:?}"), photons_agree(&gpu, &settings, &expected));
+        let mut spoiled = expected.clone();
         spoiled[100].position.x = f32::from_bits(spoiled[100].position.x.to_bits() + 1);
-        assert_complains("one bit of one photon", same_photons(spoiled, expected));
+        assert_complains_of(Kind::OtherPhotons, "one bit of one photon", photons_agree(&gpu, &settings, &spoiled));
+        spoiled.pop();
+        assert_complains_of(Kind::PhotonsAdded, "one photon more", photons_agree(&gpu, &settings, &spoiled));
 
         let on_cpu = run_on_cpu(&settings).film;
         for variant in Variant::ON_GPU {
-            let on_gpu = run(&gpu, &Settings { variant, ..settings.clone() }).film;
-            assert_holds(format!("{emission:?}, {variant:?}"), equal_sums("the film", &on_gpu.sums, &on_cpu.sums));
+            let settings = Settings { variant, ..settings.clone() };
+            assert_holds(format!("{emission:?}, {variant:?}"), film_agrees(&gpu, &settings, &on_cpu));
         }
     }
 }
@@ -280,7 +296,8 @@ fn the_cpu_builder_agrees_to_the_bit() {
 #[test]
 fn every_device_finds_these_bits() {
     let Some(gpu) = device() else { return };
-    let differing: Vec<String> = BITS.iter().filter_map(|(name, _)| bits::check(&gpu, name).err()).collect();
+    let differing: Vec<String> =
+        BITS.iter().filter_map(|(name, _)| bits::check(&gpu, name).err()).map(|complaint| complaint.text).collect();
     assert!(differing.is_empty(), "{} of {} differ:\n{}", differing.len(), BITS.len(), differing.join("\n"));
 }
 

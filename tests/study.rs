@@ -1,15 +1,17 @@
 //! `photonmill study`: points against a reference of another method, a page that loads nothing, and a study that goes on
 //! where it was cut off.
 
+use std::collections::BTreeMap;
 use std::path::Path;
 use std::sync::atomic::AtomicBool;
 use std::time::Duration;
 
-use crate::common::{device, lit};
+use crate::common::{Check, assert_complains, assert_holds, device, lit, pairs};
 use photonmill::compaction::Agreed;
 use photonmill::gpu::Gpu;
 use photonmill::output::destination::Folder;
 use photonmill::study::axes::Axis;
+use photonmill::study::point::Point;
 use photonmill::study::{self, Part, Request, Study};
 
 /// Bounded by rounds alone, so that a slow machine finds the same.
@@ -33,6 +35,70 @@ fn run(gpu: &Gpu, folder: &Path, request: Request) -> photonmill::error::Result<
     let study = study::run(gpu, &scene, request, &folder, &never, &mut |_| {})?;
     study::write(&folder, &study)?;
     Ok(study)
+}
+
+/// Points by what they are of: quantity, axis, rounds, curve and command.
+fn points_of(study: &Study) -> BTreeMap<(String, String, u32, String, String), &Point> {
+    let mut found = BTreeMap::new();
+    for part in &study.parts {
+        for comparison in &part.comparisons {
+            for (curve, point) in comparison.curves.iter().flat_map(|curve| curve.points.iter().map(move |point| (curve, point))) {
+                let axis = format!("{:?}", comparison.axis);
+                let before = found.insert((part.quantity.clone(), axis, point.rounds, curve.label.clone(), point.command.clone()), point);
+                assert_eq!(before, None, "two points of {}", point.command);
+            }
+        }
+    }
+    found
+}
+
+/// A study that was cut off and went on has the points of one that was not: those of rounds that were kept of a whole
+/// group with the times that they had, and all with the same errors, which no clock disturbs.
+fn resumed_check(resumed: &Study, whole: &Study, kept: &[(Axis, Point)]) -> Check {
+    let (found, expected) = (points_of(resumed), points_of(whole));
+    if let Some(key) = found.keys().find(|key| !expected.contains_key(*key)).or(expected.keys().find(|key| !found.contains_key(*key))) {
+        return Err(format!("{key:?} is in one study alone; {} points and {}", found.len(), expected.len()));
+    }
+    let is_kept = |axis: &str, command: &str| kept.iter().any(|(of, point)| format!("{of:?}") == axis && point.command == command);
+    for (key, point) in &found {
+        let (quantity, axis, rounds, ..) = key;
+        let of_group = |other: &&(String, String, u32, String, String)| (&other.0, &other.1, &other.2) == (quantity, axis, rounds);
+        let stands = expected.keys().filter(of_group).all(|(_, axis, _, _, command)| is_kept(axis, command));
+        // A number that is read from text may be a rounding off.
+        let same = |a: &[f64], b: &[f64], allowed: f64| a.len() == b.len() && pairs(a, b).all(|(a, b)| (a - b).abs() <= allowed * b.abs());
+        if stands && !same(&point.wall_ms, &expected[key].wall_ms, 1e-9) {
+            return Err(format!("{key:?} was measured again"));
+        }
+        // Floats are summed in another order each time.
+        let allowed = if axis == "Sums" { 1e-3 } else { 1e-9 };
+        if !same(&point.squared_errors, &expected[key].squared_errors, allowed) {
+            return Err(format!("{key:?} has other errors: {:?} instead of {:?}", point.squared_errors, expected[key].squared_errors));
+        }
+    }
+    Ok(())
+}
+
+/// Errors are those of this scene: no photons miss the reference by half, and their noise is no more than half of the
+/// light, or as many times that as the root of the photons in reach is smaller.
+fn error_check(label: &str, bias: f64, noise: f64) -> Check {
+    let times = match label {
+        "a sixteenth of the photons" | "radius 0.00625 m" => 4.0,
+        "a quarter of the photons" | "radius 0.0125 m" => 2.0,
+        _ => 1.0,
+    };
+    // More than half of the light is indirect.
+    let missed = if label == "without indirect" { 0.7 } else { 0.5 };
+    // Written so that NaN complains.
+    if bias < missed && noise < 0.5 * times { Ok(()) } else { Err(format!("a bias of {bias:.3} and a noise of {noise:.3}")) }
+}
+
+#[test]
+fn the_check_of_errors_complains() {
+    assert_holds("half", error_check("the base", 0.49, 0.49));
+    assert_complains("a bias of half", error_check("the base", 0.51, 0.1));
+    assert_complains("a noise of half", error_check("the base", 0.1, 0.51));
+    assert_complains("a noise of two", error_check("radius 0.00625 m", 0.1, 2.1));
+    assert_complains("no number", error_check("the base", f64::NAN, 0.1));
 }
 
 fn axes_of(study: &Study) -> Vec<Axis> {
@@ -67,10 +133,10 @@ fn the_open_box_is_studied_against_radiosity_and_goes_on_where_it_ended() {
         assert!(part.reference.contains("radiosity") && part.reference_error < 0.01, "{} {}", part.reference, part.reference_error);
         for curve in part.curves() {
             assert!(!curve.points.is_empty(), "{}: {}", part.quantity, curve.label);
-            // Errors are those of this scene: photons neither miss the reference by half nor hit it by chance.
             for point in &curve.points {
-                let error = point.error().value;
-                assert!(error > 1e-4 && error < 4.0, "{}: {}: {error}", part.quantity, curve.label);
+                let [bias, noise] = [point.bias().value, point.squared_noise.sqrt()];
+                assert_holds(format!("{}: {}", part.quantity, curve.label), error_check(&curve.label, bias, noise));
+                assert!(point.error().value > 1e-4, "{}: {}: no error by chance", part.quantity, curve.label);
                 assert_eq!(point.squared_errors.len(), 3);
             }
         }
@@ -108,14 +174,24 @@ fn the_open_box_is_studied_against_radiosity_and_goes_on_where_it_ended() {
     let whole = read("points.jsonl");
     let kept: Vec<&str> = whole.lines().take(1 + count / 2).collect();
     std::fs::write(folder.path().join("points.jsonl"), kept.join("\n") + "\n[\"builder\",{\"comm").unwrap();
-    let second = run(&gpu, folder.path(), request("open-box", 2)).unwrap();
+    let kept = kept.into_iter().skip(1).map(|line| serde_json::from_str(line).unwrap()).collect::<Vec<(Axis, Point)>>();
+    let mut second = run(&gpu, folder.path(), request("open-box", 2)).unwrap();
     assert!(second.complete);
-    let points = |study: &Study| study.parts[0].comparisons[0].curves.iter().flat_map(|curve| curve.points.clone()).collect::<Vec<_>>();
-    for (kept, measured) in points(&second).iter().zip(&points(&first)) {
-        // A number that is read from text may be a rounding off.
-        let same = kept.wall_ms.iter().zip(&measured.wall_ms).all(|(a, b)| (a - b).abs() < 1e-9 * b);
-        assert!(same && kept.command == measured.command, "measured again: {kept:?} {measured:?}");
-    }
+    assert_holds("the study that went on", resumed_check(&second, &first, &kept));
+    let spoiled = |second: &mut Study, spoil: &dyn Fn(&mut Vec<Point>)| {
+        let points = &mut second.parts[0].comparisons[0].curves[0].points;
+        let whole = points.clone();
+        spoil(points);
+        let check = resumed_check(second, &first, &kept);
+        second.parts[0].comparisons[0].curves[0].points = whole;
+        check
+    };
+    assert_complains("a point that was lost", spoiled(&mut second, &|points| points.truncate(points.len() - 1)));
+    assert_complains("all points of a curve lost", spoiled(&mut second, &Vec::clear));
+    assert_complains("a run that was lost", spoiled(&mut second, &|points| points[0].wall_ms.truncate(2)));
+    assert_complains("a point measured again", spoiled(&mut second, &|points| points[0].wall_ms[0] *= 1.001));
+    assert_complains("another error", spoiled(&mut second, &|points| points[0].squared_errors[0] *= 1.001));
+    assert_holds("the study that went on", resumed_check(&second, &first, &kept));
 
     // Another study does not mix with it.
     let error = run(&gpu, folder.path(), Request { photons: 4096, ..request("open-box", 2) }).unwrap_err().to_string();

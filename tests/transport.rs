@@ -2,7 +2,7 @@
 //! up, radiometry, leaks, and plans that the device's work is counted against.
 
 use crate::common::lit::{light, received, scene};
-use crate::common::{Check, assert_complains, assert_holds, device, device_with, known, z_check};
+use crate::common::{Check, Complaint, Kind, assert_complains, assert_holds, device, device_with, known, pairs, same_sums, z_check};
 use glam::{DVec3, Vec3};
 use photonmill::constants::GATHER_SLICE;
 use photonmill::gpu::{Gpu, Options};
@@ -32,7 +32,7 @@ fn camera_of(scene: &Scene) -> Camera {
     scene.cameras.first().cloned().unwrap_or_else(|| Camera::around(scene.bounds().0, scene.bounds().1))
 }
 
-fn picture(gpu: &Gpu, scene: &Scene, settings: &TransportSettings) -> Lit {
+pub fn picture(gpu: &Gpu, scene: &Scene, settings: &TransportSettings) -> Lit {
     let (geometry, plan) = plan_of(gpu, scene, settings, Sensor::Picture { width: SIZE, height: SIZE });
     light(gpu, &View { geometry: &geometry, camera: Some(&camera_of(scene)), phases: &[] }, plan)
 }
@@ -43,12 +43,17 @@ fn irradiance(gpu: &Gpu, scene: &Scene, settings: &TransportSettings, points: &[
     (0..points.len()).map(|point| (lit.film.mean(point, &lit.plan), lit.film.standard_error(point, &lit.plan))).collect()
 }
 
-fn same_film(what: &str, found: &Lit, expected: &Lit) -> Check {
-    if found.film == expected.film {
-        return Ok(());
-    }
-    let differing = found.film.sums.iter().zip(&expected.film.sums).filter(|(a, b)| a != b).count();
-    Err(format!("{what}: {differing} of {} sums differ", found.film.sums.len()))
+fn same_film(what: &str, found: &Lit, expected: &Lit) -> Check<Complaint> {
+    same_sums(what, &found.film.sums, &expected.film.sums)?;
+    if found.film == expected.film { Ok(()) } else { Err(Complaint::new(Kind::OtherSums, format!("{what}: squares of sums differ"))) }
+}
+
+/// Lists of survivors in any order give the same picture.
+pub fn appends_agree(gpu: &Gpu, scene: &Scene, settings: &TransportSettings) -> Check<Complaint> {
+    let of = |append| picture(gpu, scene, &TransportSettings { append, ..settings.clone() });
+    let ballot = of(Append::Ballot);
+    same_film("atomic append", &of(Append::Atomic), &ballot)?;
+    same_film("persistent photons", &of(Append::Persistent), &ballot)
 }
 
 #[test]
@@ -58,7 +63,6 @@ fn no_split_and_no_builder_changes_a_bit() {
     let usual = || TransportSettings { samples: 2, ..small() };
     let reference = picture(&gpu, &scene, &usual());
     let variants = [
-        ("atomic append", TransportSettings { append: Append::Atomic, ..usual() }),
         ("ballot append", TransportSettings { append: Append::Ballot, ..usual() }),
         ("chunks of 701", TransportSettings { chunk: Some(701), ..usual() }),
         ("work groups of 32", TransportSettings { group_size: 32, ..usual() }),
@@ -66,6 +70,7 @@ fn no_split_and_no_builder_changes_a_bit() {
     for (what, settings) in variants {
         assert_holds(what, same_film(what, &picture(&gpu, &scene, &settings), &reference));
     }
+    assert_holds("all builders", appends_agree(&gpu, &scene, &usual()));
     assert_holds("again", same_film("again", &picture(&gpu, &scene, &usual()), &reference));
     let other = picture(&gpu, &scene, &TransportSettings { seed: 2, ..usual() });
     assert_complains("another seed", same_film("another seed", &other, &reference));
@@ -75,18 +80,22 @@ fn no_split_and_no_builder_changes_a_bit() {
     assert_holds("two words", same_film("two words", &picture(&gpu, &scene, &usual()), &reference));
 }
 
-/// Points near which more photons lie than an invocation tests: others share them, as small chunks do.
 #[test]
 fn crowded_points_miss_no_photon() {
     let Some(gpu) = device() else { return };
+    assert_holds("crowded points", crowd_check(&gpu));
+}
+
+/// Points near which more photons lie than an invocation tests: others share them, as small chunks do.
+pub fn crowd_check(gpu: &Gpu) -> Check<Complaint> {
     let scene = scene("cornell");
     let crowded = TransportSettings { photons: 20_000, radius: Some(1.0), rounds: 1, ..small() };
     let few = TransportSettings { chunk: Some(700), ..crowded.clone() };
-    let [whole, parts] = [&crowded, &few].map(|settings| picture(&gpu, &scene, settings));
+    let [whole, parts] = [&crowded, &few].map(|settings| picture(gpu, &scene, settings));
     // Few enough photons in a chunk that no point has more candidates than one slice.
     let stored = whole.fates[0].ledger().stored;
     assert!(stored > 3 * u64::from(GATHER_SLICE) && 2 * stored * 700 / 20_000 < u64::from(GATHER_SLICE), "{stored} stored");
-    assert_holds("crowded points", same_film("crowded points", &whole, &parts));
+    same_film("crowded points", &whole, &parts)
 }
 
 /// Cameras and lookups take pixels in tiles, which no picture need be a multiple of.
@@ -338,7 +347,7 @@ fn a_furnace_is_equally_bright_everywhere() {
             let settings = TransportSettings { kernel, illumination, ..settings.clone() };
             let exact = std::f64::consts::PI / (1.0 - 0.5);
             let found = irradiance(&gpu, &scene("furnace"), &settings, &points);
-            for ((point, _), (mean, error)) in points.iter().zip(&found) {
+            for ((point, _), (mean, error)) in pairs(&points, &found) {
                 let what = format!("{kernel:?}, {illumination:?}, {point}");
                 assert!(error.x < 0.1 * exact, "{what}: error {error}");
                 assert_holds(&what, z_check("irradiance", mean.x, exact, error.x));
@@ -410,7 +419,7 @@ fn no_light_leaks_through_thin_walls() {
     let points: Vec<_> = std::iter::once(lit_side).chain(dark).collect();
     let found = irradiance(&gpu, &scene, &settings, &points);
     assert!(found[0].0.x > 0.1, "the lit side has {}", found[0].0);
-    for ((point, _), (mean, _)) in points.iter().zip(&found).skip(1) {
+    for ((point, _), (mean, _)) in pairs(&points, &found).skip(1) {
         // On the floor, the disc of the estimate reaches under the wall: surface that belongs to the lit room.
         if point.y > 0.0 || point.x > 0.6 {
             assert_eq!(*mean, DVec3::ZERO, "{point}");

@@ -156,7 +156,7 @@ fn cell(gpu: &Gpu, request: &Request, photons: u32, survival: f32) -> Result<Cel
     for variant in Variant::ON_GPU {
         let (ms, tallies) = run(gpu, &room, &of(variant), request.turns)?;
         let expected = fates.get_or_insert_with(|| tallies.clone());
-        agree(variant, photons, survival, *expected == tallies)?;
+        agree(gpu, variant, photons, survival, *expected == tallies)?;
         builders.push(Timed { variant, ms });
     }
     let stored: u64 = fates.iter().flatten().map(|tally| u64::from(tally.stored)).sum();
@@ -170,7 +170,7 @@ fn cell(gpu: &Gpu, request: &Request, photons: u32, survival: f32) -> Result<Cel
         let expected = in_order(Variant::Naive)?;
         for variant in Variant::ON_GPU {
             let found = in_order(variant)?;
-            agree(variant, photons, survival, bytemuck::cast_slice::<_, u8>(&found) == bytemuck::cast_slice::<_, u8>(&expected))?;
+            agree(gpu, variant, photons, survival, bytemuck::cast_slice::<_, u8>(&found) == bytemuck::cast_slice::<_, u8>(&expected))?;
         }
         agreed = Agreed::Photons;
     }
@@ -178,13 +178,12 @@ fn cell(gpu: &Gpu, request: &Request, photons: u32, survival: f32) -> Result<Cel
     Ok(Cell { survival, photons, stored, agreed, builders })
 }
 
-fn agree(variant: Variant, photons: u32, survival: f32, same: bool) -> Result<()> {
+fn agree(gpu: &Gpu, variant: Variant, photons: u32, survival: f32, same: bool) -> Result<()> {
     if same {
         return Ok(());
     }
-    let what =
-        format!("{} stored different photons from the builders before it, with {photons} photons at survival {survival}", variant.name());
-    Err(Error::Device { call: "the compaction study", reason: what })
+    let what = format!("the photon map of --variant {}, of {photons} photons at survival {survival},", variant.name());
+    Err(Error::Miscalculated { device: gpu.facts().name.clone(), what })
 }
 
 /// Milliseconds to trace and store all photons, on the device's clock where it has one, and their fates.

@@ -11,6 +11,7 @@ use photonmill::settings::transport::{Part, TransportSettings};
 
 use super::family::Family;
 use super::lit::{glass, grid, irradiances, lamp, level, matt, mirror, scene_of, shining};
+use super::{Check, Complaint};
 
 /// What [`scene`] knows.
 pub const KINDS: [&str; 11] = [
@@ -154,10 +155,10 @@ pub fn compare(gpu: &Gpu, kind: &str, [photons, aimed]: [u32; 2], family: &mut F
 }
 
 /// Whether aimed photons bring as much light, to some per cent.
-pub fn same_light(gpu: &Gpu, kind: &str) -> super::Check {
+pub fn same_light(gpu: &Gpu, kind: &str) -> Check<Complaint> {
     let mut family = Family::default();
     compare(gpu, kind, [16_000, 4_000], &mut family);
-    family.check()
+    family.complaint()
 }
 
 /// A light beyond everything, of which a millionth meets the ball, lights as a sun does that is as strong at the ball.

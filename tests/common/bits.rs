@@ -7,7 +7,7 @@ use photonmill::settings::{Math, Settings};
 use photonmill::transport::Lit;
 
 use super::lit::seen;
-use super::{Check, run};
+use super::{Check, Complaint, Kind, run};
 
 pub fn small() -> TransportSettings {
     TransportSettings {
@@ -75,8 +75,8 @@ fn bits_of(gpu: &Gpu, name: &str) -> u64 {
 }
 
 /// The complaint is the line to write down.
-pub fn check(gpu: &Gpu, name: &str) -> Check {
+pub fn check(gpu: &Gpu, name: &str) -> Check<Complaint> {
     let (_, expected) = BITS.iter().find(|(known, _)| *known == name).unwrap_or_else(|| panic!("no bits of {name} are written down"));
     let found = bits_of(gpu, name);
-    if found == *expected { Ok(()) } else { Err(format!("(\"{name}\", {found:#018x}),")) }
+    if found == *expected { Ok(()) } else { Err(Complaint::new(Kind::OtherBits, format!("(\"{name}\", {found:#018x}),"))) }
 }

@@ -1,8 +1,10 @@
 //! Many tests of one subject, judged together: the more there are, the further each may be off by chance.
 
+use std::cmp::Ordering;
+
 use statrs::distribution::{ChiSquared, ContinuousCDF, Normal, StudentsT};
 
-use super::Check;
+use super::{Check, Complaint, Kind};
 
 /// Chance that a whole family complains although every value in it is right. Seeds are fixed, so a family that
 /// passes once passes always on the same device.
@@ -80,15 +82,26 @@ impl Family {
 
     /// Complains about what is further off than chance allows.
     pub fn check(&self) -> Check {
+        self.complaint().map_err(|complaint| complaint.text)
+    }
+
+    /// The same, and in which way the first of them is off.
+    pub fn complaint(&self) -> Check<Complaint> {
         let least = self.least_p_value();
         for test in &self.tests {
             println!("{}", self.line(test));
             if !test.holds(test.expected, least) {
                 let (p_value, count) = (test.p_value(test.expected), self.tests.len());
-                return Err(format!("{}; p = {p_value:.1e}, of {count} tests none should be below {least:.1e}", self.line(test)));
+                let kind = match test.found.partial_cmp(&test.expected) {
+                    Some(Ordering::Less) => Kind::TooDark,
+                    Some(_) => Kind::TooBright,
+                    None => Kind::NoNumber,
+                };
+                let text = format!("{}; p = {p_value:.1e}, of {count} tests none should be below {least:.1e}", self.line(test));
+                return Err(Complaint::new(kind, text));
             }
         }
-        if self.tests.is_empty() { Err("nothing was tested".into()) } else { Ok(()) }
+        if self.tests.is_empty() { Err(Complaint::new(Kind::Broken, "nothing was tested")) } else { Ok(()) }
     }
 
     fn line(&self, test: &Test) -> String {

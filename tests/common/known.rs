@@ -13,17 +13,17 @@ use photonmill::settings::transport::{Effect, Illumination, Part, TransportSetti
 use photonmill::transport::Lit;
 
 use super::lit::{flights, glass, level, matt, mean_red, means, mirror, received, scene, scene_of, seen};
-use super::{Check, equal_sums, z_check};
+use super::{Check, Complaint, Kind, estimate_check, pairs, same_sums};
 
 /// The red channel of a point or pixel, sure to three parts in a hundred and right to its error.
-fn check_mean(what: &str, lit: &Lit, place: usize, expected: f64, tolerance: f64) -> Check {
+fn check_mean(what: &str, lit: &Lit, place: usize, expected: f64, tolerance: f64) -> Check<Complaint> {
     let [found, error] = [lit.film.mean(place, &lit.plan).x, lit.film.standard_error(place, &lit.plan).x];
     assert!(error < 0.03 * expected, "{what}: {found} +- {error}");
-    z_check(what, found, expected, error.max(tolerance * expected))
+    estimate_check(what, found, expected, error.max(tolerance * expected))
 }
 
 /// A lamp shut in by a flat box of a height of 2^-11: nothing lights the floor and the ceiling of the room around it.
-pub fn lamp_in_a_box(gpu: &Gpu, illumination: Illumination) -> Check {
+pub fn lamp_in_a_box(gpu: &Gpu, illumination: Illumination) -> Check<Complaint> {
     let mut room = scene("furnace");
     room.materials = vec![matt(0.7), Material { emission: Vec3::splat(10.0), ..matt(0.5) }];
     // Numbers without rounding, so that the sides share their corners to the bit.
@@ -44,13 +44,13 @@ pub fn lamp_in_a_box(gpu: &Gpu, illumination: Illumination) -> Check {
     let points = [(DVec3::new(0.5, 0.0, 0.5), DVec3::Y), (DVec3::new(0.5, 1.0, 0.5), DVec3::NEG_Y)];
     match mean_red(&received(gpu, &room, &settings, &points)) {
         0.0 => Ok(()),
-        leaked => Err(format!("{leaked} W/m2 leave the box")),
+        leaked => Err(Complaint::new(Kind::Leak, format!("{leaked} W/m2 leave the box"))),
     }
 }
 
 /// A second floor a hundredth of the radius above the first, facing as it does, seals it off: its photons are not the
 /// first one's.
-pub fn shelf(gpu: &Gpu) -> Check {
+pub fn shelf(gpu: &Gpu) -> Check<Complaint> {
     let mut room = scene("furnace");
     room.materials = vec![matt(0.7), Material { emission: Vec3::splat(10.0), ..matt(0.5) }];
     room.meshes.push(Mesh::parallelogram("shelf", DVec3::Y * 0.001, DVec3::Z, DVec3::X, 0));
@@ -59,12 +59,12 @@ pub fn shelf(gpu: &Gpu) -> Check {
     let points = [(DVec3::new(0.3, 0.001, 0.3), DVec3::Y), (DVec3::new(0.3, 0.0, 0.3), DVec3::Y)];
     let found = means(&received(gpu, &room, &settings, &points));
     assert!(found[0].x > 0.1, "the shelf has {}", found[0]);
-    if found[1] == DVec3::ZERO { Ok(()) } else { Err(format!("{} W/m2 below the shelf", found[1])) }
+    if found[1] == DVec3::ZERO { Ok(()) } else { Err(Complaint::new(Kind::Leak, format!("{} W/m2 below the shelf", found[1]))) }
 }
 
 /// The sun straight above a black roof, half of it level and half at 60 degrees: beside the ridge each half has the
 /// irradiance of its own slope, 1 and cos 60, from its own photons alone.
-pub fn ridge(gpu: &Gpu) -> Check {
+pub fn ridge(gpu: &Gpu) -> Check<Complaint> {
     let slope = DVec3::new(FRAC_PI_3.cos(), -FRAC_PI_3.sin(), 0.0);
     let (ridge, z) = (DVec3::NEG_Z, DVec3::Z * 2.0);
     let sun = LightKind::Directional { direction: DVec3::NEG_Y, irradiance: Vec3::ONE };
@@ -87,7 +87,7 @@ pub fn ridge(gpu: &Gpu) -> Check {
 
 /// A spot between its cones, straight onto a plane 1 m off: I s^2 cos^3 where s is how far the cosine is from the outer
 /// cone's to the inner's. Shadow rays to it have nothing random.
-pub fn spot(gpu: &Gpu) -> Check {
+pub fn spot(gpu: &Gpu) -> Check<Complaint> {
     let (inner_angle, outer_angle) = (0.3f32, 0.7f32);
     let spot = LightKind::Spot { position: DVec3::Y, direction: DVec3::NEG_Y, intensity: Vec3::splat(2.0), inner_angle, outer_angle };
     let floor = scene_of(vec![level(0.0, [4.0; 2], true, 0)], vec![matt(0.0)], vec![spot]);
@@ -97,11 +97,10 @@ pub fn spot(gpu: &Gpu) -> Check {
     let points = cosines.map(|cosine| (DVec3::X * (1.0 - cosine * cosine).sqrt() / cosine, DVec3::Y));
     let settings = TransportSettings { rounds: 1, part: Part::Direct, ..TransportSettings::default() };
     let found = means(&received(gpu, &floor, &settings, &points));
-    for ((share, cosine), found) in shares.iter().zip(cosines).zip(found) {
+    for ((share, cosine), found) in pairs(pairs(shares, cosines), found) {
         let exact = 2.0 * share * share * cosine.powi(3);
-        if (found.x - exact).abs() > 2e-5 {
-            return Err(format!("{share} of the way into the cone: {} instead of {exact}", found.x));
-        }
+        // Nothing is random; five of these are 2e-5.
+        estimate_check(&format!("{share} of the way into the cone"), found.x, exact, 4e-6)?;
     }
     Ok(())
 }
@@ -118,7 +117,7 @@ fn texel_at(wrap: Wrap, place: i32, size: i32) -> i32 {
 
 /// A lamp that wears a picture of 3 x 2 texels five times along each side, from -2 to 3: at the middle of every texel
 /// shines that texel.
-pub fn wrapped_texture(gpu: &Gpu, wrap: [Wrap; 2]) -> Check {
+pub fn wrapped_texture(gpu: &Gpu, wrap: [Wrap; 2]) -> Check<Complaint> {
     // Any two are 1 apart in some channel.
     let texels = vec![Vec3::ZERO, Vec3::X, Vec3::Y, Vec3::Z, Vec3::new(1.0, 1.0, 0.0), Vec3::ONE];
     let size = [3, 2];
@@ -139,8 +138,11 @@ pub fn wrapped_texture(gpu: &Gpu, wrap: [Wrap; 2]) -> Check {
             // Rows of pixels from the top, of texels from v = 0.
             let pixel = (49 - (5 * j + 2)) * 75 + 5 * i + 2;
             let found = found[pixel as usize];
-            if (found - expected).abs().max_element() > 0.2 {
-                return Err(format!("{wrap:?}, texel {i}, {j}: {found} instead of {expected}"));
+            let off = (found - expected).abs();
+            // Written so that NaN complains.
+            if !off.cmple(DVec3::splat(0.2)).all() {
+                let text = format!("{wrap:?}, texel {i}, {j}: {found} instead of {expected}");
+                return Err(Complaint::new(Kind::WrongTexel, text));
             }
         }
     }
@@ -154,7 +156,7 @@ fn leaning(angle: f64) -> Mesh {
 
 /// The sun straight above a plane whose shading normals lean by 40 degrees: rho E cos 40 / pi for an eye above them. An
 /// eye below them sees the plane as flat, rho E / pi.
-pub fn leaning_plane(gpu: &Gpu, illumination: Illumination) -> Check {
+pub fn leaning_plane(gpu: &Gpu, illumination: Illumination) -> Check<Complaint> {
     let lean = 40f64.to_radians();
     let sun = LightKind::Directional { direction: DVec3::NEG_Y, irradiance: Vec3::ONE };
     let plane = scene_of(vec![leaning(lean)], vec![matt(0.8)], vec![sun]);
@@ -180,7 +182,7 @@ pub fn leaning_plane(gpu: &Gpu, illumination: Illumination) -> Check {
 /// A narrow beam of W watts straight onto a plane whose shading normals lean by 40 degrees: it scatters
 /// W cos 40 rho cos / pi a steradian, whatever the shading normal says of where that goes (Veach 1997, section 5.3),
 /// onto a ceiling 1 m above, W cos 40 rho cos^4 / pi of irradiance.
-pub fn leaning_scatterer(gpu: &Gpu) -> Check {
+pub fn leaning_scatterer(gpu: &Gpu) -> Check<Complaint> {
     let lean = 40f64.to_radians();
     let angle = 3.5e-4f32;
     let beam = LightKind::Spot {
@@ -217,7 +219,7 @@ pub fn leaning_scatterer(gpu: &Gpu) -> Check {
 
 /// A white patch that lies in a white plane a hundred times its size, turned so that neither is in its plane to the
 /// last bit: what they scatter meets neither again.
-pub fn patch_in_a_plane(gpu: &Gpu) -> Check {
+pub fn patch_in_a_plane(gpu: &Gpu) -> Check<Complaint> {
     let turn = DQuat::from_axis_angle(DVec3::new(0.3, 0.5, -0.8).normalize(), 1.1);
     let mut meshes = vec![level(0.0, [4.0; 2], true, 0), level(0.0, [0.04; 2], true, 0)];
     meshes.iter_mut().flat_map(|mesh| &mut mesh.positions).for_each(|at| *at = turn * *at);
@@ -233,18 +235,19 @@ pub fn patch_in_a_plane(gpu: &Gpu) -> Check {
 }
 
 /// What a flat or convex surface scatters never meets it again: neither the triangle it left nor those beside it.
-pub fn none_returns(what: &str, lit: &Lit) -> Check {
+pub fn none_returns(what: &str, lit: &Lit) -> Check<Complaint> {
     let [first, second] = [lit.fates[0].bounces[0], lit.fates[0].bounces[1]];
     assert!(first.stored > 10_000, "{what}: only {} photons were scattered", first.stored);
     if second.stored + second.absorbed == 0 && second.escaped == first.stored {
         return Ok(());
     }
-    Err(format!("{what}: {} of {} scattered photons met the surface again", second.stored + second.absorbed, first.stored))
+    let text = format!("{what}: {} of {} scattered photons met the surface again", second.stored + second.absorbed, first.stored);
+    Err(Complaint::new(Kind::PhotonsAdded, text))
 }
 
 /// Sheets of other colours that lie in one plane without rounding, so that a ray is equally far from several: a tree
 /// takes the one that the list of all triangles does, though it meets them in another order.
-pub fn sheets_in_one_plane(gpu: &Gpu) -> Check {
+pub fn sheets_in_one_plane(gpu: &Gpu) -> Check<Complaint> {
     let sheets = 24;
     let sheet = |k: usize| {
         let size = (4 + 5 * k % 29) as f64 / 16.0;
@@ -267,12 +270,12 @@ pub fn sheets_in_one_plane(gpu: &Gpu) -> Check {
     };
     let (tree, list) = (of(&[Effect::Bvh], &[]), of(&[], &[Effect::Bvh]));
     assert!(tree.plan.keeps(Effect::Bvh) && !list.plan.keeps(Effect::Bvh));
-    equal_sums("tree and list", &tree.film.sums, &list.film.sums)
+    same_sums("tree and list", &tree.film.sums, &list.film.sums)
 }
 
 /// A block of glass and a mirror in a furnace are not to be seen: all directions are equally bright, whatever way a path
 /// takes, and however many paths a pixel has.
-pub fn glass_in_a_furnace(gpu: &Gpu, samples: u32, final_gather: bool) -> Check {
+pub fn glass_in_a_furnace(gpu: &Gpu, samples: u32, final_gather: bool) -> Check<Complaint> {
     let mut room = scene("furnace");
     room.materials.extend([glass(1.5), Material { two_sided: true, ..mirror(1.0) }]);
     let (corner, x, y, z) = (DVec3::new(0.1, 0.3, 0.1), DVec3::X * 0.25, DVec3::Y * 0.25, DVec3::Z * 0.25);
@@ -288,5 +291,5 @@ pub fn glass_in_a_furnace(gpu: &Gpu, samples: u32, final_gather: bool) -> Check 
     let error = errors.sqrt() / lit.film.pixels() as f64;
     println!("{samples} samples, gather {final_gather}: {} +- {error}, {expected} expected", mean_red(&lit));
     assert!(error < 0.005 * expected, "{error}");
-    z_check("a furnace with glass", mean_red(&lit), expected, error.max(0.003 * expected))
+    estimate_check("a furnace with glass", mean_red(&lit), expected, error.max(0.003 * expected))
 }

@@ -6,6 +6,7 @@
 
 pub mod aimed;
 pub mod bits;
+pub mod cases;
 pub mod chi_square;
 pub mod densities;
 pub mod family;
@@ -14,12 +15,16 @@ pub mod lit;
 pub mod planted;
 pub mod reference;
 
+use std::cmp::Ordering;
+use std::fmt::Display;
 use std::ops::Deref;
 use std::sync::Mutex;
 use std::sync::atomic::AtomicBool;
 
 use glam::UVec2;
+use photonmill::error::Error;
 use photonmill::gpu::{Commands, Gpu, Options};
+use photonmill::oddities::Oddities;
 use photonmill::photon::{Origin, Photon, StoredPhoton};
 use photonmill::plan::{Limits, Plan};
 use photonmill::render::{self, Control, Outcome};
@@ -100,10 +105,21 @@ pub fn run_scene(gpu: &Gpu, scene: &RoomScene, settings: &Settings) -> Outcome {
     sound(render::on_gpu(gpu, scene, settings, &mut control).unwrap_or_else(|error| panic!("{error}\n{settings:?}")))
 }
 
+/// What a run comes to, where it may fail: with `paranoid` no value may be infinite or no number.
+pub fn outcome_of(gpu: &Gpu, scene: &RoomScene, settings: &Settings) -> Result<Outcome, Complaint> {
+    let never = AtomicBool::new(false);
+    let outcome = render::on_gpu(gpu, scene, settings, &mut Control { cancelled: &never, progress: &mut |_| {} })?;
+    outcome.oddities.as_ref().map_or(Ok(()), nothing_odd)?;
+    Ok(outcome)
+}
+
+pub fn nothing_odd(oddities: &Oddities) -> Check<Complaint> {
+    if oddities.count == 0 { Ok(()) } else { Err(Complaint::new(Kind::NoNumber, oddities.text())) }
+}
+
 /// Whatever is run here has no value that is infinite or no number.
 fn sound(outcome: Outcome) -> Outcome {
-    let oddities = outcome.oddities.as_ref().expect("somebody looked");
-    assert_eq!(oddities.count, 0, "{}", oddities.text());
+    assert_holds("the run", nothing_odd(outcome.oddities.as_ref().expect("somebody looked")));
     outcome
 }
 
@@ -210,21 +226,124 @@ pub fn in_order(mut photons: Vec<Photon>) -> Vec<Photon> {
     photons
 }
 
-/// `Err` holds the complaint.
-pub type Check = Result<(), String>;
+/// `Err` holds the complaint: a sentence, or a [`Complaint`] where `tests/red.rs` asks for its kind.
+pub type Check<C = String> = Result<(), C>;
+
+/// What a check has found wrong. A planted fault must be noticed as what it is: what merely breaks a run would leave
+/// every check that needs the run without an answer, and is no sign that the check can fail.
+#[derive(Debug, Clone, Copy, PartialEq, Eq)]
+pub enum Kind {
+    /// Nothing could be checked: the run ended with an error, or left nothing at all. No fault is noticed by this.
+    Broken,
+    /// Photons had no fate, or two.
+    LedgerOpen,
+    /// Other photons are stored than are right: fewer, more, or as many.
+    OtherPhotons,
+    PhotonsLost,
+    PhotonsAdded,
+    /// Sums are others than are right: all of those too small, all too large, or some of each.
+    OtherSums,
+    SumsTooSmall,
+    SumsTooLarge,
+    /// A fingerprint of sums is not the one written down.
+    OtherBits,
+    /// An estimate lies below what is right by more than its error, or above.
+    TooDark,
+    TooBright,
+    /// Light is where none can be.
+    Leak,
+    /// A picture of a texture shows another texel.
+    WrongTexel,
+    /// A value is infinite or no number.
+    NoNumber,
+    /// Arithmetic is not rounded as IEEE 754 says.
+    Misrounded,
+    /// Builders under the clock stored different photons.
+    BuildersDisagree,
+}
+
+impl Kind {
+    /// Whether this is what was to be noticed, or a special case of it. What was not written holds whatever was there
+    /// before, so that of some faults no device says in which way photons or sums are others.
+    fn is(self, wanted: Kind) -> bool {
+        let general = match self {
+            Kind::PhotonsLost | Kind::PhotonsAdded => Kind::OtherPhotons,
+            Kind::SumsTooSmall | Kind::SumsTooLarge => Kind::OtherSums,
+            kind => kind,
+        };
+        self != Kind::Broken && (wanted == self || wanted == general)
+    }
+}
+
+/// What a check found wrong, and the sentence about it.
+#[derive(Debug, Clone, PartialEq)]
+pub struct Complaint {
+    pub kind: Kind,
+    pub text: String,
+}
+
+impl Complaint {
+    pub fn new(kind: Kind, text: impl Into<String>) -> Complaint {
+        Complaint { kind, text: text.into() }
+    }
+}
+
+impl Display for Complaint {
+    fn fmt(&self, f: &mut std::fmt::Formatter) -> std::fmt::Result {
+        write!(f, "{:?}: {}", self.kind, self.text)
+    }
+}
+
+/// The kind of an error of the program: most mean that nothing was checked.
+impl From<Error> for Complaint {
+    fn from(error: Error) -> Complaint {
+        let kind = match error {
+            Error::LedgerOpen { .. } => Kind::LedgerOpen,
+            _ => Kind::Broken,
+        };
+        Complaint::new(kind, error.to_string())
+    }
+}
 
 /// Fails unless `check` complains.
-pub fn assert_complains(what: &str, check: Check) {
+#[track_caller]
+pub fn assert_complains(what: &str, check: Result<(), impl Display>) {
     if check.is_ok() {
         panic!("the check did not complain about {what}");
     }
 }
 
+/// Whether `check` complains of just this.
+pub fn noticed_as(kind: Kind, what: &str, check: Check<Complaint>) -> Check {
+    match check {
+        Err(complaint) if complaint.kind.is(kind) => Ok(()),
+        Err(complaint) => Err(format!("{what} is to be noticed as {kind:?}, and the check complained of something else: {complaint}")),
+        Ok(()) => Err(format!("the check did not complain about {what}")),
+    }
+}
+
+/// Fails unless it does.
+#[track_caller]
+pub fn assert_complains_of(kind: Kind, what: &str, check: Check<Complaint>) {
+    if let Err(complaint) = noticed_as(kind, what, check) {
+        panic!("{complaint}");
+    }
+}
+
 /// Fails with the check's complaint and what it was about.
-pub fn assert_holds(what: impl std::fmt::Display, check: Check) {
+#[track_caller]
+pub fn assert_holds(what: impl Display, check: Result<(), impl Display>) {
     if let Err(complaint) = check {
         panic!("{what}: {complaint}");
     }
+}
+
+/// Pairs of two lists that must be equally long: `zip` alone would leave out what one of them has lost.
+#[track_caller]
+pub fn pairs<A, B>(a: impl IntoIterator<Item = A>, b: impl IntoIterator<Item = B>) -> impl Iterator<Item = (A, B)> {
+    let (a, b): (Vec<A>, Vec<B>) = (a.into_iter().collect(), b.into_iter().collect());
+    assert_eq!(a.len(), b.len(), "one list is longer than the other");
+    a.into_iter().zip(b)
 }
 
 /// Standard errors that a statistical test allows: a false alarm in 1.7 million checks, and with its
@@ -233,12 +352,20 @@ pub const Z_LIMIT: f64 = 5.0;
 
 /// A mean against its expected value.
 pub fn z_check(what: &str, measured: f64, expected: f64, standard_error: f64) -> Check {
+    estimate_check(what, measured, expected, standard_error).map_err(|complaint| complaint.text)
+}
+
+/// The same, and in which way it is off.
+pub fn estimate_check(what: &str, measured: f64, expected: f64, standard_error: f64) -> Check<Complaint> {
     let z = (measured - expected) / standard_error;
-    // Written so that NaN complains.
-    if z.abs() <= Z_LIMIT {
-        return Ok(());
-    }
-    Err(format!("{what}: {measured} where {expected} +- {standard_error:.3e} is right, z = {z:.2}"))
+    let kind = match z {
+        z if z.abs() > Z_LIMIT && measured == 0.0 => Kind::Broken,
+        z if z < -Z_LIMIT => Kind::TooDark,
+        z if z > Z_LIMIT => Kind::TooBright,
+        z if z.is_nan() => Kind::NoNumber,
+        _ => return Ok(()),
+    };
+    Err(Complaint::new(kind, format!("{what}: {measured} where {expected} +- {standard_error:.3e} is right, z = {z:.2}")))
 }
 
 /// `count` of `trials` against its probability, by the binomial standard error.
@@ -249,18 +376,42 @@ pub fn share_check(what: &str, count: u64, trials: u64, probability: f64) -> Che
 
 /// Two lists of integers, place by place.
 pub fn equal_sums(what: &str, found: &[u64], expected: &[u64]) -> Check {
+    same_sums(what, found, expected).map_err(|complaint| complaint.text)
+}
+
+/// The same, and in which way they are off.
+pub fn same_sums(what: &str, found: &[u64], expected: &[u64]) -> Check<Complaint> {
     if found.len() != expected.len() {
-        return Err(format!("{what}: {} sums instead of {}", found.len(), expected.len()));
+        return Err(Complaint::new(Kind::Broken, format!("{what}: {} sums instead of {}", found.len(), expected.len())));
     }
     let differing: Vec<usize> = (0..found.len()).filter(|&place| found[place] != expected[place]).collect();
-    match differing.first() {
-        None => Ok(()),
-        Some(&first) => Err(format!(
-            "{what}: {} of {} sums differ, the first at {first}: {} instead of {}",
-            differing.len(),
-            found.len(),
-            found[first],
-            expected[first]
-        )),
+    let Some(&first) = differing.first() else { return Ok(()) };
+    let larger = differing.iter().filter(|place| found[**place] > expected[**place]).count();
+    let kind = match larger {
+        0 if found.iter().all(|sum| *sum == 0) => Kind::Broken,
+        0 => Kind::SumsTooSmall,
+        all if all == differing.len() => Kind::SumsTooLarge,
+        _ => Kind::OtherSums,
+    };
+    let (count, of) = (differing.len(), found.len());
+    let text = format!("{what}: {count} of {of} sums differ, the first at {first}: {} instead of {}", found[first], expected[first]);
+    Err(Complaint::new(kind, text))
+}
+
+/// Two photon maps as sets, bit for bit.
+pub fn same_photons(found: &[Photon], expected: &[Photon]) -> Check<Complaint> {
+    let (found, expected) = (in_order(found.to_vec()), in_order(expected.to_vec()));
+    let kind = match found.len().cmp(&expected.len()) {
+        Ordering::Less if found.is_empty() => Kind::Broken,
+        Ordering::Less => Kind::PhotonsLost,
+        Ordering::Greater => Kind::PhotonsAdded,
+        Ordering::Equal => Kind::OtherPhotons,
+    };
+    if kind != Kind::OtherPhotons {
+        return Err(Complaint::new(kind, format!("{} photons instead of {}", found.len(), expected.len())));
     }
+    let differing: Vec<_> = found.iter().zip(&expected).filter(|(a, b)| bytemuck::bytes_of(*a) != bytemuck::bytes_of(*b)).collect();
+    differing
+        .first()
+        .map_or(Ok(()), |(a, b)| Err(Complaint::new(kind, format!("{} photons differ, the first {a:?} instead of {b:?}", differing.len()))))
 }
