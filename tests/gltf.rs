@@ -376,7 +376,7 @@ fn shared_vertices_are_read_once_for_each_use() {
 #[test]
 fn a_mark_of_the_byte_order_is_passed_over() {
     let text = square().to_string();
-    let scene = open("scene.gltf", &[b"\xef\xbb\xbf", text.as_bytes()].concat()).unwrap();
+    let scene = open("scene.gltf", &[b"\xef\xbb\xbf".as_slice(), text.as_bytes()].concat()).unwrap();
     assert_eq!(scene.triangle_count(), 2);
 }
 

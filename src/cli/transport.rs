@@ -2,8 +2,6 @@
 
 use std::path::PathBuf;
 use std::sync::atomic::AtomicBool;
-use std::sync::mpsc::{self, RecvTimeoutError};
-use std::time::{Duration, Instant};
 
 use clap::{Args, ValueEnum};
 
@@ -21,7 +19,7 @@ use crate::render::stop::mean_squared_radius;
 use crate::render::{self, Control, Progress};
 use crate::scene::geometry::Geometry;
 use crate::scene::light::{Light, LightKind};
-use crate::scene::{self, Camera, Scene};
+use crate::scene::{Camera, Scene};
 use crate::settings::Math;
 use crate::settings::transport::{Append, Effect, Filter, Illumination, Kernel, MAX_ROUNDS, Part, Stop, TransportSettings};
 use crate::transport::replay::PhotonName;
@@ -174,42 +172,10 @@ fn colour(text: &str) -> std::result::Result<[f32; 3], String> {
     if all.iter().all(|value| value.is_finite() && *value >= 0.0) { Ok(all) } else { Err("must be 0 or more".to_owned()) }
 }
 
-/// How often a line says what is being done while a scene is opened.
-const REPORT_INTERVAL: Duration = Duration::from_secs(1);
-
-/// Runs what opens a scene. Where it takes longer than a second, a line on stderr says every second what it is at.
-fn report_when_slow<T>(open: impl FnOnce(scene::Progress) -> T) -> T {
-    let (sender, receiver) = mpsc::channel::<(&'static str, f64)>();
-    std::thread::scope(|scope| {
-        scope.spawn(move || {
-            let mut stage = None;
-            let mut next = Instant::now() + REPORT_INTERVAL;
-            loop {
-                match receiver.recv_timeout(next.saturating_duration_since(Instant::now())) {
-                    Ok(reported) => stage = Some(reported),
-                    Err(RecvTimeoutError::Disconnected) => break,
-                    Err(RecvTimeoutError::Timeout) => {
-                        if let Some((stage, done)) = stage {
-                            let share = if done > 0.0 { format!(", {:.0} %", 100.0 * done) } else { String::new() };
-                            complain(&format!("{stage}{share}"));
-                        }
-                        next += REPORT_INTERVAL;
-                    }
-                }
-            }
-        });
-        // The thread ends when this closure is gone, which has the sender.
-        let mut report = move |stage: &'static str, done: f64| {
-            let _ = sender.send((stage, done));
-        };
-        open(&mut report)
-    })
-}
-
 impl SceneArgs {
     /// The scene, its warnings told.
     pub(super) fn open(&self) -> Result<Scene> {
-        let mut scene = report_when_slow(|progress| Scene::open_with(&self.scene, self.radiometric, progress))?;
+        let mut scene = Scene::open(&self.scene, self.radiometric)?;
         if let Some(radiance) = self.environment {
             scene.lights.push(Light { name: "--environment".into(), kind: LightKind::Environment { radiance: radiance.into() } });
         }
@@ -304,7 +270,7 @@ pub(super) fn plan(gpu: &Gpu, job: &Job, geometry: &Geometry) -> Result<Transpor
 
 /// Geometry of a scene without the effects that are left out.
 pub(super) fn geometry(scene: &Scene, settings: &TransportSettings) -> Result<Geometry> {
-    let geometry = report_when_slow(|progress| Geometry::new_with(&scene.without(&settings.without), progress))?;
+    let geometry = Geometry::new(&scene.without(&settings.without))?;
     if geometry.left_out > 0 {
         complain(&format!(
             "warning: {} triangle(s) have no area in single precision, or lie on others, and are left out",

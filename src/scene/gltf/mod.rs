@@ -384,7 +384,7 @@ impl Loader {
                 self.read_light(&light, &what, own)?;
             }
         }
-        for batch in parts.chunks(16 * rayon::current_num_threads()) {
+        for batch in parts.chunks((parts.len() / 100).max(16 * rayon::current_num_threads())) {
             progress("reading meshes", self.scene.meshes.len() as f64 / parts.len() as f64);
             let read: Vec<Result<Mesh>> = batch.par_iter().map(|part| self.read_primitive(part)).collect();
             for mesh in read {
@@ -519,6 +519,7 @@ impl Loader {
                 }
             }
         }
+        let indices = indices.unwrap_or_else(|| (0..positions.len() as u32).collect());
         let mut triangles = triangles_of(primitive.mode(), &indices);
         if matrices.as_ref().and_then(|matrices| matrices.first()).unwrap_or(to_world).determinant() < 0.0 {
             // A mirrored instance would show its back.
@@ -528,24 +529,24 @@ impl Loader {
         Ok(Mesh { name: name.clone(), positions, normals, uvs, triangles, material })
     }
 
-    /// Indices into those of the vertices that the primitive uses: of vertices that many primitives share, each takes
-    /// its own.
-    fn indices_and_vertices(&self, primitive: &gltf::Primitive, vertex_count: usize, what: &str) -> Result<(Vec<u32>, Vertices)> {
+    /// Indices into those of the vertices that the primitive uses, as many primitives may share one list of vertices;
+    /// `None`: all vertices, in their order.
+    fn indices_and_vertices(&self, primitive: &gltf::Primitive, vertex_count: usize, what: &str) -> Result<(Option<Vec<u32>>, Vertices)> {
         let Some(indices) = primitive.indices() else {
-            return Ok(((0..vertex_count as u32).collect(), Vertices::All));
+            return Ok((None, Vertices::All));
         };
         let indices = accessor::read_indices(self, &indices, what)?;
         if let Some(index) = indices.iter().find(|index| **index as usize >= vertex_count) {
             return Err(self.refuse(what, format!("uses vertex {index} of {vertex_count}")));
         }
         if indices.len() >= vertex_count {
-            return Ok((indices, Vertices::All));
+            return Ok((Some(indices), Vertices::All));
         }
         let mut used = indices.clone();
         used.sort_unstable();
         used.dedup();
         let place = |index: &u32| used.binary_search(index).expect("every index is there") as u32;
-        Ok((indices.iter().map(place).collect(), Vertices::Some(used)))
+        Ok((Some(indices.iter().map(place).collect()), Vertices::Some(used)))
     }
 
     /// Of each vertex, the mean of its joints' matrices by their weights; `None` where vertices follow no joints.
