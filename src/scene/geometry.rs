@@ -376,14 +376,14 @@ impl TextureSummary {
     }
 }
 
-/// Mean of a texture over a triangle, from no more samples than it has texels. It only steers choices; a hundredth of
-/// the whole texture's is in it, so that what falls between the samples keeps its chance.
+/// Mean of a texture over a triangle, from about as many samples as it has texels there, 64 at most. It only steers
+/// choices; a hundredth of the whole texture's is in it, so that what falls between the samples keeps its chance.
 fn mean_over(texture: &Texture, mean_of_all: DVec3, uvs: &TriangleUvs) -> DVec3 {
     const MOST_STEPS: f64 = 8.0;
     let [a, b, c] = [uvs.emission_a, uvs.emission_b, uvs.emission_c].map(Vec2::as_dvec2);
     let size = DVec2::new(f64::from(texture.width), f64::from(texture.height));
-    let texels_along = |edge: DVec2| (edge * size).length();
-    let steps = texels_along(b - a).max(texels_along(c - a)).max(texels_along(c - b)).ceil().clamp(1.0, MOST_STEPS) as u32;
+    let texels = 0.5 * ((b - a) * size).perp_dot((c - a) * size).abs();
+    let steps = texels.sqrt().ceil().clamp(1.0, MOST_STEPS) as u32;
     let mut sum = DVec3::ZERO;
     for i in 0..steps {
         for j in 0..steps {
