@@ -7,6 +7,7 @@ use base64::Engine;
 use base64::engine::general_purpose::STANDARD as BASE64;
 use glam::{DVec3, Vec3};
 use photonmill::error::Error;
+use photonmill::scene::geometry::Geometry;
 use photonmill::scene::light::LightKind;
 use photonmill::scene::{Scene, Surface};
 use serde_json::{Value, json};
@@ -161,11 +162,26 @@ fn what_is_left_out_is_named_once() {
     value["animations"] = json!([{"channels": [], "samplers": []}]);
     value["extensionsUsed"].as_array_mut().unwrap().push(json!("KHR_materials_clearcoat"));
     value["cameras"][0] = json!({"type": "orthographic", "orthographic": {"xmag": 1, "ymag": 1, "zfar": 9, "znear": 0.1}});
+    value["meshes"][0]["primitives"][0]["attributes"]["COLOR_0"] = json!(1);
     let scene = load(&value).unwrap();
     let [warning] = scene.warnings.as_slice() else { panic!("{:?}", scene.warnings) };
-    for word in ["transparency by alpha", "animations", "KHR_materials_clearcoat", "orthographic cameras"] {
-        assert_eq!(warning.matches(word).count(), 1, "{word}: {warning}");
+    let wanted = [
+        "transparency by alpha: material 'glow', material 'material 1'",
+        "animations",
+        "KHR_materials_clearcoat",
+        "orthographic cameras: camera 'eye'",
+        "vertex colours: mesh 'wall'",
+    ];
+    for words in wanted {
+        assert_eq!(warning.matches(words).count(), 1, "{words}: {warning}");
     }
+
+    // Of many names the first few.
+    let materials: Vec<Value> = (0..40).map(|k| json!({"name": format!("m{k:02}"), "alphaMode": "BLEND"})).collect();
+    let mut value = square();
+    value["materials"] = json!(materials);
+    let warnings = load(&value).unwrap().warnings.join(" ");
+    assert!(warnings.contains("material 'm00', ") && warnings.contains(" and 35 more") && !warnings.contains("m05"), "{warnings}");
 }
 
 /// At half a turn a picture is mirrored, at none all of its rays are one.
@@ -209,7 +225,8 @@ fn a_scene_without_light_is_read_and_flat_triangles_are_a_warning() {
     value["buffers"][0]["uri"] = json!(format!("data:application/octet-stream;base64,{}", BASE64.encode(&bytes)));
     let scene = load(&value).unwrap();
     assert_eq!(scene.triangle_count(), 1);
-    assert!(scene.warnings.iter().any(|warning| warning.contains("1 triangle(s) have no area")), "{:?}", scene.warnings);
+    let wanted = "1 triangle(s) have no area and are left out (mesh 'wall')";
+    assert!(scene.warnings.iter().any(|warning| warning.contains(wanted)), "{:?}", scene.warnings);
 }
 
 fn assert_refused(value: &Value, named: &[&str]) {
@@ -274,6 +291,172 @@ fn what_cannot_be_used_is_refused_with_file_and_object() {
     assert_refusal(open("a.gltf", b"{"), &["a.gltf"]);
     assert_refusal(Scene::open("absent.glb", false), &["absent.glb", "cannot be read"]);
     assert_refusal(Scene::open("cornel", false), &["SCENE cornel", "cornell-spheres"]);
+}
+
+/// Adds an accessor of numbers in a buffer of its own, and returns its number.
+fn add_accessor(value: &mut Value, bytes: &[u8], component: u32, count: usize, kind: &str) -> usize {
+    let add = |list: &mut Value, item: Value| {
+        let list = list.as_array_mut().unwrap();
+        list.push(item);
+        list.len() - 1
+    };
+    let uri = format!("data:application/octet-stream;base64,{}", BASE64.encode(bytes));
+    let buffer = add(&mut value["buffers"], json!({"byteLength": bytes.len(), "uri": uri}));
+    let view = add(&mut value["bufferViews"], json!({"buffer": buffer, "byteOffset": 0, "byteLength": bytes.len()}));
+    add(&mut value["accessors"], json!({"bufferView": view, "componentType": component, "count": count, "type": kind}))
+}
+
+/// The square as the skin of two joints, of which the second has the vertices 2 and 3. In the bind pose their matrices
+/// are none.
+fn skinned_square() -> Value {
+    let mut value = square();
+    let floats = |numbers: &[f32]| numbers.iter().flat_map(|number| number.to_le_bytes()).collect::<Vec<u8>>();
+    let moved = |by: f32| [1.0, 0.0, 0.0, 0.0, 0.0, 1.0, 0.0, 0.0, 0.0, 0.0, 1.0, 0.0, 0.0, 0.0, by, 1.0f32];
+    let matrices = add_accessor(&mut value, &floats(&[moved(-7.0), moved(-9.0)].concat()), 5126, 2, "MAT4");
+    let joints = add_accessor(&mut value, &[0, 0, 0, 0, 0, 0, 0, 0, 1, 0, 0, 0, 1, 0, 0, 0], 5121, 4, "VEC4");
+    let weights = add_accessor(&mut value, &floats(&[1.0, 0.0, 0.0, 0.0].repeat(4)), 5126, 4, "VEC4");
+    value["meshes"][0]["primitives"][0]["attributes"]["JOINTS_0"] = json!(joints);
+    value["meshes"][0]["primitives"][0]["attributes"]["WEIGHTS_0"] = json!(weights);
+    value["skins"] = json!([{"inverseBindMatrices": matrices, "joints": [5, 6]}]);
+    value["nodes"][0]["skin"] = json!(0);
+    value["nodes"]
+        .as_array_mut()
+        .unwrap()
+        .extend([json!({"name": "hip", "translation": [0, 0, 7], "children": [6]}), json!({"name": "knee", "translation": [0, 0, 2]})]);
+    value["scenes"][0]["nodes"].as_array_mut().unwrap().push(json!(5));
+    value
+}
+
+#[test]
+fn a_skinned_mesh_follows_its_joints_and_not_its_node() {
+    let bind = load(&skinned_square()).unwrap();
+    let corners = [DVec3::ZERO, DVec3::X, DVec3::new(1.0, 1.0, 0.0), DVec3::Y];
+    assert_eq!(bind.meshes[0].positions, corners);
+    assert_eq!((bind.meshes[0].normals[0], bind.meshes[0].area(0)), (DVec3::Z, 0.5));
+    assert!(bind.warnings.is_empty(), "{:?}", bind.warnings);
+
+    // A joint moved takes its vertices along; a joint below it is moved with it.
+    let mut posed = skinned_square();
+    posed["nodes"][6]["translation"] = json!([0, 3, 2]);
+    assert_eq!(
+        load(&posed).unwrap().meshes[0].positions,
+        [corners[0], corners[1], corners[2] + 3.0 * DVec3::Y, corners[3] + 3.0 * DVec3::Y]
+    );
+    posed["nodes"][5]["scale"] = json!([-1, 1, 1]);
+    let mirrored = load(&posed).unwrap();
+    assert_eq!((mirrored.meshes[0].positions[1], mirrored.meshes[0].normal(0)), (-DVec3::X, DVec3::Z));
+
+    for path in ["/nodes/0/skin", "/skins/0/joints/1", "/skins/0/inverseBindMatrices"] {
+        let mut value = skinned_square();
+        *value.pointer_mut(path).unwrap() = json!(99);
+        assert_refused(&value, &["scene.gltf"]);
+    }
+    let mut value = skinned_square();
+    value["skins"][0]["joints"] = json!([5]);
+    assert_refused(&value, &["mesh 'wall'", "joint 1 of 1"]);
+    let mut value = skinned_square();
+    value["scenes"][0]["nodes"].as_array_mut().unwrap().pop();
+    assert_refused(&value, &["skin 0", "node 'hip'", "not in the scene"]);
+}
+
+/// Primitives that share vertices each take those that they use.
+#[test]
+fn shared_vertices_are_read_once_for_each_use() {
+    let mut value = square();
+    let primitive = |indices: usize| json!({"attributes": {"POSITION": 0, "NORMAL": 1, "TEXCOORD_0": 2}, "indices": indices});
+    let second = add_accessor(&mut value, &[0, 2, 3], 5121, 3, "SCALAR");
+    value["accessors"][3]["count"] = json!(3);
+    value["meshes"][0]["primitives"] = json!([primitive(3), primitive(second)]);
+    let scene = load(&value).unwrap();
+    assert_eq!(scene.meshes.iter().map(|mesh| mesh.positions.len()).collect::<Vec<_>>(), [3, 3]);
+    assert_eq!(scene.meshes[1].corners(0), [DVec3::new(1.0, 2.0, 3.0), DVec3::new(3.0, 4.0, 3.0), DVec3::new(1.0, 4.0, 3.0)]);
+    assert_eq!((scene.meshes[1].uvs[0].len(), scene.meshes[1].normals.len()), (3, 3));
+}
+
+#[test]
+fn a_mark_of_the_byte_order_is_passed_over() {
+    let text = square().to_string();
+    let scene = open("scene.gltf", &[b"\xef\xbb\xbf".as_slice(), text.as_bytes()].concat()).unwrap();
+    assert_eq!(scene.triangle_count(), 2);
+}
+
+/// What the extension would say is missing without it: the complaint is about the extension, with what to do.
+#[test]
+fn extensions_that_are_needed_and_not_read_are_one_line() {
+    for (extension, remedy) in [
+        ("KHR_draco_mesh_compression", "untick Data > Compression"),
+        ("EXT_meshopt_compression", "gltfpack: without -c"),
+        ("KHR_mesh_quantization", "-noq"),
+        ("KHR_texture_basisu", "PNG or JPEG"),
+        ("EXT_unheard_of", "export it without"),
+    ] {
+        let mut value = square();
+        value["extensionsRequired"] = json!([extension]);
+        value["images"] = json!([{}]);
+        for accessor in value["accessors"].as_array_mut().unwrap() {
+            for member in ["bufferView", "min", "max"] {
+                accessor.as_object_mut().unwrap().remove(member);
+            }
+        }
+        assert_refused(&value, &["scene.gltf", extension, remedy]);
+        let line = load(&value).unwrap_err().to_string();
+        assert!(!line.contains("Missing") && line.len() < 300, "{line}");
+    }
+}
+
+/// A file may name what lies in its folder or below, and nothing else.
+#[test]
+fn files_outside_the_folder_are_not_opened() {
+    let folder = tempfile::tempdir().unwrap();
+    let inside = folder.path().join("inside");
+    std::fs::create_dir_all(inside.join("below")).unwrap();
+    for place in ["outside.bin", "inside/beside it.bin", "inside/below/it.bin"] {
+        std::fs::write(folder.path().join(place), square_buffer()).unwrap();
+    }
+    let path = inside.join("scene.gltf");
+    let open = |uri: &str| {
+        let mut value = square();
+        value["buffers"][0]["uri"] = json!(uri);
+        std::fs::write(&path, value.to_string()).unwrap();
+        Scene::open(path.to_str().unwrap(), false)
+    };
+    for uri in ["beside%20it.bin", "below/it.bin", "./below/../below/it.bin"] {
+        assert_eq!(open(uri).unwrap().triangle_count(), 2, "{uri}");
+    }
+    let absolute = folder.path().join("outside.bin").to_str().unwrap().to_owned();
+    for uri in [absolute.as_str(), "../outside.bin", "%2e%2e/outside.bin", "below/../../outside.bin", "../inside/below/it.bin"] {
+        assert_refusal(open(uri), &["buffer 0", uri, "outside the scene's folder"]);
+    }
+    assert_refusal(open(&format!("file://{absolute}")), &["buffer 0", "only files beside this one"]);
+    #[cfg(unix)]
+    {
+        std::os::unix::fs::symlink(folder.path(), inside.join("link")).unwrap();
+        assert_refusal(open("link/outside.bin"), &["buffer 0", "outside the scene's folder"]);
+    }
+}
+
+/// What is being done is reported, in order, with shares from 0 to 1.
+#[test]
+fn loading_reports_its_stages() {
+    let mut value = square();
+    let mut png = Vec::new();
+    image::RgbImage::new(2, 2).write_to(&mut std::io::Cursor::new(&mut png), image::ImageFormat::Png).unwrap();
+    value["images"] = json!([{"uri": format!("data:image/png;base64,{}", BASE64.encode(&png))}]);
+    value["textures"] = json!([{"source": 0}]);
+    value["materials"][0]["emissiveTexture"] = json!({"index": 0});
+    let file = file("scene.gltf", value.to_string().as_bytes());
+    let mut stages = Vec::new();
+    let mut report = |stage: &'static str, done: f64| {
+        assert!((0.0..=1.0).contains(&done), "{stage}: {done}");
+        if stages.last() != Some(&stage) {
+            stages.push(stage);
+        }
+    };
+    let scene = Scene::open_with(file.path.to_str().unwrap(), false, &mut report).unwrap();
+    Geometry::new_with(&scene, &mut report).unwrap();
+    let wanted = ["reading the file", "decoding textures", "reading meshes", "preparing triangles", "building the hierarchy"];
+    let mut left = stages.iter();
+    assert!(wanted.iter().all(|stage| left.any(|found| found == stage)), "{stages:?}");
 }
 
 /// Nodes within themselves, and deeper than any hierarchy.

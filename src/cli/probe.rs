@@ -115,6 +115,8 @@ fn read_points(path: &Path) -> Result<Vec<(DVec3, DVec3)>> {
     };
     read.map_err(|error| refuse(format!("cannot be read ({}); name a text file of points", error.kind())))?;
     let mut points = Vec::new();
+    // The mark that some editors write in front of a text.
+    let text = text.strip_prefix('\u{feff}').unwrap_or(&text);
     for (number, line) in text.lines().enumerate() {
         let line = line.trim();
         if line.is_empty() || line.starts_with('#') {
@@ -143,4 +145,16 @@ fn read_points(path: &Path) -> Result<Vec<(DVec3, DVec3)>> {
         return Err(refuse(format!("holds {} points, at most {MAX_POINTS}", points.len())));
     }
     Ok(points)
+}
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+
+    #[test]
+    fn points_may_follow_a_mark_of_the_byte_order() {
+        let file = tempfile::NamedTempFile::new().unwrap();
+        std::fs::write(file.path(), "\u{feff}1 2 3 0 0 2\n").unwrap();
+        assert_eq!(read_points(file.path()).unwrap(), [(DVec3::new(1.0, 2.0, 3.0), DVec3::Z)]);
+    }
 }

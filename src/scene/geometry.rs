@@ -5,15 +5,15 @@
 //! scene by a power of two changes no bit, and every coordinate lies within (-1, 1). Radiance and
 //! irradiance keep their units; a flux in W is divided by `unit`^2.
 
-use std::collections::HashSet;
 use std::f64::consts::{PI, TAU};
 
 use glam::{DVec2, DVec3, UVec2, Vec2, Vec3};
+use rayon::prelude::*;
 
 use super::bvh::Bvh;
 use super::light::LightKind;
 use super::texture::Wrap;
-use super::{Material, Mesh, Scene, Surface};
+use super::{Material, Mesh, Progress, Scene, Surface, Texture};
 use crate::constants::*;
 use crate::error::{Error, Result};
 use crate::records::{BvhNode, Emitter, SurfaceMaterial, TextureInfo, Triangle, TriangleNormals, TriangleUvs};
@@ -58,6 +58,11 @@ const CHOICES: u32 = 1 << 24;
 
 impl Geometry {
     pub fn new(scene: &Scene) -> Result<Geometry> {
+        Geometry::new_with(scene, &mut |_, _| {})
+    }
+
+    /// The same, with reports of how far it has come.
+    pub fn new_with(scene: &Scene, progress: Progress) -> Result<Geometry> {
         let refuse = |object: &str, reason: String| Error::Scene { path: (&scene.name).into(), object: object.into(), reason };
         let count = scene.triangle_count();
         if count == 0 {
@@ -81,21 +86,24 @@ impl Geometry {
             .enumerate()
             .flat_map(|(mesh, of)| (0..of.triangles.len() as u32).map(move |triangle| (mesh as u32, triangle)))
             .collect();
+        progress("preparing triangles", 0.0);
         let corners: Vec<[Vec3; 3]> =
-            sources.iter().map(|&(mesh, triangle)| scene.meshes[mesh as usize].corners(triangle as usize).map(local)).collect();
+            sources.par_iter().map(|&(mesh, triangle)| scene.meshes[mesh as usize].corners(triangle as usize).map(local)).collect();
         // What f32 makes a line of cannot be hit, and its normal would be no number; on a device that takes numbers
         // without a leading 1 for nothing, neither would that of a square below the least normal one.
         let is_solid = |[a, b, c]: &[Vec3; 3]| (*b - *a).cross(*c - *a).length_squared() >= f32::MIN_POSITIVE;
         // Of triangles that lie on one another, facing alike, only the first can be met; the others would shine, and
         // count as surface, where none is seen.
-        let mut seen = HashSet::with_capacity(corners.len());
-        let (sources, corners): (Vec<_>, Vec<_>) =
-            sources.into_iter().zip(corners).filter(|(_, corners)| is_solid(corners) && seen.insert(in_fixed_order(corners))).unzip();
+        let is_first = first_of_equals(&corners);
+        let kept = sources.into_iter().zip(corners).zip(is_first).filter(|((_, corners), is_first)| *is_first && is_solid(corners));
+        let (sources, corners): (Vec<_>, Vec<_>) = kept.map(|(triangle, _)| triangle).unzip();
         let left_out = count - corners.len();
         if corners.is_empty() {
             return Err(refuse("the scene", "holds no triangle with an area".into()));
         }
-        let Bvh { nodes, order } = Bvh::build(&corners)?;
+        progress("building the hierarchy", 0.0);
+        let Bvh { nodes, order } = Bvh::build(&corners);
+        progress("preparing triangles", 0.5);
         let sources: Vec<(u32, u32)> = order.iter().map(|&place| sources[place as usize]).collect();
         let triangles: Vec<Triangle> = order
             .iter()
@@ -105,14 +113,15 @@ impl Geometry {
                 Triangle { a, b, c, material: scene.meshes[mesh as usize].material as u32 }
             })
             .collect();
-        let normals = sources.iter().map(|&(mesh, triangle)| corner_normals(&scene.meshes[mesh as usize], triangle as usize)).collect();
+        let normals = sources.par_iter().map(|&(mesh, triangle)| corner_normals(&scene.meshes[mesh as usize], triangle as usize)).collect();
         let uvs = sources
-            .iter()
+            .par_iter()
             .map(|&(mesh, triangle)| {
                 let mesh = &scene.meshes[mesh as usize];
                 corner_uvs(mesh, &scene.materials[mesh.material], triangle as usize)
             })
             .collect();
+        progress("packing textures", 0.0);
         let (textures, texels) = pack_textures(scene);
 
         let mut geometry = Geometry {
@@ -134,6 +143,7 @@ impl Geometry {
             power: 0.0,
             left_out,
         };
+        progress("collecting lights", 0.0);
         geometry.add_emitters(scene)?;
         Ok(geometry)
     }
@@ -148,20 +158,22 @@ impl Geometry {
     }
 
     fn add_emitters(&mut self, scene: &Scene) -> Result<()> {
-        let mut found: Vec<Found> = Vec::new();
-        for (index, triangle) in self.triangles.iter().enumerate() {
+        let summaries = summaries_of_emission(scene);
+        let found_in = |(index, triangle): (usize, &Triangle)| {
             let material = &scene.materials[triangle.material as usize];
-            if material.is_emissive() {
-                let sides = if material.two_sided { 2.0 } else { 1.0 };
-                let flux = PI * sides * area(triangle) * material.emission.as_dvec3();
-                let (mean, brightest) = match material.emission_texture {
-                    Some(texture) => texture_over(&scene.textures[texture.texture], &self.uvs[index]),
-                    None => (DVec3::ONE, 1.0),
-                };
-                let emitter = Emitter { kind: EMITTER_TRIANGLE, triangle: index as u32, strength: material.emission, ..Emitter::default() };
-                found.push(Found { emitter, flux, weight: (flux * mean).element_sum(), brightest });
+            if !material.is_emissive() {
+                return None;
             }
-        }
+            let sides = if material.two_sided { 2.0 } else { 1.0 };
+            let flux = PI * sides * area(triangle) * material.emission.as_dvec3();
+            let (mean, brightest) = match material.emission_texture.and_then(|of| Some((of.texture, summaries[of.texture]?))) {
+                Some((texture, summary)) => (mean_over(&scene.textures[texture], summary.mean, &self.uvs[index]), summary.brightest),
+                None => (DVec3::ONE, 1.0),
+            };
+            let emitter = Emitter { kind: EMITTER_TRIANGLE, triangle: index as u32, strength: material.emission, ..Emitter::default() };
+            Some(Found { emitter, flux, weight: (flux * mean).element_sum(), brightest })
+        };
+        let mut found: Vec<Found> = self.triangles.par_iter().enumerate().filter_map(found_in).collect();
         let mut sky = Vec3::ZERO;
         for light in &scene.lights {
             if let LightKind::Environment { radiance } = light.kind {
@@ -271,6 +283,18 @@ impl Geometry {
     }
 }
 
+/// Which triangles lie on none that comes before them.
+fn first_of_equals(corners: &[[Vec3; 3]]) -> Vec<bool> {
+    let mut sorted: Vec<([[u32; 3]; 3], u32)> =
+        corners.par_iter().enumerate().map(|(place, corners)| (in_fixed_order(corners), place as u32)).collect();
+    sorted.par_sort_unstable();
+    let mut is_first = vec![true; corners.len()];
+    for pair in sorted.windows(2).filter(|pair| pair[0].0 == pair[1].0) {
+        is_first[pair[1].1 as usize] = false;
+    }
+    is_first
+}
+
 /// The bits of a triangle's corners, the same from whichever corner it is read.
 fn in_fixed_order(corners: &[Vec3; 3]) -> [[u32; 3]; 3] {
     // The sum turns -0 into 0.
@@ -318,22 +342,57 @@ fn area(triangle: &Triangle) -> f64 {
     0.5 * (b - a).cross(c - a).length()
 }
 
-/// Mean and largest value of a texture over a triangle. The mean only steers choices; a hundredth of the
-/// whole texture's is in it, so that what falls between the samples keeps its chance.
-fn texture_over(texture: &super::Texture, uvs: &TriangleUvs) -> (DVec3, f64) {
-    const STEPS: u32 = 8;
+/// A texture as a whole.
+#[derive(Clone, Copy)]
+struct TextureSummary {
+    mean: DVec3,
+    /// No sample is brighter.
+    brightest: f64,
+}
+
+/// Of each texture of what shines.
+fn summaries_of_emission(scene: &Scene) -> Vec<Option<TextureSummary>> {
+    let mut summaries = vec![None; scene.textures.len()];
+    for material in scene.materials.iter().filter(|material| material.is_emissive()) {
+        if let Some(of) = material.emission_texture {
+            summaries[of.texture].get_or_insert_with(|| TextureSummary::of(&scene.textures[of.texture]));
+        }
+    }
+    summaries
+}
+
+impl TextureSummary {
+    fn of(texture: &Texture) -> TextureSummary {
+        // Sums of pieces of one length do not depend on the number of threads.
+        let of_piece = |piece: &[Vec3]| {
+            let sum: DVec3 = piece.iter().map(|texel| texel.as_dvec3()).sum();
+            (sum, piece.iter().map(|texel| texel.max_element()).fold(0.0, f32::max))
+        };
+        let pieces: Vec<(DVec3, f32)> = texture.texels.par_chunks(1 << 16).map(of_piece).collect();
+        let sum: DVec3 = pieces.iter().map(|(sum, _)| *sum).sum();
+        let brightest = pieces.iter().map(|(_, brightest)| *brightest).fold(0.0, f32::max);
+        // The kernels sample half floats.
+        TextureSummary { mean: sum / texture.texels.len() as f64, brightest: half::f16::from_f32(brightest).to_f64() }
+    }
+}
+
+/// Mean of a texture over a triangle, from about as many samples as it has texels there, 64 at most. It only steers
+/// choices; a hundredth of the whole texture's is in it, so that what falls between the samples keeps its chance.
+fn mean_over(texture: &Texture, mean_of_all: DVec3, uvs: &TriangleUvs) -> DVec3 {
+    const MOST_STEPS: f64 = 8.0;
     let [a, b, c] = [uvs.emission_a, uvs.emission_b, uvs.emission_c].map(Vec2::as_dvec2);
+    let size = DVec2::new(f64::from(texture.width), f64::from(texture.height));
+    let texels = 0.5 * ((b - a) * size).perp_dot((c - a) * size).abs();
+    let steps = texels.sqrt().ceil().clamp(1.0, MOST_STEPS) as u32;
     let mut sum = DVec3::ZERO;
-    for i in 0..STEPS {
-        for j in 0..STEPS {
-            let root = ((f64::from(i) + 0.5) / f64::from(STEPS)).sqrt();
-            let (u, v) = (root * (1.0 - (f64::from(j) + 0.5) / f64::from(STEPS)), root * (f64::from(j) + 0.5) / f64::from(STEPS));
+    for i in 0..steps {
+        for j in 0..steps {
+            let root = ((f64::from(i) + 0.5) / f64::from(steps)).sqrt();
+            let (u, v) = (root * (1.0 - (f64::from(j) + 0.5) / f64::from(steps)), root * (f64::from(j) + 0.5) / f64::from(steps));
             sum += texture.sample(a + u * (b - a) + v * (c - a)).as_dvec3();
         }
     }
-    let whole: DVec3 = texture.texels.iter().map(|texel| texel.as_dvec3()).sum::<DVec3>() / texture.texels.len() as f64;
-    let brightest = texture.texels.iter().map(|texel| texel.max_element()).fold(0.0, f32::max);
-    (0.99 * sum / f64::from(STEPS * STEPS) + 0.01 * whole, f64::from(brightest))
+    0.99 * sum / f64::from(steps * steps) + 0.01 * mean_of_all
 }
 
 fn corner_normals(mesh: &Mesh, triangle: usize) -> TriangleNormals {
@@ -389,33 +448,32 @@ fn material_record(material: &Material) -> SurfaceMaterial {
 
 /// Textures that a material uses, as half floats.
 fn pack_textures(scene: &Scene) -> (Vec<TextureInfo>, Vec<UVec2>) {
+    let mut is_used = vec![false; scene.textures.len()];
+    for material in &scene.materials {
+        for of in [material.base_colour_texture, material.emission_texture].into_iter().flatten() {
+            is_used[of.texture] = true;
+        }
+    }
+    let half = |value: f32| u32::from(half::f16::from_f32(value).to_bits());
+    let pack = |texel: &Vec3| UVec2::new(half(texel.x) | half(texel.y) << 16, half(texel.z));
+    let code = |wrap: Wrap| match wrap {
+        Wrap::Repeat => 0,
+        Wrap::MirroredRepeat => 1,
+        Wrap::Clamp => 2,
+    };
     let mut texels = Vec::new();
-    let infos = scene
-        .textures
-        .iter()
-        .enumerate()
-        .map(|(index, texture)| {
-            let uses = |of: Option<super::material::TextureUse>| of.is_some_and(|of| of.texture == index);
-            let first_texel = texels.len() as u32;
-            if scene.materials.iter().any(|material| uses(material.base_colour_texture) || uses(material.emission_texture)) {
-                texels.extend(texture.texels.iter().map(|texel| {
-                    let half = |value: f32| u32::from(half::f16::from_f32(value).to_bits());
-                    UVec2::new(half(texel.x) | half(texel.y) << 16, half(texel.z))
-                }));
-            }
-            let code = |wrap: Wrap| match wrap {
-                Wrap::Repeat => 0,
-                Wrap::MirroredRepeat => 1,
-                Wrap::Clamp => 2,
-            };
-            TextureInfo {
-                width: texture.width,
-                height: texture.height,
-                first_texel,
-                wrap: code(texture.wrap[0]) | code(texture.wrap[1]) << 2,
-            }
-        })
-        .collect();
+    let mut infos = Vec::with_capacity(scene.textures.len());
+    for (texture, is_used) in scene.textures.iter().zip(is_used) {
+        infos.push(TextureInfo {
+            width: texture.width,
+            height: texture.height,
+            first_texel: texels.len() as u32,
+            wrap: code(texture.wrap[0]) | code(texture.wrap[1]) << 2,
+        });
+        if is_used {
+            texels.par_extend(texture.texels.par_iter().map(pack));
+        }
+    }
     (infos, texels)
 }
 
@@ -486,6 +544,51 @@ mod tests {
             assert_eq!(geometry.nodes, reference.nodes);
             assert_eq!(geometry.emitters, reference.emitters);
         }
+    }
+
+    /// A strip of so many triangles that shines by a texture.
+    fn textured_lamp(triangles: u32, texture: Texture) -> Scene {
+        let mut lamp = Mesh { name: "lamp".into(), ..Mesh::default() };
+        for k in 0..triangles {
+            let at = f64::from(k) / f64::from(triangles);
+            lamp.positions.extend([DVec3::X * at, DVec3::new(at, 1.0, 0.0), DVec3::new(at + 1.0 / f64::from(triangles), 1.0, 0.0)]);
+            lamp.uvs[0].extend([DVec2::new(at, 0.0), DVec2::new(at, 1.0), DVec2::new(at, 1.0)]);
+            lamp.triangles.push([3 * k, 3 * k + 1, 3 * k + 2]);
+        }
+        let mut material = Material::lambert("lamp", Vec3::ONE);
+        material.emission = Vec3::ONE;
+        material.emission_texture = Some(crate::scene::material::TextureUse { texture: 0, uv_set: 0 });
+        Scene { meshes: vec![lamp], materials: vec![material], textures: vec![texture], ..Scene::default() }
+    }
+
+    /// A texture is summed once and not for every triangle, which takes more than half a minute here.
+    #[test]
+    fn many_triangles_shine_by_a_large_texture() {
+        let texture =
+            Texture { name: "t".into(), width: 2048, height: 2048, texels: vec![Vec3::splat(0.25); 1 << 22], wrap: [Wrap::Repeat; 2] };
+        let scene = textured_lamp(6036, texture);
+        let began = std::time::Instant::now();
+        let geometry = Geometry::new(&scene).unwrap();
+        let seconds = began.elapsed().as_secs_f64();
+        assert_eq!(geometry.emitters.len(), 6036);
+        let watts = geometry.power * geometry.unit * geometry.unit;
+        assert!((watts / (3.0 * PI * 0.25 * 0.5) - 1.0).abs() < 1e-4, "{watts} W");
+        assert!(seconds < 5.0, "{seconds} s");
+    }
+
+    /// No sample of a texture, whose half floats may be rounded up, exceeds what photons' fluxes are scaled by.
+    #[test]
+    fn no_sample_is_brighter_than_the_brightest() {
+        let texels: Vec<Vec3> = (0..70_000u32).map(|k| Vec3::new(0.1, 0.2 + 0.7 * (k % 997) as f32 / 997.0, 0.3)).collect();
+        let texture = Texture { name: "t".into(), width: 700, height: 100, texels, wrap: [Wrap::Repeat; 2] };
+        let summary = TextureSummary::of(&texture);
+        let packed = |texel: &Vec3| half::f16::from_f32(texel.y).to_f64();
+        let brightest = texture.texels.iter().map(packed).fold(0.0, f64::max);
+        assert_eq!(summary.brightest, brightest);
+        let mean: DVec3 = texture.texels.iter().map(|texel| texel.as_dvec3()).sum::<DVec3>() / 70_000.0;
+        assert!((summary.mean - mean).abs().max_element() < 1e-12, "{} {mean}", summary.mean);
+        let geometry = Geometry::new(&textured_lamp(3, texture)).unwrap();
+        assert!(geometry.emitters.iter().all(|emitter| f64::from(emitter.flux.max_element()) * brightest <= 1.0 + 1e-6));
     }
 
     #[test]

@@ -16,6 +16,7 @@ pub mod room;
 pub mod targets;
 pub mod texture;
 
+use std::borrow::Cow;
 use std::path::Path;
 
 use glam::{DVec3, Vec3};
@@ -28,6 +29,9 @@ pub use texture::Texture;
 
 use crate::error::{Error, Result};
 use crate::settings::transport::Effect;
+
+/// Called with what is being done while a scene is opened, and the share of it that is done.
+pub type Progress<'a> = &'a mut dyn FnMut(&'static str, f64);
 
 /// Meshes in world space, metres, y up, with what they are made of and what lights them.
 #[derive(Debug, Clone, Default)]
@@ -47,18 +51,26 @@ impl Scene {
     /// A built-in scene by name, else a `.gltf` or `.glb` file. `radiometric`: punctual lights are
     /// given in W/sr and W/m2 instead of candela and lux.
     pub fn open(name: &str, radiometric: bool) -> Result<Scene> {
+        Scene::open_with(name, radiometric, &mut |_, _| {})
+    }
+
+    /// The same, with reports of how far it has come.
+    pub fn open_with(name: &str, radiometric: bool, progress: Progress) -> Result<Scene> {
         if let Some(scene) = built_in::by_name(name) {
             return Ok(scene);
         }
         let path = Path::new(name);
         match path.extension().and_then(|extension| extension.to_str()).map(str::to_lowercase).as_deref() {
-            Some("gltf" | "glb") => gltf::load(path, radiometric),
+            Some("gltf" | "glb") => gltf::load(path, radiometric, progress),
             _ => Err(Error::setting("SCENE", name, format!("must be a .gltf or .glb file, or one of {}", built_in::names().join(", ")))),
         }
     }
 
     /// The scene without what some effects would need.
-    pub fn without(&self, effects: &[Effect]) -> Scene {
+    pub fn without(&self, effects: &[Effect]) -> Cow<'_, Scene> {
+        if effects.is_empty() {
+            return Cow::Borrowed(self);
+        }
         let lacks = |effect: Effect| effects.contains(&effect);
         let mut scene = self.clone();
         scene.lights.retain(|light| !match light.kind {
@@ -83,7 +95,7 @@ impl Scene {
                 material.emission_texture = None;
             }
         }
-        scene
+        Cow::Owned(scene)
     }
 
     pub fn triangle_count(&self) -> usize {

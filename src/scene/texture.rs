@@ -23,6 +23,9 @@ pub struct Texture {
 impl Wrap {
     fn index(self, place: i64, size: u32) -> usize {
         let size = i64::from(size);
+        if (0..size).contains(&place) {
+            return place as usize;
+        }
         let index = match self {
             Wrap::Repeat => place.rem_euclid(size),
             Wrap::Clamp => place.clamp(0, size - 1),

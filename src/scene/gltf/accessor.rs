@@ -1,38 +1,62 @@
 //! Numbers out of glTF buffers, with every offset checked: a file from anywhere may say anything.
 
+use std::collections::HashMap;
+
 use gltf::accessor::{DataType, Dimensions};
 use gltf::{Accessor, buffer};
+use rayon::prelude::*;
 
 use super::Loader;
 use crate::error::Result;
 
-/// Bytes of one element of an accessor, and where they lie.
+/// Elements that are not worth sharing among threads.
+const MIN_PIECE: usize = 4096;
+
+/// Elements of `size` bytes, every `stride` bytes.
 struct Elements<'a> {
     bytes: &'a [u8],
     stride: usize,
     size: usize,
+    count: usize,
+    /// What a sparse accessor puts in the place of some.
+    replaced: HashMap<usize, &'a [u8]>,
 }
 
 impl<'a> Elements<'a> {
     fn element(&self, index: usize) -> &'a [u8] {
+        if !self.replaced.is_empty()
+            && let Some(element) = self.replaced.get(&index)
+        {
+            return *element;
+        }
         &self.bytes[index * self.stride..index * self.stride + self.size]
     }
 }
 
-/// `N` numbers an element. Integers are scaled to [0, 1] or [-1, 1] where the accessor says so.
-pub(super) fn read<const N: usize>(loader: &Loader, accessor: &Accessor, what: &str) -> Result<Vec<[f32; N]>> {
+/// `N` numbers of every element, or of those that `vertices` numbers, as `make` makes something of them. Integers are
+/// scaled to [0, 1] or [-1, 1] where the accessor says so.
+pub(super) fn read<const N: usize, T: Send>(
+    loader: &Loader,
+    accessor: &Accessor,
+    vertices: &Vertices,
+    what: &str,
+    make: impl Fn([f32; N]) -> T + Sync,
+) -> Result<Vec<T>> {
     let size = number_bytes(accessor.data_type());
-    elements(loader, accessor, components(N), what)?
-        .into_iter()
-        .map(|element| {
-            let numbers: [f32; N] =
-                std::array::from_fn(|k| number(&element[k * size..(k + 1) * size], accessor.data_type(), accessor.normalized()));
-            match numbers.iter().find(|number| !number.is_finite()) {
-                Some(number) => Err(loader.refuse(what, format!("holds {number}; every number must be finite"))),
-                None => Ok(numbers),
-            }
-        })
-        .collect()
+    let elements = elements(loader, accessor, components(N), what)?;
+    let made = |index: usize| {
+        let element = elements.element(index);
+        let numbers: [f32; N] =
+            std::array::from_fn(|k| number(&element[k * size..(k + 1) * size], accessor.data_type(), accessor.normalized()));
+        match numbers.iter().find(|number| !number.is_finite()) {
+            Some(number) => Err(loader.refuse(what, format!("holds {number}; every number must be finite"))),
+            None => Ok(make(numbers)),
+        }
+    };
+    match vertices {
+        Vertices::All => (0..elements.count).into_par_iter().with_min_len(MIN_PIECE).map(made).collect(),
+        Vertices::Some(numbers) => numbers.par_iter().with_min_len(MIN_PIECE).map(|index| made(*index as usize)).collect(),
+    }
 }
 
 /// Indices of vertices.
@@ -41,7 +65,22 @@ pub(super) fn read_indices(loader: &Loader, accessor: &Accessor, what: &str) -> 
         return Err(loader.refuse(what, "has indices that are no unsigned integers"));
     }
     let elements = elements(loader, accessor, Dimensions::Scalar, what)?;
-    Ok(elements.into_iter().map(integer).collect())
+    Ok((0..elements.count).into_par_iter().with_min_len(MIN_PIECE).map(|index| integer(elements.element(index))).collect())
+}
+
+/// Four unsigned integers an element: the joints of a skinned vertex.
+pub(super) fn read_joints(loader: &Loader, accessor: &Accessor, vertices: &Vertices, what: &str) -> Result<Vec<[u16; 4]>> {
+    if !matches!(accessor.data_type(), DataType::U8 | DataType::U16) {
+        return Err(loader.refuse(what, "has joints that are no unsigned integers of 8 or 16 bits"));
+    }
+    read(loader, accessor, vertices, what, |numbers: [f32; 4]| numbers.map(|number| number as u16))
+}
+
+/// Which of its vertices a primitive uses, as several may share them.
+pub(super) enum Vertices {
+    All,
+    /// In rising order.
+    Some(Vec<u32>),
 }
 
 fn components(count: usize) -> Dimensions {
@@ -49,7 +88,8 @@ fn components(count: usize) -> Dimensions {
         1 => Dimensions::Scalar,
         2 => Dimensions::Vec2,
         3 => Dimensions::Vec3,
-        _ => Dimensions::Vec4,
+        4 => Dimensions::Vec4,
+        _ => Dimensions::Mat4,
     }
 }
 
@@ -79,19 +119,16 @@ fn number(bytes: &[u8], kind: DataType, normalized: bool) -> f32 {
 }
 
 /// The bytes of every element, sparse replacements made.
-fn elements<'a>(loader: &'a Loader, accessor: &Accessor, dimensions: Dimensions, what: &str) -> Result<Vec<&'a [u8]>> {
+fn elements<'a>(loader: &'a Loader, accessor: &Accessor, dimensions: Dimensions, what: &str) -> Result<Elements<'a>> {
     if accessor.dimensions() != dimensions {
         return Err(loader.refuse(what, format!("is of type {:?} where {dimensions:?} is wanted", accessor.dimensions())));
     }
     let size = number_bytes(accessor.data_type()) * dimensions.multiplicity();
     let count = accessor.count();
-    let mut elements: Vec<&[u8]> = match accessor.view() {
-        Some(view) => {
-            let dense = slice(loader, &view, accessor.offset(), count, size, what)?;
-            (0..count).map(|index| dense.element(index)).collect()
-        }
+    let mut elements = match accessor.view() {
+        Some(view) => slice(loader, &view, accessor.offset(), count, size, what)?,
         // Without a view the accessor holds zeros; a count that no file backs must not fill memory.
-        None if count <= loader.file_bytes => vec![&[0u8; 16][..size]; count],
+        None if count <= loader.file_bytes => Elements { bytes: &[0u8; 64], stride: 0, size, count, replaced: HashMap::new() },
         None => return Err(loader.refuse(what, format!("claims {count} elements that the file does not hold"))),
     };
     if let Some(sparse) = accessor.sparse() {
@@ -105,10 +142,10 @@ fn elements<'a>(loader: &'a Loader, accessor: &Accessor, dimensions: Dimensions,
         let by = slice(loader, &values.view(), values.offset(), sparse.count(), size, what)?;
         for k in 0..sparse.count() {
             let index = integer(replaced.element(k)) as usize;
-            let Some(element) = elements.get_mut(index) else {
+            if index >= count {
                 return Err(loader.refuse(what, format!("replaces element {index} of {count}")));
-            };
-            *element = by.element(k);
+            }
+            elements.replaced.insert(index, by.element(k));
         }
     }
     Ok(elements)
@@ -123,7 +160,7 @@ fn slice<'a>(loader: &'a Loader, view: &buffer::View, offset: usize, count: usiz
         _ => (count - 1).checked_mul(stride).and_then(|last| last.checked_add(size)).and_then(|length| length.checked_add(offset)),
     };
     match end.and_then(|end| bytes.get(offset..end)) {
-        Some(bytes) if stride >= size => Ok(Elements { bytes, stride, size }),
+        Some(bytes) if stride >= size => Ok(Elements { bytes, stride, size, count, replaced: HashMap::new() }),
         Some(_) => Err(loader.refuse(what, format!("has elements of {size} bytes every {stride} bytes"))),
         None => Err(loader.refuse(what, format!("runs past the {} bytes of buffer view {}", bytes.len(), view.index()))),
     }
