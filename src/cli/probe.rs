@@ -76,12 +76,13 @@ pub(super) fn run(args: &ProbeArgs, cancelled: &AtomicBool) -> Result<End> {
     reporter.finish();
 
     let text = light_report::text(&scene.name, &lit, args.messages.explain);
+    let wrote = if output.is_standard_output() { String::new() } else { format!("\nwrote {}", args.output.display()) };
     let mut files = vec![(output, table(&lit))];
     files.extend(reports.files(&scene, &lit));
     if let Err(error) = write_all(files) {
         return say_beside(&all, &text).and(Err(error));
     }
-    say_beside(&all, &format!("{text}\nwrote {}", args.output.display()))?;
+    say_beside(&all, &format!("{}{wrote}", text.trim_end()))?;
     Ok(End::of(&lit))
 }
 

@@ -28,15 +28,14 @@ use crate::settings::transport::{Append, Effect, Filter, Illumination, Kernel, M
 use crate::transport::{self, Lit, View};
 
 #[derive(Args)]
-#[command(next_help_heading = "Scene")]
 pub(super) struct SceneArgs {
     #[arg(value_name = "SCENE", help = help::scene())]
     pub(super) scene: String,
     /// Take the intensities of the lights of a glTF file as W/sr and W/m2 [default: candela and lux, divided by 683 lm/W]
-    #[arg(long)]
+    #[arg(long, help_heading = "Scene")]
     radiometric: bool,
     /// Uniform light from the environment, W/m2/sr: one number, or three for red, green and blue
-    #[arg(long, value_name = "R,G,B", value_parser = parse_colour, allow_hyphen_values = true)]
+    #[arg(long, value_name = "R,G,B", value_parser = parse_colour, allow_hyphen_values = true, help_heading = "Scene")]
     environment: Option<[f32; 3]>,
 }
 

@@ -14,13 +14,17 @@ pub(super) fn one_line(error: &clap::Error) -> String {
         Some(ContextValue::Strings(texts)) => texts.join(", "),
         _ => String::new(),
     };
+    // clap has the best one last.
+    let similar = |kind: ContextKind| match error.get(kind) {
+        Some(ContextValue::String(text)) => format!("did you mean {text}? "),
+        Some(ContextValue::Strings(texts)) if !texts.is_empty() => {
+            format!("did you mean {}? ", texts.iter().rev().cloned().collect::<Vec<_>>().join(" or "))
+        }
+        _ => String::new(),
+    };
     let argument = context(ContextKind::InvalidArg);
     let value = context(ContextKind::InvalidValue);
     let option = argument.split([' ', '=']).next().unwrap_or_default();
-    let similar = |kind: ContextKind| match context(kind) {
-        similar if similar.is_empty() => String::new(),
-        similar => format!("did you mean {similar}? "),
-    };
     match error.kind() {
         ErrorKind::InvalidValue if !context(ContextKind::ValidValue).is_empty() => {
             let shown = if value.is_empty() { "(no value)" } else { &value };
