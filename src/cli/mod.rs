@@ -216,7 +216,7 @@ fn print_start() -> u8 {
     }
 }
 
-/// One line on stderr. Where nobody can read it, the exit code still tells.
+/// One line on stderr. Where nobody can read it there still is the exit code.
 fn complain(line: &str) {
     // Names of files and of things in them may hold anything; a complaint stays one line.
     let line: String = line.chars().map(|letter| if letter.is_control() { ' ' } else { letter }).collect();

@@ -114,7 +114,7 @@ mod tests {
     use crate::rng::Rng;
     use crate::settings::{Gather, Preset, Settings, Variant};
 
-    /// The page tells how to repeat each experiment, so the lines must mean what was run.
+    /// The page prints the command that repeats each experiment, so it must mean what was run.
     #[test]
     fn printed_commands_give_the_settings_they_stand_for() {
         for preset in [Preset::Naive, Preset::Modified, Preset::Phong, Preset::Rounds] {

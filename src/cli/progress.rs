@@ -1,5 +1,6 @@
 //! What a command prints while it runs: device, plan and progress, all on stderr.
 
+use std::cell::Cell;
 use std::io::{IsTerminal, Write};
 use std::sync::mpsc::{RecvTimeoutError, Sender, channel};
 use std::sync::{Arc, Mutex, PoisonError};
@@ -43,7 +44,8 @@ pub(super) struct ProgressReporter {
 
 enum Form {
     Quiet,
-    Bar(ProgressBar),
+    /// And whether it now has the style of a run.
+    Bar(ProgressBar, Cell<bool>),
     Lines,
     Json,
 }
@@ -75,7 +77,7 @@ impl ProgressReporter {
                 let bar = ProgressBar::new(BAR_STEPS).with_style(style("{spinner} {elapsed} {msg}"));
                 bar.enable_steady_tick(Duration::from_millis(200));
                 *BAR.lock().unwrap_or_else(PoisonError::into_inner) = Some(bar.clone());
-                Form::Bar(bar)
+                Form::Bar(bar, Cell::new(false))
             }
             ProgressForm::Auto => Form::Lines,
         };
@@ -100,7 +102,7 @@ impl ProgressReporter {
         match &self.form {
             Form::Quiet => {}
             Form::Json => print_json(&serde_json::json!({ "message": line })),
-            Form::Bar(_) | Form::Lines => complain(line),
+            Form::Bar(..) | Form::Lines => complain(line),
         }
     }
 
@@ -114,8 +116,10 @@ impl ProgressReporter {
     pub(super) fn status(&self, what: &str) {
         self.set_status(what);
         match &self.form {
-            Form::Bar(bar) => {
-                bar.set_style(style("{spinner} {elapsed} {msg}"));
+            Form::Bar(bar, is_run) => {
+                if is_run.replace(false) {
+                    bar.set_style(style("{spinner} {elapsed} {msg}"));
+                }
                 bar.set_message(what.to_owned());
             }
             Form::Json => print_json(&serde_json::json!({ "message": what })),
@@ -136,8 +140,10 @@ impl ProgressReporter {
         match &self.form {
             Form::Quiet => {}
             Form::Lines => self.set_status(&progress_line(progress, unit)),
-            Form::Bar(bar) => {
-                bar.set_style(style("{bar:32} {msg}\n{prefix}"));
+            Form::Bar(bar, is_run) => {
+                if !is_run.replace(true) {
+                    bar.set_style(style("{bar:32} {msg}\n{prefix}"));
+                }
                 bar.set_position((share_done(progress) * BAR_STEPS as f64) as u64);
                 bar.set_message(progress_line(progress, unit));
                 bar.set_prefix(ledger_line(progress));
@@ -161,7 +167,7 @@ impl Drop for ProgressReporter {
             // It only sleeps and prints.
             let _ = thread.join();
         }
-        if let Form::Bar(bar) = &self.form {
+        if let Form::Bar(bar, _) = &self.form {
             *BAR.lock().unwrap_or_else(PoisonError::into_inner) = None;
             bar.finish_and_clear();
         }

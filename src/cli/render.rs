@@ -95,7 +95,7 @@ pub(super) fn run(args: &RenderArgs, cancelled: &AtomicBool) -> Result<End> {
     let format = Format::of("-o", output)?;
     if let Some(samples) = args.judge {
         if !(2..=MAX_JUDGE_SAMPLES).contains(&samples) {
-            return Err(Error::setting("--judge", samples, format!("must be from 2 to {MAX_JUDGE_SAMPLES} samples a pixel")));
+            return Err(Error::setting("--judge", samples, format!("must be from 2 to {MAX_JUDGE_SAMPLES} samples per pixel")));
         }
         if settings.filter != Filter::Box || settings.rounds < 2 {
             return Err(Error::setting("--judge", samples, "needs --filter box, and two rounds or more to know the error"));

@@ -35,6 +35,7 @@ pub(super) fn run(args: &SelfcheckArgs, cancelled: &AtomicBool) -> Result<End> {
     let mut written = Ok(());
     let mut done = 0;
     let count = selfcheck::cases().iter().filter(|case| !case.on_gpu || gpu.is_some()).count();
+    reporter.note(&format!("plan: {count} cases, less than a minute"));
     reporter.status(&format!("0 of {count} cases done"));
     let findings = selfcheck::run(gpu.as_ref(), cancelled, |finding| {
         done += 1;

@@ -187,10 +187,10 @@ value_enum!(EffectArg => Effect {
     PointLights, SpotLights, DirectionalLights, DiscLights, Bvh, TwoSided, SmoothNormals,
 });
 
-/// Rounds of a run that ends by itself.
+/// Most rounds of a run with a stop criterion other than --total-photons.
 const MOST_ROUNDS: u32 = 65_536;
 
-/// Rounds that a run may take which ends by itself; one map at least has so many photons a round.
+/// Most rounds of a run with a stop criterion, if there is one; `photons` are those of the smaller map per round.
 fn most_rounds(stop: &Stop, photons: u32) -> Option<u32> {
     let by_total = |total: u64| total.div_ceil(u64::from(photons.max(1))).clamp(1, u64::from(MAX_ROUNDS)) as u32;
     stop.is_set().then(|| stop.photons.map_or(MOST_ROUNDS, by_total))

@@ -41,11 +41,11 @@ pub(super) fn one_line(error: &clap::Error) -> String {
             scene_without_command(&name)
                 .unwrap_or_else(|| format!("{name}: no such command; {}see --help", similar(ContextKind::SuggestedSubcommand)))
         }
-        _ => {
+        _ => scene_without_command(&context(ContextKind::InvalidSubcommand)).unwrap_or_else(|| {
             let rendered = error.render().to_string();
             let sentence: Vec<&str> = rendered.lines().take_while(|line| !line.is_empty()).map(str::trim).collect();
             sentence.join(" ").trim_start_matches("error: ").to_owned()
-        }
+        }),
     }
 }
 
