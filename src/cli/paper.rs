@@ -74,7 +74,8 @@ fn write(folder: &Folder, found: &Reproduction) -> Result<()> {
     match paper::write(folder, found) {
         Err(error @ Error::Output { .. }) => {
             let tables = [tables::running_times(&found.running_times), tables::totals(&found.totals)];
-            say(&tables.map(|table| String::from_utf8_lossy(&table).into_owned()).join("\n")).and(Err(error))
+            let text = tables.map(|table| String::from_utf8_lossy(&table).into_owned()).join("\n");
+            say(text.trim_end()).and(Err(error))
         }
         written => written,
     }
