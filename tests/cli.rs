@@ -623,6 +623,7 @@ fn help_is_grouped_alike_everywhere() {
         let takes_scene = ["render", "bake", "probe", "plan", "study"].contains(&command);
         let missing = photonmill::scene::built_in::names().into_iter().find(|scene| !help.contains(scene));
         assert!(!takes_scene || missing.is_none(), "{command}: {missing:?}");
+        assert_eq!(help.contains("\nArguments:\n  <SCENE>"), takes_scene, "{command}");
     }
     assert!(places.len() > 60, "{}", places.len());
 }

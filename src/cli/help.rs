@@ -2,7 +2,7 @@
 //!
 //! Options stand under the same headings in all commands, in this order: Output, Scene, When to stop, Measurements, Photons,
 //! Light transport, Density estimate, Implementation, Checks, Messages, Device. clap prints headings in the order in which
-//! the structs' fields first name them.
+//! the structs' fields first name them; a heading of a whole struct goes on after it, until the next one.
 
 use crate::scene::built_in;
 

@@ -114,19 +114,17 @@ impl DeviceArgs {
 
 /// Reports as files.
 #[derive(Args)]
-#[command(next_help_heading = "Output")]
 struct JsonArg {
     /// Write the report as JSON; `-` is standard output
-    #[arg(long, value_name = "FILE")]
+    #[arg(long, value_name = "FILE", help_heading = "Output")]
     json: Option<PathBuf>,
 }
 
 /// The same for commands that print what they find, where the file may be left out.
 #[derive(Args)]
-#[command(next_help_heading = "Output")]
 struct JsonOrStdoutArg {
     /// Write the report as JSON; `-`, or no FILE, is standard output
-    #[arg(long, value_name = "FILE", num_args = 0..=1, default_missing_value = "-")]
+    #[arg(long, value_name = "FILE", num_args = 0..=1, default_missing_value = "-", help_heading = "Output")]
     json: Option<PathBuf>,
 }
 
