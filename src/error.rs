@@ -4,6 +4,16 @@ use std::path::PathBuf;
 
 use crate::ledger::Ledger;
 
+/// What a machine without Vulkan lacks: the loader, a driver, or both.
+pub const INSTALL_VULKAN: &str = if cfg!(target_os = "macos") {
+    "install the Vulkan loader and MoltenVK (brew install vulkan-loader molten-vk)"
+} else if cfg!(windows) {
+    "install the current graphics driver of your GPU's vendor, which brings the Vulkan loader"
+} else {
+    "install the Vulkan loader and a driver: your GPU vendor's, or Mesa's, which can also run on the CPU \
+     (Debian, Ubuntu: apt install libvulkan1 mesa-vulkan-drivers; Fedora: dnf install vulkan-loader mesa-vulkan-drivers)"
+};
+
 pub type Result<T> = std::result::Result<T, Error>;
 
 #[derive(Debug, thiserror::Error)]
@@ -16,12 +26,16 @@ pub enum Error {
     #[error("{option} {}: cannot be written ({reason}); choose a place that can be written", path.display())]
     Output { option: &'static str, path: PathBuf, reason: String },
 
+    /// The same after a run, whose results went somewhere else.
+    #[error("{option} {}: cannot be written ({reason}); everything is saved in {} instead", path.display(), folder.display())]
+    Saved { option: &'static str, path: PathBuf, reason: String, folder: PathBuf },
+
     /// A scene file, or something in it, cannot be used.
     #[error("{}: {object} {reason}", path.display())]
     Scene { path: PathBuf, object: String, reason: String },
 
     /// There is no Vulkan loader, or no device behind it.
-    #[error("no Vulkan device: {reason}")]
+    #[error("no Vulkan device: {reason}; {INSTALL_VULKAN}")]
     NoVulkan { reason: String },
 
     /// `--device` names a device that is not there, or several.
@@ -79,7 +93,12 @@ impl Error {
     /// 2 for input that the user can mend, 1 for everything else.
     pub fn exit_code(&self) -> u8 {
         match self {
-            Error::Setting { .. } | Error::Output { .. } | Error::Scene { .. } | Error::DeviceAbsent { .. } | Error::NoValidationLayer => 2,
+            Error::Setting { .. }
+            | Error::Output { .. }
+            | Error::Saved { .. }
+            | Error::Scene { .. }
+            | Error::DeviceAbsent { .. }
+            | Error::NoValidationLayer => 2,
             Error::Interrupted => 130,
             _ => 1,
         }

@@ -1,6 +1,8 @@
 //! The program as a user meets it: refusals in one line with exit code 2, outputs whole or not at
-//! all, the CPU builder where there is no Vulkan, and Ctrl-C.
+//! all, help, progress, the CPU builder where there is no Vulkan, and Ctrl-C.
 
+use std::collections::HashMap;
+use std::io::{BufRead, BufReader};
 use std::path::Path;
 use std::process::{Command, Output, Stdio};
 use std::time::{Duration, Instant};
@@ -55,7 +57,7 @@ fn an_error_below_the_bias_is_refused() {
     let output = run(folder.path(), &["--error", "2%", "--bias", "--radius", "0.2", "--mesh", "8", "--variant", "cpu"]);
     let stderr = text(&output.stderr);
     assert_eq!(output.status.code(), Some(2), "{stderr}");
-    let [measuring, refused] = stderr.lines().collect::<Vec<_>>()[..] else { panic!("two lines expected: {stderr}") };
+    let [_device, _plan, measuring, refused] = stderr.lines().collect::<Vec<_>>()[..] else { panic!("four lines expected: {stderr}") };
     assert!(measuring.contains("measuring the bias"), "{stderr}");
     assert!(refused.starts_with("photonmill: --error 2%") && refused.contains("a smaller --radius"), "{stderr}");
     assert!(output.stdout.is_empty(), "{}", text(&output.stdout));
@@ -74,7 +76,7 @@ fn bad_input_is_refused_in_one_line() {
         (&["--radius", "0"], ["--radius", "0", "0.5"]),
         (&["--radius", "0.51"], ["--radius", "0.51", "0.5"]),
         (&["--radius", "-0.1"], ["--radius", "-0.1", "0.5"]),
-        (&["--radius", "nan"], ["--radius", "NaN", "0.5"]),
+        (&["--radius", "nan"], ["--radius", "nan", "0.5"]),
         (&["--radius", "inf"], ["--radius", "inf", "0.5"]),
         (&["--nearest", "5"], ["--nearest", "5", "--gather kdtree"]),
         (&["--nearest", "5", "--gather", "grid"], ["--nearest", "5", "--gather kdtree"]),
@@ -84,7 +86,7 @@ fn bad_input_is_refused_in_one_line() {
         (&["--gather", "kdtree", "--nearest", "9", "--chunk", "100"], ["--chunk", "100", "--photons 5000 or more"]),
         (&["--full-light", "0"], ["--full-light", "0", "from 1e-12"]),
         (&["--shininess", "-1"], ["--shininess", "-1", "0 or more"]),
-        (&["--shininess", "nan"], ["--shininess", "NaN", "0 or more"]),
+        (&["--shininess", "nan"], ["--shininess", "nan", "0 or more"]),
         (&["--shininess", "1,2"], ["--shininess", "1,2", "left,right,floor,ceiling,back"]),
         (&["--reflectance", "1.1"], ["--reflectance", "1.1", "0 to 1"]),
         (&["--light-power", "1,-1"], ["--light-power", "-1", "from 1e-12"]),
@@ -122,14 +124,14 @@ fn bad_input_is_refused_in_one_line() {
         (&["--irradiance", "i", "--reflectance", "0"], ["--reflectance", "0", "above 0"]),
         (&["--error", "0%"], ["--error", "0", "0.0001 %"]),
         (&["--error", "few"], ["--error", "few", "per cent"]),
-        (&["--confidence", "10%"], ["--confidence", "0.1", "50 %"]),
+        (&["--confidence", "10%"], ["--confidence", "10%", "50 %"]),
         (&["--time", "0s"], ["--time", "0", "1ms"]),
         (&["--total-photons", "0"], ["--total-photons", "0", "1 or more"]),
         (&["--colour"], ["--colour", "no such option", "--help"]),
-        (&["bakery"], ["bakery", "no such subcommand", "--help"]),
+        (&["bakery"], ["bakery", "no such command", "--help"]),
         (&["paper"], ["--out", "required", ""]),
         (&["paper", "--out", "p", "--longest", "0s"], ["--longest", "0s", "above 0"]),
-        (&["paper", "--out", "/dev/null/x"], ["--out", "/dev/null/x", "cannot be written"]),
+        (&["paper", "--out", "/dev/null/x"], ["-o", "/dev/null/x", "cannot be written"]),
     ];
     let folder = tempfile::tempdir().unwrap();
     for (arguments, named) in cases {
@@ -256,7 +258,7 @@ fn the_builders_write_the_same_picture() {
     }
 }
 
-/// Whoever asks for the fastest is told what each took, and gets the one that took least.
+/// Whoever asks for the fastest gets the one that took least; the times of all are printed.
 #[test]
 fn the_fastest_builder_is_taken() {
     let folder = tempfile::tempdir().unwrap();
@@ -270,9 +272,8 @@ fn the_fastest_builder_is_taken() {
             // There is no device here.
             return Vec::new();
         }
-        let (_, times) = stderr.split_once(", in ms: ").expect(&stderr);
+        let (_, times) = stderr.lines().find_map(|line| line.split_once(", in ms: ")).expect(&stderr);
         let times: Vec<(String, f64)> = times
-            .trim_end()
             .split(", ")
             .map(|candidate| candidate.split_once(' ').expect(&stderr))
             .map(|(variant, ms)| (variant.to_owned(), ms.parse().expect(&stderr)))
@@ -299,11 +300,11 @@ fn without_vulkan_the_cpu_builder_runs() {
             .output()
             .unwrap()
     };
-    let output = without(&["-o", "a.png", "--json", "a.json"]);
+    let output = without(&["-o", "a.png", "--json", "a.json", "--quiet"]);
     let stderr = text(&output.stderr);
     assert!(output.status.success(), "{stderr}");
     assert_eq!(stderr.trim_end().lines().count(), 1, "{stderr}");
-    assert!(stderr.contains("no Vulkan device") && stderr.contains("CPU builder"), "{stderr}");
+    assert!(["no Vulkan device", "install", "CPU builder"].iter().all(|word| stderr.contains(word)), "{stderr}");
     let report = json(&folder.path().join("a.json"));
     assert_eq!((&report["device"], &report["ledger"]["stored"]), (&"cpu".into(), &7511.into()));
 
@@ -312,25 +313,35 @@ fn without_vulkan_the_cpu_builder_runs() {
     assert!(text(&refused.stderr).contains("available: none"), "{}", text(&refused.stderr));
 }
 
+/// Whichever signal asks for the end: what is finished is saved, and the exit code says which it was.
 #[test]
 fn an_interrupt_saves_what_is_finished() {
+    let cases = [("INT", 130), ("TERM", 143), ("HUP", 129)];
+    let runs = cases.map(|(signal, code)| std::thread::spawn(move || interrupted(signal, code)));
+    runs.into_iter().for_each(|run| run.join().unwrap());
+}
+
+fn interrupted(signal: &str, code: i32) {
     let folder = tempfile::tempdir().unwrap();
-    let arguments = on_device(&["--rounds", "4000000", "--rng", "philox", "-o", "a.png", "--json", "a.json"]);
+    let arguments = on_device(&["--rounds", "4000000", "--rng", "philox", "-o", "a.png", "--json", "a.json", "--progress", "json"]);
     let started = Instant::now();
-    let child = photonmill(folder.path(), &arguments.iter().map(String::as_str).collect::<Vec<_>>())
+    let mut child = photonmill(folder.path(), &arguments.iter().map(String::as_str).collect::<Vec<_>>())
         .stdout(Stdio::piped())
         .stderr(Stdio::piped())
         .spawn()
         .unwrap();
-    std::thread::sleep(Duration::from_secs(2));
-    assert!(Command::new("kill").args(["-INT", &child.id().to_string()]).status().unwrap().success());
-    // A run that does not hear it must not hang the test.
+    // A run that does not end must not hang the test.
     let id = child.id().to_string();
     let guard = Command::new("bash").args(["-c", &format!("sleep 60; kill -9 {id}")]).spawn();
+    // Photons are under way once progress is reported.
+    let mut lines = BufReader::new(child.stderr.take().unwrap()).lines().map_while(Result::ok);
+    assert!(lines.any(|line| line.contains("\"photons\"")), "no progress");
+    assert!(Command::new("kill").args([&format!("-{signal}"), &id]).status().unwrap().success());
+    let rest: Vec<String> = lines.collect();
     let output = child.wait_with_output().unwrap();
     let _ = guard.and_then(|mut guard| guard.kill());
     assert!(started.elapsed() < Duration::from_secs(60), "the run went on for {:?}", started.elapsed());
-    assert_eq!(output.status.code(), Some(130), "{}", text(&output.stderr));
+    assert_eq!(output.status.code(), Some(code), "{signal}: {rest:?}");
     let report = json(&folder.path().join("a.json"));
     let emitted = report["ledger"]["emitted"].as_u64().unwrap();
     assert!(emitted > 0 && emitted < 4_000_000 * 5000, "{emitted}");
@@ -344,6 +355,280 @@ fn an_interrupt_saves_what_is_finished() {
     assert_eq!(names, ["a.json", "a.png"]);
 }
 
+/// Device and plan first, then a line every few seconds; --quiet turns all of it off.
+#[test]
+fn a_run_says_what_it_does() {
+    let start = |quiet: &[&str]| {
+        let folder = tempfile::tempdir().unwrap();
+        let arguments = ["--variant", "cpu", "--photons", "300", "--mesh", "4", "--error", "0.0002", "--time", "4s", "-o", "a.png"];
+        let mut command = photonmill(folder.path(), &[&arguments[..], quiet].concat());
+        (command.stdout(Stdio::piped()).stderr(Stdio::piped()).spawn().unwrap(), folder)
+    };
+    let (mut talking, _folder) = start(&[]);
+    let (silent, _other) = start(&["--quiet"]);
+    let started = Instant::now();
+    let mut lines = BufReader::new(talking.stderr.take().unwrap()).lines().map_while(Result::ok);
+    let [device, plan] = [lines.next().unwrap(), lines.next().unwrap()];
+    assert!(started.elapsed() < Duration::from_millis(3000), "device and plan come after {:?}", started.elapsed());
+    assert_eq!(device, "photonmill: device: CPU");
+    // The error is what was understood of a number without a unit.
+    for word in ["plan: open box", "300 photons", "15 bounces", "radius 0.05 m", "MiB", "an error of 0.0002 % (95 % confidence)", "or 4 s"]
+    {
+        assert!(plan.contains(word), "{word}: {plan}");
+    }
+    let rest: Vec<String> = lines.collect();
+    assert!(rest.iter().any(|line| line.contains("photons/s") && line.contains("s left")), "{rest:?}");
+    assert!(talking.wait_with_output().unwrap().status.success());
+    let silent = silent.wait_with_output().unwrap();
+    assert!(silent.status.success() && silent.stderr.is_empty() && !silent.stdout.is_empty(), "{}", text(&silent.stderr));
+}
+
+/// Refusals name the value as it was typed, not what was made of it.
+#[test]
+fn values_are_shown_as_typed() {
+    let main = [
+        ("--photons", "00"),
+        ("--rounds", "000"),
+        ("--bounces", "010001"),
+        ("--mesh", "01025"),
+        ("--radius", "0.50100"),
+        ("--full-light", "1e-0013"),
+        ("--light-power", "1.0,1e-13"),
+        ("--light-power", "1,1e-9"),
+        ("--light-radius", ".3"),
+        ("--reflectance", "1.10"),
+        ("--shininess", "-1.0"),
+        ("--eye", "0,0,1e+20"),
+        ("--threads", "00"),
+        ("--group-size", "048"),
+        ("--counters", "03"),
+        ("--chunk", "01"),
+        ("--nearest", "05"),
+        ("--seed", "04294967296"),
+        ("--error", "-1%"),
+        ("--error", "-0.5"),
+        ("--error", "1e-5 %"),
+        ("--confidence", "0.95"),
+        ("--confidence", "-5%"),
+        ("--time", "-1m"),
+        ("--time", "0.1ms"),
+        ("--total-photons", "00"),
+    ];
+    let of_render = [
+        ("--samples", "03"),
+        ("--shadow-rays", "065"),
+        ("--alpha", "1.50"),
+        ("--radius", "-1e-1"),
+        ("--caustic-radius", "-0.0"),
+        ("--exposure", "1e3"),
+        ("--judge", "01"),
+        ("--error", "200.0%"),
+        ("--size", "-16x16"),
+    ];
+    let others: [(&[&str], &str, &str); 7] = [
+        (&["study", "cornell", "-o", "s"], "--budget", "0.1s"),
+        (&["study", "cornell", "-o", "s"], "--side", "01"),
+        (&["study", "cornell", "-o", "s"], "--repeats", "01"),
+        (&["bench"], "--time", "-1h"),
+        (&["paper", "-o", "p"], "--longest", "-90ms"),
+        (&["paper", "-o", "p"], "--large", "05000"),
+        (&["paper", "-o", "p"], "--repeats", "01001"),
+    ];
+    let all = main.iter().map(|(option, typed)| (&[][..], *option, *typed));
+    let all = all.chain(of_render.iter().map(|(option, typed)| (&["render", "cornell", "-o", "a.png"][..], *option, *typed)));
+    let folder = tempfile::tempdir().unwrap();
+    for (command, option, typed) in all.chain(others) {
+        let output = run(folder.path(), &[command, &[option, typed]].concat());
+        let stderr = text(&output.stderr);
+        assert_eq!(output.status.code(), Some(2), "{option} {typed}: {stderr}");
+        assert!(
+            stderr.starts_with(&format!("photonmill: {option} {typed}: ")) && stderr.lines().count() == 1,
+            "{option} {typed}: {stderr}"
+        );
+    }
+    assert_eq!(entries(folder.path()), Vec::<String>::new());
+}
+
+#[test]
+fn a_slip_is_answered_with_what_was_meant() {
+    let folder = tempfile::tempdir().unwrap();
+    let cases: [(&[&str], &str); 7] = [
+        (&["rendr", "cornell"], "did you mean render?"),
+        (&["render", "cornell", "-o", "a.png", "--phtons", "3"], "did you mean --photons?"),
+        (&["--variant", "atomik"], "did you mean atomic?"),
+        (&["scene.glb"], "photonmill render scene.glb -o picture.png"),
+        (&["folder/Scene.GLTF", "-o", "a.png"], "photonmill render folder/Scene.GLTF -o picture.png"),
+        (&["-o", "a.png", "scene.glb"], "photonmill render scene.glb -o picture.png"),
+        (&["cornell-spheres"], "photonmill render cornell-spheres -o picture.png"),
+    ];
+    for (arguments, meant) in cases {
+        let output = run(folder.path(), arguments);
+        let stderr = text(&output.stderr);
+        assert!(output.status.code() == Some(2) && stderr.lines().count() == 1 && stderr.contains(meant), "{arguments:?}: {stderr}");
+    }
+}
+
+#[test]
+fn without_arguments_it_says_how_to_start() {
+    let folder = tempfile::tempdir().unwrap();
+    let output = run(folder.path(), &[]);
+    let stdout = text(&output.stdout);
+    assert!(output.status.success() && output.stderr.is_empty(), "{}", text(&output.stderr));
+    for word in ["photonmill render cornell-spheres -o picture.png", "photonmill render scene.glb", "--help"] {
+        assert!(stdout.contains(word), "{word}: {stdout}");
+    }
+    assert_eq!(entries(folder.path()), Vec::<String>::new());
+}
+
+/// Before the run, whichever option names the file.
+#[test]
+fn names_that_the_file_system_refuses_are_found_at_once() {
+    let long = "n".repeat(300);
+    let [png, exr] = [format!("{long}.png"), format!("{long}.exr")];
+    // With so many photons that a run would not end before the test does.
+    let endless = ["--variant", "cpu", "--rounds", "4000000000", "--photons", "2", "--bounces", "1", "-o", "a.png"];
+    let scene = ["cornell", "--rounds", "1000000", "-o"];
+    let cases: Vec<(Vec<&str>, &str)> = vec![
+        ([&endless[..8], &["-o", &png]].concat(), "-o"),
+        ([&endless[..], &["--json", &long]].concat(), "--json"),
+        ([&endless[..], &["--trace", &long]].concat(), "--trace"),
+        ([&endless[..], &["--irradiance", &long]].concat(), "--irradiance"),
+        ([&endless[..], &["--radiosity", &long]].concat(), "--radiosity"),
+        ([&["render"], &scene[..], &[&png]].concat(), "-o"),
+        ([&["render"], &scene[..], &["a.png", "--error-image", &exr]].concat(), "--error-image"),
+        ([&["render"], &scene[..], &["a.png", "--json", &long]].concat(), "--json"),
+        ([&["bake"], &scene[..], &[&long]].concat(), "-o"),
+        ([&["bake"], &scene[..], &["-"]].concat(), "-o"),
+        ([&["probe"], &scene[..], &[&long, "--points", "-"]].concat(), "-o"),
+        (vec!["plan", "cornell", "--json", &long], "--json"),
+        (vec!["devices", "--json", &long], "--json"),
+        (vec!["selfcheck", "--json", &long], "--json"),
+        (vec!["study", "cornell", "-o", &long], "-o"),
+        (vec!["bench", "-o", &long], "-o"),
+        (vec!["bench", "--json", &long], "--json"),
+        (vec!["paper", "-o", &long], "-o"),
+    ];
+    let folder = tempfile::tempdir().unwrap();
+    for (arguments, option) in cases {
+        let mut child = photonmill(folder.path(), &arguments).stdout(Stdio::piped()).stderr(Stdio::piped()).spawn().unwrap();
+        let started = Instant::now();
+        while child.try_wait().unwrap().is_none() && started.elapsed() < Duration::from_secs(20) {
+            std::thread::sleep(Duration::from_millis(5));
+        }
+        let _ = child.kill();
+        let output = child.wait_with_output().unwrap();
+        let stderr = text(&output.stderr);
+        let is_refused = stderr.starts_with(&format!("photonmill: {option} ")) && stderr.contains("cannot be written");
+        assert!(output.status.code() == Some(2) && stderr.lines().count() == 1 && is_refused, "{arguments:?}: {stderr}");
+    }
+    assert_eq!(entries(folder.path()), Vec::<String>::new());
+}
+
+/// A disk that fills up during the run: everything is saved in another folder, which the error names.
+#[test]
+fn results_that_cannot_be_written_are_saved_elsewhere() {
+    let folder = tempfile::tempdir().unwrap();
+    std::os::unix::fs::symlink("/dev/full", folder.path().join("a.exr")).unwrap();
+    std::fs::create_dir(folder.path().join("tmp")).unwrap();
+    let arguments = ["--variant", "cpu", "--mesh", "8", "--json", "a.json", "-o", "a.exr", "--irradiance", "i", "--quiet"];
+    let output = photonmill(folder.path(), &arguments).env("TMPDIR", folder.path().join("tmp")).output().unwrap();
+    let stderr = text(&output.stderr);
+    assert_eq!((output.status.code(), stderr.lines().count()), (Some(2), 1), "{stderr}");
+    let [saved] = &entries(&folder.path().join("tmp"))[..] else { panic!("one folder expected: {stderr}") };
+    assert!(stderr.contains("-o a.exr") && stderr.contains(saved.as_str()), "{stderr}");
+    let saved = folder.path().join("tmp").join(saved);
+    assert_eq!(json(&saved.join("json/a.json"))["ledger"]["emitted"], 5000);
+    assert!(image::open(saved.join("output/a.exr")).is_ok() && image::open(saved.join("irradiance/floor.exr")).is_ok());
+    // The report is printed, and no destination holds a part.
+    assert!(text(&output.stdout).contains("ledger: 5000 emitted"), "{}", text(&output.stdout));
+    assert!(!folder.path().join("a.json").exists());
+}
+
+/// No file at all can grow, as with a full disk everywhere: what was measured is printed.
+#[test]
+fn a_measured_paper_run_is_not_lost_on_a_full_disk() {
+    let folder = tempfile::tempdir().unwrap();
+    let program = env!("CARGO_BIN_EXE_photonmill");
+    // Without a device it is the CPU builder's, which is the shortest.
+    let line = format!("ulimit -f 1; exec {program} paper -o p --large 5001 --repeats 1 --longest 1ms");
+    let mut command = Command::new("bash");
+    command.args(["-c", &line]).current_dir(folder.path()).stdin(Stdio::null());
+    let output = command.env("VK_DRIVER_FILES", "/nonexistent").env("VK_ICD_FILENAMES", "/nonexistent").output().unwrap();
+    let (stdout, stderr) = (text(&output.stdout), text(&output.stderr));
+    assert_eq!(output.status.code(), Some(2), "{stderr}");
+    assert!(stderr.lines().last().is_some_and(|line| line.contains("-o p/") && line.contains("cannot be written")), "{stderr}");
+    // Both tables, of which the first has rows at least.
+    let tables: Vec<&str> = stdout.split("\n\n").collect();
+    assert!(tables.len() == 2 && tables[0].starts_with("photons,bounces,builder,") && tables[0].lines().count() > 1, "{stdout}");
+    assert!(tables[1].starts_with("photons_per_round,rounds,"), "{stdout}");
+}
+
+/// Headings of a help text, and the options under each.
+fn groups(help: &str) -> Vec<(String, Vec<String>)> {
+    let mut groups: Vec<(String, Vec<String>)> = Vec::new();
+    for line in help.lines() {
+        let words = line.trim_start();
+        let option = words.strip_prefix("--").or_else(|| words.strip_prefix('-')?.get(1..)?.strip_prefix(", --"));
+        if !line.starts_with(' ') && line.ends_with(':') && !line.contains('.') {
+            groups.push((line.trim_end_matches(':').to_owned(), Vec::new()));
+        } else if let (Some(option), Some((_, options))) = (option, groups.last_mut()) {
+            options.push(option.split("  ").next().unwrap().trim().to_owned());
+        }
+    }
+    groups
+}
+
+/// One order of headings, one heading and one kind of value for an option of all commands, examples at the end.
+#[test]
+fn help_is_grouped_alike_everywhere() {
+    const HEADINGS: [&str; 15] = [
+        "Commands",
+        "Arguments",
+        "Options",
+        "Output",
+        "Scene",
+        "When to stop",
+        "Measurements",
+        "Photons",
+        "Light transport",
+        "Density estimate",
+        "Implementation",
+        "Checks",
+        "Messages",
+        "Device",
+        "Examples",
+    ];
+    let folder = tempfile::tempdir().unwrap();
+    let mut places: HashMap<String, (String, String)> = HashMap::new();
+    for command in ["", "devices", "render", "bake", "probe", "plan", "selfcheck", "study", "bench", "paper"] {
+        let arguments: Vec<&str> = [command, "--help"].into_iter().filter(|word| !word.is_empty()).collect();
+        let help = text(&run(folder.path(), &arguments).stdout);
+        let groups = groups(&help);
+        let order: Vec<_> = groups.iter().map(|(heading, _)| HEADINGS.iter().position(|known| known == heading)).collect();
+        assert!(order.iter().all(Option::is_some) && order.is_sorted_by(|a, b| a < b), "{command}: {groups:?}");
+        assert_eq!(groups.last().unwrap().0, "Examples", "{command}");
+        assert!(help.contains(&format!("photonmill {command}").trim_end().to_owned()), "{command}");
+        for (heading, options) in groups {
+            for option in options {
+                let (name, value) = option.split_once(' ').unwrap_or((&option, ""));
+                // A folder is an output as a file is, and what is printed needs no file.
+                let value = match (name, value) {
+                    ("output", "<DIR>") | ("json", "[<FILE>]") => "<FILE>",
+                    _ => value,
+                };
+                let place = (heading.clone(), value.to_owned());
+                let first = places.entry(name.to_owned()).or_insert_with(|| place.clone());
+                assert_eq!(*first, place, "{command}: --{name}");
+            }
+        }
+        let takes_scene = ["render", "bake", "probe", "plan", "study"].contains(&command);
+        let missing = photonmill::scene::built_in::names().into_iter().find(|scene| !help.contains(scene));
+        assert!(!takes_scene || missing.is_none(), "{command}: {missing:?}");
+        assert_eq!(help.contains("\nArguments:\n  <SCENE>"), takes_scene, "{command}");
+    }
+    assert!(places.len() > 60, "{}", places.len());
+}
+
 /// A reader that goes away, a full disk: one line at most, no panic.
 #[test]
 fn output_that_nobody_takes_is_no_panic() {
@@ -354,7 +639,7 @@ fn output_that_nobody_takes_is_no_panic() {
     };
     let gone = shell("photonmill --variant cpu -o a.png | true");
     assert!(gone.status.success(), "{}", text(&gone.stderr));
-    let full = shell("photonmill --variant cpu -o a.png > /dev/full");
+    let full = shell("photonmill --variant cpu -o a.png --quiet > /dev/full");
     assert_eq!((full.status.code(), text(&full.stderr).lines().count()), (Some(2), 1), "{}", text(&full.stderr));
     let mute = shell("photonmill --photons 0 2> /dev/full");
     assert_eq!(mute.status.code(), Some(2));

@@ -86,7 +86,7 @@ impl Place {
     /// Exit code 2, one line that names each word, nothing on stdout, no new file.
     fn refuse(&self, arguments: &[&str], named: &[&str]) -> Option<String> {
         let before = self.names();
-        let output = self.run(arguments);
+        let output = self.run(&[arguments, &["--quiet"]].concat());
         let stderr = text(&output.stderr);
         let fault = if output.status.code() != Some(2) {
             format!("ends with {:?}", output.status.code())
@@ -156,7 +156,7 @@ fn bad_options_are_refused_in_one_line() {
     let size = |size: &'static str| place.refuse(&["render", "cornell", "-o", "a.exr", "--size", size], &["--size", size]);
     let on = |arguments: &[&'static str], named: &[&str]| place.refuse(&[&["render"], arguments].concat(), named);
     let mut faults: Vec<Option<String>> =
-        ["0x16", "16", "16x", "x16", "16x16x16", "16*16", "65537x16", "1.5x2", "-1x4", ""].map(size).into();
+        ["0x16", "0", "16x", "x16", "16x16x16", "16*16", "65537x16", "1.5x2", "-1x4", ""].map(size).into();
     faults.extend([
         on(&["cornell", "-o", "a.exr", "--size", "65536x65536"], &["--size 65536x65536"]),
         on(&["cornell", "-o", "a.exr", "--size", "65536x32768"], &["--size 65536x32768"]),
@@ -285,6 +285,11 @@ fn a_probe_writes_a_row_a_point() {
     assert!((rows[0][0] / rows[2][0] - 1.0).abs() < 1.0, "{rows:?}");
     assert_eq!(rows[3][..3], [0.0; 3], "{rows:?}");
 
+    // The same table on standard output, and the report elsewhere.
+    let (stdout, _) = place.succeed(&[&run[..], &["--points", "points.txt", "-o", "-"]].concat());
+    assert_eq!(stdout, table("a.csv"));
+    assert!(!place.0.path().join("-").exists());
+
     // Of one round no error is known.
     place.succeed(&["probe", "cornell", "--points", "points.txt", "--rounds", "1", "--photons", "1000", "-o", "c.csv"]);
     assert!(table("c.csv").lines().nth(1).unwrap().ends_with(",,,"), "{}", table("c.csv"));
@@ -327,6 +332,33 @@ fn a_camera_is_chosen_by_name() {
     let first = place.exr(&["scene.gltf"]);
     assert_eq!(place.exr(&["scene.gltf", "--camera", "eye"]), first);
     assert_ne!(place.exr(&["scene.gltf", "--camera", "side"]), first);
+}
+
+/// Of a camera of 2 : 1, whole or as wide or as large as is asked for; the vertical field of view is kept.
+#[test]
+fn a_picture_has_the_aspect_of_its_camera() {
+    let place = Place::new();
+    let with_aspect = |aspect: f64| square(|v| v["cameras"][0]["perspective"]["aspectRatio"] = json!(aspect));
+    place.write("wide.gltf", with_aspect(2.0));
+    let plan = |arguments: &[&str]| place.succeed(&[&["plan"], arguments].concat());
+    let (table, stderr) = plan(&["wide.gltf"]);
+    assert!(table.contains("\n784 x 392 pixels\n") && !stderr.contains("note"), "{table}{stderr}");
+    let (table, stderr) = plan(&["wide.gltf", "--size", "640"]);
+    assert!(table.contains("\n640 x 320 pixels\n") && !stderr.contains("note"), "{table}{stderr}");
+    let (table, stderr) = plan(&["wide.gltf", "--size", "640x480"]);
+    assert!(table.contains("\n640 x 480 pixels\n") && stderr.contains("vertical field of view is kept"), "{table}{stderr}");
+    assert!(plan(&["cornell"]).0.contains("\n554 x 554 pixels\n"));
+    place.write("open.gltf", square(|_| {}));
+    assert!(plan(&["open.gltf"]).0.contains("\n640 x 480 pixels\n"));
+    place.write("wrong.gltf", with_aspect(-1.0));
+    let (table, stderr) = plan(&["wrong.gltf"]);
+    assert!(table.contains("\n640 x 480 pixels\n") && stderr.contains("aspect ratio"), "{table}{stderr}");
+    if no_gpu() {
+        return;
+    }
+    place.succeed(&["render", "wide.gltf", "--size", "16", "--photons", "10", "--rounds", "1", "-o", "a.exr"]);
+    let picture = image::open(place.0.path().join("a.exr")).unwrap();
+    assert_eq!((picture.width(), picture.height()), (16, 8));
 }
 
 #[test]
@@ -380,7 +412,7 @@ fn tables_and_json_tell_one_plan_with_a_row_an_effect() {
                 }
             }
             assert!(table.contains(&format!("{} bytes of device memory", json["bytes"])), "{table}");
-            assert_eq!(table.matches(" photons a round in ").count(), json["maps"].as_array().unwrap().len(), "{table}");
+            assert_eq!(table.matches(" photons per round in ").count(), json["maps"].as_array().unwrap().len(), "{table}");
         }
     }
 }
@@ -470,7 +502,7 @@ fn an_environment_lights_the_scene_and_is_seen() {
     place.write("dark.gltf", square(|v| v["scenes"][0]["nodes"] = json!([0, 1])));
     let run = [&["render", "dark.gltf"], &TINY[..], &["-o", "a.exr", "--environment", "2,1,0.5"]].concat();
     let (_, stderr) = place.succeed(&run);
-    assert!(!stderr.contains("dark") || !stderr.contains("nothing shines"), "it is lit: {stderr}");
+    assert!(!stderr.contains("has no light"), "it is lit: {stderr}");
     // A white wall under an even sky is as bright as the sky.
     let pixels = place.pixels("a.exr");
     let mean = |channel: usize| pixels.iter().skip(channel).step_by(3).sum::<f32>() / 256.0;
@@ -490,7 +522,7 @@ fn a_scene_without_light_is_black_with_one_warning() {
     let place = Place::new();
     place.write("dark.gltf", square(|v| v["scenes"][0]["nodes"] = json!([0, 1])));
     let (_, stderr) = place.succeed(&[&["render", "dark.gltf"], &TINY[..], &["-o", "a.exr"]].concat());
-    assert_eq!(stderr.matches("nothing shines").count(), 1, "{stderr}");
+    assert_eq!(stderr.matches("has no light").count(), 1, "{stderr}");
     assert_eq!(place.pixels("a.exr"), vec![0.0; 3 * 256]);
     place.succeed(&[&["render", "dark.gltf"], &TINY[..], &["-o", "a.png"]].concat());
     assert!(image::open(place.0.path().join("a.png")).unwrap().into_rgb8().into_raw().iter().all(|code| *code == 0));
@@ -518,7 +550,7 @@ fn zero_area_triangles_are_a_warning_and_the_picture_is_right() {
     let place = Place::new();
     place.write("plain.gltf", square(|_| {}));
     place.write("flat.gltf", square(|v| v["accessors"][1]["count"] = json!(9)));
-    let (_, stderr) = place.succeed(&[&["render", "flat.gltf"], &TINY[..], &["-o", "flat.exr"]].concat());
+    let (_, stderr) = place.succeed(&[&["render", "flat.gltf"], &TINY[..], &["-o", "flat.exr", "--quiet"]].concat());
     assert!(stderr.contains("warning: 1 triangle(s) have no area") && stderr.lines().count() == 1, "{stderr}");
     assert_eq!(place.pixels("flat.exr"), place.exr(&["plain.gltf"]));
 }
@@ -530,7 +562,7 @@ fn a_blender_file_renders_with_all_that_it_holds() {
     }
     let place = Place::new();
     let (stdout, stderr) = place.succeed(&[&["render", BLENDER], &TINY[..], &["-o", "a.exr", "--explain", "--camera", "eye"]].concat());
-    assert!(!stderr.contains("nothing shines"), "{stderr}");
+    assert!(!stderr.contains("has no light"), "{stderr}");
     let kept: Vec<String> = rows_of(&stdout).into_iter().filter(|(_, kept)| *kept).map(|(name, _)| name).collect();
     for effect in ["textures", "point-lights", "spot-lights", "directional-lights", "mesh-lights", "refractive-caustics", "bvh"] {
         assert!(kept.iter().any(|name| name == effect), "{effect}: {kept:?}");
@@ -559,14 +591,14 @@ fn output_that_nobody_takes_is_no_panic() {
         let line = line.replace("photonmill", env!("CARGO_BIN_EXE_photonmill"));
         Command::new("bash").args(["-c", &format!("set -o pipefail; {line}")]).current_dir(place.0.path()).output().unwrap()
     };
-    for line in ["photonmill plan cornell | true", "photonmill plan cornell --json | head -c 1 > /dev/null"] {
+    for line in ["photonmill plan cornell -q | true", "photonmill plan cornell -q --json | head -c 1 > /dev/null"] {
         let gone = shell(line);
         assert!(gone.status.success() && gone.stderr.is_empty(), "{line}: {}", text(&gone.stderr));
     }
-    let full = shell("photonmill plan cornell > /dev/full");
+    let full = shell("photonmill plan cornell -q > /dev/full");
     assert_eq!((full.status.code(), text(&full.stderr).lines().count()), (Some(2), 1), "{}", text(&full.stderr));
     if !no_gpu() {
-        let gone = shell("photonmill render cornell --size 4x4 --photons 10 --rounds 1 -o a.png | true");
+        let gone = shell("photonmill render cornell --size 4x4 --photons 10 --rounds 1 -q -o a.png | true");
         assert!(gone.status.success() && gone.stderr.is_empty(), "{}", text(&gone.stderr));
         assert!(place.0.path().join("a.png").exists());
     }
@@ -583,9 +615,10 @@ fn without_vulkan_a_scene_is_planned_but_not_rendered() {
     };
     if std::env::var_os("PHOTONMILL_DEVICE").is_none() {
         assert!(without(&["plan", "cornell"]).status.success());
-        let refused = without(&["render", "cornell", "-o", "a.exr"]);
+        let refused = without(&["render", "cornell", "-o", "a.exr", "--quiet"]);
         let stderr = text(&refused.stderr);
         assert!(!refused.status.success() && stderr.lines().count() == 1 && stderr.contains("no Vulkan device"), "{stderr}");
+        assert!(stderr.contains("install") && stderr.contains("driver"), "{stderr}");
         assert!(!Path::exists(&place.0.path().join("a.exr")));
     }
 }

@@ -6,9 +6,10 @@ use std::sync::atomic::AtomicBool;
 use clap::Args;
 use glam::DVec3;
 
-use super::run::number;
-use super::transport::{Job, ReportArgs, SceneArgs, TransportArgs, geometry, light, plan};
-use super::{DeviceArgs, End, complain, say};
+use super::parse::parse_number;
+use super::progress::ProgressReporter;
+use super::transport::{Job, MessageArgs, ReportArgs, SceneArgs, TimedDeviceArgs, TransportArgs, geometry, light, plan};
+use super::{End, complain, say_beside};
 use crate::bake::{self, Layout, PHASE_COUNT, TexelEstimate};
 use crate::error::{Error, Result};
 use crate::output::colour::ColourPicture;
@@ -22,23 +23,25 @@ use crate::transport::Lit;
 
 #[derive(Args)]
 pub(super) struct BakeArgs {
+    /// Folder for the lightmaps and for the scene with them; created if needed
+    #[arg(short, long, alias = "out", value_name = "DIR", help_heading = "Output")]
+    output: PathBuf,
+    #[command(flatten)]
+    report: ReportArgs,
+    /// Exposure of the PNGs in stops, each of which doubles the brightness [default: the mean becomes middle grey]
+    #[arg(long, value_name = "STOPS", value_parser = parse_number::<f32>, allow_hyphen_values = true, help_heading = "Output")]
+    exposure: Option<f32>,
     #[command(flatten)]
     scene: SceneArgs,
-    /// Folder for the maps and the scene; made if it is not there
-    #[arg(short, long, value_name = "DIR", help_heading = "Output")]
-    output: PathBuf,
-    /// Texels along a metre of surface [default: so that all maps have about 65 536 texels]
-    #[arg(long, value_name = "N", value_parser = number::<f64>, allow_negative_numbers = true, help_heading = "Scene")]
+    /// Texels per metre of surface [default: about 65536 texels in all maps together]
+    #[arg(long, value_name = "N", value_parser = parse_number::<f64>, allow_hyphen_values = true, help_heading = "Scene")]
     texels_per_metre: Option<f64>,
-    /// Brightness of the PNGs in stops: each doubles it [default: so that the mean is a middle grey]
-    #[arg(long, value_name = "STOPS", value_parser = number::<f32>, allow_negative_numbers = true, help_heading = "Output")]
-    exposure: Option<f32>,
     #[command(flatten)]
     transport: TransportArgs,
     #[command(flatten)]
-    report: ReportArgs,
+    messages: MessageArgs,
     #[command(flatten)]
-    device: DeviceArgs,
+    device: TimedDeviceArgs,
 }
 
 pub(super) fn run(args: &BakeArgs, cancelled: &AtomicBool) -> Result<End> {
@@ -49,29 +52,40 @@ pub(super) fn run(args: &BakeArgs, cancelled: &AtomicBool) -> Result<End> {
     }
     let folder = Folder::open("-o", &args.output)?;
     let reports = args.report.open()?;
-    check_distinct(&reports.destinations())?;
+    let report_files = reports.destinations();
+    check_distinct(&report_files)?;
 
-    let scene = args.scene.open()?;
+    let reporter = ProgressReporter::new(&args.messages.progress);
+    let scene = args.scene.open(&reporter)?;
+    reporter.status("laying out the lightmaps");
     let layout = Layout::new(&scene, args.texels_per_metre.unwrap_or_else(|| usual_density(&scene)))?;
     layout.warnings.iter().for_each(|warning| complain(&format!("warning: {warning}")));
-    let geometry = geometry(&scene, &settings)?;
-    // Each round asks for one point of every texel, a different one in turn.
+    let geometry = geometry(&scene, &settings, &reporter)?;
+    // Each round estimates one point of every texel, another one each time.
     let phases: Vec<Vec<Receiver>> =
         (0..PHASE_COUNT.min(settings.rounds as usize)).map(|phase| receivers(&layout, phase, &geometry)).collect();
     let sensor = Sensor::Receivers { count: layout.texel_count() as u32 };
     let job = Job { scene: &scene, settings: &settings, sensor, camera: None, phases: &phases };
-    let gpu = args.report.device(&args.device)?;
+    let gpu = args.device.open(&reporter)?;
     let plan = plan(&gpu, &job, &geometry)?;
-    let lit = light(&gpu, &job, &geometry, plan, (args.report.progress, args.transport.stop.bias), cancelled)?;
+    let lit = light(&gpu, &job, &geometry, plan, args.transport.stop.bias, &reporter, cancelled)?;
 
     let estimates = estimates(&lit);
     let stops = args.exposure.unwrap_or_else(|| usual_exposure(&estimates));
-    bake::write(&folder, &scene, &layout, &layout.maps(&estimates), stops.exp2())?;
-    let text = light_report::text(&scene.name, &lit, reports.explain);
-    write_all(reports.files(&scene, &lit))?;
+    let text = light_report::text(&scene.name, &lit, args.messages.explain);
+    let written = bake::write(&folder, &scene, &layout, &layout.maps(&estimates), stops.exp2());
+    reporter.finish();
+    let written = written.and_then(|()| write_all(reports.files(&scene, &lit)));
+    if let Err(error) = written {
+        return say_beside(&report_files, &text).and(Err(error));
+    }
     let maps = layout.lightmaps().count();
     let document = args.output.join("scene.gltf");
-    say(&format!("{text}\nwrote {maps} lightmap(s) of {} texels and {} at {stops:+.2} stops", layout.texel_count(), document.display()))?;
+    let texels = layout.texel_count();
+    say_beside(
+        &report_files,
+        &format!("{text}\nwrote {maps} lightmap(s) of {texels} texels and {} at {stops:+.2} stops", document.display()),
+    )?;
     Ok(End::of(&lit))
 }
 

@@ -6,46 +6,48 @@ use std::time::Duration;
 
 use clap::{Args, ValueEnum};
 
-use super::stop::seconds;
-use super::{DeviceArgs, End, complain, say};
+use super::parse::parse_seconds;
+use super::progress::{ProgressArgs, ProgressReporter};
+use super::{DeviceArgs, End, JsonArg, optional_file, say_beside};
 use crate::bench::experiments::Experiment;
 use crate::bench::{self, Request, Size, table};
 use crate::error::{Error, Result};
 use crate::gpu::Gpu;
-use crate::output::destination::{Destination, Folder, write_all};
+use crate::output::destination::{Destination, Folder, check_distinct, write_all};
 
 #[derive(Args)]
 pub(super) struct BenchArgs {
-    /// Only these experiments, by name and separated by commas: open-box, builders, table-1, index, gather, cornell,
-    /// cornell-spheres, caustic-sphere, mesh, effects, compaction [default: all]
-    #[arg(long, value_name = "NAME", value_delimiter = ',', value_parser = experiment)]
-    only: Vec<Experiment>,
-    /// Workloads of the targets, or small ones that take seconds [default: full on a GPU, small on a CPU]
-    #[arg(long, value_enum)]
-    size: Option<SizeArg>,
-    /// Follow cost and memory over photons and triangles instead
-    #[arg(long, conflicts_with = "only")]
-    scale: bool,
-    /// Write the report as JSON
-    #[arg(long, value_name = "FILE")]
-    json: Option<PathBuf>,
-    /// Folder for the report as JSON and text, and charts of --scale; made if it is not there
-    #[arg(long, value_name = "DIR")]
-    out: Option<PathBuf>,
-    /// Wall time after which no further experiment begins: 90s, 10m
-    #[arg(long, value_name = "TIME", value_parser = seconds, allow_negative_numbers = true, default_value = "10m")]
+    /// Folder for the report as JSON and text, and for the charts of --scale; created if needed
+    #[arg(short, long, alias = "out", value_name = "DIR", help_heading = "Output")]
+    output: Option<PathBuf>,
+    #[command(flatten)]
+    json: JsonArg,
+    /// Start no further experiment after this time: 90s, 10m
+    #[arg(long, value_name = "TIME", value_parser = parse_seconds, allow_hyphen_values = true, default_value = "10m", help_heading = "When to stop")]
     time: f64,
+    /// Run only these experiments, separated by commas: open-box, builders, table-1, index, gather, cornell,
+    /// cornell-spheres, caustic-sphere, mesh, effects, compaction [default: all]
+    #[arg(long, value_name = "NAME", value_delimiter = ',', value_parser = parse_experiment, help_heading = "Measurements")]
+    only: Vec<Experiment>,
+    /// Size of the experiments: that of the performance targets, or seconds in all [default: full on a GPU, small on a CPU]
+    #[arg(long, alias = "size", value_enum, value_name = "SIZE", help_heading = "Measurements")]
+    workload: Option<WorkloadArg>,
+    /// Measure time and memory against the number of photons and of triangles instead
+    #[arg(long, conflicts_with = "only", help_heading = "Measurements")]
+    scale: bool,
+    #[command(flatten)]
+    progress: ProgressArgs,
     #[command(flatten)]
     device: DeviceArgs,
 }
 
 #[derive(Debug, Clone, Copy, PartialEq, Eq, ValueEnum)]
-enum SizeArg {
+enum WorkloadArg {
     Small,
     Full,
 }
 
-fn experiment(name: &str) -> std::result::Result<Experiment, String> {
+fn parse_experiment(name: &str) -> std::result::Result<Experiment, String> {
     Experiment::ALL.into_iter().find(|experiment| experiment.name() == name).ok_or_else(|| {
         let names: Vec<&str> = Experiment::ALL.iter().map(|experiment| experiment.name()).collect();
         format!("must be one of {}", names.join(", "))
@@ -56,27 +58,33 @@ pub(super) fn run(args: &BenchArgs, cancelled: &AtomicBool) -> Result<End> {
     if !(1.0..=1e6).contains(&args.time) {
         return Err(Error::setting("--time", args.time, "must be from 1s to 1000000s"));
     }
-    let json = args.json.as_ref().map(|path| Destination::open("--json", path)).transpose()?;
-    let folder = args.out.as_ref().map(|path| Folder::open("--out", path)).transpose()?;
+    let json = optional_file("--json", args.json.json.as_ref())?;
+    let folder = args.output.as_ref().map(|path| Folder::open("-o", path)).transpose()?;
+    let in_folder = folder.iter().map(|folder| folder.file("bench.json"));
+    check_distinct(&json.iter().cloned().chain(in_folder).collect::<Vec<_>>())?;
+    let reporter = ProgressReporter::new(&args.progress);
     let gpu = Gpu::open(&args.device.steady())?;
-    let usual = if gpu.facts().kind == "cpu" { SizeArg::Small } else { SizeArg::Full };
+    reporter.device(Some(&gpu));
+    let usual = if gpu.facts().kind == "cpu" { WorkloadArg::Small } else { WorkloadArg::Full };
     let request = Request {
         command: std::iter::once("photonmill".to_owned()).chain(std::env::args().skip(1)).collect::<Vec<_>>().join(" "),
-        size: match args.size.unwrap_or(usual) {
-            SizeArg::Small => Size::Small,
-            SizeArg::Full => Size::Full,
+        size: match args.workload.unwrap_or(usual) {
+            WorkloadArg::Small => Size::Small,
+            WorkloadArg::Full => Size::Full,
         },
         experiments: if args.only.is_empty() { Experiment::ALL.to_vec() } else { args.only.clone() },
         scale: args.scale,
         budget: Duration::from_secs_f64(args.time),
     };
-    let found = bench::run(&gpu, request, cancelled, &mut |line| complain(line))?;
-    if let Some(json) = json {
-        write_all([(json, found.json())])?;
-    }
-    if let Some(folder) = &folder {
-        bench::write(folder, &found)?;
-    }
-    say(table::text(&found).trim_end())?;
+    let names: Vec<&str> = request.experiments.iter().map(|experiment| experiment.name()).collect();
+    let what = if args.scale { "time and memory against photons and triangles".to_owned() } else { names.join(", ") };
+    reporter.note(&format!("plan: {what}; starts no experiment after {} s", args.time));
+    let found = bench::run(&gpu, request, cancelled, &mut |line| reporter.step(line))?;
+    reporter.finish();
+    let to_stdout = json.iter().any(Destination::is_standard_output).then(|| json.clone()).flatten();
+    let in_file = json.map_or(Ok(()), |json| write_all([(json, found.json())]));
+    let written = in_file.and(folder.map_or(Ok(()), |folder| bench::write(&folder, &found)));
+    say_beside(&to_stdout, table::text(&found).trim_end())?;
+    written?;
     Ok(if cancelled.load(std::sync::atomic::Ordering::Relaxed) { End::Cancelled } else { End::Finished })
 }

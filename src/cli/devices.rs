@@ -1,29 +1,31 @@
-//! `photonmill devices`: what the Vulkan loader offers, with the limits that matter here.
+//! `photonmill devices`: the Vulkan devices and their limits.
 
 use clap::Args;
 
-use super::say;
+use super::{JsonOrStdoutArg, optional_file, say};
 use crate::constants::LOOP_LIMIT;
-use crate::error::{Error, Result};
+use crate::error::{Error, INSTALL_VULKAN, Result};
 use crate::gpu::{DeviceFacts, Gpu, Options, check};
+use crate::output::destination::write_all;
 
 #[derive(Args)]
 pub(super) struct DevicesArgs {
-    /// Print JSON
-    #[arg(long)]
-    json: bool,
+    #[command(flatten)]
+    json: JsonOrStdoutArg,
 }
 
 pub(super) fn run(args: &DevicesArgs) -> Result<()> {
+    let json = optional_file("--json", args.json.json.as_ref())?;
     let (devices, reason) = match Gpu::list() {
         Err(Error::NoVulkan { reason }) => (Vec::new(), reason),
         devices => (devices?, "the Vulkan loader finds none".to_owned()),
     };
-    if args.json {
-        return say(&serde_json::to_string_pretty(&devices).expect("device facts are plain data"));
+    if let Some(json) = json {
+        let text = serde_json::to_string_pretty(&devices).expect("device facts are plain data");
+        return write_all([(json, (text + "\n").into_bytes())]);
     }
     if devices.is_empty() {
-        return say(&format!("No Vulkan device: {reason}. photonmill would run its CPU builder."));
+        return say(&format!("no Vulkan device: {reason}; {INSTALL_VULKAN}. Without one only the paper's box runs, by the CPU builder."));
     }
     say(&devices.iter().map(description).collect::<Vec<_>>().join("\n"))
 }
@@ -37,8 +39,8 @@ fn description(facts: &DeviceFacts) -> String {
     line("storage buffer range", mebibytes(facts.storage_buffer_range_bytes));
     line("largest allocation", mebibytes(facts.allocation_bytes));
     line("device memory", mebibytes(facts.device_memory_bytes));
-    line("storage buffers a stage", facts.storage_buffers_per_stage.to_string());
-    line("work groups", format!("{} x {}", facts.work_group_count_x, facts.work_group_count_y));
+    line("storage buffers per stage", facts.storage_buffers_per_stage.to_string());
+    line("work groups in x and y", format!("{} x {}", facts.work_group_count_x, facts.work_group_count_y));
     line("work-group size", facts.work_group_size.to_string());
     line(
         "timestamps",
@@ -47,7 +49,7 @@ fn description(facts: &DeviceFacts) -> String {
             bits => format!("{bits} bits of {} ns", facts.timestamp_period_ns),
         },
     );
-    line("64-bit atomics", if facts.int64_atomics { "yes" } else { "no: two 32-bit words instead" }.to_owned());
+    line("64-bit atomics", if facts.int64_atomics { "yes" } else { "no, photonmill uses two 32-bit words" }.to_owned());
     line("start-up check", verdict(facts));
     text
 }
@@ -58,7 +60,7 @@ fn verdict(facts: &DeviceFacts) -> String {
     let opened = Gpu::open(&Options { device: Some(facts.index.to_string()), ..Options::default() });
     match opened.and_then(|gpu| check::loop_count(&gpu, WANTED)) {
         Ok(count) if count.done == WANTED => "passed".to_owned(),
-        Ok(count) => format!("passed; loops end after {} iterations (photonmill does {LOOP_LIMIT} at most)", count.done),
+        Ok(count) => format!("passed; loops end after {} iterations (photonmill needs at most {LOOP_LIMIT})", count.done),
         Err(error) => error.to_string(),
     }
 }

@@ -1,38 +1,43 @@
-//! The command line: clap structs turned into settings, one file a subcommand. Nothing else knows
-//! clap.
+//! The command line: clap structs turned into settings, one file per subcommand. Nothing else knows clap.
 
 mod bake;
 mod bench;
 mod devices;
+mod help;
+mod interrupt;
 mod paper;
+mod parse;
+mod picture_size;
 mod plan;
 mod probe;
+mod progress;
 mod render;
 mod run;
 mod selfcheck;
 mod stop;
 mod study;
 mod transport;
+mod usage;
 
 use std::io::{ErrorKind, Write};
 use std::path::PathBuf;
-use std::sync::Arc;
-use std::sync::atomic::{AtomicBool, Ordering};
 
-use clap::error::{ContextKind, ContextValue, ErrorKind as ParseErrorKind};
-use clap::{Args, Parser, Subcommand};
+use clap::{Args, CommandFactory, FromArgMatches, Parser, Subcommand};
 
 use crate::error::{Error, Result};
 use crate::gpu::{Gpu, Options};
+use crate::output::destination::Destination;
 use crate::transport::{self as transport_line, Lit};
+use interrupt::{cancel_on_signal, exit_code, interruptible};
+use progress::print_line;
 
 /// Photon mapping on any Vulkan GPU.
 ///
-/// Without a subcommand, lights the open box of the paper 'Photon Mapping On The GPU' and writes its
-/// picture, a timing table and the photon ledger. With no option at all that is the paper's modified
-/// implementation with 15 bounces.
+/// `photonmill render` makes a picture of a scene, `photonmill bake` lightmaps. Without a command, photonmill lights the
+/// open box of the paper 'Photon Mapping On The GPU', writes its picture and prints the photon ledger and the time of
+/// every pass; the options below belong to that box.
 #[derive(Parser)]
-#[command(version, args_conflicts_with_subcommands = true, max_term_width = 100)]
+#[command(version, args_conflicts_with_subcommands = true, max_term_width = 100, after_help = help::MAIN)]
 struct Cli {
     #[command(subcommand)]
     command: Option<Command>,
@@ -42,23 +47,32 @@ struct Cli {
 
 #[derive(Subcommand)]
 enum Command {
-    /// Lists Vulkan devices with the limits that matter here
-    Devices(devices::DevicesArgs),
-    /// Renders what a camera sees of a scene
+    /// Render a picture of a scene
+    #[command(after_help = help::RENDER)]
     Render(render::RenderArgs),
-    /// Bakes the irradiance of every surface into lightmaps
+    /// Bake the irradiance of all surfaces of a scene into lightmaps
+    #[command(after_help = help::BAKE)]
     Bake(bake::BakeArgs),
-    /// Asks for the irradiance at given points of a scene
+    /// Compute the irradiance at given points of a scene
+    #[command(after_help = help::PROBE)]
     Probe(probe::ProbeArgs),
-    /// Prints which effects a scene calls for, and why
+    /// Print which effects a scene needs, and why
+    #[command(after_help = help::PLAN)]
     Plan(plan::PlanArgs),
-    /// Holds this device against closed forms, in under a minute
+    /// List the Vulkan devices and their limits
+    #[command(after_help = help::DEVICES)]
+    Devices(devices::DevicesArgs),
+    /// Check the results of a device against known solutions, in less than a minute
+    #[command(after_help = help::SELFCHECK)]
     Selfcheck(selfcheck::SelfcheckArgs),
-    /// Measures what accuracy costs in time on this device, choice by choice, and writes a page of it
+    /// Measure error against time for every setting on this device, and write a page about it
+    #[command(after_help = help::STUDY)]
     Study(study::StudyArgs),
-    /// Measures how near every pass comes to what this device can do
+    /// Measure the speed of every pass against the limits of the device
+    #[command(after_help = help::BENCH)]
     Bench(bench::BenchArgs),
-    /// Regenerates every figure and table of the paper as images, CSV and one HTML page
+    /// Reproduce every figure and table of the paper as images, CSV and one HTML page
+    #[command(after_help = help::PAPER)]
     Paper(paper::PaperArgs),
 }
 
@@ -66,11 +80,11 @@ enum Command {
 #[derive(Args)]
 #[command(next_help_heading = "Device")]
 struct DeviceArgs {
-    /// Vulkan device, by index or part of its name; see `photonmill devices` [default: a discrete GPU
-    /// if there is one]
-    #[arg(long, value_name = "INDEX|NAME")]
+    /// Vulkan device: its number or a part of its name, as `photonmill devices` lists them [default: a discrete
+    /// GPU if there is one]
+    #[arg(long, value_name = "NUMBER|NAME", allow_negative_numbers = true)]
     device: Option<String>,
-    /// Turn on the Vulkan validation layer with synchronisation validation; any message is an error
+    /// Turn on the Vulkan validation layer with synchronization validation; any message is an error
     #[arg(long)]
     validate: bool,
 }
@@ -98,15 +112,31 @@ impl DeviceArgs {
     }
 }
 
+/// Reports as files.
+#[derive(Args)]
+struct JsonArg {
+    /// Write the report as JSON; `-` is standard output
+    #[arg(long, value_name = "FILE", help_heading = "Output")]
+    json: Option<PathBuf>,
+}
+
+/// The same for commands that print what they find, where the file may be left out.
+#[derive(Args)]
+struct JsonOrStdoutArg {
+    /// Write the report as JSON; `-`, or no FILE, is standard output
+    #[arg(long, value_name = "FILE", num_args = 0..=1, default_missing_value = "-", help_heading = "Output")]
+    json: Option<PathBuf>,
+}
+
 /// How a run is timed.
 #[derive(Args)]
-#[command(next_help_heading = "Timing")]
+#[command(next_help_heading = "Device")]
 struct TimingArgs {
     /// Time every dispatch on the device, not only every pass
     #[arg(long)]
     time_dispatches: bool,
-    /// Keep the device busy before the first round, so that GPU times are those at the clock of work, to which a card that
-    /// idled takes 0.3 s to come; in no time of the report but that of --bias
+    /// Run warm-up work first, so that times are taken at full clock; it is excluded from all reported times but that of
+    /// --bias
     #[arg(long)]
     warm_up: bool,
 }
@@ -133,34 +163,50 @@ impl End {
 
 /// Runs the program on the process's arguments and returns its exit code.
 pub fn main() -> u8 {
-    let cli = match Cli::try_parse() {
-        Ok(cli) => cli,
+    if std::env::args_os().len() == 1 {
+        return print_start();
+    }
+    let command = Cli::command();
+    let parsed = command.clone().try_get_matches().and_then(|matches| Ok((Cli::from_arg_matches(&matches)?, matches)));
+    let (cli, matches) = match parsed {
+        Ok(parsed) => parsed,
         Err(error) if !error.use_stderr() => {
             // Help or version: what was asked for.
             let _ = error.print();
             return 0;
         }
         Err(error) => {
-            complain(&one_line(&error));
+            complain(&usage::one_line(&error));
             return 2;
         }
     };
-    let cancelled = cancel_on_interrupt();
+    let cancelled = cancel_on_signal();
     let result = match cli.command {
-        None => hearing(|| run::run(&cli.run, &cancelled)),
+        None => interruptible(|| run::run(&cli.run, &cancelled)),
         Some(Command::Devices(args)) => devices::run(&args).map(|()| End::Finished),
         Some(Command::Render(args)) => render::run(&args, &cancelled),
         Some(Command::Bake(args)) => bake::run(&args, &cancelled),
         Some(Command::Probe(args)) => probe::run(&args, &cancelled),
         Some(Command::Plan(args)) => plan::run(&args).map(|()| End::Finished),
-        Some(Command::Selfcheck(args)) => hearing(|| selfcheck::run(&args, &cancelled)),
-        Some(Command::Study(args)) => hearing(|| study::run(&args, &cancelled)),
-        Some(Command::Bench(args)) => hearing(|| bench::run(&args, &cancelled)),
-        Some(Command::Paper(args)) => hearing(|| paper::run(&args, &cancelled)),
+        Some(Command::Selfcheck(args)) => interruptible(|| selfcheck::run(&args, &cancelled)),
+        Some(Command::Study(args)) => interruptible(|| study::run(&args, &cancelled)),
+        Some(Command::Bench(args)) => interruptible(|| bench::run(&args, &cancelled)),
+        Some(Command::Paper(args)) => interruptible(|| paper::run(&args, &cancelled)),
     };
     match result {
         Ok(End::Finished) => 0,
-        Ok(End::Cancelled) => 130,
+        Ok(End::Cancelled) => exit_code(),
+        Err(error) => {
+            let error = usage::as_typed(error, &matches, &command);
+            complain(&error.to_string());
+            if matches!(error, Error::Interrupted) { exit_code() } else { error.exit_code() }
+        }
+    }
+}
+
+fn print_start() -> u8 {
+    match say(help::START) {
+        Ok(()) => 0,
         Err(error) => {
             complain(&error.to_string());
             error.exit_code()
@@ -168,11 +214,11 @@ pub fn main() -> u8 {
     }
 }
 
-/// One line on stderr. Where nobody can read it, the exit code still tells.
+/// One line on stderr. Where nobody can read it there still is the exit code.
 fn complain(line: &str) {
     // Names of files and of things in them may hold anything; a complaint stays one line.
     let line: String = line.chars().map(|letter| if letter.is_control() { ' ' } else { letter }).collect();
-    let _ = writeln!(std::io::stderr(), "photonmill: {line}");
+    print_line(&format!("photonmill: {line}"));
 }
 
 /// Text on stdout; a reader that has gone away, as `head` does, has seen enough.
@@ -185,60 +231,16 @@ fn say(text: &str) -> Result<()> {
     }
 }
 
-/// Whether what is under way looks at the flag; a scene that is being read does not.
-static HEARS_CANCELLING: AtomicBool = AtomicBool::new(false);
-
-/// Runs `body`, which looks at the flag.
-fn hearing<T>(body: impl FnOnce() -> T) -> T {
-    HEARS_CANCELLING.store(true, Ordering::Relaxed);
-    let result = body();
-    HEARS_CANCELLING.store(false, Ordering::Relaxed);
-    result
-}
-
-/// The first Ctrl-C (or SIGTERM) ends the run after the photons that are under way, the second at
-/// once; no temporary file exists before the end.
-fn cancel_on_interrupt() -> Arc<AtomicBool> {
-    let cancelled = Arc::new(AtomicBool::new(false));
-    let flag = cancelled.clone();
-    let handler = move || {
-        if flag.swap(true, Ordering::Relaxed) || !HEARS_CANCELLING.load(Ordering::Relaxed) {
-            std::process::exit(130);
-        }
-        complain("ending after the photons under way; Ctrl-C again to end at once");
-    };
-    // Without a handler Ctrl-C ends the program at once, and files still appear whole or not at all.
-    let _ = ctrlc::set_handler(handler);
-    cancelled
-}
-
-/// clap's complaint as one sentence with option, value and what is allowed.
-fn one_line(error: &clap::Error) -> String {
-    let context = |kind: ContextKind| match error.get(kind) {
-        Some(ContextValue::String(text)) => text.clone(),
-        Some(ContextValue::Strings(texts)) => texts.join(", "),
-        _ => String::new(),
-    };
-    let argument = context(ContextKind::InvalidArg);
-    let value = context(ContextKind::InvalidValue);
-    let option = argument.split([' ', '=']).next().unwrap_or_default();
-    match error.kind() {
-        ParseErrorKind::InvalidValue if !context(ContextKind::ValidValue).is_empty() => {
-            let shown = if value.is_empty() { "(no value)" } else { &value };
-            format!("{option} {shown}: must be one of {}", context(ContextKind::ValidValue))
-        }
-        ParseErrorKind::ValueValidation => {
-            let reason = std::error::Error::source(error).map(ToString::to_string).unwrap_or_default();
-            format!("{option} {value}: {reason}")
-        }
-        ParseErrorKind::UnknownArgument => format!("{argument}: there is no such option; see --help"),
-        ParseErrorKind::InvalidSubcommand => {
-            format!("{}: there is no such subcommand; see --help", context(ContextKind::InvalidSubcommand))
-        }
-        _ => {
-            let rendered = error.render().to_string();
-            let sentence: Vec<&str> = rendered.lines().take_while(|line| !line.is_empty()).map(str::trim).collect();
-            sentence.join(" ").trim_start_matches("error: ").to_owned()
-        }
+/// A report for people: on stdout, unless one of the files goes there.
+fn say_beside<'a>(files: impl IntoIterator<Item = &'a Destination>, text: &str) -> Result<()> {
+    if files.into_iter().any(Destination::is_standard_output) {
+        print_line(text);
+        return Ok(());
     }
+    say(text)
+}
+
+/// A destination that may be left out.
+fn optional_file(option: &'static str, path: Option<&PathBuf>) -> Result<Option<Destination>> {
+    path.map(|path| Destination::open(option, path)).transpose()
 }

@@ -5,32 +5,33 @@ use std::sync::atomic::AtomicBool;
 
 use clap::Args;
 
-use super::run::{threads, whole};
-use super::stop::seconds;
+use super::parse::{parse_integer, parse_seconds, parse_threads};
+use super::progress::{ProgressArgs, ProgressReporter};
 use super::{DeviceArgs, End, complain, say};
 use crate::error::{Error, Result};
 use crate::output::destination::Folder;
 use crate::paper::bench::Bench;
-use crate::paper::{self, Request, published};
+use crate::paper::{self, Reproduction, Request, published, tables};
 
 #[derive(Args)]
 pub(super) struct PaperArgs {
-    /// Folder for pictures, tables and index.html; made if it is not there
-    #[arg(long, value_name = "DIR")]
-    out: PathBuf,
-    /// Photons of a round at the size that fills the device [default: 4194304; 65536 on the CPU]
-    #[arg(long, value_name = "N", value_parser = whole::<u32>, allow_negative_numbers = true)]
+    /// Folder for pictures, tables and index.html; created if needed
+    #[arg(short, long, alias = "out", value_name = "DIR", help_heading = "Output")]
+    output: PathBuf,
+    /// Photons per round of a size that fills the device [default: 4194304; 65536 on a CPU]
+    #[arg(long, value_name = "N", value_parser = parse_integer::<u32>, allow_hyphen_values = true, help_heading = "Measurements")]
     large: Option<u32>,
-    /// Runs of each case after the first, which is dropped; the median counts. At most 3 at the
-    /// large size
-    #[arg(long, value_name = "K", value_parser = whole::<u32>, allow_negative_numbers = true, default_value = "7")]
+    /// Runs of each case, of which the median counts, after a first one that is dropped; at most 3 at the large size
+    #[arg(long, value_name = "N", value_parser = parse_integer::<u32>, allow_hyphen_values = true, default_value = "7", help_heading = "Measurements")]
     repeats: u32,
-    /// Measure the CPU builder on this many threads too, or on `all` [default: 1 thread only]
-    #[arg(long, value_name = "N|all", value_parser = threads)]
-    threads: Option<usize>,
-    /// Leave out rows of table 1 that are predicted to take longer
-    #[arg(long, value_name = "TIME", value_parser = seconds, allow_negative_numbers = true, default_value = "90s")]
+    /// Leave out rows of table 1 that would take longer than this
+    #[arg(long, value_name = "TIME", value_parser = parse_seconds, allow_hyphen_values = true, default_value = "90s", help_heading = "Measurements")]
     longest: f64,
+    /// Also measure the CPU builder on this many threads, or on `all` [default: only on one]
+    #[arg(long, value_name = "N|all", value_parser = parse_threads, allow_hyphen_values = true, help_heading = "Implementation")]
+    threads: Option<usize>,
+    #[command(flatten)]
+    progress: ProgressArgs,
     #[command(flatten)]
     device: DeviceArgs,
 }
@@ -40,8 +41,10 @@ const LARGE_ON_CPU: u32 = 1 << 16;
 
 pub(super) fn run(args: &PaperArgs, cancelled: &AtomicBool) -> Result<End> {
     args.validate()?;
-    let folder = Folder::open("--out", &args.out)?;
+    let folder = Folder::open("-o", &args.output)?;
+    let reporter = ProgressReporter::new(&args.progress);
     let gpu = args.device.open(&args.device.steady())?;
+    reporter.device(gpu.as_ref());
     let is_cpu = gpu.as_ref().is_none_or(|gpu| gpu.facts().kind == "cpu");
     let request = Request {
         large: args.large.unwrap_or(if is_cpu { LARGE_ON_CPU } else { LARGE_ON_GPU }),
@@ -49,28 +52,47 @@ pub(super) fn run(args: &PaperArgs, cancelled: &AtomicBool) -> Result<End> {
         threads: args.threads.unwrap_or(1),
         longest_ms: 1e3 * args.longest,
     };
-    let mut progress = |line: &str| complain(line);
+    reporter.note(&format!(
+        "plan: 4 figures, running times and table 1; {} and {} photons per round, the median of {} runs",
+        published::PHOTONS,
+        request.large,
+        request.repeats
+    ));
+    let mut progress = |line: &str| reporter.step(line);
     let found = paper::reproduce(&mut Bench::new(gpu.as_ref(), cancelled, &mut progress), request)?;
-    paper::write(&folder, &found)?;
+    reporter.finish();
+    write(&folder, &found)?;
     if !found.complete {
-        complain("incomplete: ended before the last experiment; what was finished is written");
+        complain("incomplete: ended before the last experiment; the page has what was finished");
     }
     say(&format!("wrote {}", folder.path().join("index.html").display()))?;
     Ok(if found.complete { End::Finished } else { End::Cancelled })
+}
+
+/// Writes the page. What was measured for minutes must not be lost: if no folder takes it, the tables are printed.
+fn write(folder: &Folder, found: &Reproduction) -> Result<()> {
+    match paper::write(folder, found) {
+        Err(error @ Error::Output { .. }) => {
+            let tables = [tables::running_times(&found.running_times), tables::totals(&found.totals)];
+            let text = tables.map(|table| String::from_utf8_lossy(&table).into_owned()).join("\n");
+            say(text.trim_end()).and(Err(error))
+        }
+        written => written,
+    }
 }
 
 impl PaperArgs {
     fn validate(&self) -> Result<()> {
         let smallest = published::PHOTONS + 1;
         if !(smallest..=MAX_LARGE).contains(&self.large.unwrap_or(smallest)) {
-            let allowed = format!("must be from {smallest} to {MAX_LARGE} (photons a round, more than the paper's)");
+            let allowed = format!("must be from {smallest} to {MAX_LARGE} photons per round, more than the paper's");
             return Err(Error::setting("--large", self.large.unwrap_or_default(), allowed));
         }
         if !(1..=MAX_REPEATS).contains(&self.repeats) {
             return Err(Error::setting("--repeats", self.repeats, format!("must be from 1 to {MAX_REPEATS}")));
         }
         if !(self.longest.is_finite() && self.longest > 0.0) {
-            return Err(Error::setting("--longest", format!("{}s", self.longest), "must be a time above 0, as 90s"));
+            return Err(Error::setting("--longest", format!("{}s", self.longest), "must be a time above 0, such as 90s"));
         }
         let threads = self.threads.unwrap_or(1);
         if !(1..=MAX_THREADS).contains(&threads) {
@@ -93,7 +115,7 @@ mod tests {
     use crate::rng::Rng;
     use crate::settings::{Gather, Preset, Settings, Variant};
 
-    /// The page tells how to repeat each experiment, so the lines must mean what was run.
+    /// The page prints the command that repeats each experiment, so it must mean what was run.
     #[test]
     fn printed_commands_give_the_settings_they_stand_for() {
         for preset in [Preset::Naive, Preset::Modified, Preset::Phong, Preset::Rounds] {

@@ -2,10 +2,13 @@
 
 use clap::Args;
 
-use super::transport::{Job, PartArg, SceneArgs, TransportArgs, camera, geometry, size};
-use super::{DeviceArgs, say};
+use super::picture_size::{PictureSize, parse_size};
+use super::progress::{ProgressArgs, ProgressReporter};
+use super::transport::{Job, PartArg, SceneArgs, TransportArgs, camera, geometry};
+use super::{DeviceArgs, JsonOrStdoutArg, optional_file, say};
 use crate::error::Result;
 use crate::gpu::Gpu;
+use crate::output::destination::write_all;
 use crate::output::light_report;
 use crate::plan::Limits;
 use crate::plan::transport::{Sensor, TransportPlan};
@@ -15,18 +18,23 @@ use crate::settings::transport::{Part, TransportSettings};
 #[derive(Args)]
 pub(super) struct PlanArgs {
     #[command(flatten)]
+    json: JsonOrStdoutArg,
+    #[command(flatten)]
     scene: SceneArgs,
-    /// Width and height in pixels
-    #[arg(long, value_name = "WxH", value_parser = size, allow_hyphen_values = true, default_value = "640x480", help_heading = "Scene")]
-    size: (u32, u32),
-    /// Only this part of the light
-    #[arg(long, value_enum, help_heading = "Transport")]
-    part: Option<PartArg>,
-    /// Print JSON
-    #[arg(long)]
-    json: bool,
+    /// Camera by name [default: the first one; one that sees the whole scene if it has none]
+    #[arg(long, value_name = "NAME", help_heading = "Scene")]
+    camera: Option<String>,
+    /// Size of the picture in pixels; without a height it follows from the camera's aspect ratio [default: about 307200
+    /// pixels of the camera's aspect ratio, 640x480 if it has none]
+    #[arg(long, value_name = "WIDTH[xHEIGHT]", value_parser = parse_size, allow_hyphen_values = true, help_heading = "Scene")]
+    size: Option<PictureSize>,
     #[command(flatten)]
     transport: TransportArgs,
+    /// Compute only this part of the light; the four parts sum to `all` exactly
+    #[arg(long, value_enum, value_name = "PART", help_heading = "Light transport")]
+    part: Option<PartArg>,
+    #[command(flatten)]
+    progress: ProgressArgs,
     #[command(flatten)]
     device: DeviceArgs,
 }
@@ -35,11 +43,13 @@ pub(super) fn run(args: &PlanArgs) -> Result<()> {
     let usual = args.transport.settings();
     let settings = TransportSettings { part: args.part.map_or(usual.part, Part::from), ..usual };
     settings.validate()?;
-    let scene = args.scene.open()?;
-    let (width, height) = args.size;
-    let camera = camera(&scene, None)?;
+    let json = optional_file("--json", args.json.json.as_ref())?;
+    let reporter = ProgressReporter::new(&args.progress);
+    let scene = args.scene.open(&reporter)?;
+    let camera = camera(&scene, args.camera.as_deref())?;
+    let (width, height) = PictureSize::resolve(args.size, &camera, &reporter)?;
     let job = Job { scene: &scene, settings: &settings, sensor: Sensor::Picture { width, height }, camera: Some(&camera), phases: &[] };
-    let geometry = geometry(&scene, &settings)?;
+    let geometry = geometry(&scene, &settings, &reporter)?;
     // A plan is data: it needs a device's limits, not the device.
     let limits = match Gpu::open(&args.device.options()) {
         Ok(gpu) => render::limits(gpu.facts()),
@@ -47,8 +57,9 @@ pub(super) fn run(args: &PlanArgs) -> Result<()> {
         Err(_) => Limits::of_host(),
     };
     let plan = TransportPlan::new(job.scene, &geometry, job.settings, job.sensor, &limits)?;
-    if args.json {
-        return say(&String::from_utf8(light_report::plan_json(&plan)).expect("JSON is text"));
+    reporter.finish();
+    if let Some(json) = json {
+        return write_all([(json, [light_report::plan_json(&plan), b"\n".to_vec()].concat())]);
     }
     let mut text = light_report::plan_table(&plan, None);
     if let Some(line) = light_report::missing(&plan) {
@@ -59,8 +70,8 @@ pub(super) fn run(args: &PlanArgs) -> Result<()> {
         .maps()
         .map(|map| {
             let metres = map.radius * geometry.unit;
-            format!("{} map: {} photons a round in {} chunk(s), first radius {metres:.4} m", map.name, map.photons, map.chunks().count())
+            format!("{} map: {} photons per round in {} chunk(s), first radius {metres:.4} m", map.name, map.photons, map.chunks().count())
         })
         .collect();
-    say(&format!("{text}{}\n{} bytes of device memory", maps.join("\n"), plan.bytes))
+    say(&format!("{text}{}\n{width} x {height} pixels\n{} bytes of device memory", maps.join("\n"), plan.bytes))
 }

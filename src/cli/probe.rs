@@ -7,8 +7,9 @@ use std::sync::atomic::AtomicBool;
 use clap::Args;
 use glam::DVec3;
 
-use super::transport::{Job, ReportArgs, SceneArgs, TransportArgs, geometry, light, plan};
-use super::{DeviceArgs, End, complain, say};
+use super::progress::ProgressReporter;
+use super::transport::{Job, MessageArgs, ReportArgs, SceneArgs, TimedDeviceArgs, TransportArgs, geometry, light, plan};
+use super::{End, complain, say_beside};
 use crate::error::{Error, Result};
 use crate::output::destination::{Destination, check_distinct, write_all};
 use crate::output::light_report;
@@ -21,20 +22,23 @@ use crate::transport::Lit;
 
 #[derive(Args)]
 pub(super) struct ProbeArgs {
-    #[command(flatten)]
-    scene: SceneArgs,
-    /// Points and directions, a line `x y z nx ny nz` each, metres in the world; `-` reads standard input
-    #[arg(long, value_name = "FILE", help_heading = "Scene")]
-    points: PathBuf,
-    /// A line for each point: irradiance of red, green, blue in W/m2, and their standard errors
-    #[arg(short, long, value_name = "FILE.csv", help_heading = "Output")]
+    /// CSV with one line per point: irradiance of red, green and blue in W/m2, and their standard errors; `-` is standard
+    /// output
+    #[arg(short, long, alias = "out", value_name = "FILE", help_heading = "Output")]
     output: PathBuf,
-    #[command(flatten)]
-    transport: TransportArgs,
     #[command(flatten)]
     report: ReportArgs,
     #[command(flatten)]
-    device: DeviceArgs,
+    scene: SceneArgs,
+    /// Points and normals, one `x y z nx ny nz` per line, in metres; `-` is standard input
+    #[arg(long, value_name = "FILE", help_heading = "Scene")]
+    points: PathBuf,
+    #[command(flatten)]
+    transport: TransportArgs,
+    #[command(flatten)]
+    messages: MessageArgs,
+    #[command(flatten)]
+    device: TimedDeviceArgs,
 }
 
 impl ProbeArgs {
@@ -48,31 +52,37 @@ pub(super) fn run(args: &ProbeArgs, cancelled: &AtomicBool) -> Result<End> {
     settings.validate()?;
     let output = Destination::open("-o", &args.output)?;
     let reports = args.report.open()?;
-    check_distinct(&[vec![output.clone()], reports.destinations()].concat())?;
+    let all = [vec![output.clone()], reports.destinations()].concat();
+    check_distinct(&all)?;
     let points = read_points(&args.points)?;
 
-    let scene = args.scene.open()?;
+    let reporter = ProgressReporter::new(&args.messages.progress);
+    let scene = args.scene.open(&reporter)?;
     let is_specular = |mesh: &Mesh| scene.materials[mesh.material].surface.is_specular();
     let is_point_like = |light: &Light| !matches!(light.kind, LightKind::Environment { .. });
     if scene.lights.iter().any(is_point_like) && scene.meshes.iter().any(is_specular) {
-        complain("warning: points that lie on no surface get no light over mirrors and through glass from lights that are no mesh");
+        complain("warning: points that lie on no surface receive no caustics of point, spot, directional and disc lights");
     }
     if settings.illumination == Illumination::Photons && !scene.lights.is_empty() {
-        complain("warning: with --illumination photons, points that lie on no surface get no direct light of lights that are no mesh");
+        complain("warning: with --illumination photons, points that lie on no surface receive direct light of emissive meshes only");
     }
-    let geometry = geometry(&scene, &settings)?;
+    let geometry = geometry(&scene, &settings, &reporter)?;
     let phases = [receivers(&points, &geometry)];
     let sensor = Sensor::Receivers { count: points.len() as u32 };
     let job = Job { scene: &scene, settings: &settings, sensor, camera: None, phases: &phases };
-    let gpu = args.report.device(&args.device)?;
+    let gpu = args.device.open(&reporter)?;
     let plan = plan(&gpu, &job, &geometry)?;
-    let lit = light(&gpu, &job, &geometry, plan, (args.report.progress, args.transport.stop.bias), cancelled)?;
+    let lit = light(&gpu, &job, &geometry, plan, args.transport.stop.bias, &reporter, cancelled)?;
+    reporter.finish();
 
-    let text = light_report::text(&scene.name, &lit, reports.explain);
+    let text = light_report::text(&scene.name, &lit, args.messages.explain);
+    let wrote = if output.is_standard_output() { String::new() } else { format!("\nwrote {}", args.output.display()) };
     let mut files = vec![(output, table(&lit))];
     files.extend(reports.files(&scene, &lit));
-    write_all(files)?;
-    say(&format!("{text}\nwrote {}", args.output.display()))?;
+    if let Err(error) = write_all(files) {
+        return say_beside(&all, &text).and(Err(error));
+    }
+    say_beside(&all, &format!("{}{wrote}", text.trim_end()))?;
     Ok(End::of(&lit))
 }
 
@@ -104,7 +114,7 @@ const MAX_POINTS: usize = 1 << 28;
 /// Metres: the square of anything larger would leave f32's range once normalised.
 const MAX_COORDINATE: f64 = 1e15;
 
-/// Positions and unit normals; empty lines and lines that begin with # are passed over.
+/// Positions and unit normals; empty lines and lines that begin with # are skipped.
 fn read_points(path: &Path) -> Result<Vec<(DVec3, DVec3)>> {
     let refuse = |reason: String| Error::setting("--points", path.display(), reason);
     let mut text = String::new();

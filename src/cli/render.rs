@@ -5,9 +5,13 @@ use std::sync::atomic::AtomicBool;
 
 use clap::Args;
 
-use super::run::{number, whole};
-use super::transport::{FilterArg, Job, PartArg, ReportArgs, SceneArgs, TransportArgs, camera, geometry, light, photon_name, plan, size};
-use super::{DeviceArgs, End, say};
+use super::parse::{parse_integer, parse_number, parse_photon_name};
+use super::picture_size::{PictureSize, parse_size};
+use super::progress::ProgressReporter;
+use super::transport::{
+    FilterArg, Job, MessageArgs, PartArg, ReportArgs, SceneArgs, TimedDeviceArgs, TransportArgs, camera, geometry, light, plan,
+};
+use super::{End, optional_file, say, say_beside};
 use crate::error::{Error, Result};
 use crate::judge::{self, Judge, Verdict};
 use crate::output::colour::ColourPicture;
@@ -22,50 +26,51 @@ use crate::transport::replay::{self, PhotonName};
 
 #[derive(Args)]
 pub(super) struct RenderArgs {
-    #[command(flatten)]
-    scene: SceneArgs,
-    /// Picture: an .exr of linear radiance, W/m2/sr, or a .png for the eye
-    #[arg(short, long, value_name = "FILE", required_unless_present = "replay", help_heading = "Output")]
+    /// Picture: an .exr of linear radiance in W/m2/sr, or a .png
+    #[arg(short, long, alias = "out", value_name = "FILE", required_unless_present = "replay", help_heading = "Output")]
     output: Option<PathBuf>,
-    /// Standard error of each pixel, an .exr in the same unit
-    #[arg(long, value_name = "FILE", help_heading = "Output")]
-    error_image: Option<PathBuf>,
-    /// Brightness of a PNG in stops: each doubles it [default: so that the picture's mean is a middle
-    /// grey]
-    #[arg(long, value_name = "STOPS", value_parser = number::<f32>, allow_negative_numbers = true, help_heading = "Output")]
-    exposure: Option<f32>,
-    /// Width and height in pixels
-    #[arg(long, value_name = "WxH", value_parser = size, allow_hyphen_values = true, default_value = "640x480", help_heading = "Scene")]
-    size: (u32, u32),
-    /// Hold the picture against a path tracer on the CPU of so many samples a pixel (64), and say whether they
-    /// agree within their errors
-    #[arg(long, value_name = "SAMPLES", value_parser = whole::<u32>, allow_negative_numbers = true, num_args = 0..=1, default_missing_value = "64", help_heading = "Output")]
-    judge: Option<u32>,
-    /// Trace one photon of the run by itself, print its path and end: round and number from 0, `:caustic` for one of
-    /// the caustic map
-    #[arg(long, value_name = "ROUND:PHOTON", value_parser = photon_name, help_heading = "Output",
-        conflicts_with_all = ["output", "error_image", "exposure", "judge", "explain", "json", "trace", "time_dispatches"])]
-    replay: Option<PhotonName>,
-    /// Camera by name [default: the first; one that sees everything if there is none]
-    #[arg(long, value_name = "NAME", help_heading = "Scene")]
-    camera: Option<String>,
-    /// Only this part of the light; the four add up to the whole to the bit
-    #[arg(long, value_enum, help_heading = "Transport")]
-    part: Option<PartArg>,
-    /// Paths from the camera through each pixel, each round, a power of two: even strata of the pixel, of the lamps and of what
-    /// glass mirrors. All look caustics up, and what they see in mirrors and glass; one looks up the global map for all
-    /// [default: 1]
-    #[arg(long, value_parser = whole::<u32>, allow_negative_numbers = true, help_heading = "Transport")]
-    samples: Option<u32>,
-    /// How a pixel weighs the picture around its centre [default: box]
-    #[arg(long, value_enum, help_heading = "Estimate")]
-    filter: Option<FilterArg>,
-    #[command(flatten)]
-    transport: TransportArgs,
     #[command(flatten)]
     report: ReportArgs,
+    /// Write the standard error of each pixel as an .exr, W/m2/sr
+    #[arg(long, value_name = "FILE", help_heading = "Output")]
+    error_image: Option<PathBuf>,
+    /// Exposure of a PNG in stops, each of which doubles the brightness [default: the mean becomes middle grey]
+    #[arg(long, value_name = "STOPS", value_parser = parse_number::<f32>, allow_hyphen_values = true, help_heading = "Output")]
+    exposure: Option<f32>,
     #[command(flatten)]
-    device: DeviceArgs,
+    scene: SceneArgs,
+    /// Camera by name [default: the first one; one that sees the whole scene if it has none]
+    #[arg(long, value_name = "NAME", help_heading = "Scene")]
+    camera: Option<String>,
+    /// Size of the picture in pixels; without a height it follows from the camera's aspect ratio [default: about 307200
+    /// pixels of the camera's aspect ratio, 640x480 if it has none]
+    #[arg(long, value_name = "WIDTH[xHEIGHT]", value_parser = parse_size, allow_hyphen_values = true, help_heading = "Scene")]
+    size: Option<PictureSize>,
+    #[command(flatten)]
+    transport: TransportArgs,
+    /// Compute only this part of the light; the four parts sum to `all` exactly
+    #[arg(long, value_enum, value_name = "PART", help_heading = "Light transport")]
+    part: Option<PartArg>,
+    /// Camera paths per pixel and round, a power of two. Every path queries the caustic map; only the first queries the
+    /// global map [default: 1]
+    #[arg(long, value_name = "N", value_parser = parse_integer::<u32>, allow_hyphen_values = true, help_heading = "Light transport")]
+    samples: Option<u32>,
+    /// Reconstruction filter of the pixels [default: box]
+    #[arg(long, value_enum, value_name = "FILTER", help_heading = "Light transport")]
+    filter: Option<FilterArg>,
+    /// Also path trace the picture on the CPU with this many samples per pixel (64), and print whether the two agree within
+    /// their errors
+    #[arg(long, value_name = "SAMPLES", value_parser = parse_integer::<u32>, allow_negative_numbers = true, num_args = 0..=1, default_missing_value = "64", help_heading = "Checks")]
+    judge: Option<u32>,
+    /// Trace a single photon of this run, print its path, and exit; rounds and photons count from 0, and `:caustic` at the
+    /// end takes a photon of the caustic map
+    #[arg(long, value_name = "ROUND:PHOTON", value_parser = parse_photon_name, help_heading = "Checks",
+        conflicts_with_all = ["output", "error_image", "exposure", "judge", "explain", "json", "trace", "time_dispatches"])]
+    replay: Option<PhotonName>,
+    #[command(flatten)]
+    messages: MessageArgs,
+    #[command(flatten)]
+    device: TimedDeviceArgs,
 }
 
 impl RenderArgs {
@@ -90,20 +95,20 @@ pub(super) fn run(args: &RenderArgs, cancelled: &AtomicBool) -> Result<End> {
     let format = Format::of("-o", output)?;
     if let Some(samples) = args.judge {
         if !(2..=MAX_JUDGE_SAMPLES).contains(&samples) {
-            return Err(Error::setting("--judge", samples, format!("must be from 2 to {MAX_JUDGE_SAMPLES} samples a pixel")));
+            return Err(Error::setting("--judge", samples, format!("must be from 2 to {MAX_JUDGE_SAMPLES} samples per pixel")));
         }
         if settings.filter != Filter::Box || settings.rounds < 2 {
-            return Err(Error::setting("--judge", samples, "needs --filter box and two rounds or more, whose spread is the error"));
+            return Err(Error::setting("--judge", samples, "needs --filter box, and two rounds or more to know the error"));
         }
     }
     if let (Format::Exr, Some(exposure)) = (format, args.exposure) {
-        return Err(Error::setting("--exposure", exposure, "is for PNG only: an EXR holds radiance untouched"));
+        return Err(Error::setting("--exposure", exposure, "is for PNG only: an EXR holds linear radiance"));
     }
     if let Some(exposure) = args.exposure.filter(|stops| stops.is_nan() || stops.abs() > 64.0) {
         return Err(Error::setting("--exposure", exposure, "must be from -64 to 64 stops"));
     }
     let picture = Destination::open("-o", output)?;
-    let errors = args.error_image.as_ref().map(|path| Destination::open("--error-image", path)).transpose()?;
+    let errors = optional_file("--error-image", args.error_image.as_ref())?;
     if let Some(path) = &args.error_image
         && Format::of("--error-image", path)? != Format::Exr
     {
@@ -113,45 +118,57 @@ pub(super) fn run(args: &RenderArgs, cancelled: &AtomicBool) -> Result<End> {
     let all: Vec<Destination> = [vec![picture.clone()], errors.clone().into_iter().collect(), reports.destinations()].concat();
     check_distinct(&all)?;
 
-    let scene = args.scene.open()?;
+    let reporter = ProgressReporter::new(&args.messages.progress);
+    let scene = args.scene.open(&reporter)?;
     let camera = camera(&scene, args.camera.as_deref())?;
-    let (width, height) = args.size;
+    let (width, height) = PictureSize::resolve(args.size, &camera, &reporter)?;
     let job = Job { scene: &scene, settings: &settings, sensor: Sensor::Picture { width, height }, camera: Some(&camera), phases: &[] };
-    let geometry = geometry(&scene, &settings)?;
-    let gpu = args.report.device(&args.device)?;
+    let geometry = geometry(&scene, &settings, &reporter)?;
+    let gpu = args.device.open(&reporter)?;
     let plan = plan(&gpu, &job, &geometry)?;
-    let lit = light(&gpu, &job, &geometry, plan, (args.report.progress, args.transport.stop.bias), cancelled)?;
+    let lit = light(&gpu, &job, &geometry, plan, args.transport.stop.bias, &reporter, cancelled)?;
 
     let image = radiance(&lit, width, height);
     let stops = args.exposure.unwrap_or_else(|| image.usual_exposure());
-    let text = light_report::text(&scene.name, &lit, reports.explain);
+    let text = light_report::text(&scene.name, &lit, args.messages.explain);
     let mut files = vec![(picture, image.encode(format, stops))];
     if let Some(errors) = errors {
         files.push((errors, standard_error(&lit, width, height).encode(Format::Exr, 0.0)));
     }
     files.extend(reports.files(&scene, &lit));
-    write_all(files)?;
+    let written = write_all(files);
     let shown = match format {
         Format::Png => format!(" at {stops:+.2} stops"),
         Format::Exr => String::new(),
     };
-    say(&format!("{text}\nwrote {}{shown}", output.display()))?;
+    reporter.finish();
+    if let Err(error) = written {
+        return say_beside(&all, &text).and(Err(error));
+    }
+    say_beside(&all, &format!("{text}\nwrote {}{shown}", output.display()))?;
     if let Some(samples) = args.judge {
-        // The picture is there; who has seen enough may end the program.
-        say(&format!("judge: {}", verdict(&lit, &scene, &camera, (width, height), samples)))?;
+        // The picture is there, so Ctrl-C may end the program here.
+        let reporter = ProgressReporter::new(&args.messages.progress);
+        reporter.step(&format!("path tracing {samples} samples per pixel on the CPU for --judge"));
+        let verdict = verdict(&lit, &scene, &camera, (width, height), samples);
+        reporter.finish();
+        say_beside(&all, &format!("judge: {verdict}"))?;
     }
     Ok(End::of(&lit))
 }
 
 /// The path of one photon of the run that these options ask for.
 fn show_photon(args: &RenderArgs, settings: &TransportSettings, name: PhotonName) -> Result<End> {
-    let scene = args.scene.open()?;
-    let (width, height) = args.size;
+    let reporter = ProgressReporter::new(&args.messages.progress);
+    let scene = args.scene.open(&reporter)?;
+    let camera = camera(&scene, args.camera.as_deref())?;
+    let (width, height) = PictureSize::resolve(args.size, &camera, &reporter)?;
     let job = Job { scene: &scene, settings, sensor: Sensor::Picture { width, height }, camera: None, phases: &[] };
-    let geometry = geometry(&scene, settings)?;
-    let gpu = args.report.device(&args.device)?;
+    let geometry = geometry(&scene, settings, &reporter)?;
+    let gpu = args.device.open(&reporter)?;
     let plan = plan(&gpu, &job, &geometry)?;
     let path = replay::replay(&gpu, &geometry, &plan, name)?;
+    reporter.finish();
     say(&path.table(&geometry, &plan))?;
     Ok(End::Finished)
 }

@@ -6,9 +6,10 @@ use std::time::Instant;
 
 use clap::{Args, ValueEnum};
 
-use super::stop::{ProgressArg, StopArgs, Teller, bias_before, rounds_after};
-use super::transport::photon_name;
-use super::{DeviceArgs, End, TimingArgs, complain, say};
+use super::parse::{parse_integer, parse_number, parse_numbers, parse_photon_name, parse_shininess, parse_threads};
+use super::progress::{ProgressArgs, ProgressReporter};
+use super::stop::{StopArgs, bias_before, goals, rounds_after};
+use super::{DeviceArgs, End, JsonArg, TimingArgs, complain, optional_file, say, say_beside};
 use crate::error::{Error, Result};
 use crate::film::estimate_walls;
 use crate::gpu::Gpu;
@@ -16,144 +17,140 @@ use crate::output::destination::{Destination, Folder, check_distinct, write_all}
 use crate::output::image::{Format, overview};
 use crate::output::lightmap::{self, Quantity};
 use crate::output::{report, trace_file};
+use crate::plan::{Limits, Plan};
 use crate::render::{self, Choice, Control, Outcome};
 use crate::rng::Rng;
 use crate::scene::open_box::open_box;
 use crate::scene::room::RoomScene;
 use crate::settings::stop::Stop;
-use crate::settings::{EmissionLaw, Gather, Math, PhongDirection, Preset, Settings, Sums, Variant, WALL_NAMES};
+use crate::settings::{EmissionLaw, Gather, Math, PhongDirection, Preset, Settings, Sums, Variant};
 use crate::timings::{Clock, Span};
 use crate::transport::replay::PhotonName;
 
 #[derive(Args)]
 pub(super) struct RunArgs {
-    /// Experiment of the paper whose settings are the defaults [default: modified]
-    #[arg(long, value_enum, help_heading = "Experiment")]
-    preset: Option<PresetArg>,
-    /// How the photon map is built [default: atomic; naive with --preset naive]
-    #[arg(long, value_enum, help_heading = "Experiment")]
-    variant: Option<VariantArg>,
-    /// Photons of a round, all lights together [default: 5000]
-    #[arg(long, value_parser = whole::<u32>, allow_negative_numbers = true, help_heading = "Experiment")]
-    photons: Option<u32>,
-    /// Rounds whose photons add up [default: 1; 100 with --preset rounds; with --error, --time or --total-photons as
-    /// many as it takes, 16777216 at most]
-    #[arg(long, value_parser = whole::<u32>, allow_negative_numbers = true, help_heading = "Experiment")]
-    rounds: Option<u32>,
-    /// Most bounces of a photon [default: 15; 2 with --preset naive]
-    #[arg(long, value_parser = whole::<u32>, allow_negative_numbers = true, help_heading = "Experiment")]
-    bounces: Option<u32>,
-    /// Seed of the random numbers [default: 1]
-    #[arg(long, value_parser = whole::<u64>, allow_negative_numbers = true, help_heading = "Experiment")]
-    seed: Option<u64>,
-    /// Random numbers: the paper's drand48, its alternative the Mersenne Twister, counter-based, or
-    /// Owen-scrambled Sobol' points, which fall more evenly than chance
-    /// [default: rand48 with the paper's 5000 photons a round, philox with any other number]
-    #[arg(long, value_enum, help_heading = "Experiment")]
-    rng: Option<RngArg>,
+    /// Picture of the box: a .png shows illumination from 0 to 1, an .exr keeps it unclamped
+    #[arg(short, long, alias = "out", value_name = "FILE", default_value = "open-box.png", help_heading = "Output")]
+    output: PathBuf,
+    #[command(flatten)]
+    json: JsonArg,
+    /// Write the time of every pass as a Chrome trace, for Perfetto or chrome://tracing
+    #[arg(long, value_name = "FILE", help_heading = "Output")]
+    trace: Option<PathBuf>,
+    /// Write the irradiance of each wall in W/m2 as <wall>.exr, its standard error as <wall>-error.exr, and layout.json,
+    /// into this folder
+    #[arg(long, value_name = "DIR", help_heading = "Output")]
+    irradiance: Option<PathBuf>,
+    /// The same for the radiosity, the reflected flux
+    #[arg(long, value_name = "DIR", help_heading = "Output")]
+    radiosity: Option<PathBuf>,
 
-    /// Radius of the density estimate, metres [default: 0.05; 0.025 with --preset rounds]
-    #[arg(long, value_parser = number::<f64>, allow_negative_numbers = true, help_heading = "Estimate")]
-    radius: Option<f64>,
-    /// Photons within the radius, a round, that count as full illumination [default: 90 for every
-    /// 5000 photons of a round; 10 for every 5000 with --preset rounds]
-    #[arg(long, value_parser = number::<f64>, allow_negative_numbers = true, help_heading = "Estimate")]
-    full_light: Option<f64>,
-    /// How photons near a point are found: step through all, look into a sorted grid (the CPU builder
-    /// hands photons to the grid of texels), or walk down a kd-tree; the result is the same to the bit
-    /// [default: grid]
-    #[arg(long, value_enum, help_heading = "Estimate")]
-    gather: Option<GatherArg>,
-    /// Estimate with the K photons nearest to a point, 2 to 1024 of each round, none farther than the
-    /// radius; needs --gather kdtree [default: all within the radius]
-    #[arg(long, value_name = "K", value_parser = whole::<u32>, allow_negative_numbers = true, help_heading = "Estimate")]
-    nearest: Option<u32>,
-    /// Arithmetic: as fast as the device has it, or the same bits on the CPU and on every device that rounds to nearest
-    /// [default: fast]
-    #[arg(long, value_enum, help_heading = "Estimate")]
-    math: Option<MathArg>,
-    /// How the film adds: 64-bit integers, 32-bit floats, or pairs of floats that keep what rounding
-    /// loses; only integers give the same bits in whatever order photons come [default: integer]
-    #[arg(long, value_enum, help_heading = "Estimate")]
-    sums: Option<SumsArg>,
-    /// Texels along each side of a wall [default: 64]
-    #[arg(long, value_parser = whole::<u32>, allow_negative_numbers = true, help_heading = "Estimate")]
-    mesh: Option<u32>,
-    /// Divide irradiance and radiosity by the part of the disc that lies on the wall; the paper's
-    /// illumination stays as it is [default: on]
-    #[arg(long, value_enum, help_heading = "Estimate")]
-    edge_correction: Option<SwitchArg>,
-
-    /// Directions of emission: the same intensity in all of the hemisphere, or proportional to the
-    /// cosine [default: uniform]
-    #[arg(long, value_enum, help_heading = "Scene")]
+    /// Angular distribution of emission: constant over the hemisphere, or proportional to the cosine [default: uniform]
+    #[arg(long, value_enum, value_name = "LAW", help_heading = "Scene")]
     emission: Option<EmissionArg>,
-    /// Phong exponent of all walls, or five of them for left,right,floor,ceiling,back [default: none,
+    /// Phong exponent of all walls, or five of them for left,right,floor,ceiling,back [default: none, the walls are
     /// Lambertian; 2 with --preset phong, 5 with --preset rounds]
-    #[arg(long, value_name = "N|N,N,N,N,N", value_parser = shininess, allow_hyphen_values = true, help_heading = "Scene")]
+    #[arg(long, value_name = "N|N,N,N,N,N", value_parser = parse_shininess, allow_hyphen_values = true, help_heading = "Scene")]
     shininess: Option<[f32; 5]>,
-    /// Direction that the Phong weight compares with the eye's: mirrored, or sampled [default: mirror]
-    #[arg(long, value_enum, help_heading = "Scene")]
+    /// Direction that the Phong weight compares with the direction to the eye: the mirror direction, or the sampled one
+    /// [default: mirror]
+    #[arg(long, value_enum, value_name = "DIRECTION", help_heading = "Scene")]
     phong_direction: Option<PhongDirectionArg>,
-    /// Eye of the Phong weight, metres [default: 0,0,1]
-    #[arg(long, value_name = "X,Y,Z", value_parser = numbers::<f32, 3>, allow_hyphen_values = true, help_heading = "Scene")]
+    /// Position of the eye for the Phong weight, metres [default: 0,0,1]
+    #[arg(long, value_name = "X,Y,Z", value_parser = parse_numbers::<f32, 3>, allow_hyphen_values = true, help_heading = "Scene")]
     eye: Option<[f32; 3]>,
-    /// Share of photons that a wall reflects [default: 0.75]
-    #[arg(long, value_parser = number::<f32>, allow_negative_numbers = true, help_heading = "Scene")]
+    /// Probability that a wall reflects a photon [default: 0.75]
+    #[arg(long, value_name = "SHARE", value_parser = parse_number::<f32>, allow_hyphen_values = true, help_heading = "Scene")]
     reflectance: Option<f32>,
-    /// Radius of the two discs of light, metres [default: 0.05]
-    #[arg(long, value_parser = number::<f64>, allow_negative_numbers = true, help_heading = "Scene")]
+    /// Radius of the two disc lights, metres [default: 0.05]
+    #[arg(long, value_name = "METRES", value_parser = parse_number::<f64>, allow_hyphen_values = true, help_heading = "Scene")]
     light_radius: Option<f64>,
-    /// Power of the floor's and the left wall's light, watts [default: 1,1]
-    #[arg(long, value_name = "W,W", value_parser = numbers::<f64, 2>, allow_hyphen_values = true, help_heading = "Scene")]
+    /// Power of the light on the floor and of the light on the left wall, watts [default: 1,1]
+    #[arg(long, value_name = "W,W", value_parser = parse_numbers::<f64, 2>, allow_hyphen_values = true, help_heading = "Scene")]
     light_power: Option<[f64; 2]>,
 
     #[command(flatten)]
     stop: StopArgs,
-    #[command(flatten)]
-    device: DeviceArgs,
-    /// Look for values that are infinite or no number, and say whose they are
-    #[arg(long, help_heading = "Output")]
+
+    /// Experiment of the paper that sets the defaults [default: modified]
+    #[arg(long, value_enum, value_name = "NAME", help_heading = "Photons")]
+    preset: Option<PresetArg>,
+    /// Photons per round, summed over all lights [default: 5000]
+    #[arg(long, value_name = "N", value_parser = parse_integer::<u32>, allow_hyphen_values = true, help_heading = "Photons")]
+    photons: Option<u32>,
+    /// Number of rounds, whose photons are summed [default: 1; 100 with --preset rounds; as many as needed with --error,
+    /// --time or --total-photons, 16777216 at most]
+    #[arg(long, value_name = "N", value_parser = parse_integer::<u32>, allow_hyphen_values = true, help_heading = "Photons")]
+    rounds: Option<u32>,
+    /// Maximum number of bounces of a photon [default: 15; 2 with --preset naive]
+    #[arg(long, value_name = "N", value_parser = parse_integer::<u32>, allow_hyphen_values = true, help_heading = "Photons")]
+    bounces: Option<u32>,
+    /// Seed of the random numbers [default: 1]
+    #[arg(long, value_name = "N", value_parser = parse_integer::<u64>, allow_hyphen_values = true, help_heading = "Photons")]
+    seed: Option<u64>,
+    /// Random number generator [default: rand48 with the paper's 5000 photons per round, otherwise philox]
+    #[arg(long, value_enum, value_name = "GENERATOR", help_heading = "Photons")]
+    rng: Option<RngArg>,
+
+    /// Radius of the density estimate, metres [default: 0.05; 0.025 with --preset rounds]
+    #[arg(long, value_name = "METRES", value_parser = parse_number::<f64>, allow_hyphen_values = true, help_heading = "Density estimate")]
+    radius: Option<f64>,
+    /// Photons within the radius, per round, that are shown as full illumination [default: 90 per 5000 photons of a
+    /// round; 10 per 5000 with --preset rounds]
+    #[arg(long, value_name = "N", value_parser = parse_number::<f64>, allow_hyphen_values = true, help_heading = "Density estimate")]
+    full_light: Option<f64>,
+    /// Use only the K nearest photons of each round, 2 to 1024, none farther away than the radius; needs --gather kdtree
+    /// [default: all within the radius]
+    #[arg(long, value_name = "K", value_parser = parse_integer::<u32>, allow_hyphen_values = true, help_heading = "Density estimate")]
+    nearest: Option<u32>,
+    /// Texels along each side of a wall [default: 64]
+    #[arg(long, value_name = "N", value_parser = parse_integer::<u32>, allow_hyphen_values = true, help_heading = "Density estimate")]
+    mesh: Option<u32>,
+    /// Divide by the area of the disc that lies on the wall, for irradiance and radiosity; the paper's illumination is not
+    /// corrected [default: on]
+    #[arg(long, value_enum, value_name = "SWITCH", help_heading = "Density estimate")]
+    edge_correction: Option<SwitchArg>,
+
+    /// Builder of the photon map; all GPU builders give bit-identical results [default: atomic; naive with --preset naive]
+    #[arg(long, value_enum, value_name = "BUILDER", help_heading = "Implementation")]
+    variant: Option<VariantArg>,
+    /// Search for photons near a point; all give bit-identical results [default: grid]
+    #[arg(long, value_enum, value_name = "SEARCH", help_heading = "Implementation")]
+    gather: Option<GatherArg>,
+    /// Arithmetic [default: fast]
+    #[arg(long, value_enum, value_name = "ROUNDING", help_heading = "Implementation")]
+    math: Option<MathArg>,
+    /// Numbers in which the film sums [default: integer]
+    #[arg(long, value_enum, value_name = "NUMBERS", help_heading = "Implementation")]
+    sums: Option<SumsArg>,
+    /// Most photons traced at once; the result is bit-identical [default: what fits on the device]
+    #[arg(long, value_name = "N", value_parser = parse_integer::<u32>, allow_hyphen_values = true, help_heading = "Implementation")]
+    chunk: Option<u32>,
+    /// Invocations per work group, a power of two [default: 128]
+    #[arg(long, value_name = "N", value_parser = parse_integer::<u32>, allow_hyphen_values = true, help_heading = "Implementation")]
+    group_size: Option<u32>,
+    /// Counters of --variant atomic, a power of two up to 64, which work groups use round-robin; the result is
+    /// bit-identical [default: 1; on a GPU 8 from two million photons at once]
+    #[arg(long, value_name = "N", value_parser = parse_integer::<u32>, allow_hyphen_values = true, help_heading = "Implementation")]
+    counters: Option<u32>,
+    /// Threads of --variant cpu, or `all` [default: 1, as in the paper]
+    #[arg(long, value_name = "N|all", value_parser = parse_threads, allow_hyphen_values = true, help_heading = "Implementation")]
+    threads: Option<usize>,
+
+    /// Detect NaN and infinity, and print which photon they come from
+    #[arg(long, help_heading = "Checks")]
     paranoid: bool,
-    /// Trace one photon of the run by itself, print where it is stored and end: round and number from 0
-    #[arg(long, value_name = "ROUND:PHOTON", value_parser = photon_name, help_heading = "Output",
+    /// Trace a single photon of this run, print where it is stored, and exit; rounds and photons count from 0
+    #[arg(long, value_name = "ROUND:PHOTON", value_parser = parse_photon_name, help_heading = "Checks",
         conflicts_with_all = ["output", "irradiance", "radiosity", "json", "trace", "time_dispatches"])]
     replay: Option<PhotonName>,
+
+    #[command(flatten)]
+    progress: ProgressArgs,
+    #[command(flatten)]
+    device: DeviceArgs,
     #[command(flatten)]
     timing: TimingArgs,
-    /// Threads of --variant cpu, or `all` [default: 1, as in the paper]
-    #[arg(long, value_name = "N|all", value_parser = threads, help_heading = "Device")]
-    threads: Option<usize>,
-    /// Invocations of a work group [default: 128]
-    #[arg(long, value_parser = whole::<u32>, allow_negative_numbers = true, help_heading = "Device")]
-    group_size: Option<u32>,
-    /// Counters that work groups of --variant atomic take turns at, a power of two up to 64; the result is the same to the
-    /// bit [default: 1, on a GPU 8 where two million photons and more are traced at once]
-    #[arg(long, value_parser = whole::<u32>, allow_negative_numbers = true, help_heading = "Device")]
-    counters: Option<u32>,
-    /// Most photons traced at once; the result is the same to the bit [default: what the device holds]
-    #[arg(long, value_parser = whole::<u32>, allow_negative_numbers = true, help_heading = "Device")]
-    chunk: Option<u32>,
-
-    /// Picture of the box: .png shows illumination 0 to 1, .exr keeps it unclamped
-    #[arg(short, long, value_name = "FILE", default_value = "open-box.png", help_heading = "Output")]
-    output: PathBuf,
-    /// Write each wall's irradiance in W/m2 as <wall>.exr, its standard error as <wall>-error.exr, and layout.json, into
-    /// this folder
-    #[arg(long, value_name = "DIR", help_heading = "Output")]
-    irradiance: Option<PathBuf>,
-    /// The same for radiosity, the reflected flux
-    #[arg(long, value_name = "DIR", help_heading = "Output")]
-    radiosity: Option<PathBuf>,
-    /// How far the run has come: a bar on a terminal, or lines of JSON on stderr
-    #[arg(long, value_enum, default_value = "bar", help_heading = "Output")]
-    progress: ProgressArg,
-    /// Write settings, ledger, errors and timings as JSON
-    #[arg(long, value_name = "FILE", help_heading = "Output")]
-    json: Option<PathBuf>,
-    /// Write the timings as a Chrome trace, for Perfetto or chrome://tracing
-    #[arg(long, value_name = "FILE", help_heading = "Output")]
-    trace: Option<PathBuf>,
 }
 
 /// An enum of the settings as clap values.
@@ -172,31 +169,69 @@ macro_rules! value_enum {
 
 pub(super) use value_enum;
 
-value_enum!(PresetArg => Preset { Naive, Modified, Phong, Rounds });
-value_enum!(RngArg => Rng { Rand48, Mt, Philox, Sobol });
-value_enum!(GatherArg => Gather { Brute, Grid, #[value(name = "kdtree")] KdTree });
-value_enum!(SumsArg => Sums { Integer, F32, Compensated });
-value_enum!(MathArg => Math { Fast, Strict });
+value_enum!(PresetArg => Preset {
+    /// Figure 1: the naive implementation, 2 bounces
+    Naive,
+    /// Figure 2: the modified implementation, 15 bounces
+    Modified,
+    /// Figure 3: the same with Phong walls of exponent 2
+    Phong,
+    /// Figure 4: 100 rounds, radius 0.025 m, Phong exponent 5
+    Rounds,
+});
+value_enum!(RngArg => Rng {
+    /// The paper's drand48, leap-frogged
+    Rand48,
+    /// The paper's alternative, the Mersenne Twister
+    Mt,
+    /// Counter-based
+    Philox,
+    /// Owen-scrambled Sobol' points (quasi-Monte Carlo)
+    Sobol,
+});
+value_enum!(GatherArg => Gather {
+    /// Test every photon, as the paper does
+    Brute,
+    /// A sorted uniform grid; the CPU builder splats photons onto texels instead
+    Grid,
+    /// A kd-tree
+    #[value(name = "kdtree")]
+    KdTree,
+});
+value_enum!(SumsArg => Sums {
+    /// 64-bit fixed point: the same bits in any order of addition
+    Integer,
+    /// 32-bit floats
+    F32,
+    /// Pairs of 32-bit floats (compensated summation)
+    Compensated,
+});
+value_enum!(MathArg => Math {
+    /// As fast as the device can
+    Fast,
+    /// The same bits on every device that rounds to nearest
+    Strict,
+});
 value_enum!(EmissionArg => EmissionLaw { Uniform, Cosine });
 value_enum!(PhongDirectionArg => PhongDirection { Mirror, Sampled });
 
 #[derive(Clone, Copy, PartialEq, Eq, ValueEnum)]
 enum VariantArg {
-    /// The paper's first: a slot for every photon and bounce, empty ones included
+    /// The paper's first: one slot per photon and bounce, empty slots included
     Naive,
-    /// The paper's second: survivors only, one atomic a thread
+    /// The paper's second: only surviving photons, one atomic per thread
     Atomic,
-    /// Survivors only, one atomic a subgroup
+    /// Only surviving photons, one atomic per subgroup
     Ballot,
-    /// Survivors only, one atomic a work group
+    /// Only surviving photons, one atomic per work group
     Group,
-    /// Survivors only, in their order, by prefix sums
+    /// Only surviving photons, in their original order, by prefix sums
     Scan,
-    /// Each photon in the registers of one thread until it ends
+    /// One thread traces each photon from emission to its end
     Persistent,
-    /// What the paper calls the CPU implementation, on one thread or --threads
+    /// The paper's CPU implementation, on one thread or on --threads
     Cpu,
-    /// The fastest on this device for so many photons: each traces the first of them
+    /// The fastest on this device: each builder is timed on the first photons
     Auto,
 }
 
@@ -220,39 +255,6 @@ impl VariantArg {
 pub(super) enum SwitchArg {
     On,
     Off,
-}
-
-pub(super) fn numbers<T: std::str::FromStr + Copy + Default, const N: usize>(text: &str) -> std::result::Result<[T; N], String> {
-    let parts: Vec<T> = text.split(',').filter_map(|part| part.trim().parse().ok()).collect();
-    let wanted = format!("must be {N} numbers with commas between");
-    if text.split(',').count() != N {
-        return Err(wanted);
-    }
-    parts.try_into().map_err(|_| wanted)
-}
-
-/// A whole number, with what is allowed in words; its range is the settings' affair.
-pub(super) fn whole<T: std::str::FromStr>(text: &str) -> std::result::Result<T, String> {
-    text.parse().map_err(|_| format!("must be a whole number, at most {}", (1u128 << (8 * size_of::<T>())) - 1))
-}
-
-pub(super) fn number<T: std::str::FromStr>(text: &str) -> std::result::Result<T, String> {
-    text.parse().map_err(|_| "must be a number".to_owned())
-}
-
-fn shininess(text: &str) -> std::result::Result<[f32; 5], String> {
-    let wanted = || format!("must be one number, or five for {}", WALL_NAMES.join(","));
-    match numbers::<f32, 1>(text) {
-        Ok([all]) => Ok([all; 5]),
-        Err(_) => numbers::<f32, 5>(text).map_err(|_| wanted()),
-    }
-}
-
-pub(super) fn threads(text: &str) -> std::result::Result<usize, String> {
-    if text == "all" {
-        return Ok(std::thread::available_parallelism().map_or(1, usize::from));
-    }
-    text.parse().map_err(|_| "must be a number of threads, or all".to_owned())
 }
 
 impl RunArgs {
@@ -299,17 +301,13 @@ pub(super) fn run(args: &RunArgs, cancelled: &AtomicBool) -> Result<End> {
     let settings = args.settings();
     settings.validate()?;
     if settings.reflectance == 0.0 && args.irradiance.is_some() {
-        return Err(Error::setting(
-            "--reflectance",
-            0,
-            "must be above 0 with --irradiance, as the photon map holds reflected photons only",
-        ));
+        return Err(Error::setting("--reflectance", 0, "must be above 0 with --irradiance: the photon map holds only reflected photons"));
     }
     if let (Variant::Cpu, Some(device)) = (settings.variant, &args.device.device) {
-        return Err(Error::setting("--device", device, "has no use with --variant cpu; leave one of the two out"));
+        return Err(Error::setting("--device", device, "has no effect with --variant cpu; leave one of the two out"));
     }
     if settings.variant == Variant::Cpu && args.device.validate {
-        return Err(Error::setting("--validate", "on", "has no use with --variant cpu; leave one of the two out"));
+        return Err(Error::setting("--validate", "on", "has no effect with --variant cpu; leave one of the two out"));
     }
     let scene = open_box(&settings);
     if let Some(name) = args.replay {
@@ -319,51 +317,81 @@ pub(super) fn run(args: &RunArgs, cancelled: &AtomicBool) -> Result<End> {
     if let Some(warning) = settings.warning() {
         complain(&format!("warning: {warning}"));
     }
+    let reporter = ProgressReporter::new(&args.progress);
     let gpu = match settings.variant {
         Variant::Cpu => None,
         _ => args.device.open(&args.timing.options(&args.device))?,
     };
+    reporter.device(gpu.as_ref());
     let settings = match &gpu {
-        Some(gpu) if args.variant == Some(VariantArg::Auto) => Settings { variant: fastest(gpu, &scene, &settings)?, ..settings },
+        Some(gpu) if args.variant == Some(VariantArg::Auto) => {
+            Settings { variant: fastest(gpu, &scene, &settings, &reporter)?, ..settings }
+        }
+        None => Settings { variant: Variant::Cpu, ..settings },
         _ => settings,
     };
     if let (Some(nearest), true) = (settings.nearest, args.stop.bias) {
-        let why = "takes radii of its own, whose bias no other radius tells; leave --bias out";
+        let why = "has a radius of its own at each point, whose bias --bias cannot measure; leave --bias out";
         return Err(Error::setting("--nearest", nearest, why));
     }
+    announce(&reporter, gpu.as_ref(), &scene, &settings)?;
     let measure = |settings: &Settings, rounds| render::measure_bias(gpu.as_ref(), &scene, settings, rounds, cancelled);
     let before = match settings.stop.error.filter(|_| args.stop.bias) {
-        Some(wanted) => bias_before(wanted, false, |rounds| measure(&settings, rounds))?,
+        Some(wanted) => bias_before(wanted, false, &reporter, |rounds| measure(&settings, rounds))?,
         None => None,
     };
     let settings = Settings { stop: Stop { bias: before.map(|bias| bias.upper), ..settings.stop }, ..settings };
-    let teller = Teller::new(args.progress, "photons");
-    let mut control = Control { cancelled, progress: &mut |progress| teller.tell(progress) };
+    reporter.status("making the pipelines");
+    let mut control = Control { cancelled, progress: &mut |progress| reporter.report(progress, "photons") };
     let mut outcome = match &gpu {
         Some(gpu) => render::on_gpu(gpu, &scene, &settings, &mut control)?,
         None => render::on_cpu(&scene, &settings, &mut control)?,
     };
-    teller.finish();
     outcome.bias = before;
     if before.is_none() && args.stop.bias && !outcome.cancelled {
+        reporter.status("measuring the bias");
         outcome.bias = measure(&settings, rounds_after(outcome.film.rounds))?;
     }
+    reporter.finish();
     let end = if outcome.cancelled { End::Cancelled } else { End::Finished };
     if outcome.cancelled {
         let (emitted, total) = (outcome.fates.emitted, settings.total_photons());
-        complain(&format!("ended after {emitted} of {total} photons; what is written is of these"));
+        complain(&format!("ended after {emitted} of {total} photons; the results are of these"));
     }
     outputs.write(outcome, &scene)?;
     Ok(end)
 }
 
-/// The builder that is fastest on this device, told with what each of them took.
-fn fastest(gpu: &Gpu, scene: &RoomScene, settings: &Settings) -> Result<Variant> {
+/// What will be traced, before it is.
+fn announce(reporter: &ProgressReporter, gpu: Option<&Gpu>, scene: &RoomScene, settings: &Settings) -> Result<()> {
+    let memory = match gpu {
+        Some(gpu) => {
+            let plan = Plan::new(scene, settings, &render::limits(gpu.facts()))?;
+            format!("{:.1} MiB on the device", plan.bytes() as f64 / f64::from(1 << 20))
+        }
+        None => {
+            let plan = Plan::new(scene, settings, &Limits::of_host())?;
+            format!("{:.1} MiB for the photon map", plan.photon_map_bytes() as f64 / f64::from(1 << 20))
+        }
+    };
+    let Settings { variant, rounds, photons, bounces, radius, mesh, .. } = settings;
+    let up_to = if settings.stop.is_set() { "up to " } else { "" };
+    reporter.note(&format!(
+        "plan: open box, {} builder, {up_to}{rounds} round(s) of {photons} photons, {bounces} bounces; radius {radius} m; {mesh} x {mesh} texels per wall; {memory}{}",
+        variant.name(),
+        goals(&settings.stop)
+    ));
+    Ok(())
+}
+
+/// The builder that is fastest on this device; prints the time of each.
+fn fastest(gpu: &Gpu, scene: &RoomScene, settings: &Settings, reporter: &ProgressReporter) -> Result<Variant> {
+    reporter.status("timing each builder");
     let Choice { photons, candidates } = render::choose_variant(gpu, scene, settings)?;
     let times: Vec<String> =
         candidates.iter().map(|candidate| format!("{} {:.3}", candidate.variant.name(), candidate.ms.median)).collect();
     let taken = candidates[0].variant;
-    complain(&format!("--variant auto takes {}; the first {photons} photons, in ms: {}", taken.name(), times.join(", ")));
+    reporter.note(&format!("--variant auto takes {}; the first {photons} photons, in ms: {}", taken.name(), times.join(", ")));
     Ok(taken)
 }
 
@@ -371,7 +399,7 @@ fn fastest(gpu: &Gpu, scene: &RoomScene, settings: &Settings) -> Result<Variant>
 fn show_photon(args: &RunArgs, settings: &Settings, scene: &RoomScene, name: PhotonName) -> Result<End> {
     let PhotonName { round, photon, caustic } = name;
     if caustic {
-        return Err(Error::setting("--replay", name, "the paper's box has one map; leave :caustic out"));
+        return Err(Error::setting("--replay", name, "must be ROUND:PHOTON here: the paper's box has no caustic map"));
     }
     let gpu = if settings.variant == Variant::Cpu { None } else { args.device.open(&args.device.options())? };
     let path = match &gpu {
@@ -406,12 +434,11 @@ struct Outputs {
 
 impl Outputs {
     fn open(args: &RunArgs, scene: &RoomScene) -> Result<Outputs> {
-        let file = |option, path: &Option<PathBuf>| path.as_ref().map(|path| Destination::open(option, path)).transpose();
         let folder = |option, path: &Option<PathBuf>| path.as_ref().map(|path| Folder::open(option, path)).transpose();
         let outputs = Outputs {
             picture: (Destination::open("-o", &args.output)?, Format::of("-o", &args.output)?),
-            json: file("--json", &args.json)?,
-            trace: file("--trace", &args.trace)?,
+            json: optional_file("--json", args.json.json.as_ref())?,
+            trace: optional_file("--trace", args.trace.as_ref())?,
             irradiance: folder("--irradiance", &args.irradiance)?,
             radiosity: folder("--radiosity", &args.radiosity)?,
         };
@@ -443,7 +470,11 @@ impl Outputs {
             let device = outcome.device.as_ref().map_or("CPU", |facts| &facts.name);
             files.push((trace, trace_file::chrome_trace(&outcome.timings, device)));
         }
-        write_all(files)?;
-        say(&format!("{}\nwrote {picture}", report::text(&outcome, &walls)))
+        let destinations: Vec<Destination> = files.iter().map(|(destination, _)| destination.clone()).collect();
+        let text = report::text(&outcome, &walls);
+        match write_all(files) {
+            Ok(()) => say_beside(&destinations, &format!("{text}\nwrote {picture}")),
+            Err(error) => say_beside(&destinations, &text).and(Err(error)),
+        }
     }
 }

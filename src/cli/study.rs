@@ -6,9 +6,9 @@ use std::time::Duration;
 
 use clap::Args;
 
-use super::run::whole;
-use super::stop::seconds;
-use super::{DeviceArgs, End, complain, say};
+use super::parse::{parse_integer, parse_seconds};
+use super::progress::{ProgressArgs, ProgressReporter};
+use super::{DeviceArgs, End, complain, help, say};
 use crate::error::{Error, Result};
 use crate::gpu::Gpu;
 use crate::output::destination::Folder;
@@ -17,50 +17,58 @@ use crate::study::{self, Request};
 
 #[derive(Args)]
 pub(super) struct StudyArgs {
-    /// A built-in scene by name, or a .gltf or .glb file; `open-box` is held against radiosity, scenes of one
-    /// floor against their closed form, others against path tracing
-    #[arg(value_name = "SCENE")]
+    /// Folder for index.html, points.csv, study.json and charts; a study that was interrupted resumes from what is there
+    #[arg(short, long, alias = "out", value_name = "DIR", help_heading = "Output")]
+    output: PathBuf,
+    #[arg(value_name = "SCENE", help = scene_help())]
     scene: String,
-    /// Folder for index.html, points.csv, study.json and SVG; a study that was cut off goes on from what is there
-    #[arg(long, value_name = "DIR")]
-    out: PathBuf,
-    /// Wall time of all measurements together, not of the reference: 90s, 10m
-    #[arg(long, value_name = "TIME", value_parser = seconds, allow_negative_numbers = true, default_value = "2m")]
+    /// Time of all measurements together, without the reference: 90s, 10m
+    #[arg(long, value_name = "TIME", value_parser = parse_seconds, allow_hyphen_values = true, default_value = "2m", help_heading = "When to stop")]
     budget: f64,
-    /// Rounds of the longest point, whatever time is left
-    #[arg(long, value_parser = whole::<u32>, allow_negative_numbers = true, default_value_t = study::MOST_ROUNDS)]
-    rounds: u32,
-    /// Pixels along each side of the picture, or texels along each wall of the open box [default: 48; 12 on a CPU]
-    #[arg(long, value_parser = whole::<u32>, allow_negative_numbers = true)]
-    size: Option<u32>,
-    /// Photons of a round [default: 262144; 8192 on a CPU]
-    #[arg(long, value_parser = whole::<u32>, allow_negative_numbers = true)]
-    photons: Option<u32>,
-    /// Runs of every point, whose spread is the error of what is found
-    #[arg(long, value_parser = whole::<u32>, allow_negative_numbers = true, default_value = "5")]
+    /// Runs of every point, whose spread is the error of the findings
+    #[arg(long, value_name = "N", value_parser = parse_integer::<u32>, allow_hyphen_values = true, default_value = "5", help_heading = "Measurements")]
     repeats: u32,
-    /// Seed of the first run of every point
-    #[arg(long, value_parser = whole::<u64>, allow_negative_numbers = true, default_value = "1")]
-    seed: u64,
-    /// Samples a pixel of the path-traced reference, which is kept in the user's cache
-    #[arg(long, value_parser = whole::<u32>, allow_negative_numbers = true, default_value = "4096")]
+    /// Pixels along each side of the picture, or texels along each side of a wall of the open box [default: 48; 12 on a CPU]
+    #[arg(long, alias = "size", value_name = "N", value_parser = parse_integer::<u32>, allow_hyphen_values = true, help_heading = "Measurements")]
+    side: Option<u32>,
+    /// Samples per pixel of the path-traced reference, which is kept in the user's cache
+    #[arg(long, value_name = "N", value_parser = parse_integer::<u32>, allow_hyphen_values = true, default_value = "4096", help_heading = "Measurements")]
     reference_samples: u32,
+    /// Photons per round [default: 262144; 8192 on a CPU]
+    #[arg(long, value_name = "N", value_parser = parse_integer::<u32>, allow_hyphen_values = true, help_heading = "Photons")]
+    photons: Option<u32>,
+    /// Rounds of the longest point, even if time is left
+    #[arg(long, value_name = "N", value_parser = parse_integer::<u32>, allow_hyphen_values = true, default_value_t = study::MOST_ROUNDS, help_heading = "Photons")]
+    rounds: u32,
+    /// Seed of the first run of every point
+    #[arg(long, value_name = "N", value_parser = parse_integer::<u64>, allow_hyphen_values = true, default_value = "1", help_heading = "Photons")]
+    seed: u64,
+    #[command(flatten)]
+    progress: ProgressArgs,
     #[command(flatten)]
     device: DeviceArgs,
 }
 
+fn scene_help() -> String {
+    let reference = "The reference is radiosity for open-box, the closed form for scenes of one floor, and path tracing for others";
+    format!("{}. {reference}", help::scene())
+}
+
 pub(super) fn run(args: &StudyArgs, cancelled: &AtomicBool) -> Result<End> {
-    let folder = Folder::open("--out", &args.out)?;
+    let folder = Folder::open("-o", &args.output)?;
     args.validate()?;
+    let reporter = ProgressReporter::new(&args.progress);
+    reporter.status(&format!("reading {}", args.scene));
     let scene = Scene::open(&args.scene, false)?;
     for warning in &scene.warnings {
         complain(&format!("warning: {warning}"));
     }
     let gpu = Gpu::open(&args.device.steady())?;
+    reporter.device(Some(&gpu));
     let is_cpu = gpu.facts().kind == "cpu";
     let request = Request {
         scene: args.scene.clone(),
-        size: args.size.unwrap_or(if is_cpu { 12 } else { 48 }),
+        size: args.side.unwrap_or(if is_cpu { 12 } else { 48 }),
         photons: args.photons.unwrap_or(if is_cpu { 8192 } else { 1 << 18 }),
         repeats: args.repeats,
         seed: args.seed,
@@ -68,16 +76,26 @@ pub(super) fn run(args: &StudyArgs, cancelled: &AtomicBool) -> Result<End> {
         budget: Duration::from_secs_f64(args.budget),
         most_rounds: args.rounds,
     };
-    let study = study::run(&gpu, &scene, request, &folder, cancelled, &mut |line| complain(line))?;
-    study::write(&folder, &study)?;
+    reporter.note(&format!(
+        "plan: {}, {side} x {side}; {} photons per round, {} runs of each point; stops measuring after {} s",
+        scene.name,
+        request.photons,
+        request.repeats,
+        args.budget,
+        side = request.size
+    ));
+    let study = study::run(&gpu, &scene, request, &folder, cancelled, &mut |line| reporter.step(line))?;
+    reporter.finish();
+    let written = study::write(&folder, &study);
     for part in &study.parts {
         say(&format!("\n{}", part.quantity))?;
         for sentence in part.sentences() {
             say(&format!("  {sentence}"))?;
         }
     }
+    written?;
     if !study.complete {
-        complain("incomplete: ended before the last point; the same command goes on from there");
+        complain("incomplete: ended before the last point; the same command resumes from there");
     }
     say(&format!("wrote {}", folder.path().join("index.html").display()))?;
     Ok(if study.complete { End::Finished } else { End::Cancelled })
@@ -94,16 +112,17 @@ impl StudyArgs {
             }
             Err(Error::setting(option, value, format!("must be from {} to {} ({what})", allowed.start(), allowed.end())))
         };
-        within("--size", u64::from(self.size.unwrap_or(48)), 2..=1024, "pixels or texels along a side")?;
-        within("--photons", u64::from(self.photons.unwrap_or(8192)), 64..=1 << 28, "photons a round")?;
+        within("--side", u64::from(self.side.unwrap_or(48)), 2..=1024, "pixels or texels along a side")?;
+        within("--photons", u64::from(self.photons.unwrap_or(8192)), 64..=1 << 28, "photons per round")?;
         within("--rounds", u64::from(self.rounds), 1..=u64::from(study::MOST_ROUNDS), "rounds of the longest point")?;
         within("--repeats", u64::from(self.repeats), 2..=1000, "runs of a point, whose spread is its error")?;
-        within("--seed", self.seed, 0..=u64::from(u32::MAX) - 1000, "as srand48 takes 32 bits")?;
-        within("--reference-samples", u64::from(self.reference_samples), 16..=1 << 24, "samples a pixel")?;
-        let held = 3 * u64::from(self.size.unwrap_or(48)).pow(2) * u64::from(self.repeats);
+        within("--seed", self.seed, 0..=u64::from(u32::MAX) - 1000, "srand48 takes 32 bits")?;
+        within("--reference-samples", u64::from(self.reference_samples), 16..=1 << 24, "samples per pixel")?;
+        let held = 3 * u64::from(self.side.unwrap_or(48)).pow(2) * u64::from(self.repeats);
         if held > MAX_HELD {
-            let allowed =
-                format!("3 * size^2 * repeats is {held} numbers to be held for each choice, and {MAX_HELD} are allowed; ask for fewer");
+            let allowed = format!(
+                "3 * side^2 * repeats is {held} numbers in memory for each setting, and {MAX_HELD} is the limit; use fewer, or a smaller --side"
+            );
             return Err(Error::setting("--repeats", self.repeats, allowed));
         }
         if !(1.0..=1e6).contains(&self.budget) {

@@ -5,9 +5,12 @@ use std::sync::atomic::AtomicBool;
 
 use clap::{Args, ValueEnum};
 
-use super::run::{number, numbers, whole};
-use super::stop::{ProgressArg, StopArgs, Teller, bias_before, rounds_after};
-use super::{DeviceArgs, TimingArgs, complain, hearing};
+use super::interrupt::interruptible;
+use super::parse::{parse_colour, parse_integer, parse_number};
+use super::progress::{ProgressArgs, ProgressReporter};
+use super::run::{MathArg, SwitchArg, value_enum};
+use super::stop::{StopArgs, bias_before, goals, rounds_after};
+use super::{DeviceArgs, JsonArg, TimingArgs, complain, help, optional_file};
 use crate::error::{Error, Result};
 use crate::gpu::Gpu;
 use crate::output::destination::Destination;
@@ -22,160 +25,181 @@ use crate::scene::light::{Light, LightKind};
 use crate::scene::{Camera, Scene};
 use crate::settings::Math;
 use crate::settings::transport::{Append, Effect, Filter, Illumination, Kernel, MAX_ROUNDS, Part, Stop, TransportSettings};
-use crate::transport::replay::PhotonName;
 use crate::transport::{self, Lit, View};
 
 #[derive(Args)]
 pub(super) struct SceneArgs {
-    /// A built-in scene by name, or a .gltf or .glb file
-    #[arg(value_name = "SCENE")]
+    #[arg(value_name = "SCENE", help = help::scene())]
     pub(super) scene: String,
-    /// Punctual lights of a glTF file are in W/sr and W/m2 already [default: candela and lux, divided by
-    /// 683 lm/W]
+    /// Take the intensities of the lights of a glTF file as W/sr and W/m2 [default: candela and lux, divided by 683 lm/W]
     #[arg(long, help_heading = "Scene")]
     radiometric: bool,
-    /// Light from everywhere beyond the scene, W/m2/sr: one number, or three for red, green, blue
-    #[arg(long, value_name = "R,G,B", value_parser = colour, allow_hyphen_values = true, help_heading = "Scene")]
+    /// Uniform light from the environment, W/m2/sr: one number, or three for red, green and blue
+    #[arg(long, value_name = "R,G,B", value_parser = parse_colour, allow_hyphen_values = true, help_heading = "Scene")]
     environment: Option<[f32; 3]>,
 }
 
 #[derive(Args)]
 pub(super) struct TransportArgs {
-    /// Photons of the global map, each round [default: 131072]
-    #[arg(long, value_parser = whole::<u32>, allow_negative_numbers = true, help_heading = "Transport")]
-    photons: Option<u32>,
-    /// Photons of the caustic map, each round [default: as --photons]
-    #[arg(long, value_parser = whole::<u32>, allow_negative_numbers = true, help_heading = "Transport")]
-    caustic_photons: Option<u32>,
-    /// Independent rounds, of which the result is the mean [default: 16; 65536 at most with --error or
-    /// --time, and as many as --total-photons takes]
-    #[arg(long, value_parser = whole::<u32>, allow_negative_numbers = true, help_heading = "Transport")]
-    rounds: Option<u32>,
-    /// Cut photons off after this many bounces [default: none; Russian roulette ends paths]
-    #[arg(long, value_parser = whole::<u32>, allow_negative_numbers = true, help_heading = "Transport")]
-    bounces: Option<u32>,
-    /// Seed of the random numbers [default: 1]
-    #[arg(long, value_parser = whole::<u64>, allow_negative_numbers = true, help_heading = "Transport")]
-    seed: Option<u64>,
-    /// Shadow rays from each visible point, each round [default: 4]
-    #[arg(long, value_parser = whole::<u32>, allow_negative_numbers = true, help_heading = "Transport")]
-    shadow_rays: Option<u32>,
-    /// Take indirect light from a ray to the next surface instead of the map where the camera looks
-    #[arg(long, help_heading = "Transport")]
-    final_gather: bool,
-    /// Send photons of the caustic map only towards mirrors and glass [default: on]
-    #[arg(long, value_enum, help_heading = "Transport")]
-    aim: Option<super::run::SwitchArg>,
-    /// Where direct light and caustics come from: shadow rays and a map of their own, or all of it from one
-    /// photon map, as in the paper [default: split]
-    #[arg(long, value_enum, help_heading = "Transport")]
-    illumination: Option<IlluminationArg>,
-    /// How photons fly and take places in their map; the result is the same to the bit. auto: persistent, or ballot with
-    /// --math strict, or where photons may bounce more often than the device lets a loop go on [default: auto]
-    #[arg(long, value_enum, help_heading = "Transport")]
-    variant: Option<AppendArg>,
-    /// Arithmetic: as fast as the device has it, or the same bits on every device that rounds to nearest [default: fast]
-    #[arg(long, value_enum, help_heading = "Transport")]
-    math: Option<super::run::MathArg>,
     #[command(flatten)]
     pub(super) stop: StopArgs,
-    /// Most photons traced at once; the result is the same to the bit [default: what the device holds]
-    #[arg(long, value_parser = whole::<u32>, allow_negative_numbers = true, help_heading = "Transport")]
+
+    /// Photons of the global map, per round [default: 131072]
+    #[arg(long, value_name = "N", value_parser = parse_integer::<u32>, allow_hyphen_values = true, help_heading = "Photons")]
+    photons: Option<u32>,
+    /// Photons of the caustic map, per round [default: the same as --photons]
+    #[arg(long, value_name = "N", value_parser = parse_integer::<u32>, allow_hyphen_values = true, help_heading = "Photons")]
+    caustic_photons: Option<u32>,
+    /// Number of independent rounds, of which the result is the mean [default: 16; with --error or --time up to 65536, with
+    /// --total-photons as many as needed]
+    #[arg(long, value_name = "N", value_parser = parse_integer::<u32>, allow_hyphen_values = true, help_heading = "Photons")]
+    rounds: Option<u32>,
+    /// Cut photons off after this many bounces [default: none; Russian roulette ends paths]
+    #[arg(long, value_name = "N", value_parser = parse_integer::<u32>, allow_hyphen_values = true, help_heading = "Photons")]
+    bounces: Option<u32>,
+    /// Seed of the random numbers [default: 1]
+    #[arg(long, value_name = "N", value_parser = parse_integer::<u64>, allow_hyphen_values = true, help_heading = "Photons")]
+    seed: Option<u64>,
+    /// Emit photons of the caustic map only towards mirrors and glass (projection maps) [default: on]
+    #[arg(long, value_enum, value_name = "SWITCH", help_heading = "Photons")]
+    aim: Option<SwitchArg>,
+
+    /// Source of direct light and caustics [default: split]
+    #[arg(long, value_enum, value_name = "METHOD", help_heading = "Light transport")]
+    illumination: Option<IlluminationArg>,
+    /// Shadow rays per visible point and round [default: 4]
+    #[arg(long, value_name = "N", value_parser = parse_integer::<u32>, allow_hyphen_values = true, help_heading = "Light transport")]
+    shadow_rays: Option<u32>,
+    /// Final gathering: take indirect light from one ray to the next surface, not from the map at the visible point
+    #[arg(long, help_heading = "Light transport")]
+    final_gather: bool,
+    /// Simulate an effect even if the scene does not need it; `photonmill plan` lists them
+    #[arg(long, value_name = "EFFECT", value_enum, value_delimiter = ',', help_heading = "Light transport")]
+    with: Vec<EffectArg>,
+    /// Leave an effect out even if the scene needs it
+    #[arg(long, value_name = "EFFECT", value_enum, value_delimiter = ',', help_heading = "Light transport")]
+    without: Vec<EffectArg>,
+
+    /// Radius of the density estimate of the global map in the first round, metres [default: from the area of the scene]
+    #[arg(long, value_name = "METRES", value_parser = parse_number::<f64>, allow_hyphen_values = true, help_heading = "Density estimate")]
+    radius: Option<f64>,
+    /// The same for the caustic map [default: a quarter of the default of --radius]
+    #[arg(long, value_name = "METRES", value_parser = parse_number::<f64>, allow_hyphen_values = true, help_heading = "Density estimate")]
+    caustic_radius: Option<f64>,
+    /// How slowly the radius shrinks from round to round (Knaus and Zwicker 2011): above 0, and 1 keeps it [default: 0.667]
+    #[arg(long, value_name = "ALPHA", value_parser = parse_number::<f64>, allow_hyphen_values = true, help_heading = "Density estimate", conflicts_with = "fixed_radius")]
+    alpha: Option<f64>,
+    /// Keep the radius, like `--alpha 1`
+    #[arg(long, help_heading = "Density estimate")]
+    fixed_radius: bool,
+    /// Kernel of the density estimate: weight of a photon by its distance [default: box]
+    #[arg(long, value_enum, value_name = "KERNEL", help_heading = "Density estimate")]
+    kernel: Option<KernelArg>,
+    /// Divide by the area within the radius that lies on the surface [default: on]
+    #[arg(long, value_enum, value_name = "SWITCH", help_heading = "Density estimate")]
+    edge_correction: Option<SwitchArg>,
+
+    /// Builder of the photon maps; all give bit-identical results [default: auto]
+    #[arg(long, value_enum, value_name = "BUILDER", help_heading = "Implementation")]
+    variant: Option<AppendArg>,
+    /// Arithmetic [default: fast]
+    #[arg(long, value_enum, value_name = "ROUNDING", help_heading = "Implementation")]
+    math: Option<MathArg>,
+    /// Most photons traced at once; the result is bit-identical [default: what fits on the device]
+    #[arg(long, value_name = "N", value_parser = parse_integer::<u32>, allow_hyphen_values = true, help_heading = "Implementation")]
     chunk: Option<u32>,
-    /// Invocations of a work group, a power of two [default: 128]
-    #[arg(long, value_parser = whole::<u32>, allow_negative_numbers = true, help_heading = "Transport")]
+    /// Invocations per work group, a power of two [default: 128]
+    #[arg(long, value_name = "N", value_parser = parse_integer::<u32>, allow_hyphen_values = true, help_heading = "Implementation")]
     group_size: Option<u32>,
 
-    /// Radius of the global map's estimate in the first round, metres [default: by the scene's area]
-    #[arg(long, value_parser = number::<f64>, allow_negative_numbers = true, help_heading = "Estimate")]
-    radius: Option<f64>,
-    /// The same of the caustic map [default: by the scene's area, a quarter of the global map's]
-    #[arg(long, value_parser = number::<f64>, allow_negative_numbers = true, help_heading = "Estimate")]
-    caustic_radius: Option<f64>,
-    /// How fast the radius shrinks from round to round (Knaus and Zwicker 2011), above 0; 1 keeps it
-    /// [default: 0.667]
-    #[arg(long, value_parser = number::<f64>, allow_negative_numbers = true, help_heading = "Estimate", conflicts_with = "fixed_radius")]
-    alpha: Option<f64>,
-    /// Keep the radius, as `--alpha 1` does
-    #[arg(long, help_heading = "Estimate")]
-    fixed_radius: bool,
-    /// How a photon's weight falls with its distance [default: box]
-    #[arg(long, value_enum, help_heading = "Estimate")]
-    kernel: Option<KernelArg>,
-    /// Divide by the area that really lies on the surface [default: on]
-    #[arg(long, value_enum, help_heading = "Estimate")]
-    edge_correction: Option<super::run::SwitchArg>,
-
-    /// Look on the device for values that are infinite or no number, and say whose they are
-    #[arg(long, help_heading = "Output")]
+    /// Detect NaN and infinity, and print which photon or pixel they come from
+    #[arg(long, help_heading = "Checks")]
     paranoid: bool,
-    /// Simulate an effect even where the scene does not need it; see `photonmill plan`
-    #[arg(long, value_name = "EFFECT", value_enum, value_delimiter = ',', help_heading = "Plan")]
-    with: Vec<EffectArg>,
-    /// Leave an effect out, even where the scene needs it
-    #[arg(long, value_name = "EFFECT", value_enum, value_delimiter = ',', help_heading = "Plan")]
-    without: Vec<EffectArg>,
 }
 
-/// What a run tells beside its result.
+/// Reports of a run as files.
 #[derive(Args)]
 pub(super) struct ReportArgs {
-    /// Print which effects were kept or dropped and why, what each cost and gave
-    #[arg(long, help_heading = "Output")]
-    explain: bool,
-    /// How far the run has come: a bar on a terminal, or lines of JSON on stderr
-    #[arg(long, value_enum, default_value = "bar", help_heading = "Output")]
-    pub(super) progress: ProgressArg,
-    /// Report as JSON
-    #[arg(long, value_name = "FILE", help_heading = "Output")]
-    json: Option<PathBuf>,
-    /// Chrome trace of all passes, for Perfetto
+    #[command(flatten)]
+    json: JsonArg,
+    /// Write the time of every pass as a Chrome trace, for Perfetto or chrome://tracing
     #[arg(long, value_name = "FILE", help_heading = "Output")]
     trace: Option<PathBuf>,
+}
+
+/// What a run prints.
+#[derive(Args)]
+pub(super) struct MessageArgs {
+    /// Also print which effects were kept or dropped and why, with the time and the light of each
+    #[arg(long, help_heading = "Messages")]
+    pub(super) explain: bool,
+    #[command(flatten)]
+    pub(super) progress: ProgressArgs,
+}
+
+/// The device of a run and how it is timed.
+#[derive(Args)]
+pub(super) struct TimedDeviceArgs {
+    #[command(flatten)]
+    device: DeviceArgs,
     #[command(flatten)]
     timing: TimingArgs,
 }
 
-super::run::value_enum!(IlluminationArg => Illumination { Split, Photons });
-super::run::value_enum!(AppendArg => Append { Auto, Atomic, Ballot, Persistent });
-super::run::value_enum!(KernelArg => Kernel { Box, Cone, Epanechnikov });
-super::run::value_enum!(FilterArg => Filter { Box, Tent, Gaussian });
-super::run::value_enum!(PartArg => Part { All, Direct, Specular, Caustic, Indirect });
-super::run::value_enum!(EffectArg => Effect {
+value_enum!(IlluminationArg => Illumination {
+    /// Direct light by shadow rays, caustics from a map of their own, the rest from the global map
+    Split,
+    /// Everything from one photon map, as in the paper
+    Photons,
+});
+value_enum!(AppendArg => Append {
+    /// Persistent; ballot with --math strict, or where a photon may bounce more often than the device can loop
+    Auto,
+    /// Bounce by bounce, one atomic per photon
+    Atomic,
+    /// Bounce by bounce, one atomic per subgroup
+    Ballot,
+    /// One invocation traces each photon from emission to its end
+    Persistent,
+});
+value_enum!(KernelArg => Kernel { Box, Cone, Epanechnikov });
+value_enum!(FilterArg => Filter {
+    /// The square of the pixel
+    Box,
+    /// A tent two pixels wide
+    Tent,
+    /// A Gaussian with a standard deviation of half a pixel
+    Gaussian,
+});
+value_enum!(PartArg => Part {
+    All,
+    /// Emission that is seen directly, and surfaces lit by lights directly
+    Direct,
+    /// Everything that is seen in mirrors and through glass
+    Specular,
+    /// Light that reached what the camera sees over mirrors and glass only
+    Caustic,
+    /// Light that was scattered before
+    Indirect,
+});
+value_enum!(EffectArg => Effect {
     Direct, Indirect, Glossy, ReflectiveCaustics, RefractiveCaustics, SpecularChains, Textures, Environment, MeshLights,
     PointLights, SpotLights, DirectionalLights, DiscLights, Bvh, TwoSided, SmoothNormals,
 });
 
-/// Rounds of a run that ends by itself.
+/// Most rounds of a run with a stop criterion other than --total-photons.
 const MOST_ROUNDS: u32 = 65_536;
 
-/// Rounds that a run may take which ends by itself; one map at least has so many photons a round.
+/// Most rounds of a run with a stop criterion, if there is one; `photons` are those of the smaller map per round.
 fn most_rounds(stop: &Stop, photons: u32) -> Option<u32> {
     let by_total = |total: u64| total.div_ceil(u64::from(photons.max(1))).clamp(1, u64::from(MAX_ROUNDS)) as u32;
     stop.is_set().then(|| stop.photons.map_or(MOST_ROUNDS, by_total))
 }
 
-/// `3:4711`, `3:4711:caustic`.
-pub(super) fn photon_name(text: &str) -> std::result::Result<PhotonName, String> {
-    let (numbers, caustic) = text.strip_suffix(":caustic").map_or((text, false), |numbers| (numbers, true));
-    let parsed = numbers.split_once(':').and_then(|(round, photon)| Some((round.parse().ok()?, photon.parse().ok()?)));
-    parsed
-        .map(|(round, photon)| PhotonName { round, photon, caustic })
-        .ok_or_else(|| "must be ROUND:PHOTON, two whole numbers, or ROUND:PHOTON:caustic".to_owned())
-}
-
-fn colour(text: &str) -> std::result::Result<[f32; 3], String> {
-    let all = match numbers::<f32, 1>(text) {
-        Ok([grey]) => [grey; 3],
-        Err(_) => numbers::<f32, 3>(text).map_err(|_| "must be one number, or three with commas between".to_owned())?,
-    };
-    if all.iter().all(|value| value.is_finite() && *value >= 0.0) { Ok(all) } else { Err("must be 0 or more".to_owned()) }
-}
-
 impl SceneArgs {
-    /// The scene, its warnings told.
-    pub(super) fn open(&self) -> Result<Scene> {
-        let mut scene = Scene::open(&self.scene, self.radiometric)?;
+    /// The scene; prints its warnings.
+    pub(super) fn open(&self, reporter: &ProgressReporter) -> Result<Scene> {
+        let mut scene = Scene::open_with(&self.scene, self.radiometric, &mut stages(&self.scene, reporter))?;
         if let Some(radiance) = self.environment {
             scene.lights.push(Light { name: "--environment".into(), kind: LightKind::Environment { radiance: radiance.into() } });
         }
@@ -183,7 +207,7 @@ impl SceneArgs {
             complain(&format!("warning: {warning}"));
         }
         if !scene.is_lit() {
-            complain("warning: nothing shines in this scene: it is dark");
+            complain("warning: this scene has no light and is dark; add a light, an emissive material, or --environment 1");
         }
         Ok(scene)
     }
@@ -206,10 +230,10 @@ impl TransportArgs {
             caustic_radius: self.caustic_radius,
             alpha: if self.fixed_radius { 1.0 } else { self.alpha.unwrap_or(usual.alpha) },
             kernel: self.kernel.map_or(usual.kernel, Kernel::from),
-            edge_correction: self.edge_correction.map_or(usual.edge_correction, |switch| switch == super::run::SwitchArg::On),
+            edge_correction: self.edge_correction.map_or(usual.edge_correction, |switch| switch == SwitchArg::On),
             shadow_rays: self.shadow_rays.unwrap_or(usual.shadow_rays),
             final_gather: self.final_gather,
-            aim: self.aim.map_or(usual.aim, |switch| switch == super::run::SwitchArg::On),
+            aim: self.aim.map_or(usual.aim, |switch| switch == SwitchArg::On),
             illumination: self.illumination.map_or(usual.illumination, Illumination::from),
             append: self.variant.map_or(usual.append, Append::from),
             math: self.math.map_or(usual.math, Math::from),
@@ -225,20 +249,22 @@ impl TransportArgs {
 
 /// The outputs of [`ReportArgs`], checked before the run.
 pub(super) struct Reports {
-    pub(super) explain: bool,
     json: Option<Destination>,
     trace: Option<Destination>,
 }
 
 impl ReportArgs {
     pub(super) fn open(&self) -> Result<Reports> {
-        let file = |option, path: &Option<PathBuf>| path.as_ref().map(|path| Destination::open(option, path)).transpose();
-        Ok(Reports { explain: self.explain, json: file("--json", &self.json)?, trace: file("--trace", &self.trace)? })
+        Ok(Reports { json: optional_file("--json", self.json.json.as_ref())?, trace: optional_file("--trace", self.trace.as_ref())? })
     }
+}
 
+impl TimedDeviceArgs {
     /// The device; a scene of triangles needs one.
-    pub(super) fn device(&self, device: &DeviceArgs) -> Result<Gpu> {
-        Gpu::open(&self.timing.options(device))
+    pub(super) fn open(&self, reporter: &ProgressReporter) -> Result<Gpu> {
+        let gpu = Gpu::open(&self.timing.options(&self.device))?;
+        reporter.device(Some(&gpu));
+        Ok(gpu)
     }
 }
 
@@ -263,14 +289,15 @@ pub(super) struct Job<'a> {
     pub(super) phases: &'a [Vec<Receiver>],
 }
 
-/// The geometry of what is left of a scene, and the plan.
+/// The plan of what is left of a scene.
 pub(super) fn plan(gpu: &Gpu, job: &Job, geometry: &Geometry) -> Result<TransportPlan> {
     TransportPlan::new(job.scene, geometry, job.settings, job.sensor, &render::limits(gpu.facts()))
 }
 
 /// Geometry of a scene without the effects that are left out.
-pub(super) fn geometry(scene: &Scene, settings: &TransportSettings) -> Result<Geometry> {
-    let geometry = Geometry::new(&scene.without(&settings.without))?;
+pub(super) fn geometry(scene: &Scene, settings: &TransportSettings, reporter: &ProgressReporter) -> Result<Geometry> {
+    let what = format!("{} triangles", scene.triangle_count());
+    let geometry = Geometry::new_with(&scene.without(&settings.without), &mut stages(&what, reporter))?;
     if geometry.left_out > 0 {
         complain(&format!(
             "warning: {} triangle(s) have no area in single precision, or lie on others, and are left out",
@@ -280,57 +307,84 @@ pub(super) fn geometry(scene: &Scene, settings: &TransportSettings) -> Result<Ge
     Ok(geometry)
 }
 
-/// Runs all rounds, and tells how far it has come; with `bias`, measures that too.
+/// Reports the stages of loading `what`, each at its start and at every tenth of it.
+fn stages<'a>(what: &'a str, reporter: &'a ProgressReporter) -> impl FnMut(&'static str, f64) + 'a {
+    let mut reported = None;
+    move |stage, done| {
+        let step = (stage, (10.0 * done) as u32);
+        if reported.replace(step) != Some(step) {
+            reporter.status(&format!("{what}: {stage}, {} %", 10 * step.1));
+        }
+    }
+}
+
+/// What will be traced, before it is.
+fn announce(job: &Job, geometry: &Geometry, plan: &TransportPlan, reporter: &ProgressReporter) {
+    let what = match plan.sensor {
+        Sensor::Picture { width, height } => format!("{width} x {height} pixels"),
+        Sensor::Receivers { count } => format!("{count} point(s)"),
+    };
+    let maps: Vec<String> = plan.maps().map(|map| format!("{} {} photons", map.photons, map.name)).collect();
+    let radii: Vec<String> = plan.maps().map(|map| format!("{:.4} m ({})", map.radius * geometry.unit, map.name)).collect();
+    let rounds = plan.settings.rounds;
+    let up_to = if plan.settings.stop.is_set() { "up to " } else { "" };
+    let (maps, radius) = if maps.is_empty() {
+        ("no photons".to_owned(), String::new())
+    } else {
+        (maps.join(" and "), format!("; first radius {}", radii.join(", ")))
+    };
+    reporter.note(&format!(
+        "plan: {}, {what}; {up_to}{rounds} round(s) of {maps}{radius}; {:.1} MiB on the device{}",
+        job.scene.name,
+        plan.bytes as f64 / f64::from(1 << 20),
+        goals(&plan.settings.stop)
+    ));
+}
+
+/// Runs all rounds and reports progress; with `bias`, measures that too.
 pub(super) fn light(
     gpu: &Gpu,
     job: &Job,
     geometry: &Geometry,
     mut plan: TransportPlan,
-    (told, bias): (ProgressArg, bool),
+    bias: bool,
+    reporter: &ProgressReporter,
     cancelled: &AtomicBool,
 ) -> Result<Lit> {
+    announce(job, geometry, &plan, reporter);
     let view = View { geometry, camera: job.camera, phases: job.phases };
     let of_first = |plan: &TransportPlan, factor_and_rounds| {
-        hearing(|| transport::bias::measure(gpu, job.scene, &view, plan, factor_and_rounds, cancelled))
+        interruptible(|| transport::bias::measure(gpu, job.scene, &view, plan, factor_and_rounds, cancelled))
     };
     let alpha = plan.settings.alpha;
     let stop = plan.settings.stop;
-    // An error that is wanted is one of noise and bias together, so that the bias must be known beforehand.
+    // The error asked for is noise and bias together, so the bias must be known beforehand.
     let before = match stop.error.filter(|_| bias) {
-        Some(wanted) => bias_before(wanted, alpha < 1.0, |rounds| of_first(&plan, (1.0, rounds)))?,
+        Some(wanted) => bias_before(wanted, alpha < 1.0, reporter, |rounds| of_first(&plan, (1.0, rounds)))?,
         None => None,
     };
     plan.settings.stop.bias = before.map(|bias| bias.upper);
 
-    let teller = Teller::new(told, "rounds");
-    let mut tell = |progress: &Progress| teller.tell(progress);
-    let mut control = Control { cancelled, progress: &mut tell };
-    let mut lit = hearing(|| transport::light(gpu, &view, plan, &mut control))?;
-    teller.finish();
+    reporter.status("making the pipelines");
+    let mut report = |progress: &Progress| reporter.report(progress, "rounds");
+    let mut control = Control { cancelled, progress: &mut report };
+    let mut lit = interruptible(|| transport::light(gpu, &view, plan, &mut control))?;
     if lit.end == transport::End::Cancelled {
-        complain(&format!("ended after {} of {} rounds; what is written is of these", lit.film.rounds, lit.plan.settings.rounds));
+        complain(&format!("ended after {} of {} rounds; the results are of these", lit.film.rounds, lit.plan.settings.rounds));
         return Ok(lit);
     }
     let shrunk = mean_squared_radius(alpha, lit.film.rounds);
     lit.bias = match before {
         Some(bias) => Some(bias.scaled(shrunk)),
         // At the radius whose square is the mean of the rounds' squares.
-        None if bias => of_first(&lit.plan, (shrunk.sqrt(), rounds_after(lit.film.rounds)))?,
+        None if bias => {
+            reporter.status("measuring the bias");
+            of_first(&lit.plan, (shrunk.sqrt(), rounds_after(lit.film.rounds)))?
+        }
         None => None,
     };
+    reporter.status("writing the results");
     Ok(lit)
-}
-
-/// Of a picture; numbers of its sums are 32-bit.
-const MAX_PIXELS: u32 = 1 << 28;
-
-/// `800x600`.
-pub(super) fn size(text: &str) -> std::result::Result<(u32, u32), String> {
-    let parsed = text.split_once('x').and_then(|(width, height)| Some((width.parse().ok()?, height.parse().ok()?)));
-    parsed
-        .filter(|(width, height): &(u32, u32)| (1..=65_535).contains(width) && (1..=65_535).contains(height))
-        .filter(|(width, height)| width * height <= MAX_PIXELS)
-        .ok_or_else(|| format!("must be WIDTHxHEIGHT, each from 1 to 65535, and {MAX_PIXELS} pixels at most"))
 }
 
 /// The camera by name, else the scene's first, else one that sees all of it.
@@ -339,7 +393,7 @@ pub(super) fn camera(scene: &Scene, name: Option<&str>) -> Result<Camera> {
         Some(name) => scene.cameras.iter().find(|camera| camera.name == name).cloned().ok_or_else(|| {
             let names: Vec<&str> = scene.cameras.iter().map(|camera| camera.name.as_str()).collect();
             let there = if names.is_empty() {
-                "the scene has none; leave --camera out".to_owned()
+                "no such camera: the scene has none; leave --camera out".to_owned()
             } else {
                 format!("must be one of {}", names.join(", "))
             };

@@ -1,6 +1,7 @@
-//! Files that appear whole or not at all. Destinations are checked before a run, so that a run never
-//! ends in 'cannot be written'; afterwards everything is written under temporary names, and only when
-//! all of it is there are the files renamed.
+//! Files that appear whole or not at all. Destinations are checked before a run, so that few runs end in
+//! 'cannot be written'; afterwards everything is written under temporary names, and only when all of it is
+//! there are the files renamed. Where that fails all the same (a full disk), everything is saved in another
+//! folder. `-` is standard output.
 
 use std::collections::HashMap;
 use std::io::Write;
@@ -29,6 +30,9 @@ impl Destination {
     /// Fails now if `path` could not be written later. `option` is named in errors.
     pub fn open(option: &'static str, path: &Path) -> Result<Destination> {
         let destination = Destination { option, path: path.to_owned() };
+        if destination.is_standard_output() {
+            return Ok(destination);
+        }
         let ends_as_folder = path.as_os_str().as_encoded_bytes().last().is_none_or(|byte| std::path::is_separator(char::from(*byte)));
         if path.is_dir() || ends_as_folder {
             return Err(destination.refuse("it names a folder"));
@@ -42,8 +46,13 @@ impl Destination {
         if !folder.is_dir() {
             return Err(destination.refuse(format!("there is no folder {}", folder.display())));
         }
+        check_name(&target).map_err(|error| destination.refuse(error.kind()))?;
         temporary_in(folder).map_err(|error| destination.refuse(error.kind()))?;
         Ok(destination)
+    }
+
+    pub fn is_standard_output(&self) -> bool {
+        self.path == Path::new("-")
     }
 
     pub fn path(&self) -> &Path {
@@ -68,12 +77,16 @@ impl Folder {
         if path.exists() && !path.is_dir() {
             return Err(refuse("it is not a folder".into()));
         }
-        if path.as_os_str().is_empty() {
+        if path.as_os_str().is_empty() || path == Path::new("-") {
             return Err(refuse("it names no folder".into()));
         }
         let nearest = path.ancestors().find(|ancestor| ancestor.is_dir()).unwrap_or(Path::new("."));
         if path.ancestors().any(|ancestor| ancestor.exists() && !ancestor.is_dir()) {
             return Err(refuse("a part of its path is a file".into()));
+        }
+        // A name that is too long is refused only by the folder that is to hold it, which may not be there yet.
+        for name in path.iter().filter(|_| !path.exists()) {
+            check_name(&nearest.join(name)).map_err(|error| refuse(error.kind().to_string()))?;
         }
         // Making a folder asks for the same right as making a file.
         temporary_in(nearest).map_err(|error| refuse(error.kind().to_string()))?;
@@ -104,25 +117,111 @@ pub fn check_distinct(destinations: &[Destination]) -> Result<()> {
     Ok(())
 }
 
-/// Writes every file, or none: all are there under temporary names before the first gets its own.
+/// Writes every file, or none: all are there under temporary names before the first gets its own. If one cannot be
+/// written, all go to a new folder elsewhere, which the error names.
 pub fn write_all(files: impl IntoIterator<Item = (Destination, Vec<u8>)>) -> Result<()> {
-    let mut staged = Vec::new();
-    for (destination, content) in files {
-        let target = destination.target();
-        let refuse = |error: std::io::Error| destination.refuse(error.kind());
-        if target.exists() && !target.is_file() {
-            std::fs::OpenOptions::new().write(true).open(&target).and_then(|mut file| file.write_all(&content)).map_err(refuse)?;
+    let cache = directories::BaseDirs::new().map(|folders| folders.cache_dir().to_owned());
+    write_or_save(files, &[Some(std::env::temp_dir()), cache].into_iter().flatten().collect::<Vec<_>>())
+}
+
+/// The same with the folders that may hold results in an emergency, the best first. Contents are asked for one by one, as
+/// all of them may be too large for memory.
+fn write_or_save(files: impl IntoIterator<Item = (Destination, Vec<u8>)>, places: &[PathBuf]) -> Result<()> {
+    let mut files = files.into_iter();
+    let (mut staged, mut streams) = (Vec::new(), Vec::new());
+    let mut failed = None;
+    for (destination, content) in files.by_ref() {
+        if destination.is_standard_output() {
+            streams.push((destination, content));
             continue;
         }
-        std::fs::create_dir_all(parent(&target)).map_err(refuse)?;
-        let mut file = temporary_in(parent(&target)).map_err(refuse)?;
-        file.write_all(&content).map_err(refuse)?;
-        staged.push((destination, target, file));
+        match stage(&destination, &content) {
+            Ok(Some(file)) => staged.push((destination, file)),
+            Ok(None) => {}
+            Err(error) => {
+                failed = Some((destination, content, error));
+                break;
+            }
+        }
     }
-    for (destination, target, file) in staged {
-        file.persist(&target).map_err(|error| destination.refuse(error.error.kind()))?;
+    let mut staged = staged.into_iter();
+    let mut written = Ok(());
+    if failed.is_none() {
+        for (destination, file) in staged.by_ref() {
+            let target = destination.target();
+            if let Err(refused) = file.persist(&target) {
+                let content = std::fs::read(refused.file.path()).unwrap_or_default();
+                failed = Some((destination, content, refused.error));
+                break;
+            }
+        }
     }
-    Ok(())
+    if let Some((destination, content, error)) = failed {
+        let refused = destination.refuse(error.kind());
+        let staged = staged.map(|(destination, file)| (destination, std::fs::read(file.path()).unwrap_or_default()));
+        written = Err(save(staged.chain([(destination, content)]).chain(files), places, refused));
+    }
+    for (destination, content) in streams {
+        match std::io::stdout().write_all(&content) {
+            // A reader that has gone away, as `head` does, has seen enough.
+            Err(error) if error.kind() != std::io::ErrorKind::BrokenPipe => return Err(destination.refuse(error.kind())),
+            _ => {}
+        }
+    }
+    written
+}
+
+/// Writes a file under a temporary name; a pipe or a device at once.
+fn stage(destination: &Destination, content: &[u8]) -> std::io::Result<Option<NamedTempFile>> {
+    let target = destination.target();
+    if target.exists() && !target.is_file() {
+        std::fs::OpenOptions::new().write(true).open(&target)?.write_all(content)?;
+        return Ok(None);
+    }
+    std::fs::create_dir_all(parent(&target))?;
+    let mut file = temporary_in(parent(&target))?;
+    file.write_all(content)?;
+    Ok(Some(file))
+}
+
+/// Saves what could not be written in the first place that takes all of it, a folder for each option; the error says where.
+fn save(files: impl Iterator<Item = (Destination, Vec<u8>)>, places: &[PathBuf], error: Error) -> Error {
+    let mut places = places.iter();
+    let mut folder: Option<PathBuf> = None;
+    for (destination, content) in files {
+        let option = if destination.option == "-o" { "output" } else { destination.option.trim_start_matches('-') };
+        let name = Path::new(option).join(destination.path.file_name().unwrap_or_default());
+        let put = |folder: &Path| {
+            let path = folder.join(&name);
+            std::fs::create_dir_all(parent(&path)).and_then(|()| std::fs::write(&path, &content))
+        };
+        // Only the first file may still choose another place.
+        let done = match &folder {
+            Some(folder) => put(folder).is_ok(),
+            None => {
+                folder = places.find_map(|place| {
+                    let made = tempfile::Builder::new().prefix("photonmill-").tempdir_in(place).ok()?;
+                    put(made.path()).is_ok().then(|| made.keep())
+                });
+                folder.is_some()
+            }
+        };
+        if !done {
+            return error;
+        }
+    }
+    match (error, folder) {
+        (Error::Output { option, path, reason }, Some(folder)) => Error::Saved { option, path, reason, folder },
+        (error, _) => error,
+    }
+}
+
+/// Whether the file system takes this name; a file need not be there.
+fn check_name(path: &Path) -> std::io::Result<()> {
+    match std::fs::symlink_metadata(path) {
+        Err(error) if error.kind() != std::io::ErrorKind::NotFound => Err(error),
+        _ => Ok(()),
+    }
 }
 
 fn parent(path: &Path) -> &Path {
@@ -158,7 +257,15 @@ mod tests {
 
         // The second cannot be written, so the first stays what it was.
         let lost = Destination { option: "-o", path: folder.path().join("a.txt/c.txt") };
-        assert!(write_all(vec![(first.clone(), b"new".to_vec()), (lost, Vec::new())]).is_err());
+        let saved = tempfile::tempdir().unwrap();
+        let both = || vec![(first.clone(), b"new".to_vec()), (lost.clone(), b"two".to_vec())];
+        assert!(matches!(write_or_save(both(), &[]), Err(Error::Output { .. })));
+        let places = [folder.path().join("absent"), saved.path().to_owned()];
+        let Err(Error::Saved { folder: elsewhere, .. }) = write_or_save(both(), &places) else { panic!("nothing was saved") };
+        assert!(elsewhere.starts_with(saved.path()));
+        for (name, content) in [("a.txt", "new"), ("c.txt", "two")] {
+            assert_eq!(std::fs::read_to_string(elsewhere.join("output").join(name)).unwrap(), content);
+        }
         assert_eq!(std::fs::read(first.path()).unwrap(), b"one");
         assert_eq!(std::fs::read_dir(folder.path()).unwrap().count(), 2);
     }
@@ -167,11 +274,13 @@ mod tests {
     fn what_cannot_be_written_is_refused_at_once() {
         let folder = tempfile::tempdir().unwrap();
         let at = |name: &str| folder.path().join(name);
-        for path in [at("absent/a.txt"), folder.path().to_owned(), at("new/"), PathBuf::new()] {
+        // Longer than any file system allows.
+        let long = "n".repeat(300);
+        for path in [at("absent/a.txt"), folder.path().to_owned(), at("new/"), PathBuf::new(), at(&long)] {
             assert!(matches!(Destination::open("-o", &path), Err(Error::Output { option: "-o", .. })), "{path:?}");
         }
         std::fs::write(at("file"), "").unwrap();
-        for path in [at("file"), at("file/below")] {
+        for path in [at("file"), at("file/below"), at(&long), at("new").join(&long), PathBuf::from("-")] {
             assert!(matches!(Folder::open("--out", &path), Err(Error::Output { option: "--out", .. })), "{path:?}");
         }
     }

@@ -51,7 +51,7 @@ fn open_box(name: &str, preset: Preset) -> Scene {
         };
         scene.lights.push(Light { name: format!("lamp on face {}", light.face), kind });
     }
-    scene.cameras.push(Camera::looking_at("front", DVec3::new(0.0, 0.0, 1.0), DVec3::ZERO, DVec3::Y, 0.7));
+    scene.cameras.push(Camera::looking_at("front", DVec3::new(0.0, 0.0, 1.0), DVec3::ZERO, DVec3::Y, 0.7).with_aspect(1.0));
     scene
 }
 
@@ -85,13 +85,10 @@ fn cornell_room() -> Scene {
             Mesh::parallelogram("lamp", lamp, 0.3 * x, 0.3 * z, 3),
         ],
         materials: cornell_materials(),
-        cameras: vec![Camera::looking_at(
-            "front",
-            DVec3::new(0.5, 0.5, 2.4) * BOX,
-            DVec3::new(0.5, 0.5, 0.0) * BOX,
-            DVec3::Y,
-            39.0f64.to_radians(),
-        )],
+        cameras: vec![
+            Camera::looking_at("front", DVec3::new(0.5, 0.5, 2.4) * BOX, DVec3::new(0.5, 0.5, 0.0) * BOX, DVec3::Y, 39.0f64.to_radians())
+                .with_aspect(1.0),
+        ],
         ..Scene::default()
     }
 }
@@ -141,7 +138,9 @@ fn caustic_sphere() -> Scene {
             Mesh::sphere("glass sphere", DVec3::new(0.0, 0.35, 0.0), 0.25, 128, 2),
         ],
         materials: vec![Material::lambert("plane", Vec3::splat(0.6)), lamp, glass],
-        cameras: vec![Camera::looking_at("front", DVec3::new(0.6, 1.0, 2.2), DVec3::new(0.1, 0.15, 0.0), DVec3::Y, 0.7)],
+        cameras: vec![
+            Camera::looking_at("front", DVec3::new(0.6, 1.0, 2.2), DVec3::new(0.1, 0.15, 0.0), DVec3::Y, 0.7).with_aspect(4.0 / 3.0),
+        ],
         ..Scene::default()
     }
 }
@@ -155,7 +154,7 @@ mod tests {
         for name in names() {
             let scene = by_name(name).unwrap();
             assert_eq!(scene.name, name);
-            assert!(scene.is_lit() && scene.triangle_count() > 0 && !scene.cameras.is_empty(), "{name}");
+            assert!(scene.is_lit() && scene.triangle_count() > 0 && scene.cameras.iter().any(|camera| camera.aspect.is_some()), "{name}");
             assert!(scene.meshes.iter().all(|mesh| mesh.material < scene.materials.len()), "{name}");
         }
     }

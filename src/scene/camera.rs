@@ -13,6 +13,8 @@ pub struct Camera {
     pub up: DVec3,
     /// Angle between the picture's lower and upper edge, radians.
     pub vertical_view: f64,
+    /// Width over height of the picture that it was set up for; `None` leaves that open.
+    pub aspect: Option<f64>,
 }
 
 impl Camera {
@@ -22,7 +24,11 @@ impl Camera {
         let side = forward.cross(up);
         let side = if side.length_squared() < 1.0 / 1_048_576.0 { forward.cross(forward.any_orthonormal_vector()) } else { side };
         let right = side.normalize();
-        Camera { name: name.to_owned(), eye, forward, right, up: right.cross(forward), vertical_view }
+        Camera { name: name.to_owned(), eye, forward, right, up: right.cross(forward), vertical_view, aspect: None }
+    }
+
+    pub fn with_aspect(self, aspect: f64) -> Camera {
+        Camera { aspect: Some(aspect), ..self }
     }
 
     /// A camera in front of the scene (towards +z) that sees all of a box.

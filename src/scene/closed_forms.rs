@@ -82,7 +82,7 @@ fn furnace() -> Scene {
             Mesh::parallelogram("right", far, -z, -y, 0),
         ],
         materials: vec![material],
-        cameras: vec![Camera::looking_at("inside", DVec3::splat(0.5), DVec3::new(0.1, 0.4, 0.0), DVec3::Y, 1.4)],
+        cameras: vec![Camera::looking_at("inside", DVec3::splat(0.5), DVec3::new(0.1, 0.4, 0.0), DVec3::Y, 1.4).with_aspect(1.0)],
         ..Scene::default()
     }
 }
@@ -99,7 +99,7 @@ fn integrating_sphere() -> Scene {
         meshes: vec![sphere],
         materials: vec![Material::lambert("wall", Vec3::splat(WALL_ALBEDO))],
         lights: vec![Light { name: "middle".into(), kind: LightKind::Point { position: DVec3::ZERO, intensity } }],
-        cameras: vec![Camera::looking_at("inside", DVec3::new(0.0, 0.0, 0.5), DVec3::NEG_Z, DVec3::Y, 1.4)],
+        cameras: vec![Camera::looking_at("inside", DVec3::new(0.0, 0.0, 0.5), DVec3::NEG_Z, DVec3::Y, 1.4).with_aspect(1.0)],
         ..Scene::default()
     }
 }
@@ -117,7 +117,7 @@ fn over_plane(light: LightKind) -> Scene {
         meshes: vec![Mesh::parallelogram("plane", DVec3::new(-2.0, 0.0, -2.0), DVec3::Z * 4.0, DVec3::X * 4.0, 0)],
         materials: vec![Material::lambert("plane", Vec3::splat(0.8))],
         lights: vec![Light { name: "light".into(), kind: light }],
-        cameras: vec![Camera::looking_at("above", DVec3::new(0.0, 1.5, 3.5), DVec3::ZERO, DVec3::Y, 0.9)],
+        cameras: vec![Camera::looking_at("above", DVec3::new(0.0, 1.5, 3.5), DVec3::ZERO, DVec3::Y, 0.9).with_aspect(4.0 / 3.0)],
         ..Scene::default()
     }
 }
@@ -134,7 +134,7 @@ fn mirror_corridor() -> Scene {
             Mesh::parallelogram("end", DVec3::new(-0.5, -1.0, -10.0), DVec3::X, DVec3::Y * 2.0, 1),
         ],
         materials: vec![mirror, lamp],
-        cameras: vec![Camera::looking_at("entrance", DVec3::ZERO, DVec3::new(0.0, 0.0, -1.0), DVec3::Y, 0.5)],
+        cameras: vec![Camera::looking_at("entrance", DVec3::ZERO, DVec3::new(0.0, 0.0, -1.0), DVec3::Y, 0.5).with_aspect(1.0)],
         ..Scene::default()
     }
 }
@@ -152,7 +152,7 @@ fn glass_slab() -> Scene {
             Mesh::parallelogram("back", corner - 0.1 * DVec3::Z, DVec3::Y * 4.0, DVec3::X * 4.0, 0),
         ],
         materials: vec![glass, lamp],
-        cameras: vec![Camera::looking_at("front", DVec3::Z * 2.0, DVec3::ZERO, DVec3::Y, 0.3)],
+        cameras: vec![Camera::looking_at("front", DVec3::Z * 2.0, DVec3::ZERO, DVec3::Y, 0.3).with_aspect(1.0)],
         ..Scene::default()
     }
 }

@@ -597,7 +597,14 @@ impl Loader {
         let eye = to_world.transform_point3(DVec3::ZERO);
         let target = eye + to_world.transform_vector3(DVec3::NEG_Z).normalize_or(DVec3::NEG_Z);
         let up = to_world.transform_vector3(DVec3::Y);
-        self.scene.cameras.push(Camera::looking_at(&name, eye, target, up, vertical_view));
+        // Where the file leaves the aspect open, so does the camera.
+        let aspect = perspective.aspect_ratio().map(f64::from);
+        let is_usable = |aspect: &f64| aspect.is_finite() && *aspect > 0.0;
+        if let Some(aspect) = aspect.filter(|aspect| !is_usable(aspect)) {
+            self.leave_out(format!("an aspect ratio of {aspect}"), &format!("camera '{name}'"));
+        }
+        let camera = Camera::looking_at(&name, eye, target, up, vertical_view);
+        self.scene.cameras.push(Camera { aspect: aspect.filter(is_usable), ..camera });
     }
 
     fn read_light(&mut self, light: &gltf::khr_lights_punctual::Light, node: &str, to_world: DMat4) -> Result<()> {

@@ -1,0 +1,98 @@
+//! Texts of `--help`: the built-in scenes, and examples for each command.
+//!
+//! Options stand under the same headings in all commands, in this order: Output, Scene, When to stop, Measurements, Photons,
+//! Light transport, Density estimate, Implementation, Checks, Messages, Device. clap prints headings in the order in which
+//! the structs' fields first name them; a heading of a whole struct goes on after it, until the next one.
+
+use crate::scene::built_in;
+
+/// Printed where no argument is given.
+pub(super) const START: &str = "\
+photonmill: photon mapping on any Vulkan GPU
+
+Three commands to start with:
+  photonmill render cornell-spheres -o picture.png    render a built-in scene
+  photonmill render scene.glb -o picture.png          render your own scene (glTF, from Blender for example)
+  photonmill --preset modified                        light the box of the paper and write open-box.png
+
+`photonmill --help` lists all commands and options.";
+
+pub(super) fn scene() -> String {
+    format!("glTF file (.gltf or .glb), or a built-in scene: {}", built_in::names().join(", "))
+}
+
+pub(super) const MAIN: &str = "\
+Examples:
+  photonmill --preset modified
+      The paper's modified implementation: 5000 photons, 15 bounces; writes open-box.png
+  photonmill --variant persistent --photons 1048576 -o box.exr
+      A million photons by the persistent builder
+  photonmill --error 1% --json report.json
+      As many rounds as an error of 1 % takes, with a report
+  photonmill render scene.glb -o picture.png
+      A scene of your own";
+
+pub(super) const RENDER: &str = "\
+Examples:
+  photonmill render cornell-spheres -o picture.png
+      A built-in scene
+  photonmill render scene.glb -o picture.exr --size 1920 --error 2%
+      Your own scene, 1920 pixels wide, until the error is at most 2 %
+  photonmill render scene.glb -o picture.png --camera Camera.001 --time 1m --error-image error.exr
+      Another camera, one minute, and the standard error of each pixel";
+
+pub(super) const BAKE: &str = "\
+Examples:
+  photonmill bake scene.glb -o baked
+      Lightmaps of all surfaces, and the scene with these lightmaps
+  photonmill bake scene.glb -o baked --texels-per-metre 64 --error 5%
+      A finer lightmap, until the error is at most 5 %";
+
+pub(super) const PROBE: &str = "\
+Examples:
+  echo '0.5 0.01 0.5 0 1 0' | photonmill probe cornell --points - -o -
+      Irradiance at one point above the floor, on standard output
+  photonmill probe scene.glb --points points.txt -o irradiance.csv --error 1%
+      Irradiance at the points of a file, until the error is at most 1 %";
+
+pub(super) const PLAN: &str = "\
+Examples:
+  photonmill plan scene.glb
+      The effects that rendering this scene would simulate, and the memory that it needs
+  photonmill plan cornell --size 1920x1080 --json plan.json
+      The same as JSON";
+
+pub(super) const DEVICES: &str = "\
+Examples:
+  photonmill devices
+      All Vulkan devices; their number or name is what --device takes
+  photonmill devices --json devices.json
+      The same as JSON";
+
+pub(super) const SELFCHECK: &str = "\
+Examples:
+  photonmill selfcheck
+      Checks the default device
+  photonmill selfcheck --device 1 --json selfcheck.json
+      Checks another device; the report is JSON";
+
+pub(super) const STUDY: &str = "\
+Examples:
+  photonmill study open-box -o study
+      Two minutes of measurements; open study/index.html
+  photonmill study scene.glb -o study --budget 10m
+      A scene of your own, in ten minutes";
+
+pub(super) const BENCH: &str = "\
+Examples:
+  photonmill bench --only open-box,cornell
+      Two experiments, as text
+  photonmill bench --scale -o bench
+      Time and memory against photons and triangles, with charts";
+
+pub(super) const PAPER: &str = "\
+Examples:
+  photonmill paper -o paper
+      All figures and tables; open paper/index.html
+  photonmill paper -o paper --threads all --longest 20s
+      Also with all CPU threads; leaves out rows that would take longer than 20 s";

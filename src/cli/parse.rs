@@ -1,0 +1,67 @@
+//! Values of options: text to numbers, with what is allowed in words. Ranges are the settings' affair.
+
+use std::str::FromStr;
+
+use crate::settings::WALL_NAMES;
+use crate::transport::replay::PhotonName;
+
+type Parsed<T> = Result<T, String>;
+
+pub(super) fn parse_integer<T: FromStr>(text: &str) -> Parsed<T> {
+    text.parse().map_err(|_| format!("must be a whole number from 0 to {}", (1u128 << (8 * size_of::<T>())) - 1))
+}
+
+pub(super) fn parse_number<T: FromStr>(text: &str) -> Parsed<T> {
+    text.parse().map_err(|_| "must be a number".to_owned())
+}
+
+/// `1,2,3`.
+pub(super) fn parse_numbers<T: FromStr + Copy, const N: usize>(text: &str) -> Parsed<[T; N]> {
+    let wanted = format!("must be {N} numbers separated by commas");
+    let parts: Option<Vec<T>> = text.split(',').map(|part| part.trim().parse().ok()).collect();
+    parts.and_then(|parts| parts.try_into().ok()).ok_or(wanted)
+}
+
+/// `1%` or `1`: per cent, as a share of 1.
+pub(super) fn parse_percent(text: &str) -> Parsed<f64> {
+    let number = text.strip_suffix('%').unwrap_or(text).trim();
+    number.parse().map(|percent: f64| percent / 100.0).map_err(|_| "must be a number of per cent, such as 1%".to_owned())
+}
+
+/// `2s`, `500ms`, `3m`, `1h`, or seconds.
+pub(super) fn parse_seconds(text: &str) -> Parsed<f64> {
+    let units = [("ms", 1e-3), ("s", 1.0), ("m", 60.0), ("h", 3600.0)];
+    let (number, unit) = units.iter().find_map(|(name, unit)| Some((text.strip_suffix(name)?, *unit))).unwrap_or((text, 1.0));
+    number.trim().parse().map(|count: f64| count * unit).map_err(|_| "must be a time, such as 2s, 500ms or 3m".to_owned())
+}
+
+pub(super) fn parse_shininess(text: &str) -> Parsed<[f32; 5]> {
+    match parse_numbers::<f32, 1>(text) {
+        Ok([all]) => Ok([all; 5]),
+        Err(_) => parse_numbers::<f32, 5>(text).map_err(|_| format!("must be one number, or five for {}", WALL_NAMES.join(","))),
+    }
+}
+
+pub(super) fn parse_colour(text: &str) -> Parsed<[f32; 3]> {
+    let all = match parse_numbers::<f32, 1>(text) {
+        Ok([grey]) => [grey; 3],
+        Err(_) => parse_numbers::<f32, 3>(text).map_err(|_| "must be one number, or three separated by commas".to_owned())?,
+    };
+    if all.iter().all(|value| value.is_finite() && *value >= 0.0) { Ok(all) } else { Err("must be 0 or more".to_owned()) }
+}
+
+pub(super) fn parse_threads(text: &str) -> Parsed<usize> {
+    if text == "all" {
+        return Ok(std::thread::available_parallelism().map_or(1, usize::from));
+    }
+    text.parse().map_err(|_| "must be a number of threads, or all".to_owned())
+}
+
+/// `3:4711`, `3:4711:caustic`.
+pub(super) fn parse_photon_name(text: &str) -> Parsed<PhotonName> {
+    let (numbers, caustic) = text.strip_suffix(":caustic").map_or((text, false), |numbers| (numbers, true));
+    let parsed = numbers.split_once(':').and_then(|(round, photon)| Some((round.parse().ok()?, photon.parse().ok()?)));
+    parsed
+        .map(|(round, photon)| PhotonName { round, photon, caustic })
+        .ok_or_else(|| "must be ROUND:PHOTON, two whole numbers, or ROUND:PHOTON:caustic".to_owned())
+}

@@ -1,0 +1,206 @@
+//! What a command prints while it runs: device, plan and progress, all on stderr.
+
+use std::cell::Cell;
+use std::io::{IsTerminal, Write};
+use std::sync::mpsc::{RecvTimeoutError, Sender, channel};
+use std::sync::{Arc, Mutex, PoisonError};
+use std::thread::JoinHandle;
+use std::time::{Duration, Instant};
+
+use clap::{Args, ValueEnum};
+use indicatif::{ProgressBar, ProgressStyle};
+
+use super::complain;
+use crate::gpu::{DeviceFacts, Gpu};
+use crate::render::Progress;
+
+#[derive(Args)]
+#[command(next_help_heading = "Messages")]
+pub(super) struct ProgressArgs {
+    /// Progress on stderr
+    #[arg(long, value_enum, value_name = "FORM", default_value = "auto")]
+    progress: ProgressForm,
+    /// Print neither device and plan nor progress; warnings and errors are still printed
+    #[arg(short, long, conflicts_with = "progress")]
+    quiet: bool,
+}
+
+#[derive(Clone, Copy, PartialEq, Eq, ValueEnum)]
+enum ProgressForm {
+    /// A bar on a terminal, elsewhere a line every few seconds
+    #[value(alias = "bar")]
+    Auto,
+    /// One JSON object per step
+    Json,
+}
+
+/// Prints device, plan and progress of a command.
+pub(super) struct ProgressReporter {
+    form: Form,
+    status: Arc<Mutex<String>>,
+    /// Prints the status every few seconds; ends when the sender goes.
+    ticker: Option<(Sender<()>, JoinHandle<()>)>,
+}
+
+enum Form {
+    Quiet,
+    /// And whether it now has the style of a run.
+    Bar(ProgressBar, Cell<bool>),
+    Lines,
+    Json,
+}
+
+/// Time between two lines.
+const INTERVAL: Duration = Duration::from_secs(3);
+/// Of the bar.
+const BAR_STEPS: u64 = 1000;
+
+/// The bar on the terminal, which must step aside for any other line.
+static BAR: Mutex<Option<ProgressBar>> = Mutex::new(None);
+
+/// Prints a line on stderr, above the bar if there is one. Where nobody can read it, the run goes on.
+pub(super) fn print_line(line: &str) {
+    let print = || drop(writeln!(std::io::stderr(), "{line}"));
+    match BAR.lock().unwrap_or_else(PoisonError::into_inner).as_ref() {
+        Some(bar) => bar.suspend(print),
+        None => print(),
+    }
+}
+
+impl ProgressReporter {
+    pub(super) fn new(args: &ProgressArgs) -> ProgressReporter {
+        let status = Arc::new(Mutex::new(String::new()));
+        let form = match args.progress {
+            _ if args.quiet => Form::Quiet,
+            ProgressForm::Json => Form::Json,
+            ProgressForm::Auto if std::io::stderr().is_terminal() => {
+                let bar = ProgressBar::new(BAR_STEPS).with_style(style("{spinner} {elapsed} {msg}"));
+                bar.enable_steady_tick(Duration::from_millis(200));
+                *BAR.lock().unwrap_or_else(PoisonError::into_inner) = Some(bar.clone());
+                Form::Bar(bar, Cell::new(false))
+            }
+            ProgressForm::Auto => Form::Lines,
+        };
+        let ticker = matches!(form, Form::Lines).then(|| {
+            let (end, ended) = channel::<()>();
+            let (status, started) = (status.clone(), Instant::now());
+            let thread = std::thread::spawn(move || {
+                while ended.recv_timeout(INTERVAL) == Err(RecvTimeoutError::Timeout) {
+                    let status = status.lock().unwrap_or_else(PoisonError::into_inner).clone();
+                    if !status.is_empty() {
+                        complain(&format!("{:.0} s: {status}", started.elapsed().as_secs_f64()));
+                    }
+                }
+            });
+            (end, thread)
+        });
+        ProgressReporter { form, status, ticker }
+    }
+
+    /// One line, printed now.
+    pub(super) fn note(&self, line: &str) {
+        match &self.form {
+            Form::Quiet => {}
+            Form::Json => print_json(&serde_json::json!({ "message": line })),
+            Form::Bar(..) | Form::Lines => complain(line),
+        }
+    }
+
+    /// The device in use; `None` is the CPU builder.
+    pub(super) fn device(&self, gpu: Option<&Gpu>) {
+        let describe = |facts: &DeviceFacts| format!("{}, {}", facts.name, facts.driver);
+        self.note(&format!("device: {}", gpu.map_or_else(|| "CPU".to_owned(), |gpu| describe(gpu.facts()))));
+    }
+
+    /// What is being done from now on; printed every few seconds.
+    pub(super) fn status(&self, what: &str) {
+        self.set_status(what);
+        match &self.form {
+            Form::Bar(bar, is_run) => {
+                if is_run.replace(false) {
+                    bar.set_style(style("{spinner} {elapsed} {msg}"));
+                }
+                bar.set_message(what.to_owned());
+            }
+            Form::Json => print_json(&serde_json::json!({ "message": what })),
+            Form::Quiet | Form::Lines => {}
+        }
+    }
+
+    /// A step of several, printed now and every few seconds until the next one.
+    pub(super) fn step(&self, what: &str) {
+        if !matches!(self.form, Form::Json) {
+            self.note(what);
+        }
+        self.status(what);
+    }
+
+    /// How far a run has come, in rounds or photons.
+    pub(super) fn report(&self, progress: &Progress, unit: &str) {
+        match &self.form {
+            Form::Quiet => {}
+            Form::Lines => self.set_status(&progress_line(progress, unit)),
+            Form::Bar(bar, is_run) => {
+                if !is_run.replace(true) {
+                    bar.set_style(style("{bar:32} {msg}\n{prefix}"));
+                }
+                bar.set_position((share_done(progress) * BAR_STEPS as f64) as u64);
+                bar.set_message(progress_line(progress, unit));
+                bar.set_prefix(ledger_line(progress));
+            }
+            Form::Json => print_json(progress),
+        }
+    }
+
+    fn set_status(&self, what: &str) {
+        what.clone_into(&mut self.status.lock().unwrap_or_else(PoisonError::into_inner));
+    }
+
+    /// Ends all output, before the results are printed; so does dropping it.
+    pub(super) fn finish(self) {}
+}
+
+impl Drop for ProgressReporter {
+    fn drop(&mut self) {
+        if let Some((end, thread)) = self.ticker.take() {
+            drop(end);
+            // It only sleeps and prints.
+            let _ = thread.join();
+        }
+        if let Form::Bar(bar, _) = &self.form {
+            *BAR.lock().unwrap_or_else(PoisonError::into_inner) = None;
+            bar.finish_and_clear();
+        }
+    }
+}
+
+fn style(template: &str) -> ProgressStyle {
+    ProgressStyle::with_template(template).expect("the template is valid")
+}
+
+fn print_json(value: &impl serde::Serialize) {
+    print_line(&serde_json::to_string(value).expect("progress is plain data"));
+}
+
+/// By the time that is predicted, as a run may end before its last round.
+fn share_done(progress: &Progress) -> f64 {
+    progress.seconds_left.map_or(0.0, |left| progress.seconds / (progress.seconds + left).max(1e-9))
+}
+
+/// Amount done, rate, error now and wanted, and the predicted end.
+fn progress_line(progress: &Progress, unit: &str) -> String {
+    let Progress { done, seconds, photons, .. } = progress;
+    let rate = *photons as f64 / seconds.max(1e-9);
+    let wanted = progress.error_wanted.map_or_else(String::new, |wanted| format!(" (goal {:.3} %)", 100.0 * wanted));
+    let error = progress.error.map_or_else(String::new, |error| format!(", error {:.3} %{wanted}", 100.0 * error));
+    let left = progress.seconds_left.map_or_else(String::new, |left| format!(", {left:.0} s left"));
+    format!("{done} {unit}, {rate:.2e} photons/s{error}{left}")
+}
+
+fn ledger_line(progress: &Progress) -> String {
+    let ledger = &progress.ledger;
+    format!(
+        "{} emitted = {} absorbed + {} escaped + {} cut off; {} stored",
+        ledger.emitted, ledger.absorbed, ledger.escaped, ledger.cut_off, ledger.stored
+    )
+}

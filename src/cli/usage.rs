@@ -1,0 +1,76 @@
+//! Complaints about the command line, as one sentence with option, value as typed, and what is allowed.
+
+use clap::error::{ContextKind, ContextValue, ErrorKind};
+use clap::parser::ValueSource;
+use clap::{ArgMatches, Command};
+
+use crate::error::Error;
+use crate::scene::built_in;
+
+/// What clap complains of, in one line.
+pub(super) fn one_line(error: &clap::Error) -> String {
+    let context = |kind: ContextKind| match error.get(kind) {
+        Some(ContextValue::String(text)) => text.clone(),
+        Some(ContextValue::Strings(texts)) => texts.join(", "),
+        _ => String::new(),
+    };
+    // clap has the best one last.
+    let similar = |kind: ContextKind| match error.get(kind) {
+        Some(ContextValue::String(text)) => format!("did you mean {text}? "),
+        Some(ContextValue::Strings(texts)) if !texts.is_empty() => {
+            format!("did you mean {}? ", texts.iter().rev().cloned().collect::<Vec<_>>().join(" or "))
+        }
+        _ => String::new(),
+    };
+    let argument = context(ContextKind::InvalidArg);
+    let value = context(ContextKind::InvalidValue);
+    let option = argument.split([' ', '=']).next().unwrap_or_default();
+    match error.kind() {
+        ErrorKind::InvalidValue if !context(ContextKind::ValidValue).is_empty() => {
+            let shown = if value.is_empty() { "(no value)" } else { &value };
+            format!("{option} {shown}: {}must be one of {}", similar(ContextKind::SuggestedValue), context(ContextKind::ValidValue))
+        }
+        ErrorKind::ValueValidation => {
+            let reason = std::error::Error::source(error).map(ToString::to_string).unwrap_or_default();
+            format!("{option} {value}: {reason}")
+        }
+        ErrorKind::UnknownArgument => scene_without_command(&argument)
+            .unwrap_or_else(|| format!("{argument}: no such option; {}see --help", similar(ContextKind::SuggestedArg))),
+        ErrorKind::InvalidSubcommand => {
+            let name = context(ContextKind::InvalidSubcommand);
+            scene_without_command(&name)
+                .unwrap_or_else(|| format!("{name}: no such command; {}see --help", similar(ContextKind::SuggestedSubcommand)))
+        }
+        _ => scene_without_command(&context(ContextKind::InvalidSubcommand)).unwrap_or_else(|| {
+            let rendered = error.render().to_string();
+            let sentence: Vec<&str> = rendered.lines().take_while(|line| !line.is_empty()).map(str::trim).collect();
+            sentence.join(" ").trim_start_matches("error: ").to_owned()
+        }),
+    }
+}
+
+/// What to type for a scene that stands where a command is expected.
+fn scene_without_command(name: &str) -> Option<String> {
+    let is_file = [".gltf", ".glb"].iter().any(|ending| name.to_lowercase().ends_with(ending));
+    (is_file || built_in::names().contains(&name))
+        .then(|| format!("{name}: a scene needs a command; to render it: photonmill render {name} -o picture.png"))
+}
+
+/// The same error with the option's value as the user typed it. Settings hold what was understood: 0.0095 of
+/// `--confidence 0.95`, in which nobody finds the fault.
+pub(super) fn as_typed(error: Error, matches: &ArgMatches, command: &Command) -> Error {
+    let Error::Setting { option, value, allowed } = error else { return error };
+    let (matches, command) = match matches.subcommand() {
+        Some((name, inner)) => (inner, command.find_subcommand(name).unwrap_or(command)),
+        None => (matches, command),
+    };
+    let argument = command
+        .get_arguments()
+        .filter(|argument| argument.get_long().is_some_and(|long| option.strip_prefix("--") == Some(long)))
+        .find(|argument| argument.get_action().takes_values())
+        .filter(|argument| matches.value_source(argument.get_id().as_str()) == Some(ValueSource::CommandLine));
+    let typed: Vec<_> = argument.and_then(|argument| matches.get_raw(argument.get_id().as_str())).into_iter().flatten().collect();
+    // Of a list, the value already is the entry in question.
+    let value = if let [typed] = typed[..] { typed.to_string_lossy().into_owned() } else { value };
+    Error::Setting { option, value, allowed }
+}
