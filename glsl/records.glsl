@@ -217,7 +217,7 @@ struct Emitter {
     vec3 position;
     vec3 direction;
     float size;
-    float cos_outer;
+    float outer_versine;
 };
 
 struct CausticTarget {

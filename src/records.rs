@@ -330,10 +330,10 @@ records! {
         position: Vec3,
         /// Its axis or normal; a directional light's flight.
         direction: Vec3,
-        /// Radius of a disc, cosine of a spot's inner cone.
+        /// Radius of a disc; versine (1 - cosine) of a spot's inner cone, of which a narrow one keeps its digits.
         size: f32,
-        /// Cosine of a spot's outer cone.
-        cos_outer: f32,
+        /// Versine of a spot's outer cone.
+        outer_versine: f32,
     }
 
     /// A sphere around surfaces that make caustics, which photons are aimed at.

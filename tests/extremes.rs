@@ -28,7 +28,7 @@ use photonmill::scene::open_box::open_box;
 use photonmill::scene::rectangle::disc_rectangle_area;
 use photonmill::scene::room::Wall;
 use photonmill::selfcheck::measure::irradiance;
-use photonmill::settings::transport::{Illumination, Kernel, TransportSettings};
+use photonmill::settings::transport::{Illumination, Kernel, Part, TransportSettings};
 use photonmill::settings::{EmissionLaw, Gather, MAX_EVENTS, Settings, Variant};
 use photonmill::transport::{Lit, RoundFilm};
 use photonmill::{estimate, index};
@@ -688,5 +688,56 @@ fn the_checks_of_numbers_complain() {
         [("a little more", 2.0 + 4e-6), ("a little less", 2.0 - 4e-6), ("no number", f64::NAN), ("infinity", f64::INFINITY)]
     {
         assert_complains(what, complains(found));
+    }
+}
+
+/// A spot's light falls off by one law down to half angles of a thousandth of a degree: on its axis and between its cones,
+/// from shadow rays against the closed form, and as a power that photons bring.
+#[test]
+fn narrow_spots_shine_as_wide_ones() {
+    let Some(gpu) = device() else { return };
+    let position = DVec3::new(0.25, 1.0, -0.5);
+    for (what, direction) in [("straight down", DVec3::NEG_Y), ("aslant", DVec3::new(0.3, -1.0, 0.2).normalize())] {
+        for degrees in [10.0f64, 1.0, 0.1, 0.05, 0.01, 0.001] {
+            let outer_angle = degrees.to_radians() as f32;
+            let (inner, outer) = (0.5 * f64::from(outer_angle), f64::from(outer_angle));
+            let inner_angle = inner as f32;
+            let spot = over_plane(LightKind::Spot { position, direction, intensity: Vec3::ONE, inner_angle, outer_angle });
+            let versine = |angle: f64| 2.0 * (0.5 * angle).sin().powi(2);
+            let falloff = |angle: f64| ((versine(outer) - versine(angle)) / (versine(outer) - versine(inner))).clamp(0.0, 1.0).powi(2);
+            // Where rays at an angle from the axis meet the plane, and the irradiance there.
+            let across = direction.any_orthonormal_vector();
+            let place = |angle: f64| {
+                let way = angle.cos() * direction + angle.sin() * across;
+                let distance = -1.0 / way.y;
+                (position + distance * way, -way.y / distance.powi(2) * falloff(angle))
+            };
+            let shares = [0.0, 0.25, 0.45, 0.6, 0.75, 0.9, 1.1];
+            let places = shares.map(|share| place(share * outer));
+            let settings = TransportSettings { rounds: 2, part: Part::Direct, ..TransportSettings::default() };
+            let lit = received(&gpu, &spot, &settings, &places.map(|(point, _)| (point, DVec3::Y)));
+            // Single precision knows a direction to 1e-7 radians.
+            let tolerance = 2e-5 + 1e-7 * 8.0 / outer;
+            for (k, (_, exact)) in places.iter().enumerate() {
+                let found = lit.film.mean(k, &lit.plan).x;
+                println!("{what}, {degrees} degrees, at {} of them: {found:.6}, {exact:.6} is right", shares[k]);
+                assert!((found - exact).abs() <= tolerance, "{what}, {degrees} degrees, at {} of them: {found}, not {exact}", shares[k]);
+            }
+
+            // Within its whole disc, a photon map holds the spot's power.
+            let radius = 1.2 * place(outer).0.distance(place(0.0).0).max(2e-4);
+            let settings = TransportSettings {
+                photons: 1000,
+                rounds: 2,
+                bounces: 1,
+                radius: Some(radius),
+                alpha: 1.0,
+                illumination: Illumination::Photons,
+                ..TransportSettings::default()
+            };
+            let lit = received(&gpu, &spot, &settings, &[(place(0.0).0, DVec3::Y)]);
+            let exact = 2.0 * PI * (versine(inner) + (versine(outer) - versine(inner)) / 3.0) / (PI * radius * radius);
+            assert_holds(format!("{what}, {degrees} degrees"), relative_check("power", lit.film.mean(0, &lit.plan).x, exact, 1e-5));
+        }
     }
 }

@@ -31,11 +31,27 @@ float triangle_area(Triangle triangle)
     return 0.5 * norm(cross(triangle.b - triangle.a, triangle.c - triangle.a));
 }
 
-// glTF's falloff between a spot's cones.
-float spot_falloff(Emitter light, float cosine)
+// 1 - cosine of the angle between unit vectors, with all digits of a small angle.
+float versine_between(vec3 a, vec3 b)
 {
-    float share = clamp(divide(cosine - light.cos_outer, max(light.size - light.cos_outer, 1e-6)), 0.0, 1.0);
+    vec3 chord = a - b;
+    return 0.5 * dot(chord, chord);
+}
+
+// glTF's falloff between a spot's cones, at a versine from its axis.
+float spot_falloff(Emitter light, float versine)
+{
+    if (versine <= light.size) {
+        return 1.0;
+    }
+    float share = versine < light.outer_versine ? divide(light.outer_versine - versine, light.outer_versine - light.size) : 0.0;
     return share * share;
+}
+
+// Integral of the falloff over the versine: solid angle over 2 pi. The square of what is linear has a third of the ring.
+float spot_integral(Emitter light)
+{
+    return light.size + (light.outer_versine - light.size) * (1.0 / 3.0);
 }
 
 struct Emission {
@@ -81,12 +97,14 @@ Emission sample_emission(Emitter light, float scene_radius, vec4 u, vec4 w)
     if (HAS_SPOT_LIGHTS) {
         if (light.kind == EMITTER_SPOT) {
             // In proportion to the intensity: the inner cone evenly, the ring by its falloff.
-            float inner = 1.0 - light.size;
-            float ring = (light.size - light.cos_outer) * (1.0 / 3.0);
-            float below = w.x * (inner + ring);
-            float cosine = below < inner ? 1.0 - below
-                                         : light.cos_outer + (light.size - light.cos_outer) * exp2(log2(max(1.0 - divide(below - inner, max(ring, 1e-12)), 1e-12)) * (1.0 / 3.0));
-            emission.direction = to_frame(direction_at(cosine, (1.0 - cosine) * (1.0 + cosine), w.y), light.direction);
+            float width = light.outer_versine - light.size;
+            float below = w.x * spot_integral(light);
+            float versine = below;
+            if (below > light.size) {
+                float above = max(1.0 - divide(3.0 * (below - light.size), width), LEAST);
+                versine = light.outer_versine - width * exp2(log2(above) * (1.0 / 3.0));
+            }
+            emission.direction = to_frame(direction_at(1.0 - versine, versine * (2.0 - versine), w.y), light.direction);
         }
     }
     if (HAS_DISC_LIGHTS) {
@@ -166,7 +184,7 @@ Arriving sample_light(uint emitter_count, vec3 position, vec3 ns, vec3 u)
     }
     if (HAS_SPOT_LIGHTS) {
         if (light.kind == EMITTER_SPOT) {
-            cos_light = spot_falloff(light, dot(normalize(position - light.position), light.direction));
+            cos_light = spot_falloff(light, versine_between(normalize(position - light.position), light.direction));
         }
     }
     if (HAS_DISC_LIGHTS) {
