@@ -294,6 +294,7 @@ struct FlyWholePush {
 
 struct ViewPush {
     Draws draws;
+    uint rounding;
     uint width;
     uint height;
     uint first_pixel;
@@ -309,6 +310,7 @@ struct ViewPush {
 
 struct ReceivePush {
     Draws draws;
+    uint rounding;
     uint first_point;
     uint end_point;
     uint point_count;
@@ -332,6 +334,7 @@ struct LookupPush {
     uint pixel_count;
     uint arrival;
     uint round;
+    uint rounding;
     uint width;
     uint height;
     uint first_slice;
@@ -349,6 +352,7 @@ struct WeighPush {
     uint height;
     uint arrivals;
     uint round;
+    uint rounding;
     float film_scale;
     float film_limit;
     float global_radius;

@@ -430,6 +430,8 @@ records! {
 
     ViewPush {
         draws: Draws,
+        /// Hash of the seed and the round that decides what is rounded up.
+        rounding: u32,
         width: u32,
         height: u32,
         first_pixel: u32,
@@ -448,6 +450,8 @@ records! {
 
     ReceivePush {
         draws: Draws,
+        /// Hash of the seed and the round that decides what is rounded up.
+        rounding: u32,
         first_point: u32,
         end_point: u32,
         point_count: u32,
@@ -474,6 +478,8 @@ records! {
         /// Index of the arrival that the map holds, where it holds one only: where its sums stand.
         arrival: u32,
         round: u32,
+        /// Hash of the seed and the round that decides what is rounded up.
+        rounding: u32,
         /// Of the picture; 0 where points are receivers, in an order of their own.
         width: u32,
         height: u32,
@@ -496,6 +502,8 @@ records! {
         /// Mask of the arrivals that some map holds.
         arrivals: u32,
         round: u32,
+        /// Hash of the seed and the round that decides what is rounded up.
+        rounding: u32,
         film_scale: f32,
         film_limit: f32,
         global_radius: f32,

@@ -4,7 +4,8 @@
 use std::f64::consts::PI;
 use std::time::Instant;
 
-use crate::common::lit::{mean_red, received, received_within, scene, seen};
+use crate::common::aimed::mean_and_error;
+use crate::common::lit::{grid, irradiances, level, matt, mean_red, means, received, received_within, scene, scene_of, seen};
 use crate::common::{
     Check, Device, assert_complains, assert_holds, device, device_with, equal_sums, photons_on_cpu, plan_for, plan_for_host,
     relative_check, run, run_on_cpu, run_scene, run_scene_on_cpu, share_check, upload_photons, z_check,
@@ -21,12 +22,12 @@ use photonmill::records::Tally;
 use photonmill::render::constants;
 use photonmill::resources::Resources;
 use photonmill::rng::Rng;
-use photonmill::scene::Scene;
 use photonmill::scene::geometry::Geometry;
 use photonmill::scene::light::{Light, LightKind};
 use photonmill::scene::open_box::open_box;
 use photonmill::scene::rectangle::disc_rectangle_area;
 use photonmill::scene::room::Wall;
+use photonmill::scene::{Material, Scene};
 use photonmill::selfcheck::measure::irradiance;
 use photonmill::settings::transport::{Illumination, Kernel, Part, TransportSettings};
 use photonmill::settings::{EmissionLaw, Gather, MAX_EVENTS, Settings, Variant};
@@ -739,5 +740,63 @@ fn narrow_spots_shine_as_wide_ones() {
             let exact = 2.0 * PI * (versine(inner) + (versine(outer) - versine(inner)) / 3.0) / (PI * radius * radius);
             assert_holds(format!("{what}, {degrees} degrees"), relative_check("power", lit.film.mean(0, &lit.plan).x, exact, 1e-5));
         }
+    }
+}
+
+/// Channels that are dim beside another are as bright as their share of it: light of a tinted lamp, and light that a
+/// tinted wall reflects. The same photons carry all channels, so only rounding tells them apart.
+#[test]
+fn channels_a_billionth_as_bright_are_right() {
+    let Some(gpu) = device() else { return };
+    let tint = Vec3::new(1.0, 3e-8, 1e-9);
+    let mut lamp = scene("furnace");
+    lamp.materials.iter_mut().for_each(|material| material.emission *= tint);
+    let floor = Material::lambert("tinted", 0.5 * tint);
+    let down =
+        LightKind::Spot { position: DVec3::Y * 0.5, direction: DVec3::NEG_Y, intensity: Vec3::ONE, inner_angle: 0.5, outer_angle: 1.0 };
+    let wall = scene_of(vec![level(0.0, [1.0; 2], true, 0), level(1.0, [1.0; 2], false, 1)], vec![floor, matt(0.0)], vec![down]);
+    let settings = |illumination, part| TransportSettings {
+        photons: 20_000,
+        bounces: 4,
+        rounds: 4,
+        radius: Some(0.4),
+        illumination,
+        part,
+        ..TransportSettings::default()
+    };
+    let of_lamp = (lamp, settings(Illumination::Photons, Part::All), DVec3::splat(0.5));
+    let of_wall = (wall, settings(Illumination::Split, Part::Indirect), DVec3::Y * 0.5);
+    for (what, (scene, settings, middle)) in [("a lamp", of_lamp), ("a wall", of_wall)] {
+        let points: Vec<_> =
+            grid(0.5, DVec3::NEG_Y, 3).into_iter().map(|(point, normal)| (middle + 0.8 * point + DVec3::Y * 0.1, normal)).collect();
+        let sums: Vec<DVec3> = irradiances(&gpu, &scene, &settings, &points, 1..9).iter().map(|run| run.iter().sum()).collect();
+        for channel in [1, 2] {
+            let shares: Vec<f64> = sums.iter().map(|sum| sum[channel] / (sum.x * f64::from(tint[channel]))).collect();
+            let (share, error) = mean_and_error(&shares);
+            println!("{what}, channel {channel}: {share:.4} +- {error:.4} of what is right");
+            assert!(error < 0.02, "{what}: {share} +- {error}");
+            assert_holds(format!("{what}, channel {channel}"), z_check("share", share, 1.0, error.max(1e-6)));
+        }
+    }
+}
+
+/// The same in a picture, where a channel lies below the film's unit.
+#[test]
+fn channels_below_the_films_unit_are_right() {
+    let Some(gpu) = device() else { return };
+    let tint = DVec3::new(1.0, 1e-9, 1e-10);
+    let mut plane = scene("sky-over-plane");
+    plane.materials[0].base_colour = tint.as_vec3();
+    let camera = photonmill::scene::Camera::looking_at("above", DVec3::Y * 1.5, DVec3::ZERO, DVec3::Z, 0.1);
+    let settings = TransportSettings { photons: 1, rounds: 64, shadow_rays: 1, samples: 1, ..TransportSettings::default() };
+    let lit = seen(&gpu, &plane, &settings, &camera, [16, 16]);
+    let pixels = lit.film.pixels();
+    for channel in 0..3 {
+        let found = means(&lit).iter().map(|mean| mean[channel]).sum::<f64>() / pixels as f64;
+        let variance: f64 = (0..pixels).map(|pixel| lit.film.standard_error(pixel, &lit.plan)[channel].powi(2)).sum();
+        let (exact, error) = (tint[channel], variance.sqrt() / pixels as f64);
+        println!("channel {channel}: {found:e} +- {error:e}, {exact:e} is right, a unit is {:e}", 1.0 / lit.plan.film_scale);
+        assert!(error < 0.05 * exact);
+        assert_holds(channel, z_check("radiance", found, exact, error.max(1e-6 * exact)));
     }
 }

@@ -83,6 +83,6 @@ void main()
     }
     note_unless(is_finite(chain.light[0]) && is_finite(chain.light[1]) && is_finite(chain.light[2]), ODD_LIGHT, push.draws.domain,
                 push.draws.round, index);
-    write_pass_sum(index, chain.light, push.film_scale, push.film_limit);
+    write_pass_sum(index, chain.light, push.film_scale, push.film_limit, push.rounding);
     write_points(chain, index, 0, push.point_count);
 }

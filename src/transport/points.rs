@@ -9,7 +9,7 @@ use crate::gpu::kernels::{CrowdSize, LookupTwoWords, LookupU64, Receive, Resolve
 use crate::gpu::{Commands, Extent};
 use crate::plan::transport::{MapPlan, Sensor, TESTS_PER_POINT, TransportPlan};
 use crate::records::{CellPush, CrowdSizePush, Draws, LookupPush, ReceivePush, ResolvePush, ViewPush, WeighPush};
-use crate::rng::words;
+use crate::rng::{mix32, words};
 use crate::scene::Camera;
 
 /// Runs of `count` items, `step` long.
@@ -21,6 +21,12 @@ fn runs(count: u32, step: u32) -> impl Iterator<Item = (u32, u32)> {
 fn add_work(commands: &mut Commands, plan: &TransportPlan, work: u64) -> Result<()> {
     commands.add_work(work);
     if commands.work() >= plan.work_per_submission { commands.submit() } else { Ok(()) }
+}
+
+/// What decides in a round which fractions are rounded up (`glsl/scene/rounding.glsl`).
+fn rounding(plan: &TransportPlan, round: u32) -> u32 {
+    let seed = words(plan.settings.seed);
+    mix32(seed.x.wrapping_add(mix32(seed.y.wrapping_add(mix32(round)))))
 }
 
 /// Finds the visible points of a round and writes the light that needs no photons.
@@ -39,6 +45,7 @@ pub fn see(commands: &mut Commands, round: Round, camera: Option<&Camera>) -> Re
                 let half_width = half_height * f64::from(width) / f64::from(height);
                 let push = ViewPush {
                     draws: draws(DOMAIN_CAMERA),
+                    rounding: rounding(plan, round),
                     width,
                     height,
                     first_pixel: first,
@@ -74,6 +81,7 @@ pub fn see(commands: &mut Commands, round: Round, camera: Option<&Camera>) -> Re
                 let radius = plan.maps().map(|map| plan.radius(map, round)).fold(f64::INFINITY, f64::min);
                 let push = ReceivePush {
                     draws: draws(DOMAIN_RECEIVERS),
+                    rounding: rounding(plan, round),
                     first_point: first,
                     end_point: end,
                     point_count: plan.sensor.pixels(),
@@ -129,6 +137,7 @@ pub fn look_up(commands: &mut Commands, round: Round, photons: &PhotonBuffers, m
             pixel_count: plan.sensor.pixels(),
             arrival: map.stored.trailing_zeros(),
             round,
+            rounding: rounding(plan, round),
             width,
             height,
             first_slice: 0,
@@ -165,6 +174,7 @@ pub fn weigh(commands: &mut Commands, round: Round) -> Result<()> {
             height,
             arrivals: plan.arrivals,
             round,
+            rounding: rounding(plan, round),
             film_scale: plan.film_scale as f32,
             film_limit: plan.point_limit() as f32,
             global_radius: radius(&plan.global),
