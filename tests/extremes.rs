@@ -5,12 +5,13 @@ use std::f64::consts::PI;
 use std::time::Instant;
 
 use crate::common::aimed::mean_and_error;
+use crate::common::family::Family;
 use crate::common::lit::{grid, irradiances, level, matt, mean_red, means, received, received_within, scene, scene_of, seen};
 use crate::common::{
     Check, Device, assert_complains, assert_holds, device, device_with, equal_sums, photons_on_cpu, plan_for, plan_for_host,
     relative_check, run, run_on_cpu, run_scene, run_scene_on_cpu, share_check, upload_photons, z_check,
 };
-use glam::{DVec3, Vec3};
+use glam::{DQuat, DVec3, EulerRot, Vec3};
 use photonmill::cpu::bsdf::phong_lobe;
 use photonmill::film::{Film, estimate_walls};
 use photonmill::gpu::{Commands, Options};
@@ -24,10 +25,12 @@ use photonmill::resources::Resources;
 use photonmill::rng::Rng;
 use photonmill::scene::geometry::Geometry;
 use photonmill::scene::light::{Light, LightKind};
+use photonmill::scene::material::TextureUse;
 use photonmill::scene::open_box::open_box;
 use photonmill::scene::rectangle::disc_rectangle_area;
 use photonmill::scene::room::Wall;
-use photonmill::scene::{Material, Scene};
+use photonmill::scene::texture::{Texture, Wrap};
+use photonmill::scene::{Material, Mesh, Scene};
 use photonmill::selfcheck::measure::irradiance;
 use photonmill::settings::transport::{Illumination, Kernel, Part, TransportSettings};
 use photonmill::settings::{EmissionLaw, Gather, MAX_EVENTS, Settings, Variant};
@@ -741,6 +744,50 @@ fn narrow_spots_shine_as_wide_ones() {
             assert_holds(format!("{what}, {degrees} degrees"), relative_check("power", lit.film.mean(0, &lit.plan).x, exact, 1e-5));
         }
     }
+}
+
+/// Points on a floor that touches walls which shine, at distances around what single precision tells apart.
+#[test]
+fn walls_light_the_points_that_touch_them() {
+    let Some(gpu) = device() else { return };
+    let distances = [0.0, 1e-8, 1e-7, 1e-6, 3e-6, 1e-5, 1e-4];
+    let mut family = Family::default();
+    let mut check = |what: &str, scene: &Scene, points: &[(DVec3, DVec3)], expected: &dyn Fn(DVec3) -> f64| {
+        let settings = TransportSettings { rounds: 16, shadow_rays: 64, part: Part::Direct, ..TransportSettings::default() };
+        let lit = received(&gpu, scene, &settings, points);
+        for (k, (point, _)) in points.iter().enumerate() {
+            let (found, error, exact) = (lit.film.mean(k, &lit.plan).x, lit.film.standard_error(k, &lit.plan).x, expected(*point));
+            println!("{what}, {point}: {found:.4} +- {error:.4}, {exact:.4} is right");
+
+            family.expect_estimate(format!("{what}, {point}"), found, error.max(2e-3 * exact), settings.rounds, exact);
+        }
+    };
+    let on = |place: fn(f64) -> DVec3, normal: DVec3| distances.map(|distance| (place(distance), normal));
+    // Every point of a furnace sees walls that shine wherever it looks.
+    let furnace = scene("furnace");
+    check("beside a wall", &furnace, &on(|d| DVec3::new(d, 0.0, 0.37), DVec3::Y), &|_| PI);
+    check("in a corner", &furnace, &on(|d| DVec3::new(d, 0.0, d), DVec3::Y), &|_| PI);
+    check("in an edge", &furnace, &on(|d| DVec3::new(1.0 - d, 0.6, 1.0), DVec3::NEG_Z), &|_| PI);
+
+    // One wall, of plain or textured light, aslant to all axes.
+    let turn = DQuat::from_euler(EulerRot::XYZ, 0.3, 0.7, -0.4);
+    for textured in [false, true] {
+        let emission_texture = textured.then_some(TextureUse { texture: 0, uv_set: 0 });
+        let lamp = Material { emission: Vec3::ONE, emission_texture, ..matt(0.0) };
+        let wall = Mesh::parallelogram("wall", DVec3::ZERO, turn * DVec3::Y, turn * DVec3::Z, 1);
+        let floor = Mesh::parallelogram("floor", turn * DVec3::NEG_X, turn * DVec3::Z, turn * (DVec3::X * 2.0), 0);
+        let texture = Texture { name: "white".into(), width: 1, height: 1, texels: vec![Vec3::ONE], wrap: [Wrap::Clamp; 2] };
+        let room = Scene { textures: vec![texture], ..scene_of(vec![wall, floor], vec![matt(0.0), lamp], vec![]) };
+        let points = distances.map(|distance| (turn * DVec3::new(distance, 0.0, 0.4), turn * DVec3::Y));
+        let exact = |point: DVec3| {
+            let distance = (turn.inverse() * point).x.abs();
+            // From a foot of the wall, one of its sides on either hand (Howell, configuration B-3).
+            let half = |width: f64| width.atan2(distance) - distance / distance.hypot(1.0) * width.atan2(distance.hypot(1.0));
+            0.5 * (half(0.4) + half(0.6))
+        };
+        check(if textured { "a textured wall" } else { "a wall" }, &room, &points, &exact);
+    }
+    family.assert_tells(0.2, |_| true);
 }
 
 /// Channels that are dim beside another are as bright as their share of it: light of a tinted lamp, and light that a

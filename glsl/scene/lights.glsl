@@ -168,7 +168,7 @@ Arriving sample_light(uint emitter_count, vec3 position, vec3 ns, vec3 u)
             arriving.target = offset_origin(point, position_error(point) + triangle_error(triangle), normal, normal);
             arriving.radiance = emitted_radiance(material, light.triangle, at.x, at.y) * divide(triangle_area(triangle), light.probability);
             cos_light = is_before(side, position, triangle_error(triangle)) ? max(dot(normal, normalize(position - point)), 0.0) : 0.0;
-            if (cos_light > 0.0 && material.emission_texture == NONE) {
+            if (cos_light > 0.0) {
                 vec4 direction = sample_spherical_triangle(normalize(triangle.a - position), normalize(triangle.b - position),
                                                            normalize(triangle.c - position), u.xy);
                 float approach = -dot(direction.xyz, normal);
@@ -177,7 +177,11 @@ Arriving sample_light(uint emitter_count, vec3 position, vec3 ns, vec3 u)
                     point = position + direction.xyz * divide(dot(normal, position - triangle.a), approach);
                     float error = position_error(point) + triangle_error(triangle);
                     arriving.target = offset_origin(point, error, normal, normal);
-                    arriving.radiance = material.emission * divide(direction.w, light.probability);
+                    if (HAS_TEXTURES) {
+                        at = triangle_weights(triangle, point);
+                    }
+                    arriving.radiance = emitted_radiance(material, light.triangle, at.x, at.y) * divide(direction.w, light.probability);
+                    arriving.wi = direction.xyz;
                 }
             }
         }
@@ -200,7 +204,9 @@ Arriving sample_light(uint emitter_count, vec3 position, vec3 ns, vec3 u)
     if (HAS_DIRECTIONAL_LIGHTS) {
         arriving.is_far = arriving.is_far || light.kind == EMITTER_DIRECTIONAL;
     }
-    arriving.wi = -light.direction;
+    if (arriving.is_far) {
+        arriving.wi = -light.direction;
+    }
     if (HAS_ENVIRONMENT) {
         if (light.kind == EMITTER_ENVIRONMENT) {
             arriving.is_far = true;
@@ -212,8 +218,8 @@ Arriving sample_light(uint emitter_count, vec3 position, vec3 ns, vec3 u)
     if (!arriving.is_far) {
         vec3 way = arriving.target - position;
         float distance_squared = dot(way, way);
-        arriving.wi = distance_squared > 0.0 ? way * inversesqrt(distance_squared) : vec3(0.0);
         if (!by_direction) {
+            arriving.wi = distance_squared > 0.0 ? way * inversesqrt(distance_squared) : vec3(0.0);
             arriving.radiance *= distance_squared > 0.0 ? divide(cos_light, distance_squared) : 0.0;
         }
     }
