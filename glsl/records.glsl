@@ -217,7 +217,7 @@ struct Emitter {
     vec3 position;
     vec3 direction;
     float size;
-    float cos_outer;
+    float outer_versine;
 };
 
 struct CausticTarget {
@@ -311,10 +311,12 @@ struct GoOnPush {
     uint emitter_count;
     float film_scale;
     float film_limit;
+    uint rounding;
 };
 
 struct ViewPush {
     Draws draws;
+    uint rounding;
     uint width;
     uint height;
     uint first_pixel;
@@ -330,6 +332,7 @@ struct ViewPush {
 
 struct ReceivePush {
     Draws draws;
+    uint rounding;
     uint first_point;
     uint end_point;
     uint point_count;
@@ -353,6 +356,7 @@ struct LookupPush {
     uint pixel_count;
     uint arrival;
     uint round;
+    uint rounding;
     uint width;
     uint height;
     uint first_slice;
@@ -370,6 +374,7 @@ struct WeighPush {
     uint height;
     uint arrivals;
     uint round;
+    uint rounding;
     float film_scale;
     float film_limit;
     float global_radius;

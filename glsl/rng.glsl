@@ -3,6 +3,7 @@
 // `stream` is what a path carries between bounces: the 48-bit state of rand48, the two state words
 // of MT19937 that the next output needs, nothing for Philox, (sample, key of its light) of Sobol' points.
 
+#include "hash.glsl"
 #include "philox.glsl"
 #include "sobol.glsl"
 
@@ -23,17 +24,6 @@ float rand48_next(inout uvec2 state, RandomKey key)
     float u = unit_float((state.y << 8) | (state.x >> 24));
     state = affine48(state, key.leap_multiplier, key.leap_increment);
     return u;
-}
-
-// Bijective 32-bit finaliser (Wellons, "prospecting for hash functions", lowbias32): distinct
-// photons get distinct seeds.
-uint mix32(uint x)
-{
-    x ^= x >> 16;
-    x *= 0x7feb352du;
-    x ^= x >> 15;
-    x *= 0x846ca68bu;
-    return x ^ (x >> 16);
 }
 
 // Seeding recurrence of MT19937 (Matsumoto and Nishimura, 2002): word `index` from the one before.

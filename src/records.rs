@@ -330,10 +330,10 @@ records! {
         position: Vec3,
         /// Its axis or normal; a directional light's flight.
         direction: Vec3,
-        /// Radius of a disc, cosine of a spot's inner cone.
+        /// Radius of a disc; versine (1 - cosine) of a spot's inner cone, of which a narrow one keeps its digits.
         size: f32,
-        /// Cosine of a spot's outer cone.
-        cos_outer: f32,
+        /// Versine of a spot's outer cone.
+        outer_versine: f32,
     }
 
     /// A sphere around surfaces that make caustics, which photons are aimed at.
@@ -456,10 +456,13 @@ records! {
         emitter_count: u32,
         film_scale: f32,
         film_limit: f32,
+        rounding: u32,
     }
 
     ViewPush {
         draws: Draws,
+        /// Hash of the seed and the round that decides what is rounded up.
+        rounding: u32,
         width: u32,
         height: u32,
         first_pixel: u32,
@@ -478,6 +481,8 @@ records! {
 
     ReceivePush {
         draws: Draws,
+        /// Hash of the seed and the round that decides what is rounded up.
+        rounding: u32,
         first_point: u32,
         end_point: u32,
         point_count: u32,
@@ -504,6 +509,8 @@ records! {
         /// Index of the arrival that the map holds, where it holds one only: where its sums stand.
         arrival: u32,
         round: u32,
+        /// Hash of the seed and the round that decides what is rounded up.
+        rounding: u32,
         /// Of the picture; 0 where points are receivers, in an order of their own.
         width: u32,
         height: u32,
@@ -526,6 +533,8 @@ records! {
         /// Mask of the arrivals that some map holds.
         arrivals: u32,
         round: u32,
+        /// Hash of the seed and the round that decides what is rounded up.
+        rounding: u32,
         film_scale: f32,
         film_limit: f32,
         global_radius: f32,

@@ -172,7 +172,7 @@ fn rand48_next(state: &mut UVec2, key: &RandomKey) -> f32 {
 }
 
 #[inline(always)]
-fn mix32(mut x: u32) -> u32 {
+pub fn mix32(mut x: u32) -> u32 {
     x ^= x >> 16;
     x = x.wrapping_mul(0x7feb_352d);
     x ^= x >> 15;

@@ -4,12 +4,14 @@
 use std::f64::consts::PI;
 use std::time::Instant;
 
-use crate::common::lit::{mean_red, received, received_within, scene, seen};
+use crate::common::aimed::mean_and_error;
+use crate::common::family::Family;
+use crate::common::lit::{grid, irradiances, level, matt, mean_red, means, received, received_within, scene, scene_of, seen};
 use crate::common::{
     Check, Device, assert_complains, assert_holds, device, device_with, equal_sums, pairs, photons_on_cpu, plan_for, plan_for_host,
     relative_check, run, run_on_cpu, run_scene, run_scene_on_cpu, share_check, upload_photons, z_check,
 };
-use glam::{DVec3, Vec3};
+use glam::{DQuat, DVec3, EulerRot, Vec3};
 use photonmill::cpu::bsdf::phong_lobe;
 use photonmill::film::{Film, estimate_walls};
 use photonmill::gpu::{Commands, Options};
@@ -21,14 +23,16 @@ use photonmill::records::Tally;
 use photonmill::render::constants;
 use photonmill::resources::Resources;
 use photonmill::rng::Rng;
-use photonmill::scene::Scene;
 use photonmill::scene::geometry::Geometry;
 use photonmill::scene::light::{Light, LightKind};
+use photonmill::scene::material::TextureUse;
 use photonmill::scene::open_box::open_box;
 use photonmill::scene::rectangle::disc_rectangle_area;
 use photonmill::scene::room::Wall;
+use photonmill::scene::texture::{Texture, Wrap};
+use photonmill::scene::{Material, Mesh, Scene};
 use photonmill::selfcheck::measure::irradiance;
-use photonmill::settings::transport::{Illumination, Kernel, TransportSettings};
+use photonmill::settings::transport::{Illumination, Kernel, Part, TransportSettings};
 use photonmill::settings::{EmissionLaw, Gather, MAX_EVENTS, Settings, Variant};
 use photonmill::transport::{Lit, RoundFilm};
 use photonmill::{estimate, index};
@@ -692,5 +696,158 @@ fn the_checks_of_numbers_complain() {
         [("a little more", 2.0 + 4e-6), ("a little less", 2.0 - 4e-6), ("no number", f64::NAN), ("infinity", f64::INFINITY)]
     {
         assert_complains(what, complains(found));
+    }
+}
+
+/// A spot's light falls off by one law down to half angles of a thousandth of a degree: on its axis and between its cones,
+/// from shadow rays against the closed form, and as a power that photons bring.
+#[test]
+fn narrow_spots_shine_as_wide_ones() {
+    let Some(gpu) = device() else { return };
+    let position = DVec3::new(0.25, 1.0, -0.5);
+    for (what, direction) in [("straight down", DVec3::NEG_Y), ("aslant", DVec3::new(0.3, -1.0, 0.2).normalize())] {
+        for degrees in [10.0f64, 1.0, 0.1, 0.05, 0.01, 0.001] {
+            let outer_angle = degrees.to_radians() as f32;
+            let (inner, outer) = (0.5 * f64::from(outer_angle), f64::from(outer_angle));
+            let inner_angle = inner as f32;
+            let spot = over_plane(LightKind::Spot { position, direction, intensity: Vec3::ONE, inner_angle, outer_angle });
+            let versine = |angle: f64| 2.0 * (0.5 * angle).sin().powi(2);
+            let falloff = |angle: f64| ((versine(outer) - versine(angle)) / (versine(outer) - versine(inner))).clamp(0.0, 1.0).powi(2);
+            // Where rays at an angle from the axis meet the plane, and the irradiance there.
+            let across = direction.any_orthonormal_vector();
+            let place = |angle: f64| {
+                let way = angle.cos() * direction + angle.sin() * across;
+                let distance = -1.0 / way.y;
+                (position + distance * way, -way.y / distance.powi(2) * falloff(angle))
+            };
+            let shares = [0.0, 0.25, 0.45, 0.6, 0.75, 0.9, 1.1];
+            let places = shares.map(|share| place(share * outer));
+            let settings = TransportSettings { rounds: 2, part: Part::Direct, ..TransportSettings::default() };
+            let lit = received(&gpu, &spot, &settings, &places.map(|(point, _)| (point, DVec3::Y)));
+            // Single precision knows a direction to 1e-7 radians.
+            let tolerance = 2e-5 + 1e-7 * 8.0 / outer;
+            for (k, (_, exact)) in places.iter().enumerate() {
+                let found = lit.film.mean(k, &lit.plan).x;
+                println!("{what}, {degrees} degrees, at {} of them: {found:.6}, {exact:.6} is right", shares[k]);
+                assert!((found - exact).abs() <= tolerance, "{what}, {degrees} degrees, at {} of them: {found}, not {exact}", shares[k]);
+            }
+
+            // Within its whole disc, a photon map holds the spot's power.
+            let radius = 1.2 * place(outer).0.distance(place(0.0).0).max(2e-4);
+            let settings = TransportSettings {
+                photons: 1000,
+                rounds: 2,
+                bounces: 1,
+                radius: Some(radius),
+                alpha: 1.0,
+                illumination: Illumination::Photons,
+                ..TransportSettings::default()
+            };
+            let lit = received(&gpu, &spot, &settings, &[(place(0.0).0, DVec3::Y)]);
+            let exact = 2.0 * PI * (versine(inner) + (versine(outer) - versine(inner)) / 3.0) / (PI * radius * radius);
+            assert_holds(format!("{what}, {degrees} degrees"), relative_check("power", lit.film.mean(0, &lit.plan).x, exact, 1e-5));
+        }
+    }
+}
+
+/// Points on a floor that touches walls which shine, at distances around what single precision tells apart.
+#[test]
+fn walls_light_the_points_that_touch_them() {
+    let Some(gpu) = device() else { return };
+    let distances = [0.0, 1e-8, 1e-7, 1e-6, 3e-6, 1e-5, 1e-4];
+    let mut family = Family::default();
+    let mut check = |what: &str, scene: &Scene, points: &[(DVec3, DVec3)], expected: &dyn Fn(DVec3) -> f64| {
+        let settings = TransportSettings { rounds: 16, shadow_rays: 64, part: Part::Direct, ..TransportSettings::default() };
+        let lit = received(&gpu, scene, &settings, points);
+        for (k, (point, _)) in points.iter().enumerate() {
+            let (found, error, exact) = (lit.film.mean(k, &lit.plan).x, lit.film.standard_error(k, &lit.plan).x, expected(*point));
+            println!("{what}, {point}: {found:.4} +- {error:.4}, {exact:.4} is right");
+
+            family.expect_estimate(format!("{what}, {point}"), found, error.max(2e-3 * exact), settings.rounds, exact);
+        }
+    };
+    let on = |place: fn(f64) -> DVec3, normal: DVec3| distances.map(|distance| (place(distance), normal));
+    // Every point of a furnace sees walls that shine wherever it looks.
+    let furnace = scene("furnace");
+    check("beside a wall", &furnace, &on(|d| DVec3::new(d, 0.0, 0.37), DVec3::Y), &|_| PI);
+    check("in a corner", &furnace, &on(|d| DVec3::new(d, 0.0, d), DVec3::Y), &|_| PI);
+    check("in an edge", &furnace, &on(|d| DVec3::new(1.0 - d, 0.6, 1.0), DVec3::NEG_Z), &|_| PI);
+
+    // One wall, of plain or textured light, aslant to all axes.
+    let turn = DQuat::from_euler(EulerRot::XYZ, 0.3, 0.7, -0.4);
+    for textured in [false, true] {
+        let emission_texture = textured.then_some(TextureUse { texture: 0, uv_set: 0 });
+        let lamp = Material { emission: Vec3::ONE, emission_texture, ..matt(0.0) };
+        let wall = Mesh::parallelogram("wall", DVec3::ZERO, turn * DVec3::Y, turn * DVec3::Z, 1);
+        let floor = Mesh::parallelogram("floor", turn * DVec3::NEG_X, turn * DVec3::Z, turn * (DVec3::X * 2.0), 0);
+        let texture = Texture { name: "white".into(), width: 1, height: 1, texels: vec![Vec3::ONE], wrap: [Wrap::Clamp; 2] };
+        let room = Scene { textures: vec![texture], ..scene_of(vec![wall, floor], vec![matt(0.0), lamp], vec![]) };
+        let points = distances.map(|distance| (turn * DVec3::new(distance, 0.0, 0.4), turn * DVec3::Y));
+        let exact = |point: DVec3| {
+            let distance = (turn.inverse() * point).x.abs();
+            // From a foot of the wall, one of its sides on either hand (Howell, configuration B-3).
+            let half = |width: f64| width.atan2(distance) - distance / distance.hypot(1.0) * width.atan2(distance.hypot(1.0));
+            0.5 * (half(0.4) + half(0.6))
+        };
+        check(if textured { "a textured wall" } else { "a wall" }, &room, &points, &exact);
+    }
+    family.assert_tells(0.2, |_| true);
+}
+
+/// Channels that are dim beside another are as bright as their share of it: light of a tinted lamp, and light that a
+/// tinted wall reflects. The same photons carry all channels, so only rounding tells them apart.
+#[test]
+fn channels_a_billionth_as_bright_are_right() {
+    let Some(gpu) = device() else { return };
+    let tint = Vec3::new(1.0, 3e-8, 1e-9);
+    let mut lamp = scene("furnace");
+    lamp.materials.iter_mut().for_each(|material| material.emission *= tint);
+    let floor = Material::lambert("tinted", 0.5 * tint);
+    let down =
+        LightKind::Spot { position: DVec3::Y * 0.5, direction: DVec3::NEG_Y, intensity: Vec3::ONE, inner_angle: 0.5, outer_angle: 1.0 };
+    let wall = scene_of(vec![level(0.0, [1.0; 2], true, 0), level(1.0, [1.0; 2], false, 1)], vec![floor, matt(0.0)], vec![down]);
+    let settings = |illumination, part| TransportSettings {
+        photons: 20_000,
+        bounces: 4,
+        rounds: 4,
+        radius: Some(0.4),
+        illumination,
+        part,
+        ..TransportSettings::default()
+    };
+    let of_lamp = (lamp, settings(Illumination::Photons, Part::All), DVec3::splat(0.5));
+    let of_wall = (wall, settings(Illumination::Split, Part::Indirect), DVec3::Y * 0.5);
+    for (what, (scene, settings, middle)) in [("a lamp", of_lamp), ("a wall", of_wall)] {
+        let points: Vec<_> =
+            grid(0.5, DVec3::NEG_Y, 3).into_iter().map(|(point, normal)| (middle + 0.8 * point + DVec3::Y * 0.1, normal)).collect();
+        let sums: Vec<DVec3> = irradiances(&gpu, &scene, &settings, &points, 1..9).iter().map(|run| run.iter().sum()).collect();
+        for channel in [1, 2] {
+            let shares: Vec<f64> = sums.iter().map(|sum| sum[channel] / (sum.x * f64::from(tint[channel]))).collect();
+            let (share, error) = mean_and_error(&shares);
+            println!("{what}, channel {channel}: {share:.4} +- {error:.4} of what is right");
+            assert!(error < 0.02, "{what}: {share} +- {error}");
+            assert_holds(format!("{what}, channel {channel}"), z_check("share", share, 1.0, error.max(1e-6)));
+        }
+    }
+}
+
+/// The same in a picture, where a channel lies below the film's unit.
+#[test]
+fn channels_below_the_films_unit_are_right() {
+    let Some(gpu) = device() else { return };
+    let tint = DVec3::new(1.0, 1e-9, 1e-10);
+    let mut plane = scene("sky-over-plane");
+    plane.materials[0].base_colour = tint.as_vec3();
+    let camera = photonmill::scene::Camera::looking_at("above", DVec3::Y * 1.5, DVec3::ZERO, DVec3::Z, 0.1);
+    let settings = TransportSettings { photons: 1, rounds: 64, shadow_rays: 1, samples: 1, ..TransportSettings::default() };
+    let lit = seen(&gpu, &plane, &settings, &camera, [16, 16]);
+    let pixels = lit.film.pixels();
+    for channel in 0..3 {
+        let found = means(&lit).iter().map(|mean| mean[channel]).sum::<f64>() / pixels as f64;
+        let variance: f64 = (0..pixels).map(|pixel| lit.film.standard_error(pixel, &lit.plan)[channel].powi(2)).sum();
+        let (exact, error) = (tint[channel], variance.sqrt() / pixels as f64);
+        println!("channel {channel}: {found:e} +- {error:e}, {exact:e} is right, a unit is {:e}", 1.0 / lit.plan.film_scale);
+        assert!(error < 0.05 * exact);
+        assert_holds(channel, z_check("radiance", found, exact, error.max(1e-6 * exact)));
     }
 }

@@ -237,14 +237,17 @@ fn every_operation_is_rounded_by_itself() {
     assert!(modules.iter().any(|module| contractible(module.spirv, "no such function") > 0));
 }
 
-/// Rays that are aimed at places of a closed room, half of them exactly: a spot of the narrowest cone whose cosine
-/// f32 tells from 1.
+/// Rays that are aimed at places of a closed room, half of them exactly: by a cone below the spacing of f32's directions.
+/// A wider cone around it has as much power.
 fn aimed_at(places: &[DVec3], from: DVec3) -> Vec<Light> {
-    let spot = |place: &DVec3| {
+    let spots = |place: &DVec3| {
         let direction = (*place - from).normalize();
-        lamp(LightKind::Spot { position: from, direction, intensity: Vec3::splat(1e7), inner_angle: 3.5e-4, outer_angle: 3.5e-4 })
+        [1e-9f32, 3.5e-4].map(|angle| {
+            let intensity = Vec3::splat(angle.powi(-2));
+            lamp(LightKind::Spot { position: from, direction, intensity, inner_angle: angle, outer_angle: angle })
+        })
     };
-    places.iter().map(spot).collect()
+    places.iter().flat_map(spots).collect()
 }
 
 /// Points of a cube's edges and corners.

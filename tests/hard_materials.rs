@@ -146,7 +146,7 @@ fn lobes_reflect_what_lies_above_the_horizon() {
 #[test]
 fn lobes_of_any_width_throw_their_share() {
     let Some(gpu) = device() else { return };
-    // Half of the beam is 3.45e-4 off its axis, beside a lobe 6.4e-3 wide at the last exponent: 0.1 % of the light.
+    // The beam is 3.5e-4 wide, beside a lobe 6.4e-3 wide at the last exponent: 0.1 % of the light.
     for (exponent, tolerance) in [(0.0, 0.0), (5.0, 0.0), (100.0, 0.0), (1e4, 0.0), (48_826.0, 0.001)] {
         let n = f64::from(exponent);
         // Half of the light within h.

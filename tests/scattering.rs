@@ -172,7 +172,7 @@ fn lights_emit_as_their_kinds_have_it() {
     assert!(point.emitted.iter().all(|path| path.position == position.as_vec3()));
     assert_holds("point", sphere_check("point light", &Traced::directions(&point.emitted)));
 
-    for (inner, outer) in [(20f64, 40f64), (0.0, 30.0), (1.0, 1.5), (59.0, 60.0), (45.0, 90.0)] {
+    for (inner, outer) in [(20f64, 40f64), (0.0, 30.0), (1.0, 1.5), (0.02, 0.05), (59.0, 60.0), (45.0, 90.0)] {
         let (inner_angle, outer_angle) = (inner.to_radians() as f32, outer.to_radians() as f32);
         let spot =
             tracer.trace(&lit(LightKind::Spot { position, direction: AXIS.normalize(), intensity: Vec3::ONE, inner_angle, outer_angle }));

@@ -56,6 +56,6 @@ void main()
     }
     note_unless(is_finite(chain.light[0]) && is_finite(chain.light[1]) && is_finite(chain.light[2]), ODD_LIGHT, push.draws.domain,
                 push.draws.round, index);
-    write_pass_sum(path.place, chain.light, push.film_scale, push.film_limit, true);
+    write_pass_sum(path.place, chain.light, push.film_scale, push.film_limit, mix32(push.rounding + depth), true);
     write_points(chain, index, number, push.pixel_count, first_point);
 }

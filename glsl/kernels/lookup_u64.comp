@@ -21,6 +21,7 @@ layout(push_constant, scalar) uniform Push { LookupPush push; };
 #include "scene/lobes.glsl"
 #include "scene/belongs.glsl"
 #include "scene/cells.glsl"
+#include "scene/rounding.glsl"
 #include "scene/tiles.glsl"
 #include "stages/map_rows.glsl"
 #include "stages/lookup.glsl"

@@ -28,6 +28,7 @@ layout(set = 0, binding = 8, scalar) readonly buffer Receivers { Receiver receiv
 #include "scene/scatter.glsl"
 #include "scene/areas.glsl"
 #include "scene/lights.glsl"
+#include "scene/walls.glsl"
 #include "scene/direct.glsl"
 #include "scene/belongs.glsl"
 #include "scene/cover.glsl"
@@ -49,8 +50,9 @@ void main()
     Receiver receiver = receivers[index];
     vec3 ng = receiver.normal;
     vec3 ns = receiver.shading_normal;
-    Target here = Target(receiver.position, position_error(receiver.position), ng, ns, ns, SURFACE_RECEIVER, 0.0);
-    Chain chain = new_chain(receiver.position, ns, vec3(1.0), vec2(0.0));
+    vec3 position = off_the_walls(receiver.position, ng);
+    Target here = Target(position, position_error(position), ng, ns, ns, SURFACE_RECEIVER, 0.0);
+    Chain chain = new_chain(position, ns, vec3(1.0), vec2(0.0));
     if (SHADOW_RAYS != 0) {
         add_light(chain, direct_light(here, push.emitter_count, push.draws, index, 0, RECEIVER_BLOCK));
     }
@@ -70,7 +72,7 @@ void main()
         // Irradiance is pi times the radiance that arrives from cosine-weighted directions.
         vec3 u = philox_floats(uvec4(index, push.draws.round, 0, push.draws.domain), push.draws.seed).xyz;
         chain.direction = to_frame(sample_cosine_hemisphere(u.y, u.z), ns);
-        chain.position = offset_origin(receiver.position, here.error, ng, chain.direction);
+        chain.position = offset_origin(position, here.error, ng, chain.direction);
         chain.weight = vec3(3.14159265358979324);
         chain.gathers = true;
         chain.starts_nowhere = !on_surface;
@@ -85,6 +87,6 @@ void main()
     }
     note_unless(is_finite(chain.light[0]) && is_finite(chain.light[1]) && is_finite(chain.light[2]), ODD_LIGHT, push.draws.domain,
                 push.draws.round, index);
-    write_pass_sum(index, chain.light, push.film_scale, push.film_limit, false);
+    write_pass_sum(index, chain.light, push.film_scale, push.film_limit, push.rounding, false);
     write_points(chain, index, 0, push.point_count, 0);
 }

@@ -56,6 +56,6 @@ void main()
     }
     note_unless(is_finite(chain.light[0]) && is_finite(chain.light[1]) && is_finite(chain.light[2]), ODD_LIGHT, push.draws.domain,
                 push.draws.round, pixel);
-    write_pass_sum(SAMPLES * pixel + number, chain.light, push.film_scale, push.film_limit, false);
+    write_pass_sum(SAMPLES * pixel + number, chain.light, push.film_scale, push.film_limit, push.rounding, false);
     write_points(chain, pixel, number, push.width * push.height, 0);
 }

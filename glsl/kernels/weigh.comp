@@ -102,8 +102,9 @@ void main()
         vec3 radiance = for_all * point.weight * (flux * divide(is_caustic ? push.caustic_flux : push.global_flux, area));
         note_unless(is_finite(radiance), ODD_ESTIMATE, 0, push.round, place % push.pixel_count);
         uint part = part_number(point.arrivals, arrival);
+        uint chance = mix32(push.rounding + position_bits(point.position));
         for (uint channel = 0; channel < 3; channel++) {
-            uvec2 units = to_film_units(radiance[channel], push.film_scale, push.film_limit);
+            uvec2 units = to_film_units(radiance[channel], push.film_scale, push.film_limit, chance);
             sums[channel] = add64(sums[channel], units);
             totals[part] = add64(totals[part], units);
         }

@@ -10,24 +10,13 @@ layout(set = 0, binding = 9, scalar) readonly buffer CausticTargets { CausticTar
 // sine, and a law's reach by its cosine.
 const float AIM_MARGIN = 1.0 / 1048576.0;
 
-// 1 - cosine of the angle between unit vectors, to a few units in the last place for small angles too.
-float versine_between(vec3 a, vec3 b)
-{
-    vec3 chord = a - b;
-    return 0.5 * dot(chord, chord);
-}
-
 // Density, 1/sr, of the directions in which a light's photons leave, at a versine from its axis. None is larger further off.
 float emission_density(Emitter light, float versine)
 {
     float cosine = 1.0 - versine;
     if (HAS_SPOT_LIGHTS) {
         if (light.kind == EMITTER_SPOT) {
-            // Versines, which a narrow cone is sampled by; of its cosines few digits are left.
-            float inner = 1.0 - light.size, outer = 1.0 - light.cos_outer;
-            float width = outer - inner;
-            float share = versine <= inner ? 1.0 : (versine < outer ? divide(outer - versine, width) : 0.0);
-            return divide(share * share, 6.28318530717958648 * (inner + width * (1.0 / 3.0)));
+            return divide(spot_falloff(light, versine), 6.28318530717958648 * spot_integral(light));
         }
     }
     if (HAS_DISC_LIGHTS) {

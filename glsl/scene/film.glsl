@@ -1,6 +1,8 @@
 // The film of a picture: for each pixel and channel the sum of all passes and the sum of their squares,
 // exact integers (64 and 128 bits), so that passes add up in any order. One invocation owns a pixel.
 
+#include "scene/rounding.glsl"
+
 // Counts: [0] values that are no number, [1] values clamped to the film's largest, [2] estimates on a mesh too dense
 // for its area to be found, [3] camera paths cut off after MAX_BOUNCES; sums of two words, low word first: [4] what clamped
 // values lost, in 1/1024 of the film's largest, [6] the weights of cut paths, in 2^-20.
@@ -20,9 +22,9 @@ void note_cut_path(float weight)
 }
 
 // A value in film units as a 64-bit integer (low word, high word), at most `limit` units.
-uvec2 to_film_units(float value, float scale, float limit)
+uvec2 to_film_units(float value, float scale, float limit, uint chance)
 {
-    float units = roundEven(value * scale);
+    float units = value * scale;
     if (!is_finite(units)) {
         atomicAdd(anomalies[0], 1);
         return uvec2(0);
@@ -33,8 +35,9 @@ uvec2 to_film_units(float value, float scale, float limit)
     }
     units = clamp(units, 0.0, limit);
     // Exact: a float is a 24-bit integer times a power of two.
-    float high = floor(units * (1.0 / 4294967296.0));
-    return uvec2(uint(units - high * 4294967296.0), uint(high));
+    float whole = floor(units);
+    float high = floor(whole * (1.0 / 4294967296.0));
+    return add64(uvec2(uint(whole - high * 4294967296.0), uint(high)), uvec2(round_up(units - whole, chance), 0));
 }
 
 // Film units of each part of the picture over all pixels, channels and passes: two words each.

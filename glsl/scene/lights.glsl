@@ -31,11 +31,27 @@ float triangle_area(Triangle triangle)
     return 0.5 * norm(cross(triangle.b - triangle.a, triangle.c - triangle.a));
 }
 
-// glTF's falloff between a spot's cones.
-float spot_falloff(Emitter light, float cosine)
+// 1 - cosine of the angle between unit vectors, with all digits of a small angle.
+float versine_between(vec3 a, vec3 b)
 {
-    float share = clamp(divide(cosine - light.cos_outer, max(light.size - light.cos_outer, 1e-6)), 0.0, 1.0);
+    vec3 chord = a - b;
+    return 0.5 * dot(chord, chord);
+}
+
+// glTF's falloff between a spot's cones, at a versine from its axis.
+float spot_falloff(Emitter light, float versine)
+{
+    if (versine <= light.size) {
+        return 1.0;
+    }
+    float share = versine < light.outer_versine ? divide(light.outer_versine - versine, light.outer_versine - light.size) : 0.0;
     return share * share;
+}
+
+// Integral of the falloff over the versine: solid angle over 2 pi. The square of what is linear has a third of the ring.
+float spot_integral(Emitter light)
+{
+    return light.size + (light.outer_versine - light.size) * (1.0 / 3.0);
 }
 
 struct Emission {
@@ -81,12 +97,14 @@ Emission sample_emission(Emitter light, float scene_radius, vec4 u, vec4 w)
     if (HAS_SPOT_LIGHTS) {
         if (light.kind == EMITTER_SPOT) {
             // In proportion to the intensity: the inner cone evenly, the ring by its falloff.
-            float inner = 1.0 - light.size;
-            float ring = (light.size - light.cos_outer) * (1.0 / 3.0);
-            float below = w.x * (inner + ring);
-            float cosine = below < inner ? 1.0 - below
-                                         : light.cos_outer + (light.size - light.cos_outer) * exp2(log2(max(1.0 - divide(below - inner, max(ring, 1e-12)), 1e-12)) * (1.0 / 3.0));
-            emission.direction = to_frame(direction_at(cosine, (1.0 - cosine) * (1.0 + cosine), w.y), light.direction);
+            float width = light.outer_versine - light.size;
+            float below = w.x * spot_integral(light);
+            float versine = below;
+            if (below > light.size) {
+                float above = max(1.0 - divide(3.0 * (below - light.size), width), LEAST);
+                versine = light.outer_versine - width * exp2(log2(above) * (1.0 / 3.0));
+            }
+            emission.direction = to_frame(direction_at(1.0 - versine, versine * (2.0 - versine), w.y), light.direction);
         }
     }
     if (HAS_DISC_LIGHTS) {
@@ -150,7 +168,7 @@ Arriving sample_light(uint emitter_count, vec3 position, vec3 ns, vec3 u)
             arriving.target = offset_origin(point, position_error(point) + triangle_error(triangle), normal, normal);
             arriving.radiance = emitted_radiance(material, light.triangle, at.x, at.y) * divide(triangle_area(triangle), light.probability);
             cos_light = is_before(side, position, triangle_error(triangle)) ? max(dot(normal, normalize(position - point)), 0.0) : 0.0;
-            if (cos_light > 0.0 && material.emission_texture == NONE) {
+            if (cos_light > 0.0) {
                 vec4 direction = sample_spherical_triangle(normalize(triangle.a - position), normalize(triangle.b - position),
                                                            normalize(triangle.c - position), u.xy);
                 float approach = -dot(direction.xyz, normal);
@@ -159,14 +177,18 @@ Arriving sample_light(uint emitter_count, vec3 position, vec3 ns, vec3 u)
                     point = position + direction.xyz * divide(dot(normal, position - triangle.a), approach);
                     float error = position_error(point) + triangle_error(triangle);
                     arriving.target = offset_origin(point, error, normal, normal);
-                    arriving.radiance = material.emission * divide(direction.w, light.probability);
+                    if (HAS_TEXTURES) {
+                        at = triangle_weights(triangle, point);
+                    }
+                    arriving.radiance = emitted_radiance(material, light.triangle, at.x, at.y) * divide(direction.w, light.probability);
+                    arriving.wi = direction.xyz;
                 }
             }
         }
     }
     if (HAS_SPOT_LIGHTS) {
         if (light.kind == EMITTER_SPOT) {
-            cos_light = spot_falloff(light, dot(normalize(position - light.position), light.direction));
+            cos_light = spot_falloff(light, versine_between(normalize(position - light.position), light.direction));
         }
     }
     if (HAS_DISC_LIGHTS) {
@@ -182,7 +204,9 @@ Arriving sample_light(uint emitter_count, vec3 position, vec3 ns, vec3 u)
     if (HAS_DIRECTIONAL_LIGHTS) {
         arriving.is_far = arriving.is_far || light.kind == EMITTER_DIRECTIONAL;
     }
-    arriving.wi = -light.direction;
+    if (arriving.is_far) {
+        arriving.wi = -light.direction;
+    }
     if (HAS_ENVIRONMENT) {
         if (light.kind == EMITTER_ENVIRONMENT) {
             arriving.is_far = true;
@@ -194,8 +218,8 @@ Arriving sample_light(uint emitter_count, vec3 position, vec3 ns, vec3 u)
     if (!arriving.is_far) {
         vec3 way = arriving.target - position;
         float distance_squared = dot(way, way);
-        arriving.wi = distance_squared > 0.0 ? way * inversesqrt(distance_squared) : vec3(0.0);
         if (!by_direction) {
+            arriving.wi = distance_squared > 0.0 ? way * inversesqrt(distance_squared) : vec3(0.0);
             arriving.radiance *= distance_squared > 0.0 ? divide(cos_light, distance_squared) : 0.0;
         }
     }

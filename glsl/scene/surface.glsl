@@ -67,6 +67,14 @@ vec3 triangle_point(Triangle triangle, float u, float v)
     return point;
 }
 
+// The weights of the second and third corner at a point of a triangle.
+vec2 triangle_weights(Triangle triangle, vec3 point)
+{
+    vec3 ab = triangle.b - triangle.a, ac = triangle.c - triangle.a, ap = point - triangle.a;
+    vec3 perpendicular = cross(ab, ac);
+    return divide(vec2(dot(cross(ap, ac), perpendicular), dot(cross(ab, ap), perpendicular)), dot(perpendicular, perpendicular));
+}
+
 // Barycentric weights of the second and third corner, moved into the triangle until the point is off its edges by
 // its own error: what starts there starts on the right side of the wall beyond the edge.
 vec2 off_the_edges(Triangle triangle, vec2 weights, float error)

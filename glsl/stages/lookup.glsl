@@ -32,6 +32,7 @@ void look_up()
         return;
     }
     VisiblePoint point = visible_points[index];
+    uint point_bits = mix32(push.rounding + position_bits(point.position));
     uint wanted = 1u << push.arrival;
     if (HAS_ALL_ARRIVALS) {
         wanted = ARRIVED_DIRECT | ARRIVED_CAUSTIC | ARRIVED_INDIRECT;
@@ -96,8 +97,11 @@ void look_up()
                         }
                         precise vec3 flux = uintBitsToFloat(light.xyz) * weight;
                         note_unless(is_finite(flux), ODD_ESTIMATE, 0, push.round, index % push.pixel_count);
+                        uint chance = mix32(point_bits + position_bits(position));
                         [[unroll]] for (uint channel = 0; channel < 3; channel++) {
-                            uint amount = to_fixed_point(flux[channel], float(1u << FLUX_BITS));
+                            float units = flux[channel] * float(1u << FLUX_BITS);
+                            float whole = floor(units);
+                            uint amount = uint(whole) + round_up(units - whole, chance);
                             if (HAS_ALL_ARRIVALS) {
                                 [[unroll]] for (uint arrival = 0; arrival < 3; arrival++) {
                                     sums[3 * arrival + channel] = add_words(sums[3 * arrival + channel], arrival == light.w >> 30 ? amount : 0);

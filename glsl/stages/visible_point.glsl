@@ -5,9 +5,10 @@ layout(set = 1, binding = 1, scalar) writeonly buffer VisiblePoints { VisiblePoi
 // For each sample of a pixel, or receiver, and each channel, film units of this pass so far.
 layout(set = 1, binding = 2, scalar) buffer PassSums { uvec2 pass_sums[]; };
 
-// `scale` and `limit` are those of a share of the pixel's light. Adds to what is there, or replaces it.
-void write_pass_sum(uint place, vec3 light[3], float scale, float limit, bool adds)
+// `scale` and `limit` are those of a share of the pixel's light, `rounding` is the round's. Adds to what is there, or replaces it.
+void write_pass_sum(uint place, vec3 light[3], float scale, float limit, uint rounding, bool adds)
 {
+    uint chance = mix32(rounding + place);
     // Each part is rounded by itself, so that the parts of a picture add up to the whole to the bit.
     uvec2 totals[3];
     for (uint part = 0; part < 3; part++) {
@@ -16,7 +17,7 @@ void write_pass_sum(uint place, vec3 light[3], float scale, float limit, bool ad
     for (uint channel = 0; channel < 3; channel++) {
         uvec2 sum = adds ? pass_sums[3 * place + channel] : uvec2(0);
         for (uint part = 0; part < 3; part++) {
-            uvec2 units = to_film_units(light[part][channel], scale, limit);
+            uvec2 units = to_film_units(light[part][channel], scale, limit, chance);
             sum = add64(sum, units);
             totals[part] = add64(totals[part], units);
         }

@@ -42,18 +42,23 @@ fn power(light: &LightKind, scene_radius: f64) -> f64 {
     let cross_section = PI * scene_radius * scene_radius;
     match light {
         LightKind::Point { intensity, .. } => 4.0 * PI * sum(*intensity),
-        LightKind::Spot { intensity, outer_angle, .. } => 2.0 * PI * (1.0 - f64::from(*outer_angle).cos()) * sum(*intensity),
+        LightKind::Spot { intensity, outer_angle, .. } => 2.0 * PI * versine(*outer_angle) * sum(*intensity),
         LightKind::Directional { irradiance, .. } => cross_section * sum(*irradiance),
         LightKind::Disc { power, .. } => sum(*power),
         LightKind::Environment { radiance } => 4.0 * PI * cross_section * sum(*radiance),
     }
 }
 
-/// glTF's falloff between the cones, from the cosine to the axis.
-fn spot_falloff(cosine: f64, inner_angle: f32, outer_angle: f32) -> f64 {
-    let (inner, outer) = (f64::from(inner_angle).cos(), f64::from(outer_angle).cos());
-    let share = (cosine - outer) / (inner - outer).max(f64::MIN_POSITIVE);
-    share.clamp(0.0, 1.0).powi(2)
+/// 1 - cosine of an angle, of which small ones keep their digits.
+fn versine(angle: f32) -> f64 {
+    2.0 * (0.5 * f64::from(angle)).sin().powi(2)
+}
+
+/// glTF's falloff between the cones, in a direction from the light.
+fn spot_falloff(direction: DVec3, axis: DVec3, inner_angle: f32, outer_angle: f32) -> f64 {
+    let (inner, outer) = (versine(inner_angle), versine(outer_angle));
+    let off = 0.5 * direction.distance_squared(axis);
+    if off <= inner { 1.0 } else { ((outer - off) / (outer - inner)).max(0.0).powi(2) }
 }
 
 /// A disc's radiant intensity over its power in a direction at this cosine to its normal, 1/sr.
@@ -112,7 +117,7 @@ impl<'a> Emitters<'a> {
             Emitter::Light(light) => match light {
                 LightKind::Point { position: place, intensity } => from(*place, &|_| intensity.as_dvec3()),
                 LightKind::Spot { position: place, direction, intensity, inner_angle, outer_angle } => {
-                    from(*place, &|w| intensity.as_dvec3() * spot_falloff(w.dot(*direction), *inner_angle, *outer_angle))
+                    from(*place, &|w| intensity.as_dvec3() * spot_falloff(w, *direction, *inner_angle, *outer_angle))
                 }
                 LightKind::Directional { direction, irradiance } => {
                     Arriving { wi: -*direction, irradiance: irradiance.as_dvec3(), place: None }

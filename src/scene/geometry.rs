@@ -231,18 +231,19 @@ impl Geometry {
             }
             LightKind::Spot { position, direction, intensity, inner_angle, outer_angle } => {
                 let strength = intensity.as_dvec3() / area_unit;
-                let (inner, outer) = (f64::from(inner_angle).cos(), f64::from(outer_angle).cos());
+                // f32 holds a solid angle of so much, and its inverse.
+                let (inner, outer) = (versine(inner_angle), versine(outer_angle).max(1e-36));
                 let emitter = Emitter {
                     kind: EMITTER_SPOT,
                     position: self.to_local(position),
                     direction: direction.as_vec3(),
                     strength: strength.as_vec3(),
                     size: inner as f32,
-                    cos_outer: outer as f32,
+                    outer_versine: outer as f32,
                     ..Emitter::default()
                 };
                 // The square of a falloff that is linear in the cosine has a third of the ring's light.
-                (emitter, TAU * ((1.0 - inner) + (inner - outer) / 3.0) * strength)
+                (emitter, TAU * (inner + (outer - inner) / 3.0) * strength)
             }
             LightKind::Directional { direction, irradiance } => {
                 let emitter =
@@ -275,11 +276,14 @@ impl Geometry {
         Found { emitter, flux, weight: flux.element_sum(), brightest: 1.0 }
     }
 
-    /// Radiance of the brightest thing that a camera can see, W/m2/sr.
+    /// Radiance of the brightest thing that a camera can see, W/m2/sr, or the irradiance a sixteenth of the scene's
+    /// unit from a point or spot light: what a narrow spot lights is far brighter than its power over the scene's area.
     pub fn brightest(&self) -> f64 {
         let shines = self.materials.iter().map(|material| material.emission);
         let environment = self.emitters.iter().filter(|emitter| emitter.kind == EMITTER_ENVIRONMENT).map(|emitter| emitter.strength);
-        shines.chain(environment).map(|radiance| f64::from(radiance.max_element())).fold(0.0, f64::max)
+        let small = self.emitters.iter().filter(|emitter| matches!(emitter.kind, EMITTER_POINT | EMITTER_SPOT));
+        let irradiance = small.map(|emitter| 2f64.powi(8) * f64::from(emitter.strength.max_element()));
+        shines.chain(environment).map(|radiance| f64::from(radiance.max_element())).chain(irradiance).fold(0.0, f64::max)
     }
 }
 
@@ -301,6 +305,11 @@ fn in_fixed_order(corners: &[Vec3; 3]) -> [[u32; 3]; 3] {
     let bits = corners.map(|corner| (corner + Vec3::ZERO).to_array().map(f32::to_bits));
     let first = (0..3).min_by_key(|corner| bits[*corner]).expect("a triangle has corners");
     [bits[first], bits[(first + 1) % 3], bits[(first + 2) % 3]]
+}
+
+/// 1 - cosine of an angle, with all digits of a small one.
+fn versine(angle: f32) -> f64 {
+    2.0 * (0.5 * f64::from(angle)).sin().powi(2)
 }
 
 /// An emitter before its probability is known.

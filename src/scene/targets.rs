@@ -174,7 +174,7 @@ fn share_towards(geometry: &Geometry, emitter: &Emitter, target: &CausticTarget)
             (middle, corners.iter().map(|corner| corner.distance(middle)).fold(0.0, f64::max), cosine_density)
         }
         EMITTER_POINT => (point, 0.0, 0.5 / TAU),
-        EMITTER_SPOT => (point, 0.0, 1.0 / (TAU * ((1.0 - size) + (size - f64::from(emitter.cos_outer)) / 3.0))),
+        EMITTER_SPOT => (point, 0.0, 1.0 / (TAU * (size + (f64::from(emitter.outer_versine) - size) / 3.0))),
         EMITTER_DISC_COSINE => (point, size, cosine_density),
         EMITTER_DISC_UNIFORM => (point, size, 1.0 / TAU),
         // From beyond the scene: discs across the photons' way.

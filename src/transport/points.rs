@@ -8,7 +8,7 @@ use crate::gpu::kernels::{CrowdSize, GoOn, LookupTwoWords, LookupU64, Receive, R
 use crate::gpu::{Commands, Extent};
 use crate::plan::transport::{MapPlan, Sensor, TESTS_PER_POINT, TransportPlan};
 use crate::records::{CellPush, CrowdSizePush, Draws, GoOnPush, LookupPush, ReceivePush, ResolvePush, ViewPush, WeighPush};
-use crate::rng::words;
+use crate::rng::{mix32, words};
 use crate::scene::Camera;
 use crate::scene::geometry::Geometry;
 
@@ -21,6 +21,12 @@ fn runs(count: u32, step: u32) -> impl Iterator<Item = (u32, u32)> {
 fn add_work(commands: &mut Commands, plan: &TransportPlan, work: u64) -> Result<()> {
     commands.add_work(work);
     if commands.work() >= commands.paced(plan.work_per_submission) { commands.submit() } else { Ok(()) }
+}
+
+/// What decides in a round which fractions are rounded up (`glsl/scene/rounding.glsl`).
+fn rounding(plan: &TransportPlan, round: u32) -> u32 {
+    let seed = words(plan.settings.seed);
+    mix32(seed.x.wrapping_add(mix32(seed.y.wrapping_add(mix32(round)))))
 }
 
 /// Finds the visible points of a round and writes the light that needs no photons.
@@ -44,6 +50,7 @@ pub fn see(commands: &mut Commands, round: Round, camera: Option<&Camera>) -> Re
                 let half_width = half_height * f64::from(width) / f64::from(height);
                 let push = ViewPush {
                     draws: draws(DOMAIN_CAMERA),
+                    rounding: rounding(plan, round),
                     width,
                     height,
                     first_pixel: first,
@@ -81,6 +88,7 @@ pub fn see(commands: &mut Commands, round: Round, camera: Option<&Camera>) -> Re
                 let radius = plan.maps().map(|map| plan.radius(map, round)).fold(f64::INFINITY, f64::min);
                 let push = ReceivePush {
                     draws: draws(DOMAIN_RECEIVERS),
+                    rounding: rounding(plan, round),
                     first_point: first,
                     end_point: end,
                     point_count: plan.sensor.pixels(),
@@ -136,6 +144,7 @@ fn go_on(commands: &mut Commands, resources: &TransportResources, geometry: &Geo
             emitter_count: geometry.emitters.len() as u32,
             film_scale: (plan.film_scale / f64::from(plan.samples())) as f32,
             film_limit: (plan.film_limit / f64::from(plan.samples())) as f32,
+            rounding: rounding(plan, round),
         };
         let kernel = GoOn {
             nodes,
@@ -183,6 +192,7 @@ pub fn look_up(commands: &mut Commands, round: Round, photons: &PhotonBuffers, m
             pixel_count: plan.sensor.pixels(),
             arrival: map.stored.trailing_zeros(),
             round,
+            rounding: rounding(plan, round),
             width,
             height,
             first_slice: 0,
@@ -220,6 +230,7 @@ pub fn weigh(commands: &mut Commands, round: Round, traced: [u32; 2]) -> Result<
             height,
             arrivals: plan.arrivals,
             round,
+            rounding: rounding(plan, round),
             film_scale: plan.film_scale as f32,
             film_limit: plan.point_limit() as f32,
             global_radius: radius(&plan.global),

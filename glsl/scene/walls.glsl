@@ -1,0 +1,76 @@
+// Receivers that touch walls.
+
+// Moves a wall's part of a receiver's place: along the receiver's own plane, until it lies before the wall for certain.
+vec3 off_the_wall(uint index, vec3 position, vec3 normal)
+{
+    Triangle triangle = triangles[index];
+    float least = 2.5 * (position_error(position) + triangle_error(triangle));
+    vec3 wall = triangle_normal(triangle);
+    float cosine = dot(wall, normal);
+    float sine_squared = (1.0 - cosine) * (1.0 + cosine);
+    vec3 heights = vec3(dot(triangle.a - position, normal), dot(triangle.b - position, normal), dot(triangle.c - position, normal));
+    // The receiver's own plane, and what falls off from it at an edge, hide nothing from it.
+    if (sine_squared < 0.02 || max(heights.x, max(heights.y, heights.z)) <= least) {
+        return position;
+    }
+    float before = dot(wall, position - triangle.a);
+    if (HAS_TWO_SIDED) {
+        if (materials[triangle.material].two_sided != 0 && before < 0.0) {
+            wall = -wall;
+            cosine = -cosine;
+            before = -before;
+        }
+    }
+    bool touches = before < least && before > -0.25 * least;
+    return touches ? position + (wall - cosine * normal) * divide(least - before, sine_squared) : position;
+}
+
+// A receiver's place off the walls that rise where it lies. In the plane of a wall it would get nothing from that wall
+// (see is_before), and its rays would pass between the two sides.
+vec3 off_the_walls(vec3 position, vec3 normal)
+{
+    if (HAS_BVH) {
+        // Coordinates lie within 1.
+        float reach = 2.5 * (position_error(position) + 1.0 / 1048576.0);
+        uvec2 group = uvec2(0, 0x100u);
+        uvec2 stack[BVH_STACK];
+        uint depth = 0;
+        for (;;) {
+            uint slot = findLSB(group.y >> 8);
+            group.y &= ~(0x100u << slot);
+            if (group.y > 0xffu) {
+                stack[depth++] = group;
+            }
+            BvhNode node = nodes[group.x + bitCount(group.y & ((1u << slot) - 1u))];
+            vec3 spacing = uintBitsToFloat((uvec3(node.spacing, node.spacing >> 8, node.spacing >> 16) & 0xffu) << 23);
+            uint child_nodes = node.spacing >> 24;
+            uint near_nodes = 0;
+            uint near_leaves = 0;
+            for (uint child = 0; child < 8; child++) {
+                vec3 low = vec3(byte_of(node.min_x, child), byte_of(node.min_y, child), byte_of(node.min_z, child)) * spacing + node.origin;
+                vec3 high = vec3(byte_of(node.max_x, child), byte_of(node.max_y, child), byte_of(node.max_z, child)) * spacing + node.origin;
+                uint meta = byte_of(node.meta, child);
+                if (meta != 0 && all(lessThanEqual(low, position + reach)) && all(greaterThanEqual(high, position - reach))) {
+                    bool is_node = ((child_nodes >> child) & 1u) != 0;
+                    near_nodes |= is_node ? 1u << child : 0;
+                    near_leaves |= is_node ? 0 : (meta >> 5) << (meta & 31u);
+                }
+            }
+            for (; near_leaves != 0; near_leaves &= near_leaves - 1) {
+                position = off_the_wall(node.first_triangle + findLSB(near_leaves), position, normal);
+            }
+            group = uvec2(node.first_child, (near_nodes << 8) | child_nodes);
+            if (near_nodes == 0) {
+                if (depth == 0) {
+                    break;
+                }
+                group = stack[--depth];
+            }
+        }
+    } else {
+        for (uint index = 0; index < triangles.length(); index++) {
+            position = off_the_wall(index, position, normal);
+        }
+    }
+    return position;
+}
