@@ -173,6 +173,12 @@ struct Triangle {
     vec3 b;
     vec3 c;
     uint material;
+    uint plane;
+};
+
+struct Plane {
+    vec3 normal;
+    float offset;
 };
 
 struct TriangleNormals {
@@ -235,7 +241,7 @@ struct LightPath {
 
 struct VisiblePoint {
     vec3 position;
-    uint normal;
+    uint plane;
     vec3 weight;
     uint shading_normal;
     uint wo;

@@ -5,18 +5,20 @@
 //! scene by a power of two changes no bit, and every coordinate lies within (-1, 1). Radiance and
 //! irradiance keep their units; a flux in W is divided by `unit`^2.
 
-use std::collections::HashSet;
+use std::collections::{BTreeSet, HashMap};
 use std::f64::consts::{PI, TAU};
+use std::ops::{Add, Mul};
 
 use glam::{DVec2, DVec3, UVec2, Vec2, Vec3};
 
 use super::bvh::Bvh;
 use super::light::LightKind;
+use super::overlap::{self, Planes};
 use super::texture::Wrap;
 use super::{Material, Mesh, Scene, Surface};
 use crate::constants::*;
 use crate::error::{Error, Result};
-use crate::records::{BvhNode, Emitter, SurfaceMaterial, TextureInfo, Triangle, TriangleNormals, TriangleUvs};
+use crate::records::{BvhNode, Emitter, Plane, SurfaceMaterial, TextureInfo, Triangle, TriangleNormals, TriangleUvs};
 use crate::settings::EmissionLaw;
 
 #[derive(Debug, Clone)]
@@ -28,10 +30,11 @@ pub struct Geometry {
     pub bounds: (Vec3, Vec3),
     /// Radius of a sphere around the middle that holds everything, normalised.
     pub radius: f64,
-    /// Area of all triangles, normalised.
+    /// Area of all surfaces, normalised; where some lie on one another, of one.
     pub area: f64,
     pub nodes: Vec<BvhNode>,
     pub triangles: Vec<Triangle>,
+    pub planes: Vec<Plane>,
     /// For each triangle (mesh, triangle of the mesh).
     pub sources: Vec<(u32, u32)>,
     pub normals: Vec<TriangleNormals>,
@@ -47,6 +50,8 @@ pub struct Geometry {
     pub power: f64,
     /// Triangles that f32 makes a line of, or that lie on others.
     pub left_out: usize,
+    /// Meshes that lie in the plane of another and overlap it: (hidden there, seen there), each pair once.
+    pub overlaps: Vec<(u32, u32)>,
 }
 
 /// Most triangles: their numbers and those of the BVH's nodes are 32-bit, and a photon's choice of
@@ -86,33 +91,71 @@ impl Geometry {
         // What f32 makes a line of cannot be hit, and its normal would be no number; on a device that takes numbers
         // without a leading 1 for nothing, neither would that of a square below the least normal one.
         let is_solid = |[a, b, c]: &[Vec3; 3]| (*b - *a).cross(*c - *a).length_squared() >= f32::MIN_POSITIVE;
-        // Of triangles that lie on one another, facing alike, only the first can be met; the others would shine, and
-        // count as surface, where none is seen.
-        let mut seen = HashSet::with_capacity(corners.len());
-        let (sources, corners): (Vec<_>, Vec<_>) =
-            sources.into_iter().zip(corners).filter(|(_, corners)| is_solid(corners) && seen.insert(in_fixed_order(corners))).unzip();
+        // Of triangles that are the same, facing alike, only one can be met; the others would shine, and count as surface,
+        // where none is seen.
+        let ranks = overlap::ranks(scene);
+        let mut overlaps = BTreeSet::new();
+        let mut first = HashMap::with_capacity(corners.len());
+        let mut is_kept = vec![false; corners.len()];
+        for place in (0..corners.len()).filter(|place| is_solid(&corners[*place])) {
+            let seen = first.entry(in_fixed_order(&corners[place])).or_insert(place);
+            if *seen != place {
+                let (mesh, other) = (sources[place].0, sources[*seen].0);
+                let wins = ranks[mesh as usize] < ranks[other as usize];
+                overlaps.insert(if wins { (other, mesh) } else { (mesh, other) });
+                is_kept[*seen] = false;
+                *seen = if wins { place } else { *seen };
+            }
+            is_kept[*seen] = true;
+        }
+        let (mut sources, mut corners): (Vec<_>, Vec<_>) =
+            sources.into_iter().zip(corners).zip(is_kept).filter_map(|(triangle, is_kept)| is_kept.then_some(triangle)).unzip();
         let left_out = count - corners.len();
         if corners.is_empty() {
             return Err(refuse("the scene", "holds no triangle with an area".into()));
         }
+        let mut planes = Planes::of(&corners);
+        // Parts of triangles, behind the whole ones: weights of the corners.
+        let whole_count = corners.len();
+        let mut weights: Vec<[DVec3; 3]> = Vec::new();
+        for covered in overlap::find(scene, &ranks, &sources, &corners) {
+            let (source, [a, b, c], plane) =
+                (sources[covered.triangle], corners[covered.triangle].map(Vec3::as_dvec3), planes.of_triangles[covered.triangle]);
+            overlaps.extend(covered.by.iter().map(|other| (source.0, sources[*other].0)));
+            for piece in covered.pieces {
+                let at = piece.map(|of| (a * of.x + b * of.y + c * of.z).as_vec3());
+                if is_solid(&at) {
+                    sources.push(source);
+                    corners.push(at);
+                    planes.of_triangles.push(plane);
+                    weights.push(piece);
+                }
+            }
+            planes.of_triangles[covered.triangle] |= HIDDEN;
+        }
         let Bvh { nodes, order } = Bvh::build(&corners)?;
-        let sources: Vec<(u32, u32)> = order.iter().map(|&place| sources[place as usize]).collect();
-        let triangles: Vec<Triangle> = order
+        let triangle_of = |&place: &u32| {
+            let ([a, b, c], (mesh, _)) = (corners[place as usize], sources[place as usize]);
+            Triangle { a, b, c, material: scene.meshes[mesh as usize].material as u32, plane: planes.of_triangles[place as usize] }
+        };
+        let triangles: Vec<Triangle> = order.iter().map(triangle_of).collect();
+        let part_of = |place: u32| (place as usize).checked_sub(whole_count).map(|part| &weights[part]);
+        let normals = order
             .iter()
-            .zip(&sources)
-            .map(|(&place, &(mesh, _))| {
-                let [a, b, c] = corners[place as usize];
-                Triangle { a, b, c, material: scene.meshes[mesh as usize].material as u32 }
+            .map(|&place| {
+                let (mesh, triangle) = sources[place as usize];
+                corner_normals(&scene.meshes[mesh as usize], triangle as usize, part_of(place))
             })
             .collect();
-        let normals = sources.iter().map(|&(mesh, triangle)| corner_normals(&scene.meshes[mesh as usize], triangle as usize)).collect();
-        let uvs = sources
+        let uvs = order
             .iter()
-            .map(|&(mesh, triangle)| {
+            .map(|&place| {
+                let (mesh, triangle) = sources[place as usize];
                 let mesh = &scene.meshes[mesh as usize];
-                corner_uvs(mesh, &scene.materials[mesh.material], triangle as usize)
+                corner_uvs(mesh, &scene.materials[mesh.material], triangle as usize, part_of(place))
             })
             .collect();
+        let sources = order.iter().map(|&place| sources[place as usize]).collect();
         let (textures, texels) = pack_textures(scene);
 
         let mut geometry = Geometry {
@@ -120,9 +163,10 @@ impl Geometry {
             unit,
             bounds: (local(min), local(max)),
             radius: (0.5 * (max - min).length() / unit) * 1.001,
-            area: triangles.iter().map(area).sum(),
+            area: triangles.iter().filter(|triangle| triangle.plane < HIDDEN).map(area).sum(),
             nodes,
             triangles,
+            planes: planes.planes,
             sources,
             normals,
             uvs,
@@ -133,6 +177,7 @@ impl Geometry {
             flux_unit: 1.0,
             power: 0.0,
             left_out,
+            overlaps: overlaps.into_iter().filter(|(hidden, other)| hidden != other).collect(),
         };
         geometry.add_emitters(scene)?;
         Ok(geometry)
@@ -149,7 +194,7 @@ impl Geometry {
 
     fn add_emitters(&mut self, scene: &Scene) -> Result<()> {
         let mut found: Vec<Found> = Vec::new();
-        for (index, triangle) in self.triangles.iter().enumerate() {
+        for (index, triangle) in self.triangles.iter().enumerate().filter(|(_, triangle)| triangle.plane < HIDDEN) {
             let material = &scene.materials[triangle.material as usize];
             if material.is_emissive() {
                 let sides = if material.two_sided { 2.0 } else { 1.0 };
@@ -336,7 +381,13 @@ fn texture_over(texture: &super::Texture, uvs: &TriangleUvs) -> (DVec3, f64) {
     (0.99 * sum / f64::from(STEPS * STEPS) + 0.01 * whole, f64::from(brightest))
 }
 
-fn corner_normals(mesh: &Mesh, triangle: usize) -> TriangleNormals {
+/// Values of a triangle's corners, or of those of a part of it.
+fn at_corners<T: Copy + Add<Output = T> + Mul<f64, Output = T>>(values: [T; 3], part: Option<&[DVec3; 3]>) -> [T; 3] {
+    let [a, b, c] = values;
+    part.map_or(values, |weights| weights.map(|of| a * of.x + b * of.y + c * of.z))
+}
+
+fn corner_normals(mesh: &Mesh, triangle: usize, part: Option<&[DVec3; 3]>) -> TriangleNormals {
     let flat = TriangleNormals { a: NONE, b: NONE, c: NONE };
     if mesh.normals.is_empty() {
         return flat;
@@ -347,18 +398,18 @@ fn corner_normals(mesh: &Mesh, triangle: usize) -> TriangleNormals {
     if normals.iter().any(|normal| normal.length_squared() < 0.25) || normals.iter().all(|normal| normal.dot(own) > 1.0 - 1e-9) {
         return flat;
     }
-    let [a, b, c] = normals.map(|normal| pack_normal(normal.as_vec3()));
+    let [a, b, c] = at_corners(normals, part).map(|normal| pack_normal(normal.as_vec3()));
     TriangleNormals { a, b, c }
 }
 
-fn corner_uvs(mesh: &Mesh, material: &Material, triangle: usize) -> TriangleUvs {
+fn corner_uvs(mesh: &Mesh, material: &Material, triangle: usize, part: Option<&[DVec3; 3]>) -> TriangleUvs {
     let of_set = |set: Option<usize>| -> [Vec2; 3] {
         match set {
             Some(set) if !mesh.uvs[set].is_empty() => {
                 // Whole turns mean nothing and would cost digits.
                 let uvs = mesh.triangles[triangle].map(|vertex| mesh.uvs[set][vertex as usize]);
                 let base: DVec2 = uvs[0].floor() - uvs[0].floor() % 2.0;
-                uvs.map(|uv| (uv - if base.abs().max_element() > 64.0 { base } else { DVec2::ZERO }).as_vec2())
+                at_corners(uvs, part).map(|uv| (uv - if base.abs().max_element() > 64.0 { base } else { DVec2::ZERO }).as_vec2())
             }
             _ => [Vec2::ZERO; 3],
         }

@@ -11,6 +11,7 @@ use i_triangle::float::triangulatable::Triangulatable as _;
 use rayon::prelude::*;
 
 use super::{Material, Scene, Surface};
+use crate::records::Plane;
 
 /// Corners that are no further from a plane lie in it: 16 units in the last place of a coordinate of 0.5, where
 /// normalised scenes end. Rounding of positions and of their heights takes half of that (`glsl/scene/belongs.glsl`).
@@ -30,6 +31,41 @@ pub struct Covered {
     pub by: Vec<usize>,
     /// What remains visible: barycentric weights of the triangle's corners at the corners of each piece.
     pub pieces: Vec<[DVec3; 3]>,
+}
+
+/// Planes of triangles, those that agree to a few units in the last place as one.
+pub struct Planes {
+    pub planes: Vec<Plane>,
+    /// Each triangle's number among them.
+    pub of_triangles: Vec<u32>,
+}
+
+impl Planes {
+    /// Of the fronts of normalised triangles.
+    pub fn of(corners: &[[Vec3; 3]]) -> Planes {
+        // A quarter of what two surfaces must be apart.
+        const STEP: f64 = 0.25 * IN_PLANE;
+        let plane = |corners: &[Vec3; 3]| {
+            let [a, b, c] = corners.map(Vec3::as_dvec3);
+            // Of the very normal that is stored, so that the plane goes through the triangle's middle.
+            let normal = (b - a).cross(c - a).normalize().as_vec3();
+            (normal, -normal.as_dvec3().dot((a + b + c) / 3.0))
+        };
+        let rounded = |(place, corners): (usize, &[Vec3; 3])| {
+            let (normal, offset) = plane(corners);
+            ((normal.as_dvec3().extend(offset) / STEP).round().as_ivec4().to_array(), place as u32)
+        };
+        let mut order: Vec<([i32; 4], u32)> = corners.par_iter().enumerate().map(rounded).collect();
+        order.par_sort_unstable();
+        let mut planes = Vec::new();
+        let mut of_triangles = vec![0; corners.len()];
+        for alike in order.chunk_by(|a, b| a.0 == b.0) {
+            alike.iter().for_each(|(_, triangle)| of_triangles[*triangle as usize] = planes.len() as u32);
+            let (normal, offset) = plane(&corners[alike[0].1 as usize]);
+            planes.push(Plane { normal, offset: offset as f32 });
+        }
+        Planes { planes, of_triangles }
+    }
 }
 
 /// Which of two overlapping surfaces counts, by mesh: the smaller number. What shines wins over what does not, so that a
@@ -105,7 +141,8 @@ impl Sheet<'_> {
         let size = n.abs();
         // A plane has two normals: that with its largest component above 0, and both where that is in doubt.
         let largest = size.max_element();
-        let signs = [1.0, -1.0].into_iter().filter(|sign| (0..3).any(|axis| size[axis] >= largest - 2.0 * uncertain && sign * n[axis] > 0.0));
+        let signs =
+            [1.0, -1.0].into_iter().filter(|sign| (0..3).any(|axis| size[axis] >= largest - 2.0 * uncertain && sign * n[axis] > 0.0));
         let mut classes = Vec::with_capacity(1);
         for sign in signs {
             let values = [n.x, n.y, n.z, n.dot(self.corners[0])].map(|value| sign * value);
@@ -157,11 +194,10 @@ fn altitude([a, b, c]: &[DVec3; 3]) -> f64 {
 }
 
 /// Finds the triangles of a scene, normalised, that others of their plane hide in part or whole. `sources` are the
-/// triangles' meshes and numbers there.
+/// triangles' meshes and numbers there, `ranks` those of [`ranks`].
 ///
 /// Triangles are sorted by classes of planes, then by place, so that the time goes with their number.
-pub fn find(scene: &Scene, sources: &[(u32, u32)], corners: &[[Vec3; 3]]) -> Vec<Covered> {
-    let ranks = ranks(scene);
+pub fn find(scene: &Scene, ranks: &[u32], sources: &[(u32, u32)], corners: &[[Vec3; 3]]) -> Vec<Covered> {
     let sheet = |triangle: u32| {
         let corners = corners[triangle as usize].map(Vec3::as_dvec3);
         let normal = (corners[1] - corners[0]).cross(corners[2] - corners[0]).normalize();
