@@ -50,7 +50,7 @@ pub struct Geometry {
     pub power: f64,
     /// Triangles that f32 makes a line of, or that lie on others.
     pub left_out: usize,
-    /// Meshes that lie in the plane of another and overlap it: (hidden there, seen there), each pair once.
+    /// Meshes that overlap in one plane, facing alike: (hidden there, seen there), each pair once.
     pub overlaps: Vec<(u32, u32)>,
 }
 
@@ -177,7 +177,7 @@ impl Geometry {
             flux_unit: 1.0,
             power: 0.0,
             left_out,
-            overlaps: overlaps.into_iter().filter(|(hidden, other)| hidden != other).collect(),
+            overlaps: overlaps.into_iter().collect(),
         };
         geometry.add_emitters(scene)?;
         Ok(geometry)
@@ -190,6 +190,23 @@ impl Geometry {
 
     pub fn to_local(&self, position: DVec3) -> Vec3 {
         ((position - self.centre) / self.unit).as_vec3()
+    }
+
+    /// A line for each pair of meshes that overlap in one plane.
+    pub fn overlap_warnings(&self, scene: &Scene) -> Vec<String> {
+        const MOST: usize = 5;
+        let name = |mesh: u32| &scene.meshes[mesh as usize].name;
+        let line = |&(hidden, seen): &(u32, u32)| {
+            if hidden == seen {
+                return format!("mesh {:?} overlaps itself in one plane; what overlaps counts once", name(hidden));
+            }
+            format!("meshes {:?} and {:?} overlap in one plane; only {:?} counts there", name(hidden), name(seen), name(seen))
+        };
+        let mut lines: Vec<String> = self.overlaps.iter().take(MOST).map(line).collect();
+        if self.overlaps.len() > MOST {
+            lines.push(format!("{} more pairs of meshes overlap in one plane; one of each counts there", self.overlaps.len() - MOST));
+        }
+        lines
     }
 
     fn add_emitters(&mut self, scene: &Scene) -> Result<()> {

@@ -1,7 +1,7 @@
 //! Surfaces that lie in one plane and overlap, as a rug on its floor or a lamp that was exported twice. Where they
 //! overlap one of them counts, and of the others only what is visible beside it: [`find`] says what that is.
 
-use std::collections::BTreeMap;
+use std::collections::{BTreeMap, HashMap};
 
 use glam::{DVec2, DVec3, Vec3};
 use i_overlay::core::fill_rule::FillRule;
@@ -23,11 +23,14 @@ const WIDTH: f64 = 1.0 / 1_048_576.0;
 /// Width of the classes of normals and of distances from the origin: only triangles of one class are compared.
 const CLASS: f64 = 1.0 / 512.0;
 
+/// Normal and distance from the origin, in steps of [`CLASS`].
+type Class = [i16; 4];
+
 /// A triangle of which a part is hidden by others in its plane.
 #[derive(Debug, Clone, PartialEq)]
 pub struct Covered {
     pub triangle: usize,
-    /// Those that hide it.
+    /// Those that hide it and face as it does; more may hide it whose back is seen.
     pub by: Vec<usize>,
     /// What remains visible: barycentric weights of the triangle's corners at the corners of each piece.
     pub pieces: Vec<[DVec3; 3]>,
@@ -96,6 +99,7 @@ struct Sheet<'a> {
     normal: DVec3,
     /// The height over its longest side: how well the corners tell the normal.
     altitude: f64,
+    mesh: u32,
     material: &'a Material,
 }
 
@@ -134,7 +138,7 @@ impl Sheet<'_> {
     }
 
     /// Classes of planes that it may be in: one, but for what rounding may shift.
-    fn classes(&self) -> Vec<[i64; 4]> {
+    fn classes(&self) -> Vec<Class> {
         let is_exact = (0..3).any(|axis| self.corners.iter().all(|corner| corner[axis] == self.corners[0][axis]));
         let uncertain = if is_exact { IN_PLANE } else { (IN_PLANE / self.altitude).min(0.5 * CLASS) + IN_PLANE };
         let n = self.normal;
@@ -146,7 +150,7 @@ impl Sheet<'_> {
         let mut classes = Vec::with_capacity(1);
         for sign in signs {
             let values = [n.x, n.y, n.z, n.dot(self.corners[0])].map(|value| sign * value);
-            let ends = values.map(|value| [-uncertain, uncertain].map(|off| ((value + off) / CLASS).floor() as i64));
+            let ends = values.map(|value| [-uncertain, uncertain].map(|off| ((value + off) / CLASS).floor() as i16));
             for choice in 0..16 {
                 let class = [0, 1, 2, 3].map(|k| ends[k][choice >> k & 1]);
                 // Ends that are equal are one choice.
@@ -201,21 +205,22 @@ pub fn find(scene: &Scene, ranks: &[u32], sources: &[(u32, u32)], corners: &[[Ve
     let sheet = |triangle: u32| {
         let corners = corners[triangle as usize].map(Vec3::as_dvec3);
         let normal = (corners[1] - corners[0]).cross(corners[2] - corners[0]).normalize();
-        let material = &scene.materials[scene.meshes[sources[triangle as usize].0 as usize].material];
-        Sheet { corners, normal, altitude: altitude(&corners), material }
+        let (mesh, _) = sources[triangle as usize];
+        let material = &scene.materials[scene.meshes[mesh as usize].material];
+        Sheet { corners, normal, altitude: altitude(&corners), mesh, material }
     };
     let classes_of = |triangle: u32| {
         let sheet = sheet(triangle);
         let classes = if sheet.altitude > WIDTH { sheet.classes() } else { Vec::new() };
         classes.into_iter().map(move |class| (class, triangle))
     };
-    let mut members: Vec<([i64; 4], u32)> = (0..corners.len() as u32).into_par_iter().flat_map_iter(classes_of).collect();
+    let mut members: Vec<(Class, u32)> = (0..corners.len() as u32).into_par_iter().flat_map_iter(classes_of).collect();
     members.par_sort_unstable();
-    let classes: Vec<&[([i64; 4], u32)]> = members.chunk_by(|a, b| a.0 == b.0).filter(|members| members.len() > 1).collect();
-    let pairs_of = |class: &&[([i64; 4], u32)]| {
+    let classes: Vec<&[(Class, u32)]> = members.chunk_by(|a, b| a.0 == b.0).filter(|members| members.len() > 1).collect();
+    let pairs_of = |class: &&[(Class, u32)]| {
         let sheets: Vec<Sheet> = class.iter().map(|(_, triangle)| sheet(*triangle)).collect();
         let overlap = |a: usize, b: usize| sheets[a].competes(&sheets[b]) && sheets[a].overlaps(&sheets[b]);
-        near(&sheets).into_iter().filter(|(a, b)| overlap(*a, *b)).map(|(a, b)| (class[a].1, class[b].1)).collect::<Vec<_>>()
+        near(&sheets, overlap).into_iter().map(|(a, b)| (class[a].1, class[b].1)).collect::<Vec<_>>()
     };
     let mut hidden: BTreeMap<u32, Vec<u32>> = BTreeMap::new();
     for (a, b) in classes.par_iter().flat_map_iter(pairs_of).collect::<Vec<_>>() {
@@ -228,13 +233,35 @@ pub fn find(scene: &Scene, ranks: &[u32], sources: &[(u32, u32)], corners: &[[Ve
         by.dedup();
         let others: Vec<Sheet> = by.iter().map(|other| sheet(*other)).collect();
         let pieces = sheet(triangle).without(&others.iter().collect::<Vec<_>>())?;
-        Some(Covered { triangle: triangle as usize, by: by.into_iter().map(|other| other as usize).collect(), pieces })
+        let normal = sheet(triangle).normal;
+        let alike = by.iter().zip(&others).filter(|(_, other)| other.normal.dot(normal) > 0.0);
+        Some(Covered { triangle: triangle as usize, by: alike.map(|(other, _)| *other as usize).collect(), pieces })
     };
     hidden.into_iter().collect::<Vec<_>>().into_par_iter().filter_map(visible).collect()
 }
 
-/// Pairs of triangles of about one plane whose boxes overlap.
-fn near(sheets: &[Sheet]) -> Vec<(usize, usize)> {
+/// What is visible of each triangle of a scene, by mesh and number, that others of its plane hide in part or whole.
+pub fn of_scene(scene: &Scene) -> HashMap<(u32, u32), Vec<[DVec3; 3]>> {
+    let (min, max) = scene.bounds();
+    let (centre, extent) = (0.5 * (min + max), (max - min).max_element());
+    if !extent.is_normal() {
+        return HashMap::new();
+    }
+    let numbers = |mesh: usize| (0..scene.meshes[mesh].triangles.len() as u32).map(move |triangle| (mesh as u32, triangle));
+    let sources: Vec<(u32, u32)> = (0..scene.meshes.len()).flat_map(numbers).collect();
+    let local = |position: DVec3| ((position - centre) / extent).as_vec3();
+    let corners: Vec<[Vec3; 3]> =
+        sources.iter().map(|(mesh, triangle)| scene.meshes[*mesh as usize].corners(*triangle as usize).map(local)).collect();
+    let covered = find(scene, &ranks(scene), &sources, &corners);
+    covered.into_iter().map(|covered| (sources[covered.triangle], covered.pieces)).collect()
+}
+
+/// Triangles in a cell of which those of one mesh are not compared: so many meet in a corner, as in the middle of a disc,
+/// and to compare all would take time with the square of their number.
+const CROWD: usize = 1024;
+
+/// Pairs of triangles of about one plane whose boxes overlap and that `is_wanted` holds for.
+fn near(sheets: &[Sheet], is_wanted: impl Fn(usize, usize) -> bool + Sync) -> Vec<(usize, usize)> {
     // Along the two axes in which the plane is widest.
     let across = sheets[0].normal.abs().max_position();
     let flat = |point: DVec3| DVec2::new(point[(across + 1) % 3], point[(across + 2) % 3]);
@@ -248,7 +275,7 @@ fn near(sheets: &[Sheet]) -> Vec<(usize, usize)> {
     let is_near = |a: usize, b: usize| boxes[a].1.min(boxes[b].1).cmpgt(boxes[a].0.max(boxes[b].0)).all();
     let count = sheets.len();
     if count <= 16 {
-        return (0..count).flat_map(|b| (0..b).map(move |a| (a, b))).filter(|(a, b)| is_near(*a, *b)).collect();
+        return (0..count).flat_map(|b| (0..b).map(move |a| (a, b))).filter(|(a, b)| is_near(*a, *b) && is_wanted(*a, *b)).collect();
     }
     // A grid of about as many cells as triangles.
     let low = boxes.iter().fold(DVec2::INFINITY, |low, of| low.min(of.0));
@@ -265,11 +292,16 @@ fn near(sheets: &[Sheet]) -> Vec<(usize, usize)> {
     let pairs_of = |members: &[(u64, u32)]| {
         let mut pairs = Vec::new();
         for (place, (number, b)) in members.iter().enumerate() {
-            for (_, a) in &members[..place] {
+            // A mesh's triangles stand side by side.
+            let others = match members.len() {
+                0..=CROWD => place,
+                _ => members.partition_point(|(_, a)| sheets[*a as usize].mesh < sheets[*b as usize].mesh),
+            };
+            for (_, a) in &members[..others] {
                 let (a, b) = (*a as usize, *b as usize);
                 // In the one cell that holds the lower corner of what both boxes share.
                 let corner = cell(boxes[a].0.max(boxes[b].0));
-                if is_near(a, b) && corner.y * (last.x + 1) + corner.x == *number {
+                if is_near(a, b) && corner.y * (last.x + 1) + corner.x == *number && is_wanted(a, b) {
                     pairs.push((a, b));
                 }
             }
@@ -277,4 +309,59 @@ fn near(sheets: &[Sheet]) -> Vec<(usize, usize)> {
         pairs
     };
     cells.chunk_by(|a, b| a.0 == b.0).collect::<Vec<_>>().into_par_iter().flat_map_iter(pairs_of).collect()
+}
+
+#[cfg(test)]
+mod timing {
+    use super::*;
+    use crate::scene::Mesh;
+    fn time(what: &str, mesh: Mesh) {
+        let scene = Scene { meshes: vec![mesh], materials: vec![Material::lambert("m", Vec3::ONE)], ..Scene::default() };
+        let mesh = &scene.meshes[0];
+        let sources: Vec<(u32, u32)> = (0..mesh.triangles.len() as u32).map(|t| (0, t)).collect();
+        let corners: Vec<[Vec3; 3]> = (0..mesh.triangles.len()).map(|t| mesh.corners(t).map(|p| (p * 0.4).as_vec3())).collect();
+        let start = std::time::Instant::now();
+        let planes = Planes::of(&corners);
+        let of_planes = start.elapsed();
+        let found = find(&scene, &ranks(&scene), &sources, &corners);
+        println!(
+            "{what}: {} triangles, planes {} in {of_planes:?}, with overlaps {:?}, {} covered",
+            corners.len(),
+            planes.planes.len(),
+            start.elapsed(),
+            found.len()
+        );
+    }
+    #[test]
+    fn timing() {
+        let turn = glam::DQuat::from_axis_angle(DVec3::new(0.3, 0.5, -0.8).normalize(), 1.1);
+        time("sphere", Mesh::sphere("s", DVec3::ZERO, 1.0, 1000, 0));
+        let grid = |n: u32, f: &dyn Fn(f64, f64) -> DVec3| Mesh {
+            positions: (0..=n)
+                .flat_map(|j| (0..=n).map(move |i| (f64::from(i) / f64::from(n), f64::from(j) / f64::from(n))))
+                .map(|(x, y)| f(x, y))
+                .collect(),
+            triangles: (0..n)
+                .flat_map(|j| {
+                    (0..n).flat_map(move |i| {
+                        let v = j * (n + 1) + i;
+                        [[v, v + 1, v + n + 2], [v, v + n + 2, v + n + 1]]
+                    })
+                })
+                .collect(),
+            ..Mesh::default()
+        };
+        time("terrain", grid(700, &|x, y| DVec3::new(x, 0.03 * (13.0 * x).sin() * (17.0 * y + x).cos(), y)));
+        time("floor", grid(700, &|x, y| DVec3::new(x, 0.0, y)));
+        time("turned floor", grid(700, &|x, y| turn * DVec3::new(x, 0.0, y)));
+        let mut fan = Mesh::default();
+        fan.positions.push(DVec3::ZERO);
+        let n = 4000;
+        for k in 0..=n {
+            let a = std::f64::consts::TAU * f64::from(k) / f64::from(n);
+            fan.positions.push(DVec3::new(a.cos(), 0.0, a.sin()));
+        }
+        fan.triangles = (0..n as u32).map(|k| [0, k + 1, k + 2]).collect();
+        time("fan", fan);
+    }
 }
