@@ -176,11 +176,6 @@ struct Triangle {
     uint plane;
 };
 
-struct Plane {
-    vec3 normal;
-    float offset;
-};
-
 struct TriangleNormals {
     uint a;
     uint b;

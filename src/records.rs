@@ -279,12 +279,6 @@ records! {
         plane: u32,
     }
 
-    /// Points p with `normal` . p + `offset` = 0.
-    Plane {
-        normal: Vec3,
-        offset: f32,
-    }
-
     /// Shading normals at a triangle's corners, octahedral; all `NONE` on a flat triangle.
     TriangleNormals {
         a: u32,

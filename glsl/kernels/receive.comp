@@ -58,7 +58,7 @@ void main()
     bool gathers = GATHER_RAYS == GATHER_ALL || !on_surface;
     if (on_surface) {
         uint arrivals = arrivals_wanted(chain, gathers);
-        vec3 on_plane = receiver.position - plane_height(plane, receiver.position) * planes[plane >> 1].normal;
+        vec3 on_plane = receiver.position - plane_height(plane, receiver.position) * planes[plane >> 1].xyz;
         chain.points[chain.point_count++] =
             VisiblePoint(on_plane, plane, vec3(1.0), ns == ng ? NONE : pack_normal(ns), 0, 0.0, SURFACE_RECEIVER, arrivals);
     }

@@ -3,7 +3,8 @@
 // Only planes decide what belongs: that of the visible point, and that of a photon or a triangle. So photons are counted
 // on the very surfaces whose area is.
 
-layout(set = 0, binding = 10, scalar) readonly buffer Planes { Plane planes[]; };
+// Unit normal n of the front, and what makes n . p + offset = 0: one load each.
+layout(set = 0, binding = 10, scalar) readonly buffer Planes { vec4 planes[]; };
 
 // Least cosine between normals: 41 degrees take in the facets of a curved surface, no box's corner.
 const float MIN_NORMAL_COSINE = 0.75;
@@ -15,15 +16,15 @@ const float HEIGHT_ERROR = 1.0 / 4194304.0;
 // Unit normal on the side that is meant.
 vec3 plane_normal(uint plane)
 {
-    vec3 normal = planes[plane >> 1].normal;
+    vec3 normal = planes[plane >> 1].xyz;
     return (plane & 1u) != 0 ? -normal : normal;
 }
 
 // Height of a point over a plane's front.
 float plane_height(uint plane, vec3 position)
 {
-    Plane of = planes[plane >> 1];
-    return of.normal.x * position.x + of.normal.y * position.y + of.normal.z * position.z + of.offset;
+    vec4 front = planes[plane >> 1];
+    return front.x * position.x + front.y * position.y + front.z * position.z + front.w;
 }
 
 // Whether a plane at height `height` below the middle of an estimate, with normal `other`, may carry photons that count.

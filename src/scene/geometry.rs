@@ -9,7 +9,7 @@ use std::collections::{BTreeSet, HashMap};
 use std::f64::consts::{PI, TAU};
 use std::ops::{Add, Mul};
 
-use glam::{DVec2, DVec3, UVec2, Vec2, Vec3};
+use glam::{DVec2, DVec3, UVec2, Vec2, Vec3, Vec4};
 
 use super::bvh::Bvh;
 use super::light::LightKind;
@@ -18,7 +18,7 @@ use super::texture::Wrap;
 use super::{Material, Mesh, Scene, Surface};
 use crate::constants::*;
 use crate::error::{Error, Result};
-use crate::records::{BvhNode, Emitter, Plane, SurfaceMaterial, TextureInfo, Triangle, TriangleNormals, TriangleUvs};
+use crate::records::{BvhNode, Emitter, SurfaceMaterial, TextureInfo, Triangle, TriangleNormals, TriangleUvs};
 use crate::settings::EmissionLaw;
 
 #[derive(Debug, Clone)]
@@ -34,7 +34,8 @@ pub struct Geometry {
     pub area: f64,
     pub nodes: Vec<BvhNode>,
     pub triangles: Vec<Triangle>,
-    pub planes: Vec<Plane>,
+    /// Of triangles: unit normal n of the front, then what makes n . p + offset = 0.
+    pub planes: Vec<Vec4>,
     /// For each triangle (mesh, triangle of the mesh).
     pub sources: Vec<(u32, u32)>,
     pub normals: Vec<TriangleNormals>,

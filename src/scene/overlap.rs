@@ -3,7 +3,7 @@
 
 use std::collections::{BTreeMap, HashMap};
 
-use glam::{DVec2, DVec3, Vec3};
+use glam::{DVec2, DVec3, Vec3, Vec4};
 use i_overlay::core::fill_rule::FillRule;
 use i_overlay::core::overlay_rule::OverlayRule;
 use i_overlay::float::single::SingleFloatOverlay as _;
@@ -11,7 +11,6 @@ use i_triangle::float::triangulatable::Triangulatable as _;
 use rayon::prelude::*;
 
 use super::{Material, Scene, Surface};
-use crate::records::Plane;
 
 /// Corners that are no further from a plane lie in it: 16 units in the last place of a coordinate of 0.5, where
 /// normalised scenes end. Rounding of positions and of their heights takes half of that (`glsl/scene/belongs.glsl`).
@@ -38,7 +37,8 @@ pub struct Covered {
 
 /// Planes of triangles, those that agree to a few units in the last place as one.
 pub struct Planes {
-    pub planes: Vec<Plane>,
+    /// Unit normal n of the front, then what makes n . p + offset = 0.
+    pub planes: Vec<Vec4>,
     /// Each triangle's number among them.
     pub of_triangles: Vec<u32>,
 }
@@ -65,7 +65,7 @@ impl Planes {
         for alike in order.chunk_by(|a, b| a.0 == b.0) {
             alike.iter().for_each(|(_, triangle)| of_triangles[*triangle as usize] = planes.len() as u32);
             let (normal, offset) = plane(&corners[alike[0].1 as usize]);
-            planes.push(Plane { normal, offset: offset as f32 });
+            planes.push(normal.extend(offset as f32));
         }
         Planes { planes, of_triangles }
     }
