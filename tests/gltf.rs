@@ -455,7 +455,8 @@ fn loading_reports_its_stages() {
     let scene = Scene::open_with(file.path.to_str().unwrap(), false, &mut report).unwrap();
     Geometry::new_with(&scene, &mut report).unwrap();
     let wanted = ["reading the file", "decoding textures", "reading meshes", "preparing triangles", "building the hierarchy"];
-    assert_eq!(stages[..5], wanted, "{stages:?}");
+    let mut left = stages.iter();
+    assert!(wanted.iter().all(|stage| left.any(|found| found == stage)), "{stages:?}");
 }
 
 /// Nodes within themselves, and deeper than any hierarchy.

@@ -24,7 +24,7 @@
 //! | G11 | the_smallest_lamps_shine_into_the_room_or_are_left_out |
 //! | G12 | ten_thousand_sizes_away_the_light_is_the_same_to_the_bit, size_and_place_do_not_change_the_light |
 //! | G13 | every_power_of_two_is_the_same_light_to_the_bit, the_open_box_of_any_power_of_two_stores_the_same_photons |
-//! | G14 | flat_doubled_and_reordered_triangles_change_no_bit, sheets_in_one_plane_are_met_alike_by_tree_and_list, two_sheets_at_one_place_show_each_its_own_side |
+//! | G14 | flat_doubled_and_reordered_triangles_change_no_bit, sheets_in_one_plane_are_met_alike_by_tree_and_list, two_sheets_at_one_place_show_each_its_own_side, a_rug_on_the_floor_is_lit_like_the_floor, a_lamp_that_is_given_twice_shines_once |
 //! | G15 | thin_walls_and_sheets_let_no_light_through, no_light_leaks_from_one_shelf_to_the_next |
 //! | S1 | unit_floats_stay_below_one |
 //! | S2 | grazing_and_straight_directions_end_in_the_room |

@@ -26,6 +26,7 @@ mod layout;
 mod ledger;
 mod memory;
 mod optics;
+mod overlap;
 mod paranoid;
 mod photons;
 mod primitives;
