@@ -173,6 +173,7 @@ struct Triangle {
     vec3 b;
     vec3 c;
     uint material;
+    uint plane;
 };
 
 struct TriangleNormals {
@@ -243,7 +244,7 @@ struct CameraPath {
 
 struct VisiblePoint {
     vec3 position;
-    uint normal;
+    uint plane;
     vec3 weight;
     uint shading_normal;
     uint wo;

@@ -62,6 +62,8 @@ constants! {
     SURFACE_RECEIVER = 5;
     /// A material without a texture, a triangle without smooth normals, a ray without a hit.
     NONE = 0xffff_ffff;
+    /// Bit of a triangle's plane: others hide a part of the triangle.
+    HIDDEN = 0x8000_0000;
 
     /// What an emitter is; see `scene::LightKind`.
     EMITTER_TRIANGLE = 0;

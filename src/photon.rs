@@ -40,8 +40,8 @@ pub struct Origin {
 #[derive(Debug, Clone, Copy, PartialEq, Default, Pod, Zeroable)]
 pub struct MapPhoton {
     pub position: Vec3,
-    /// Geometric normal on the side of its arrival, octahedral.
-    pub normal: u32,
+    /// That it arrived at: twice its number, plus 1 on its back.
+    pub plane: u32,
     pub flux: Vec3,
     /// Where it came from, octahedral in 2 x 15 bits, and log2 of `ARRIVED_...` above.
     pub wi: u32,
@@ -142,7 +142,7 @@ mod tests {
     /// Kernels write it as two words of four.
     #[test]
     fn a_map_photon_is_two_words() {
-        let photon = MapPhoton { position: Vec3::new(1.0, 2.0, 3.0), normal: 4, flux: Vec3::new(5.0, 6.0, 7.0), wi: 8 };
+        let photon = MapPhoton { position: Vec3::new(1.0, 2.0, 3.0), plane: 4, flux: Vec3::new(5.0, 6.0, 7.0), wi: 8 };
         let [x, y, z, r, g, b] = [1.0f32, 2.0, 3.0, 5.0, 6.0, 7.0].map(f32::to_bits);
         assert_eq!(bytemuck::cast::<MapPhoton, [[u32; 4]; 2]>(photon), [[x, y, z, 4], [r, g, b, 8]]);
     }

@@ -274,6 +274,9 @@ records! {
         b: Vec3,
         c: Vec3,
         material: u32,
+        /// Number of its front's plane; plus `HIDDEN` if others that lie in it hide a part: then it counts as no surface,
+        /// triangles of their own stand for what is visible of it, and rays meet it only between those.
+        plane: u32,
     }
 
     /// Shading normals at a triangle's corners, octahedral; all `NONE` on a flat triangle.
@@ -368,10 +371,11 @@ records! {
     /// A point whose light the photon maps are asked for.
     VisiblePoint {
         position: Vec3,
-        /// Geometric and shading normal, octahedral.
-        normal: u32,
+        /// That it lies in: twice its number, plus 1 on its back.
+        plane: u32,
         /// What a unit of flux density that arrives adds to the pixel, W/m2/sr per W/m2.
         weight: Vec3,
+        /// Octahedral; `NONE`: the plane's.
         shading_normal: u32,
         /// Towards the eye, octahedral.
         wo: u32,

@@ -27,6 +27,7 @@ mod ledger;
 mod limits;
 mod memory;
 mod optics;
+mod overlap;
 mod paranoid;
 mod photons;
 mod primitives;

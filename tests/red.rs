@@ -569,8 +569,8 @@ const FAULTS: [Fault; 65] = [
     Fault {
         what: "what lies a sixteenth of the radius below belongs to an estimate",
         file: "scene/belongs.glsl",
-        from: "return abs(height) <= radius * (1.0 / 1024.0);",
-        to: "return abs(height) <= radius * (1.0 / 16.0);",
+        from: "+ HEIGHT_ERROR;",
+        to: "+ radius * (1.0 / 16.0);",
         kernels: &["lookup_u64", "lookup_two_words"],
         noticed_by: &[(Shelf, Leak)],
     },

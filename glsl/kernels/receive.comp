@@ -38,9 +38,6 @@ layout(set = 0, binding = 8, scalar) readonly buffer Receivers { Receiver receiv
 #include "stages/visible_point.glsl"
 #include "stages/chain.glsl"
 
-// A degree: what single precision and the facets of a fine mesh may turn a normal by.
-const float RECEIVER_NORMAL_COSINE = 0.99985;
-
 void main()
 {
     uint index = push.first_point + invocation_index();
@@ -58,15 +55,14 @@ void main()
     }
     // Photons only ever land on surfaces, and tell the irradiance of those: any other point, or direction, looks
     // around.
-    bool whole;
-    float covered = covered_area(receiver.position, ng, push.radius, RECEIVER_NORMAL_COSINE, whole);
-    note_unless(is_finite(covered), ODD_LIGHT, push.draws.domain, push.draws.round, index);
-    bool on_surface = covered > 0.0;
+    uint plane = plane_below(receiver.position, ng, push.radius);
+    bool on_surface = plane != NONE;
     bool gathers = GATHER_RAYS == GATHER_ALL || !on_surface;
     if (on_surface) {
         uint arrivals = arrivals_wanted(chain, gathers);
+        vec3 on_plane = receiver.position - plane_height(plane, receiver.position) * planes[plane >> 1].xyz;
         chain.points[chain.point_count++] =
-            VisiblePoint(receiver.position, pack_normal(ng), vec3(1.0), pack_normal(ns), 0, 0.0, SURFACE_RECEIVER, arrivals);
+            VisiblePoint(on_plane, plane, vec3(1.0), ns == ng ? NONE : pack_normal(ns), 0, 0.0, SURFACE_RECEIVER, arrivals);
     }
     if (gathers) {
         // Irradiance is pi times the radiance that arrives from cosine-weighted directions.

@@ -44,7 +44,7 @@ float estimate_area(VisiblePoint point, uint pixel, float radius)
     float area = 3.14159265358979324 * kernel_norm() * radius * radius;
     if (HAS_EDGE_CORRECTION) {
         bool whole;
-        float covered = covered_area(point.position, unpack_normal(point.normal), radius, MIN_NORMAL_COSINE, whole);
+        float covered = covered_area(point.position, point.plane, radius, whole);
         note_unless(is_finite(covered), ODD_ESTIMATE, 0, push.round, pixel);
         if (whole) {
             atomicAdd(anomalies[2], 1);

@@ -1,22 +1,38 @@
 // What belongs to a density estimate, and how much it weighs.
+//
+// Only planes decide what belongs: that of the visible point, and that of a photon or a triangle. So photons are counted
+// on the very surfaces whose area is.
+
+// Unit normal n of the front, and what makes n . p + offset = 0: one load each.
+layout(set = 0, binding = 10, scalar) readonly buffer Planes { vec4 planes[]; };
 
 // Least cosine between normals: 41 degrees take in the facets of a curved surface, no box's corner.
 const float MIN_NORMAL_COSINE = 0.75;
 
-// Whether a plane through a point at signed distance `height` from the middle of an estimate, with normal
-// `other`, may carry photons that count. On a smooth surface distance grows with the angle between the
-// normals; a parallel plane further off is another surface (a thin wall's other side, a shelf below).
-bool belongs(vec3 normal, vec3 other, float height, float radius, float least_cosine)
+// What rounding adds to the height of a point over its own plane: 8 units in the last place of a coordinate of 0.5, where
+// scenes end. Sheets twice as close are one surface (src/scene/overlap.rs).
+const float HEIGHT_ERROR = 1.0 / 4194304.0;
+
+// Unit normal on the side that is meant.
+vec3 plane_normal(uint plane)
 {
-    float cosine = dot(normal, other);
-    float sine = sqrt(max(1.0 - cosine * cosine, 0.0));
-    return cosine >= least_cosine && abs(height) <= radius * (sine + 1.0 / 1024.0);
+    vec3 normal = planes[plane >> 1].xyz;
+    return (plane & 1u) != 0 ? -normal : normal;
 }
 
-// The same of equal normals, whose angle is 0.
-bool belongs_to_plane(float height, float radius)
+// Height of a point over a plane's front.
+float plane_height(uint plane, vec3 position)
 {
-    return abs(height) <= radius * (1.0 / 1024.0);
+    vec4 front = planes[plane >> 1];
+    return front.x * position.x + front.y * position.y + front.z * position.z + front.w;
+}
+
+// Whether a plane at height `height` below the middle of an estimate, with normal `other`, may carry photons that count.
+// On a smooth surface heights grow with the sine of the angle between the normals; a parallel plane further off is another
+// surface (a thin wall's other side, a rug's floor).
+bool belongs(vec3 normal, vec3 other, float height, float radius)
+{
+    return dot(normal, other) >= MIN_NORMAL_COSINE && abs(height) <= radius * norm(cross(normal, other)) + HEIGHT_ERROR;
 }
 
 // Weight of a photon at the squared share `s` of the radius.

@@ -90,8 +90,11 @@ void intersect_triangle(ShearedRay ray, uint index, inout Hit hit)
     if (t <= certain && !comes_towards(ray, a, b, c, triangle_error(triangle))) {
         return;
     }
-    // A back at the same place as a front lies behind it, whichever way their distances were rounded.
-    t += (determinant < 0.0) != (ray.shear.z < 0.0) ? min(certain, t * (1.0 / 262144.0)) : 0.0;
+    // A back at the same place as a front lies behind it, whichever way their distances were rounded, and so does what
+    // others hide.
+    float rounding = min(certain, t * (1.0 / 262144.0));
+    t += (determinant < 0.0) != (ray.shear.z < 0.0) ? rounding : 0.0;
+    t += triangle.plane >= HIDDEN ? rounding : 0.0;
     if (t < hit.t || (t == hit.t && index < hit.triangle)) {
         precise float second = divide(v, determinant);
         precise float third = divide(w, determinant);

@@ -1,4 +1,4 @@
-// How much surface a density estimate covers.
+// How much surface a density estimate covers, and on which surface a given point lies.
 
 // Integral of the kernel over a disc of radius 1, over pi.
 float kernel_norm()
@@ -36,9 +36,9 @@ float kernel_in_sector(vec2 from, vec2 to)
 }
 
 // Integral of the kernel over the triangle between the centre and an edge, clipped to the unit disc;
-// signed by the edge's direction. Says whether the edge enters the disc, and counts the edges that have the
-// centre on their left.
-float kernel_over_edge(vec2 from, vec2 to, inout bool enters, inout uint left_count)
+// signed by the edge's direction. Says whether the edge enters the disc, and how far the centre lies at least to the left
+// of all edges.
+float kernel_over_edge(vec2 from, vec2 to, inout bool enters, inout float left)
 {
     vec2 edge = to - from;
     float edge_length = norm(edge);
@@ -48,7 +48,7 @@ float kernel_over_edge(vec2 from, vec2 to, inout bool enters, inout uint left_co
     vec2 along = divide(edge, edge_length);
     float h = from.x * along.y - from.y * along.x;
     float s0 = dot(from, along), s1 = dot(to, along);
-    left_count += h > 0.0 ? 1 : 0;
+    left = min(left, h);
     float half_chord_squared = 1.0 - h * h;
     if (half_chord_squared <= 0.0) {
         return kernel_in_sector(from, to);
@@ -67,66 +67,98 @@ float kernel_over_edge(vec2 from, vec2 to, inout bool enters, inout uint left_co
     return sum;
 }
 
-// Integral of the kernel over the part of a triangle that belongs to an estimate, in units of 2^-24 of the
-// squared radius: integers add up alike in whatever order the triangles come.
-uint kernel_over_triangle(uint index, vec3 position, vec3 normal, float radius, float least_cosine)
-{
-    Triangle triangle = triangles[index];
-    // No photon is ever stored on a mirror or on glass.
-    uint kind = materials[triangle.material].surface;
-    if (kind == SURFACE_MIRROR || kind == SURFACE_DIELECTRIC) {
-        return 0;
-    }
-    vec3 front = triangle_normal(triangle);
-    bool turned = false;
-    if (HAS_TWO_SIDED) {
-        turned = dot(front, normal) < 0.0 && materials[triangle.material].two_sided != 0;
-    }
-    vec3 side = turned ? -front : front;
-    float height = dot(position - triangle.a, side);
-    if (abs(height) >= radius || !belongs(normal, side, height, radius, least_cosine)) {
-        return 0;
-    }
-    // In the triangle's own plane, in units of the disc that the sphere cuts out of it.
-    float disc = sqrt((radius - height) * (radius + height));
-    vec3 centre = position - height * side;
-    vec3 x = normalize(triangle.b - triangle.a);
-    vec3 y = cross(front, x);
-    vec2 a = divide(vec2(dot(triangle.a - centre, x), dot(triangle.a - centre, y)), disc);
-    vec2 b = divide(vec2(dot(triangle.b - centre, x), dot(triangle.b - centre, y)), disc);
-    vec2 c = divide(vec2(dot(triangle.c - centre, x), dot(triangle.c - centre, y)), disc);
-    bool enters = false;
-    uint left_count = 0;
-    float whole = kernel_over_edge(a, b, enters, left_count);
-    whole += kernel_over_edge(b, c, enters, left_count);
-    whole += kernel_over_edge(c, a, enters, left_count);
-    // No edge in the disc: all of it or nothing, not the rounding of sectors that cancel.
-    if (!enters) {
-        whole = left_count == 3 ? 3.14159265358979324 * kernel_norm() : 0.0;
-    }
-    float share = divide(disc, radius);
-    return uint(roundEven(max(whole, 0.0) * share * share * 16777216.0));
-}
+// A degree: what single precision and the facets of a fine mesh may turn a receiver's normal by.
+const float RECEIVER_NORMAL_COSINE = 0.99985;
 
-// Triangles that one estimate looks at: a mesh so dense that more lie within the radius is taken as a surface
-// that goes on beyond it.
-const uint MAX_COVERED = 8192;
+// A place whose surroundings are looked through, and what was found.
+struct Cover {
+    vec3 position;
+    vec3 normal;
+    uint plane; // of a visible point; NONE: of a receiver, that is to be found
+    float radius;
+    float reach; // half the edge of the box that is looked through
+    uint sum; // kernel's integral, in units of 2^-24 of the squared radius: integers add up alike in whatever order
+    uint nearest; // plane of the nearest surface
+    float distance; // to it
+};
+
+// Whether photons of a plane, or the receiver itself, may lie on it for this place.
+bool may_cover(Cover cover, uint plane, vec3 side, float height)
+{
+    if (cover.plane != NONE) {
+        return plane == cover.plane || belongs(cover.normal, side, height, cover.radius);
+    }
+    float cosine = dot(cover.normal, side);
+    float sine = sqrt(max(1.0 - cosine * cosine, 0.0));
+    return cosine >= RECEIVER_NORMAL_COSINE && abs(height) <= cover.radius * (sine + 1.0 / 1024.0);
+}
 
 uint saturated_sum(uint a, uint b)
 {
     return a > 0xffffffffu - b ? 0xffffffffu : a + b;
 }
 
-// Integral of the kernel over all surface that belongs to an estimate: the area, with the box kernel. Whole is set
-// if it could not be found: then the whole disc stands for it.
-float covered_area(vec3 position, vec3 normal, float radius, float least_cosine, out bool whole)
+// Adds the part of a triangle that belongs.
+void cover_triangle(inout Cover cover, uint index)
 {
-    uint sum = 0;
+    Triangle triangle = triangles[index];
+    // No photon is ever stored on a mirror or on glass.
+    uint kind = materials[triangle.material].surface;
+    if (triangle.plane >= HIDDEN || kind == SURFACE_MIRROR || kind == SURFACE_DIELECTRIC) {
+        return;
+    }
+    float radius = cover.radius;
+    uint plane = 2 * triangle.plane;
+    vec3 front = plane_normal(plane);
+    if (HAS_TWO_SIDED) {
+        plane += dot(front, cover.normal) < 0.0 && materials[triangle.material].two_sided != 0 ? 1 : 0;
+    }
+    vec3 side = plane_normal(plane);
+    float height = plane_height(plane, cover.position);
+    if (abs(height) >= radius || !may_cover(cover, plane, side, height)) {
+        return;
+    }
+    // In the triangle's own plane, in units of the disc that the sphere cuts out of it.
+    float disc = sqrt((radius - height) * (radius + height));
+    vec3 centre = cover.position - height * front;
+    vec3 x = normalize(triangle.b - triangle.a);
+    vec3 y = cross(front, x);
+    vec2 a = divide(vec2(dot(triangle.a - centre, x), dot(triangle.a - centre, y)), disc);
+    vec2 b = divide(vec2(dot(triangle.b - centre, x), dot(triangle.b - centre, y)), disc);
+    vec2 c = divide(vec2(dot(triangle.c - centre, x), dot(triangle.c - centre, y)), disc);
+    bool enters = false;
+    float left = 1.0;
+    float whole = kernel_over_edge(a, b, enters, left);
+    whole += kernel_over_edge(b, c, enters, left);
+    whole += kernel_over_edge(c, a, enters, left);
+    // No edge in the disc: all of it or nothing, not the rounding of sectors that cancel.
+    if (!enters) {
+        whole = left > 0.0 ? 3.14159265358979324 * kernel_norm() : 0.0;
+    }
+    float share = divide(disc, radius);
+    uint sum = uint(roundEven(max(whole, 0.0) * share * share * 16777216.0));
+    cover.sum = saturated_sum(cover.sum, sum);
+    if (cover.plane == NONE && sum != 0) {
+        // A triangle that the place lies on, or within rounding of its edge, is nearer than any that it lies beside.
+        bool is_below = left > -1.0 / 1024.0;
+        float distance = abs(height) + (is_below ? 0.0 : radius);
+        if (distance < cover.distance || (distance == cover.distance && plane < cover.nearest)) {
+            cover.distance = distance;
+            cover.nearest = plane;
+        }
+        cover.reach = is_below ? min(cover.reach, abs(height) + radius * (1.0 / 256.0)) : cover.reach;
+    }
+}
+
+// Triangles that one estimate looks at: a mesh so dense that more lie within the radius is taken as a surface
+// that goes on beyond it.
+const uint MAX_COVERED = 8192;
+
+// Looks at all triangles in reach, and says whether they were too many.
+bool cover_triangles(inout Cover cover)
+{
     uint seen = 0;
-    whole = false;
     if (HAS_BVH) {
-        // A little wider than the sphere, for the rounding of the boxes.
-        float reach = radius * (1.0 + 1.0 / 1024.0);
         // Siblings to visit: the first of them, and a bit for each in reach above the mask of those that are
         // nodes at all.
         uvec2 group = uvec2(0, 0x100u);
@@ -148,20 +180,19 @@ float covered_area(vec3 position, vec3 normal, float radius, float least_cosine,
                 vec3 low = vec3(byte_of(node.min_x, child), byte_of(node.min_y, child), byte_of(node.min_z, child)) * spacing + node.origin;
                 vec3 high = vec3(byte_of(node.max_x, child), byte_of(node.max_y, child), byte_of(node.max_z, child)) * spacing + node.origin;
                 uint meta = byte_of(node.meta, child);
-                if (meta != 0 && all(lessThanEqual(low, position + reach)) && all(greaterThanEqual(high, position - reach))) {
+                if (meta != 0 && all(lessThanEqual(low, cover.position + cover.reach)) && all(greaterThanEqual(high, cover.position - cover.reach))) {
                     bool is_node = ((child_nodes >> child) & 1u) != 0;
                     near_nodes |= is_node ? 1u << child : 0;
                     near_leaves |= is_node ? 0 : (meta >> 5) << (meta & 31u);
                 }
             }
             while (near_leaves != 0) {
-                sum = saturated_sum(sum, kernel_over_triangle(node.first_triangle + findLSB(near_leaves), position, normal, radius, least_cosine));
+                cover_triangle(cover, node.first_triangle + findLSB(near_leaves));
                 near_leaves &= near_leaves - 1;
                 seen++;
             }
-            if (seen > MAX_COVERED) {
-                whole = true;
-                return 3.14159265358979324 * kernel_norm() * radius * radius;
+            if (seen > MAX_COVERED && (cover.plane != NONE || cover.nearest != NONE)) {
+                return true;
             }
             group = uvec2(node.first_child, (near_nodes << 8) | child_nodes);
             if (near_nodes == 0) {
@@ -173,8 +204,31 @@ float covered_area(vec3 position, vec3 normal, float radius, float least_cosine,
         }
     } else {
         for (uint index = 0; index < triangles.length(); index++) {
-            sum = saturated_sum(sum, kernel_over_triangle(index, position, normal, radius, least_cosine));
+            cover_triangle(cover, index);
         }
     }
-    return float(sum) * (1.0 / 16777216.0) * radius * radius;
+    return false;
+}
+
+Cover around(vec3 position, vec3 normal, uint plane, float radius)
+{
+    // A little wider than the sphere, for the rounding of the boxes.
+    return Cover(position, normal, plane, radius, radius * (1.0 + 1.0 / 1024.0), 0, NONE, 2.0 * radius);
+}
+
+// Integral of the kernel over all surface that belongs to an estimate: the area, with the box kernel. Whole is set
+// if it could not be found: then the whole disc stands for it.
+float covered_area(vec3 position, uint plane, float radius, out bool whole)
+{
+    Cover cover = around(position, plane_normal(plane), plane, radius);
+    whole = cover_triangles(cover);
+    return whole ? 3.14159265358979324 * kernel_norm() * radius * radius : float(cover.sum) * (1.0 / 16777216.0) * radius * radius;
+}
+
+// Plane of the surface that a receiver lies on; NONE: it lies on none.
+uint plane_below(vec3 position, vec3 normal, float radius)
+{
+    Cover cover = around(position, normal, NONE, radius);
+    cover_triangles(cover);
+    return cover.nearest;
 }

@@ -4,14 +4,14 @@
 
 struct MapPhoton {
     vec3 position;
-    uint normal;
+    uint plane;
     vec3 flux;
     uint wi;
 };
 
 uvec4 place_word(MapPhoton photon)
 {
-    return uvec4(floatBitsToUint(photon.position), photon.normal);
+    return uvec4(floatBitsToUint(photon.position), photon.plane);
 }
 
 uvec4 light_word(MapPhoton photon)

@@ -9,6 +9,7 @@ layout(set = 0, binding = 6, scalar) readonly buffer Texels { uvec2 texels[]; };
 struct Surface {
     vec3 position;
     float error; // bound of each coordinate's
+    uint plane; // twice its number, plus 1 on the back
     vec3 ng; // geometric normal on the side of wo
     vec3 ns; // shading normal on the same side
     bool front;
@@ -118,6 +119,7 @@ Surface surface_at(Hit hit, vec3 wo)
     vec3 normal = triangle_normal(triangle);
     surface.front = dot(normal, wo) >= 0.0;
     surface.ng = surface.front ? normal : -normal;
+    surface.plane = 2 * (triangle.plane & ~HIDDEN) + (surface.front ? 0 : 1);
     surface.ns = surface.ng;
     if (HAS_SMOOTH_NORMALS) {
         TriangleNormals at = normals[hit.triangle];

@@ -120,8 +120,8 @@ bool follow(inout Chain chain, uint index, uint number, Draws draws, uint emitte
             arrivals |= arrivals == 0 ? 0
                                       : (chain.saw_specular ? SEEN_OVER_SPECULAR : 0) | (chain.gathers ? SEEN_BY_GATHER : 0)
                                             | (for_all ? SEEN_FOR_ALL : 0);
-            chain.points[chain.point_count++] = VisiblePoint(surface.position, pack_normal(surface.ng), divide(chain.weight * scale, float(SAMPLES)),
-                                                             pack_normal(surface.ns), pack_direction(wo, 0), surface.parameter,
+            chain.points[chain.point_count++] = VisiblePoint(surface.position, surface.plane, divide(chain.weight * scale, float(SAMPLES)),
+                                                             surface.ns == surface.ng ? NONE : pack_normal(surface.ns), pack_direction(wo, 0), surface.parameter,
                                                              surface.kind, arrivals);
             if (!gathers) {
                 return false;

@@ -24,7 +24,7 @@ Flown fly_once(inout LightPath path, uint bounce)
         Surface surface = surface_at(hit, wo);
         bool specular = is_specular(surface);
         flown.stored = !specular && (path.arrival & push.map.stored) != 0;
-        flown.photon = MapPhoton(surface.position, pack_normal(surface.ng), path.flux, pack_direction(wo, findLSB(path.arrival)));
+        flown.photon = MapPhoton(surface.position, surface.plane, path.flux, pack_direction(wo, findLSB(path.arrival)));
 
         vec4 u = philox_floats(uvec4(path.photon, push.draws.round, EMISSION_BLOCKS + bounce, push.draws.domain), push.draws.seed);
         Scatter scatter = sample_scatter(surface, wo, u.yzw, false, 0.0);

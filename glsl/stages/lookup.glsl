@@ -40,10 +40,11 @@ void look_up()
     if ((point.arrivals & wanted) == 0) {
         return;
     }
-    vec3 normal = unpack_normal(point.normal);
-    vec3 ns = unpack_normal(point.shading_normal);
+    vec3 normal = plane_normal(point.plane);
+    bool is_flat = point.shading_normal == NONE;
+    vec3 ns = is_flat ? normal : unpack_normal(point.shading_normal);
     vec3 wo = unpack_direction(point.wo);
-    bool is_even = point.normal == point.shading_normal && !has_lobe(point.surface);
+    bool is_even = is_flat && !has_lobe(point.surface);
     CellRange range = cells_near(point.position);
     uint photon_count = map_length();
     uint slice_begin = slice * GATHER_SLICE;
@@ -70,15 +71,15 @@ void look_up()
                 precise float distance_squared = way.x * way.x + way.y * way.y + way.z * way.z;
                 if (distance_squared <= push.radius * push.radius && cell_at(position, push.cells).yz == ivec2(y, z)) {
                     uvec4 light = sorted_map[2 * place + 1];
-                    // Most photons lie on a surface as flat as the point's: nothing of theirs is to be unpacked but their flux.
-                    bool is_alike = words.w == point.normal;
+                    // Most photons lie in the point's plane: nothing of theirs is to be unpacked but their flux.
+                    bool is_alike = words.w == point.plane;
                     vec3 photon_normal = normal;
+                    float height = 0.0;
                     if (!is_alike) {
-                        photon_normal = unpack_normal(words.w);
+                        photon_normal = plane_normal(words.w);
+                        height = plane_height(words.w, point.position);
                     }
-                    precise float height = -(way.x * photon_normal.x + way.y * photon_normal.y + way.z * photon_normal.z);
-                    bool counts = (is_alike ? belongs_to_plane(height, push.radius)
-                                            : belongs(normal, photon_normal, height, push.radius, MIN_NORMAL_COSINE))
+                    bool counts = (is_alike || belongs(normal, photon_normal, height, push.radius))
                                   && ((point.arrivals >> (light.w >> 30)) & 1u) != 0;
                     vec3 wi = ns;
                     float cosine = 1.0;
@@ -93,7 +94,7 @@ void look_up()
                             weight *= kernel_weight(clamp(divide(distance_squared - height_squared, push.radius * push.radius - height_squared), 0.0, 1.0));
                         }
                         if (HAS_SMOOTH_NORMALS) {
-                            weight *= point.normal == point.shading_normal ? 1.0 : shading_gain(cosine, dot(wi, photon_normal));
+                            weight *= is_flat ? 1.0 : shading_gain(cosine, dot(wi, photon_normal));
                         }
                         precise vec3 flux = uintBitsToFloat(light.xyz) * weight;
                         note_unless(is_finite(flux), ODD_ESTIMATE, 0, push.round, index % push.pixel_count);

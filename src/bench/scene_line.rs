@@ -89,9 +89,8 @@ pub fn survey(gpu: &Gpu, job: &Job, map: impl Fn(&TransportPlan) -> Option<&MapP
             .par_iter()
             .step_by(step)
             .map(|point| {
-                let near = |photon: &&MapPhoton| {
-                    photon.normal == point.normal && photon.position.distance_squared(point.position) <= radius_squared
-                };
+                let near =
+                    |photon: &&MapPhoton| photon.plane == point.plane && photon.position.distance_squared(point.position) <= radius_squared;
                 photons.iter().filter(near).count() as u64
             })
             .sum::<u64>();

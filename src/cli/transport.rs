@@ -304,6 +304,7 @@ pub(super) fn geometry(scene: &Scene, settings: &TransportSettings, reporter: &P
             geometry.left_out
         ));
     }
+    geometry.overlap_warnings(scene).iter().for_each(|line| complain(&format!("warning: {line}")));
     Ok(geometry)
 }
 

@@ -9,7 +9,7 @@ use obvhs::bvh2::Bvh2;
 use obvhs::bvh2::builder::build_bvh2;
 
 use crate::scene::material::TextureUse;
-use crate::scene::{Material, Mesh, Scene, Surface};
+use crate::scene::{Material, Mesh, Scene, Surface, overlap};
 
 /// Rays start this share of the scene's largest coordinate off the surface that they leave: some 10^5
 /// roundings of f64, and less than a nanometre in a room.
@@ -28,6 +28,8 @@ pub struct Ray {
 pub struct Triangle<'a> {
     mesh: &'a Mesh,
     vertices: [usize; 3],
+    /// Weights of the vertices at the corners of a triangle of which others hide a part.
+    part: Option<[DVec3; 3]>,
     pub corners: [DVec3; 3],
     /// Unit, of the front.
     pub normal: DVec3,
@@ -80,6 +82,18 @@ fn bounds([a, b, c]: [DVec3; 3], slack: f64) -> Aabb {
 }
 
 impl Triangle<'_> {
+    /// The part of a whole triangle between points with these weights of its corners.
+    fn part(&self, weights: [DVec3; 3]) -> Self {
+        let corners = weights.map(|weights| mix(self.corners, weights));
+        let area = 0.5 * (corners[1] - corners[0]).cross(corners[2] - corners[0]).length();
+        Triangle { part: Some(weights), corners, area, ..*self }
+    }
+
+    /// Weights of the mesh's vertices.
+    fn of_vertices(&self, weights: DVec3) -> DVec3 {
+        self.part.map_or(weights, |part| mix(part, weights))
+    }
+
     pub fn point(&self, weights: DVec3) -> DVec3 {
         mix(self.corners, weights)
     }
@@ -104,16 +118,22 @@ impl Triangle<'_> {
 impl<'a> Geometry<'a> {
     pub fn new(scene: &'a Scene) -> Geometry<'a> {
         let mut triangles = Vec::new();
-        for mesh in &scene.meshes {
+        let overlaps = overlap::of_scene(scene);
+        for (number, mesh) in (0u32..).zip(&scene.meshes) {
             for index in (0..mesh.triangles.len()).filter(|index| mesh.area(*index) > 0.0) {
-                triangles.push(Triangle {
+                let whole = Triangle {
                     mesh,
                     vertices: mesh.triangles[index].map(|vertex| vertex as usize),
+                    part: None,
                     corners: mesh.corners(index),
                     normal: mesh.normal(index),
                     area: mesh.area(index),
                     material: &scene.materials[mesh.material],
-                });
+                };
+                match overlaps.get(&(number, index as u32)) {
+                    None => triangles.push(whole),
+                    Some(pieces) => triangles.extend(pieces.iter().map(|piece| whole.part(*piece))),
+                }
             }
         }
         let corners = triangles.iter().flat_map(|triangle| triangle.corners);
@@ -178,7 +198,7 @@ impl<'a> Geometry<'a> {
     fn texture(&self, texture: Option<TextureUse>, triangle: &Triangle, weights: DVec3) -> DVec3 {
         let Some(TextureUse { texture, uv_set }) = texture else { return DVec3::ONE };
         let uvs = &triangle.mesh.uvs[uv_set];
-        let uv = if uvs.is_empty() { DVec2::ZERO } else { mix(triangle.vertices.map(|vertex| uvs[vertex]), weights) };
+        let uv = if uvs.is_empty() { DVec2::ZERO } else { mix(triangle.vertices.map(|vertex| uvs[vertex]), triangle.of_vertices(weights)) };
         self.scene.textures[texture].sample(uv).as_dvec3()
     }
 
@@ -214,7 +234,7 @@ fn shading_normal(triangle: &Triangle, weights: DVec3, ng: DVec3, wo: DVec3) -> 
     if normals.is_empty() {
         return ng;
     }
-    let normal = mix(triangle.vertices.map(|vertex| normals[vertex]), weights).normalize_or(ng);
+    let normal = mix(triangle.vertices.map(|vertex| normals[vertex]), triangle.of_vertices(weights)).normalize_or(ng);
     let ns = if normal.dot(ng) < 0.0 { -normal } else { normal };
     if ns.dot(wo) > 0.0 { ns } else { ng }
 }

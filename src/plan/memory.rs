@@ -145,6 +145,7 @@ pub(super) fn of_transport(plan: &TransportPlan, geometry: &Geometry, keeps: &dy
     let mut buffers = vec![
         ("nodes", kept(&geometry.nodes, keeps(Effect::Bvh))),
         ("triangles", kept(&geometry.triangles, true)),
+        ("planes", kept(&geometry.planes, true)),
         ("normals", kept(&geometry.normals, keeps(Effect::SmoothNormals))),
         ("texture coordinates", kept(&geometry.uvs, textured)),
         ("materials", kept(&geometry.materials, true)),

@@ -449,6 +449,7 @@ impl TransportPlan {
         ];
         let scene = [
             ("triangles", size_of_val(geometry.triangles.as_slice()) as u64),
+            ("the triangles' planes", size_of_val(geometry.planes.as_slice()) as u64),
             ("the triangles' texture coordinates", size_of_val(geometry.uvs.as_slice()) as u64),
             ("the triangles' hierarchy", size_of_val(geometry.nodes.as_slice()) as u64),
             ("textures", size_of_val(geometry.texels.as_slice()) as u64),

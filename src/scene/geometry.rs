@@ -5,13 +5,16 @@
 //! scene by a power of two changes no bit, and every coordinate lies within (-1, 1). Radiance and
 //! irradiance keep their units; a flux in W is divided by `unit`^2.
 
+use std::collections::{BTreeSet, HashMap};
 use std::f64::consts::{PI, TAU};
+use std::ops::{Add, Mul};
 
-use glam::{DVec2, DVec3, UVec2, Vec2, Vec3};
+use glam::{DVec2, DVec3, UVec2, Vec2, Vec3, Vec4};
 use rayon::prelude::*;
 
 use super::bvh::Bvh;
 use super::light::LightKind;
+use super::overlap::{self, Planes};
 use super::texture::Wrap;
 use super::{Material, Mesh, Progress, Scene, Surface, Texture};
 use crate::constants::*;
@@ -28,10 +31,12 @@ pub struct Geometry {
     pub bounds: (Vec3, Vec3),
     /// Radius of a sphere around the middle that holds everything, normalised.
     pub radius: f64,
-    /// Area of all triangles, normalised.
+    /// Area of all surfaces, normalised; where some lie on one another, of one.
     pub area: f64,
     pub nodes: Vec<BvhNode>,
     pub triangles: Vec<Triangle>,
+    /// Of triangles: unit normal n of the front, then what makes n . p + offset = 0.
+    pub planes: Vec<Vec4>,
     /// For each triangle (mesh, triangle of the mesh).
     pub sources: Vec<(u32, u32)>,
     pub normals: Vec<TriangleNormals>,
@@ -47,6 +52,8 @@ pub struct Geometry {
     pub power: f64,
     /// Triangles that f32 makes a line of, or that lie on others.
     pub left_out: usize,
+    /// Meshes that overlap in one plane, facing alike: (hidden there, seen there), each pair once.
+    pub overlaps: Vec<(u32, u32)>,
 }
 
 /// Most triangles: their numbers and those of the BVH's nodes are 32-bit, and a photon's choice of
@@ -92,35 +99,74 @@ impl Geometry {
         // What f32 makes a line of cannot be hit, and its normal would be no number; on a device that takes numbers
         // without a leading 1 for nothing, neither would that of a square below the least normal one.
         let is_solid = |[a, b, c]: &[Vec3; 3]| (*b - *a).cross(*c - *a).length_squared() >= f32::MIN_POSITIVE;
-        // Of triangles that lie on one another, facing alike, only the first can be met; the others would shine, and
-        // count as surface, where none is seen.
-        let is_first = first_of_equals(&corners);
-        let kept = sources.into_iter().zip(corners).zip(is_first).filter(|((_, corners), is_first)| *is_first && is_solid(corners));
-        let (sources, corners): (Vec<_>, Vec<_>) = kept.map(|(triangle, _)| triangle).unzip();
+        // Of triangles that are the same, facing alike, only one can be met; the others would shine, and count as surface,
+        // where none is seen.
+        let ranks = overlap::ranks(scene);
+        let mut overlaps = BTreeSet::new();
+        let mut first = HashMap::with_capacity(corners.len());
+        let mut is_kept = vec![false; corners.len()];
+        for place in (0..corners.len()).filter(|place| is_solid(&corners[*place])) {
+            let seen = first.entry(in_fixed_order(&corners[place])).or_insert(place);
+            if *seen != place {
+                let (mesh, other) = (sources[place].0, sources[*seen].0);
+                let wins = ranks[mesh as usize] < ranks[other as usize];
+                overlaps.insert(if wins { (other, mesh) } else { (mesh, other) });
+                is_kept[*seen] = false;
+                *seen = if wins { place } else { *seen };
+            }
+            is_kept[*seen] = true;
+        }
+        let (mut sources, mut corners): (Vec<_>, Vec<_>) =
+            sources.into_iter().zip(corners).zip(is_kept).filter_map(|(triangle, is_kept)| is_kept.then_some(triangle)).unzip();
         let left_out = count - corners.len();
         if corners.is_empty() {
             return Err(refuse("the scene", "holds no triangle with an area".into()));
         }
+        progress("looking for overlaps", 0.0);
+        let mut planes = Planes::of(&corners);
+        // Parts of triangles, behind the whole ones: weights of the corners.
+        let whole_count = corners.len();
+        let mut weights: Vec<[DVec3; 3]> = Vec::new();
+        for covered in overlap::find(scene, &ranks, &sources, &corners) {
+            let (source, [a, b, c], plane) =
+                (sources[covered.triangle], corners[covered.triangle].map(Vec3::as_dvec3), planes.of_triangles[covered.triangle]);
+            overlaps.extend(covered.by.iter().map(|other| (source.0, sources[*other].0)));
+            for piece in covered.pieces {
+                let at = piece.map(|of| (a * of.x + b * of.y + c * of.z).as_vec3());
+                if is_solid(&at) {
+                    sources.push(source);
+                    corners.push(at);
+                    planes.of_triangles.push(plane);
+                    weights.push(piece);
+                }
+            }
+            planes.of_triangles[covered.triangle] |= HIDDEN;
+        }
         progress("building the hierarchy", 0.0);
         let Bvh { nodes, order } = Bvh::build(&corners);
         progress("preparing triangles", 0.5);
-        let sources: Vec<(u32, u32)> = order.iter().map(|&place| sources[place as usize]).collect();
-        let triangles: Vec<Triangle> = order
-            .iter()
-            .zip(&sources)
-            .map(|(&place, &(mesh, _))| {
-                let [a, b, c] = corners[place as usize];
-                Triangle { a, b, c, material: scene.meshes[mesh as usize].material as u32 }
-            })
-            .collect();
-        let normals = sources.par_iter().map(|&(mesh, triangle)| corner_normals(&scene.meshes[mesh as usize], triangle as usize)).collect();
-        let uvs = sources
+        let triangle_of = |&place: &u32| {
+            let ([a, b, c], (mesh, _)) = (corners[place as usize], sources[place as usize]);
+            Triangle { a, b, c, material: scene.meshes[mesh as usize].material as u32, plane: planes.of_triangles[place as usize] }
+        };
+        let triangles: Vec<Triangle> = order.par_iter().map(triangle_of).collect();
+        let part_of = |place: u32| (place as usize).checked_sub(whole_count).map(|part| &weights[part]);
+        let normals = order
             .par_iter()
-            .map(|&(mesh, triangle)| {
-                let mesh = &scene.meshes[mesh as usize];
-                corner_uvs(mesh, &scene.materials[mesh.material], triangle as usize)
+            .map(|&place| {
+                let (mesh, triangle) = sources[place as usize];
+                corner_normals(&scene.meshes[mesh as usize], triangle as usize, part_of(place))
             })
             .collect();
+        let uvs = order
+            .par_iter()
+            .map(|&place| {
+                let (mesh, triangle) = sources[place as usize];
+                let mesh = &scene.meshes[mesh as usize];
+                corner_uvs(mesh, &scene.materials[mesh.material], triangle as usize, part_of(place))
+            })
+            .collect();
+        let sources = order.iter().map(|&place| sources[place as usize]).collect();
         progress("packing textures", 0.0);
         let (textures, texels) = pack_textures(scene);
 
@@ -129,9 +175,10 @@ impl Geometry {
             unit,
             bounds: (local(min), local(max)),
             radius: (0.5 * (max - min).length() / unit) * 1.001,
-            area: triangles.iter().map(area).sum(),
+            area: triangles.iter().filter(|triangle| triangle.plane < HIDDEN).map(area).sum(),
             nodes,
             triangles,
+            planes: planes.planes,
             sources,
             normals,
             uvs,
@@ -142,6 +189,7 @@ impl Geometry {
             flux_unit: 1.0,
             power: 0.0,
             left_out,
+            overlaps: overlaps.into_iter().collect(),
         };
         progress("collecting lights", 0.0);
         geometry.add_emitters(scene)?;
@@ -157,9 +205,29 @@ impl Geometry {
         ((position - self.centre) / self.unit).as_vec3()
     }
 
+    /// A line for each pair of meshes that overlap in one plane.
+    pub fn overlap_warnings(&self, scene: &Scene) -> Vec<String> {
+        const MOST: usize = 5;
+        let name = |mesh: u32| &scene.meshes[mesh as usize].name;
+        let line = |&(hidden, seen): &(u32, u32)| {
+            if hidden == seen {
+                return format!("mesh {:?} overlaps itself in one plane; what overlaps counts once", name(hidden));
+            }
+            format!("meshes {:?} and {:?} overlap in one plane; only {:?} counts there", name(hidden), name(seen), name(seen))
+        };
+        let mut lines: Vec<String> = self.overlaps.iter().take(MOST).map(line).collect();
+        if self.overlaps.len() > MOST {
+            lines.push(format!("{} more pairs of meshes overlap in one plane; one of each counts there", self.overlaps.len() - MOST));
+        }
+        lines
+    }
+
     fn add_emitters(&mut self, scene: &Scene) -> Result<()> {
         let summaries = summaries_of_emission(scene);
         let found_in = |(index, triangle): (usize, &Triangle)| {
+            if triangle.plane >= HIDDEN {
+                return None;
+            }
             let material = &scene.materials[triangle.material as usize];
             if !material.is_emissive() {
                 return None;
@@ -287,18 +355,6 @@ impl Geometry {
     }
 }
 
-/// Which triangles lie on none that comes before them.
-fn first_of_equals(corners: &[[Vec3; 3]]) -> Vec<bool> {
-    let mut sorted: Vec<([[u32; 3]; 3], u32)> =
-        corners.par_iter().enumerate().map(|(place, corners)| (in_fixed_order(corners), place as u32)).collect();
-    sorted.par_sort_unstable();
-    let mut is_first = vec![true; corners.len()];
-    for pair in sorted.windows(2).filter(|pair| pair[0].0 == pair[1].0) {
-        is_first[pair[1].1 as usize] = false;
-    }
-    is_first
-}
-
 /// The bits of a triangle's corners, the same from whichever corner it is read.
 fn in_fixed_order(corners: &[Vec3; 3]) -> [[u32; 3]; 3] {
     // The sum turns -0 into 0.
@@ -404,7 +460,13 @@ fn mean_over(texture: &Texture, mean_of_all: DVec3, uvs: &TriangleUvs) -> DVec3 
     0.99 * sum / f64::from(steps * steps) + 0.01 * mean_of_all
 }
 
-fn corner_normals(mesh: &Mesh, triangle: usize) -> TriangleNormals {
+/// Values of a triangle's corners, or of those of a part of it.
+fn at_corners<T: Copy + Add<Output = T> + Mul<f64, Output = T>>(values: [T; 3], part: Option<&[DVec3; 3]>) -> [T; 3] {
+    let [a, b, c] = values;
+    part.map_or(values, |weights| weights.map(|of| a * of.x + b * of.y + c * of.z))
+}
+
+fn corner_normals(mesh: &Mesh, triangle: usize, part: Option<&[DVec3; 3]>) -> TriangleNormals {
     let flat = TriangleNormals { a: NONE, b: NONE, c: NONE };
     if mesh.normals.is_empty() {
         return flat;
@@ -415,18 +477,18 @@ fn corner_normals(mesh: &Mesh, triangle: usize) -> TriangleNormals {
     if normals.iter().any(|normal| normal.length_squared() < 0.25) || normals.iter().all(|normal| normal.dot(own) > 1.0 - 1e-9) {
         return flat;
     }
-    let [a, b, c] = normals.map(|normal| pack_normal(normal.as_vec3()));
+    let [a, b, c] = at_corners(normals, part).map(|normal| pack_normal(normal.as_vec3()));
     TriangleNormals { a, b, c }
 }
 
-fn corner_uvs(mesh: &Mesh, material: &Material, triangle: usize) -> TriangleUvs {
+fn corner_uvs(mesh: &Mesh, material: &Material, triangle: usize, part: Option<&[DVec3; 3]>) -> TriangleUvs {
     let of_set = |set: Option<usize>| -> [Vec2; 3] {
         match set {
             Some(set) if !mesh.uvs[set].is_empty() => {
                 // Whole turns mean nothing and would cost digits.
                 let uvs = mesh.triangles[triangle].map(|vertex| mesh.uvs[set][vertex as usize]);
                 let base: DVec2 = uvs[0].floor() - uvs[0].floor() % 2.0;
-                uvs.map(|uv| (uv - if base.abs().max_element() > 64.0 { base } else { DVec2::ZERO }).as_vec2())
+                at_corners(uvs, part).map(|uv| (uv - if base.abs().max_element() > 64.0 { base } else { DVec2::ZERO }).as_vec2())
             }
             _ => [Vec2::ZERO; 3],
         }

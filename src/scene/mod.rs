@@ -11,6 +11,7 @@ pub mod light;
 pub mod material;
 pub mod mesh;
 pub mod open_box;
+pub mod overlap;
 pub mod rectangle;
 pub mod room;
 pub mod targets;

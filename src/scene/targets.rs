@@ -31,7 +31,7 @@ struct Sphere {
 /// squared radii, as a cone's solid angle goes with that.
 pub fn caustic_targets(geometry: &Geometry, surfaces: u32) -> Vec<CausticTarget> {
     let is_wanted = |material: u32| surfaces >> geometry.materials[material as usize].surface & 1 != 0;
-    let wanted = geometry.triangles.iter().filter(|triangle| is_wanted(triangle.material));
+    let wanted = geometry.triangles.iter().filter(|triangle| triangle.plane < HIDDEN && is_wanted(triangle.material));
     let mut groups = Vec::new();
     gathered(connected(&wanted.map(|triangle| [triangle.a, triangle.b, triangle.c]).collect::<Vec<_>>()), MAX_GROUPS_MERGED, &mut groups);
     merged(groups).iter().map(|points| target(points)).collect()

@@ -32,7 +32,7 @@ fn rounding(plan: &TransportPlan, round: u32) -> u32 {
 /// Finds the visible points of a round and writes the light that needs no photons.
 pub fn see(commands: &mut Commands, round: Round, camera: Option<&Camera>) -> Result<()> {
     let Round { resources, geometry, plan, number: round } = round;
-    let TransportResources { nodes, triangles, normals, uvs, materials, textures, texels, emitters, .. } = resources;
+    let TransportResources { nodes, triangles, planes, normals, uvs, materials, textures, texels, emitters, .. } = resources;
     let TransportResources { visible_points, pass_sums, part_totals, anomalies, oddities, .. } = resources;
     let TransportResources { camera_paths: [camera_paths, _], camera_path_counts, .. } = resources;
     let step = plan.pixels_at_once(plan.rays_per_pixel());
@@ -107,6 +107,7 @@ pub fn see(commands: &mut Commands, round: Round, camera: Option<&Camera>) -> Re
                     texels,
                     emitters,
                     receivers,
+                    planes,
                     anomalies,
                     visible_points,
                     pass_sums,
@@ -173,15 +174,19 @@ fn go_on(commands: &mut Commands, resources: &TransportResources, geometry: &Geo
 pub fn look_up(commands: &mut Commands, round: Round, photons: &PhotonBuffers, map: &MapPlan, cells_push: CellPush) -> Result<()> {
     let Round { resources, plan, number: round, .. } = round;
     let PhotonBuffers { cells, sorted_map, crowded, dispatch_args, .. } = photons;
-    let TransportResources { visible_points, estimates, oddities, .. } = resources;
+    let TransportResources { planes, visible_points, estimates, oddities, .. } = resources;
     let point_count = plan.visible_points();
     let (lanes, step) = (map.lanes, plan.points_at_once());
     let (width, height) = plan.sensor.size();
     let dispatch = |commands: &mut Commands, push: &LookupPush, extent: Extent| {
         if commands.facts().int64_atomics {
-            commands.dispatch(LookupU64 { visible_points, film: estimates, cells, sorted_map, crowded, oddities }, push, extent)
+            commands.dispatch(LookupU64 { visible_points, planes, film: estimates, cells, sorted_map, crowded, oddities }, push, extent)
         } else {
-            commands.dispatch(LookupTwoWords { visible_points, film: estimates, cells, sorted_map, crowded, oddities }, push, extent)
+            commands.dispatch(
+                LookupTwoWords { visible_points, planes, film: estimates, cells, sorted_map, crowded, oddities },
+                push,
+                extent,
+            )
         }
     };
     for (first_point, end_point) in runs(point_count, step) {
@@ -214,7 +219,7 @@ pub fn look_up(commands: &mut Commands, round: Round, photons: &PhotonBuffers, m
 /// Turns what the maps found at all visible points into light; so many photons of the global and of the caustic map were traced.
 pub fn weigh(commands: &mut Commands, round: Round, traced: [u32; 2]) -> Result<()> {
     let Round { resources, geometry, plan, number: round } = round;
-    let TransportResources { nodes, triangles, normals, uvs, materials, textures, texels, visible_points, .. } = resources;
+    let TransportResources { nodes, triangles, normals, uvs, materials, textures, texels, planes, visible_points, .. } = resources;
     let TransportResources { estimates, part_totals, anomalies, oddities, .. } = resources;
     let radius = |map: &Option<MapPlan>| map.as_ref().map_or(1.0, |map| plan.radius(map, round)) as f32;
     let flux =
@@ -246,6 +251,7 @@ pub fn weigh(commands: &mut Commands, round: Round, traced: [u32; 2]) -> Result<
             materials,
             textures,
             texels,
+            planes,
             anomalies,
             visible_points,
             estimates,

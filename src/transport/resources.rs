@@ -21,6 +21,7 @@ pub struct TransportResources {
     // The scene, written once; what the plan dropped has one empty element.
     pub nodes: Buffer,
     pub triangles: Buffer,
+    pub planes: Buffer,
     pub normals: Buffer,
     pub uvs: Buffer,
     pub materials: Buffer,
@@ -94,6 +95,7 @@ impl TransportResources {
         let resources = TransportResources {
             nodes: filled(gpu, commands, "nodes", &geometry.nodes, plan.keeps(Effect::Bvh))?,
             triangles: filled(gpu, commands, "triangles", &geometry.triangles, true)?,
+            planes: filled(gpu, commands, "planes", &geometry.planes, true)?,
             normals: filled(gpu, commands, "normals", &geometry.normals, plan.keeps(Effect::SmoothNormals))?,
             uvs: filled(gpu, commands, "uvs", &geometry.uvs, textured)?,
             materials: filled(gpu, commands, "materials", &geometry.materials, true)?,
