@@ -73,7 +73,8 @@ impl Planes {
 
 /// Which of two overlapping surfaces counts, by mesh: the smaller number. What shines wins over what does not, so that a
 /// lamp in a ceiling's plane is seen; what is opaque over glass, as nothing would be lit through it; a small mesh over a
-/// large one, as rugs lie on floors; and at last the first.
+/// large one, as rugs lie on floors; and at last the first. What is hidden is so from both sides: from behind, a rug with
+/// one side on a floor with two is the rug's back.
 pub fn ranks(scene: &Scene) -> Vec<u32> {
     let class = |material: &Material| match material.surface {
         _ if material.is_emissive() => 0,
