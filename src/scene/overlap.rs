@@ -73,7 +73,8 @@ impl Planes {
 
 /// Which of two overlapping surfaces counts, by mesh: the smaller number. What shines wins over what does not, so that a
 /// lamp in a ceiling's plane is seen; what is opaque over glass, as nothing would be lit through it; a small mesh over a
-/// large one, as rugs lie on floors; and at last the first.
+/// large one, as rugs lie on floors; and at last the first. What is hidden is so from both sides: from behind, a rug with
+/// one side on a floor with two is the rug's back.
 pub fn ranks(scene: &Scene) -> Vec<u32> {
     let class = |material: &Material| match material.surface {
         _ if material.is_emissive() => 0,
@@ -140,7 +141,7 @@ impl Sheet<'_> {
     /// Classes of planes that it may be in: one, but for what rounding may shift.
     fn classes(&self) -> Vec<Class> {
         let is_exact = (0..3).any(|axis| self.corners.iter().all(|corner| corner[axis] == self.corners[0][axis]));
-        let uncertain = if is_exact { IN_PLANE } else { (IN_PLANE / self.altitude).min(0.5 * CLASS) + IN_PLANE };
+        let uncertain = if is_exact { IN_PLANE } else { (0.25 * IN_PLANE / self.altitude).min(0.5 * CLASS) + IN_PLANE };
         let n = self.normal;
         let size = n.abs();
         // A plane has two normals: that with its largest component above 0, and both where that is in doubt.
@@ -309,59 +310,4 @@ fn near(sheets: &[Sheet], is_wanted: impl Fn(usize, usize) -> bool + Sync) -> Ve
         pairs
     };
     cells.chunk_by(|a, b| a.0 == b.0).collect::<Vec<_>>().into_par_iter().flat_map_iter(pairs_of).collect()
-}
-
-#[cfg(test)]
-mod timing {
-    use super::*;
-    use crate::scene::Mesh;
-    fn time(what: &str, mesh: Mesh) {
-        let scene = Scene { meshes: vec![mesh], materials: vec![Material::lambert("m", Vec3::ONE)], ..Scene::default() };
-        let mesh = &scene.meshes[0];
-        let sources: Vec<(u32, u32)> = (0..mesh.triangles.len() as u32).map(|t| (0, t)).collect();
-        let corners: Vec<[Vec3; 3]> = (0..mesh.triangles.len()).map(|t| mesh.corners(t).map(|p| (p * 0.4).as_vec3())).collect();
-        let start = std::time::Instant::now();
-        let planes = Planes::of(&corners);
-        let of_planes = start.elapsed();
-        let found = find(&scene, &ranks(&scene), &sources, &corners);
-        println!(
-            "{what}: {} triangles, planes {} in {of_planes:?}, with overlaps {:?}, {} covered",
-            corners.len(),
-            planes.planes.len(),
-            start.elapsed(),
-            found.len()
-        );
-    }
-    #[test]
-    fn timing() {
-        let turn = glam::DQuat::from_axis_angle(DVec3::new(0.3, 0.5, -0.8).normalize(), 1.1);
-        time("sphere", Mesh::sphere("s", DVec3::ZERO, 1.0, 1000, 0));
-        let grid = |n: u32, f: &dyn Fn(f64, f64) -> DVec3| Mesh {
-            positions: (0..=n)
-                .flat_map(|j| (0..=n).map(move |i| (f64::from(i) / f64::from(n), f64::from(j) / f64::from(n))))
-                .map(|(x, y)| f(x, y))
-                .collect(),
-            triangles: (0..n)
-                .flat_map(|j| {
-                    (0..n).flat_map(move |i| {
-                        let v = j * (n + 1) + i;
-                        [[v, v + 1, v + n + 2], [v, v + n + 2, v + n + 1]]
-                    })
-                })
-                .collect(),
-            ..Mesh::default()
-        };
-        time("terrain", grid(700, &|x, y| DVec3::new(x, 0.03 * (13.0 * x).sin() * (17.0 * y + x).cos(), y)));
-        time("floor", grid(700, &|x, y| DVec3::new(x, 0.0, y)));
-        time("turned floor", grid(700, &|x, y| turn * DVec3::new(x, 0.0, y)));
-        let mut fan = Mesh::default();
-        fan.positions.push(DVec3::ZERO);
-        let n = 4000;
-        for k in 0..=n {
-            let a = std::f64::consts::TAU * f64::from(k) / f64::from(n);
-            fan.positions.push(DVec3::new(a.cos(), 0.0, a.sin()));
-        }
-        fan.triangles = (0..n as u32).map(|k| [0, k + 1, k + 2]).collect();
-        time("fan", fan);
-    }
 }
