@@ -1,11 +1,14 @@
 //! Compiles every kernel of `glsl/kernels` to SPIR-V and writes `kernels.rs`: for each kernel a
-//! struct whose fields are its buffers, with everything else that reflection knows of it.
+//! struct whose fields are its buffers, with everything else that reflection knows of it. Writes `charts.md` too: the
+//! charts of the guide.
 
 use std::collections::BTreeSet;
 use std::fmt::Write as _;
 use std::path::PathBuf;
 use std::{env, fs};
 
+use base64::Engine;
+use base64::engine::general_purpose::STANDARD as BASE64;
 use compile::{Compiled, compile};
 use spirq::ReflectConfig;
 use spirq::ty::{AccessType, DescriptorType, StructType, Type};
@@ -60,6 +63,33 @@ fn main() {
         "{structs}\n{buffer_count}\n/// Every struct in a buffer or push-constant block of a kernel.\npub const STRUCTS: &[(&str, ReflectedStruct)] = &[\n{layouts}];\n"
     );
     fs::write(out.join("kernels.rs"), source).expect("OUT_DIR can be written");
+    fs::write(out.join("charts.md"), charts()).expect("OUT_DIR can be written");
+}
+
+/// Charts of the guide, under `tools`.
+const CHARTS: [&str; 9] = [
+    "study/open-box-overview",
+    "study/open-box-radius",
+    "study/open-box-paper",
+    "study/cornell-spheres-overview",
+    "bench/compaction-lavapipe",
+    "bench/peers",
+    "bench/h200/compaction",
+    "bench/h200-scale/scale-photons",
+    "bench/h200-scale/scale-triangles",
+];
+
+/// Markdown that defines a link for each chart, named as its file. The link is the chart itself, as rustdoc keeps no files
+/// beside its pages.
+fn charts() -> String {
+    let definition = |chart: &str| {
+        let path = format!("tools/{chart}.svg");
+        println!("cargo:rerun-if-changed={path}");
+        let svg = fs::read(&path).unwrap_or_else(|error| panic!("{path}: {error}"));
+        let name = chart.rsplit('/').next().expect("a path has a last part");
+        format!("[{name}]: data:image/svg+xml;base64,{}\n", BASE64.encode(svg))
+    };
+    CHARTS.map(definition).concat() + "\n"
 }
 
 struct Buffer {

@@ -18,6 +18,7 @@ mod engine;
 mod extremes;
 mod film;
 mod gltf;
+mod guide;
 mod hard_cases;
 mod hard_materials;
 mod judge;

@@ -1,0 +1,373 @@
+//! README and guide: commands run, tables are those of their sources, links and options exist.
+//!
+//! `PHOTONMILL_WRITE_GUIDE=1 cargo test --test tests guide::` writes the tables anew.
+
+use std::collections::BTreeSet;
+use std::fs;
+use std::path::{Path, PathBuf};
+use std::process::{Command, Stdio};
+
+use photonmill::bench::table::scaled;
+use photonmill::bench::targets::{TARGETS, Target, Wanted};
+use photonmill::output::words::number;
+use photonmill::scene::built_in;
+use serde_json::Value;
+
+use crate::common::{Check, assert_complains, assert_holds, device};
+
+fn root(path: &str) -> PathBuf {
+    Path::new(env!("CARGO_MANIFEST_DIR")).join(path)
+}
+
+fn read(path: &str) -> String {
+    fs::read_to_string(root(path)).unwrap_or_else(|error| panic!("{path}: {error}"))
+}
+
+/// Pages of the guide by path, without `links.md`, which is no page.
+fn pages() -> Vec<(String, String)> {
+    let names = fs::read_dir(root("src/guide")).unwrap().map(|entry| entry.unwrap().file_name().into_string().unwrap());
+    let mut paths: Vec<String> = names.filter(|name| name.ends_with(".md") && name != "links.md").collect();
+    paths.sort();
+    assert!(paths.len() >= 9, "{paths:?}");
+    paths.iter().map(|name| format!("src/guide/{name}")).map(|path| (path.clone(), read(&path))).collect()
+}
+
+fn all_texts() -> Vec<(String, String)> {
+    [vec![("README.md".to_owned(), read("README.md"))], pages()].concat()
+}
+
+/// Lines of the fenced blocks of a language.
+fn fenced<'a>(text: &'a str, language: &str) -> Vec<&'a str> {
+    let mut inside = None;
+    let mut lines = Vec::new();
+    for line in text.lines() {
+        match (line.strip_prefix("```"), inside) {
+            (Some(named), None) => inside = Some(named),
+            (Some(_), Some(_)) => inside = None,
+            (None, Some(named)) if named == language => lines.push(line),
+            _ => {}
+        }
+    }
+    lines
+}
+
+/// Commands of a text without their comments.
+fn commands(text: &str) -> Vec<String> {
+    let bare = |line: &str| line.split(" #").next().unwrap_or_default().trim().to_owned();
+    fenced(text, "sh").into_iter().map(bare).filter(|line| !line.is_empty()).collect()
+}
+
+/// Commands that start so are not run, and why.
+const NOT_RUN: [(&str, &str); 7] = [
+    ("tools/setup && cargo test", "runs this test"),
+    ("cargo test", "runs this test"),
+    ("tools/bench/run ", "writes into the repository"),
+    ("tools/bench_peers", "installs other programs"),
+    ("tools/fuzz/run ", "needs a nightly toolchain"),
+    ("tools/sanitize", "needs a nightly toolchain"),
+    ("photonmill selfcheck", "takes half a minute at any size; `every_closed_form_holds` runs the same"),
+];
+
+/// Commands of which only the options are checked, and why.
+const PARSED: [(&str, &str); 3] = [
+    ("photonmill paper ", "takes a minute at any size; `tests/bench.rs` and `tests/cli.rs` run its parts"),
+    ("photonmill study ", "compiles pipelines for every choice; `tests/study.rs` runs small studies"),
+    ("photonmill bench", "takes a minute at any size; `tests/bench.rs` runs all of it"),
+];
+
+/// Sets options to values that make a run short. An option that is not there is added.
+fn shrunk(arguments: &[&str], values: &[(&str, &str)]) -> Vec<String> {
+    let mut all: Vec<String> = arguments.iter().map(ToString::to_string).collect();
+    for (option, value) in values {
+        match all.iter().position(|argument| argument == option) {
+            Some(at) => all[at + 1] = (*value).to_owned(),
+            None => all.extend([(*option).to_owned(), (*value).to_owned()]),
+        }
+    }
+    all
+}
+
+/// A run of the same kind that takes a second or less.
+fn short(arguments: &[&str]) -> Vec<String> {
+    // A photon is replayed by its number in the run as it is given.
+    if arguments.contains(&"--replay") {
+        return arguments.iter().map(ToString::to_string).collect();
+    }
+    let of_run = [("--photons", "500"), ("--rounds", "2")];
+    let only_if_there = [("--error", "60%"), ("--samples", "2"), ("--counters", "2")];
+    let there: Vec<_> = only_if_there.into_iter().filter(|(option, _)| arguments.contains(option)).collect();
+    let more: &[(&str, &str)] = match arguments.first() {
+        Some(&"render") => &[("--size", "16x12")],
+        Some(&"bake") => &[("--texels-per-metre", "2")],
+        Some(&"probe") => &[],
+        Some(&"plan" | &"devices") => return arguments.iter().map(ToString::to_string).collect(),
+        _ => &[("--mesh", "8")],
+    };
+    shrunk(arguments, &[&of_run, &there[..], more].concat())
+}
+
+fn program(folder: &Path, arguments: &[String]) -> Check {
+    let mut command = Command::new(env!("CARGO_BIN_EXE_photonmill"));
+    let output = command.current_dir(folder).args(arguments).stdin(Stdio::null()).output().expect("the program starts");
+    match output.status.code() {
+        Some(0) => Ok(()),
+        code => Err(format!("{}: exit code {code:?}: {}", arguments.join(" "), String::from_utf8_lossy(&output.stderr).trim())),
+    }
+}
+
+/// Files and folders that the command says it writes.
+fn outputs<'a>(arguments: &[&'a str]) -> Vec<&'a str> {
+    let options = ["-o", "--json", "--trace", "--error-image", "--irradiance", "--radiosity"];
+    let values = arguments.windows(2).filter(|pair| options.contains(&pair[0])).map(|pair| pair[1]);
+    values.filter(|value| *value != "-").collect()
+}
+
+/// Runs one command of a text in a folder that holds its inputs; what it says it writes must be there.
+fn run(folder: &Path, command: &str) -> Check {
+    let line = command.replace("tools/setup && cargo run --release --", "photonmill");
+    let mut words = line.split_whitespace();
+    if words.next() != Some("photonmill") || line.contains(['|', '>', '<', ';', '&', '$', '"', '\'', '\\']) {
+        return Err(format!("{command}: is neither run nor listed as not run"));
+    }
+    let arguments: Vec<&str> = words.collect();
+    let mut run = short(&arguments);
+    match std::env::var("PHOTONMILL_DEVICE") {
+        Ok(device) if arguments.first() != Some(&"devices") => run.extend(["--device".to_owned(), device]),
+        _ => {}
+    }
+    program(folder, &run)?;
+    match outputs(&arguments).into_iter().find(|path| !folder.join(path).exists()) {
+        Some(absent) => Err(format!("{command}: wrote no {absent}")),
+        None => Ok(()),
+    }
+}
+
+/// Only whether the program knows command, options and values: what stands before `--help` is parsed first.
+fn parse(folder: &Path, command: &str) -> Check {
+    let words = command.split_whitespace().skip(1).chain(["--help"]);
+    program(folder, &words.map(ToString::to_string).collect::<Vec<_>>())
+}
+
+/// A folder with the files that the commands read.
+fn folder_with_inputs() -> tempfile::TempDir {
+    let folder = tempfile::tempdir().unwrap();
+    fs::copy(root("tests/scenes/blender.glb"), folder.path().join("scene.glb")).unwrap();
+    fs::write(folder.path().join("points.txt"), "# two points of the floor\n0 0.01 0 0 1 0\n1 0.01 1 0 1 0\n").unwrap();
+    folder
+}
+
+#[test]
+fn commands_of_readme_and_guide_run() {
+    let Some(_) = device() else { return };
+    let folder = folder_with_inputs();
+    let mut seen = BTreeSet::new();
+    for (path, text) in all_texts() {
+        for command in commands(&text) {
+            let starts = |(start, _): &&(&'static str, &'static str)| command.starts_with(start);
+            if let Some((start, why)) = NOT_RUN.iter().find(starts) {
+                println!("{path}: {command}: not run, {why}");
+                seen.insert(*start);
+            } else if let Some((start, why)) = PARSED.iter().find(starts) {
+                println!("{path}: {command}: parsed only, {why}");
+                seen.insert(*start);
+                assert_holds(&path, parse(folder.path(), &command));
+            } else {
+                let began = std::time::Instant::now();
+                assert_holds(&path, run(folder.path(), &command));
+                println!("{path}: {command}: {:.2} s", began.elapsed().as_secs_f64());
+            }
+        }
+    }
+    let listed: BTreeSet<&str> = NOT_RUN.iter().chain(&PARSED).map(|(start, _)| *start).collect();
+    assert_eq!(listed, seen, "what is listed as not run stands in no text");
+}
+
+#[test]
+fn commands_that_are_wrong_are_noticed() {
+    let folder = folder_with_inputs();
+    let text = "```sh\nphotonmill a  # one\n\nphotonmill b --c\n```\n```text\nphotonmill no\n```\n";
+    assert_eq!(commands(text), ["photonmill a", "photonmill b --c"]);
+    assert_complains("another program", run(folder.path(), "photonhill render scene.glb -o a.exr"));
+    assert_complains("a shell's syntax", run(folder.path(), "photonmill devices | head"));
+    assert_complains("no such option", run(folder.path(), "photonmill render cornell -o a.exr --no-such-option"));
+    assert_complains("no such file", run(folder.path(), "photonmill plan absent.glb"));
+    assert_complains("a file that is not written", run(folder.path(), "photonmill --version -o absent.png"));
+    assert_holds("options that are known", parse(folder.path(), "photonmill render cornell -o a.exr"));
+    assert_complains("no such option, parsed", parse(folder.path(), "photonmill render cornell -o a.exr --no-such-option"));
+    assert_complains("no such value, parsed", parse(folder.path(), "photonmill render cornell -o a.exr --rounds some"));
+    assert_eq!(shrunk(&["--rounds", "25", "-o", "x"], &[("--rounds", "2"), ("--mesh", "8")]), ["--rounds", "2", "-o", "x", "--mesh", "8"]);
+}
+
+/// Options of the project's other tools and of cargo.
+const OTHER_OPTIONS: [&str; 8] = ["--help", "--ignored", "--limit", "--open", "--plot", "--quick", "--release", "--test"];
+
+/// Words of a text that are options.
+fn options(text: &str) -> BTreeSet<String> {
+    let words = text.split(|letter: char| !(letter.is_ascii_alphanumeric() || letter == '-' || letter == '<'));
+    // The lines of tables are dashes, too, and so are those of HTML comments.
+    let is_option = |word: &&str| word.strip_prefix("--").is_some_and(|name| name.starts_with(|letter: char| letter.is_ascii_lowercase()));
+    words.filter(is_option).map(ToOwned::to_owned).collect()
+}
+
+#[test]
+fn options_of_readme_and_guide_exist() {
+    let names = ["", "render", "bake", "probe", "plan", "devices", "selfcheck", "study", "bench", "paper"];
+    let help = |name: &str| {
+        let mut command = Command::new(env!("CARGO_BIN_EXE_photonmill"));
+        let output = command.args(name.split_whitespace()).arg("--help").output().expect("the program starts");
+        assert!(output.status.success(), "{name}");
+        String::from_utf8(output.stdout).unwrap()
+    };
+    let known = options(&names.map(help).concat());
+    assert!(known.len() > 60 && known.contains("--final-gather"), "{known:?}");
+    for (path, text) in all_texts() {
+        let unknown: Vec<String> =
+            options(&text).into_iter().filter(|option| !known.contains(option) && !OTHER_OPTIONS.contains(&option.as_str())).collect();
+        assert!(unknown.is_empty(), "{path}: {unknown:?}");
+    }
+    let found = options("| --- | <!-- a --> `--error 2%`, `--aim off`; -o, --math=strict");
+    assert_eq!(found.iter().collect::<Vec<_>>(), ["--aim", "--error", "--math"]);
+}
+
+#[test]
+fn readme_is_short_and_in_order() {
+    let readme = read("README.md");
+    assert!(readme.lines().count() <= 150, "{} lines", readme.lines().count());
+    assert!(readme.len() <= 12_000, "{} bytes", readme.len());
+    let headings: Vec<&str> = readme.lines().filter(|line| line.starts_with('#')).collect();
+    let wanted = [
+        "# photonmill",
+        "## Try it",
+        "## Your own scene",
+        "## How wrong is it, and when to stop",
+        "## The paper's box",
+        "## What is guaranteed",
+        "## Speed against peers",
+        "## Limits and platforms",
+        "## More",
+    ];
+    assert_eq!(headings, wanted);
+    let commands = commands(&readme);
+    assert_eq!(commands[..2], ["tools/setup && cargo run --release -- --variant atomic", "tools/setup && cargo test --release"]);
+    assert!(fs::metadata(root("src/guide/caustic.png")).unwrap().len() < 100_000);
+}
+
+/// Targets of links of one kind: `[label](target)`, or at the start of a line `[label]: target`.
+fn links(text: &str) -> (Vec<String>, Vec<(String, String)>) {
+    let inline = text.split("](").skip(1).filter_map(|rest| Some(rest.split_once(')')?.0.to_owned())).collect();
+    let defined = text.lines().filter_map(|line| line.strip_prefix('[')?.split_once("]: "));
+    (inline, defined.map(|(label, target)| (label.to_owned(), target.to_owned())).collect())
+}
+
+/// Links of the guide lead to files where it is read as Markdown, and to the same pages where rustdoc shows it.
+fn guide_links_check(path: &str, text: &str, for_rustdoc: &[(String, String)], build: &str) -> Check {
+    let (inline, defined) = links(text);
+    if let Some(target) = inline.iter().find(|target| !target.starts_with("https://")) {
+        return Err(format!("{path}: rustdoc cannot follow ({target})"));
+    }
+    for (label, target) in &defined {
+        if !root("src/guide").join(target).is_file() {
+            return Err(format!("{path}: there is no {target}"));
+        }
+        let has_twin = match target.strip_suffix(".md") {
+            Some(page) => for_rustdoc.contains(&(label.clone(), format!("crate::guide::{page}"))),
+            None => {
+                let chart = target.trim_start_matches("../../tools/").trim_end_matches(".svg");
+                chart.ends_with(label.as_str()) && build.contains(&format!("\"{chart}\""))
+            }
+        };
+        if !has_twin {
+            return Err(format!("{path}: rustdoc knows no [{label}]"));
+        }
+    }
+    let in_brackets = text.split('[').skip(1).filter_map(|rest| Some(rest.split_once(']')?.0));
+    let is_label = |label: &&str| !label.is_empty() && label.chars().all(|letter| letter.is_ascii_lowercase() || letter == '-');
+    for label in in_brackets.filter(is_label) {
+        if !defined.iter().any(|(known, _)| known == label) {
+            return Err(format!("{path}: [{label}] is not defined"));
+        }
+    }
+    Ok(())
+}
+
+#[test]
+fn links_of_readme_and_guide_lead_somewhere() {
+    for target in links(&read("README.md")).0 {
+        assert!(target.starts_with("https://") || root(&target).is_file(), "README.md: {target}");
+    }
+    let for_rustdoc = links(&read("src/guide/links.md")).1;
+    let build = read("build.rs");
+    for (path, text) in pages() {
+        assert_holds(&path, guide_links_check(&path, &text, &for_rustdoc, &build));
+    }
+    let check = |text: &str| guide_links_check("a page", text, &for_rustdoc, &build);
+    assert_complains("a file", check("[a](paper.md)"));
+    assert_complains("no such page", check("[a]: absent.md\n"));
+    assert_complains("a label that rustdoc does not know", check("[a]: paper.md\n"));
+    assert_complains("a chart that rustdoc does not know", check("[a]: ../../tools/setup\n"));
+    assert_complains("no such label", check("[a][b]"));
+}
+
+#[test]
+fn built_in_scenes_are_in_the_guide() {
+    let text = read("src/guide/scenes.md");
+    for name in built_in::names() {
+        assert!(text.contains(&format!("`{name}`")), "{name}");
+    }
+}
+
+/// The part of a text between the marks of a table that is written from a source.
+fn written<'a>(text: &'a str, name: &str) -> &'a str {
+    let (_, rest) = text.split_once(&format!("<!-- {name}: ")).expect("the table has its mark");
+    let (_, rest) = rest.split_once("-->\n").expect("the mark is a comment");
+    rest.split_once(&format!("<!-- end of {name} -->")).expect("the table has an end").0
+}
+
+/// Compares, or with `PHOTONMILL_WRITE_GUIDE=1` writes.
+fn table_is(path: &str, name: &str, table: &str) {
+    let text = read(path);
+    if std::env::var_os("PHOTONMILL_WRITE_GUIDE").is_some() {
+        let now = written(&text, name);
+        let start = now.as_ptr() as usize - text.as_ptr() as usize;
+        fs::write(root(path), [&text[..start], table, &text[start + now.len()..]].concat()).unwrap();
+        return;
+    }
+    assert_eq!(written(&text, name), table, "{path}: PHOTONMILL_WRITE_GUIDE=1 cargo test --test tests guide:: writes it anew");
+}
+
+/// Three digits with a unit.
+fn quantity(value: f64, unit: &str) -> String {
+    match unit {
+        "/s" => scaled(value) + "/s",
+        "s" if value < 1.0 => number(1e3 * value) + " ms",
+        unit => format!("{value:.2} {unit}"),
+    }
+}
+
+#[test]
+fn targets_in_the_guide_are_those_of_bench() {
+    let bench: Value = serde_json::from_str(&read("tools/bench/h200/bench.json")).unwrap();
+    let findings = bench["targets"].as_array().unwrap();
+    assert_eq!(findings.len(), TARGETS.len());
+    let row = |(target, finding): (&Target, &Value)| {
+        assert_eq!(finding["unit"], target.unit);
+        let value = |value: f64| quantity(value, target.unit);
+        let wanted = match target.wanted {
+            Wanted::AtLeast(least) => format!("at least {}", value(least)),
+            Wanted::AtMost(most) => format!("at most {}", value(most)),
+        };
+        let limit = finding["limit"].as_f64().map_or("-".to_owned(), value);
+        format!("| {} | {wanted} | {} | {limit} | {} |\n", target.work, value(finding["found"].as_f64().unwrap()), target.peer)
+    };
+    let rows: String = TARGETS.iter().zip(findings).map(row).collect();
+    let head = "\n| work | target | found | the device's limit | peer |\n| --- | --- | --- | --- | --- |\n";
+    table_is("src/guide/performance.md", "targets", &format!("{head}{rows}\n"));
+}
+
+/// The table of the same page is checked by `tests/hard_cases.rs`.
+#[test]
+fn planted_faults_are_counted() {
+    let (page, red) = (read("src/guide/hard_cases.md"), read("tests/red.rs"));
+    let count = red.split_once("const FAULTS: [Fault; ").unwrap().1.split_once(']').unwrap().0;
+    assert!(page.contains(&format!("plants {count} faults")), "{count} faults are planted");
+}
