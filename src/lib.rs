@@ -13,7 +13,7 @@
 //! module uses only what stands to its left:
 //!
 //! ```text
-//! constants, records, path, photon, error, bias, ledger, rng, settings, timings < scene < plan < cpu
+//! constants, records, path, photon, error, bias, unknown, ledger, rng, settings, timings < scene < plan < cpu
 //! scene < judge
 //! constants, records, error, ledger, timings < gpu
 //! gpu < oddities, tallies; plan, gpu < prefix_sum
@@ -106,3 +106,4 @@ pub mod tallies;
 pub mod timings;
 pub mod trace;
 pub mod transport;
+pub mod unknown;

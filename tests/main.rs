@@ -42,3 +42,4 @@ mod strict;
 mod study;
 mod transport;
 mod tree;
+mod unknown;

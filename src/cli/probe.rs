@@ -26,7 +26,8 @@ pub(super) struct ProbeArgs {
     /// Points and directions, a line `x y z nx ny nz` each, metres in the world; `-` reads standard input
     #[arg(long, value_name = "FILE", help_heading = "Scene")]
     points: PathBuf,
-    /// A line for each point: irradiance of red, green, blue in W/m2, and their standard errors
+    /// A line for each point: irradiance of red, green, blue in W/m2, and their standard errors, `inf` where unknown: after
+    /// a single round, or where no light has reached the point though some may
     #[arg(short, long, value_name = "FILE.csv", help_heading = "Output")]
     output: PathBuf,
     #[command(flatten)]
@@ -86,15 +87,15 @@ fn receivers(points: &[(DVec3, DVec3)], geometry: &Geometry) -> Vec<Receiver> {
         .collect()
 }
 
-/// Irradiance and standard errors, W/m2; an error that is not known is left empty.
+/// Irradiance and standard errors, W/m2; an error that is not known is `inf`.
 fn table(lit: &Lit) -> Vec<u8> {
     let mut table = csv::Writer::from_writer(Vec::new());
     table.write_record(["red", "green", "blue", "red_error", "green_error", "blue_error"]).expect("memory takes what is written");
     for point in 0..lit.film.pixels() {
-        let (mean, error) = (lit.film.mean(point, &lit.plan), lit.film.standard_error(point, &lit.plan));
-        let known = |value: f64| if value.is_finite() { value.to_string() } else { String::new() };
-        let row = [mean.x.to_string(), mean.y.to_string(), mean.z.to_string(), known(error.x), known(error.y), known(error.z)];
-        table.write_record(row).expect("memory takes what is written");
+        let (mean, error) = (lit.film.mean(point, &lit.plan), lit.film.stated_error(point, &lit.plan));
+        table
+            .write_record([mean.x, mean.y, mean.z, error.x, error.y, error.z].map(|value| value.to_string()))
+            .expect("memory takes what is written");
     }
     table.into_inner().expect("memory takes what is written")
 }

@@ -27,7 +27,8 @@ pub(super) struct RenderArgs {
     /// Picture: an .exr of linear radiance, W/m2/sr, or a .png for the eye
     #[arg(short, long, value_name = "FILE", required_unless_present = "replay", help_heading = "Output")]
     output: Option<PathBuf>,
-    /// Standard error of each pixel, an .exr in the same unit
+    /// Standard error of each pixel, an .exr in the same unit; infinite where unknown: after a single round, or where no light
+    /// has reached the pixel though some may
     #[arg(long, value_name = "FILE", help_heading = "Output")]
     error_image: Option<PathBuf>,
     /// Brightness of a PNG in stops: each doubles it [default: so that the picture's mean is a middle
@@ -183,6 +184,6 @@ fn radiance(lit: &Lit, width: u32, height: u32) -> ColourPicture {
 }
 
 fn standard_error(lit: &Lit, width: u32, height: u32) -> ColourPicture {
-    let pixels = (0..lit.film.pixels()).map(|pixel| lit.film.standard_error(pixel, &lit.plan).as_vec3()).collect();
+    let pixels = (0..lit.film.pixels()).map(|pixel| lit.film.stated_error(pixel, &lit.plan).as_vec3()).collect();
     ColourPicture { width, height, pixels }
 }

@@ -10,7 +10,7 @@ use super::stop::{ProgressArg, StopArgs, Teller, bias_before, rounds_after};
 use super::transport::photon_name;
 use super::{DeviceArgs, End, TimingArgs, complain, say};
 use crate::error::{Error, Result};
-use crate::film::estimate_walls;
+use crate::film::{estimate_walls, irradiance_weights};
 use crate::gpu::Gpu;
 use crate::output::destination::{Destination, Folder, check_distinct, write_all};
 use crate::output::image::{Format, overview};
@@ -426,6 +426,9 @@ impl Outputs {
     fn write(self, mut outcome: Outcome, scene: &RoomScene) -> Result<()> {
         let began = Instant::now();
         let walls = estimate_walls(&outcome.film, scene, &outcome.plan);
+        // W of a photon of relative flux 1.
+        let watts = outcome.plan.flux_unit / outcome.film.emitted.max(1) as f64;
+        let unknown = outcome.film.unknown(&irradiance_weights(scene, &outcome.plan), watts, outcome.plan.settings.stop.confidence);
         let (destination, format) = self.picture;
         let picture = destination.path().display().to_string();
         let mut files = vec![(destination, overview(scene, &walls).encode(format))];
@@ -437,13 +440,13 @@ impl Outputs {
         outcome.timings.add(Span { name: "output".into(), clock: Clock::Wall, start: run, duration: began.elapsed() });
 
         if let Some(json) = self.json {
-            files.push((json, report::json(&outcome, &walls)));
+            files.push((json, report::json(&outcome, &walls, &unknown)));
         }
         if let Some(trace) = self.trace {
             let device = outcome.device.as_ref().map_or("CPU", |facts| &facts.name);
             files.push((trace, trace_file::chrome_trace(&outcome.timings, device)));
         }
         write_all(files)?;
-        say(&format!("{}\nwrote {picture}", report::text(&outcome, &walls)))
+        say(&format!("{}\nwrote {picture}", report::text(&outcome, &walls, &unknown)))
     }
 }

@@ -10,11 +10,12 @@ use crate::bias::Bias;
 use crate::ledger::Ledger;
 use crate::oddities::Oddities;
 use crate::plan::evidence::EffectDecision;
-use crate::plan::transport::{MapPlan, TransportPlan};
+use crate::plan::transport::{MapPlan, Sensor, TransportPlan};
 use crate::settings::transport::{Effect, TransportSettings};
 use crate::timings::{Row, Timings};
 use crate::transport::stop::error_bound;
 use crate::transport::{End, Lit};
+use crate::unknown::Unknown;
 
 /// A row of the plan: what was decided, and after a run what it cost and gave.
 #[derive(Serialize)]
@@ -107,8 +108,11 @@ struct Report<'a> {
     ledgers: [Ledger; 2],
     /// Root mean square of the standard errors over that of the values.
     relative_error: f64,
-    /// What the relative error is not above, with the confidence of the settings; null from a single round.
+    /// What the relative error is not above, with the confidence of the settings; null from a single round, and while all is
+    /// black and need not be.
     error_bound: Option<f64>,
+    /// What nothing has reached.
+    unknown: Unknown,
     /// Of the radius, relative to the result; null without `--bias`.
     bias: Option<Bias>,
     anomalies: Anomalies,
@@ -157,6 +161,7 @@ pub fn json(scene: &str, lit: &Lit) -> Vec<u8> {
         ledgers: [lit.fates[0].ledger(), lit.fates[1].ledger()],
         relative_error: lit.film.relative_error(&lit.plan),
         error_bound: Some(error_bound(&lit.film, &lit.plan, lit.plan.settings.stop.confidence)).filter(|bound| bound.is_finite()),
+        unknown: lit.film.unknown(&lit.plan, lit.plan.settings.stop.confidence),
         bias: lit.bias,
         anomalies: Anomalies { not_a_number: lit.anomalies[0], cut_to_largest: lit.anomalies[1], too_dense: lit.anomalies[2] },
         oddities: lit.oddities.as_ref(),
@@ -203,7 +208,13 @@ pub fn text(scene: &str, lit: &Lit, explain: bool) -> String {
         writeln!(text, "{}", oddities.text()).unwrap();
     }
     let noise = (lit.film.rounds > 1).then(|| lit.film.relative_error(&lit.plan));
-    text.push_str(&errors(lit.film.rounds, noise, lit.bias.as_ref(), settings.stop.confidence));
+    let unknown = lit.film.unknown(&lit.plan, settings.stop.confidence);
+    text.push_str(&errors(lit.film.rounds, noise, &unknown, lit.bias.as_ref(), settings.stop.confidence));
+    let (point, unit) = match lit.plan.sensor {
+        Sensor::Picture { .. } => ("pixel", "W/m2/sr"),
+        Sensor::Receivers { .. } => ("point", "W/m2"),
+    };
+    text.push_str(&unknown.text(point, unit, settings.stop.confidence));
     text.push('\n');
     text.push_str(&timing_table(&lit.timings, Some(&lit.device)));
     text

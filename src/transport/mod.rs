@@ -27,7 +27,7 @@ pub use film::RoundFilm;
 use resources::{PhotonBuffers, TransportResources};
 
 use crate::bias::Bias;
-use crate::constants::PART_COUNT;
+use crate::constants::{HIT_KINDS, PART_COUNT};
 use crate::error::{Error, Result};
 use crate::gpu::check::strict_math;
 use crate::gpu::kernels::*;
@@ -154,7 +154,8 @@ pub fn light(gpu: &Gpu, view: &View, plan: TransportPlan, control: &mut Control)
             settle(&mut commands, &resources, &plan, u64::from(done - settled), &mut fates)?;
             settled = done;
             if watch.is_due(done) {
-                watch.look(done, film(&mut commands, &resources, &plan, done)?.relative_error(&plan));
+                let film = film(&mut commands, &resources, &plan, done)?;
+                watch.look(done, film.relative_error(&plan), film.unknown(&plan, plan.settings.stop.confidence).relative);
             }
             submissions_settled = commands.submission_count();
             let ledger = fates[0].ledger().plus(&fates[1].ledger());
@@ -193,7 +194,8 @@ fn film(commands: &mut Commands, resources: &TransportResources, plan: &Transpor
     let pixels = plan.sensor.pixels() as usize;
     let sums = commands.read::<u64>(&resources.film_sums, 3 * pixels)?;
     let squares = commands.read::<u64>(&resources.film_squares, 6 * pixels)?;
-    Ok(RoundFilm::new(rounds, sums, squares))
+    let one_hits = commands.read::<u32>(&resources.one_hits, HIT_KINDS as usize * pixels)?;
+    Ok(RoundFilm::new(rounds, sums, squares, one_hits))
 }
 
 fn one_round(commands: &mut Commands, view: &View, round: Round) -> Result<()> {

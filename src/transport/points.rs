@@ -27,7 +27,7 @@ fn add_work(commands: &mut Commands, plan: &TransportPlan, work: u64) -> Result<
 pub fn see(commands: &mut Commands, round: Round, camera: Option<&Camera>) -> Result<()> {
     let Round { resources, geometry, plan, number: round } = round;
     let TransportResources { nodes, triangles, normals, uvs, materials, textures, texels, emitters, .. } = resources;
-    let TransportResources { visible_points, pass_sums, part_totals, anomalies, oddities, .. } = resources;
+    let TransportResources { visible_points, pass_sums, one_hits, part_totals, anomalies, oddities, .. } = resources;
     let step = plan.pixels_at_once(plan.rays_per_pixel());
     let emitter_count = geometry.emitters.len() as u32;
     let draws = |domain| Draws { seed: words(plan.settings.seed), round, domain };
@@ -64,6 +64,7 @@ pub fn see(commands: &mut Commands, round: Round, camera: Option<&Camera>) -> Re
                     anomalies,
                     visible_points,
                     pass_sums,
+                    one_hits,
                     part_totals,
                     oddities,
                 };
@@ -95,6 +96,7 @@ pub fn see(commands: &mut Commands, round: Round, camera: Option<&Camera>) -> Re
                     anomalies,
                     visible_points,
                     pass_sums,
+                    one_hits,
                     part_totals,
                     oddities,
                 };
@@ -151,7 +153,7 @@ pub fn look_up(commands: &mut Commands, round: Round, photons: &PhotonBuffers, m
 pub fn weigh(commands: &mut Commands, round: Round) -> Result<()> {
     let Round { resources, geometry, plan, number: round } = round;
     let TransportResources { nodes, triangles, normals, uvs, materials, textures, texels, visible_points, .. } = resources;
-    let TransportResources { estimates, part_totals, anomalies, oddities, .. } = resources;
+    let TransportResources { estimates, one_hits, part_totals, anomalies, oddities, .. } = resources;
     let radius = |map: &Option<MapPlan>| map.as_ref().map_or(1.0, |map| plan.radius(map, round)) as f32;
     let flux = |map: &Option<MapPlan>| map.as_ref().map_or(0.0, |map| map.photon_flux(geometry)) as f32;
     let (width, height) = plan.sensor.size();
@@ -183,6 +185,7 @@ pub fn weigh(commands: &mut Commands, round: Round) -> Result<()> {
             anomalies,
             visible_points,
             estimates,
+            one_hits,
             part_totals,
             oddities,
         };
