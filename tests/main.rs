@@ -42,4 +42,5 @@ mod strict;
 mod study;
 mod transport;
 mod tree;
+mod trial;
 mod unknown;

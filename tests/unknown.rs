@@ -17,7 +17,7 @@ use photonmill::transport::stop::error_bound;
 use photonmill::transport::{End, Lit};
 
 /// Walls of a room over [-2, 2] x [-2, 2], as high as 3 m, that face inwards; and its ceiling but for a hole in the middle.
-fn room_without_floor(hole: f64) -> Vec<Mesh> {
+pub fn room_without_floor(hole: f64) -> Vec<Mesh> {
     let (side, height) = (4.0 * DVec3::X, 3.0 * DVec3::Y);
     let depth = 4.0 * DVec3::Z;
     let wall = |name, origin, u, v| Mesh::parallelogram(name, origin, u, v, 0);

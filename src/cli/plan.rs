@@ -8,7 +8,7 @@ use crate::error::Result;
 use crate::gpu::Gpu;
 use crate::output::light_report;
 use crate::plan::Limits;
-use crate::plan::transport::{Sensor, TransportPlan};
+use crate::plan::transport::{RadiusFrom, Sensor, TransportPlan};
 use crate::render;
 use crate::settings::transport::{Part, TransportSettings};
 
@@ -58,8 +58,12 @@ pub(super) fn run(args: &PlanArgs) -> Result<()> {
     let maps: Vec<String> = plan
         .maps()
         .map(|map| {
-            let metres = map.radius * geometry.unit;
-            format!("{} map: {} photons a round in {} chunk(s), first radius {metres:.4} m", map.name, map.photons, map.chunks().count())
+            let radius = match map.radius_from {
+                RadiusFrom::User => format!("{:.4} m", map.radius * geometry.unit),
+                // A plan needs no device, and a trial round does.
+                _ => "by a trial round at the start of the run".to_owned(),
+            };
+            format!("{} map: {} photons a round in {} chunk(s), first radius {radius}", map.name, map.photons, map.chunks().count())
         })
         .collect();
     say(&format!("{text}{}\n{} bytes of device memory", maps.join("\n"), plan.bytes))

@@ -14,7 +14,8 @@ use crate::output::colour::ColourPicture;
 use crate::output::destination::{Destination, check_distinct, write_all};
 use crate::output::image::Format;
 use crate::output::light_report;
-use crate::plan::transport::Sensor;
+use crate::plan::transport::{Sensor, TransportPlan};
+use crate::render::limits;
 use crate::scene::{Camera, Scene};
 use crate::settings::transport::{Filter, Part, TransportSettings};
 use crate::transport::Lit;
@@ -148,10 +149,10 @@ pub(super) fn run(args: &RenderArgs, cancelled: &AtomicBool) -> Result<End> {
 fn show_photon(args: &RenderArgs, settings: &TransportSettings, name: PhotonName) -> Result<End> {
     let scene = args.scene.open()?;
     let (width, height) = args.size;
-    let job = Job { scene: &scene, settings, sensor: Sensor::Picture { width, height }, camera: None, phases: &[] };
     let geometry = geometry(&scene, settings)?;
     let gpu = args.report.device(&args.device)?;
-    let plan = plan(&gpu, &job, &geometry)?;
+    // No photon's path knows of a radius.
+    let plan = TransportPlan::new(&scene, &geometry, settings, Sensor::Picture { width, height }, &limits(gpu.facts()))?;
     let path = replay::replay(&gpu, &geometry, &plan, name)?;
     say(&path.table(&geometry, &plan))?;
     Ok(End::Finished)

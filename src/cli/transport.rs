@@ -16,7 +16,7 @@ use crate::output::trace_file;
 use crate::plan::transport::{Sensor, TransportPlan};
 use crate::records::Receiver;
 use crate::render::stop::mean_squared_radius;
-use crate::render::{self, Control, Progress};
+use crate::render::{Control, Progress};
 use crate::scene::geometry::Geometry;
 use crate::scene::light::{Light, LightKind};
 use crate::scene::{Camera, Scene};
@@ -86,10 +86,11 @@ pub(super) struct TransportArgs {
     #[arg(long, value_parser = whole::<u32>, allow_negative_numbers = true, help_heading = "Transport")]
     group_size: Option<u32>,
 
-    /// Radius of the global map's estimate in the first round, metres [default: by the scene's area]
+    /// Radius of the global map's estimate in the first round, metres [default: so that about 60 photons lie
+    /// within it at most points that are asked about, by a trial round]
     #[arg(long, value_parser = number::<f64>, allow_negative_numbers = true, help_heading = "Estimate")]
     radius: Option<f64>,
-    /// The same of the caustic map [default: by the scene's area, a quarter of the global map's]
+    /// The same of the caustic map [default: as for the global map]
     #[arg(long, value_parser = number::<f64>, allow_negative_numbers = true, help_heading = "Estimate")]
     caustic_radius: Option<f64>,
     /// How fast the radius shrinks from round to round (Knaus and Zwicker 2011), above 0; 1 keeps it
@@ -263,9 +264,14 @@ pub(super) struct Job<'a> {
     pub(super) phases: &'a [Vec<Receiver>],
 }
 
-/// The geometry of what is left of a scene, and the plan.
+/// The plan of a job, its default radii by a trial round.
 pub(super) fn plan(gpu: &Gpu, job: &Job, geometry: &Geometry) -> Result<TransportPlan> {
-    TransportPlan::new(job.scene, geometry, job.settings, job.sensor, &render::limits(gpu.facts()))
+    let view = View { geometry, camera: job.camera, phases: job.phases };
+    let plan = transport::trial::plan(gpu, job.scene, &view, job.settings, job.sensor)?;
+    if let Some(warning) = light_report::radius_warning(&plan, geometry) {
+        complain(&format!("warning: {warning}"));
+    }
+    Ok(plan)
 }
 
 /// Geometry of a scene without the effects that are left out.

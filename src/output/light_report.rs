@@ -10,7 +10,8 @@ use crate::bias::Bias;
 use crate::ledger::Ledger;
 use crate::oddities::Oddities;
 use crate::plan::evidence::EffectDecision;
-use crate::plan::transport::{MapPlan, Sensor, TransportPlan};
+use crate::plan::transport::{MapPlan, RadiusFrom, Sensor, TransportPlan, Trial};
+use crate::scene::geometry::Geometry;
 use crate::settings::transport::{Effect, TransportSettings};
 use crate::timings::{Row, Timings};
 use crate::transport::stop::error_bound;
@@ -93,6 +94,22 @@ pub fn missing(plan: &TransportPlan) -> Option<String> {
     (!names.is_empty()).then(|| format!("left out, though the scene has it: {}; the result lacks that light", names.join(", ")))
 }
 
+/// Share of the points that may lie in something smaller than the radius.
+const TOO_WIDE: f64 = 0.1;
+
+/// One line on a radius by a trial round that is wider than what many points lie in.
+pub fn radius_warning(plan: &TransportPlan, geometry: &Geometry) -> Option<String> {
+    let trial = plan.trial.as_ref().filter(|trial| trial.too_wide > TOO_WIDE)?;
+    let widest = plan.maps().filter(|map| map.radius_from == RadiusFrom::Trial).max_by(|a, b| a.radius.total_cmp(&b.radius))?;
+    let option = if widest.caustic_only { "--caustic-radius" } else { "--radius" };
+    Some(format!(
+        "the radius of the {} map, {:.3} m, is wider than what {:.0} % of the points lie in, so that their light is blurred; more photons or a smaller {option} helps",
+        widest.name,
+        widest.radius * geometry.unit,
+        100.0 * trial.too_wide
+    ))
+}
+
 /// The JSON report of a run.
 #[derive(Serialize)]
 struct Report<'a> {
@@ -134,12 +151,20 @@ struct Anomalies {
 struct PlanReport<'a> {
     effects: Vec<EffectRow<'a>>,
     maps: Vec<&'a MapPlan>,
+    /// What found the radii that nobody has given.
+    trial: Option<&'a Trial>,
     points_per_pixel: u32,
     bytes: u64,
 }
 
 fn plan_report<'a>(plan: &'a TransportPlan, run: Option<(&Timings, &[u64])>) -> PlanReport<'a> {
-    PlanReport { effects: rows(plan, run), maps: plan.maps().collect(), points_per_pixel: plan.points_per_pixel, bytes: plan.bytes }
+    PlanReport {
+        effects: rows(plan, run),
+        maps: plan.maps().collect(),
+        trial: plan.trial.as_ref(),
+        points_per_pixel: plan.points_per_pixel,
+        bytes: plan.bytes,
+    }
 }
 
 /// A plan as JSON.

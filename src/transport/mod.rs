@@ -19,6 +19,7 @@ pub mod points;
 pub mod replay;
 pub mod resources;
 pub mod stop;
+pub mod trial;
 
 use std::sync::atomic::Ordering;
 use std::time::{Duration, Instant};
@@ -128,6 +129,11 @@ pub fn light(gpu: &Gpu, view: &View, plan: TransportPlan, control: &mut Control)
     commands.timings().count("run");
     commands.timings().count("plan");
     commands.timings().add(Span { name: "plan".into(), clock: Clock::Wall, start: Duration::ZERO, duration: plan.planned_in });
+    if let Some(trial) = &plan.trial {
+        let duration = Duration::from_secs_f64(trial.seconds);
+        commands.timings().count("trial");
+        commands.timings().add(Span { name: "trial".into(), clock: Clock::Wall, start: Duration::ZERO, duration });
+    }
     let resources = commands.scope("set-up", |commands| TransportResources::new(gpu, commands, view.geometry, &plan, view.phases))?;
     commands.warm_up()?;
     commands.submit()?;
