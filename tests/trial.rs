@@ -83,6 +83,7 @@ fn tried(gpu: &Gpu, scene: &Scene, geometry: &Geometry, settings: &TransportSett
 fn built_in_scenes_keep_about_the_radius_of_their_area() {
     let Some(gpu) = device() else { return };
     let settings = TransportSettings::default();
+    let mut off = Vec::new();
     for name in ["open-box", "cornell", "cornell-spheres", "caustic-sphere", "furnace"] {
         let scene = scene(name);
         let geometry = Geometry::new(&scene).unwrap();
@@ -92,10 +93,12 @@ fn built_in_scenes_keep_about_the_radius_of_their_area() {
             assert_eq!(map.radius_from, RadiusFrom::Trial);
             let ratio = map.radius / area_radius(&geometry, map.photons, map.caustic_only);
             println!("{name}, {}: {ratio:.3} of the radius by area, {trial:?}", map.name);
-            assert!((0.5..2.1).contains(&ratio), "{name}, {}: {ratio}", map.name);
+            if !(0.7..1.45).contains(&ratio) || trial.too_wide > 0.1 {
+                off.push(format!("{name}, {}: {ratio}, {trial:?}", map.name));
+            }
         }
-        assert!(trial.too_wide < 0.1, "{name}: {trial:?}");
     }
+    assert!(off.is_empty(), "{off:#?}");
 }
 
 /// The radius follows from scene, points and settings alone; one that is given is taken, and nothing is tried.

@@ -86,11 +86,11 @@ pub(super) struct TransportArgs {
     #[arg(long, value_parser = whole::<u32>, allow_negative_numbers = true, help_heading = "Transport")]
     group_size: Option<u32>,
 
-    /// Radius of the global map's estimate in the first round, metres [default: so that about 60 photons lie
-    /// within it at most points that are asked about, by a trial round]
+    /// Radius of the global map's estimate in the first round, metres [default: by a trial round, so that
+    /// about 24 photons lie within it at the median of the points that are asked about]
     #[arg(long, value_parser = number::<f64>, allow_negative_numbers = true, help_heading = "Estimate")]
     radius: Option<f64>,
-    /// The same of the caustic map [default: as for the global map]
+    /// The same of the caustic map [default: by the same trial, for 6 photons]
     #[arg(long, value_parser = number::<f64>, allow_negative_numbers = true, help_heading = "Estimate")]
     caustic_radius: Option<f64>,
     /// How fast the radius shrinks from round to round (Knaus and Zwicker 2011), above 0; 1 keeps it

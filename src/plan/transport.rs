@@ -64,7 +64,7 @@ pub struct Trial {
     /// Radii of the first round, normalised; `None` where the map has none, or its radius is given.
     pub global_radius: Option<f64>,
     pub caustic_radius: Option<f64>,
-    /// Points that were asked, of those that the run asks about.
+    /// Points that were asked, some of those that the run asks about.
     pub points: u32,
     /// Share of them that lie in something smaller than the radius: whose way along the surface to the next wall or edge
     /// is shorter. Of the map with the larger radius.
@@ -151,7 +151,7 @@ pub struct TransportPlan {
 /// Triangles up to which a list may be asked for: a path tests it some hundred times, and loops are short.
 const MAX_LIST_TRIANGLES: usize = 256;
 /// Photons within the first radius of the global map, on average.
-pub const PHOTONS_PER_ESTIMATE: f64 = 60.0;
+const PHOTONS_PER_ESTIMATE: f64 = 60.0;
 /// A caustic's photons lie closer: its radius over that of as many photons spread over everything.
 const CAUSTIC_RADIUS_SHARE: f64 = 0.25;
 /// Radii relative to the scene's normalised extent: from f32's resolution of positions up to all of it.

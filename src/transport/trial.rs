@@ -3,7 +3,7 @@
 //!
 //! A radius by the scene's area is right where photons lie everywhere alike. Of a room on a plain it would be wider than the
 //! room. So a few photons are traced, with random numbers that no run has, and each of a few points is given the radius
-//! within which a round of the run will leave [`PHOTONS_PER_ESTIMATE`]. The median is taken, in steps of a fourth root of 2:
+//! within which a round of the run will leave [`PHOTONS_AT_POINT`]. The median is taken, in steps of a fourth root of 2:
 //! an integer, so that nothing but these photons and points decides. It depends on no seed, builder or split.
 
 use std::time::Instant;
@@ -19,9 +19,7 @@ use crate::gpu::kernels::Clearance;
 use crate::gpu::{Commands, Extent, Gpu, Kernel, Memory};
 use crate::photon::MapPhoton;
 use crate::plan::Limits;
-use crate::plan::transport::{
-    MAX_DEFAULT_RADIUS, MapPlan, PHOTONS_PER_ESTIMATE, RADIUS_RANGE, RadiusFrom, Sensor, TransportPlan, Trial, area_radius,
-};
+use crate::plan::transport::{MAX_DEFAULT_RADIUS, MapPlan, RADIUS_RANGE, RadiusFrom, Sensor, TransportPlan, Trial, area_radius};
 use crate::records::{ClearancePush, VisiblePoint};
 use crate::render;
 use crate::scene::Scene;
@@ -35,6 +33,11 @@ const PHOTONS: u32 = 1 << 14;
 const POINTS: u32 = 1 << 10;
 /// Nearest photons whose distance tells the density at a point.
 const NEAREST: usize = 8;
+/// Photons of a round within the radius of a point of the global map: about what the rule by the area leaves of light that
+/// was scattered before, in closed rooms.
+const PHOTONS_AT_POINT: f64 = 24.0;
+/// The same of the caustic map, whose light has edges: half the radius.
+const CAUSTIC_PHOTONS_AT_POINT: f64 = 6.0;
 /// Steps of a radius in a factor of 2.
 const STEPS: f64 = 4.0;
 /// Of the clearance of points: a radius that is no larger reaches round few corners.
@@ -102,7 +105,8 @@ fn run(gpu: &Gpu, scene: &Scene, view: &View, run: &TransportPlan, limits: &Limi
             continue;
         }
         let found = photons_of(&mut commands, round, map)?;
-        let own: Vec<f64> = asked.par_iter().map(|point| own_radius(&visible_points[*point], &found, of_run.photons)).collect();
+        let wanted = if map.caustic_only { CAUSTIC_PHOTONS_AT_POINT } else { PHOTONS_AT_POINT };
+        let own: Vec<f64> = asked.par_iter().map(|point| own_radius(&visible_points[*point], &found, of_run.photons, wanted)).collect();
         let clear: Vec<f64> = asked.iter().map(|point| f64::from(clearances[*point])).collect();
         let by_area = area_radius(view.geometry, of_run.photons, map.caustic_only);
         let radius = radius(&own, &clear, by_area);
@@ -129,9 +133,9 @@ fn photons_of(commands: &mut Commands, round: Round, map: &MapPlan) -> Result<Ve
     Ok(found)
 }
 
-/// The radius around a point within which a round of so many photons is to leave [`PHOTONS_PER_ESTIMATE`]; infinite where too
-/// few photons are about to tell.
-fn own_radius(point: &VisiblePoint, photons: &[MapPhoton], photons_of_run: u32) -> f64 {
+/// The radius around a point within which a round of so many photons is to leave `wanted`; infinite where too few photons are
+/// about to tell.
+fn own_radius(point: &VisiblePoint, photons: &[MapPhoton], photons_of_run: u32, wanted: f64) -> f64 {
     let normal = unpack_normal(point.normal);
     // Squared distances, ascending.
     let mut nearest = [f32::INFINITY; NEAREST];
@@ -146,7 +150,7 @@ fn own_radius(point: &VisiblePoint, photons: &[MapPhoton], photons_of_run: u32) 
     }
     // The disc up to the k-th of some points at random holds k - 1/3 in the median.
     let of_trial = (NEAREST as f64 - 1.0 / 3.0) * f64::from(photons_of_run) / f64::from(PHOTONS);
-    (f64::from(nearest[NEAREST - 1]) * PHOTONS_PER_ESTIMATE / of_trial).sqrt()
+    (f64::from(nearest[NEAREST - 1]) * wanted / of_trial).sqrt()
 }
 
 /// Whether a photon counts at a point. Twin of `belongs` in `glsl/scene/belongs.glsl`.
@@ -189,7 +193,7 @@ mod tests {
 
     /// Photons on a grid of a plane have a density that is known; those of another plane do not count.
     #[test]
-    fn a_points_own_radius_holds_sixty_photons_of_the_run() {
+    fn a_points_own_radius_holds_as_many_photons_of_the_run_as_wanted() {
         let up = crate::scene::geometry::pack_normal(Vec3::Z);
         let side = 256;
         let place = |i: usize| (i as f32 + 0.5) / side as f32 - 0.5;
@@ -201,9 +205,9 @@ mod tests {
         };
         let photons: Vec<MapPhoton> = (0..side * side).flat_map(|i| [photon(i, 0.0), photon(i, 0.001)]).collect();
         let point = VisiblePoint { position: Vec3::ZERO, normal: up, ..bytemuck::Zeroable::zeroed() };
-        let found = own_radius(&point, &photons, 4 * PHOTONS);
-        let exact = (PHOTONS_PER_ESTIMATE / (std::f64::consts::PI * 4.0 * (side * side) as f64)).sqrt();
+        let found = own_radius(&point, &photons, 4 * PHOTONS, 60.0);
+        let exact = (60.0 / (std::f64::consts::PI * 4.0 * (side * side) as f64)).sqrt();
         assert!((found / exact - 1.0).abs() < 0.3, "{found}, {exact}");
-        assert_eq!(own_radius(&point, &photons[..3], PHOTONS), f64::INFINITY);
+        assert_eq!(own_radius(&point, &photons[..3], PHOTONS, 60.0), f64::INFINITY);
     }
 }
