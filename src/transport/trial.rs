@@ -4,7 +4,8 @@
 //! A radius by the scene's area is right where photons lie everywhere alike. Of a room on a plain it would be wider than the
 //! room. So a few photons are traced, with random numbers that no run has, and each of a few points is given the radius
 //! within which a round of the run will leave about two dozen. The median is taken, in steps of a fourth root of 2:
-//! an integer, so that nothing but these photons and points decides. It depends on no seed, builder or split.
+//! an integer, so that nothing but these photons and points decides; but no more than the radius by the area. It depends on no
+//! seed, builder or split.
 
 use std::time::Instant;
 
@@ -171,7 +172,8 @@ fn radius(own: &[f64], clear: &[f64], by_area: f64) -> f64 {
     // Where no photon came near, the scene's area is all that is known.
     let steps = reached.unwrap_or((STEPS * by_area.log2()).round());
     let room = median(clear.iter().map(|clear| CLEARANCE_SHARE * clear).collect()).unwrap_or(f64::INFINITY);
-    (steps.min(room) / STEPS).exp2().clamp(RADIUS_RANGE.0, MAX_DEFAULT_RADIUS)
+    // The median point of a caustic lies at its faint rim: what is wider than by the area is wider than need be.
+    (steps.min(room) / STEPS).exp2().min(by_area).clamp(RADIUS_RANGE.0, MAX_DEFAULT_RADIUS)
 }
 
 #[cfg(test)]
