@@ -103,6 +103,10 @@ struct DispatchSizePush {
     uint max_groups;
 };
 
+struct ClearancePush {
+    uint point_count;
+};
+
 struct CrowdSizePush {
     uint items_per_group;
     uint max_groups;

@@ -88,6 +88,11 @@ constants! {
     PART_CAUSTIC = 4;
     PART_INDIRECT = 8;
     PART_COUNT = 4;
+    /// Kinds of chances by which light may reach a pixel.
+    HIT_SHADOW_RAY = 0;
+    HIT_CAUSTIC_PHOTON = 1;
+    HIT_GLOBAL_PHOTON = 2;
+    HIT_KINDS = 3;
 
     /// Bits of a visible point's arrivals: it lies behind a mirror or glass, or behind a gather ray; or neither, so that
     /// one of a pixel's samples looks the global map up for all (each looks caustics up for itself).

@@ -6,6 +6,7 @@ use std::f64::consts::PI;
 use crate::plan::Plan;
 use crate::scene::room::RoomScene;
 use crate::settings::Sums;
+use crate::unknown::{Unknown, most_hits};
 
 /// Sums of a run, point by point, and what they are worth.
 #[derive(Debug, Clone, PartialEq)]
@@ -95,6 +96,32 @@ impl Film {
         if means > 0.0 { (square_sum(&|point| self.flux_error(point)) / means).sqrt() } else { 0.0 }
     }
 
+    /// Points of walls that reflect, but where no photon was stored: what is known of them is a bound. Of relative flux, a
+    /// photon has 1 at most; `unit` makes W/m2 of flux times weight.
+    pub fn unknown(&self, weights: &[f64], unit: f64, confidence: f64) -> Unknown {
+        let mut unknown = Unknown { asked: weights.iter().filter(|weight| **weight > 0.0).count() as u64, ..Unknown::default() };
+        let (mut bounds, mut result) = (0.0, 0.0);
+        for (point, weight) in weights.iter().enumerate().filter(|(_, weight)| **weight > 0.0) {
+            result += (weight * self.flux(point)).powi(2);
+            if self.is_unreached(point) {
+                let most = weight * most_hits(confidence);
+                unknown.add_unreached(unit * most);
+                bounds += most * most;
+            }
+        }
+        unknown.relative_to(bounds, result)
+    }
+
+    /// [`Film::flux_error`], but infinite where nothing was found on a wall that reflects.
+    fn stated_error(&self, point: usize, albedo: f32) -> f64 {
+        if albedo > 0.0 && self.is_unreached(point) { f64::INFINITY } else { self.flux_error(point) }
+    }
+
+    /// Whether no photon was found at a point.
+    pub fn is_unreached(&self, point: usize) -> bool {
+        self.units(point * self.channel_count as usize) == 0.0
+    }
+
     pub fn point_count(&self) -> usize {
         self.sums.len() / self.channel_count as usize
     }
@@ -133,7 +160,7 @@ pub struct WallEstimate {
     pub radiosity: Vec<f64>,
     /// Arriving flux an area, W/m2: radiosity over albedo.
     pub irradiance: Vec<f64>,
-    /// Their standard errors, W/m2; infinite where fewer than two rounds are whole.
+    /// Their standard errors, W/m2; infinite where fewer than two rounds are whole, and where no photon was found.
     pub radiosity_error: Vec<f64>,
     pub irradiance_error: Vec<f64>,
 }
@@ -186,7 +213,8 @@ pub fn estimate_walls(film: &Film, scene: &RoomScene, plan: &Plan) -> Vec<WallEs
             let density = |flux: &dyn Fn(usize) -> f64| -> Vec<f64> {
                 (first..first + mesh * mesh).map(|point| flux(point) * watts / areas[point]).collect()
             };
-            let (radiosity, radiosity_error) = (density(&|point| film.flux(point)), density(&|point| film.flux_error(point)));
+            let (radiosity, radiosity_error) =
+                (density(&|point| film.flux(point)), density(&|point| film.stated_error(point, wall.albedo)));
             let over_albedo = |values: &[f64]| values.iter().map(|value| value / f64::from(wall.albedo)).collect();
             WallEstimate {
                 name: wall.name,

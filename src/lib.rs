@@ -18,7 +18,7 @@
 //! uses only what stands to its left:
 //!
 //! ```text
-//! constants, records, path, photon, error, bias, ledger, rng, settings, timings < scene < plan < cpu
+//! constants, records, path, photon, error, bias, unknown, ledger, rng, settings, timings < scene < plan < cpu
 //! scene < judge
 //! constants, records, error, ledger, timings < gpu
 //! gpu < oddities, tallies, totals; plan, gpu < prefix_sum
@@ -65,3 +65,4 @@ pub mod timings;
 pub mod totals;
 pub mod trace;
 pub mod transport;
+pub mod unknown;

@@ -181,6 +181,10 @@ records! {
         max_groups: u32,
     }
 
+    ClearancePush {
+        point_count: u32,
+    }
+
     CrowdSizePush {
         items_per_group: u32,
         max_groups: u32,

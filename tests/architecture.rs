@@ -6,7 +6,7 @@ use std::fs;
 use std::path::{Path, PathBuf};
 
 /// What everyone may use, and what among itself has no order.
-const GROUND: [&str; 10] = ["error", "bias", "constants", "records", "path", "photon", "ledger", "rng", "settings", "timings"];
+const GROUND: [&str; 11] = ["error", "bias", "unknown", "constants", "records", "path", "photon", "ledger", "rng", "settings", "timings"];
 /// From left to right.
 const LINE: [&str; 24] = [
     "scene",

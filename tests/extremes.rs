@@ -193,7 +193,8 @@ fn standard_errors_survive_a_mean_far_above_them() {
     let half = u64::from(settings.rounds) / 2;
     let square = |value: u64| u128::from(value) * u128::from(value);
     let squares = u128::from(half) * (square(low) + square(high));
-    let film = RoundFilm::new(settings.rounds, vec![half * (low + high); 3], [squares as u64, (squares >> 64) as u64].repeat(3));
+    let film =
+        RoundFilm::new(settings.rounds, vec![half * (low + high); 3], [squares as u64, (squares >> 64) as u64].repeat(3), vec![0; 3]);
     let exact = 0.1 / (f64::from(settings.rounds) - 1.0).sqrt();
     assert_holds("mean", relative_check("mean", film.mean(0, &plan).x, 1000.0, 1e-6));
     assert_holds("error", relative_check("standard error", film.standard_error(0, &plan).x, exact, 1e-3));

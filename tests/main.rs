@@ -45,3 +45,5 @@ mod strict;
 mod study;
 mod transport;
 mod tree;
+mod trial;
+mod unknown;

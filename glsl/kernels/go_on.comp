@@ -30,6 +30,7 @@ layout(set = 1, binding = 11, scalar) readonly buffer CameraPaths { CameraPath c
 #include "scene/direct.glsl"
 #include "film/wide.glsl"
 #include "scene/film.glsl"
+#include "scene/one_hit.glsl"
 #include "scene/no_point.glsl"
 #include "stages/visible_point.glsl"
 #include "stages/chain.glsl"

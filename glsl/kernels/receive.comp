@@ -35,6 +35,7 @@ layout(set = 0, binding = 8, scalar) readonly buffer Receivers { Receiver receiv
 #include "film/wide.glsl"
 #include "scene/film.glsl"
 #include "scene/no_point.glsl"
+#include "scene/one_hit.glsl"
 #include "stages/visible_point.glsl"
 #include "stages/chain.glsl"
 
@@ -52,6 +53,7 @@ void main()
     Chain chain = new_chain(position, ns, vec3(1.0), vec2(0.0));
     if (SHADOW_RAYS != 0) {
         add_light(chain, direct_light(here, push.emitter_count, push.draws, index, 0, RECEIVER_BLOCK));
+        note_shadow_rays(index, vec3(1.0));
     }
     // Photons only ever land on surfaces, and tell the irradiance of those: any other point, or direction, looks
     // around.

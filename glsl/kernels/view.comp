@@ -33,6 +33,7 @@ layout(push_constant, scalar) uniform Push { ViewPush push; };
 #include "scene/film.glsl"
 #include "scene/tiles.glsl"
 #include "scene/no_point.glsl"
+#include "scene/one_hit.glsl"
 #include "stages/visible_point.glsl"
 #include "stages/chain.glsl"
 

@@ -27,6 +27,7 @@ layout(set = 1, binding = 2, scalar) buffer Estimates { uvec2 estimates[]; };
 #include "scene/film.glsl"
 #include "scene/tiles.glsl"
 #include "scene/no_point.glsl"
+#include "scene/one_hit.glsl"
 
 vec3 gathered_flux(uint place)
 {
@@ -81,26 +82,41 @@ void main()
         first_arrival = 0;
     }
     float global_area = 0.0; // 0: not known yet
+    // The area of what nothing is found in costs as much as any: rounds 0, 1, 2, 4, 8 and so on are enough to know it.
+    bool looks_at_misses = (push.round & (push.round - 1)) == 0;
     for (uint arrival = first_arrival; arrival < 3; arrival++) {
         if ((point.arrivals & push.arrivals & (1u << arrival)) == 0) {
             continue;
         }
         vec3 flux = gathered_flux((arrival - first_arrival) * push.point_count + place);
-        if (flux == vec3(0.0)) {
-            continue;
-        }
         bool is_caustic = false;
         if (HAS_CAUSTIC_MAP) {
             is_caustic = arrival == 1;
         }
+        uint pixel = place % push.pixel_count;
+        uint kind = is_caustic ? HIT_CAUSTIC_PHOTON : HIT_GLOBAL_PHOTON;
+        bool is_new = !is_reached(pixel, kind);
+        if (flux == vec3(0.0)) {
+            if (!(is_new && looks_at_misses && point.weight != vec3(0.0))) {
+                continue;
+            }
+        } else if (is_new) {
+            note_hit(pixel, kind);
+        }
         float area = is_caustic ? 0.0 : global_area;
         if (area == 0.0) {
-            area = estimate_area(point, place % push.pixel_count, is_caustic ? push.caustic_radius : push.global_radius);
+            area = estimate_area(point, pixel, is_caustic ? push.caustic_radius : push.global_radius);
         }
         global_area = is_caustic ? global_area : area;
         float for_all = !is_caustic && (point.arrivals & SEEN_FOR_ALL) != 0 ? float(SAMPLES) : 1.0;
-        vec3 radiance = for_all * point.weight * (flux * divide(is_caustic ? push.caustic_flux : push.global_flux, area));
-        note_unless(is_finite(radiance), ODD_ESTIMATE, 0, push.round, place % push.pixel_count);
+        float density = divide(is_caustic ? push.caustic_flux : push.global_flux, area);
+        if (flux == vec3(0.0)) {
+            float radius = is_caustic ? push.caustic_radius : push.global_radius;
+            note_miss(pixel, kind, for_all * point.weight * (density * radius * radius));
+            continue;
+        }
+        vec3 radiance = for_all * point.weight * (flux * density);
+        note_unless(is_finite(radiance), ODD_ESTIMATE, 0, push.round, pixel);
         uint part = part_number(point.arrivals, arrival);
         uint chance = mix32(push.rounding + position_bits(point.position));
         for (uint channel = 0; channel < 3; channel++) {

@@ -11,11 +11,19 @@ struct Target {
     float exponent;
 };
 
+// Of the place that was asked last: the most that one shadow ray would have added which something stopped, and whether some
+// light arrived. A ray to a point or along a direction finds the same each time, so that one that is stopped is no chance
+// missed.
+vec3 stopped_light = vec3(0.0);
+bool light_arrived = false;
+
 // What arrives straight from lights, times lobe and cosine: irradiance where there is no lobe. The rays of all samples of
 // the place `index` share a block of random numbers.
 vec3 direct_light(Target point, uint emitter_count, Draws draws, uint index, uint number, uint block)
 {
     vec3 sum = vec3(0.0);
+    stopped_light = vec3(0.0);
+    light_arrived = false;
     if (emitter_count == 0) {
         return sum;
     }
@@ -31,8 +39,14 @@ vec3 direct_light(Target point, uint emitter_count, Draws draws, uint index, uin
             vec3 start = offset_origin(point.position, point.error, point.ng, point.ng);
             bool hidden = arriving.is_far ? traverse(start, arriving.wi, uintBitsToFloat(0x7f7fffffu), true).triangle != NONE
                                           : is_occluded(start, arriving.target - start);
+            vec3 light = arriving.radiance * (cosine * lobe_weight(point.kind, point.exponent, point.ns, point.wo, arriving.wi));
             if (!hidden) {
-                sum += arriving.radiance * (cosine * lobe_weight(point.kind, point.exponent, point.ns, point.wo, arriving.wi));
+                sum += light;
+                light_arrived = true;
+            } else {
+                uint kind = emitters[pick_emitter(emitter_count, u.z)].kind;
+                bool is_certain = kind == EMITTER_POINT || kind == EMITTER_SPOT || kind == EMITTER_DIRECTIONAL;
+                stopped_light = is_certain ? stopped_light : max(stopped_light, divide(light, float(SHADOW_RAYS)));
             }
         }
     }

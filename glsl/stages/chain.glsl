@@ -39,6 +39,18 @@ void add_light(inout Chain chain, vec3 radiance)
     }
 }
 
+// Notes what the latest shadow rays found; `weight` is what light at their point adds to the pixel.
+void note_shadow_rays(uint pixel, vec3 weight)
+{
+    if (light_arrived) {
+        if (!is_reached(pixel, HIT_SHADOW_RAY)) {
+            note_hit(pixel, HIT_SHADOW_RAY);
+        }
+    } else {
+        note_miss(pixel, HIT_SHADOW_RAY, weight * stopped_light);
+    }
+}
+
 // The arrivals at the current vertex that some part asks for by photons: shadow rays see to direct light, and a gather
 // ray to indirect.
 uint arrivals_wanted(Chain chain, bool gathers)
@@ -106,6 +118,7 @@ bool follow(inout Chain chain, uint index, uint number, Draws draws, uint emitte
                 if ((PARTS & part_of(chain, ARRIVED_DIRECT)) != 0) {
                     Target here = Target(surface.position, surface.error, surface.ng, surface.ns, wo, surface.kind, surface.parameter);
                     add_light(chain, scale * direct_light(here, emitter_count, draws, index, number, block + 1));
+                    note_shadow_rays(index, divide(chain.weight * scale, float(SAMPLES)));
                 }
             }
             bool for_all = !chain.saw_specular && !chain.gathers;

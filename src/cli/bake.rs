@@ -4,7 +4,6 @@ use std::path::PathBuf;
 use std::sync::atomic::AtomicBool;
 
 use clap::Args;
-use glam::DVec3;
 
 use super::parse::parse_number;
 use super::progress::ProgressReporter;
@@ -111,12 +110,10 @@ fn receivers(layout: &Layout, phase: usize, geometry: &Geometry) -> Vec<Receiver
 }
 
 fn estimates(lit: &Lit) -> Vec<TexelEstimate> {
-    // Of a single round no error is known; a map cannot say so but by a value that is no number.
-    let known = |error: DVec3| if error.is_finite() { error.as_vec3() } else { glam::Vec3::NAN };
     (0..lit.film.pixels())
         .map(|texel| TexelEstimate {
             irradiance: lit.film.mean(texel, &lit.plan).as_vec3(),
-            standard_error: known(lit.film.standard_error(texel, &lit.plan)),
+            standard_error: lit.film.stated_error(texel, &lit.plan).as_vec3(),
         })
         .collect()
 }

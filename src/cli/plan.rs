@@ -11,7 +11,7 @@ use crate::gpu::Gpu;
 use crate::output::destination::write_all;
 use crate::output::light_report;
 use crate::plan::Limits;
-use crate::plan::transport::{Sensor, TransportPlan};
+use crate::plan::transport::{RadiusFrom, Sensor, TransportPlan};
 use crate::render;
 use crate::settings::transport::{Part, TransportSettings};
 
@@ -69,8 +69,12 @@ pub(super) fn run(args: &PlanArgs) -> Result<()> {
     let maps: Vec<String> = plan
         .maps()
         .map(|map| {
-            let metres = map.radius * geometry.unit;
-            format!("{} map: {} photons per round in {} chunk(s), first radius {metres:.4} m", map.name, map.photons, map.chunks().count())
+            let radius = match map.radius_from {
+                RadiusFrom::User => format!("{:.4} m", map.radius * geometry.unit),
+                // A plan needs no device, and a trial round does.
+                _ => "from a trial round at the start of the run".to_owned(),
+            };
+            format!("{} map: {} photons per round in {} chunk(s), first radius {radius}", map.name, map.photons, map.chunks().count())
         })
         .collect();
     say(&format!("{text}{}\n{width} x {height} pixels\n{} bytes of device memory", maps.join("\n"), plan.bytes))

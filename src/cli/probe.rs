@@ -22,8 +22,8 @@ use crate::transport::Lit;
 
 #[derive(Args)]
 pub(super) struct ProbeArgs {
-    /// CSV with one line per point: irradiance of red, green and blue in W/m2, and their standard errors; `-` is standard
-    /// output
+    /// CSV with one line per point: irradiance of red, green and blue in W/m2, and their standard errors, `inf`
+    /// where unknown: after a single round, or where no light has reached the point though some may; `-` is standard output
     #[arg(short, long, alias = "out", value_name = "FILE", help_heading = "Output")]
     output: PathBuf,
     #[command(flatten)]
@@ -96,15 +96,15 @@ fn receivers(points: &[(DVec3, DVec3)], geometry: &Geometry) -> Vec<Receiver> {
         .collect()
 }
 
-/// Irradiance and standard errors, W/m2; an error that is not known is left empty.
+/// Irradiance and standard errors, W/m2; an error that is not known is `inf`.
 fn table(lit: &Lit) -> Vec<u8> {
     let mut table = csv::Writer::from_writer(Vec::new());
     table.write_record(["red", "green", "blue", "red_error", "green_error", "blue_error"]).expect("memory takes what is written");
     for point in 0..lit.film.pixels() {
-        let (mean, error) = (lit.film.mean(point, &lit.plan), lit.film.standard_error(point, &lit.plan));
-        let known = |value: f64| if value.is_finite() { value.to_string() } else { String::new() };
-        let row = [mean.x.to_string(), mean.y.to_string(), mean.z.to_string(), known(error.x), known(error.y), known(error.z)];
-        table.write_record(row).expect("memory takes what is written");
+        let (mean, error) = (lit.film.mean(point, &lit.plan), lit.film.stated_error(point, &lit.plan));
+        table
+            .write_record([mean.x, mean.y, mean.z, error.x, error.y, error.z].map(|value| value.to_string()))
+            .expect("memory takes what is written");
     }
     table.into_inner().expect("memory takes what is written")
 }

@@ -18,7 +18,8 @@ use crate::output::colour::ColourPicture;
 use crate::output::destination::{Destination, check_distinct, write_all};
 use crate::output::image::Format;
 use crate::output::light_report;
-use crate::plan::transport::Sensor;
+use crate::plan::transport::{Sensor, TransportPlan};
+use crate::render::limits;
 use crate::scene::{Camera, Scene};
 use crate::settings::transport::{Filter, Part, TransportSettings};
 use crate::transport::Lit;
@@ -31,7 +32,8 @@ pub(super) struct RenderArgs {
     output: Option<PathBuf>,
     #[command(flatten)]
     report: ReportArgs,
-    /// Write the standard error of each pixel as an .exr, W/m2/sr
+    /// Write the standard error of each pixel as an .exr, W/m2/sr; infinite where unknown: after a single round, or where no
+    /// light has reached the pixel though some may
     #[arg(long, value_name = "FILE", help_heading = "Output")]
     error_image: Option<PathBuf>,
     /// Exposure of a PNG in stops, each of which doubles the brightness [default: the mean becomes middle grey]
@@ -163,10 +165,10 @@ fn show_photon(args: &RenderArgs, settings: &TransportSettings, name: PhotonName
     let scene = args.scene.open(&reporter)?;
     let camera = camera(&scene, args.camera.as_deref())?;
     let (width, height) = PictureSize::resolve(args.size, &camera, &reporter)?;
-    let job = Job { scene: &scene, settings, sensor: Sensor::Picture { width, height }, camera: None, phases: &[] };
     let geometry = geometry(&scene, settings, &reporter)?;
     let gpu = args.device.open(&reporter)?;
-    let plan = plan(&gpu, &job, &geometry)?;
+    // A photon's path does not depend on the radius.
+    let plan = TransportPlan::new(&scene, &geometry, settings, Sensor::Picture { width, height }, &limits(gpu.facts()))?;
     let path = replay::replay(&gpu, &geometry, &plan, name)?;
     reporter.finish();
     say(&path.table(&geometry, &plan))?;
@@ -200,6 +202,6 @@ fn radiance(lit: &Lit, width: u32, height: u32) -> ColourPicture {
 }
 
 fn standard_error(lit: &Lit, width: u32, height: u32) -> ColourPicture {
-    let pixels = (0..lit.film.pixels()).map(|pixel| lit.film.standard_error(pixel, &lit.plan).as_vec3()).collect();
+    let pixels = (0..lit.film.pixels()).map(|pixel| lit.film.stated_error(pixel, &lit.plan).as_vec3()).collect();
     ColourPicture { width, height, pixels }
 }

@@ -11,7 +11,7 @@ use super::progress::{ProgressArgs, ProgressReporter};
 use super::stop::{StopArgs, bias_before, goals, rounds_after};
 use super::{DeviceArgs, End, JsonArg, TimingArgs, complain, optional_file, say, say_beside};
 use crate::error::{Error, Result};
-use crate::film::estimate_walls;
+use crate::film::{estimate_walls, irradiance_weights};
 use crate::gpu::Gpu;
 use crate::output::destination::{Destination, Folder, check_distinct, write_all};
 use crate::output::image::{Format, overview};
@@ -453,6 +453,9 @@ impl Outputs {
     fn write(self, mut outcome: Outcome, scene: &RoomScene) -> Result<()> {
         let began = Instant::now();
         let walls = estimate_walls(&outcome.film, scene, &outcome.plan);
+        // W of a photon of relative flux 1.
+        let watts = outcome.plan.flux_unit / outcome.film.emitted.max(1) as f64;
+        let unknown = outcome.film.unknown(&irradiance_weights(scene, &outcome.plan), watts, outcome.plan.settings.stop.confidence);
         let (destination, format) = self.picture;
         let picture = destination.path().display().to_string();
         let mut files = vec![(destination, overview(scene, &walls).encode(format))];
@@ -464,14 +467,14 @@ impl Outputs {
         outcome.timings.add(Span { name: "output".into(), clock: Clock::Wall, start: run, duration: began.elapsed() });
 
         if let Some(json) = self.json {
-            files.push((json, report::json(&outcome, &walls)));
+            files.push((json, report::json(&outcome, &walls, &unknown)));
         }
         if let Some(trace) = self.trace {
             let device = outcome.device.as_ref().map_or("CPU", |facts| &facts.name);
             files.push((trace, trace_file::chrome_trace(&outcome.timings, device)));
         }
         let destinations: Vec<Destination> = files.iter().map(|(destination, _)| destination.clone()).collect();
-        let text = report::text(&outcome, &walls);
+        let text = report::text(&outcome, &walls, &unknown);
         match write_all(files) {
             Ok(()) => say_beside(&destinations, &format!("{text}\nwrote {picture}")),
             Err(error) => say_beside(&destinations, &text).and(Err(error)),

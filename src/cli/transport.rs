@@ -19,7 +19,7 @@ use crate::output::trace_file;
 use crate::plan::transport::{Sensor, TransportPlan};
 use crate::records::Receiver;
 use crate::render::stop::mean_squared_radius;
-use crate::render::{self, Control, Progress};
+use crate::render::{Control, Progress};
 use crate::scene::geometry::Geometry;
 use crate::scene::light::{Light, LightKind};
 use crate::scene::{Camera, Scene};
@@ -80,10 +80,11 @@ pub(super) struct TransportArgs {
     #[arg(long, value_name = "EFFECT", value_enum, value_delimiter = ',', help_heading = "Light transport")]
     without: Vec<EffectArg>,
 
-    /// Radius of the density estimate of the global map in the first round, metres [default: from the area of the scene]
+    /// Radius of the density estimate of the global map in the first round, metres [default: from a trial round,
+    /// so that about 24 photons lie within it around the median of the points asked about]
     #[arg(long, value_name = "METRES", value_parser = parse_number::<f64>, allow_hyphen_values = true, help_heading = "Density estimate")]
     radius: Option<f64>,
-    /// The same for the caustic map [default: a quarter of the default of --radius]
+    /// The same for the caustic map [default: from the same trial round, for 6 photons]
     #[arg(long, value_name = "METRES", value_parser = parse_number::<f64>, allow_hyphen_values = true, help_heading = "Density estimate")]
     caustic_radius: Option<f64>,
     /// How slowly the radius shrinks from round to round (Knaus and Zwicker 2011): above 0, and 1 keeps it [default: 0.667]
@@ -289,9 +290,14 @@ pub(super) struct Job<'a> {
     pub(super) phases: &'a [Vec<Receiver>],
 }
 
-/// The plan of what is left of a scene.
+/// The plan of a job, its default radii from a trial round.
 pub(super) fn plan(gpu: &Gpu, job: &Job, geometry: &Geometry) -> Result<TransportPlan> {
-    TransportPlan::new(job.scene, geometry, job.settings, job.sensor, &render::limits(gpu.facts()))
+    let view = View { geometry, camera: job.camera, phases: job.phases };
+    let plan = transport::trial::plan(gpu, job.scene, &view, job.settings, job.sensor)?;
+    if let Some(warning) = light_report::radius_warning(&plan, geometry) {
+        complain(&format!("warning: {warning}"));
+    }
+    Ok(plan)
 }
 
 /// Geometry of a scene without the effects that are left out.

@@ -11,11 +11,13 @@ use crate::constants::MAX_BOUNCES;
 use crate::ledger::{Ledger, Losses};
 use crate::oddities::Oddities;
 use crate::plan::evidence::EffectDecision;
-use crate::plan::transport::{MapPlan, TransportPlan};
+use crate::plan::transport::{MapPlan, RadiusFrom, Sensor, TransportPlan, Trial};
+use crate::scene::geometry::Geometry;
 use crate::settings::transport::{Effect, TransportSettings};
 use crate::timings::{Row, Timings};
 use crate::transport::stop::error_bound;
 use crate::transport::{End, Lit};
+use crate::unknown::Unknown;
 
 /// A row of the plan: what was decided, and after a run what it cost and gave.
 #[derive(Serialize)]
@@ -93,6 +95,22 @@ pub fn missing(plan: &TransportPlan) -> Option<String> {
     (!names.is_empty()).then(|| format!("left out, though the scene has it: {}; the result lacks that light", names.join(", ")))
 }
 
+/// Share of the points that may lie in something smaller than the radius.
+const TOO_WIDE: f64 = 0.1;
+
+/// One line on a radius by a trial round that is wider than what many points lie in.
+pub fn radius_warning(plan: &TransportPlan, geometry: &Geometry) -> Option<String> {
+    let trial = plan.trial.as_ref().filter(|trial| trial.too_wide > TOO_WIDE)?;
+    let widest = plan.maps().filter(|map| map.radius_from == RadiusFrom::Trial).max_by(|a, b| a.radius.total_cmp(&b.radius))?;
+    let option = if widest.caustic_only { "--caustic-radius" } else { "--radius" };
+    Some(format!(
+        "the radius of the {} map, {:.3} m, is wider than what {:.0} % of the points lie in, so that their light is blurred; more photons or a smaller {option} helps",
+        widest.name,
+        widest.radius * geometry.unit,
+        100.0 * trial.too_wide
+    ))
+}
+
 /// The JSON report of a run.
 #[derive(Serialize)]
 struct Report<'a> {
@@ -110,8 +128,11 @@ struct Report<'a> {
     losses: Losses,
     /// Root mean square of the standard errors over that of the values.
     relative_error: f64,
-    /// What the relative error is not above, with the confidence of the settings; null from a single round.
+    /// What the relative error is not above, with the confidence of the settings; null from a single round, and while all is
+    /// black and need not be.
     error_bound: Option<f64>,
+    /// What nothing has reached.
+    unknown: Unknown,
     /// Of the radius, relative to the result; null without `--bias`.
     bias: Option<Bias>,
     anomalies: Anomalies,
@@ -133,12 +154,20 @@ struct Anomalies {
 struct PlanReport<'a> {
     effects: Vec<EffectRow<'a>>,
     maps: Vec<&'a MapPlan>,
+    /// What found the radii that nobody has given.
+    trial: Option<&'a Trial>,
     points_per_pixel: u32,
     bytes: u64,
 }
 
 fn plan_report<'a>(plan: &'a TransportPlan, run: Option<(&Timings, &[u64])>) -> PlanReport<'a> {
-    PlanReport { effects: rows(plan, run), maps: plan.maps().collect(), points_per_pixel: plan.points_per_pixel, bytes: plan.bytes }
+    PlanReport {
+        effects: rows(plan, run),
+        maps: plan.maps().collect(),
+        trial: plan.trial.as_ref(),
+        points_per_pixel: plan.points_per_pixel,
+        bytes: plan.bytes,
+    }
 }
 
 /// A plan as JSON.
@@ -161,6 +190,7 @@ pub fn json(scene: &str, lit: &Lit) -> Vec<u8> {
         losses: lit.losses,
         relative_error: lit.film.relative_error(&lit.plan),
         error_bound: Some(error_bound(&lit.film, &lit.plan, lit.plan.settings.stop.confidence)).filter(|bound| bound.is_finite()),
+        unknown: lit.film.unknown(&lit.plan, lit.plan.settings.stop.confidence),
         bias: lit.bias,
         anomalies: Anomalies { not_a_number: lit.anomalies[0], cut_to_largest: lit.anomalies[1], too_dense: lit.anomalies[2] },
         oddities: lit.oddities.as_ref(),
@@ -213,7 +243,13 @@ pub fn text(scene: &str, lit: &Lit, explain: bool) -> String {
         writeln!(text, "{}", oddities.text()).unwrap();
     }
     let noise = (lit.film.rounds > 1).then(|| lit.film.relative_error(&lit.plan));
-    text.push_str(&errors(lit.film.rounds, noise, lit.bias.as_ref(), lit.losses.relative, settings.stop.confidence));
+    let unknown = lit.film.unknown(&lit.plan, settings.stop.confidence);
+    text.push_str(&errors(lit.film.rounds, noise, &unknown, lit.bias.as_ref(), lit.losses.relative, settings.stop.confidence));
+    let (point, unit) = match lit.plan.sensor {
+        Sensor::Picture { .. } => ("pixel", "W/m2/sr"),
+        Sensor::Receivers { .. } => ("point", "W/m2"),
+    };
+    text.push_str(&unknown.text(point, unit, settings.stop.confidence));
     text.push('\n');
     text.push_str(&timing_table(&lit.timings, Some(&lit.device)));
     text

@@ -61,10 +61,8 @@ pub fn files(folder: &Folder, quantity: Quantity, scene: &RoomScene, walls: &[Wa
         };
         let mesh = values.len().isqrt();
         let picture = |values: Vec<f64>| Picture { width: mesh, height: mesh, values }.encode(Format::Exr);
-        // Of a single round no error is known; an image cannot say so but by a value that is no number.
-        let errors = errors.iter().map(|error| if error.is_finite() { *error } else { f64::NAN }).collect();
         files.push((folder.file(&image_name(wall.name)), picture(values.clone())));
-        files.push((folder.file(&error_name(wall.name)), picture(errors)));
+        files.push((folder.file(&error_name(wall.name)), picture(errors.clone())));
         let rectangle = scene.rectangle(wall.face);
         layout.walls.push(WallLayout {
             name: wall.name,

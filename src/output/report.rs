@@ -16,6 +16,7 @@ use crate::render::stop::{End, error_bound};
 use crate::settings::Settings;
 use crate::settings::stop::Stop;
 use crate::timings::{Row, Timings};
+use crate::unknown::Unknown;
 
 /// The JSON report.
 #[derive(Serialize)]
@@ -38,6 +39,8 @@ struct Report<'a> {
     relative_error: Option<f64>,
     /// What it is not above, with the confidence of the settings.
     error_bound: Option<f64>,
+    /// What nothing has reached.
+    unknown: &'a Unknown,
     /// Of the radius, relative to the irradiance; null without `--bias`.
     bias: Option<Bias>,
     ledger: Ledger,
@@ -79,7 +82,7 @@ struct WallReport {
 }
 
 /// The run as JSON.
-pub fn json(outcome: &Outcome, walls: &[WallEstimate]) -> Vec<u8> {
+pub fn json(outcome: &Outcome, walls: &[WallEstimate], unknown: &Unknown) -> Vec<u8> {
     let plan = &outcome.plan;
     let noise = relative_error(walls);
     let mean = |values: &[f64]| values.iter().sum::<f64>() / values.len() as f64;
@@ -106,7 +109,10 @@ pub fn json(outcome: &Outcome, walls: &[WallEstimate]) -> Vec<u8> {
         end: outcome.end,
         rounds: outcome.film.rounds,
         relative_error: noise,
-        error_bound: noise.map(|noise| error_bound(outcome.film.rounds, noise, plan.settings.stop.confidence)),
+        error_bound: noise
+            .map(|noise| error_bound(outcome.film.rounds, noise, plan.settings.stop.confidence).hypot(unknown.relative))
+            .filter(|bound| bound.is_finite()),
+        unknown,
         bias: outcome.bias,
         ledger: outcome.fates.ledger(),
         losses: outcome.losses,
@@ -138,18 +144,20 @@ fn driver(outcome: &Outcome) -> String {
 /// Root mean square over all texels of the standard error of irradiance, over that of irradiance.
 fn relative_error(walls: &[WallEstimate]) -> Option<f64> {
     // A wall that reflects nothing stores nothing, and its irradiance is no number.
-    let squares = |values: fn(&WallEstimate) -> &Vec<f64>| -> f64 {
-        walls.iter().flat_map(values).filter(|value| !value.is_nan()).map(|value| value * value).sum()
-    };
-    let (errors, means) = (squares(|wall| &wall.irradiance_error), squares(|wall| &wall.irradiance));
+    // Where no photon was found the error is not known, and stands apart.
+    let texels = || walls.iter().flat_map(|wall| wall.irradiance.iter().zip(&wall.irradiance_error)).filter(|(mean, _)| !mean.is_nan());
+    let means: f64 = texels().map(|(mean, _)| mean * mean).sum();
+    let errors: f64 = texels().filter(|(mean, _)| **mean > 0.0).map(|(_, error)| error * error).sum();
     if means > 0.0 { Some((errors / means).sqrt()).filter(|error| error.is_finite()) } else { None }
 }
 
-/// Noise, bias, and both together, a line each, in per cent of the result's RMS.
-pub(super) fn errors(rounds: u32, noise: Option<f64>, bias: Option<&Bias>, lost: f64, confidence: f64) -> String {
+/// Noise, bias, and both together, a line each, in per cent of the result's RMS. What nothing has reached counts in the bounds,
+/// and so does light that limits kept.
+pub(super) fn errors(rounds: u32, noise: Option<f64>, unknown: &Unknown, bias: Option<&Bias>, lost: f64, confidence: f64) -> String {
     let mut text = String::new();
     let (percent, sure) = (|share: f64| 100.0 * share, 100.0 * confidence);
-    let bound = noise.map(|noise| error_bound(rounds, noise, confidence));
+    let noise = noise.filter(|_| unknown.relative.is_finite());
+    let bound = noise.map(|noise| error_bound(rounds, noise, confidence).hypot(unknown.relative));
     match noise.zip(bound) {
         Some((noise, bound)) => {
             writeln!(text, "noise: {:.2} % relative RMS error, at most {:.2} % ({sure} % confidence)", percent(noise), percent(bound))
@@ -222,7 +230,7 @@ fn unreached(stop: &Stop) -> String {
 }
 
 /// The run in words: device, settings, ledger, errors and timing table.
-pub fn text(outcome: &Outcome, walls: &[WallEstimate]) -> String {
+pub fn text(outcome: &Outcome, walls: &[WallEstimate], unknown: &Unknown) -> String {
     let mut text = String::new();
     let settings = &outcome.plan.settings;
     let device = outcome.device.as_ref().map_or("CPU", |facts| &facts.name);
@@ -259,10 +267,12 @@ pub fn text(outcome: &Outcome, walls: &[WallEstimate]) -> String {
     text.push_str(&errors(
         outcome.film.rounds,
         relative_error(walls),
+        unknown,
         outcome.bias.as_ref(),
         outcome.losses.relative,
         settings.stop.confidence,
     ));
+    text.push_str(&unknown.text("texel", "W/m2", settings.stop.confidence));
     text.push('\n');
     text.push_str(&timing_table(&outcome.timings, outcome.device.as_ref()));
     text

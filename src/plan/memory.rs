@@ -6,7 +6,9 @@ use glam::UVec2;
 
 use super::Plan;
 use super::transport::{MapPlan, SEGMENT_BOUNCES, Sensor, TransportPlan};
-use crate::constants::{FACE_COUNT, MAX_ODDITIES, ODD_ESTIMATE, PART_COUNT, SCAN_ITEMS, TALLY_COPIES, TOTAL_WORDS, TREE_LEAF, TREE_RUN};
+use crate::constants::{
+    FACE_COUNT, HIT_KINDS, MAX_ODDITIES, ODD_ESTIMATE, PART_COUNT, SCAN_ITEMS, TALLY_COPIES, TOTAL_WORDS, TREE_LEAF, TREE_RUN,
+};
 use crate::path::StoredPath;
 use crate::photon::{MapPhoton, Origin, StoredPhoton};
 use crate::records::*;
@@ -158,6 +160,7 @@ pub(super) fn of_transport(plan: &TransportPlan, geometry: &Geometry, keeps: &dy
         ("camera paths", 2 * array::<CameraPath>(plan.camera_path_capacity())),
         ("camera path counts", array::<u32>(1)),
         ("estimates", array::<u64>(3 * points * u64::from(plan.arrival_sets))),
+        ("one hits", array::<u32>(u64::from(HIT_KINDS) * pixels)),
         ("film", pixels.max(1) * FILM_PIXEL_BYTES),
         ("part totals", array::<u64>(u64::from(PART_COUNT))),
         ("anomalies", array::<u32>(8)),

@@ -47,6 +47,32 @@ impl Sensor {
     }
 }
 
+/// Where the radius of a map's first round comes from.
+#[derive(Debug, Clone, Copy, PartialEq, Eq, Serialize)]
+#[serde(rename_all = "lowercase")]
+pub enum RadiusFrom {
+    /// `--radius`, `--caustic-radius`.
+    User,
+    /// Photons of a trial round around the points that are asked about (`transport::trial`).
+    Trial,
+    /// The area of the whole scene.
+    Area,
+}
+
+/// What a trial round found.
+#[derive(Debug, Clone, Default, PartialEq, Serialize)]
+pub struct Trial {
+    /// Radii of the first round, normalised; `None` where the map has none, or its radius is given.
+    pub global_radius: Option<f64>,
+    pub caustic_radius: Option<f64>,
+    /// Points that were asked, some of those that the run asks about.
+    pub points: u32,
+    /// Share of them that lie in something smaller than the radius: whose way along the surface to the next wall or edge
+    /// is shorter. Of the map with the larger radius.
+    pub too_wide: f64,
+    pub seconds: f64,
+}
+
 /// A photon map of each round.
 #[derive(Debug, Clone, PartialEq, Serialize)]
 pub struct MapPlan {
@@ -73,6 +99,7 @@ pub struct MapPlan {
     pub bucket_count: u32,
     /// Of the first round, normalised.
     pub radius: f64,
+    pub radius_from: RadiusFrom,
     /// Invocations that share the candidates of a visible point.
     pub lanes: u32,
     /// Spheres that its photons are aimed at; 0: they leave their lights in all directions.
@@ -104,6 +131,8 @@ impl MapPlan {
 pub struct TransportPlan {
     pub settings: TransportSettings,
     pub sensor: Sensor,
+    /// What found the radii that nobody has given; `None` where nothing was tried.
+    pub trial: Option<Trial>,
     pub decisions: Vec<EffectDecision>,
     /// Specialization constants of all kernels.
     pub constants: Vec<(&'static str, u32)>,
@@ -139,6 +168,8 @@ const PHOTONS_PER_ESTIMATE: f64 = 60.0;
 const CAUSTIC_RADIUS_SHARE: f64 = 0.25;
 /// Radii relative to the scene's normalised extent: from f32's resolution of positions up to all of it.
 pub const RADIUS_RANGE: (f64, f64) = (1.0 / 32_768.0, 2.0);
+/// Largest radius that is taken by default, relative to the same.
+pub const MAX_DEFAULT_RADIUS: f64 = 0.125;
 /// Bits of a film unit below the scene's mean radiance: as many as leave so many above it, within these.
 const FILM_BITS: (i32, i32) = (24, 32);
 const FILM_HEADROOM_BITS: i32 = 24;
@@ -162,7 +193,20 @@ const FLIGHTS_PER_PHOTON: u64 = 8;
 const RAY_COST: u64 = 64;
 
 impl TransportPlan {
+    /// With radii by the scene's area where none are given.
     pub fn new(scene: &Scene, geometry: &Geometry, settings: &TransportSettings, sensor: Sensor, limits: &Limits) -> Result<TransportPlan> {
+        TransportPlan::with_trial(scene, geometry, settings, sensor, limits, None)
+    }
+
+    /// With the radii of a trial round where none are given.
+    pub fn with_trial(
+        scene: &Scene,
+        geometry: &Geometry,
+        settings: &TransportSettings,
+        sensor: Sensor,
+        limits: &Limits,
+        trial: Option<Trial>,
+    ) -> Result<TransportPlan> {
         let began = Instant::now();
         settings.validate()?;
         if settings.leaves_out(Effect::Bvh) && geometry.triangles.len() > MAX_LIST_TRIANGLES {
@@ -198,17 +242,22 @@ impl TransportPlan {
         let persistent = append == Append::Persistent;
         let landings_of_each = expected_landings(scene, settings.bounces);
         let map = |name, domain, photons: u32, stored, caustic_only: bool, radius: Option<f64>, option| -> Result<MapPlan> {
-            let share = if caustic_only { CAUSTIC_RADIUS_SHARE } else { 1.0 };
-            let usual = usual_radius(geometry, f64::from(photons)) * share;
-            let radius = match radius {
-                None => usual.clamp(RADIUS_RANGE.0, 0.125),
-                Some(metres) => {
+            let usual = usual_radius(geometry, f64::from(photons)) * if caustic_only { CAUSTIC_RADIUS_SHARE } else { 1.0 };
+            let tried = trial.as_ref().and_then(|trial| if caustic_only { trial.caustic_radius } else { trial.global_radius });
+            let (radius, radius_from) = match (radius, tried) {
+                (None, Some(tried)) => (tried, RadiusFrom::Trial),
+                (None, None) => (area_radius(geometry, photons, caustic_only), RadiusFrom::Area),
+                (Some(metres), _) => {
                     let (least, most) = (RADIUS_RANGE.0 * geometry.unit, RADIUS_RANGE.1 * geometry.unit);
                     if !(least..=most).contains(&metres) {
                         return Err(Error::setting(option, metres, format!("must be from {least:e} to {most} metres in this scene")));
                     }
-                    metres / geometry.unit
+                    (metres / geometry.unit, RadiusFrom::User)
                 }
+            };
+            let expected = match radius_from {
+                RadiusFrom::Trial => PHOTONS_PER_ESTIMATE,
+                RadiusFrom::User | RadiusFrom::Area => PHOTONS_PER_ESTIMATE * (radius / usual).powi(2),
             };
             // Photons of a pass land once at every bounce at most; a caustic's only once.
             let landings = if caustic_only { 1 } else { u64::from(settings.bounces.min(SEGMENT_BOUNCES)) };
@@ -235,7 +284,8 @@ impl TransportPlan {
                 caustic_only,
                 bucket_count: chunk_photons.clamp(1 << 10, 1 << 24).next_power_of_two(),
                 radius,
-                lanes: capacity::lanes_of(PHOTONS_PER_ESTIMATE * (radius / usual).powi(2) / FOUND_BY_LANE, limits),
+                radius_from,
+                lanes: capacity::lanes_of(expected / FOUND_BY_LANE, limits),
                 target_count: 0,
                 flux_gain: 1.0,
             })
@@ -315,6 +365,7 @@ impl TransportPlan {
         let mut plan = TransportPlan {
             settings: TransportSettings { append, ..settings.clone() },
             sensor,
+            trial: None,
             decisions: Vec::new(),
             constants,
             global,
@@ -337,6 +388,7 @@ impl TransportPlan {
             plan.give(decision, geometry);
         }
         plan.decisions = decisions;
+        plan.trial = trial;
         plan.planned_in = began.elapsed();
         Ok(plan)
     }
@@ -547,6 +599,12 @@ fn flights_of_an_invocation(limits: &Limits) -> u32 {
 /// Radius, normalised, in which so many photons from lamps leave [`PHOTONS_PER_ESTIMATE`] on average: each lands about twice.
 pub fn usual_radius(geometry: &Geometry, photons: f64) -> f64 {
     (PHOTONS_PER_ESTIMATE * geometry.area / (PI * 2.0 * photons)).sqrt()
+}
+
+/// Radius of a map's first round, normalised, where nothing but the scene's area is known.
+pub fn area_radius(geometry: &Geometry, photons: u32, caustic_only: bool) -> f64 {
+    let share = if caustic_only { CAUSTIC_RADIUS_SHARE } else { 1.0 };
+    (usual_radius(geometry, f64::from(photons)) * share).clamp(RADIUS_RANGE.0, MAX_DEFAULT_RADIUS)
 }
 
 /// Photons traced at once, so that their map can never be full.

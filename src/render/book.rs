@@ -77,7 +77,8 @@ impl<'a, 'c> Book<'a, 'c> {
 
     pub(super) fn look(&mut self, film: &Film, scene: &RoomScene, plan: &Plan) {
         let weights = self.weights.get_or_insert_with(|| irradiance_weights(scene, plan));
-        self.watch.look(film.rounds, film.relative_error(weights), Losses::of_room(&self.fates, self.watts).relative);
+        let unknown = film.unknown(weights, 1.0, plan.settings.stop.confidence).relative;
+        self.watch.look(film.rounds, film.relative_error(weights), unknown, Losses::of_room(&self.fates, self.watts).relative);
     }
 
     /// Books the fates of all photons handed out, and says whether to stop.

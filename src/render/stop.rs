@@ -33,16 +33,26 @@ pub struct Watch {
     alpha: f64,
     started: Instant,
     next_look: u32,
-    /// At the latest look: rounds, and the bound of the noise.
-    noise: Option<(u32, f64)>,
-    /// What limits have kept from the result, relative to it.
+    /// The latest look.
+    seen: Option<Look>,
+}
+
+/// What a film of so many rounds told.
+#[derive(Clone, Copy)]
+struct Look {
+    rounds: u32,
+    /// Bound of the noise.
+    noise: f64,
+    /// Of what nothing has reached ([`crate::unknown`]).
+    unknown: f64,
+    /// What limits have kept from the result ([`crate::ledger::Losses`]).
     lost: f64,
 }
 
 impl Watch {
     /// Of a run that began at `started`.
     pub fn new(stop: Stop, alpha: f64, started: Instant) -> Watch {
-        Watch { stop, alpha, started, next_look: FIRST_LOOK, noise: None, lost: 0.0 }
+        Watch { stop, alpha, started, next_look: FIRST_LOOK, seen: None }
     }
 
     /// Whether the film should be read after so many rounds.
@@ -60,24 +70,25 @@ impl Watch {
         self.stop.seconds.map(|seconds| self.started + Duration::from_secs_f64(seconds))
     }
 
-    /// Takes the relative standard error of a film of so many rounds, and what limits kept from it, relative to it too.
-    pub fn look(&mut self, rounds: u32, relative_error: f64, lost: f64) {
-        self.lost = lost;
-        self.noise = Some((rounds, error_bound(rounds, relative_error, self.stop.confidence)));
+    /// Takes the relative standard error of a film of so many rounds, the bound of what nothing has reached, and what limits kept
+    /// from the film, relative to it.
+    pub fn look(&mut self, rounds: u32, relative_error: f64, unknown: f64, lost: f64) {
+        self.seen = Some(Look { rounds, noise: error_bound(rounds, relative_error, self.stop.confidence), unknown, lost });
         self.next_look = rounds + (rounds / 4).max(1);
     }
 
-    /// Noise and bias together at the latest look.
+    /// Noise, bias and what is unknown together at the latest look.
     fn error(&self) -> Option<(u32, f64)> {
-        self.noise.map(|(rounds, noise)| (rounds, noise.hypot(self.bias(rounds) + self.lost)))
+        self.seen.map(|Look { rounds, noise, unknown, lost }| (rounds, noise.hypot(unknown).hypot(self.bias(rounds) + lost)))
     }
 
     /// Refuses an error that cannot be reached, as limits alone keep more light from the result.
     pub fn check_losses(&self, bounces: u32) -> Result<()> {
-        let Some(wanted) = self.stop.error.filter(|wanted| self.lost > *wanted) else { return Ok(()) };
+        let lost = self.seen.map_or(0.0, |look| look.lost);
+        let Some(wanted) = self.stop.error.filter(|wanted| lost > *wanted) else { return Ok(()) };
         let allowed = format!(
-            "cannot be reached, as what photons cut off after {bounces} bounces would bring may be {:.2} % of the result; allow more --bounces",
-            100.0 * self.lost
+            "cannot be reached, because photons cut off after {bounces} bounces may take {:.2} % of the light; allow more --bounces",
+            100.0 * lost
         );
         Err(Error::setting("--error", format!("{}%", 100.0 * wanted), allowed))
     }
@@ -111,7 +122,7 @@ impl Watch {
         let by_photons = self.stop.photons.map_or(most, |photons| (photons as f64 / photons_per_round.max(1) as f64).ceil());
         // Before the first look nobody knows when the error will be what is wanted.
         let by_error = match self.stop.error {
-            Some(wanted) => self.noise.map(|noise| self.rounds_wanted(wanted, noise, most)),
+            Some(wanted) => self.seen.map(|seen| self.rounds_wanted(wanted, seen, most)),
             None => Some(most),
         };
         let by_rounds = by_error.map(|by_error| a_round * (by_error.min(by_photons).min(most) - rounds).max(0.0));
@@ -121,7 +132,7 @@ impl Watch {
             total: u64::from(most_rounds),
             seconds,
             seconds_left: by_rounds.into_iter().chain(by_time).reduce(f64::min),
-            error: self.error().map(|(_, error)| error),
+            error: self.error().map(|(_, error)| error).filter(|error| error.is_finite()),
             error_wanted: self.stop.error,
             photons: ledger.emitted,
             ledger,
@@ -129,10 +140,13 @@ impl Watch {
     }
 
     /// Rounds after which the error will be what is wanted: the square of the noise falls as 1 / rounds, the bias as
-    /// rounds^(alpha - 1).
-    fn rounds_wanted(&self, wanted: f64, (rounds, noise): (u32, f64), most: f64) -> f64 {
+    /// rounds^(alpha - 1), and what nothing has reached as 1 / (rounds and area of the discs).
+    fn rounds_wanted(&self, wanted: f64, Look { rounds, noise, unknown, lost }: Look, most: f64) -> f64 {
         let (at, bias) = (f64::from(rounds), self.bias(rounds));
-        let error = |rounds: f64| (noise * (at / rounds).sqrt()).hypot(bias * (at / rounds).powf(1.0 - self.alpha) + self.lost);
+        let error = |rounds: f64| {
+            let unknown = unknown * (at / rounds).powf(self.alpha);
+            (noise * (at / rounds).sqrt()).hypot(unknown).hypot(bias * (at / rounds).powf(1.0 - self.alpha) + lost)
+        };
         let (mut less, mut more) = (at.min(most), most);
         if error(less) <= wanted {
             return less;

@@ -194,8 +194,8 @@ pub struct TransportSettings {
     /// Bounces after which a photon is cut off; by default roulette ends it long before.
     pub bounces: u32,
     pub seed: u64,
-    /// Radius of the first pass's density estimate, metres; `None`: by the scene's area and the
-    /// photons.
+    /// Radius of the first pass's density estimate, metres; `None`: by a trial round
+    /// (`transport::trial`), or by the scene's area and the photons where none is made.
     pub radius: Option<f64>,
     /// The same of the caustic map.
     pub caustic_radius: Option<f64>,

@@ -186,8 +186,9 @@ impl Subject {
         };
         let phases: Vec<Vec<Receiver>> =
             if self.receivers.is_empty() { Vec::new() } else { vec![self.receivers.iter().map(receiver).collect()] };
-        let plan = TransportPlan::new(&self.scene, &geometry, &settings, sensor, &render::limits(gpu.facts()))?;
-        transport::light(gpu, &View { geometry: &geometry, camera: self.camera.as_ref(), phases: &phases }, plan, control)
+        let view = View { geometry: &geometry, camera: self.camera.as_ref(), phases: &phases };
+        let plan = transport::trial::plan(gpu, &self.scene, &view, &settings, sensor)?;
+        transport::light(gpu, &view, plan, control)
     }
 }
 

@@ -20,6 +20,7 @@ pub mod points;
 pub mod replay;
 pub mod resources;
 pub mod stop;
+pub mod trial;
 
 use std::sync::atomic::Ordering;
 use std::time::{Duration, Instant};
@@ -29,7 +30,7 @@ pub use film::RoundFilm;
 use resources::{PhotonBuffers, TransportResources};
 
 use crate::bias::Bias;
-use crate::constants::{PART_COUNT, TALLY_COPIES};
+use crate::constants::{HIT_KINDS, PART_COUNT, TALLY_COPIES};
 use crate::error::{Error, Result};
 use crate::gpu::check::strict_math;
 use crate::gpu::kernels::*;
@@ -135,6 +136,11 @@ pub fn light(gpu: &Gpu, view: &View, plan: TransportPlan, control: &mut Control)
     commands.timings().count("run");
     commands.timings().count("plan");
     commands.timings().add(Span { name: "plan".into(), clock: Clock::Wall, start: Duration::ZERO, duration: plan.planned_in });
+    if let Some(trial) = &plan.trial {
+        let duration = Duration::from_secs_f64(trial.seconds);
+        commands.timings().count("trial");
+        commands.timings().add(Span { name: "trial".into(), clock: Clock::Wall, start: Duration::ZERO, duration });
+    }
     let resources = commands.scope("set-up", |commands| TransportResources::new(gpu, commands, view.geometry, &plan, view.phases))?;
     commands.warm_up()?;
     commands.submit()?;
@@ -177,7 +183,8 @@ pub fn light(gpu: &Gpu, view: &View, plan: TransportPlan, control: &mut Control)
             if watch.is_due(done) {
                 let film = film(&mut commands, &resources, &plan, done)?;
                 let losses = losses(&mut commands, &resources, view, &plan, &book, &film)?;
-                watch.look(done, film.relative_error(&plan), losses.relative);
+                let unknown = film.unknown(&plan, plan.settings.stop.confidence).relative;
+                watch.look(done, film.relative_error(&plan), unknown, losses.relative);
                 watch.check_losses(plan.settings.bounces)?;
             }
             book.submissions = commands.submission_count();
@@ -218,7 +225,8 @@ fn film(commands: &mut Commands, resources: &TransportResources, plan: &Transpor
     let pixels = plan.sensor.pixels() as usize;
     let sums = commands.read::<u64>(&resources.film_sums, 3 * pixels)?;
     let squares = commands.read::<u64>(&resources.film_squares, 6 * pixels)?;
-    Ok(RoundFilm::new(rounds, sums, squares))
+    let one_hits = commands.read::<u32>(&resources.one_hits, HIT_KINDS as usize * pixels)?;
+    Ok(RoundFilm::new(rounds, sums, squares, one_hits))
 }
 
 /// Photons and their fates, as far as the host has looked.

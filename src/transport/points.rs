@@ -33,7 +33,7 @@ fn rounding(plan: &TransportPlan, round: u32) -> u32 {
 pub fn see(commands: &mut Commands, round: Round, camera: Option<&Camera>) -> Result<()> {
     let Round { resources, geometry, plan, number: round } = round;
     let TransportResources { nodes, triangles, planes, normals, uvs, materials, textures, texels, emitters, .. } = resources;
-    let TransportResources { visible_points, pass_sums, part_totals, anomalies, oddities, .. } = resources;
+    let TransportResources { visible_points, pass_sums, one_hits, part_totals, anomalies, oddities, .. } = resources;
     let TransportResources { camera_paths: [camera_paths, _], camera_path_counts, .. } = resources;
     let step = plan.pixels_at_once(plan.rays_per_pixel());
     let goes_on = plan.chains_go_on();
@@ -76,6 +76,7 @@ pub fn see(commands: &mut Commands, round: Round, camera: Option<&Camera>) -> Re
                     anomalies,
                     visible_points,
                     pass_sums,
+                    one_hits,
                     part_totals,
                     next_camera_paths: camera_paths,
                     camera_path_counts,
@@ -111,6 +112,7 @@ pub fn see(commands: &mut Commands, round: Round, camera: Option<&Camera>) -> Re
                     anomalies,
                     visible_points,
                     pass_sums,
+                    one_hits,
                     part_totals,
                     next_camera_paths: camera_paths,
                     camera_path_counts,
@@ -130,7 +132,7 @@ pub fn see(commands: &mut Commands, round: Round, camera: Option<&Camera>) -> Re
 /// Follows camera paths that are still under way over mirrors and glass, until none is left.
 fn go_on(commands: &mut Commands, resources: &TransportResources, geometry: &Geometry, plan: &TransportPlan, round: u32) -> Result<()> {
     let TransportResources { nodes, triangles, normals, uvs, materials, textures, texels, emitters, .. } = resources;
-    let TransportResources { visible_points, pass_sums, part_totals, anomalies, oddities, camera_path_counts, .. } = resources;
+    let TransportResources { visible_points, pass_sums, one_hits, part_totals, anomalies, oddities, camera_path_counts, .. } = resources;
     let domain = if matches!(plan.sensor, Sensor::Picture { .. }) { DOMAIN_CAMERA } else { DOMAIN_RECEIVERS };
     for parity in [0, 1].into_iter().cycle() {
         let path_count = commands.read::<u32>(camera_path_counts, 1)?[0];
@@ -159,6 +161,7 @@ fn go_on(commands: &mut Commands, resources: &TransportResources, geometry: &Geo
             anomalies,
             visible_points,
             pass_sums,
+            one_hits,
             part_totals,
             camera_paths: &resources.camera_paths[parity],
             next_camera_paths: &resources.camera_paths[1 - parity],
@@ -220,7 +223,7 @@ pub fn look_up(commands: &mut Commands, round: Round, photons: &PhotonBuffers, m
 pub fn weigh(commands: &mut Commands, round: Round, traced: [u32; 2]) -> Result<()> {
     let Round { resources, geometry, plan, number: round } = round;
     let TransportResources { nodes, triangles, normals, uvs, materials, textures, texels, planes, visible_points, .. } = resources;
-    let TransportResources { estimates, part_totals, anomalies, oddities, .. } = resources;
+    let TransportResources { estimates, one_hits, part_totals, anomalies, oddities, .. } = resources;
     let radius = |map: &Option<MapPlan>| map.as_ref().map_or(1.0, |map| plan.radius(map, round)) as f32;
     let flux =
         |map: &Option<MapPlan>| map.as_ref().map_or(0.0, |map| map.photon_flux_of(geometry, traced[usize::from(map.caustic_only)])) as f32;
@@ -255,6 +258,7 @@ pub fn weigh(commands: &mut Commands, round: Round, traced: [u32; 2]) -> Result<
             anomalies,
             visible_points,
             estimates,
+            one_hits,
             part_totals,
             oddities,
         };

@@ -5,7 +5,7 @@ use glam::UVec2;
 
 use super::losses::ANOMALY_WORDS;
 use super::photons::counter_count;
-use crate::constants::PART_COUNT;
+use crate::constants::{HIT_KINDS, PART_COUNT};
 use crate::error::Result;
 use crate::gpu::{Buffer, Commands, Gpu, Memory};
 use crate::oddities;
@@ -43,6 +43,8 @@ pub struct TransportResources {
     // All rounds.
     pub film_sums: Buffer,
     pub film_squares: Buffer,
+    /// What is known of pixels that some kind of light has not reached; see `glsl/scene/one_hit.glsl`.
+    pub one_hits: Buffer,
     pub part_totals: Buffer,
     pub anomalies: Buffer,
     pub oddities: Buffer,
@@ -115,12 +117,14 @@ impl TransportResources {
             estimates: gpu.buffer::<u64>("estimates", estimates, device)?,
             film_sums: gpu.buffer::<u64>("film sums", 3 * pixels, device)?,
             film_squares: gpu.buffer::<u64>("film squares", 6 * pixels, device)?,
+            one_hits: gpu.buffer::<u32>("one hits", u64::from(HIT_KINDS) * pixels, device)?,
             part_totals: gpu.buffer::<u64>("part totals", u64::from(PART_COUNT), device)?,
             anomalies: gpu.buffer::<u32>("anomalies", ANOMALY_WORDS as u64, device)?,
             oddities: oddities::buffer(gpu, commands)?,
         };
         commands.fill(&resources.film_sums, 0, 6 * pixels, 0);
         commands.fill(&resources.film_squares, 0, 12 * pixels, 0);
+        commands.fill(&resources.one_hits, 0, u64::from(HIT_KINDS) * pixels, 0);
         commands.fill(&resources.part_totals, 0, 2 * u64::from(PART_COUNT), 0);
         commands.fill(&resources.anomalies, 0, ANOMALY_WORDS as u64, 0);
         Ok(resources)

@@ -1,0 +1,53 @@
+// How far it is from each visible point, along its surface, to what stands on it or ends it: the median of 8 directions. A
+// density estimate of a larger radius would look past walls and over edges.
+// Dispatched by src/transport/trial.rs once, before a run. One thread = one visible point.
+#version 460
+#extension GL_GOOGLE_include_directive : require
+#extension GL_EXT_scalar_block_layout : require
+#extension GL_EXT_control_flow_attributes : require
+#include "records.glsl"
+
+layout(local_size_x_id = 0) in;
+layout(push_constant, scalar) uniform Push { ClearancePush push; };
+layout(set = 1, binding = 1, scalar) readonly buffer VisiblePoints { VisiblePoint visible_points[]; };
+layout(set = 1, binding = 2, scalar) writeonly buffer Clearances { float clearances[]; };
+
+#include "math.glsl"
+#include "dispatch.glsl"
+#include "scene/effects.glsl"
+#include "scene/directions.glsl"
+#include "scene/bvh.glsl"
+#include "scene/belongs.glsl"
+
+// Cosines of eighths of a circle; the sine of each is the cosine six further.
+const float COSINES[8] = float[](1.0, 0.70710678, 0.0, -0.70710678, -1.0, -0.70710678, 0.0, 0.70710678);
+// Of a ray's rise above the surface: low steps and a mesh's facets do not count as walls.
+const float RISE = 0.1;
+
+void main()
+{
+    uint index = invocation_index();
+    if (index >= push.point_count) {
+        return;
+    }
+    VisiblePoint point = visible_points[index];
+    vec3 normal = plane_normal(point.plane);
+    vec3 size = abs(point.position);
+    float error = max(size.x, max(size.y, size.z)) * (1.0 / 1048576.0);
+    // Ascending.
+    float distances[8];
+    for (uint k = 0; k < 8; k++) {
+        vec3 direction = normalize(to_frame(vec3(COSINES[k], COSINES[(k + 6) % 8], RISE), normal));
+        float distance = 0.0;
+        if (point.arrivals != 0) {
+            distance = closest_hit(offset_origin(point.position, error, normal, direction), direction).t;
+        }
+        uint place = k;
+        while (place > 0 && distances[place - 1] > distance) {
+            distances[place] = distances[place - 1];
+            place--;
+        }
+        distances[place] = distance;
+    }
+    clearances[index] = distances[4];
+}

@@ -1,0 +1,86 @@
+//! Points of a result that asked for light and that nothing has reached: how bright they may be all the same.
+//!
+//! No hit in many tries is no proof of darkness, and its spread of 0 no error. If a run's photons, or shadow rays, are
+//! expected to hit a point m times, they all miss with probability exp(-m). So m is at most -ln(1 - c) with confidence c
+//! (3.0 at 95 %: the rule of three), and the light of the point at most that times what one hit adds. Points that ask
+//! nothing, as a background without an environment, are known to be 0.
+
+use serde::Serialize;
+
+/// Hits that a run may expect at most, with this confidence, where it had none.
+pub fn most_hits(confidence: f64) -> f64 {
+    -(1.0 - confidence).ln()
+}
+
+/// What nothing has reached, of pixels, texels or probes.
+#[derive(Debug, Clone, PartialEq, Default, Serialize)]
+pub struct Unknown {
+    /// Points that asked for light.
+    pub asked: u64,
+    /// Those that nothing has reached: their error is not known, but an upper bound of their light is.
+    pub unreached: u64,
+    /// The largest of these bounds, in the result's unit.
+    pub upper_bound: f64,
+    /// Root mean square of all bounds over that of the result; infinite, null in JSON, where the result is 0.
+    pub relative: f64,
+    /// What reached no point at all, though some asked for it; its bounds count in `relative` too.
+    pub absent: Vec<&'static str>,
+}
+
+impl Unknown {
+    /// Sets the relative error from the sums of squares of all bounds and of the result.
+    pub(crate) fn relative_to(self, bounds: f64, result: f64) -> Unknown {
+        Unknown { relative: if bounds > 0.0 { (bounds / result).sqrt() } else { 0.0 }, ..self }
+    }
+
+    pub(crate) fn add_unreached(&mut self, upper_bound: f64) {
+        self.unreached += 1;
+        self.upper_bound = self.upper_bound.max(upper_bound);
+    }
+
+    /// A line each for points and kinds of light; `unit` is the result's.
+    pub fn text(&self, point: &str, unit: &str, confidence: f64) -> String {
+        let Unknown { asked, unreached, upper_bound, relative, absent } = self;
+        let sure = 100.0 * confidence;
+        let mut text = String::new();
+        if *unreached > 0 {
+            let share = if relative.is_finite() {
+                format!(" and counts in the noise's bound, {:.2} % with all of them", 100.0 * relative)
+            } else {
+                "; the result is black so far, so its relative error is unknown".to_owned()
+            };
+            text.push_str(&format!(
+                "unknown: nothing has reached {unreached} of {asked} {point}s that asked for light; each is at most {upper_bound:.3e} {unit} ({sure} % confidence){share}\n"
+            ));
+        }
+        for kind in absent {
+            text.push_str(&format!("unknown: no {kind} has reached any {point}, so light by this way may be missing\n"));
+        }
+        text
+    }
+}
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+
+    #[test]
+    fn the_rule_of_three() {
+        assert!((most_hits(0.95) - 2.9957).abs() < 1e-4);
+        // Tries that miss with the chance that is left.
+        assert!(((-most_hits(0.9)).exp() - 0.1).abs() < 1e-12);
+    }
+
+    #[test]
+    fn what_is_black_altogether_has_no_relative_error() {
+        let mut unknown = Unknown { asked: 3, ..Unknown::default() };
+        assert_eq!(unknown.clone().relative_to(0.0, 0.0).relative, 0.0);
+        unknown.add_unreached(2.0);
+        unknown.add_unreached(1.0);
+        let of = |result: f64| unknown.clone().relative_to(5.0, result);
+        assert_eq!((of(20.0).relative, of(20.0).upper_bound, of(20.0).unreached), (0.5, 2.0, 2));
+        assert_eq!(of(0.0).relative, f64::INFINITY);
+        assert!(of(0.0).text("pixel", "W/m2/sr", 0.95).contains("2 of 3 pixels"));
+        assert!(serde_json::to_value(of(0.0)).unwrap()["relative"].is_null());
+    }
+}

@@ -1,0 +1,153 @@
+//! Default radii come from a trial round: from the photons around the points that are asked about, and not from the scene's
+//! area.
+
+use glam::{DVec3, dvec3};
+
+use crate::common::lit::{level, light, matt, scene, scene_of, shining};
+use crate::common::{Check, assert_complains, assert_holds, device};
+use crate::unknown::room_without_floor;
+use photonmill::gpu::Gpu;
+use photonmill::judge::Judge;
+use photonmill::output::light_report;
+use photonmill::plan::transport::{RadiusFrom, Sensor, TransportPlan, area_radius};
+use photonmill::records::Receiver;
+use photonmill::render;
+use photonmill::scene::geometry::Geometry;
+use photonmill::scene::{Camera, Scene};
+use photonmill::settings::transport::{Append, Part, TransportSettings};
+use photonmill::transport::{View, trial};
+
+/// A room of 4 x 4 x 3 m with a lamp under its ceiling, on a ground of 800 m.
+fn room_on_a_plain() -> Scene {
+    let mut meshes = room_without_floor(0.0);
+    meshes.push(level(0.0, [800.0, 800.0], true, 0));
+    meshes.push(level(2.9, [1.0, 1.0], false, 1));
+    scene_of(meshes, vec![matt(0.6), shining(0.0)], vec![])
+}
+
+/// Points of the room's floor, some of them near its walls.
+fn floor_points() -> Vec<(DVec3, DVec3)> {
+    let places = [-1.7, -0.6, 0.5, 1.6];
+    places.iter().flat_map(|x| places.map(|z| (dvec3(*x, 0.0, z), DVec3::Y))).collect()
+}
+
+fn receivers(geometry: &Geometry, points: &[(DVec3, DVec3)]) -> Vec<Receiver> {
+    let receiver = |(position, normal): &(DVec3, DVec3)| Receiver {
+        position: geometry.to_local(*position),
+        normal: normal.as_vec3(),
+        shading_normal: normal.as_vec3(),
+    };
+    points.iter().map(receiver).collect()
+}
+
+fn light_check(found: f64, expected: f64) -> Check {
+    if (found / expected - 1.0).abs() < 0.04 { Ok(()) } else { Err(format!("{found:.4} where {expected:.4} is right")) }
+}
+
+#[test]
+fn a_room_on_a_plain_is_lit_as_it_is_without_the_plain() {
+    let Some(gpu) = device() else { return };
+    let scene = room_on_a_plain();
+    let points = floor_points();
+    let geometry = Geometry::new(&scene).unwrap();
+    let phases = [receivers(&geometry, &points)];
+    let view = View { geometry: &geometry, camera: None, phases: &phases };
+    let sensor = Sensor::Receivers { count: points.len() as u32 };
+    let settings = TransportSettings { photons: 1 << 14, rounds: 12, part: Part::Indirect, ..TransportSettings::default() };
+    let mean = |plan: TransportPlan| {
+        let lit = light(&gpu, &view, plan);
+        (0..points.len()).map(|point| lit.film.mean(point, &lit.plan).x).sum::<f64>() / points.len() as f64
+    };
+    let judged = Judge::new(&scene, 32).irradiance_at(&points, 3000, 1);
+    let expected = judged.iter().map(|point| point.mean.indirect.x).sum::<f64>() / points.len() as f64;
+    let plan = trial::plan(&gpu, &scene, &view, &settings, sensor).unwrap();
+    let radius = plan.global.as_ref().unwrap().radius * geometry.unit;
+    let found = mean(plan);
+    println!("radius {radius:.3} m, {found:.4} where {expected:.4} is right");
+    assert_holds("the room", light_check(found, expected));
+    assert!((0.05..0.6).contains(&radius), "{radius}");
+    let by_area = TransportPlan::new(&scene, &geometry, &settings, sensor, &render::limits(gpu.facts())).unwrap();
+    println!("by area: {} m", by_area.global.as_ref().unwrap().radius * geometry.unit);
+    assert_complains("a radius by the area", light_check(mean(by_area), expected));
+}
+
+/// The plan of a picture, by a trial round.
+fn tried(gpu: &Gpu, scene: &Scene, geometry: &Geometry, settings: &TransportSettings) -> TransportPlan {
+    let camera = scene.cameras.first().cloned().unwrap_or_else(|| Camera::around(scene.bounds().0, scene.bounds().1));
+    let view = View { geometry, camera: Some(&camera), phases: &[] };
+    trial::plan(gpu, scene, &view, settings, Sensor::Picture { width: 64, height: 48 }).unwrap()
+}
+
+/// Where photons lie everywhere alike, so that the area tells the same.
+#[test]
+fn built_in_scenes_keep_about_the_radius_of_their_area() {
+    let Some(gpu) = device() else { return };
+    let settings = TransportSettings::default();
+    let mut off = Vec::new();
+    for name in ["open-box", "cornell", "cornell-spheres", "caustic-sphere", "furnace"] {
+        let scene = scene(name);
+        let geometry = Geometry::new(&scene).unwrap();
+        let plan = tried(&gpu, &scene, &geometry, &settings);
+        let trial = plan.trial.as_ref().unwrap();
+        for map in plan.maps() {
+            assert_eq!(map.radius_from, RadiusFrom::Trial);
+            let ratio = map.radius / area_radius(&geometry, map.photons, map.caustic_only);
+            println!("{name}, {}: {ratio:.3} of the radius by area, {trial:?}", map.name);
+            if !(0.7..1.45).contains(&ratio) || trial.too_wide > 0.1 {
+                off.push(format!("{name}, {}: {ratio}, {trial:?}", map.name));
+            }
+        }
+    }
+    assert!(off.is_empty(), "{off:#?}");
+}
+
+/// The radius follows from scene, points and settings alone; one that is given is taken, and nothing is tried.
+#[test]
+fn a_trial_knows_no_seed_builder_or_split() {
+    let Some(gpu) = device() else { return };
+    let scene = scene("cornell-spheres");
+    let geometry = Geometry::new(&scene).unwrap();
+    let radii = |settings: &TransportSettings| {
+        let plan = tried(&gpu, &scene, &geometry, settings);
+        plan.maps().map(|map| (map.radius.to_bits(), map.radius_from)).collect::<Vec<_>>()
+    };
+    let settings = TransportSettings::default();
+    let expected = radii(&settings);
+    for append in [Append::Atomic, Append::Ballot] {
+        assert_eq!(radii(&TransportSettings { append, seed: 7, chunk: Some(5000), ..settings.clone() }), expected, "{append:?}");
+    }
+    // A quarter of the photons: twice the radius, in whole steps.
+    let fewer = radii(&TransportSettings { photons: settings.photons / 4, ..settings.clone() });
+    assert_eq!(f64::from_bits(fewer[0].0), 2.0 * f64::from_bits(expected[0].0));
+
+    let given = TransportSettings { radius: Some(0.03), ..settings.clone() };
+    let one = radii(&given);
+    assert_eq!((one[0].1, one[1]), (RadiusFrom::User, expected[1]));
+    let plan = tried(&gpu, &scene, &geometry, &TransportSettings { caustic_radius: Some(0.01), ..given });
+    assert_eq!(plan.trial, None);
+    let plan = tried(&gpu, &scene, &geometry, &settings);
+    let json: serde_json::Value = serde_json::from_slice(&light_report::plan_json(&plan)).unwrap();
+    assert!(json["trial"]["seconds"].as_f64().unwrap() > 0.0 && json["maps"][0]["radius_from"] == "trial", "{json}");
+}
+
+/// A narrow shelf is all that is asked about: the radius that its few photons call for is wider than it.
+#[test]
+fn a_radius_wider_than_what_it_lies_in_is_warned_of() {
+    let Some(gpu) = device() else { return };
+    let scene = room_on_a_plain();
+    let geometry = Geometry::new(&scene).unwrap();
+    // All but two points stand in the room's corners, where the wall is near in most directions.
+    let corner = |x: f64, z: f64| (dvec3(1.97 * x, 0.0, 1.97 * z), DVec3::Y);
+    let corners = vec![corner(1.0, 1.0), corner(-1.0, 1.0), corner(1.0, -1.0), corner(-1.0, -1.0)];
+    let middle = vec![(DVec3::ZERO, DVec3::Y); 6];
+    let warning = |points: Vec<(DVec3, DVec3)>| {
+        let phases = [receivers(&geometry, &points)];
+        let view = View { geometry: &geometry, camera: None, phases: &phases };
+        let settings = TransportSettings { photons: 1 << 10, ..TransportSettings::default() };
+        let plan = trial::plan(&gpu, &scene, &view, &settings, Sensor::Receivers { count: points.len() as u32 }).unwrap();
+        light_report::radius_warning(&plan, &geometry)
+    };
+    let told = warning([middle.clone(), corners].concat()).expect("a warning");
+    assert!(told.contains("40 % of the points"), "{told}");
+    assert_eq!(warning(middle), None);
+}

@@ -1,0 +1,167 @@
+//! What nothing has reached has an unknown error and an upper bound, and no run ends on it.
+
+use glam::{DVec3, Vec3, dvec3};
+
+use crate::common::lit::{level, matt, mirror, received, scene_of, seen, shining};
+use crate::common::{device, run};
+use photonmill::film::{estimate_walls, irradiance_weights};
+use photonmill::judge::Judge;
+use photonmill::rng::Rng;
+use photonmill::scene::light::LightKind;
+use photonmill::scene::open_box::open_box;
+use photonmill::scene::{Camera, Mesh, Scene};
+use photonmill::settings::Settings;
+use photonmill::settings::stop::Stop;
+use photonmill::settings::transport::TransportSettings;
+use photonmill::transport::stop::error_bound;
+use photonmill::transport::{End, Lit};
+
+/// Walls of a room over [-2, 2] x [-2, 2], as high as 3 m, that face inwards; and its ceiling but for a hole in the middle.
+pub fn room_without_floor(hole: f64) -> Vec<Mesh> {
+    let (side, height) = (4.0 * DVec3::X, 3.0 * DVec3::Y);
+    let depth = 4.0 * DVec3::Z;
+    let wall = |name, origin, u, v| Mesh::parallelogram(name, origin, u, v, 0);
+    let ceiling = |x: [f64; 2], z: [f64; 2]| {
+        let (u, v) = ((x[1] - x[0]) * DVec3::X, (z[1] - z[0]) * DVec3::Z);
+        wall("ceiling", dvec3(x[0], 3.0, z[0]), u, v)
+    };
+    vec![
+        wall("back", dvec3(-2.0, 0.0, -2.0), side, height),
+        wall("front", dvec3(-2.0, 0.0, 2.0), height, side),
+        wall("left", dvec3(-2.0, 0.0, -2.0), height, depth),
+        wall("right", dvec3(2.0, 0.0, -2.0), depth, height),
+        ceiling([-2.0, 2.0], [-2.0, -hole]),
+        ceiling([-2.0, 2.0], [hole, 2.0]),
+        ceiling([-2.0, -hole], [-hole, hole]),
+        ceiling([hole, 2.0], [-hole, hole]),
+    ]
+}
+
+/// A room lit through a hole in its ceiling, so small that no photon of a run may find it.
+fn pinhole_room() -> Scene {
+    let meshes = [room_without_floor(0.01), vec![level(0.0, [4.0, 4.0], true, 0), level(4.0, [4.0, 4.0], false, 1)]].concat();
+    scene_of(meshes, vec![matt(0.5), shining(0.0)], vec![])
+}
+
+fn is_black(lit: &Lit) -> bool {
+    lit.film.sums.iter().all(|sum| *sum == 0)
+}
+
+#[test]
+fn no_run_ends_on_a_picture_that_nothing_has_reached() {
+    let Some(gpu) = device() else { return };
+    let scene = pinhole_room();
+    let camera = Camera::looking_at("camera", dvec3(0.0, 1.5, 1.9), DVec3::ZERO, DVec3::Y, 1.2);
+    let mut black = 0;
+    for seed in 1..=6 {
+        let settings = TransportSettings {
+            photons: 300,
+            rounds: 40,
+            shadow_rays: 1,
+            seed,
+            stop: Stop { error: Some(0.02), ..Stop::default() },
+            ..TransportSettings::default()
+        };
+        let lit = seen(&gpu, &scene, &settings, &camera, [6, 6]);
+        assert_eq!((lit.end, lit.film.rounds), (End::Rounds, 40), "seed {seed}");
+        if is_black(&lit) {
+            black += 1;
+            // By its spread alone a run would have been known exactly.
+            assert_eq!(lit.film.relative_error(&lit.plan), 0.0);
+            let unknown = lit.film.unknown(&lit.plan, 0.95);
+            assert_eq!((unknown.asked, unknown.unreached), (36, 36), "seed {seed}");
+            assert_eq!(unknown.absent, ["shadow ray", "photon of the global map"], "seed {seed}");
+            assert_eq!(error_bound(&lit.film, &lit.plan, 0.95), f64::INFINITY);
+            assert_eq!(lit.film.stated_error(7, &lit.plan), DVec3::INFINITY);
+        }
+    }
+    assert!(black > 1, "{black} of 6 seeds: the hole is too large for this test");
+}
+
+/// A house with a window on a sunlit plain: photons fall everywhere, and next to none of them into the house.
+#[test]
+fn probes_in_a_house_on_a_sunlit_plain_have_a_bound_and_no_error() {
+    let Some(gpu) = device() else { return };
+    let mut meshes = room_without_floor(0.0);
+    // Sun comes from the left, and light of the ground through a window in the right wall.
+    let pane = |y: [f64; 2]| Mesh::parallelogram("right", dvec3(2.0, y[0], -2.0), 4.0 * DVec3::Z, (y[1] - y[0]) * DVec3::Y, 0);
+    meshes.splice(3..4, [pane([0.0, 1.0]), pane([2.0, 3.0])]);
+    meshes.push(level(0.0, [800.0, 800.0], true, 0));
+    let sun = LightKind::Directional { direction: dvec3(1.0, -1.0, 0.0).normalize(), irradiance: Vec3::splat(1000.0) };
+    let scene = scene_of(meshes, vec![matt(0.5)], vec![sun]);
+    let inside = [(dvec3(0.5, 0.0, 0.5), DVec3::Y), (dvec3(-1.0, 0.0, -0.5), DVec3::Y)];
+    let settings = TransportSettings { photons: 3000, radius: Some(1.0), ..TransportSettings::default() };
+    let lit = received(&gpu, &scene, &settings, &inside);
+    assert!(is_black(&lit), "light has found the house: the test needs fewer photons");
+    let unknown = lit.film.unknown(&lit.plan, 0.95);
+    assert_eq!((unknown.asked, unknown.unreached, unknown.relative), (2, 2, f64::INFINITY), "{unknown:?}");
+    assert_eq!(lit.film.stated_error(0, &lit.plan), DVec3::INFINITY);
+    for truth in Judge::new(&scene, 8).irradiance_at(&inside, 4000, 1) {
+        let truth = truth.mean.total().x;
+        assert!(truth > 0.05 && truth < unknown.upper_bound, "{truth}, {unknown:?}");
+    }
+}
+
+/// Darkness that matters little beside what is lit, and what asks for no light, keep no run from its end.
+#[test]
+fn runs_end_where_the_dark_is_known_well_enough() {
+    let Some(gpu) = device() else { return };
+    let stop = Stop { error: Some(0.2), ..Stop::default() };
+    let settings = TransportSettings { photons: 3000, rounds: 2000, stop, ..TransportSettings::default() };
+    let closed = [room_without_floor(0.0), vec![level(0.0, [4.0, 4.0], true, 0)]].concat();
+    let lamp_outside = vec![level(3.5, [4.0, 4.0], true, 1), level(8.0, [4.0, 4.0], false, 0)];
+    let scene = scene_of([closed, lamp_outside].concat(), vec![matt(0.5), shining(0.0)], vec![]);
+    let lit = received(&gpu, &scene, &settings, &[(dvec3(0.0, 8.0, 0.0), -DVec3::Y), (DVec3::ZERO, DVec3::Y)]);
+    assert_eq!(lit.end, End::Error);
+    let unknown = lit.film.unknown(&lit.plan, 0.95);
+    assert_eq!((unknown.asked, unknown.unreached), (2, 1), "{unknown:?}");
+    assert!(unknown.relative > 0.0 && unknown.relative < 0.2, "{unknown:?}");
+    assert!(lit.film.stated_error(0, &lit.plan).is_finite() && lit.film.stated_error(1, &lit.plan) == DVec3::INFINITY);
+
+    // A lit square before nothing: the background is black for certain.
+    let lamp = LightKind::Point { position: dvec3(0.0, 1.0, 0.0), intensity: Vec3::ONE };
+    let scene = scene_of(vec![level(0.0, [1.0, 1.0], true, 0)], vec![matt(0.5)], vec![lamp]);
+    let camera = Camera::looking_at("camera", dvec3(0.0, 3.0, 0.01), DVec3::ZERO, DVec3::Z, 1.2);
+    let lit = seen(&gpu, &scene, &settings, &camera, [8, 8]);
+    let unknown = lit.film.unknown(&lit.plan, 0.95);
+    assert_eq!((lit.end, unknown.unreached), (End::Error, 0), "{unknown:?}");
+    assert!(unknown.asked > 0 && unknown.asked < 60, "{unknown:?}");
+    // And nothing but background has no error at all.
+    let away = Camera::looking_at("camera", dvec3(0.0, 3.0, 0.0), dvec3(0.0, 9.0, 0.0), DVec3::Z, 0.5);
+    let lit = seen(&gpu, &scene, &settings, &away, [4, 4]);
+    assert_eq!((lit.end, error_bound(&lit.film, &lit.plan, 0.95)), (End::Error, 0.0));
+}
+
+/// A mirror below the floor is a target of the caustic map's photons, and none of them gets there.
+#[test]
+fn a_map_of_which_no_photon_arrives_is_named() {
+    let Some(gpu) = device() else { return };
+    let below = level(-1.0, [1.0, 1.0], true, 2);
+    let scene = |meshes: Vec<Mesh>| scene_of(meshes, vec![matt(0.5), shining(0.0), mirror(0.9)], vec![]);
+    let hidden = scene(vec![level(0.0, [4.0, 4.0], true, 0), level(2.0, [1.0, 1.0], false, 1), below.clone()]);
+    let settings = TransportSettings { photons: 3000, caustic_photons: 1000, rounds: 4, ..TransportSettings::default() };
+    let point = [(dvec3(0.3, 0.0, 0.0), DVec3::Y)];
+    let lit = received(&gpu, &hidden, &settings, &point);
+    let unknown = lit.film.unknown(&lit.plan, 0.95);
+    assert!(unknown.absent.contains(&"photon of the caustic map") && unknown.unreached == 0, "{unknown:?}");
+    assert!(unknown.relative > 0.0 && unknown.relative.is_finite(), "{unknown:?}");
+    assert!(unknown.text("point", "W/m2", 0.95).contains("no photon of the caustic map has reached any point"));
+}
+
+/// The paper's box means the same by it: texels that no photon has found.
+#[test]
+fn texels_of_the_box_that_no_photon_has_found_have_no_error() {
+    let Some(gpu) = device() else { return };
+    let settings = Settings { photons: 40, rounds: 3, mesh: 16, radius: 0.01, rng: Rng::Philox, ..Settings::default() };
+    let outcome = run(&gpu, &settings);
+    let scene = open_box(&outcome.plan.settings);
+    let unknown = outcome.film.unknown(&irradiance_weights(&scene, &outcome.plan), 1.0, 0.95);
+    let walls = estimate_walls(&outcome.film, &scene, &outcome.plan);
+    let texels = || walls.iter().flat_map(|wall| wall.irradiance.iter().zip(&wall.irradiance_error));
+    let dark = texels().filter(|(irradiance, _)| **irradiance == 0.0).count() as u64;
+    assert_eq!((unknown.unreached, unknown.asked), (dark, texels().count() as u64));
+    assert!(dark > 0 && dark < unknown.asked, "{unknown:?}");
+    assert!(texels().all(|(irradiance, error)| (*irradiance == 0.0) == error.is_infinite()));
+    // Each bound is three photons' worth, so that all of them together are far from nothing.
+    assert!(unknown.relative > 0.1, "{unknown:?}");
+}
