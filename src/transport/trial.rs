@@ -25,7 +25,7 @@ use crate::records::{ClearancePush, VisiblePoint};
 use crate::render;
 use crate::scene::Scene;
 use crate::settings::stop::Stop;
-use crate::settings::transport::TransportSettings;
+use crate::settings::transport::{Part, TransportSettings};
 
 /// Photons of each map.
 const PHOTONS: u32 = 1 << 14;
@@ -63,6 +63,8 @@ fn run(gpu: &Gpu, scene: &Scene, view: &View, run: &TransportPlan, limits: &Limi
         caustic_photons: PHOTONS,
         rounds: 1,
         seed: bias::seed(SEED, 0),
+        // Parts of a picture have the radii of the whole, so that they add up to it.
+        part: Part::All,
         stop: Stop::default(),
         ..run.settings.clone()
     };
@@ -81,7 +83,7 @@ fn run(gpu: &Gpu, scene: &Scene, view: &View, run: &TransportPlan, limits: &Limi
     };
     let plan = TransportPlan::new(scene, view.geometry, &settings, sensor, limits)?;
 
-    // All pipelines of the run, which they are made for.
+    // All pipelines of the run, which they are made for, but where it shows a part alone.
     gpu.prepare(&[modules(&plan, gpu.facts()), vec![Clearance::MODULE]].concat(), &constants(&plan))?;
     let began = Instant::now();
     let mut commands = Commands::new(gpu, constants(&plan), began)?;
@@ -98,7 +100,8 @@ fn run(gpu: &Gpu, scene: &Scene, view: &View, run: &TransportPlan, limits: &Limi
 
     let mut trial = Trial::default();
     let mut largest = 0.0;
-    for (map, of_run) in plan.maps().zip(run.maps()) {
+    for of_run in run.maps() {
+        let Some(map) = plan.maps().find(|map| map.caustic_only == of_run.caustic_only) else { continue };
         let asked: Vec<usize> = (0..visible_points.len()).filter(|point| visible_points[*point].arrivals & map.stored != 0).collect();
         trial.points = trial.points.max(asked.len() as u32);
         if of_run.radius_from == RadiusFrom::User || asked.is_empty() {
