@@ -203,6 +203,9 @@ fn sheets_in_one_plane_cover_their_union() {
             let found = geometry.area * geometry.unit * geometry.unit;
             assert!((found / area - 1.0).abs() < 1e-5, "{what}, turned {is_turned}: {found} m2 instead of {area}");
             assert!(!geometry.overlaps.is_empty());
+            let up = turned_points(&[(DVec3::ZERO, DVec3::Y)])[0].1.as_vec3();
+            let up = if is_turned { up } else { DVec3::Y.as_vec3() };
+            assert!(geometry.triangles.iter().all(|of| (of.b - of.a).cross(of.c - of.a).dot(up) > 0.0), "{what}: a piece faces down");
         }
     }
     let Some(gpu) = device() else { return };
