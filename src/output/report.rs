@@ -161,7 +161,7 @@ pub(super) fn errors(rounds: u32, noise: Option<f64>, unknown: &Unknown, bias: O
     match noise.zip(bound) {
         Some((noise, bound)) => {
             writeln!(text, "noise: {:.2} % relative RMS error, at most {:.2} % ({sure} % confidence)", percent(noise), percent(bound))
-                .unwrap()
+                .unwrap();
         }
         None if rounds == 1 => text.push_str("noise: unknown after a single round\n"),
         None => text.push_str("noise: unknown\n"),

@@ -162,7 +162,7 @@ fn own_radius(point: &VisiblePoint, photons: &[MapPhoton], planes: &[Vec4], phot
 
 /// Whether a photon counts at a point. Twin of `belongs` in `glsl/scene/belongs.glsl`.
 fn belongs(point: &VisiblePoint, plane: u32, planes: &[Vec4], radius: f32) -> bool {
-    let normal = |plane: u32| planes[plane as usize / 2].truncate() * if plane % 2 == 0 { 1.0 } else { -1.0 };
+    let normal = |plane: u32| planes[plane as usize / 2].truncate() * if plane.is_multiple_of(2) { 1.0 } else { -1.0 };
     let (own, other) = (normal(point.plane), normal(plane));
     let height = planes[plane as usize / 2].dot(point.position.extend(1.0));
     plane == point.plane || (own.dot(other) >= 0.75 && height.abs() <= radius * own.cross(other).length() + 1.0 / 4_194_304.0)

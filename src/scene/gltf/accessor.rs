@@ -27,7 +27,7 @@ impl<'a> Elements<'a> {
         if !self.replaced.is_empty()
             && let Some(element) = self.replaced.get(&index)
         {
-            return *element;
+            return element;
         }
         &self.bytes[index * self.stride..index * self.stride + self.size]
     }
