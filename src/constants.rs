@@ -136,8 +136,10 @@ constants! {
     /// Bounces after which any path ends: of a photon, and of a camera path over mirrors and glass. Roulette ends nearly all of
     /// them long before; what it leaves is counted as cut off.
     MAX_BOUNCES = 10_000;
-    /// Mirrors and panes of glass after which roulette may end a camera path.
+    /// Mirrors and panes of glass after which roulette may end a camera path in proportion to what it still carries, and after
+    /// which it may end any: a path that lossless glass traps would cost as much time as a whole round.
     ROULETTE_DEPTH = 32;
+    LOSSLESS_DEPTH = 128;
     /// Bounces of a scene's photons of which fates are counted apart; the last count takes in all later ones.
     TALLY_ROWS = 64;
     /// Words of one copy of a map's totals (`glsl/totals.glsl`), and the bits of flux after the binary point.

@@ -235,8 +235,9 @@ fn a_run_says_how_wrong_it_is() {
     assert_eq!((&report["end"], &report["rounds"], &report["cancelled"]), (&"error".into(), &30.into(), &false.into()));
     let known = |value: &Value| value.as_f64().unwrap();
     let (noise, bias) = (known(&report["error_bound"]), known(&report["bias"]["upper"]));
-    assert!((noise.hypot(bias) - known(&last["error"])).abs() < 1e-9 && noise > known(&report["relative_error"]), "{report}");
-    for word in ["ended at the requested error", "noise: ", "bias of the radius: ", "noise and bias: "] {
+    let lost = known(&report["losses"]["relative"]);
+    assert!((noise.hypot(bias + lost) - known(&last["error"])).abs() < 1e-9 && lost > 0.0 && noise > known(&report["relative_error"]), "{report}");
+    for word in ["ended at the requested error", "noise: ", "bias of the radius: ", "cut off after 15 bounces: ", "noise, bias and light cut off: "] {
         assert!(text(&output.stdout).contains(word), "{word}: {}", text(&output.stdout));
     }
     let texels = |name: &str| image::open(folder.path().join(name)).unwrap().into_rgb32f().into_raw();

@@ -99,7 +99,7 @@ fn a_scene_costs_what_it_did() {
     let device_bytes = plan.bytes;
     let lit = lit::light(&gpu, &View { geometry: &geometry, camera: scene.cameras.first(), phases: &[] }, plan);
     let events = lit.fates.each_ref().map(|fates| Counts::of(fates, 1).events as u64);
-    assert_eq!((lit.dispatches, lit.submissions, lit.pipelines), (82, 7, 12));
+    assert_eq!((lit.dispatches, lit.submissions, lit.pipelines), (82, 12, 14));
     assert_eq!((events, device_bytes), ([3458, 2413], 1_564_076));
 }
 

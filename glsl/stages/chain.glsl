@@ -83,6 +83,9 @@ const uint MIRROR_SAMPLES = 4;
 // Surfaces that one dispatch follows a chain over; what is still under way then goes on in another (kernels/go_on.comp).
 layout(constant_id = 46) const uint CHAIN_STEPS = MAX_BOUNCES;
 
+// Of a camera path beyond LOSSLESS_DEPTH.
+const float MAX_SURVIVAL = 0.95;
+
 // Random numbers of a place that are no vertex's: light at a receiver, then roulette at each depth.
 const uint RECEIVER_BLOCK = 1 + VERTEX_BLOCKS * MAX_BOUNCES;
 const uint ROULETTE_BLOCK = RECEIVER_BLOCK + 1;
@@ -163,7 +166,8 @@ bool follow(inout Chain chain, uint index, uint number, Draws draws, uint emitte
             return false;
         }
         if (depth >= ROULETTE_DEPTH) {
-            float survival = min(max(scatter.weight.x, max(scatter.weight.y, scatter.weight.z)), 1.0);
+            float most = depth < LOSSLESS_DEPTH ? 1.0 : MAX_SURVIVAL;
+            float survival = min(max(scatter.weight.x, max(scatter.weight.y, scatter.weight.z)), most);
             if (stratified(number, count, words_of(index, ROULETTE_BLOCK + depth, draws)).x >= survival) {
                 return false;
             }
