@@ -14,6 +14,13 @@ uint position_bits(vec3 position)
     return bits.x * 0x9e3779b1u + bits.y * 0x85ebca77u + bits.z * 0xc2b2ae3du;
 }
 
+// A number from 0 to below 1: a value that it is added to is rounded up, by dropping what is behind the point, as often as its
+// fraction says, to some 2^-24.
+float chance_of(uint bits)
+{
+    return float(bits >> 8) * (1.0 / 16777216.0);
+}
+
 // 1 if a fraction, 0 to below 1, is rounded up. Both products are exact.
 uint round_up(float fraction, uint chance)
 {

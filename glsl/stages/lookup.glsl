@@ -98,11 +98,10 @@ void look_up()
                         }
                         precise vec3 flux = uintBitsToFloat(light.xyz) * weight;
                         note_unless(is_finite(flux), ODD_ESTIMATE, 0, push.round, index % push.pixel_count);
-                        uint chance = mix32(point_bits + position_bits(position));
+                        float chance = chance_of(mix32(point_bits + position_bits(position)));
                         [[unroll]] for (uint channel = 0; channel < 3; channel++) {
-                            float units = flux[channel] * float(1u << FLUX_BITS);
-                            float whole = floor(units);
-                            uint amount = uint(whole) + round_up(units - whole, chance);
+                            precise float units = flux[channel] * float(1u << FLUX_BITS) + chance;
+                            uint amount = uint(units);
                             if (HAS_ALL_ARRIVALS) {
                                 [[unroll]] for (uint arrival = 0; arrival < 3; arrival++) {
                                     sums[3 * arrival + channel] = add_words(sums[3 * arrival + channel], arrival == light.w >> 30 ? amount : 0);

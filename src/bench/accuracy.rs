@@ -59,6 +59,7 @@ pub fn measure(lab: &mut Lab, name: &str) -> Result<Found> {
     };
     let subjects = Subject::all(lab.gpu, &scene, &request, lab.cancelled, lab.tell)?;
     let subject = &subjects[0];
+    (lab.tell)(&format!("{name}: time to {} % relative RMSE", 100.0 * wanted));
     let job = |settings: TransportSettings| Job { name, scene: &scene, geometry: &geometry, size: (size, size), settings };
     let candidates = candidates(lab, name, &geometry);
     let mut search = Search { subject, reference: subject.reference.clone(), wanted, patience };
