@@ -45,16 +45,16 @@ impl Unknown {
         let mut text = String::new();
         if *unreached > 0 {
             let share = if relative.is_finite() {
-                format!(" and counts in the noise's bound, {:.2} % with all of them", 100.0 * relative)
+                format!("The noise bound includes {:.2} % for them.", 100.0 * relative)
             } else {
-                "; the result is black so far, so its relative error is unknown".to_owned()
+                "The result is black so far, so its relative error is unknown.".to_owned()
             };
             text.push_str(&format!(
-                "unknown: nothing has reached {unreached} of {asked} {point}s that asked for light; each is at most {upper_bound:.3e} {unit} ({sure} % confidence){share}\n"
+                "unknown: no light has reached {unreached} of {asked} {point}s where some may arrive. Each of them has at most {upper_bound:.3e} {unit} ({sure} % confidence). {share}\n"
             ));
         }
         for kind in absent {
-            text.push_str(&format!("unknown: no {kind} has reached any {point}, so light by this way may be missing\n"));
+            text.push_str(&format!("unknown: no {kind} has reached any {point}, so this part of the light may be missing\n"));
         }
         text
     }

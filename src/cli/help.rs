@@ -13,7 +13,7 @@ photonmill: photon mapping on any Vulkan GPU
 Three commands to start with:
   photonmill render cornell-spheres -o picture.png    render a built-in scene
   photonmill render scene.glb -o picture.png          render your own scene (glTF, from Blender for example)
-  photonmill --preset modified                        light the box of the paper and write open-box.png
+  photonmill --variant atomic                         light the box of the paper and write open-box.png
 
 `photonmill --help` lists all commands and options.";
 
