@@ -266,8 +266,8 @@ fn beam(material: Material, incidence: f64, from_behind: bool) -> Scene {
     let frame = frame(normal, DVec3::X);
     let (sin, cos) = incidence.to_radians().sin_cos();
     let wo = cos * if from_behind { -normal } else { normal } + sin * (0.6 * frame.x_axis + 0.8 * frame.y_axis);
-    // A cone so narrow that in f32 its cosine is 1.
-    let kind = LightKind::Spot { position: wo, direction: -wo, intensity: Vec3::ONE, inner_angle: 0.0, outer_angle: 1e-4 };
+    // A cone so narrow that in f32 all its directions are one.
+    let kind = LightKind::Spot { position: wo, direction: -wo, intensity: Vec3::ONE, inner_angle: 0.0, outer_angle: 1e-12 };
     scene(normal, material, kind)
 }
 
