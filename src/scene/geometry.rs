@@ -5,7 +5,7 @@
 //! scene by a power of two changes no bit, and every coordinate lies within (-1, 1). Radiance and
 //! irradiance keep their units; a flux in W is divided by `unit`^2.
 
-use std::collections::{BTreeSet, HashMap};
+use std::collections::BTreeSet;
 use std::f64::consts::{PI, TAU};
 use std::ops::{Add, Mul};
 
@@ -14,7 +14,7 @@ use rayon::prelude::*;
 
 use super::bvh::Bvh;
 use super::light::LightKind;
-use super::overlap::{self, Planes};
+use super::overlap::{self, Planes, for_equals};
 use super::texture::Wrap;
 use super::{Material, Mesh, Progress, Scene, Surface, Texture};
 use crate::constants::*;
@@ -87,14 +87,14 @@ impl Geometry {
         let unit = 2f64.powi(extent.log2().ceil() as i32);
         let local = |position: DVec3| ((position - centre) / unit).as_vec3();
 
-        let sources: Vec<(u32, u32)> = scene
+        let mut sources: Vec<(u32, u32)> = scene
             .meshes
             .iter()
             .enumerate()
             .flat_map(|(mesh, of)| (0..of.triangles.len() as u32).map(move |triangle| (mesh as u32, triangle)))
             .collect();
         progress("preparing triangles", 0.0);
-        let corners: Vec<[Vec3; 3]> =
+        let mut corners: Vec<[Vec3; 3]> =
             sources.par_iter().map(|&(mesh, triangle)| scene.meshes[mesh as usize].corners(triangle as usize).map(local)).collect();
         // What f32 makes a line of cannot be hit, and its normal would be no number; on a device that takes numbers
         // without a leading 1 for nothing, neither would that of a square below the least normal one.
@@ -103,21 +103,24 @@ impl Geometry {
         // where none is seen.
         let ranks = overlap::ranks(scene);
         let mut overlaps = BTreeSet::new();
-        let mut first = HashMap::with_capacity(corners.len());
-        let mut is_kept = vec![false; corners.len()];
-        for place in (0..corners.len()).filter(|place| is_solid(&corners[*place])) {
-            let seen = first.entry(in_fixed_order(&corners[place])).or_insert(place);
-            if *seen != place {
-                let (mesh, other) = (sources[place].0, sources[*seen].0);
+        let mut is_kept: Vec<bool> = corners.par_iter().map(is_solid).collect();
+        let words = |place: u32| in_fixed_order(&corners[place as usize]);
+        for_equals(corners.len(), words, |alike| {
+            let solid: Vec<usize> = alike.iter().map(|place| *place as usize).filter(|place| is_kept[*place]).collect();
+            let Some((first, others)) = solid.split_first() else { return };
+            let mut seen = *first;
+            for &place in others {
+                let (mesh, other) = (sources[place].0, sources[seen].0);
                 let wins = ranks[mesh as usize] < ranks[other as usize];
                 overlaps.insert(if wins { (other, mesh) } else { (mesh, other) });
-                is_kept[*seen] = false;
-                *seen = if wins { place } else { *seen };
+                let hidden = if wins { std::mem::replace(&mut seen, place) } else { place };
+                is_kept[hidden] = false;
             }
-            is_kept[*seen] = true;
-        }
-        let (mut sources, mut corners): (Vec<_>, Vec<_>) =
-            sources.into_iter().zip(corners).zip(is_kept).filter_map(|(triangle, is_kept)| is_kept.then_some(triangle)).unzip();
+        });
+        let mut of_source = is_kept.iter();
+        sources.retain(|_| *of_source.next().expect("one for each"));
+        let mut of_corners = is_kept.iter();
+        corners.retain(|_| *of_corners.next().expect("one for each"));
         let left_out = count - corners.len();
         if corners.is_empty() {
             return Err(refuse("the scene", "holds no triangle with an area".into()));
@@ -356,11 +359,12 @@ impl Geometry {
 }
 
 /// The bits of a triangle's corners, the same from whichever corner it is read.
-fn in_fixed_order(corners: &[Vec3; 3]) -> [[u32; 3]; 3] {
+fn in_fixed_order(corners: &[Vec3; 3]) -> [u32; 9] {
     // The sum turns -0 into 0.
     let bits = corners.map(|corner| (corner + Vec3::ZERO).to_array().map(f32::to_bits));
     let first = (0..3).min_by_key(|corner| bits[*corner]).expect("a triangle has corners");
-    [bits[first], bits[(first + 1) % 3], bits[(first + 2) % 3]]
+    let word = |k: usize| bits[(first + k / 3) % 3][k % 3];
+    std::array::from_fn(word)
 }
 
 /// 1 - cosine of an angle, with all digits of a small one.

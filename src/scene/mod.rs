@@ -21,6 +21,7 @@ use std::borrow::Cow;
 use std::path::Path;
 
 use glam::{DVec3, Vec3};
+use rayon::prelude::*;
 
 pub use camera::Camera;
 pub use light::{Light, LightKind};
@@ -105,8 +106,16 @@ impl Scene {
 
     /// Smallest box around all triangles: (lower corner, upper corner).
     pub fn bounds(&self) -> (DVec3, DVec3) {
-        let corners = self.meshes.iter().flat_map(|mesh| (0..mesh.triangles.len()).flat_map(|triangle| mesh.corners(triangle)));
-        corners.fold((DVec3::INFINITY, DVec3::NEG_INFINITY), |(min, max), position| (min.min(position), max.max(position)))
+        let nothing = (DVec3::INFINITY, DVec3::NEG_INFINITY);
+        let grown = |(min, max): (DVec3, DVec3), corner: DVec3| (min.min(corner), max.max(corner));
+        let joined = |a: (DVec3, DVec3), b: (DVec3, DVec3)| (a.0.min(b.0), a.1.max(b.1));
+        let of_mesh = |mesh: &Mesh| {
+            let with = |bounds, triangle| mesh.corners(triangle).into_iter().fold(bounds, grown);
+            (0..mesh.triangles.len()).into_par_iter().with_min_len(1 << 12).fold(|| nothing, with).reduce(|| nothing, joined)
+        };
+        let (min, max) = self.meshes.par_iter().map(of_mesh).reduce(|| nothing, joined);
+        // Threads decide which of 0 and -0 comes first; the sum turns both into 0.
+        (min + DVec3::ZERO, max + DVec3::ZERO)
     }
 
     /// Whether anything shines.
