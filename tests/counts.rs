@@ -7,7 +7,7 @@ use photonmill::gpu::Options;
 use photonmill::path::StoredPath;
 use photonmill::photon::{MapPhoton, Origin, StoredPhoton};
 use photonmill::plan::transport::{Sensor, TransportPlan};
-use photonmill::records::{LightPath, VisiblePoint};
+use photonmill::records::{CameraPath, LightPath, VisiblePoint};
 use photonmill::render;
 use photonmill::rng::Rng;
 use photonmill::scene::built_in;
@@ -99,8 +99,11 @@ fn a_scene_costs_what_it_did() {
     let device_bytes = plan.bytes;
     let lit = lit::light(&gpu, &View { geometry: &geometry, camera: scene.cameras.first(), phases: &[] }, plan);
     let events = lit.fates.each_ref().map(|fates| Counts::of(fates, 1).events as u64);
-    assert_eq!((lit.dispatches, lit.submissions, lit.pipelines), (82, 12, 14));
-    assert_eq!((events, device_bytes), ([3458, 2413], 1_564_076));
+    // Where one dispatch may leave camera paths under way, the host looks how many, each round.
+    let (goes_on, paths) = (lit.plan.chains_go_on(), lit.plan.camera_path_capacity().max(1));
+    assert_eq!((lit.dispatches, lit.submissions, lit.pipelines), (82, if goes_on { 12 } else { 10 }, if goes_on { 14 } else { 13 }));
+    let bytes = device_bytes - 2 * paths * size_of::<CameraPath>() as u64;
+    assert_eq!((events, bytes), ([3458, 2413], 1_925_188));
 }
 
 /// Records decide how many bytes an event moves.

@@ -811,7 +811,7 @@ fn channels_a_billionth_as_bright_are_right() {
     let settings = |illumination, part| TransportSettings {
         photons: 20_000,
         bounces: 4,
-        rounds: 4,
+        rounds: 16,
         radius: Some(0.4),
         illumination,
         part,

@@ -190,7 +190,7 @@ fn run(gpu: &Gpu, scene: &Scene, settings: &TransportSettings, cancelled: &Atomi
 fn long_rounds_end_soon_after_they_are_asked_to() {
     let Some(gpu) = device() else { return };
     let scene = scene("cornell-spheres");
-    let long = TransportSettings { photons: 1 << 26, caustic_photons: 1 << 20, rounds: 4, ..settings() };
+    let long = TransportSettings { photons: 1 << 31, caustic_photons: 1 << 20, rounds: 4, ..settings() };
     let soon = Duration::from_millis(500);
 
     // Pipelines are made before the time is taken.

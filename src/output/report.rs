@@ -179,7 +179,8 @@ pub(super) fn errors(rounds: u32, noise: Option<f64>, unknown: &Unknown, bias: O
         .unwrap();
     }
     let (relative, upper) = bias.map_or((0.0, 0.0), |bias| (bias.relative, bias.upper));
-    let what = match (bias.is_some(), lost > 0.0) {
+    // Below what the per cents show, light cut off is stated by itself only.
+    let what = match (bias.is_some(), lost >= 5e-5) {
         (true, true) => "noise, bias and light cut off",
         (true, false) => "noise and bias",
         (false, true) => "noise and light cut off",

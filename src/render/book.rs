@@ -75,6 +75,11 @@ impl<'a, 'c> Book<'a, 'c> {
         Losses::of_room(&self.fates, self.watts)
     }
 
+    /// Adds the fates of all photons handed out.
+    pub(super) fn count(&mut self, tallies: &[Tally]) {
+        self.fates.add(self.open(), tallies);
+    }
+
     pub(super) fn look(&mut self, film: &Film, scene: &RoomScene, plan: &Plan) {
         let weights = self.weights.get_or_insert_with(|| irradiance_weights(scene, plan));
         let unknown = film.unknown(weights, 1.0, plan.settings.stop.confidence).relative;
@@ -82,8 +87,8 @@ impl<'a, 'c> Book<'a, 'c> {
     }
 
     /// Books the fates of all photons handed out, and says whether to stop.
-    pub(super) fn settle(&mut self, tallies: &[Tally]) -> Result<bool> {
-        self.fates.add(self.open(), tallies);
+    pub(super) fn settle(&mut self) -> Result<bool> {
+        self.watch.check_losses(self.fates.bounces.len() as u32)?;
         let ledger = self.fates.ledger();
         if !ledger.closes() || ledger.dropped != 0 {
             return Err(Error::LedgerOpen { ledger });

@@ -48,6 +48,7 @@ pub fn on_cpu(scene: &RoomScene, settings: &Settings, control: &mut Control) -> 
                     None => gather(&pool, scene, &plan, &photons_of_blocks(&blocks), &mut sums, clock),
                 }
                 book.emitted += u64::from(photons_of(&ranges));
+                book.count(&tallies);
                 film.emitted = book.emitted;
                 if chunk == last_chunk {
                     clock.time("film", |_| {
@@ -59,7 +60,7 @@ pub fn on_cpu(scene: &RoomScene, settings: &Settings, control: &mut Control) -> 
                         book.look(&film, scene, &plan);
                     }
                 }
-                if book.settle(&tallies)? {
+                if book.settle()? {
                     break;
                 }
             }

@@ -137,12 +137,13 @@ fn settle(commands: &mut Commands, resources: &Resources, scene: &RoomScene, pla
     }
     let tallies = tallies::read(commands, &resources.tallies, plan.settings.bounces)?;
     tallies::clear(commands, &resources.tallies);
+    book.count(&tallies);
     if book.wants_film() {
         let film = read_film(commands, resources, plan, book)?;
         book.look(&film, scene, plan);
     }
     book.submissions_settled = commands.submission_count();
-    book.settle(&tallies)
+    book.settle()
 }
 
 /// What all photons handed out so far have left.

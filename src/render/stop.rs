@@ -163,7 +163,7 @@ impl Watch {
 /// Mean over rounds of the squared radius, relative to the first one's: r_(i+1)^2 = r_i^2 (i + alpha) / (i + 1)
 /// (Knaus and Zwicker 2011).
 pub fn mean_squared_radius(alpha: f64, rounds: u32) -> f64 {
-    if alpha == 1.0 {
+    if alpha == 1.0 || rounds <= 1 {
         return 1.0;
     }
     // Terms Gamma(k + alpha) / Gamma(k + 1), k from 1, have the sum (Gamma(n + 1 + alpha) / n! - Gamma(1 + alpha)) / alpha.
