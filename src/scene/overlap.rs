@@ -225,8 +225,9 @@ fn classes(corners: [DVec3; 3]) -> impl Iterator<Item = u64> {
     let least = if altitude > WIDTH { size.max_element() - 2.0 * uncertain } else { f64::INFINITY };
     (0..3).filter(move |axis| size[*axis] >= least).flat_map(move |axis| {
         let front = if normal[axis] < 0.0 { -normal } else { normal };
-        // Above 0, where to drop the fraction is to round down.
-        let steps = |value: f64| [-uncertain, uncertain].map(|off| ((value + off) / CLASS + 256.0) as u64);
+        // Above 0, where to drop the fraction is to round down; and no wall along an axis or at a round height lies between
+        // two classes.
+        let steps = |value: f64| [-uncertain, uncertain].map(|off| ((value + off) / CLASS + 256.4) as u64);
         let ends = [front[(axis + 1) % 3], front[(axis + 2) % 3], front.dot(a)].map(steps);
         (0..8).filter_map(move |choice| {
             // Ends that are equal are one choice.
