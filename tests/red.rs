@@ -278,8 +278,8 @@ const FAULTS: [Fault; 65] = [
     Fault {
         what: "a photon that flies to its end begins with its second bounce's random numbers",
         file: "stages/fly_whole.glsl",
-        from: "            bounce = 0;",
-        to: "            bounce = 1;",
+        from: "            flights = 0;",
+        to: "            flights = 1;",
         kernels: &["fly_whole"],
         noticed_by: &[(Appends, OtherSums)],
     },
