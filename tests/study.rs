@@ -82,8 +82,8 @@ fn resumed_check(resumed: &Study, whole: &Study, kept: &[(Axis, Point)]) -> Chec
 /// light, or as many times that as the root of the photons in reach is smaller.
 fn error_check(label: &str, bias: f64, noise: f64) -> Check {
     let times = match label {
-        "a sixteenth of the photons" | "radius 0.00625 m" => 4.0,
-        "a quarter of the photons" | "radius 0.0125 m" => 2.0,
+        "1/16 of the photons" | "radius 0.00625 m" => 4.0,
+        "1/4 of the photons" | "radius 0.0125 m" => 2.0,
         _ => 1.0,
     };
     // More than half of the light is indirect.
