@@ -64,6 +64,8 @@ pub struct Totals {
     /// Photons whose flux a shading normal would have raised beyond `MAX_SHADING_GAIN`, and what they lost.
     pub clamped: u64,
     pub clamped_flux: RelativeFlux,
+    /// Photons that were under way when the run was interrupted, in a round that does not count. They are among those cut off.
+    pub interrupted: u64,
 }
 
 impl Totals {
@@ -114,7 +116,10 @@ impl Fates {
     /// Counts photons as cut off that were under way when a run was interrupted.
     pub fn interrupt(&mut self) {
         let Ledger { emitted, absorbed, escaped, cut_off, dropped, .. } = self.ledger();
-        self.totals.get_or_insert_default().cut_off += emitted.saturating_sub(absorbed + escaped + cut_off + dropped);
+        let open = emitted.saturating_sub(absorbed + escaped + cut_off + dropped);
+        let totals = self.totals.get_or_insert_default();
+        totals.cut_off += open;
+        totals.interrupted += open;
     }
 
     pub fn add(&mut self, emitted: u64, tallies: &[Tally]) {

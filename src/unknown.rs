@@ -39,22 +39,29 @@ impl Unknown {
     }
 
     /// A line each for points and kinds of light; `unit` is the result's.
-    pub fn text(&self, point: &str, unit: &str, confidence: f64) -> String {
+    pub fn text(&self, point: &str, unit: &str, confidence: f64, rounds: u32) -> String {
         let Unknown { asked, unreached, upper_bound, relative, absent } = self;
         let sure = 100.0 * confidence;
         let mut text = String::new();
         if *unreached > 0 {
-            let share = if relative.is_finite() {
-                format!("The noise bound includes {:.2} % for them.", 100.0 * relative)
+            let share = if rounds < 2 {
+                String::new()
+            } else if relative.is_finite() {
+                format!(" The noise bound includes {:.2} % for them.", 100.0 * relative)
             } else {
-                "The result is black so far, so its relative error is unknown.".to_owned()
+                " The result is black so far, so its relative error is unknown.".to_owned()
             };
             text.push_str(&format!(
-                "unknown: no light has reached {unreached} of {asked} {point}s where some may arrive. Each of them has at most {upper_bound:.3e} {unit} ({sure} % confidence). {share}\n"
+                "unknown: no light has reached {unreached} of {asked} {point}s where some may arrive. Each of them has at most {upper_bound:.3e} {unit} ({sure} % confidence).{share}\n"
             ));
         }
         for kind in absent {
-            text.push_str(&format!("unknown: no {kind} has reached any {point}, so this part of the light may be missing\n"));
+            let part = match *kind {
+                "shadow ray" => "direct light",
+                "photon of the caustic map" => "caustics",
+                _ => "indirect light",
+            };
+            text.push_str(&format!("unknown: no {kind} has reached any {point}, so {part} may be missing\n"));
         }
         text
     }
@@ -80,7 +87,7 @@ mod tests {
         let of = |result: f64| unknown.clone().relative_to(5.0, result);
         assert_eq!((of(20.0).relative, of(20.0).upper_bound, of(20.0).unreached), (0.5, 2.0, 2));
         assert_eq!(of(0.0).relative, f64::INFINITY);
-        assert!(of(0.0).text("pixel", "W/m2/sr", 0.95).contains("2 of 3 pixels"));
+        assert!(of(0.0).text("pixel", "W/m2/sr", 0.95, 2).contains("2 of 3 pixels"));
         assert!(serde_json::to_value(of(0.0)).unwrap()["relative"].is_null());
     }
 }

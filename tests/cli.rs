@@ -240,9 +240,13 @@ fn a_run_says_how_wrong_it_is() {
         (noise.hypot(bias + lost) - known(&last["error"])).abs() < 1e-9 && lost > 0.0 && noise > known(&report["relative_error"]),
         "{report}"
     );
-    for word in
-        ["ended at the requested error", "noise: ", "bias of the radius: ", "cut off after 15 bounces: ", "noise, bias and light cut off: "]
-    {
+    for word in [
+        "ended at the requested error",
+        "noise: ",
+        "bias of the radius: ",
+        "light cut off after 15 bounces: ",
+        "noise, bias and light cut off: ",
+    ] {
         assert!(text(&output.stdout).contains(word), "{word}: {}", text(&output.stdout));
     }
     let texels = |name: &str| image::open(folder.path().join(name)).unwrap().into_rgb32f().into_raw();

@@ -145,7 +145,7 @@ fn a_map_of_which_no_photon_arrives_is_named() {
     let unknown = lit.film.unknown(&lit.plan, 0.95);
     assert!(unknown.absent.contains(&"photon of the caustic map") && unknown.unreached == 0, "{unknown:?}");
     assert!(unknown.relative > 0.0 && unknown.relative.is_finite(), "{unknown:?}");
-    assert!(unknown.text("point", "W/m2", 0.95).contains("no photon of the caustic map has reached any point"));
+    assert!(unknown.text("point", "W/m2", 0.95, 2).contains("no photon of the caustic map has reached any point"));
 }
 
 /// The paper's box means the same by it: texels that no photon has found.

@@ -33,7 +33,7 @@ use progress::print_line;
 
 /// Photon mapping on any Vulkan GPU.
 ///
-/// `photonmill render` makes a picture of a scene, `photonmill bake` lightmaps. Without a command, photonmill lights the
+/// `photonmill render` makes a picture of a scene, `photonmill bake` lightmaps. With options but no command, photonmill lights the
 /// open box of the paper 'Photon Mapping On The GPU', writes its picture and prints the photon ledger and the time of
 /// every pass; the options below belong to that box.
 #[derive(Parser)]

@@ -20,7 +20,7 @@ pub(super) struct ProgressArgs {
     /// Progress on stderr
     #[arg(long, value_enum, value_name = "FORM", default_value = "auto")]
     progress: ProgressForm,
-    /// Print neither device and plan nor progress; warnings and errors are still printed
+    /// Print nothing before the report but warnings and errors: no device, plan or progress
     #[arg(short, long, conflicts_with = "progress")]
     quiet: bool,
 }

@@ -154,7 +154,7 @@ value_enum!(IlluminationArg => Illumination {
     Photons,
 });
 value_enum!(AppendArg => Append {
-    /// Persistent; ballot with --math strict, or where a photon may bounce more often than the device can loop
+    /// Persistent; ballot with --math strict
     Auto,
     /// Bounce by bounce, one atomic per photon
     Atomic,

@@ -229,6 +229,9 @@ pub fn text(scene: &str, lit: &Lit, explain: bool) -> String {
     for map in lit.plan.maps() {
         let fates = &lit.fates[usize::from(map.caustic_only)];
         write!(text, "{} {}", map.name, ledger(&fates.ledger())).unwrap();
+        if let Some(open) = fates.totals.map(|totals| totals.interrupted).filter(|open| *open > 0) {
+            writeln!(text, "        {open} of those cut off were under way when the run ended, in a round that does not count").unwrap();
+        }
     }
     text.push_str(&losses(&lit.losses, settings.bounces));
     if lit.anomalies[0] > 0 {
@@ -249,7 +252,7 @@ pub fn text(scene: &str, lit: &Lit, explain: bool) -> String {
         Sensor::Picture { .. } => ("pixel", "W/m2/sr"),
         Sensor::Receivers { .. } => ("point", "W/m2"),
     };
-    text.push_str(&unknown.text(point, unit, settings.stop.confidence));
+    text.push_str(&unknown.text(point, unit, settings.stop.confidence, lit.film.rounds));
     text.push('\n');
     text.push_str(&timing_table(&lit.timings, Some(&lit.device)));
     text

@@ -195,9 +195,14 @@ pub(super) fn errors(rounds: u32, noise: Option<f64>, unknown: &Unknown, bias: O
 
 /// Light that limits kept from the result; `bounces` is the cap.
 pub(super) fn losses(losses: &Losses, bounces: u32) -> String {
-    let mut text = format!("cut off after {bounces} bounces: {} of {:.4} W emitted", watts(losses.cut_off), losses.emitted);
+    let emitted = losses.emitted.abs();
+    let mut text = if losses.cut_off > 0.0 {
+        format!("light cut off after {bounces} bounces: {:.3e} of {emitted:.3e} W", losses.cut_off)
+    } else {
+        format!("light cut off: none of {emitted:.3e} W")
+    };
     if losses.clamped > 0.0 {
-        write!(text, "; clamped at shading normals: {}", watts(losses.clamped)).unwrap();
+        write!(text, "; clamped at shading normals: {:.3e} W", losses.clamped).unwrap();
     }
     if losses.clamped_values > 0 {
         write!(text, "; {} value(s) clamped to the largest that the film holds", losses.clamped_values).unwrap();
@@ -209,10 +214,6 @@ pub(super) fn losses(losses: &Losses, bounces: u32) -> String {
         write!(text, "; together at most {:.2} % of the result", 100.0 * losses.relative).unwrap();
     }
     text + "\n"
-}
-
-fn watts(watts: f64) -> String {
-    if watts == 0.0 { "0".to_owned() } else { format!("{watts:.3e}") }
 }
 
 /// Why a run ended before its last round, unless the user interrupted it.
@@ -273,7 +274,7 @@ pub fn text(outcome: &Outcome, walls: &[WallEstimate], unknown: &Unknown) -> Str
         outcome.losses.relative,
         settings.stop.confidence,
     ));
-    text.push_str(&unknown.text("texel", "W/m2", settings.stop.confidence));
+    text.push_str(&unknown.text("texel", "W/m2", settings.stop.confidence, outcome.film.rounds));
     text.push('\n');
     text.push_str(&timing_table(&outcome.timings, outcome.device.as_ref()));
     text

@@ -87,7 +87,7 @@ impl Watch {
         let lost = self.seen.map_or(0.0, |look| look.lost);
         let Some(wanted) = self.stop.error.filter(|wanted| lost > *wanted) else { return Ok(()) };
         let allowed = format!(
-            "cannot be reached, because photons cut off after {bounces} bounces may take {:.2} % of the light; allow more --bounces",
+            "cannot be reached, because photons are cut off after {bounces} bounces, and what they carry may add up to {:.2} % of the result; allow more --bounces",
             100.0 * lost
         );
         Err(Error::setting("--error", format!("{}%", 100.0 * wanted), allowed))

@@ -54,6 +54,8 @@ pub struct Geometry {
     pub left_out: usize,
     /// Meshes that overlap in one plane, facing alike: (hidden there, seen there), each pair once.
     pub overlaps: Vec<(u32, u32)>,
+    /// Triangles that more others overlap than are cut out of one.
+    pub crowded: usize,
 }
 
 /// Most triangles: their numbers and those of the BVH's nodes are 32-bit, and a photon's choice of
@@ -103,6 +105,7 @@ impl Geometry {
         // where none is seen.
         let ranks = overlap::ranks(scene);
         let mut overlaps = BTreeSet::new();
+        let mut crowded = 0;
         let mut is_kept: Vec<bool> = corners.par_iter().map(is_solid).collect();
         let words = |place: u32| in_fixed_order(&corners[place as usize]);
         for_equals(corners.len(), words, |alike| {
@@ -133,6 +136,7 @@ impl Geometry {
         for covered in overlap::find(scene, &ranks, &sources, &corners) {
             let (source, [a, b, c], plane) =
                 (sources[covered.triangle], corners[covered.triangle].map(Vec3::as_dvec3), planes.of_triangles[covered.triangle]);
+            crowded += usize::from(covered.crowded);
             overlaps.extend(covered.by.iter().map(|other| (source.0, sources[*other].0)));
             for piece in covered.pieces {
                 let at = piece.map(|of| (a * of.x + b * of.y + c * of.z).as_vec3());
@@ -193,6 +197,7 @@ impl Geometry {
             power: 0.0,
             left_out,
             overlaps: overlaps.into_iter().collect(),
+            crowded,
         };
         progress("collecting lights", 0.0);
         geometry.add_emitters(scene)?;
@@ -219,6 +224,12 @@ impl Geometry {
             format!("meshes {:?} and {:?} overlap in one plane; only {:?} counts there", name(hidden), name(seen), name(seen))
         };
         let mut lines: Vec<String> = self.overlaps.iter().take(MOST).map(line).collect();
+        if self.crowded > 0 {
+            lines.push(format!(
+                "{} triangle(s) have more than 64 others in their plane and place; light there may count more than once",
+                self.crowded
+            ));
+        }
         if self.overlaps.len() > MOST {
             lines.push(format!("{} more pairs of meshes overlap in one plane; one of each counts there", self.overlaps.len() - MOST));
         }

@@ -35,7 +35,12 @@ pub struct Covered {
     pub by: Vec<usize>,
     /// What remains visible: barycentric weights of the triangle's corners at the corners of each piece.
     pub pieces: Vec<[DVec3; 3]>,
+    /// So many hide it that some were left out, and what only they hide counts as visible.
+    pub crowded: bool,
 }
+
+/// Triangles that are cut out of one, the largest first; each costs time with each other one.
+const MOST_CLIPS: usize = 64;
 
 /// Planes of triangles, those that agree to a few units in the last place as one.
 pub struct Planes {
@@ -273,10 +278,17 @@ pub fn find(scene: &Scene, ranks: &[u32], sources: &[(u32, u32)], corners: &[[Ve
     pairs.dedup();
     let visible = |pairs: &[(u32, u32)]| {
         let hidden = sheet(pairs[0].0);
-        let others: Vec<Sheet> = pairs.iter().map(|(_, other)| sheet(*other)).collect();
-        let pieces = hidden.without(&others)?;
-        let alike = pairs.iter().zip(&others).filter(|(_, other)| other.normal.dot(hidden.normal) > 0.0);
-        Some(Covered { triangle: pairs[0].0 as usize, by: alike.map(|((_, other), _)| *other as usize).collect(), pieces })
+        let mut others: Vec<(u32, Sheet)> = pairs.iter().map(|(_, other)| (*other, sheet(*other))).collect();
+        let crowded = others.len() > MOST_CLIPS;
+        if crowded {
+            let size = |[a, b, c]: &[DVec3; 3]| (*b - *a).cross(*c - *a).length_squared();
+            others.sort_by(|(a, one), (b, other)| size(&other.corners).total_cmp(&size(&one.corners)).then(a.cmp(b)));
+            others.truncate(MOST_CLIPS);
+        }
+        let (others, sheets): (Vec<u32>, Vec<Sheet>) = others.into_iter().unzip();
+        let pieces = hidden.without(&sheets)?;
+        let alike = others.iter().zip(&sheets).filter(|(_, other)| other.normal.dot(hidden.normal) > 0.0);
+        Some(Covered { triangle: pairs[0].0 as usize, by: alike.map(|(other, _)| *other as usize).collect(), pieces, crowded })
     };
     pairs.par_chunk_by(|a, b| a.0 == b.0).filter_map(visible).collect()
 }

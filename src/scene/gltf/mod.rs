@@ -54,7 +54,8 @@ pub fn load(path: &Path, radiometric: bool, progress: Progress) -> Result<Scene>
     let content = content.strip_prefix(b"\xef\xbb\xbf").unwrap_or(&content);
     let refuse = |reason: String| Error::Scene { path: path.to_owned(), object: "the file".into(), reason: one_line(&reason) };
     malformed::binary_length(content).map_err(refuse)?;
-    let Gltf { document, blob } = Gltf::from_slice_without_validation(content).map_err(|error| refuse(error.to_string()))?;
+    let Gltf { document, blob } =
+        Gltf::from_slice_without_validation(content).map_err(|error| refuse(format!("is not valid glTF: {error}")))?;
     let root = document.into_json();
     let version = root.asset.version.as_str();
     if !version.starts_with("2.") {
