@@ -68,7 +68,6 @@ enum Question {
     LeaningPlane(Illumination),
     LeaningScatterer,
     PatchInPlane,
-    SheetsInOnePlane,
     /// With so many samples a pixel, and with a final gather or not.
     GlassInFurnace(u32, bool),
     /// Aimed photons bring as much light as others: a scene of `common::aimed`.
@@ -84,7 +83,7 @@ impl Question {
             Photons(_) | InTurn | Film(_) | Ledger(_) | ClosedForm(_) | Appends | Builders | StrictMath | Finite | FiniteBox | Nearest
             | Pairs | Crowds | AimedLight(_) => false,
             Bits(_) | LampInBox(_) | Shelf | Ridge | Spot | Texture(_) => true,
-            LeaningPlane(_) | LeaningScatterer | PatchInPlane | SheetsInOnePlane | GlassInFurnace(..) => true,
+            LeaningPlane(_) | LeaningScatterer | PatchInPlane | GlassInFurnace(..) => true,
         }
     }
 }
@@ -105,7 +104,7 @@ impl Question {
             }
             AimedLight(_) => Subject::Aiming,
             Appends | Finite | Crowds | Bits(_) | LampInBox(_) | Shelf | Ridge | Spot | Texture(_) => Subject::Scenes,
-            LeaningPlane(_) | LeaningScatterer | PatchInPlane | SheetsInOnePlane | GlassInFurnace(..) => Subject::Scenes,
+            LeaningPlane(_) | LeaningScatterer | PatchInPlane | GlassInFurnace(..) => Subject::Scenes,
         }
     }
 }
@@ -122,7 +121,7 @@ struct Fault {
     noticed_by: &'static [(Question, Kind)],
 }
 
-const FAULTS: [Fault; 65] = [
+const FAULTS: [Fault; 64] = [
     Fault {
         what: "what rounding takes from a pair of floats is forgotten",
         file: "film/compensated.glsl",
@@ -394,10 +393,10 @@ const FAULTS: [Fault; 65] = [
         noticed_by: &[(ClosedForm("furnace, Photons, Ballot: irradiance"), TooDark)],
     },
     Fault {
-        what: "one photon is sorted into the cell beside its own",
+        what: "one photon in sixteen is sorted into the cell beside its own",
         file: "kernels/cell_scatter.comp",
         from: "cell_number(cell, push.cell_count)",
-        to: "(cell_number(cell, push.cell_count) ^ uint(index == 11u))",
+        to: "(cell_number(cell, push.cell_count) ^ uint(index % 16 == 11))",
         kernels: &["cell_scatter"],
         noticed_by: &[(Film(Gather::Grid), SumsTooSmall)],
     },
@@ -548,15 +547,6 @@ const FAULTS: [Fault; 65] = [
         to: "",
         kernels: &["fly_whole", "fly_ballot"],
         noticed_by: &[(PatchInPlane, PhotonsAdded)],
-    },
-    Fault {
-        what: "of triangles equally near, the first that is tested is met",
-        file: "scene/bvh.glsl",
-        from: "t < hit.t || (t == hit.t && index < hit.triangle)",
-        to: "t < hit.t",
-        kernels: &["view"],
-        // Which of them is met is no matter, as long as it is always the same.
-        noticed_by: &[(SheetsInOnePlane, OtherSums)],
     },
     Fault {
         what: "shadow rays end 0.5 % before their lamp",
@@ -733,7 +723,6 @@ fn ask(gpu: &Gpu, question: Question) -> Check<Complaint> {
         LeaningPlane(illumination) => known::leaning_plane(gpu, illumination),
         LeaningScatterer => known::leaning_scatterer(gpu),
         PatchInPlane => known::patch_in_a_plane(gpu),
-        SheetsInOnePlane => known::sheets_in_one_plane(gpu),
         AimedLight(kind) => aimed::same_light(gpu, kind),
     }
 }
