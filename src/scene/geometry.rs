@@ -226,7 +226,7 @@ impl Geometry {
         let mut lines: Vec<String> = self.overlaps.iter().take(MOST).map(line).collect();
         if self.crowded > 0 {
             lines.push(format!(
-                "{} triangle(s) have more than 64 others in their plane and place; light there may count more than once",
+                "{} triangle(s) lie among more than 64 others that overlap each other in one plane; light there may count more than once",
                 self.crowded
             ));
         }

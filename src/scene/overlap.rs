@@ -39,7 +39,8 @@ pub struct Covered {
     pub crowded: bool,
 }
 
-/// Triangles that are cut out of one, the largest first; each costs time with each other one.
+/// Triangles that are cut out of one, the largest first, where these hide each other as often: each then costs time with each
+/// other one. A rug of many triangles that do not overlap is cut out whole.
 const MOST_CLIPS: usize = 64;
 
 /// Planes of triangles, those that agree to a few units in the last place as one.
@@ -276,10 +277,12 @@ pub fn find(scene: &Scene, ranks: &[u32], sources: &[(u32, u32)], corners: &[[Ve
     let mut pairs: Vec<(u32, u32)> = members.par_chunk_by(|a, b| a >> NUMBER_BITS == b >> NUMBER_BITS).flat_map_iter(pairs_of).collect();
     pairs.par_sort_unstable();
     pairs.dedup();
-    let visible = |pairs: &[(u32, u32)]| {
-        let hidden = sheet(pairs[0].0);
-        let mut others: Vec<(u32, Sheet)> = pairs.iter().map(|(_, other)| (*other, sheet(*other))).collect();
-        let crowded = others.len() > MOST_CLIPS;
+    let hider_count = |triangle: u32| pairs.partition_point(|pair| pair.0 <= triangle) - pairs.partition_point(|pair| pair.0 < triangle);
+    let visible = |own: &[(u32, u32)]| {
+        let hidden = sheet(own[0].0);
+        let mut others: Vec<(u32, Sheet)> = own.iter().map(|(_, other)| (*other, sheet(*other))).collect();
+        let crowded =
+            others.len() > MOST_CLIPS && others.iter().map(|(other, _)| hider_count(*other)).sum::<usize>() > MOST_CLIPS * others.len();
         if crowded {
             let size = |[a, b, c]: &[DVec3; 3]| (*b - *a).cross(*c - *a).length_squared();
             others.sort_by(|(a, one), (b, other)| size(&other.corners).total_cmp(&size(&one.corners)).then(a.cmp(b)));
@@ -288,7 +291,7 @@ pub fn find(scene: &Scene, ranks: &[u32], sources: &[(u32, u32)], corners: &[[Ve
         let (others, sheets): (Vec<u32>, Vec<Sheet>) = others.into_iter().unzip();
         let pieces = hidden.without(&sheets)?;
         let alike = others.iter().zip(&sheets).filter(|(_, other)| other.normal.dot(hidden.normal) > 0.0);
-        Some(Covered { triangle: pairs[0].0 as usize, by: alike.map(|(other, _)| *other as usize).collect(), pieces, crowded })
+        Some(Covered { triangle: own[0].0 as usize, by: alike.map(|(other, _)| *other as usize).collect(), pieces, crowded })
     };
     pairs.par_chunk_by(|a, b| a.0 == b.0).filter_map(visible).collect()
 }
