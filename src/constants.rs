@@ -129,8 +129,6 @@ constants! {
     /// `SUMS`: a 32-bit float in the low word, what its rounding lost in the high word.
     SUMS_COMPENSATED = 2;
 
-    /// Bits after the binary point of the flux that a point gathers.
-    FLUX_BITS = 24;
     /// Most that a shading normal may change a photon's flux by, all bounces together.
     MAX_SHADING_GAIN = 8;
     /// Bounces after which any path ends: of a photon, and of a camera path over mirrors and glass. Roulette ends nearly all of

@@ -12,7 +12,7 @@ layout(push_constant, scalar) uniform Push { LookupPush push; };
 
 #include "math.glsl"
 #include "oddities.glsl"
-#include "film/film.glsl"
+#include "film/wide.glsl"
 #include "film/two_words.glsl"
 #include "scene/directions.glsl"
 #include "scene/effects.glsl"

@@ -14,7 +14,7 @@ layout(push_constant, scalar) uniform Push { LookupPush push; };
 
 #include "math.glsl"
 #include "oddities.glsl"
-#include "film/film.glsl"
+#include "film/wide.glsl"
 #include "film/u64.glsl"
 #include "scene/directions.glsl"
 #include "scene/effects.glsl"

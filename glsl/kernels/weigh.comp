@@ -34,7 +34,7 @@ vec3 gathered_flux(uint place)
     vec3 flux;
     for (uint channel = 0; channel < 3; channel++) {
         uvec2 sum = estimates[3 * place + channel];
-        flux[channel] = (float(sum.y) * 4294967296.0 + float(sum.x)) * (1.0 / float(1u << FLUX_BITS));
+        flux[channel] = float(sum.y) + float(sum.x) * (1.0 / 4294967296.0);
     }
     return flux;
 }

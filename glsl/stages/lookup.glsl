@@ -50,7 +50,8 @@ void look_up()
     uint slice_begin = slice * GATHER_SLICE;
     uint slice_end = slice_begin + GATHER_SLICE;
 
-    // Three channels of each arrival; the first three of a map that holds one arrival only.
+    // Three channels of each arrival; the first three of a map that holds one arrival only. 32 bits after the binary point:
+    // of a channel a billionth as bright as the photons' mean, a photon still adds some units.
     uvec2 sums[9];
     [[unroll]] for (uint k = 0; k < 9; k++) {
         sums[k] = uvec2(0);
@@ -100,14 +101,15 @@ void look_up()
                         note_unless(is_finite(flux), ODD_ESTIMATE, 0, push.round, index % push.pixel_count);
                         float chance = chance_of(mix32(point_bits + position_bits(position)));
                         [[unroll]] for (uint channel = 0; channel < 3; channel++) {
-                            precise float units = flux[channel] * float(1u << FLUX_BITS) + chance;
-                            uint amount = uint(units);
+                            float whole = floor(flux[channel]);
+                            precise float fraction = (flux[channel] - whole) * 4294967296.0 + chance;
+                            uvec2 amount = uvec2(uint(fraction), uint(whole));
                             if (HAS_ALL_ARRIVALS) {
                                 [[unroll]] for (uint arrival = 0; arrival < 3; arrival++) {
-                                    sums[3 * arrival + channel] = add_words(sums[3 * arrival + channel], arrival == light.w >> 30 ? amount : 0);
+                                    sums[3 * arrival + channel] = add64(sums[3 * arrival + channel], arrival == light.w >> 30 ? amount : uvec2(0));
                                 }
                             } else {
-                                sums[channel] = add_words(sums[channel], amount);
+                                sums[channel] = add64(sums[channel], amount);
                             }
                         }
                         found = true;

@@ -445,6 +445,12 @@ impl TransportPlan {
         self.film_limit / f64::from((self.points_per_pixel * self.arrival_sets).next_power_of_two())
     }
 
+    /// How often at most a pixel's light is rounded to the film's unit in a round: each part of a path's direct light, and each
+    /// map's at each visible point.
+    pub fn roundings_per_round(&self) -> f64 {
+        f64::from(PART_COUNT * self.samples() + self.points_per_pixel * self.arrival_sets)
+    }
+
     /// Visible points of one lookup, which has a work group of them along x.
     pub fn points_at_once(&self) -> u32 {
         let lanes = self.maps().map(|map| map.lanes).max().unwrap_or(1);

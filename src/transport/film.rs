@@ -47,18 +47,23 @@ impl RoundFilm {
     }
 
     /// Standard error of the mean, from the variance between rounds; of a single round nothing is known,
-    /// and it is infinite.
+    /// and it is infinite. Where a channel lies below the film's unit few rounds may not show that it is rounded at random
+    /// to 0 or 1: then the variance is at least what that rounding has.
     pub fn standard_error(&self, pixel: usize, plan: &TransportPlan) -> DVec3 {
         if self.rounds < 2 {
             return DVec3::INFINITY;
         }
         let rounds = f64::from(self.rounds);
+        let is_lit = self.sums[3 * pixel..][..3] != [0; 3];
         DVec3::from_array([0, 1, 2].map(|channel| {
             let (sum, square) = (u128::from(self.sums[3 * pixel + channel]), self.squares[3 * pixel + channel]);
             // sum^2 <= rounds * square, so what is left of the square is not negative but for the division's
             // remainder.
             let deviation = square.saturating_sub(sum * sum / u128::from(self.rounds)) as f64;
-            (deviation / (rounds - 1.0) / rounds).sqrt() / plan.film_scale
+            // That of a fraction f is f (1 - f), at most f and at most 1/4; a sum of 0 may be of any fraction below 1 / rounds.
+            let rounding = (sum as f64).max(1.0).min(0.25 * plan.roundings_per_round() * rounds);
+            let variance = (deviation * rounds / (rounds - 1.0)).max(if is_lit { rounding } else { 0.0 });
+            variance.sqrt() / rounds / plan.film_scale
         }))
     }
 
