@@ -1,7 +1,7 @@
 //! Lighting scenes of triangles: bits that no split, builder or unused effect may change, parts that add
 //! up, radiometry, leaks, and plans that the device's work is counted against.
 
-use crate::common::lit::{light, received, scene};
+use crate::common::lit::{light, received, run, scene};
 use crate::common::{Check, Complaint, Kind, assert_complains, assert_holds, device, device_with, known, pairs, same_sums, z_check};
 use glam::{DVec3, Vec3};
 use photonmill::constants::GATHER_SLICE;
@@ -48,9 +48,14 @@ fn same_film(what: &str, found: &Lit, expected: &Lit) -> Check<Complaint> {
     if found.film == expected.film { Ok(()) } else { Err(Complaint::new(Kind::OtherSums, format!("{what}: squares of sums differ"))) }
 }
 
-/// Lists of survivors in any order give the same picture.
+/// Lists of survivors in any order give the same picture. What a list without a survivor shows may be odd in any way.
 pub fn appends_agree(gpu: &Gpu, scene: &Scene, settings: &TransportSettings) -> Check<Complaint> {
-    let of = |append| picture(gpu, scene, &TransportSettings { append, ..settings.clone() });
+    let camera = camera_of(scene);
+    let of = |append| {
+        let settings = TransportSettings { append, ..settings.clone() };
+        let (geometry, plan) = plan_of(gpu, scene, &settings, Sensor::Picture { width: SIZE, height: SIZE });
+        run(gpu, &View { geometry: &geometry, camera: Some(&camera), phases: &[] }, plan)
+    };
     let ballot = of(Append::Ballot);
     same_film("atomic append", &of(Append::Atomic), &ballot)?;
     same_film("persistent photons", &of(Append::Persistent), &ballot)

@@ -21,10 +21,15 @@ use super::{Check, z_check};
 pub const APPENDS: [Append; 2] = [Append::Ballot, Append::Persistent];
 pub const BOTH: [Illumination; 2] = [Illumination::Split, Illumination::Photons];
 
+/// Runs to the end, whatever comes out.
+pub fn run(gpu: &Gpu, view: &View, plan: TransportPlan) -> Lit {
+    let never = AtomicBool::new(false);
+    transport::light(gpu, view, plan, &mut Control { cancelled: &never, progress: &mut |_| {} }).unwrap()
+}
+
 /// Runs to the end, with nothing odd.
 pub fn light(gpu: &Gpu, view: &View, plan: TransportPlan) -> Lit {
-    let never = AtomicBool::new(false);
-    let lit = transport::light(gpu, view, plan, &mut Control { cancelled: &never, progress: &mut |_| {} }).unwrap();
+    let lit = run(gpu, view, plan);
     assert_eq!(lit.anomalies, [0, 0, 0], "values that are no number, or too large for the film");
     if let Some(oddities) = &lit.oddities {
         assert_eq!(oddities.count, 0, "{}", oddities.text());
