@@ -598,6 +598,12 @@ fn sheets_in_one_plane_are_met_alike_by_tree_and_list() {
     assert_holds("the sheets", known::sheets_in_one_plane(&gpu));
 }
 
+#[test]
+fn of_triangles_equally_near_the_lowest_number_is_met() {
+    let Some(gpu) = device() else { return };
+    assert_holds("the stack", known::stack_from_afar(&gpu));
+}
+
 /// Triangles without area, triangles given twice, and the order in which triangles are given change no bit.
 #[test]
 fn flat_doubled_and_reordered_triangles_change_no_bit() {

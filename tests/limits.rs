@@ -6,6 +6,7 @@ use std::time::{Duration, Instant};
 use crate::common::lit::{BOTH, glass, level, matt, mean_red, mirror, received, scene, scene_of, seen, shaft, shining};
 use crate::common::{assert_complains, assert_holds, device, z_check};
 use glam::{DVec3, Vec3};
+use photonmill::constants::MAX_BOUNCES;
 use photonmill::error::Error;
 use photonmill::gpu::{Commands, Gpu};
 use photonmill::plan::transport::{Sensor, TransportPlan};
@@ -78,12 +79,12 @@ fn what_a_cap_cuts_off_is_counted() {
     }
 }
 
-/// An error that a cap makes impossible is refused, when the run first looks.
+/// An error that a cap makes impossible is refused, when the run first looks: after 30 rounds.
 #[test]
 fn an_error_beyond_a_cap_is_refused() {
     let Some(gpu) = device() else { return };
     let stop = Stop { error: Some(0.01), ..Stop::default() };
-    let settings = TransportSettings { bounces: 4, photons: 500, rounds: 20_000, stop, ..settings() };
+    let settings = TransportSettings { bounces: 4, photons: 500, rounds: 31, stop, ..settings() };
     let refused = run(&gpu, &furnace(0.9), &settings, &AtomicBool::new(false)).unwrap_err();
     assert!(refused.to_string().starts_with("--error 1%: cannot be reached"), "{refused}");
 }
@@ -125,6 +126,9 @@ fn light_trapped_for_ever_is_counted() {
     assert_eq!(lit.losses.camera_paths, 0);
     let ledger = lit.fates[0].ledger();
     assert_eq!((ledger.emitted, ledger.cut_off), (40, 40));
+    // Each went as far as any may.
+    let survived = lit.fates[0].bounces.iter().map(|bounce| bounce.stored).sum::<u64>();
+    assert_eq!(survived, 40 * u64::from(MAX_BOUNCES));
     assert!((lit.losses.cut_off / lit.losses.emitted - 1.0).abs() < 1e-5, "{:?}", lit.losses);
 }
 
@@ -210,17 +214,20 @@ fn long_rounds_end_soon_after_they_are_asked_to() {
         assert!(late < soon, "{late:?} after it was cancelled");
     });
 
+    // Radii of so many photons would find next to none of those that there is time for.
+    let wide = |of: &TransportSettings| TransportSettings { radius: Some(0.05), caustic_radius: Some(0.02), ..of.clone() };
     // In its first round a run ends with the photons that it has.
     let wanted = Duration::from_millis(1500);
     let stop = Stop { seconds: Some(wanted.as_secs_f64()), ..Stop::default() };
     let began = Instant::now();
-    let lit = run(&gpu, &scene, &TransportSettings { stop, ..long.clone() }, &AtomicBool::new(false)).unwrap();
+    let lit = run(&gpu, &scene, &TransportSettings { stop, ..wide(&long) }, &AtomicBool::new(false)).unwrap();
     let over = began.elapsed().saturating_sub(wanted);
     assert_eq!((lit.end, lit.film.rounds), (End::Time, 1));
     assert!(lit.fates[0].emitted < u64::from(long.photons) && lit.fates[1].emitted > 0);
     assert!(over < soon, "{over:?} after its time was up");
     // Fewer photons are no less light.
-    let reference = run(&gpu, &scene, &TransportSettings { photons: 50_000, rounds: 2, ..settings() }, &AtomicBool::new(false)).unwrap();
+    let reference = TransportSettings { photons: 50_000, rounds: 2, ..wide(&settings()) };
+    let reference = run(&gpu, &scene, &reference, &AtomicBool::new(false)).unwrap();
     let (found, expected) = (mean_red(&lit), mean_red(&reference));
     assert!((found / expected - 1.0).abs() < 0.05, "{found}, {expected}");
 }

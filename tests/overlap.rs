@@ -217,7 +217,7 @@ fn sheets_in_one_plane_cover_their_union() {
     assert!(fates.escaped == 0, "{} photons of {} left the room", fates.escaped, lit.fates[0].emitted);
 }
 
-/// What touches, stands on, crosses or lies back to back is no overlap, and neither is what lies a hair above.
+/// What touches, stands on, crosses, rises from or lies back to back is no overlap, and neither is what lies a hair above.
 #[test]
 fn neighbours_are_no_overlaps() {
     for name in built_in::names() {
@@ -228,7 +228,9 @@ fn neighbours_are_no_overlaps() {
     let beside = Mesh::parallelogram("beside", DVec3::new(2.0, 0.0, -2.0), DVec3::Z, DVec3::X, 0);
     let across = Mesh::parallelogram("across", DVec3::new(0.3, -1.0, -1.0), DVec3::Y * 2.0, DVec3::Z * 2.0, 0);
     let floor = level(0.0, [4.0; 2], true, 0);
-    for other in [stands(0.0), beside, across, rug(DVec3::ZERO, 1.0, 1e-5, 1), rug(DVec3::ZERO, 1.0, -1e-5, 1)] {
+    // Flat enough that its normal is all but the floor's.
+    let ramp = Mesh::parallelogram("ramp", DVec3::new(-0.5, 0.0, -0.5), DVec3::Z, DVec3::new(1.0, 1e-4, 0.0), 0);
+    for other in [stands(0.0), beside, across, ramp, rug(DVec3::ZERO, 1.0, 1e-5, 1), rug(DVec3::ZERO, 1.0, -1e-5, 1)] {
         for is_turned in [false, true] {
             let scene = scene_of(vec![floor.clone(), other.clone()], vec![matt(0.6)], vec![]);
             let geometry = Geometry::new(&if is_turned { turned(scene) } else { scene }).unwrap();

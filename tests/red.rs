@@ -68,6 +68,7 @@ enum Question {
     LeaningPlane(Illumination),
     LeaningScatterer,
     PatchInPlane,
+    StackFromAfar,
     /// With so many samples a pixel, and with a final gather or not.
     GlassInFurnace(u32, bool),
     /// Aimed photons bring as much light as others: a scene of `common::aimed`.
@@ -83,7 +84,7 @@ impl Question {
             Photons(_) | InTurn | Film(_) | Ledger(_) | ClosedForm(_) | Appends | Builders | StrictMath | Finite | FiniteBox | Nearest
             | Pairs | Crowds | AimedLight(_) => false,
             Bits(_) | LampInBox(_) | Shelf | Ridge | Spot | Texture(_) => true,
-            LeaningPlane(_) | LeaningScatterer | PatchInPlane | GlassInFurnace(..) => true,
+            LeaningPlane(_) | LeaningScatterer | PatchInPlane | StackFromAfar | GlassInFurnace(..) => true,
         }
     }
 }
@@ -104,7 +105,7 @@ impl Question {
             }
             AimedLight(_) => Subject::Aiming,
             Appends | Finite | Crowds | Bits(_) | LampInBox(_) | Shelf | Ridge | Spot | Texture(_) => Subject::Scenes,
-            LeaningPlane(_) | LeaningScatterer | PatchInPlane | GlassInFurnace(..) => Subject::Scenes,
+            LeaningPlane(_) | LeaningScatterer | PatchInPlane | StackFromAfar | GlassInFurnace(..) => Subject::Scenes,
         }
     }
 }
@@ -121,7 +122,7 @@ struct Fault {
     noticed_by: &'static [(Question, Kind)],
 }
 
-const FAULTS: [Fault; 64] = [
+const FAULTS: [Fault; 65] = [
     Fault {
         what: "what rounding takes from a pair of floats is forgotten",
         file: "film/compensated.glsl",
@@ -549,6 +550,14 @@ const FAULTS: [Fault; 64] = [
         noticed_by: &[(PatchInPlane, PhotonsAdded)],
     },
     Fault {
+        what: "of triangles equally near, the first that is tested is met",
+        file: "scene/bvh.glsl",
+        from: "t < hit.t || (t == hit.t && index < hit.triangle)",
+        to: "t < hit.t",
+        kernels: &["view"],
+        noticed_by: &[(StackFromAfar, OtherSums)],
+    },
+    Fault {
         what: "shadow rays end 0.5 % before their lamp",
         file: "scene/direct.glsl",
         from: "arriving.target - start)",
@@ -723,6 +732,7 @@ fn ask(gpu: &Gpu, question: Question) -> Check<Complaint> {
         LeaningPlane(illumination) => known::leaning_plane(gpu, illumination),
         LeaningScatterer => known::leaning_scatterer(gpu),
         PatchInPlane => known::patch_in_a_plane(gpu),
+        StackFromAfar => known::stack_from_afar(gpu),
         AimedLight(kind) => aimed::same_light(gpu, kind),
     }
 }

@@ -7,6 +7,7 @@ use crate::common::{device, run};
 use photonmill::film::{estimate_walls, irradiance_weights};
 use photonmill::judge::Judge;
 use photonmill::rng::Rng;
+use photonmill::scene::geometry::Geometry;
 use photonmill::scene::light::LightKind;
 use photonmill::scene::open_box::open_box;
 use photonmill::scene::{Camera, Mesh, Scene};
@@ -90,12 +91,17 @@ fn probes_in_a_house_on_a_sunlit_plain_have_a_bound_and_no_error() {
     let sun = LightKind::Directional { direction: dvec3(1.0, -1.0, 0.0).normalize(), irradiance: Vec3::splat(1000.0) };
     let scene = scene_of(meshes, vec![matt(0.5)], vec![sun]);
     let inside = [(dvec3(0.5, 0.0, 0.5), DVec3::Y), (dvec3(-1.0, 0.0, -0.5), DVec3::Y)];
-    let settings = TransportSettings { photons: 3000, radius: Some(1.0), ..TransportSettings::default() };
+    let settings = TransportSettings { photons: 3000, rounds: 16, radius: Some(1.0), alpha: 1.0, ..TransportSettings::default() };
     let lit = received(&gpu, &scene, &settings, &inside);
     assert!(is_black(&lit), "light has found the house: the test needs fewer photons");
     let unknown = lit.film.unknown(&lit.plan, 0.95);
     assert_eq!((unknown.asked, unknown.unreached, unknown.relative), (2, 2, f64::INFINITY), "{unknown:?}");
     assert_eq!(lit.film.stated_error(0, &lit.plan), DVec3::INFINITY);
+    // The rule of three: 3.0 photons of all rounds at most, each with its share of what falls on the scene's sphere, in a disc
+    // of 1 m.
+    let geometry = Geometry::new(&scene).unwrap();
+    let expected = 20f64.ln() * 1000.0 * (geometry.radius * geometry.unit).powi(2) / (3000.0 * 16.0);
+    assert!((unknown.upper_bound / expected - 1.0).abs() < 1e-3, "{unknown:?}: {expected}");
     for truth in Judge::new(&scene, 8).irradiance_at(&inside, 4000, 1) {
         let truth = truth.mean.total().x;
         assert!(truth > 0.05 && truth < unknown.upper_bound, "{truth}, {unknown:?}");
@@ -162,6 +168,10 @@ fn texels_of_the_box_that_no_photon_has_found_have_no_error() {
     assert_eq!((unknown.unreached, unknown.asked), (dark, texels().count() as u64));
     assert!(dark > 0 && dark < unknown.asked, "{unknown:?}");
     assert!(texels().all(|(irradiance, error)| (*irradiance == 0.0) == error.is_infinite()));
-    // Each bound is three photons' worth, so that all of them together are far from nothing.
-    assert!(unknown.relative > 0.1, "{unknown:?}");
+    // Each bound is 3.0 photons' worth, and the texels that are lit have one or a few each.
+    let weights = irradiance_weights(&scene, &outcome.plan);
+    let square = |of: &dyn Fn(usize) -> f64| (0..weights.len()).map(|texel| (weights[texel] * of(texel)).powi(2)).sum::<f64>();
+    let bounds = square(&|texel| if outcome.film.flux(texel) == 0.0 { 20f64.ln() } else { 0.0 });
+    let expected = (bounds / square(&|texel| outcome.film.flux(texel))).sqrt();
+    assert!((unknown.relative / expected - 1.0).abs() < 1e-9, "{unknown:?}: {expected}");
 }

@@ -5,6 +5,7 @@ use std::f64::consts::{FRAC_PI_3, PI, TAU};
 
 use glam::{DQuat, DVec2, DVec3, Vec3};
 use photonmill::gpu::Gpu;
+use photonmill::scene::geometry::Geometry;
 use photonmill::scene::light::LightKind;
 use photonmill::scene::material::TextureUse;
 use photonmill::scene::texture::{Texture, Wrap};
@@ -245,8 +246,7 @@ pub fn none_returns(what: &str, lit: &Lit) -> Check<Complaint> {
     Err(Complaint::new(Kind::PhotonsAdded, text))
 }
 
-/// Sheets of other colours that lie in one plane without rounding, so that a ray is equally far from several: a tree
-/// takes the one that the list of all triangles does, though it meets them in another order.
+/// Sheets of other colours that overlap in one plane: a tree shows the parts that the list of all triangles does.
 pub fn sheets_in_one_plane(gpu: &Gpu) -> Check<Complaint> {
     let sheets = 24;
     let sheet = |k: usize| {
@@ -271,6 +271,45 @@ pub fn sheets_in_one_plane(gpu: &Gpu) -> Check<Complaint> {
     let (tree, list) = (of(&[Effect::Bvh], &[]), of(&[], &[Effect::Bvh]));
     assert!(tree.plan.keeps(Effect::Bvh) && !list.plan.keeps(Effect::Bvh));
     same_sums("tree and list", &tree.film.sums, &list.film.sums)
+}
+
+/// A stack of sheets, seen from 16 384 times its width: a unit in the last place of that distance is more than its
+/// height, so that a ray is equally far from all of them. The sheet with the lowest number is met, in whatever order a
+/// tree tests them: one order from above and another from below.
+pub fn stack_from_afar(gpu: &Gpu) -> Check<Complaint> {
+    let sheets = 256;
+    let sheet = |k: usize| {
+        // Twice as far from the next as surfaces must be not to overlap.
+        let height = k as f64 / 1_048_576.0;
+        let positions = [(-0.5, -0.5), (-0.5, 0.5), (0.5, -0.5)].map(|(x, z)| DVec3::new(x, height, z)).to_vec();
+        Mesh { name: "sheet".into(), positions, triangles: vec![[0, 1, 2]], material: k, ..Mesh::default() }
+    };
+    let radiance = |sheet: usize| 1.0 + sheet as f32;
+    let material = |k: usize| Material { emission: Vec3::splat(radiance(k)), two_sided: true, ..matt(0.0) };
+    let scene = scene_of((0..sheets).map(sheet).collect(), (0..sheets).map(material).collect(), vec![]);
+    let geometry = Geometry::new(&scene).unwrap();
+    assert!(geometry.overlaps.is_empty() && geometry.triangles.len() == sheets);
+    let lowest = f64::from(radiance(geometry.triangles[0].material as usize));
+    for (what, height) in [("above", 16_384.0), ("below", -16_384.0)] {
+        let middle = DVec3::new(-0.2, 0.0, -0.2);
+        let camera = Camera::looking_at(what, middle + DVec3::Y * height, middle, DVec3::Z, 2e-5);
+        let of = |with: &[Effect], without: &[Effect]| {
+            let settings = TransportSettings {
+                with: with.to_vec(),
+                without: without.to_vec(),
+                rounds: 1,
+                part: Part::Direct,
+                ..TransportSettings::default()
+            };
+            seen(gpu, &scene, &settings, &camera, [8, 8])
+        };
+        let (tree, list) = (of(&[Effect::Bvh], &[]), of(&[], &[Effect::Bvh]));
+        assert!(tree.plan.keeps(Effect::Bvh) && !list.plan.keeps(Effect::Bvh));
+        // A list is tested from its first triangle to its last.
+        assert!(means(&list).iter().all(|mean| (mean.x - lowest).abs() < 1e-3), "from {what}: {:?}", means(&list));
+        same_sums(&format!("tree and list from {what}"), &tree.film.sums, &list.film.sums)?;
+    }
+    Ok(())
 }
 
 /// A block of glass and a mirror in a furnace are not to be seen: all directions are equally bright, whatever way a path
