@@ -348,7 +348,8 @@ pub fn find<'a>(
             others.sort_by(|(a, one), (b, other)| size(&other.corners).total_cmp(&size(&one.corners)).then(a.cmp(b)));
             others.truncate(MOST_CLIPS);
         }
-        let overlaps_often = crowded || (others.len() <= MOST_CLIPS && hidden_count > CLIPS_AT_ONCE * others.len());
+        // Of a rug in a few layers, each hides a few of very many.
+        let overlaps_often = crowded || hidden_count > others.len() * CLIPS_AT_ONCE.max(others.len() / 8);
         let clips_at_once = if overlaps_often { CLIPS_AT_ONCE } else { others.len() };
         let (others, sheets): (Vec<u32>, Vec<Sheet>) = others.into_iter().unzip();
         let pieces = hidden.without(&sheets, clips_at_once)?;
