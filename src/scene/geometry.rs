@@ -5,16 +5,18 @@
 //! scene by a power of two changes no bit, and every coordinate lies within (-1, 1). Radiance and
 //! irradiance keep their units; a flux in W is divided by `unit`^2.
 
+use std::cell::LazyCell;
 use std::collections::BTreeSet;
 use std::f64::consts::{PI, TAU};
 use std::ops::{Add, Mul};
 
 use glam::{DVec2, DVec3, UVec2, Vec2, Vec3, Vec4};
+use half::slice::HalfFloatSliceExt as _;
 use rayon::prelude::*;
 
 use super::bvh::Bvh;
 use super::light::LightKind;
-use super::overlap::{self, Planes, for_equals};
+use super::overlap::{self, Planes, for_equals, hash_of};
 use super::texture::Wrap;
 use super::{Material, Mesh, Progress, Scene, Surface, Texture};
 use crate::constants::*;
@@ -87,14 +89,14 @@ impl Geometry {
         }
         let centre = 0.5 * (min + max);
         let unit = 2f64.powi(extent.log2().ceil() as i32);
-        let local = |position: DVec3| ((position - centre) / unit).as_vec3();
+        // As a power of two it has an exact inverse.
+        let per_unit = 1.0 / unit;
+        let local = |position: DVec3| ((position - centre) * per_unit).as_vec3();
 
-        let mut sources: Vec<(u32, u32)> = scene
-            .meshes
-            .iter()
-            .enumerate()
-            .flat_map(|(mesh, of)| (0..of.triangles.len() as u32).map(move |triangle| (mesh as u32, triangle)))
-            .collect();
+        let mut sources: Vec<(u32, u32)> = Vec::with_capacity(count);
+        for (mesh, of) in (0..).zip(&scene.meshes) {
+            sources.extend((0..of.triangles.len() as u32).map(|triangle| (mesh, triangle)));
+        }
         progress("preparing triangles", 0.0);
         let mut corners: Vec<[Vec3; 3]> =
             sources.par_iter().map(|&(mesh, triangle)| scene.meshes[mesh as usize].corners(triangle as usize).map(local)).collect();
@@ -103,23 +105,28 @@ impl Geometry {
         let is_solid = |[a, b, c]: &[Vec3; 3]| (*b - *a).cross(*c - *a).length_squared() >= f32::MIN_POSITIVE;
         // Of triangles that are the same, facing alike, only one can be met; the others would shine, and count as surface,
         // where none is seen.
-        let ranks = overlap::ranks(scene);
+        let ranks = LazyCell::new(|| overlap::ranks(scene));
         let mut overlaps = BTreeSet::new();
         let mut crowded = 0;
         let mut is_kept: Vec<bool> = corners.par_iter().map(is_solid).collect();
         let words = |place: u32| in_fixed_order(&corners[place as usize]);
-        for_equals(corners.len(), words, |alike| {
-            let solid: Vec<usize> = alike.iter().map(|place| *place as usize).filter(|place| is_kept[*place]).collect();
-            let Some((first, others)) = solid.split_first() else { return };
-            let mut seen = *first;
-            for &place in others {
-                let (mesh, other) = (sources[place].0, sources[seen].0);
-                let wins = ranks[mesh as usize] < ranks[other as usize];
-                overlaps.insert(if wins { (other, mesh) } else { (mesh, other) });
-                let hidden = if wins { std::mem::replace(&mut seen, place) } else { place };
-                is_kept[hidden] = false;
-            }
-        });
+        for_equals(
+            corners.len(),
+            |place| hash_of_corners(&corners[place as usize]),
+            words,
+            |alike| {
+                let solid: Vec<usize> = alike.iter().map(|place| *place as usize).filter(|place| is_kept[*place]).collect();
+                let Some((first, others)) = solid.split_first() else { return };
+                let mut seen = *first;
+                for &place in others {
+                    let (mesh, other) = (sources[place].0, sources[seen].0);
+                    let wins = ranks[mesh as usize] < ranks[other as usize];
+                    overlaps.insert(if wins { (other, mesh) } else { (mesh, other) });
+                    let hidden = if wins { std::mem::replace(&mut seen, place) } else { place };
+                    is_kept[hidden] = false;
+                }
+            },
+        );
         let mut of_source = is_kept.iter();
         sources.retain(|_| *of_source.next().expect("one for each"));
         let mut of_corners = is_kept.iter();
@@ -133,7 +140,7 @@ impl Geometry {
         // Parts of triangles, behind the whole ones: weights of the corners.
         let whole_count = corners.len();
         let mut weights: Vec<[DVec3; 3]> = Vec::new();
-        for covered in overlap::find(scene, &ranks, &sources, &corners) {
+        for covered in overlap::find(scene, || &ranks, &sources, &corners, |done| progress("looking for overlaps", done)) {
             let (source, [a, b, c], plane) =
                 (sources[covered.triangle], corners[covered.triangle].map(Vec3::as_dvec3), planes.of_triangles[covered.triangle]);
             crowded += usize::from(covered.crowded);
@@ -152,28 +159,22 @@ impl Geometry {
         progress("building the hierarchy", 0.0);
         let Bvh { nodes, order } = Bvh::build(&corners);
         progress("preparing triangles", 0.5);
-        let triangle_of = |&place: &u32| {
-            let ([a, b, c], (mesh, _)) = (corners[place as usize], sources[place as usize]);
+        let sources: Vec<(u32, u32)> = order.par_iter().map(|&place| sources[place as usize]).collect();
+        let triangle_of = |(&place, &(mesh, _)): (&u32, &(u32, u32))| {
+            let [a, b, c] = corners[place as usize];
             Triangle { a, b, c, material: scene.meshes[mesh as usize].material as u32, plane: planes.of_triangles[place as usize] }
         };
-        let triangles: Vec<Triangle> = order.par_iter().map(triangle_of).collect();
+        let triangles: Vec<Triangle> = order.par_iter().zip(&sources).map(triangle_of).collect();
         let part_of = |place: u32| (place as usize).checked_sub(whole_count).map(|part| &weights[part]);
-        let normals = order
-            .par_iter()
-            .map(|&place| {
-                let (mesh, triangle) = sources[place as usize];
-                corner_normals(&scene.meshes[mesh as usize], triangle as usize, part_of(place))
-            })
-            .collect();
-        let uvs = order
-            .par_iter()
-            .map(|&place| {
-                let (mesh, triangle) = sources[place as usize];
-                let mesh = &scene.meshes[mesh as usize];
-                corner_uvs(mesh, &scene.materials[mesh.material], triangle as usize, part_of(place))
-            })
-            .collect();
-        let sources = order.iter().map(|&place| sources[place as usize]).collect();
+        let normals_of = |(&place, &(mesh, triangle)): (&u32, &(u32, u32))| {
+            corner_normals(&scene.meshes[mesh as usize], triangle as usize, part_of(place))
+        };
+        let normals = order.par_iter().zip(&sources).map(normals_of).collect();
+        let uvs_of = |(&place, &(mesh, triangle)): (&u32, &(u32, u32))| {
+            let mesh = &scene.meshes[mesh as usize];
+            corner_uvs(mesh, &scene.materials[mesh.material], triangle as usize, part_of(place))
+        };
+        let uvs = order.par_iter().zip(&sources).map(uvs_of).collect();
         progress("packing textures", 0.0);
         let (textures, texels) = pack_textures(scene);
 
@@ -378,6 +379,11 @@ fn in_fixed_order(corners: &[Vec3; 3]) -> [u32; 9] {
     std::array::from_fn(word)
 }
 
+/// Of a triangle's corners, the same from whichever corner it is read.
+fn hash_of_corners(corners: &[Vec3; 3]) -> u64 {
+    corners.iter().map(|corner| hash_of(&(corner + Vec3::ZERO).to_array().map(f32::to_bits))).fold(0, u64::wrapping_add)
+}
+
 /// 1 - cosine of an angle, with all digits of a small one.
 fn versine(angle: f32) -> f64 {
     2.0 * (0.5 * f64::from(angle)).sin().powi(2)
@@ -502,7 +508,8 @@ fn corner_uvs(mesh: &Mesh, material: &Material, triangle: usize, part: Option<&[
             Some(set) if !mesh.uvs[set].is_empty() => {
                 // Whole turns mean nothing and would cost digits.
                 let uvs = mesh.triangles[triangle].map(|vertex| mesh.uvs[set][vertex as usize]);
-                let base: DVec2 = uvs[0].floor() - uvs[0].floor() % 2.0;
+                let is_far = uvs[0].abs().max_element() > 64.0;
+                let base: DVec2 = if is_far { uvs[0].floor() - uvs[0].floor() % 2.0 } else { DVec2::ZERO };
                 at_corners(uvs, part).map(|uv| (uv - if base.abs().max_element() > 64.0 { base } else { DVec2::ZERO }).as_vec2())
             }
             _ => [Vec2::ZERO; 3],
@@ -540,8 +547,13 @@ fn pack_textures(scene: &Scene) -> (Vec<TextureInfo>, Vec<UVec2>) {
             is_used[of.texture] = true;
         }
     }
-    let half = |value: f32| u32::from(half::f16::from_f32(value).to_bits());
-    let pack = |texel: &Vec3| UVec2::new(half(texel.x) | half(texel.y) << 16, half(texel.z));
+    let pack = |texel: &Vec3| {
+        // Four at once, as CPUs convert them in one instruction.
+        let mut halves = [half::f16::ZERO; 4];
+        halves.convert_from_f32_slice(&texel.extend(0.0).to_array());
+        let [x, y, z, _] = halves.map(|half| u32::from(half.to_bits()));
+        UVec2::new(x | y << 16, z)
+    };
     let code = |wrap: Wrap| match wrap {
         Wrap::Repeat => 0,
         Wrap::MirroredRepeat => 1,
@@ -568,7 +580,9 @@ pub fn pack_normal(n: Vec3) -> u32 {
     let sign = |x: f32| if x >= 0.0 { 1.0 } else { -1.0 };
     let flat = Vec2::new(n.x, n.y) / (n.x.abs() + n.y.abs() + n.z.abs());
     let folded = if n.z >= 0.0 { flat } else { (1.0 - flat.yx().abs()) * Vec2::new(sign(flat.x), sign(flat.y)) };
-    let code = |x: f32| ((x.clamp(-1.0, 1.0) * 32767.0).round_ties_even() + 32767.0) as u32;
+    // So large a number leaves no room for a fraction: this rounds to the nearest, ties to even, without a call.
+    const NO_FRACTION: f32 = 12_582_912.0;
+    let code = |x: f32| ((x.clamp(-1.0, 1.0) * 32767.0 + NO_FRACTION) - NO_FRACTION + 32767.0) as u32;
     code(folded.x) | code(folded.y) << 16
 }
 

@@ -1,6 +1,7 @@
 //! Triangle meshes in world space.
 
 use glam::{DVec2, DVec3};
+use rayon::prelude::*;
 
 /// One primitive of one node: vertices, triangles, one material.
 #[derive(Debug, Clone, Default)]
@@ -21,6 +22,9 @@ pub struct Mesh {
 /// Triangles whose area is below this share of the scene's squared extent are lines: rounding of their corners
 /// alone gives so much. What single precision cannot tell from a line goes when the scene is normalised.
 const MIN_AREA_SHARE: f64 = 1.0 / (1u128 << 80) as f64;
+
+/// Triangles that are not worth sharing among threads.
+const MIN_PIECE: usize = 4096;
 
 impl Mesh {
     /// Corners of a triangle.
@@ -47,10 +51,14 @@ impl Mesh {
         let before = self.triangles.len();
         let least = MIN_AREA_SHARE * scene_extent * scene_extent;
         let positions = &self.positions;
-        self.triangles.retain(|vertices| {
+        let has_area = |vertices: &[u32; 3]| {
             let corners = vertices.map(|vertex| positions[vertex as usize]);
             0.5 * Mesh::doubled_area(corners).length() > least
-        });
+        };
+        // On all cores, as there seldom is one.
+        if !self.triangles.par_iter().with_min_len(MIN_PIECE).all(has_area) {
+            self.triangles.retain(has_area);
+        }
         before - self.triangles.len()
     }
 

@@ -1,6 +1,7 @@
 //! Numbers out of glTF buffers, with every offset checked: a file from anywhere may say anything.
 
 use std::collections::HashMap;
+use std::sync::OnceLock;
 
 use gltf::accessor::{DataType, Dimensions};
 use gltf::{Accessor, buffer};
@@ -10,7 +11,7 @@ use super::Loader;
 use crate::error::Result;
 
 /// Elements that are not worth sharing among threads.
-const MIN_PIECE: usize = 4096;
+pub(super) const MIN_PIECE: usize = 4096;
 
 /// Elements of `size` bytes, every `stride` bytes.
 struct Elements<'a> {
@@ -44,18 +45,24 @@ pub(super) fn read<const N: usize, T: Send>(
 ) -> Result<Vec<T>> {
     let size = number_bytes(accessor.data_type());
     let elements = elements(loader, accessor, components(N), what)?;
+    let (kind, normalized) = (accessor.data_type(), accessor.normalized());
+    // Beside the result: a vector of results would be made in pieces and copied.
+    let not_finite = OnceLock::new();
     let made = |index: usize| {
         let element = elements.element(index);
-        let numbers: [f32; N] =
-            std::array::from_fn(|k| number(&element[k * size..(k + 1) * size], accessor.data_type(), accessor.normalized()));
-        match numbers.iter().find(|number| !number.is_finite()) {
-            Some(number) => Err(loader.refuse(what, format!("holds {number}; every number must be finite"))),
-            None => Ok(make(numbers)),
+        let numbers: [f32; N] = std::array::from_fn(|k| number(&element[k * size..(k + 1) * size], kind, normalized));
+        if let Some(number) = numbers.iter().find(|number| !number.is_finite()) {
+            not_finite.get_or_init(|| *number);
         }
+        make(numbers)
     };
-    match vertices {
+    let made = match vertices {
         Vertices::All => (0..elements.count).into_par_iter().with_min_len(MIN_PIECE).map(made).collect(),
         Vertices::Some(numbers) => numbers.par_iter().with_min_len(MIN_PIECE).map(|index| made(*index as usize)).collect(),
+    };
+    match not_finite.get() {
+        Some(number) => Err(loader.refuse(what, format!("holds {number}; every number must be finite"))),
+        None => Ok(made),
     }
 }
 
@@ -102,10 +109,15 @@ fn number_bytes(kind: DataType) -> usize {
 }
 
 /// The little-endian unsigned integer in one to four bytes.
+#[inline]
 fn integer(bytes: &[u8]) -> u32 {
-    bytes.iter().rev().fold(0, |value, byte| value << 8 | u32::from(*byte))
+    match *bytes {
+        [a, b, c, d] => u32::from_le_bytes([a, b, c, d]),
+        _ => bytes.iter().rev().fold(0, |value, byte| value << 8 | u32::from(*byte)),
+    }
 }
 
+#[inline]
 fn number(bytes: &[u8], kind: DataType, normalized: bool) -> f32 {
     let bits = integer(bytes);
     let (value, largest) = match kind {

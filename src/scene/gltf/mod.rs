@@ -756,7 +756,7 @@ fn triangles_of(mode: Mode, indices: &[u32]) -> Vec<[u32; 3]> {
             indices.windows(3).enumerate().map(turned).collect()
         }
         Mode::TriangleFan => indices.get(1..).unwrap_or_default().windows(2).map(|pair| [indices[0], pair[0], pair[1]]).collect(),
-        _ => indices.chunks_exact(3).map(|triangle| [triangle[0], triangle[1], triangle[2]]).collect(),
+        _ => indices.par_chunks_exact(3).with_min_len(accessor::MIN_PIECE).map(|of| [of[0], of[1], of[2]]).collect(),
     }
 }
 
