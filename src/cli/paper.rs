@@ -18,10 +18,10 @@ pub(super) struct PaperArgs {
     /// Folder for pictures, tables and index.html; created if needed
     #[arg(short, long, alias = "out", value_name = "DIR", help_heading = "Output")]
     output: PathBuf,
-    /// Photons per round of a size that fills the device [default: 4194304; 65536 on a CPU]
+    /// Photons per round of the large size, which is to fill the device [default: 4194304; 65536 on a CPU]
     #[arg(long, value_name = "N", value_parser = parse_integer::<u32>, allow_hyphen_values = true, help_heading = "Measurements")]
     large: Option<u32>,
-    /// Runs of each case, of which the median counts, after a first one that is dropped; at most 3 at the large size
+    /// Timed runs of each case, of which the median is shown; a first run is not timed, and the large size has at most 3
     #[arg(long, value_name = "N", value_parser = parse_integer::<u32>, allow_hyphen_values = true, default_value = "7", help_heading = "Measurements")]
     repeats: u32,
     /// Leave out rows of table 1 that would take longer than this

@@ -11,16 +11,16 @@ use clap::{Args, ValueEnum};
 use indicatif::{ProgressBar, ProgressStyle};
 
 use super::complain;
-use crate::gpu::{DeviceFacts, Gpu};
+use crate::gpu::Gpu;
 use crate::render::Progress;
 
 #[derive(Args)]
 #[command(next_help_heading = "Messages")]
 pub(super) struct ProgressArgs {
-    /// Progress on stderr
+    /// How progress is shown on stderr
     #[arg(long, value_enum, value_name = "FORM", default_value = "auto")]
     progress: ProgressForm,
-    /// Print nothing before the report but warnings and errors: no device, plan or progress
+    /// Before the report print only warnings and errors: no device, plan or progress
     #[arg(short, long, conflicts_with = "progress")]
     quiet: bool,
 }
@@ -108,8 +108,7 @@ impl ProgressReporter {
 
     /// The device in use; `None` is the CPU builder.
     pub(super) fn device(&self, gpu: Option<&Gpu>) {
-        let describe = |facts: &DeviceFacts| format!("{}, {}", facts.name, facts.driver);
-        self.note(&format!("device: {}", gpu.map_or_else(|| "CPU".to_owned(), |gpu| describe(gpu.facts()))));
+        self.note(&format!("device: {}", gpu.map_or_else(|| "CPU".to_owned(), |gpu| gpu.facts().label())));
     }
 
     /// What is being done from now on; printed every few seconds.

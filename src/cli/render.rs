@@ -27,7 +27,7 @@ use crate::transport::replay::{self, PhotonName};
 
 #[derive(Args)]
 pub(super) struct RenderArgs {
-    /// Picture: an .exr of linear radiance in W/m2/sr, or a .png
+    /// Picture: an .exr holds linear radiance in W/m2/sr, a .png is sRGB at --exposure
     #[arg(short, long, alias = "out", value_name = "FILE", required_unless_present = "replay", help_heading = "Output")]
     output: Option<PathBuf>,
     #[command(flatten)]
@@ -60,8 +60,8 @@ pub(super) struct RenderArgs {
     /// Reconstruction filter of the pixels [default: box]
     #[arg(long, value_enum, value_name = "FILTER", help_heading = "Light transport")]
     filter: Option<FilterArg>,
-    /// Also path trace the picture on the CPU with this many samples per pixel (64), and print whether the two agree within
-    /// their errors
+    /// Also path trace the picture on the CPU, and print whether the two agree within their errors; `--judge` alone takes 64
+    /// samples per pixel
     #[arg(long, value_name = "SAMPLES", value_parser = parse_integer::<u32>, allow_negative_numbers = true, num_args = 0..=1, default_missing_value = "64", help_heading = "Checks")]
     judge: Option<u32>,
     /// Trace a single photon of this run, print its path, and exit; rounds and photons count from 0, and `:caustic` at the
@@ -124,7 +124,14 @@ pub(super) fn run(args: &RenderArgs, cancelled: &AtomicBool) -> Result<End> {
     let scene = args.scene.open(&reporter)?;
     let camera = camera(&scene, args.camera.as_deref())?;
     let (width, height) = PictureSize::resolve(args.size, &camera, &reporter)?;
-    let job = Job { scene: &scene, settings: &settings, sensor: Sensor::Picture { width, height }, camera: Some(&camera), phases: &[] };
+    let job = Job {
+        scene: &scene,
+        settings: &settings,
+        sensor: Sensor::Picture { width, height },
+        camera: Some(&camera),
+        phases: &[],
+        point: "pixel",
+    };
     let geometry = geometry(&scene, &settings, &reporter)?;
     let gpu = args.device.open(&reporter)?;
     let plan = plan(&gpu, &job, &geometry)?;
@@ -132,7 +139,7 @@ pub(super) fn run(args: &RenderArgs, cancelled: &AtomicBool) -> Result<End> {
 
     let image = radiance(&lit, width, height);
     let stops = args.exposure.unwrap_or_else(|| image.usual_exposure());
-    let text = light_report::text(&scene.name, &lit, args.messages.explain);
+    let text = light_report::text(&scene.name, &lit, job.point, args.messages.explain);
     let mut files = vec![(picture, image.encode(format, stops))];
     if let Some(errors) = errors {
         files.push((errors, standard_error(&lit, width, height).encode(Format::Exr, 0.0)));

@@ -42,6 +42,16 @@ pub struct DeviceFacts {
     pub(super) pipeline_cache_id: String,
 }
 
+impl DeviceFacts {
+    /// Name and driver; what the driver repeats of the name is left out.
+    pub fn label(&self) -> String {
+        let name = self.name.to_lowercase();
+        let is_new = |word: &&str| !name.contains(&word.to_lowercase().replace(['(', ')', ','], ""));
+        let driver: Vec<&str> = self.driver.split_whitespace().filter(is_new).collect();
+        format!("{}, driver {}", self.name, driver.join(" "))
+    }
+}
+
 /// Loads the Vulkan loader at run time and makes an instance.
 pub(super) fn instance(validate: bool) -> Result<(ash::Entry, ash::Instance, Option<Messages>)> {
     let no_vulkan = |reason: String| Error::NoVulkan { reason };
