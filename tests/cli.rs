@@ -75,6 +75,7 @@ fn bad_input_is_refused_in_one_line() {
         (&["--rounds", "5000000000"], ["--rounds", "5000000000", "from 1 to 4294967295"]),
         (&["--bounces", "-99999999999999999999999999999999999999999"], ["--bounces", "-99", "from 1 to 10000"]),
         (&["--bounces", "99999999999999999999999999999999999999999"], ["--bounces", "99", "from 1 to 10000"]),
+        (&["--threads", "-3"], ["--threads", "-3", "from 1 to 1024"]),
         (&["--seed", "-1"], ["--seed", "-1", "from 0 to 18446744073709551615"]),
         (&["render", "cornell", "-o", "a.png", "--rounds", "-3"], ["--rounds", "-3", "from 1 to 1048576"]),
         (&["study", "cornell", "-o", "s", "--seed", "-1"], ["--seed", "-1", "from 0 to 4294966295"]),
@@ -251,7 +252,15 @@ fn a_run_says_how_wrong_it_is() {
     let arguments = ["--photons", "501", "--mesh", "8", "--error", "90%", "--bias", "--progress", "json", "--json", "a.json"];
     let output = run_on_device(folder.path(), &[&arguments[..], &["--irradiance", "i"]].concat());
     assert!(output.status.success(), "{}", text(&output.stderr));
-    let lines: Vec<Value> = text(&output.stderr).lines().filter_map(|line| serde_json::from_str(line).ok()).collect();
+    // Warnings stay text.
+    let stderr = text(&output.stderr);
+    let lines = stderr.lines().filter(|line| !line.starts_with("photonmill: "));
+    let lines: Vec<Value> = lines.map(|line| serde_json::from_str(line).expect(line)).collect();
+    const STEP: [&str; 8] = ["done", "error", "error_wanted", "ledger", "photons", "seconds", "seconds_left", "total"];
+    for line in &lines {
+        let fields: Vec<&str> = line.as_object().unwrap().keys().map(String::as_str).collect();
+        assert!(fields == ["message"] || fields == STEP, "{line}");
+    }
     let last = lines.last().expect("progress is told");
     assert_eq!(last["ledger"]["emitted"], last["photons"]);
     assert!(last["error"].as_f64().unwrap() <= last["error_wanted"].as_f64().unwrap() && last["seconds_left"].is_number(), "{last}");

@@ -603,7 +603,7 @@ fn a_bake_speaks_of_texels() {
     let place = Place::new();
     let (stdout, stderr) = place.succeed(&["bake", "cornell", "-o", "b", "--texels-per-metre", "2", "--photons", "50", "--rounds", "1"]);
     assert!(stderr.contains(" texels; 1 round of 50 global photons"), "{stderr}");
-    assert!(stdout.contains(" texels where some may arrive") && !stdout.contains(" points "), "{stdout}");
+    assert!(stdout.contains(" texels where some may arrive"), "{stdout}");
 }
 
 #[test]

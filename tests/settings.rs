@@ -7,6 +7,7 @@ use photonmill::error::{Error, Result};
 use photonmill::rng::Rng;
 use photonmill::settings::transport::{Effect, TransportSettings};
 use photonmill::settings::{Gather, Preset, Settings};
+use photonmill::text::echo;
 
 const CASES: usize = 40_000;
 
@@ -57,7 +58,7 @@ struct Rule {
 }
 
 fn rule(option: &str, value: impl ToString, holds: bool) -> Rule {
-    Rule { holds, refusal: format!("{option} {}: ", value.to_string()) }
+    Rule { holds, refusal: format!("{option} {}: ", echo(value.to_string())) }
 }
 
 /// Compares validation with the rules, case by case. Every rule must have been the only broken one somewhere, else

@@ -28,7 +28,7 @@ pub(super) struct BakeArgs {
     output: PathBuf,
     #[command(flatten)]
     report: ReportArgs,
-    /// Exposure of the PNGs in stops, each of which doubles the brightness [default: the mean becomes middle grey]
+    /// Exposure of the PNGs in stops, each of which doubles the brightness [default: what makes the mean middle grey]
     #[arg(long, value_name = "STOPS", value_parser = parse_number::<f32>, allow_hyphen_values = true, help_heading = "Output")]
     exposure: Option<f32>,
     #[command(flatten)]

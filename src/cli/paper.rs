@@ -12,6 +12,7 @@ use crate::error::{Error, Result};
 use crate::output::destination::Folder;
 use crate::paper::bench::Bench;
 use crate::paper::{self, Reproduction, Request, published, tables};
+use crate::text::counted;
 
 #[derive(Args)]
 pub(super) struct PaperArgs {
@@ -53,10 +54,10 @@ pub(super) fn run(args: &PaperArgs, cancelled: &AtomicBool) -> Result<End> {
         longest_ms: 1e3 * args.longest,
     };
     reporter.note(&format!(
-        "plan: 4 figures, running times and table 1; {} and {} photons per round, the median of {} runs",
+        "plan: 4 figures, running times and table 1; {} and {} photons per round, the median of {}",
         published::PHOTONS,
         request.large,
-        request.repeats
+        counted(request.repeats, "run")
     ));
     let mut progress = |line: &str| reporter.step(line);
     let found = paper::reproduce(&mut Bench::new(gpu.as_ref(), cancelled, &mut progress), request)?;

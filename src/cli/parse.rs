@@ -77,7 +77,7 @@ pub(super) fn parse_threads(text: &str) -> Parsed<usize> {
     if text == "all" {
         return Ok(std::thread::available_parallelism().map_or(1, usize::from));
     }
-    text.parse().map_err(|_| "must be a number of threads, or all".to_owned())
+    parse_integer(text).map_err(|_| "must be a number of threads, or all".to_owned())
 }
 
 /// `3:4711`, `3:4711:caustic`.

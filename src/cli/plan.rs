@@ -25,8 +25,8 @@ pub(super) struct PlanArgs {
     /// Camera by name [default: the first one; one that sees the whole scene if it has none]
     #[arg(long, value_name = "NAME", help_heading = "Scene")]
     camera: Option<String>,
-    /// Size of the picture in pixels; without a height it follows from the camera's aspect ratio [default: about 307200
-    /// pixels of the camera's aspect ratio, 640x480 if it has none]
+    /// Size of the picture in pixels; a width alone takes its height from the camera's aspect ratio [default: about 307200
+    /// pixels in the camera's aspect ratio, 640x480 if it has none]
     #[arg(long, value_name = "WIDTH[xHEIGHT]", value_parser = parse_size, allow_hyphen_values = true, help_heading = "Scene")]
     size: Option<PictureSize>,
     #[command(flatten)]

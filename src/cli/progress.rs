@@ -13,6 +13,7 @@ use indicatif::{ProgressBar, ProgressStyle};
 use super::complain;
 use crate::gpu::Gpu;
 use crate::render::Progress;
+use crate::text::counted;
 
 #[derive(Args)]
 #[command(next_help_heading = "Messages")]
@@ -193,7 +194,7 @@ fn progress_line(progress: &Progress, unit: &str) -> String {
     let wanted = progress.error_wanted.map_or_else(String::new, |wanted| format!(" (goal {:.3} %)", 100.0 * wanted));
     let error = progress.error.map_or_else(String::new, |error| format!(", error {:.3} %{wanted}", 100.0 * error));
     let left = progress.seconds_left.map_or_else(String::new, |left| format!(", {left:.0} s left"));
-    format!("{done} {unit}, {rate:.2e} photons/s{error}{left}")
+    format!("{}, {rate:.2e} photons/s{error}{left}", counted(done, unit))
 }
 
 fn ledger_line(progress: &Progress) -> String {

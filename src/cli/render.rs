@@ -36,7 +36,7 @@ pub(super) struct RenderArgs {
     /// light has reached the pixel though some may
     #[arg(long, value_name = "FILE", help_heading = "Output")]
     error_image: Option<PathBuf>,
-    /// Exposure of a PNG in stops, each of which doubles the brightness [default: the mean becomes middle grey]
+    /// Exposure of a PNG in stops, each of which doubles the brightness [default: what makes the mean middle grey]
     #[arg(long, value_name = "STOPS", value_parser = parse_number::<f32>, allow_hyphen_values = true, help_heading = "Output")]
     exposure: Option<f32>,
     #[command(flatten)]
@@ -44,8 +44,8 @@ pub(super) struct RenderArgs {
     /// Camera by name [default: the first one; one that sees the whole scene if it has none]
     #[arg(long, value_name = "NAME", help_heading = "Scene")]
     camera: Option<String>,
-    /// Size of the picture in pixels; without a height it follows from the camera's aspect ratio [default: about 307200
-    /// pixels of the camera's aspect ratio, 640x480 if it has none]
+    /// Size of the picture in pixels; a width alone takes its height from the camera's aspect ratio [default: about 307200
+    /// pixels in the camera's aspect ratio, 640x480 if it has none]
     #[arg(long, value_name = "WIDTH[xHEIGHT]", value_parser = parse_size, allow_hyphen_values = true, help_heading = "Scene")]
     size: Option<PictureSize>,
     #[command(flatten)]

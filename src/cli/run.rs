@@ -343,7 +343,7 @@ pub(super) fn run(args: &RunArgs, cancelled: &AtomicBool) -> Result<End> {
     };
     let settings = Settings { stop: Stop { bias: before.map(|bias| bias.upper), ..settings.stop }, ..settings };
     reporter.status("making the pipelines");
-    let mut control = Control { cancelled, progress: &mut |progress| reporter.report(progress, "photons") };
+    let mut control = Control { cancelled, progress: &mut |progress| reporter.report(progress, "photon") };
     let mut outcome = match &gpu {
         Some(gpu) => render::on_gpu(gpu, &scene, &settings, &mut control)?,
         None => render::on_cpu(&scene, &settings, &mut control)?,

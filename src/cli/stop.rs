@@ -12,8 +12,8 @@ use crate::text::counted;
 #[derive(Args)]
 #[command(next_help_heading = "When to stop")]
 pub(super) struct StopArgs {
-    /// Stop once the relative error of the result (RMSE over the root mean square of the result) is at most this, such as 2%; a
-    /// number alone is per cent, too
+    /// Stop once the relative error of the result (RMSE over the root mean square of the result) is at most this: 2% (2 is the
+    /// same)
     #[arg(long, value_name = "PERCENT", value_parser = parse_percent, allow_hyphen_values = true)]
     error: Option<f64>,
     /// Confidence level of the error bound [default: 95%]

@@ -299,7 +299,7 @@ pub(super) struct Job<'a> {
 pub(super) fn plan(gpu: &Gpu, job: &Job, geometry: &Geometry) -> Result<TransportPlan> {
     let view = View { geometry, camera: job.camera, phases: job.phases };
     let plan = transport::trial::plan(gpu, job.scene, &view, job.settings, job.sensor)?;
-    if let Some(warning) = light_report::radius_warning(&plan, geometry) {
+    if let Some(warning) = light_report::radius_warning(&plan, geometry, job.point) {
         complain(&format!("warning: {warning}"));
     }
     Ok(plan)
@@ -307,7 +307,7 @@ pub(super) fn plan(gpu: &Gpu, job: &Job, geometry: &Geometry) -> Result<Transpor
 
 /// Geometry of a scene without the effects that are left out.
 pub(super) fn geometry(scene: &Scene, settings: &TransportSettings, reporter: &ProgressReporter) -> Result<Geometry> {
-    let what = counted(scene.triangle_count(), "triangle");
+    let what = format!("{} ({})", scene.name, counted(scene.triangle_count(), "triangle"));
     let geometry = Geometry::new_with(&scene.without(&settings.without), &mut stages(&what, reporter))?;
     if geometry.left_out > 0 {
         let count = counted(geometry.left_out, "triangle");
@@ -376,7 +376,7 @@ pub(super) fn light(
     plan.settings.stop.bias = before.map(|bias| bias.upper);
 
     reporter.status("making the pipelines");
-    let mut report = |progress: &Progress| reporter.report(progress, "rounds");
+    let mut report = |progress: &Progress| reporter.report(progress, "round");
     let mut control = Control { cancelled, progress: &mut report };
     let mut lit = interruptible(|| transport::light(gpu, &view, plan, &mut control))?;
     if lit.end == transport::End::Cancelled {

@@ -100,12 +100,12 @@ pub fn missing(plan: &TransportPlan) -> Option<String> {
 const TOO_WIDE: f64 = 0.1;
 
 /// One line on a radius by a trial round that is wider than what many points lie in.
-pub fn radius_warning(plan: &TransportPlan, geometry: &Geometry) -> Option<String> {
+pub fn radius_warning(plan: &TransportPlan, geometry: &Geometry, point: &str) -> Option<String> {
     let trial = plan.trial.as_ref().filter(|trial| trial.too_wide > TOO_WIDE)?;
     let widest = plan.maps().filter(|map| map.radius_from == RadiusFrom::Trial).max_by(|a, b| a.radius.total_cmp(&b.radius))?;
     let option = if widest.caustic_only { "--caustic-radius" } else { "--radius" };
     Some(format!(
-        "at {:.0} % of the points the next wall or edge is nearer than the search radius of the {} map, {:.3} m, so the light there will be blurred; for a sharper result use more --photons or a smaller {option}",
+        "at {:.0} % of the {point}s the next wall or edge is nearer than the search radius of the {} map, {:.3} m, so the light there will be blurred; for a sharper result use more --photons or a smaller {option}",
         100.0 * trial.too_wide,
         widest.name,
         widest.radius * geometry.unit
@@ -248,11 +248,11 @@ pub fn text(scene: &str, lit: &Lit, point: &str, explain: bool) -> String {
     }
     text.push_str(&losses(&lit.losses, settings.bounces));
     if lit.anomalies[0] > 0 {
-        writeln!(text, "warning: {} (NaN or infinity) count as 0", counted(lit.anomalies[0], "nonfinite value")).unwrap();
+        writeln!(text, "warning: {} (NaN or infinity), added as 0", counted(lit.anomalies[0], "nonfinite value")).unwrap();
     }
     if lit.anomalies[2] > 0 {
         let count = counted(lit.anomalies[2], "estimate");
-        writeln!(text, "warning: no edge correction for {count} that cover too many triangles; a smaller --radius mends it").unwrap();
+        writeln!(text, "warning: no edge correction for {count} over too many triangles; a smaller --radius mends it").unwrap();
     }
     if let Some(oddities) = &lit.oddities {
         writeln!(text, "{}", oddities.text()).unwrap();
