@@ -31,7 +31,7 @@ impl Random {
     /// An end of what is allowed, a neighbour of one, or any number.
     fn count(&mut self, least: u32, most: u32) -> u32 {
         let any = self.word() as u32 >> self.below(32);
-        self.pick(&[least, least + 1, least.wrapping_sub(1), most, most - 1, most.wrapping_add(1), 0, u32::MAX, any])
+        self.pick(&[least, least + 1, least.wrapping_sub(1), most, most.wrapping_sub(1), most.wrapping_add(1), 0, u32::MAX, any])
     }
 
     fn number(&mut self, least: f64, most: f64) -> f64 {

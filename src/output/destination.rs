@@ -114,11 +114,11 @@ pub fn check_distinct(destinations: &[Destination]) -> Result<()> {
         let place = std::fs::canonicalize(parent(&target)).unwrap_or_else(|_| parent(&target).to_owned());
         let file = place.join(target.file_name().unwrap_or_default());
         if let Some(first) = seen.insert(file, destination) {
-            let Destination { option, path } = destination;
             return Err(if destination.is_standard_output() {
-                Error::setting(option, "-", format!("{} - already is standard output; name a file for one of the two", first.option))
+                let allowed = format!("{} - already is standard output; name a file for one of the two", first.option);
+                Error::setting(destination.option, "-", allowed)
             } else {
-                Error::setting(option, path.display(), format!("{} writes it too; name another file for one of the two", first.option))
+                destination.refuse(format!("{} writes it too", first.option))
             });
         }
     }
