@@ -3,6 +3,7 @@
 use std::path::PathBuf;
 
 use crate::ledger::Ledger;
+use crate::text::{counted, echo};
 
 /// What a machine without Vulkan lacks: the loader, a driver, or both.
 pub const INSTALL_VULKAN: &str = if cfg!(target_os = "macos") {
@@ -19,19 +20,19 @@ pub type Result<T> = std::result::Result<T, Error>;
 #[derive(Debug, thiserror::Error)]
 pub enum Error {
     /// An option's value is not allowed.
-    #[error("{option} {value}: {allowed}")]
+    #[error("{option} {}: {allowed}", echo(value))]
     Setting { option: &'static str, value: String, allowed: String },
 
     /// A file or folder that an option names cannot be written.
-    #[error("{option} {}: cannot be written ({reason}); choose a place that can be written", path.display())]
+    #[error("{option} {}: cannot be written ({reason}); choose a place that can be written", echo(path.display()))]
     Output { option: &'static str, path: PathBuf, reason: String },
 
     /// The same after a run, whose results went somewhere else.
-    #[error("{option} {}: cannot be written ({reason}); everything is saved in {} instead", path.display(), folder.display())]
+    #[error("{option} {}: cannot be written ({reason}); everything is saved in {} instead", echo(path.display()), folder.display())]
     Saved { option: &'static str, path: PathBuf, reason: String, folder: PathBuf },
 
     /// A scene file, or something in it, cannot be used.
-    #[error("{}: {object} {reason}", path.display())]
+    #[error("{}: {object} {reason}", echo(path.display()))]
     Scene { path: PathBuf, object: String, reason: String },
 
     /// There is no Vulkan loader, or no device behind it.
@@ -39,7 +40,7 @@ pub enum Error {
     NoVulkan { reason: String },
 
     /// `--device` names a device that is not there, or several.
-    #[error("--device {wanted}: must match exactly one Vulkan device; available: {present}")]
+    #[error("--device {}: must match exactly one Vulkan device; available: {present}", echo(wanted))]
     DeviceAbsent { wanted: String, present: String },
 
     /// A device lacks something that every kernel needs.
@@ -85,7 +86,7 @@ pub enum Error {
     NoValidationLayer,
 
     /// The validation layer reported errors.
-    #[error("--validate: {count} message(s) from the validation layer, the first: {first}")]
+    #[error("--validate: {} from the validation layer, the first: {first}", counted(count, "message"))]
     Validation { count: usize, first: String },
 }
 

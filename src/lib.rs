@@ -18,9 +18,9 @@
 //! uses only what stands to its left:
 //!
 //! ```text
-//! constants, records, path, photon, error, bias, unknown, ledger, rng, settings, timings < scene < plan < cpu
+//! text, constants, records, path, photon, error, bias, unknown, ledger, rng, settings, timings < scene < plan < cpu
 //! scene < judge
-//! constants, records, error, ledger, timings < gpu
+//! text, constants, records, error, ledger, timings < gpu
 //! gpu < oddities, tallies, totals; plan, gpu < prefix_sum
 //! plan, oddities, tallies, totals, prefix_sum < resources < trace < index < estimate < film < render < transport < selfcheck < output
 //! output < bake < paper < compaction < study < bench < cli
@@ -61,6 +61,7 @@ pub mod selfcheck;
 pub mod settings;
 pub mod study;
 pub mod tallies;
+pub mod text;
 pub mod timings;
 pub mod totals;
 pub mod trace;

@@ -86,8 +86,8 @@ impl Oddities {
             What::CausticPhoton => {
                 format!("caustic photon {item} of round {round}; trace it alone with render --replay {round}:{item}:caustic")
             }
-            What::SeenLight => format!("directly sampled light at pixel or point {item} in round {round}"),
-            What::Estimate => format!("the density estimate at pixel or point {item} in round {round}"),
+            What::SeenLight => format!("directly sampled light at pixel, texel or point {item} in round {round}"),
+            What::Estimate => format!("the density estimate at pixel, texel or point {item} in round {round}"),
         };
         format!("nonfinite values: {} (NaN or infinity), the first: {whose}", self.count)
     }

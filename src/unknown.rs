@@ -7,6 +7,8 @@
 
 use serde::Serialize;
 
+use crate::text::counted;
+
 /// Hits that a run may expect at most, with this confidence, where it had none.
 pub fn most_hits(confidence: f64) -> f64 {
     -(1.0 - confidence).ln()
@@ -52,7 +54,8 @@ impl Unknown {
                 " The result is black so far, so its relative error is unknown.".to_owned()
             };
             text.push_str(&format!(
-                "unknown: no light has reached {unreached} of {asked} {point}s where some may arrive. Each of them has at most {upper_bound:.3e} {unit} ({sure} % confidence).{share}\n"
+                "unknown: no light has reached {unreached} of {} where some may arrive. Each of them has at most {upper_bound:.3e} {unit} ({sure} % confidence).{share}\n",
+                counted(asked, point)
             ));
         }
         for kind in absent {

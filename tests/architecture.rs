@@ -6,7 +6,8 @@ use std::fs;
 use std::path::{Path, PathBuf};
 
 /// What everyone may use, and what among itself has no order.
-const GROUND: [&str; 11] = ["error", "bias", "unknown", "constants", "records", "path", "photon", "ledger", "rng", "settings", "timings"];
+const GROUND: [&str; 12] =
+    ["text", "error", "bias", "unknown", "constants", "records", "path", "photon", "ledger", "rng", "settings", "timings"];
 /// From left to right.
 const LINE: [&str; 24] = [
     "scene",
@@ -48,7 +49,7 @@ fn allowed(from: &str, to: &str) -> bool {
     }
     match from {
         // The engine knows no photon.
-        "gpu" => ["error", "records", "constants", "ledger", "timings"].contains(&to),
+        "gpu" => ["text", "error", "records", "constants", "ledger", "timings"].contains(&to),
         CPU => GROUND.contains(&to) || ["scene", "plan"].contains(&to),
         _ if GROUND.contains(&to) => place(from).is_some(),
         _ if to == CPU => place(from) >= place("render"),

@@ -69,7 +69,16 @@ fn bad_input_is_refused_in_one_line() {
     // Arguments, and what the line must name: option, value, what is allowed.
     let cases: &[(&[&str], [&str; 3])] = &[
         (&["--photons", "0"], ["--photons", "0", "from 2"]),
-        (&["--photons", "-5"], ["--photons", "-5", "whole number"]),
+        (&["--photons", "-5"], ["--photons", "-5", "from 2 to 2147483648"]),
+        (&["--photons", "5000000000"], ["--photons", "5000000000", "from 2 to 2147483648"]),
+        (&["--rounds", "-3"], ["--rounds", "-3", "from 1 to 4294967295"]),
+        (&["--rounds", "5000000000"], ["--rounds", "5000000000", "from 1 to 4294967295"]),
+        (&["--bounces", "-99999999999999999999999999999999999999999"], ["--bounces", "-99", "from 1 to 10000"]),
+        (&["--bounces", "99999999999999999999999999999999999999999"], ["--bounces", "99", "from 1 to 10000"]),
+        (&["--threads", "-3"], ["--threads", "-3", "from 1 to 1024"]),
+        (&["--seed", "-1"], ["--seed", "-1", "from 0 to 18446744073709551615"]),
+        (&["render", "cornell", "-o", "a.png", "--rounds", "-3"], ["--rounds", "-3", "from 1 to 1048576"]),
+        (&["study", "cornell", "-o", "s", "--seed", "-1"], ["--seed", "-1", "from 0 to 4294966295"]),
         (&["--photons", "many"], ["--photons", "many", "whole number"]),
         (&["--rounds", "0"], ["--rounds", "0", "from 1"]),
         (&["--bounces", "0"], ["--bounces", "0", "from 1"]),
@@ -126,10 +135,22 @@ fn bad_input_is_refused_in_one_line() {
         (&["--error", "few"], ["--error", "few", "per cent"]),
         (&["--confidence", "10%"], ["--confidence", "10%", "50 %"]),
         (&["--time", "0s"], ["--time", "0", "1ms"]),
-        (&["--total-photons", "0"], ["--total-photons", "0", "1 or more"]),
+        (&["--total-photons", "0"], ["--total-photons", "0", "from 1"]),
         (&["--colour"], ["--colour", "no such option", "--help"]),
         (&["bakery"], ["bakery", "no such command", "--help"]),
-        (&["paper"], ["--out", "required", ""]),
+        (&["paper"], ["--out", "required", "photonmill paper -o paper"]),
+        (&["render", "cornell"], ["required", "--output <FILE>", "photonmill render cornell-spheres -o picture.png"]),
+        (&["render"], ["--output <FILE> and <SCENE>", "photonmill render cornell-spheres", "-o picture.png"]),
+        (&["--size", "64"], ["--size", "is an option of render and plan;", "photonmill render --help"]),
+        (&["devices", "--points", "p"], ["--points", "is an option of probe", "--help"]),
+        (
+            &["render", "cornell", "-o", "a.png", "--mesh", "8"],
+            ["--mesh", "is an option of photonmill without a command", "photonmill --help"],
+        ),
+        (&["render", "absent.glb", "-o", "a.png"], ["photonmill: absent.glb: the file cannot be read", "no such file", ""]),
+        (&["probe", "cornell", "--points", "p", "-o", "-", "--json", "-"], ["--json -", "-o - already is standard output", "name a file"]),
+        (&["--photons", "5", "render", "cornell", "-o", "a.png"], ["render", "options stand after the command", "--photons"]),
+        (&["bake", "cornell", "-o", "-"], ["-o -", "standard output", "several files"]),
         (&["paper", "--out", "p", "--longest", "0s"], ["--longest", "0s", "above 0"]),
         (&["paper", "--out", "/dev/null/x"], ["-o", "/dev/null/x", "cannot be written"]),
     ];
@@ -169,6 +190,10 @@ fn a_run_writes_everything_it_was_asked_for() {
     let output = run_on_device(folder.path(), &arguments);
     assert!(output.status.success(), "{}", text(&output.stderr));
     let stdout = text(&output.stdout);
+    assert!(stdout.contains(": 1 round of 5000 photons, ") && !stdout.contains("(s)"), "{stdout}");
+    // What the driver repeats of the device's name is left out.
+    let device: Vec<&str> = stdout.lines().next().unwrap().split([' ', ',', '(', ')']).filter(|word| !word.is_empty()).collect();
+    assert!((1..device.len()).all(|word| !device[..word].contains(&device[word])), "{device:?}");
     // The CPU builder takes a photon through all its bounces at once.
     let on_gpu = std::env::var_os("PHOTONMILL_NO_GPU").is_none();
     let bounce = on_gpu.then_some("bounce 15");
@@ -184,7 +209,7 @@ fn a_run_writes_everything_it_was_asked_for() {
     let count = |fate: &str| ledger[fate].as_u64().unwrap();
     assert_eq!(count("emitted"), count("absorbed") + count("escaped") + count("cut_off") + count("dropped"));
     assert_eq!((count("emitted"), count("stored"), count("dropped")), (5000, 7511, 0));
-    assert_eq!(report["seed"], 1);
+    assert_eq!((&report["seed"], &report["nonfinite_values"]), (&1.into(), &Value::Null));
     assert_eq!(report["settings"]["bounces"], 15);
     assert!(report["device"].is_string() && report["driver"].is_string());
     let timings = report["timings"].as_array().unwrap();
@@ -227,7 +252,15 @@ fn a_run_says_how_wrong_it_is() {
     let arguments = ["--photons", "501", "--mesh", "8", "--error", "90%", "--bias", "--progress", "json", "--json", "a.json"];
     let output = run_on_device(folder.path(), &[&arguments[..], &["--irradiance", "i"]].concat());
     assert!(output.status.success(), "{}", text(&output.stderr));
-    let lines: Vec<Value> = text(&output.stderr).lines().filter_map(|line| serde_json::from_str(line).ok()).collect();
+    // Warnings stay text.
+    let stderr = text(&output.stderr);
+    let lines = stderr.lines().filter(|line| !line.starts_with("photonmill: "));
+    let lines: Vec<Value> = lines.map(|line| serde_json::from_str(line).expect(line)).collect();
+    const STEP: [&str; 8] = ["done", "error", "error_wanted", "ledger", "photons", "seconds", "seconds_left", "total"];
+    for line in &lines {
+        let fields: Vec<&str> = line.as_object().unwrap().keys().map(String::as_str).collect();
+        assert!(fields == ["message"] || fields == STEP, "{line}");
+    }
     let last = lines.last().expect("progress is told");
     assert_eq!(last["ledger"]["emitted"], last["photons"]);
     assert!(last["error"].as_f64().unwrap() <= last["error_wanted"].as_f64().unwrap() && last["seconds_left"].is_number(), "{last}");
@@ -459,10 +492,56 @@ fn values_are_shown_as_typed() {
     assert_eq!(entries(folder.path()), Vec::<String>::new());
 }
 
+/// Of a long value a message shows the beginning and the end.
+#[test]
+fn long_values_are_not_repeated_whole() {
+    let long = "7".repeat(5000);
+    let [file, scene, option] = [format!("absent/{long}.png"), format!("{long}.glb"), format!("--{long}")];
+    let cases: [&[&str]; 14] = [
+        &["--photons", &long],
+        &["--eye", &long],
+        &["--variant", &long],
+        &["--replay", &long],
+        &["--device", &long],
+        &["-o", &file],
+        &[&option],
+        &[&long],
+        &["render", &long, "-o", "a.png"],
+        &["render", &scene, "-o", "a.png"],
+        &["render", "cornell", "-o", "a.png", "--camera", &long],
+        &["render", "cornell", "-o", "a.png", "--fixed-radius", &long],
+        &["probe", "cornell", "--points", &long, "-o", "a.csv"],
+        &["bench", "--only", &long],
+    ];
+    let folder = tempfile::tempdir().unwrap();
+    for arguments in cases {
+        let output = run(folder.path(), arguments);
+        let stderr = text(&output.stderr);
+        let is_short = stderr.lines().count() == 1 && stderr.len() < 600 && stderr.contains("777...777");
+        assert!(output.status.code() == Some(2) && is_short, "{:?}: {stderr}", arguments[0]);
+    }
+    let line = format!("{long} 0 0 0 1 0\n");
+    std::fs::write(folder.path().join("points.txt"), line).unwrap();
+    let stderr = text(&run(folder.path(), &["probe", "cornell", "--points", "points.txt", "-o", "a.csv"]).stderr);
+    assert!(stderr.len() < 600 && stderr.contains("777...777") && stderr.contains("1e15"), "{stderr}");
+}
+
+#[test]
+fn help_takes_help() {
+    let folder = tempfile::tempdir().unwrap();
+    for (asked, meant) in
+        [(&["help", "--help"][..], &["help"][..]), (&["help", "-h"], &["help"]), (&["help", "plan", "--help"], &["help", "plan"])]
+    {
+        let [asked, meant] = [asked, meant].map(|arguments| run(folder.path(), arguments));
+        assert!(asked.status.success() && asked.stdout == meant.stdout && !asked.stdout.is_empty(), "{}", text(&asked.stderr));
+    }
+}
+
 #[test]
 fn a_slip_is_answered_with_what_was_meant() {
     let folder = tempfile::tempdir().unwrap();
-    let cases: [(&[&str], &str); 7] = [
+    let cases: [(&[&str], &str); 8] = [
+        (&["render", "cornel", "-o", "a.png"], "did you mean cornell? "),
         (&["rendr", "cornell"], "did you mean render?"),
         (&["render", "cornell", "-o", "a.png", "--phtons", "3"], "did you mean --photons?"),
         (&["--variant", "atomik"], "did you mean atomic?"),

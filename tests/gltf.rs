@@ -225,7 +225,7 @@ fn a_scene_without_light_is_read_and_flat_triangles_are_a_warning() {
     value["buffers"][0]["uri"] = json!(format!("data:application/octet-stream;base64,{}", BASE64.encode(&bytes)));
     let scene = load(&value).unwrap();
     assert_eq!(scene.triangle_count(), 1);
-    let wanted = "1 triangle(s) have no area and are left out (mesh 'wall')";
+    let wanted = "1 triangle without area left out (mesh 'wall')";
     assert!(scene.warnings.iter().any(|warning| warning.contains(wanted)), "{:?}", scene.warnings);
 }
 
@@ -243,6 +243,12 @@ fn assert_refusal(result: Result<Scene, Error>, named: &[&str]) {
     }
 }
 
+fn with_absent_image(value: &mut Value) {
+    value["images"] = json!([{"uri": "absent.png"}]);
+    value["textures"] = json!([{"source": 0}]);
+    value["materials"][0]["pbrMetallicRoughness"]["baseColorTexture"] = json!({"index": 0});
+}
+
 #[test]
 fn what_cannot_be_used_is_refused_with_file_and_object() {
     type Spoil = fn(&mut Value);
@@ -254,7 +260,8 @@ fn what_cannot_be_used_is_refused_with_file_and_object() {
         (|v| v["accessors"][1]["count"] = json!(3), &["mesh 'wall'", "3 normals for 4 vertices"]),
         (|v| v["accessors"][3]["componentType"] = json!(5126), &["mesh 'wall'", "indices"]),
         (|v| v["buffers"][0]["byteLength"] = json!(10_000), &["buffer 0", "140 bytes", "10000"]),
-        (|v| v["buffers"][0]["uri"] = json!("absent.bin"), &["absent.bin", "cannot be read"]),
+        (|v| v["buffers"][0]["uri"] = json!("absent.bin"), &["buffer 0", "absent.bin", "cannot be read"]),
+        (with_absent_image, &["scene.gltf", "texture image 0", "absent.png", "no such file"]),
         (|v| v["buffers"][0]["uri"] = json!("%zz"), &["buffer 0", "%zz"]),
         (|v| v["buffers"][0]["uri"] = json!("https://example.com/a.bin"), &["buffer 0", "only files beside this one"]),
         (|v| v["buffers"][0]["uri"] = json!("data:x;base64,@@@"), &["buffer 0", "not base64"]),

@@ -210,7 +210,7 @@ fn bad_scenes_are_refused_in_one_line() {
     place.write("points.txt", "0.5 0 0.5 0 1 0");
     let cases: &[(&str, &[&str])] = &[
         ("absent.glb", &["absent.glb", "cannot be read"]),
-        ("cornel", &["SCENE cornel", "cornell-spheres", ".gltf"]),
+        ("cornel", &["SCENE cornel", "did you mean cornell?", "cornell-spheres", ".gltf"]),
         ("", &["SCENE"]),
         ("scene.obj", &["scene.obj", ".gltf or .glb"]),
         ("folder.glb", &["folder.glb", "is no file"]),
@@ -238,7 +238,7 @@ fn bad_points_are_refused_with_their_line() {
         ("comments.txt", "# nothing\n\n".into(), &["no point"]),
         ("five.txt", format!("{good}# five\n1 2 3 4 5\n"), &["line 3", "5 numbers"]),
         ("seven.txt", format!("{good}1 2 3 4 5 6 7\n"), &["line 2", "7 numbers"]),
-        ("nan.txt", format!("{good}{good}nan 0 0 0 1 0\n"), &["line 3", "nan"]),
+        ("nan.txt", format!("{good}{good}nan 0 0 0 1 0\n"), &["line 3", "holds NaN", "from -1e15 to 1e15"]),
         ("infinite.txt", "0 0 inf 0 1 0".into(), &["line 1", "inf"]),
         ("huge.txt", "0 0 1e16 0 1 0".into(), &["line 1", "1e15"]),
         ("zero.txt", format!("{good}\n0 0 0 0 0 0\n"), &["line 3", "normal"]),
@@ -430,14 +430,20 @@ fn a_run_explains_itself_and_its_report_closes() {
         assert!(stdout.contains(word), "{word}: {stdout}");
     }
     let report = place.json("a.json");
-    let ledgers = report["ledgers"].as_array().unwrap();
+    let ledgers = ["global", "caustic"].map(|map| &report["ledgers"][map]);
     for ledger in ledgers {
         let count = |fate: &str| ledger[fate].as_u64().unwrap();
         assert_eq!(count("emitted"), count("absorbed") + count("escaped") + count("cut_off") + count("dropped"), "{ledger}");
         assert_eq!((count("emitted"), count("dropped")), (4000, 0), "{ledger}");
     }
-    assert_eq!((ledgers.len(), &report["rounds"], &report["end"]), (2, &json!(2), &json!("rounds")));
-    assert_eq!(report["anomalies"], json!({"not_a_number": 0, "cut_to_largest": 0, "too_dense": 0}));
+    assert_eq!((&report["rounds"], &report["end"]), (&json!(2), &json!("rounds")));
+    assert_eq!(report["film"], json!({"nonfinite_values": 0, "uncorrected_estimates": 0}));
+    let settings = &report["settings"];
+    assert_eq!(
+        (&settings["bounces"], &settings["builder"], &report["nonfinite_values"]),
+        (&Value::Null, &json!("persistent"), &Value::Null)
+    );
+    assert!(stdout.contains(": 2 rounds of ") && !stdout.contains("(s)"), "{stdout}");
     let timings = report["timings"].as_array().unwrap();
     for name in ["round", "round/visible points", "round/global", "round/caustic", "round/resolve"] {
         let row = timings.iter().find(|row| row["name"] == name).unwrap_or_else(|| panic!("no {name}: {timings:?}"));
@@ -450,10 +456,27 @@ fn a_run_explains_itself_and_its_report_closes() {
     assert!(!place.json("t.json")["traceEvents"].as_array().unwrap().is_empty());
 
     // What is not asked for is not told; one round knows no error and still is JSON.
-    let (stdout, _) =
-        place.succeed(&["render", "cornell", "--size", "4x4", "--photons", "10", "--rounds", "1", "-o", "a.png", "--json", "b.json"]);
+    let (stdout, _) = place.succeed(&[
+        "render",
+        "cornell",
+        "--size",
+        "4x4",
+        "--photons",
+        "10",
+        "--rounds",
+        "1",
+        "--bounces",
+        "9",
+        "--paranoid",
+        "-o",
+        "a.png",
+        "--json",
+        "b.json",
+    ]);
     assert!(rows_of(&stdout).is_empty() && stdout.contains("unknown after a single round"), "{stdout}");
-    assert!(place.json("b.json")["relative_error"].is_null());
+    let report = place.json("b.json");
+    assert!(report["relative_error"].is_null());
+    assert_eq!((&report["settings"]["bounces"], &report["nonfinite_values"]), (&json!(9), &json!({"count": 0, "first": []})));
 }
 
 #[test]
@@ -551,7 +574,7 @@ fn zero_area_triangles_are_a_warning_and_the_picture_is_right() {
     place.write("plain.gltf", square(|_| {}));
     place.write("flat.gltf", square(|v| v["accessors"][1]["count"] = json!(9)));
     let (_, stderr) = place.succeed(&[&["render", "flat.gltf"], &TINY[..], &["-o", "flat.exr", "--quiet"]].concat());
-    assert!(stderr.contains("warning: 1 triangle(s) have no area") && stderr.lines().count() == 1, "{stderr}");
+    assert!(stderr.contains("warning: 1 triangle without area left out") && stderr.lines().count() == 1, "{stderr}");
     assert_eq!(place.pixels("flat.exr"), place.exr(&["plain.gltf"]));
 }
 
@@ -569,6 +592,18 @@ fn a_blender_file_renders_with_all_that_it_holds() {
     }
     let pixels = place.pixels("a.exr");
     assert!(pixels.iter().all(|value| value.is_finite()) && pixels.iter().filter(|value| **value > 0.0).count() > 300);
+}
+
+/// Results are of texels here, not of points.
+#[test]
+fn a_bake_speaks_of_texels() {
+    if no_gpu() {
+        return;
+    }
+    let place = Place::new();
+    let (stdout, stderr) = place.succeed(&["bake", "cornell", "-o", "b", "--texels-per-metre", "2", "--photons", "50", "--rounds", "1"]);
+    assert!(stderr.contains(" texels; 1 round of 50 global photons"), "{stderr}");
+    assert!(stdout.contains(" texels where some may arrive"), "{stdout}");
 }
 
 #[test]

@@ -7,6 +7,7 @@ use photonmill::error::{Error, Result};
 use photonmill::rng::Rng;
 use photonmill::settings::transport::{Effect, TransportSettings};
 use photonmill::settings::{Gather, Preset, Settings};
+use photonmill::text::echo;
 
 const CASES: usize = 40_000;
 
@@ -30,7 +31,7 @@ impl Random {
     /// An end of what is allowed, a neighbour of one, or any number.
     fn count(&mut self, least: u32, most: u32) -> u32 {
         let any = self.word() as u32 >> self.below(32);
-        self.pick(&[least, least + 1, least.wrapping_sub(1), most, most - 1, most.wrapping_add(1), 0, u32::MAX, any])
+        self.pick(&[least, least + 1, least.wrapping_sub(1), most, most.wrapping_sub(1), most.wrapping_add(1), 0, u32::MAX, any])
     }
 
     fn number(&mut self, least: f64, most: f64) -> f64 {
@@ -57,7 +58,7 @@ struct Rule {
 }
 
 fn rule(option: &str, value: impl ToString, holds: bool) -> Rule {
-    Rule { holds, refusal: format!("{option} {}: ", value.to_string()) }
+    Rule { holds, refusal: format!("{option} {}: ", echo(value.to_string())) }
 }
 
 /// Compares validation with the rules, case by case. Every rule must have been the only broken one somewhere, else

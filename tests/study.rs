@@ -30,7 +30,7 @@ fn request(scene: &str, most_rounds: u32) -> Request {
 
 fn run(gpu: &Gpu, folder: &Path, request: Request) -> photonmill::error::Result<Study> {
     let never = AtomicBool::new(false);
-    let folder = Folder::open("--out", folder)?;
+    let folder = Folder::open("-o", folder)?;
     let scene = lit::scene(&request.scene);
     let study = study::run(gpu, &scene, request, &folder, &never, &mut |_| {})?;
     study::write(&folder, &study)?;
@@ -195,7 +195,7 @@ fn the_open_box_is_studied_against_radiosity_and_goes_on_where_it_ended() {
 
     // Another study does not mix with it.
     let error = run(&gpu, folder.path(), Request { photons: 4096, ..request("open-box", 2) }).unwrap_err().to_string();
-    assert!(error.starts_with("--out ") && error.contains("points.jsonl") && !error.contains('\n'), "{error}");
+    assert!(error.starts_with("-o ") && error.contains("points.jsonl") && !error.contains('\n'), "{error}");
 }
 
 /// What is said of a picture's study.
@@ -249,7 +249,7 @@ fn a_study_that_is_cancelled_keeps_what_it_has() {
     let cancelled = AtomicBool::new(false);
     let mut told = 0;
     let scene = lit::scene("open-box");
-    let out = Folder::open("--out", folder.path()).unwrap();
+    let out = Folder::open("-o", folder.path()).unwrap();
     let study = study::run(&gpu, &scene, request("open-box", 2), &out, &cancelled, &mut |_| {
         told += 1;
         // At the third comparison.

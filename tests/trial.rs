@@ -145,9 +145,9 @@ fn a_radius_wider_than_what_it_lies_in_is_warned_of() {
         let view = View { geometry: &geometry, camera: None, phases: &phases };
         let settings = TransportSettings { photons: 1 << 10, ..TransportSettings::default() };
         let plan = trial::plan(&gpu, &scene, &view, &settings, Sensor::Receivers { count: points.len() as u32 }).unwrap();
-        light_report::radius_warning(&plan, &geometry)
+        light_report::radius_warning(&plan, &geometry, "point")
     };
     let told = warning([middle.clone(), corners].concat()).expect("a warning");
-    assert!(told.contains("40 % of the points"), "{told}");
+    assert!(told.contains("at 40 % of the points the next wall or edge is nearer than the search radius"), "{told}");
     assert_eq!(warning(middle), None);
 }

@@ -20,6 +20,7 @@ use crate::study::axes::{Configuration, Line};
 use crate::study::point::{Curve, Point};
 use crate::study::reference::Reference;
 use crate::study::subject::Subject;
+use crate::text::counted;
 use crate::transport::Lit;
 
 /// Runs of a point, each with a seed of its own.
@@ -89,7 +90,7 @@ pub fn measure(lab: &mut Lab, name: &str) -> Result<Found> {
     let timed = scene_line::time(lab.gpu, &lab.rates, &job(used), lab.cancelled)?;
     let (seconds, how) = match best {
         Some((ms, settings, rounds)) => {
-            let mut how = format!("{} % within {rounds} round(s): {}", 100.0 * wanted, search.command(&settings, rounds));
+            let mut how = format!("{} % within {}: {}", 100.0 * wanted, counted(rounds, "round"), search.command(&settings, rounds));
             if leaves_out_images {
                 let lit = job(settings.clone()).light(lab.gpu, TransportSettings { rounds, ..settings }, lab.cancelled)?;
                 let all = Reference { counts: not_straight, ..search.reference.clone() };

@@ -7,7 +7,7 @@ use super::targets::Wanted;
 use crate::timings::Spread;
 
 pub fn text(bench: &Bench) -> String {
-    let mut text = format!("{}, {}, Vulkan {}\n{}\n\n", bench.device, bench.driver, bench.vulkan, bench.request.command);
+    let mut text = format!("{}, driver {}, Vulkan {}\n{}\n\n", bench.device, bench.driver, bench.vulkan, bench.request.command);
     rates(&mut text, bench);
     if !bench.passes.is_empty() {
         passes(&mut text, bench);

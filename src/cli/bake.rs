@@ -18,6 +18,7 @@ use crate::plan::transport::Sensor;
 use crate::records::Receiver;
 use crate::scene::Scene;
 use crate::scene::geometry::Geometry;
+use crate::text::counted;
 use crate::transport::Lit;
 
 #[derive(Args)]
@@ -27,7 +28,7 @@ pub(super) struct BakeArgs {
     output: PathBuf,
     #[command(flatten)]
     report: ReportArgs,
-    /// Exposure of the PNGs in stops, each of which doubles the brightness [default: the mean becomes middle grey]
+    /// Exposure of the PNGs in stops, each of which doubles the brightness [default: what makes the mean middle grey]
     #[arg(long, value_name = "STOPS", value_parser = parse_number::<f32>, allow_hyphen_values = true, help_heading = "Output")]
     exposure: Option<f32>,
     #[command(flatten)]
@@ -64,27 +65,24 @@ pub(super) fn run(args: &BakeArgs, cancelled: &AtomicBool) -> Result<End> {
     let phases: Vec<Vec<Receiver>> =
         (0..PHASE_COUNT.min(settings.rounds as usize)).map(|phase| receivers(&layout, phase, &geometry)).collect();
     let sensor = Sensor::Receivers { count: layout.texel_count() as u32 };
-    let job = Job { scene: &scene, settings: &settings, sensor, camera: None, phases: &phases };
+    let job = Job { scene: &scene, settings: &settings, sensor, camera: None, phases: &phases, point: "texel" };
     let gpu = args.device.open(&reporter)?;
     let plan = plan(&gpu, &job, &geometry)?;
     let lit = light(&gpu, &job, &geometry, plan, args.transport.stop.bias, &reporter, cancelled)?;
 
     let estimates = estimates(&lit);
     let stops = args.exposure.unwrap_or_else(|| usual_exposure(&estimates));
-    let text = light_report::text(&scene.name, &lit, args.messages.explain);
+    let text = light_report::text(&scene.name, &lit, job.point, args.messages.explain);
     let written = bake::write(&folder, &scene, &layout, &layout.maps(&estimates), stops.exp2());
     reporter.finish();
     let written = written.and_then(|()| write_all(reports.files(&scene, &lit)));
     if let Err(error) = written {
         return say_beside(&report_files, &text).and(Err(error));
     }
-    let maps = layout.lightmaps().count();
+    let maps = counted(layout.lightmaps().count(), "lightmap");
     let document = args.output.join("scene.gltf");
-    let texels = layout.texel_count();
-    say_beside(
-        &report_files,
-        &format!("{text}\nwrote {maps} lightmap(s) of {texels} texels and {} at {stops:+.2} stops", document.display()),
-    )?;
+    let texels = counted(layout.texel_count(), "texel");
+    say_beside(&report_files, &format!("{text}\nwrote {maps} of {texels} and {} at {stops:+.2} stops", document.display()))?;
     Ok(End::of(&lit))
 }
 

@@ -29,7 +29,7 @@ pub(super) struct BenchArgs {
     /// cornell-spheres, caustic-sphere, mesh, effects, compaction [default: all]
     #[arg(long, value_name = "NAME", value_delimiter = ',', value_parser = parse_experiment, help_heading = "Measurements")]
     only: Vec<Experiment>,
-    /// Size of the experiments: that of the performance targets, or seconds in all [default: full on a GPU, small on a CPU]
+    /// Size of the experiments [default: full on a GPU, small on a CPU]
     #[arg(long, alias = "size", value_enum, value_name = "SIZE", help_heading = "Measurements")]
     workload: Option<WorkloadArg>,
     /// Measure time and memory against the number of photons and of triangles instead
@@ -43,7 +43,9 @@ pub(super) struct BenchArgs {
 
 #[derive(Debug, Clone, Copy, PartialEq, Eq, ValueEnum)]
 enum WorkloadArg {
+    /// Seconds in all
     Small,
+    /// That of the performance targets, which takes minutes
     Full,
 }
 

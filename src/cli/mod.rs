@@ -19,6 +19,7 @@ mod study;
 mod transport;
 mod usage;
 
+use std::ffi::OsString;
 use std::io::{ErrorKind, Write};
 use std::path::PathBuf;
 
@@ -163,11 +164,16 @@ impl End {
 
 /// Runs the program on the process's arguments and returns its exit code.
 pub fn main() -> u8 {
-    if std::env::args_os().len() == 1 {
+    let mut arguments: Vec<OsString> = std::env::args_os().collect();
+    if arguments.len() == 1 {
         return print_start();
     }
+    // `help --help` is `help`, and `help render --help` is `help render`.
+    if arguments[1] == "help" {
+        arguments.retain(|argument| argument != "--help" && argument != "-h");
+    }
     let command = Cli::command();
-    let parsed = command.clone().try_get_matches().and_then(|matches| Ok((Cli::from_arg_matches(&matches)?, matches)));
+    let parsed = command.clone().try_get_matches_from(&arguments).and_then(|matches| Ok((Cli::from_arg_matches(&matches)?, matches)));
     let (cli, matches) = match parsed {
         Ok(parsed) => parsed,
         Err(error) if !error.use_stderr() => {
@@ -176,7 +182,7 @@ pub fn main() -> u8 {
             return 0;
         }
         Err(error) => {
-            complain(&usage::one_line(&error));
+            complain(&usage::one_line(&error, &command, &arguments));
             return 2;
         }
     };

@@ -12,16 +12,17 @@ use crate::error::{Error, Result};
 use crate::output::destination::Folder;
 use crate::paper::bench::Bench;
 use crate::paper::{self, Reproduction, Request, published, tables};
+use crate::text::counted;
 
 #[derive(Args)]
 pub(super) struct PaperArgs {
     /// Folder for pictures, tables and index.html; created if needed
     #[arg(short, long, alias = "out", value_name = "DIR", help_heading = "Output")]
     output: PathBuf,
-    /// Photons per round of a size that fills the device [default: 4194304; 65536 on a CPU]
+    /// Photons per round of the large size, which is to fill the device [default: 4194304; 65536 on a CPU]
     #[arg(long, value_name = "N", value_parser = parse_integer::<u32>, allow_hyphen_values = true, help_heading = "Measurements")]
     large: Option<u32>,
-    /// Runs of each case, of which the median counts, after a first one that is dropped; at most 3 at the large size
+    /// Timed runs of each case, of which the median is shown; a first run is not timed, and the large size has at most 3
     #[arg(long, value_name = "N", value_parser = parse_integer::<u32>, allow_hyphen_values = true, default_value = "7", help_heading = "Measurements")]
     repeats: u32,
     /// Leave out rows of table 1 that would take longer than this
@@ -53,10 +54,10 @@ pub(super) fn run(args: &PaperArgs, cancelled: &AtomicBool) -> Result<End> {
         longest_ms: 1e3 * args.longest,
     };
     reporter.note(&format!(
-        "plan: 4 figures, running times and table 1; {} and {} photons per round, the median of {} runs",
+        "plan: 4 figures, running times and table 1; {} and {} photons per round, the median of {}",
         published::PHOTONS,
         request.large,
-        request.repeats
+        counted(request.repeats, "run")
     ));
     let mut progress = |line: &str| reporter.step(line);
     let found = paper::reproduce(&mut Bench::new(gpu.as_ref(), cancelled, &mut progress), request)?;

@@ -1,5 +1,8 @@
 //! Values of options: text to numbers, with what is allowed in words. Ranges are the settings' affair.
 
+use std::fmt::Display;
+use std::num::IntErrorKind;
+use std::ops::RangeInclusive;
 use std::str::FromStr;
 
 use crate::settings::WALL_NAMES;
@@ -7,8 +10,28 @@ use crate::transport::replay::PhotonName;
 
 type Parsed<T> = Result<T, String>;
 
-pub(super) fn parse_integer<T: FromStr>(text: &str) -> Parsed<T> {
-    text.parse().map_err(|_| format!("must be a whole number from 0 to {}", (1u128 << (8 * size_of::<T>())) - 1))
+/// A number that `T` does not hold becomes 0 or the largest of `T`. The setting must allow neither: validation, which knows
+/// its range, then refuses both.
+pub(super) fn parse_integer<T: TryFrom<u64>>(text: &str) -> Parsed<T> {
+    let number = match text.parse::<i128>() {
+        Ok(number) => number,
+        Err(error) if *error.kind() == IntErrorKind::PosOverflow => i128::MAX,
+        Err(error) if *error.kind() == IntErrorKind::NegOverflow => 0,
+        Err(_) => return Err("must be a whole number".to_owned()),
+    };
+    let largest = u64::MAX >> (64 - 8 * size_of::<T>());
+    Ok(T::try_from(number.clamp(0, largest.into()) as u64).ok().expect("the number is in the range of T"))
+}
+
+/// The same for a setting that allows an end of `T`.
+pub(super) fn parse_within<T>(allowed: RangeInclusive<T>) -> impl Fn(&str) -> Parsed<T> + Clone + Send + Sync
+where
+    T: FromStr + PartialOrd + Display + Clone + Send + Sync,
+{
+    move |text| {
+        let number = text.parse().ok().filter(|number| allowed.contains(number));
+        number.ok_or_else(|| format!("must be a whole number from {} to {}", allowed.start(), allowed.end()))
+    }
 }
 
 pub(super) fn parse_number<T: FromStr>(text: &str) -> Parsed<T> {
@@ -54,7 +77,7 @@ pub(super) fn parse_threads(text: &str) -> Parsed<usize> {
     if text == "all" {
         return Ok(std::thread::available_parallelism().map_or(1, usize::from));
     }
-    text.parse().map_err(|_| "must be a number of threads, or all".to_owned())
+    parse_integer(text).map_err(|_| "must be a number of threads, or all".to_owned())
 }
 
 /// `3:4711`, `3:4711:caustic`.

@@ -14,6 +14,7 @@ use crate::plan::Limits;
 use crate::plan::transport::{RadiusFrom, Sensor, TransportPlan};
 use crate::render;
 use crate::settings::transport::{Part, TransportSettings};
+use crate::text::counted;
 
 #[derive(Args)]
 pub(super) struct PlanArgs {
@@ -24,8 +25,8 @@ pub(super) struct PlanArgs {
     /// Camera by name [default: the first one; one that sees the whole scene if it has none]
     #[arg(long, value_name = "NAME", help_heading = "Scene")]
     camera: Option<String>,
-    /// Size of the picture in pixels; without a height it follows from the camera's aspect ratio [default: about 307200
-    /// pixels of the camera's aspect ratio, 640x480 if it has none]
+    /// Size of the picture in pixels; a width alone takes its height from the camera's aspect ratio [default: about 307200
+    /// pixels in the camera's aspect ratio, 640x480 if it has none]
     #[arg(long, value_name = "WIDTH[xHEIGHT]", value_parser = parse_size, allow_hyphen_values = true, help_heading = "Scene")]
     size: Option<PictureSize>,
     #[command(flatten)]
@@ -48,7 +49,14 @@ pub(super) fn run(args: &PlanArgs) -> Result<()> {
     let scene = args.scene.open(&reporter)?;
     let camera = camera(&scene, args.camera.as_deref())?;
     let (width, height) = PictureSize::resolve(args.size, &camera, &reporter)?;
-    let job = Job { scene: &scene, settings: &settings, sensor: Sensor::Picture { width, height }, camera: Some(&camera), phases: &[] };
+    let job = Job {
+        scene: &scene,
+        settings: &settings,
+        sensor: Sensor::Picture { width, height },
+        camera: Some(&camera),
+        phases: &[],
+        point: "pixel",
+    };
     let geometry = geometry(&scene, &settings, &reporter)?;
     // A plan is data: it needs a device's limits, not the device.
     let limits = match Gpu::open(&args.device.options()) {
@@ -74,7 +82,8 @@ pub(super) fn run(args: &PlanArgs) -> Result<()> {
                 // A plan needs no device, and a trial round does.
                 _ => "from a trial round at the start of the run".to_owned(),
             };
-            format!("{} map: {} photons per round in {} chunk(s), first radius {radius}", map.name, map.photons, map.chunks().count())
+            let (photons, chunks) = (counted(map.photons, "photon"), counted(map.chunks().count(), "chunk"));
+            format!("{} map: {photons} per round in {chunks}, first radius {radius}", map.name)
         })
         .collect();
     say(&format!("{text}{}\n{width} x {height} pixels\n{} bytes of device memory", maps.join("\n"), plan.bytes))

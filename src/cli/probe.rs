@@ -18,6 +18,7 @@ use crate::records::Receiver;
 use crate::scene::geometry::Geometry;
 use crate::scene::{Light, LightKind, Mesh};
 use crate::settings::transport::{Illumination, TransportSettings};
+use crate::text::{counted, echo, refusal};
 use crate::transport::Lit;
 
 #[derive(Args)]
@@ -69,13 +70,13 @@ pub(super) fn run(args: &ProbeArgs, cancelled: &AtomicBool) -> Result<End> {
     let geometry = geometry(&scene, &settings, &reporter)?;
     let phases = [receivers(&points, &geometry)];
     let sensor = Sensor::Receivers { count: points.len() as u32 };
-    let job = Job { scene: &scene, settings: &settings, sensor, camera: None, phases: &phases };
+    let job = Job { scene: &scene, settings: &settings, sensor, camera: None, phases: &phases, point: "point" };
     let gpu = args.device.open(&reporter)?;
     let plan = plan(&gpu, &job, &geometry)?;
     let lit = light(&gpu, &job, &geometry, plan, args.transport.stop.bias, &reporter, cancelled)?;
     reporter.finish();
 
-    let text = light_report::text(&scene.name, &lit, args.messages.explain);
+    let text = light_report::text(&scene.name, &lit, job.point, args.messages.explain);
     let wrote = if output.is_standard_output() { String::new() } else { format!("\nwrote {}", args.output.display()) };
     let mut files = vec![(output, table(&lit))];
     files.extend(reports.files(&scene, &lit));
@@ -123,7 +124,7 @@ fn read_points(path: &Path) -> Result<Vec<(DVec3, DVec3)>> {
     } else {
         std::fs::File::open(path).and_then(|mut file| file.read_to_string(&mut text))
     };
-    read.map_err(|error| refuse(format!("cannot be read ({}); name a text file of points", error.kind())))?;
+    read.map_err(|error| refuse(format!("cannot be read ({}); name a text file of points", refusal(&error))))?;
     let mut points = Vec::new();
     // The mark that some editors write in front of a text.
     let text = text.strip_prefix('\u{feff}').unwrap_or(&text);
@@ -132,15 +133,15 @@ fn read_points(path: &Path) -> Result<Vec<(DVec3, DVec3)>> {
         if line.is_empty() || line.starts_with('#') {
             continue;
         }
-        let wrong = |what: &str| refuse(format!("line {}, '{line}': {what}; a line is `x y z nx ny nz`", number + 1));
+        let wrong = |what: &str| refuse(format!("line {}, '{}': {what}; a line is `x y z nx ny nz`", number + 1, echo(line)));
         let fields: Vec<f64> = line
             .split([' ', '\t', ',', ';'])
             .filter(|field| !field.is_empty())
-            .map(|field| field.parse().map_err(|_| wrong(&format!("'{field}' is no number"))))
+            .map(|field| field.parse().map_err(|_| wrong(&format!("'{}' is no number", echo(field)))))
             .collect::<Result<_>>()?;
-        let [x, y, z, nx, ny, nz] = fields[..] else { return Err(wrong(&format!("has {} numbers", fields.len()))) };
-        if !fields.iter().all(|value| value.abs() <= MAX_COORDINATE) {
-            return Err(wrong(&format!("holds a number beyond {MAX_COORDINATE:e}")));
+        let [x, y, z, nx, ny, nz] = fields[..] else { return Err(wrong(&format!("has {} instead of 6", counted(fields.len(), "number")))) };
+        if let Some(value) = fields.iter().find(|value| value.is_nan() || value.abs() > MAX_COORDINATE) {
+            return Err(wrong(&format!("holds {value}; numbers must be from -{MAX_COORDINATE:e} to {MAX_COORDINATE:e}")));
         }
         let normal = DVec3::new(nx, ny, nz);
         if normal == DVec3::ZERO {

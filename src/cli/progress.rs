@@ -11,16 +11,17 @@ use clap::{Args, ValueEnum};
 use indicatif::{ProgressBar, ProgressStyle};
 
 use super::complain;
-use crate::gpu::{DeviceFacts, Gpu};
+use crate::gpu::Gpu;
 use crate::render::Progress;
+use crate::text::counted;
 
 #[derive(Args)]
 #[command(next_help_heading = "Messages")]
 pub(super) struct ProgressArgs {
-    /// Progress on stderr
+    /// How progress is shown on stderr
     #[arg(long, value_enum, value_name = "FORM", default_value = "auto")]
     progress: ProgressForm,
-    /// Print nothing before the report but warnings and errors: no device, plan or progress
+    /// Before the report print only warnings and errors: no device, plan or progress
     #[arg(short, long, conflicts_with = "progress")]
     quiet: bool,
 }
@@ -108,8 +109,7 @@ impl ProgressReporter {
 
     /// The device in use; `None` is the CPU builder.
     pub(super) fn device(&self, gpu: Option<&Gpu>) {
-        let describe = |facts: &DeviceFacts| format!("{}, {}", facts.name, facts.driver);
-        self.note(&format!("device: {}", gpu.map_or_else(|| "CPU".to_owned(), |gpu| describe(gpu.facts()))));
+        self.note(&format!("device: {}", gpu.map_or_else(|| "CPU".to_owned(), |gpu| gpu.facts().label())));
     }
 
     /// What is being done from now on; printed every few seconds.
@@ -194,7 +194,7 @@ fn progress_line(progress: &Progress, unit: &str) -> String {
     let wanted = progress.error_wanted.map_or_else(String::new, |wanted| format!(" (goal {:.3} %)", 100.0 * wanted));
     let error = progress.error.map_or_else(String::new, |error| format!(", error {:.3} %{wanted}", 100.0 * error));
     let left = progress.seconds_left.map_or_else(String::new, |left| format!(", {left:.0} s left"));
-    format!("{done} {unit}, {rate:.2e} photons/s{error}{left}")
+    format!("{}, {rate:.2e} photons/s{error}{left}", counted(done, unit))
 }
 
 fn ledger_line(progress: &Progress) -> String {

@@ -27,7 +27,7 @@ use crate::transport::replay::{self, PhotonName};
 
 #[derive(Args)]
 pub(super) struct RenderArgs {
-    /// Picture: an .exr of linear radiance in W/m2/sr, or a .png
+    /// Picture: an .exr holds linear radiance in W/m2/sr, a .png is sRGB at --exposure
     #[arg(short, long, alias = "out", value_name = "FILE", required_unless_present = "replay", help_heading = "Output")]
     output: Option<PathBuf>,
     #[command(flatten)]
@@ -36,7 +36,7 @@ pub(super) struct RenderArgs {
     /// light has reached the pixel though some may
     #[arg(long, value_name = "FILE", help_heading = "Output")]
     error_image: Option<PathBuf>,
-    /// Exposure of a PNG in stops, each of which doubles the brightness [default: the mean becomes middle grey]
+    /// Exposure of a PNG in stops, each of which doubles the brightness [default: what makes the mean middle grey]
     #[arg(long, value_name = "STOPS", value_parser = parse_number::<f32>, allow_hyphen_values = true, help_heading = "Output")]
     exposure: Option<f32>,
     #[command(flatten)]
@@ -44,8 +44,8 @@ pub(super) struct RenderArgs {
     /// Camera by name [default: the first one; one that sees the whole scene if it has none]
     #[arg(long, value_name = "NAME", help_heading = "Scene")]
     camera: Option<String>,
-    /// Size of the picture in pixels; without a height it follows from the camera's aspect ratio [default: about 307200
-    /// pixels of the camera's aspect ratio, 640x480 if it has none]
+    /// Size of the picture in pixels; a width alone takes its height from the camera's aspect ratio [default: about 307200
+    /// pixels in the camera's aspect ratio, 640x480 if it has none]
     #[arg(long, value_name = "WIDTH[xHEIGHT]", value_parser = parse_size, allow_hyphen_values = true, help_heading = "Scene")]
     size: Option<PictureSize>,
     #[command(flatten)]
@@ -60,8 +60,8 @@ pub(super) struct RenderArgs {
     /// Reconstruction filter of the pixels [default: box]
     #[arg(long, value_enum, value_name = "FILTER", help_heading = "Light transport")]
     filter: Option<FilterArg>,
-    /// Also path trace the picture on the CPU with this many samples per pixel (64), and print whether the two agree within
-    /// their errors
+    /// Also path trace the picture on the CPU, and print whether the two agree within their errors; `--judge` alone takes 64
+    /// samples per pixel
     #[arg(long, value_name = "SAMPLES", value_parser = parse_integer::<u32>, allow_negative_numbers = true, num_args = 0..=1, default_missing_value = "64", help_heading = "Checks")]
     judge: Option<u32>,
     /// Trace a single photon of this run, print its path, and exit; rounds and photons count from 0, and `:caustic` at the
@@ -124,7 +124,14 @@ pub(super) fn run(args: &RenderArgs, cancelled: &AtomicBool) -> Result<End> {
     let scene = args.scene.open(&reporter)?;
     let camera = camera(&scene, args.camera.as_deref())?;
     let (width, height) = PictureSize::resolve(args.size, &camera, &reporter)?;
-    let job = Job { scene: &scene, settings: &settings, sensor: Sensor::Picture { width, height }, camera: Some(&camera), phases: &[] };
+    let job = Job {
+        scene: &scene,
+        settings: &settings,
+        sensor: Sensor::Picture { width, height },
+        camera: Some(&camera),
+        phases: &[],
+        point: "pixel",
+    };
     let geometry = geometry(&scene, &settings, &reporter)?;
     let gpu = args.device.open(&reporter)?;
     let plan = plan(&gpu, &job, &geometry)?;
@@ -132,7 +139,7 @@ pub(super) fn run(args: &RenderArgs, cancelled: &AtomicBool) -> Result<End> {
 
     let image = radiance(&lit, width, height);
     let stops = args.exposure.unwrap_or_else(|| image.usual_exposure());
-    let text = light_report::text(&scene.name, &lit, args.messages.explain);
+    let text = light_report::text(&scene.name, &lit, job.point, args.messages.explain);
     let mut files = vec![(picture, image.encode(format, stops))];
     if let Some(errors) = errors {
         files.push((errors, standard_error(&lit, width, height).encode(Format::Exr, 0.0)));

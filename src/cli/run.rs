@@ -6,7 +6,7 @@ use std::time::Instant;
 
 use clap::{Args, ValueEnum};
 
-use super::parse::{parse_integer, parse_number, parse_numbers, parse_photon_name, parse_shininess, parse_threads};
+use super::parse::{parse_integer, parse_number, parse_numbers, parse_photon_name, parse_shininess, parse_threads, parse_within};
 use super::progress::{ProgressArgs, ProgressReporter};
 use super::stop::{StopArgs, bias_before, goals, rounds_after};
 use super::{DeviceArgs, End, JsonArg, TimingArgs, complain, optional_file, say, say_beside};
@@ -24,6 +24,7 @@ use crate::scene::open_box::open_box;
 use crate::scene::room::RoomScene;
 use crate::settings::stop::Stop;
 use crate::settings::{EmissionLaw, Gather, Math, PhongDirection, Preset, Settings, Sums, Variant};
+use crate::text::counted;
 use crate::timings::{Clock, Span};
 use crate::transport::replay::PhotonName;
 
@@ -41,7 +42,7 @@ pub(super) struct RunArgs {
     /// into this folder
     #[arg(long, value_name = "DIR", help_heading = "Output")]
     irradiance: Option<PathBuf>,
-    /// The same for the radiosity, the reflected flux
+    /// The same for the radiosity, the reflected flux per area
     #[arg(long, value_name = "DIR", help_heading = "Output")]
     radiosity: Option<PathBuf>,
 
@@ -80,13 +81,13 @@ pub(super) struct RunArgs {
     photons: Option<u32>,
     /// Number of rounds, whose photons are summed [default: 1; 100 with --preset rounds; as many as needed with --error,
     /// --time or --total-photons, 16777216 at most]
-    #[arg(long, value_name = "N", value_parser = parse_integer::<u32>, allow_hyphen_values = true, help_heading = "Photons")]
+    #[arg(long, value_name = "N", value_parser = parse_within(1..=u32::MAX), allow_hyphen_values = true, help_heading = "Photons")]
     rounds: Option<u32>,
     /// Maximum number of bounces of a photon [default: 15; 2 with --preset naive]
     #[arg(long, value_name = "N", value_parser = parse_integer::<u32>, allow_hyphen_values = true, help_heading = "Photons")]
     bounces: Option<u32>,
     /// Seed of the random numbers [default: 1]
-    #[arg(long, value_name = "N", value_parser = parse_integer::<u64>, allow_hyphen_values = true, help_heading = "Photons")]
+    #[arg(long, value_name = "N", value_parser = parse_within(0..=u64::MAX), allow_hyphen_values = true, help_heading = "Photons")]
     seed: Option<u64>,
     /// Random number generator [default: rand48 with the paper's 5000 photons per round, otherwise philox]
     #[arg(long, value_enum, value_name = "GENERATOR", help_heading = "Photons")]
@@ -106,31 +107,31 @@ pub(super) struct RunArgs {
     /// Texels along each side of a wall [default: 64]
     #[arg(long, value_name = "N", value_parser = parse_integer::<u32>, allow_hyphen_values = true, help_heading = "Density estimate")]
     mesh: Option<u32>,
-    /// Divide by the area of the disc that lies on the wall, for irradiance and radiosity; the paper's illumination is not
-    /// corrected [default: on]
+    /// Divide by the part of the search disc that lies on the wall, not by the whole disc, for irradiance and radiosity; the
+    /// paper's illumination stays uncorrected [default: on]
     #[arg(long, value_enum, value_name = "SWITCH", help_heading = "Density estimate")]
     edge_correction: Option<SwitchArg>,
 
     /// Builder of the photon map; all GPU builders give bit-identical results [default: atomic; naive with --preset naive]
     #[arg(long, value_enum, value_name = "BUILDER", help_heading = "Implementation")]
     variant: Option<VariantArg>,
-    /// Search for photons near a point; all give bit-identical results [default: grid]
+    /// How photons near a point are found; all give bit-identical results [default: grid]
     #[arg(long, value_enum, value_name = "SEARCH", help_heading = "Implementation")]
     gather: Option<GatherArg>,
-    /// Arithmetic [default: fast]
+    /// Rounding of the arithmetic [default: fast]
     #[arg(long, value_enum, value_name = "ROUNDING", help_heading = "Implementation")]
     math: Option<MathArg>,
-    /// Numbers in which the film sums [default: integer]
+    /// Number format of the film's sums [default: integer]
     #[arg(long, value_enum, value_name = "NUMBERS", help_heading = "Implementation")]
     sums: Option<SumsArg>,
-    /// Most photons traced at once; the result is bit-identical [default: what fits on the device]
+    /// Most photons traced at once; the result is the same to the bit [default: what fits on the device]
     #[arg(long, value_name = "N", value_parser = parse_integer::<u32>, allow_hyphen_values = true, help_heading = "Implementation")]
     chunk: Option<u32>,
     /// Invocations per work group, a power of two [default: 128]
     #[arg(long, value_name = "N", value_parser = parse_integer::<u32>, allow_hyphen_values = true, help_heading = "Implementation")]
     group_size: Option<u32>,
     /// Counters of --variant atomic, a power of two up to 64, which work groups use round-robin; the result is
-    /// bit-identical [default: 1; on a GPU 8 from two million photons at once]
+    /// the same to the bit [default: 1; on a GPU 8 from two million photons at once]
     #[arg(long, value_name = "N", value_parser = parse_integer::<u32>, allow_hyphen_values = true, help_heading = "Implementation")]
     counters: Option<u32>,
     /// Threads of --variant cpu, or `all` [default: 1, as in the paper]
@@ -190,7 +191,7 @@ value_enum!(RngArg => Rng {
     Sobol,
 });
 value_enum!(GatherArg => Gather {
-    /// Test every photon, as the paper does
+    /// Test every photon, as in the paper
     Brute,
     /// A sorted uniform grid; the CPU builder splats photons onto texels instead
     Grid,
@@ -342,7 +343,7 @@ pub(super) fn run(args: &RunArgs, cancelled: &AtomicBool) -> Result<End> {
     };
     let settings = Settings { stop: Stop { bias: before.map(|bias| bias.upper), ..settings.stop }, ..settings };
     reporter.status("making the pipelines");
-    let mut control = Control { cancelled, progress: &mut |progress| reporter.report(progress, "photons") };
+    let mut control = Control { cancelled, progress: &mut |progress| reporter.report(progress, "photon") };
     let mut outcome = match &gpu {
         Some(gpu) => render::on_gpu(gpu, &scene, &settings, &mut control)?,
         None => render::on_cpu(&scene, &settings, &mut control)?,
@@ -377,8 +378,10 @@ fn announce(reporter: &ProgressReporter, gpu: Option<&Gpu>, scene: &RoomScene, s
     let Settings { variant, rounds, photons, bounces, radius, mesh, .. } = settings;
     let up_to = if settings.stop.is_set() { "up to " } else { "" };
     reporter.note(&format!(
-        "plan: open box, {} builder, {up_to}{rounds} round(s) of {photons} photons, {bounces} bounces; radius {radius} m; {mesh} x {mesh} texels per wall; {memory}{}",
+        "plan: open box, {} builder, {up_to}{} of {photons} photons, {}; radius {radius} m; {mesh} x {mesh} texels per wall; {memory}{}",
         variant.name(),
+        counted(rounds, "round"),
+        counted(bounces, "bounce"),
         goals(&settings.stop)
     ));
     Ok(())
@@ -416,7 +419,7 @@ fn show_photon(args: &RunArgs, settings: &Settings, scene: &RoomScene, name: Pho
         let (wall, p) = (name_of(photon.wall), photon.position);
         say(&format!("{:>6} {wall:<8} {:>10.6} {:>10.6} {:>10.6} {:>10.6}", photon.bounce + 1, p.x, p.y, p.z, photon.weight))?;
     }
-    say(&format!("stored {} time(s), then it {}", path.stored.len(), path.fate))?;
+    say(&format!("stored {}, then it {}", counted(path.stored.len(), "time"), path.fate))?;
     if let Some(oddities) = &path.oddities {
         say(&oddities.text())?;
     }

@@ -26,7 +26,7 @@ pub(super) fn run(args: &SelfcheckArgs, cancelled: &AtomicBool) -> Result<End> {
     let reporter = ProgressReporter::new(&args.progress);
     let gpu = args.device.open(&args.device.options())?;
     reporter.device(gpu.as_ref());
-    let device = gpu.as_ref().map_or("CPU".to_owned(), |gpu| format!("{}, {}", gpu.facts().name, gpu.facts().driver));
+    let device = gpu.as_ref().map_or("CPU".to_owned(), |gpu| gpu.facts().label());
     let began = Instant::now();
     // Where standard output is the JSON there is no table.
     let has_table = !json.as_ref().is_some_and(Destination::is_standard_output);

@@ -2,17 +2,18 @@
 
 use clap::Args;
 
-use super::parse::{parse_integer, parse_percent, parse_seconds};
+use super::parse::{parse_percent, parse_seconds, parse_within};
 use super::progress::ProgressReporter;
 use crate::bias::Bias;
 use crate::error::{Error, Result};
 use crate::settings::stop::Stop;
+use crate::text::counted;
 
 #[derive(Args)]
 #[command(next_help_heading = "When to stop")]
 pub(super) struct StopArgs {
-    /// Stop when the relative error of the result (RMSE over root mean square) is at most this many per cent:
-    /// 2% and 2 are the same
+    /// Stop once the relative error of the result (RMSE over the root mean square of the result) is at most this: 2% (2 is the
+    /// same)
     #[arg(long, value_name = "PERCENT", value_parser = parse_percent, allow_hyphen_values = true)]
     error: Option<f64>,
     /// Confidence level of the error bound [default: 95%]
@@ -22,9 +23,9 @@ pub(super) struct StopArgs {
     #[arg(long, value_name = "TIME", value_parser = parse_seconds, allow_hyphen_values = true)]
     time: Option<f64>,
     /// Stop once this many photons have been traced, summed over all rounds and maps
-    #[arg(long, value_name = "N", value_parser = parse_integer::<u64>, allow_hyphen_values = true)]
+    #[arg(long, value_name = "N", value_parser = parse_within(1..=u64::MAX), allow_hyphen_values = true)]
     total_photons: Option<u64>,
-    /// Also measure the bias of the density estimate, in extra runs; with --error it counts as part of the error
+    /// Also measure the bias, which is the blur by the search radius, in extra runs; with --error it counts as part of the error
     #[arg(long)]
     pub(super) bias: bool,
 }
@@ -49,7 +50,7 @@ pub(super) fn goals(stop: &Stop) -> String {
     let percent = |share: f64| format!("{} %", (share * 1e14).round() / 1e12);
     goals.extend(stop.error.map(|error| format!("an error of {} ({} confidence)", percent(error), percent(stop.confidence))));
     goals.extend(stop.seconds.map(|seconds| format!("{seconds} s")));
-    goals.extend(stop.photons.map(|photons| format!("{photons} photons")));
+    goals.extend(stop.photons.map(|photons| counted(photons, "photon")));
     if goals.is_empty() { String::new() } else { format!("; stops at {}", goals.join(" or ")) }
 }
 
@@ -73,7 +74,7 @@ pub(super) fn bias_before(
 ) -> Result<Option<Bias>> {
     let mut rounds = FIRST_ROUNDS;
     for refinement in 0..=REFINEMENTS {
-        reporter.step(&format!("measuring the bias first: {} batches of {rounds} round(s) at two radii", crate::bias::BATCHES));
+        reporter.step(&format!("measuring the bias first: {} batches of {} at two radii", crate::bias::BATCHES, counted(rounds, "round")));
         let Some(bias) = measure(rounds)? else { return Ok(None) };
         // More than half of the error wanted is then left for noise.
         let is_decided = bias.upper <= 0.85 * wanted || bias.lower > wanted || refinement == REFINEMENTS;

@@ -6,7 +6,7 @@ use std::time::Duration;
 
 use clap::Args;
 
-use super::parse::{parse_integer, parse_seconds};
+use super::parse::{parse_integer, parse_seconds, parse_within};
 use super::progress::{ProgressArgs, ProgressReporter};
 use super::{DeviceArgs, End, complain, help, say};
 use crate::error::{Error, Result};
@@ -25,7 +25,7 @@ pub(super) struct StudyArgs {
     /// Time of all measurements together, without the reference: 90s, 10m
     #[arg(long, value_name = "TIME", value_parser = parse_seconds, allow_hyphen_values = true, default_value = "2m", help_heading = "When to stop")]
     budget: f64,
-    /// Runs of every point, whose spread is the error of the findings
+    /// Runs of every setting and number of rounds; their spread gives the confidence intervals
     #[arg(long, value_name = "N", value_parser = parse_integer::<u32>, allow_hyphen_values = true, default_value = "5", help_heading = "Measurements")]
     repeats: u32,
     /// Pixels along each side of the picture, or texels along each side of a wall of the open box [default: 48; 12 on a CPU]
@@ -37,11 +37,11 @@ pub(super) struct StudyArgs {
     /// Photons per round [default: 262144; 8192 on a CPU]
     #[arg(long, value_name = "N", value_parser = parse_integer::<u32>, allow_hyphen_values = true, help_heading = "Photons")]
     photons: Option<u32>,
-    /// Rounds of the longest point, even if time is left
+    /// Most rounds of a run, even if time is left
     #[arg(long, value_name = "N", value_parser = parse_integer::<u32>, allow_hyphen_values = true, default_value_t = study::MOST_ROUNDS, help_heading = "Photons")]
     rounds: u32,
-    /// Seed of the first run of every point
-    #[arg(long, value_name = "N", value_parser = parse_integer::<u64>, allow_hyphen_values = true, default_value = "1", help_heading = "Photons")]
+    /// Seed of the first run of every setting; the next runs take the next seeds
+    #[arg(long, value_name = "N", value_parser = parse_within(0..=MAX_SEED), allow_hyphen_values = true, default_value = "1", help_heading = "Photons")]
     seed: u64,
     #[command(flatten)]
     progress: ProgressArgs,
@@ -101,6 +101,8 @@ pub(super) fn run(args: &StudyArgs, cancelled: &AtomicBool) -> Result<End> {
     Ok(if study.complete { End::Finished } else { End::Cancelled })
 }
 
+/// srand48 takes 32 bits, and each run has a seed of its own.
+const MAX_SEED: u64 = u32::MAX as u64 - 1000;
 /// Of all runs of a choice, a gigabyte in all.
 const MAX_HELD: u64 = 1 << 27;
 
@@ -116,7 +118,6 @@ impl StudyArgs {
         within("--photons", u64::from(self.photons.unwrap_or(8192)), 64..=1 << 28, "photons per round")?;
         within("--rounds", u64::from(self.rounds), 1..=u64::from(study::MOST_ROUNDS), "rounds of the longest point")?;
         within("--repeats", u64::from(self.repeats), 2..=1000, "runs of a point, whose spread is its error")?;
-        within("--seed", self.seed, 0..=u64::from(u32::MAX) - 1000, "srand48 takes 32 bits")?;
         within("--reference-samples", u64::from(self.reference_samples), 16..=1 << 24, "samples per pixel")?;
         let held = 3 * u64::from(self.side.unwrap_or(48)).pow(2) * u64::from(self.repeats);
         if held > MAX_HELD {

@@ -6,7 +6,7 @@ use std::sync::atomic::AtomicBool;
 use clap::{Args, ValueEnum};
 
 use super::interrupt::interruptible;
-use super::parse::{parse_colour, parse_integer, parse_number};
+use super::parse::{parse_colour, parse_integer, parse_number, parse_within};
 use super::progress::{ProgressArgs, ProgressReporter};
 use super::run::{MathArg, SwitchArg, value_enum};
 use super::stop::{StopArgs, bias_before, goals, rounds_after};
@@ -25,6 +25,7 @@ use crate::scene::light::{Light, LightKind};
 use crate::scene::{Camera, Scene};
 use crate::settings::Math;
 use crate::settings::transport::{Append, Effect, Filter, Illumination, Kernel, MAX_ROUNDS, Part, Stop, TransportSettings};
+use crate::text::counted;
 use crate::transport::{self, Lit, View};
 
 #[derive(Args)]
@@ -58,7 +59,7 @@ pub(super) struct TransportArgs {
     #[arg(long, value_name = "N", value_parser = parse_integer::<u32>, allow_hyphen_values = true, help_heading = "Photons")]
     bounces: Option<u32>,
     /// Seed of the random numbers [default: 1]
-    #[arg(long, value_name = "N", value_parser = parse_integer::<u64>, allow_hyphen_values = true, help_heading = "Photons")]
+    #[arg(long, value_name = "N", value_parser = parse_within(0..=u64::MAX), allow_hyphen_values = true, help_heading = "Photons")]
     seed: Option<u64>,
     /// Emit photons of the caustic map only towards mirrors and glass (projection maps) [default: on]
     #[arg(long, value_enum, value_name = "SWITCH", help_heading = "Photons")]
@@ -81,13 +82,14 @@ pub(super) struct TransportArgs {
     without: Vec<EffectArg>,
 
     /// Radius of the density estimate of the global map in the first round, metres [default: from a trial round,
-    /// so that about 24 photons lie within it around the median of the points asked about]
+    /// so that about 24 photons of a round lie within it at the median pixel, texel or point]
     #[arg(long, value_name = "METRES", value_parser = parse_number::<f64>, allow_hyphen_values = true, help_heading = "Density estimate")]
     radius: Option<f64>,
-    /// The same for the caustic map [default: from the same trial round, for 6 photons]
+    /// The same for the caustic map [default: from the same trial round, for about 6 photons]
     #[arg(long, value_name = "METRES", value_parser = parse_number::<f64>, allow_hyphen_values = true, help_heading = "Density estimate")]
     caustic_radius: Option<f64>,
-    /// How slowly the radius shrinks from round to round (Knaus and Zwicker 2011): above 0, and 1 keeps it [default: 0.667]
+    /// How the radius shrinks from round to round, as alpha of Knaus and Zwicker (2011): above 0 and at most 1, which keeps the
+    /// radius [default: 0.667]
     #[arg(long, value_name = "ALPHA", value_parser = parse_number::<f64>, allow_hyphen_values = true, help_heading = "Density estimate", conflicts_with = "fixed_radius")]
     alpha: Option<f64>,
     /// Keep the radius, like `--alpha 1`
@@ -96,24 +98,24 @@ pub(super) struct TransportArgs {
     /// Kernel of the density estimate: weight of a photon by its distance [default: box]
     #[arg(long, value_enum, value_name = "KERNEL", help_heading = "Density estimate")]
     kernel: Option<KernelArg>,
-    /// Divide by the area within the radius that lies on the surface [default: on]
+    /// Divide by the part of the search disc that lies on the surface, not by the whole disc [default: on]
     #[arg(long, value_enum, value_name = "SWITCH", help_heading = "Density estimate")]
     edge_correction: Option<SwitchArg>,
 
     /// Builder of the photon maps; all give bit-identical results [default: auto]
     #[arg(long, value_enum, value_name = "BUILDER", help_heading = "Implementation")]
     variant: Option<AppendArg>,
-    /// Arithmetic [default: fast]
+    /// Rounding of the arithmetic [default: fast]
     #[arg(long, value_enum, value_name = "ROUNDING", help_heading = "Implementation")]
     math: Option<MathArg>,
-    /// Most photons traced at once; the result is bit-identical [default: what fits on the device]
+    /// Most photons traced at once; the result is the same to the bit [default: what fits on the device]
     #[arg(long, value_name = "N", value_parser = parse_integer::<u32>, allow_hyphen_values = true, help_heading = "Implementation")]
     chunk: Option<u32>,
     /// Invocations per work group, a power of two [default: 128]
     #[arg(long, value_name = "N", value_parser = parse_integer::<u32>, allow_hyphen_values = true, help_heading = "Implementation")]
     group_size: Option<u32>,
 
-    /// Detect NaN and infinity, and print which photon or pixel they come from
+    /// Detect NaN and infinity, and print which photon, pixel, texel or point they come from
     #[arg(long, help_heading = "Checks")]
     paranoid: bool,
 }
@@ -173,14 +175,15 @@ value_enum!(FilterArg => Filter {
     Gaussian,
 });
 value_enum!(PartArg => Part {
+    /// The whole picture
     All,
-    /// Emission that is seen directly, and surfaces lit by lights directly
+    /// Lamps that are seen directly, and what lamps light directly
     Direct,
     /// Everything that is seen in mirrors and through glass
     Specular,
-    /// Light that reached what the camera sees over mirrors and glass only
+    /// Light that came from lamps through glass or over mirrors to the surface that is seen
     Caustic,
-    /// Light that was scattered before
+    /// Light that other surfaces scattered onto the surface that is seen
     Indirect,
 });
 value_enum!(EffectArg => Effect {
@@ -288,13 +291,15 @@ pub(super) struct Job<'a> {
     pub(super) sensor: Sensor,
     pub(super) camera: Option<&'a Camera>,
     pub(super) phases: &'a [Vec<Receiver>],
+    /// What results are of: pixel, texel or point.
+    pub(super) point: &'static str,
 }
 
 /// The plan of a job, its default radii from a trial round.
 pub(super) fn plan(gpu: &Gpu, job: &Job, geometry: &Geometry) -> Result<TransportPlan> {
     let view = View { geometry, camera: job.camera, phases: job.phases };
     let plan = transport::trial::plan(gpu, job.scene, &view, job.settings, job.sensor)?;
-    if let Some(warning) = light_report::radius_warning(&plan, geometry) {
+    if let Some(warning) = light_report::radius_warning(&plan, geometry, job.point) {
         complain(&format!("warning: {warning}"));
     }
     Ok(plan)
@@ -302,13 +307,11 @@ pub(super) fn plan(gpu: &Gpu, job: &Job, geometry: &Geometry) -> Result<Transpor
 
 /// Geometry of a scene without the effects that are left out.
 pub(super) fn geometry(scene: &Scene, settings: &TransportSettings, reporter: &ProgressReporter) -> Result<Geometry> {
-    let what = format!("{} triangles", scene.triangle_count());
+    let what = format!("{} ({})", scene.name, counted(scene.triangle_count(), "triangle"));
     let geometry = Geometry::new_with(&scene.without(&settings.without), &mut stages(&what, reporter))?;
     if geometry.left_out > 0 {
-        complain(&format!(
-            "warning: {} triangle(s) have no area in single precision, or lie on others, and are left out",
-            geometry.left_out
-        ));
+        let count = counted(geometry.left_out, "triangle");
+        complain(&format!("warning: {count} without area in single precision, or on others, left out"));
     }
     geometry.overlap_warnings(scene).iter().for_each(|line| complain(&format!("warning: {line}")));
     Ok(geometry)
@@ -329,11 +332,11 @@ fn stages<'a>(what: &'a str, reporter: &'a ProgressReporter) -> impl FnMut(&'sta
 fn announce(job: &Job, geometry: &Geometry, plan: &TransportPlan, reporter: &ProgressReporter) {
     let what = match plan.sensor {
         Sensor::Picture { width, height } => format!("{width} x {height} pixels"),
-        Sensor::Receivers { count } => format!("{count} point(s)"),
+        Sensor::Receivers { count } => counted(count, job.point),
     };
-    let maps: Vec<String> = plan.maps().map(|map| format!("{} {} photons", map.photons, map.name)).collect();
+    let maps: Vec<String> = plan.maps().map(|map| counted(map.photons, &format!("{} photon", map.name))).collect();
     let radii: Vec<String> = plan.maps().map(|map| format!("{:.4} m ({})", map.radius * geometry.unit, map.name)).collect();
-    let rounds = plan.settings.rounds;
+    let rounds = counted(plan.settings.rounds, "round");
     let up_to = if plan.settings.stop.is_set() { "up to " } else { "" };
     let (maps, radius) = if maps.is_empty() {
         ("no photons".to_owned(), String::new())
@@ -341,7 +344,7 @@ fn announce(job: &Job, geometry: &Geometry, plan: &TransportPlan, reporter: &Pro
         (maps.join(" and "), format!("; first radius {}", radii.join(", ")))
     };
     reporter.note(&format!(
-        "plan: {}, {what}; {up_to}{rounds} round(s) of {maps}{radius}; {:.1} MiB on the device{}",
+        "plan: {}, {what}; {up_to}{rounds} of {maps}{radius}; {:.1} MiB on the device{}",
         job.scene.name,
         plan.bytes as f64 / f64::from(1 << 20),
         goals(&plan.settings.stop)
@@ -373,11 +376,11 @@ pub(super) fn light(
     plan.settings.stop.bias = before.map(|bias| bias.upper);
 
     reporter.status("making the pipelines");
-    let mut report = |progress: &Progress| reporter.report(progress, "rounds");
+    let mut report = |progress: &Progress| reporter.report(progress, "round");
     let mut control = Control { cancelled, progress: &mut report };
     let mut lit = interruptible(|| transport::light(gpu, &view, plan, &mut control))?;
     if lit.end == transport::End::Cancelled {
-        complain(&format!("ended after {} of {} rounds; the results are of these", lit.film.rounds, lit.plan.settings.rounds));
+        complain(&format!("ended early: the results are of {} of {}", counted(lit.film.rounds, "round"), lit.plan.settings.rounds));
         return Ok(lit);
     }
     let shrunk = mean_squared_radius(alpha, lit.film.rounds);

@@ -1,16 +1,20 @@
 //! Complaints about the command line, as one sentence with option, value as typed, and what is allowed.
 
+use std::ffi::OsString;
+
 use clap::error::{ContextKind, ContextValue, ErrorKind};
 use clap::parser::ValueSource;
-use clap::{ArgMatches, Command};
+use clap::{Arg, ArgMatches, Command};
 
 use crate::error::Error;
+use crate::output::words::list;
 use crate::scene::built_in;
+use crate::text::echo;
 
 /// What clap complains of, in one line.
-pub(super) fn one_line(error: &clap::Error) -> String {
+pub(super) fn one_line(error: &clap::Error, command: &Command, arguments: &[OsString]) -> String {
     let context = |kind: ContextKind| match error.get(kind) {
-        Some(ContextValue::String(text)) => text.clone(),
+        Some(ContextValue::String(text)) => echo(text),
         Some(ContextValue::Strings(texts)) => texts.join(", "),
         _ => String::new(),
     };
@@ -35,18 +39,45 @@ pub(super) fn one_line(error: &clap::Error) -> String {
             format!("{option} {value}: {reason}")
         }
         ErrorKind::UnknownArgument => scene_without_command(&argument)
+            .or_else(|| of_other_commands(&argument, command))
             .unwrap_or_else(|| format!("{argument}: no such option; {}see --help", similar(ContextKind::SuggestedArg))),
+        ErrorKind::MissingRequiredArgument => {
+            let used = arguments.iter().find_map(|argument| command.find_subcommand(argument)).unwrap_or(command);
+            let missing = match error.get(ContextKind::InvalidArg) {
+                Some(ContextValue::Strings(names)) => names.join(" and "),
+                _ => argument,
+            };
+            let help = used.get_after_help().map(ToString::to_string).unwrap_or_default();
+            let example = help.lines().nth(1).unwrap_or_default().trim();
+            format!("required: {missing}; for example: {example}")
+        }
         ErrorKind::InvalidSubcommand => {
             let name = context(ContextKind::InvalidSubcommand);
             scene_without_command(&name)
                 .unwrap_or_else(|| format!("{name}: no such command; {}see --help", similar(ContextKind::SuggestedSubcommand)))
         }
-        _ => scene_without_command(&context(ContextKind::InvalidSubcommand)).unwrap_or_else(|| {
+        _ => {
+            let name = context(ContextKind::InvalidSubcommand);
             let rendered = error.render().to_string();
-            let sentence: Vec<&str> = rendered.lines().take_while(|line| !line.is_empty()).map(str::trim).collect();
-            sentence.join(" ").trim_start_matches("error: ").to_owned()
-        }),
+            let sentence = rendered.lines().take_while(|line| !line.is_empty()).flat_map(str::split_whitespace).skip(1);
+            match scene_without_command(&name) {
+                Some(meant) => meant,
+                None if !name.is_empty() => {
+                    format!("{name}: options stand after the command: photonmill {name} ... {}", context(ContextKind::PriorArg))
+                }
+                None => sentence.map(echo).collect::<Vec<_>>().join(" "),
+            }
+        }
     }
+}
+
+/// Where an option belongs that this command does not know.
+fn of_other_commands(option: &str, command: &Command) -> Option<String> {
+    let knows = |command: &&Command| command.get_arguments().filter_map(Arg::get_long).any(|long| option.strip_prefix("--") == Some(long));
+    let main = knows(&command).then_some("photonmill without a command");
+    let names: Vec<String> = command.get_subcommands().filter(knows).map(Command::get_name).chain(main).map(str::to_owned).collect();
+    let first = command.get_subcommands().find(knows).map_or_else(String::new, |first| format!("{} ", first.get_name()));
+    (!names.is_empty()).then(|| format!("{option}: is an option of {}; see photonmill {first}--help", list(&names)))
 }
 
 /// What to type for a scene that stands where a command is expected.

@@ -18,7 +18,7 @@ pub struct DeviceFacts {
     pub name: String,
     /// discrete, integrated, virtual, cpu or other.
     pub kind: &'static str,
-    /// Name and version, as the driver calls itself.
+    /// Name and version, as the driver calls itself, without the words of the device's name.
     pub driver: String,
     pub vulkan: String,
     pub subgroup_size: u32,
@@ -40,6 +40,13 @@ pub struct DeviceFacts {
     pub(super) queue_family: u32,
     #[serde(skip)]
     pub(super) pipeline_cache_id: String,
+}
+
+impl DeviceFacts {
+    /// Name and driver.
+    pub fn label(&self) -> String {
+        format!("{}, driver {}", self.name, self.driver)
+    }
 }
 
 /// Loads the Vulkan loader at run time and makes an instance.
@@ -185,10 +192,15 @@ fn facts(instance: &ash::Instance, device: vk::PhysicalDevice, index: usize) -> 
 
     let version = |v: u32| format!("{}.{}.{}", vk::api_version_major(v), vk::api_version_minor(v), vk::api_version_patch(v));
     let text = |name: std::result::Result<&CStr, _>| name.map(|name: &CStr| name.to_string_lossy().into_owned()).unwrap_or_default();
+    let name = text(properties.device_name_as_c_str());
+    let driver = format!("{} {}", text(v12.driver_name_as_c_str()), text(v12.driver_info_as_c_str()));
+    let is_new = |word: &&str| !name.to_lowercase().contains(&word.to_lowercase().replace(['(', ')', ','], ""));
+    let driver: Vec<&str> = driver.split_whitespace().filter(is_new).collect();
     let heaps = &memory.memory_heaps[..memory.memory_heap_count as usize];
     DeviceFacts {
         index,
-        name: properties.device_name_as_c_str().map(|name| name.to_string_lossy().into_owned()).unwrap_or_default(),
+        driver: driver.join(" "),
+        name,
         kind: match properties.device_type {
             vk::PhysicalDeviceType::DISCRETE_GPU => "discrete",
             vk::PhysicalDeviceType::INTEGRATED_GPU => "integrated",
@@ -196,7 +208,6 @@ fn facts(instance: &ash::Instance, device: vk::PhysicalDevice, index: usize) -> 
             vk::PhysicalDeviceType::CPU => "cpu",
             _ => "other",
         },
-        driver: format!("{} {}", text(v12.driver_name_as_c_str()), text(v12.driver_info_as_c_str())).trim().to_owned(),
         vulkan: version(properties.api_version),
         subgroup_size: v11.subgroup_size,
         storage_buffer_range_bytes: u64::from(limits.max_storage_buffer_range),

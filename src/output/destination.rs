@@ -77,7 +77,10 @@ impl Folder {
         if path.exists() && !path.is_dir() {
             return Err(refuse("it is not a folder".into()));
         }
-        if path.as_os_str().is_empty() || path == Path::new("-") {
+        if path == Path::new("-") {
+            return Err(refuse("it is standard output, and several files are written".into()));
+        }
+        if path.as_os_str().is_empty() {
             return Err(refuse("it names no folder".into()));
         }
         let nearest = path.ancestors().find(|ancestor| ancestor.is_dir()).unwrap_or(Path::new("."));
@@ -111,7 +114,12 @@ pub fn check_distinct(destinations: &[Destination]) -> Result<()> {
         let place = std::fs::canonicalize(parent(&target)).unwrap_or_else(|_| parent(&target).to_owned());
         let file = place.join(target.file_name().unwrap_or_default());
         if let Some(first) = seen.insert(file, destination) {
-            return Err(destination.refuse(format!("{} writes it too", first.option)));
+            return Err(if destination.is_standard_output() {
+                let allowed = format!("{} - already is standard output; name a file for one of the two", first.option);
+                Error::setting(destination.option, "-", allowed)
+            } else {
+                destination.refuse(format!("{} writes it too", first.option))
+            });
         }
     }
     Ok(())

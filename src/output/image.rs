@@ -35,7 +35,7 @@ impl Format {
         match path.extension().and_then(|extension| extension.to_str()).map(str::to_lowercase).as_deref() {
             Some("png") => Ok(Format::Png),
             Some("exr") => Ok(Format::Exr),
-            _ => Err(Error::setting(option, path.display(), "must end in .png or .exr")),
+            _ => Err(Error::setting(option, path.display(), "must be a file name that ends in .png or .exr")),
         }
     }
 }

@@ -14,6 +14,7 @@ use crate::plan::evidence::EffectDecision;
 use crate::plan::transport::{MapPlan, RadiusFrom, Sensor, TransportPlan, Trial};
 use crate::scene::geometry::Geometry;
 use crate::settings::transport::{Effect, TransportSettings};
+use crate::text::counted;
 use crate::timings::{Row, Timings};
 use crate::transport::stop::error_bound;
 use crate::transport::{End, Lit};
@@ -99,15 +100,15 @@ pub fn missing(plan: &TransportPlan) -> Option<String> {
 const TOO_WIDE: f64 = 0.1;
 
 /// One line on a radius by a trial round that is wider than what many points lie in.
-pub fn radius_warning(plan: &TransportPlan, geometry: &Geometry) -> Option<String> {
+pub fn radius_warning(plan: &TransportPlan, geometry: &Geometry, point: &str) -> Option<String> {
     let trial = plan.trial.as_ref().filter(|trial| trial.too_wide > TOO_WIDE)?;
     let widest = plan.maps().filter(|map| map.radius_from == RadiusFrom::Trial).max_by(|a, b| a.radius.total_cmp(&b.radius))?;
     let option = if widest.caustic_only { "--caustic-radius" } else { "--radius" };
     Some(format!(
-        "the radius of the {} map, {:.3} m, is wider than what {:.0} % of the points lie in, so that their light is blurred; more photons or a smaller {option} helps",
+        "at {:.0} % of the {point}s the next wall or edge is nearer than the search radius of the {} map, {:.3} m, so the light there will be blurred; for a sharper result use more --photons or a smaller {option}",
+        100.0 * trial.too_wide,
         widest.name,
-        widest.radius * geometry.unit,
-        100.0 * trial.too_wide
+        widest.radius * geometry.unit
     ))
 }
 
@@ -122,8 +123,7 @@ struct Report<'a> {
     plan: PlanReport<'a>,
     end: End,
     rounds: u32,
-    /// Of the global map's photons and of the caustic map's.
-    ledgers: [Ledger; 2],
+    ledgers: Ledgers,
     /// Light that limits kept from the result.
     losses: Losses,
     /// Root mean square of the standard errors over that of the values.
@@ -135,19 +135,28 @@ struct Report<'a> {
     unknown: Unknown,
     /// Of the radius, relative to the result; null without `--bias`.
     bias: Option<Bias>,
-    anomalies: Anomalies,
-    /// What `--paranoid` found; null where nobody looked.
-    oddities: Option<&'a Oddities>,
+    film: FilmReport,
+    /// What `--paranoid` found; null without it.
+    nonfinite_values: Option<&'a Oddities>,
     timings: &'a [Row],
     dispatches: u64,
     submissions: u64,
 }
 
+/// Of the photons of each map.
 #[derive(Serialize)]
-struct Anomalies {
-    not_a_number: u32,
-    cut_to_largest: u32,
-    too_dense: u32,
+struct Ledgers {
+    global: Ledger,
+    caustic: Ledger,
+}
+
+/// What the film could not add as it was, but for `losses`.
+#[derive(Serialize)]
+struct FilmReport {
+    /// Counted as 0.
+    nonfinite_values: u32,
+    /// Estimates that cover too many triangles for an edge correction.
+    uncorrected_estimates: u32,
 }
 
 #[derive(Serialize)]
@@ -186,14 +195,14 @@ pub fn json(scene: &str, lit: &Lit) -> Vec<u8> {
         plan: plan_report(&lit.plan, Some((&lit.timings, &lit.part_totals))),
         end: lit.end,
         rounds: lit.film.rounds,
-        ledgers: [lit.fates[0].ledger(), lit.fates[1].ledger()],
+        ledgers: Ledgers { global: lit.fates[0].ledger(), caustic: lit.fates[1].ledger() },
         losses: lit.losses,
         relative_error: lit.film.relative_error(&lit.plan),
         error_bound: Some(error_bound(&lit.film, &lit.plan, lit.plan.settings.stop.confidence)).filter(|bound| bound.is_finite()),
         unknown: lit.film.unknown(&lit.plan, lit.plan.settings.stop.confidence),
         bias: lit.bias,
-        anomalies: Anomalies { not_a_number: lit.anomalies[0], cut_to_largest: lit.anomalies[1], too_dense: lit.anomalies[2] },
-        oddities: lit.oddities.as_ref(),
+        film: FilmReport { nonfinite_values: lit.anomalies[0], uncorrected_estimates: lit.anomalies[2] },
+        nonfinite_values: lit.oddities.as_ref(),
         timings: lit.timings.rows(),
         dispatches: lit.dispatches,
         submissions: lit.submissions,
@@ -201,24 +210,28 @@ pub fn json(scene: &str, lit: &Lit) -> Vec<u8> {
     serde_json::to_vec_pretty(&report).expect("a report is plain data")
 }
 
-/// A run in words.
-pub fn text(scene: &str, lit: &Lit, explain: bool) -> String {
+/// A run in words; `point` is what its results are of: pixel, texel or point.
+pub fn text(scene: &str, lit: &Lit, point: &str, explain: bool) -> String {
     let mut text = String::new();
     let settings = &lit.plan.settings;
-    writeln!(text, "{}, {}", lit.device.name, lit.device.driver).unwrap();
-    let maps: Vec<String> = lit.plan.maps().map(|map| format!("{} {} photons", map.photons, map.name)).collect();
+    writeln!(text, "{}", lit.device.label()).unwrap();
+    let maps: Vec<String> = lit.plan.maps().map(|map| counted(map.photons, &format!("{} photon", map.name))).collect();
     let maps = if maps.is_empty() { "no photons".to_owned() } else { maps.join(" and ") };
-    let capped = if settings.bounces < MAX_BOUNCES { format!(", at most {} bounces", settings.bounces) } else { String::new() };
-    writeln!(text, "{scene}: {} round(s) of {maps}{capped}, seed {}", lit.film.rounds, settings.seed).unwrap();
+    let capped = if settings.bounces < MAX_BOUNCES { format!(", at most {}", counted(settings.bounces, "bounce")) } else { String::new() };
+    writeln!(text, "{scene}: {} of {maps}{capped}, seed {}", counted(lit.film.rounds, "round"), settings.seed).unwrap();
     if lit.film.rounds == 1 && lit.end == End::Time {
         let traced: u64 = lit.fates.iter().map(|fates| fates.emitted).sum();
         let planned: u64 = lit.plan.maps().map(|map| u64::from(map.photons)).sum();
         if traced < planned {
-            writeln!(text, "time was up in the first round: it has {traced} of {planned} photons").unwrap();
+            writeln!(
+                text,
+                "time was up in the first round, after {traced} of {planned} photons, so the result is noisy and its error unknown; use fewer --photons, so that several rounds fit into --time"
+            )
+            .unwrap();
         }
     }
     if let Some(why) = end_in_words(lit.end, &settings.stop) {
-        writeln!(text, "ended {why}, {} of at most {} rounds", lit.film.rounds, settings.rounds).unwrap();
+        writeln!(text, "ended {why}: {} of at most {}", counted(lit.film.rounds, "round"), settings.rounds).unwrap();
     }
     if explain {
         writeln!(text, "\n{}", plan_table(&lit.plan, Some((&lit.timings, &lit.part_totals)))).unwrap();
@@ -235,12 +248,11 @@ pub fn text(scene: &str, lit: &Lit, explain: bool) -> String {
     }
     text.push_str(&losses(&lit.losses, settings.bounces));
     if lit.anomalies[0] > 0 {
-        writeln!(text, "warning: {} value(s) were no number and count as 0", lit.anomalies[0]).unwrap();
+        writeln!(text, "warning: {} (NaN or infinity), added as 0", counted(lit.anomalies[0], "nonfinite value")).unwrap();
     }
     if lit.anomalies[2] > 0 {
-        let count = lit.anomalies[2];
-        writeln!(text, "warning: {count} estimate(s) cover too many triangles for an edge correction; a smaller --radius mends it")
-            .unwrap();
+        let count = counted(lit.anomalies[2], "estimate");
+        writeln!(text, "warning: no edge correction for {count} over too many triangles; a smaller --radius mends it").unwrap();
     }
     if let Some(oddities) = &lit.oddities {
         writeln!(text, "{}", oddities.text()).unwrap();
@@ -248,9 +260,9 @@ pub fn text(scene: &str, lit: &Lit, explain: bool) -> String {
     let noise = (lit.film.rounds > 1).then(|| lit.film.relative_error(&lit.plan));
     let unknown = lit.film.unknown(&lit.plan, settings.stop.confidence);
     text.push_str(&errors(lit.film.rounds, noise, &unknown, lit.bias.as_ref(), lit.losses.relative, settings.stop.confidence));
-    let (point, unit) = match lit.plan.sensor {
-        Sensor::Picture { .. } => ("pixel", "W/m2/sr"),
-        Sensor::Receivers { .. } => ("point", "W/m2"),
+    let unit = match lit.plan.sensor {
+        Sensor::Picture { .. } => "W/m2/sr",
+        Sensor::Receivers { .. } => "W/m2",
     };
     text.push_str(&unknown.text(point, unit, settings.stop.confidence, lit.film.rounds));
     text.push('\n');

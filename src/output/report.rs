@@ -15,6 +15,7 @@ use crate::render::Outcome;
 use crate::render::stop::{End, error_bound};
 use crate::settings::Settings;
 use crate::settings::stop::Stop;
+use crate::text::counted;
 use crate::timings::{Row, Timings};
 use crate::unknown::Unknown;
 
@@ -53,7 +54,7 @@ struct Report<'a> {
     submissions: u64,
     walls: Vec<WallReport>,
     /// Nonfinite values that `--paranoid` found; null without it.
-    oddities: Option<&'a Oddities>,
+    nonfinite_values: Option<&'a Oddities>,
 }
 
 #[derive(Serialize)]
@@ -129,7 +130,7 @@ pub fn json(outcome: &Outcome, walls: &[WallEstimate], unknown: &Unknown) -> Vec
                 radiosity: mean(&wall.radiosity),
             })
             .collect(),
-        oddities: outcome.oddities.as_ref(),
+        nonfinite_values: outcome.oddities.as_ref(),
     };
     serde_json::to_vec_pretty(&report).expect("a report is plain data")
 }
@@ -137,7 +138,7 @@ pub fn json(outcome: &Outcome, walls: &[WallEstimate], unknown: &Unknown) -> Vec
 fn driver(outcome: &Outcome) -> String {
     match &outcome.device {
         Some(facts) => facts.driver.clone(),
-        None => format!("photonmill on {} thread(s)", outcome.plan.settings.threads),
+        None => format!("photonmill on {}", counted(outcome.plan.settings.threads, "thread")),
     }
 }
 
@@ -171,10 +172,11 @@ pub(super) fn errors(rounds: u32, noise: Option<f64>, unknown: &Unknown, bias: O
     } else if let Some(Bias { relative, lower, upper, batches, rounds_per_batch, seconds, .. }) = bias {
         writeln!(
             text,
-            "bias of the radius: {:.2} %, from {:.2} % to {:.2} % ({sure} % confidence; measured in {seconds:.2} s from {batches} batches of {rounds_per_batch} round(s) at two radii)",
+            "bias of the radius: {:.2} %, from {:.2} % to {:.2} % ({sure} % confidence; measured in {seconds:.2} s from {batches} batches of {} at two radii)",
             percent(*relative),
             percent(*lower),
-            percent(*upper)
+            percent(*upper),
+            counted(rounds_per_batch, "round")
         )
         .unwrap();
     }
@@ -197,7 +199,7 @@ pub(super) fn errors(rounds: u32, noise: Option<f64>, unknown: &Unknown, bias: O
 pub(super) fn losses(losses: &Losses, bounces: u32) -> String {
     let emitted = losses.emitted.abs();
     let mut text = if losses.cut_off > 0.0 {
-        format!("light cut off after {bounces} bounces: {:.3e} of {emitted:.3e} W", losses.cut_off)
+        format!("light cut off after {}: {:.3e} of {emitted:.3e} W", counted(bounces, "bounce"), losses.cut_off)
     } else {
         format!("light cut off: none of {emitted:.3e} W")
     };
@@ -205,10 +207,10 @@ pub(super) fn losses(losses: &Losses, bounces: u32) -> String {
         write!(text, "; clamped at shading normals: {:.3e} W", losses.clamped).unwrap();
     }
     if losses.clamped_values > 0 {
-        write!(text, "; {} value(s) clamped to the largest that the film holds", losses.clamped_values).unwrap();
+        write!(text, "; {} clamped to the largest that the film holds", counted(losses.clamped_values, "value")).unwrap();
     }
     if losses.camera_paths > 0 {
-        write!(text, "; {} camera path(s) cut off after {MAX_BOUNCES} mirrors and panes", losses.camera_paths).unwrap();
+        write!(text, "; {} cut off after {MAX_BOUNCES} mirrors and panes", counted(losses.camera_paths, "camera path")).unwrap();
     }
     if losses.relative > 0.0 {
         write!(text, "; together at most {:.2} % of the result", 100.0 * losses.relative).unwrap();
@@ -223,7 +225,7 @@ pub(super) fn end_in_words(end: End, stop: &Stop) -> Option<String> {
         End::Rounds => stop.error.map(|error| format!("before the requested error of {} % was reached", 100.0 * error)),
         End::Error => Some("at the requested error".to_owned()),
         End::Time => Some(format!("after the requested {} s{}", stop.seconds.unwrap_or_default(), unreached(stop))),
-        End::Photons => Some(format!("at the requested {} photons{}", stop.photons.unwrap_or_default(), unreached(stop))),
+        End::Photons => Some(format!("at the requested {}{}", counted(stop.photons.unwrap_or_default(), "photon"), unreached(stop))),
     }
 }
 
@@ -235,15 +237,15 @@ fn unreached(stop: &Stop) -> String {
 pub fn text(outcome: &Outcome, walls: &[WallEstimate], unknown: &Unknown) -> String {
     let mut text = String::new();
     let settings = &outcome.plan.settings;
-    let device = outcome.device.as_ref().map_or("CPU", |facts| &facts.name);
-    writeln!(text, "{device}, {}", driver(outcome)).unwrap();
+    let device = outcome.device.as_ref().map_or_else(|| format!("CPU, {}", driver(outcome)), DeviceFacts::label);
+    writeln!(text, "{device}").unwrap();
     writeln!(
         text,
-        "open-box, {}: {} round(s) of {} photons, {} bounces, radius {} m, {} gather{}, {} sums, {} seed {}",
+        "open-box, {}: {} of {} photons, {}, radius {} m, {} gather{}, {} sums, {} seed {}",
         settings.variant.name(),
-        outcome.film.rounds.max(1),
+        counted(outcome.film.rounds.max(1), "round"),
         settings.photons,
-        settings.bounces,
+        counted(settings.bounces, "bounce"),
         settings.radius,
         format!("{:?}", settings.gather).to_lowercase(),
         settings.nearest.map_or_else(String::new, |nearest| format!(" of the {nearest} nearest")),
@@ -254,7 +256,7 @@ pub fn text(outcome: &Outcome, walls: &[WallEstimate], unknown: &Unknown) -> Str
     .unwrap();
     if let Some(why) = end_in_words(outcome.end, &settings.stop) {
         let unfinished = if outcome.film.unfinished.is_empty() { "" } else { " and part of another" };
-        writeln!(text, "ended {why}: {} round(s){unfinished} of at most {}", outcome.film.rounds, settings.rounds).unwrap();
+        writeln!(text, "ended {why}: {}{unfinished} of at most {}", counted(outcome.film.rounds, "round"), settings.rounds).unwrap();
     }
     for decision in &outcome.plan.decisions {
         let verb = if decision.kept { "with" } else { "without" };

@@ -9,6 +9,7 @@ use crate::gpu::Gpu;
 use crate::render::{self, Control, Outcome};
 use crate::scene::open_box::open_box;
 use crate::settings::{Settings, Variant};
+use crate::text::counted;
 
 /// Why no further experiment runs.
 pub enum Stop {
@@ -141,7 +142,7 @@ fn processor() -> String {
     let threads = std::thread::available_parallelism().map_or(1, usize::from);
     let listed = std::fs::read_to_string("/proc/cpuinfo").unwrap_or_default();
     let model = listed.lines().find_map(|line| line.strip_prefix("model name")?.split_once(": ").map(|(_, name)| name.trim().to_owned()));
-    format!("{}, {threads} threads", model.unwrap_or_else(|| std::env::consts::ARCH.to_owned()))
+    format!("{}, {}", model.unwrap_or_else(|| std::env::consts::ARCH.to_owned()), counted(threads, "thread"))
 }
 
 #[cfg(test)]

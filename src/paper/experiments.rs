@@ -8,6 +8,7 @@ use crate::output::words;
 use crate::render::Outcome;
 use crate::rng::Rng;
 use crate::settings::{Gather, Preset, Settings, Variant};
+use crate::text::counted;
 use crate::timings::Clock;
 use crate::timings::Spread;
 
@@ -242,8 +243,9 @@ pub fn totals(bench: &mut Bench, found: &mut Reproduction) -> Step<()> {
             let variant = bench.available(Variant::Atomic);
             let settings = Settings { variant, rounds, gather, ..at_size(Preset::Rounds, photons) };
             let title = format!(
-                "{} photons as {rounds} round(s) of {}, {} gather",
+                "{} photons as {} of {}, {} gather",
                 words::count(settings.total_photons()),
+                counted(rounds, "round"),
                 words::count(u64::from(photons)),
                 command::gather_name(gather)
             );

@@ -7,6 +7,7 @@ use crate::output::command;
 use crate::output::image::{Format, Picture, overview, view};
 use crate::scene::open_box::open_box;
 use crate::settings::{Preset, Settings};
+use crate::text::counted;
 
 pub const COUNT: usize = 4;
 
@@ -104,9 +105,7 @@ fn exhibits() -> [Exhibit; COUNT] {
             title: "1, 5, 10, 25, 50 and 100 rounds",
             caption: "From top left to bottom right. Every round adds 5000 photons. Noise decreases, but the radius (here 0.025 m) is fixed: \
                 the dark rims along the edges, where part of each disc lies beyond the wall, remain after 100 rounds.",
-            frames: published::FIGURE_4_ROUNDS
-                .map(|count| (format!("{count} {}", if count == 1 { "round" } else { "rounds" }), Preset::Rounds, rounds(count)))
-                .into(),
+            frames: published::FIGURE_4_ROUNDS.map(|count| (counted(count, "round"), Preset::Rounds, rounds(count))).into(),
             columns: 3,
         },
     ]

@@ -11,6 +11,7 @@ use super::verdicts::{self, Standing};
 use super::{Reproduction, chart, published};
 use crate::output::words::{count, duration, number, times};
 use crate::settings::{Gather, Variant};
+use crate::text::counted;
 
 pub fn html(found: &Reproduction) -> String {
     let page = html! {
@@ -148,7 +149,7 @@ fn running_times(found: &Reproduction) -> Markup {
             p {
                 "The map pass emits and traces photons; the rendering pass estimates the light at 5 × 64 × 64 points. "
                 "GPU times come from the device's timestamps, CPU times from the host's clock. "
-                "Each time is the median of up to " (found.request.repeats) " runs (up to " (found.request.repeats.min(LARGE_REPEATS)) " at the large size); the fastest and slowest run stand below it. "
+                "Each time is the median of up to " (counted(found.request.repeats, "run")) " (up to " (found.request.repeats.min(LARGE_REPEATS)) " at the large size); the fastest and slowest run stand below it. "
                 "The builders run alternately. The first run of each case creates pipelines and is not counted. "
                 "Warm-up work before each run brings the device to its full clock (" code { "--warm-up" } "). "
                 "A case that takes longer than " (PATIENCE.as_secs()) " s in all is repeated less often; if its first run alone takes that long, that run is shown. "

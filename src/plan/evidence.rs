@@ -7,6 +7,7 @@ use crate::constants::*;
 use crate::scene::geometry::Geometry;
 use crate::scene::{Material, Scene, Surface};
 use crate::settings::transport::{Effect, Illumination, Part, TransportSettings};
+use crate::text::counted;
 
 /// One effect, kept or dropped, with the evidence.
 #[derive(Debug, Clone, PartialEq, Eq, Serialize)]
@@ -90,7 +91,7 @@ impl<'a> Facts<'a> {
         let receives = !self.is_picture || self.has(|surface| !surface.is_specular());
         let lights = |kind: u32, what: &str| match self.emitters[kind as usize] {
             0 => (false, format!("no {what} light")),
-            count => (true, format!("{count} {what} light(s)")),
+            count => (true, counted(count, &format!("{what} light"))),
         };
         let caustic = |found: &Option<String>, what: &str| match found {
             None => (false, format!("no {what} material")),
@@ -107,7 +108,9 @@ impl<'a> Facts<'a> {
             Effect::Direct if self.part == Part::Caustic => (false, "only caustics were asked for".into()),
             Effect::Direct if self.part == Part::Indirect && !self.gathers => (false, "only indirect light was asked for".into()),
             Effect::Direct if self.part == Part::Indirect => (true, "final-gather rays need direct light where they end".into()),
-            Effect::Direct => (true, format!("{} light source(s), and diffuse or glossy surfaces", self.emitters.iter().sum::<usize>())),
+            Effect::Direct => {
+                (true, format!("{}, and diffuse or glossy surfaces", counted(self.emitters.iter().sum::<usize>(), "light source")))
+            }
             Effect::Indirect if !lit => (false, "no light source".into()),
             Effect::Indirect if !receives => (false, "no diffuse or glossy surface".into()),
             Effect::Indirect if !wants(Part::Indirect) => (false, format!("only {:?} light was asked for", self.part).to_lowercase()),
@@ -143,25 +146,25 @@ impl<'a> Facts<'a> {
             Effect::Environment => lights(EMITTER_ENVIRONMENT, "environment"),
             Effect::MeshLights => match self.emitters[EMITTER_TRIANGLE as usize] {
                 0 => (false, "no emissive triangle".into()),
-                count => (true, format!("{count} emissive triangle(s)")),
+                count => (true, counted(count, "emissive triangle")),
             },
             Effect::PointLights => lights(EMITTER_POINT, "point"),
             Effect::SpotLights => lights(EMITTER_SPOT, "spot"),
             Effect::DirectionalLights => lights(EMITTER_DIRECTIONAL, "directional"),
             Effect::DiscLights => match self.emitters[EMITTER_DISC_COSINE as usize] + self.emitters[EMITTER_DISC_UNIFORM as usize] {
                 0 => (false, "no disc light".into()),
-                count => (true, format!("{count} disc light(s)")),
+                count => (true, counted(count, "disc light")),
             },
             Effect::Bvh if self.triangles <= LIST_TRIANGLES => {
-                (false, format!("only {} triangles: testing each of them is as fast", self.triangles))
+                (false, format!("only {}: testing each of them is as fast", counted(self.triangles, "triangle")))
             }
-            Effect::Bvh => (true, format!("{} triangles", self.triangles)),
+            Effect::Bvh => (true, counted(self.triangles, "triangle")),
             Effect::TwoSided => match self.named(|material| material.two_sided) {
                 Some(names) => (true, format!("two-sided: {names}")),
                 None => (false, "no two-sided material".into()),
             },
             Effect::SmoothNormals if self.smooth == 0 => (false, "no smooth normals".into()),
-            Effect::SmoothNormals => (true, format!("{} triangle(s) have smooth normals", self.smooth)),
+            Effect::SmoothNormals => (true, format!("{} with smooth normals", counted(self.smooth, "triangle"))),
         }
     }
 }

@@ -23,6 +23,7 @@ use crate::constants::*;
 use crate::error::{Error, Result};
 use crate::records::{BvhNode, Emitter, SurfaceMaterial, TextureInfo, Triangle, TriangleNormals, TriangleUvs};
 use crate::settings::EmissionLaw;
+use crate::text::counted;
 
 #[derive(Debug, Clone)]
 pub struct Geometry {
@@ -227,8 +228,8 @@ impl Geometry {
         let mut lines: Vec<String> = self.overlaps.iter().take(MOST).map(line).collect();
         if self.crowded > 0 {
             lines.push(format!(
-                "{} triangle(s) lie among more than 64 others that overlap each other in one plane; light there may count more than once",
-                self.crowded
+                "{} among more than 64 others that overlap each other in one plane; light there may count more than once",
+                counted(self.crowded, "triangle")
             ));
         }
         if self.overlaps.len() > MOST {

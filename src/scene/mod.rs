@@ -64,7 +64,13 @@ impl Scene {
         let path = Path::new(name);
         match path.extension().and_then(|extension| extension.to_str()).map(str::to_lowercase).as_deref() {
             Some("gltf" | "glb") => gltf::load(path, radiometric, progress),
-            _ => Err(Error::setting("SCENE", name, format!("must be a .gltf or .glb file, or one of {}", built_in::names().join(", ")))),
+            _ => {
+                let names = built_in::names();
+                let likeness = |known: &&str| strsim::jaro(known, name);
+                let meant = names.iter().copied().max_by(|a, b| likeness(a).total_cmp(&likeness(b))).filter(|best| likeness(best) > 0.8);
+                let meant = meant.map_or_else(String::new, |meant| format!("did you mean {meant}? "));
+                Err(Error::setting("SCENE", name, format!("{meant}must be a .gltf or .glb file, or one of {}", names.join(", "))))
+            }
         }
     }
 

@@ -14,6 +14,7 @@ use crate::scene::light::LightKind;
 use crate::scene::{Camera, Scene};
 use crate::settings::EmissionLaw;
 use crate::settings::transport::{Append, Illumination, TransportSettings};
+use crate::text::counted;
 
 const BOTH: [Illumination; 2] = [Illumination::Split, Illumination::Photons];
 /// Each way of lighting, and photons by each builder.
@@ -191,7 +192,7 @@ fn mirrors() -> Vec<Case> {
     [1, 3, 6]
         .into_iter()
         .map(|n: i32| {
-            case(format!("mirror corridor, {n} mirror(s): radiance"), 0.8f64.powi(n), move |gpu| {
+            case(format!("mirror corridor, {}: radiance", counted(n, "mirror")), 0.8f64.powi(n), move |gpu| {
                 // Unfolded, the end wall lies straight on: the ray goes to the middle of its nth image.
                 let target = DVec3::new(f64::from(n), 0.0, -10.0);
                 radiance(gpu, scene("mirror-corridor"), &settings(Illumination::Split, 0.1), DVec3::ZERO, target)

@@ -191,7 +191,8 @@ pub struct TransportSettings {
     pub caustic_photons: u32,
     /// Independent passes, of which the result is the mean.
     pub rounds: u32,
-    /// Bounces after which a photon is cut off; by default roulette ends it long before.
+    /// Bounces after which a photon is cut off; by default roulette ends it long before, which is null in JSON.
+    #[serde(serialize_with = "cap")]
     pub bounces: u32,
     pub seed: u64,
     /// Radius of the first pass's density estimate, metres; `None`: by a trial round
@@ -215,6 +216,7 @@ pub struct TransportSettings {
     pub illumination: Illumination,
     pub part: Part,
     pub filter: Filter,
+    #[serde(rename = "builder")]
     pub append: Append,
     pub math: Math,
     /// Look for values that are infinite or no number.
@@ -226,6 +228,10 @@ pub struct TransportSettings {
     /// Effects forced on, and effects left out, whatever the scene holds.
     pub with: Vec<Effect>,
     pub without: Vec<Effect>,
+}
+
+fn cap<S: serde::Serializer>(bounces: &u32, serializer: S) -> std::result::Result<S::Ok, S::Error> {
+    Some(*bounces).filter(|bounces| *bounces < MAX_BOUNCES).serialize(serializer)
 }
 
 impl Default for TransportSettings {

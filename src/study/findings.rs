@@ -5,6 +5,7 @@ use super::point::{CONFIDENCE, Curve, Estimate, Point};
 use super::{Comparison, Part, Study};
 use crate::output::words::{count, duration, number};
 use crate::paper::published;
+use crate::text::counted;
 
 /// Relative errors that people ask for, the largest first.
 pub const ASKED: [f64; 10] = [0.5, 0.2, 0.1, 0.05, 0.02, 0.01, 0.005, 0.002, 0.001, 0.0005];
@@ -207,9 +208,9 @@ fn floor(name: &str, curve: &Curve, least: f64) -> Option<String> {
     let rounds = f64::from(last.rounds) * (last.noise() / bias.value).powi(2);
     (bias.low > least && bias.low > 0.5 * last.noise()).then(|| {
         format!(
-            "{name}: an error of {} after {} round(s), with a bias of {} ({}); noise is below this bias from {} round(s) on.",
+            "{name}: an error of {} after {}, with a bias of {} ({}); noise is below this bias from round {} on.",
             percent(last.error().value),
-            last.rounds,
+            counted(last.rounds, "round"),
             percent(bias.value),
             between(bias, percent),
             count(rounds.ceil().max(1.0) as u64)

@@ -48,11 +48,11 @@ const LOCK: &str = "study.lock";
 impl Store {
     pub fn open(folder: &Folder, scene: &Scene, request: &Request, device: &DeviceFacts) -> Result<Store> {
         let path = folder.path().join(NAME);
-        let refuse = |reason: String| Error::Output { option: "--out", path: path.clone(), reason };
+        let refuse = |reason: String| Error::Output { option: "-o", path: path.clone(), reason };
         std::fs::create_dir_all(folder.path()).map_err(|error| refuse(error.kind().to_string()))?;
         let lock = std::fs::File::create(folder.path().join(LOCK)).map_err(|error| refuse(error.kind().to_string()))?;
         if lock.try_lock().is_err() {
-            return Err(Error::setting("--out", folder.path().display(), "is in use by another study; choose another folder"));
+            return Err(Error::setting("-o", folder.path().display(), "is in use by another study; choose another folder"));
         }
         let head = Head {
             photonmill: env!("CARGO_PKG_VERSION").to_owned(),
@@ -68,7 +68,7 @@ impl Store {
                 let mut lines = text.lines();
                 if lines.next().and_then(|line| serde_json::from_str(line).ok()).as_ref() != Some(&head) {
                     return Err(Error::setting(
-                        "--out",
+                        "-o",
                         folder.path().display(),
                         format!("holds the {NAME} of a different study or device; choose another folder, or delete that file"),
                     ));
@@ -100,7 +100,7 @@ impl Store {
     pub fn keep(&mut self, axis: Axis, point: &Point) -> Result<()> {
         let line = serde_json::to_string(&(axis, point)).expect("a point is plain data") + "\n";
         self.file.write_all(line.as_bytes()).and_then(|()| self.file.flush()).map_err(|error| Error::Output {
-            option: "--out",
+            option: "-o",
             path: self.path.clone(),
             reason: error.kind().to_string(),
         })

@@ -28,6 +28,7 @@ use super::material::{Material, TextureUse, surface_of};
 use super::texture::{Texture, Wrap, linear_of_srgb};
 use super::{Camera, Mesh, Progress, Scene};
 use crate::error::{Error, Result};
+use crate::text::{counted, refusal};
 use accessor::Vertices;
 
 /// Larger files are refused: their triangles would not fit a device's buffers either.
@@ -49,10 +50,10 @@ const MAX_NAMES: usize = 5;
 /// Reads a file.
 pub fn load(path: &Path, radiometric: bool, progress: Progress) -> Result<Scene> {
     progress("reading the file", 0.0);
-    let content = read_file(path, path)?;
+    let refuse = |reason: String| Error::Scene { path: path.to_owned(), object: "the file".into(), reason: one_line(&reason) };
+    let content = read_file(path).map_err(refuse)?;
     // The mark that some editors write in front of a text.
     let content = content.strip_prefix(b"\xef\xbb\xbf").unwrap_or(&content);
-    let refuse = |reason: String| Error::Scene { path: path.to_owned(), object: "the file".into(), reason: one_line(&reason) };
     malformed::binary_length(content).map_err(refuse)?;
     let Gltf { document, blob } =
         Gltf::from_slice_without_validation(content).map_err(|error| refuse(format!("is not valid glTF: {error}")))?;
@@ -109,16 +110,17 @@ fn one_line(text: &str) -> String {
     printable(&text.lines().map(str::trim).collect::<Vec<_>>().join(" "))
 }
 
-fn read_file(path: &Path, of: &Path) -> Result<Vec<u8>> {
-    let refuse = |reason: String| Error::Scene { path: of.to_owned(), object: printable(&path.display().to_string()), reason };
-    let facts = std::fs::metadata(path).map_err(|error| refuse(format!("cannot be read ({})", error.kind())))?;
+/// The content of a file, or what is wrong with it.
+fn read_file(path: &Path) -> std::result::Result<Vec<u8>, String> {
+    let unreadable = |error: std::io::Error| format!("cannot be read ({})", refusal(&error));
+    let facts = std::fs::metadata(path).map_err(unreadable)?;
     if !facts.is_file() {
-        return Err(refuse("is no file".into()));
+        return Err("is no file".into());
     }
     if facts.len() > MAX_FILE_BYTES {
-        return Err(refuse(format!("has {} bytes, and at most {MAX_FILE_BYTES} are read", facts.len())));
+        return Err(format!("has {} bytes, and at most {MAX_FILE_BYTES} are read", facts.len()));
     }
-    std::fs::read(path).map_err(|error| refuse(format!("cannot be read ({})", error.kind())))
+    std::fs::read(path).map_err(unreadable)
 }
 
 /// A file being read.
@@ -185,7 +187,7 @@ impl Loader {
         if leaves_folder(Path::new(&name)) || leads_out() {
             return Err(self.refuse(what, format!("lies at {uri}, outside the scene's folder, and is not read; copy it into that folder")));
         }
-        read_file(&place, &self.path)
+        read_file(&place).map_err(|reason| self.refuse(what, format!("lies at {uri}, which {reason}")))
     }
 
     fn read_textures(&mut self, document: &Document, progress: Progress) -> Result<()> {
@@ -667,7 +669,7 @@ impl Loader {
         }
         if !flat.is_empty() {
             let count: usize = dropped.iter().sum();
-            self.scene.warnings.push(format!("{count} triangle(s) have no area and are left out ({})", some_of(&flat)));
+            self.scene.warnings.push(format!("{} without area left out ({})", counted(count, "triangle"), some_of(&flat)));
         }
         if !self.left_out.is_empty() {
             let named = |(what, owners): (&String, &BTreeSet<String>)| match owners.is_empty() {

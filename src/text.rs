@@ -1,0 +1,51 @@
+//! What messages and reports have in common: counts with their nouns, typed values, and why a file was refused.
+
+use std::fmt::Display;
+use std::io;
+
+/// `1 round`, `2 rounds`.
+pub fn counted(count: impl Display, noun: &str) -> String {
+    let count = count.to_string();
+    let plural = if count == "1" { "" } else { "s" };
+    format!("{count} {noun}{plural}")
+}
+
+/// Characters of a typed value that a message repeats.
+const MOST_ECHOED: usize = 120;
+
+/// A value as it was typed; of a long one the beginning and the end.
+pub fn echo(typed: impl Display) -> String {
+    const END: usize = 40;
+    let typed = typed.to_string();
+    let letters: Vec<char> = typed.chars().collect();
+    if letters.len() <= MOST_ECHOED {
+        return typed;
+    }
+    let part = |letters: &[char]| letters.iter().collect::<String>();
+    format!("{}...{}", part(&letters[..MOST_ECHOED - END]), part(&letters[letters.len() - END..]))
+}
+
+/// Why the system refuses a file.
+pub fn refusal(error: &io::Error) -> String {
+    match error.kind() {
+        io::ErrorKind::NotFound => "there is no such file".to_owned(),
+        kind => kind.to_string(),
+    }
+}
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+
+    #[test]
+    fn counts_have_the_right_number() {
+        assert_eq!([0, 1, 2, 11].map(|count| counted(count, "round")), ["0 rounds", "1 round", "2 rounds", "11 rounds"]);
+    }
+
+    #[test]
+    fn long_values_keep_beginning_and_end() {
+        assert_eq!(echo("scene.glb"), "scene.glb");
+        let long = echo(format!("\u{e4}{}.glb", "x".repeat(5000)));
+        assert!(long.chars().count() <= MOST_ECHOED + 3 && long.starts_with("\u{e4}xx") && long.ends_with("xx.glb"), "{long}");
+    }
+}
