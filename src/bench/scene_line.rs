@@ -249,8 +249,8 @@ impl Model<'_> {
             ..Cost::default()
         };
         let chunks = map.chunks().count() as f64;
-        // Emission, and flights with what works out the sizes of all but the first.
-        let flights = chunks * if persistent { 1.0 } else { 2.0 * f64::from(map.bounces) };
+        // Emission, and flights with what works out the sizes of all but the first: of the first segment, which all have.
+        let flights = chunks * if persistent { 1.0 } else { 2.0 * f64::from(map.segment_bounces) };
         // A prefix sum goes down its levels and up again.
         let scans = chunks * (2.0 * block_sum_counts(u64::from(map.bucket_count) + 1, self.plan.settings.group_size).len() as f64 - 1.0);
         let sorts = 3.0 * chunks + scans;
