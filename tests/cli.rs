@@ -368,7 +368,12 @@ fn interrupted(signal: &str, code: i32) {
     let folder = tempfile::tempdir().unwrap();
     let arguments = on_device(&["--rounds", "4000000", "--rng", "philox", "-o", "a.png", "--json", "a.json", "--progress", "json"]);
     let started = Instant::now();
-    let mut child = photonmill(folder.path(), &arguments.iter().map(String::as_str).collect::<Vec<_>>())
+    // The program leaves alone what it was started to ignore, and tests that nohup or a script's & starts ignore some signals.
+    let mut child = Command::new("env")
+        .args(["--default-signal=INT,TERM,HUP", env!("CARGO_BIN_EXE_photonmill")])
+        .args(&arguments)
+        .current_dir(folder.path())
+        .stdin(Stdio::null())
         .stdout(Stdio::piped())
         .stderr(Stdio::piped())
         .spawn()
