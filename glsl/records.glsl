@@ -87,7 +87,7 @@ struct EndBouncePush {
     uint max_groups;
 };
 
-struct TraceWholePush {
+struct TracePersistentPush {
     RandomKey key;
     PhotonRange range;
     uint stride;
@@ -299,7 +299,7 @@ struct FlightPush {
     uint path_capacity;
 };
 
-struct FlyWholePush {
+struct SceneTracePersistentPush {
     Draws draws;
     PhotonEmission emission;
     PhotonStore map;
@@ -354,7 +354,7 @@ struct CellPush {
     uint photon_capacity;
 };
 
-struct LookupPush {
+struct SceneGatherPush {
     uint first_point;
     uint end_point;
     uint point_count;
@@ -370,7 +370,7 @@ struct LookupPush {
     CellPush cells;
 };
 
-struct WeighPush {
+struct FluxToRadiancePush {
     uint first_point;
     uint end_point;
     uint point_count;

@@ -116,11 +116,11 @@ constants! {
     FILTER_GAUSSIAN = 2;
 
     /// What `--paranoid` found odd: a photon, light at a point, a density estimate there.
-    ODD_PHOTON = 0;
-    ODD_LIGHT = 1;
-    ODD_ESTIMATE = 2;
+    NONFINITE_PHOTON = 0;
+    NONFINITE_LIGHT = 1;
+    NONFINITE_ESTIMATE = 2;
     /// Odd values of which the owner is written down.
-    MAX_ODDITIES = 64;
+    MAX_NONFINITE_VALUES = 64;
 
     /// `SUMS`: 64-bit fixed point.
     SUMS_INTEGER = 0;

@@ -21,8 +21,8 @@
 //! text, constants, records, path, photon, error, bias, unknown, ledger, rng, settings, timings < scene < plan < cpu
 //! scene < judge
 //! text, constants, records, error, ledger, timings < gpu
-//! gpu < oddities, tallies, totals; plan, gpu < prefix_sum
-//! plan, oddities, tallies, totals, prefix_sum < resources < trace < index < estimate < film < render < transport < selfcheck < output
+//! gpu < nonfinite_values, tallies, totals; plan, gpu < prefix_sum
+//! plan, nonfinite_values, tallies, totals, prefix_sum < resources < trace < index < estimate < film < render < transport < selfcheck < output
 //! output < bake < paper < compaction < study < bench < cli
 //! ```
 //!
@@ -45,7 +45,7 @@ pub mod guide;
 pub mod index;
 pub mod judge;
 pub mod ledger;
-pub mod oddities;
+pub mod nonfinite_values;
 pub mod output;
 pub mod paper;
 pub mod path;

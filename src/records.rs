@@ -164,7 +164,7 @@ records! {
         photon_capacity: u32,
     }
 
-    TraceWholePush {
+    TracePersistentPush {
         key: RandomKey,
         range: PhotonRange,
         /// Invocations that take photons: each every so many.
@@ -443,7 +443,7 @@ records! {
         path_capacity: u32,
     }
 
-    FlyWholePush {
+    SceneTracePersistentPush {
         draws: Draws,
         emission: PhotonEmission,
         map: PhotonStore,
@@ -509,7 +509,7 @@ records! {
         photon_capacity: u32,
     }
 
-    LookupPush {
+    SceneGatherPush {
         first_point: u32,
         end_point: u32,
         point_count: u32,
@@ -530,7 +530,7 @@ records! {
         cells: CellPush,
     }
 
-    WeighPush {
+    FluxToRadiancePush {
         first_point: u32,
         end_point: u32,
         point_count: u32,

@@ -3,7 +3,7 @@
 use crate::constants::{FACE_COUNT, TREE_LEAF};
 use crate::error::Result;
 use crate::gpu::{Buffer, Commands, Gpu, Memory};
-use crate::oddities;
+use crate::nonfinite_values;
 use crate::path::StoredPath;
 use crate::photon::{Origin, StoredPhoton};
 use crate::plan::Plan;
@@ -11,7 +11,7 @@ use crate::plan::memory::{group_count, searches_at_once, tree_count_capacity};
 use crate::prefix_sum::block_sums;
 use crate::records::{self, DispatchArgs, Point, Search};
 use crate::scene::room::RoomScene;
-use crate::settings::Variant;
+use crate::settings::Builder;
 use crate::tallies;
 use glam::UVec2;
 
@@ -43,7 +43,7 @@ pub struct Resources {
     pub film: Buffer,
     /// What all rounds left; `None` of a single one.
     pub rounds: Option<RoundBuffers>,
-    pub oddities: Buffer,
+    pub nonfinite_values: Buffer,
 }
 
 /// Survivors of a bounce, for prefix sums over them.
@@ -130,13 +130,13 @@ impl Resources {
             origins: gpu.buffer::<Origin>("origins", u64::from(plan.origin_array_length()), device)?,
             counters: gpu.buffer::<u32>("counters", plan.counter_array_length(), device)?,
             dispatch_args: gpu.buffer::<DispatchArgs>("dispatch args", 1, device)?,
-            order: if plan.settings.variant == Variant::Scan { Some(OrderBuffers::new(gpu, plan)?) } else { None },
+            order: if plan.settings.builder == Builder::Scan { Some(OrderBuffers::new(gpu, plan)?) } else { None },
             tallies: tallies::buffer(gpu, "tallies", plan.settings.bounces)?,
             index: if plan.gathers_by_grid() { Some(IndexBuffers::new(gpu, plan)?) } else { None },
             tree: if plan.gathers_by_tree() { Some(TreeBuffers::new(gpu, plan)?) } else { None },
             film: gpu.buffer::<u64>("film", sums, device)?,
             rounds: if plan.keeps_squares() { Some(RoundBuffers::new(gpu, commands, sums)?) } else { None },
-            oddities: oddities::buffer(gpu, commands)?,
+            nonfinite_values: nonfinite_values::buffer(gpu, commands)?,
         };
         commands.upload(&resources.rooms, &[scene.room_record()])?;
         commands.upload(&resources.walls, &scene.wall_records())?;

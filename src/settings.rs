@@ -2,6 +2,7 @@
 //! that the paper leaves open is a field here, and [`Settings::validate`] is the one place that
 //! judges values.
 
+pub mod builder;
 pub mod stop;
 pub mod transport;
 
@@ -10,48 +11,8 @@ use serde::Serialize;
 use crate::constants;
 use crate::error::{Error, Result};
 use crate::rng::{self, Rng};
+pub use builder::Builder;
 use stop::Stop;
-
-/// How the photon map is built.
-#[derive(Debug, Clone, Copy, PartialEq, Eq, Serialize)]
-#[serde(rename_all = "lowercase")]
-pub enum Variant {
-    /// The paper's first: one slot a photon and bounce, empty ones included.
-    Naive,
-    /// The paper's second: survivors only, one atomic a thread.
-    Atomic,
-    /// Survivors only, one atomic a subgroup.
-    Ballot,
-    /// Survivors only, one atomic a work group.
-    Group,
-    /// Survivors only, by prefix sums over all of them: photons keep their order.
-    Scan,
-    /// Each photon from its light to its end by one invocation, which keeps it in registers.
-    Persistent,
-    /// On the CPU, survivors only, photons side by side in vectors.
-    Cpu,
-}
-
-impl Variant {
-    pub const ON_GPU: [Variant; 6] = [Variant::Naive, Variant::Atomic, Variant::Ballot, Variant::Group, Variant::Scan, Variant::Persistent];
-
-    /// Every way, the CPU's last.
-    pub fn all() -> impl Iterator<Item = Variant> {
-        Variant::ON_GPU.into_iter().chain([Variant::Cpu])
-    }
-
-    pub fn name(self) -> &'static str {
-        match self {
-            Variant::Naive => "naive",
-            Variant::Atomic => "atomic",
-            Variant::Ballot => "ballot",
-            Variant::Group => "group",
-            Variant::Scan => "scan",
-            Variant::Persistent => "persistent",
-            Variant::Cpu => "cpu",
-        }
-    }
-}
 
 /// How photons near a point are found.
 #[derive(Debug, Clone, Copy, PartialEq, Eq, Serialize)]
@@ -163,7 +124,7 @@ pub const WALL_NAMES: [&str; 5] = ["left", "right", "floor", "ceiling", "back"];
 
 #[derive(Debug, Clone, PartialEq, Serialize)]
 pub struct Settings {
-    pub variant: Variant,
+    pub builder: Builder,
     /// Photons emitted in a round, by all lights together.
     pub photons: u32,
     pub rounds: u32,
@@ -224,7 +185,7 @@ impl Default for Settings {
 impl Settings {
     pub fn preset(preset: Preset) -> Settings {
         let modified = Settings {
-            variant: Variant::Atomic,
+            builder: Builder::Atomic,
             photons: PAPER_PHOTONS,
             rounds: 1,
             bounces: 15,
@@ -254,7 +215,7 @@ impl Settings {
         };
         match preset {
             Preset::Modified => modified,
-            Preset::Naive => Settings { variant: Variant::Naive, bounces: 2, ..modified },
+            Preset::Naive => Settings { builder: Builder::Naive, bounces: 2, ..modified },
             Preset::Phong => Settings { shininess: [Some(2.0); 5], ..modified },
             Preset::Rounds => Settings { rounds: 100, radius: 0.025, full_light: 10.0, shininess: [Some(5.0); 5], ..modified },
         }
@@ -287,7 +248,7 @@ impl Settings {
         within("--photons", self.photons, 2..=MAX_PHOTONS, "photons per round, at least one for each of the two lights")?;
         within("--rounds", self.rounds, 1..=u32::MAX, "rounds")?;
         within("--bounces", self.bounces, 1..=MAX_BOUNCES, "bounces")?;
-        if self.variant == Variant::Persistent {
+        if self.builder == Builder::Persistent {
             within("--bounces", self.bounces, 1..=MAX_PERSISTENT_BOUNCES, "bounces with --variant persistent")?;
         }
         within("--mesh", self.mesh, 1..=MAX_MESH, "texels along a wall")?;

@@ -5,28 +5,29 @@ mod in_order;
 use crate::constants::{MAX_GROUPS, PATHS_TOGETHER};
 use crate::error::Result;
 use crate::gpu::kernels::{
-    Emit, EndBounce, FillGaps, KeepOrder, ScanAdd, ScanBlocks, TraceAtomic, TraceBallot, TraceGroup, TraceInPlace, TraceSlots, TraceWhole,
+    Emit, EndBounce, FillGaps, KeepOrder, ScanAdd, ScanBlocks, TraceAtomic, TraceBallot, TraceGroup, TraceInPlace, TracePersistent,
+    TraceSlots,
 };
 use crate::gpu::{Commands, Extent, Kernel, Module};
 use crate::plan::{EmissionRange, Plan, photons_of};
-use crate::records::{EmitPush, EndBouncePush, FillGapsPush, PhotonRange, TracePush, TraceWholePush};
+use crate::records::{EmitPush, EndBouncePush, FillGapsPush, PhotonRange, TracePersistentPush, TracePush};
 use crate::resources::Resources;
 use crate::rng::words;
-use crate::settings::Variant;
+use crate::settings::Builder;
 
 /// Kernels that tracing needs.
 pub fn modules(plan: &Plan) -> Vec<Module> {
-    match plan.settings.variant {
-        Variant::Naive => vec![Emit::MODULE, TraceSlots::MODULE],
-        Variant::Atomic if plan.counters > 1 => vec![Emit::MODULE, TraceAtomic::MODULE, FillGaps::MODULE, EndBounce::MODULE],
-        Variant::Atomic => vec![Emit::MODULE, TraceAtomic::MODULE, EndBounce::MODULE],
-        Variant::Ballot => vec![Emit::MODULE, TraceBallot::MODULE, EndBounce::MODULE],
-        Variant::Group => vec![Emit::MODULE, TraceGroup::MODULE, EndBounce::MODULE],
-        Variant::Scan => {
+    match plan.settings.builder {
+        Builder::Naive => vec![Emit::MODULE, TraceSlots::MODULE],
+        Builder::Atomic if plan.counters > 1 => vec![Emit::MODULE, TraceAtomic::MODULE, FillGaps::MODULE, EndBounce::MODULE],
+        Builder::Atomic => vec![Emit::MODULE, TraceAtomic::MODULE, EndBounce::MODULE],
+        Builder::Ballot => vec![Emit::MODULE, TraceBallot::MODULE, EndBounce::MODULE],
+        Builder::Group => vec![Emit::MODULE, TraceGroup::MODULE, EndBounce::MODULE],
+        Builder::Scan => {
             vec![Emit::MODULE, TraceInPlace::MODULE, ScanBlocks::MODULE, ScanAdd::MODULE, KeepOrder::MODULE, EndBounce::MODULE]
         }
-        Variant::Persistent => vec![TraceWhole::MODULE],
-        Variant::Cpu => panic!("the CPU builder has no kernels"),
+        Builder::Persistent => vec![TracePersistent::MODULE],
+        Builder::Cpu => panic!("the CPU builder has no kernels"),
     }
 }
 
@@ -37,7 +38,7 @@ pub fn chunk(commands: &mut Commands, resources: &Resources, plan: &Plan, round:
         commands.fill(&resources.counters, 0, plan.counter_array_length(), 0);
         commands.fill(&resources.counters, 1, 1, photon_count);
         commands.add_work(plan.work.tracing(photon_count));
-        if plan.settings.variant == Variant::Persistent {
+        if plan.settings.builder == Builder::Persistent {
             return whole(commands, resources, plan, round, ranges);
         }
         commands.scope("emit", |commands| emit(commands, resources, plan, round, ranges))?;
@@ -54,7 +55,7 @@ pub fn chunk(commands: &mut Commands, resources: &Resources, plan: &Plan, round:
 
 /// Writes the paths of a chunk as they leave their lights, light after light.
 pub fn emit(commands: &mut Commands, resources: &Resources, plan: &Plan, round: u32, ranges: &[EmissionRange]) -> Result<()> {
-    let Resources { lights, walls, stream_seeds, paths: [paths, _], oddities, .. } = resources;
+    let Resources { lights, walls, stream_seeds, paths: [paths, _], nonfinite_values, .. } = resources;
     let mut path_offset = 0;
     for range in ranges {
         let push = EmitPush {
@@ -63,7 +64,7 @@ pub fn emit(commands: &mut Commands, resources: &Resources, plan: &Plan, round: 
             path_offset,
             path_capacity: plan.path_array_length(),
         };
-        commands.dispatch(Emit { lights, walls, stream_seeds, paths, oddities }, &push, Extent::Items(u64::from(range.count)))?;
+        commands.dispatch(Emit { lights, walls, stream_seeds, paths, nonfinite_values }, &push, Extent::Items(u64::from(range.count)))?;
         path_offset += range.count;
     }
     Ok(())
@@ -83,9 +84,9 @@ fn photon_range(plan: &Plan, round: u32, range: &EmissionRange) -> PhotonRange {
 
 /// Traces every photon from its light to its end.
 fn whole(commands: &mut Commands, resources: &Resources, plan: &Plan, round: u32, ranges: &[EmissionRange]) -> Result<()> {
-    let Resources { rooms, walls, lights, stream_seeds, photons, origins, counters, tallies, oddities, .. } = resources;
+    let Resources { rooms, walls, lights, stream_seeds, photons, origins, counters, tallies, nonfinite_values, .. } = resources;
     for range in ranges.iter().flat_map(|range| range.parts(plan.photons_per_dispatch())) {
-        let push = TraceWholePush {
+        let push = TracePersistentPush {
             key: plan.streams().key(round),
             range: photon_range(plan, round, &range),
             stride: plan.persistence.invocations(range.count),
@@ -93,7 +94,7 @@ fn whole(commands: &mut Commands, resources: &Resources, plan: &Plan, round: u32
             photon_capacity: plan.photon_capacity,
             eye: plan.settings.eye.into(),
         };
-        let kernel = TraceWhole { rooms, walls, lights, stream_seeds, photons, origins, counters, tallies, oddities };
+        let kernel = TracePersistent { rooms, walls, lights, stream_seeds, photons, origins, counters, tallies, nonfinite_values };
         commands.dispatch(kernel, &push, Extent::Items(u64::from(push.stride)))?;
     }
     Ok(())
@@ -113,15 +114,15 @@ pub fn photon_list_capacity(plan: &Plan, photon_count: u32) -> u32 {
 }
 
 /// Paths that an invocation takes through a bounce.
-fn paths_each(variant: Variant) -> u32 {
-    match variant {
-        Variant::Ballot | Variant::Group => PATHS_TOGETHER,
+fn paths_each(builder: Builder) -> u32 {
+    match builder {
+        Builder::Ballot | Builder::Group => PATHS_TOGETHER,
         _ => 1,
     }
 }
 
 fn one_bounce(commands: &mut Commands, resources: &Resources, plan: &Plan, round: u32, bounce: u32, photon_count: u32) -> Result<()> {
-    let variant = plan.settings.variant;
+    let builder = plan.settings.builder;
     let push = TracePush {
         key: plan.streams().key(round),
         bounce,
@@ -133,29 +134,33 @@ fn one_bounce(commands: &mut Commands, resources: &Resources, plan: &Plan, round
     // Every photon enters bounce 0, and the naive builder looks at every slot each time. After that
     // only the device knows how many paths are left.
     let extent = || {
-        if bounce == 0 || variant == Variant::Naive {
-            Extent::Items(u64::from(photon_count.div_ceil(paths_each(variant))))
+        if bounce == 0 || builder == Builder::Naive {
+            Extent::Items(u64::from(photon_count.div_ceil(paths_each(builder))))
         } else {
             Extent::Indirect(&resources.dispatch_args)
         }
     };
     let [even, odd] = &resources.paths;
     let (paths, next_paths) = if bounce.is_multiple_of(2) { (even, odd) } else { (odd, even) };
-    let Resources { rooms, walls, photons, origins, counters, tallies, oddities, .. } = resources;
+    let Resources { rooms, walls, photons, origins, counters, tallies, nonfinite_values, .. } = resources;
     macro_rules! trace {
         ($kernel:ident) => {
-            commands.dispatch($kernel { rooms, walls, paths, next_paths, photons, origins, counters, tallies, oddities }, &push, extent())
+            commands.dispatch(
+                $kernel { rooms, walls, paths, next_paths, photons, origins, counters, tallies, nonfinite_values },
+                &push,
+                extent(),
+            )
         };
     }
-    match variant {
-        Variant::Naive => trace!(TraceSlots),
-        Variant::Atomic => trace!(TraceAtomic),
-        Variant::Ballot => trace!(TraceBallot),
-        Variant::Group => trace!(TraceGroup),
-        Variant::Scan => in_order::one_bounce(commands, resources, plan, [paths, next_paths], &push, extent),
-        Variant::Persistent | Variant::Cpu => panic!("{} has no bounces of all paths", variant.name()),
+    match builder {
+        Builder::Naive => trace!(TraceSlots),
+        Builder::Atomic => trace!(TraceAtomic),
+        Builder::Ballot => trace!(TraceBallot),
+        Builder::Group => trace!(TraceGroup),
+        Builder::Scan => in_order::one_bounce(commands, resources, plan, [paths, next_paths], &push, extent),
+        Builder::Persistent | Builder::Cpu => panic!("{} has no bounces of all paths", builder.name()),
     }?;
-    if variant == Variant::Naive {
+    if builder == Builder::Naive {
         return Ok(());
     }
     if plan.counters > 1 {
@@ -166,7 +171,7 @@ fn one_bounce(commands: &mut Commands, resources: &Resources, plan: &Plan, round
     let end = EndBouncePush {
         bounce,
         photon_capacity: push.photon_capacity,
-        items_per_group: plan.settings.group_size * paths_each(variant),
+        items_per_group: plan.settings.group_size * paths_each(builder),
         max_groups: MAX_GROUPS,
     };
     commands.dispatch(EndBounce { counters, dispatch_args: &resources.dispatch_args }, &end, Extent::Groups(1, 1))

@@ -10,9 +10,9 @@ use photonmill::plan::transport::{Sensor, TransportPlan};
 use photonmill::render;
 use photonmill::scene::Scene;
 use photonmill::scene::geometry::Geometry;
-use photonmill::settings::Math;
-use photonmill::settings::transport::{Append, Illumination, Part, TransportSettings};
-use photonmill::transport::Lit;
+use photonmill::settings::transport::{Illumination, Part, TransportSettings};
+use photonmill::settings::{Builder, Math};
+use photonmill::transport::RunResult;
 use photonmill::transport::replay::{Flights, light_paths};
 
 fn plan_of(gpu: &Gpu, scene: &Scene, settings: &TransportSettings) -> (Geometry, TransportPlan) {
@@ -129,7 +129,7 @@ fn lamps_within_a_target_shine_in_all_directions() {
     assert!(off.0.targets.is_empty() && on.0.targets.len() == 1 && off.1 != on.1);
 }
 
-fn film(gpu: &Gpu, kind: &str, settings: &TransportSettings) -> Lit {
+fn film(gpu: &Gpu, kind: &str, settings: &TransportSettings) -> RunResult {
     received(gpu, &scene(kind), settings, &grid(0.0, DVec3::Y, 4))
 }
 
@@ -142,9 +142,9 @@ fn no_builder_and_no_split_changes_a_bit() {
             let usual = TransportSettings { math, rounds: 2, ..settings(3001, true) };
             let reference = film(&gpu, kind, &usual);
             for (what, settings) in [
-                ("atomic", TransportSettings { append: Append::Atomic, ..usual.clone() }),
-                ("ballot", TransportSettings { append: Append::Ballot, ..usual.clone() }),
-                ("persistent", TransportSettings { append: Append::Persistent, ..usual.clone() }),
+                ("atomic", TransportSettings { builder: Some(Builder::Atomic), ..usual.clone() }),
+                ("ballot", TransportSettings { builder: Some(Builder::Ballot), ..usual.clone() }),
+                ("persistent", TransportSettings { builder: Some(Builder::Persistent), ..usual.clone() }),
                 ("chunks", TransportSettings { chunk: Some(701), ..usual.clone() }),
             ] {
                 let found = film(&gpu, kind, &settings);

@@ -14,7 +14,7 @@ const LINE: [&str; 24] = [
     "judge",
     "plan",
     "gpu",
-    "oddities",
+    "nonfinite_values",
     "tallies",
     "totals",
     "prefix_sum",
@@ -294,7 +294,7 @@ fn the_check_complains_about_arrows_to_the_right() {
     assert!(complains("plan", "fn f() { crate::gpu::check::run() }"));
     assert!(complains("scene", "use crate::{error::Result, gpu::{Buffer, Gpu}};"));
     assert!(complains("cpu", "use crate::resources::Resources;"));
-    assert!(complains("film", "use super::render::Outcome;"));
+    assert!(complains("film", "use super::render::RunResult;"));
     assert!(complains("estimate", "use crate::cpu::index::Index;"));
     assert!(complains("records", "use crate::scene::room::RoomScene;"));
     assert!(complains("trace", "use crate::{\n    error::Result,\n    index,\n};"));

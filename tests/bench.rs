@@ -7,14 +7,14 @@ use std::time::Duration;
 
 use crate::common::{device, device_with, lit, planted};
 use photonmill::bench::experiments::Experiment;
-use photonmill::bench::paper_line::{self, Timed};
-use photonmill::bench::scene_line::{self, Job};
+use photonmill::bench::room::{self, Timed};
+use photonmill::bench::scene::{self, Job};
 use photonmill::bench::targets::TARGETS;
 use photonmill::bench::{self, Request, Size, rates, table};
 use photonmill::gpu::Options;
 use photonmill::scene::geometry::Geometry;
 use photonmill::settings::transport::TransportSettings;
-use photonmill::settings::{Settings, Variant};
+use photonmill::settings::{Builder, Settings};
 use serde_json::Value;
 
 /// Measurements of one device do not disturb each other.
@@ -97,9 +97,9 @@ fn the_roofline_counts_every_dispatch() {
         let counted: f64 = outermost.map(|pass| pass.work.unwrap_or_else(|| panic!("{what}: {}", pass.name)).dispatches).sum();
         assert_eq!(counted, timed.dispatches, "{what}");
     };
-    for variant in Variant::ON_GPU {
-        let settings = Settings { variant, photons: 600, mesh: 4, bounces: 3, chunk: Some(300), ..Settings::default() };
-        check(variant.name(), &paper_line::time(&gpu, &rates, &settings, &never).unwrap());
+    for builder in Builder::ON_GPU {
+        let settings = Settings { builder, photons: 600, mesh: 4, bounces: 3, chunk: Some(300), ..Settings::default() };
+        check(builder.name(), &room::time(&gpu, &rates, &settings, &never).unwrap());
     }
     let scene = lit::scene("cornell-spheres");
     let geometry = Geometry::new(&scene).unwrap();
@@ -113,7 +113,7 @@ fn the_roofline_counts_every_dispatch() {
             ..TransportSettings::default()
         };
         let job = Job { name: "cornell-spheres", scene: &scene, geometry: &geometry, size: (8, 8), settings };
-        check("cornell-spheres", &scene_line::time(&gpu, &rates, &job, &never).unwrap());
+        check("cornell-spheres", &scene::time(&gpu, &rates, &job, &never).unwrap());
     }
 }
 

@@ -188,10 +188,10 @@ fn the_bias_of_the_box_lies_in_its_interval_at_every_radius() {
 fn scene_intervals_hold(seeds: u64, cases: &[(&str, Illumination, f64)], rounds: u32) {
     let Some(gpu) = device() else { return };
     for &(name, illumination, radius) in cases {
-        let long = Lit::new(scene(name), illumination, radius, 20_000, 99, &gpu);
+        let long = RunResult::new(scene(name), illumination, radius, 20_000, 99, &gpu);
         let [lower, middle, upper] = long.difference(&gpu, 0.2, rounds).map(|difference| difference / (1.0 - 0.04));
         let biases: Vec<Bias> =
-            (1..=seeds).map(|seed| Lit::new(scene(name), illumination, radius, 4000, seed, &gpu).bias(&gpu, 1)).collect();
+            (1..=seeds).map(|seed| RunResult::new(scene(name), illumination, radius, 4000, seed, &gpu).bias(&gpu, 1)).collect();
         println!("{name}: {lower:.4} to {upper:.4}");
         report(&format!("{name}, {illumination:?}, radius {radius}"), &biases, middle);
         assert_holds(name, coverage_check(&biases, middle));
@@ -218,7 +218,7 @@ fn the_bias_of_many_scenes_lies_in_its_interval_as_often_as_stated() {
 fn the_bias_of_a_shrinking_radius_lies_in_the_scaled_interval() {
     let Some(gpu) = device() else { return };
     const ROUNDS: u32 = 32;
-    let long = Lit::new(scene("disc-over-plane"), Illumination::Photons, 0.15, 4000, 99, &gpu);
+    let long = RunResult::new(scene("disc-over-plane"), Illumination::Photons, 0.15, 4000, 99, &gpu);
     let alpha = TransportSettings::default().alpha;
     let batch = |factor: f64, number: u32| {
         if factor < 1.0 {
@@ -231,7 +231,7 @@ fn the_bias_of_a_shrinking_radius_lies_in_the_scaled_interval() {
         Ok(Some((0..lit.film.pixels()).flat_map(|pixel| lit.film.mean(pixel, &lit.plan).to_array()).collect()))
     };
     let truth = bias::difference(CONFIDENCE, 0.2, batch).unwrap().unwrap()[1];
-    let of_seed = |seed| Lit::new(scene("disc-over-plane"), Illumination::Photons, 0.15, 4000, seed, &gpu).bias(&gpu, 2);
+    let of_seed = |seed| RunResult::new(scene("disc-over-plane"), Illumination::Photons, 0.15, 4000, seed, &gpu).bias(&gpu, 2);
     let first: Vec<Bias> = (1..=10).map(of_seed).collect();
     let scaled: Vec<Bias> = first.iter().map(|bias| bias.scaled(mean_squared_radius(alpha, ROUNDS))).collect();
     report("a shrinking radius", &scaled, truth);
@@ -243,7 +243,7 @@ fn the_bias_of_a_shrinking_radius_lies_in_the_scaled_interval() {
 #[test]
 fn light_without_a_map_has_no_bias() {
     let Some(gpu) = device() else { return };
-    let lit = Lit::new(scene("disc-over-plane"), Illumination::Split, 0.1, 100, 1, &gpu);
+    let lit = RunResult::new(scene("disc-over-plane"), Illumination::Split, 0.1, 100, 1, &gpu);
     assert_eq!(lit.bias(&gpu, 1).upper, 0.0);
     assert_eq!(mean_squared_radius(1.0, 1000), 1.0);
     assert_eq!(mean_squared_radius(0.5, 1), 1.0);
@@ -255,16 +255,16 @@ fn light_without_a_map_has_no_bias() {
 }
 
 /// A picture of a scene.
-struct Lit {
+struct RunResult {
     scene: Scene,
     camera: Camera,
     geometry: Geometry,
     plan: TransportPlan,
 }
 
-impl Lit {
+impl RunResult {
     /// `radius` as a share of the scene's extent.
-    fn new(scene: Scene, illumination: Illumination, radius: f64, photons: u32, seed: u64, gpu: &Gpu) -> Lit {
+    fn new(scene: Scene, illumination: Illumination, radius: f64, photons: u32, seed: u64, gpu: &Gpu) -> RunResult {
         let camera = scene.cameras.first().cloned().unwrap_or_else(|| Camera::around(scene.bounds().0, scene.bounds().1));
         let geometry = Geometry::new(&scene).unwrap();
         let (min, max) = scene.bounds();
@@ -282,7 +282,7 @@ impl Lit {
         };
         let sensor = Sensor::Picture { width: 16, height: 16 };
         let plan = TransportPlan::new(&scene, &geometry, &settings, sensor, &render::limits(gpu.facts())).unwrap();
-        Lit { scene, camera, geometry, plan }
+        RunResult { scene, camera, geometry, plan }
     }
 
     fn view(&self) -> View<'_> {

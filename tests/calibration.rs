@@ -6,12 +6,12 @@ use std::f64::consts::{PI, TAU};
 use crate::common::reference::{Arrival, Emission, HALF_EDGE, MESH, Model, texels_in_reach};
 use crate::common::{Check, assert_complains, assert_holds, device, pairs, run, run_on_cpu, z_check};
 use photonmill::film::{WallEstimate, estimate_walls};
-use photonmill::render::Outcome;
+use photonmill::render::RunResult;
 use photonmill::rng::Rng;
 use photonmill::scene::open_box::open_box;
 use photonmill::settings::{EmissionLaw, Settings};
 
-fn walls(outcome: &Outcome) -> Vec<WallEstimate> {
+fn walls(outcome: &RunResult) -> Vec<WallEstimate> {
     estimate_walls(&outcome.film, &open_box(&outcome.plan.settings), &outcome.plan)
 }
 

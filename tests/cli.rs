@@ -290,14 +290,14 @@ fn a_run_says_how_wrong_it_is() {
 #[test]
 fn the_builders_write_the_same_picture() {
     let folder = tempfile::tempdir().unwrap();
-    let picture = |variant: &'static str| {
-        let output = run_on_device(folder.path(), &["--variant", variant, "--rounds", "2", "--rng", "philox", "-o", "a.png"]);
+    let picture = |builder: &'static str| {
+        let output = run_on_device(folder.path(), &["--variant", builder, "--rounds", "2", "--rng", "philox", "-o", "a.png"]);
         assert!(output.status.success(), "{}", text(&output.stderr));
         std::fs::read(folder.path().join("a.png")).unwrap()
     };
     let naive = picture("naive");
-    for variant in ["atomic", "ballot", "group", "scan", "persistent", "auto"] {
-        assert!(naive == picture(variant), "{variant}");
+    for builder in ["atomic", "ballot", "group", "scan", "persistent", "auto"] {
+        assert!(naive == picture(builder), "{builder}");
     }
 }
 
@@ -319,13 +319,13 @@ fn the_fastest_builder_is_taken() {
         let times: Vec<(String, f64)> = times
             .split(", ")
             .map(|candidate| candidate.split_once(' ').expect(&stderr))
-            .map(|(variant, ms)| (variant.to_owned(), ms.parse().expect(&stderr)))
+            .map(|(builder, ms)| (builder.to_owned(), ms.parse().expect(&stderr)))
             .collect();
         assert!(stderr.contains(&format!("auto takes {taken};")) && times[0].0 == taken, "{stderr}");
         assert!(times.is_sorted_by(|a, b| a.1 <= b.1) && times[0].1 > 0.0, "{stderr}");
         times
     };
-    let holds = |times: &[(String, f64)], variant: &str| times.iter().any(|(name, _)| name == variant);
+    let holds = |times: &[(String, f64)], builder: &str| times.iter().any(|(name, _)| name == builder);
     let short = auto("15");
     // A persistent invocation would loop too long.
     let long = auto("1001");

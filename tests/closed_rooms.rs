@@ -4,7 +4,7 @@
 use std::f64::consts::PI;
 
 use crate::common::family::Family;
-use crate::common::lit::{APPENDS, BOTH, grid, irradiances, level, matt, mirror, received, scene_of, shaft, shining};
+use crate::common::lit::{BOTH, SCENE_BUILDERS, grid, irradiances, level, matt, mirror, received, scene_of, shaft, shining};
 use crate::common::{JUDGED, device, run_scene, run_scene_on_cpu};
 use glam::{DVec3, Vec3};
 use photonmill::ledger::Fates;
@@ -14,7 +14,7 @@ use photonmill::scene::open_box::open_box;
 use photonmill::scene::room::Wall;
 use photonmill::scene::{Material, Mesh};
 use photonmill::settings::transport::{Illumination, TransportSettings};
-use photonmill::settings::{Gather, Settings, Variant};
+use photonmill::settings::{Builder, Gather, Settings};
 
 /// A sphere of 1 m of flat triangles, seen from inside.
 fn hollow_sphere(segments: u32) -> Mesh {
@@ -88,13 +88,13 @@ fn an_integrating_sphere_multiplies_light() {
     let kept = kept_by_horizon(&sphere, &points, RADIUS);
     assert!((kept - (1.0 - RADIUS * RADIUS / 8.0)).abs() < 0.002, "{kept}");
     let mut family = Family::default();
-    for append in APPENDS {
+    for builder in SCENE_BUILDERS {
         for (albedo, bounces, photons) in [(Vec3::new(1.0, 0.99, 0.9), 60, 800), (Vec3::new(0.9, 0.5, 1.0), 16, 3000)] {
             let material = Material::lambert("wall", albedo);
             let scene = scene_of(vec![sphere.clone()], vec![material], vec![LightKind::Point { position: DVec3::ZERO, intensity }]);
             let settings = TransportSettings {
                 illumination: Illumination::Photons,
-                append,
+                builder: Some(builder),
                 photons,
                 bounces,
                 rounds: 1,
@@ -108,7 +108,7 @@ fn an_integrating_sphere_multiplies_light() {
                 let series: f64 = (1..bounces).map(|bounce| rho.powi(bounce as i32)).sum();
                 // What comes straight from the middle comes from above every horizon near.
                 let expected = (1.0 + kept * series) / area;
-                let what = format!("sphere, {append:?}, albedo {rho:.2}, {bounces} bounces");
+                let what = format!("sphere, {builder:?}, albedo {rho:.2}, {bounces} bounces");
                 family.expect_mean(what, &over_points(&runs, channel), expected);
             }
         }
@@ -125,10 +125,10 @@ fn a_furnace_sphere_is_evenly_lit() {
     let points = evenly_over(&sphere, 1500);
     let scene = scene_of(vec![sphere], vec![shining(0.5)], vec![]);
     let mut family = Family::default();
-    for append in APPENDS {
+    for builder in SCENE_BUILDERS {
         let settings = TransportSettings {
             illumination: Illumination::Photons,
-            append,
+            builder: Some(builder),
             photons: 20_000,
             bounces: 16,
             rounds: 1,
@@ -137,7 +137,7 @@ fn a_furnace_sphere_is_evenly_lit() {
             ..TransportSettings::default()
         };
         let runs = irradiances(&gpu, &scene, &settings, &points, 1..17);
-        let what = format!("furnace sphere, {append:?}");
+        let what = format!("furnace sphere, {builder:?}");
         let expected = 2.0 * PI * kept_by_horizon(&scene.meshes[0], &points, RADIUS);
         family.expect_mean(&what, &over_points(&runs, 0), expected);
         for point in (0..points.len()).step_by(150) {
@@ -158,10 +158,10 @@ fn parallel_plates_send_light_to_and_fro() {
     meshes.extend([level(-0.2, [1.0; 2], true, 0), level(0.2, [1.0; 2], false, 1)]);
     let scene = scene_of(meshes, vec![shining(below as f32), matt(above as f32), mirror(1.0)], vec![]);
     let mut family = Family::default();
-    for (illumination, append) in BOTH.into_iter().flat_map(|illumination| APPENDS.map(|append| (illumination, append))) {
+    for (illumination, builder) in BOTH.into_iter().flat_map(|illumination| SCENE_BUILDERS.map(|builder| (illumination, builder))) {
         let settings = TransportSettings {
             illumination,
-            append,
+            builder: Some(builder),
             photons: 30_000,
             caustic_photons: 20_000,
             bounces: 48,
@@ -175,8 +175,8 @@ fn parallel_plates_send_light_to_and_fro() {
         let runs = irradiances(&gpu, &scene, &settings, &points, 1..25);
         let (upper, lower): (Vec<_>, Vec<_>) = runs.iter().map(|run| (run[..36].to_vec(), run[36..].to_vec())).unzip();
         let exact = PI / (1.0 - below * above);
-        family.expect_mean(format!("plates, {illumination:?}, {append:?}: above"), &over_points(&upper, 0), exact);
-        family.expect_mean(format!("plates, {illumination:?}, {append:?}: below"), &over_points(&lower, 0), above * exact);
+        family.expect_mean(format!("plates, {illumination:?}, {builder:?}: above"), &over_points(&upper, 0), exact);
+        family.expect_mean(format!("plates, {illumination:?}, {builder:?}: below"), &over_points(&lower, 0), above * exact);
     }
     family.assert_tells_one_per_cent();
 }
@@ -200,9 +200,9 @@ fn bounces_in_a_closed_room_are_a_geometric_series() {
     let gpu = device();
     let mut family = Family::default();
     for rho in [0.5f32, 0.9, 0.99] {
-        for variant in JUDGED {
+        for builder in JUDGED {
             let settings = Settings {
-                variant,
+                builder,
                 reflectance: rho,
                 photons: 1 << 19,
                 rng: Rng::Philox,
@@ -214,11 +214,11 @@ fn bounces_in_a_closed_room_are_a_geometric_series() {
             };
             let mut room = open_box(&settings);
             room.faces[5] = Some(Wall { name: "front", albedo: rho, shininess: None });
-            let outcome = match gpu.as_ref().filter(|_| variant != Variant::Cpu) {
+            let outcome = match gpu.as_ref().filter(|_| builder != Builder::Cpu) {
                 Some(gpu) => run_scene(gpu, &room, &settings),
                 None => run_scene_on_cpu(&room, &settings),
             };
-            expect_geometric(&mut family, &format!("room, {}", variant.name()), &outcome.fates, f64::from(rho));
+            expect_geometric(&mut family, &format!("room, {}", builder.name()), &outcome.fates, f64::from(rho));
         }
     }
     family.assert_tells(0.01, |what| what.starts_with("bright"));
@@ -232,11 +232,17 @@ fn bounces_in_a_sphere_are_a_geometric_series() {
     let mut family = Family::default();
     for rho in [0.5f32, 0.9, 0.99] {
         let scene = scene_of(vec![hollow_sphere(12)], vec![matt(rho)], vec![lamp.clone()]);
-        for append in APPENDS {
-            let settings =
-                TransportSettings { append, photons: 1 << 17, bounces: 15, rounds: 1, radius: Some(0.05), ..TransportSettings::default() };
+        for builder in SCENE_BUILDERS {
+            let settings = TransportSettings {
+                builder: Some(builder),
+                photons: 1 << 17,
+                bounces: 15,
+                rounds: 1,
+                radius: Some(0.05),
+                ..TransportSettings::default()
+            };
             let lit = received(&gpu, &scene, &settings, &[(DVec3::ZERO, DVec3::Y)]);
-            expect_geometric(&mut family, &format!("sphere, {append:?}"), &lit.fates[0], f64::from(rho));
+            expect_geometric(&mut family, &format!("sphere, {builder:?}"), &lit.fates[0], f64::from(rho));
         }
     }
     family.assert_tells(0.01, |what| what.starts_with("bright"));

@@ -2,7 +2,7 @@
 //! small runs beside the numbers that they had. Whoever changes one of them on purpose writes the new one here.
 
 use crate::common::{device, device_with, lit, run};
-use photonmill::bench::paper_line::{self, Counts};
+use photonmill::bench::room::{self, Counts};
 use photonmill::gpu::Options;
 use photonmill::path::StoredPath;
 use photonmill::photon::{MapPhoton, Origin, StoredPhoton};
@@ -13,7 +13,7 @@ use photonmill::rng::Rng;
 use photonmill::scene::built_in;
 use photonmill::scene::geometry::Geometry;
 use photonmill::settings::transport::TransportSettings;
-use photonmill::settings::{Math, Settings, Variant};
+use photonmill::settings::{Builder, Math, Settings};
 use photonmill::transport::View;
 
 /// Counts of a run: dispatches, submissions, events of all photons, bytes on the device, and bytes that the build moves.
@@ -28,31 +28,31 @@ struct Cost {
 }
 
 /// 1000 photons, 4 bounces, 2 rounds, 5 x 8 x 8 texels over the grid.
-fn of_the_box(variant: Variant, counters: Option<u32>) -> Option<Cost> {
+fn of_the_box(builder: Builder, counters: Option<u32>) -> Option<Cost> {
     let cost =
         |dispatches, build_bytes_per_event| Cost { dispatches, submissions: 6, events: 3530, device_bytes: 266_204, build_bytes_per_event };
-    Some(match variant {
+    Some(match builder {
         // A round: two lights, four bounces, five of the index, the gather, the film.
-        Variant::Naive => cost(2 * 13, 254),
+        Builder::Naive => cost(2 * 13, 254),
         // And one after each bounce, which counts it, and one before the index, whose size only the device knows.
         // And one more a bounce that marks gaps.
-        Variant::Atomic if counters.is_some() => Cost { device_bytes: 272_988, ..cost(2 * 22, 131) },
-        Variant::Atomic | Variant::Ballot | Variant::Group => cost(2 * 18, 131),
+        Builder::Atomic if counters.is_some() => Cost { device_bytes: 272_988, ..cost(2 * 22, 131) },
+        Builder::Atomic | Builder::Ballot | Builder::Group => cost(2 * 18, 131),
         // In place, a prefix sum of one level, moved together, counted: four a bounce.
-        Variant::Scan => Cost { device_bytes: 266_248, ..cost(2 * 26, 212) },
+        Builder::Scan => Cost { device_bytes: 266_248, ..cost(2 * 26, 212) },
         // The lights', and no path is stored.
-        Variant::Persistent => Cost { device_bytes: 170_300, ..cost(2 * 10, 12) },
-        Variant::Cpu => return None,
+        Builder::Persistent => Cost { device_bytes: 170_300, ..cost(2 * 10, 12) },
+        Builder::Cpu => return None,
     })
 }
 
 #[test]
 fn the_box_costs_what_it_did() {
     let Some(gpu) = device() else { return };
-    for (variant, counters) in Variant::ON_GPU.map(|variant| (variant, None)).into_iter().chain([(Variant::Atomic, Some(4))]) {
+    for (builder, counters) in Builder::ON_GPU.map(|builder| (builder, None)).into_iter().chain([(Builder::Atomic, Some(4))]) {
         // Strict, so that every device traces the same photons to the bit.
         let settings = Settings {
-            variant,
+            builder,
             counters,
             photons: 1000,
             bounces: 4,
@@ -64,11 +64,11 @@ fn the_box_costs_what_it_did() {
         };
         let outcome = run(&gpu, &settings);
         let counts = Counts::of(&outcome.fates, settings.rounds);
-        let work = |pass| paper_line::work(pass, &outcome.plan, &counts, 0.0).unwrap();
+        let work = |pass| room::work(pass, &outcome.plan, &counts, 0.0).unwrap();
         let build = work("build");
         // The roofline's own counts are those of the run.
         let dispatches: f64 = ["build", "index", "gather", "film"].map(|pass| work(pass).dispatches).iter().sum();
-        assert_eq!(dispatches * f64::from(settings.rounds), outcome.dispatches as f64, "{}", variant.name());
+        assert_eq!(dispatches * f64::from(settings.rounds), outcome.dispatches as f64, "{}", builder.name());
         let found = Cost {
             dispatches: outcome.dispatches,
             submissions: outcome.submissions,
@@ -76,8 +76,8 @@ fn the_box_costs_what_it_did() {
             device_bytes: outcome.plan.bytes(),
             build_bytes_per_event: (build.cost.bytes / build.items).round() as u64,
         };
-        let expected = of_the_box(variant, counters).unwrap_or_else(|| panic!("{}: write here what it costs: {found:?}", variant.name()));
-        assert_eq!(found, expected, "{}", variant.name());
+        let expected = of_the_box(builder, counters).unwrap_or_else(|| panic!("{}: write here what it costs: {found:?}", builder.name()));
+        assert_eq!(found, expected, "{}", builder.name());
     }
 }
 

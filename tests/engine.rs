@@ -10,7 +10,7 @@ use photonmill::gpu::kernels::ScanAdd;
 use photonmill::gpu::{Commands, Constants, Extent, Gpu, Memory, Options, check};
 use photonmill::records::ScanPush;
 use photonmill::rng::Rng;
-use photonmill::settings::{Gather, Settings, Variant};
+use photonmill::settings::{Builder, Gather, Settings};
 use photonmill::timings::{Clock, Row, Timings};
 
 /// Opening a device runs the start-up check on it, with 64-bit sums and with sums of two words.
@@ -158,13 +158,13 @@ fn nesting_check(rows: &[Row]) -> Check {
 fn count_check(timings: &Timings, settings: &Settings, chunks: u64) -> Check {
     let rounds = u64::from(settings.rounds);
     // Neither does the persistent builder know bounces of all photons.
-    let bounces = if matches!(settings.variant, Variant::Cpu | Variant::Persistent) { 0 } else { settings.bounces };
+    let bounces = if matches!(settings.builder, Builder::Cpu | Builder::Persistent) { 0 } else { settings.bounces };
     let mut names = vec!["round".to_owned(), "round/build".to_owned(), "round/gather".to_owned()];
     if bounces != 0 {
         names.push("round/build/emit".to_owned());
     }
     names.extend((1..=bounces).map(|bounce| format!("round/build/bounce {bounce}")));
-    if settings.variant != Variant::Cpu && settings.gather == Gather::Grid {
+    if settings.builder != Builder::Cpu && settings.gather == Gather::Grid {
         names.push("round/index".to_owned());
     }
     for name in &names {
@@ -186,15 +186,15 @@ fn count_check(timings: &Timings, settings: &Settings, chunks: u64) -> Check {
 #[test]
 fn timings_nest_and_count() {
     let Some(gpu) = device() else { return };
-    for variant in Variant::ON_GPU {
+    for builder in Builder::ON_GPU {
         // 120 bounces of many rounds take more timestamps than one submission has.
         for (rounds, bounces, chunk, gather) in
             [(1, 15, None, Gather::Grid), (7, 2, Some(1000), Gather::Brute), (40, 120, None, Gather::Grid)]
         {
             let settings =
-                Settings { variant, rounds, bounces, chunk, gather, mesh: 16, photons: 2001, rng: Rng::Philox, ..Settings::default() };
+                Settings { builder, rounds, bounces, chunk, gather, mesh: 16, photons: 2001, rng: Rng::Philox, ..Settings::default() };
             let outcome = run(&gpu, &settings);
-            let what = format!("{variant:?}, {rounds} rounds");
+            let what = format!("{builder:?}, {rounds} rounds");
             assert_holds(&what, count_check(&outcome.timings, &settings, u64::from(outcome.plan.chunks_per_round)));
             assert_holds(&what, nesting_check(outcome.timings.rows()));
             assert!(outcome.submissions >= 1 && outcome.dispatches > u64::from(rounds));
@@ -228,7 +228,7 @@ fn timings_nest_and_count() {
 
 #[test]
 fn the_cpu_builder_is_timed_on_the_host() {
-    let settings = Settings { variant: Variant::Cpu, rounds: 3, chunk: Some(1500), mesh: 16, ..Settings::default() };
+    let settings = Settings { builder: Builder::Cpu, rounds: 3, chunk: Some(1500), mesh: 16, ..Settings::default() };
     let outcome = run_on_cpu(&settings);
     assert_holds("cpu", count_check(&outcome.timings, &settings, u64::from(outcome.plan.chunks_per_round)));
     assert_holds("cpu", nesting_check(outcome.timings.rows()));
@@ -240,7 +240,7 @@ fn the_cpu_builder_is_timed_on_the_host() {
 #[test]
 fn a_run_makes_the_pipelines_of_its_plan_once() {
     let Some(gpu) = device_with(Options::default()) else { return };
-    let settings = Settings { variant: Variant::Naive, gather: Gather::Brute, mesh: 8, ..Settings::default() };
+    let settings = Settings { builder: Builder::Naive, gather: Gather::Brute, mesh: 8, ..Settings::default() };
     let before = gpu.pipeline_count();
     run(&gpu, &settings);
     // Emission, one bounce, one gather.
@@ -251,7 +251,7 @@ fn a_run_makes_the_pipelines_of_its_plan_once() {
 
 #[test]
 fn the_checks_of_timings_complain() {
-    let settings = Settings { variant: Variant::Cpu, rounds: 2, mesh: 4, ..Settings::default() };
+    let settings = Settings { builder: Builder::Cpu, rounds: 2, mesh: 4, ..Settings::default() };
     let timings = run_on_cpu(&settings).timings;
     assert_holds("the run itself", nesting_check(timings.rows()));
     let spoiled = |name: &str, spoil: fn(&mut Row)| {

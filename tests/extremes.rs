@@ -34,8 +34,8 @@ use photonmill::scene::{Material, Mesh, Scene};
 use photonmill::selfcheck::measure::irradiance;
 use photonmill::settings::stop::Stop;
 use photonmill::settings::transport::{Illumination, Kernel, Part, TransportSettings};
-use photonmill::settings::{EmissionLaw, Gather, MAX_EVENTS, Settings, Variant};
-use photonmill::transport::{Lit, RoundFilm};
+use photonmill::settings::{Builder, EmissionLaw, Gather, MAX_EVENTS, Settings};
+use photonmill::transport::{RoundFilm, RunResult};
 use photonmill::{estimate, index};
 
 /// Half of an f32's spacing below 1.
@@ -348,7 +348,7 @@ fn a_thousand_bounces_store_a_geometric_series() {
 fn a_billion_photons_have_the_exact_share() {
     let Some(gpu) = device() else { return };
     let settings =
-        Settings { photons: 1_000_000_000, bounces: 1, mesh: 1, rng: Rng::Philox, variant: Variant::Ballot, ..Settings::default() };
+        Settings { photons: 1_000_000_000, bounces: 1, mesh: 1, rng: Rng::Philox, builder: Builder::Ballot, ..Settings::default() };
     let fates = run(&gpu, &settings).fates;
     assert_eq!(fates.emitted, 1_000_000_000);
     assert_holds("first bounce", share_check("stored", fates.bounces[0].stored, fates.emitted, 0.586_425_3));
@@ -524,7 +524,7 @@ fn vast() -> Limits {
 fn slots_of_a_chunk_are_numbered_in_32_bits() {
     let plan = |photons: u32, bounces: u32, limits: &Limits| {
         let settings =
-            Settings { photons, bounces, chunk: Some(1 << 31), mesh: 1, rng: Rng::Philox, variant: Variant::Naive, ..Settings::default() };
+            Settings { photons, bounces, chunk: Some(1 << 31), mesh: 1, rng: Rng::Philox, builder: Builder::Naive, ..Settings::default() };
         Plan::new(&open_box(&settings), &settings, limits).unwrap()
     };
     let check = |plan: &Plan, limits: &Limits| {
@@ -624,9 +624,9 @@ fn photons_of_a_second_row_of_groups_reach_the_map() {
     assert_eq!(whole.plan.global.as_ref().unwrap().chunk_photons, photons, "the photons do not fit one dispatch here");
     let split = lit(&TransportSettings { chunk: Some(1_000_003), ..settings.clone() });
     assert_eq!((&whole.film, &whole.fates), (&split.film, &split.fates));
-    let flown = |lit: &Lit| lit.fates[0].bounces[0].stored + lit.fates[0].bounces[0].absorbed + lit.fates[0].bounces[0].escaped;
-    assert_eq!(flown(&whole), u64::from(photons));
-    assert_eq!(flown(&lit(&TransportSettings { photons: photons - 33, ..settings })), u64::from(photons) - 33);
+    let traced = |lit: &RunResult| lit.fates[0].bounces[0].stored + lit.fates[0].bounces[0].absorbed + lit.fates[0].bounces[0].escaped;
+    assert_eq!(traced(&whole), u64::from(photons));
+    assert_eq!(traced(&lit(&TransportSettings { photons: photons - 33, ..settings })), u64::from(photons) - 33);
 }
 
 /// Pictures of one pixel, of odd sides and of one long row, by small and large work groups.
@@ -825,7 +825,7 @@ fn channels_a_billionth_as_bright_are_right() {
             grid(0.5, DVec3::NEG_Y, 3).into_iter().map(|(point, normal)| (middle + 0.8 * point + DVec3::Y * 0.1, normal)).collect();
         let runs: Vec<_> = (1..9).map(|seed| received(&gpu, &scene, &TransportSettings { seed, ..settings.clone() }, &points)).collect();
         // Of a point too few photons may be seen for a channel to be right, but not without its error saying so.
-        let off = |lit: &Lit, point: usize, channel: usize| {
+        let off = |lit: &RunResult, point: usize, channel: usize| {
             let (mean, error) = (lit.film.mean(point, &lit.plan), lit.film.stated_error(point, &lit.plan));
             (mean[channel] - mean.x * f64::from(tint[channel])).abs() / error[channel]
         };

@@ -22,7 +22,7 @@ use photonmill::render::{self, Control, constants};
 use photonmill::resources::Resources;
 use photonmill::rng::Rng;
 use photonmill::scene::open_box::open_box;
-use photonmill::settings::{Gather, Preset, Settings, Sums, Variant};
+use photonmill::settings::{Builder, Gather, Preset, Settings, Sums};
 use photonmill::{estimate, index};
 use pulp::Arch;
 
@@ -59,10 +59,10 @@ fn runs_and_builders_and_gathers_give_the_same_bits() {
         for run in 1..10 {
             assert_same(what, &format!("run {run}"), &film(&gpu, &settings), &expected);
         }
-        for variant in Variant::ON_GPU {
+        for builder in Builder::ON_GPU {
             for gather in [Gather::Grid, Gather::Brute] {
-                let other = Settings { variant, gather, ..settings.clone() };
-                assert_same(what, &format!("{variant:?} {gather:?}"), &film(&gpu, &other), &expected);
+                let other = Settings { builder, gather, ..settings.clone() };
+                assert_same(what, &format!("{builder:?} {gather:?}"), &film(&gpu, &other), &expected);
             }
         }
     }
@@ -77,18 +77,18 @@ fn work_groups_and_chunks_give_the_same_bits() {
             if group_size > gpu.facts().work_group_size {
                 continue;
             }
-            let variant = Variant::ON_GPU[place % Variant::ON_GPU.len()];
+            let builder = Builder::ON_GPU[place % Builder::ON_GPU.len()];
             for gather in [Gather::Grid, Gather::Brute] {
-                let other = Settings { group_size, variant, gather, ..settings.clone() };
-                assert_same(what, &format!("groups of {group_size}, {variant:?} {gather:?}"), &film(&gpu, &other), &expected);
+                let other = Settings { group_size, builder, gather, ..settings.clone() };
+                assert_same(what, &format!("groups of {group_size}, {builder:?} {gather:?}"), &film(&gpu, &other), &expected);
             }
         }
         for (counters, group_size, gather) in [(2, 128, Gather::Grid), (8, 32, Gather::Brute), (64, 64, Gather::Grid)] {
-            let other = Settings { variant: Variant::Atomic, counters: Some(counters), group_size, gather, ..settings.clone() };
+            let other = Settings { builder: Builder::Atomic, counters: Some(counters), group_size, gather, ..settings.clone() };
             assert_same(what, &format!("{counters} counters, {gather:?}"), &film(&gpu, &other), &expected);
         }
         for (place, chunk) in [301, 1024, 4998].into_iter().enumerate() {
-            let other = Settings { chunk: Some(chunk), variant: Variant::ON_GPU[place % Variant::ON_GPU.len()], ..settings.clone() };
+            let other = Settings { chunk: Some(chunk), builder: Builder::ON_GPU[place % Builder::ON_GPU.len()], ..settings.clone() };
             let outcome = run(&gpu, &other);
             assert_eq!(outcome.plan.chunks_per_round, settings.photons.div_ceil(chunk), "{what}");
             assert_same(what, &format!("chunks of {chunk}"), &outcome.film, &expected);
@@ -296,8 +296,8 @@ fn an_empty_map_and_a_map_of_one() {
         }
     }
     // Nothing is stored in a black box, and the whole line still runs.
-    for variant in Variant::ON_GPU {
-        let black = film(&gpu, &Settings { reflectance: 0.0, variant, ..Settings::default() });
+    for builder in Builder::ON_GPU {
+        let black = film(&gpu, &Settings { reflectance: 0.0, builder, ..Settings::default() });
         assert!(black.sums.iter().all(|sum| *sum == 0));
     }
 }
@@ -308,7 +308,7 @@ fn long_photon_lists_are_gathered_to_the_end() {
     let Some(gpu) = device() else { return };
     // Few points keep the brute gather short; what is long is the list.
     let settings =
-        Settings { photons: 200_000, rng: Rng::Philox, mesh: 8, chunk: Some(200_000), variant: Variant::Ballot, ..Settings::default() };
+        Settings { photons: 200_000, rng: Rng::Philox, mesh: 8, chunk: Some(200_000), builder: Builder::Ballot, ..Settings::default() };
     let map = photons(&gpu, &settings);
     assert!(map.len() > 290_000);
     let plan = plan_for(&gpu, &open_box(&settings), &settings);
@@ -322,9 +322,9 @@ fn long_photon_lists_are_gathered_to_the_end() {
     let settings = Settings { radius: 0.5, mesh: 2, ..settings };
     let plan = plan_for(&gpu, &open_box(&settings), &settings);
     let expected = gathered_on_cpu(&plan, &map);
-    for (gather, variant) in [(Gather::Brute, Variant::Ballot), (Gather::Grid, Variant::Ballot), (Gather::Brute, Variant::Naive)] {
-        let found = film(&gpu, &Settings { gather, variant, ..settings.clone() });
-        assert_holds(format!("{gather:?} {variant:?}, wide"), equal_sums("200 000 photons", &found.sums, &expected));
+    for (gather, builder) in [(Gather::Brute, Builder::Ballot), (Gather::Grid, Builder::Ballot), (Gather::Brute, Builder::Naive)] {
+        let found = film(&gpu, &Settings { gather, builder, ..settings.clone() });
+        assert_holds(format!("{gather:?} {builder:?}, wide"), equal_sums("200 000 photons", &found.sums, &expected));
     }
     let cut_short = gathered_on_cpu(&plan, &map[..65_535]);
     assert_complains("a list cut short", equal_sums("65 535 photons", &cut_short, &expected));

@@ -20,8 +20,8 @@ use photonmill::scene::open_box::open_box;
 use photonmill::scene::{Camera, Material, Mesh, Scene, built_in};
 use photonmill::selfcheck::measure::{irradiance, radiance};
 use photonmill::settings::transport::{Effect, Illumination, TransportSettings};
-use photonmill::settings::{EmissionLaw, Settings, Variant};
-use photonmill::transport::Lit;
+use photonmill::settings::{Builder, EmissionLaw, Settings};
+use photonmill::transport::RunResult;
 
 fn settings() -> TransportSettings {
     TransportSettings { photons: 4000, caustic_photons: 4000, rounds: 2, shadow_rays: 8, ..TransportSettings::default() }
@@ -168,15 +168,15 @@ fn closed_room(albedo: f32) -> Scene {
 }
 
 /// Photons that left the scene.
-fn escaped(lit: &Lit) -> u64 {
+fn escaped(lit: &RunResult) -> u64 {
     lit.fates.iter().map(|fates| fates.ledger().escaped).sum()
 }
 
-fn none_escapes(what: &str, lit: &Lit) -> Check {
-    let flown: u64 = lit.fates[0].bounces.iter().map(|bounce| bounce.stored + bounce.absorbed + bounce.escaped).sum();
+fn none_escapes(what: &str, lit: &RunResult) -> Check {
+    let traced: u64 = lit.fates[0].bounces.iter().map(|bounce| bounce.stored + bounce.absorbed + bounce.escaped).sum();
     match escaped(lit) {
         0 => Ok(()),
-        lost => Err(format!("{what}: {lost} of {} photons and {flown} flights left a closed room", lit.fates[0].emitted)),
+        lost => Err(format!("{what}: {lost} of {} photons and {traced} flights left a closed room", lit.fates[0].emitted)),
     }
 }
 
@@ -223,8 +223,8 @@ fn every_operation_is_rounded_by_itself() {
             modules.extend(photonmill::transport::modules(&plan, gpu.facts()));
         }
     }
-    for variant in Variant::ON_GPU {
-        let settings = Settings { variant, ..Settings::default() };
+    for builder in Builder::ON_GPU {
+        let settings = Settings { builder, ..Settings::default() };
         let plan = Plan::new(&open_box(&settings), &settings, &limits).unwrap();
         modules.extend(photonmill::trace::modules(&plan));
         modules.extend(photonmill::estimate::modules(&plan, gpu.facts()));
@@ -402,7 +402,7 @@ fn thin_walls_and_sheets_let_no_light_through() {
     let no_wall = lit_and_dark_room(|_| {});
     let points = [(half, DVec3::NEG_X), (thin, DVec3::X), (DVec3::new(0.99, 0.0, 0.4), y), (DVec3::X, DVec3::NEG_X)]
         .map(|(at, normal)| (at + DVec3::new(0.0, 0.5, 0.5) * (y + z - normal.abs()), normal));
-    let check = |what: &str, lit: &Lit| -> Check {
+    let check = |what: &str, lit: &RunResult| -> Check {
         let means: Vec<DVec3> = (0..points.len()).map(|point| lit.film.mean(point, &lit.plan)).collect();
         assert!(means[0].x > 0.1, "{what}: the lit side has {}", means[0]);
         match means[1..].iter().find(|mean| **mean != DVec3::ZERO) {
@@ -482,7 +482,7 @@ fn scaled_cornell(k: i32) -> (Scene, Vec<(DVec3, DVec3)>) {
     (scene, points)
 }
 
-fn same_sums(what: &str, found: &Lit, expected: &Lit) -> Check {
+fn same_sums(what: &str, found: &RunResult, expected: &RunResult) -> Check {
     if found.film == expected.film && found.fates == expected.fates { Ok(()) } else { Err(format!("{what}: other light or other fates")) }
 }
 
@@ -516,8 +516,8 @@ fn every_power_of_two_is_the_same_light_to_the_bit() {
 #[test]
 fn the_open_box_of_any_power_of_two_stores_the_same_photons() {
     let gpu = device();
-    for variant in [Variant::Cpu, Variant::Naive, Variant::Ballot] {
-        let settings = Settings { variant, photons: 1001, shininess: [Some(2.0); 5], ..Settings::default() };
+    for builder in [Builder::Cpu, Builder::Naive, Builder::Ballot] {
+        let settings = Settings { builder, photons: 1001, shininess: [Some(2.0); 5], ..Settings::default() };
         let of = |k: i32| {
             let factor = 2f64.powi(k);
             let mut scene = open_box(&settings);
@@ -525,8 +525,8 @@ fn the_open_box_of_any_power_of_two_stores_the_same_photons() {
             scene.max_corner *= factor;
             scene.lights.iter_mut().for_each(|light| light.radius *= factor);
             let settings = Settings { eye: settings.eye.map(|place| place * factor as f32), ..settings.clone() };
-            let photons = match (variant, &gpu) {
-                (Variant::Cpu, _) => photonmill::render::photons_on_cpu(&scene, &settings),
+            let photons = match (builder, &gpu) {
+                (Builder::Cpu, _) => photonmill::render::photons_on_cpu(&scene, &settings),
                 (_, Some(gpu)) => photonmill::render::photons_on_gpu(gpu, &scene, &settings),
                 (_, None) => return Vec::new(),
             };
@@ -536,7 +536,7 @@ fn the_open_box_of_any_power_of_two_stores_the_same_photons() {
         };
         let expected = of(0);
         assert!(gpu.is_none() || expected.len() > 1001);
-        (-20..=20).for_each(|k| assert_eq!(of(k), expected, "{variant:?}, 2^{k}"));
+        (-20..=20).for_each(|k| assert_eq!(of(k), expected, "{builder:?}, 2^{k}"));
     }
 }
 

@@ -10,7 +10,7 @@ use photonmill::photon::StoredPhoton;
 use photonmill::rng::Rng;
 use photonmill::scene::open_box::open_box;
 use photonmill::scene::room::{RoomScene, Wall};
-use photonmill::settings::{EmissionLaw, Settings, Variant};
+use photonmill::settings::{Builder, EmissionLaw, Settings};
 
 /// Every path that entered a bounce has one fate there, and who was stored enters the next.
 fn closes(fates: &Fates, emitted: u64) -> Check {
@@ -51,8 +51,8 @@ fn fates(gpu: &Gpu, scene: &RoomScene, settings: &Settings) -> Fates {
     let total = settings.total_photons();
     let expected = run_scene_on_cpu(scene, settings).fates;
     assert_holds(format!("cpu\n{settings:?}"), closes(&expected, total));
-    for variant in Variant::ON_GPU {
-        let settings = Settings { variant, paranoid: true, ..settings.clone() };
+    for builder in Builder::ON_GPU {
+        let settings = Settings { builder, paranoid: true, ..settings.clone() };
         match closed_fates(gpu, scene, &settings) {
             Ok(found) => assert_eq!(found, expected, "{settings:?}"),
             Err(complaint) => panic!("{settings:?}: {complaint}"),
@@ -145,14 +145,14 @@ fn a_round_larger_than_a_buffer_splits_and_drops_nothing() {
     let photons = 600_001;
     let settings = Settings { photons, rng: Rng::Philox, ..small() };
     let expected = run_on_cpu(&Settings { threads: 2, ..settings.clone() }).fates;
-    for variant in Variant::ON_GPU {
-        let outcome = run(&gpu, &Settings { variant, ..settings.clone() });
+    for builder in Builder::ON_GPU {
+        let outcome = run(&gpu, &Settings { builder, ..settings.clone() });
         if largest < size_of::<StoredPhoton>() as u64 * 15 * u64::from(photons) {
-            assert!(outcome.plan.chunks_per_round > 1, "{variant:?}");
+            assert!(outcome.plan.chunks_per_round > 1, "{builder:?}");
         }
-        assert_holds(format!("{variant:?}"), closes(&outcome.fates, u64::from(photons)));
+        assert_holds(format!("{builder:?}"), closes(&outcome.fates, u64::from(photons)));
         let flips: u64 = pairs(&outcome.fates.bounces, &expected.bounces).map(|(a, b)| a.stored.abs_diff(b.stored)).sum();
-        assert!(flips <= 3, "{variant:?}: {flips} stored photons more or less than the CPU's");
+        assert!(flips <= 3, "{builder:?}: {flips} stored photons more or less than the CPU's");
     }
 }
 

@@ -15,10 +15,11 @@ use photonmill::render::{self, Control};
 use photonmill::scene::geometry::Geometry;
 use photonmill::scene::light::LightKind;
 use photonmill::scene::{Camera, Scene};
+use photonmill::settings::Builder;
 use photonmill::settings::stop::{Stop, squared_radius};
-use photonmill::settings::transport::{Append, Illumination, TransportSettings};
+use photonmill::settings::transport::{Illumination, TransportSettings};
 use photonmill::transport::resources::TransportResources;
-use photonmill::transport::{self, End, Lit, Round, View, photons};
+use photonmill::transport::{self, End, Round, RunResult, View, photons};
 
 fn settings() -> TransportSettings {
     TransportSettings { photons: 8000, caustic_photons: 8000, rounds: 8, shadow_rays: 1, ..TransportSettings::default() }
@@ -39,9 +40,9 @@ fn bright_rooms_lose_no_light() {
     let Some(gpu) = device() else { return };
     for albedo in [0.95f32, 0.99] {
         let exact = std::f64::consts::PI / (1.0 - f64::from(albedo));
-        for append in [Append::Atomic, Append::Ballot, Append::Persistent] {
-            let what = format!("albedo {albedo}, {}", append.name());
-            let settings = TransportSettings { append, radius: Some(0.4), alpha: 1.0, ..settings() };
+        for builder in [Builder::Atomic, Builder::Ballot, Builder::Persistent] {
+            let what = format!("albedo {albedo}, {}", builder.name());
+            let settings = TransportSettings { builder: Some(builder), radius: Some(0.4), alpha: 1.0, ..settings() };
             let lit = received(&gpu, &furnace(albedo), &settings, &POINT);
             let (mean, error) = (lit.film.mean(0, &lit.plan).x, lit.film.standard_error(0, &lit.plan).x);
             assert!(error < 0.04 * exact, "{what}: {mean} +- {error}");
@@ -67,7 +68,7 @@ fn what_a_cap_cuts_off_is_counted() {
         let what = format!("{illumination:?}, albedo {albedo}, {bounces} bounces");
         let settings = TransportSettings { illumination, bounces, radius: Some(0.4), alpha: 1.0, ..settings() };
         let lit = received(&gpu, &furnace(albedo), &settings, &POINT);
-        let Lit { losses, fates, .. } = &lit;
+        let RunResult { losses, fates, .. } = &lit;
         let survivors = f64::from(albedo).powi(bounces as i32);
         let emitted = fates[0].emitted as f64;
         // A binomial deviation of the photons that survive.
@@ -138,8 +139,9 @@ fn light_trapped_for_ever_is_counted() {
 fn photons_stored_are_the_length_of_the_map() {
     let Some(gpu) = device() else { return };
     let scene = scene("cornell-spheres");
-    for (append, illumination) in [Append::Ballot, Append::Persistent].into_iter().flat_map(|append| BOTH.map(|light| (append, light))) {
-        let settings = TransportSettings { append, illumination, photons: 3000, rounds: 1, chunk: Some(700), ..settings() };
+    for (builder, illumination) in [Builder::Ballot, Builder::Persistent].into_iter().flat_map(|builder| BOTH.map(|light| (builder, light)))
+    {
+        let settings = TransportSettings { builder: Some(builder), illumination, photons: 3000, rounds: 1, chunk: Some(700), ..settings() };
         let lit = run(&gpu, &scene, &settings, &AtomicBool::new(false)).unwrap();
         let geometry = Geometry::new(&scene).unwrap();
         let mut commands = Commands::new(&gpu, transport::constants(&lit.plan), Instant::now()).unwrap();
@@ -156,8 +158,8 @@ fn photons_stored_are_the_length_of_the_map() {
                 photons::trace(&mut commands, round, buffers, map, chunk, &mut count).unwrap();
             }
             let fates = &lit.fates[usize::from(map.caustic_only)];
-            assert!(stored > 100, "{append:?}, {illumination:?}, {}: {stored}", map.name);
-            assert_eq!(fates.ledger().stored, stored, "{append:?}, {illumination:?}, {}", map.name);
+            assert!(stored > 100, "{builder:?}, {illumination:?}, {}: {stored}", map.name);
+            assert_eq!(fates.ledger().stored, stored, "{builder:?}, {illumination:?}, {}", map.name);
         }
     }
 }
@@ -181,7 +183,7 @@ fn radii_take_no_sum_over_earlier_rounds() {
     assert!(began.elapsed() < Duration::from_secs(2), "{:?}", began.elapsed());
 }
 
-fn run(gpu: &Gpu, scene: &Scene, settings: &TransportSettings, cancelled: &AtomicBool) -> Result<Lit, Error> {
+fn run(gpu: &Gpu, scene: &Scene, settings: &TransportSettings, cancelled: &AtomicBool) -> Result<RunResult, Error> {
     let geometry = Geometry::new(scene)?;
     let camera = scene.cameras.first().cloned().unwrap_or_else(|| Camera::around(scene.bounds().0, scene.bounds().1));
     let sensor = Sensor::Picture { width: 64, height: 64 };

@@ -8,7 +8,7 @@ use photonmill::rng::Rng;
 use photonmill::scene::geometry::Geometry;
 use photonmill::scene::{Scene, built_in};
 use photonmill::settings::transport::{Illumination, TransportSettings};
-use photonmill::settings::{Gather, Preset, Settings, Sums, Variant};
+use photonmill::settings::{Builder, Gather, Preset, Settings, Sums};
 use photonmill::transport::View;
 
 /// Device memory against what a plan lists.
@@ -41,9 +41,9 @@ fn the_papers_line_takes_what_its_plan_says() {
         Settings { photons: 999, mesh: 5, rounds: 2, ..Settings::preset(Preset::Rounds) },
     ];
     cases.push(Settings { counters: Some(4), ..small() });
-    cases.extend(Variant::ON_GPU.map(|variant| Settings { variant, ..small() }));
+    cases.extend(Builder::ON_GPU.map(|builder| Settings { builder, ..small() }));
     // Weights at the eye, which only the builder that keeps order holds apart from their photons.
-    cases.push(Settings { variant: Variant::Scan, shininess: [Some(2.0); 5], ..small() });
+    cases.push(Settings { builder: Builder::Scan, shininess: [Some(2.0); 5], ..small() });
     for settings in cases {
         let (bytes, outcome) = taken(&gpu, || run(&gpu, &settings));
         let plan = &outcome.plan;

@@ -5,11 +5,14 @@ use std::f64::consts::{FRAC_PI_2, PI, TAU};
 
 use crate::common::device;
 use crate::common::family::Family;
-use crate::common::lit::{APPENDS, BOTH, glass, grid, irradiances, level, matt, mirror, radiances, received, scene_of, shaft, shining};
+use crate::common::lit::{
+    BOTH, SCENE_BUILDERS, glass, grid, irradiances, level, matt, mirror, radiances, received, scene_of, shaft, shining,
+};
 use glam::{DVec3, Vec3};
 use photonmill::scene::light::LightKind;
 use photonmill::scene::{Mesh, Scene};
-use photonmill::settings::transport::{Append, Illumination, Part, TransportSettings};
+use photonmill::settings::Builder;
+use photonmill::settings::transport::{Illumination, Part, TransportSettings};
 
 const IOR: f64 = 1.5;
 
@@ -173,10 +176,10 @@ fn even_light_crosses_a_surface_of_glass() {
         let scene = scene_of(meshes, vec![glass(IOR as f32), shining(0.0), matt(0.0), mirror(1.0)], vec![]);
         let (floor, ceiling) = (grid(-0.5, DVec3::Y, 6), grid(0.5, DVec3::NEG_Y, 6));
         let (far, near) = if lamp_below { (ceiling, floor) } else { (floor, ceiling) };
-        for (illumination, append) in BOTH.into_iter().flat_map(|illumination| APPENDS.map(|append| (illumination, append))) {
+        for (illumination, builder) in BOTH.into_iter().flat_map(|illumination| SCENE_BUILDERS.map(|builder| (illumination, builder))) {
             let settings = TransportSettings {
                 illumination,
-                append,
+                builder: Some(builder),
                 radius: Some(0.1),
                 caustic_radius: Some(0.1),
                 alpha: 1.0,
@@ -191,7 +194,7 @@ fn even_light_crosses_a_surface_of_glass() {
             for (where_, points, expected) in [("beyond", &far, share), ("back", &near, 1.0 - share)] {
                 let runs = irradiances(&gpu, &scene, &settings, points, 1..25);
                 let means: Vec<f64> = runs.iter().map(|run| run.iter().map(|light| light.x).sum::<f64>() / run.len() as f64).collect();
-                family.expect_mean(format!("{what}, {illumination:?}, {append:?}: {where_}"), &means, PI * expected);
+                family.expect_mean(format!("{what}, {illumination:?}, {builder:?}: {where_}"), &means, PI * expected);
             }
         }
     }
@@ -245,11 +248,11 @@ fn images_light_the_end_of_a_corridor() {
     };
     let reflected = over_disc(&|x, y| (-9..=9).filter(|n| *n != 0).map(|n| image(n, x, y)).sum());
     let mut family = Family::default();
-    for append in APPENDS {
+    for builder in SCENE_BUILDERS {
         for illumination in BOTH {
             let settings = TransportSettings {
                 illumination,
-                append,
+                builder: Some(builder),
                 radius: Some(radius),
                 caustic_radius: Some(radius),
                 alpha: 1.0,
@@ -263,7 +266,7 @@ fn images_light_the_end_of_a_corridor() {
             let lit = received(&gpu, &scene, &settings, &[(DVec3::ZERO, DVec3::Z)]);
             let own = if illumination == Illumination::Split { image(0, 0.0, 0.0) } else { over_disc(&|x, y| image(0, x, y)) };
             let (mean, error) = (lit.film.mean(0, &lit.plan).x, lit.film.standard_error(0, &lit.plan).x);
-            family.expect_estimate(format!("corridor, {illumination:?}, {append:?}"), mean, error, 32, own + reflected);
+            family.expect_estimate(format!("corridor, {illumination:?}, {builder:?}"), mean, error, 32, own + reflected);
         }
     }
     family.assert_tells_one_per_cent();
@@ -298,10 +301,10 @@ fn paraboloid(material: usize) -> Mesh {
     mesh
 }
 
-fn caustics(illumination: Illumination, append: Append, photons: u32, radius: f64) -> TransportSettings {
+fn caustics(illumination: Illumination, builder: Builder, photons: u32, radius: f64) -> TransportSettings {
     TransportSettings {
         illumination,
-        append,
+        builder: Some(builder),
         part: Part::Caustic,
         radius: Some(radius),
         caustic_radius: Some(radius),
@@ -334,11 +337,11 @@ fn light_from_a_focus_leaves_in_parallel() {
             outer_angle: 1.0,
         };
         let scene = scene_of(vec![paraboloid(0), level(distance, [2.0; 2], false, 1)], vec![mirror(0.9), matt(0.0)], vec![lamp]);
-        for append in APPENDS {
+        for builder in SCENE_BUILDERS {
             for illumination in BOTH {
-                let lit = received(&gpu, &scene, &caustics(illumination, append, 12_000, h), &[(DVec3::Y * distance, DVec3::NEG_Y)]);
+                let lit = received(&gpu, &scene, &caustics(illumination, builder, 12_000, h), &[(DVec3::Y * distance, DVec3::NEG_Y)]);
                 let (mean, error) = (lit.film.mean(0, &lit.plan).x, lit.film.standard_error(0, &lit.plan).x);
-                family.expect_estimate(format!("{distance} m off, {illumination:?}, {append:?}"), mean, error, 24, expected);
+                family.expect_estimate(format!("{distance} m off, {illumination:?}, {builder:?}"), mean, error, 24, expected);
             }
         }
     }
@@ -357,11 +360,11 @@ fn sunlight_meets_in_the_focus() {
     // The plate's own back is black, and it takes its light away before the mirror.
     let scene = scene_of(vec![paraboloid(0), level(FOCUS, [plate; 2], false, 1)], vec![mirror(0.9), matt(0.0)], vec![sun]);
     let expected = 0.9 * (opening - plate * plate) / (PI * radius * radius);
-    for append in APPENDS {
+    for builder in SCENE_BUILDERS {
         for illumination in BOTH {
-            let lit = received(&gpu, &scene, &caustics(illumination, append, 20_000, radius), &[(DVec3::Y * FOCUS, DVec3::NEG_Y)]);
+            let lit = received(&gpu, &scene, &caustics(illumination, builder, 20_000, radius), &[(DVec3::Y * FOCUS, DVec3::NEG_Y)]);
             let (mean, error) = (lit.film.mean(0, &lit.plan).x, lit.film.standard_error(0, &lit.plan).x);
-            family.expect_estimate(format!("in the focus, {illumination:?}, {append:?}"), mean, error, 24, expected);
+            family.expect_estimate(format!("in the focus, {illumination:?}, {builder:?}"), mean, error, 24, expected);
         }
     }
     family.assert_tells_one_per_cent();

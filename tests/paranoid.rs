@@ -7,16 +7,16 @@ use std::sync::atomic::AtomicBool;
 use crate::common::{Check, Complaint, assert_holds, device, in_order, nothing_odd, outcome_of, photons, photons_on_cpu, run_on_cpu};
 use glam::Vec3;
 use photonmill::gpu::Gpu;
-use photonmill::oddities::{Oddities, What};
+use photonmill::nonfinite_values::{NonfiniteValues, What};
 use photonmill::plan::transport::{Sensor, TransportPlan};
 use photonmill::render::{self, Control};
 use photonmill::scene::geometry::Geometry;
 use photonmill::scene::open_box::open_box;
 use photonmill::scene::{Camera, Scene, built_in};
 use photonmill::settings::transport::{Illumination, TransportSettings};
-use photonmill::settings::{Preset, Settings, Variant};
+use photonmill::settings::{Builder, Preset, Settings};
 use photonmill::transport::replay::{PhotonName, replay};
-use photonmill::transport::{self, Lit, View};
+use photonmill::transport::{self, RunResult, View};
 
 const SENSOR: Sensor = Sensor::Picture { width: 24, height: 24 };
 
@@ -28,7 +28,7 @@ fn plan_of(gpu: &Gpu, scene: &Scene, geometry: &Geometry, settings: &TransportSe
     TransportPlan::new(scene, geometry, settings, SENSOR, &render::limits(gpu.facts())).unwrap()
 }
 
-fn light(gpu: &Gpu, scene: &Scene, geometry: &Geometry, settings: &TransportSettings) -> Lit {
+fn light(gpu: &Gpu, scene: &Scene, geometry: &Geometry, settings: &TransportSettings) -> RunResult {
     let camera = scene.cameras.first().cloned().unwrap_or_else(|| Camera::around(scene.bounds().0, scene.bounds().1));
     let view = View { geometry, camera: Some(&camera), phases: &[] };
     let never = AtomicBool::new(false);
@@ -42,7 +42,7 @@ pub fn scene_is_finite(gpu: &Gpu, settings: &TransportSettings) -> Check<Complai
     let geometry = Geometry::new(&scene).unwrap();
     for illumination in [Illumination::Split, Illumination::Photons] {
         let settings = TransportSettings { illumination, paranoid: true, ..settings.clone() };
-        nothing_odd(light(gpu, &scene, &geometry, &settings).oddities.as_ref().unwrap())?;
+        nothing_odd(light(gpu, &scene, &geometry, &settings).nonfinite_values.as_ref().unwrap())?;
     }
     Ok(())
 }
@@ -61,18 +61,18 @@ fn no_built_in_scene_has_a_value_that_is_no_number() {
         for (illumination, final_gather) in [(Illumination::Split, true), (Illumination::Photons, false)] {
             let settings = TransportSettings { illumination, final_gather, photons: 1000, ..paranoid() };
             let lit = light(&gpu, &scene, &geometry, &settings);
-            assert_holds(format!("{name}, {illumination:?}"), nothing_odd(lit.oddities.as_ref().unwrap()));
-            assert_eq!(lit.oddities, Some(Oddities::default()));
+            assert_holds(format!("{name}, {illumination:?}"), nothing_odd(lit.nonfinite_values.as_ref().unwrap()));
+            assert_eq!(lit.nonfinite_values, Some(NonfiniteValues::default()));
             // Looking changes nothing.
             let unwatched = light(&gpu, &scene, &geometry, &TransportSettings { paranoid: false, ..settings });
-            assert_eq!(unwatched.oddities, None);
+            assert_eq!(unwatched.nonfinite_values, None);
             assert_eq!(unwatched.film, lit.film, "{name}, {illumination:?}");
         }
     }
     for preset in [Preset::Naive, Preset::Modified, Preset::Phong, Preset::Rounds] {
         let settings = Settings { paranoid: true, rounds: 2, ..Settings::preset(preset) };
         assert_holds(format!("{preset:?}"), box_is_finite(&gpu, &settings));
-        assert_eq!(run_on_cpu(&settings).oddities, Some(Oddities::default()), "{preset:?}");
+        assert_eq!(run_on_cpu(&settings).nonfinite_values, Some(NonfiniteValues::default()), "{preset:?}");
     }
 }
 
@@ -87,16 +87,21 @@ fn a_planted_value_is_counted_and_its_photon_named() {
         geometry.materials[mirror].base_colour = Vec3::new(1.0, poison, 1.0);
         let settings = TransportSettings { rounds: 1, photons: 400, caustic_photons: 50, ..paranoid() };
         let lit = light(&gpu, &scene, &geometry, &settings);
-        let oddities = lit.oddities.unwrap();
-        assert!(oddities.count > 10, "{oddities:?}");
-        assert!(oddities.text().contains("--replay 0:"), "{}", oddities.text());
+        let nonfinite_values = lit.nonfinite_values.unwrap();
+        assert!(nonfinite_values.count > 10, "{nonfinite_values:?}");
+        assert!(nonfinite_values.text().contains("--replay 0:"), "{}", nonfinite_values.text());
         let plan = plan_of(&gpu, &scene, &geometry, &settings);
-        let named: BTreeSet<u32> = oddities.first.iter().filter(|oddity| oddity.what == What::Photon).map(|oddity| oddity.item).collect();
+        let named: BTreeSet<u32> = nonfinite_values
+            .first
+            .iter()
+            .filter(|nonfinite_value| nonfinite_value.what == What::Photon)
+            .map(|nonfinite_value| nonfinite_value.item)
+            .collect();
         // All of them were written down, so that those not named have nothing odd.
-        assert!(named.len() < 60 && !named.is_empty(), "{oddities:?}");
+        assert!(named.len() < 60 && !named.is_empty(), "{nonfinite_values:?}");
         for photon in named.iter().copied().take(6).chain((0..400).filter(|photon| !named.contains(photon)).take(6)) {
             let path = replay(&gpu, &geometry, &plan, PhotonName { round: 0, photon, caustic: false }).unwrap();
-            assert_eq!(path.oddities.unwrap().count > 0, named.contains(&photon), "photon {photon}: {:?}", path.vertices);
+            assert_eq!(path.nonfinite_values.unwrap().count > 0, named.contains(&photon), "photon {photon}: {:?}", path.vertices);
         }
     }
 }
@@ -106,14 +111,14 @@ fn a_planted_value_is_counted_and_its_photon_named() {
 fn a_photon_alone_takes_the_path_that_it_takes_among_others() {
     let Some(gpu) = device() else { return };
     for settings in [Settings::default(), Settings { photons: 20_001, rng: photonmill::rng::Rng::Philox, ..Settings::default() }] {
-        for variant in Variant::ON_GPU {
-            let settings = Settings { variant, ..settings.clone() };
+        for builder in Builder::ON_GPU {
+            let settings = Settings { builder, ..settings.clone() };
             let all = in_order(photons(&gpu, &settings));
             let most = all.iter().max_by_key(|photon| photon.bounce).unwrap().photon;
             for photon in [0, 1, most, settings.photons / 2, settings.photons - 1] {
                 let expected: Vec<_> = all.iter().copied().filter(|stored| stored.photon == photon).collect();
                 let found = in_order(render::replay_on_gpu(&gpu, &open_box(&settings), &settings, 0, photon).unwrap().stored);
-                assert_eq!(found, expected, "{variant:?}, photon {photon}");
+                assert_eq!(found, expected, "{builder:?}, photon {photon}");
             }
         }
         let all = in_order(photons_on_cpu(&settings));

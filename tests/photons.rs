@@ -13,7 +13,7 @@ use photonmill::render::photons_on_gpu;
 use photonmill::rng::{self, Rng, Streams};
 use photonmill::scene::open_box::open_box;
 use photonmill::scene::room::Wall;
-use photonmill::settings::{EmissionLaw, PhongDirection, Settings, Variant};
+use photonmill::settings::{Builder, EmissionLaw, PhongDirection, Settings};
 
 const GENERATORS: [Rng; 4] = [Rng::Rand48, Rng::Mt, Rng::Philox, Rng::Sobol];
 /// Around subgroups of 8, 32 and 64, around the work group of 128, and two odd numbers of photons.
@@ -39,20 +39,20 @@ fn each_once(found: &[Photon], photon_count: u32, bounces: u32) -> Check {
 
 /// The builders on the device store one set; returns it.
 fn builders_agree(gpu: &Gpu, settings: &Settings) -> Vec<Photon> {
-    let of = |variant| photons(gpu, &Settings { variant, ..settings.clone() });
-    let expected = of(Variant::Naive);
-    let what = |variant| {
+    let of = |builder| photons(gpu, &Settings { builder, ..settings.clone() });
+    let expected = of(Builder::Naive);
+    let what = |builder| {
         let Settings { photons, rng, emission, shininess, group_size, chunk, .. } = settings;
         format!(
-            "{variant:?}, {photons} photons, {rng:?}, {emission:?}, shininess {:?}, groups of {group_size}, chunks of {chunk:?}",
+            "{builder:?}, {photons} photons, {rng:?}, {emission:?}, shininess {:?}, groups of {group_size}, chunks of {chunk:?}",
             shininess[0]
         )
     };
-    assert_holds(what(Variant::Naive), each_once(&expected, settings.photons, settings.bounces));
-    for variant in Variant::ON_GPU {
-        let found = of(variant);
-        assert_holds(what(variant), each_once(&found, settings.photons, settings.bounces));
-        assert_holds(what(variant), same_photons(&found, &expected));
+    assert_holds(what(Builder::Naive), each_once(&expected, settings.photons, settings.bounces));
+    for builder in Builder::ON_GPU {
+        let found = of(builder);
+        assert_holds(what(builder), each_once(&found, settings.photons, settings.bounces));
+        assert_holds(what(builder), same_photons(&found, &expected));
     }
     expected
 }
@@ -81,13 +81,13 @@ fn a_persistent_invocation_takes_photon_after_photon() {
         let mut closed = open_box(&endless);
         closed.faces[5] = Some(Wall { name: "front", albedo: 1.0, shininess: None });
         for (scene, settings) in [(open_box(&many), &many), (closed, &endless)] {
-            let of = |variant| photons_on_gpu(&gpu, &scene, &Settings { variant, ..settings.clone() }).unwrap();
-            let found = of(Variant::Persistent);
-            assert_holds(format!("{rng:?}, {} bounces", settings.bounces), same_photons(&found, &of(Variant::Atomic)));
+            let of = |builder| photons_on_gpu(&gpu, &scene, &Settings { builder, ..settings.clone() }).unwrap();
+            let found = of(Builder::Persistent);
+            assert_holds(format!("{rng:?}, {} bounces", settings.bounces), same_photons(&found, &of(Builder::Atomic)));
             assert!(settings.bounces == 15 || found.len() == 257 * settings.bounces as usize, "{} photons", found.len());
         }
     }
-    let longer = Settings { variant: Variant::Persistent, bounces: 321, rng: Rng::Philox, ..Settings::default() };
+    let longer = Settings { builder: Builder::Persistent, bounces: 321, rng: Rng::Philox, ..Settings::default() };
     let refused = longer.validate().unwrap_err().to_string();
     assert!(refused.starts_with("--bounces 321: "), "{refused}");
 }
@@ -96,7 +96,7 @@ fn a_persistent_invocation_takes_photon_after_photon() {
 fn the_scanning_builder_keeps_photons_in_their_order() {
     let Some(gpu) = device() else { return };
     for (photon_count, group_size, chunk) in [(65, 64, None), (5001, 128, None), (5000, 32, Some(777))] {
-        let settings = Settings { variant: Variant::Scan, photons: photon_count, group_size, chunk, ..Settings::default() };
+        let settings = Settings { builder: Builder::Scan, photons: photon_count, group_size, chunk, ..Settings::default() };
         let map: Vec<(u32, u32)> = photons(&gpu, &settings).iter().map(|photon| (photon.bounce, photon.photon)).collect();
         // Chunks come one after the other, and each begins with its first bounce.
         let chunks = map.chunk_by(|before, after| before.0 <= after.0);
@@ -137,7 +137,7 @@ fn group_sizes_and_chunks_change_no_photon() {
             assert_holds(format!("{rng:?}, groups of {group_size}"), same_photons(&found, &expected));
         }
         for (counters, group_size) in [(2, 32), (8, 64), (8, 128), (64, 32)] {
-            let settings = Settings { counters: Some(counters), group_size, variant: Variant::Atomic, ..settings.clone() };
+            let settings = Settings { counters: Some(counters), group_size, builder: Builder::Atomic, ..settings.clone() };
             for chunk in [None, Some(500)] {
                 let found = photons(&gpu, &Settings { chunk, ..settings.clone() });
                 assert_holds(format!("{rng:?}, {counters} counters, groups of {group_size}, {chunk:?}"), same_photons(&found, &expected));
@@ -153,11 +153,11 @@ fn group_sizes_and_chunks_change_no_photon() {
 #[test]
 fn the_order_of_appending_changes_no_photon() {
     let Some(gpu) = device() else { return };
-    for variant in Variant::ON_GPU {
-        let settings = Settings { variant, photons: 20_001, ..Settings::default() };
+    for builder in Builder::ON_GPU {
+        let settings = Settings { builder, photons: 20_001, ..Settings::default() };
         let expected = photons(&gpu, &settings);
         for run in 1..10 {
-            assert_holds(format!("{variant:?}, run {run}"), same_photons(&photons(&gpu, &settings), &expected));
+            assert_holds(format!("{builder:?}, run {run}"), same_photons(&photons(&gpu, &settings), &expected));
         }
     }
 }
@@ -167,7 +167,7 @@ fn two_naive_bounces_are_the_first_two_of_fifteen() {
     let Some(gpu) = device() else { return };
     for rng in GENERATORS {
         let settings = Settings { rng, ..Settings::default() };
-        let naive = photons(&gpu, &Settings { variant: Variant::Naive, bounces: 2, ..settings.clone() });
+        let naive = photons(&gpu, &Settings { builder: Builder::Naive, bounces: 2, ..settings.clone() });
         let mut modified = photons(&gpu, &settings);
         assert!(modified.iter().any(|photon| photon.bounce >= 10), "{rng:?}");
         modified.retain(|photon| photon.bounce < 2);

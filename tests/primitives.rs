@@ -19,7 +19,7 @@ use photonmill::resources::Resources;
 use photonmill::rng::Rng;
 use photonmill::scene::open_box::open_box;
 use photonmill::scene::room::{RoomScene, Wall};
-use photonmill::settings::{Settings, Variant};
+use photonmill::settings::{Builder, Settings};
 use photonmill::{index, tallies, trace};
 
 /// Words that nothing may touch. As an entry of the photon map they are a photon on some wall.
@@ -177,12 +177,12 @@ fn index_check(plan: &Plan, cells: &[u32], sorted: &[Photon], map: &[Photon]) ->
 #[test]
 fn the_index_holds_every_photon_in_its_cell() {
     let Some(gpu) = device() else { return };
-    for variant in Variant::ON_GPU {
+    for builder in Builder::ON_GPU {
         for (photon_count, radius, group_size) in
             [(2, 0.05, 128), (129, 0.05, 32), (5000, 0.05, 128), (5001, 0.001, 256), (20_001, 0.5, 64)]
         {
             let settings =
-                Settings { variant, photons: photon_count, radius, group_size, chunk: Some(photon_count), ..Settings::default() };
+                Settings { builder, photons: photon_count, radius, group_size, chunk: Some(photon_count), ..Settings::default() };
             let scene = open_box(&settings);
             let plan = plan_for(&gpu, &scene, &settings);
             assert_eq!(plan.chunks_per_round, 1);
@@ -198,7 +198,7 @@ fn the_index_holds_every_photon_in_its_cell() {
             let cells = begins[1..].to_vec();
             let sorted = commands.read::<StoredPhoton>(&buffers.sorted_photons, map.len()).unwrap();
             let sorted: Vec<Photon> = sorted.into_iter().map(|photon| photon.photon(Origin::default(), &scene.room_record())).collect();
-            assert_holds(format!("{variant:?}, {photon_count} photons, radius {radius}"), index_check(&plan, &cells, &sorted, &map));
+            assert_holds(format!("{builder:?}, {photon_count} photons, radius {radius}"), index_check(&plan, &cells, &sorted, &map));
 
             if photon_count == 5000 {
                 let mut swapped = sorted.clone();
@@ -232,7 +232,7 @@ impl Appended {
     /// Entries of the photon map that anybody looks at.
     fn entries(&self, settings: &Settings) -> u32 {
         let slots = settings.photons * settings.bounces;
-        if settings.variant == Variant::Naive { slots } else { self.counters[0] }.min(self.photons.len() as u32)
+        if settings.builder == Builder::Naive { slots } else { self.counters[0] }.min(self.photons.len() as u32)
     }
 
     fn stored(&self, settings: &Settings) -> impl Iterator<Item = &Photon> {
@@ -315,7 +315,7 @@ fn overflow_check(appended: &Appended, settings: &Settings, capacity: u32, all: 
     if first.stored + first.dropped != needed {
         return fail(format!("{} + {} survivors of the first bounce, {needed} are right", first.stored, first.dropped));
     }
-    if settings.variant == Variant::Naive {
+    if settings.builder == Builder::Naive {
         // Slot = number of the photon, so it is known which ones find no room.
         let fits = all.iter().filter(|photon| photon.bounce * settings.photons + photon.photon < capacity);
         // A photon that was dropped at one bounce has no later ones.
@@ -336,7 +336,7 @@ fn overflow_check(appended: &Appended, settings: &Settings, capacity: u32, all: 
     if appended.counters[0] < survivors || appended.counters[0] > survivors && !has_gaps {
         return fail(format!("the counter says {} instead of the need, {survivors}", appended.counters[0]));
     }
-    if settings.variant == Variant::Persistent {
+    if settings.builder == Builder::Persistent {
         // No bounce hands paths to the next.
         return Ok(());
     }
@@ -357,19 +357,19 @@ fn overflow_check(appended: &Appended, settings: &Settings, capacity: u32, all: 
 #[test]
 fn a_full_map_drops_counts_and_keeps_to_its_room() {
     let Some(gpu) = device() else { return };
-    for (variant, counters) in Variant::ON_GPU.map(|variant| (variant, None)).into_iter().chain([2, 16].map(|n| (Variant::Atomic, Some(n))))
+    for (builder, counters) in Builder::ON_GPU.map(|builder| (builder, None)).into_iter().chain([2, 16].map(|n| (Builder::Atomic, Some(n))))
     {
         for photon_count in [9, 65, 1000, 5001] {
-            let settings = Settings { variant, counters, photons: photon_count, bounces: 3, ..Settings::default() };
+            let settings = Settings { builder, counters, photons: photon_count, bounces: 3, ..Settings::default() };
             let scene = open_box(&settings);
             let all = photons(&gpu, &settings);
             let most = plan_for(&gpu, &scene, &settings).photon_capacity;
-            let slots = variant == Variant::Naive;
+            let slots = builder == Builder::Naive;
             let need = if slots || counters.is_some() { most } else { all.len() as u32 };
             let half = if slots { need / 2 } else { all.len() as u32 / 2 };
             // Half of the need; room for none but one; all but one; enough.
             for capacity in [half, 1, need - 1, need, need + 17] {
-                let what = format!("{variant:?}, {counters:?}, {photon_count} photons, room for {capacity} of {need}");
+                let what = format!("{builder:?}, {counters:?}, {photon_count} photons, room for {capacity} of {need}");
                 let appended = append(&gpu, &scene, &settings, capacity);
                 assert_holds(&what, overflow_check(&appended, &settings, capacity, &all));
                 let dropped: u32 = appended.tallies.iter().map(|tally| tally.dropped).sum();
@@ -387,15 +387,15 @@ fn a_full_map_drops_counts_and_keeps_to_its_room() {
 #[test]
 fn appending_at_survival_none_and_all() {
     let Some(gpu) = device() else { return };
-    for variant in Variant::ON_GPU {
+    for builder in Builder::ON_GPU {
         for (albedo, stored_each) in [(0.0, 0), (1.0, 3)] {
             for photon_count in [2, 7, 8, 9, 31, 33, 127, 128, 129, 1000] {
-                let settings = Settings { variant, photons: photon_count, bounces: 3, reflectance: albedo, ..Settings::default() };
+                let settings = Settings { builder, photons: photon_count, bounces: 3, reflectance: albedo, ..Settings::default() };
                 let mut scene = open_box(&settings);
                 scene.faces[5] = Some(Wall { name: "front", albedo, shininess: None });
                 let capacity = photon_count * 3;
                 let appended = append(&gpu, &scene, &settings, capacity);
-                let what = format!("{variant:?}, {photon_count} photons, albedo {albedo}");
+                let what = format!("{builder:?}, {photon_count} photons, albedo {albedo}");
                 assert!(appended.guards.iter().all(|word| *word == GUARD), "{what}");
                 let stored: HashSet<(u32, u32)> = appended.stored(&settings).map(|photon| (photon.photon, photon.bounce)).collect();
                 assert_eq!(stored.len() as u32, photon_count * stored_each, "{what}");
@@ -506,12 +506,12 @@ fn indirect_dispatches_are_folded_below_the_limit() {
 fn rounds_around_a_full_row_of_groups_lose_no_photon() {
     let Some(gpu) = device() else { return };
     let row = 65_535 * 32;
-    for variant in Variant::ON_GPU {
+    for builder in Builder::ON_GPU {
         // The builders dispatch alike, so one of them tries every count.
-        let counts = if variant == Variant::Ballot { &[row - 1, row, row + 1, row + 33][..] } else { &[row + 33] };
+        let counts = if builder == Builder::Ballot { &[row - 1, row, row + 1, row + 33][..] } else { &[row + 33] };
         for &photon_count in counts {
             let settings =
-                Settings { variant, photons: photon_count, bounces: 1, mesh: 1, group_size: 32, rng: Rng::Philox, ..Settings::default() };
+                Settings { builder, photons: photon_count, bounces: 1, mesh: 1, group_size: 32, rng: Rng::Philox, ..Settings::default() };
             let folded = run(&gpu, &settings);
             assert_eq!(folded.plan.chunks_per_round, 1, "{photon_count} photons do not fit one dispatch here");
             let ledger = folded.fates.ledger();

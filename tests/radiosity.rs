@@ -15,8 +15,8 @@ use photonmill::rng::Rng;
 use photonmill::scene::built_in;
 use photonmill::scene::light::LightKind;
 use photonmill::scene::open_box::open_box;
-use photonmill::settings::transport::{Append, Illumination, TransportSettings};
-use photonmill::settings::{EmissionLaw, Settings, Variant};
+use photonmill::settings::transport::{Illumination, TransportSettings};
+use photonmill::settings::{Builder, EmissionLaw, Settings};
 
 const ALBEDO: f64 = 0.75;
 /// Bounces of the paper's modified implementation: orders of reflection that are stored.
@@ -115,9 +115,9 @@ fn disc_middles() -> impl Iterator<Item = [f64; 2]> {
 const PHOTONS: u32 = 1 << 18;
 const SEEDS: u64 = 16;
 
-fn settings(variant: Variant, emission: EmissionLaw) -> Settings {
+fn settings(builder: Builder, emission: EmissionLaw) -> Settings {
     Settings {
-        variant,
+        builder,
         emission,
         photons: PHOTONS,
         rng: Rng::Philox,
@@ -129,15 +129,15 @@ fn settings(variant: Variant, emission: EmissionLaw) -> Settings {
 }
 
 fn photons_of(gpu: Option<&Device>, settings: &Settings) -> Vec<Photon> {
-    match gpu.filter(|_| settings.variant != Variant::Cpu) {
+    match gpu.filter(|_| settings.builder != Builder::Cpu) {
         Some(gpu) => photons(gpu, settings),
         None => photons_on_cpu(settings),
     }
 }
 
 /// Builders that can run here.
-fn builders(gpu: Option<&Device>) -> impl Iterator<Item = Variant> {
-    JUDGED.into_iter().filter(move |variant| gpu.is_some() || *variant == Variant::Cpu)
+fn builders(gpu: Option<&Device>) -> impl Iterator<Item = Builder> {
+    JUDGED.into_iter().filter(move |builder| gpu.is_some() || *builder == Builder::Cpu)
 }
 
 /// Mean of a quantity a photon, and the standard error of that mean, from sums over chains of a photon.
@@ -170,7 +170,7 @@ struct Counts {
 }
 
 impl Counts {
-    fn of(gpu: Option<&Device>, variant: Variant, emission: EmissionLaw) -> Counts {
+    fn of(gpu: Option<&Device>, builder: Builder, emission: EmissionLaw) -> Counts {
         let mut counts = Counts {
             photons: f64::from(PHOTONS) * SEEDS as f64,
             squares: vec![vec![0; WALLS * SQUARES * SQUARES]; BOUNCES],
@@ -178,7 +178,7 @@ impl Counts {
         };
         for seed in 1..=SEEDS {
             let mut chains = vec![[0u8; WALLS]; PHOTONS as usize];
-            for photon in photons_of(gpu, &Settings { seed, ..settings(variant, emission) }) {
+            for photon in photons_of(gpu, &Settings { seed, ..settings(builder, emission) }) {
                 let wall = photon.wall as usize;
                 let place =
                     |axis: usize| (((f64::from(photon.position[axis % 3]) + 0.25) * 2.0 * SQUARES as f64) as usize).min(SQUARES - 1);
@@ -247,9 +247,9 @@ fn photons_of_every_order_land_as_radiosity_says() {
         let chance = |order: usize, squares: Range<usize>| -> ByLamp {
             [0, 1].map(|lamp| chances[order][squares.clone()].iter().map(|by_lamp| by_lamp[lamp]).sum())
         };
-        for variant in builders(gpu.as_ref()) {
-            let counts = Counts::of(gpu.as_ref(), variant, emission);
-            let name = variant.name();
+        for builder in builders(gpu.as_ref()) {
+            let counts = Counts::of(gpu.as_ref(), builder, emission);
+            let name = builder.name();
             let all = 0..WALLS * SQUARES * SQUARES;
             let of_wall = |wall: usize| wall * SQUARES * SQUARES..(wall + 1) * SQUARES * SQUARES;
             let mut family = Family::default();
@@ -298,7 +298,7 @@ fn disc_of(photon: &Photon) -> Option<usize> {
 /// Standard errors of the film's irradiance for so many photons, W/m2: of each disc and of the mean over a wall's
 /// discs, from what single photons add to them.
 fn film_errors(emission: EmissionLaw, photons: f64) -> (Vec<f64>, Vec<f64>) {
-    let sample = photons_on_cpu(&Settings { seed: 99, ..settings(Variant::Cpu, emission) });
+    let sample = photons_on_cpu(&Settings { seed: 99, ..settings(Builder::Cpu, emission) });
     let mut landed: Vec<(u32, usize)> = sample.iter().filter_map(|photon| disc_of(photon).map(|disc| (photon.photon, disc))).collect();
     landed.sort_unstable();
     let (mut discs, mut walls) = (vec![ByPhoton::default(); WALLS * MESH * MESH], vec![ByPhoton::default(); WALLS]);
@@ -331,15 +331,15 @@ fn the_film_has_the_irradiance_of_radiosity() {
         let rounds = 8;
         let (disc_errors, wall_errors) = film_errors(emission, f64::from(rounds) * f64::from(PHOTONS));
         let mean = |values: &[f64]| values.iter().sum::<f64>() / values.len() as f64;
-        for variant in builders(gpu.as_ref()) {
-            let settings = Settings { rounds, seed: 7, ..settings(variant, emission) };
-            let outcome = match gpu.as_ref().filter(|_| variant != Variant::Cpu) {
+        for builder in builders(gpu.as_ref()) {
+            let settings = Settings { rounds, seed: 7, ..settings(builder, emission) };
+            let outcome = match gpu.as_ref().filter(|_| builder != Builder::Cpu) {
                 Some(gpu) => run(gpu, &settings),
                 None => run_on_cpu(&settings),
             };
             let found: Vec<f64> =
                 estimate_walls(&outcome.film, &open_box(&settings), &outcome.plan).into_iter().flat_map(|wall| wall.irradiance).collect();
-            let what = format!("{law:?}, {}", variant.name());
+            let what = format!("{law:?}, {}", builder.name());
             let (mut walls, mut all) = (Family::default(), Family::default());
             for (wall, error) in wall_errors.iter().enumerate() {
                 let of_wall = wall * MESH * MESH..(wall + 1) * MESH * MESH;
@@ -360,14 +360,14 @@ fn the_film_has_the_irradiance_of_radiosity() {
 fn the_box_of_triangles_has_the_irradiance_of_radiosity() {
     let Some(gpu) = device() else { return };
     let ways = [
-        (Law::Uniform, Illumination::Split, Append::Ballot),
-        (Law::Uniform, Illumination::Photons, Append::Atomic),
-        (Law::Cosine, Illumination::Split, Append::Atomic),
-        (Law::Cosine, Illumination::Photons, Append::Ballot),
+        (Law::Uniform, Illumination::Split, Builder::Ballot),
+        (Law::Uniform, Illumination::Photons, Builder::Atomic),
+        (Law::Cosine, Illumination::Split, Builder::Atomic),
+        (Law::Cosine, Illumination::Photons, Builder::Ballot),
     ];
     let points: Vec<(DVec3, DVec3)> =
         (0..WALLS).flat_map(|wall| disc_middles().map(move |[s, t]| (on_wall(wall, s, t), inward(wall)))).collect();
-    for (law, illumination, append) in ways {
+    for (law, illumination, builder) in ways {
         let mut family = Family::default();
         let solution = solution(law);
         let mut scene = built_in::by_name("open-box").unwrap();
@@ -378,7 +378,7 @@ fn the_box_of_triangles_has_the_irradiance_of_radiosity() {
         }
         let settings = TransportSettings {
             illumination,
-            append,
+            builder: Some(builder),
             photons: 90_000,
             bounces: BOUNCES as u32,
             rounds: 1,
@@ -399,7 +399,7 @@ fn the_box_of_triangles_has_the_irradiance_of_radiosity() {
                 .sum();
             let of_wall = wall * MESH * MESH..(wall + 1) * MESH * MESH;
             let means: Vec<f64> = runs.iter().map(|run| run[of_wall.clone()].iter().map(|light| light.x).sum()).collect();
-            family.expect_mean(format!("{law:?}, {illumination:?}, {append:?}, wall {wall}"), &means, expected);
+            family.expect_mean(format!("{law:?}, {illumination:?}, {builder:?}, wall {wall}"), &means, expected);
         }
         family.assert_tells_one_per_cent();
     }

@@ -26,22 +26,22 @@ use photonmill::photon::Photon;
 use photonmill::scene::built_in;
 use photonmill::scene::open_box::open_box;
 use photonmill::scene::texture::Wrap;
-use photonmill::settings::transport::{Append, Illumination, TransportSettings};
-use photonmill::settings::{Gather, Math, Settings, Variant};
+use photonmill::settings::transport::{Illumination, TransportSettings};
+use photonmill::settings::{Builder, Gather, Math, Settings};
 
 /// What is asked of a device.
 #[derive(Debug, Clone, Copy)]
 enum Question {
     /// A builder's photon map is the CPU builder's, bit for bit.
-    Photons(Variant),
+    Photons(Builder),
     /// So is the film.
     Film(Gather),
     /// So is the film of the nearest photons.
     Nearest,
     /// So is the photon map of the atomic builder with several counters.
-    InTurn,
+    StripedCounters,
     /// The ledger closes and nothing is dropped.
-    Ledger(Variant),
+    Ledger(Builder),
     /// A closed form of `selfcheck`, by name.
     ClosedForm(&'static str),
     /// Lists of survivors in any order give the same picture.
@@ -81,8 +81,8 @@ impl Question {
     /// Whether another test, the same for every device, shows that a device without a fault answers it right.
     fn has_a_test_of_its_own(self) -> bool {
         match self {
-            Photons(_) | InTurn | Film(_) | Ledger(_) | ClosedForm(_) | Appends | Builders | StrictMath | Finite | FiniteBox | Nearest
-            | Pairs | Crowds | AimedLight(_) => false,
+            Photons(_) | StripedCounters | Film(_) | Ledger(_) | ClosedForm(_) | Appends | Builders | StrictMath | Finite | FiniteBox
+            | Nearest | Pairs | Crowds | AimedLight(_) => false,
             Bits(_) | LampInBox(_) | Shelf | Ridge | Spot | Texture(_) => true,
             LeaningPlane(_) | LeaningScatterer | PatchInPlane | StackFromAfar | GlassInFurnace(..) => true,
         }
@@ -92,7 +92,7 @@ impl Question {
 /// What a fault spoils; one test each, as they run side by side.
 #[derive(Debug, Clone, Copy, PartialEq, Eq)]
 enum Subject {
-    PapersLine,
+    Room,
     Scenes,
     Aiming,
 }
@@ -100,8 +100,8 @@ enum Subject {
 impl Question {
     fn subject(self) -> Subject {
         match self {
-            Photons(_) | InTurn | Film(_) | Ledger(_) | ClosedForm(_) | Builders | StrictMath | Nearest | Pairs | FiniteBox => {
-                Subject::PapersLine
+            Photons(_) | StripedCounters | Film(_) | Ledger(_) | ClosedForm(_) | Builders | StrictMath | Nearest | Pairs | FiniteBox => {
+                Subject::Room
             }
             AimedLight(_) => Subject::Aiming,
             Appends | Finite | Crowds | Bits(_) | LampInBox(_) | Shelf | Ridge | Spot | Texture(_) => Subject::Scenes,
@@ -133,10 +133,10 @@ const FAULTS: [Fault; 65] = [
     },
     Fault {
         what: "what one sample looks up for all counts for itself alone",
-        file: "kernels/weigh.comp",
+        file: "kernels/flux_to_radiance.comp",
         from: "(point.arrivals & SEEN_FOR_ALL) != 0 ? float(SAMPLES) : 1.0;",
         to: "(point.arrivals & SEEN_FOR_ALL) != 0 ? 1.0 : 1.0;",
-        kernels: &["weigh"],
+        kernels: &["flux_to_radiance"],
         noticed_by: &[(GlassInFurnace(4, false), TooDark)],
     },
     Fault {
@@ -157,19 +157,19 @@ const FAULTS: [Fault; 65] = [
     },
     Fault {
         what: "every other lane of a subgroup writes over its neighbour",
-        file: "append/ballot.glsl",
+        file: "builder/ballot.glsl",
         from: "subgroupBallotExclusiveBitCount(survivors);",
         to: "(subgroupBallotExclusiveBitCount(survivors) & 0xfffffffeu);",
-        kernels: &["fly_whole", "trace_whole", "fly_ballot"],
-        noticed_by: &[(Photons(Variant::Persistent), OtherPhotons), (Appends, OtherSums)],
+        kernels: &["scene_trace_persistent", "trace_persistent", "scene_trace_ballot"],
+        noticed_by: &[(Photons(Builder::Persistent), OtherPhotons), (Appends, OtherSums)],
     },
     Fault {
         what: "a subgroup's second paths write over its first ones'",
-        file: "append/block.glsl",
+        file: "builder/block.glsl",
         from: "count + subgroupBallotExclusiveBitCount(survivors);",
         to: "subgroupBallotExclusiveBitCount(survivors);",
         kernels: &["trace_ballot"],
-        noticed_by: &[(Photons(Variant::Ballot), OtherPhotons), (Builders, BuildersDisagree)],
+        noticed_by: &[(Photons(Builder::Ballot), OtherPhotons), (Builders, BuildersDisagree)],
     },
     Fault {
         what: "the path in the middle of an odd number is left out",
@@ -177,7 +177,7 @@ const FAULTS: [Fault; 65] = [
         from: "(path_count + PLACES - 1) / PLACES",
         to: "path_count / PLACES",
         kernels: &["trace_ballot"],
-        noticed_by: &[(Ledger(Variant::Ballot), LedgerOpen), (Photons(Variant::Ballot), PhotonsLost)],
+        noticed_by: &[(Ledger(Builder::Ballot), LedgerOpen), (Photons(Builder::Ballot), PhotonsLost)],
     },
     Fault {
         what: "a gap of several counters is taken for a photon",
@@ -185,7 +185,7 @@ const FAULTS: [Fault; 65] = [
         from: "photons[first_photon + place] = pack_photon(Photon(vec3(0.0), NO_WALL, 0.0, 0.0, 0, 0));",
         to: "",
         kernels: &["fill_gaps"],
-        noticed_by: &[(InTurn, PhotonsAdded)],
+        noticed_by: &[(StripedCounters, PhotonsAdded)],
     },
     Fault {
         what: "a gap of several counters is taken for a path",
@@ -193,22 +193,22 @@ const FAULTS: [Fault; 65] = [
         from: "next_paths[path_word(0, place, push.path_capacity)].w = NO_WALL;",
         to: "",
         kernels: &["fill_gaps"],
-        noticed_by: &[(InTurn, OtherPhotons)],
+        noticed_by: &[(StripedCounters, OtherPhotons)],
     },
     Fault {
         what: "the last block of the counter that is ahead is left out",
         file: "kernels/fill_gaps.comp",
-        from: "end = max(end, taken == 0 ? 0 : place_in_turn(turn, taken - 1) + 1);",
-        to: "end = max(end, taken == 0 ? 0 : place_in_turn(0, taken - 1) + 1);",
+        from: "end = max(end, taken == 0 ? 0 : striped_place(turn, taken - 1) + 1);",
+        to: "end = max(end, taken == 0 ? 0 : striped_place(0, taken - 1) + 1);",
         kernels: &["fill_gaps"],
-        noticed_by: &[(InTurn, PhotonsLost)],
+        noticed_by: &[(StripedCounters, PhotonsLost)],
     },
     Fault {
         what: "a row of cells is taken for narrower than the disc",
         file: "stages/map_rows.glsl",
         from: "range.reach * range.reach - dot(off, off);",
         to: "0.9 * range.reach * range.reach - dot(off, off);",
-        kernels: &["lookup_u64"],
+        kernels: &["scene_gather_u64"],
         noticed_by: &[(Bits("cornell"), OtherBits)],
     },
     Fault {
@@ -217,15 +217,15 @@ const FAULTS: [Fault; 65] = [
         from: "bool stored = alive[k] &&",
         to: "bool stored = alive[k] && gl_SubgroupInvocationID != 5u &&",
         kernels: &["trace_atomic"],
-        noticed_by: &[(Ledger(Variant::Atomic), LedgerOpen), (Photons(Variant::Atomic), OtherPhotons)],
+        noticed_by: &[(Ledger(Builder::Atomic), LedgerOpen), (Photons(Builder::Atomic), OtherPhotons)],
     },
     Fault {
         what: "the last invocation of each work group finds no place of its own",
-        file: "append/group_prefix.glsl",
+        file: "builder/group_prefix.glsl",
         from: "before += s < gl_SubgroupID",
         to: "before += s + 1 < gl_SubgroupID",
         kernels: &["trace_group"],
-        noticed_by: &[(Photons(Variant::Group), OtherPhotons), (Builders, BuildersDisagree)],
+        noticed_by: &[(Photons(Builder::Group), OtherPhotons), (Builders, BuildersDisagree)],
     },
     Fault {
         what: "survivors of one work group are not counted",
@@ -233,23 +233,23 @@ const FAULTS: [Fault; 65] = [
         from: "survivors[work_group_index()] = prefix.total;",
         to: "survivors[work_group_index()] = work_group_index() == 3u ? 0u : prefix.total;",
         kernels: &["trace_in_place"],
-        noticed_by: &[(Photons(Variant::Scan), PhotonsLost), (Ledger(Variant::Scan), LedgerOpen)],
+        noticed_by: &[(Photons(Builder::Scan), PhotonsLost), (Ledger(Builder::Scan), LedgerOpen)],
     },
     Fault {
         what: "an invocation that took a photon starts it at the bounce at which the last one ended",
-        file: "stages/trace_whole.glsl",
+        file: "stages/trace_persistent.glsl",
         from: "            bounce = 0;\n",
         to: "",
-        kernels: &["trace_whole"],
-        noticed_by: &[(Photons(Variant::Persistent), PhotonsLost)],
+        kernels: &["trace_persistent"],
+        noticed_by: &[(Photons(Builder::Persistent), PhotonsLost)],
     },
     Fault {
         what: "a photon's last bounce is not counted",
-        file: "stages/trace_whole.glsl",
+        file: "stages/trace_persistent.glsl",
         from: "if (flying) {\n            count_fate(",
         to: "if (flying && !bounced.escaped) {\n            count_fate(",
-        kernels: &["trace_whole"],
-        noticed_by: &[(Ledger(Variant::Persistent), LedgerOpen)],
+        kernels: &["trace_persistent"],
+        noticed_by: &[(Ledger(Builder::Persistent), LedgerOpen)],
     },
     Fault {
         what: "a survivor's path is forgotten",
@@ -257,7 +257,7 @@ const FAULTS: [Fault; 65] = [
         from: "store_path(index, path);",
         to: "if (index % 10u != 7u) store_path(index, path);",
         kernels: &["trace_slots"],
-        noticed_by: &[(Ledger(Variant::Naive), LedgerOpen), (Photons(Variant::Naive), OtherPhotons)],
+        noticed_by: &[(Ledger(Builder::Naive), LedgerOpen), (Photons(Builder::Naive), OtherPhotons)],
     },
     Fault {
         what: "a photon is gathered twice",
@@ -269,26 +269,26 @@ const FAULTS: [Fault; 65] = [
     },
     Fault {
         what: "a photon in fifty is stored twice",
-        file: "stages/flight.glsl",
-        from: "        store(place, flown.photon);",
-        to: "        store(place, flown.photon);\n        if (path.photon % 50u == 0u) store(atomicAdd(counters[0], 1), flown.photon);",
-        kernels: &["fly_atomic"],
+        file: "stages/scene_trace.glsl",
+        from: "        store(place, traced.photon);",
+        to: "        store(place, traced.photon);\n        if (path.photon % 50u == 0u) store(atomicAdd(counters[0], 1), traced.photon);",
+        kernels: &["scene_trace_atomic"],
         noticed_by: &[(Appends, SumsTooLarge)],
     },
     Fault {
         what: "a photon that flies to its end begins with its second bounce's random numbers",
-        file: "stages/fly_whole.glsl",
+        file: "stages/scene_trace_persistent.glsl",
         from: "            flights = 0;",
         to: "            flights = 1;",
-        kernels: &["fly_whole"],
+        kernels: &["scene_trace_persistent"],
         noticed_by: &[(Appends, OtherSums)],
     },
     Fault {
         what: "a point that others help keeps its first slice twice",
-        file: "stages/lookup.glsl",
+        file: "stages/scene_gather.glsl",
         from: "slice_begin = slice * GATHER_SLICE",
         to: "slice_begin = gl_WorkGroupID.y * GATHER_SLICE",
-        kernels: &["lookup_u64", "lookup_two_words"],
+        kernels: &["scene_gather_u64", "scene_gather_two_words"],
         noticed_by: &[(Crowds, OtherSums)],
     },
     Fault {
@@ -305,7 +305,7 @@ const FAULTS: [Fault; 65] = [
         from: "uint place = counters[0] + path_place;",
         to: "uint place = path_place;",
         kernels: &["keep_order"],
-        noticed_by: &[(Photons(Variant::Scan), OtherPhotons)],
+        noticed_by: &[(Photons(Builder::Scan), OtherPhotons)],
     },
     Fault {
         what: "stored photons forget which of two walls that face each other is theirs",
@@ -313,7 +313,7 @@ const FAULTS: [Fault; 65] = [
         from: " | photon.wall << 31",
         to: "",
         kernels: &["trace_atomic"],
-        noticed_by: &[(Photons(Variant::Atomic), OtherPhotons)],
+        noticed_by: &[(Photons(Builder::Atomic), OtherPhotons)],
     },
     Fault {
         what: "points look for photons in the first layer of cells, whatever their wall",
@@ -349,10 +349,10 @@ const FAULTS: [Fault; 65] = [
     },
     Fault {
         what: "the radius of a lookup is 1 % too small",
-        file: "stages/lookup.glsl",
+        file: "stages/scene_gather.glsl",
         from: "distance_squared <= push.radius * push.radius &&",
         to: "distance_squared <= 0.9801 * push.radius * push.radius &&",
-        kernels: &["lookup_u64", "lookup_two_words"],
+        kernels: &["scene_gather_u64", "scene_gather_two_words"],
         noticed_by: &[(ClosedForm("furnace, Photons, Ballot: irradiance"), TooDark)],
     },
     Fault {
@@ -371,7 +371,7 @@ const FAULTS: [Fault; 65] = [
         file: "sampling.glsl",
         from: "direction_at(sqrt(u), 1.0 - u, azimuth)",
         to: "direction_at(sqrt(sqrt(u)), 1.0 - sqrt(u), azimuth)",
-        kernels: &["fly_whole", "trace_ballot", "shine", "fly_ballot"],
+        kernels: &["scene_trace_persistent", "trace_ballot", "scene_emit", "scene_trace_ballot"],
         noticed_by: &[
             (ClosedForm("open box, ballot builder, uniform lights: hits stored per photon"), TooDark),
             (ClosedForm("disc light, photons: irradiance"), TooBright),
@@ -451,10 +451,10 @@ const FAULTS: [Fault; 65] = [
     },
     Fault {
         what: "edges are not corrected",
-        file: "kernels/weigh.comp",
+        file: "kernels/flux_to_radiance.comp",
         from: "if (HAS_EDGE_CORRECTION) {",
         to: "if (false) {",
-        kernels: &["weigh"],
+        kernels: &["flux_to_radiance"],
         noticed_by: &[
             (ClosedForm("furnace, Photons, Ballot: irradiance"), TooDark),
             (ClosedForm("sun-over-plane, Photons: irradiance"), TooDark),
@@ -465,7 +465,7 @@ const FAULTS: [Fault; 65] = [
         file: "scene/bvh.glsl",
         from: "precise vec3 start = position + way;",
         to: "precise vec3 start = position + 1e-3 * normal * (dot(direction, normal) < 0.0 ? -1.0 : 1.0);",
-        kernels: &["fly_whole", "shine", "fly_ballot", "fly_atomic", "receive", "view"],
+        kernels: &["scene_trace_persistent", "scene_emit", "scene_trace_ballot", "scene_trace_atomic", "receive", "view"],
         noticed_by: &[(LampInBox(Illumination::Photons), Leak)],
     },
     Fault {
@@ -494,18 +494,18 @@ const FAULTS: [Fault; 65] = [
     },
     Fault {
         what: "a photon in 500 starts nowhere",
-        file: "stages/fly_once.glsl",
+        file: "stages/scene_flight.glsl",
         from: "surface.ng, scatter.direction);",
         to: "surface.ng, scatter.direction);\n            if (u.z < 0.002) start.y = uintBitsToFloat(0x7fc00000u);",
-        kernels: &["fly_whole", "fly_ballot"],
+        kernels: &["scene_trace_persistent", "scene_trace_ballot"],
         noticed_by: &[(Finite, NoNumber)],
     },
     Fault {
         what: "a photon in 500 carries no number into the map",
-        file: "stages/flight.glsl",
-        from: "store(place, flown.photon);",
-        to: "if (path.photon % 500u == 7u) flown.photon.flux.y = uintBitsToFloat(0x7fc00000u);\n        store(place, flown.photon);",
-        kernels: &["fly_ballot"],
+        file: "stages/scene_trace.glsl",
+        from: "store(place, traced.photon);",
+        to: "if (path.photon % 500u == 7u) traced.photon.flux.y = uintBitsToFloat(0x7fc00000u);\n        store(place, traced.photon);",
+        kernels: &["scene_trace_ballot"],
         noticed_by: &[(Finite, NoNumber)],
     },
     Fault {
@@ -537,7 +537,7 @@ const FAULTS: [Fault; 65] = [
         file: "scene/bvh.glsl",
         from: "return mix(intBitsToFloat(bits + away), start, equal(start, vec3(0.0)));",
         to: "return start;",
-        kernels: &["fly_whole", "shine", "fly_ballot", "view"],
+        kernels: &["scene_trace_persistent", "scene_emit", "scene_trace_ballot", "view"],
         // The error alone is 16 times what the rounding of the start may take from it: no answer is wrong for it.
         noticed_by: &[(Bits("cornell"), OtherBits)],
     },
@@ -546,7 +546,7 @@ const FAULTS: [Fault; 65] = [
         file: "scene/bvh.glsl",
         from: "height * height > 0.0625 * error * error * dot(normal, normal) && ",
         to: "",
-        kernels: &["fly_whole", "fly_ballot"],
+        kernels: &["scene_trace_persistent", "scene_trace_ballot"],
         noticed_by: &[(PatchInPlane, PhotonsAdded)],
     },
     Fault {
@@ -570,7 +570,7 @@ const FAULTS: [Fault; 65] = [
         file: "scene/belongs.glsl",
         from: "+ HEIGHT_ERROR;",
         to: "+ radius * (1.0 / 16.0);",
-        kernels: &["lookup_u64", "lookup_two_words"],
+        kernels: &["scene_gather_u64", "scene_gather_two_words"],
         noticed_by: &[(Shelf, Leak)],
     },
     Fault {
@@ -578,7 +578,7 @@ const FAULTS: [Fault; 65] = [
         file: "scene/belongs.glsl",
         from: "MIN_NORMAL_COSINE = 0.75",
         to: "MIN_NORMAL_COSINE = 0.2",
-        kernels: &["lookup_u64", "lookup_two_words", "weigh"],
+        kernels: &["scene_gather_u64", "scene_gather_two_words", "flux_to_radiance"],
         noticed_by: &[(Ridge, TooDark)],
     },
     Fault {
@@ -586,7 +586,7 @@ const FAULTS: [Fault; 65] = [
         file: "scene/lobes.glsl",
         from: SHADING_GAIN,
         to: "return 1.0;",
-        kernels: &["lookup_u64", "lookup_two_words"],
+        kernels: &["scene_gather_u64", "scene_gather_two_words"],
         noticed_by: &[(LeaningPlane(Illumination::Photons), TooBright)],
     },
     Fault {
@@ -594,7 +594,7 @@ const FAULTS: [Fault; 65] = [
         file: "scene/lobes.glsl",
         from: SHADING_GAIN,
         to: "return 1.0;",
-        kernels: &["fly_whole", "fly_ballot"],
+        kernels: &["scene_trace_persistent", "scene_trace_ballot"],
         noticed_by: &[(LeaningScatterer, TooBright)],
     },
     Fault {
@@ -637,7 +637,7 @@ const FAULTS: [Fault; 65] = [
         file: "scene/aim.glsl",
         from: "k == chosen || versine_between(emission.direction, other.axis) <= other.versine",
         to: "k == chosen",
-        kernels: &["fly_whole", "shine"],
+        kernels: &["scene_trace_persistent", "scene_emit"],
         noticed_by: &[(AimedLight("overlapping cones"), TooBright)],
     },
     Fault {
@@ -645,7 +645,7 @@ const FAULTS: [Fault; 65] = [
         file: "scene/aim.glsl",
         from: "k == chosen || dot(off, off) <= radius * radius",
         to: "k == chosen",
-        kernels: &["fly_whole", "shine"],
+        kernels: &["scene_trace_persistent", "scene_emit"],
         noticed_by: &[(AimedLight("overlapping discs"), TooBright)],
     },
     Fault {
@@ -653,7 +653,7 @@ const FAULTS: [Fault; 65] = [
         file: "scene/aim.glsl",
         from: "return max(cosine, 0.0) * 0.31830988618379067;",
         to: "return cosine > 0.0 ? 0.31830988618379067 : 0.0;",
-        kernels: &["fly_whole", "shine"],
+        kernels: &["scene_trace_persistent", "scene_emit"],
         noticed_by: &[(AimedLight("cosine disc"), TooBright), (AimedLight("two-sided triangles"), TooBright)],
     },
 ];
@@ -696,16 +696,16 @@ fn ask(gpu: &Gpu, question: Question) -> Check<Complaint> {
     let builds = |settings: Settings| photons_agree(gpu, &settings, &expected_photons(&settings));
     let gathers = |settings: Settings| film_agrees(gpu, &settings, &expected_film(&settings));
     match question {
-        Photons(variant @ Variant::Persistent) => {
-            builds(Settings { variant, photons: MANY_PHOTONS, chunk: Some(MANY_PHOTONS), ..strict() })
+        Photons(builder @ Builder::Persistent) => {
+            builds(Settings { builder, photons: MANY_PHOTONS, chunk: Some(MANY_PHOTONS), ..strict() })
         }
-        Photons(variant) => builds(Settings { variant, ..strict() }),
-        InTurn => builds(Settings { variant: Variant::Atomic, counters: Some(8), ..strict() }),
+        Photons(builder) => builds(Settings { builder, ..strict() }),
+        StripedCounters => builds(Settings { builder: Builder::Atomic, counters: Some(8), ..strict() }),
         Film(gather) => gathers(Settings { gather, ..strict() }),
         Nearest => gathers(Settings { gather: Gather::KdTree, nearest: Some(20), ..strict() }),
         Pairs => pairs_count_on(gpu),
-        Ledger(variant) => {
-            let settings = Settings { variant, mesh: 1, ..strict() };
+        Ledger(builder) => {
+            let settings = Settings { builder, mesh: 1, ..strict() };
             closed_fates(gpu, &open_box(&settings), &settings).map(|_| ())
         }
         ClosedForm(name) => closed_form_check(gpu, name),
@@ -720,7 +720,7 @@ fn ask(gpu: &Gpu, question: Question) -> Check<Complaint> {
         }
         Crowds => crowd_check(gpu),
         StrictMath => rounding_check(gpu),
-        Finite => scene_is_finite(gpu, &TransportSettings { rounds: 1, append: Append::Ballot, ..small() }),
+        Finite => scene_is_finite(gpu, &TransportSettings { rounds: 1, builder: Some(Builder::Ballot), ..small() }),
         FiniteBox => box_is_finite(gpu, &strict()),
         Bits(name) => bits::check(gpu, name),
         LampInBox(illumination) => known::lamp_in_a_box(gpu, illumination),
@@ -761,8 +761,8 @@ fn faults_are_noticed(subject: Subject) {
 }
 
 #[test]
-fn faults_of_the_papers_line_are_noticed() {
-    faults_are_noticed(Subject::PapersLine);
+fn faults_of_the_room_are_noticed() {
+    faults_are_noticed(Subject::Room);
 }
 
 #[test]
@@ -823,7 +823,7 @@ fn what_only_breaks_is_not_noticed() {
 
     let Some(gpu) = open(Options::default()) else { return };
     // More bounces than the persistent builder has: refused before anything is traced.
-    let settings = Settings { variant: Variant::Persistent, bounces: 321, ..strict() };
+    let settings = Settings { builder: Builder::Persistent, bounces: 321, ..strict() };
     for check in [closed_fates(&gpu, &open_box(&settings), &settings).map(|_| ()), photons_agree(&gpu, &settings, &[])] {
         assert_eq!(check.unwrap_err().kind, Broken);
     }

@@ -6,10 +6,10 @@ use crate::common::{Check, assert_complains, assert_holds, device, pairs, run, r
 use photonmill::film::{Film, estimate_walls};
 use photonmill::gpu::Gpu;
 use photonmill::ledger::Fates;
-use photonmill::render::Outcome;
+use photonmill::render::RunResult;
 use photonmill::rng::Rng;
 use photonmill::scene::open_box::open_box;
-use photonmill::settings::{EmissionLaw, Preset, Settings, Variant};
+use photonmill::settings::{Builder, EmissionLaw, Preset, Settings};
 
 /// Photons stored at bounces 1 to 15 of the paper's run: rand48, seed 1, 5000 photons. Printed by the
 /// independent numpy model `paper_reference.py`, as is every number of the first two tests.
@@ -97,10 +97,10 @@ fn the_judge_gathers_what_the_numpy_model_gathers() {
 }
 
 /// Runs of the three builders on the device, if there is one, and of the CPU's.
-fn every_builder(gpu: Option<&Gpu>, settings: &Settings) -> Vec<(Variant, Outcome)> {
-    let mut outcomes = vec![(Variant::Cpu, run_on_cpu(settings))];
+fn every_builder(gpu: Option<&Gpu>, settings: &Settings) -> Vec<(Builder, RunResult)> {
+    let mut outcomes = vec![(Builder::Cpu, run_on_cpu(settings))];
     if let Some(gpu) = gpu {
-        outcomes.extend(Variant::ON_GPU.map(|variant| (variant, run(gpu, &Settings { variant, ..settings.clone() }))));
+        outcomes.extend(Builder::ON_GPU.map(|builder| (builder, run(gpu, &Settings { builder, ..settings.clone() }))));
     }
     outcomes
 }
@@ -112,13 +112,13 @@ fn stored(fates: &Fates) -> Vec<u64> {
 #[test]
 fn every_builder_stores_the_papers_photons() {
     let gpu = device();
-    for (variant, outcome) in every_builder(gpu.as_deref(), &Settings::preset(Preset::Modified)) {
-        assert_eq!(stored(&outcome.fates), STORED, "{variant:?}");
-        assert_eq!(outcome.fates.ledger().stored, 7511, "{variant:?}");
+    for (builder, outcome) in every_builder(gpu.as_deref(), &Settings::preset(Preset::Modified)) {
+        assert_eq!(stored(&outcome.fates), STORED, "{builder:?}");
+        assert_eq!(outcome.fates.ledger().stored, 7511, "{builder:?}");
     }
-    for (variant, outcome) in every_builder(gpu.as_deref(), &Settings::preset(Preset::Naive)) {
-        assert_eq!(stored(&outcome.fates), STORED[..2], "{variant:?}");
-        assert_eq!(outcome.fates.ledger().stored, STORED_WITH_TWO_BOUNCES, "{variant:?}");
+    for (builder, outcome) in every_builder(gpu.as_deref(), &Settings::preset(Preset::Naive)) {
+        assert_eq!(stored(&outcome.fates), STORED[..2], "{builder:?}");
+        assert_eq!(outcome.fates.ledger().stored, STORED_WITH_TWO_BOUNCES, "{builder:?}");
     }
 }
 
@@ -155,12 +155,12 @@ fn power_tables_agree_to_single_counts() {
     for (preset, bounces) in [(Preset::Naive, 2), (Preset::Modified, 15)] {
         let settings = Settings::preset(preset);
         let expected = power_table(&Model { bounces, ..Model::default() }.trace(0), 0.05);
-        for (variant, outcome) in every_builder(gpu.as_deref(), &settings) {
-            assert_holds(format!("{preset:?} {variant:?}"), same_power(&outcome.film, &expected, &expected, 0.0));
+        for (builder, outcome) in every_builder(gpu.as_deref(), &settings) {
+            assert_holds(format!("{preset:?} {builder:?}"), same_power(&outcome.film, &expected, &expected, 0.0));
             // The paper's illumination is that power over full light, and may exceed 1.
             for (wall, estimate) in estimate_walls(&outcome.film, &open_box(&settings), &outcome.plan).iter().enumerate() {
                 for (texel, illumination) in estimate.illumination.iter().enumerate() {
-                    assert_eq!(*illumination, outcome.film.power(wall * 4096 + texel) / 90.0, "{variant:?}");
+                    assert_eq!(*illumination, outcome.film.power(wall * 4096 + texel) / 90.0, "{builder:?}");
                 }
             }
         }
@@ -174,12 +174,12 @@ fn illumination_is_the_papers() {
     let printed = [([None; 5], [0.4510, 0.4839, 0.4481, 0.4884, 0.5560]), ([Some(2.0); 5], [0.1105, 0.0932, 0.1057, 0.0972, 0.2628])];
     for (shininess, expected) in printed {
         let settings = Settings { shininess, ..Settings::default() };
-        for (variant, outcome) in every_builder(gpu.as_deref(), &settings) {
+        for (builder, outcome) in every_builder(gpu.as_deref(), &settings) {
             for (estimate, expected) in pairs(estimate_walls(&outcome.film, &open_box(&settings), &outcome.plan), expected) {
                 let clamped: f64 = estimate.illumination.iter().map(|illumination| illumination.min(1.0)).sum();
                 let mean = clamped / estimate.illumination.len() as f64;
                 // Half a digit of the print, and a few flipped counts of 1/90 among 4096 texels.
-                assert!((mean - expected).abs() < 7e-5, "{variant:?} {}: {mean} instead of {expected}", estimate.name);
+                assert!((mean - expected).abs() < 7e-5, "{builder:?} {}: {mean} instead of {expected}", estimate.name);
             }
         }
     }
@@ -196,9 +196,9 @@ fn phong_tables_agree() {
     for shininess in [2.0, 0.5, 0.01, 5.0] {
         let expected = power_table(&Model { shininess: Some(shininess), ..Model::default() }.trace(0), 0.05);
         let settings = Settings { shininess: [Some(shininess as f32); 5], ..Settings::default() };
-        for (variant, outcome) in every_builder(gpu.as_deref(), &settings) {
-            assert_eq!(stored(&outcome.fates), STORED, "{variant:?}");
-            assert_holds(format!("shininess {shininess} {variant:?}"), same_power(&outcome.film, &expected, &counts, WEIGHT_TOLERANCE));
+        for (builder, outcome) in every_builder(gpu.as_deref(), &settings) {
+            assert_eq!(stored(&outcome.fates), STORED, "{builder:?}");
+            assert_holds(format!("shininess {shininess} {builder:?}"), same_power(&outcome.film, &expected, &counts, WEIGHT_TOLERANCE));
         }
     }
 }
@@ -217,15 +217,15 @@ fn rounds_agree() {
         add_power(&mut counts, &unweighted, 0.025);
         pairs(&mut per_bounce, model.stored_per_bounce(&arrivals)).for_each(|(sum, stored)| *sum += stored);
     }
-    for (variant, outcome) in every_builder(gpu.as_deref(), &settings) {
-        assert_eq!(stored(&outcome.fates), per_bounce, "{variant:?}");
-        assert_holds(format!("{variant:?}"), same_power(&outcome.film, &expected, &counts, WEIGHT_TOLERANCE));
+    for (builder, outcome) in every_builder(gpu.as_deref(), &settings) {
+        assert_eq!(stored(&outcome.fates), per_bounce, "{builder:?}");
+        assert_holds(format!("{builder:?}"), same_power(&outcome.film, &expected, &counts, WEIGHT_TOLERANCE));
         let walls = estimate_walls(&outcome.film, &open_box(&settings), &outcome.plan);
         for (wall, estimate) in walls.iter().enumerate() {
             for (texel, illumination) in estimate.illumination.iter().enumerate() {
                 // Full light is ten photons a round.
                 let expected = outcome.film.power(wall * 4096 + texel) / (10.0 * f64::from(rounds));
-                assert!((illumination - expected).abs() <= 1e-12, "{variant:?}");
+                assert!((illumination - expected).abs() <= 1e-12, "{builder:?}");
             }
         }
     }
@@ -290,7 +290,7 @@ fn a_million_photons_have_the_exact_shares() {
     let Some(gpu) = device() else { return };
     for rng in [Rng::Philox, Rng::Mt] {
         for emission in [EmissionLaw::Uniform, EmissionLaw::Cosine] {
-            let settings = Settings { rng, emission, photons: 1_000_000, variant: Variant::Ballot, ..Settings::default() };
+            let settings = Settings { rng, emission, photons: 1_000_000, builder: Builder::Ballot, ..Settings::default() };
             let fates = fates_of(&gpu, &settings);
             assert_eq!(fates.emitted, 1_000_000);
             assert_holds(format!("{rng:?} {emission:?}"), has_shares(&fates, emission));
@@ -308,7 +308,7 @@ fn ten_million_photons_have_the_exact_shares() {
     let Some(gpu) = device() else { return };
     for rng in [Rng::Philox, Rng::Mt] {
         for emission in [EmissionLaw::Uniform, EmissionLaw::Cosine] {
-            let settings = Settings { rng, emission, photons: 10_000_000, variant: Variant::Ballot, ..Settings::default() };
+            let settings = Settings { rng, emission, photons: 10_000_000, builder: Builder::Ballot, ..Settings::default() };
             assert_holds(format!("{rng:?} {emission:?}"), has_shares(&fates_of(&gpu, &settings), emission));
         }
     }

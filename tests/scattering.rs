@@ -63,7 +63,7 @@ impl Tracer<'_> {
         let settings = TransportSettings {
             photons: photons.0 + photons.1,
             chunk: Some(photons.1),
-            // One more than is flown: what the last one leaves is cut off.
+            // One more than is traced: what the last one leaves is cut off.
             bounces: 2,
             illumination: Illumination::Photons,
             math: self.math,

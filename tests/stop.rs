@@ -10,7 +10,7 @@ use glam::DVec3;
 use photonmill::film::{estimate_walls, irradiance_weights};
 use photonmill::gpu::Gpu;
 use photonmill::plan::transport::{Sensor, TransportPlan};
-use photonmill::render::{self, Control, Outcome, Progress, stop};
+use photonmill::render::{self, Control, Progress, RunResult, stop};
 use photonmill::rng::Rng;
 use photonmill::scene::geometry::Geometry;
 use photonmill::scene::open_box::open_box;
@@ -19,7 +19,7 @@ use photonmill::settings::stop::Stop;
 use photonmill::settings::transport::TransportSettings;
 use photonmill::settings::{Math, Settings};
 use photonmill::transport::stop::error_bound;
-use photonmill::transport::{self, End, Lit, View};
+use photonmill::transport::{self, End, View};
 
 const SIZE: u32 = 8;
 const CONFIDENCE: f64 = 0.9;
@@ -56,7 +56,7 @@ fn settings(error: f64, seed: u64) -> TransportSettings {
     }
 }
 
-fn means(lit: &Lit) -> Vec<DVec3> {
+fn means(lit: &transport::RunResult) -> Vec<DVec3> {
     (0..lit.film.pixels()).map(|pixel| lit.film.mean(pixel, &lit.plan)).collect()
 }
 
@@ -118,13 +118,13 @@ fn errors_of_a_hundred_runs_lie_within_the_claim_as_often_as_claimed() {
 }
 
 /// The paper's box by a builder, with an error that is wanted.
-fn in_box(gpu: Option<&Gpu>, error: Option<f64>, rounds: u32, seed: u64) -> (Outcome, Vec<Progress>) {
+fn in_box(gpu: Option<&Gpu>, error: Option<f64>, rounds: u32, seed: u64) -> (RunResult, Vec<Progress>) {
     let stop = Stop { error, confidence: CONFIDENCE, ..Stop::default() };
     let settings = Settings { photons: 301, rounds, seed, mesh: 8, rng: Rng::Philox, stop, ..Settings::default() };
     run_box(gpu, &settings)
 }
 
-fn run_box(gpu: Option<&Gpu>, settings: &Settings) -> (Outcome, Vec<Progress>) {
+fn run_box(gpu: Option<&Gpu>, settings: &Settings) -> (RunResult, Vec<Progress>) {
     let (never, mut told) = (AtomicBool::new(false), Vec::new());
     let mut tell = |progress: &Progress| told.push(progress.clone());
     let mut control = Control { cancelled: &never, progress: &mut tell };
@@ -135,13 +135,13 @@ fn run_box(gpu: Option<&Gpu>, settings: &Settings) -> (Outcome, Vec<Progress>) {
     (outcome, told)
 }
 
-fn irradiances(outcome: &Outcome) -> Vec<DVec3> {
+fn irradiances(outcome: &RunResult) -> Vec<DVec3> {
     let walls = estimate_walls(&outcome.film, &open_box(&outcome.plan.settings), &outcome.plan);
     walls.into_iter().flat_map(|wall| wall.irradiance).map(|irradiance| DVec3::X * irradiance).collect()
 }
 
 /// The relative error that a film of the box has not more of.
-fn bound_in_box(outcome: &Outcome) -> f64 {
+fn bound_in_box(outcome: &RunResult) -> f64 {
     let weights = irradiance_weights(&open_box(&outcome.plan.settings), &outcome.plan);
     stop::error_bound(outcome.film.rounds, outcome.film.relative_error(&weights), CONFIDENCE)
 }
@@ -220,7 +220,7 @@ fn bias_counts_in_the_error_that_is_wanted() {
     assert!(told.last().unwrap().error.unwrap() > 0.25);
 }
 
-fn watched(gpu: &Gpu, name: &str, settings: &TransportSettings) -> (Lit, Vec<Progress>) {
+fn watched(gpu: &Gpu, name: &str, settings: &TransportSettings) -> (transport::RunResult, Vec<Progress>) {
     let scene = scene(name);
     let geometry = Geometry::new(&scene).unwrap();
     let sensor = Sensor::Picture { width: 16, height: 16 };

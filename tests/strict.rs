@@ -21,7 +21,7 @@ use photonmill::rng::philox;
 use photonmill::scene::built_in;
 use photonmill::scene::open_box::open_box;
 use photonmill::settings::transport::TransportSettings;
-use photonmill::settings::{EmissionLaw, Math, Settings, Variant};
+use photonmill::settings::{Builder, EmissionLaw, Math, Settings};
 
 /// Numbers of every size, evenly over exponents and mantissas, and those at which functions change their ways.
 fn operands() -> Vec<Vec2> {
@@ -286,9 +286,9 @@ fn the_cpu_builder_agrees_to_the_bit() {
         assert_complains_of(Kind::PhotonsAdded, "one photon more", photons_agree(&gpu, &settings, &spoiled));
 
         let on_cpu = run_on_cpu(&settings).film;
-        for variant in Variant::ON_GPU {
-            let settings = Settings { variant, ..settings.clone() };
-            assert_holds(format!("{emission:?}, {variant:?}"), film_agrees(&gpu, &settings, &on_cpu));
+        for builder in Builder::ON_GPU {
+            let settings = Settings { builder, ..settings.clone() };
+            assert_holds(format!("{emission:?}, {builder:?}"), film_agrees(&gpu, &settings, &on_cpu));
         }
     }
 }

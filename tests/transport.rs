@@ -12,9 +12,9 @@ use photonmill::render;
 use photonmill::scene::geometry::Geometry;
 use photonmill::scene::light::{Light, LightKind};
 use photonmill::scene::{Camera, Material, Mesh, Scene, Surface};
-use photonmill::settings::EmissionLaw;
-use photonmill::settings::transport::{Append, Effect, Illumination, Kernel, Part, TransportSettings};
-use photonmill::transport::{self, Lit, View};
+use photonmill::settings::transport::{Effect, Illumination, Kernel, Part, TransportSettings};
+use photonmill::settings::{Builder, EmissionLaw};
+use photonmill::transport::{self, RunResult, View};
 
 const SIZE: u32 = 24;
 
@@ -32,7 +32,7 @@ fn camera_of(scene: &Scene) -> Camera {
     scene.cameras.first().cloned().unwrap_or_else(|| Camera::around(scene.bounds().0, scene.bounds().1))
 }
 
-pub fn picture(gpu: &Gpu, scene: &Scene, settings: &TransportSettings) -> Lit {
+pub fn picture(gpu: &Gpu, scene: &Scene, settings: &TransportSettings) -> RunResult {
     let (geometry, plan) = plan_of(gpu, scene, settings, Sensor::Picture { width: SIZE, height: SIZE });
     light(gpu, &View { geometry: &geometry, camera: Some(&camera_of(scene)), phases: &[] }, plan)
 }
@@ -43,7 +43,7 @@ fn irradiance(gpu: &Gpu, scene: &Scene, settings: &TransportSettings, points: &[
     (0..points.len()).map(|point| (lit.film.mean(point, &lit.plan), lit.film.standard_error(point, &lit.plan))).collect()
 }
 
-fn same_film(what: &str, found: &Lit, expected: &Lit) -> Check<Complaint> {
+fn same_film(what: &str, found: &RunResult, expected: &RunResult) -> Check<Complaint> {
     same_sums(what, &found.film.sums, &expected.film.sums)?;
     if found.film == expected.film { Ok(()) } else { Err(Complaint::new(Kind::OtherSums, format!("{what}: squares of sums differ"))) }
 }
@@ -51,14 +51,14 @@ fn same_film(what: &str, found: &Lit, expected: &Lit) -> Check<Complaint> {
 /// Lists of survivors in any order give the same picture. What a list without a survivor shows may be odd in any way.
 pub fn appends_agree(gpu: &Gpu, scene: &Scene, settings: &TransportSettings) -> Check<Complaint> {
     let camera = camera_of(scene);
-    let of = |append| {
-        let settings = TransportSettings { append, ..settings.clone() };
+    let of = |builder| {
+        let settings = TransportSettings { builder: Some(builder), ..settings.clone() };
         let (geometry, plan) = plan_of(gpu, scene, &settings, Sensor::Picture { width: SIZE, height: SIZE });
         run(gpu, &View { geometry: &geometry, camera: Some(&camera), phases: &[] }, plan)
     };
-    let ballot = of(Append::Ballot);
-    same_film("atomic append", &of(Append::Atomic), &ballot)?;
-    same_film("persistent photons", &of(Append::Persistent), &ballot)
+    let ballot = of(Builder::Ballot);
+    same_film("atomic builder", &of(Builder::Atomic), &ballot)?;
+    same_film("persistent photons", &of(Builder::Persistent), &ballot)
 }
 
 #[test]
@@ -67,12 +67,12 @@ fn no_split_and_no_builder_changes_a_bit() {
     let scene = scene("cornell-spheres");
     let usual = || TransportSettings { samples: 2, ..small() };
     let reference = picture(&gpu, &scene, &usual());
-    let variants = [
-        ("ballot append", TransportSettings { append: Append::Ballot, ..usual() }),
+    let builders = [
+        ("ballot builder", TransportSettings { builder: Some(Builder::Ballot), ..usual() }),
         ("chunks of 701", TransportSettings { chunk: Some(701), ..usual() }),
         ("work groups of 32", TransportSettings { group_size: 32, ..usual() }),
     ];
-    for (what, settings) in variants {
+    for (what, settings) in builders {
         assert_holds(what, same_film(what, &picture(&gpu, &scene, &settings), &reference));
     }
     assert_holds("all builders", appends_agree(&gpu, &scene, &usual()));
@@ -144,9 +144,9 @@ fn every_pixel_of_walls_that_shine_is_the_same() {
 fn persistent_photons_are_the_same_in_several_dispatches() {
     let Some(gpu) = device() else { return };
     let scene = scene("cornell");
-    let of = |append| picture(&gpu, &scene, &TransportSettings { append, photons: 70_001, rounds: 1, ..small() });
+    let of = |builder| picture(&gpu, &scene, &TransportSettings { builder: Some(builder), photons: 70_001, rounds: 1, ..small() });
     let what = "70 001 photons";
-    assert_holds(what, same_film(what, &of(Append::Persistent), &of(Append::Ballot)));
+    assert_holds(what, same_film(what, &of(Builder::Persistent), &of(Builder::Ballot)));
 }
 
 /// With the paper's way too, where one map holds everything, and with a final gather.
@@ -161,7 +161,7 @@ fn the_four_parts_add_up_to_the_whole_to_the_bit() {
         TransportSettings { illumination: Illumination::Photons, ..small() },
     ] {
         let whole = picture(&gpu, &scene, &settings);
-        let parts: Vec<Lit> = Part::EACH.map(|part| picture(&gpu, &scene, &TransportSettings { part, ..settings.clone() })).into();
+        let parts: Vec<RunResult> = Part::EACH.map(|part| picture(&gpu, &scene, &TransportSettings { part, ..settings.clone() })).into();
         for (sum, place) in whole.film.sums.iter().zip(0..) {
             let of_parts: u64 = parts.iter().map(|part| part.film.sums[place]).sum();
             assert_eq!(*sum, of_parts, "sum {place}, {:?}", settings.illumination);
@@ -279,7 +279,7 @@ fn what_is_dropped_is_not_there() {
     let all = picture(&gpu, &cornell, &TransportSettings { with: vec![Effect::RefractiveCaustics], ..small() });
     let needed = picture(&gpu, &cornell, &small());
     let direct = picture(&gpu, &cornell, &TransportSettings { part: Part::Direct, ..small() });
-    let count = |lit: &Lit, pass: &str| lit.timings.row(pass).map_or(0, |row| row.count);
+    let count = |lit: &RunResult, pass: &str| lit.timings.row(pass).map_or(0, |row| row.count);
     for (lit, global, caustic) in [(&all, 3, 3), (&needed, 3, 0), (&direct, 0, 0)] {
         assert_eq!(count(lit, "round/global"), global);
         assert_eq!(count(lit, "round/caustic"), caustic);
@@ -476,7 +476,7 @@ fn a_scene_without_light_is_black_and_costs_no_photon() {
 fn stated_errors_are_the_spread_over_seeds() {
     let Some(gpu) = device() else { return };
     let scene = scene("cornell");
-    let runs: Vec<Lit> = (0..120).map(|seed| picture(&gpu, &scene, &TransportSettings { seed, rounds: 8, ..small() })).collect();
+    let runs: Vec<RunResult> = (0..120).map(|seed| picture(&gpu, &scene, &TransportSettings { seed, rounds: 8, ..small() })).collect();
     let pixels = runs[0].film.pixels();
     let (mut stated, mut spread) = (0.0, 0.0);
     for pixel in 0..pixels {

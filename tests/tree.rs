@@ -19,7 +19,7 @@ use photonmill::render::constants;
 use photonmill::resources::Resources;
 use photonmill::rng::{Rng, philox};
 use photonmill::scene::open_box::open_box;
-use photonmill::settings::{Gather, Math, Settings, Variant};
+use photonmill::settings::{Builder, Gather, Math, Settings};
 use photonmill::{estimate, index};
 
 fn by_tree(settings: &Settings) -> Settings {
@@ -119,13 +119,13 @@ fn builders_and_splits_give_the_bits_of_the_grid() {
         let expected = film(&gpu, &settings);
         assert!(expected.sums.iter().filter(|sum| **sum > 0).count() > expected.sums.len() / 2);
         for (place, group_size) in [32, 128, 1024].into_iter().enumerate() {
-            for variant in Variant::ON_GPU {
+            for builder in Builder::ON_GPU {
                 let chunk = [None, Some(301), Some(1024)][place];
                 let group_size = group_size.min(gpu.facts().work_group_size);
-                let other = Settings { variant, group_size, counters: [None, Some(4), Some(16)][place], chunk, ..by_tree(&settings) };
+                let other = Settings { builder, group_size, counters: [None, Some(4), Some(16)][place], chunk, ..by_tree(&settings) };
                 let found = film(&gpu, &other);
                 assert_eq!((found.channel_count, found.scale), (expected.channel_count, expected.scale));
-                assert_holds(format!("{what}, {variant:?}, groups of {group_size}"), equal_sums("film", &found.sums, &expected.sums));
+                assert_holds(format!("{what}, {builder:?}, groups of {group_size}"), equal_sums("film", &found.sums, &expected.sums));
             }
         }
         assert_holds(format!("{what}, 32 bits"), equal_sums("film", &film(&lesser, &by_tree(&settings)).sums, &expected.sums));
@@ -134,8 +134,8 @@ fn builders_and_splits_give_the_bits_of_the_grid() {
         assert_holds(format!("{what}, CPU"), equal_sums("film", &tree.sums, &grid.sums));
     }
     // Nothing is stored in a black box, and the whole line still runs.
-    for variant in Variant::ON_GPU {
-        let black = by_tree(&Settings { reflectance: 0.0, variant, mesh: 8, ..Settings::default() });
+    for builder in Builder::ON_GPU {
+        let black = by_tree(&Settings { reflectance: 0.0, builder, mesh: 8, ..Settings::default() });
         assert!(film(&gpu, &black).sums.iter().all(|sum| *sum == 0));
         assert!(film(&gpu, &Settings { nearest: Some(5), ..black }).sums.iter().all(|sum| *sum == 0));
     }
@@ -307,11 +307,11 @@ fn builders_and_the_cpu_take_the_same_nearest_photons() {
             ..by_tree(&Settings::default())
         };
         let expected = run_on_cpu(&settings).film;
-        for (place, variant) in Variant::ON_GPU.into_iter().enumerate() {
-            let other = Settings { variant, group_size: [128, 32, 64][place % 3], ..settings.clone() };
+        for (place, builder) in Builder::ON_GPU.into_iter().enumerate() {
+            let other = Settings { builder, group_size: [128, 32, 64][place % 3], ..settings.clone() };
             let found = film(&gpu, &other);
             assert_eq!((found.channel_count, found.scale), (expected.channel_count, expected.scale));
-            assert_holds(format!("{nearest} nearest, {variant:?}"), equal_sums("film", &found.sums, &expected.sums));
+            assert_holds(format!("{nearest} nearest, {builder:?}"), equal_sums("film", &found.sums, &expected.sums));
         }
         assert_holds("32 bits", equal_sums("film", &film(&lesser, &settings).sums, &expected.sums));
         let one_channel = Settings { shininess: [None; 5], light_power: [1.0; 2], ..settings };

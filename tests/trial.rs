@@ -14,7 +14,8 @@ use photonmill::records::Receiver;
 use photonmill::render;
 use photonmill::scene::geometry::Geometry;
 use photonmill::scene::{Camera, Scene};
-use photonmill::settings::transport::{Append, Part, TransportSettings};
+use photonmill::settings::Builder;
+use photonmill::settings::transport::{Part, TransportSettings};
 use photonmill::transport::{View, trial};
 
 /// A room of 4 x 4 x 3 m with a lamp under its ceiling, on a ground of 800 m.
@@ -113,8 +114,12 @@ fn a_trial_knows_no_seed_builder_or_split() {
     };
     let settings = TransportSettings::default();
     let expected = radii(&settings);
-    for append in [Append::Atomic, Append::Ballot] {
-        assert_eq!(radii(&TransportSettings { append, seed: 7, chunk: Some(5000), ..settings.clone() }), expected, "{append:?}");
+    for builder in [Builder::Atomic, Builder::Ballot] {
+        assert_eq!(
+            radii(&TransportSettings { builder: Some(builder), seed: 7, chunk: Some(5000), ..settings.clone() }),
+            expected,
+            "{builder:?}"
+        );
     }
     // A quarter of the photons: twice the radius, in whole steps.
     let fewer = radii(&TransportSettings { photons: settings.photons / 4, ..settings.clone() });

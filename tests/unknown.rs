@@ -15,7 +15,7 @@ use photonmill::settings::Settings;
 use photonmill::settings::stop::Stop;
 use photonmill::settings::transport::TransportSettings;
 use photonmill::transport::stop::error_bound;
-use photonmill::transport::{End, Lit};
+use photonmill::transport::{End, RunResult};
 
 /// Walls of a room over [-2, 2] x [-2, 2], as high as 3 m, that face inwards; and its ceiling but for a hole in the middle.
 pub fn room_without_floor(hole: f64) -> Vec<Mesh> {
@@ -44,7 +44,7 @@ fn pinhole_room() -> Scene {
     scene_of(meshes, vec![matt(0.5), shining(0.0)], vec![])
 }
 
-fn is_black(lit: &Lit) -> bool {
+fn is_black(lit: &RunResult) -> bool {
     lit.film.sums.iter().all(|sum| *sum == 0)
 }
 

@@ -11,7 +11,7 @@ layout(set = 0, binding = 1, scalar) readonly buffer Walls { Wall walls[]; };
 layout(set = 1, binding = 1, scalar) writeonly buffer Paths { uvec4 paths[]; };
 
 #include "math.glsl"
-#include "oddities.glsl"
+#include "nonfinite_values.glsl"
 #include "dispatch.glsl"
 #include "rng.glsl"
 #include "sampling.glsl"

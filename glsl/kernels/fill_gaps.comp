@@ -1,4 +1,4 @@
-// Ends a bounce whose survivors took places from several counters in turn (append/in_turn.glsl): says how many places that
+// Ends a bounce whose survivors took places from several counters in turn (append/striped_counters.glsl): says how many places that
 // makes, gaps included, marks the gaps as no photon and no path, and empties the counters for the next bounce.
 // Dispatched by src/trace.rs once a bounce, as one work group. One thread = every so many-th gap.
 #version 460
@@ -14,19 +14,19 @@ layout(set = 1, binding = 2, scalar) writeonly buffer NextPaths { uvec4 next_pat
 
 #include "photon.glsl"
 #include "path.glsl"
-#include "append/in_turn.glsl"
+#include "append/striped_counters.glsl"
 
 void main()
 {
     uint end = 0;
     for (uint turn = 0; turn < COUNTERS; turn++) {
-        uint taken = counters[counter_in_turn(turn)];
-        end = max(end, taken == 0 ? 0 : place_in_turn(turn, taken - 1) + 1);
+        uint taken = counters[striped_counter(turn)];
+        end = max(end, taken == 0 ? 0 : striped_place(turn, taken - 1) + 1);
     }
     uint first_photon = counters[0];
     for (uint turn = 0; turn < COUNTERS; turn++) {
-        uint gap = counters[counter_in_turn(turn)] + gl_LocalInvocationIndex;
-        for (uint place = place_in_turn(turn, gap); place < end; gap += gl_WorkGroupSize.x, place = place_in_turn(turn, gap)) {
+        uint gap = counters[striped_counter(turn)] + gl_LocalInvocationIndex;
+        for (uint place = striped_place(turn, gap); place < end; gap += gl_WorkGroupSize.x, place = striped_place(turn, gap)) {
             if (first_photon + place < push.photon_capacity) {
                 photons[first_photon + place] = pack_photon(Photon(vec3(0.0), NO_WALL, 0.0, 0.0, 0, 0));
             }
@@ -36,7 +36,7 @@ void main()
     memoryBarrierBuffer();
     barrier(); // all have read the counters
     for (uint turn = gl_LocalInvocationIndex; turn < COUNTERS; turn += gl_WorkGroupSize.x) {
-        counters[counter_in_turn(turn)] = 0;
+        counters[striped_counter(turn)] = 0;
     }
     if (gl_LocalInvocationIndex == 0) {
         counters[2 + push.bounce] = end;

@@ -13,7 +13,7 @@ layout(push_constant, scalar) uniform Push { GoOnPush push; };
 layout(set = 1, binding = 11, scalar) readonly buffer CameraPaths { CameraPath camera_paths[]; };
 
 #include "math.glsl"
-#include "oddities.glsl"
+#include "nonfinite_values.glsl"
 #include "dispatch.glsl"
 #include "philox.glsl"
 #include "sobol.glsl"
@@ -55,7 +55,7 @@ void main()
     if (follow(chain, index, number, push.draws, push.emitter_count, depth)) {
         put_off(chain, path.place, depth + CHAIN_STEPS);
     }
-    note_unless(is_finite(chain.light[0]) && is_finite(chain.light[1]) && is_finite(chain.light[2]), ODD_LIGHT, push.draws.domain,
+    note_unless(is_finite(chain.light[0]) && is_finite(chain.light[1]) && is_finite(chain.light[2]), NONFINITE_LIGHT, push.draws.domain,
                 push.draws.round, index);
     write_pass_sum(path.place, chain.light, push.film_scale, push.film_limit, mix32(push.rounding + depth), true);
     write_points(chain, index, number, push.pixel_count, first_point);

@@ -14,7 +14,7 @@ layout(push_constant, scalar) uniform Push { ReceivePush push; };
 layout(set = 0, binding = 8, scalar) readonly buffer Receivers { Receiver receivers[]; };
 
 #include "math.glsl"
-#include "oddities.glsl"
+#include "nonfinite_values.glsl"
 #include "dispatch.glsl"
 #include "philox.glsl"
 #include "sobol.glsl"
@@ -83,7 +83,7 @@ void main()
             put_off(chain, index, CHAIN_STEPS);
         }
     }
-    note_unless(is_finite(chain.light[0]) && is_finite(chain.light[1]) && is_finite(chain.light[2]), ODD_LIGHT, push.draws.domain,
+    note_unless(is_finite(chain.light[0]) && is_finite(chain.light[1]) && is_finite(chain.light[2]), NONFINITE_LIGHT, push.draws.domain,
                 push.draws.round, index);
     write_pass_sum(index, chain.light, push.film_scale, push.film_limit, push.rounding, false);
     write_points(chain, index, 0, push.point_count, 0);

@@ -1,4 +1,4 @@
-// One bounce, survivors stored by append/atomic_in_turn.glsl.
+// One bounce, survivors stored by append/atomic_striped.glsl.
 // Dispatched by src/trace.rs once a bounce. One thread = one incoming path.
 #version 460
 #extension GL_GOOGLE_include_directive : require
@@ -16,7 +16,7 @@ layout(set = 1, binding = 3, scalar) buffer Counters { uint counters[]; };
 layout(set = 1, binding = 4, scalar) buffer Tallies { Tally tallies[]; };
 
 #include "math.glsl"
-#include "oddities.glsl"
+#include "nonfinite_values.glsl"
 #include "dispatch.glsl"
 #include "rng.glsl"
 #include "sampling.glsl"
@@ -29,8 +29,8 @@ layout(set = 1, binding = 4, scalar) buffer Tallies { Tally tallies[]; };
 const uint PLACES = 1;
 #include "append/paths.glsl"
 #include "append/store.glsl"
-#include "append/in_turn.glsl"
-#include "append/atomic_in_turn.glsl"
+#include "append/striped_counters.glsl"
+#include "append/atomic_striped.glsl"
 #include "append/each.glsl"
 #include "stages/bounce.glsl"
 #include "stages/trace_compact.glsl"

@@ -16,7 +16,7 @@ layout(set = 1, binding = 3, scalar) buffer Counters { uint counters[]; };
 layout(set = 1, binding = 4, scalar) buffer Tallies { Tally tallies[]; };
 
 #include "math.glsl"
-#include "oddities.glsl"
+#include "nonfinite_values.glsl"
 #include "dispatch.glsl"
 #include "rng.glsl"
 #include "sampling.glsl"

@@ -14,7 +14,7 @@ layout(set = 1, binding = 1, scalar) writeonly buffer NextPaths { uvec4 next_pat
 layout(set = 1, binding = 4, scalar) buffer Tallies { Tally tallies[]; };
 
 #include "math.glsl"
-#include "oddities.glsl"
+#include "nonfinite_values.glsl"
 #include "dispatch.glsl"
 #include "rng.glsl"
 #include "sampling.glsl"

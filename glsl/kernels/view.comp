@@ -13,7 +13,7 @@ layout(local_size_x_id = 0) in;
 layout(push_constant, scalar) uniform Push { ViewPush push; };
 
 #include "math.glsl"
-#include "oddities.glsl"
+#include "nonfinite_values.glsl"
 #include "dispatch.glsl"
 #include "philox.glsl"
 #include "sobol.glsl"
@@ -55,7 +55,7 @@ void main()
     if (follow(chain, pixel, number, push.draws, push.emitter_count, 0)) {
         put_off(chain, SAMPLES * pixel + number, CHAIN_STEPS);
     }
-    note_unless(is_finite(chain.light[0]) && is_finite(chain.light[1]) && is_finite(chain.light[2]), ODD_LIGHT, push.draws.domain,
+    note_unless(is_finite(chain.light[0]) && is_finite(chain.light[1]) && is_finite(chain.light[2]), NONFINITE_LIGHT, push.draws.domain,
                 push.draws.round, pixel);
     write_pass_sum(SAMPLES * pixel + number, chain.light, push.film_scale, push.film_limit, push.rounding, false);
     write_points(chain, pixel, number, push.width * push.height, 0);

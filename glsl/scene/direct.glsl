@@ -33,7 +33,7 @@ vec3 direct_light(Target point, uint emitter_count, Draws draws, uint index, uin
         Arriving arriving = sample_light(emitter_count, point.position, point.ns, u);
         float cosine = dot(arriving.wi, point.ns);
         // Before the guards below, which would drop what is no number.
-        note_unless(is_finite(cosine) && is_finite(arriving.radiance) && (arriving.is_far || is_finite(arriving.target)), ODD_LIGHT,
+        note_unless(is_finite(cosine) && is_finite(arriving.radiance) && (arriving.is_far || is_finite(arriving.target)), NONFINITE_LIGHT,
                     draws.domain, draws.round, index);
         if (cosine > 0.0 && dot(arriving.wi, point.ng) > 0.0 && max(arriving.radiance.x, max(arriving.radiance.y, arriving.radiance.z)) > 0.0) {
             vec3 start = offset_origin(point.position, point.error, point.ng, point.ng);

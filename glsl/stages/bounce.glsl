@@ -27,7 +27,7 @@ Bounced bounce_path(inout Path path, uint bounce)
     path.wall = hit.wall;
     float weight = view_weight(wall, hit.position, arriving, path.direction, push.eye);
     bounced.photon = Photon(hit.position, hit.wall, path.flux, weight, path.photon, bounce);
-    note_unless(!bounced.alive || (is_finite(hit.position) && is_finite(path.direction) && is_finite(weight)), ODD_PHOTON,
+    note_unless(!bounced.alive || (is_finite(hit.position) && is_finite(path.direction) && is_finite(weight)), NONFINITE_PHOTON,
                 DOMAIN_PHOTONS, push.key.round, path.photon);
     return bounced;
 }

@@ -96,7 +96,7 @@ bool follow(inout Chain chain, uint index, uint number, Draws draws, uint emitte
 {
     uint end_depth = min(first_depth + CHAIN_STEPS, MAX_BOUNCES);
     for (uint depth = first_depth; depth < end_depth; depth++) {
-        note_unless(is_finite(chain.position) && is_finite(chain.direction) && is_finite(chain.weight), ODD_LIGHT, draws.domain,
+        note_unless(is_finite(chain.position) && is_finite(chain.direction) && is_finite(chain.weight), NONFINITE_LIGHT, draws.domain,
                     draws.round, index);
         vec3 wo = -chain.direction;
         Hit hit = closest_hit(chain.position, chain.direction);

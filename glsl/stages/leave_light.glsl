@@ -16,6 +16,6 @@ Path leave_light(uint index, PhotonRange range)
     vec3 position;
     vec3 direction;
     emit_from_disc(light, walls[light.wall], u, position, direction);
-    note_unless(is_finite(position) && is_finite(direction) && is_finite(light.flux), ODD_PHOTON, DOMAIN_PHOTONS, push.key.round, photon);
+    note_unless(is_finite(position) && is_finite(direction) && is_finite(light.flux), NONFINITE_PHOTON, DOMAIN_PHOTONS, push.key.round, photon);
     return Path(position, light.wall, direction, photon, stream, light.flux);
 }

@@ -10,18 +10,19 @@ use glam::{DVec3, Vec3};
 
 use super::Lab;
 use super::experiments::{Found, limit_of_round};
-use super::scene_line::{self, Job};
+use super::scene::{self, Job};
 use crate::error::Result;
 use crate::plan::transport::usual_radius;
 use crate::scene::geometry::Geometry;
 use crate::scene::{Scene, Surface, built_in};
-use crate::settings::transport::{Append, TransportSettings};
+use crate::settings::Builder;
+use crate::settings::transport::TransportSettings;
 use crate::study::axes::{Configuration, Line};
 use crate::study::point::{Curve, Point};
 use crate::study::reference::Reference;
 use crate::study::subject::Subject;
 use crate::text::counted;
-use crate::transport::Lit;
+use crate::transport::RunResult;
 
 /// Runs of a point, each with a seed of its own.
 const REPEATS: u32 = 3;
@@ -87,7 +88,7 @@ pub fn measure(lab: &mut Lab, name: &str) -> Result<Found> {
         }
     }
     let used = best.as_ref().map_or_else(|| candidates[0].clone(), |best| best.1.clone());
-    let timed = scene_line::time(lab.gpu, &lab.rates, &job(used), lab.cancelled)?;
+    let timed = scene::time(lab.gpu, &lab.rates, &job(used), lab.cancelled)?;
     let (seconds, how) = match best {
         Some((ms, settings, rounds)) => {
             let mut how = format!("{} % within {}: {}", 100.0 * wanted, counted(rounds, "round"), search.command(&settings, rounds));
@@ -120,7 +121,7 @@ fn candidates(lab: &Lab, name: &str, geometry: &Geometry) -> Vec<TransportSettin
         caustic_photons,
         radius: Some(usual_radius(geometry, spread) * geometry.unit),
         alpha: 1.0,
-        append: Append::Persistent,
+        builder: Some(Builder::Persistent),
         ..TransportSettings::default()
     };
     let many = match name {
@@ -177,12 +178,12 @@ fn long_run(lab: &Lab, job: &Job, search: &Search) -> Result<Reference> {
     }
 }
 
-fn values(lit: &Lit) -> Vec<f64> {
+fn values(lit: &RunResult) -> Vec<f64> {
     (0..lit.film.pixels()).flat_map(|pixel| lit.film.mean(pixel, &lit.plan).to_array()).collect()
 }
 
 /// What a run found, with its own standard errors, at the places that count for the judge.
-fn of_film(lit: &Lit, judge: &Reference) -> Reference {
+fn of_film(lit: &RunResult, judge: &Reference) -> Reference {
     let pixels = 0..lit.film.pixels();
     let mut reference = Reference {
         method: String::new(),

@@ -5,10 +5,10 @@ use std::time::Instant;
 use serde::Serialize;
 
 use super::accuracy;
-use super::paper_line::{self, Timed};
 use super::pass::Pass;
+use super::room::{self, Timed};
 use super::scale::ball_room;
-use super::scene_line::{self, Job, radius_for, survey};
+use super::scene::{self, Job, radius_for, survey};
 use super::targets::{Finding, findings};
 use super::{Lab, Size};
 use crate::compaction::{self, Map};
@@ -16,8 +16,8 @@ use crate::error::Result;
 use crate::rng::Rng;
 use crate::scene::built_in;
 use crate::scene::geometry::Geometry;
-use crate::settings::transport::{Append, Effect, Illumination, TransportSettings};
-use crate::settings::{Preset, Settings, Variant};
+use crate::settings::transport::{Effect, Illumination, TransportSettings};
+use crate::settings::{Builder, Preset, Settings};
 use crate::timings::Spread;
 
 #[derive(Debug, Clone, Copy, PartialEq, Eq, Serialize)]
@@ -125,21 +125,21 @@ pub fn limit_of_round(timed: &Timed) -> Option<f64> {
 }
 
 /// The paper's box at other sizes: cells of a centimetre, random numbers that fit any count, all photons at once.
-fn large_box(variant: Variant, photons: u32, mesh: u32) -> Settings {
-    Settings { variant, photons, mesh, radius: 0.01, rng: Rng::Philox, chunk: Some(photons), ..Settings::default() }
+fn large_box(builder: Builder, photons: u32, mesh: u32) -> Settings {
+    Settings { builder, photons, mesh, radius: 0.01, rng: Rng::Philox, chunk: Some(photons), ..Settings::default() }
 }
 
 fn open_box(lab: &mut Lab) -> Result<Found> {
     let photons = lab.choose(1 << 12, 1 << 16, 1 << 24);
     let mut passes = Vec::new();
     let mut best: Option<(f64, Option<f64>, String)> = None;
-    for variant in Variant::ON_GPU {
+    for builder in Builder::ON_GPU {
         lab.go_on()?;
-        let timed = paper_line::time(lab.gpu, &lab.rates, &large_box(variant, photons, lab.choose(16, 64, 64)), lab.cancelled)?;
+        let timed = room::time(lab.gpu, &lab.rates, &large_box(builder, photons, lab.choose(16, 64, 64)), lab.cancelled)?;
         let rate = timed.counts.events / timed.ms("build") * 1e3;
         if best.as_ref().is_none_or(|best| rate > best.0) {
             let limit = limit_ms(timed.pass("build")).map(|ms| timed.counts.events / ms * 1e3);
-            best = Some((rate, limit, format!("{}, {photons} photons per round", variant.name())));
+            best = Some((rate, limit, format!("{}, {photons} photons per round", builder.name())));
         }
         passes.extend(timed.passes);
     }
@@ -152,21 +152,21 @@ fn builders(lab: &mut Lab) -> Result<Found> {
     let mut ratios = Vec::new();
     for bounces in [2, 15] {
         let (mut builds, mut one_counter) = (Vec::new(), None);
-        for variant in Variant::ON_GPU {
+        for builder in Builder::ON_GPU {
             lab.go_on()?;
-            let settings = Settings { bounces, radius: Settings::default().radius, ..large_box(variant, photons, lab.choose(16, 32, 64)) };
-            let timed = paper_line::time(lab.gpu, &lab.rates, &settings, lab.cancelled)?;
-            builds.push((variant, timed.ms("build"), limit_ms(timed.pass("build"))));
+            let settings = Settings { bounces, radius: Settings::default().radius, ..large_box(builder, photons, lab.choose(16, 32, 64)) };
+            let timed = room::time(lab.gpu, &lab.rates, &settings, lab.cancelled)?;
+            builds.push((builder, timed.ms("build"), limit_ms(timed.pass("build"))));
             passes.extend(timed.passes);
             // The paper's atomics literally, where more counters serve the device better.
             if timed.counters > 1 {
-                let timed = paper_line::time(lab.gpu, &lab.rates, &Settings { counters: Some(1), ..settings }, lab.cancelled)?;
+                let timed = room::time(lab.gpu, &lab.rates, &Settings { counters: Some(1), ..settings }, lab.cancelled)?;
                 one_counter = Some(timed.ms("build"));
                 passes.extend(timed.passes);
             }
         }
-        let of = |wanted: Variant| *builds.iter().find(|(variant, ..)| *variant == wanted).expect("every builder was timed");
-        let ((_, naive, naive_limit), (_, atomic, atomic_limit)) = (of(Variant::Naive), of(Variant::Atomic));
+        let of = |wanted: Builder| *builds.iter().find(|(builder, ..)| *builder == wanted).expect("every builder was timed");
+        let ((_, naive, naive_limit), (_, atomic, atomic_limit)) = (of(Builder::Naive), of(Builder::Atomic));
         let ratio = |over: f64, under: f64| if bounces == 2 { over / under } else { under / over };
         let limit = atomic_limit.zip(naive_limit).map(|(atomic, naive)| ratio(atomic, naive));
         let of_one = one_counter.map_or_else(String::new, |one| format!("; with a single counter: {:.2} x", ratio(one, naive)));
@@ -192,10 +192,10 @@ fn table_1(lab: &mut Lab) -> Result<Found> {
     let mut passes = Vec::new();
     let mut best: Option<(f64, Option<f64>, String)> = None;
     // The paper's builder, and the one that wins at this size.
-    for variant in [Variant::Atomic, Variant::Persistent] {
+    for builder in [Builder::Atomic, Builder::Persistent] {
         lab.go_on()?;
-        let settings = Settings { variant, rounds: lab.choose(5, 50, 50), ..Settings::preset(Preset::Rounds) };
-        let runs = paper_line::time_run(lab.gpu, &lab.rates, &settings, lab.cancelled)?;
+        let settings = Settings { builder, rounds: lab.choose(5, 50, 50), ..Settings::preset(Preset::Rounds) };
+        let runs = room::time_run(lab.gpu, &lab.rates, &settings, lab.cancelled)?;
         let median = |value: &dyn Fn(&Timed) -> f64| Spread::of(runs.iter().map(value).collect()).map_or(f64::NAN, |spread| spread.median);
         let seconds = 1e-3 * median(&|run| run.run_ms);
         if best.as_ref().is_none_or(|best| seconds < best.0) {
@@ -204,7 +204,7 @@ fn table_1(lab: &mut Lab) -> Result<Found> {
                 "{} rounds of {} photons, {}, set-up included; {:.4} s wall time",
                 settings.rounds,
                 settings.photons,
-                variant.name(),
+                builder.name(),
                 1e-3 * median(&|run| run.wall_ms)
             );
             best = Some((seconds, limit, how));
@@ -222,10 +222,10 @@ fn index(lab: &mut Lab) -> Result<Found> {
     let wanted = lab.choose(1e4, 2e5, INDEXED);
     let scaled = |ms: f64, stored: f64| 1e-3 * ms * INDEXED / stored;
 
-    let room = |photons: u32| Settings { variant: Variant::Ballot, ..large_box(Variant::Ballot, photons, 16) };
+    let room = |photons: u32| Settings { builder: Builder::Ballot, ..large_box(Builder::Ballot, photons, 16) };
     let few = 1 << 12;
-    let share = paper_line::time(lab.gpu, &lab.rates, &room(few), lab.cancelled)?.counts.survivors / f64::from(few);
-    let of_room = paper_line::time(lab.gpu, &lab.rates, &room((wanted / share) as u32), lab.cancelled)?;
+    let share = room::time(lab.gpu, &lab.rates, &room(few), lab.cancelled)?.counts.survivors / f64::from(few);
+    let of_room = room::time(lab.gpu, &lab.rates, &room((wanted / share) as u32), lab.cancelled)?;
     let mut found = Vec::new();
     let stored = of_room.counts.survivors;
     let how = |stored: f64| format!("measured with {stored:.0} photons in the map, time scaled in proportion");
@@ -244,7 +244,7 @@ fn index(lab: &mut Lab) -> Result<Found> {
     let stored_of = |job: &Job| Ok(survey(lab.gpu, job, |plan| plan.global.as_ref())?.map_or(0.0, |survey| survey.stored));
     let share = stored_of(&job(few))? / f64::from(few);
     let job = job((wanted / share) as u32);
-    let of_scene = scene_line::time(lab.gpu, &lab.rates, &job, lab.cancelled)?;
+    let of_scene = scene::time(lab.gpu, &lab.rates, &job, lab.cancelled)?;
     let pass = of_scene.pass("global/index");
     let stored = pass.and_then(|pass| pass.work).map_or(f64::NAN, |work| work.items);
     found.push((scaled(of_scene.ms("global/index"), stored), limit_ms(pass).map(|ms| scaled(ms, stored)), how(stored)));
@@ -281,7 +281,7 @@ fn gather(lab: &mut Lab) -> Result<Found> {
     }
     let job = job(photons, radius, size);
     let per_estimate = survey(&job)?.map_or(f64::NAN, |survey| survey.per_estimate);
-    let timed = scene_line::time(lab.gpu, &lab.rates, &job, lab.cancelled)?;
+    let timed = scene::time(lab.gpu, &lab.rates, &job, lab.cancelled)?;
     let how = format!("{} x {} points, {photons} photons emitted, {per_estimate:.1} per estimate", size.0, size.1);
     let found = (1e-3 * timed.ms("global/gather"), limit_ms(timed.pass("global/gather")).map(|ms| 1e-3 * ms), how);
     Ok((timed.passes, vec![found]))
@@ -311,14 +311,14 @@ fn mesh(lab: &mut Lab) -> Result<Found> {
 fn best_builder(lab: &mut Lab, job: &Job, pass: &str, how: &str) -> Result<Found> {
     let mut passes = Vec::new();
     let mut best: Option<(f64, Option<f64>, String)> = None;
-    for append in [Append::Ballot, Append::Persistent] {
+    for builder in [Builder::Ballot, Builder::Persistent] {
         lab.go_on()?;
-        let settings = TransportSettings { append, ..job.settings.clone() };
-        let timed = scene_line::time(lab.gpu, &lab.rates, &Job { settings, ..*job }, lab.cancelled)?;
+        let settings = TransportSettings { builder: Some(builder), ..job.settings.clone() };
+        let timed = scene::time(lab.gpu, &lab.rates, &Job { settings, ..*job }, lab.cancelled)?;
         let rate = |ms: f64| timed.counts.emitted / ms * 1e3;
         let found = rate(timed.ms(pass));
         if best.as_ref().is_none_or(|best| found > best.0) {
-            let how = format!("{}, {} photons per round, {how}", append.name(), job.settings.photons);
+            let how = format!("{}, {} photons per round, {how}", builder.name(), job.settings.photons);
             best = Some((found, limit_ms(timed.pass(pass)).map(rate), how));
         }
         passes.extend(timed.passes);
@@ -348,7 +348,7 @@ fn effects(lab: &mut Lab) -> Result<Found> {
     for _ in 0..lab.choose(1, 3, 3) {
         for (job, round_ms) in jobs.iter().zip(&mut round_ms) {
             lab.go_on()?;
-            let timed = scene_line::time(lab.gpu, &lab.rates, job, lab.cancelled)?;
+            let timed = scene::time(lab.gpu, &lab.rates, job, lab.cancelled)?;
             round_ms.push(timed.round_ms);
             if passes.is_empty() {
                 passes = timed.passes;

@@ -1,17 +1,17 @@
 //! How close every pass comes to the device's limits (roofline).
 //!
-//! [`rates`] measures what the device can do, [`paper_line`] and [`scene_line`] time the passes of both lines beside what
+//! [`rates`] measures what the device can do, [`room`] and [`scene`] time the passes of both lines beside what
 //! they cannot do without ([`pass`]), [`experiments`] runs the workloads that the targets name ([`targets`]), and [`scale`]
 //! follows cost and memory over photons and triangles.
 
 pub mod accuracy;
 pub mod chart;
 pub mod experiments;
-pub mod paper_line;
 pub mod pass;
 pub mod rates;
+pub mod room;
 pub mod scale;
-pub mod scene_line;
+pub mod scene;
 pub mod table;
 pub mod targets;
 
@@ -113,7 +113,7 @@ impl Lab<'_> {
 /// Measures the device, then the experiments that are asked for. Experiments that were complete when it was
 /// interrupted are kept.
 pub fn run(gpu: &Gpu, request: Request, cancelled: &AtomicBool, tell: &mut dyn FnMut(&str)) -> Result<Bench> {
-    paper_line::check_clock(gpu)?;
+    room::check_clock(gpu)?;
     let deadline = Instant::now() + request.budget;
     tell("limits of the device");
     let rates = rates::measure(gpu, request.size)?;

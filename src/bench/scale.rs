@@ -3,17 +3,17 @@
 use serde::Serialize;
 
 use super::Lab;
-use super::paper_line::DROPPED;
 use super::pass::rounds_of;
-use super::scene_line::{self, Job};
+use super::room::DROPPED;
+use super::scene::{self, Job};
 use crate::error::{Error, Result};
-use crate::render::{self, Control, Outcome};
+use crate::render::{self, Control, RunResult};
 use crate::rng::Rng;
 use crate::scene::geometry::Geometry;
 use crate::scene::open_box::open_box;
 use crate::scene::{Mesh, Scene, built_in};
 use crate::settings::transport::TransportSettings;
-use crate::settings::{Settings, Variant};
+use crate::settings::{Builder, Settings};
 use crate::timings::Spread;
 
 /// A size and what it cost.
@@ -124,8 +124,8 @@ fn over_photons(lab: &mut Lab, left_out: &mut Vec<String>) -> Result<Vec<Step>> 
         }
         (lab.tell)(&format!("{size} photons"));
         let photons = size.min(most) as u32;
-        let settings = Settings { variant: Variant::Ballot, photons, rng: Rng::Philox, radius: 0.01, mesh: 16, ..Settings::default() };
-        let run = |rounds: u32| -> Result<Outcome> {
+        let settings = Settings { builder: Builder::Ballot, photons, rng: Rng::Philox, radius: 0.01, mesh: 16, ..Settings::default() };
+        let run = |rounds: u32| -> Result<RunResult> {
             let control = &mut Control { cancelled: lab.cancelled, progress: &mut |_| {} };
             let outcome = render::on_gpu(lab.gpu, &open_box(&settings), &Settings { rounds, ..settings.clone() }, control)?;
             if outcome.cancelled { Err(Error::Interrupted) } else { Ok(outcome) }
@@ -165,7 +165,7 @@ fn over_triangles(lab: &mut Lab, left_out: &mut Vec<String>) -> Result<Vec<Step>
         let settings = TransportSettings { photons: lab.choose(1 << 12, 1 << 15, 1 << 20), ..TransportSettings::default() };
         let size = (lab.choose(32, 128, 512), lab.choose(32, 128, 512));
         let job = Job { name: "a ball in a room", scene: &scene, geometry: &geometry, size, settings };
-        let timed = scene_line::time(lab.gpu, &lab.rates, &job, lab.cancelled)?;
+        let timed = scene::time(lab.gpu, &lab.rates, &job, lab.cancelled)?;
         steps.push(Step {
             size: geometry.triangles.len() as u64,
             passes: timed

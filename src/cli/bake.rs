@@ -19,7 +19,7 @@ use crate::records::Receiver;
 use crate::scene::Scene;
 use crate::scene::geometry::Geometry;
 use crate::text::counted;
-use crate::transport::Lit;
+use crate::transport::RunResult;
 
 #[derive(Args)]
 pub(super) struct BakeArgs {
@@ -107,7 +107,7 @@ fn receivers(layout: &Layout, phase: usize, geometry: &Geometry) -> Vec<Receiver
         .collect()
 }
 
-fn estimates(lit: &Lit) -> Vec<TexelEstimate> {
+fn estimates(lit: &RunResult) -> Vec<TexelEstimate> {
     (0..lit.film.pixels())
         .map(|texel| TexelEstimate {
             irradiance: lit.film.mean(texel, &lit.plan).as_vec3(),

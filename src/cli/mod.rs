@@ -28,7 +28,7 @@ use clap::{Args, CommandFactory, FromArgMatches, Parser, Subcommand};
 use crate::error::{Error, Result};
 use crate::gpu::{Gpu, Options};
 use crate::output::destination::Destination;
-use crate::transport::{self as transport_line, Lit};
+use crate::transport::{self as transport_line, RunResult};
 use interrupt::{cancel_on_signal, exit_code, interruptible};
 use progress::print_line;
 
@@ -157,7 +157,7 @@ enum End {
 }
 
 impl End {
-    fn of(lit: &Lit) -> End {
+    fn of(lit: &RunResult) -> End {
         if lit.end == transport_line::End::Cancelled { End::Cancelled } else { End::Finished }
     }
 }

@@ -114,7 +114,7 @@ mod tests {
     use crate::cli::Cli;
     use crate::output::command;
     use crate::rng::Rng;
-    use crate::settings::{Gather, Preset, Settings, Variant};
+    use crate::settings::{Builder, Gather, Preset, Settings};
 
     /// The page prints the command that repeats each experiment, so it must mean what was run.
     #[test]
@@ -124,7 +124,7 @@ mod tests {
             let full_light = defaults.full_light_for(65_536);
             for settings in [
                 defaults.clone(),
-                Settings { variant: Variant::Cpu, threads: 3, bounces: 7, gather: Gather::Brute, ..defaults.clone() },
+                Settings { builder: Builder::Cpu, threads: 3, bounces: 7, gather: Gather::Brute, ..defaults.clone() },
                 Settings { photons: 65_536, full_light, rng: Rng::Philox, rounds: 5, ..defaults.clone() },
                 Settings { shininess: [Some(0.01); 5], ..defaults.clone() },
             ] {

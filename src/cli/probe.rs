@@ -19,7 +19,7 @@ use crate::scene::geometry::Geometry;
 use crate::scene::{Light, LightKind, Mesh};
 use crate::settings::transport::{Illumination, TransportSettings};
 use crate::text::{counted, echo, refusal};
-use crate::transport::Lit;
+use crate::transport::RunResult;
 
 #[derive(Args)]
 pub(super) struct ProbeArgs {
@@ -98,7 +98,7 @@ fn receivers(points: &[(DVec3, DVec3)], geometry: &Geometry) -> Vec<Receiver> {
 }
 
 /// Irradiance and standard errors, W/m2; an error that is not known is `inf`.
-fn table(lit: &Lit) -> Vec<u8> {
+fn table(lit: &RunResult) -> Vec<u8> {
     let mut table = csv::Writer::from_writer(Vec::new());
     table.write_record(["red", "green", "blue", "red_error", "green_error", "blue_error"]).expect("memory takes what is written");
     for point in 0..lit.film.pixels() {

@@ -22,7 +22,7 @@ use crate::plan::transport::{Sensor, TransportPlan};
 use crate::render::limits;
 use crate::scene::{Camera, Scene};
 use crate::settings::transport::{Filter, Part, TransportSettings};
-use crate::transport::Lit;
+use crate::transport::RunResult;
 use crate::transport::replay::{self, PhotonName};
 
 #[derive(Args)]
@@ -185,7 +185,7 @@ fn show_photon(args: &RenderArgs, settings: &TransportSettings, name: PhotonName
 const MAX_JUDGE_SAMPLES: u32 = 1 << 24;
 
 /// How the picture compares with a path tracer's.
-fn verdict(lit: &Lit, scene: &Scene, camera: &Camera, (width, height): (u32, u32), samples: u32) -> Verdict {
+fn verdict(lit: &RunResult, scene: &Scene, camera: &Camera, (width, height): (u32, u32), samples: u32) -> Verdict {
     let settings = &lit.plan.settings;
     let part = match settings.part {
         Part::All => None,
@@ -203,12 +203,12 @@ fn verdict(lit: &Lit, scene: &Scene, camera: &Camera, (width, height): (u32, u32
 }
 
 /// W/m2/sr.
-fn radiance(lit: &Lit, width: u32, height: u32) -> ColourPicture {
+fn radiance(lit: &RunResult, width: u32, height: u32) -> ColourPicture {
     let pixels = (0..lit.film.pixels()).map(|pixel| lit.film.mean(pixel, &lit.plan).as_vec3()).collect();
     ColourPicture { width, height, pixels }
 }
 
-fn standard_error(lit: &Lit, width: u32, height: u32) -> ColourPicture {
+fn standard_error(lit: &RunResult, width: u32, height: u32) -> ColourPicture {
     let pixels = (0..lit.film.pixels()).map(|pixel| lit.film.stated_error(pixel, &lit.plan).as_vec3()).collect();
     ColourPicture { width, height, pixels }
 }

@@ -18,12 +18,12 @@ use crate::output::image::{Format, overview};
 use crate::output::lightmap::{self, Quantity};
 use crate::output::{report, trace_file};
 use crate::plan::{Limits, Plan};
-use crate::render::{self, Choice, Control, Outcome};
+use crate::render::{self, Choice, Control, RunResult};
 use crate::rng::Rng;
 use crate::scene::open_box::open_box;
 use crate::scene::room::RoomScene;
 use crate::settings::stop::Stop;
-use crate::settings::{EmissionLaw, Gather, Math, PhongDirection, Preset, Settings, Sums, Variant};
+use crate::settings::{Builder, EmissionLaw, Gather, Math, PhongDirection, Preset, Settings, Sums};
 use crate::text::counted;
 use crate::timings::{Clock, Span};
 use crate::transport::replay::PhotonName;
@@ -114,7 +114,7 @@ pub(super) struct RunArgs {
 
     /// Builder of the photon map; all GPU builders give bit-identical results [default: atomic; naive with --preset naive]
     #[arg(long, value_enum, value_name = "BUILDER", help_heading = "Implementation")]
-    variant: Option<VariantArg>,
+    variant: Option<BuilderArg>,
     /// How photons near a point are found; all give bit-identical results [default: grid]
     #[arg(long, value_enum, value_name = "SEARCH", help_heading = "Implementation")]
     gather: Option<GatherArg>,
@@ -217,7 +217,7 @@ value_enum!(EmissionArg => EmissionLaw { Uniform, Cosine });
 value_enum!(PhongDirectionArg => PhongDirection { Mirror, Sampled });
 
 #[derive(Clone, Copy, PartialEq, Eq, ValueEnum)]
-enum VariantArg {
+enum BuilderArg {
     /// The paper's first: one slot per photon and bounce, empty slots included
     Naive,
     /// The paper's second: only surviving photons, one atomic per thread
@@ -236,18 +236,18 @@ enum VariantArg {
     Auto,
 }
 
-impl VariantArg {
+impl BuilderArg {
     /// `None` until the device has been asked.
-    fn variant(self) -> Option<Variant> {
+    fn builder(self) -> Option<Builder> {
         Some(match self {
-            VariantArg::Naive => Variant::Naive,
-            VariantArg::Atomic => Variant::Atomic,
-            VariantArg::Ballot => Variant::Ballot,
-            VariantArg::Group => Variant::Group,
-            VariantArg::Scan => Variant::Scan,
-            VariantArg::Persistent => Variant::Persistent,
-            VariantArg::Cpu => Variant::Cpu,
-            VariantArg::Auto => return None,
+            BuilderArg::Naive => Builder::Naive,
+            BuilderArg::Atomic => Builder::Atomic,
+            BuilderArg::Ballot => Builder::Ballot,
+            BuilderArg::Group => Builder::Group,
+            BuilderArg::Scan => Builder::Scan,
+            BuilderArg::Persistent => Builder::Persistent,
+            BuilderArg::Cpu => Builder::Cpu,
+            BuilderArg::Auto => return None,
         })
     }
 }
@@ -263,7 +263,7 @@ impl RunArgs {
         let preset = Settings::preset(self.preset.map_or(Preset::Modified, Preset::from));
         let photons = self.photons.unwrap_or(preset.photons);
         let settings = Settings {
-            variant: self.variant.and_then(VariantArg::variant).unwrap_or(preset.variant),
+            builder: self.variant.and_then(BuilderArg::builder).unwrap_or(preset.builder),
             photons,
             rounds: self.rounds.unwrap_or(preset.rounds),
             bounces: self.bounces.unwrap_or(preset.bounces),
@@ -304,10 +304,10 @@ pub(super) fn run(args: &RunArgs, cancelled: &AtomicBool) -> Result<End> {
     if settings.reflectance == 0.0 && args.irradiance.is_some() {
         return Err(Error::setting("--reflectance", 0, "must be above 0 with --irradiance: the photon map holds only reflected photons"));
     }
-    if let (Variant::Cpu, Some(device)) = (settings.variant, &args.device.device) {
+    if let (Builder::Cpu, Some(device)) = (settings.builder, &args.device.device) {
         return Err(Error::setting("--device", device, "has no effect with --variant cpu; leave one of the two out"));
     }
-    if settings.variant == Variant::Cpu && args.device.validate {
+    if settings.builder == Builder::Cpu && args.device.validate {
         return Err(Error::setting("--validate", "on", "has no effect with --variant cpu; leave one of the two out"));
     }
     let scene = open_box(&settings);
@@ -319,16 +319,16 @@ pub(super) fn run(args: &RunArgs, cancelled: &AtomicBool) -> Result<End> {
         complain(&format!("warning: {warning}"));
     }
     let reporter = ProgressReporter::new(&args.progress);
-    let gpu = match settings.variant {
-        Variant::Cpu => None,
+    let gpu = match settings.builder {
+        Builder::Cpu => None,
         _ => args.device.open(&args.timing.options(&args.device))?,
     };
     reporter.device(gpu.as_ref());
     let settings = match &gpu {
-        Some(gpu) if args.variant == Some(VariantArg::Auto) => {
-            Settings { variant: fastest(gpu, &scene, &settings, &reporter)?, ..settings }
+        Some(gpu) if args.variant == Some(BuilderArg::Auto) => {
+            Settings { builder: fastest(gpu, &scene, &settings, &reporter)?, ..settings }
         }
-        None => Settings { variant: Variant::Cpu, ..settings },
+        None => Settings { builder: Builder::Cpu, ..settings },
         _ => settings,
     };
     if let (Some(nearest), true) = (settings.nearest, args.stop.bias) {
@@ -375,11 +375,11 @@ fn announce(reporter: &ProgressReporter, gpu: Option<&Gpu>, scene: &RoomScene, s
             format!("{:.1} MiB for the photon map", plan.photon_map_bytes() as f64 / f64::from(1 << 20))
         }
     };
-    let Settings { variant, rounds, photons, bounces, radius, mesh, .. } = settings;
+    let Settings { builder, rounds, photons, bounces, radius, mesh, .. } = settings;
     let up_to = if settings.stop.is_set() { "up to " } else { "" };
     reporter.note(&format!(
         "plan: open box, {} builder, {up_to}{} of {photons} photons, {}; radius {radius} m; {mesh} x {mesh} texels per wall; {memory}{}",
-        variant.name(),
+        builder.name(),
         counted(rounds, "round"),
         counted(bounces, "bounce"),
         goals(&settings.stop)
@@ -388,12 +388,12 @@ fn announce(reporter: &ProgressReporter, gpu: Option<&Gpu>, scene: &RoomScene, s
 }
 
 /// The builder that is fastest on this device; prints the time of each.
-fn fastest(gpu: &Gpu, scene: &RoomScene, settings: &Settings, reporter: &ProgressReporter) -> Result<Variant> {
+fn fastest(gpu: &Gpu, scene: &RoomScene, settings: &Settings, reporter: &ProgressReporter) -> Result<Builder> {
     reporter.status("timing each builder");
-    let Choice { photons, candidates } = render::choose_variant(gpu, scene, settings)?;
+    let Choice { photons, candidates } = render::choose_builder(gpu, scene, settings)?;
     let times: Vec<String> =
-        candidates.iter().map(|candidate| format!("{} {:.3}", candidate.variant.name(), candidate.ms.median)).collect();
-    let taken = candidates[0].variant;
+        candidates.iter().map(|candidate| format!("{} {:.3}", candidate.builder.name(), candidate.ms.median)).collect();
+    let taken = candidates[0].builder;
     reporter.note(&format!("--variant auto takes {}; the first {photons} photons, in ms: {}", taken.name(), times.join(", ")));
     Ok(taken)
 }
@@ -404,7 +404,7 @@ fn show_photon(args: &RunArgs, settings: &Settings, scene: &RoomScene, name: Pho
     if caustic {
         return Err(Error::setting("--replay", name, "must be ROUND:PHOTON here: the paper's box has no caustic map"));
     }
-    let gpu = if settings.variant == Variant::Cpu { None } else { args.device.open(&args.device.options())? };
+    let gpu = if settings.builder == Builder::Cpu { None } else { args.device.open(&args.device.options())? };
     let path = match &gpu {
         Some(gpu) => render::replay_on_gpu(gpu, scene, settings, round, photon)?,
         None => render::replay_on_cpu(scene, settings, round, photon)?,
@@ -420,8 +420,8 @@ fn show_photon(args: &RunArgs, settings: &Settings, scene: &RoomScene, name: Pho
         say(&format!("{:>6} {wall:<8} {:>10.6} {:>10.6} {:>10.6} {:>10.6}", photon.bounce + 1, p.x, p.y, p.z, photon.weight))?;
     }
     say(&format!("stored {}, then it {}", counted(path.stored.len(), "time"), path.fate))?;
-    if let Some(oddities) = &path.oddities {
-        say(&oddities.text())?;
+    if let Some(nonfinite_values) = &path.nonfinite_values {
+        say(&nonfinite_values.text())?;
     }
     Ok(End::Finished)
 }
@@ -453,7 +453,7 @@ impl Outputs {
         Ok(outputs)
     }
 
-    fn write(self, mut outcome: Outcome, scene: &RoomScene) -> Result<()> {
+    fn write(self, mut outcome: RunResult, scene: &RoomScene) -> Result<()> {
         let began = Instant::now();
         let walls = estimate_walls(&outcome.film, scene, &outcome.plan);
         // W of a photon of relative flux 1.

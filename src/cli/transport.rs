@@ -23,10 +23,10 @@ use crate::render::{Control, Progress};
 use crate::scene::geometry::Geometry;
 use crate::scene::light::{Light, LightKind};
 use crate::scene::{Camera, Scene};
-use crate::settings::Math;
-use crate::settings::transport::{Append, Effect, Filter, Illumination, Kernel, MAX_ROUNDS, Part, Stop, TransportSettings};
+use crate::settings::transport::{Effect, Filter, Illumination, Kernel, MAX_ROUNDS, Part, Stop, TransportSettings};
+use crate::settings::{Builder, Math};
 use crate::text::counted;
-use crate::transport::{self, Lit, View};
+use crate::transport::{self, RunResult, View};
 
 #[derive(Args)]
 pub(super) struct SceneArgs {
@@ -104,7 +104,7 @@ pub(super) struct TransportArgs {
 
     /// Builder of the photon maps; all give bit-identical results [default: auto]
     #[arg(long, value_enum, value_name = "BUILDER", help_heading = "Implementation")]
-    variant: Option<AppendArg>,
+    variant: Option<BuilderArg>,
     /// Rounding of the arithmetic [default: fast]
     #[arg(long, value_enum, value_name = "ROUNDING", help_heading = "Implementation")]
     math: Option<MathArg>,
@@ -155,7 +155,9 @@ value_enum!(IlluminationArg => Illumination {
     /// Everything from one photon map, as in the paper
     Photons,
 });
-value_enum!(AppendArg => Append {
+
+#[derive(Clone, Copy, ValueEnum)]
+enum BuilderArg {
     /// Persistent; ballot with --math strict
     Auto,
     /// Bounce by bounce, one atomic per photon
@@ -164,7 +166,20 @@ value_enum!(AppendArg => Append {
     Ballot,
     /// One invocation traces each photon from emission to its end
     Persistent,
-});
+}
+
+impl BuilderArg {
+    /// `None`: the plan chooses.
+    fn builder(self) -> Option<Builder> {
+        match self {
+            BuilderArg::Auto => None,
+            BuilderArg::Atomic => Some(Builder::Atomic),
+            BuilderArg::Ballot => Some(Builder::Ballot),
+            BuilderArg::Persistent => Some(Builder::Persistent),
+        }
+    }
+}
+
 value_enum!(KernelArg => Kernel { Box, Cone, Epanechnikov });
 value_enum!(FilterArg => Filter {
     /// The square of the pixel
@@ -239,7 +254,7 @@ impl TransportArgs {
             final_gather: self.final_gather,
             aim: self.aim.map_or(usual.aim, |switch| switch == SwitchArg::On),
             illumination: self.illumination.map_or(usual.illumination, Illumination::from),
-            append: self.variant.map_or(usual.append, Append::from),
+            builder: self.variant.map_or(usual.builder, BuilderArg::builder),
             math: self.math.map_or(usual.math, Math::from),
             paranoid: self.paranoid,
             group_size: self.group_size.unwrap_or(usual.group_size),
@@ -277,7 +292,7 @@ impl Reports {
         [&self.json, &self.trace].into_iter().flatten().cloned().collect()
     }
 
-    pub(super) fn files(self, scene: &Scene, lit: &Lit) -> Vec<(Destination, Vec<u8>)> {
+    pub(super) fn files(self, scene: &Scene, lit: &RunResult) -> Vec<(Destination, Vec<u8>)> {
         let json = self.json.map(|json| (json, light_report::json(&scene.name, lit)));
         let trace = self.trace.map(|trace| (trace, trace_file::chrome_trace(&lit.timings, &lit.device.name)));
         json.into_iter().chain(trace).collect()
@@ -360,7 +375,7 @@ pub(super) fn light(
     bias: bool,
     reporter: &ProgressReporter,
     cancelled: &AtomicBool,
-) -> Result<Lit> {
+) -> Result<RunResult> {
     announce(job, geometry, &plan, reporter);
     let view = View { geometry, camera: job.camera, phases: job.phases };
     let of_first = |plan: &TransportPlan, factor_and_rounds| {

@@ -6,18 +6,18 @@ use plotters::style::text_anchor::{HPos, Pos, VPos};
 use super::Map;
 use crate::output::svg::{SCALE, TEXT, svg};
 use crate::output::words::times;
-use crate::settings::Variant;
+use crate::settings::Builder;
 
 /// Colours on which black letters are read, on a white and on a black page.
-fn colour(variant: Variant) -> RGBColor {
-    match variant {
-        Variant::Naive => RGBColor(0xb0, 0xb0, 0xb0),
-        Variant::Atomic => RGBColor(0xf2, 0x9a, 0x4a),
-        Variant::Ballot => RGBColor(0x62, 0xb8, 0xea),
-        Variant::Group => RGBColor(0x74, 0xc9, 0x8d),
-        Variant::Scan => RGBColor(0xcf, 0x92, 0xdf),
-        Variant::Persistent => RGBColor(0xe6, 0xc8, 0x4f),
-        Variant::Cpu => RGBColor(0xf0, 0x82, 0x96),
+fn colour(builder: Builder) -> RGBColor {
+    match builder {
+        Builder::Naive => RGBColor(0xb0, 0xb0, 0xb0),
+        Builder::Atomic => RGBColor(0xf2, 0x9a, 0x4a),
+        Builder::Ballot => RGBColor(0x62, 0xb8, 0xea),
+        Builder::Group => RGBColor(0x74, 0xc9, 0x8d),
+        Builder::Scan => RGBColor(0xcf, 0x92, 0xdf),
+        Builder::Persistent => RGBColor(0xe6, 0xc8, 0x4f),
+        Builder::Cpu => RGBColor(0xf0, 0x82, 0x96),
     }
 }
 
@@ -40,10 +40,10 @@ pub fn draw(map: &Map) -> String {
             for (column, photons) in sizes.iter().enumerate() {
                 let Some(cell) = map.cell(*photons, *survival) else { continue };
                 let (left, middle) = (LEFT + FIELD.0 * column as i32, LEFT + FIELD.0 * column as i32 + FIELD.0 / 2);
-                let winner = cell.builders[0].variant;
+                let winner = cell.builders[0].builder;
                 let corners = [(left + 1, top + 1), (left + FIELD.0 - 1, top + FIELD.1 - 1)];
                 area.draw(&Rectangle::new(corners, colour(winner).filled()))?;
-                let level: Vec<&str> = cell.winners().skip(1).map(Variant::name).collect();
+                let level: Vec<&str> = cell.winners().skip(1).map(Builder::name).collect();
                 let lines = [(TEXT - 2, winner.name().to_owned()), (TEXT - 3, times(cell.gain())), (TEXT - 7, level.join(" "))];
                 for (line, (size, words)) in lines.into_iter().enumerate() {
                     area.draw(&Text::new(words, (middle, top + 14 + 19 * line as i32), text(size, HPos::Center, &BLACK)))?;

@@ -19,7 +19,7 @@ use crate::resources::Resources;
 use crate::rng::Rng;
 use crate::scene::open_box::open_box;
 use crate::scene::room::{RoomScene, Wall};
-use crate::settings::{Gather, Settings, Variant};
+use crate::settings::{Builder, Gather, Settings};
 use crate::timings::Spread;
 use crate::{tallies, trace};
 
@@ -91,7 +91,7 @@ impl Agreed {
 /// What a builder took.
 #[derive(Debug, Clone, PartialEq, Serialize)]
 pub struct Timed {
-    pub variant: Variant,
+    pub builder: Builder,
     /// Milliseconds of the device to trace and store all photons.
     pub ms: Spread,
 }
@@ -150,27 +150,27 @@ fn cell(gpu: &Gpu, request: &Request, photons: u32, survival: f32) -> Result<Cel
         ..Settings::default()
     };
     let room = room(&base);
-    let of = |variant| Settings { variant, ..base.clone() };
+    let of = |builder| Settings { builder, ..base.clone() };
     let mut builders = Vec::new();
     let mut fates: Option<Vec<Tally>> = None;
-    for variant in Variant::ON_GPU {
-        let (ms, tallies) = run(gpu, &room, &of(variant), request.turns)?;
+    for builder in Builder::ON_GPU {
+        let (ms, tallies) = run(gpu, &room, &of(builder), request.turns)?;
         let expected = fates.get_or_insert_with(|| tallies.clone());
-        agree(gpu, variant, photons, survival, *expected == tallies)?;
-        builders.push(Timed { variant, ms });
+        agree(gpu, builder, photons, survival, *expected == tallies)?;
+        builders.push(Timed { builder, ms });
     }
     let stored: u64 = fates.iter().flatten().map(|tally| u64::from(tally.stored)).sum();
     let mut agreed = Agreed::Fates;
     if stored as f64 <= MOST_COMPARED {
-        let in_order = |variant| -> Result<Vec<Photon>> {
-            let mut stored = photons_on_gpu(gpu, &room, &of(variant))?;
+        let in_order = |builder| -> Result<Vec<Photon>> {
+            let mut stored = photons_on_gpu(gpu, &room, &of(builder))?;
             stored.sort_by_key(|photon| (photon.photon, photon.bounce));
             Ok(stored)
         };
-        let expected = in_order(Variant::Naive)?;
-        for variant in Variant::ON_GPU {
-            let found = in_order(variant)?;
-            agree(gpu, variant, photons, survival, bytemuck::cast_slice::<_, u8>(&found) == bytemuck::cast_slice::<_, u8>(&expected))?;
+        let expected = in_order(Builder::Naive)?;
+        for builder in Builder::ON_GPU {
+            let found = in_order(builder)?;
+            agree(gpu, builder, photons, survival, bytemuck::cast_slice::<_, u8>(&found) == bytemuck::cast_slice::<_, u8>(&expected))?;
         }
         agreed = Agreed::Photons;
     }
@@ -178,11 +178,11 @@ fn cell(gpu: &Gpu, request: &Request, photons: u32, survival: f32) -> Result<Cel
     Ok(Cell { survival, photons, stored, agreed, builders })
 }
 
-fn agree(gpu: &Gpu, variant: Variant, photons: u32, survival: f32, same: bool) -> Result<()> {
+fn agree(gpu: &Gpu, builder: Builder, photons: u32, survival: f32, same: bool) -> Result<()> {
     if same {
         return Ok(());
     }
-    let what = format!("the photon map of --variant {}, of {photons} photons at survival {survival},", variant.name());
+    let what = format!("the photon map of --variant {}, of {photons} photons at survival {survival},", builder.name());
     Err(Error::Miscalculated { device: gpu.facts().name.clone(), what })
 }
 
@@ -216,19 +216,19 @@ fn turn_name(turn: usize) -> String {
 }
 
 impl Cell {
-    pub fn of(&self, variant: Variant) -> &Timed {
-        self.builders.iter().find(|timed| timed.variant == variant).expect("every builder was timed")
+    pub fn of(&self, builder: Builder) -> &Timed {
+        self.builders.iter().find(|timed| timed.builder == builder).expect("every builder was timed")
     }
 
     /// The fastest builder, and those not significantly slower: their fastest run is no slower than its slowest.
-    pub fn winners(&self) -> impl Iterator<Item = Variant> {
+    pub fn winners(&self) -> impl Iterator<Item = Builder> {
         let slowest = self.builders[0].ms.max;
-        self.builders.iter().filter(move |timed| timed.ms.min <= slowest).map(|timed| timed.variant)
+        self.builders.iter().filter(move |timed| timed.ms.min <= slowest).map(|timed| timed.builder)
     }
 
     /// How many times longer the paper's modified builder takes than the fastest.
     pub fn gain(&self) -> f64 {
-        self.of(Variant::Atomic).ms.median / self.builders[0].ms.median
+        self.of(Builder::Atomic).ms.median / self.builders[0].ms.median
     }
 }
 
@@ -256,13 +256,13 @@ impl Map {
         );
         for cell in &self.cells {
             let best = cell.builders[0].ms.median;
-            let winners: Vec<Variant> = cell.winners().collect();
+            let winners: Vec<Builder> = cell.winners().collect();
             let all: Vec<String> = cell
                 .builders
                 .iter()
                 .map(|timed| {
-                    let mark = if winners.contains(&timed.variant) { "*" } else { "" };
-                    format!("{}{mark} {:.2}", timed.variant.name(), timed.ms.median / best)
+                    let mark = if winners.contains(&timed.builder) { "*" } else { "" };
+                    format!("{}{mark} {:.2}", timed.builder.name(), timed.ms.median / best)
                 })
                 .collect();
             let line = format!(

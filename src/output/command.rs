@@ -43,7 +43,7 @@ pub fn main_job(preset: Preset, settings: &Settings) -> String {
     let usual = Settings::preset(preset);
     let mut line = Line("photonmill".to_owned());
     line.named("preset", preset, Preset::Modified);
-    line.differing("variant", settings.variant.name(), usual.variant.name());
+    line.differing("variant", settings.builder.name(), usual.builder.name());
     line.differing("photons", settings.photons, usual.photons);
     line.differing("rounds", settings.rounds, usual.rounds);
     line.differing("bounces", settings.bounces, usual.bounces);
@@ -87,7 +87,9 @@ pub fn on_scene(subcommand: &str, settings: &TransportSettings) -> String {
     }
     line.differing("aim", switch(settings.aim), switch(usual.aim));
     line.named("illumination", settings.illumination, usual.illumination);
-    line.named("variant", settings.append, usual.append);
+    if let Some(builder) = settings.builder {
+        line.differing("variant", builder.name(), "auto");
+    }
     line.named("math", settings.math, usual.math);
     let names = |effects: &[Effect]| effects.iter().map(|effect| effect.name()).collect::<Vec<_>>().join(",");
     line.differing("with", names(&settings.with), String::new());

@@ -9,7 +9,7 @@ use super::report::{end_in_words, errors, ledger, losses, timing_table};
 use crate::bias::Bias;
 use crate::constants::MAX_BOUNCES;
 use crate::ledger::{Ledger, Losses};
-use crate::oddities::Oddities;
+use crate::nonfinite_values::NonfiniteValues;
 use crate::plan::evidence::EffectDecision;
 use crate::plan::transport::{MapPlan, RadiusFrom, Sensor, TransportPlan, Trial};
 use crate::scene::geometry::Geometry;
@@ -17,7 +17,7 @@ use crate::settings::transport::{Effect, TransportSettings};
 use crate::text::counted;
 use crate::timings::{Row, Timings};
 use crate::transport::stop::error_bound;
-use crate::transport::{End, Lit};
+use crate::transport::{End, RunResult};
 use crate::unknown::Unknown;
 
 /// A row of the plan: what was decided, and after a run what it cost and gave.
@@ -137,7 +137,7 @@ struct Report<'a> {
     bias: Option<Bias>,
     film: FilmReport,
     /// What `--paranoid` found; null without it.
-    nonfinite_values: Option<&'a Oddities>,
+    nonfinite_values: Option<&'a NonfiniteValues>,
     timings: &'a [Row],
     dispatches: u64,
     submissions: u64,
@@ -185,7 +185,7 @@ pub fn plan_json(plan: &TransportPlan) -> Vec<u8> {
 }
 
 /// A run as JSON.
-pub fn json(scene: &str, lit: &Lit) -> Vec<u8> {
+pub fn json(scene: &str, lit: &RunResult) -> Vec<u8> {
     let report = Report {
         photonmill: env!("CARGO_PKG_VERSION"),
         scene,
@@ -202,7 +202,7 @@ pub fn json(scene: &str, lit: &Lit) -> Vec<u8> {
         unknown: lit.film.unknown(&lit.plan, lit.plan.settings.stop.confidence),
         bias: lit.bias,
         film: FilmReport { nonfinite_values: lit.anomalies[0], uncorrected_estimates: lit.anomalies[2] },
-        nonfinite_values: lit.oddities.as_ref(),
+        nonfinite_values: lit.nonfinite_values.as_ref(),
         timings: lit.timings.rows(),
         dispatches: lit.dispatches,
         submissions: lit.submissions,
@@ -211,7 +211,7 @@ pub fn json(scene: &str, lit: &Lit) -> Vec<u8> {
 }
 
 /// A run in words; `point` is what its results are of: pixel, texel or point.
-pub fn text(scene: &str, lit: &Lit, point: &str, explain: bool) -> String {
+pub fn text(scene: &str, lit: &RunResult, point: &str, explain: bool) -> String {
     let mut text = String::new();
     let settings = &lit.plan.settings;
     writeln!(text, "{}", lit.device.label()).unwrap();
@@ -254,8 +254,8 @@ pub fn text(scene: &str, lit: &Lit, point: &str, explain: bool) -> String {
         let count = counted(lit.anomalies[2], "estimate");
         writeln!(text, "warning: no edge correction for {count} over too many triangles; a smaller --radius mends it").unwrap();
     }
-    if let Some(oddities) = &lit.oddities {
-        writeln!(text, "{}", oddities.text()).unwrap();
+    if let Some(nonfinite_values) = &lit.nonfinite_values {
+        writeln!(text, "{}", nonfinite_values.text()).unwrap();
     }
     let noise = (lit.film.rounds > 1).then(|| lit.film.relative_error(&lit.plan));
     let unknown = lit.film.unknown(&lit.plan, settings.stop.confidence);

@@ -9,9 +9,9 @@ use crate::constants::MAX_BOUNCES;
 use crate::film::WallEstimate;
 use crate::gpu::DeviceFacts;
 use crate::ledger::{BounceFates, Ledger, Losses};
-use crate::oddities::Oddities;
+use crate::nonfinite_values::NonfiniteValues;
 use crate::plan::Decision;
-use crate::render::Outcome;
+use crate::render::RunResult;
 use crate::render::stop::{End, error_bound};
 use crate::settings::Settings;
 use crate::settings::stop::Stop;
@@ -54,7 +54,7 @@ struct Report<'a> {
     submissions: u64,
     walls: Vec<WallReport>,
     /// Nonfinite values that `--paranoid` found; null without it.
-    nonfinite_values: Option<&'a Oddities>,
+    nonfinite_values: Option<&'a NonfiniteValues>,
 }
 
 #[derive(Serialize)]
@@ -83,7 +83,7 @@ struct WallReport {
 }
 
 /// The run as JSON.
-pub fn json(outcome: &Outcome, walls: &[WallEstimate], unknown: &Unknown) -> Vec<u8> {
+pub fn json(outcome: &RunResult, walls: &[WallEstimate], unknown: &Unknown) -> Vec<u8> {
     let plan = &outcome.plan;
     let noise = relative_error(walls);
     let mean = |values: &[f64]| values.iter().sum::<f64>() / values.len() as f64;
@@ -130,12 +130,12 @@ pub fn json(outcome: &Outcome, walls: &[WallEstimate], unknown: &Unknown) -> Vec
                 radiosity: mean(&wall.radiosity),
             })
             .collect(),
-        nonfinite_values: outcome.oddities.as_ref(),
+        nonfinite_values: outcome.nonfinite_values.as_ref(),
     };
     serde_json::to_vec_pretty(&report).expect("a report is plain data")
 }
 
-fn driver(outcome: &Outcome) -> String {
+fn driver(outcome: &RunResult) -> String {
     match &outcome.device {
         Some(facts) => facts.driver.clone(),
         None => format!("photonmill on {}", counted(outcome.plan.settings.threads, "thread")),
@@ -234,7 +234,7 @@ fn unreached(stop: &Stop) -> String {
 }
 
 /// The run in words: device, settings, ledger, errors and timing table.
-pub fn text(outcome: &Outcome, walls: &[WallEstimate], unknown: &Unknown) -> String {
+pub fn text(outcome: &RunResult, walls: &[WallEstimate], unknown: &Unknown) -> String {
     let mut text = String::new();
     let settings = &outcome.plan.settings;
     let device = outcome.device.as_ref().map_or_else(|| format!("CPU, {}", driver(outcome)), DeviceFacts::label);
@@ -242,7 +242,7 @@ pub fn text(outcome: &Outcome, walls: &[WallEstimate], unknown: &Unknown) -> Str
     writeln!(
         text,
         "open-box, {}: {} of {} photons, {}, radius {} m, {} gather{}, {} sums, {} seed {}",
-        settings.variant.name(),
+        settings.builder.name(),
         counted(outcome.film.rounds.max(1), "round"),
         settings.photons,
         counted(settings.bounces, "bounce"),
@@ -265,8 +265,8 @@ pub fn text(outcome: &Outcome, walls: &[WallEstimate], unknown: &Unknown) -> Str
     text.push('\n');
     text.push_str(&ledger(&outcome.fates.ledger()));
     text.push_str(&losses(&outcome.losses, settings.bounces));
-    if let Some(oddities) = &outcome.oddities {
-        writeln!(text, "{}", oddities.text()).unwrap();
+    if let Some(nonfinite_values) = &outcome.nonfinite_values {
+        writeln!(text, "{}", nonfinite_values.text()).unwrap();
     }
     text.push_str(&errors(
         outcome.film.rounds,

@@ -6,9 +6,9 @@ use std::time::{Duration, Instant};
 
 use crate::error::{Error, Result};
 use crate::gpu::Gpu;
-use crate::render::{self, Control, Outcome};
+use crate::render::{self, Control, RunResult};
 use crate::scene::open_box::open_box;
-use crate::settings::{Settings, Variant};
+use crate::settings::{Builder, Settings};
 use crate::text::counted;
 
 /// Why no further experiment runs.
@@ -64,9 +64,9 @@ impl<'a> Bench<'a> {
         self.gpu.is_some()
     }
 
-    /// The builder that stands for `variant` here.
-    pub fn available(&self, variant: Variant) -> Variant {
-        if self.has_gpu() { variant } else { Variant::Cpu }
+    /// The builder that stands for `builder` here.
+    pub fn available(&self, builder: Builder) -> Builder {
+        if self.has_gpu() { builder } else { Builder::Cpu }
     }
 
     pub fn machine(&self) -> Machine {
@@ -95,16 +95,16 @@ impl<'a> Bench<'a> {
     }
 
     /// One run to its last photon.
-    pub fn run(&self, settings: &Settings) -> Step<Outcome> {
+    pub fn run(&self, settings: &Settings) -> Step<RunResult> {
         let outcome = self.run_once(settings)?;
         if outcome.cancelled { Err(Stop::Cancelled) } else { Ok(outcome) }
     }
 
-    fn run_once(&self, settings: &Settings) -> Result<Outcome> {
+    fn run_once(&self, settings: &Settings) -> Result<RunResult> {
         let scene = open_box(settings);
         let mut control = Control { cancelled: self.cancelled, progress: &mut |_| {} };
-        match (settings.variant, self.gpu) {
-            (Variant::Cpu, _) | (_, None) => render::on_cpu(&scene, settings, &mut control),
+        match (settings.builder, self.gpu) {
+            (Builder::Cpu, _) | (_, None) => render::on_cpu(&scene, settings, &mut control),
             (_, Some(gpu)) => render::on_gpu(gpu, &scene, settings, &mut control),
         }
     }
@@ -112,7 +112,7 @@ impl<'a> Bench<'a> {
     /// `repeats` runs of every case after one that is dropped, as it makes pipelines and fills caches; in turn, so that a
     /// clock that drifts touches all alike. A case that is slow is repeated less, and one whose first run alone is slow
     /// keeps that.
-    pub fn repeat_in_turn(&self, cases: &[Settings], repeats: usize) -> Step<Vec<Vec<Outcome>>> {
+    pub fn repeat_interleaved(&self, cases: &[Settings], repeats: usize) -> Step<Vec<Vec<RunResult>>> {
         let mut first = Vec::new();
         let mut spent = Vec::new();
         for settings in cases {
@@ -162,10 +162,12 @@ mod tests {
     #[test]
     fn the_first_run_is_dropped() {
         let cancelled = AtomicBool::new(false);
-        let bench_settings = Settings { variant: Variant::Cpu, photons: 10, mesh: 2, ..Settings::default() };
+        let bench_settings = Settings { builder: Builder::Cpu, photons: 10, mesh: 2, ..Settings::default() };
         let mut silent = |_: &str| {};
         let bench = Bench::new(None, &cancelled, &mut silent);
-        let Ok(outcomes) = bench.repeat_in_turn(&[bench_settings.clone(), bench_settings], 3) else { panic!("a run of ten photons fails") };
+        let Ok(outcomes) = bench.repeat_interleaved(&[bench_settings.clone(), bench_settings], 3) else {
+            panic!("a run of ten photons fails")
+        };
         assert_eq!(outcomes.iter().map(Vec::len).collect::<Vec<_>>(), [3, 3]);
     }
 }

@@ -3,11 +3,11 @@
 use plotters::coord::Shift;
 use plotters::prelude::*;
 
-use super::experiments::{Builder, Pass, TotalTime};
+use super::experiments::{Implementation, Pass, TotalTime};
 use super::{Reproduction, published};
 use crate::output::svg::{Drawn, SCALE, TEXT, decades, svg};
 use crate::output::words;
-use crate::settings::{Gather, Variant};
+use crate::settings::{Builder, Gather};
 
 /// Colours that stand out on white and on black alike, and apart from each other without hue.
 const PAPER: RGBColor = RGBColor(0x8a, 0x8a, 0x8a);
@@ -68,7 +68,9 @@ pub fn running_times(found: &Reproduction) -> Option<String> {
     let rows: Vec<(String, Option<f64>, f64)> =
         [(Pass::Map, None), (Pass::Rendering, Some(Gather::Brute)), (Pass::Rendering, Some(Gather::Grid))]
             .into_iter()
-            .flat_map(|(pass, gather)| found.builders().into_iter().filter_map(move |builder| row(found, builder, pass, gather)))
+            .flat_map(|(pass, gather)| {
+                found.implementations().into_iter().filter_map(move |implementation| row(found, implementation, pass, gather))
+            })
             .collect();
     if rows.is_empty() {
         return None;
@@ -78,13 +80,13 @@ pub fn running_times(found: &Reproduction) -> Option<String> {
 }
 
 /// Name, published and measured milliseconds.
-fn row(found: &Reproduction, builder: Builder, pass: Pass, gather: Option<Gather>) -> Option<(String, Option<f64>, f64)> {
-    let time = found.running_time(published::PHOTONS, published::BOUNCES, builder, pass, gather)?;
+fn row(found: &Reproduction, implementation: Implementation, pass: Pass, gather: Option<Gather>) -> Option<(String, Option<f64>, f64)> {
+    let time = found.running_time(published::PHOTONS, published::BOUNCES, implementation, pass, gather)?;
     let pass = match gather {
         Some(Gather::Grid) => "rendering, grid".to_owned(),
         _ => pass.name().to_owned(),
     };
-    let name = if builder.variant == Variant::Atomic { "modified (atomic)".to_owned() } else { builder.name() };
+    let name = if implementation.builder == Builder::Atomic { "modified (atomic)".to_owned() } else { implementation.name() };
     Some((format!("{pass}: {name}"), time.published_ms(), time.ms.median))
 }
 

@@ -5,30 +5,30 @@ use super::bench::{Bench, Step};
 use super::{Reproduction, Request, published};
 use crate::output::command;
 use crate::output::words;
-use crate::render::Outcome;
+use crate::render::RunResult;
 use crate::rng::Rng;
-use crate::settings::{Gather, Preset, Settings, Variant};
+use crate::settings::{Builder, Gather, Preset, Settings};
 use crate::text::counted;
 use crate::timings::Clock;
 use crate::timings::Spread;
 
 /// Who builds the photon map.
 #[derive(Debug, Clone, Copy, PartialEq, Eq)]
-pub struct Builder {
-    pub variant: Variant,
+pub struct Implementation {
+    pub builder: Builder,
     /// Threads of the CPU builder.
     pub threads: usize,
 }
 
-impl Builder {
-    pub fn of(variant: Variant) -> Builder {
-        Builder { variant, threads: 1 }
+impl Implementation {
+    pub fn of(builder: Builder) -> Implementation {
+        Implementation { builder, threads: 1 }
     }
 
     pub fn name(self) -> String {
         match self.threads {
-            1 => self.variant.name().to_owned(),
-            threads => format!("{} x{threads}", self.variant.name()),
+            1 => self.builder.name().to_owned(),
+            threads => format!("{} x{threads}", self.builder.name()),
         }
     }
 }
@@ -38,7 +38,7 @@ impl Builder {
 pub struct Case {
     pub photons: u32,
     pub bounces: u32,
-    pub builder: Builder,
+    pub implementation: Implementation,
     pub gather: Gather,
 }
 
@@ -65,7 +65,7 @@ impl Pass {
 pub struct RunningTime {
     pub photons: u32,
     pub bounces: u32,
-    pub builder: Builder,
+    pub implementation: Implementation,
     pub pass: Pass,
     /// `None` for the map pass, which comes before any gathering.
     pub gather: Option<Gather>,
@@ -112,8 +112,8 @@ pub fn count(bench: &Bench, request: &Request) -> usize {
 impl Case {
     fn settings(&self) -> Settings {
         Settings {
-            variant: self.builder.variant,
-            threads: self.builder.threads,
+            builder: self.implementation.builder,
+            threads: self.implementation.threads,
             photons: self.photons,
             bounces: self.bounces,
             gather: self.gather,
@@ -122,11 +122,11 @@ impl Case {
     }
 
     fn title(&self) -> String {
-        let Case { photons, bounces, builder, gather } = self;
+        let Case { photons, bounces, implementation, gather } = self;
         format!(
             "{} photons, {bounces} bounces, {}, {} gather",
             words::count(u64::from(*photons)),
-            builder.name(),
+            implementation.name(),
             command::gather_name(*gather)
         )
     }
@@ -142,14 +142,14 @@ fn at_size(preset: Preset, photons: u32) -> Settings {
 
 /// Small before large, as the small ones predict the large.
 fn cases(bench: &Bench, request: &Request) -> Vec<Case> {
-    let mut builders = Vec::new();
+    let mut implementations = Vec::new();
     if bench.has_gpu() {
         // The paper's two, and its second with one atomic a subgroup.
-        builders.extend([Variant::Naive, Variant::Atomic, Variant::Ballot].map(Builder::of));
+        implementations.extend([Builder::Naive, Builder::Atomic, Builder::Ballot].map(Implementation::of));
     }
-    builders.push(Builder::of(Variant::Cpu));
+    implementations.push(Implementation::of(Builder::Cpu));
     if request.threads > 1 {
-        builders.push(Builder { variant: Variant::Cpu, threads: request.threads });
+        implementations.push(Implementation { builder: Builder::Cpu, threads: request.threads });
     }
     let mut cases = Vec::new();
     for photons in [published::PHOTONS, request.large] {
@@ -157,7 +157,7 @@ fn cases(bench: &Bench, request: &Request) -> Vec<Case> {
             for gather in [Gather::Grid, Gather::Brute] {
                 let too_much = photons == request.large && gather == Gather::Brute && bounces != published::BOUNCES;
                 if !too_much {
-                    cases.extend(builders.iter().map(|&builder| Case { photons, bounces, builder, gather }));
+                    cases.extend(implementations.iter().map(|&implementation| Case { photons, bounces, implementation, gather }));
                 }
             }
         }
@@ -169,8 +169,8 @@ fn cases(bench: &Bench, request: &Request) -> Vec<Case> {
 pub fn running_times(bench: &mut Bench, found: &mut Reproduction) -> Step<()> {
     let all = cases(bench, &found.request);
     let alike = |a: &Case, b: &Case| {
-        (a.photons, a.bounces, a.gather, a.builder.variant == Variant::Cpu)
-            == (b.photons, b.bounces, b.gather, b.builder.variant == Variant::Cpu)
+        (a.photons, a.bounces, a.gather, a.implementation.builder == Builder::Cpu)
+            == (b.photons, b.bounces, b.gather, b.implementation.builder == Builder::Cpu)
     };
     for group in all.chunk_by(alike) {
         let mut measured = Vec::new();
@@ -184,7 +184,7 @@ pub fn running_times(bench: &mut Bench, found: &mut Reproduction) -> Step<()> {
         let is_large = group[0].photons == found.request.large;
         let repeats = if is_large { found.request.repeats.min(LARGE_REPEATS) } else { found.request.repeats };
         let settings: Vec<Settings> = measured.iter().map(|case| case.settings()).collect();
-        let outcomes = bench.repeat_in_turn(&settings, repeats)?;
+        let outcomes = bench.repeat_interleaved(&settings, repeats)?;
         for ((case, settings), outcomes) in measured.iter().zip(&settings).zip(&outcomes) {
             let command = command::main_job(Preset::Modified, settings);
             // The map does not depend on the gather, and is timed where the gather disturbs least.
@@ -198,21 +198,21 @@ pub fn running_times(bench: &mut Bench, found: &mut Reproduction) -> Step<()> {
 }
 
 /// `None` on a device without timestamps: passes inside a submission are not seen by the host.
-fn running_time(case: &Case, pass: Pass, outcomes: &[Outcome], command: &str) -> Option<RunningTime> {
+fn running_time(case: &Case, pass: Pass, outcomes: &[RunResult], command: &str) -> Option<RunningTime> {
     let scopes: &[&str] = match pass {
         Pass::Map => &["round/build"],
         Pass::Rendering => &["round/index", "round/gather"],
     };
     // Brute force has no index, nor has the CPU builder's splatting.
-    let has_run = |outcome: &Outcome, scope: &str| outcome.timings.row(scope).is_some();
-    let sum = |outcome: &Outcome| {
+    let has_run = |outcome: &RunResult, scope: &str| outcome.timings.row(scope).is_some();
+    let sum = |outcome: &RunResult| {
         scopes.iter().filter(|scope| has_run(outcome, scope)).map(|scope| outcome.timings.best_ms(scope)).sum::<Option<f64>>()
     };
     let first = outcomes.first()?;
     Some(RunningTime {
         photons: case.photons,
         bounces: case.bounces,
-        builder: case.builder,
+        implementation: case.implementation,
         pass,
         gather: (pass == Pass::Rendering).then_some(case.gather),
         clock: if first.device.is_some() { Clock::Gpu } else { Clock::Wall },
@@ -225,7 +225,7 @@ fn running_time(case: &Case, pass: Pass, outcomes: &[Outcome], command: &str) ->
 /// Length of the rendering pass at another size: pair tests grow with the photon list, and those a
 /// second are known from the paper's size.
 fn predicted(case: &Case, found: &Reproduction) -> Option<f64> {
-    let known = found.running_time(published::PHOTONS, case.bounces, case.builder, Pass::Rendering, Some(case.gather))?;
+    let known = found.running_time(published::PHOTONS, case.bounces, case.implementation, Pass::Rendering, Some(case.gather))?;
     Some(known.ms.median * f64::from(case.photons) / f64::from(published::PHOTONS))
 }
 
@@ -240,8 +240,8 @@ pub fn totals(bench: &mut Bench, found: &mut Reproduction) -> Step<()> {
         // Wall time of a round, by the latest row.
         let mut a_round = None;
         for (rounds, _) in published::TABLE_1 {
-            let variant = bench.available(Variant::Atomic);
-            let settings = Settings { variant, rounds, gather, ..at_size(Preset::Rounds, photons) };
+            let builder = bench.available(Builder::Atomic);
+            let settings = Settings { builder, rounds, gather, ..at_size(Preset::Rounds, photons) };
             let title = format!(
                 "{} photons as {} of {}, {} gather",
                 words::count(settings.total_photons()),
@@ -271,15 +271,22 @@ pub fn totals(bench: &mut Bench, found: &mut Reproduction) -> Step<()> {
 }
 
 impl Reproduction {
-    pub fn running_time(&self, photons: u32, bounces: u32, builder: Builder, pass: Pass, gather: Option<Gather>) -> Option<&RunningTime> {
-        self.running_times
-            .iter()
-            .find(|time| (time.photons, time.bounces, time.builder, time.pass, time.gather) == (photons, bounces, builder, pass, gather))
+    pub fn running_time(
+        &self,
+        photons: u32,
+        bounces: u32,
+        implementation: Implementation,
+        pass: Pass,
+        gather: Option<Gather>,
+    ) -> Option<&RunningTime> {
+        self.running_times.iter().find(|time| {
+            (time.photons, time.bounces, time.implementation, time.pass, time.gather) == (photons, bounces, implementation, pass, gather)
+        })
     }
 
     /// Median of a pass, milliseconds.
-    pub fn median_ms(&self, photons: u32, bounces: u32, builder: Builder, pass: Pass, gather: Option<Gather>) -> Option<f64> {
-        self.running_time(photons, bounces, builder, pass, gather).map(|time| time.ms.median)
+    pub fn median_ms(&self, photons: u32, bounces: u32, implementation: Implementation, pass: Pass, gather: Option<Gather>) -> Option<f64> {
+        self.running_time(photons, bounces, implementation, pass, gather).map(|time| time.ms.median)
     }
 
     /// (photons, bounces) that were measured, in order.
@@ -290,14 +297,14 @@ impl Reproduction {
     }
 
     /// Builders that were measured, in order.
-    pub fn builders(&self) -> Vec<Builder> {
-        let mut builders: Vec<Builder> = Vec::new();
+    pub fn implementations(&self) -> Vec<Implementation> {
+        let mut implementations: Vec<Implementation> = Vec::new();
         for time in &self.running_times {
-            if !builders.contains(&time.builder) {
-                builders.push(time.builder);
+            if !implementations.contains(&time.implementation) {
+                implementations.push(time.implementation);
             }
         }
-        builders
+        implementations
     }
 
     /// Rows of table 1 with one size of round and one gather.
@@ -311,17 +318,17 @@ impl RunningTime {
     pub fn published_ms(&self) -> Option<f64> {
         let comparable = self.photons == published::PHOTONS
             && self.bounces == published::BOUNCES
-            && self.builder.threads == 1
+            && self.implementation.threads == 1
             && self.gather != Some(Gather::Grid);
         let passes = match self.pass {
             Pass::Map => published::MAP_MS,
             Pass::Rendering => published::RENDERING_MS,
         };
-        match self.builder.variant {
+        match self.implementation.builder {
             _ if !comparable => None,
-            Variant::Naive => Some(passes.naive),
-            Variant::Atomic => Some(passes.modified),
-            Variant::Cpu => Some(passes.cpu),
+            Builder::Naive => Some(passes.naive),
+            Builder::Atomic => Some(passes.modified),
+            Builder::Cpu => Some(passes.cpu),
             _ => None,
         }
     }

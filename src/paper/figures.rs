@@ -112,7 +112,7 @@ fn exhibits() -> [Exhibit; COUNT] {
 }
 
 fn frame(bench: &Bench, label: String, preset: Preset, settings: Settings) -> Step<Frame> {
-    let settings = Settings { variant: bench.available(settings.variant), ..settings };
+    let settings = Settings { builder: bench.available(settings.builder), ..settings };
     let outcome = bench.run(&settings)?;
     let walls = estimate_walls(&outcome.film, &open_box(&settings), &outcome.plan);
     Ok(Frame { label, command: command::main_job(preset, &settings), settings, walls })

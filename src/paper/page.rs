@@ -5,12 +5,12 @@ use base64::engine::general_purpose::STANDARD;
 use maud::{DOCTYPE, Markup, PreEscaped, html};
 
 use super::bench::PATIENCE;
-use super::experiments::{Builder, LARGE_REPEATS, LONGEST_PASS_MS, LeftOut, Pass, RunningTime, TotalTime};
+use super::experiments::{Implementation, LARGE_REPEATS, LONGEST_PASS_MS, LeftOut, Pass, RunningTime, TotalTime};
 use super::figures::Figure;
 use super::verdicts::{self, Standing};
 use super::{Reproduction, chart, published};
 use crate::output::words::{count, duration, number, times};
-use crate::settings::{Gather, Variant};
+use crate::settings::{Builder, Gather};
 use crate::text::counted;
 
 pub fn html(found: &Reproduction) -> String {
@@ -179,21 +179,21 @@ fn running_times(found: &Reproduction) -> Markup {
 /// The paper's comparison: each builder, each pass, then and here.
 fn beside_published(found: &Reproduction) -> Markup {
     let passes = [(Pass::Map, None), (Pass::Rendering, Some(Gather::Brute))];
-    let time = |builder: Builder, (pass, gather): (Pass, Option<Gather>)| {
-        found.running_time(published::PHOTONS, published::BOUNCES, builder, pass, gather)
+    let time = |implementation: Implementation, (pass, gather): (Pass, Option<Gather>)| {
+        found.running_time(published::PHOTONS, published::BOUNCES, implementation, pass, gather)
     };
     html! {
         div.scroll { table {
             thead {
-                tr { th.name rowspan="2" { "Builder" } th colspan="3" { "Map pass, ms" } th colspan="3" { "Rendering pass, ms" } }
+                tr { th.name rowspan="2" { "Implementation" } th colspan="3" { "Map pass, ms" } th colspan="3" { "Rendering pass, ms" } }
                 tr { @for _ in passes { th { "2008" } th { "here" } th { "2008 / here" } } }
             }
             tbody {
-                @for builder in found.builders() {
+                @for implementation in found.implementations() {
                     tr {
-                        th scope="row" { (described(builder)) }
+                        th scope="row" { (described(implementation)) }
                         @for pass in passes {
-                            @let time = time(builder, pass);
+                            @let time = time(implementation, pass);
                             @let then = time.and_then(RunningTime::published_ms);
                             td { (exact(then)) }
                             td { (spread(time)) }
@@ -211,20 +211,20 @@ fn all_times(found: &Reproduction) -> Markup {
         div.scroll { table {
             thead {
                 tr {
-                    th { "Photons" } th { "Bounces" } th.name { "Builder" } th { "Photons stored" }
+                    th { "Photons" } th { "Bounces" } th.name { "Implementation" } th { "Photons stored" }
                     th { "Map, ms" } th { "Brute force, ms" } th { "Grid, ms" } th { "Runs" }
                 }
             }
             tbody {
                 @for (photons, bounces) in found.sizes() {
-                    @for builder in found.builders() {
-                        @let time = |pass, gather| found.running_time(photons, bounces, builder, pass, gather);
+                    @for implementation in found.implementations() {
+                        @let time = |pass, gather| found.running_time(photons, bounces, implementation, pass, gather);
                         @let map = time(Pass::Map, None);
                         @let brute = time(Pass::Rendering, Some(Gather::Brute));
                         @let grid = time(Pass::Rendering, Some(Gather::Grid));
                         @if let Some(map) = map.or(brute).or(grid) {
                             tr {
-                                td { (count(u64::from(photons))) } td { (bounces) } th scope="row" { (described(builder)) } td { (count(map.stored)) }
+                                td { (count(u64::from(photons))) } td { (bounces) } th scope="row" { (described(implementation)) } td { (count(map.stored)) }
                                 td { (spread(time(Pass::Map, None))) } td { (spread(brute)) } td { (spread(grid)) }
                                 td { (runs([brute, grid])) }
                             }
@@ -334,13 +334,13 @@ fn choices() -> Markup {
     }
 }
 
-fn described(builder: Builder) -> String {
-    match (builder.variant, builder.threads) {
-        (Variant::Naive, _) => "naive (slots)".to_owned(),
-        (Variant::Atomic, _) => "modified (atomic)".to_owned(),
-        (Variant::Cpu, 1) => "CPU, 1 thread".to_owned(),
-        (Variant::Cpu, threads) => format!("CPU, {threads} threads"),
-        (variant, _) => variant.name().to_owned(),
+fn described(implementation: Implementation) -> String {
+    match (implementation.builder, implementation.threads) {
+        (Builder::Naive, _) => "naive (slots)".to_owned(),
+        (Builder::Atomic, _) => "modified (atomic)".to_owned(),
+        (Builder::Cpu, 1) => "CPU, 1 thread".to_owned(),
+        (Builder::Cpu, threads) => format!("CPU, {threads} threads"),
+        (builder, _) => builder.name().to_owned(),
     }
 }
 

@@ -1,11 +1,11 @@
 //! A reproduction with made-up times, for the tests of what is said of it.
 
 use super::bench::{Device, Machine};
-use super::experiments::{Builder, LeftOut, Pass, RunningTime, TotalTime};
+use super::experiments::{Implementation, LeftOut, Pass, RunningTime, TotalTime};
 use super::figures::Figure;
 use super::{Reproduction, Request, published};
 use crate::output::command;
-use crate::settings::{Gather, Preset, Settings, Variant};
+use crate::settings::{Builder, Gather, Preset, Settings};
 use crate::timings::Clock;
 use crate::timings::Spread;
 
@@ -39,18 +39,18 @@ fn running_times() -> Vec<RunningTime> {
     let mut times = Vec::new();
     for photons in [published::PHOTONS, LARGE] {
         for bounces in [published::BOUNCES, 15] {
-            for variant in [Variant::Naive, Variant::Atomic, Variant::Ballot, Variant::Cpu] {
+            for builder in [Builder::Naive, Builder::Atomic, Builder::Ballot, Builder::Cpu] {
                 let passes = [(Pass::Map, None), (Pass::Rendering, Some(Gather::Brute)), (Pass::Rendering, Some(Gather::Grid))];
                 times.extend(passes.map(|(pass, gather)| RunningTime {
                     photons,
                     bounces,
-                    builder: Builder::of(variant),
+                    implementation: Implementation::of(builder),
                     pass,
                     gather,
-                    clock: if variant == Variant::Cpu { Clock::Wall } else { Clock::Gpu },
+                    clock: if builder == Builder::Cpu { Clock::Wall } else { Clock::Gpu },
                     ms: Spread { median: f64::from(photons) / 1000.0, min: 0.5, max: 100.0, repeats: 7 },
                     stored: u64::from(photons),
-                    command: command::main_job(Preset::Modified, &Settings { variant, photons, ..Settings::default() }),
+                    command: command::main_job(Preset::Modified, &Settings { builder, photons, ..Settings::default() }),
                 }));
             }
         }

@@ -15,7 +15,7 @@ pub fn running_times(times: &[RunningTime]) -> Vec<u8> {
             [
                 time.photons.to_string(),
                 time.bounces.to_string(),
-                time.builder.name(),
+                time.implementation.name(),
                 time.pass.name().to_owned(),
                 time.gather.map(command::gather_name).unwrap_or_default(),
                 match time.clock {

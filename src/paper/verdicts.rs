@@ -1,12 +1,12 @@
 //! Which of the paper's findings still hold: sentences computed from this run's measurements.
 
-use super::experiments::{Builder, Pass, TotalTime};
+use super::experiments::{Implementation, Pass, TotalTime};
 use super::figures::Frame;
 use super::{Reproduction, published};
 use crate::film::WallEstimate;
 use crate::output::words::{count, duration, list, number, times};
 use crate::scene::open_box::open_box;
-use crate::settings::{Gather, Variant};
+use crate::settings::{Builder, Gather};
 
 /// What became of something that the paper found.
 #[derive(Debug, Clone, Copy, PartialEq, Eq)]
@@ -85,11 +85,11 @@ struct Ratio {
     bounces: u32,
 }
 
-fn ratios(found: &Reproduction, over: Variant, under: Variant, pass: Pass, gather: Option<Gather>) -> Vec<Ratio> {
+fn ratios(found: &Reproduction, over: Builder, under: Builder, pass: Pass, gather: Option<Gather>) -> Vec<Ratio> {
     let sizes = found.sizes().into_iter();
     sizes
         .filter_map(|(photons, bounces)| {
-            let ms = |variant| found.median_ms(photons, bounces, Builder::of(variant), pass, gather);
+            let ms = |builder| found.median_ms(photons, bounces, Implementation::of(builder), pass, gather);
             Some(Ratio { value: ms(over)? / ms(under)?, photons, bounces })
         })
         .collect()
@@ -115,7 +115,7 @@ fn held(ratios: &[Ratio], holds: impl Fn(f64) -> bool) -> Option<Standing> {
 }
 
 fn append(found: &Reproduction) -> Option<Verdict> {
-    let ratios = ratios(found, Variant::Atomic, Variant::Naive, Pass::Map, None);
+    let ratios = ratios(found, Builder::Atomic, Builder::Naive, Pass::Map, None);
     let standing = held(&ratios, |ratio| ratio > MARGIN)?;
     let text = format!(
         "In 2008 the map pass took {} as long with atomics as with naive slots. Here the factor is {}",
@@ -126,7 +126,7 @@ fn append(found: &Reproduction) -> Option<Verdict> {
 }
 
 fn ballot(found: &Reproduction) -> Option<Verdict> {
-    let ratios = ratios(found, Variant::Ballot, Variant::Atomic, Pass::Map, None);
+    let ratios = ratios(found, Builder::Ballot, Builder::Atomic, Pass::Map, None);
     if ratios.is_empty() {
         return None;
     }
@@ -162,7 +162,7 @@ fn empty_slots(found: &Reproduction) -> Option<Verdict> {
 }
 
 fn packed(found: &Reproduction) -> Option<Verdict> {
-    let ratios = ratios(found, Variant::Naive, Variant::Atomic, Pass::Rendering, Some(Gather::Brute));
+    let ratios = ratios(found, Builder::Naive, Builder::Atomic, Pass::Rendering, Some(Gather::Brute));
     let standing = held(&ratios, |ratio| ratio > MARGIN)?;
     let text = format!(
         "In 2008 the rendering pass took {} as long over all slots, including empty ones, as over a compact list. Here the factor is {}",
@@ -173,7 +173,7 @@ fn packed(found: &Reproduction) -> Option<Verdict> {
 }
 
 fn map_on_gpu(found: &Reproduction) -> Option<Verdict> {
-    let [naive, modified] = [Variant::Naive, Variant::Atomic].map(|variant| ratios(found, Variant::Cpu, variant, Pass::Map, None));
+    let [naive, modified] = [Builder::Naive, Builder::Atomic].map(|builder| ratios(found, Builder::Cpu, builder, Pass::Map, None));
     let published = published::MAP_MS;
     let text = format!(
         "In 2008 the CPU's map pass took {} as long as the naive one on the GPU and {} as long as the modified one. \
@@ -187,10 +187,10 @@ fn map_on_gpu(found: &Reproduction) -> Option<Verdict> {
 }
 
 fn rendering_on_gpu(found: &Reproduction) -> Option<Verdict> {
-    let against = |variant, gather| ratios(found, Variant::Cpu, variant, Pass::Rendering, Some(gather));
-    let [naive, modified] = [Variant::Naive, Variant::Atomic].map(|variant| against(variant, Gather::Brute));
+    let against = |builder, gather| ratios(found, Builder::Cpu, builder, Pass::Rendering, Some(gather));
+    let [naive, modified] = [Builder::Naive, Builder::Atomic].map(|builder| against(builder, Gather::Brute));
     let published = published::RENDERING_MS;
-    let grid = against(Variant::Atomic, Gather::Grid);
+    let grid = against(Builder::Atomic, Gather::Grid);
     let with_grid = if grid.is_empty() { String::new() } else { format!(". With a grid on both CPU and GPU it takes {}", listed(&grid)) };
     let text = format!(
         "In 2008 the CPU's rendering pass took {} as long as the naive one on the GPU and {} as long as the modified one. \
@@ -272,7 +272,7 @@ fn table_1(found: &Reproduction) -> Option<Verdict> {
 }
 
 fn memory(found: &Reproduction) -> Option<Verdict> {
-    let most = found.running_times.iter().filter(|time| time.builder.variant != Variant::Cpu).max_by_key(|time| time.photons)?;
+    let most = found.running_times.iter().filter(|time| time.implementation.builder != Builder::Cpu).max_by_key(|time| time.photons)?;
     let standing = if most.photons > published::PHOTONS { Standing::NoLonger } else { return None };
     let text = format!(
         "In 2008 memory limited a round to about {} photons. Here a round of {} photons and {} bounces was run, and a round that exceeds a buffer is split automatically",
@@ -386,11 +386,11 @@ mod tests {
     fn with_map_ms(naive: f64, atomic: f64, ballot: f64) -> Reproduction {
         let mut found = sample::reproduction();
         for time in found.running_times.iter_mut().filter(|time| time.pass == Pass::Map) {
-            time.ms.median = match time.builder.variant {
-                Variant::Naive => naive,
-                Variant::Atomic => atomic,
-                Variant::Ballot => ballot,
-                Variant::Cpu => 15.0,
+            time.ms.median = match time.implementation.builder {
+                Builder::Naive => naive,
+                Builder::Atomic => atomic,
+                Builder::Ballot => ballot,
+                Builder::Cpu => 15.0,
                 _ => unreachable!("not the paper's"),
             };
         }
@@ -406,7 +406,7 @@ mod tests {
             assert!(verdict.text.contains(&times(atomic)) && verdict.text.contains(&times(11.0 / 1.7)), "{}", verdict.text);
         }
         let mut mixed = with_map_ms(1.0, 2.0, 1.0);
-        let slow = mixed.running_times.iter_mut().find(|time| time.pass == Pass::Map && time.builder.variant == Variant::Atomic);
+        let slow = mixed.running_times.iter_mut().find(|time| time.pass == Pass::Map && time.implementation.builder == Builder::Atomic);
         slow.unwrap().ms.median = 1.0;
         assert_eq!(append(&mixed).unwrap().standing, Some(Standing::HoldsInPart));
     }
@@ -418,7 +418,7 @@ mod tests {
         assert!(text(1.0).contains("no significant difference"));
         assert!(text(2.0).contains("not faster, and slower"));
         let mut mixed = with_map_ms(1.0, 1.0, 0.5);
-        let slow = mixed.running_times.iter_mut().find(|time| time.pass == Pass::Map && time.builder.variant == Variant::Ballot);
+        let slow = mixed.running_times.iter_mut().find(|time| time.pass == Pass::Map && time.implementation.builder == Builder::Ballot);
         slow.unwrap().ms.median = 2.0;
         assert!(ballot(&mixed).unwrap().text.ends_with("faster at some sizes and slower at others."));
     }
@@ -431,7 +431,7 @@ mod tests {
         found.figures.clear();
         assert_eq!(all(&found), []);
         let mut found = sample::reproduction();
-        found.running_times.retain(|time| time.builder.variant == Variant::Cpu);
+        found.running_times.retain(|time| time.implementation.builder == Builder::Cpu);
         assert!(append(&found).is_none() && packed(&found).is_none() && map_on_gpu(&found).is_none());
     }
 

@@ -9,7 +9,7 @@ use crate::path::StoredPath;
 use crate::photon::{Origin, StoredPhoton};
 use crate::rng::Rng;
 use crate::scene::room::RoomScene;
-use crate::settings::{Gather, Settings, Sums, Variant};
+use crate::settings::{Builder, Gather, Settings, Sums};
 
 /// What a device allows.
 #[derive(Debug, Clone, Copy, PartialEq, Eq, Serialize)]
@@ -119,7 +119,7 @@ impl Work {
         let albedo = scene.walls().map(|(_, wall)| f64::from(wall.albedo)).fold(0.0, f64::max);
         let stored = (albedo / (1.0 - albedo)).min(f64::from(settings.bounces));
         let tests_per_photon = match settings.gather {
-            Gather::Brute if settings.variant == Variant::Naive => f64::from(settings.bounces),
+            Gather::Brute if settings.builder == Builder::Naive => f64::from(settings.bounces),
             Gather::Brute => stored,
             Gather::Grid | Gather::KdTree => {
                 // The cells in reach are three radii wide and may hold pieces of two walls; photons
@@ -129,7 +129,7 @@ impl Work {
                 stored * (in_reach / areas.sum::<f64>()).min(1.0)
             }
         };
-        let slots = settings.variant == Variant::Naive;
+        let slots = settings.builder == Builder::Naive;
         Work {
             points: point_count as f64,
             tests_per_photon,
@@ -184,7 +184,7 @@ const MANY_PHOTONS: u32 = 1 << 21;
 
 /// Counters that the atomic builder's work groups take turns at.
 pub(super) fn counters(settings: &Settings, limits: &Limits, photons: u32) -> u32 {
-    if settings.variant != Variant::Atomic {
+    if settings.builder != Builder::Atomic {
         return 1;
     }
     settings.counters.unwrap_or(if photons < MANY_PHOTONS { 1 } else { limits.counters })

@@ -7,13 +7,13 @@ use glam::UVec2;
 use super::Plan;
 use super::transport::{MapPlan, SEGMENT_BOUNCES, Sensor, TransportPlan};
 use crate::constants::{
-    FACE_COUNT, HIT_KINDS, MAX_ODDITIES, ODD_ESTIMATE, PART_COUNT, SCAN_ITEMS, TALLY_COPIES, TOTAL_WORDS, TREE_LEAF, TREE_RUN,
+    FACE_COUNT, HIT_KINDS, MAX_NONFINITE_VALUES, NONFINITE_ESTIMATE, PART_COUNT, SCAN_ITEMS, TALLY_COPIES, TOTAL_WORDS, TREE_LEAF, TREE_RUN,
 };
 use crate::path::StoredPath;
 use crate::photon::{MapPhoton, Origin, StoredPhoton};
 use crate::records::*;
 use crate::scene::geometry::Geometry;
-use crate::settings::Variant;
+use crate::settings::Builder;
 use crate::settings::transport::Effect;
 
 /// A buffer, or several of one name, and all their bytes.
@@ -25,7 +25,7 @@ fn array<T: Pod>(count: u64) -> u64 {
 }
 
 /// Words of the buffer in which kernels note what is odd: of each kind a count and the first ones.
-const ODDITY_WORDS: u64 = (ODD_ESTIMATE as u64 + 1) * (1 + 3 * MAX_ODDITIES as u64);
+const NONFINITE_WORDS: u64 = (NONFINITE_ESTIMATE as u64 + 1) * (1 + 3 * MAX_NONFINITE_VALUES as u64);
 
 /// Sums of each level of a prefix sum over `items`: sums of blocks of the level below, down to one block.
 pub fn block_sum_counts(items: u64, group_size: u32) -> Vec<u64> {
@@ -78,9 +78,9 @@ impl Plan {
             ("dispatch args", array::<DispatchArgs>(1)),
             ("tallies", array::<Tally>(bounces * u64::from(TALLY_COPIES))),
             ("film", array::<u64>(sums)),
-            ("oddities", array::<u32>(ODDITY_WORDS)),
+            ("nonfinite_values", array::<u32>(NONFINITE_WORDS)),
         ];
-        if self.settings.variant == Variant::Scan {
+        if self.settings.builder == Builder::Scan {
             let sums = u64::from(group_count(self)) + 1;
             buffers.extend([
                 ("survivors", array::<u32>(sums)),
@@ -164,7 +164,7 @@ pub(super) fn of_transport(plan: &TransportPlan, geometry: &Geometry, keeps: &dy
         ("film", pixels.max(1) * FILM_PIXEL_BYTES),
         ("part totals", array::<u64>(u64::from(PART_COUNT))),
         ("anomalies", array::<u32>(8)),
-        ("oddities", array::<u32>(ODDITY_WORDS)),
+        ("nonfinite_values", array::<u32>(NONFINITE_WORDS)),
     ];
     if let Sensor::Receivers { count } = plan.sensor {
         buffers.push(("receivers", array::<Receiver>(u64::from(count))));

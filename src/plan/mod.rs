@@ -20,7 +20,7 @@ use crate::photon::StoredPhoton;
 use crate::records::{IndexPush, Point};
 use crate::rng::Streams;
 use crate::scene::room::RoomScene;
-use crate::settings::{Gather, Settings, Sums, Variant};
+use crate::settings::{Builder, Gather, Settings, Sums};
 
 /// A run of photons of one light inside a chunk.
 #[derive(Debug, Clone, Copy, PartialEq, Eq)]
@@ -256,7 +256,7 @@ impl Plan {
 
     /// Paths that one bounce hands to the next; where each photon has an invocation to its end, the one that a replay starts.
     pub fn path_array_length(&self) -> u32 {
-        if self.settings.variant == Variant::Persistent { 1 } else { self.path_capacity }
+        if self.settings.builder == Builder::Persistent { 1 } else { self.path_capacity }
     }
 
     /// Length of the photon map, paths entering each bounce, and what is counted in turn.
@@ -271,7 +271,7 @@ impl Plan {
     }
 
     pub fn has_slots(&self) -> bool {
-        self.settings.variant == Variant::Naive
+        self.settings.builder == Builder::Naive
     }
 
     /// Fixed-point units in 1.
@@ -344,15 +344,15 @@ mod tests {
     #[test]
     fn several_counters_serve_many_photons_of_the_atomic_builder() {
         let limits = Limits { buffer_bytes: 1 << 32, memory_bytes: 1 << 36, counters: 8, ..Limits::of_host() };
-        let counters = |photons, variant, counters| {
+        let counters = |photons, builder, counters| {
             let settings =
-                Settings { photons, variant, counters, bounces: 2, chunk: Some(photons), mesh: 1, rng: Rng::Philox, ..Settings::default() };
+                Settings { photons, builder, counters, bounces: 2, chunk: Some(photons), mesh: 1, rng: Rng::Philox, ..Settings::default() };
             Plan::new(&open_box(&settings), &settings, &limits).unwrap().counters
         };
-        assert_eq!([1000, (1 << 21) - 1, 1 << 21, 1 << 24].map(|photons| counters(photons, Variant::Atomic, None)), [1, 1, 8, 8]);
-        assert_eq!([1, 4, 64].map(|number| counters(1000, Variant::Atomic, Some(number))), [1, 4, 64]);
-        for variant in Variant::all().filter(|variant| *variant != Variant::Atomic) {
-            assert_eq!([None, Some(4)].map(|number| counters(1 << 21, variant, number)), [1, 1], "{variant:?}");
+        assert_eq!([1000, (1 << 21) - 1, 1 << 21, 1 << 24].map(|photons| counters(photons, Builder::Atomic, None)), [1, 1, 8, 8]);
+        assert_eq!([1, 4, 64].map(|number| counters(1000, Builder::Atomic, Some(number))), [1, 4, 64]);
+        for builder in Builder::all().filter(|builder| *builder != Builder::Atomic) {
+            assert_eq!([None, Some(4)].map(|number| counters(1 << 21, builder, number)), [1, 1], "{builder:?}");
         }
     }
 

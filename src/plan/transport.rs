@@ -16,9 +16,9 @@ use crate::records::*;
 use crate::scene::geometry::Geometry;
 use crate::scene::targets::{aimed_shares, caustic_targets};
 use crate::scene::{Scene, Surface};
-use crate::settings::Math;
 use crate::settings::stop::squared_radius;
-use crate::settings::transport::{Append, Effect, Illumination, TransportSettings};
+use crate::settings::transport::{Effect, Illumination, TransportSettings};
+use crate::settings::{Builder, Math};
 
 /// What light is asked of.
 #[derive(Debug, Clone, Copy, PartialEq, Eq, Serialize)]
@@ -234,12 +234,9 @@ impl TransportPlan {
         .map(|(kept, arrival)| if *kept { *arrival } else { 0 })
         .sum::<u32>();
 
-        let append = match settings.append {
-            Append::Auto if settings.math == Math::Strict => Append::Ballot,
-            Append::Auto => Append::Persistent,
-            named => named,
-        };
-        let persistent = append == Append::Persistent;
+        let by_itself = if settings.math == Math::Strict { Builder::Ballot } else { Builder::Persistent };
+        let builder = settings.builder.unwrap_or(by_itself);
+        let persistent = builder == Builder::Persistent;
         let landings_of_each = expected_landings(scene, settings.bounces);
         let map = |name, domain, photons: u32, stored, caustic_only: bool, radius: Option<f64>, option| -> Result<MapPlan> {
             let usual = usual_radius(geometry, f64::from(photons)) * if caustic_only { CAUSTIC_RADIUS_SHARE } else { 1.0 };
@@ -363,7 +360,7 @@ impl TransportPlan {
         ];
 
         let mut plan = TransportPlan {
-            settings: TransportSettings { append, ..settings.clone() },
+            settings: TransportSettings { builder: Some(builder), ..settings.clone() },
             sensor,
             trial: None,
             decisions: Vec::new(),
@@ -397,6 +394,11 @@ impl TransportPlan {
         self.decisions.iter().any(|decision| decision.effect == effect && decision.kept)
     }
 
+    /// What traces the photons: the settings' builder, or the one that was chosen.
+    pub fn builder(&self) -> Builder {
+        self.settings.builder.expect("the plan chose a builder")
+    }
+
     pub fn maps(&self) -> impl Iterator<Item = &MapPlan> {
         self.global.iter().chain(&self.caustic)
     }
@@ -404,8 +406,8 @@ impl TransportPlan {
     /// The same by a builder that stops after each flight; `bytes` stay those of the run.
     pub fn by_flights(&self) -> TransportPlan {
         let mut plan = self.clone();
-        if plan.settings.append == Append::Persistent {
-            plan.settings.append = Append::Ballot;
+        if plan.builder() == Builder::Persistent {
+            plan.settings.builder = Some(Builder::Ballot);
             for map in plan.global.iter_mut().chain(&mut plan.caustic) {
                 map.path_array_length = map.chunk_photons;
                 map.segment_bounces = map.bounces.min(SEGMENT_BOUNCES);

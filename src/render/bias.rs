@@ -2,7 +2,7 @@
 
 use std::sync::atomic::AtomicBool;
 
-use super::{Control, Outcome, on_cpu, on_gpu};
+use super::{Control, RunResult, on_cpu, on_gpu};
 use crate::bias::{self, Bias};
 use crate::error::Result;
 use crate::film::estimate_walls;
@@ -42,7 +42,7 @@ pub fn bias_batch(
         ..settings.clone()
     };
     let mut control = Control { cancelled, progress: &mut |_| {} };
-    let outcome: Outcome = match gpu {
+    let outcome: RunResult = match gpu {
         Some(gpu) => on_gpu(gpu, scene, &settings, &mut control)?,
         None => on_cpu(scene, &settings, &mut control)?,
     };

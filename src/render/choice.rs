@@ -10,7 +10,7 @@ use crate::gpu::{Commands, Gpu};
 use crate::plan::{Plan, photons_of};
 use crate::resources::Resources;
 use crate::scene::room::RoomScene;
-use crate::settings::{Gather, Math, Settings, Variant};
+use crate::settings::{Builder, Gather, Math, Settings};
 use crate::timings::Spread;
 use crate::{estimate, index, trace};
 
@@ -26,7 +26,7 @@ pub struct Choice {
 /// What one builder took.
 #[derive(Debug, Clone, Copy, PartialEq)]
 pub struct Candidate {
-    pub variant: Variant,
+    pub builder: Builder,
     /// Milliseconds to trace and index the photons, and to gather them by brute force where that steps through the
     /// builder's list; of the device's clock, or of the host's where the device has none.
     pub ms: Spread,
@@ -41,7 +41,7 @@ fn most_photons(gpu: &Gpu) -> u32 {
 const TURNS: usize = 5;
 const LONG: Duration = Duration::from_secs(1);
 
-pub fn choose_variant(gpu: &Gpu, scene: &RoomScene, settings: &Settings) -> Result<Choice> {
+pub fn choose_builder(gpu: &Gpu, scene: &RoomScene, settings: &Settings) -> Result<Choice> {
     if settings.math == Math::Strict {
         strict_math(gpu)?;
     }
@@ -62,7 +62,7 @@ pub fn choose_variant(gpu: &Gpu, scene: &RoomScene, settings: &Settings) -> Resu
     let mut candidates: Vec<Candidate> = plans
         .iter()
         .zip(times)
-        .map(|(plan, times)| Candidate { variant: plan.settings.variant, ms: Spread::of(times).expect("there is a turn that counts") })
+        .map(|(plan, times)| Candidate { builder: plan.settings.builder, ms: Spread::of(times).expect("there is a turn that counts") })
         .collect();
     candidates.sort_by(|a, b| a.ms.median.total_cmp(&b.ms.median));
     Ok(Choice { photons: photons_of(&plans[0].chunk(0)), candidates })
@@ -72,8 +72,8 @@ pub fn choose_variant(gpu: &Gpu, scene: &RoomScene, settings: &Settings) -> Resu
 fn plans(gpu: &Gpu, scene: &RoomScene, settings: &Settings) -> Result<Vec<Plan>> {
     let with = |chunk: Option<u32>| -> Result<Vec<Plan>> {
         let (mut plans, mut refusal) = (Vec::new(), None);
-        for variant in Variant::ON_GPU {
-            let settings = Settings { variant, chunk, rounds: 1, ..settings.clone() };
+        for builder in Builder::ON_GPU {
+            let settings = Settings { builder, chunk, rounds: 1, ..settings.clone() };
             match Plan::new(scene, &settings, &limits(gpu.facts())) {
                 Ok(plan) => plans.push(plan),
                 // Some builder has a limit of its own.

@@ -2,10 +2,10 @@
 //! [`on_gpu`] walks it with kernels, [`on_cpu`] with their twins.
 
 mod bias;
-mod book;
 mod choice;
 mod on_cpu;
 mod on_gpu;
+mod run_state;
 pub mod stop;
 
 use std::sync::atomic::AtomicBool;
@@ -13,7 +13,7 @@ use std::sync::atomic::AtomicBool;
 use serde::Serialize;
 
 pub use bias::{bias_batch, measure_bias};
-pub use choice::{Candidate, Choice, choose_variant};
+pub use choice::{Candidate, Choice, choose_builder};
 pub use on_cpu::{on_cpu, photons_on_cpu, replay_on_cpu};
 pub use on_gpu::{constants, limits, on_gpu, photons_on_gpu, replay_on_gpu};
 
@@ -21,7 +21,7 @@ use crate::bias::Bias;
 use crate::film::Film;
 use crate::gpu::DeviceFacts;
 use crate::ledger::{Fates, Ledger, Losses};
-use crate::oddities::Oddities;
+use crate::nonfinite_values::NonfiniteValues;
 use crate::path::Path;
 use crate::photon::Photon;
 use crate::plan::Plan;
@@ -56,7 +56,7 @@ pub struct Progress {
 
 /// What a run leaves behind.
 #[derive(Debug, Clone)]
-pub struct Outcome {
+pub struct RunResult {
     pub plan: Plan,
     pub film: Film,
     pub fates: Fates,
@@ -73,7 +73,7 @@ pub struct Outcome {
     pub dispatches: u64,
     pub submissions: u64,
     /// Nonfinite values that `--paranoid` found; `None` without it.
-    pub oddities: Option<Oddities>,
+    pub nonfinite_values: Option<NonfiniteValues>,
 }
 
 /// One photon of a run by itself.
@@ -84,5 +84,5 @@ pub struct Replayed {
     pub stored: Vec<Photon>,
     pub fate: &'static str,
     /// Nonfinite values that `--paranoid` found; `None` without it.
-    pub oddities: Option<Oddities>,
+    pub nonfinite_values: Option<NonfiniteValues>,
 }

@@ -5,24 +5,24 @@ use std::time::Instant;
 use pulp::Arch;
 use rayon::{ThreadPool, ThreadPoolBuilder};
 
-use super::book::Book;
+use super::run_state::RunState;
 use super::stop::End;
-use super::{Control, Outcome, Replayed};
+use super::{Control, Replayed, RunResult};
 use crate::cpu::trace::{Block, Tracer};
 use crate::cpu::{estimate, nearest, splat::Splats, tree::Tree};
 use crate::error::{Error, Result};
 use crate::film::Film;
 use crate::ledger::fate;
-use crate::oddities::{Oddities, What};
+use crate::nonfinite_values::{NonfiniteValues, What};
 use crate::photon::Photon;
 use crate::plan::{EmissionRange, Limits, Plan, photons_of};
 use crate::records::Tally;
 use crate::scene::room::RoomScene;
-use crate::settings::{Gather, Settings, Sums, Variant};
+use crate::settings::{Builder, Gather, Settings, Sums};
 use crate::timings::HostClock;
 
 /// Runs on the CPU, on `settings.threads` threads.
-pub fn on_cpu(scene: &RoomScene, settings: &Settings, control: &mut Control) -> Result<Outcome> {
+pub fn on_cpu(scene: &RoomScene, settings: &Settings, control: &mut Control) -> Result<RunResult> {
     let started = Instant::now();
     let mut clock = HostClock::start("run");
     let plan = plan(scene, settings)?;
@@ -31,8 +31,8 @@ pub fn on_cpu(scene: &RoomScene, settings: &Settings, control: &mut Control) -> 
     let mut film = Film::new(&plan);
     // What the round under way has left so far.
     let mut sums = vec![0u64; film.sums.len()];
-    let mut book = Book::new(&plan, control, started);
-    let mut oddities = Oddities::default();
+    let mut state = RunState::new(&plan, control, started);
+    let mut nonfinite_values = NonfiniteValues::default();
     let last_chunk = plan.chunks_per_round as usize - 1;
     let mut splats = adds_by_splatting(&plan).then(|| pool.install(|| Splats::new(&plan, Arch::new())));
     let mut blocks = Vec::new();
@@ -41,45 +41,45 @@ pub fn on_cpu(scene: &RoomScene, settings: &Settings, control: &mut Control) -> 
             for (chunk, ranges) in plan.chunks().enumerate() {
                 let tallies = clock.time("build", |_| {
                     pool.install(|| tracer.trace(round, &ranges, &mut blocks));
-                    tallies_of(&blocks, round, &plan, &mut oddities)
+                    tallies_of(&blocks, round, &plan, &mut nonfinite_values)
                 });
                 match &mut splats {
                     Some(splats) => clock.time("gather", |_| pool.install(|| splats.add(&blocks))),
                     None => gather(&pool, scene, &plan, &photons_of_blocks(&blocks), &mut sums, clock),
                 }
-                book.emitted += u64::from(photons_of(&ranges));
-                book.count(&tallies);
-                film.emitted = book.emitted;
+                state.emitted += u64::from(photons_of(&ranges));
+                state.count(&tallies);
+                film.emitted = state.emitted;
                 if chunk == last_chunk {
                     clock.time("film", |_| {
                         splats.iter_mut().for_each(|splats| pool.install(|| splats.flush(&mut sums)));
                         film.end_round(&mut sums);
                     });
-                    book.rounds += 1;
-                    if book.wants_film() {
-                        book.look(&film, scene, &plan);
+                    state.rounds += 1;
+                    if state.wants_film() {
+                        state.look(&film, scene, &plan);
                     }
                 }
-                if book.settle()? {
+                if state.collect()? {
                     break;
                 }
             }
             Ok(())
         })?;
-        if book.end.is_some() {
+        if state.end.is_some() {
             break;
         }
     }
-    if !book.is_whole() {
+    if !state.is_whole() {
         splats.iter_mut().for_each(|splats| pool.install(|| splats.flush(&mut sums)));
         film.add_unfinished(sums);
     }
-    let end = book.end.unwrap_or(End::Rounds);
-    Ok(Outcome {
-        oddities: settings.paranoid.then_some(oddities),
+    let end = state.end.unwrap_or(End::Rounds);
+    Ok(RunResult {
+        nonfinite_values: settings.paranoid.then_some(nonfinite_values),
         film,
-        losses: book.losses(),
-        fates: book.fates,
+        losses: state.losses(),
+        fates: state.fates,
         end,
         cancelled: end == End::Cancelled,
         bias: None,
@@ -112,7 +112,7 @@ fn adds_by_splatting(plan: &Plan) -> bool {
 }
 
 fn plan(scene: &RoomScene, settings: &Settings) -> Result<Plan> {
-    let settings = Settings { variant: Variant::Cpu, ..settings.clone() };
+    let settings = Settings { builder: Builder::Cpu, ..settings.clone() };
     Plan::new(scene, &settings, &Limits::of_host())
 }
 
@@ -125,7 +125,7 @@ fn thread_pool(settings: &Settings) -> Result<ThreadPool> {
 }
 
 /// Fates bounce by bounce. What `--paranoid` found is noted.
-fn tallies_of(blocks: &[Block], round: u32, plan: &Plan, oddities: &mut Oddities) -> Vec<Tally> {
+fn tallies_of(blocks: &[Block], round: u32, plan: &Plan, nonfinite_values: &mut NonfiniteValues) -> Vec<Tally> {
     let mut sums = vec![Tally::default(); plan.settings.bounces as usize];
     for block in blocks {
         for (sum, tally) in sums.iter_mut().zip(&block.tallies) {
@@ -134,7 +134,7 @@ fn tallies_of(blocks: &[Block], round: u32, plan: &Plan, oddities: &mut Oddities
             sum.escaped += tally.escaped;
             sum.dropped += tally.dropped;
         }
-        block.odd.iter().for_each(|photon| oddities.add(What::Photon, round, *photon));
+        block.odd.iter().for_each(|photon| nonfinite_values.add(What::Photon, round, *photon));
     }
     sums
 }
@@ -149,12 +149,12 @@ pub fn replay_on_cpu(scene: &RoomScene, settings: &Settings, round: u32, photon:
     let tracer = Tracer::new(scene, &plan);
     let ranges = [plan.range_of(round, photon)?];
     let start = tracer.emit(round, &ranges)[0];
-    let mut oddities = Oddities::default();
+    let mut nonfinite_values = NonfiniteValues::default();
     let mut blocks = Vec::new();
     tracer.trace(round, &ranges, &mut blocks);
-    let tallies = tallies_of(&blocks, round, &plan, &mut oddities);
+    let tallies = tallies_of(&blocks, round, &plan, &mut nonfinite_values);
     let stored = photons_of_blocks(&blocks);
-    Ok(Replayed { start, stored, fate: fate(&tallies), oddities: settings.paranoid.then_some(oddities) })
+    Ok(Replayed { start, stored, fate: fate(&tallies), nonfinite_values: settings.paranoid.then_some(nonfinite_values) })
 }
 
 /// The photon map of round 0, for comparing builders.

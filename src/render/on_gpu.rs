@@ -2,16 +2,16 @@
 
 use std::time::Instant;
 
-use super::book::Book;
+use super::run_state::RunState;
 use super::stop::End;
-use super::{Control, Outcome, Replayed};
+use super::{Control, Replayed, RunResult};
 use crate::constants::NO_WALL;
 use crate::error::Result;
 use crate::film::Film;
 use crate::gpu::check::strict_math;
 use crate::gpu::{Commands, Constants, DeviceFacts, Gpu};
 use crate::ledger::fate;
-use crate::oddities::Oddities;
+use crate::nonfinite_values::NonfiniteValues;
 use crate::path::StoredPath;
 use crate::photon::{Origin, Photon, StoredPhoton};
 use crate::plan::{EmissionRange, Limits, Plan, photons_of};
@@ -21,7 +21,7 @@ use crate::settings::{Math, Settings};
 use crate::{estimate, index, path, tallies, trace};
 
 /// Runs on the GPU.
-pub fn on_gpu(gpu: &Gpu, scene: &RoomScene, settings: &Settings, control: &mut Control) -> Result<Outcome> {
+pub fn on_gpu(gpu: &Gpu, scene: &RoomScene, settings: &Settings, control: &mut Control) -> Result<RunResult> {
     let started = Instant::now();
     let plan = Plan::new(scene, settings, &limits(gpu.facts()))?;
     estimate::check_sums(&plan, gpu.facts())?;
@@ -35,40 +35,40 @@ pub fn on_gpu(gpu: &Gpu, scene: &RoomScene, settings: &Settings, control: &mut C
     commands.warm_up()?;
     commands.submit()?;
 
-    let mut book = Book::new(&plan, control, commands.started());
-    book.submissions_settled = commands.submission_count();
+    let mut state = RunState::new(&plan, control, commands.started());
+    state.submissions_settled = commands.submission_count();
     for round in 0..settings.rounds {
         commands.scope("round", |commands| {
             for (chunk, ranges) in (1..).zip(plan.chunks()) {
                 trace::chunk(commands, &resources, &plan, round, &ranges)?;
                 index::build(commands, &resources, &plan, photons_of(&ranges))?;
                 estimate::gather(commands, &resources, &plan, photons_of(&ranges))?;
-                book.emitted += u64::from(photons_of(&ranges));
+                state.emitted += u64::from(photons_of(&ranges));
                 if chunk == plan.chunks_per_round {
                     estimate::end_round(commands, &resources, &plan)?;
-                    book.rounds += 1;
+                    state.rounds += 1;
                 }
-                if is_due(commands, &plan, &book) && settle(commands, &resources, scene, &plan, &mut book)? {
+                if is_due(commands, &plan, &state) && collect(commands, &resources, scene, &plan, &mut state)? {
                     break;
                 }
             }
             Ok(())
         })?;
-        if book.end.is_some() {
+        if state.end.is_some() {
             break;
         }
     }
-    settle(&mut commands, &resources, scene, &plan, &mut book)?;
-    let film = read_film(&mut commands, &resources, &plan, &book)?;
-    let oddities = if settings.paranoid { Some(Oddities::read(&mut commands, &resources.oddities)?) } else { None };
+    collect(&mut commands, &resources, scene, &plan, &mut state)?;
+    let film = read_film(&mut commands, &resources, &plan, &state)?;
+    let nonfinite_values = if settings.paranoid { Some(NonfiniteValues::read(&mut commands, &resources.nonfinite_values)?) } else { None };
     gpu.check_validation()?;
 
-    let end = book.end.unwrap_or(End::Rounds);
-    Ok(Outcome {
-        oddities,
+    let end = state.end.unwrap_or(End::Rounds);
+    Ok(RunResult {
+        nonfinite_values,
         film,
-        losses: book.losses(),
-        fates: book.fates,
+        losses: state.losses(),
+        fates: state.fates,
         end,
         cancelled: end == End::Cancelled,
         bias: None,
@@ -121,34 +121,34 @@ pub(super) fn prepare(gpu: &Gpu, plan: &Plan) -> Result<()> {
 }
 
 /// Whether the recorded commands should go to the device now.
-fn is_due(commands: &Commands, plan: &Plan, book: &Book) -> bool {
+fn is_due(commands: &Commands, plan: &Plan, state: &RunState) -> bool {
     // Tallies are 32-bit on the device.
-    let tallies_full = book.open() + u64::from(plan.path_capacity) > u64::from(u32::MAX);
+    let tallies_full = state.open() + u64::from(plan.path_capacity) > u64::from(u32::MAX);
     let timestamps_short = commands.timestamps_left() < trace::timestamps_per_chunk(plan);
     // A long gather hands commands over by itself, and nobody has looked at the result yet.
-    let submitted = commands.submission_count() > book.submissions_settled;
-    commands.work() >= plan.pair_tests_per_submission || submitted || timestamps_short || tallies_full || book.may_end()
+    let submitted = commands.submission_count() > state.submissions_settled;
+    commands.work() >= plan.pair_tests_per_submission || submitted || timestamps_short || tallies_full || state.may_end()
 }
 
 /// Runs what is recorded, looks at the error where that is due, books the fates, and says whether to stop.
-fn settle(commands: &mut Commands, resources: &Resources, scene: &RoomScene, plan: &Plan, book: &mut Book) -> Result<bool> {
-    if book.open() == 0 {
-        return Ok(book.end.is_some());
+fn collect(commands: &mut Commands, resources: &Resources, scene: &RoomScene, plan: &Plan, state: &mut RunState) -> Result<bool> {
+    if state.open() == 0 {
+        return Ok(state.end.is_some());
     }
     let tallies = tallies::read(commands, &resources.tallies, plan.settings.bounces)?;
     tallies::clear(commands, &resources.tallies);
-    book.count(&tallies);
-    if book.wants_film() {
-        let film = read_film(commands, resources, plan, book)?;
-        book.look(&film, scene, plan);
+    state.count(&tallies);
+    if state.wants_film() {
+        let film = read_film(commands, resources, plan, state)?;
+        state.look(&film, scene, plan);
     }
-    book.submissions_settled = commands.submission_count();
-    book.settle()
+    state.submissions_settled = commands.submission_count();
+    state.collect()
 }
 
 /// What all photons handed out so far have left.
-fn read_film(commands: &mut Commands, resources: &Resources, plan: &Plan, book: &Book) -> Result<Film> {
-    let mut film = Film { emitted: book.emitted, rounds: book.rounds, ..Film::new(plan) };
+fn read_film(commands: &mut Commands, resources: &Resources, plan: &Plan, state: &RunState) -> Result<Film> {
+    let mut film = Film { emitted: state.emitted, rounds: state.rounds, ..Film::new(plan) };
     let count = film.sums.len();
     let Some(RoundBuffers { totals, low_squares, high_squares }) = &resources.rounds else {
         film.sums = commands.read::<u64>(&resources.film, count)?;
@@ -157,7 +157,7 @@ fn read_film(commands: &mut Commands, resources: &Resources, plan: &Plan, book: 
     film.sums = commands.read::<u64>(totals, count)?;
     let (low, high) = (commands.read::<u64>(low_squares, count)?, commands.read::<u64>(high_squares, count)?);
     film.squares = low.into_iter().zip(high).map(|(low, high)| u128::from(low) | u128::from(high) << 64).collect();
-    if !book.is_whole() {
+    if !state.is_whole() {
         film.add_unfinished(commands.read::<u64>(&resources.film, count)?);
     }
     Ok(film)
@@ -190,9 +190,9 @@ pub fn replay_on_gpu(gpu: &Gpu, scene: &RoomScene, settings: &Settings, round: u
     let start = path::unpack(&commands.read::<StoredPath>(&resources.paths[0], 1)?, 0);
     let stored = stored(&mut commands, &resources, scene, &plan, round, &ranges)?;
     let tallies = tallies::read(&mut commands, &resources.tallies, settings.bounces)?;
-    let oddities = if settings.paranoid { Some(Oddities::read(&mut commands, &resources.oddities)?) } else { None };
+    let nonfinite_values = if settings.paranoid { Some(NonfiniteValues::read(&mut commands, &resources.nonfinite_values)?) } else { None };
     gpu.check_validation()?;
-    Ok(Replayed { start, stored, fate: fate(&tallies), oddities })
+    Ok(Replayed { start, stored, fate: fate(&tallies), nonfinite_values })
 }
 
 /// What a chunk leaves in the photon map.

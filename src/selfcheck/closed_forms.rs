@@ -12,17 +12,17 @@ use crate::gpu::Gpu;
 use crate::scene::closed_forms::{DISC_RADIUS, WALL_ALBEDO, by_name};
 use crate::scene::light::LightKind;
 use crate::scene::{Camera, Scene};
-use crate::settings::EmissionLaw;
-use crate::settings::transport::{Append, Illumination, TransportSettings};
+use crate::settings::transport::{Illumination, TransportSettings};
+use crate::settings::{Builder, EmissionLaw};
 use crate::text::counted;
 
 const BOTH: [Illumination; 2] = [Illumination::Split, Illumination::Photons];
 /// Each way of lighting, and photons by each builder.
-const WAYS: [(Illumination, Append); 4] = [
-    (Illumination::Split, Append::Ballot),
-    (Illumination::Photons, Append::Ballot),
-    (Illumination::Photons, Append::Atomic),
-    (Illumination::Photons, Append::Persistent),
+const WAYS: [(Illumination, Builder); 4] = [
+    (Illumination::Split, Builder::Ballot),
+    (Illumination::Photons, Builder::Ballot),
+    (Illumination::Photons, Builder::Atomic),
+    (Illumination::Photons, Builder::Persistent),
 ];
 
 fn scene(name: &str) -> Scene {
@@ -75,11 +75,11 @@ pub fn cases() -> Vec<Case> {
 fn furnace() -> Vec<Case> {
     let share = 1.0 - f64::from(WALL_ALBEDO);
     WAYS.into_iter()
-        .flat_map(|(illumination, append)| {
+        .flat_map(|(illumination, builder)| {
             // More bounces than 24 have 1e-7 of the light.
-            let settings = TransportSettings { append, bounces: 24, ..settings(illumination, 0.2) };
+            let settings = TransportSettings { builder: Some(builder), bounces: 24, ..settings(illumination, 0.2) };
             let other = settings.clone();
-            let what = format!("furnace, {illumination:?}, {append:?}");
+            let what = format!("furnace, {illumination:?}, {builder:?}");
             [
                 case(format!("{what}: irradiance"), PI / share, move |gpu| irradiance(gpu, &scene("furnace"), &settings, &all_walls())),
                 case(format!("{what}: radiance"), 1.0 / share, move |gpu| {

@@ -6,7 +6,7 @@ use super::{Case, Estimate};
 use crate::render::{self, Control};
 use crate::rng::Rng;
 use crate::scene::open_box::open_box;
-use crate::settings::{EmissionLaw, Settings, Variant};
+use crate::settings::{Builder, EmissionLaw, Settings};
 
 /// Photons stored at 1 to 15 bounces for each one emitted, lights of equal intensity and Lambertian ones: the
 /// radiosity recursion g_(k+1) = K g_k with exact form factors.
@@ -18,21 +18,21 @@ const PHOTONS: u32 = 1 << 20;
 
 pub(super) fn cases() -> Vec<Case> {
     let laws = [(EmissionLaw::Uniform, STORED_UNIFORM), (EmissionLaw::Cosine, STORED_COSINE)];
-    Variant::all().flat_map(|variant| laws.map(|(law, expected)| case(variant, law, expected))).collect()
+    Builder::all().flat_map(|builder| laws.map(|(law, expected)| case(builder, law, expected))).collect()
 }
 
-fn case(variant: Variant, emission: EmissionLaw, expected: f64) -> Case {
-    let settings = Settings { variant, emission, photons: PHOTONS, rng: Rng::Philox, mesh: 1, ..Settings::default() };
+fn case(builder: Builder, emission: EmissionLaw, expected: f64) -> Case {
+    let settings = Settings { builder, emission, photons: PHOTONS, rng: Rng::Philox, mesh: 1, ..Settings::default() };
     let law = format!("{emission:?}").to_lowercase();
     Case {
-        name: format!("open box, {} builder, {law} lights: hits stored per photon", variant.name()),
+        name: format!("open box, {} builder, {law} lights: hits stored per photon", builder.name()),
         expected,
-        on_gpu: variant != Variant::Cpu,
+        on_gpu: builder != Builder::Cpu,
         measure: Box::new(move |gpu| {
             let never = AtomicBool::new(false);
             let mut control = Control { cancelled: &never, progress: &mut |_| {} };
             let scene = open_box(&settings);
-            let outcome = match gpu.filter(|_| variant != Variant::Cpu) {
+            let outcome = match gpu.filter(|_| builder != Builder::Cpu) {
                 Some(gpu) => render::on_gpu(gpu, &scene, &settings, &mut control)?,
                 None => render::on_cpu(&scene, &settings, &mut control)?,
             };

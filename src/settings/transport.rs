@@ -3,7 +3,7 @@
 use serde::Serialize;
 
 pub use super::stop::Stop;
-use super::{Math, within};
+use super::{Builder, Math, within};
 use crate::constants;
 use crate::constants::MAX_BOUNCES;
 use crate::error::{Error, Result};
@@ -85,32 +85,6 @@ impl Filter {
             Filter::Box => constants::FILTER_BOX,
             Filter::Tent => constants::FILTER_TENT,
             Filter::Gaussian => constants::FILTER_GAUSSIAN,
-        }
-    }
-}
-
-/// How photons fly and take places in their map.
-#[derive(Debug, Clone, Copy, PartialEq, Eq, Serialize)]
-#[serde(rename_all = "lowercase")]
-pub enum Append {
-    /// Persistent; ballot where photons may bounce more often than the device lets a loop go on, and with strict
-    /// arithmetic, which needs so many registers that few photons would be under way.
-    Auto,
-    /// Flight by flight, an atomic a photon.
-    Atomic,
-    /// Flight by flight, an atomic a subgroup.
-    Ballot,
-    /// Each photon from its light to its end by one invocation, an atomic a subgroup.
-    Persistent,
-}
-
-impl Append {
-    pub fn name(self) -> &'static str {
-        match self {
-            Append::Auto => "auto",
-            Append::Atomic => "atomic",
-            Append::Ballot => "ballot",
-            Append::Persistent => "persistent",
         }
     }
 }
@@ -216,8 +190,9 @@ pub struct TransportSettings {
     pub illumination: Illumination,
     pub part: Part,
     pub filter: Filter,
-    #[serde(rename = "builder")]
-    pub append: Append,
+    /// `None`: persistent; ballot where photons may bounce more often than the device lets a loop go on, and with strict
+    /// arithmetic, which needs so many registers that few photons would be under way.
+    pub builder: Option<Builder>,
     pub math: Math,
     /// Look for values that are infinite or no number.
     pub paranoid: bool,
@@ -254,7 +229,7 @@ impl Default for TransportSettings {
             illumination: Illumination::Split,
             part: Part::All,
             filter: Filter::Box,
-            append: Append::Auto,
+            builder: None,
             math: Math::Fast,
             paranoid: false,
             stop: Stop::default(),
@@ -280,6 +255,14 @@ impl TransportSettings {
         within("--caustic-photons", self.caustic_photons, 1..=MAX_PHOTONS, "photons of the caustic map, each round")?;
         within("--rounds", self.rounds, 1..=MAX_ROUNDS, "rounds")?;
         within("--bounces", self.bounces, 1..=MAX_BOUNCES, "bounces")?;
+        if let Some(builder) = self.builder.filter(|builder| !Builder::IN_SCENES.contains(builder)) {
+            let known = Builder::IN_SCENES.map(Builder::name).join(", ");
+            return Err(Error::setting(
+                "--variant",
+                builder.name(),
+                format!("traces the paper's box only; for a scene choose one of {known}"),
+            ));
+        }
         within("--shadow-rays", self.shadow_rays, 1..=MAX_SHADOW_RAYS, "shadow rays from each visible point, each round")?;
         if !(self.samples.is_power_of_two() && self.samples <= MAX_SAMPLES) {
             return Err(Error::setting("--samples", self.samples, format!("must be a power of two up to {MAX_SAMPLES}")));

@@ -3,8 +3,8 @@
 use serde::{Deserialize, Serialize};
 
 use crate::rng::Rng;
-use crate::settings::transport::{Append, Effect, Illumination, Kernel, TransportSettings};
-use crate::settings::{Gather, Math, Settings, Sums, Variant};
+use crate::settings::transport::{Effect, Illumination, Kernel, TransportSettings};
+use crate::settings::{Builder, Gather, Math, Settings, Sums};
 
 #[derive(Debug, Clone, Copy, PartialEq, Eq, Hash, Serialize, Deserialize)]
 #[serde(rename_all = "snake_case")]
@@ -118,12 +118,12 @@ pub fn of_paper(mesh: u32, photons: u32) -> Vec<Group> {
     let base = Settings { mesh, photons, rng: Rng::Philox, radius: 0.025, bounces: 30, ..Settings::default() };
     let base = Settings { full_light: base.full_light_for(photons), ..base };
     let mut sweep = Sweep::new(base, "atomic, grid, radius 0.025 m, 30 bounces, philox", Line::Paper);
-    sweep.add(Axis::Builder, "naive slots", |s| s.variant = Variant::Naive);
-    sweep.add(Axis::Builder, "subgroup ballot", |s| s.variant = Variant::Ballot);
-    sweep.add(Axis::Builder, "work-group aggregate", |s| s.variant = Variant::Group);
-    sweep.add(Axis::Builder, "prefix sums, order kept", |s| s.variant = Variant::Scan);
-    sweep.add(Axis::Builder, "persistent", |s| s.variant = Variant::Persistent);
-    sweep.add(Axis::Builder, "CPU, one thread", |s| s.variant = Variant::Cpu);
+    sweep.add(Axis::Builder, "naive slots", |s| s.builder = Builder::Naive);
+    sweep.add(Axis::Builder, "subgroup ballot", |s| s.builder = Builder::Ballot);
+    sweep.add(Axis::Builder, "work-group aggregate", |s| s.builder = Builder::Group);
+    sweep.add(Axis::Builder, "prefix sums, order kept", |s| s.builder = Builder::Scan);
+    sweep.add(Axis::Builder, "persistent", |s| s.builder = Builder::Persistent);
+    sweep.add(Axis::Builder, "CPU, one thread", |s| s.builder = Builder::Cpu);
     for (factor, name) in [(16, "1/16 of the photons"), (4, "1/4 of the photons")] {
         sweep.add(Axis::Photons, name, |s| s.photons = (photons / factor).max(2));
     }
@@ -183,8 +183,8 @@ const REMOVABLE: [Effect; 5] =
 pub fn of_scene(photons: u32, kept: &[Effect], radius: Option<f64>, has_few_triangles: bool, is_picture: bool) -> Vec<Group> {
     let base = TransportSettings { photons, caustic_photons: photons, ..TransportSettings::default() };
     let mut sweep = Sweep::new(base, "persistent, shrinking radius, shadow rays", Line::Scene);
-    sweep.add(Axis::Builder, "atomic", |s| s.append = Append::Atomic);
-    sweep.add(Axis::Builder, "subgroup ballot", |s| s.append = Append::Ballot);
+    sweep.add(Axis::Builder, "atomic", |s| s.builder = Some(Builder::Atomic));
+    sweep.add(Axis::Builder, "subgroup ballot", |s| s.builder = Some(Builder::Ballot));
     let of_photons = |s: &mut TransportSettings, photons: u32| (s.photons, s.caustic_photons) = (photons, photons);
     sweep.add(Axis::Photons, "1/16 of the photons", |s| of_photons(s, (photons / 16).max(1)));
     sweep.add(Axis::Photons, "1/4 of the photons", |s| of_photons(s, (photons / 4).max(1)));

@@ -23,9 +23,9 @@ use crate::scene::light::LightKind;
 use crate::scene::open_box::open_box;
 use crate::scene::{Camera, Light, Mesh, Scene};
 use crate::settings::transport::{Effect, TransportSettings};
-use crate::settings::{Preset, Settings, Variant};
+use crate::settings::{Builder, Preset, Settings};
 use crate::timings::Timings;
-use crate::transport::{self, Lit, View};
+use crate::transport::{self, RunResult, View};
 
 pub struct Subject {
     pub quantity: String,
@@ -116,7 +116,7 @@ impl Subject {
         match &configuration.line {
             Line::Paper(settings) => {
                 let job = command::main_job(Preset::Modified, &Settings { rounds, seed, ..settings.clone() });
-                let warm_up = if settings.variant == Variant::Cpu { "" } else { WARM_UP };
+                let warm_up = if settings.builder == Builder::Cpu { "" } else { WARM_UP };
                 format!("{job} --irradiance irradiance{warm_up}")
             }
             Line::Scene(settings) => {
@@ -148,8 +148,8 @@ impl Subject {
             Line::Paper(settings) => {
                 let settings = Settings { rounds, seed, ..settings.clone() };
                 let room = open_box(&settings);
-                let outcome = match settings.variant {
-                    Variant::Cpu => render::on_cpu(&room, &settings, &mut control)?,
+                let outcome = match settings.builder {
+                    Builder::Cpu => render::on_cpu(&room, &settings, &mut control)?,
                     _ => render::on_gpu(gpu, &room, &settings, &mut control)?,
                 };
                 let walls = estimate_walls(&outcome.film, &room, &outcome.plan);
@@ -171,7 +171,7 @@ impl Subject {
         Ok((!cancelled.load(Ordering::Relaxed)).then_some(shot))
     }
 
-    fn light(&self, gpu: &Gpu, settings: TransportSettings, control: &mut Control) -> Result<Lit> {
+    fn light(&self, gpu: &Gpu, settings: TransportSettings, control: &mut Control) -> Result<RunResult> {
         let geometry = match settings.without.as_slice() {
             [] => self.geometry.clone(),
             without => Rc::new(Geometry::new(&self.scene.without(without))?),

@@ -18,12 +18,12 @@ pub fn one_bounce<'a>(
     push: &TracePush,
     extent: impl Fn() -> Extent<'a>,
 ) -> Result<()> {
-    let Resources { rooms, walls, photons, origins, counters, tallies, oddities, order, .. } = resources;
+    let Resources { rooms, walls, photons, origins, counters, tallies, nonfinite_values, order, .. } = resources;
     let Some(OrderBuffers { survivors, block_sums, weights }) = order else { panic!("the plan has no order to keep") };
     let group_count = group_count(plan);
     // Groups that no path is left for count none, and so does the place behind the last, which becomes the sum of all.
     commands.fill(survivors, 0, u64::from(group_count) + 1, 0);
-    commands.dispatch(TraceInPlace { rooms, walls, paths, weights, counters, tallies, survivors, oddities }, push, extent())?;
+    commands.dispatch(TraceInPlace { rooms, walls, paths, weights, counters, tallies, survivors, nonfinite_values }, push, extent())?;
     scan(commands, survivors, block_sums, group_count + 1, plan.settings.group_size)?;
     commands.dispatch(KeepOrder { paths, next_paths, photons, origins, counters, tallies, survivors, weights }, push, extent())
 }

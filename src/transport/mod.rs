@@ -36,7 +36,7 @@ use crate::gpu::check::strict_math;
 use crate::gpu::kernels::*;
 use crate::gpu::{Commands, Constants, DeviceFacts, Gpu, Interrupt, Kernel, Module};
 use crate::ledger::{Fates, Ledger};
-use crate::oddities::Oddities;
+use crate::nonfinite_values::NonfiniteValues;
 use crate::plan::transport::{MapPlan, Sensor, TransportPlan};
 use crate::records::{Receiver, Tally};
 use crate::render::Control;
@@ -44,8 +44,8 @@ pub use crate::render::stop::End;
 use crate::render::stop::Watch;
 use crate::scene::Camera;
 use crate::scene::geometry::Geometry;
-use crate::settings::Math;
-use crate::settings::transport::Append;
+use crate::settings::{Builder, Math};
+
 use crate::timings::{Clock, Span, Timings};
 use crate::{tallies, totals};
 
@@ -69,7 +69,7 @@ pub struct Round<'a> {
 
 /// What a run leaves behind.
 #[derive(Debug, Clone)]
-pub struct Lit {
+pub struct RunResult {
     pub plan: TransportPlan,
     pub film: RoundFilm,
     /// Light of each part (direct, specular, caustic, indirect) over all pixels and channels, film units.
@@ -90,7 +90,7 @@ pub struct Lit {
     /// Light that limits kept from the result.
     pub losses: Losses,
     /// Nonfinite values that `--paranoid` found; `None` without it.
-    pub oddities: Option<Oddities>,
+    pub nonfinite_values: Option<NonfiniteValues>,
 }
 
 /// Kernels that the plan needs, and no others.
@@ -105,13 +105,13 @@ pub fn modules(plan: &TransportPlan, facts: &DeviceFacts) -> Vec<Module> {
     }
     if plan.maps().next().is_some() {
         modules.extend([MapCount::MODULE, MapScatter::MODULE, ScanBlocks::MODULE, ScanAdd::MODULE]);
-        modules.extend([DispatchSize::MODULE, MapSize::MODULE, CrowdSize::MODULE, Weigh::MODULE]);
-        modules.extend(match plan.settings.append {
-            Append::Atomic => vec![Shine::MODULE, FlyAtomic::MODULE],
-            Append::Ballot => vec![Shine::MODULE, FlyBallot::MODULE],
-            Append::Persistent | Append::Auto => vec![FlyWhole::MODULE],
+        modules.extend([DispatchSize::MODULE, MapSize::MODULE, CrowdSize::MODULE, FluxToRadiance::MODULE]);
+        modules.extend(match plan.builder() {
+            Builder::Atomic => vec![SceneEmit::MODULE, SceneTraceAtomic::MODULE],
+            Builder::Ballot => vec![SceneEmit::MODULE, SceneTraceBallot::MODULE],
+            _ => vec![SceneTracePersistent::MODULE],
         });
-        modules.push(if facts.int64_atomics { LookupU64::MODULE } else { LookupTwoWords::MODULE });
+        modules.push(if facts.int64_atomics { SceneGatherU64::MODULE } else { SceneGatherTwoWords::MODULE });
     }
     modules
 }
@@ -125,7 +125,7 @@ pub fn constants(plan: &TransportPlan) -> Constants {
 const TIMESTAMPS_PER_ROUND: u32 = 64;
 
 /// Runs all rounds of a plan; progress is reported in rounds.
-pub fn light(gpu: &Gpu, view: &View, plan: TransportPlan, control: &mut Control) -> Result<Lit> {
+pub fn light(gpu: &Gpu, view: &View, plan: TransportPlan, control: &mut Control) -> Result<RunResult> {
     let started = Instant::now();
     if plan.settings.math == Math::Strict {
         strict_math(gpu)?;
@@ -145,7 +145,7 @@ pub fn light(gpu: &Gpu, view: &View, plan: TransportPlan, control: &mut Control)
     commands.warm_up()?;
     commands.submit()?;
 
-    let mut book = Book::new(&plan);
+    let mut state = RunState::new(&plan);
     let mut watch = Watch::new(plan.settings.stop, plan.settings.alpha, commands.started());
     let (mut done, mut end) = (0, None);
     let photons_per_round = plan.maps().map(|map| u64::from(map.photons)).sum::<u64>();
@@ -155,40 +155,40 @@ pub fn light(gpu: &Gpu, view: &View, plan: TransportPlan, control: &mut Control)
         let deadline = watch.deadline();
         commands.set_interrupt(Some(Interrupt { cancelled: control.cancelled, deadline: deadline.filter(|_| number > 0) }));
         let round = Round { resources: &resources, geometry: view.geometry, plan: &plan, number };
-        let traced = match commands.scope("round", |commands| one_round(commands, view, round, deadline.filter(|_| number == 0), &mut book))
-        {
-            Ok(traced) => traced,
-            Err(Error::Interrupted) => {
-                commands.set_interrupt(None);
-                if number == 0 {
-                    return Err(Error::Interrupted);
+        let traced =
+            match commands.scope("round", |commands| one_round(commands, view, round, deadline.filter(|_| number == 0), &mut state)) {
+                Ok(traced) => traced,
+                Err(Error::Interrupted) => {
+                    commands.set_interrupt(None);
+                    if number == 0 {
+                        return Err(Error::Interrupted);
+                    }
+                    // A round cut short is no part of the film.
+                    state.collect(&mut commands, &resources, &plan, true)?;
+                    end = Some(if control.cancelled.load(Ordering::Relaxed) { End::Cancelled } else { End::Time });
+                    break;
                 }
-                // A round cut short is no part of the film.
-                book.settle(&mut commands, &resources, &plan, true)?;
-                end = Some(if control.cancelled.load(Ordering::Relaxed) { End::Cancelled } else { End::Time });
-                break;
-            }
-            Err(error) => return Err(error),
-        };
+                Err(error) => return Err(error),
+            };
         commands.set_interrupt(None);
         done = number + 1;
         let last = done == plan.settings.rounds || traced < photons_per_round;
-        let short = commands.timestamps_left() < TIMESTAMPS_PER_ROUND || book.open() + photons_per_round > u64::from(u32::MAX);
+        let short = commands.timestamps_left() < TIMESTAMPS_PER_ROUND || state.open() + photons_per_round > u64::from(u32::MAX);
         let photons = u64::from(done) * photons_per_round;
         // A long round hands commands over by itself, and nobody has looked at the clock since.
-        let submitted = commands.submission_count() > book.submissions;
+        let submitted = commands.submission_count() > state.submissions;
         let busy = submitted || commands.work() * 2 >= commands.paced(plan.work_per_submission);
         if last || short || busy || watch.is_due(done) || watch.may_end(done, photons) {
-            book.settle(&mut commands, &resources, &plan, false)?;
+            state.collect(&mut commands, &resources, &plan, false)?;
             if watch.is_due(done) {
                 let film = film(&mut commands, &resources, &plan, done)?;
-                let losses = losses(&mut commands, &resources, view, &plan, &book, &film)?;
+                let losses = losses(&mut commands, &resources, view, &plan, &state, &film)?;
                 let unknown = film.unknown(&plan, plan.settings.stop.confidence).relative;
                 watch.look(done, film.relative_error(&plan), unknown, losses.relative);
                 watch.check_losses(plan.settings.bounces)?;
             }
-            book.submissions = commands.submission_count();
-            (control.progress)(&watch.progress(f64::from(done), plan.settings.rounds, photons_per_round, book.ledger()));
+            state.submissions = commands.submission_count();
+            (control.progress)(&watch.progress(f64::from(done), plan.settings.rounds, photons_per_round, state.ledger()));
             let cancelled = control.cancelled.load(Ordering::Relaxed).then_some(End::Cancelled);
             end = match (traced < photons_per_round, done == plan.settings.rounds) {
                 (true, _) => Some(End::Time),
@@ -198,15 +198,16 @@ pub fn light(gpu: &Gpu, view: &View, plan: TransportPlan, control: &mut Control)
         }
     }
     let film = film(&mut commands, &resources, &plan, done)?;
-    let losses = losses(&mut commands, &resources, view, &plan, &book, &film)?;
+    let losses = losses(&mut commands, &resources, view, &plan, &state, &film)?;
     let part_totals = commands.read::<u64>(&resources.part_totals, PART_COUNT as usize)?;
     let anomalies = commands.read::<u32>(&resources.anomalies, 3)?;
-    let oddities = if plan.settings.paranoid { Some(Oddities::read(&mut commands, &resources.oddities)?) } else { None };
+    let nonfinite_values =
+        if plan.settings.paranoid { Some(NonfiniteValues::read(&mut commands, &resources.nonfinite_values)?) } else { None };
     gpu.check_validation()?;
-    Ok(Lit {
+    Ok(RunResult {
         film,
         part_totals,
-        fates: book.fates,
+        fates: state.fates,
         end: end.unwrap_or(End::Rounds),
         bias: None,
         dispatches: commands.dispatch_count(),
@@ -216,7 +217,7 @@ pub fn light(gpu: &Gpu, view: &View, plan: TransportPlan, control: &mut Control)
         device: gpu.facts().clone(),
         anomalies: [anomalies[0], anomalies[1], anomalies[2]],
         losses,
-        oddities,
+        nonfinite_values,
         plan,
     })
 }
@@ -230,7 +231,7 @@ fn film(commands: &mut Commands, resources: &TransportResources, plan: &Transpor
 }
 
 /// Photons and their fates, as far as the host has looked.
-struct Book {
+struct RunState {
     /// Of the global map's photons and of the caustic map's.
     fates: [Fates; 2],
     /// Photons traced since the last look, of each.
@@ -239,9 +240,9 @@ struct Book {
     submissions: u64,
 }
 
-impl Book {
-    fn new(plan: &TransportPlan) -> Book {
-        Book { fates: [0, 1].map(|_| Fates::of_scene(plan.settings.bounces)), open: [0; 2], submissions: 0 }
+impl RunState {
+    fn new(plan: &TransportPlan) -> RunState {
+        RunState { fates: [0, 1].map(|_| Fates::of_scene(plan.settings.bounces)), open: [0; 2], submissions: 0 }
     }
 
     /// Most photons of a map of which the host does not know the fates; the device counts them in 32 bits.
@@ -254,7 +255,7 @@ impl Book {
     }
 
     /// Runs what is recorded and adds up the fates of its photons. Those of a run that was interrupted may still be under way.
-    fn settle(&mut self, commands: &mut Commands, resources: &TransportResources, plan: &TransportPlan, interrupted: bool) -> Result<()> {
+    fn collect(&mut self, commands: &mut Commands, resources: &TransportResources, plan: &TransportPlan, interrupted: bool) -> Result<()> {
         let Some(photons) = &resources.photons else { return commands.submit() };
         let copies = (plan.tally_rows() * TALLY_COPIES) as usize;
         let mut read_backs = Vec::new();
@@ -292,12 +293,12 @@ fn losses(
     resources: &TransportResources,
     view: &View,
     plan: &TransportPlan,
-    book: &Book,
+    state: &RunState,
     film: &RoundFilm,
 ) -> Result<Losses> {
     let anomalies = commands.read::<u32>(&resources.anomalies, losses::ANOMALY_WORDS)?;
     let part_totals = commands.read::<u64>(&resources.part_totals, PART_COUNT as usize)?;
-    Ok(losses::losses(view.geometry, plan, &book.fates, &anomalies, &part_totals, film))
+    Ok(losses::losses(view.geometry, plan, &state.fates, &anomalies, &part_totals, film))
 }
 
 /// Photons of the first chunk of a round in which the time may be up, and how long a chunk may take that the next one doubles.
@@ -305,7 +306,7 @@ const FIRST_TIMED_CHUNK: u32 = 1 << 12;
 const TIMED_CHUNK: Duration = Duration::from_millis(40);
 
 /// One round; says how many photons it traced. When its time is up, it takes no further chunk of photons.
-fn one_round(commands: &mut Commands, view: &View, round: Round, deadline: Option<Instant>, book: &mut Book) -> Result<u64> {
+fn one_round(commands: &mut Commands, view: &View, round: Round, deadline: Option<Instant>, state: &mut RunState) -> Result<u64> {
     let Round { resources, plan, .. } = round;
     commands.scope("visible points", |commands| points::see(commands, round, view.camera))?;
     let sums = 3 * u64::from(plan.visible_points()) * u64::from(plan.arrival_sets);
@@ -323,7 +324,7 @@ fn one_round(commands: &mut Commands, view: &View, round: Round, deadline: Optio
                         break;
                     }
                     let count = most.min(map.chunk_photons).min(map.photons - traced[which]);
-                    book.open[which] += u64::from(count);
+                    state.open[which] += u64::from(count);
                     one_chunk(commands, round, photons, map, (traced[which], count))?;
                     traced[which] += count;
                     if deadline.is_some() {

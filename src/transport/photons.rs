@@ -1,17 +1,19 @@
 //! Photons of a chunk through a scene of triangles, and the index of their map.
+use crate::settings::Builder;
 
 use super::Round;
 use super::resources::{PhotonBuffers, TransportResources};
 use crate::constants::MAX_GROUPS;
 use crate::error::Result;
-use crate::gpu::kernels::{DispatchSize, FlyAtomic, FlyBallot, FlyWhole, MapCount, MapScatter, MapSize, Shine};
+use crate::gpu::kernels::{
+    DispatchSize, MapCount, MapScatter, MapSize, SceneEmit, SceneTraceAtomic, SceneTraceBallot, SceneTracePersistent,
+};
 use crate::gpu::{Commands, Extent};
 use crate::plan::transport::{MapPlan, SEGMENT_BOUNCES, TransportPlan};
 use crate::prefix_sum::scan;
-use crate::records::{CellPush, DispatchSizePush, Draws, EmissionPush, FlightPush, FlyWholePush, PhotonEmission, PhotonStore};
+use crate::records::{CellPush, DispatchSizePush, Draws, EmissionPush, FlightPush, PhotonEmission, PhotonStore, SceneTracePersistentPush};
 use crate::rng::words;
 use crate::scene::geometry::Geometry;
-use crate::settings::transport::Append;
 
 /// The grid of a map in a round: cells as wide as the radius, its corner a little outside of the scene.
 pub fn cells(round: Round, map: &MapPlan) -> CellPush {
@@ -79,7 +81,7 @@ pub fn trace(
 }
 
 fn is_persistent(plan: &TransportPlan) -> bool {
-    plan.settings.append == Append::Persistent
+    plan.builder() == Builder::Persistent
 }
 
 /// Words of the counters: length of the map, then of the lists of a segment.
@@ -145,8 +147,9 @@ fn store(plan: &TransportPlan, map: &MapPlan) -> PhotonStore {
 /// So many flights of each photon, which keeps its invocation; says where those are that are left.
 fn whole(commands: &mut Commands, round: Round, photons: &PhotonBuffers, map: &MapPlan, start: Start, flights: u32) -> Result<usize> {
     let Round { resources, geometry, plan, .. } = round;
-    let TransportResources { nodes, triangles, normals, uvs, materials, textures, texels, emitters, caustic_targets, oddities, .. } =
-        resources;
+    let TransportResources {
+        nodes, triangles, normals, uvs, materials, textures, texels, emitters, caustic_targets, nonfinite_values, ..
+    } = resources;
     let PhotonBuffers { paths, counters, map: map_buffer, .. } = photons;
     let which = usize::from(map.caustic_only);
     let (tallies, totals) = (&photons.tallies[which], &photons.totals[which]);
@@ -156,7 +159,7 @@ fn whole(commands: &mut Commands, round: Round, photons: &PhotonBuffers, map: &M
     };
     while first < end {
         let count = photons_at_once(commands, plan).min(end - first);
-        let push = FlyWholePush {
+        let push = SceneTracePersistentPush {
             draws: draws(round, map),
             emission: emission(geometry, map, (first, count)),
             map: store(plan, map),
@@ -165,7 +168,7 @@ fn whole(commands: &mut Commands, round: Round, photons: &PhotonBuffers, map: &M
             flights,
             stride: map.persistence.invocations(count),
         };
-        let kernel = FlyWhole {
+        let kernel = SceneTracePersistent {
             nodes,
             triangles,
             normals,
@@ -181,7 +184,7 @@ fn whole(commands: &mut Commands, round: Round, photons: &PhotonBuffers, map: &M
             counters,
             tallies,
             totals,
-            oddities,
+            nonfinite_values,
         };
         commands.dispatch(kernel, &push, Extent::Items(u64::from(push.stride)))?;
         commands.add_work(WORK_PER_PHOTON * u64::from(count));
@@ -205,11 +208,13 @@ const LEAST_PHOTONS: u32 = 1 << 12;
 /// Writes the paths of a chunk as they leave the lights.
 pub fn emit(commands: &mut Commands, round: Round, photons: &PhotonBuffers, map: &MapPlan, chunk: (u32, u32)) -> Result<()> {
     let Round { resources, geometry, .. } = round;
-    let TransportResources { nodes, triangles, normals, uvs, materials, textures, texels, emitters, caustic_targets, oddities, .. } =
-        resources;
+    let TransportResources {
+        nodes, triangles, normals, uvs, materials, textures, texels, emitters, caustic_targets, nonfinite_values, ..
+    } = resources;
     let light_paths = &photons.paths[0];
     let push = EmissionPush { draws: draws(round, map), emission: emission(geometry, map, chunk) };
-    let kernel = Shine { nodes, triangles, normals, uvs, materials, textures, texels, emitters, caustic_targets, light_paths, oddities };
+    let kernel =
+        SceneEmit { nodes, triangles, normals, uvs, materials, textures, texels, emitters, caustic_targets, light_paths, nonfinite_values };
     commands.dispatch(kernel, &push, Extent::Items(u64::from(chunk.1)))
 }
 
@@ -223,7 +228,7 @@ pub struct Flight {
 
 pub fn fly(commands: &mut Commands, round: Round, photons: &PhotonBuffers, map: &MapPlan, flight: Flight, extent: Extent) -> Result<()> {
     let Round { resources, plan, .. } = round;
-    let TransportResources { nodes, triangles, normals, uvs, materials, textures, texels, oddities, .. } = resources;
+    let TransportResources { nodes, triangles, normals, uvs, materials, textures, texels, nonfinite_values, .. } = resources;
     let Flight { bounce, list, parity } = flight;
     let is_last = u32::from(bounce + 1 == map.bounces);
     let push = FlightPush { draws: draws(round, map), map: store(plan, map), bounce, list, is_last, path_capacity: map.chunk_photons };
@@ -231,9 +236,9 @@ pub fn fly(commands: &mut Commands, round: Round, photons: &PhotonBuffers, map: 
     let (tallies, totals) = (&photons.tallies[which], &photons.totals[which]);
     let PhotonBuffers { paths, counters, map, .. } = photons;
     let (light_paths, next_light_paths) = (&paths[parity], &paths[1 - parity]);
-    match plan.settings.append {
-        Append::Atomic => commands.dispatch(
-            FlyAtomic {
+    match plan.builder() {
+        Builder::Atomic => commands.dispatch(
+            SceneTraceAtomic {
                 nodes,
                 triangles,
                 normals,
@@ -247,14 +252,13 @@ pub fn fly(commands: &mut Commands, round: Round, photons: &PhotonBuffers, map: 
                 counters,
                 tallies,
                 totals,
-                oddities,
+                nonfinite_values,
             },
             &push,
             extent,
         ),
-        Append::Persistent | Append::Auto => panic!("{} has no flights of all photons", plan.settings.append.name()),
-        Append::Ballot => commands.dispatch(
-            FlyBallot {
+        Builder::Ballot => commands.dispatch(
+            SceneTraceBallot {
                 nodes,
                 triangles,
                 normals,
@@ -268,11 +272,12 @@ pub fn fly(commands: &mut Commands, round: Round, photons: &PhotonBuffers, map: 
                 counters,
                 tallies,
                 totals,
-                oddities,
+                nonfinite_values,
             },
             &push,
             extent,
         ),
+        builder => panic!("{} has no flights of all photons", builder.name()),
     }
 }
 

@@ -4,10 +4,10 @@ use super::Round;
 use super::resources::{PhotonBuffers, TransportResources};
 use crate::constants::{DOMAIN_CAMERA, DOMAIN_RECEIVERS, MAX_GROUPS};
 use crate::error::Result;
-use crate::gpu::kernels::{CrowdSize, GoOn, LookupTwoWords, LookupU64, Receive, Resolve, View, Weigh};
+use crate::gpu::kernels::{CrowdSize, FluxToRadiance, GoOn, Receive, Resolve, SceneGatherTwoWords, SceneGatherU64, View};
 use crate::gpu::{Commands, Extent};
 use crate::plan::transport::{MapPlan, Sensor, TESTS_PER_POINT, TransportPlan};
-use crate::records::{CellPush, CrowdSizePush, Draws, GoOnPush, LookupPush, ReceivePush, ResolvePush, ViewPush, WeighPush};
+use crate::records::{CellPush, CrowdSizePush, Draws, FluxToRadiancePush, GoOnPush, ReceivePush, ResolvePush, SceneGatherPush, ViewPush};
 use crate::rng::{mix32, words};
 use crate::scene::Camera;
 use crate::scene::geometry::Geometry;
@@ -33,7 +33,7 @@ fn rounding(plan: &TransportPlan, round: u32) -> u32 {
 pub fn see(commands: &mut Commands, round: Round, camera: Option<&Camera>) -> Result<()> {
     let Round { resources, geometry, plan, number: round } = round;
     let TransportResources { nodes, triangles, planes, normals, uvs, materials, textures, texels, emitters, .. } = resources;
-    let TransportResources { visible_points, pass_sums, one_hits, part_totals, anomalies, oddities, .. } = resources;
+    let TransportResources { visible_points, pass_sums, one_hits, part_totals, anomalies, nonfinite_values, .. } = resources;
     let TransportResources { camera_paths: [camera_paths, _], camera_path_counts, .. } = resources;
     let step = plan.pixels_at_once(plan.rays_per_pixel());
     let goes_on = plan.chains_go_on();
@@ -80,7 +80,7 @@ pub fn see(commands: &mut Commands, round: Round, camera: Option<&Camera>) -> Re
                     part_totals,
                     next_camera_paths: camera_paths,
                     camera_path_counts,
-                    oddities,
+                    nonfinite_values,
                 };
                 commands.dispatch(kernel, &push, Extent::Items(u64::from(end - first) * u64::from(plan.samples())))?;
             }
@@ -116,7 +116,7 @@ pub fn see(commands: &mut Commands, round: Round, camera: Option<&Camera>) -> Re
                     part_totals,
                     next_camera_paths: camera_paths,
                     camera_path_counts,
-                    oddities,
+                    nonfinite_values,
                 };
                 commands.dispatch(kernel, &push, Extent::Items(u64::from(end - first)))?;
             }
@@ -132,7 +132,8 @@ pub fn see(commands: &mut Commands, round: Round, camera: Option<&Camera>) -> Re
 /// Follows camera paths that are still under way over mirrors and glass, until none is left.
 fn go_on(commands: &mut Commands, resources: &TransportResources, geometry: &Geometry, plan: &TransportPlan, round: u32) -> Result<()> {
     let TransportResources { nodes, triangles, normals, uvs, materials, textures, texels, emitters, .. } = resources;
-    let TransportResources { visible_points, pass_sums, one_hits, part_totals, anomalies, oddities, camera_path_counts, .. } = resources;
+    let TransportResources { visible_points, pass_sums, one_hits, part_totals, anomalies, nonfinite_values, camera_path_counts, .. } =
+        resources;
     let domain = if matches!(plan.sensor, Sensor::Picture { .. }) { DOMAIN_CAMERA } else { DOMAIN_RECEIVERS };
     for parity in [0, 1].into_iter().cycle() {
         let path_count = commands.read::<u32>(camera_path_counts, 1)?[0];
@@ -166,7 +167,7 @@ fn go_on(commands: &mut Commands, resources: &TransportResources, geometry: &Geo
             camera_paths: &resources.camera_paths[parity],
             next_camera_paths: &resources.camera_paths[1 - parity],
             camera_path_counts,
-            oddities,
+            nonfinite_values,
         };
         commands.dispatch(kernel, &push, Extent::Items(u64::from(path_count)))?;
     }
@@ -177,23 +178,27 @@ fn go_on(commands: &mut Commands, resources: &TransportResources, geometry: &Geo
 pub fn look_up(commands: &mut Commands, round: Round, photons: &PhotonBuffers, map: &MapPlan, cells_push: CellPush) -> Result<()> {
     let Round { resources, plan, number: round, .. } = round;
     let PhotonBuffers { cells, sorted_map, crowded, dispatch_args, .. } = photons;
-    let TransportResources { planes, visible_points, estimates, oddities, .. } = resources;
+    let TransportResources { planes, visible_points, estimates, nonfinite_values, .. } = resources;
     let point_count = plan.visible_points();
     let (lanes, step) = (map.lanes, plan.points_at_once());
     let (width, height) = plan.sensor.size();
-    let dispatch = |commands: &mut Commands, push: &LookupPush, extent: Extent| {
+    let dispatch = |commands: &mut Commands, push: &SceneGatherPush, extent: Extent| {
         if commands.facts().int64_atomics {
-            commands.dispatch(LookupU64 { visible_points, planes, film: estimates, cells, sorted_map, crowded, oddities }, push, extent)
+            commands.dispatch(
+                SceneGatherU64 { visible_points, planes, film: estimates, cells, sorted_map, crowded, nonfinite_values },
+                push,
+                extent,
+            )
         } else {
             commands.dispatch(
-                LookupTwoWords { visible_points, planes, film: estimates, cells, sorted_map, crowded, oddities },
+                SceneGatherTwoWords { visible_points, planes, film: estimates, cells, sorted_map, crowded, nonfinite_values },
                 push,
                 extent,
             )
         }
     };
     for (first_point, end_point) in runs(point_count, step) {
-        let push = LookupPush {
+        let push = SceneGatherPush {
             first_point,
             end_point,
             point_count,
@@ -213,7 +218,7 @@ pub fn look_up(commands: &mut Commands, round: Round, photons: &PhotonBuffers, m
         dispatch(commands, &push, Extent::Groups(groups, 1))?;
         let size = CrowdSizePush { items_per_group: plan.settings.group_size / lanes, max_groups: MAX_GROUPS };
         commands.dispatch(CrowdSize { crowded, dispatch_args }, &size, Extent::Groups(1, 1))?;
-        dispatch(commands, &LookupPush { first_slice: 1, ..push }, Extent::Indirect(dispatch_args))?;
+        dispatch(commands, &SceneGatherPush { first_slice: 1, ..push }, Extent::Indirect(dispatch_args))?;
         add_work(commands, plan, TESTS_PER_POINT * u64::from(end_point - first_point))?;
     }
     Ok(())
@@ -223,13 +228,13 @@ pub fn look_up(commands: &mut Commands, round: Round, photons: &PhotonBuffers, m
 pub fn weigh(commands: &mut Commands, round: Round, traced: [u32; 2]) -> Result<()> {
     let Round { resources, geometry, plan, number: round } = round;
     let TransportResources { nodes, triangles, normals, uvs, materials, textures, texels, planes, visible_points, .. } = resources;
-    let TransportResources { estimates, one_hits, part_totals, anomalies, oddities, .. } = resources;
+    let TransportResources { estimates, one_hits, part_totals, anomalies, nonfinite_values, .. } = resources;
     let radius = |map: &Option<MapPlan>| map.as_ref().map_or(1.0, |map| plan.radius(map, round)) as f32;
     let flux =
         |map: &Option<MapPlan>| map.as_ref().map_or(0.0, |map| map.photon_flux_of(geometry, traced[usize::from(map.caustic_only)])) as f32;
     let (width, height) = plan.sensor.size();
     for (first_point, end_point) in runs(plan.visible_points(), plan.pixels_at_once(4)) {
-        let push = WeighPush {
+        let push = FluxToRadiancePush {
             first_point,
             end_point,
             point_count: plan.visible_points(),
@@ -246,7 +251,7 @@ pub fn weigh(commands: &mut Commands, round: Round, traced: [u32; 2]) -> Result<
             global_flux: flux(&plan.global),
             caustic_flux: flux(&plan.caustic),
         };
-        let kernel = Weigh {
+        let kernel = FluxToRadiance {
             nodes,
             triangles,
             normals,
@@ -260,7 +265,7 @@ pub fn weigh(commands: &mut Commands, round: Round, traced: [u32; 2]) -> Result<
             estimates,
             one_hits,
             part_totals,
-            oddities,
+            nonfinite_values,
         };
         commands.dispatch(kernel, &push, Extent::Items(u64::from(end_point - first_point)))?;
         add_work(commands, plan, 256 * u64::from(end_point - first_point))?;

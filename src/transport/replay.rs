@@ -10,7 +10,7 @@ use crate::error::{Error, Result};
 use crate::gpu::check::strict_math;
 use crate::gpu::{Commands, Extent, Gpu};
 use crate::ledger::fate;
-use crate::oddities::Oddities;
+use crate::nonfinite_values::NonfiniteValues;
 use crate::plan::transport::{MapPlan, TransportPlan};
 use crate::records::{LightPath, Tally};
 use crate::scene::geometry::Geometry;
@@ -39,7 +39,7 @@ pub struct Path {
     pub vertices: Vec<LightPath>,
     pub fate: &'static str,
     /// Nonfinite values that `--paranoid` found on this path; `None` without it.
-    pub oddities: Option<Oddities>,
+    pub nonfinite_values: Option<NonfiniteValues>,
 }
 
 pub fn replay(gpu: &Gpu, geometry: &Geometry, plan: &TransportPlan, name: PhotonName) -> Result<Path> {
@@ -60,8 +60,8 @@ pub fn replay(gpu: &Gpu, geometry: &Geometry, plan: &TransportPlan, name: Photon
     if plan.settings.math == Math::Strict {
         strict_math(gpu)?;
     }
-    let Flights { paths, tallies, oddities } = light_paths(gpu, geometry, plan, map, number, (photon, 1), map.bounces)?;
-    Ok(Path { name, vertices: paths.concat(), fate: fate(&tallies), oddities })
+    let Flights { paths, tallies, nonfinite_values } = light_paths(gpu, geometry, plan, map, number, (photon, 1), map.bounces)?;
+    Ok(Path { name, vertices: paths.concat(), fate: fate(&tallies), nonfinite_values })
 }
 
 /// Some photons in flight.
@@ -72,7 +72,7 @@ pub struct Flights {
     /// Their fates in each flight.
     pub tallies: Vec<Tally>,
     /// Nonfinite values that `--paranoid` found; `None` without it.
-    pub oddities: Option<Oddities>,
+    pub nonfinite_values: Option<NonfiniteValues>,
 }
 
 /// The photons (first, count) of a round of `map`, no more than it traces at once, through `flights` flights or until
@@ -94,7 +94,7 @@ pub fn light_paths(
     let round = Round { resources: &resources, geometry, plan, number };
     photons::emit(&mut commands, round, buffers, map, chunk)?;
     let mut paths = vec![commands.read::<LightPath>(&buffers.paths[0], chunk.1 as usize)?];
-    let mut flown = 0;
+    let mut traced = 0;
     let mut left = chunk.1;
     for bounce in 0..flights {
         let parity = bounce as usize % 2;
@@ -102,16 +102,17 @@ pub fn light_paths(
         commands.fill(&buffers.counters, 0, 3, 0);
         commands.fill(&buffers.counters, 1, 1, left);
         photons::fly(&mut commands, round, buffers, map, Flight { bounce, list: 0, parity }, Extent::Items(u64::from(left)))?;
-        flown += 1;
+        traced += 1;
         left = commands.read::<u32>(&buffers.counters, 3)?[2];
         if left == 0 {
             break;
         }
         paths.push(commands.read(&buffers.paths[1 - parity], left as usize)?);
     }
-    let tallies = tallies::read(&mut commands, &buffers.tallies[usize::from(map.caustic_only)], flown.min(TALLY_ROWS))?;
-    let oddities = if plan.settings.paranoid { Some(Oddities::read(&mut commands, &resources.oddities)?) } else { None };
-    Ok(Flights { paths, tallies, oddities })
+    let tallies = tallies::read(&mut commands, &buffers.tallies[usize::from(map.caustic_only)], traced.min(TALLY_ROWS))?;
+    let nonfinite_values =
+        if plan.settings.paranoid { Some(NonfiniteValues::read(&mut commands, &resources.nonfinite_values)?) } else { None };
+    Ok(Flights { paths, tallies, nonfinite_values })
 }
 
 impl Path {
@@ -134,7 +135,8 @@ impl Path {
             "bounce", "x, m", "y", "z", "dir x", "y", "z", "red, W", "green", "blue"
         );
         let rows: Vec<String> = self.vertices.iter().enumerate().map(row).collect();
-        let oddities = self.oddities.as_ref().map_or_else(String::new, |oddities| format!("\n{}", oddities.text()));
-        format!("{head}\n{columns}\n{}\nthen it {}{oddities}", rows.join("\n"), self.fate)
+        let nonfinite_values =
+            self.nonfinite_values.as_ref().map_or_else(String::new, |nonfinite_values| format!("\n{}", nonfinite_values.text()));
+        format!("{head}\n{columns}\n{}\nthen it {}{nonfinite_values}", rows.join("\n"), self.fate)
     }
 }

@@ -8,7 +8,7 @@ use super::photons::counter_count;
 use crate::constants::{HIT_KINDS, PART_COUNT};
 use crate::error::Result;
 use crate::gpu::{Buffer, Commands, Gpu, Memory};
-use crate::oddities;
+use crate::nonfinite_values;
 use crate::photon::MapPhoton;
 use crate::plan::transport::{MapPlan, TransportPlan};
 use crate::prefix_sum::block_sums;
@@ -47,7 +47,7 @@ pub struct TransportResources {
     pub one_hits: Buffer,
     pub part_totals: Buffer,
     pub anomalies: Buffer,
-    pub oddities: Buffer,
+    pub nonfinite_values: Buffer,
 }
 
 /// Photons in flight and their map; both maps of a round use the same ones in turn.
@@ -120,7 +120,7 @@ impl TransportResources {
             one_hits: gpu.buffer::<u32>("one hits", u64::from(HIT_KINDS) * pixels, device)?,
             part_totals: gpu.buffer::<u64>("part totals", u64::from(PART_COUNT), device)?,
             anomalies: gpu.buffer::<u32>("anomalies", ANOMALY_WORDS as u64, device)?,
-            oddities: oddities::buffer(gpu, commands)?,
+            nonfinite_values: nonfinite_values::buffer(gpu, commands)?,
         };
         commands.fill(&resources.film_sums, 0, 6 * pixels, 0);
         commands.fill(&resources.film_squares, 0, 12 * pixels, 0);

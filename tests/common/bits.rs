@@ -2,9 +2,9 @@
 
 use photonmill::gpu::Gpu;
 use photonmill::scene::{Camera, Scene, built_in};
-use photonmill::settings::transport::{Append, Illumination, Kernel, TransportSettings};
-use photonmill::settings::{Math, Settings};
-use photonmill::transport::Lit;
+use photonmill::settings::transport::{Illumination, Kernel, TransportSettings};
+use photonmill::settings::{Builder, Math, Settings};
+use photonmill::transport::RunResult;
 
 use super::lit::seen;
 use super::{Check, Complaint, Kind, run};
@@ -20,7 +20,7 @@ pub fn small() -> TransportSettings {
     }
 }
 
-pub fn picture(gpu: &Gpu, scene: &Scene, settings: &TransportSettings) -> Lit {
+pub fn picture(gpu: &Gpu, scene: &Scene, settings: &TransportSettings) -> RunResult {
     let camera = scene.cameras.first().cloned().unwrap_or_else(|| Camera::around(scene.bounds().0, scene.bounds().1));
     seen(gpu, scene, settings, &camera, [24, 24])
 }
@@ -62,7 +62,9 @@ fn bits_of(gpu: &Gpu, name: &str) -> u64 {
         "cornell-spheres from photons" => {
             TransportSettings { illumination: Illumination::Photons, kernel: Kernel::Epanechnikov, ..small() }
         }
-        "cornell-spheres gathered" => TransportSettings { final_gather: true, kernel: Kernel::Cone, append: Append::Atomic, ..small() },
+        "cornell-spheres gathered" => {
+            TransportSettings { final_gather: true, kernel: Kernel::Cone, builder: Some(Builder::Atomic), ..small() }
+        }
         _ => small(),
     };
     let scene = match name {

@@ -11,13 +11,13 @@ use photonmill::scene::material::TextureUse;
 use photonmill::scene::texture::{Texture, Wrap};
 use photonmill::scene::{Camera, Material, Mesh};
 use photonmill::settings::transport::{Effect, Illumination, Part, TransportSettings};
-use photonmill::transport::Lit;
+use photonmill::transport::RunResult;
 
 use super::lit::{flights, glass, level, matt, mean_red, means, mirror, received, scene, scene_of, seen};
 use super::{Check, Complaint, Kind, estimate_check, pairs, same_sums};
 
 /// The red channel of a point or pixel, sure to three parts in a hundred and right to its error.
-fn check_mean(what: &str, lit: &Lit, place: usize, expected: f64, tolerance: f64) -> Check<Complaint> {
+fn check_mean(what: &str, lit: &RunResult, place: usize, expected: f64, tolerance: f64) -> Check<Complaint> {
     let [found, error] = [lit.film.mean(place, &lit.plan).x, lit.film.standard_error(place, &lit.plan).x];
     assert!(error < 0.03 * expected, "{what}: {found} +- {error}");
     estimate_check(what, found, expected, error.max(tolerance * expected))
@@ -236,7 +236,7 @@ pub fn patch_in_a_plane(gpu: &Gpu) -> Check<Complaint> {
 }
 
 /// What a flat or convex surface scatters never meets it again: neither the triangle it left nor those beside it.
-pub fn none_returns(what: &str, lit: &Lit) -> Check<Complaint> {
+pub fn none_returns(what: &str, lit: &RunResult) -> Check<Complaint> {
     let [first, second] = [lit.fates[0].bounces[0], lit.fates[0].bounces[1]];
     assert!(first.stored > 10_000, "{what}: only {} photons were scattered", first.stored);
     if second.stored + second.absorbed == 0 && second.escaped == first.stored {

@@ -12,27 +12,28 @@ use photonmill::scene::geometry::Geometry;
 use photonmill::scene::light::LightKind;
 use photonmill::scene::{Camera, Light, Material, Mesh, Scene, Surface, built_in};
 use photonmill::selfcheck::Estimate;
-use photonmill::settings::transport::{Append, Illumination, TransportSettings};
-use photonmill::transport::{self, Lit, View};
+use photonmill::settings::Builder;
+use photonmill::settings::transport::{Illumination, TransportSettings};
+use photonmill::transport::{self, RunResult, View};
 
 use super::{Check, z_check};
 
 /// Builders of a map of a scene of triangles that fly in ways of their own.
-pub const APPENDS: [Append; 2] = [Append::Ballot, Append::Persistent];
+pub const SCENE_BUILDERS: [Builder; 2] = [Builder::Ballot, Builder::Persistent];
 pub const BOTH: [Illumination; 2] = [Illumination::Split, Illumination::Photons];
 
 /// Runs to the end, whatever comes out.
-pub fn run(gpu: &Gpu, view: &View, plan: TransportPlan) -> Lit {
+pub fn run(gpu: &Gpu, view: &View, plan: TransportPlan) -> RunResult {
     let never = AtomicBool::new(false);
     transport::light(gpu, view, plan, &mut Control { cancelled: &never, progress: &mut |_| {} }).unwrap()
 }
 
 /// Runs to the end, with nothing odd.
-pub fn light(gpu: &Gpu, view: &View, plan: TransportPlan) -> Lit {
+pub fn light(gpu: &Gpu, view: &View, plan: TransportPlan) -> RunResult {
     let lit = run(gpu, view, plan);
     assert_eq!(lit.anomalies, [0, 0, 0], "values that are no number, or too large for the film");
-    if let Some(oddities) = &lit.oddities {
-        assert_eq!(oddities.count, 0, "{}", oddities.text());
+    if let Some(nonfinite_values) = &lit.nonfinite_values {
+        assert_eq!(nonfinite_values.count, 0, "{}", nonfinite_values.text());
     }
     lit
 }
@@ -43,12 +44,12 @@ fn watched(settings: &TransportSettings) -> TransportSettings {
 }
 
 /// What arrives at points (position, normal) of a scene of triangles.
-pub fn received(gpu: &Gpu, scene: &Scene, settings: &TransportSettings, points: &[(DVec3, DVec3)]) -> Lit {
+pub fn received(gpu: &Gpu, scene: &Scene, settings: &TransportSettings, points: &[(DVec3, DVec3)]) -> RunResult {
     received_within(gpu, scene, settings, points, &render::limits(gpu.facts()))
 }
 
 /// The same within other limits than the device's own.
-pub fn received_within(gpu: &Gpu, scene: &Scene, settings: &TransportSettings, points: &[(DVec3, DVec3)], limits: &Limits) -> Lit {
+pub fn received_within(gpu: &Gpu, scene: &Scene, settings: &TransportSettings, points: &[(DVec3, DVec3)], limits: &Limits) -> RunResult {
     received_in(gpu, (scene, &Geometry::new(scene).unwrap()), settings, points, limits)
 }
 
@@ -58,7 +59,7 @@ fn received_in(
     settings: &TransportSettings,
     points: &[(DVec3, DVec3)],
     limits: &Limits,
-) -> Lit {
+) -> RunResult {
     let receiver = |(position, normal): &(DVec3, DVec3)| Receiver {
         position: geometry.to_local(*position),
         normal: normal.as_vec3(),
@@ -71,7 +72,7 @@ fn received_in(
 }
 
 /// What a camera sees of a scene of triangles.
-pub fn seen(gpu: &Gpu, scene: &Scene, settings: &TransportSettings, camera: &Camera, [width, height]: [u32; 2]) -> Lit {
+pub fn seen(gpu: &Gpu, scene: &Scene, settings: &TransportSettings, camera: &Camera, [width, height]: [u32; 2]) -> RunResult {
     let geometry = Geometry::new(scene).unwrap();
     let sensor = Sensor::Picture { width, height };
     let plan = TransportPlan::new(scene, &geometry, &watched(settings), sensor, &render::limits(gpu.facts())).unwrap();
@@ -79,13 +80,13 @@ pub fn seen(gpu: &Gpu, scene: &Scene, settings: &TransportSettings, camera: &Cam
 }
 
 /// Mean of the red channel over all pixels or points.
-pub fn mean_red(lit: &Lit) -> f64 {
+pub fn mean_red(lit: &RunResult) -> f64 {
     let pixels = lit.film.pixels();
     (0..pixels).map(|pixel| lit.film.mean(pixel, &lit.plan).x).sum::<f64>() / pixels as f64
 }
 
 /// Mean of every pixel or point.
-pub fn means(lit: &Lit) -> Vec<DVec3> {
+pub fn means(lit: &RunResult) -> Vec<DVec3> {
     (0..lit.film.pixels()).map(|pixel| lit.film.mean(pixel, &lit.plan)).collect()
 }
 

@@ -24,15 +24,15 @@ use std::sync::atomic::AtomicBool;
 use glam::UVec2;
 use photonmill::error::Error;
 use photonmill::gpu::{Commands, Gpu, Options};
-use photonmill::oddities::Oddities;
+use photonmill::nonfinite_values::NonfiniteValues;
 use photonmill::photon::{Origin, Photon, StoredPhoton};
 use photonmill::plan::{Limits, Plan};
-use photonmill::render::{self, Control, Outcome};
+use photonmill::render::{self, Control, RunResult};
 use photonmill::resources::Resources;
 use photonmill::rng::{self, Rng, Streams};
 use photonmill::scene::open_box::open_box;
 use photonmill::scene::room::RoomScene;
-use photonmill::settings::{Settings, Variant};
+use photonmill::settings::{Builder, Settings};
 
 /// Devices that no test has at the moment: what one test compiled serves the next.
 static IDLE: Mutex<Vec<Gpu>> = Mutex::new(Vec::new());
@@ -93,12 +93,12 @@ pub fn open(options: Options) -> Option<Gpu> {
 }
 
 /// Runs the open box on a device to its end.
-pub fn run(gpu: &Gpu, settings: &Settings) -> Outcome {
+pub fn run(gpu: &Gpu, settings: &Settings) -> RunResult {
     run_scene(gpu, &open_box(settings), settings)
 }
 
 /// Runs a scene on a device to its end.
-pub fn run_scene(gpu: &Gpu, scene: &RoomScene, settings: &Settings) -> Outcome {
+pub fn run_scene(gpu: &Gpu, scene: &RoomScene, settings: &Settings) -> RunResult {
     let never = AtomicBool::new(false);
     let mut control = Control { cancelled: &never, progress: &mut |_| {} };
     let settings = &Settings { paranoid: true, ..settings.clone() };
@@ -106,30 +106,30 @@ pub fn run_scene(gpu: &Gpu, scene: &RoomScene, settings: &Settings) -> Outcome {
 }
 
 /// What a run comes to, where it may fail: with `paranoid` no value may be infinite or no number.
-pub fn outcome_of(gpu: &Gpu, scene: &RoomScene, settings: &Settings) -> Result<Outcome, Complaint> {
+pub fn outcome_of(gpu: &Gpu, scene: &RoomScene, settings: &Settings) -> Result<RunResult, Complaint> {
     let never = AtomicBool::new(false);
     let outcome = render::on_gpu(gpu, scene, settings, &mut Control { cancelled: &never, progress: &mut |_| {} })?;
-    outcome.oddities.as_ref().map_or(Ok(()), nothing_odd)?;
+    outcome.nonfinite_values.as_ref().map_or(Ok(()), nothing_odd)?;
     Ok(outcome)
 }
 
-pub fn nothing_odd(oddities: &Oddities) -> Check<Complaint> {
-    if oddities.count == 0 { Ok(()) } else { Err(Complaint::new(Kind::NoNumber, oddities.text())) }
+pub fn nothing_odd(nonfinite_values: &NonfiniteValues) -> Check<Complaint> {
+    if nonfinite_values.count == 0 { Ok(()) } else { Err(Complaint::new(Kind::NoNumber, nonfinite_values.text())) }
 }
 
 /// Whatever is run here has no value that is infinite or no number.
-fn sound(outcome: Outcome) -> Outcome {
-    assert_holds("the run", nothing_odd(outcome.oddities.as_ref().expect("somebody looked")));
+fn sound(outcome: RunResult) -> RunResult {
+    assert_holds("the run", nothing_odd(outcome.nonfinite_values.as_ref().expect("somebody looked")));
     outcome
 }
 
 /// Runs the open box on the CPU builder to its end.
-pub fn run_on_cpu(settings: &Settings) -> Outcome {
+pub fn run_on_cpu(settings: &Settings) -> RunResult {
     run_scene_on_cpu(&open_box(settings), settings)
 }
 
 /// Runs a scene on the CPU builder to its end.
-pub fn run_scene_on_cpu(scene: &RoomScene, settings: &Settings) -> Outcome {
+pub fn run_scene_on_cpu(scene: &RoomScene, settings: &Settings) -> RunResult {
     let never = AtomicBool::new(false);
     let mut control = Control { cancelled: &never, progress: &mut |_| {} };
     let settings = &Settings { paranoid: true, ..settings.clone() };
@@ -143,7 +143,7 @@ pub fn photons(gpu: &Gpu, settings: &Settings) -> Vec<Photon> {
 
 /// Builders that are held against closed forms: those that fly in ways of their own. The others store the same photons
 /// to the bit (tests/photons.rs).
-pub const JUDGED: [Variant; 4] = [Variant::Naive, Variant::Atomic, Variant::Persistent, Variant::Cpu];
+pub const JUDGED: [Builder; 4] = [Builder::Naive, Builder::Atomic, Builder::Persistent, Builder::Cpu];
 
 /// Photons of a chunk of which an invocation of the persistent builder takes several.
 pub const MANY_PHOTONS: u32 = 600_001;

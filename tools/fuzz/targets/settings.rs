@@ -13,8 +13,8 @@ use photonmill::scene::geometry::Geometry;
 use photonmill::scene::open_box::open_box;
 use photonmill::scene::{Scene, built_in};
 use photonmill::settings::stop::Stop;
-use photonmill::settings::transport::{Append, Effect, Filter, Illumination, Kernel, Part, TransportSettings};
-use photonmill::settings::{EmissionLaw, Gather, Math, PhongDirection, Preset, Settings, Sums, Variant};
+use photonmill::settings::transport::{Builder, Effect, Filter, Illumination, Kernel, Part, TransportSettings};
+use photonmill::settings::{EmissionLaw, Gather, Math, PhongDirection, Preset, Settings, Sums, Builder};
 use photonmill_fuzz::{panics_are_caught, refused};
 
 static SCENES: LazyLock<Vec<(Scene, Geometry)>> = LazyLock::new(|| {
@@ -116,7 +116,7 @@ impl<'a> Arbitrary<'a> for Room {
         let preset = *u.choose(&[Preset::Naive, Preset::Modified, Preset::Phong, Preset::Rounds])?;
         let usual = Settings::preset(preset);
         Ok(Room(Settings {
-            variant: *u.choose(&[Variant::Naive, Variant::Atomic, Variant::Ballot, Variant::Cpu])?,
+            builder: *u.choose(&[Builder::Naive, Builder::Atomic, Builder::Ballot, Builder::Cpu])?,
             photons: count(u, usual.photons)?,
             rounds: count(u, usual.rounds)?,
             bounces: count(u, usual.bounces)?,
@@ -171,7 +171,7 @@ impl<'a> Arbitrary<'a> for Triangles {
             illumination: *u.choose(&[Illumination::Split, Illumination::Photons])?,
             part: *u.choose(&[Part::All, Part::Direct, Part::Specular, Part::Caustic, Part::Indirect])?,
             filter: *u.choose(&[Filter::Box, Filter::Tent, Filter::Gaussian])?,
-            append: *u.choose(&[Append::Auto, Append::Atomic, Append::Ballot, Append::Persistent])?,
+            append: *u.choose(&[Builder::Auto, Builder::Atomic, Builder::Ballot, Builder::Persistent])?,
             math: *u.choose(&[Math::Fast, Math::Strict])?,
             paranoid: u.arbitrary()?,
             group_size: count(u, usual.group_size)?,

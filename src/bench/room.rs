@@ -12,10 +12,10 @@ use crate::photon::StoredPhoton;
 use crate::plan::Plan;
 use crate::plan::memory::{block_sum_counts, group_count};
 use crate::records::Point;
-use crate::render::{self, Control, Outcome};
+use crate::render::{self, Control, RunResult};
 use crate::rng::Rng;
 use crate::scene::open_box::open_box;
-use crate::settings::{Settings, Variant};
+use crate::settings::{Builder, Settings};
 use crate::timings::Spread;
 
 /// What photons did in a round, on average over all.
@@ -84,7 +84,7 @@ pub fn check_clock(gpu: &Gpu) -> Result<()> {
     Ok(())
 }
 
-fn run_once(gpu: &Gpu, settings: &Settings, cancelled: &AtomicBool) -> Result<Outcome> {
+fn run_once(gpu: &Gpu, settings: &Settings, cancelled: &AtomicBool) -> Result<RunResult> {
     let outcome = render::on_gpu(gpu, &open_box(settings), settings, &mut Control { cancelled, progress: &mut |_| {} })?;
     if outcome.cancelled { Err(Error::Interrupted) } else { Ok(outcome) }
 }
@@ -108,7 +108,7 @@ pub fn time_run(gpu: &Gpu, rates: &Rates, settings: &Settings, cancelled: &Atomi
     Ok(runs.split_off(1))
 }
 
-fn timed(gpu: &Gpu, rates: &Rates, outcome: &Outcome, rounds: u32, first: u32) -> Timed {
+fn timed(gpu: &Gpu, rates: &Rates, outcome: &RunResult, rounds: u32, first: u32) -> Timed {
     let plan = &outcome.plan;
     let counts = Counts::of(&outcome.fates, rounds);
     let found = photons_per_point(outcome) / f64::from(rounds);
@@ -133,13 +133,13 @@ fn timed(gpu: &Gpu, rates: &Rates, outcome: &Outcome, rounds: u32, first: u32) -
 }
 
 fn workload(plan: &Plan) -> String {
-    let Settings { variant, photons, bounces, radius, .. } = &plan.settings;
+    let Settings { builder, photons, bounces, radius, .. } = &plan.settings;
     let counters = if plan.counters > 1 { format!(" by {} counters", plan.counters) } else { String::new() };
-    format!("open box, {}{counters}, {photons} photons, {bounces} bounces, radius {radius} m", variant.name())
+    format!("open box, {}{counters}, {photons} photons, {bounces} bounces, radius {radius} m", builder.name())
 }
 
 /// Photons within the radius of a point, of all rounds: without Phong weights the first sum of a point counts them.
-fn photons_per_point(outcome: &Outcome) -> f64 {
+fn photons_per_point(outcome: &RunResult) -> f64 {
     let plan = &outcome.plan;
     let sums = outcome.film.sums.iter().step_by(plan.channel_count as usize);
     sums.map(|sum| *sum as f64).sum::<f64>() / plan.film_scale() / plan.points.len() as f64
@@ -180,19 +180,19 @@ pub fn work(pass: &str, plan: &Plan, counts: &Counts, found: f64) -> Option<Work
     // Entries of the map that the index reads: the naive builder's with the empty ones.
     let entries = if plan.has_slots() { slots } else { counts.survivors };
     // Where an invocation keeps a photon to its end, no path is written and read again.
-    let path = if settings.variant == Variant::Persistent { 0.0 } else { bytes::<StoredPath>() };
+    let path = if settings.builder == Builder::Persistent { 0.0 } else { bytes::<StoredPath>() };
     let emit = Cost {
         bytes: counts.emitted * (path + if settings.rng == Rng::Rand48 { 8.0 } else { 0.0 }),
         float_operations: counts.emitted * EMISSION_OPERATIONS,
         integer_products: counts.emitted * products(settings.rng, 4.0),
     };
     let bounces = Cost {
-        bytes: match settings.variant {
+        bytes: match settings.builder {
             // Every slot is read and written at every bounce, alive or not; after the last one nobody asks for paths.
-            Variant::Naive => slots * (path + bytes::<StoredPhoton>()) + (slots - counts.emitted) * path,
+            Builder::Naive => slots * (path + bytes::<StoredPhoton>()) + (slots - counts.emitted) * path,
             // Survivors' paths are written where they were read, and read again once their places are known; of the dead
             // only the word is read that says so.
-            Variant::Scan => {
+            Builder::Scan => {
                 counts.flights * (path + 16.0)
                     + counts.survivors * (2.0 * path - 16.0 + bytes::<StoredPhoton>())
                     + (counts.flights - counts.emitted) * path
@@ -222,11 +222,11 @@ pub fn work(pass: &str, plan: &Plan, counts: &Counts, found: f64) -> Option<Work
     let bounce_count = f64::from(settings.bounces);
     // Down the levels of a prefix sum and up again.
     let scans_of = |items: u32| 2.0 * block_sum_counts(u64::from(items) + 1, settings.group_size).len() as f64 - 1.0;
-    let flights = match settings.variant {
-        Variant::Persistent => 0.0,
-        Variant::Naive => chunks * bounce_count,
+    let flights = match settings.builder {
+        Builder::Persistent => 0.0,
+        Builder::Naive => chunks * bounce_count,
         // In place, moved together in order, and counted.
-        Variant::Scan => chunks * bounce_count * (3.0 + scans_of(group_count(plan))),
+        Builder::Scan => chunks * bounce_count * (3.0 + scans_of(group_count(plan))),
         // Stored where they belong, gaps marked where there are any, and counted.
         _ => chunks * bounce_count * if plan.counters > 1 { 3.0 } else { 2.0 },
     };

@@ -1,6 +1,6 @@
 // A photon as it leaves the lights of a scene.
 
-LightPath shine(uint photon, Draws draws, PhotonEmission emission)
+LightPath emit_photon(uint photon, Draws draws, PhotonEmission emission)
 {
     vec4 u = philox_floats(uvec4(photon, draws.round, 0, draws.domain), draws.seed);
     vec4 w = philox_floats(uvec4(photon, draws.round, 1, draws.domain), draws.seed);
@@ -16,7 +16,7 @@ LightPath shine(uint photon, Draws draws, PhotonEmission emission)
             emitted.flux *= emission.flux_gain;
         }
     }
-    note_unless(is_finite(emitted.position) && is_finite(emitted.direction) && is_finite(emitted.flux), ODD_PHOTON, draws.domain,
+    note_unless(is_finite(emitted.position) && is_finite(emitted.direction) && is_finite(emitted.flux), NONFINITE_PHOTON, draws.domain,
                 draws.round, photon);
     return LightPath(emitted.position, photon, emitted.direction, ARRIVED_DIRECT, emitted.flux);
 }

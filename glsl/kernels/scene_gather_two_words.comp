@@ -1,21 +1,19 @@
-// Density estimation of a photon map, sums added by film/u64.glsl.
+// Density estimation of a photon map, sums added by film/two_words.glsl.
 // Dispatched by src/transport/points.rs twice a map and chunk. One thread = one slice of a point's
 // candidates: points along x, slices along y.
 #version 460
 #extension GL_GOOGLE_include_directive : require
 #extension GL_EXT_scalar_block_layout : require
 #extension GL_EXT_control_flow_attributes : require
-#extension GL_EXT_shader_explicit_arithmetic_types_int64 : require
-#extension GL_EXT_shader_atomic_int64 : require
 #include "records.glsl"
 
 layout(local_size_x_id = 0) in;
-layout(push_constant, scalar) uniform Push { LookupPush push; };
+layout(push_constant, scalar) uniform Push { SceneGatherPush push; };
 
 #include "math.glsl"
-#include "oddities.glsl"
+#include "nonfinite_values.glsl"
 #include "film/wide.glsl"
-#include "film/u64.glsl"
+#include "film/two_words.glsl"
 #include "scene/directions.glsl"
 #include "scene/effects.glsl"
 #include "scene/lobes.glsl"
@@ -24,9 +22,9 @@ layout(push_constant, scalar) uniform Push { LookupPush push; };
 #include "scene/rounding.glsl"
 #include "scene/tiles.glsl"
 #include "stages/map_rows.glsl"
-#include "stages/lookup.glsl"
+#include "stages/scene_gather.glsl"
 
 void main()
 {
-    look_up();
+    gather_photons();
 }

@@ -6,12 +6,12 @@
 layout(constant_id = 42) const uint COUNTERS = 1;
 
 // Behind the lengths of the photon map and of each bounce's paths, and far enough from each other not to be served together.
-uint counter_in_turn(uint turn)
+uint striped_counter(uint turn)
 {
     return push.bounces + 2 + turn * COUNTER_STRIDE;
 }
 
-uint place_in_turn(uint turn, uint taken)
+uint striped_place(uint turn, uint taken)
 {
     uint block = gl_WorkGroupSize.x;
     return (taken / block * COUNTERS + turn) * block + taken % block;

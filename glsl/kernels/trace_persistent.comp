@@ -8,12 +8,12 @@
 #include "records.glsl"
 
 layout(local_size_x_id = 0) in;
-layout(push_constant, scalar) uniform Push { TraceWholePush push; };
+layout(push_constant, scalar) uniform Push { TracePersistentPush push; };
 layout(set = 1, binding = 3, scalar) buffer Counters { uint counters[]; };
 layout(set = 1, binding = 4, scalar) buffer Tallies { Tally tallies[]; };
 
 #include "math.glsl"
-#include "oddities.glsl"
+#include "nonfinite_values.glsl"
 #include "dispatch.glsl"
 #include "rng.glsl"
 #include "sampling.glsl"
@@ -28,9 +28,9 @@ layout(set = 1, binding = 4, scalar) buffer Tallies { Tally tallies[]; };
 #include "append/store.glsl"
 #include "stages/bounce.glsl"
 #include "stages/leave_light.glsl"
-#include "stages/trace_whole.glsl"
+#include "stages/trace_persistent.glsl"
 
 void main()
 {
-    trace_whole();
+    trace_persistent();
 }

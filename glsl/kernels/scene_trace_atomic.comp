@@ -15,7 +15,7 @@ layout(set = 1, binding = 3, scalar) buffer Counters { uint counters[]; };
 layout(set = 1, binding = 4, scalar) buffer Tallies { Tally tallies[]; };
 
 #include "math.glsl"
-#include "oddities.glsl"
+#include "nonfinite_values.glsl"
 #include "dispatch.glsl"
 #include "philox.glsl"
 #include "sampling.glsl"
@@ -30,8 +30,8 @@ layout(set = 1, binding = 4, scalar) buffer Tallies { Tally tallies[]; };
 #include "scene/scatter.glsl"
 #include "totals.glsl"
 #include "stages/map_store.glsl"
-#include "stages/fly_once.glsl"
-#include "stages/flight.glsl"
+#include "stages/scene_flight.glsl"
+#include "stages/scene_trace.glsl"
 
 void main()
 {

@@ -5,9 +5,9 @@ layout(constant_id = 31) const bool PARANOID = false;
 
 // For each kind ODD_...: how many there are, then three words each of the first: the photons' domain, round, item.
 // Kinds have room of their own, so that many pixels do not keep a photon's name out.
-layout(set = 1, binding = 15, scalar) buffer Oddities { uint oddities[]; };
+layout(set = 1, binding = 15, scalar) buffer NonfiniteValues { uint nonfinite_values[]; };
 
-const uint ODDITY_WORDS = 1 + 3 * MAX_ODDITIES;
+const uint NONFINITE_WORDS = 1 + 3 * MAX_NONFINITE_VALUES;
 
 bool is_finite(float x)
 {
@@ -25,13 +25,13 @@ void note_unless(bool fine, uint what, uint domain, uint round, uint item)
 {
     if (PARANOID) {
         // As many as count; more would wrap.
-        uint kind = what * ODDITY_WORDS;
-        if (!fine && oddities[kind] < 0x40000000u) {
-            uint place = atomicAdd(oddities[kind], 1);
-            if (place < MAX_ODDITIES) {
-                oddities[kind + 3 * place + 1] = domain;
-                oddities[kind + 3 * place + 2] = round;
-                oddities[kind + 3 * place + 3] = item;
+        uint kind = what * NONFINITE_WORDS;
+        if (!fine && nonfinite_values[kind] < 0x40000000u) {
+            uint place = atomicAdd(nonfinite_values[kind], 1);
+            if (place < MAX_NONFINITE_VALUES) {
+                nonfinite_values[kind + 3 * place + 1] = domain;
+                nonfinite_values[kind + 3 * place + 2] = round;
+                nonfinite_values[kind + 3 * place + 3] = item;
             }
         }
     }

@@ -7,31 +7,31 @@ layout(set = 1, binding = 1, scalar) writeonly buffer NextLightPaths { LightPath
 void fly()
 {
     uint index = invocation_index();
-    Flown flown = no_flight();
+    Traced traced = no_flight();
     LightPath path;
     if (index < min(counters[1 + push.list], push.path_capacity)) {
         path = light_paths[index];
-        flown = fly_once(path, push.bounce);
+        traced = trace_flight(path, push.bounce);
     }
-    bool goes_on = flown.alive;
+    bool goes_on = traced.alive;
     if (push.is_last != 0) {
         goes_on = false;
-        if (flown.alive) {
+        if (traced.alive) {
             count_loss(TOTAL_CUT_OFF, path.flux);
         }
     }
     // Full maps drop nothing: the plan gives room for every photon at every bounce.
-    uint place = take_place(0, flown.stored);
-    bool dropped = flown.stored && place >= push.map.photon_capacity;
-    if (flown.stored && !dropped) {
-        store(place, flown.photon);
+    uint place = take_place(0, traced.stored);
+    bool dropped = traced.stored && place >= push.map.photon_capacity;
+    if (traced.stored && !dropped) {
+        store(place, traced.photon);
     }
     uint path_place = take_place(2 + push.list, goes_on);
     if (goes_on) {
         next_light_paths[path_place] = path;
     }
     uint row = min(push.bounce, TALLY_ROWS - 1);
-    tally(row, fates(flown.alive, flown.absorbed, flown.escaped, false));
+    tally(row, fates(traced.alive, traced.absorbed, traced.escaped, false));
     if (dropped) {
         atomicAdd(tallies[tally_copy(row)].dropped, 1);
     }

@@ -11,7 +11,7 @@ layout(push_constant, scalar) uniform Push { EmissionPush push; };
 layout(set = 1, binding = 0, scalar) writeonly buffer LightPaths { LightPath light_paths[]; };
 
 #include "math.glsl"
-#include "oddities.glsl"
+#include "nonfinite_values.glsl"
 #include "dispatch.glsl"
 #include "philox.glsl"
 #include "sampling.glsl"
@@ -22,7 +22,7 @@ layout(set = 1, binding = 0, scalar) writeonly buffer LightPaths { LightPath lig
 #include "scene/areas.glsl"
 #include "scene/lights.glsl"
 #include "scene/aim.glsl"
-#include "stages/shine.glsl"
+#include "stages/scene_emit.glsl"
 
 void main()
 {
@@ -30,5 +30,5 @@ void main()
     if (index >= push.emission.photon_count) {
         return;
     }
-    light_paths[index] = shine(push.emission.first_photon + index, push.draws, push.emission);
+    light_paths[index] = emit_photon(push.emission.first_photon + index, push.draws, push.emission);
 }

@@ -22,7 +22,7 @@ uint point_of(uint item, uint slice)
     return point_in_tiles(place, push.width, push.height, push.pixel_count);
 }
 
-void look_up()
+void gather_photons()
 {
     uint slice = push.first_slice + gl_WorkGroupID.y;
     uint invocation = gl_WorkGroupID.x * gl_WorkGroupSize.x + gl_LocalInvocationIndex;
@@ -98,7 +98,7 @@ void look_up()
                             weight *= is_flat ? 1.0 : shading_gain(cosine, dot(wi, photon_normal));
                         }
                         precise vec3 flux = uintBitsToFloat(light.xyz) * weight;
-                        note_unless(is_finite(flux), ODD_ESTIMATE, 0, push.round, index % push.pixel_count);
+                        note_unless(is_finite(flux), NONFINITE_ESTIMATE, 0, push.round, index % push.pixel_count);
                         float chance = chance_of(mix32(point_bits + position_bits(position)));
                         [[unroll]] for (uint channel = 0; channel < 3; channel++) {
                             float whole = floor(flux[channel]);

@@ -6,9 +6,9 @@ use std::time::Instant;
 
 use rayon::prelude::*;
 
-use super::paper_line::{Counts, DROPPED, RANK_BYTES, REPEATS, Timed};
 use super::pass::{Cost, Pass, SLOW_OPERATION, Work, rounds_of, whole};
 use super::rates::{PHILOX_PRODUCTS, Rates};
+use super::room::{Counts, DROPPED, RANK_BYTES, REPEATS, Timed};
 use crate::error::{Error, Result};
 use crate::gpu::{Commands, Gpu};
 use crate::ledger::Fates;
@@ -19,10 +19,11 @@ use crate::records::{LightPath, VisiblePoint};
 use crate::render::{self, Control};
 use crate::scene::geometry::Geometry;
 use crate::scene::{Camera, Scene};
-use crate::settings::transport::{Append, Effect, TransportSettings};
+use crate::settings::Builder;
+use crate::settings::transport::{Effect, TransportSettings};
 use crate::timings::Spread;
 use crate::transport::resources::TransportResources;
-use crate::transport::{self, End, Lit, Round, View, photons, points};
+use crate::transport::{self, End, Round, RunResult, View, photons, points};
 
 /// A scene, what looks at it, and how.
 pub struct Job<'a> {
@@ -41,7 +42,7 @@ impl Job<'_> {
     }
 
     /// A run to its end.
-    pub fn light(&self, gpu: &Gpu, settings: TransportSettings, cancelled: &AtomicBool) -> Result<Lit> {
+    pub fn light(&self, gpu: &Gpu, settings: TransportSettings, cancelled: &AtomicBool) -> Result<RunResult> {
         let plan = self.plan(gpu, &settings)?;
         let camera = self.camera();
         let view = View { geometry: self.geometry, camera: Some(&camera), phases: &[] };
@@ -132,7 +133,7 @@ fn time_once(gpu: &Gpu, rates: &Rates, job: &Job, cancelled: &AtomicBool) -> Res
     let counts = lit.fates.each_ref().map(|fates: &Fates| Counts::of(fates, rounds));
     let model = Model { job, plan: &lit.plan, counts, surveys };
     let scopes = rounds_of(&lit.timings, rounds, DROPPED);
-    let workload = format!("{}, {}, {} triangles", job.name, lit.plan.settings.append.name(), job.geometry.triangles.len());
+    let workload = format!("{}, {}, {} triangles", job.name, lit.plan.builder().name(), job.geometry.triangles.len());
     let passes =
         scopes.iter().filter_map(|(name, ms)| Some(Pass::new(&workload, name, Spread::of(ms.clone())?, model.work(name), rates))).collect();
     let sum = |scope: &str| lit.timings.row(scope).and_then(|row| row.gpu_ms).unwrap_or(0.0);
@@ -227,7 +228,7 @@ impl Model<'_> {
         let which = usize::from(map.caustic_only);
         let (counts, survey) = (self.counts[which], self.surveys[which]?);
         let buckets = f64::from(map.bucket_count);
-        let persistent = self.plan.settings.append == Append::Persistent;
+        let persistent = self.plan.builder() == Builder::Persistent;
         // Where an invocation keeps a photon to its end, no path is written and read again.
         let path = if persistent { 0.0 } else { bytes::<LightPath>() };
         let trace = Cost {

@@ -2,7 +2,7 @@
 // written between bounces. An invocation whose photon has ended takes its next one in the same step in which its
 // neighbours fly on (persistent threads, Aila and Laine 2009), so that a subgroup stays full.
 
-void trace_whole()
+void trace_persistent()
 {
     open_tallies();
     uint next = invocation_index(); // photon of the range to start with, then every `stride`th

@@ -1,11 +1,11 @@
-// Photons in the registers of one invocation, which takes its next one when one ends; see stages/trace_whole.glsl. They come
+// Photons in the registers of one invocation, which takes its next one when one ends; see stages/trace_persistent.glsl. They come
 // from their lights, or from the list of those that an earlier dispatch left under way. Those that are still under way after
 // push.flights flights go to the next list; after push.bounces bounces in all they are cut off.
 
 layout(set = 1, binding = 0, scalar) readonly buffer LightPaths { LightPath light_paths[]; };
 layout(set = 1, binding = 1, scalar) writeonly buffer NextLightPaths { LightPath next_light_paths[]; };
 
-void fly_whole()
+void scene_trace_persistent()
 {
     open_tallies();
     uint next = invocation_index(); // photon of the dispatch to start with, then every `stride`th
@@ -18,7 +18,7 @@ void fly_whole()
     for (;;) {
         if (!flying && next < push.emission.photon_count) {
             if (push.first_bounce == 0) {
-                path = shine(push.emission.first_photon + next, push.draws, push.emission);
+                path = emit_photon(push.emission.first_photon + next, push.draws, push.emission);
             } else {
                 path = light_paths[push.emission.first_photon + next];
             }
@@ -29,26 +29,26 @@ void fly_whole()
         if (subgroupBallot(flying) == uvec4(0)) {
             break;
         }
-        Flown flown = no_flight();
+        Traced traced = no_flight();
         uint bounce = push.first_bounce + flights;
         if (flying) {
-            flown = fly_once(path, bounce);
+            traced = trace_flight(path, bounce);
         }
-        uint place = take_place(0, flown.stored);
-        bool dropped = flown.stored && place >= push.map.photon_capacity;
-        if (flown.stored && !dropped) {
-            store(place, flown.photon);
+        uint place = take_place(0, traced.stored);
+        bool dropped = traced.stored && place >= push.map.photon_capacity;
+        if (traced.stored && !dropped) {
+            store(place, traced.photon);
         }
         uint row = min(bounce, TALLY_ROWS - 1);
         if (flying) {
-            count_fate(row, flown.alive, flown.absorbed, flown.escaped);
+            count_fate(row, traced.alive, traced.absorbed, traced.escaped);
         }
         if (dropped) {
             count_on_device(row, FATE_DROPPED, 1);
         }
         flights++;
-        flying = flown.alive && flights < push.flights;
-        if (flown.alive && !flying) {
+        flying = traced.alive && flights < push.flights;
+        if (traced.alive && !flying) {
             if (bounce + 1 < push.bounces) {
                 next_light_paths[atomicAdd(counters[1], 1)] = path;
             } else {

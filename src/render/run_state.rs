@@ -1,4 +1,4 @@
-//! Book-keeping of a run: photons emitted, their fates, the error, and whether to go on.
+//! RunState-keeping of a run: photons emitted, their fates, the error, and whether to go on.
 
 use std::sync::atomic::Ordering;
 use std::time::Instant;
@@ -12,7 +12,7 @@ use crate::plan::Plan;
 use crate::records::Tally;
 use crate::scene::room::RoomScene;
 
-pub(super) struct Book<'a, 'c> {
+pub(super) struct RunState<'a, 'c> {
     control: &'a mut Control<'c>,
     watch: Watch,
     photons_per_round: u32,
@@ -31,10 +31,10 @@ pub(super) struct Book<'a, 'c> {
     pub(super) end: Option<End>,
 }
 
-impl<'a, 'c> Book<'a, 'c> {
+impl<'a, 'c> RunState<'a, 'c> {
     /// Of a run that began at `started`.
-    pub(super) fn new(plan: &Plan, control: &'a mut Control<'c>, started: Instant) -> Book<'a, 'c> {
-        Book {
+    pub(super) fn new(plan: &Plan, control: &'a mut Control<'c>, started: Instant) -> RunState<'a, 'c> {
+        RunState {
             control,
             // The paper's radius never shrinks.
             watch: Watch::new(plan.settings.stop, 1.0, started),
@@ -87,7 +87,7 @@ impl<'a, 'c> Book<'a, 'c> {
     }
 
     /// Books the fates of all photons handed out, and says whether to stop.
-    pub(super) fn settle(&mut self) -> Result<bool> {
+    pub(super) fn collect(&mut self) -> Result<bool> {
         self.watch.check_losses(self.fates.bounces.len() as u32)?;
         let ledger = self.fates.ledger();
         if !ledger.closes() || ledger.dropped != 0 {

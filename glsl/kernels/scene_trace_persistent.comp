@@ -1,5 +1,5 @@
-// One flight of every photon, places taken by append/ballot.glsl.
-// Dispatched by src/transport/photons.rs once a bounce. One thread = one incoming path.
+// Photons from emission to their end.
+// Dispatched by src/transport/photons.rs once a chunk. One thread = every `stride`th photon.
 #version 460
 #extension GL_GOOGLE_include_directive : require
 #extension GL_EXT_scalar_block_layout : require
@@ -10,30 +10,34 @@
 #include "scene/map_photon.glsl"
 
 layout(local_size_x_id = 0) in;
-layout(push_constant, scalar) uniform Push { FlightPush push; };
+layout(push_constant, scalar) uniform Push { SceneTracePersistentPush push; };
 layout(set = 1, binding = 3, scalar) buffer Counters { uint counters[]; };
 layout(set = 1, binding = 4, scalar) buffer Tallies { Tally tallies[]; };
 
 #include "math.glsl"
-#include "oddities.glsl"
+#include "nonfinite_values.glsl"
 #include "dispatch.glsl"
 #include "philox.glsl"
 #include "sampling.glsl"
 #include "tally_copy.glsl"
-#include "tally.glsl"
+#include "tallies.glsl"
 #include "append/ballot.glsl"
 #include "scene/effects.glsl"
 #include "scene/directions.glsl"
 #include "scene/bvh.glsl"
 #include "scene/surface.glsl"
+#include "scene/areas.glsl"
+#include "scene/lights.glsl"
+#include "scene/aim.glsl"
 #include "scene/lobes.glsl"
 #include "scene/scatter.glsl"
 #include "totals.glsl"
 #include "stages/map_store.glsl"
-#include "stages/fly_once.glsl"
-#include "stages/flight.glsl"
+#include "stages/scene_flight.glsl"
+#include "stages/scene_emit.glsl"
+#include "stages/scene_trace_persistent.glsl"
 
 void main()
 {
-    fly();
+    scene_trace_persistent();
 }

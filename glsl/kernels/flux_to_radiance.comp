@@ -10,12 +10,12 @@
 #include "records.glsl"
 
 layout(local_size_x_id = 0) in;
-layout(push_constant, scalar) uniform Push { WeighPush push; };
+layout(push_constant, scalar) uniform Push { FluxToRadiancePush push; };
 layout(set = 1, binding = 1, scalar) readonly buffer VisiblePoints { VisiblePoint visible_points[]; };
 layout(set = 1, binding = 2, scalar) buffer Estimates { uvec2 estimates[]; };
 
 #include "math.glsl"
-#include "oddities.glsl"
+#include "nonfinite_values.glsl"
 #include "dispatch.glsl"
 #include "scene/effects.glsl"
 #include "scene/directions.glsl"
@@ -46,7 +46,7 @@ float estimate_area(VisiblePoint point, uint pixel, float radius)
     if (HAS_EDGE_CORRECTION) {
         bool whole;
         float covered = covered_area(point.position, point.plane, radius, whole);
-        note_unless(is_finite(covered), ODD_ESTIMATE, 0, push.round, pixel);
+        note_unless(is_finite(covered), NONFINITE_ESTIMATE, 0, push.round, pixel);
         if (whole) {
             atomicAdd(anomalies[2], 1);
         }
@@ -116,7 +116,7 @@ void main()
             continue;
         }
         vec3 radiance = for_all * point.weight * (flux * density);
-        note_unless(is_finite(radiance), ODD_ESTIMATE, 0, push.round, pixel);
+        note_unless(is_finite(radiance), NONFINITE_ESTIMATE, 0, push.round, pixel);
         uint part = part_number(point.arrivals, arrival);
         uint chance = mix32(push.rounding + position_bits(point.position));
         for (uint channel = 0; channel < 3; channel++) {

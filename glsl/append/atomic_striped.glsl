@@ -6,5 +6,5 @@ uint take_place(uint counter, bool wanted)
         return wanted ? atomicAdd(counters[counter], 1) : 0;
     }
     uint turn = work_group_index() % COUNTERS;
-    return wanted ? place_in_turn(turn, atomicAdd(counters[counter_in_turn(turn)], 1)) : 0;
+    return wanted ? striped_place(turn, atomicAdd(counters[striped_counter(turn)], 1)) : 0;
 }
