@@ -1,7 +1,7 @@
 //! The order of the house, read off the sources: a module may use what stands to its left on the
 //! straight line, the engine sees no scene and no plan, and the CPU builder, as a judge, no engine.
 
-use std::collections::BTreeSet;
+use std::collections::{BTreeMap, BTreeSet};
 use std::fs;
 use std::path::{Path, PathBuf};
 
@@ -198,6 +198,107 @@ fn forks_in_functions(source: &str) -> Vec<usize> {
         depth += line.matches('{').count() as i32 - line.matches('}').count() as i32;
     }
     lines
+}
+
+/// The path of a file's module: `plan::memory` of src/plan/memory.rs.
+fn module_path(inside: &Path) -> String {
+    let names: Vec<String> = inside.with_extension("").iter().map(|name| name.to_string_lossy().into_owned()).collect();
+    names.join("::").trim_end_matches("::mod").to_owned()
+}
+
+/// What a tree of a `use` line names, its groups opened.
+fn opened(tree: &str) -> Vec<String> {
+    let Some((prefix, group)) = tree.split_once('{') else {
+        return vec![tree.trim().to_owned()];
+    };
+    let group = group.trim_end().strip_suffix('}').expect("a group ends");
+    let mut depth = 0;
+    let parts = group.split(|symbol| {
+        depth += i32::from(symbol == '{') - i32::from(symbol == '}');
+        symbol == ',' && depth == 0
+    });
+    parts.filter(|part| !part.trim().is_empty()).flat_map(opened).map(|part| format!("{}{part}", prefix.trim())).collect()
+}
+
+/// The modules of files that the `use` lines of a file name. A folder's own file and what is in the folder belong together.
+fn files_used(module: &str, code: &str, known: &BTreeSet<String>) -> BTreeSet<String> {
+    let lines = format!("\n{code}");
+    let uses = ["\nuse ", "\npub use ", "\npub(super) use ", "\npub(crate) use "].map(|start| {
+        let trees: Vec<String> = lines.split(start).skip(1).map(|rest| rest.split(';').next().unwrap_or("").to_owned()).collect();
+        trees
+    });
+    let resolved = |path: String| {
+        let mut base: Vec<&str> = module.split("::").collect();
+        let mut names = path.split("::").peekable();
+        match names.peek() {
+            Some(&"crate") => {
+                names.next();
+                base.clear();
+            }
+            Some(&"super") => {
+                while names.next_if_eq(&"super").is_some() {
+                    base.pop();
+                }
+            }
+            Some(&"self") => drop(names.next()),
+            // Of the file itself, or of another crate.
+            _ => {}
+        }
+        base.extend(names.map(|name| name.split(' ').next().unwrap_or(name)));
+        (1..=base.len()).rev().map(|length| base[..length].join("::")).find(|path| known.contains(path))
+    };
+    let is_kin = |other: &str| other.starts_with(&format!("{module}::")) || module.starts_with(&format!("{other}::"));
+    uses.into_iter()
+        .flatten()
+        .flat_map(|tree| opened(&tree))
+        .filter_map(resolved)
+        .filter(|other| other != module && !is_kin(other))
+        .collect()
+}
+
+/// A circle of files that use each other, the first again at the end.
+fn circle(sources: &BTreeMap<String, String>) -> Option<Vec<String>> {
+    let known: BTreeSet<String> = sources.keys().cloned().collect();
+    let arrows: BTreeMap<&str, BTreeSet<String>> =
+        sources.iter().map(|(module, source)| (module.as_str(), files_used(module, &code_of(source), &known))).collect();
+    // What is in no circle.
+    let mut done = BTreeSet::new();
+    fn search(module: &str, way: &mut Vec<String>, arrows: &BTreeMap<&str, BTreeSet<String>>, done: &mut BTreeSet<String>) -> bool {
+        if done.contains(module) {
+            return false;
+        }
+        if let Some(first) = way.iter().position(|before| before == module) {
+            way.drain(..first);
+            way.push(module.to_owned());
+            return true;
+        }
+        way.push(module.to_owned());
+        if arrows[module].iter().any(|next| search(next, way, arrows, done)) {
+            return true;
+        }
+        done.insert(way.pop().expect("what was pushed"));
+        false
+    }
+    arrows.keys().find_map(|module| {
+        let mut way = Vec::new();
+        search(module, &mut way, &arrows, &mut done).then_some(way)
+    })
+}
+
+#[test]
+fn no_files_use_each_other_in_a_circle() {
+    let folder = root("src");
+    let sources: BTreeMap<String, String> =
+        files(&folder).into_iter().map(|(path, source)| (module_path(path.strip_prefix(&folder).unwrap()), source)).collect();
+    assert!(sources.len() > 100, "{} sources", sources.len());
+    assert_eq!(circle(&sources), None);
+
+    let of =
+        |sources: &[(&str, &str)]| circle(&sources.iter().map(|(module, source)| ((*module).to_owned(), (*source).to_owned())).collect());
+    let three =
+        [("a", ""), ("a::b", "use super::c::{self, D};"), ("a::c", "pub use crate::{e::{F, G}, h};"), ("e", "use crate::a::b::B as C;")];
+    assert_eq!(of(&three).unwrap(), ["a::b", "a::c", "e", "a::b"]);
+    assert_eq!(of(&[("a", "use self::b::B;"), ("a::b", "use super::A;\nmod tests {\n    use super::*;\n}"), ("b", "use std::fmt;")]), None);
 }
 
 #[test]

@@ -6,7 +6,7 @@ use std::sync::{Mutex, MutexGuard, PoisonError};
 use std::time::Duration;
 
 use crate::common::{device, device_with, lit, planted};
-use photonmill::bench::experiments::Experiment;
+use photonmill::bench::experiment::Experiment;
 use photonmill::bench::room::{self, Timed};
 use photonmill::bench::scene::{self, Job};
 use photonmill::bench::targets::TARGETS;

@@ -310,7 +310,7 @@ fn the_fastest_builder_is_taken() {
         let output = run_on_device(folder.path(), &arguments);
         assert!(output.status.success(), "{}", text(&output.stderr));
         let stderr = text(&output.stderr).to_owned();
-        let taken = json(&folder.path().join("a.json"))["settings"]["variant"].as_str().unwrap().to_owned();
+        let taken = json(&folder.path().join("a.json"))["settings"]["builder"].as_str().unwrap().to_owned();
         if taken == "cpu" {
             // There is no device here.
             return Vec::new();

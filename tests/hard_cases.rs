@@ -13,7 +13,8 @@ use crate::common::lit::{BOTH, flights, lamp, mean_red, received, same_light, sc
 use crate::common::{Check, assert_complains, assert_holds, device, relative_check, z_check};
 use glam::{DQuat, DVec2, DVec3, Vec3};
 use photonmill::plan::Plan;
-use photonmill::plan::transport::{Sensor, TransportPlan};
+use photonmill::plan::sensor::Sensor;
+use photonmill::plan::transport::TransportPlan;
 use photonmill::scene::geometry::Geometry;
 use photonmill::scene::light::{Light, LightKind};
 use photonmill::scene::open_box::open_box;

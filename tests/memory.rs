@@ -2,7 +2,8 @@
 
 use crate::common::{device, lit, run};
 use photonmill::gpu::Gpu;
-use photonmill::plan::transport::{Sensor, TransportPlan};
+use photonmill::plan::sensor::Sensor;
+use photonmill::plan::transport::TransportPlan;
 use photonmill::render;
 use photonmill::rng::Rng;
 use photonmill::scene::geometry::Geometry;

@@ -8,7 +8,8 @@ use crate::common::{Check, Complaint, assert_holds, device, in_order, nothing_od
 use glam::Vec3;
 use photonmill::gpu::Gpu;
 use photonmill::nonfinite_values::{NonfiniteValues, What};
-use photonmill::plan::transport::{Sensor, TransportPlan};
+use photonmill::plan::sensor::Sensor;
+use photonmill::plan::transport::TransportPlan;
 use photonmill::render::{self, Control};
 use photonmill::scene::geometry::Geometry;
 use photonmill::scene::open_box::open_box;

@@ -12,7 +12,8 @@ use crate::common::{Check, assert_complains, assert_holds, device, pairs, share_
 use glam::{DMat3, DVec2, DVec3, Vec3};
 use photonmill::constants::EMISSION_BLOCKS;
 use photonmill::gpu::Gpu;
-use photonmill::plan::transport::{Sensor, TransportPlan};
+use photonmill::plan::sensor::Sensor;
+use photonmill::plan::transport::TransportPlan;
 use photonmill::records::{LightPath, Tally};
 use photonmill::render;
 use photonmill::rng::philox;

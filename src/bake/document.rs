@@ -5,7 +5,7 @@ use std::collections::BTreeSet;
 use glam::{DMat3, DQuat, DVec2, DVec3, Vec3};
 use serde_json::{Map, Value, json};
 
-use super::files::{GEOMETRY, Names};
+use super::names::{GEOMETRY, Names};
 use super::{Layout, MeshLightmap};
 use crate::scene::light::{LUMENS_PER_WATT, LightKind};
 use crate::scene::material::TextureUse;

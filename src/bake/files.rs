@@ -1,21 +1,18 @@
 //! The files of a bake: what each is called and what it holds.
 
-use std::collections::{HashMap, HashSet};
+use std::collections::HashMap;
 use std::f32::consts::PI;
 
 use glam::Vec3;
 
 use super::document::{self, Geometry, Kind};
+use super::names::{ENDINGS, ERROR, GEOMETRY, IRRADIANCE, LIGHTMAP, LIGHTMAP_SCENE, Names, RADIANCE, RADIANCE_SCENE};
 use super::{Layout, Map, MeshLightmap};
 use crate::error::Result;
 use crate::output::colour;
 use crate::output::destination::{Folder, write_all};
 use crate::scene::material::TextureUse;
 use crate::scene::{Material, Scene};
-
-pub const GEOMETRY: &str = "scene.bin";
-const RADIANCE_SCENE: &str = "scene.gltf";
-const LIGHTMAP_SCENE: &str = "scene_lightmap.gltf";
 
 /// Writes all files of a bake, or none. `exposure` multiplies radiance (and irradiance / pi) in every
 /// PNG and in the scenes; EXR files hold values untouched. `maps` are all of [`Layout::maps`].
@@ -52,13 +49,6 @@ pub fn write(folder: &Folder, scene: &Scene, layout: &Layout, maps: &[Map], expo
     write_all(files.map(|(name, content)| (folder.file(&name), content)))
 }
 
-const IRRADIANCE: &str = "_irradiance.exr";
-const ERROR: &str = "_error.exr";
-const PREVIEW: &str = ".png";
-const RADIANCE: &str = "_radiance.png";
-const LIGHTMAP: &str = "_lightmap.png";
-const ENDINGS: [&str; 5] = [IRRADIANCE, ERROR, PREVIEW, RADIANCE, LIGHTMAP];
-
 /// Irradiance that is white in the map's linear PNG: the brightest, but for the brightest thousandth
 /// of its texels. So a few caustic texels do not leave the rest a handful of 8-bit steps.
 fn ceiling(map: &Map) -> f32 {
@@ -89,83 +79,9 @@ fn radiance(scene: &Scene, lightmap: &MeshLightmap, map: &Map) -> Vec<Vec3> {
     lightmap.spread(&radiance.collect::<Vec<_>>())
 }
 
-/// File names, each once even where case does not count.
-pub struct Names {
-    /// One a mesh of the scene; empty where it has no map.
-    stems: Vec<String>,
-}
-
-impl Names {
-    fn new(scene: &Scene, layout: &Layout) -> Names {
-        let mut taken: HashSet<String> = [GEOMETRY, RADIANCE_SCENE, LIGHTMAP_SCENE].map(str::to_owned).into();
-        taken.extend((0..scene.textures.len()).map(texture_name));
-        let mut stems = vec![String::new(); scene.meshes.len()];
-        // Meshes of one name are told apart by numbers that go on, so that many of them cost no search.
-        let mut counts = HashMap::new();
-        for (mesh, lightmap) in layout.lightmaps() {
-            let wanted = sanitised(&lightmap.mesh.name);
-            let count = counts.entry(wanted.to_lowercase()).or_insert(0);
-            stems[mesh] = loop {
-                *count += 1;
-                let stem = if *count == 1 { wanted.clone() } else { format!("{wanted}_{count}") };
-                let files = ENDINGS.map(|ending| format!("{stem}{ending}").to_lowercase());
-                if files.iter().all(|file| !taken.contains(file)) {
-                    taken.extend(files);
-                    break stem;
-                }
-            };
-        }
-        Names { stems }
-    }
-
-    fn stem(&self, mesh: usize) -> &str {
-        &self.stems[mesh]
-    }
-
-    pub fn radiance(&self, mesh: usize) -> String {
-        format!("{}{RADIANCE}", self.stem(mesh))
-    }
-
-    pub fn lightmap(&self, mesh: usize) -> String {
-        format!("{}{LIGHTMAP}", self.stem(mesh))
-    }
-
-    pub fn texture(&self, texture: usize) -> String {
-        texture_name(texture)
-    }
-}
-
-fn texture_name(texture: usize) -> String {
-    format!("texture_{texture}.png")
-}
-
-/// A name that every file system takes and that needs no escapes in a URI's path: letters, digits, `-`
-/// and `_`.
-fn sanitised(name: &str) -> String {
-    const LONGEST: usize = 60;
-    // Names of devices on Windows, whatever their extension.
-    const RESERVED: [&str; 4] = ["con", "prn", "aux", "nul"];
-    let kept = |letter: char| if letter.is_alphanumeric() || letter == '-' { letter } else { '_' };
-    let text: String = name.trim().chars().take(LONGEST).map(kept).collect();
-    let is_port = |text: &str| text.len() == 4 && (text.starts_with("com") || text.starts_with("lpt"));
-    let lower = text.to_lowercase();
-    match text.is_empty() || RESERVED.contains(&lower.as_str()) || is_port(&lower) {
-        true => format!("mesh_{text}"),
-        false => text,
-    }
-}
-
 #[cfg(test)]
 mod tests {
     use super::*;
-
-    #[test]
-    fn names_suit_every_file_system() {
-        let names = ["tall block", "../../etc/passwd", "a:b*c?", "Würfel", "", "NUL", "com1", ".hidden"];
-        let sane = ["tall_block", "______etc_passwd", "a_b_c_", "Würfel", "mesh_", "mesh_NUL", "mesh_com1", "_hidden"];
-        assert_eq!(names.map(sanitised), sane);
-        assert!(sanitised(&"x".repeat(500)).len() < 100);
-    }
 
     #[test]
     fn a_few_bright_texels_do_not_set_the_scale() {

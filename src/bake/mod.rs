@@ -44,6 +44,7 @@
 mod document;
 mod files;
 mod gutters;
+mod names;
 mod raster;
 mod texels;
 pub mod unwrap;

@@ -9,10 +9,10 @@ use std::time::{Duration, Instant};
 use glam::{DVec3, Vec3};
 
 use super::Lab;
-use super::experiments::{Found, limit_of_round};
+use super::experiment::Found;
 use super::scene::{self, Job};
 use crate::error::Result;
-use crate::plan::transport::usual_radius;
+use crate::plan::planning::usual_radius;
 use crate::scene::geometry::Geometry;
 use crate::scene::{Scene, Surface, built_in};
 use crate::settings::Builder;
@@ -108,7 +108,7 @@ pub fn measure(lab: &mut Lab, name: &str) -> Result<Found> {
         None => (f64::NAN, format!("{} % at {size} x {size} was not reached; the best was {:.2} %", 100.0 * wanted, 100.0 * closest)),
     };
     let how = format!("{how}; reference: {}, own error {:.2} %", search.reference.method, 100.0 * search.reference.relative_error);
-    let limit = limit_of_round(&timed).map(|ms| seconds * ms / timed.round_ms);
+    let limit = timed.limit_of_round().map(|ms| seconds * ms / timed.round_ms);
     Ok((timed.passes, vec![(seconds, limit, how)]))
 }
 

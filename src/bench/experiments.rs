@@ -2,9 +2,8 @@
 
 use std::time::Instant;
 
-use serde::Serialize;
-
 use super::accuracy;
+use super::experiment::{Experiment, Found};
 use super::pass::Pass;
 use super::room::{self, Timed};
 use super::scale::ball_room;
@@ -19,70 +18,6 @@ use crate::scene::geometry::Geometry;
 use crate::settings::transport::{Effect, Illumination, TransportSettings};
 use crate::settings::{Builder, Preset, Settings};
 use crate::timings::Spread;
-
-#[derive(Debug, Clone, Copy, PartialEq, Eq, Serialize)]
-pub enum Experiment {
-    OpenBox,
-    Builders,
-    Compaction,
-    Table1,
-    Index,
-    Gather,
-    Cornell,
-    CornellSpheres,
-    CausticSphere,
-    Mesh,
-    Effects,
-}
-
-impl Experiment {
-    pub const ALL: [Experiment; 11] = [
-        Experiment::OpenBox,
-        Experiment::Builders,
-        Experiment::Table1,
-        Experiment::Index,
-        Experiment::Gather,
-        Experiment::Cornell,
-        Experiment::CornellSpheres,
-        Experiment::CausticSphere,
-        Experiment::Mesh,
-        Experiment::Effects,
-        // Takes all the time that is left.
-        Experiment::Compaction,
-    ];
-
-    pub fn name(self) -> &'static str {
-        match self {
-            Experiment::OpenBox => "open-box",
-            Experiment::Builders => "builders",
-            Experiment::Compaction => "compaction",
-            Experiment::Table1 => "table-1",
-            Experiment::Index => "index",
-            Experiment::Gather => "gather",
-            Experiment::Cornell => "cornell",
-            Experiment::CornellSpheres => "cornell-spheres",
-            Experiment::CausticSphere => "caustic-sphere",
-            Experiment::Mesh => "mesh",
-            Experiment::Effects => "effects",
-        }
-    }
-
-    pub fn title(self) -> &'static str {
-        match self {
-            Experiment::OpenBox => "open box, 15 bounces, every builder",
-            Experiment::Builders => "the paper's workload, 2 and 15 bounces, every builder",
-            Experiment::Compaction => "fastest builder by photon count and survival",
-            Experiment::Table1 => "last row of table 1",
-            Experiment::Index => "index of a large photon map",
-            Experiment::Gather => "gather at the points of a picture",
-            Experiment::Cornell => "cornell, 16 bounces",
-            Experiment::CornellSpheres => "cornell-spheres: time to an error",
-            Experiment::CausticSphere => "caustic-sphere: time to an error",
-            Experiment::Mesh => "many triangles",
-            Experiment::Effects => "effects that a scene lacks",
-        }
-    }
-}
 
 /// What an experiment gives.
 pub struct Results {
@@ -111,19 +46,6 @@ pub fn run(lab: &mut Lab, experiment: Experiment) -> Result<Results> {
     Ok(Results { findings: findings(lab, experiment, &found), passes, compaction: map })
 }
 
-/// Passes, and for each target (found, limit, how).
-pub type Found = (Vec<Pass>, Vec<(f64, Option<f64>, String)>);
-
-/// Milliseconds that a pass takes at least.
-fn limit_ms(pass: Option<&Pass>) -> Option<f64> {
-    pass.and_then(|pass| pass.limit).map(|limit| limit.ms)
-}
-
-/// The same of all outermost passes together.
-pub fn limit_of_round(timed: &Timed) -> Option<f64> {
-    timed.passes.iter().filter(|pass| !pass.name.contains('/')).map(|pass| limit_ms(Some(pass))).sum()
-}
-
 /// The paper's box at other sizes: cells of a centimetre, random numbers that fit any count, all photons at once.
 fn large_box(builder: Builder, photons: u32, mesh: u32) -> Settings {
     Settings { builder, photons, mesh, radius: 0.01, rng: Rng::Philox, chunk: Some(photons), ..Settings::default() }
@@ -138,7 +60,7 @@ fn open_box(lab: &mut Lab) -> Result<Found> {
         let timed = room::time(lab.gpu, &lab.rates, &large_box(builder, photons, lab.choose(16, 64, 64)), lab.cancelled)?;
         let rate = timed.counts.events / timed.ms("build") * 1e3;
         if best.as_ref().is_none_or(|best| rate > best.0) {
-            let limit = limit_ms(timed.pass("build")).map(|ms| timed.counts.events / ms * 1e3);
+            let limit = timed.limit_ms("build").map(|ms| timed.counts.events / ms * 1e3);
             best = Some((rate, limit, format!("{}, {photons} photons per round", builder.name())));
         }
         passes.extend(timed.passes);
@@ -156,7 +78,7 @@ fn builders(lab: &mut Lab) -> Result<Found> {
             lab.go_on()?;
             let settings = Settings { bounces, radius: Settings::default().radius, ..large_box(builder, photons, lab.choose(16, 32, 64)) };
             let timed = room::time(lab.gpu, &lab.rates, &settings, lab.cancelled)?;
-            builds.push((builder, timed.ms("build"), limit_ms(timed.pass("build"))));
+            builds.push((builder, timed.ms("build"), timed.limit_ms("build")));
             passes.extend(timed.passes);
             // The paper's atomics literally, where more counters serve the device better.
             if timed.counters > 1 {
@@ -199,7 +121,7 @@ fn table_1(lab: &mut Lab) -> Result<Found> {
         let median = |value: &dyn Fn(&Timed) -> f64| Spread::of(runs.iter().map(value).collect()).map_or(f64::NAN, |spread| spread.median);
         let seconds = 1e-3 * median(&|run| run.run_ms);
         if best.as_ref().is_none_or(|best| seconds < best.0) {
-            let limit = limit_of_round(&runs[0]).map(|ms| 1e-3 * ms * f64::from(settings.rounds));
+            let limit = runs[0].limit_of_round().map(|ms| 1e-3 * ms * f64::from(settings.rounds));
             let how = format!(
                 "{} rounds of {} photons, {}, set-up included; {:.4} s wall time",
                 settings.rounds,
@@ -229,7 +151,7 @@ fn index(lab: &mut Lab) -> Result<Found> {
     let mut found = Vec::new();
     let stored = of_room.counts.survivors;
     let how = |stored: f64| format!("measured with {stored:.0} photons in the map, time scaled in proportion");
-    found.push((scaled(of_room.ms("index"), stored), limit_ms(of_room.pass("index")).map(|ms| scaled(ms, stored)), how(stored)));
+    found.push((scaled(of_room.ms("index"), stored), of_room.limit_ms("index").map(|ms| scaled(ms, stored)), how(stored)));
 
     lab.go_on()?;
     let scene = built_in::by_name("cornell").expect("it is built in");
@@ -245,9 +167,8 @@ fn index(lab: &mut Lab) -> Result<Found> {
     let share = stored_of(&job(few))? / f64::from(few);
     let job = job((wanted / share) as u32);
     let of_scene = scene::time(lab.gpu, &lab.rates, &job, lab.cancelled)?;
-    let pass = of_scene.pass("global/index");
-    let stored = pass.and_then(|pass| pass.work).map_or(f64::NAN, |work| work.items);
-    found.push((scaled(of_scene.ms("global/index"), stored), limit_ms(pass).map(|ms| scaled(ms, stored)), how(stored)));
+    let stored = of_scene.pass("global/index").and_then(|pass| pass.work).map_or(f64::NAN, |work| work.items);
+    found.push((scaled(of_scene.ms("global/index"), stored), of_scene.limit_ms("global/index").map(|ms| scaled(ms, stored)), how(stored)));
     Ok(([of_room.passes, of_scene.passes].concat(), found))
 }
 
@@ -283,7 +204,7 @@ fn gather(lab: &mut Lab) -> Result<Found> {
     let per_estimate = survey(&job)?.map_or(f64::NAN, |survey| survey.per_estimate);
     let timed = scene::time(lab.gpu, &lab.rates, &job, lab.cancelled)?;
     let how = format!("{} x {} points, {photons} photons emitted, {per_estimate:.1} per estimate", size.0, size.1);
-    let found = (1e-3 * timed.ms("global/gather"), limit_ms(timed.pass("global/gather")).map(|ms| 1e-3 * ms), how);
+    let found = (1e-3 * timed.ms("global/gather"), timed.limit_ms("global/gather").map(|ms| 1e-3 * ms), how);
     Ok((timed.passes, vec![found]))
 }
 
@@ -319,7 +240,7 @@ fn best_builder(lab: &mut Lab, job: &Job, pass: &str, how: &str) -> Result<Found
         let found = rate(timed.ms(pass));
         if best.as_ref().is_none_or(|best| found > best.0) {
             let how = format!("{}, {} photons per round, {how}", builder.name(), job.settings.photons);
-            best = Some((found, limit_ms(timed.pass(pass)).map(rate), how));
+            best = Some((found, timed.limit_ms(pass).map(rate), how));
         }
         passes.extend(timed.passes);
     }

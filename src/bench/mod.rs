@@ -6,6 +6,7 @@
 
 pub mod accuracy;
 pub mod chart;
+pub mod experiment;
 pub mod experiments;
 pub mod pass;
 pub mod rates;
@@ -25,7 +26,7 @@ use crate::error::{Error, Result};
 use crate::gpu::Gpu;
 use crate::output::destination::{Folder, write_all};
 use crate::study::chart::alone;
-use experiments::Experiment;
+use experiment::Experiment;
 use pass::Pass;
 use rates::Rates;
 use scale::Scale;

@@ -69,6 +69,16 @@ impl Timed {
     pub fn ms(&self, name: &str) -> f64 {
         self.pass(name).map_or(f64::NAN, |pass| pass.ms.median)
     }
+
+    /// Milliseconds that a pass takes at least.
+    pub fn limit_ms(&self, name: &str) -> Option<f64> {
+        self.pass(name)?.limit.map(|limit| limit.ms)
+    }
+
+    /// The same of all outermost passes together.
+    pub fn limit_of_round(&self) -> Option<f64> {
+        self.passes.iter().filter(|pass| !pass.name.contains('/')).map(|pass| pass.limit.map(|limit| limit.ms)).sum()
+    }
 }
 
 /// Rounds that count.

@@ -4,7 +4,7 @@ use serde::Serialize;
 
 use super::Lab;
 use super::Size;
-use super::experiments::Experiment;
+use super::experiment::Experiment;
 
 #[derive(Debug, Clone, Copy, PartialEq, Serialize)]
 #[serde(rename_all = "snake_case")]

@@ -14,7 +14,7 @@ use crate::error::{Error, Result};
 use crate::output::colour::ColourPicture;
 use crate::output::destination::{Folder, check_distinct, write_all};
 use crate::output::light_report;
-use crate::plan::transport::Sensor;
+use crate::plan::sensor::Sensor;
 use crate::records::Receiver;
 use crate::scene::Scene;
 use crate::scene::geometry::Geometry;

@@ -9,7 +9,7 @@ use clap::{Args, ValueEnum};
 use super::parse::parse_seconds;
 use super::progress::{ProgressArgs, ProgressReporter};
 use super::{DeviceArgs, End, JsonArg, optional_file, say_beside};
-use crate::bench::experiments::Experiment;
+use crate::bench::experiment::Experiment;
 use crate::bench::{self, Request, Size, table};
 use crate::error::{Error, Result};
 use crate::gpu::Gpu;

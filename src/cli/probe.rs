@@ -13,7 +13,7 @@ use super::{End, complain, say_beside};
 use crate::error::{Error, Result};
 use crate::output::destination::{Destination, check_distinct, write_all};
 use crate::output::light_report;
-use crate::plan::transport::Sensor;
+use crate::plan::sensor::Sensor;
 use crate::records::Receiver;
 use crate::scene::geometry::Geometry;
 use crate::scene::{Light, LightKind, Mesh};

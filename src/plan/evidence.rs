@@ -2,7 +2,7 @@
 
 use serde::Serialize;
 
-use super::transport::Sensor;
+use super::sensor::Sensor;
 use crate::constants::*;
 use crate::scene::geometry::Geometry;
 use crate::scene::{Material, Scene, Surface};

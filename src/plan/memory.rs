@@ -5,7 +5,8 @@ use bytemuck::Pod;
 use glam::UVec2;
 
 use super::Plan;
-use super::transport::{MapPlan, SEGMENT_BOUNCES, Sensor, TransportPlan};
+use super::sensor::Sensor;
+use super::transport::{MapPlan, TransportPlan};
 use crate::constants::{
     FACE_COUNT, HIT_KINDS, MAX_NONFINITE_VALUES, NONFINITE_ESTIMATE, PART_COUNT, SCAN_ITEMS, TALLY_COPIES, TOTAL_WORDS, TREE_LEAF, TREE_RUN,
 };
@@ -173,7 +174,7 @@ pub(super) fn of_transport(plan: &TransportPlan, geometry: &Geometry, keeps: &dy
         // Both maps of a round use the same buffers in turn.
         let most = |size: fn(&MapPlan) -> u32| plan.maps().map(size).max().map_or(0, u64::from);
         let (paths, capacity, buckets) = (most(|map| map.path_array_length), most(|map| map.capacity), most(|map| map.bucket_count));
-        let counters = plan.maps().map(|map| u64::from(map.segment_bounces.min(SEGMENT_BOUNCES)) + 2).max().unwrap_or(2);
+        let counters = plan.maps().map(MapPlan::counter_count).max().unwrap_or(2);
         buffers.extend([
             ("light paths", 2 * array::<LightPath>(paths)),
             ("map", array::<MapPhoton>(capacity)),

@@ -5,6 +5,8 @@ pub mod capacity;
 pub mod effect;
 pub mod evidence;
 pub mod memory;
+pub mod planning;
+pub mod sensor;
 pub mod transport;
 
 use std::ops::Range;

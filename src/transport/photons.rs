@@ -9,7 +9,7 @@ use crate::gpu::kernels::{
     DispatchSize, MapCount, MapScatter, MapSize, SceneEmit, SceneTraceAtomic, SceneTraceBallot, SceneTracePersistent,
 };
 use crate::gpu::{Commands, Extent};
-use crate::plan::transport::{MapPlan, SEGMENT_BOUNCES, TransportPlan};
+use crate::plan::transport::{MapPlan, TransportPlan};
 use crate::prefix_sum::scan;
 use crate::records::{CellPush, DispatchSizePush, Draws, EmissionPush, FlightPush, PhotonEmission, PhotonStore, SceneTracePersistentPush};
 use crate::rng::words;
@@ -51,7 +51,7 @@ pub fn trace(
     chunk: (u32, u32),
     gather: &mut dyn FnMut(&mut Commands) -> Result<()>,
 ) -> Result<()> {
-    commands.fill(&photons.counters, 0, counter_count(map), 0);
+    commands.fill(&photons.counters, 0, map.counter_count(), 0);
     let mut start = Start::Lights(chunk);
     let mut first_bounce = 0;
     loop {
@@ -61,7 +61,7 @@ pub fn trace(
         if first_bounce == map.bounces {
             return gather(commands);
         }
-        let counters = commands.read::<u32>(&photons.counters, counter_count(map) as usize)?;
+        let counters = commands.read::<u32>(&photons.counters, map.counter_count() as usize)?;
         let left = counters[if is_persistent(round.plan) { 1 } else { 1 + flights as usize }];
         let stored = counters[0];
         if left == 0 {
@@ -72,7 +72,7 @@ pub fn trace(
         if is_full {
             gather(commands)?;
         }
-        commands.fill(&photons.counters, 0, counter_count(map), 0);
+        commands.fill(&photons.counters, 0, map.counter_count(), 0);
         if !is_full {
             commands.fill(&photons.counters, 0, 1, stored);
         }
@@ -82,11 +82,6 @@ pub fn trace(
 
 fn is_persistent(plan: &TransportPlan) -> bool {
     plan.builder() == Builder::Persistent
-}
-
-/// Words of the counters: length of the map, then of the lists of a segment.
-pub fn counter_count(map: &MapPlan) -> u64 {
-    2 + u64::from(map.segment_bounces.min(SEGMENT_BOUNCES))
 }
 
 /// So many flights of each photon; says where those are that are left.

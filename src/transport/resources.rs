@@ -4,7 +4,6 @@ use bytemuck::Pod;
 use glam::UVec2;
 
 use super::losses::ANOMALY_WORDS;
-use super::photons::counter_count;
 use crate::constants::{HIT_KINDS, PART_COUNT};
 use crate::error::Result;
 use crate::gpu::{Buffer, Commands, Gpu, Memory};
@@ -136,7 +135,7 @@ impl PhotonBuffers {
         let most = |size: fn(&MapPlan) -> u32| plan.maps().map(size).max().map_or(0, u64::from);
         let device = Memory::Device;
         let (paths, capacity, buckets) = (most(|map| map.path_array_length), most(|map| map.capacity), most(|map| map.bucket_count));
-        let counters = plan.maps().map(counter_count).max().unwrap_or(2);
+        let counters = plan.maps().map(MapPlan::counter_count).max().unwrap_or(2);
         let rows = plan.tally_rows();
         let buffers = PhotonBuffers {
             paths: [

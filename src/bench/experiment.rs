@@ -1,0 +1,72 @@
+//! The names of the experiments, and what each finds.
+
+use serde::Serialize;
+
+use super::pass::Pass;
+
+#[derive(Debug, Clone, Copy, PartialEq, Eq, Serialize)]
+pub enum Experiment {
+    OpenBox,
+    Builders,
+    Compaction,
+    Table1,
+    Index,
+    Gather,
+    Cornell,
+    CornellSpheres,
+    CausticSphere,
+    Mesh,
+    Effects,
+}
+
+impl Experiment {
+    pub const ALL: [Experiment; 11] = [
+        Experiment::OpenBox,
+        Experiment::Builders,
+        Experiment::Table1,
+        Experiment::Index,
+        Experiment::Gather,
+        Experiment::Cornell,
+        Experiment::CornellSpheres,
+        Experiment::CausticSphere,
+        Experiment::Mesh,
+        Experiment::Effects,
+        // Takes all the time that is left.
+        Experiment::Compaction,
+    ];
+
+    pub fn name(self) -> &'static str {
+        match self {
+            Experiment::OpenBox => "open-box",
+            Experiment::Builders => "builders",
+            Experiment::Compaction => "compaction",
+            Experiment::Table1 => "table-1",
+            Experiment::Index => "index",
+            Experiment::Gather => "gather",
+            Experiment::Cornell => "cornell",
+            Experiment::CornellSpheres => "cornell-spheres",
+            Experiment::CausticSphere => "caustic-sphere",
+            Experiment::Mesh => "mesh",
+            Experiment::Effects => "effects",
+        }
+    }
+
+    pub fn title(self) -> &'static str {
+        match self {
+            Experiment::OpenBox => "open box, 15 bounces, every builder",
+            Experiment::Builders => "the paper's workload, 2 and 15 bounces, every builder",
+            Experiment::Compaction => "fastest builder by photon count and survival",
+            Experiment::Table1 => "last row of table 1",
+            Experiment::Index => "index of a large photon map",
+            Experiment::Gather => "gather at the points of a picture",
+            Experiment::Cornell => "cornell, 16 bounces",
+            Experiment::CornellSpheres => "cornell-spheres: time to an error",
+            Experiment::CausticSphere => "caustic-sphere: time to an error",
+            Experiment::Mesh => "many triangles",
+            Experiment::Effects => "effects that a scene lacks",
+        }
+    }
+}
+
+/// Passes, and for each target (found, limit, how).
+pub type Found = (Vec<Pass>, Vec<(f64, Option<f64>, String)>);
