@@ -64,6 +64,9 @@ constants! {
     NONE = 0xffff_ffff;
     /// Bit of a triangle's plane: others hide a part of the triangle.
     HIDDEN = 0x8000_0000;
+    /// What is nearer to a plane than the inverse lies in it: 16 units in the last place of a coordinate of 0.5, where
+    /// normalised scenes end. Rounding of positions and of their heights takes half of that (`glsl/scene/belongs.glsl`).
+    IN_PLANE_INVERSE = 2_097_152;
 
     /// What an emitter is; see `scene::LightKind`.
     EMITTER_TRIANGLE = 0;

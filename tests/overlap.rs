@@ -2,11 +2,12 @@
 
 use crate::common::lit::{flights, level, matt, means, received, scene_of, seen, shining};
 use crate::common::{assert_holds, device, z_check};
-use glam::{DQuat, DVec3};
+use glam::{DQuat, DVec3, Vec3};
 use photonmill::constants::HIDDEN;
 use photonmill::gpu::Gpu;
 use photonmill::judge::Judge;
 use photonmill::scene::geometry::Geometry;
+use photonmill::scene::light::LightKind;
 use photonmill::scene::{Camera, Mesh, Scene, built_in};
 use photonmill::settings::transport::{Illumination, Part, TransportSettings};
 
@@ -267,5 +268,32 @@ fn the_judge_counts_an_overlap_once() {
         let [found, expected] = [found.mean.total().x, expected.mean.total().x];
         assert!(error < 0.03 * expected, "{at}: {error} of {expected}");
         assert_holds("judge", z_check(&format!("{at}"), found, expected, error));
+    }
+}
+
+/// Rays that start close above a rug see the rug, however little rounding leaves of their way, and where the rug ends the floor.
+#[test]
+fn short_rays_see_what_counts() {
+    let Some(gpu) = device() else { return };
+    let lamp = LightKind::Point { position: DVec3::Y * 2.0, intensity: Vec3::ONE };
+    let settings = TransportSettings { photons: 1, rounds: 1, shadow_rays: 1, ..TransportSettings::default() };
+    for (what, lift) in [("on the floor", 0.0), ("above the floor", 3e-6), ("below the floor", -3e-6)] {
+        let floor = level(0.0, [10.0; 2], true, 0);
+        let mut rug = level(0.0, [2.0; 2], true, 1);
+        rug.positions.iter_mut().for_each(|at| at.y += lift);
+        let scene = scene_of(vec![floor, rug], vec![matt(0.2), matt(0.8)], vec![lamp.clone()]);
+        for height in [0.02, 0.001] {
+            let down = |albedo: f64, middle: DVec3| {
+                let at = |k: u32| middle + DVec3::new(f64::from(k % 20) * 0.01 - 0.1, height, f64::from(k / 20) * 0.01 - 0.1);
+                let points: Vec<(DVec3, DVec3)> = (0..400).map(|k| (at(k), DVec3::NEG_Y)).collect();
+                let seen = means(&received(&gpu, &scene, &settings, &points));
+                // A few rays run so flat that they reach another place.
+                let exact = albedo * middle.with_y(2.0).length_squared().recip() * 2.0 / middle.with_y(2.0).length();
+                let others = seen.iter().filter(|mean| (mean.x / exact - 1.0).abs() > 0.25).count();
+                assert!(others <= 4, "rug {what}, probes {height} m above albedo {albedo}: {others} of 400 see something else");
+            };
+            down(0.8, DVec3::ZERO);
+            down(0.2, DVec3::X * 3.0);
+        }
     }
 }

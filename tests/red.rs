@@ -157,7 +157,7 @@ const FAULTS: [Fault; 65] = [
     },
     Fault {
         what: "every other lane of a subgroup writes over its neighbour",
-        file: "builder/ballot.glsl",
+        file: "append/ballot.glsl",
         from: "subgroupBallotExclusiveBitCount(survivors);",
         to: "(subgroupBallotExclusiveBitCount(survivors) & 0xfffffffeu);",
         kernels: &["scene_trace_persistent", "trace_persistent", "scene_trace_ballot"],
@@ -165,7 +165,7 @@ const FAULTS: [Fault; 65] = [
     },
     Fault {
         what: "a subgroup's second paths write over its first ones'",
-        file: "builder/block.glsl",
+        file: "append/block.glsl",
         from: "count + subgroupBallotExclusiveBitCount(survivors);",
         to: "subgroupBallotExclusiveBitCount(survivors);",
         kernels: &["trace_ballot"],
@@ -221,7 +221,7 @@ const FAULTS: [Fault; 65] = [
     },
     Fault {
         what: "the last invocation of each work group finds no place of its own",
-        file: "builder/group_prefix.glsl",
+        file: "append/group_prefix.glsl",
         from: "before += s < gl_SubgroupID",
         to: "before += s + 1 < gl_SubgroupID",
         kernels: &["trace_group"],

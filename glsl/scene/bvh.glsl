@@ -63,6 +63,13 @@ bool comes_towards(ShearedRay ray, vec3 a, vec3 b, vec3 c, float error)
     return height * height > 0.0625 * error * error * dot(normal, normal) && (height > 0.0) != (approach > 0.0);
 }
 
+// How far a ray still goes to get behind everything that may hide a triangle of its plane.
+float hidden_depth(ShearedRay ray, vec3 a, vec3 b, vec3 c)
+{
+    vec3 normal = cross(b - a, c - a);
+    return divide(abs(ray.shear.z) * norm(normal), abs(dot(normal, vec3(ray.shear.xy, 1.0))) * (0.5 * float(IN_PLANE_INVERSE)));
+}
+
 // Takes the triangle if the ray meets it within (0, hit.t), or at hit.t with a smaller number: then the
 // nearest hit does not depend on the order of the tests. `precise` keeps an edge's value the same, sign
 // apart, in both triangles that share it: no ray slips through between them.
@@ -90,11 +97,16 @@ void intersect_triangle(ShearedRay ray, uint index, inout Hit hit)
     if (t <= certain && !comes_towards(ray, a, b, c, triangle_error(triangle))) {
         return;
     }
-    // A back at the same place as a front lies behind it, whichever way their distances were rounded, and so does what
-    // others hide.
-    float rounding = min(certain, t * (1.0 / 262144.0));
-    t += (determinant < 0.0) != (ray.shear.z < 0.0) ? rounding : 0.0;
-    t += triangle.plane >= HIDDEN ? rounding : 0.0;
+    // A back at the same place as a front lies behind it, whichever way their distances were rounded.
+    t += (determinant < 0.0) != (ray.shear.z < 0.0) ? min(certain, t * (1.0 / 262144.0)) : 0.0;
+    if (triangle.plane >= HIDDEN) {
+        float depth = 2.0 * certain + hidden_depth(ray, a, b, c);
+        // What leaves one of those that hide it may start on either side of it.
+        if (t <= depth) {
+            return;
+        }
+        t += depth;
+    }
     if (t < hit.t || (t == hit.t && index < hit.triangle)) {
         precise float second = divide(v, determinant);
         precise float third = divide(w, determinant);

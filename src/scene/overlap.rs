@@ -12,10 +12,10 @@ use i_triangle::float::triangulatable::Triangulatable as _;
 use rayon::prelude::*;
 
 use super::{Material, Scene, Surface};
+use crate::constants::IN_PLANE_INVERSE;
 
-/// Corners that are no further from a plane lie in it: 16 units in the last place of a coordinate of 0.5, where
-/// normalised scenes end. Rounding of positions and of their heights takes half of that (`glsl/scene/belongs.glsl`).
-const IN_PLANE: f64 = 1.0 / 2_097_152.0;
+/// Corners that are no further from a plane lie in it.
+const IN_PLANE: f64 = 1.0 / IN_PLANE_INVERSE as f64;
 
 /// Overlaps and triangles that are no wider are rounding of edges that only touch.
 const WIDTH: f64 = 1.0 / 1_048_576.0;

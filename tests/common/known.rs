@@ -218,11 +218,11 @@ pub fn leaning_scatterer(gpu: &Gpu) -> Check<Complaint> {
     check_mean("a leaning scatterer", &lit, 0, exact, 1e-3)
 }
 
-/// A white patch that lies in a white plane a hundred times its size, turned so that neither is in its plane to the
+/// A white patch back to back with a white plane a hundred times its size, turned so that neither is in its plane to the
 /// last bit: what they scatter meets neither again.
 pub fn patch_in_a_plane(gpu: &Gpu) -> Check<Complaint> {
     let turn = DQuat::from_axis_angle(DVec3::new(0.3, 0.5, -0.8).normalize(), 1.1);
-    let mut meshes = vec![level(0.0, [4.0; 2], true, 0), level(0.0, [0.04; 2], true, 0)];
+    let mut meshes = vec![level(0.0, [4.0; 2], false, 0), level(0.0, [0.04; 2], true, 0)];
     meshes.iter_mut().flat_map(|mesh| &mut mesh.positions).for_each(|at| *at = turn * *at);
     let spot = LightKind::Spot {
         position: turn * DVec3::new(0.1, 0.5, 0.2),
