@@ -51,6 +51,15 @@ impl Bias {
         Bias { relative: 0.0, lower: 0.0, upper: 0.0, confidence, batches: 0, rounds_per_batch: 0, seconds: 0.0 }
     }
 
+    /// Of radii that are as small as they may be, and still wider than what many points lie in: a wider one tells nothing.
+    pub fn unknown(confidence: f64) -> Bias {
+        Bias { relative: f64::INFINITY, upper: f64::INFINITY, ..Bias::none(confidence) }
+    }
+
+    pub fn is_known(&self) -> bool {
+        self.upper.is_finite()
+    }
+
     /// Of radii whose mean square is so many times that of the one it was measured at.
     pub fn scaled(self, mean_squared_radius: f64) -> Bias {
         let Bias { relative, lower, upper, .. } = self;

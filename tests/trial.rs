@@ -1,6 +1,8 @@
 //! Default radii come from a trial round: from the photons around the points that are asked about, and not from the scene's
 //! area.
 
+use std::sync::atomic::AtomicBool;
+
 use glam::{DVec3, dvec3};
 
 use crate::common::lit::{level, light, matt, scene, scene_of, shining};
@@ -18,7 +20,7 @@ use photonmill::scene::geometry::Geometry;
 use photonmill::scene::{Camera, Scene};
 use photonmill::settings::Builder;
 use photonmill::settings::transport::{Part, TransportSettings};
-use photonmill::transport::{View, trial};
+use photonmill::transport::{self, View, trial};
 
 /// A room of 4 x 4 x 3 m with a lamp under its ceiling, on a ground of 800 m.
 fn room_on_a_plain() -> Scene {
@@ -157,4 +159,24 @@ fn a_radius_wider_than_what_it_lies_in_is_warned_of() {
     let told = warning([middle.clone(), corners].concat()).expect("a warning");
     assert!(told.contains("at 40 % of the points the next wall or edge is nearer than the search radius"), "{told}");
     assert_eq!(warning(middle), None);
+}
+
+/// The least radius that a scene of 200 km allows is wider than a room: two such radii differ by nothing, and tell no bias.
+#[test]
+fn a_room_too_small_for_its_scene_has_an_unknown_bias() {
+    let Some(gpu) = device() else { return };
+    for (width, is_known) in [(10.0, true), (2e5, false)] {
+        let mut scene = room_on_a_plain();
+        scene.meshes.push(level(-1.0, [width; 2], true, 0));
+        let geometry = Geometry::new(&scene).unwrap();
+        let points: Vec<_> = (0..8).map(|k| (dvec3(0.4 * f64::from(k) - 1.4, 0.0, 0.1), DVec3::Y)).collect();
+        let phases = [receivers(&geometry, &points)];
+        let view = View { geometry: &geometry, camera: None, phases: &phases };
+        let settings = TransportSettings { photons: 1 << 12, ..TransportSettings::default() };
+        let plan = trial::plan(&gpu, &scene, &view, &settings, Sensor::Receivers { count: points.len() as u32 }).unwrap();
+        let bias = transport::bias::measure(&gpu, &scene, &view, &plan, (1.0, 2), &AtomicBool::new(false)).unwrap().unwrap();
+        assert_eq!(bias.is_known(), is_known, "{width} m: {bias:?}");
+        let warning = light_report::radius_warning(&plan, &geometry, "point").unwrap_or_default();
+        assert_eq!(warning.contains("use --final-gather"), !is_known, "{width} m: {warning}");
+    }
 }

@@ -338,7 +338,7 @@ pub(super) fn run(args: &RunArgs, cancelled: &AtomicBool) -> Result<End> {
     announce(&reporter, gpu.as_ref(), &scene, &settings)?;
     let measure = |settings: &Settings, rounds| render::measure_bias(gpu.as_ref(), &scene, settings, rounds, cancelled);
     let before = match settings.stop.error.filter(|_| args.stop.bias) {
-        Some(wanted) => bias_before(wanted, false, &reporter, |rounds| measure(&settings, rounds))?,
+        Some(wanted) => bias_before(wanted, (false, false), &reporter, |rounds| measure(&settings, rounds))?,
         None => None,
     };
     let settings = Settings { stop: Stop { bias: before.map(|bias| bias.upper), ..settings.stop }, ..settings };

@@ -65,10 +65,10 @@ const FIRST_ROUNDS: u32 = 2;
 const REFINEMENTS: u32 = 4;
 
 /// Measures the bias of the first round's radius for a run that ends at an error, of which the bias is a part. `shrinks`
-/// says whether later radii are smaller.
+/// says whether later radii are smaller, `ends_otherwise` whether something else ends the run.
 pub(super) fn bias_before(
     wanted: f64,
-    shrinks: bool,
+    (shrinks, ends_otherwise): (bool, bool),
     reporter: &ProgressReporter,
     mut measure: impl FnMut(u32) -> Result<Option<Bias>>,
 ) -> Result<Option<Bias>> {
@@ -76,6 +76,13 @@ pub(super) fn bias_before(
     for refinement in 0..=REFINEMENTS {
         reporter.step(&format!("measuring the bias first: {} batches of {} at two radii", crate::bias::BATCHES, counted(rounds, "round")));
         let Some(bias) = measure(rounds)? else { return Ok(None) };
+        if !bias.is_known() && !ends_otherwise {
+            return Err(Error::setting(
+                "--error",
+                format!("{}%", 100.0 * wanted),
+                "cannot be reached with --bias: the search radius is wider than what the points lie in and cannot be smaller in a scene this wide; use --final-gather, make the scene smaller, or add --time",
+            ));
+        }
         // More than half of the error wanted is then left for noise.
         let is_decided = bias.upper <= 0.85 * wanted || bias.lower > wanted || refinement == REFINEMENTS;
         // Where the radius shrinks the bias need not be known as well: it will be small enough some day.

@@ -386,7 +386,9 @@ pub(super) fn light(
     let stop = plan.settings.stop;
     // The error asked for is noise and bias together, so the bias must be known beforehand.
     let before = match stop.error.filter(|_| bias) {
-        Some(wanted) => bias_before(wanted, alpha < 1.0, reporter, |rounds| of_first(&plan, (1.0, rounds)))?,
+        Some(wanted) => bias_before(wanted, (alpha < 1.0, stop.seconds.is_some() || stop.photons.is_some()), reporter, |rounds| {
+            of_first(&plan, (1.0, rounds))
+        })?,
         None => None,
     };
     plan.settings.stop.bias = before.map(|bias| bias.upper);

@@ -97,16 +97,17 @@ pub fn missing(plan: &TransportPlan) -> Option<String> {
     (!names.is_empty()).then(|| format!("left out, though the scene has it: {}; the result lacks that light", names.join(", ")))
 }
 
-/// Share of the points that may lie in something smaller than the radius.
-const TOO_WIDE: f64 = 0.1;
-
 /// One line on a radius by a trial round that is wider than what many points lie in.
 pub fn radius_warning(plan: &TransportPlan, geometry: &Geometry, point: &str) -> Option<String> {
-    let trial = plan.trial.as_ref().filter(|trial| trial.too_wide > TOO_WIDE)?;
+    let trial = plan.trial.as_ref().filter(|_| plan.radius_is_too_wide())?;
     let widest = plan.maps().filter(|map| map.radius_from == RadiusFrom::Trial).max_by(|a, b| a.radius.total_cmp(&b.radius))?;
-    let option = if widest.caustic_only { "--caustic-radius" } else { "--radius" };
+    let remedy = match widest.caustic_only {
+        _ if plan.bias_is_unknown() => "the scene is too wide for a smaller radius: use --final-gather, or leave out what makes it so wide",
+        true => "for a sharper result use more --photons or a smaller --caustic-radius",
+        false => "for a sharper result use more --photons or a smaller --radius",
+    };
     Some(format!(
-        "at {:.0} % of the {point}s the next wall or edge is nearer than the search radius of the {} map, {:.3} m, so the light there will be blurred; for a sharper result use more --photons or a smaller {option}",
+        "at {:.0} % of the {point}s the next wall or edge is nearer than the search radius of the {} map, {:.3} m, so the light there will be blurred; {remedy}",
         100.0 * trial.too_wide,
         widest.name,
         widest.radius * geometry.unit

@@ -167,6 +167,10 @@ pub(super) fn errors(rounds: u32, noise: Option<f64>, unknown: &Unknown, bias: O
         None if rounds == 1 => text.push_str("noise: unknown after a single round\n"),
         None => text.push_str("noise: unknown\n"),
     }
+    if bias.is_some_and(|bias| !bias.is_known()) {
+        text.push_str("bias of the radius: unknown, because the search radius is wider than what the points lie in and cannot be smaller in a scene this wide\n");
+        return text;
+    }
     if bias.is_some_and(|bias| bias.batches == 0) {
         text.push_str("bias of the radius: none, because no light comes from a photon map\n");
     } else if let Some(Bias { relative, lower, upper, batches, rounds_per_batch, seconds, .. }) = bias {

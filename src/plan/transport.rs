@@ -8,6 +8,7 @@ use serde::Serialize;
 use super::capacity::Persistence;
 use super::evidence::EffectDecision;
 use super::sensor::Sensor;
+use crate::bias::ROOM_BELOW;
 use crate::constants::*;
 use crate::records::*;
 use crate::scene::geometry::Geometry;
@@ -144,9 +145,23 @@ const FLIGHTS_PER_PHOTON: u64 = 8;
 /// Work of a ray, in pair tests.
 const RAY_COST: u64 = 64;
 
+/// Share of the points that may lie in something smaller than the radius.
+const TOO_WIDE: f64 = 0.1;
+
 impl TransportPlan {
     pub fn keeps(&self, effect: Effect) -> bool {
         self.decisions.iter().any(|decision| decision.effect == effect && decision.kept)
+    }
+
+    /// Whether many points of the trial lie in something narrower than the radius.
+    pub fn radius_is_too_wide(&self) -> bool {
+        self.trial.as_ref().is_some_and(|trial| trial.too_wide > TOO_WIDE)
+    }
+
+    /// Whether that radius also leaves no room for a smaller one, as the scene is so much wider than what the points lie in.
+    pub fn bias_is_unknown(&self) -> bool {
+        let is_least = |map: &MapPlan| map.radius_from == RadiusFrom::Trial && map.radius < ROOM_BELOW * RADIUS_RANGE.0;
+        self.radius_is_too_wide() && self.maps().any(is_least)
     }
 
     /// What traces the photons: the settings' builder, or the one that was chosen.

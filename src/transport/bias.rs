@@ -25,6 +25,9 @@ pub fn measure(
     if plan.maps().next().is_none() {
         return Ok(Some(Bias::none(plan.settings.stop.confidence)));
     }
+    if plan.bias_is_unknown() {
+        return Ok(Some(Bias::unknown(plan.settings.stop.confidence)));
+    }
     let room = plan.maps().map(|map| bias::ROOM_BELOW * RADIUS_RANGE.0 / map.radius).fold(0.0, f64::max);
     let factor = factor.max(room);
     bias::extrapolate(plan.settings.stop.confidence, rounds, |smaller, number| {
