@@ -3,6 +3,8 @@
 
 // A scene of few triangles needs no tree: its list is tested from end to end.
 layout(constant_id = 7) const bool HAS_BVH = true;
+// Some triangle is HIDDEN.
+layout(constant_id = 47) const bool HAS_OVERLAPS = true;
 layout(constant_id = 8) const bool HAS_SMOOTH_NORMALS = true;
 layout(constant_id = 9) const bool HAS_TEXTURES = true;
 layout(constant_id = 10) const bool HAS_TWO_SIDED = true;

@@ -175,6 +175,7 @@ impl TransportPlan {
         let shadow_rays = if split && keeps(Effect::Direct) { settings.shadow_rays } else { 0 };
         let constants = vec![
             ("HAS_BVH", flag(Effect::Bvh)),
+            ("HAS_OVERLAPS", u32::from(geometry.triangles.iter().any(|triangle| triangle.plane >= HIDDEN))),
             ("HAS_SMOOTH_NORMALS", flag(Effect::SmoothNormals)),
             ("HAS_TEXTURES", flag(Effect::Textures)),
             ("HAS_TWO_SIDED", flag(Effect::TwoSided)),
