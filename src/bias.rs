@@ -56,6 +56,10 @@ impl Bias {
         Bias { relative: f64::INFINITY, upper: f64::INFINITY, ..Bias::none(confidence) }
     }
 
+    /// Why a bias may be unknown.
+    pub const UNKNOWN: &str =
+        "the search radius exceeds the distance from many points to the next wall, and the scene is too wide for a smaller one";
+
     pub fn is_known(&self) -> bool {
         self.upper.is_finite()
     }

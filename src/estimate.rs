@@ -50,7 +50,7 @@ pub fn modules(plan: &Plan, facts: &DeviceFacts) -> Vec<Module> {
 }
 
 /// A gather of all points; its dispatches each cover a part.
-fn whole_push(plan: &Plan, photon_count: u32) -> GatherPush {
+fn push_for_all_points(plan: &Plan, photon_count: u32) -> GatherPush {
     GatherPush {
         first_point: 0,
         end_point: plan.points.len() as u32,
@@ -88,7 +88,7 @@ pub fn gather(commands: &mut Commands, resources: &Resources, plan: &Plan, photo
 /// Every point steps through the whole photon list, a slice of it an invocation.
 fn gather_brute(commands: &mut Commands, resources: &Resources, plan: &Plan, photon_count: u32) -> Result<()> {
     let Resources { film, points, photons, counters, .. } = resources;
-    let whole = whole_push(plan, photon_count);
+    let whole = push_for_all_points(plan, photon_count);
     let slice_count = whole.photon_capacity.div_ceil(GATHER_SLICE);
     let tests_per_point = u64::from(GATHER_SLICE);
     for (first_point, end_point) in point_ranges(commands, plan, tests_per_point, 1) {
@@ -114,7 +114,7 @@ fn gather_brute(commands: &mut Commands, resources: &Resources, plan: &Plan, pho
 fn gather_grid(commands: &mut Commands, resources: &Resources, index: &IndexBuffers, plan: &Plan, photon_count: u32) -> Result<()> {
     let Resources { film, points, dispatch_args, .. } = resources;
     let IndexBuffers { cells, sorted_photons, longest, .. } = index;
-    let whole = whole_push(plan, photon_count);
+    let whole = push_for_all_points(plan, photon_count);
     if plan.slices_candidates {
         commands.fill(longest, 0, 1, 0);
         commands.dispatch(CandidateCount { points, longest, cells }, &whole, Extent::Items(u64::from(whole.end_point)))?;

@@ -39,7 +39,7 @@ pub fn chunk(commands: &mut Commands, resources: &Resources, plan: &Plan, round:
         commands.fill(&resources.counters, 1, 1, photon_count);
         commands.add_work(plan.work.tracing(photon_count));
         if plan.settings.builder == Builder::Persistent {
-            return whole(commands, resources, plan, round, ranges);
+            return trace_persistent(commands, resources, plan, round, ranges);
         }
         commands.scope("emit", |commands| emit(commands, resources, plan, round, ranges))?;
         for bounce in 0..plan.settings.bounces {
@@ -83,7 +83,7 @@ fn photon_range(plan: &Plan, round: u32, range: &EmissionRange) -> PhotonRange {
 }
 
 /// Traces every photon from its light to its end.
-fn whole(commands: &mut Commands, resources: &Resources, plan: &Plan, round: u32, ranges: &[EmissionRange]) -> Result<()> {
+fn trace_persistent(commands: &mut Commands, resources: &Resources, plan: &Plan, round: u32, ranges: &[EmissionRange]) -> Result<()> {
     let Resources { rooms, walls, lights, stream_seeds, photons, origins, counters, tallies, nonfinite_values, .. } = resources;
     for range in ranges.iter().flat_map(|range| range.parts(plan.photons_per_dispatch())) {
         let push = TracePersistentPush {

@@ -246,8 +246,8 @@ const FAULTS: [Fault; 65] = [
     Fault {
         what: "a photon's last bounce is not counted",
         file: "stages/trace_persistent.glsl",
-        from: "if (flying) {\n            count_fate(",
-        to: "if (flying && !bounced.escaped) {\n            count_fate(",
+        from: "if (under_way) {\n            count_fate(",
+        to: "if (under_way && !bounced.escaped) {\n            count_fate(",
         kernels: &["trace_persistent"],
         noticed_by: &[(Ledger(Builder::Persistent), LedgerOpen)],
     },

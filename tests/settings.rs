@@ -6,7 +6,7 @@ use std::collections::BTreeMap;
 use photonmill::error::{Error, Result};
 use photonmill::rng::Rng;
 use photonmill::settings::transport::{Effect, TransportSettings};
-use photonmill::settings::{Gather, Preset, Settings};
+use photonmill::settings::{Builder, Gather, Preset, Settings};
 use photonmill::text::echo;
 
 const CASES: usize = 40_000;
@@ -192,7 +192,7 @@ fn settings_are_accepted_exactly_within_their_ranges() {
 fn any_transport_settings(random: &mut Random) -> TransportSettings {
     let mut settings = TransportSettings::default();
     for _ in 0..=random.below(3) {
-        match random.below(12) {
+        match random.below(13) {
             0 => settings.photons = random.count(1, 1 << 31),
             1 => settings.caustic_photons = random.count(1, 1 << 31),
             2 => settings.rounds = random.count(1, 1 << 20),
@@ -204,6 +204,7 @@ fn any_transport_settings(random: &mut Random) -> TransportSettings {
             8 => settings.group_size = if random.below(2) == 0 { 1 << random.below(12) } else { random.count(32, 1024) },
             9 => settings.chunk = Some(random.count(1, 1 << 31)),
             10 => settings.samples = if random.below(2) == 0 { 1 << random.below(12) } else { random.count(1, 1024) },
+            11 => settings.builder = Some(random.pick(&Builder::ON_GPU)),
             _ => {
                 settings.with = (0..random.below(4)).map(|_| random.pick(&Effect::ALL)).collect();
                 settings.without = (0..random.below(4)).map(|_| random.pick(&Effect::ALL)).collect();
@@ -221,11 +222,14 @@ fn transport_settings_are_accepted_exactly_within_their_ranges() {
     let rules = |settings: &TransportSettings| {
         let is_radius = |radius: Option<f64>| radius.is_none_or(|radius| radius > 0.0 && radius <= f64::MAX);
         let both = settings.with.iter().find(|effect| settings.without.contains(effect));
+        let builder = settings.builder;
+        let is_for_scenes = |builder| matches!(builder, Builder::Atomic | Builder::Ballot | Builder::Persistent);
         vec![
             rule("--photons", settings.photons, (1..=1 << 31).contains(&settings.photons)),
             rule("--caustic-photons", settings.caustic_photons, (1..=1 << 31).contains(&settings.caustic_photons)),
             rule("--rounds", settings.rounds, (1..=1 << 20).contains(&settings.rounds)),
             rule("--bounces", settings.bounces, (1..=10_000).contains(&settings.bounces)),
+            rule("--variant", builder.map_or("", Builder::name), builder.is_none_or(is_for_scenes)),
             rule("--shadow-rays", settings.shadow_rays, (1..=MAX_SHADOW_RAYS).contains(&settings.shadow_rays)),
             rule("--samples", settings.samples, (0..=10).any(|k| settings.samples == 1 << k)),
             rule("--radius", settings.radius.unwrap_or_default(), is_radius(settings.radius)),

@@ -1,4 +1,4 @@
-// As append/atomic.glsl, but from several counters in turn where COUNTERS is above 1.
+// As append/atomic.glsl, but from several counters, which work groups use round-robin where COUNTERS is above 1.
 
 uint take_place(uint counter, bool wanted)
 {

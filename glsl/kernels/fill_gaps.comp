@@ -1,4 +1,4 @@
-// Ends a bounce whose survivors took places from several counters in turn (append/striped_counters.glsl): says how many places that
+// Ends a bounce whose survivors took places from striped counters (append/striped_counters.glsl): says how many places that
 // makes, gaps included, marks the gaps as no photon and no path, and empties the counters for the next bounce.
 // Dispatched by src/trace.rs once a bounce, as one work group. One thread = every so many-th gap.
 #version 460

@@ -35,5 +35,5 @@ layout(set = 1, binding = 4, scalar) buffer Tallies { Tally tallies[]; };
 
 void main()
 {
-    fly();
+    scene_trace();
 }

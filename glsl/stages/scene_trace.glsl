@@ -4,7 +4,7 @@
 layout(set = 1, binding = 0, scalar) readonly buffer LightPaths { LightPath light_paths[]; };
 layout(set = 1, binding = 1, scalar) writeonly buffer NextLightPaths { LightPath next_light_paths[]; };
 
-void fly()
+void scene_trace()
 {
     uint index = invocation_index();
     Traced traced = no_flight();

@@ -12,11 +12,11 @@ void scene_trace_persistent()
     if (next >= push.stride) {
         next = push.emission.photon_count;
     }
-    bool flying = false;
+    bool under_way = false;
     uint flights = 0; // of the photon in this dispatch
     LightPath path;
     for (;;) {
-        if (!flying && next < push.emission.photon_count) {
+        if (!under_way && next < push.emission.photon_count) {
             if (push.first_bounce == 0) {
                 path = emit_photon(push.emission.first_photon + next, push.draws, push.emission);
             } else {
@@ -24,14 +24,14 @@ void scene_trace_persistent()
             }
             next += push.stride;
             flights = 0;
-            flying = true;
+            under_way = true;
         }
-        if (subgroupBallot(flying) == uvec4(0)) {
+        if (subgroupBallot(under_way) == uvec4(0)) {
             break;
         }
         Traced traced = no_flight();
         uint bounce = push.first_bounce + flights;
-        if (flying) {
+        if (under_way) {
             traced = trace_flight(path, bounce);
         }
         uint place = take_place(0, traced.stored);
@@ -40,15 +40,15 @@ void scene_trace_persistent()
             store(place, traced.photon);
         }
         uint row = min(bounce, TALLY_ROWS - 1);
-        if (flying) {
+        if (under_way) {
             count_fate(row, traced.alive, traced.absorbed, traced.escaped);
         }
         if (dropped) {
             count_on_device(row, FATE_DROPPED, 1);
         }
         flights++;
-        flying = traced.alive && flights < push.flights;
-        if (traced.alive && !flying) {
+        under_way = traced.alive && flights < push.flights;
+        if (traced.alive && !under_way) {
             if (bounce + 1 < push.bounces) {
                 next_light_paths[atomicAdd(counters[1], 1)] = path;
             } else {

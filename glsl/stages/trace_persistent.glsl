@@ -1,6 +1,6 @@
 // Photons from their light to their end, each in the registers of one invocation: no array of paths is read or
 // written between bounces. An invocation whose photon has ended takes its next one in the same step in which its
-// neighbours fly on (persistent threads, Aila and Laine 2009), so that a subgroup stays full.
+// neighbours go on (persistent threads, Aila and Laine 2009), so that a subgroup stays full.
 
 void trace_persistent()
 {
@@ -9,21 +9,21 @@ void trace_persistent()
     if (next >= push.stride) {
         next = push.range.count;
     }
-    bool flying = false;
+    bool under_way = false;
     uint bounce = 0;
     Path path;
     for (;;) {
-        if (!flying && next < push.range.count) {
+        if (!under_way && next < push.range.count) {
             path = leave_light(next, push.range);
             next += push.stride;
             bounce = 0;
-            flying = true;
+            under_way = true;
         }
-        if (subgroupBallot(flying) == uvec4(0)) {
+        if (subgroupBallot(under_way) == uvec4(0)) {
             break;
         }
         Bounced bounced = no_bounce();
-        if (flying) {
+        if (under_way) {
             bounced = bounce_path(path, bounce);
         }
         uint place = take_place(0, bounced.alive);
@@ -31,11 +31,11 @@ void trace_persistent()
         if (stored) {
             store_photon(place, bounced.photon);
         }
-        if (flying) {
+        if (under_way) {
             count_fate(bounce, stored, bounced.absorbed, bounced.escaped);
         }
         bounce++;
-        flying = stored && bounce < push.bounces;
+        under_way = stored && bounce < push.bounces;
     }
     close_tallies();
 }

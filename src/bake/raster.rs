@@ -55,7 +55,7 @@ impl Lattice {
 impl Triangle {
     /// Rows that may hold points of the triangle.
     pub fn rows(&self) -> Range<u32> {
-        whole(self.low.y, self.high.y, self.lattice.rows)
+        integers_within(self.low.y, self.high.y, self.lattice.rows)
     }
 
     /// Columns of the row's points within the triangle.
@@ -74,7 +74,7 @@ impl Triangle {
                 return 0..0;
             }
         }
-        whole(low, high, self.lattice.columns)
+        integers_within(low, high, self.lattice.columns)
     }
 
     /// Whether any point of the lattice lies within.
@@ -90,7 +90,7 @@ impl Triangle {
 }
 
 /// Whole numbers from `low` to `high`, both within `EDGE`, that are below `count`.
-fn whole(low: f64, high: f64, count: u32) -> Range<u32> {
+fn integers_within(low: f64, high: f64, count: u32) -> Range<u32> {
     // Casts of floats saturate, so what lies outside becomes an empty range.
     let start = (low - EDGE).ceil().max(0.0) as u32;
     let end = ((high + EDGE).floor() + 1.0).clamp(0.0, f64::from(count)) as u32;

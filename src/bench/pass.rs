@@ -184,7 +184,7 @@ pub fn rounds_of(timings: &Timings, rounds: u32, first: u32) -> Vec<(String, Vec
 }
 
 /// Sum of the outermost scopes: all of a round.
-pub fn whole(scopes: &[(String, Vec<f64>)]) -> f64 {
+pub fn sum_of_outermost(scopes: &[(String, Vec<f64>)]) -> f64 {
     let median = |values: &Vec<f64>| Spread::of(values.clone()).map_or(0.0, |spread| spread.median);
     scopes.iter().filter(|(name, _)| !name.contains('/')).map(|(_, values)| median(values)).sum()
 }
@@ -213,7 +213,7 @@ mod tests {
         let found = rounds_of(&timings(&[spans, later].concat()), 2, 0);
         let expected = [("build/bounce", vec![3.0, 30.0]), ("build", vec![4.0, 40.0]), ("gather", vec![7.0, 70.0])];
         assert_eq!(found, expected.map(|(name, ms)| (name.to_owned(), ms)));
-        assert_eq!(whole(&found), 22.0 + 38.5);
+        assert_eq!(sum_of_outermost(&found), 22.0 + 38.5);
         assert_eq!(rounds_of(&timings(&[spans, later].concat()), 2, 1)[1].1, [40.0]);
         // Commands were submitted in the second round's gather, and in the first round's second bounce.
         let cut = [

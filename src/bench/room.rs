@@ -2,7 +2,7 @@
 
 use std::sync::atomic::AtomicBool;
 
-use super::pass::{Cost, Pass, SLOW_OPERATION, Work, rounds_of, whole};
+use super::pass::{Cost, Pass, SLOW_OPERATION, Work, rounds_of, sum_of_outermost};
 use super::rates::{PHILOX_PRODUCTS, Rates};
 use crate::error::{Error, Result};
 use crate::gpu::{Gpu, HeldMemory};
@@ -132,7 +132,7 @@ fn timed(gpu: &Gpu, rates: &Rates, outcome: &RunResult, rounds: u32, first: u32)
     Timed {
         passes,
         counts,
-        round_ms: whole(&scopes),
+        round_ms: sum_of_outermost(&scopes),
         run_ms: sum("set-up") + sum("round"),
         wall_ms: outcome.timings.row("run").and_then(|row| row.wall_ms).unwrap_or(f64::NAN),
         dispatches: outcome.dispatches as f64 / f64::from(rounds),

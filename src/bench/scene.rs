@@ -6,7 +6,7 @@ use std::time::Instant;
 
 use rayon::prelude::*;
 
-use super::pass::{Cost, Pass, SLOW_OPERATION, Work, rounds_of, whole};
+use super::pass::{Cost, Pass, SLOW_OPERATION, Work, rounds_of, sum_of_outermost};
 use super::rates::{PHILOX_PRODUCTS, Rates};
 use super::room::{Counts, DROPPED, RANK_BYTES, REPEATS, Timed};
 use crate::error::{Error, Result};
@@ -141,7 +141,7 @@ fn time_once(gpu: &Gpu, rates: &Rates, job: &Job, cancelled: &AtomicBool) -> Res
     Ok(Timed {
         passes,
         counts: counts[0],
-        round_ms: whole(&scopes),
+        round_ms: sum_of_outermost(&scopes),
         run_ms: sum("set-up") + sum("round"),
         wall_ms: lit.timings.row("run").and_then(|row| row.wall_ms).unwrap_or(f64::NAN),
         dispatches: lit.dispatches as f64 / f64::from(rounds),
@@ -245,7 +245,7 @@ impl Model<'_> {
         let scan = Cost { bytes: 16.0 * buckets, ..Cost::default() };
         let sort = Cost { bytes: survey.stored * (2.0 * bytes::<MapPhoton>() + RANK_BYTES), ..Cost::default() };
         let found = survey.asking_points * survey.per_estimate;
-        let look_up = Cost {
+        let gather = Cost {
             bytes: survey.stored * bytes::<MapPhoton>() + survey.asking_points * (bytes::<VisiblePoint>() + 48.0),
             float_operations: found * PAIR_OPERATIONS,
             ..Cost::default()
@@ -256,15 +256,15 @@ impl Model<'_> {
         // A prefix sum goes down its levels and up again.
         let scans = chunks * (2.0 * block_sum_counts(u64::from(map.bucket_count) + 1, self.plan.settings.group_size).len() as f64 - 1.0);
         let sorts = 3.0 * chunks + scans;
-        let look_ups = chunks * 3.0;
+        let gathers = chunks * 3.0;
         let (item, items, dispatches, cost) = match stage {
-            "" => ("photons", counts.emitted, flights + sorts + look_ups, trace + count + scan + sort + look_up),
+            "" => ("photons", counts.emitted, flights + sorts + gathers, trace + count + scan + sort + gather),
             "trace" => ("events", counts.events, flights, trace),
             "index" => ("photons", survey.stored, sorts, count + scan + sort),
             "index/count" => ("photons", survey.stored, 2.0 * chunks, count),
             "index/scan" => ("cells", buckets, scans, scan),
             "index/sort" => ("photons", survey.stored, chunks, sort),
-            "gather" => ("photons found", found, look_ups, look_up),
+            "gather" => ("photons found", found, gathers, gather),
             _ => return None,
         };
         Some(Work { item, items, dispatches, cost })

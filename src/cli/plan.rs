@@ -11,7 +11,6 @@ use crate::gpu::Gpu;
 use crate::output::destination::write_all;
 use crate::output::light_report;
 use crate::plan::Limits;
-use crate::plan::sensor::Sensor;
 use crate::plan::transport::{RadiusFrom, TransportPlan};
 use crate::render;
 use crate::settings::transport::{Part, TransportSettings};
@@ -50,14 +49,7 @@ pub(super) fn run(args: &PlanArgs) -> Result<()> {
     let scene = args.scene.open(&reporter)?;
     let camera = camera(&scene, args.camera.as_deref())?;
     let (width, height) = PictureSize::resolve(args.size, &camera, &reporter)?;
-    let job = Job {
-        scene: &scene,
-        settings: &settings,
-        sensor: Sensor::Picture { width, height },
-        camera: Some(&camera),
-        phases: &[],
-        point: "pixel",
-    };
+    let job = Job::picture(&scene, &settings, &camera, (width, height));
     let geometry = geometry(&scene, &settings, &reporter)?;
     // A plan is data: it needs a device's limits, not the device.
     let limits = match Gpu::open(&args.device.options()) {

@@ -125,14 +125,7 @@ pub(super) fn run(args: &RenderArgs, cancelled: &AtomicBool) -> Result<End> {
     let scene = args.scene.open(&reporter)?;
     let camera = camera(&scene, args.camera.as_deref())?;
     let (width, height) = PictureSize::resolve(args.size, &camera, &reporter)?;
-    let job = Job {
-        scene: &scene,
-        settings: &settings,
-        sensor: Sensor::Picture { width, height },
-        camera: Some(&camera),
-        phases: &[],
-        point: "pixel",
-    };
+    let job = Job::picture(&scene, &settings, &camera, (width, height));
     let geometry = geometry(&scene, &settings, &reporter)?;
     let gpu = args.device.open(&reporter)?;
     let plan = plan(&gpu, &job, &geometry)?;

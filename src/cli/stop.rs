@@ -80,7 +80,10 @@ pub(super) fn bias_before(
             return Err(Error::setting(
                 "--error",
                 format!("{}%", 100.0 * wanted),
-                "cannot be reached with --bias: the search radius is wider than what the points lie in and cannot be smaller in a scene this wide; use --final-gather, make the scene smaller, or add --time",
+                format!(
+                    "cannot be reached with --bias: {}; use --final-gather without --bias, leave out what makes the scene so wide, or add --time",
+                    Bias::UNKNOWN
+                ),
             ));
         }
         // More than half of the error wanted is then left for noise.

@@ -311,6 +311,12 @@ pub(super) struct Job<'a> {
     pub(super) point: &'static str,
 }
 
+impl<'a> Job<'a> {
+    pub(super) fn picture(scene: &'a Scene, settings: &'a TransportSettings, camera: &'a Camera, (width, height): (u32, u32)) -> Job<'a> {
+        Job { scene, settings, sensor: Sensor::Picture { width, height }, camera: Some(camera), phases: &[], point: "pixel" }
+    }
+}
+
 /// The plan of a job, its default radii from a trial round.
 pub(super) fn plan(gpu: &Gpu, job: &Job, geometry: &Geometry) -> Result<TransportPlan> {
     let view = View { geometry, camera: job.camera, phases: job.phases };

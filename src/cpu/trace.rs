@@ -256,7 +256,7 @@ fn draw_by(rng: Rng, key: &RandomKey, bounce: u32, count: usize, paths: &mut Pat
 }
 
 #[inline(always)]
-fn fly(room: &Room, count: usize, paths: &Paths, hits: &mut Hits) {
+fn next_hits(room: &Room, count: usize, paths: &Paths, hits: &mut Hits) {
     for group in 0..count.div_ceil(LANES) {
         for lane in 0..LANES {
             let at = |columns: &[Column<f32>; 3]| Vec3::new(columns[0][group][lane], columns[1][group][lane], columns[2][group][lane]);
@@ -324,7 +324,7 @@ impl WithSimd for TraceBlock<'_> {
                 break;
             }
             draw(settings.rng, key, bounce, count, paths, &mut hits);
-            fly(&tracer.room, count, paths, &mut hits);
+            next_hits(&tracer.room, count, paths, &mut hits);
             let tally = tracer.play_roulette(count, &hits, &mut survivors);
             tallies[bounce as usize] = tally;
             count = tally.stored as usize;

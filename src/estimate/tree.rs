@@ -1,6 +1,6 @@
 //! Density estimation over the kd-tree: with all photons within the radius, or with the nearest of them.
 
-use super::{adds_in_one_word, point_ranges, whole_push};
+use super::{adds_in_one_word, point_ranges, push_for_all_points};
 use crate::constants::{GATHER_SLICE, MAX_GROUPS};
 use crate::error::Result;
 use crate::gpu::kernels::{GatherTreeTwoWords, GatherTreeU64, NearestTwoWords, NearestU64, SliceCount};
@@ -31,7 +31,7 @@ pub(super) fn gather(commands: &mut Commands, resources: &Resources, tree: &Tree
 fn gather_radius(commands: &mut Commands, resources: &Resources, tree: &TreeBuffers, plan: &Plan, photon_count: u32) -> Result<()> {
     let Resources { film, points, dispatch_args, .. } = resources;
     let TreeBuffers { wall_begins, planes, tree_photons, longest, .. } = tree;
-    let whole = whole_push(plan, photon_count);
+    let whole = push_for_all_points(plan, photon_count);
     let tests_per_point = plan.work.tests_per_point(photon_count);
     for (first_point, end_point) in point_ranges(commands, plan, tests_per_point, 1) {
         let size = DispatchSizePush {

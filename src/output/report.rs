@@ -168,7 +168,7 @@ pub(super) fn errors(rounds: u32, noise: Option<f64>, unknown: &Unknown, bias: O
         None => text.push_str("noise: unknown\n"),
     }
     if bias.is_some_and(|bias| !bias.is_known()) {
-        text.push_str("bias of the radius: unknown, because the search radius is wider than what the points lie in and cannot be smaller in a scene this wide\n");
+        writeln!(text, "bias of the radius: unknown, because {}", Bias::UNKNOWN).unwrap();
         return text;
     }
     if bias.is_some_and(|bias| bias.batches == 0) {

@@ -36,7 +36,7 @@ pub fn on_gpu(gpu: &Gpu, scene: &RoomScene, settings: &Settings, control: &mut C
     commands.submit()?;
 
     let mut state = RunState::new(&plan, control, commands.started());
-    state.submissions_settled = commands.submission_count();
+    state.submissions_collected = commands.submission_count();
     for round in 0..settings.rounds {
         commands.scope("round", |commands| {
             for (chunk, ranges) in (1..).zip(plan.chunks()) {
@@ -126,11 +126,11 @@ fn is_due(commands: &Commands, plan: &Plan, state: &RunState) -> bool {
     let tallies_full = state.open() + u64::from(plan.path_capacity) > u64::from(u32::MAX);
     let timestamps_short = commands.timestamps_left() < trace::timestamps_per_chunk(plan);
     // A long gather hands commands over by itself, and nobody has looked at the result yet.
-    let submitted = commands.submission_count() > state.submissions_settled;
+    let submitted = commands.submission_count() > state.submissions_collected;
     commands.work() >= plan.pair_tests_per_submission || submitted || timestamps_short || tallies_full || state.may_end()
 }
 
-/// Runs what is recorded, looks at the error where that is due, books the fates, and says whether to stop.
+/// Runs what is recorded, looks at the error where that is due, collects the fates, and says whether to stop.
 fn collect(commands: &mut Commands, resources: &Resources, scene: &RoomScene, plan: &Plan, state: &mut RunState) -> Result<bool> {
     if state.open() == 0 {
         return Ok(state.end.is_some());
@@ -142,7 +142,7 @@ fn collect(commands: &mut Commands, resources: &Resources, scene: &RoomScene, pl
         let film = read_film(commands, resources, plan, state)?;
         state.look(&film, scene, plan);
     }
-    state.submissions_settled = commands.submission_count();
+    state.submissions_collected = commands.submission_count();
     state.collect()
 }
 

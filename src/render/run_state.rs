@@ -25,8 +25,8 @@ pub(super) struct RunState<'a, 'c> {
     pub(super) emitted: u64,
     pub(super) rounds: u32,
     pub(super) fates: Fates,
-    /// Submissions of which the fates are booked.
-    pub(super) submissions_settled: u64,
+    /// Submissions of which the fates are collected.
+    pub(super) submissions_collected: u64,
     /// Why the run ends, once it does.
     pub(super) end: Option<End>,
 }
@@ -45,12 +45,12 @@ impl<'a, 'c> RunState<'a, 'c> {
             emitted: 0,
             rounds: 0,
             fates: Fates::new(plan.settings.bounces),
-            submissions_settled: 0,
+            submissions_collected: 0,
             end: None,
         }
     }
 
-    /// Photons whose fates are not booked.
+    /// Photons whose fates are not collected.
     pub(super) fn open(&self) -> u64 {
         self.emitted - self.fates.emitted
     }
@@ -60,7 +60,7 @@ impl<'a, 'c> RunState<'a, 'c> {
         self.emitted == u64::from(self.rounds) * u64::from(self.photons_per_round)
     }
 
-    /// Whether the run may have done enough, so that its fates must be booked.
+    /// Whether the run may have done enough, so that its fates must be collected.
     pub(super) fn may_end(&self) -> bool {
         self.watch.has_photons(self.emitted) || (self.is_whole() && self.watch.may_end(self.rounds, self.emitted))
     }

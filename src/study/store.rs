@@ -34,7 +34,7 @@ pub struct Store {
 }
 
 /// A point and its axis, if the line holds all runs of it.
-fn whole(line: &str, repeats: u32) -> Option<(Axis, Point)> {
+fn parse_complete(line: &str, repeats: u32) -> Option<(Axis, Point)> {
     let (axis, point) = serde_json::from_str::<(Axis, Point)>(line).ok()?;
     let lengths = [point.gpu_ms.len(), point.wall_ms.len(), point.seconds.len(), point.squared_errors.len()];
     lengths.iter().all(|length| *length == repeats as usize).then_some((axis, point))
@@ -74,7 +74,7 @@ impl Store {
                     ));
                 }
                 // A last line that was cut off is measured again.
-                for (line, (axis, point)) in lines.filter_map(|line| Some((line, whole(line, request.repeats)?))) {
+                for (line, (axis, point)) in lines.filter_map(|line| Some((line, parse_complete(line, request.repeats)?))) {
                     kept.push_str(line);
                     kept.push('\n');
                     points.insert((axis, point.command.clone()), point);

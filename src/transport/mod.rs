@@ -6,9 +6,9 @@
 //!
 //! ```text
 //! see       paths from the camera over mirrors and glass: visible points, direct light by shadow rays
-//! photons   of the global map: traced, sorted, looked up at every visible point
+//! photons   of the global map: traced, sorted, gathered at every visible point
 //! caustics  the same with photons that took mirrors and glass only, and were aimed at these
-//! weigh     flux over area that really lies on the surface, times reflectance: light
+//! radiance  from flux over the area that lies on the surface, times reflectance
 //! resolve   all light of a pixel: to the film
 //! ```
 
@@ -336,7 +336,7 @@ fn one_round(commands: &mut Commands, view: &View, round: Round, deadline: Optio
                 Ok(())
             })?;
         }
-        commands.scope("flux to radiance", |commands| points::weigh(commands, round, traced))?;
+        commands.scope("flux to radiance", |commands| points::flux_to_radiance(commands, round, traced))?;
     }
     commands.scope("resolve", |commands| points::resolve(commands, round))?;
     Ok(traced.iter().map(|count| u64::from(*count)).sum())
@@ -349,6 +349,6 @@ fn one_chunk(commands: &mut Commands, round: Round, photons: &PhotonBuffers, map
     let cells = photons::cells(round, map);
     photons::trace(commands, round, photons, map, chunk, &mut |commands| {
         commands.scope("index", |commands| photons::index(commands, round, photons, map, &cells))?;
-        commands.scope("gather", |commands| points::look_up(commands, round, photons, map, cells))
+        commands.scope("gather", |commands| points::gather(commands, round, photons, map, cells))
     })
 }

@@ -87,7 +87,7 @@ fn is_persistent(plan: &TransportPlan) -> bool {
 /// So many flights of each photon; says where those are that are left.
 fn segment(commands: &mut Commands, round: Round, photons: &PhotonBuffers, map: &MapPlan, start: Start, flights: u32) -> Result<usize> {
     if is_persistent(round.plan) {
-        return whole(commands, round, photons, map, start, flights);
+        return trace_persistent(commands, round, photons, map, start, flights);
     }
     let (count, mut parity, first_bounce) = match start {
         Start::Lights(chunk) => {
@@ -108,7 +108,7 @@ fn segment(commands: &mut Commands, round: Round, photons: &PhotonBuffers, map: 
             dispatch_size(commands, photons, round.plan, 1 + list, map.chunk_photons)?;
             Extent::Indirect(&photons.dispatch_args)
         };
-        fly(commands, round, photons, map, Flight { bounce: first_bounce + list, list, parity }, extent)?;
+        trace_flight(commands, round, photons, map, Flight { bounce: first_bounce + list, list, parity }, extent)?;
         parity = 1 - parity;
     }
     commands.add_work(WORK_PER_PHOTON * u64::from(count));
@@ -140,7 +140,14 @@ fn store(plan: &TransportPlan, map: &MapPlan) -> PhotonStore {
 }
 
 /// So many flights of each photon, which keeps its invocation; says where those are that are left.
-fn whole(commands: &mut Commands, round: Round, photons: &PhotonBuffers, map: &MapPlan, start: Start, flights: u32) -> Result<usize> {
+fn trace_persistent(
+    commands: &mut Commands,
+    round: Round,
+    photons: &PhotonBuffers,
+    map: &MapPlan,
+    start: Start,
+    flights: u32,
+) -> Result<usize> {
     let Round { resources, geometry, plan, .. } = round;
     let TransportResources {
         nodes, triangles, normals, uvs, materials, textures, texels, emitters, caustic_targets, nonfinite_values, ..
@@ -221,7 +228,14 @@ pub struct Flight {
     pub parity: usize,
 }
 
-pub fn fly(commands: &mut Commands, round: Round, photons: &PhotonBuffers, map: &MapPlan, flight: Flight, extent: Extent) -> Result<()> {
+pub fn trace_flight(
+    commands: &mut Commands,
+    round: Round,
+    photons: &PhotonBuffers,
+    map: &MapPlan,
+    flight: Flight,
+    extent: Extent,
+) -> Result<()> {
     let Round { resources, plan, .. } = round;
     let TransportResources { nodes, triangles, normals, uvs, materials, textures, texels, nonfinite_values, .. } = resources;
     let Flight { bounce, list, parity } = flight;

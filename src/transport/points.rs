@@ -176,7 +176,7 @@ fn go_on(commands: &mut Commands, resources: &TransportResources, geometry: &Geo
 }
 
 /// Adds a chunk of a map to the estimates of all visible points.
-pub fn look_up(commands: &mut Commands, round: Round, photons: &PhotonBuffers, map: &MapPlan, cells_push: CellPush) -> Result<()> {
+pub fn gather(commands: &mut Commands, round: Round, photons: &PhotonBuffers, map: &MapPlan, cells_push: CellPush) -> Result<()> {
     let Round { resources, plan, number: round, .. } = round;
     let PhotonBuffers { cells, sorted_map, crowded, dispatch_args, .. } = photons;
     let TransportResources { planes, visible_points, estimates, nonfinite_values, .. } = resources;
@@ -226,7 +226,7 @@ pub fn look_up(commands: &mut Commands, round: Round, photons: &PhotonBuffers, m
 }
 
 /// Turns what the maps found at all visible points into light; so many photons of the global and of the caustic map were traced.
-pub fn weigh(commands: &mut Commands, round: Round, traced: [u32; 2]) -> Result<()> {
+pub fn flux_to_radiance(commands: &mut Commands, round: Round, traced: [u32; 2]) -> Result<()> {
     let Round { resources, geometry, plan, number: round } = round;
     let TransportResources { nodes, triangles, normals, uvs, materials, textures, texels, planes, visible_points, .. } = resources;
     let TransportResources { estimates, one_hits, part_totals, anomalies, nonfinite_values, .. } = resources;

@@ -9,7 +9,7 @@ use photonmill::scene::geometry::Geometry;
 use photonmill::scene::light::LightKind;
 use photonmill::scene::material::TextureUse;
 use photonmill::scene::texture::{Texture, Wrap};
-use photonmill::scene::{Camera, Material, Mesh};
+use photonmill::scene::{Camera, Material, Mesh, Scene};
 use photonmill::settings::transport::{Effect, Illumination, Part, TransportSettings};
 use photonmill::transport::RunResult;
 
@@ -246,6 +246,16 @@ pub fn none_returns(what: &str, lit: &RunResult) -> Check<Complaint> {
     Err(Complaint::new(Kind::PhotonsAdded, text))
 }
 
+/// Direct light of a picture of so many pixels a side, by the tree and by the list of all triangles.
+fn by_tree_and_list(gpu: &Gpu, scene: &Scene, camera: &Camera, side: u32) -> [RunResult; 2] {
+    let usual = || TransportSettings { rounds: 1, part: Part::Direct, ..TransportSettings::default() };
+    let by_tree = TransportSettings { with: vec![Effect::Bvh], ..usual() };
+    let by_list = TransportSettings { without: vec![Effect::Bvh], ..usual() };
+    let [tree, list] = [by_tree, by_list].map(|settings| seen(gpu, scene, &settings, camera, [side; 2]));
+    assert!(tree.plan.keeps(Effect::Bvh) && !list.plan.keeps(Effect::Bvh));
+    [tree, list]
+}
+
 /// Sheets of other colours that overlap in one plane: a tree shows the parts that the list of all triangles does.
 pub fn sheets_in_one_plane(gpu: &Gpu) -> Check<Complaint> {
     let sheets = 24;
@@ -258,18 +268,7 @@ pub fn sheets_in_one_plane(gpu: &Gpu) -> Check<Complaint> {
     let sun = LightKind::Directional { direction: DVec3::NEG_Y, irradiance: Vec3::ONE };
     let scene = scene_of((0..sheets).map(sheet).collect(), materials, vec![sun]);
     let camera = Camera::looking_at("above", DVec3::new(1.0, 3.0, 1.0), DVec3::new(1.0, 0.0, 1.0), DVec3::Z, 1.0);
-    let of = |with: &[Effect], without: &[Effect]| {
-        let settings = TransportSettings {
-            with: with.to_vec(),
-            without: without.to_vec(),
-            rounds: 1,
-            part: Part::Direct,
-            ..TransportSettings::default()
-        };
-        seen(gpu, &scene, &settings, &camera, [48, 48])
-    };
-    let (tree, list) = (of(&[Effect::Bvh], &[]), of(&[], &[Effect::Bvh]));
-    assert!(tree.plan.keeps(Effect::Bvh) && !list.plan.keeps(Effect::Bvh));
+    let [tree, list] = by_tree_and_list(gpu, &scene, &camera, 48);
     same_sums("tree and list", &tree.film.sums, &list.film.sums)
 }
 
@@ -293,18 +292,7 @@ pub fn stack_from_afar(gpu: &Gpu) -> Check<Complaint> {
     for (what, height) in [("above", 16_384.0), ("below", -16_384.0)] {
         let middle = DVec3::new(-0.2, 0.0, -0.2);
         let camera = Camera::looking_at(what, middle + DVec3::Y * height, middle, DVec3::Z, 2e-5);
-        let of = |with: &[Effect], without: &[Effect]| {
-            let settings = TransportSettings {
-                with: with.to_vec(),
-                without: without.to_vec(),
-                rounds: 1,
-                part: Part::Direct,
-                ..TransportSettings::default()
-            };
-            seen(gpu, &scene, &settings, &camera, [8, 8])
-        };
-        let (tree, list) = (of(&[Effect::Bvh], &[]), of(&[], &[Effect::Bvh]));
-        assert!(tree.plan.keeps(Effect::Bvh) && !list.plan.keeps(Effect::Bvh));
+        let [tree, list] = by_tree_and_list(gpu, &scene, &camera, 8);
         // A list is tested from its first triangle to its last.
         assert!(means(&list).iter().all(|mean| (mean.x - lowest).abs() < 1e-3), "from {what}: {:?}", means(&list));
         same_sums(&format!("tree and list from {what}"), &tree.film.sums, &list.film.sums)?;
