@@ -26,11 +26,12 @@ fn main() {
     let glsl = PathBuf::from(env::var("CARGO_MANIFEST_DIR").expect("cargo sets it")).join("glsl");
     let out = PathBuf::from(env::var("OUT_DIR").expect("cargo sets it"));
 
-    let mut kernels: Vec<PathBuf> = fs::read_dir(glsl.join("kernels"))
-        .expect("glsl/kernels can be read")
-        .map(|entry| entry.expect("glsl/kernels can be read").path())
-        .filter(|path| path.extension().is_some_and(|extension| extension == "comp"))
-        .collect();
+    let in_folder = |folder: &&str| -> Vec<String> {
+        let entries = fs::read_dir(glsl.join(folder)).unwrap_or_else(|error| panic!("glsl/{folder}: {error}"));
+        let names = entries.map(|entry| entry.expect("a folder can be read").file_name().to_string_lossy().into_owned());
+        names.filter(|name| name.ends_with(".comp")).map(|name| format!("{folder}/{name}")).collect()
+    };
+    let mut kernels: Vec<String> = ["kernels", "check"].iter().flat_map(in_folder).collect();
     kernels.sort();
 
     // A fault in a shared file is found by every kernel that includes it, and shown once.
@@ -39,15 +40,15 @@ fn main() {
     let mut layouts = String::new();
     let mut max_buffers = 0;
     for path in &kernels {
-        let name = path.file_stem().expect("a kernel has a name").to_string_lossy().into_owned();
-        match compile(&glsl, &format!("kernels/{name}.comp"), constants::SHARED_WITH_GLSL, &|_, text| text) {
+        let name = path.rsplit('/').next().and_then(|file| file.strip_suffix(".comp")).expect("a kernel has a name").to_owned();
+        match compile(&glsl, path, constants::SHARED_WITH_GLSL, &|_, text| text) {
             Ok(Compiled { words, files }) => {
                 files.iter().for_each(|file| println!("cargo:rerun-if-changed={}", file.display()));
                 let bytes: Vec<u8> = words.iter().flat_map(|word| word.to_le_bytes()).collect();
                 fs::write(out.join(format!("{name}.spv")), bytes).expect("OUT_DIR can be written");
                 let kernel = reflect(&words);
                 max_buffers = max_buffers.max(kernel.buffers.len());
-                write_kernel(&mut structs, &name, &kernel);
+                write_kernel(&mut structs, path, &name, &kernel);
                 write_layouts(&mut layouts, &name, &kernel);
             }
             Err(message) => drop(failures.insert(message)),
@@ -170,10 +171,10 @@ fn camel_case(name: &str) -> String {
     name.split('_').map(|part| part[..1].to_uppercase() + &part[1..]).collect()
 }
 
-fn write_kernel(source: &mut String, name: &str, kernel: &Kernel) {
+fn write_kernel(source: &mut String, path: &str, name: &str, kernel: &Kernel) {
     let type_name = camel_case(name);
     let push = kernel.push.as_ref().map_or("()".to_owned(), |record| format!("crate::records::{}", struct_name(record)));
-    writeln!(source, "/// `glsl/kernels/{name}.comp`.\npub struct {type_name}<'a> {{").unwrap();
+    writeln!(source, "/// `glsl/{path}`.\npub struct {type_name}<'a> {{").unwrap();
     for buffer in &kernel.buffers {
         writeln!(source, "    pub {}: &'a Buffer,", buffer.name).unwrap();
     }

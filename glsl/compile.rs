@@ -47,7 +47,7 @@ pub fn compile(glsl: &Path, name: &str, macros: &[(&str, u32)], edit: &dyn Fn(&s
     drop(options);
     let words = artifact.as_binary();
     if let Some(function) = rounded_as_the_device_likes(words) {
-        return Err(format!("{shown}: {function} divides or calls a function that devices round differently; use glsl/math.glsl\n"));
+        return Err(format!("{shown}: {function} divides or calls a function that devices round differently; use glsl/math/math.glsl\n"));
     }
     Ok(Compiled { words: uncontracted(words), files: files.into_inner() })
 }

@@ -65,7 +65,7 @@ constants! {
     /// Bit of a triangle's plane: others hide a part of the triangle.
     HIDDEN = 0x8000_0000;
     /// What is nearer to a plane than the inverse lies in it: 16 units in the last place of a coordinate of 0.5, where
-    /// normalised scenes end. Rounding of positions and of their heights takes half of that (`glsl/scene/belongs.glsl`).
+    /// normalised scenes end. Rounding of positions and of their heights takes half of that (`glsl/gather/belongs.glsl`).
     IN_PLANE_INVERSE = 2_097_152;
 
     /// What an emitter is; see `scene::LightKind`.
@@ -143,7 +143,7 @@ constants! {
     LOSSLESS_DEPTH = 128;
     /// Bounces of a scene's photons of which fates are counted apart; the last count takes in all later ones.
     TALLY_ROWS = 64;
-    /// Words of one copy of a map's totals (`glsl/totals.glsl`), and the bits of flux after the binary point.
+    /// Words of one copy of a map's totals (`glsl/ledger/totals.glsl`), and the bits of flux after the binary point.
     TOTAL_WORDS = 16;
     TOTAL_FLUX_BITS = 20;
     /// Entries of the stack that traverses the bounding volume hierarchy.

@@ -50,7 +50,7 @@ impl std::fmt::Display for Ledger {
     }
 }
 
-/// Relative flux per channel; [`crate::plan::transport::MapPlan::photon_flux`] makes watts of it.
+/// Relative flux per channel; [`crate::plan::scene::MapPlan::photon_flux`] makes watts of it.
 pub type RelativeFlux = [f64; 3];
 
 /// What the photons of a scene's map lose to limits, and how many photons the map has held.

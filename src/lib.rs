@@ -14,56 +14,36 @@
 //! is lit   effects the device   of hits  kd-tree  point               report
 //! ```
 //!
-//! [`render`] is that line on one page for the paper's box; [`transport`] is the same line for scenes of triangles. A module
-//! uses only what stands to its left:
+//! One engine walks that line for two worlds: [`engine::room`], the paper's box, and [`engine::scene`], triangles. A file uses
+//! only what stands to its left:
 //!
 //! ```text
-//! text, constants, records, path, photon, error, bias, unknown, ledger, rng, settings, timings < scene < plan < cpu
-//! scene < judge
-//! text, constants, records, error, ledger, timings < gpu
-//! gpu < nonfinite_values, tallies, totals; plan, gpu < prefix_sum
-//! plan, nonfinite_values, tallies, totals, prefix_sum < resources < trace < index < estimate < film < render < transport < selfcheck < output
-//! output < bake < paper < compaction < study < bench < cli
+//! constants, error, text, records, rng, ledger, timings < settings, path, photon < scene < plan < cpu, gpu < engine < output
+//! output < bake < measure < cli;  scene < verify::judge;  engine < verify::selfcheck
 //! ```
 //!
 //! `tests/architecture.rs` checks it.
 
 pub mod bake;
-pub mod bench;
-pub mod bias;
 pub mod cli;
-pub mod compaction;
 pub mod constants;
 pub mod cpu;
+pub mod engine;
 pub mod error;
-pub mod estimate;
-pub mod film;
 #[expect(unsafe_code, reason = "Vulkan's functions are unsafe; nothing outside this module is")]
 pub mod gpu;
 #[cfg(doc)]
 pub mod guide;
-pub mod index;
-pub mod judge;
 pub mod ledger;
-pub mod nonfinite_values;
+pub mod measure;
 pub mod output;
-pub mod paper;
 pub mod path;
 pub mod photon;
 pub mod plan;
-pub mod prefix_sum;
 pub mod records;
-pub mod render;
-pub mod resources;
 pub mod rng;
 pub mod scene;
-pub mod selfcheck;
 pub mod settings;
-pub mod study;
-pub mod tallies;
 pub mod text;
 pub mod timings;
-pub mod totals;
-pub mod trace;
-pub mod transport;
-pub mod unknown;
+pub mod verify;

@@ -1,4 +1,4 @@
-//! Photons in flight, and their paths between bounces as the device holds them: 48 bytes each, twin of `glsl/path.glsl`.
+//! Photons in flight, and their paths between bounces as the device holds them: 48 bytes each, twin of `glsl/world/room/path.glsl`.
 
 use bytemuck::{Pod, Zeroable};
 use glam::{UVec2, Vec3};

@@ -1,5 +1,5 @@
-//! Photons as the maps of both lines hold them: in the room 16 bytes, twin of `glsl/photon.glsl`; in a scene of triangles 32,
-//! twin of `glsl/scene/map_photon.glsl`.
+//! Photons as the maps of both lines hold them: in the room 16 bytes, twin of `glsl/world/room/photon.glsl`; in a scene of triangles 32,
+//! twin of `glsl/world/scene/photon.glsl`.
 
 use bytemuck::{Pod, Zeroable};
 use glam::Vec3;
@@ -22,7 +22,7 @@ pub struct Photon {
     pub bounce: u32,
 }
 
-/// One entry of the photon map on the device; `glsl/photon.glsl` tells its bits.
+/// One entry of the photon map on the device; `glsl/world/room/photon.glsl` tells its bits.
 #[repr(C)]
 #[derive(Debug, Clone, Copy, PartialEq, Eq, Default, Pod, Zeroable)]
 pub struct StoredPhoton(pub [u32; 4]);

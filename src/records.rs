@@ -2,7 +2,7 @@
 //! field by field with what reflection finds in the kernels.
 //!
 //! Lengths are in metres, directions point along the photon's flight, `flux` is relative: the power
-//! of a photon divided by that of the strongest photon of the run (see [`crate::film`]).
+//! of a photon divided by that of the strongest photon of the run (see [`crate::engine::room::film`]).
 
 use bytemuck::{Pod, Zeroable};
 use glam::{UVec2, UVec3, Vec2, Vec3};
@@ -412,7 +412,7 @@ records! {
         scene_radius: f32,
         /// Spheres that they are aimed at; 0: at none.
         target_count: u32,
-        /// What aimed photons' flux is multiplied by; see [`crate::plan::transport::MapPlan::flux_gain`].
+        /// What aimed photons' flux is multiplied by; see [`crate::plan::scene::MapPlan::flux_gain`].
         flux_gain: f32,
     }
 
@@ -436,7 +436,7 @@ records! {
         draws: Draws,
         map: PhotonStore,
         bounce: u32,
-        /// Number of the list that its paths come from: [`crate::transport::photons`] counts them from 0 in each segment.
+        /// Number of the list that its paths come from: [`crate::engine::scene::photons`] counts them from 0 in each segment.
         list: u32,
         /// 1: no path goes on after it.
         is_last: u32,
@@ -571,7 +571,7 @@ records! {
         add_count: u32,
     }
 
-    /// Functions of `glsl/math.glsl` at (a, b).
+    /// Functions of `glsl/math/math.glsl` at (a, b).
     MathResults {
         /// The bits of a, taken for an integer.
         converted: f32,
@@ -603,7 +603,7 @@ records! {
         c: Vec3,
     }
 
-    /// What the functions of `glsl/sampling.glsl`, `glsl/filter.glsl` and `glsl/scene` make of a case.
+    /// What the functions of `glsl/rng/sampling.glsl`, `glsl/world/scene/filter.glsl` and `glsl/scene` make of a case.
     Samples {
         /// Around the z axis.
         cosine_hemisphere: Vec3,

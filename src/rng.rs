@@ -1,5 +1,5 @@
 //! Random numbers of a photon, a function of (seed, round, photon, draw) alone, so that every
-//! builder, split and thread traces the same photons. Twin of `glsl/rng.glsl`.
+//! builder, split and thread traces the same photons. Twin of `glsl/rng/rng.glsl`.
 //!
 //! What a photon draws from is always inlined, so that it is compiled for the vectors of the loops that call it
 //! ([`crate::cpu::trace`]).
@@ -132,7 +132,7 @@ impl Streams {
 
     /// From the first state of photon i in round 0 to that of photon `first_photon` + i in `round`.
     pub fn jump(self, round: u32, first_photon: u32) -> Affine48 {
-        // The caller has checked that a run's draws stay below 2^48 (Settings::validate).
+        // The caller has checked that a run's draws stay below 2^48 (RoomSettings::validate).
         Affine48::steps(u64::from(round) * u64::from(self.photons) * self.draws_per_photon + u64::from(first_photon))
     }
 

@@ -5,26 +5,26 @@ use crate::common::family::Family;
 use crate::common::lit::{self, grid, irradiances, received};
 use crate::common::{assert_complains, assert_holds, device, equal_sums};
 use glam::DVec3;
+use photonmill::engine;
+use photonmill::engine::scene::RunResult;
+use photonmill::engine::scene::replay::{Flights, light_paths};
 use photonmill::gpu::Gpu;
+use photonmill::plan::scene::ScenePlan;
 use photonmill::plan::sensor::Sensor;
-use photonmill::plan::transport::TransportPlan;
-use photonmill::render;
 use photonmill::scene::Scene;
 use photonmill::scene::geometry::Geometry;
-use photonmill::settings::transport::{Illumination, Part, TransportSettings};
+use photonmill::settings::scene::{Illumination, Part, SceneSettings};
 use photonmill::settings::{Builder, Math};
-use photonmill::transport::RunResult;
-use photonmill::transport::replay::{Flights, light_paths};
 
-fn plan_of(gpu: &Gpu, scene: &Scene, settings: &TransportSettings) -> (Geometry, TransportPlan) {
+fn plan_of(gpu: &Gpu, scene: &Scene, settings: &SceneSettings) -> (Geometry, ScenePlan) {
     let geometry = Geometry::new(scene).unwrap();
     let sensor = Sensor::Receivers { count: 1 };
-    let plan = TransportPlan::new(scene, &geometry, settings, sensor, &render::limits(gpu.facts())).unwrap();
+    let plan = ScenePlan::new(scene, &geometry, settings, sensor, &engine::limits(gpu.facts())).unwrap();
     (geometry, plan)
 }
 
 /// Photons of round 0 of the caustic map as they leave their lights, and after their first flight.
-fn first_flight(gpu: &Gpu, scene: &Scene, settings: &TransportSettings) -> (TransportPlan, Flights) {
+fn first_flight(gpu: &Gpu, scene: &Scene, settings: &SceneSettings) -> (ScenePlan, Flights) {
     let (geometry, plan) = plan_of(gpu, scene, settings);
     let map = plan.caustic.clone().unwrap();
     let flights = light_paths(gpu, &geometry, &plan, &map, 0, (0, map.photons), 1).unwrap();
@@ -130,7 +130,7 @@ fn lamps_within_a_target_shine_in_all_directions() {
     assert!(off.0.targets.is_empty() && on.0.targets.len() == 1 && off.1 != on.1);
 }
 
-fn film(gpu: &Gpu, kind: &str, settings: &TransportSettings) -> RunResult {
+fn film(gpu: &Gpu, kind: &str, settings: &SceneSettings) -> RunResult {
     received(gpu, &scene(kind), settings, &grid(0.0, DVec3::Y, 4))
 }
 
@@ -140,19 +140,19 @@ fn no_builder_and_no_split_changes_a_bit() {
     let Some(gpu) = device() else { return };
     for kind in ["overlapping cones", "two-sided triangles", "sky"] {
         for math in [Math::Fast, Math::Strict] {
-            let usual = TransportSettings { math, rounds: 2, ..settings(3001, true) };
+            let usual = SceneSettings { math, rounds: 2, ..settings(3001, true) };
             let reference = film(&gpu, kind, &usual);
             for (what, settings) in [
-                ("atomic", TransportSettings { builder: Some(Builder::Atomic), ..usual.clone() }),
-                ("ballot", TransportSettings { builder: Some(Builder::Ballot), ..usual.clone() }),
-                ("persistent", TransportSettings { builder: Some(Builder::Persistent), ..usual.clone() }),
-                ("chunks", TransportSettings { chunk: Some(701), ..usual.clone() }),
+                ("atomic", SceneSettings { builder: Some(Builder::Atomic), ..usual.clone() }),
+                ("ballot", SceneSettings { builder: Some(Builder::Ballot), ..usual.clone() }),
+                ("persistent", SceneSettings { builder: Some(Builder::Persistent), ..usual.clone() }),
+                ("chunks", SceneSettings { chunk: Some(701), ..usual.clone() }),
             ] {
                 let found = film(&gpu, kind, &settings);
                 assert_holds(format!("{kind}, {what}, {math:?}"), equal_sums(what, &found.film.sums, &reference.film.sums));
                 assert_eq!(found.fates, reference.fates);
             }
-            let off = film(&gpu, kind, &TransportSettings { aim: false, ..usual });
+            let off = film(&gpu, kind, &SceneSettings { aim: false, ..usual });
             assert_complains("photons in all directions", equal_sums("off", &off.film.sums, &reference.film.sums));
         }
     }
@@ -166,7 +166,7 @@ fn pictures_agree(photons: u32, pairs: u64, share: f64) {
     for name in ["caustic-sphere", "cornell-spheres"] {
         let scene = lit::scene(name);
         let total = |aim, photons, seed| {
-            let settings = TransportSettings { seed, caustic_radius: Some(0.05), bounces: 32, ..settings(photons, aim) };
+            let settings = SceneSettings { seed, caustic_radius: Some(0.05), bounces: 32, ..settings(photons, aim) };
             let lit = lit::seen(&gpu, &scene, &settings, &scene.cameras[0], [48, 48]);
             lit.part_totals[2] as f64 / lit.plan.film_scale
         };
@@ -194,7 +194,7 @@ fn pictures_have_the_same_caustics_to_a_per_cent() {
 fn only_caustic_maps_are_aimed() {
     let Some(gpu) = device() else { return };
     for (illumination, part) in [(Illumination::Photons, Part::All), (Illumination::Split, Part::Indirect)] {
-        let settings = TransportSettings { illumination, part, ..settings(100, true) };
+        let settings = SceneSettings { illumination, part, ..settings(100, true) };
         let (_, plan) = plan_of(&gpu, &scene("point"), &settings);
         assert!(plan.caustic.is_none() && plan.targets.is_empty());
         assert!(plan.maps().all(|map| map.target_count == 0 && map.flux_gain == 1.0));

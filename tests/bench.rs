@@ -6,15 +6,15 @@ use std::sync::{Mutex, MutexGuard, PoisonError};
 use std::time::Duration;
 
 use crate::common::{device, device_with, lit, planted};
-use photonmill::bench::experiment::Experiment;
-use photonmill::bench::room::{self, Timed};
-use photonmill::bench::scene::{self, Job};
-use photonmill::bench::targets::TARGETS;
-use photonmill::bench::{self, Request, Size, rates, table};
 use photonmill::gpu::Options;
+use photonmill::measure::bench::experiment::Experiment;
+use photonmill::measure::bench::room::{self, Timed};
+use photonmill::measure::bench::scene::{self, Job};
+use photonmill::measure::bench::targets::TARGETS;
+use photonmill::measure::bench::{self, Request, Size, rates, table};
 use photonmill::scene::geometry::Geometry;
-use photonmill::settings::transport::TransportSettings;
-use photonmill::settings::{Builder, Settings};
+use photonmill::settings::scene::SceneSettings;
+use photonmill::settings::{Builder, RoomSettings};
 use serde_json::Value;
 
 /// Measurements of one device do not disturb each other.
@@ -98,20 +98,14 @@ fn the_roofline_counts_every_dispatch() {
         assert_eq!(counted, timed.dispatches, "{what}");
     };
     for builder in Builder::ON_GPU {
-        let settings = Settings { builder, photons: 600, mesh: 4, bounces: 3, chunk: Some(300), ..Settings::default() };
+        let settings = RoomSettings { builder, photons: 600, mesh: 4, bounces: 3, chunk: Some(300), ..RoomSettings::default() };
         check(builder.name(), &room::time(&gpu, &rates, &settings, &never).unwrap());
     }
     let scene = lit::scene("cornell-spheres");
     let geometry = Geometry::new(&scene).unwrap();
     for illumination in lit::BOTH {
-        let settings = TransportSettings {
-            photons: 600,
-            caustic_photons: 500,
-            bounces: 3,
-            chunk: Some(400),
-            illumination,
-            ..TransportSettings::default()
-        };
+        let settings =
+            SceneSettings { photons: 600, caustic_photons: 500, bounces: 3, chunk: Some(400), illumination, ..SceneSettings::default() };
         let job = Job { name: "cornell-spheres", scene: &scene, geometry: &geometry, size: (8, 8), settings };
         check("cornell-spheres", &scene::time(&gpu, &rates, &job, &never).unwrap());
     }

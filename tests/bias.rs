@@ -5,22 +5,24 @@ use std::sync::atomic::AtomicBool;
 
 use crate::common::lit::scene;
 use crate::common::{Check, assert_complains, assert_holds, device, pairs};
-use photonmill::bias::{self, Bias};
-use photonmill::film::estimate_walls;
+use photonmill::engine;
+use photonmill::engine::Control;
+use photonmill::engine::bias::{self, Bias};
+use photonmill::engine::room::film::estimate_walls;
+use photonmill::engine::room::{self};
+use photonmill::engine::scene::{self, View};
+use photonmill::engine::watch::mean_squared_radius;
 use photonmill::gpu::Gpu;
-use photonmill::judge::radiosity::{Law, Radiosity, WALLS, on_wall};
+use photonmill::plan::scene::ScenePlan;
 use photonmill::plan::sensor::Sensor;
-use photonmill::plan::transport::TransportPlan;
-use photonmill::render::stop::mean_squared_radius;
-use photonmill::render::{self, Control};
 use photonmill::rng::Rng;
 use photonmill::scene::geometry::Geometry;
 use photonmill::scene::open_box::open_box;
 use photonmill::scene::{Camera, Scene};
-use photonmill::settings::Settings;
+use photonmill::settings::RoomSettings;
+use photonmill::settings::scene::{Illumination, SceneSettings};
 use photonmill::settings::stop::Stop;
-use photonmill::settings::transport::{Illumination, TransportSettings};
-use photonmill::transport::{self, View};
+use photonmill::verify::judge::radiosity::{Law, Radiosity, WALLS, on_wall};
 
 const CONFIDENCE: f64 = 0.9;
 static NEVER: AtomicBool = AtomicBool::new(false);
@@ -32,8 +34,8 @@ fn stop() -> Stop {
 /// Texels along a wall of the box.
 const MESH: usize = 12;
 
-fn in_box(radius: f64, photons: u32, seed: u64) -> Settings {
-    Settings { mesh: MESH as u32, radius, photons, seed, rng: Rng::Philox, stop: stop(), threads: 2, ..Settings::default() }
+fn in_box(radius: f64, photons: u32, seed: u64) -> RoomSettings {
+    RoomSettings { mesh: MESH as u32, radius, photons, seed, rng: Rng::Philox, stop: stop(), threads: 2, ..RoomSettings::default() }
 }
 
 /// Irradiance of the box at the middles of its texels, W/m2, by radiosity: what a radius of 0 would find.
@@ -52,12 +54,12 @@ fn at_points() -> &'static [f64] {
 
 /// The relative bias of the box at a radius: a long run's mean squared distance from the truth, less its variance.
 fn true_bias_in_box(gpu: Option<&Gpu>, radius: f64) -> f64 {
-    let settings = Settings { rounds: 48, ..in_box(radius, 8191, 4711) };
+    let settings = RoomSettings { rounds: 48, ..in_box(radius, 8191, 4711) };
     let scene = open_box(&settings);
     let mut control = Control { cancelled: &NEVER, progress: &mut |_| {} };
     let outcome = match gpu {
-        Some(gpu) => render::on_gpu(gpu, &scene, &settings, &mut control).unwrap(),
-        None => render::on_cpu(&scene, &settings, &mut control).unwrap(),
+        Some(gpu) => room::on_gpu(gpu, &scene, &settings, &mut control).unwrap(),
+        None => room::on_cpu(&scene, &settings, &mut control).unwrap(),
     };
     let (mut off, mut light) = (0.0, 0.0);
     let walls = estimate_walls(&outcome.film, &scene, &outcome.plan);
@@ -159,7 +161,7 @@ fn box_intervals_hold(seeds: u64, radii: &[f64]) {
         let truth = true_bias_in_box(gpu, radius);
         let measured = |seed, photons| {
             let settings = in_box(radius, photons, seed);
-            render::measure_bias(gpu, &open_box(&settings), &settings, 1, &NEVER).unwrap().unwrap()
+            room::measure_bias(gpu, &open_box(&settings), &settings, 1, &NEVER).unwrap().unwrap()
         };
         let biases: Vec<Bias> = (1..=seeds).map(|seed| measured(seed, 3001)).collect();
         report(&format!("the paper's box, radius {radius} m"), &biases, truth);
@@ -220,15 +222,15 @@ fn the_bias_of_a_shrinking_radius_lies_in_the_scaled_interval() {
     let Some(gpu) = device() else { return };
     const ROUNDS: u32 = 32;
     let long = RunResult::new(scene("disc-over-plane"), Illumination::Photons, 0.15, 4000, 99, &gpu);
-    let alpha = TransportSettings::default().alpha;
+    let alpha = SceneSettings::default().alpha;
     let batch = |factor: f64, number: u32| {
         if factor < 1.0 {
-            return transport::bias::batch(&gpu, &long.scene, &long.view(), &long.plan, (factor, ROUNDS, number), &NEVER);
+            return scene::bias::batch(&gpu, &long.scene, &long.view(), &long.plan, (factor, ROUNDS, number), &NEVER);
         }
         let seed = bias::seed(long.plan.settings.seed, number);
-        let settings = TransportSettings { rounds: ROUNDS, alpha, seed, ..long.plan.settings.clone() };
-        let plan = TransportPlan::new(&long.scene, &long.geometry, &settings, long.plan.sensor, &render::limits(gpu.facts()))?;
-        let lit = transport::light(&gpu, &long.view(), plan, &mut Control { cancelled: &NEVER, progress: &mut |_| {} })?;
+        let settings = SceneSettings { rounds: ROUNDS, alpha, seed, ..long.plan.settings.clone() };
+        let plan = ScenePlan::new(&long.scene, &long.geometry, &settings, long.plan.sensor, &engine::limits(gpu.facts()))?;
+        let lit = scene::light(&gpu, &long.view(), plan, &mut Control { cancelled: &NEVER, progress: &mut |_| {} })?;
         Ok(Some((0..lit.film.pixels()).flat_map(|pixel| lit.film.mean(pixel, &lit.plan).to_array()).collect()))
     };
     let truth = bias::difference(CONFIDENCE, 0.2, batch).unwrap().unwrap()[1];
@@ -260,7 +262,7 @@ struct RunResult {
     scene: Scene,
     camera: Camera,
     geometry: Geometry,
-    plan: TransportPlan,
+    plan: ScenePlan,
 }
 
 impl RunResult {
@@ -270,7 +272,7 @@ impl RunResult {
         let geometry = Geometry::new(&scene).unwrap();
         let (min, max) = scene.bounds();
         let radius = Some(radius * (max - min).max_element());
-        let settings = TransportSettings {
+        let settings = SceneSettings {
             photons,
             caustic_photons: photons,
             illumination,
@@ -279,10 +281,10 @@ impl RunResult {
             shadow_rays: 1,
             seed,
             stop: stop(),
-            ..TransportSettings::default()
+            ..SceneSettings::default()
         };
         let sensor = Sensor::Picture { width: 16, height: 16 };
-        let plan = TransportPlan::new(&scene, &geometry, &settings, sensor, &render::limits(gpu.facts())).unwrap();
+        let plan = ScenePlan::new(&scene, &geometry, &settings, sensor, &engine::limits(gpu.facts())).unwrap();
         RunResult { scene, camera, geometry, plan }
     }
 
@@ -291,12 +293,12 @@ impl RunResult {
     }
 
     fn bias(&self, gpu: &Gpu, rounds: u32) -> Bias {
-        transport::bias::measure(gpu, &self.scene, &self.view(), &self.plan, (1.0, rounds), &NEVER).unwrap().unwrap()
+        scene::bias::measure(gpu, &self.scene, &self.view(), &self.plan, (1.0, rounds), &NEVER).unwrap().unwrap()
     }
 
     /// From light at a radius that is so many times smaller.
     fn difference(&self, gpu: &Gpu, factor: f64, rounds: u32) -> [f64; 3] {
-        let batch = |factor, number| transport::bias::batch(gpu, &self.scene, &self.view(), &self.plan, (factor, rounds, number), &NEVER);
+        let batch = |factor, number| scene::bias::batch(gpu, &self.scene, &self.view(), &self.plan, (factor, rounds, number), &NEVER);
         bias::difference(CONFIDENCE, factor, batch).unwrap().unwrap()
     }
 }

@@ -5,11 +5,11 @@ use std::f64::consts::{PI, TAU};
 
 use crate::common::reference::{Arrival, Emission, HALF_EDGE, MESH, Model, texels_in_reach};
 use crate::common::{Check, assert_complains, assert_holds, device, pairs, run, run_on_cpu, z_check};
-use photonmill::film::{WallEstimate, estimate_walls};
-use photonmill::render::RunResult;
+use photonmill::engine::room::RunResult;
+use photonmill::engine::room::film::{WallEstimate, estimate_walls};
 use photonmill::rng::Rng;
 use photonmill::scene::open_box::open_box;
-use photonmill::settings::{EmissionLaw, Settings};
+use photonmill::settings::{EmissionLaw, RoomSettings};
 
 fn walls(outcome: &RunResult) -> Vec<WallEstimate> {
     estimate_walls(&outcome.film, &open_box(&outcome.plan.settings), &outcome.plan)
@@ -116,7 +116,7 @@ fn direct_on_disc(emission: EmissionLaw, wall: usize, centre: [f64; 2], radius: 
 
 /// Mean irradiance over the disc around each texel from both lights, and its standard error for
 /// `photons` photons of which each light has half and each hit is stored with the albedo's chance.
-fn expected_direct(settings: &Settings) -> Vec<(f64, f64)> {
+fn expected_direct(settings: &RoomSettings) -> Vec<(f64, f64)> {
     let mesh = settings.mesh as usize;
     let albedo = f64::from(settings.reflectance);
     let texel = |i: usize| (i as f64 + 0.5) / mesh as f64 * 2.0 * HALF_EDGE - HALF_EDGE;
@@ -152,8 +152,8 @@ fn direct_check(irradiance: &[f64], expected: &[(f64, f64)]) -> Check {
 }
 
 /// Direct light alone, in discs that do not overlap and lie on their walls.
-fn direct_settings(emission: EmissionLaw) -> Settings {
-    Settings { emission, bounces: 1, photons: 2_000_000, rng: Rng::Philox, mesh: 16, radius: 0.015, ..Settings::default() }
+fn direct_settings(emission: EmissionLaw) -> RoomSettings {
+    RoomSettings { emission, bounces: 1, photons: 2_000_000, rng: Rng::Philox, mesh: 16, radius: 0.015, ..RoomSettings::default() }
 }
 
 #[test]
@@ -169,14 +169,14 @@ fn direct_light_is_the_closed_form() {
         let gained: Vec<f64> = irradiance.iter().map(|value| value * 1.01).collect();
         assert_complains("a gain of 1 %", direct_check(&gained, &expected));
         // A gather that looks 1 % too far, divided by the area it should have looked at.
-        let wider = Settings { radius: 1.01 * settings.radius, edge_correction: false, ..settings.clone() };
+        let wider = RoomSettings { radius: 1.01 * settings.radius, edge_correction: false, ..settings.clone() };
         let wider: Vec<f64> =
             walls(&run(&gpu, &wider)).into_iter().flat_map(|wall| wall.irradiance).map(|value| value * 1.01 * 1.01).collect();
         assert_complains("a radius 1 % too large", direct_check(&wider, &expected));
         let other = if emission == EmissionLaw::Uniform { EmissionLaw::Cosine } else { EmissionLaw::Uniform };
         assert_complains(
             "the other law of emission",
-            direct_check(&irradiance, &expected_direct(&Settings { emission: other, ..settings })),
+            direct_check(&irradiance, &expected_direct(&RoomSettings { emission: other, ..settings })),
         );
     }
 }
@@ -186,8 +186,8 @@ fn direct_light_is_the_closed_form() {
 #[test]
 fn power_and_rounds_scale_as_watts_do() {
     let Some(gpu) = device() else { return };
-    let settings = Settings { photons: 400_000, ..direct_settings(EmissionLaw::Uniform) };
-    let mean = |settings: &Settings| {
+    let settings = RoomSettings { photons: 400_000, ..direct_settings(EmissionLaw::Uniform) };
+    let mean = |settings: &RoomSettings| {
         let walls = walls(&run(&gpu, settings));
         let texels = walls.len() * walls[0].irradiance.len();
         walls.iter().flat_map(|wall| &wall.irradiance).sum::<f64>() / texels as f64
@@ -196,14 +196,14 @@ fn power_and_rounds_scale_as_watts_do() {
     let one_watt = expected.iter().map(|(mean, _)| mean).sum::<f64>() / expected.len() as f64;
     let error = expected.iter().map(|(_, error)| error * error).sum::<f64>().sqrt() / expected.len() as f64;
     assert_holds("one round", z_check("mean irradiance", mean(&settings), one_watt, error));
-    let bright = Settings { light_power: [10.0, 10.0], ..settings.clone() };
+    let bright = RoomSettings { light_power: [10.0, 10.0], ..settings.clone() };
     assert_holds("ten watts", z_check("mean irradiance", mean(&bright), 10.0 * one_watt, 10.0 * error));
     for rounds in [2, 5] {
-        let rounds = Settings { rounds, photons: 400_000 / rounds, ..settings.clone() };
+        let rounds = RoomSettings { rounds, photons: 400_000 / rounds, ..settings.clone() };
         assert_holds(format!("{} rounds", rounds.rounds), z_check("mean irradiance", mean(&rounds), one_watt, error));
     }
     // By symmetry of the two lights, whose walls are mirror images, the watts of one may move to the other.
-    let uneven = Settings { light_power: [1.9, 0.1], ..settings };
+    let uneven = RoomSettings { light_power: [1.9, 0.1], ..settings };
     assert_holds("uneven lights", z_check("mean irradiance", mean(&uneven), one_watt, 2.0 * error));
 }
 
@@ -270,7 +270,7 @@ impl Blocks {
 /// against every photon that arrives in the f64 model, the absorbed ones too, of another sequence.
 #[test]
 fn stored_photons_over_albedo_are_the_arriving_ones() {
-    let settings = Settings { photons: 120_001, rng: Rng::Philox, seed: 7, threads: 2, ..Settings::default() };
+    let settings = RoomSettings { photons: 120_001, rng: Rng::Philox, seed: 7, threads: 2, ..RoomSettings::default() };
     let outcome = match device() {
         Some(gpu) => run(&gpu, &settings),
         None => run_on_cpu(&settings),
@@ -306,7 +306,7 @@ fn stored_photons_over_albedo_are_the_arriving_ones() {
 #[test]
 fn radiosity_is_albedo_times_irradiance() {
     for reflectance in [0.25, 0.75, 1.0] {
-        let settings = Settings { reflectance, ..Settings::default() };
+        let settings = RoomSettings { reflectance, ..RoomSettings::default() };
         for wall in walls(&run_on_cpu(&settings)) {
             assert!(wall.radiosity.iter().any(|value| *value > 0.0));
             for (radiosity, irradiance) in pairs(&wall.radiosity, &wall.irradiance) {
@@ -322,8 +322,8 @@ fn radiosity_is_albedo_times_irradiance() {
 /// at this radius.
 #[test]
 fn reflected_flux_is_that_of_the_stored_photons() {
-    let settings = Settings { photons: 200_001, rounds: 1, rng: Rng::Philox, radius: 0.015, threads: 2, ..Settings::default() };
-    let reflected = |settings: &Settings| {
+    let settings = RoomSettings { photons: 200_001, rounds: 1, rng: Rng::Philox, radius: 0.015, threads: 2, ..RoomSettings::default() };
+    let reflected = |settings: &RoomSettings| {
         let outcome = run_on_cpu(settings);
         let texel_area = (2.0 * HALF_EDGE / f64::from(settings.mesh)).powi(2);
         let watts = walls(&outcome).iter().flat_map(|wall| &wall.radiosity).sum::<f64>() * texel_area;
@@ -332,9 +332,9 @@ fn reflected_flux_is_that_of_the_stored_photons() {
     };
     for settings in [
         settings.clone(),
-        Settings { light_power: [7.0, 7.0], ..settings.clone() },
-        Settings { photons: 50_001, rounds: 4, ..settings.clone() },
-        Settings { shininess: [Some(5.0); 5], ..settings },
+        RoomSettings { light_power: [7.0, 7.0], ..settings.clone() },
+        RoomSettings { photons: 50_001, rounds: 4, ..settings.clone() },
+        RoomSettings { shininess: [Some(5.0); 5], ..settings },
     ] {
         let (film, photons) = reflected(&settings);
         assert!((film / photons - 1.0).abs() < 0.005, "{film} W in the film, {photons} W stored, {} rounds", settings.rounds);
@@ -346,8 +346,8 @@ fn reflected_flux_is_that_of_the_stored_photons() {
 #[test]
 fn edge_correction_divides_by_what_lies_on_the_wall() {
     let Some(gpu) = device() else { return };
-    let corrected = Settings { bounces: 1, photons: 1_000_000, rng: Rng::Philox, ..Settings::default() };
-    let uncorrected = Settings { edge_correction: false, ..corrected.clone() };
+    let corrected = RoomSettings { bounces: 1, photons: 1_000_000, rng: Rng::Philox, ..RoomSettings::default() };
+    let uncorrected = RoomSettings { edge_correction: false, ..corrected.clone() };
     let (with, without) = (walls(&run(&gpu, &corrected)), walls(&run(&gpu, &uncorrected)));
     let radius = corrected.radius;
     let half_texel = HALF_EDGE / 64.0;

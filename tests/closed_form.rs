@@ -1,4 +1,4 @@
-//! Closed forms (`photonmill::selfcheck`) on the device, and those of direct light that need a scene of their own.
+//! Closed forms (`photonmill::verify::selfcheck`) on the device, and those of direct light that need a scene of their own.
 //! `tests/closed_rooms.rs` has light that is scattered to and fro, `tests/optics.rs` mirrors and glass,
 //! `tests/radiosity.rs` the paper's box.
 
@@ -10,14 +10,14 @@ use crate::common::lit::{SCENE_BUILDERS, irradiances, level, matt, received, sce
 use crate::common::{Check, Complaint, Kind, assert_complains, assert_holds, device, known, pairs};
 use glam::{DVec3, Vec3};
 use photonmill::gpu::Gpu;
-use photonmill::judge::radiosity::{cells_of, form_factor_from, on_wall};
 use photonmill::scene::closed_forms::NAMES;
 use photonmill::scene::light::LightKind;
 use photonmill::scene::{Mesh, Scene};
-use photonmill::selfcheck::measure::{irradiance, radiance};
-use photonmill::selfcheck::{self, Estimate, Finding};
 use photonmill::settings::EmissionLaw;
-use photonmill::settings::transport::{Illumination, TransportSettings};
+use photonmill::settings::scene::{Illumination, SceneSettings};
+use photonmill::verify::judge::radiosity::{cells_of, form_factor_from, on_wall};
+use photonmill::verify::selfcheck::measure::{irradiance, radiance};
+use photonmill::verify::selfcheck::{self, Estimate, Finding};
 
 /// Right within the error.
 fn right(finding: &Finding) -> Check<Complaint> {
@@ -68,7 +68,7 @@ fn the_cpu_builder_is_checked_without_a_device() {
 
 #[test]
 fn every_scene_of_a_closed_form_has_a_case() {
-    let source = include_str!("../src/selfcheck/closed_forms.rs");
+    let source = include_str!("../src/verify/selfcheck/closed_forms.rs");
     NAMES.iter().for_each(|name| assert!(source.contains(&format!("\"{name}\"")), "{name}"));
 }
 
@@ -90,8 +90,8 @@ fn families_tell_chance_from_error() {
     assert_complains("nothing tested", Family::default().check());
 }
 
-fn settings() -> TransportSettings {
-    TransportSettings { photons: 1000, rounds: 2, shadow_rays: 32, ..TransportSettings::default() }
+fn settings() -> SceneSettings {
+    SceneSettings { photons: 1000, rounds: 2, shadow_rays: 32, ..SceneSettings::default() }
 }
 
 #[test]
@@ -143,7 +143,7 @@ fn a_disc_lights_points_and_a_wall_by_either_law() {
     let points = repeated(&known.map(|(_, point, ..)| point), times);
     let mut family = Family::default();
     for law in [EmissionLaw::Cosine, EmissionLaw::Uniform] {
-        let settings = TransportSettings { rounds: 8, ..settings() };
+        let settings = SceneSettings { rounds: 8, ..settings() };
         let found = irradiances(&gpu, &lamp_in_a_black_box(law), &settings, &points, 1..2).remove(0);
         for ((what, _, cosine, uniform), found) in pairs(&known, found.chunks(times)) {
             let found: Vec<f64> = found.iter().map(|light| light.x).collect();
@@ -210,7 +210,7 @@ fn a_point_light_falls_off_with_distance_and_cosine() {
         }
         for builder in SCENE_BUILDERS {
             let h: f64 = 1.9;
-            let photons = TransportSettings {
+            let photons = SceneSettings {
                 illumination: Illumination::Photons,
                 builder: Some(builder),
                 photons: 50_000,

@@ -1,5 +1,5 @@
 //! Light that is scattered to and fro and cannot leave, against closed forms: an integrating sphere, a furnace, parallel
-//! plates, the geometric series of bounces. `photonmill::selfcheck` has the furnace that is a box.
+//! plates, the geometric series of bounces. `photonmill::verify::selfcheck` has the furnace that is a box.
 
 use std::f64::consts::PI;
 
@@ -13,8 +13,8 @@ use photonmill::scene::light::LightKind;
 use photonmill::scene::open_box::open_box;
 use photonmill::scene::room::Wall;
 use photonmill::scene::{Material, Mesh};
-use photonmill::settings::transport::{Illumination, TransportSettings};
-use photonmill::settings::{Builder, Gather, Settings};
+use photonmill::settings::scene::{Illumination, SceneSettings};
+use photonmill::settings::{Builder, Gather, RoomSettings};
 
 /// A sphere of 1 m of flat triangles, seen from inside.
 fn hollow_sphere(segments: u32) -> Mesh {
@@ -92,7 +92,7 @@ fn an_integrating_sphere_multiplies_light() {
         for (albedo, bounces, photons) in [(Vec3::new(1.0, 0.99, 0.9), 60, 800), (Vec3::new(0.9, 0.5, 1.0), 16, 3000)] {
             let material = Material::lambert("wall", albedo);
             let scene = scene_of(vec![sphere.clone()], vec![material], vec![LightKind::Point { position: DVec3::ZERO, intensity }]);
-            let settings = TransportSettings {
+            let settings = SceneSettings {
                 illumination: Illumination::Photons,
                 builder: Some(builder),
                 photons,
@@ -100,7 +100,7 @@ fn an_integrating_sphere_multiplies_light() {
                 rounds: 1,
                 radius: Some(RADIUS),
                 alpha: 1.0,
-                ..TransportSettings::default()
+                ..SceneSettings::default()
             };
             let runs = irradiances(&gpu, &scene, &settings, &points, 1..17);
             for channel in 0..3 {
@@ -126,7 +126,7 @@ fn a_furnace_sphere_is_evenly_lit() {
     let scene = scene_of(vec![sphere], vec![shining(0.5)], vec![]);
     let mut family = Family::default();
     for builder in SCENE_BUILDERS {
-        let settings = TransportSettings {
+        let settings = SceneSettings {
             illumination: Illumination::Photons,
             builder: Some(builder),
             photons: 20_000,
@@ -134,7 +134,7 @@ fn a_furnace_sphere_is_evenly_lit() {
             rounds: 1,
             radius: Some(RADIUS),
             alpha: 1.0,
-            ..TransportSettings::default()
+            ..SceneSettings::default()
         };
         let runs = irradiances(&gpu, &scene, &settings, &points, 1..17);
         let what = format!("furnace sphere, {builder:?}");
@@ -159,7 +159,7 @@ fn parallel_plates_send_light_to_and_fro() {
     let scene = scene_of(meshes, vec![shining(below as f32), matt(above as f32), mirror(1.0)], vec![]);
     let mut family = Family::default();
     for (illumination, builder) in BOTH.into_iter().flat_map(|illumination| SCENE_BUILDERS.map(|builder| (illumination, builder))) {
-        let settings = TransportSettings {
+        let settings = SceneSettings {
             illumination,
             builder: Some(builder),
             photons: 30_000,
@@ -169,7 +169,7 @@ fn parallel_plates_send_light_to_and_fro() {
             radius: Some(0.15),
             caustic_radius: Some(0.15),
             alpha: 1.0,
-            ..TransportSettings::default()
+            ..SceneSettings::default()
         };
         let points = [grid(0.2, DVec3::NEG_Y, 6), grid(-0.2, DVec3::Y, 6)].concat();
         let runs = irradiances(&gpu, &scene, &settings, &points, 1..25);
@@ -201,7 +201,7 @@ fn bounces_in_a_closed_room_are_a_geometric_series() {
     let mut family = Family::default();
     for rho in [0.5f32, 0.9, 0.99] {
         for builder in JUDGED {
-            let settings = Settings {
+            let settings = RoomSettings {
                 builder,
                 reflectance: rho,
                 photons: 1 << 19,
@@ -210,7 +210,7 @@ fn bounces_in_a_closed_room_are_a_geometric_series() {
                 // So few points need no index of so many photons.
                 gather: Gather::Brute,
                 threads: 2,
-                ..Settings::default()
+                ..RoomSettings::default()
             };
             let mut room = open_box(&settings);
             room.faces[5] = Some(Wall { name: "front", albedo: rho, shininess: None });
@@ -233,13 +233,13 @@ fn bounces_in_a_sphere_are_a_geometric_series() {
     for rho in [0.5f32, 0.9, 0.99] {
         let scene = scene_of(vec![hollow_sphere(12)], vec![matt(rho)], vec![lamp.clone()]);
         for builder in SCENE_BUILDERS {
-            let settings = TransportSettings {
+            let settings = SceneSettings {
                 builder: Some(builder),
                 photons: 1 << 17,
                 bounces: 15,
                 rounds: 1,
                 radius: Some(0.05),
-                ..TransportSettings::default()
+                ..SceneSettings::default()
             };
             let lit = received(&gpu, &scene, &settings, &[(DVec3::ZERO, DVec3::Y)]);
             expect_geometric(&mut family, &format!("sphere, {builder:?}"), &lit.fates[0], f64::from(rho));

@@ -2,20 +2,21 @@
 //! small runs beside the numbers that they had. Whoever changes one of them on purpose writes the new one here.
 
 use crate::common::{device, device_with, lit, run};
-use photonmill::bench::room::{self, Counts};
+use photonmill::engine;
+
+use photonmill::engine::scene::View;
 use photonmill::gpu::Options;
+use photonmill::measure::bench::room::{self, Counts};
 use photonmill::path::StoredPath;
 use photonmill::photon::{MapPhoton, Origin, StoredPhoton};
+use photonmill::plan::scene::ScenePlan;
 use photonmill::plan::sensor::Sensor;
-use photonmill::plan::transport::TransportPlan;
 use photonmill::records::{CameraPath, LightPath, VisiblePoint};
-use photonmill::render;
 use photonmill::rng::Rng;
 use photonmill::scene::built_in;
 use photonmill::scene::geometry::Geometry;
-use photonmill::settings::transport::TransportSettings;
-use photonmill::settings::{Builder, Math, Settings};
-use photonmill::transport::View;
+use photonmill::settings::scene::SceneSettings;
+use photonmill::settings::{Builder, Math, RoomSettings};
 
 /// Counts of a run: dispatches, submissions, events of all photons, bytes on the device, and bytes that the build moves.
 #[derive(Debug, PartialEq)]
@@ -52,7 +53,7 @@ fn the_box_costs_what_it_did() {
     let Some(gpu) = device() else { return };
     for (builder, counters) in Builder::ON_GPU.map(|builder| (builder, None)).into_iter().chain([(Builder::Atomic, Some(4))]) {
         // Strict, so that every device traces the same photons to the bit.
-        let settings = Settings {
+        let settings = RoomSettings {
             builder,
             counters,
             photons: 1000,
@@ -61,7 +62,7 @@ fn the_box_costs_what_it_did() {
             mesh: 8,
             rng: Rng::Philox,
             math: Math::Strict,
-            ..Settings::default()
+            ..RoomSettings::default()
         };
         let outcome = run(&gpu, &settings);
         let counts = Counts::of(&outcome.fates, settings.rounds);
@@ -87,16 +88,10 @@ fn a_scene_costs_what_it_did() {
     let Some(gpu) = device_with(Options::default()) else { return };
     let scene = built_in::by_name("cornell-spheres").unwrap();
     let geometry = Geometry::new(&scene).unwrap();
-    let settings = TransportSettings {
-        photons: 1000,
-        caustic_photons: 500,
-        bounces: 5,
-        rounds: 2,
-        math: Math::Strict,
-        ..TransportSettings::default()
-    };
+    let settings =
+        SceneSettings { photons: 1000, caustic_photons: 500, bounces: 5, rounds: 2, math: Math::Strict, ..SceneSettings::default() };
     let sensor = Sensor::Picture { width: 16, height: 12 };
-    let plan = TransportPlan::new(&scene, &geometry, &settings, sensor, &render::limits(gpu.facts())).unwrap();
+    let plan = ScenePlan::new(&scene, &geometry, &settings, sensor, &engine::limits(gpu.facts())).unwrap();
     let device_bytes = plan.bytes;
     let lit = lit::light(&gpu, &View { geometry: &geometry, camera: scene.cameras.first(), phases: &[] }, plan);
     let events = lit.fates.each_ref().map(|fates| Counts::of(fates, 1).events as u64);

@@ -8,12 +8,12 @@ use photonmill::cpu::estimate::gather_brute;
 use photonmill::cpu::splat::Splats;
 use photonmill::cpu::trace::{Block, Tracer};
 use photonmill::photon::Photon;
-use photonmill::plan::{Limits, Plan};
+use photonmill::plan::{Limits, RoomPlan};
 use photonmill::records::Tally;
 use photonmill::rng::{Rng, philox};
 use photonmill::scene::open_box::open_box;
 use photonmill::scene::room::RoomScene;
-use photonmill::settings::{EmissionLaw, PhongDirection, Settings, Sums};
+use photonmill::settings::{EmissionLaw, PhongDirection, RoomSettings, Sums};
 use pulp::Arch;
 use rayon::ThreadPoolBuilder;
 
@@ -34,7 +34,7 @@ fn kinds_of_vectors() -> Vec<Arch> {
 type Traced = (Vec<Photon>, Vec<Tally>);
 
 /// Of round 1, block by block.
-fn traced(scene: &RoomScene, plan: &Plan, vectors: Arch, threads: usize) -> Vec<Traced> {
+fn traced(scene: &RoomScene, plan: &RoomPlan, vectors: Arch, threads: usize) -> Vec<Traced> {
     let tracer = Tracer::with_vectors(scene, plan, vectors);
     let pool = ThreadPoolBuilder::new().num_threads(threads).build().unwrap();
     let mut blocks = Vec::new();
@@ -62,7 +62,7 @@ fn neither_threads_nor_vectors_change_a_photon() {
             [(EmissionLaw::Uniform, [None; 5]), (EmissionLaw::Cosine, [Some(2.0), None, Some(0.5), Some(0.0), Some(50.0)])]
         {
             for photons in [2, 33, 513, 4099, 50_001] {
-                let settings = Settings {
+                let settings = RoomSettings {
                     photons,
                     rounds: 2,
                     rng,
@@ -71,7 +71,7 @@ fn neither_threads_nor_vectors_change_a_photon() {
                     light_power: [3.0, 0.5],
                     phong_direction: if photons % 2 == 0 { PhongDirection::Mirror } else { PhongDirection::Sampled },
                     chunk: Some(photons),
-                    ..Settings::default()
+                    ..RoomSettings::default()
                 };
                 let (scene, plan) = (open_box(&settings), plan_for_host(&settings));
                 let expected = traced(&scene, &plan, Arch::Scalar, 1);
@@ -98,17 +98,24 @@ fn neither_threads_nor_vectors_change_a_photon() {
 #[test]
 fn threads_change_no_bit_of_a_film() {
     for (what, settings) in [
-        ("one channel", Settings { photons: 20_001, rounds: 3, rng: Rng::Philox, ..Settings::default() }),
+        ("one channel", RoomSettings { photons: 20_001, rounds: 3, rng: Rng::Philox, ..RoomSettings::default() }),
         (
             "two channels",
-            Settings { photons: 5001, rounds: 2, shininess: [Some(2.0); 5], light_power: [2.0, 1.0], mesh: 37, ..Settings::default() },
+            RoomSettings {
+                photons: 5001,
+                rounds: 2,
+                shininess: [Some(2.0); 5],
+                light_power: [2.0, 1.0],
+                mesh: 37,
+                ..RoomSettings::default()
+            },
         ),
-        ("chunks", Settings { photons: 5001, rounds: 2, chunk: Some(700), radius: 0.3, ..Settings::default() }),
-        ("floats", Settings { photons: 5001, rounds: 2, sums: Sums::F32, ..Settings::default() }),
+        ("chunks", RoomSettings { photons: 5001, rounds: 2, chunk: Some(700), radius: 0.3, ..RoomSettings::default() }),
+        ("floats", RoomSettings { photons: 5001, rounds: 2, sums: Sums::F32, ..RoomSettings::default() }),
     ] {
-        let expected = run_on_cpu(&Settings { threads: 1, ..settings.clone() });
+        let expected = run_on_cpu(&RoomSettings { threads: 1, ..settings.clone() });
         for threads in [2, 3, 8] {
-            let found = run_on_cpu(&Settings { threads, ..settings.clone() });
+            let found = run_on_cpu(&RoomSettings { threads, ..settings.clone() });
             assert_eq!(found.film, expected.film, "{what}, {threads} threads");
             assert_eq!(found.fates, expected.fates, "{what}, {threads} threads");
         }
@@ -116,7 +123,7 @@ fn threads_change_no_bit_of_a_film() {
     }
 }
 
-fn splatted(plan: &Plan, photons: &[Photon], vectors: Arch, threads: usize) -> Vec<u64> {
+fn splatted(plan: &RoomPlan, photons: &[Photon], vectors: Arch, threads: usize) -> Vec<u64> {
     let pool = ThreadPoolBuilder::new().num_threads(threads).build().unwrap();
     let mut sums = vec![0; plan.points.len() * plan.channel_count as usize];
     pool.install(|| {
@@ -135,7 +142,7 @@ fn splatted(plan: &Plan, photons: &[Photon], vectors: Arch, threads: usize) -> V
 }
 
 /// Photons all over a room, a step of f32 beside the rims of texels, beyond the walls, and no photons at all.
-fn photons_around(plan: &Plan, scene: &RoomScene, count: u32) -> Vec<Photon> {
+fn photons_around(plan: &RoomPlan, scene: &RoomScene, count: u32) -> Vec<Photon> {
     let radius = plan.settings.radius as f32;
     (0..count)
         .map(|photon| {
@@ -175,7 +182,7 @@ fn photons_around(plan: &Plan, scene: &RoomScene, count: u32) -> Vec<Photon> {
         .collect()
 }
 
-fn slab(settings: &Settings) -> RoomScene {
+fn slab(settings: &RoomSettings) -> RoomScene {
     let cube = open_box(settings);
     RoomScene { min_corner: DVec3::new(-0.25, -1.0, 3.0), max_corner: DVec3::new(0.25, 1.5, 3.1), ..cube }
 }
@@ -195,9 +202,10 @@ fn splats_are_the_sums_of_brute_force() {
         (128, 0.003, 2000),
     ] {
         for shininess in [[None; 5], [Some(2.0); 5]] {
-            let settings = Settings { mesh, radius, photons: count, bounces: 1, rng: Rng::Philox, shininess, ..Settings::default() };
+            let settings =
+                RoomSettings { mesh, radius, photons: count, bounces: 1, rng: Rng::Philox, shininess, ..RoomSettings::default() };
             for scene in [open_box(&settings), slab(&settings)] {
-                let plan = Plan::new(&scene, &settings, &Limits::of_host()).unwrap();
+                let plan = RoomPlan::new(&scene, &settings, &Limits::of_host()).unwrap();
                 let photons = photons_around(&plan, &scene, count);
                 let mut expected = vec![0; plan.points.len() * plan.channel_count as usize];
                 gather_brute(&plan, &photons, &mut expected);

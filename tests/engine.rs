@@ -10,7 +10,7 @@ use photonmill::gpu::kernels::ScanAdd;
 use photonmill::gpu::{Commands, Constants, Extent, Gpu, Memory, Options, check};
 use photonmill::records::ScanPush;
 use photonmill::rng::Rng;
-use photonmill::settings::{Builder, Gather, Settings};
+use photonmill::settings::{Builder, Gather, RoomSettings};
 use photonmill::timings::{Clock, Row, Timings};
 
 /// Opening a device runs the start-up check on it, with 64-bit sums and with sums of two words.
@@ -44,7 +44,7 @@ fn loops_count_right_up_to_the_limit() {
 #[test]
 fn a_warm_up_is_no_part_of_the_run() {
     let Some(plain) = device() else { return };
-    let settings = Settings { photons: 999, mesh: 5, bounces: 4, ..Settings::default() };
+    let settings = RoomSettings { photons: 999, mesh: 5, bounces: 4, ..RoomSettings::default() };
     let expected = run(&plain, &settings);
     let gpu = device_with(Options { warm_up: true, ..Options::default() }).unwrap();
     gpu.forget_peaks();
@@ -155,7 +155,7 @@ fn nesting_check(rows: &[Row]) -> Check {
 
 /// How often each scope must have run. The CPU builder takes a photon from its emission to its end before the next, and
 /// splats it without an index.
-fn count_check(timings: &Timings, settings: &Settings, chunks: u64) -> Check {
+fn count_check(timings: &Timings, settings: &RoomSettings, chunks: u64) -> Check {
     let rounds = u64::from(settings.rounds);
     // Neither does the persistent builder know bounces of all photons.
     let bounces = if matches!(settings.builder, Builder::Cpu | Builder::Persistent) { 0 } else { settings.bounces };
@@ -191,8 +191,17 @@ fn timings_nest_and_count() {
         for (rounds, bounces, chunk, gather) in
             [(1, 15, None, Gather::Grid), (7, 2, Some(1000), Gather::Brute), (40, 120, None, Gather::Grid)]
         {
-            let settings =
-                Settings { builder, rounds, bounces, chunk, gather, mesh: 16, photons: 2001, rng: Rng::Philox, ..Settings::default() };
+            let settings = RoomSettings {
+                builder,
+                rounds,
+                bounces,
+                chunk,
+                gather,
+                mesh: 16,
+                photons: 2001,
+                rng: Rng::Philox,
+                ..RoomSettings::default()
+            };
             let outcome = run(&gpu, &settings);
             let what = format!("{builder:?}, {rounds} rounds");
             assert_holds(&what, count_check(&outcome.timings, &settings, u64::from(outcome.plan.chunks_per_round)));
@@ -228,7 +237,7 @@ fn timings_nest_and_count() {
 
 #[test]
 fn the_cpu_builder_is_timed_on_the_host() {
-    let settings = Settings { builder: Builder::Cpu, rounds: 3, chunk: Some(1500), mesh: 16, ..Settings::default() };
+    let settings = RoomSettings { builder: Builder::Cpu, rounds: 3, chunk: Some(1500), mesh: 16, ..RoomSettings::default() };
     let outcome = run_on_cpu(&settings);
     assert_holds("cpu", count_check(&outcome.timings, &settings, u64::from(outcome.plan.chunks_per_round)));
     assert_holds("cpu", nesting_check(outcome.timings.rows()));
@@ -240,7 +249,7 @@ fn the_cpu_builder_is_timed_on_the_host() {
 #[test]
 fn a_run_makes_the_pipelines_of_its_plan_once() {
     let Some(gpu) = device_with(Options::default()) else { return };
-    let settings = Settings { builder: Builder::Naive, gather: Gather::Brute, mesh: 8, ..Settings::default() };
+    let settings = RoomSettings { builder: Builder::Naive, gather: Gather::Brute, mesh: 8, ..RoomSettings::default() };
     let before = gpu.pipeline_count();
     run(&gpu, &settings);
     // Emission, one bounce, one gather.
@@ -251,7 +260,7 @@ fn a_run_makes_the_pipelines_of_its_plan_once() {
 
 #[test]
 fn the_checks_of_timings_complain() {
-    let settings = Settings { builder: Builder::Cpu, rounds: 2, mesh: 4, ..Settings::default() };
+    let settings = RoomSettings { builder: Builder::Cpu, rounds: 2, mesh: 4, ..RoomSettings::default() };
     let timings = run_on_cpu(&settings).timings;
     assert_holds("the run itself", nesting_check(timings.rows()));
     let spoiled = |name: &str, spoil: fn(&mut Row)| {
@@ -269,5 +278,5 @@ fn the_checks_of_timings_complain() {
     let mut extra = timings.clone();
     extra.count("round/build/bounce 1");
     assert_complains("a bounce too many", count_check(&extra, &settings, 1));
-    assert_complains("a round left out", count_check(&timings, &Settings { rounds: 3, ..settings.clone() }, 1));
+    assert_complains("a round left out", count_check(&timings, &RoomSettings { rounds: 3, ..settings.clone() }, 1));
 }

@@ -13,16 +13,19 @@ use crate::common::{
 };
 use glam::{DQuat, DVec3, EulerRot, Vec3};
 use photonmill::cpu::bsdf::phong_lobe;
-use photonmill::film::{Film, estimate_walls};
+use photonmill::engine::room::constants;
+use photonmill::engine::room::estimate;
+use photonmill::engine::room::film::{RoomFilm, estimate_walls};
+use photonmill::engine::room::index;
+use photonmill::engine::room::resources::RoomResources;
+use photonmill::engine::scene::{RunResult, SceneFilm};
 use photonmill::gpu::{Commands, Gpu, Options};
 use photonmill::ledger::Fates;
 use photonmill::photon::{MapPhoton, Photon, StoredPhoton};
+use photonmill::plan::scene::{SEGMENT_BOUNCES, ScenePlan};
 use photonmill::plan::sensor::Sensor;
-use photonmill::plan::transport::{SEGMENT_BOUNCES, TransportPlan};
-use photonmill::plan::{Limits, Plan};
+use photonmill::plan::{Limits, RoomPlan};
 use photonmill::records::Tally;
-use photonmill::render::constants;
-use photonmill::resources::Resources;
 use photonmill::rng::Rng;
 use photonmill::scene::geometry::Geometry;
 use photonmill::scene::light::{Light, LightKind};
@@ -32,23 +35,21 @@ use photonmill::scene::rectangle::disc_rectangle_area;
 use photonmill::scene::room::Wall;
 use photonmill::scene::texture::{Texture, Wrap};
 use photonmill::scene::{Material, Mesh, Scene};
-use photonmill::selfcheck::measure::irradiance;
+use photonmill::settings::scene::{Illumination, Kernel, Part, SceneSettings};
 use photonmill::settings::stop::Stop;
-use photonmill::settings::transport::{Illumination, Kernel, Part, TransportSettings};
-use photonmill::settings::{Builder, EmissionLaw, Gather, MAX_EVENTS, Settings};
-use photonmill::transport::{RoundFilm, RunResult};
-use photonmill::{estimate, index};
+use photonmill::settings::{Builder, EmissionLaw, Gather, MAX_EVENTS, RoomSettings};
+use photonmill::verify::selfcheck::measure::irradiance;
 
 /// Half of an f32's spacing below 1.
 const U: f64 = 1.0 / 16_777_216.0;
 
 /// Film sums of a photon list that is gathered again and again.
-fn gathered(gpu: &Device, settings: &Settings, photons: &[Photon], times: u32) -> Vec<u64> {
+fn gathered(gpu: &Device, settings: &RoomSettings, photons: &[Photon], times: u32) -> Vec<u64> {
     let scene = open_box(settings);
     let plan = plan_for(gpu, &scene, settings);
     assert!(photons.len() <= plan.photon_capacity as usize);
     let mut commands = Commands::new(gpu, constants(&plan), Instant::now()).unwrap();
-    let resources = Resources::new(gpu, &mut commands, &scene, &plan).unwrap();
+    let resources = RoomResources::new(gpu, &mut commands, &scene, &plan).unwrap();
     upload_photons(&mut commands, &resources, &plan, photons);
     index::build(&mut commands, &resources, &plan, settings.photons).unwrap();
     for _ in 0..times {
@@ -65,7 +66,8 @@ fn a_texel_counts_beyond_2_to_the_24() {
     let expected = [0, 0, 0, 0, u64::from(count * times)];
     for without_int64_atomics in [false, true] {
         let Some(gpu) = device_with(Options { without_int64_atomics, ..Options::default() }) else { return };
-        let settings = Settings { photons: count, chunk: Some(count), bounces: 1, mesh: 1, rng: Rng::Philox, ..Settings::default() };
+        let settings =
+            RoomSettings { photons: count, chunk: Some(count), bounces: 1, mesh: 1, rng: Rng::Philox, ..RoomSettings::default() };
         let found = gathered(&gpu, &settings, &vec![on_the_back_wall; count as usize], times);
         assert_holds(format!("64-bit atomics masked: {without_int64_atomics}"), equal_sums("one texel", &found, &expected));
     }
@@ -76,12 +78,12 @@ fn a_texel_counts_beyond_2_to_the_24() {
 /// Runs that are merged sum by sum: a million million photons are as bright as the five thousand that they repeat.
 #[test]
 fn a_trillion_photons_merge_into_the_same_light() {
-    let settings = Settings { mesh: 16, ..Settings::default() };
+    let settings = RoomSettings { mesh: 16, ..RoomSettings::default() };
     let outcome = run_on_cpu(&settings);
     let scene = open_box(&settings);
     let one = estimate_walls(&outcome.film, &scene, &outcome.plan);
     for times in [200_000u64, 200_000_000] {
-        let merged = Film {
+        let merged = RoomFilm {
             sums: outcome.film.sums.iter().map(|sum| sum.checked_mul(times).unwrap()).collect(),
             emitted: outcome.film.emitted * times,
             ..outcome.film.clone()
@@ -107,7 +109,7 @@ fn a_trillion_photons_merge_into_the_same_light() {
 #[test]
 fn light_is_linear_in_power_over_24_decades() {
     let of = |light_power: [f64; 2]| {
-        let settings = Settings { light_power, mesh: 8, ..Settings::default() };
+        let settings = RoomSettings { light_power, mesh: 8, ..RoomSettings::default() };
         let outcome = run_on_cpu(&settings);
         let walls = estimate_walls(&outcome.film, &open_box(&settings), &outcome.plan);
         (outcome.film.sums, walls.into_iter().flat_map(|wall| wall.irradiance).collect::<Vec<f64>>())
@@ -123,7 +125,7 @@ fn light_is_linear_in_power_over_24_decades() {
         }
     }
     for refused in [[1e-13, 1.0], [1.0, 1e13], [1.0, 0.999e-6]] {
-        let error = Settings { light_power: refused, ..Settings::default() }.validate().unwrap_err().to_string();
+        let error = RoomSettings { light_power: refused, ..RoomSettings::default() }.validate().unwrap_err().to_string();
         assert!(error.starts_with("--light-power "), "{refused:?}: {error}");
     }
 }
@@ -132,11 +134,11 @@ fn light_is_linear_in_power_over_24_decades() {
 /// is off by no more than half a unit of fixed point for each photon.
 #[test]
 fn mixed_weights_are_summed_to_half_a_unit_each() {
-    let settings = Settings {
+    let settings = RoomSettings {
         shininess: [Some(1e4), None, Some(0.01), Some(5.0), Some(0.0)],
         light_power: [1.0, 1.1e-6],
         mesh: 16,
-        ..Settings::default()
+        ..RoomSettings::default()
     };
     let (map, plan, film) = (photons_on_cpu(&settings), plan_for_host(&settings), run_on_cpu(&settings).film);
     let radius_squared = (settings.radius * settings.radius) as f32;
@@ -167,7 +169,7 @@ fn mixed_weights_are_summed_to_half_a_unit_each() {
 #[test]
 fn faint_light_is_right_to_half_a_film_unit() {
     let Some(gpu) = device() else { return };
-    let settings = TransportSettings { photons: 1, rounds: 2, shadow_rays: 1, ..TransportSettings::default() };
+    let settings = SceneSettings { photons: 1, rounds: 2, shadow_rays: 1, ..SceneSettings::default() };
     for exponent in [0, -3, -6, -9, -12] {
         let mut plane = scene("sky-over-plane");
         let albedo = 10f32.powi(exponent);
@@ -186,17 +188,17 @@ fn faint_light_is_right_to_half_a_film_unit() {
 #[test]
 fn standard_errors_survive_a_mean_far_above_them() {
     let furnace = scene("furnace");
-    let settings = TransportSettings { rounds: 1_000_000, ..TransportSettings::default() };
+    let settings = SceneSettings { rounds: 1_000_000, ..SceneSettings::default() };
     let geometry = Geometry::new(&furnace).unwrap();
     let sensor = Sensor::Picture { width: 1, height: 1 };
-    let plan = TransportPlan::new(&furnace, &geometry, &settings, sensor, &Limits::of_host()).unwrap();
+    let plan = ScenePlan::new(&furnace, &geometry, &settings, sensor, &Limits::of_host()).unwrap();
     let units = |value: f64| (value * plan.film_scale).round() as u64;
     let (low, high) = (units(999.9), units(1000.1));
     let half = u64::from(settings.rounds) / 2;
     let square = |value: u64| u128::from(value) * u128::from(value);
     let squares = u128::from(half) * (square(low) + square(high));
     let film =
-        RoundFilm::new(settings.rounds, vec![half * (low + high); 3], [squares as u64, (squares >> 64) as u64].repeat(3), vec![0; 3]);
+        SceneFilm::new(settings.rounds, vec![half * (low + high); 3], [squares as u64, (squares >> 64) as u64].repeat(3), vec![0; 3]);
     let exact = 0.1 / (f64::from(settings.rounds) - 1.0).sqrt();
     assert_holds("mean", relative_check("mean", film.mean(0, &plan).x, 1000.0, 1e-6));
     assert_holds("error", relative_check("standard error", film.standard_error(0, &plan).x, exact, 1e-3));
@@ -214,14 +216,14 @@ fn standard_errors_survive_a_mean_far_above_them() {
 /// The most events that 64-bit sums hold, and one more.
 #[test]
 fn film_sums_are_refused_before_they_could_overflow() {
-    let most = Settings { photons: 1 << 31, bounces: 1 << 4, rounds: 1 << 12, rng: Rng::Philox, ..Settings::default() };
+    let most = RoomSettings { photons: 1 << 31, bounces: 1 << 4, rounds: 1 << 12, rng: Rng::Philox, ..RoomSettings::default() };
     assert_eq!(most.total_photons() * u64::from(most.bounces), MAX_EVENTS);
     most.validate().unwrap();
     let host = Limits::of_host();
-    let plan = Plan::new(&open_box(&most), &Settings { mesh: 1, shininess: [Some(2.0); 5], ..most.clone() }, &host).unwrap();
+    let plan = RoomPlan::new(&open_box(&most), &RoomSettings { mesh: 1, shininess: [Some(2.0); 5], ..most.clone() }, &host).unwrap();
     // Photons of weight 1 only, in every texel at every bounce.
     assert!(u128::from(MAX_EVENTS) << plan.film_shift <= 1 << 63);
-    for settings in [Settings { rounds: most.rounds + 1, ..most.clone() }, Settings { bounces: most.bounces + 1, ..most }] {
+    for settings in [RoomSettings { rounds: most.rounds + 1, ..most.clone() }, RoomSettings { bounces: most.bounces + 1, ..most }] {
         let error = settings.validate().unwrap_err().to_string();
         assert!(error.contains("film"), "{error}");
     }
@@ -276,7 +278,7 @@ fn phong_weights_have_their_mean_and_vanish_behind() {
     }
     let Some(gpu) = device() else { return };
     let weights = |shininess: f32| {
-        let settings = Settings { shininess: [Some(shininess); 5], photons: 20_001, ..Settings::default() };
+        let settings = RoomSettings { shininess: [Some(shininess); 5], photons: 20_001, ..RoomSettings::default() };
         let map = crate::common::in_order(crate::common::photons(&gpu, &settings));
         assert!(map.iter().all(|photon| (0.0..=1.0).contains(&photon.weight)), "shininess {shininess}");
         map.iter().map(|photon| photon.weight).collect::<Vec<f32>>()
@@ -295,18 +297,18 @@ fn phong_weights_have_their_mean_and_vanish_behind() {
 
 /// Numbers in [0, 1), drawn as photons draw them.
 fn first_draws(count: u32) -> Vec<f32> {
-    let settings = Settings { rng: Rng::Philox, photons: count, ..Settings::default() };
+    let settings = RoomSettings { rng: Rng::Philox, photons: count, ..RoomSettings::default() };
     (0..count).map(|photon| crate::common::draws_of(crate::common::streams_of(&settings), 0, photon, 0)[0]).collect()
 }
 
 /// From a photon's own place there is no direction to the eye, and from an eye in the wall's plane none but along it.
 #[test]
 fn an_eye_on_a_photon_sees_no_weight_and_no_nan() {
-    let settings = Settings { shininess: [Some(2.0); 5], ..Settings::default() };
+    let settings = RoomSettings { shininess: [Some(2.0); 5], ..RoomSettings::default() };
     let all = photons_on_cpu(&settings);
     for place in [0, all.len() / 2, all.len() - 1] {
         let eye = all[place].position.to_array();
-        let settings = Settings { eye, ..settings.clone() };
+        let settings = RoomSettings { eye, ..settings.clone() };
         let map = photons_on_cpu(&settings);
         assert_eq!(map[place].weight, 0.0);
         assert!(map.iter().all(|photon| (0.0..=1.0).contains(&photon.weight)));
@@ -321,7 +323,7 @@ fn an_eye_on_a_photon_sees_no_weight_and_no_nan() {
 fn a_thousand_bounces_store_a_geometric_series() {
     let gpu = device();
     for (albedo, bounces, photons) in [(0.75f32, 200, 100_001), (0.99, 2000, 10_001), (0.999, 9000, 1001)] {
-        let settings = Settings { reflectance: albedo, bounces, photons, mesh: 1, rng: Rng::Philox, ..Settings::default() };
+        let settings = RoomSettings { reflectance: albedo, bounces, photons, mesh: 1, rng: Rng::Philox, ..RoomSettings::default() };
         let mut scene = open_box(&settings);
         scene.faces[5] = Some(Wall { name: "front", albedo, shininess: None });
         let mut ledgers = vec![("cpu", run_scene_on_cpu(&scene, &settings).fates.ledger())];
@@ -349,7 +351,7 @@ fn a_thousand_bounces_store_a_geometric_series() {
 fn a_billion_photons_have_the_exact_share() {
     let Some(gpu) = device() else { return };
     let settings =
-        Settings { photons: 1_000_000_000, bounces: 1, mesh: 1, rng: Rng::Philox, builder: Builder::Ballot, ..Settings::default() };
+        RoomSettings { photons: 1_000_000_000, bounces: 1, mesh: 1, rng: Rng::Philox, builder: Builder::Ballot, ..RoomSettings::default() };
     let fates = run(&gpu, &settings).fates;
     assert_eq!(fates.emitted, 1_000_000_000);
     assert_holds("first bounce", share_check("stored", fates.bounces[0].stored, fates.emitted, 0.586_425_3));
@@ -367,14 +369,14 @@ fn a_map_of_one_photon_is_one_disc() {
     let Some(gpu) = device() else { return };
     let close = LightKind::Disc { centre: DVec3::Y * 1e-3, normal: DVec3::NEG_Y, radius: 1e-3, power: Vec3::ONE, law: EmissionLaw::Cosine };
     for radius in [0.05, 0.2, 1.0] {
-        let settings = TransportSettings {
+        let settings = SceneSettings {
             photons: 1,
             rounds: 1,
             bounces: 1,
             radius: Some(radius),
             alpha: 1.0,
             illumination: Illumination::Photons,
-            ..TransportSettings::default()
+            ..SceneSettings::default()
         };
         let points = [(DVec3::ZERO, DVec3::Y), (DVec3::X * 1.9, DVec3::Y), (DVec3::ZERO, DVec3::NEG_Y)];
         let lit = received(&gpu, &over_plane(close.clone()), &settings, &points);
@@ -389,15 +391,15 @@ fn a_map_of_one_photon_is_one_disc() {
     }
 }
 
-fn furnace_settings(radius: f64) -> TransportSettings {
-    TransportSettings {
+fn furnace_settings(radius: f64) -> SceneSettings {
+    SceneSettings {
         photons: 10_000,
         rounds: 2,
         bounces: 60,
         radius: Some(radius),
         alpha: 1.0,
         illumination: Illumination::Photons,
-        ..TransportSettings::default()
+        ..SceneSettings::default()
     }
 }
 
@@ -421,7 +423,7 @@ fn radii_from_the_whole_scene_to_below_the_photons_spacing_are_right() {
     let geometry = Geometry::new(&furnace).unwrap();
     let sensor = Sensor::Receivers { count: 1 };
     let plan =
-        |radius: f64| TransportPlan::new(&furnace, &geometry, &furnace_settings(radius), sensor, &photonmill::render::limits(gpu.facts()));
+        |radius: f64| ScenePlan::new(&furnace, &geometry, &furnace_settings(radius), sensor, &photonmill::engine::limits(gpu.facts()));
     let least = 1.0 / 32_768.0;
     assert!(plan(2.0).is_ok() && plan(least).is_ok());
     for radius in [2.0f64.next_up(), least.next_down(), 1e-23, f64::MIN_POSITIVE, 1e30, f64::NAN, f64::INFINITY, 0.0, -0.1] {
@@ -432,10 +434,10 @@ fn radii_from_the_whole_scene_to_below_the_photons_spacing_are_right() {
     assert!(lit.film.mean(0, &lit.plan).is_finite());
     // The paper's box, at both ends of what it allows.
     for radius in [0.5, 0.5 / 65_536.0] {
-        Settings { radius, ..Settings::default() }.validate().unwrap();
+        RoomSettings { radius, ..RoomSettings::default() }.validate().unwrap();
     }
     for radius in [0.5f64.next_up(), (0.5f64 / 65_536.0).next_down(), f64::NAN] {
-        let error = Settings { radius, ..Settings::default() }.validate().unwrap_err().to_string();
+        let error = RoomSettings { radius, ..RoomSettings::default() }.validate().unwrap_err().to_string();
         assert!(error.starts_with("--radius "), "{radius}: {error}");
     }
 }
@@ -449,8 +451,7 @@ fn edges_and_corners_are_dark_by_what_lies_beyond_them() {
     let at = |x: f64, z: f64| (DVec3::new(x * radius, 0.0, z * radius), DVec3::Y);
     let places = [(0.0, 2.5), (0.25, 2.5), (0.5, 2.5), (0.75, 2.5), (1.0, 2.5), (2.5, 2.5), (0.0, 0.0), (0.5, 0.5), (0.8, 0.8), (0.3, 0.9)];
     let points: Vec<_> = places.iter().map(|(x, z)| at(*x, *z)).collect();
-    let lit =
-        |edge_correction| received(&gpu, &scene("furnace"), &TransportSettings { edge_correction, ..furnace_settings(radius) }, &points);
+    let lit = |edge_correction| received(&gpu, &scene("furnace"), &SceneSettings { edge_correction, ..furnace_settings(radius) }, &points);
     let (with, without) = (lit(true), lit(false));
     let mut worst = 0.0f64;
     for (place, (x, z)) in places.iter().enumerate() {
@@ -475,7 +476,7 @@ fn every_kernel_of_every_radius_integrates_to_one() {
     let points = [(DVec3::new(0.5, 0.0, 0.5), DVec3::Y), (DVec3::new(0.0, 0.0, 0.5), DVec3::Y), (DVec3::new(1e-3, 0.0, 1e-3), DVec3::Y)];
     for kernel in [Kernel::Box, Kernel::Cone, Kernel::Epanechnikov] {
         for radius in [2.0, 0.1] {
-            let settings = TransportSettings { kernel, photons: 20_000, ..furnace_settings(radius) };
+            let settings = SceneSettings { kernel, photons: 20_000, ..furnace_settings(radius) };
             let found = irradiance(&gpu, &scene("furnace"), &settings, &points).unwrap();
             assert!(found.standard_error < 0.03 * 2.0 * PI, "{kernel:?}, {radius}: {found:?}");
             assert_holds(format!("{kernel:?}, radius {radius}"), z_check("irradiance", found.mean, 2.0 * PI, found.standard_error));
@@ -488,8 +489,8 @@ fn every_kernel_of_every_radius_integrates_to_one() {
 fn radii_of_ten_thousand_rounds_follow_the_gamma_function() {
     let furnace = scene("furnace");
     let geometry = Geometry::new(&furnace).unwrap();
-    let settings = TransportSettings { rounds: 10_000, alpha: 2.0 / 3.0, ..furnace_settings(0.25) };
-    let plan = TransportPlan::new(&furnace, &geometry, &settings, Sensor::Receivers { count: 1 }, &Limits::of_host()).unwrap();
+    let settings = SceneSettings { rounds: 10_000, alpha: 2.0 / 3.0, ..furnace_settings(0.25) };
+    let plan = ScenePlan::new(&furnace, &geometry, &settings, Sensor::Receivers { count: 1 }, &Limits::of_host()).unwrap();
     let map = plan.global.as_ref().unwrap();
     // ln Gamma(n + a) - ln n! - ln Gamma(1 + a) as a product of the first terms and Stirling's series of the rest.
     let alpha = 2.0 / 3.0;
@@ -524,11 +525,18 @@ fn vast() -> Limits {
 #[test]
 fn slots_of_a_chunk_are_numbered_in_32_bits() {
     let plan = |photons: u32, bounces: u32, limits: &Limits| {
-        let settings =
-            Settings { photons, bounces, chunk: Some(1 << 31), mesh: 1, rng: Rng::Philox, builder: Builder::Naive, ..Settings::default() };
-        Plan::new(&open_box(&settings), &settings, limits).unwrap()
+        let settings = RoomSettings {
+            photons,
+            bounces,
+            chunk: Some(1 << 31),
+            mesh: 1,
+            rng: Rng::Philox,
+            builder: Builder::Naive,
+            ..RoomSettings::default()
+        };
+        RoomPlan::new(&open_box(&settings), &settings, limits).unwrap()
     };
-    let check = |plan: &Plan, limits: &Limits| {
+    let check = |plan: &RoomPlan, limits: &Limits| {
         let slots = u64::from(plan.path_capacity) * u64::from(plan.settings.bounces);
         assert!(slots <= u64::from(u32::MAX) && u64::from(plan.photon_capacity) == slots, "{slots} slots");
         assert!(slots * size_of::<StoredPhoton>() as u64 <= limits.buffer_bytes);
@@ -543,9 +551,16 @@ fn slots_of_a_chunk_are_numbered_in_32_bits() {
     for (counters, group_size) in [(None, 32), (None, 1024), (Some(64), 1024), (Some(2), 128)] {
         for (bounces, limits) in [(1, vast()), (15, vast()), (10_000, vast()), (15, Limits { buffer_bytes: 1 << 32, ..vast() })] {
             let limits = Limits { counters: 8, ..limits };
-            let atomic =
-                Settings { photons: 1 << 31, bounces, group_size, counters, chunk: Some(1 << 31), rng: Rng::Philox, ..Settings::default() };
-            let plan = Plan::new(&open_box(&atomic), &atomic, &limits).unwrap();
+            let atomic = RoomSettings {
+                photons: 1 << 31,
+                bounces,
+                group_size,
+                counters,
+                chunk: Some(1 << 31),
+                rng: Rng::Philox,
+                ..RoomSettings::default()
+            };
+            let plan = RoomPlan::new(&open_box(&atomic), &atomic, &limits).unwrap();
             check(&plan, &limits);
             let is_wanted = counters.is_some() || plan.path_capacity >= 1 << 21;
             assert_eq!(plan.counters > 1, is_wanted, "{bounces} bounces, {counters:?} counters");
@@ -564,8 +579,8 @@ fn slots_of_a_chunk_are_numbered_in_32_bits() {
     check(&plan(1 << 31, 15, &small), &small);
     // Room for fewer than two photons is an error that names the bounces.
     let none = Limits { buffer_bytes: 3 * 16 * 15, ..vast() };
-    let settings = Settings { mesh: 1, ..Settings::default() };
-    assert!(Plan::new(&open_box(&settings), &settings, &none).unwrap_err().to_string().starts_with("--bounces"));
+    let settings = RoomSettings { mesh: 1, ..RoomSettings::default() };
+    assert!(RoomPlan::new(&open_box(&settings), &settings, &none).unwrap_err().to_string().starts_with("--bounces"));
 }
 
 /// The same for maps of scenes of triangles.
@@ -578,8 +593,8 @@ fn maps_of_a_chunk_are_numbered_in_32_bits() {
         let limits = Limits { buffer_bytes, ..vast() };
         for bounces in [1, 2, 15, 10_000] {
             for photons in [1, 300_000_000, 1 << 31] {
-                let settings = TransportSettings { photons, bounces, illumination: Illumination::Photons, ..TransportSettings::default() };
-                let plan = TransportPlan::new(&furnace, &geometry, &settings, Sensor::Receivers { count: 1 }, &limits).unwrap();
+                let settings = SceneSettings { photons, bounces, illumination: Illumination::Photons, ..SceneSettings::default() };
+                let plan = ScenePlan::new(&furnace, &geometry, &settings, Sensor::Receivers { count: 1 }, &limits).unwrap();
                 let map = plan.global.as_ref().unwrap();
                 // More bounces go in segments.
                 let landings = u64::from(map.chunk_photons) * u64::from(bounces.min(SEGMENT_BOUNCES));
@@ -594,8 +609,8 @@ fn maps_of_a_chunk_are_numbered_in_32_bits() {
     }
     // Pictures up to what a buffer holds, and one row more.
     let limits = Limits { buffer_bytes: 1 << 27, ..vast() };
-    let settings = TransportSettings { photons: 1, ..TransportSettings::default() };
-    let size = |width, height| TransportPlan::new(&furnace, &geometry, &settings, Sensor::Picture { width, height }, &limits);
+    let settings = SceneSettings { photons: 1, ..SceneSettings::default() };
+    let size = |width, height| ScenePlan::new(&furnace, &geometry, &settings, Sensor::Picture { width, height }, &limits);
     assert!(size(1, 1).is_ok() && size(65_536, 1).is_ok());
     // Film sums and estimates take 48 bytes a pixel.
     let rows = (1 << 27) / 48 / 1024;
@@ -608,26 +623,26 @@ fn maps_of_a_chunk_are_numbered_in_32_bits() {
 fn photons_of_a_second_row_of_groups_reach_the_map() {
     let Some(gpu) = device() else { return };
     let photons = 65_535 * 32 + 33;
-    let settings = TransportSettings {
+    let settings = SceneSettings {
         photons,
         group_size: 32,
         rounds: 1,
         bounces: 1,
         radius: Some(0.01),
         illumination: Illumination::Photons,
-        ..TransportSettings::default()
+        ..SceneSettings::default()
     };
     let points = [(DVec3::new(0.5, 0.0, 0.5), DVec3::Y), (DVec3::new(0.5, 0.5, 0.0), DVec3::Z)];
     // A software device counts less memory than it has.
-    let limits = Limits { memory_bytes: 1 << 33, ..photonmill::render::limits(gpu.facts()) };
-    let lit = |settings: &TransportSettings| received_within(&gpu, &scene("furnace"), settings, &points, &limits);
+    let limits = Limits { memory_bytes: 1 << 33, ..photonmill::engine::limits(gpu.facts()) };
+    let lit = |settings: &SceneSettings| received_within(&gpu, &scene("furnace"), settings, &points, &limits);
     let whole = lit(&settings);
     assert_eq!(whole.plan.global.as_ref().unwrap().chunk_photons, photons, "the photons do not fit one dispatch here");
-    let split = lit(&TransportSettings { chunk: Some(1_000_003), ..settings.clone() });
+    let split = lit(&SceneSettings { chunk: Some(1_000_003), ..settings.clone() });
     assert_eq!((&whole.film, &whole.fates), (&split.film, &split.fates));
     let traced = |lit: &RunResult| lit.fates[0].bounces[0].stored + lit.fates[0].bounces[0].absorbed + lit.fates[0].bounces[0].escaped;
     assert_eq!(traced(&whole), u64::from(photons));
-    assert_eq!(traced(&lit(&TransportSettings { photons: photons - 33, ..settings })), u64::from(photons) - 33);
+    assert_eq!(traced(&lit(&SceneSettings { photons: photons - 33, ..settings })), u64::from(photons) - 33);
 }
 
 /// Pictures of one pixel, of odd sides and of one long row, by small and large work groups.
@@ -638,7 +653,7 @@ fn pictures_of_any_shape_are_whole() {
     let camera = cornell.cameras[0].clone();
     for size in [[1, 1], [63, 65], [4097, 1], [1, 129]] {
         let of = |group_size| {
-            let settings = TransportSettings { group_size, photons: 2000, rounds: 1, shadow_rays: 1, ..TransportSettings::default() };
+            let settings = SceneSettings { group_size, photons: 2000, rounds: 1, shadow_rays: 1, ..SceneSettings::default() };
             seen(&gpu, &cornell, &settings, &camera, size).film
         };
         let expected = of(128);
@@ -657,23 +672,23 @@ fn pictures_of_any_shape_are_whole() {
 #[test]
 fn the_ends_of_every_setting_give_numbers() {
     let gpu = device();
-    let base = Settings { photons: 2, mesh: 3, rng: Rng::Philox, ..Settings::default() };
+    let base = RoomSettings { photons: 2, mesh: 3, rng: Rng::Philox, ..RoomSettings::default() };
     let ends = [
         ("least photons", base.clone()),
-        ("least lamps", Settings { light_radius: f64::MIN_POSITIVE, photons: 101, ..base.clone() }),
-        ("largest lamps", Settings { light_radius: 0.25, photons: 101, ..base.clone() }),
-        ("least radius", Settings { radius: 0.5 / 65_536.0, photons: 101, ..base.clone() }),
-        ("largest radius", Settings { radius: 0.5, photons: 101, ..base.clone() }),
-        ("far eye", Settings { eye: [1e15, -1e15, 1e15], shininess: [Some(5.0); 5], photons: 101, ..base.clone() }),
-        ("eye in a corner", Settings { eye: [-0.25; 3], shininess: [Some(1e4); 5], photons: 101, ..base.clone() }),
-        ("largest exponent", Settings { shininess: [Some(f32::MAX); 5], photons: 101, ..base.clone() }),
-        ("least exponent", Settings { shininess: [Some(f32::MIN_POSITIVE); 5], photons: 101, ..base.clone() }),
-        ("white walls", Settings { reflectance: 1.0, bounces: 300, photons: 101, ..base.clone() }),
-        ("black walls", Settings { reflectance: 0.0, photons: 101, ..base }),
+        ("least lamps", RoomSettings { light_radius: f64::MIN_POSITIVE, photons: 101, ..base.clone() }),
+        ("largest lamps", RoomSettings { light_radius: 0.25, photons: 101, ..base.clone() }),
+        ("least radius", RoomSettings { radius: 0.5 / 65_536.0, photons: 101, ..base.clone() }),
+        ("largest radius", RoomSettings { radius: 0.5, photons: 101, ..base.clone() }),
+        ("far eye", RoomSettings { eye: [1e15, -1e15, 1e15], shininess: [Some(5.0); 5], photons: 101, ..base.clone() }),
+        ("eye in a corner", RoomSettings { eye: [-0.25; 3], shininess: [Some(1e4); 5], photons: 101, ..base.clone() }),
+        ("largest exponent", RoomSettings { shininess: [Some(f32::MAX); 5], photons: 101, ..base.clone() }),
+        ("least exponent", RoomSettings { shininess: [Some(f32::MIN_POSITIVE); 5], photons: 101, ..base.clone() }),
+        ("white walls", RoomSettings { reflectance: 1.0, bounces: 300, photons: 101, ..base.clone() }),
+        ("black walls", RoomSettings { reflectance: 0.0, photons: 101, ..base }),
     ];
     for (what, settings) in ends {
         for gather in [Gather::Grid, Gather::Brute] {
-            let settings = Settings { gather, ..settings.clone() };
+            let settings = RoomSettings { gather, ..settings.clone() };
             let mut outcomes = vec![run_on_cpu(&settings)];
             outcomes.extend(gpu.as_ref().map(|gpu| run(gpu, &settings)));
             for outcome in outcomes {
@@ -726,7 +741,7 @@ fn narrow_spots_shine_as_wide_ones() {
             };
             let shares = [0.0, 0.25, 0.45, 0.6, 0.75, 0.9, 1.1];
             let places = shares.map(|share| place(share * outer));
-            let settings = TransportSettings { rounds: 2, part: Part::Direct, ..TransportSettings::default() };
+            let settings = SceneSettings { rounds: 2, part: Part::Direct, ..SceneSettings::default() };
             let lit = received(&gpu, &spot, &settings, &places.map(|(point, _)| (point, DVec3::Y)));
             // Single precision knows a direction to 1e-7 radians.
             let tolerance = 2e-5 + 1e-7 * 8.0 / outer;
@@ -738,14 +753,14 @@ fn narrow_spots_shine_as_wide_ones() {
 
             // Within its whole disc, a photon map holds the spot's power.
             let radius = 1.2 * place(outer).0.distance(place(0.0).0).max(2e-4);
-            let settings = TransportSettings {
+            let settings = SceneSettings {
                 photons: 1000,
                 rounds: 2,
                 bounces: 1,
                 radius: Some(radius),
                 alpha: 1.0,
                 illumination: Illumination::Photons,
-                ..TransportSettings::default()
+                ..SceneSettings::default()
             };
             let lit = received(&gpu, &spot, &settings, &[(place(0.0).0, DVec3::Y)]);
             let exact = 2.0 * PI * (versine(inner) + (versine(outer) - versine(inner)) / 3.0) / (PI * radius * radius);
@@ -761,7 +776,7 @@ fn walls_light_the_points_that_touch_them() {
     let distances = [0.0, 1e-8, 1e-7, 1e-6, 3e-6, 1e-5, 1e-4];
     let mut family = Family::default();
     let mut check = |what: &str, scene: &Scene, points: &[(DVec3, DVec3)], expected: &dyn Fn(DVec3) -> f64| {
-        let settings = TransportSettings { rounds: 16, shadow_rays: 64, part: Part::Direct, ..TransportSettings::default() };
+        let settings = SceneSettings { rounds: 16, shadow_rays: 64, part: Part::Direct, ..SceneSettings::default() };
         let lit = received(&gpu, scene, &settings, points);
         for (k, (point, _)) in points.iter().enumerate() {
             let (found, error, exact) = (lit.film.mean(k, &lit.plan).x, lit.film.standard_error(k, &lit.plan).x, expected(*point));
@@ -810,21 +825,21 @@ fn channels_a_billionth_as_bright_are_right() {
     let down =
         LightKind::Spot { position: DVec3::Y * 0.5, direction: DVec3::NEG_Y, intensity: Vec3::ONE, inner_angle: 0.5, outer_angle: 1.0 };
     let wall = scene_of(vec![level(0.0, [1.0; 2], true, 0), level(1.0, [1.0; 2], false, 1)], vec![floor, matt(0.0)], vec![down]);
-    let settings = |illumination, part| TransportSettings {
+    let settings = |illumination, part| SceneSettings {
         photons: 20_000,
         bounces: 4,
         rounds: 16,
         radius: Some(0.4),
         illumination,
         part,
-        ..TransportSettings::default()
+        ..SceneSettings::default()
     };
     let of_lamp = (lamp, settings(Illumination::Photons, Part::All), DVec3::splat(0.5));
     let of_wall = (wall, settings(Illumination::Split, Part::Indirect), DVec3::Y * 0.5);
     for (what, (scene, settings, middle)) in [("a lamp", of_lamp), ("a wall", of_wall)] {
         let points: Vec<_> =
             grid(0.5, DVec3::NEG_Y, 3).into_iter().map(|(point, normal)| (middle + 0.8 * point + DVec3::Y * 0.1, normal)).collect();
-        let runs: Vec<_> = (1..9).map(|seed| received(&gpu, &scene, &TransportSettings { seed, ..settings.clone() }, &points)).collect();
+        let runs: Vec<_> = (1..9).map(|seed| received(&gpu, &scene, &SceneSettings { seed, ..settings.clone() }, &points)).collect();
         // Of a point too few photons may be seen for a channel to be right, but not without its error saying so.
         let off = |lit: &RunResult, point: usize, channel: usize| {
             let (mean, error) = (lit.film.mean(point, &lit.plan), lit.film.stated_error(point, &lit.plan));
@@ -860,7 +875,7 @@ fn a_channel_below_the_films_unit_is_right(gpu: &Gpu, rounds: u32, done: u32) {
     plane.materials[0].base_colour = tint.as_vec3();
     let camera = photonmill::scene::Camera::looking_at("above", DVec3::Y * 1.5, DVec3::ZERO, DVec3::Z, 0.1);
     let stop = Stop { photons: Some(u64::from(done)), ..Stop::default() };
-    let settings = TransportSettings { photons: 1, rounds, shadow_rays: 1, samples: 1, stop, ..TransportSettings::default() };
+    let settings = SceneSettings { photons: 1, rounds, shadow_rays: 1, samples: 1, stop, ..SceneSettings::default() };
     let lit = seen(gpu, &plane, &settings, &camera, [16, 16]);
     assert_eq!(lit.film.rounds, done);
     let pixels = lit.film.pixels();

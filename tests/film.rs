@@ -13,38 +13,40 @@ use glam::Vec3;
 use photonmill::cpu;
 use photonmill::cpu::splat::Splats;
 use photonmill::cpu::trace::Block;
-use photonmill::film::Film;
+use photonmill::engine::room::film::RoomFilm;
 use photonmill::gpu::{Commands, Gpu, Options};
 use photonmill::photon::Photon;
-use photonmill::plan::Plan;
+use photonmill::plan::RoomPlan;
 
-use photonmill::render::{self, Control, constants};
-use photonmill::resources::Resources;
+use photonmill::engine::Control;
+use photonmill::engine::room::estimate;
+use photonmill::engine::room::index;
+use photonmill::engine::room::resources::RoomResources;
+use photonmill::engine::room::{self, constants};
 use photonmill::rng::Rng;
 use photonmill::scene::open_box::open_box;
-use photonmill::settings::{Builder, Gather, Preset, Settings, Sums};
-use photonmill::{estimate, index};
+use photonmill::settings::{Builder, Gather, Preset, RoomSettings, Sums};
 use pulp::Arch;
 
 /// What changes the film's channels and its fixed point. A smaller mesh than the paper's, and no
 /// multiple of a work group, keeps the brute gathers short.
-fn effects() -> Vec<(&'static str, Settings)> {
-    let paper = Settings { mesh: 19, ..Settings::default() };
+fn effects() -> Vec<(&'static str, RoomSettings)> {
+    let paper = RoomSettings { mesh: 19, ..RoomSettings::default() };
     let glossy = [Some(2.0), None, Some(0.5), Some(0.01), Some(5.0)];
     vec![
         ("Lambertian walls", paper.clone()),
-        ("Phong walls", Settings { shininess: glossy, ..paper.clone() }),
-        ("lights of unequal power", Settings { light_power: [3.0, 0.2], ..paper.clone() }),
-        ("an odd number of photons", Settings { photons: 4999, rng: Rng::Philox, ..paper.clone() }),
-        ("several rounds", Settings { photons: 1201, rounds: 4, shininess: glossy, light_power: [1.0, 2.0], radius: 0.025, ..paper }),
+        ("Phong walls", RoomSettings { shininess: glossy, ..paper.clone() }),
+        ("lights of unequal power", RoomSettings { light_power: [3.0, 0.2], ..paper.clone() }),
+        ("an odd number of photons", RoomSettings { photons: 4999, rng: Rng::Philox, ..paper.clone() }),
+        ("several rounds", RoomSettings { photons: 1201, rounds: 4, shininess: glossy, light_power: [1.0, 2.0], radius: 0.025, ..paper }),
     ]
 }
 
-fn film(gpu: &Gpu, settings: &Settings) -> Film {
+fn film(gpu: &Gpu, settings: &RoomSettings) -> RoomFilm {
     run(gpu, settings).film
 }
 
-fn assert_same(what: &str, how: &str, found: &Film, expected: &Film) {
+fn assert_same(what: &str, how: &str, found: &RoomFilm, expected: &RoomFilm) {
     let what = format!("{what}, {how}");
     assert_eq!((found.channel_count, found.scale, found.emitted), (expected.channel_count, expected.scale, expected.emitted), "{what}");
     assert_holds(&what, equal_sums(&what, &found.sums, &expected.sums));
@@ -61,7 +63,7 @@ fn runs_and_builders_and_gathers_give_the_same_bits() {
         }
         for builder in Builder::ON_GPU {
             for gather in [Gather::Grid, Gather::Brute] {
-                let other = Settings { builder, gather, ..settings.clone() };
+                let other = RoomSettings { builder, gather, ..settings.clone() };
                 assert_same(what, &format!("{builder:?} {gather:?}"), &film(&gpu, &other), &expected);
             }
         }
@@ -79,16 +81,16 @@ fn work_groups_and_chunks_give_the_same_bits() {
             }
             let builder = Builder::ON_GPU[place % Builder::ON_GPU.len()];
             for gather in [Gather::Grid, Gather::Brute] {
-                let other = Settings { group_size, builder, gather, ..settings.clone() };
+                let other = RoomSettings { group_size, builder, gather, ..settings.clone() };
                 assert_same(what, &format!("groups of {group_size}, {builder:?} {gather:?}"), &film(&gpu, &other), &expected);
             }
         }
         for (counters, group_size, gather) in [(2, 128, Gather::Grid), (8, 32, Gather::Brute), (64, 64, Gather::Grid)] {
-            let other = Settings { builder: Builder::Atomic, counters: Some(counters), group_size, gather, ..settings.clone() };
+            let other = RoomSettings { builder: Builder::Atomic, counters: Some(counters), group_size, gather, ..settings.clone() };
             assert_same(what, &format!("{counters} counters, {gather:?}"), &film(&gpu, &other), &expected);
         }
         for (place, chunk) in [301, 1024, 4998].into_iter().enumerate() {
-            let other = Settings { chunk: Some(chunk), builder: Builder::ON_GPU[place % Builder::ON_GPU.len()], ..settings.clone() };
+            let other = RoomSettings { chunk: Some(chunk), builder: Builder::ON_GPU[place % Builder::ON_GPU.len()], ..settings.clone() };
             let outcome = run(&gpu, &other);
             assert_eq!(outcome.plan.chunks_per_round, settings.photons.div_ceil(chunk), "{what}");
             assert_same(what, &format!("chunks of {chunk}"), &outcome.film, &expected);
@@ -105,7 +107,7 @@ fn a_device_without_abilities_gives_the_same_bits() {
         for (what, settings) in effects() {
             let expected = film(&gpu, &settings);
             for gather in [Gather::Grid, Gather::Brute] {
-                let outcome = run(&lesser, &Settings { gather, ..settings.clone() });
+                let outcome = run(&lesser, &RoomSettings { gather, ..settings.clone() });
                 assert_same(what, &format!("64-bit atomics masked: {without_int64_atomics}, {gather:?}"), &outcome.film, &expected);
                 let rows = outcome.timings.rows();
                 assert!(!rows.is_empty());
@@ -122,7 +124,7 @@ fn a_device_without_abilities_gives_the_same_bits() {
 
 /// The CPU's gather of some photons: what the device's must equal, to the bit, as both test the same
 /// f32 numbers.
-fn gathered_on_cpu(plan: &Plan, photons: &[Photon]) -> Vec<u64> {
+fn gathered_on_cpu(plan: &RoomPlan, photons: &[Photon]) -> Vec<u64> {
     let mut by_brute = vec![0; plan.points.len() * plan.channel_count as usize];
     cpu::estimate::gather_brute(plan, photons, &mut by_brute);
     if plan.settings.sums == Sums::Integer {
@@ -136,15 +138,15 @@ fn gathered_on_cpu(plan: &Plan, photons: &[Photon]) -> Vec<u64> {
 }
 
 /// The device's gather of photons that are handed to it.
-fn gathered_on_gpu(gpu: &Gpu, settings: &Settings, photons: &[Photon]) -> Vec<u64> {
+fn gathered_on_gpu(gpu: &Gpu, settings: &RoomSettings, photons: &[Photon]) -> Vec<u64> {
     gathered_by(gpu, &plan_for(gpu, &open_box(settings), settings), photons)
 }
 
-fn gathered_by(gpu: &Gpu, plan: &Plan, photons: &[Photon]) -> Vec<u64> {
+fn gathered_by(gpu: &Gpu, plan: &RoomPlan, photons: &[Photon]) -> Vec<u64> {
     let settings = &plan.settings;
     assert!(photons.len() <= plan.photon_capacity as usize);
     let mut commands = Commands::new(gpu, constants(plan), Instant::now()).unwrap();
-    let resources = Resources::new(gpu, &mut commands, &open_box(settings), plan).unwrap();
+    let resources = RoomResources::new(gpu, &mut commands, &open_box(settings), plan).unwrap();
     upload_photons(&mut commands, &resources, plan, photons);
     index::build(&mut commands, &resources, plan, settings.photons).unwrap();
     estimate::gather(&mut commands, &resources, plan, settings.photons).unwrap();
@@ -158,8 +160,8 @@ fn device_and_cpu_gather_the_same_photons_to_the_same_bits() {
         let map = photons(&gpu, &settings);
         let plan = plan_for(&gpu, &open_box(&settings), &settings);
         for radius in [0.5 / 65_536.0, 0.003, 0.025, 0.05, 0.1, 0.5] {
-            let settings = Settings { radius, ..settings.clone() };
-            let plan = Plan { grid: plan_for(&gpu, &open_box(&settings), &settings).grid, settings: settings.clone(), ..plan.clone() };
+            let settings = RoomSettings { radius, ..settings.clone() };
+            let plan = RoomPlan { grid: plan_for(&gpu, &open_box(&settings), &settings).grid, settings: settings.clone(), ..plan.clone() };
             assert_holds(
                 format!("{what}, radius {radius}"),
                 equal_sums("the device's film", &film(&gpu, &settings).sums, &gathered_on_cpu(&plan, &map)),
@@ -173,23 +175,23 @@ fn device_and_cpu_gather_the_same_photons_to_the_same_bits() {
 fn lanes_and_slices_change_no_bit() {
     let Some(gpu) = device() else { return };
     for (group_size, radius, mesh) in [(32, 0.05, 13), (128, 0.5, 3), (64, 0.003, 31)] {
-        let settings = Settings { group_size, radius, mesh, shininess: [Some(2.0); 5], ..Settings::default() };
+        let settings = RoomSettings { group_size, radius, mesh, shininess: [Some(2.0); 5], ..RoomSettings::default() };
         let plan = plan_for(&gpu, &open_box(&settings), &settings);
         let map = photons(&gpu, &settings);
         let expected = gathered_on_cpu(&plan, &map);
         for (lanes, slices_candidates) in [1, 2, 8, 32].into_iter().flat_map(|lanes| [(lanes, false), (lanes, true)]) {
-            let plan = Plan { lanes, slices_candidates, ..plan.clone() };
+            let plan = RoomPlan { lanes, slices_candidates, ..plan.clone() };
             let what = format!("{lanes} lanes, slices {slices_candidates}, groups of {group_size}, radius {radius}");
             assert_holds(what, equal_sums("film", &gathered_by(&gpu, &plan, &map), &expected));
         }
         // One submission's work a point, so that dispatches are many.
-        let plan = Plan { lanes: 32, pair_tests_per_submission: 1, ..plan.clone() };
+        let plan = RoomPlan { lanes: 32, pair_tests_per_submission: 1, ..plan.clone() };
         assert_holds("a dispatch for every few points", equal_sums("film", &gathered_by(&gpu, &plan, &map), &expected));
     }
 }
 
 /// Sum over all photons of the texels of their wall within the radius, counted photon by photon.
-fn texels_in_reach(plan: &Plan, photons: &[Photon]) -> u64 {
+fn texels_in_reach(plan: &RoomPlan, photons: &[Photon]) -> u64 {
     let radius_squared = (plan.settings.radius * plan.settings.radius) as f32;
     let in_reach = |photon: &Photon| {
         let reached = plan.points.iter().filter(|point| {
@@ -202,7 +204,7 @@ fn texels_in_reach(plan: &Plan, photons: &[Photon]) -> u64 {
     photons.iter().map(in_reach).sum()
 }
 
-fn mass_check(film: &Film, plan: &Plan, photons: &[Photon]) -> Check {
+fn mass_check(film: &RoomFilm, plan: &RoomPlan, photons: &[Photon]) -> Check {
     equal_sums("mass", &[film.sums.iter().sum()], &[texels_in_reach(plan, photons)])
 }
 
@@ -210,7 +212,7 @@ fn mass_check(film: &Film, plan: &Plan, photons: &[Photon]) -> Check {
 fn the_film_holds_every_photon_once_for_each_texel_in_reach() {
     let Some(gpu) = device() else { return };
     for (radius, gather) in [(0.05, Gather::Grid), (0.05, Gather::Brute), (0.025, Gather::Grid), (0.5, Gather::Grid)] {
-        let settings = Settings { radius, gather, mesh: 32, ..Settings::default() };
+        let settings = RoomSettings { radius, gather, mesh: 32, ..RoomSettings::default() };
         let plan = plan_for(&gpu, &open_box(&settings), &settings);
         let found = film(&gpu, &settings);
         let map = photons(&gpu, &settings);
@@ -221,7 +223,7 @@ fn the_film_holds_every_photon_once_for_each_texel_in_reach() {
         assert_complains("a photon lost", mass_check(&found, &plan, &map[1..]));
         assert_complains("a photon doubled", mass_check(&found, &plan, &[&map[..], &map[..1]].concat()));
         if radius < 0.5 {
-            let wider = Plan { settings: Settings { radius: 1.01 * radius, ..settings.clone() }, ..plan.clone() };
+            let wider = RoomPlan { settings: RoomSettings { radius: 1.01 * radius, ..settings.clone() }, ..plan.clone() };
             assert_complains("a radius 1 % too large", mass_check(&found, &wider, &map));
         }
     }
@@ -231,7 +233,7 @@ fn the_film_holds_every_photon_once_for_each_texel_in_reach() {
 #[test]
 fn the_cpu_builders_film_agrees_to_single_counts() {
     let Some(gpu) = device() else { return };
-    let settings = Settings::default();
+    let settings = RoomSettings::default();
     let (device, host) = (film(&gpu, &settings), run_on_cpu(&settings).film);
     assert_eq!((device.channel_count, device.scale), (host.channel_count, host.scale));
     let differences: Vec<u64> = pairs(&device.sums, &host.sums).map(|(a, b)| a.abs_diff(*b)).collect();
@@ -243,7 +245,7 @@ fn the_cpu_builders_film_agrees_to_single_counts() {
     for (threads, gather, chunk) in
         [(2, Gather::Grid, None), (3, Gather::Brute, None), (1, Gather::Brute, Some(777)), (2, Gather::Grid, Some(64))]
     {
-        let other = run_on_cpu(&Settings { threads, gather, chunk, ..settings.clone() }).film;
+        let other = run_on_cpu(&RoomSettings { threads, gather, chunk, ..settings.clone() }).film;
         assert_same("cpu", &format!("{threads} threads {gather:?} chunks of {chunk:?}"), &other, &host);
     }
 }
@@ -267,12 +269,12 @@ fn ties() -> Vec<(f64, Photon, u64)> {
 fn a_photon_on_the_rim_counts() {
     let gpu = device();
     for (radius_in_texels, photon, expected) in ties() {
-        let settings = Settings { radius: radius_in_texels * 0.5 / 64.0, ..Settings::default() };
+        let settings = RoomSettings { radius: radius_in_texels * 0.5 / 64.0, ..RoomSettings::default() };
         let on_cpu = gathered_on_cpu(&plan_for_host(&settings), &[photon]);
         assert_eq!(on_cpu.iter().sum::<u64>(), expected, "radius of {radius_in_texels} texels");
         for gather in [Gather::Grid, Gather::Brute] {
             let Some(gpu) = &gpu else { continue };
-            let on_gpu = gathered_on_gpu(gpu, &Settings { gather, ..settings.clone() }, &[photon]);
+            let on_gpu = gathered_on_gpu(gpu, &RoomSettings { gather, ..settings.clone() }, &[photon]);
             assert_holds(format!("{gather:?}"), equal_sums("one photon", &on_gpu, &on_cpu));
         }
     }
@@ -284,7 +286,7 @@ fn a_photon_on_the_rim_counts() {
 fn an_empty_map_and_a_map_of_one() {
     let Some(gpu) = device() else { return };
     for gather in [Gather::Grid, Gather::Brute] {
-        let settings = Settings { gather, ..Settings::default() };
+        let settings = RoomSettings { gather, ..RoomSettings::default() };
         assert!(gathered_on_gpu(&gpu, &settings, &[]).iter().all(|sum| *sum == 0));
         let plan = plan_for(&gpu, &open_box(&settings), &settings);
         for (x, y) in [(0.25, 0.25), (-0.25, -0.25), (0.25, -0.25), (0.1, 0.25), (0.0, 0.0)] {
@@ -297,7 +299,7 @@ fn an_empty_map_and_a_map_of_one() {
     }
     // Nothing is stored in a black box, and the whole line still runs.
     for builder in Builder::ON_GPU {
-        let black = film(&gpu, &Settings { reflectance: 0.0, builder, ..Settings::default() });
+        let black = film(&gpu, &RoomSettings { reflectance: 0.0, builder, ..RoomSettings::default() });
         assert!(black.sums.iter().all(|sum| *sum == 0));
     }
 }
@@ -307,23 +309,29 @@ fn an_empty_map_and_a_map_of_one() {
 fn long_photon_lists_are_gathered_to_the_end() {
     let Some(gpu) = device() else { return };
     // Few points keep the brute gather short; what is long is the list.
-    let settings =
-        Settings { photons: 200_000, rng: Rng::Philox, mesh: 8, chunk: Some(200_000), builder: Builder::Ballot, ..Settings::default() };
+    let settings = RoomSettings {
+        photons: 200_000,
+        rng: Rng::Philox,
+        mesh: 8,
+        chunk: Some(200_000),
+        builder: Builder::Ballot,
+        ..RoomSettings::default()
+    };
     let map = photons(&gpu, &settings);
     assert!(map.len() > 290_000);
     let plan = plan_for(&gpu, &open_box(&settings), &settings);
     let expected = gathered_on_cpu(&plan, &map);
     for gather in [Gather::Brute, Gather::Grid] {
-        let outcome = run(&gpu, &Settings { gather, ..settings.clone() });
+        let outcome = run(&gpu, &RoomSettings { gather, ..settings.clone() });
         assert_eq!(outcome.plan.photon_capacity, plan.photon_capacity);
         assert_holds(format!("{gather:?}"), equal_sums("200 000 photons", &outcome.film.sums, &expected));
     }
     // Every photon within reach of every point of its wall: a list of 60 000 for each, in many slices.
-    let settings = Settings { radius: 0.5, mesh: 2, ..settings };
+    let settings = RoomSettings { radius: 0.5, mesh: 2, ..settings };
     let plan = plan_for(&gpu, &open_box(&settings), &settings);
     let expected = gathered_on_cpu(&plan, &map);
     for (gather, builder) in [(Gather::Brute, Builder::Ballot), (Gather::Grid, Builder::Ballot), (Gather::Brute, Builder::Naive)] {
-        let found = film(&gpu, &Settings { gather, builder, ..settings.clone() });
+        let found = film(&gpu, &RoomSettings { gather, builder, ..settings.clone() });
         assert_holds(format!("{gather:?} {builder:?}, wide"), equal_sums("200 000 photons", &found.sums, &expected));
     }
     let cut_short = gathered_on_cpu(&plan, &map[..65_535]);
@@ -334,9 +342,9 @@ fn long_photon_lists_are_gathered_to_the_end() {
 #[ignore = "6e9 pair tests on the paper's mesh take half a minute on a software device"]
 fn long_photon_lists_are_gathered_to_the_end_on_the_papers_mesh() {
     let Some(gpu) = device() else { return };
-    let settings = Settings { photons: 200_000, rng: Rng::Philox, threads: 2, ..Settings::default() };
+    let settings = RoomSettings { photons: 200_000, rng: Rng::Philox, threads: 2, ..RoomSettings::default() };
     let expected = film(&gpu, &settings);
-    let brute = film(&gpu, &Settings { gather: Gather::Brute, ..settings.clone() });
+    let brute = film(&gpu, &RoomSettings { gather: Gather::Brute, ..settings.clone() });
     assert_same("200 000 photons", "brute", &brute, &expected);
     let plan = plan_for_host(&settings);
     assert_holds("cpu", equal_sums("cpu", &gathered_on_cpu(&plan, &photons(&gpu, &settings)), &expected.sums));
@@ -347,10 +355,10 @@ fn long_photon_lists_are_gathered_to_the_end_on_the_papers_mesh() {
 fn a_run_is_the_sum_of_rounds_that_differ() {
     let Some(gpu) = device() else { return };
     for rng in [Rng::Rand48, Rng::Mt, Rng::Philox, Rng::Sobol] {
-        let of = |rounds| film(&gpu, &Settings { rng, rounds, ..Settings::preset(Preset::Modified) });
+        let of = |rounds| film(&gpu, &RoomSettings { rng, rounds, ..RoomSettings::preset(Preset::Modified) });
         let (one, two, three) = (of(1), of(2), of(3));
         assert_eq!(three.emitted, 15_000);
-        let added = |more: &Film, less: &Film| {
+        let added = |more: &RoomFilm, less: &RoomFilm| {
             pairs(&more.sums, &less.sums).map(|(more, less)| more.checked_sub(*less).unwrap()).collect::<Vec<u64>>()
         };
         let (second, third) = (added(&two, &one), added(&three, &two));
@@ -374,7 +382,7 @@ fn a_run_is_the_sum_of_rounds_that_differ() {
 /// What the comparisons above would say of a film that is off.
 #[test]
 fn the_checks_complain_about_spoiled_films() {
-    let settings = Settings::default();
+    let settings = RoomSettings::default();
     let map = photons_on_cpu(&settings);
     let plan = plan_for_host(&settings);
     let expected = gathered_on_cpu(&plan, &map);
@@ -401,9 +409,9 @@ fn the_checks_complain_about_spoiled_films() {
 #[test]
 fn a_gather_that_is_cut_into_parts_is_whole() {
     let Some(gpu) = device() else { return };
-    let settings = Settings { photons: 301, mesh: 200, radius: 0.5, group_size: 32, rng: Rng::Philox, ..Settings::default() };
+    let settings = RoomSettings { photons: 301, mesh: 200, radius: 0.5, group_size: 32, rng: Rng::Philox, ..RoomSettings::default() };
     let grid = run(&gpu, &settings);
-    let brute = run(&gpu, &Settings { gather: Gather::Brute, ..settings.clone() });
+    let brute = run(&gpu, &RoomSettings { gather: Gather::Brute, ..settings.clone() });
     assert_holds("grid and brute", equal_sums("200 x 200 texels", &grid.film.sums, &brute.film.sums));
     let tests = grid.plan.points.len() as u64 * grid.plan.work.tests_per_point(settings.photons);
     let submissions_needed = tests / grid.plan.pair_tests_per_submission;
@@ -414,7 +422,7 @@ fn a_gather_that_is_cut_into_parts_is_whole() {
 }
 
 /// Sums in fixed-point units against others, within `allowed`.
-fn near(found: &Film, expected: &Film, allowed: impl Fn(f64) -> f64) -> Check {
+fn near(found: &RoomFilm, expected: &RoomFilm, allowed: impl Fn(f64) -> f64) -> Check {
     assert_eq!(found.sums.len(), expected.sums.len());
     for sum in 0..found.sums.len() {
         let (a, b) = (found.units(sum), expected.units(sum));
@@ -428,7 +436,7 @@ fn near(found: &Film, expected: &Film, allowed: impl Fn(f64) -> f64) -> Check {
 }
 
 /// Photons that one sum holds, at most.
-fn most_photons(film: &Film, settings: &Settings) -> f64 {
+fn most_photons(film: &RoomFilm, settings: &RoomSettings) -> f64 {
     (film.emitted * u64::from(settings.bounces)) as f64
 }
 
@@ -454,11 +462,11 @@ fn floats_and_integers_agree_within_rounding() {
         for sums in [Sums::F32, Sums::Compensated] {
             let mut films = Vec::new();
             for gather in [Gather::Grid, Gather::Brute] {
-                films.push((format!("{gather:?}"), film(&gpu, &Settings { sums, gather, ..settings.clone() })));
+                films.push((format!("{gather:?}"), film(&gpu, &RoomSettings { sums, gather, ..settings.clone() })));
             }
             // The host's film is of its own photons, of which some lie on the other side of a rim.
             let host = run_on_cpu(&settings).film;
-            let on_cpu = run_on_cpu(&Settings { sums, threads: 2, ..settings.clone() }).film;
+            let on_cpu = run_on_cpu(&RoomSettings { sums, threads: 2, ..settings.clone() }).film;
             assert_holds(format!("{what}, cpu, {sums:?}"), near(&on_cpu, &host, rounding(sums, photons, is_whole)));
             for (how, found) in films {
                 assert_eq!((found.kind, found.scale), (sums, expected.scale));
@@ -467,7 +475,7 @@ fn floats_and_integers_agree_within_rounding() {
                 let brightest = (0..found.sums.len()).max_by(|a, b| found.units(*a).total_cmp(&found.units(*b))).unwrap();
                 spoiled.sums[brightest] = u64::from((1.01 * found.units(brightest) as f32).to_bits());
                 assert_complains("a sum 1 % too large", near(&spoiled, &expected, rounding(sums, photons, is_whole)));
-                let integers = Film { kind: Sums::Integer, ..found };
+                let integers = RoomFilm { kind: Sums::Integer, ..found };
                 assert_complains("bits taken for integers", near(&integers, &expected, rounding(sums, photons, is_whole)));
             }
         }
@@ -478,12 +486,12 @@ fn floats_and_integers_agree_within_rounding() {
 #[test]
 fn additions_of_floats_that_meet_are_all_counted() {
     let Some(gpu) = device() else { return };
-    let settings = Settings { photons: 200_000, rng: Rng::Philox, mesh: 2, radius: 0.5, group_size: 32, ..Settings::default() };
+    let settings = RoomSettings { photons: 200_000, rng: Rng::Philox, mesh: 2, radius: 0.5, group_size: 32, ..RoomSettings::default() };
     let expected = film(&gpu, &settings);
     assert!((0..expected.sums.len()).all(|sum| (10_000.0..1e7).contains(&expected.units(sum))));
     for sums in [Sums::F32, Sums::Compensated] {
         for gather in [Gather::Grid, Gather::Brute] {
-            let found = film(&gpu, &Settings { sums, gather, ..settings.clone() });
+            let found = film(&gpu, &RoomSettings { sums, gather, ..settings.clone() });
             assert_holds(format!("{gather:?}, {sums:?}"), near(&found, &expected, |_| 0.0));
         }
     }
@@ -491,7 +499,7 @@ fn additions_of_floats_that_meet_are_all_counted() {
 
 /// A film that already holds `start` photons on every texel, and what another `count` of them, gathered
 /// one by one, make of the back wall's.
-fn counted_on(gpu: Option<&Gpu>, settings: &Settings, start: f32, count: u32) -> f64 {
+fn counted_on(gpu: Option<&Gpu>, settings: &RoomSettings, start: f32, count: u32) -> f64 {
     let bits = match settings.sums {
         Sums::Integer => start as u64,
         Sums::F32 | Sums::Compensated => u64::from(start.to_bits()),
@@ -504,7 +512,7 @@ fn counted_on(gpu: Option<&Gpu>, settings: &Settings, start: f32, count: u32) ->
         None => (0..count).for_each(|_| cpu::estimate::gather_brute(&plan, &photon, &mut sums)),
         Some(gpu) => {
             let mut commands = Commands::new(gpu, constants(&plan), Instant::now()).unwrap();
-            let resources = Resources::new(gpu, &mut commands, &scene, &plan).unwrap();
+            let resources = RoomResources::new(gpu, &mut commands, &scene, &plan).unwrap();
             upload_photons(&mut commands, &resources, &plan, &photon);
             commands.upload(&resources.film, &sums).unwrap();
             index::build(&mut commands, &resources, &plan, settings.photons).unwrap();
@@ -512,14 +520,14 @@ fn counted_on(gpu: Option<&Gpu>, settings: &Settings, start: f32, count: u32) ->
             sums = commands.read(&resources.film, sums.len()).unwrap();
         }
     }
-    Film { sums, ..Film::new(&plan) }.units(plan.points.len() - 1)
+    RoomFilm { sums, ..RoomFilm::new(&plan) }.units(plan.points.len() - 1)
 }
 
 /// Ten photons more than 2^24, and than so many that the lost part alone would have stopped, are ten more in a pair.
 pub fn pairs_count_on(gpu: &Gpu) -> Check<Complaint> {
     for gather in [Gather::Brute, Gather::Grid] {
         for start in [16_777_216.0, 1024.0 * 16_777_216.0] {
-            let settings = Settings { sums: Sums::Compensated, gather, mesh: 1, radius: 0.5, ..Settings::default() };
+            let settings = RoomSettings { sums: Sums::Compensated, gather, mesh: 1, radius: 0.5, ..RoomSettings::default() };
             let counted = counted_on(Some(gpu), &settings, start, 10) - f64::from(start);
             let kind = match counted {
                 10.0 => continue,
@@ -544,7 +552,7 @@ fn f32_stops_counting_where_integers_and_pairs_go_on() {
     for builder in [None, gpu.as_deref()].into_iter().take(if gpu.is_some() { 2 } else { 1 }) {
         for gather in [Gather::Brute, Gather::Grid] {
             let of = |sums, start: f32| {
-                let settings = Settings { sums, gather, mesh: 1, radius: 0.5, ..Settings::default() };
+                let settings = RoomSettings { sums, gather, mesh: 1, radius: 0.5, ..RoomSettings::default() };
                 counted_on(builder, &settings, start, 10) - f64::from(start)
             };
             for start in [0.0, full - 4.0, full, 2.0 * full, 1024.0 * full] {
@@ -560,7 +568,7 @@ fn f32_stops_counting_where_integers_and_pairs_go_on() {
 }
 
 /// Largest relative error of a film against integers.
-fn relative_error(found: &Film, expected: &Film) -> f64 {
+fn relative_error(found: &RoomFilm, expected: &RoomFilm) -> f64 {
     let error = |sum| (found.units(sum) / expected.units(sum) - 1.0).abs();
     (0..found.sums.len()).filter(|sum| expected.units(*sum) > 0.0).map(error).fold(0.0, f64::max)
 }
@@ -569,7 +577,7 @@ fn relative_error(found: &Film, expected: &Film) -> f64 {
 #[test]
 fn the_error_of_f32_sums_is_measured() {
     let Some(gpu) = device() else { return };
-    let settings = Settings {
+    let settings = RoomSettings {
         photons: 1_000_000,
         rng: Rng::Philox,
         mesh: 1,
@@ -577,10 +585,10 @@ fn the_error_of_f32_sums_is_measured() {
         shininess: [Some(2.0); 5],
         light_power: [3.0, 0.7],
         threads: 2,
-        ..Settings::default()
+        ..RoomSettings::default()
     };
     let films = |sums| {
-        let settings = Settings { sums, ..settings.clone() };
+        let settings = RoomSettings { sums, ..settings.clone() };
         [film(&gpu, &settings), run_on_cpu(&settings).film]
     };
     let [integer, f32, compensated] = [Sums::Integer, Sums::F32, Sums::Compensated].map(films);
@@ -596,7 +604,7 @@ fn the_error_of_f32_sums_is_measured() {
 #[test]
 #[ignore = "forty million photons three times take the CPU builder over two minutes"]
 fn twenty_million_photons_on_a_texel_are_too_many_for_f32() {
-    let settings = Settings {
+    let settings = RoomSettings {
         photons: 20_000_000,
         rounds: 2,
         rng: Rng::Philox,
@@ -605,9 +613,9 @@ fn twenty_million_photons_on_a_texel_are_too_many_for_f32() {
         radius: 0.5,
         chunk: Some(1_000_000),
         threads: 2,
-        ..Settings::default()
+        ..RoomSettings::default()
     };
-    let of = |sums| run_on_cpu(&Settings { sums, ..settings.clone() }).film;
+    let of = |sums| run_on_cpu(&RoomSettings { sums, ..settings.clone() }).film;
     let [integer, f32, compensated] = [Sums::Integer, Sums::F32, Sums::Compensated].map(of);
     assert_eq!(relative_error(&compensated, &integer), 0.0);
     let full = f64::from(1 << 24);
@@ -622,14 +630,14 @@ fn twenty_million_photons_on_a_texel_are_too_many_for_f32() {
 fn pairs_are_refused_without_64_bit_atomics() {
     let Some(lesser) = device_with(Options { without_int64_atomics: true, ..Options::default() }) else { return };
     // An even number, so that both lights' photons are of the same flux and the sums whole.
-    let settings = Settings { photons: 1000, mesh: 8, ..Settings::default() };
+    let settings = RoomSettings { photons: 1000, mesh: 8, ..RoomSettings::default() };
     let never = AtomicBool::new(false);
     let mut control = Control { cancelled: &never, progress: &mut |_| {} };
-    let pairs = Settings { sums: Sums::Compensated, ..settings.clone() };
-    let error = render::on_gpu(&lesser, &open_box(&pairs), &pairs, &mut control).unwrap_err();
+    let pairs = RoomSettings { sums: Sums::Compensated, ..settings.clone() };
+    let error = room::on_gpu(&lesser, &open_box(&pairs), &pairs, &mut control).unwrap_err();
     let line = error.to_string();
     assert_eq!(error.exit_code(), 2, "{line}");
     assert!(["--sums", "compensated", "64-bit atomics", "integer or f32"].iter().all(|word| line.contains(word)), "{line}");
     let expected = film(&lesser, &settings);
-    assert_holds("f32", near(&film(&lesser, &Settings { sums: Sums::F32, ..settings }), &expected, |_| 0.0));
+    assert_holds("f32", near(&film(&lesser, &RoomSettings { sums: Sums::F32, ..settings }), &expected, |_| 0.0));
 }

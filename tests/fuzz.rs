@@ -10,14 +10,14 @@ use std::time::{Duration, Instant};
 use base64::Engine;
 use base64::engine::general_purpose::STANDARD as BASE64;
 use glam::Vec3;
+use photonmill::plan::scene::ScenePlan;
 use photonmill::plan::sensor::Sensor;
-use photonmill::plan::transport::TransportPlan;
-use photonmill::plan::{Limits, Plan, photons_of};
+use photonmill::plan::{Limits, RoomPlan, photons_of};
 use photonmill::scene::Scene;
 use photonmill::scene::geometry::Geometry;
 use photonmill::scene::open_box::open_box;
-use photonmill::settings::Settings;
-use photonmill::settings::transport::TransportSettings;
+use photonmill::settings::RoomSettings;
+use photonmill::settings::scene::SceneSettings;
 use serde_json::{Value, json};
 
 const BLENDER: &[u8] = include_bytes!("scenes/blender.glb");
@@ -40,7 +40,7 @@ fn plan(folder: &Path, name: &str, content: &[u8]) -> Fate {
     let outcome = Scene::open(path.to_str().unwrap(), false).and_then(|scene| {
         let geometry = Geometry::new(&scene)?;
         let sensor = Sensor::Picture { width: 16, height: 16 };
-        let plan = TransportPlan::new(&scene, &geometry, &TransportSettings::default(), sensor, &Limits::of_host())?;
+        let plan = ScenePlan::new(&scene, &geometry, &SceneSettings::default(), sensor, &Limits::of_host())?;
         assert!(plan.film_scale.is_finite() && plan.film_scale > 0.0, "film scale {}", plan.film_scale);
         assert!(plan.bytes <= Limits::of_host().memory_bytes, "{} bytes", plan.bytes);
         check_records(&geometry);
@@ -507,8 +507,8 @@ fn many_equal_triangles_are_planned_or_refused() {
 /// Planning looks at no chunk, however many are asked for.
 #[test]
 fn a_billion_chunks_are_planned_at_once() {
-    let settings = Settings { photons: 1 << 31, chunk: Some(2), ..Settings::default() };
-    let plan = in_time("a billion chunks", move || Plan::new(&open_box(&settings), &settings, &Limits::of_host()).unwrap());
+    let settings = RoomSettings { photons: 1 << 31, chunk: Some(2), ..RoomSettings::default() };
+    let plan = in_time("a billion chunks", move || RoomPlan::new(&open_box(&settings), &settings, &Limits::of_host()).unwrap());
     let last = plan.chunks_per_round - 1;
     assert!((1..=4).contains(&plan.path_capacity) && last > 1 << 29, "{} chunks of {}", last + 1, plan.path_capacity);
     for chunk in [0, 1, last / 2, last] {

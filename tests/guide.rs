@@ -7,8 +7,8 @@ use std::fs;
 use std::path::{Path, PathBuf};
 use std::process::{Command, Stdio};
 
-use photonmill::bench::table::scaled;
-use photonmill::bench::targets::{TARGETS, Target, Wanted};
+use photonmill::measure::bench::table::scaled;
+use photonmill::measure::bench::targets::{TARGETS, Target, Wanted};
 use photonmill::output::words::number;
 use photonmill::scene::built_in;
 use serde_json::Value;

@@ -12,20 +12,20 @@ use crate::common::known::{self, none_returns};
 use crate::common::lit::{BOTH, flights, lamp, mean_red, received, same_light, scene, seen};
 use crate::common::{Check, assert_complains, assert_holds, device, relative_check, z_check};
 use glam::{DQuat, DVec2, DVec3, Vec3};
-use photonmill::plan::Plan;
+use photonmill::engine::scene::RunResult;
+use photonmill::plan::RoomPlan;
+use photonmill::plan::scene::ScenePlan;
 use photonmill::plan::sensor::Sensor;
-use photonmill::plan::transport::TransportPlan;
 use photonmill::scene::geometry::Geometry;
 use photonmill::scene::light::{Light, LightKind};
 use photonmill::scene::open_box::open_box;
 use photonmill::scene::{Camera, Material, Mesh, Scene, built_in};
-use photonmill::selfcheck::measure::{irradiance, radiance};
-use photonmill::settings::transport::{Effect, Illumination, TransportSettings};
-use photonmill::settings::{Builder, EmissionLaw, Settings};
-use photonmill::transport::RunResult;
+use photonmill::settings::scene::{Effect, Illumination, SceneSettings};
+use photonmill::settings::{Builder, EmissionLaw, RoomSettings};
+use photonmill::verify::selfcheck::measure::{irradiance, radiance};
 
-fn settings() -> TransportSettings {
-    TransportSettings { photons: 4000, caustic_photons: 4000, rounds: 2, shadow_rays: 8, ..TransportSettings::default() }
+fn settings() -> SceneSettings {
+    SceneSettings { photons: 4000, caustic_photons: 4000, rounds: 2, shadow_rays: 8, ..SceneSettings::default() }
 }
 
 fn cornell() -> Scene {
@@ -49,7 +49,7 @@ fn size_and_place_do_not_change_the_light() {
     let far = DVec3::new(1e4, -2e4, 5e3);
     for (what, scale, way) in [("a thousandth", 1e-3, DVec3::ZERO), ("ten thousand times", 1e4, DVec3::ZERO), ("far away", 1.0, far)] {
         let (scene, points) = moved(cornell(), scale, way);
-        let found = irradiance(&gpu, &scene, &TransportSettings { seed: 99, ..settings() }, &points).unwrap();
+        let found = irradiance(&gpu, &scene, &SceneSettings { seed: 99, ..settings() }, &points).unwrap();
         assert_holds(what, same_light(what, found, expected));
     }
     let (scene, points) = moved(cornell(), 1.0, DVec3::ZERO);
@@ -86,7 +86,7 @@ fn how_a_wall_is_cut_does_not_change_its_light() {
     let replace = |cut: &dyn Fn(&Mesh) -> Mesh| {
         let mut scene = cornell();
         scene.meshes.iter_mut().take(5).for_each(|mesh| *mesh = cut(mesh));
-        irradiance(&gpu, &scene, &TransportSettings { seed: 98, ..settings() }, &POINTS).unwrap()
+        irradiance(&gpu, &scene, &SceneSettings { seed: 98, ..settings() }, &POINTS).unwrap()
     };
     let fine = replace(&|mesh| tessellated(mesh, 40));
     assert_holds("3200 triangles a wall", same_light("3200 triangles a wall", fine, expected));
@@ -110,7 +110,7 @@ fn how_a_wall_is_cut_does_not_change_its_light() {
 #[test]
 fn flat_lamps_light_nothing_of_their_own_plane() {
     let Some(gpu) = device() else { return };
-    let direct = TransportSettings { photons: 1, rounds: 40, bounces: 1, shadow_rays: 32, ..settings() };
+    let direct = SceneSettings { photons: 1, rounds: 40, bounces: 1, shadow_rays: 32, ..settings() };
     let grid = |middle: DVec3, normal: DVec3, width: f64| {
         let (u, v) = normal.any_orthonormal_pair();
         let place = move |k: i32| width * (f64::from(k) / 15.0 - 0.5);
@@ -151,11 +151,11 @@ fn a_light_flush_with_a_wall_shines_into_the_room() {
     };
     scene.lights = vec![Light { name: "flush".into(), kind: kind(0.0) }];
     let above = [(DVec3::Y * 2.0, DVec3::NEG_Y)];
-    let found = irradiance(&gpu, &scene, &TransportSettings { shadow_rays: 32, ..settings() }, &above).unwrap();
+    let found = irradiance(&gpu, &scene, &SceneSettings { shadow_rays: 32, ..settings() }, &above).unwrap();
     let exact = 1.0 / (PI * (0.01 + 4.0));
     assert_holds("above", z_check("above", found.mean, exact, found.standard_error.max(1e-4 * exact)));
     for illumination in [Illumination::Split, Illumination::Photons] {
-        let settings = TransportSettings { illumination, bounces: 1, ..settings() };
+        let settings = SceneSettings { illumination, bounces: 1, ..settings() };
         let beside = irradiance(&gpu, &scene, &settings, &[(DVec3::X * 0.3, DVec3::Y)]).unwrap();
         assert_eq!(beside.mean, 0.0, "{illumination:?}: the lamp's own wall");
     }
@@ -215,20 +215,20 @@ fn contractible(spirv: &[u8], free: &str) -> usize {
 #[test]
 fn every_operation_is_rounded_by_itself() {
     let Some(gpu) = device() else { return };
-    let limits = photonmill::render::limits(gpu.facts());
+    let limits = photonmill::engine::limits(gpu.facts());
     let mut modules = Vec::new();
     for illumination in [Illumination::Split, Illumination::Photons] {
         for sensor in [Sensor::Picture { width: 1, height: 1 }, Sensor::Receivers { count: 1 }] {
-            let settings = TransportSettings { illumination, ..settings() };
-            let plan = TransportPlan::new(&cornell(), &Geometry::new(&cornell()).unwrap(), &settings, sensor, &limits).unwrap();
-            modules.extend(photonmill::transport::modules(&plan, gpu.facts()));
+            let settings = SceneSettings { illumination, ..settings() };
+            let plan = ScenePlan::new(&cornell(), &Geometry::new(&cornell()).unwrap(), &settings, sensor, &limits).unwrap();
+            modules.extend(photonmill::engine::scene::modules(&plan, gpu.facts()));
         }
     }
     for builder in Builder::ON_GPU {
-        let settings = Settings { builder, ..Settings::default() };
-        let plan = Plan::new(&open_box(&settings), &settings, &limits).unwrap();
-        modules.extend(photonmill::trace::modules(&plan));
-        modules.extend(photonmill::estimate::modules(&plan, gpu.facts()));
+        let settings = RoomSettings { builder, ..RoomSettings::default() };
+        let plan = RoomPlan::new(&open_box(&settings), &settings, &limits).unwrap();
+        modules.extend(photonmill::engine::room::trace::modules(&plan));
+        modules.extend(photonmill::engine::room::estimate::modules(&plan, gpu.facts()));
     }
     assert!(modules.len() > 20);
     for module in &modules {
@@ -337,7 +337,7 @@ fn photons_leave_a_surface_once_and_for_all() {
                 plane.meshes[0] = tessellated(&plane.meshes[0], cells);
                 plane.meshes[0].positions.iter_mut().for_each(|position| *position = tilt * *position * size + place);
                 plane.lights = vec![sun(tilt * DVec3::new(0.3, -1.0, 0.2))];
-                let settings = TransportSettings { radius: None, ..flights(40_000, 2) };
+                let settings = SceneSettings { radius: None, ..flights(40_000, 2) };
                 let lit = received(&gpu, &plane, &settings, &[(place, tilt * DVec3::Y)]);
                 let what = format!("tilt {number}, {cells} x {cells} cells, size {size} at {place}");
                 assert_holds(&what, none_returns(&what, &lit));
@@ -413,14 +413,8 @@ fn thin_walls_and_sheets_let_no_light_through() {
     };
     for illumination in [Illumination::Split, Illumination::Photons] {
         for radius in [0.3, 0.02] {
-            let settings = TransportSettings {
-                illumination,
-                photons: 20_000,
-                rounds: 4,
-                radius: Some(radius),
-                alpha: 1.0,
-                ..TransportSettings::default()
-            };
+            let settings =
+                SceneSettings { illumination, photons: 20_000, rounds: 4, radius: Some(radius), alpha: 1.0, ..SceneSettings::default() };
             for (what, rooms) in [("a 4096th", &two_walls), ("a sheet", &sheet)] {
                 let what = format!("{what}, {illumination:?}, radius {radius}");
                 let points: Vec<_> = points
@@ -445,7 +439,7 @@ fn a_lit_floor_does_not_light_the_foot_of_the_wall() {
     corner.meshes.push(Mesh::parallelogram("wall", DVec3::new(-2.0, 0.0, -2.0), DVec3::Y * 2.0, DVec3::Z * 4.0, 0));
     for illumination in [Illumination::Split, Illumination::Photons] {
         let settings =
-            TransportSettings { illumination, photons: 100_000, radius: Some(0.3), alpha: 1.0, rounds: 2, ..TransportSettings::default() };
+            SceneSettings { illumination, photons: 100_000, radius: Some(0.3), alpha: 1.0, rounds: 2, ..SceneSettings::default() };
         let points =
             [(DVec3::new(-1.99, 0.0, 0.0), DVec3::Y), (DVec3::new(-2.0, 0.01, 0.0), DVec3::X), (DVec3::new(-2.0, 0.0, 0.0), DVec3::X)];
         let lit = received(&gpu, &corner, &settings, &points);
@@ -491,25 +485,19 @@ fn same_sums(what: &str, found: &RunResult, expected: &RunResult) -> Check {
 #[test]
 fn every_power_of_two_is_the_same_light_to_the_bit() {
     let Some(gpu) = device() else { return };
-    let of = |k: i32, settings: &TransportSettings| {
+    let of = |k: i32, settings: &SceneSettings| {
         let (scene, points) = scaled_cornell(k);
         let radius = settings.radius.map(|radius| radius * 2f64.powi(k));
-        received(&gpu, &scene, &TransportSettings { radius, ..settings.clone() }, &points)
+        received(&gpu, &scene, &SceneSettings { radius, ..settings.clone() }, &points)
     };
-    let settings = TransportSettings {
-        photons: 1500,
-        caustic_photons: 1500,
-        rounds: 2,
-        shadow_rays: 4,
-        radius: Some(0.1),
-        ..TransportSettings::default()
-    };
+    let settings =
+        SceneSettings { photons: 1500, caustic_photons: 1500, rounds: 2, shadow_rays: 4, radius: Some(0.1), ..SceneSettings::default() };
     let expected = of(0, &settings);
     assert!(mean_red(&expected) > 0.5);
     for k in -20..=20 {
         assert_holds(k, same_sums(&format!("scaled by 2^{k}"), &of(k, &settings), &expected));
     }
-    let wider = of(0, &TransportSettings { radius: Some(0.1 * (1.0 + 1e-6)), ..settings });
+    let wider = of(0, &SceneSettings { radius: Some(0.1 * (1.0 + 1e-6)), ..settings });
     assert_complains("a radius a millionth larger", same_sums("radius", &wider, &expected));
 }
 
@@ -518,17 +506,17 @@ fn every_power_of_two_is_the_same_light_to_the_bit() {
 fn the_open_box_of_any_power_of_two_stores_the_same_photons() {
     let gpu = device();
     for builder in [Builder::Cpu, Builder::Naive, Builder::Ballot] {
-        let settings = Settings { builder, photons: 1001, shininess: [Some(2.0); 5], ..Settings::default() };
+        let settings = RoomSettings { builder, photons: 1001, shininess: [Some(2.0); 5], ..RoomSettings::default() };
         let of = |k: i32| {
             let factor = 2f64.powi(k);
             let mut scene = open_box(&settings);
             scene.min_corner *= factor;
             scene.max_corner *= factor;
             scene.lights.iter_mut().for_each(|light| light.radius *= factor);
-            let settings = Settings { eye: settings.eye.map(|place| place * factor as f32), ..settings.clone() };
+            let settings = RoomSettings { eye: settings.eye.map(|place| place * factor as f32), ..settings.clone() };
             let photons = match (builder, &gpu) {
-                (Builder::Cpu, _) => photonmill::render::photons_on_cpu(&scene, &settings),
-                (_, Some(gpu)) => photonmill::render::photons_on_gpu(gpu, &scene, &settings),
+                (Builder::Cpu, _) => photonmill::engine::room::photons_on_cpu(&scene, &settings),
+                (_, Some(gpu)) => photonmill::engine::room::photons_on_gpu(gpu, &scene, &settings),
                 (_, None) => return Vec::new(),
             };
             let mut photons = crate::common::in_order(photons.unwrap());
@@ -546,7 +534,7 @@ fn the_open_box_of_any_power_of_two_stores_the_same_photons() {
 #[test]
 fn ten_thousand_sizes_away_the_light_is_the_same_to_the_bit() {
     let Some(gpu) = device() else { return };
-    let settings = TransportSettings { photons: 1500, caustic_photons: 1500, rounds: 2, ..TransportSettings::default() };
+    let settings = SceneSettings { photons: 1500, caustic_photons: 1500, rounds: 2, ..SceneSettings::default() };
     let of = |way: DVec3| {
         let mut scene = cornell();
         scene.meshes.iter_mut().flat_map(|mesh| &mut mesh.positions).for_each(|at| *at = (*at * 1_048_576.0).round() / 1_048_576.0 + way);
@@ -559,7 +547,7 @@ fn ten_thousand_sizes_away_the_light_is_the_same_to_the_bit() {
     }
     assert_complains(
         "a light in another place",
-        same_sums("moved", &received(&gpu, &cornell(), &TransportSettings { seed: 2, ..settings.clone() }, &POINTS), &expected),
+        same_sums("moved", &received(&gpu, &cornell(), &SceneSettings { seed: 2, ..settings.clone() }, &POINTS), &expected),
     );
 }
 
@@ -575,14 +563,14 @@ fn axis_parallel_rays_meet_the_same_by_tree_and_list() {
     room.lights = [DVec3::X, DVec3::Y, DVec3::Z].into_iter().flat_map(|axis| [sun(axis), sun(-axis)]).collect();
     room.lights.extend([flush(DVec3::new(0.5, 0.0, 0.5), DVec3::Y), flush(DVec3::new(0.0, 0.5, 0.5), DVec3::X)]);
     let lit = |with: &[Effect], without: &[Effect], room: &Scene| {
-        let settings = TransportSettings {
+        let settings = SceneSettings {
             with: with.to_vec(),
             without: without.to_vec(),
             illumination: Illumination::Photons,
             photons: 60_000,
             rounds: 2,
             bounces: 4,
-            ..TransportSettings::default()
+            ..SceneSettings::default()
         };
         received(&gpu, room, &settings, &POINTS)
     };
@@ -613,7 +601,7 @@ fn flat_doubled_and_reordered_triangles_change_no_bit() {
     let mut plain = cornell();
     plain.materials.iter_mut().for_each(|material| material.emission = Vec3::ZERO);
     plain.lights = vec![lamp(LightKind::Point { position: DVec3::new(0.4, 0.8, 0.6), intensity: Vec3::ONE })];
-    let settings = TransportSettings { photons: 20_000, rounds: 2, ..TransportSettings::default() };
+    let settings = SceneSettings { photons: 20_000, rounds: 2, ..SceneSettings::default() };
     let of = |spoil: &dyn Fn(&mut Mesh)| {
         let mut scene = plain.clone();
         scene.meshes.iter_mut().for_each(spoil);
@@ -653,7 +641,7 @@ fn two_sheets_at_one_place_show_each_its_own_side() {
     let faces = [sheet("above", v, u, 0), sheet("below", u, v, 1)];
     let sun = |y: f64| lamp(LightKind::Directional { direction: tilt * DVec3::new(0.0, y, 0.0), irradiance: Vec3::ONE });
     sheets.lights = vec![sun(-1.0), sun(1.0)];
-    let settings = TransportSettings { shadow_rays: 8, ..settings() };
+    let settings = SceneSettings { shadow_rays: 8, ..settings() };
     let mut complaints = Vec::new();
     for order in [[0, 1], [1, 0]] {
         sheets.meshes = order.map(|face| faces[face].clone()).into();
@@ -690,12 +678,12 @@ fn small_lamps_shine_by_their_area() {
         let area = 0.5 * 4f64.powi(-k);
         // L A cos cos / d^2, and what the lamp's extent takes from it: 2 E[r^2] / d^2 of it, E[r^2] = edge^2 / 9.
         let (expected, extent) = (area / 0.25, 8.0 / 9.0 * 4f64.powi(-k));
-        let direct = TransportSettings { photons: 1, rounds: 1, bounces: 1, shadow_rays: 32, ..settings() };
+        let direct = SceneSettings { photons: 1, rounds: 1, bounces: 1, shadow_rays: 32, ..settings() };
         let found = irradiance(&gpu, &room, &direct, &[below]).unwrap();
         println!("lamp of 2^-{k} m: shadow rays see {:.4} of its light", found.mean / expected);
         let error = found.standard_error.max((extent + 1e-4) * expected);
         complaints.extend(z_check(&format!("2^-{k}, shadow rays"), found.mean, expected, error).err());
-        let photons = TransportSettings {
+        let photons = SceneSettings {
             photons: 10_000,
             rounds: 1,
             bounces: 1,
@@ -730,7 +718,7 @@ fn the_smallest_lamps_shine_into_the_room_or_are_left_out() {
 fn a_furnace_glows_alike_however_it_is_turned() {
     let Some(gpu) = device() else { return };
     let settings =
-        TransportSettings { photons: 6000, bounces: 60, radius: Some(0.3), alpha: 1.0, illumination: Illumination::Photons, ..settings() };
+        SceneSettings { photons: 6000, bounces: 60, radius: Some(0.3), alpha: 1.0, illumination: Illumination::Photons, ..settings() };
     for e in [1e-2, 1e-4, 1e-6, 0.0] {
         let turn = DQuat::from_rotation_arc(DVec3::Y, DVec3::new(e, 0.0, -1.0).normalize());
         let mut furnace = scene("furnace");
@@ -751,7 +739,7 @@ fn a_furnace_glows_alike_however_it_is_turned() {
 fn an_eye_on_a_surface_sees_numbers() {
     let Some(gpu) = device() else { return };
     let cornell = cornell();
-    let settings = TransportSettings { photons: 500, rounds: 1, ..TransportSettings::default() };
+    let settings = SceneSettings { photons: 500, rounds: 1, ..SceneSettings::default() };
     for (eye, target) in [
         (DVec3::new(0.5, 0.0, 0.9), DVec3::new(0.5, 0.5, 0.0)),
         (DVec3::ZERO, DVec3::ONE),

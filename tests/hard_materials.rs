@@ -10,13 +10,13 @@ use photonmill::gpu::Gpu;
 use photonmill::scene::light::{Light, LightKind};
 use photonmill::scene::texture::Wrap;
 use photonmill::scene::{Camera, Material, Mesh, Scene, Surface};
-use photonmill::selfcheck::Estimate;
-use photonmill::selfcheck::measure::{irradiance, radiance};
 use photonmill::settings::EmissionLaw;
-use photonmill::settings::transport::{Illumination, Part, TransportSettings};
+use photonmill::settings::scene::{Illumination, Part, SceneSettings};
+use photonmill::verify::selfcheck::Estimate;
+use photonmill::verify::selfcheck::measure::{irradiance, radiance};
 
-fn settings() -> TransportSettings {
-    TransportSettings { photons: 4000, caustic_photons: 4000, rounds: 2, shadow_rays: 8, ..TransportSettings::default() }
+fn settings() -> SceneSettings {
+    SceneSettings { photons: 4000, caustic_photons: 4000, rounds: 2, shadow_rays: 8, ..SceneSettings::default() }
 }
 
 /// Of the Cornell box: (position, normal).
@@ -40,10 +40,10 @@ fn behind_a_pane(ior: Option<f32>) -> Scene {
 fn glass_of_the_air_s_own_index_is_not_there() {
     let Some(gpu) = device() else { return };
     // A wide radius: all direct light comes as a caustic now.
-    let settings = TransportSettings { photons: 30_000, caustic_photons: 30_000, caustic_radius: Some(0.08), ..settings() };
+    let settings = SceneSettings { photons: 30_000, caustic_photons: 30_000, caustic_radius: Some(0.08), ..settings() };
     let expected = irradiance(&gpu, &behind_a_pane(None), &settings, &POINTS).unwrap();
     for ior in [1.0, 1.0 + 1e-6] {
-        let found = irradiance(&gpu, &behind_a_pane(Some(ior)), &TransportSettings { seed: 97, ..settings.clone() }, &POINTS).unwrap();
+        let found = irradiance(&gpu, &behind_a_pane(Some(ior)), &SceneSettings { seed: 97, ..settings.clone() }, &POINTS).unwrap();
         // The wide radius blurs the light by a per cent or so.
         let found = Estimate { standard_error: found.standard_error.hypot(0.01 * expected.mean), ..found };
         assert_holds(ior, same_light(&format!("index {ior}"), found, expected));
@@ -63,7 +63,7 @@ fn reflectances_and_bounces_at_their_ends_are_right() {
     };
     let points = [(DVec3::new(0.5, 0.0, 0.5), DVec3::Y), (DVec3::new(0.2, 0.0, 0.999), DVec3::Y)];
     let ask = |gpu: &Gpu, albedo, bounces| {
-        let settings = TransportSettings { bounces, radius: Some(0.2), alpha: 1.0, illumination: Illumination::Photons, ..settings() };
+        let settings = SceneSettings { bounces, radius: Some(0.2), alpha: 1.0, illumination: Illumination::Photons, ..settings() };
         irradiance(gpu, &furnace(albedo), &settings, &points).unwrap()
     };
     // b landings: 1 + rho + ... + rho^(b - 1) times pi.
@@ -82,14 +82,8 @@ fn each_channel_has_its_own_reflectance() {
     for colour in [Vec3::new(0.9, 0.1, 0.1), Vec3::new(0.1, 0.9, 0.1), Vec3::new(0.5, 0.5, 0.9)] {
         let mut furnace = scene("furnace");
         furnace.materials[0].base_colour = colour;
-        let settings = TransportSettings {
-            photons: 8000,
-            bounces: 300,
-            radius: Some(0.5),
-            alpha: 1.0,
-            illumination: Illumination::Photons,
-            ..settings()
-        };
+        let settings =
+            SceneSettings { photons: 8000, bounces: 300, radius: Some(0.5), alpha: 1.0, illumination: Illumination::Photons, ..settings() };
         let exact = PI / (1.0 - f64::from(colour.x));
         let found = irradiance(&gpu, &furnace, &settings, &[(DVec3::new(0.5, 0.0, 0.5), DVec3::Y)]).unwrap();
         assert!(found.standard_error < 0.02 * exact, "{colour}: {found:?}");
@@ -124,7 +118,7 @@ fn lobes_reflect_what_lies_above_the_horizon() {
     let sky = || vec![lamp(LightKind::Environment { radiance: Vec3::ONE })];
     for (exponent, albedos) in table {
         for (degrees, albedo) in [0.0f64, 30.0, 60.0, 80.0].into_iter().zip(albedos) {
-            let settings = TransportSettings { photons: 1, rounds: 1, shadow_rays: 32, ..settings() };
+            let settings = SceneSettings { photons: 1, rounds: 1, shadow_rays: 32, ..settings() };
             let eye = towards(degrees.to_radians());
             let found = radiance(&gpu, plate(Surface::Glossy { exponent }, sky()), &settings, eye, DVec3::ZERO).unwrap();
             // The table has four digits.
@@ -163,7 +157,7 @@ fn lobes_of_any_width_throw_their_share() {
         let mut bench = plate(Surface::Glossy { exponent }, vec![lamp(spot)]);
         bench.materials.push(Material::lambert("screen", Vec3::ZERO));
         bench.meshes.push(Mesh::parallelogram("screen", DVec3::new(-2.0, 1.0, -2.0), DVec3::X * 4.0, DVec3::Z * 4.0, 1));
-        let settings = TransportSettings { photons: 20_000, bounces: 2, radius: Some(h), alpha: 1.0, ..settings() };
+        let settings = SceneSettings { photons: 20_000, bounces: 2, radius: Some(h), alpha: 1.0, ..settings() };
         let found = irradiance(&gpu, &bench, &settings, &[(DVec3::Y, DVec3::NEG_Y)]).unwrap();
         let expected = 0.5 * watts / (PI * h * h);
         let error = found.standard_error.hypot(tolerance * expected);
@@ -192,8 +186,7 @@ fn a_sun_in_a_plate_is_a_power_of_the_cosine() {
                     continue;
                 }
                 let camera = Camera::looking_at("eye", eye, DVec3::ZERO, DVec3::Z, 1e-9);
-                let settings =
-                    TransportSettings { photons: 1, rounds: 1, shadow_rays: 1, part: Part::Direct, ..TransportSettings::default() };
+                let settings = SceneSettings { photons: 1, rounds: 1, shadow_rays: 1, part: Part::Direct, ..SceneSettings::default() };
                 let lit = seen(&gpu, &plate(surface, sun()), &settings, &camera, [4, 4]);
                 let found = mean_red(&lit);
                 let what = format!("{surface:?}, {off} off");
@@ -245,7 +238,7 @@ fn over_glass(ior: f32, depth: f64) -> Scene {
 /// Radiance along one ray and the number of samples.
 fn along(gpu: &Gpu, scene: &Scene, eye: DVec3) -> (f64, f64) {
     let camera = Camera::looking_at("ray", eye, DVec3::ZERO, DVec3::Z, 1e-6);
-    let settings = TransportSettings { photons: 1, caustic_photons: 1, rounds: 4, part: Part::Specular, ..TransportSettings::default() };
+    let settings = SceneSettings { photons: 1, caustic_photons: 1, rounds: 4, part: Part::Specular, ..SceneSettings::default() };
     let lit = seen(gpu, scene, &settings, &camera, [64, 64]);
     (mean_red(&lit), 4.0 * 64.0 * 64.0)
 }
@@ -314,7 +307,7 @@ fn diffuse_light_crosses_glass_by_its_mean_transmittance() {
         scene.meshes[0].positions.iter_mut().for_each(|at| *at *= 16.0);
         scene.materials.push(Material::lambert("ground", Vec3::ZERO));
         scene.meshes.push(Mesh::parallelogram("ground", DVec3::new(-400.0, -0.25, -400.0), DVec3::Z * 800.0, DVec3::X * 800.0, 1));
-        let settings = TransportSettings { radius: None, ..flights(400_000, 2) };
+        let settings = SceneSettings { radius: None, ..flights(400_000, 2) };
         let fates = received(&gpu, &scene, &settings, &[(DVec3::Y * -0.25, DVec3::Y)]).fates[0].clone();
         let through = if height < 0.0 { fates.bounces[1].escaped } else { fates.bounces[1].absorbed };
         println!("{what}: {} passes, expected {expected}", through as f64 / fates.emitted as f64);

@@ -6,14 +6,15 @@ use std::time::Instant;
 use crate::common::device;
 use glam::{DVec3, Vec3};
 use photonmill::bake::{self, Layout};
+use photonmill::engine;
+use photonmill::engine::Control;
+use photonmill::engine::scene::{self, View};
 use photonmill::output::destination::Folder;
+use photonmill::plan::scene::ScenePlan;
 use photonmill::plan::sensor::Sensor;
-use photonmill::plan::transport::TransportPlan;
-use photonmill::render::{self, Control};
 use photonmill::scene::geometry::Geometry;
 use photonmill::scene::{Camera, Material, Mesh, Scene, Surface};
-use photonmill::settings::transport::TransportSettings;
-use photonmill::transport::{self, View};
+use photonmill::settings::scene::SceneSettings;
 
 /// A glass ball of a million triangles over a plane, lit by a lamp.
 fn million() -> Scene {
@@ -50,12 +51,12 @@ fn a_million_triangles_load_and_render() {
     let geometry = Geometry::new(&loaded).unwrap();
     let built = began.elapsed() - read;
 
-    let settings = TransportSettings { photons: 100_000, caustic_photons: 100_000, rounds: 4, ..TransportSettings::default() };
+    let settings = SceneSettings { photons: 100_000, caustic_photons: 100_000, rounds: 4, ..SceneSettings::default() };
     let sensor = Sensor::Picture { width: 256, height: 256 };
-    let plan = TransportPlan::new(&loaded, &geometry, &settings, sensor, &render::limits(gpu.facts())).unwrap();
+    let plan = ScenePlan::new(&loaded, &geometry, &settings, sensor, &engine::limits(gpu.facts())).unwrap();
     let never = AtomicBool::new(false);
     let view = View { geometry: &geometry, camera: loaded.cameras.first(), phases: &[] };
-    let lit = transport::light(&gpu, &view, plan, &mut Control { cancelled: &never, progress: &mut |_| {} }).unwrap();
+    let lit = scene::light(&gpu, &view, plan, &mut Control { cancelled: &never, progress: &mut |_| {} }).unwrap();
     let row = |name: &str| lit.timings.row(name).and_then(|row| row.gpu_ms).unwrap_or_default();
     println!("read {read:?}, hierarchy {built:?}, GPU ms: 4 rounds {:.1}, photons {:.1}", row("round"), row("round/global/trace"));
     assert_eq!(lit.anomalies[..2], [0, 0]);

@@ -10,7 +10,7 @@ use photonmill::photon::StoredPhoton;
 use photonmill::rng::Rng;
 use photonmill::scene::open_box::open_box;
 use photonmill::scene::room::{RoomScene, Wall};
-use photonmill::settings::{Builder, EmissionLaw, Settings};
+use photonmill::settings::{Builder, EmissionLaw, RoomSettings};
 
 /// Every path that entered a bounce has one fate there, and who was stored enters the next.
 fn closes(fates: &Fates, emitted: u64) -> Check {
@@ -39,7 +39,7 @@ fn closes(fates: &Fates, emitted: u64) -> Check {
 }
 
 /// The fates of a run's photons, if its ledger closes.
-pub fn closed_fates(gpu: &Gpu, scene: &RoomScene, settings: &Settings) -> Result<Fates, Complaint> {
+pub fn closed_fates(gpu: &Gpu, scene: &RoomScene, settings: &RoomSettings) -> Result<Fates, Complaint> {
     let fates = outcome_of(gpu, scene, settings)?.fates;
     closes(&fates, settings.total_photons()).map_err(|text| Complaint::new(Kind::LedgerOpen, text))?;
     Ok(fates)
@@ -47,12 +47,12 @@ pub fn closed_fates(gpu: &Gpu, scene: &RoomScene, settings: &Settings) -> Result
 
 /// The fates of the device's builders and of the CPU's, all alike and all closed. A photon whose fate
 /// hangs on the last bit is rarer than one in 1e5, and these runs are smaller.
-fn fates(gpu: &Gpu, scene: &RoomScene, settings: &Settings) -> Fates {
+fn fates(gpu: &Gpu, scene: &RoomScene, settings: &RoomSettings) -> Fates {
     let total = settings.total_photons();
     let expected = run_scene_on_cpu(scene, settings).fates;
     assert_holds(format!("cpu\n{settings:?}"), closes(&expected, total));
     for builder in Builder::ON_GPU {
-        let settings = Settings { builder, paranoid: true, ..settings.clone() };
+        let settings = RoomSettings { builder, paranoid: true, ..settings.clone() };
         match closed_fates(gpu, scene, &settings) {
             Ok(found) => assert_eq!(found, expected, "{settings:?}"),
             Err(complaint) => panic!("{settings:?}: {complaint}"),
@@ -62,8 +62,8 @@ fn fates(gpu: &Gpu, scene: &RoomScene, settings: &Settings) -> Fates {
 }
 
 /// Small meshes: the film is not what is asked here.
-fn small() -> Settings {
-    Settings { mesh: 4, ..Settings::default() }
+fn small() -> RoomSettings {
+    RoomSettings { mesh: 4, ..RoomSettings::default() }
 }
 
 #[test]
@@ -72,7 +72,7 @@ fn every_builder_closes_the_ledger_alike() {
     for reflectance in [0.0, 0.75, 1.0] {
         for bounces in [1, 2, 15, 200] {
             for (photons, chunk) in [(2, None), (501, None), (5000, Some(1701))] {
-                let settings = Settings { photons, reflectance, bounces, chunk, ..small() };
+                let settings = RoomSettings { photons, reflectance, bounces, chunk, ..small() };
                 let ledger = fates(&gpu, &open_box(&settings), &settings).ledger();
                 assert_eq!(ledger.emitted, u64::from(photons));
                 if reflectance == 1.0 {
@@ -90,9 +90,9 @@ fn every_builder_closes_the_ledger_alike() {
 fn generators_rounds_and_lights_close_it_too() {
     let Some(gpu) = device() else { return };
     for rng in [Rng::Rand48, Rng::Mt, Rng::Philox] {
-        let settings = Settings { rng, photons: 333, rounds: 7, light_power: [1.0, 0.01], emission: EmissionLaw::Cosine, ..small() };
+        let settings = RoomSettings { rng, photons: 333, rounds: 7, light_power: [1.0, 0.01], emission: EmissionLaw::Cosine, ..small() };
         fates(&gpu, &open_box(&settings), &settings);
-        let one_at_a_time = Settings { chunk: Some(2), photons: 21, rounds: 2, ..settings };
+        let one_at_a_time = RoomSettings { chunk: Some(2), photons: 21, rounds: 2, ..settings };
         fates(&gpu, &open_box(&one_at_a_time), &one_at_a_time);
     }
 }
@@ -103,7 +103,7 @@ fn generators_rounds_and_lights_close_it_too() {
 fn black_walls_absorb_the_first_flights_hits() {
     let Some(gpu) = device() else { return };
     for (emission, probability) in [(EmissionLaw::Uniform, 0.781_900_4), (EmissionLaw::Cosine, 0.809_523_7)] {
-        let settings = Settings { emission, reflectance: 0.0, bounces: 3, photons: 500_001, rng: Rng::Philox, ..small() };
+        let settings = RoomSettings { emission, reflectance: 0.0, bounces: 3, photons: 500_001, rng: Rng::Philox, ..small() };
         let ledger = run(&gpu, &settings).fates.ledger();
         assert_eq!((ledger.stored, ledger.cut_off), (0, 0));
         let what = format!("{emission:?}: share of first flights that end on a wall");
@@ -117,7 +117,7 @@ fn black_walls_absorb_the_first_flights_hits() {
 #[test]
 fn a_closed_white_room_stores_everything() {
     let Some(gpu) = device() else { return };
-    let settings = Settings { reflectance: 1.0, photons: 777, ..small() };
+    let settings = RoomSettings { reflectance: 1.0, photons: 777, ..small() };
     let mut scene = open_box(&settings);
     scene.faces[5] = Some(Wall { name: "front", albedo: 1.0, shininess: None });
     let white = fates(&gpu, &scene, &settings).ledger();
@@ -125,7 +125,7 @@ fn a_closed_white_room_stores_everything() {
     assert_eq!((white.absorbed, white.escaped), (0, 0));
 
     // Half-grey: each bounce stores half of what the last one did, so 1 - 2^-15 in all.
-    let grey = Settings { reflectance: 0.5, photons: 100_001, rng: Rng::Philox, ..settings };
+    let grey = RoomSettings { reflectance: 0.5, photons: 100_001, rng: Rng::Philox, ..settings };
     scene.faces.iter_mut().flatten().for_each(|wall| wall.albedo = 0.5);
     let found = fates(&gpu, &scene, &grey);
     assert_eq!(found.ledger().escaped, 0);
@@ -143,10 +143,10 @@ fn a_round_larger_than_a_buffer_splits_and_drops_nothing() {
     let largest = gpu.facts().storage_buffer_range_bytes.min(gpu.facts().allocation_bytes);
     // Photons whose map with all bounces is just larger than one buffer of lavapipe, 128 MiB.
     let photons = 600_001;
-    let settings = Settings { photons, rng: Rng::Philox, ..small() };
-    let expected = run_on_cpu(&Settings { threads: 2, ..settings.clone() }).fates;
+    let settings = RoomSettings { photons, rng: Rng::Philox, ..small() };
+    let expected = run_on_cpu(&RoomSettings { threads: 2, ..settings.clone() }).fates;
     for builder in Builder::ON_GPU {
-        let outcome = run(&gpu, &Settings { builder, ..settings.clone() });
+        let outcome = run(&gpu, &RoomSettings { builder, ..settings.clone() });
         if largest < size_of::<StoredPhoton>() as u64 * 15 * u64::from(photons) {
             assert!(outcome.plan.chunks_per_round > 1, "{builder:?}");
         }

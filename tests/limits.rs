@@ -7,23 +7,24 @@ use crate::common::lit::{BOTH, glass, level, matt, mean_red, mirror, received, s
 use crate::common::{assert_complains, assert_holds, device, z_check};
 use glam::{DVec3, Vec3};
 use photonmill::constants::MAX_BOUNCES;
+use photonmill::engine;
+use photonmill::engine::scene::resources::SceneResources;
+use photonmill::engine::scene::{self, End, Round, RunResult, View, photons};
+use photonmill::engine::{Control, watch};
 use photonmill::error::Error;
 use photonmill::gpu::{Commands, Gpu};
 use photonmill::output::light_report;
+use photonmill::plan::scene::ScenePlan;
 use photonmill::plan::sensor::Sensor;
-use photonmill::plan::transport::TransportPlan;
-use photonmill::render::{self, Control};
 use photonmill::scene::geometry::Geometry;
 use photonmill::scene::light::LightKind;
 use photonmill::scene::{Camera, Scene};
 use photonmill::settings::Builder;
+use photonmill::settings::scene::{Illumination, SceneSettings};
 use photonmill::settings::stop::{Stop, squared_radius};
-use photonmill::settings::transport::{Illumination, TransportSettings};
-use photonmill::transport::resources::TransportResources;
-use photonmill::transport::{self, End, Round, RunResult, View, photons};
 
-fn settings() -> TransportSettings {
-    TransportSettings { photons: 8000, caustic_photons: 8000, rounds: 8, shadow_rays: 1, ..TransportSettings::default() }
+fn settings() -> SceneSettings {
+    SceneSettings { photons: 8000, caustic_photons: 8000, rounds: 8, shadow_rays: 1, ..SceneSettings::default() }
 }
 
 /// A closed room whose walls all shine.
@@ -43,7 +44,7 @@ fn bright_rooms_lose_no_light() {
         let exact = std::f64::consts::PI / (1.0 - f64::from(albedo));
         for builder in [Builder::Atomic, Builder::Ballot, Builder::Persistent] {
             let what = format!("albedo {albedo}, {}", builder.name());
-            let settings = TransportSettings { builder: Some(builder), radius: Some(0.4), alpha: 1.0, ..settings() };
+            let settings = SceneSettings { builder: Some(builder), radius: Some(0.4), alpha: 1.0, ..settings() };
             let lit = received(&gpu, &furnace(albedo), &settings, &POINT);
             let (mean, error) = (lit.film.mean(0, &lit.plan).x, lit.film.standard_error(0, &lit.plan).x);
             assert!(error < 0.04 * exact, "{what}: {mean} +- {error}");
@@ -51,7 +52,7 @@ fn bright_rooms_lose_no_light() {
             assert_eq!((lit.fates[0].ledger().cut_off, lit.losses.cut_off), (0, 0.0), "{what}");
 
             // With the cap that was the default.
-            let capped = received(&gpu, &furnace(albedo), &TransportSettings { bounces: 32, ..settings }, &POINT);
+            let capped = received(&gpu, &furnace(albedo), &SceneSettings { bounces: 32, ..settings }, &POINT);
             let (mean, error) = (capped.film.mean(0, &capped.plan).x, capped.film.standard_error(0, &capped.plan).x);
             assert_complains("32 bounces", z_check(&what, mean, exact, error));
             assert!(capped.losses.relative >= 1.0 - mean / exact - 3.0 * error / exact, "{what}: {mean}, {:?}", capped.losses);
@@ -67,7 +68,7 @@ fn what_a_cap_cuts_off_is_counted() {
         BOTH.into_iter().flat_map(|illumination| [(illumination, 0.5f32, 1), (illumination, 0.5, 6), (illumination, 0.9, 6)])
     {
         let what = format!("{illumination:?}, albedo {albedo}, {bounces} bounces");
-        let settings = TransportSettings { illumination, bounces, radius: Some(0.4), alpha: 1.0, ..settings() };
+        let settings = SceneSettings { illumination, bounces, radius: Some(0.4), alpha: 1.0, ..settings() };
         let lit = received(&gpu, &furnace(albedo), &settings, &POINT);
         let RunResult { losses, fates, .. } = &lit;
         let survivors = f64::from(albedo).powi(bounces as i32);
@@ -87,7 +88,7 @@ fn what_a_cap_cuts_off_is_counted() {
 fn an_error_beyond_a_cap_is_refused() {
     let Some(gpu) = device() else { return };
     let stop = Stop { error: Some(0.01), ..Stop::default() };
-    let settings = TransportSettings { bounces: 4, photons: 500, rounds: 31, stop, ..settings() };
+    let settings = SceneSettings { bounces: 4, photons: 500, rounds: 31, stop, ..settings() };
     let refused = run(&gpu, &furnace(0.9), &settings, &AtomicBool::new(false)).unwrap_err();
     assert!(refused.to_string().starts_with("--error 1%: cannot be reached"), "{refused}");
 }
@@ -102,7 +103,7 @@ fn long_chains_of_mirrors_end_at_what_they_show() {
     let scene = scene_of(meshes, vec![mirror(1.0), shining(0.0)], vec![]);
     // Two metres across for each one along: a hundred reflections.
     let camera = Camera::looking_at("ray", DVec3::new(0.0, 0.01, 0.1), DVec3::new(0.49, 0.255, 0.1), DVec3::Y, 1e-4);
-    let lit = seen(&gpu, &scene, &TransportSettings { rounds: 2, photons: 10, caustic_photons: 10, ..settings() }, &camera, [4, 4]);
+    let lit = seen(&gpu, &scene, &SceneSettings { rounds: 2, photons: 10, caustic_photons: 10, ..settings() }, &camera, [4, 4]);
     let mean = mean_red(&lit);
     assert!((mean - 1.0).abs() < 1e-5, "{mean}");
     assert_eq!(lit.losses.camera_paths, 0);
@@ -116,15 +117,9 @@ fn light_trapped_for_ever_is_counted() {
     meshes.extend([level(0.0, [1.0; 2], true, 0), level(1.0, [1.0; 2], false, 0)]);
     let lamp = LightKind::Point { position: DVec3::new(0.1, 0.4, 0.2), intensity: Vec3::ONE };
     let scene = scene_of(meshes, vec![mirror(1.0), matt(0.5), glass(1.5)], vec![lamp]);
-    let settings = TransportSettings { rounds: 1, photons: 40, illumination: Illumination::Photons, ..settings() };
+    let settings = SceneSettings { rounds: 1, photons: 40, illumination: Illumination::Photons, ..settings() };
     let camera = Camera::looking_at("ray", DVec3::new(0.0, 0.5, 0.1), DVec3::new(0.4, 0.8, 0.2), DVec3::Y, 0.5);
-    let lit = seen(
-        &gpu,
-        &scene,
-        &TransportSettings { with: vec![photonmill::settings::transport::Effect::Indirect], ..settings },
-        &camera,
-        [2, 1],
-    );
+    let lit = seen(&gpu, &scene, &SceneSettings { with: vec![photonmill::settings::scene::Effect::Indirect], ..settings }, &camera, [2, 1]);
     // Roulette ends what the eye sees there.
     assert_eq!(lit.losses.camera_paths, 0);
     let ledger = lit.fates[0].ledger();
@@ -142,11 +137,11 @@ fn photons_stored_are_the_length_of_the_map() {
     let scene = scene("cornell-spheres");
     for (builder, illumination) in [Builder::Ballot, Builder::Persistent].into_iter().flat_map(|builder| BOTH.map(|light| (builder, light)))
     {
-        let settings = TransportSettings { builder: Some(builder), illumination, photons: 3000, rounds: 1, chunk: Some(700), ..settings() };
+        let settings = SceneSettings { builder: Some(builder), illumination, photons: 3000, rounds: 1, chunk: Some(700), ..settings() };
         let lit = run(&gpu, &scene, &settings, &AtomicBool::new(false)).unwrap();
         let geometry = Geometry::new(&scene).unwrap();
-        let mut commands = Commands::new(&gpu, transport::constants(&lit.plan), Instant::now()).unwrap();
-        let resources = TransportResources::new(&gpu, &mut commands, &geometry, &lit.plan, &[]).unwrap();
+        let mut commands = Commands::new(&gpu, scene::constants(&lit.plan), Instant::now()).unwrap();
+        let resources = SceneResources::new(&gpu, &mut commands, &geometry, &lit.plan, &[]).unwrap();
         let buffers = resources.photons.as_ref().unwrap();
         let round = Round { resources: &resources, geometry: &geometry, plan: &lit.plan, number: 0 };
         for map in lit.plan.maps() {
@@ -174,7 +169,7 @@ fn radii_take_no_sum_over_earlier_rounds() {
             let found = squared_radius(alpha, round);
             assert!((found / squared - 1.0).abs() < 1e-9, "alpha {alpha}, round {round}: {found}, {squared}");
             sum += squared;
-            let mean = render::stop::mean_squared_radius(alpha, round + 1);
+            let mean = watch::mean_squared_radius(alpha, round + 1);
             assert!((mean * f64::from(round + 1) / sum - 1.0).abs() < 1e-9, "alpha {alpha}, mean of {}", round + 1);
             squared *= (f64::from(round + 1) + alpha) / (f64::from(round + 1) + 1.0);
         }
@@ -184,13 +179,13 @@ fn radii_take_no_sum_over_earlier_rounds() {
     assert!(began.elapsed() < Duration::from_secs(2), "{:?}", began.elapsed());
 }
 
-fn run(gpu: &Gpu, scene: &Scene, settings: &TransportSettings, cancelled: &AtomicBool) -> Result<RunResult, Error> {
+fn run(gpu: &Gpu, scene: &Scene, settings: &SceneSettings, cancelled: &AtomicBool) -> Result<RunResult, Error> {
     let geometry = Geometry::new(scene)?;
     let camera = scene.cameras.first().cloned().unwrap_or_else(|| Camera::around(scene.bounds().0, scene.bounds().1));
     let sensor = Sensor::Picture { width: 64, height: 64 };
-    let plan = TransportPlan::new(scene, &geometry, settings, sensor, &render::limits(gpu.facts()))?;
+    let plan = ScenePlan::new(scene, &geometry, settings, sensor, &engine::limits(gpu.facts()))?;
     let view = View { geometry: &geometry, camera: Some(&camera), phases: &[] };
-    transport::light(gpu, &view, plan, &mut Control { cancelled, progress: &mut |_| {} })
+    scene::light(gpu, &view, plan, &mut Control { cancelled, progress: &mut |_| {} })
 }
 
 /// Rounds that would take minutes end within half a second of being asked to.
@@ -198,12 +193,11 @@ fn run(gpu: &Gpu, scene: &Scene, settings: &TransportSettings, cancelled: &Atomi
 fn long_rounds_end_soon_after_they_are_asked_to() {
     let Some(gpu) = device() else { return };
     let scene = scene("cornell-spheres");
-    let long = TransportSettings { photons: 1 << 31, caustic_photons: 1 << 20, rounds: 4, ..settings() };
+    let long = SceneSettings { photons: 1 << 31, caustic_photons: 1 << 20, rounds: 4, ..settings() };
     let soon = Duration::from_millis(500);
 
     // Pipelines are made before the time is taken.
-    run(&gpu, &scene, &TransportSettings { photons: 1000, caustic_photons: 1000, rounds: 1, ..long.clone() }, &AtomicBool::new(false))
-        .unwrap();
+    run(&gpu, &scene, &SceneSettings { photons: 1000, caustic_photons: 1000, rounds: 1, ..long.clone() }, &AtomicBool::new(false)).unwrap();
     let cancelled = AtomicBool::new(false);
     std::thread::scope(|scope| {
         let asker = scope.spawn(|| {
@@ -219,12 +213,12 @@ fn long_rounds_end_soon_after_they_are_asked_to() {
     });
 
     // Radii of so many photons would find next to none of those that there is time for.
-    let wide = |of: &TransportSettings| TransportSettings { radius: Some(0.05), caustic_radius: Some(0.02), ..of.clone() };
+    let wide = |of: &SceneSettings| SceneSettings { radius: Some(0.05), caustic_radius: Some(0.02), ..of.clone() };
     // In its first round a run ends with the photons that it has.
     let wanted = Duration::from_millis(1500);
     let stop = Stop { seconds: Some(wanted.as_secs_f64()), ..Stop::default() };
     let began = Instant::now();
-    let lit = run(&gpu, &scene, &TransportSettings { stop, ..wide(&long) }, &AtomicBool::new(false)).unwrap();
+    let lit = run(&gpu, &scene, &SceneSettings { stop, ..wide(&long) }, &AtomicBool::new(false)).unwrap();
     let over = began.elapsed().saturating_sub(wanted);
     assert_eq!((lit.end, lit.film.rounds), (End::Time, 1));
     assert!(lit.fates[0].emitted < u64::from(long.photons) && lit.fates[1].emitted > 0);
@@ -232,7 +226,7 @@ fn long_rounds_end_soon_after_they_are_asked_to() {
     assert!(report.contains("time was up in the first round") && report.contains("use fewer --photons"), "{report}");
     assert!(over < soon, "{over:?} after its time was up");
     // Fewer photons are no less light.
-    let reference = TransportSettings { photons: 50_000, rounds: 2, ..wide(&settings()) };
+    let reference = SceneSettings { photons: 50_000, rounds: 2, ..wide(&settings()) };
     let reference = run(&gpu, &scene, &reference, &AtomicBool::new(false)).unwrap();
     let (found, expected) = (mean_red(&lit), mean_red(&reference));
     assert!((found / expected - 1.0).abs() < 0.05, "{found}, {expected}");

@@ -1,16 +1,16 @@
 //! Memory stays within what the plan says beforehand, and is that to the byte.
 
 use crate::common::{device, lit, run};
+use photonmill::engine;
+use photonmill::engine::scene::View;
 use photonmill::gpu::Gpu;
+use photonmill::plan::scene::ScenePlan;
 use photonmill::plan::sensor::Sensor;
-use photonmill::plan::transport::TransportPlan;
-use photonmill::render;
 use photonmill::rng::Rng;
 use photonmill::scene::geometry::Geometry;
 use photonmill::scene::{Scene, built_in};
-use photonmill::settings::transport::{Illumination, TransportSettings};
-use photonmill::settings::{Builder, Gather, Preset, Settings, Sums};
-use photonmill::transport::View;
+use photonmill::settings::scene::{Illumination, SceneSettings};
+use photonmill::settings::{Builder, Gather, Preset, RoomSettings, Sums};
 
 /// Device memory against what a plan lists.
 fn check(what: &str, taken: u64, stated: u64, buffers: &[(&'static str, u64)]) -> crate::common::Check {
@@ -25,26 +25,26 @@ fn taken<T>(gpu: &Gpu, body: impl FnOnce() -> T) -> (u64, T) {
     (gpu.held_memory().peak_device_bytes, result)
 }
 
-fn small() -> Settings {
-    Settings { photons: 999, mesh: 5, bounces: 4, ..Settings::default() }
+fn small() -> RoomSettings {
+    RoomSettings { photons: 999, mesh: 5, bounces: 4, ..RoomSettings::default() }
 }
 
 #[test]
 fn the_papers_line_takes_what_its_plan_says() {
     let Some(gpu) = device() else { return };
     let mut cases = vec![
-        Settings { gather: Gather::Brute, ..small() },
-        Settings { gather: Gather::KdTree, ..small() },
-        Settings { gather: Gather::KdTree, nearest: Some(7), rng: Rng::Philox, ..small() },
-        Settings { rounds: 3, chunk: Some(100), ..small() },
-        Settings { rounds: 2, sums: Sums::F32, rng: Rng::Philox, ..small() },
-        Settings { radius: 0.004, ..small() },
-        Settings { photons: 999, mesh: 5, rounds: 2, ..Settings::preset(Preset::Rounds) },
+        RoomSettings { gather: Gather::Brute, ..small() },
+        RoomSettings { gather: Gather::KdTree, ..small() },
+        RoomSettings { gather: Gather::KdTree, nearest: Some(7), rng: Rng::Philox, ..small() },
+        RoomSettings { rounds: 3, chunk: Some(100), ..small() },
+        RoomSettings { rounds: 2, sums: Sums::F32, rng: Rng::Philox, ..small() },
+        RoomSettings { radius: 0.004, ..small() },
+        RoomSettings { photons: 999, mesh: 5, rounds: 2, ..RoomSettings::preset(Preset::Rounds) },
     ];
-    cases.push(Settings { counters: Some(4), ..small() });
-    cases.extend(Builder::ON_GPU.map(|builder| Settings { builder, ..small() }));
+    cases.push(RoomSettings { counters: Some(4), ..small() });
+    cases.extend(Builder::ON_GPU.map(|builder| RoomSettings { builder, ..small() }));
     // Weights at the eye, which only the builder that keeps order holds apart from their photons.
-    cases.push(Settings { builder: Builder::Scan, shininess: [Some(2.0); 5], ..small() });
+    cases.push(RoomSettings { builder: Builder::Scan, shininess: [Some(2.0); 5], ..small() });
     for settings in cases {
         let (bytes, outcome) = taken(&gpu, || run(&gpu, &settings));
         let plan = &outcome.plan;
@@ -55,12 +55,12 @@ fn the_papers_line_takes_what_its_plan_says() {
 #[test]
 fn scenes_take_what_their_plan_says() {
     let Some(gpu) = device() else { return };
-    let limits = render::limits(gpu.facts());
+    let limits = engine::limits(gpu.facts());
     for name in ["cornell-spheres", "open-box-phong", "sky-over-plane"] {
         let scene: Scene = built_in::by_name(name).unwrap();
         let geometry = Geometry::new(&scene).unwrap();
         for illumination in lit::BOTH {
-            let settings = TransportSettings {
+            let settings = SceneSettings {
                 photons: 777,
                 caustic_photons: 555,
                 bounces: 5,
@@ -68,23 +68,23 @@ fn scenes_take_what_their_plan_says() {
                 chunk: Some(500),
                 illumination,
                 final_gather: illumination == Illumination::Split,
-                ..TransportSettings::default()
+                ..SceneSettings::default()
             };
             let sensor = Sensor::Picture { width: 7, height: 5 };
-            let plan = TransportPlan::new(&scene, &geometry, &settings, sensor, &limits).unwrap();
+            let plan = ScenePlan::new(&scene, &geometry, &settings, sensor, &limits).unwrap();
             let stated = plan.bytes;
             let view = View { geometry: &geometry, camera: scene.cameras.first(), phases: &[] };
             let (bytes, _) = taken(&gpu, || lit::light(&gpu, &view, plan));
             crate::common::assert_holds(name, check("a picture", bytes, stated, &[]));
         }
         let receivers = [vec![Default::default(); 9], vec![Default::default(); 9]];
-        let settings = TransportSettings { photons: 300, rounds: 2, ..TransportSettings::default() };
-        let plan = TransportPlan::new(&scene, &geometry, &settings, Sensor::Receivers { count: 9 }, &limits).unwrap();
+        let settings = SceneSettings { photons: 300, rounds: 2, ..SceneSettings::default() };
+        let plan = ScenePlan::new(&scene, &geometry, &settings, Sensor::Receivers { count: 9 }, &limits).unwrap();
         let stated = plan.bytes_of(2);
         let view = View { geometry: &geometry, camera: None, phases: &receivers };
         let never = std::sync::atomic::AtomicBool::new(false);
-        let mut control = render::Control { cancelled: &never, progress: &mut |_| {} };
-        let (bytes, _) = taken(&gpu, || photonmill::transport::light(&gpu, &view, plan, &mut control).unwrap());
+        let mut control = engine::Control { cancelled: &never, progress: &mut |_| {} };
+        let (bytes, _) = taken(&gpu, || engine::scene::light(&gpu, &view, plan, &mut control).unwrap());
         crate::common::assert_holds(name, check("two sets of receivers", bytes, stated, &[]));
     }
 }

@@ -12,7 +12,7 @@ use glam::{DVec3, Vec3};
 use photonmill::scene::light::LightKind;
 use photonmill::scene::{Mesh, Scene};
 use photonmill::settings::Builder;
-use photonmill::settings::transport::{Illumination, Part, TransportSettings};
+use photonmill::settings::scene::{Illumination, Part, SceneSettings};
 
 const IOR: f64 = 1.5;
 
@@ -43,16 +43,8 @@ fn slanting(angle: f64, distance: f64) -> (DVec3, DVec3) {
 }
 
 /// No photons: rays from the eye alone.
-fn rays(rounds: u32) -> TransportSettings {
-    TransportSettings {
-        photons: 1,
-        caustic_photons: 1,
-        bounces: 1,
-        shadow_rays: 1,
-        part: Part::Specular,
-        rounds,
-        ..TransportSettings::default()
-    }
+fn rays(rounds: u32) -> SceneSettings {
+    SceneSettings { photons: 1, caustic_photons: 1, bounces: 1, shadow_rays: 1, part: Part::Specular, rounds, ..SceneSettings::default() }
 }
 
 /// What a smooth surface reflects of an even sky, with nothing but black below: F = 0.04 at normal incidence, 0.0892 at
@@ -177,7 +169,7 @@ fn even_light_crosses_a_surface_of_glass() {
         let (floor, ceiling) = (grid(-0.5, DVec3::Y, 6), grid(0.5, DVec3::NEG_Y, 6));
         let (far, near) = if lamp_below { (ceiling, floor) } else { (floor, ceiling) };
         for (illumination, builder) in BOTH.into_iter().flat_map(|illumination| SCENE_BUILDERS.map(|builder| (illumination, builder))) {
-            let settings = TransportSettings {
+            let settings = SceneSettings {
                 illumination,
                 builder: Some(builder),
                 radius: Some(0.1),
@@ -189,7 +181,7 @@ fn even_light_crosses_a_surface_of_glass() {
                 bounces: 64,
                 shadow_rays: 1,
                 rounds: 1,
-                ..TransportSettings::default()
+                ..SceneSettings::default()
             };
             for (where_, points, expected) in [("beyond", &far, share), ("back", &near, 1.0 - share)] {
                 let runs = irradiances(&gpu, &scene, &settings, points, 1..25);
@@ -250,7 +242,7 @@ fn images_light_the_end_of_a_corridor() {
     let mut family = Family::default();
     for builder in SCENE_BUILDERS {
         for illumination in BOTH {
-            let settings = TransportSettings {
+            let settings = SceneSettings {
                 illumination,
                 builder: Some(builder),
                 radius: Some(radius),
@@ -261,7 +253,7 @@ fn images_light_the_end_of_a_corridor() {
                 bounces: 8,
                 shadow_rays: 1,
                 rounds: 32,
-                ..TransportSettings::default()
+                ..SceneSettings::default()
             };
             let lit = received(&gpu, &scene, &settings, &[(DVec3::ZERO, DVec3::Z)]);
             let own = if illumination == Illumination::Split { image(0, 0.0, 0.0) } else { over_disc(&|x, y| image(0, x, y)) };
@@ -301,8 +293,8 @@ fn paraboloid(material: usize) -> Mesh {
     mesh
 }
 
-fn caustics(illumination: Illumination, builder: Builder, photons: u32, radius: f64) -> TransportSettings {
-    TransportSettings {
+fn caustics(illumination: Illumination, builder: Builder, photons: u32, radius: f64) -> SceneSettings {
+    SceneSettings {
         illumination,
         builder: Some(builder),
         part: Part::Caustic,
@@ -314,7 +306,7 @@ fn caustics(illumination: Illumination, builder: Builder, photons: u32, radius: 
         bounces: 4,
         shadow_rays: 1,
         rounds: 24,
-        ..TransportSettings::default()
+        ..SceneSettings::default()
     }
 }
 

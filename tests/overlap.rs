@@ -5,11 +5,11 @@ use crate::common::{assert_holds, device, z_check};
 use glam::{DQuat, DVec3, Vec3};
 use photonmill::constants::HIDDEN;
 use photonmill::gpu::Gpu;
-use photonmill::judge::Judge;
 use photonmill::scene::geometry::Geometry;
 use photonmill::scene::light::LightKind;
 use photonmill::scene::{Camera, Mesh, Scene, built_in};
-use photonmill::settings::transport::{Illumination, Part, TransportSettings};
+use photonmill::settings::scene::{Illumination, Part, SceneSettings};
+use photonmill::verify::judge::Judge;
 
 /// A room of 4 x 3 x 4 m around the y axis with a lamp of a square metre below its ceiling.
 fn room() -> Scene {
@@ -68,25 +68,25 @@ fn points(height: f64) -> Vec<(DVec3, DVec3)> {
 }
 
 /// Red irradiance at each point, with its standard error.
-fn irradiance(gpu: &Gpu, scene: &Scene, settings: &TransportSettings, points: &[(DVec3, DVec3)]) -> Vec<(f64, f64)> {
+fn irradiance(gpu: &Gpu, scene: &Scene, settings: &SceneSettings, points: &[(DVec3, DVec3)]) -> Vec<(f64, f64)> {
     let lit = received(gpu, scene, settings, points);
     (0..points.len()).map(|point| (lit.film.mean(point, &lit.plan).x, lit.film.standard_error(point, &lit.plan).x)).collect()
 }
 
-fn settings() -> TransportSettings {
-    TransportSettings {
+fn settings() -> SceneSettings {
+    SceneSettings {
         photons: 20_000,
         rounds: 16,
         radius: Some(0.3),
         alpha: 1.0,
         illumination: Illumination::Photons,
-        ..TransportSettings::default()
+        ..SceneSettings::default()
     }
 }
 
 /// Complains where a scene is not lit as another at some points.
 fn compare(gpu: &Gpu, what: &str, scene: &Scene, points: &[(DVec3, DVec3)], expected: &[(f64, f64)]) -> Vec<String> {
-    let found = irradiance(gpu, scene, &TransportSettings { seed: 99, ..settings() }, points);
+    let found = irradiance(gpu, scene, &SceneSettings { seed: 99, ..settings() }, points);
     let pairs = points.iter().zip(found.iter().zip(expected));
     pairs
         .filter_map(|((at, _), ((found, error), (expected, other)))| {
@@ -129,7 +129,7 @@ fn a_lamp_that_is_given_twice_shines_once() {
     let Some(gpu) = device() else { return };
     let power = Geometry::new(&room()).unwrap().power;
     for illumination in [Illumination::Photons, Illumination::Split] {
-        let settings = TransportSettings { illumination, shadow_rays: 8, ..settings() };
+        let settings = SceneSettings { illumination, shadow_rays: 8, ..settings() };
         let points = &points(0.0)[..3];
         let expected = irradiance(&gpu, &room(), &settings, points);
         for is_turned in [false, true] {
@@ -142,7 +142,7 @@ fn a_lamp_that_is_given_twice_shines_once() {
             assert!((geometry.power / power / size - 1.0).abs() < 1e-5, "{} instead of {power}", geometry.power);
             let [warning] = &geometry.overlap_warnings(&scene)[..] else { panic!("{:?}", geometry.overlap_warnings(&scene)) };
             assert!(warning.contains("\"lamp\"") && warning.contains("\"lamp.001\""), "{warning}");
-            let found = irradiance(&gpu, &scene, &TransportSettings { seed: 99, ..settings.clone() }, &points);
+            let found = irradiance(&gpu, &scene, &SceneSettings { seed: 99, ..settings.clone() }, &points);
             for ((found, error), (expected, other)) in found.iter().zip(&expected) {
                 assert_holds("twice", z_check("a lamp that is given twice", *found, *expected, error.hypot(*other)));
             }
@@ -167,12 +167,12 @@ fn a_lamp_in_the_plane_of_the_ceiling_shines() {
         if is_turned {
             (scene, points) = (turned(scene), turned_points(&points));
         }
-        let found = irradiance(&gpu, &scene, &TransportSettings { seed: 99, ..settings.clone() }, &points);
+        let found = irradiance(&gpu, &scene, &SceneSettings { seed: 99, ..settings.clone() }, &points);
         for ((found, error), (expected, other)) in found.iter().zip(&expected) {
             assert_holds("in the ceiling", z_check("in the ceiling", *found, *expected, error.hypot(*other)));
         }
         let place = |at: DVec3| if is_turned { tilted(at) } else { at };
-        let direct = TransportSettings { rounds: 1, part: Part::Direct, shadow_rays: 1, ..TransportSettings::default() };
+        let direct = SceneSettings { rounds: 1, part: Part::Direct, shadow_rays: 1, ..SceneSettings::default() };
         for eye in [DVec3::new(0.1, 0.3, 0.2), DVec3::new(1.9, 0.4, -1.7), DVec3::new(-1.9, 2.8, 0.3)] {
             let angle = 0.05 / eye.distance(DVec3::Y * 3.0);
             let camera = Camera::looking_at("eye", place(eye), place(DVec3::Y * 3.0), DVec3::X, angle);
@@ -276,7 +276,7 @@ fn the_judge_counts_an_overlap_once() {
 fn short_rays_see_what_counts() {
     let Some(gpu) = device() else { return };
     let lamp = LightKind::Point { position: DVec3::Y * 2.0, intensity: Vec3::ONE };
-    let settings = TransportSettings { photons: 1, rounds: 1, shadow_rays: 1, ..TransportSettings::default() };
+    let settings = SceneSettings { photons: 1, rounds: 1, shadow_rays: 1, ..SceneSettings::default() };
     for (what, lift) in [("on the floor", 0.0), ("above the floor", 3e-6), ("below the floor", -3e-6)] {
         let floor = level(0.0, [10.0; 2], true, 0);
         let mut rug = level(0.0, [2.0; 2], true, 1);

@@ -6,51 +6,53 @@ use std::sync::atomic::AtomicBool;
 
 use crate::common::{Check, Complaint, assert_holds, device, in_order, nothing_odd, outcome_of, photons, photons_on_cpu, run_on_cpu};
 use glam::Vec3;
+use photonmill::engine;
+use photonmill::engine::Control;
+use photonmill::engine::nonfinite_values::{NonfiniteValues, What};
+use photonmill::engine::room::{self};
+use photonmill::engine::scene::replay::{PhotonName, replay};
+use photonmill::engine::scene::{self, RunResult, View};
 use photonmill::gpu::Gpu;
-use photonmill::nonfinite_values::{NonfiniteValues, What};
+use photonmill::plan::scene::ScenePlan;
 use photonmill::plan::sensor::Sensor;
-use photonmill::plan::transport::TransportPlan;
-use photonmill::render::{self, Control};
 use photonmill::scene::geometry::Geometry;
 use photonmill::scene::open_box::open_box;
 use photonmill::scene::{Camera, Scene, built_in};
-use photonmill::settings::transport::{Illumination, TransportSettings};
-use photonmill::settings::{Builder, Preset, Settings};
-use photonmill::transport::replay::{PhotonName, replay};
-use photonmill::transport::{self, RunResult, View};
+use photonmill::settings::scene::{Illumination, SceneSettings};
+use photonmill::settings::{Builder, Preset, RoomSettings};
 
 const SENSOR: Sensor = Sensor::Picture { width: 24, height: 24 };
 
-fn paranoid() -> TransportSettings {
-    TransportSettings { photons: 3000, caustic_photons: 3000, rounds: 2, paranoid: true, ..TransportSettings::default() }
+fn paranoid() -> SceneSettings {
+    SceneSettings { photons: 3000, caustic_photons: 3000, rounds: 2, paranoid: true, ..SceneSettings::default() }
 }
 
-fn plan_of(gpu: &Gpu, scene: &Scene, geometry: &Geometry, settings: &TransportSettings) -> TransportPlan {
-    TransportPlan::new(scene, geometry, settings, SENSOR, &render::limits(gpu.facts())).unwrap()
+fn plan_of(gpu: &Gpu, scene: &Scene, geometry: &Geometry, settings: &SceneSettings) -> ScenePlan {
+    ScenePlan::new(scene, geometry, settings, SENSOR, &engine::limits(gpu.facts())).unwrap()
 }
 
-fn light(gpu: &Gpu, scene: &Scene, geometry: &Geometry, settings: &TransportSettings) -> RunResult {
+fn light(gpu: &Gpu, scene: &Scene, geometry: &Geometry, settings: &SceneSettings) -> RunResult {
     let camera = scene.cameras.first().cloned().unwrap_or_else(|| Camera::around(scene.bounds().0, scene.bounds().1));
     let view = View { geometry, camera: Some(&camera), phases: &[] };
     let never = AtomicBool::new(false);
     let plan = plan_of(gpu, scene, geometry, settings);
-    transport::light(gpu, &view, plan, &mut Control { cancelled: &never, progress: &mut |_| {} }).unwrap()
+    scene::light(gpu, &view, plan, &mut Control { cancelled: &never, progress: &mut |_| {} }).unwrap()
 }
 
 /// No value of a scene with mirrors and glass is infinite or no number, by either way of lighting it.
-pub fn scene_is_finite(gpu: &Gpu, settings: &TransportSettings) -> Check<Complaint> {
+pub fn scene_is_finite(gpu: &Gpu, settings: &SceneSettings) -> Check<Complaint> {
     let scene = built_in::by_name("cornell-spheres").unwrap();
     let geometry = Geometry::new(&scene).unwrap();
     for illumination in [Illumination::Split, Illumination::Photons] {
-        let settings = TransportSettings { illumination, paranoid: true, ..settings.clone() };
+        let settings = SceneSettings { illumination, paranoid: true, ..settings.clone() };
         nothing_odd(light(gpu, &scene, &geometry, &settings).nonfinite_values.as_ref().unwrap())?;
     }
     Ok(())
 }
 
 /// Nor is one of the paper's box.
-pub fn box_is_finite(gpu: &Gpu, settings: &Settings) -> Check<Complaint> {
-    outcome_of(gpu, &open_box(settings), &Settings { paranoid: true, ..settings.clone() }).map(|_| ())
+pub fn box_is_finite(gpu: &Gpu, settings: &RoomSettings) -> Check<Complaint> {
+    outcome_of(gpu, &open_box(settings), &RoomSettings { paranoid: true, ..settings.clone() }).map(|_| ())
 }
 
 #[test]
@@ -60,18 +62,18 @@ fn no_built_in_scene_has_a_value_that_is_no_number() {
         let scene = built_in::by_name(name).unwrap();
         let geometry = Geometry::new(&scene).unwrap();
         for (illumination, final_gather) in [(Illumination::Split, true), (Illumination::Photons, false)] {
-            let settings = TransportSettings { illumination, final_gather, photons: 1000, ..paranoid() };
+            let settings = SceneSettings { illumination, final_gather, photons: 1000, ..paranoid() };
             let lit = light(&gpu, &scene, &geometry, &settings);
             assert_holds(format!("{name}, {illumination:?}"), nothing_odd(lit.nonfinite_values.as_ref().unwrap()));
             assert_eq!(lit.nonfinite_values, Some(NonfiniteValues::default()));
             // Looking changes nothing.
-            let unwatched = light(&gpu, &scene, &geometry, &TransportSettings { paranoid: false, ..settings });
+            let unwatched = light(&gpu, &scene, &geometry, &SceneSettings { paranoid: false, ..settings });
             assert_eq!(unwatched.nonfinite_values, None);
             assert_eq!(unwatched.film, lit.film, "{name}, {illumination:?}");
         }
     }
     for preset in [Preset::Naive, Preset::Modified, Preset::Phong, Preset::Rounds] {
-        let settings = Settings { paranoid: true, rounds: 2, ..Settings::preset(preset) };
+        let settings = RoomSettings { paranoid: true, rounds: 2, ..RoomSettings::preset(preset) };
         assert_holds(format!("{preset:?}"), box_is_finite(&gpu, &settings));
         assert_eq!(run_on_cpu(&settings).nonfinite_values, Some(NonfiniteValues::default()), "{preset:?}");
     }
@@ -86,7 +88,7 @@ fn a_planted_value_is_counted_and_its_photon_named() {
     let mirror = scene.materials.iter().position(|material| material.name == "mirror").unwrap();
     for poison in [f32::NAN, f32::INFINITY] {
         geometry.materials[mirror].base_colour = Vec3::new(1.0, poison, 1.0);
-        let settings = TransportSettings { rounds: 1, photons: 400, caustic_photons: 50, ..paranoid() };
+        let settings = SceneSettings { rounds: 1, photons: 400, caustic_photons: 50, ..paranoid() };
         let lit = light(&gpu, &scene, &geometry, &settings);
         let nonfinite_values = lit.nonfinite_values.unwrap();
         assert!(nonfinite_values.count > 10, "{nonfinite_values:?}");
@@ -111,14 +113,16 @@ fn a_planted_value_is_counted_and_its_photon_named() {
 #[test]
 fn a_photon_alone_takes_the_path_that_it_takes_among_others() {
     let Some(gpu) = device() else { return };
-    for settings in [Settings::default(), Settings { photons: 20_001, rng: photonmill::rng::Rng::Philox, ..Settings::default() }] {
+    for settings in
+        [RoomSettings::default(), RoomSettings { photons: 20_001, rng: photonmill::rng::Rng::Philox, ..RoomSettings::default() }]
+    {
         for builder in Builder::ON_GPU {
-            let settings = Settings { builder, ..settings.clone() };
+            let settings = RoomSettings { builder, ..settings.clone() };
             let all = in_order(photons(&gpu, &settings));
             let most = all.iter().max_by_key(|photon| photon.bounce).unwrap().photon;
             for photon in [0, 1, most, settings.photons / 2, settings.photons - 1] {
                 let expected: Vec<_> = all.iter().copied().filter(|stored| stored.photon == photon).collect();
-                let found = in_order(render::replay_on_gpu(&gpu, &open_box(&settings), &settings, 0, photon).unwrap().stored);
+                let found = in_order(room::replay_on_gpu(&gpu, &open_box(&settings), &settings, 0, photon).unwrap().stored);
                 assert_eq!(found, expected, "{builder:?}, photon {photon}");
             }
         }
@@ -126,6 +130,6 @@ fn a_photon_alone_takes_the_path_that_it_takes_among_others() {
         let most = all.iter().max_by_key(|photon| photon.bounce).unwrap().photon;
         let expected: Vec<_> = all.into_iter().filter(|stored| stored.photon == most).collect();
         assert!(expected.len() > 5);
-        assert_eq!(in_order(render::replay_on_cpu(&open_box(&settings), &settings, 0, most).unwrap().stored), expected);
+        assert_eq!(in_order(room::replay_on_cpu(&open_box(&settings), &settings, 0, most).unwrap().stored), expected);
     }
 }

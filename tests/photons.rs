@@ -7,13 +7,13 @@ use crate::common::{
     Check, Kind, MANY_PHOTONS, assert_complains, assert_complains_of, assert_holds, device, draws_of, photons, photons_on_cpu, plan_for,
     same_photons, streams_of,
 };
+use photonmill::engine::room::photons_on_gpu;
 use photonmill::gpu::Gpu;
 use photonmill::photon::Photon;
-use photonmill::render::photons_on_gpu;
 use photonmill::rng::{self, Rng, Streams};
 use photonmill::scene::open_box::open_box;
 use photonmill::scene::room::Wall;
-use photonmill::settings::{Builder, EmissionLaw, PhongDirection, Settings};
+use photonmill::settings::{Builder, EmissionLaw, PhongDirection, RoomSettings};
 
 const GENERATORS: [Rng; 4] = [Rng::Rand48, Rng::Mt, Rng::Philox, Rng::Sobol];
 /// Around subgroups of 8, 32 and 64, around the work group of 128, and two odd numbers of photons.
@@ -38,11 +38,11 @@ fn each_once(found: &[Photon], photon_count: u32, bounces: u32) -> Check {
 }
 
 /// The builders on the device store one set; returns it.
-fn builders_agree(gpu: &Gpu, settings: &Settings) -> Vec<Photon> {
-    let of = |builder| photons(gpu, &Settings { builder, ..settings.clone() });
+fn builders_agree(gpu: &Gpu, settings: &RoomSettings) -> Vec<Photon> {
+    let of = |builder| photons(gpu, &RoomSettings { builder, ..settings.clone() });
     let expected = of(Builder::Naive);
     let what = |builder| {
-        let Settings { photons, rng, emission, shininess, group_size, chunk, .. } = settings;
+        let RoomSettings { photons, rng, emission, shininess, group_size, chunk, .. } = settings;
         format!(
             "{builder:?}, {photons} photons, {rng:?}, {emission:?}, shininess {:?}, groups of {group_size}, chunks of {chunk:?}",
             shininess[0]
@@ -62,7 +62,7 @@ fn builders_store_the_same_photons_at_every_count() {
     let Some(gpu) = device() else { return };
     for rng in GENERATORS {
         for photons in COUNTS {
-            let stored = builders_agree(&gpu, &Settings { photons, rng, ..Settings::default() });
+            let stored = builders_agree(&gpu, &RoomSettings { photons, rng, ..RoomSettings::default() });
             // Empty maps would agree with each other; a handful of photons may all be absorbed.
             assert!(photons < 63 || stored.len() as u32 > photons, "{rng:?}, {photons} photons stored {}", stored.len());
         }
@@ -75,19 +75,19 @@ fn builders_store_the_same_photons_at_every_count() {
 fn a_persistent_invocation_takes_photon_after_photon() {
     let Some(gpu) = device() else { return };
     for rng in [Rng::Philox, Rng::Sobol, Rng::Mt] {
-        let many = Settings { photons: MANY_PHOTONS, chunk: Some(MANY_PHOTONS), rng, ..Settings::default() };
+        let many = RoomSettings { photons: MANY_PHOTONS, chunk: Some(MANY_PHOTONS), rng, ..RoomSettings::default() };
         let endless =
-            Settings { photons: 257, bounces: if rng == Rng::Mt { 74 } else { 320 }, reflectance: 1.0, rng, ..Settings::default() };
+            RoomSettings { photons: 257, bounces: if rng == Rng::Mt { 74 } else { 320 }, reflectance: 1.0, rng, ..RoomSettings::default() };
         let mut closed = open_box(&endless);
         closed.faces[5] = Some(Wall { name: "front", albedo: 1.0, shininess: None });
         for (scene, settings) in [(open_box(&many), &many), (closed, &endless)] {
-            let of = |builder| photons_on_gpu(&gpu, &scene, &Settings { builder, ..settings.clone() }).unwrap();
+            let of = |builder| photons_on_gpu(&gpu, &scene, &RoomSettings { builder, ..settings.clone() }).unwrap();
             let found = of(Builder::Persistent);
             assert_holds(format!("{rng:?}, {} bounces", settings.bounces), same_photons(&found, &of(Builder::Atomic)));
             assert!(settings.bounces == 15 || found.len() == 257 * settings.bounces as usize, "{} photons", found.len());
         }
     }
-    let longer = Settings { builder: Builder::Persistent, bounces: 321, rng: Rng::Philox, ..Settings::default() };
+    let longer = RoomSettings { builder: Builder::Persistent, bounces: 321, rng: Rng::Philox, ..RoomSettings::default() };
     let refused = longer.validate().unwrap_err().to_string();
     assert!(refused.starts_with("--bounces 321: "), "{refused}");
 }
@@ -96,7 +96,7 @@ fn a_persistent_invocation_takes_photon_after_photon() {
 fn the_scanning_builder_keeps_photons_in_their_order() {
     let Some(gpu) = device() else { return };
     for (photon_count, group_size, chunk) in [(65, 64, None), (5001, 128, None), (5000, 32, Some(777))] {
-        let settings = Settings { builder: Builder::Scan, photons: photon_count, group_size, chunk, ..Settings::default() };
+        let settings = RoomSettings { builder: Builder::Scan, photons: photon_count, group_size, chunk, ..RoomSettings::default() };
         let map: Vec<(u32, u32)> = photons(&gpu, &settings).iter().map(|photon| (photon.bounce, photon.photon)).collect();
         // Chunks come one after the other, and each begins with its first bounce.
         let chunks = map.chunk_by(|before, after| before.0 <= after.0);
@@ -114,37 +114,37 @@ fn builders_store_the_same_photons_for_every_effect() {
         for emission in [EmissionLaw::Uniform, EmissionLaw::Cosine] {
             for shininess in [[None; 5], [Some(2.0), None, Some(0.5), Some(0.0), Some(50.0)]] {
                 for photons in [65, 1000] {
-                    builders_agree(&gpu, &Settings { photons, rng, emission, shininess, ..Settings::default() });
+                    builders_agree(&gpu, &RoomSettings { photons, rng, emission, shininess, ..RoomSettings::default() });
                 }
             }
         }
     }
-    let sampled = Settings { phong_direction: PhongDirection::Sampled, shininess: [Some(2.0); 5], ..Settings::default() };
+    let sampled = RoomSettings { phong_direction: PhongDirection::Sampled, shininess: [Some(2.0); 5], ..RoomSettings::default() };
     builders_agree(&gpu, &sampled);
-    builders_agree(&gpu, &Settings { light_power: [3.0, 0.5], ..Settings::default() });
+    builders_agree(&gpu, &RoomSettings { light_power: [3.0, 0.5], ..RoomSettings::default() });
 }
 
 #[test]
 fn group_sizes_and_chunks_change_no_photon() {
     let Some(gpu) = device() else { return };
-    let settings = Settings { photons: 1001, ..Settings::default() };
+    let settings = RoomSettings { photons: 1001, ..RoomSettings::default() };
     // One that carries its state in the path, and one that has none.
     for rng in [Rng::Rand48, Rng::Philox] {
-        let settings = Settings { rng, ..settings.clone() };
+        let settings = RoomSettings { rng, ..settings.clone() };
         let expected = photons(&gpu, &settings);
         for group_size in [32, 64, 128, 256, 512, 1024].into_iter().filter(|size| *size <= gpu.facts().work_group_size) {
-            let found = builders_agree(&gpu, &Settings { group_size, ..settings.clone() });
+            let found = builders_agree(&gpu, &RoomSettings { group_size, ..settings.clone() });
             assert_holds(format!("{rng:?}, groups of {group_size}"), same_photons(&found, &expected));
         }
         for (counters, group_size) in [(2, 32), (8, 64), (8, 128), (64, 32)] {
-            let settings = Settings { counters: Some(counters), group_size, builder: Builder::Atomic, ..settings.clone() };
+            let settings = RoomSettings { counters: Some(counters), group_size, builder: Builder::Atomic, ..settings.clone() };
             for chunk in [None, Some(500)] {
-                let found = photons(&gpu, &Settings { chunk, ..settings.clone() });
+                let found = photons(&gpu, &RoomSettings { chunk, ..settings.clone() });
                 assert_holds(format!("{rng:?}, {counters} counters, groups of {group_size}, {chunk:?}"), same_photons(&found, &expected));
             }
         }
         for chunk in [65, 500, 1000, 1001, 5000] {
-            let found = builders_agree(&gpu, &Settings { chunk: Some(chunk), ..settings.clone() });
+            let found = builders_agree(&gpu, &RoomSettings { chunk: Some(chunk), ..settings.clone() });
             assert_holds(format!("{rng:?}, chunks of {chunk}"), same_photons(&found, &expected));
         }
     }
@@ -154,7 +154,7 @@ fn group_sizes_and_chunks_change_no_photon() {
 fn the_order_of_appending_changes_no_photon() {
     let Some(gpu) = device() else { return };
     for builder in Builder::ON_GPU {
-        let settings = Settings { builder, photons: 20_001, ..Settings::default() };
+        let settings = RoomSettings { builder, photons: 20_001, ..RoomSettings::default() };
         let expected = photons(&gpu, &settings);
         for run in 1..10 {
             assert_holds(format!("{builder:?}, run {run}"), same_photons(&photons(&gpu, &settings), &expected));
@@ -166,8 +166,8 @@ fn the_order_of_appending_changes_no_photon() {
 fn two_naive_bounces_are_the_first_two_of_fifteen() {
     let Some(gpu) = device() else { return };
     for rng in GENERATORS {
-        let settings = Settings { rng, ..Settings::default() };
-        let naive = photons(&gpu, &Settings { builder: Builder::Naive, bounces: 2, ..settings.clone() });
+        let settings = RoomSettings { rng, ..RoomSettings::default() };
+        let naive = photons(&gpu, &RoomSettings { builder: Builder::Naive, bounces: 2, ..settings.clone() });
         let mut modified = photons(&gpu, &settings);
         assert!(modified.iter().any(|photon| photon.bounce >= 10), "{rng:?}");
         modified.retain(|photon| photon.bounce < 2);
@@ -236,7 +236,7 @@ fn the_cpu_builder_agrees_photon_by_photon() {
     let Some(gpu) = device() else { return };
     for rng in GENERATORS {
         for (emission, shininess) in [(EmissionLaw::Uniform, [None; 5]), (EmissionLaw::Cosine, [Some(2.0); 5])] {
-            let settings = Settings { photons: 200_001, rng, emission, shininess, threads: 2, ..Settings::default() };
+            let settings = RoomSettings { photons: 200_001, rng, emission, shininess, threads: 2, ..RoomSettings::default() };
             let disagreement = Disagreement::between(&photons(&gpu, &settings), &photons_on_cpu(&settings));
             assert!(disagreement.distances.len() > 290_000);
             println!(
@@ -254,14 +254,14 @@ fn the_cpu_builder_agrees_photon_by_photon() {
 fn threads_change_no_photon_of_the_cpu_builder() {
     for photons in [2, 3, 511, 512, 513, 5001] {
         for rng in GENERATORS {
-            let settings = Settings { photons, rng, ..Settings::default() };
+            let settings = RoomSettings { photons, rng, ..RoomSettings::default() };
             let expected = photons_on_cpu(&settings);
             assert_holds("one thread", each_once(&expected, photons, settings.bounces));
             for threads in [2, 3, 8] {
-                let found = photons_on_cpu(&Settings { threads, ..settings.clone() });
+                let found = photons_on_cpu(&RoomSettings { threads, ..settings.clone() });
                 assert_holds(format!("{rng:?}, {photons} photons, {threads} threads"), same_photons(&found, &expected));
             }
-            let found = photons_on_cpu(&Settings { chunk: Some(64), threads: 3, ..settings.clone() });
+            let found = photons_on_cpu(&RoomSettings { chunk: Some(64), threads: 3, ..settings.clone() });
             assert_holds(format!("{rng:?}, {photons} photons in chunks"), same_photons(&found, &expected));
         }
     }
@@ -270,7 +270,7 @@ fn threads_change_no_photon_of_the_cpu_builder() {
 #[test]
 fn no_two_photons_draw_the_same_numbers() {
     for rng in GENERATORS {
-        let settings = Settings { rng, photons: 30_001, rounds: 4, ..Settings::default() };
+        let settings = RoomSettings { rng, photons: 30_001, rounds: 4, ..RoomSettings::default() };
         let emission_draws =
             |streams, round, photon| draws_of(streams, round, photon, 0).iter().map(|draw| draw.to_bits()).collect::<Vec<u32>>();
         let streams = streams_of(&settings);
@@ -295,7 +295,7 @@ fn no_two_photons_draw_the_same_numbers() {
 #[test]
 fn no_two_bounces_draw_the_same_numbers() {
     for rng in GENERATORS {
-        let settings = Settings { rng, photons: 3001, rounds: 2, ..Settings::default() };
+        let settings = RoomSettings { rng, photons: 3001, rounds: 2, ..RoomSettings::default() };
         let mut seen = HashSet::new();
         for (round, photon) in (0..settings.rounds).flat_map(|round| (0..settings.photons).map(move |photon| (round, photon))) {
             let draws = draws_of(streams_of(&settings), round, photon, settings.bounces);
@@ -332,7 +332,7 @@ fn twister(seed: u32, count: usize) -> Vec<u32> {
 #[test]
 fn a_photons_draws_are_its_twisters_outputs_in_order() {
     assert_eq!(twister(5489, 3), [3_499_211_612, 581_869_302, 3_890_346_734]);
-    let settings = Settings { rng: Rng::Mt, bounces: rng::MT_MAX_BOUNCES, photons: 501, rounds: 2, ..Settings::default() };
+    let settings = RoomSettings { rng: Rng::Mt, bounces: rng::MT_MAX_BOUNCES, photons: 501, rounds: 2, ..RoomSettings::default() };
     let streams = streams_of(&settings);
     for (round, photon) in [(0, 0), (0, 1), (0, 500), (1, 0), (1, 77)] {
         // The first of the two words that a stream keeps is the first of the twister, its seed.
@@ -345,7 +345,7 @@ fn a_photons_draws_are_its_twisters_outputs_in_order() {
 
 #[test]
 fn the_checks_complain_about_spoiled_maps() {
-    let settings = Settings::default();
+    let settings = RoomSettings::default();
     let map = photons_on_cpu(&settings);
     assert_holds("the map itself", same_photons(&map, &map));
     let spoiled = |spoil: fn(&mut Vec<Photon>)| {

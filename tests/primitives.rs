@@ -7,20 +7,22 @@ use std::time::Instant;
 use crate::common::{Check, Device, assert_complains, assert_holds, device, equal_sums, in_order, photons, plan_for, run};
 use bytemuck::Zeroable;
 use photonmill::constants::{NO_WALL, SCAN_ITEMS};
+use photonmill::engine::prefix_sum::{block_sums, scan};
+use photonmill::engine::room::constants;
+use photonmill::engine::room::index;
+use photonmill::engine::room::resources::RoomResources;
+use photonmill::engine::room::trace;
+use photonmill::engine::tallies;
 use photonmill::gpu::kernels::DispatchSize;
 use photonmill::gpu::{Buffer, Commands, Constants, Extent, Memory};
 use photonmill::path::StoredPath;
 use photonmill::photon::{Origin, Photon, StoredPhoton};
-use photonmill::plan::Plan;
-use photonmill::prefix_sum::{block_sums, scan};
+use photonmill::plan::RoomPlan;
 use photonmill::records::{DispatchArgs, DispatchSizePush, Tally};
-use photonmill::render::constants;
-use photonmill::resources::Resources;
 use photonmill::rng::Rng;
 use photonmill::scene::open_box::open_box;
 use photonmill::scene::room::{RoomScene, Wall};
-use photonmill::settings::{Builder, Settings};
-use photonmill::{index, tallies, trace};
+use photonmill::settings::{Builder, RoomSettings};
 
 /// Words that nothing may touch. As an entry of the photon map they are a photon on some wall.
 const GUARD: u32 = 0x5EAD_BEEF;
@@ -142,7 +144,7 @@ fn sorted_bits(photon: &Photon) -> [u32; 6] {
 }
 
 /// The index holds each photon once, in the run of its own cell.
-fn index_check(plan: &Plan, cells: &[u32], sorted: &[Photon], map: &[Photon]) -> Check {
+fn index_check(plan: &RoomPlan, cells: &[u32], sorted: &[Photon], map: &[Photon]) -> Check {
     let grid = &plan.grid;
     let mut expected: Vec<[u32; 6]> = map.iter().map(sorted_bits).collect();
     let mut found: Vec<[u32; 6]> = sorted.iter().map(sorted_bits).collect();
@@ -182,12 +184,12 @@ fn the_index_holds_every_photon_in_its_cell() {
             [(2, 0.05, 128), (129, 0.05, 32), (5000, 0.05, 128), (5001, 0.001, 256), (20_001, 0.5, 64)]
         {
             let settings =
-                Settings { builder, photons: photon_count, radius, group_size, chunk: Some(photon_count), ..Settings::default() };
+                RoomSettings { builder, photons: photon_count, radius, group_size, chunk: Some(photon_count), ..RoomSettings::default() };
             let scene = open_box(&settings);
             let plan = plan_for(&gpu, &scene, &settings);
             assert_eq!(plan.chunks_per_round, 1);
             let mut commands = Commands::new(&gpu, constants(&plan), Instant::now()).unwrap();
-            let resources = Resources::new(&gpu, &mut commands, &scene, &plan).unwrap();
+            let resources = RoomResources::new(&gpu, &mut commands, &scene, &plan).unwrap();
             let buffers = resources.index.as_ref().expect("a grid gather has an index");
             trace::chunk(&mut commands, &resources, &plan, 0, &plan.chunk(0)).unwrap();
             index::build(&mut commands, &resources, &plan, photon_count).unwrap();
@@ -230,12 +232,12 @@ struct Appended {
 
 impl Appended {
     /// Entries of the photon map that anybody looks at.
-    fn entries(&self, settings: &Settings) -> u32 {
+    fn entries(&self, settings: &RoomSettings) -> u32 {
         let slots = settings.photons * settings.bounces;
         if settings.builder == Builder::Naive { slots } else { self.counters[0] }.min(self.photons.len() as u32)
     }
 
-    fn stored(&self, settings: &Settings) -> impl Iterator<Item = &Photon> {
+    fn stored(&self, settings: &RoomSettings) -> impl Iterator<Item = &Photon> {
         self.photons[..self.entries(settings) as usize].iter().filter(|photon| photon.wall != NO_WALL)
     }
 }
@@ -243,15 +245,15 @@ impl Appended {
 /// Entries of each array that stand behind its capacity.
 const GUARD_ENTRIES: u64 = 64;
 
-fn append(gpu: &Device, scene: &RoomScene, settings: &Settings, capacity: u32) -> Appended {
-    let mut plan = Plan { keeps_origins: true, ..plan_for(gpu, scene, settings) };
+fn append(gpu: &Device, scene: &RoomScene, settings: &RoomSettings, capacity: u32) -> Appended {
+    let mut plan = RoomPlan { keeps_origins: true, ..plan_for(gpu, scene, settings) };
     let bounces = settings.bounces;
     // Behind each of the arrays that paths lie in.
     let path_places = plan.path_capacity as usize;
     plan.path_capacity += GUARD_ENTRIES as u32;
     let path_count = u64::from(plan.path_capacity);
     let mut commands = Commands::new(gpu, constants(&plan), Instant::now()).unwrap();
-    let mut resources = Resources::new(gpu, &mut commands, scene, &plan).unwrap();
+    let mut resources = RoomResources::new(gpu, &mut commands, scene, &plan).unwrap();
     plan.photon_capacity = capacity;
     let guarded = |commands: &mut Commands, buffer: Buffer| {
         commands.fill(&buffer, 0, buffer.size_bytes() / 4, GUARD);
@@ -284,7 +286,7 @@ fn append(gpu: &Device, scene: &RoomScene, settings: &Settings, capacity: u32) -
 }
 
 /// Everything that must hold of a map with too little room; `all` are the photons that exist.
-fn overflow_check(appended: &Appended, settings: &Settings, capacity: u32, all: &[Photon]) -> Check {
+fn overflow_check(appended: &Appended, settings: &RoomSettings, capacity: u32, all: &[Photon]) -> Check {
     let fail = |complaint: String| Err(complaint);
     if let Some(word) = appended.guards.iter().find(|word| **word != GUARD) {
         return fail(format!("a guard word became {word:#x}"));
@@ -360,7 +362,7 @@ fn a_full_map_drops_counts_and_keeps_to_its_room() {
     for (builder, counters) in Builder::ON_GPU.map(|builder| (builder, None)).into_iter().chain([2, 16].map(|n| (Builder::Atomic, Some(n))))
     {
         for photon_count in [9, 65, 1000, 5001] {
-            let settings = Settings { builder, counters, photons: photon_count, bounces: 3, ..Settings::default() };
+            let settings = RoomSettings { builder, counters, photons: photon_count, bounces: 3, ..RoomSettings::default() };
             let scene = open_box(&settings);
             let all = photons(&gpu, &settings);
             let most = plan_for(&gpu, &scene, &settings).photon_capacity;
@@ -390,7 +392,7 @@ fn appending_at_survival_none_and_all() {
     for builder in Builder::ON_GPU {
         for (albedo, stored_each) in [(0.0, 0), (1.0, 3)] {
             for photon_count in [2, 7, 8, 9, 31, 33, 127, 128, 129, 1000] {
-                let settings = Settings { builder, photons: photon_count, bounces: 3, reflectance: albedo, ..Settings::default() };
+                let settings = RoomSettings { builder, photons: photon_count, bounces: 3, reflectance: albedo, ..RoomSettings::default() };
                 let mut scene = open_box(&settings);
                 scene.faces[5] = Some(Wall { name: "front", albedo, shininess: None });
                 let capacity = photon_count * 3;
@@ -421,7 +423,7 @@ fn the_check_of_a_full_map_complains() {
         ("a path without a photon", |appended| appended.counters[2] += 1),
     ];
     for counters in [None, Some(4)] {
-        let settings = Settings { photons: 1000, bounces: 3, counters, ..Settings::default() };
+        let settings = RoomSettings { photons: 1000, bounces: 3, counters, ..RoomSettings::default() };
         let all = photons(&gpu, &settings);
         let capacity = all.len() as u32 / 2;
         let scene = open_box(&settings);
@@ -510,13 +512,20 @@ fn rounds_around_a_full_row_of_groups_lose_no_photon() {
         // The builders dispatch alike, so one of them tries every count.
         let counts = if builder == Builder::Ballot { &[row - 1, row, row + 1, row + 33][..] } else { &[row + 33] };
         for &photon_count in counts {
-            let settings =
-                Settings { builder, photons: photon_count, bounces: 1, mesh: 1, group_size: 32, rng: Rng::Philox, ..Settings::default() };
+            let settings = RoomSettings {
+                builder,
+                photons: photon_count,
+                bounces: 1,
+                mesh: 1,
+                group_size: 32,
+                rng: Rng::Philox,
+                ..RoomSettings::default()
+            };
             let folded = run(&gpu, &settings);
             assert_eq!(folded.plan.chunks_per_round, 1, "{photon_count} photons do not fit one dispatch here");
             let ledger = folded.fates.ledger();
             assert!(ledger.closes() && ledger.emitted == u64::from(photon_count), "{ledger:?}");
-            let split = run(&gpu, &Settings { chunk: Some(1_000_003), ..settings.clone() });
+            let split = run(&gpu, &RoomSettings { chunk: Some(1_000_003), ..settings.clone() });
             assert_eq!(split.fates, folded.fates);
             assert_holds("film", equal_sums("a folded round", &folded.film.sums, &split.film.sums));
         }

@@ -1,4 +1,4 @@
-//! The paper's box against a radiosity solution of its own (`photonmill::judge::radiosity`): photons an order of reflection, wall
+//! The paper's box against a radiosity solution of its own (`photonmill::verify::judge::radiosity`): photons an order of reflection, wall
 //! by wall and cell by cell, and irradiance in W/m2, for every builder and both laws of emission.
 
 use std::ops::Range;
@@ -8,15 +8,15 @@ use crate::common::family::{Family, chi_squared_z};
 use crate::common::lit::irradiances;
 use crate::common::{Device, JUDGED, device, photons, photons_on_cpu, run, run_on_cpu};
 use glam::DVec3;
-use photonmill::film::estimate_walls;
-use photonmill::judge::radiosity::{ByLamp, Law, Radiosity, WALLS, cells_of, exchange, form_factor_from, inward, on_wall};
+use photonmill::engine::room::film::estimate_walls;
 use photonmill::photon::Photon;
 use photonmill::rng::Rng;
 use photonmill::scene::built_in;
 use photonmill::scene::light::LightKind;
 use photonmill::scene::open_box::open_box;
-use photonmill::settings::transport::{Illumination, TransportSettings};
-use photonmill::settings::{Builder, EmissionLaw, Settings};
+use photonmill::settings::scene::{Illumination, SceneSettings};
+use photonmill::settings::{Builder, EmissionLaw, RoomSettings};
+use photonmill::verify::judge::radiosity::{ByLamp, Law, Radiosity, WALLS, cells_of, exchange, form_factor_from, inward, on_wall};
 
 const ALBEDO: f64 = 0.75;
 /// Bounces of the paper's modified implementation: orders of reflection that are stored.
@@ -115,8 +115,8 @@ fn disc_middles() -> impl Iterator<Item = [f64; 2]> {
 const PHOTONS: u32 = 1 << 18;
 const SEEDS: u64 = 16;
 
-fn settings(builder: Builder, emission: EmissionLaw) -> Settings {
-    Settings {
+fn settings(builder: Builder, emission: EmissionLaw) -> RoomSettings {
+    RoomSettings {
         builder,
         emission,
         photons: PHOTONS,
@@ -124,11 +124,11 @@ fn settings(builder: Builder, emission: EmissionLaw) -> Settings {
         mesh: MESH as u32,
         radius: DISC_RADIUS,
         threads: 2,
-        ..Settings::default()
+        ..RoomSettings::default()
     }
 }
 
-fn photons_of(gpu: Option<&Device>, settings: &Settings) -> Vec<Photon> {
+fn photons_of(gpu: Option<&Device>, settings: &RoomSettings) -> Vec<Photon> {
     match gpu.filter(|_| settings.builder != Builder::Cpu) {
         Some(gpu) => photons(gpu, settings),
         None => photons_on_cpu(settings),
@@ -178,7 +178,7 @@ impl Counts {
         };
         for seed in 1..=SEEDS {
             let mut chains = vec![[0u8; WALLS]; PHOTONS as usize];
-            for photon in photons_of(gpu, &Settings { seed, ..settings(builder, emission) }) {
+            for photon in photons_of(gpu, &RoomSettings { seed, ..settings(builder, emission) }) {
                 let wall = photon.wall as usize;
                 let place =
                     |axis: usize| (((f64::from(photon.position[axis % 3]) + 0.25) * 2.0 * SQUARES as f64) as usize).min(SQUARES - 1);
@@ -298,7 +298,7 @@ fn disc_of(photon: &Photon) -> Option<usize> {
 /// Standard errors of the film's irradiance for so many photons, W/m2: of each disc and of the mean over a wall's
 /// discs, from what single photons add to them.
 fn film_errors(emission: EmissionLaw, photons: f64) -> (Vec<f64>, Vec<f64>) {
-    let sample = photons_on_cpu(&Settings { seed: 99, ..settings(Builder::Cpu, emission) });
+    let sample = photons_on_cpu(&RoomSettings { seed: 99, ..settings(Builder::Cpu, emission) });
     let mut landed: Vec<(u32, usize)> = sample.iter().filter_map(|photon| disc_of(photon).map(|disc| (photon.photon, disc))).collect();
     landed.sort_unstable();
     let (mut discs, mut walls) = (vec![ByPhoton::default(); WALLS * MESH * MESH], vec![ByPhoton::default(); WALLS]);
@@ -332,7 +332,7 @@ fn the_film_has_the_irradiance_of_radiosity() {
         let (disc_errors, wall_errors) = film_errors(emission, f64::from(rounds) * f64::from(PHOTONS));
         let mean = |values: &[f64]| values.iter().sum::<f64>() / values.len() as f64;
         for builder in builders(gpu.as_ref()) {
-            let settings = Settings { rounds, seed: 7, ..settings(builder, emission) };
+            let settings = RoomSettings { rounds, seed: 7, ..settings(builder, emission) };
             let outcome = match gpu.as_ref().filter(|_| builder != Builder::Cpu) {
                 Some(gpu) => run(gpu, &settings),
                 None => run_on_cpu(&settings),
@@ -376,7 +376,7 @@ fn the_box_of_triangles_has_the_irradiance_of_radiosity() {
                 *of_light = LAWS[law as usize].1;
             }
         }
-        let settings = TransportSettings {
+        let settings = SceneSettings {
             illumination,
             builder: Some(builder),
             photons: 90_000,
@@ -385,7 +385,7 @@ fn the_box_of_triangles_has_the_irradiance_of_radiosity() {
             shadow_rays: 8,
             radius: Some(DISC_RADIUS),
             alpha: 1.0,
-            ..TransportSettings::default()
+            ..SceneSettings::default()
         };
         let runs = irradiances(&gpu, &scene, &settings, &points, 1..25);
         for wall in 0..WALLS {

@@ -12,15 +12,15 @@ use photonmill::cpu::emission::emit_from_disc;
 use photonmill::cpu::room::intersect_room;
 use photonmill::cpu::sampling::{sample_cosine_hemisphere, sample_uniform_hemisphere};
 use photonmill::cpu::trace::Tracer;
+use photonmill::engine::room::constants;
+use photonmill::engine::room::resources::RoomResources;
+use photonmill::engine::room::trace;
 use photonmill::gpu::Commands;
 use photonmill::path::{self, Path};
-use photonmill::plan::{EmissionRange, Plan};
-use photonmill::render::constants;
-use photonmill::resources::Resources;
+use photonmill::plan::{EmissionRange, RoomPlan};
 use photonmill::rng::{self, Affine48, Rng, Streams, owen_scramble, sobol, srand48};
 use photonmill::scene::open_box::open_box;
-use photonmill::settings::{EmissionLaw, Settings};
-use photonmill::trace;
+use photonmill::settings::{EmissionLaw, RoomSettings};
 
 /// Those that imitate chance; Sobol' points are more even than that.
 const GENERATORS: [Rng; 3] = [Rng::Rand48, Rng::Mt, Rng::Philox];
@@ -57,12 +57,12 @@ fn rand48_jumps_and_steps_meet_across_2_to_the_48() {
 /// allowed: 2^31 photons, 2^13 rounds, 16 draws. One round more is refused.
 #[test]
 fn a_run_draws_the_whole_period_and_no_number_twice() {
-    let whole = Settings { photons: 1 << 31, rounds: 1 << 13, bounces: 4, ..Settings::default() };
+    let whole = RoomSettings { photons: 1 << 31, rounds: 1 << 13, bounces: 4, ..RoomSettings::default() };
     assert_eq!(u128::from(whole.total_photons()) * u128::from(whole.draws_per_photon()), u128::from(PERIOD));
     whole.validate().unwrap();
-    for beyond in [Settings { rounds: whole.rounds + 1, ..whole.clone() }, Settings { bounces: 5, ..whole.clone() }] {
+    for beyond in [RoomSettings { rounds: whole.rounds + 1, ..whole.clone() }, RoomSettings { bounces: 5, ..whole.clone() }] {
         assert!(beyond.validate().unwrap_err().to_string().contains("2^48"));
-        Settings { rng: Rng::Philox, ..beyond }.validate().unwrap();
+        RoomSettings { rng: Rng::Philox, ..beyond }.validate().unwrap();
     }
     let streams = streams_of(&whole);
     let start = srand48(1);
@@ -78,7 +78,7 @@ fn a_run_draws_the_whole_period_and_no_number_twice() {
     assert_eq!(state, start, "the last draw closes the sequence");
 
     // The same layout in small, with every place looked at.
-    let small = Settings { photons: 25, rounds: 3, bounces: 2, ..whole };
+    let small = RoomSettings { photons: 25, rounds: 3, bounces: 2, ..whole };
     let mut places: HashSet<u32> = HashSet::new();
     for (round, photon) in (0..3).flat_map(|round| (0..25).map(move |photon| (round, photon))) {
         draws_of(streams_of(&small), round, photon, 2).iter().for_each(|draw| assert!(places.insert(draw.to_bits())));
@@ -95,7 +95,7 @@ fn class(u: f32, count: usize) -> usize {
 #[test]
 fn draws_are_even_alone_in_pairs_and_in_triples() {
     for rng in GENERATORS {
-        let settings = Settings { rng, photons: 20_001, ..Settings::default() };
+        let settings = RoomSettings { rng, photons: 20_001, ..RoomSettings::default() };
         let draws: Vec<Vec<f32>> = (0..settings.photons).map(|photon| draws_of(streams_of(&settings), 0, photon, 2)).collect();
         for k in 0..8 {
             let what = |of: &str| format!("{rng:?}, {of} from draw {k}");
@@ -133,7 +133,7 @@ fn third_difference(u: &[f32]) -> usize {
 fn neighbouring_photons_do_not_resemble_each_other() {
     for rng in GENERATORS {
         for photons in [5000, 5001] {
-            let settings = Settings { rng, photons, ..Settings::default() };
+            let settings = RoomSettings { rng, photons, ..RoomSettings::default() };
             let draws: Vec<Vec<f32>> = (0..photons).map(|photon| draws_of(streams_of(&settings), 0, photon, 3)).collect();
             for k in 0..13 {
                 let what = format!("{rng:?}, {photons} photons, draw {k}");
@@ -148,8 +148,8 @@ fn neighbouring_photons_do_not_resemble_each_other() {
         }
     }
     // What is known to be bad: a power of two of photons, about which a run is warned,
-    let even = Settings { photons: 1 << 16, ..Settings::default() };
-    assert!(even.warning().is_some() && Settings::default().warning().is_none());
+    let even = RoomSettings { photons: 1 << 16, ..RoomSettings::default() };
+    assert!(even.warning().is_some() && RoomSettings::default().warning().is_none());
     let parabolas = (0..even.photons).map(|photon| third_difference(&draws_of(streams_of(&even), 0, photon, 1)));
     assert_complains("leaps of a power of two", evenness_check("third differences", parabolas));
     // and a generator started anew with each photon's number.
@@ -161,10 +161,10 @@ fn neighbouring_photons_do_not_resemble_each_other() {
 }
 
 /// The paths of some photons as they leave their light, by the device.
-fn emitted(gpu: &crate::common::Device, plan: &Plan, round: u32, range: EmissionRange) -> Vec<Path> {
+fn emitted(gpu: &crate::common::Device, plan: &RoomPlan, round: u32, range: EmissionRange) -> Vec<Path> {
     let scene = open_box(&plan.settings);
     let mut commands = Commands::new(gpu, constants(plan), Instant::now()).unwrap();
-    let resources = Resources::new(gpu, &mut commands, &scene, plan).unwrap();
+    let resources = RoomResources::new(gpu, &mut commands, &scene, plan).unwrap();
     trace::emit(&mut commands, &resources, plan, round, &[range]).unwrap();
     let array = commands.read(&resources.paths[0], plan.path_array_length() as usize).unwrap();
     (0..range.count as usize).map(|index| path::unpack(&array, index)).collect()
@@ -192,7 +192,8 @@ fn same_start(found: &[Path], expected: &[Path]) -> Check {
 fn photons_of_the_largest_numbers_are_their_own() {
     let Some(gpu) = device() else { return };
     for (rng, bounces, round) in [(Rng::Philox, 1, (1 << 16) - 1), (Rng::Rand48, 4, (1 << 13) - 1), (Rng::Mt, 1, 1), (Rng::Sobol, 1, 1)] {
-        let settings = Settings { rng, bounces, photons: 1 << 31, rounds: round + 1, mesh: 1, chunk: Some(1 << 20), ..Settings::default() };
+        let settings =
+            RoomSettings { rng, bounces, photons: 1 << 31, rounds: round + 1, mesh: 1, chunk: Some(1 << 20), ..RoomSettings::default() };
         let scene = open_box(&settings);
         let plan = plan_for(&gpu, &scene, &settings);
         let tracer = Tracer::new(&scene, &plan);
@@ -252,14 +253,14 @@ fn emission_check(law: EmissionLaw, radius: f64, starts: &[(DVec3, DVec3)]) -> C
 fn discs_and_hemispheres_have_their_moments() {
     let gpu = device();
     for law in [EmissionLaw::Uniform, EmissionLaw::Cosine] {
-        let settings = Settings {
+        let settings = RoomSettings {
             emission: law,
             photons: 400_001,
             rng: Rng::Philox,
             bounces: 1,
             mesh: 1,
             chunk: Some(400_001),
-            ..Settings::default()
+            ..RoomSettings::default()
         };
         let scene = open_box(&settings);
         let host = crate::common::plan_for_host(&settings);
@@ -302,7 +303,7 @@ fn grazing_and_straight_directions_end_in_the_room() {
             }
         }
     }
-    let settings = Settings::default();
+    let settings = RoomSettings::default();
     let scene = open_box(&settings);
     let (room, walls) = (scene.room_record(), scene.wall_records());
     let (min, max) = (scene.min_corner.as_vec3(), scene.max_corner.as_vec3());
@@ -455,7 +456,7 @@ fn the_checks_complain_about_spoiled_sobol_points() {
     let late: Vec<(f32, f32)> = (1..1025).map(|i| sobol_draws(1, 0, i, 0)).map(|u| (u[0], u[1])).collect();
     assert_complains("a run that is not aligned", both(&late));
     let chance: Vec<(f32, f32)> = (0..1024)
-        .map(|i| draws_of(streams_of(&Settings { rng: Rng::Philox, ..Settings::default() }), 0, i, 0))
+        .map(|i| draws_of(streams_of(&RoomSettings { rng: Rng::Philox, ..RoomSettings::default() }), 0, i, 0))
         .map(|u| (u[0], u[1]))
         .collect();
     assert_complains("chance", both(&chance));
@@ -514,7 +515,7 @@ fn sobol_estimates_are_unbiased_and_closer_than_chance() {
         let mean = means.iter().sum::<f64>() / 2000.0;
         (mean, (means.iter().map(|value| (value - mean).powi(2)).sum::<f64>() / 1999.0).sqrt())
     };
-    let philox = Settings { rng: Rng::Philox, ..Settings::default() };
+    let philox = RoomSettings { rng: Rng::Philox, ..RoomSettings::default() };
     for (count, gain) in [(1, 0.9), (13, 1.3), (200, 2.5), (256, 2.5)] {
         let (mean, deviation) = by_seed(count, &|seed, sample| sobol_draws(seed, 0, sample, 1));
         assert_holds(format!("{count} points"), z_check("mean", mean, expected, deviation / 2000f64.sqrt()));
@@ -549,7 +550,7 @@ fn sobol_photons_are_as_many_with_less_noise() {
     let (photons, seeds) = (1 << 15, 24u32);
     let runs = |rng| -> Vec<Vec<f64>> {
         let run = |seed| {
-            let settings = Settings { rng, seed, photons, bounces: 5, mesh: 1, threads: 2, ..Settings::default() };
+            let settings = RoomSettings { rng, seed, photons, bounces: 5, mesh: 1, threads: 2, ..RoomSettings::default() };
             let fates = run_on_cpu(&settings).fates;
             let stored = fates.bounces.iter().map(|bounce| bounce.stored);
             [fates.bounces[0].stored + fates.bounces[0].absorbed].into_iter().chain(stored).map(|count| count as f64).collect()

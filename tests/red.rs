@@ -18,16 +18,16 @@ use crate::ledger::closed_fates;
 use crate::paranoid::{box_is_finite, scene_is_finite};
 use crate::strict::{film_agrees, photons_agree, rounding_check};
 use crate::transport::{appends_agree, crowd_check};
-use photonmill::compaction;
+use photonmill::engine::room::film;
 use photonmill::error::Error;
-use photonmill::film;
 use photonmill::gpu::{Gpu, Options};
+use photonmill::measure::compaction;
 use photonmill::photon::Photon;
 use photonmill::scene::built_in;
 use photonmill::scene::open_box::open_box;
 use photonmill::scene::texture::Wrap;
-use photonmill::settings::transport::{Illumination, TransportSettings};
-use photonmill::settings::{Builder, Gather, Math, Settings};
+use photonmill::settings::scene::{Illumination, SceneSettings};
+use photonmill::settings::{Builder, Gather, Math, RoomSettings};
 
 /// What is asked of a device.
 #[derive(Debug, Clone, Copy)]
@@ -35,7 +35,7 @@ enum Question {
     /// A builder's photon map is the CPU builder's, bit for bit.
     Photons(Builder),
     /// So is the film.
-    Film(Gather),
+    RoomFilm(Gather),
     /// So is the film of the nearest photons.
     Nearest,
     /// So is the photon map of the atomic builder with several counters.
@@ -81,8 +81,8 @@ impl Question {
     /// Whether another test, the same for every device, shows that a device without a fault answers it right.
     fn has_a_test_of_its_own(self) -> bool {
         match self {
-            Photons(_) | StripedCounters | Film(_) | Ledger(_) | ClosedForm(_) | Appends | Builders | StrictMath | Finite | FiniteBox
-            | Nearest | Pairs | Crowds | AimedLight(_) => false,
+            Photons(_) | StripedCounters | RoomFilm(_) | Ledger(_) | ClosedForm(_) | Appends | Builders | StrictMath | Finite
+            | FiniteBox | Nearest | Pairs | Crowds | AimedLight(_) => false,
             Bits(_) | LampInBox(_) | Shelf | Ridge | Spot | Texture(_) => true,
             LeaningPlane(_) | LeaningScatterer | PatchInPlane | StackFromAfar | GlassInFurnace(..) => true,
         }
@@ -100,9 +100,8 @@ enum Subject {
 impl Question {
     fn subject(self) -> Subject {
         match self {
-            Photons(_) | StripedCounters | Film(_) | Ledger(_) | ClosedForm(_) | Builders | StrictMath | Nearest | Pairs | FiniteBox => {
-                Subject::Room
-            }
+            Photons(_) | StripedCounters | RoomFilm(_) | Ledger(_) | ClosedForm(_) | Builders | StrictMath | Nearest | Pairs
+            | FiniteBox => Subject::Room,
             AimedLight(_) => Subject::Aiming,
             Appends | Finite | Crowds | Bits(_) | LampInBox(_) | Shelf | Ridge | Spot | Texture(_) => Subject::Scenes,
             LeaningPlane(_) | LeaningScatterer | PatchInPlane | StackFromAfar | GlassInFurnace(..) => Subject::Scenes,
@@ -141,7 +140,7 @@ const FAULTS: [Fault; 65] = [
     },
     Fault {
         what: "what one sample gathers for all counts for itself alone",
-        file: "stages/chain.glsl",
+        file: "world/scene/camera_path.glsl",
         from: "chain.weight *= for_all ? float(SAMPLES) : 1.0;",
         to: "",
         kernels: &["view"],
@@ -149,7 +148,7 @@ const FAULTS: [Fault; 65] = [
     },
     Fault {
         what: "what glass mirrors weighs as much as it is looked at",
-        file: "scene/scatter.glsl",
+        file: "material/scatter.glsl",
         from: "float weight = as_much ? 1.0 : divide(reflectance, chance);",
         to: "float weight = 1.0;",
         kernels: &["view"],
@@ -157,7 +156,7 @@ const FAULTS: [Fault; 65] = [
     },
     Fault {
         what: "every other lane of a subgroup writes over its neighbour",
-        file: "append/ballot.glsl",
+        file: "builder/ballot.glsl",
         from: "subgroupBallotExclusiveBitCount(survivors);",
         to: "(subgroupBallotExclusiveBitCount(survivors) & 0xfffffffeu);",
         kernels: &["scene_trace_persistent", "trace_persistent", "scene_trace_ballot"],
@@ -165,7 +164,7 @@ const FAULTS: [Fault; 65] = [
     },
     Fault {
         what: "a subgroup's second paths write over its first ones'",
-        file: "append/block.glsl",
+        file: "builder/block.glsl",
         from: "count + subgroupBallotExclusiveBitCount(survivors);",
         to: "subgroupBallotExclusiveBitCount(survivors);",
         kernels: &["trace_ballot"],
@@ -173,7 +172,7 @@ const FAULTS: [Fault; 65] = [
     },
     Fault {
         what: "the path in the middle of an odd number is left out",
-        file: "stages/trace_compact.glsl",
+        file: "builder/trace_compact.glsl",
         from: "(path_count + PLACES - 1) / PLACES",
         to: "path_count / PLACES",
         kernels: &["trace_ballot"],
@@ -205,7 +204,7 @@ const FAULTS: [Fault; 65] = [
     },
     Fault {
         what: "a row of cells is taken for narrower than the disc",
-        file: "stages/map_rows.glsl",
+        file: "gather/bucket_rows.glsl",
         from: "range.reach * range.reach - dot(off, off);",
         to: "0.9 * range.reach * range.reach - dot(off, off);",
         kernels: &["scene_gather_u64"],
@@ -213,7 +212,7 @@ const FAULTS: [Fault; 65] = [
     },
     Fault {
         what: "a lane is lost",
-        file: "stages/trace_compact.glsl",
+        file: "builder/trace_compact.glsl",
         from: "bool stored = alive[k] &&",
         to: "bool stored = alive[k] && gl_SubgroupInvocationID != 5u &&",
         kernels: &["trace_atomic"],
@@ -221,7 +220,7 @@ const FAULTS: [Fault; 65] = [
     },
     Fault {
         what: "the last invocation of each work group finds no place of its own",
-        file: "append/group_prefix.glsl",
+        file: "builder/group_prefix.glsl",
         from: "before += s < gl_SubgroupID",
         to: "before += s + 1 < gl_SubgroupID",
         kernels: &["trace_group"],
@@ -229,7 +228,7 @@ const FAULTS: [Fault; 65] = [
     },
     Fault {
         what: "survivors of one work group are not counted",
-        file: "stages/trace_in_place.glsl",
+        file: "builder/trace_in_place.glsl",
         from: "survivors[work_group_index()] = prefix.total;",
         to: "survivors[work_group_index()] = work_group_index() == 3u ? 0u : prefix.total;",
         kernels: &["trace_in_place"],
@@ -237,7 +236,7 @@ const FAULTS: [Fault; 65] = [
     },
     Fault {
         what: "an invocation that took a photon starts it at the bounce at which the last one ended",
-        file: "stages/trace_persistent.glsl",
+        file: "builder/trace_persistent.glsl",
         from: "            bounce = 0;\n",
         to: "",
         kernels: &["trace_persistent"],
@@ -245,7 +244,7 @@ const FAULTS: [Fault; 65] = [
     },
     Fault {
         what: "a photon's last bounce is not counted",
-        file: "stages/trace_persistent.glsl",
+        file: "builder/trace_persistent.glsl",
         from: "if (under_way) {\n            count_fate(",
         to: "if (under_way && !bounced.escaped) {\n            count_fate(",
         kernels: &["trace_persistent"],
@@ -253,7 +252,7 @@ const FAULTS: [Fault; 65] = [
     },
     Fault {
         what: "a survivor's path is forgotten",
-        file: "stages/trace_slots.glsl",
+        file: "builder/trace_slots.glsl",
         from: "store_path(index, path);",
         to: "if (index % 10u != 7u) store_path(index, path);",
         kernels: &["trace_slots"],
@@ -261,15 +260,15 @@ const FAULTS: [Fault; 65] = [
     },
     Fault {
         what: "a photon is gathered twice",
-        file: "stages/gather_grid.glsl",
+        file: "gather/grid.glsl",
         from: "gather_photon(gathered, photon);",
         to: "gather_photon(gathered, photon);\n if (i == 100u) gather_photon(gathered, photon);",
         kernels: &["gather_grid_u64", "gather_grid_two_words"],
-        noticed_by: &[(Film(Gather::Grid), SumsTooLarge)],
+        noticed_by: &[(RoomFilm(Gather::Grid), SumsTooLarge)],
     },
     Fault {
         what: "a photon in fifty is stored twice",
-        file: "stages/scene_trace.glsl",
+        file: "builder/scene_trace.glsl",
         from: "        store(place, traced.photon);",
         to: "        store(place, traced.photon);\n        if (path.photon % 50u == 0u) store(atomicAdd(counters[0], 1), traced.photon);",
         kernels: &["scene_trace_atomic"],
@@ -277,7 +276,7 @@ const FAULTS: [Fault; 65] = [
     },
     Fault {
         what: "a photon that flies to its end begins with its second bounce's random numbers",
-        file: "stages/scene_trace_persistent.glsl",
+        file: "builder/scene_trace_persistent.glsl",
         from: "            flights = 0;",
         to: "            flights = 1;",
         kernels: &["scene_trace_persistent"],
@@ -285,7 +284,7 @@ const FAULTS: [Fault; 65] = [
     },
     Fault {
         what: "a point that others help keeps its first slice twice",
-        file: "stages/scene_gather.glsl",
+        file: "gather/visible_points.glsl",
         from: "slice_begin = slice * GATHER_SLICE",
         to: "slice_begin = gl_WorkGroupID.y * GATHER_SLICE",
         kernels: &["scene_gather_u64", "scene_gather_two_words"],
@@ -301,7 +300,7 @@ const FAULTS: [Fault; 65] = [
     },
     Fault {
         what: "survivors in order overwrite those of the bounce before",
-        file: "stages/keep_order.glsl",
+        file: "builder/keep_order.glsl",
         from: "uint place = counters[0] + path_place;",
         to: "uint place = path_place;",
         kernels: &["keep_order"],
@@ -309,7 +308,7 @@ const FAULTS: [Fault; 65] = [
     },
     Fault {
         what: "stored photons forget which of two walls that face each other is theirs",
-        file: "photon.glsl",
+        file: "world/room/photon.glsl",
         from: " | photon.wall << 31",
         to: "",
         kernels: &["trace_atomic"],
@@ -317,11 +316,11 @@ const FAULTS: [Fault; 65] = [
     },
     Fault {
         what: "points look for photons in the first layer of cells, whatever their wall",
-        file: "stages/grid_rows.glsl",
+        file: "gather/grid_rows.glsl",
         from: "box.first[axis] = layer;\n    box.last[axis] = layer;",
         to: "box.first[axis] = 0u;\n    box.last[axis] = 0u;",
         kernels: &["gather_grid_u64", "gather_grid_two_words"],
-        noticed_by: &[(Film(Gather::Grid), SumsTooSmall)],
+        noticed_by: &[(RoomFilm(Gather::Grid), SumsTooSmall)],
     },
     Fault {
         what: "two photons share a place in their cell",
@@ -329,27 +328,27 @@ const FAULTS: [Fault; 65] = [
         from: "ranks[index] = atomicAdd(cells[cell_number(cell, push.cell_count)], 1);",
         to: "ranks[index] = atomicAdd(cells[cell_number(cell, push.cell_count)], 1) & 0xfffffffeu;",
         kernels: &["cell_count"],
-        noticed_by: &[(Film(Gather::Grid), OtherSums)],
+        noticed_by: &[(RoomFilm(Gather::Grid), OtherSums)],
     },
     Fault {
         what: "the radius is 1 % too large over the grid",
-        file: "stages/estimate.glsl",
+        file: "gather/estimate.glsl",
         from: "distance_squared <= push.radius_squared",
         to: "distance_squared <= 1.0201 * push.radius_squared",
         kernels: &["gather_grid_u64", "gather_grid_two_words"],
-        noticed_by: &[(Film(Gather::Grid), SumsTooLarge)],
+        noticed_by: &[(RoomFilm(Gather::Grid), SumsTooLarge)],
     },
     Fault {
         what: "the radius is 1 % too small by brute force",
-        file: "stages/estimate.glsl",
+        file: "gather/estimate.glsl",
         from: "distance_squared <= push.radius_squared",
         to: "distance_squared <= 0.9801 * push.radius_squared",
         kernels: &["gather_brute_u64", "gather_brute_two_words"],
-        noticed_by: &[(Film(Gather::Brute), SumsTooSmall)],
+        noticed_by: &[(RoomFilm(Gather::Brute), SumsTooSmall)],
     },
     Fault {
         what: "the radius of a lookup is 1 % too small",
-        file: "stages/scene_gather.glsl",
+        file: "gather/visible_points.glsl",
         from: "distance_squared <= push.radius * push.radius &&",
         to: "distance_squared <= 0.9801 * push.radius * push.radius &&",
         kernels: &["scene_gather_u64", "scene_gather_two_words"],
@@ -357,7 +356,7 @@ const FAULTS: [Fault; 65] = [
     },
     Fault {
         what: "shadow rays count the cosine twice",
-        file: "scene/direct.glsl",
+        file: "world/scene/direct.glsl",
         from: "(cosine * lobe_weight",
         to: "(cosine * cosine * lobe_weight",
         kernels: &["receive", "view"],
@@ -368,7 +367,7 @@ const FAULTS: [Fault; 65] = [
     },
     Fault {
         what: "reflected directions have the cosine thrice",
-        file: "sampling.glsl",
+        file: "rng/sampling.glsl",
         from: "direction_at(sqrt(u), 1.0 - u, azimuth)",
         to: "direction_at(sqrt(sqrt(u)), 1.0 - sqrt(u), azimuth)",
         kernels: &["scene_trace_persistent", "trace_ballot", "scene_emit", "scene_trace_ballot"],
@@ -379,7 +378,7 @@ const FAULTS: [Fault; 65] = [
     },
     Fault {
         what: "the probability of a light is taken for twice its value",
-        file: "scene/lights.glsl",
+        file: "world/scene/lights.glsl",
         from: "divide(light.strength, light.probability)",
         to: "divide(light.strength, 2.0 * light.probability)",
         kernels: &["receive"],
@@ -399,15 +398,15 @@ const FAULTS: [Fault; 65] = [
         from: "cell_number(cell, push.cell_count)",
         to: "(cell_number(cell, push.cell_count) ^ uint(index % 16 == 11))",
         kernels: &["cell_scatter"],
-        noticed_by: &[(Film(Gather::Grid), SumsTooSmall)],
+        noticed_by: &[(RoomFilm(Gather::Grid), SumsTooSmall)],
     },
     Fault {
         what: "nodes of the kd-tree are taken to be split along the wrong axis",
-        file: "tree.glsl",
+        file: "index/tree.glsl",
         from: "(wall / 2 + 1 + (height & 1)) % 3",
         to: "(wall / 2 + 1 + (height >> 1 & 1)) % 3",
         kernels: &["gather_tree_u64", "gather_tree_two_words", "nearest_u64", "nearest_two_words"],
-        noticed_by: &[(Film(Gather::KdTree), SumsTooSmall), (Nearest, OtherSums)],
+        noticed_by: &[(RoomFilm(Gather::KdTree), SumsTooSmall), (Nearest, OtherSums)],
     },
     Fault {
         what: "one photon goes to the wrong half of its node",
@@ -415,19 +414,19 @@ const FAULTS: [Fault; 65] = [
         from: "ranks[keys[place].y] < node_at(place).middle",
         to: "(ranks[keys[place].y] < node_at(place).middle) != (push.height == 3u && place == 100u)",
         kernels: &["tree_sides"],
-        noticed_by: &[(Film(Gather::KdTree), OtherSums)],
+        noticed_by: &[(RoomFilm(Gather::KdTree), OtherSums)],
     },
     Fault {
         what: "the sort along an axis leaves out a digit",
-        file: "stages/tree_digits.glsl",
+        file: "index/tree_digits.glsl",
         from: "(key.x >> (4 * push.digit)) & (TREE_RADIX - 1)",
         to: "push.digit == 6u ? 0 : (key.x >> (4 * push.digit)) & (TREE_RADIX - 1)",
         kernels: &["tree_count", "tree_order"],
-        noticed_by: &[(Film(Gather::KdTree), SumsTooSmall), (Nearest, OtherSums)],
+        noticed_by: &[(RoomFilm(Gather::KdTree), SumsTooSmall), (Nearest, OtherSums)],
     },
     Fault {
         what: "the farthest of the nearest photons counts",
-        file: "stages/nearest.glsl",
+        file: "gather/nearest.glsl",
         from: "is_full ? 1 : 0",
         to: "0",
         kernels: &["nearest_u64", "nearest_two_words"],
@@ -435,7 +434,7 @@ const FAULTS: [Fault; 65] = [
     },
     Fault {
         what: "the disc of the nearest photons reaches over the edge",
-        file: "stages/nearest.glsl",
+        file: "gather/nearest.glsl",
         from: "covered_disc(point.position, point.wall, sqrt(farthest), rooms[0])",
         to: "3.14159265",
         kernels: &["nearest_u64", "nearest_two_words"],
@@ -447,7 +446,7 @@ const FAULTS: [Fault; 65] = [
         from: "sum.x = uaddCarry(sum.x, amount, carry);",
         to: "sum.x = uint(float(sum.x) + float(amount)); carry = 0;",
         kernels: &["gather_grid_u64", "gather_grid_two_words"],
-        noticed_by: &[(Film(Gather::Grid), OtherSums)],
+        noticed_by: &[(RoomFilm(Gather::Grid), OtherSums)],
     },
     Fault {
         what: "edges are not corrected",
@@ -462,7 +461,7 @@ const FAULTS: [Fault; 65] = [
     },
     Fault {
         what: "rays start a fixed length off their surface",
-        file: "scene/bvh.glsl",
+        file: "world/scene/bvh.glsl",
         from: "precise vec3 start = position + way;",
         to: "precise vec3 start = position + 1e-3 * normal * (dot(direction, normal) < 0.0 ? -1.0 : 1.0);",
         kernels: &["scene_trace_persistent", "scene_emit", "scene_trace_ballot", "scene_trace_atomic", "receive", "view"],
@@ -470,7 +469,7 @@ const FAULTS: [Fault; 65] = [
     },
     Fault {
         what: "glass reflects one and a half times as much",
-        file: "scene/scatter.glsl",
+        file: "material/scatter.glsl",
         from: "if (u.x < chance) {",
         to: "if (u.x < 1.5 * chance) {",
         kernels: &["view"],
@@ -478,7 +477,7 @@ const FAULTS: [Fault; 65] = [
     },
     Fault {
         what: "strict quotients are cut instead of rounded",
-        file: "math.glsl",
+        file: "math/math.glsl",
         from: "quotient += uint(off) + uint(2 * remainder > d);",
         to: "quotient += uint(off);",
         kernels: &["check_math"],
@@ -486,7 +485,7 @@ const FAULTS: [Fault; 65] = [
     },
     Fault {
         what: "a light in 50 shines with no number",
-        file: "scene/direct.glsl",
+        file: "world/scene/direct.glsl",
         from: "float cosine = dot(arriving.wi, point.ns);",
         to: "if (u.y < 0.02) arriving.radiance.x = uintBitsToFloat(0x7fc00000u);\n        float cosine = dot(arriving.wi, point.ns);",
         kernels: &["view"],
@@ -494,7 +493,7 @@ const FAULTS: [Fault; 65] = [
     },
     Fault {
         what: "a photon in 500 starts nowhere",
-        file: "stages/scene_flight.glsl",
+        file: "world/scene/step.glsl",
         from: "surface.ng, scatter.direction);",
         to: "surface.ng, scatter.direction);\n            if (u.z < 0.002) start.y = uintBitsToFloat(0x7fc00000u);",
         kernels: &["scene_trace_persistent", "scene_trace_ballot"],
@@ -502,7 +501,7 @@ const FAULTS: [Fault; 65] = [
     },
     Fault {
         what: "a photon in 500 carries no number into the map",
-        file: "stages/scene_trace.glsl",
+        file: "builder/scene_trace.glsl",
         from: "store(place, traced.photon);",
         to: "if (path.photon % 500u == 7u) traced.photon.flux.y = uintBitsToFloat(0x7fc00000u);\n        store(place, traced.photon);",
         kernels: &["scene_trace_ballot"],
@@ -510,7 +509,7 @@ const FAULTS: [Fault; 65] = [
     },
     Fault {
         what: "a path from the eye goes on nowhere",
-        file: "stages/chain.glsl",
+        file: "world/scene/camera_path.glsl",
         from: "chain.direction = scatter.direction;",
         to: "chain.direction = scatter.direction;\n        if (u.x < 0.2) chain.direction.z = uintBitsToFloat(0x7fc00000u);",
         kernels: &["view"],
@@ -518,7 +517,7 @@ const FAULTS: [Fault; 65] = [
     },
     Fault {
         what: "a path from the eye goes on from nowhere",
-        file: "stages/chain.glsl",
+        file: "world/scene/camera_path.glsl",
         from: "chain.direction = scatter.direction;",
         to: "chain.direction = scatter.direction;\n        if (u.x < 0.2) chain.position.z = uintBitsToFloat(0x7fc00000u);",
         kernels: &["view"],
@@ -526,7 +525,7 @@ const FAULTS: [Fault; 65] = [
     },
     Fault {
         what: "a reflected direction of the paper's box is no number",
-        file: "stages/bounce.glsl",
+        file: "world/room/step.glsl",
         from: "path.wall = hit.wall;",
         to: "path.wall = hit.wall;\n        if (u.x < 0.002) path.direction.y = uintBitsToFloat(0x7fc00000u);",
         kernels: &["trace_atomic"],
@@ -534,7 +533,7 @@ const FAULTS: [Fault; 65] = [
     },
     Fault {
         what: "rays do not start one float further than their surface's error",
-        file: "scene/bvh.glsl",
+        file: "world/scene/bvh.glsl",
         from: "return mix(intBitsToFloat(bits + away), start, equal(start, vec3(0.0)));",
         to: "return start;",
         kernels: &["scene_trace_persistent", "scene_emit", "scene_trace_ballot", "view"],
@@ -543,7 +542,7 @@ const FAULTS: [Fault; 65] = [
     },
     Fault {
         what: "rays meet what they leave, where its height is lost in rounding",
-        file: "scene/bvh.glsl",
+        file: "world/scene/bvh.glsl",
         from: "height * height > 0.0625 * error * error * dot(normal, normal) && ",
         to: "",
         kernels: &["scene_trace_persistent", "scene_trace_ballot"],
@@ -551,7 +550,7 @@ const FAULTS: [Fault; 65] = [
     },
     Fault {
         what: "of triangles equally near, the first that is tested is met",
-        file: "scene/bvh.glsl",
+        file: "world/scene/bvh.glsl",
         from: "t < hit.t || (t == hit.t && index < hit.triangle)",
         to: "t < hit.t",
         kernels: &["view"],
@@ -559,7 +558,7 @@ const FAULTS: [Fault; 65] = [
     },
     Fault {
         what: "shadow rays end 0.5 % before their lamp",
-        file: "scene/direct.glsl",
+        file: "world/scene/direct.glsl",
         from: "arriving.target - start)",
         to: "0.995 * (arriving.target - start))",
         kernels: &["receive"],
@@ -567,7 +566,7 @@ const FAULTS: [Fault; 65] = [
     },
     Fault {
         what: "what lies a sixteenth of the radius below belongs to an estimate",
-        file: "scene/belongs.glsl",
+        file: "gather/belongs.glsl",
         from: "+ HEIGHT_ERROR;",
         to: "+ radius * (1.0 / 16.0);",
         kernels: &["scene_gather_u64", "scene_gather_two_words"],
@@ -575,7 +574,7 @@ const FAULTS: [Fault; 65] = [
     },
     Fault {
         what: "normals 78 degrees apart belong together",
-        file: "scene/belongs.glsl",
+        file: "gather/belongs.glsl",
         from: "MIN_NORMAL_COSINE = 0.75",
         to: "MIN_NORMAL_COSINE = 0.2",
         kernels: &["scene_gather_u64", "scene_gather_two_words", "flux_to_radiance"],
@@ -583,7 +582,7 @@ const FAULTS: [Fault; 65] = [
     },
     Fault {
         what: "a photon's weight knows no shading normal",
-        file: "scene/lobes.glsl",
+        file: "material/lobes.glsl",
         from: SHADING_GAIN,
         to: "return 1.0;",
         kernels: &["scene_gather_u64", "scene_gather_two_words"],
@@ -591,7 +590,7 @@ const FAULTS: [Fault; 65] = [
     },
     Fault {
         what: "a scattered photon knows no shading normal",
-        file: "scene/lobes.glsl",
+        file: "material/lobes.glsl",
         from: SHADING_GAIN,
         to: "return 1.0;",
         kernels: &["scene_trace_persistent", "scene_trace_ballot"],
@@ -599,7 +598,7 @@ const FAULTS: [Fault; 65] = [
     },
     Fault {
         what: "a spot falls off by its share, not by the square of it",
-        file: "scene/lights.glsl",
+        file: "world/scene/lights.glsl",
         from: "return share * share;",
         to: "return share;",
         kernels: &["receive"],
@@ -607,7 +606,7 @@ const FAULTS: [Fault; 65] = [
     },
     Fault {
         what: "a mirrored texture is a texel off",
-        file: "scene/surface.glsl",
+        file: "material/surface.glsl",
         from: "period - 1 - folded",
         to: "period - folded",
         kernels: &["view"],
@@ -618,7 +617,7 @@ const FAULTS: [Fault; 65] = [
     },
     Fault {
         what: "a shading normal is kept where it is seen from below",
-        file: "scene/surface.glsl",
+        file: "material/surface.glsl",
         from: "dot(smooth_normal, wo) > 0.0 ? smooth_normal : surface.ng",
         to: "smooth_normal",
         kernels: &["view"],
@@ -626,7 +625,7 @@ const FAULTS: [Fault; 65] = [
     },
     Fault {
         what: "large integers are cut instead of rounded",
-        file: "kernels/check_math.comp",
+        file: "check/check_math.comp",
         from: "float(floatBitsToUint(a))",
         to: "float(floatBitsToUint(a) & ~0xffu)",
         kernels: &["check_math"],
@@ -634,7 +633,7 @@ const FAULTS: [Fault; 65] = [
     },
     Fault {
         what: "directions within two cones are weighed as if only one could have chosen them",
-        file: "scene/aim.glsl",
+        file: "world/scene/aim.glsl",
         from: "k == chosen || versine_between(emission.direction, other.axis) <= other.versine",
         to: "k == chosen",
         kernels: &["scene_trace_persistent", "scene_emit"],
@@ -642,7 +641,7 @@ const FAULTS: [Fault; 65] = [
     },
     Fault {
         what: "places on two discs are weighed as if only one could have chosen them",
-        file: "scene/aim.glsl",
+        file: "world/scene/aim.glsl",
         from: "k == chosen || dot(off, off) <= radius * radius",
         to: "k == chosen",
         kernels: &["scene_trace_persistent", "scene_emit"],
@@ -650,7 +649,7 @@ const FAULTS: [Fault; 65] = [
     },
     Fault {
         what: "aimed photons forget the cosine of their lamp",
-        file: "scene/aim.glsl",
+        file: "world/scene/aim.glsl",
         from: "return max(cosine, 0.0) * 0.31830988618379067;",
         to: "return cosine > 0.0 ? 0.31830988618379067 : 0.0;",
         kernels: &["scene_trace_persistent", "scene_emit"],
@@ -663,49 +662,49 @@ const SHADING_GAIN: &str = "return min(divide(abs(shading_cosine), max(abs(geome
 
 const FOREVER: Duration = Duration::from_secs(3600);
 
-fn strict() -> Settings {
-    Settings { math: Math::Strict, shininess: [Some(2.0); 5], mesh: 16, ..Settings::default() }
+fn strict() -> RoomSettings {
+    RoomSettings { math: Math::Strict, shininess: [Some(2.0); 5], mesh: 16, ..RoomSettings::default() }
 }
 
-fn small() -> TransportSettings {
-    TransportSettings {
+fn small() -> SceneSettings {
+    SceneSettings {
         photons: 3000,
         rounds: 2,
         shadow_rays: 2,
         illumination: Illumination::Photons,
         math: Math::Strict,
-        ..TransportSettings::default()
+        ..SceneSettings::default()
     }
 }
 
 /// Photons of the CPU builder, by their number: of builders that are asked for, nothing else differs.
-fn expected_photons(settings: &Settings) -> Arc<Vec<Photon>> {
+fn expected_photons(settings: &RoomSettings) -> Arc<Vec<Photon>> {
     static KNOWN: LazyLock<Mutex<HashMap<u32, Arc<Vec<Photon>>>>> = LazyLock::new(Mutex::default);
     let mut known = KNOWN.lock().unwrap();
-    known.entry(settings.photons).or_insert_with(|| Arc::new(photons_on_cpu(&Settings { chunk: None, ..settings.clone() }))).clone()
+    known.entry(settings.photons).or_insert_with(|| Arc::new(photons_on_cpu(&RoomSettings { chunk: None, ..settings.clone() }))).clone()
 }
 
 /// Films of the CPU builder, by the number of nearest photons.
-fn expected_film(settings: &Settings) -> Arc<film::Film> {
-    static KNOWN: LazyLock<Mutex<HashMap<Option<u32>, Arc<film::Film>>>> = LazyLock::new(Mutex::default);
+fn expected_film(settings: &RoomSettings) -> Arc<film::RoomFilm> {
+    static KNOWN: LazyLock<Mutex<HashMap<Option<u32>, Arc<film::RoomFilm>>>> = LazyLock::new(Mutex::default);
     KNOWN.lock().unwrap().entry(settings.nearest).or_insert_with(|| Arc::new(run_on_cpu(settings).film)).clone()
 }
 
 /// The checks of the other tests, on any device.
 fn ask(gpu: &Gpu, question: Question) -> Check<Complaint> {
-    let builds = |settings: Settings| photons_agree(gpu, &settings, &expected_photons(&settings));
-    let gathers = |settings: Settings| film_agrees(gpu, &settings, &expected_film(&settings));
+    let builds = |settings: RoomSettings| photons_agree(gpu, &settings, &expected_photons(&settings));
+    let gathers = |settings: RoomSettings| film_agrees(gpu, &settings, &expected_film(&settings));
     match question {
         Photons(builder @ Builder::Persistent) => {
-            builds(Settings { builder, photons: MANY_PHOTONS, chunk: Some(MANY_PHOTONS), ..strict() })
+            builds(RoomSettings { builder, photons: MANY_PHOTONS, chunk: Some(MANY_PHOTONS), ..strict() })
         }
-        Photons(builder) => builds(Settings { builder, ..strict() }),
-        StripedCounters => builds(Settings { builder: Builder::Atomic, counters: Some(8), ..strict() }),
-        Film(gather) => gathers(Settings { gather, ..strict() }),
-        Nearest => gathers(Settings { gather: Gather::KdTree, nearest: Some(20), ..strict() }),
+        Photons(builder) => builds(RoomSettings { builder, ..strict() }),
+        StripedCounters => builds(RoomSettings { builder: Builder::Atomic, counters: Some(8), ..strict() }),
+        RoomFilm(gather) => gathers(RoomSettings { gather, ..strict() }),
+        Nearest => gathers(RoomSettings { gather: Gather::KdTree, nearest: Some(20), ..strict() }),
         Pairs => pairs_count_on(gpu),
         Ledger(builder) => {
-            let settings = Settings { builder, mesh: 1, ..strict() };
+            let settings = RoomSettings { builder, mesh: 1, ..strict() };
             closed_fates(gpu, &open_box(&settings), &settings).map(|_| ())
         }
         ClosedForm(name) => closed_form_check(gpu, name),
@@ -720,7 +719,7 @@ fn ask(gpu: &Gpu, question: Question) -> Check<Complaint> {
         }
         Crowds => crowd_check(gpu),
         StrictMath => rounding_check(gpu),
-        Finite => scene_is_finite(gpu, &TransportSettings { rounds: 1, builder: Some(Builder::Ballot), ..small() }),
+        Finite => scene_is_finite(gpu, &SceneSettings { rounds: 1, builder: Some(Builder::Ballot), ..small() }),
         FiniteBox => box_is_finite(gpu, &strict()),
         Bits(name) => bits::check(gpu, name),
         LampInBox(illumination) => known::lamp_in_a_box(gpu, illumination),
@@ -815,7 +814,7 @@ fn what_only_breaks_is_not_noticed() {
     // A run that leaves nothing is no sign either.
     for check in [
         same_sums("a film", &[0, 0], &[0, 7]),
-        same_photons(&[], &photons_on_cpu(&Settings { photons: 2, reflectance: 1.0, ..strict() })),
+        same_photons(&[], &photons_on_cpu(&RoomSettings { photons: 2, reflectance: 1.0, ..strict() })),
         estimate_check("light", 0.0, 1.0, 0.1),
     ] {
         assert_eq!(check.unwrap_err().kind, Broken);
@@ -823,7 +822,7 @@ fn what_only_breaks_is_not_noticed() {
 
     let Some(gpu) = open(Options::default()) else { return };
     // More bounces than the persistent builder has: refused before anything is traced.
-    let settings = Settings { builder: Builder::Persistent, bounces: 321, ..strict() };
+    let settings = RoomSettings { builder: Builder::Persistent, bounces: 321, ..strict() };
     for check in [closed_fates(&gpu, &open_box(&settings), &settings).map(|_| ()), photons_agree(&gpu, &settings, &[])] {
         assert_eq!(check.unwrap_err().kind, Broken);
     }

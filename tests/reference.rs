@@ -3,13 +3,13 @@
 
 use crate::common::reference::{self, Emission, Model, add_power, power_table};
 use crate::common::{Check, assert_complains, assert_holds, device, pairs, run, run_on_cpu, share_check};
-use photonmill::film::{Film, estimate_walls};
+use photonmill::engine::room::RunResult;
+use photonmill::engine::room::film::{RoomFilm, estimate_walls};
 use photonmill::gpu::Gpu;
 use photonmill::ledger::Fates;
-use photonmill::render::RunResult;
 use photonmill::rng::Rng;
 use photonmill::scene::open_box::open_box;
-use photonmill::settings::{Builder, EmissionLaw, Preset, Settings};
+use photonmill::settings::{Builder, EmissionLaw, Preset, RoomSettings};
 
 /// Photons stored at bounces 1 to 15 of the paper's run: rand48, seed 1, 5000 photons. Printed by the
 /// independent numpy model `paper_reference.py`, as is every number of the first two tests.
@@ -97,10 +97,10 @@ fn the_judge_gathers_what_the_numpy_model_gathers() {
 }
 
 /// Runs of the three builders on the device, if there is one, and of the CPU's.
-fn every_builder(gpu: Option<&Gpu>, settings: &Settings) -> Vec<(Builder, RunResult)> {
+fn every_builder(gpu: Option<&Gpu>, settings: &RoomSettings) -> Vec<(Builder, RunResult)> {
     let mut outcomes = vec![(Builder::Cpu, run_on_cpu(settings))];
     if let Some(gpu) = gpu {
-        outcomes.extend(Builder::ON_GPU.map(|builder| (builder, run(gpu, &Settings { builder, ..settings.clone() }))));
+        outcomes.extend(Builder::ON_GPU.map(|builder| (builder, run(gpu, &RoomSettings { builder, ..settings.clone() }))));
     }
     outcomes
 }
@@ -112,11 +112,11 @@ fn stored(fates: &Fates) -> Vec<u64> {
 #[test]
 fn every_builder_stores_the_papers_photons() {
     let gpu = device();
-    for (builder, outcome) in every_builder(gpu.as_deref(), &Settings::preset(Preset::Modified)) {
+    for (builder, outcome) in every_builder(gpu.as_deref(), &RoomSettings::preset(Preset::Modified)) {
         assert_eq!(stored(&outcome.fates), STORED, "{builder:?}");
         assert_eq!(outcome.fates.ledger().stored, 7511, "{builder:?}");
     }
-    for (builder, outcome) in every_builder(gpu.as_deref(), &Settings::preset(Preset::Naive)) {
+    for (builder, outcome) in every_builder(gpu.as_deref(), &RoomSettings::preset(Preset::Naive)) {
         assert_eq!(stored(&outcome.fates), STORED[..2], "{builder:?}");
         assert_eq!(outcome.fates.ledger().stored, STORED_WITH_TWO_BOUNCES, "{builder:?}");
     }
@@ -128,7 +128,7 @@ const FLIPS: f64 = 2e-5;
 
 /// Power tables texel by texel: a texel may differ by one photon, a share [`FLIPS`] of the pairs in
 /// all; beyond that a weight may be off by `tolerance` of its size.
-fn same_power(film: &Film, expected: &[f64], counts: &[f64], tolerance: f64) -> Check {
+fn same_power(film: &RoomFilm, expected: &[f64], counts: &[f64], tolerance: f64) -> Check {
     if film.point_count() != expected.len() {
         return Err(format!("{} points instead of {}", film.point_count(), expected.len()));
     }
@@ -153,7 +153,7 @@ fn same_power(film: &Film, expected: &[f64], counts: &[f64], tolerance: f64) -> 
 fn power_tables_agree_to_single_counts() {
     let gpu = device();
     for (preset, bounces) in [(Preset::Naive, 2), (Preset::Modified, 15)] {
-        let settings = Settings::preset(preset);
+        let settings = RoomSettings::preset(preset);
         let expected = power_table(&Model { bounces, ..Model::default() }.trace(0), 0.05);
         for (builder, outcome) in every_builder(gpu.as_deref(), &settings) {
             assert_holds(format!("{preset:?} {builder:?}"), same_power(&outcome.film, &expected, &expected, 0.0));
@@ -173,7 +173,7 @@ fn illumination_is_the_papers() {
     let gpu = device();
     let printed = [([None; 5], [0.4510, 0.4839, 0.4481, 0.4884, 0.5560]), ([Some(2.0); 5], [0.1105, 0.0932, 0.1057, 0.0972, 0.2628])];
     for (shininess, expected) in printed {
-        let settings = Settings { shininess, ..Settings::default() };
+        let settings = RoomSettings { shininess, ..RoomSettings::default() };
         for (builder, outcome) in every_builder(gpu.as_deref(), &settings) {
             for (estimate, expected) in pairs(estimate_walls(&outcome.film, &open_box(&settings), &outcome.plan), expected) {
                 let clamped: f64 = estimate.illumination.iter().map(|illumination| illumination.min(1.0)).sum();
@@ -195,7 +195,7 @@ fn phong_tables_agree() {
     let counts = power_table(&Model::default().trace(0), 0.05);
     for shininess in [2.0, 0.5, 0.01, 5.0] {
         let expected = power_table(&Model { shininess: Some(shininess), ..Model::default() }.trace(0), 0.05);
-        let settings = Settings { shininess: [Some(shininess as f32); 5], ..Settings::default() };
+        let settings = RoomSettings { shininess: [Some(shininess as f32); 5], ..RoomSettings::default() };
         for (builder, outcome) in every_builder(gpu.as_deref(), &settings) {
             assert_eq!(stored(&outcome.fates), STORED, "{builder:?}");
             assert_holds(format!("shininess {shininess} {builder:?}"), same_power(&outcome.film, &expected, &counts, WEIGHT_TOLERANCE));
@@ -207,7 +207,7 @@ fn phong_tables_agree() {
 fn rounds_agree() {
     let gpu = device();
     let rounds = 3;
-    let settings = Settings { rounds, ..Settings::preset(Preset::Rounds) };
+    let settings = RoomSettings { rounds, ..RoomSettings::preset(Preset::Rounds) };
     let model = Model { shininess: Some(5.0), ..Model::default() };
     let (mut expected, mut counts, mut per_bounce) = (vec![0.0; 5 * 64 * 64], vec![0.0; 5 * 64 * 64], vec![0; 15]);
     for round in 0..rounds as usize {
@@ -233,7 +233,7 @@ fn rounds_agree() {
 
 #[test]
 fn the_check_of_power_complains() {
-    let outcome = run_on_cpu(&Settings::default());
+    let outcome = run_on_cpu(&RoomSettings::default());
     let film = &outcome.film;
     let arrivals = Model::default().trace(0);
     let expected = power_table(&arrivals, 0.05);
@@ -281,8 +281,8 @@ fn has_shares(fates: &Fates, emission: EmissionLaw) -> Check {
 }
 
 /// One point a wall: only the fates are asked for.
-fn fates_of(gpu: &Gpu, settings: &Settings) -> Fates {
-    run(gpu, &Settings { mesh: 1, ..settings.clone() }).fates
+fn fates_of(gpu: &Gpu, settings: &RoomSettings) -> Fates {
+    run(gpu, &RoomSettings { mesh: 1, ..settings.clone() }).fates
 }
 
 #[test]
@@ -290,7 +290,7 @@ fn a_million_photons_have_the_exact_shares() {
     let Some(gpu) = device() else { return };
     for rng in [Rng::Philox, Rng::Mt] {
         for emission in [EmissionLaw::Uniform, EmissionLaw::Cosine] {
-            let settings = Settings { rng, emission, photons: 1_000_000, builder: Builder::Ballot, ..Settings::default() };
+            let settings = RoomSettings { rng, emission, photons: 1_000_000, builder: Builder::Ballot, ..RoomSettings::default() };
             let fates = fates_of(&gpu, &settings);
             assert_eq!(fates.emitted, 1_000_000);
             assert_holds(format!("{rng:?} {emission:?}"), has_shares(&fates, emission));
@@ -308,7 +308,7 @@ fn ten_million_photons_have_the_exact_shares() {
     let Some(gpu) = device() else { return };
     for rng in [Rng::Philox, Rng::Mt] {
         for emission in [EmissionLaw::Uniform, EmissionLaw::Cosine] {
-            let settings = Settings { rng, emission, photons: 10_000_000, builder: Builder::Ballot, ..Settings::default() };
+            let settings = RoomSettings { rng, emission, photons: 10_000_000, builder: Builder::Ballot, ..RoomSettings::default() };
             assert_holds(format!("{rng:?} {emission:?}"), has_shares(&fates_of(&gpu, &settings), emission));
         }
     }

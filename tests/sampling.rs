@@ -11,7 +11,7 @@ use photonmill::gpu::{Gpu, check};
 use photonmill::records::{Samples, SamplingCase};
 use photonmill::rng::philox;
 use photonmill::settings::Math;
-use photonmill::settings::transport::Filter;
+use photonmill::settings::scene::Filter;
 
 /// Cases of each function.
 const SAMPLES: u32 = 1 << 17;

@@ -11,20 +11,20 @@ use crate::common::densities::{
 use crate::common::{Check, assert_complains, assert_holds, device, pairs, share_check, z_check};
 use glam::{DMat3, DVec2, DVec3, Vec3};
 use photonmill::constants::EMISSION_BLOCKS;
+use photonmill::engine;
+use photonmill::engine::scene::replay::{Flights, light_paths};
 use photonmill::gpu::Gpu;
+use photonmill::plan::scene::ScenePlan;
 use photonmill::plan::sensor::Sensor;
-use photonmill::plan::transport::TransportPlan;
 use photonmill::records::{LightPath, Tally};
-use photonmill::render;
 use photonmill::rng::philox;
 use photonmill::scene::geometry::Geometry;
 use photonmill::scene::light::{Light, LightKind};
 use photonmill::scene::material::TextureUse;
 use photonmill::scene::texture::Wrap;
 use photonmill::scene::{Material, Mesh, Scene, Surface, Texture};
-use photonmill::settings::transport::{Effect, Illumination, TransportSettings};
+use photonmill::settings::scene::{Effect, Illumination, SceneSettings};
 use photonmill::settings::{EmissionLaw, Math};
-use photonmill::transport::replay::{Flights, light_paths};
 
 /// Photons of each scene.
 const SAMPLES: u32 = 1 << 17;
@@ -61,7 +61,7 @@ struct Traced {
 impl Tracer<'_> {
     fn trace_photons(&self, scene: &Scene, photons: (u32, u32)) -> Traced {
         let geometry = Geometry::new(scene).unwrap();
-        let settings = TransportSettings {
+        let settings = SceneSettings {
             photons: photons.0 + photons.1,
             chunk: Some(photons.1),
             // One more than is traced: what the last one leaves is cut off.
@@ -69,10 +69,10 @@ impl Tracer<'_> {
             illumination: Illumination::Photons,
             math: self.math,
             with: Effect::ALL.to_vec(),
-            ..TransportSettings::default()
+            ..SceneSettings::default()
         };
-        let limits = render::limits(self.gpu.facts());
-        let plan = TransportPlan::new(scene, &geometry, &settings, Sensor::Receivers { count: 1 }, &limits).unwrap();
+        let limits = engine::limits(self.gpu.facts());
+        let plan = ScenePlan::new(scene, &geometry, &settings, Sensor::Receivers { count: 1 }, &limits).unwrap();
         let map = plan.global.as_ref().expect("a lit scene has a map");
         let Flights { mut paths, tallies, .. } = light_paths(self.gpu, &geometry, &plan, map, 0, photons, 1).unwrap();
         let survivors = if paths.len() == 2 { paths.pop().unwrap() } else { Vec::new() };

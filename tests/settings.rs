@@ -5,8 +5,8 @@ use std::collections::BTreeMap;
 
 use photonmill::error::{Error, Result};
 use photonmill::rng::Rng;
-use photonmill::settings::transport::{Effect, TransportSettings};
-use photonmill::settings::{Builder, Gather, Preset, Settings};
+use photonmill::settings::scene::{Effect, SceneSettings};
+use photonmill::settings::{Builder, Gather, Preset, RoomSettings};
 use photonmill::text::echo;
 
 const CASES: usize = 40_000;
@@ -92,8 +92,8 @@ fn judge<S: std::fmt::Debug>(make: impl Fn(&mut Random) -> S, rules: impl Fn(&S)
     assert!(never.is_empty(), "rules that were never broken alone: {never:?}");
 }
 
-fn any_settings(random: &mut Random) -> Settings {
-    let mut settings = Settings::preset(random.pick(&[Preset::Naive, Preset::Modified, Preset::Phong, Preset::Rounds]));
+fn any_settings(random: &mut Random) -> RoomSettings {
+    let mut settings = RoomSettings::preset(random.pick(&[Preset::Naive, Preset::Modified, Preset::Phong, Preset::Rounds]));
     settings.rng = random.pick(&[Rng::Rand48, Rng::Mt, Rng::Sobol, Rng::Philox, Rng::Philox]);
     for _ in 0..=random.below(3) {
         match random.below(18) {
@@ -135,8 +135,8 @@ fn any_settings(random: &mut Random) -> Settings {
 /// The box: `photonmill --help`, and what refusals say.
 #[test]
 fn settings_are_accepted_exactly_within_their_ranges() {
-    let rules = |settings: &Settings| {
-        let Settings { photons, rounds, bounces, light_power: [floor, left], eye: [x, y, z], .. } = *settings;
+    let rules = |settings: &RoomSettings| {
+        let RoomSettings { photons, rounds, bounces, light_power: [floor, left], eye: [x, y, z], .. } = *settings;
         let is_power = |power: f64| (1e-12..=1e12).contains(&power);
         let is_coordinate = |coordinate: &f32| (-1e15..=1e15).contains(coordinate);
         let wrong = settings.shininess.iter().flatten().copied().find(|shininess| !(0.0..=f32::MAX).contains(shininess));
@@ -186,11 +186,11 @@ fn settings_are_accepted_exactly_within_their_ranges() {
             rule("--rounds", rounds, all_photons * u128::from(bounces) <= 1 << 47),
         ]
     };
-    judge(any_settings, rules, Settings::validate);
+    judge(any_settings, rules, RoomSettings::validate);
 }
 
-fn any_transport_settings(random: &mut Random) -> TransportSettings {
-    let mut settings = TransportSettings::default();
+fn any_transport_settings(random: &mut Random) -> SceneSettings {
+    let mut settings = SceneSettings::default();
     for _ in 0..=random.below(3) {
         match random.below(13) {
             0 => settings.photons = random.count(1, 1 << 31),
@@ -219,7 +219,7 @@ const MAX_SHADOW_RAYS: u32 = 64;
 /// Scenes of triangles: `photonmill render --help`, and what refusals say.
 #[test]
 fn transport_settings_are_accepted_exactly_within_their_ranges() {
-    let rules = |settings: &TransportSettings| {
+    let rules = |settings: &SceneSettings| {
         let is_radius = |radius: Option<f64>| radius.is_none_or(|radius| radius > 0.0 && radius <= f64::MAX);
         let both = settings.with.iter().find(|effect| settings.without.contains(effect));
         let builder = settings.builder;
@@ -240,5 +240,5 @@ fn transport_settings_are_accepted_exactly_within_their_ranges() {
             rule("--without", both.map_or("", |effect| effect.name()), both.is_none()),
         ]
     };
-    judge(any_transport_settings, rules, TransportSettings::validate);
+    judge(any_transport_settings, rules, SceneSettings::validate);
 }

@@ -7,20 +7,24 @@ use std::time::Instant;
 use crate::common::lit::{scene, seen};
 use crate::common::{Check, assert_complains, assert_holds, device};
 use glam::DVec3;
-use photonmill::film::{estimate_walls, irradiance_weights};
+use photonmill::engine;
+use photonmill::engine::Control;
+use photonmill::engine::Progress;
+use photonmill::engine::room::film::{estimate_walls, irradiance_weights};
+use photonmill::engine::room::{self, RunResult};
+use photonmill::engine::scene::stop::error_bound;
+use photonmill::engine::scene::{self, End, View};
+use photonmill::engine::watch;
 use photonmill::gpu::Gpu;
+use photonmill::plan::scene::ScenePlan;
 use photonmill::plan::sensor::Sensor;
-use photonmill::plan::transport::TransportPlan;
-use photonmill::render::{self, Control, Progress, RunResult, stop};
 use photonmill::rng::Rng;
 use photonmill::scene::geometry::Geometry;
 use photonmill::scene::open_box::open_box;
 use photonmill::scene::{Camera, Scene};
+use photonmill::settings::scene::SceneSettings;
 use photonmill::settings::stop::Stop;
-use photonmill::settings::transport::TransportSettings;
-use photonmill::settings::{Math, Settings};
-use photonmill::transport::stop::error_bound;
-use photonmill::transport::{self, End, View};
+use photonmill::settings::{Math, RoomSettings};
 
 const SIZE: u32 = 8;
 const CONFIDENCE: f64 = 0.9;
@@ -44,8 +48,8 @@ fn camera_of(scene: &Scene) -> Camera {
 }
 
 /// A fixed radius: the error in question is noise.
-fn settings(error: f64, seed: u64) -> TransportSettings {
-    TransportSettings {
+fn settings(error: f64, seed: u64) -> SceneSettings {
+    SceneSettings {
         photons: 300,
         caustic_photons: 300,
         rounds: 20_000,
@@ -53,11 +57,11 @@ fn settings(error: f64, seed: u64) -> TransportSettings {
         alpha: 1.0,
         seed,
         stop: Stop { error: Some(error), confidence: CONFIDENCE, ..Stop::default() },
-        ..TransportSettings::default()
+        ..SceneSettings::default()
     }
 }
 
-fn means(lit: &transport::RunResult) -> Vec<DVec3> {
+fn means(lit: &scene::RunResult) -> Vec<DVec3> {
     (0..lit.film.pixels()).map(|pixel| lit.film.mean(pixel, &lit.plan)).collect()
 }
 
@@ -89,8 +93,8 @@ fn claims_hold(seeds: u64) {
         let camera = camera_of(&scene);
         // Of aimed photons so little noise is left there that the lamp's image in the glass is nearly all of it, and of what
         // one path in thousands meets, runs as short as these know no error: README says how often they claim too little.
-        let settings = |error, seed| TransportSettings { aim: name != "caustic-sphere", ..settings(error, seed) };
-        let first = seen(&gpu, &scene, &TransportSettings { rounds: 60, stop: Stop::default(), ..settings(1.0, 0) }, &camera, [SIZE; 2]);
+        let settings = |error, seed| SceneSettings { aim: name != "caustic-sphere", ..settings(error, seed) };
+        let first = seen(&gpu, &scene, &SceneSettings { rounds: 60, stop: Stop::default(), ..settings(1.0, 0) }, &camera, [SIZE; 2]);
         let wanted = error_bound(&first.film, &first.plan, CONFIDENCE).min(1.0);
         let runs: Vec<(Vec<DVec3>, f64)> = (1..=seeds)
             .map(|seed| {
@@ -121,17 +125,17 @@ fn errors_of_a_hundred_runs_lie_within_the_claim_as_often_as_claimed() {
 /// The paper's box by a builder, with an error that is wanted.
 fn in_box(gpu: Option<&Gpu>, error: Option<f64>, rounds: u32, seed: u64) -> (RunResult, Vec<Progress>) {
     let stop = Stop { error, confidence: CONFIDENCE, ..Stop::default() };
-    let settings = Settings { photons: 301, rounds, seed, mesh: 8, rng: Rng::Philox, stop, ..Settings::default() };
+    let settings = RoomSettings { photons: 301, rounds, seed, mesh: 8, rng: Rng::Philox, stop, ..RoomSettings::default() };
     run_box(gpu, &settings)
 }
 
-fn run_box(gpu: Option<&Gpu>, settings: &Settings) -> (RunResult, Vec<Progress>) {
+fn run_box(gpu: Option<&Gpu>, settings: &RoomSettings) -> (RunResult, Vec<Progress>) {
     let (never, mut told) = (AtomicBool::new(false), Vec::new());
     let mut tell = |progress: &Progress| told.push(progress.clone());
     let mut control = Control { cancelled: &never, progress: &mut tell };
     let outcome = match gpu {
-        Some(gpu) => render::on_gpu(gpu, &open_box(settings), settings, &mut control).unwrap(),
-        None => render::on_cpu(&open_box(settings), settings, &mut control).unwrap(),
+        Some(gpu) => room::on_gpu(gpu, &open_box(settings), settings, &mut control).unwrap(),
+        None => room::on_cpu(&open_box(settings), settings, &mut control).unwrap(),
     };
     (outcome, told)
 }
@@ -144,7 +148,7 @@ fn irradiances(outcome: &RunResult) -> Vec<DVec3> {
 /// The relative error that a film of the box has not more of.
 fn bound_in_box(outcome: &RunResult) -> f64 {
     let weights = irradiance_weights(&open_box(&outcome.plan.settings), &outcome.plan);
-    stop::error_bound(outcome.film.rounds, outcome.film.relative_error(&weights), CONFIDENCE)
+    watch::error_bound(outcome.film.rounds, outcome.film.relative_error(&weights), CONFIDENCE)
 }
 
 /// The same of the paper's line, whichever way it is built.
@@ -173,8 +177,15 @@ fn errors_of_the_box_lie_within_the_claim_as_often_as_claimed() {
 fn a_run_of_the_box_ends_at_what_is_reached_first() {
     let gpu = device();
     for gpu in [None, gpu.as_deref()] {
-        let settings =
-            |stop| Settings { photons: 1001, rounds: 1000, mesh: 8, rng: Rng::Philox, chunk: Some(100), stop, ..Settings::default() };
+        let settings = |stop| RoomSettings {
+            photons: 1001,
+            rounds: 1000,
+            mesh: 8,
+            rng: Rng::Philox,
+            chunk: Some(100),
+            stop,
+            ..RoomSettings::default()
+        };
         let (outcome, told) = run_box(gpu, &settings(Stop { photons: Some(5100), error: Some(1e-6), ..Stop::default() }));
         assert_eq!((outcome.end, outcome.film.rounds, outcome.cancelled), (End::Photons, 5, false));
         let emitted = outcome.fates.emitted;
@@ -182,7 +193,7 @@ fn a_run_of_the_box_ends_at_what_is_reached_first() {
         let ledger = told.last().unwrap().ledger;
         assert!(ledger.closes() && ledger == outcome.fates.ledger(), "{ledger:?}");
         // Five whole rounds have the errors that they have alone, and the rest is light.
-        let whole = run_box(gpu, &Settings { rounds: 5, ..settings(Stop::default()) }).0;
+        let whole = run_box(gpu, &RoomSettings { rounds: 5, ..settings(Stop::default()) }).0;
         assert_eq!((whole.end, &whole.film.squares), (End::Rounds, &outcome.film.squares));
         let rest: u64 = outcome.film.unfinished.iter().sum();
         assert_eq!(outcome.film.sums.iter().sum::<u64>(), whole.film.sums.iter().sum::<u64>() + rest);
@@ -201,7 +212,7 @@ fn squares_of_rounds_are_the_same_on_device_and_cpu() {
     let Some(gpu) = device() else { return };
     for shininess in [[None; 5], [Some(3.0); 5]] {
         let settings =
-            Settings { photons: 501, rounds: 7, mesh: 8, shininess, math: Math::Strict, rng: Rng::Philox, ..Settings::default() };
+            RoomSettings { photons: 501, rounds: 7, mesh: 8, shininess, math: Math::Strict, rng: Rng::Philox, ..RoomSettings::default() };
         let (found, expected) = (run_box(Some(&gpu), &settings).0.film, run_box(None, &settings).0.film);
         assert!(found == expected, "{shininess:?}");
     }
@@ -212,32 +223,32 @@ fn squares_of_rounds_are_the_same_on_device_and_cpu() {
 fn bias_counts_in_the_error_that_is_wanted() {
     let gpu = device();
     let stop = |bias| Stop { error: Some(0.2), confidence: CONFIDENCE, bias, ..Stop::default() };
-    let settings = |bias| Settings { photons: 301, rounds: 5000, mesh: 8, rng: Rng::Philox, stop: stop(bias), ..Settings::default() };
+    let settings =
+        |bias| RoomSettings { photons: 301, rounds: 5000, mesh: 8, rng: Rng::Philox, stop: stop(bias), ..RoomSettings::default() };
     let (alone, with) = (run_box(gpu.as_deref(), &settings(None)).0, run_box(gpu.as_deref(), &settings(Some(0.15))).0);
     assert_eq!((alone.end, with.end), (End::Error, End::Error));
     assert!(bound_in_box(&with).hypot(0.15) <= 0.2 && with.film.rounds > alone.film.rounds);
-    let (without_end, told) = run_box(gpu.as_deref(), &Settings { rounds: 100, ..settings(Some(0.25)) });
+    let (without_end, told) = run_box(gpu.as_deref(), &RoomSettings { rounds: 100, ..settings(Some(0.25)) });
     assert_eq!(without_end.end, End::Rounds);
     assert!(told.last().unwrap().error.unwrap() > 0.25);
 }
 
-fn watched(gpu: &Gpu, name: &str, settings: &TransportSettings) -> (transport::RunResult, Vec<Progress>) {
+fn watched(gpu: &Gpu, name: &str, settings: &SceneSettings) -> (scene::RunResult, Vec<Progress>) {
     let scene = scene(name);
     let geometry = Geometry::new(&scene).unwrap();
     let sensor = Sensor::Picture { width: 16, height: 16 };
-    let plan = TransportPlan::new(&scene, &geometry, settings, sensor, &render::limits(gpu.facts())).unwrap();
+    let plan = ScenePlan::new(&scene, &geometry, settings, sensor, &engine::limits(gpu.facts())).unwrap();
     let (never, mut told) = (AtomicBool::new(false), Vec::new());
     let mut tell = |progress: &Progress| told.push(progress.clone());
     let mut control = Control { cancelled: &never, progress: &mut tell };
-    let lit =
-        transport::light(gpu, &View { geometry: &geometry, camera: Some(&camera_of(&scene)), phases: &[] }, plan, &mut control).unwrap();
+    let lit = scene::light(gpu, &View { geometry: &geometry, camera: Some(&camera_of(&scene)), phases: &[] }, plan, &mut control).unwrap();
     (lit, told)
 }
 
 #[test]
 fn a_run_ends_at_its_time_or_its_error_whichever_comes_first() {
     let Some(gpu) = device() else { return };
-    let stop = |error, seconds| TransportSettings {
+    let stop = |error, seconds| SceneSettings {
         rounds: 1 << 20,
         stop: Stop { error, confidence: 0.95, seconds, ..Stop::default() },
         ..settings(1.0, 1)
@@ -250,7 +261,7 @@ fn a_run_ends_at_its_time_or_its_error_whichever_comes_first() {
     assert_eq!(u64::from(lit.film.rounds), told.last().unwrap().done);
     let (lit, _) = watched(&gpu, "cornell", &stop(Some(0.9), Some(1000.0)));
     assert_eq!((lit.end, lit.film.rounds), (End::Error, 30));
-    let (lit, _) = watched(&gpu, "cornell", &TransportSettings { rounds: 7, ..stop(Some(1e-6), Some(1000.0)) });
+    let (lit, _) = watched(&gpu, "cornell", &SceneSettings { rounds: 7, ..stop(Some(1e-6), Some(1000.0)) });
     assert_eq!((lit.end, lit.film.rounds), (End::Rounds, 7));
 }
 
@@ -261,7 +272,7 @@ fn the_end_is_predicted_at_a_tenth_of_the_run() {
     let Some(gpu) = device() else { return };
     let mut off = Vec::new();
     for name in SCENES {
-        let first = watched(&gpu, name, &TransportSettings { rounds: 60, stop: Stop::default(), ..settings(1.0, 3) }).0;
+        let first = watched(&gpu, name, &SceneSettings { rounds: 60, stop: Stop::default(), ..settings(1.0, 3) }).0;
         // About 700 rounds.
         let wanted = error_bound(&first.film, &first.plan, CONFIDENCE) / 3.4;
         if wanted < 1e-5 {

@@ -10,18 +10,18 @@ use crate::common::{
 };
 use glam::Vec2;
 use photonmill::cpu;
+use photonmill::engine::room;
+use photonmill::engine::room::film::RoomFilm;
 use photonmill::error::Error;
-use photonmill::film::Film;
 use photonmill::gpu::{Gpu, Options, check};
 use photonmill::photon::Photon;
 use photonmill::records::MathResults;
-use photonmill::render;
 use photonmill::rng::Rng;
 use photonmill::rng::philox;
 use photonmill::scene::built_in;
 use photonmill::scene::open_box::open_box;
-use photonmill::settings::transport::TransportSettings;
-use photonmill::settings::{Builder, EmissionLaw, Math, Settings};
+use photonmill::settings::scene::SceneSettings;
+use photonmill::settings::{Builder, EmissionLaw, Math, RoomSettings};
 
 /// Numbers of every size, evenly over exponents and mantissas, and those at which functions change their ways.
 fn operands() -> Vec<Vec2> {
@@ -208,7 +208,7 @@ fn spoiled_guesses(quotient: i32, root: i32) -> Vec<(String, Vec<u32>)> {
         ("float native_root(float x) { return sqrt(x); }", spoiled("float native_root(float x)", "sqrt(x)", root)),
         ("uint quotient = uint(native_quotient(float(dividend), float(divisor)) * float(1u << shift));", long_division),
     ];
-    planted::kernels(&["check_math"], "math.glsl", &changes.each_ref().map(|(from, to)| (*from, to.as_str())))
+    planted::kernels(&["check_math"], "math/math.glsl", &changes.each_ref().map(|(from, to)| (*from, to.as_str())))
 }
 
 /// Corrections that never run where a device guesses right. Vulkan allows a quotient 2.5 units in the last place, 3 once
@@ -253,17 +253,17 @@ pub fn rounding_check(gpu: &Gpu) -> Check<Complaint> {
     })
 }
 
-fn strict(settings: &Settings) -> Settings {
-    Settings { math: Math::Strict, ..settings.clone() }
+fn strict(settings: &RoomSettings) -> RoomSettings {
+    RoomSettings { math: Math::Strict, ..settings.clone() }
 }
 
 /// A builder of the device stores the photons that are expected, bit for bit.
-pub fn photons_agree(gpu: &Gpu, settings: &Settings, expected: &[Photon]) -> Check<Complaint> {
-    same_photons(&render::photons_on_gpu(gpu, &open_box(settings), settings)?, expected)
+pub fn photons_agree(gpu: &Gpu, settings: &RoomSettings, expected: &[Photon]) -> Check<Complaint> {
+    same_photons(&room::photons_on_gpu(gpu, &open_box(settings), settings)?, expected)
 }
 
 /// A run on the device leaves the film that is expected, bit for bit.
-pub fn film_agrees(gpu: &Gpu, settings: &Settings, expected: &Film) -> Check<Complaint> {
+pub fn film_agrees(gpu: &Gpu, settings: &RoomSettings, expected: &RoomFilm) -> Check<Complaint> {
     same_sums("the film", &outcome_of(gpu, &open_box(settings), settings)?.film.sums, &expected.sums)
 }
 
@@ -276,7 +276,7 @@ fn the_cpu_builder_agrees_to_the_bit() {
         (EmissionLaw::Cosine, [Some(0.01), Some(0.5), Some(2.0), Some(5.0), Some(1e4)], Rng::Rand48),
         (EmissionLaw::Uniform, [None; 5], Rng::Sobol),
     ] {
-        let settings = strict(&Settings { photons: 50_001, emission, shininess, rng, threads: 2, mesh: 32, ..Settings::default() });
+        let settings = strict(&RoomSettings { photons: 50_001, emission, shininess, rng, threads: 2, mesh: 32, ..RoomSettings::default() });
         let expected = photons_on_cpu(&settings);
         assert_holds(format!("{emission:?}"), photons_agree(&gpu, &settings, &expected));
         let mut spoiled = expected.clone();
@@ -287,7 +287,7 @@ fn the_cpu_builder_agrees_to_the_bit() {
 
         let on_cpu = run_on_cpu(&settings).film;
         for builder in Builder::ON_GPU {
-            let settings = Settings { builder, ..settings.clone() };
+            let settings = RoomSettings { builder, ..settings.clone() };
             assert_holds(format!("{emission:?}, {builder:?}"), film_agrees(&gpu, &settings, &on_cpu));
         }
     }
@@ -306,8 +306,8 @@ fn every_device_finds_these_bits() {
 fn fast_and_strict_differ_by_far_less_than_the_noise() {
     let Some(gpu) = device() else { return };
     let scene = built_in::by_name("cornell-spheres").unwrap();
-    let settings = TransportSettings { rounds: 4, ..small() };
-    let lit = [Math::Fast, Math::Strict].map(|math| picture(&gpu, &scene, &TransportSettings { math, ..settings.clone() }));
+    let settings = SceneSettings { rounds: 4, ..small() };
+    let lit = [Math::Fast, Math::Strict].map(|math| picture(&gpu, &scene, &SceneSettings { math, ..settings.clone() }));
     let rms = |f: &dyn Fn(usize) -> f64| (0..lit[0].film.pixels()).map(|pixel| f(pixel).powi(2)).sum::<f64>().sqrt();
     let difference = rms(&|pixel| (lit[0].film.mean(pixel, &lit[0].plan) - lit[1].film.mean(pixel, &lit[1].plan)).length());
     let noise = rms(&|pixel| lit[1].film.standard_error(pixel, &lit[1].plan).length());

@@ -7,12 +7,12 @@ use std::sync::atomic::AtomicBool;
 use std::time::Duration;
 
 use crate::common::{Check, assert_complains, assert_holds, device, lit, pairs};
-use photonmill::compaction::Agreed;
 use photonmill::gpu::Gpu;
+use photonmill::measure::compaction::Agreed;
+use photonmill::measure::study::axes::Axis;
+use photonmill::measure::study::point::Point;
+use photonmill::measure::study::{self, Part, Request, Study};
 use photonmill::output::destination::Folder;
-use photonmill::study::axes::Axis;
-use photonmill::study::point::Point;
-use photonmill::study::{self, Part, Request, Study};
 
 /// Bounded by rounds alone, so that a slow machine finds the same.
 fn request(scene: &str, most_rounds: u32) -> Request {

@@ -5,27 +5,27 @@ use crate::common::lit::{light, received, run, scene};
 use crate::common::{Check, Complaint, Kind, assert_complains, assert_holds, device, device_with, known, pairs, same_sums, z_check};
 use glam::{DVec3, Vec3};
 use photonmill::constants::GATHER_SLICE;
+use photonmill::engine;
+use photonmill::engine::scene::{self, RunResult, View};
 use photonmill::gpu::{Gpu, Options};
-use photonmill::judge::{Judge, Verdict};
+use photonmill::plan::scene::ScenePlan;
 use photonmill::plan::sensor::Sensor;
-use photonmill::plan::transport::TransportPlan;
-use photonmill::render;
 use photonmill::scene::geometry::Geometry;
 use photonmill::scene::light::{Light, LightKind};
 use photonmill::scene::{Camera, Material, Mesh, Scene, Surface};
-use photonmill::settings::transport::{Effect, Illumination, Kernel, Part, TransportSettings};
+use photonmill::settings::scene::{Effect, Illumination, Kernel, Part, SceneSettings};
 use photonmill::settings::{Builder, EmissionLaw};
-use photonmill::transport::{self, RunResult, View};
+use photonmill::verify::judge::{Judge, Verdict};
 
 const SIZE: u32 = 24;
 
-fn small() -> TransportSettings {
-    TransportSettings { photons: 3000, caustic_photons: 3000, rounds: 3, shadow_rays: 2, ..TransportSettings::default() }
+fn small() -> SceneSettings {
+    SceneSettings { photons: 3000, caustic_photons: 3000, rounds: 3, shadow_rays: 2, ..SceneSettings::default() }
 }
 
-fn plan_of(gpu: &Gpu, scene: &Scene, settings: &TransportSettings, sensor: Sensor) -> (Geometry, TransportPlan) {
+fn plan_of(gpu: &Gpu, scene: &Scene, settings: &SceneSettings, sensor: Sensor) -> (Geometry, ScenePlan) {
     let geometry = Geometry::new(&scene.without(&settings.without)).unwrap();
-    let plan = TransportPlan::new(scene, &geometry, settings, sensor, &render::limits(gpu.facts())).unwrap();
+    let plan = ScenePlan::new(scene, &geometry, settings, sensor, &engine::limits(gpu.facts())).unwrap();
     (geometry, plan)
 }
 
@@ -33,13 +33,13 @@ fn camera_of(scene: &Scene) -> Camera {
     scene.cameras.first().cloned().unwrap_or_else(|| Camera::around(scene.bounds().0, scene.bounds().1))
 }
 
-pub fn picture(gpu: &Gpu, scene: &Scene, settings: &TransportSettings) -> RunResult {
+pub fn picture(gpu: &Gpu, scene: &Scene, settings: &SceneSettings) -> RunResult {
     let (geometry, plan) = plan_of(gpu, scene, settings, Sensor::Picture { width: SIZE, height: SIZE });
     light(gpu, &View { geometry: &geometry, camera: Some(&camera_of(scene)), phases: &[] }, plan)
 }
 
 /// Mean and standard error of the irradiance at points, W/m2.
-fn irradiance(gpu: &Gpu, scene: &Scene, settings: &TransportSettings, points: &[(DVec3, DVec3)]) -> Vec<(DVec3, DVec3)> {
+fn irradiance(gpu: &Gpu, scene: &Scene, settings: &SceneSettings, points: &[(DVec3, DVec3)]) -> Vec<(DVec3, DVec3)> {
     let lit = received(gpu, scene, settings, points);
     (0..points.len()).map(|point| (lit.film.mean(point, &lit.plan), lit.film.standard_error(point, &lit.plan))).collect()
 }
@@ -50,10 +50,10 @@ fn same_film(what: &str, found: &RunResult, expected: &RunResult) -> Check<Compl
 }
 
 /// Lists of survivors in any order give the same picture. What a list without a survivor shows may be odd in any way.
-pub fn appends_agree(gpu: &Gpu, scene: &Scene, settings: &TransportSettings) -> Check<Complaint> {
+pub fn appends_agree(gpu: &Gpu, scene: &Scene, settings: &SceneSettings) -> Check<Complaint> {
     let camera = camera_of(scene);
     let of = |builder| {
-        let settings = TransportSettings { builder: Some(builder), ..settings.clone() };
+        let settings = SceneSettings { builder: Some(builder), ..settings.clone() };
         let (geometry, plan) = plan_of(gpu, scene, &settings, Sensor::Picture { width: SIZE, height: SIZE });
         run(gpu, &View { geometry: &geometry, camera: Some(&camera), phases: &[] }, plan)
     };
@@ -66,19 +66,19 @@ pub fn appends_agree(gpu: &Gpu, scene: &Scene, settings: &TransportSettings) -> 
 fn no_split_and_no_builder_changes_a_bit() {
     let Some(gpu) = device() else { return };
     let scene = scene("cornell-spheres");
-    let usual = || TransportSettings { samples: 2, ..small() };
+    let usual = || SceneSettings { samples: 2, ..small() };
     let reference = picture(&gpu, &scene, &usual());
     let builders = [
-        ("ballot builder", TransportSettings { builder: Some(Builder::Ballot), ..usual() }),
-        ("chunks of 701", TransportSettings { chunk: Some(701), ..usual() }),
-        ("work groups of 32", TransportSettings { group_size: 32, ..usual() }),
+        ("ballot builder", SceneSettings { builder: Some(Builder::Ballot), ..usual() }),
+        ("chunks of 701", SceneSettings { chunk: Some(701), ..usual() }),
+        ("work groups of 32", SceneSettings { group_size: 32, ..usual() }),
     ];
     for (what, settings) in builders {
         assert_holds(what, same_film(what, &picture(&gpu, &scene, &settings), &reference));
     }
     assert_holds("all builders", appends_agree(&gpu, &scene, &usual()));
     assert_holds("again", same_film("again", &picture(&gpu, &scene, &usual()), &reference));
-    let other = picture(&gpu, &scene, &TransportSettings { seed: 2, ..usual() });
+    let other = picture(&gpu, &scene, &SceneSettings { seed: 2, ..usual() });
     assert_complains("another seed", same_film("another seed", &other, &reference));
     drop(gpu);
 
@@ -95,8 +95,8 @@ fn crowded_points_miss_no_photon() {
 /// Points near which more photons lie than an invocation tests: others share them, as small chunks do.
 pub fn crowd_check(gpu: &Gpu) -> Check<Complaint> {
     let scene = scene("cornell");
-    let crowded = TransportSettings { photons: 20_000, radius: Some(1.0), rounds: 1, ..small() };
-    let few = TransportSettings { chunk: Some(700), ..crowded.clone() };
+    let crowded = SceneSettings { photons: 20_000, radius: Some(1.0), rounds: 1, ..small() };
+    let few = SceneSettings { chunk: Some(700), ..crowded.clone() };
     let [whole, parts] = [&crowded, &few].map(|settings| picture(gpu, &scene, settings));
     // Few enough photons in a chunk that no point has more candidates than one slice.
     let stored = whole.fates[0].ledger().stored;
@@ -145,7 +145,7 @@ fn every_pixel_of_walls_that_shine_is_the_same() {
 fn persistent_photons_are_the_same_in_several_dispatches() {
     let Some(gpu) = device() else { return };
     let scene = scene("cornell");
-    let of = |builder| picture(&gpu, &scene, &TransportSettings { builder: Some(builder), photons: 70_001, rounds: 1, ..small() });
+    let of = |builder| picture(&gpu, &scene, &SceneSettings { builder: Some(builder), photons: 70_001, rounds: 1, ..small() });
     let what = "70 001 photons";
     assert_holds(what, same_film(what, &of(Builder::Persistent), &of(Builder::Ballot)));
 }
@@ -157,12 +157,12 @@ fn the_four_parts_add_up_to_the_whole_to_the_bit() {
     let scene = scene("cornell-spheres");
     for settings in [
         small(),
-        TransportSettings { samples: 4, ..small() },
-        TransportSettings { samples: 4, final_gather: true, ..small() },
-        TransportSettings { illumination: Illumination::Photons, ..small() },
+        SceneSettings { samples: 4, ..small() },
+        SceneSettings { samples: 4, final_gather: true, ..small() },
+        SceneSettings { illumination: Illumination::Photons, ..small() },
     ] {
         let whole = picture(&gpu, &scene, &settings);
-        let parts: Vec<RunResult> = Part::EACH.map(|part| picture(&gpu, &scene, &TransportSettings { part, ..settings.clone() })).into();
+        let parts: Vec<RunResult> = Part::EACH.map(|part| picture(&gpu, &scene, &SceneSettings { part, ..settings.clone() })).into();
         for (sum, place) in whole.film.sums.iter().zip(0..) {
             let of_parts: u64 = parts.iter().map(|part| part.film.sums[place]).sum();
             assert_eq!(*sum, of_parts, "sum {place}, {:?}", settings.illumination);
@@ -183,13 +183,13 @@ fn an_effect_that_the_scene_lacks_changes_no_bit() {
         let reference = picture(&gpu, &scene, &small());
         for decision in reference.plan.decisions.iter().filter(|decision| !decision.needed) {
             let effect = decision.effect;
-            let forced = picture(&gpu, &scene, &TransportSettings { with: vec![effect], ..small() });
+            let forced = picture(&gpu, &scene, &SceneSettings { with: vec![effect], ..small() });
             assert!(forced.plan.keeps(effect));
             assert_holds(effect.name(), same_film(&format!("{name} with {}", effect.name()), &forced, &reference));
         }
         // A list instead of a tree finds the same.
         if name == "cornell" {
-            let list = picture(&gpu, &scene, &TransportSettings { without: vec![Effect::Bvh], ..small() });
+            let list = picture(&gpu, &scene, &SceneSettings { without: vec![Effect::Bvh], ..small() });
             assert_holds("list", same_film("list", &list, &reference));
         }
     }
@@ -237,24 +237,24 @@ fn rich_scene() -> Scene {
 fn an_effect_that_the_scene_needs_is_missed_when_it_is_left_out() {
     let Some(gpu) = device() else { return };
     let scene = rich_scene();
-    let settings = TransportSettings { rounds: 12, ..small() };
+    let settings = SceneSettings { rounds: 12, ..small() };
     let reference = picture(&gpu, &scene, &settings);
     for effect in Effect::ALL {
         let decision = reference.plan.decisions.iter().find(|decision| decision.effect == effect).unwrap();
         assert!(decision.needed && decision.kept, "{}: {}", effect.name(), decision.evidence);
         if effect == Effect::Bvh {
             // So many triangles cannot be a list; of few the bits are the same, as the test above shows.
-            let settings = TransportSettings { without: vec![effect], ..settings.clone() };
+            let settings = SceneSettings { without: vec![effect], ..settings.clone() };
             let geometry = Geometry::new(&scene).unwrap();
-            let refused = TransportPlan::new(&scene, &geometry, &settings, reference.plan.sensor, &render::limits(gpu.facts()));
+            let refused = ScenePlan::new(&scene, &geometry, &settings, reference.plan.sensor, &engine::limits(gpu.facts()));
             assert!(refused.unwrap_err().to_string().starts_with("--without bvh"));
             continue;
         }
         // Faint caustics show best by themselves.
         let is_caustic = matches!(effect, Effect::ReflectiveCaustics | Effect::RefractiveCaustics);
-        let settings = TransportSettings { part: if is_caustic { Part::Caustic } else { Part::All }, ..settings.clone() };
+        let settings = SceneSettings { part: if is_caustic { Part::Caustic } else { Part::All }, ..settings.clone() };
         let reference = if is_caustic { &picture(&gpu, &scene, &settings) } else { &reference };
-        let without = picture(&gpu, &scene, &TransportSettings { without: vec![effect], ..settings });
+        let without = picture(&gpu, &scene, &SceneSettings { without: vec![effect], ..settings });
         assert_eq!(without.plan.missing(), [effect]);
         // Somewhere, or over the whole picture, the two differ by more than their errors.
         let (mut worst, mut sum, mut variance) = (0.0f64, 0.0, 0.0);
@@ -276,10 +276,10 @@ fn what_is_dropped_is_not_there() {
     let Some(gpu) = device() else { return };
     let cornell = scene("cornell");
     // So few bounces are one segment, whatever the device.
-    let small = || TransportSettings { bounces: 8, ..small() };
-    let all = picture(&gpu, &cornell, &TransportSettings { with: vec![Effect::RefractiveCaustics], ..small() });
+    let small = || SceneSettings { bounces: 8, ..small() };
+    let all = picture(&gpu, &cornell, &SceneSettings { with: vec![Effect::RefractiveCaustics], ..small() });
     let needed = picture(&gpu, &cornell, &small());
-    let direct = picture(&gpu, &cornell, &TransportSettings { part: Part::Direct, ..small() });
+    let direct = picture(&gpu, &cornell, &SceneSettings { part: Part::Direct, ..small() });
     let count = |lit: &RunResult, pass: &str| lit.timings.row(pass).map_or(0, |row| row.count);
     for (lit, global, caustic) in [(&all, 3, 3), (&needed, 3, 0), (&direct, 0, 0)] {
         assert_eq!(count(lit, "round/global"), global);
@@ -296,8 +296,8 @@ fn what_is_dropped_is_not_there() {
     // Of pipelines only those of the plan, each made once.
     let fresh = device_with(Options::default()).unwrap();
     let before = fresh.pipeline_count();
-    let lit = picture(&fresh, &cornell, &TransportSettings { part: Part::Direct, ..small() });
-    assert_eq!(lit.pipelines, transport::modules(&lit.plan, fresh.facts()).len());
+    let lit = picture(&fresh, &cornell, &SceneSettings { part: Part::Direct, ..small() });
+    assert_eq!(lit.pipelines, scene::modules(&lit.plan, fresh.facts()).len());
     assert_eq!(fresh.pipeline_count() - before, lit.pipelines);
     assert_eq!(lit.pipelines, 2);
 }
@@ -330,7 +330,7 @@ fn no_number_of_samples_changes_the_light() {
 fn samples_of_a_pixel_leave_little_noise() {
     let Some(gpu) = device() else { return };
     let error = |samples, shadow_rays, rounds| {
-        let settings = TransportSettings { part: Part::Direct, samples, shadow_rays, rounds, ..small() };
+        let settings = SceneSettings { part: Part::Direct, samples, shadow_rays, rounds, ..small() };
         let lit = picture(&gpu, &scene("cornell"), &settings);
         lit.film.relative_error(&lit.plan)
     };
@@ -349,10 +349,10 @@ fn a_furnace_is_equally_bright_everywhere() {
         (DVec3::new(0.0, 0.37, 0.998), DVec3::X),
         (DVec3::new(0.31, 0.44, 0.52), DVec3::new(0.6, 0.0, 0.8)),
     ];
-    let settings = TransportSettings { rounds: 40, photons: 20_000, bounces: 200, ..TransportSettings::default() };
+    let settings = SceneSettings { rounds: 40, photons: 20_000, bounces: 200, ..SceneSettings::default() };
     for kernel in [Kernel::Box, Kernel::Cone, Kernel::Epanechnikov] {
         for illumination in [Illumination::Split, Illumination::Photons] {
-            let settings = TransportSettings { kernel, illumination, ..settings.clone() };
+            let settings = SceneSettings { kernel, illumination, ..settings.clone() };
             let exact = std::f64::consts::PI / (1.0 - 0.5);
             let found = irradiance(&gpu, &scene("furnace"), &settings, &points);
             for ((point, _), (mean, error)) in pairs(&points, &found) {
@@ -365,7 +365,7 @@ fn a_furnace_is_equally_bright_everywhere() {
     let wrong = irradiance(
         &gpu,
         &scene("furnace"),
-        &TransportSettings { edge_correction: false, illumination: Illumination::Photons, ..settings },
+        &SceneSettings { edge_correction: false, illumination: Illumination::Photons, ..settings },
         &points,
     );
     let edge = wrong[1];
@@ -381,13 +381,13 @@ fn radiance_and_irradiance_of_a_wall_agree() {
     // One pixel that looks at a small patch of the back wall.
     let target = DVec3::new(0.8, 0.75, 0.0);
     scene.cameras = vec![Camera::looking_at("patch", DVec3::new(0.6, 0.5, 2.0), target, DVec3::Y, 0.002)];
-    let settings = TransportSettings { rounds: 60, photons: 4000, shadow_rays: 8, ..TransportSettings::default() };
+    let settings = SceneSettings { rounds: 60, photons: 4000, shadow_rays: 8, ..SceneSettings::default() };
     for final_gather in [false, true] {
-        let settings = TransportSettings { final_gather, ..settings.clone() };
+        let settings = SceneSettings { final_gather, ..settings.clone() };
         let (geometry, plan) = plan_of(&gpu, &scene, &settings, Sensor::Picture { width: 1, height: 1 });
         let lit = light(&gpu, &View { geometry: &geometry, camera: scene.cameras.first(), phases: &[] }, plan);
         let (radiance, radiance_error) = (lit.film.mean(0, &lit.plan), lit.film.standard_error(0, &lit.plan));
-        let other = TransportSettings { seed: 9, ..settings };
+        let other = SceneSettings { seed: 9, ..settings };
         let (irradiance, irradiance_error) = irradiance(&gpu, &scene, &other, &[(target, DVec3::Z)])[0];
         for channel in 0..3 {
             let share = albedo[channel] / std::f64::consts::PI;
@@ -416,7 +416,7 @@ fn no_light_leaks_through_thin_walls() {
     scene.meshes.push(Mesh::parallelogram("thin, lit side", DVec3::X * 0.5, z, y, 0));
     scene.meshes.push(Mesh::parallelogram("thin, dark side", DVec3::X * 0.502, y, z, 0));
     scene.meshes.push(Mesh::parallelogram("lamp", DVec3::new(0.1, 0.9, 0.3), DVec3::X * 0.2, z * 0.2, 1));
-    let settings = TransportSettings { radius: Some(0.1), photons: 20_000, rounds: 6, ..TransportSettings::default() };
+    let settings = SceneSettings { radius: Some(0.1), photons: 20_000, rounds: 6, ..SceneSettings::default() };
     let lit_side = (DVec3::new(0.5, 0.5, 0.5), DVec3::NEG_X);
     let dark = [
         (DVec3::new(0.502, 0.5, 0.5), DVec3::X),
@@ -446,9 +446,9 @@ fn no_light_leaks_from_one_shelf_to_the_next() {
 fn radii_shrink_as_published() {
     let geometry = Geometry::new(&scene("cornell")).unwrap();
     let limits = photonmill::plan::Limits::of_host();
-    let settings = TransportSettings { radius: Some(0.25), ..small() };
+    let settings = SceneSettings { radius: Some(0.25), ..small() };
     let sensor = Sensor::Picture { width: 4, height: 4 };
-    let plan = TransportPlan::new(&scene("cornell"), &geometry, &settings, sensor, &limits).unwrap();
+    let plan = ScenePlan::new(&scene("cornell"), &geometry, &settings, sensor, &limits).unwrap();
     let map = plan.global.as_ref().unwrap();
     let mut squared = map.radius * map.radius;
     for round in 0..40 {
@@ -457,7 +457,7 @@ fn radii_shrink_as_published() {
         let i = f64::from(round + 1);
         squared *= (i + 2.0 / 3.0) / (i + 1.0);
     }
-    let fixed = TransportPlan::new(&scene("cornell"), &geometry, &TransportSettings { alpha: 1.0, ..settings }, sensor, &limits).unwrap();
+    let fixed = ScenePlan::new(&scene("cornell"), &geometry, &SceneSettings { alpha: 1.0, ..settings }, sensor, &limits).unwrap();
     assert_eq!(fixed.radius(map, 39), map.radius);
 }
 
@@ -477,7 +477,7 @@ fn a_scene_without_light_is_black_and_costs_no_photon() {
 fn stated_errors_are_the_spread_over_seeds() {
     let Some(gpu) = device() else { return };
     let scene = scene("cornell");
-    let runs: Vec<RunResult> = (0..120).map(|seed| picture(&gpu, &scene, &TransportSettings { seed, rounds: 8, ..small() })).collect();
+    let runs: Vec<RunResult> = (0..120).map(|seed| picture(&gpu, &scene, &SceneSettings { seed, rounds: 8, ..small() })).collect();
     let pixels = runs[0].film.pixels();
     let (mut stated, mut spread) = (0.0, 0.0);
     for pixel in 0..pixels {
@@ -502,7 +502,7 @@ fn pictures_agree_with_the_judge() {
         ("caustic-sphere", 20_000, 64, 768),
     ] {
         let scene = scene(name);
-        let settings = TransportSettings { photons, caustic_photons: photons, rounds, ..TransportSettings::default() };
+        let settings = SceneSettings { photons, caustic_photons: photons, rounds, ..SceneSettings::default() };
         let lit = picture(&gpu, &scene, &settings);
         let judged = Judge::new(&scene, settings.bounces).image(&camera_of(&scene), SIZE, SIZE, samples, 77);
         let means: Vec<DVec3> = (0..lit.film.pixels()).map(|pixel| lit.film.mean(pixel, &lit.plan)).collect();

@@ -10,42 +10,43 @@ use crate::common::{
 use glam::{DVec3, Vec3};
 use photonmill::cpu;
 use photonmill::cpu::tree::Tree;
-use photonmill::film::{Film, estimate_walls};
+use photonmill::engine::room::film::{RoomFilm, estimate_walls};
 use photonmill::gpu::{Commands, Gpu, Options};
 use photonmill::photon::Photon;
-use photonmill::plan::{Limits, Plan};
+use photonmill::plan::{Limits, RoomPlan};
 
-use photonmill::render::constants;
-use photonmill::resources::Resources;
+use photonmill::engine::room::constants;
+use photonmill::engine::room::estimate;
+use photonmill::engine::room::index;
+use photonmill::engine::room::resources::RoomResources;
 use photonmill::rng::{Rng, philox};
 use photonmill::scene::open_box::open_box;
-use photonmill::settings::{Builder, Gather, Math, Settings};
-use photonmill::{estimate, index};
+use photonmill::settings::{Builder, Gather, Math, RoomSettings};
 
-fn by_tree(settings: &Settings) -> Settings {
-    Settings { gather: Gather::KdTree, ..settings.clone() }
+fn by_tree(settings: &RoomSettings) -> RoomSettings {
+    RoomSettings { gather: Gather::KdTree, ..settings.clone() }
 }
 
 /// Settings whose photon map holds a list of photons.
-fn room_for(photons: &[Photon], settings: &Settings) -> Settings {
+fn room_for(photons: &[Photon], settings: &RoomSettings) -> RoomSettings {
     let photons = (photons.len() as u32).max(2);
-    Settings { photons, bounces: 1, chunk: Some(photons), rng: Rng::Philox, ..settings.clone() }
+    RoomSettings { photons, bounces: 1, chunk: Some(photons), rng: Rng::Philox, ..settings.clone() }
 }
 
 /// The device's gather of photons that are handed to it.
-fn gathered_on_gpu(gpu: &Gpu, settings: &Settings, photons: &[Photon]) -> Vec<u64> {
+fn gathered_on_gpu(gpu: &Gpu, settings: &RoomSettings, photons: &[Photon]) -> Vec<u64> {
     let scene = open_box(settings);
     let plan = plan_for(gpu, &scene, settings);
     assert!(photons.len() <= plan.photon_capacity as usize && plan.chunks_per_round == 1);
     let mut commands = Commands::new(gpu, constants(&plan), Instant::now()).unwrap();
-    let resources = Resources::new(gpu, &mut commands, &scene, &plan).unwrap();
+    let resources = RoomResources::new(gpu, &mut commands, &scene, &plan).unwrap();
     upload_photons(&mut commands, &resources, &plan, photons);
     index::build(&mut commands, &resources, &plan, settings.photons).unwrap();
     estimate::gather(&mut commands, &resources, &plan, settings.photons).unwrap();
     commands.read(&resources.film, plan.points.len() * plan.channel_count as usize).unwrap()
 }
 
-fn gathered_on_cpu(plan: &Plan, photons: &[Photon]) -> Vec<u64> {
+fn gathered_on_cpu(plan: &RoomPlan, photons: &[Photon]) -> Vec<u64> {
     let mut sums = vec![0; plan.points.len() * plan.channel_count as usize];
     match (plan.settings.gather, plan.settings.nearest) {
         (Gather::KdTree, Some(count)) => {
@@ -80,8 +81,8 @@ fn scattered(count: u32) -> Vec<Photon> {
 }
 
 /// Two channels, so that flux and weight are both seen.
-fn two_channels() -> Settings {
-    Settings { mesh: 13, shininess: [Some(2.0); 5], ..Settings::default() }
+fn two_channels() -> RoomSettings {
+    RoomSettings { mesh: 13, shininess: [Some(2.0); 5], ..RoomSettings::default() }
 }
 
 #[test]
@@ -90,8 +91,8 @@ fn the_tree_gives_the_films_of_brute_force_for_every_number_of_photons() {
     for count in [0, 1, 2, 7, 8, 9, 40, 41, 640, 1000, 20_000] {
         let map = scattered(count);
         for radius in [0.5 / 65_536.0, 0.003, 0.05, 0.5] {
-            let settings = room_for(&map, &Settings { radius, ..two_channels() });
-            let expected = gathered_on_cpu(&plan_for_host(&Settings { gather: Gather::Brute, ..settings.clone() }), &map);
+            let settings = room_for(&map, &RoomSettings { radius, ..two_channels() });
+            let expected = gathered_on_cpu(&plan_for_host(&RoomSettings { gather: Gather::Brute, ..settings.clone() }), &map);
             let settings = by_tree(&settings);
             let what = format!("{count} photons, radius {radius}");
             assert_holds(format!("CPU, {what}"), equal_sums("film", &gathered_on_cpu(&plan_for_host(&settings), &map), &expected));
@@ -102,7 +103,7 @@ fn the_tree_gives_the_films_of_brute_force_for_every_number_of_photons() {
     }
 }
 
-fn film(gpu: &Gpu, settings: &Settings) -> Film {
+fn film(gpu: &Gpu, settings: &RoomSettings) -> RoomFilm {
     run(gpu, settings).film
 }
 
@@ -110,11 +111,14 @@ fn film(gpu: &Gpu, settings: &Settings) -> Film {
 fn builders_and_splits_give_the_bits_of_the_grid() {
     let Some(gpu) = device() else { return };
     let lesser = device_with(Options { without_int64_atomics: true, ..Options::default() }).unwrap();
-    let paper = Settings { mesh: 19, ..Settings::default() };
+    let paper = RoomSettings { mesh: 19, ..RoomSettings::default() };
     let glossy = [Some(2.0), None, Some(0.5), Some(0.01), Some(5.0)];
     for (what, settings) in [
         ("Lambertian walls", paper.clone()),
-        ("two channels, rounds", Settings { photons: 1201, rounds: 3, shininess: glossy, light_power: [3.0, 0.2], radius: 0.025, ..paper }),
+        (
+            "two channels, rounds",
+            RoomSettings { photons: 1201, rounds: 3, shininess: glossy, light_power: [3.0, 0.2], radius: 0.025, ..paper },
+        ),
     ] {
         let expected = film(&gpu, &settings);
         assert!(expected.sums.iter().filter(|sum| **sum > 0).count() > expected.sums.len() / 2);
@@ -122,22 +126,22 @@ fn builders_and_splits_give_the_bits_of_the_grid() {
             for builder in Builder::ON_GPU {
                 let chunk = [None, Some(301), Some(1024)][place];
                 let group_size = group_size.min(gpu.facts().work_group_size);
-                let other = Settings { builder, group_size, counters: [None, Some(4), Some(16)][place], chunk, ..by_tree(&settings) };
+                let other = RoomSettings { builder, group_size, counters: [None, Some(4), Some(16)][place], chunk, ..by_tree(&settings) };
                 let found = film(&gpu, &other);
                 assert_eq!((found.channel_count, found.scale), (expected.channel_count, expected.scale));
                 assert_holds(format!("{what}, {builder:?}, groups of {group_size}"), equal_sums("film", &found.sums, &expected.sums));
             }
         }
         assert_holds(format!("{what}, 32 bits"), equal_sums("film", &film(&lesser, &by_tree(&settings)).sums, &expected.sums));
-        let settings = Settings { threads: 2, ..settings };
+        let settings = RoomSettings { threads: 2, ..settings };
         let (tree, grid) = (run_on_cpu(&by_tree(&settings)).film, run_on_cpu(&settings).film);
         assert_holds(format!("{what}, CPU"), equal_sums("film", &tree.sums, &grid.sums));
     }
     // Nothing is stored in a black box, and the whole line still runs.
     for builder in Builder::ON_GPU {
-        let black = by_tree(&Settings { reflectance: 0.0, builder, mesh: 8, ..Settings::default() });
+        let black = by_tree(&RoomSettings { reflectance: 0.0, builder, mesh: 8, ..RoomSettings::default() });
         assert!(film(&gpu, &black).sums.iter().all(|sum| *sum == 0));
-        assert!(film(&gpu, &Settings { nearest: Some(5), ..black }).sums.iter().all(|sum| *sum == 0));
+        assert!(film(&gpu, &RoomSettings { nearest: Some(5), ..black }).sums.iter().all(|sum| *sum == 0));
     }
 }
 
@@ -147,8 +151,8 @@ fn long_lists_are_gathered_to_the_end() {
     let Some(gpu) = device() else { return };
     let map: Vec<Photon> =
         scattered(80_000).into_iter().map(|photon| Photon { wall: 4, position: photon.position.with_z(-0.25), ..photon }).collect();
-    let settings = room_for(&map, &Settings { radius: 0.5, mesh: 3, ..by_tree(&two_channels()) });
-    let expected = gathered_on_cpu(&plan_for_host(&Settings { gather: Gather::Brute, ..settings.clone() }), &map);
+    let settings = room_for(&map, &RoomSettings { radius: 0.5, mesh: 3, ..by_tree(&two_channels()) });
+    let expected = gathered_on_cpu(&plan_for_host(&RoomSettings { gather: Gather::Brute, ..settings.clone() }), &map);
     let found = gathered_on_gpu(&gpu, &settings, &map);
     assert_holds("80 000 photons", equal_sums("film", &found, &expected));
     let cut_short = gathered_on_cpu(&plan_for_host(&settings), &map[..65_535]);
@@ -157,7 +161,7 @@ fn long_lists_are_gathered_to_the_end() {
 
 /// Flux of the nearest photons scaled to the disc of the radius, from the description alone: all photons of the wall
 /// sorted by their distance in f64.
-fn expected_flux(plan: &Plan, photons: &[Photon], nearest: usize, point: usize) -> [f64; 2] {
+fn expected_flux(plan: &RoomPlan, photons: &[Photon], nearest: usize, point: usize) -> [f64; 2] {
     let settings = &plan.settings;
     let scene = open_box(settings);
     let (position, wall) = (plan.points[point].position.as_dvec3(), plan.points[point].wall);
@@ -181,7 +185,7 @@ fn expected_flux(plan: &Plan, photons: &[Photon], nearest: usize, point: usize) 
         .map(|sum| sum * factor)
 }
 
-fn nearest_check(plan: &Plan, photons: &[Photon], nearest: usize, sums: &[u64]) -> Check {
+fn nearest_check(plan: &RoomPlan, photons: &[Photon], nearest: usize, sums: &[u64]) -> Check {
     for point in 0..plan.points.len() {
         for (channel, expected) in expected_flux(plan, photons, nearest, point).into_iter().enumerate() {
             let found = sums[point * 2 + channel] as f64 / plan.film_scale();
@@ -202,7 +206,7 @@ fn the_nearest_photons_are_those_that_f64_finds() {
     for (count, radius) in [(0, 0.05), (1, 0.5), (3, 0.5), (30, 0.5), (1000, 0.05), (1000, 0.5), (6000, 0.2)] {
         let map = scattered(count);
         for nearest in [2, 3, 10, 64, 1000] {
-            let settings = Settings { nearest: Some(nearest), radius, mesh: 5, ..by_tree(&two_channels()) };
+            let settings = RoomSettings { nearest: Some(nearest), radius, mesh: 5, ..by_tree(&two_channels()) };
             let settings = room_for(&map, &settings);
             let plan = plan_for_host(&settings);
             let what = format!("{nearest} of {count} photons, radius {radius}");
@@ -214,7 +218,7 @@ fn the_nearest_photons_are_those_that_f64_finds() {
             }
             if let Some(gpu) = &gpu {
                 for math in [Math::Fast, Math::Strict] {
-                    let found = gathered_on_gpu(gpu, &Settings { math, ..settings.clone() }, &map);
+                    let found = gathered_on_gpu(gpu, &RoomSettings { math, ..settings.clone() }, &map);
                     assert_holds(format!("GPU, {math:?}, {what}"), nearest_check(&plan, &map, nearest as usize, &found));
                     if math == Math::Strict {
                         assert_holds(format!("GPU, {what}"), equal_sums("film", &found, &on_cpu));
@@ -251,7 +255,7 @@ fn ties_are_broken_by_the_photons_number_in_any_order() {
     let mut shuffled = map.clone();
     shuffled.sort_by_key(|photon| philox([photon.photon, photon.bounce, 0, 0], [3, 4])[0]);
     for nearest in [2, 5, 37, 100, 901] {
-        let settings = Settings { nearest: Some(nearest), radius: 0.2, mesh: 8, math: Math::Strict, ..by_tree(&two_channels()) };
+        let settings = RoomSettings { nearest: Some(nearest), radius: 0.2, mesh: 8, math: Math::Strict, ..by_tree(&two_channels()) };
         let settings = room_for(&map, &settings);
         let plan = plan_for_host(&settings);
         let expected = gathered_on_cpu(&plan, &map);
@@ -264,7 +268,7 @@ fn ties_are_broken_by_the_photons_number_in_any_order() {
         }
     }
     let renumbered: Vec<Photon> = map.iter().map(|photon| Photon { photon: 1000 - photon.photon, ..*photon }).collect();
-    let plan = plan_for_host(&room_for(&map, &Settings { nearest: Some(20), radius: 0.2, mesh: 8, ..by_tree(&two_channels()) }));
+    let plan = plan_for_host(&room_for(&map, &RoomSettings { nearest: Some(20), radius: 0.2, mesh: 8, ..by_tree(&two_channels()) }));
     assert_complains("other numbers", equal_sums("film", &gathered_on_cpu(&plan, &renumbered), &gathered_on_cpu(&plan, &map)));
 }
 
@@ -282,7 +286,7 @@ fn a_search_goes_on_for_as_long_as_it_takes() {
     };
     let map: Vec<Photon> = (0..70_000).rev().map(at).collect();
     for nearest in [2, 1024] {
-        let settings = Settings { nearest: Some(nearest), radius: 0.5, mesh: 2, math: Math::Strict, ..by_tree(&two_channels()) };
+        let settings = RoomSettings { nearest: Some(nearest), radius: 0.5, mesh: 2, math: Math::Strict, ..by_tree(&two_channels()) };
         let settings = room_for(&map, &settings);
         let expected = gathered_on_cpu(&plan_for_host(&settings), &map);
         assert!(expected.iter().any(|sum| *sum > 0));
@@ -296,7 +300,7 @@ fn builders_and_the_cpu_take_the_same_nearest_photons() {
     let lesser = device_with(Options { without_int64_atomics: true, ..Options::default() }).unwrap();
     let glossy = [Some(2.0), None, Some(0.5), Some(0.01), Some(5.0)];
     for (nearest, rounds) in [(40, 1), (6, 3)] {
-        let settings = Settings {
+        let settings = RoomSettings {
             nearest: Some(nearest),
             rounds,
             mesh: 33,
@@ -304,17 +308,17 @@ fn builders_and_the_cpu_take_the_same_nearest_photons() {
             light_power: [3.0, 0.2],
             math: Math::Strict,
             threads: 2,
-            ..by_tree(&Settings::default())
+            ..by_tree(&RoomSettings::default())
         };
         let expected = run_on_cpu(&settings).film;
         for (place, builder) in Builder::ON_GPU.into_iter().enumerate() {
-            let other = Settings { builder, group_size: [128, 32, 64][place % 3], ..settings.clone() };
+            let other = RoomSettings { builder, group_size: [128, 32, 64][place % 3], ..settings.clone() };
             let found = film(&gpu, &other);
             assert_eq!((found.channel_count, found.scale), (expected.channel_count, expected.scale));
             assert_holds(format!("{nearest} nearest, {builder:?}"), equal_sums("film", &found.sums, &expected.sums));
         }
         assert_holds("32 bits", equal_sums("film", &film(&lesser, &settings).sums, &expected.sums));
-        let one_channel = Settings { shininess: [None; 5], light_power: [1.0; 2], ..settings };
+        let one_channel = RoomSettings { shininess: [None; 5], light_power: [1.0; 2], ..settings };
         let (found, expected) = (film(&gpu, &one_channel), run_on_cpu(&one_channel).film);
         assert_eq!(found.channel_count, 1);
         assert_holds("one channel", equal_sums("film", &found.sums, &expected.sums));
@@ -326,8 +330,8 @@ fn builders_and_the_cpu_take_the_same_nearest_photons() {
 #[test]
 fn the_estimate_has_no_bias() {
     for (nearest, radius) in [(4, 0.5), (10, 0.06), (10, 0.5), (60, 0.2)] {
-        let settings = by_tree(&Settings { nearest: Some(nearest), radius, mesh: 3, photons: 4000, ..Settings::default() });
-        let plan = Plan { settings: Settings { bounces: 1, ..settings.clone() }, ..plan_for_host(&settings) };
+        let settings = by_tree(&RoomSettings { nearest: Some(nearest), radius, mesh: 3, photons: 4000, ..RoomSettings::default() });
+        let plan = RoomPlan { settings: RoomSettings { bounces: 1, ..settings.clone() }, ..plan_for_host(&settings) };
         let scene = open_box(&plan.settings);
         let rounds = 400;
         // By wall and round: mean of radiosity of its texels, corners, edges and middle.
@@ -348,7 +352,7 @@ fn the_estimate_has_no_bias() {
                 };
                 let map: Vec<Photon> =
                     (0..4000).map(place).filter(|photon| photon.position.truncate().abs().max_element() <= 0.25).collect();
-                let film = Film { sums: gathered_on_cpu(&plan, &map), emitted: u64::from(settings.photons), ..Film::new(&plan) };
+                let film = RoomFilm { sums: gathered_on_cpu(&plan, &map), emitted: u64::from(settings.photons), ..RoomFilm::new(&plan) };
                 let back = estimate_walls(&film, &scene, &plan).pop().unwrap();
                 // 4000 photons a square metre at 2 W in all.
                 back.radiosity.iter().sum::<f64>() / 9.0 / 2.0
@@ -365,14 +369,14 @@ fn the_estimate_has_no_bias() {
 
 #[test]
 fn plans_keep_a_round_together() {
-    let settings = Settings { photons: 300_000, rng: Rng::Philox, ..by_tree(&Settings::default()) };
+    let settings = RoomSettings { photons: 300_000, rng: Rng::Philox, ..by_tree(&RoomSettings::default()) };
     let limits = Limits { pair_tests_per_submission: 1 << 25, ..Limits::of_host() };
-    let plan = Plan::new(&open_box(&settings), &settings, &limits).unwrap();
+    let plan = RoomPlan::new(&open_box(&settings), &settings, &limits).unwrap();
     assert!(plan.chunks_per_round > 1);
-    let settings = Settings { nearest: Some(10), ..settings };
-    assert_eq!(Plan::new(&open_box(&settings), &settings, &limits).unwrap().chunks_per_round, 1);
+    let settings = RoomSettings { nearest: Some(10), ..settings };
+    assert_eq!(RoomPlan::new(&open_box(&settings), &settings, &limits).unwrap().chunks_per_round, 1);
     let small = Limits { memory_bytes: 1 << 20, ..limits };
-    let error = Plan::new(&open_box(&settings), &settings, &small).unwrap_err().to_string();
+    let error = RoomPlan::new(&open_box(&settings), &settings, &small).unwrap_err().to_string();
     assert!(error.starts_with("--nearest 10: searches the 300000 photons of a round at once"), "{error}");
 }
 
@@ -380,7 +384,7 @@ fn plans_keep_a_round_together() {
 #[test]
 fn traced_photons_are_found() {
     let Some(gpu) = device() else { return };
-    let settings = Settings { nearest: Some(25), mesh: 9, shininess: [Some(2.0); 5], ..by_tree(&Settings::default()) };
+    let settings = RoomSettings { nearest: Some(25), mesh: 9, shininess: [Some(2.0); 5], ..by_tree(&RoomSettings::default()) };
     let map = photons(&gpu, &settings);
     assert_holds("25 nearest", nearest_check(&plan_for_host(&settings), &map, 25, &film(&gpu, &settings).sums));
 }

@@ -8,19 +8,19 @@ use glam::{DVec3, dvec3};
 use crate::common::lit::{level, light, matt, scene, scene_of, shining};
 use crate::common::{Check, assert_complains, assert_holds, device};
 use crate::unknown::room_without_floor;
+use photonmill::engine;
+use photonmill::engine::scene::{self, View, trial};
 use photonmill::gpu::Gpu;
-use photonmill::judge::Judge;
 use photonmill::output::light_report;
 use photonmill::plan::planning::area_radius;
+use photonmill::plan::scene::{RadiusFrom, ScenePlan};
 use photonmill::plan::sensor::Sensor;
-use photonmill::plan::transport::{RadiusFrom, TransportPlan};
 use photonmill::records::Receiver;
-use photonmill::render;
 use photonmill::scene::geometry::Geometry;
 use photonmill::scene::{Camera, Scene};
 use photonmill::settings::Builder;
-use photonmill::settings::transport::{Part, TransportSettings};
-use photonmill::transport::{self, View, trial};
+use photonmill::settings::scene::{Part, SceneSettings};
+use photonmill::verify::judge::Judge;
 
 /// A room of 4 x 4 x 3 m with a lamp under its ceiling, on a ground of 800 m.
 fn room_on_a_plain() -> Scene {
@@ -58,8 +58,8 @@ fn a_room_on_a_plain_is_lit_as_it_is_without_the_plain() {
     let phases = [receivers(&geometry, &points)];
     let view = View { geometry: &geometry, camera: None, phases: &phases };
     let sensor = Sensor::Receivers { count: points.len() as u32 };
-    let settings = TransportSettings { photons: 1 << 14, rounds: 12, part: Part::Indirect, ..TransportSettings::default() };
-    let mean = |plan: TransportPlan| {
+    let settings = SceneSettings { photons: 1 << 14, rounds: 12, part: Part::Indirect, ..SceneSettings::default() };
+    let mean = |plan: ScenePlan| {
         let lit = light(&gpu, &view, plan);
         (0..points.len()).map(|point| lit.film.mean(point, &lit.plan).x).sum::<f64>() / points.len() as f64
     };
@@ -71,13 +71,13 @@ fn a_room_on_a_plain_is_lit_as_it_is_without_the_plain() {
     println!("radius {radius:.3} m, {found:.4} where {expected:.4} is right");
     assert_holds("the room", light_check(found, expected));
     assert!((0.05..0.6).contains(&radius), "{radius}");
-    let by_area = TransportPlan::new(&scene, &geometry, &settings, sensor, &render::limits(gpu.facts())).unwrap();
+    let by_area = ScenePlan::new(&scene, &geometry, &settings, sensor, &engine::limits(gpu.facts())).unwrap();
     println!("by area: {} m", by_area.global.as_ref().unwrap().radius * geometry.unit);
     assert_complains("a radius by the area", light_check(mean(by_area), expected));
 }
 
 /// The plan of a picture, by a trial round.
-fn tried(gpu: &Gpu, scene: &Scene, geometry: &Geometry, settings: &TransportSettings) -> TransportPlan {
+fn tried(gpu: &Gpu, scene: &Scene, geometry: &Geometry, settings: &SceneSettings) -> ScenePlan {
     let camera = scene.cameras.first().cloned().unwrap_or_else(|| Camera::around(scene.bounds().0, scene.bounds().1));
     let view = View { geometry, camera: Some(&camera), phases: &[] };
     trial::plan(gpu, scene, &view, settings, Sensor::Picture { width: 64, height: 48 }).unwrap()
@@ -87,7 +87,7 @@ fn tried(gpu: &Gpu, scene: &Scene, geometry: &Geometry, settings: &TransportSett
 #[test]
 fn built_in_scenes_keep_about_the_radius_of_their_area() {
     let Some(gpu) = device() else { return };
-    let settings = TransportSettings::default();
+    let settings = SceneSettings::default();
     let mut off = Vec::new();
     for name in ["open-box", "cornell", "cornell-spheres", "caustic-sphere", "furnace"] {
         let scene = scene(name);
@@ -112,27 +112,27 @@ fn a_trial_knows_no_seed_builder_or_split() {
     let Some(gpu) = device() else { return };
     let scene = scene("cornell-spheres");
     let geometry = Geometry::new(&scene).unwrap();
-    let radii = |settings: &TransportSettings| {
+    let radii = |settings: &SceneSettings| {
         let plan = tried(&gpu, &scene, &geometry, settings);
         plan.maps().map(|map| (map.radius.to_bits(), map.radius_from)).collect::<Vec<_>>()
     };
-    let settings = TransportSettings::default();
+    let settings = SceneSettings::default();
     let expected = radii(&settings);
     for builder in [Builder::Atomic, Builder::Ballot] {
         assert_eq!(
-            radii(&TransportSettings { builder: Some(builder), seed: 7, chunk: Some(5000), ..settings.clone() }),
+            radii(&SceneSettings { builder: Some(builder), seed: 7, chunk: Some(5000), ..settings.clone() }),
             expected,
             "{builder:?}"
         );
     }
     // A quarter of the photons: twice the radius, in whole steps.
-    let fewer = radii(&TransportSettings { photons: settings.photons / 4, ..settings.clone() });
+    let fewer = radii(&SceneSettings { photons: settings.photons / 4, ..settings.clone() });
     assert_eq!(f64::from_bits(fewer[0].0), 2.0 * f64::from_bits(expected[0].0));
 
-    let given = TransportSettings { radius: Some(0.03), ..settings.clone() };
+    let given = SceneSettings { radius: Some(0.03), ..settings.clone() };
     let one = radii(&given);
     assert_eq!((one[0].1, one[1]), (RadiusFrom::User, expected[1]));
-    let plan = tried(&gpu, &scene, &geometry, &TransportSettings { caustic_radius: Some(0.01), ..given });
+    let plan = tried(&gpu, &scene, &geometry, &SceneSettings { caustic_radius: Some(0.01), ..given });
     assert_eq!(plan.trial, None);
     let plan = tried(&gpu, &scene, &geometry, &settings);
     let json: serde_json::Value = serde_json::from_slice(&light_report::plan_json(&plan)).unwrap();
@@ -152,7 +152,7 @@ fn a_radius_wider_than_what_it_lies_in_is_warned_of() {
     let warning = |points: Vec<(DVec3, DVec3)>| {
         let phases = [receivers(&geometry, &points)];
         let view = View { geometry: &geometry, camera: None, phases: &phases };
-        let settings = TransportSettings { photons: 1 << 10, ..TransportSettings::default() };
+        let settings = SceneSettings { photons: 1 << 10, ..SceneSettings::default() };
         let plan = trial::plan(&gpu, &scene, &view, &settings, Sensor::Receivers { count: points.len() as u32 }).unwrap();
         light_report::radius_warning(&plan, &geometry, "point")
     };
@@ -172,9 +172,9 @@ fn a_room_too_small_for_its_scene_has_an_unknown_bias() {
         let points: Vec<_> = (0..8).map(|k| (dvec3(0.4 * f64::from(k) - 1.4, 0.0, 0.1), DVec3::Y)).collect();
         let phases = [receivers(&geometry, &points)];
         let view = View { geometry: &geometry, camera: None, phases: &phases };
-        let settings = TransportSettings { photons: 1 << 12, ..TransportSettings::default() };
+        let settings = SceneSettings { photons: 1 << 12, ..SceneSettings::default() };
         let plan = trial::plan(&gpu, &scene, &view, &settings, Sensor::Receivers { count: points.len() as u32 }).unwrap();
-        let bias = transport::bias::measure(&gpu, &scene, &view, &plan, (1.0, 2), &AtomicBool::new(false)).unwrap().unwrap();
+        let bias = scene::bias::measure(&gpu, &scene, &view, &plan, (1.0, 2), &AtomicBool::new(false)).unwrap().unwrap();
         assert_eq!(bias.is_known(), is_known, "{width} m: {bias:?}");
         let warning = light_report::radius_warning(&plan, &geometry, "point").unwrap_or_default();
         assert_eq!(warning.contains("use --final-gather"), !is_known, "{width} m: {warning}");

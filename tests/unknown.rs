@@ -4,18 +4,18 @@ use glam::{DVec3, Vec3, dvec3};
 
 use crate::common::lit::{level, matt, mirror, received, scene_of, seen, shining};
 use crate::common::{device, run};
-use photonmill::film::{estimate_walls, irradiance_weights};
-use photonmill::judge::Judge;
+use photonmill::engine::room::film::{estimate_walls, irradiance_weights};
+use photonmill::engine::scene::stop::error_bound;
+use photonmill::engine::scene::{End, RunResult};
 use photonmill::rng::Rng;
 use photonmill::scene::geometry::Geometry;
 use photonmill::scene::light::LightKind;
 use photonmill::scene::open_box::open_box;
 use photonmill::scene::{Camera, Mesh, Scene};
-use photonmill::settings::Settings;
+use photonmill::settings::RoomSettings;
+use photonmill::settings::scene::SceneSettings;
 use photonmill::settings::stop::Stop;
-use photonmill::settings::transport::TransportSettings;
-use photonmill::transport::stop::error_bound;
-use photonmill::transport::{End, RunResult};
+use photonmill::verify::judge::Judge;
 
 /// Walls of a room over [-2, 2] x [-2, 2], as high as 3 m, that face inwards; and its ceiling but for a hole in the middle.
 pub fn room_without_floor(hole: f64) -> Vec<Mesh> {
@@ -55,13 +55,13 @@ fn no_run_ends_on_a_picture_that_nothing_has_reached() {
     let camera = Camera::looking_at("camera", dvec3(0.0, 1.5, 1.9), DVec3::ZERO, DVec3::Y, 1.2);
     let mut black = 0;
     for seed in 1..=6 {
-        let settings = TransportSettings {
+        let settings = SceneSettings {
             photons: 300,
             rounds: 40,
             shadow_rays: 1,
             seed,
             stop: Stop { error: Some(0.02), ..Stop::default() },
-            ..TransportSettings::default()
+            ..SceneSettings::default()
         };
         let lit = seen(&gpu, &scene, &settings, &camera, [6, 6]);
         assert_eq!((lit.end, lit.film.rounds), (End::Rounds, 40), "seed {seed}");
@@ -91,7 +91,7 @@ fn probes_in_a_house_on_a_sunlit_plain_have_a_bound_and_no_error() {
     let sun = LightKind::Directional { direction: dvec3(1.0, -1.0, 0.0).normalize(), irradiance: Vec3::splat(1000.0) };
     let scene = scene_of(meshes, vec![matt(0.5)], vec![sun]);
     let inside = [(dvec3(0.5, 0.0, 0.5), DVec3::Y), (dvec3(-1.0, 0.0, -0.5), DVec3::Y)];
-    let settings = TransportSettings { photons: 3000, rounds: 16, radius: Some(1.0), alpha: 1.0, ..TransportSettings::default() };
+    let settings = SceneSettings { photons: 3000, rounds: 16, radius: Some(1.0), alpha: 1.0, ..SceneSettings::default() };
     let lit = received(&gpu, &scene, &settings, &inside);
     assert!(is_black(&lit), "light has found the house: the test needs fewer photons");
     let unknown = lit.film.unknown(&lit.plan, 0.95);
@@ -113,7 +113,7 @@ fn probes_in_a_house_on_a_sunlit_plain_have_a_bound_and_no_error() {
 fn runs_end_where_the_dark_is_known_well_enough() {
     let Some(gpu) = device() else { return };
     let stop = Stop { error: Some(0.2), ..Stop::default() };
-    let settings = TransportSettings { photons: 3000, rounds: 2000, stop, ..TransportSettings::default() };
+    let settings = SceneSettings { photons: 3000, rounds: 2000, stop, ..SceneSettings::default() };
     let closed = [room_without_floor(0.0), vec![level(0.0, [4.0, 4.0], true, 0)]].concat();
     let lamp_outside = vec![level(3.5, [4.0, 4.0], true, 1), level(8.0, [4.0, 4.0], false, 0)];
     let scene = scene_of([closed, lamp_outside].concat(), vec![matt(0.5), shining(0.0)], vec![]);
@@ -145,7 +145,7 @@ fn a_map_of_which_no_photon_arrives_is_named() {
     let below = level(-1.0, [1.0, 1.0], true, 2);
     let scene = |meshes: Vec<Mesh>| scene_of(meshes, vec![matt(0.5), shining(0.0), mirror(0.9)], vec![]);
     let hidden = scene(vec![level(0.0, [4.0, 4.0], true, 0), level(2.0, [1.0, 1.0], false, 1), below.clone()]);
-    let settings = TransportSettings { photons: 3000, caustic_photons: 1000, rounds: 4, ..TransportSettings::default() };
+    let settings = SceneSettings { photons: 3000, caustic_photons: 1000, rounds: 4, ..SceneSettings::default() };
     let point = [(dvec3(0.3, 0.0, 0.0), DVec3::Y)];
     let lit = received(&gpu, &hidden, &settings, &point);
     let unknown = lit.film.unknown(&lit.plan, 0.95);
@@ -158,7 +158,7 @@ fn a_map_of_which_no_photon_arrives_is_named() {
 #[test]
 fn texels_of_the_box_that_no_photon_has_found_have_no_error() {
     let Some(gpu) = device() else { return };
-    let settings = Settings { photons: 40, rounds: 3, mesh: 16, radius: 0.01, rng: Rng::Philox, ..Settings::default() };
+    let settings = RoomSettings { photons: 40, rounds: 3, mesh: 16, radius: 0.01, rng: Rng::Philox, ..RoomSettings::default() };
     let outcome = run(&gpu, &settings);
     let scene = open_box(&outcome.plan.settings);
     let unknown = outcome.film.unknown(&irradiance_weights(&scene, &outcome.plan), 1.0, 0.95);

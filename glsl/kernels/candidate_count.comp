@@ -13,9 +13,9 @@ layout(push_constant, scalar) uniform Push { GatherPush push; };
 layout(set = 0, binding = 0, scalar) readonly buffer Points { Point points[]; };
 layout(set = 1, binding = 0, scalar) buffer Longest { uint longest[]; };
 
-#include "dispatch.glsl"
-#include "grid.glsl"
-#include "stages/grid_rows.glsl"
+#include "dispatch/dispatch.glsl"
+#include "index/grid.glsl"
+#include "gather/grid_rows.glsl"
 
 void main()
 {

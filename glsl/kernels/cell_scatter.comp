@@ -9,14 +9,14 @@
 layout(local_size_x_id = 0) in;
 layout(push_constant, scalar) uniform Push { IndexPush push; };
 layout(set = 0, binding = 0, scalar) readonly buffer Rooms { Room rooms[]; };
-#include "stages/photon_list.glsl"
+#include "index/photon_list.glsl"
 layout(set = 1, binding = 2, scalar) readonly buffer Cells { uint cells[]; };
 layout(set = 1, binding = 3, scalar) writeonly buffer SortedPhotons { uvec4 sorted_photons[]; };
 layout(set = 1, binding = 4, scalar) readonly buffer Ranks { uint ranks[]; };
 
-#include "dispatch.glsl"
-#include "photon.glsl"
-#include "grid.glsl"
+#include "dispatch/dispatch.glsl"
+#include "world/room/photon.glsl"
+#include "index/grid.glsl"
 
 void main()
 {

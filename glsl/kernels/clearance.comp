@@ -12,12 +12,12 @@ layout(push_constant, scalar) uniform Push { ClearancePush push; };
 layout(set = 1, binding = 1, scalar) readonly buffer VisiblePoints { VisiblePoint visible_points[]; };
 layout(set = 1, binding = 2, scalar) writeonly buffer Clearances { float clearances[]; };
 
-#include "math.glsl"
-#include "dispatch.glsl"
-#include "scene/effects.glsl"
-#include "scene/directions.glsl"
-#include "scene/bvh.glsl"
-#include "scene/belongs.glsl"
+#include "math/math.glsl"
+#include "dispatch/dispatch.glsl"
+#include "world/scene/effects.glsl"
+#include "math/directions.glsl"
+#include "world/scene/bvh.glsl"
+#include "gather/belongs.glsl"
 
 // Cosines of eighths of a circle; the sine of each is the cosine six further.
 const float COSINES[8] = float[](1.0, 0.70710678, 0.0, -0.70710678, -1.0, -0.70710678, 0.0, 0.70710678);

@@ -10,14 +10,14 @@ layout(push_constant, scalar) uniform Push { EmitPush push; };
 layout(set = 0, binding = 1, scalar) readonly buffer Walls { Wall walls[]; };
 layout(set = 1, binding = 1, scalar) writeonly buffer Paths { uvec4 paths[]; };
 
-#include "math.glsl"
-#include "nonfinite_values.glsl"
-#include "dispatch.glsl"
-#include "rng.glsl"
-#include "sampling.glsl"
-#include "emission.glsl"
-#include "path.glsl"
-#include "stages/leave_light.glsl"
+#include "math/math.glsl"
+#include "ledger/nonfinite_values.glsl"
+#include "dispatch/dispatch.glsl"
+#include "rng/rng.glsl"
+#include "rng/sampling.glsl"
+#include "world/room/emission.glsl"
+#include "world/room/path.glsl"
+#include "world/room/emit.glsl"
 
 void main()
 {

@@ -11,7 +11,7 @@ layout(push_constant, scalar) uniform Push { EndBouncePush push; };
 layout(set = 1, binding = 0, scalar) buffer Counters { uint counters[]; };
 layout(set = 1, binding = 1, scalar) writeonly buffer Sizes { DispatchArgs dispatch_args[]; };
 
-#include "dispatch_size.glsl"
+#include "dispatch/dispatch_size.glsl"
 
 void main()
 {

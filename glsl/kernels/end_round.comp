@@ -14,7 +14,7 @@ layout(set = 1, binding = 1, scalar) buffer FilmTotals { uvec2 film_totals[]; };
 layout(set = 1, binding = 2, scalar) buffer LowSquares { uvec2 low_squares[]; };
 layout(set = 1, binding = 3, scalar) buffer HighSquares { uvec2 high_squares[]; };
 
-#include "dispatch.glsl"
+#include "dispatch/dispatch.glsl"
 #include "film/wide.glsl"
 
 void main()

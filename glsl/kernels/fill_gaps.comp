@@ -1,4 +1,4 @@
-// Ends a bounce whose survivors took places from striped counters (append/striped_counters.glsl): says how many places that
+// Ends a bounce whose survivors took places from striped counters (builder/striped_counters.glsl): says how many places that
 // makes, gaps included, marks the gaps as no photon and no path, and empties the counters for the next bounce.
 // Dispatched by src/trace.rs once a bounce, as one work group. One thread = every so many-th gap.
 #version 460
@@ -12,9 +12,9 @@ layout(set = 1, binding = 0, scalar) buffer Counters { uint counters[]; };
 layout(set = 1, binding = 1, scalar) writeonly buffer Photons { uvec4 photons[]; };
 layout(set = 1, binding = 2, scalar) writeonly buffer NextPaths { uvec4 next_paths[]; };
 
-#include "photon.glsl"
-#include "path.glsl"
-#include "append/striped_counters.glsl"
+#include "world/room/photon.glsl"
+#include "world/room/path.glsl"
+#include "builder/striped_counters.glsl"
 
 void main()
 {

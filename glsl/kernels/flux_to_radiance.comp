@@ -14,20 +14,20 @@ layout(push_constant, scalar) uniform Push { FluxToRadiancePush push; };
 layout(set = 1, binding = 1, scalar) readonly buffer VisiblePoints { VisiblePoint visible_points[]; };
 layout(set = 1, binding = 2, scalar) buffer Estimates { uvec2 estimates[]; };
 
-#include "math.glsl"
-#include "nonfinite_values.glsl"
-#include "dispatch.glsl"
-#include "scene/effects.glsl"
-#include "scene/directions.glsl"
-#include "scene/bvh.glsl"
-#include "scene/surface.glsl"
-#include "scene/belongs.glsl"
-#include "scene/cover.glsl"
+#include "math/math.glsl"
+#include "ledger/nonfinite_values.glsl"
+#include "dispatch/dispatch.glsl"
+#include "world/scene/effects.glsl"
+#include "math/directions.glsl"
+#include "world/scene/bvh.glsl"
+#include "material/surface.glsl"
+#include "gather/belongs.glsl"
+#include "gather/cover.glsl"
 #include "film/wide.glsl"
-#include "scene/film.glsl"
-#include "scene/tiles.glsl"
-#include "scene/no_point.glsl"
-#include "scene/one_hit.glsl"
+#include "world/scene/film.glsl"
+#include "world/scene/tiles.glsl"
+#include "world/scene/no_point.glsl"
+#include "world/scene/one_hit.glsl"
 
 vec3 gathered_flux(uint place)
 {

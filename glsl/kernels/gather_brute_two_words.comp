@@ -1,4 +1,4 @@
-// Density estimation at every point, photons found by stages/gather_brute.glsl, summed by film/two_words.glsl
+// Density estimation at every point, photons found by gather/brute.glsl, summed by film/two_words.glsl
 // and film/f32.glsl.
 // Dispatched by src/estimate.rs once a chunk. One thread = one point and one slice of its photons.
 #version 460
@@ -12,9 +12,9 @@ layout(push_constant, scalar) uniform Push { GatherPush push; };
 #include "film/film.glsl"
 #include "film/two_words.glsl"
 #include "film/f32.glsl"
-#include "photon.glsl"
-#include "stages/estimate.glsl"
-#include "stages/gather_brute.glsl"
+#include "world/room/photon.glsl"
+#include "gather/estimate.glsl"
+#include "gather/brute.glsl"
 
 void main()
 {

@@ -1,4 +1,4 @@
-// Density estimation at every point, photons found by stages/gather_grid.glsl, summed by film/two_words.glsl
+// Density estimation at every point, photons found by gather/grid.glsl, summed by film/two_words.glsl
 // and film/f32.glsl.
 // Dispatched by src/estimate.rs once a chunk. LANES threads = one point, or one slice of its photons.
 #version 460
@@ -12,11 +12,11 @@ layout(push_constant, scalar) uniform Push { GatherPush push; };
 #include "film/film.glsl"
 #include "film/two_words.glsl"
 #include "film/f32.glsl"
-#include "photon.glsl"
-#include "grid.glsl"
-#include "stages/grid_rows.glsl"
-#include "stages/estimate.glsl"
-#include "stages/gather_grid.glsl"
+#include "world/room/photon.glsl"
+#include "index/grid.glsl"
+#include "gather/grid_rows.glsl"
+#include "gather/estimate.glsl"
+#include "gather/grid.glsl"
 
 void main()
 {

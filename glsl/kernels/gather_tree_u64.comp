@@ -1,4 +1,4 @@
-// Density estimation at every point, photons found by stages/gather_tree.glsl, summed by film/u64.glsl.
+// Density estimation at every point, photons found by gather/tree.glsl, summed by film/u64.glsl.
 // Dispatched by src/estimate/tree.rs once a chunk. One thread = one point and one slice of its photons.
 #version 460
 #extension GL_GOOGLE_include_directive : require
@@ -13,11 +13,11 @@ layout(push_constant, scalar) uniform Push { GatherPush push; };
 #include "film/film.glsl"
 #include "film/u64.glsl"
 #include "film/compensated.glsl"
-#include "photon.glsl"
-#include "tree.glsl"
-#include "stages/tree_walk.glsl"
-#include "stages/estimate.glsl"
-#include "stages/gather_tree.glsl"
+#include "world/room/photon.glsl"
+#include "index/tree.glsl"
+#include "gather/tree_walk.glsl"
+#include "gather/estimate.glsl"
+#include "gather/tree.glsl"
 
 void main()
 {

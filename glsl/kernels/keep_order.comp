@@ -13,18 +13,18 @@ layout(set = 1, binding = 0, scalar) readonly buffer Paths { uvec4 paths[]; };
 layout(set = 1, binding = 1, scalar) writeonly buffer NextPaths { uvec4 next_paths[]; };
 layout(set = 1, binding = 4, scalar) buffer Tallies { Tally tallies[]; };
 
-#include "math.glsl"
-#include "dispatch.glsl"
-#include "bsdf.glsl"
-#include "tally_copy.glsl"
-#include "tally.glsl"
-#include "photon.glsl"
-#include "path.glsl"
-#include "append/paths.glsl"
+#include "math/math.glsl"
+#include "dispatch/dispatch.glsl"
+#include "material/phong_weight.glsl"
+#include "ledger/tally_copy.glsl"
+#include "ledger/tally.glsl"
+#include "world/room/photon.glsl"
+#include "world/room/path.glsl"
+#include "builder/paths.glsl"
 const uint PLACES = 1;
-#include "append/group_prefix.glsl"
-#include "append/store.glsl"
-#include "stages/keep_order.glsl"
+#include "builder/group_prefix.glsl"
+#include "builder/store.glsl"
+#include "builder/keep_order.glsl"
 
 void main()
 {

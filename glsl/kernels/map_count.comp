@@ -15,8 +15,8 @@ layout(set = 1, binding = 1, scalar) readonly buffer Counters { uint counters[];
 layout(set = 1, binding = 2, scalar) buffer Cells { uint cells[]; };
 layout(set = 1, binding = 3, scalar) writeonly buffer Ranks { uint ranks[]; };
 
-#include "dispatch.glsl"
-#include "scene/cells.glsl"
+#include "dispatch/dispatch.glsl"
+#include "index/buckets.glsl"
 
 void main()
 {

@@ -15,8 +15,8 @@ layout(set = 1, binding = 2, scalar) readonly buffer Cells { uint cells[]; };
 layout(set = 1, binding = 3, scalar) writeonly buffer SortedMap { uvec4 sorted_map[]; };
 layout(set = 1, binding = 4, scalar) readonly buffer Ranks { uint ranks[]; };
 
-#include "dispatch.glsl"
-#include "scene/cells.glsl"
+#include "dispatch/dispatch.glsl"
+#include "index/buckets.glsl"
 
 void main()
 {

@@ -10,9 +10,9 @@ layout(push_constant, scalar) uniform Push { DispatchSizePush push; };
 layout(set = 1, binding = 0, scalar) readonly buffer Counters { uint counters[]; };
 layout(set = 1, binding = 1, scalar) writeonly buffer Sizes { DispatchArgs dispatch_args[]; };
 
-#include "dispatch.glsl"
-#include "dispatch_size.glsl"
-#include "totals.glsl"
+#include "dispatch/dispatch.glsl"
+#include "dispatch/dispatch_size.glsl"
+#include "ledger/totals.glsl"
 
 void main()
 {

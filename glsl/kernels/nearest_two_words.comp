@@ -1,4 +1,4 @@
-// Density estimation by the nearest photons of every point (stages/nearest.glsl), summed by film/two_words.glsl.
+// Density estimation by the nearest photons of every point (gather/nearest.glsl), summed by film/two_words.glsl.
 // Dispatched by src/estimate/tree.rs until all searches are done. One thread = one point.
 #version 460
 #extension GL_GOOGLE_include_directive : require
@@ -8,15 +8,15 @@
 layout(local_size_x_id = 0) in;
 layout(push_constant, scalar) uniform Push { NearestPush push; };
 
-#include "math.glsl"
-#include "dispatch.glsl"
-#include "covered_disc.glsl"
+#include "math/math.glsl"
+#include "dispatch/dispatch.glsl"
+#include "gather/covered_disc.glsl"
 #include "film/film.glsl"
 #include "film/two_words.glsl"
-#include "photon.glsl"
-#include "tree.glsl"
-#include "stages/tree_walk.glsl"
-#include "stages/nearest.glsl"
+#include "world/room/photon.glsl"
+#include "index/tree.glsl"
+#include "gather/tree_walk.glsl"
+#include "gather/nearest.glsl"
 
 void main()
 {

@@ -13,8 +13,8 @@ layout(set = 1, binding = 1, scalar) readonly buffer Estimates { uvec2 estimates
 layout(set = 1, binding = 2, scalar) buffer FilmSums { uvec2 film_sums[]; };
 layout(set = 1, binding = 3, scalar) buffer FilmSquares { uvec4 film_squares[]; };
 
-#include "dispatch.glsl"
-#include "scene/effects.glsl"
+#include "dispatch/dispatch.glsl"
+#include "world/scene/effects.glsl"
 #include "film/wide.glsl"
 
 void main()

@@ -11,7 +11,7 @@ layout(push_constant, scalar) uniform Push { ScanPush push; };
 layout(set = 1, binding = 0, scalar) buffer Items { uint items[]; };
 layout(set = 1, binding = 1, scalar) readonly buffer BlockSums { uint block_sums[]; };
 
-#include "dispatch.glsl"
+#include "dispatch/dispatch.glsl"
 
 void main()
 {

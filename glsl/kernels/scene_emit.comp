@@ -10,19 +10,19 @@ layout(local_size_x_id = 0) in;
 layout(push_constant, scalar) uniform Push { EmissionPush push; };
 layout(set = 1, binding = 0, scalar) writeonly buffer LightPaths { LightPath light_paths[]; };
 
-#include "math.glsl"
-#include "nonfinite_values.glsl"
-#include "dispatch.glsl"
-#include "philox.glsl"
-#include "sampling.glsl"
-#include "scene/effects.glsl"
-#include "scene/directions.glsl"
-#include "scene/bvh.glsl"
-#include "scene/surface.glsl"
-#include "scene/areas.glsl"
-#include "scene/lights.glsl"
-#include "scene/aim.glsl"
-#include "stages/scene_emit.glsl"
+#include "math/math.glsl"
+#include "ledger/nonfinite_values.glsl"
+#include "dispatch/dispatch.glsl"
+#include "rng/philox.glsl"
+#include "rng/sampling.glsl"
+#include "world/scene/effects.glsl"
+#include "math/directions.glsl"
+#include "world/scene/bvh.glsl"
+#include "material/surface.glsl"
+#include "world/scene/areas.glsl"
+#include "world/scene/lights.glsl"
+#include "world/scene/aim.glsl"
+#include "world/scene/emit.glsl"
 
 void main()
 {

@@ -10,19 +10,19 @@
 layout(local_size_x_id = 0) in;
 layout(push_constant, scalar) uniform Push { SceneGatherPush push; };
 
-#include "math.glsl"
-#include "nonfinite_values.glsl"
+#include "math/math.glsl"
+#include "ledger/nonfinite_values.glsl"
 #include "film/wide.glsl"
 #include "film/two_words.glsl"
-#include "scene/directions.glsl"
-#include "scene/effects.glsl"
-#include "scene/lobes.glsl"
-#include "scene/belongs.glsl"
-#include "scene/cells.glsl"
-#include "scene/rounding.glsl"
-#include "scene/tiles.glsl"
-#include "stages/map_rows.glsl"
-#include "stages/scene_gather.glsl"
+#include "math/directions.glsl"
+#include "world/scene/effects.glsl"
+#include "material/lobes.glsl"
+#include "gather/belongs.glsl"
+#include "index/buckets.glsl"
+#include "world/scene/rounding.glsl"
+#include "world/scene/tiles.glsl"
+#include "gather/bucket_rows.glsl"
+#include "gather/visible_points.glsl"
 
 void main()
 {

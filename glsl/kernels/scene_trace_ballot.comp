@@ -1,4 +1,4 @@
-// One flight of every photon, places taken by append/ballot.glsl.
+// One flight of every photon, places taken by builder/ballot.glsl.
 // Dispatched by src/transport/photons.rs once a bounce. One thread = one incoming path.
 #version 460
 #extension GL_GOOGLE_include_directive : require
@@ -7,31 +7,31 @@
 #extension GL_KHR_shader_subgroup_basic : require
 #extension GL_KHR_shader_subgroup_ballot : require
 #include "records.glsl"
-#include "scene/map_photon.glsl"
+#include "world/scene/photon.glsl"
 
 layout(local_size_x_id = 0) in;
 layout(push_constant, scalar) uniform Push { FlightPush push; };
 layout(set = 1, binding = 3, scalar) buffer Counters { uint counters[]; };
 layout(set = 1, binding = 4, scalar) buffer Tallies { Tally tallies[]; };
 
-#include "math.glsl"
-#include "nonfinite_values.glsl"
-#include "dispatch.glsl"
-#include "philox.glsl"
-#include "sampling.glsl"
-#include "tally_copy.glsl"
-#include "tally.glsl"
-#include "append/ballot.glsl"
-#include "scene/effects.glsl"
-#include "scene/directions.glsl"
-#include "scene/bvh.glsl"
-#include "scene/surface.glsl"
-#include "scene/lobes.glsl"
-#include "scene/scatter.glsl"
-#include "totals.glsl"
-#include "stages/map_store.glsl"
-#include "stages/scene_flight.glsl"
-#include "stages/scene_trace.glsl"
+#include "math/math.glsl"
+#include "ledger/nonfinite_values.glsl"
+#include "dispatch/dispatch.glsl"
+#include "rng/philox.glsl"
+#include "rng/sampling.glsl"
+#include "ledger/tally_copy.glsl"
+#include "ledger/tally.glsl"
+#include "builder/ballot.glsl"
+#include "world/scene/effects.glsl"
+#include "math/directions.glsl"
+#include "world/scene/bvh.glsl"
+#include "material/surface.glsl"
+#include "material/lobes.glsl"
+#include "material/scatter.glsl"
+#include "ledger/totals.glsl"
+#include "world/scene/store.glsl"
+#include "world/scene/step.glsl"
+#include "builder/scene_trace.glsl"
 
 void main()
 {

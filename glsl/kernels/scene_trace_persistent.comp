@@ -7,35 +7,35 @@
 #extension GL_KHR_shader_subgroup_basic : require
 #extension GL_KHR_shader_subgroup_ballot : require
 #include "records.glsl"
-#include "scene/map_photon.glsl"
+#include "world/scene/photon.glsl"
 
 layout(local_size_x_id = 0) in;
 layout(push_constant, scalar) uniform Push { SceneTracePersistentPush push; };
 layout(set = 1, binding = 3, scalar) buffer Counters { uint counters[]; };
 layout(set = 1, binding = 4, scalar) buffer Tallies { Tally tallies[]; };
 
-#include "math.glsl"
-#include "nonfinite_values.glsl"
-#include "dispatch.glsl"
-#include "philox.glsl"
-#include "sampling.glsl"
-#include "tally_copy.glsl"
-#include "tallies.glsl"
-#include "append/ballot.glsl"
-#include "scene/effects.glsl"
-#include "scene/directions.glsl"
-#include "scene/bvh.glsl"
-#include "scene/surface.glsl"
-#include "scene/areas.glsl"
-#include "scene/lights.glsl"
-#include "scene/aim.glsl"
-#include "scene/lobes.glsl"
-#include "scene/scatter.glsl"
-#include "totals.glsl"
-#include "stages/map_store.glsl"
-#include "stages/scene_flight.glsl"
-#include "stages/scene_emit.glsl"
-#include "stages/scene_trace_persistent.glsl"
+#include "math/math.glsl"
+#include "ledger/nonfinite_values.glsl"
+#include "dispatch/dispatch.glsl"
+#include "rng/philox.glsl"
+#include "rng/sampling.glsl"
+#include "ledger/tally_copy.glsl"
+#include "ledger/tallies.glsl"
+#include "builder/ballot.glsl"
+#include "world/scene/effects.glsl"
+#include "math/directions.glsl"
+#include "world/scene/bvh.glsl"
+#include "material/surface.glsl"
+#include "world/scene/areas.glsl"
+#include "world/scene/lights.glsl"
+#include "world/scene/aim.glsl"
+#include "material/lobes.glsl"
+#include "material/scatter.glsl"
+#include "ledger/totals.glsl"
+#include "world/scene/store.glsl"
+#include "world/scene/step.glsl"
+#include "world/scene/emit.glsl"
+#include "builder/scene_trace_persistent.glsl"
 
 void main()
 {

@@ -1,4 +1,4 @@
-// One bounce, survivors stored by append/block.glsl.
+// One bounce, survivors stored by builder/block.glsl.
 // Dispatched by src/trace.rs once a bounce. One thread = PATHS_TOGETHER incoming paths.
 #version 460
 #extension GL_GOOGLE_include_directive : require
@@ -15,23 +15,23 @@ layout(set = 1, binding = 1, scalar) writeonly buffer NextPaths { uvec4 next_pat
 layout(set = 1, binding = 3, scalar) buffer Counters { uint counters[]; };
 layout(set = 1, binding = 4, scalar) buffer Tallies { Tally tallies[]; };
 
-#include "math.glsl"
-#include "nonfinite_values.glsl"
-#include "dispatch.glsl"
-#include "rng.glsl"
-#include "sampling.glsl"
-#include "room.glsl"
-#include "bsdf.glsl"
-#include "tally_copy.glsl"
-#include "tally.glsl"
-#include "photon.glsl"
-#include "path.glsl"
+#include "math/math.glsl"
+#include "ledger/nonfinite_values.glsl"
+#include "dispatch/dispatch.glsl"
+#include "rng/rng.glsl"
+#include "rng/sampling.glsl"
+#include "world/room/geometry.glsl"
+#include "material/phong_weight.glsl"
+#include "ledger/tally_copy.glsl"
+#include "ledger/tally.glsl"
+#include "world/room/photon.glsl"
+#include "world/room/path.glsl"
 const uint PLACES = PATHS_TOGETHER;
-#include "append/paths.glsl"
-#include "append/store.glsl"
-#include "append/block.glsl"
-#include "stages/bounce.glsl"
-#include "stages/trace_compact.glsl"
+#include "builder/paths.glsl"
+#include "builder/store.glsl"
+#include "builder/block.glsl"
+#include "world/room/step.glsl"
+#include "builder/trace_compact.glsl"
 
 void main()
 {

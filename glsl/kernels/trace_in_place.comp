@@ -13,22 +13,22 @@ layout(set = 1, binding = 0, scalar) buffer Paths { uvec4 paths[]; };
 #define next_paths paths // each stays where it is
 layout(set = 1, binding = 4, scalar) buffer Tallies { Tally tallies[]; };
 
-#include "math.glsl"
-#include "nonfinite_values.glsl"
-#include "dispatch.glsl"
-#include "rng.glsl"
-#include "sampling.glsl"
-#include "room.glsl"
-#include "bsdf.glsl"
-#include "tally_copy.glsl"
-#include "tally.glsl"
-#include "photon.glsl"
-#include "path.glsl"
-#include "append/paths.glsl"
+#include "math/math.glsl"
+#include "ledger/nonfinite_values.glsl"
+#include "dispatch/dispatch.glsl"
+#include "rng/rng.glsl"
+#include "rng/sampling.glsl"
+#include "world/room/geometry.glsl"
+#include "material/phong_weight.glsl"
+#include "ledger/tally_copy.glsl"
+#include "ledger/tally.glsl"
+#include "world/room/photon.glsl"
+#include "world/room/path.glsl"
+#include "builder/paths.glsl"
 const uint PLACES = 1;
-#include "append/group_prefix.glsl"
-#include "stages/bounce.glsl"
-#include "stages/trace_in_place.glsl"
+#include "builder/group_prefix.glsl"
+#include "world/room/step.glsl"
+#include "builder/trace_in_place.glsl"
 
 void main()
 {

@@ -13,21 +13,21 @@ layout(set = 1, binding = 0, scalar) readonly buffer Paths { uvec4 paths[]; };
 layout(set = 1, binding = 1, scalar) writeonly buffer NextPaths { uvec4 next_paths[]; };
 layout(set = 1, binding = 4, scalar) buffer Tallies { Tally tallies[]; };
 
-#include "math.glsl"
-#include "nonfinite_values.glsl"
-#include "dispatch.glsl"
-#include "rng.glsl"
-#include "sampling.glsl"
-#include "room.glsl"
-#include "bsdf.glsl"
-#include "tally_copy.glsl"
-#include "tally.glsl"
-#include "photon.glsl"
-#include "path.glsl"
-#include "append/paths.glsl"
-#include "append/store.glsl"
-#include "stages/bounce.glsl"
-#include "stages/trace_slots.glsl"
+#include "math/math.glsl"
+#include "ledger/nonfinite_values.glsl"
+#include "dispatch/dispatch.glsl"
+#include "rng/rng.glsl"
+#include "rng/sampling.glsl"
+#include "world/room/geometry.glsl"
+#include "material/phong_weight.glsl"
+#include "ledger/tally_copy.glsl"
+#include "ledger/tally.glsl"
+#include "world/room/photon.glsl"
+#include "world/room/path.glsl"
+#include "builder/paths.glsl"
+#include "builder/store.glsl"
+#include "world/room/step.glsl"
+#include "builder/trace_slots.glsl"
 
 void main()
 {

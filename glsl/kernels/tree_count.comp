@@ -1,4 +1,4 @@
-// Counts the digits of a pass of the radix sort of stages/tree_digits.glsl.
+// Counts the digits of a pass of the radix sort of index/tree_digits.glsl.
 // Dispatched by src/index/tree.rs once a digit. One thread = a run of TREE_RUN photons.
 // After it counts[d * runs + r] = photons of run r with the digit d.
 #version 460
@@ -8,12 +8,12 @@
 
 layout(local_size_x_id = 0) in;
 layout(push_constant, scalar) uniform Push { TreePush push; };
-#include "photon.glsl"
-#include "stages/photon_list.glsl"
-#include "stages/tree_digits.glsl"
+#include "world/room/photon.glsl"
+#include "index/photon_list.glsl"
+#include "index/tree_digits.glsl"
 layout(set = 1, binding = 3, scalar) writeonly buffer Counts { uint counts[]; };
 
-#include "dispatch.glsl"
+#include "dispatch/dispatch.glsl"
 
 void main()
 {

@@ -7,12 +7,12 @@
 
 layout(local_size_x_id = 0) in;
 layout(push_constant, scalar) uniform Push { TreePush push; };
-#include "stages/photon_list.glsl"
+#include "index/photon_list.glsl"
 layout(set = 1, binding = 2, scalar) writeonly buffer Keys { uvec2 keys[]; };
 
-#include "dispatch.glsl"
-#include "photon.glsl"
-#include "tree.glsl"
+#include "dispatch/dispatch.glsl"
+#include "world/room/photon.glsl"
+#include "index/tree.glsl"
 
 void main()
 {

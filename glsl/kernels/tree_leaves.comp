@@ -15,7 +15,7 @@ layout(set = 1, binding = 5, scalar) writeonly buffer TreeOrigins { uvec2 tree_o
 
 layout(constant_id = 37) const bool HAS_ORIGINS = false;
 
-#include "dispatch.glsl"
+#include "dispatch/dispatch.glsl"
 
 void main()
 {

@@ -1,4 +1,4 @@
-// Moves photons to their places of a pass of the radix sort of stages/tree_digits.glsl.
+// Moves photons to their places of a pass of the radix sort of index/tree_digits.glsl.
 // Dispatched by src/index/tree.rs once a digit. One thread = a run of TREE_RUN photons.
 // counts[d * runs + r] = first place of the photons of run r with the digit d.
 #version 460
@@ -8,13 +8,13 @@
 
 layout(local_size_x_id = 0) in;
 layout(push_constant, scalar) uniform Push { TreePush push; };
-#include "photon.glsl"
-#include "stages/photon_list.glsl"
-#include "stages/tree_digits.glsl"
+#include "world/room/photon.glsl"
+#include "index/photon_list.glsl"
+#include "index/tree_digits.glsl"
 layout(set = 1, binding = 3, scalar) readonly buffer Counts { uint counts[]; };
 layout(set = 1, binding = 4, scalar) writeonly buffer NextKeys { uvec2 next_keys[]; };
 
-#include "dispatch.glsl"
+#include "dispatch/dispatch.glsl"
 
 void main()
 {

@@ -8,13 +8,13 @@
 
 layout(local_size_x_id = 0) in;
 layout(push_constant, scalar) uniform Push { TreePush push; };
-#include "stages/tree_nodes.glsl"
+#include "index/tree_nodes.glsl"
 layout(set = 1, binding = 2, scalar) readonly buffer Keys { uvec2 keys[]; }; // in order along the axis
 layout(set = 1, binding = 3, scalar) writeonly buffer Ranks { uint ranks[]; };
 layout(set = 1, binding = 4, scalar) writeonly buffer Planes { float planes[]; };
 
-#include "dispatch.glsl"
-#include "tree.glsl"
+#include "dispatch/dispatch.glsl"
+#include "index/tree.glsl"
 
 void main()
 {

@@ -8,12 +8,12 @@
 
 layout(local_size_x_id = 0) in;
 layout(push_constant, scalar) uniform Push { TreePush push; };
-#include "stages/tree_nodes.glsl"
+#include "index/tree_nodes.glsl"
 layout(set = 1, binding = 2, scalar) readonly buffer Keys { uvec2 keys[]; }; // in order along the other axis
 layout(set = 1, binding = 3, scalar) readonly buffer Ranks { uint ranks[]; };
 layout(set = 1, binding = 4, scalar) writeonly buffer Counts { uint counts[]; };
 
-#include "dispatch.glsl"
+#include "dispatch/dispatch.glsl"
 
 void main()
 {

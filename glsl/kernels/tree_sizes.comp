@@ -7,7 +7,7 @@
 
 layout(local_size_x = 1) in;
 layout(push_constant, scalar) uniform Push { DispatchSizePush push; };
-#include "stages/photon_list.glsl"
+#include "index/photon_list.glsl"
 layout(set = 1, binding = 2, scalar) writeonly buffer ItemArgs { DispatchArgs item_args[]; };
 layout(set = 1, binding = 3, scalar) writeonly buffer RunArgs { DispatchArgs run_args[]; };
 layout(set = 1, binding = 4, scalar) writeonly buffer ScanArgs { DispatchArgs scan_args[]; };

@@ -9,13 +9,13 @@
 
 layout(local_size_x_id = 0) in;
 layout(push_constant, scalar) uniform Push { TreePush push; };
-#include "stages/tree_nodes.glsl"
+#include "index/tree_nodes.glsl"
 layout(set = 1, binding = 2, scalar) readonly buffer Keys { uvec2 keys[]; };
 layout(set = 1, binding = 3, scalar) readonly buffer Ranks { uint ranks[]; };
 layout(set = 1, binding = 4, scalar) readonly buffer Counts { uint counts[]; };
 layout(set = 1, binding = 5, scalar) writeonly buffer NextKeys { uvec2 next_keys[]; };
 
-#include "dispatch.glsl"
+#include "dispatch/dispatch.glsl"
 
 void main()
 {

@@ -7,9 +7,9 @@
 
 layout(local_size_x = 1) in;
 layout(push_constant, scalar) uniform Push { TreePush push; };
-#include "photon.glsl"
-#include "stages/photon_list.glsl"
-#include "stages/tree_digits.glsl"
+#include "world/room/photon.glsl"
+#include "index/photon_list.glsl"
+#include "index/tree_digits.glsl"
 layout(set = 1, binding = 3, scalar) readonly buffer Counts { uint counts[]; };
 layout(set = 1, binding = 4, scalar) writeonly buffer WallBegins { uint wall_begins[]; };
 layout(set = 1, binding = 5, scalar) writeonly buffer Longest { uint longest[]; };

@@ -10,6 +10,7 @@ use super::progress::ProgressReporter;
 use super::transport::{Job, MessageArgs, ReportArgs, SceneArgs, TimedDeviceArgs, TransportArgs, geometry, light, plan};
 use super::{End, complain, say_beside};
 use crate::bake::{self, Layout, PHASE_COUNT, TexelEstimate};
+use crate::engine::scene::RunResult;
 use crate::error::{Error, Result};
 use crate::output::colour::ColourPicture;
 use crate::output::destination::{Folder, check_distinct, write_all};
@@ -19,7 +20,6 @@ use crate::records::Receiver;
 use crate::scene::Scene;
 use crate::scene::geometry::Geometry;
 use crate::text::counted;
-use crate::transport::RunResult;
 
 #[derive(Args)]
 pub(super) struct BakeArgs {

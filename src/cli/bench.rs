@@ -9,10 +9,10 @@ use clap::{Args, ValueEnum};
 use super::parse::parse_seconds;
 use super::progress::{ProgressArgs, ProgressReporter};
 use super::{DeviceArgs, End, JsonArg, optional_file, say_beside};
-use crate::bench::experiment::Experiment;
-use crate::bench::{self, Request, Size, table};
 use crate::error::{Error, Result};
 use crate::gpu::Gpu;
+use crate::measure::bench::experiment::Experiment;
+use crate::measure::bench::{self, Request, Size, table};
 use crate::output::destination::{Destination, Folder, check_distinct, write_all};
 
 #[derive(Args)]

@@ -25,10 +25,10 @@ use std::path::PathBuf;
 
 use clap::{Args, CommandFactory, FromArgMatches, Parser, Subcommand};
 
+use crate::engine::scene::{self as transport_line, RunResult};
 use crate::error::{Error, Result};
 use crate::gpu::{Gpu, Options};
 use crate::output::destination::Destination;
-use crate::transport::{self as transport_line, RunResult};
 use interrupt::{cancel_on_signal, exit_code, interruptible};
 use progress::print_line;
 

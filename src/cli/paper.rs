@@ -9,9 +9,9 @@ use super::parse::{parse_integer, parse_seconds, parse_threads};
 use super::progress::{ProgressArgs, ProgressReporter};
 use super::{DeviceArgs, End, complain, say};
 use crate::error::{Error, Result};
+use crate::measure::paper::bench::Bench;
+use crate::measure::paper::{self, Reproduction, Request, published, tables};
 use crate::output::destination::Folder;
-use crate::paper::bench::Bench;
-use crate::paper::{self, Reproduction, Request, published, tables};
 use crate::text::counted;
 
 #[derive(Args)]
@@ -114,19 +114,19 @@ mod tests {
     use crate::cli::Cli;
     use crate::output::command;
     use crate::rng::Rng;
-    use crate::settings::{Builder, Gather, Preset, Settings};
+    use crate::settings::{Builder, Gather, Preset, RoomSettings};
 
     /// The page prints the command that repeats each experiment, so it must mean what was run.
     #[test]
     fn printed_commands_give_the_settings_they_stand_for() {
         for preset in [Preset::Naive, Preset::Modified, Preset::Phong, Preset::Rounds] {
-            let defaults = Settings::preset(preset);
+            let defaults = RoomSettings::preset(preset);
             let full_light = defaults.full_light_for(65_536);
             for settings in [
                 defaults.clone(),
-                Settings { builder: Builder::Cpu, threads: 3, bounces: 7, gather: Gather::Brute, ..defaults.clone() },
-                Settings { photons: 65_536, full_light, rng: Rng::Philox, rounds: 5, ..defaults.clone() },
-                Settings { shininess: [Some(0.01); 5], ..defaults.clone() },
+                RoomSettings { builder: Builder::Cpu, threads: 3, bounces: 7, gather: Gather::Brute, ..defaults.clone() },
+                RoomSettings { photons: 65_536, full_light, rng: Rng::Philox, rounds: 5, ..defaults.clone() },
+                RoomSettings { shininess: [Some(0.01); 5], ..defaults.clone() },
             ] {
                 let line = command::main_job(preset, &settings);
                 let Ok(cli) = Cli::try_parse_from(line.split_whitespace()) else { panic!("{line} cannot be parsed") };

@@ -5,8 +5,8 @@ use std::num::IntErrorKind;
 use std::ops::RangeInclusive;
 use std::str::FromStr;
 
+use crate::engine::scene::replay::PhotonName;
 use crate::settings::WALL_NAMES;
-use crate::transport::replay::PhotonName;
 
 type Parsed<T> = Result<T, String>;
 

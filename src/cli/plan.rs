@@ -6,14 +6,14 @@ use super::picture_size::{PictureSize, parse_size};
 use super::progress::{ProgressArgs, ProgressReporter};
 use super::transport::{Job, PartArg, SceneArgs, TransportArgs, camera, geometry};
 use super::{DeviceArgs, JsonOrStdoutArg, optional_file, say};
+use crate::engine;
 use crate::error::Result;
 use crate::gpu::Gpu;
 use crate::output::destination::write_all;
 use crate::output::light_report;
 use crate::plan::Limits;
-use crate::plan::transport::{RadiusFrom, TransportPlan};
-use crate::render;
-use crate::settings::transport::{Part, TransportSettings};
+use crate::plan::scene::{RadiusFrom, ScenePlan};
+use crate::settings::scene::{Part, SceneSettings};
 use crate::text::counted;
 
 #[derive(Args)]
@@ -42,7 +42,7 @@ pub(super) struct PlanArgs {
 
 pub(super) fn run(args: &PlanArgs) -> Result<()> {
     let usual = args.transport.settings();
-    let settings = TransportSettings { part: args.part.map_or(usual.part, Part::from), ..usual };
+    let settings = SceneSettings { part: args.part.map_or(usual.part, Part::from), ..usual };
     settings.validate()?;
     let json = optional_file("--json", args.json.json.as_ref())?;
     let reporter = ProgressReporter::new(&args.progress);
@@ -53,11 +53,11 @@ pub(super) fn run(args: &PlanArgs) -> Result<()> {
     let geometry = geometry(&scene, &settings, &reporter)?;
     // A plan is data: it needs a device's limits, not the device.
     let limits = match Gpu::open(&args.device.options()) {
-        Ok(gpu) => render::limits(gpu.facts()),
+        Ok(gpu) => engine::limits(gpu.facts()),
         Err(error) if args.device.device.is_some() => return Err(error),
         Err(_) => Limits::of_host(),
     };
-    let plan = TransportPlan::new(job.scene, &geometry, job.settings, job.sensor, &limits)?;
+    let plan = ScenePlan::new(job.scene, &geometry, job.settings, job.sensor, &limits)?;
     reporter.finish();
     if let Some(json) = json {
         return write_all([(json, [light_report::plan_json(&plan), b"\n".to_vec()].concat())]);

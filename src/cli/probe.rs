@@ -10,6 +10,7 @@ use glam::DVec3;
 use super::progress::ProgressReporter;
 use super::transport::{Job, MessageArgs, ReportArgs, SceneArgs, TimedDeviceArgs, TransportArgs, geometry, light, plan};
 use super::{End, complain, say_beside};
+use crate::engine::scene::RunResult;
 use crate::error::{Error, Result};
 use crate::output::destination::{Destination, check_distinct, write_all};
 use crate::output::light_report;
@@ -17,9 +18,8 @@ use crate::plan::sensor::Sensor;
 use crate::records::Receiver;
 use crate::scene::geometry::Geometry;
 use crate::scene::{Light, LightKind, Mesh};
-use crate::settings::transport::{Illumination, TransportSettings};
+use crate::settings::scene::{Illumination, SceneSettings};
 use crate::text::{counted, echo, refusal};
-use crate::transport::RunResult;
 
 #[derive(Args)]
 pub(super) struct ProbeArgs {
@@ -43,7 +43,7 @@ pub(super) struct ProbeArgs {
 }
 
 impl ProbeArgs {
-    pub(super) fn settings(&self) -> TransportSettings {
+    pub(super) fn settings(&self) -> SceneSettings {
         self.transport.settings()
     }
 }

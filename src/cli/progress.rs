@@ -11,8 +11,8 @@ use clap::{Args, ValueEnum};
 use indicatif::{ProgressBar, ProgressStyle};
 
 use super::complain;
+use crate::engine::Progress;
 use crate::gpu::Gpu;
-use crate::render::Progress;
 use crate::text::counted;
 
 #[derive(Args)]

@@ -12,19 +12,19 @@ use super::transport::{
     FilterArg, Job, MessageArgs, PartArg, ReportArgs, SceneArgs, TimedDeviceArgs, TransportArgs, camera, geometry, light, plan,
 };
 use super::{End, optional_file, say, say_beside};
+use crate::engine;
+use crate::engine::scene::RunResult;
+use crate::engine::scene::replay::{self, PhotonName};
 use crate::error::{Error, Result};
-use crate::judge::{self, Judge, Verdict};
 use crate::output::colour::ColourPicture;
 use crate::output::destination::{Destination, check_distinct, write_all};
 use crate::output::image::Format;
 use crate::output::light_report;
+use crate::plan::scene::ScenePlan;
 use crate::plan::sensor::Sensor;
-use crate::plan::transport::TransportPlan;
-use crate::render::limits;
 use crate::scene::{Camera, Scene};
-use crate::settings::transport::{Filter, Part, TransportSettings};
-use crate::transport::RunResult;
-use crate::transport::replay::{self, PhotonName};
+use crate::settings::scene::{Filter, Part, SceneSettings};
+use crate::verify::judge::{self, Judge, Verdict};
 
 #[derive(Args)]
 pub(super) struct RenderArgs {
@@ -77,9 +77,9 @@ pub(super) struct RenderArgs {
 }
 
 impl RenderArgs {
-    pub(super) fn settings(&self) -> TransportSettings {
+    pub(super) fn settings(&self) -> SceneSettings {
         let usual = self.transport.settings();
-        TransportSettings {
+        SceneSettings {
             part: self.part.map_or(usual.part, Part::from),
             filter: self.filter.map_or(usual.filter, Filter::from),
             samples: self.samples.unwrap_or(usual.samples),
@@ -161,7 +161,7 @@ pub(super) fn run(args: &RenderArgs, cancelled: &AtomicBool) -> Result<End> {
 }
 
 /// The path of one photon of the run that these options ask for.
-fn show_photon(args: &RenderArgs, settings: &TransportSettings, name: PhotonName) -> Result<End> {
+fn show_photon(args: &RenderArgs, settings: &SceneSettings, name: PhotonName) -> Result<End> {
     let reporter = ProgressReporter::new(&args.messages.progress);
     let scene = args.scene.open(&reporter)?;
     let camera = camera(&scene, args.camera.as_deref())?;
@@ -169,7 +169,7 @@ fn show_photon(args: &RenderArgs, settings: &TransportSettings, name: PhotonName
     let geometry = geometry(&scene, settings, &reporter)?;
     let gpu = args.device.open(&reporter)?;
     // A photon's path does not depend on the radius.
-    let plan = TransportPlan::new(&scene, &geometry, settings, Sensor::Picture { width, height }, &limits(gpu.facts()))?;
+    let plan = ScenePlan::new(&scene, &geometry, settings, Sensor::Picture { width, height }, &engine::limits(gpu.facts()))?;
     let path = replay::replay(&gpu, &geometry, &plan, name)?;
     reporter.finish();
     say(&path.table(&geometry, &plan))?;

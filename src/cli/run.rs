@@ -10,23 +10,26 @@ use super::parse::{parse_integer, parse_number, parse_numbers, parse_photon_name
 use super::progress::{ProgressArgs, ProgressReporter};
 use super::stop::{StopArgs, bias_before, goals, rounds_after};
 use super::{DeviceArgs, End, JsonArg, TimingArgs, complain, optional_file, say, say_beside};
+use crate::engine;
+use crate::engine::Control;
+use crate::engine::choose_builder::{Choice, choose_builder};
+use crate::engine::room::film::{estimate_walls, irradiance_weights};
+use crate::engine::room::{self, RunResult};
+use crate::engine::scene::replay::PhotonName;
 use crate::error::{Error, Result};
-use crate::film::{estimate_walls, irradiance_weights};
 use crate::gpu::Gpu;
 use crate::output::destination::{Destination, Folder, check_distinct, write_all};
 use crate::output::image::{Format, overview};
 use crate::output::lightmap::{self, Quantity};
 use crate::output::{report, trace_file};
-use crate::plan::{Limits, Plan};
-use crate::render::{self, Choice, Control, RunResult};
+use crate::plan::{Limits, RoomPlan};
 use crate::rng::Rng;
 use crate::scene::open_box::open_box;
 use crate::scene::room::RoomScene;
 use crate::settings::stop::Stop;
-use crate::settings::{Builder, EmissionLaw, Gather, Math, PhongDirection, Preset, Settings, Sums};
+use crate::settings::{Builder, EmissionLaw, Gather, Math, PhongDirection, Preset, RoomSettings, Sums};
 use crate::text::counted;
 use crate::timings::{Clock, Span};
-use crate::transport::replay::PhotonName;
 
 #[derive(Args)]
 pub(super) struct RunArgs {
@@ -259,10 +262,10 @@ pub(super) enum SwitchArg {
 }
 
 impl RunArgs {
-    pub(super) fn settings(&self) -> Settings {
-        let preset = Settings::preset(self.preset.map_or(Preset::Modified, Preset::from));
+    pub(super) fn settings(&self) -> RoomSettings {
+        let preset = RoomSettings::preset(self.preset.map_or(Preset::Modified, Preset::from));
         let photons = self.photons.unwrap_or(preset.photons);
-        let settings = Settings {
+        let settings = RoomSettings {
             builder: self.variant.and_then(BuilderArg::builder).unwrap_or(preset.builder),
             photons,
             rounds: self.rounds.unwrap_or(preset.rounds),
@@ -292,7 +295,7 @@ impl RunArgs {
             stop: self.stop.stop(),
         };
         match self.rounds {
-            None if settings.stop.is_set() => Settings { rounds: settings.most_rounds(), ..settings },
+            None if settings.stop.is_set() => RoomSettings { rounds: settings.most_rounds(), ..settings },
             _ => settings,
         }
     }
@@ -326,9 +329,9 @@ pub(super) fn run(args: &RunArgs, cancelled: &AtomicBool) -> Result<End> {
     reporter.device(gpu.as_ref());
     let settings = match &gpu {
         Some(gpu) if args.variant == Some(BuilderArg::Auto) => {
-            Settings { builder: fastest(gpu, &scene, &settings, &reporter)?, ..settings }
+            RoomSettings { builder: fastest(gpu, &scene, &settings, &reporter)?, ..settings }
         }
-        None => Settings { builder: Builder::Cpu, ..settings },
+        None => RoomSettings { builder: Builder::Cpu, ..settings },
         _ => settings,
     };
     if let (Some(nearest), true) = (settings.nearest, args.stop.bias) {
@@ -336,17 +339,17 @@ pub(super) fn run(args: &RunArgs, cancelled: &AtomicBool) -> Result<End> {
         return Err(Error::setting("--nearest", nearest, why));
     }
     announce(&reporter, gpu.as_ref(), &scene, &settings)?;
-    let measure = |settings: &Settings, rounds| render::measure_bias(gpu.as_ref(), &scene, settings, rounds, cancelled);
+    let measure = |settings: &RoomSettings, rounds| room::measure_bias(gpu.as_ref(), &scene, settings, rounds, cancelled);
     let before = match settings.stop.error.filter(|_| args.stop.bias) {
         Some(wanted) => bias_before(wanted, (false, false), &reporter, |rounds| measure(&settings, rounds))?,
         None => None,
     };
-    let settings = Settings { stop: Stop { bias: before.map(|bias| bias.upper), ..settings.stop }, ..settings };
+    let settings = RoomSettings { stop: Stop { bias: before.map(|bias| bias.upper), ..settings.stop }, ..settings };
     reporter.status("making the pipelines");
     let mut control = Control { cancelled, progress: &mut |progress| reporter.report(progress, "photon") };
     let mut outcome = match &gpu {
-        Some(gpu) => render::on_gpu(gpu, &scene, &settings, &mut control)?,
-        None => render::on_cpu(&scene, &settings, &mut control)?,
+        Some(gpu) => room::on_gpu(gpu, &scene, &settings, &mut control)?,
+        None => room::on_cpu(&scene, &settings, &mut control)?,
     };
     outcome.bias = before;
     if before.is_none() && args.stop.bias && !outcome.cancelled {
@@ -364,18 +367,18 @@ pub(super) fn run(args: &RunArgs, cancelled: &AtomicBool) -> Result<End> {
 }
 
 /// What will be traced, before it is.
-fn announce(reporter: &ProgressReporter, gpu: Option<&Gpu>, scene: &RoomScene, settings: &Settings) -> Result<()> {
+fn announce(reporter: &ProgressReporter, gpu: Option<&Gpu>, scene: &RoomScene, settings: &RoomSettings) -> Result<()> {
     let memory = match gpu {
         Some(gpu) => {
-            let plan = Plan::new(scene, settings, &render::limits(gpu.facts()))?;
+            let plan = RoomPlan::new(scene, settings, &engine::limits(gpu.facts()))?;
             format!("{:.1} MiB on the device", plan.bytes() as f64 / f64::from(1 << 20))
         }
         None => {
-            let plan = Plan::new(scene, settings, &Limits::of_host())?;
+            let plan = RoomPlan::new(scene, settings, &Limits::of_host())?;
             format!("{:.1} MiB for the photon map", plan.photon_map_bytes() as f64 / f64::from(1 << 20))
         }
     };
-    let Settings { builder, rounds, photons, bounces, radius, mesh, .. } = settings;
+    let RoomSettings { builder, rounds, photons, bounces, radius, mesh, .. } = settings;
     let up_to = if settings.stop.is_set() { "up to " } else { "" };
     reporter.note(&format!(
         "plan: open box, {} builder, {up_to}{} of {photons} photons, {}; radius {radius} m; {mesh} x {mesh} texels per wall; {memory}{}",
@@ -388,9 +391,9 @@ fn announce(reporter: &ProgressReporter, gpu: Option<&Gpu>, scene: &RoomScene, s
 }
 
 /// The builder that is fastest on this device; prints the time of each.
-fn fastest(gpu: &Gpu, scene: &RoomScene, settings: &Settings, reporter: &ProgressReporter) -> Result<Builder> {
+fn fastest(gpu: &Gpu, scene: &RoomScene, settings: &RoomSettings, reporter: &ProgressReporter) -> Result<Builder> {
     reporter.status("timing each builder");
-    let Choice { photons, candidates } = render::choose_builder(gpu, scene, settings)?;
+    let Choice { photons, candidates } = choose_builder(gpu, scene, settings)?;
     let times: Vec<String> =
         candidates.iter().map(|candidate| format!("{} {:.3}", candidate.builder.name(), candidate.ms.median)).collect();
     let taken = candidates[0].builder;
@@ -399,15 +402,15 @@ fn fastest(gpu: &Gpu, scene: &RoomScene, settings: &Settings, reporter: &Progres
 }
 
 /// Where one photon of the run is stored.
-fn show_photon(args: &RunArgs, settings: &Settings, scene: &RoomScene, name: PhotonName) -> Result<End> {
+fn show_photon(args: &RunArgs, settings: &RoomSettings, scene: &RoomScene, name: PhotonName) -> Result<End> {
     let PhotonName { round, photon, caustic } = name;
     if caustic {
         return Err(Error::setting("--replay", name, "must be ROUND:PHOTON here: the paper's box has no caustic map"));
     }
     let gpu = if settings.builder == Builder::Cpu { None } else { args.device.open(&args.device.options())? };
     let path = match &gpu {
-        Some(gpu) => render::replay_on_gpu(gpu, scene, settings, round, photon)?,
-        None => render::replay_on_cpu(scene, settings, round, photon)?,
+        Some(gpu) => room::replay_on_gpu(gpu, scene, settings, round, photon)?,
+        None => room::replay_on_cpu(scene, settings, round, photon)?,
     };
     let name_of = |wall: u32| scene.faces[wall as usize].as_ref().map_or("opening", |wall| wall.name);
     let (p, d) = (path.start.position, path.start.direction);

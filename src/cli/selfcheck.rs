@@ -9,7 +9,7 @@ use super::progress::{ProgressArgs, ProgressReporter};
 use super::{DeviceArgs, End, JsonOrStdoutArg, complain, optional_file, say};
 use crate::error::{Error, Result};
 use crate::output::destination::{Destination, write_all};
-use crate::selfcheck::{self, Finding};
+use crate::verify::selfcheck::{self, Finding};
 
 #[derive(Args)]
 pub(super) struct SelfcheckArgs {

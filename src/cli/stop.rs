@@ -4,7 +4,7 @@ use clap::Args;
 
 use super::parse::{parse_percent, parse_seconds, parse_within};
 use super::progress::ProgressReporter;
-use crate::bias::Bias;
+use crate::engine::bias::Bias;
 use crate::error::{Error, Result};
 use crate::settings::stop::Stop;
 use crate::text::counted;
@@ -56,7 +56,7 @@ pub(super) fn goals(stop: &Stop) -> String {
 
 /// Rounds of a batch after a run of so many: all batches at both radii together do about as many as the run.
 pub(super) fn rounds_after(rounds: u32) -> u32 {
-    rounds.div_ceil(2 * crate::bias::BATCHES).max(1)
+    rounds.div_ceil(2 * crate::engine::bias::BATCHES).max(1)
 }
 
 /// Rounds of a batch at first, and how often it is made again with four times as many, as long as the interval leaves
@@ -74,7 +74,11 @@ pub(super) fn bias_before(
 ) -> Result<Option<Bias>> {
     let mut rounds = FIRST_ROUNDS;
     for refinement in 0..=REFINEMENTS {
-        reporter.step(&format!("measuring the bias first: {} batches of {} at two radii", crate::bias::BATCHES, counted(rounds, "round")));
+        reporter.step(&format!(
+            "measuring the bias first: {} batches of {} at two radii",
+            crate::engine::bias::BATCHES,
+            counted(rounds, "round")
+        ));
         let Some(bias) = measure(rounds)? else { return Ok(None) };
         if !bias.is_known() && !ends_otherwise {
             return Err(Error::setting(

@@ -11,9 +11,9 @@ use super::progress::{ProgressArgs, ProgressReporter};
 use super::{DeviceArgs, End, complain, help, say};
 use crate::error::{Error, Result};
 use crate::gpu::Gpu;
+use crate::measure::study::{self, Request};
 use crate::output::destination::Folder;
 use crate::scene::Scene;
-use crate::study::{self, Request};
 
 #[derive(Args)]
 pub(super) struct StudyArgs {
@@ -138,10 +138,10 @@ mod tests {
     use clap::Parser;
 
     use super::super::{Cli, Command};
+    use crate::measure::study::axes::{self, Group, Line};
     use crate::output::command;
     use crate::settings::Preset;
-    use crate::settings::transport::Effect;
-    use crate::study::axes::{self, Group, Line};
+    use crate::settings::scene::Effect;
 
     fn parse(line: &str) -> Cli {
         Cli::try_parse_from(line.split(' ')).unwrap_or_else(|error| panic!("{line}: {error}"))
@@ -159,7 +159,7 @@ mod tests {
                     let line = command::main_job(Preset::Modified, settings);
                     let parsed = parse(&line).run.settings();
                     // Full light is of the paper's picture, which no study looks at.
-                    assert_eq!(crate::settings::Settings { full_light: settings.full_light, ..parsed }, *settings, "{line}");
+                    assert_eq!(crate::settings::RoomSettings { full_light: settings.full_light, ..parsed }, *settings, "{line}");
                 }
                 Line::Scene(settings) => {
                     let line = command::on_scene("render open-box -o picture.exr", settings);

@@ -11,23 +11,24 @@ use super::progress::{ProgressArgs, ProgressReporter};
 use super::run::{MathArg, SwitchArg, value_enum};
 use super::stop::{StopArgs, bias_before, goals, rounds_after};
 use super::{DeviceArgs, JsonArg, TimingArgs, complain, help, optional_file};
+use crate::engine::Control;
+use crate::engine::Progress;
+use crate::engine::scene::{self, RunResult, View};
+use crate::engine::watch::mean_squared_radius;
 use crate::error::{Error, Result};
 use crate::gpu::Gpu;
 use crate::output::destination::Destination;
 use crate::output::light_report;
 use crate::output::trace_file;
+use crate::plan::scene::ScenePlan;
 use crate::plan::sensor::Sensor;
-use crate::plan::transport::TransportPlan;
 use crate::records::Receiver;
-use crate::render::stop::mean_squared_radius;
-use crate::render::{Control, Progress};
 use crate::scene::geometry::Geometry;
 use crate::scene::light::{Light, LightKind};
 use crate::scene::{Camera, Scene};
-use crate::settings::transport::{Effect, Filter, Illumination, Kernel, MAX_ROUNDS, Part, Stop, TransportSettings};
+use crate::settings::scene::{Effect, Filter, Illumination, Kernel, MAX_ROUNDS, Part, SceneSettings, Stop};
 use crate::settings::{Builder, Math};
 use crate::text::counted;
-use crate::transport::{self, RunResult, View};
 
 #[derive(Args)]
 pub(super) struct SceneArgs {
@@ -234,12 +235,12 @@ impl SceneArgs {
 }
 
 impl TransportArgs {
-    pub(super) fn settings(&self) -> TransportSettings {
-        let usual = TransportSettings::default();
+    pub(super) fn settings(&self) -> SceneSettings {
+        let usual = SceneSettings::default();
         let photons = self.photons.unwrap_or(usual.photons);
         let caustic_photons = self.caustic_photons.unwrap_or(photons);
         let stop = self.stop.stop();
-        TransportSettings {
+        SceneSettings {
             photons,
             caustic_photons,
             rounds: self.rounds.unwrap_or_else(|| most_rounds(&stop, photons.min(caustic_photons)).unwrap_or(usual.rounds)),
@@ -303,7 +304,7 @@ impl Reports {
 /// What a run is about.
 pub(super) struct Job<'a> {
     pub(super) scene: &'a Scene,
-    pub(super) settings: &'a TransportSettings,
+    pub(super) settings: &'a SceneSettings,
     pub(super) sensor: Sensor,
     pub(super) camera: Option<&'a Camera>,
     pub(super) phases: &'a [Vec<Receiver>],
@@ -312,15 +313,15 @@ pub(super) struct Job<'a> {
 }
 
 impl<'a> Job<'a> {
-    pub(super) fn picture(scene: &'a Scene, settings: &'a TransportSettings, camera: &'a Camera, (width, height): (u32, u32)) -> Job<'a> {
+    pub(super) fn picture(scene: &'a Scene, settings: &'a SceneSettings, camera: &'a Camera, (width, height): (u32, u32)) -> Job<'a> {
         Job { scene, settings, sensor: Sensor::Picture { width, height }, camera: Some(camera), phases: &[], point: "pixel" }
     }
 }
 
 /// The plan of a job, its default radii from a trial round.
-pub(super) fn plan(gpu: &Gpu, job: &Job, geometry: &Geometry) -> Result<TransportPlan> {
+pub(super) fn plan(gpu: &Gpu, job: &Job, geometry: &Geometry) -> Result<ScenePlan> {
     let view = View { geometry, camera: job.camera, phases: job.phases };
-    let plan = transport::trial::plan(gpu, job.scene, &view, job.settings, job.sensor)?;
+    let plan = scene::trial::plan(gpu, job.scene, &view, job.settings, job.sensor)?;
     if let Some(warning) = light_report::radius_warning(&plan, geometry, job.point) {
         complain(&format!("warning: {warning}"));
     }
@@ -328,7 +329,7 @@ pub(super) fn plan(gpu: &Gpu, job: &Job, geometry: &Geometry) -> Result<Transpor
 }
 
 /// Geometry of a scene without the effects that are left out.
-pub(super) fn geometry(scene: &Scene, settings: &TransportSettings, reporter: &ProgressReporter) -> Result<Geometry> {
+pub(super) fn geometry(scene: &Scene, settings: &SceneSettings, reporter: &ProgressReporter) -> Result<Geometry> {
     let what = format!("{} ({})", scene.name, counted(scene.triangle_count(), "triangle"));
     let geometry = Geometry::new_with(&scene.without(&settings.without), &mut stages(&what, reporter))?;
     if geometry.left_out > 0 {
@@ -351,7 +352,7 @@ fn stages<'a>(what: &'a str, reporter: &'a ProgressReporter) -> impl FnMut(&'sta
 }
 
 /// What will be traced, before it is.
-fn announce(job: &Job, geometry: &Geometry, plan: &TransportPlan, reporter: &ProgressReporter) {
+fn announce(job: &Job, geometry: &Geometry, plan: &ScenePlan, reporter: &ProgressReporter) {
     let what = match plan.sensor {
         Sensor::Picture { width, height } => format!("{width} x {height} pixels"),
         Sensor::Receivers { count } => counted(count, job.point),
@@ -378,15 +379,15 @@ pub(super) fn light(
     gpu: &Gpu,
     job: &Job,
     geometry: &Geometry,
-    mut plan: TransportPlan,
+    mut plan: ScenePlan,
     bias: bool,
     reporter: &ProgressReporter,
     cancelled: &AtomicBool,
 ) -> Result<RunResult> {
     announce(job, geometry, &plan, reporter);
     let view = View { geometry, camera: job.camera, phases: job.phases };
-    let of_first = |plan: &TransportPlan, factor_and_rounds| {
-        interruptible(|| transport::bias::measure(gpu, job.scene, &view, plan, factor_and_rounds, cancelled))
+    let of_first = |plan: &ScenePlan, factor_and_rounds| {
+        interruptible(|| scene::bias::measure(gpu, job.scene, &view, plan, factor_and_rounds, cancelled))
     };
     let alpha = plan.settings.alpha;
     let stop = plan.settings.stop;
@@ -402,8 +403,8 @@ pub(super) fn light(
     reporter.status("making the pipelines");
     let mut report = |progress: &Progress| reporter.report(progress, "round");
     let mut control = Control { cancelled, progress: &mut report };
-    let mut lit = interruptible(|| transport::light(gpu, &view, plan, &mut control))?;
-    if lit.end == transport::End::Cancelled {
+    let mut lit = interruptible(|| scene::light(gpu, &view, plan, &mut control))?;
+    if lit.end == scene::End::Cancelled {
         complain(&format!("ended early: the results are of {} of {}", counted(lit.film.rounds, "round"), lit.plan.settings.rounds));
         return Ok(lit);
     }

@@ -1,4 +1,4 @@
-//! The paper's Phong weight (section 4.4). Twin of `glsl/bsdf.glsl`, which explains it.
+//! The paper's Phong weight (section 4.4). Twin of `glsl/material/phong_weight.glsl`, which explains it.
 
 use glam::Vec3;
 

@@ -1,21 +1,21 @@
-//! Density estimation on the CPU. Twin of `glsl/stages/estimate.glsl`.
+//! Density estimation on the CPU. Twin of `glsl/gather/estimate.glsl`.
 
 use glam::Vec3;
 use rayon::prelude::*;
 
 use super::tree::Tree;
 use crate::photon::Photon;
-use crate::plan::Plan;
+use crate::plan::RoomPlan;
 use crate::records::Point;
 use crate::settings::Sums;
 
 /// Adds to `sums` what each point receives from a list of photons, stepping through all of it.
-pub fn gather_brute(plan: &Plan, photons: &[Photon], sums: &mut [u64]) {
+pub fn gather_brute(plan: &RoomPlan, photons: &[Photon], sums: &mut [u64]) {
     gather(plan, sums, |_| std::iter::once(photons));
 }
 
 /// The same from the leaves of a kd-tree in reach of each point.
-pub fn gather_tree(plan: &Plan, tree: &Tree, sums: &mut [u64]) {
+pub fn gather_tree(plan: &RoomPlan, tree: &Tree, sums: &mut [u64]) {
     let radius_squared = (plan.settings.radius * plan.settings.radius) as f32;
     gather(plan, sums, |point| {
         let mut walk = tree.walk(point);
@@ -23,7 +23,7 @@ pub fn gather_tree(plan: &Plan, tree: &Tree, sums: &mut [u64]) {
     });
 }
 
-fn gather<'a, Runs>(plan: &Plan, sums: &mut [u64], runs_near: impl Fn(&Point) -> Runs + Sync)
+fn gather<'a, Runs>(plan: &RoomPlan, sums: &mut [u64], runs_near: impl Fn(&Point) -> Runs + Sync)
 where
     Runs: Iterator<Item = &'a [Photon]>,
 {

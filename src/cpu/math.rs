@@ -1,4 +1,4 @@
-//! Powers, logarithms and angles that are the same to the bit on every machine. Twin of `glsl/math.glsl`, which explains
+//! Powers, logarithms and angles that are the same to the bit on every machine. Twin of `glsl/math/math.glsl`, which explains
 //! them; quotients and roots are rounded to nearest on a CPU anyway.
 
 /// 2^x to 2 units in the last place, 0 below 2^-125.

@@ -1,5 +1,5 @@
-//! Density estimation by the nearest photons on the CPU. Twin of `glsl/stages/nearest.glsl`, which explains the
-//! estimate, and of `glsl/covered_disc.glsl`.
+//! Density estimation by the nearest photons on the CPU. Twin of `glsl/gather/nearest.glsl`, which explains the
+//! estimate, and of `glsl/gather/covered_disc.glsl`.
 
 use std::collections::BinaryHeap;
 
@@ -9,7 +9,7 @@ use super::estimate::{squared_distance, to_fixed_point};
 use super::math::angle_of;
 use super::tree::Tree;
 use crate::constants::{NEAREST_BITS, NEAREST_GAIN_BITS};
-use crate::plan::Plan;
+use crate::plan::RoomPlan;
 use crate::records::{Point, Room};
 use crate::scene::room::RoomScene;
 
@@ -17,7 +17,7 @@ use crate::scene::room::RoomScene;
 const LEAST_DISC: f32 = 1.0 / 1_048_576.0;
 
 /// Adds to `sums` what the `count` photons nearest to each point say that the disc of the full radius holds.
-pub fn gather(plan: &Plan, scene: &RoomScene, tree: &Tree, count: u32, sums: &mut [u64]) {
+pub fn gather(plan: &RoomPlan, scene: &RoomScene, tree: &Tree, count: u32, sums: &mut [u64]) {
     let channels = plan.channel_count as usize;
     let room = scene.room_record();
     let one_point = |(point, sums): (&Point, &mut [u64])| {
@@ -31,7 +31,7 @@ pub fn gather(plan: &Plan, scene: &RoomScene, tree: &Tree, count: u32, sums: &mu
 }
 
 /// What one point adds to its two channels.
-fn of_point(plan: &Plan, room: &Room, tree: &Tree, count: usize, point: &Point) -> [u64; 2] {
+fn of_point(plan: &RoomPlan, room: &Room, tree: &Tree, count: usize, point: &Point) -> [u64; 2] {
     let radius_squared = (plan.settings.radius * plan.settings.radius) as f32;
     // (bits of the squared distance, photon, bounce), which are in the order of nearness, and the place in the tree.
     let mut nearest: BinaryHeap<(u32, (u32, u32), usize)> = BinaryHeap::with_capacity(count + 1);
@@ -102,12 +102,12 @@ pub fn covered_disc(point: &Point, radius: f32, room: &Room) -> f32 {
 mod tests {
     use super::*;
     use crate::scene::open_box::open_box;
-    use crate::settings::Settings;
+    use crate::settings::RoomSettings;
     use glam::Vec3;
 
     #[test]
     fn covered_discs_are_those_of_f64() {
-        let scene = open_box(&Settings::default());
+        let scene = open_box(&RoomSettings::default());
         let rectangle = scene.rectangle(4);
         for (s, t) in [(0.5, 0.5), (0.001, 0.5), (0.01, 0.01), (0.99, 0.3), (0.2, 0.999)] {
             for radius in [1e-6, 0.002, 0.05, 0.25, 0.5] {

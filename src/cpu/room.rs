@@ -1,4 +1,4 @@
-//! Where a path leaves a convex room. Twin of `glsl/room.glsl`, which explains it.
+//! Where a path leaves a convex room. Twin of `glsl/world/room/geometry.glsl`, which explains it.
 
 use glam::{BVec3, Vec3};
 

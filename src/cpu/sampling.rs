@@ -1,4 +1,4 @@
-//! Directions from uniform numbers. Twin of `glsl/sampling.glsl`.
+//! Directions from uniform numbers. Twin of `glsl/rng/sampling.glsl`.
 
 use glam::{Vec2, Vec3};
 

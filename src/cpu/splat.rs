@@ -13,13 +13,13 @@ use super::estimate::{squared_distance, to_fixed_point};
 use super::trace::Block;
 use crate::constants::FACE_COUNT;
 use crate::photon::Photon;
-use crate::plan::Plan;
+use crate::plan::RoomPlan;
 use crate::records::Point;
 use crate::scene::room::face_axis;
 
 /// What photons add to the texels of all walls.
 pub struct Splats<'a> {
-    plan: &'a Plan,
+    plan: &'a RoomPlan,
     meshes: [Option<Mesh<'a>>; FACE_COUNT as usize],
     /// By how much the running sum of a row grows at each texel and behind the last: for each task that adds its own, so
     /// that none waits.
@@ -59,7 +59,7 @@ struct Lattice {
 
 impl<'a> Splats<'a> {
     /// For as many tasks as the current pool has threads.
-    pub fn new(plan: &'a Plan, vectors: Arch) -> Splats<'a> {
+    pub fn new(plan: &'a RoomPlan, vectors: Arch) -> Splats<'a> {
         let mesh = plan.settings.mesh as usize;
         let meshes = std::array::from_fn(|face| {
             let first = plan.points.iter().position(|point| point.wall as usize == face)?;
@@ -204,7 +204,7 @@ fn round(x: f32) -> (u32, f32) {
 
 /// A task: takes one block after another until none is left.
 struct AddPhotons<'a> {
-    plan: &'a Plan,
+    plan: &'a RoomPlan,
     meshes: &'a [Option<Mesh<'a>>; FACE_COUNT as usize],
     blocks: &'a [Block],
     next_block: &'a AtomicUsize,

@@ -19,14 +19,14 @@ use super::sampling::{sample_cosine_hemisphere, to_world};
 use crate::constants::FACE_COUNT;
 use crate::path::Path;
 use crate::photon::Photon;
-use crate::plan::{EmissionRange, Plan};
+use crate::plan::{EmissionRange, RoomPlan};
 use crate::records::{DiscLight, RandomKey, Room, Tally, Wall};
 use crate::rng::{self, Rng, words};
 use crate::scene::room::RoomScene;
 
 /// The scene and settings as the tracing functions read them.
 pub struct Tracer<'a> {
-    plan: &'a Plan,
+    plan: &'a RoomPlan,
     room: Room,
     walls: [Wall; FACE_COUNT as usize],
     /// Of each wall: below it a random number lets a photon live.
@@ -75,12 +75,12 @@ struct Hits {
 }
 
 impl<'a> Tracer<'a> {
-    pub fn new(scene: &RoomScene, plan: &'a Plan) -> Tracer<'a> {
+    pub fn new(scene: &RoomScene, plan: &'a RoomPlan) -> Tracer<'a> {
         Tracer::with_vectors(scene, plan, Arch::new())
     }
 
     /// For vectors of a given kind.
-    pub fn with_vectors(scene: &RoomScene, plan: &'a Plan, vectors: Arch) -> Tracer<'a> {
+    pub fn with_vectors(scene: &RoomScene, plan: &'a RoomPlan, vectors: Arch) -> Tracer<'a> {
         let walls: [Wall; FACE_COUNT as usize] = scene.wall_records().try_into().expect("a room has six faces");
         Tracer {
             plan,

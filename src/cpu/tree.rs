@@ -1,5 +1,5 @@
-//! The kd-tree over the photons of each wall, on the CPU. Twin of `glsl/tree.glsl`, which explains its layout, and
-//! of `glsl/stages/tree_walk.glsl`.
+//! The kd-tree over the photons of each wall, on the CPU. Twin of `glsl/index/tree.glsl`, which explains its layout, and
+//! of `glsl/gather/tree_walk.glsl`.
 
 use std::ops::Range;
 

@@ -54,7 +54,7 @@ pub fn loop_count(gpu: &Gpu, wanted: u32) -> Result<LoopCount> {
     Ok(LoopCount { wanted, done: ask(gpu, &push)?.iterations })
 }
 
-/// What the strict functions of `glsl/math.glsl` make of each pair on the device.
+/// What the strict functions of `glsl/math/math.glsl` make of each pair on the device.
 pub fn math(gpu: &Gpu, operands: &[Vec2]) -> Result<Vec<MathResults>> {
     let constants = Constants::new(GROUP_SIZE).set("STRICT_MATH", 1);
     let mut commands = Commands::new(gpu, constants, Instant::now())?;

@@ -237,7 +237,7 @@ impl<'gpu> Commands<'gpu> {
         Ok(())
     }
 
-    /// Groups laid out in rows that the device allows; glsl/dispatch.glsl reads them back.
+    /// Groups laid out in rows that the device allows; glsl/dispatch/dispatch.glsl reads them back.
     fn fold(&self, groups: u64) -> DispatchArgs {
         let columns = groups.min(u64::from(self.gpu.facts.work_group_count_x));
         let rows = if columns == 0 { 0 } else { groups.div_ceil(columns) };

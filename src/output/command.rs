@@ -3,8 +3,8 @@
 
 use std::fmt::Display;
 
-use crate::settings::transport::{Effect, TransportSettings};
-use crate::settings::{Gather, Preset, Settings};
+use crate::settings::scene::{Effect, SceneSettings};
+use crate::settings::{Gather, Preset, RoomSettings};
 
 struct Line(String);
 
@@ -39,8 +39,8 @@ fn switch(on: bool) -> &'static str {
 }
 
 /// `photonmill` on the paper's box.
-pub fn main_job(preset: Preset, settings: &Settings) -> String {
-    let usual = Settings::preset(preset);
+pub fn main_job(preset: Preset, settings: &RoomSettings) -> String {
+    let usual = RoomSettings::preset(preset);
     let mut line = Line("photonmill".to_owned());
     line.named("preset", preset, Preset::Modified);
     line.differing("variant", settings.builder.name(), usual.builder.name());
@@ -67,8 +67,8 @@ pub fn main_job(preset: Preset, settings: &Settings) -> String {
 }
 
 /// A subcommand with its scene and other arguments, such as `render cornell -o a.exr`, on a scene of triangles.
-pub fn on_scene(subcommand: &str, settings: &TransportSettings) -> String {
-    let usual = TransportSettings::default();
+pub fn on_scene(subcommand: &str, settings: &SceneSettings) -> String {
+    let usual = SceneSettings::default();
     let mut line = Line(format!("photonmill {subcommand}"));
     line.differing("photons", settings.photons, usual.photons);
     line.differing("caustic-photons", settings.caustic_photons, settings.photons);

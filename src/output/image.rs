@@ -8,8 +8,8 @@ use image::codecs::openexr::OpenExrEncoder;
 use image::codecs::png::PngEncoder;
 use image::{ExtendedColorType, ImageEncoder};
 
+use crate::engine::room::film::WallEstimate;
 use crate::error::{Error, Result};
-use crate::film::WallEstimate;
 use crate::scene::rectangle::Rectangle;
 use crate::scene::room::{RoomScene, face_axis};
 
@@ -234,7 +234,7 @@ impl Picture {
 mod tests {
     use super::*;
     use crate::scene::open_box::open_box;
-    use crate::settings::Settings;
+    use crate::settings::RoomSettings;
 
     /// Walls that shine with 0.1 times their face number plus one.
     fn numbered_walls(scene: &RoomScene) -> Vec<WallEstimate> {
@@ -249,7 +249,7 @@ mod tests {
 
     #[test]
     fn walls_stand_where_they_belong() {
-        let scene = open_box(&Settings::default());
+        let scene = open_box(&RoomSettings::default());
         let walls = numbered_walls(&scene);
         let unfolded = unfolded(&scene, &walls);
         let at = |column: usize, row: usize| {

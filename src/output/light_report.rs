@@ -6,20 +6,20 @@ use std::fmt::Write;
 use serde::Serialize;
 
 use super::report::{end_in_words, errors, ledger, losses, timing_table};
-use crate::bias::Bias;
 use crate::constants::MAX_BOUNCES;
+use crate::engine::bias::Bias;
+use crate::engine::nonfinite_values::NonfiniteValues;
+use crate::engine::scene::stop::error_bound;
+use crate::engine::scene::{End, RunResult};
+use crate::engine::unknown::Unknown;
 use crate::ledger::{Ledger, Losses};
-use crate::nonfinite_values::NonfiniteValues;
 use crate::plan::evidence::EffectDecision;
+use crate::plan::scene::{MapPlan, RadiusFrom, ScenePlan, Trial};
 use crate::plan::sensor::Sensor;
-use crate::plan::transport::{MapPlan, RadiusFrom, TransportPlan, Trial};
 use crate::scene::geometry::Geometry;
-use crate::settings::transport::{Effect, TransportSettings};
+use crate::settings::scene::{Effect, SceneSettings};
 use crate::text::counted;
 use crate::timings::{Row, Timings};
-use crate::transport::stop::error_bound;
-use crate::transport::{End, RunResult};
-use crate::unknown::Unknown;
 
 /// A row of the plan: what was decided, and after a run what it cost and gave.
 #[derive(Serialize)]
@@ -34,7 +34,7 @@ pub struct EffectRow<'a> {
 }
 
 /// The rows of a plan, with what a run measured.
-pub fn rows<'a>(plan: &'a TransportPlan, run: Option<(&Timings, &[u64])>) -> Vec<EffectRow<'a>> {
+pub fn rows<'a>(plan: &'a ScenePlan, run: Option<(&Timings, &[u64])>) -> Vec<EffectRow<'a>> {
     let pass = |name: &str| run.and_then(|(timings, _)| timings.row(name)).and_then(|row| row.gpu_ms);
     let share = |part: usize| {
         run.and_then(|(_, totals)| {
@@ -59,7 +59,7 @@ pub fn rows<'a>(plan: &'a TransportPlan, run: Option<(&Timings, &[u64])>) -> Vec
 }
 
 /// The plan as a table.
-pub fn plan_table(plan: &TransportPlan, run: Option<(&Timings, &[u64])>) -> String {
+pub fn plan_table(plan: &ScenePlan, run: Option<(&Timings, &[u64])>) -> String {
     let mut text = String::new();
     let rows = rows(plan, run);
     write!(text, "{:<20} {:<8} {:>10} {:>12}", "effect", "", "photons", "bytes").unwrap();
@@ -92,13 +92,13 @@ pub fn plan_table(plan: &TransportPlan, run: Option<(&Timings, &[u64])>) -> Stri
 }
 
 /// One line on effects that the scene needs and the user left out.
-pub fn missing(plan: &TransportPlan) -> Option<String> {
+pub fn missing(plan: &ScenePlan) -> Option<String> {
     let names: Vec<&str> = plan.missing().iter().map(|effect| effect.name()).collect();
     (!names.is_empty()).then(|| format!("left out, though the scene has it: {}; the result lacks that light", names.join(", ")))
 }
 
 /// One line on a radius by a trial round that is wider than what many points lie in.
-pub fn radius_warning(plan: &TransportPlan, geometry: &Geometry, point: &str) -> Option<String> {
+pub fn radius_warning(plan: &ScenePlan, geometry: &Geometry, point: &str) -> Option<String> {
     let trial = plan.trial.as_ref().filter(|_| plan.radius_is_too_wide())?;
     let widest = plan.maps().filter(|map| map.radius_from == RadiusFrom::Trial).max_by(|a, b| a.radius.total_cmp(&b.radius))?;
     let remedy = match widest.caustic_only {
@@ -121,7 +121,7 @@ struct Report<'a> {
     scene: &'a str,
     device: &'a str,
     driver: &'a str,
-    settings: &'a TransportSettings,
+    settings: &'a SceneSettings,
     plan: PlanReport<'a>,
     end: End,
     rounds: u32,
@@ -171,7 +171,7 @@ struct PlanReport<'a> {
     bytes: u64,
 }
 
-fn plan_report<'a>(plan: &'a TransportPlan, run: Option<(&Timings, &[u64])>) -> PlanReport<'a> {
+fn plan_report<'a>(plan: &'a ScenePlan, run: Option<(&Timings, &[u64])>) -> PlanReport<'a> {
     PlanReport {
         effects: rows(plan, run),
         maps: plan.maps().collect(),
@@ -182,7 +182,7 @@ fn plan_report<'a>(plan: &'a TransportPlan, run: Option<(&Timings, &[u64])>) -> 
 }
 
 /// A plan as JSON.
-pub fn plan_json(plan: &TransportPlan) -> Vec<u8> {
+pub fn plan_json(plan: &ScenePlan) -> Vec<u8> {
     serde_json::to_vec_pretty(&plan_report(plan, None)).expect("a plan is plain data")
 }
 

@@ -4,7 +4,7 @@ use serde::Serialize;
 
 use super::destination::{Destination, Folder};
 use super::image::{Format, Picture};
-use crate::film::WallEstimate;
+use crate::engine::room::film::WallEstimate;
 use crate::scene::room::RoomScene;
 
 /// Physical quantities of a wall's texel, both in W/m2.

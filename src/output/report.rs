@@ -4,20 +4,20 @@ use std::fmt::Write;
 
 use serde::Serialize;
 
-use crate::bias::Bias;
 use crate::constants::MAX_BOUNCES;
-use crate::film::WallEstimate;
+use crate::engine::bias::Bias;
+use crate::engine::nonfinite_values::NonfiniteValues;
+use crate::engine::room::RunResult;
+use crate::engine::room::film::WallEstimate;
+use crate::engine::unknown::Unknown;
+use crate::engine::watch::{End, error_bound};
 use crate::gpu::DeviceFacts;
 use crate::ledger::{BounceFates, Ledger, Losses};
-use crate::nonfinite_values::NonfiniteValues;
 use crate::plan::Decision;
-use crate::render::RunResult;
-use crate::render::stop::{End, error_bound};
-use crate::settings::Settings;
+use crate::settings::RoomSettings;
 use crate::settings::stop::Stop;
 use crate::text::counted;
 use crate::timings::{Row, Timings};
-use crate::unknown::Unknown;
 
 /// The JSON report.
 #[derive(Serialize)]
@@ -28,7 +28,7 @@ struct Report<'a> {
     driver: String,
     device_facts: Option<&'a DeviceFacts>,
     seed: u64,
-    settings: &'a Settings,
+    settings: &'a RoomSettings,
     plan: PlanReport<'a>,
     /// The run was ended before its last photon; all numbers are of the photons emitted.
     cancelled: bool,

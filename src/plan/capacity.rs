@@ -9,7 +9,7 @@ use crate::path::StoredPath;
 use crate::photon::{Origin, StoredPhoton};
 use crate::rng::Rng;
 use crate::scene::room::RoomScene;
-use crate::settings::{Builder, Gather, Settings, Sums};
+use crate::settings::{Builder, Gather, RoomSettings, Sums};
 
 /// What a device allows.
 #[derive(Debug, Clone, Copy, PartialEq, Eq, Serialize)]
@@ -114,7 +114,7 @@ pub struct Work {
 }
 
 impl Work {
-    pub fn new(scene: &RoomScene, settings: &Settings, point_count: usize) -> Work {
+    pub fn new(scene: &RoomScene, settings: &RoomSettings, point_count: usize) -> Work {
         // A photon is stored albedo + albedo^2 + ... times at most, and never more than `bounces`.
         let albedo = scene.walls().map(|(_, wall)| f64::from(wall.albedo)).fold(0.0, f64::max);
         let stored = (albedo / (1.0 - albedo)).min(f64::from(settings.bounces));
@@ -159,7 +159,7 @@ impl Work {
 const TESTS_PER_LANE: f64 = 8.0;
 
 /// Invocations that share a point of a gather over the grid, where it is expected to test so many photons.
-pub(super) fn lanes(settings: &Settings, limits: &Limits, tests_per_point: u64) -> u32 {
+pub(super) fn lanes(settings: &RoomSettings, limits: &Limits, tests_per_point: u64) -> u32 {
     // Sums of floats depend on who adds what.
     if settings.sums != Sums::Integer {
         return 1;
@@ -183,7 +183,7 @@ pub(super) fn most_candidates(limits: &Limits) -> u32 {
 const MANY_PHOTONS: u32 = 1 << 21;
 
 /// Counters that the atomic builder's work groups take turns at.
-pub(super) fn counters(settings: &Settings, limits: &Limits, photons: u32) -> u32 {
+pub(super) fn counters(settings: &RoomSettings, limits: &Limits, photons: u32) -> u32 {
     if settings.builder != Builder::Atomic {
         return 1;
     }
@@ -231,7 +231,7 @@ pub(super) fn loops_to_begin(rng: Rng) -> u32 {
 ///
 /// The photon map has room for `bounces` photons of each path, the most that can be stored, so it
 /// can never be full: a round that does not fit is split here, and nothing is dropped there.
-pub fn chunk_photons(settings: &Settings, limits: &Limits, work: &Work) -> Result<u32> {
+pub fn chunk_photons(settings: &RoomSettings, limits: &Limits, work: &Work) -> Result<u32> {
     let bounces = u64::from(settings.bounces);
     let path = size_of::<StoredPath>() as u64;
     let by_buffer = (limits.buffer_bytes / path).min(limits.buffer_bytes / (PHOTON_BYTES * bounces));

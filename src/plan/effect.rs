@@ -3,7 +3,7 @@
 use serde::Serialize;
 
 use crate::scene::room::RoomScene;
-use crate::settings::Settings;
+use crate::settings::RoomSettings;
 
 #[derive(Debug, Clone, PartialEq, Eq, Serialize)]
 pub struct Decision {
@@ -12,7 +12,7 @@ pub struct Decision {
     pub reason: String,
 }
 
-pub fn decide(scene: &RoomScene, settings: &Settings, equal_flux: bool) -> Vec<Decision> {
+pub fn decide(scene: &RoomScene, settings: &RoomSettings, equal_flux: bool) -> Vec<Decision> {
     let glossy: Vec<&str> = scene.walls().filter(|(_, wall)| wall.shininess.is_some()).map(|(_, wall)| wall.name).collect();
     let reflects = scene.walls().any(|(_, wall)| wall.albedo > 0.0);
     vec![

@@ -6,7 +6,7 @@ use super::sensor::Sensor;
 use crate::constants::*;
 use crate::scene::geometry::Geometry;
 use crate::scene::{Material, Scene, Surface};
-use crate::settings::transport::{Effect, Illumination, Part, TransportSettings};
+use crate::settings::scene::{Effect, Illumination, Part, SceneSettings};
 use crate::text::counted;
 
 /// One effect, kept or dropped, with the evidence.
@@ -38,7 +38,7 @@ pub(super) struct Facts<'a> {
 }
 
 impl<'a> Facts<'a> {
-    pub(super) fn new(scene: &'a Scene, geometry: &Geometry, settings: &TransportSettings, sensor: Sensor) -> Facts<'a> {
+    pub(super) fn new(scene: &'a Scene, geometry: &Geometry, settings: &SceneSettings, sensor: Sensor) -> Facts<'a> {
         let mut used = vec![false; scene.materials.len()];
         geometry.triangles.iter().for_each(|triangle| used[triangle.material as usize] = true);
         let mut emitters = [0; 7];
@@ -71,7 +71,7 @@ impl<'a> Facts<'a> {
         }
     }
 
-    pub(super) fn decide(&self, effect: Effect, settings: &TransportSettings) -> EffectDecision {
+    pub(super) fn decide(&self, effect: Effect, settings: &SceneSettings) -> EffectDecision {
         let (needed, evidence) = self.evidence(effect);
         let kept = (needed || settings.forces(effect)) && !settings.leaves_out(effect);
         let evidence = match (needed, kept) {

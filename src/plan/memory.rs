@@ -4,9 +4,9 @@
 use bytemuck::Pod;
 use glam::UVec2;
 
-use super::Plan;
+use super::RoomPlan;
+use super::scene::{MapPlan, ScenePlan};
 use super::sensor::Sensor;
-use super::transport::{MapPlan, TransportPlan};
 use crate::constants::{
     FACE_COUNT, HIT_KINDS, MAX_NONFINITE_VALUES, NONFINITE_ESTIMATE, PART_COUNT, SCAN_ITEMS, TALLY_COPIES, TOTAL_WORDS, TREE_LEAF, TREE_RUN,
 };
@@ -15,7 +15,7 @@ use crate::photon::{MapPhoton, Origin, StoredPhoton};
 use crate::records::*;
 use crate::scene::geometry::Geometry;
 use crate::settings::Builder;
-use crate::settings::transport::Effect;
+use crate::settings::scene::Effect;
 
 /// A buffer, or several of one name, and all their bytes.
 pub type Stated = (&'static str, u64);
@@ -40,12 +40,12 @@ fn block_sum_bytes(items: u64, group_size: u32) -> u64 {
 }
 
 /// Counts of a list of the kd-tree: a word a photon, up to whole runs of the radix sort.
-pub fn tree_count_capacity(plan: &Plan) -> u32 {
+pub fn tree_count_capacity(plan: &RoomPlan) -> u32 {
     plan.photon_capacity.next_multiple_of(TREE_RUN)
 }
 
 /// Work groups of the largest chunk's paths.
-pub fn group_count(plan: &Plan) -> u32 {
+pub fn group_count(plan: &RoomPlan) -> u32 {
     plan.path_capacity.div_ceil(plan.settings.group_size)
 }
 
@@ -53,12 +53,12 @@ pub fn group_count(plan: &Plan) -> u32 {
 const SEARCH_ENTRIES: u64 = 1 << 22;
 
 /// Points whose `nearest` photons are searched for at once.
-pub fn searches_at_once(plan: &Plan, nearest: u32) -> u64 {
+pub fn searches_at_once(plan: &RoomPlan, nearest: u32) -> u64 {
     let group = u64::from(plan.settings.group_size);
     (SEARCH_ENTRIES / u64::from(nearest) / group * group).clamp(group, (plan.points.len() as u64).next_multiple_of(group))
 }
 
-impl Plan {
+impl RoomPlan {
     /// Every buffer of the paper's line.
     pub fn buffers(&self) -> Vec<Stated> {
         let bounces = u64::from(self.settings.bounces);
@@ -138,7 +138,7 @@ impl Plan {
 const FILM_PIXEL_BYTES: u64 = 3 * 8 + 3 * 16;
 
 /// Every buffer of lighting a scene of triangles, with one set of receivers where points are asked.
-pub(super) fn of_transport(plan: &TransportPlan, geometry: &Geometry, keeps: &dyn Fn(Effect) -> bool) -> Vec<Stated> {
+pub(super) fn of_transport(plan: &ScenePlan, geometry: &Geometry, keeps: &dyn Fn(Effect) -> bool) -> Vec<Stated> {
     fn kept<T: Pod>(content: &[T], is_kept: bool) -> u64 {
         array::<T>(if is_kept { content.len() as u64 } else { 0 })
     }
@@ -192,7 +192,7 @@ pub(super) fn of_transport(plan: &TransportPlan, geometry: &Geometry, keeps: &dy
     buffers
 }
 
-impl TransportPlan {
+impl ScenePlan {
     /// Bytes of all buffers of a run that asks `phases` sets of receivers in turn; of a picture there are none.
     pub fn bytes_of(&self, phases: usize) -> u64 {
         match self.sensor {

@@ -6,8 +6,8 @@ pub mod effect;
 pub mod evidence;
 pub mod memory;
 pub mod planning;
+pub mod scene;
 pub mod sensor;
-pub mod transport;
 
 use std::ops::Range;
 
@@ -22,7 +22,7 @@ use crate::photon::StoredPhoton;
 use crate::records::{IndexPush, Point};
 use crate::rng::Streams;
 use crate::scene::room::RoomScene;
-use crate::settings::{Builder, Gather, Settings, Sums};
+use crate::settings::{Builder, Gather, RoomSettings, Sums};
 
 /// A run of photons of one light inside a chunk.
 #[derive(Debug, Clone, Copy, PartialEq, Eq)]
@@ -46,8 +46,8 @@ impl EmissionRange {
 }
 
 #[derive(Debug, Clone, PartialEq)]
-pub struct Plan {
-    pub settings: Settings,
+pub struct RoomPlan {
+    pub settings: RoomSettings,
     pub decisions: Vec<Decision>,
     /// Sums a point keeps: flux, and where it differs from the paper's illumination, that too.
     pub channel_count: u32,
@@ -123,8 +123,8 @@ const DENSE: u64 = 512;
 /// Fixed-point units that the faintest photon must be worth: a thousandth is lost to rounding at most.
 const MIN_FIXED_POINT: f64 = 512.0;
 
-impl Plan {
-    pub fn new(scene: &RoomScene, settings: &Settings, limits: &Limits) -> Result<Plan> {
+impl RoomPlan {
+    pub fn new(scene: &RoomScene, settings: &RoomSettings, limits: &Limits) -> Result<RoomPlan> {
         settings.validate()?;
         let light_photons = deal(settings.photons, &scene.lights.iter().map(|light| light.power).collect::<Vec<_>>());
         let watts: Vec<f64> = scene.lights.iter().zip(&light_photons).map(|(light, count)| light.power / f64::from(*count)).collect();
@@ -156,7 +156,7 @@ impl Plan {
         let is_dense = work.tests_per_point(chunk_photons) >= DENSE;
         let grid = Grid::new(scene, settings.radius, settings.radius * if is_dense { 0.5 } else { 1.0 });
         let chunks_per_round = settings.photons.div_ceil(chunk_photons);
-        let mut plan = Plan {
+        let mut plan = RoomPlan {
             settings: settings.clone(),
             decisions,
             channel_count,
@@ -327,7 +327,7 @@ fn deal(photons: u32, powers: &[f64]) -> Vec<u32> {
 ///
 /// Of nearest photons a round adds fewer than K, each scaled up by 2^[`NEAREST_GAIN_BITS`] at most, and
 /// their flux has no more bits to give than [`NEAREST_BITS`].
-fn film_shift(settings: &Settings) -> u32 {
+fn film_shift(settings: &RoomSettings) -> u32 {
     let (events, most) = match settings.nearest {
         Some(nearest) => ((u64::from(settings.rounds) * u64::from(nearest)) << NEAREST_GAIN_BITS, NEAREST_BITS),
         None => (settings.total_photons() * u64::from(settings.bounces), 31),
@@ -347,9 +347,17 @@ mod tests {
     fn several_counters_serve_many_photons_of_the_atomic_builder() {
         let limits = Limits { buffer_bytes: 1 << 32, memory_bytes: 1 << 36, counters: 8, ..Limits::of_host() };
         let counters = |photons, builder, counters| {
-            let settings =
-                Settings { photons, builder, counters, bounces: 2, chunk: Some(photons), mesh: 1, rng: Rng::Philox, ..Settings::default() };
-            Plan::new(&open_box(&settings), &settings, &limits).unwrap().counters
+            let settings = RoomSettings {
+                photons,
+                builder,
+                counters,
+                bounces: 2,
+                chunk: Some(photons),
+                mesh: 1,
+                rng: Rng::Philox,
+                ..RoomSettings::default()
+            };
+            RoomPlan::new(&open_box(&settings), &settings, &limits).unwrap().counters
         };
         assert_eq!([1000, (1 << 21) - 1, 1 << 21, 1 << 24].map(|photons| counters(photons, Builder::Atomic, None)), [1, 1, 8, 8]);
         assert_eq!([1, 4, 64].map(|number| counters(1000, Builder::Atomic, Some(number))), [1, 4, 64]);
@@ -370,14 +378,14 @@ mod tests {
     #[test]
     fn film_sums_cannot_overflow() {
         for (photons, rounds, bounces) in [(5000, 1, 15), (5000, 100, 15), (1 << 31, 1, 15), (1 << 30, 1 << 13, 16), (2, 1, 1)] {
-            let settings = Settings { photons, rounds, bounces, ..Settings::default() };
+            let settings = RoomSettings { photons, rounds, bounces, ..RoomSettings::default() };
             let events = u128::from(settings.total_photons()) * u128::from(bounces);
             let shift = film_shift(&settings);
             assert!(events << shift <= 1 << 63, "{events} events, shift {shift}");
             assert!((16..=31).contains(&shift), "{events} events, shift {shift}");
         }
         for (rounds, nearest) in [(1, 2), (1, 1024), (100, 50), (1 << 21, 1024), (1 << 30, 2)] {
-            let settings = Settings { photons: 2, rounds, gather: Gather::KdTree, nearest: Some(nearest), ..Settings::default() };
+            let settings = RoomSettings { photons: 2, rounds, gather: Gather::KdTree, nearest: Some(nearest), ..RoomSettings::default() };
             assert!(u64::from(rounds) * u64::from(nearest) <= crate::settings::MAX_NEAREST_SUMMED);
             let shift = film_shift(&settings);
             // With half a unit of rounding each round.
@@ -392,8 +400,8 @@ mod tests {
     #[test]
     fn chunks_partition_the_round() {
         for (photons, chunk) in [(5000, None), (5000, Some(64)), (5001, Some(7)), (11, Some(2))] {
-            let settings = Settings { photons, chunk, ..Settings::preset(Preset::Modified) };
-            let plan = Plan::new(&open_box(&settings), &settings, &Limits::of_host()).unwrap();
+            let settings = RoomSettings { photons, chunk, ..RoomSettings::preset(Preset::Modified) };
+            let plan = RoomPlan::new(&open_box(&settings), &settings, &Limits::of_host()).unwrap();
             let mut seen = vec![0; photons as usize];
             for chunk in 0..plan.chunks_per_round {
                 let ranges = plan.chunk(chunk);
@@ -413,12 +421,12 @@ mod tests {
     #[test]
     fn points_lie_in_the_planes_of_their_walls() {
         for size in [0.5, 1e-7, 0.1, 3e9] {
-            let settings = Settings { mesh: 7, ..Settings::default() };
+            let settings = RoomSettings { mesh: 7, ..RoomSettings::default() };
             let mut scene = open_box(&settings);
             scene.min_corner *= size / 3.0;
             scene.max_corner *= size;
             let room = scene.room_record();
-            for point in Plan::new(&scene, &settings, &Limits::of_host()).unwrap().points {
+            for point in RoomPlan::new(&scene, &settings, &Limits::of_host()).unwrap().points {
                 let axis = point.wall as usize / 2;
                 let plane = if point.wall % 2 == 1 { room.max_corner } else { room.min_corner }[axis];
                 assert_eq!(point.position[axis].to_bits(), plane.to_bits(), "{point:?}");
@@ -447,8 +455,9 @@ mod tests {
     #[test]
     fn lights_number_their_photons_without_gaps() {
         for chunk in [None, Some(64)] {
-            let settings = Settings { photons: 5001, chunk, rounds: 3, light_power: [2.0, 1.0], ..Settings::preset(Preset::Modified) };
-            let plan = Plan::new(&open_box(&settings), &settings, &Limits::of_host()).unwrap();
+            let settings =
+                RoomSettings { photons: 5001, chunk, rounds: 3, light_power: [2.0, 1.0], ..RoomSettings::preset(Preset::Modified) };
+            let plan = RoomPlan::new(&open_box(&settings), &settings, &Limits::of_host()).unwrap();
             let mut samples = [Vec::new(), Vec::new()];
             for (round, ranges) in (0..settings.rounds).flat_map(|round| plan.chunks().map(move |ranges| (round, ranges))) {
                 for range in ranges {

@@ -5,8 +5,8 @@ use std::time::{Duration, Instant};
 
 use super::capacity::{self, Persistence};
 use super::evidence::{EffectDecision, Facts};
+use super::scene::{MapPlan, RADIUS_RANGE, RadiusFrom, SEGMENT_BOUNCES, ScenePlan, Trial};
 use super::sensor::Sensor;
-use super::transport::{MapPlan, RADIUS_RANGE, RadiusFrom, SEGMENT_BOUNCES, TransportPlan, Trial};
 use super::{Limits, memory};
 use crate::constants::*;
 use crate::error::{Error, Result};
@@ -15,7 +15,7 @@ use crate::records::*;
 use crate::scene::geometry::Geometry;
 use crate::scene::targets::{aimed_shares, caustic_targets};
 use crate::scene::{Scene, Surface};
-use crate::settings::transport::{Effect, Illumination, TransportSettings};
+use crate::settings::scene::{Effect, Illumination, SceneSettings};
 use crate::settings::{Builder, Math};
 
 /// Triangles up to which a list may be asked for: a path tests it some hundred times, and loops are short.
@@ -40,21 +40,21 @@ const MAX_GAIN_BITS: f64 = 30.0;
 /// Largest radius that is taken by default, relative to the same.
 pub const MAX_DEFAULT_RADIUS: f64 = 0.125;
 
-impl TransportPlan {
+impl ScenePlan {
     /// With radii by the scene's area where none are given.
-    pub fn new(scene: &Scene, geometry: &Geometry, settings: &TransportSettings, sensor: Sensor, limits: &Limits) -> Result<TransportPlan> {
-        TransportPlan::with_trial(scene, geometry, settings, sensor, limits, None)
+    pub fn new(scene: &Scene, geometry: &Geometry, settings: &SceneSettings, sensor: Sensor, limits: &Limits) -> Result<ScenePlan> {
+        ScenePlan::with_trial(scene, geometry, settings, sensor, limits, None)
     }
 
     /// With the radii of a trial round where none are given.
     pub fn with_trial(
         scene: &Scene,
         geometry: &Geometry,
-        settings: &TransportSettings,
+        settings: &SceneSettings,
         sensor: Sensor,
         limits: &Limits,
         trial: Option<Trial>,
-    ) -> Result<TransportPlan> {
+    ) -> Result<ScenePlan> {
         let began = Instant::now();
         settings.validate()?;
         if settings.leaves_out(Effect::Bvh) && geometry.triangles.len() > MAX_LIST_TRIANGLES {
@@ -208,8 +208,8 @@ impl TransportPlan {
             ("HAS_AIMED_PHOTONS", u32::from(!targets.is_empty())),
         ];
 
-        let mut plan = TransportPlan {
-            settings: TransportSettings { builder: Some(builder), ..settings.clone() },
+        let mut plan = ScenePlan {
+            settings: SceneSettings { builder: Some(builder), ..settings.clone() },
             sensor,
             trial: None,
             decisions: Vec::new(),
@@ -365,7 +365,7 @@ pub fn area_radius(geometry: &Geometry, photons: u32, caustic_only: bool) -> f64
 }
 
 /// Photons traced at once, so that their map can never be full.
-fn chunk_photons(photons: u32, landings: u64, settings: &TransportSettings, limits: &Limits) -> Result<u32> {
+fn chunk_photons(photons: u32, landings: u64, settings: &SceneSettings, limits: &Limits) -> Result<u32> {
     let (path, photon) = (size_of::<LightPath>() as u64, size_of::<MapPhoton>() as u64);
     let by_buffer = (limits.buffer_bytes / path).min(limits.buffer_bytes / (photon * landings));
     // Two maps of a chunk, sorted and unsorted, and its paths twice, with room for the film.

@@ -8,7 +8,7 @@ use super::material::{Material, Surface};
 use super::open_box;
 use super::room::face_axis;
 use super::{Camera, Mesh, Scene};
-use crate::settings::{Preset, Settings};
+use crate::settings::{Preset, RoomSettings};
 
 /// Every built-in scene, those of [`closed_forms`] last.
 pub fn names() -> Vec<&'static str> {
@@ -28,7 +28,7 @@ pub fn by_name(name: &str) -> Option<Scene> {
 
 /// The paper's box, with the lamps and walls of one of its experiments.
 fn open_box(name: &str, preset: Preset) -> Scene {
-    let settings = Settings::preset(preset);
+    let settings = RoomSettings::preset(preset);
     let room = open_box::open_box(&settings);
     let mut scene = Scene { name: name.into(), ..Scene::default() };
     for (face, wall) in room.walls() {

@@ -1,5 +1,5 @@
 //! The bounding volume hierarchy: triangles in, nodes of a compressed wide BVH and the order of its
-//! leaves out. `glsl/scene/bvh.glsl` traverses it.
+//! leaves out. `glsl/world/scene/bvh.glsl` traverses it.
 
 use glam::{UVec2, Vec3, Vec3A};
 use obvhs::aabb::Aabb;

@@ -576,7 +576,7 @@ fn pack_textures(scene: &Scene) -> (Vec<TextureInfo>, Vec<UVec2>) {
     (infos, texels)
 }
 
-/// A unit vector in 2 x 16 bits (Cigolle et al. 2014). Twin of `glsl/scene/directions.glsl`.
+/// A unit vector in 2 x 16 bits (Cigolle et al. 2014). Twin of `glsl/math/directions.glsl`.
 pub fn pack_normal(n: Vec3) -> u32 {
     let sign = |x: f32| if x >= 0.0 { 1.0 } else { -1.0 };
     let flat = Vec2::new(n.x, n.y) / (n.x.abs() + n.y.abs() + n.z.abs());

@@ -30,7 +30,7 @@ pub use mesh::Mesh;
 pub use texture::Texture;
 
 use crate::error::{Error, Result};
-use crate::settings::transport::Effect;
+use crate::settings::scene::Effect;
 
 /// Called with what is being done while a scene is opened, and the share of it that is done.
 pub type Progress<'a> = &'a mut dyn FnMut(&'static str, f64);

@@ -1,5 +1,5 @@
 //! Where caustics begin: a few spheres that hold every surface which makes them. Photons of a caustic map are aimed at
-//! these (projection maps, Jensen 1996, section 3); see `glsl/scene/aim.glsl`.
+//! these (projection maps, Jensen 1996, section 3); see `glsl/world/scene/aim.glsl`.
 
 use std::collections::HashMap;
 use std::f64::consts::{PI, TAU};
@@ -152,7 +152,7 @@ fn target(points: &[DVec3]) -> CausticTarget {
 }
 
 /// Bounds of the share of an emitter's light that leaves towards each target, summed over targets and at most 1:
-/// the least and the largest such sum of all emitters. Twin of the sums in `glsl/scene/aim.glsl`, which are of one place.
+/// the least and the largest such sum of all emitters. Twin of the sums in `glsl/world/scene/aim.glsl`, which are of one place.
 pub fn aimed_shares(geometry: &Geometry, targets: &[CausticTarget]) -> (f64, f64) {
     let shares = geometry.emitters.iter().map(|emitter| {
         let share = |target: &CausticTarget| share_towards(geometry, emitter, target);

@@ -7,7 +7,7 @@ use photonmill::scene::material::TextureUse;
 use photonmill::scene::texture::{Texture, Wrap};
 use photonmill::scene::{Material, Mesh, Scene};
 use photonmill::settings::EmissionLaw;
-use photonmill::settings::transport::{Part, TransportSettings};
+use photonmill::settings::scene::{Part, SceneSettings};
 
 use super::family::Family;
 use super::lit::{glass, grid, irradiances, lamp, level, matt, mirror, scene_of, shining};
@@ -110,8 +110,8 @@ pub fn scene(kind: &str) -> Scene {
     }
 }
 
-pub fn settings(photons: u32, aim: bool) -> TransportSettings {
-    TransportSettings {
+pub fn settings(photons: u32, aim: bool) -> SceneSettings {
+    SceneSettings {
         caustic_photons: photons,
         aim,
         part: Part::Caustic,
@@ -119,7 +119,7 @@ pub fn settings(photons: u32, aim: bool) -> TransportSettings {
         alpha: 1.0,
         bounces: 12,
         rounds: 1,
-        ..TransportSettings::default()
+        ..SceneSettings::default()
     }
 }
 

@@ -1,26 +1,19 @@
 //! Films of `--math strict`, whose bits are written down here.
 
+use photonmill::engine::scene::RunResult;
 use photonmill::gpu::Gpu;
 use photonmill::scene::{Camera, Scene, built_in};
-use photonmill::settings::transport::{Illumination, Kernel, TransportSettings};
-use photonmill::settings::{Builder, Math, Settings};
-use photonmill::transport::RunResult;
+use photonmill::settings::scene::{Illumination, Kernel, SceneSettings};
+use photonmill::settings::{Builder, Math, RoomSettings};
 
 use super::lit::seen;
 use super::{Check, Complaint, Kind, run};
 
-pub fn small() -> TransportSettings {
-    TransportSettings {
-        photons: 2000,
-        caustic_photons: 2000,
-        rounds: 2,
-        shadow_rays: 2,
-        math: Math::Strict,
-        ..TransportSettings::default()
-    }
+pub fn small() -> SceneSettings {
+    SceneSettings { photons: 2000, caustic_photons: 2000, rounds: 2, shadow_rays: 2, math: Math::Strict, ..SceneSettings::default() }
 }
 
-pub fn picture(gpu: &Gpu, scene: &Scene, settings: &TransportSettings) -> RunResult {
+pub fn picture(gpu: &Gpu, scene: &Scene, settings: &SceneSettings) -> RunResult {
     let camera = scene.cameras.first().cloned().unwrap_or_else(|| Camera::around(scene.bounds().0, scene.bounds().1));
     seen(gpu, scene, settings, &camera, [24, 24])
 }
@@ -56,15 +49,13 @@ pub const BITS: [(&str, u64); 17] = [
 
 fn bits_of(gpu: &Gpu, name: &str) -> u64 {
     if name == "the paper's box" {
-        return fingerprint(&run(gpu, &Settings { math: Math::Strict, shininess: [Some(2.0); 5], ..Settings::default() }).film.sums);
+        return fingerprint(
+            &run(gpu, &RoomSettings { math: Math::Strict, shininess: [Some(2.0); 5], ..RoomSettings::default() }).film.sums,
+        );
     }
     let settings = match name {
-        "cornell-spheres from photons" => {
-            TransportSettings { illumination: Illumination::Photons, kernel: Kernel::Epanechnikov, ..small() }
-        }
-        "cornell-spheres gathered" => {
-            TransportSettings { final_gather: true, kernel: Kernel::Cone, builder: Some(Builder::Atomic), ..small() }
-        }
+        "cornell-spheres from photons" => SceneSettings { illumination: Illumination::Photons, kernel: Kernel::Epanechnikov, ..small() },
+        "cornell-spheres gathered" => SceneSettings { final_gather: true, kernel: Kernel::Cone, builder: Some(Builder::Atomic), ..small() },
         _ => small(),
     };
     let scene = match name {

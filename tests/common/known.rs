@@ -4,14 +4,14 @@
 use std::f64::consts::{FRAC_PI_3, PI, TAU};
 
 use glam::{DQuat, DVec2, DVec3, Vec3};
+use photonmill::engine::scene::RunResult;
 use photonmill::gpu::Gpu;
 use photonmill::scene::geometry::Geometry;
 use photonmill::scene::light::LightKind;
 use photonmill::scene::material::TextureUse;
 use photonmill::scene::texture::{Texture, Wrap};
 use photonmill::scene::{Camera, Material, Mesh, Scene};
-use photonmill::settings::transport::{Effect, Illumination, Part, TransportSettings};
-use photonmill::transport::RunResult;
+use photonmill::settings::scene::{Effect, Illumination, Part, SceneSettings};
 
 use super::lit::{flights, glass, level, matt, mean_red, means, mirror, received, scene, scene_of, seen};
 use super::{Check, Complaint, Kind, estimate_check, pairs, same_sums};
@@ -41,7 +41,7 @@ pub fn lamp_in_a_box(gpu: &Gpu, illumination: Illumination) -> Check<Complaint> 
     side("right", corner + x, height, z, 0);
     side("back", corner, height, x, 0);
     side("front", corner + z, x, height, 0);
-    let settings = TransportSettings { photons: 20_000, rounds: 4, illumination, ..TransportSettings::default() };
+    let settings = SceneSettings { photons: 20_000, rounds: 4, illumination, ..SceneSettings::default() };
     let points = [(DVec3::new(0.5, 0.0, 0.5), DVec3::Y), (DVec3::new(0.5, 1.0, 0.5), DVec3::NEG_Y)];
     match mean_red(&received(gpu, &room, &settings, &points)) {
         0.0 => Ok(()),
@@ -56,7 +56,7 @@ pub fn shelf(gpu: &Gpu) -> Check<Complaint> {
     room.materials = vec![matt(0.7), Material { emission: Vec3::splat(10.0), ..matt(0.5) }];
     room.meshes.push(Mesh::parallelogram("shelf", DVec3::Y * 0.001, DVec3::Z, DVec3::X, 0));
     room.meshes.push(Mesh::parallelogram("lamp", DVec3::new(0.4, 0.9, 0.4), DVec3::X * 0.2, DVec3::Z * 0.2, 1));
-    let settings = TransportSettings { radius: Some(0.1), photons: 20_000, rounds: 4, ..TransportSettings::default() };
+    let settings = SceneSettings { radius: Some(0.1), photons: 20_000, rounds: 4, ..SceneSettings::default() };
     let points = [(DVec3::new(0.3, 0.001, 0.3), DVec3::Y), (DVec3::new(0.3, 0.0, 0.3), DVec3::Y)];
     let found = means(&received(gpu, &room, &settings, &points));
     assert!(found[0].x > 0.1, "the shelf has {}", found[0]);
@@ -71,14 +71,14 @@ pub fn ridge(gpu: &Gpu) -> Check<Complaint> {
     let sun = LightKind::Directional { direction: DVec3::NEG_Y, irradiance: Vec3::ONE };
     let halves = vec![Mesh::parallelogram("level", ridge, DVec3::NEG_X, z, 0), Mesh::parallelogram("slope", ridge, z, slope, 0)];
     let roof = scene_of(halves, vec![matt(0.0)], vec![sun]);
-    let settings = TransportSettings {
+    let settings = SceneSettings {
         photons: 40_000,
         rounds: 64,
         bounces: 1,
         radius: Some(0.1),
         alpha: 1.0,
         illumination: Illumination::Photons,
-        ..TransportSettings::default()
+        ..SceneSettings::default()
     };
     let normal = DVec3::new(-slope.y, slope.x, 0.0);
     let lit = received(gpu, &roof, &settings, &[(DVec3::NEG_X * 0.02, DVec3::Y), (slope * 0.02, normal)]);
@@ -96,7 +96,7 @@ pub fn spot(gpu: &Gpu) -> Check<Complaint> {
     let shares = [0.0, 0.1, 0.25, 0.5, 0.75, 1.0];
     let cosines = shares.map(|share| outer + share * (inner - outer));
     let points = cosines.map(|cosine| (DVec3::X * (1.0 - cosine * cosine).sqrt() / cosine, DVec3::Y));
-    let settings = TransportSettings { rounds: 1, part: Part::Direct, ..TransportSettings::default() };
+    let settings = SceneSettings { rounds: 1, part: Part::Direct, ..SceneSettings::default() };
     let found = means(&received(gpu, &floor, &settings, &points));
     for ((share, cosine), found) in pairs(pairs(shares, cosines), found) {
         let exact = 2.0 * share * share * cosine.powi(3);
@@ -130,7 +130,7 @@ pub fn wrapped_texture(gpu: &Gpu, wrap: [Wrap; 2]) -> Check<Complaint> {
     // Five pixels a texel: the middle one of a row is within a tenth of the texel's middle.
     let eye = DVec3::Z * 20.0;
     let camera = Camera::looking_at("eye", eye, DVec3::ZERO, DVec3::Y, 2.0 * (5.0f64 / 20.0).atan());
-    let settings = TransportSettings { rounds: 1, part: Part::Direct, ..TransportSettings::default() };
+    let settings = SceneSettings { rounds: 1, part: Part::Direct, ..SceneSettings::default() };
     let found = means(&seen(gpu, &sign, &settings, &camera, [75, 50]));
     for j in 0..10 {
         for i in 0..15 {
@@ -161,15 +161,8 @@ pub fn leaning_plane(gpu: &Gpu, illumination: Illumination) -> Check<Complaint> 
     let lean = 40f64.to_radians();
     let sun = LightKind::Directional { direction: DVec3::NEG_Y, irradiance: Vec3::ONE };
     let plane = scene_of(vec![leaning(lean)], vec![matt(0.8)], vec![sun]);
-    let settings = TransportSettings {
-        photons: 20_000,
-        rounds: 32,
-        bounces: 1,
-        radius: Some(0.5),
-        alpha: 1.0,
-        illumination,
-        ..TransportSettings::default()
-    };
+    let settings =
+        SceneSettings { photons: 20_000, rounds: 32, bounces: 1, radius: Some(0.5), alpha: 1.0, illumination, ..SceneSettings::default() };
     for (what, degrees, cosine) in [("above", 30f64, lean.cos()), ("below", -70.0, 1.0)] {
         let eye = DVec3::new(degrees.to_radians().sin(), degrees.to_radians().cos(), 0.0);
         let camera = Camera::looking_at("eye", eye, DVec3::ZERO, DVec3::Z, 2e-4);
@@ -196,14 +189,14 @@ pub fn leaning_scatterer(gpu: &Gpu) -> Check<Complaint> {
     let watts = TAU * (1.0 - f64::from(angle.cos())) * 1e7;
     let bench = scene_of(vec![leaning(lean), level(1.0, [6.0; 2], false, 1)], vec![matt(0.8), matt(0.0)], vec![beam]);
     let radius = 0.3;
-    let settings = TransportSettings {
+    let settings = SceneSettings {
         photons: 5000,
         rounds: 32,
         bounces: 2,
         radius: Some(radius),
         alpha: 1.0,
         illumination: Illumination::Photons,
-        ..TransportSettings::default()
+        ..SceneSettings::default()
     };
     let middle = DVec3::new(lean.tan(), 1.0, 0.0);
     let lit = received(gpu, &bench, &settings, &[(middle, DVec3::NEG_Y)]);
@@ -248,9 +241,9 @@ pub fn none_returns(what: &str, lit: &RunResult) -> Check<Complaint> {
 
 /// Direct light of a picture of so many pixels a side, by the tree and by the list of all triangles.
 fn by_tree_and_list(gpu: &Gpu, scene: &Scene, camera: &Camera, side: u32) -> [RunResult; 2] {
-    let usual = || TransportSettings { rounds: 1, part: Part::Direct, ..TransportSettings::default() };
-    let by_tree = TransportSettings { with: vec![Effect::Bvh], ..usual() };
-    let by_list = TransportSettings { without: vec![Effect::Bvh], ..usual() };
+    let usual = || SceneSettings { rounds: 1, part: Part::Direct, ..SceneSettings::default() };
+    let by_tree = SceneSettings { with: vec![Effect::Bvh], ..usual() };
+    let by_list = SceneSettings { without: vec![Effect::Bvh], ..usual() };
     let [tree, list] = [by_tree, by_list].map(|settings| seen(gpu, scene, &settings, camera, [side; 2]));
     assert!(tree.plan.keeps(Effect::Bvh) && !list.plan.keeps(Effect::Bvh));
     [tree, list]
@@ -310,7 +303,7 @@ pub fn glass_in_a_furnace(gpu: &Gpu, samples: u32, final_gather: bool) -> Check<
     let faces = [(corner, x, z), (corner, y, x), (corner, z, y), (far, -z, -x), (far, -x, -y), (far, -y, -z)];
     room.meshes.extend(faces.map(|(origin, u, v)| Mesh::parallelogram("block", origin, u, v, 1)));
     room.meshes.push(Mesh::parallelogram("mirror", DVec3::new(0.4, 0.1, 0.2), x, y, 2));
-    let settings = TransportSettings { samples, final_gather, shadow_rays: 2, photons: 20_000, rounds: 8, ..TransportSettings::default() };
+    let settings = SceneSettings { samples, final_gather, shadow_rays: 2, photons: 20_000, rounds: 8, ..SceneSettings::default() };
     let lit = seen(gpu, &room, &settings, &room.cameras[0], [24, 24]);
     // Emission over what a wall absorbs.
     let expected = 1.0 / (1.0 - 0.5);

@@ -3,19 +3,20 @@
 use std::sync::atomic::AtomicBool;
 
 use glam::{DVec3, Vec3};
+use photonmill::engine;
+use photonmill::engine::Control;
+use photonmill::engine::scene::{self, RunResult, View};
 use photonmill::gpu::Gpu;
 use photonmill::plan::Limits;
+use photonmill::plan::scene::ScenePlan;
 use photonmill::plan::sensor::Sensor;
-use photonmill::plan::transport::TransportPlan;
 use photonmill::records::Receiver;
-use photonmill::render::{self, Control};
 use photonmill::scene::geometry::Geometry;
 use photonmill::scene::light::LightKind;
 use photonmill::scene::{Camera, Light, Material, Mesh, Scene, Surface, built_in};
-use photonmill::selfcheck::Estimate;
 use photonmill::settings::Builder;
-use photonmill::settings::transport::{Illumination, TransportSettings};
-use photonmill::transport::{self, RunResult, View};
+use photonmill::settings::scene::{Illumination, SceneSettings};
+use photonmill::verify::selfcheck::Estimate;
 
 use super::{Check, z_check};
 
@@ -24,13 +25,13 @@ pub const SCENE_BUILDERS: [Builder; 2] = [Builder::Ballot, Builder::Persistent];
 pub const BOTH: [Illumination; 2] = [Illumination::Split, Illumination::Photons];
 
 /// Runs to the end, whatever comes out.
-pub fn run(gpu: &Gpu, view: &View, plan: TransportPlan) -> RunResult {
+pub fn run(gpu: &Gpu, view: &View, plan: ScenePlan) -> RunResult {
     let never = AtomicBool::new(false);
-    transport::light(gpu, view, plan, &mut Control { cancelled: &never, progress: &mut |_| {} }).unwrap()
+    scene::light(gpu, view, plan, &mut Control { cancelled: &never, progress: &mut |_| {} }).unwrap()
 }
 
 /// Runs to the end, with nothing odd.
-pub fn light(gpu: &Gpu, view: &View, plan: TransportPlan) -> RunResult {
+pub fn light(gpu: &Gpu, view: &View, plan: ScenePlan) -> RunResult {
     let lit = run(gpu, view, plan);
     assert_eq!(lit.anomalies, [0, 0, 0], "values that are no number, or too large for the film");
     if let Some(nonfinite_values) = &lit.nonfinite_values {
@@ -40,24 +41,24 @@ pub fn light(gpu: &Gpu, view: &View, plan: TransportPlan) -> RunResult {
 }
 
 /// The device looks for values that are no finite number.
-fn watched(settings: &TransportSettings) -> TransportSettings {
-    TransportSettings { paranoid: true, ..settings.clone() }
+fn watched(settings: &SceneSettings) -> SceneSettings {
+    SceneSettings { paranoid: true, ..settings.clone() }
 }
 
 /// What arrives at points (position, normal) of a scene of triangles.
-pub fn received(gpu: &Gpu, scene: &Scene, settings: &TransportSettings, points: &[(DVec3, DVec3)]) -> RunResult {
-    received_within(gpu, scene, settings, points, &render::limits(gpu.facts()))
+pub fn received(gpu: &Gpu, scene: &Scene, settings: &SceneSettings, points: &[(DVec3, DVec3)]) -> RunResult {
+    received_within(gpu, scene, settings, points, &engine::limits(gpu.facts()))
 }
 
 /// The same within other limits than the device's own.
-pub fn received_within(gpu: &Gpu, scene: &Scene, settings: &TransportSettings, points: &[(DVec3, DVec3)], limits: &Limits) -> RunResult {
+pub fn received_within(gpu: &Gpu, scene: &Scene, settings: &SceneSettings, points: &[(DVec3, DVec3)], limits: &Limits) -> RunResult {
     received_in(gpu, (scene, &Geometry::new(scene).unwrap()), settings, points, limits)
 }
 
 fn received_in(
     gpu: &Gpu,
     (scene, geometry): (&Scene, &Geometry),
-    settings: &TransportSettings,
+    settings: &SceneSettings,
     points: &[(DVec3, DVec3)],
     limits: &Limits,
 ) -> RunResult {
@@ -68,15 +69,15 @@ fn received_in(
     };
     let receivers = points.iter().map(receiver).collect();
     let sensor = Sensor::Receivers { count: points.len() as u32 };
-    let plan = TransportPlan::new(scene, geometry, &watched(settings), sensor, limits).unwrap();
+    let plan = ScenePlan::new(scene, geometry, &watched(settings), sensor, limits).unwrap();
     light(gpu, &View { geometry, camera: None, phases: &[receivers] }, plan)
 }
 
 /// What a camera sees of a scene of triangles.
-pub fn seen(gpu: &Gpu, scene: &Scene, settings: &TransportSettings, camera: &Camera, [width, height]: [u32; 2]) -> RunResult {
+pub fn seen(gpu: &Gpu, scene: &Scene, settings: &SceneSettings, camera: &Camera, [width, height]: [u32; 2]) -> RunResult {
     let geometry = Geometry::new(scene).unwrap();
     let sensor = Sensor::Picture { width, height };
-    let plan = TransportPlan::new(scene, &geometry, &watched(settings), sensor, &render::limits(gpu.facts())).unwrap();
+    let plan = ScenePlan::new(scene, &geometry, &watched(settings), sensor, &engine::limits(gpu.facts())).unwrap();
     light(gpu, &View { geometry: &geometry, camera: Some(camera), phases: &[] }, plan)
 }
 
@@ -95,18 +96,18 @@ pub fn means(lit: &RunResult) -> Vec<DVec3> {
 pub fn irradiances(
     gpu: &Gpu,
     scene: &Scene,
-    settings: &TransportSettings,
+    settings: &SceneSettings,
     points: &[(DVec3, DVec3)],
     seeds: std::ops::Range<u64>,
 ) -> Vec<Vec<DVec3>> {
-    let (geometry, limits) = (Geometry::new(scene).unwrap(), render::limits(gpu.facts()));
-    let settings_of = |seed| TransportSettings { seed, ..settings.clone() };
+    let (geometry, limits) = (Geometry::new(scene).unwrap(), engine::limits(gpu.facts()));
+    let settings_of = |seed| SceneSettings { seed, ..settings.clone() };
     seeds.map(|seed| means(&received_in(gpu, (scene, &geometry), &settings_of(seed), points, &limits))).collect()
 }
 
 /// Radiance along one ray, W/m2/sr, once for each pixel of a picture so narrow that they are all but the same ray;
 /// pixels draw random numbers of their own. The red channel of a grey scene.
-pub fn radiances(gpu: &Gpu, scene: &Scene, settings: &TransportSettings, eye: DVec3, target: DVec3, side: u32) -> Vec<f64> {
+pub fn radiances(gpu: &Gpu, scene: &Scene, settings: &SceneSettings, eye: DVec3, target: DVec3, side: u32) -> Vec<f64> {
     let up = if (target - eye).normalize().y.abs() > 0.9 { DVec3::X } else { DVec3::Y };
     let camera = Camera::looking_at("ray", eye, target, up, 2e-4);
     means(&seen(gpu, scene, settings, &camera, [side, side])).into_iter().map(|mean| mean.x).collect()
@@ -167,14 +168,14 @@ pub fn lamp(kind: LightKind) -> Light {
 }
 
 /// Maps alone, of a radius so small that looking them up takes no time.
-pub fn flights(photons: u32, bounces: u32) -> TransportSettings {
-    TransportSettings {
+pub fn flights(photons: u32, bounces: u32) -> SceneSettings {
+    SceneSettings {
         photons,
         bounces,
         rounds: 1,
         radius: Some(1.0 / 1024.0),
         illumination: Illumination::Photons,
-        ..TransportSettings::default()
+        ..SceneSettings::default()
     }
 }
 

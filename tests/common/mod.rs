@@ -22,17 +22,19 @@ use std::sync::Mutex;
 use std::sync::atomic::AtomicBool;
 
 use glam::UVec2;
+use photonmill::engine;
+use photonmill::engine::Control;
+use photonmill::engine::nonfinite_values::NonfiniteValues;
+use photonmill::engine::room::resources::RoomResources;
+use photonmill::engine::room::{self, RunResult};
 use photonmill::error::Error;
 use photonmill::gpu::{Commands, Gpu, Options};
-use photonmill::nonfinite_values::NonfiniteValues;
 use photonmill::photon::{Origin, Photon, StoredPhoton};
-use photonmill::plan::{Limits, Plan};
-use photonmill::render::{self, Control, RunResult};
-use photonmill::resources::Resources;
+use photonmill::plan::{Limits, RoomPlan};
 use photonmill::rng::{self, Rng, Streams};
 use photonmill::scene::open_box::open_box;
 use photonmill::scene::room::RoomScene;
-use photonmill::settings::{Builder, Settings};
+use photonmill::settings::{Builder, RoomSettings};
 
 /// Devices that no test has at the moment: what one test compiled serves the next.
 static IDLE: Mutex<Vec<Gpu>> = Mutex::new(Vec::new());
@@ -93,22 +95,22 @@ pub fn open(options: Options) -> Option<Gpu> {
 }
 
 /// Runs the open box on a device to its end.
-pub fn run(gpu: &Gpu, settings: &Settings) -> RunResult {
+pub fn run(gpu: &Gpu, settings: &RoomSettings) -> RunResult {
     run_scene(gpu, &open_box(settings), settings)
 }
 
 /// Runs a scene on a device to its end.
-pub fn run_scene(gpu: &Gpu, scene: &RoomScene, settings: &Settings) -> RunResult {
+pub fn run_scene(gpu: &Gpu, scene: &RoomScene, settings: &RoomSettings) -> RunResult {
     let never = AtomicBool::new(false);
     let mut control = Control { cancelled: &never, progress: &mut |_| {} };
-    let settings = &Settings { paranoid: true, ..settings.clone() };
-    sound(render::on_gpu(gpu, scene, settings, &mut control).unwrap_or_else(|error| panic!("{error}\n{settings:?}")))
+    let settings = &RoomSettings { paranoid: true, ..settings.clone() };
+    sound(room::on_gpu(gpu, scene, settings, &mut control).unwrap_or_else(|error| panic!("{error}\n{settings:?}")))
 }
 
 /// What a run comes to, where it may fail: with `paranoid` no value may be infinite or no number.
-pub fn outcome_of(gpu: &Gpu, scene: &RoomScene, settings: &Settings) -> Result<RunResult, Complaint> {
+pub fn outcome_of(gpu: &Gpu, scene: &RoomScene, settings: &RoomSettings) -> Result<RunResult, Complaint> {
     let never = AtomicBool::new(false);
-    let outcome = render::on_gpu(gpu, scene, settings, &mut Control { cancelled: &never, progress: &mut |_| {} })?;
+    let outcome = room::on_gpu(gpu, scene, settings, &mut Control { cancelled: &never, progress: &mut |_| {} })?;
     outcome.nonfinite_values.as_ref().map_or(Ok(()), nothing_odd)?;
     Ok(outcome)
 }
@@ -124,21 +126,21 @@ fn sound(outcome: RunResult) -> RunResult {
 }
 
 /// Runs the open box on the CPU builder to its end.
-pub fn run_on_cpu(settings: &Settings) -> RunResult {
+pub fn run_on_cpu(settings: &RoomSettings) -> RunResult {
     run_scene_on_cpu(&open_box(settings), settings)
 }
 
 /// Runs a scene on the CPU builder to its end.
-pub fn run_scene_on_cpu(scene: &RoomScene, settings: &Settings) -> RunResult {
+pub fn run_scene_on_cpu(scene: &RoomScene, settings: &RoomSettings) -> RunResult {
     let never = AtomicBool::new(false);
     let mut control = Control { cancelled: &never, progress: &mut |_| {} };
-    let settings = &Settings { paranoid: true, ..settings.clone() };
-    sound(render::on_cpu(scene, settings, &mut control).unwrap_or_else(|error| panic!("{error}\n{settings:?}")))
+    let settings = &RoomSettings { paranoid: true, ..settings.clone() };
+    sound(room::on_cpu(scene, settings, &mut control).unwrap_or_else(|error| panic!("{error}\n{settings:?}")))
 }
 
 /// Photons of round 0 of the open box, as a builder of the device stores them.
-pub fn photons(gpu: &Gpu, settings: &Settings) -> Vec<Photon> {
-    render::photons_on_gpu(gpu, &open_box(settings), settings).unwrap_or_else(|error| panic!("{error}\n{settings:?}"))
+pub fn photons(gpu: &Gpu, settings: &RoomSettings) -> Vec<Photon> {
+    room::photons_on_gpu(gpu, &open_box(settings), settings).unwrap_or_else(|error| panic!("{error}\n{settings:?}"))
 }
 
 /// Builders that are held against closed forms: those that fly in ways of their own. The others store the same photons
@@ -149,12 +151,12 @@ pub const JUDGED: [Builder; 4] = [Builder::Naive, Builder::Atomic, Builder::Pers
 pub const MANY_PHOTONS: u32 = 600_001;
 
 /// The same from the CPU builder.
-pub fn photons_on_cpu(settings: &Settings) -> Vec<Photon> {
-    render::photons_on_cpu(&open_box(settings), settings).unwrap_or_else(|error| panic!("{error}\n{settings:?}"))
+pub fn photons_on_cpu(settings: &RoomSettings) -> Vec<Photon> {
+    room::photons_on_cpu(&open_box(settings), settings).unwrap_or_else(|error| panic!("{error}\n{settings:?}"))
 }
 
 /// Puts photons into the photon map as if they had been traced.
-pub fn upload_photons(commands: &mut Commands, resources: &Resources, plan: &Plan, photons: &[Photon]) {
+pub fn upload_photons(commands: &mut Commands, resources: &RoomResources, plan: &RoomPlan, photons: &[Photon]) {
     let stored: Vec<StoredPhoton> = photons.iter().map(Photon::stored).collect();
     commands.upload(&resources.photons, &stored).unwrap();
     if plan.keeps_origins {
@@ -165,13 +167,13 @@ pub fn upload_photons(commands: &mut Commands, resources: &Resources, plan: &Pla
 }
 
 /// What a device would do with these settings.
-pub fn plan_for(gpu: &Gpu, scene: &RoomScene, settings: &Settings) -> Plan {
-    Plan::new(scene, settings, &render::limits(gpu.facts())).unwrap()
+pub fn plan_for(gpu: &Gpu, scene: &RoomScene, settings: &RoomSettings) -> RoomPlan {
+    RoomPlan::new(scene, settings, &engine::limits(gpu.facts())).unwrap()
 }
 
 /// What the CPU builder would do with these settings.
-pub fn plan_for_host(settings: &Settings) -> Plan {
-    Plan::new(&open_box(settings), settings, &Limits::of_host()).unwrap()
+pub fn plan_for_host(settings: &RoomSettings) -> RoomPlan {
+    RoomPlan::new(&open_box(settings), settings, &Limits::of_host()).unwrap()
 }
 
 /// Every draw of a photon: four of its emission, three of each bounce.
@@ -191,7 +193,7 @@ pub fn draws_of(streams: Streams, round: u32, photon: u32, bounces: u32) -> Vec<
 }
 
 /// The streams that a run draws from.
-pub fn streams_of(settings: &Settings) -> Streams {
+pub fn streams_of(settings: &RoomSettings) -> Streams {
     Streams { rng: settings.rng, seed: settings.seed, photons: settings.photons, draws_per_photon: settings.draws_per_photon() }
 }
 

@@ -7,10 +7,10 @@ use std::sync::LazyLock;
 
 use libfuzzer_sys::{fuzz_mutator, fuzz_target, fuzzer_mutate};
 use photonmill::plan::Limits;
-use photonmill::plan::transport::{Sensor, TransportPlan};
+use photonmill::plan::scene::{Sensor, TransportPlan};
 use photonmill::scene::Scene;
 use photonmill::scene::geometry::Geometry;
-use photonmill::settings::transport::TransportSettings;
+use photonmill::settings::scene::TransportSettings;
 use photonmill_fuzz::{mutation, panics_are_caught, refused};
 
 /// The file that the loader opens; `run` lays it into memory.

@@ -6,14 +6,14 @@ use std::sync::LazyLock;
 
 use arbitrary::{Arbitrary, Result, Unstructured};
 use libfuzzer_sys::fuzz_target;
-use photonmill::plan::transport::{MapPlan, Sensor, TransportPlan};
+use photonmill::plan::scene::{MapPlan, Sensor, TransportPlan};
 use photonmill::plan::{Limits, Plan, photons_of};
 use photonmill::rng::Rng;
 use photonmill::scene::geometry::Geometry;
 use photonmill::scene::open_box::open_box;
 use photonmill::scene::{Scene, built_in};
 use photonmill::settings::stop::Stop;
-use photonmill::settings::transport::{Builder, Effect, Filter, Illumination, Kernel, Part, TransportSettings};
+use photonmill::settings::scene::{Builder, Effect, Filter, Illumination, Kernel, Part, TransportSettings};
 use photonmill::settings::{EmissionLaw, Gather, Math, PhongDirection, Preset, Settings, Sums, Builder};
 use photonmill_fuzz::{panics_are_caught, refused};
 

@@ -1,0 +1,23 @@
+// The functions of math/math.glsl at given numbers.
+// Dispatched by src/gpu/check.rs. One thread = one pair of operands.
+#version 460
+#extension GL_GOOGLE_include_directive : require
+#extension GL_EXT_scalar_block_layout : require
+#include "records.glsl"
+
+layout(local_size_x_id = 0) in;
+layout(set = 1, binding = 0, scalar) readonly buffer Operands { vec2 operands[]; };
+layout(set = 1, binding = 1, scalar) writeonly buffer Results { MathResults results[]; };
+
+#include "math/math.glsl"
+#include "dispatch/dispatch.glsl"
+
+void main()
+{
+    uint index = invocation_index();
+    if (index >= operands.length()) {
+        return;
+    }
+    float a = operands[index].x, b = operands[index].y;
+    results[index] = MathResults(float(floatBitsToUint(a)), a * b + a, divide(a, b), sqrt(a), inversesqrt(a), exp2(a), log2(a), atan(a, b), asinh(a));
+}

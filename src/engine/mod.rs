@@ -1,0 +1,33 @@
+//! The engine: from a plan to light. Both worlds, the paper's box ([`room`]) and scenes of triangles ([`scene`]), trace photons,
+//! index them, and estimate densities with the kernels of `glsl`; what stands beside them here is the same for both.
+
+pub mod bias;
+pub mod choose_builder;
+pub mod nonfinite_values;
+pub mod prefix_sum;
+pub mod room;
+pub mod scene;
+pub mod tallies;
+pub mod totals;
+pub mod unknown;
+pub mod watch;
+
+pub use watch::{Control, End, Progress};
+
+use crate::gpu::DeviceFacts;
+use crate::plan::Limits;
+
+/// What the plan may use of a device.
+pub fn limits(facts: &DeviceFacts) -> Limits {
+    Limits {
+        buffer_bytes: facts.storage_buffer_range_bytes.min(facts.allocation_bytes),
+        // Half, as the device is not ours alone.
+        memory_bytes: facts.device_memory_bytes / 2,
+        pair_tests_per_submission: Limits::pair_tests_of(facts.kind),
+        group_size: facts.work_group_size,
+        loop_iterations: Limits::loop_iterations_of(facts.kind),
+        busy_invocations: Limits::busy_invocations_of(facts.kind),
+        lanes: Limits::lanes_of(facts.kind),
+        counters: Limits::counters_of(facts.kind),
+    }
+}

@@ -1,0 +1,152 @@
+//! Density estimation: adds to the film what each point receives from a chunk's photons.
+
+pub mod tree;
+
+use crate::constants::{GATHER_SLICE, MAX_GROUPS};
+use crate::engine::room::index::add_work;
+use crate::engine::room::resources::{IndexBuffers, RoomResources, RoundBuffers};
+use crate::engine::room::trace::photon_list_capacity;
+use crate::error::{Error, Result};
+use crate::gpu::kernels::{CandidateCount, EndRound, GatherBruteTwoWords, GatherBruteU64, GatherGridTwoWords, GatherGridU64, SliceCount};
+use crate::gpu::{Commands, DeviceFacts, Extent, Kernel, Module};
+use crate::plan::RoomPlan;
+use crate::records::{DispatchSizePush, EndRoundPush, GatherPush};
+use crate::settings::Sums;
+
+/// Refuses sums that a device cannot make.
+pub fn check_sums(plan: &RoomPlan, facts: &DeviceFacts) -> Result<()> {
+    if plan.settings.sums == Sums::Compensated && !facts.int64_atomics {
+        let why = format!("needs 64-bit atomics, which {} lacks; use --sums integer or f32", facts.name);
+        return Err(Error::setting("--sums", "compensated", why));
+    }
+    Ok(())
+}
+
+/// Whether kernels see a film sum as one 64-bit word: a float has a 32-bit word of its own.
+fn adds_in_one_word(plan: &RoomPlan, facts: &DeviceFacts) -> bool {
+    match plan.settings.sums {
+        Sums::Integer => facts.int64_atomics,
+        Sums::F32 => false,
+        Sums::Compensated => true,
+    }
+}
+
+/// Kernels that the estimate needs.
+pub fn modules(plan: &RoomPlan, facts: &DeviceFacts) -> Vec<Module> {
+    let mut modules = match (plan.gathers_by_tree(), plan.gathers_by_grid(), adds_in_one_word(plan, facts)) {
+        (true, ..) => tree::modules(plan, facts),
+        (_, false, true) => vec![GatherBruteU64::MODULE],
+        (_, false, false) => vec![GatherBruteTwoWords::MODULE],
+        (_, true, true) => vec![GatherGridU64::MODULE],
+        (_, true, false) => vec![GatherGridTwoWords::MODULE],
+    };
+    if plan.gathers_by_grid() && plan.slices_candidates {
+        modules.extend([CandidateCount::MODULE, SliceCount::MODULE]);
+    }
+    if plan.keeps_squares() {
+        modules.push(EndRound::MODULE);
+    }
+    modules
+}
+
+/// A gather of all points; its dispatches each cover a part.
+fn push_for_all_points(plan: &RoomPlan, photon_count: u32) -> GatherPush {
+    GatherPush {
+        first_point: 0,
+        end_point: plan.points.len() as u32,
+        first_slice: 0,
+        photon_capacity: photon_list_capacity(plan, photon_count),
+        radius_squared: (plan.settings.radius * plan.settings.radius) as f32,
+        reach: plan.grid.reach,
+        film_scale: plan.film_scale() as f32,
+        origin: plan.grid.origin.into(),
+        cells_per_metre: plan.grid.cells_per_metre,
+        cell_count: plan.grid.cell_count.into(),
+    }
+}
+
+/// Runs of points, none so long that its dispatch would exceed a submission's work or the groups that
+/// the device allows along x. `lanes` invocations share a point.
+fn point_ranges(commands: &Commands, plan: &RoomPlan, tests_per_point: u64, lanes: u32) -> impl Iterator<Item = (u32, u32)> + use<> {
+    let (group_size, lanes) = (u64::from(plan.settings.group_size), u64::from(lanes));
+    // Invocations are numbered in 32 bits.
+    let most_groups = u64::from(commands.facts().work_group_count_x).min(u64::from(u32::MAX) / group_size);
+    let groups = (plan.pair_tests_per_submission / tests_per_point.max(1) * lanes / group_size).clamp(1, most_groups);
+    let (points, step) = (plan.points.len(), (groups * group_size / lanes).max(1) as usize);
+    (0..points).step_by(step).map(move |first| (first as u32, points.min(first + step) as u32))
+}
+
+/// Adds a chunk to the film.
+pub fn gather(commands: &mut Commands, resources: &RoomResources, plan: &RoomPlan, photon_count: u32) -> Result<()> {
+    commands.scope("gather", |commands| match (&resources.tree, &resources.index) {
+        (Some(tree), _) => tree::gather(commands, resources, tree, plan, photon_count),
+        (None, Some(index)) => gather_grid(commands, resources, index, plan, photon_count),
+        (None, None) => gather_brute(commands, resources, plan, photon_count),
+    })
+}
+
+/// Every point steps through the whole photon list, a slice of it an invocation.
+fn gather_brute(commands: &mut Commands, resources: &RoomResources, plan: &RoomPlan, photon_count: u32) -> Result<()> {
+    let RoomResources { film, points, photons, counters, .. } = resources;
+    let whole = push_for_all_points(plan, photon_count);
+    let slice_count = whole.photon_capacity.div_ceil(GATHER_SLICE);
+    let tests_per_point = u64::from(GATHER_SLICE);
+    for (first_point, end_point) in point_ranges(commands, plan, tests_per_point, 1) {
+        let point_count = end_point - first_point;
+        let tests_per_slice = u64::from(point_count) * tests_per_point;
+        let slices_at_once = (plan.pair_tests_per_submission / tests_per_slice).clamp(1, u64::from(MAX_GROUPS)) as u32;
+        for first_slice in (0..slice_count).step_by(slices_at_once as usize) {
+            let slices = slices_at_once.min(slice_count - first_slice);
+            let push = GatherPush { first_point, end_point, first_slice, ..whole };
+            let extent = Extent::Groups(point_count.div_ceil(plan.settings.group_size), slices);
+            if adds_in_one_word(plan, commands.facts()) {
+                commands.dispatch(GatherBruteU64 { points, film, photons, counters }, &push, extent)?;
+            } else {
+                commands.dispatch(GatherBruteTwoWords { points, film, photons, counters }, &push, extent)?;
+            }
+            add_work(commands, plan, u64::from(slices) * tests_per_slice)?;
+        }
+    }
+    Ok(())
+}
+
+/// Every point tests the photons of the grid cells in reach.
+fn gather_grid(commands: &mut Commands, resources: &RoomResources, index: &IndexBuffers, plan: &RoomPlan, photon_count: u32) -> Result<()> {
+    let RoomResources { film, points, dispatch_args, .. } = resources;
+    let IndexBuffers { cells, sorted_photons, longest, .. } = index;
+    let whole = push_for_all_points(plan, photon_count);
+    if plan.slices_candidates {
+        commands.fill(longest, 0, 1, 0);
+        commands.dispatch(CandidateCount { points, longest, cells }, &whole, Extent::Items(u64::from(whole.end_point)))?;
+    }
+    let tests_per_point = plan.work.tests_per_point(photon_count);
+    let group_size = plan.settings.group_size;
+    for (first_point, end_point) in point_ranges(commands, plan, tests_per_point, plan.lanes) {
+        let capacity = (end_point - first_point) * plan.lanes;
+        let extent = if plan.slices_candidates {
+            let size = DispatchSizePush { counter: 0, capacity, items_per_group: group_size, max_groups: MAX_GROUPS };
+            commands.dispatch(SliceCount { longest, dispatch_args }, &size, Extent::Groups(1, 1))?;
+            Extent::Indirect(dispatch_args)
+        } else {
+            Extent::Groups(capacity.div_ceil(group_size), 1)
+        };
+        let push = GatherPush { first_point, end_point, ..whole };
+        if adds_in_one_word(plan, commands.facts()) {
+            commands.dispatch(GatherGridU64 { points, film, cells, sorted_photons }, &push, extent)?;
+        } else {
+            commands.dispatch(GatherGridTwoWords { points, film, cells, sorted_photons }, &push, extent)?;
+        }
+        add_work(commands, plan, u64::from(end_point - first_point) * tests_per_point)?;
+    }
+    Ok(())
+}
+
+/// Moves what a round left on the film to the sums and squares of all rounds, of which there are several.
+pub fn end_round(commands: &mut Commands, resources: &RoomResources, plan: &RoomPlan) -> Result<()> {
+    let RoomResources { film, rounds: Some(RoundBuffers { totals, low_squares, high_squares }), .. } = resources else {
+        return Ok(());
+    };
+    let sum_count = plan.points.len() as u32 * plan.channel_count;
+    let kernel = EndRound { film, film_totals: totals, low_squares, high_squares };
+    commands.scope("film", |commands| commands.dispatch(kernel, &EndRoundPush { sum_count }, Extent::Items(u64::from(sum_count))))
+}

@@ -1,0 +1,118 @@
+//! Density estimation over the kd-tree: with all photons within the radius, or with the nearest of them.
+
+use super::{adds_in_one_word, point_ranges, push_for_all_points};
+use crate::constants::{GATHER_SLICE, MAX_GROUPS};
+use crate::engine::room::index::add_work;
+use crate::engine::room::resources::{RoomResources, SearchBuffers, TreeBuffers};
+use crate::error::Result;
+use crate::gpu::kernels::{GatherTreeTwoWords, GatherTreeU64, NearestTwoWords, NearestU64, SliceCount};
+use crate::gpu::{Commands, DeviceFacts, Extent, Kernel, Module};
+use crate::plan::RoomPlan;
+use crate::records::{DispatchSizePush, GatherPush, NearestPush};
+
+/// Kernels that the estimate needs.
+pub(super) fn modules(plan: &RoomPlan, facts: &DeviceFacts) -> Vec<Module> {
+    match (plan.settings.nearest, adds_in_one_word(plan, facts)) {
+        (None, true) => vec![SliceCount::MODULE, GatherTreeU64::MODULE],
+        (None, false) => vec![SliceCount::MODULE, GatherTreeTwoWords::MODULE],
+        (Some(_), true) => vec![NearestU64::MODULE],
+        (Some(_), false) => vec![NearestTwoWords::MODULE],
+    }
+}
+
+pub(super) fn gather(
+    commands: &mut Commands,
+    resources: &RoomResources,
+    tree: &TreeBuffers,
+    plan: &RoomPlan,
+    photon_count: u32,
+) -> Result<()> {
+    match (&tree.searches, plan.settings.nearest) {
+        (Some(searches), Some(nearest)) => gather_nearest(commands, resources, tree, searches, plan, nearest, photon_count),
+        _ => gather_radius(commands, resources, tree, plan, photon_count),
+    }
+}
+
+/// Every point tests the photons of the leaves in reach, a slice of its wall's leaves an invocation.
+fn gather_radius(commands: &mut Commands, resources: &RoomResources, tree: &TreeBuffers, plan: &RoomPlan, photon_count: u32) -> Result<()> {
+    let RoomResources { film, points, dispatch_args, .. } = resources;
+    let TreeBuffers { wall_begins, planes, tree_photons, longest, .. } = tree;
+    let whole = push_for_all_points(plan, photon_count);
+    let tests_per_point = plan.work.tests_per_point(photon_count);
+    for (first_point, end_point) in point_ranges(commands, plan, tests_per_point, 1) {
+        let size = DispatchSizePush {
+            counter: 0,
+            capacity: end_point - first_point,
+            items_per_group: plan.settings.group_size,
+            max_groups: MAX_GROUPS,
+        };
+        commands.dispatch(SliceCount { longest, dispatch_args }, &size, Extent::Groups(1, 1))?;
+        let push = GatherPush { first_point, end_point, ..whole };
+        let extent = Extent::Indirect(dispatch_args);
+        if adds_in_one_word(plan, commands.facts()) {
+            commands.dispatch(GatherTreeU64 { points, film, wall_begins, planes, tree_photons }, &push, extent)?;
+        } else {
+            commands.dispatch(GatherTreeTwoWords { points, film, wall_begins, planes, tree_photons }, &push, extent)?;
+        }
+        add_work(commands, plan, u64::from(end_point - first_point) * tests_per_point)?;
+    }
+    Ok(())
+}
+
+/// Every point searches for its nearest photons, all of them its own invocation's. How long a search is depends on
+/// how the photons lie; each dispatch does a bounded part of it, and the host asks whether any is left.
+fn gather_nearest(
+    commands: &mut Commands,
+    resources: &RoomResources,
+    tree: &TreeBuffers,
+    buffers: &SearchBuffers,
+    plan: &RoomPlan,
+    nearest_count: u32,
+    photon_count: u32,
+) -> Result<()> {
+    let RoomResources { film, points, rooms, .. } = resources;
+    let TreeBuffers { wall_begins, planes, tree_photons, tree_origins, .. } = tree;
+    let SearchBuffers { nearest, searches, unfinished, .. } = buffers;
+    let tests_per_point = plan.work.tests_per_point(photon_count).min(u64::from(GATHER_SLICE));
+    for (first, last) in point_ranges(commands, plan, tests_per_point, 1) {
+        for first_point in (first..last).step_by(buffers.point_count as usize) {
+            let end_point = last.min(first_point + buffers.point_count);
+            let mut push = NearestPush {
+                first_point,
+                end_point,
+                nearest: nearest_count,
+                is_first: 1,
+                radius_squared: (plan.settings.radius * plan.settings.radius) as f32,
+                film_shift: plan.film_shift,
+            };
+            loop {
+                commands.fill(unfinished, 0, 1, 0);
+                let extent = Extent::Items(u64::from(end_point - first_point));
+                if adds_in_one_word(plan, commands.facts()) {
+                    let kernel =
+                        NearestU64 { points, rooms, film, wall_begins, planes, tree_photons, tree_origins, nearest, searches, unfinished };
+                    commands.dispatch(kernel, &push, extent)?;
+                } else {
+                    let kernel = NearestTwoWords {
+                        points,
+                        rooms,
+                        film,
+                        wall_begins,
+                        planes,
+                        tree_photons,
+                        tree_origins,
+                        nearest,
+                        searches,
+                        unfinished,
+                    };
+                    commands.dispatch(kernel, &push, extent)?;
+                }
+                if commands.read::<u32>(unfinished, 1)? == [0] {
+                    break;
+                }
+                push.is_first = 0;
+            }
+        }
+    }
+    Ok(())
+}

@@ -1,0 +1,62 @@
+//! The index of a chunk's photons: counted by grid cell, prefix sums, sorted into cell order; or a kd-tree ([`tree`]).
+
+pub mod tree;
+
+use crate::constants::MAX_GROUPS;
+use crate::engine::prefix_sum::scan;
+use crate::engine::room::resources::{IndexBuffers, RoomResources};
+use crate::engine::room::trace::photon_list_capacity;
+use crate::error::Result;
+use crate::gpu::kernels::{CellCount, CellScatter, DispatchSize, ScanAdd, ScanBlocks};
+use crate::gpu::{Commands, Extent, Kernel, Module};
+use crate::plan::RoomPlan;
+use crate::records::DispatchSizePush;
+
+/// Kernels that the index needs.
+pub fn modules(plan: &RoomPlan) -> Vec<Module> {
+    if plan.gathers_by_tree() {
+        return tree::modules();
+    }
+    if !plan.gathers_by_grid() {
+        return Vec::new();
+    }
+    vec![CellCount::MODULE, ScanBlocks::MODULE, ScanAdd::MODULE, CellScatter::MODULE, DispatchSize::MODULE]
+}
+
+/// Sorts the photon map into cell order, or into the leaves of a kd-tree.
+///
+/// Does nothing where the plan has no index.
+pub fn build(commands: &mut Commands, resources: &RoomResources, plan: &RoomPlan, photon_count: u32) -> Result<()> {
+    if let Some(buffers) = &resources.tree {
+        return commands.scope("index", |commands| tree::build(commands, resources, buffers, plan, photon_count));
+    }
+    let RoomResources { rooms, photons, counters, dispatch_args, index: Some(index), .. } = resources else { return Ok(()) };
+    let IndexBuffers { cells, ranks, block_sums, sorted_photons, .. } = index;
+    let push = plan.grid.index_push(photon_list_capacity(plan, photon_count));
+    let extent = || if plan.has_slots() { Extent::Items(u64::from(push.photon_capacity)) } else { Extent::Indirect(dispatch_args) };
+    commands.scope("index", |commands| {
+        commands.scope("count", |commands| {
+            commands.fill(cells, 0, u64::from(plan.grid.cells()) + 1, 0);
+            if !plan.has_slots() {
+                let size = DispatchSizePush {
+                    counter: 0,
+                    capacity: push.photon_capacity,
+                    items_per_group: plan.settings.group_size,
+                    max_groups: MAX_GROUPS,
+                };
+                commands.dispatch(DispatchSize { counters, dispatch_args }, &size, Extent::Groups(1, 1))?;
+            }
+            commands.dispatch(CellCount { rooms, photons, counters, cells, ranks }, &push, extent())
+        })?;
+        commands.scope("scan", |commands| scan(commands, cells, block_sums, plan.grid.cells() + 1, plan.settings.group_size))?;
+        commands.scope("sort", |commands| {
+            commands.dispatch(CellScatter { rooms, photons, counters, cells, sorted_photons, ranks }, &push, extent())
+        })
+    })
+}
+
+/// Counts work, and hands the commands over once they amount to a submission.
+pub fn add_work(commands: &mut Commands, plan: &RoomPlan, pair_tests: u64) -> Result<()> {
+    commands.add_work(pair_tests);
+    if commands.work() >= plan.pair_tests_per_submission { commands.submit() } else { Ok(()) }
+}

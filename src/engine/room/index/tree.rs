@@ -1,0 +1,140 @@
+//! The kd-tree over a chunk's photons, built on the device. The layout is that of `glsl/index/tree.glsl`.
+//!
+//! Photons are sorted once along each of their wall's two axes (radix sort, wall first). From the root down, the
+//! median of a node along one axis is then the middle of its list, and the list along the other axis is parted
+//! stably by it: no node is sorted twice (Procopiuc, Agarwal, Arge and Vitter 2003; Brown 2015). How many photons
+//! there are only the device knows, so dispatches are sized there, and heights that the tree does not reach are
+//! passed over there.
+
+use super::add_work;
+use crate::constants::{MAX_GROUPS, TREE_DIGITS, TREE_LEAF};
+use crate::engine::prefix_sum::scan_part;
+use crate::engine::room::resources::{RoomResources, TreeBuffers};
+use crate::engine::room::trace::photon_list_capacity;
+use crate::error::Result;
+use crate::gpu::kernels::{
+    ScanAdd, ScanBlocks, TreeCount, TreeKeys, TreeLeaves, TreeOrder, TreeRanks, TreeSides, TreeSizes, TreeSplit, TreeWalls,
+};
+use crate::gpu::{Buffer, Commands, Extent, Kernel, Module};
+use crate::plan::RoomPlan;
+use crate::plan::memory::tree_count_capacity;
+use crate::records::{DispatchSizePush, TreePush};
+
+/// Kernels that the tree needs.
+pub fn modules() -> Vec<Module> {
+    vec![
+        TreeSizes::MODULE,
+        TreeKeys::MODULE,
+        TreeCount::MODULE,
+        ScanBlocks::MODULE,
+        ScanAdd::MODULE,
+        TreeOrder::MODULE,
+        TreeWalls::MODULE,
+        TreeRanks::MODULE,
+        TreeSides::MODULE,
+        TreeSplit::MODULE,
+        TreeLeaves::MODULE,
+    ]
+}
+
+/// Timestamps that must be left before a pass, where every dispatch takes two.
+const TIMESTAMP_RESERVE: u32 = 64;
+
+/// Builds the tree of a chunk's photons.
+pub(super) fn build(
+    commands: &mut Commands,
+    resources: &RoomResources,
+    tree: &TreeBuffers,
+    plan: &RoomPlan,
+    photon_count: u32,
+) -> Result<()> {
+    let RoomResources { photons, origins, counters, .. } = resources;
+    let TreeBuffers { lists, wall_begins, item_args, run_args, scan_args, tree_photons, tree_origins, .. } = tree;
+    let capacity = photon_list_capacity(plan, photon_count);
+    let push = TreePush { photon_capacity: capacity, axis: 0, digit: 0, height: 0 };
+    let one = Extent::Groups(1, 1);
+    let size = DispatchSizePush { counter: 0, capacity, items_per_group: plan.settings.group_size, max_groups: MAX_GROUPS };
+    commands.dispatch(TreeSizes { photons, counters, item_args, run_args, scan_args }, &size, one)?;
+    let pass_work = plan.work.tree_pass(photon_count);
+    commands.scope("sort", |commands| {
+        // The last pass ends in the first list, then in the second.
+        sort(commands, resources, tree, plan, &TreePush { axis: 0, ..push }, [&lists[1], &lists[0]], pass_work)?;
+        sort(commands, resources, tree, plan, &TreePush { axis: 1, ..push }, [&lists[2], &lists[1]], pass_work)
+    })?;
+    commands.scope("split", |commands| {
+        let (mut along, mut spare) = ([&lists[0], &lists[1]], &lists[2]);
+        for height in (1..=heights(capacity)).rev() {
+            let push = TreePush { height, ..push };
+            let axis = (height % 2) as usize;
+            split(commands, tree, plan, &push, along[axis], along[1 - axis], spare)?;
+            std::mem::swap(&mut along[1 - axis], &mut spare);
+            make_room(commands, plan, pass_work)?;
+        }
+        let leaves = TreeLeaves { photons, origins, wall_begins, keys: along[0], tree_photons, tree_origins };
+        commands.dispatch(leaves, &(), Extent::Indirect(item_args))
+    })
+}
+
+/// Heights of nodes of two leaves and more that `capacity` photons on one wall may need.
+fn heights(capacity: u32) -> u32 {
+    capacity.div_ceil(TREE_LEAF).max(1).next_power_of_two().ilog2()
+}
+
+fn make_room(commands: &mut Commands, plan: &RoomPlan, pass_work: u64) -> Result<()> {
+    if commands.timestamps_left() < TIMESTAMP_RESERVE {
+        commands.submit()?;
+    }
+    add_work(commands, plan, pass_work)
+}
+
+/// Sorts the photons by wall and along an axis; starts in the first list and ends in the second.
+fn sort(
+    commands: &mut Commands,
+    resources: &RoomResources,
+    tree: &TreeBuffers,
+    plan: &RoomPlan,
+    push: &TreePush,
+    lists: [&Buffer; 2],
+    pass_work: u64,
+) -> Result<()> {
+    let RoomResources { photons, counters, .. } = resources;
+    let TreeBuffers { counts, item_args, run_args, wall_begins, longest, .. } = tree;
+    let [mut keys, mut next_keys] = lists;
+    commands.dispatch(TreeKeys { photons, counters, keys }, push, Extent::Indirect(item_args))?;
+    for digit in 0..=TREE_DIGITS {
+        let push = TreePush { digit, ..*push };
+        commands.dispatch(TreeCount { photons, counters, keys, counts }, &push, Extent::Indirect(run_args))?;
+        sum_counts(commands, tree, plan)?;
+        if digit == TREE_DIGITS {
+            commands.dispatch(TreeWalls { photons, counters, keys, counts, wall_begins, longest }, &push, Extent::Groups(1, 1))?;
+        }
+        commands.dispatch(TreeOrder { photons, counters, keys, counts, next_keys }, &push, Extent::Indirect(run_args))?;
+        std::mem::swap(&mut keys, &mut next_keys);
+        make_room(commands, plan, pass_work)?;
+    }
+    Ok(())
+}
+
+fn sum_counts(commands: &mut Commands, tree: &TreeBuffers, plan: &RoomPlan) -> Result<()> {
+    let threads = || Extent::Indirect(&tree.scan_args);
+    scan_part(commands, &tree.counts, &tree.block_sums, tree_count_capacity(plan), plan.settings.group_size, &threads)
+}
+
+/// Splits the nodes of a height at the middle of the order along one axis; parts the order along the other into
+/// another list.
+fn split(
+    commands: &mut Commands,
+    tree: &TreeBuffers,
+    plan: &RoomPlan,
+    push: &TreePush,
+    along: &Buffer,
+    across: &Buffer,
+    next_keys: &Buffer,
+) -> Result<()> {
+    let TreeBuffers { wall_begins, longest, ranks, counts, planes, item_args, .. } = tree;
+    let photons = || Extent::Indirect(item_args);
+    commands.dispatch(TreeRanks { wall_begins, longest, keys: along, ranks, planes }, push, photons())?;
+    commands.dispatch(TreeSides { wall_begins, longest, keys: across, ranks, counts }, push, photons())?;
+    sum_counts(commands, tree, plan)?;
+    commands.dispatch(TreeSplit { wall_begins, longest, keys: across, ranks, counts, next_keys }, push, photons())
+}

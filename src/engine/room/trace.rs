@@ -1,0 +1,191 @@
+//! Photons of a chunk, without a word from the host: emission, then bounce after bounce of all paths; or photon by photon.
+
+mod in_order;
+
+use crate::constants::{MAX_GROUPS, PATHS_TOGETHER};
+use crate::engine::room::resources::RoomResources;
+use crate::error::Result;
+use crate::gpu::kernels::{
+    Emit, EndBounce, FillGaps, KeepOrder, ScanAdd, ScanBlocks, TraceAtomic, TraceBallot, TraceGroup, TraceInPlace, TracePersistent,
+    TraceSlots,
+};
+use crate::gpu::{Commands, Extent, Kernel, Module};
+use crate::plan::{EmissionRange, RoomPlan, photons_of};
+use crate::records::{EmitPush, EndBouncePush, FillGapsPush, PhotonRange, TracePersistentPush, TracePush};
+use crate::rng::words;
+use crate::settings::Builder;
+
+/// Kernels that tracing needs.
+pub fn modules(plan: &RoomPlan) -> Vec<Module> {
+    match plan.settings.builder {
+        Builder::Naive => vec![Emit::MODULE, TraceSlots::MODULE],
+        Builder::Atomic if plan.counters > 1 => vec![Emit::MODULE, TraceAtomic::MODULE, FillGaps::MODULE, EndBounce::MODULE],
+        Builder::Atomic => vec![Emit::MODULE, TraceAtomic::MODULE, EndBounce::MODULE],
+        Builder::Ballot => vec![Emit::MODULE, TraceBallot::MODULE, EndBounce::MODULE],
+        Builder::Group => vec![Emit::MODULE, TraceGroup::MODULE, EndBounce::MODULE],
+        Builder::Scan => {
+            vec![Emit::MODULE, TraceInPlace::MODULE, ScanBlocks::MODULE, ScanAdd::MODULE, KeepOrder::MODULE, EndBounce::MODULE]
+        }
+        Builder::Persistent => vec![TracePersistent::MODULE],
+        Builder::Cpu => panic!("the CPU builder has no kernels"),
+    }
+}
+
+/// Traces the photons of a chunk into the photon map and adds their fates to the tallies.
+pub fn chunk(commands: &mut Commands, resources: &RoomResources, plan: &RoomPlan, round: u32, ranges: &[EmissionRange]) -> Result<()> {
+    let photon_count = photons_of(ranges);
+    commands.scope("build", |commands| {
+        commands.fill(&resources.counters, 0, plan.counter_array_length(), 0);
+        commands.fill(&resources.counters, 1, 1, photon_count);
+        commands.add_work(plan.work.tracing(photon_count));
+        if plan.settings.builder == Builder::Persistent {
+            return trace_persistent(commands, resources, plan, round, ranges);
+        }
+        commands.scope("emit", |commands| emit(commands, resources, plan, round, ranges))?;
+        for bounce in 0..plan.settings.bounces {
+            if commands.timestamps_left() < TIMESTAMP_RESERVE {
+                commands.submit()?;
+            }
+            let name = format!("bounce {}", bounce + 1);
+            commands.scope(&name, |commands| one_bounce(commands, resources, plan, round, bounce, photon_count))?;
+        }
+        Ok(())
+    })
+}
+
+/// Writes the paths of a chunk as they leave their lights, light after light.
+pub fn emit(commands: &mut Commands, resources: &RoomResources, plan: &RoomPlan, round: u32, ranges: &[EmissionRange]) -> Result<()> {
+    let RoomResources { lights, walls, stream_seeds, paths: [paths, _], nonfinite_values, .. } = resources;
+    let mut path_offset = 0;
+    for range in ranges {
+        let push = EmitPush {
+            key: plan.streams().key(round),
+            range: photon_range(plan, round, range),
+            path_offset,
+            path_capacity: plan.path_array_length(),
+        };
+        commands.dispatch(Emit { lights, walls, stream_seeds, paths, nonfinite_values }, &push, Extent::Items(u64::from(range.count)))?;
+        path_offset += range.count;
+    }
+    Ok(())
+}
+
+fn photon_range(plan: &RoomPlan, round: u32, range: &EmissionRange) -> PhotonRange {
+    let jump = plan.streams().jump(round, range.first_photon);
+    PhotonRange {
+        light: range.light,
+        first_photon: range.first_photon,
+        count: range.count,
+        first_sample: plan.first_sample(round, range),
+        jump_multiplier: words(jump.multiplier),
+        jump_increment: words(jump.increment),
+    }
+}
+
+/// Traces every photon from its light to its end.
+fn trace_persistent(
+    commands: &mut Commands,
+    resources: &RoomResources,
+    plan: &RoomPlan,
+    round: u32,
+    ranges: &[EmissionRange],
+) -> Result<()> {
+    let RoomResources { rooms, walls, lights, stream_seeds, photons, origins, counters, tallies, nonfinite_values, .. } = resources;
+    for range in ranges.iter().flat_map(|range| range.parts(plan.photons_per_dispatch())) {
+        let push = TracePersistentPush {
+            key: plan.streams().key(round),
+            range: photon_range(plan, round, &range),
+            stride: plan.persistence.invocations(range.count),
+            bounces: plan.settings.bounces,
+            photon_capacity: plan.photon_capacity,
+            eye: plan.settings.eye.into(),
+        };
+        let kernel = TracePersistent { rooms, walls, lights, stream_seeds, photons, origins, counters, tallies, nonfinite_values };
+        commands.dispatch(kernel, &push, Extent::Items(u64::from(push.stride)))?;
+    }
+    Ok(())
+}
+
+/// Timestamps that must be left for the scopes that are open and those that follow the bounces.
+const TIMESTAMP_RESERVE: u32 = 64;
+
+/// Timestamps after which a chunk need not submit on its own account.
+pub fn timestamps_per_chunk(plan: &RoomPlan) -> u32 {
+    (6 * plan.settings.bounces + TIMESTAMP_RESERVE).min(4 * TIMESTAMP_RESERVE)
+}
+
+/// Entries of the photon map that a chunk uses: all slots, or as many as there is room for.
+pub fn photon_list_capacity(plan: &RoomPlan, photon_count: u32) -> u32 {
+    if plan.has_slots() { (photon_count * plan.settings.bounces).min(plan.photon_capacity) } else { plan.photon_capacity }
+}
+
+/// Paths that an invocation takes through a bounce.
+fn paths_each(builder: Builder) -> u32 {
+    match builder {
+        Builder::Ballot | Builder::Group => PATHS_TOGETHER,
+        _ => 1,
+    }
+}
+
+fn one_bounce(
+    commands: &mut Commands,
+    resources: &RoomResources,
+    plan: &RoomPlan,
+    round: u32,
+    bounce: u32,
+    photon_count: u32,
+) -> Result<()> {
+    let builder = plan.settings.builder;
+    let push = TracePush {
+        key: plan.streams().key(round),
+        bounce,
+        bounces: plan.settings.bounces,
+        path_capacity: plan.path_capacity,
+        photon_capacity: photon_list_capacity(plan, photon_count),
+        eye: plan.settings.eye.into(),
+    };
+    // Every photon enters bounce 0, and the naive builder looks at every slot each time. After that
+    // only the device knows how many paths are left.
+    let extent = || {
+        if bounce == 0 || builder == Builder::Naive {
+            Extent::Items(u64::from(photon_count.div_ceil(paths_each(builder))))
+        } else {
+            Extent::Indirect(&resources.dispatch_args)
+        }
+    };
+    let [even, odd] = &resources.paths;
+    let (paths, next_paths) = if bounce.is_multiple_of(2) { (even, odd) } else { (odd, even) };
+    let RoomResources { rooms, walls, photons, origins, counters, tallies, nonfinite_values, .. } = resources;
+    macro_rules! trace {
+        ($kernel:ident) => {
+            commands.dispatch(
+                $kernel { rooms, walls, paths, next_paths, photons, origins, counters, tallies, nonfinite_values },
+                &push,
+                extent(),
+            )
+        };
+    }
+    match builder {
+        Builder::Naive => trace!(TraceSlots),
+        Builder::Atomic => trace!(TraceAtomic),
+        Builder::Ballot => trace!(TraceBallot),
+        Builder::Group => trace!(TraceGroup),
+        Builder::Scan => in_order::one_bounce(commands, resources, plan, [paths, next_paths], &push, extent),
+        Builder::Persistent | Builder::Cpu => panic!("{} has no bounces of all paths", builder.name()),
+    }?;
+    if builder == Builder::Naive {
+        return Ok(());
+    }
+    if plan.counters > 1 {
+        let TracePush { bounces, path_capacity, photon_capacity, .. } = push;
+        let gaps = FillGapsPush { bounce, bounces, path_capacity, photon_capacity };
+        commands.dispatch(FillGaps { counters, photons, next_paths }, &gaps, Extent::Groups(1, 1))?;
+    }
+    let end = EndBouncePush {
+        bounce,
+        photon_capacity: push.photon_capacity,
+        items_per_group: plan.settings.group_size * paths_each(builder),
+        max_groups: MAX_GROUPS,
+    };
+    commands.dispatch(EndBounce { counters, dispatch_args: &resources.dispatch_args }, &end, Extent::Groups(1, 1))
+}

@@ -1,0 +1,147 @@
+//! The film of all rounds: the mean of each pixel and its standard error, from integer sums.
+
+use glam::DVec3;
+
+use crate::constants::{HIT_CAUSTIC_PHOTON, HIT_GLOBAL_PHOTON, HIT_KINDS, HIT_SHADOW_RAY};
+use crate::engine::unknown::{Unknown, most_hits};
+use crate::engine::watch::mean_squared_radius;
+use crate::plan::scene::{MapPlan, ScenePlan};
+
+/// Names of the kinds of `HIT_...`.
+const KINDS: [&str; HIT_KINDS as usize] = ["shadow ray", "photon of the caustic map", "photon of the global map"];
+/// In place of a bound: something has hit (`glsl/world/scene/one_hit.glsl`).
+const REACHED: u32 = u32::MAX;
+
+/// Exact sums over rounds, three channels a pixel, in film units.
+#[derive(Debug, Clone)]
+pub struct SceneFilm {
+    pub rounds: u32,
+    pub sums: Vec<u64>,
+    pub squares: Vec<u128>,
+    /// For each pixel and kind of light what one hit would have added to a round, or that something has hit
+    /// (`glsl/world/scene/one_hit.glsl`).
+    pub one_hits: Vec<u32>,
+}
+
+/// Films are equal that hold the same light, whatever else was asked for and not found.
+impl PartialEq for SceneFilm {
+    fn eq(&self, other: &SceneFilm) -> bool {
+        (self.rounds, &self.sums, &self.squares) == (other.rounds, &other.sums, &other.squares)
+    }
+}
+
+impl SceneFilm {
+    pub fn new(rounds: u32, sums: Vec<u64>, squares: Vec<u64>, one_hits: Vec<u32>) -> SceneFilm {
+        let squares = squares.chunks_exact(2).map(|words| u128::from(words[0]) | u128::from(words[1]) << 64).collect();
+        SceneFilm { rounds, sums, squares, one_hits }
+    }
+
+    pub fn pixels(&self) -> usize {
+        self.sums.len() / 3
+    }
+
+    /// Radiance (W/m2/sr) or irradiance (W/m2) of a pixel.
+    pub fn mean(&self, pixel: usize, plan: &ScenePlan) -> DVec3 {
+        let unit = plan.film_scale * f64::from(self.rounds.max(1));
+        DVec3::from_array([0, 1, 2].map(|channel| self.sums[3 * pixel + channel] as f64 / unit))
+    }
+
+    /// Standard error of the mean, from the variance between rounds; of a single round nothing is known,
+    /// and it is infinite. Where a channel lies below the film's unit few rounds may not show that it is rounded at random
+    /// to 0 or 1: then the variance is at least what that rounding has.
+    pub fn standard_error(&self, pixel: usize, plan: &ScenePlan) -> DVec3 {
+        if self.rounds < 2 {
+            return DVec3::INFINITY;
+        }
+        let rounds = f64::from(self.rounds);
+        let is_lit = self.sums[3 * pixel..][..3] != [0; 3];
+        DVec3::from_array([0, 1, 2].map(|channel| {
+            let (sum, square) = (u128::from(self.sums[3 * pixel + channel]), self.squares[3 * pixel + channel]);
+            // sum^2 <= rounds * square, so what is left of the square is not negative but for the division's
+            // remainder.
+            let deviation = square.saturating_sub(sum * sum / u128::from(self.rounds)) as f64;
+            // That of a fraction f is f (1 - f), at most f and at most 1/4; a sum of 0 may be of any fraction below 1 / rounds.
+            let rounding = (sum as f64).max(1.0).min(0.25 * plan.roundings_per_round() * rounds);
+            let variance = (deviation * rounds / (rounds - 1.0)).max(if is_lit { rounding } else { 0.0 });
+            variance.sqrt() / rounds / plan.film_scale
+        }))
+    }
+
+    /// Of all pixels and channels.
+    pub fn root_mean_square(&self, plan: &ScenePlan) -> f64 {
+        let squares: f64 = (0..self.pixels()).map(|pixel| self.mean(pixel, plan).length_squared()).sum();
+        (squares / (3 * self.pixels()).max(1) as f64).sqrt()
+    }
+
+    fn kinds(&self, pixel: usize) -> &[u32] {
+        &self.one_hits[KINDS.len() * pixel..][..KINDS.len()]
+    }
+
+    /// Whether a pixel asked for light and nothing has reached it: its spread of 0 is no error.
+    pub fn is_unreached(&self, pixel: usize) -> bool {
+        let kinds = self.kinds(pixel);
+        self.sums[3 * pixel..][..3] == [0; 3] && kinds.iter().any(|kind| *kind != 0) && !kinds.contains(&REACHED)
+    }
+
+    /// The standard error to be shown: infinite where it is not known, as nothing has reached the pixel.
+    pub fn stated_error(&self, pixel: usize, plan: &ScenePlan) -> DVec3 {
+        if self.is_unreached(pixel) { DVec3::INFINITY } else { self.standard_error(pixel, plan) }
+    }
+
+    /// Pixels, and kinds of light, of which no hit is all that is known.
+    pub fn unknown(&self, plan: &ScenePlan, confidence: f64) -> Unknown {
+        // Rounds with larger discs would have had more hits.
+        let shrunk = mean_squared_radius(plan.settings.alpha, self.rounds);
+        let per_disc = |map: &Option<MapPlan>| map.as_ref().map_or(0.0, |map| 1.0 / (map.radius * map.radius * shrunk));
+        let mut scales = [most_hits(confidence) / f64::from(self.rounds.max(1)); KINDS.len()];
+        scales[HIT_CAUSTIC_PHOTON as usize] *= per_disc(&plan.caustic);
+        scales[HIT_GLOBAL_PHOTON as usize] *= per_disc(&plan.global);
+        // The most light of a kind at a pixel, as far as no hit tells.
+        let bound = |pixel: usize, kind: usize| match self.kinds(pixel)[kind] {
+            REACHED => 0.0,
+            bits => scales[kind] * f64::from(f32::from_bits(bits)),
+        };
+        let pixels = || 0..self.pixels();
+        let is_absent = |kind: usize| {
+            let of_kind = || pixels().map(|pixel| self.kinds(pixel)[kind]);
+            of_kind().any(|bits| bits != 0) && of_kind().all(|bits| bits != REACHED)
+        };
+        let absent: Vec<usize> = (0..KINDS.len()).filter(|kind| is_absent(*kind)).collect();
+        let mut unknown = Unknown { absent: absent.iter().map(|kind| KINDS[*kind]).collect(), ..Unknown::default() };
+        let (mut bounds, mut result, mut shadow_rays) = (0.0, 0.0, 0.0);
+        for pixel in pixels() {
+            result += self.mean(pixel, plan).length_squared();
+            unknown.asked += u64::from(self.kinds(pixel).iter().any(|bits| *bits != 0));
+            if self.is_unreached(pixel) {
+                // Hits of all kinds together are as few as those of one.
+                let most = (0..KINDS.len()).map(|kind| bound(pixel, kind)).fold(0.0, f64::max);
+                unknown.add_unreached(most);
+                bounds += 3.0 * most * most;
+                continue;
+            }
+            for kind in &absent {
+                let most = bound(pixel, *kind);
+                if *kind == HIT_SHADOW_RAY as usize {
+                    shadow_rays = most.max(shadow_rays);
+                } else {
+                    bounds += 3.0 * most * most;
+                }
+            }
+        }
+        // Each pixel has shadow rays of its own, and those of all have missed: the worst is that one pixel alone might have
+        // been hit. Photons are shared, so that all pixels may be in the dark for the same reason.
+        bounds += 3.0 * shadow_rays * shadow_rays;
+        unknown.relative_to(bounds, result)
+    }
+
+    /// Root mean square over pixels and channels of standard error and of the mean; of pixels that nothing has reached see
+    /// [`SceneFilm::unknown`].
+    pub fn relative_error(&self, plan: &ScenePlan) -> f64 {
+        let (mut errors, mut means) = (0.0, 0.0);
+        for pixel in 0..self.pixels() {
+            errors += self.standard_error(pixel, plan).length_squared();
+            means += self.mean(pixel, plan).length_squared();
+        }
+        if means > 0.0 { (errors / means).sqrt() } else { 0.0 }
+    }
+}

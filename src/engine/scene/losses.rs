@@ -1,0 +1,61 @@
+//! Light that limits keep from the result: photons cut off after their last bounce, flux beyond what a shading normal may
+//! change, values beyond what the film holds, camera paths cut off among mirrors. Every watt of it is counted, and bounds a bias.
+
+use super::SceneFilm;
+use crate::constants::{ARRIVED_DIRECT, PART_COUNT};
+use crate::ledger::{Fates, Losses, RelativeFlux};
+use crate::plan::scene::ScenePlan;
+use crate::scene::geometry::Geometry;
+
+/// Words that kernels count in (`glsl/world/scene/film.glsl`).
+pub const ANOMALY_WORDS: usize = 8;
+
+/// Of a run so far, from what its kernels counted.
+pub fn losses(
+    geometry: &Geometry,
+    plan: &ScenePlan,
+    fates: &[Fates; 2],
+    anomalies: &[u32],
+    part_totals: &[u64],
+    film: &SceneFilm,
+) -> Losses {
+    let area_unit = geometry.unit * geometry.unit;
+    let emitted = geometry.power * area_unit;
+    let mut losses = Losses { emitted, clamped_values: anomalies[1], camera_paths: anomalies[3], ..Losses::default() };
+    let all: f64 = part_totals.iter().map(|total| *total as f64).sum();
+    for map in plan.maps() {
+        let of_map = &fates[usize::from(map.caustic_only)];
+        let Some(totals) = of_map.totals.filter(|_| of_map.emitted > 0) else { continue };
+        // Sums over all photons traced, each of which stands for that share of a round.
+        let watts = |flux: RelativeFlux| {
+            let unit = geometry.flux_unit / (of_map.emitted as f64 * map.flux_gain) * area_unit;
+            flux.iter().sum::<f64>() * unit
+        };
+        let (cut_off, clamped) = (watts(totals.cut_flux), watts(totals.clamped_flux));
+        losses.cut_off += cut_off;
+        losses.clamped += clamped;
+        let missed = (cut_off + clamped) * if map.caustic_only { 1.0 } else { of_map.further_landings() };
+        if missed == 0.0 {
+            continue;
+        }
+        // Landings so far that the map holds: what is missed belongs to the same part of the result.
+        let landed = (emitted / map.flux_gain * totals.stored as f64 / of_map.emitted as f64).max(f64::MIN_POSITIVE);
+        let share = missed / (landed + missed);
+        let part = if map.stored & ARRIVED_DIRECT != 0 {
+            all
+        } else {
+            part_totals[if map.caustic_only { 2 } else { PART_COUNT as usize - 1 }] as f64 + part_totals[1] as f64
+        };
+        // Of a part that is missed altogether nothing is known but its watts.
+        let of_part = if totals.stored > 0 && all > 0.0 { part / (1.0 - share) / (all + part * share / (1.0 - share)) } else { 1.0 };
+        losses.relative += Losses::SAFETY * share * of_part;
+    }
+    let paths = f64::from(plan.sensor.pixels()) * f64::from(plan.samples()) * f64::from(film.rounds.max(1));
+    let mean = film.root_mean_square(plan);
+    if mean > 0.0 {
+        let wide = |word: usize| (u64::from(anomalies[word]) | u64::from(anomalies[word + 1]) << 32) as f64;
+        losses.relative += wide(6) / 1_048_576.0 / paths * geometry.brightest() / mean;
+        losses.relative += wide(4) / 1024.0 * plan.film_limit / plan.film_scale / paths / mean;
+    }
+    losses
+}

@@ -1,0 +1,318 @@
+//! Photons of a chunk through a scene of triangles, and the index of their map.
+use crate::settings::Builder;
+
+use super::Round;
+use super::resources::{PhotonBuffers, SceneResources};
+use crate::constants::MAX_GROUPS;
+use crate::engine::prefix_sum::scan;
+use crate::error::Result;
+use crate::gpu::kernels::{
+    DispatchSize, MapCount, MapScatter, MapSize, SceneEmit, SceneTraceAtomic, SceneTraceBallot, SceneTracePersistent,
+};
+use crate::gpu::{Commands, Extent};
+use crate::plan::scene::{MapPlan, ScenePlan};
+use crate::records::{CellPush, DispatchSizePush, Draws, EmissionPush, FlightPush, PhotonEmission, PhotonStore, SceneTracePersistentPush};
+use crate::rng::words;
+use crate::scene::geometry::Geometry;
+
+/// The grid of a map in a round: cells as wide as the radius, its corner a little outside of the scene.
+pub fn cells(round: Round, map: &MapPlan) -> CellPush {
+    let radius = round.plan.radius(map, round.number) as f32;
+    CellPush {
+        origin: round.geometry.bounds.0 - 4.0 * radius,
+        cells_per_unit: 1.0 / radius,
+        bucket_mask: map.bucket_count - 1,
+        photon_capacity: map.capacity,
+    }
+}
+
+/// Timestamps that must be left for the scopes that are open and for a bounce.
+const TIMESTAMP_RESERVE: u32 = 32;
+/// Work of one flight of a photon, in the plan's units.
+const WORK_PER_PHOTON: u64 = 256;
+
+/// Photons that a segment begins with.
+#[derive(Debug, Clone, Copy)]
+enum Start {
+    /// Photons (first, count) of the round, at their lights.
+    Lights((u32, u32)),
+    /// So many in the list of this parity, with so many bounces behind them.
+    List { count: u32, parity: usize, first_bounce: u32 },
+}
+
+/// Traces the photons (first, count) of a chunk to their end and adds their fates to the map's tallies. They go in segments of
+/// bounces where more would not fit one dispatch or one map; survivors go on in the next. `gather` is called with the photons in
+/// the map: at the end, and before a segment for which the map might have no room.
+pub fn trace(
+    commands: &mut Commands,
+    round: Round,
+    photons: &PhotonBuffers,
+    map: &MapPlan,
+    chunk: (u32, u32),
+    gather: &mut dyn FnMut(&mut Commands) -> Result<()>,
+) -> Result<()> {
+    commands.fill(&photons.counters, 0, map.counter_count(), 0);
+    let mut start = Start::Lights(chunk);
+    let mut first_bounce = 0;
+    loop {
+        let flights = map.segment_bounces.min(map.bounces - first_bounce);
+        let parity = commands.scope("trace", |commands| segment(commands, round, photons, map, start, flights))?;
+        first_bounce += flights;
+        if first_bounce == map.bounces {
+            return gather(commands);
+        }
+        let counters = commands.read::<u32>(&photons.counters, map.counter_count() as usize)?;
+        let left = counters[if is_persistent(round.plan) { 1 } else { 1 + flights as usize }];
+        let stored = counters[0];
+        if left == 0 {
+            return if stored > 0 { gather(commands) } else { Ok(()) };
+        }
+        let landings = u64::from(map.capacity / map.chunk_photons);
+        let is_full = u64::from(stored) + u64::from(left) * landings > u64::from(map.capacity);
+        if is_full {
+            gather(commands)?;
+        }
+        commands.fill(&photons.counters, 0, map.counter_count(), 0);
+        if !is_full {
+            commands.fill(&photons.counters, 0, 1, stored);
+        }
+        start = Start::List { count: left, parity, first_bounce };
+    }
+}
+
+fn is_persistent(plan: &ScenePlan) -> bool {
+    plan.builder() == Builder::Persistent
+}
+
+/// So many flights of each photon; says where those are that are left.
+fn segment(commands: &mut Commands, round: Round, photons: &PhotonBuffers, map: &MapPlan, start: Start, flights: u32) -> Result<usize> {
+    if is_persistent(round.plan) {
+        return trace_persistent(commands, round, photons, map, start, flights);
+    }
+    let (count, mut parity, first_bounce) = match start {
+        Start::Lights(chunk) => {
+            emit(commands, round, photons, map, chunk)?;
+            (chunk.1, 0, 0)
+        }
+        Start::List { count, parity, first_bounce } => (count, parity, first_bounce),
+    };
+    commands.fill(&photons.counters, 1, 1, count);
+    for list in 0..flights {
+        if commands.timestamps_left() < TIMESTAMP_RESERVE {
+            commands.submit()?;
+        }
+        // After the first flight only the device knows how many paths are left.
+        let extent = if list == 0 {
+            Extent::Items(u64::from(count))
+        } else {
+            dispatch_size(commands, photons, round.plan, 1 + list, map.chunk_photons)?;
+            Extent::Indirect(&photons.dispatch_args)
+        };
+        trace_flight(commands, round, photons, map, Flight { bounce: first_bounce + list, list, parity }, extent)?;
+        parity = 1 - parity;
+    }
+    commands.add_work(WORK_PER_PHOTON * u64::from(count));
+    Ok(parity)
+}
+
+fn draws(round: Round, map: &MapPlan) -> Draws {
+    Draws { seed: words(round.plan.settings.seed), round: round.number, domain: map.domain }
+}
+
+fn emission(geometry: &Geometry, map: &MapPlan, (first_photon, photon_count): (u32, u32)) -> PhotonEmission {
+    PhotonEmission {
+        first_photon,
+        photon_count,
+        emitter_count: geometry.emitters.len() as u32,
+        scene_radius: geometry.radius as f32,
+        target_count: map.target_count,
+        flux_gain: map.flux_gain as f32,
+    }
+}
+
+fn store(plan: &ScenePlan, map: &MapPlan) -> PhotonStore {
+    PhotonStore {
+        photon_capacity: map.capacity,
+        stored: map.stored,
+        caustic_only: u32::from(map.caustic_only),
+        caustic_surfaces: plan.caustic_surfaces,
+    }
+}
+
+/// So many flights of each photon, which keeps its invocation; says where those are that are left.
+fn trace_persistent(
+    commands: &mut Commands,
+    round: Round,
+    photons: &PhotonBuffers,
+    map: &MapPlan,
+    start: Start,
+    flights: u32,
+) -> Result<usize> {
+    let Round { resources, geometry, plan, .. } = round;
+    let SceneResources { nodes, triangles, normals, uvs, materials, textures, texels, emitters, caustic_targets, nonfinite_values, .. } =
+        resources;
+    let PhotonBuffers { paths, counters, map: map_buffer, .. } = photons;
+    let which = usize::from(map.caustic_only);
+    let (tallies, totals) = (&photons.tallies[which], &photons.totals[which]);
+    let (mut first, end, parity, first_bounce) = match start {
+        Start::Lights((first, count)) => (first, first + count, 0, 0),
+        Start::List { count, parity, first_bounce } => (0, count, parity, first_bounce),
+    };
+    while first < end {
+        let count = photons_at_once(commands, plan).min(end - first);
+        let push = SceneTracePersistentPush {
+            draws: draws(round, map),
+            emission: emission(geometry, map, (first, count)),
+            map: store(plan, map),
+            bounces: map.bounces,
+            first_bounce,
+            flights,
+            stride: map.persistence.invocations(count),
+        };
+        let kernel = SceneTracePersistent {
+            nodes,
+            triangles,
+            normals,
+            uvs,
+            materials,
+            textures,
+            texels,
+            emitters,
+            caustic_targets,
+            light_paths: &paths[parity],
+            next_light_paths: &paths[1 - parity],
+            map: map_buffer,
+            counters,
+            tallies,
+            totals,
+            nonfinite_values,
+        };
+        commands.dispatch(kernel, &push, Extent::Items(u64::from(push.stride)))?;
+        commands.add_work(WORK_PER_PHOTON * u64::from(count));
+        first += count;
+        if first < end && commands.work() >= commands.paced(plan.work_per_submission) {
+            commands.submit()?;
+        }
+    }
+    Ok(1 - parity)
+}
+
+/// Photons of one dispatch.
+fn photons_at_once(commands: &Commands, plan: &ScenePlan) -> u32 {
+    let paced = commands.paced(u64::from(plan.photons_per_dispatch()));
+    (paced as u32).max(LEAST_PHOTONS).min(plan.photons_per_dispatch())
+}
+
+/// Fewer photons in a dispatch would leave a device idle.
+const LEAST_PHOTONS: u32 = 1 << 12;
+
+/// Writes the paths of a chunk as they leave the lights.
+pub fn emit(commands: &mut Commands, round: Round, photons: &PhotonBuffers, map: &MapPlan, chunk: (u32, u32)) -> Result<()> {
+    let Round { resources, geometry, .. } = round;
+    let SceneResources { nodes, triangles, normals, uvs, materials, textures, texels, emitters, caustic_targets, nonfinite_values, .. } =
+        resources;
+    let light_paths = &photons.paths[0];
+    let push = EmissionPush { draws: draws(round, map), emission: emission(geometry, map, chunk) };
+    let kernel =
+        SceneEmit { nodes, triangles, normals, uvs, materials, textures, texels, emitters, caustic_targets, light_paths, nonfinite_values };
+    commands.dispatch(kernel, &push, Extent::Items(u64::from(chunk.1)))
+}
+
+/// One flight of the paths in list `list` of a segment, which the buffer of this parity holds.
+#[derive(Debug, Clone, Copy)]
+pub struct Flight {
+    pub bounce: u32,
+    pub list: u32,
+    pub parity: usize,
+}
+
+pub fn trace_flight(
+    commands: &mut Commands,
+    round: Round,
+    photons: &PhotonBuffers,
+    map: &MapPlan,
+    flight: Flight,
+    extent: Extent,
+) -> Result<()> {
+    let Round { resources, plan, .. } = round;
+    let SceneResources { nodes, triangles, normals, uvs, materials, textures, texels, nonfinite_values, .. } = resources;
+    let Flight { bounce, list, parity } = flight;
+    let is_last = u32::from(bounce + 1 == map.bounces);
+    let push = FlightPush { draws: draws(round, map), map: store(plan, map), bounce, list, is_last, path_capacity: map.chunk_photons };
+    let which = usize::from(map.caustic_only);
+    let (tallies, totals) = (&photons.tallies[which], &photons.totals[which]);
+    let PhotonBuffers { paths, counters, map, .. } = photons;
+    let (light_paths, next_light_paths) = (&paths[parity], &paths[1 - parity]);
+    match plan.builder() {
+        Builder::Atomic => commands.dispatch(
+            SceneTraceAtomic {
+                nodes,
+                triangles,
+                normals,
+                uvs,
+                materials,
+                textures,
+                texels,
+                light_paths,
+                next_light_paths,
+                map,
+                counters,
+                tallies,
+                totals,
+                nonfinite_values,
+            },
+            &push,
+            extent,
+        ),
+        Builder::Ballot => commands.dispatch(
+            SceneTraceBallot {
+                nodes,
+                triangles,
+                normals,
+                uvs,
+                materials,
+                textures,
+                texels,
+                light_paths,
+                next_light_paths,
+                map,
+                counters,
+                tallies,
+                totals,
+                nonfinite_values,
+            },
+            &push,
+            extent,
+        ),
+        builder => panic!("{} has no flights of all photons", builder.name()),
+    }
+}
+
+fn dispatch_size(commands: &mut Commands, photons: &PhotonBuffers, plan: &ScenePlan, counter: u32, capacity: u32) -> Result<()> {
+    let PhotonBuffers { counters, dispatch_args, .. } = photons;
+    let push = DispatchSizePush { counter, capacity, items_per_group: plan.settings.group_size, max_groups: MAX_GROUPS };
+    commands.dispatch(DispatchSize { counters, dispatch_args }, &push, Extent::Groups(1, 1))
+}
+
+/// Sorts the map by the buckets of its cells.
+pub fn index(commands: &mut Commands, round: Round, photons: &PhotonBuffers, map_plan: &MapPlan, cells_push: &CellPush) -> Result<()> {
+    let plan = round.plan;
+    let totals = &photons.totals[usize::from(map_plan.caustic_only)];
+    let PhotonBuffers { map, sorted_map, counters, cells, ranks, block_sums, dispatch_args, .. } = photons;
+    let buckets = cells_push.bucket_mask + 1;
+    commands.scope("count", |commands| {
+        commands.fill(cells, 0, u64::from(buckets) + 1, 0);
+        let push = DispatchSizePush {
+            counter: 0,
+            capacity: cells_push.photon_capacity,
+            items_per_group: plan.settings.group_size,
+            max_groups: MAX_GROUPS,
+        };
+        commands.dispatch(MapSize { counters, dispatch_args, totals }, &push, Extent::Groups(1, 1))?;
+        commands.dispatch(MapCount { map, counters, cells, ranks }, cells_push, Extent::Indirect(dispatch_args))
+    })?;
+    commands.scope("scan", |commands| scan(commands, cells, block_sums, buckets + 1, plan.settings.group_size))?;
+    commands.scope("sort", |commands| {
+        commands.dispatch(MapScatter { map, counters, cells, sorted_map, ranks }, cells_push, Extent::Indirect(dispatch_args))
+    })
+}

@@ -1,0 +1,226 @@
+//! A trial round, from which the default radii are taken: the density of photons around the points that are asked about,
+//! and how far it is from these to the next wall.
+//!
+//! A radius by the scene's area is right where photons lie everywhere alike. Of a room on a plain it would be wider than the
+//! room. So a few photons are traced, with random numbers that no run has, and each of a few points is given the radius
+//! within which a round of the run will leave about two dozen. The median is taken, in steps of a fourth root of 2:
+//! an integer, so that nothing but these photons and points decides; but no more than the radius by the area. It depends on no
+//! seed, builder or split.
+
+use std::time::Instant;
+
+use glam::Vec4;
+use rayon::prelude::*;
+
+use super::resources::SceneResources;
+use super::{Round, View, constants, modules, photons, points};
+use crate::engine;
+use crate::engine::bias;
+use crate::error::Result;
+use crate::gpu::kernels::Clearance;
+use crate::gpu::{Commands, Extent, Gpu, Kernel, Memory};
+use crate::photon::MapPhoton;
+use crate::plan::Limits;
+use crate::plan::planning::{MAX_DEFAULT_RADIUS, area_radius};
+use crate::plan::scene::{MapPlan, RADIUS_RANGE, RadiusFrom, ScenePlan, Trial};
+use crate::plan::sensor::Sensor;
+use crate::records::{ClearancePush, VisiblePoint};
+use crate::scene::Scene;
+use crate::settings::scene::{Part, SceneSettings};
+use crate::settings::stop::Stop;
+
+/// Photons of each map.
+const PHOTONS: u32 = 1 << 14;
+/// Points at most.
+const POINTS: u32 = 1 << 10;
+/// Nearest photons whose distance tells the density at a point.
+const NEAREST: usize = 8;
+/// Photons of a round within the radius of a point of the global map: about what the rule by the area leaves of light that
+/// was scattered before, in closed rooms.
+const PHOTONS_AT_POINT: f64 = 24.0;
+/// The same of the caustic map, whose light has edges: half the radius.
+const CAUSTIC_PHOTONS_AT_POINT: f64 = 6.0;
+/// Steps of a radius in a factor of 2.
+const STEPS: f64 = 4.0;
+/// Of the clearance of points: a radius that is no larger reaches round few corners.
+const CLEARANCE_SHARE: f64 = 0.25;
+/// Over the radius by the scene's area: points with so few photons about them are not reached by this map's light.
+const REACH: f64 = 4.0;
+const SEED: u64 = 0x7472_6961;
+
+/// The plan of a run, its default radii by a trial round.
+pub fn plan(gpu: &Gpu, scene: &Scene, view: &View, settings: &SceneSettings, sensor: Sensor) -> Result<ScenePlan> {
+    let limits = engine::limits(gpu.facts());
+    let plan = ScenePlan::new(scene, view.geometry, settings, sensor, &limits)?;
+    if plan.maps().all(|map| map.radius_from == RadiusFrom::User) {
+        return Ok(plan);
+    }
+    let trial = run(gpu, scene, view, &plan, &limits)?;
+    ScenePlan::with_trial(scene, view.geometry, settings, sensor, &limits, Some(trial))
+}
+
+fn run(gpu: &Gpu, scene: &Scene, view: &View, run: &ScenePlan, limits: &Limits) -> Result<Trial> {
+    let settings = SceneSettings {
+        photons: PHOTONS,
+        caustic_photons: PHOTONS,
+        rounds: 1,
+        seed: bias::seed(SEED, 0),
+        // Parts of a picture have the radii of the whole, so that they add up to it.
+        part: Part::All,
+        stop: Stop::default(),
+        ..run.settings.clone()
+    };
+    let most_points = (POINTS / run.points_per_pixel).max(1);
+    let (sensor, phases) = match run.sensor {
+        Sensor::Picture { width, height } => {
+            let smaller = (f64::from(most_points) / (f64::from(width) * f64::from(height))).sqrt().min(1.0);
+            let length = |length: u32| ((f64::from(length) * smaller) as u32).max(1);
+            (Sensor::Picture { width: length(width), height: length(height) }, Vec::new())
+        }
+        Sensor::Receivers { .. } => {
+            let all = &view.phases[0];
+            let some: Vec<_> = all.iter().step_by(all.len().div_ceil(most_points as usize)).copied().collect();
+            (Sensor::Receivers { count: some.len() as u32 }, vec![some])
+        }
+    };
+    let plan = ScenePlan::new(scene, view.geometry, &settings, sensor, limits)?;
+
+    // All pipelines of the run, which they are made for, but where it shows a part alone.
+    gpu.prepare(&[modules(&plan, gpu.facts()), vec![Clearance::MODULE]].concat(), &constants(&plan))?;
+    let began = Instant::now();
+    let mut commands = Commands::new(gpu, constants(&plan), began)?;
+    let resources = SceneResources::new(gpu, &mut commands, view.geometry, &plan, &phases)?;
+    let round = Round { resources: &resources, geometry: view.geometry, plan: &plan, number: 0 };
+    points::see(&mut commands, round, view.camera)?;
+    let point_count = plan.visible_points();
+    let clearances = gpu.buffer::<f32>("clearances", u64::from(point_count), Memory::Device)?;
+    let SceneResources { nodes, triangles, planes, visible_points, .. } = &resources;
+    let kernel = Clearance { nodes, triangles, planes, visible_points, clearances: &clearances };
+    commands.dispatch(kernel, &ClearancePush { point_count }, Extent::Items(u64::from(point_count)))?;
+    let visible_points = commands.read::<VisiblePoint>(visible_points, point_count as usize)?;
+    let clearances = commands.read::<f32>(&clearances, point_count as usize)?;
+
+    let mut trial = Trial::default();
+    let mut largest = 0.0;
+    for of_run in run.maps() {
+        let Some(map) = plan.maps().find(|map| map.caustic_only == of_run.caustic_only) else { continue };
+        let asked: Vec<usize> = (0..visible_points.len()).filter(|point| visible_points[*point].arrivals & map.stored != 0).collect();
+        trial.points = trial.points.max(asked.len() as u32);
+        if of_run.radius_from == RadiusFrom::User || asked.is_empty() {
+            continue;
+        }
+        let found = photons_of(&mut commands, round, map)?;
+        let wanted = if map.caustic_only { CAUSTIC_PHOTONS_AT_POINT } else { PHOTONS_AT_POINT };
+        let own: Vec<f64> = asked
+            .par_iter()
+            .map(|point| own_radius(&visible_points[*point], &found, &view.geometry.planes, of_run.photons, wanted))
+            .collect();
+        let clear: Vec<f64> = asked.iter().map(|point| f64::from(clearances[*point])).collect();
+        let by_area = area_radius(view.geometry, of_run.photons, map.caustic_only);
+        let radius = radius(&own, &clear, by_area);
+        *(if map.caustic_only { &mut trial.caustic_radius } else { &mut trial.global_radius }) = Some(radius);
+        if radius > largest {
+            largest = radius;
+            trial.too_wide = clear.iter().filter(|clear| **clear < radius).count() as f64 / clear.len() as f64;
+        }
+    }
+    gpu.check_validation()?;
+    trial.seconds = began.elapsed().as_secs_f64();
+    Ok(trial)
+}
+
+/// The photons that a map holds of a round.
+fn photons_of(commands: &mut Commands, round: Round, map: &MapPlan) -> Result<Vec<MapPhoton>> {
+    let buffers = round.resources.photons.as_ref().expect("a map has photons");
+    let mut found = Vec::new();
+    let mut take = |commands: &mut Commands| {
+        let count = commands.read::<u32>(&buffers.counters, 1)?[0].min(map.capacity);
+        found.extend(commands.read::<MapPhoton>(&buffers.map, count as usize)?);
+        Ok(())
+    };
+    for chunk in map.chunks() {
+        photons::trace(commands, round, buffers, map, chunk, &mut take)?;
+    }
+    Ok(found)
+}
+
+/// The radius around a point within which a round of so many photons is to leave `wanted`; infinite where too few photons are
+/// about to tell.
+fn own_radius(point: &VisiblePoint, photons: &[MapPhoton], planes: &[Vec4], photons_of_run: u32, wanted: f64) -> f64 {
+    // Squared distances, ascending.
+    let mut nearest = [f32::INFINITY; NEAREST];
+    for photon in photons {
+        let squared = photon.position.distance_squared(point.position);
+        if squared < nearest[NEAREST - 1] && belongs(point, photon.plane, planes, squared.sqrt()) {
+            let place = nearest.partition_point(|other| *other <= squared);
+            nearest[place..].rotate_right(1);
+            nearest[place] = squared;
+        }
+    }
+    // The disc up to the k-th of some points at random holds k - 1/3 in the median.
+    let of_trial = (NEAREST as f64 - 1.0 / 3.0) * f64::from(photons_of_run) / f64::from(PHOTONS);
+    (f64::from(nearest[NEAREST - 1]) * wanted / of_trial).sqrt()
+}
+
+/// Whether a photon counts at a point. Twin of `belongs` in `glsl/gather/belongs.glsl`.
+fn belongs(point: &VisiblePoint, plane: u32, planes: &[Vec4], radius: f32) -> bool {
+    let normal = |plane: u32| planes[plane as usize / 2].truncate() * if plane.is_multiple_of(2) { 1.0 } else { -1.0 };
+    let (own, other) = (normal(point.plane), normal(plane));
+    let height = planes[plane as usize / 2].dot(point.position.extend(1.0));
+    plane == point.plane || (own.dot(other) >= 0.75 && height.abs() <= radius * own.cross(other).length() + 1.0 / 4_194_304.0)
+}
+
+/// The radius for all points, from those that each would have for itself and from their clearances.
+fn radius(own: &[f64], clear: &[f64], by_area: f64) -> f64 {
+    let median = |values: Vec<f64>| {
+        let mut steps: Vec<i32> = values.into_iter().map(|value| (STEPS * value.log2()).round().clamp(-1e6, 1e6) as i32).collect();
+        steps.sort_unstable();
+        steps.get(steps.len() / 2).map(|steps| f64::from(*steps))
+    };
+    let reached = median(own.iter().copied().filter(|radius| *radius <= REACH * by_area).collect());
+    // Where no photon came near, the scene's area is all that is known.
+    let steps = reached.unwrap_or((STEPS * by_area.log2()).round());
+    let room = median(clear.iter().map(|clear| CLEARANCE_SHARE * clear).collect()).unwrap_or(f64::INFINITY);
+    // The median point of a caustic lies at its faint rim: what is wider than by the area is wider than need be.
+    (steps.min(room) / STEPS).exp2().min(by_area).clamp(RADIUS_RANGE.0, MAX_DEFAULT_RADIUS)
+}
+
+#[cfg(test)]
+mod tests {
+    use glam::Vec3;
+
+    use super::*;
+
+    #[test]
+    fn radii_are_medians_in_steps_and_no_wider_than_the_room() {
+        let step = |k: i32| (f64::from(k) / STEPS).exp2();
+        let (near, far) = (step(-20), step(-24));
+        let own = [near, 1.01 * near, 0.99 * near, far, f64::INFINITY];
+        let clear = [1.0; 5];
+        assert_eq!(radius(&own, &clear, 0.05), near);
+        // Points that no photon is near do not count, nor does the order.
+        assert_eq!(radius(&[f64::INFINITY, f64::INFINITY, 0.99 * near], &clear, 0.05), near);
+        assert_eq!(radius(&[f64::INFINITY], &clear, near), near);
+        assert_eq!(radius(&own, &[4.0 * far; 5], 0.05), far);
+    }
+
+    /// Photons on a grid of a plane have a density that is known; those of another plane do not count.
+    #[test]
+    fn a_points_own_radius_holds_as_many_photons_of_the_run_as_wanted() {
+        let planes = [Vec4::new(0.0, 0.0, 1.0, 0.0), Vec4::new(0.0, 0.0, 1.0, -0.001)];
+        let side = 256;
+        let place = |i: usize| (i as f32 + 0.5) / side as f32 - 0.5;
+        let photon = |i: usize, plane: u32, height: f32| MapPhoton {
+            position: Vec3::new(place(i % side), place(i / side), height),
+            plane,
+            flux: Vec3::ONE,
+            wi: 0,
+        };
+        let photons: Vec<MapPhoton> = (0..side * side).flat_map(|i| [photon(i, 0, 0.0), photon(i, 2, 0.001)]).collect();
+        let point = VisiblePoint { position: Vec3::ZERO, plane: 0, ..bytemuck::Zeroable::zeroed() };
+        let found = own_radius(&point, &photons, &planes, 4 * PHOTONS, 60.0);
+        let exact = (60.0 / (std::f64::consts::PI * 4.0 * (side * side) as f64)).sqrt();
+        assert!((found / exact - 1.0).abs() < 0.3, "{found}, {exact}");
+        assert_eq!(own_radius(&point, &photons[..3], &planes, PHOTONS, 60.0), f64::INFINITY);
+    }
+}

@@ -1,0 +1,36 @@
+//! What a map's photons lose to limits, and how many photons the map has held, while kernels count them
+//! (`glsl/ledger/totals.glsl`).
+
+use crate::constants::{TALLY_COPIES, TOTAL_FLUX_BITS, TOTAL_WORDS};
+use crate::error::Result;
+use crate::gpu::{Buffer, Commands, Gpu, Memory};
+use crate::ledger::Totals;
+
+/// Words of the buffer.
+pub const WORDS: u64 = TOTAL_WORDS as u64 * TALLY_COPIES as u64;
+
+pub fn buffer(gpu: &Gpu, name: &'static str) -> Result<Buffer> {
+    gpu.buffer::<u32>(name, WORDS, Memory::Device)
+}
+
+pub fn clear(commands: &mut Commands, totals: &Buffer) {
+    commands.fill(totals, 0, WORDS, 0);
+}
+
+/// What [`WORDS`] words of a buffer count, copies added up.
+pub fn sum(words: &[u32]) -> Totals {
+    let wide = |low: u32, high: u32| u64::from(low) | u64::from(high) << 32;
+    let mut sum = Totals { stored: wide(words[14], words[15]), ..Totals::default() };
+    let (mut cut, mut clamped) = ([0u64; 3], [0u64; 3]);
+    for copy in words.chunks_exact(TOTAL_WORDS as usize) {
+        sum.cut_off += u64::from(copy[0]);
+        sum.clamped += u64::from(copy[1]);
+        for channel in 0..3 {
+            cut[channel] += wide(copy[2 + 2 * channel], copy[3 + 2 * channel]);
+            clamped[channel] += wide(copy[8 + 2 * channel], copy[9 + 2 * channel]);
+        }
+    }
+    let flux = |sums: [u64; 3]| sums.map(|sum| sum as f64 / f64::from(1u32 << TOTAL_FLUX_BITS));
+    (sum.cut_flux, sum.clamped_flux) = (flux(cut), flux(clamped));
+    sum
+}

@@ -1,0 +1,189 @@
+//! How close every pass comes to the device's limits (roofline).
+//!
+//! [`rates`] measures what the device can do, [`room`] and [`scene`] time the passes of both lines beside what
+//! they cannot do without ([`pass`]), [`experiments`] runs the workloads that the targets name ([`targets`]), and [`scale`]
+//! follows cost and memory over photons and triangles.
+
+pub mod accuracy;
+pub mod chart;
+pub mod experiment;
+pub mod experiments;
+pub mod pass;
+pub mod rates;
+pub mod room;
+pub mod scale;
+pub mod scene;
+pub mod table;
+pub mod targets;
+
+use std::sync::atomic::{AtomicBool, Ordering};
+use std::time::{Duration, Instant};
+
+use serde::Serialize;
+
+use crate::error::{Error, Result};
+use crate::gpu::Gpu;
+use crate::measure::compaction::{self, Map};
+use crate::measure::study::chart::alone;
+use crate::output::destination::{Folder, write_all};
+use experiment::Experiment;
+use pass::Pass;
+use rates::Rates;
+use scale::Scale;
+use targets::Finding;
+
+/// How large the workloads are.
+#[derive(Debug, Clone, Copy, PartialEq, Eq, Serialize)]
+#[serde(rename_all = "lowercase")]
+pub enum Size {
+    /// Seconds on a software device.
+    Small,
+    /// Those of the targets; on a software device smaller ones, minutes in all.
+    Full,
+}
+
+/// What is asked for.
+#[derive(Debug, Clone, Serialize)]
+pub struct Request {
+    /// What repeats it.
+    pub command: String,
+    pub size: Size,
+    #[serde(skip)]
+    pub experiments: Vec<Experiment>,
+    /// Follow cost over photons and triangles instead.
+    #[serde(skip)]
+    pub scale: bool,
+    /// Wall time after which no further experiment begins.
+    #[serde(skip)]
+    pub budget: Duration,
+}
+
+/// Everything that was found.
+#[derive(Debug, Serialize)]
+pub struct Bench {
+    pub photonmill: &'static str,
+    pub request: Request,
+    pub device: String,
+    pub driver: String,
+    pub vulkan: String,
+    pub rates: Rates,
+    pub passes: Vec<Pass>,
+    pub targets: Vec<Finding>,
+    /// The fastest builder of the paper's box by photon count and survival.
+    pub compaction: Option<Map>,
+    pub scale: Option<Scale>,
+    /// What was not measured, and why.
+    pub left_out: Vec<String>,
+}
+
+/// What experiments share.
+pub struct Lab<'a> {
+    pub gpu: &'a Gpu,
+    pub rates: Rates,
+    pub size: Size,
+    pub deadline: Instant,
+    pub cancelled: &'a AtomicBool,
+    pub tell: &'a mut dyn FnMut(&str),
+}
+
+impl Lab<'_> {
+    /// Whether workloads are cut to what a processor does.
+    pub fn is_cpu(&self) -> bool {
+        self.gpu.facts().kind == "cpu"
+    }
+
+    /// The number for a small run, for a processor, and for a card.
+    pub fn choose<T>(&self, small: T, on_cpu: T, full: T) -> T {
+        match (self.size, self.is_cpu()) {
+            (Size::Small, _) => small,
+            (Size::Full, true) => on_cpu,
+            (Size::Full, false) => full,
+        }
+    }
+
+    /// Fails once the bench is interrupted.
+    pub fn go_on(&self) -> Result<()> {
+        if self.cancelled.load(Ordering::Relaxed) { Err(Error::Interrupted) } else { Ok(()) }
+    }
+
+    pub fn is_late(&self) -> bool {
+        Instant::now() >= self.deadline
+    }
+}
+
+/// Measures the device, then the experiments that are asked for. Experiments that were complete when it was
+/// interrupted are kept.
+pub fn run(gpu: &Gpu, request: Request, cancelled: &AtomicBool, tell: &mut dyn FnMut(&str)) -> Result<Bench> {
+    room::check_clock(gpu)?;
+    let deadline = Instant::now() + request.budget;
+    tell("limits of the device");
+    let rates = rates::measure(gpu, request.size)?;
+    let mut lab = Lab { gpu, rates, size: request.size, deadline, cancelled, tell };
+    let facts = gpu.facts();
+    let mut bench = Bench {
+        photonmill: env!("CARGO_PKG_VERSION"),
+        device: facts.name.clone(),
+        driver: facts.driver.clone(),
+        vulkan: facts.vulkan.clone(),
+        rates,
+        passes: Vec::new(),
+        targets: Vec::new(),
+        compaction: None,
+        scale: None,
+        left_out: Vec::new(),
+        request,
+    };
+    match measure(&mut lab, &mut bench) {
+        Err(Error::Interrupted) => bench.left_out.push("the remaining experiments: interrupted".to_owned()),
+        result => result?,
+    }
+    Ok(bench)
+}
+
+fn measure(lab: &mut Lab, bench: &mut Bench) -> Result<()> {
+    if bench.request.scale {
+        bench.scale = Some(scale::measure(lab, &mut bench.left_out)?);
+        return Ok(());
+    }
+    for (number, experiment) in bench.request.experiments.clone().into_iter().enumerate() {
+        lab.go_on()?;
+        if lab.is_late() {
+            bench.left_out.push(format!("{}: no --time left", experiment.name()));
+            continue;
+        }
+        (lab.tell)(&format!("[{}/{}] {}", number + 1, bench.request.experiments.len(), experiment.title()));
+        match experiments::run(lab, experiment) {
+            Ok(mut results) => {
+                bench.passes.append(&mut results.passes);
+                bench.targets.append(&mut results.findings);
+                bench.compaction = bench.compaction.take().or(results.compaction);
+            }
+            // What this device cannot do is no reason to end.
+            Err(Error::Setting { option, value, allowed }) => {
+                bench.left_out.push(format!("{}: {option} {value} {allowed}", experiment.name()));
+            }
+            Err(error) => return Err(error),
+        }
+    }
+    Ok(())
+}
+
+impl Bench {
+    pub fn json(&self) -> Vec<u8> {
+        let mut text = serde_json::to_vec_pretty(self).expect("a bench is plain data");
+        text.push(b'\n');
+        text
+    }
+}
+
+/// Writes the report and its charts.
+pub fn write(folder: &Folder, bench: &Bench) -> Result<()> {
+    let mut files = vec![(folder.file("bench.json"), bench.json()), (folder.file("bench.txt"), table::text(bench).into_bytes())];
+    if let Some(map) = &bench.compaction {
+        files.push((folder.file("compaction.svg"), alone(&compaction::chart::draw(map)).into_bytes()));
+    }
+    if let Some(scale) = &bench.scale {
+        files.extend(chart::all(scale).into_iter().map(|(name, drawn)| (folder.file(&name), drawn.into_bytes())));
+    }
+    write_all(files)
+}

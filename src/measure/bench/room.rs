@@ -1,0 +1,259 @@
+//! Times of the paper's box: rounds of one builder, pass by pass, beside the least work that each pass needs.
+
+use std::sync::atomic::AtomicBool;
+
+use super::pass::{Cost, Pass, SLOW_OPERATION, Work, rounds_of, sum_of_outermost};
+use super::rates::{PHILOX_PRODUCTS, Rates};
+use crate::engine::Control;
+use crate::engine::room::{self, RunResult};
+use crate::error::{Error, Result};
+use crate::gpu::{Gpu, HeldMemory};
+use crate::ledger::Fates;
+use crate::path::StoredPath;
+use crate::photon::StoredPhoton;
+use crate::plan::RoomPlan;
+use crate::plan::memory::{block_sum_counts, group_count};
+use crate::records::Point;
+use crate::rng::Rng;
+use crate::scene::open_box::open_box;
+use crate::settings::{Builder, RoomSettings};
+use crate::timings::Spread;
+
+/// What photons did in a round, on average over all.
+#[derive(Debug, Clone, Copy, PartialEq)]
+pub struct Counts {
+    pub emitted: f64,
+    /// Paths that entered a bounce.
+    pub flights: f64,
+    /// Flights that ended on a wall: photon-wall events.
+    pub events: f64,
+    /// Events that a wall reflected; in a scene of triangles, those after which a path went on.
+    pub survivors: f64,
+}
+
+impl Counts {
+    pub fn of(fates: &Fates, rounds: u32) -> Counts {
+        let sum = |count: &dyn Fn(usize) -> u64| (0..fates.bounces.len()).map(count).sum::<u64>() as f64 / f64::from(rounds.max(1));
+        let bounces = &fates.bounces;
+        Counts {
+            emitted: fates.emitted as f64 / f64::from(rounds.max(1)),
+            flights: sum(&|bounce| if bounce == 0 { fates.emitted } else { bounces[bounce - 1].stored }),
+            events: sum(&|bounce| bounces[bounce].stored + bounces[bounce].absorbed),
+            survivors: sum(&|bounce| bounces[bounce].stored),
+        }
+    }
+}
+
+/// A run under the clock.
+pub struct Timed {
+    pub passes: Vec<Pass>,
+    pub counts: Counts,
+    /// Of a round, all passes together.
+    pub round_ms: f64,
+    /// Of the run on the device, buffers' content and all.
+    pub run_ms: f64,
+    /// The same on the host's clock.
+    pub wall_ms: f64,
+    /// Of a round.
+    pub dispatches: f64,
+    pub memory: HeldMemory,
+    pub stated_bytes: u64,
+    /// Counters that places were taken from in turn; 1 but in the paper's atomic builder.
+    pub counters: u32,
+}
+
+impl Timed {
+    pub fn pass(&self, name: &str) -> Option<&Pass> {
+        self.passes.iter().find(|pass| pass.name == name)
+    }
+
+    pub fn ms(&self, name: &str) -> f64 {
+        self.pass(name).map_or(f64::NAN, |pass| pass.ms.median)
+    }
+
+    /// Milliseconds that a pass takes at least.
+    pub fn limit_ms(&self, name: &str) -> Option<f64> {
+        self.pass(name)?.limit.map(|limit| limit.ms)
+    }
+
+    /// The same of all outermost passes together.
+    pub fn limit_of_round(&self) -> Option<f64> {
+        self.passes.iter().filter(|pass| !pass.name.contains('/')).map(|pass| pass.limit.map(|limit| limit.ms)).sum()
+    }
+}
+
+/// Rounds that count.
+pub const REPEATS: u32 = 7;
+/// Rounds before them: the first fills caches.
+pub const DROPPED: u32 = 1;
+
+/// Fails where nothing can be timed, or the run was interrupted.
+pub fn check_clock(gpu: &Gpu) -> Result<()> {
+    if gpu.facts().timestamp_bits == 0 {
+        return Err(Error::setting("--device", &gpu.facts().name, "has no timestamps, so its passes cannot be timed; choose another"));
+    }
+    Ok(())
+}
+
+fn run_once(gpu: &Gpu, settings: &RoomSettings, cancelled: &AtomicBool) -> Result<RunResult> {
+    let outcome = room::on_gpu(gpu, &open_box(settings), settings, &mut Control { cancelled, progress: &mut |_| {} })?;
+    if outcome.cancelled { Err(Error::Interrupted) } else { Ok(outcome) }
+}
+
+/// Times the passes of a builder: [`REPEATS`] rounds of one run, after [`DROPPED`] others.
+pub fn time(gpu: &Gpu, rates: &Rates, settings: &RoomSettings, cancelled: &AtomicBool) -> Result<Timed> {
+    let rounds = DROPPED + REPEATS;
+    gpu.forget_peaks();
+    let outcome = run_once(gpu, &RoomSettings { rounds, ..settings.clone() }, cancelled)?;
+    Ok(timed(gpu, rates, &outcome, rounds, DROPPED))
+}
+
+/// Times a run as it is, all rounds; a first one is dropped.
+pub fn time_run(gpu: &Gpu, rates: &Rates, settings: &RoomSettings, cancelled: &AtomicBool) -> Result<Vec<Timed>> {
+    let mut runs = Vec::new();
+    for _ in 0..=REPEATS {
+        gpu.forget_peaks();
+        let outcome = run_once(gpu, settings, cancelled)?;
+        runs.push(timed(gpu, rates, &outcome, settings.rounds, 0));
+    }
+    Ok(runs.split_off(1))
+}
+
+fn timed(gpu: &Gpu, rates: &Rates, outcome: &RunResult, rounds: u32, first: u32) -> Timed {
+    let plan = &outcome.plan;
+    let counts = Counts::of(&outcome.fates, rounds);
+    let found = photons_per_point(outcome) / f64::from(rounds);
+    let scopes = rounds_of(&outcome.timings, rounds, first);
+    let workload = workload(plan);
+    let passes = scopes
+        .iter()
+        .filter_map(|(name, ms)| Some(Pass::new(&workload, name, Spread::of(ms.clone())?, work(name, plan, &counts, found), rates)))
+        .collect();
+    let sum = |scope: &str| outcome.timings.row(scope).and_then(|row| row.gpu_ms).unwrap_or(0.0);
+    Timed {
+        passes,
+        counts,
+        round_ms: sum_of_outermost(&scopes),
+        run_ms: sum("set-up") + sum("round"),
+        wall_ms: outcome.timings.row("run").and_then(|row| row.wall_ms).unwrap_or(f64::NAN),
+        dispatches: outcome.dispatches as f64 / f64::from(rounds),
+        memory: gpu.held_memory(),
+        stated_bytes: plan.bytes(),
+        counters: plan.counters,
+    }
+}
+
+fn workload(plan: &RoomPlan) -> String {
+    let RoomSettings { builder, photons, bounces, radius, .. } = &plan.settings;
+    let counters = if plan.counters > 1 { format!(" by {} counters", plan.counters) } else { String::new() };
+    format!("open box, {}{counters}, {photons} photons, {bounces} bounces, radius {radius} m", builder.name())
+}
+
+/// Photons within the radius of a point, of all rounds: without Phong weights the first sum of a point counts them.
+fn photons_per_point(outcome: &RunResult) -> f64 {
+    let plan = &outcome.plan;
+    let sums = outcome.film.sums.iter().step_by(plan.channel_count as usize);
+    sums.map(|sum| *sum as f64).sum::<f64>() / plan.film_scale() / plan.points.len() as f64
+}
+
+fn bytes<T>() -> f64 {
+    size_of::<T>() as f64
+}
+
+/// A point and the photon's position on a disc, a direction (two roots, sine and cosine), its turn into the wall's frame.
+const EMISSION_OPERATIONS: f64 = 5.0 * SLOW_OPERATION + 40.0;
+/// Three planes, the point on the nearest, the roulette, a direction, its turn into the wall's frame.
+const FLIGHT_OPERATIONS: f64 = 7.0 * SLOW_OPERATION + 32.0;
+/// Squared distance, two comparisons, a sum.
+const PAIR_OPERATIONS: f64 = 11.0;
+/// A photon's place among those of its cell.
+pub const RANK_BYTES: f64 = 4.0;
+/// Of rand48: one product to 64 bits and two to 32 a draw.
+const RAND48_PRODUCTS: f64 = 3.0;
+
+/// Products of random numbers of `draws` draws that lie in one block.
+fn products(rng: Rng, draws: f64) -> f64 {
+    match rng {
+        Rng::Philox => PHILOX_PRODUCTS as f64,
+        Rng::Rand48 => RAND48_PRODUCTS * draws,
+        // Mostly shifts; not counted.
+        Rng::Mt | Rng::Sobol => 0.0,
+    }
+}
+
+/// What a pass of the paper's line cannot do without in a round.
+///
+/// `found` photons lie within the radius of a point; `None` for what nobody has counted.
+pub fn work(pass: &str, plan: &RoomPlan, counts: &Counts, found: f64) -> Option<Work> {
+    let settings = &plan.settings;
+    let slots = counts.emitted * f64::from(settings.bounces);
+    let (cells, points) = (f64::from(plan.grid.cells()), plan.points.len() as f64);
+    // Entries of the map that the index reads: the naive builder's with the empty ones.
+    let entries = if plan.has_slots() { slots } else { counts.survivors };
+    // Where an invocation keeps a photon to its end, no path is written and read again.
+    let path = if settings.builder == Builder::Persistent { 0.0 } else { bytes::<StoredPath>() };
+    let emit = Cost {
+        bytes: counts.emitted * (path + if settings.rng == Rng::Rand48 { 8.0 } else { 0.0 }),
+        float_operations: counts.emitted * EMISSION_OPERATIONS,
+        integer_products: counts.emitted * products(settings.rng, 4.0),
+    };
+    let bounces = Cost {
+        bytes: match settings.builder {
+            // Every slot is read and written at every bounce, alive or not; after the last one nobody asks for paths.
+            Builder::Naive => slots * (path + bytes::<StoredPhoton>()) + (slots - counts.emitted) * path,
+            // Survivors' paths are written where they were read, and read again once their places are known; of the dead
+            // only the word is read that says so.
+            Builder::Scan => {
+                counts.flights * (path + 16.0)
+                    + counts.survivors * (2.0 * path - 16.0 + bytes::<StoredPhoton>())
+                    + (counts.flights - counts.emitted) * path
+            }
+            _ => counts.flights * path + counts.survivors * bytes::<StoredPhoton>() + (counts.flights - counts.emitted) * path,
+        },
+        float_operations: counts.flights * FLIGHT_OPERATIONS,
+        integer_products: counts.flights * products(settings.rng, 3.0),
+    };
+    // Each entry's place in its cell is written, and read for sorting.
+    let count = Cost { bytes: entries * (bytes::<StoredPhoton>() + RANK_BYTES) + cells * 4.0, ..Cost::default() };
+    // Each level is read and written, and once more with the sums of the level above; the upper levels are small.
+    let scan = Cost { bytes: cells * 16.0, ..Cost::default() };
+    let sort =
+        Cost { bytes: entries * (bytes::<StoredPhoton>() + RANK_BYTES) + counts.survivors * bytes::<StoredPhoton>(), ..Cost::default() };
+    let gather = Cost {
+        bytes: counts.survivors * bytes::<StoredPhoton>() + points * (bytes::<Point>() + 16.0 * f64::from(plan.channel_count)),
+        float_operations: points * found * PAIR_OPERATIONS,
+        ..Cost::default()
+    };
+    let film = Cost { bytes: points * f64::from(plan.channel_count) * 64.0, ..Cost::default() };
+    let work = |item, items, dispatches, cost| Some(Work { item, items, dispatches, cost });
+    // Before each dispatch whose size only the device knows, one that works it out.
+    let sized = |dispatches: f64| if plan.has_slots() { 0.0 } else { dispatches };
+    let chunks = f64::from(plan.chunks_per_round);
+    let emits = chunks * plan.light_photons.len() as f64;
+    let bounce_count = f64::from(settings.bounces);
+    // Down the levels of a prefix sum and up again.
+    let scans_of = |items: u32| 2.0 * block_sum_counts(u64::from(items) + 1, settings.group_size).len() as f64 - 1.0;
+    let flights = match settings.builder {
+        Builder::Persistent => 0.0,
+        Builder::Naive => chunks * bounce_count,
+        // In place, moved together in order, and counted.
+        Builder::Scan => chunks * bounce_count * (3.0 + scans_of(group_count(plan))),
+        // Stored where they belong, gaps marked where there are any, and counted.
+        _ => chunks * bounce_count * if plan.counters > 1 { 3.0 } else { 2.0 },
+    };
+    let scans = chunks * scans_of(plan.grid.cells());
+    let counting = chunks * (1.0 + sized(1.0));
+    let slicing = if plan.slices_candidates { 2.0 } else { 0.0 };
+    match pass {
+        "build" => work("events", counts.events, emits + flights, emit + bounces),
+        "build/emit" => work("photons", counts.emitted, emits, emit),
+        "build/bounce" => work("events", counts.events, flights, bounces),
+        "index" if plan.gathers_by_grid() => work("photons", counts.survivors, counting + scans + chunks, count + scan + sort),
+        "index/count" => work("photons", counts.survivors, counting, count),
+        "index/scan" => work("cells", cells, scans, scan),
+        "index/sort" if plan.gathers_by_grid() => work("photons", counts.survivors, chunks, sort),
+        "gather" => work("photons found", points * found, chunks * (1.0 + slicing), gather),
+        "film" => work("sums", points * f64::from(plan.channel_count), 1.0, film),
+        _ => None,
+    }
+}

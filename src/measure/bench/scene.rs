@@ -1,0 +1,279 @@
+//! Times of a scene of triangles: rounds, pass by pass, beside the least work that each pass needs.
+
+use std::f64::consts::PI;
+use std::sync::atomic::AtomicBool;
+use std::time::Instant;
+
+use rayon::prelude::*;
+
+use super::pass::{Cost, Pass, SLOW_OPERATION, Work, rounds_of, sum_of_outermost};
+use super::rates::{PHILOX_PRODUCTS, Rates};
+use super::room::{Counts, DROPPED, RANK_BYTES, REPEATS, Timed};
+use crate::engine;
+use crate::engine::Control;
+use crate::engine::scene::resources::SceneResources;
+use crate::engine::scene::{self, End, Round, RunResult, View, photons, points};
+use crate::error::{Error, Result};
+use crate::gpu::{Commands, Gpu};
+use crate::ledger::Fates;
+use crate::photon::MapPhoton;
+use crate::plan::memory::block_sum_counts;
+use crate::plan::scene::{MapPlan, ScenePlan};
+use crate::plan::sensor::Sensor;
+use crate::records::{LightPath, VisiblePoint};
+use crate::scene::geometry::Geometry;
+use crate::scene::{Camera, Scene};
+use crate::settings::Builder;
+use crate::settings::scene::{Effect, SceneSettings};
+use crate::timings::Spread;
+
+/// A scene, what looks at it, and how.
+pub struct Job<'a> {
+    pub name: &'a str,
+    pub scene: &'a Scene,
+    pub geometry: &'a Geometry,
+    pub size: (u32, u32),
+    pub settings: SceneSettings,
+}
+
+impl Job<'_> {
+    pub fn plan(&self, gpu: &Gpu, settings: &SceneSettings) -> Result<ScenePlan> {
+        let (width, height) = self.size;
+        let sensor = Sensor::Picture { width, height };
+        ScenePlan::new(self.scene, self.geometry, settings, sensor, &engine::limits(gpu.facts()))
+    }
+
+    /// A run to its end.
+    pub fn light(&self, gpu: &Gpu, settings: SceneSettings, cancelled: &AtomicBool) -> Result<RunResult> {
+        let plan = self.plan(gpu, &settings)?;
+        let camera = self.camera();
+        let view = View { geometry: self.geometry, camera: Some(&camera), phases: &[] };
+        let lit = scene::light(gpu, &view, plan, &mut Control { cancelled, progress: &mut |_| {} })?;
+        if lit.end == End::Cancelled { Err(Error::Interrupted) } else { Ok(lit) }
+    }
+
+    fn camera(&self) -> Camera {
+        self.scene.cameras.first().cloned().unwrap_or_else(|| {
+            let (min, max) = self.scene.bounds();
+            Camera::around(min, max)
+        })
+    }
+}
+
+/// What a map of the first round holds.
+#[derive(Debug, Clone, Copy, PartialEq)]
+pub struct Survey {
+    /// Entries of the map.
+    pub stored: f64,
+    /// Entries within the radius of a visible point and on its plane, on average over those that ask.
+    pub per_estimate: f64,
+    pub asking_points: f64,
+}
+
+/// Traces the first round's photons of a map and looks at it from the host.
+pub fn survey(gpu: &Gpu, job: &Job, map: impl Fn(&ScenePlan) -> Option<&MapPlan>) -> Result<Option<Survey>> {
+    let plan = job.plan(gpu, &job.settings)?;
+    let Some(map) = map(&plan) else { return Ok(None) };
+    let mut commands = Commands::new(gpu, scene::constants(&plan), Instant::now())?;
+    let resources = SceneResources::new(gpu, &mut commands, job.geometry, &plan, &[])?;
+    let buffers = resources.photons.as_ref().expect("there is a map");
+    let round = Round { resources: &resources, geometry: job.geometry, plan: &plan, number: 0 };
+    points::see(&mut commands, round, Some(&job.camera()))?;
+    let seen = commands.read::<VisiblePoint>(&resources.visible_points, plan.visible_points() as usize)?;
+    let asking: Vec<VisiblePoint> = seen.into_iter().filter(|point| point.arrivals & map.stored != 0).collect();
+    let step = (asking.len() / SAMPLES).max(1);
+    let radius_squared = plan.radius(map, 0).powi(2) as f32;
+    let (mut stored, mut found) = (0u64, 0u64);
+    let mut look = |commands: &mut Commands| {
+        let length = commands.read::<u32>(&buffers.counters, 1)?[0];
+        let photons = commands.read::<MapPhoton>(&buffers.map, length as usize)?;
+        stored += u64::from(length);
+        found += asking
+            .par_iter()
+            .step_by(step)
+            .map(|point| {
+                let near =
+                    |photon: &&MapPhoton| photon.plane == point.plane && photon.position.distance_squared(point.position) <= radius_squared;
+                photons.iter().filter(near).count() as u64
+            })
+            .sum::<u64>();
+        Ok(())
+    };
+    for chunk in map.chunks() {
+        photons::trace(&mut commands, round, buffers, map, chunk, &mut look)?;
+    }
+    let samples = asking.len().div_ceil(step).max(1);
+    Ok(Some(Survey { stored: stored as f64, per_estimate: found as f64 / samples as f64, asking_points: asking.len() as f64 }))
+}
+
+/// Visible points of a survey.
+const SAMPLES: usize = 256;
+
+/// Times the passes of a scene: [`REPEATS`] rounds of one run, after [`DROPPED`] others. Radii stay. On a
+/// card the fastest of [`RUNS`] counts: its clock may fall for a second or so by what others do on the same machine.
+pub fn time(gpu: &Gpu, rates: &Rates, job: &Job, cancelled: &AtomicBool) -> Result<Timed> {
+    let runs = if gpu.facts().kind == "cpu" { 1 } else { RUNS };
+    let mut best: Option<Timed> = None;
+    for _ in 0..runs {
+        let timed = time_once(gpu, rates, job, cancelled)?;
+        if best.as_ref().is_none_or(|best| timed.round_ms < best.round_ms) {
+            best = Some(timed);
+        }
+    }
+    Ok(best.expect("there was a run"))
+}
+
+const RUNS: u32 = 3;
+
+fn time_once(gpu: &Gpu, rates: &Rates, job: &Job, cancelled: &AtomicBool) -> Result<Timed> {
+    let run = |rounds: u32| job.light(gpu, SceneSettings { alpha: 1.0, rounds, ..job.settings.clone() }, cancelled);
+    let rounds = DROPPED + REPEATS;
+    gpu.forget_peaks();
+    let lit = run(rounds)?;
+    let memory = gpu.held_memory();
+    let surveys = [survey(gpu, job, |plan| plan.global.as_ref())?, survey(gpu, job, |plan| plan.caustic.as_ref())?];
+    let counts = lit.fates.each_ref().map(|fates: &Fates| Counts::of(fates, rounds));
+    let model = Model { job, plan: &lit.plan, counts, surveys };
+    let scopes = rounds_of(&lit.timings, rounds, DROPPED);
+    let workload = format!("{}, {}, {} triangles", job.name, lit.plan.builder().name(), job.geometry.triangles.len());
+    let passes =
+        scopes.iter().filter_map(|(name, ms)| Some(Pass::new(&workload, name, Spread::of(ms.clone())?, model.work(name), rates))).collect();
+    let sum = |scope: &str| lit.timings.row(scope).and_then(|row| row.gpu_ms).unwrap_or(0.0);
+    Ok(Timed {
+        passes,
+        counts: counts[0],
+        round_ms: sum_of_outermost(&scopes),
+        run_ms: sum("set-up") + sum("round"),
+        wall_ms: lit.timings.row("run").and_then(|row| row.wall_ms).unwrap_or(f64::NAN),
+        dispatches: lit.dispatches as f64 / f64::from(rounds),
+        memory,
+        stated_bytes: lit.plan.bytes,
+        counters: 1,
+    })
+}
+
+/// A node of the hierarchy: six planes of eight children, a product and a sum each, and the nearest and farthest of them.
+const NODE_OPERATIONS: f64 = 8.0 * 6.0 * 3.0;
+const TRIANGLE_OPERATIONS: f64 = 30.0;
+/// A point on an emitter and a direction; a surface's frame, a lobe and the roulette.
+const EMISSION_OPERATIONS: f64 = 5.0 * SLOW_OPERATION + 40.0;
+const SCATTER_OPERATIONS: f64 = 5.0 * SLOW_OPERATION + 40.0;
+/// Squared distance, plane and normal of a pair, its share in three channels.
+const PAIR_OPERATIONS: f64 = 24.0;
+/// Of a shadow ray: a point on a lamp, its distance, two cosines.
+const LIGHT_OPERATIONS: f64 = 3.0 * SLOW_OPERATION + 20.0;
+/// Of a visible point's light at the end of a round: area of the disc and three channels.
+const WEIGH_OPERATIONS: f64 = 4.0 * SLOW_OPERATION + 20.0;
+
+struct Model<'a> {
+    job: &'a Job<'a>,
+    plan: &'a ScenePlan,
+    /// Of the global map and of the caustic map.
+    counts: [Counts; 2],
+    surveys: [Option<Survey>; 2],
+}
+
+fn bytes<T>() -> f64 {
+    size_of::<T>() as f64
+}
+
+impl Model<'_> {
+    /// A ray that meets one leaf of a hierarchy as full as can be; nodes and triangles are taken to stay in caches.
+    fn ray_operations(&self) -> f64 {
+        let triangles = self.job.geometry.triangles.len() as f64;
+        if !self.plan.keeps(Effect::Bvh) {
+            return triangles * TRIANGLE_OPERATIONS;
+        }
+        (triangles / 3.0).log(8.0).ceil().max(1.0) * NODE_OPERATIONS + TRIANGLE_OPERATIONS
+    }
+
+    /// What a pass cannot do without in a round.
+    fn work(&self, pass: &str) -> Option<Work> {
+        let work = |item, items, cost| Some(Work { item, items, dispatches: 1.0, cost });
+        let pixels = f64::from(self.plan.sensor.pixels());
+        let samples = pixels * f64::from(self.plan.samples());
+        let points = f64::from(self.plan.visible_points());
+        let sums = 24.0 * points * f64::from(self.plan.arrival_sets);
+        match pass {
+            "visible points" => {
+                let shadow_rays = f64::from(self.plan.constant("SHADOW_RAYS"));
+                let cost = Cost {
+                    bytes: samples * 24.0 + points * bytes::<VisiblePoint>(),
+                    float_operations: samples * ((1.0 + shadow_rays) * self.ray_operations() + shadow_rays * LIGHT_OPERATIONS),
+                    // Where a path starts, and where its shadow rays end.
+                    integer_products: samples * 2.0 * PHILOX_PRODUCTS as f64,
+                };
+                work("samples", samples, cost)
+            }
+            "flux to radiance" => {
+                let cost = Cost {
+                    bytes: points * (bytes::<VisiblePoint>() + 24.0) + sums,
+                    float_operations: points * WEIGH_OPERATIONS,
+                    ..Cost::default()
+                };
+                work("points", points, cost)
+            }
+            // Sums and squares are read and written.
+            "resolve" => {
+                let read = if self.plan.maps().next().is_some() { points + samples } else { samples };
+                work("pixels", pixels, Cost { bytes: 24.0 * read + pixels * 2.0 * 72.0, ..Cost::default() })
+            }
+            _ => {
+                let (map, stage) = pass.split_once('/').unwrap_or((pass, ""));
+                let which = self.plan.maps().find(|known| known.name == map)?;
+                self.work_of_map(which, stage)
+            }
+        }
+    }
+
+    fn work_of_map(&self, map: &MapPlan, stage: &str) -> Option<Work> {
+        let which = usize::from(map.caustic_only);
+        let (counts, survey) = (self.counts[which], self.surveys[which]?);
+        let buckets = f64::from(map.bucket_count);
+        let persistent = self.plan.builder() == Builder::Persistent;
+        // Where an invocation keeps a photon to its end, no path is written and read again.
+        let path = if persistent { 0.0 } else { bytes::<LightPath>() };
+        let trace = Cost {
+            bytes: (counts.emitted + counts.flights + counts.survivors) * path + survey.stored * bytes::<MapPhoton>(),
+            float_operations: counts.emitted * EMISSION_OPERATIONS
+                + counts.flights * self.ray_operations()
+                + counts.events * SCATTER_OPERATIONS,
+            integer_products: (2.0 * counts.emitted + counts.events) * PHILOX_PRODUCTS as f64,
+        };
+        // Photons are counted by their first half and numbered; counts of buckets are cleared, and twice read and written; then
+        // photons are read again and written in order.
+        let count = Cost { bytes: survey.stored * (0.5 * bytes::<MapPhoton>() + RANK_BYTES) + 4.0 * buckets, ..Cost::default() };
+        let scan = Cost { bytes: 16.0 * buckets, ..Cost::default() };
+        let sort = Cost { bytes: survey.stored * (2.0 * bytes::<MapPhoton>() + RANK_BYTES), ..Cost::default() };
+        let found = survey.asking_points * survey.per_estimate;
+        let gather = Cost {
+            bytes: survey.stored * bytes::<MapPhoton>() + survey.asking_points * (bytes::<VisiblePoint>() + 48.0),
+            float_operations: found * PAIR_OPERATIONS,
+            ..Cost::default()
+        };
+        let chunks = map.chunks().count() as f64;
+        // Emission, and flights with what works out the sizes of all but the first: of the first segment, which all have.
+        let flights = chunks * if persistent { 1.0 } else { 2.0 * f64::from(map.segment_bounces) };
+        // A prefix sum goes down its levels and up again.
+        let scans = chunks * (2.0 * block_sum_counts(u64::from(map.bucket_count) + 1, self.plan.settings.group_size).len() as f64 - 1.0);
+        let sorts = 3.0 * chunks + scans;
+        let gathers = chunks * 3.0;
+        let (item, items, dispatches, cost) = match stage {
+            "" => ("photons", counts.emitted, flights + sorts + gathers, trace + count + scan + sort + gather),
+            "trace" => ("events", counts.events, flights, trace),
+            "index" => ("photons", survey.stored, sorts, count + scan + sort),
+            "index/count" => ("photons", survey.stored, 2.0 * chunks, count),
+            "index/scan" => ("cells", buckets, scans, scan),
+            "index/sort" => ("photons", survey.stored, chunks, sort),
+            "gather" => ("photons found", found, gathers, gather),
+            _ => return None,
+        };
+        Some(Work { item, items, dispatches, cost })
+    }
+}
+
+/// Radius, metres, at which a map of so many entries spread over a scene's surfaces gives so many an estimate.
+pub fn radius_for(geometry: &Geometry, survey: &Survey, radius: f64, wanted: f64) -> f64 {
+    let by_area = (wanted * geometry.area / (PI * survey.stored.max(1.0))).sqrt() * geometry.unit;
+    if survey.per_estimate > 0.0 { radius * (wanted / survey.per_estimate).sqrt() } else { by_area }
+}

@@ -1,0 +1,6 @@
+//! What photonmill costs: benchmarks, builders compared, accuracy against time, and the paper's tables.
+
+pub mod bench;
+pub mod compaction;
+pub mod paper;
+pub mod study;

@@ -1,0 +1,174 @@
+//! The bench on which experiments run: the device if there is one, else the CPU builder; and the
+//! statistics of repeated runs.
+
+use std::sync::atomic::{AtomicBool, Ordering};
+use std::time::{Duration, Instant};
+
+use crate::engine::Control;
+use crate::engine::room::{self, RunResult};
+use crate::error::{Error, Result};
+use crate::gpu::Gpu;
+use crate::scene::open_box::open_box;
+use crate::settings::{Builder, RoomSettings};
+use crate::text::counted;
+
+/// Why no further experiment runs.
+pub enum Stop {
+    Cancelled,
+    Failed(Error),
+}
+
+pub type Step<T> = std::result::Result<T, Stop>;
+
+impl From<Error> for Stop {
+    fn from(error: Error) -> Stop {
+        Stop::Failed(error)
+    }
+}
+
+/// What the times were measured on.
+#[derive(Debug, Clone)]
+pub struct Machine {
+    /// `None` without Vulkan.
+    pub device: Option<Device>,
+    /// The host's processor.
+    pub cpu: String,
+}
+
+#[derive(Debug, Clone)]
+pub struct Device {
+    pub name: String,
+    pub driver: String,
+    pub has_timestamps: bool,
+    /// A software device, whose 'GPU' is the CPU.
+    pub is_cpu: bool,
+}
+
+pub struct Bench<'a> {
+    gpu: Option<&'a Gpu>,
+    cancelled: &'a AtomicBool,
+    /// Told one line an experiment.
+    progress: &'a mut dyn FnMut(&str),
+    begun: usize,
+    expected: usize,
+}
+
+/// A case is not repeated once its runs have taken this long.
+pub const PATIENCE: Duration = Duration::from_secs(6);
+
+impl<'a> Bench<'a> {
+    pub fn new(gpu: Option<&'a Gpu>, cancelled: &'a AtomicBool, progress: &'a mut dyn FnMut(&str)) -> Bench<'a> {
+        Bench { gpu, cancelled, progress, begun: 0, expected: 0 }
+    }
+
+    pub fn has_gpu(&self) -> bool {
+        self.gpu.is_some()
+    }
+
+    /// The builder that stands for `builder` here.
+    pub fn available(&self, builder: Builder) -> Builder {
+        if self.has_gpu() { builder } else { Builder::Cpu }
+    }
+
+    pub fn machine(&self) -> Machine {
+        let device = self.gpu.map(Gpu::facts).map(|facts| Device {
+            name: facts.name.clone(),
+            driver: facts.driver.clone(),
+            has_timestamps: facts.timestamp_bits > 0,
+            is_cpu: facts.kind == "cpu",
+        });
+        Machine { device, cpu: processor() }
+    }
+
+    /// Sets how many experiments there will be.
+    pub fn expect(&mut self, experiments: usize) {
+        self.expected = experiments;
+    }
+
+    /// Begins an experiment, unless the user has had enough.
+    pub fn begin(&mut self, title: &str) -> Step<()> {
+        if self.cancelled.load(Ordering::Relaxed) {
+            return Err(Stop::Cancelled);
+        }
+        self.begun += 1;
+        (self.progress)(&format!("[{}/{}] {title}", self.begun, self.expected));
+        Ok(())
+    }
+
+    /// One run to its last photon.
+    pub fn run(&self, settings: &RoomSettings) -> Step<RunResult> {
+        let outcome = self.run_once(settings)?;
+        if outcome.cancelled { Err(Stop::Cancelled) } else { Ok(outcome) }
+    }
+
+    fn run_once(&self, settings: &RoomSettings) -> Result<RunResult> {
+        let scene = open_box(settings);
+        let mut control = Control { cancelled: self.cancelled, progress: &mut |_| {} };
+        match (settings.builder, self.gpu) {
+            (Builder::Cpu, _) | (_, None) => room::on_cpu(&scene, settings, &mut control),
+            (_, Some(gpu)) => room::on_gpu(gpu, &scene, settings, &mut control),
+        }
+    }
+
+    /// `repeats` runs of every case after one that is dropped, as it makes pipelines and fills caches; in turn, so that a
+    /// clock that drifts touches all alike. A case that is slow is repeated less, and one whose first run alone is slow
+    /// keeps that.
+    pub fn repeat_interleaved(&self, cases: &[RoomSettings], repeats: usize) -> Step<Vec<Vec<RunResult>>> {
+        let mut first = Vec::new();
+        let mut spent = Vec::new();
+        for settings in cases {
+            let began = Instant::now();
+            first.push(self.run(settings)?);
+            spent.push(began.elapsed());
+        }
+        let mut outcomes = vec![Vec::new(); cases.len()];
+        for _ in 0..repeats {
+            for (case, settings) in cases.iter().enumerate().filter(|(case, _)| spent[*case] < PATIENCE).collect::<Vec<_>>() {
+                let began = Instant::now();
+                outcomes[case].push(self.run(settings)?);
+                spent[case] += began.elapsed();
+            }
+        }
+        for (outcomes, first) in outcomes.iter_mut().zip(first) {
+            if outcomes.is_empty() {
+                outcomes.push(first);
+            }
+        }
+        Ok(outcomes)
+    }
+}
+
+/// The host's processor, as Linux calls it; elsewhere its architecture.
+fn processor() -> String {
+    let threads = std::thread::available_parallelism().map_or(1, usize::from);
+    let listed = std::fs::read_to_string("/proc/cpuinfo").unwrap_or_default();
+    let model = listed.lines().find_map(|line| line.strip_prefix("model name")?.split_once(": ").map(|(_, name)| name.trim().to_owned()));
+    format!("{}, {}", model.unwrap_or_else(|| std::env::consts::ARCH.to_owned()), counted(threads, "thread"))
+}
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+
+    #[test]
+    fn a_cancelled_bench_begins_nothing() {
+        let cancelled = AtomicBool::new(true);
+        let mut lines = 0;
+        let mut count = |_: &str| lines += 1;
+        let mut bench = Bench::new(None, &cancelled, &mut count);
+        assert!(matches!(bench.begin("figure 1"), Err(Stop::Cancelled)));
+        assert_eq!(lines, 0);
+    }
+
+    #[test]
+    fn the_first_run_is_dropped() {
+        let cancelled = AtomicBool::new(false);
+        let bench_settings = RoomSettings { builder: Builder::Cpu, photons: 10, mesh: 2, ..RoomSettings::default() };
+        let mut silent = |_: &str| {};
+        let bench = Bench::new(None, &cancelled, &mut silent);
+        let Ok(outcomes) = bench.repeat_interleaved(&[bench_settings.clone(), bench_settings], 3) else {
+            panic!("a run of ten photons fails")
+        };
+        assert_eq!(outcomes.iter().map(Vec::len).collect::<Vec<_>>(), [3, 3]);
+    }
+}

@@ -1,0 +1,351 @@
+//! The paper's times, measured again: both passes by builder (section 4.3), and the whole run by
+//! photon count (table 1).
+
+use super::bench::{Bench, Step};
+use super::{Reproduction, Request, published};
+use crate::engine::room::RunResult;
+use crate::output::command;
+use crate::output::words;
+use crate::rng::Rng;
+use crate::settings::{Builder, Gather, Preset, RoomSettings};
+use crate::text::counted;
+use crate::timings::Clock;
+use crate::timings::Spread;
+
+/// Who builds the photon map.
+#[derive(Debug, Clone, Copy, PartialEq, Eq)]
+pub struct Implementation {
+    pub builder: Builder,
+    /// Threads of the CPU builder.
+    pub threads: usize,
+}
+
+impl Implementation {
+    pub fn of(builder: Builder) -> Implementation {
+        Implementation { builder, threads: 1 }
+    }
+
+    pub fn name(self) -> String {
+        match self.threads {
+            1 => self.builder.name().to_owned(),
+            threads => format!("{} x{threads}", self.builder.name()),
+        }
+    }
+}
+
+/// One combination of section 4.3's comparison.
+#[derive(Debug, Clone, Copy, PartialEq, Eq)]
+pub struct Case {
+    pub photons: u32,
+    pub bounces: u32,
+    pub implementation: Implementation,
+    pub gather: Gather,
+}
+
+/// The paper's two passes.
+#[derive(Debug, Clone, Copy, PartialEq, Eq)]
+pub enum Pass {
+    /// Emission and bounces: the photon map.
+    Map,
+    /// Density estimation at every point of the mesh, building the grid included where there is one.
+    Rendering,
+}
+
+impl Pass {
+    pub fn name(self) -> &'static str {
+        match self {
+            Pass::Map => "map",
+            Pass::Rendering => "rendering",
+        }
+    }
+}
+
+/// One pass of one case, measured.
+#[derive(Debug, Clone)]
+pub struct RunningTime {
+    pub photons: u32,
+    pub bounces: u32,
+    pub implementation: Implementation,
+    pub pass: Pass,
+    /// `None` for the map pass, which comes before any gathering.
+    pub gather: Option<Gather>,
+    pub clock: Clock,
+    pub ms: Spread,
+    /// Photons that the map holds.
+    pub stored: u64,
+    pub command: String,
+}
+
+/// A whole run, for table 1.
+#[derive(Debug, Clone)]
+pub struct TotalTime {
+    pub photons_per_round: u32,
+    pub rounds: u32,
+    pub gather: Gather,
+    /// Rounds on the device; `None` on the CPU builder and on devices without timestamps.
+    pub gpu_ms: Option<f64>,
+    /// The run from its first buffer to its film.
+    pub wall_ms: f64,
+    pub command: String,
+}
+
+/// An experiment that was not run because it would take too long, and its predicted time.
+#[derive(Debug, Clone)]
+pub struct LeftOut {
+    pub what: String,
+    pub predicted_ms: f64,
+}
+
+/// A rendering pass that is predicted to take longer is left out.
+pub const LONGEST_PASS_MS: f64 = 20_000.0;
+/// A row that is shorter is run once before it counts, as it makes pipelines.
+const SHORT_TOTAL_MS: f64 = 1_000.0;
+/// Runs whose median counts at the large size, at most.
+pub const LARGE_REPEATS: usize = 3;
+const BOUNCES: [u32; 2] = [published::BOUNCES, 15];
+
+/// Experiments that [`running_times`] and [`totals`] will announce, unless some are left out.
+pub fn count(bench: &Bench, request: &Request) -> usize {
+    cases(bench, request).len() + series(request).len() * published::TABLE_1.len()
+}
+
+impl Case {
+    fn settings(&self) -> RoomSettings {
+        RoomSettings {
+            builder: self.implementation.builder,
+            threads: self.implementation.threads,
+            photons: self.photons,
+            bounces: self.bounces,
+            gather: self.gather,
+            ..at_size(Preset::Modified, self.photons)
+        }
+    }
+
+    fn title(&self) -> String {
+        let Case { photons, bounces, implementation, gather } = self;
+        format!(
+            "{} photons, {bounces} bounces, {}, {} gather",
+            words::count(u64::from(*photons)),
+            implementation.name(),
+            command::gather_name(*gather)
+        )
+    }
+}
+
+/// The paper's settings at another photon count. Rand48 is dealt out by leap-frogging, which a count
+/// with a large power of two makes almost regular, so the large size has the counter-based generator.
+fn at_size(preset: Preset, photons: u32) -> RoomSettings {
+    let paper = RoomSettings::preset(preset);
+    let rng = if photons == paper.photons { paper.rng } else { Rng::Philox };
+    RoomSettings { photons, rng, full_light: paper.full_light_for(photons), ..paper }
+}
+
+/// Small before large, as the small ones predict the large.
+fn cases(bench: &Bench, request: &Request) -> Vec<Case> {
+    let mut implementations = Vec::new();
+    if bench.has_gpu() {
+        // The paper's two, and its second with one atomic a subgroup.
+        implementations.extend([Builder::Naive, Builder::Atomic, Builder::Ballot].map(Implementation::of));
+    }
+    implementations.push(Implementation::of(Builder::Cpu));
+    if request.threads > 1 {
+        implementations.push(Implementation { builder: Builder::Cpu, threads: request.threads });
+    }
+    let mut cases = Vec::new();
+    for photons in [published::PHOTONS, request.large] {
+        for bounces in BOUNCES {
+            for gather in [Gather::Grid, Gather::Brute] {
+                let too_much = photons == request.large && gather == Gather::Brute && bounces != published::BOUNCES;
+                if !too_much {
+                    cases.extend(implementations.iter().map(|&implementation| Case { photons, bounces, implementation, gather }));
+                }
+            }
+        }
+    }
+    cases
+}
+
+/// Both passes of every case. Builders are measured in turn, the GPU's apart from the CPU's, during which a card idles.
+pub fn running_times(bench: &mut Bench, found: &mut Reproduction) -> Step<()> {
+    let all = cases(bench, &found.request);
+    let alike = |a: &Case, b: &Case| {
+        (a.photons, a.bounces, a.gather, a.implementation.builder == Builder::Cpu)
+            == (b.photons, b.bounces, b.gather, b.implementation.builder == Builder::Cpu)
+    };
+    for group in all.chunk_by(alike) {
+        let mut measured = Vec::new();
+        for case in group {
+            bench.begin(&case.title())?;
+            match predicted(case, found).filter(|ms| *ms > LONGEST_PASS_MS) {
+                Some(predicted_ms) => found.passes_left_out.push(LeftOut { what: case.title(), predicted_ms }),
+                None => measured.push(case),
+            }
+        }
+        let is_large = group[0].photons == found.request.large;
+        let repeats = if is_large { found.request.repeats.min(LARGE_REPEATS) } else { found.request.repeats };
+        let settings: Vec<RoomSettings> = measured.iter().map(|case| case.settings()).collect();
+        let outcomes = bench.repeat_interleaved(&settings, repeats)?;
+        for ((case, settings), outcomes) in measured.iter().zip(&settings).zip(&outcomes) {
+            let command = command::main_job(Preset::Modified, settings);
+            // The map does not depend on the gather, and is timed where the gather disturbs least.
+            if case.gather == Gather::Grid {
+                found.running_times.extend(running_time(case, Pass::Map, outcomes, &command));
+            }
+            found.running_times.extend(running_time(case, Pass::Rendering, outcomes, &command));
+        }
+    }
+    Ok(())
+}
+
+/// `None` on a device without timestamps: passes inside a submission are not seen by the host.
+fn running_time(case: &Case, pass: Pass, outcomes: &[RunResult], command: &str) -> Option<RunningTime> {
+    let scopes: &[&str] = match pass {
+        Pass::Map => &["round/build"],
+        Pass::Rendering => &["round/index", "round/gather"],
+    };
+    // Brute force has no index, nor has the CPU builder's splatting.
+    let has_run = |outcome: &RunResult, scope: &str| outcome.timings.row(scope).is_some();
+    let sum = |outcome: &RunResult| {
+        scopes.iter().filter(|scope| has_run(outcome, scope)).map(|scope| outcome.timings.best_ms(scope)).sum::<Option<f64>>()
+    };
+    let first = outcomes.first()?;
+    Some(RunningTime {
+        photons: case.photons,
+        bounces: case.bounces,
+        implementation: case.implementation,
+        pass,
+        gather: (pass == Pass::Rendering).then_some(case.gather),
+        clock: if first.device.is_some() { Clock::Gpu } else { Clock::Wall },
+        ms: Spread::of(outcomes.iter().map(sum).collect::<Option<Vec<f64>>>()?)?,
+        stored: first.fates.ledger().stored,
+        command: command.to_owned(),
+    })
+}
+
+/// Length of the rendering pass at another size: pair tests grow with the photon list, and those a
+/// second are known from the paper's size.
+fn predicted(case: &Case, found: &Reproduction) -> Option<f64> {
+    let known = found.running_time(published::PHOTONS, case.bounces, case.implementation, Pass::Rendering, Some(case.gather))?;
+    Some(known.ms.median * f64::from(case.photons) / f64::from(published::PHOTONS))
+}
+
+/// (photons of a round, gather) of the rows of table 1.
+fn series(request: &Request) -> [(u32, Gather); 3] {
+    [(published::PHOTONS, Gather::Brute), (published::PHOTONS, Gather::Grid), (request.large, Gather::Grid)]
+}
+
+/// Whole runs of table 1's rounds.
+pub fn totals(bench: &mut Bench, found: &mut Reproduction) -> Step<()> {
+    for (photons, gather) in series(&found.request) {
+        // Wall time of a round, by the latest row.
+        let mut a_round = None;
+        for (rounds, _) in published::TABLE_1 {
+            let builder = bench.available(Builder::Atomic);
+            let settings = RoomSettings { builder, rounds, gather, ..at_size(Preset::Rounds, photons) };
+            let title = format!(
+                "{} photons as {} of {}, {} gather",
+                words::count(settings.total_photons()),
+                counted(rounds, "round"),
+                words::count(u64::from(photons)),
+                command::gather_name(gather)
+            );
+            bench.begin(&title)?;
+            if let Some(predicted_ms) = a_round.map(|ms| ms * f64::from(rounds)).filter(|ms| *ms > found.request.longest_ms) {
+                found.totals_left_out.push(LeftOut { what: title, predicted_ms });
+                continue;
+            }
+            if a_round.is_none_or(|ms| ms * f64::from(rounds) < SHORT_TOTAL_MS) {
+                // It makes pipelines.
+                bench.run(&settings)?;
+            }
+            let outcome = bench.run(&settings)?;
+            let row = |name: &str| outcome.timings.row(name);
+            let wall_ms = row("run").and_then(|row| row.wall_ms).expect("a run has its wall time");
+            let gpu_ms = row("round").and_then(|row| row.gpu_ms);
+            a_round = Some(wall_ms / f64::from(rounds));
+            let command = command::main_job(Preset::Rounds, &settings);
+            found.totals.push(TotalTime { photons_per_round: photons, rounds, gather, gpu_ms, wall_ms, command });
+        }
+    }
+    Ok(())
+}
+
+impl Reproduction {
+    pub fn running_time(
+        &self,
+        photons: u32,
+        bounces: u32,
+        implementation: Implementation,
+        pass: Pass,
+        gather: Option<Gather>,
+    ) -> Option<&RunningTime> {
+        self.running_times.iter().find(|time| {
+            (time.photons, time.bounces, time.implementation, time.pass, time.gather) == (photons, bounces, implementation, pass, gather)
+        })
+    }
+
+    /// Median of a pass, milliseconds.
+    pub fn median_ms(&self, photons: u32, bounces: u32, implementation: Implementation, pass: Pass, gather: Option<Gather>) -> Option<f64> {
+        self.running_time(photons, bounces, implementation, pass, gather).map(|time| time.ms.median)
+    }
+
+    /// (photons, bounces) that were measured, in order.
+    pub fn sizes(&self) -> [(u32, u32); 4] {
+        let [few, many] = BOUNCES;
+        let (small, large) = (published::PHOTONS, self.request.large);
+        [(small, few), (small, many), (large, few), (large, many)]
+    }
+
+    /// Builders that were measured, in order.
+    pub fn implementations(&self) -> Vec<Implementation> {
+        let mut implementations: Vec<Implementation> = Vec::new();
+        for time in &self.running_times {
+            if !implementations.contains(&time.implementation) {
+                implementations.push(time.implementation);
+            }
+        }
+        implementations
+    }
+
+    /// Rows of table 1 with one size of round and one gather.
+    pub fn totals_of(&self, photons_per_round: u32, gather: Gather) -> impl Iterator<Item = &TotalTime> {
+        self.totals.iter().filter(move |total| (total.photons_per_round, total.gather) == (photons_per_round, gather))
+    }
+}
+
+impl RunningTime {
+    /// What the paper measured for the same: two bounces, brute force.
+    pub fn published_ms(&self) -> Option<f64> {
+        let comparable = self.photons == published::PHOTONS
+            && self.bounces == published::BOUNCES
+            && self.implementation.threads == 1
+            && self.gather != Some(Gather::Grid);
+        let passes = match self.pass {
+            Pass::Map => published::MAP_MS,
+            Pass::Rendering => published::RENDERING_MS,
+        };
+        match self.implementation.builder {
+            _ if !comparable => None,
+            Builder::Naive => Some(passes.naive),
+            Builder::Atomic => Some(passes.modified),
+            Builder::Cpu => Some(passes.cpu),
+            _ => None,
+        }
+    }
+}
+
+impl TotalTime {
+    pub fn photons(&self) -> u64 {
+        u64::from(self.photons_per_round) * u64::from(self.rounds)
+    }
+
+    /// The device's time, else the host's.
+    pub fn best_ms(&self) -> f64 {
+        self.gpu_ms.unwrap_or(self.wall_ms)
+    }
+
+    /// What the paper measured for the same rounds.
+    pub fn published_ms(&self) -> Option<f64> {
+        (self.photons_per_round == published::PHOTONS).then(|| published::total_ms(self.rounds)).flatten()
+    }
+}

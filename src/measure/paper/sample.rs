@@ -1,0 +1,72 @@
+//! A reproduction with made-up times, for the tests of what is said of it.
+
+use super::bench::{Device, Machine};
+use super::experiments::{Implementation, LeftOut, Pass, RunningTime, TotalTime};
+use super::figures::Figure;
+use super::{Reproduction, Request, published};
+use crate::output::command;
+use crate::settings::{Builder, Gather, Preset, RoomSettings};
+use crate::timings::Clock;
+use crate::timings::Spread;
+
+const LARGE: u32 = 65_536;
+
+pub fn reproduction() -> Reproduction {
+    Reproduction {
+        machine: Machine {
+            device: Some(Device { name: "a device".to_owned(), driver: "its driver".to_owned(), has_timestamps: true, is_cpu: true }),
+            cpu: "a processor".to_owned(),
+        },
+        request: Request { large: LARGE, repeats: 7, threads: 1, longest_ms: 90e3 },
+        figures: vec![Figure {
+            number: 1,
+            title: "a figure",
+            caption: "A caption.",
+            frames: Vec::new(),
+            width: 1,
+            height: 1,
+            png: vec![1, 2, 3],
+        }],
+        running_times: running_times(),
+        totals: totals(),
+        passes_left_out: Vec::new(),
+        totals_left_out: vec![LeftOut { what: "a long run".to_owned(), predicted_ms: 100_000.0 }],
+        complete: true,
+    }
+}
+
+fn running_times() -> Vec<RunningTime> {
+    let mut times = Vec::new();
+    for photons in [published::PHOTONS, LARGE] {
+        for bounces in [published::BOUNCES, 15] {
+            for builder in [Builder::Naive, Builder::Atomic, Builder::Ballot, Builder::Cpu] {
+                let passes = [(Pass::Map, None), (Pass::Rendering, Some(Gather::Brute)), (Pass::Rendering, Some(Gather::Grid))];
+                times.extend(passes.map(|(pass, gather)| RunningTime {
+                    photons,
+                    bounces,
+                    implementation: Implementation::of(builder),
+                    pass,
+                    gather,
+                    clock: if builder == Builder::Cpu { Clock::Wall } else { Clock::Gpu },
+                    ms: Spread { median: f64::from(photons) / 1000.0, min: 0.5, max: 100.0, repeats: 7 },
+                    stored: u64::from(photons),
+                    command: command::main_job(Preset::Modified, &RoomSettings { builder, photons, ..RoomSettings::default() }),
+                }));
+            }
+        }
+    }
+    times
+}
+
+fn totals() -> Vec<TotalTime> {
+    let series = [(published::PHOTONS, Gather::Brute), (published::PHOTONS, Gather::Grid), (LARGE, Gather::Grid)];
+    let total = |photons: u32, rounds: u32, gather: Gather| TotalTime {
+        photons_per_round: photons,
+        rounds,
+        gather,
+        gpu_ms: Some(f64::from(rounds)),
+        wall_ms: f64::from(rounds) + 1.0,
+        command: command::main_job(Preset::Rounds, &RoomSettings { photons, rounds, gather, ..RoomSettings::preset(Preset::Rounds) }),
+    };
+    series.into_iter().flat_map(|(photons, gather)| published::TABLE_1.map(|(rounds, _)| total(photons, rounds, gather))).collect()
+}

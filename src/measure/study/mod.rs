@@ -1,0 +1,274 @@
+//! What accuracy costs in time: error against time on this device, for every option.
+//!
+//! A study runs each configuration of each axis ([`axes`]) at numbers of rounds that double, several times with seeds of
+//! their own, compares the results with a reference from another method ([`mod@reference`]), and writes what it found
+//! as a page, CSV, JSON and SVG. Points that are finished are kept ([`store`]), so that a study that was cut off goes on
+//! where it ended.
+
+pub mod axes;
+pub mod chart;
+pub mod findings;
+pub mod page;
+pub mod point;
+pub mod reference;
+pub mod store;
+pub mod subject;
+
+use std::sync::atomic::{AtomicBool, Ordering};
+use std::time::{Duration, Instant};
+
+use serde::Serialize;
+
+use crate::error::{Error, Result};
+use crate::gpu::{Gpu, clock};
+use crate::measure::compaction;
+use crate::output::destination::{Folder, write_all};
+use crate::scene::Scene;
+use axes::{Axis, Group};
+use point::{Curve, Point};
+use store::Store;
+use subject::Subject;
+
+/// What is asked for.
+#[derive(Debug, Clone, PartialEq, Serialize)]
+pub struct Request {
+    /// As the user names it.
+    pub scene: String,
+    /// Pixels along each side of the picture, or texels along each wall of the paper's box.
+    pub size: u32,
+    /// Photons of a round, from which the axis of photons goes up and down.
+    pub photons: u32,
+    /// Runs of every point, each with a seed of its own.
+    pub repeats: u32,
+    pub seed: u64,
+    /// Samples a pixel of a path-traced reference.
+    pub reference_samples: u32,
+    /// Wall time of all measurements together, shared out evenly; not of the reference.
+    #[serde(skip)]
+    pub budget: Duration,
+    /// Rounds of the longest point, whatever time is left.
+    #[serde(skip)]
+    pub most_rounds: u32,
+}
+
+/// Everything that was found.
+#[derive(Debug, Serialize)]
+pub struct Study {
+    pub photonmill: &'static str,
+    pub request: Request,
+    pub device: String,
+    pub driver: String,
+    /// A software device, whose 'GPU' is the CPU.
+    pub is_cpu: bool,
+    pub parts: Vec<Part>,
+    /// The fastest builder by photon count and survival; for the open box only.
+    pub compaction: Option<compaction::Map>,
+    /// False if it was ended before its last point.
+    pub complete: bool,
+}
+
+/// One quantity and everything that was measured of it.
+#[derive(Debug, Serialize)]
+pub struct Part {
+    pub quantity: String,
+    /// Where the reference comes from and how well it is known.
+    pub reference: String,
+    /// Root mean square of the reference's own error over its root mean square.
+    pub reference_error: f64,
+    pub comparisons: Vec<Comparison>,
+}
+
+/// Curves that were measured in turn: the base, then its alternatives along an axis.
+#[derive(Debug, Serialize)]
+pub struct Comparison {
+    pub axis: Axis,
+    pub curves: Vec<Curve>,
+}
+
+/// Runs a study, and reports a line for each axis.
+pub fn run(
+    gpu: &Gpu,
+    scene: &Scene,
+    request: Request,
+    folder: &Folder,
+    cancelled: &AtomicBool,
+    tell: &mut dyn FnMut(&str),
+) -> Result<Study> {
+    let mut store = Store::open(folder, scene, &request, gpu.facts())?;
+    let mut study = Study {
+        photonmill: env!("CARGO_PKG_VERSION"),
+        device: gpu.facts().name.clone(),
+        driver: gpu.facts().driver.clone(),
+        is_cpu: gpu.facts().kind == "cpu",
+        parts: Vec::new(),
+        compaction: None,
+        complete: false,
+        request,
+    };
+    let subjects = Subject::all(gpu, scene, &study.request, cancelled, tell)?;
+    for points in subjects.iter().filter_map(Subject::points_file).take(1) {
+        write_all([(folder.file(subject::POINTS), points.into_bytes())])?;
+    }
+    let count: usize = subjects.iter().flat_map(|subject| &subject.groups).map(|group| group.configurations.len()).sum();
+    let of_builders = if subjects.iter().any(Subject::is_of_paper) { study.request.budget / COMPACTION_SHARE } else { Duration::ZERO };
+    let share = (study.request.budget - of_builders) / count.max(1) as u32;
+    clock::warm_up(gpu, FIRST_WARM_UP)?;
+    let mut begun = 0;
+    for subject in &subjects {
+        study.parts.push(Part {
+            quantity: subject.quantity.clone(),
+            reference: subject.reference.method.clone(),
+            reference_error: subject.reference.relative_error,
+            comparisons: Vec::new(),
+        });
+        for group in &subject.groups {
+            begun += group.configurations.len();
+            tell(&format!("[{begun}/{count}] {}: {}", subject.quantity, group.axis.name()));
+            let mut measuring = Measuring { gpu, subject, group, request: &study.request, share, cancelled, store: &mut store };
+            let (comparison, whole) = measuring.compare()?;
+            study.parts.last_mut().expect("pushed above").comparisons.push(comparison);
+            if !whole {
+                return Ok(study);
+            }
+        }
+    }
+    if !of_builders.is_zero() {
+        let request = &study.request;
+        let most = request.photons.saturating_mul(request.most_rounds).min(MOST_COMPACTED);
+        let wanted = compaction::Request::up_to(most, of_builders);
+        match compaction::measure(gpu, &wanted, cancelled, tell) {
+            Ok(map) => study.compaction = Some(map),
+            // What was measured before is worth its page.
+            Err(error) => tell(&format!("the comparison of builders was not measured: {error}")),
+        }
+        if cancelled.load(Ordering::Relaxed) {
+            return Ok(study);
+        }
+    }
+    study.complete = true;
+    Ok(study)
+}
+
+/// A group under measurement.
+struct Measuring<'a> {
+    gpu: &'a Gpu,
+    subject: &'a Subject,
+    group: &'a Group,
+    request: &'a Request,
+    /// Time for each configuration.
+    share: Duration,
+    cancelled: &'a AtomicBool,
+    store: &'a mut Store,
+}
+
+impl Measuring<'_> {
+    /// Points of every configuration at numbers of rounds that double until its share of time is spent, and whether
+    /// nobody ended it before.
+    fn compare(&mut self) -> Result<(Comparison, bool)> {
+        let mut curves: Vec<Curve> = self
+            .group
+            .configurations
+            .iter()
+            .map(|configuration| Curve { label: configuration.label.clone(), points: Vec::new(), left_out: None })
+            .collect();
+        let whole = self.climb(&mut curves)?;
+        Ok((Comparison { axis: self.group.axis, curves }, whole))
+    }
+
+    fn climb(&mut self, curves: &mut [Curve]) -> Result<bool> {
+        // First rounds, which no point holds.
+        let mut unmeasured = vec![Duration::ZERO; curves.len()];
+        for doublings in 0..=self.request.most_rounds.ilog2() as usize {
+            let rounds = 1 << doublings;
+            // Those that have time left for twice the photons of before, which take at most twice the time.
+            let going: Vec<usize> = (0..curves.len())
+                .filter(|which| {
+                    let Curve { points, left_out, .. } = &curves[*which];
+                    let spent: Duration = unmeasured[*which] + points.iter().map(Point::spent).sum::<Duration>();
+                    let next = points.last().map_or(Duration::ZERO, |last| 2 * last.spent());
+                    let allowed = rounds <= self.group.configurations[*which].most_rounds();
+                    left_out.is_none() && points.len() == doublings && allowed && spent + next <= self.share
+                })
+                .collect();
+            if !self.level(&going, rounds, curves, &mut unmeasured)? {
+                return Ok(false);
+            }
+        }
+        Ok(true)
+    }
+
+    /// Adds a point to each of these curves, their runs in turn; false if it was interrupted.
+    fn level(&mut self, going: &[usize], rounds: u32, curves: &mut [Curve], unmeasured: &mut [Duration]) -> Result<bool> {
+        let Measuring { gpu, subject, group, request, cancelled, share, .. } = *self;
+        let command = |which: usize| subject.command(&group.configurations[which], rounds, request.seed);
+        let known: Option<Vec<Point>> = going.iter().map(|which| self.store.find(group.axis, &command(*which))).collect();
+        if let Some(known) = known {
+            going.iter().zip(known).for_each(|(which, point)| curves[*which].points.push(point));
+            return Ok(true);
+        }
+        let mut shots = vec![Vec::new(); curves.len()];
+        // The first turn of all is dropped: it makes pipelines.
+        let first_turn = u64::from(going.iter().any(|which| !curves[*which].points.is_empty()));
+        for turn in first_turn..=u64::from(request.repeats) {
+            for which in going.iter().copied() {
+                if curves[which].left_out.is_some() {
+                    continue;
+                }
+                let began = Instant::now();
+                let (rounds, seed) = if turn == 0 { (1, request.seed) } else { (rounds, request.seed + turn - 1) };
+                match subject.run(gpu, &group.configurations[which], rounds, seed, cancelled) {
+                    Ok(Some(_)) if turn == 0 => {
+                        unmeasured[which] += began.elapsed();
+                        if began.elapsed() > PATIENCE.max(2 * share) {
+                            let seconds = began.elapsed().as_secs_f64();
+                            curves[which].left_out = Some(format!("one round takes {seconds:.1} s, too long for the budget"));
+                        }
+                    }
+                    Ok(Some(shot)) => shots[which].push((shot, began.elapsed())),
+                    Ok(None) => return Ok(false),
+                    // What this device cannot do is no reason to end the study.
+                    Err(Error::Setting { option, allowed, .. }) => curves[which].left_out = Some(format!("{option} {allowed}")),
+                    Err(error) => return Err(error),
+                }
+            }
+        }
+        for which in going.iter().copied().filter(|which| !shots[*which].is_empty()) {
+            let point = Point::of(&shots[which], &subject.reference, command(which), rounds);
+            self.store.keep(group.axis, &point)?;
+            curves[which].points.push(point);
+        }
+        Ok(true)
+    }
+}
+
+/// A card that idled while references were made takes longer to come to its clock than each run gives it.
+const FIRST_WARM_UP: Duration = Duration::from_secs(3);
+
+/// How long the first round of a configuration may take, pipelines and all, before it is left out; or twice its share of
+/// time, where that is longer.
+const PATIENCE: Duration = Duration::from_secs(5);
+
+/// Of the budget, for the map of builders, and most photons in it.
+const COMPACTION_SHARE: u32 = 8;
+const MOST_COMPACTED: u32 = 1 << 26;
+
+/// Most that [`Request::most_rounds`] may be.
+pub const MOST_ROUNDS: u32 = 1 << 20;
+
+/// Writes the page and its data.
+pub fn write(folder: &Folder, study: &Study) -> Result<()> {
+    let mut files = vec![
+        (folder.file("index.html"), page::html(study).into_bytes()),
+        (folder.file("study.json"), serde_json::to_vec_pretty(study).expect("a study is plain data")),
+        (folder.file("points.csv"), findings::csv(study)),
+    ];
+    for (number, part) in study.parts.iter().enumerate() {
+        for (name, drawn) in chart::all(part) {
+            files.push((folder.file(&format!("{}-{name}.svg", number + 1)), chart::alone(&drawn).into_bytes()));
+        }
+    }
+    if let Some(map) = &study.compaction {
+        files.push((folder.file("compaction.svg"), chart::alone(&compaction::chart::draw(map)).into_bytes()));
+    }
+    write_all(files)
+}

@@ -1,0 +1,198 @@
+//! The page: all results in one file that loads nothing.
+
+use maud::{DOCTYPE, Markup, PreEscaped, html};
+
+use super::findings::{self, Row, clock, equal_error, equal_time, percent};
+use super::point::{Curve, Point};
+use super::{Part, Study, chart};
+use crate::measure::compaction::{self, Map};
+use crate::output::words::{count, duration, number, times};
+
+pub fn html(study: &Study) -> String {
+    let page = html! {
+        (DOCTYPE)
+        html lang="en" {
+            head {
+                meta charset="utf-8";
+                meta name="viewport" content="width=device-width, initial-scale=1";
+                meta name="color-scheme" content="light dark";
+                title { "What accuracy costs in time: " (study.request.scene) }
+                style { (PreEscaped(include_str!("../../output/page.css"))) }
+            }
+            body {
+                main {
+                    (head(study))
+                    @for part in &study.parts {
+                        (of_part(part))
+                    }
+                    @if let Some(map) = &study.compaction {
+                        (of_builders(map))
+                    }
+                    (how(study))
+                }
+            }
+        }
+    };
+    page.into_string()
+}
+
+fn head(study: &Study) -> Markup {
+    let request = &study.request;
+    html! {
+        header {
+            h1 { "What accuracy costs in time: " (request.scene) }
+            p { "Relative RMS error against time, for every option of photonmill " (study.photonmill) " that applies to this scene." }
+            @if !study.complete {
+                p.notice { strong { "Incomplete." } " The study was interrupted. The same command continues it." }
+            }
+            @if study.is_cpu {
+                p.notice { strong { "This device is software." } " It runs Vulkan on the CPU, so 'GPU' times on this page are CPU times." }
+            }
+            dl {
+                dt { "Device" }
+                dd { (study.device) "; driver " (study.driver) }
+                dt { "Photons per round" }
+                dd { (count(u64::from(request.photons))) ", unless the configuration says otherwise" }
+                dt { "Runs per point" }
+                dd { (request.repeats) ", with seeds " (request.seed) " to " (request.seed + u64::from(request.repeats) - 1) }
+            }
+        }
+    }
+}
+
+fn of_builders(map: &Map) -> Markup {
+    html! {
+        section {
+            h2 { "Fastest builder by photon count and survival" }
+            p {
+                "Time to trace and store photons over " (map.bounces) " bounces in a closed room. At every wall a given share of the photons survives. "
+                "Each cell shows the fastest builder, its speed relative to one atomic per thread, and, below, the builders that are not significantly slower. "
+                "All builders gave the same result: bit-identical stored photons up to a million, and above that the same numbers of photons stored and absorbed at each bounce."
+            }
+            figure { (PreEscaped(compaction::chart::draw(map))) }
+            details {
+                summary { "All times" }
+                pre { (map.text()) }
+            }
+        }
+    }
+}
+
+fn of_part(part: &Part) -> Markup {
+    html! {
+        section {
+            h2 { (part.quantity) }
+            p { "Reference: " (part.reference) ". Its own error is " (percent(part.reference_error)) "; smaller errors in this section are not reliable." }
+            ul { @for sentence in part.sentences() { li { (sentence) } } }
+            @if let Some(drawn) = chart::overview(part) {
+                figure {
+                    div.scroll { (PreEscaped(drawn)) }
+                    figcaption { "All points. The line is the Pareto front: the points that no other point beats in both time and error." }
+                }
+            }
+            (front(part))
+            @if let Some((ms, rows)) = equal_time(part) {
+                (table(&format!("Error after {}", duration(ms)), "error", &rows, percent))
+            }
+            @if let Some((error, rows)) = equal_error(part) {
+                (table(&format!("Time to reach {}", percent(error)), "time", &rows, duration))
+            }
+            @for comparison in &part.comparisons {
+                h3 { (comparison.axis.name()) }
+                @if let Some(drawn) = chart::of_axis(&comparison.curves) {
+                    figure { div.scroll { (PreEscaped(drawn)) } }
+                }
+                @for curve in &comparison.curves { (points(curve)) }
+            }
+        }
+    }
+}
+
+fn front(part: &Part) -> Markup {
+    html! {
+        div.scroll {
+            table {
+                thead { tr { th.name { "Pareto front" } th { "rounds" } th { "time" } th { "error" } } }
+                tbody {
+                    @for (curve, point) in part.pareto_front() {
+                        tr { th scope="row" { (curve.label) } td { (point.rounds) } td { (duration(point.ms().value)) } td { (percent(point.error().value)) } }
+                    }
+                }
+            }
+        }
+    }
+}
+
+fn table(title: &str, what: &str, rows: &[Row], show: impl Fn(f64) -> String) -> Markup {
+    html! {
+        div.scroll {
+            table {
+                thead { tr { th.name { (title) } th { (what) } th { (findings::words_of_confidence()) " interval" } th { "relative to base" } } }
+                tbody {
+                    @for Row { name, value, ratio } in rows {
+                        tr {
+                            th scope="row" { (name) }
+                            @match value {
+                                Ok(value) => {
+                                    td { (show(value.value)) }
+                                    td { @if value.low > 0.0 && value.low < value.high && value.high.is_finite() { (show(value.low)) " to " (show(value.high)) } }
+                                },
+                                Err(why) => { td { (why) } td {} },
+                            }
+                            td { (ratio.map_or_else(String::new, times)) }
+                        }
+                    }
+                }
+            }
+        }
+        p { "Each option was measured alternately with the base; ratios compare these runs." }
+    }
+}
+
+fn points(curve: &Curve) -> Markup {
+    html! {
+        details {
+            summary { (curve.label) ": all points" }
+            div.scroll {
+                table {
+                    thead { tr { th { "rounds" } th { "photons" } th { "time (median)" } th { "fastest to slowest" } th { "wall" } th { "error" } th { (findings::words_of_confidence()) " interval" } th { "noise" } th { "bias" } } }
+                    tbody { @for point in &curve.points { (row(point)) } }
+                }
+            }
+            @for point in &curve.points { p { code { (point.command) } } }
+        }
+    }
+}
+
+fn row(point: &Point) -> Markup {
+    let (ms, error, bias) = (point.ms(), point.error(), point.bias());
+    html! {
+        tr {
+            td { (point.rounds) }
+            td { (count(point.photons)) }
+            td { (duration(ms.value)) " " small { (clock(point)) } }
+            td { (duration(ms.low)) " to " (duration(ms.high)) }
+            td { (duration(point.wall())) }
+            td { (percent(error.value)) }
+            td { @if error.high.is_finite() { (percent(error.low)) " to " (percent(error.high)) } @else { "unknown" } }
+            td { (percent(point.noise())) }
+            td { @if bias.low > 0.0 { (percent(bias.value)) } @else if bias.high.is_finite() { "at most " (percent(bias.high)) } @else { "unknown" } }
+        }
+    }
+}
+
+fn how(study: &Study) -> Markup {
+    html! {
+        section {
+            h2 { "How this was measured" }
+            ul {
+                li { "Error: RMS difference from the reference, relative to the RMS of the reference. The contribution of the reference's own noise is subtracted." }
+                li { "Noise is the error that differs between runs with different seeds. Bias is the error that they share. Both are computed from the " (study.request.repeats) " runs of a point. Intervals and bands are " (findings::words_of_confidence()) " confidence intervals (Student's t over those runs); few runs give wide bands." }
+                li { "Time: device time of all rounds by timestamps, without set-up; the CPU builder uses the host's clock. Warm-up work before each run brings the device to its full clock. The time of a point is the median of its runs; the fastest and the slowest run show the drift of the clock." }
+                li { "Times to reach an error are interpolated linearly between points on logarithmic scales, and never extrapolated." }
+                li { "Each command repeats the first run of its point. The other runs use the seeds that follow." }
+                li { "Pixels that show a light source directly are excluded from the error of images. This page has " (number(study.parts.iter().map(|part| part.curves().map(|curve| curve.points.len()).sum::<usize>()).sum::<usize>() as f64)) " points." }
+            }
+        }
+    }
+}

@@ -1,0 +1,261 @@
+//! What lighting a scene of triangles will do: which effects are kept and why, which maps are traced with
+//! how many photons, the schedule of radii, and the size of every buffer.
+
+use std::time::Duration;
+
+use serde::Serialize;
+
+use super::capacity::Persistence;
+use super::evidence::EffectDecision;
+use super::sensor::Sensor;
+use crate::constants::*;
+use crate::records::*;
+use crate::scene::geometry::Geometry;
+use crate::settings::Builder;
+use crate::settings::scene::{Effect, SceneSettings};
+use crate::settings::stop::squared_radius;
+
+/// Where the radius of a map's first round comes from.
+#[derive(Debug, Clone, Copy, PartialEq, Eq, Serialize)]
+#[serde(rename_all = "lowercase")]
+pub enum RadiusFrom {
+    /// `--radius`, `--caustic-radius`.
+    User,
+    /// Photons of a trial round around the points that are asked about (`scene::trial`).
+    Trial,
+    /// The area of the whole scene.
+    Area,
+}
+
+/// What a trial round found.
+#[derive(Debug, Clone, Default, PartialEq, Serialize)]
+pub struct Trial {
+    /// Radii of the first round, normalised; `None` where the map has none, or its radius is given.
+    pub global_radius: Option<f64>,
+    pub caustic_radius: Option<f64>,
+    /// Points that were asked, some of those that the run asks about.
+    pub points: u32,
+    /// Share of them that lie in something smaller than the radius: whose way along the surface to the next wall or edge
+    /// is shorter. Of the map with the larger radius.
+    pub too_wide: f64,
+    pub seconds: f64,
+}
+
+/// A photon map of each round.
+#[derive(Debug, Clone, PartialEq, Serialize)]
+pub struct MapPlan {
+    pub name: &'static str,
+    pub domain: u32,
+    /// Photons of a round.
+    pub photons: u32,
+    /// Photons traced at once, and entries that the map of those can have.
+    pub chunk_photons: u32,
+    pub capacity: u32,
+    /// Paths that one flight hands to the next: none where each photon has an invocation to its end.
+    pub path_array_length: u32,
+    /// How photons are dealt to invocations that keep them to their end.
+    pub persistence: Persistence,
+    /// Bounces after which photons are cut off.
+    pub bounces: u32,
+    /// Bounces that photons take before the host looks how many are left: all, where few enough land in the map for certain and
+    /// the device runs loops so long.
+    pub segment_bounces: u32,
+    /// Mask of the arrivals that are stored.
+    pub stored: u32,
+    /// Photons end where they scatter.
+    pub caustic_only: bool,
+    pub bucket_count: u32,
+    /// Of the first round, normalised.
+    pub radius: f64,
+    pub radius_from: RadiusFrom,
+    /// Invocations that share the candidates of a visible point.
+    pub lanes: u32,
+    /// Spheres that its photons are aimed at; 0: they leave their lights in all directions.
+    pub target_count: u32,
+    /// A power of two by which its photons carry more than they stand for: aimed ones stand for a share of their
+    /// light's, and their sums have a fixed point.
+    pub flux_gain: f64,
+}
+
+impl MapPlan {
+    /// Words of the counters: length of the map, then of the lists of a segment.
+    pub fn counter_count(&self) -> u64 {
+        2 + u64::from(self.segment_bounces.min(SEGMENT_BOUNCES))
+    }
+
+    /// W of a photon of relative flux 1, over the square of the scene's unit.
+    pub fn photon_flux(&self, geometry: &Geometry) -> f64 {
+        self.photon_flux_of(geometry, self.photons)
+    }
+
+    /// The same in a round of so many photons.
+    pub fn photon_flux_of(&self, geometry: &Geometry, photons: u32) -> f64 {
+        geometry.flux_unit / (f64::from(photons.max(1)) * self.flux_gain)
+    }
+
+    /// (first photon, count) of each chunk.
+    pub fn chunks(&self) -> impl Iterator<Item = (u32, u32)> + use<> {
+        let (photons, step) = (self.photons, self.chunk_photons);
+        (0..photons.div_ceil(step)).map(move |chunk| (chunk * step, step.min(photons - chunk * step)))
+    }
+}
+
+#[derive(Debug, Clone, PartialEq)]
+pub struct ScenePlan {
+    pub settings: SceneSettings,
+    pub sensor: Sensor,
+    /// What found the radii that nobody has given; `None` where nothing was tried.
+    pub trial: Option<Trial>,
+    pub decisions: Vec<EffectDecision>,
+    /// Specialization constants of all kernels.
+    pub constants: Vec<(&'static str, u32)>,
+    pub global: Option<MapPlan>,
+    pub caustic: Option<MapPlan>,
+    /// Mask of `SURFACE_...` whose caustics are wanted.
+    pub caustic_surfaces: u32,
+    /// What photons of the caustic map are aimed at.
+    pub targets: Vec<CausticTarget>,
+    pub points_per_pixel: u32,
+    /// Sets of sums a visible point has, one an arrival.
+    pub arrival_sets: u32,
+    /// Mask of the arrivals that some map holds.
+    pub arrivals: u32,
+    /// Surfaces that one dispatch follows a camera path over.
+    pub chain_steps: u32,
+    /// Film units in 1 W/m2/sr or W/m2, a power of two, and the most that one round may add.
+    pub film_scale: f64,
+    pub film_limit: f64,
+    /// Rays or pair tests after which commands are handed to the device.
+    pub work_per_submission: u64,
+    /// Bytes of all buffers, with one set of receivers; see [`ScenePlan::bytes_of`].
+    pub bytes: u64,
+    /// Time that planning took.
+    pub planned_in: Duration,
+}
+
+/// Candidates of a point, roughly: what a lookup counts as work.
+pub const TESTS_PER_POINT: u64 = 256;
+/// Radii relative to the scene's normalised extent: from f32's resolution of positions up to all of it.
+pub const RADIUS_RANGE: (f64, f64) = (1.0 / 32_768.0, 2.0);
+/// Landings of each photon of a chunk that a map has room for.
+pub const SEGMENT_BOUNCES: u32 = 16;
+/// Flights of a photon, generously.
+const FLIGHTS_PER_PHOTON: u64 = 8;
+/// Work of a ray, in pair tests.
+const RAY_COST: u64 = 64;
+
+/// Share of the points that may lie in something smaller than the radius.
+const TOO_WIDE: f64 = 0.1;
+
+impl ScenePlan {
+    pub fn keeps(&self, effect: Effect) -> bool {
+        self.decisions.iter().any(|decision| decision.effect == effect && decision.kept)
+    }
+
+    /// Whether many points of the trial lie in something narrower than the radius.
+    pub fn radius_is_too_wide(&self) -> bool {
+        self.trial.as_ref().is_some_and(|trial| trial.too_wide > TOO_WIDE)
+    }
+
+    /// Whether that radius also leaves no room for a smaller one, as the scene is so much wider than what the points lie in.
+    pub fn bias_is_unknown(&self) -> bool {
+        let is_least = |map: &MapPlan| map.radius_from == RadiusFrom::Trial && map.radius < crate::settings::ROOM_BELOW * RADIUS_RANGE.0;
+        self.radius_is_too_wide() && self.maps().any(is_least)
+    }
+
+    /// What traces the photons: the settings' builder, or the one that was chosen.
+    pub fn builder(&self) -> Builder {
+        self.settings.builder.expect("the plan chose a builder")
+    }
+
+    pub fn maps(&self) -> impl Iterator<Item = &MapPlan> {
+        self.global.iter().chain(&self.caustic)
+    }
+
+    /// The same by a builder that stops after each flight; `bytes` stay those of the run.
+    pub fn by_flights(&self) -> ScenePlan {
+        let mut plan = self.clone();
+        if plan.builder() == Builder::Persistent {
+            plan.settings.builder = Some(Builder::Ballot);
+            for map in plan.global.iter_mut().chain(&mut plan.caustic) {
+                map.path_array_length = map.chunk_photons;
+                map.segment_bounces = map.bounces.min(SEGMENT_BOUNCES);
+            }
+        }
+        plan
+    }
+
+    /// Radius of a map in a round, normalised: r_(i+1)^2 = r_i^2 (i + alpha) / (i + 1) with i from 1
+    /// (Knaus and Zwicker 2011, equation 15).
+    pub fn radius(&self, map: &MapPlan, round: u32) -> f64 {
+        (map.radius * squared_radius(self.settings.alpha, round).sqrt()).max(RADIUS_RANGE.0)
+    }
+
+    /// Bounces whose fates are counted apart.
+    pub fn tally_rows(&self) -> u32 {
+        self.settings.bounces.min(TALLY_ROWS)
+    }
+
+    pub fn visible_points(&self) -> u32 {
+        self.sensor.pixels().saturating_mul(self.points_per_pixel)
+    }
+
+    /// Pixels of one dispatch that casts `rays` rays each.
+    pub fn pixels_at_once(&self, rays: u32) -> u32 {
+        let least = ((1 << 12) / self.samples()).max(1);
+        (self.work_per_submission / (RAY_COST * u64::from(rays.max(1)))).clamp(u64::from(least), 1 << 22) as u32
+    }
+
+    /// Photons that one dispatch traces from their light to their end, in a fraction of a second.
+    pub fn photons_per_dispatch(&self) -> u32 {
+        (self.work_per_submission / (RAY_COST * FLIGHTS_PER_PHOTON)).clamp(1, u64::from(u32::MAX)) as u32
+    }
+
+    /// What each arrival at a visible point may add, so that all of a pixel's stay below the film's limit together.
+    pub fn point_limit(&self) -> f64 {
+        self.film_limit / f64::from((self.points_per_pixel * self.arrival_sets).next_power_of_two())
+    }
+
+    /// How often at most a pixel's light is rounded to the film's unit in a round: each part of a path's direct light, and each
+    /// map's at each visible point.
+    pub fn roundings_per_round(&self) -> f64 {
+        f64::from(PART_COUNT * self.samples() + self.points_per_pixel * self.arrival_sets)
+    }
+
+    /// Visible points of one lookup, which has a work group of them along x.
+    pub fn points_at_once(&self) -> u32 {
+        let lanes = self.maps().map(|map| map.lanes).max().unwrap_or(1);
+        let most = (self.work_per_submission / TESTS_PER_POINT).clamp(1 << 12, 1 << 22) as u32;
+        most.min(self.visible_points()).min(MAX_GROUPS * self.settings.group_size / lanes)
+    }
+
+    /// Whether a camera path may be under way when its dispatch ends.
+    pub fn chains_go_on(&self) -> bool {
+        self.chain_steps < MAX_BOUNCES && (self.constant("HAS_MIRROR") | self.constant("HAS_DIELECTRIC")) != 0
+    }
+
+    /// Camera paths that one dispatch may leave.
+    pub fn camera_path_capacity(&self) -> u64 {
+        let pixels = self.pixels_at_once(self.rays_per_pixel()).min(self.sensor.pixels());
+        if self.chains_go_on() { u64::from(pixels) * u64::from(self.samples()) } else { 0 }
+    }
+
+    /// Rays of one pixel, roughly.
+    pub fn rays_per_pixel(&self) -> u32 {
+        self.points_per_pixel * (1 + self.constant("SHADOW_RAYS"))
+    }
+
+    /// Paths from the camera through a pixel, or from a receiver, in a round.
+    pub fn samples(&self) -> u32 {
+        self.constant("SAMPLES")
+    }
+
+    pub fn constant(&self, name: &str) -> u32 {
+        self.constants.iter().find(|(known, _)| *known == name).map_or(0, |(_, value)| *value)
+    }
+
+    /// Effects that the scene needs and the user left out.
+    pub fn missing(&self) -> Vec<Effect> {
+        self.decisions.iter().filter(|decision| decision.needed && !decision.kept).map(|decision| decision.effect).collect()
+    }
+}

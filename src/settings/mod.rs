@@ -1,0 +1,453 @@
+//! What a run is asked to do: counts, radius, seed, builder. Defaults are the paper's, each choice
+//! that the paper leaves open is a field here, and [`RoomSettings::validate`] is the one place that
+//! judges values.
+
+pub mod builder;
+pub mod scene;
+pub mod stop;
+
+use serde::Serialize;
+
+use crate::constants;
+use crate::error::{Error, Result};
+use crate::rng::{self, Rng};
+pub use builder::Builder;
+use stop::Stop;
+
+/// How photons near a point are found.
+#[derive(Debug, Clone, Copy, PartialEq, Eq, Serialize)]
+#[serde(rename_all = "lowercase")]
+pub enum Gather {
+    /// Step through the whole photon list, as the paper does.
+    Brute,
+    /// Look into the cells of a sorted uniform grid.
+    Grid,
+    /// Walk down a kd-tree.
+    KdTree,
+}
+
+/// How the film adds.
+#[derive(Debug, Clone, Copy, PartialEq, Eq, Serialize)]
+#[serde(rename_all = "lowercase")]
+pub enum Sums {
+    /// 64-bit fixed point: the same bits in whatever order photons come.
+    Integer,
+    /// 32-bit floats: a sum's last digits depend on the order of addition, and it stops growing once
+    /// what is added is less than half its last digit.
+    F32,
+    /// Pairs of 32-bit floats, the second what the first lost to rounding: some 48 bits, of which the
+    /// last depend on the order of addition.
+    Compensated,
+}
+
+impl Sums {
+    pub fn code(self) -> u32 {
+        match self {
+            Sums::Integer => constants::SUMS_INTEGER,
+            Sums::F32 => constants::SUMS_F32,
+            Sums::Compensated => constants::SUMS_COMPENSATED,
+        }
+    }
+}
+
+/// Radiant intensity of a light.
+#[derive(Debug, Clone, Copy, PartialEq, Eq, Serialize)]
+#[serde(rename_all = "lowercase")]
+pub enum EmissionLaw {
+    /// The same in all directions of the hemisphere.
+    Uniform,
+    /// Proportional to the cosine (Lambertian).
+    Cosine,
+}
+
+impl EmissionLaw {
+    pub fn code(self) -> u32 {
+        match self {
+            EmissionLaw::Uniform => constants::EMISSION_UNIFORM,
+            EmissionLaw::Cosine => constants::EMISSION_COSINE,
+        }
+    }
+}
+
+/// How quotients, roots and logarithms are rounded.
+#[derive(Debug, Clone, Copy, PartialEq, Eq, Serialize)]
+#[serde(rename_all = "lowercase")]
+pub enum Math {
+    /// As the device has them.
+    Fast,
+    /// The same bits on every device that rounds to nearest, and on the CPU builder.
+    Strict,
+}
+
+impl Math {
+    /// Value of the kernels' STRICT_MATH.
+    pub fn code(self) -> u32 {
+        u32::from(self == Math::Strict)
+    }
+}
+
+/// Which direction the Phong weight compares with the direction to the eye.
+#[derive(Debug, Clone, Copy, PartialEq, Eq, Serialize)]
+#[serde(rename_all = "lowercase")]
+pub enum PhongDirection {
+    /// The mirror direction of the arriving photon.
+    Mirror,
+    /// The direction in which the photon left.
+    Sampled,
+}
+
+impl PhongDirection {
+    pub fn code(self) -> u32 {
+        match self {
+            PhongDirection::Mirror => constants::PHONG_MIRROR,
+            PhongDirection::Sampled => constants::PHONG_SAMPLED,
+        }
+    }
+}
+
+/// The paper's experiments.
+#[derive(Debug, Clone, Copy, PartialEq, Eq, Serialize)]
+#[serde(rename_all = "lowercase")]
+pub enum Preset {
+    /// Figure 1: naive slots, 2 bounces.
+    Naive,
+    /// Figure 2: the modified implementation, 15 bounces.
+    Modified,
+    /// Figure 3: the same with Phong walls, shininess 2.
+    Phong,
+    /// Figure 4: rounds of 5000 photons, radius 0.025 m, shininess 5.
+    Rounds,
+}
+
+/// Walls of the open box in the order of their numbers; the sixth face is the opening.
+pub const WALL_NAMES: [&str; 5] = ["left", "right", "floor", "ceiling", "back"];
+
+#[derive(Debug, Clone, PartialEq, Serialize)]
+pub struct RoomSettings {
+    pub builder: Builder,
+    /// Photons emitted in a round, by all lights together.
+    pub photons: u32,
+    pub rounds: u32,
+    /// Most bounces of a photon.
+    pub bounces: u32,
+    /// Radius of the density estimate, metres.
+    pub radius: f64,
+    /// Photons within the radius, a round, that count as full illumination.
+    pub full_light: f64,
+    pub seed: u64,
+    pub rng: Rng,
+    pub gather: Gather,
+    pub sums: Sums,
+    /// Estimate with this many nearest photons of a round within the radius; `None`: with all of them.
+    pub nearest: Option<u32>,
+    pub math: Math,
+    pub emission: EmissionLaw,
+    /// Phong exponent of each wall in the order of [`WALL_NAMES`]; `None` is Lambertian.
+    pub shininess: [Option<f32>; 5],
+    pub phong_direction: PhongDirection,
+    /// Eye of the Phong weight, metres.
+    pub eye: [f32; 3],
+    /// Radius of each disc of light, metres.
+    pub light_radius: f64,
+    /// Power of the floor's and of the left wall's light, watts.
+    pub light_power: [f64; 2],
+    /// Share of photons that each wall reflects.
+    pub reflectance: f32,
+    /// Texels along each side of a wall.
+    pub mesh: u32,
+    /// Divide irradiance by the part of the disc that lies on the wall.
+    pub edge_correction: bool,
+    /// Threads of the CPU builder.
+    pub threads: usize,
+    /// Look for values that are infinite or no number.
+    pub paranoid: bool,
+    pub stop: Stop,
+    /// Invocations of a work group.
+    pub group_size: u32,
+    /// Counters that the atomic builder's work groups take turns at; `None`: as many as serve the device.
+    pub counters: Option<u32>,
+    /// Most photons traced at once; `None`: as many as the device's buffers hold.
+    pub chunk: Option<u32>,
+}
+
+/// Half the edge of the open box, metres.
+pub const HALF_WIDTH: f64 = 0.25;
+
+/// Photons of the paper's round, to which its `full_light` refers.
+pub const PAPER_PHOTONS: u32 = 5000;
+
+impl Default for RoomSettings {
+    fn default() -> RoomSettings {
+        RoomSettings::preset(Preset::Modified)
+    }
+}
+
+impl RoomSettings {
+    pub fn preset(preset: Preset) -> RoomSettings {
+        let modified = RoomSettings {
+            builder: Builder::Atomic,
+            photons: PAPER_PHOTONS,
+            rounds: 1,
+            bounces: 15,
+            radius: 0.05,
+            full_light: 90.0,
+            seed: 1,
+            rng: Rng::Rand48,
+            gather: Gather::Grid,
+            sums: Sums::Integer,
+            nearest: None,
+            math: Math::Fast,
+            emission: EmissionLaw::Uniform,
+            shininess: [None; 5],
+            phong_direction: PhongDirection::Mirror,
+            eye: [0.0, 0.0, 1.0],
+            light_radius: 0.05,
+            light_power: [1.0, 1.0],
+            reflectance: 0.75,
+            mesh: 64,
+            edge_correction: true,
+            threads: 1,
+            paranoid: false,
+            stop: Stop::default(),
+            group_size: 128,
+            counters: None,
+            chunk: None,
+        };
+        match preset {
+            Preset::Modified => modified,
+            Preset::Naive => RoomSettings { builder: Builder::Naive, bounces: 2, ..modified },
+            Preset::Phong => RoomSettings { shininess: [Some(2.0); 5], ..modified },
+            Preset::Rounds => RoomSettings { rounds: 100, radius: 0.025, full_light: 10.0, shininess: [Some(5.0); 5], ..modified },
+        }
+    }
+
+    /// The same full light for another photon count: as many photons within the radius in
+    /// proportion.
+    pub fn full_light_for(&self, photons: u32) -> f64 {
+        self.full_light * f64::from(photons) / f64::from(self.photons)
+    }
+
+    /// Photons of the whole run.
+    pub fn total_photons(&self) -> u64 {
+        u64::from(self.photons) * u64::from(self.rounds)
+    }
+
+    /// Random numbers that one photon may draw.
+    pub fn draws_per_photon(&self) -> u64 {
+        u64::from(constants::EMISSION_DRAWS) + u64::from(constants::BOUNCE_DRAWS) * u64::from(self.bounces)
+    }
+
+    /// Whether some wall follows the paper's Phong model.
+    pub fn has_phong(&self) -> bool {
+        self.shininess.iter().any(Option::is_some)
+    }
+
+    /// Refuses settings that no run can satisfy; each error names the option, its value and the remedy.
+    pub fn validate(&self) -> Result<()> {
+        let width = 2.0 * HALF_WIDTH;
+        within("--photons", self.photons, 2..=MAX_PHOTONS, "photons per round, at least one for each of the two lights")?;
+        within("--rounds", self.rounds, 1..=u32::MAX, "rounds")?;
+        within("--bounces", self.bounces, 1..=MAX_BOUNCES, "bounces")?;
+        if self.builder == Builder::Persistent {
+            within("--bounces", self.bounces, 1..=MAX_PERSISTENT_BOUNCES, "bounces with --variant persistent")?;
+        }
+        within("--mesh", self.mesh, 1..=MAX_MESH, "texels along a wall")?;
+        if !(self.radius >= MIN_RADIUS && self.radius <= width) {
+            return Err(Error::setting(
+                "--radius",
+                self.radius,
+                format!("must be from {MIN_RADIUS:e} to {width} metres (the box's width)"),
+            ));
+        }
+        if !(self.full_light >= 1.0 / MAX_QUANTITY && self.full_light <= MAX_QUANTITY) {
+            let allowed = format!("must be from {:e} to {MAX_QUANTITY:e} (photons within the radius)", 1.0 / MAX_QUANTITY);
+            return Err(Error::setting("--full-light", self.full_light, allowed));
+        }
+        for (light, power) in self.light_power.iter().enumerate() {
+            if !(*power >= 1.0 / MAX_QUANTITY && *power <= MAX_QUANTITY) {
+                let which = ["floor", "left"][light];
+                let allowed = format!("must be from {:e} to {MAX_QUANTITY:e} watts ({which} light)", 1.0 / MAX_QUANTITY);
+                return Err(Error::setting("--light-power", power, allowed));
+            }
+        }
+        let weakest_share = self.light_power.iter().fold(f64::INFINITY, |a, b| a.min(*b)) / self.light_power.iter().sum::<f64>();
+        if weakest_share < 1e-6 {
+            let [floor, left] = self.light_power;
+            return Err(Error::setting(
+                "--light-power",
+                format!("{floor},{left}"),
+                "the weaker light must have at least a millionth of the total power",
+            ));
+        }
+        if !(self.light_radius > 0.0 && self.light_radius <= HALF_WIDTH) {
+            return Err(Error::setting(
+                "--light-radius",
+                self.light_radius,
+                format!("must be above 0 and at most {HALF_WIDTH} metres, so that the disc fits its wall"),
+            ));
+        }
+        if !(0.0..=1.0).contains(&self.reflectance) {
+            return Err(Error::setting("--reflectance", self.reflectance, "must be from 0 to 1"));
+        }
+        for shininess in self.shininess.iter().flatten() {
+            if !(shininess.is_finite() && *shininess >= 0.0) {
+                return Err(Error::setting("--shininess", shininess, "must be 0 or more; omit it for Lambertian walls"));
+            }
+        }
+        if !self.eye.iter().all(|coordinate| coordinate.abs() <= MAX_EYE) {
+            let [x, y, z] = self.eye;
+            return Err(Error::setting("--eye", format!("{x},{y},{z}"), format!("must be three numbers from -{MAX_EYE:e} to {MAX_EYE:e}")));
+        }
+        within("--threads", self.threads as u64, 1..=1024, "threads")?;
+        if !(self.group_size.is_power_of_two() && (32..=1024).contains(&self.group_size)) {
+            return Err(Error::setting("--group-size", self.group_size, "must be a power of two from 32 to 1024"));
+        }
+        if let Some(counters) = self.counters.filter(|counters| !counters.is_power_of_two() || *counters > MAX_COUNTERS) {
+            return Err(Error::setting("--counters", counters, format!("must be a power of two up to {MAX_COUNTERS}")));
+        }
+        if let Some(chunk) = self.chunk {
+            within("--chunk", chunk, 2..=MAX_PHOTONS, "photons traced at once, at least one for each of the two lights")?;
+        }
+        self.validate_nearest()?;
+        self.stop.validate()?;
+        if let (Some(error), true) = (self.stop.error, self.sums != Sums::Integer) {
+            return Err(Error::setting("--error", error, "needs --sums integer, because float sums have no error estimate"));
+        }
+        self.validate_random_numbers()?;
+        let events = self.total_photons().saturating_mul(u64::from(self.bounces));
+        if events > MAX_EVENTS {
+            return Err(Error::setting(
+                "--rounds",
+                self.rounds,
+                format!("photons * rounds * bounces is {events}, but the film's 64-bit sums hold at most {MAX_EVENTS}; ask for fewer"),
+            ));
+        }
+        Ok(())
+    }
+
+    fn validate_nearest(&self) -> Result<()> {
+        let Some(nearest) = self.nearest else { return Ok(()) };
+        within("--nearest", nearest, 2..=constants::MAX_NEAREST, "photons; the farthest of them sets the radius of the disc")?;
+        if self.gather != Gather::KdTree {
+            return Err(Error::setting("--nearest", nearest, "needs --gather kdtree, which finds the nearest photons"));
+        }
+        if self.sums != Sums::Integer {
+            return Err(Error::setting("--nearest", nearest, "always uses integer sums; omit --sums"));
+        }
+        if let Some(chunk) = self.chunk.filter(|chunk| *chunk < self.photons) {
+            let allowed =
+                format!("must be --photons {} or more with --nearest, which searches all photons of a round at once", self.photons);
+            return Err(Error::setting("--chunk", chunk, allowed));
+        }
+        let wanted = u64::from(self.rounds) * u64::from(nearest);
+        if wanted > MAX_NEAREST_SUMMED {
+            let allowed =
+                format!("rounds * nearest is {wanted}, but the film's 64-bit sums hold at most {MAX_NEAREST_SUMMED}; ask for fewer rounds");
+            return Err(Error::setting("--rounds", self.rounds, allowed));
+        }
+        Ok(())
+    }
+
+    /// Rounds of a run that ends by itself: as many as its photons take, or as film and random numbers allow, and no
+    /// more than `MOST_ROUNDS`.
+    pub fn most_rounds(&self) -> u32 {
+        let photons = u64::from(self.photons).max(1);
+        let bounces = u64::from(self.bounces).max(1);
+        let by_random_numbers = match self.rng {
+            Rng::Rand48 => ((1 << 48) / u128::from(self.draws_per_photon())) as u64 / photons,
+            Rng::Mt | Rng::Sobol => (1 << 32) / photons,
+            Rng::Philox => u64::MAX,
+        };
+        let by_total = self.stop.photons.map_or(u64::MAX, |total| total.div_ceil(photons));
+        let by_nearest = self.nearest.map_or(u64::MAX, |nearest| MAX_NEAREST_SUMMED / u64::from(nearest).max(1));
+        let fits = (MAX_EVENTS / bounces / photons).min(by_random_numbers).min(by_total).min(by_nearest);
+        fits.clamp(1, u64::from(MOST_ROUNDS)) as u32
+    }
+
+    fn validate_random_numbers(&self) -> Result<()> {
+        match self.rng {
+            Rng::Philox => Ok(()),
+            Rng::Rand48 => {
+                within("--seed", self.seed, 0..=u64::from(u32::MAX), "with --rng rand48, whose seed has 32 bits")?;
+                let draws = u128::from(self.total_photons()) * u128::from(self.draws_per_photon());
+                if draws > 1 << 48 {
+                    return Err(Error::setting(
+                        "--rng",
+                        "rand48",
+                        format!(
+                            "the run draws {draws} numbers, but the generator has a period of 2^48, so its streams would overlap; use --rng philox"
+                        ),
+                    ));
+                }
+                Ok(())
+            }
+            Rng::Mt => {
+                let most = rng::MT_MAX_BOUNCES;
+                if self.bounces > most {
+                    return Err(Error::setting(
+                        "--bounces",
+                        self.bounces,
+                        format!("must be at most {most} with --rng mt, whose streams hold 227 numbers; use --rng philox"),
+                    ));
+                }
+                if self.total_photons() > 1 << 32 {
+                    return Err(Error::setting("--rng", "mt", "has 2^32 streams, but the run has more photons; use --rng philox"));
+                }
+                Ok(())
+            }
+            Rng::Sobol if self.total_photons() > 1 << 32 => {
+                Err(Error::setting("--rng", "sobol", "has 2^32 points, but the run has more photons; use --rng philox"))
+            }
+            Rng::Sobol => Ok(()),
+        }
+    }
+
+    /// A remark on settings that are allowed and unwise.
+    pub fn warning(&self) -> Option<String> {
+        let twos = self.photons.trailing_zeros();
+        (self.rng == Rng::Rand48 && twos >= 10).then(|| {
+            format!(
+                "rand48 gives correlated streams for {} = {} * 2^{twos} photons per round, a multiple of a large power of two; use an odd --photons or --rng philox",
+                self.photons,
+                self.photons >> twos
+            )
+        })
+    }
+}
+
+/// Most counters that photons are appended by.
+const MAX_COUNTERS: u32 = 64;
+/// Photons of a round: their numbers and the counters of a round are 32-bit.
+const MAX_PHOTONS: u32 = 1 << 31;
+const MAX_BOUNCES: u32 = 10_000;
+/// A photon's bounces are one loop there, of at most [`constants::LOOP_LIMIT`] iterations with those of its random numbers.
+const MAX_PERSISTENT_BOUNCES: u32 = 320;
+/// Metres; the square of a larger one would come close to what f32 holds.
+const MAX_EYE: f32 = 1e15;
+/// Watts and photons: far from what f64 and f32 hold, either way.
+const MAX_QUANTITY: f64 = 1e12;
+/// Texels along a wall; points are numbered in 32 bits and held in one buffer of 128 MiB.
+const MAX_MESH: u32 = 1024;
+/// Smallest radius relative to the box: below it the squares of f32 distances lose their meaning.
+/// Smallest radius at which a bias is measured, over the smallest that a run allows: there is room for the smaller radius.
+pub const ROOM_BELOW: f64 = 1.415;
+const MIN_RADIUS_SHARE: f64 = 1.0 / 65_536.0;
+/// The same in metres.
+pub const MIN_RADIUS: f64 = 2.0 * HALF_WIDTH * MIN_RADIUS_SHARE;
+/// Rounds of a run that ends by itself.
+const MOST_ROUNDS: u32 = 1 << 24;
+/// Photons * bounces that a film sum can hold with 16 bits after the binary point.
+pub const MAX_EVENTS: u64 = 1 << 47;
+/// Rounds * nearest photons that a film sum can hold, each scaled up by 2^`NEAREST_GAIN_BITS`, with 10 bits after
+/// the binary point.
+pub const MAX_NEAREST_SUMMED: u64 = 1 << 31;
+
+fn within<T>(option: &'static str, value: T, allowed: std::ops::RangeInclusive<T>, what: &str) -> Result<()>
+where
+    T: PartialOrd + Copy + std::fmt::Display,
+{
+    if allowed.contains(&value) {
+        return Ok(());
+    }
+    Err(Error::setting(option, value, format!("must be from {} to {} ({what})", allowed.start(), allowed.end())))
+}

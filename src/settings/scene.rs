@@ -1,0 +1,300 @@
+//! What lighting a scene of triangles is asked to do.
+
+use serde::Serialize;
+
+pub use super::stop::Stop;
+use super::{Builder, Math, within};
+use crate::constants;
+use crate::constants::MAX_BOUNCES;
+use crate::error::{Error, Result};
+
+/// Where direct light and caustics come from.
+#[derive(Debug, Clone, Copy, PartialEq, Eq, Serialize)]
+#[serde(rename_all = "lowercase")]
+pub enum Illumination {
+    /// Direct light by shadow rays, caustics from a map of their own, the rest from the global map
+    /// (Jensen 1996).
+    Split,
+    /// Everything from one photon map, as the paper has it.
+    Photons,
+}
+
+/// Parts of a picture.
+#[derive(Debug, Clone, Copy, PartialEq, Eq, Serialize)]
+#[serde(rename_all = "lowercase")]
+pub enum Part {
+    All,
+    /// Light that comes straight from a lamp to what the camera sees, and lamps themselves.
+    Direct,
+    /// Whatever is seen in mirrors and through glass.
+    Specular,
+    /// Light that reached what the camera sees over mirrors and glass alone.
+    Caustic,
+    /// Light that was scattered before.
+    Indirect,
+}
+
+impl Part {
+    pub const EACH: [Part; 4] = [Part::Direct, Part::Specular, Part::Caustic, Part::Indirect];
+
+    pub fn mask(self) -> u32 {
+        match self {
+            Part::All => Part::EACH.iter().map(|part| part.mask()).sum(),
+            Part::Direct => constants::PART_DIRECT,
+            Part::Specular => constants::PART_SPECULAR,
+            Part::Caustic => constants::PART_CAUSTIC,
+            Part::Indirect => constants::PART_INDIRECT,
+        }
+    }
+}
+
+/// How a photon's weight falls with its distance.
+#[derive(Debug, Clone, Copy, PartialEq, Eq, Serialize)]
+#[serde(rename_all = "lowercase")]
+pub enum Kernel {
+    Box,
+    Cone,
+    Epanechnikov,
+}
+
+impl Kernel {
+    pub fn code(self) -> u32 {
+        match self {
+            Kernel::Box => constants::KERNEL_BOX,
+            Kernel::Cone => constants::KERNEL_CONE,
+            Kernel::Epanechnikov => constants::KERNEL_EPANECHNIKOV,
+        }
+    }
+}
+
+/// How a pixel weighs the picture around its centre.
+#[derive(Debug, Clone, Copy, PartialEq, Eq, Serialize)]
+#[serde(rename_all = "lowercase")]
+pub enum Filter {
+    /// Its own square.
+    Box,
+    /// A tent two pixels wide.
+    Tent,
+    /// A Gaussian of half a pixel's deviation.
+    Gaussian,
+}
+
+impl Filter {
+    pub fn code(self) -> u32 {
+        match self {
+            Filter::Box => constants::FILTER_BOX,
+            Filter::Tent => constants::FILTER_TENT,
+            Filter::Gaussian => constants::FILTER_GAUSSIAN,
+        }
+    }
+}
+
+/// What a scene may call for; each can be forced on or left out.
+#[derive(Debug, Clone, Copy, PartialEq, Eq, PartialOrd, Ord, Hash, Serialize)]
+#[serde(rename_all = "kebab-case")]
+pub enum Effect {
+    Direct,
+    Indirect,
+    Glossy,
+    ReflectiveCaustics,
+    RefractiveCaustics,
+    SpecularChains,
+    Textures,
+    Environment,
+    MeshLights,
+    PointLights,
+    SpotLights,
+    DirectionalLights,
+    DiscLights,
+    Bvh,
+    TwoSided,
+    SmoothNormals,
+}
+
+impl Effect {
+    pub const ALL: [Effect; 16] = [
+        Effect::Direct,
+        Effect::Indirect,
+        Effect::Glossy,
+        Effect::ReflectiveCaustics,
+        Effect::RefractiveCaustics,
+        Effect::SpecularChains,
+        Effect::Textures,
+        Effect::Environment,
+        Effect::MeshLights,
+        Effect::PointLights,
+        Effect::SpotLights,
+        Effect::DirectionalLights,
+        Effect::DiscLights,
+        Effect::Bvh,
+        Effect::TwoSided,
+        Effect::SmoothNormals,
+    ];
+
+    pub fn name(self) -> &'static str {
+        match self {
+            Effect::Direct => "direct",
+            Effect::Indirect => "indirect",
+            Effect::Glossy => "glossy",
+            Effect::ReflectiveCaustics => "reflective-caustics",
+            Effect::RefractiveCaustics => "refractive-caustics",
+            Effect::SpecularChains => "specular-chains",
+            Effect::Textures => "textures",
+            Effect::Environment => "environment",
+            Effect::MeshLights => "mesh-lights",
+            Effect::PointLights => "point-lights",
+            Effect::SpotLights => "spot-lights",
+            Effect::DirectionalLights => "directional-lights",
+            Effect::DiscLights => "disc-lights",
+            Effect::Bvh => "bvh",
+            Effect::TwoSided => "two-sided",
+            Effect::SmoothNormals => "smooth-normals",
+        }
+    }
+
+    pub fn is_caustic(self) -> bool {
+        matches!(self, Effect::ReflectiveCaustics | Effect::RefractiveCaustics)
+    }
+}
+
+#[derive(Debug, Clone, PartialEq, Serialize)]
+pub struct SceneSettings {
+    /// Photons of the global map, each pass.
+    pub photons: u32,
+    /// Photons of the caustic map, each pass.
+    pub caustic_photons: u32,
+    /// Independent passes, of which the result is the mean.
+    pub rounds: u32,
+    /// Bounces after which a photon is cut off; by default roulette ends it long before, which is null in JSON.
+    #[serde(serialize_with = "cap")]
+    pub bounces: u32,
+    pub seed: u64,
+    /// Radius of the first pass's density estimate, metres; `None`: by a trial round
+    /// (`scene::trial`), or by the scene's area and the photons where none is made.
+    pub radius: Option<f64>,
+    /// The same of the caustic map.
+    pub caustic_radius: Option<f64>,
+    /// How fast the radius shrinks, r_(i+1)^2 = r_i^2 (i + alpha) / (i + 1) (Knaus and Zwicker 2011);
+    /// 1 keeps it.
+    pub alpha: f64,
+    pub kernel: Kernel,
+    pub edge_correction: bool,
+    /// Paths from the camera through each pixel, each pass, a power of two; of a picture.
+    pub samples: u32,
+    /// Shadow rays from each visible point, each pass.
+    pub shadow_rays: u32,
+    /// Indirect light by a ray to the next surface instead of the map where the camera looks.
+    pub final_gather: bool,
+    /// Photons of the caustic map leave their lights only towards mirrors and glass (projection maps, Jensen 1996).
+    pub aim: bool,
+    pub illumination: Illumination,
+    pub part: Part,
+    pub filter: Filter,
+    /// `None`: persistent; ballot where photons may bounce more often than the device lets a loop go on, and with strict
+    /// arithmetic, which needs so many registers that few photons would be under way.
+    pub builder: Option<Builder>,
+    pub math: Math,
+    /// Look for values that are infinite or no number.
+    pub paranoid: bool,
+    pub stop: Stop,
+    pub group_size: u32,
+    /// Most photons traced at once; `None`: as many as the device's buffers hold.
+    pub chunk: Option<u32>,
+    /// Effects forced on, and effects left out, whatever the scene holds.
+    pub with: Vec<Effect>,
+    pub without: Vec<Effect>,
+}
+
+fn cap<S: serde::Serializer>(bounces: &u32, serializer: S) -> std::result::Result<S::Ok, S::Error> {
+    Some(*bounces).filter(|bounces| *bounces < MAX_BOUNCES).serialize(serializer)
+}
+
+impl Default for SceneSettings {
+    fn default() -> SceneSettings {
+        SceneSettings {
+            photons: 1 << 17,
+            caustic_photons: 1 << 17,
+            rounds: 16,
+            bounces: MAX_BOUNCES,
+            seed: 1,
+            radius: None,
+            caustic_radius: None,
+            alpha: 2.0 / 3.0,
+            kernel: Kernel::Box,
+            edge_correction: true,
+            samples: 1,
+            shadow_rays: 4,
+            final_gather: false,
+            aim: true,
+            illumination: Illumination::Split,
+            part: Part::All,
+            filter: Filter::Box,
+            builder: None,
+            math: Math::Fast,
+            paranoid: false,
+            stop: Stop::default(),
+            group_size: 128,
+            chunk: None,
+            with: Vec::new(),
+            without: Vec::new(),
+        }
+    }
+}
+
+/// Photons of a pass: their numbers are 32-bit.
+const MAX_PHOTONS: u32 = 1 << 31;
+pub const MAX_ROUNDS: u32 = 1 << 20;
+/// A visible point's rays are one loop.
+const MAX_SHADOW_RAYS: u32 = 64;
+/// A pixel's paths are summed by one invocation.
+const MAX_SAMPLES: u32 = 1024;
+
+impl SceneSettings {
+    pub fn validate(&self) -> Result<()> {
+        within("--photons", self.photons, 1..=MAX_PHOTONS, "photons of the global map, each round")?;
+        within("--caustic-photons", self.caustic_photons, 1..=MAX_PHOTONS, "photons of the caustic map, each round")?;
+        within("--rounds", self.rounds, 1..=MAX_ROUNDS, "rounds")?;
+        within("--bounces", self.bounces, 1..=MAX_BOUNCES, "bounces")?;
+        if let Some(builder) = self.builder.filter(|builder| !Builder::IN_SCENES.contains(builder)) {
+            let known = Builder::IN_SCENES.map(Builder::name).join(", ");
+            return Err(Error::setting(
+                "--variant",
+                builder.name(),
+                format!("traces the paper's box only; for a scene choose one of {known}"),
+            ));
+        }
+        within("--shadow-rays", self.shadow_rays, 1..=MAX_SHADOW_RAYS, "shadow rays from each visible point, each round")?;
+        if !(self.samples.is_power_of_two() && self.samples <= MAX_SAMPLES) {
+            return Err(Error::setting("--samples", self.samples, format!("must be a power of two up to {MAX_SAMPLES}")));
+        }
+        for (option, radius) in [("--radius", self.radius), ("--caustic-radius", self.caustic_radius)] {
+            if let Some(radius) = radius
+                && !(radius.is_finite() && radius > 0.0)
+            {
+                return Err(Error::setting(option, radius, "must be a number of metres above 0"));
+            }
+        }
+        if !(self.alpha > 0.0 && self.alpha <= 1.0) {
+            return Err(Error::setting("--alpha", self.alpha, "must be above 0 and at most 1 (1 keeps the radius fixed)"));
+        }
+        self.stop.validate()?;
+        if !(self.group_size.is_power_of_two() && (32..=1024).contains(&self.group_size)) {
+            return Err(Error::setting("--group-size", self.group_size, "must be a power of two from 32 to 1024"));
+        }
+        if let Some(chunk) = self.chunk {
+            within("--chunk", chunk, 1..=MAX_PHOTONS, "photons traced at once")?;
+        }
+        if let Some(both) = self.with.iter().find(|effect| self.without.contains(effect)) {
+            return Err(Error::setting("--without", both.name(), "is also in --with; choose one of the two"));
+        }
+        Ok(())
+    }
+
+    pub fn forces(&self, effect: Effect) -> bool {
+        self.with.contains(&effect)
+    }
+
+    pub fn leaves_out(&self, effect: Effect) -> bool {
+        self.without.contains(&effect)
+    }
+}
