@@ -98,6 +98,36 @@ struct Buffer {
     set: u32,
     binding: u32,
     access: AccessType,
+    /// Rust type of an element.
+    element: String,
+    /// Bytes from one element to the next in GLSL, where it may be a part of Rust's.
+    stride: usize,
+}
+
+/// Rust types of elements that kernels see as words, by the names of their buffers; all other elements are what they are in GLSL.
+const PACKED: [(&str, &[&str]); 5] = [
+    ("crate::photon::StoredPhoton", &["photons", "sorted_photons", "tree_photons"]),
+    ("crate::photon::Origin", &["origins", "tree_origins"]),
+    ("crate::photon::MapPhoton", &["map", "sorted_map"]),
+    ("crate::path::StoredPath", &["paths", "next_paths"]),
+    ("u64", &["film", "film_totals", "low_squares", "high_squares", "pass_sums", "estimates", "film_sums", "film_squares", "part_totals"]),
+];
+
+fn element_type(buffer: &str, element: &Type) -> String {
+    if let Some((packed, _)) = PACKED.iter().find(|(_, buffers)| buffers.contains(&buffer)) {
+        return (*packed).to_owned();
+    }
+    match element {
+        Type::Struct(record) => format!("crate::records::{}", struct_name(record)),
+        number => match number.to_string().as_str() {
+            known @ ("u32" | "f32") => known.to_owned(),
+            "vec2<u32>" => "glam::UVec2".to_owned(),
+            "vec2<f32>" => "glam::Vec2".to_owned(),
+            "vec4<f32>" => "glam::Vec4".to_owned(),
+            "vec4<u32>" => "[u32; 4]".to_owned(),
+            other => panic!("buffer {buffer}: {other} has no Rust type here"),
+        },
+    }
 }
 
 #[derive(Default)]
@@ -119,16 +149,19 @@ fn reflect(words: &[u32]) -> Kernel {
             Variable::Descriptor { desc_bind, desc_ty: DescriptorType::StorageBuffer(_), ty, .. } => {
                 let Type::Struct(block) = ty else { panic!("a storage buffer that is no block: {ty:?}") };
                 let [member] = block.members.as_slice() else { panic!("a buffer block holds one array: {block:?}") };
+                let Type::Array(array) = &member.ty else { panic!("a buffer block holds one array: {block:?}") };
+                let name = member.name.clone().expect("buffers have names");
+                let stride = array.stride.expect("buffer arrays have a stride");
                 kernel.buffers.push(Buffer {
-                    name: member.name.clone().expect("buffers have names"),
+                    element: element_type(&name, &array.element_ty),
+                    stride,
+                    name,
                     set: desc_bind.set(),
                     binding: desc_bind.bind(),
                     access: member.access_ty,
                 });
-                if let Type::Array(array) = &member.ty
-                    && let Type::Struct(record) = array.element_ty.as_ref()
-                {
-                    kernel.strides.push((struct_name(record), array.stride.expect("buffer arrays have a stride")));
+                if let Type::Struct(record) = array.element_ty.as_ref() {
+                    kernel.strides.push((struct_name(record), stride));
                     kernel.records.push(record.clone());
                 }
             }
@@ -176,7 +209,7 @@ fn write_kernel(source: &mut String, path: &str, name: &str, kernel: &Kernel) {
     let push = kernel.push.as_ref().map_or("()".to_owned(), |record| format!("crate::records::{}", struct_name(record)));
     writeln!(source, "/// `glsl/{path}`.\npub struct {type_name}<'a> {{").unwrap();
     for buffer in &kernel.buffers {
-        writeln!(source, "    pub {}: &'a Buffer,", buffer.name).unwrap();
+        writeln!(source, "    pub {}: &'a Buffer<{}>,", buffer.name, buffer.element).unwrap();
     }
     writeln!(source, "}}\n\nimpl Kernel for {type_name}<'_> {{").unwrap();
     writeln!(source, "    type Push = {push};").unwrap();
@@ -185,7 +218,7 @@ fn write_kernel(source: &mut String, path: &str, name: &str, kernel: &Kernel) {
     writeln!(source, "        spirv: include_bytes!(concat!(env!(\"OUT_DIR\"), \"/{name}.spv\")),").unwrap();
     writeln!(source, "        push_bytes: size_of::<{push}>() as u32,").unwrap();
     writeln!(source, "        bindings: &[").unwrap();
-    for Buffer { name, set, binding, access } in &kernel.buffers {
+    for Buffer { name, set, binding, access, .. } in &kernel.buffers {
         let reads = *access != AccessType::WriteOnly;
         let writes = *access != AccessType::ReadOnly;
         writeln!(source, "            Binding {{ name: \"{name}\", set: {set}, binding: {binding}, reads: {reads}, writes: {writes} }},")
@@ -197,9 +230,14 @@ fn write_kernel(source: &mut String, path: &str, name: &str, kernel: &Kernel) {
     }
     writeln!(source, "        ],\n    }};\n").unwrap();
     // The least that a Vulkan device may offer.
-    writeln!(source, "    const FITS: () = assert!(size_of::<{push}>() <= 128, \"push constants of {name}\");\n").unwrap();
-    writeln!(source, "    fn buffers(&self) -> Vec<&Buffer> {{").unwrap();
-    let fields: Vec<String> = kernel.buffers.iter().map(|buffer| format!("self.{}", buffer.name)).collect();
+    writeln!(source, "    const FITS: () = {{\n        assert!(size_of::<{push}>() <= 128, \"push constants of {name}\");").unwrap();
+    for Buffer { name: buffer, element, stride, .. } in &kernel.buffers {
+        let fits = format!("size_of::<{element}>().is_multiple_of({stride}) || {stride}usize.is_multiple_of(size_of::<{element}>())");
+        writeln!(source, "        assert!({fits}, \"elements of {buffer} in {name}\");").unwrap();
+    }
+    writeln!(source, "    }};\n").unwrap();
+    writeln!(source, "    fn buffers(&self) -> Vec<&AnyBuffer> {{").unwrap();
+    let fields: Vec<String> = kernel.buffers.iter().map(|buffer| format!("self.{}.any()", buffer.name)).collect();
     writeln!(source, "        vec![{}]\n    }}\n}}\n", fields.join(", ")).unwrap();
 }
 

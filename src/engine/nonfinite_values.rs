@@ -40,15 +40,15 @@ const KINDS: usize = 3;
 const WORDS: usize = 1 + 3 * MAX_NONFINITE_VALUES as usize;
 
 /// The buffer in which kernels record nonfinite values.
-pub fn buffer(gpu: &Gpu, commands: &mut Commands) -> Result<Buffer> {
+pub fn buffer(gpu: &Gpu, commands: &mut Commands) -> Result<Buffer<u32>> {
     let buffer = gpu.buffer::<u32>("nonfinite_values", (KINDS * WORDS) as u64, Memory::Device)?;
-    commands.fill(&buffer, 0, (KINDS * WORDS) as u64, 0);
+    commands.clear(&buffer);
     Ok(buffer)
 }
 
 impl NonfiniteValues {
-    pub fn read(commands: &mut Commands, buffer: &Buffer) -> Result<NonfiniteValues> {
-        let words = commands.read::<u32>(buffer, KINDS * WORDS)?;
+    pub fn read(commands: &mut Commands, buffer: &Buffer<u32>) -> Result<NonfiniteValues> {
+        let words = commands.read(buffer, KINDS * WORDS)?;
         let mut nonfinite_values = NonfiniteValues::default();
         for (kind, words) in words.chunks_exact(WORDS).enumerate() {
             nonfinite_values.count = nonfinite_values.count.saturating_add(words[0]);

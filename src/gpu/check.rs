@@ -115,15 +115,15 @@ fn ask(gpu: &Gpu, push: &CheckPush) -> Result<Answers> {
     let mut commands = Commands::new(gpu, Constants::new(GROUP_SIZE), Instant::now())?;
     let answers = gpu.buffer::<u32>("check answers", 5, Memory::Device)?;
     let film = gpu.buffer::<u64>("check film", 1, Memory::Device)?;
-    commands.fill(&answers, 0, 5, 0);
-    commands.fill(&film, 0, 2, 0);
+    commands.clear(&answers);
+    commands.clear(&film);
     if gpu.facts.int64_atomics {
         commands.dispatch(CheckU64 { film: &film, answers: &answers }, push, Extent::Groups(1, 1))?;
     } else {
         commands.dispatch(CheckTwoWords { film: &film, answers: &answers }, push, Extent::Groups(1, 1))?;
     }
-    let words = commands.read::<u32>(&answers, 5)?;
-    let film_sum = commands.read::<u64>(&film, 1)?[0];
+    let words = commands.read(&answers, 5)?;
+    let film_sum = commands.read(&film, 1)?[0];
     let [iterations, chain, survivors, order_sum, subgroups] = words[..] else { unreachable!("five words were read") };
     Ok(Answers { iterations, chain, survivors, order_sum, subgroups, film_sum })
 }

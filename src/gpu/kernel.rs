@@ -10,7 +10,7 @@ use bytemuck::Pod;
 use rayon::prelude::*;
 
 use super::specialize::decided;
-use super::{Buffer, Context, DeviceFacts, Gpu, call};
+use super::{AnyBuffer, Context, DeviceFacts, Gpu, call};
 use crate::error::Result;
 use crate::records::Field;
 
@@ -22,7 +22,7 @@ pub trait Kernel {
     /// Fails to compile if the push constants exceed what every device allows.
     const FITS: ();
     /// In the order of `MODULE.bindings`.
-    fn buffers(&self) -> Vec<&Buffer>;
+    fn buffers(&self) -> Vec<&AnyBuffer>;
 }
 
 /// A compiled kernel and what reflection found in it.

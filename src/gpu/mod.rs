@@ -19,7 +19,7 @@ use std::time::Instant;
 use ash::vk;
 use gpu_allocator::vulkan::{Allocator, AllocatorCreateDesc};
 
-pub use buffer::{Buffer, HeldMemory, Memory};
+pub use buffer::{AnyBuffer, Buffer, HeldMemory, Memory};
 pub use commands::{Commands, Extent, Interrupt};
 pub use device::DeviceFacts;
 pub use kernel::{Constants, Kernel, Module};
@@ -30,7 +30,7 @@ use validation::Messages;
 
 /// The kernels that `build.rs` found, one struct each.
 pub mod kernels {
-    use super::buffer::Buffer;
+    use super::buffer::{AnyBuffer, Buffer};
     use super::kernel::{Binding, Kernel, Module, ReflectedStruct};
     use crate::records::Field;
 

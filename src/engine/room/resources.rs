@@ -10,93 +10,93 @@ use crate::path::StoredPath;
 use crate::photon::{Origin, StoredPhoton};
 use crate::plan::RoomPlan;
 use crate::plan::memory::{group_count, searches_at_once, tree_count_capacity};
-use crate::records::{self, DispatchArgs, Point, Search};
+use crate::records::{self, DispatchArgs, Point, Search, Tally};
 use crate::scene::room::RoomScene;
 use crate::settings::Builder;
 use glam::UVec2;
 
 pub struct RoomResources {
     // The scene, written once.
-    pub rooms: Buffer,
-    pub walls: Buffer,
-    pub lights: Buffer,
-    pub points: Buffer,
-    pub stream_seeds: Buffer,
+    pub rooms: Buffer<records::Room>,
+    pub walls: Buffer<records::Wall>,
+    pub lights: Buffer<records::DiscLight>,
+    pub points: Buffer<Point>,
+    pub stream_seeds: Buffer<UVec2>,
     // Photons of the chunk under way.
     /// Paths entering even bounces and odd bounces; one element, for a replay, where no bounce hands paths to the next.
-    pub paths: [Buffer; 2],
-    pub photons: Buffer,
+    pub paths: [Buffer<StoredPath>; 2],
+    pub photons: Buffer<StoredPhoton>,
     /// Which photon each entry of the photon map is; one empty element where nobody asks.
-    pub origins: Buffer,
+    pub origins: Buffer<Origin>,
     /// Length of the photon map, the paths entering each bounce, and the counters that are taken in turn.
-    pub counters: Buffer,
-    pub dispatch_args: Buffer,
+    pub counters: Buffer<u32>,
+    pub dispatch_args: Buffer<DispatchArgs>,
     /// What keeps photons in order; `None` where they come as they do.
     pub order: Option<OrderBuffers>,
     /// Ledger of the submission under way; see `tallies`.
-    pub tallies: Buffer,
+    pub tallies: Buffer<Tally>,
     /// The grid; `None` where the gather has another index or none.
     pub index: Option<IndexBuffers>,
     /// The kd-tree; `None` where the gather has another index or none.
     pub tree: Option<TreeBuffers>,
     /// What the round under way has left so far; of a single round, the result.
-    pub film: Buffer,
+    pub film: Buffer<u64>,
     /// What all rounds left; `None` of a single one.
     pub rounds: Option<RoundBuffers>,
-    pub nonfinite_values: Buffer,
+    pub nonfinite_values: Buffer<u32>,
 }
 
 /// Survivors of a bounce, for prefix sums over them.
 pub struct OrderBuffers {
     /// Survivors in each work group of paths, then their prefix sums, and the sum of all behind them.
-    pub survivors: Buffer,
-    pub block_sums: Vec<Buffer>,
+    pub survivors: Buffer<u32>,
+    pub block_sums: Vec<Buffer<u32>>,
     /// Weight at the eye of each path's photon; one element where all weigh 1.
-    pub weights: Buffer,
+    pub weights: Buffer<f32>,
 }
 
 /// The rounds that have ended, sum by sum of the film.
 pub struct RoundBuffers {
-    pub totals: Buffer,
+    pub totals: Buffer<u64>,
     /// Lower and upper 64 bits of the sums of squares.
-    pub low_squares: Buffer,
-    pub high_squares: Buffer,
+    pub low_squares: Buffer<u64>,
+    pub high_squares: Buffer<u64>,
 }
 
 pub struct IndexBuffers {
     /// Photons in each cell; after their prefix sums the first photon of each, and behind the last the number of all.
-    pub cells: Buffer,
+    pub cells: Buffer<u32>,
     /// Place of each entry of the photon map among those of its cell.
-    pub ranks: Buffer,
+    pub ranks: Buffer<u32>,
     /// Sums of blocks of cells, sums of blocks of those, ... down to one.
-    pub block_sums: Vec<Buffer>,
-    pub sorted_photons: Buffer,
+    pub block_sums: Vec<Buffer<u32>>,
+    pub sorted_photons: Buffer<StoredPhoton>,
     /// Candidates of the busiest point.
-    pub longest: Buffer,
+    pub longest: Buffer<u32>,
 }
 
 /// The kd-tree of `glsl/index/tree.glsl`, and what it is built with.
 pub struct TreeBuffers {
     /// (order key, entry of the photon map) in the order along the walls' first axis and along their second, and one
     /// to write into, in changing roles.
-    pub lists: [Buffer; 3],
+    pub lists: [Buffer<UVec2>; 3],
     /// Place of each photon in the order along the axis that nodes are split along.
-    pub ranks: Buffer,
+    pub ranks: Buffer<u32>,
     /// Photons of each digit and run, or that go to the left; then their prefix sums.
-    pub counts: Buffer,
-    pub block_sums: Vec<Buffer>,
+    pub counts: Buffer<u32>,
+    pub block_sums: Vec<Buffer<u32>>,
     /// Sizes of dispatches of an invocation a photon, a run of them, and a share of a prefix sum.
-    pub item_args: Buffer,
-    pub run_args: Buffer,
-    pub scan_args: Buffer,
+    pub item_args: Buffer<DispatchArgs>,
+    pub run_args: Buffer<DispatchArgs>,
+    pub scan_args: Buffer<DispatchArgs>,
     /// First photon of each wall, and the number of all.
-    pub wall_begins: Buffer,
+    pub wall_begins: Buffer<u32>,
     /// Photons of the fullest wall.
-    pub longest: Buffer,
-    pub planes: Buffer,
-    pub tree_photons: Buffer,
+    pub longest: Buffer<u32>,
+    pub planes: Buffer<f32>,
+    pub tree_photons: Buffer<StoredPhoton>,
     /// Which photon each of them is; one empty element where nobody asks.
-    pub tree_origins: Buffer,
+    pub tree_origins: Buffer<Origin>,
     /// Searches for nearest photons; `None` where the radius alone decides.
     pub searches: Option<SearchBuffers>,
 }
@@ -105,10 +105,10 @@ pub struct SearchBuffers {
     /// Points that are searched for at once.
     pub point_count: u32,
     /// Nearest photons of each.
-    pub nearest: Buffer,
-    pub searches: Buffer,
+    pub nearest: Buffer<UVec2>,
+    pub searches: Buffer<Search>,
     /// 1: some search has not ended.
-    pub unfinished: Buffer,
+    pub unfinished: Buffer<u32>,
 }
 
 impl RoomResources {
@@ -143,7 +143,7 @@ impl RoomResources {
         commands.upload(&resources.lights, &scene.light_records(&plan.relative_flux))?;
         commands.upload(&resources.points, &plan.points)?;
         commands.upload(&resources.stream_seeds, &seeds)?;
-        commands.fill(&resources.film, 0, 2 * sums, 0);
+        commands.clear(&resources.film);
         tallies::clear(commands, &resources.tallies);
         Ok(resources)
     }
@@ -169,7 +169,7 @@ impl RoundBuffers {
             high_squares: gpu.buffer::<u64>("high squares", sums, Memory::Device)?,
         };
         for buffer in [&buffers.totals, &buffers.low_squares, &buffers.high_squares] {
-            commands.fill(buffer, 0, 2 * sums, 0);
+            commands.clear(buffer);
         }
         Ok(buffers)
     }

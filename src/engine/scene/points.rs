@@ -137,7 +137,7 @@ fn go_on(commands: &mut Commands, resources: &SceneResources, geometry: &Geometr
         resources;
     let domain = if matches!(plan.sensor, Sensor::Picture { .. }) { DOMAIN_CAMERA } else { DOMAIN_RECEIVERS };
     for parity in [0, 1].into_iter().cycle() {
-        let path_count = commands.read::<u32>(camera_path_counts, 1)?[0];
+        let path_count = commands.read(camera_path_counts, 1)?[0];
         if path_count == 0 {
             break;
         }

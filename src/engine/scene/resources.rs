@@ -1,7 +1,7 @@
 //! Every buffer of lighting a scene of triangles, named and sized by the plan.
 
 use bytemuck::Pod;
-use glam::UVec2;
+use glam::{UVec2, Vec4};
 
 use super::losses::ANOMALY_WORDS;
 use crate::constants::{HIT_KINDS, PART_COUNT};
@@ -19,58 +19,58 @@ use crate::settings::scene::Effect;
 
 pub struct SceneResources {
     // The scene, written once; what the plan dropped has one empty element.
-    pub nodes: Buffer,
-    pub triangles: Buffer,
-    pub planes: Buffer,
-    pub normals: Buffer,
-    pub uvs: Buffer,
-    pub materials: Buffer,
-    pub textures: Buffer,
-    pub texels: Buffer,
-    pub emitters: Buffer,
-    pub caustic_targets: Buffer,
+    pub nodes: Buffer<BvhNode>,
+    pub triangles: Buffer<Triangle>,
+    pub planes: Buffer<Vec4>,
+    pub normals: Buffer<TriangleNormals>,
+    pub uvs: Buffer<TriangleUvs>,
+    pub materials: Buffer<SurfaceMaterial>,
+    pub textures: Buffer<TextureInfo>,
+    pub texels: Buffer<UVec2>,
+    pub emitters: Buffer<Emitter>,
+    pub caustic_targets: Buffer<CausticTarget>,
     /// Points of all phases; empty for a picture.
-    pub receivers: Vec<Buffer>,
+    pub receivers: Vec<Buffer<Receiver>>,
     // Photons of the chunk under way.
     pub photons: Option<PhotonBuffers>,
     // What the sensor sees in the round under way.
-    pub visible_points: Buffer,
-    pub pass_sums: Buffer,
+    pub visible_points: Buffer<VisiblePoint>,
+    pub pass_sums: Buffer<u64>,
     /// Camera paths that one dispatch leaves to the next, which leaves its own in the other; and how many.
-    pub camera_paths: [Buffer; 2],
-    pub camera_path_counts: Buffer,
-    pub estimates: Buffer,
+    pub camera_paths: [Buffer<CameraPath>; 2],
+    pub camera_path_counts: Buffer<u32>,
+    pub estimates: Buffer<u64>,
     // All rounds.
-    pub film_sums: Buffer,
-    pub film_squares: Buffer,
+    pub film_sums: Buffer<u64>,
+    pub film_squares: Buffer<u64>,
     /// What is known of pixels that some kind of light has not reached; see `glsl/world/scene/one_hit.glsl`.
-    pub one_hits: Buffer,
-    pub part_totals: Buffer,
-    pub anomalies: Buffer,
-    pub nonfinite_values: Buffer,
+    pub one_hits: Buffer<u32>,
+    pub part_totals: Buffer<u64>,
+    pub anomalies: Buffer<u32>,
+    pub nonfinite_values: Buffer<u32>,
 }
 
 /// Photons in flight and their map; both maps of a round use the same ones in turn.
 pub struct PhotonBuffers {
     /// Paths entering even bounces and odd bounces.
-    pub paths: [Buffer; 2],
-    pub map: Buffer,
-    pub sorted_map: Buffer,
+    pub paths: [Buffer<LightPath>; 2],
+    pub map: Buffer<MapPhoton>,
+    pub sorted_map: Buffer<MapPhoton>,
     /// Length of the map, then the paths entering each bounce.
-    pub counters: Buffer,
-    pub dispatch_args: Buffer,
+    pub counters: Buffer<u32>,
+    pub dispatch_args: Buffer<DispatchArgs>,
     /// Photons in each bucket; after their prefix sums the first photon of each, and behind the last the number of all.
-    pub cells: Buffer,
+    pub cells: Buffer<u32>,
     /// Place of each photon among those of its bucket.
-    pub ranks: Buffer,
-    pub block_sums: Vec<Buffer>,
+    pub ranks: Buffer<u32>,
+    pub block_sums: Vec<Buffer<u32>>,
     /// Points with so many candidates that several invocations share them: how many, the most candidates, and each one with its candidates.
-    pub crowded: Buffer,
+    pub crowded: Buffer<u32>,
     /// Fates of the submission under way, one tally a bounce: of the global map's photons, and of the
     /// caustic map's.
-    pub tallies: [Buffer; 2],
+    pub tallies: [Buffer<Tally>; 2],
     /// Photons stored and what limits cost, of each map.
-    pub totals: [Buffer; 2],
+    pub totals: [Buffer<u32>; 2],
 }
 
 impl SceneResources {
@@ -83,7 +83,7 @@ impl SceneResources {
         plan: &ScenePlan,
         phases: &[Vec<Receiver>],
     ) -> Result<SceneResources> {
-        fn filled<T: Pod>(gpu: &Gpu, commands: &mut Commands, name: &str, content: &[T], kept: bool) -> Result<Buffer> {
+        fn filled<T: Pod>(gpu: &Gpu, commands: &mut Commands, name: &str, content: &[T], kept: bool) -> Result<Buffer<T>> {
             let content = if kept { content } else { &[] };
             let buffer = gpu.buffer::<T>(name, content.len() as u64, Memory::Device)?;
             commands.upload(&buffer, content)?;
@@ -122,11 +122,11 @@ impl SceneResources {
             anomalies: gpu.buffer::<u32>("anomalies", ANOMALY_WORDS as u64, device)?,
             nonfinite_values: nonfinite_values::buffer(gpu, commands)?,
         };
-        commands.fill(&resources.film_sums, 0, 6 * pixels, 0);
-        commands.fill(&resources.film_squares, 0, 12 * pixels, 0);
-        commands.fill(&resources.one_hits, 0, u64::from(HIT_KINDS) * pixels, 0);
-        commands.fill(&resources.part_totals, 0, 2 * u64::from(PART_COUNT), 0);
-        commands.fill(&resources.anomalies, 0, ANOMALY_WORDS as u64, 0);
+        commands.clear(&resources.film_sums);
+        commands.clear(&resources.film_squares);
+        commands.clear(&resources.one_hits);
+        commands.clear(&resources.part_totals);
+        commands.clear(&resources.anomalies);
         Ok(resources)
     }
 }

@@ -97,8 +97,8 @@ fn run(gpu: &Gpu, scene: &Scene, view: &View, run: &ScenePlan, limits: &Limits) 
     let SceneResources { nodes, triangles, planes, visible_points, .. } = &resources;
     let kernel = Clearance { nodes, triangles, planes, visible_points, clearances: &clearances };
     commands.dispatch(kernel, &ClearancePush { point_count }, Extent::Items(u64::from(point_count)))?;
-    let visible_points = commands.read::<VisiblePoint>(visible_points, point_count as usize)?;
-    let clearances = commands.read::<f32>(&clearances, point_count as usize)?;
+    let visible_points = commands.read(visible_points, point_count as usize)?;
+    let clearances = commands.read(&clearances, point_count as usize)?;
 
     let mut trial = Trial::default();
     let mut largest = 0.0;
@@ -134,8 +134,8 @@ fn photons_of(commands: &mut Commands, round: Round, map: &MapPlan) -> Result<Ve
     let buffers = round.resources.photons.as_ref().expect("a map has photons");
     let mut found = Vec::new();
     let mut take = |commands: &mut Commands| {
-        let count = commands.read::<u32>(&buffers.counters, 1)?[0].min(map.capacity);
-        found.extend(commands.read::<MapPhoton>(&buffers.map, count as usize)?);
+        let count = commands.read(&buffers.counters, 1)?[0].min(map.capacity);
+        found.extend(commands.read(&buffers.map, count as usize)?);
         Ok(())
     };
     for chunk in map.chunks() {

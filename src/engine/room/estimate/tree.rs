@@ -107,7 +107,7 @@ fn gather_nearest(
                     };
                     commands.dispatch(kernel, &push, extent)?;
                 }
-                if commands.read::<u32>(unfinished, 1)? == [0] {
+                if commands.read(unfinished, 1)? == [0] {
                     break;
                 }
                 push.is_first = 0;

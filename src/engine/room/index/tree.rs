@@ -6,6 +6,8 @@
 //! there are only the device knows, so dispatches are sized there, and heights that the tree does not reach are
 //! passed over there.
 
+use glam::UVec2;
+
 use super::add_work;
 use crate::constants::{MAX_GROUPS, TREE_DIGITS, TREE_LEAF};
 use crate::engine::prefix_sum::scan_part;
@@ -94,7 +96,7 @@ fn sort(
     tree: &TreeBuffers,
     plan: &RoomPlan,
     push: &TreePush,
-    lists: [&Buffer; 2],
+    lists: [&Buffer<UVec2>; 2],
     pass_work: u64,
 ) -> Result<()> {
     let RoomResources { photons, counters, .. } = resources;
@@ -127,9 +129,9 @@ fn split(
     tree: &TreeBuffers,
     plan: &RoomPlan,
     push: &TreePush,
-    along: &Buffer,
-    across: &Buffer,
-    next_keys: &Buffer,
+    along: &Buffer<UVec2>,
+    across: &Buffer<UVec2>,
+    next_keys: &Buffer<UVec2>,
 ) -> Result<()> {
     let TreeBuffers { wall_begins, longest, ranks, counts, planes, item_args, .. } = tree;
     let photons = || Extent::Indirect(item_args);

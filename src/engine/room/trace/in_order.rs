@@ -5,6 +5,7 @@ use crate::engine::room::resources::{OrderBuffers, RoomResources};
 use crate::error::Result;
 use crate::gpu::kernels::{KeepOrder, TraceInPlace};
 use crate::gpu::{Buffer, Commands, Extent};
+use crate::path::StoredPath;
 use crate::plan::RoomPlan;
 use crate::plan::memory::group_count;
 use crate::records::TracePush;
@@ -14,7 +15,7 @@ pub fn one_bounce<'a>(
     commands: &mut Commands,
     resources: &RoomResources,
     plan: &RoomPlan,
-    [paths, next_paths]: [&Buffer; 2],
+    [paths, next_paths]: [&Buffer<StoredPath>; 2],
     push: &TracePush,
     extent: impl Fn() -> Extent<'a>,
 ) -> Result<()> {
