@@ -12,7 +12,7 @@ const LINE: &[&[&str]] = &[
     &["scene"],
     &["verify::judge", "plan"],
     &["cpu", "gpu"],
-    &["engine", "engine::bias", "engine::prefix_sum", "engine::tallies", "engine::totals", "engine::unknown", "engine::nonfinite_values"],
+    &["engine", "engine::bias", "engine::planned", "engine::prefix_sum", "engine::tallies", "engine::totals", "engine::unknown", "engine::nonfinite_values"],
     &["engine::watch"],
     &["engine::room", "engine::scene"],
     &["engine::choose_builder"],

@@ -3,12 +3,8 @@
 
 use crate::constants::TALLY_COPIES;
 use crate::error::Result;
-use crate::gpu::{Buffer, Commands, Gpu, Memory};
+use crate::gpu::{Buffer, Commands};
 use crate::records::Tally;
-
-pub fn buffer(gpu: &Gpu, name: &'static str, bounces: u32) -> Result<Buffer<Tally>> {
-    gpu.buffer::<Tally>(name, u64::from(bounces) * u64::from(TALLY_COPIES), Memory::Device)
-}
 
 pub fn clear(commands: &mut Commands, tallies: &Buffer<Tally>) {
     commands.clear(tallies);

@@ -36,7 +36,7 @@ pub fn build(commands: &mut Commands, resources: &RoomResources, plan: &RoomPlan
     let extent = || if plan.has_slots() { Extent::Items(u64::from(push.photon_capacity)) } else { Extent::Indirect(dispatch_args) };
     commands.scope("index", |commands| {
         commands.scope("count", |commands| {
-            commands.fill(cells, 0, u64::from(plan.grid.cells()) + 1, 0);
+            commands.clear(cells);
             if !plan.has_slots() {
                 let size = DispatchSizePush {
                     counter: 0,

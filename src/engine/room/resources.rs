@@ -1,25 +1,22 @@
 //! Every buffer of a run on the device, named and sized by the plan.
 
-use crate::constants::{FACE_COUNT, TREE_LEAF};
-use crate::engine::nonfinite_values;
-use crate::engine::prefix_sum::block_sums;
-use crate::engine::tallies;
+use glam::UVec2;
+
+use crate::engine::planned::Planned;
 use crate::error::Result;
-use crate::gpu::{Buffer, Commands, Gpu, Memory};
+use crate::gpu::{Buffer, Commands, Gpu};
 use crate::path::StoredPath;
 use crate::photon::{Origin, StoredPhoton};
 use crate::plan::RoomPlan;
-use crate::plan::memory::{group_count, searches_at_once, tree_count_capacity};
-use crate::records::{self, DispatchArgs, Point, Search, Tally};
+use crate::records::{DiscLight, DispatchArgs, Point, Room, Search, Tally, Wall};
 use crate::scene::room::RoomScene;
 use crate::settings::Builder;
-use glam::UVec2;
 
 pub struct RoomResources {
     // The scene, written once.
-    pub rooms: Buffer<records::Room>,
-    pub walls: Buffer<records::Wall>,
-    pub lights: Buffer<records::DiscLight>,
+    pub rooms: Buffer<Room>,
+    pub walls: Buffer<Wall>,
+    pub lights: Buffer<DiscLight>,
     pub points: Buffer<Point>,
     pub stream_seeds: Buffer<UVec2>,
     // Photons of the chunk under way.
@@ -102,10 +99,9 @@ pub struct TreeBuffers {
 }
 
 pub struct SearchBuffers {
-    /// Points that are searched for at once.
-    pub point_count: u32,
-    /// Nearest photons of each.
+    /// Nearest photons of each point that is searched for.
     pub nearest: Buffer<UVec2>,
+    /// As many as go on at once.
     pub searches: Buffer<Search>,
     /// 1: some search has not ended.
     pub unfinished: Buffer<u32>,
@@ -114,114 +110,87 @@ pub struct SearchBuffers {
 impl RoomResources {
     /// Makes the buffers and records the upload of what never changes.
     pub fn new(gpu: &Gpu, commands: &mut Commands, scene: &RoomScene, plan: &RoomPlan) -> Result<RoomResources> {
-        let paths = u64::from(plan.path_array_length());
-        let photons = u64::from(plan.photon_capacity);
-        let seeds = plan.streams().first_states(plan.path_capacity);
-        let sums = plan.points.len() as u64 * u64::from(plan.channel_count);
-        let device = Memory::Device;
-        let resources = RoomResources {
-            rooms: gpu.buffer::<records::Room>("rooms", 1, device)?,
-            walls: gpu.buffer::<records::Wall>("walls", scene.faces.len() as u64, device)?,
-            lights: gpu.buffer::<records::DiscLight>("lights", scene.lights.len() as u64, device)?,
-            points: gpu.buffer::<Point>("points", plan.points.len() as u64, device)?,
-            stream_seeds: gpu.buffer::<UVec2>("stream seeds", seeds.len() as u64, device)?,
-            paths: [gpu.buffer::<StoredPath>("even paths", paths, device)?, gpu.buffer::<StoredPath>("odd paths", paths, device)?],
-            photons: gpu.buffer::<StoredPhoton>("photons", photons, device)?,
-            origins: gpu.buffer::<Origin>("origins", u64::from(plan.origin_array_length()), device)?,
-            counters: gpu.buffer::<u32>("counters", plan.counter_array_length(), device)?,
-            dispatch_args: gpu.buffer::<DispatchArgs>("dispatch args", 1, device)?,
-            order: if plan.settings.builder == Builder::Scan { Some(OrderBuffers::new(gpu, plan)?) } else { None },
-            tallies: tallies::buffer(gpu, "tallies", plan.settings.bounces)?,
-            index: if plan.gathers_by_grid() { Some(IndexBuffers::new(gpu, plan)?) } else { None },
-            tree: if plan.gathers_by_tree() { Some(TreeBuffers::new(gpu, plan)?) } else { None },
-            film: gpu.buffer::<u64>("film", sums, device)?,
-            rounds: if plan.keeps_squares() { Some(RoundBuffers::new(gpu, commands, sums)?) } else { None },
-            nonfinite_values: nonfinite_values::buffer(gpu, commands)?,
-        };
-        commands.upload(&resources.rooms, &[scene.room_record()])?;
-        commands.upload(&resources.walls, &scene.wall_records())?;
-        commands.upload(&resources.lights, &scene.light_records(&plan.relative_flux))?;
-        commands.upload(&resources.points, &plan.points)?;
-        commands.upload(&resources.stream_seeds, &seeds)?;
-        commands.clear(&resources.film);
-        tallies::clear(commands, &resources.tallies);
-        Ok(resources)
+        let planned = &Planned { gpu, buffers: plan.buffers() };
+        Ok(RoomResources {
+            rooms: planned.filled(commands, "rooms", &[scene.room_record()])?,
+            walls: planned.filled(commands, "walls", &scene.wall_records())?,
+            lights: planned.filled(commands, "lights", &scene.light_records(&plan.relative_flux))?,
+            points: planned.filled(commands, "points", &plan.points)?,
+            stream_seeds: planned.filled(commands, "stream seeds", &plan.streams().first_states(plan.path_capacity))?,
+            paths: [planned.one("even paths")?, planned.one("odd paths")?],
+            photons: planned.one("photons")?,
+            origins: planned.one("origins")?,
+            counters: planned.one("counters")?,
+            dispatch_args: planned.one("dispatch args")?,
+            order: if plan.settings.builder == Builder::Scan { Some(OrderBuffers::new(planned)?) } else { None },
+            tallies: planned.zeroed(commands, "tallies")?,
+            index: if plan.gathers_by_grid() { Some(IndexBuffers::new(planned)?) } else { None },
+            tree: if plan.gathers_by_tree() { Some(TreeBuffers::new(planned, plan)?) } else { None },
+            film: planned.zeroed(commands, "film")?,
+            rounds: if plan.keeps_squares() { Some(RoundBuffers::new(planned, commands)?) } else { None },
+            nonfinite_values: planned.zeroed(commands, "nonfinite values")?,
+        })
     }
 }
 
 impl OrderBuffers {
-    fn new(gpu: &Gpu, plan: &RoomPlan) -> Result<OrderBuffers> {
-        let sums = u64::from(group_count(plan)) + 1;
-        let weights = if plan.settings.has_phong() { u64::from(plan.path_capacity) } else { 1 };
+    fn new(planned: &Planned) -> Result<OrderBuffers> {
         Ok(OrderBuffers {
-            survivors: gpu.buffer::<u32>("survivors", sums, Memory::Device)?,
-            block_sums: block_sums(gpu, sums, plan.settings.group_size)?,
-            weights: gpu.buffer::<f32>("weights", weights, Memory::Device)?,
+            survivors: planned.one("survivors")?,
+            block_sums: planned.all("sums of survivors")?,
+            weights: planned.one("weights")?,
         })
     }
 }
 
 impl RoundBuffers {
-    fn new(gpu: &Gpu, commands: &mut Commands, sums: u64) -> Result<RoundBuffers> {
-        let buffers = RoundBuffers {
-            totals: gpu.buffer::<u64>("film totals", sums, Memory::Device)?,
-            low_squares: gpu.buffer::<u64>("low squares", sums, Memory::Device)?,
-            high_squares: gpu.buffer::<u64>("high squares", sums, Memory::Device)?,
-        };
-        for buffer in [&buffers.totals, &buffers.low_squares, &buffers.high_squares] {
-            commands.clear(buffer);
-        }
-        Ok(buffers)
+    fn new(planned: &Planned, commands: &mut Commands) -> Result<RoundBuffers> {
+        Ok(RoundBuffers {
+            totals: planned.zeroed(commands, "film totals")?,
+            low_squares: planned.zeroed(commands, "low squares")?,
+            high_squares: planned.zeroed(commands, "high squares")?,
+        })
     }
 }
 
 impl IndexBuffers {
-    fn new(gpu: &Gpu, plan: &RoomPlan) -> Result<IndexBuffers> {
-        let cells = u64::from(plan.grid.cells()) + 1;
+    fn new(planned: &Planned) -> Result<IndexBuffers> {
         Ok(IndexBuffers {
-            cells: gpu.buffer::<u32>("cells", cells, Memory::Device)?,
-            ranks: gpu.buffer::<u32>("ranks", u64::from(plan.photon_capacity), Memory::Device)?,
-            block_sums: block_sums(gpu, cells, plan.settings.group_size)?,
-            sorted_photons: gpu.buffer::<StoredPhoton>("sorted photons", u64::from(plan.photon_capacity), Memory::Device)?,
-            longest: gpu.buffer::<u32>("longest", 1, Memory::Device)?,
+            cells: planned.one("cells")?,
+            ranks: planned.one("ranks")?,
+            block_sums: planned.all("sums of cells")?,
+            sorted_photons: planned.one("sorted photons")?,
+            longest: planned.one("longest")?,
         })
     }
 }
 
 impl TreeBuffers {
-    fn new(gpu: &Gpu, plan: &RoomPlan) -> Result<TreeBuffers> {
-        let photons = u64::from(plan.photon_capacity);
-        let counts = u64::from(tree_count_capacity(plan));
-        let device = Memory::Device;
-        let list = || gpu.buffer::<UVec2>("tree list", photons, device);
-        let args = || gpu.buffer::<DispatchArgs>("tree dispatch args", 1, device);
+    fn new(planned: &Planned, plan: &RoomPlan) -> Result<TreeBuffers> {
         Ok(TreeBuffers {
-            lists: [list()?, list()?, list()?],
-            ranks: gpu.buffer::<u32>("tree ranks", photons, device)?,
-            counts: gpu.buffer::<u32>("tree counts", counts, device)?,
-            block_sums: block_sums(gpu, counts, plan.settings.group_size)?,
-            item_args: args()?,
-            run_args: args()?,
-            scan_args: args()?,
-            wall_begins: gpu.buffer::<u32>("wall begins", u64::from(FACE_COUNT) + 1, device)?,
-            longest: gpu.buffer::<u32>("longest", 1, device)?,
-            planes: gpu.buffer::<f32>("planes", photons / u64::from(TREE_LEAF) + 1, device)?,
-            tree_photons: gpu.buffer::<StoredPhoton>("tree photons", photons, device)?,
-            tree_origins: gpu.buffer::<Origin>("tree origins", u64::from(plan.origin_array_length()), device)?,
-            searches: plan.settings.nearest.map(|nearest| SearchBuffers::new(gpu, plan, nearest)).transpose()?,
+            lists: planned.several("tree list")?,
+            ranks: planned.one("tree ranks")?,
+            counts: planned.one("tree counts")?,
+            block_sums: planned.all("sums of tree counts")?,
+            item_args: planned.one("item args")?,
+            run_args: planned.one("run args")?,
+            scan_args: planned.one("scan args")?,
+            wall_begins: planned.one("wall begins")?,
+            longest: planned.one("longest")?,
+            planes: planned.one("planes")?,
+            tree_photons: planned.one("tree photons")?,
+            tree_origins: planned.one("tree origins")?,
+            searches: if plan.settings.nearest.is_some() { Some(SearchBuffers::new(planned)?) } else { None },
         })
     }
 }
 
 impl SearchBuffers {
-    fn new(gpu: &Gpu, plan: &RoomPlan, nearest: u32) -> Result<SearchBuffers> {
-        let at_once = searches_at_once(plan, nearest);
-        let device = Memory::Device;
+    fn new(planned: &Planned) -> Result<SearchBuffers> {
         Ok(SearchBuffers {
-            point_count: at_once as u32,
-            nearest: gpu.buffer::<UVec2>("nearest photons", at_once * u64::from(nearest), device)?,
-            searches: gpu.buffer::<Search>("searches", at_once, device)?,
-            unfinished: gpu.buffer::<u32>("unfinished", 1, device)?,
+            nearest: planned.one("nearest photons")?,
+            searches: planned.one("searches")?,
+            unfinished: planned.one("unfinished")?,
         })
     }
 }

@@ -75,8 +75,8 @@ fn gather_nearest(
     let SearchBuffers { nearest, searches, unfinished, .. } = buffers;
     let tests_per_point = plan.work.tests_per_point(photon_count).min(u64::from(GATHER_SLICE));
     for (first, last) in point_ranges(commands, plan, tests_per_point, 1) {
-        for first_point in (first..last).step_by(buffers.point_count as usize) {
-            let end_point = last.min(first_point + buffers.point_count);
+        for first_point in (first..last).step_by(searches.count() as usize) {
+            let end_point = last.min(first_point + searches.count() as u32);
             let mut push = NearestPush {
                 first_point,
                 end_point,

@@ -19,7 +19,6 @@ use crate::gpu::kernels::{
 };
 use crate::gpu::{Buffer, Commands, Extent, Kernel, Module};
 use crate::plan::RoomPlan;
-use crate::plan::memory::tree_count_capacity;
 use crate::records::{DispatchSizePush, TreePush};
 
 /// Kernels that the tree needs.
@@ -119,7 +118,7 @@ fn sort(
 
 fn sum_counts(commands: &mut Commands, tree: &TreeBuffers, plan: &RoomPlan) -> Result<()> {
     let threads = || Extent::Indirect(&tree.scan_args);
-    scan_part(commands, &tree.counts, &tree.block_sums, tree_count_capacity(plan), plan.settings.group_size, &threads)
+    scan_part(commands, &tree.counts, &tree.block_sums, tree.counts.count() as u32, plan.settings.group_size, &threads)
 }
 
 /// Splits the nodes of a height at the middle of the order along one axis; parts the order along the other into
