@@ -49,6 +49,8 @@ pub struct Commands<'gpu> {
     descriptor_pools: Vec<vk::DescriptorPool>,
     descriptor_pool_in_use: usize,
     descriptor_sets: HashMap<(vk::DescriptorSetLayout, Vec<vk::Buffer>), vk::DescriptorSet>,
+    /// What stands in set 0, if that is a scene: it is bound once and stays for as long as kernels look at it.
+    bound_scene: Option<vk::DescriptorSet>,
     timestamps: Timestamps,
     open_scopes: Vec<OpenScope>,
     timed_scopes: Vec<TimedScope>,
@@ -124,6 +126,7 @@ impl<'gpu> Commands<'gpu> {
             descriptor_pools: Vec::new(),
             descriptor_pool_in_use: 0,
             descriptor_sets: HashMap::new(),
+            bound_scene: None,
             timestamps,
             open_scopes: Vec::new(),
             timed_scopes: Vec::new(),
@@ -189,20 +192,17 @@ impl<'gpu> Commands<'gpu> {
         let module = K::MODULE;
         let buffers = kernel.buffers();
         let pipeline = self.gpu.pipeline(&module, &self.constants)?;
-        let sets = (0..pipeline.set_layouts.len() as u32)
-            .map(|set| {
-                let of_set: Vec<(u32, vk::Buffer)> = module
-                    .bindings
-                    .iter()
-                    .zip(&buffers)
-                    .filter(|(binding, _)| binding.set == set)
-                    .map(|(binding, buffer)| (binding.binding, buffer.raw()))
-                    .collect();
-                self.descriptor_set(pipeline.set_layouts[set as usize], &of_set)
-            })
-            .collect::<Result<Vec<_>>>()?;
+        let numbered = module.bindings.iter().map(|binding| binding.binding).zip(&buffers);
+        let own = self.descriptor_set(pipeline.set_layouts[1], numbered.collect())?;
+        let scene = kernel.scene();
+        let scene_set =
+            if scene.is_empty() { None } else { Some(self.descriptor_set(pipeline.set_layouts[0], (0..).zip(&scene).collect())?) };
+        // A kernel without a scene has another layout of set 0, and so disturbs what is bound there.
+        let sets: Vec<_> = scene_set.filter(|_| self.bound_scene != scene_set).into_iter().chain([own]).collect();
+        self.bound_scene = scene_set;
         let mut accesses: Vec<(&AnyBuffer, bool, bool)> =
             module.bindings.iter().zip(&buffers).map(|(binding, buffer)| (*buffer, binding.reads, binding.writes)).collect();
+        accesses.extend(scene.iter().map(|buffer| (*buffer, true, false)));
         if let Extent::Indirect(args) = &extent {
             accesses.push((args.any(), true, false));
         }
@@ -213,7 +213,14 @@ impl<'gpu> Commands<'gpu> {
         // submission has ended; group counts are within the device's limits.
         unsafe {
             device.cmd_bind_pipeline(command_buffer, vk::PipelineBindPoint::COMPUTE, pipeline.raw);
-            device.cmd_bind_descriptor_sets(command_buffer, vk::PipelineBindPoint::COMPUTE, pipeline.layout, 0, &sets, &[]);
+            device.cmd_bind_descriptor_sets(
+                command_buffer,
+                vk::PipelineBindPoint::COMPUTE,
+                pipeline.layout,
+                2 - sets.len() as u32,
+                &sets,
+                &[],
+            );
             if module.push_bytes != 0 {
                 device.cmd_push_constants(command_buffer, pipeline.layout, vk::ShaderStageFlags::COMPUTE, 0, bytemuck::bytes_of(push));
             }
@@ -362,6 +369,7 @@ impl<'gpu> Commands<'gpu> {
             }
         }
         self.descriptor_sets.clear();
+        self.bound_scene = None;
         self.descriptor_pool_in_use = 0;
         self.staging.clear();
         self.hazards = Hazards::default();
@@ -432,14 +440,14 @@ impl<'gpu> Commands<'gpu> {
         self.submission_count
     }
 
-    fn descriptor_set(&mut self, layout: vk::DescriptorSetLayout, buffers: &[(u32, vk::Buffer)]) -> Result<vk::DescriptorSet> {
-        let key = (layout, buffers.iter().map(|(_, buffer)| *buffer).collect());
+    fn descriptor_set(&mut self, layout: vk::DescriptorSetLayout, buffers: Vec<(u32, &&AnyBuffer)>) -> Result<vk::DescriptorSet> {
+        let key = (layout, buffers.iter().map(|(_, buffer)| buffer.raw()).collect());
         if let Some(set) = self.descriptor_sets.get(&key) {
             return Ok(*set);
         }
         let set = self.allocate_set(layout)?;
         let infos: Vec<[vk::DescriptorBufferInfo; 1]> =
-            buffers.iter().map(|(_, buffer)| [vk::DescriptorBufferInfo::default().buffer(*buffer).range(vk::WHOLE_SIZE)]).collect();
+            buffers.iter().map(|(_, buffer)| [vk::DescriptorBufferInfo::default().buffer(buffer.raw()).range(vk::WHOLE_SIZE)]).collect();
         let writes: Vec<_> = buffers
             .iter()
             .zip(&infos)

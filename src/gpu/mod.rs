@@ -65,6 +65,7 @@ pub struct Gpu {
     replaced: Vec<(String, Vec<u32>)>,
     queue: vk::Queue,
     pipelines: RefCell<HashMap<kernel::PipelineKey, Arc<kernel::Pipeline>>>,
+    set_layouts: kernel::SetLayouts,
     cache: kernel::DiskCache,
     context: Arc<Context>,
 }
@@ -167,6 +168,7 @@ impl Gpu {
             replaced: options.replaced.clone(),
             queue,
             pipelines: RefCell::default(),
+            set_layouts: kernel::SetLayouts::new(&context),
             cache,
             context,
         };

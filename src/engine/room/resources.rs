@@ -4,20 +4,17 @@ use glam::UVec2;
 
 use crate::engine::planned::Planned;
 use crate::error::Result;
-use crate::gpu::{Buffer, Commands, Gpu};
+use crate::gpu::{Buffer, Commands, Gpu, kernels};
 use crate::path::StoredPath;
 use crate::photon::{Origin, StoredPhoton};
 use crate::plan::RoomPlan;
-use crate::records::{DiscLight, DispatchArgs, Point, Room, Search, Tally, Wall};
+use crate::records::{DispatchArgs, Search, Tally};
 use crate::scene::room::RoomScene;
 use crate::settings::Builder;
 
 pub struct RoomResources {
-    // The scene, written once.
-    pub rooms: Buffer<Room>,
-    pub walls: Buffer<Wall>,
-    pub lights: Buffer<DiscLight>,
-    pub points: Buffer<Point>,
+    /// Written once.
+    pub room: kernels::Room,
     pub stream_seeds: Buffer<UVec2>,
     // Photons of the chunk under way.
     /// Paths entering even bounces and odd bounces; one element, for a replay, where no bounce hands paths to the next.
@@ -112,10 +109,12 @@ impl RoomResources {
     pub fn new(gpu: &Gpu, commands: &mut Commands, scene: &RoomScene, plan: &RoomPlan) -> Result<RoomResources> {
         let planned = &Planned { gpu, buffers: plan.buffers() };
         Ok(RoomResources {
-            rooms: planned.filled(commands, "rooms", &[scene.room_record()])?,
-            walls: planned.filled(commands, "walls", &scene.wall_records())?,
-            lights: planned.filled(commands, "lights", &scene.light_records(&plan.relative_flux))?,
-            points: planned.filled(commands, "points", &plan.points)?,
+            room: kernels::Room {
+                rooms: planned.filled(commands, "rooms", &[scene.room_record()])?,
+                walls: planned.filled(commands, "walls", &scene.wall_records())?,
+                lights: planned.filled(commands, "lights", &scene.light_records(&plan.relative_flux))?,
+                points: planned.filled(commands, "points", &plan.points)?,
+            },
             stream_seeds: planned.filled(commands, "stream seeds", &plan.streams().first_states(plan.path_capacity))?,
             paths: [planned.one("even paths")?, planned.one("odd paths")?],
             photons: planned.one("photons")?,

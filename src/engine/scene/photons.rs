@@ -149,8 +149,7 @@ fn trace_persistent(
     flights: u32,
 ) -> Result<usize> {
     let Round { resources, geometry, plan, .. } = round;
-    let SceneResources { nodes, triangles, normals, uvs, materials, textures, texels, emitters, caustic_targets, nonfinite_values, .. } =
-        resources;
+    let SceneResources { scene, nonfinite_values, .. } = resources;
     let PhotonBuffers { paths, counters, map: map_buffer, .. } = photons;
     let which = usize::from(map.caustic_only);
     let (tallies, totals) = (&photons.tallies[which], &photons.totals[which]);
@@ -170,15 +169,7 @@ fn trace_persistent(
             stride: map.persistence.invocations(count),
         };
         let kernel = SceneTracePersistent {
-            nodes,
-            triangles,
-            normals,
-            uvs,
-            materials,
-            textures,
-            texels,
-            emitters,
-            caustic_targets,
+            scene,
             light_paths: &paths[parity],
             next_light_paths: &paths[1 - parity],
             map: map_buffer,
@@ -209,12 +200,10 @@ const LEAST_PHOTONS: u32 = 1 << 12;
 /// Writes the paths of a chunk as they leave the lights.
 pub fn emit(commands: &mut Commands, round: Round, photons: &PhotonBuffers, map: &MapPlan, chunk: (u32, u32)) -> Result<()> {
     let Round { resources, geometry, .. } = round;
-    let SceneResources { nodes, triangles, normals, uvs, materials, textures, texels, emitters, caustic_targets, nonfinite_values, .. } =
-        resources;
+    let SceneResources { scene, nonfinite_values, .. } = resources;
     let light_paths = &photons.paths[0];
     let push = EmissionPush { draws: draws(round, map), emission: emission(geometry, map, chunk) };
-    let kernel =
-        SceneEmit { nodes, triangles, normals, uvs, materials, textures, texels, emitters, caustic_targets, light_paths, nonfinite_values };
+    let kernel = SceneEmit { scene, light_paths, nonfinite_values };
     commands.dispatch(kernel, &push, Extent::Items(u64::from(chunk.1)))
 }
 
@@ -235,7 +224,7 @@ pub fn trace_flight(
     extent: Extent,
 ) -> Result<()> {
     let Round { resources, plan, .. } = round;
-    let SceneResources { nodes, triangles, normals, uvs, materials, textures, texels, nonfinite_values, .. } = resources;
+    let SceneResources { scene, nonfinite_values, .. } = resources;
     let Flight { bounce, list, parity } = flight;
     let is_last = u32::from(bounce + 1 == map.bounces);
     let push = FlightPush { draws: draws(round, map), map: store(plan, map), bounce, list, is_last, path_capacity: map.chunk_photons };
@@ -245,42 +234,12 @@ pub fn trace_flight(
     let (light_paths, next_light_paths) = (&paths[parity], &paths[1 - parity]);
     match plan.builder() {
         Builder::Atomic => commands.dispatch(
-            SceneTraceAtomic {
-                nodes,
-                triangles,
-                normals,
-                uvs,
-                materials,
-                textures,
-                texels,
-                light_paths,
-                next_light_paths,
-                map,
-                counters,
-                tallies,
-                totals,
-                nonfinite_values,
-            },
+            SceneTraceAtomic { scene, light_paths, next_light_paths, map, counters, tallies, totals, nonfinite_values },
             &push,
             extent,
         ),
         Builder::Ballot => commands.dispatch(
-            SceneTraceBallot {
-                nodes,
-                triangles,
-                normals,
-                uvs,
-                materials,
-                textures,
-                texels,
-                light_paths,
-                next_light_paths,
-                map,
-                counters,
-                tallies,
-                totals,
-                nonfinite_values,
-            },
+            SceneTraceBallot { scene, light_paths, next_light_paths, map, counters, tallies, totals, nonfinite_values },
             &push,
             extent,
         ),

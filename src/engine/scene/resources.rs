@@ -1,27 +1,16 @@
 //! Every buffer of lighting a scene of triangles, named and sized by the plan.
 
-use glam::{UVec2, Vec4};
-
 use crate::engine::planned::Planned;
 use crate::error::Result;
-use crate::gpu::{Buffer, Commands, Gpu};
+use crate::gpu::{Buffer, Commands, Gpu, kernels};
 use crate::photon::MapPhoton;
 use crate::plan::scene::ScenePlan;
 use crate::records::*;
 use crate::scene::geometry::Geometry;
 
 pub struct SceneResources {
-    // The scene, written once; what the plan dropped has one empty element.
-    pub nodes: Buffer<BvhNode>,
-    pub triangles: Buffer<Triangle>,
-    pub planes: Buffer<Vec4>,
-    pub normals: Buffer<TriangleNormals>,
-    pub uvs: Buffer<TriangleUvs>,
-    pub materials: Buffer<SurfaceMaterial>,
-    pub textures: Buffer<TextureInfo>,
-    pub texels: Buffer<UVec2>,
-    pub emitters: Buffer<Emitter>,
-    pub caustic_targets: Buffer<CausticTarget>,
+    /// Written once; what the plan dropped has one empty element.
+    pub scene: kernels::Scene,
     /// Points of all phases; empty for a picture.
     pub receivers: Vec<Buffer<Receiver>>,
     // Photons of the chunk under way.
@@ -78,16 +67,18 @@ impl SceneResources {
     ) -> Result<SceneResources> {
         let planned = &Planned { gpu, buffers: plan.buffers(geometry) };
         Ok(SceneResources {
-            nodes: planned.filled(commands, "nodes", &geometry.nodes)?,
-            triangles: planned.filled(commands, "triangles", &geometry.triangles)?,
-            planes: planned.filled(commands, "planes", &geometry.planes)?,
-            normals: planned.filled(commands, "normals", &geometry.normals)?,
-            uvs: planned.filled(commands, "texture coordinates", &geometry.uvs)?,
-            materials: planned.filled(commands, "materials", &geometry.materials)?,
-            textures: planned.filled(commands, "textures", &geometry.textures)?,
-            texels: planned.filled(commands, "texels", &geometry.texels)?,
-            emitters: planned.filled(commands, "emitters", &geometry.emitters)?,
-            caustic_targets: planned.filled(commands, "caustic targets", &plan.targets)?,
+            scene: kernels::Scene {
+                nodes: planned.filled(commands, "nodes", &geometry.nodes)?,
+                triangles: planned.filled(commands, "triangles", &geometry.triangles)?,
+                planes: planned.filled(commands, "planes", &geometry.planes)?,
+                normals: planned.filled(commands, "normals", &geometry.normals)?,
+                uvs: planned.filled(commands, "texture coordinates", &geometry.uvs)?,
+                materials: planned.filled(commands, "materials", &geometry.materials)?,
+                textures: planned.filled(commands, "textures", &geometry.textures)?,
+                texels: planned.filled(commands, "texels", &geometry.texels)?,
+                emitters: planned.filled(commands, "emitters", &geometry.emitters)?,
+                caustic_targets: planned.filled(commands, "caustic targets", &plan.targets)?,
+            },
             receivers: phases.iter().map(|phase| planned.filled(commands, "receivers", phase)).collect::<Result<_>>()?,
             photons: if plan.maps().next().is_some() { Some(PhotonBuffers::new(planned, commands)?) } else { None },
             visible_points: planned.one("visible points")?,

@@ -18,11 +18,11 @@ pub fn one_bounce<'a>(
     push: &TracePush,
     extent: impl Fn() -> Extent<'a>,
 ) -> Result<()> {
-    let RoomResources { rooms, walls, photons, origins, counters, tallies, nonfinite_values, order, .. } = resources;
+    let RoomResources { room, photons, origins, counters, tallies, nonfinite_values, order, .. } = resources;
     let Some(OrderBuffers { survivors, block_sums, weights }) = order else { panic!("the plan has no order to keep") };
     // Groups that no path is left for count none, and so does the place behind the last, which becomes the sum of all.
     commands.clear(survivors);
-    commands.dispatch(TraceInPlace { rooms, walls, paths, weights, counters, tallies, survivors, nonfinite_values }, push, extent())?;
+    commands.dispatch(TraceInPlace { room, paths, weights, counters, tallies, survivors, nonfinite_values }, push, extent())?;
     scan(commands, survivors, block_sums, survivors.count() as u32, plan.settings.group_size)?;
     commands.dispatch(KeepOrder { paths, next_paths, photons, origins, counters, tallies, survivors, weights }, push, extent())
 }
