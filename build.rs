@@ -26,35 +26,28 @@ fn main() {
     let glsl = PathBuf::from(env::var("CARGO_MANIFEST_DIR").expect("cargo sets it")).join("glsl");
     let out = PathBuf::from(env::var("OUT_DIR").expect("cargo sets it"));
 
-    let in_folder = |folder: &&str| -> Vec<String> {
-        let entries = fs::read_dir(glsl.join(folder)).unwrap_or_else(|error| panic!("glsl/{folder}: {error}"));
-        let names = entries.map(|entry| entry.expect("a folder can be read").file_name().to_string_lossy().into_owned());
-        names.filter(|name| name.ends_with(".comp")).map(|name| format!("{folder}/{name}")).collect()
-    };
-    let mut kernels: Vec<String> = ["kernels", "check"].iter().flat_map(in_folder).collect();
-    kernels.sort();
-
     // A fault in a shared file is found by every kernel that includes it, and shown once.
     let mut failures = BTreeSet::new();
     let mut structs = String::new();
     let mut layouts = String::new();
     let mut max_buffers = 0;
     let mut scene_elements: BTreeMap<String, String> = BTreeMap::new();
-    for path in &kernels {
-        let name = path.rsplit('/').next().and_then(|file| file.strip_suffix(".comp")).expect("a kernel has a name").to_owned();
-        match compile(&glsl, path, constants::SHARED_WITH_GLSL, &|_, text| text) {
+    for source in compile::sources(&glsl) {
+        let compile::Source { name, path, .. } = &source;
+        match compile(&glsl, &source, constants::SHARED_WITH_GLSL, &|_, text| text) {
             Ok(Compiled { words, files }) => {
                 files.iter().for_each(|file| println!("cargo:rerun-if-changed={}", file.display()));
                 let bytes: Vec<u8> = words.iter().flat_map(|word| word.to_le_bytes()).collect();
                 fs::write(out.join(format!("{name}.spv")), bytes).expect("OUT_DIR can be written");
-                let kernel = reflect(&words);
+                let kernel =
+                    Kernel { votes_in_loops: files.iter().any(|file| file.ends_with("builder/persistent.glsl")), ..reflect(&words) };
                 for Buffer { name: buffer, element, .. } in &kernel.scene {
                     assert_eq!(scene_elements.entry(buffer.clone()).or_insert(element.clone()), element, "{buffer} of set 0 in {name}");
                 }
-                let scene_bindings = world_of(&name, &kernel.scene).map_or(0, |(_, buffers)| buffers.len());
+                let scene_bindings = world_of(name, &kernel.scene).map_or(0, |(_, buffers)| buffers.len());
                 max_buffers = max_buffers.max(scene_bindings + kernel.buffers.len());
-                write_kernel(&mut structs, path, &name, &kernel);
-                write_layouts(&mut layouts, &name, &kernel);
+                write_kernel(&mut structs, path, name, &kernel);
+                write_layouts(&mut layouts, name, &kernel);
             }
             Err(message) => drop(failures.insert(message)),
         }
@@ -113,7 +106,7 @@ struct Buffer {
 const PACKED: [(&str, &[&str]); 5] = [
     ("crate::photon::StoredPhoton", &["photons", "sorted_photons", "tree_photons"]),
     ("crate::photon::Origin", &["origins", "tree_origins"]),
-    ("crate::photon::MapPhoton", &["map", "sorted_map"]),
+    ("crate::photon::MapPhoton", &["map", "sorted_map", "landed"]),
     ("crate::path::StoredPath", &["paths", "next_paths"]),
     ("u64", &["film", "film_totals", "low_squares", "high_squares", "pass_sums", "estimates", "film_sums", "film_squares", "part_totals"]),
 ];
@@ -125,20 +118,20 @@ const WORLDS: [(&str, &[&str]); 2] = [
 ];
 
 fn element_type(buffer: &str, element: &Type) -> String {
-    if let Some((packed, _)) = PACKED.iter().find(|(_, buffers)| buffers.contains(&buffer)) {
-        return (*packed).to_owned();
+    if let Type::Struct(record) = element {
+        return format!("crate::records::{}", struct_name(record));
     }
-    match element {
-        Type::Struct(record) => format!("crate::records::{}", struct_name(record)),
-        number => match number.to_string().as_str() {
-            known @ ("u32" | "f32") => known.to_owned(),
-            "vec2<u32>" => "glam::UVec2".to_owned(),
-            "vec2<f32>" => "glam::Vec2".to_owned(),
-            "vec4<f32>" => "glam::Vec4".to_owned(),
-            "vec4<u32>" => "[u32; 4]".to_owned(),
-            other => panic!("buffer {buffer}: {other} has no Rust type here"),
-        },
-    }
+    let packed = PACKED.iter().find(|(_, buffers)| buffers.contains(&buffer)).map(|(packed, _)| *packed);
+    let number = element.to_string();
+    let own = || match number.as_str() {
+        known @ ("u32" | "f32") => known,
+        "vec2<u32>" => "glam::UVec2",
+        "vec2<f32>" => "glam::Vec2",
+        "vec4<f32>" => "glam::Vec4",
+        "vec4<u32>" => "[u32; 4]",
+        other => panic!("buffer {buffer}: {other} has no Rust type here"),
+    };
+    packed.unwrap_or_else(own).to_owned()
 }
 
 #[derive(Default)]
@@ -150,6 +143,8 @@ struct Kernel {
     /// (name, id) of the named specialization constants.
     constants: Vec<(String, u32)>,
     push: Option<StructType>,
+    /// Its lanes vote in the loop of builder/persistent.glsl.
+    votes_in_loops: bool,
     records: Vec<StructType>,
     /// Stride of the array that each record lies in, by record name.
     strides: Vec<(String, usize)>,
@@ -231,6 +226,7 @@ fn write_kernel(source: &mut String, path: &str, name: &str, kernel: &Kernel) {
     writeln!(source, "        spirv: include_bytes!(concat!(env!(\"OUT_DIR\"), \"/{name}.spv\")),").unwrap();
     writeln!(source, "        push_bytes: size_of::<{push}>() as u32,").unwrap();
     writeln!(source, "        scene_bindings: {},", world.map_or(0, |(_, bindings)| bindings.len())).unwrap();
+    writeln!(source, "        votes_in_loops: {},", kernel.votes_in_loops).unwrap();
     writeln!(source, "        bindings: &[").unwrap();
     for Buffer { name, binding, access, .. } in &kernel.buffers {
         let reads = *access != AccessType::WriteOnly;

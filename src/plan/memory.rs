@@ -73,6 +73,12 @@ pub fn group_count(plan: &RoomPlan) -> u32 {
     plan.path_capacity.div_ceil(plan.settings.group_size)
 }
 
+/// Survivors of each work group of so many paths in a scene, with those before them: of the paths that go on and of the photons
+/// that are stored, each with a sum behind.
+pub fn survivor_count(plan: &ScenePlan, paths: u32) -> u32 {
+    2 * (paths.div_ceil(plan.settings.group_size) + 1)
+}
+
 /// Photons that the searches under way may hold: 32 MiB, less than any device's largest buffer.
 const SEARCH_ENTRIES: u64 = 1 << 22;
 
@@ -237,6 +243,11 @@ impl ScenePlan {
             buffer::<u32>("caustic totals", totals, "what limits cost the caustic map"),
         ];
         buffers.extend(block_sums("sums of cells", buckets + 1, self.settings.group_size));
+        if self.builder() == Builder::Scan {
+            let survivors = u64::from(survivor_count(self, most(|map| map.chunk_photons) as u32));
+            buffers.push(buffer::<u32>("survivors", survivors, "survivors and stored photons of each work group"));
+            buffers.extend(block_sums("sums of survivors", survivors, self.settings.group_size));
+        }
         buffers
     }
 

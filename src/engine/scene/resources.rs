@@ -7,6 +7,7 @@ use crate::photon::MapPhoton;
 use crate::plan::scene::ScenePlan;
 use crate::records::*;
 use crate::scene::geometry::Geometry;
+use crate::settings::Builder;
 
 pub struct SceneResources {
     /// Written once; what the plan dropped has one empty element.
@@ -48,11 +49,19 @@ pub struct PhotonBuffers {
     pub block_sums: Vec<Buffer<u32>>,
     /// Points with so many candidates that several invocations share them: how many, the most candidates, and each one with its candidates.
     pub crowded: Buffer<u32>,
+    /// What keeps photons in order; `None` where they come as they do.
+    pub order: Option<OrderBuffers>,
     /// Fates of the submission under way, one tally a bounce: of the global map's photons, and of the
     /// caustic map's.
     pub tallies: [Buffer<Tally>; 2],
     /// Photons stored and what limits cost, of each map.
     pub totals: [Buffer<u32>; 2],
+}
+
+/// Survivors of a bounce, for prefix sums over them.
+pub struct OrderBuffers {
+    pub survivors: Buffer<u32>,
+    pub block_sums: Vec<Buffer<u32>>,
 }
 
 impl SceneResources {
@@ -80,7 +89,7 @@ impl SceneResources {
                 caustic_targets: planned.filled(commands, "caustic targets", &plan.targets)?,
             },
             receivers: phases.iter().map(|phase| planned.filled(commands, "receivers", phase)).collect::<Result<_>>()?,
-            photons: if plan.maps().next().is_some() { Some(PhotonBuffers::new(planned, commands)?) } else { None },
+            photons: if plan.maps().next().is_some() { Some(PhotonBuffers::new(planned, commands, plan)?) } else { None },
             visible_points: planned.one("visible points")?,
             pass_sums: planned.one("pass sums")?,
             camera_paths: planned.several("camera paths")?,
@@ -97,7 +106,7 @@ impl SceneResources {
 }
 
 impl PhotonBuffers {
-    fn new(planned: &Planned, commands: &mut Commands) -> Result<PhotonBuffers> {
+    fn new(planned: &Planned, commands: &mut Commands, plan: &ScenePlan) -> Result<PhotonBuffers> {
         Ok(PhotonBuffers {
             paths: [planned.one("even light paths")?, planned.one("odd light paths")?],
             map: planned.one("map")?,
@@ -108,6 +117,11 @@ impl PhotonBuffers {
             ranks: planned.one("ranks")?,
             block_sums: planned.all("sums of cells")?,
             crowded: planned.one("crowded points")?,
+            order: if plan.builder() == Builder::Scan {
+                Some(OrderBuffers { survivors: planned.one("survivors")?, block_sums: planned.all("sums of survivors")? })
+            } else {
+                None
+            },
             tallies: [planned.zeroed(commands, "global tallies")?, planned.zeroed(commands, "caustic tallies")?],
             totals: [planned.zeroed(commands, "global totals")?, planned.zeroed(commands, "caustic totals")?],
         })

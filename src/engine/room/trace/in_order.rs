@@ -3,7 +3,7 @@
 use crate::engine::prefix_sum::scan;
 use crate::engine::room::resources::{OrderBuffers, RoomResources};
 use crate::error::Result;
-use crate::gpu::kernels::{KeepOrder, TraceInPlace};
+use crate::gpu::kernels::{ScanMoveRoom, TraceRoomScan};
 use crate::gpu::{Buffer, Commands, Extent};
 use crate::path::StoredPath;
 use crate::plan::RoomPlan;
@@ -22,7 +22,11 @@ pub fn one_bounce<'a>(
     let Some(OrderBuffers { survivors, block_sums, weights }) = order else { panic!("the plan has no order to keep") };
     // Groups that no path is left for count none, and so does the place behind the last, which becomes the sum of all.
     commands.clear(survivors);
-    commands.dispatch(TraceInPlace { room, paths, weights, counters, tallies, survivors, nonfinite_values }, push, extent())?;
+    commands.dispatch(
+        TraceRoomScan { room, paths, next_paths: paths, photons, origins, weights, counters, tallies, survivors, nonfinite_values },
+        push,
+        extent(),
+    )?;
     scan(commands, survivors, block_sums, survivors.count() as u32, plan.settings.group_size)?;
-    commands.dispatch(KeepOrder { paths, next_paths, photons, origins, counters, tallies, survivors, weights }, push, extent())
+    commands.dispatch(ScanMoveRoom { paths, next_paths, photons, origins, counters, tallies, survivors, weights }, push, extent())
 }
