@@ -4,6 +4,7 @@
 pub mod bias;
 pub mod choose_builder;
 pub mod nonfinite_values;
+pub mod planned;
 pub mod prefix_sum;
 pub mod room;
 pub mod scene;

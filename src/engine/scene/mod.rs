@@ -309,7 +309,7 @@ fn one_round(commands: &mut Commands, view: &View, round: Round, deadline: Optio
     let sums = 3 * u64::from(plan.visible_points()) * u64::from(plan.arrival_sets);
     let mut traced = [0u32; 2];
     if let Some(photons) = &resources.photons {
-        commands.fill(&resources.estimates, 0, 2 * sums, 0);
+        commands.fill(&resources.estimates, 0, sums, 0);
         for map in plan.maps() {
             let which = usize::from(map.caustic_only);
             commands.scope(map.name, |commands| {

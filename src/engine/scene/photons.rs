@@ -195,8 +195,7 @@ fn trace_persistent(
     flights: u32,
 ) -> Result<usize> {
     let Round { resources, geometry, plan, .. } = round;
-    let SceneResources { nodes, triangles, normals, uvs, materials, textures, texels, emitters, caustic_targets, nonfinite_values, .. } =
-        resources;
+    let SceneResources { scene, nonfinite_values, .. } = resources;
     let PhotonBuffers { paths, counters, map: map_buffer, .. } = photons;
     let which = usize::from(map.caustic_only);
     let (tallies, totals) = (&photons.tallies[which], &photons.totals[which]);
@@ -216,15 +215,7 @@ fn trace_persistent(
             stride: map.persistence.invocations(count),
         };
         let kernel = TracePersistentScene {
-            nodes,
-            triangles,
-            normals,
-            uvs,
-            materials,
-            textures,
-            texels,
-            emitters,
-            caustic_targets,
+            scene,
             paths: &paths[parity],
             next_paths: &paths[1 - parity],
             map: map_buffer,
@@ -255,12 +246,10 @@ const LEAST_PHOTONS: u32 = 1 << 12;
 /// Writes the paths of a chunk as they leave the lights.
 pub fn emit(commands: &mut Commands, round: Round, photons: &PhotonBuffers, map: &MapPlan, chunk: (u32, u32)) -> Result<()> {
     let Round { resources, geometry, .. } = round;
-    let SceneResources { nodes, triangles, normals, uvs, materials, textures, texels, emitters, caustic_targets, nonfinite_values, .. } =
-        resources;
+    let SceneResources { scene, nonfinite_values, .. } = resources;
     let next_paths = &photons.paths[0];
     let push = EmissionPush { draws: draws(round, map), emission: emission(geometry, map, chunk) };
-    let kernel =
-        EmitScene { nodes, triangles, normals, uvs, materials, textures, texels, emitters, caustic_targets, next_paths, nonfinite_values };
+    let kernel = EmitScene { scene, next_paths, nonfinite_values };
     commands.dispatch(kernel, &push, Extent::Items(u64::from(chunk.1)))
 }
 
@@ -283,7 +272,7 @@ pub fn trace_flight(
     extent: Extent,
 ) -> Result<()> {
     let Round { resources, plan, .. } = round;
-    let SceneResources { nodes, triangles, normals, uvs, materials, textures, texels, nonfinite_values, .. } = resources;
+    let SceneResources { scene, nonfinite_values, .. } = resources;
     let Flight { bounce, list, parity, is_asked } = flight;
     let push = FlightPush {
         draws: draws(round, map),
@@ -302,7 +291,7 @@ pub fn trace_flight(
         ($kernel:ident { $next_paths:expr $(, $more:ident)* }) => {
             commands.dispatch(
                 $kernel {
-                    nodes, triangles, normals, uvs, materials, textures, texels, paths, next_paths: $next_paths, map, counters, tallies,
+                    scene, paths, next_paths: $next_paths, map, counters, tallies,
                     totals, nonfinite_values $(, $more)*
                 },
                 &push,

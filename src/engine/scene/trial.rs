@@ -94,11 +94,11 @@ fn run(gpu: &Gpu, scene: &Scene, view: &View, run: &ScenePlan, limits: &Limits) 
     points::see(&mut commands, round, view.camera)?;
     let point_count = plan.visible_points();
     let clearances = gpu.buffer::<f32>("clearances", u64::from(point_count), Memory::Device)?;
-    let SceneResources { nodes, triangles, planes, visible_points, .. } = &resources;
-    let kernel = Clearance { nodes, triangles, planes, visible_points, clearances: &clearances };
+    let SceneResources { scene, visible_points, .. } = &resources;
+    let kernel = Clearance { scene, visible_points, clearances: &clearances };
     commands.dispatch(kernel, &ClearancePush { point_count }, Extent::Items(u64::from(point_count)))?;
-    let visible_points = commands.read::<VisiblePoint>(visible_points, point_count as usize)?;
-    let clearances = commands.read::<f32>(&clearances, point_count as usize)?;
+    let visible_points = commands.read(visible_points, point_count as usize)?;
+    let clearances = commands.read(&clearances, point_count as usize)?;
 
     let mut trial = Trial::default();
     let mut largest = 0.0;
