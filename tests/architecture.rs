@@ -12,8 +12,10 @@ const LINE: &[&[&str]] = &[
     &["scene"],
     &["verify::judge", "plan"],
     &["cpu", "gpu"],
-    &["engine", "engine::bias", "engine::prefix_sum", "engine::tallies", "engine::totals", "engine::unknown", "engine::nonfinite_values"],
-    &["engine::watch"],
+    &["engine", "engine::film", "engine::prefix_sum", "engine::tallies", "engine::totals", "engine::unknown", "engine::nonfinite_values"],
+    &["engine::watch", "engine::replay"],
+    &["engine::bias"],
+    &["engine::run"],
     &["engine::room", "engine::scene"],
     &["engine::choose_builder"],
     &["output", "verify::selfcheck"],
@@ -338,6 +340,7 @@ fn the_check_complains_about_arrows_to_the_right() {
     assert!(complains("engine::room", "use super::scene::View;"));
     assert!(complains("engine::scene::film", "use super::super::room::film::RoomFilm;"));
     assert!(complains("engine::watch", "use super::choose_builder::Choice;"));
+    assert!(complains("engine::run", "use super::room::film::RoomFilm;"));
 
     assert!(!complains("engine::room::trace", "use crate::{error::{Error, Result}, engine::tallies, plan::{self, RoomPlan}};"));
     assert!(!complains("plan", "//! See [`crate::engine::room`].\n/* crate::gpu */ const A: &str = \"crate::gpu\";"));

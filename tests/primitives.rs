@@ -523,7 +523,7 @@ fn rounds_around_a_full_row_of_groups_lose_no_photon() {
             };
             let folded = run(&gpu, &settings);
             assert_eq!(folded.plan.chunks_per_round, 1, "{photon_count} photons do not fit one dispatch here");
-            let ledger = folded.fates.ledger();
+            let ledger = folded.ledger();
             assert!(ledger.closes() && ledger.emitted == u64::from(photon_count), "{ledger:?}");
             let split = run(&gpu, &RoomSettings { chunk: Some(1_000_003), ..settings.clone() });
             assert_eq!(split.fates, folded.fates);

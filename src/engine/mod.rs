@@ -3,9 +3,12 @@
 
 pub mod bias;
 pub mod choose_builder;
+pub mod film;
 pub mod nonfinite_values;
 pub mod prefix_sum;
+pub mod replay;
 pub mod room;
+pub mod run;
 pub mod scene;
 pub mod tallies;
 pub mod totals;

@@ -47,7 +47,12 @@ pub fn buffer(gpu: &Gpu, commands: &mut Commands) -> Result<Buffer> {
 }
 
 impl NonfiniteValues {
-    pub fn read(commands: &mut Commands, buffer: &Buffer) -> Result<NonfiniteValues> {
+    /// What a run with `--paranoid` found; `None` without it.
+    pub fn found(commands: &mut Commands, buffer: &Buffer, paranoid: bool) -> Result<Option<NonfiniteValues>> {
+        if paranoid { NonfiniteValues::read(commands, buffer).map(Some) } else { Ok(None) }
+    }
+
+    fn read(commands: &mut Commands, buffer: &Buffer) -> Result<NonfiniteValues> {
         let words = commands.read::<u32>(buffer, KINDS * WORDS)?;
         let mut nonfinite_values = NonfiniteValues::default();
         for (kind, words) in words.chunks_exact(WORDS).enumerate() {

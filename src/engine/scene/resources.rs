@@ -3,7 +3,7 @@
 use bytemuck::Pod;
 use glam::UVec2;
 
-use super::losses::ANOMALY_WORDS;
+use super::film::ANOMALY_WORDS;
 use crate::constants::{HIT_KINDS, PART_COUNT};
 use crate::engine::nonfinite_values;
 use crate::engine::prefix_sum::block_sums;
