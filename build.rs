@@ -26,30 +26,23 @@ fn main() {
     let glsl = PathBuf::from(env::var("CARGO_MANIFEST_DIR").expect("cargo sets it")).join("glsl");
     let out = PathBuf::from(env::var("OUT_DIR").expect("cargo sets it"));
 
-    let in_folder = |folder: &&str| -> Vec<String> {
-        let entries = fs::read_dir(glsl.join(folder)).unwrap_or_else(|error| panic!("glsl/{folder}: {error}"));
-        let names = entries.map(|entry| entry.expect("a folder can be read").file_name().to_string_lossy().into_owned());
-        names.filter(|name| name.ends_with(".comp")).map(|name| format!("{folder}/{name}")).collect()
-    };
-    let mut kernels: Vec<String> = ["kernels", "check"].iter().flat_map(in_folder).collect();
-    kernels.sort();
-
     // A fault in a shared file is found by every kernel that includes it, and shown once.
     let mut failures = BTreeSet::new();
     let mut structs = String::new();
     let mut layouts = String::new();
     let mut max_buffers = 0;
-    for path in &kernels {
-        let name = path.rsplit('/').next().and_then(|file| file.strip_suffix(".comp")).expect("a kernel has a name").to_owned();
-        match compile(&glsl, path, constants::SHARED_WITH_GLSL, &|_, text| text) {
+    for source in compile::sources(&glsl) {
+        let compile::Source { name, path, .. } = &source;
+        match compile(&glsl, &source, constants::SHARED_WITH_GLSL, &|_, text| text) {
             Ok(Compiled { words, files }) => {
                 files.iter().for_each(|file| println!("cargo:rerun-if-changed={}", file.display()));
                 let bytes: Vec<u8> = words.iter().flat_map(|word| word.to_le_bytes()).collect();
                 fs::write(out.join(format!("{name}.spv")), bytes).expect("OUT_DIR can be written");
-                let kernel = reflect(&words);
+                let kernel =
+                    Kernel { votes_in_loops: files.iter().any(|file| file.ends_with("builder/persistent.glsl")), ..reflect(&words) };
                 max_buffers = max_buffers.max(kernel.buffers.len());
-                write_kernel(&mut structs, path, &name, &kernel);
-                write_layouts(&mut layouts, &name, &kernel);
+                write_kernel(&mut structs, path, name, &kernel);
+                write_layouts(&mut layouts, name, &kernel);
             }
             Err(message) => drop(failures.insert(message)),
         }
@@ -106,6 +99,8 @@ struct Kernel {
     /// (name, id) of the named specialization constants.
     constants: Vec<(String, u32)>,
     push: Option<StructType>,
+    /// Its lanes vote in the loop of builder/persistent.glsl.
+    votes_in_loops: bool,
     records: Vec<StructType>,
     /// Stride of the array that each record lies in, by record name.
     strides: Vec<(String, usize)>,
@@ -184,6 +179,7 @@ fn write_kernel(source: &mut String, path: &str, name: &str, kernel: &Kernel) {
     writeln!(source, "        name: \"{name}\",").unwrap();
     writeln!(source, "        spirv: include_bytes!(concat!(env!(\"OUT_DIR\"), \"/{name}.spv\")),").unwrap();
     writeln!(source, "        push_bytes: size_of::<{push}>() as u32,").unwrap();
+    writeln!(source, "        votes_in_loops: {},", kernel.votes_in_loops).unwrap();
     writeln!(source, "        bindings: &[").unwrap();
     for Buffer { name, set, binding, access } in &kernel.buffers {
         let reads = *access != AccessType::WriteOnly;

@@ -230,14 +230,6 @@ struct CausticTarget {
     float radius;
 };
 
-struct LightPath {
-    vec3 position;
-    uint photon;
-    vec3 direction;
-    uint arrival;
-    vec3 flux;
-};
-
 struct CameraPath {
     vec3 position;
     uint place;
@@ -296,6 +288,7 @@ struct FlightPush {
     uint bounce;
     uint list;
     uint is_last;
+    uint counts_left;
     uint path_capacity;
 };
 
@@ -404,6 +397,8 @@ struct CheckPush {
     uint addend_low;
     uint addend_high;
     uint add_count;
+    uint photon_count;
+    uint stride;
 };
 
 struct MathResults {

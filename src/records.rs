@@ -440,6 +440,8 @@ records! {
         list: u32,
         /// 1: no path goes on after it.
         is_last: u32,
+        /// 1: the naive builder says how many paths are left.
+        counts_left: u32,
         path_capacity: u32,
     }
 
@@ -569,6 +571,9 @@ records! {
         addend_low: u32,
         addend_high: u32,
         add_count: u32,
+        /// Photons of a loop in which lanes vote, and invocations that take them.
+        photon_count: u32,
+        stride: u32,
     }
 
     /// Functions of `glsl/math/math.glsl` at (a, b).

@@ -308,7 +308,7 @@ fn waits(source: &str) -> Vec<&'static str> {
 
 /// Sums of floats, where bits are compared and swapped without a wait: a try fails only where another's addition
 /// went in, so that somebody moves on whatever the device promises.
-const LOCK_FREE: [&str; 2] = ["film/f32.glsl", "film/compensated.glsl"];
+const LOCK_FREE: [&str; 2] = ["film/float_two_words.glsl", "film/float_u64.glsl"];
 
 #[test]
 fn no_kernel_waits_for_another_invocation() {

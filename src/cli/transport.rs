@@ -160,12 +160,18 @@ value_enum!(IlluminationArg => Illumination {
 
 #[derive(Clone, Copy, ValueEnum)]
 enum BuilderArg {
-    /// Persistent; ballot with --math strict
+    /// Persistent; ballot with --math strict, and where the device fails the check of what persistent needs
     Auto,
+    /// Bounce by bounce, one slot per photon and bounce, empty slots included
+    Naive,
     /// Bounce by bounce, one atomic per photon
     Atomic,
     /// Bounce by bounce, one atomic per subgroup
     Ballot,
+    /// Bounce by bounce, one atomic per work group
+    Group,
+    /// Bounce by bounce, photons in their original order, by prefix sums
+    Scan,
     /// One invocation traces each photon from emission to its end
     Persistent,
 }
@@ -175,8 +181,11 @@ impl BuilderArg {
     fn builder(self) -> Option<Builder> {
         match self {
             BuilderArg::Auto => None,
+            BuilderArg::Naive => Some(Builder::Naive),
             BuilderArg::Atomic => Some(Builder::Atomic),
             BuilderArg::Ballot => Some(Builder::Ballot),
+            BuilderArg::Group => Some(Builder::Group),
+            BuilderArg::Scan => Some(Builder::Scan),
             BuilderArg::Persistent => Some(Builder::Persistent),
         }
     }

@@ -32,5 +32,6 @@ pub fn limits(facts: &DeviceFacts) -> Limits {
         busy_invocations: Limits::busy_invocations_of(facts.kind),
         lanes: Limits::lanes_of(facts.kind),
         counters: Limits::counters_of(facts.kind),
+        votes_in_loops: facts.votes_in_loops,
     }
 }

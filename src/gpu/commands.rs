@@ -18,6 +18,7 @@ use crate::records::DispatchArgs;
 use crate::timings::{Clock, Span, Timings};
 
 /// How many invocations or groups a dispatch has.
+#[derive(Clone, Copy)]
 pub enum Extent<'a> {
     /// One invocation an item; folded into rows where the device allows too few groups along x.
     Items(u64),

@@ -9,6 +9,7 @@ use ash::vk;
 use bytemuck::Pod;
 use rayon::prelude::*;
 
+use super::reconvergence::reconverging;
 use super::specialize::decided;
 use super::{Buffer, Context, DeviceFacts, Gpu, call};
 use crate::error::Result;
@@ -32,6 +33,8 @@ pub struct Module {
     pub spirv: &'static [u8],
     pub push_bytes: u32,
     pub bindings: &'static [Binding],
+    /// Its lanes vote in a loop that they come to on different ways.
+    pub votes_in_loops: bool,
     /// Specialization constants: name and id. Id 0 is the work-group size, which has no name.
     pub constants: &'static [(&'static str, u32)],
 }
@@ -125,6 +128,7 @@ impl Gpu {
             let key = PipelineKey::new(module, constants);
             if !self.pipelines.borrow().contains_key(&key) && missing.iter().all(|(other, ..)| *other != key) {
                 let words = decided(&self.words_of(module), &key.constants);
+                let words = if module.votes_in_loops { reconverging(&words, self.facts.reconvergence) } else { words };
                 missing.push((key, self.pipeline_layout(module)?, words));
             }
         }

@@ -7,6 +7,7 @@ pub mod clock;
 pub mod commands;
 pub mod device;
 pub mod kernel;
+mod reconvergence;
 mod specialize;
 pub mod timestamps;
 mod validation;
@@ -159,7 +160,7 @@ impl Gpu {
             _entry: entry,
         });
         let cache = kernel::DiskCache::open(&context, &facts)?;
-        let gpu = Gpu {
+        let mut gpu = Gpu {
             facts,
             time_dispatches: options.time_dispatches,
             warms_up: options.warm_up,
@@ -170,7 +171,7 @@ impl Gpu {
             cache,
             context,
         };
-        check::run(&gpu)?;
+        gpu.facts.votes_in_loops = check::run(&gpu)?;
         if gpu.warms_up {
             clock::prepare(&gpu)?;
         }

@@ -49,6 +49,12 @@ pub fn group_count(plan: &RoomPlan) -> u32 {
     plan.path_capacity.div_ceil(plan.settings.group_size)
 }
 
+/// Survivors of each work group of so many paths in a scene, with those before them: of the paths that go on and of the photons
+/// that are stored, each with a sum behind.
+pub fn survivor_count(plan: &ScenePlan, paths: u32) -> u32 {
+    2 * (paths.div_ceil(plan.settings.group_size) + 1)
+}
+
 /// Photons that the searches under way may hold: 32 MiB, less than any device's largest buffer.
 const SEARCH_ENTRIES: u64 = 1 << 22;
 
@@ -188,6 +194,10 @@ pub(super) fn of_transport(plan: &ScenePlan, geometry: &Geometry, keeps: &dyn Fn
             ("tallies", 2 * array::<Tally>(u64::from(plan.tally_rows()) * u64::from(TALLY_COPIES))),
             ("totals", 2 * array::<u32>(u64::from(TOTAL_WORDS) * u64::from(TALLY_COPIES))),
         ]);
+        if plan.builder() == Builder::Scan {
+            let survivors = u64::from(survivor_count(plan, most(|map| map.chunk_photons) as u32));
+            buffers.extend([("survivors", array::<u32>(survivors)), ("block sums", block_sum_bytes(survivors, plan.settings.group_size))]);
+        }
     }
     buffers
 }

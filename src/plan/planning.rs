@@ -82,8 +82,9 @@ impl ScenePlan {
         .map(|(kept, arrival)| if *kept { *arrival } else { 0 })
         .sum::<u32>();
 
-        let by_itself = if settings.math == Math::Strict { Builder::Ballot } else { Builder::Persistent };
+        let by_itself = if settings.math == Math::Strict || !limits.votes_in_loops { Builder::Ballot } else { Builder::Persistent };
         let builder = settings.builder.unwrap_or(by_itself);
+        limits.check_builder(builder)?;
         let persistent = builder == Builder::Persistent;
         let landings_of_each = expected_landings(scene, settings.bounces);
         let map = |name, domain, photons: u32, stored, caustic_only: bool, radius: Option<f64>, option| -> Result<MapPlan> {
@@ -205,6 +206,7 @@ impl ScenePlan {
             ("FILTER", settings.filter.code()),
             ("HAS_SPECULAR_CHAINS", flag(Effect::SpecularChains)),
             ("CHAIN_STEPS", chain_steps),
+            ("HAS_SLOTS", u32::from(builder == Builder::Naive)),
             ("HAS_AIMED_PHOTONS", u32::from(!targets.is_empty())),
         ];
 

@@ -172,11 +172,12 @@ impl ScenePlan {
         self.global.iter().chain(&self.caustic)
     }
 
-    /// The same by a builder that stops after each flight; `bytes` stay those of the run.
+    /// The same by a builder that stops after each flight and leaves no gaps; `bytes` stay those of the run.
     pub fn by_flights(&self) -> ScenePlan {
         let mut plan = self.clone();
-        if plan.builder() == Builder::Persistent {
-            plan.settings.builder = Some(Builder::Ballot);
+        let was_persistent = plan.builder() == Builder::Persistent;
+        plan.settings.builder = Some(Builder::Ballot);
+        if was_persistent {
             for map in plan.global.iter_mut().chain(&mut plan.caustic) {
                 map.path_array_length = map.chunk_photons;
                 map.segment_bounces = map.bounces.min(SEGMENT_BOUNCES);

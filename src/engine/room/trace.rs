@@ -6,8 +6,8 @@ use crate::constants::{MAX_GROUPS, PATHS_TOGETHER};
 use crate::engine::room::resources::RoomResources;
 use crate::error::Result;
 use crate::gpu::kernels::{
-    Emit, EndBounce, FillGaps, KeepOrder, ScanAdd, ScanBlocks, TraceAtomic, TraceBallot, TraceGroup, TraceInPlace, TracePersistent,
-    TraceSlots,
+    EmitRoom, EndBounce, FillGaps, ScanAdd, ScanBlocks, ScanMoveRoom, TracePersistentRoom, TraceRoomAtomic, TraceRoomBallot,
+    TraceRoomGroup, TraceRoomScan, TraceRoomSlots,
 };
 use crate::gpu::{Commands, Extent, Kernel, Module};
 use crate::plan::{EmissionRange, RoomPlan, photons_of};
@@ -18,15 +18,15 @@ use crate::settings::Builder;
 /// Kernels that tracing needs.
 pub fn modules(plan: &RoomPlan) -> Vec<Module> {
     match plan.settings.builder {
-        Builder::Naive => vec![Emit::MODULE, TraceSlots::MODULE],
-        Builder::Atomic if plan.counters > 1 => vec![Emit::MODULE, TraceAtomic::MODULE, FillGaps::MODULE, EndBounce::MODULE],
-        Builder::Atomic => vec![Emit::MODULE, TraceAtomic::MODULE, EndBounce::MODULE],
-        Builder::Ballot => vec![Emit::MODULE, TraceBallot::MODULE, EndBounce::MODULE],
-        Builder::Group => vec![Emit::MODULE, TraceGroup::MODULE, EndBounce::MODULE],
+        Builder::Naive => vec![EmitRoom::MODULE, TraceRoomSlots::MODULE],
+        Builder::Atomic if plan.counters > 1 => vec![EmitRoom::MODULE, TraceRoomAtomic::MODULE, FillGaps::MODULE, EndBounce::MODULE],
+        Builder::Atomic => vec![EmitRoom::MODULE, TraceRoomAtomic::MODULE, EndBounce::MODULE],
+        Builder::Ballot => vec![EmitRoom::MODULE, TraceRoomBallot::MODULE, EndBounce::MODULE],
+        Builder::Group => vec![EmitRoom::MODULE, TraceRoomGroup::MODULE, EndBounce::MODULE],
         Builder::Scan => {
-            vec![Emit::MODULE, TraceInPlace::MODULE, ScanBlocks::MODULE, ScanAdd::MODULE, KeepOrder::MODULE, EndBounce::MODULE]
+            vec![EmitRoom::MODULE, TraceRoomScan::MODULE, ScanBlocks::MODULE, ScanAdd::MODULE, ScanMoveRoom::MODULE, EndBounce::MODULE]
         }
-        Builder::Persistent => vec![TracePersistent::MODULE],
+        Builder::Persistent => vec![TracePersistentRoom::MODULE],
         Builder::Cpu => panic!("the CPU builder has no kernels"),
     }
 }
@@ -64,7 +64,11 @@ pub fn emit(commands: &mut Commands, resources: &RoomResources, plan: &RoomPlan,
             path_offset,
             path_capacity: plan.path_array_length(),
         };
-        commands.dispatch(Emit { lights, walls, stream_seeds, paths, nonfinite_values }, &push, Extent::Items(u64::from(range.count)))?;
+        commands.dispatch(
+            EmitRoom { lights, walls, stream_seeds, next_paths: paths, nonfinite_values },
+            &push,
+            Extent::Items(u64::from(range.count)),
+        )?;
         path_offset += range.count;
     }
     Ok(())
@@ -100,7 +104,7 @@ fn trace_persistent(
             photon_capacity: plan.photon_capacity,
             eye: plan.settings.eye.into(),
         };
-        let kernel = TracePersistent { rooms, walls, lights, stream_seeds, photons, origins, counters, tallies, nonfinite_values };
+        let kernel = TracePersistentRoom { rooms, walls, lights, stream_seeds, photons, origins, counters, tallies, nonfinite_values };
         commands.dispatch(kernel, &push, Extent::Items(u64::from(push.stride)))?;
     }
     Ok(())
@@ -166,10 +170,10 @@ fn one_bounce(
         };
     }
     match builder {
-        Builder::Naive => trace!(TraceSlots),
-        Builder::Atomic => trace!(TraceAtomic),
-        Builder::Ballot => trace!(TraceBallot),
-        Builder::Group => trace!(TraceGroup),
+        Builder::Naive => trace!(TraceRoomSlots),
+        Builder::Atomic => trace!(TraceRoomAtomic),
+        Builder::Ballot => trace!(TraceRoomBallot),
+        Builder::Group => trace!(TraceRoomGroup),
         Builder::Scan => in_order::one_bounce(commands, resources, plan, [paths, next_paths], &push, extent),
         Builder::Persistent | Builder::Cpu => panic!("{} has no bounces of all paths", builder.name()),
     }?;

@@ -22,7 +22,6 @@ use crate::ledger::{Fates, Losses};
 use crate::plan::scene::{MapPlan, ScenePlan};
 use crate::plan::sensor::Sensor;
 use crate::records::Tally;
-use crate::settings::Builder;
 use crate::timings::{Clock, Span};
 
 /// Kernels that the plan needs, and no others.
@@ -36,14 +35,9 @@ pub fn modules(plan: &ScenePlan, facts: &DeviceFacts) -> Vec<Module> {
         modules.push(GoOn::MODULE);
     }
     if plan.maps().next().is_some() {
-        modules.extend([MapCount::MODULE, MapScatter::MODULE, ScanBlocks::MODULE, ScanAdd::MODULE]);
-        modules.extend([DispatchSize::MODULE, MapSize::MODULE, CrowdSize::MODULE, FluxToRadiance::MODULE]);
-        modules.extend(match plan.builder() {
-            Builder::Atomic => vec![SceneEmit::MODULE, SceneTraceAtomic::MODULE],
-            Builder::Ballot => vec![SceneEmit::MODULE, SceneTraceBallot::MODULE],
-            _ => vec![SceneTracePersistent::MODULE],
-        });
-        modules.push(if facts.int64_atomics { SceneGatherU64::MODULE } else { SceneGatherTwoWords::MODULE });
+        modules.extend([CrowdSize::MODULE, FluxToRadiance::MODULE]);
+        modules.extend(photons::modules(plan));
+        modules.push(if facts.int64_atomics { GatherVisiblePointsU64::MODULE } else { GatherVisiblePointsTwoWords::MODULE });
     }
     modules
 }

@@ -4,7 +4,7 @@ use super::Round;
 use super::resources::{PhotonBuffers, SceneResources};
 use crate::constants::{DOMAIN_CAMERA, DOMAIN_RECEIVERS, MAX_GROUPS};
 use crate::error::Result;
-use crate::gpu::kernels::{CrowdSize, FluxToRadiance, GoOn, Receive, Resolve, SceneGatherTwoWords, SceneGatherU64, View};
+use crate::gpu::kernels::{CrowdSize, FluxToRadiance, GatherVisiblePointsTwoWords, GatherVisiblePointsU64, GoOn, Receive, Resolve, View};
 use crate::gpu::{Commands, Extent};
 use crate::plan::scene::{MapPlan, ScenePlan, TESTS_PER_POINT};
 use crate::plan::sensor::Sensor;
@@ -186,13 +186,13 @@ pub fn gather(commands: &mut Commands, round: Round, photons: &PhotonBuffers, ma
     let dispatch = |commands: &mut Commands, push: &SceneGatherPush, extent: Extent| {
         if commands.facts().int64_atomics {
             commands.dispatch(
-                SceneGatherU64 { visible_points, planes, film: estimates, cells, sorted_map, crowded, nonfinite_values },
+                GatherVisiblePointsU64 { visible_points, planes, film: estimates, cells, sorted_map, crowded, nonfinite_values },
                 push,
                 extent,
             )
         } else {
             commands.dispatch(
-                SceneGatherTwoWords { visible_points, planes, film: estimates, cells, sorted_map, crowded, nonfinite_values },
+                GatherVisiblePointsTwoWords { visible_points, planes, film: estimates, cells, sorted_map, crowded, nonfinite_values },
                 push,
                 extent,
             )

@@ -69,7 +69,14 @@ pub fn light_paths(
         // Each flight starts with an empty map, so that there is always room.
         commands.fill(&buffers.counters, 0, 3, 0);
         commands.fill(&buffers.counters, 1, 1, left);
-        photons::trace_flight(&mut commands, round, buffers, map, Flight { bounce, list: 0, parity }, Extent::Items(u64::from(left)))?;
+        photons::trace_flight(
+            &mut commands,
+            round,
+            buffers,
+            map,
+            Flight { bounce, list: 0, parity, is_asked: false },
+            Extent::Items(u64::from(left)),
+        )?;
         traced += 1;
         left = commands.read::<u32>(&buffers.counters, 3)?[2];
         if left == 0 {

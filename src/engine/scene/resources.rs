@@ -12,9 +12,11 @@ use crate::engine::totals;
 use crate::error::Result;
 use crate::gpu::{Buffer, Commands, Gpu, Memory};
 use crate::photon::MapPhoton;
+use crate::plan::memory::survivor_count;
 use crate::plan::scene::{MapPlan, ScenePlan};
 use crate::records::*;
 use crate::scene::geometry::Geometry;
+use crate::settings::Builder;
 use crate::settings::scene::Effect;
 
 pub struct SceneResources {
@@ -66,11 +68,19 @@ pub struct PhotonBuffers {
     pub block_sums: Vec<Buffer>,
     /// Points with so many candidates that several invocations share them: how many, the most candidates, and each one with its candidates.
     pub crowded: Buffer,
+    /// What keeps photons in order; `None` where they come as they do.
+    pub order: Option<OrderBuffers>,
     /// Fates of the submission under way, one tally a bounce: of the global map's photons, and of the
     /// caustic map's.
     pub tallies: [Buffer; 2],
     /// Photons stored and what limits cost, of each map.
     pub totals: [Buffer; 2],
+}
+
+/// Survivors of a bounce, for prefix sums over them.
+pub struct OrderBuffers {
+    pub survivors: Buffer,
+    pub block_sums: Vec<Buffer>,
 }
 
 impl SceneResources {
@@ -151,6 +161,15 @@ impl PhotonBuffers {
             ranks: gpu.buffer::<u32>("ranks", capacity, device)?,
             block_sums: block_sums(gpu, buckets + 1, plan.settings.group_size)?,
             crowded: gpu.buffer::<u32>("crowded points", 2 + 2 * u64::from(plan.points_at_once()), device)?,
+            order: if plan.builder() == Builder::Scan {
+                let survivors = u64::from(survivor_count(plan, most(|map| map.chunk_photons) as u32));
+                Some(OrderBuffers {
+                    survivors: gpu.buffer::<u32>("survivors", survivors, device)?,
+                    block_sums: block_sums(gpu, survivors, plan.settings.group_size)?,
+                })
+            } else {
+                None
+            },
             tallies: [tallies::buffer(gpu, "global tallies", rows)?, tallies::buffer(gpu, "caustic tallies", rows)?],
             totals: [totals::buffer(gpu, "global totals")?, totals::buffer(gpu, "caustic totals")?],
         };

@@ -3,7 +3,7 @@
 use crate::engine::prefix_sum::scan;
 use crate::engine::room::resources::{OrderBuffers, RoomResources};
 use crate::error::Result;
-use crate::gpu::kernels::{KeepOrder, TraceInPlace};
+use crate::gpu::kernels::{ScanMoveRoom, TraceRoomScan};
 use crate::gpu::{Buffer, Commands, Extent};
 use crate::plan::RoomPlan;
 use crate::plan::memory::group_count;
@@ -23,7 +23,11 @@ pub fn one_bounce<'a>(
     let group_count = group_count(plan);
     // Groups that no path is left for count none, and so does the place behind the last, which becomes the sum of all.
     commands.fill(survivors, 0, u64::from(group_count) + 1, 0);
-    commands.dispatch(TraceInPlace { rooms, walls, paths, weights, counters, tallies, survivors, nonfinite_values }, push, extent())?;
+    commands.dispatch(
+        TraceRoomScan { rooms, walls, paths, next_paths: paths, photons, origins, weights, counters, tallies, survivors, nonfinite_values },
+        push,
+        extent(),
+    )?;
     scan(commands, survivors, block_sums, group_count + 1, plan.settings.group_size)?;
-    commands.dispatch(KeepOrder { paths, next_paths, photons, origins, counters, tallies, survivors, weights }, push, extent())
+    commands.dispatch(ScanMoveRoom { paths, next_paths, photons, origins, counters, tallies, survivors, weights }, push, extent())
 }
