@@ -56,8 +56,9 @@ impl<Plan, Film> RunResult<Plan, Film> {
 }
 
 /// What a run of a world is to do.
-#[derive(Debug, Clone)]
-pub struct Task {
+pub struct Task<'a> {
+    /// The device, and its pipelines before the run; `None` for the CPU.
+    pub device: Option<(&'a Gpu, usize)>,
     pub stop: Stop,
     /// How fast the radius shrinks; 1 keeps it.
     pub alpha: f64,
@@ -77,25 +78,20 @@ pub struct Task {
 
 /// What rounds are recorded with, and timed by: commands of a device, or the host's clock.
 pub trait Recorder {
-    /// Runs `body` under a name inside the scopes that are open, and times it.
-    fn scope(&mut self, name: &str, body: impl FnOnce(&mut Self) -> Result<()>) -> Result<()>;
+    /// Runs `body` as a round, and times it.
+    fn round(&mut self, body: impl FnOnce(&mut Self) -> Result<()>) -> Result<()>;
     /// The zero of all times.
     fn started(&self) -> Instant;
-    fn dispatch_count(&self) -> u64;
-    fn submission_count(&self) -> u64;
+    /// Dispatches and submissions so far.
+    fn counts(&self) -> [u64; 2];
     fn finish(self) -> Timings;
 }
 
 /// What is lit: the paper's box or a scene, on a device or on the CPU.
 pub trait World {
     type Recorder: Recorder;
-    type Plan: Clone;
     type Film;
 
-    fn plan(&self) -> &Self::Plan;
-    fn task(&self) -> Task;
-    /// The device, and its pipelines before the run; `None` for the CPU.
-    fn device(&self) -> Option<(&Gpu, usize)>;
     /// Records a part of the round under way, and tells `state` of its photons. Fails with [`Error::Interrupted`] where the round
     /// was cut short and nothing of it counts.
     fn trace(&mut self, recorder: &mut Self::Recorder, state: &mut RunState, part: u32) -> Result<()>;
@@ -113,8 +109,8 @@ pub trait World {
 }
 
 /// How far a run has come, and whether it goes on.
-pub struct RunState {
-    task: Task,
+pub struct RunState<'a> {
+    task: Task<'a>,
     watch: Watch,
     /// Of each map, as far as they are collected.
     pub fates: Vec<Fates>,
@@ -130,10 +126,16 @@ pub struct RunState {
 }
 
 /// Runs a world that is set up to its end.
-pub fn run<W: World>(mut world: W, mut recorder: W::Recorder, control: &mut Control) -> Result<RunResult<W::Plan, W::Film>> {
-    let mut state = RunState::new(world.task(), &recorder);
+pub fn run<W: World, Plan: Clone>(
+    mut world: W,
+    mut recorder: W::Recorder,
+    plan: &Plan,
+    task: Task,
+    control: &mut Control,
+) -> Result<RunResult<Plan, W::Film>> {
+    let mut state = RunState::new(task, &recorder);
     while state.end.is_none() {
-        let round = recorder.scope("round", |recorder| {
+        let round = recorder.round(|recorder| {
             for part in 0..state.task.parts_per_round {
                 if part > 0 && state.pause(&mut world, recorder, control)? {
                     return Ok(());
@@ -159,22 +161,24 @@ pub fn run<W: World>(mut world: W, mut recorder: W::Recorder, control: &mut Cont
     }
     let film = world.film(&mut recorder, &state)?;
     let nonfinite_values = world.nonfinite_values(&mut recorder)?;
-    if let Some((gpu, _)) = world.device() {
+    let device = state.task.device;
+    if let Some((gpu, _)) = device {
         gpu.check_validation()?;
     }
+    let [dispatches, submissions] = recorder.counts();
     Ok(RunResult {
         losses: world.losses(&film, &state.fates),
         film,
         fates: state.fates,
-        device: world.device().map(|(gpu, _)| gpu.facts().clone()),
+        device: device.map(|(gpu, _)| gpu.facts().clone()),
         end: state.end.expect("the run has ended"),
         bias: None,
-        dispatches: recorder.dispatch_count(),
-        submissions: recorder.submission_count(),
-        pipelines: world.device().map_or(0, |(gpu, before)| gpu.pipeline_count() - before),
+        dispatches,
+        submissions,
+        pipelines: device.map_or(0, |(gpu, before)| gpu.pipeline_count() - before),
         nonfinite_values,
         timings: recorder.finish(),
-        plan: world.plan().clone(),
+        plan: plan.clone(),
     })
 }
 
@@ -197,15 +201,15 @@ pub fn commands<'gpu>(
     Ok((commands, pipelines_before))
 }
 
-impl RunState {
-    fn new(task: Task, recorder: &impl Recorder) -> RunState {
+impl<'a> RunState<'a> {
+    fn new(task: Task<'a>, recorder: &impl Recorder) -> RunState<'a> {
         RunState {
             watch: Watch::new(task.stop, task.alpha, recorder.started()),
             fates: task.fates.clone(),
             open: vec![0; task.fates.len()],
             emitted: 0,
             rounds: 0,
-            submissions: recorder.submission_count(),
+            submissions: recorder.counts()[1],
             end: None,
             task,
         }
@@ -248,7 +252,7 @@ impl RunState {
             self.watch.look(&world.error(&film), world.losses(&film, &self.fates).relative);
             self.watch.check_losses(self.task.bounces)?;
         }
-        self.submissions = recorder.submission_count();
+        self.submissions = recorder.counts()[1];
         (control.progress)(&self.progress());
         self.end = if self.is_short() {
             Some(End::Time)
@@ -269,7 +273,7 @@ impl RunState {
         let open = self.open.iter().max().copied().unwrap_or(0);
         let tallies_full = open + self.task.photons_per_part > u64::from(u32::MAX);
         // Long work hands commands over by itself, and nobody has looked at the result yet.
-        let submitted = recorder.submission_count() > self.submissions;
+        let submitted = recorder.counts()[1] > self.submissions;
         is_last || may_end || tallies_full || submitted || world.is_full(recorder)
     }
 
@@ -306,46 +310,38 @@ fn sum_of(fates: &[Fates]) -> Ledger {
 }
 
 impl Recorder for Commands<'_> {
-    fn scope(&mut self, name: &str, body: impl FnOnce(&mut Self) -> Result<()>) -> Result<()> {
-        Commands::scope(self, name, body)
+    fn round(&mut self, body: impl FnOnce(&mut Self) -> Result<()>) -> Result<()> {
+        self.scope("round", body)
     }
 
     fn started(&self) -> Instant {
-        Commands::started(self)
+        self.started()
     }
 
-    fn dispatch_count(&self) -> u64 {
-        Commands::dispatch_count(self)
-    }
-
-    fn submission_count(&self) -> u64 {
-        Commands::submission_count(self)
+    fn counts(&self) -> [u64; 2] {
+        [self.dispatch_count(), self.submission_count()]
     }
 
     fn finish(self) -> Timings {
-        Commands::finish(self, "run")
+        self.finish("run")
     }
 }
 
 /// The CPU runs everything at once.
 impl Recorder for HostClock {
-    fn scope(&mut self, name: &str, body: impl FnOnce(&mut Self) -> Result<()>) -> Result<()> {
-        self.time(name, body)
+    fn round(&mut self, body: impl FnOnce(&mut Self) -> Result<()>) -> Result<()> {
+        self.time("round", body)
     }
 
     fn started(&self) -> Instant {
-        HostClock::started(self)
+        self.started()
     }
 
-    fn dispatch_count(&self) -> u64 {
-        0
-    }
-
-    fn submission_count(&self) -> u64 {
-        0
+    fn counts(&self) -> [u64; 2] {
+        [0; 2]
     }
 
     fn finish(self) -> Timings {
-        HostClock::finish(self)
+        self.finish()
     }
 }

@@ -40,8 +40,9 @@ pub fn run(gpu: Option<&Gpu>, scene: &RoomScene, settings: &RoomSettings, contro
     }
 }
 
-fn task(plan: &RoomPlan) -> Task {
+fn task<'a>(plan: &RoomPlan, device: Option<(&'a Gpu, usize)>) -> Task<'a> {
     Task {
+        device,
         stop: plan.settings.stop,
         // The paper's radius never shrinks.
         alpha: 1.0,

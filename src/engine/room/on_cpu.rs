@@ -11,10 +11,9 @@ use crate::cpu::{estimate, nearest, splat::Splats, tree::Tree};
 use crate::engine::Control;
 use crate::engine::nonfinite_values::{NonfiniteValues, What};
 use crate::engine::room::film::RoomFilm;
-use crate::engine::run::{self, RunState, Task, World};
+use crate::engine::run::{self, RunState, World};
 use crate::engine::watch::FilmError;
 use crate::error::{Error, Result};
-use crate::gpu::Gpu;
 use crate::ledger::{Fates, Losses};
 use crate::photon::Photon;
 use crate::plan::{Limits, RoomPlan, photons_of};
@@ -59,25 +58,12 @@ pub fn on_cpu(scene: &RoomScene, settings: &RoomSettings, control: &mut Control)
         plan,
         pool,
     };
-    run::run(world, clock, control)
+    run::run(world, clock, plan, super::task(plan, None), control)
 }
 
 impl World for RoomOnCpu<'_> {
     type Recorder = HostClock;
-    type Plan = RoomPlan;
     type Film = RoomFilm;
-
-    fn plan(&self) -> &RoomPlan {
-        self.plan
-    }
-
-    fn task(&self) -> Task {
-        super::task(self.plan)
-    }
-
-    fn device(&self) -> Option<(&Gpu, usize)> {
-        None
-    }
 
     fn trace(&mut self, clock: &mut HostClock, state: &mut RunState, chunk: u32) -> Result<()> {
         let ranges = self.plan.chunk(chunk);

@@ -13,7 +13,7 @@ use crate::engine::room::film::RoomFilm;
 use crate::engine::room::index;
 use crate::engine::room::resources::{RoomResources, RoundBuffers};
 use crate::engine::room::trace;
-use crate::engine::run::{self, RunState, Task, World};
+use crate::engine::run::{self, RunState, World};
 use crate::engine::tallies;
 use crate::engine::watch::FilmError;
 use crate::error::Result;
@@ -24,8 +24,6 @@ use crate::scene::room::RoomScene;
 use crate::settings::RoomSettings;
 
 struct RoomOnGpu<'a> {
-    gpu: &'a Gpu,
-    pipelines_before: usize,
     scene: &'a RoomScene,
     plan: &'a RoomPlan,
     resources: RoomResources,
@@ -41,25 +39,13 @@ pub fn on_gpu(gpu: &Gpu, scene: &RoomScene, settings: &RoomSettings, control: &m
     let resources = commands.scope("set-up", |commands| RoomResources::new(gpu, commands, scene, &plan))?;
     commands.warm_up()?;
     commands.submit()?;
-    run::run(RoomOnGpu { gpu, pipelines_before, scene, plan: &plan, resources, weights: OnceCell::new() }, commands, control)
+    let world = RoomOnGpu { scene, plan: &plan, resources, weights: OnceCell::new() };
+    run::run(world, commands, &plan, super::task(&plan, Some((gpu, pipelines_before))), control)
 }
 
 impl<'a> World for RoomOnGpu<'a> {
     type Recorder = Commands<'a>;
-    type Plan = RoomPlan;
     type Film = RoomFilm;
-
-    fn plan(&self) -> &RoomPlan {
-        self.plan
-    }
-
-    fn task(&self) -> Task {
-        super::task(self.plan)
-    }
-
-    fn device(&self) -> Option<(&Gpu, usize)> {
-        Some((self.gpu, self.pipelines_before))
-    }
 
     fn trace(&mut self, commands: &mut Commands<'a>, state: &mut RunState, chunk: u32) -> Result<()> {
         let RoomOnGpu { resources, plan, .. } = self;

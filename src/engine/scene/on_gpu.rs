@@ -51,8 +51,6 @@ pub fn constants(plan: &ScenePlan) -> Constants {
 const TIMESTAMPS_PER_ROUND: u32 = 64;
 
 struct SceneOnGpu<'a> {
-    gpu: &'a Gpu,
-    pipelines_before: usize,
     view: &'a View<'a>,
     plan: &'a ScenePlan,
     resources: SceneResources,
@@ -71,39 +69,27 @@ pub fn light(gpu: &Gpu, view: &View, plan: ScenePlan, control: &mut Control) -> 
     let resources = commands.scope("set-up", |commands| SceneResources::new(gpu, commands, view.geometry, &plan, view.phases))?;
     commands.warm_up()?;
     commands.submit()?;
-    let cancelled = control.cancelled;
-    run::run(SceneOnGpu { gpu, pipelines_before, view, plan: &plan, resources, cancelled }, commands, control)
+    let photons_per_round = plan.maps().map(|map| u64::from(map.photons)).sum();
+    let task = Task {
+        device: Some((gpu, pipelines_before)),
+        stop: plan.settings.stop,
+        alpha: plan.settings.alpha,
+        rounds: plan.settings.rounds,
+        bounces: plan.settings.bounces,
+        photons_per_round,
+        parts_per_round: 1,
+        photons_per_part: photons_per_round,
+        counts_photons: false,
+        // Of the global map and of the caustic map.
+        fates: vec![Fates::of_scene(plan.settings.bounces); 2],
+    };
+    let world = SceneOnGpu { view, plan: &plan, resources, cancelled: control.cancelled };
+    run::run(world, commands, &plan, task, control)
 }
 
 impl<'a> World for SceneOnGpu<'a> {
     type Recorder = Commands<'a>;
-    type Plan = ScenePlan;
     type Film = SceneFilm;
-
-    fn plan(&self) -> &ScenePlan {
-        self.plan
-    }
-
-    fn task(&self) -> Task {
-        let settings = &self.plan.settings;
-        let photons_per_round = self.plan.maps().map(|map| u64::from(map.photons)).sum();
-        Task {
-            stop: settings.stop,
-            alpha: settings.alpha,
-            rounds: settings.rounds,
-            bounces: settings.bounces,
-            photons_per_round,
-            parts_per_round: 1,
-            photons_per_part: photons_per_round,
-            counts_photons: false,
-            // Of the global map and of the caustic map.
-            fates: vec![Fates::of_scene(settings.bounces); 2],
-        }
-    }
-
-    fn device(&self) -> Option<(&Gpu, usize)> {
-        Some((self.gpu, self.pipelines_before))
-    }
 
     /// There must be a first round: when the time is up in it, it ends with the photons that it has by then.
     fn trace(&mut self, commands: &mut Commands<'a>, state: &mut RunState, _: u32) -> Result<()> {
