@@ -7,7 +7,8 @@ use glam::DVec3;
 use crate::constants::{HIT_CAUSTIC_PHOTON, HIT_GLOBAL_PHOTON, HIT_KINDS, HIT_SHADOW_RAY};
 use crate::engine::film::RoundSums;
 use crate::engine::unknown::{Unknown, most_hits};
-use crate::engine::watch::{FilmError, mean_squared_radius};
+use crate::engine::watch::FilmError;
+use crate::plan::radius::mean_squared_radius;
 use crate::plan::scene::{MapPlan, ScenePlan};
 
 /// Names of the kinds of `HIT_...`.
