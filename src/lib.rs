@@ -6,6 +6,21 @@
 //! [hard cases](guide::hard_cases) and [file formats](guide::formats). [Architecture](guide::architecture) explains how
 //! the program is built, why its results repeat, and how it is tested.
 //!
+//! ```no_run
+//! use photonmill::engine::scene::{Target, render};
+//! use photonmill::gpu::{Gpu, Options};
+//! use photonmill::scene::Scene;
+//! use photonmill::settings::scene::SceneSettings;
+//!
+//! let gpu = Gpu::open(&Options::default())?;
+//! let scene = Scene::open("cornell", false)?;
+//! let camera = scene.first_camera();
+//! let run = render(&gpu, &scene, &SceneSettings::default(), Target::Picture(&camera, [320, 240]))?;
+//! let radiance: Vec<glam::DVec3> = run.film.means(&run.plan).collect();
+//! println!("{} pixels; {}", radiance.len(), run.ledger());
+//! # Ok::<(), photonmill::error::Error>(())
+//! ```
+//!
 //! # The straight line
 //!
 //! ```text
@@ -14,8 +29,8 @@
 //! is lit   effects the device   of hits  kd-tree  point               report
 //! ```
 //!
-//! One engine walks that line for two worlds: [`engine::room`], the paper's box, and [`engine::scene`], triangles. A file uses
-//! only what stands to its left:
+//! One loop, [`engine::run`], walks that line for two worlds: [`engine::room`], the paper's box, and [`engine::scene`],
+//! triangles. A file uses only what stands to its left:
 //!
 //! ```text
 //! constants, error, text, records, rng, ledger, timings < settings, path, photon < scene < plan < cpu, gpu < engine < output

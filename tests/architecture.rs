@@ -14,7 +14,7 @@ const LINE: &[&[&str]] = &[
     &["cpu", "gpu"],
     &[
         "engine",
-        "engine::bias",
+        "engine::film",
         "engine::planned",
         "engine::prefix_sum",
         "engine::tallies",
@@ -22,7 +22,9 @@ const LINE: &[&[&str]] = &[
         "engine::unknown",
         "engine::nonfinite_values",
     ],
-    &["engine::watch"],
+    &["engine::watch", "engine::replay"],
+    &["engine::bias"],
+    &["engine::run"],
     &["engine::room", "engine::scene"],
     &["engine::choose_builder"],
     &["output", "verify::selfcheck"],
@@ -366,6 +368,7 @@ fn the_check_complains_about_arrows_to_the_right() {
     assert!(complains("engine::room", "use super::scene::View;"));
     assert!(complains("engine::scene::film", "use super::super::room::film::RoomFilm;"));
     assert!(complains("engine::watch", "use super::choose_builder::Choice;"));
+    assert!(complains("engine::run", "use super::room::film::RoomFilm;"));
 
     assert!(!complains("engine::room::trace", "use crate::{error::{Error, Result}, engine::tallies, plan::{self, RoomPlan}};"));
     assert!(!complains("plan", "//! See [`crate::engine::room`].\n/* crate::gpu */ const A: &str = \"crate::gpu\";"));

@@ -7,7 +7,7 @@ use crate::common::lit::scene;
 use crate::common::{Check, assert_complains, assert_holds, device, pairs};
 use photonmill::engine;
 use photonmill::engine::Control;
-use photonmill::engine::bias::{self, Bias};
+use photonmill::engine::bias::{self, Batches, Bias};
 use photonmill::engine::room::film::estimate_walls;
 use photonmill::engine::room::{self};
 use photonmill::engine::scene::{self, View};
@@ -225,7 +225,7 @@ fn the_bias_of_a_shrinking_radius_lies_in_the_scaled_interval() {
     let alpha = SceneSettings::default().alpha;
     let batch = |factor: f64, number: u32| {
         if factor < 1.0 {
-            return scene::bias::batch(&gpu, &long.scene, &long.view(), &long.plan, (factor, ROUNDS, number), &NEVER);
+            return long.batch(&gpu, ROUNDS, factor, number);
         }
         let seed = bias::seed(long.plan.settings.seed, number);
         let settings = SceneSettings { rounds: ROUNDS, alpha, seed, ..long.plan.settings.clone() };
@@ -298,7 +298,12 @@ impl RunResult {
 
     /// From light at a radius that is so many times smaller.
     fn difference(&self, gpu: &Gpu, factor: f64, rounds: u32) -> [f64; 3] {
-        let batch = |factor, number| scene::bias::batch(gpu, &self.scene, &self.view(), &self.plan, (factor, rounds, number), &NEVER);
-        bias::difference(CONFIDENCE, factor, batch).unwrap().unwrap()
+        bias::difference(CONFIDENCE, factor, |factor, number| self.batch(gpu, rounds, factor, number)).unwrap().unwrap()
+    }
+
+    /// Values of a batch at radii times a factor.
+    fn batch(&self, gpu: &Gpu, rounds: u32, factor: f64, number: u32) -> photonmill::error::Result<Option<Vec<f64>>> {
+        let batches = Batches { seed: self.plan.settings.seed, confidence: CONFIDENCE, rounds, cancelled: &NEVER };
+        batches.values(factor, number, |batch, control| scene::bias::batch(gpu, &self.scene, &self.view(), &self.plan, batch, control))
     }
 }

@@ -327,7 +327,7 @@ fn reflected_flux_is_that_of_the_stored_photons() {
         let outcome = run_on_cpu(settings);
         let texel_area = (2.0 * HALF_EDGE / f64::from(settings.mesh)).powi(2);
         let watts = walls(&outcome).iter().flat_map(|wall| &wall.radiosity).sum::<f64>() * texel_area;
-        let stored = outcome.fates.ledger().stored as f64;
+        let stored = outcome.ledger().stored as f64;
         (watts, stored * settings.light_power.iter().sum::<f64>() / settings.total_photons() as f64)
     };
     for settings in [

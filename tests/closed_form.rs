@@ -102,7 +102,7 @@ fn two_skies_shine_as_one_of_both_radiances() {
     assert!(matches!(both.lights[0].kind, LightKind::Environment { .. }));
     let plane = irradiance(&gpu, &both, &settings(), &[(DVec3::ZERO, DVec3::Y)]).unwrap();
     check(&Finding::new("the plane under two skies", 2.0 * PI, plane));
-    let up = radiance(&gpu, both, &settings(), DVec3::Y, DVec3::Y * 2.0).unwrap();
+    let up = radiance(&gpu, &both, &settings(), DVec3::Y, DVec3::Y * 2.0).unwrap();
     check(&Finding::new("two skies seen", 2.0, up));
 }
 

@@ -218,7 +218,7 @@ fn bounces_in_a_closed_room_are_a_geometric_series() {
                 Some(gpu) => run_scene(gpu, &room, &settings),
                 None => run_scene_on_cpu(&room, &settings),
             };
-            expect_geometric(&mut family, &format!("room, {}", builder.name()), &outcome.fates, f64::from(rho));
+            expect_geometric(&mut family, &format!("room, {}", builder.name()), &outcome.fates[0], f64::from(rho));
         }
     }
     family.assert_tells(0.01, |what| what.starts_with("bright"));

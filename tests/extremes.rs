@@ -13,6 +13,7 @@ use crate::common::{
 };
 use glam::{DQuat, DVec3, EulerRot, Vec3};
 use photonmill::cpu::bsdf::phong_lobe;
+use photonmill::engine::film::RoundSums;
 use photonmill::engine::room::constants;
 use photonmill::engine::room::estimate;
 use photonmill::engine::room::film::{RoomFilm, estimate_walls};
@@ -84,7 +85,10 @@ fn a_trillion_photons_merge_into_the_same_light() {
     let one = estimate_walls(&outcome.film, &scene, &outcome.plan);
     for times in [200_000u64, 200_000_000] {
         let merged = RoomFilm {
-            sums: outcome.film.sums.iter().map(|sum| sum.checked_mul(times).unwrap()).collect(),
+            of_rounds: RoundSums {
+                sums: outcome.film.sums.iter().map(|sum| sum.checked_mul(times).unwrap()).collect(),
+                ..outcome.film.of_rounds.clone()
+            },
             emitted: outcome.film.emitted * times,
             ..outcome.film.clone()
         };
@@ -112,7 +116,7 @@ fn light_is_linear_in_power_over_24_decades() {
         let settings = RoomSettings { light_power, mesh: 8, ..RoomSettings::default() };
         let outcome = run_on_cpu(&settings);
         let walls = estimate_walls(&outcome.film, &open_box(&settings), &outcome.plan);
-        (outcome.film.sums, walls.into_iter().flat_map(|wall| wall.irradiance).collect::<Vec<f64>>())
+        (outcome.film.of_rounds.sums, walls.into_iter().flat_map(|wall| wall.irradiance).collect::<Vec<f64>>())
     };
     let (sums, one_watt) = of([1.0, 1.0]);
     assert!(one_watt.iter().all(|irradiance| *irradiance > 0.0));
@@ -197,8 +201,8 @@ fn standard_errors_survive_a_mean_far_above_them() {
     let half = u64::from(settings.rounds) / 2;
     let square = |value: u64| u128::from(value) * u128::from(value);
     let squares = u128::from(half) * (square(low) + square(high));
-    let film =
-        SceneFilm::new(settings.rounds, vec![half * (low + high); 3], [squares as u64, (squares >> 64) as u64].repeat(3), vec![0; 3]);
+    let of_rounds = RoundSums { rounds: settings.rounds, sums: vec![half * (low + high); 3], squares: vec![squares; 3] };
+    let film = SceneFilm { of_rounds, one_hits: vec![0; 3], part_totals: Vec::new(), anomalies: Default::default() };
     let exact = 0.1 / (f64::from(settings.rounds) - 1.0).sqrt();
     assert_holds("mean", relative_check("mean", film.mean(0, &plan).x, 1000.0, 1e-6));
     assert_holds("error", relative_check("standard error", film.standard_error(0, &plan).x, exact, 1e-3));
@@ -326,9 +330,9 @@ fn a_thousand_bounces_store_a_geometric_series() {
         let settings = RoomSettings { reflectance: albedo, bounces, photons, mesh: 1, rng: Rng::Philox, ..RoomSettings::default() };
         let mut scene = open_box(&settings);
         scene.faces[5] = Some(Wall { name: "front", albedo, shininess: None });
-        let mut ledgers = vec![("cpu", run_scene_on_cpu(&scene, &settings).fates.ledger())];
+        let mut ledgers = vec![("cpu", run_scene_on_cpu(&scene, &settings).ledger())];
         if let Some(gpu) = gpu.as_ref().filter(|_| bounces <= 2000) {
-            ledgers.push(("device", run_scene(gpu, &scene, &settings).fates.ledger()));
+            ledgers.push(("device", run_scene(gpu, &scene, &settings).ledger()));
         }
         let rho = f64::from(albedo);
         let (mean, deviation) = (rho / (1.0 - rho), rho.sqrt() / (1.0 - rho));
@@ -352,7 +356,7 @@ fn a_billion_photons_have_the_exact_share() {
     let Some(gpu) = device() else { return };
     let settings =
         RoomSettings { photons: 1_000_000_000, bounces: 1, mesh: 1, rng: Rng::Philox, builder: Builder::Ballot, ..RoomSettings::default() };
-    let fates = run(&gpu, &settings).fates;
+    let fates = &run(&gpu, &settings).fates[0];
     assert_eq!(fates.emitted, 1_000_000_000);
     assert_holds("first bounce", share_check("stored", fates.bounces[0].stored, fates.emitted, 0.586_425_3));
 }
@@ -693,7 +697,7 @@ fn the_ends_of_every_setting_give_numbers() {
             let mut outcomes = vec![run_on_cpu(&settings)];
             outcomes.extend(gpu.as_ref().map(|gpu| run(gpu, &settings)));
             for outcome in outcomes {
-                assert!(outcome.fates.ledger().closes(), "{what}");
+                assert!(outcome.ledger().closes(), "{what}");
                 for wall in estimate_walls(&outcome.film, &open_box(&settings), &outcome.plan) {
                     let values = wall.illumination.iter().chain(&wall.radiosity);
                     assert!(values.clone().all(|value| value.is_finite() && *value >= 0.0), "{what}, {gather:?}: {}", wall.name);

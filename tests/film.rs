@@ -19,6 +19,7 @@ use photonmill::photon::Photon;
 use photonmill::plan::RoomPlan;
 
 use photonmill::engine::Control;
+use photonmill::engine::film::RoundSums;
 use photonmill::engine::room::estimate;
 use photonmill::engine::room::index;
 use photonmill::engine::room::resources::RoomResources;
@@ -520,7 +521,7 @@ fn counted_on(gpu: Option<&Gpu>, settings: &RoomSettings, start: f32, count: u32
             sums = commands.read(&resources.film, sums.len()).unwrap();
         }
     }
-    RoomFilm { sums, ..RoomFilm::new(&plan) }.units(plan.points.len() - 1)
+    RoomFilm { of_rounds: RoundSums { sums, ..RoundSums::default() }, ..RoomFilm::new(&plan) }.units(plan.points.len() - 1)
 }
 
 /// Ten photons more than 2^24, and than so many that the lost part alone would have stopped, are ten more in a pair.

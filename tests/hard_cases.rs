@@ -647,8 +647,7 @@ fn two_sheets_at_one_place_show_each_its_own_side() {
         sheets.meshes = order.map(|face| faces[face].clone()).into();
         for (side, albedo) in [(1.0, 0.8), (-1.0, 0.4)] {
             let found =
-                radiance(&gpu, sheets.clone(), &settings, tilt * DVec3::new(0.3, side * 1.5, 0.4), tilt * DVec3::new(0.1, 0.0, 0.2))
-                    .unwrap();
+                radiance(&gpu, &sheets, &settings, tilt * DVec3::new(0.3, side * 1.5, 0.4), tilt * DVec3::new(0.1, 0.0, 0.2)).unwrap();
             // Each sun is chosen by half of the rays, stratified.
             let what = format!("order {order:?}, side {side}");
             complaints.extend(relative_check(&what, found.mean, albedo / PI, 1e-4).err());

@@ -120,7 +120,7 @@ fn lobes_reflect_what_lies_above_the_horizon() {
         for (degrees, albedo) in [0.0f64, 30.0, 60.0, 80.0].into_iter().zip(albedos) {
             let settings = SceneSettings { photons: 1, rounds: 1, shadow_rays: 32, ..settings() };
             let eye = towards(degrees.to_radians());
-            let found = radiance(&gpu, plate(Surface::Glossy { exponent }, sky()), &settings, eye, DVec3::ZERO).unwrap();
+            let found = radiance(&gpu, &plate(Surface::Glossy { exponent }, sky()), &settings, eye, DVec3::ZERO).unwrap();
             // The table has four digits.
             let error = found.standard_error.hypot(5e-5);
             println!("exponent {exponent}, {degrees} degrees: {:.4} +- {:.4}, expected {albedo}", found.mean, found.standard_error);

@@ -59,7 +59,7 @@ fn a_million_triangles_load_and_render() {
     let lit = scene::light(&gpu, &view, plan, &mut Control { cancelled: &never, progress: &mut |_| {} }).unwrap();
     let row = |name: &str| lit.timings.row(name).and_then(|row| row.gpu_ms).unwrap_or_default();
     println!("read {read:?}, hierarchy {built:?}, GPU ms: 4 rounds {:.1}, photons {:.1}", row("round"), row("round/global/trace"));
-    assert_eq!(lit.anomalies[..2], [0, 0]);
+    assert_eq!(lit.film.anomalies[..2], [0, 0]);
     // The caustic under the ball and the plane around it are lit.
-    assert!(lit.part_totals[0] > 0 && lit.part_totals[1] > 0 && lit.part_totals[2] > 0);
+    assert!(lit.film.part_totals[0] > 0 && lit.film.part_totals[1] > 0 && lit.film.part_totals[2] > 0);
 }

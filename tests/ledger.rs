@@ -40,7 +40,7 @@ fn closes(fates: &Fates, emitted: u64) -> Check {
 
 /// The fates of a run's photons, if its ledger closes.
 pub fn closed_fates(gpu: &Gpu, scene: &RoomScene, settings: &RoomSettings) -> Result<Fates, Complaint> {
-    let fates = outcome_of(gpu, scene, settings)?.fates;
+    let fates = outcome_of(gpu, scene, settings)?.fates[0].clone();
     closes(&fates, settings.total_photons()).map_err(|text| Complaint::new(Kind::LedgerOpen, text))?;
     Ok(fates)
 }
@@ -49,7 +49,7 @@ pub fn closed_fates(gpu: &Gpu, scene: &RoomScene, settings: &RoomSettings) -> Re
 /// hangs on the last bit is rarer than one in 1e5, and these runs are smaller.
 fn fates(gpu: &Gpu, scene: &RoomScene, settings: &RoomSettings) -> Fates {
     let total = settings.total_photons();
-    let expected = run_scene_on_cpu(scene, settings).fates;
+    let expected = run_scene_on_cpu(scene, settings).fates[0].clone();
     assert_holds(format!("cpu\n{settings:?}"), closes(&expected, total));
     for builder in Builder::ON_GPU {
         let settings = RoomSettings { builder, paranoid: true, ..settings.clone() };
@@ -104,7 +104,7 @@ fn black_walls_absorb_the_first_flights_hits() {
     let Some(gpu) = device() else { return };
     for (emission, probability) in [(EmissionLaw::Uniform, 0.781_900_4), (EmissionLaw::Cosine, 0.809_523_7)] {
         let settings = RoomSettings { emission, reflectance: 0.0, bounces: 3, photons: 500_001, rng: Rng::Philox, ..small() };
-        let ledger = run(&gpu, &settings).fates.ledger();
+        let ledger = run(&gpu, &settings).ledger();
         assert_eq!((ledger.stored, ledger.cut_off), (0, 0));
         let what = format!("{emission:?}: share of first flights that end on a wall");
         assert_holds(&what, share_check(&what, ledger.absorbed, ledger.emitted, probability));
@@ -144,14 +144,14 @@ fn a_round_larger_than_a_buffer_splits_and_drops_nothing() {
     // Photons whose map with all bounces is just larger than one buffer of lavapipe, 128 MiB.
     let photons = 600_001;
     let settings = RoomSettings { photons, rng: Rng::Philox, ..small() };
-    let expected = run_on_cpu(&RoomSettings { threads: 2, ..settings.clone() }).fates;
+    let expected = run_on_cpu(&RoomSettings { threads: 2, ..settings.clone() }).fates[0].clone();
     for builder in Builder::ON_GPU {
         let outcome = run(&gpu, &RoomSettings { builder, ..settings.clone() });
         if largest < size_of::<StoredPhoton>() as u64 * 15 * u64::from(photons) {
             assert!(outcome.plan.chunks_per_round > 1, "{builder:?}");
         }
-        assert_holds(format!("{builder:?}"), closes(&outcome.fates, u64::from(photons)));
-        let flips: u64 = pairs(&outcome.fates.bounces, &expected.bounces).map(|(a, b)| a.stored.abs_diff(b.stored)).sum();
+        assert_holds(format!("{builder:?}"), closes(&outcome.fates[0], u64::from(photons)));
+        let flips: u64 = pairs(&outcome.fates[0].bounces, &expected.bounces).map(|(a, b)| a.stored.abs_diff(b.stored)).sum();
         assert!(flips <= 3, "{builder:?}: {flips} stored photons more or less than the CPU's");
     }
 }
@@ -162,7 +162,7 @@ type Spoil = (&'static str, fn(&mut Fates));
 #[test]
 fn the_check_complains_about_lost_and_doubled_photons() {
     let settings = small();
-    let fates = run_on_cpu(&settings).fates;
+    let fates = run_on_cpu(&settings).fates[0].clone();
     assert_holds("the run itself", closes(&fates, 5000));
     let spoils: [Spoil; 5] = [
         ("a stored photon lost", |fates| fates.bounces[3].stored -= 1),

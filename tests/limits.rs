@@ -9,11 +9,12 @@ use glam::{DVec3, Vec3};
 use photonmill::constants::MAX_BOUNCES;
 use photonmill::engine;
 use photonmill::engine::Control;
+use photonmill::engine::End;
 use photonmill::engine::scene::resources::SceneResources;
-use photonmill::engine::scene::{self, End, Round, RunResult, View, trace};
+use photonmill::engine::scene::{self, Round, RunResult, View, trace};
 use photonmill::error::Error;
 use photonmill::gpu::{Commands, Gpu};
-use photonmill::output::light_report;
+use photonmill::output::scene_report;
 use photonmill::plan::radius::{mean_squared_radius, squared_radius};
 use photonmill::plan::scene::ScenePlan;
 use photonmill::plan::sensor::Sensor;
@@ -149,7 +150,7 @@ fn photons_stored_are_the_length_of_the_map() {
             let mut stored = 0;
             for chunk in map.chunks() {
                 let mut count = |commands: &mut Commands| {
-                    stored += u64::from(commands.read::<u32>(&buffers.counters, 1)?[0]);
+                    stored += u64::from(commands.read(&buffers.counters, 1)?[0]);
                     Ok(())
                 };
                 trace::trace(&mut commands, round, buffers, map, chunk, &mut count).unwrap();
@@ -223,7 +224,7 @@ fn long_rounds_end_soon_after_they_are_asked_to() {
     let over = began.elapsed().saturating_sub(wanted);
     assert_eq!((lit.end, lit.film.rounds), (End::Time, 1));
     assert!(lit.fates[0].emitted < u64::from(long.photons) && lit.fates[1].emitted > 0);
-    let report = light_report::text("cornell-spheres", &lit, "pixel", false);
+    let report = scene_report::text("cornell-spheres", &lit, "pixel", false);
     assert!(report.contains("time was up in the first round") && report.contains("use fewer --photons"), "{report}");
     assert!(over < soon, "{over:?} after its time was up");
     // Fewer photons are no less light.

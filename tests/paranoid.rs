@@ -9,10 +9,12 @@ use glam::Vec3;
 use photonmill::engine;
 use photonmill::engine::Control;
 use photonmill::engine::nonfinite_values::{NonfiniteValues, What};
+use photonmill::engine::replay::PhotonName;
 use photonmill::engine::room::{self};
-use photonmill::engine::scene::replay::{PhotonName, replay};
+use photonmill::engine::scene::replay::replay;
 use photonmill::engine::scene::{self, RunResult, View};
 use photonmill::gpu::Gpu;
+use photonmill::photon::Photon;
 use photonmill::plan::scene::ScenePlan;
 use photonmill::plan::sensor::Sensor;
 use photonmill::scene::geometry::Geometry;
@@ -109,6 +111,12 @@ fn a_planted_value_is_counted_and_its_photon_named() {
     }
 }
 
+/// Where a photon of round 0 is stored when it is traced alone.
+fn alone(gpu: Option<&Gpu>, settings: &RoomSettings, photon: u32) -> Vec<Photon> {
+    let name = PhotonName { round: 0, photon, caustic: false };
+    room::replay(gpu, &open_box(settings), settings, name).unwrap().vertices
+}
+
 /// Every builder's map holds of a photon what it stores when it is traced alone.
 #[test]
 fn a_photon_alone_takes_the_path_that_it_takes_among_others() {
@@ -122,7 +130,7 @@ fn a_photon_alone_takes_the_path_that_it_takes_among_others() {
             let most = all.iter().max_by_key(|photon| photon.bounce).unwrap().photon;
             for photon in [0, 1, most, settings.photons / 2, settings.photons - 1] {
                 let expected: Vec<_> = all.iter().copied().filter(|stored| stored.photon == photon).collect();
-                let found = in_order(room::replay_on_gpu(&gpu, &open_box(&settings), &settings, 0, photon).unwrap().stored);
+                let found = in_order(alone(Some(&gpu), &settings, photon));
                 assert_eq!(found, expected, "{builder:?}, photon {photon}");
             }
         }
@@ -130,6 +138,6 @@ fn a_photon_alone_takes_the_path_that_it_takes_among_others() {
         let most = all.iter().max_by_key(|photon| photon.bounce).unwrap().photon;
         let expected: Vec<_> = all.into_iter().filter(|stored| stored.photon == most).collect();
         assert!(expected.len() > 5);
-        assert_eq!(in_order(room::replay_on_cpu(&open_box(&settings), &settings, 0, most).unwrap().stored), expected);
+        assert_eq!(in_order(alone(None, &settings, most)), expected);
     }
 }

@@ -551,7 +551,7 @@ fn sobol_photons_are_as_many_with_less_noise() {
     let runs = |rng| -> Vec<Vec<f64>> {
         let run = |seed| {
             let settings = RoomSettings { rng, seed, photons, bounces: 5, mesh: 1, threads: 2, ..RoomSettings::default() };
-            let fates = run_on_cpu(&settings).fates;
+            let fates = &run_on_cpu(&settings).fates[0];
             let stored = fates.bounces.iter().map(|bounce| bounce.stored);
             [fates.bounces[0].stored + fates.bounces[0].absorbed].into_iter().chain(stored).map(|count| count as f64).collect()
         };

@@ -8,13 +8,11 @@ use crate::common::lit::{scene, seen};
 use crate::common::{Check, assert_complains, assert_holds, device};
 use glam::DVec3;
 use photonmill::engine;
-use photonmill::engine::Control;
-use photonmill::engine::Progress;
 use photonmill::engine::room::film::{estimate_walls, irradiance_weights};
 use photonmill::engine::room::{self, RunResult};
-use photonmill::engine::scene::stop::error_bound;
-use photonmill::engine::scene::{self, End, View};
+use photonmill::engine::scene::{self, View};
 use photonmill::engine::watch;
+use photonmill::engine::{Control, End, Progress};
 use photonmill::gpu::Gpu;
 use photonmill::plan::scene::ScenePlan;
 use photonmill::plan::sensor::Sensor;
@@ -95,11 +93,11 @@ fn claims_hold(seeds: u64) {
         // one path in thousands meets, runs as short as these know no error: README says how often they claim too little.
         let settings = |error, seed| SceneSettings { aim: name != "caustic-sphere", ..settings(error, seed) };
         let first = seen(&gpu, &scene, &SceneSettings { rounds: 60, stop: Stop::default(), ..settings(1.0, 0) }, &camera, [SIZE; 2]);
-        let wanted = error_bound(&first.film, &first.plan, CONFIDENCE).min(1.0);
+        let wanted = first.film.error(&first.plan, CONFIDENCE).bound(CONFIDENCE).min(1.0);
         let runs: Vec<(Vec<DVec3>, f64)> = (1..=seeds)
             .map(|seed| {
                 let lit = seen(&gpu, &scene, &settings(wanted, seed), &camera, [SIZE; 2]);
-                let bound = error_bound(&lit.film, &lit.plan, CONFIDENCE);
+                let bound = lit.film.error(&lit.plan, CONFIDENCE).bound(CONFIDENCE);
                 assert_eq!(lit.end, End::Error, "{name}, {bound}");
                 assert!(bound <= wanted && lit.film.rounds >= 30, "{name}: {bound} of {wanted} after {} rounds", lit.film.rounds);
                 (means(&lit), bound)
@@ -187,11 +185,11 @@ fn a_run_of_the_box_ends_at_what_is_reached_first() {
             ..RoomSettings::default()
         };
         let (outcome, told) = run_box(gpu, &settings(Stop { photons: Some(5100), error: Some(1e-6), ..Stop::default() }));
-        assert_eq!((outcome.end, outcome.film.rounds, outcome.cancelled), (End::Photons, 5, false));
-        let emitted = outcome.fates.emitted;
+        assert_eq!((outcome.end, outcome.film.rounds, outcome.is_cancelled()), (End::Photons, 5, false));
+        let emitted = outcome.fates[0].emitted;
         assert!((5100..6006).contains(&emitted) && outcome.film.emitted == emitted, "{emitted}");
         let ledger = told.last().unwrap().ledger;
-        assert!(ledger.closes() && ledger == outcome.fates.ledger(), "{ledger:?}");
+        assert!(ledger.closes() && ledger == outcome.ledger(), "{ledger:?}");
         // Five whole rounds have the errors that they have alone, and the rest is light.
         let whole = run_box(gpu, &RoomSettings { rounds: 5, ..settings(Stop::default()) }).0;
         assert_eq!((whole.end, &whole.film.squares), (End::Rounds, &outcome.film.squares));
@@ -274,7 +272,7 @@ fn the_end_is_predicted_at_a_tenth_of_the_run() {
     for name in SCENES {
         let first = watched(&gpu, name, &SceneSettings { rounds: 60, stop: Stop::default(), ..settings(1.0, 3) }).0;
         // About 700 rounds.
-        let wanted = error_bound(&first.film, &first.plan, CONFIDENCE) / 3.4;
+        let wanted = first.film.error(&first.plan, CONFIDENCE).bound(CONFIDENCE) / 3.4;
         if wanted < 1e-5 {
             continue;
         }
@@ -291,7 +289,7 @@ fn the_end_is_predicted_at_a_tenth_of_the_run() {
     let wanted = bound_in_box(&in_box(Some(&gpu), None, 60, 1000).0) / 3.4;
     let (outcome, told) = in_box(Some(&gpu), Some(wanted), 20_000, 5);
     assert_eq!(outcome.end, End::Error);
-    let end = outcome.fates.emitted as f64;
+    let end = outcome.fates[0].emitted as f64;
     let tenth = told.iter().find(|progress| progress.done as f64 >= 0.1 * end && progress.error.is_some()).unwrap();
     let predicted = tenth.done as f64 * (1.0 + tenth.seconds_left.unwrap() / tenth.seconds);
     println!("the box: {predicted:.0} photons predicted after {}, {end} done", tenth.done);

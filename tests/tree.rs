@@ -15,6 +15,7 @@ use photonmill::gpu::{Commands, Gpu, Options};
 use photonmill::photon::Photon;
 use photonmill::plan::{Limits, RoomPlan};
 
+use photonmill::engine::film::RoundSums;
 use photonmill::engine::room::constants;
 use photonmill::engine::room::estimate;
 use photonmill::engine::room::index;
@@ -352,7 +353,8 @@ fn the_estimate_has_no_bias() {
                 };
                 let map: Vec<Photon> =
                     (0..4000).map(place).filter(|photon| photon.position.truncate().abs().max_element() <= 0.25).collect();
-                let film = RoomFilm { sums: gathered_on_cpu(&plan, &map), emitted: u64::from(settings.photons), ..RoomFilm::new(&plan) };
+                let of_rounds = RoundSums { sums: gathered_on_cpu(&plan, &map), ..RoundSums::default() };
+                let film = RoomFilm { of_rounds, emitted: u64::from(settings.photons), ..RoomFilm::new(&plan) };
                 let back = estimate_walls(&film, &scene, &plan).pop().unwrap();
                 // 4000 photons a square metre at 2 W in all.
                 back.radiosity.iter().sum::<f64>() / 9.0 / 2.0

@@ -11,9 +11,8 @@ use crate::unknown::room_without_floor;
 use photonmill::engine;
 use photonmill::engine::scene::{self, View, trial};
 use photonmill::gpu::Gpu;
-use photonmill::output::light_report;
-use photonmill::plan::radius::RadiusFrom;
-use photonmill::plan::radius::area_radius;
+use photonmill::output::scene_report;
+use photonmill::plan::radius::{RadiusFrom, area_radius};
 use photonmill::plan::scene::ScenePlan;
 use photonmill::plan::sensor::Sensor;
 use photonmill::records::Receiver;
@@ -136,7 +135,7 @@ fn a_trial_knows_no_seed_builder_or_split() {
     let plan = tried(&gpu, &scene, &geometry, &SceneSettings { caustic_radius: Some(0.01), ..given });
     assert_eq!(plan.trial, None);
     let plan = tried(&gpu, &scene, &geometry, &settings);
-    let json: serde_json::Value = serde_json::from_slice(&light_report::plan_json(&plan)).unwrap();
+    let json: serde_json::Value = serde_json::from_slice(&scene_report::plan_json(&plan)).unwrap();
     assert!(json["trial"]["seconds"].as_f64().unwrap() > 0.0 && json["maps"][0]["radius_from"] == "trial", "{json}");
 }
 
@@ -155,7 +154,7 @@ fn a_radius_wider_than_what_it_lies_in_is_warned_of() {
         let view = View { geometry: &geometry, camera: None, phases: &phases };
         let settings = SceneSettings { photons: 1 << 10, ..SceneSettings::default() };
         let plan = trial::plan(&gpu, &scene, &view, &settings, Sensor::Receivers { count: points.len() as u32 }).unwrap();
-        light_report::radius_warning(&plan, &geometry, "point")
+        scene_report::radius_warning(&plan, &geometry, "point")
     };
     let told = warning([middle.clone(), corners].concat()).expect("a warning");
     assert!(told.contains("at 40 % of the points the next wall or edge is nearer than the search radius"), "{told}");
@@ -177,7 +176,7 @@ fn a_room_too_small_for_its_scene_has_an_unknown_bias() {
         let plan = trial::plan(&gpu, &scene, &view, &settings, Sensor::Receivers { count: points.len() as u32 }).unwrap();
         let bias = scene::bias::measure(&gpu, &scene, &view, &plan, (1.0, 2), &AtomicBool::new(false)).unwrap().unwrap();
         assert_eq!(bias.is_known(), is_known, "{width} m: {bias:?}");
-        let warning = light_report::radius_warning(&plan, &geometry, "point").unwrap_or_default();
+        let warning = scene_report::radius_warning(&plan, &geometry, "point").unwrap_or_default();
         assert_eq!(warning.contains("use --final-gather"), !is_known, "{width} m: {warning}");
     }
 }

@@ -4,9 +4,9 @@ use glam::{DVec3, Vec3, dvec3};
 
 use crate::common::lit::{level, matt, mirror, received, scene_of, seen, shining};
 use crate::common::{device, run};
+use photonmill::engine::End;
 use photonmill::engine::room::film::{estimate_walls, irradiance_weights};
-use photonmill::engine::scene::stop::error_bound;
-use photonmill::engine::scene::{End, RunResult};
+use photonmill::engine::scene::RunResult;
 use photonmill::rng::Rng;
 use photonmill::scene::geometry::Geometry;
 use photonmill::scene::light::LightKind;
@@ -72,7 +72,7 @@ fn no_run_ends_on_a_picture_that_nothing_has_reached() {
             let unknown = lit.film.unknown(&lit.plan, 0.95);
             assert_eq!((unknown.asked, unknown.unreached), (36, 36), "seed {seed}");
             assert_eq!(unknown.absent, ["shadow ray", "photon of the global map"], "seed {seed}");
-            assert_eq!(error_bound(&lit.film, &lit.plan, 0.95), f64::INFINITY);
+            assert_eq!(lit.film.error(&lit.plan, 0.95).bound(0.95), f64::INFINITY);
             assert_eq!(lit.film.stated_error(7, &lit.plan), DVec3::INFINITY);
         }
     }
@@ -135,7 +135,7 @@ fn runs_end_where_the_dark_is_known_well_enough() {
     // And nothing but background has no error at all.
     let away = Camera::looking_at("camera", dvec3(0.0, 3.0, 0.0), dvec3(0.0, 9.0, 0.0), DVec3::Z, 0.5);
     let lit = seen(&gpu, &scene, &settings, &away, [4, 4]);
-    assert_eq!((lit.end, error_bound(&lit.film, &lit.plan, 0.95)), (End::Error, 0.0));
+    assert_eq!((lit.end, lit.film.error(&lit.plan, 0.95).bound(0.95)), (End::Error, 0.0));
 }
 
 /// A mirror below the floor is a target of the caustic map's photons, and none of them gets there.

@@ -14,7 +14,7 @@ use crate::engine::scene::RunResult;
 use crate::error::{Error, Result};
 use crate::output::colour::ColourPicture;
 use crate::output::destination::{Folder, check_distinct, write_all};
-use crate::output::light_report;
+use crate::output::scene_report;
 use crate::plan::sensor::Sensor;
 use crate::records::Receiver;
 use crate::scene::Scene;
@@ -72,7 +72,7 @@ pub(super) fn run(args: &BakeArgs, cancelled: &AtomicBool) -> Result<End> {
 
     let estimates = estimates(&lit);
     let stops = args.exposure.unwrap_or_else(|| usual_exposure(&estimates));
-    let text = light_report::text(&scene.name, &lit, job.point, args.messages.explain);
+    let text = scene_report::text(&scene.name, &lit, job.point, args.messages.explain);
     let written = bake::write(&folder, &scene, &layout, &layout.maps(&estimates), stops.exp2());
     reporter.finish();
     let written = written.and_then(|()| write_all(reports.files(&scene, &lit)));

@@ -25,7 +25,7 @@ use std::path::PathBuf;
 
 use clap::{Args, CommandFactory, FromArgMatches, Parser, Subcommand};
 
-use crate::engine::scene::{self as transport_line, RunResult};
+use crate::engine::run::RunResult;
 use crate::error::{Error, Result};
 use crate::gpu::{Gpu, Options};
 use crate::output::destination::Destination;
@@ -157,8 +157,8 @@ enum End {
 }
 
 impl End {
-    fn of(lit: &RunResult) -> End {
-        if lit.end == transport_line::End::Cancelled { End::Cancelled } else { End::Finished }
+    fn of<Plan, Film>(run: &RunResult<Plan, Film>) -> End {
+        if run.is_cancelled() { End::Cancelled } else { End::Finished }
     }
 }
 

@@ -5,7 +5,7 @@ use std::num::IntErrorKind;
 use std::ops::RangeInclusive;
 use std::str::FromStr;
 
-use crate::engine::scene::replay::PhotonName;
+use crate::engine::replay::PhotonName;
 use crate::settings::WALL_NAMES;
 
 type Parsed<T> = Result<T, String>;

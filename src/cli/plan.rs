@@ -10,7 +10,7 @@ use crate::engine;
 use crate::error::Result;
 use crate::gpu::Gpu;
 use crate::output::destination::write_all;
-use crate::output::light_report;
+use crate::output::scene_report;
 use crate::plan::Limits;
 use crate::plan::radius::RadiusFrom;
 use crate::plan::scene::ScenePlan;
@@ -61,10 +61,10 @@ pub(super) fn run(args: &PlanArgs) -> Result<()> {
     let plan = ScenePlan::new(job.scene, &geometry, job.settings, job.sensor, &limits)?;
     reporter.finish();
     if let Some(json) = json {
-        return write_all([(json, [light_report::plan_json(&plan), b"\n".to_vec()].concat())]);
+        return write_all([(json, [scene_report::plan_json(&plan), b"\n".to_vec()].concat())]);
     }
-    let mut text = light_report::plan_table(&plan, None);
-    if let Some(line) = light_report::missing(&plan) {
+    let mut text = scene_report::plan_table(&plan, None);
+    if let Some(line) = scene_report::missing(&plan) {
         text.push_str(&line);
         text.push('\n');
     }

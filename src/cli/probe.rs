@@ -10,13 +10,11 @@ use glam::DVec3;
 use super::progress::ProgressReporter;
 use super::transport::{Job, MessageArgs, ReportArgs, SceneArgs, TimedDeviceArgs, TransportArgs, geometry, light, plan};
 use super::{End, complain, say_beside};
-use crate::engine::scene::RunResult;
+use crate::engine::scene::{RunResult, Target};
 use crate::error::{Error, Result};
 use crate::output::destination::{Destination, check_distinct, write_all};
-use crate::output::light_report;
+use crate::output::scene_report;
 use crate::plan::sensor::Sensor;
-use crate::records::Receiver;
-use crate::scene::geometry::Geometry;
 use crate::scene::{Light, LightKind, Mesh};
 use crate::settings::scene::{Illumination, SceneSettings};
 use crate::text::{counted, echo, refusal};
@@ -68,7 +66,7 @@ pub(super) fn run(args: &ProbeArgs, cancelled: &AtomicBool) -> Result<End> {
         complain("warning: with --illumination photons, points that lie on no surface receive direct light of emissive meshes only");
     }
     let geometry = geometry(&scene, &settings, &reporter)?;
-    let phases = [receivers(&points, &geometry)];
+    let phases = Target::Points(&points).phases(&geometry);
     let sensor = Sensor::Receivers { count: points.len() as u32 };
     let job = Job { scene: &scene, settings: &settings, sensor, camera: None, phases: &phases, point: "point" };
     let gpu = args.device.open(&reporter)?;
@@ -76,7 +74,7 @@ pub(super) fn run(args: &ProbeArgs, cancelled: &AtomicBool) -> Result<End> {
     let lit = light(&gpu, &job, &geometry, plan, args.transport.stop.bias, &reporter, cancelled)?;
     reporter.finish();
 
-    let text = light_report::text(&scene.name, &lit, job.point, args.messages.explain);
+    let text = scene_report::text(&scene.name, &lit, job.point, args.messages.explain);
     let wrote = if output.is_standard_output() { String::new() } else { format!("\nwrote {}", args.output.display()) };
     let mut files = vec![(output, table(&lit))];
     files.extend(reports.files(&scene, &lit));
@@ -85,16 +83,6 @@ pub(super) fn run(args: &ProbeArgs, cancelled: &AtomicBool) -> Result<End> {
     }
     say_beside(&all, &format!("{}{wrote}", text.trim_end()))?;
     Ok(End::of(&lit))
-}
-
-fn receivers(points: &[(DVec3, DVec3)], geometry: &Geometry) -> Vec<Receiver> {
-    points
-        .iter()
-        .map(|(position, normal)| {
-            let normal = normal.as_vec3();
-            Receiver { position: geometry.to_local(*position), normal, shading_normal: normal }
-        })
-        .collect()
 }
 
 /// Irradiance and standard errors, W/m2; an error that is not known is `inf`.

@@ -4,6 +4,7 @@ use std::path::PathBuf;
 use std::sync::atomic::AtomicBool;
 
 use clap::Args;
+use glam::DVec3;
 
 use super::parse::{parse_integer, parse_number, parse_photon_name};
 use super::picture_size::{PictureSize, parse_size};
@@ -13,13 +14,13 @@ use super::transport::{
 };
 use super::{End, optional_file, say, say_beside};
 use crate::engine;
-use crate::engine::scene::RunResult;
-use crate::engine::scene::replay::{self, PhotonName};
+use crate::engine::replay::PhotonName;
+use crate::engine::scene::{RunResult, replay};
 use crate::error::{Error, Result};
 use crate::output::colour::ColourPicture;
 use crate::output::destination::{Destination, check_distinct, write_all};
 use crate::output::image::Format;
-use crate::output::light_report;
+use crate::output::scene_report;
 use crate::plan::scene::ScenePlan;
 use crate::plan::sensor::Sensor;
 use crate::scene::{Camera, Scene};
@@ -133,7 +134,7 @@ pub(super) fn run(args: &RenderArgs, cancelled: &AtomicBool) -> Result<End> {
 
     let image = radiance(&lit, width, height);
     let stops = args.exposure.unwrap_or_else(|| image.usual_exposure());
-    let text = light_report::text(&scene.name, &lit, job.point, args.messages.explain);
+    let text = scene_report::text(&scene.name, &lit, job.point, args.messages.explain);
     let mut files = vec![(picture, image.encode(format, stops))];
     if let Some(errors) = errors {
         files.push((errors, standard_error(&lit, width, height).encode(Format::Exr, 0.0)));
@@ -191,14 +192,14 @@ fn verdict(lit: &RunResult, scene: &Scene, camera: &Camera, (width, height): (u3
     // Of the same scene, without what was left out, and with other random numbers than the photons'.
     let scene = scene.without(&settings.without);
     let judged = Judge::new(&scene, settings.bounces).image(camera, width, height, samples, !settings.seed);
-    let means: Vec<_> = (0..lit.film.pixels()).map(|pixel| lit.film.mean(pixel, &lit.plan)).collect();
+    let means: Vec<_> = lit.film.means(&lit.plan).collect();
     let errors: Vec<_> = (0..lit.film.pixels()).map(|pixel| lit.film.standard_error(pixel, &lit.plan)).collect();
     Verdict::new(&means, &errors, lit.film.rounds.min(samples), &judged, part)
 }
 
 /// W/m2/sr.
 fn radiance(lit: &RunResult, width: u32, height: u32) -> ColourPicture {
-    let pixels = (0..lit.film.pixels()).map(|pixel| lit.film.mean(pixel, &lit.plan).as_vec3()).collect();
+    let pixels = lit.film.means(&lit.plan).map(DVec3::as_vec3).collect();
     ColourPicture { width, height, pixels }
 }
 

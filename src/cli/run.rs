@@ -13,15 +13,15 @@ use super::{DeviceArgs, End, JsonArg, TimingArgs, complain, optional_file, say, 
 use crate::engine;
 use crate::engine::Control;
 use crate::engine::choose_builder::{Choice, choose_builder};
-use crate::engine::room::film::{estimate_walls, irradiance_weights};
+use crate::engine::replay::PhotonName;
+use crate::engine::room::film::estimate_walls;
 use crate::engine::room::{self, RunResult};
-use crate::engine::scene::replay::PhotonName;
 use crate::error::{Error, Result};
 use crate::gpu::Gpu;
 use crate::output::destination::{Destination, Folder, check_distinct, write_all};
 use crate::output::image::{Format, overview};
 use crate::output::lightmap::{self, Quantity};
-use crate::output::{report, trace_file};
+use crate::output::{room_report, trace_file};
 use crate::plan::{Limits, RoomPlan};
 use crate::rng::Rng;
 use crate::scene::open_box::open_box;
@@ -347,19 +347,16 @@ pub(super) fn run(args: &RunArgs, cancelled: &AtomicBool) -> Result<End> {
     let settings = RoomSettings { stop: Stop { bias: before.map(|bias| bias.upper), ..settings.stop }, ..settings };
     reporter.status("making the pipelines");
     let mut control = Control { cancelled, progress: &mut |progress| reporter.report(progress, "photon") };
-    let mut outcome = match &gpu {
-        Some(gpu) => room::on_gpu(gpu, &scene, &settings, &mut control)?,
-        None => room::on_cpu(&scene, &settings, &mut control)?,
-    };
+    let mut outcome = room::run(gpu.as_ref(), &scene, &settings, &mut control)?;
     outcome.bias = before;
-    if before.is_none() && args.stop.bias && !outcome.cancelled {
+    if before.is_none() && args.stop.bias && !outcome.is_cancelled() {
         reporter.status("measuring the bias");
         outcome.bias = measure(&settings, rounds_after(outcome.film.rounds))?;
     }
     reporter.finish();
-    let end = if outcome.cancelled { End::Cancelled } else { End::Finished };
-    if outcome.cancelled {
-        let (emitted, total) = (outcome.fates.emitted, settings.total_photons());
+    let end = End::of(&outcome);
+    if outcome.is_cancelled() {
+        let (emitted, total) = (outcome.film.emitted, settings.total_photons());
         complain(&format!("ended after {emitted} of {total} photons; the results are of these"));
     }
     outputs.write(outcome, &scene)?;
@@ -403,29 +400,8 @@ fn fastest(gpu: &Gpu, scene: &RoomScene, settings: &RoomSettings, reporter: &Pro
 
 /// Where one photon of the run is stored.
 fn show_photon(args: &RunArgs, settings: &RoomSettings, scene: &RoomScene, name: PhotonName) -> Result<End> {
-    let PhotonName { round, photon, caustic } = name;
-    if caustic {
-        return Err(Error::setting("--replay", name, "must be ROUND:PHOTON here: the paper's box has no caustic map"));
-    }
     let gpu = if settings.builder == Builder::Cpu { None } else { args.device.open(&args.device.options())? };
-    let path = match &gpu {
-        Some(gpu) => room::replay_on_gpu(gpu, scene, settings, round, photon)?,
-        None => room::replay_on_cpu(scene, settings, round, photon)?,
-    };
-    let name_of = |wall: u32| scene.faces[wall as usize].as_ref().map_or("opening", |wall| wall.name);
-    let (p, d) = (path.start.position, path.start.direction);
-    say(&format!("photon {photon} of round {round}, seed {}", settings.seed))?;
-    say(&format!("{:>6} {:<8} {:>10} {:>10} {:>10} {:>10}", "bounce", "wall", "x, m", "y", "z", "weight"))?;
-    let start = name_of(path.start.wall);
-    say(&format!("{:>6} {start:<8} {:>10.6} {:>10.6} {:>10.6}   towards {:.6}, {:.6}, {:.6}", "light", p.x, p.y, p.z, d.x, d.y, d.z))?;
-    for photon in &path.stored {
-        let (wall, p) = (name_of(photon.wall), photon.position);
-        say(&format!("{:>6} {wall:<8} {:>10.6} {:>10.6} {:>10.6} {:>10.6}", photon.bounce + 1, p.x, p.y, p.z, photon.weight))?;
-    }
-    say(&format!("stored {}, then it {}", counted(path.stored.len(), "time"), path.fate))?;
-    if let Some(nonfinite_values) = &path.nonfinite_values {
-        say(&nonfinite_values.text())?;
-    }
+    say(&room::replay(gpu.as_ref(), scene, settings, name)?.table(scene, settings.seed))?;
     Ok(End::Finished)
 }
 
@@ -459,9 +435,7 @@ impl Outputs {
     fn write(self, mut outcome: RunResult, scene: &RoomScene) -> Result<()> {
         let began = Instant::now();
         let walls = estimate_walls(&outcome.film, scene, &outcome.plan);
-        // W of a photon of relative flux 1.
-        let watts = outcome.plan.flux_unit / outcome.film.emitted.max(1) as f64;
-        let unknown = outcome.film.unknown(&irradiance_weights(scene, &outcome.plan), watts, outcome.plan.settings.stop.confidence);
+        let error = room_report::error(&outcome, scene);
         let (destination, format) = self.picture;
         let picture = destination.path().display().to_string();
         let mut files = vec![(destination, overview(scene, &walls).encode(format))];
@@ -473,14 +447,14 @@ impl Outputs {
         outcome.timings.add(Span { name: "output".into(), clock: Clock::Wall, start: run, duration: began.elapsed() });
 
         if let Some(json) = self.json {
-            files.push((json, report::json(&outcome, &walls, &unknown)));
+            files.push((json, room_report::json(&outcome, &walls, &error)));
         }
         if let Some(trace) = self.trace {
             let device = outcome.device.as_ref().map_or("CPU", |facts| &facts.name);
             files.push((trace, trace_file::chrome_trace(&outcome.timings, device)));
         }
         let destinations: Vec<Destination> = files.iter().map(|(destination, _)| destination.clone()).collect();
-        let text = report::text(&outcome, &walls, &unknown);
+        let text = room_report::text(&outcome, &error);
         match write_all(files) {
             Ok(()) => say_beside(&destinations, &format!("{text}\nwrote {picture}")),
             Err(error) => say_beside(&destinations, &text).and(Err(error)),

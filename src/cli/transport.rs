@@ -17,7 +17,7 @@ use crate::engine::scene::{self, RunResult, View};
 use crate::error::{Error, Result};
 use crate::gpu::Gpu;
 use crate::output::destination::Destination;
-use crate::output::light_report;
+use crate::output::scene_report;
 use crate::output::trace_file;
 use crate::plan::radius::mean_squared_radius;
 use crate::plan::scene::ScenePlan;
@@ -304,8 +304,8 @@ impl Reports {
     }
 
     pub(super) fn files(self, scene: &Scene, lit: &RunResult) -> Vec<(Destination, Vec<u8>)> {
-        let json = self.json.map(|json| (json, light_report::json(&scene.name, lit)));
-        let trace = self.trace.map(|trace| (trace, trace_file::chrome_trace(&lit.timings, &lit.device.name)));
+        let json = self.json.map(|json| (json, scene_report::json(&scene.name, lit)));
+        let trace = self.trace.map(|trace| (trace, trace_file::chrome_trace(&lit.timings, lit.device_name())));
         json.into_iter().chain(trace).collect()
     }
 }
@@ -331,7 +331,7 @@ impl<'a> Job<'a> {
 pub(super) fn plan(gpu: &Gpu, job: &Job, geometry: &Geometry) -> Result<ScenePlan> {
     let view = View { geometry, camera: job.camera, phases: job.phases };
     let plan = scene::trial::plan(gpu, job.scene, &view, job.settings, job.sensor)?;
-    if let Some(warning) = light_report::radius_warning(&plan, geometry, job.point) {
+    if let Some(warning) = scene_report::radius_warning(&plan, geometry, job.point) {
         complain(&format!("warning: {warning}"));
     }
     Ok(plan)
@@ -413,7 +413,7 @@ pub(super) fn light(
     let mut report = |progress: &Progress| reporter.report(progress, "round");
     let mut control = Control { cancelled, progress: &mut report };
     let mut lit = interruptible(|| scene::light(gpu, &view, plan, &mut control))?;
-    if lit.end == scene::End::Cancelled {
+    if lit.is_cancelled() {
         complain(&format!("ended early: the results are of {} of {}", counted(lit.film.rounds, "round"), lit.plan.settings.rounds));
         return Ok(lit);
     }
@@ -443,9 +443,6 @@ pub(super) fn camera(scene: &Scene, name: Option<&str>) -> Result<Camera> {
             };
             Error::setting("--camera", name, there)
         }),
-        None => Ok(scene.cameras.first().cloned().unwrap_or_else(|| {
-            let (min, max) = scene.bounds();
-            Camera::around(min, max)
-        })),
+        None => Ok(scene.first_camera()),
     }
 }

@@ -11,12 +11,15 @@
 //! over batches with Student's quantile.
 
 use std::f64::consts::FRAC_1_SQRT_2;
+use std::sync::atomic::AtomicBool;
 use std::time::Instant;
 
 use serde::Serialize;
 use statrs::distribution::{ContinuousCDF, StudentsT};
 
+use super::watch::{Control, End};
 use crate::error::Result;
+use crate::settings::stop::Stop;
 
 /// Root mean square over a result's pixels and channels, over that of the result.
 #[derive(Debug, Clone, Copy, PartialEq, Serialize)]
@@ -66,6 +69,46 @@ impl Bias {
         let Bias { relative, lower, upper, .. } = self;
         let [relative, lower, upper] = [relative, lower, upper].map(|bias| bias * mean_squared_radius);
         Bias { relative, lower, upper, ..self }
+    }
+}
+
+/// Batches of a run's own kind, with photons of their own.
+pub struct Batches<'a> {
+    /// Of the run.
+    pub seed: u64,
+    pub confidence: f64,
+    /// Of each batch.
+    pub rounds: u32,
+    pub cancelled: &'a AtomicBool,
+}
+
+/// What a batch differs in from the run.
+pub struct Batch {
+    /// Of the radius, which stays.
+    pub factor: f64,
+    pub rounds: u32,
+    pub seed: u64,
+    /// Its rounds alone end it.
+    pub stop: Stop,
+}
+
+impl Batches<'_> {
+    /// The bias at the run's radius; `None` if it was cancelled. `run` gives the values of a batch's result.
+    pub fn measure(&self, mut run: impl FnMut(&Batch, &mut Control) -> Result<(End, Vec<f64>)>) -> Result<Option<Bias>> {
+        extrapolate(self.confidence, self.rounds, |factor, number| self.values(factor, number, &mut run))
+    }
+
+    /// The values of a batch; `None` if it was cancelled.
+    pub fn values(
+        &self,
+        factor: f64,
+        number: u32,
+        run: impl FnOnce(&Batch, &mut Control) -> Result<(End, Vec<f64>)>,
+    ) -> Result<Option<Vec<f64>>> {
+        let stop = Stop { confidence: self.confidence, ..Stop::default() };
+        let batch = Batch { factor, rounds: self.rounds, seed: seed(self.seed, number), stop };
+        let (end, values) = run(&batch, &mut Control::quiet(self.cancelled))?;
+        Ok((end != End::Cancelled).then_some(values))
     }
 }
 

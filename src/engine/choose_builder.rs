@@ -5,7 +5,7 @@ use std::time::{Duration, Instant};
 
 use super::limits;
 use super::room::constants;
-use super::room::on_gpu::prepare;
+use super::room::on_gpu::modules;
 use crate::engine::room::estimate;
 use crate::engine::room::index;
 use crate::engine::room::resources::RoomResources;
@@ -101,7 +101,7 @@ fn plans(gpu: &Gpu, scene: &RoomScene, settings: &RoomSettings) -> Result<Vec<Ro
 }
 
 fn first_chunk_ms(gpu: &Gpu, scene: &RoomScene, plan: &RoomPlan) -> Result<f64> {
-    prepare(gpu, plan)?;
+    gpu.prepare(&modules(plan, gpu), &constants(plan))?;
     let mut commands = Commands::new(gpu, constants(plan), Instant::now())?;
     let resources = RoomResources::new(gpu, &mut commands, scene, plan)?;
     commands.warm_up()?;

@@ -3,10 +3,13 @@
 
 pub mod bias;
 pub mod choose_builder;
+pub mod film;
 pub mod nonfinite_values;
 pub mod planned;
 pub mod prefix_sum;
+pub mod replay;
 pub mod room;
+pub mod run;
 pub mod scene;
 pub mod tallies;
 pub mod totals;

@@ -37,7 +37,12 @@ pub struct NonfiniteValues {
 }
 
 impl NonfiniteValues {
-    pub fn read(commands: &mut Commands, buffer: &Buffer<u32>) -> Result<NonfiniteValues> {
+    /// What a run with `--paranoid` found; `None` without it.
+    pub fn found(commands: &mut Commands, buffer: &Buffer<u32>, paranoid: bool) -> Result<Option<NonfiniteValues>> {
+        if paranoid { NonfiniteValues::read(commands, buffer).map(Some) } else { Ok(None) }
+    }
+
+    fn read(commands: &mut Commands, buffer: &Buffer<u32>) -> Result<NonfiniteValues> {
         let words = commands.read(buffer, buffer.count() as usize)?;
         let mut nonfinite_values = NonfiniteValues::default();
         for (kind, words) in words.chunks_exact(NONFINITE_KIND_WORDS).enumerate() {

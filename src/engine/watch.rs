@@ -1,16 +1,17 @@
 //! When a run has done enough: at its last round, at an error, at a time, or at a number of photons, whichever comes
 //! first.
 
+use std::sync::atomic::AtomicBool;
 use std::time::{Duration, Instant};
 
 use serde::Serialize;
 use statrs::distribution::{ContinuousCDF, StudentsT};
 
+use super::unknown::Unknown;
 use crate::error::{Error, Result};
 use crate::ledger::Ledger;
 use crate::plan::radius::mean_squared_radius;
 use crate::settings::stop::Stop;
-use std::sync::atomic::AtomicBool;
 
 /// How a caller watches a run and ends it early.
 pub struct Control<'a> {
@@ -18,6 +19,22 @@ pub struct Control<'a> {
     pub cancelled: &'a AtomicBool,
     /// Told from time to time how far the run has come.
     pub progress: &'a mut dyn FnMut(&Progress),
+}
+
+impl<'a> Control<'a> {
+    /// Watches nothing but `cancelled`.
+    pub fn quiet(cancelled: &'a AtomicBool) -> Control<'a> {
+        // A closure without captures takes no memory, so none is lost.
+        Control { cancelled, progress: Box::leak(Box::new(|_: &Progress| {})) }
+    }
+}
+
+/// Lets a run go on to its end.
+impl Default for Control<'_> {
+    fn default() -> Self {
+        static NEVER: AtomicBool = AtomicBool::new(false);
+        Control::quiet(&NEVER)
+    }
 }
 
 /// How far a run has come.
@@ -64,13 +81,30 @@ pub struct Watch {
     seen: Option<Look>,
 }
 
-/// What a film of so many rounds told.
+/// What a film of so many rounds tells of its error, relative to its light.
+#[derive(Debug, Clone, PartialEq)]
+pub struct FilmError {
+    pub rounds: u32,
+    /// Standard error; infinite of fewer than two rounds.
+    pub noise: f64,
+    /// What nothing has reached.
+    pub unknown: Unknown,
+}
+
+impl FilmError {
+    /// The relative error that the film has not more of, with this confidence: of its noise (see [`error_bound`]), and of what
+    /// nothing has reached. Infinite where that is all there is.
+    pub fn bound(&self, confidence: f64) -> f64 {
+        error_bound(self.rounds, self.noise, confidence).hypot(self.unknown.relative)
+    }
+}
+
+/// What a film told.
 #[derive(Clone, Copy)]
 struct Look {
     rounds: u32,
     /// Bound of the noise.
     noise: f64,
-    /// Of what nothing has reached ([`crate::engine::unknown`]).
     unknown: f64,
     /// What limits have kept from the result ([`crate::ledger::Losses`]).
     lost: f64,
@@ -97,10 +131,11 @@ impl Watch {
         self.stop.seconds.map(|seconds| self.started + Duration::from_secs_f64(seconds))
     }
 
-    /// Takes the relative standard error of a film of so many rounds, the bound of what nothing has reached, and what limits kept
-    /// from the film, relative to it.
-    pub fn look(&mut self, rounds: u32, relative_error: f64, unknown: f64, lost: f64) {
-        self.seen = Some(Look { rounds, noise: error_bound(rounds, relative_error, self.stop.confidence), unknown, lost });
+    /// Takes what a film tells, and what limits kept from it, relative to it.
+    pub fn look(&mut self, error: &FilmError, lost: f64) {
+        let FilmError { rounds, noise, ref unknown } = *error;
+        let noise = error_bound(rounds, noise, self.stop.confidence);
+        self.seen = Some(Look { rounds, noise, unknown: unknown.relative, lost });
         self.next_look = rounds + (rounds / 4).max(1);
     }
 

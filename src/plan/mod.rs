@@ -215,21 +215,14 @@ impl RoomPlan {
         (0..self.chunks_per_round).map(|chunk| self.chunk(chunk))
     }
 
-    /// The range of one photon of a round of the run.
-    pub fn range_of(&self, round: u32, photon: u32) -> Result<EmissionRange> {
-        let settings = &self.settings;
-        let refuse = |allowed: String| Error::setting("--replay", format!("{round}:{photon}"), allowed);
-        if round >= settings.rounds {
-            return Err(refuse(format!("the run has rounds 0 to {}", settings.rounds - 1)));
-        }
+    /// The range of one photon of a round.
+    pub fn range_of(&self, photon: u32) -> EmissionRange {
         let mut first_of_next = 0;
         let light = self.light_photons.iter().position(|count| {
             first_of_next += count;
             photon < first_of_next
         });
-        light
-            .map(|light| EmissionRange { light: light as u32, first_photon: photon, count: 1 })
-            .ok_or_else(|| refuse(format!("a round has photons 0 to {}", settings.photons - 1)))
+        EmissionRange { light: light.expect("a round has this photon") as u32, first_photon: photon, count: 1 }
     }
 
     /// Number of a range's first photon among its light's photons of the run, mod 2^32.

@@ -106,6 +106,14 @@ impl Scene {
         Cow::Owned(scene)
     }
 
+    /// Its first camera, or one that sees all of it.
+    pub fn first_camera(&self) -> Camera {
+        self.cameras.first().cloned().unwrap_or_else(|| {
+            let (min, max) = self.bounds();
+            Camera::around(min, max)
+        })
+    }
+
     pub fn triangle_count(&self) -> usize {
         self.meshes.iter().map(|mesh| mesh.triangles.len()).sum()
     }

@@ -33,7 +33,7 @@ pub fn run(gpu: &Gpu, view: &View, plan: ScenePlan) -> RunResult {
 /// Runs to the end, with nothing odd.
 pub fn light(gpu: &Gpu, view: &View, plan: ScenePlan) -> RunResult {
     let lit = run(gpu, view, plan);
-    assert_eq!(lit.anomalies, [0, 0, 0], "values that are no number, or too large for the film");
+    assert_eq!(lit.film.anomalies[..3], [0, 0, 0], "values that are no number, or too large for the film");
     if let Some(nonfinite_values) = &lit.nonfinite_values {
         assert_eq!(nonfinite_values.count, 0, "{}", nonfinite_values.text());
     }

@@ -2,8 +2,11 @@
 //! not matter in which order photons, chunks, rounds or devices add to it.
 
 use std::f64::consts::PI;
+use std::ops::{Deref, DerefMut};
 
+use crate::engine::film::RoundSums;
 use crate::engine::unknown::{Unknown, most_hits};
+use crate::engine::watch::FilmError;
 use crate::plan::RoomPlan;
 use crate::scene::room::RoomScene;
 use crate::settings::Sums;
@@ -13,15 +16,12 @@ use crate::settings::Sums;
 pub struct RoomFilm {
     /// `channel_count` sums a point, in fixed-point units: relative flux, then the paper's illumination
     /// power (photons within the radius times their Phong weight). With one channel the two are the same. With
-    /// `--nearest` it is what the disc of the radius would hold at the density of the nearest photons.
-    pub sums: Vec<u64>,
+    /// `--nearest` it is what the disc of the radius would hold at the density of the nearest photons. No squares of a run
+    /// of a single round.
+    pub of_rounds: RoundSums,
     /// What the bits of a sum mean.
     pub kind: Sums,
-    /// Sums over whole rounds of the squares of what each left; empty of a run of a single round.
-    pub squares: Vec<u128>,
-    /// Rounds that are whole.
-    pub rounds: u32,
-    /// What of `sums` a round left that was ended in its middle. Such a round counts in the mean, and in no error, as
+    /// What of the sums a round left that was ended in its middle. Such a round counts in the mean, and in no error, as
     /// less light is in it than in others. Empty where every round is whole.
     pub unfinished: Vec<u64>,
     pub channel_count: u32,
@@ -32,14 +32,27 @@ pub struct RoomFilm {
     pub photons_per_round: u32,
 }
 
+impl Deref for RoomFilm {
+    type Target = RoundSums;
+
+    fn deref(&self) -> &RoundSums {
+        &self.of_rounds
+    }
+}
+
+impl DerefMut for RoomFilm {
+    fn deref_mut(&mut self) -> &mut RoundSums {
+        &mut self.of_rounds
+    }
+}
+
 impl RoomFilm {
     /// Of no photon.
     pub fn new(plan: &RoomPlan) -> RoomFilm {
         let count = plan.points.len() * plan.channel_count as usize;
+        let squares = if plan.keeps_squares() { vec![0; count] } else { Vec::new() };
         RoomFilm {
-            sums: vec![0; count],
-            squares: if plan.keeps_squares() { vec![0; count] } else { Vec::new() },
-            rounds: 0,
+            of_rounds: RoundSums { rounds: 0, sums: vec![0; count], squares },
             unfinished: Vec::new(),
             kind: plan.settings.sums,
             channel_count: plan.channel_count,
@@ -57,8 +70,9 @@ impl RoomFilm {
             self.sums.copy_from_slice(of_round);
             return;
         }
-        self.sums.iter_mut().zip(&*of_round).for_each(|(sum, of_round)| *sum += of_round);
-        self.squares.iter_mut().zip(&*of_round).for_each(|(squares, of_round)| *squares += u128::from(*of_round).pow(2));
+        let RoundSums { sums, squares, .. } = &mut self.of_rounds;
+        sums.iter_mut().zip(&*of_round).for_each(|(sum, of_round)| *sum += of_round);
+        squares.iter_mut().zip(&*of_round).for_each(|(squares, of_round)| *squares += u128::from(*of_round).pow(2));
         of_round.fill(0);
     }
 
@@ -74,15 +88,9 @@ impl RoomFilm {
 
     /// Standard error of [`RoomFilm::flux`], from the variance between rounds; infinite where fewer than two are whole.
     pub fn flux_error(&self, point: usize) -> f64 {
-        if self.rounds < 2 || self.squares.is_empty() {
-            return f64::INFINITY;
-        }
         let place = point * self.channel_count as usize;
-        let sum = u128::from(self.sums[place] - self.unfinished.get(place).copied().unwrap_or(0));
-        // sum^2 <= rounds * squares, and sums are at most 2^63.
-        let deviation = self.squares[place].saturating_sub(sum * sum / u128::from(self.rounds)) as f64;
-        let rounds = f64::from(self.rounds);
-        let of_mean = (deviation / (rounds - 1.0) / rounds).sqrt() / self.scale;
+        let sum = self.sums[place] - self.unfinished.get(place).copied().unwrap_or(0);
+        let of_mean = self.variance(place, sum).sqrt() / f64::from(self.rounds) / self.scale;
         of_mean * self.emitted as f64 / f64::from(self.photons_per_round)
     }
 
@@ -94,6 +102,11 @@ impl RoomFilm {
         };
         let means = square_sum(&|point| self.flux(point));
         if means > 0.0 { (square_sum(&|point| self.flux_error(point)) / means).sqrt() } else { 0.0 }
+    }
+
+    /// What it tells of its error; `unit` makes W/m2 of flux times weight.
+    pub fn error(&self, weights: &[f64], unit: f64, confidence: f64) -> FilmError {
+        FilmError { rounds: self.rounds, noise: self.relative_error(weights), unknown: self.unknown(weights, unit, confidence) }
     }
 
     /// Points of walls that reflect, but where no photon was stored: what is known of them is a bound. Of relative flux, a

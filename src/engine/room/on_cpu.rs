@@ -1,108 +1,143 @@
-//! The line on the CPU.
+//! The box on the CPU.
 
-use std::time::Instant;
+use std::cell::OnceCell;
 
 use pulp::Arch;
 use rayon::{ThreadPool, ThreadPoolBuilder};
 
-use super::run_state::RunState;
-use super::{Replayed, RunResult};
+use super::RunResult;
 use crate::cpu::trace::{Block, Tracer};
 use crate::cpu::{estimate, nearest, splat::Splats, tree::Tree};
+use crate::engine::Control;
 use crate::engine::nonfinite_values::{NonfiniteValues, What};
 use crate::engine::room::film::RoomFilm;
-use crate::engine::{Control, End};
+use crate::engine::run::{self, RunState, World};
+use crate::engine::watch::FilmError;
 use crate::error::{Error, Result};
-use crate::ledger::fate;
+use crate::ledger::{Fates, Losses};
 use crate::photon::Photon;
-use crate::plan::{EmissionRange, Limits, RoomPlan, photons_of};
+use crate::plan::{Limits, RoomPlan, photons_of};
 use crate::records::Tally;
 use crate::scene::room::RoomScene;
 use crate::settings::{Builder, Gather, RoomSettings, Sums};
 use crate::timings::HostClock;
 
-/// Runs on the CPU, on `settings.threads` threads.
-pub fn on_cpu(scene: &RoomScene, settings: &RoomSettings, control: &mut Control) -> Result<RunResult> {
-    let started = Instant::now();
-    let mut clock = HostClock::start("run");
-    let plan = plan(scene, settings)?;
-    let pool = thread_pool(settings)?;
-    let tracer = Tracer::new(scene, &plan);
-    let mut film = RoomFilm::new(&plan);
-    // What the round under way has left so far.
-    let mut sums = vec![0u64; film.sums.len()];
-    let mut state = RunState::new(&plan, control, started);
-    let mut nonfinite_values = NonfiniteValues::default();
-    let last_chunk = plan.chunks_per_round as usize - 1;
-    let mut splats = adds_by_splatting(&plan).then(|| pool.install(|| Splats::new(&plan, Arch::new())));
-    let mut blocks = Vec::new();
-    for round in 0..settings.rounds {
-        clock.time("round", |clock| {
-            for (chunk, ranges) in plan.chunks().enumerate() {
-                let tallies = clock.time("build", |_| {
-                    pool.install(|| tracer.trace(round, &ranges, &mut blocks));
-                    tallies_of(&blocks, round, &plan, &mut nonfinite_values)
-                });
-                match &mut splats {
-                    Some(splats) => clock.time("gather", |_| pool.install(|| splats.add(&blocks))),
-                    None => gather(&pool, scene, &plan, &photons_of_blocks(&blocks), &mut sums, clock),
-                }
-                state.emitted += u64::from(photons_of(&ranges));
-                state.count(&tallies);
-                film.emitted = state.emitted;
-                if chunk == last_chunk {
-                    clock.time("film", |_| {
-                        splats.iter_mut().for_each(|splats| pool.install(|| splats.flush(&mut sums)));
-                        film.end_round(&mut sums);
-                    });
-                    state.rounds += 1;
-                    if state.wants_film() {
-                        state.look(&film, scene, &plan);
-                    }
-                }
-                if state.collect()? {
-                    break;
-                }
-            }
-            Ok(())
-        })?;
-        if state.end.is_some() {
-            break;
-        }
-    }
-    if !state.is_whole() {
-        splats.iter_mut().for_each(|splats| pool.install(|| splats.flush(&mut sums)));
-        film.add_unfinished(sums);
-    }
-    let end = state.end.unwrap_or(End::Rounds);
-    Ok(RunResult {
-        nonfinite_values: settings.paranoid.then_some(nonfinite_values),
-        film,
-        losses: state.losses(),
-        fates: state.fates,
-        end,
-        cancelled: end == End::Cancelled,
-        bias: None,
-        timings: clock.finish(),
-        device: None,
-        dispatches: 0,
-        submissions: 0,
-        plan,
-    })
+struct RoomOnCpu<'a> {
+    scene: &'a RoomScene,
+    plan: &'a RoomPlan,
+    pool: ThreadPool,
+    tracer: Tracer<'a>,
+    blocks: Vec<Block>,
+    /// Fates of the latest chunk.
+    tallies: Vec<Tally>,
+    /// `None` where points gather.
+    splats: Option<Splats<'a>>,
+    /// What the round under way has left so far.
+    sums: Vec<u64>,
+    film: RoomFilm,
+    weights: OnceCell<Vec<f64>>,
+    nonfinite_values: NonfiniteValues,
 }
 
-/// Adds to `sums` what each point receives, point by point.
-fn gather(pool: &ThreadPool, scene: &RoomScene, plan: &RoomPlan, photons: &[Photon], sums: &mut [u64], clock: &mut HostClock) {
-    if plan.settings.gather == Gather::Brute {
-        return clock.time("gather", |_| pool.install(|| estimate::gather_brute(plan, photons, sums)));
-    }
-    let tree = clock.time("index", |_| Tree::build(photons));
-    clock.time("gather", |_| {
-        pool.install(|| match plan.settings.nearest {
-            Some(count) => nearest::gather(plan, scene, &tree, count, sums),
-            None => estimate::gather_tree(plan, &tree, sums),
+/// Runs on the CPU, on `settings.threads` threads.
+pub fn on_cpu(scene: &RoomScene, settings: &RoomSettings, control: &mut Control) -> Result<RunResult> {
+    let clock = HostClock::start("run");
+    let plan = &plan(scene, settings)?;
+    let pool = thread_pool(settings)?;
+    let film = RoomFilm::new(plan);
+    let world = RoomOnCpu {
+        tracer: Tracer::new(scene, plan),
+        blocks: Vec::new(),
+        tallies: Vec::new(),
+        splats: adds_by_splatting(plan).then(|| pool.install(|| Splats::new(plan, Arch::new()))),
+        sums: vec![0; film.sums.len()],
+        film,
+        weights: OnceCell::new(),
+        nonfinite_values: NonfiniteValues::default(),
+        scene,
+        plan,
+        pool,
+    };
+    run::run(world, clock, plan, super::task(plan, None), control)
+}
+
+impl World for RoomOnCpu<'_> {
+    type Recorder = HostClock;
+    type Film = RoomFilm;
+
+    fn trace(&mut self, clock: &mut HostClock, state: &mut RunState, chunk: u32) -> Result<()> {
+        let ranges = self.plan.chunk(chunk);
+        clock.time("build", |_| {
+            self.pool.install(|| self.tracer.trace(state.rounds, &ranges, &mut self.blocks));
+            self.tallies = tallies_of(&self.blocks, state.rounds, self.plan, &mut self.nonfinite_values);
         });
-    });
+        match &mut self.splats {
+            Some(splats) => clock.time("gather", |_| self.pool.install(|| splats.add(&self.blocks))),
+            None => self.gather(clock),
+        }
+        state.hand_out(0, photons_of(&ranges));
+        if chunk + 1 == self.plan.chunks_per_round {
+            clock.time("film", |_| {
+                self.flush();
+                self.film.end_round(&mut self.sums);
+            });
+        }
+        Ok(())
+    }
+
+    fn is_full(&self, _: &HostClock) -> bool {
+        true
+    }
+
+    fn collect(&mut self, _: &mut HostClock, state: &mut RunState) -> Result<()> {
+        state.count(0, &self.tallies);
+        Ok(())
+    }
+
+    fn film(&mut self, _: &mut HostClock, state: &RunState) -> Result<RoomFilm> {
+        let mut film = RoomFilm { emitted: state.emitted, ..self.film.clone() };
+        if !state.is_whole() {
+            self.flush();
+            film.add_unfinished(self.sums.clone());
+        }
+        Ok(film)
+    }
+
+    fn error(&self, film: &RoomFilm) -> FilmError {
+        super::error(film, self.scene, self.plan, &self.weights)
+    }
+
+    fn losses(&self, _: &RoomFilm, fates: &[Fates]) -> Losses {
+        super::losses(self.plan, fates)
+    }
+
+    fn nonfinite_values(&mut self, _: &mut HostClock) -> Result<Option<NonfiniteValues>> {
+        Ok(self.plan.settings.paranoid.then(|| self.nonfinite_values.clone()))
+    }
+}
+
+impl RoomOnCpu<'_> {
+    /// Adds to the sums what each point receives, point by point.
+    fn gather(&mut self, clock: &mut HostClock) {
+        let RoomOnCpu { scene, plan, pool, blocks, sums, .. } = self;
+        let photons = photons_of_blocks(blocks);
+        if plan.settings.gather == Gather::Brute {
+            return clock.time("gather", |_| pool.install(|| estimate::gather_brute(plan, &photons, sums)));
+        }
+        let tree = clock.time("index", |_| Tree::build(&photons));
+        clock.time("gather", |_| {
+            pool.install(|| match plan.settings.nearest {
+                Some(count) => nearest::gather(plan, scene, &tree, count, sums),
+                None => estimate::gather_tree(plan, &tree, sums),
+            });
+        });
+    }
+
+    /// Adds to the sums what splats hold.
+    fn flush(&mut self) {
+        let RoomOnCpu { pool, splats, sums, .. } = self;
+        splats.iter_mut().for_each(|splats| pool.install(|| splats.flush(sums)));
+    }
 }
 
 /// Integers come to the same whichever way they are added. Floats are added one by one, since that is what they are
@@ -111,12 +146,13 @@ fn adds_by_splatting(plan: &RoomPlan) -> bool {
     plan.gathers_by_grid() && plan.settings.sums == Sums::Integer
 }
 
-fn plan(scene: &RoomScene, settings: &RoomSettings) -> Result<RoomPlan> {
+/// What the CPU does with these settings.
+pub(super) fn plan(scene: &RoomScene, settings: &RoomSettings) -> Result<RoomPlan> {
     let settings = RoomSettings { builder: Builder::Cpu, ..settings.clone() };
     RoomPlan::new(scene, &settings, &Limits::of_host())
 }
 
-fn thread_pool(settings: &RoomSettings) -> Result<ThreadPool> {
+pub(super) fn thread_pool(settings: &RoomSettings) -> Result<ThreadPool> {
     let threads = settings.threads;
     ThreadPoolBuilder::new()
         .num_threads(threads)
@@ -125,7 +161,7 @@ fn thread_pool(settings: &RoomSettings) -> Result<ThreadPool> {
 }
 
 /// Fates bounce by bounce. What `--paranoid` found is noted.
-fn tallies_of(blocks: &[Block], round: u32, plan: &RoomPlan, nonfinite_values: &mut NonfiniteValues) -> Vec<Tally> {
+pub(super) fn tallies_of(blocks: &[Block], round: u32, plan: &RoomPlan, nonfinite_values: &mut NonfiniteValues) -> Vec<Tally> {
     let mut sums = vec![Tally::default(); plan.settings.bounces as usize];
     for block in blocks {
         for (sum, tally) in sums.iter_mut().zip(&block.tallies) {
@@ -139,33 +175,6 @@ fn tallies_of(blocks: &[Block], round: u32, plan: &RoomPlan, nonfinite_values: &
     sums
 }
 
-fn photons_of_blocks(blocks: &[Block]) -> Vec<Photon> {
+pub(super) fn photons_of_blocks(blocks: &[Block]) -> Vec<Photon> {
     blocks.iter().flat_map(|block| block.photons.iter().copied()).collect()
-}
-
-/// One photon by itself.
-pub fn replay_on_cpu(scene: &RoomScene, settings: &RoomSettings, round: u32, photon: u32) -> Result<Replayed> {
-    let plan = plan(scene, settings)?;
-    let tracer = Tracer::new(scene, &plan);
-    let ranges = [plan.range_of(round, photon)?];
-    let start = tracer.emit(round, &ranges)[0];
-    let mut nonfinite_values = NonfiniteValues::default();
-    let mut blocks = Vec::new();
-    tracer.trace(round, &ranges, &mut blocks);
-    let tallies = tallies_of(&blocks, round, &plan, &mut nonfinite_values);
-    let stored = photons_of_blocks(&blocks);
-    Ok(Replayed { start, stored, fate: fate(&tallies), nonfinite_values: settings.paranoid.then_some(nonfinite_values) })
-}
-
-/// The photon map of round 0, for comparing builders.
-pub fn photons_on_cpu(scene: &RoomScene, settings: &RoomSettings) -> Result<Vec<Photon>> {
-    let plan = plan(scene, settings)?;
-    let pool = thread_pool(settings)?;
-    let tracer = Tracer::new(scene, &plan);
-    let mut blocks = Vec::new();
-    let of_chunk = |ranges: Vec<EmissionRange>| {
-        pool.install(|| tracer.trace(0, &ranges, &mut blocks));
-        photons_of_blocks(&blocks)
-    };
-    Ok(plan.chunks().flat_map(of_chunk).collect())
 }

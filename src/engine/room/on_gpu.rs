@@ -1,87 +1,102 @@
-//! The line on the GPU.
+//! The box on the GPU.
 
+use std::cell::OnceCell;
 use std::time::Instant;
 
-use super::run_state::RunState;
-use super::{Replayed, RunResult};
-use crate::constants::NO_WALL;
+use super::RunResult;
+use crate::engine;
+use crate::engine::Control;
+use crate::engine::film::{RoundSums, wide};
 use crate::engine::nonfinite_values::NonfiniteValues;
 use crate::engine::room::estimate;
 use crate::engine::room::film::RoomFilm;
 use crate::engine::room::index;
 use crate::engine::room::resources::{RoomResources, RoundBuffers};
 use crate::engine::room::trace;
+use crate::engine::run::{self, RunState, World};
 use crate::engine::tallies;
-use crate::engine::{self, Control, End};
+use crate::engine::watch::FilmError;
 use crate::error::Result;
-use crate::gpu::check::strict_math;
-use crate::gpu::{Commands, Constants, Gpu};
-use crate::ledger::fate;
-use crate::path;
-use crate::path::StoredPath;
-use crate::photon::{Origin, Photon, StoredPhoton};
-use crate::plan::{EmissionRange, RoomPlan, photons_of};
+use crate::gpu::{Commands, Constants, Gpu, Module};
+use crate::ledger::{Fates, Losses};
+use crate::plan::{RoomPlan, photons_of};
 use crate::scene::room::RoomScene;
-use crate::settings::{Math, RoomSettings};
+use crate::settings::RoomSettings;
+
+struct RoomOnGpu<'a> {
+    scene: &'a RoomScene,
+    plan: &'a RoomPlan,
+    resources: RoomResources,
+    weights: OnceCell<Vec<f64>>,
+}
 
 /// Runs on the GPU.
 pub fn on_gpu(gpu: &Gpu, scene: &RoomScene, settings: &RoomSettings, control: &mut Control) -> Result<RunResult> {
     let started = Instant::now();
     let plan = RoomPlan::new(scene, settings, &engine::limits(gpu.facts()))?;
     estimate::check_sums(&plan, gpu.facts())?;
-    if settings.math == Math::Strict {
-        strict_math(gpu)?;
-    }
-    let mut commands = Commands::new(gpu, constants(&plan), started)?;
-    commands.timings().count("run");
+    let (mut commands, pipelines_before) = run::commands(gpu, &modules(&plan, gpu), constants(&plan), settings.math, started)?;
     let resources = commands.scope("set-up", |commands| RoomResources::new(gpu, commands, scene, &plan))?;
-    prepare(gpu, &plan)?;
     commands.warm_up()?;
     commands.submit()?;
+    let world = RoomOnGpu { scene, plan: &plan, resources, weights: OnceCell::new() };
+    run::run(world, commands, &plan, super::task(&plan, Some((gpu, pipelines_before))), control)
+}
 
-    let mut state = RunState::new(&plan, control, commands.started());
-    state.submissions_collected = commands.submission_count();
-    for round in 0..settings.rounds {
-        commands.scope("round", |commands| {
-            for (chunk, ranges) in (1..).zip(plan.chunks()) {
-                trace::chunk(commands, &resources, &plan, round, &ranges)?;
-                index::build(commands, &resources, &plan, photons_of(&ranges))?;
-                estimate::gather(commands, &resources, &plan, photons_of(&ranges))?;
-                state.emitted += u64::from(photons_of(&ranges));
-                if chunk == plan.chunks_per_round {
-                    estimate::end_round(commands, &resources, &plan)?;
-                    state.rounds += 1;
-                }
-                if is_due(commands, &plan, &state) && collect(commands, &resources, scene, &plan, &mut state)? {
-                    break;
-                }
-            }
-            Ok(())
-        })?;
-        if state.end.is_some() {
-            break;
-        }
+impl<'a> World for RoomOnGpu<'a> {
+    type Recorder = Commands<'a>;
+    type Film = RoomFilm;
+
+    fn trace(&mut self, commands: &mut Commands<'a>, state: &mut RunState, chunk: u32) -> Result<()> {
+        let RoomOnGpu { resources, plan, .. } = self;
+        let ranges = plan.chunk(chunk);
+        trace::chunk(commands, resources, plan, state.rounds, &ranges)?;
+        index::build(commands, resources, plan, photons_of(&ranges))?;
+        estimate::gather(commands, resources, plan, photons_of(&ranges))?;
+        state.hand_out(0, photons_of(&ranges));
+        if chunk + 1 == plan.chunks_per_round { estimate::end_round(commands, resources, plan) } else { Ok(()) }
     }
-    collect(&mut commands, &resources, scene, &plan, &mut state)?;
-    let film = read_film(&mut commands, &resources, &plan, &state)?;
-    let nonfinite_values = if settings.paranoid { Some(NonfiniteValues::read(&mut commands, &resources.nonfinite_values)?) } else { None };
-    gpu.check_validation()?;
 
-    let end = state.end.unwrap_or(End::Rounds);
-    Ok(RunResult {
-        nonfinite_values,
-        film,
-        losses: state.losses(),
-        fates: state.fates,
-        end,
-        cancelled: end == End::Cancelled,
-        bias: None,
-        dispatches: commands.dispatch_count(),
-        submissions: commands.submission_count(),
-        timings: commands.finish("run"),
-        device: Some(gpu.facts().clone()),
-        plan,
-    })
+    fn is_full(&self, commands: &Commands<'a>) -> bool {
+        commands.work() >= self.plan.pair_tests_per_submission || commands.timestamps_left() < trace::timestamps_per_chunk(self.plan)
+    }
+
+    fn collect(&mut self, commands: &mut Commands<'a>, state: &mut RunState) -> Result<()> {
+        let tallies = tallies::read(commands, &self.resources.tallies, self.plan.settings.bounces)?;
+        tallies::clear(commands, &self.resources.tallies);
+        state.count(0, &tallies);
+        Ok(())
+    }
+
+    fn film(&mut self, commands: &mut Commands<'a>, state: &RunState) -> Result<RoomFilm> {
+        let RoomOnGpu { resources, plan, .. } = self;
+        let mut film = RoomFilm { emitted: state.emitted, ..RoomFilm::new(plan) };
+        let count = film.sums.len();
+        let Some(RoundBuffers { totals, low_squares, high_squares }) = &resources.rounds else {
+            film.of_rounds = RoundSums { rounds: state.rounds, sums: commands.read(&resources.film, count)?, squares: Vec::new() };
+            return Ok(film);
+        };
+        let sums = commands.read(totals, count)?;
+        let (low, high) = (commands.read(low_squares, count)?, commands.read(high_squares, count)?);
+        let squares = low.into_iter().zip(high).map(|(low, high)| wide(low, high)).collect();
+        film.of_rounds = RoundSums { rounds: state.rounds, sums, squares };
+        if !state.is_whole() {
+            film.add_unfinished(commands.read(&resources.film, count)?);
+        }
+        Ok(film)
+    }
+
+    fn error(&self, film: &RoomFilm) -> FilmError {
+        super::error(film, self.scene, self.plan, &self.weights)
+    }
+
+    fn losses(&self, _: &RoomFilm, fates: &[Fates]) -> Losses {
+        super::losses(self.plan, fates)
+    }
+
+    fn nonfinite_values(&mut self, commands: &mut Commands<'a>) -> Result<Option<NonfiniteValues>> {
+        NonfiniteValues::found(commands, &self.resources.nonfinite_values, self.plan.settings.paranoid)
+    }
 }
 
 /// Specialization constants of a plan.
@@ -103,102 +118,7 @@ pub fn constants(plan: &RoomPlan) -> Constants {
         .set("SUMS", settings.sums.code())
 }
 
-/// Makes the pipelines of the plan, and only those.
-pub(in crate::engine) fn prepare(gpu: &Gpu, plan: &RoomPlan) -> Result<()> {
-    let modules = [trace::modules(plan), index::modules(plan), estimate::modules(plan, gpu.facts())].concat();
-    gpu.prepare(&modules, &constants(plan))
-}
-
-/// Whether the recorded commands should go to the device now.
-fn is_due(commands: &Commands, plan: &RoomPlan, state: &RunState) -> bool {
-    // Tallies are 32-bit on the device.
-    let tallies_full = state.open() + u64::from(plan.path_capacity) > u64::from(u32::MAX);
-    let timestamps_short = commands.timestamps_left() < trace::timestamps_per_chunk(plan);
-    // A long gather hands commands over by itself, and nobody has looked at the result yet.
-    let submitted = commands.submission_count() > state.submissions_collected;
-    commands.work() >= plan.pair_tests_per_submission || submitted || timestamps_short || tallies_full || state.may_end()
-}
-
-/// Runs what is recorded, looks at the error where that is due, collects the fates, and says whether to stop.
-fn collect(commands: &mut Commands, resources: &RoomResources, scene: &RoomScene, plan: &RoomPlan, state: &mut RunState) -> Result<bool> {
-    if state.open() == 0 {
-        return Ok(state.end.is_some());
-    }
-    let tallies = tallies::read(commands, &resources.tallies, plan.settings.bounces)?;
-    tallies::clear(commands, &resources.tallies);
-    state.count(&tallies);
-    if state.wants_film() {
-        let film = read_film(commands, resources, plan, state)?;
-        state.look(&film, scene, plan);
-    }
-    state.submissions_collected = commands.submission_count();
-    state.collect()
-}
-
-/// What all photons handed out so far have left.
-fn read_film(commands: &mut Commands, resources: &RoomResources, plan: &RoomPlan, state: &RunState) -> Result<RoomFilm> {
-    let mut film = RoomFilm { emitted: state.emitted, rounds: state.rounds, ..RoomFilm::new(plan) };
-    let count = film.sums.len();
-    let Some(RoundBuffers { totals, low_squares, high_squares }) = &resources.rounds else {
-        film.sums = commands.read::<u64>(&resources.film, count)?;
-        return Ok(film);
-    };
-    film.sums = commands.read::<u64>(totals, count)?;
-    let (low, high) = (commands.read::<u64>(low_squares, count)?, commands.read::<u64>(high_squares, count)?);
-    film.squares = low.into_iter().zip(high).map(|(low, high)| u128::from(low) | u128::from(high) << 64).collect();
-    if !state.is_whole() {
-        film.add_unfinished(commands.read::<u64>(&resources.film, count)?);
-    }
-    Ok(film)
-}
-
-/// The photon map of round 0, for comparing builders.
-pub fn photons_on_gpu(gpu: &Gpu, scene: &RoomScene, settings: &RoomSettings) -> Result<Vec<Photon>> {
-    let plan = RoomPlan { keeps_origins: true, ..RoomPlan::new(scene, settings, &engine::limits(gpu.facts()))? };
-    let mut commands = Commands::new(gpu, constants(&plan), Instant::now())?;
-    let resources = RoomResources::new(gpu, &mut commands, scene, &plan)?;
-    let mut photons = Vec::new();
-    for ranges in plan.chunks() {
-        photons.extend(stored(&mut commands, &resources, scene, &plan, 0, &ranges)?);
-    }
-    gpu.check_validation()?;
-    Ok(photons)
-}
-
-/// One photon by itself. A photon is (seed, round, number), so it takes the same path alone as among millions.
-pub fn replay_on_gpu(gpu: &Gpu, scene: &RoomScene, settings: &RoomSettings, round: u32, photon: u32) -> Result<Replayed> {
-    let whole = RoomPlan::new(scene, settings, &engine::limits(gpu.facts()))?;
-    let plan = RoomPlan { keeps_origins: true, counters: 1, path_capacity: 1, photon_capacity: settings.bounces, ..whole };
-    if settings.math == Math::Strict {
-        strict_math(gpu)?;
-    }
-    let ranges = [plan.range_of(round, photon)?];
-    let mut commands = Commands::new(gpu, constants(&plan), Instant::now())?;
-    let resources = RoomResources::new(gpu, &mut commands, scene, &plan)?;
-    trace::emit(&mut commands, &resources, &plan, round, &ranges)?;
-    let start = path::unpack(&commands.read::<StoredPath>(&resources.paths[0], 1)?, 0);
-    let stored = stored(&mut commands, &resources, scene, &plan, round, &ranges)?;
-    let tallies = tallies::read(&mut commands, &resources.tallies, settings.bounces)?;
-    let nonfinite_values = if settings.paranoid { Some(NonfiniteValues::read(&mut commands, &resources.nonfinite_values)?) } else { None };
-    gpu.check_validation()?;
-    Ok(Replayed { start, stored, fate: fate(&tallies), nonfinite_values })
-}
-
-/// What a chunk leaves in the photon map.
-fn stored(
-    commands: &mut Commands,
-    resources: &RoomResources,
-    scene: &RoomScene,
-    plan: &RoomPlan,
-    round: u32,
-    ranges: &[EmissionRange],
-) -> Result<Vec<Photon>> {
-    trace::chunk(commands, resources, plan, round, ranges)?;
-    let capacity = trace::photon_list_capacity(plan, photons_of(ranges));
-    let length = if plan.has_slots() { capacity } else { commands.read::<u32>(&resources.counters, 1)?[0].min(capacity) };
-    let photons = commands.read::<StoredPhoton>(&resources.photons, length as usize)?;
-    let origins = commands.read::<Origin>(&resources.origins, length as usize)?;
-    let room = scene.room_record();
-    let stored = photons.into_iter().zip(origins).map(|(photon, origin)| photon.photon(origin, &room));
-    Ok(stored.filter(|photon| photon.wall != NO_WALL).collect())
+/// Kernels that the plan needs, and no others.
+pub(in crate::engine) fn modules(plan: &RoomPlan, gpu: &Gpu) -> Vec<Module> {
+    [trace::modules(plan), index::modules(plan), estimate::modules(plan, gpu.facts())].concat()
 }

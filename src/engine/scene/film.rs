@@ -1,9 +1,14 @@
 //! The film of all rounds: the mean of each pixel and its standard error, from integer sums.
 
+use std::ops::Deref;
+
 use glam::DVec3;
 
 use crate::constants::{HIT_CAUSTIC_PHOTON, HIT_GLOBAL_PHOTON, HIT_KINDS, HIT_SHADOW_RAY};
+use crate::engine::film::RoundSums;
 use crate::engine::unknown::{Unknown, most_hits};
+use crate::engine::watch::FilmError;
+use crate::plan::memory::ANOMALY_WORDS;
 use crate::plan::radius::mean_squared_radius;
 use crate::plan::scene::{MapPlan, ScenePlan};
 
@@ -12,30 +17,36 @@ const KINDS: [&str; HIT_KINDS as usize] = ["shadow ray", "photon of the caustic 
 /// In place of a bound: something has hit (`glsl/world/scene/one_hit.glsl`).
 const REACHED: u32 = u32::MAX;
 
-/// Exact sums over rounds, three channels a pixel, in film units.
+/// Exact sums over rounds, three channels a pixel, in film units, and what else a run leaves of its light.
 #[derive(Debug, Clone)]
 pub struct SceneFilm {
-    pub rounds: u32,
-    pub sums: Vec<u64>,
-    pub squares: Vec<u128>,
+    pub of_rounds: RoundSums,
     /// For each pixel and kind of light what one hit would have added to a round, or that something has hit
     /// (`glsl/world/scene/one_hit.glsl`).
     pub one_hits: Vec<u32>,
+    /// Light of each part (direct, specular, caustic, indirect) over all pixels and channels, film units.
+    pub part_totals: Vec<u64>,
+    /// Values that were no number, values clamped to the film's largest, estimates on a mesh too dense for the area within the
+    /// radius to be found, camera paths that were cut off; then what was clamped and what was cut off, 64 bits each.
+    pub anomalies: [u32; ANOMALY_WORDS],
 }
 
 /// Films are equal that hold the same light, whatever else was asked for and not found.
 impl PartialEq for SceneFilm {
     fn eq(&self, other: &SceneFilm) -> bool {
-        (self.rounds, &self.sums, &self.squares) == (other.rounds, &other.sums, &other.squares)
+        self.of_rounds == other.of_rounds
+    }
+}
+
+impl Deref for SceneFilm {
+    type Target = RoundSums;
+
+    fn deref(&self) -> &RoundSums {
+        &self.of_rounds
     }
 }
 
 impl SceneFilm {
-    pub fn new(rounds: u32, sums: Vec<u64>, squares: Vec<u64>, one_hits: Vec<u32>) -> SceneFilm {
-        let squares = squares.chunks_exact(2).map(|words| u128::from(words[0]) | u128::from(words[1]) << 64).collect();
-        SceneFilm { rounds, sums, squares, one_hits }
-    }
-
     pub fn pixels(&self) -> usize {
         self.sums.len() / 3
     }
@@ -46,30 +57,35 @@ impl SceneFilm {
         DVec3::from_array([0, 1, 2].map(|channel| self.sums[3 * pixel + channel] as f64 / unit))
     }
 
+    /// Of every pixel.
+    pub fn means(&self, plan: &ScenePlan) -> impl Iterator<Item = DVec3> {
+        (0..self.pixels()).map(|pixel| self.mean(pixel, plan))
+    }
+
+    /// The same, channel by channel.
+    pub fn values(&self, plan: &ScenePlan) -> Vec<f64> {
+        self.means(plan).flat_map(|mean| mean.to_array()).collect()
+    }
+
     /// Standard error of the mean, from the variance between rounds; of a single round nothing is known,
     /// and it is infinite. Where a channel lies below the film's unit few rounds may not show that it is rounded at random
     /// to 0 or 1: then the variance is at least what that rounding has.
     pub fn standard_error(&self, pixel: usize, plan: &ScenePlan) -> DVec3 {
-        if self.rounds < 2 {
-            return DVec3::INFINITY;
-        }
         let rounds = f64::from(self.rounds);
         let is_lit = self.sums[3 * pixel..][..3] != [0; 3];
         DVec3::from_array([0, 1, 2].map(|channel| {
-            let (sum, square) = (u128::from(self.sums[3 * pixel + channel]), self.squares[3 * pixel + channel]);
-            // sum^2 <= rounds * square, so what is left of the square is not negative but for the division's
-            // remainder.
-            let deviation = square.saturating_sub(sum * sum / u128::from(self.rounds)) as f64;
+            let place = 3 * pixel + channel;
+            let sum = self.sums[place];
             // That of a fraction f is f (1 - f), at most f and at most 1/4; a sum of 0 may be of any fraction below 1 / rounds.
             let rounding = (sum as f64).max(1.0).min(0.25 * plan.roundings_per_round() * rounds);
-            let variance = (deviation * rounds / (rounds - 1.0)).max(if is_lit { rounding } else { 0.0 });
+            let variance = self.variance(place, sum).max(if is_lit { rounding } else { 0.0 });
             variance.sqrt() / rounds / plan.film_scale
         }))
     }
 
     /// Of all pixels and channels.
     pub fn root_mean_square(&self, plan: &ScenePlan) -> f64 {
-        let squares: f64 = (0..self.pixels()).map(|pixel| self.mean(pixel, plan).length_squared()).sum();
+        let squares: f64 = self.means(plan).map(DVec3::length_squared).sum();
         (squares / (3 * self.pixels()).max(1) as f64).sqrt()
     }
 
@@ -132,6 +148,11 @@ impl SceneFilm {
         // been hit. Photons are shared, so that all pixels may be in the dark for the same reason.
         bounds += 3.0 * shadow_rays * shadow_rays;
         unknown.relative_to(bounds, result)
+    }
+
+    /// What it tells of its error.
+    pub fn error(&self, plan: &ScenePlan, confidence: f64) -> FilmError {
+        FilmError { rounds: self.rounds, noise: self.relative_error(plan), unknown: self.unknown(plan, confidence) }
     }
 
     /// Root mean square over pixels and channels of standard error and of the mean; of pixels that nothing has reached see

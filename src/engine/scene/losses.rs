@@ -7,17 +7,9 @@ use crate::ledger::{Fates, Losses, RelativeFlux};
 use crate::plan::scene::ScenePlan;
 use crate::scene::geometry::Geometry;
 
-pub use crate::plan::memory::ANOMALY_WORDS;
-
 /// Of a run so far, from what its kernels counted.
-pub fn losses(
-    geometry: &Geometry,
-    plan: &ScenePlan,
-    fates: &[Fates; 2],
-    anomalies: &[u32],
-    part_totals: &[u64],
-    film: &SceneFilm,
-) -> Losses {
+pub fn losses(geometry: &Geometry, plan: &ScenePlan, fates: &[Fates], film: &SceneFilm) -> Losses {
+    let SceneFilm { anomalies, part_totals, .. } = film;
     let area_unit = geometry.unit * geometry.unit;
     let emitted = geometry.power * area_unit;
     let mut losses = Losses { emitted, clamped_values: anomalies[1], camera_paths: anomalies[3], ..Losses::default() };

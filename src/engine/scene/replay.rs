@@ -1,4 +1,4 @@
-//! Traces single photons of a run: a photon is (seed, round, number), so its path alone is the same as in the run.
+//! Traces some photons of a scene by themselves.
 
 use std::time::Instant;
 
@@ -7,8 +7,9 @@ use super::trace::Flight;
 use super::{Round, constants, trace};
 use crate::constants::{DOMAIN_CAUSTIC_PHOTONS, DOMAIN_PHOTONS, TALLY_ROWS};
 use crate::engine::nonfinite_values::NonfiniteValues;
+use crate::engine::replay::{PhotonName, Replayed};
 use crate::engine::tallies;
-use crate::error::{Error, Result};
+use crate::error::Result;
 use crate::gpu::check::strict_math;
 use crate::gpu::{Commands, Extent, Gpu};
 use crate::ledger::fate;
@@ -17,51 +18,18 @@ use crate::records::{LightPath, Tally};
 use crate::scene::geometry::Geometry;
 use crate::settings::Math;
 
-/// Which photon.
-#[derive(Debug, Clone, Copy, PartialEq, Eq)]
-pub struct PhotonName {
-    pub round: u32,
-    pub photon: u32,
-    /// Of the caustic map.
-    pub caustic: bool,
-}
-
-impl std::fmt::Display for PhotonName {
-    fn fmt(&self, f: &mut std::fmt::Formatter) -> std::fmt::Result {
-        write!(f, "{}:{}{}", self.round, self.photon, if self.caustic { ":caustic" } else { "" })
-    }
-}
-
-/// The photon as it left its light source and each surface, normalised as in the kernels, and how it ended.
-#[derive(Debug, Clone, PartialEq)]
-pub struct Path {
-    pub name: PhotonName,
-    pub vertices: Vec<LightPath>,
-    pub fate: &'static str,
-    /// Nonfinite values that `--paranoid` found on this path; `None` without it.
-    pub nonfinite_values: Option<NonfiniteValues>,
-}
-
-pub fn replay(gpu: &Gpu, geometry: &Geometry, plan: &ScenePlan, name: PhotonName) -> Result<Path> {
-    let PhotonName { round: number, photon, caustic } = name;
-    let domain = if caustic { DOMAIN_CAUSTIC_PHOTONS } else { DOMAIN_PHOTONS };
-    let kind = if caustic { "caustic" } else { "global" };
-    let refuse = |allowed: String| Error::setting("--replay", name, allowed);
-    let rounds = plan.settings.rounds;
-    if number >= rounds {
-        return Err(refuse(format!("the run has rounds 0 to {}", rounds - 1)));
-    }
-    let Some(map) = plan.maps().find(|map| map.domain == domain) else {
-        return Err(refuse(format!("this run has no {kind} map")));
-    };
-    if photon >= map.photons {
-        return Err(refuse(format!("a round has photons 0 to {} in the {kind} map", map.photons - 1)));
-    }
+/// The photon as it left its light source and then each surface, normalised as in the kernels.
+pub fn replay(gpu: &Gpu, geometry: &Geometry, plan: &ScenePlan, name: PhotonName) -> Result<Replayed<LightPath, LightPath>> {
+    let (domain, kind) = if name.caustic { (DOMAIN_CAUSTIC_PHOTONS, "caustic") } else { (DOMAIN_PHOTONS, "global") };
+    name.check_round(plan.settings.rounds)?;
+    let map = plan.maps().find(|map| map.domain == domain).ok_or_else(|| name.refused(format!("this run has no {kind} map")))?;
+    name.check_photon(map.photons, &format!(" in the {kind} map"))?;
     if plan.settings.math == Math::Strict {
         strict_math(gpu)?;
     }
-    let Flights { paths, tallies, nonfinite_values } = light_paths(gpu, geometry, plan, map, number, (photon, 1), map.bounces)?;
-    Ok(Path { name, vertices: paths.concat(), fate: fate(&tallies), nonfinite_values })
+    let Flights { paths, tallies, nonfinite_values } = light_paths(gpu, geometry, plan, map, name.round, (name.photon, 1), map.bounces)?;
+    let mut vertices = paths.concat();
+    Ok(Replayed { name, start: vertices.remove(0), vertices, fate: fate(&tallies), nonfinite_values })
 }
 
 /// Some photons in flight.
@@ -117,12 +85,11 @@ pub fn light_paths(
         paths.push(commands.read(&buffers.paths[1 - parity], left as usize)?);
     }
     let tallies = tallies::read(&mut commands, &buffers.tallies[usize::from(map.caustic_only)], traced.min(TALLY_ROWS))?;
-    let nonfinite_values =
-        if plan.settings.paranoid { Some(NonfiniteValues::read(&mut commands, &resources.nonfinite_values)?) } else { None };
+    let nonfinite_values = NonfiniteValues::found(&mut commands, &resources.nonfinite_values, plan.settings.paranoid)?;
     Ok(Flights { paths, tallies, nonfinite_values })
 }
 
-impl Path {
+impl Replayed<LightPath, LightPath> {
     /// A line per vertex: position, direction and flux after the vertex.
     pub fn table(&self, geometry: &Geometry, plan: &ScenePlan) -> String {
         let flux = plan.maps().find(|map| map.caustic_only == self.name.caustic).map_or(0.0, |map| map.photon_flux(geometry));
@@ -141,7 +108,7 @@ impl Path {
             "{:>6} {:>11} {:>11} {:>11} {:>9} {:>9} {:>9} {:>11} {:>11} {:>11}",
             "bounce", "x, m", "y", "z", "dir x", "y", "z", "red, W", "green", "blue"
         );
-        let rows: Vec<String> = self.vertices.iter().enumerate().map(row).collect();
+        let rows: Vec<String> = [&self.start].into_iter().chain(&self.vertices).enumerate().map(row).collect();
         let nonfinite_values =
             self.nonfinite_values.as_ref().map_or_else(String::new, |nonfinite_values| format!("\n{}", nonfinite_values.text()));
         format!("{head}\n{columns}\n{}\nthen it {}{nonfinite_values}", rows.join("\n"), self.fate)

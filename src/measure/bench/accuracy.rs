@@ -96,7 +96,7 @@ pub fn measure(lab: &mut Lab, name: &str) -> Result<Found> {
                 let lit = job(settings.clone()).light(lab.gpu, SceneSettings { rounds, ..settings }, lab.cancelled)?;
                 let all = Reference { counts: not_straight, ..search.reference.clone() };
                 let shown = all.mean_over(|place| f64::from(u8::from(!search.reference.counts[place])));
-                let error = (all.squared_error(&values(&lit)).max(0.0) / all.mean_square()).sqrt();
+                let error = (all.squared_error(&lit.film.values(&lit.plan)).max(0.0) / all.mean_square()).sqrt();
                 how += &format!(
                     "; excludes the {:.2} % of pixels that show the light source through glass (error with them: {:.2} %)",
                     100.0 * shown,
@@ -178,16 +178,12 @@ fn long_run(lab: &Lab, job: &Job, search: &Search) -> Result<Reference> {
     }
 }
 
-fn values(lit: &RunResult) -> Vec<f64> {
-    (0..lit.film.pixels()).flat_map(|pixel| lit.film.mean(pixel, &lit.plan).to_array()).collect()
-}
-
 /// What a run found, with its own standard errors, at the places that count for the judge.
 fn of_film(lit: &RunResult, judge: &Reference) -> Reference {
     let pixels = 0..lit.film.pixels();
     let mut reference = Reference {
         method: String::new(),
-        values: values(lit),
+        values: lit.film.values(&lit.plan),
         standard_errors: pixels.flat_map(|pixel| lit.film.standard_error(pixel, &lit.plan).to_array()).collect(),
         counts: judge.counts.clone(),
         relative_error: 0.0,

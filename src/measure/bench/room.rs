@@ -96,8 +96,8 @@ pub fn check_clock(gpu: &Gpu) -> Result<()> {
 }
 
 fn run_once(gpu: &Gpu, settings: &RoomSettings, cancelled: &AtomicBool) -> Result<RunResult> {
-    let outcome = room::on_gpu(gpu, &open_box(settings), settings, &mut Control { cancelled, progress: &mut |_| {} })?;
-    if outcome.cancelled { Err(Error::Interrupted) } else { Ok(outcome) }
+    let outcome = room::on_gpu(gpu, &open_box(settings), settings, &mut Control::quiet(cancelled))?;
+    if outcome.is_cancelled() { Err(Error::Interrupted) } else { Ok(outcome) }
 }
 
 /// Times the passes of a builder: [`REPEATS`] rounds of one run, after [`DROPPED`] others.
@@ -121,7 +121,7 @@ pub fn time_run(gpu: &Gpu, rates: &Rates, settings: &RoomSettings, cancelled: &A
 
 fn timed(gpu: &Gpu, rates: &Rates, outcome: &RunResult, rounds: u32, first: u32) -> Timed {
     let plan = &outcome.plan;
-    let counts = Counts::of(&outcome.fates, rounds);
+    let counts = Counts::of(&outcome.fates[0], rounds);
     let found = photons_per_point(outcome) / f64::from(rounds);
     let scopes = rounds_of(&outcome.timings, rounds, first);
     let workload = workload(plan);

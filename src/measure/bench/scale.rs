@@ -128,9 +128,9 @@ fn over_photons(lab: &mut Lab, left_out: &mut Vec<String>) -> Result<Vec<Step>> 
         let settings =
             RoomSettings { builder: Builder::Ballot, photons, rng: Rng::Philox, radius: 0.01, mesh: 16, ..RoomSettings::default() };
         let run = |rounds: u32| -> Result<RunResult> {
-            let control = &mut Control { cancelled: lab.cancelled, progress: &mut |_| {} };
+            let control = &mut Control::quiet(lab.cancelled);
             let outcome = room::on_gpu(lab.gpu, &open_box(&settings), &RoomSettings { rounds, ..settings.clone() }, control)?;
-            if outcome.cancelled { Err(Error::Interrupted) } else { Ok(outcome) }
+            if outcome.is_cancelled() { Err(Error::Interrupted) } else { Ok(outcome) }
         };
         let rounds = (size / u64::from(photons)) as u32;
         let all = DROPPED + rounds * (most_rounds / rounds).clamp(1, REPEATS);

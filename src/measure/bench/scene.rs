@@ -12,17 +12,16 @@ use super::room::{Counts, DROPPED, RANK_BYTES, REPEATS, Timed};
 use crate::engine;
 use crate::engine::Control;
 use crate::engine::scene::resources::SceneResources;
-use crate::engine::scene::{self, End, Round, RunResult, View, points, trace};
+use crate::engine::scene::{self, Round, RunResult, View, points, trace};
 use crate::error::{Error, Result};
 use crate::gpu::{Commands, Gpu};
-use crate::ledger::Fates;
 use crate::photon::MapPhoton;
 use crate::plan::memory::block_sum_counts;
 use crate::plan::scene::{MapPlan, ScenePlan};
 use crate::plan::sensor::Sensor;
 use crate::records::{LightPath, VisiblePoint};
+use crate::scene::Scene;
 use crate::scene::geometry::Geometry;
-use crate::scene::{Camera, Scene};
 use crate::settings::Builder;
 use crate::settings::scene::{Effect, SceneSettings};
 use crate::timings::Spread;
@@ -46,17 +45,10 @@ impl Job<'_> {
     /// A run to its end.
     pub fn light(&self, gpu: &Gpu, settings: SceneSettings, cancelled: &AtomicBool) -> Result<RunResult> {
         let plan = self.plan(gpu, &settings)?;
-        let camera = self.camera();
+        let camera = self.scene.first_camera();
         let view = View { geometry: self.geometry, camera: Some(&camera), phases: &[] };
-        let lit = scene::light(gpu, &view, plan, &mut Control { cancelled, progress: &mut |_| {} })?;
-        if lit.end == End::Cancelled { Err(Error::Interrupted) } else { Ok(lit) }
-    }
-
-    fn camera(&self) -> Camera {
-        self.scene.cameras.first().cloned().unwrap_or_else(|| {
-            let (min, max) = self.scene.bounds();
-            Camera::around(min, max)
-        })
+        let lit = scene::light(gpu, &view, plan, &mut Control::quiet(cancelled))?;
+        if lit.is_cancelled() { Err(Error::Interrupted) } else { Ok(lit) }
     }
 }
 
@@ -78,7 +70,7 @@ pub fn survey(gpu: &Gpu, job: &Job, map: impl Fn(&ScenePlan) -> Option<&MapPlan>
     let resources = SceneResources::new(gpu, &mut commands, job.geometry, &plan, &[])?;
     let buffers = resources.photons.as_ref().expect("there is a map");
     let round = Round { resources: &resources, geometry: job.geometry, plan: &plan, number: 0 };
-    points::see(&mut commands, round, Some(&job.camera()))?;
+    points::see(&mut commands, round, Some(&job.scene.first_camera()))?;
     let seen = commands.read(&resources.visible_points, plan.visible_points() as usize)?;
     let asking: Vec<VisiblePoint> = seen.into_iter().filter(|point| point.arrivals & map.stored != 0).collect();
     let step = (asking.len() / SAMPLES).max(1);
@@ -132,7 +124,7 @@ fn time_once(gpu: &Gpu, rates: &Rates, job: &Job, cancelled: &AtomicBool) -> Res
     let lit = run(rounds)?;
     let memory = gpu.held_memory();
     let surveys = [survey(gpu, job, |plan| plan.global.as_ref())?, survey(gpu, job, |plan| plan.caustic.as_ref())?];
-    let counts = lit.fates.each_ref().map(|fates: &Fates| Counts::of(fates, rounds));
+    let counts = [0, 1].map(|map: usize| Counts::of(&lit.fates[map], rounds));
     let model = Model { job, plan: &lit.plan, counts, surveys };
     let scopes = rounds_of(&lit.timings, rounds, DROPPED);
     let workload = format!("{}, {}, {} triangles", job.name, lit.plan.builder().name(), job.geometry.triangles.len());

@@ -98,16 +98,12 @@ impl<'a> Bench<'a> {
     /// One run to its last photon.
     pub fn run(&self, settings: &RoomSettings) -> Step<RunResult> {
         let outcome = self.run_once(settings)?;
-        if outcome.cancelled { Err(Stop::Cancelled) } else { Ok(outcome) }
+        if outcome.is_cancelled() { Err(Stop::Cancelled) } else { Ok(outcome) }
     }
 
     fn run_once(&self, settings: &RoomSettings) -> Result<RunResult> {
         let scene = open_box(settings);
-        let mut control = Control { cancelled: self.cancelled, progress: &mut |_| {} };
-        match (settings.builder, self.gpu) {
-            (Builder::Cpu, _) | (_, None) => room::on_cpu(&scene, settings, &mut control),
-            (_, Some(gpu)) => room::on_gpu(gpu, &scene, settings, &mut control),
-        }
+        room::run(self.gpu, &scene, settings, &mut Control::quiet(self.cancelled))
     }
 
     /// `repeats` runs of every case after one that is dropped, as it makes pipelines and fills caches; in turn, so that a

@@ -217,7 +217,7 @@ fn running_time(case: &Case, pass: Pass, outcomes: &[RunResult], command: &str) 
         gather: (pass == Pass::Rendering).then_some(case.gather),
         clock: if first.device.is_some() { Clock::Gpu } else { Clock::Wall },
         ms: Spread::of(outcomes.iter().map(sum).collect::<Option<Vec<f64>>>()?)?,
-        stored: first.fates.ledger().stored,
+        stored: first.ledger().stored,
         command: command.to_owned(),
     })
 }

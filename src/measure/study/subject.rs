@@ -13,14 +13,13 @@ use crate::engine;
 use crate::engine::Control;
 use crate::engine::room::film::estimate_walls;
 use crate::engine::room::{self};
-use crate::engine::scene::{self, RunResult, View};
+use crate::engine::scene::{self, RunResult, Target, View};
 use crate::error::{Error, Result};
 use crate::gpu::Gpu;
-use crate::ledger::{Fates, Ledger};
+use crate::ledger::Ledger;
 use crate::output::command;
 use crate::plan::scene::ScenePlan;
 use crate::plan::sensor::Sensor;
-use crate::records::Receiver;
 use crate::scene::geometry::Geometry;
 use crate::scene::light::LightKind;
 use crate::scene::open_box::open_box;
@@ -88,10 +87,7 @@ impl Subject {
             let axes = scene_axes(gpu, scene, &geometry, request, false)?;
             return Ok(vec![Subject { receivers, ..subject("Irradiance of the floor", reference, axes) }]);
         }
-        let camera = scene.cameras.first().cloned().unwrap_or_else(|| {
-            let (min, max) = scene.bounds();
-            Camera::around(min, max)
-        });
+        let camera = scene.first_camera();
         if unknown_to_paths(scene) {
             return Err(Error::setting(
                 "study",
@@ -146,18 +142,15 @@ impl Subject {
 
     /// One run; `None` if it was interrupted.
     pub fn run(&self, gpu: &Gpu, configuration: &Configuration, rounds: u32, seed: u64, cancelled: &AtomicBool) -> Result<Option<Shot>> {
-        let mut control = Control { cancelled, progress: &mut |_| {} };
+        let mut control = Control::quiet(cancelled);
         let shot = match &configuration.line {
             Line::Paper(settings) => {
                 let settings = RoomSettings { rounds, seed, ..settings.clone() };
                 let room = open_box(&settings);
-                let outcome = match settings.builder {
-                    Builder::Cpu => room::on_cpu(&room, &settings, &mut control)?,
-                    _ => room::on_gpu(gpu, &room, &settings, &mut control)?,
-                };
+                let outcome = room::run(Some(gpu), &room, &settings, &mut control)?;
                 let walls = estimate_walls(&outcome.film, &room, &outcome.plan);
                 let values = walls.into_iter().flat_map(|wall| wall.irradiance).collect();
-                shot(values, &outcome.timings, outcome.fates.ledger())
+                shot(values, &outcome.timings, outcome.ledger())
             }
             Line::Scene(settings) => {
                 let settings = SceneSettings { rounds, seed, ..settings.clone() };
@@ -166,9 +159,9 @@ impl Subject {
                 let values = (0..lit.film.pixels())
                     .flat_map(|pixel| lit.film.mean(pixel, &lit.plan).to_array().into_iter().take(channels))
                     .collect();
-                let [global, caustic] = lit.fates.each_ref().map(Fates::ledger);
+                let global = lit.fates[0].ledger();
                 // A caustic map's photons end at the first surface that scatters, so the cap is the global map's.
-                Shot { photons: global.emitted + caustic.emitted, ..shot(values, &lit.timings, global) }
+                Shot { photons: lit.ledger().emitted, ..shot(values, &lit.timings, global) }
             }
         };
         Ok((!cancelled.load(Ordering::Relaxed)).then_some(shot))
@@ -179,18 +172,9 @@ impl Subject {
             [] => self.geometry.clone(),
             without => Rc::new(Geometry::new(&self.scene.without(without))?),
         };
-        let sensor = match self.camera {
-            Some(_) => Sensor::Picture { width: self.size, height: self.size },
-            None => Sensor::Receivers { count: self.receivers.len() as u32 },
-        };
-        let receiver = |(position, normal): &(DVec3, DVec3)| {
-            let normal = normal.as_vec3();
-            Receiver { position: geometry.to_local(*position), normal, shading_normal: normal }
-        };
-        let phases: Vec<Vec<Receiver>> =
-            if self.receivers.is_empty() { Vec::new() } else { vec![self.receivers.iter().map(receiver).collect()] };
-        let view = View { geometry: &geometry, camera: self.camera.as_ref(), phases: &phases };
-        let plan = scene::trial::plan(gpu, &self.scene, &view, &settings, sensor)?;
+        let target = self.camera.as_ref().map_or(Target::Points(&self.receivers), |camera| Target::Picture(camera, [self.size; 2]));
+        let view = View { geometry: &geometry, camera: target.camera(), phases: &target.phases(&geometry) };
+        let plan = scene::trial::plan(gpu, &self.scene, &view, &settings, target.sensor())?;
         scene::light(gpu, &view, plan, control)
     }
 }

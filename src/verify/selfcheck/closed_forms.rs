@@ -84,7 +84,7 @@ fn furnace() -> Vec<Case> {
                 case(format!("{what}: irradiance"), PI / share, move |gpu| irradiance(gpu, &scene("furnace"), &settings, &all_walls())),
                 case(format!("{what}: radiance"), 1.0 / share, move |gpu| {
                     let camera = Camera::looking_at("wide", DVec3::splat(0.5), DVec3::new(0.3, 0.4, 0.0), DVec3::Y, 2.2);
-                    mean_radiance(gpu, scene("furnace"), &other, camera)
+                    mean_radiance(gpu, &scene("furnace"), &other, &camera)
                 }),
             ]
         })
@@ -134,7 +134,7 @@ fn point() -> Vec<Case> {
     }));
     cases.push(case("point light: radiance of the plane".into(), 0.8 / PI * 1.25f64.powf(-1.5), |gpu| {
         let split = settings(Illumination::Split, 0.1);
-        radiance(gpu, scene("point-over-plane"), &split, DVec3::new(0.4, 1.0, 1.5), DVec3::X * 0.5)
+        radiance(gpu, &scene("point-over-plane"), &split, DVec3::new(0.4, 1.0, 1.5), DVec3::X * 0.5)
     }));
     cases
 }
@@ -182,7 +182,7 @@ fn sun_and_sky() -> Vec<Case> {
         }
     }
     cases.push(case("sky: radiance".into(), 1.0, |gpu| {
-        radiance(gpu, scene("sky-over-plane"), &settings(Illumination::Split, 0.1), DVec3::Y, DVec3::Y * 2.0)
+        radiance(gpu, &scene("sky-over-plane"), &settings(Illumination::Split, 0.1), DVec3::Y, DVec3::Y * 2.0)
     }));
     cases
 }
@@ -195,7 +195,7 @@ fn mirrors() -> Vec<Case> {
             case(format!("mirror corridor, {}: radiance", counted(n, "mirror")), 0.8f64.powi(n), move |gpu| {
                 // Unfolded, the end wall lies straight on: the ray goes to the middle of its nth image.
                 let target = DVec3::new(f64::from(n), 0.0, -10.0);
-                radiance(gpu, scene("mirror-corridor"), &settings(Illumination::Split, 0.1), DVec3::ZERO, target)
+                radiance(gpu, &scene("mirror-corridor"), &settings(Illumination::Split, 0.1), DVec3::ZERO, target)
             })
         })
         .collect()
@@ -208,7 +208,7 @@ fn glass() -> Vec<Case> {
         case(format!("glass slab, {name}: radiance"), (1.0 - fresnel) / (1.0 + fresnel), move |gpu| {
             let rays = SceneSettings { photons: 1, caustic_photons: 1, rounds: 16, ..settings(Illumination::Split, 0.1) };
             let (sin, cos) = degrees.to_radians().sin_cos();
-            radiance(gpu, scene("glass-slab"), &rays, 2.0 * DVec3::new(sin, 0.0, cos), DVec3::ZERO)
+            radiance(gpu, &scene("glass-slab"), &rays, 2.0 * DVec3::new(sin, 0.0, cos), DVec3::ZERO)
         })
     };
     vec![of("normal incidence", 0.0), of("at 60 degrees", 60.0)]

@@ -1,18 +1,14 @@
 //! How a case is measured: independent runs of a scene, of which the spread is the error.
 
-use std::sync::atomic::AtomicBool;
-
 use glam::DVec3;
 
 use super::Estimate;
 use crate::engine;
 use crate::engine::Control;
-use crate::engine::scene::{self, View};
+use crate::engine::scene::{self, Target, View};
 use crate::error::Result;
 use crate::gpu::Gpu;
 use crate::plan::scene::ScenePlan;
-use crate::plan::sensor::Sensor;
-use crate::records::Receiver;
 use crate::scene::geometry::Geometry;
 use crate::scene::{Camera, Scene};
 use crate::settings::scene::SceneSettings;
@@ -30,24 +26,17 @@ pub fn estimate_of(values: &[f64]) -> Estimate {
 
 /// Mean over all pixels or points and over seeds; the error is of the seeds' spread, since points share
 /// photons. Scenes are grey: the red channel stands for all.
-fn light(gpu: &Gpu, scene: &Scene, settings: &SceneSettings, sensor: Sensor, points: &[(DVec3, DVec3)]) -> Result<Estimate> {
+fn light(gpu: &Gpu, scene: &Scene, settings: &SceneSettings, target: Target) -> Result<Estimate> {
     let geometry = Geometry::new(scene)?;
-    let receiver = |(position, normal): &(DVec3, DVec3)| Receiver {
-        position: geometry.to_local(*position),
-        normal: normal.as_vec3(),
-        shading_normal: normal.as_vec3(),
-    };
-    let phases: Vec<Vec<Receiver>> = if points.is_empty() { Vec::new() } else { vec![points.iter().map(receiver).collect()] };
-    let view = View { geometry: &geometry, camera: scene.cameras.first().filter(|_| points.is_empty()), phases: &phases };
+    let view = View { geometry: &geometry, camera: target.camera(), phases: &target.phases(&geometry) };
     let means: Vec<f64> = (1..=SEEDS)
         .map(|seed| {
             let settings = SceneSettings { seed, ..settings.clone() };
-            let plan = ScenePlan::new(scene, &geometry, &settings, sensor, &engine::limits(gpu.facts()))?;
-            let never = AtomicBool::new(false);
-            let lit = scene::light(gpu, &view, plan, &mut Control { cancelled: &never, progress: &mut |_| {} })?;
-            let sum: f64 = (0..lit.film.pixels()).map(|pixel| lit.film.mean(pixel, &lit.plan).x).sum();
+            let plan = ScenePlan::new(scene, &geometry, &settings, target.sensor(), &engine::limits(gpu.facts()))?;
+            let lit = scene::light(gpu, &view, plan, &mut Control::default())?;
+            let sum: f64 = lit.film.means(&lit.plan).map(|mean| mean.x).sum();
             // What is no number makes the case fail instead of counting as dark.
-            Ok(if lit.anomalies == [0, 0, 0] { sum / lit.film.pixels() as f64 } else { f64::NAN })
+            Ok(if lit.film.anomalies[..3] == [0, 0, 0] { sum / lit.film.pixels() as f64 } else { f64::NAN })
         })
         .collect::<Result<_>>()?;
     Ok(estimate_of(&means))
@@ -55,16 +44,15 @@ fn light(gpu: &Gpu, scene: &Scene, settings: &SceneSettings, sensor: Sensor, poi
 
 /// Irradiance at points (position, normal), W/m2.
 pub fn irradiance(gpu: &Gpu, scene: &Scene, settings: &SceneSettings, points: &[(DVec3, DVec3)]) -> Result<Estimate> {
-    light(gpu, scene, settings, Sensor::Receivers { count: points.len() as u32 }, points)
+    light(gpu, scene, settings, Target::Points(points))
 }
 
 /// Radiance along one ray, W/m2/sr, seen through a picture of a narrow view.
-pub fn radiance(gpu: &Gpu, scene: Scene, settings: &SceneSettings, eye: DVec3, target: DVec3) -> Result<Estimate> {
-    mean_radiance(gpu, scene, settings, Camera::looking_at("ray", eye, target, DVec3::Y, 0.003))
+pub fn radiance(gpu: &Gpu, scene: &Scene, settings: &SceneSettings, eye: DVec3, target: DVec3) -> Result<Estimate> {
+    mean_radiance(gpu, scene, settings, &Camera::looking_at("ray", eye, target, DVec3::Y, 0.003))
 }
 
 /// Radiance over a camera's picture, W/m2/sr.
-pub fn mean_radiance(gpu: &Gpu, mut scene: Scene, settings: &SceneSettings, camera: Camera) -> Result<Estimate> {
-    scene.cameras = vec![camera];
-    light(gpu, &scene, settings, Sensor::Picture { width: 24, height: 24 }, &[])
+pub fn mean_radiance(gpu: &Gpu, scene: &Scene, settings: &SceneSettings, camera: &Camera) -> Result<Estimate> {
+    light(gpu, scene, settings, Target::Picture(camera, [24, 24]))
 }

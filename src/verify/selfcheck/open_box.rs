@@ -1,7 +1,5 @@
 //! The paper's box: photons stored for each one emitted, by every builder.
 
-use std::sync::atomic::AtomicBool;
-
 use super::{Case, Estimate};
 use crate::engine::Control;
 use crate::engine::room::{self};
@@ -30,15 +28,9 @@ fn case(builder: Builder, emission: EmissionLaw, expected: f64) -> Case {
         expected,
         on_gpu: builder != Builder::Cpu,
         measure: Box::new(move |gpu| {
-            let never = AtomicBool::new(false);
-            let mut control = Control { cancelled: &never, progress: &mut |_| {} };
-            let scene = open_box(&settings);
-            let outcome = match gpu.filter(|_| builder != Builder::Cpu) {
-                Some(gpu) => room::on_gpu(gpu, &scene, &settings, &mut control)?,
-                None => room::on_cpu(&scene, &settings, &mut control)?,
-            };
+            let outcome = room::run(gpu, &open_box(&settings), &settings, &mut Control::default())?;
             let emitted = f64::from(PHOTONS);
-            Ok(Estimate { mean: outcome.fates.ledger().stored as f64 / emitted, standard_error: DEVIATION / emitted.sqrt() })
+            Ok(Estimate { mean: outcome.ledger().stored as f64 / emitted, standard_error: DEVIATION / emitted.sqrt() })
         }),
     }
 }

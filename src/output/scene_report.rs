@@ -5,22 +5,21 @@ use std::fmt::Write;
 
 use serde::Serialize;
 
-use super::report::{end_in_words, errors, ledger, losses, timing_table};
+use super::report::{Common, common, end_in_words, ending, ledger, losses};
 use crate::constants::MAX_BOUNCES;
-use crate::engine::bias::Bias;
-use crate::engine::nonfinite_values::NonfiniteValues;
-use crate::engine::scene::stop::error_bound;
-use crate::engine::scene::{End, RunResult};
-use crate::engine::unknown::Unknown;
-use crate::ledger::{Ledger, Losses};
+use crate::engine::End;
+use crate::engine::scene::RunResult;
+use crate::gpu::DeviceFacts;
+use crate::ledger::Ledger;
 use crate::plan::evidence::EffectDecision;
 use crate::plan::radius::RadiusFrom;
-use crate::plan::scene::{MapPlan, ScenePlan, Trial};
+use crate::plan::radius::Trial;
+use crate::plan::scene::{MapPlan, ScenePlan};
 use crate::plan::sensor::Sensor;
 use crate::scene::geometry::Geometry;
 use crate::settings::scene::{Effect, SceneSettings};
 use crate::text::counted;
-use crate::timings::{Row, Timings};
+use crate::timings::Timings;
 
 /// A row of the plan: what was decided, and after a run what it cost and gave.
 #[derive(Serialize)]
@@ -118,32 +117,12 @@ pub fn radius_warning(plan: &ScenePlan, geometry: &Geometry, point: &str) -> Opt
 /// The JSON report of a run.
 #[derive(Serialize)]
 struct Report<'a> {
-    photonmill: &'static str,
     scene: &'a str,
-    device: &'a str,
-    driver: &'a str,
-    settings: &'a SceneSettings,
+    #[serde(flatten)]
+    common: Common<'a, SceneSettings>,
     plan: PlanReport<'a>,
-    end: End,
-    rounds: u32,
     ledgers: Ledgers,
-    /// Light that limits kept from the result.
-    losses: Losses,
-    /// Root mean square of the standard errors over that of the values.
-    relative_error: f64,
-    /// What the relative error is not above, with the confidence of the settings; null from a single round, and while all is
-    /// black and need not be.
-    error_bound: Option<f64>,
-    /// What nothing has reached.
-    unknown: Unknown,
-    /// Of the radius, relative to the result; null without `--bias`.
-    bias: Option<Bias>,
     film: FilmReport,
-    /// What `--paranoid` found; null without it.
-    nonfinite_values: Option<&'a NonfiniteValues>,
-    timings: &'a [Row],
-    dispatches: u64,
-    submissions: u64,
 }
 
 /// Of the photons of each map.
@@ -189,26 +168,15 @@ pub fn plan_json(plan: &ScenePlan) -> Vec<u8> {
 
 /// A run as JSON.
 pub fn json(scene: &str, lit: &RunResult) -> Vec<u8> {
+    let RunResult { plan, film, fates, timings, .. } = lit;
+    let confidence = plan.settings.stop.confidence;
+    let error = film.error(plan, confidence);
     let report = Report {
-        photonmill: env!("CARGO_PKG_VERSION"),
         scene,
-        device: &lit.device.name,
-        driver: &lit.device.driver,
-        settings: &lit.plan.settings,
-        plan: plan_report(&lit.plan, Some((&lit.timings, &lit.part_totals))),
-        end: lit.end,
-        rounds: lit.film.rounds,
-        ledgers: Ledgers { global: lit.fates[0].ledger(), caustic: lit.fates[1].ledger() },
-        losses: lit.losses,
-        relative_error: lit.film.relative_error(&lit.plan),
-        error_bound: Some(error_bound(&lit.film, &lit.plan, lit.plan.settings.stop.confidence)).filter(|bound| bound.is_finite()),
-        unknown: lit.film.unknown(&lit.plan, lit.plan.settings.stop.confidence),
-        bias: lit.bias,
-        film: FilmReport { nonfinite_values: lit.anomalies[0], uncorrected_estimates: lit.anomalies[2] },
-        nonfinite_values: lit.nonfinite_values.as_ref(),
-        timings: lit.timings.rows(),
-        dispatches: lit.dispatches,
-        submissions: lit.submissions,
+        common: common(lit, &plan.settings, &error, confidence, ""),
+        plan: plan_report(plan, Some((timings, &film.part_totals))),
+        ledgers: Ledgers { global: fates[0].ledger(), caustic: fates[1].ledger() },
+        film: FilmReport { nonfinite_values: film.anomalies[0], uncorrected_estimates: film.anomalies[2] },
     };
     serde_json::to_vec_pretty(&report).expect("a report is plain data")
 }
@@ -217,13 +185,13 @@ pub fn json(scene: &str, lit: &RunResult) -> Vec<u8> {
 pub fn text(scene: &str, lit: &RunResult, point: &str, explain: bool) -> String {
     let mut text = String::new();
     let settings = &lit.plan.settings;
-    writeln!(text, "{}", lit.device.label()).unwrap();
+    writeln!(text, "{}", lit.device.as_ref().map_or_else(String::new, DeviceFacts::label)).unwrap();
     let maps: Vec<String> = lit.plan.maps().map(|map| counted(map.photons, &format!("{} photon", map.name))).collect();
     let maps = if maps.is_empty() { "no photons".to_owned() } else { maps.join(" and ") };
     let capped = if settings.bounces < MAX_BOUNCES { format!(", at most {}", counted(settings.bounces, "bounce")) } else { String::new() };
     writeln!(text, "{scene}: {} of {maps}{capped}, seed {}", counted(lit.film.rounds, "round"), settings.seed).unwrap();
     if lit.film.rounds == 1 && lit.end == End::Time {
-        let traced: u64 = lit.fates.iter().map(|fates| fates.emitted).sum();
+        let traced = lit.ledger().emitted;
         let planned: u64 = lit.plan.maps().map(|map| u64::from(map.photons)).sum();
         if traced < planned {
             writeln!(
@@ -237,7 +205,7 @@ pub fn text(scene: &str, lit: &RunResult, point: &str, explain: bool) -> String 
         writeln!(text, "ended {why}: {} of at most {}", counted(lit.film.rounds, "round"), settings.rounds).unwrap();
     }
     if explain {
-        writeln!(text, "\n{}", plan_table(&lit.plan, Some((&lit.timings, &lit.part_totals)))).unwrap();
+        writeln!(text, "\n{}", plan_table(&lit.plan, Some((&lit.timings, &lit.film.part_totals)))).unwrap();
     }
     if let Some(line) = missing(&lit.plan) {
         writeln!(text, "{line}").unwrap();
@@ -250,25 +218,18 @@ pub fn text(scene: &str, lit: &RunResult, point: &str, explain: bool) -> String 
         }
     }
     text.push_str(&losses(&lit.losses, settings.bounces));
-    if lit.anomalies[0] > 0 {
-        writeln!(text, "warning: {} (NaN or infinity), added as 0", counted(lit.anomalies[0], "nonfinite value")).unwrap();
+    if lit.film.anomalies[0] > 0 {
+        writeln!(text, "warning: {} (NaN or infinity), added as 0", counted(lit.film.anomalies[0], "nonfinite value")).unwrap();
     }
-    if lit.anomalies[2] > 0 {
-        let count = counted(lit.anomalies[2], "estimate");
+    if lit.film.anomalies[2] > 0 {
+        let count = counted(lit.film.anomalies[2], "estimate");
         writeln!(text, "warning: no edge correction for {count} over too many triangles; a smaller --radius mends it").unwrap();
     }
-    if let Some(nonfinite_values) = &lit.nonfinite_values {
-        writeln!(text, "{}", nonfinite_values.text()).unwrap();
-    }
-    let noise = (lit.film.rounds > 1).then(|| lit.film.relative_error(&lit.plan));
-    let unknown = lit.film.unknown(&lit.plan, settings.stop.confidence);
-    text.push_str(&errors(lit.film.rounds, noise, &unknown, lit.bias.as_ref(), lit.losses.relative, settings.stop.confidence));
     let unit = match lit.plan.sensor {
         Sensor::Picture { .. } => "W/m2/sr",
         Sensor::Receivers { .. } => "W/m2",
     };
-    text.push_str(&unknown.text(point, unit, settings.stop.confidence, lit.film.rounds));
-    text.push('\n');
-    text.push_str(&timing_table(&lit.timings, Some(&lit.device)));
+    let confidence = settings.stop.confidence;
+    text.push_str(&ending(lit, &lit.film.error(&lit.plan, confidence), confidence, (point, unit)));
     text
 }

@@ -1,0 +1,221 @@
+//! A scene on the GPU.
+
+use std::sync::atomic::AtomicBool;
+use std::time::{Duration, Instant};
+
+use super::film::SceneFilm;
+use super::losses::losses;
+use super::resources::{PhotonBuffers, SceneResources};
+use super::{Round, RunResult, View, estimate, index, points, trace};
+use crate::constants::{HIT_KINDS, PART_COUNT, TALLY_COPIES};
+use crate::engine::Control;
+use crate::engine::film::{RoundSums, wide};
+use crate::engine::nonfinite_values::NonfiniteValues;
+use crate::engine::run::{self, RunState, Task, World};
+use crate::engine::tallies;
+use crate::engine::totals;
+use crate::engine::watch::FilmError;
+use crate::error::Result;
+use crate::gpu::kernels::*;
+use crate::gpu::{Commands, Constants, DeviceFacts, Gpu, Interrupt, Kernel, Module};
+use crate::ledger::{Fates, Losses};
+use crate::plan::memory::ANOMALY_WORDS;
+use crate::plan::scene::{MapPlan, ScenePlan};
+use crate::plan::sensor::Sensor;
+use crate::timings::{Clock, Span};
+
+/// Kernels that the plan needs, and no others.
+pub fn modules(plan: &ScenePlan, facts: &DeviceFacts) -> Vec<Module> {
+    let mut modules = vec![Resolve::MODULE];
+    modules.push(match plan.sensor {
+        Sensor::Picture { .. } => crate::gpu::kernels::View::MODULE,
+        Sensor::Receivers { .. } => Receive::MODULE,
+    });
+    if plan.chains_go_on() {
+        modules.push(GoOn::MODULE);
+    }
+    if plan.maps().next().is_some() {
+        modules.extend([CrowdSize::MODULE, FluxToRadiance::MODULE]);
+        modules.extend([trace::modules(plan), index::modules()].concat());
+        modules.push(if facts.int64_atomics { GatherVisiblePointsU64::MODULE } else { GatherVisiblePointsTwoWords::MODULE });
+    }
+    modules
+}
+
+/// Specialization constants of a plan.
+pub fn constants(plan: &ScenePlan) -> Constants {
+    plan.constants.iter().fold(Constants::new(plan.settings.group_size), |constants, (name, value)| constants.set(name, *value))
+}
+
+/// Timestamps that a round may need.
+const TIMESTAMPS_PER_ROUND: u32 = 64;
+
+struct SceneOnGpu<'a> {
+    view: &'a View<'a>,
+    plan: &'a ScenePlan,
+    resources: SceneResources,
+    cancelled: &'a AtomicBool,
+}
+
+/// Runs all rounds of a plan; progress is reported in rounds.
+pub fn light(gpu: &Gpu, view: &View, plan: ScenePlan, control: &mut Control) -> Result<RunResult> {
+    let started = Instant::now();
+    let (mut commands, pipelines_before) = run::commands(gpu, &modules(&plan, gpu.facts()), constants(&plan), plan.settings.math, started)?;
+    let trial = plan.trial.as_ref().map(|trial| ("trial", Duration::from_secs_f64(trial.seconds)));
+    for (name, duration) in [("plan", plan.planned_in)].into_iter().chain(trial) {
+        commands.timings().count(name);
+        commands.timings().add(Span { name: name.into(), clock: Clock::Wall, start: Duration::ZERO, duration });
+    }
+    let resources = commands.scope("set-up", |commands| SceneResources::new(gpu, commands, view.geometry, &plan, view.phases))?;
+    commands.warm_up()?;
+    commands.submit()?;
+    let photons_per_round = plan.maps().map(|map| u64::from(map.photons)).sum();
+    let task = Task {
+        device: Some((gpu, pipelines_before)),
+        stop: plan.settings.stop,
+        alpha: plan.settings.alpha,
+        rounds: plan.settings.rounds,
+        bounces: plan.settings.bounces,
+        photons_per_round,
+        parts_per_round: 1,
+        photons_per_part: photons_per_round,
+        counts_photons: false,
+        // Of the global map and of the caustic map.
+        fates: vec![Fates::of_scene(plan.settings.bounces); 2],
+    };
+    let world = SceneOnGpu { view, plan: &plan, resources, cancelled: control.cancelled };
+    run::run(world, commands, &plan, task, control)
+}
+
+impl<'a> World for SceneOnGpu<'a> {
+    type Recorder = Commands<'a>;
+    type Film = SceneFilm;
+
+    /// There must be a first round: when the time is up in it, it ends with the photons that it has by then.
+    fn trace(&mut self, commands: &mut Commands<'a>, state: &mut RunState, _: u32) -> Result<()> {
+        let deadline = state.deadline();
+        let is_first = state.rounds == 0;
+        commands.set_interrupt(Some(Interrupt { cancelled: self.cancelled, deadline: deadline.filter(|_| !is_first) }));
+        let traced = self.one_round(commands, deadline.filter(|_| is_first), state);
+        commands.set_interrupt(None);
+        traced
+    }
+
+    fn is_full(&self, commands: &Commands<'a>) -> bool {
+        commands.timestamps_left() < TIMESTAMPS_PER_ROUND || 2 * commands.work() >= commands.paced(self.plan.work_per_submission)
+    }
+
+    fn collect(&mut self, commands: &mut Commands<'a>, state: &mut RunState) -> Result<()> {
+        let Some(photons) = &self.resources.photons else { return commands.submit() };
+        let copies = (self.plan.tally_rows() * TALLY_COPIES) as usize;
+        let mut read_backs = Vec::new();
+        for map in self.plan.maps() {
+            let which = usize::from(map.caustic_only);
+            let (tallies, totals) = (&photons.tallies[which], &photons.totals[which]);
+            read_backs.push((which, commands.copy_out(tallies, copies)?, commands.copy_out(totals, totals::WORDS as usize)?));
+            tallies::clear(commands, tallies);
+            totals::clear(commands, totals);
+        }
+        commands.submit()?;
+        for (which, tallies, totals) in read_backs {
+            state.count(which, &tallies::sums(&tallies.take()));
+            state.fates[which].add_totals(&totals::sum(&totals.take()));
+        }
+        Ok(())
+    }
+
+    fn film(&mut self, commands: &mut Commands<'a>, state: &RunState) -> Result<SceneFilm> {
+        let SceneResources { film_sums, film_squares, one_hits, part_totals, anomalies, .. } = &self.resources;
+        let pixels = self.plan.sensor.pixels() as usize;
+        let sums = commands.read(film_sums, 3 * pixels)?;
+        let words = commands.read(film_squares, 6 * pixels)?;
+        let squares = words.chunks_exact(2).map(|words| wide(words[0], words[1])).collect();
+        let one_hits = commands.read(one_hits, HIT_KINDS as usize * pixels)?;
+        let part_totals = commands.copy_out(part_totals, PART_COUNT as usize)?;
+        let anomalies = commands.copy_out(anomalies, ANOMALY_WORDS)?;
+        commands.submit()?;
+        Ok(SceneFilm {
+            of_rounds: RoundSums { rounds: state.rounds, sums, squares },
+            one_hits,
+            part_totals: part_totals.take(),
+            anomalies: anomalies.take().try_into().expect("so many words were read"),
+        })
+    }
+
+    fn error(&self, film: &SceneFilm) -> FilmError {
+        film.error(self.plan, self.plan.settings.stop.confidence)
+    }
+
+    fn losses(&self, film: &SceneFilm, fates: &[Fates]) -> Losses {
+        losses(self.view.geometry, self.plan, fates, film)
+    }
+
+    fn nonfinite_values(&mut self, commands: &mut Commands<'a>) -> Result<Option<NonfiniteValues>> {
+        NonfiniteValues::found(commands, &self.resources.nonfinite_values, self.plan.settings.paranoid)
+    }
+}
+
+impl SceneOnGpu<'_> {
+    /// One round. When its time is up, it takes no further chunk of photons.
+    fn one_round(&self, commands: &mut Commands, deadline: Option<Instant>, state: &mut RunState) -> Result<()> {
+        let SceneOnGpu { view, plan, resources, .. } = self;
+        let round = Round { resources, geometry: view.geometry, plan, number: state.rounds };
+        commands.scope("visible points", |commands| points::see(commands, round, view.camera))?;
+        if let Some(photons) = &resources.photons {
+            let sums = 3 * u64::from(plan.visible_points()) * u64::from(plan.arrival_sets);
+            commands.fill(&resources.estimates, 0, 2 * sums, 0);
+            let mut traced = [0; 2];
+            for map in plan.maps() {
+                let of_map = commands.scope(map.name, |commands| one_map(commands, round, photons, map, deadline, state))?;
+                traced[usize::from(map.caustic_only)] = of_map;
+            }
+            commands.scope("flux to radiance", |commands| estimate::flux_to_radiance(commands, round, traced))?;
+        }
+        // What is on the film counts, whatever ends the run from here on.
+        commands.set_interrupt(None);
+        commands.scope("resolve", |commands| estimate::resolve(commands, round))
+    }
+}
+
+/// Photons of the first chunk of a round in which the time may be up, and how long a chunk may take that the next one doubles.
+const FIRST_TIMED_CHUNK: u32 = 1 << 12;
+const TIMED_CHUNK: Duration = Duration::from_millis(40);
+
+/// The photons of a map; says how many. Where the time may be up, chunks grow only as long as they take little of it.
+fn one_map(
+    commands: &mut Commands,
+    round: Round,
+    photons: &PhotonBuffers,
+    map: &MapPlan,
+    deadline: Option<Instant>,
+    state: &mut RunState,
+) -> Result<u32> {
+    let mut traced = 0;
+    let mut most = if deadline.is_some() { FIRST_TIMED_CHUNK } else { map.chunk_photons };
+    while traced < map.photons {
+        let began = Instant::now();
+        if traced > 0 && deadline.is_some_and(|deadline| began >= deadline) {
+            break;
+        }
+        let count = most.min(map.chunk_photons).min(map.photons - traced);
+        state.hand_out(usize::from(map.caustic_only), count);
+        one_chunk(commands, round, photons, map, (traced, count))?;
+        traced += count;
+        if deadline.is_some() {
+            commands.submit()?;
+            most = if began.elapsed() < TIMED_CHUNK { most.saturating_mul(2) } else { most };
+        }
+    }
+    Ok(traced)
+}
+
+fn one_chunk(commands: &mut Commands, round: Round, photons: &PhotonBuffers, map: &MapPlan, chunk: (u32, u32)) -> Result<()> {
+    if commands.timestamps_left() < TIMESTAMPS_PER_ROUND || commands.work() >= commands.paced(round.plan.work_per_submission) {
+        commands.submit()?;
+    }
+    let cells = index::cells(round, map);
+    trace::trace(commands, round, photons, map, chunk, &mut |commands| {
+        commands.scope("index", |commands| index::build(commands, round, photons, map, &cells))?;
+        commands.scope("gather", |commands| estimate::gather(commands, round, photons, map, cells))
+    })
+}
