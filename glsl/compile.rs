@@ -9,7 +9,7 @@ use std::path::{Path, PathBuf};
 use shaderc::{CompileOptions, Compiler, EnvVersion, OptimizationLevel, ResolvedInclude, ShaderKind, TargetEnv};
 
 /// Kernels that exist in several forms: in the paths of their includes each word stands for one of these.
-const FORMS: &[(&str, &[(&str, &[&str])])] = &[
+const FORMS: &[(&str, &[Word])] = &[
     ("kernels/emit.comp", &[WORLDS]),
     ("kernels/trace.comp", &[WORLDS, ("BUILDER", &["slots", "atomic", "ballot", "group", "scan"])]),
     ("kernels/scan_move.comp", &[WORLDS]),
@@ -19,9 +19,11 @@ const FORMS: &[(&str, &[(&str, &[&str])])] = &[
     ("kernels/gather_visible_points.comp", &[SUMS]),
     ("check/start_up.comp", &[SUMS]),
 ];
-const WORLDS: (&str, &[&str]) = ("WORLD", &["room", "scene"]);
+/// A word and what it may stand for.
+type Word = (&'static str, &'static [&'static str]);
+const WORLDS: Word = ("WORLD", &["room", "scene"]);
 /// With 64-bit atomics and without.
-const SUMS: (&str, &[&str]) = ("SUMS", &["u64", "two_words"]);
+const SUMS: Word = ("SUMS", &["u64", "two_words"]);
 
 /// A kernel: of `trace.comp` in the room by ballots the name is `trace_room_ballot`.
 pub struct Source {

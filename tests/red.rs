@@ -736,7 +736,7 @@ fn ask(gpu: &Gpu, question: Question) -> Check<Complaint> {
         Builders => {
             let request =
                 compaction::Request { survivals: vec![0.75], bounces: 4, turns: 1, ..compaction::Request::up_to(1 << 12, FOREVER) };
-            compaction::measure(gpu, &request, &AtomicBool::new(false), &mut |_| {}).map(|_| ()).map_err(|error| match error {
+            compaction::measure(gpu, &request, None, &AtomicBool::new(false), &mut |_| {}).map(|_| ()).map_err(|error| match error {
                 Error::Miscalculated { what, .. } => Complaint::new(BuildersDisagree, what),
                 error => error.into(),
             })

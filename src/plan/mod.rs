@@ -4,8 +4,10 @@
 pub mod capacity;
 pub mod effect;
 pub mod evidence;
+mod maps;
 pub mod memory;
 pub mod planning;
+pub mod radius;
 pub mod scene;
 pub mod sensor;
 

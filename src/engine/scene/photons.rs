@@ -2,7 +2,7 @@
 
 use super::Round;
 use super::resources::{OrderBuffers, PhotonBuffers, SceneResources};
-use crate::constants::MAX_GROUPS;
+use crate::constants::{MAX_GROUPS, NONE};
 use crate::engine::prefix_sum::scan;
 use crate::error::Result;
 use crate::gpu::kernels::{
@@ -10,6 +10,7 @@ use crate::gpu::kernels::{
     TraceSceneBallot, TraceSceneGroup, TraceSceneScan, TraceSceneSlots,
 };
 use crate::gpu::{Commands, Extent, Kernel, Module};
+use crate::photon::MapPhoton;
 use crate::plan::memory::survivor_count;
 use crate::plan::scene::{MapPlan, ScenePlan};
 use crate::records::{CellPush, DispatchSizePush, Draws, EmissionPush, FlightPush, PhotonEmission, PhotonStore, SceneTracePersistentPush};
@@ -101,6 +102,22 @@ pub fn trace(
         let count = if slots.is_some() { chunk.1 } else { left };
         start = Start::List { count, parity, first_bounce };
     }
+}
+
+/// The photons that a map holds of a round.
+pub fn stored(commands: &mut Commands, round: Round, map: &MapPlan) -> Result<Vec<MapPhoton>> {
+    let buffers = round.resources.photons.as_ref().expect("a map has photons");
+    let mut found = Vec::new();
+    let mut take = |commands: &mut Commands| {
+        let count = commands.read::<u32>(&buffers.counters, 1)?[0].min(map.capacity);
+        let entries = commands.read::<MapPhoton>(&buffers.map, count as usize)?;
+        found.extend(entries.into_iter().filter(|photon| photon.plane != NONE));
+        Ok(())
+    };
+    for chunk in map.chunks() {
+        trace(commands, round, buffers, map, chunk, &mut take)?;
+    }
+    Ok(found)
 }
 
 /// Whether the map has slots, some of them empty.
