@@ -436,7 +436,7 @@ records! {
         draws: Draws,
         map: PhotonStore,
         bounce: u32,
-        /// Number of the list that its paths come from: [`crate::engine::scene::photons`] counts them from 0 in each segment.
+        /// Number of the list that its paths come from: [`crate::engine::scene::trace`] counts them from 0 in each segment.
         list: u32,
         /// 1: no path goes on after it.
         is_last: u32,

@@ -10,7 +10,7 @@ use photonmill::constants::MAX_BOUNCES;
 use photonmill::engine;
 use photonmill::engine::Control;
 use photonmill::engine::scene::resources::SceneResources;
-use photonmill::engine::scene::{self, End, Round, RunResult, View, photons};
+use photonmill::engine::scene::{self, End, Round, RunResult, View, trace};
 use photonmill::error::Error;
 use photonmill::gpu::{Commands, Gpu};
 use photonmill::output::light_report;
@@ -152,7 +152,7 @@ fn photons_stored_are_the_length_of_the_map() {
                     stored += u64::from(commands.read::<u32>(&buffers.counters, 1)?[0]);
                     Ok(())
                 };
-                photons::trace(&mut commands, round, buffers, map, chunk, &mut count).unwrap();
+                trace::trace(&mut commands, round, buffers, map, chunk, &mut count).unwrap();
             }
             let fates = &lit.fates[usize::from(map.caustic_only)];
             assert!(stored > 100, "{builder:?}, {illumination:?}, {}: {stored}", map.name);

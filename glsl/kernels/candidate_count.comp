@@ -1,5 +1,5 @@
 // The longest candidate list of any point, which decides how many slices the grid gather needs.
-// Dispatched by src/estimate.rs once a chunk. One thread = one point.
+// Dispatched by src/engine/room/estimate.rs once a chunk. One thread = one point.
 // After it longest[0] = candidates of the busiest point.
 #version 460
 #extension GL_GOOGLE_include_directive : require

@@ -1,6 +1,6 @@
 // The light that arrives at given points: direct light, and a visible point for the photon maps; a point
 // that lies on no surface looks around by a ray instead.
-// Dispatched by src/transport/points.rs once a pass. One thread = one receiver.
+// Dispatched by src/engine/scene/points.rs once a pass. One thread = one receiver.
 #version 460
 #extension GL_GOOGLE_include_directive : require
 #extension GL_EXT_scalar_block_layout : require

@@ -13,13 +13,15 @@
 //! ```
 
 pub mod bias;
+pub mod estimate;
 pub mod film;
+pub mod index;
 pub mod losses;
-pub mod photons;
 pub mod points;
 pub mod replay;
 pub mod resources;
 pub mod stop;
+pub mod trace;
 pub mod trial;
 
 use std::sync::atomic::Ordering;
@@ -107,7 +109,7 @@ pub fn modules(plan: &ScenePlan, facts: &DeviceFacts) -> Vec<Module> {
     }
     if plan.maps().next().is_some() {
         modules.extend([CrowdSize::MODULE, FluxToRadiance::MODULE]);
-        modules.extend(photons::modules(plan));
+        modules.extend([trace::modules(plan), index::modules()].concat());
         modules.push(if facts.int64_atomics { GatherVisiblePointsU64::MODULE } else { GatherVisiblePointsTwoWords::MODULE });
     }
     modules
@@ -332,9 +334,9 @@ fn one_round(commands: &mut Commands, view: &View, round: Round, deadline: Optio
                 Ok(())
             })?;
         }
-        commands.scope("flux to radiance", |commands| points::flux_to_radiance(commands, round, traced))?;
+        commands.scope("flux to radiance", |commands| estimate::flux_to_radiance(commands, round, traced))?;
     }
-    commands.scope("resolve", |commands| points::resolve(commands, round))?;
+    commands.scope("resolve", |commands| estimate::resolve(commands, round))?;
     Ok(traced.iter().map(|count| u64::from(*count)).sum())
 }
 
@@ -342,9 +344,9 @@ fn one_chunk(commands: &mut Commands, round: Round, photons: &PhotonBuffers, map
     if commands.timestamps_left() < TIMESTAMPS_PER_ROUND || commands.work() >= commands.paced(round.plan.work_per_submission) {
         commands.submit()?;
     }
-    let cells = photons::cells(round, map);
-    photons::trace(commands, round, photons, map, chunk, &mut |commands| {
-        commands.scope("index", |commands| photons::index(commands, round, photons, map, &cells))?;
-        commands.scope("gather", |commands| points::gather(commands, round, photons, map, cells))
+    let cells = index::cells(round, map);
+    trace::trace(commands, round, photons, map, chunk, &mut |commands| {
+        commands.scope("index", |commands| index::build(commands, round, photons, map, &cells))?;
+        commands.scope("gather", |commands| estimate::gather(commands, round, photons, map, cells))
     })
 }

@@ -13,7 +13,7 @@ use glam::Vec4;
 use rayon::prelude::*;
 
 use super::resources::SceneResources;
-use super::{Round, View, constants, modules, photons, points};
+use super::{Round, View, constants, modules, points, trace};
 use crate::engine;
 use crate::engine::bias;
 use crate::error::Result;
@@ -109,7 +109,7 @@ fn run(gpu: &Gpu, scene: &Scene, view: &View, run: &ScenePlan, limits: &Limits) 
         if of_run.radius_from == RadiusFrom::User || asked.is_empty() {
             continue;
         }
-        let found = photons::stored(&mut commands, round, map)?;
+        let found = trace::stored(&mut commands, round, map)?;
         let wanted = if map.caustic_only { CAUSTIC_PHOTONS_AT_POINT } else { PHOTONS_AT_POINT };
         let own: Vec<f64> = asked
             .par_iter()

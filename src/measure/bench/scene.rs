@@ -12,7 +12,7 @@ use super::room::{Counts, DROPPED, RANK_BYTES, REPEATS, Timed};
 use crate::engine;
 use crate::engine::Control;
 use crate::engine::scene::resources::SceneResources;
-use crate::engine::scene::{self, End, Round, RunResult, View, photons, points};
+use crate::engine::scene::{self, End, Round, RunResult, View, points, trace};
 use crate::error::{Error, Result};
 use crate::gpu::{Commands, Gpu};
 use crate::ledger::Fates;
@@ -100,7 +100,7 @@ pub fn survey(gpu: &Gpu, job: &Job, map: impl Fn(&ScenePlan) -> Option<&MapPlan>
         Ok(())
     };
     for chunk in map.chunks() {
-        photons::trace(&mut commands, round, buffers, map, chunk, &mut look)?;
+        trace::trace(&mut commands, round, buffers, map, chunk, &mut look)?;
     }
     let samples = asking.len().div_ceil(step).max(1);
     Ok(Some(Survey { stored: stored as f64, per_estimate: found as f64 / samples as f64, asking_points: asking.len() as f64 }))

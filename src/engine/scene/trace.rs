@@ -1,4 +1,4 @@
-//! Photons of a chunk through a scene of triangles, and the index of their map.
+//! Photons of a chunk through a scene of triangles, by each builder.
 
 use super::Round;
 use super::resources::{OrderBuffers, PhotonBuffers, SceneResources};
@@ -6,22 +6,21 @@ use crate::constants::{MAX_GROUPS, NONE};
 use crate::engine::prefix_sum::scan;
 use crate::error::Result;
 use crate::gpu::kernels::{
-    DispatchSize, EmitScene, MapCount, MapScatter, ScanAdd, ScanBlocks, ScanMoveScene, TracePersistentScene, TraceSceneAtomic,
-    TraceSceneBallot, TraceSceneGroup, TraceSceneScan, TraceSceneSlots,
+    DispatchSize, EmitScene, ScanAdd, ScanBlocks, ScanMoveScene, TracePersistentScene, TraceSceneAtomic, TraceSceneBallot, TraceSceneGroup,
+    TraceSceneScan, TraceSceneSlots,
 };
 use crate::gpu::{Commands, Extent, Kernel, Module};
 use crate::photon::MapPhoton;
 use crate::plan::memory::survivor_count;
 use crate::plan::scene::{MapPlan, ScenePlan};
-use crate::records::{CellPush, DispatchSizePush, Draws, EmissionPush, FlightPush, PhotonEmission, PhotonStore, SceneTracePersistentPush};
+use crate::records::{DispatchSizePush, Draws, EmissionPush, FlightPush, PhotonEmission, PhotonStore, SceneTracePersistentPush};
 use crate::rng::words;
 use crate::scene::geometry::Geometry;
 use crate::settings::Builder;
 
-/// Kernels that tracing and the index need.
+/// Kernels that tracing needs.
 pub fn modules(plan: &ScenePlan) -> Vec<Module> {
-    let index = vec![MapCount::MODULE, MapScatter::MODULE, ScanBlocks::MODULE, ScanAdd::MODULE, DispatchSize::MODULE];
-    let trace = match plan.builder() {
+    let by_builder = match plan.builder() {
         Builder::Naive => vec![EmitScene::MODULE, TraceSceneSlots::MODULE],
         Builder::Atomic => vec![EmitScene::MODULE, TraceSceneAtomic::MODULE],
         Builder::Ballot => vec![EmitScene::MODULE, TraceSceneBallot::MODULE],
@@ -30,18 +29,7 @@ pub fn modules(plan: &ScenePlan) -> Vec<Module> {
         Builder::Persistent => vec![TracePersistentScene::MODULE],
         Builder::Cpu => panic!("the CPU builder traces no scene"),
     };
-    [index, trace].concat()
-}
-
-/// The grid of a map in a round: cells as wide as the radius, its corner a little outside of the scene.
-pub fn cells(round: Round, map: &MapPlan) -> CellPush {
-    let radius = round.plan.radius(map, round.number) as f32;
-    CellPush {
-        origin: round.geometry.bounds.0 - 4.0 * radius,
-        cells_per_unit: 1.0 / radius,
-        bucket_mask: map.bucket_count - 1,
-        photon_capacity: map.capacity,
-    }
+    [vec![DispatchSize::MODULE, ScanBlocks::MODULE, ScanAdd::MODULE], by_builder].concat()
 }
 
 /// Timestamps that must be left for the scopes that are open and for a bounce.
@@ -322,27 +310,4 @@ fn dispatch_size(commands: &mut Commands, photons: &PhotonBuffers, plan: &SceneP
     let PhotonBuffers { counters, dispatch_args, .. } = photons;
     let push = DispatchSizePush { counter, capacity, items_per_group: plan.settings.group_size, max_groups: MAX_GROUPS };
     commands.dispatch(DispatchSize { counters, dispatch_args }, &push, Extent::Groups(1, 1))
-}
-
-/// Sorts the map by the buckets of its cells.
-pub fn index(commands: &mut Commands, round: Round, photons: &PhotonBuffers, map_plan: &MapPlan, cells_push: &CellPush) -> Result<()> {
-    let plan = round.plan;
-    let totals = &photons.totals[usize::from(map_plan.caustic_only)];
-    let PhotonBuffers { map, sorted_map, counters, cells, ranks, block_sums, dispatch_args, .. } = photons;
-    let buckets = cells_push.bucket_mask + 1;
-    commands.scope("count", |commands| {
-        commands.fill(cells, 0, u64::from(buckets) + 1, 0);
-        let push = DispatchSizePush {
-            counter: 0,
-            capacity: cells_push.photon_capacity,
-            items_per_group: plan.settings.group_size,
-            max_groups: MAX_GROUPS,
-        };
-        commands.dispatch(DispatchSize { counters, dispatch_args }, &push, Extent::Groups(1, 1))?;
-        commands.dispatch(MapCount { map, counters, cells, ranks }, cells_push, Extent::Indirect(dispatch_args))
-    })?;
-    commands.scope("scan", |commands| scan(commands, cells, block_sums, buckets + 1, plan.settings.group_size))?;
-    commands.scope("sort", |commands| {
-        commands.dispatch(MapScatter { map, counters, cells, sorted_map, ranks, totals }, cells_push, Extent::Indirect(dispatch_args))
-    })
 }
