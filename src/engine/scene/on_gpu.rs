@@ -163,7 +163,7 @@ impl SceneOnGpu<'_> {
         commands.scope("visible points", |commands| points::see(commands, round, view.camera))?;
         if let Some(photons) = &resources.photons {
             let sums = 3 * u64::from(plan.visible_points()) * u64::from(plan.arrival_sets);
-            commands.fill(&resources.estimates, 0, 2 * sums, 0);
+            commands.fill(&resources.estimates, 0, sums, 0);
             let mut traced = [0; 2];
             for map in plan.maps() {
                 let of_map = commands.scope(map.name, |commands| one_map(commands, round, photons, map, deadline, state))?;
