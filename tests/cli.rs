@@ -743,7 +743,7 @@ fn output_that_nobody_takes_is_no_panic() {
 #[test]
 fn the_paper_is_regenerated() {
     let folder = tempfile::tempdir().unwrap();
-    let output = run_on_device(folder.path(), &["paper", "--out", "paper", "--large", "5001", "--repeats", "1", "--longest", "9s"]);
+    let output = run_on_device(folder.path(), &["paper", "--out", "paper", "--large", "5001", "--repeats", "1", "--longest", "1s"]);
     assert!(output.status.success(), "{}", text(&output.stderr));
     let mut names = entries(&folder.path().join("paper"));
     names.sort();
