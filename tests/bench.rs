@@ -133,7 +133,7 @@ fn measurements_that_come_out_wrong_are_refused() {
         ("measure_gather", "measured_place(index * push.step_count + step)", "(index * push.step_count + step)", "copied blocks"),
         ("measure_atomic", "step < push.step_count", "step < push.step_count - 1", "atomic additions"),
     ] {
-        let replaced = planted::kernels(&[kernel], &format!("kernels/{kernel}.comp"), &[(from, to)]);
+        let replaced = planted::kernels(&[kernel], &format!("check/{kernel}.comp"), &[(from, to)]);
         let gpu = device_with(Options { replaced, ..Options::default() }).expect("it was there before");
         let error = rates::measure(&gpu, Size::Small).expect_err(kernel).to_string();
         assert!(error.contains(what) && error.contains("wrongly"), "{kernel}: {error}");

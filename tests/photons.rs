@@ -118,11 +118,11 @@ fn builders_store_the_same_photons_for_every_effect() {
     let Some(gpu) = device() else { return };
     let emissions = [EmissionLaw::Uniform, EmissionLaw::Cosine];
     let walls = [[None; 5], [Some(2.0), None, Some(0.5), Some(0.0), Some(50.0)]];
-    for [builder, rng, emission, wall] in pairwise([Builder::ON_GPU.len(), GENERATORS.len(), 2, 2]) {
+    for row in pairwise(&[Builder::ON_GPU.len(), GENERATORS.len(), emissions.len(), walls.len()]) {
         for photons in [65, 1000] {
-            let (rng, emission, shininess) = (GENERATORS[rng], emissions[emission], walls[wall]);
+            let (rng, emission, shininess) = (GENERATORS[row[1]], emissions[row[2]], walls[row[3]]);
             let settings = RoomSettings { photons, rng, emission, shininess, ..RoomSettings::default() };
-            these_builders_agree(&gpu, &[Builder::ON_GPU[builder]], &settings);
+            these_builders_agree(&gpu, &[Builder::ON_GPU[row[0]]], &settings);
         }
     }
     let sampled = RoomSettings { phong_direction: PhongDirection::Sampled, shininess: [Some(2.0); 5], ..RoomSettings::default() };
@@ -140,12 +140,12 @@ fn group_sizes_and_chunks_change_no_photon() {
     let chunks = [None, Some(65), Some(500), Some(1000), Some(1001), Some(5000)];
     let of = |rng| photons(&gpu, &RoomSettings { rng, ..settings.clone() });
     let expected = rngs.map(of);
-    for [builder, size, chunk, rng] in pairwise([Builder::ON_GPU.len(), group_sizes.len(), chunks.len(), rngs.len()]) {
-        let (builder, group_size, chunk) = (Builder::ON_GPU[builder], group_sizes[size], chunks[chunk]);
-        let found = photons(&gpu, &RoomSettings { rng: rngs[rng], builder, group_size, chunk, ..settings.clone() });
-        let what = format!("{:?}, {builder:?}, groups of {group_size}, chunks of {chunk:?}", rngs[rng]);
+    for row in pairwise(&[Builder::ON_GPU.len(), group_sizes.len(), chunks.len(), rngs.len()]) {
+        let (builder, group_size, chunk, rng) = (Builder::ON_GPU[row[0]], group_sizes[row[1]], chunks[row[2]], rngs[row[3]]);
+        let found = photons(&gpu, &RoomSettings { rng, builder, group_size, chunk, ..settings.clone() });
+        let what = format!("{rng:?}, {builder:?}, groups of {group_size}, chunks of {chunk:?}");
         assert_holds(&what, each_once(&found, settings.photons, settings.bounces));
-        assert_holds(&what, same_photons(&found, &expected[rng]));
+        assert_holds(&what, same_photons(&found, &expected[row[3]]));
     }
     for (rng, expected) in rngs.into_iter().zip(expected) {
         let settings = RoomSettings { rng, ..settings.clone() };

@@ -2,6 +2,7 @@
 //! up, radiometry, leaks, and plans that the device's work is counted against.
 
 use crate::common::lit::{light, received, run, scene};
+use crate::common::pairwise::pairwise;
 use crate::common::{Check, Complaint, Kind, assert_complains, assert_holds, device, device_with, known, pairs, same_sums, z_check};
 use glam::{DVec3, Vec3};
 use photonmill::constants::GATHER_SLICE;
@@ -181,11 +182,15 @@ fn an_effect_that_the_scene_lacks_changes_no_bit() {
     for name in ["cornell", "cornell-spheres"] {
         let scene = scene(name);
         let reference = picture(&gpu, &scene, &small());
-        for decision in reference.plan.decisions.iter().filter(|decision| !decision.needed) {
-            let effect = decision.effect;
-            let forced = picture(&gpu, &scene, &SceneSettings { with: vec![effect], ..small() });
-            assert!(forced.plan.keeps(effect));
-            assert_holds(effect.name(), same_film(&format!("{name} with {}", effect.name()), &forced, &reference));
+        let unneeded: Vec<Effect> =
+            reference.plan.decisions.iter().filter(|decision| !decision.needed).map(|decision| decision.effect).collect();
+        assert!(unneeded.len() > 5, "{name}: {unneeded:?}");
+        // Each with and without each other.
+        for row in pairwise(&vec![2; unneeded.len()]) {
+            let with: Vec<Effect> = unneeded.iter().zip(row).filter(|(_, forced)| *forced == 1).map(|(effect, _)| *effect).collect();
+            let forced = picture(&gpu, &scene, &SceneSettings { with: with.clone(), ..small() });
+            assert!(with.iter().all(|effect| forced.plan.keeps(*effect)), "{with:?}");
+            assert_holds(format!("{with:?}"), same_film(&format!("{name} with {with:?}"), &forced, &reference));
         }
         // A list instead of a tree finds the same.
         if name == "cornell" {
