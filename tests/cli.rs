@@ -378,7 +378,7 @@ fn interrupted(signal: &str, code: i32) {
         .unwrap();
     // A run that does not end must not hang the test.
     let id = child.id().to_string();
-    let guard = Command::new("bash").args(["-c", &format!("sleep 600; kill -9 {id}")]).spawn();
+    let guard = Command::new("bash").args(["-c", &format!("sleep 600; kill -9 {id}")]).stdout(Stdio::null()).stderr(Stdio::null()).spawn();
     // Photons are under way once progress is reported.
     let mut lines = BufReader::new(child.stderr.take().unwrap()).lines().map_while(Result::ok);
     assert!(lines.any(|line| line.contains("\"photons\"")), "no progress");
@@ -739,7 +739,7 @@ fn output_that_nobody_takes_is_no_panic() {
 #[test]
 fn the_paper_is_regenerated() {
     let folder = tempfile::tempdir().unwrap();
-    let output = run_on_device(folder.path(), &["paper", "--out", "paper", "--large", "5001", "--repeats", "1", "--longest", "1s"]);
+    let output = run_on_device(folder.path(), &["paper", "--out", "paper", "--large", "5001", "--repeats", "1", "--longest", "9s"]);
     assert!(output.status.success(), "{}", text(&output.stderr));
     let mut names = entries(&folder.path().join("paper"));
     names.sort();

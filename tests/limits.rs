@@ -216,9 +216,9 @@ fn long_rounds_end_soon_after_they_are_asked_to() {
     assert!(lit.fates[0].emitted < u64::from(long.photons) && lit.fates[1].emitted > 0);
     let report = light_report::text("cornell-spheres", &lit, "pixel", false);
     assert!(report.contains("time was up in the first round") && report.contains("use fewer --photons"), "{report}");
-    // It ended between two chunks, long before the last.
-    let [emitted, chunk] = [lit.fates[0].emitted, u64::from(lit.plan.global.as_ref().unwrap().chunk_photons)];
-    assert!(emitted % chunk == 0 && emitted < u64::from(long.photons) / 8, "{emitted} photons in chunks of {chunk}");
+    // It ended long before the last chunk of photons.
+    let chunks = lit.plan.global.as_ref().unwrap().chunks().count();
+    assert!(chunks > 100 && lit.fates[0].emitted < u64::from(long.photons) / 8, "{} photons, {chunks} chunks", lit.fates[0].emitted);
     // Fewer photons are no less light.
     let reference = SceneSettings { photons: 50_000, rounds: 2, ..wide(&settings()) };
     let reference = run(&gpu, &scene, &reference, &AtomicBool::new(false)).unwrap();
