@@ -8,6 +8,57 @@ use std::path::{Path, PathBuf};
 
 use shaderc::{CompileOptions, Compiler, EnvVersion, OptimizationLevel, ResolvedInclude, ShaderKind, TargetEnv};
 
+/// Kernels that exist in several forms: in the paths of their includes each word stands for one of these.
+const FORMS: &[(&str, &[Word])] = &[
+    ("kernels/emit.comp", &[WORLDS]),
+    ("kernels/trace.comp", &[WORLDS, ("BUILDER", &["slots", "atomic", "ballot", "group", "scan"])]),
+    ("kernels/scan_move.comp", &[WORLDS]),
+    ("kernels/trace_persistent.comp", &[WORLDS]),
+    ("kernels/gather.comp", &[("INDEX", &["brute", "grid", "tree"]), SUMS]),
+    ("kernels/nearest.comp", &[SUMS]),
+    ("kernels/gather_visible_points.comp", &[SUMS]),
+    ("check/start_up.comp", &[SUMS]),
+];
+/// A word and what it may stand for.
+type Word = (&'static str, &'static [&'static str]);
+const WORLDS: Word = ("WORLD", &["room", "scene"]);
+/// With 64-bit atomics and without.
+const SUMS: Word = ("SUMS", &["u64", "two_words"]);
+
+/// A kernel: of `trace.comp` in the room by ballots the name is `trace_room_ballot`.
+pub struct Source {
+    pub name: String,
+    /// Within `glsl`.
+    pub path: String,
+    /// What stands for which word in the paths of its includes.
+    choices: Vec<(&'static str, &'static str)>,
+}
+
+/// Every kernel, by name.
+pub fn sources(glsl: &Path) -> Vec<Source> {
+    let mut sources = Vec::new();
+    for folder in ["kernels", "check"] {
+        let entries = fs::read_dir(glsl.join(folder)).unwrap_or_else(|error| panic!("glsl/{folder}: {error}"));
+        for file in entries.map(|entry| entry.expect("a folder can be read").file_name().to_string_lossy().into_owned()) {
+            let Some(stem) = file.strip_suffix(".comp") else { continue };
+            let path = format!("{folder}/{file}");
+            let words = FORMS.iter().find(|(of, _)| *of == path).map_or(&[][..], |(_, words)| *words);
+            let mut forms = vec![Source { name: stem.to_owned(), path, choices: Vec::new() }];
+            for (word, values) in words {
+                let with = |form: &Source, value: &'static str| Source {
+                    name: format!("{}_{value}", form.name),
+                    path: form.path.clone(),
+                    choices: [form.choices.clone(), vec![(*word, value)]].concat(),
+                };
+                forms = forms.iter().flat_map(|form| values.iter().map(move |value| with(form, value))).collect();
+            }
+            sources.extend(forms);
+        }
+    }
+    sources.sort_by(|a, b| a.name.cmp(&b.name));
+    sources
+}
+
 /// A module, and the files that it was made from.
 pub struct Compiled {
     pub words: Vec<u32>,
@@ -20,14 +71,14 @@ pub struct Compiled {
 /// and unused bindings that reflection needs.
 ///
 /// `edit` changes the text of files on their way (path within `glsl`, text): tests plant faults by it.
-pub fn compile(glsl: &Path, name: &str, macros: &[(&str, u32)], edit: &dyn Fn(&str, String) -> String) -> Result<Compiled, String> {
+pub fn compile(glsl: &Path, kernel: &Source, macros: &[(&str, u32)], edit: &dyn Fn(&str, String) -> String) -> Result<Compiled, String> {
     let read = |name: &str| -> Result<String, String> {
         let path = glsl.join(name);
         let text = fs::read_to_string(&path).map_err(|error| format!("{}: {error}", path.display()))?;
         Ok(edit(name, text))
     };
-    let source = read(name)?;
-    let files = RefCell::new(BTreeSet::from([glsl.join(name)]));
+    let source = read(&kernel.path)?;
+    let files = RefCell::new(BTreeSet::from([glsl.join(&kernel.path)]));
     let compiler = Compiler::new().expect("shaderc starts");
     let mut options = CompileOptions::new().expect("shaderc starts");
     options.set_target_env(TargetEnv::Vulkan, EnvVersion::Vulkan1_3 as u32);
@@ -37,11 +88,12 @@ pub fn compile(glsl: &Path, name: &str, macros: &[(&str, u32)], edit: &dyn Fn(&s
         options.add_macro_definition(name, Some(&format!("{value}u")));
     }
     options.set_include_callback(|name, _kind, from, _depth| {
+        let name = &kernel.choices.iter().fold(name.to_owned(), |name, (word, value)| name.replace(word, value));
         files.borrow_mut().insert(glsl.join(name));
         let content = read(name).map_err(|error| format!("included from {from}: {error}"))?;
         Ok(ResolvedInclude { resolved_name: format!("glsl/{name}"), content })
     });
-    let shown = format!("glsl/{name}");
+    let shown = format!("glsl/{} ({})", kernel.path, kernel.name);
     let artifact =
         compiler.compile_into_spirv(&source, ShaderKind::Compute, &shown, "main", Some(&options)).map_err(|error| error.to_string())?;
     drop(options);

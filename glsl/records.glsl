@@ -230,14 +230,6 @@ struct CausticTarget {
     float radius;
 };
 
-struct LightPath {
-    vec3 position;
-    uint photon;
-    vec3 direction;
-    uint arrival;
-    vec3 flux;
-};
-
 struct CameraPath {
     vec3 position;
     uint place;
@@ -296,6 +288,7 @@ struct FlightPush {
     uint bounce;
     uint list;
     uint is_last;
+    uint counts_left;
     uint path_capacity;
 };
 
@@ -404,6 +397,8 @@ struct CheckPush {
     uint addend_low;
     uint addend_high;
     uint add_count;
+    uint photon_count;
+    uint stride;
 };
 
 struct MathResults {
@@ -441,6 +436,46 @@ struct Samples {
     vec3 bitangent;
     vec3 unpacked_normal;
     vec3 unpacked_direction;
+};
+
+struct PackingCase {
+    vec3 position;
+    uint wall;
+    vec3 direction;
+    uint photon;
+    uvec2 stream;
+    float flux;
+    float weight;
+    vec3 colour;
+    uint normal_code;
+    Room room;
+};
+
+struct UnpackedRoom {
+    vec3 place;
+    uint wall;
+    float flux;
+    float weight;
+    vec3 position;
+    uint path_wall;
+    vec3 direction;
+    uint photon;
+    uvec2 stream;
+    float path_flux;
+};
+
+struct UnpackedScene {
+    vec3 position;
+    uint plane;
+    vec3 flux;
+    uint wi;
+    uint normal_code;
+    vec3 normal;
+    uint direction_code;
+    vec3 low;
+    vec3 high;
+    uint meta;
+    uint child_nodes;
 };
 
 struct MeasurePush {

@@ -440,6 +440,8 @@ records! {
         list: u32,
         /// 1: no path goes on after it.
         is_last: u32,
+        /// 1: the naive builder says how many paths are left.
+        counts_left: u32,
         path_capacity: u32,
     }
 
@@ -569,6 +571,9 @@ records! {
         addend_low: u32,
         addend_high: u32,
         add_count: u32,
+        /// Photons of a loop in which lanes vote, and invocations that take them.
+        photon_count: u32,
+        stride: u32,
     }
 
     /// Functions of `glsl/math/math.glsl` at (a, b).
@@ -623,6 +628,53 @@ records! {
         /// The normal, packed in 2 x 16 and in 2 x 15 bits.
         unpacked_normal: Vec3,
         unpacked_direction: Vec3,
+    }
+
+    /// What `glsl/check/check_packing_...` pack.
+    PackingCase {
+        /// In the plane of its wall, where it has one.
+        position: Vec3,
+        wall: u32,
+        /// A unit vector.
+        direction: Vec3,
+        photon: u32,
+        stream: UVec2,
+        flux: f32,
+        weight: f32,
+        /// Flux of a map's photon, and what one hit adds.
+        colour: Vec3,
+        /// Of a normal that is only unpacked.
+        normal_code: u32,
+        room: Room,
+    }
+
+    /// An entry of the room's photon map and a path, unpacked.
+    UnpackedRoom {
+        place: Vec3,
+        wall: u32,
+        flux: f32,
+        weight: f32,
+        position: Vec3,
+        path_wall: u32,
+        direction: Vec3,
+        photon: u32,
+        stream: UVec2,
+        path_flux: f32,
+    }
+
+    /// An entry of the map of a scene of triangles, unit vectors packed and unpacked, and a child of a node.
+    UnpackedScene {
+        position: Vec3,
+        plane: u32,
+        flux: Vec3,
+        wi: u32,
+        normal_code: u32,
+        normal: Vec3,
+        direction_code: u32,
+        low: Vec3,
+        high: Vec3,
+        meta: u32,
+        child_nodes: u32,
     }
 
     /// A measurement of a device's limits; see `glsl/kernels/measure_...`.

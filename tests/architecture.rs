@@ -12,7 +12,16 @@ const LINE: &[&[&str]] = &[
     &["scene"],
     &["verify::judge", "plan"],
     &["cpu", "gpu"],
-    &["engine", "engine::bias", "engine::prefix_sum", "engine::tallies", "engine::totals", "engine::unknown", "engine::nonfinite_values"],
+    &[
+        "engine",
+        "engine::bias",
+        "engine::planned",
+        "engine::prefix_sum",
+        "engine::tallies",
+        "engine::totals",
+        "engine::unknown",
+        "engine::nonfinite_values",
+    ],
     &["engine::watch"],
     &["engine::room", "engine::scene"],
     &["engine::choose_builder"],
@@ -306,7 +315,7 @@ fn waits(source: &str) -> Vec<&'static str> {
 
 /// Sums of floats, where bits are compared and swapped without a wait: a try fails only where another's addition
 /// went in, so that somebody moves on whatever the device promises.
-const LOCK_FREE: [&str; 2] = ["film/f32.glsl", "film/compensated.glsl"];
+const LOCK_FREE: [&str; 2] = ["film/float_two_words.glsl", "film/float_u64.glsl"];
 
 #[test]
 fn no_kernel_waits_for_another_invocation() {

@@ -36,6 +36,7 @@ fn request(experiments: &[Experiment], scale: bool) -> Request {
         command: "photonmill bench".to_owned(),
         size: Size::Small,
         experiments: experiments.to_vec(),
+        scene: photonmill::scene::Scene::open("cornell-spheres", false).unwrap(),
         scale,
         budget: Duration::from_secs(36_000),
     }

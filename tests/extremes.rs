@@ -517,6 +517,7 @@ fn vast() -> Limits {
         loop_iterations: 1 << 14,
         lanes: 32,
         counters: 1,
+        votes_in_loops: true,
     }
 }
 

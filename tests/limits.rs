@@ -8,12 +8,13 @@ use crate::common::{assert_complains, assert_holds, device, z_check};
 use glam::{DVec3, Vec3};
 use photonmill::constants::MAX_BOUNCES;
 use photonmill::engine;
+use photonmill::engine::Control;
 use photonmill::engine::scene::resources::SceneResources;
 use photonmill::engine::scene::{self, End, Round, RunResult, View, photons};
-use photonmill::engine::{Control, watch};
 use photonmill::error::Error;
 use photonmill::gpu::{Commands, Gpu};
 use photonmill::output::light_report;
+use photonmill::plan::radius::{mean_squared_radius, squared_radius};
 use photonmill::plan::scene::ScenePlan;
 use photonmill::plan::sensor::Sensor;
 use photonmill::scene::geometry::Geometry;
@@ -21,7 +22,7 @@ use photonmill::scene::light::LightKind;
 use photonmill::scene::{Camera, Scene};
 use photonmill::settings::Builder;
 use photonmill::settings::scene::{Illumination, SceneSettings};
-use photonmill::settings::stop::{Stop, squared_radius};
+use photonmill::settings::stop::Stop;
 
 fn settings() -> SceneSettings {
     SceneSettings { photons: 8000, caustic_photons: 8000, rounds: 8, shadow_rays: 1, ..SceneSettings::default() }
@@ -169,7 +170,7 @@ fn radii_take_no_sum_over_earlier_rounds() {
             let found = squared_radius(alpha, round);
             assert!((found / squared - 1.0).abs() < 1e-9, "alpha {alpha}, round {round}: {found}, {squared}");
             sum += squared;
-            let mean = watch::mean_squared_radius(alpha, round + 1);
+            let mean = mean_squared_radius(alpha, round + 1);
             assert!((mean * f64::from(round + 1) / sum - 1.0).abs() < 1e-9, "alpha {alpha}, mean of {}", round + 1);
             squared *= (f64::from(round + 1) + alpha) / (f64::from(round + 1) + 1.0);
         }

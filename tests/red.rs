@@ -121,10 +121,10 @@ struct Fault {
     noticed_by: &'static [(Question, Kind)],
 }
 
-const FAULTS: [Fault; 65] = [
+const FAULTS: [Fault; 68] = [
     Fault {
         what: "what rounding takes from a pair of floats is forgotten",
-        file: "film/compensated.glsl",
+        file: "film/float_u64.glsl",
         from: "precise float rest = sum.y + (",
         to: "precise float rest = 0.0 * (",
         kernels: &["gather_brute_u64", "gather_grid_u64"],
@@ -156,26 +156,26 @@ const FAULTS: [Fault; 65] = [
     },
     Fault {
         what: "every other lane of a subgroup writes over its neighbour",
-        file: "builder/ballot.glsl",
+        file: "builder/place.glsl",
         from: "subgroupBallotExclusiveBitCount(survivors);",
         to: "(subgroupBallotExclusiveBitCount(survivors) & 0xfffffffeu);",
-        kernels: &["scene_trace_persistent", "trace_persistent", "scene_trace_ballot"],
+        kernels: &["trace_persistent_scene", "trace_persistent_room"],
         noticed_by: &[(Photons(Builder::Persistent), OtherPhotons), (Appends, OtherSums)],
     },
     Fault {
         what: "a subgroup's second paths write over its first ones'",
-        file: "builder/block.glsl",
+        file: "builder/ballot.glsl",
         from: "count + subgroupBallotExclusiveBitCount(survivors);",
         to: "subgroupBallotExclusiveBitCount(survivors);",
-        kernels: &["trace_ballot"],
+        kernels: &["trace_room_ballot"],
         noticed_by: &[(Photons(Builder::Ballot), OtherPhotons), (Builders, BuildersDisagree)],
     },
     Fault {
         what: "the path in the middle of an odd number is left out",
-        file: "builder/trace_compact.glsl",
+        file: "builder/compact.glsl",
         from: "(path_count + PLACES - 1) / PLACES",
         to: "path_count / PLACES",
-        kernels: &["trace_ballot"],
+        kernels: &["trace_room_ballot"],
         noticed_by: &[(Ledger(Builder::Ballot), LedgerOpen), (Photons(Builder::Ballot), PhotonsLost)],
     },
     Fault {
@@ -207,15 +207,15 @@ const FAULTS: [Fault; 65] = [
         file: "gather/bucket_rows.glsl",
         from: "range.reach * range.reach - dot(off, off);",
         to: "0.9 * range.reach * range.reach - dot(off, off);",
-        kernels: &["scene_gather_u64"],
+        kernels: &["gather_visible_points_u64"],
         noticed_by: &[(Bits("cornell"), OtherBits)],
     },
     Fault {
         what: "a lane is lost",
-        file: "builder/trace_compact.glsl",
-        from: "bool stored = alive[k] &&",
-        to: "bool stored = alive[k] && gl_SubgroupInvocationID != 5u &&",
-        kernels: &["trace_atomic"],
+        file: "builder/compact.glsl",
+        from: "bool fits = stored[k] &&",
+        to: "bool fits = stored[k] && gl_SubgroupInvocationID != 5u &&",
+        kernels: &["trace_room_atomic"],
         noticed_by: &[(Ledger(Builder::Atomic), LedgerOpen), (Photons(Builder::Atomic), OtherPhotons)],
     },
     Fault {
@@ -223,39 +223,39 @@ const FAULTS: [Fault; 65] = [
         file: "builder/group_prefix.glsl",
         from: "before += s < gl_SubgroupID",
         to: "before += s + 1 < gl_SubgroupID",
-        kernels: &["trace_group"],
+        kernels: &["trace_room_group"],
         noticed_by: &[(Photons(Builder::Group), OtherPhotons), (Builders, BuildersDisagree)],
     },
     Fault {
         what: "survivors of one work group are not counted",
-        file: "builder/trace_in_place.glsl",
+        file: "builder/scan.glsl",
         from: "survivors[work_group_index()] = prefix.total;",
         to: "survivors[work_group_index()] = work_group_index() == 3u ? 0u : prefix.total;",
-        kernels: &["trace_in_place"],
+        kernels: &["trace_room_scan"],
         noticed_by: &[(Photons(Builder::Scan), PhotonsLost), (Ledger(Builder::Scan), LedgerOpen)],
     },
     Fault {
         what: "an invocation that took a photon starts it at the bounce at which the last one ended",
-        file: "builder/trace_persistent.glsl",
-        from: "            bounce = 0;\n",
+        file: "builder/persistent.glsl",
+        from: "            bounce = first_bounce();\n",
         to: "",
-        kernels: &["trace_persistent"],
+        kernels: &["trace_persistent_room"],
         noticed_by: &[(Photons(Builder::Persistent), PhotonsLost)],
     },
     Fault {
         what: "a photon's last bounce is not counted",
-        file: "builder/trace_persistent.glsl",
+        file: "builder/persistent.glsl",
         from: "if (under_way) {\n            count_fate(",
-        to: "if (under_way && !bounced.escaped) {\n            count_fate(",
-        kernels: &["trace_persistent"],
+        to: "if (under_way && !taken.escaped) {\n            count_fate(",
+        kernels: &["trace_persistent_room"],
         noticed_by: &[(Ledger(Builder::Persistent), LedgerOpen)],
     },
     Fault {
         what: "a survivor's path is forgotten",
-        file: "builder/trace_slots.glsl",
+        file: "builder/slots.glsl",
         from: "store_path(index, path);",
         to: "if (index % 10u != 7u) store_path(index, path);",
-        kernels: &["trace_slots"],
+        kernels: &["trace_room_slots"],
         noticed_by: &[(Ledger(Builder::Naive), LedgerOpen), (Photons(Builder::Naive), OtherPhotons)],
     },
     Fault {
@@ -268,26 +268,50 @@ const FAULTS: [Fault; 65] = [
     },
     Fault {
         what: "a photon in fifty is stored twice",
-        file: "builder/scene_trace.glsl",
-        from: "        store(place, traced.photon);",
-        to: "        store(place, traced.photon);\n        if (path.photon % 50u == 0u) store(atomicAdd(counters[0], 1), traced.photon);",
-        kernels: &["scene_trace_atomic"],
+        file: "builder/compact.glsl",
+        from: "            store_photon(photon_place, taken[k].photon);",
+        to: "            store_photon(photon_place, taken[k].photon);\n            if (path[k].photon % 50u == 0u) store_photon(atomicAdd(counters[0], 1), taken[k].photon);",
+        kernels: &["trace_scene_atomic"],
         noticed_by: &[(Appends, SumsTooLarge)],
     },
     Fault {
         what: "a photon that flies to its end begins with its second bounce's random numbers",
-        file: "builder/scene_trace_persistent.glsl",
-        from: "            flights = 0;",
-        to: "            flights = 1;",
-        kernels: &["scene_trace_persistent"],
+        file: "builder/persistent.glsl",
+        from: "bounce = first_bounce();",
+        to: "bounce = first_bounce() + 1;",
+        kernels: &["trace_persistent_scene"],
         noticed_by: &[(Appends, OtherSums)],
+    },
+    Fault {
+        what: "a slot of a scene in which nothing landed is taken for a photon",
+        file: "kernels/map_count.comp",
+        from: "is_there = place.w != NONE;",
+        to: "is_there = true;",
+        kernels: &["map_count"],
+        noticed_by: &[(Appends, OtherSums)],
+    },
+    Fault {
+        what: "a scene's photon of a later bounce takes the slot of an earlier one",
+        file: "world/scene/bounce.glsl",
+        from: "push.list * photon_count + index",
+        to: "(push.list % 2u) * photon_count + index",
+        kernels: &["trace_scene_slots"],
+        noticed_by: &[(Appends, OtherSums)],
+    },
+    Fault {
+        what: "a scene's photons in order overwrite those of the bounce before",
+        file: "builder/scan.glsl",
+        from: "survivors[group_count()] = counters[0];",
+        to: "survivors[group_count()] = 0;",
+        kernels: &["trace_scene_scan"],
+        noticed_by: &[(Appends, SumsTooSmall)],
     },
     Fault {
         what: "a point that others help keeps its first slice twice",
         file: "gather/visible_points.glsl",
         from: "slice_begin = slice * GATHER_SLICE",
         to: "slice_begin = gl_WorkGroupID.y * GATHER_SLICE",
-        kernels: &["scene_gather_u64", "scene_gather_two_words"],
+        kernels: &["gather_visible_points_u64", "gather_visible_points_two_words"],
         noticed_by: &[(Crowds, OtherSums)],
     },
     Fault {
@@ -300,10 +324,10 @@ const FAULTS: [Fault; 65] = [
     },
     Fault {
         what: "survivors in order overwrite those of the bounce before",
-        file: "builder/keep_order.glsl",
-        from: "uint place = counters[0] + path_place;",
-        to: "uint place = path_place;",
-        kernels: &["keep_order"],
+        file: "builder/scan_move.glsl",
+        from: "photon_place = counters[0] + path_place;",
+        to: "photon_place = path_place;",
+        kernels: &["scan_move_room"],
         noticed_by: &[(Photons(Builder::Scan), OtherPhotons)],
     },
     Fault {
@@ -311,7 +335,7 @@ const FAULTS: [Fault; 65] = [
         file: "world/room/photon.glsl",
         from: " | photon.wall << 31",
         to: "",
-        kernels: &["trace_atomic"],
+        kernels: &["trace_room_atomic"],
         noticed_by: &[(Photons(Builder::Atomic), OtherPhotons)],
     },
     Fault {
@@ -351,7 +375,7 @@ const FAULTS: [Fault; 65] = [
         file: "gather/visible_points.glsl",
         from: "distance_squared <= push.radius * push.radius &&",
         to: "distance_squared <= 0.9801 * push.radius * push.radius &&",
-        kernels: &["scene_gather_u64", "scene_gather_two_words"],
+        kernels: &["gather_visible_points_u64", "gather_visible_points_two_words"],
         noticed_by: &[(ClosedForm("furnace, Photons, Ballot: irradiance"), TooDark)],
     },
     Fault {
@@ -370,7 +394,7 @@ const FAULTS: [Fault; 65] = [
         file: "rng/sampling.glsl",
         from: "direction_at(sqrt(u), 1.0 - u, azimuth)",
         to: "direction_at(sqrt(sqrt(u)), 1.0 - sqrt(u), azimuth)",
-        kernels: &["scene_trace_persistent", "trace_ballot", "scene_emit", "scene_trace_ballot"],
+        kernels: &["trace_persistent_scene", "trace_room_ballot", "emit_scene", "trace_scene_ballot"],
         noticed_by: &[
             (ClosedForm("open box, ballot builder, uniform lights: hits stored per photon"), TooDark),
             (ClosedForm("disc light, photons: irradiance"), TooBright),
@@ -464,7 +488,7 @@ const FAULTS: [Fault; 65] = [
         file: "world/scene/bvh.glsl",
         from: "precise vec3 start = position + way;",
         to: "precise vec3 start = position + 1e-3 * normal * (dot(direction, normal) < 0.0 ? -1.0 : 1.0);",
-        kernels: &["scene_trace_persistent", "scene_emit", "scene_trace_ballot", "scene_trace_atomic", "receive", "view"],
+        kernels: &["trace_persistent_scene", "emit_scene", "trace_scene_ballot", "trace_scene_atomic", "receive", "view"],
         noticed_by: &[(LampInBox(Illumination::Photons), Leak)],
     },
     Fault {
@@ -496,15 +520,15 @@ const FAULTS: [Fault; 65] = [
         file: "world/scene/step.glsl",
         from: "surface.ng, scatter.direction);",
         to: "surface.ng, scatter.direction);\n            if (u.z < 0.002) start.y = uintBitsToFloat(0x7fc00000u);",
-        kernels: &["scene_trace_persistent", "scene_trace_ballot"],
+        kernels: &["trace_persistent_scene", "trace_scene_ballot"],
         noticed_by: &[(Finite, NoNumber)],
     },
     Fault {
         what: "a photon in 500 carries no number into the map",
-        file: "builder/scene_trace.glsl",
-        from: "store(place, traced.photon);",
-        to: "if (path.photon % 500u == 7u) traced.photon.flux.y = uintBitsToFloat(0x7fc00000u);\n        store(place, traced.photon);",
-        kernels: &["scene_trace_ballot"],
+        file: "builder/compact.glsl",
+        from: "store_photon(photon_place, taken[k].photon);",
+        to: "if (path[k].photon % 500u == 7u) taken[k].photon.flux.y = uintBitsToFloat(0x7fc00000u);\n            store_photon(photon_place, taken[k].photon);",
+        kernels: &["trace_scene_ballot"],
         noticed_by: &[(Finite, NoNumber)],
     },
     Fault {
@@ -528,7 +552,7 @@ const FAULTS: [Fault; 65] = [
         file: "world/room/step.glsl",
         from: "path.wall = hit.wall;",
         to: "path.wall = hit.wall;\n        if (u.x < 0.002) path.direction.y = uintBitsToFloat(0x7fc00000u);",
-        kernels: &["trace_atomic"],
+        kernels: &["trace_room_atomic"],
         noticed_by: &[(FiniteBox, NoNumber)],
     },
     Fault {
@@ -536,7 +560,7 @@ const FAULTS: [Fault; 65] = [
         file: "world/scene/bvh.glsl",
         from: "return mix(intBitsToFloat(bits + away), start, equal(start, vec3(0.0)));",
         to: "return start;",
-        kernels: &["scene_trace_persistent", "scene_emit", "scene_trace_ballot", "view"],
+        kernels: &["trace_persistent_scene", "emit_scene", "trace_scene_ballot", "view"],
         // The error alone is 16 times what the rounding of the start may take from it: no answer is wrong for it.
         noticed_by: &[(Bits("cornell"), OtherBits)],
     },
@@ -545,7 +569,7 @@ const FAULTS: [Fault; 65] = [
         file: "world/scene/bvh.glsl",
         from: "height * height > 0.0625 * error * error * dot(normal, normal) && ",
         to: "",
-        kernels: &["scene_trace_persistent", "scene_trace_ballot"],
+        kernels: &["trace_persistent_scene", "trace_scene_ballot"],
         noticed_by: &[(PatchInPlane, PhotonsAdded)],
     },
     Fault {
@@ -569,7 +593,7 @@ const FAULTS: [Fault; 65] = [
         file: "gather/belongs.glsl",
         from: "+ HEIGHT_ERROR;",
         to: "+ radius * (1.0 / 16.0);",
-        kernels: &["scene_gather_u64", "scene_gather_two_words"],
+        kernels: &["gather_visible_points_u64", "gather_visible_points_two_words"],
         noticed_by: &[(Shelf, Leak)],
     },
     Fault {
@@ -577,7 +601,7 @@ const FAULTS: [Fault; 65] = [
         file: "gather/belongs.glsl",
         from: "MIN_NORMAL_COSINE = 0.75",
         to: "MIN_NORMAL_COSINE = 0.2",
-        kernels: &["scene_gather_u64", "scene_gather_two_words", "flux_to_radiance"],
+        kernels: &["gather_visible_points_u64", "gather_visible_points_two_words", "flux_to_radiance"],
         noticed_by: &[(Ridge, TooDark)],
     },
     Fault {
@@ -585,7 +609,7 @@ const FAULTS: [Fault; 65] = [
         file: "material/lobes.glsl",
         from: SHADING_GAIN,
         to: "return 1.0;",
-        kernels: &["scene_gather_u64", "scene_gather_two_words"],
+        kernels: &["gather_visible_points_u64", "gather_visible_points_two_words"],
         noticed_by: &[(LeaningPlane(Illumination::Photons), TooBright)],
     },
     Fault {
@@ -593,7 +617,7 @@ const FAULTS: [Fault; 65] = [
         file: "material/lobes.glsl",
         from: SHADING_GAIN,
         to: "return 1.0;",
-        kernels: &["scene_trace_persistent", "scene_trace_ballot"],
+        kernels: &["trace_persistent_scene", "trace_scene_ballot"],
         noticed_by: &[(LeaningScatterer, TooBright)],
     },
     Fault {
@@ -636,7 +660,7 @@ const FAULTS: [Fault; 65] = [
         file: "world/scene/aim.glsl",
         from: "k == chosen || versine_between(emission.direction, other.axis) <= other.versine",
         to: "k == chosen",
-        kernels: &["scene_trace_persistent", "scene_emit"],
+        kernels: &["trace_persistent_scene", "emit_scene"],
         noticed_by: &[(AimedLight("overlapping cones"), TooBright)],
     },
     Fault {
@@ -644,7 +668,7 @@ const FAULTS: [Fault; 65] = [
         file: "world/scene/aim.glsl",
         from: "k == chosen || dot(off, off) <= radius * radius",
         to: "k == chosen",
-        kernels: &["scene_trace_persistent", "scene_emit"],
+        kernels: &["trace_persistent_scene", "emit_scene"],
         noticed_by: &[(AimedLight("overlapping discs"), TooBright)],
     },
     Fault {
@@ -652,7 +676,7 @@ const FAULTS: [Fault; 65] = [
         file: "world/scene/aim.glsl",
         from: "return max(cosine, 0.0) * 0.31830988618379067;",
         to: "return cosine > 0.0 ? 0.31830988618379067 : 0.0;",
-        kernels: &["scene_trace_persistent", "scene_emit"],
+        kernels: &["trace_persistent_scene", "emit_scene"],
         noticed_by: &[(AimedLight("cosine disc"), TooBright), (AimedLight("two-sided triangles"), TooBright)],
     },
 ];
@@ -712,7 +736,7 @@ fn ask(gpu: &Gpu, question: Question) -> Check<Complaint> {
         Builders => {
             let request =
                 compaction::Request { survivals: vec![0.75], bounces: 4, turns: 1, ..compaction::Request::up_to(1 << 12, FOREVER) };
-            compaction::measure(gpu, &request, &AtomicBool::new(false), &mut |_| {}).map(|_| ()).map_err(|error| match error {
+            compaction::measure(gpu, &request, None, &AtomicBool::new(false), &mut |_| {}).map(|_| ()).map_err(|error| match error {
                 Error::Miscalculated { what, .. } => Complaint::new(BuildersDisagree, what),
                 error => error.into(),
             })

@@ -223,7 +223,7 @@ fn transport_settings_are_accepted_exactly_within_their_ranges() {
         let is_radius = |radius: Option<f64>| radius.is_none_or(|radius| radius > 0.0 && radius <= f64::MAX);
         let both = settings.with.iter().find(|effect| settings.without.contains(effect));
         let builder = settings.builder;
-        let is_for_scenes = |builder| matches!(builder, Builder::Atomic | Builder::Ballot | Builder::Persistent);
+        let is_for_scenes = |builder| builder != Builder::Cpu;
         vec![
             rule("--photons", settings.photons, (1..=1 << 31).contains(&settings.photons)),
             rule("--caustic-photons", settings.caustic_photons, (1..=1 << 31).contains(&settings.caustic_photons)),

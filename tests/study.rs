@@ -165,8 +165,8 @@ fn the_open_box_is_studied_against_radiosity_and_goes_on_where_it_ended() {
         // Of photons that all go on with the same chance: s + s^2 + ... of them are stored.
         let s = f64::from(cell.survival);
         let expected = f64::from(cell.photons) * s * (1.0 - s.powi(15)) / (1.0 - s);
-        let z = (cell.stored as f64 - expected) / (f64::from(cell.photons) * 10.0 * s).sqrt();
-        assert!(z.abs() < 5.0, "{} stored of {expected}", cell.stored);
+        let z = (cell.survivors as f64 - expected) / (f64::from(cell.photons) * 10.0 * s).sqrt();
+        assert!(z.abs() < 5.0, "{} stored of {expected}", cell.survivors);
         assert!(cell.builders.is_sorted_by(|a, b| a.ms.median <= b.ms.median) && cell.gain() >= 1.0);
     }
 

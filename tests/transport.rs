@@ -61,8 +61,8 @@ pub fn appends_agree(gpu: &Gpu, scene: &Scene, settings: &SceneSettings) -> Chec
         run(gpu, &View { geometry: &geometry, camera: Some(&camera), phases: &[] }, plan)
     };
     let ballot = of(Builder::Ballot);
-    same_film("atomic builder", &of(Builder::Atomic), &ballot)?;
-    same_film("persistent photons", &of(Builder::Persistent), &ballot)
+    let others = Builder::ON_GPU.into_iter().filter(|builder| *builder != Builder::Ballot);
+    others.map(|builder| same_film(builder.name(), &of(builder), &ballot)).collect()
 }
 
 #[test]

@@ -1,14 +1,26 @@
-// The modified store with one atomic a subgroup instead of one a thread: a ballot finds the
-// survivors, an exclusive bit count their order, and a broadcast tells them where the subgroup's
-// block begins.
+// One atomic a subgroup instead of one a thread: ballots find the survivors, exclusive bit counts their order, and a broadcast
+// tells them where the subgroup's block begins.
 
-uint take_place(uint counter, bool wanted)
+const uint PLACES = PATHS_EACH;
+
+uint[PLACES] take_places(uint counter, bool[PLACES] wanted)
 {
-    uvec4 survivors = subgroupBallot(wanted);
-    uint survivor_count = subgroupBallotBitCount(survivors);
-    uint base = 0;
-    if (survivor_count != 0 && subgroupElect()) {
-        base = atomicAdd(counters[counter], survivor_count);
+    uint[PLACES] places;
+    uint count = 0;
+    for (uint k = 0; k < PLACES; k++) {
+        uvec4 survivors = subgroupBallot(wanted[k]);
+        places[k] = count + subgroupBallotExclusiveBitCount(survivors);
+        count += subgroupBallotBitCount(survivors);
     }
-    return subgroupBroadcastFirst(base) + subgroupBallotExclusiveBitCount(survivors);
+    uint base = 0;
+    if (count != 0 && subgroupElect()) {
+        base = atomicAdd(counters[counter], count);
+    }
+    base = subgroupBroadcastFirst(base);
+    for (uint k = 0; k < PLACES; k++) {
+        places[k] += base;
+    }
+    return places;
 }
+
+#include "builder/compact.glsl"

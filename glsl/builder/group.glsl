@@ -1,5 +1,9 @@
-// The modified store with one atomic a work group: a prefix sum over the group finds each survivor's place in the
+// One atomic a work group: a prefix sum over the group finds each survivor's place in the
 // group's block.
+
+const uint PLACES = PATHS_EACH;
+
+#include "builder/group_prefix.glsl"
 
 shared uint group_base;
 
@@ -15,3 +19,5 @@ uint[PLACES] take_places(uint counter, bool[PLACES] wanted)
     }
     return prefix.before;
 }
+
+#include "builder/compact.glsl"

@@ -33,3 +33,9 @@ GroupPrefix prefix_in_group(bool[PLACES] wanted)
     }
     return prefix;
 }
+
+// Work groups of as many paths as there may be.
+uint group_count()
+{
+    return (push.path_capacity + gl_WorkGroupSize.x - 1) / gl_WorkGroupSize.x;
+}

@@ -13,7 +13,7 @@ layout(set = 1, binding = 0, scalar) buffer Counters { uint counters[]; };
 layout(set = 1, binding = 1, scalar) writeonly buffer Sums { uint sums[]; };
 
 #include "dispatch/dispatch.glsl"
-#include "builder/ballot.glsl"
+#include "builder/place.glsl"
 
 void main()
 {

@@ -1,5 +1,7 @@
 // The paper's rendering pass: every point steps through the photon list, empty slots and all.
 
+#include "gather/estimate.glsl"
+
 layout(set = 1, binding = 1, scalar) readonly buffer Photons { uvec4 photons[]; };
 layout(set = 1, binding = 2, scalar) readonly buffer Counters { uint counters[]; };
 

@@ -2,6 +2,10 @@
 // invocations share a point and step through its candidates together, so that their reads are one. Where loops must
 // end early, candidates are shared out in slices of GATHER_SLICE too.
 
+#include "index/grid.glsl"
+#include "gather/grid_rows.glsl"
+#include "gather/estimate.glsl"
+
 layout(set = 1, binding = 2, scalar) readonly buffer SortedPhotons { uvec4 sorted_photons[]; };
 
 layout(constant_id = 38) const uint LANES = 1;

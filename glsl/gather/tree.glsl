@@ -1,6 +1,10 @@
 // Density estimation over the kd-tree: each point tests the photons of the leaves in reach. A wall's leaves are
 // shared out in slices of GATHER_SLICE photons, so that no invocation loops long.
 
+#include "index/tree.glsl"
+#include "gather/tree_walk.glsl"
+#include "gather/estimate.glsl"
+
 const uint SLICE_LEAVES = GATHER_SLICE / TREE_LEAF;
 
 // Whether the planes above the node of a slice leave it within reach.

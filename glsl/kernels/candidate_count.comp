@@ -10,7 +10,7 @@
 
 layout(local_size_x_id = 0) in;
 layout(push_constant, scalar) uniform Push { GatherPush push; };
-layout(set = 0, binding = 0, scalar) readonly buffer Points { Point points[]; };
+layout(set = 0, binding = 3, scalar) readonly buffer Points { Point points[]; };
 layout(set = 1, binding = 0, scalar) buffer Longest { uint longest[]; };
 
 #include "dispatch/dispatch.glsl"

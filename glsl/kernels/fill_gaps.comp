@@ -14,6 +14,12 @@ layout(set = 1, binding = 2, scalar) writeonly buffer NextPaths { uvec4 next_pat
 
 #include "world/room/photon.glsl"
 #include "world/room/path.glsl"
+
+uint lists_end()
+{
+    return push.bounces + 2;
+}
+
 #include "builder/striped_counters.glsl"
 
 void main()

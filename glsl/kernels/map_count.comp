@@ -15,13 +15,23 @@ layout(set = 1, binding = 1, scalar) readonly buffer Counters { uint counters[];
 layout(set = 1, binding = 2, scalar) buffer Cells { uint cells[]; };
 layout(set = 1, binding = 3, scalar) writeonly buffer Ranks { uint ranks[]; };
 
+layout(constant_id = 5) const bool HAS_SLOTS = false;
+
 #include "dispatch/dispatch.glsl"
 #include "index/buckets.glsl"
 
 void main()
 {
     uint index = invocation_index();
-    if (index < min(counters[0], push.photon_capacity)) {
-        ranks[index] = atomicAdd(cells[bucket_of(cell_at(uintBitsToFloat(map[2 * index].xyz), push), push)], 1);
+    if (index >= min(counters[0], push.photon_capacity)) {
+        return;
+    }
+    uvec4 place = map[2 * index];
+    bool is_there = true;
+    if (HAS_SLOTS) {
+        is_there = place.w != NONE;
+    }
+    if (is_there) {
+        ranks[index] = atomicAdd(cells[bucket_of(cell_at(uintBitsToFloat(place.xyz), push), push)], 1);
     }
 }

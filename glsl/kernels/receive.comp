@@ -11,7 +11,7 @@
 
 layout(local_size_x_id = 0) in;
 layout(push_constant, scalar) uniform Push { ReceivePush push; };
-layout(set = 0, binding = 8, scalar) readonly buffer Receivers { Receiver receivers[]; };
+layout(set = 1, binding = 12, scalar) readonly buffer Receivers { Receiver receivers[]; };
 
 #include "math/math.glsl"
 #include "ledger/nonfinite_values.glsl"

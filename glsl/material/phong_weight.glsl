@@ -1,6 +1,5 @@
 // The paper's Phong weight (section 4.4), fixed when the photon is stored. Twin of src/cpu/bsdf.rs.
 
-layout(constant_id = 3) const bool HAS_PHONG = false;
 layout(constant_id = 4) const uint PHONG_DIRECTION = PHONG_MIRROR;
 
 #include "material/phong_lobe.glsl"

@@ -14,6 +14,7 @@ use crate::gpu::Gpu;
 use crate::measure::bench::experiment::Experiment;
 use crate::measure::bench::{self, Request, Size, table};
 use crate::output::destination::{Destination, Folder, check_distinct, write_all};
+use crate::scene::Scene;
 
 #[derive(Args)]
 pub(super) struct BenchArgs {
@@ -32,6 +33,9 @@ pub(super) struct BenchArgs {
     /// Size of the experiments [default: full on a GPU, small on a CPU]
     #[arg(long, alias = "size", value_enum, value_name = "SIZE", help_heading = "Measurements")]
     workload: Option<WorkloadArg>,
+    /// Scene in which `compaction` compares the builders, beside the paper's box: a built-in scene or a glTF file
+    #[arg(long, value_name = "SCENE", default_value = "cornell-spheres", help_heading = "Measurements")]
+    scene: String,
     /// Measure time and memory against the number of photons and of triangles instead
     #[arg(long, conflicts_with = "only", help_heading = "Measurements")]
     scale: bool,
@@ -65,6 +69,7 @@ pub(super) fn run(args: &BenchArgs, cancelled: &AtomicBool) -> Result<End> {
     let in_folder = folder.iter().map(|folder| folder.file("bench.json"));
     check_distinct(&json.iter().cloned().chain(in_folder).collect::<Vec<_>>())?;
     let reporter = ProgressReporter::new(&args.progress);
+    let scene = Scene::open(&args.scene, false)?;
     let gpu = Gpu::open(&args.device.steady())?;
     reporter.device(Some(&gpu));
     let usual = if gpu.facts().kind == "cpu" { WorkloadArg::Small } else { WorkloadArg::Full };
@@ -75,6 +80,7 @@ pub(super) fn run(args: &BenchArgs, cancelled: &AtomicBool) -> Result<End> {
             WorkloadArg::Full => Size::Full,
         },
         experiments: if args.only.is_empty() { Experiment::ALL.to_vec() } else { args.only.clone() },
+        scene,
         scale: args.scale,
         budget: Duration::from_secs_f64(args.time),
     };

@@ -12,7 +12,8 @@ use crate::gpu::Gpu;
 use crate::output::destination::write_all;
 use crate::output::light_report;
 use crate::plan::Limits;
-use crate::plan::scene::{RadiusFrom, ScenePlan};
+use crate::plan::radius::RadiusFrom;
+use crate::plan::scene::ScenePlan;
 use crate::settings::scene::{Part, SceneSettings};
 use crate::text::counted;
 

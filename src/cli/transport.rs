@@ -14,12 +14,12 @@ use super::{DeviceArgs, JsonArg, TimingArgs, complain, help, optional_file};
 use crate::engine::Control;
 use crate::engine::Progress;
 use crate::engine::scene::{self, RunResult, View};
-use crate::engine::watch::mean_squared_radius;
 use crate::error::{Error, Result};
 use crate::gpu::Gpu;
 use crate::output::destination::Destination;
 use crate::output::light_report;
 use crate::output::trace_file;
+use crate::plan::radius::mean_squared_radius;
 use crate::plan::scene::ScenePlan;
 use crate::plan::sensor::Sensor;
 use crate::records::Receiver;
@@ -160,12 +160,18 @@ value_enum!(IlluminationArg => Illumination {
 
 #[derive(Clone, Copy, ValueEnum)]
 enum BuilderArg {
-    /// Persistent; ballot with --math strict
+    /// Persistent; ballot with --math strict, and where the device fails the check of what persistent needs
     Auto,
+    /// Bounce by bounce, one slot per photon and bounce, empty slots included
+    Naive,
     /// Bounce by bounce, one atomic per photon
     Atomic,
     /// Bounce by bounce, one atomic per subgroup
     Ballot,
+    /// Bounce by bounce, one atomic per work group
+    Group,
+    /// Bounce by bounce, photons in their original order, by prefix sums
+    Scan,
     /// One invocation traces each photon from emission to its end
     Persistent,
 }
@@ -175,8 +181,11 @@ impl BuilderArg {
     fn builder(self) -> Option<Builder> {
         match self {
             BuilderArg::Auto => None,
+            BuilderArg::Naive => Some(Builder::Naive),
             BuilderArg::Atomic => Some(Builder::Atomic),
             BuilderArg::Ballot => Some(Builder::Ballot),
+            BuilderArg::Group => Some(Builder::Group),
+            BuilderArg::Scan => Some(Builder::Scan),
             BuilderArg::Persistent => Some(Builder::Persistent),
         }
     }

@@ -4,6 +4,7 @@
 pub mod bias;
 pub mod choose_builder;
 pub mod nonfinite_values;
+pub mod planned;
 pub mod prefix_sum;
 pub mod room;
 pub mod scene;
@@ -29,5 +30,6 @@ pub fn limits(facts: &DeviceFacts) -> Limits {
         busy_invocations: Limits::busy_invocations_of(facts.kind),
         lanes: Limits::lanes_of(facts.kind),
         counters: Limits::counters_of(facts.kind),
+        votes_in_loops: facts.votes_in_loops,
     }
 }

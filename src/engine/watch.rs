@@ -8,7 +8,8 @@ use statrs::distribution::{ContinuousCDF, StudentsT};
 
 use crate::error::{Error, Result};
 use crate::ledger::Ledger;
-use crate::settings::stop::{Stop, squared_radius};
+use crate::plan::radius::mean_squared_radius;
+use crate::settings::stop::Stop;
 use std::sync::atomic::AtomicBool;
 
 /// How a caller watches a run and ends it early.
@@ -187,18 +188,6 @@ impl Watch {
         }
         more
     }
-}
-
-/// Mean over rounds of the squared radius, relative to the first one's: r_(i+1)^2 = r_i^2 (i + alpha) / (i + 1)
-/// (Knaus and Zwicker 2011).
-pub fn mean_squared_radius(alpha: f64, rounds: u32) -> f64 {
-    if alpha == 1.0 || rounds <= 1 {
-        return 1.0;
-    }
-    // Terms Gamma(k + alpha) / Gamma(k + 1), k from 1, have the sum (Gamma(n + 1 + alpha) / n! - Gamma(1 + alpha)) / alpha.
-    let rounds = rounds.max(1);
-    let next = squared_radius(alpha, rounds) * (f64::from(rounds) + 1.0);
-    (next - 1.0) / (alpha * f64::from(rounds))
 }
 
 /// The relative error that the mean of so many rounds has not more of, with this confidence: Student's quantile times

@@ -6,11 +6,11 @@ use std::time::Instant;
 
 use glam::Vec2;
 
-use super::kernels::{CheckMath, CheckSampling, CheckTwoWords, CheckU64};
+use super::kernels::{CheckMath, CheckSampling, StartUpTwoWords, StartUpU64};
 use super::{Commands, Constants, Extent, Gpu, Memory};
-use crate::constants::LOOP_LIMIT;
+use crate::constants::{LOOP_LIMIT, TALLY_COPIES};
 use crate::error::{Error, Result};
-use crate::records::{CheckPush, MathResults, Samples, SamplingCase};
+use crate::records::{CheckPush, MathResults, Samples, SamplingCase, Tally};
 
 /// What the check found beyond passing.
 #[derive(Debug, Clone, Copy, PartialEq, Eq)]
@@ -19,10 +19,18 @@ pub struct LoopCount {
     pub done: u32,
 }
 
-/// Fails unless the device counts, votes and adds right.
-pub(super) fn run(gpu: &Gpu) -> Result<()> {
+/// Fails unless the device counts, votes and adds right. Says whether lanes vote right in a loop that they come to on different
+/// ways: no version of Vulkan promises that, and only the persistent builder needs it.
+pub(super) fn run(gpu: &Gpu) -> Result<bool> {
     let wrong = |what: String| Error::DeviceWrong { device: gpu.facts.name.clone(), what };
-    let push = CheckPush { iteration_count: LOOP_LIMIT, addend_low: 0xC000_0001, addend_high: 3, add_count: 5 };
+    let push = CheckPush {
+        iteration_count: LOOP_LIMIT,
+        addend_low: 0xC000_0001,
+        addend_high: 3,
+        add_count: 5,
+        photon_count: PHOTONS,
+        stride: GROUP_SIZE,
+    };
     let answers = ask(gpu, &push)?;
 
     let expected_chain = (0..LOOP_LIMIT).fold(1u32, |chain, _| chain.wrapping_mul(1_664_525).wrapping_add(1_013_904_223));
@@ -45,12 +53,21 @@ pub(super) fn run(gpu: &Gpu) -> Result<()> {
     if answers.film_sum != expected_sum {
         return Err(wrong(format!("64-bit sums gave {} instead of {expected_sum}", answers.film_sum)));
     }
-    Ok(())
+    Ok(answers.entries == expected_entries())
+}
+
+/// Photons of the loop in which lanes vote: several an invocation.
+const PHOTONS: u32 = 5 * GROUP_SIZE - 3;
+
+/// The map that the photons of `glsl/check/photons.glsl` leave, sorted.
+fn expected_entries() -> Vec<u32> {
+    let bounces = |photon: u32| (photon.wrapping_mul(747_796_405).wrapping_add(2_891_336_453) >> 16) % 11;
+    (0..PHOTONS).flat_map(|photon| (0..=bounces(photon)).step_by(2).map(move |bounce| 16 * photon + bounce)).collect()
 }
 
 /// How far a loop of `wanted` iterations really gets.
 pub fn loop_count(gpu: &Gpu, wanted: u32) -> Result<LoopCount> {
-    let push = CheckPush { iteration_count: wanted, addend_low: 0, addend_high: 0, add_count: 0 };
+    let push = CheckPush { iteration_count: wanted, addend_low: 0, addend_high: 0, add_count: 0, photon_count: 0, stride: 0 };
     Ok(LoopCount { wanted, done: ask(gpu, &push)?.iterations })
 }
 
@@ -109,21 +126,32 @@ struct Answers {
     order_sum: u32,
     subgroups: u32,
     film_sum: u64,
+    /// Of the photon map, sorted.
+    entries: Vec<u32>,
 }
 
 fn ask(gpu: &Gpu, push: &CheckPush) -> Result<Answers> {
     let mut commands = Commands::new(gpu, Constants::new(GROUP_SIZE), Instant::now())?;
     let answers = gpu.buffer::<u32>("check answers", 5, Memory::Device)?;
     let film = gpu.buffer::<u64>("check film", 1, Memory::Device)?;
-    commands.fill(&answers, 0, 5, 0);
-    commands.fill(&film, 0, 2, 0);
+    commands.clear(&answers);
+    commands.clear(&film);
+    let entries = gpu.buffer::<u32>("check entries", 16 * u64::from(push.photon_count), Memory::Device)?;
+    let counters = gpu.buffer::<u32>("check counters", 1, Memory::Device)?;
+    let tallies = gpu.buffer::<Tally>("check tallies", u64::from(TALLY_COPIES), Memory::Device)?;
+    commands.clear(&counters);
     if gpu.facts.int64_atomics {
-        commands.dispatch(CheckU64 { film: &film, answers: &answers }, push, Extent::Groups(1, 1))?;
+        let kernel = StartUpU64 { film: &film, answers: &answers, entries: &entries, counters: &counters, tallies: &tallies };
+        commands.dispatch(kernel, push, Extent::Groups(1, 1))?;
     } else {
-        commands.dispatch(CheckTwoWords { film: &film, answers: &answers }, push, Extent::Groups(1, 1))?;
+        let kernel = StartUpTwoWords { film: &film, answers: &answers, entries: &entries, counters: &counters, tallies: &tallies };
+        commands.dispatch(kernel, push, Extent::Groups(1, 1))?;
     }
-    let words = commands.read::<u32>(&answers, 5)?;
-    let film_sum = commands.read::<u64>(&film, 1)?[0];
+    let words = commands.read(&answers, 5)?;
+    let film_sum = commands.read(&film, 1)?[0];
     let [iterations, chain, survivors, order_sum, subgroups] = words[..] else { unreachable!("five words were read") };
-    Ok(Answers { iterations, chain, survivors, order_sum, subgroups, film_sum })
+    let stored = commands.read::<u32>(&counters, 1)?[0].min(16 * push.photon_count);
+    let mut entries = commands.read::<u32>(&entries, stored as usize)?;
+    entries.sort_unstable();
+    Ok(Answers { iterations, chain, survivors, order_sum, subgroups, film_sum, entries })
 }

@@ -34,12 +34,27 @@ pub struct DeviceFacts {
     /// Nanoseconds a timestamp tick.
     pub timestamp_period_ns: f32,
     pub int64_atomics: bool,
+    /// What brings the lanes of a subgroup together again after they went different ways.
+    pub reconvergence: Reconvergence,
+    /// Lanes vote right in a loop that they come to on different ways, as the start-up check found; false before it.
+    pub votes_in_loops: bool,
     /// What the device lacks of what every kernel needs; empty if it can be used.
     pub lacks: Vec<String>,
     #[serde(skip)]
     pub(super) queue_family: u32,
     #[serde(skip)]
     pub(super) pipeline_cache_id: String,
+}
+
+/// What a device promises about lanes that went different ways.
+#[derive(Debug, Clone, Copy, PartialEq, Eq, Serialize)]
+#[serde(rename_all = "kebab-case")]
+pub enum Reconvergence {
+    /// VK_KHR_shader_maximal_reconvergence: they come together as the source reads.
+    Maximal,
+    /// VK_KHR_shader_subgroup_uniform_control_flow: they do where all of them went in together.
+    UniformControlFlow,
+    None,
 }
 
 impl DeviceFacts {
@@ -144,15 +159,25 @@ fn facts(instance: &ash::Instance, device: vk::PhysicalDevice, index: usize) -> 
     let mut v13 = vk::PhysicalDeviceVulkan13Properties::default();
     let mut f12 = vk::PhysicalDeviceVulkan12Features::default();
     let mut f13 = vk::PhysicalDeviceVulkan13Features::default();
+    let mut maximal = vk::PhysicalDeviceShaderMaximalReconvergenceFeaturesKHR::default();
+    let mut uniform = vk::PhysicalDeviceShaderSubgroupUniformControlFlowFeaturesKHR::default();
     // SAFETY: the device belongs to the instance; only a 1.3 device fills the 1.3 structs, and they
     // are chained only for one.
     let (properties, features, families, memory) = unsafe {
+        let extensions = instance.enumerate_device_extension_properties(device).unwrap_or_default();
+        let has = |name: &CStr| extensions.iter().any(|extension| extension.extension_name_as_c_str() == Ok(name));
         let version = instance.get_physical_device_properties(device).api_version;
         let mut properties = vk::PhysicalDeviceProperties2::default();
         let mut features = vk::PhysicalDeviceFeatures2::default();
         if version >= vk::API_VERSION_1_3 {
             properties = properties.push_next(&mut v11).push_next(&mut v12).push_next(&mut v13);
             features = features.push_next(&mut f12).push_next(&mut f13);
+            if has(ash::khr::shader_maximal_reconvergence::NAME) {
+                features = features.push_next(&mut maximal);
+            }
+            if has(ash::khr::shader_subgroup_uniform_control_flow::NAME) {
+                features = features.push_next(&mut uniform);
+            }
         }
         instance.get_physical_device_properties2(device, &mut properties);
         instance.get_physical_device_features2(device, &mut features);
@@ -225,6 +250,14 @@ fn facts(instance: &ash::Instance, device: vk::PhysicalDevice, index: usize) -> 
         timestamp_bits: queue_family.map_or(0, |family| families[family as usize].timestamp_valid_bits),
         timestamp_period_ns: limits.timestamp_period,
         int64_atomics: features.shader_int64 == vk::TRUE && f12.shader_buffer_int64_atomics == vk::TRUE,
+        reconvergence: if maximal.shader_maximal_reconvergence == vk::TRUE {
+            Reconvergence::Maximal
+        } else if uniform.shader_subgroup_uniform_control_flow == vk::TRUE {
+            Reconvergence::UniformControlFlow
+        } else {
+            Reconvergence::None
+        },
+        votes_in_loops: false,
         lacks,
         queue_family: queue_family.unwrap_or(0),
         pipeline_cache_id: properties.pipeline_cache_uuid.iter().map(|byte| format!("{byte:02x}")).collect(),
@@ -237,8 +270,24 @@ pub(super) fn create(instance: &ash::Instance, physical: vk::PhysicalDevice, fac
     let features = vk::PhysicalDeviceFeatures::default().shader_int64(facts.int64_atomics);
     let mut v12 = vk::PhysicalDeviceVulkan12Features::default().scalar_block_layout(true).shader_buffer_int64_atomics(facts.int64_atomics);
     let mut v13 = vk::PhysicalDeviceVulkan13Features::default().synchronization2(true).maintenance4(true);
-    let info =
-        vk::DeviceCreateInfo::default().queue_create_infos(&queues).enabled_features(&features).push_next(&mut v12).push_next(&mut v13);
+    let mut maximal = vk::PhysicalDeviceShaderMaximalReconvergenceFeaturesKHR::default().shader_maximal_reconvergence(true);
+    let mut uniform = vk::PhysicalDeviceShaderSubgroupUniformControlFlowFeaturesKHR::default().shader_subgroup_uniform_control_flow(true);
+    let extensions = match facts.reconvergence {
+        Reconvergence::Maximal => vec![ash::khr::shader_maximal_reconvergence::NAME.as_ptr()],
+        Reconvergence::UniformControlFlow => vec![ash::khr::shader_subgroup_uniform_control_flow::NAME.as_ptr()],
+        Reconvergence::None => Vec::new(),
+    };
+    let mut info = vk::DeviceCreateInfo::default()
+        .queue_create_infos(&queues)
+        .enabled_features(&features)
+        .enabled_extension_names(&extensions)
+        .push_next(&mut v12)
+        .push_next(&mut v13);
+    match facts.reconvergence {
+        Reconvergence::Maximal => info = info.push_next(&mut maximal),
+        Reconvergence::UniformControlFlow => info = info.push_next(&mut uniform),
+        Reconvergence::None => {}
+    }
     // SAFETY: all pointers in `info` are alive, and `facts` says that the features are there.
     unsafe {
         let device = call("vkCreateDevice", instance.create_device(physical, &info, None))?;

@@ -30,6 +30,8 @@ pub struct Limits {
     pub lanes: u32,
     /// Counters that serve more work groups than one does.
     pub counters: u32,
+    /// Lanes vote right in a loop that they come to on different ways, as those of the persistent builder do.
+    pub votes_in_loops: bool,
 }
 
 impl Limits {
@@ -44,7 +46,17 @@ impl Limits {
             loop_iterations: LOOP_LIMIT,
             lanes: 1,
             counters: 1,
+            votes_in_loops: true,
         }
+    }
+
+    /// Refuses a builder that the device cannot run.
+    pub fn check_builder(&self, builder: Builder) -> Result<()> {
+        if builder == Builder::Persistent && !self.votes_in_loops {
+            let why = "needs the lanes of a subgroup to vote together in a loop, which this device's start-up check found wrong; choose another builder, or auto";
+            return Err(Error::setting("--variant", builder.name(), why));
+        }
+        Ok(())
     }
 
     /// Pair tests a tenth of a second by kind of device: a slow one of its kind does 2^36 (discrete),

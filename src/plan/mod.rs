@@ -4,8 +4,10 @@
 pub mod capacity;
 pub mod effect;
 pub mod evidence;
+mod maps;
 pub mod memory;
 pub mod planning;
+pub mod radius;
 pub mod scene;
 pub mod sensor;
 
@@ -126,6 +128,7 @@ const MIN_FIXED_POINT: f64 = 512.0;
 impl RoomPlan {
     pub fn new(scene: &RoomScene, settings: &RoomSettings, limits: &Limits) -> Result<RoomPlan> {
         settings.validate()?;
+        limits.check_builder(settings.builder)?;
         let light_photons = deal(settings.photons, &scene.lights.iter().map(|light| light.power).collect::<Vec<_>>());
         let watts: Vec<f64> = scene.lights.iter().zip(&light_photons).map(|(light, count)| light.power / f64::from(*count)).collect();
         let strongest = watts.iter().fold(0.0, |a: f64, b| a.max(*b));

@@ -7,25 +7,13 @@ use serde::Serialize;
 
 use super::capacity::Persistence;
 use super::evidence::EffectDecision;
+use super::radius::{RADIUS_RANGE, RadiusFrom, squared_radius};
 use super::sensor::Sensor;
 use crate::constants::*;
 use crate::records::*;
 use crate::scene::geometry::Geometry;
 use crate::settings::Builder;
 use crate::settings::scene::{Effect, SceneSettings};
-use crate::settings::stop::squared_radius;
-
-/// Where the radius of a map's first round comes from.
-#[derive(Debug, Clone, Copy, PartialEq, Eq, Serialize)]
-#[serde(rename_all = "lowercase")]
-pub enum RadiusFrom {
-    /// `--radius`, `--caustic-radius`.
-    User,
-    /// Photons of a trial round around the points that are asked about (`scene::trial`).
-    Trial,
-    /// The area of the whole scene.
-    Area,
-}
 
 /// What a trial round found.
 #[derive(Debug, Clone, Default, PartialEq, Serialize)]
@@ -135,8 +123,6 @@ pub struct ScenePlan {
 
 /// Candidates of a point, roughly: what a lookup counts as work.
 pub const TESTS_PER_POINT: u64 = 256;
-/// Radii relative to the scene's normalised extent: from f32's resolution of positions up to all of it.
-pub const RADIUS_RANGE: (f64, f64) = (1.0 / 32_768.0, 2.0);
 /// Landings of each photon of a chunk that a map has room for.
 pub const SEGMENT_BOUNCES: u32 = 16;
 /// Flights of a photon, generously.
@@ -172,11 +158,12 @@ impl ScenePlan {
         self.global.iter().chain(&self.caustic)
     }
 
-    /// The same by a builder that stops after each flight; `bytes` stay those of the run.
+    /// The same by a builder that stops after each flight and leaves no gaps; `bytes` stay those of the run.
     pub fn by_flights(&self) -> ScenePlan {
         let mut plan = self.clone();
-        if plan.builder() == Builder::Persistent {
-            plan.settings.builder = Some(Builder::Ballot);
+        let was_persistent = plan.builder() == Builder::Persistent;
+        plan.settings.builder = Some(Builder::Ballot);
+        if was_persistent {
             for map in plan.global.iter_mut().chain(&mut plan.caustic) {
                 map.path_array_length = map.chunk_photons;
                 map.segment_bounces = map.bounces.min(SEGMENT_BOUNCES);

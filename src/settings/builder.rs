@@ -23,8 +23,7 @@ pub enum Builder {
 }
 
 impl Builder {
-    /// What scenes of triangles can be traced by.
-    pub const IN_SCENES: [Builder; 3] = [Builder::Atomic, Builder::Ballot, Builder::Persistent];
+    /// Those that trace either world.
     pub const ON_GPU: [Builder; 6] = [Builder::Naive, Builder::Atomic, Builder::Ballot, Builder::Group, Builder::Scan, Builder::Persistent];
 
     /// Every way, the CPU's last.

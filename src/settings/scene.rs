@@ -190,8 +190,8 @@ pub struct SceneSettings {
     pub illumination: Illumination,
     pub part: Part,
     pub filter: Filter,
-    /// `None`: persistent; ballot where photons may bounce more often than the device lets a loop go on, and with strict
-    /// arithmetic, which needs so many registers that few photons would be under way.
+    /// `None`: persistent; ballot where lanes do not vote right in loops, and with strict arithmetic, which needs so many registers
+    /// that few photons would be under way.
     pub builder: Option<Builder>,
     pub math: Math,
     /// Look for values that are infinite or no number.
@@ -255,8 +255,8 @@ impl SceneSettings {
         within("--caustic-photons", self.caustic_photons, 1..=MAX_PHOTONS, "photons of the caustic map, each round")?;
         within("--rounds", self.rounds, 1..=MAX_ROUNDS, "rounds")?;
         within("--bounces", self.bounces, 1..=MAX_BOUNCES, "bounces")?;
-        if let Some(builder) = self.builder.filter(|builder| !Builder::IN_SCENES.contains(builder)) {
-            let known = Builder::IN_SCENES.map(Builder::name).join(", ");
+        if let Some(builder) = self.builder.filter(|builder| !Builder::ON_GPU.contains(builder)) {
+            let known = Builder::ON_GPU.map(Builder::name).join(", ");
             return Err(Error::setting(
                 "--variant",
                 builder.name(),

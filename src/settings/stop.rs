@@ -1,7 +1,6 @@
 //! What ends a run before its last round, whichever comes first.
 
 use serde::Serialize;
-use statrs::function::gamma::ln_gamma;
 
 use crate::error::{Error, Result};
 
@@ -47,21 +46,4 @@ impl Stop {
         }
         Ok(())
     }
-}
-
-/// Rounds of which the radius is multiplied out.
-const EXACT_ROUNDS: u32 = 32;
-
-/// The squared radius of a round, relative to the first one's: r_(i+1)^2 = r_i^2 (i + alpha) / (i + 1) with i from 1 (Knaus and
-/// Zwicker 2011, equation 15), whose product is Gamma(n + 1 + alpha) / (Gamma(1 + alpha) (n + 1)!).
-pub fn squared_radius(alpha: f64, round: u32) -> f64 {
-    if alpha == 1.0 || round == 0 {
-        return 1.0;
-    }
-    let n = f64::from(round);
-    // Exact where the digits of the logarithms would show, and short.
-    if round <= EXACT_ROUNDS {
-        return (1..=round).map(|i| (f64::from(i) + alpha) / (f64::from(i) + 1.0)).product();
-    }
-    (ln_gamma(n + 1.0 + alpha) - ln_gamma(1.0 + alpha) - ln_gamma(n + 2.0)).exp()
 }

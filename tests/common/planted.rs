@@ -19,10 +19,10 @@ pub fn kernels(names: &[&str], file: &str, changes: &[(&str, &str)]) -> Vec<(Str
             text.replace(from, to)
         })
     };
+    let sources = compile::sources(&glsl);
     let compile = |kernel: &&str| {
-        let paths = ["kernels", "check"].map(|folder| format!("{folder}/{kernel}.comp"));
-        let name = paths.into_iter().find(|path| glsl.join(path).exists()).unwrap_or_else(|| panic!("there is no kernel {kernel}"));
-        let compiled = compile::compile(&glsl, &name, constants::SHARED_WITH_GLSL, &edit).unwrap_or_else(|error| panic!("{error}"));
+        let source = sources.iter().find(|source| source.name == *kernel).unwrap_or_else(|| panic!("there is no kernel {kernel}"));
+        let compiled = compile::compile(&glsl, source, constants::SHARED_WITH_GLSL, &edit).unwrap_or_else(|error| panic!("{error}"));
         assert!(compiled.files.contains(&glsl.join(file)), "{kernel} has nothing of {file}");
         (kernel.to_string(), compiled.words)
     };

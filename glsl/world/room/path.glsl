@@ -2,7 +2,7 @@
 // words of all paths stand side by side, then the second and the third ones, so that neighbouring invocations move
 // neighbouring words. Twin of src/path.rs.
 
-struct Path {
+struct LightPath {
     vec3 position;
     uint wall; // NO_WALL once it has died where it stands
     vec3 direction;
@@ -19,14 +19,14 @@ uint path_word(uint k, uint index, uint capacity)
     return k * capacity + index;
 }
 
-uvec4[PATH_WORDS] pack_path(Path path)
+uvec4[PATH_WORDS] pack_path(LightPath path)
 {
     return uvec4[](uvec4(floatBitsToUint(path.position), path.wall), uvec4(floatBitsToUint(path.direction), path.photon),
                    uvec4(path.stream, floatBitsToUint(path.flux), 0));
 }
 
-Path unpack_path(uvec4[PATH_WORDS] words)
+LightPath unpack_path(uvec4[PATH_WORDS] words)
 {
-    return Path(uintBitsToFloat(words[0].xyz), words[0].w, uintBitsToFloat(words[1].xyz), words[1].w, words[2].xy,
+    return LightPath(uintBitsToFloat(words[0].xyz), words[0].w, uintBitsToFloat(words[1].xyz), words[1].w, words[2].xy,
                 uintBitsToFloat(words[2].z));
 }

@@ -3,36 +3,38 @@
 layout(set = 0, binding = 0, scalar) readonly buffer Rooms { Room rooms[]; };
 layout(set = 0, binding = 1, scalar) readonly buffer Walls { Wall walls[]; };
 
-// What the wall made of the path. A path that is alive was reflected, and `photon` is to be stored.
-struct Bounced {
+// What the wall made of the path. A path that is alive was reflected, and `photon` is stored there.
+struct Step {
     bool escaped;
     bool absorbed;
+    bool stored;
     bool alive;
     Photon photon;
 };
 
-Bounced bounce_path(inout Path path, uint bounce)
+Step step_path(inout LightPath path, uint bounce)
 {
     Hit hit = intersect_room(rooms[0], path.position, path.direction, path.wall);
     Wall wall = walls[hit.wall];
     vec3 u = draw_bounce(push.key, path.photon, bounce, path.stream);
-    Bounced bounced;
-    bounced.escaped = wall.is_open != 0;
-    bounced.alive = !bounced.escaped && u.x < wall.albedo;
-    bounced.absorbed = !bounced.escaped && !bounced.alive;
+    Step taken;
+    taken.escaped = wall.is_open != 0;
+    taken.alive = !taken.escaped && u.x < wall.albedo;
+    taken.stored = taken.alive;
+    taken.absorbed = !taken.escaped && !taken.alive;
 
     vec3 arriving = path.direction;
     path.position = hit.position;
     path.direction = to_world(sample_cosine_hemisphere(u.y, u.z), wall);
     path.wall = hit.wall;
     float weight = view_weight(wall, hit.position, arriving, path.direction, push.eye);
-    bounced.photon = Photon(hit.position, hit.wall, path.flux, weight, path.photon, bounce);
-    note_unless(!bounced.alive || (is_finite(hit.position) && is_finite(path.direction) && is_finite(weight)), NONFINITE_PHOTON,
+    taken.photon = Photon(hit.position, hit.wall, path.flux, weight, path.photon, bounce);
+    note_unless(!taken.alive || (is_finite(hit.position) && is_finite(path.direction) && is_finite(weight)), NONFINITE_PHOTON,
                 DOMAIN_PHOTONS, push.key.round, path.photon);
-    return bounced;
+    return taken;
 }
 
-Bounced no_bounce()
+Step no_step()
 {
-    return Bounced(false, false, false, Photon(vec3(0.0), NO_WALL, 0.0, 0.0, 0, 0));
+    return Step(false, false, false, false, Photon(vec3(0.0), NO_WALL, 0.0, 0.0, 0, 0));
 }

@@ -1,6 +1,6 @@
 // A photon as it leaves the lights of a scene.
 
-LightPath emit_photon(uint photon, Draws draws, PhotonEmission emission)
+LightPath leave_light(uint photon, Draws draws, PhotonEmission emission)
 {
     vec4 u = philox_floats(uvec4(photon, draws.round, 0, draws.domain), draws.seed);
     vec4 w = philox_floats(uvec4(photon, draws.round, 1, draws.domain), draws.seed);

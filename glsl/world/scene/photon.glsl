@@ -2,19 +2,19 @@
 // aligned words of 16 bytes, each read and written at once; the first alone tells whether a photon is near. Twin of
 // src/photon.rs.
 
-struct MapPhoton {
+struct Photon {
     vec3 position;
     uint plane;
     vec3 flux;
     uint wi;
 };
 
-uvec4 place_word(MapPhoton photon)
+uvec4 place_word(Photon photon)
 {
     return uvec4(floatBitsToUint(photon.position), photon.plane);
 }
 
-uvec4 light_word(MapPhoton photon)
+uvec4 light_word(Photon photon)
 {
     return uvec4(floatBitsToUint(photon.flux), photon.wi);
 }

@@ -1,30 +1,30 @@
 // One flight of a photon in a scene of triangles: nearest surface, Russian roulette, scatter.
 
 // What the surface made of the path. `photon` is to be stored if `stored`, whatever became of its path.
-struct Traced {
+struct Step {
     bool escaped;
     bool absorbed;
     bool stored;
     bool alive;
-    MapPhoton photon;
+    Photon photon;
 };
 
-Traced no_flight()
+Step no_step()
 {
-    return Traced(false, false, false, false, MapPhoton(vec3(0.0), 0, vec3(0.0), 0));
+    return Step(false, false, false, false, Photon(vec3(0.0), 0, vec3(0.0), 0));
 }
 
-Traced trace_flight(inout LightPath path, uint bounce)
+Step step_path(inout LightPath path, uint bounce)
 {
-    Traced traced = no_flight();
+    Step taken = no_step();
     Hit hit = closest_hit(path.position, path.direction);
-    traced.escaped = hit.triangle == NONE;
-    if (!traced.escaped) {
+    taken.escaped = hit.triangle == NONE;
+    if (!taken.escaped) {
         vec3 wo = -path.direction;
         Surface surface = surface_at(hit, wo);
         bool specular = is_specular(surface);
-        traced.stored = !specular && (path.arrival & push.map.stored) != 0;
-        traced.photon = MapPhoton(surface.position, surface.plane, path.flux, pack_direction(wo, findLSB(path.arrival)));
+        taken.stored = !specular && (path.arrival & push.map.stored) != 0;
+        taken.photon = Photon(surface.position, surface.plane, path.flux, pack_direction(wo, findLSB(path.arrival)));
 
         vec4 u = philox_floats(uvec4(path.photon, push.draws.round, EMISSION_BLOCKS + bounce, push.draws.domain), push.draws.seed);
         Scatter scatter = sample_scatter(surface, wo, u.yzw, false, 0.0);
@@ -38,18 +38,18 @@ Traced trace_flight(inout LightPath path, uint bounce)
         }
         vec3 start = offset_origin(surface.position, surface.error, surface.ng, scatter.direction);
         // Before the cuts below, which would hide what is no number.
-        note_unless(is_finite(traced.photon.position) && is_finite(traced.photon.flux) && is_finite(start) && is_finite(scatter.direction)
+        note_unless(is_finite(taken.photon.position) && is_finite(taken.photon.flux) && is_finite(start) && is_finite(scatter.direction)
                         && is_finite(flux), NONFINITE_PHOTON, push.draws.domain, push.draws.round, path.photon);
         float before = max(path.flux.x, max(path.flux.y, path.flux.z));
         float after = max(flux.x, max(flux.y, flux.z));
         // Survival in proportion to the flux that is left, so that survivors carry about what they did.
         float survival = before > 0.0 ? min(divide(after, before), 1.0) : 0.0;
-        traced.alive = surface.scatters && scatter.alive && u.x < survival && (specular || push.map.caustic_only == 0);
-        traced.absorbed = !traced.alive;
+        taken.alive = surface.scatters && scatter.alive && u.x < survival && (specular || push.map.caustic_only == 0);
+        taken.absorbed = !taken.alive;
         flux = divide(flux, max(survival, 1e-12));
         if (HAS_SMOOTH_NORMALS) {
             vec3 clamped = min(flux, vec3(float(MAX_SHADING_GAIN)));
-            if (traced.alive && clamped != flux) {
+            if (taken.alive && clamped != flux) {
                 count_loss(TOTAL_CLAMPED, flux - clamped);
             }
             flux = clamped;
@@ -62,5 +62,5 @@ Traced trace_flight(inout LightPath path, uint bounce)
         }
         path = LightPath(start, path.photon, scatter.direction, onward, flux);
     }
-    return traced;
+    return taken;
 }

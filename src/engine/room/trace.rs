@@ -6,8 +6,8 @@ use crate::constants::{MAX_GROUPS, PATHS_TOGETHER};
 use crate::engine::room::resources::RoomResources;
 use crate::error::Result;
 use crate::gpu::kernels::{
-    Emit, EndBounce, FillGaps, KeepOrder, ScanAdd, ScanBlocks, TraceAtomic, TraceBallot, TraceGroup, TraceInPlace, TracePersistent,
-    TraceSlots,
+    EmitRoom, EndBounce, FillGaps, ScanAdd, ScanBlocks, ScanMoveRoom, TracePersistentRoom, TraceRoomAtomic, TraceRoomBallot,
+    TraceRoomGroup, TraceRoomScan, TraceRoomSlots,
 };
 use crate::gpu::{Commands, Extent, Kernel, Module};
 use crate::plan::{EmissionRange, RoomPlan, photons_of};
@@ -18,15 +18,15 @@ use crate::settings::Builder;
 /// Kernels that tracing needs.
 pub fn modules(plan: &RoomPlan) -> Vec<Module> {
     match plan.settings.builder {
-        Builder::Naive => vec![Emit::MODULE, TraceSlots::MODULE],
-        Builder::Atomic if plan.counters > 1 => vec![Emit::MODULE, TraceAtomic::MODULE, FillGaps::MODULE, EndBounce::MODULE],
-        Builder::Atomic => vec![Emit::MODULE, TraceAtomic::MODULE, EndBounce::MODULE],
-        Builder::Ballot => vec![Emit::MODULE, TraceBallot::MODULE, EndBounce::MODULE],
-        Builder::Group => vec![Emit::MODULE, TraceGroup::MODULE, EndBounce::MODULE],
+        Builder::Naive => vec![EmitRoom::MODULE, TraceRoomSlots::MODULE],
+        Builder::Atomic if plan.counters > 1 => vec![EmitRoom::MODULE, TraceRoomAtomic::MODULE, FillGaps::MODULE, EndBounce::MODULE],
+        Builder::Atomic => vec![EmitRoom::MODULE, TraceRoomAtomic::MODULE, EndBounce::MODULE],
+        Builder::Ballot => vec![EmitRoom::MODULE, TraceRoomBallot::MODULE, EndBounce::MODULE],
+        Builder::Group => vec![EmitRoom::MODULE, TraceRoomGroup::MODULE, EndBounce::MODULE],
         Builder::Scan => {
-            vec![Emit::MODULE, TraceInPlace::MODULE, ScanBlocks::MODULE, ScanAdd::MODULE, KeepOrder::MODULE, EndBounce::MODULE]
+            vec![EmitRoom::MODULE, TraceRoomScan::MODULE, ScanBlocks::MODULE, ScanAdd::MODULE, ScanMoveRoom::MODULE, EndBounce::MODULE]
         }
-        Builder::Persistent => vec![TracePersistent::MODULE],
+        Builder::Persistent => vec![TracePersistentRoom::MODULE],
         Builder::Cpu => panic!("the CPU builder has no kernels"),
     }
 }
@@ -55,7 +55,7 @@ pub fn chunk(commands: &mut Commands, resources: &RoomResources, plan: &RoomPlan
 
 /// Writes the paths of a chunk as they leave their lights, light after light.
 pub fn emit(commands: &mut Commands, resources: &RoomResources, plan: &RoomPlan, round: u32, ranges: &[EmissionRange]) -> Result<()> {
-    let RoomResources { lights, walls, stream_seeds, paths: [paths, _], nonfinite_values, .. } = resources;
+    let RoomResources { room, stream_seeds, paths: [paths, _], nonfinite_values, .. } = resources;
     let mut path_offset = 0;
     for range in ranges {
         let push = EmitPush {
@@ -64,7 +64,11 @@ pub fn emit(commands: &mut Commands, resources: &RoomResources, plan: &RoomPlan,
             path_offset,
             path_capacity: plan.path_array_length(),
         };
-        commands.dispatch(Emit { lights, walls, stream_seeds, paths, nonfinite_values }, &push, Extent::Items(u64::from(range.count)))?;
+        commands.dispatch(
+            EmitRoom { room, stream_seeds, next_paths: paths, nonfinite_values },
+            &push,
+            Extent::Items(u64::from(range.count)),
+        )?;
         path_offset += range.count;
     }
     Ok(())
@@ -90,7 +94,7 @@ fn trace_persistent(
     round: u32,
     ranges: &[EmissionRange],
 ) -> Result<()> {
-    let RoomResources { rooms, walls, lights, stream_seeds, photons, origins, counters, tallies, nonfinite_values, .. } = resources;
+    let RoomResources { room, stream_seeds, photons, origins, counters, tallies, nonfinite_values, .. } = resources;
     for range in ranges.iter().flat_map(|range| range.parts(plan.photons_per_dispatch())) {
         let push = TracePersistentPush {
             key: plan.streams().key(round),
@@ -100,7 +104,7 @@ fn trace_persistent(
             photon_capacity: plan.photon_capacity,
             eye: plan.settings.eye.into(),
         };
-        let kernel = TracePersistent { rooms, walls, lights, stream_seeds, photons, origins, counters, tallies, nonfinite_values };
+        let kernel = TracePersistentRoom { room, stream_seeds, photons, origins, counters, tallies, nonfinite_values };
         commands.dispatch(kernel, &push, Extent::Items(u64::from(push.stride)))?;
     }
     Ok(())
@@ -155,21 +159,17 @@ fn one_bounce(
     };
     let [even, odd] = &resources.paths;
     let (paths, next_paths) = if bounce.is_multiple_of(2) { (even, odd) } else { (odd, even) };
-    let RoomResources { rooms, walls, photons, origins, counters, tallies, nonfinite_values, .. } = resources;
+    let RoomResources { room, photons, origins, counters, tallies, nonfinite_values, .. } = resources;
     macro_rules! trace {
         ($kernel:ident) => {
-            commands.dispatch(
-                $kernel { rooms, walls, paths, next_paths, photons, origins, counters, tallies, nonfinite_values },
-                &push,
-                extent(),
-            )
+            commands.dispatch($kernel { room, paths, next_paths, photons, origins, counters, tallies, nonfinite_values }, &push, extent())
         };
     }
     match builder {
-        Builder::Naive => trace!(TraceSlots),
-        Builder::Atomic => trace!(TraceAtomic),
-        Builder::Ballot => trace!(TraceBallot),
-        Builder::Group => trace!(TraceGroup),
+        Builder::Naive => trace!(TraceRoomSlots),
+        Builder::Atomic => trace!(TraceRoomAtomic),
+        Builder::Ballot => trace!(TraceRoomBallot),
+        Builder::Group => trace!(TraceRoomGroup),
         Builder::Scan => in_order::one_bounce(commands, resources, plan, [paths, next_paths], &push, extent),
         Builder::Persistent | Builder::Cpu => panic!("{} has no bounces of all paths", builder.name()),
     }?;

@@ -4,7 +4,7 @@ use glam::DVec3;
 
 use crate::constants::{HIT_CAUSTIC_PHOTON, HIT_GLOBAL_PHOTON, HIT_KINDS, HIT_SHADOW_RAY};
 use crate::engine::unknown::{Unknown, most_hits};
-use crate::engine::watch::mean_squared_radius;
+use crate::plan::radius::mean_squared_radius;
 use crate::plan::scene::{MapPlan, ScenePlan};
 
 /// Names of the kinds of `HIT_...`.

@@ -7,8 +7,7 @@ use crate::ledger::{Fates, Losses, RelativeFlux};
 use crate::plan::scene::ScenePlan;
 use crate::scene::geometry::Geometry;
 
-/// Words that kernels count in (`glsl/world/scene/film.glsl`).
-pub const ANOMALY_WORDS: usize = 8;
+pub use crate::plan::memory::ANOMALY_WORDS;
 
 /// Of a run so far, from what its kernels counted.
 pub fn losses(

@@ -45,7 +45,7 @@ use crate::plan::sensor::Sensor;
 use crate::records::{Receiver, Tally};
 use crate::scene::Camera;
 use crate::scene::geometry::Geometry;
-use crate::settings::{Builder, Math};
+use crate::settings::Math;
 
 use crate::engine::tallies;
 use crate::engine::totals;
@@ -106,14 +106,9 @@ pub fn modules(plan: &ScenePlan, facts: &DeviceFacts) -> Vec<Module> {
         modules.push(GoOn::MODULE);
     }
     if plan.maps().next().is_some() {
-        modules.extend([MapCount::MODULE, MapScatter::MODULE, ScanBlocks::MODULE, ScanAdd::MODULE]);
-        modules.extend([DispatchSize::MODULE, MapSize::MODULE, CrowdSize::MODULE, FluxToRadiance::MODULE]);
-        modules.extend(match plan.builder() {
-            Builder::Atomic => vec![SceneEmit::MODULE, SceneTraceAtomic::MODULE],
-            Builder::Ballot => vec![SceneEmit::MODULE, SceneTraceBallot::MODULE],
-            _ => vec![SceneTracePersistent::MODULE],
-        });
-        modules.push(if facts.int64_atomics { SceneGatherU64::MODULE } else { SceneGatherTwoWords::MODULE });
+        modules.extend([CrowdSize::MODULE, FluxToRadiance::MODULE]);
+        modules.extend(photons::modules(plan));
+        modules.push(if facts.int64_atomics { GatherVisiblePointsU64::MODULE } else { GatherVisiblePointsTwoWords::MODULE });
     }
     modules
 }
@@ -314,7 +309,7 @@ fn one_round(commands: &mut Commands, view: &View, round: Round, deadline: Optio
     let sums = 3 * u64::from(plan.visible_points()) * u64::from(plan.arrival_sets);
     let mut traced = [0u32; 2];
     if let Some(photons) = &resources.photons {
-        commands.fill(&resources.estimates, 0, 2 * sums, 0);
+        commands.fill(&resources.estimates, 0, sums, 0);
         for map in plan.maps() {
             let which = usize::from(map.caustic_only);
             commands.scope(map.name, |commands| {

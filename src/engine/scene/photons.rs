@@ -1,19 +1,37 @@
 //! Photons of a chunk through a scene of triangles, and the index of their map.
-use crate::settings::Builder;
 
 use super::Round;
-use super::resources::{PhotonBuffers, SceneResources};
-use crate::constants::MAX_GROUPS;
+use super::resources::{OrderBuffers, PhotonBuffers, SceneResources};
+use crate::constants::{MAX_GROUPS, NONE};
 use crate::engine::prefix_sum::scan;
 use crate::error::Result;
 use crate::gpu::kernels::{
-    DispatchSize, MapCount, MapScatter, MapSize, SceneEmit, SceneTraceAtomic, SceneTraceBallot, SceneTracePersistent,
+    DispatchSize, EmitScene, MapCount, MapScatter, ScanAdd, ScanBlocks, ScanMoveScene, TracePersistentScene, TraceSceneAtomic,
+    TraceSceneBallot, TraceSceneGroup, TraceSceneScan, TraceSceneSlots,
 };
-use crate::gpu::{Commands, Extent};
+use crate::gpu::{Commands, Extent, Kernel, Module};
+use crate::photon::MapPhoton;
+use crate::plan::memory::survivor_count;
 use crate::plan::scene::{MapPlan, ScenePlan};
 use crate::records::{CellPush, DispatchSizePush, Draws, EmissionPush, FlightPush, PhotonEmission, PhotonStore, SceneTracePersistentPush};
 use crate::rng::words;
 use crate::scene::geometry::Geometry;
+use crate::settings::Builder;
+
+/// Kernels that tracing and the index need.
+pub fn modules(plan: &ScenePlan) -> Vec<Module> {
+    let index = vec![MapCount::MODULE, MapScatter::MODULE, ScanBlocks::MODULE, ScanAdd::MODULE, DispatchSize::MODULE];
+    let trace = match plan.builder() {
+        Builder::Naive => vec![EmitScene::MODULE, TraceSceneSlots::MODULE],
+        Builder::Atomic => vec![EmitScene::MODULE, TraceSceneAtomic::MODULE],
+        Builder::Ballot => vec![EmitScene::MODULE, TraceSceneBallot::MODULE],
+        Builder::Group => vec![EmitScene::MODULE, TraceSceneGroup::MODULE],
+        Builder::Scan => vec![EmitScene::MODULE, TraceSceneScan::MODULE, ScanMoveScene::MODULE],
+        Builder::Persistent => vec![TracePersistentScene::MODULE],
+        Builder::Cpu => panic!("the CPU builder traces no scene"),
+    };
+    [index, trace].concat()
+}
 
 /// The grid of a map in a round: cells as wide as the radius, its corner a little outside of the scene.
 pub fn cells(round: Round, map: &MapPlan) -> CellPush {
@@ -58,6 +76,10 @@ pub fn trace(
         let flights = map.segment_bounces.min(map.bounces - first_bounce);
         let parity = commands.scope("trace", |commands| segment(commands, round, photons, map, start, flights))?;
         first_bounce += flights;
+        let slots = has_slots(round.plan).then(|| chunk.1 * if map.caustic_only { 1 } else { flights });
+        if let Some(slots) = slots {
+            commands.fill(&photons.counters, 0, 1, slots);
+        }
         if first_bounce == map.bounces {
             return gather(commands);
         }
@@ -68,7 +90,7 @@ pub fn trace(
             return if stored > 0 { gather(commands) } else { Ok(()) };
         }
         let landings = u64::from(map.capacity / map.chunk_photons);
-        let is_full = u64::from(stored) + u64::from(left) * landings > u64::from(map.capacity);
+        let is_full = slots.is_some() || u64::from(stored) + u64::from(left) * landings > u64::from(map.capacity);
         if is_full {
             gather(commands)?;
         }
@@ -76,8 +98,31 @@ pub fn trace(
         if !is_full {
             commands.fill(&photons.counters, 0, 1, stored);
         }
-        start = Start::List { count: left, parity, first_bounce };
+        // Paths that keep their slots leave gaps among those that go on.
+        let count = if slots.is_some() { chunk.1 } else { left };
+        start = Start::List { count, parity, first_bounce };
     }
+}
+
+/// The photons that a map holds of a round.
+pub fn stored(commands: &mut Commands, round: Round, map: &MapPlan) -> Result<Vec<MapPhoton>> {
+    let buffers = round.resources.photons.as_ref().expect("a map has photons");
+    let mut found = Vec::new();
+    let mut take = |commands: &mut Commands| {
+        let count = commands.read::<u32>(&buffers.counters, 1)?[0].min(map.capacity);
+        let entries = commands.read::<MapPhoton>(&buffers.map, count as usize)?;
+        found.extend(entries.into_iter().filter(|photon| photon.plane != NONE));
+        Ok(())
+    };
+    for chunk in map.chunks() {
+        trace(commands, round, buffers, map, chunk, &mut take)?;
+    }
+    Ok(found)
+}
+
+/// Whether the map has slots, some of them empty.
+fn has_slots(plan: &ScenePlan) -> bool {
+    plan.builder() == Builder::Naive
 }
 
 fn is_persistent(plan: &ScenePlan) -> bool {
@@ -101,14 +146,15 @@ fn segment(commands: &mut Commands, round: Round, photons: &PhotonBuffers, map: 
         if commands.timestamps_left() < TIMESTAMP_RESERVE {
             commands.submit()?;
         }
-        // After the first flight only the device knows how many paths are left.
-        let extent = if list == 0 {
+        // After the first flight only the device knows how many paths are left; the naive builder looks at every slot each time.
+        let extent = if list == 0 || has_slots(round.plan) {
             Extent::Items(u64::from(count))
         } else {
             dispatch_size(commands, photons, round.plan, 1 + list, map.chunk_photons)?;
             Extent::Indirect(&photons.dispatch_args)
         };
-        trace_flight(commands, round, photons, map, Flight { bounce: first_bounce + list, list, parity }, extent)?;
+        let is_asked = list + 1 == flights && first_bounce + flights < map.bounces;
+        trace_flight(commands, round, photons, map, Flight { bounce: first_bounce + list, list, parity, is_asked }, extent)?;
         parity = 1 - parity;
     }
     commands.add_work(WORK_PER_PHOTON * u64::from(count));
@@ -149,8 +195,7 @@ fn trace_persistent(
     flights: u32,
 ) -> Result<usize> {
     let Round { resources, geometry, plan, .. } = round;
-    let SceneResources { nodes, triangles, normals, uvs, materials, textures, texels, emitters, caustic_targets, nonfinite_values, .. } =
-        resources;
+    let SceneResources { scene, nonfinite_values, .. } = resources;
     let PhotonBuffers { paths, counters, map: map_buffer, .. } = photons;
     let which = usize::from(map.caustic_only);
     let (tallies, totals) = (&photons.tallies[which], &photons.totals[which]);
@@ -169,18 +214,10 @@ fn trace_persistent(
             flights,
             stride: map.persistence.invocations(count),
         };
-        let kernel = SceneTracePersistent {
-            nodes,
-            triangles,
-            normals,
-            uvs,
-            materials,
-            textures,
-            texels,
-            emitters,
-            caustic_targets,
-            light_paths: &paths[parity],
-            next_light_paths: &paths[1 - parity],
+        let kernel = TracePersistentScene {
+            scene,
+            paths: &paths[parity],
+            next_paths: &paths[1 - parity],
             map: map_buffer,
             counters,
             tallies,
@@ -209,12 +246,10 @@ const LEAST_PHOTONS: u32 = 1 << 12;
 /// Writes the paths of a chunk as they leave the lights.
 pub fn emit(commands: &mut Commands, round: Round, photons: &PhotonBuffers, map: &MapPlan, chunk: (u32, u32)) -> Result<()> {
     let Round { resources, geometry, .. } = round;
-    let SceneResources { nodes, triangles, normals, uvs, materials, textures, texels, emitters, caustic_targets, nonfinite_values, .. } =
-        resources;
-    let light_paths = &photons.paths[0];
+    let SceneResources { scene, nonfinite_values, .. } = resources;
+    let next_paths = &photons.paths[0];
     let push = EmissionPush { draws: draws(round, map), emission: emission(geometry, map, chunk) };
-    let kernel =
-        SceneEmit { nodes, triangles, normals, uvs, materials, textures, texels, emitters, caustic_targets, light_paths, nonfinite_values };
+    let kernel = EmitScene { scene, next_paths, nonfinite_values };
     commands.dispatch(kernel, &push, Extent::Items(u64::from(chunk.1)))
 }
 
@@ -224,6 +259,8 @@ pub struct Flight {
     pub bounce: u32,
     pub list: u32,
     pub parity: usize,
+    /// The host will ask how many paths are left.
+    pub is_asked: bool,
 }
 
 pub fn trace_flight(
@@ -235,56 +272,49 @@ pub fn trace_flight(
     extent: Extent,
 ) -> Result<()> {
     let Round { resources, plan, .. } = round;
-    let SceneResources { nodes, triangles, normals, uvs, materials, textures, texels, nonfinite_values, .. } = resources;
-    let Flight { bounce, list, parity } = flight;
-    let is_last = u32::from(bounce + 1 == map.bounces);
-    let push = FlightPush { draws: draws(round, map), map: store(plan, map), bounce, list, is_last, path_capacity: map.chunk_photons };
+    let SceneResources { scene, nonfinite_values, .. } = resources;
+    let Flight { bounce, list, parity, is_asked } = flight;
+    let push = FlightPush {
+        draws: draws(round, map),
+        map: store(plan, map),
+        bounce,
+        list,
+        is_last: u32::from(bounce + 1 == map.bounces),
+        counts_left: u32::from(is_asked),
+        path_capacity: map.chunk_photons,
+    };
     let which = usize::from(map.caustic_only);
     let (tallies, totals) = (&photons.tallies[which], &photons.totals[which]);
-    let PhotonBuffers { paths, counters, map, .. } = photons;
-    let (light_paths, next_light_paths) = (&paths[parity], &paths[1 - parity]);
+    let PhotonBuffers { paths, counters, map, sorted_map, order, .. } = photons;
+    let (paths, next_paths) = (&paths[parity], &paths[1 - parity]);
+    macro_rules! trace {
+        ($kernel:ident { $next_paths:expr $(, $more:ident)* }) => {
+            commands.dispatch(
+                $kernel {
+                    scene, paths, next_paths: $next_paths, map, counters, tallies,
+                    totals, nonfinite_values $(, $more)*
+                },
+                &push,
+                extent,
+            )
+        };
+    }
     match plan.builder() {
-        Builder::Atomic => commands.dispatch(
-            SceneTraceAtomic {
-                nodes,
-                triangles,
-                normals,
-                uvs,
-                materials,
-                textures,
-                texels,
-                light_paths,
-                next_light_paths,
-                map,
-                counters,
-                tallies,
-                totals,
-                nonfinite_values,
-            },
-            &push,
-            extent,
-        ),
-        Builder::Ballot => commands.dispatch(
-            SceneTraceBallot {
-                nodes,
-                triangles,
-                normals,
-                uvs,
-                materials,
-                textures,
-                texels,
-                light_paths,
-                next_light_paths,
-                map,
-                counters,
-                tallies,
-                totals,
-                nonfinite_values,
-            },
-            &push,
-            extent,
-        ),
-        builder => panic!("{} has no flights of all photons", builder.name()),
+        Builder::Naive => trace!(TraceSceneSlots { next_paths }),
+        Builder::Atomic => trace!(TraceSceneAtomic { next_paths }),
+        Builder::Ballot => trace!(TraceSceneBallot { next_paths }),
+        Builder::Group => trace!(TraceSceneGroup { next_paths }),
+        Builder::Scan => {
+            let Some(OrderBuffers { survivors, block_sums }) = order else { panic!("the plan has no order to keep") };
+            // Nobody needs the sorted map before the photons of all bounces are there.
+            let landed = sorted_map;
+            let item_count = survivor_count(plan, push.path_capacity);
+            commands.fill(survivors, 0, u64::from(item_count), 0);
+            trace!(TraceSceneScan { paths, survivors, landed })?;
+            scan(commands, survivors, block_sums, item_count, plan.settings.group_size)?;
+            commands.dispatch(ScanMoveScene { paths, next_paths, map, counters, tallies, totals, survivors, landed }, &push, extent)
+        }
+        Builder::Persistent | Builder::Cpu => panic!("{} has no flights of all photons", plan.builder().name()),
     }
 }
 
@@ -308,11 +338,11 @@ pub fn index(commands: &mut Commands, round: Round, photons: &PhotonBuffers, map
             items_per_group: plan.settings.group_size,
             max_groups: MAX_GROUPS,
         };
-        commands.dispatch(MapSize { counters, dispatch_args, totals }, &push, Extent::Groups(1, 1))?;
+        commands.dispatch(DispatchSize { counters, dispatch_args }, &push, Extent::Groups(1, 1))?;
         commands.dispatch(MapCount { map, counters, cells, ranks }, cells_push, Extent::Indirect(dispatch_args))
     })?;
     commands.scope("scan", |commands| scan(commands, cells, block_sums, buckets + 1, plan.settings.group_size))?;
     commands.scope("sort", |commands| {
-        commands.dispatch(MapScatter { map, counters, cells, sorted_map, ranks }, cells_push, Extent::Indirect(dispatch_args))
+        commands.dispatch(MapScatter { map, counters, cells, sorted_map, ranks, totals }, cells_push, Extent::Indirect(dispatch_args))
     })
 }

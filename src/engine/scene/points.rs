@@ -4,7 +4,7 @@ use super::Round;
 use super::resources::{PhotonBuffers, SceneResources};
 use crate::constants::{DOMAIN_CAMERA, DOMAIN_RECEIVERS, MAX_GROUPS};
 use crate::error::Result;
-use crate::gpu::kernels::{CrowdSize, FluxToRadiance, GoOn, Receive, Resolve, SceneGatherTwoWords, SceneGatherU64, View};
+use crate::gpu::kernels::{CrowdSize, FluxToRadiance, GatherVisiblePointsTwoWords, GatherVisiblePointsU64, GoOn, Receive, Resolve, View};
 use crate::gpu::{Commands, Extent};
 use crate::plan::scene::{MapPlan, ScenePlan, TESTS_PER_POINT};
 use crate::plan::sensor::Sensor;
@@ -33,8 +33,7 @@ fn rounding(plan: &ScenePlan, round: u32) -> u32 {
 /// Finds the visible points of a round and writes the light that needs no photons.
 pub fn see(commands: &mut Commands, round: Round, camera: Option<&Camera>) -> Result<()> {
     let Round { resources, geometry, plan, number: round } = round;
-    let SceneResources { nodes, triangles, planes, normals, uvs, materials, textures, texels, emitters, .. } = resources;
-    let SceneResources { visible_points, pass_sums, one_hits, part_totals, anomalies, nonfinite_values, .. } = resources;
+    let SceneResources { scene, visible_points, pass_sums, one_hits, part_totals, anomalies, nonfinite_values, .. } = resources;
     let SceneResources { camera_paths: [camera_paths, _], camera_path_counts, .. } = resources;
     let step = plan.pixels_at_once(plan.rays_per_pixel());
     let goes_on = plan.chains_go_on();
@@ -66,14 +65,7 @@ pub fn see(commands: &mut Commands, round: Round, camera: Option<&Camera>) -> Re
                     film_limit: (plan.film_limit / f64::from(plan.samples())) as f32,
                 };
                 let kernel = View {
-                    nodes,
-                    triangles,
-                    normals,
-                    uvs,
-                    materials,
-                    textures,
-                    texels,
-                    emitters,
+                    scene,
                     anomalies,
                     visible_points,
                     pass_sums,
@@ -100,16 +92,8 @@ pub fn see(commands: &mut Commands, round: Round, camera: Option<&Camera>) -> Re
                     radius: if radius.is_finite() { radius as f32 } else { 1.0 / 1024.0 },
                 };
                 let kernel = Receive {
-                    nodes,
-                    triangles,
-                    normals,
-                    uvs,
-                    materials,
-                    textures,
-                    texels,
-                    emitters,
+                    scene,
                     receivers,
-                    planes,
                     anomalies,
                     visible_points,
                     pass_sums,
@@ -132,12 +116,11 @@ pub fn see(commands: &mut Commands, round: Round, camera: Option<&Camera>) -> Re
 
 /// Follows camera paths that are still under way over mirrors and glass, until none is left.
 fn go_on(commands: &mut Commands, resources: &SceneResources, geometry: &Geometry, plan: &ScenePlan, round: u32) -> Result<()> {
-    let SceneResources { nodes, triangles, normals, uvs, materials, textures, texels, emitters, .. } = resources;
-    let SceneResources { visible_points, pass_sums, one_hits, part_totals, anomalies, nonfinite_values, camera_path_counts, .. } =
+    let SceneResources { scene, visible_points, pass_sums, one_hits, part_totals, anomalies, nonfinite_values, camera_path_counts, .. } =
         resources;
     let domain = if matches!(plan.sensor, Sensor::Picture { .. }) { DOMAIN_CAMERA } else { DOMAIN_RECEIVERS };
     for parity in [0, 1].into_iter().cycle() {
-        let path_count = commands.read::<u32>(camera_path_counts, 1)?[0];
+        let path_count = commands.read(camera_path_counts, 1)?[0];
         if path_count == 0 {
             break;
         }
@@ -152,14 +135,7 @@ fn go_on(commands: &mut Commands, resources: &SceneResources, geometry: &Geometr
             rounding: rounding(plan, round),
         };
         let kernel = GoOn {
-            nodes,
-            triangles,
-            normals,
-            uvs,
-            materials,
-            textures,
-            texels,
-            emitters,
+            scene,
             anomalies,
             visible_points,
             pass_sums,
@@ -179,20 +155,20 @@ fn go_on(commands: &mut Commands, resources: &SceneResources, geometry: &Geometr
 pub fn gather(commands: &mut Commands, round: Round, photons: &PhotonBuffers, map: &MapPlan, cells_push: CellPush) -> Result<()> {
     let Round { resources, plan, number: round, .. } = round;
     let PhotonBuffers { cells, sorted_map, crowded, dispatch_args, .. } = photons;
-    let SceneResources { planes, visible_points, estimates, nonfinite_values, .. } = resources;
+    let SceneResources { scene, visible_points, estimates, nonfinite_values, .. } = resources;
     let point_count = plan.visible_points();
     let (lanes, step) = (map.lanes, plan.points_at_once());
     let (width, height) = plan.sensor.size();
     let dispatch = |commands: &mut Commands, push: &SceneGatherPush, extent: Extent| {
         if commands.facts().int64_atomics {
             commands.dispatch(
-                SceneGatherU64 { visible_points, planes, film: estimates, cells, sorted_map, crowded, nonfinite_values },
+                GatherVisiblePointsU64 { scene, visible_points, film: estimates, cells, sorted_map, crowded, nonfinite_values },
                 push,
                 extent,
             )
         } else {
             commands.dispatch(
-                SceneGatherTwoWords { visible_points, planes, film: estimates, cells, sorted_map, crowded, nonfinite_values },
+                GatherVisiblePointsTwoWords { scene, visible_points, film: estimates, cells, sorted_map, crowded, nonfinite_values },
                 push,
                 extent,
             )
@@ -228,8 +204,7 @@ pub fn gather(commands: &mut Commands, round: Round, photons: &PhotonBuffers, ma
 /// Turns what the maps found at all visible points into light; so many photons of the global and of the caustic map were traced.
 pub fn flux_to_radiance(commands: &mut Commands, round: Round, traced: [u32; 2]) -> Result<()> {
     let Round { resources, geometry, plan, number: round } = round;
-    let SceneResources { nodes, triangles, normals, uvs, materials, textures, texels, planes, visible_points, .. } = resources;
-    let SceneResources { estimates, one_hits, part_totals, anomalies, nonfinite_values, .. } = resources;
+    let SceneResources { scene, visible_points, estimates, one_hits, part_totals, anomalies, nonfinite_values, .. } = resources;
     let radius = |map: &Option<MapPlan>| map.as_ref().map_or(1.0, |map| plan.radius(map, round)) as f32;
     let flux =
         |map: &Option<MapPlan>| map.as_ref().map_or(0.0, |map| map.photon_flux_of(geometry, traced[usize::from(map.caustic_only)])) as f32;
@@ -252,22 +227,7 @@ pub fn flux_to_radiance(commands: &mut Commands, round: Round, traced: [u32; 2])
             global_flux: flux(&plan.global),
             caustic_flux: flux(&plan.caustic),
         };
-        let kernel = FluxToRadiance {
-            nodes,
-            triangles,
-            normals,
-            uvs,
-            materials,
-            textures,
-            texels,
-            planes,
-            anomalies,
-            visible_points,
-            estimates,
-            one_hits,
-            part_totals,
-            nonfinite_values,
-        };
+        let kernel = FluxToRadiance { scene, anomalies, visible_points, estimates, one_hits, part_totals, nonfinite_values };
         commands.dispatch(kernel, &push, Extent::Items(u64::from(end_point - first_point)))?;
         add_work(commands, plan, 256 * u64::from(end_point - first_point))?;
     }

@@ -93,7 +93,7 @@ pub fn light_paths(
     let buffers = resources.photons.as_ref().expect("a map has photons");
     let round = Round { resources: &resources, geometry, plan, number };
     photons::emit(&mut commands, round, buffers, map, chunk)?;
-    let mut paths = vec![commands.read::<LightPath>(&buffers.paths[0], chunk.1 as usize)?];
+    let mut paths = vec![commands.read(&buffers.paths[0], chunk.1 as usize)?];
     let mut traced = 0;
     let mut left = chunk.1;
     for bounce in 0..flights {
@@ -101,9 +101,16 @@ pub fn light_paths(
         // Each flight starts with an empty map, so that there is always room.
         commands.fill(&buffers.counters, 0, 3, 0);
         commands.fill(&buffers.counters, 1, 1, left);
-        photons::trace_flight(&mut commands, round, buffers, map, Flight { bounce, list: 0, parity }, Extent::Items(u64::from(left)))?;
+        photons::trace_flight(
+            &mut commands,
+            round,
+            buffers,
+            map,
+            Flight { bounce, list: 0, parity, is_asked: false },
+            Extent::Items(u64::from(left)),
+        )?;
         traced += 1;
-        left = commands.read::<u32>(&buffers.counters, 3)?[2];
+        left = commands.read(&buffers.counters, 3)?[2];
         if left == 0 {
             break;
         }

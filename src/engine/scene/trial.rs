@@ -21,8 +21,8 @@ use crate::gpu::kernels::Clearance;
 use crate::gpu::{Commands, Extent, Gpu, Kernel, Memory};
 use crate::photon::MapPhoton;
 use crate::plan::Limits;
-use crate::plan::planning::{MAX_DEFAULT_RADIUS, area_radius};
-use crate::plan::scene::{MapPlan, RADIUS_RANGE, RadiusFrom, ScenePlan, Trial};
+use crate::plan::radius::{MAX_DEFAULT_RADIUS, RADIUS_RANGE, RadiusFrom, area_radius};
+use crate::plan::scene::{ScenePlan, Trial};
 use crate::plan::sensor::Sensor;
 use crate::records::{ClearancePush, VisiblePoint};
 use crate::scene::Scene;
@@ -94,11 +94,11 @@ fn run(gpu: &Gpu, scene: &Scene, view: &View, run: &ScenePlan, limits: &Limits) 
     points::see(&mut commands, round, view.camera)?;
     let point_count = plan.visible_points();
     let clearances = gpu.buffer::<f32>("clearances", u64::from(point_count), Memory::Device)?;
-    let SceneResources { nodes, triangles, planes, visible_points, .. } = &resources;
-    let kernel = Clearance { nodes, triangles, planes, visible_points, clearances: &clearances };
+    let SceneResources { scene, visible_points, .. } = &resources;
+    let kernel = Clearance { scene, visible_points, clearances: &clearances };
     commands.dispatch(kernel, &ClearancePush { point_count }, Extent::Items(u64::from(point_count)))?;
-    let visible_points = commands.read::<VisiblePoint>(visible_points, point_count as usize)?;
-    let clearances = commands.read::<f32>(&clearances, point_count as usize)?;
+    let visible_points = commands.read(visible_points, point_count as usize)?;
+    let clearances = commands.read(&clearances, point_count as usize)?;
 
     let mut trial = Trial::default();
     let mut largest = 0.0;
@@ -109,7 +109,7 @@ fn run(gpu: &Gpu, scene: &Scene, view: &View, run: &ScenePlan, limits: &Limits) 
         if of_run.radius_from == RadiusFrom::User || asked.is_empty() {
             continue;
         }
-        let found = photons_of(&mut commands, round, map)?;
+        let found = photons::stored(&mut commands, round, map)?;
         let wanted = if map.caustic_only { CAUSTIC_PHOTONS_AT_POINT } else { PHOTONS_AT_POINT };
         let own: Vec<f64> = asked
             .par_iter()
@@ -127,21 +127,6 @@ fn run(gpu: &Gpu, scene: &Scene, view: &View, run: &ScenePlan, limits: &Limits) 
     gpu.check_validation()?;
     trial.seconds = began.elapsed().as_secs_f64();
     Ok(trial)
-}
-
-/// The photons that a map holds of a round.
-fn photons_of(commands: &mut Commands, round: Round, map: &MapPlan) -> Result<Vec<MapPhoton>> {
-    let buffers = round.resources.photons.as_ref().expect("a map has photons");
-    let mut found = Vec::new();
-    let mut take = |commands: &mut Commands| {
-        let count = commands.read::<u32>(&buffers.counters, 1)?[0].min(map.capacity);
-        found.extend(commands.read::<MapPhoton>(&buffers.map, count as usize)?);
-        Ok(())
-    };
-    for chunk in map.chunks() {
-        photons::trace(commands, round, buffers, map, chunk, &mut take)?;
-    }
-    Ok(found)
 }
 
 /// The radius around a point within which a round of so many photons is to leave `wanted`; infinite where too few photons are

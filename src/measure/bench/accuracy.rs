@@ -17,7 +17,7 @@ use crate::measure::study::axes::{Configuration, Line};
 use crate::measure::study::point::{Curve, Point};
 use crate::measure::study::reference::Reference;
 use crate::measure::study::subject::Subject;
-use crate::plan::planning::usual_radius;
+use crate::plan::radius::usual_radius;
 use crate::scene::geometry::Geometry;
 use crate::scene::{Scene, Surface, built_in};
 use crate::settings::Builder;

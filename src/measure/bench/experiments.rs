@@ -108,7 +108,7 @@ fn compaction(lab: &mut Lab) -> Result<Map> {
         Size::Small => compaction::Request { survivals: vec![0.25, 0.75], turns: 1, ..all },
         Size::Full => all,
     };
-    compaction::measure(lab.gpu, &request, lab.cancelled, lab.tell)
+    compaction::measure(lab.gpu, &request, Some(lab.scene), lab.cancelled, lab.tell)
 }
 
 fn table_1(lab: &mut Lab) -> Result<Found> {

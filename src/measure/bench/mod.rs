@@ -26,6 +26,7 @@ use crate::gpu::Gpu;
 use crate::measure::compaction::{self, Map};
 use crate::measure::study::chart::alone;
 use crate::output::destination::{Folder, write_all};
+use crate::scene::Scene;
 use experiment::Experiment;
 use pass::Pass;
 use rates::Rates;
@@ -50,6 +51,9 @@ pub struct Request {
     pub size: Size,
     #[serde(skip)]
     pub experiments: Vec<Experiment>,
+    /// Builders are compared in it, beside the paper's box.
+    #[serde(skip)]
+    pub scene: Scene,
     /// Follow cost over photons and triangles instead.
     #[serde(skip)]
     pub scale: bool,
@@ -69,7 +73,7 @@ pub struct Bench {
     pub rates: Rates,
     pub passes: Vec<Pass>,
     pub targets: Vec<Finding>,
-    /// The fastest builder of the paper's box by photon count and survival.
+    /// The fastest builder by photon count, in a closed room by survival, and in a scene.
     pub compaction: Option<Map>,
     pub scale: Option<Scale>,
     /// What was not measured, and why.
@@ -80,6 +84,8 @@ pub struct Bench {
 pub struct Lab<'a> {
     pub gpu: &'a Gpu,
     pub rates: Rates,
+    /// That builders are compared in, beside the paper's box.
+    pub scene: &'a Scene,
     pub size: Size,
     pub deadline: Instant,
     pub cancelled: &'a AtomicBool,
@@ -118,7 +124,8 @@ pub fn run(gpu: &Gpu, request: Request, cancelled: &AtomicBool, tell: &mut dyn F
     let deadline = Instant::now() + request.budget;
     tell("limits of the device");
     let rates = rates::measure(gpu, request.size)?;
-    let mut lab = Lab { gpu, rates, size: request.size, deadline, cancelled, tell };
+    let scene = &request.scene.clone();
+    let mut lab = Lab { gpu, rates, scene, size: request.size, deadline, cancelled, tell };
     let facts = gpu.facts();
     let mut bench = Bench {
         photonmill: env!("CARGO_PKG_VERSION"),

@@ -79,14 +79,14 @@ pub fn survey(gpu: &Gpu, job: &Job, map: impl Fn(&ScenePlan) -> Option<&MapPlan>
     let buffers = resources.photons.as_ref().expect("there is a map");
     let round = Round { resources: &resources, geometry: job.geometry, plan: &plan, number: 0 };
     points::see(&mut commands, round, Some(&job.camera()))?;
-    let seen = commands.read::<VisiblePoint>(&resources.visible_points, plan.visible_points() as usize)?;
+    let seen = commands.read(&resources.visible_points, plan.visible_points() as usize)?;
     let asking: Vec<VisiblePoint> = seen.into_iter().filter(|point| point.arrivals & map.stored != 0).collect();
     let step = (asking.len() / SAMPLES).max(1);
     let radius_squared = plan.radius(map, 0).powi(2) as f32;
     let (mut stored, mut found) = (0u64, 0u64);
     let mut look = |commands: &mut Commands| {
-        let length = commands.read::<u32>(&buffers.counters, 1)?[0];
-        let photons = commands.read::<MapPhoton>(&buffers.map, length as usize)?;
+        let length = commands.read(&buffers.counters, 1)?[0];
+        let photons = commands.read(&buffers.map, length as usize)?;
         stored += u64::from(length);
         found += asking
             .par_iter()

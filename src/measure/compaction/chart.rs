@@ -25,20 +25,19 @@ const FIELD: (i32, i32) = (92, 64);
 const LEFT: i32 = 110;
 const TOP: i32 = 16;
 
-/// Photons to the right, survival upwards; in each cell the fastest builder, its speed-up over one atomic per thread, and,
+/// Photons to the right, survival upwards, a scene on top; in each cell the fastest builder, its speed-up over one atomic per thread, and,
 /// in small letters, the builders that are not significantly slower.
 pub fn draw(map: &Map) -> String {
-    let (sizes, survivals) = (map.sizes(), map.survivals());
+    let (sizes, rows) = (map.sizes(), map.rows());
     let width = LEFT + FIELD.0 * sizes.len() as i32 + 16;
-    let height = TOP + FIELD.1 * survivals.len() as i32 + 56;
+    let height = TOP + FIELD.1 * rows.len() as i32 + 56;
     svg((width as u32, height as u32), |area| {
-        let bottom = TOP + FIELD.1 * survivals.len() as i32;
-        for (row, survival) in survivals.iter().enumerate() {
+        let bottom = TOP + FIELD.1 * rows.len() as i32;
+        for (row, cells) in rows.iter().enumerate() {
             let top = bottom - FIELD.1 * (row as i32 + 1);
-            let label = format!("{:.0} % survive", 100.0 * survival);
+            let label = cells[0].scene.clone().unwrap_or_else(|| format!("{:.0} % survive", 100.0 * cells[0].survival));
             area.draw(&Text::new(label, (LEFT - 8, top + FIELD.1 / 2), text(TEXT - 3, HPos::Right, &SCALE)))?;
-            for (column, photons) in sizes.iter().enumerate() {
-                let Some(cell) = map.cell(*photons, *survival) else { continue };
+            for (column, cell) in cells.iter().enumerate() {
                 let (left, middle) = (LEFT + FIELD.0 * column as i32, LEFT + FIELD.0 * column as i32 + FIELD.0 / 2);
                 let winner = cell.builders[0].builder;
                 let corners = [(left + 1, top + 1), (left + FIELD.0 - 1, top + FIELD.1 - 1)];

@@ -10,25 +10,30 @@ use serde::Serialize;
 
 use crate::engine;
 use crate::engine::room::resources::RoomResources;
-use crate::engine::room::trace;
-use crate::engine::room::{constants, photons_on_gpu};
+use crate::engine::room::{constants, photons_on_gpu, trace};
+use crate::engine::scene::resources::SceneResources;
+use crate::engine::scene::{self, Round, photons};
 use crate::engine::tallies;
 use crate::error::{Error, Result};
 use crate::gpu::{Commands, Gpu};
 use crate::output::words::{count, number};
-use crate::photon::Photon;
-use crate::plan::RoomPlan;
+use crate::plan::scene::{MapPlan, ScenePlan};
+use crate::plan::sensor::Sensor;
+use crate::plan::{Limits, RoomPlan};
 use crate::records::Tally;
 use crate::rng::Rng;
+use crate::scene::Scene;
+use crate::scene::geometry::Geometry;
 use crate::scene::open_box::open_box;
 use crate::scene::room::{RoomScene, Wall};
+use crate::settings::scene::{Illumination, SceneSettings};
 use crate::settings::{Builder, Gather, RoomSettings};
 use crate::timings::Spread;
 
 /// What is asked for.
 #[derive(Debug, Clone, PartialEq)]
 pub struct Request {
-    /// Shares of the paths that every bounce lets go on.
+    /// Shares of the paths that every bounce in a closed room lets go on.
     pub survivals: Vec<f32>,
     /// Photons, fewest first.
     pub sizes: Vec<u32>,
@@ -61,10 +66,13 @@ pub struct Map {
 /// One number of photons at one survival.
 #[derive(Debug, Clone, PartialEq, Serialize)]
 pub struct Cell {
+    /// Name of the scene; `None`: the closed room.
+    pub scene: Option<String>,
+    /// Share of the paths that a bounce lets go on; of a scene over all bounces.
     pub survival: f32,
     pub photons: u32,
-    /// Stored over all bounces.
-    pub stored: u64,
+    /// Paths that went on, over all bounces; a room stores these.
+    pub survivors: u64,
     /// What every builder agreed on with all others.
     pub agreed: Agreed,
     /// The fastest first.
@@ -101,19 +109,23 @@ pub struct Timed {
 /// Stored photons up to which all of them are compared.
 const MOST_COMPARED: f64 = 1e6;
 
-/// A closed room, whose every wall lets the same share go on.
-fn room(settings: &RoomSettings) -> RoomScene {
-    let mut room = open_box(settings);
-    room.faces.iter_mut().for_each(|face| *face = Some(Wall { name: "wall", albedo: settings.reflectance, shininess: None }));
-    room
+/// Where photons are traced.
+enum Place<'a> {
+    /// A closed room, whose every wall lets the same share of paths go on.
+    Room(f32),
+    /// All light of a scene in one map.
+    Scene(&'a Scene, &'a Geometry),
 }
 
-/// Measures all builders at all sizes and survivals.
-pub fn measure(gpu: &Gpu, request: &Request, cancelled: &AtomicBool, tell: &mut dyn FnMut(&str)) -> Result<Map> {
+/// Measures all builders at all sizes, in a closed room of each survival and in a scene.
+pub fn measure(gpu: &Gpu, request: &Request, scene: Option<&Scene>, cancelled: &AtomicBool, tell: &mut dyn FnMut(&str)) -> Result<Map> {
     let began = Instant::now();
     let facts = gpu.facts();
     let mut map =
         Map { device: facts.name.clone(), driver: facts.driver.clone(), bounces: request.bounces, cells: Vec::new(), left_out: Vec::new() };
+    let geometry = scene.map(Geometry::new).transpose()?;
+    let rooms = request.survivals.iter().map(|survival| Place::Room(*survival));
+    let places: Vec<Place> = rooms.chain(scene.zip(geometry.as_ref()).map(|(scene, geometry)| Place::Scene(scene, geometry))).collect();
     // Sizes and what they took, the last two: time goes with photons, and some of it with none.
     let (mut before, mut last) = ((0u32, Duration::ZERO), (0u32, Duration::ZERO));
     for &photons in &request.sizes {
@@ -124,23 +136,101 @@ pub fn measure(gpu: &Gpu, request: &Request, cancelled: &AtomicBool, tell: &mut 
             continue;
         }
         let size_began = Instant::now();
-        let whole = map.cells.len();
-        for &survival in &request.survivals {
+        let complete = map.cells.len();
+        for place in &places {
             if cancelled.load(Ordering::Relaxed) {
-                // Whole sizes are kept.
-                map.cells.truncate(whole);
-                return if whole == 0 { Err(Error::Interrupted) } else { Ok(map) };
+                // Sizes that are complete are kept.
+                map.cells.truncate(complete);
+                return if complete == 0 { Err(Error::Interrupted) } else { Ok(map) };
             }
-            tell(&format!("compaction: {} photons, survival {survival}", count(u64::from(photons))));
-            map.cells.push(cell(gpu, request, photons, survival)?);
+            tell(&format!("compaction: {} photons, {}", count(u64::from(photons)), place.label()));
+            map.cells.push(cell(gpu, request, photons, place)?);
         }
         (before, last) = (last, (photons, size_began.elapsed()));
     }
     Ok(map)
 }
 
-fn cell(gpu: &Gpu, request: &Request, photons: u32, survival: f32) -> Result<Cell> {
-    let base = RoomSettings {
+impl Place<'_> {
+    fn label(&self) -> String {
+        match self {
+            Place::Room(survival) => format!("survival {survival}"),
+            Place::Scene(scene, _) => scene.name.clone(),
+        }
+    }
+
+    /// Milliseconds to trace and store all photons, on the device's clock where it has one, and their fates.
+    fn run(&self, gpu: &Gpu, request: &Request, photons: u32, builder: Builder) -> Result<(Spread, Vec<Tally>)> {
+        match self {
+            Place::Room(survival) => {
+                let settings = room_settings(request, photons, *survival, builder);
+                run_room(gpu, &room(&settings), &settings, request.turns)
+            }
+            Place::Scene(scene, geometry) => {
+                run_scene(gpu, geometry, &scene_plan(gpu, request, photons, scene, geometry, builder)?, request)
+            }
+        }
+    }
+
+    /// The photon map, sorted.
+    fn stored(&self, gpu: &Gpu, request: &Request, photons: u32, builder: Builder) -> Result<Vec<[u32; 8]>> {
+        let mut stored: Vec<[u32; 8]> = match self {
+            Place::Room(survival) => {
+                let settings = room_settings(request, photons, *survival, builder);
+                photons_on_gpu(gpu, &room(&settings), &settings)?.into_iter().map(bytemuck::cast).collect()
+            }
+            Place::Scene(scene, geometry) => {
+                let plan = scene_plan(gpu, request, photons, scene, geometry, builder)?;
+                let mut commands = Commands::new(gpu, scene::constants(&plan), Instant::now())?;
+                let resources = SceneResources::new(gpu, &mut commands, geometry, &plan, &[])?;
+                let round = Round { resources: &resources, geometry, plan: &plan, number: 0 };
+                photons::stored(&mut commands, round, global_map(&plan))?.into_iter().map(bytemuck::cast).collect()
+            }
+        };
+        stored.sort_unstable();
+        Ok(stored)
+    }
+}
+
+fn cell(gpu: &Gpu, request: &Request, photons: u32, place: &Place) -> Result<Cell> {
+    let mut builders = Vec::new();
+    let mut fates: Option<Vec<Tally>> = None;
+    for builder in Builder::ON_GPU {
+        let (ms, tallies) = place.run(gpu, request, photons, builder)?;
+        let expected = fates.get_or_insert_with(|| tallies.clone());
+        agree(gpu, builder, photons, place, *expected == tallies)?;
+        builders.push(Timed { builder, ms });
+    }
+    let sum = |of: fn(&Tally) -> u32| fates.iter().flatten().map(|tally| u64::from(of(tally))).sum::<u64>();
+    // A room stores what goes on, a scene what arrives: that is what goes on or was absorbed, but for mirrors and glass.
+    let (survivors, others) = (sum(|tally| tally.stored), sum(|tally| tally.absorbed) + sum(|tally| tally.escaped));
+    let mut agreed = Agreed::Fates;
+    if (survivors + others) as f64 <= MOST_COMPARED {
+        let expected = place.stored(gpu, request, photons, Builder::Naive)?;
+        for builder in Builder::ON_GPU {
+            agree(gpu, builder, photons, place, place.stored(gpu, request, photons, builder)? == expected)?;
+        }
+        agreed = Agreed::Photons;
+    }
+    builders.sort_by(|a, b| a.ms.median.total_cmp(&b.ms.median));
+    let (scene, survival) = match place {
+        Place::Room(survival) => (None, *survival),
+        Place::Scene(scene, _) => (Some(scene.name.clone()), (survivors as f64 / (survivors + others).max(1) as f64) as f32),
+    };
+    Ok(Cell { scene, survival, photons, survivors, agreed, builders })
+}
+
+fn agree(gpu: &Gpu, builder: Builder, photons: u32, place: &Place, same: bool) -> Result<()> {
+    if same {
+        return Ok(());
+    }
+    let what = format!("the photon map of --variant {}, of {photons} photons at {},", builder.name(), place.label());
+    Err(Error::Miscalculated { device: gpu.facts().name.clone(), what })
+}
+
+fn room_settings(request: &Request, photons: u32, survival: f32, builder: Builder) -> RoomSettings {
+    RoomSettings {
+        builder,
         photons,
         // At once, as far as they fit, so that builders differ in nothing else.
         chunk: Some(photons),
@@ -150,66 +240,87 @@ fn cell(gpu: &Gpu, request: &Request, photons: u32, survival: f32) -> Result<Cel
         mesh: 1,
         gather: Gather::Brute,
         ..RoomSettings::default()
-    };
-    let room = room(&base);
-    let of = |builder| RoomSettings { builder, ..base.clone() };
-    let mut builders = Vec::new();
-    let mut fates: Option<Vec<Tally>> = None;
-    for builder in Builder::ON_GPU {
-        let (ms, tallies) = run(gpu, &room, &of(builder), request.turns)?;
-        let expected = fates.get_or_insert_with(|| tallies.clone());
-        agree(gpu, builder, photons, survival, *expected == tallies)?;
-        builders.push(Timed { builder, ms });
     }
-    let stored: u64 = fates.iter().flatten().map(|tally| u64::from(tally.stored)).sum();
-    let mut agreed = Agreed::Fates;
-    if stored as f64 <= MOST_COMPARED {
-        let in_order = |builder| -> Result<Vec<Photon>> {
-            let mut stored = photons_on_gpu(gpu, &room, &of(builder))?;
-            stored.sort_by_key(|photon| (photon.photon, photon.bounce));
-            Ok(stored)
-        };
-        let expected = in_order(Builder::Naive)?;
-        for builder in Builder::ON_GPU {
-            let found = in_order(builder)?;
-            agree(gpu, builder, photons, survival, bytemuck::cast_slice::<_, u8>(&found) == bytemuck::cast_slice::<_, u8>(&expected))?;
-        }
-        agreed = Agreed::Photons;
-    }
-    builders.sort_by(|a, b| a.ms.median.total_cmp(&b.ms.median));
-    Ok(Cell { survival, photons, stored, agreed, builders })
 }
 
-fn agree(gpu: &Gpu, builder: Builder, photons: u32, survival: f32, same: bool) -> Result<()> {
-    if same {
-        return Ok(());
-    }
-    let what = format!("the photon map of --variant {}, of {photons} photons at survival {survival},", builder.name());
-    Err(Error::Miscalculated { device: gpu.facts().name.clone(), what })
+fn room(settings: &RoomSettings) -> RoomScene {
+    let mut room = open_box(settings);
+    room.faces.iter_mut().for_each(|face| *face = Some(Wall { name: "wall", albedo: settings.reflectance, shininess: None }));
+    room
 }
 
-/// Milliseconds to trace and store all photons, on the device's clock where it has one, and their fates.
-fn run(gpu: &Gpu, room: &RoomScene, settings: &RoomSettings, turns: usize) -> Result<(Spread, Vec<Tally>)> {
-    let began = Instant::now();
-    let plan = RoomPlan::new(room, settings, &engine::limits(gpu.facts()))?;
+fn run_room(gpu: &Gpu, room: &RoomScene, settings: &RoomSettings, turns: usize) -> Result<(Spread, Vec<Tally>)> {
+    let plan = RoomPlan::new(room, settings, &limits(gpu))?;
     gpu.prepare(&trace::modules(&plan), &constants(&plan))?;
-    let mut commands = Commands::new(gpu, constants(&plan), began)?;
+    let mut commands = Commands::new(gpu, constants(&plan), Instant::now())?;
     let resources = RoomResources::new(gpu, &mut commands, room, &plan)?;
+    timed(gpu, commands, turns, |commands, name| {
+        tallies::clear(commands, &resources.tallies);
+        for ranges in plan.chunks() {
+            commands.scope(name, |commands| trace::chunk(commands, &resources, &plan, 0, &ranges))?;
+            commands.submit()?;
+        }
+        tallies::read(commands, &resources.tallies, settings.bounces)
+    })
+}
+
+/// The plan by which all light of a scene goes into one map.
+fn scene_plan(gpu: &Gpu, request: &Request, photons: u32, scene: &Scene, geometry: &Geometry, builder: Builder) -> Result<ScenePlan> {
+    let settings = SceneSettings {
+        builder: Some(builder),
+        photons,
+        chunk: Some(photons),
+        bounces: request.bounces,
+        illumination: Illumination::Photons,
+        ..SceneSettings::default()
+    };
+    let plan = ScenePlan::new(scene, geometry, &settings, Sensor::Receivers { count: 1 }, &limits(gpu))?;
+    if plan.global.is_none() {
+        return Err(Error::setting("SCENE", &scene.name, "has no light, and so no photons; name a scene that has some"));
+    }
+    Ok(plan)
+}
+
+fn global_map(plan: &ScenePlan) -> &MapPlan {
+    plan.global.as_ref().expect("a plan without the map is refused")
+}
+
+fn run_scene(gpu: &Gpu, geometry: &Geometry, plan: &ScenePlan, request: &Request) -> Result<(Spread, Vec<Tally>)> {
+    gpu.prepare(&photons::modules(plan), &scene::constants(plan))?;
+    let mut commands = Commands::new(gpu, scene::constants(plan), Instant::now())?;
+    let resources = SceneResources::new(gpu, &mut commands, geometry, plan, &[])?;
+    let (round, map) = (Round { resources: &resources, geometry, plan, number: 0 }, global_map(plan));
+    let buffers = resources.photons.as_ref().expect("a map has photons");
+    timed(gpu, commands, request.turns, |commands, name| {
+        tallies::clear(commands, &buffers.tallies[0]);
+        for chunk in map.chunks() {
+            commands.scope(name, |commands| photons::trace(commands, round, buffers, map, chunk, &mut |_| Ok(())))?;
+            commands.submit()?;
+        }
+        tallies::read(commands, &buffers.tallies[0], plan.tally_rows())
+    })
+}
+
+fn limits(gpu: &Gpu) -> Limits {
+    engine::limits(gpu.facts())
+}
+
+/// Milliseconds of each turn, and the fates of the last; the first turn, which fills caches, does not count.
+fn timed(
+    gpu: &Gpu,
+    mut commands: Commands,
+    turns: usize,
+    mut turn: impl FnMut(&mut Commands, &str) -> Result<Vec<Tally>>,
+) -> Result<(Spread, Vec<Tally>)> {
     commands.warm_up()?;
     commands.submit()?;
     let mut fates = Vec::new();
-    // The first turn fills caches.
-    for turn in 0..=turns {
-        tallies::clear(&mut commands, &resources.tallies);
-        for ranges in plan.chunks() {
-            commands.scope(&turn_name(turn), |commands| trace::chunk(commands, &resources, &plan, 0, &ranges))?;
-            commands.submit()?;
-        }
-        fates = tallies::read(&mut commands, &resources.tallies, settings.bounces)?;
+    for number in 0..=turns {
+        fates = turn(&mut commands, &turn_name(number))?;
     }
     gpu.check_validation()?;
     let timings = commands.finish("compaction");
-    let times = (1..=turns).map(|turn| timings.best_ms(&turn_name(turn)).expect("the turn has run"));
+    let times = (1..=turns).map(|number| timings.best_ms(&turn_name(number)).expect("the turn has run"));
     Ok((Spread::of(times.collect()).expect("there is a turn that counts"), fates))
 }
 
@@ -241,20 +352,18 @@ impl Map {
         sizes
     }
 
-    pub fn survivals(&self) -> Vec<f32> {
-        let first = self.cells.first().map_or(0, |cell| cell.photons);
-        self.cells.iter().take_while(|cell| cell.photons == first).map(|cell| cell.survival).collect()
-    }
-
-    pub fn cell(&self, photons: u32, survival: f32) -> Option<&Cell> {
-        self.cells.iter().find(|cell| cell.photons == photons && cell.survival == survival)
+    /// The cells of each row, a room's survivals first, then the scene: as many as sizes.
+    pub fn rows(&self) -> Vec<Vec<&Cell>> {
+        let sizes = self.sizes();
+        let rows = self.cells.len() / sizes.len().max(1);
+        (0..rows).map(|row| self.cells.iter().skip(row).step_by(rows).collect()).collect()
     }
 
     /// A line for each cell: the fastest builder, those not significantly slower, and every builder's time relative to it.
     pub fn text(&self) -> String {
         let mut text = format!(
             "{:>12} {:>9} {:>14} {:>8} {:>10}  {}\n",
-            "photons", "survival", "stored", "compared", "best, ms", "time relative to the best"
+            "photons", "survival", "survivors", "compared", "best, ms", "time relative to the best"
         );
         for cell in &self.cells {
             let best = cell.builders[0].ms.median;
@@ -268,14 +377,15 @@ impl Map {
                 })
                 .collect();
             let line = format!(
-                "{:>12} {:>8}% {:>14} {:>8} {:>10}  {}
+                "{:>12} {:>8}% {:>14} {:>8} {:>10}  {}{}
 ",
                 count(u64::from(cell.photons)),
                 number(100.0 * f64::from(cell.survival)),
-                count(cell.stored),
+                count(cell.survivors),
                 cell.agreed.name(),
                 number(best),
-                all.join(", ")
+                all.join(", "),
+                cell.scene.as_ref().map_or_else(String::new, |scene| format!("  ({scene})"))
             );
             text.push_str(&line);
         }

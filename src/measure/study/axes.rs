@@ -183,8 +183,11 @@ const REMOVABLE: [Effect; 5] =
 pub fn of_scene(photons: u32, kept: &[Effect], radius: Option<f64>, has_few_triangles: bool, is_picture: bool) -> Vec<Group> {
     let base = SceneSettings { photons, caustic_photons: photons, ..SceneSettings::default() };
     let mut sweep = Sweep::new(base, "persistent, shrinking radius, shadow rays", Line::Scene);
+    sweep.add(Axis::Builder, "naive slots", |s| s.builder = Some(Builder::Naive));
     sweep.add(Axis::Builder, "atomic", |s| s.builder = Some(Builder::Atomic));
     sweep.add(Axis::Builder, "subgroup ballot", |s| s.builder = Some(Builder::Ballot));
+    sweep.add(Axis::Builder, "work-group aggregate", |s| s.builder = Some(Builder::Group));
+    sweep.add(Axis::Builder, "prefix sums, order kept", |s| s.builder = Some(Builder::Scan));
     let of_photons = |s: &mut SceneSettings, photons: u32| (s.photons, s.caustic_photons) = (photons, photons);
     sweep.add(Axis::Photons, "1/16 of the photons", |s| of_photons(s, (photons / 16).max(1)));
     sweep.add(Axis::Photons, "1/4 of the photons", |s| of_photons(s, (photons / 4).max(1)));

@@ -61,7 +61,7 @@ pub struct Study {
     /// A software device, whose 'GPU' is the CPU.
     pub is_cpu: bool,
     pub parts: Vec<Part>,
-    /// The fastest builder by photon count and survival; for the open box only.
+    /// The fastest builder by photon count: of the open box by survival too, of another scene as it is.
     pub compaction: Option<compaction::Map>,
     /// False if it was ended before its last point.
     pub complete: bool,
@@ -110,7 +110,8 @@ pub fn run(
         write_all([(folder.file(subject::POINTS), points.into_bytes())])?;
     }
     let count: usize = subjects.iter().flat_map(|subject| &subject.groups).map(|group| group.configurations.len()).sum();
-    let of_builders = if subjects.iter().any(Subject::is_of_paper) { study.request.budget / COMPACTION_SHARE } else { Duration::ZERO };
+    let is_of_paper = subjects.iter().any(Subject::is_of_paper);
+    let of_builders = study.request.budget / COMPACTION_SHARE;
     let share = (study.request.budget - of_builders) / count.max(1) as u32;
     clock::warm_up(gpu, FIRST_WARM_UP)?;
     let mut begun = 0;
@@ -132,11 +133,17 @@ pub fn run(
             }
         }
     }
-    if !of_builders.is_zero() {
+    {
         let request = &study.request;
         let most = request.photons.saturating_mul(request.most_rounds).min(MOST_COMPACTED);
         let wanted = compaction::Request::up_to(most, of_builders);
-        match compaction::measure(gpu, &wanted, cancelled, tell) {
+        // The paper's box has rooms of every survival beside it, a scene stands for itself.
+        let found = if is_of_paper {
+            compaction::measure(gpu, &wanted, None, cancelled, tell)
+        } else {
+            compaction::measure(gpu, &compaction::Request { survivals: Vec::new(), ..wanted }, Some(scene), cancelled, tell)
+        };
+        match found {
             Ok(map) => study.compaction = Some(map),
             // What was measured before is worth its page.
             Err(error) => tell(&format!("the comparison of builders was not measured: {error}")),

@@ -61,11 +61,13 @@ fn head(study: &Study) -> Markup {
 }
 
 fn of_builders(map: &Map) -> Markup {
+    let is_scene = map.cells.iter().all(|cell| cell.scene.is_some());
     html! {
         section {
-            h2 { "Fastest builder by photon count and survival" }
+            h2 { @if is_scene { "Fastest builder by photon count" } @else { "Fastest builder by photon count and survival" } }
             p {
-                "Time to trace and store photons over " (map.bounces) " bounces in a closed room. At every wall a given share of the photons survives. "
+                "Time to trace and store photons over " (map.bounces) " bounces"
+                @if is_scene { " in the scene. " } @else { " in a closed room. At every wall a given share of the photons survives. " }
                 "Each cell shows the fastest builder, its speed relative to one atomic per thread, and, below, the builders that are not significantly slower. "
                 "All builders gave the same result: bit-identical stored photons up to a million, and above that the same numbers of photons stored and absorbed at each bounce."
             }

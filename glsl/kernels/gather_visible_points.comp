@@ -1,0 +1,32 @@
+// Density estimation of a photon map, sums added by film/SUMS.glsl.
+// Dispatched by src/transport/points.rs twice a map and chunk. One thread = one slice of a point's
+// candidates: points along x, slices along y.
+#version 460
+#extension GL_GOOGLE_include_directive : require
+#extension GL_EXT_scalar_block_layout : require
+#extension GL_EXT_control_flow_attributes : require
+#extension GL_EXT_shader_explicit_arithmetic_types_int64 : require
+#extension GL_EXT_shader_atomic_int64 : require
+#include "records.glsl"
+
+layout(local_size_x_id = 0) in;
+layout(push_constant, scalar) uniform Push { SceneGatherPush push; };
+
+#include "math/math.glsl"
+#include "ledger/nonfinite_values.glsl"
+#include "film/wide.glsl"
+#include "film/SUMS.glsl"
+#include "math/directions.glsl"
+#include "world/scene/effects.glsl"
+#include "material/lobes.glsl"
+#include "gather/belongs.glsl"
+#include "index/buckets.glsl"
+#include "world/scene/rounding.glsl"
+#include "world/scene/tiles.glsl"
+#include "gather/bucket_rows.glsl"
+#include "gather/visible_points.glsl"
+
+void main()
+{
+    gather_photons();
+}

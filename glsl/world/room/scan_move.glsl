@@ -1,0 +1,9 @@
+// What builder/scan_move.glsl needs of the paper's box.
+
+layout(push_constant, scalar) uniform Push { TracePush push; };
+
+#include "world/room/photon.glsl"
+#include "world/room/path.glsl"
+#include "world/room/map.glsl"
+#include "world/room/lists.glsl"
+#include "world/room/bounce.glsl"

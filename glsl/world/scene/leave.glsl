@@ -1,0 +1,30 @@
+// What kernels/emit.comp needs of a scene of triangles.
+
+layout(push_constant, scalar) uniform Push { EmissionPush push; };
+
+#include "math/math.glsl"
+#include "ledger/nonfinite_values.glsl"
+#include "dispatch/dispatch.glsl"
+#include "rng/philox.glsl"
+#include "rng/sampling.glsl"
+#include "world/scene/effects.glsl"
+#include "math/directions.glsl"
+#include "world/scene/bvh.glsl"
+#include "material/surface.glsl"
+#include "world/scene/areas.glsl"
+#include "world/scene/lights.glsl"
+#include "world/scene/path.glsl"
+#include "world/scene/aim.glsl"
+#include "world/scene/emit.glsl"
+
+layout(set = 1, binding = 1, scalar) writeonly buffer NextPaths { LightPath next_paths[]; };
+
+uint photon_count()
+{
+    return push.emission.photon_count;
+}
+
+void emit_photon(uint index)
+{
+    next_paths[index] = leave_light(push.emission.first_photon + index, push.draws, push.emission);
+}

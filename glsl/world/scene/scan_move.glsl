@@ -1,0 +1,10 @@
+// What builder/scan_move.glsl needs of a scene of triangles.
+
+layout(push_constant, scalar) uniform Push { FlightPush push; };
+
+#include "ledger/totals.glsl"
+#include "world/scene/photon.glsl"
+#include "world/scene/path.glsl"
+#include "world/scene/map.glsl"
+#include "world/scene/lists.glsl"
+#include "world/scene/bounce.glsl"

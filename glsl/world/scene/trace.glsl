@@ -1,0 +1,23 @@
+// What a builder that goes bounce by bounce needs of a scene of triangles: the push constants, the lists of paths, the photon map,
+// and step_path(), which takes a path to the next surface.
+
+layout(push_constant, scalar) uniform Push { FlightPush push; };
+
+#include "math/math.glsl"
+#include "ledger/nonfinite_values.glsl"
+#include "dispatch/dispatch.glsl"
+#include "rng/philox.glsl"
+#include "rng/sampling.glsl"
+#include "world/scene/effects.glsl"
+#include "math/directions.glsl"
+#include "world/scene/bvh.glsl"
+#include "material/surface.glsl"
+#include "material/lobes.glsl"
+#include "material/scatter.glsl"
+#include "ledger/totals.glsl"
+#include "world/scene/photon.glsl"
+#include "world/scene/path.glsl"
+#include "world/scene/map.glsl"
+#include "world/scene/lists.glsl"
+#include "world/scene/bounce.glsl"
+#include "world/scene/step.glsl"

@@ -1,0 +1,186 @@
+//! The photon maps that a scene's plan calls for: what they store, their radii, what their photons are aimed at, and how many are
+//! traced at once.
+
+use super::Limits;
+use super::capacity::{self, Persistence};
+use super::radius::FirstRadius;
+use super::scene::{MapPlan, SEGMENT_BOUNCES, Trial};
+use crate::constants::*;
+use crate::error::{Error, Result};
+use crate::photon::MapPhoton;
+use crate::records::{CausticTarget, LightPath};
+use crate::scene::geometry::Geometry;
+use crate::scene::targets::{aimed_shares, caustic_targets};
+use crate::scene::{Scene, Surface};
+use crate::settings::Builder;
+use crate::settings::scene::{Effect, Illumination, SceneSettings};
+
+/// Photons that one invocation finds of those of a point's estimate.
+const FOUND_BY_LANE: f64 = 60.0;
+/// Loop iterations of choosing a light, of the random numbers with which a photon leaves it, and of aiming it.
+const LOOPS_TO_EMIT: u32 = 128;
+/// Loop iterations of a flight of a photon, mostly of its ray through the hierarchy.
+const LOOPS_PER_FLIGHT: u32 = 256;
+/// Most bits of the gain of aimed photons: of lights that send less than a billionth towards what makes caustics.
+const MAX_GAIN_BITS: f64 = 30.0;
+
+pub(super) struct Maps {
+    pub(super) global: Option<MapPlan>,
+    pub(super) caustic: Option<MapPlan>,
+    /// Mask of `SURFACE_...` whose caustics are wanted.
+    pub(super) caustic_surfaces: u32,
+    /// What photons of the caustic map are aimed at.
+    pub(super) targets: Vec<CausticTarget>,
+    /// Mask of the arrivals that some map holds.
+    pub(super) arrivals: u32,
+}
+
+impl Maps {
+    /// `settings` have a builder.
+    pub(super) fn new(
+        scene: &Scene,
+        geometry: &Geometry,
+        settings: &SceneSettings,
+        limits: &Limits,
+        trial: Option<&Trial>,
+        keeps: &dyn Fn(Effect) -> bool,
+    ) -> Result<Maps> {
+        let builder = settings.builder.expect("the plan chose a builder");
+        limits.check_builder(builder)?;
+        let split = settings.illumination == Illumination::Split;
+        let caustic_surfaces = (u32::from(keeps(Effect::ReflectiveCaustics)) << SURFACE_MIRROR)
+            | (u32::from(keeps(Effect::RefractiveCaustics)) << SURFACE_DIELECTRIC);
+        let caustics = caustic_surfaces != 0;
+        let stored = [
+            (keeps(Effect::Direct) && !split, ARRIVED_DIRECT),
+            (caustics && !split, ARRIVED_CAUSTIC),
+            (keeps(Effect::Indirect), ARRIVED_INDIRECT),
+        ]
+        .iter()
+        .map(|(kept, arrival)| if *kept { *arrival } else { 0 })
+        .sum::<u32>();
+
+        let landings = expected_landings(scene, settings.bounces);
+        let map = |kind: Kind| map(kind, geometry, settings, limits, trial, landings);
+        // Without a light there is nothing to trace.
+        let has_light = !geometry.emitters.is_empty();
+        let global = Kind {
+            name: "global",
+            domain: DOMAIN_PHOTONS,
+            photons: settings.photons,
+            stored,
+            caustic_only: false,
+            radius: ("--radius", settings.radius),
+        };
+        let caustic = Kind {
+            name: "caustic",
+            domain: DOMAIN_CAUSTIC_PHOTONS,
+            photons: settings.caustic_photons,
+            stored: ARRIVED_CAUSTIC,
+            caustic_only: true,
+            radius: ("--caustic-radius", settings.caustic_radius),
+        };
+        let global = (has_light && stored != 0).then(|| map(global)).transpose()?;
+        let mut caustic = (has_light && split && caustics).then(|| map(caustic)).transpose()?;
+        let targets = caustic.as_mut().filter(|_| settings.aim).map_or_else(Vec::new, |map| aim(map, geometry, caustic_surfaces));
+        let arrivals = stored | if caustic.is_some() { ARRIVED_CAUSTIC } else { 0 };
+        Ok(Maps { global, caustic, caustic_surfaces, targets, arrivals })
+    }
+}
+
+/// What tells the global map from the caustic map.
+struct Kind {
+    name: &'static str,
+    domain: u32,
+    photons: u32,
+    stored: u32,
+    caustic_only: bool,
+    /// The option that gives it, and what it gives in metres.
+    radius: (&'static str, Option<f64>),
+}
+
+fn map(
+    Kind { name, domain, photons, stored, caustic_only, radius }: Kind,
+    geometry: &Geometry,
+    settings: &SceneSettings,
+    limits: &Limits,
+    trial: Option<&Trial>,
+    landings_of_each: f64,
+) -> Result<MapPlan> {
+    let FirstRadius { radius, from, expected } = FirstRadius::new(geometry, photons, caustic_only, radius, trial)?;
+    // Photons of a round land once at every bounce at most; a caustic's only once.
+    let landings = if caustic_only { 1 } else { u64::from(settings.bounces.min(SEGMENT_BOUNCES)) };
+    let chunk_photons = chunk_photons(photons, landings, settings, limits)?;
+    let capacity = chunk_photons * landings as u32;
+    let fits = caustic_only || settings.bounces <= SEGMENT_BOUNCES || {
+        // Ten deviations above what is expected, twice.
+        let photons = f64::from(chunk_photons);
+        2.0 * landings_of_each * (photons + 10.0 * photons.sqrt()) <= f64::from(capacity)
+    };
+    let is_persistent = settings.builder == Some(Builder::Persistent);
+    let in_one = is_persistent && fits && settings.bounces <= flights_of_an_invocation(limits);
+    let segment_bounces = if in_one { settings.bounces } else { settings.bounces.min(SEGMENT_BOUNCES) };
+    Ok(MapPlan {
+        name,
+        domain,
+        photons,
+        chunk_photons,
+        capacity,
+        path_array_length: if in_one { 0 } else { chunk_photons },
+        persistence: Persistence::new(LOOPS_TO_EMIT, LOOPS_PER_FLIGHT, segment_bounces.min(2 * SEGMENT_BOUNCES), limits),
+        bounces: settings.bounces,
+        segment_bounces,
+        stored,
+        caustic_only,
+        bucket_count: chunk_photons.clamp(1 << 10, 1 << 24).next_power_of_two(),
+        radius,
+        radius_from: from,
+        lanes: capacity::lanes_of(expected / FOUND_BY_LANE, limits),
+        target_count: 0,
+        flux_gain: 1.0,
+    })
+}
+
+/// What the photons of a caustic map are aimed at; nothing where that would leave none, or none out.
+fn aim(map: &mut MapPlan, geometry: &Geometry, caustic_surfaces: u32) -> Vec<CausticTarget> {
+    let targets = caustic_targets(geometry, caustic_surfaces);
+    let (least, most) = aimed_shares(geometry, &targets);
+    if least >= 1.0 || most <= 0.0 {
+        return Vec::new();
+    }
+    map.target_count = targets.len() as u32;
+    // No photon carries more than 1, but for rounding.
+    map.flux_gain = 2f64.powi((-most.log2()).floor().min(MAX_GAIN_BITS) as i32);
+    targets
+}
+
+/// Landings of a photon in a map, at most on average: roulette keeps as large a share of photons as the brightest channel of the
+/// brightest surface that scatters; shading normals and rounding have room in what the plan makes of it.
+fn expected_landings(scene: &Scene, bounces: u32) -> f64 {
+    let is_specular = |surface: &Surface| matches!(surface, Surface::Mirror | Surface::Dielectric { .. });
+    let scatterers = scene.materials.iter().filter(|material| !is_specular(&material.surface));
+    let most = scatterers.map(|material| f64::from(material.base_colour.max_element())).fold(0.0, f64::max);
+    (1.0 / (1.0 - most).max(1e-9)).min(f64::from(bounces))
+}
+
+/// Flights that one invocation may take: software devices count loops, others only time, of which so many take milliseconds.
+fn flights_of_an_invocation(limits: &Limits) -> u32 {
+    if limits.loop_iterations > LOOP_LIMIT { MAX_BOUNCES } else { limits.loop_iterations / LOOPS_PER_FLIGHT }
+}
+
+/// Photons traced at once, so that their map can never be full.
+fn chunk_photons(photons: u32, landings: u64, settings: &SceneSettings, limits: &Limits) -> Result<u32> {
+    let (path, photon) = (size_of::<LightPath>() as u64, size_of::<MapPhoton>() as u64);
+    let by_buffer = (limits.buffer_bytes / path).min(limits.buffer_bytes / (photon * landings));
+    // Two maps of a chunk, sorted and unsorted, and its paths twice, with room for the film.
+    let by_memory = limits.memory_bytes / 2 / (4 * photon * landings + 4 * path);
+    let fits = by_buffer.min(by_memory).min(u64::from(u32::MAX) / landings);
+    if fits == 0 {
+        return Err(Error::setting(
+            "--bounces",
+            settings.bounces,
+            format!("the hits of one photon exceed the device's largest buffer, {} bytes; ask for fewer bounces", limits.buffer_bytes),
+        ));
+    }
+    Ok(fits.min(settings.chunk.map_or(u64::MAX, u64::from)).min(u64::from(photons)) as u32)
+}

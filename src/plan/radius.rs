@@ -1,0 +1,115 @@
+//! The radius of a density estimate: of the first round, from what is known before a photon is traced, and how it shrinks from
+//! round to round.
+
+use std::f64::consts::PI;
+
+use serde::Serialize;
+use statrs::function::gamma::ln_gamma;
+
+use super::scene::Trial;
+use crate::error::{Error, Result};
+use crate::scene::geometry::Geometry;
+
+/// Where the radius of a map's first round comes from.
+#[derive(Debug, Clone, Copy, PartialEq, Eq, Serialize)]
+#[serde(rename_all = "lowercase")]
+pub enum RadiusFrom {
+    /// `--radius`, `--caustic-radius`.
+    User,
+    /// Photons of a trial round around the points that are asked about (`scene::trial`).
+    Trial,
+    /// The area of the whole scene.
+    Area,
+}
+
+/// Radii relative to the scene's normalised extent: from f32's resolution of positions up to all of it.
+pub const RADIUS_RANGE: (f64, f64) = (1.0 / 32_768.0, 2.0);
+/// Largest radius that is taken by default, relative to the scene's normalised extent.
+pub const MAX_DEFAULT_RADIUS: f64 = 0.125;
+/// Photons within the first radius of the global map, on average.
+const PHOTONS_PER_ESTIMATE: f64 = 60.0;
+/// A caustic's photons lie closer: its radius over that of as many photons spread over everything.
+const CAUSTIC_RADIUS_SHARE: f64 = 0.25;
+
+/// The first round's radius of a map.
+#[derive(Debug, Clone, Copy)]
+pub(super) struct FirstRadius {
+    /// Normalised.
+    pub(super) radius: f64,
+    pub(super) from: RadiusFrom,
+    /// Photons of a round that it holds, on average.
+    pub(super) expected: f64,
+}
+
+impl FirstRadius {
+    /// What `option` asks for in metres, or a trial round found, or the scene's area tells.
+    pub(super) fn new(
+        geometry: &Geometry,
+        photons: u32,
+        caustic_only: bool,
+        (option, asked): (&'static str, Option<f64>),
+        trial: Option<&Trial>,
+    ) -> Result<FirstRadius> {
+        let tried = trial.and_then(|trial| if caustic_only { trial.caustic_radius } else { trial.global_radius });
+        let by_area = |radius: f64| {
+            let usual = usual_radius(geometry, f64::from(photons)) * share(caustic_only);
+            PHOTONS_PER_ESTIMATE * (radius / usual).powi(2)
+        };
+        let Some(metres) = asked else {
+            let radius = tried.unwrap_or_else(|| area_radius(geometry, photons, caustic_only));
+            return Ok(match tried {
+                Some(_) => FirstRadius { radius, from: RadiusFrom::Trial, expected: PHOTONS_PER_ESTIMATE },
+                None => FirstRadius { radius, from: RadiusFrom::Area, expected: by_area(radius) },
+            });
+        };
+        let (least, most) = (RADIUS_RANGE.0 * geometry.unit, RADIUS_RANGE.1 * geometry.unit);
+        if !(least..=most).contains(&metres) {
+            return Err(Error::setting(option, metres, format!("must be from {least:e} to {most} metres in this scene")));
+        }
+        let radius = metres / geometry.unit;
+        Ok(FirstRadius { radius, from: RadiusFrom::User, expected: by_area(radius) })
+    }
+}
+
+fn share(caustic_only: bool) -> f64 {
+    if caustic_only { CAUSTIC_RADIUS_SHARE } else { 1.0 }
+}
+
+/// Radius, normalised, in which so many photons from lamps leave [`PHOTONS_PER_ESTIMATE`] on average: each lands about twice.
+pub fn usual_radius(geometry: &Geometry, photons: f64) -> f64 {
+    (PHOTONS_PER_ESTIMATE * geometry.area / (PI * 2.0 * photons)).sqrt()
+}
+
+/// Radius of a map's first round, normalised, where nothing but the scene's area is known.
+pub fn area_radius(geometry: &Geometry, photons: u32, caustic_only: bool) -> f64 {
+    (usual_radius(geometry, f64::from(photons)) * share(caustic_only)).clamp(RADIUS_RANGE.0, MAX_DEFAULT_RADIUS)
+}
+
+/// Rounds of which the radius is multiplied out.
+const EXACT_ROUNDS: u32 = 32;
+
+/// The squared radius of a round, relative to the first one's: r_(i+1)^2 = r_i^2 (i + alpha) / (i + 1) with i from 1 (Knaus and
+/// Zwicker 2011, equation 15), whose product is Gamma(n + 1 + alpha) / (Gamma(1 + alpha) (n + 1)!).
+pub fn squared_radius(alpha: f64, round: u32) -> f64 {
+    if alpha == 1.0 || round == 0 {
+        return 1.0;
+    }
+    let n = f64::from(round);
+    // Exact where the digits of the logarithms would show, and short.
+    if round <= EXACT_ROUNDS {
+        return (1..=round).map(|i| (f64::from(i) + alpha) / (f64::from(i) + 1.0)).product();
+    }
+    (ln_gamma(n + 1.0 + alpha) - ln_gamma(1.0 + alpha) - ln_gamma(n + 2.0)).exp()
+}
+
+/// Mean over rounds of the squared radius, relative to the first one's: r_(i+1)^2 = r_i^2 (i + alpha) / (i + 1)
+/// (Knaus and Zwicker 2011).
+pub fn mean_squared_radius(alpha: f64, rounds: u32) -> f64 {
+    if alpha == 1.0 || rounds <= 1 {
+        return 1.0;
+    }
+    // Terms Gamma(k + alpha) / Gamma(k + 1), k from 1, have the sum (Gamma(n + 1 + alpha) / n! - Gamma(1 + alpha)) / alpha.
+    let rounds = rounds.max(1);
+    let next = squared_radius(alpha, rounds) * (f64::from(rounds) + 1.0);
+    (next - 1.0) / (alpha * f64::from(rounds))
+}
