@@ -215,7 +215,7 @@ mod tests {
         ]
     }
 
-    /// In a time that is not quadratic: of most of these, clustering alone takes five seconds.
+    /// In a time that is not quadratic, as clustering all of them is: a sample of each shows it.
     #[test]
     fn every_mesh_has_a_tree_that_can_be_traversed() {
         for (name, corners) in hard_meshes() {
@@ -223,9 +223,7 @@ mod tests {
             let (tree, clustered) = work::of(|| build_tree(&boxes));
             println!("{name}: {} levels, {clustered} boxes clustered", levels(&tree));
             assert!(levels(&tree) <= MAX_LEVELS, "{name}: {} levels", levels(&tree));
-            // All are clustered only where the tree is then kept, whose levels are few.
-            let kept = cluster(&boxes).is_some();
-            assert!(clustered <= SAMPLE + if kept { COUNT } else { 0 }, "{name}: {clustered} boxes clustered, kept: {kept}");
+            assert!(clustered <= SAMPLE, "{name}: {clustered} boxes clustered");
             // Every triangle once, every box around what is in it.
             tree.validate(&boxes, false);
             let mut order = tree.primitive_indices;
