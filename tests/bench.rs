@@ -2,16 +2,17 @@
 
 use std::process::Command;
 use std::sync::atomic::AtomicBool;
-use std::sync::{Mutex, MutexGuard, PoisonError};
+use std::sync::{Mutex, MutexGuard, OnceLock, PoisonError};
 use std::time::Duration;
 
 use crate::common::{device, device_with, lit, planted};
-use photonmill::gpu::Options;
+use photonmill::gpu::{Gpu, Options};
 use photonmill::measure::bench::experiment::Experiment;
+use photonmill::measure::bench::rates::{self, Rates};
 use photonmill::measure::bench::room::{self, Timed};
 use photonmill::measure::bench::scene::{self, Job};
 use photonmill::measure::bench::targets::TARGETS;
-use photonmill::measure::bench::{self, Request, Size, rates, table};
+use photonmill::measure::bench::{self, Request, Size, table};
 use photonmill::scene::geometry::Geometry;
 use photonmill::settings::scene::SceneSettings;
 use photonmill::settings::{Builder, RoomSettings};
@@ -22,6 +23,12 @@ static DEVICE: Mutex<()> = Mutex::new(());
 
 fn alone() -> MutexGuard<'static, ()> {
     DEVICE.lock().unwrap_or_else(PoisonError::into_inner)
+}
+
+/// Rates of the device, measured once.
+fn rates_of(gpu: &Gpu) -> &'static Rates {
+    static RATES: OnceLock<Rates> = OnceLock::new();
+    RATES.get_or_init(|| rates::measure(gpu, Size::Small).unwrap())
 }
 
 fn request(experiments: &[Experiment], scale: bool) -> Request {
@@ -92,7 +99,7 @@ fn the_roofline_counts_every_dispatch() {
     let _alone = alone();
     let Some(gpu) = device() else { return };
     let never = AtomicBool::new(false);
-    let rates = rates::measure(&gpu, Size::Small).unwrap();
+    let rates = rates_of(&gpu);
     let check = |what: &str, timed: &Timed| {
         let outermost = timed.passes.iter().filter(|pass| !pass.name.contains('/'));
         let counted: f64 = outermost.map(|pass| pass.work.unwrap_or_else(|| panic!("{what}: {}", pass.name)).dispatches).sum();
@@ -100,7 +107,7 @@ fn the_roofline_counts_every_dispatch() {
     };
     for builder in Builder::ON_GPU {
         let settings = RoomSettings { builder, photons: 600, mesh: 4, bounces: 3, chunk: Some(300), ..RoomSettings::default() };
-        check(builder.name(), &room::time(&gpu, &rates, &settings, &never).unwrap());
+        check(builder.name(), &room::time(&gpu, rates, &settings, &never).unwrap());
     }
     let scene = lit::scene("cornell-spheres");
     let geometry = Geometry::new(&scene).unwrap();
@@ -108,7 +115,7 @@ fn the_roofline_counts_every_dispatch() {
         let settings =
             SceneSettings { photons: 600, caustic_photons: 500, bounces: 3, chunk: Some(400), illumination, ..SceneSettings::default() };
         let job = Job { name: "cornell-spheres", scene: &scene, geometry: &geometry, size: (8, 8), settings };
-        check("cornell-spheres", &scene::time(&gpu, &rates, &job, &never).unwrap());
+        check("cornell-spheres", &scene::time(&gpu, rates, &job, &never).unwrap());
     }
 }
 
@@ -116,8 +123,8 @@ fn the_roofline_counts_every_dispatch() {
 #[test]
 fn measurements_that_come_out_wrong_are_refused() {
     let _alone = alone();
-    let right = device().map(|gpu| rates::measure(&gpu, Size::Small).unwrap());
-    let Some(right) = right else { return };
+    let Some(gpu) = device() else { return };
+    let right = rates_of(&gpu);
     assert!(right.most_bytes(1e6) >= right.copies[0].rate.median);
     for (kernel, from, to, what) in [
         ("measure_copy", "copies[index] = blocks[index];", "copies[index] = uvec4(index);", "copied blocks"),
@@ -127,7 +134,7 @@ fn measurements_that_come_out_wrong_are_refused() {
         ("measure_gather", "measured_place(index * push.step_count + step)", "(index * push.step_count + step)", "copied blocks"),
         ("measure_atomic", "step < push.step_count", "step < push.step_count - 1", "atomic additions"),
     ] {
-        let replaced = planted::kernels(&[kernel], &format!("kernels/{kernel}.comp"), &[(from, to)]);
+        let replaced = planted::kernels(&[kernel], &format!("check/{kernel}.comp"), &[(from, to)]);
         let gpu = device_with(Options { replaced, ..Options::default() }).expect("it was there before");
         let error = rates::measure(&gpu, Size::Small).expect_err(kernel).to_string();
         assert!(error.contains(what) && error.contains("wrongly"), "{kernel}: {error}");

@@ -4,7 +4,7 @@
 use std::f64::consts::PI;
 
 use crate::common::family::Family;
-use crate::common::lit::{BOTH, SCENE_BUILDERS, grid, irradiances, level, matt, mirror, received, scene_of, shaft, shining};
+use crate::common::lit::{BOTH, assert_builders_agree, grid, irradiances, level, matt, mirror, received, scene_of, shaft, shining};
 use crate::common::{JUDGED, device, run_scene, run_scene_on_cpu};
 use glam::{DVec3, Vec3};
 use photonmill::ledger::Fates;
@@ -88,29 +88,26 @@ fn an_integrating_sphere_multiplies_light() {
     let kept = kept_by_horizon(&sphere, &points, RADIUS);
     assert!((kept - (1.0 - RADIUS * RADIUS / 8.0)).abs() < 0.002, "{kept}");
     let mut family = Family::default();
-    for builder in SCENE_BUILDERS {
-        for (albedo, bounces, photons) in [(Vec3::new(1.0, 0.99, 0.9), 60, 800), (Vec3::new(0.9, 0.5, 1.0), 16, 3000)] {
-            let material = Material::lambert("wall", albedo);
-            let scene = scene_of(vec![sphere.clone()], vec![material], vec![LightKind::Point { position: DVec3::ZERO, intensity }]);
-            let settings = SceneSettings {
-                illumination: Illumination::Photons,
-                builder: Some(builder),
-                photons,
-                bounces,
-                rounds: 1,
-                radius: Some(RADIUS),
-                alpha: 1.0,
-                ..SceneSettings::default()
-            };
-            let runs = irradiances(&gpu, &scene, &settings, &points, 1..17);
-            for channel in 0..3 {
-                let rho = f64::from(albedo[channel]);
-                let series: f64 = (1..bounces).map(|bounce| rho.powi(bounce as i32)).sum();
-                // What comes straight from the middle comes from above every horizon near.
-                let expected = (1.0 + kept * series) / area;
-                let what = format!("sphere, {builder:?}, albedo {rho:.2}, {bounces} bounces");
-                family.expect_mean(what, &over_points(&runs, channel), expected);
-            }
+    for (albedo, bounces, photons) in [(Vec3::new(1.0, 0.99, 0.9), 60, 800), (Vec3::new(0.9, 0.5, 1.0), 16, 3000)] {
+        let material = Material::lambert("wall", albedo);
+        let scene = scene_of(vec![sphere.clone()], vec![material], vec![LightKind::Point { position: DVec3::ZERO, intensity }]);
+        let settings = SceneSettings {
+            illumination: Illumination::Photons,
+            photons,
+            bounces,
+            rounds: 1,
+            radius: Some(RADIUS),
+            alpha: 1.0,
+            ..SceneSettings::default()
+        };
+        assert_builders_agree(&gpu, &scene, &settings, &points);
+        let runs = irradiances(&gpu, &scene, &settings, &points, 1..17);
+        for channel in 0..3 {
+            let rho = f64::from(albedo[channel]);
+            let series: f64 = (1..bounces).map(|bounce| rho.powi(bounce as i32)).sum();
+            // What comes straight from the middle comes from above every horizon near.
+            let expected = (1.0 + kept * series) / area;
+            family.expect_mean(format!("sphere, albedo {rho:.2}, {bounces} bounces"), &over_points(&runs, channel), expected);
         }
     }
     family.assert_tells_one_per_cent();
@@ -125,25 +122,22 @@ fn a_furnace_sphere_is_evenly_lit() {
     let points = evenly_over(&sphere, 1500);
     let scene = scene_of(vec![sphere], vec![shining(0.5)], vec![]);
     let mut family = Family::default();
-    for builder in SCENE_BUILDERS {
-        let settings = SceneSettings {
-            illumination: Illumination::Photons,
-            builder: Some(builder),
-            photons: 20_000,
-            bounces: 16,
-            rounds: 1,
-            radius: Some(RADIUS),
-            alpha: 1.0,
-            ..SceneSettings::default()
-        };
-        let runs = irradiances(&gpu, &scene, &settings, &points, 1..17);
-        let what = format!("furnace sphere, {builder:?}");
-        let expected = 2.0 * PI * kept_by_horizon(&scene.meshes[0], &points, RADIUS);
-        family.expect_mean(&what, &over_points(&runs, 0), expected);
-        for point in (0..points.len()).step_by(150) {
-            let of_point: Vec<f64> = runs.iter().map(|run| run[point].x).collect();
-            family.expect_mean(format!("{what}, point {point}"), &of_point, expected);
-        }
+    let settings = SceneSettings {
+        illumination: Illumination::Photons,
+        photons: 20_000,
+        bounces: 16,
+        rounds: 1,
+        radius: Some(RADIUS),
+        alpha: 1.0,
+        ..SceneSettings::default()
+    };
+    assert_builders_agree(&gpu, &scene, &settings, &points);
+    let runs = irradiances(&gpu, &scene, &settings, &points, 1..17);
+    let expected = 2.0 * PI * kept_by_horizon(&scene.meshes[0], &points, RADIUS);
+    family.expect_mean("furnace sphere", &over_points(&runs, 0), expected);
+    for point in (0..points.len()).step_by(150) {
+        let of_point: Vec<f64> = runs.iter().map(|run| run[point].x).collect();
+        family.expect_mean(format!("furnace sphere, point {point}"), &of_point, expected);
     }
     family.assert_tells(0.01, |what| !what.contains("point"));
 }
@@ -158,10 +152,9 @@ fn parallel_plates_send_light_to_and_fro() {
     meshes.extend([level(-0.2, [1.0; 2], true, 0), level(0.2, [1.0; 2], false, 1)]);
     let scene = scene_of(meshes, vec![shining(below as f32), matt(above as f32), mirror(1.0)], vec![]);
     let mut family = Family::default();
-    for (illumination, builder) in BOTH.into_iter().flat_map(|illumination| SCENE_BUILDERS.map(|builder| (illumination, builder))) {
+    for illumination in BOTH {
         let settings = SceneSettings {
             illumination,
-            builder: Some(builder),
             photons: 30_000,
             caustic_photons: 20_000,
             bounces: 48,
@@ -172,11 +165,12 @@ fn parallel_plates_send_light_to_and_fro() {
             ..SceneSettings::default()
         };
         let points = [grid(0.2, DVec3::NEG_Y, 6), grid(-0.2, DVec3::Y, 6)].concat();
+        assert_builders_agree(&gpu, &scene, &settings, &points);
         let runs = irradiances(&gpu, &scene, &settings, &points, 1..25);
         let (upper, lower): (Vec<_>, Vec<_>) = runs.iter().map(|run| (run[..36].to_vec(), run[36..].to_vec())).unzip();
         let exact = PI / (1.0 - below * above);
-        family.expect_mean(format!("plates, {illumination:?}, {builder:?}: above"), &over_points(&upper, 0), exact);
-        family.expect_mean(format!("plates, {illumination:?}, {builder:?}: below"), &over_points(&lower, 0), above * exact);
+        family.expect_mean(format!("plates, {illumination:?}: above"), &over_points(&upper, 0), exact);
+        family.expect_mean(format!("plates, {illumination:?}: below"), &over_points(&lower, 0), above * exact);
     }
     family.assert_tells_one_per_cent();
 }
@@ -193,18 +187,18 @@ fn expect_geometric(family: &mut Family, what: &str, fates: &Fates, rho: f64) {
     }
 }
 
-/// With a sixth wall the paper's box is closed: every builder stores albedo^k of its photons at bounce k. Where fewer
+/// With a sixth wall the paper's box is closed: albedo^k of the photons are stored at bounce k, by every builder. Where fewer
 /// than half of the 524 288 photons are left, more than 1 % goes unnoticed.
 #[test]
 fn bounces_in_a_closed_room_are_a_geometric_series() {
     let gpu = device();
     let mut family = Family::default();
     for rho in [0.5f32, 0.9, 0.99] {
-        for builder in JUDGED {
+        let fates = |builder, photons| {
             let settings = RoomSettings {
                 builder,
                 reflectance: rho,
-                photons: 1 << 19,
+                photons,
                 rng: Rng::Philox,
                 mesh: 1,
                 // So few points need no index of so many photons.
@@ -214,17 +208,24 @@ fn bounces_in_a_closed_room_are_a_geometric_series() {
             };
             let mut room = open_box(&settings);
             room.faces[5] = Some(Wall { name: "front", albedo: rho, shininess: None });
-            let outcome = match gpu.as_ref().filter(|_| builder != Builder::Cpu) {
+            match gpu.as_ref().filter(|_| builder != Builder::Cpu) {
                 Some(gpu) => run_scene(gpu, &room, &settings),
                 None => run_scene_on_cpu(&room, &settings),
-            };
-            expect_geometric(&mut family, &format!("room, {}", builder.name()), &outcome.fates[0], f64::from(rho));
+            }
+            .fates
+        };
+        for builder in JUDGED {
+            expect_geometric(&mut family, &format!("room, {}", builder.name()), &fates(builder, 1 << 19)[0], f64::from(rho));
+        }
+        let few = fates(Builder::Atomic, 3001);
+        for builder in Builder::ON_GPU.into_iter().filter(|_| gpu.is_some()) {
+            assert_eq!(fates(builder, 3001), few, "{}", builder.name());
         }
     }
     family.assert_tells(0.01, |what| what.starts_with("bright"));
 }
 
-/// The same in a sphere of triangles by both builders.
+/// The same in a sphere of triangles.
 #[test]
 fn bounces_in_a_sphere_are_a_geometric_series() {
     let Some(gpu) = device() else { return };
@@ -232,18 +233,11 @@ fn bounces_in_a_sphere_are_a_geometric_series() {
     let mut family = Family::default();
     for rho in [0.5f32, 0.9, 0.99] {
         let scene = scene_of(vec![hollow_sphere(12)], vec![matt(rho)], vec![lamp.clone()]);
-        for builder in SCENE_BUILDERS {
-            let settings = SceneSettings {
-                builder: Some(builder),
-                photons: 1 << 17,
-                bounces: 15,
-                rounds: 1,
-                radius: Some(0.05),
-                ..SceneSettings::default()
-            };
-            let lit = received(&gpu, &scene, &settings, &[(DVec3::ZERO, DVec3::Y)]);
-            expect_geometric(&mut family, &format!("sphere, {builder:?}"), &lit.fates[0], f64::from(rho));
-        }
+        let settings = SceneSettings { photons: 1 << 17, bounces: 15, rounds: 1, radius: Some(0.05), ..SceneSettings::default() };
+        let floor = [(DVec3::NEG_Y * 0.95, DVec3::Y)];
+        assert_builders_agree(&gpu, &scene, &SceneSettings { radius: Some(0.5), ..settings.clone() }, &floor);
+        let lit = received(&gpu, &scene, &settings, &[(DVec3::ZERO, DVec3::Y)]);
+        expect_geometric(&mut family, "sphere", &lit.fates[0], f64::from(rho));
     }
     family.assert_tells(0.01, |what| what.starts_with("bright"));
 }

@@ -6,12 +6,11 @@ use std::f64::consts::{FRAC_PI_2, PI, TAU};
 use crate::common::device;
 use crate::common::family::Family;
 use crate::common::lit::{
-    BOTH, SCENE_BUILDERS, glass, grid, irradiances, level, matt, mirror, radiances, received, scene_of, shaft, shining,
+    BOTH, assert_builders_agree, glass, grid, irradiances, level, matt, mirror, radiances, received, scene_of, shaft, shining,
 };
 use glam::{DVec3, Vec3};
 use photonmill::scene::light::LightKind;
 use photonmill::scene::{Mesh, Scene};
-use photonmill::settings::Builder;
 use photonmill::settings::scene::{Illumination, Part, SceneSettings};
 
 const IOR: f64 = 1.5;
@@ -167,11 +166,10 @@ fn even_light_crosses_a_surface_of_glass() {
         meshes.push(level(0.5, [1.0; 2], false, if lamp_below { wall } else { lamp }));
         let scene = scene_of(meshes, vec![glass(IOR as f32), shining(0.0), matt(0.0), mirror(1.0)], vec![]);
         let (floor, ceiling) = (grid(-0.5, DVec3::Y, 6), grid(0.5, DVec3::NEG_Y, 6));
-        let (far, near) = if lamp_below { (ceiling, floor) } else { (floor, ceiling) };
-        for (illumination, builder) in BOTH.into_iter().flat_map(|illumination| SCENE_BUILDERS.map(|builder| (illumination, builder))) {
+        let points = if lamp_below { [ceiling, floor] } else { [floor, ceiling] }.concat();
+        for illumination in BOTH {
             let settings = SceneSettings {
                 illumination,
-                builder: Some(builder),
                 radius: Some(0.1),
                 caustic_radius: Some(0.1),
                 alpha: 1.0,
@@ -183,10 +181,15 @@ fn even_light_crosses_a_surface_of_glass() {
                 rounds: 1,
                 ..SceneSettings::default()
             };
-            for (where_, points, expected) in [("beyond", &far, share), ("back", &near, 1.0 - share)] {
-                let runs = irradiances(&gpu, &scene, &settings, points, 1..25);
-                let means: Vec<f64> = runs.iter().map(|run| run.iter().map(|light| light.x).sum::<f64>() / run.len() as f64).collect();
-                family.expect_mean(format!("{what}, {illumination:?}, {builder:?}: {where_}"), &means, PI * expected);
+            assert_builders_agree(&gpu, &scene, &settings, &points);
+            let runs = irradiances(&gpu, &scene, &settings, &points, 1..25);
+            for (where_, of_points, expected) in [("beyond", 0..36, share), ("back", 36..72, 1.0 - share)] {
+                let mean = |run: &Vec<DVec3>| run[of_points.clone()].iter().map(|light| light.x).sum::<f64>() / of_points.len() as f64;
+                family.expect_mean(
+                    format!("{what}, {illumination:?}: {where_}"),
+                    &runs.iter().map(mean).collect::<Vec<_>>(),
+                    PI * expected,
+                );
             }
         }
     }
@@ -240,26 +243,25 @@ fn images_light_the_end_of_a_corridor() {
     };
     let reflected = over_disc(&|x, y| (-9..=9).filter(|n| *n != 0).map(|n| image(n, x, y)).sum());
     let mut family = Family::default();
-    for builder in SCENE_BUILDERS {
-        for illumination in BOTH {
-            let settings = SceneSettings {
-                illumination,
-                builder: Some(builder),
-                radius: Some(radius),
-                caustic_radius: Some(radius),
-                alpha: 1.0,
-                photons: 40_000,
-                caustic_photons: 80_000,
-                bounces: 8,
-                shadow_rays: 1,
-                rounds: 32,
-                ..SceneSettings::default()
-            };
-            let lit = received(&gpu, &scene, &settings, &[(DVec3::ZERO, DVec3::Z)]);
-            let own = if illumination == Illumination::Split { image(0, 0.0, 0.0) } else { over_disc(&|x, y| image(0, x, y)) };
-            let (mean, error) = (lit.film.mean(0, &lit.plan).x, lit.film.standard_error(0, &lit.plan).x);
-            family.expect_estimate(format!("corridor, {illumination:?}, {builder:?}"), mean, error, 32, own + reflected);
-        }
+    for illumination in BOTH {
+        let settings = SceneSettings {
+            illumination,
+            radius: Some(radius),
+            caustic_radius: Some(radius),
+            alpha: 1.0,
+            photons: 40_000,
+            caustic_photons: 80_000,
+            bounces: 8,
+            shadow_rays: 1,
+            rounds: 32,
+            ..SceneSettings::default()
+        };
+        let points = [(DVec3::ZERO, DVec3::Z)];
+        assert_builders_agree(&gpu, &scene, &settings, &points);
+        let lit = received(&gpu, &scene, &settings, &points);
+        let own = if illumination == Illumination::Split { image(0, 0.0, 0.0) } else { over_disc(&|x, y| image(0, x, y)) };
+        let (mean, error) = (lit.film.mean(0, &lit.plan).x, lit.film.standard_error(0, &lit.plan).x);
+        family.expect_estimate(format!("corridor, {illumination:?}"), mean, error, 32, own + reflected);
     }
     family.assert_tells_one_per_cent();
 }
@@ -293,10 +295,9 @@ fn paraboloid(material: usize) -> Mesh {
     mesh
 }
 
-fn caustics(illumination: Illumination, builder: Builder, photons: u32, radius: f64) -> SceneSettings {
+fn caustics(illumination: Illumination, photons: u32, radius: f64) -> SceneSettings {
     SceneSettings {
         illumination,
-        builder: Some(builder),
         part: Part::Caustic,
         radius: Some(radius),
         caustic_radius: Some(radius),
@@ -329,12 +330,12 @@ fn light_from_a_focus_leaves_in_parallel() {
             outer_angle: 1.0,
         };
         let scene = scene_of(vec![paraboloid(0), level(distance, [2.0; 2], false, 1)], vec![mirror(0.9), matt(0.0)], vec![lamp]);
-        for builder in SCENE_BUILDERS {
-            for illumination in BOTH {
-                let lit = received(&gpu, &scene, &caustics(illumination, builder, 12_000, h), &[(DVec3::Y * distance, DVec3::NEG_Y)]);
-                let (mean, error) = (lit.film.mean(0, &lit.plan).x, lit.film.standard_error(0, &lit.plan).x);
-                family.expect_estimate(format!("{distance} m off, {illumination:?}, {builder:?}"), mean, error, 24, expected);
-            }
+        for illumination in BOTH {
+            let (settings, points) = (caustics(illumination, 12_000, h), [(DVec3::Y * distance, DVec3::NEG_Y)]);
+            assert_builders_agree(&gpu, &scene, &settings, &points);
+            let lit = received(&gpu, &scene, &settings, &points);
+            let (mean, error) = (lit.film.mean(0, &lit.plan).x, lit.film.standard_error(0, &lit.plan).x);
+            family.expect_estimate(format!("{distance} m off, {illumination:?}"), mean, error, 24, expected);
         }
     }
     family.assert_tells_one_per_cent();
@@ -352,12 +353,12 @@ fn sunlight_meets_in_the_focus() {
     // The plate's own back is black, and it takes its light away before the mirror.
     let scene = scene_of(vec![paraboloid(0), level(FOCUS, [plate; 2], false, 1)], vec![mirror(0.9), matt(0.0)], vec![sun]);
     let expected = 0.9 * (opening - plate * plate) / (PI * radius * radius);
-    for builder in SCENE_BUILDERS {
-        for illumination in BOTH {
-            let lit = received(&gpu, &scene, &caustics(illumination, builder, 20_000, radius), &[(DVec3::Y * FOCUS, DVec3::NEG_Y)]);
-            let (mean, error) = (lit.film.mean(0, &lit.plan).x, lit.film.standard_error(0, &lit.plan).x);
-            family.expect_estimate(format!("in the focus, {illumination:?}, {builder:?}"), mean, error, 24, expected);
-        }
+    for illumination in BOTH {
+        let (settings, points) = (caustics(illumination, 20_000, radius), [(DVec3::Y * FOCUS, DVec3::NEG_Y)]);
+        assert_builders_agree(&gpu, &scene, &settings, &points);
+        let lit = received(&gpu, &scene, &settings, &points);
+        let (mean, error) = (lit.film.mean(0, &lit.plan).x, lit.film.standard_error(0, &lit.plan).x);
+        family.expect_estimate(format!("in the focus, {illumination:?}"), mean, error, 24, expected);
     }
     family.assert_tells_one_per_cent();
 }

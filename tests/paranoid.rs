@@ -60,7 +60,7 @@ pub fn box_is_finite(gpu: &Gpu, settings: &RoomSettings) -> Check<Complaint> {
 #[test]
 fn no_built_in_scene_has_a_value_that_is_no_number() {
     let Some(gpu) = device() else { return };
-    for name in built_in::names() {
+    for (place, name) in built_in::names().into_iter().enumerate() {
         let scene = built_in::by_name(name).unwrap();
         let geometry = Geometry::new(&scene).unwrap();
         for (illumination, final_gather) in [(Illumination::Split, true), (Illumination::Photons, false)] {
@@ -68,7 +68,10 @@ fn no_built_in_scene_has_a_value_that_is_no_number() {
             let lit = light(&gpu, &scene, &geometry, &settings);
             assert_holds(format!("{name}, {illumination:?}"), nothing_odd(lit.nonfinite_values.as_ref().unwrap()));
             assert_eq!(lit.nonfinite_values, Some(NonfiniteValues::default()));
-            // Looking changes nothing.
+            // Looking changes nothing, of either way of lighting in every other scene.
+            if (illumination == Illumination::Split) == (place % 2 == 0) {
+                continue;
+            }
             let unwatched = light(&gpu, &scene, &geometry, &SceneSettings { paranoid: false, ..settings });
             assert_eq!(unwatched.nonfinite_values, None);
             assert_eq!(unwatched.film, lit.film, "{name}, {illumination:?}");

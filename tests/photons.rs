@@ -3,6 +3,7 @@
 
 use std::collections::{HashMap, HashSet};
 
+use crate::common::pairwise::pairwise;
 use crate::common::{
     Check, Kind, MANY_PHOTONS, assert_complains, assert_complains_of, assert_holds, device, draws_of, photons, photons_on_cpu, plan_for,
     same_photons, streams_of,
@@ -39,6 +40,11 @@ fn each_once(found: &[Photon], photon_count: u32, bounces: u32) -> Check {
 
 /// The builders on the device store one set; returns it.
 fn builders_agree(gpu: &Gpu, settings: &RoomSettings) -> Vec<Photon> {
+    these_builders_agree(gpu, &Builder::ON_GPU, settings)
+}
+
+/// The same of some of them and the naive one.
+fn these_builders_agree(gpu: &Gpu, builders: &[Builder], settings: &RoomSettings) -> Vec<Photon> {
     let of = |builder| photons(gpu, &RoomSettings { builder, ..settings.clone() });
     let expected = of(Builder::Naive);
     let what = |builder| {
@@ -49,7 +55,7 @@ fn builders_agree(gpu: &Gpu, settings: &RoomSettings) -> Vec<Photon> {
         )
     };
     assert_holds(what(Builder::Naive), each_once(&expected, settings.photons, settings.bounces));
-    for builder in Builder::ON_GPU {
+    for &builder in builders {
         let found = of(builder);
         assert_holds(what(builder), each_once(&found, settings.photons, settings.bounces));
         assert_holds(what(builder), same_photons(&found, &expected));
@@ -110,13 +116,13 @@ fn the_scanning_builder_keeps_photons_in_their_order() {
 #[test]
 fn builders_store_the_same_photons_for_every_effect() {
     let Some(gpu) = device() else { return };
-    for rng in GENERATORS {
-        for emission in [EmissionLaw::Uniform, EmissionLaw::Cosine] {
-            for shininess in [[None; 5], [Some(2.0), None, Some(0.5), Some(0.0), Some(50.0)]] {
-                for photons in [65, 1000] {
-                    builders_agree(&gpu, &RoomSettings { photons, rng, emission, shininess, ..RoomSettings::default() });
-                }
-            }
+    let emissions = [EmissionLaw::Uniform, EmissionLaw::Cosine];
+    let walls = [[None; 5], [Some(2.0), None, Some(0.5), Some(0.0), Some(50.0)]];
+    for row in pairwise(&[Builder::ON_GPU.len(), GENERATORS.len(), emissions.len(), walls.len()]) {
+        for photons in [65, 1000] {
+            let (rng, emission, shininess) = (GENERATORS[row[1]], emissions[row[2]], walls[row[3]]);
+            let settings = RoomSettings { photons, rng, emission, shininess, ..RoomSettings::default() };
+            these_builders_agree(&gpu, &[Builder::ON_GPU[row[0]]], &settings);
         }
     }
     let sampled = RoomSettings { phong_direction: PhongDirection::Sampled, shininess: [Some(2.0); 5], ..RoomSettings::default() };
@@ -129,23 +135,26 @@ fn group_sizes_and_chunks_change_no_photon() {
     let Some(gpu) = device() else { return };
     let settings = RoomSettings { photons: 1001, ..RoomSettings::default() };
     // One that carries its state in the path, and one that has none.
-    for rng in [Rng::Rand48, Rng::Philox] {
+    let rngs = [Rng::Rand48, Rng::Philox];
+    let group_sizes: Vec<u32> = [32, 64, 128, 256, 512, 1024].into_iter().filter(|size| *size <= gpu.facts().work_group_size).collect();
+    let chunks = [None, Some(65), Some(500), Some(1000), Some(1001), Some(5000)];
+    let of = |rng| photons(&gpu, &RoomSettings { rng, ..settings.clone() });
+    let expected = rngs.map(of);
+    for row in pairwise(&[Builder::ON_GPU.len(), group_sizes.len(), chunks.len(), rngs.len()]) {
+        let (builder, group_size, chunk, rng) = (Builder::ON_GPU[row[0]], group_sizes[row[1]], chunks[row[2]], rngs[row[3]]);
+        let found = photons(&gpu, &RoomSettings { rng, builder, group_size, chunk, ..settings.clone() });
+        let what = format!("{rng:?}, {builder:?}, groups of {group_size}, chunks of {chunk:?}");
+        assert_holds(&what, each_once(&found, settings.photons, settings.bounces));
+        assert_holds(&what, same_photons(&found, &expected[row[3]]));
+    }
+    for (rng, expected) in rngs.into_iter().zip(expected) {
         let settings = RoomSettings { rng, ..settings.clone() };
-        let expected = photons(&gpu, &settings);
-        for group_size in [32, 64, 128, 256, 512, 1024].into_iter().filter(|size| *size <= gpu.facts().work_group_size) {
-            let found = builders_agree(&gpu, &RoomSettings { group_size, ..settings.clone() });
-            assert_holds(format!("{rng:?}, groups of {group_size}"), same_photons(&found, &expected));
-        }
         for (counters, group_size) in [(2, 32), (8, 64), (8, 128), (64, 32)] {
             let settings = RoomSettings { counters: Some(counters), group_size, builder: Builder::Atomic, ..settings.clone() };
             for chunk in [None, Some(500)] {
                 let found = photons(&gpu, &RoomSettings { chunk, ..settings.clone() });
                 assert_holds(format!("{rng:?}, {counters} counters, groups of {group_size}, {chunk:?}"), same_photons(&found, &expected));
             }
-        }
-        for chunk in [65, 500, 1000, 1001, 5000] {
-            let found = builders_agree(&gpu, &RoomSettings { chunk: Some(chunk), ..settings.clone() });
-            assert_holds(format!("{rng:?}, chunks of {chunk}"), same_photons(&found, &expected));
         }
     }
 }

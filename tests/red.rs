@@ -81,9 +81,9 @@ impl Question {
     /// Whether another test, the same for every device, shows that a device without a fault answers it right.
     fn has_a_test_of_its_own(self) -> bool {
         match self {
-            Photons(_) | StripedCounters | RoomFilm(_) | Ledger(_) | ClosedForm(_) | Appends | Builders | StrictMath | Finite
-            | FiniteBox | Nearest | Pairs | Crowds | AimedLight(_) => false,
-            Bits(_) | LampInBox(_) | Shelf | Ridge | Spot | Texture(_) => true,
+            Photons(_) | StripedCounters | RoomFilm(_) | Ledger(_) | Appends | Builders | StrictMath | Finite | FiniteBox | Nearest
+            | Pairs | Crowds | AimedLight(_) => false,
+            ClosedForm(_) | Bits(_) | LampInBox(_) | Shelf | Ridge | Spot | Texture(_) => true,
             LeaningPlane(_) | LeaningScatterer | PatchInPlane | StackFromAfar | GlassInFurnace(..) => true,
         }
     }

@@ -306,10 +306,9 @@ fn a_million_photons_have_the_exact_shares() {
 #[test]
 fn ten_million_photons_have_the_exact_shares() {
     let Some(gpu) = device() else { return };
-    for rng in [Rng::Philox, Rng::Mt] {
-        for emission in [EmissionLaw::Uniform, EmissionLaw::Cosine] {
-            let settings = RoomSettings { rng, emission, photons: 10_000_000, builder: Builder::Ballot, ..RoomSettings::default() };
-            assert_holds(format!("{rng:?} {emission:?}"), has_shares(&fates_of(&gpu, &settings), emission));
-        }
+    // A million photons have each generator with each law.
+    for (rng, emission) in [(Rng::Philox, EmissionLaw::Cosine), (Rng::Mt, EmissionLaw::Uniform)] {
+        let settings = RoomSettings { rng, emission, photons: 10_000_000, builder: Builder::Ballot, ..RoomSettings::default() };
+        assert_holds(format!("{rng:?} {emission:?}"), has_shares(&fates_of(&gpu, &settings), emission));
     }
 }

@@ -1,7 +1,10 @@
 //! Lighting scenes of triangles: bits that no split, builder or unused effect may change, parts that add
 //! up, radiometry, leaks, and plans that the device's work is counted against.
 
+use std::cell::LazyCell;
+
 use crate::common::lit::{light, received, run, scene};
+use crate::common::pairwise::pairwise;
 use crate::common::{Check, Complaint, Kind, assert_complains, assert_holds, device, device_with, known, pairs, same_sums, z_check};
 use glam::{DVec3, Vec3};
 use photonmill::constants::GATHER_SLICE;
@@ -181,11 +184,15 @@ fn an_effect_that_the_scene_lacks_changes_no_bit() {
     for name in ["cornell", "cornell-spheres"] {
         let scene = scene(name);
         let reference = picture(&gpu, &scene, &small());
-        for decision in reference.plan.decisions.iter().filter(|decision| !decision.needed) {
-            let effect = decision.effect;
-            let forced = picture(&gpu, &scene, &SceneSettings { with: vec![effect], ..small() });
-            assert!(forced.plan.keeps(effect));
-            assert_holds(effect.name(), same_film(&format!("{name} with {}", effect.name()), &forced, &reference));
+        let unneeded: Vec<Effect> =
+            reference.plan.decisions.iter().filter(|decision| !decision.needed).map(|decision| decision.effect).collect();
+        assert!(unneeded.len() > 5, "{name}: {unneeded:?}");
+        // Each with and without each other.
+        for row in pairwise(&vec![2; unneeded.len()]) {
+            let with: Vec<Effect> = unneeded.iter().zip(row).filter(|(_, forced)| *forced == 1).map(|(effect, _)| *effect).collect();
+            let forced = picture(&gpu, &scene, &SceneSettings { with: with.clone(), ..small() });
+            assert!(with.iter().all(|effect| forced.plan.keeps(*effect)), "{with:?}");
+            assert_holds(format!("{with:?}"), same_film(&format!("{name} with {with:?}"), &forced, &reference));
         }
         // A list instead of a tree finds the same.
         if name == "cornell" {
@@ -239,6 +246,7 @@ fn an_effect_that_the_scene_needs_is_missed_when_it_is_left_out() {
     let scene = rich_scene();
     let settings = SceneSettings { rounds: 12, ..small() };
     let reference = picture(&gpu, &scene, &settings);
+    let caustics = LazyCell::new(|| picture(&gpu, &scene, &SceneSettings { part: Part::Caustic, ..settings.clone() }));
     for effect in Effect::ALL {
         let decision = reference.plan.decisions.iter().find(|decision| decision.effect == effect).unwrap();
         assert!(decision.needed && decision.kept, "{}: {}", effect.name(), decision.evidence);
@@ -253,7 +261,7 @@ fn an_effect_that_the_scene_needs_is_missed_when_it_is_left_out() {
         // Faint caustics show best by themselves.
         let is_caustic = matches!(effect, Effect::ReflectiveCaustics | Effect::RefractiveCaustics);
         let settings = SceneSettings { part: if is_caustic { Part::Caustic } else { Part::All }, ..settings.clone() };
-        let reference = if is_caustic { &picture(&gpu, &scene, &settings) } else { &reference };
+        let reference = if is_caustic { &*caustics } else { &reference };
         let without = picture(&gpu, &scene, &SceneSettings { without: vec![effect], ..settings });
         assert_eq!(without.plan.missing(), [effect]);
         // Somewhere, or over the whole picture, the two differ by more than their errors.

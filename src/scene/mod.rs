@@ -16,6 +16,7 @@ pub mod rectangle;
 pub mod room;
 pub mod targets;
 pub mod texture;
+mod work;
 
 use std::borrow::Cow;
 use std::path::Path;

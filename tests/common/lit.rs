@@ -18,10 +18,10 @@ use photonmill::settings::Builder;
 use photonmill::settings::scene::{Illumination, SceneSettings};
 use photonmill::verify::selfcheck::Estimate;
 
-use super::{Check, z_check};
+use super::{Check, assert_holds, equal_sums, z_check};
 
-/// Builders of a map of a scene of triangles that fly in ways of their own.
-pub const SCENE_BUILDERS: [Builder; 2] = [Builder::Ballot, Builder::Persistent];
+/// Builders of a scene that trace in ways of their own.
+const SCENE_BUILDERS: [Builder; 2] = [Builder::Ballot, Builder::Persistent];
 pub const BOTH: [Illumination; 2] = [Illumination::Split, Illumination::Photons];
 
 /// Runs to the end, whatever comes out.
@@ -71,6 +71,20 @@ fn received_in(
     let sensor = Sensor::Receivers { count: points.len() as u32 };
     let plan = ScenePlan::new(scene, geometry, &watched(settings), sensor, limits).unwrap();
     light(gpu, &View { geometry, camera: None, phases: &[receivers] }, plan)
+}
+
+/// Fails unless every builder comes to the same fates and sums in a short run: what one of them shows of these settings then
+/// holds for all.
+pub fn assert_builders_agree(gpu: &Gpu, scene: &Scene, settings: &SceneSettings, points: &[(DVec3, DVec3)]) {
+    let [photons, caustic_photons] = [settings.photons, settings.caustic_photons].map(|photons| photons.min(3001));
+    let found = SCENE_BUILDERS.map(|builder| {
+        received(gpu, scene, &SceneSettings { builder: Some(builder), photons, caustic_photons, rounds: 1, ..settings.clone() }, points)
+    });
+    assert!(found[0].film.sums.iter().any(|sum| *sum > 0), "nothing is lit: {settings:?}");
+    for other in &found[1..] {
+        assert_holds(format!("{:?}", other.plan.settings), equal_sums("light", &other.film.sums, &found[0].film.sums));
+        assert_eq!(other.fates, found[0].fates, "{:?}", other.plan.settings);
+    }
 }
 
 /// What a camera sees of a scene of triangles.
