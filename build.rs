@@ -2,7 +2,7 @@
 //! struct whose fields are its buffers, with everything else that reflection knows of it. Writes `charts.md` too: the
 //! charts of the guide.
 
-use std::collections::BTreeSet;
+use std::collections::{BTreeMap, BTreeSet};
 use std::fmt::Write as _;
 use std::path::PathBuf;
 use std::{env, fs};
@@ -31,6 +31,7 @@ fn main() {
     let mut structs = String::new();
     let mut layouts = String::new();
     let mut max_buffers = 0;
+    let mut scene_elements: BTreeMap<String, String> = BTreeMap::new();
     for source in compile::sources(&glsl) {
         let compile::Source { name, path, .. } = &source;
         match compile(&glsl, &source, constants::SHARED_WITH_GLSL, &|_, text| text) {
@@ -40,7 +41,11 @@ fn main() {
                 fs::write(out.join(format!("{name}.spv")), bytes).expect("OUT_DIR can be written");
                 let kernel =
                     Kernel { votes_in_loops: files.iter().any(|file| file.ends_with("builder/persistent.glsl")), ..reflect(&words) };
-                max_buffers = max_buffers.max(kernel.buffers.len());
+                for Buffer { name: buffer, element, .. } in &kernel.scene {
+                    assert_eq!(scene_elements.entry(buffer.clone()).or_insert(element.clone()), element, "{buffer} of set 0 in {name}");
+                }
+                let scene_bindings = world_of(name, &kernel.scene).map_or(0, |(_, buffers)| buffers.len());
+                max_buffers = max_buffers.max(scene_bindings + kernel.buffers.len());
                 write_kernel(&mut structs, path, name, &kernel);
                 write_layouts(&mut layouts, name, &kernel);
             }
@@ -51,6 +56,7 @@ fn main() {
         failures.iter().for_each(|message| eprint!("{message}"));
         std::process::exit(1);
     }
+    write_worlds(&mut structs, &scene_elements);
     let buffer_count =
         format!("/// Storage buffers that the kernel with the most of them binds.\npub const MAX_BUFFERS: u32 = {max_buffers};\n");
     let source = format!(
@@ -88,14 +94,52 @@ fn charts() -> String {
 
 struct Buffer {
     name: String,
-    set: u32,
     binding: u32,
     access: AccessType,
+    /// Rust type of an element.
+    element: String,
+    /// Bytes from one element to the next in GLSL, where it may be a part of Rust's.
+    stride: usize,
+}
+
+/// Rust types of elements that kernels see as words, by the names of their buffers; all other elements are what they are in GLSL.
+const PACKED: [(&str, &[&str]); 5] = [
+    ("crate::photon::StoredPhoton", &["photons", "sorted_photons", "tree_photons"]),
+    ("crate::photon::Origin", &["origins", "tree_origins"]),
+    ("crate::photon::MapPhoton", &["map", "sorted_map", "landed"]),
+    ("crate::path::StoredPath", &["paths", "next_paths"]),
+    ("u64", &["film", "film_totals", "low_squares", "high_squares", "pass_sums", "estimates", "film_sums", "film_squares", "part_totals"]),
+];
+
+/// Set 0 of each world: the buffers of its scene, in the order of their bindings.
+const WORLDS: [(&str, &[&str]); 2] = [
+    ("Room", &["rooms", "walls", "lights", "points"]),
+    ("Scene", &["nodes", "triangles", "normals", "uvs", "materials", "textures", "texels", "emitters", "caustic_targets", "planes"]),
+];
+
+fn element_type(buffer: &str, element: &Type) -> String {
+    if let Type::Struct(record) = element {
+        return format!("crate::records::{}", struct_name(record));
+    }
+    let packed = PACKED.iter().find(|(_, buffers)| buffers.contains(&buffer)).map(|(packed, _)| *packed);
+    let number = element.to_string();
+    let own = || match number.as_str() {
+        known @ ("u32" | "f32") => known,
+        "vec2<u32>" => "glam::UVec2",
+        "vec2<f32>" => "glam::Vec2",
+        "vec4<f32>" => "glam::Vec4",
+        "vec4<u32>" => "[u32; 4]",
+        other => panic!("buffer {buffer}: {other} has no Rust type here"),
+    };
+    packed.unwrap_or_else(own).to_owned()
 }
 
 #[derive(Default)]
 struct Kernel {
+    /// Of set 1: its own.
     buffers: Vec<Buffer>,
+    /// Of set 0.
+    scene: Vec<Buffer>,
     /// (name, id) of the named specialization constants.
     constants: Vec<(String, u32)>,
     push: Option<StructType>,
@@ -114,16 +158,14 @@ fn reflect(words: &[u32]) -> Kernel {
             Variable::Descriptor { desc_bind, desc_ty: DescriptorType::StorageBuffer(_), ty, .. } => {
                 let Type::Struct(block) = ty else { panic!("a storage buffer that is no block: {ty:?}") };
                 let [member] = block.members.as_slice() else { panic!("a buffer block holds one array: {block:?}") };
-                kernel.buffers.push(Buffer {
-                    name: member.name.clone().expect("buffers have names"),
-                    set: desc_bind.set(),
-                    binding: desc_bind.bind(),
-                    access: member.access_ty,
-                });
-                if let Type::Array(array) = &member.ty
-                    && let Type::Struct(record) = array.element_ty.as_ref()
-                {
-                    kernel.strides.push((struct_name(record), array.stride.expect("buffer arrays have a stride")));
+                let Type::Array(array) = &member.ty else { panic!("a buffer block holds one array: {block:?}") };
+                let name = member.name.clone().expect("buffers have names");
+                let stride = array.stride.expect("buffer arrays have a stride");
+                let element = element_type(&name, &array.element_ty);
+                let buffer = Buffer { element, stride, name, binding: desc_bind.bind(), access: member.access_ty };
+                if desc_bind.set() == 0 { &mut kernel.scene } else { &mut kernel.buffers }.push(buffer);
+                if let Type::Struct(record) = array.element_ty.as_ref() {
+                    kernel.strides.push((struct_name(record), stride));
                     kernel.records.push(record.clone());
                 }
             }
@@ -139,7 +181,7 @@ fn reflect(words: &[u32]) -> Kernel {
             _ => {}
         }
     }
-    kernel.buffers.sort_by_key(|buffer| (buffer.set, buffer.binding));
+    kernel.buffers.sort_by_key(|buffer| buffer.binding);
     kernel.constants.sort();
     // A record inside a record has a twin of its own.
     let mut next = 0;
@@ -170,8 +212,12 @@ fn write_kernel(source: &mut String, path: &str, name: &str, kernel: &Kernel) {
     let type_name = camel_case(name);
     let push = kernel.push.as_ref().map_or("()".to_owned(), |record| format!("crate::records::{}", struct_name(record)));
     writeln!(source, "/// `glsl/{path}`.\npub struct {type_name}<'a> {{").unwrap();
+    let world = world_of(name, &kernel.scene);
+    if let Some((world, _)) = world {
+        writeln!(source, "    pub {}: &'a {world},", world.to_lowercase()).unwrap();
+    }
     for buffer in &kernel.buffers {
-        writeln!(source, "    pub {}: &'a Buffer,", buffer.name).unwrap();
+        writeln!(source, "    pub {}: &'a Buffer<{}>,", buffer.name, buffer.element).unwrap();
     }
     writeln!(source, "}}\n\nimpl Kernel for {type_name}<'_> {{").unwrap();
     writeln!(source, "    type Push = {push};").unwrap();
@@ -179,24 +225,63 @@ fn write_kernel(source: &mut String, path: &str, name: &str, kernel: &Kernel) {
     writeln!(source, "        name: \"{name}\",").unwrap();
     writeln!(source, "        spirv: include_bytes!(concat!(env!(\"OUT_DIR\"), \"/{name}.spv\")),").unwrap();
     writeln!(source, "        push_bytes: size_of::<{push}>() as u32,").unwrap();
+    writeln!(source, "        scene_bindings: {},", world.map_or(0, |(_, bindings)| bindings.len())).unwrap();
     writeln!(source, "        votes_in_loops: {},", kernel.votes_in_loops).unwrap();
     writeln!(source, "        bindings: &[").unwrap();
-    for Buffer { name, set, binding, access } in &kernel.buffers {
+    for Buffer { name, binding, access, .. } in &kernel.buffers {
         let reads = *access != AccessType::WriteOnly;
         let writes = *access != AccessType::ReadOnly;
-        writeln!(source, "            Binding {{ name: \"{name}\", set: {set}, binding: {binding}, reads: {reads}, writes: {writes} }},")
-            .unwrap();
+        writeln!(source, "            Binding {{ name: \"{name}\", binding: {binding}, reads: {reads}, writes: {writes} }},").unwrap();
     }
     writeln!(source, "        ],\n        constants: &[").unwrap();
     for (constant, id) in &kernel.constants {
         writeln!(source, "            (\"{constant}\", {id}),").unwrap();
     }
     writeln!(source, "        ],\n    }};\n").unwrap();
-    // The least that a Vulkan device may offer.
-    writeln!(source, "    const FITS: () = assert!(size_of::<{push}>() <= 128, \"push constants of {name}\");\n").unwrap();
-    writeln!(source, "    fn buffers(&self) -> Vec<&Buffer> {{").unwrap();
-    let fields: Vec<String> = kernel.buffers.iter().map(|buffer| format!("self.{}", buffer.name)).collect();
-    writeln!(source, "        vec![{}]\n    }}\n}}\n", fields.join(", ")).unwrap();
+    writeln!(
+        source,
+        "    const FITS: () = {{\n        assert!(size_of::<{push}>() <= super::kernel::PUSH_BYTES as usize, \"push constants of {name}\");"
+    )
+    .unwrap();
+    for Buffer { name: buffer, element, stride, .. } in kernel.scene.iter().chain(&kernel.buffers) {
+        let fits = format!("size_of::<{element}>().is_multiple_of({stride}) || {stride}usize.is_multiple_of(size_of::<{element}>())");
+        writeln!(source, "        assert!({fits}, \"elements of {buffer} in {name}\");").unwrap();
+    }
+    writeln!(source, "    }};\n").unwrap();
+    let scene = world.map_or("Vec::new()".to_owned(), |(world, _)| format!("self.{}.buffers()", world.to_lowercase()));
+    writeln!(source, "    fn scene(&self) -> Vec<&AnyBuffer> {{\n        {scene}\n    }}\n").unwrap();
+    write_buffers(source, kernel.buffers.iter().map(|buffer| buffer.name.as_str()));
+    writeln!(source, "}}\n").unwrap();
+}
+
+fn write_buffers<'a>(source: &mut String, names: impl Iterator<Item = &'a str>) {
+    let fields: Vec<String> = names.map(|name| format!("self.{name}.any()")).collect();
+    writeln!(source, "    fn buffers(&self) -> Vec<&AnyBuffer> {{\n        vec![{}]\n    }}", fields.join(", ")).unwrap();
+}
+
+/// The world whose scene a kernel looks at, where it looks at one: name, and buffers in the order of their bindings.
+fn world_of(kernel: &str, scene: &[Buffer]) -> Option<(&'static str, &'static [&'static str])> {
+    let first = scene.first()?;
+    let world = *WORLDS.iter().find(|(_, buffers)| buffers.contains(&first.name.as_str())).unwrap_or_else(|| {
+        panic!("{} of {kernel} is in no scene; set 0 is for scenes", first.name);
+    });
+    for Buffer { name, binding, .. } in scene {
+        assert_eq!(world.1.get(*binding as usize), Some(&name.as_str()), "binding {binding} of set 0 in {kernel}");
+    }
+    Some(world)
+}
+
+/// The scene of each world, by the types that kernels give its buffers.
+fn write_worlds(source: &mut String, elements: &BTreeMap<String, String>) {
+    for (world, buffers) in WORLDS {
+        writeln!(source, "/// What kernels look at: set 0, the same for all of them.\npub struct {world} {{").unwrap();
+        for name in buffers {
+            writeln!(source, "    pub {name}: Buffer<{}>,", elements[*name]).unwrap();
+        }
+        writeln!(source, "}}\n\nimpl {world} {{").unwrap();
+        write_buffers(source, buffers.iter().copied());
+        writeln!(source, "}}\n").unwrap();
+    }
 }
 
 fn write_layouts(source: &mut String, kernel_name: &str, kernel: &Kernel) {

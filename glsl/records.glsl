@@ -438,6 +438,46 @@ struct Samples {
     vec3 unpacked_direction;
 };
 
+struct PackingCase {
+    vec3 position;
+    uint wall;
+    vec3 direction;
+    uint photon;
+    uvec2 stream;
+    float flux;
+    float weight;
+    vec3 colour;
+    uint normal_code;
+    Room room;
+};
+
+struct UnpackedRoom {
+    vec3 place;
+    uint wall;
+    float flux;
+    float weight;
+    vec3 position;
+    uint path_wall;
+    vec3 direction;
+    uint photon;
+    uvec2 stream;
+    float path_flux;
+};
+
+struct UnpackedScene {
+    vec3 position;
+    uint plane;
+    vec3 flux;
+    uint wi;
+    uint normal_code;
+    vec3 normal;
+    uint direction_code;
+    vec3 low;
+    vec3 high;
+    uint meta;
+    uint child_nodes;
+};
+
 struct MeasurePush {
     uint item_count;
     uint step_count;

@@ -436,7 +436,7 @@ records! {
         draws: Draws,
         map: PhotonStore,
         bounce: u32,
-        /// Number of the list that its paths come from: [`crate::engine::scene::photons`] counts them from 0 in each segment.
+        /// Number of the list that its paths come from: [`crate::engine::scene::trace`] counts them from 0 in each segment.
         list: u32,
         /// 1: no path goes on after it.
         is_last: u32,
@@ -628,6 +628,53 @@ records! {
         /// The normal, packed in 2 x 16 and in 2 x 15 bits.
         unpacked_normal: Vec3,
         unpacked_direction: Vec3,
+    }
+
+    /// What `glsl/check/check_packing_...` pack.
+    PackingCase {
+        /// In the plane of its wall, where it has one.
+        position: Vec3,
+        wall: u32,
+        /// A unit vector.
+        direction: Vec3,
+        photon: u32,
+        stream: UVec2,
+        flux: f32,
+        weight: f32,
+        /// Flux of a map's photon, and what one hit adds.
+        colour: Vec3,
+        /// Of a normal that is only unpacked.
+        normal_code: u32,
+        room: Room,
+    }
+
+    /// An entry of the room's photon map and a path, unpacked.
+    UnpackedRoom {
+        place: Vec3,
+        wall: u32,
+        flux: f32,
+        weight: f32,
+        position: Vec3,
+        path_wall: u32,
+        direction: Vec3,
+        photon: u32,
+        stream: UVec2,
+        path_flux: f32,
+    }
+
+    /// An entry of the map of a scene of triangles, unit vectors packed and unpacked, and a child of a node.
+    UnpackedScene {
+        position: Vec3,
+        plane: u32,
+        flux: Vec3,
+        wi: u32,
+        normal_code: u32,
+        normal: Vec3,
+        direction_code: u32,
+        low: Vec3,
+        high: Vec3,
+        meta: u32,
+        child_nodes: u32,
     }
 
     /// A measurement of a device's limits; see `glsl/kernels/measure_...`.

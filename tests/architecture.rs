@@ -12,7 +12,16 @@ const LINE: &[&[&str]] = &[
     &["scene"],
     &["verify::judge", "plan"],
     &["cpu", "gpu"],
-    &["engine", "engine::film", "engine::prefix_sum", "engine::tallies", "engine::totals", "engine::unknown", "engine::nonfinite_values"],
+    &[
+        "engine",
+        "engine::film",
+        "engine::planned",
+        "engine::prefix_sum",
+        "engine::tallies",
+        "engine::totals",
+        "engine::unknown",
+        "engine::nonfinite_values",
+    ],
     &["engine::watch", "engine::replay"],
     &["engine::bias"],
     &["engine::run"],
@@ -258,6 +267,25 @@ fn no_arrow_points_to_the_right() {
     assert_eq!(wrong_arrows(&sources), Vec::<String>::new());
     for module in sources.keys().filter(|module| !SIGNPOSTS.contains(&module.as_str()) && !module.starts_with("guide")) {
         assert!(place(module).is_some(), "say in this test where {module} stands");
+    }
+}
+
+/// A comment or page that sends its reader to a file that is not there.
+#[test]
+fn files_that_are_named_exist() {
+    let is_path = |symbol: char| symbol.is_ascii_alphanumeric() || "_/.*".contains(symbol);
+    let pages = ["README.md", "src/guide/architecture.md", "src/guide/performance.md"];
+    let pages = pages.map(|page| (root(page), fs::read_to_string(root(page)).unwrap()));
+    for (path, text) in files(&root("src")).into_iter().chain(files(&root("glsl"))).chain(pages) {
+        for named in text.split(|symbol| !is_path(symbol)) {
+            let named = named.trim_end_matches('.');
+            let is_ours = ["src/", "glsl/"].iter().any(|folder| named.starts_with(folder));
+            if !is_ours || ![".rs", ".glsl", ".comp"].iter().any(|end| named.ends_with(end)) || named.contains('*') {
+                continue;
+            }
+            let worlds = ["room", "scene"].map(|world| root(&named.replace("WORLD", world)));
+            assert!(worlds.iter().all(|file| file.exists()), "{} names {named}", path.display());
+        }
     }
 }
 

@@ -6,9 +6,7 @@ use crate::common::{Check, assert_complains, assert_holds, device, device_with, 
 use photonmill::constants::LOOP_LIMIT;
 use photonmill::error::Error;
 use photonmill::gpu::clock::LEAST_WARM_UP;
-use photonmill::gpu::kernels::ScanAdd;
-use photonmill::gpu::{Commands, Constants, Extent, Gpu, Memory, Options, check};
-use photonmill::records::ScanPush;
+use photonmill::gpu::{Commands, Constants, Gpu, Memory, Options, check};
 use photonmill::rng::Rng;
 use photonmill::settings::{Builder, Gather, RoomSettings};
 use photonmill::timings::{Clock, Row, Timings};
@@ -101,15 +99,12 @@ fn a_validation_message_is_an_error() {
     {
         let mut commands = Commands::new(&gpu, Constants::new(128), Instant::now()).unwrap();
         let items = gpu.buffer::<u32>("items", 128, Memory::Device).unwrap();
-        let block_sums = gpu.buffer::<u32>("block sums", 1, Memory::Device).unwrap();
-        // One word cannot hold the three of a dispatch size.
-        let too_small = gpu.buffer::<u32>("too small", 1, Memory::Device).unwrap();
-        let kernel = ScanAdd { items: &items, block_sums: &block_sums };
-        commands.dispatch(kernel, &ScanPush { item_count: 128 }, Extent::Indirect(&too_small)).unwrap();
+        // Nothing cannot be filled.
+        commands.fill(&items, 0, 0, 1);
     }
     let error = gpu.check_validation().unwrap_err();
     assert!(matches!(error, Error::Validation { count: 1.., .. }), "{error}");
-    assert!(error.to_string().contains("vkCmdDispatchIndirect"), "{error}");
+    assert!(error.to_string().contains("vkCmdFillBuffer"), "{error}");
     // Once said, it stays said.
     assert!(matches!(gpu.check_validation(), Err(Error::Validation { .. })));
 }

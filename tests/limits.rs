@@ -11,7 +11,7 @@ use photonmill::engine;
 use photonmill::engine::Control;
 use photonmill::engine::End;
 use photonmill::engine::scene::resources::SceneResources;
-use photonmill::engine::scene::{self, Round, RunResult, View, photons};
+use photonmill::engine::scene::{self, Round, RunResult, View, trace};
 use photonmill::error::Error;
 use photonmill::gpu::{Commands, Gpu};
 use photonmill::output::scene_report;
@@ -153,7 +153,7 @@ fn photons_stored_are_the_length_of_the_map() {
                     stored += u64::from(commands.read::<u32>(&buffers.counters, 1)?[0]);
                     Ok(())
                 };
-                photons::trace(&mut commands, round, buffers, map, chunk, &mut count).unwrap();
+                trace::trace(&mut commands, round, buffers, map, chunk, &mut count).unwrap();
             }
             let fates = &lit.fates[usize::from(map.caustic_only)];
             assert!(stored > 100, "{builder:?}, {illumination:?}, {}: {stored}", map.name);

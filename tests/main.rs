@@ -29,6 +29,7 @@ mod limits;
 mod memory;
 mod optics;
 mod overlap;
+mod packing;
 mod paranoid;
 mod photons;
 mod primitives;

@@ -4,6 +4,7 @@ use crate::common::{device, lit, run};
 use photonmill::engine;
 use photonmill::engine::scene::View;
 use photonmill::gpu::Gpu;
+use photonmill::plan::memory::{PlannedBuffer, bytes_of};
 use photonmill::plan::scene::ScenePlan;
 use photonmill::plan::sensor::Sensor;
 use photonmill::rng::Rng;
@@ -13,7 +14,7 @@ use photonmill::settings::scene::{Illumination, SceneSettings};
 use photonmill::settings::{Builder, Gather, Preset, RoomSettings, Sums};
 
 /// Device memory against what a plan lists.
-fn check(what: &str, taken: u64, stated: u64, buffers: &[(&'static str, u64)]) -> crate::common::Check {
+fn check(what: &str, taken: u64, stated: u64, buffers: &[PlannedBuffer]) -> crate::common::Check {
     if taken == stated { Ok(()) } else { Err(format!("{what}: {taken} bytes taken, {stated} stated: {buffers:?}")) }
 }
 
@@ -97,8 +98,7 @@ fn the_check_complains_about_a_forgotten_buffer() {
     let buffers = outcome.plan.buffers();
     for forgotten in 0..buffers.len() {
         let mut others = buffers.clone();
-        let (name, _) = others.remove(forgotten);
-        let stated = others.iter().map(|(_, bytes)| bytes).sum();
-        crate::common::assert_complains(name, check("the paper's line", bytes, stated, &others));
+        let PlannedBuffer { name, .. } = others.remove(forgotten);
+        crate::common::assert_complains(name, check("the paper's line", bytes, bytes_of(&others), &others));
     }
 }

@@ -7,17 +7,17 @@ use std::time::Instant;
 use crate::common::{Check, Device, assert_complains, assert_holds, device, equal_sums, in_order, photons, plan_for, run};
 use bytemuck::Zeroable;
 use photonmill::constants::{NO_WALL, SCAN_ITEMS};
-use photonmill::engine::prefix_sum::{block_sums, scan};
+use photonmill::engine::prefix_sum::scan;
 use photonmill::engine::room::constants;
 use photonmill::engine::room::index;
 use photonmill::engine::room::resources::RoomResources;
 use photonmill::engine::room::trace;
 use photonmill::engine::tallies;
 use photonmill::gpu::kernels::DispatchSize;
-use photonmill::gpu::{Buffer, Commands, Constants, Extent, Memory};
-use photonmill::path::StoredPath;
+use photonmill::gpu::{Commands, Constants, Extent, Memory};
 use photonmill::photon::{Origin, Photon, StoredPhoton};
 use photonmill::plan::RoomPlan;
+use photonmill::plan::memory::block_sum_counts;
 use photonmill::records::{DispatchArgs, DispatchSizePush, Tally};
 use photonmill::rng::Rng;
 use photonmill::scene::open_box::open_box;
@@ -43,7 +43,8 @@ fn prefix_sums(gpu: &Device, items: &[u32], group_size: u32) -> (Vec<u32>, Vec<u
     let guards = 64;
     let mut commands = Commands::new(gpu, Constants::new(group_size), Instant::now()).unwrap();
     let buffer = gpu.buffer::<u32>("items", items.len() as u64 + guards, Memory::Device).unwrap();
-    let levels = block_sums(gpu, items.len() as u64, group_size).unwrap();
+    let level = |count| gpu.buffer("block sums", count, Memory::Device).unwrap();
+    let levels: Vec<_> = block_sum_counts(items.len() as u64, group_size).into_iter().map(level).collect();
     commands.fill(&buffer, 0, items.len() as u64 + guards, GUARD);
     commands.upload(&buffer, items).unwrap();
     scan(&mut commands, &buffer, &levels, items.len() as u32, group_size).unwrap();
@@ -255,15 +256,15 @@ fn append(gpu: &Device, scene: &RoomScene, settings: &RoomSettings, capacity: u3
     let mut commands = Commands::new(gpu, constants(&plan), Instant::now()).unwrap();
     let mut resources = RoomResources::new(gpu, &mut commands, scene, &plan).unwrap();
     plan.photon_capacity = capacity;
-    let guarded = |commands: &mut Commands, buffer: Buffer| {
-        commands.fill(&buffer, 0, buffer.size_bytes() / 4, GUARD);
-        buffer
-    };
-    let paths = || gpu.buffer::<StoredPath>("guarded paths", path_count, Memory::Device).unwrap();
     let entries = u64::from(capacity) + GUARD_ENTRIES;
-    resources.photons = guarded(&mut commands, gpu.buffer::<StoredPhoton>("guarded photons", entries, Memory::Device).unwrap());
-    resources.origins = guarded(&mut commands, gpu.buffer::<Origin>("guarded origins", entries, Memory::Device).unwrap());
-    resources.paths = [guarded(&mut commands, paths()), guarded(&mut commands, paths())];
+    resources.photons = gpu.buffer("guarded photons", entries, Memory::Device).unwrap();
+    resources.origins = gpu.buffer("guarded origins", entries, Memory::Device).unwrap();
+    commands.fill(&resources.photons, 0, entries, GUARD);
+    commands.fill(&resources.origins, 0, entries, GUARD);
+    for paths in &mut resources.paths {
+        *paths = gpu.buffer("guarded paths", path_count, Memory::Device).unwrap();
+        commands.fill(paths, 0, path_count, GUARD);
+    }
     trace::chunk(&mut commands, &resources, &plan, 0, &plan.chunk(0)).unwrap();
     let map = commands.read::<StoredPhoton>(&resources.photons, entries as usize).unwrap();
     let (map, behind) = map.split_at(capacity as usize);
@@ -271,8 +272,8 @@ fn append(gpu: &Device, scene: &RoomScene, settings: &RoomSettings, capacity: u3
     let (origins, origins_behind) = origins.split_at(capacity as usize);
     let mut guards: Vec<u32> = [bytemuck::cast_slice(behind), bytemuck::cast_slice(origins_behind)].concat();
     for paths in &resources.paths {
-        let words = commands.read::<[u32; 4]>(paths, 3 * path_count as usize).unwrap();
-        for array in words.chunks_exact(path_count as usize) {
+        let words = commands.read(paths, path_count as usize).unwrap();
+        for array in bytemuck::cast_slice::<_, [u32; 4]>(&words).chunks_exact(path_count as usize) {
             guards.extend(array[path_places..].as_flattened());
         }
     }
@@ -443,7 +444,7 @@ fn dispatch_size(gpu: &Device, items: u32, push: DispatchSizePush) -> DispatchAr
     let dispatch_args = gpu.buffer::<DispatchArgs>("dispatch args", 2, Memory::Device).unwrap();
     commands.fill(&counters, 0, 3, 17);
     commands.fill(&counters, u64::from(push.counter), 1, items);
-    commands.fill(&dispatch_args, 0, 6, GUARD);
+    commands.fill(&dispatch_args, 0, 2, GUARD);
     commands.dispatch(DispatchSize { counters: &counters, dispatch_args: &dispatch_args }, &push, Extent::Groups(1, 1)).unwrap();
     let sizes = commands.read::<DispatchArgs>(&dispatch_args, 2).unwrap();
     assert_eq!(sizes[1], DispatchArgs { x: GUARD, y: GUARD, z: GUARD });

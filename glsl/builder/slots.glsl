@@ -16,21 +16,23 @@ void trace()
         uint slot = slot_of(index, photon_count);
         bool is_there = slot < photon_capacity();
         fits = taken.stored && is_there;
-        if (fits) {
-            store_photon(slot, taken.photon);
-        } else if (is_there && clears_slot()) {
-            store_no_photon(slot);
+        // Every neighbour stores, as memory takes whole lines sooner than parts of them.
+        Photon photon = taken.photon;
+        if (!fits) {
+            photon = emptied(photon);
+        }
+        if (is_there && (fits || clears_slot())) {
+            store_photon(slot, photon);
         }
         goes_on = taken.alive && (fits || !STORED_IS_ALIVE) && has_next_bounce();
-        if (goes_on) {
+        if (taken.alive && !goes_on) {
+            cut_off(path);
+        }
+        if (!goes_on) {
+            path = emptied(path);
+        }
+        if (has_next_bounce()) {
             store_path(index, path);
-        } else {
-            if (taken.alive) {
-                cut_off(path);
-            }
-            if (has_next_bounce()) {
-                store_no_path(index);
-            }
         }
     }
     count_left(goes_on);

@@ -1,5 +1,5 @@
 // The rate of atomic additions whose answer is used, at random counters up to number `mask`, or with mask 0 at one.
-// Dispatched by src/bench/rates.rs. One thread = `step_count` additions.
+// Dispatched by src/measure/bench/rates.rs. One thread = `step_count` additions.
 #version 460
 #extension GL_GOOGLE_include_directive : require
 #extension GL_EXT_scalar_block_layout : require

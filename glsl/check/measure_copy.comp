@@ -1,5 +1,5 @@
 // The bandwidth of memory: 16 bytes an invocation from one buffer to another.
-// Dispatched by src/bench/rates.rs. One thread = one block.
+// Dispatched by src/measure/bench/rates.rs. One thread = one block.
 #version 460
 #extension GL_GOOGLE_include_directive : require
 #extension GL_EXT_scalar_block_layout : require

@@ -1,5 +1,5 @@
 // The rate of additions to one counter, one a subgroup, whose answer all its invocations use.
-// Dispatched by src/bench/rates.rs. One thread = `step_count` additions by its subgroup.
+// Dispatched by src/measure/bench/rates.rs. One thread = `step_count` additions by its subgroup.
 #version 460
 #extension GL_GOOGLE_include_directive : require
 #extension GL_EXT_scalar_block_layout : require

@@ -1,5 +1,5 @@
 // The rate of single-precision sums and products, each rounded by itself as everywhere else here.
-// Dispatched by src/bench/rates.rs. One thread = four points that turn around the origin, which neither settle nor
+// Dispatched by src/measure/bench/rates.rs. One thread = four points that turn around the origin, which neither settle nor
 // wait for each other; a step takes 16 sums and products.
 #version 460
 #extension GL_GOOGLE_include_directive : require

@@ -1,5 +1,5 @@
 // The rate of reads of 32 bytes, a record's size, at random places of a large buffer.
-// Dispatched by src/bench/rates.rs. One thread = `step_count` reads, at pairs of blocks up to number `mask`.
+// Dispatched by src/measure/bench/rates.rs. One thread = `step_count` reads, at pairs of blocks up to number `mask`.
 #version 460
 #extension GL_GOOGLE_include_directive : require
 #extension GL_EXT_scalar_block_layout : require

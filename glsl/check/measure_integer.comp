@@ -1,6 +1,6 @@
 // The rate of 32-bit multiplications, and with one step the content of the buffer that the other measurements move:
 // Philox on itself, `step_count` times.
-// Dispatched by src/bench/rates.rs. One thread = one block of four words, whose counter begins with its number.
+// Dispatched by src/measure/bench/rates.rs. One thread = one block of four words, whose counter begins with its number.
 #version 460
 #extension GL_GOOGLE_include_directive : require
 #extension GL_EXT_scalar_block_layout : require

@@ -1,4 +1,4 @@
-// Places without order for measurements: the PCG hash of a number (Jarzynski and Olano 2020). Twin of src/bench/rates.rs.
+// Places without order for measurements: the PCG hash of a number (Jarzynski and Olano 2020). Twin of src/measure/bench/rates.rs.
 
 uint measured_place(uint number)
 {

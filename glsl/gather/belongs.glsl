@@ -4,7 +4,7 @@
 // on the very surfaces whose area is.
 
 // Unit normal n of the front, and what makes n . p + offset = 0: one load each.
-layout(set = 0, binding = 10, scalar) readonly buffer Planes { vec4 planes[]; };
+layout(set = 0, binding = 9, scalar) readonly buffer Planes { vec4 planes[]; };
 
 // Least cosine between normals: 41 degrees take in the facets of a curved surface, no box's corner.
 const float MIN_NORMAL_COSINE = 0.75;

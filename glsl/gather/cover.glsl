@@ -172,13 +172,12 @@ bool cover_triangles(inout Cover cover)
             }
             uint place = group.x + bitCount(group.y & ((1u << slot) - 1u));
             BvhNode node = nodes[place];
-            vec3 spacing = uintBitsToFloat((uvec3(node.spacing, node.spacing >> 8, node.spacing >> 16) & 0xffu) << 23);
-            uint child_nodes = node.spacing >> 24;
+            uint child_nodes = child_nodes_of(node);
             uint near_nodes = 0;
             uint near_leaves = 0;
             [[unroll]] for (uint child = 0; child < 8; child++) {
-                vec3 low = vec3(byte_of(node.min_x, child), byte_of(node.min_y, child), byte_of(node.min_z, child)) * spacing + node.origin;
-                vec3 high = vec3(byte_of(node.max_x, child), byte_of(node.max_y, child), byte_of(node.max_z, child)) * spacing + node.origin;
+                vec3 low = low_corner(node, child);
+                vec3 high = high_corner(node, child);
                 uint meta = byte_of(node.meta, child);
                 if (meta != 0 && all(lessThanEqual(low, cover.position + cover.reach)) && all(greaterThanEqual(high, cover.position - cover.reach))) {
                     bool is_node = ((child_nodes >> child) & 1u) != 0;

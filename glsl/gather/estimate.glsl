@@ -1,7 +1,7 @@
 // Density estimation: what each point receives from the photons of its wall within the radius.
 // The including kernel chose how the film adds.
 
-layout(set = 0, binding = 0, scalar) readonly buffer Points { Point points[]; };
+layout(set = 0, binding = 3, scalar) readonly buffer Points { Point points[]; };
 
 // Sums of one invocation, each as (low word, high word) of a film sum.
 struct Gathered {

@@ -10,8 +10,8 @@
 // are the same ones whatever order the map has. A search goes on in a further dispatch where it takes many
 // steps. The including kernel chose how the film adds.
 
-layout(set = 0, binding = 0, scalar) readonly buffer Points { Point points[]; };
-layout(set = 0, binding = 1, scalar) readonly buffer Rooms { Room rooms[]; };
+layout(set = 0, binding = 3, scalar) readonly buffer Points { Point points[]; };
+layout(set = 0, binding = 0, scalar) readonly buffer Rooms { Room rooms[]; };
 // Heaps, the farthest photon on top: (bits of the squared distance, place in the tree), entry by entry of all points.
 layout(set = 1, binding = 4, scalar) buffer Nearest { uvec2 nearest[]; };
 layout(set = 1, binding = 5, scalar) buffer Searches { Search searches[]; };

@@ -3,7 +3,7 @@
 // every point at first, then those of the few points that have more. Of a slice, as many invocations as there are
 // lanes take every so many-th candidate. The including kernel chose how sums are added.
 
-layout(set = 0, binding = 0, scalar) readonly buffer VisiblePoints { VisiblePoint visible_points[]; };
+layout(set = 1, binding = 4, scalar) readonly buffer VisiblePoints { VisiblePoint visible_points[]; };
 layout(set = 1, binding = 2, scalar) readonly buffer SortedMap { uvec4 sorted_map[]; };
 // Points with more than one slice: how many, the longest one's candidates; then which, and each one's candidates.
 layout(set = 1, binding = 3, scalar) buffer Crowded { uint crowded[]; };

@@ -1,5 +1,5 @@
 // Counts the photons of each grid cell, and numbers them in it.
-// Dispatched by src/index.rs once a chunk. One thread = one entry of the photon map.
+// Dispatched by src/engine/room/index.rs once a chunk. One thread = one entry of the photon map.
 // After it cells[c] = photons in cell c; ranks[i] = photons that came to the cell of entry i before it. That order
 // varies from run to run; the integer sums of the film do not see it.
 #version 460

@@ -1,5 +1,5 @@
 // Writes each photon to its place in cell order.
-// Dispatched by src/index.rs once a chunk. One thread = one entry of the photon map.
+// Dispatched by src/engine/room/index.rs once a chunk. One thread = one entry of the photon map.
 // cells[c] = first place of cell c; ranks from cell_count.comp.
 #version 460
 #extension GL_GOOGLE_include_directive : require

@@ -1,5 +1,5 @@
 // Size of the second part of a lookup: points with more candidates than one slice along x, their other slices along y.
-// Dispatched by src/transport/points.rs as one thread.
+// Dispatched by src/engine/scene/estimate.rs as one thread.
 #version 460
 #extension GL_GOOGLE_include_directive : require
 #extension GL_EXT_scalar_block_layout : require

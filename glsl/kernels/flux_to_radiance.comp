@@ -1,6 +1,6 @@
 // What the photon maps found at each visible point, as light: flux over the area that really lies on the surface, times
 // reflectance, in film units. It takes the place of the point's first sums.
-// Dispatched by src/transport/points.rs once a pass. One thread = one visible point.
+// Dispatched by src/engine/scene/estimate.rs once a pass. One thread = one visible point.
 #version 460
 #extension GL_GOOGLE_include_directive : require
 #extension GL_EXT_scalar_block_layout : require

@@ -1,5 +1,5 @@
 // Density estimation of a photon map, sums added by film/SUMS.glsl.
-// Dispatched by src/transport/points.rs twice a map and chunk. One thread = one slice of a point's
+// Dispatched by src/engine/scene/estimate.rs twice a map and chunk. One thread = one slice of a point's
 // candidates: points along x, slices along y.
 #version 460
 #extension GL_GOOGLE_include_directive : require

@@ -1,5 +1,5 @@
 // Camera paths, or paths from receivers, that an earlier dispatch left on their way over mirrors and glass.
-// Dispatched by src/transport/points.rs until none is left. One thread = one path.
+// Dispatched by src/engine/scene/points.rs until none is left. One thread = one path.
 #version 460
 #extension GL_GOOGLE_include_directive : require
 #extension GL_EXT_scalar_block_layout : require

@@ -1,5 +1,5 @@
 // Density estimation by the nearest photons of every point (gather/nearest.glsl), summed by film/SUMS.glsl.
-// Dispatched by src/estimate/tree.rs until all searches are done. One thread = one point.
+// Dispatched by src/engine/room/estimate/tree.rs until all searches are done. One thread = one point.
 #version 460
 #extension GL_GOOGLE_include_directive : require
 #extension GL_EXT_scalar_block_layout : require

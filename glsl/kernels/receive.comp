@@ -1,6 +1,6 @@
 // The light that arrives at given points: direct light, and a visible point for the photon maps; a point
 // that lies on no surface looks around by a ray instead.
-// Dispatched by src/transport/points.rs once a pass. One thread = one receiver.
+// Dispatched by src/engine/scene/points.rs once a pass. One thread = one receiver.
 #version 460
 #extension GL_GOOGLE_include_directive : require
 #extension GL_EXT_scalar_block_layout : require
@@ -11,7 +11,7 @@
 
 layout(local_size_x_id = 0) in;
 layout(push_constant, scalar) uniform Push { ReceivePush push; };
-layout(set = 0, binding = 8, scalar) readonly buffer Receivers { Receiver receivers[]; };
+layout(set = 1, binding = 12, scalar) readonly buffer Receivers { Receiver receivers[]; };
 
 #include "math/math.glsl"
 #include "ledger/nonfinite_values.glsl"

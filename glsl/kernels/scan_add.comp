@@ -1,5 +1,5 @@
 // Adds what stands before each block to the block's own prefix sums.
-// Dispatched by src/prefix_sum.rs once a level. One thread = SCAN_ITEMS neighbouring items.
+// Dispatched by src/engine/prefix_sum.rs once a level. One thread = SCAN_ITEMS neighbouring items.
 // `block_sums` holds exclusive prefix sums by now.
 #version 460
 #extension GL_GOOGLE_include_directive : require

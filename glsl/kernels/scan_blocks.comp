@@ -1,5 +1,5 @@
 // Exclusive prefix sum inside blocks of group size * SCAN_ITEMS items, and the sum of each block.
-// Dispatched by src/prefix_sum.rs once a level. One thread = SCAN_ITEMS neighbouring items.
+// Dispatched by src/engine/prefix_sum.rs once a level. One thread = SCAN_ITEMS neighbouring items.
 #version 460
 #extension GL_GOOGLE_include_directive : require
 #extension GL_EXT_scalar_block_layout : require

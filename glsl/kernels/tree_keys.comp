@@ -1,5 +1,5 @@
 // What the kd-tree sorts its photons by along one axis of their walls.
-// Dispatched by src/index/tree.rs once an axis. One thread = one entry of the photon map.
+// Dispatched by src/engine/room/index/tree.rs once an axis. One thread = one entry of the photon map.
 #version 460
 #extension GL_GOOGLE_include_directive : require
 #extension GL_EXT_scalar_block_layout : require

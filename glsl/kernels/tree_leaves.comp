@@ -1,5 +1,5 @@
 // Writes each photon to its place in the leaves of the kd-tree.
-// Dispatched by src/index/tree.rs once a chunk. One thread = one photon of a leaf.
+// Dispatched by src/engine/room/index/tree.rs once a chunk. One thread = one photon of a leaf.
 #version 460
 #extension GL_GOOGLE_include_directive : require
 #extension GL_EXT_scalar_block_layout : require

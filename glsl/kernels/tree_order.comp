@@ -1,5 +1,5 @@
 // Moves photons to their places of a pass of the radix sort of index/tree_digits.glsl.
-// Dispatched by src/index/tree.rs once a digit. One thread = a run of TREE_RUN photons.
+// Dispatched by src/engine/room/index/tree.rs once a digit. One thread = a run of TREE_RUN photons.
 // counts[d * runs + r] = first place of the photons of run r with the digit d.
 #version 460
 #extension GL_GOOGLE_include_directive : require

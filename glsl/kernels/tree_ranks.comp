@@ -1,6 +1,6 @@
 // Splits the nodes of one height along one axis: notes the place of every photon in the order along it, and
 // the planes.
-// Dispatched by src/index/tree.rs once a height. One thread = one photon of a node.
+// Dispatched by src/engine/room/index/tree.rs once a height. One thread = one photon of a node.
 #version 460
 #extension GL_GOOGLE_include_directive : require
 #extension GL_EXT_scalar_block_layout : require

@@ -1,5 +1,5 @@
 // Says which photons go to the left half of their node, in the order along the other axis.
-// Dispatched by src/index/tree.rs once a height. One thread = one photon of a node.
+// Dispatched by src/engine/room/index/tree.rs once a height. One thread = one photon of a node.
 // After it counts[i] = 1 where photon i goes left.
 #version 460
 #extension GL_GOOGLE_include_directive : require

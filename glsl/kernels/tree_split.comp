@@ -1,6 +1,6 @@
 // Moves photons to the half of their node that they belong to and keeps their order along the other axis, so
 // that no node is ever sorted again.
-// Dispatched by src/index/tree.rs once a height. One thread = one photon of a node.
+// Dispatched by src/engine/room/index/tree.rs once a height. One thread = one photon of a node.
 // counts[i] = photons before i that go left.
 #version 460
 #extension GL_GOOGLE_include_directive : require

@@ -1,4 +1,4 @@
-// The copy of a bounce's tally that this work group counts in; src/tallies.rs adds them up.
+// The copy of a bounce's tally that this work group counts in; src/engine/tallies.rs adds them up.
 
 uint tally_copy(uint bounce)
 {

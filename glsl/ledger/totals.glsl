@@ -1,7 +1,7 @@
 // What a map's photons lose to limits, and how many photons the map has held, since the host last asked. A copy of
 // TOTAL_WORDS words for each of TALLY_COPIES groups of work groups: photons cut off, photons clamped, the flux of the first and
 // of the second (three channels of two words, low word first), and in the first copy photons stored (two words).
-// src/totals.rs adds the copies up.
+// src/engine/totals.rs adds the copies up.
 
 layout(set = 1, binding = 8, scalar) buffer Totals { uint totals[]; };
 

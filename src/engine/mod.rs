@@ -5,6 +5,7 @@ pub mod bias;
 pub mod choose_builder;
 pub mod film;
 pub mod nonfinite_values;
+pub mod planned;
 pub mod prefix_sum;
 pub mod replay;
 pub mod room;

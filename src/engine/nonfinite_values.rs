@@ -4,7 +4,8 @@ use serde::Serialize;
 
 use crate::constants::*;
 use crate::error::Result;
-use crate::gpu::{Buffer, Commands, Gpu, Memory};
+use crate::gpu::{Buffer, Commands};
+use crate::plan::memory::NONFINITE_KIND_WORDS;
 
 /// One nonfinite value, and the photon or pixel it belongs to.
 #[derive(Debug, Clone, Copy, PartialEq, Eq, Serialize)]
@@ -35,27 +36,16 @@ pub struct NonfiniteValues {
     pub first: Vec<NonfiniteValue>,
 }
 
-/// Kinds, and words of each in the buffer.
-const KINDS: usize = 3;
-const WORDS: usize = 1 + 3 * MAX_NONFINITE_VALUES as usize;
-
-/// The buffer in which kernels record nonfinite values.
-pub fn buffer(gpu: &Gpu, commands: &mut Commands) -> Result<Buffer> {
-    let buffer = gpu.buffer::<u32>("nonfinite_values", (KINDS * WORDS) as u64, Memory::Device)?;
-    commands.fill(&buffer, 0, (KINDS * WORDS) as u64, 0);
-    Ok(buffer)
-}
-
 impl NonfiniteValues {
     /// What a run with `--paranoid` found; `None` without it.
-    pub fn found(commands: &mut Commands, buffer: &Buffer, paranoid: bool) -> Result<Option<NonfiniteValues>> {
+    pub fn found(commands: &mut Commands, buffer: &Buffer<u32>, paranoid: bool) -> Result<Option<NonfiniteValues>> {
         if paranoid { NonfiniteValues::read(commands, buffer).map(Some) } else { Ok(None) }
     }
 
-    fn read(commands: &mut Commands, buffer: &Buffer) -> Result<NonfiniteValues> {
-        let words = commands.read::<u32>(buffer, KINDS * WORDS)?;
+    fn read(commands: &mut Commands, buffer: &Buffer<u32>) -> Result<NonfiniteValues> {
+        let words = commands.read(buffer, buffer.count() as usize)?;
         let mut nonfinite_values = NonfiniteValues::default();
-        for (kind, words) in words.chunks_exact(WORDS).enumerate() {
+        for (kind, words) in words.chunks_exact(NONFINITE_KIND_WORDS).enumerate() {
             nonfinite_values.count = nonfinite_values.count.saturating_add(words[0]);
             for note in words[1..].chunks_exact(3).take(words[0] as usize) {
                 let what = match (kind as u32, note[0]) {

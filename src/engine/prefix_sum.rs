@@ -3,18 +3,13 @@
 use crate::constants::SCAN_ITEMS;
 use crate::error::Result;
 use crate::gpu::kernels::{ScanAdd, ScanBlocks};
-use crate::gpu::{Buffer, Commands, Extent, Gpu, Memory};
-use crate::plan::memory::block_sum_counts;
+use crate::gpu::{Buffer, Commands, Extent};
 use crate::records::ScanPush;
 
-/// One buffer a level of a prefix sum over `items`: block sums of the level below, down to one block.
-pub fn block_sums(gpu: &Gpu, items: u64, group_size: u32) -> Result<Vec<Buffer>> {
-    block_sum_counts(items, group_size).into_iter().map(|count| gpu.buffer::<u32>("block sums", count, Memory::Device)).collect()
-}
-
-/// Turns `item_count` numbers into their exclusive prefix sums; `levels` as [`block_sums`]
-/// makes them.
-pub fn scan(commands: &mut Commands, items: &Buffer, levels: &[Buffer], item_count: u32, group_size: u32) -> Result<()> {
+/// Turns `item_count` numbers into their exclusive prefix sums; `levels` have room for [`block_sum_counts`].
+///
+/// [`block_sum_counts`]: crate::plan::memory::block_sum_counts
+pub fn scan(commands: &mut Commands, items: &Buffer<u32>, levels: &[Buffer<u32>], item_count: u32, group_size: u32) -> Result<()> {
     let threads = || Extent::Items(u64::from(item_count.div_ceil(SCAN_ITEMS)));
     scan_part(commands, items, levels, item_count, group_size, &threads)
 }
@@ -23,8 +18,8 @@ pub fn scan(commands: &mut Commands, items: &Buffer, levels: &[Buffer], item_cou
 /// which are left in disorder.
 pub fn scan_part<'a>(
     commands: &mut Commands,
-    items: &Buffer,
-    levels: &[Buffer],
+    items: &Buffer<u32>,
+    levels: &[Buffer<u32>],
     item_count: u32,
     group_size: u32,
     threads: &dyn Fn() -> Extent<'a>,

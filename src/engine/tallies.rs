@@ -3,20 +3,16 @@
 
 use crate::constants::TALLY_COPIES;
 use crate::error::Result;
-use crate::gpu::{Buffer, Commands, Gpu, Memory};
+use crate::gpu::{Buffer, Commands};
 use crate::records::Tally;
 
-pub fn buffer(gpu: &Gpu, name: &'static str, bounces: u32) -> Result<Buffer> {
-    gpu.buffer::<Tally>(name, u64::from(bounces) * u64::from(TALLY_COPIES), Memory::Device)
-}
-
-pub fn clear(commands: &mut Commands, tallies: &Buffer) {
-    commands.fill(tallies, 0, tallies.size_bytes() / 4, 0);
+pub fn clear(commands: &mut Commands, tallies: &Buffer<Tally>) {
+    commands.clear(tallies);
 }
 
 /// Fates of the first bounces, copies added up.
-pub fn read(commands: &mut Commands, tallies: &Buffer, bounces: u32) -> Result<Vec<Tally>> {
-    Ok(sums(&commands.read::<Tally>(tallies, (bounces * TALLY_COPIES) as usize)?))
+pub fn read(commands: &mut Commands, tallies: &Buffer<Tally>, bounces: u32) -> Result<Vec<Tally>> {
+    Ok(sums(&commands.read(tallies, (bounces * TALLY_COPIES) as usize)?))
 }
 
 /// Fates of bounces, the copies of each added up.

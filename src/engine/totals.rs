@@ -2,19 +2,14 @@
 //! (`glsl/ledger/totals.glsl`).
 
 use crate::constants::{TALLY_COPIES, TOTAL_FLUX_BITS, TOTAL_WORDS};
-use crate::error::Result;
-use crate::gpu::{Buffer, Commands, Gpu, Memory};
+use crate::gpu::{Buffer, Commands};
 use crate::ledger::Totals;
 
 /// Words of the buffer.
 pub const WORDS: u64 = TOTAL_WORDS as u64 * TALLY_COPIES as u64;
 
-pub fn buffer(gpu: &Gpu, name: &'static str) -> Result<Buffer> {
-    gpu.buffer::<u32>(name, WORDS, Memory::Device)
-}
-
-pub fn clear(commands: &mut Commands, totals: &Buffer) {
-    commands.fill(totals, 0, WORDS, 0);
+pub fn clear(commands: &mut Commands, totals: &Buffer<u32>) {
+    commands.clear(totals);
 }
 
 /// What [`WORDS`] words of a buffer count, copies added up.

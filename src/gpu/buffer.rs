@@ -1,5 +1,6 @@
 //! Storage buffers.
 
+use std::marker::PhantomData;
 use std::sync::Arc;
 
 use ash::vk;
@@ -51,7 +52,32 @@ impl HeldMemory {
     }
 }
 
-pub struct Buffer {
+/// A buffer of elements of one type: one in another's place does not compile.
+///
+/// ```
+/// use photonmill::gpu::{Buffer, kernels::MapCount};
+/// use photonmill::photon::MapPhoton;
+///
+/// fn kernel<'a>(map: &'a Buffer<MapPhoton>, counters: &'a Buffer<u32>, cells: &'a Buffer<u32>, ranks: &'a Buffer<u32>) -> MapCount<'a> {
+///     MapCount { map, counters, cells, ranks }
+/// }
+/// ```
+///
+/// ```compile_fail,E0308
+/// use photonmill::gpu::{Buffer, kernels::MapCount};
+/// use photonmill::photon::MapPhoton;
+///
+/// fn kernel<'a>(map: &'a Buffer<MapPhoton>, counters: &'a Buffer<u32>, cells: &'a Buffer<u32>, ranks: &'a Buffer<u32>) -> MapCount<'a> {
+///     MapCount { map: counters, counters, cells, ranks }
+/// }
+/// ```
+pub struct Buffer<T> {
+    any: AnyBuffer,
+    element: PhantomData<T>,
+}
+
+/// A buffer whose elements do not matter: as commands see it.
+pub struct AnyBuffer {
     name: String,
     memory: Memory,
     size_bytes: u64,
@@ -63,7 +89,7 @@ pub struct Buffer {
 impl Gpu {
     /// A buffer of `count` elements of `T`, and of one at least, as Vulkan has no empty ones. Its
     /// content is undefined.
-    pub fn buffer<T: Pod>(&self, name: &str, count: u64, memory: Memory) -> Result<Buffer> {
+    pub fn buffer<T: Pod>(&self, name: &str, count: u64, memory: Memory) -> Result<Buffer<T>> {
         let size_bytes = count.max(1) * size_of::<T>() as u64;
         let largest = self.facts.storage_buffer_range_bytes.min(self.facts.allocation_bytes);
         assert!(size_bytes <= largest, "buffer {name}: {size_bytes} bytes, the plan must keep to {largest}");
@@ -76,7 +102,7 @@ impl Gpu {
         let device = &self.context.device;
         // SAFETY: `info` is complete; the buffer is destroyed in Drop.
         let raw = call("vkCreateBuffer", unsafe { device.create_buffer(&info, None) })?;
-        let mut buffer = Buffer { name: name.to_owned(), memory, size_bytes, raw, allocation: None, context: self.context.clone() };
+        let mut buffer = AnyBuffer { name: name.to_owned(), memory, size_bytes, raw, allocation: None, context: self.context.clone() };
         // SAFETY: the buffer was just made.
         let requirements = unsafe { device.get_buffer_memory_requirements(raw) };
         let allocation = self
@@ -105,7 +131,7 @@ impl Gpu {
         buffer.allocation = Some(allocation);
         self.context.held().take(memory, size_bytes);
         self.context.set_name(raw, name);
-        Ok(buffer)
+        Ok(Buffer { any: buffer, element: PhantomData })
     }
 
     /// What buffers take by the sizes that were asked for; an allocator rounds them up.
@@ -129,32 +155,43 @@ impl Gpu {
     }
 }
 
-impl Buffer {
-    pub fn name(&self) -> &str {
-        &self.name
+impl<T> Buffer<T> {
+    pub fn any(&self) -> &AnyBuffer {
+        &self.any
     }
 
-    pub fn size_bytes(&self) -> u64 {
-        self.size_bytes
+    /// Elements that it has room for.
+    pub fn count(&self) -> u64 {
+        self.any.size_bytes / size_of::<T>() as u64
+    }
+
+    pub(super) fn into_any(self) -> AnyBuffer {
+        self.any
+    }
+
+    pub(super) fn mapped(&self) -> &[u8] {
+        let allocation = self.any.allocation.as_ref().expect("bound at creation");
+        &allocation.mapped_slice().expect("the host maps upload and read-back buffers")[..self.any.size_bytes as usize]
+    }
+
+    pub(super) fn mapped_mut(&mut self) -> &mut [u8] {
+        let size_bytes = self.any.size_bytes as usize;
+        let allocation = self.any.allocation.as_mut().expect("bound at creation");
+        &mut allocation.mapped_slice_mut().expect("the host maps upload and read-back buffers")[..size_bytes]
+    }
+}
+
+impl AnyBuffer {
+    pub(super) fn name(&self) -> &str {
+        &self.name
     }
 
     pub(super) fn raw(&self) -> vk::Buffer {
         self.raw
     }
-
-    pub(super) fn mapped(&self) -> &[u8] {
-        let allocation = self.allocation.as_ref().expect("bound at creation");
-        &allocation.mapped_slice().expect("the host maps upload and read-back buffers")[..self.size_bytes as usize]
-    }
-
-    pub(super) fn mapped_mut(&mut self) -> &mut [u8] {
-        let size_bytes = self.size_bytes as usize;
-        let allocation = self.allocation.as_mut().expect("bound at creation");
-        &mut allocation.mapped_slice_mut().expect("the host maps upload and read-back buffers")[..size_bytes]
-    }
 }
 
-impl Drop for Buffer {
+impl Drop for AnyBuffer {
     fn drop(&mut self) {
         // SAFETY: commands wait for the device before they return, so nothing uses the buffer.
         unsafe { self.context.device.destroy_buffer(self.raw, None) };

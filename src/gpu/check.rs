@@ -134,12 +134,12 @@ fn ask(gpu: &Gpu, push: &CheckPush) -> Result<Answers> {
     let mut commands = Commands::new(gpu, Constants::new(GROUP_SIZE), Instant::now())?;
     let answers = gpu.buffer::<u32>("check answers", 5, Memory::Device)?;
     let film = gpu.buffer::<u64>("check film", 1, Memory::Device)?;
-    commands.fill(&answers, 0, 5, 0);
-    commands.fill(&film, 0, 2, 0);
+    commands.clear(&answers);
+    commands.clear(&film);
     let entries = gpu.buffer::<u32>("check entries", 16 * u64::from(push.photon_count), Memory::Device)?;
     let counters = gpu.buffer::<u32>("check counters", 1, Memory::Device)?;
     let tallies = gpu.buffer::<Tally>("check tallies", u64::from(TALLY_COPIES), Memory::Device)?;
-    commands.fill(&counters, 0, 1, 0);
+    commands.clear(&counters);
     if gpu.facts.int64_atomics {
         let kernel = StartUpU64 { film: &film, answers: &answers, entries: &entries, counters: &counters, tallies: &tallies };
         commands.dispatch(kernel, push, Extent::Groups(1, 1))?;
@@ -147,8 +147,8 @@ fn ask(gpu: &Gpu, push: &CheckPush) -> Result<Answers> {
         let kernel = StartUpTwoWords { film: &film, answers: &answers, entries: &entries, counters: &counters, tallies: &tallies };
         commands.dispatch(kernel, push, Extent::Groups(1, 1))?;
     }
-    let words = commands.read::<u32>(&answers, 5)?;
-    let film_sum = commands.read::<u64>(&film, 1)?[0];
+    let words = commands.read(&answers, 5)?;
+    let film_sum = commands.read(&film, 1)?[0];
     let [iterations, chain, survivors, order_sum, subgroups] = words[..] else { unreachable!("five words were read") };
     let stored = commands.read::<u32>(&counters, 1)?[0].min(16 * push.photon_count);
     let mut entries = commands.read::<u32>(&entries, stored as usize)?;

@@ -54,7 +54,7 @@ pub fn warm_up(gpu: &Gpu, time: Duration) -> Result<()> {
     gpu.without_peaks(|| {
         prepare(gpu)?;
         let mut commands = Commands::new(gpu, Constants::new(GROUP_SIZE), Instant::now())?;
-        let results = gpu.buffer::<u32>("results", u64::from(ITEMS), Memory::Device)?;
+        let results = gpu.buffer::<f32>("results", u64::from(ITEMS), Memory::Device)?;
         let push = MeasurePush { item_count: ITEMS, step_count: STEPS, mask: 0 };
         let began = Instant::now();
         while began.elapsed() < time {

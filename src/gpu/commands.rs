@@ -2,7 +2,6 @@
 //! reads and writes, times every scope, and stays within the device's limits.
 
 use std::collections::{HashMap, HashSet};
-use std::marker::PhantomData;
 use std::sync::Arc;
 use std::sync::atomic::{AtomicBool, Ordering};
 use std::time::{Duration, Instant};
@@ -12,7 +11,7 @@ use bytemuck::Pod;
 
 use super::clock::{self, LEAST_WARM_UP};
 use super::timestamps::{TimedScope, Timestamps};
-use super::{Buffer, Constants, Context, DeviceFacts, Gpu, Kernel, Memory, call};
+use super::{AnyBuffer, Buffer, Constants, Context, DeviceFacts, Gpu, Kernel, Memory, call};
 use crate::error::{Error, Result};
 use crate::records::DispatchArgs;
 use crate::timings::{Clock, Span, Timings};
@@ -25,7 +24,7 @@ pub enum Extent<'a> {
     /// Groups along x and y.
     Groups(u32, u32),
     /// As a [`DispatchArgs`] record on the device says.
-    Indirect(&'a Buffer),
+    Indirect(&'a Buffer<DispatchArgs>),
 }
 
 /// What happened to buffers since the last barrier.
@@ -51,12 +50,14 @@ pub struct Commands<'gpu> {
     descriptor_pools: Vec<vk::DescriptorPool>,
     descriptor_pool_in_use: usize,
     descriptor_sets: HashMap<(vk::DescriptorSetLayout, Vec<vk::Buffer>), vk::DescriptorSet>,
+    /// What stands in set 0, if that is a scene: it is bound once and stays for as long as kernels look at it.
+    bound_scene: Option<vk::DescriptorSet>,
     timestamps: Timestamps,
     open_scopes: Vec<OpenScope>,
     timed_scopes: Vec<TimedScope>,
     hazards: Hazards,
     /// Buffers that only this submission needs.
-    staging: Vec<Buffer>,
+    staging: Vec<AnyBuffer>,
     work: u64,
     /// Share of a plan's work per submission that keeps submissions short on this device and in this scene.
     pace: f64,
@@ -69,15 +70,12 @@ pub struct Commands<'gpu> {
 
 /// Elements on their way to the host.
 #[must_use]
-pub struct ReadBack<T> {
-    buffer: Option<Buffer>,
-    element: PhantomData<T>,
-}
+pub struct ReadBack<T>(Option<Buffer<T>>);
 
 impl<T: Pod> ReadBack<T> {
     /// The elements, once the commands that copy them have run.
     pub fn take(self) -> Vec<T> {
-        self.buffer.map_or_else(Vec::new, |buffer| bytemuck::pod_collect_to_vec(buffer.mapped()))
+        self.0.map_or_else(Vec::new, |buffer| bytemuck::pod_collect_to_vec(buffer.mapped()))
     }
 }
 
@@ -129,6 +127,7 @@ impl<'gpu> Commands<'gpu> {
             descriptor_pools: Vec::new(),
             descriptor_pool_in_use: 0,
             descriptor_sets: HashMap::new(),
+            bound_scene: None,
             timestamps,
             open_scopes: Vec::new(),
             timed_scopes: Vec::new(),
@@ -194,22 +193,19 @@ impl<'gpu> Commands<'gpu> {
         let module = K::MODULE;
         let buffers = kernel.buffers();
         let pipeline = self.gpu.pipeline(&module, &self.constants)?;
-        let sets = (0..pipeline.set_layouts.len() as u32)
-            .map(|set| {
-                let of_set: Vec<(u32, vk::Buffer)> = module
-                    .bindings
-                    .iter()
-                    .zip(&buffers)
-                    .filter(|(binding, _)| binding.set == set)
-                    .map(|(binding, buffer)| (binding.binding, buffer.raw()))
-                    .collect();
-                self.descriptor_set(pipeline.set_layouts[set as usize], &of_set)
-            })
-            .collect::<Result<Vec<_>>>()?;
-        let mut accesses: Vec<(&Buffer, bool, bool)> =
+        let numbered = module.bindings.iter().map(|binding| binding.binding).zip(&buffers);
+        let own = self.descriptor_set(pipeline.set_layouts[1], numbered.collect())?;
+        let scene = kernel.scene();
+        let scene_set =
+            if scene.is_empty() { None } else { Some(self.descriptor_set(pipeline.set_layouts[0], (0..).zip(&scene).collect())?) };
+        // A kernel without a scene has another layout of set 0, and so disturbs what is bound there.
+        let sets: Vec<_> = scene_set.filter(|_| self.bound_scene != scene_set).into_iter().chain([own]).collect();
+        self.bound_scene = scene_set;
+        let mut accesses: Vec<(&AnyBuffer, bool, bool)> =
             module.bindings.iter().zip(&buffers).map(|(binding, buffer)| (*buffer, binding.reads, binding.writes)).collect();
+        accesses.extend(scene.iter().map(|buffer| (*buffer, true, false)));
         if let Extent::Indirect(args) = &extent {
-            accesses.push((args, true, false));
+            accesses.push((args.any(), true, false));
         }
         self.order(&accesses);
 
@@ -218,7 +214,14 @@ impl<'gpu> Commands<'gpu> {
         // submission has ended; group counts are within the device's limits.
         unsafe {
             device.cmd_bind_pipeline(command_buffer, vk::PipelineBindPoint::COMPUTE, pipeline.raw);
-            device.cmd_bind_descriptor_sets(command_buffer, vk::PipelineBindPoint::COMPUTE, pipeline.layout, 0, &sets, &[]);
+            device.cmd_bind_descriptor_sets(
+                command_buffer,
+                vk::PipelineBindPoint::COMPUTE,
+                pipeline.layout,
+                2 - sets.len() as u32,
+                &sets,
+                &[],
+            );
             if module.push_bytes != 0 {
                 device.cmd_push_constants(command_buffer, pipeline.layout, vk::ShaderStageFlags::COMPUTE, 0, bytemuck::bytes_of(push));
             }
@@ -231,7 +234,7 @@ impl<'gpu> Commands<'gpu> {
                     assert!(x <= self.gpu.facts.work_group_count_x && y <= self.gpu.facts.work_group_count_y, "{x} x {y} groups");
                     device.cmd_dispatch(command_buffer, x, y, 1);
                 }
-                Extent::Indirect(args) => device.cmd_dispatch_indirect(command_buffer, args.raw(), 0),
+                Extent::Indirect(args) => device.cmd_dispatch_indirect(command_buffer, args.any().raw(), 0),
             }
         }
         self.dispatch_count += 1;
@@ -246,52 +249,60 @@ impl<'gpu> Commands<'gpu> {
         DispatchArgs { x: columns as u32, y: rows as u32, z: 1 }
     }
 
-    /// Sets `words` 32-bit words of a buffer, from word `first` on.
-    pub fn fill(&mut self, buffer: &Buffer, first: u64, words: u64, value: u32) {
-        self.order(&[(buffer, false, true)]);
-        assert!(4 * (first + words) <= buffer.size_bytes(), "{}: words {first} to {}", buffer.name(), first + words);
+    /// Sets every 32-bit word of `count` elements of a buffer, from element `first` on.
+    pub fn fill<T>(&mut self, buffer: &Buffer<T>, first: u64, count: u64, word: u32) {
+        self.order(&[(buffer.any(), false, true)]);
+        assert!(first + count <= buffer.count(), "{}: elements {first} to {}", buffer.any().name(), first + count);
+        let element = size_of::<T>() as u64;
+        let (device, raw) = (&self.context.device, buffer.any().raw());
         // SAFETY: the buffer outlives the submission; the range is inside it.
-        unsafe { self.context.device.cmd_fill_buffer(self.command_buffer, buffer.raw(), 4 * first, 4 * words, value) };
+        unsafe { device.cmd_fill_buffer(self.command_buffer, raw, element * first, element * count, word) };
+    }
+
+    /// Sets all of a buffer to zero.
+    pub fn clear<T>(&mut self, buffer: &Buffer<T>) {
+        self.fill(buffer, 0, buffer.count(), 0);
     }
 
     /// Copies host data to the start of a buffer.
-    pub fn upload<T: Pod>(&mut self, buffer: &Buffer, content: &[T]) -> Result<()> {
-        let bytes: &[u8] = bytemuck::cast_slice(content);
-        assert!(bytes.len() as u64 <= buffer.size_bytes(), "{}: {} bytes", buffer.name(), bytes.len());
-        if bytes.is_empty() {
+    pub fn upload<T: Pod>(&mut self, buffer: &Buffer<T>, content: &[T]) -> Result<()> {
+        if content.is_empty() {
             return Ok(());
         }
-        let mut staging = self.gpu.buffer::<u8>("upload", bytes.len() as u64, Memory::Upload)?;
-        staging.mapped_mut().copy_from_slice(bytes);
-        self.copy(&staging, buffer, bytes.len() as u64);
-        self.staging.push(staging);
+        let count = content.len() as u64;
+        let mut staging = self.gpu.buffer::<T>("upload", count, Memory::Upload)?;
+        staging.mapped_mut().copy_from_slice(bytemuck::cast_slice(content));
+        self.copy(&staging, buffer, count);
+        self.staging.push(staging.into_any());
         Ok(())
     }
 
-    fn copy(&mut self, from: &Buffer, to: &Buffer, bytes: u64) {
+    fn copy<T>(&mut self, from: &Buffer<T>, to: &Buffer<T>, count: u64) {
+        for buffer in [from, to] {
+            assert!(count <= buffer.count(), "{}: {count} elements of {}", buffer.any().name(), buffer.count());
+        }
+        let (from, to) = (from.any(), to.any());
         self.order(&[(from, true, false), (to, false, true)]);
-        let region = [vk::BufferCopy::default().size(bytes)];
-        // SAFETY: both buffers outlive the submission and hold `bytes`.
+        let region = [vk::BufferCopy::default().size(count * size_of::<T>() as u64)];
+        // SAFETY: both buffers outlive the submission and hold so many elements.
         unsafe { self.context.device.cmd_copy_buffer(self.command_buffer, from.raw(), to.raw(), &region) };
     }
 
     /// Runs everything recorded so far and returns the first `count` elements of a buffer.
-    pub fn read<T: Pod>(&mut self, buffer: &Buffer, count: usize) -> Result<Vec<T>> {
-        let read_back = self.copy_out::<T>(buffer, count)?;
+    pub fn read<T: Pod>(&mut self, buffer: &Buffer<T>, count: usize) -> Result<Vec<T>> {
+        let read_back = self.copy_out(buffer, count)?;
         self.submit()?;
         Ok(read_back.take())
     }
 
     /// Records a copy of the first `count` elements of a buffer to the host; after the next submission they can be taken.
-    pub fn copy_out<T: Pod>(&mut self, buffer: &Buffer, count: usize) -> Result<ReadBack<T>> {
-        let bytes = (count * size_of::<T>()) as u64;
-        assert!(bytes <= buffer.size_bytes(), "{}: {bytes} bytes of {}", buffer.name(), buffer.size_bytes());
+    pub fn copy_out<T: Pod>(&mut self, buffer: &Buffer<T>, count: usize) -> Result<ReadBack<T>> {
         if count == 0 {
-            return Ok(ReadBack { buffer: None, element: PhantomData });
+            return Ok(ReadBack(None));
         }
-        let read_back = self.gpu.buffer::<u8>("read back", bytes, Memory::ReadBack)?;
-        self.copy(buffer, &read_back, bytes);
-        Ok(ReadBack { buffer: Some(read_back), element: PhantomData })
+        let read_back = self.gpu.buffer::<T>("read back", count as u64, Memory::ReadBack)?;
+        self.copy(buffer, &read_back, count as u64);
+        Ok(ReadBack(Some(read_back)))
     }
 
     /// Counts work of any unit towards [`Commands::work`].
@@ -359,6 +370,7 @@ impl<'gpu> Commands<'gpu> {
             }
         }
         self.descriptor_sets.clear();
+        self.bound_scene = None;
         self.descriptor_pool_in_use = 0;
         self.staging.clear();
         self.hazards = Hazards::default();
@@ -429,14 +441,14 @@ impl<'gpu> Commands<'gpu> {
         self.submission_count
     }
 
-    fn descriptor_set(&mut self, layout: vk::DescriptorSetLayout, buffers: &[(u32, vk::Buffer)]) -> Result<vk::DescriptorSet> {
-        let key = (layout, buffers.iter().map(|(_, buffer)| *buffer).collect());
+    fn descriptor_set(&mut self, layout: vk::DescriptorSetLayout, buffers: Vec<(u32, &&AnyBuffer)>) -> Result<vk::DescriptorSet> {
+        let key = (layout, buffers.iter().map(|(_, buffer)| buffer.raw()).collect());
         if let Some(set) = self.descriptor_sets.get(&key) {
             return Ok(*set);
         }
         let set = self.allocate_set(layout)?;
         let infos: Vec<[vk::DescriptorBufferInfo; 1]> =
-            buffers.iter().map(|(_, buffer)| [vk::DescriptorBufferInfo::default().buffer(*buffer).range(vk::WHOLE_SIZE)]).collect();
+            buffers.iter().map(|(_, buffer)| [vk::DescriptorBufferInfo::default().buffer(buffer.raw()).range(vk::WHOLE_SIZE)]).collect();
         let writes: Vec<_> = buffers
             .iter()
             .zip(&infos)
@@ -480,8 +492,8 @@ impl<'gpu> Commands<'gpu> {
 /// what an earlier one read or wrote.
 impl Commands<'_> {
     /// Takes (buffer, reads, writes) of everything that the next command touches.
-    fn order(&mut self, accesses: &[(&Buffer, bool, bool)]) {
-        let waits = |(buffer, _, writes): &(&Buffer, bool, bool)| {
+    fn order(&mut self, accesses: &[(&AnyBuffer, bool, bool)]) {
+        let waits = |(buffer, _, writes): &(&AnyBuffer, bool, bool)| {
             self.hazards.written.contains(&buffer.raw()) || (*writes && self.hazards.read.contains(&buffer.raw()))
         };
         if accesses.iter().any(waits) {

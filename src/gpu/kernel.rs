@@ -1,6 +1,7 @@
 //! Kernels: their reflected interfaces, and the pipelines made from them.
 
-use std::collections::BTreeMap;
+use std::cell::RefCell;
+use std::collections::{BTreeMap, HashMap};
 use std::io::{Cursor, Write};
 use std::path::PathBuf;
 use std::sync::Arc;
@@ -11,9 +12,12 @@ use rayon::prelude::*;
 
 use super::reconvergence::reconverging;
 use super::specialize::decided;
-use super::{Buffer, Context, DeviceFacts, Gpu, call};
+use super::{AnyBuffer, Context, DeviceFacts, Gpu, call};
 use crate::error::Result;
 use crate::records::Field;
+
+/// Bytes of push constants that every Vulkan device has.
+pub(super) const PUSH_BYTES: u32 = 128;
 
 /// A kernel with its buffers filled in; `build.rs` writes one implementor a kernel.
 pub trait Kernel {
@@ -22,8 +26,10 @@ pub trait Kernel {
     const MODULE: Module;
     /// Fails to compile if the push constants exceed what every device allows.
     const FITS: ();
-    /// In the order of `MODULE.bindings`.
-    fn buffers(&self) -> Vec<&Buffer>;
+    /// The scene that it looks at, all of it; empty where it looks at none.
+    fn scene(&self) -> Vec<&AnyBuffer>;
+    /// Its own, in the order of `MODULE.bindings`.
+    fn buffers(&self) -> Vec<&AnyBuffer>;
 }
 
 /// A compiled kernel and what reflection found in it.
@@ -32,6 +38,9 @@ pub struct Module {
     pub name: &'static str,
     pub spirv: &'static [u8],
     pub push_bytes: u32,
+    /// Bindings of set 0, the scene's, which are the same for all kernels of a world; none where it looks at no scene.
+    pub scene_bindings: u32,
+    /// Bindings of set 1: its own.
     pub bindings: &'static [Binding],
     /// Its lanes vote in a loop that they come to on different ways.
     pub votes_in_loops: bool,
@@ -42,7 +51,6 @@ pub struct Module {
 #[derive(Debug, Clone, Copy)]
 pub struct Binding {
     pub name: &'static str,
-    pub set: u32,
     pub binding: u32,
     pub reads: bool,
     pub writes: bool,
@@ -93,7 +101,8 @@ impl PipelineKey {
 pub(super) struct Pipeline {
     pub(super) raw: vk::Pipeline,
     pub(super) layout: vk::PipelineLayout,
-    pub(super) set_layouts: Vec<vk::DescriptorSetLayout>,
+    /// Of the scene, and of the kernel's own buffers.
+    pub(super) set_layouts: [vk::DescriptorSetLayout; 2],
     context: Arc<Context>,
 }
 
@@ -104,9 +113,46 @@ impl Drop for Pipeline {
         unsafe {
             device.destroy_pipeline(self.raw, None);
             device.destroy_pipeline_layout(self.layout, None);
-            for layout in &self.set_layouts {
-                device.destroy_descriptor_set_layout(*layout, None);
-            }
+        }
+    }
+}
+
+/// Layouts of descriptor sets, by the numbers of their bindings: pipelines with the same ones leave each other's sets bound.
+pub(super) struct SetLayouts {
+    made: RefCell<HashMap<Vec<u32>, vk::DescriptorSetLayout>>,
+    context: Arc<Context>,
+}
+
+impl SetLayouts {
+    pub(super) fn new(context: &Arc<Context>) -> SetLayouts {
+        SetLayouts { made: RefCell::default(), context: context.clone() }
+    }
+
+    fn of(&self, numbers: Vec<u32>) -> Result<vk::DescriptorSetLayout> {
+        if let Some(layout) = self.made.borrow().get(&numbers) {
+            return Ok(*layout);
+        }
+        let binding = |number: &u32| {
+            vk::DescriptorSetLayoutBinding::default()
+                .binding(*number)
+                .descriptor_type(vk::DescriptorType::STORAGE_BUFFER)
+                .descriptor_count(1)
+                .stage_flags(vk::ShaderStageFlags::COMPUTE)
+        };
+        let bindings: Vec<_> = numbers.iter().map(binding).collect();
+        let info = vk::DescriptorSetLayoutCreateInfo::default().bindings(&bindings);
+        // SAFETY: `info` is complete; destroyed in Drop.
+        let layout = call("vkCreateDescriptorSetLayout", unsafe { self.context.device.create_descriptor_set_layout(&info, None) })?;
+        self.made.borrow_mut().insert(numbers, layout);
+        Ok(layout)
+    }
+}
+
+impl Drop for SetLayouts {
+    fn drop(&mut self) {
+        for layout in self.made.borrow().values() {
+            // SAFETY: commands borrow the device that this belongs to, so no set is made any more.
+            unsafe { self.context.device.destroy_descriptor_set_layout(*layout, None) };
         }
     }
 }
@@ -156,38 +202,16 @@ impl Gpu {
 
     /// A pipeline that is still to be compiled.
     fn pipeline_layout(&self, module: &Module) -> Result<Pipeline> {
-        let device = &self.context.device;
-        let set_count = module.bindings.iter().map(|binding| binding.set + 1).max().unwrap_or(0);
-        let mut pipeline = Pipeline {
-            raw: vk::Pipeline::null(),
-            layout: vk::PipelineLayout::null(),
-            set_layouts: Vec::new(),
-            context: self.context.clone(),
-        };
-        for set in 0..set_count {
-            let bindings: Vec<_> = module
-                .bindings
-                .iter()
-                .filter(|binding| binding.set == set)
-                .map(|binding| {
-                    vk::DescriptorSetLayoutBinding::default()
-                        .binding(binding.binding)
-                        .descriptor_type(vk::DescriptorType::STORAGE_BUFFER)
-                        .descriptor_count(1)
-                        .stage_flags(vk::ShaderStageFlags::COMPUTE)
-                })
-                .collect();
-            let info = vk::DescriptorSetLayoutCreateInfo::default().bindings(&bindings);
-            // SAFETY: `info` is complete; destroyed with the pipeline.
-            pipeline.set_layouts.push(call("vkCreateDescriptorSetLayout", unsafe { device.create_descriptor_set_layout(&info, None) })?);
-        }
-        let push = [vk::PushConstantRange::default().stage_flags(vk::ShaderStageFlags::COMPUTE).size(module.push_bytes)];
-        let info = vk::PipelineLayoutCreateInfo::default()
-            .set_layouts(&pipeline.set_layouts)
-            .push_constant_ranges(if module.push_bytes == 0 { &[] } else { &push });
-        // SAFETY: as above.
-        pipeline.layout = call("vkCreatePipelineLayout", unsafe { device.create_pipeline_layout(&info, None) })?;
-        Ok(pipeline)
+        let set_layouts = [
+            self.set_layouts.of((0..module.scene_bindings).collect())?,
+            self.set_layouts.of(module.bindings.iter().map(|binding| binding.binding).collect())?,
+        ];
+        // The same for all, as sets stay bound only between layouts whose push constants are alike.
+        let push = [vk::PushConstantRange::default().stage_flags(vk::ShaderStageFlags::COMPUTE).size(PUSH_BYTES)];
+        let info = vk::PipelineLayoutCreateInfo::default().set_layouts(&set_layouts).push_constant_ranges(&push);
+        // SAFETY: `info` is complete; destroyed with the pipeline.
+        let layout = call("vkCreatePipelineLayout", unsafe { self.context.device.create_pipeline_layout(&info, None) })?;
+        Ok(Pipeline { raw: vk::Pipeline::null(), layout, set_layouts, context: self.context.clone() })
     }
 }
 

@@ -20,7 +20,7 @@ use std::time::Instant;
 use ash::vk;
 use gpu_allocator::vulkan::{Allocator, AllocatorCreateDesc};
 
-pub use buffer::{Buffer, HeldMemory, Memory};
+pub use buffer::{AnyBuffer, Buffer, HeldMemory, Memory};
 pub use commands::{Commands, Extent, Interrupt};
 pub use device::DeviceFacts;
 pub use kernel::{Constants, Kernel, Module};
@@ -31,7 +31,7 @@ use validation::Messages;
 
 /// The kernels that `build.rs` found, one struct each.
 pub mod kernels {
-    use super::buffer::Buffer;
+    use super::buffer::{AnyBuffer, Buffer};
     use super::kernel::{Binding, Kernel, Module, ReflectedStruct};
     use crate::records::Field;
 
@@ -66,6 +66,7 @@ pub struct Gpu {
     replaced: Vec<(String, Vec<u32>)>,
     queue: vk::Queue,
     pipelines: RefCell<HashMap<kernel::PipelineKey, Arc<kernel::Pipeline>>>,
+    set_layouts: kernel::SetLayouts,
     cache: kernel::DiskCache,
     context: Arc<Context>,
 }
@@ -168,6 +169,7 @@ impl Gpu {
             replaced: options.replaced.clone(),
             queue,
             pipelines: RefCell::default(),
+            set_layouts: kernel::SetLayouts::new(&context),
             cache,
             context,
         };

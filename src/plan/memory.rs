@@ -1,8 +1,7 @@
-//! What a plan's buffers take on the device: one list for each line, by the names that the engine gives them.
-//! `resources` and `transport::resources` make them; `tests/memory.rs` holds what they made against these lists.
+//! The buffers of a plan, each listed once: resources are made from this list, and what a run takes is said and checked by it.
 
 use bytemuck::Pod;
-use glam::UVec2;
+use glam::{UVec2, Vec4};
 
 use super::RoomPlan;
 use super::scene::{MapPlan, ScenePlan};
@@ -17,16 +16,45 @@ use crate::scene::geometry::Geometry;
 use crate::settings::Builder;
 use crate::settings::scene::Effect;
 
-/// A buffer, or several of one name, and all their bytes.
-pub type Stated = (&'static str, u64);
-
-/// Bytes of `count` records; Vulkan has no empty buffers, so there is one at least.
-fn array<T: Pod>(count: u64) -> u64 {
-    count.max(1) * size_of::<T>() as u64
+/// A buffer that a run will have.
+#[derive(Debug, Clone, Copy, PartialEq, Eq)]
+pub struct PlannedBuffer {
+    /// Several that are alike have the same.
+    pub name: &'static str,
+    /// What it holds, and so what it is for.
+    pub why: &'static str,
+    /// Rust's name of the type of its elements.
+    pub element: &'static str,
+    pub element_bytes: u64,
+    /// Elements; 0 where nobody reads any.
+    pub count: u64,
 }
 
-/// Words of the buffer in which kernels note what is odd: of each kind a count and the first ones.
-const NONFINITE_WORDS: u64 = (NONFINITE_ESTIMATE as u64 + 1) * (1 + 3 * MAX_NONFINITE_VALUES as u64);
+impl PlannedBuffer {
+    /// Vulkan has no empty buffers, so there is one element at least.
+    pub fn bytes(&self) -> u64 {
+        self.count.max(1) * self.element_bytes
+    }
+}
+
+fn buffer<T: Pod>(name: &'static str, count: u64, why: &'static str) -> PlannedBuffer {
+    PlannedBuffer { name, why, element: std::any::type_name::<T>(), element_bytes: size_of::<T>() as u64, count }
+}
+
+pub fn bytes_of(buffers: &[PlannedBuffer]) -> u64 {
+    buffers.iter().map(PlannedBuffer::bytes).sum()
+}
+
+/// Words of a kind of nonfinite values: how many there were, and three for each of the first ones.
+pub const NONFINITE_KIND_WORDS: usize = 1 + 3 * MAX_NONFINITE_VALUES as usize;
+
+fn nonfinite_values() -> PlannedBuffer {
+    let kinds = NONFINITE_ESTIMATE as u64 + 1;
+    buffer::<u32>("nonfinite values", kinds * NONFINITE_KIND_WORDS as u64, "the nonfinite values that --paranoid found")
+}
+
+/// Words that kernels count clamped values and lost camera paths in (`glsl/world/scene/film.glsl`).
+pub const ANOMALY_WORDS: usize = 8;
 
 /// Sums of each level of a prefix sum over `items`: sums of blocks of the level below, down to one block.
 pub fn block_sum_counts(items: u64, group_size: u32) -> Vec<u64> {
@@ -35,13 +63,9 @@ pub fn block_sum_counts(items: u64, group_size: u32) -> Vec<u64> {
     std::iter::successors(Some(items.div_ceil(block).max(1)), up).collect()
 }
 
-fn block_sum_bytes(items: u64, group_size: u32) -> u64 {
-    block_sum_counts(items, group_size).into_iter().map(array::<u32>).sum()
-}
-
-/// Counts of a list of the kd-tree: a word a photon, up to whole runs of the radix sort.
-pub fn tree_count_capacity(plan: &RoomPlan) -> u32 {
-    plan.photon_capacity.next_multiple_of(TREE_RUN)
+/// One buffer a level, from the finest.
+fn block_sums(name: &'static str, items: u64, group_size: u32) -> impl Iterator<Item = PlannedBuffer> {
+    block_sum_counts(items, group_size).into_iter().map(move |count| buffer::<u32>(name, count, "sums of blocks, for prefix sums"))
 }
 
 /// Work groups of the largest chunk's paths.
@@ -59,155 +83,187 @@ pub fn survivor_count(plan: &ScenePlan, paths: u32) -> u32 {
 const SEARCH_ENTRIES: u64 = 1 << 22;
 
 /// Points whose `nearest` photons are searched for at once.
-pub fn searches_at_once(plan: &RoomPlan, nearest: u32) -> u64 {
+fn searches_at_once(plan: &RoomPlan, nearest: u32) -> u64 {
     let group = u64::from(plan.settings.group_size);
     (SEARCH_ENTRIES / u64::from(nearest) / group * group).clamp(group, (plan.points.len() as u64).next_multiple_of(group))
 }
 
 impl RoomPlan {
-    /// Every buffer of the paper's line.
-    pub fn buffers(&self) -> Vec<Stated> {
+    /// Every buffer of a run.
+    pub fn buffers(&self) -> Vec<PlannedBuffer> {
         let bounces = u64::from(self.settings.bounces);
+        let group_size = self.settings.group_size;
         let (paths, photons) = (u64::from(self.path_array_length()), u64::from(self.photon_capacity));
         let origins = u64::from(self.origin_array_length());
         let points = self.points.len() as u64;
         let sums = points * u64::from(self.channel_count);
+        let states = self.streams().first_state_count(self.path_capacity);
         let mut buffers = vec![
-            ("rooms", array::<Room>(1)),
-            ("walls", array::<Wall>(u64::from(FACE_COUNT))),
-            ("lights", array::<DiscLight>(self.light_photons.len() as u64)),
-            ("points", array::<Point>(points)),
-            ("stream seeds", array::<UVec2>(self.streams().first_state_count(self.path_capacity))),
-            ("paths", 2 * array::<StoredPath>(paths)),
-            ("photons", array::<StoredPhoton>(photons)),
-            ("origins", array::<Origin>(origins)),
-            ("counters", array::<u32>(self.counter_array_length())),
-            ("dispatch args", array::<DispatchArgs>(1)),
-            ("tallies", array::<Tally>(bounces * u64::from(TALLY_COPIES))),
-            ("film", array::<u64>(sums)),
-            ("nonfinite_values", array::<u32>(NONFINITE_WORDS)),
+            buffer::<Room>("rooms", 1, "the room's corners"),
+            buffer::<Wall>("walls", u64::from(FACE_COUNT), "the walls"),
+            buffer::<DiscLight>("lights", self.light_photons.len() as u64, "the lights"),
+            buffer::<Point>("points", points, "the texels of the walls"),
+            buffer::<UVec2>("stream seeds", states, "the first state of each photon's random numbers"),
+            buffer::<StoredPath>("even paths", paths, "paths that enter even bounces"),
+            buffer::<StoredPath>("odd paths", paths, "paths that enter odd bounces"),
+            buffer::<StoredPhoton>("photons", photons, "the photon map"),
+            buffer::<Origin>("origins", origins, "which photon each entry of the photon map is"),
+            buffer::<u32>("counters", self.counter_array_length(), "lengths of the photon map and of the lists of paths"),
+            buffer::<DispatchArgs>("dispatch args", 1, "the size of the next dispatch"),
+            buffer::<Tally>("tallies", bounces * u64::from(TALLY_COPIES), "fates of photons"),
+            buffer::<u64>("film", sums, "sums of the round under way"),
+            nonfinite_values(),
         ];
         if self.settings.builder == Builder::Scan {
             let sums = u64::from(group_count(self)) + 1;
+            let weights = if self.settings.has_phong() { paths } else { 1 };
             buffers.extend([
-                ("survivors", array::<u32>(sums)),
-                ("block sums", block_sum_bytes(sums, self.settings.group_size)),
-                ("weights", array::<f32>(if self.settings.has_phong() { paths } else { 1 })),
+                buffer::<u32>("survivors", sums, "survivors of each work group"),
+                buffer::<f32>("weights", weights, "each path's weight at the eye"),
             ]);
+            buffers.extend(block_sums("sums of survivors", sums, group_size));
         }
         if self.gathers_by_grid() {
             let cells = u64::from(self.grid.cells()) + 1;
             buffers.extend([
-                ("cells", array::<u32>(cells)),
-                ("ranks", array::<u32>(photons)),
-                ("block sums", block_sum_bytes(cells, self.settings.group_size)),
-                ("sorted photons", array::<StoredPhoton>(photons)),
-                ("longest", array::<u32>(1)),
+                buffer::<u32>("cells", cells, "the first photon of each cell"),
+                buffer::<u32>("ranks", photons, "each photon's place in its cell"),
+                buffer::<StoredPhoton>("sorted photons", photons, "the photon map by cells"),
+                buffer::<u32>("longest", 1, "candidates of the busiest point"),
             ]);
+            buffers.extend(block_sums("sums of cells", cells, group_size));
         }
         if self.gathers_by_tree() {
-            let counts = u64::from(tree_count_capacity(self));
+            // A word a photon, up to whole runs of the radix sort.
+            let counts = u64::from(self.photon_capacity.next_multiple_of(TREE_RUN));
+            buffers.extend([buffer::<UVec2>("tree list", photons, "photons in the order along an axis"); 3]);
             buffers.extend([
-                ("tree lists", 3 * array::<UVec2>(photons)),
-                ("tree ranks", array::<u32>(photons)),
-                ("tree counts", array::<u32>(counts)),
-                ("block sums", block_sum_bytes(counts, self.settings.group_size)),
-                ("tree dispatch args", 3 * array::<DispatchArgs>(1)),
-                ("wall begins", array::<u32>(u64::from(FACE_COUNT) + 1)),
-                ("longest", array::<u32>(1)),
-                ("planes", array::<f32>(photons / u64::from(TREE_LEAF) + 1)),
-                ("tree photons", array::<StoredPhoton>(photons)),
-                ("tree origins", array::<Origin>(origins)),
+                buffer::<u32>("tree ranks", photons, "each photon's place in that order"),
+                buffer::<u32>("tree counts", counts, "photons of each digit and run"),
+                buffer::<DispatchArgs>("item args", 1, "the size of a dispatch over photons"),
+                buffer::<DispatchArgs>("run args", 1, "the size of a dispatch over runs"),
+                buffer::<DispatchArgs>("scan args", 1, "the size of a dispatch of a prefix sum"),
+                buffer::<u32>("wall begins", u64::from(FACE_COUNT) + 1, "the first photon of each wall"),
+                buffer::<u32>("longest", 1, "photons of the fullest wall"),
+                buffer::<f32>("planes", photons / u64::from(TREE_LEAF) + 1, "planes that split the tree's nodes"),
+                buffer::<StoredPhoton>("tree photons", photons, "the photon map in the tree's order"),
+                buffer::<Origin>("tree origins", origins, "which photon each of them is"),
             ]);
+            buffers.extend(block_sums("sums of tree counts", counts, group_size));
             if let Some(nearest) = self.settings.nearest {
                 let at_once = searches_at_once(self, nearest);
                 buffers.extend([
-                    ("nearest photons", array::<UVec2>(at_once * u64::from(nearest))),
-                    ("searches", array::<Search>(at_once)),
-                    ("unfinished", array::<u32>(1)),
+                    buffer::<UVec2>("nearest photons", at_once * u64::from(nearest), "the nearest photons of points"),
+                    buffer::<Search>("searches", at_once, "searches under way"),
+                    buffer::<u32>("unfinished", 1, "whether some search goes on"),
                 ]);
             }
         }
         if self.keeps_squares() {
-            buffers.push(("film totals and squares", 3 * array::<u64>(sums)));
+            buffers.extend([
+                buffer::<u64>("film totals", sums, "sums of all rounds"),
+                buffer::<u64>("low squares", sums, "lower halves of their squares"),
+                buffer::<u64>("high squares", sums, "upper halves of their squares"),
+            ]);
         }
         buffers
     }
 
     /// Bytes of all of them.
     pub fn bytes(&self) -> u64 {
-        self.buffers().iter().map(|(_, bytes)| bytes).sum()
+        bytes_of(&self.buffers())
     }
-}
-
-/// Bytes of a pixel on the film: sums and squares of three channels.
-const FILM_PIXEL_BYTES: u64 = 3 * 8 + 3 * 16;
-
-/// Every buffer of lighting a scene of triangles, with one set of receivers where points are asked.
-pub(super) fn of_transport(plan: &ScenePlan, geometry: &Geometry, keeps: &dyn Fn(Effect) -> bool) -> Vec<Stated> {
-    fn kept<T: Pod>(content: &[T], is_kept: bool) -> u64 {
-        array::<T>(if is_kept { content.len() as u64 } else { 0 })
-    }
-    let pixels = u64::from(plan.sensor.pixels());
-    let points = u64::from(plan.visible_points());
-    let textured = keeps(Effect::Textures);
-    let mut buffers = vec![
-        ("nodes", kept(&geometry.nodes, keeps(Effect::Bvh))),
-        ("triangles", kept(&geometry.triangles, true)),
-        ("planes", kept(&geometry.planes, true)),
-        ("normals", kept(&geometry.normals, keeps(Effect::SmoothNormals))),
-        ("texture coordinates", kept(&geometry.uvs, textured)),
-        ("materials", kept(&geometry.materials, true)),
-        ("textures", kept(&geometry.textures, textured)),
-        ("texels", kept(&geometry.texels, textured)),
-        ("emitters", kept(&geometry.emitters, true)),
-        ("caustic targets", kept(&plan.targets, true)),
-        ("visible points", array::<VisiblePoint>(points)),
-        ("pass sums", array::<u64>(3 * pixels * u64::from(plan.samples()))),
-        ("camera paths", 2 * array::<CameraPath>(plan.camera_path_capacity())),
-        ("camera path counts", array::<u32>(1)),
-        ("estimates", array::<u64>(3 * points * u64::from(plan.arrival_sets))),
-        ("one hits", array::<u32>(u64::from(HIT_KINDS) * pixels)),
-        ("film", pixels.max(1) * FILM_PIXEL_BYTES),
-        ("part totals", array::<u64>(u64::from(PART_COUNT))),
-        ("anomalies", array::<u32>(8)),
-        ("nonfinite_values", array::<u32>(NONFINITE_WORDS)),
-    ];
-    if let Sensor::Receivers { count } = plan.sensor {
-        buffers.push(("receivers", array::<Receiver>(u64::from(count))));
-    }
-    if plan.maps().next().is_some() {
-        // Both maps of a round use the same buffers in turn.
-        let most = |size: fn(&MapPlan) -> u32| plan.maps().map(size).max().map_or(0, u64::from);
-        let (paths, capacity, buckets) = (most(|map| map.path_array_length), most(|map| map.capacity), most(|map| map.bucket_count));
-        let counters = plan.maps().map(MapPlan::counter_count).max().unwrap_or(2);
-        buffers.extend([
-            ("light paths", 2 * array::<LightPath>(paths)),
-            ("map", array::<MapPhoton>(capacity)),
-            ("sorted map", array::<MapPhoton>(capacity)),
-            ("counters", array::<u32>(counters)),
-            ("dispatch args", array::<DispatchArgs>(1)),
-            ("cells", array::<u32>(buckets + 1)),
-            ("ranks", array::<u32>(capacity)),
-            ("block sums", block_sum_bytes(buckets + 1, plan.settings.group_size)),
-            ("crowded points", array::<u32>(2 + 2 * u64::from(plan.points_at_once()))),
-            ("tallies", 2 * array::<Tally>(u64::from(plan.tally_rows()) * u64::from(TALLY_COPIES))),
-            ("totals", 2 * array::<u32>(u64::from(TOTAL_WORDS) * u64::from(TALLY_COPIES))),
-        ]);
-        if plan.builder() == Builder::Scan {
-            let survivors = u64::from(survivor_count(plan, most(|map| map.chunk_photons) as u32));
-            buffers.extend([("survivors", array::<u32>(survivors)), ("block sums", block_sum_bytes(survivors, plan.settings.group_size))]);
-        }
-    }
-    buffers
 }
 
 impl ScenePlan {
+    /// Every buffer of a run, with one set of receivers where points are asked.
+    pub fn buffers(&self, geometry: &Geometry) -> Vec<PlannedBuffer> {
+        [self.scene_buffers(geometry), self.sensor_buffers(), self.photon_buffers(), self.count_buffers()].concat()
+    }
+
+    /// The scene, written once.
+    pub(super) fn scene_buffers(&self, geometry: &Geometry) -> Vec<PlannedBuffer> {
+        fn of<T: Pod>(name: &'static str, content: &[T], is_kept: bool, why: &'static str) -> PlannedBuffer {
+            buffer::<T>(name, if is_kept { content.len() as u64 } else { 0 }, why)
+        }
+        let textured = self.keeps(Effect::Textures);
+        vec![
+            of("nodes", &geometry.nodes, self.keeps(Effect::Bvh), "the triangles' hierarchy"),
+            of("triangles", &geometry.triangles, true, "triangles"),
+            of::<Vec4>("planes", &geometry.planes, true, "the triangles' planes"),
+            of("normals", &geometry.normals, self.keeps(Effect::SmoothNormals), "the triangles' normals"),
+            of("texture coordinates", &geometry.uvs, textured, "the triangles' texture coordinates"),
+            of("materials", &geometry.materials, true, "materials"),
+            of("textures", &geometry.textures, textured, "sizes of textures"),
+            of::<UVec2>("texels", &geometry.texels, textured, "textures"),
+            of("emitters", &geometry.emitters, true, "emitters"),
+            of("caustic targets", &self.targets, true, "spheres that photons are aimed at"),
+        ]
+    }
+
+    /// What grows with the pixels or receivers.
+    pub(super) fn sensor_buffers(&self) -> Vec<PlannedBuffer> {
+        let (pixels, points) = (u64::from(self.sensor.pixels()), u64::from(self.visible_points()));
+        let mut buffers = vec![
+            buffer::<u64>("film sums", 3 * pixels, "sums of all rounds"),
+            buffer::<u64>("film squares", 6 * pixels, "sums of their squares"),
+            buffer::<u32>("one hits", u64::from(HIT_KINDS) * pixels, "what one hit would add where none has"),
+            buffer::<u64>("pass sums", 3 * pixels * u64::from(self.samples()), "samples of pixels in a round"),
+            buffer::<VisiblePoint>("visible points", points, "where photons are looked up"),
+            buffer::<u64>("estimates", 3 * points * u64::from(self.arrival_sets), "what photons add there"),
+        ];
+        let camera_paths = buffer::<CameraPath>("camera paths", self.camera_path_capacity(), "paths that one dispatch leaves");
+        buffers.extend([camera_paths; 2]);
+        if let Sensor::Receivers { count } = self.sensor {
+            buffers.push(buffer::<Receiver>("receivers", u64::from(count), "points that are asked about"));
+        }
+        buffers
+    }
+
+    /// Photons of a chunk and their map; both maps of a round use the same buffers in turn.
+    fn photon_buffers(&self) -> Vec<PlannedBuffer> {
+        let Some(counters) = self.maps().map(MapPlan::counter_count).max() else { return Vec::new() };
+        let most = |size: fn(&MapPlan) -> u32| self.maps().map(size).max().map_or(0, u64::from);
+        let (paths, capacity, buckets) = (most(|map| map.path_array_length), most(|map| map.capacity), most(|map| map.bucket_count));
+        let tallies = u64::from(self.tally_rows() * TALLY_COPIES);
+        let totals = u64::from(TOTAL_WORDS * TALLY_COPIES);
+        let mut buffers = vec![
+            buffer::<LightPath>("even light paths", paths, "paths that enter even bounces"),
+            buffer::<LightPath>("odd light paths", paths, "paths that enter odd bounces"),
+            buffer::<MapPhoton>("map", capacity, "the photon map"),
+            buffer::<MapPhoton>("sorted map", capacity, "the photon map by buckets"),
+            buffer::<u32>("counters", counters, "lengths of the photon map and of the lists of paths"),
+            buffer::<DispatchArgs>("dispatch args", 1, "the size of the next dispatch"),
+            buffer::<u32>("cells", buckets + 1, "the first photon of each bucket"),
+            buffer::<u32>("ranks", capacity, "each photon's place in its bucket"),
+            buffer::<u32>("crowded points", 2 + 2 * u64::from(self.points_at_once()), "points with many candidates"),
+            buffer::<Tally>("global tallies", tallies, "fates of the global map's photons"),
+            buffer::<Tally>("caustic tallies", tallies, "fates of the caustic map's photons"),
+            buffer::<u32>("global totals", totals, "what limits cost the global map"),
+            buffer::<u32>("caustic totals", totals, "what limits cost the caustic map"),
+        ];
+        buffers.extend(block_sums("sums of cells", buckets + 1, self.settings.group_size));
+        if self.builder() == Builder::Scan {
+            let survivors = u64::from(survivor_count(self, most(|map| map.chunk_photons) as u32));
+            buffers.push(buffer::<u32>("survivors", survivors, "survivors and stored photons of each work group"));
+            buffers.extend(block_sums("sums of survivors", survivors, self.settings.group_size));
+        }
+        buffers
+    }
+
+    /// What kernels count, whatever the sizes.
+    fn count_buffers(&self) -> Vec<PlannedBuffer> {
+        vec![
+            buffer::<u32>("camera path counts", 1, "how many camera paths a dispatch leaves"),
+            buffer::<u64>("part totals", u64::from(PART_COUNT), "light of each part of a path"),
+            buffer::<u32>("anomalies", ANOMALY_WORDS as u64, "clamped values and lost camera paths"),
+            nonfinite_values(),
+        ]
+    }
+
     /// Bytes of all buffers of a run that asks `phases` sets of receivers in turn; of a picture there are none.
     pub fn bytes_of(&self, phases: usize) -> u64 {
-        match self.sensor {
-            Sensor::Picture { .. } => self.bytes,
-            Sensor::Receivers { count } => self.bytes + (phases as u64).saturating_sub(1) * array::<Receiver>(u64::from(count)),
-        }
+        let receivers = self.sensor_buffers().into_iter().find(|buffer| buffer.name == "receivers");
+        self.bytes + (phases as u64).saturating_sub(1) * receivers.map_or(0, |receivers| receivers.bytes())
     }
 }

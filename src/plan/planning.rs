@@ -3,15 +3,15 @@
 use std::f64::consts::PI;
 use std::time::{Duration, Instant};
 
+use super::Limits;
 use super::evidence::{EffectDecision, Facts};
 use super::maps::Maps;
+use super::memory::{PlannedBuffer, bytes_of};
 use super::scene::{MapPlan, SEGMENT_BOUNCES, ScenePlan, Trial};
 use super::sensor::Sensor;
-use super::{Limits, memory};
 use crate::constants::*;
 use crate::error::{Error, Result};
 use crate::photon::MapPhoton;
-use crate::records::*;
 use crate::scene::geometry::Geometry;
 use crate::scene::{Scene, Surface};
 use crate::settings::scene::{Effect, Illumination, SceneSettings};
@@ -51,7 +51,7 @@ impl ScenePlan {
             ));
         }
         let facts = Facts::new(scene, geometry, settings, sensor);
-        let mut decisions: Vec<EffectDecision> = Effect::ALL.iter().map(|effect| facts.decide(*effect, settings)).collect();
+        let decisions: Vec<EffectDecision> = Effect::ALL.iter().map(|effect| facts.decide(*effect, settings)).collect();
         let keeps = |effect: Effect| decisions.iter().any(|decision| decision.effect == effect && decision.kept);
 
         let by_itself = if settings.math == Math::Strict || !limits.votes_in_loops { Builder::Ballot } else { Builder::Persistent };
@@ -73,7 +73,7 @@ impl ScenePlan {
             settings,
             sensor,
             trial: None,
-            decisions: Vec::new(),
+            decisions,
             constants,
             global,
             caustic,
@@ -90,11 +90,8 @@ impl ScenePlan {
             planned_in: Duration::ZERO,
         };
         plan.set_film(geometry);
-        plan.check_sizes(geometry, &keeps, limits)?;
-        for decision in &mut decisions {
-            plan.give(decision, geometry);
-        }
-        plan.decisions = decisions;
+        plan.check_sizes(geometry, limits)?;
+        plan.decisions = plan.decisions.iter().map(|decision| plan.given(decision, geometry)).collect();
         plan.trial = trial;
         plan.planned_in = began.elapsed();
         Ok(plan)
@@ -113,34 +110,20 @@ impl ScenePlan {
         self.film_limit = limit;
     }
 
-    fn check_sizes(&mut self, geometry: &Geometry, keeps: &dyn Fn(Effect) -> bool, limits: &Limits) -> Result<()> {
-        let pixels = u64::from(self.sensor.pixels());
-        let points = u64::from(self.visible_points());
-        let film = [
-            ("the film", 48 * pixels),
-            ("the samples of pixels", 24 * pixels * u64::from(self.samples())),
-            ("visible points", points * size_of::<VisiblePoint>() as u64),
-            ("estimates", points * u64::from(self.arrival_sets) * 24),
-        ];
-        let scene = [
-            ("triangles", size_of_val(geometry.triangles.as_slice()) as u64),
-            ("the triangles' planes", size_of_val(geometry.planes.as_slice()) as u64),
-            ("the triangles' texture coordinates", size_of_val(geometry.uvs.as_slice()) as u64),
-            ("the triangles' hierarchy", size_of_val(geometry.nodes.as_slice()) as u64),
-            ("textures", size_of_val(geometry.texels.as_slice()) as u64),
-            ("emitters", size_of_val(geometry.emitters.as_slice()) as u64),
-        ];
-        let too_large = |(_, bytes): &&(&'static str, u64)| *bytes > limits.buffer_bytes;
-        if let Some((what, bytes)) = scene.iter().find(too_large) {
+    fn check_sizes(&mut self, geometry: &Geometry, limits: &Limits) -> Result<()> {
+        if let Some(too_large) = self.scene_buffers(geometry).iter().find(|buffer| buffer.bytes() > limits.buffer_bytes) {
             let allowed = format!(
-                "{what} take {bytes} bytes, but a buffer on this device holds at most {}; choose another --device",
+                "{} take {} bytes, but a buffer on this device holds at most {}; choose another --device",
+                too_large.why,
+                too_large.bytes(),
                 limits.buffer_bytes
             );
             return Err(Error::setting("SCENE", format!("({} triangles)", geometry.triangles.len()), allowed));
         }
-        if film.iter().any(|(_, bytes)| *bytes > limits.buffer_bytes) {
-            let per_pixel = film.iter().map(|(_, bytes)| bytes / pixels).max().unwrap_or(1);
-            let most = limits.buffer_bytes / per_pixel;
+        let pixels = u64::from(self.sensor.pixels());
+        let largest = self.sensor_buffers().iter().map(PlannedBuffer::bytes).max().unwrap_or(0);
+        if largest > limits.buffer_bytes {
+            let most = limits.buffer_bytes / (largest / pixels);
             return Err(match self.sensor {
                 Sensor::Picture { width, height } => Error::setting(
                     "--size",
@@ -157,7 +140,7 @@ impl ScenePlan {
                 }
             });
         }
-        self.bytes = memory::of_transport(self, geometry, keeps).iter().map(|(_, bytes)| bytes).sum();
+        self.bytes = bytes_of(&self.buffers(geometry));
         if self.bytes > limits.memory_bytes {
             return Err(Error::setting(
                 "--chunk",
@@ -180,10 +163,11 @@ impl ScenePlan {
         }
     }
 
-    /// Photons and bytes that exist for one effect, and what became of it.
-    fn give(&self, decision: &mut EffectDecision, geometry: &Geometry) {
+    /// A decision with the photons and bytes that exist for its effect, and what became of it.
+    fn given(&self, decision: &EffectDecision, geometry: &Geometry) -> EffectDecision {
+        let mut decision = decision.clone();
         if !decision.kept {
-            return;
+            return decision;
         }
         let map_bytes = |map: &MapPlan| u64::from(map.capacity) * MAP_ENTRY_BYTES + u64::from(map.bucket_count) * 4;
         (decision.photons, decision.bytes) = match decision.effect {
@@ -197,6 +181,7 @@ impl ScenePlan {
             Effect::Bvh => (0, size_of_val(geometry.nodes.as_slice()) as u64),
             _ => (0, 0),
         };
+        decision
     }
 }
 

@@ -156,7 +156,8 @@ fn levels(tree: &CwBvh) -> usize {
     deepest
 }
 
-fn record(node: &CwBvhNode) -> BvhNode {
+/// The node as kernels read it.
+pub fn record(node: &CwBvhNode) -> BvhNode {
     let words = |bytes: [u8; 8]| {
         let word = |first: usize| u32::from_le_bytes([bytes[first], bytes[first + 1], bytes[first + 2], bytes[first + 3]]);
         UVec2::new(word(0), word(4))

@@ -26,6 +26,13 @@ bool has_path(uint index)
     return paths[path_word(0, index, push.path_capacity)].w != NO_WALL;
 }
 
+// A path that has died where it stands.
+LightPath emptied(LightPath path)
+{
+    path.wall = NO_WALL;
+    return path;
+}
+
 void store_path(uint place, LightPath path)
 {
     uvec4[PATH_WORDS] words = pack_path(path);

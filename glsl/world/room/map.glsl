@@ -20,7 +20,9 @@ void store_photon(uint place, Photon photon)
     }
 }
 
-void store_no_photon(uint place)
+// An entry that is none.
+Photon emptied(Photon photon)
 {
-    photons[place] = pack_photon(Photon(vec3(0.0), NO_WALL, 0.0, 0.0, 0, 0));
+    photon.wall = NO_WALL;
+    return photon;
 }

@@ -4,7 +4,7 @@
 // heuristic, Veach 1997, section 9.2), so that spheres may overlap. As no law exceeds its bound, no photon weighs
 // more than the sum of the bounds; where that is 1 or more, as within a sphere, photons leave as ever.
 
-layout(set = 0, binding = 9, scalar) readonly buffer CausticTargets { CausticTarget caustic_targets[]; };
+layout(set = 0, binding = 8, scalar) readonly buffer CausticTargets { CausticTarget caustic_targets[]; };
 
 // Directions are no better known than to some of their last bits: by so much each sphere's half angle is widened, by its
 // sine, and a law's reach by its cosine.

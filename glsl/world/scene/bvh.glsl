@@ -1,6 +1,8 @@
 // Rays against the scene's triangles: a compressed wide BVH (Ylitie, Karras and Laine 2017), and the
 // watertight test of Woop, Benthin and Wald (2013).
 
+#include "world/scene/bvh_node.glsl"
+
 layout(set = 0, binding = 0, scalar) readonly buffer Nodes { BvhNode nodes[]; };
 layout(set = 0, binding = 1, scalar) readonly buffer Triangles { Triangle triangles[]; };
 
@@ -118,11 +120,6 @@ void intersect_triangle(ShearedRay ray, uint index, inout Hit hit)
     }
 }
 
-uint byte_of(uvec2 bytes, uint index)
-{
-    return ((index < 4 ? bytes.x : bytes.y) >> (8 * (index & 3u))) & 0xffu;
-}
-
 // Children that the ray may meet before t_max: nodes as bits 24 to 31 in the order of their visit,
 // triangles as bits 0 to 23.
 //
@@ -130,7 +127,7 @@ uint byte_of(uvec2 bytes, uint index)
 // whose triangle would be met.
 uint intersect_children(BvhNode node, vec3 origin, vec3 inverse, uint octant, float t_max)
 {
-    vec3 spacing = uintBitsToFloat((uvec3(node.spacing, node.spacing >> 8, node.spacing >> 16) & 0xffu) << 23);
+    vec3 spacing = spacing_of(node);
     vec3 slope = spacing * inverse;
     vec3 start = (node.origin - origin) * inverse;
     vec3 slack = (abs(start) + 255.0 * abs(slope)) * (1.0 / 1048576.0);
@@ -178,7 +175,7 @@ Hit traverse(vec3 origin, vec3 direction, float t_max, bool any)
             uint place = group.x + bitCount(group.y & 0xffu & ~(0xffffffffu << slot));
             BvhNode node = nodes[place];
             uint hits = intersect_children(node, origin, inverse, octant, hit.t);
-            group = uvec2(node.first_child, (hits & 0xff000000u) | (node.spacing >> 24));
+            group = uvec2(node.first_child, (hits & 0xff000000u) | child_nodes_of(node));
             uint leaves = hits & 0x00ffffffu;
             while (leaves != 0) {
                 uint leaf = findLSB(leaves);

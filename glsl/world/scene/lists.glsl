@@ -23,6 +23,13 @@ bool has_path(uint index)
     return paths[index].arrival != 0;
 }
 
+// A path that has died where it stands.
+LightPath emptied(LightPath path)
+{
+    path.arrival = 0;
+    return path;
+}
+
 void store_path(uint place, LightPath path)
 {
     next_paths[place] = path;

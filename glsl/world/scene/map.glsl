@@ -11,7 +11,9 @@ void store_photon(uint place, Photon photon)
     map[2 * place + 1] = light_word(photon);
 }
 
-void store_no_photon(uint place)
+// An entry that is none.
+Photon emptied(Photon photon)
 {
-    map[2 * place].w = NONE;
+    photon.plane = NONE;
+    return photon;
 }

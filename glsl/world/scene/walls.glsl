@@ -42,13 +42,12 @@ vec3 off_the_walls(vec3 position, vec3 normal)
                 stack[depth++] = group;
             }
             BvhNode node = nodes[group.x + bitCount(group.y & ((1u << slot) - 1u))];
-            vec3 spacing = uintBitsToFloat((uvec3(node.spacing, node.spacing >> 8, node.spacing >> 16) & 0xffu) << 23);
-            uint child_nodes = node.spacing >> 24;
+            uint child_nodes = child_nodes_of(node);
             uint near_nodes = 0;
             uint near_leaves = 0;
             for (uint child = 0; child < 8; child++) {
-                vec3 low = vec3(byte_of(node.min_x, child), byte_of(node.min_y, child), byte_of(node.min_z, child)) * spacing + node.origin;
-                vec3 high = vec3(byte_of(node.max_x, child), byte_of(node.max_y, child), byte_of(node.max_z, child)) * spacing + node.origin;
+                vec3 low = low_corner(node, child);
+                vec3 high = high_corner(node, child);
                 uint meta = byte_of(node.meta, child);
                 if (meta != 0 && all(lessThanEqual(low, position + reach)) && all(greaterThanEqual(high, position - reach))) {
                     bool is_node = ((child_nodes >> child) & 1u) != 0;

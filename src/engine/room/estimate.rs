@@ -87,7 +87,7 @@ pub fn gather(commands: &mut Commands, resources: &RoomResources, plan: &RoomPla
 
 /// Every point steps through the whole photon list, a slice of it an invocation.
 fn gather_brute(commands: &mut Commands, resources: &RoomResources, plan: &RoomPlan, photon_count: u32) -> Result<()> {
-    let RoomResources { film, points, photons, counters, .. } = resources;
+    let RoomResources { film, room, photons, counters, .. } = resources;
     let whole = push_for_all_points(plan, photon_count);
     let slice_count = whole.photon_capacity.div_ceil(GATHER_SLICE);
     let tests_per_point = u64::from(GATHER_SLICE);
@@ -100,9 +100,9 @@ fn gather_brute(commands: &mut Commands, resources: &RoomResources, plan: &RoomP
             let push = GatherPush { first_point, end_point, first_slice, ..whole };
             let extent = Extent::Groups(point_count.div_ceil(plan.settings.group_size), slices);
             if adds_in_one_word(plan, commands.facts()) {
-                commands.dispatch(GatherBruteU64 { points, film, photons, counters }, &push, extent)?;
+                commands.dispatch(GatherBruteU64 { room, film, photons, counters }, &push, extent)?;
             } else {
-                commands.dispatch(GatherBruteTwoWords { points, film, photons, counters }, &push, extent)?;
+                commands.dispatch(GatherBruteTwoWords { room, film, photons, counters }, &push, extent)?;
             }
             add_work(commands, plan, u64::from(slices) * tests_per_slice)?;
         }
@@ -112,12 +112,12 @@ fn gather_brute(commands: &mut Commands, resources: &RoomResources, plan: &RoomP
 
 /// Every point tests the photons of the grid cells in reach.
 fn gather_grid(commands: &mut Commands, resources: &RoomResources, index: &IndexBuffers, plan: &RoomPlan, photon_count: u32) -> Result<()> {
-    let RoomResources { film, points, dispatch_args, .. } = resources;
+    let RoomResources { film, room, dispatch_args, .. } = resources;
     let IndexBuffers { cells, sorted_photons, longest, .. } = index;
     let whole = push_for_all_points(plan, photon_count);
     if plan.slices_candidates {
         commands.fill(longest, 0, 1, 0);
-        commands.dispatch(CandidateCount { points, longest, cells }, &whole, Extent::Items(u64::from(whole.end_point)))?;
+        commands.dispatch(CandidateCount { room, longest, cells }, &whole, Extent::Items(u64::from(whole.end_point)))?;
     }
     let tests_per_point = plan.work.tests_per_point(photon_count);
     let group_size = plan.settings.group_size;
@@ -132,9 +132,9 @@ fn gather_grid(commands: &mut Commands, resources: &RoomResources, index: &Index
         };
         let push = GatherPush { first_point, end_point, ..whole };
         if adds_in_one_word(plan, commands.facts()) {
-            commands.dispatch(GatherGridU64 { points, film, cells, sorted_photons }, &push, extent)?;
+            commands.dispatch(GatherGridU64 { room, film, cells, sorted_photons }, &push, extent)?;
         } else {
-            commands.dispatch(GatherGridTwoWords { points, film, cells, sorted_photons }, &push, extent)?;
+            commands.dispatch(GatherGridTwoWords { room, film, cells, sorted_photons }, &push, extent)?;
         }
         add_work(commands, plan, u64::from(end_point - first_point) * tests_per_point)?;
     }

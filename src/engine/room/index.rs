@@ -30,13 +30,13 @@ pub fn build(commands: &mut Commands, resources: &RoomResources, plan: &RoomPlan
     if let Some(buffers) = &resources.tree {
         return commands.scope("index", |commands| tree::build(commands, resources, buffers, plan, photon_count));
     }
-    let RoomResources { rooms, photons, counters, dispatch_args, index: Some(index), .. } = resources else { return Ok(()) };
+    let RoomResources { room, photons, counters, dispatch_args, index: Some(index), .. } = resources else { return Ok(()) };
     let IndexBuffers { cells, ranks, block_sums, sorted_photons, .. } = index;
     let push = plan.grid.index_push(photon_list_capacity(plan, photon_count));
     let extent = || if plan.has_slots() { Extent::Items(u64::from(push.photon_capacity)) } else { Extent::Indirect(dispatch_args) };
     commands.scope("index", |commands| {
         commands.scope("count", |commands| {
-            commands.fill(cells, 0, u64::from(plan.grid.cells()) + 1, 0);
+            commands.clear(cells);
             if !plan.has_slots() {
                 let size = DispatchSizePush {
                     counter: 0,
@@ -46,11 +46,11 @@ pub fn build(commands: &mut Commands, resources: &RoomResources, plan: &RoomPlan
                 };
                 commands.dispatch(DispatchSize { counters, dispatch_args }, &size, Extent::Groups(1, 1))?;
             }
-            commands.dispatch(CellCount { rooms, photons, counters, cells, ranks }, &push, extent())
+            commands.dispatch(CellCount { room, photons, counters, cells, ranks }, &push, extent())
         })?;
         commands.scope("scan", |commands| scan(commands, cells, block_sums, plan.grid.cells() + 1, plan.settings.group_size))?;
         commands.scope("sort", |commands| {
-            commands.dispatch(CellScatter { rooms, photons, counters, cells, sorted_photons, ranks }, &push, extent())
+            commands.dispatch(CellScatter { room, photons, counters, cells, sorted_photons, ranks }, &push, extent())
         })
     })
 }

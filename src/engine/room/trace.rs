@@ -55,7 +55,7 @@ pub fn chunk(commands: &mut Commands, resources: &RoomResources, plan: &RoomPlan
 
 /// Writes the paths of a chunk as they leave their lights, light after light.
 pub fn emit(commands: &mut Commands, resources: &RoomResources, plan: &RoomPlan, round: u32, ranges: &[EmissionRange]) -> Result<()> {
-    let RoomResources { lights, walls, stream_seeds, paths: [paths, _], nonfinite_values, .. } = resources;
+    let RoomResources { room, stream_seeds, paths: [paths, _], nonfinite_values, .. } = resources;
     let mut path_offset = 0;
     for range in ranges {
         let push = EmitPush {
@@ -65,7 +65,7 @@ pub fn emit(commands: &mut Commands, resources: &RoomResources, plan: &RoomPlan,
             path_capacity: plan.path_array_length(),
         };
         commands.dispatch(
-            EmitRoom { lights, walls, stream_seeds, next_paths: paths, nonfinite_values },
+            EmitRoom { room, stream_seeds, next_paths: paths, nonfinite_values },
             &push,
             Extent::Items(u64::from(range.count)),
         )?;
@@ -94,7 +94,7 @@ fn trace_persistent(
     round: u32,
     ranges: &[EmissionRange],
 ) -> Result<()> {
-    let RoomResources { rooms, walls, lights, stream_seeds, photons, origins, counters, tallies, nonfinite_values, .. } = resources;
+    let RoomResources { room, stream_seeds, photons, origins, counters, tallies, nonfinite_values, .. } = resources;
     for range in ranges.iter().flat_map(|range| range.parts(plan.photons_per_dispatch())) {
         let push = TracePersistentPush {
             key: plan.streams().key(round),
@@ -104,7 +104,7 @@ fn trace_persistent(
             photon_capacity: plan.photon_capacity,
             eye: plan.settings.eye.into(),
         };
-        let kernel = TracePersistentRoom { rooms, walls, lights, stream_seeds, photons, origins, counters, tallies, nonfinite_values };
+        let kernel = TracePersistentRoom { room, stream_seeds, photons, origins, counters, tallies, nonfinite_values };
         commands.dispatch(kernel, &push, Extent::Items(u64::from(push.stride)))?;
     }
     Ok(())
@@ -159,14 +159,10 @@ fn one_bounce(
     };
     let [even, odd] = &resources.paths;
     let (paths, next_paths) = if bounce.is_multiple_of(2) { (even, odd) } else { (odd, even) };
-    let RoomResources { rooms, walls, photons, origins, counters, tallies, nonfinite_values, .. } = resources;
+    let RoomResources { room, photons, origins, counters, tallies, nonfinite_values, .. } = resources;
     macro_rules! trace {
         ($kernel:ident) => {
-            commands.dispatch(
-                $kernel { rooms, walls, paths, next_paths, photons, origins, counters, tallies, nonfinite_values },
-                &push,
-                extent(),
-            )
+            commands.dispatch($kernel { room, paths, next_paths, photons, origins, counters, tallies, nonfinite_values }, &push, extent())
         };
     }
     match builder {

@@ -8,6 +8,7 @@ use crate::constants::{HIT_CAUSTIC_PHOTON, HIT_GLOBAL_PHOTON, HIT_KINDS, HIT_SHA
 use crate::engine::film::RoundSums;
 use crate::engine::unknown::{Unknown, most_hits};
 use crate::engine::watch::FilmError;
+use crate::plan::memory::ANOMALY_WORDS;
 use crate::plan::radius::mean_squared_radius;
 use crate::plan::scene::{MapPlan, ScenePlan};
 
@@ -15,9 +16,6 @@ use crate::plan::scene::{MapPlan, ScenePlan};
 const KINDS: [&str; HIT_KINDS as usize] = ["shadow ray", "photon of the caustic map", "photon of the global map"];
 /// In place of a bound: something has hit (`glsl/world/scene/one_hit.glsl`).
 const REACHED: u32 = u32::MAX;
-
-/// Words that count what the film could not add as it was (`glsl/world/scene/film.glsl`).
-pub const ANOMALY_WORDS: usize = 8;
 
 /// Exact sums over rounds, three channels a pixel, in film units, and what else a run leaves of its light.
 #[derive(Debug, Clone)]

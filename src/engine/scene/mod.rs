@@ -13,13 +13,15 @@
 //! ```
 
 pub mod bias;
+pub mod estimate;
 pub mod film;
+pub mod index;
 pub mod losses;
 mod on_gpu;
-pub mod photons;
 pub mod points;
 pub mod replay;
 pub mod resources;
+pub mod trace;
 pub mod trial;
 
 use glam::DVec3;

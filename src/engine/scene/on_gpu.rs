@@ -3,10 +3,10 @@
 use std::sync::atomic::AtomicBool;
 use std::time::{Duration, Instant};
 
-use super::film::{ANOMALY_WORDS, SceneFilm};
+use super::film::SceneFilm;
 use super::losses::losses;
 use super::resources::{PhotonBuffers, SceneResources};
-use super::{Round, RunResult, View, photons, points};
+use super::{Round, RunResult, View, estimate, index, points, trace};
 use crate::constants::{HIT_KINDS, PART_COUNT, TALLY_COPIES};
 use crate::engine::Control;
 use crate::engine::film::{RoundSums, wide};
@@ -19,9 +19,9 @@ use crate::error::Result;
 use crate::gpu::kernels::*;
 use crate::gpu::{Commands, Constants, DeviceFacts, Gpu, Interrupt, Kernel, Module};
 use crate::ledger::{Fates, Losses};
+use crate::plan::memory::ANOMALY_WORDS;
 use crate::plan::scene::{MapPlan, ScenePlan};
 use crate::plan::sensor::Sensor;
-use crate::records::Tally;
 use crate::timings::{Clock, Span};
 
 /// Kernels that the plan needs, and no others.
@@ -36,7 +36,7 @@ pub fn modules(plan: &ScenePlan, facts: &DeviceFacts) -> Vec<Module> {
     }
     if plan.maps().next().is_some() {
         modules.extend([CrowdSize::MODULE, FluxToRadiance::MODULE]);
-        modules.extend(photons::modules(plan));
+        modules.extend([trace::modules(plan), index::modules()].concat());
         modules.push(if facts.int64_atomics { GatherVisiblePointsU64::MODULE } else { GatherVisiblePointsTwoWords::MODULE });
     }
     modules
@@ -112,11 +112,7 @@ impl<'a> World for SceneOnGpu<'a> {
         for map in self.plan.maps() {
             let which = usize::from(map.caustic_only);
             let (tallies, totals) = (&photons.tallies[which], &photons.totals[which]);
-            read_backs.push((
-                which,
-                commands.copy_out::<Tally>(tallies, copies)?,
-                commands.copy_out::<u32>(totals, totals::WORDS as usize)?,
-            ));
+            read_backs.push((which, commands.copy_out(tallies, copies)?, commands.copy_out(totals, totals::WORDS as usize)?));
             tallies::clear(commands, tallies);
             totals::clear(commands, totals);
         }
@@ -167,17 +163,17 @@ impl SceneOnGpu<'_> {
         commands.scope("visible points", |commands| points::see(commands, round, view.camera))?;
         if let Some(photons) = &resources.photons {
             let sums = 3 * u64::from(plan.visible_points()) * u64::from(plan.arrival_sets);
-            commands.fill(&resources.estimates, 0, 2 * sums, 0);
+            commands.fill(&resources.estimates, 0, sums, 0);
             let mut traced = [0; 2];
             for map in plan.maps() {
                 let of_map = commands.scope(map.name, |commands| one_map(commands, round, photons, map, deadline, state))?;
                 traced[usize::from(map.caustic_only)] = of_map;
             }
-            commands.scope("flux to radiance", |commands| points::flux_to_radiance(commands, round, traced))?;
+            commands.scope("flux to radiance", |commands| estimate::flux_to_radiance(commands, round, traced))?;
         }
         // What is on the film counts, whatever ends the run from here on.
         commands.set_interrupt(None);
-        commands.scope("resolve", |commands| points::resolve(commands, round))
+        commands.scope("resolve", |commands| estimate::resolve(commands, round))
     }
 }
 
@@ -217,9 +213,9 @@ fn one_chunk(commands: &mut Commands, round: Round, photons: &PhotonBuffers, map
     if commands.timestamps_left() < TIMESTAMPS_PER_ROUND || commands.work() >= commands.paced(round.plan.work_per_submission) {
         commands.submit()?;
     }
-    let cells = photons::cells(round, map);
-    photons::trace(commands, round, photons, map, chunk, &mut |commands| {
-        commands.scope("index", |commands| photons::index(commands, round, photons, map, &cells))?;
-        commands.scope("gather", |commands| points::gather(commands, round, photons, map, cells))
+    let cells = index::cells(round, map);
+    trace::trace(commands, round, photons, map, chunk, &mut |commands| {
+        commands.scope("index", |commands| index::build(commands, round, photons, map, &cells))?;
+        commands.scope("gather", |commands| estimate::gather(commands, round, photons, map, cells))
     })
 }

@@ -1,31 +1,31 @@
-//! Visible points and direct light at the start of a round, density estimates from the maps, and the film at its end.
+//! Visible points and direct light, at the start of a round.
 
 use super::Round;
-use super::resources::{PhotonBuffers, SceneResources};
-use crate::constants::{DOMAIN_CAMERA, DOMAIN_RECEIVERS, MAX_GROUPS};
+use super::resources::SceneResources;
+use crate::constants::{DOMAIN_CAMERA, DOMAIN_RECEIVERS};
 use crate::error::Result;
-use crate::gpu::kernels::{CrowdSize, FluxToRadiance, GatherVisiblePointsTwoWords, GatherVisiblePointsU64, GoOn, Receive, Resolve, View};
+use crate::gpu::kernels::{GoOn, Receive, View};
 use crate::gpu::{Commands, Extent};
-use crate::plan::scene::{MapPlan, ScenePlan, TESTS_PER_POINT};
+use crate::plan::scene::ScenePlan;
 use crate::plan::sensor::Sensor;
-use crate::records::{CellPush, CrowdSizePush, Draws, FluxToRadiancePush, GoOnPush, ReceivePush, ResolvePush, SceneGatherPush, ViewPush};
+use crate::records::{Draws, GoOnPush, ReceivePush, ViewPush};
 use crate::rng::{mix32, words};
 use crate::scene::Camera;
 use crate::scene::geometry::Geometry;
 
 /// Runs of `count` items, `step` long.
-fn runs(count: u32, step: u32) -> impl Iterator<Item = (u32, u32)> {
+pub(super) fn runs(count: u32, step: u32) -> impl Iterator<Item = (u32, u32)> {
     (0..count).step_by(step as usize).map(move |first| (first, count.min(first.saturating_add(step))))
 }
 
 /// Hands the commands over once they amount to a submission.
-fn add_work(commands: &mut Commands, plan: &ScenePlan, work: u64) -> Result<()> {
+pub(super) fn add_work(commands: &mut Commands, plan: &ScenePlan, work: u64) -> Result<()> {
     commands.add_work(work);
     if commands.work() >= commands.paced(plan.work_per_submission) { commands.submit() } else { Ok(()) }
 }
 
 /// What decides in a round which fractions are rounded up (`glsl/world/scene/rounding.glsl`).
-fn rounding(plan: &ScenePlan, round: u32) -> u32 {
+pub(super) fn rounding(plan: &ScenePlan, round: u32) -> u32 {
     let seed = words(plan.settings.seed);
     mix32(seed.x.wrapping_add(mix32(seed.y.wrapping_add(mix32(round)))))
 }
@@ -33,8 +33,7 @@ fn rounding(plan: &ScenePlan, round: u32) -> u32 {
 /// Finds the visible points of a round and writes the light that needs no photons.
 pub fn see(commands: &mut Commands, round: Round, camera: Option<&Camera>) -> Result<()> {
     let Round { resources, geometry, plan, number: round } = round;
-    let SceneResources { nodes, triangles, planes, normals, uvs, materials, textures, texels, emitters, .. } = resources;
-    let SceneResources { visible_points, pass_sums, one_hits, part_totals, anomalies, nonfinite_values, .. } = resources;
+    let SceneResources { scene, visible_points, pass_sums, one_hits, part_totals, anomalies, nonfinite_values, .. } = resources;
     let SceneResources { camera_paths: [camera_paths, _], camera_path_counts, .. } = resources;
     let step = plan.pixels_at_once(plan.rays_per_pixel());
     let goes_on = plan.chains_go_on();
@@ -66,14 +65,7 @@ pub fn see(commands: &mut Commands, round: Round, camera: Option<&Camera>) -> Re
                     film_limit: (plan.film_limit / f64::from(plan.samples())) as f32,
                 };
                 let kernel = View {
-                    nodes,
-                    triangles,
-                    normals,
-                    uvs,
-                    materials,
-                    textures,
-                    texels,
-                    emitters,
+                    scene,
                     anomalies,
                     visible_points,
                     pass_sums,
@@ -100,16 +92,8 @@ pub fn see(commands: &mut Commands, round: Round, camera: Option<&Camera>) -> Re
                     radius: if radius.is_finite() { radius as f32 } else { 1.0 / 1024.0 },
                 };
                 let kernel = Receive {
-                    nodes,
-                    triangles,
-                    normals,
-                    uvs,
-                    materials,
-                    textures,
-                    texels,
-                    emitters,
+                    scene,
                     receivers,
-                    planes,
                     anomalies,
                     visible_points,
                     pass_sums,
@@ -132,12 +116,11 @@ pub fn see(commands: &mut Commands, round: Round, camera: Option<&Camera>) -> Re
 
 /// Follows camera paths that are still under way over mirrors and glass, until none is left.
 fn go_on(commands: &mut Commands, resources: &SceneResources, geometry: &Geometry, plan: &ScenePlan, round: u32) -> Result<()> {
-    let SceneResources { nodes, triangles, normals, uvs, materials, textures, texels, emitters, .. } = resources;
-    let SceneResources { visible_points, pass_sums, one_hits, part_totals, anomalies, nonfinite_values, camera_path_counts, .. } =
+    let SceneResources { scene, visible_points, pass_sums, one_hits, part_totals, anomalies, nonfinite_values, camera_path_counts, .. } =
         resources;
     let domain = if matches!(plan.sensor, Sensor::Picture { .. }) { DOMAIN_CAMERA } else { DOMAIN_RECEIVERS };
     for parity in [0, 1].into_iter().cycle() {
-        let path_count = commands.read::<u32>(camera_path_counts, 1)?[0];
+        let path_count = commands.read(camera_path_counts, 1)?[0];
         if path_count == 0 {
             break;
         }
@@ -152,14 +135,7 @@ fn go_on(commands: &mut Commands, resources: &SceneResources, geometry: &Geometr
             rounding: rounding(plan, round),
         };
         let kernel = GoOn {
-            nodes,
-            triangles,
-            normals,
-            uvs,
-            materials,
-            textures,
-            texels,
-            emitters,
+            scene,
             anomalies,
             visible_points,
             pass_sums,
@@ -171,120 +147,6 @@ fn go_on(commands: &mut Commands, resources: &SceneResources, geometry: &Geometr
             nonfinite_values,
         };
         commands.dispatch(kernel, &push, Extent::Items(u64::from(path_count)))?;
-    }
-    Ok(())
-}
-
-/// Adds a chunk of a map to the estimates of all visible points.
-pub fn gather(commands: &mut Commands, round: Round, photons: &PhotonBuffers, map: &MapPlan, cells_push: CellPush) -> Result<()> {
-    let Round { resources, plan, number: round, .. } = round;
-    let PhotonBuffers { cells, sorted_map, crowded, dispatch_args, .. } = photons;
-    let SceneResources { planes, visible_points, estimates, nonfinite_values, .. } = resources;
-    let point_count = plan.visible_points();
-    let (lanes, step) = (map.lanes, plan.points_at_once());
-    let (width, height) = plan.sensor.size();
-    let dispatch = |commands: &mut Commands, push: &SceneGatherPush, extent: Extent| {
-        if commands.facts().int64_atomics {
-            commands.dispatch(
-                GatherVisiblePointsU64 { visible_points, planes, film: estimates, cells, sorted_map, crowded, nonfinite_values },
-                push,
-                extent,
-            )
-        } else {
-            commands.dispatch(
-                GatherVisiblePointsTwoWords { visible_points, planes, film: estimates, cells, sorted_map, crowded, nonfinite_values },
-                push,
-                extent,
-            )
-        }
-    };
-    for (first_point, end_point) in runs(point_count, step) {
-        let push = SceneGatherPush {
-            first_point,
-            end_point,
-            point_count,
-            pixel_count: plan.sensor.pixels(),
-            arrival: map.stored.trailing_zeros(),
-            round,
-            rounding: rounding(plan, round),
-            width,
-            height,
-            first_slice: 0,
-            lanes,
-            radius: plan.radius(map, round) as f32,
-            cells: cells_push,
-        };
-        commands.fill(crowded, 0, 2, 0);
-        let groups = ((end_point - first_point) * lanes).div_ceil(plan.settings.group_size);
-        dispatch(commands, &push, Extent::Groups(groups, 1))?;
-        let size = CrowdSizePush { items_per_group: plan.settings.group_size / lanes, max_groups: MAX_GROUPS };
-        commands.dispatch(CrowdSize { crowded, dispatch_args }, &size, Extent::Groups(1, 1))?;
-        dispatch(commands, &SceneGatherPush { first_slice: 1, ..push }, Extent::Indirect(dispatch_args))?;
-        add_work(commands, plan, TESTS_PER_POINT * u64::from(end_point - first_point))?;
-    }
-    Ok(())
-}
-
-/// Turns what the maps found at all visible points into light; so many photons of the global and of the caustic map were traced.
-pub fn flux_to_radiance(commands: &mut Commands, round: Round, traced: [u32; 2]) -> Result<()> {
-    let Round { resources, geometry, plan, number: round } = round;
-    let SceneResources { nodes, triangles, normals, uvs, materials, textures, texels, planes, visible_points, .. } = resources;
-    let SceneResources { estimates, one_hits, part_totals, anomalies, nonfinite_values, .. } = resources;
-    let radius = |map: &Option<MapPlan>| map.as_ref().map_or(1.0, |map| plan.radius(map, round)) as f32;
-    let flux =
-        |map: &Option<MapPlan>| map.as_ref().map_or(0.0, |map| map.photon_flux_of(geometry, traced[usize::from(map.caustic_only)])) as f32;
-    let (width, height) = plan.sensor.size();
-    for (first_point, end_point) in runs(plan.visible_points(), plan.pixels_at_once(4)) {
-        let push = FluxToRadiancePush {
-            first_point,
-            end_point,
-            point_count: plan.visible_points(),
-            pixel_count: plan.sensor.pixels(),
-            width,
-            height,
-            arrivals: plan.arrivals,
-            round,
-            rounding: rounding(plan, round),
-            film_scale: plan.film_scale as f32,
-            film_limit: plan.point_limit() as f32,
-            global_radius: radius(&plan.global),
-            caustic_radius: radius(&plan.caustic),
-            global_flux: flux(&plan.global),
-            caustic_flux: flux(&plan.caustic),
-        };
-        let kernel = FluxToRadiance {
-            nodes,
-            triangles,
-            normals,
-            uvs,
-            materials,
-            textures,
-            texels,
-            planes,
-            anomalies,
-            visible_points,
-            estimates,
-            one_hits,
-            part_totals,
-            nonfinite_values,
-        };
-        commands.dispatch(kernel, &push, Extent::Items(u64::from(end_point - first_point)))?;
-        add_work(commands, plan, 256 * u64::from(end_point - first_point))?;
-    }
-    Ok(())
-}
-
-/// Ends a round: light that was found goes to the film.
-pub fn resolve(commands: &mut Commands, round: Round) -> Result<()> {
-    let Round { resources, plan, .. } = round;
-    let SceneResources { pass_sums, estimates, film_sums, film_squares, .. } = resources;
-    let pixel_count = plan.sensor.pixels();
-    let points_per_pixel = if resources.photons.is_some() { plan.points_per_pixel } else { 0 };
-    for (first_pixel, end_pixel) in runs(pixel_count, plan.pixels_at_once(1)) {
-        let push = ResolvePush { first_pixel, end_pixel, pixel_count, points_per_pixel };
-        let kernel = Resolve { pass_sums, estimates, film_sums, film_squares };
-        commands.dispatch(kernel, &push, Extent::Items(u64::from(end_pixel - first_pixel)))?;
-        add_work(commands, plan, u64::from(end_pixel - first_pixel) * u64::from(plan.samples() + points_per_pixel))?;
     }
     Ok(())
 }

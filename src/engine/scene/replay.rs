@@ -2,9 +2,9 @@
 
 use std::time::Instant;
 
-use super::photons::Flight;
 use super::resources::SceneResources;
-use super::{Round, constants, photons};
+use super::trace::Flight;
+use super::{Round, constants, trace};
 use crate::constants::{DOMAIN_CAUSTIC_PHOTONS, DOMAIN_PHOTONS, TALLY_ROWS};
 use crate::engine::nonfinite_values::NonfiniteValues;
 use crate::engine::replay::{PhotonName, Replayed};
@@ -60,8 +60,8 @@ pub fn light_paths(
     let resources = SceneResources::new(gpu, &mut commands, geometry, plan, &[])?;
     let buffers = resources.photons.as_ref().expect("a map has photons");
     let round = Round { resources: &resources, geometry, plan, number };
-    photons::emit(&mut commands, round, buffers, map, chunk)?;
-    let mut paths = vec![commands.read::<LightPath>(&buffers.paths[0], chunk.1 as usize)?];
+    trace::emit(&mut commands, round, buffers, map, chunk)?;
+    let mut paths = vec![commands.read(&buffers.paths[0], chunk.1 as usize)?];
     let mut traced = 0;
     let mut left = chunk.1;
     for bounce in 0..flights {
@@ -69,7 +69,7 @@ pub fn light_paths(
         // Each flight starts with an empty map, so that there is always room.
         commands.fill(&buffers.counters, 0, 3, 0);
         commands.fill(&buffers.counters, 1, 1, left);
-        photons::trace_flight(
+        trace::trace_flight(
             &mut commands,
             round,
             buffers,
@@ -78,7 +78,7 @@ pub fn light_paths(
             Extent::Items(u64::from(left)),
         )?;
         traced += 1;
-        left = commands.read::<u32>(&buffers.counters, 3)?[2];
+        left = commands.read(&buffers.counters, 3)?[2];
         if left == 0 {
             break;
         }

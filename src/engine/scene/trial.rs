@@ -13,7 +13,7 @@ use glam::Vec4;
 use rayon::prelude::*;
 
 use super::resources::SceneResources;
-use super::{Round, View, constants, modules, photons, points};
+use super::{Round, View, constants, modules, points, trace};
 use crate::engine;
 use crate::engine::bias;
 use crate::error::Result;
@@ -94,11 +94,11 @@ fn run(gpu: &Gpu, scene: &Scene, view: &View, run: &ScenePlan, limits: &Limits) 
     points::see(&mut commands, round, view.camera)?;
     let point_count = plan.visible_points();
     let clearances = gpu.buffer::<f32>("clearances", u64::from(point_count), Memory::Device)?;
-    let SceneResources { nodes, triangles, planes, visible_points, .. } = &resources;
-    let kernel = Clearance { nodes, triangles, planes, visible_points, clearances: &clearances };
+    let SceneResources { scene, visible_points, .. } = &resources;
+    let kernel = Clearance { scene, visible_points, clearances: &clearances };
     commands.dispatch(kernel, &ClearancePush { point_count }, Extent::Items(u64::from(point_count)))?;
-    let visible_points = commands.read::<VisiblePoint>(visible_points, point_count as usize)?;
-    let clearances = commands.read::<f32>(&clearances, point_count as usize)?;
+    let visible_points = commands.read(visible_points, point_count as usize)?;
+    let clearances = commands.read(&clearances, point_count as usize)?;
 
     let mut trial = Trial::default();
     let mut largest = 0.0;
@@ -109,7 +109,7 @@ fn run(gpu: &Gpu, scene: &Scene, view: &View, run: &ScenePlan, limits: &Limits) 
         if of_run.radius_from == RadiusFrom::User || asked.is_empty() {
             continue;
         }
-        let found = photons::stored(&mut commands, round, map)?;
+        let found = trace::stored(&mut commands, round, map)?;
         let wanted = if map.caustic_only { CAUSTIC_PHOTONS_AT_POINT } else { PHOTONS_AT_POINT };
         let own: Vec<f64> = asked
             .par_iter()

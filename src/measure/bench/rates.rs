@@ -100,11 +100,13 @@ pub fn measure(gpu: &Gpu, size: Size) -> Result<Rates> {
     let mut commands = Commands::new(gpu, Constants::new(GROUP_SIZE), Instant::now())?;
     let blocks = gpu.buffer::<[u32; 4]>("blocks", u64::from(block_count), Memory::Device)?;
     let copies = gpu.buffer::<[u32; 4]>("copies", u64::from(block_count), Memory::Device)?;
-    let results = gpu.buffer::<u32>("results", u64::from(items.max(accesses)), Memory::Device)?;
+    let results = gpu.buffer::<f32>("results", u64::from(items), Memory::Device)?;
+    let sums = gpu.buffer::<u32>("sums", u64::from(accesses), Memory::Device)?;
     let counts = gpu.buffer::<u32>("counts", u64::from(COUNTERS), Memory::Device)?;
     // What a run before this one left in the same memory must not pass for a result.
-    commands.fill(&copies, 0, 4 * u64::from(block_count), 0);
-    commands.fill(&results, 0, u64::from(items.max(accesses)), 0);
+    commands.clear(&copies);
+    commands.clear(&results);
+    commands.clear(&sums);
     let mut bench = Bench { gpu, commands: &mut commands };
     clock::warm_up(gpu, warm_up)?;
 
@@ -113,7 +115,7 @@ pub fn measure(gpu: &Gpu, size: Size) -> Result<Rates> {
         |commands: &mut Commands| commands.dispatch(MeasureFloat { results: &results }, &float_push, Extent::Items(u64::from(items)));
     let seconds = bench.seconds("float", REPEATS, &mut float)?;
     let float_operations = rate(&seconds, u64::from(items) * u64::from(STEPS) * FLOAT_OPERATIONS);
-    let found = bench.commands.read::<f32>(&results, items as usize)?;
+    let found = bench.commands.read(&results, items as usize)?;
     bench.check("sums and products", items, |index| found[index as usize].to_bits() == turned(index, STEPS).to_bits())?;
 
     let philox_push = push(items, PHILOX_STEPS, 0);
@@ -121,7 +123,7 @@ pub fn measure(gpu: &Gpu, size: Size) -> Result<Rates> {
         commands.dispatch(MeasureInteger { blocks: &blocks }, &philox_push, Extent::Items(u64::from(items)))
     })?;
     let integer_products = rate(&seconds, u64::from(items) * u64::from(PHILOX_STEPS) * PHILOX_PRODUCTS);
-    let found = bench.commands.read::<[u32; 4]>(&blocks, items as usize)?;
+    let found = bench.commands.read(&blocks, items as usize)?;
     bench.check("products of integers", items, |index| found[index as usize] == block(index, PHILOX_STEPS))?;
 
     let items = || Extent::Items(u64::from(block_count));
@@ -140,16 +142,16 @@ pub fn measure(gpu: &Gpu, size: Size) -> Result<Rates> {
     let mask = block_count / 2 - 1;
     let read_push = push(accesses, ACCESSES, mask);
     let seconds = bench.seconds("random reads", REPEATS, &mut |commands| {
-        commands.dispatch(MeasureGather { blocks: &copies, sums: &results }, &read_push, Extent::Items(u64::from(accesses)))
+        commands.dispatch(MeasureGather { blocks: &copies, sums: &sums }, &read_push, Extent::Items(u64::from(accesses)))
     })?;
     let random_reads = rate(&seconds, u64::from(accesses) * u64::from(ACCESSES));
-    let found = bench.commands.read::<u32>(&results, accesses as usize)?;
+    let found = bench.commands.read(&sums, accesses as usize)?;
     // The copy as a whole is held against what it should be by this, at random places.
     bench.check("copied blocks", accesses, |index| found[index as usize] == read_sum(index, ACCESSES, mask))?;
 
-    let spread_atomics = bench.atomics(&counts, &results, accesses, COUNTERS - 1)?;
-    let single_atomics = bench.atomics(&counts, &results, accesses, 0)?;
-    let counter_additions = bench.counter(&counts, &results, accesses)?;
+    let spread_atomics = bench.atomics(&counts, &sums, accesses, COUNTERS - 1)?;
+    let single_atomics = bench.atomics(&counts, &sums, accesses, 0)?;
+    let counter_additions = bench.counter(&counts, &sums, accesses)?;
     gpu.check_validation()?;
     Ok(Rates {
         dispatches,
@@ -189,28 +191,28 @@ impl<'gpu> Bench<'_, 'gpu> {
         Ok(of_name.take(repeats).map(|span| span.duration.as_secs_f64()).collect())
     }
 
-    fn copy(&mut self, blocks: &Buffer, copies: &Buffer, block_count: u32) -> Result<CopyRate> {
+    fn copy(&mut self, blocks: &Buffer<[u32; 4]>, copies: &Buffer<[u32; 4]>, block_count: u32) -> Result<CopyRate> {
         let push = push(block_count, 0, 0);
         let seconds = self.seconds("copy", REPEATS, &mut |commands| {
             commands.dispatch(MeasureCopy { blocks, copies }, &push, Extent::Items(u64::from(block_count)))
         })?;
         let shown = block_count.min(1 << 12);
-        let found = self.commands.read::<[u32; 4]>(copies, shown as usize)?;
+        let found = self.commands.read(copies, shown as usize)?;
         self.check("copied blocks", shown, |index| found[index as usize] == block(index, 1))?;
         let moved_bytes = 2 * 16 * u64::from(block_count);
         Ok(CopyRate { moved_bytes, rate: rate(&seconds, moved_bytes) })
     }
 
     /// Every addition is answered by how many came before it, so that the answers of n at one counter are 0 to n - 1.
-    fn atomics(&mut self, counts: &Buffer, sums: &Buffer, items: u32, mask: u32) -> Result<Spread> {
+    fn atomics(&mut self, counts: &Buffer<u32>, sums: &Buffer<u32>, items: u32, mask: u32) -> Result<Spread> {
         let push = push(items, ACCESSES, mask);
         let seconds = self.seconds("atomics", REPEATS, &mut |commands| {
             commands.dispatch(MeasureAtomic { counts, sums }, &push, Extent::Items(u64::from(items)))
         })?;
-        self.commands.fill(counts, 0, u64::from(COUNTERS), 0);
+        self.commands.clear(counts);
         self.commands.dispatch(MeasureAtomic { counts, sums }, &push, Extent::Items(u64::from(items)))?;
-        let found = self.commands.read::<u32>(sums, items as usize)?.into_iter().fold(0, u32::wrapping_add);
-        let counted = self.commands.read::<u32>(counts, COUNTERS as usize)?;
+        let found = self.commands.read(sums, items as usize)?.into_iter().fold(0, u32::wrapping_add);
+        let counted = self.commands.read(counts, COUNTERS as usize)?;
         let mut expected = vec![0u32; COUNTERS as usize];
         (0..items * ACCESSES).for_each(|number| expected[(place(number) & mask) as usize] += 1);
         let answers = expected.iter().map(|count| u64::from(*count) * u64::from(count.saturating_sub(1)) / 2).sum::<u64>();
@@ -221,16 +223,16 @@ impl<'gpu> Bench<'_, 'gpu> {
     }
 
     /// Every invocation of `items` gets places of its own, so that those of n are 0 to n - 1.
-    fn counter(&mut self, counters: &Buffer, sums: &Buffer, items: u32) -> Result<Spread> {
+    fn counter(&mut self, counters: &Buffer<u32>, sums: &Buffer<u32>, items: u32) -> Result<Spread> {
         let push = push(items, ACCESSES, 0);
         let seconds = self.seconds("counter", REPEATS, &mut |commands| {
             commands.dispatch(MeasureCounter { counters, sums }, &push, Extent::Items(u64::from(items)))
         })?;
         self.commands.fill(counters, 0, 1, 0);
         self.commands.dispatch(MeasureCounter { counters, sums }, &push, Extent::Items(u64::from(items)))?;
-        let found = self.commands.read::<u32>(sums, items as usize)?.into_iter().fold(0, u32::wrapping_add);
+        let found = self.commands.read(sums, items as usize)?.into_iter().fold(0, u32::wrapping_add);
         let places = u64::from(items) * u64::from(ACCESSES);
-        if self.commands.read::<u32>(counters, 1)? != [places as u32] || found != (places * (places - 1) / 2) as u32 {
+        if self.commands.read(counters, 1)? != [places as u32] || found != (places * (places - 1) / 2) as u32 {
             return Err(self.wrong("additions to one counter"));
         }
         Ok(rate(&seconds, places / u64::from(self.gpu.facts().subgroup_size)))

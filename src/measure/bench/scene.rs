@@ -12,7 +12,7 @@ use super::room::{Counts, DROPPED, RANK_BYTES, REPEATS, Timed};
 use crate::engine;
 use crate::engine::Control;
 use crate::engine::scene::resources::SceneResources;
-use crate::engine::scene::{self, Round, RunResult, View, photons, points};
+use crate::engine::scene::{self, Round, RunResult, View, points, trace};
 use crate::error::{Error, Result};
 use crate::gpu::{Commands, Gpu};
 use crate::photon::MapPhoton;
@@ -71,14 +71,14 @@ pub fn survey(gpu: &Gpu, job: &Job, map: impl Fn(&ScenePlan) -> Option<&MapPlan>
     let buffers = resources.photons.as_ref().expect("there is a map");
     let round = Round { resources: &resources, geometry: job.geometry, plan: &plan, number: 0 };
     points::see(&mut commands, round, Some(&job.scene.first_camera()))?;
-    let seen = commands.read::<VisiblePoint>(&resources.visible_points, plan.visible_points() as usize)?;
+    let seen = commands.read(&resources.visible_points, plan.visible_points() as usize)?;
     let asking: Vec<VisiblePoint> = seen.into_iter().filter(|point| point.arrivals & map.stored != 0).collect();
     let step = (asking.len() / SAMPLES).max(1);
     let radius_squared = plan.radius(map, 0).powi(2) as f32;
     let (mut stored, mut found) = (0u64, 0u64);
     let mut look = |commands: &mut Commands| {
-        let length = commands.read::<u32>(&buffers.counters, 1)?[0];
-        let photons = commands.read::<MapPhoton>(&buffers.map, length as usize)?;
+        let length = commands.read(&buffers.counters, 1)?[0];
+        let photons = commands.read(&buffers.map, length as usize)?;
         stored += u64::from(length);
         found += asking
             .par_iter()
@@ -92,7 +92,7 @@ pub fn survey(gpu: &Gpu, job: &Job, map: impl Fn(&ScenePlan) -> Option<&MapPlan>
         Ok(())
     };
     for chunk in map.chunks() {
-        photons::trace(&mut commands, round, buffers, map, chunk, &mut look)?;
+        trace::trace(&mut commands, round, buffers, map, chunk, &mut look)?;
     }
     let samples = asking.len().div_ceil(step).max(1);
     Ok(Some(Survey { stored: stored as f64, per_estimate: found as f64 / samples as f64, asking_points: asking.len() as f64 }))

@@ -12,7 +12,7 @@ use crate::engine;
 use crate::engine::room::resources::RoomResources;
 use crate::engine::room::{constants, photons_on_gpu, trace};
 use crate::engine::scene::resources::SceneResources;
-use crate::engine::scene::{self, Round, photons};
+use crate::engine::scene::{self, Round, trace as scene_trace};
 use crate::engine::tallies;
 use crate::error::{Error, Result};
 use crate::gpu::{Commands, Gpu};
@@ -184,7 +184,7 @@ impl Place<'_> {
                 let mut commands = Commands::new(gpu, scene::constants(&plan), Instant::now())?;
                 let resources = SceneResources::new(gpu, &mut commands, geometry, &plan, &[])?;
                 let round = Round { resources: &resources, geometry, plan: &plan, number: 0 };
-                photons::stored(&mut commands, round, global_map(&plan))?.into_iter().map(bytemuck::cast).collect()
+                scene_trace::stored(&mut commands, round, global_map(&plan))?.into_iter().map(bytemuck::cast).collect()
             }
         };
         stored.sort_unstable();
@@ -286,7 +286,7 @@ fn global_map(plan: &ScenePlan) -> &MapPlan {
 }
 
 fn run_scene(gpu: &Gpu, geometry: &Geometry, plan: &ScenePlan, request: &Request) -> Result<(Spread, Vec<Tally>)> {
-    gpu.prepare(&photons::modules(plan), &scene::constants(plan))?;
+    gpu.prepare(&scene_trace::modules(plan), &scene::constants(plan))?;
     let mut commands = Commands::new(gpu, scene::constants(plan), Instant::now())?;
     let resources = SceneResources::new(gpu, &mut commands, geometry, plan, &[])?;
     let (round, map) = (Round { resources: &resources, geometry, plan, number: 0 }, global_map(plan));
@@ -294,7 +294,7 @@ fn run_scene(gpu: &Gpu, geometry: &Geometry, plan: &ScenePlan, request: &Request
     timed(gpu, commands, request.turns, |commands, name| {
         tallies::clear(commands, &buffers.tallies[0]);
         for chunk in map.chunks() {
-            commands.scope(name, |commands| photons::trace(commands, round, buffers, map, chunk, &mut |_| Ok(())))?;
+            commands.scope(name, |commands| scene_trace::trace(commands, round, buffers, map, chunk, &mut |_| Ok(())))?;
             commands.submit()?;
         }
         tallies::read(commands, &buffers.tallies[0], plan.tally_rows())

@@ -35,7 +35,7 @@ pub(super) fn gather(
 
 /// Every point tests the photons of the leaves in reach, a slice of its wall's leaves an invocation.
 fn gather_radius(commands: &mut Commands, resources: &RoomResources, tree: &TreeBuffers, plan: &RoomPlan, photon_count: u32) -> Result<()> {
-    let RoomResources { film, points, dispatch_args, .. } = resources;
+    let RoomResources { film, room, dispatch_args, .. } = resources;
     let TreeBuffers { wall_begins, planes, tree_photons, longest, .. } = tree;
     let whole = push_for_all_points(plan, photon_count);
     let tests_per_point = plan.work.tests_per_point(photon_count);
@@ -50,9 +50,9 @@ fn gather_radius(commands: &mut Commands, resources: &RoomResources, tree: &Tree
         let push = GatherPush { first_point, end_point, ..whole };
         let extent = Extent::Indirect(dispatch_args);
         if adds_in_one_word(plan, commands.facts()) {
-            commands.dispatch(GatherTreeU64 { points, film, wall_begins, planes, tree_photons }, &push, extent)?;
+            commands.dispatch(GatherTreeU64 { room, film, wall_begins, planes, tree_photons }, &push, extent)?;
         } else {
-            commands.dispatch(GatherTreeTwoWords { points, film, wall_begins, planes, tree_photons }, &push, extent)?;
+            commands.dispatch(GatherTreeTwoWords { room, film, wall_begins, planes, tree_photons }, &push, extent)?;
         }
         add_work(commands, plan, u64::from(end_point - first_point) * tests_per_point)?;
     }
@@ -70,13 +70,13 @@ fn gather_nearest(
     nearest_count: u32,
     photon_count: u32,
 ) -> Result<()> {
-    let RoomResources { film, points, rooms, .. } = resources;
+    let RoomResources { film, room, .. } = resources;
     let TreeBuffers { wall_begins, planes, tree_photons, tree_origins, .. } = tree;
     let SearchBuffers { nearest, searches, unfinished, .. } = buffers;
     let tests_per_point = plan.work.tests_per_point(photon_count).min(u64::from(GATHER_SLICE));
     for (first, last) in point_ranges(commands, plan, tests_per_point, 1) {
-        for first_point in (first..last).step_by(buffers.point_count as usize) {
-            let end_point = last.min(first_point + buffers.point_count);
+        for first_point in (first..last).step_by(searches.count() as usize) {
+            let end_point = last.min(first_point + searches.count() as u32);
             let mut push = NearestPush {
                 first_point,
                 end_point,
@@ -89,25 +89,14 @@ fn gather_nearest(
                 commands.fill(unfinished, 0, 1, 0);
                 let extent = Extent::Items(u64::from(end_point - first_point));
                 if adds_in_one_word(plan, commands.facts()) {
-                    let kernel =
-                        NearestU64 { points, rooms, film, wall_begins, planes, tree_photons, tree_origins, nearest, searches, unfinished };
+                    let kernel = NearestU64 { room, film, wall_begins, planes, tree_photons, tree_origins, nearest, searches, unfinished };
                     commands.dispatch(kernel, &push, extent)?;
                 } else {
-                    let kernel = NearestTwoWords {
-                        points,
-                        rooms,
-                        film,
-                        wall_begins,
-                        planes,
-                        tree_photons,
-                        tree_origins,
-                        nearest,
-                        searches,
-                        unfinished,
-                    };
+                    let kernel =
+                        NearestTwoWords { room, film, wall_begins, planes, tree_photons, tree_origins, nearest, searches, unfinished };
                     commands.dispatch(kernel, &push, extent)?;
                 }
-                if commands.read::<u32>(unfinished, 1)? == [0] {
+                if commands.read(unfinished, 1)? == [0] {
                     break;
                 }
                 push.is_first = 0;

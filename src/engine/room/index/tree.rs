@@ -6,6 +6,8 @@
 //! there are only the device knows, so dispatches are sized there, and heights that the tree does not reach are
 //! passed over there.
 
+use glam::UVec2;
+
 use super::add_work;
 use crate::constants::{MAX_GROUPS, TREE_DIGITS, TREE_LEAF};
 use crate::engine::prefix_sum::scan_part;
@@ -17,7 +19,6 @@ use crate::gpu::kernels::{
 };
 use crate::gpu::{Buffer, Commands, Extent, Kernel, Module};
 use crate::plan::RoomPlan;
-use crate::plan::memory::tree_count_capacity;
 use crate::records::{DispatchSizePush, TreePush};
 
 /// Kernels that the tree needs.
@@ -94,7 +95,7 @@ fn sort(
     tree: &TreeBuffers,
     plan: &RoomPlan,
     push: &TreePush,
-    lists: [&Buffer; 2],
+    lists: [&Buffer<UVec2>; 2],
     pass_work: u64,
 ) -> Result<()> {
     let RoomResources { photons, counters, .. } = resources;
@@ -117,7 +118,7 @@ fn sort(
 
 fn sum_counts(commands: &mut Commands, tree: &TreeBuffers, plan: &RoomPlan) -> Result<()> {
     let threads = || Extent::Indirect(&tree.scan_args);
-    scan_part(commands, &tree.counts, &tree.block_sums, tree_count_capacity(plan), plan.settings.group_size, &threads)
+    scan_part(commands, &tree.counts, &tree.block_sums, tree.counts.count() as u32, plan.settings.group_size, &threads)
 }
 
 /// Splits the nodes of a height at the middle of the order along one axis; parts the order along the other into
@@ -127,9 +128,9 @@ fn split(
     tree: &TreeBuffers,
     plan: &RoomPlan,
     push: &TreePush,
-    along: &Buffer,
-    across: &Buffer,
-    next_keys: &Buffer,
+    along: &Buffer<UVec2>,
+    across: &Buffer<UVec2>,
+    next_keys: &Buffer<UVec2>,
 ) -> Result<()> {
     let TreeBuffers { wall_begins, longest, ranks, counts, planes, item_args, .. } = tree;
     let photons = || Extent::Indirect(item_args);

@@ -5,8 +5,8 @@ use crate::engine::room::resources::{OrderBuffers, RoomResources};
 use crate::error::Result;
 use crate::gpu::kernels::{ScanMoveRoom, TraceRoomScan};
 use crate::gpu::{Buffer, Commands, Extent};
+use crate::path::StoredPath;
 use crate::plan::RoomPlan;
-use crate::plan::memory::group_count;
 use crate::records::TracePush;
 
 /// Survivors are counted by work group, the counts summed, and the survivors moved to where they belong.
@@ -14,20 +14,19 @@ pub fn one_bounce<'a>(
     commands: &mut Commands,
     resources: &RoomResources,
     plan: &RoomPlan,
-    [paths, next_paths]: [&Buffer; 2],
+    [paths, next_paths]: [&Buffer<StoredPath>; 2],
     push: &TracePush,
     extent: impl Fn() -> Extent<'a>,
 ) -> Result<()> {
-    let RoomResources { rooms, walls, photons, origins, counters, tallies, nonfinite_values, order, .. } = resources;
+    let RoomResources { room, photons, origins, counters, tallies, nonfinite_values, order, .. } = resources;
     let Some(OrderBuffers { survivors, block_sums, weights }) = order else { panic!("the plan has no order to keep") };
-    let group_count = group_count(plan);
     // Groups that no path is left for count none, and so does the place behind the last, which becomes the sum of all.
-    commands.fill(survivors, 0, u64::from(group_count) + 1, 0);
+    commands.clear(survivors);
     commands.dispatch(
-        TraceRoomScan { rooms, walls, paths, next_paths: paths, photons, origins, weights, counters, tallies, survivors, nonfinite_values },
+        TraceRoomScan { room, paths, next_paths: paths, photons, origins, weights, counters, tallies, survivors, nonfinite_values },
         push,
         extent(),
     )?;
-    scan(commands, survivors, block_sums, group_count + 1, plan.settings.group_size)?;
+    scan(commands, survivors, block_sums, survivors.count() as u32, plan.settings.group_size)?;
     commands.dispatch(ScanMoveRoom { paths, next_paths, photons, origins, counters, tallies, survivors, weights }, push, extent())
 }

@@ -1,4 +1,4 @@
-//! Photons of a chunk through a scene of triangles, and the index of their map.
+//! Photons of a chunk through a scene of triangles, by each builder.
 
 use super::Round;
 use super::resources::{OrderBuffers, PhotonBuffers, SceneResources};
@@ -6,22 +6,21 @@ use crate::constants::{MAX_GROUPS, NONE};
 use crate::engine::prefix_sum::scan;
 use crate::error::Result;
 use crate::gpu::kernels::{
-    DispatchSize, EmitScene, MapCount, MapScatter, ScanAdd, ScanBlocks, ScanMoveScene, TracePersistentScene, TraceSceneAtomic,
-    TraceSceneBallot, TraceSceneGroup, TraceSceneScan, TraceSceneSlots,
+    DispatchSize, EmitScene, ScanAdd, ScanBlocks, ScanMoveScene, TracePersistentScene, TraceSceneAtomic, TraceSceneBallot, TraceSceneGroup,
+    TraceSceneScan, TraceSceneSlots,
 };
 use crate::gpu::{Commands, Extent, Kernel, Module};
 use crate::photon::MapPhoton;
 use crate::plan::memory::survivor_count;
 use crate::plan::scene::{MapPlan, ScenePlan};
-use crate::records::{CellPush, DispatchSizePush, Draws, EmissionPush, FlightPush, PhotonEmission, PhotonStore, SceneTracePersistentPush};
+use crate::records::{DispatchSizePush, Draws, EmissionPush, FlightPush, PhotonEmission, PhotonStore, SceneTracePersistentPush};
 use crate::rng::words;
 use crate::scene::geometry::Geometry;
 use crate::settings::Builder;
 
-/// Kernels that tracing and the index need.
+/// Kernels that tracing needs.
 pub fn modules(plan: &ScenePlan) -> Vec<Module> {
-    let index = vec![MapCount::MODULE, MapScatter::MODULE, ScanBlocks::MODULE, ScanAdd::MODULE, DispatchSize::MODULE];
-    let trace = match plan.builder() {
+    let by_builder = match plan.builder() {
         Builder::Naive => vec![EmitScene::MODULE, TraceSceneSlots::MODULE],
         Builder::Atomic => vec![EmitScene::MODULE, TraceSceneAtomic::MODULE],
         Builder::Ballot => vec![EmitScene::MODULE, TraceSceneBallot::MODULE],
@@ -30,18 +29,7 @@ pub fn modules(plan: &ScenePlan) -> Vec<Module> {
         Builder::Persistent => vec![TracePersistentScene::MODULE],
         Builder::Cpu => panic!("the CPU builder traces no scene"),
     };
-    [index, trace].concat()
-}
-
-/// The grid of a map in a round: cells as wide as the radius, its corner a little outside of the scene.
-pub fn cells(round: Round, map: &MapPlan) -> CellPush {
-    let radius = round.plan.radius(map, round.number) as f32;
-    CellPush {
-        origin: round.geometry.bounds.0 - 4.0 * radius,
-        cells_per_unit: 1.0 / radius,
-        bucket_mask: map.bucket_count - 1,
-        photon_capacity: map.capacity,
-    }
+    [vec![DispatchSize::MODULE, ScanBlocks::MODULE, ScanAdd::MODULE], by_builder].concat()
 }
 
 /// Timestamps that must be left for the scopes that are open and for a bounce.
@@ -195,8 +183,7 @@ fn trace_persistent(
     flights: u32,
 ) -> Result<usize> {
     let Round { resources, geometry, plan, .. } = round;
-    let SceneResources { nodes, triangles, normals, uvs, materials, textures, texels, emitters, caustic_targets, nonfinite_values, .. } =
-        resources;
+    let SceneResources { scene, nonfinite_values, .. } = resources;
     let PhotonBuffers { paths, counters, map: map_buffer, .. } = photons;
     let which = usize::from(map.caustic_only);
     let (tallies, totals) = (&photons.tallies[which], &photons.totals[which]);
@@ -216,15 +203,7 @@ fn trace_persistent(
             stride: map.persistence.invocations(count),
         };
         let kernel = TracePersistentScene {
-            nodes,
-            triangles,
-            normals,
-            uvs,
-            materials,
-            textures,
-            texels,
-            emitters,
-            caustic_targets,
+            scene,
             paths: &paths[parity],
             next_paths: &paths[1 - parity],
             map: map_buffer,
@@ -255,12 +234,10 @@ const LEAST_PHOTONS: u32 = 1 << 12;
 /// Writes the paths of a chunk as they leave the lights.
 pub fn emit(commands: &mut Commands, round: Round, photons: &PhotonBuffers, map: &MapPlan, chunk: (u32, u32)) -> Result<()> {
     let Round { resources, geometry, .. } = round;
-    let SceneResources { nodes, triangles, normals, uvs, materials, textures, texels, emitters, caustic_targets, nonfinite_values, .. } =
-        resources;
+    let SceneResources { scene, nonfinite_values, .. } = resources;
     let next_paths = &photons.paths[0];
     let push = EmissionPush { draws: draws(round, map), emission: emission(geometry, map, chunk) };
-    let kernel =
-        EmitScene { nodes, triangles, normals, uvs, materials, textures, texels, emitters, caustic_targets, next_paths, nonfinite_values };
+    let kernel = EmitScene { scene, next_paths, nonfinite_values };
     commands.dispatch(kernel, &push, Extent::Items(u64::from(chunk.1)))
 }
 
@@ -283,7 +260,7 @@ pub fn trace_flight(
     extent: Extent,
 ) -> Result<()> {
     let Round { resources, plan, .. } = round;
-    let SceneResources { nodes, triangles, normals, uvs, materials, textures, texels, nonfinite_values, .. } = resources;
+    let SceneResources { scene, nonfinite_values, .. } = resources;
     let Flight { bounce, list, parity, is_asked } = flight;
     let push = FlightPush {
         draws: draws(round, map),
@@ -302,7 +279,7 @@ pub fn trace_flight(
         ($kernel:ident { $next_paths:expr $(, $more:ident)* }) => {
             commands.dispatch(
                 $kernel {
-                    nodes, triangles, normals, uvs, materials, textures, texels, paths, next_paths: $next_paths, map, counters, tallies,
+                    scene, paths, next_paths: $next_paths, map, counters, tallies,
                     totals, nonfinite_values $(, $more)*
                 },
                 &push,
@@ -333,27 +310,4 @@ fn dispatch_size(commands: &mut Commands, photons: &PhotonBuffers, plan: &SceneP
     let PhotonBuffers { counters, dispatch_args, .. } = photons;
     let push = DispatchSizePush { counter, capacity, items_per_group: plan.settings.group_size, max_groups: MAX_GROUPS };
     commands.dispatch(DispatchSize { counters, dispatch_args }, &push, Extent::Groups(1, 1))
-}
-
-/// Sorts the map by the buckets of its cells.
-pub fn index(commands: &mut Commands, round: Round, photons: &PhotonBuffers, map_plan: &MapPlan, cells_push: &CellPush) -> Result<()> {
-    let plan = round.plan;
-    let totals = &photons.totals[usize::from(map_plan.caustic_only)];
-    let PhotonBuffers { map, sorted_map, counters, cells, ranks, block_sums, dispatch_args, .. } = photons;
-    let buckets = cells_push.bucket_mask + 1;
-    commands.scope("count", |commands| {
-        commands.fill(cells, 0, u64::from(buckets) + 1, 0);
-        let push = DispatchSizePush {
-            counter: 0,
-            capacity: cells_push.photon_capacity,
-            items_per_group: plan.settings.group_size,
-            max_groups: MAX_GROUPS,
-        };
-        commands.dispatch(DispatchSize { counters, dispatch_args }, &push, Extent::Groups(1, 1))?;
-        commands.dispatch(MapCount { map, counters, cells, ranks }, cells_push, Extent::Indirect(dispatch_args))
-    })?;
-    commands.scope("scan", |commands| scan(commands, cells, block_sums, buckets + 1, plan.settings.group_size))?;
-    commands.scope("sort", |commands| {
-        commands.dispatch(MapScatter { map, counters, cells, sorted_map, ranks, totals }, cells_push, Extent::Indirect(dispatch_args))
-    })
 }

@@ -1,0 +1,109 @@
+//! Density estimates from the maps at the visible points, and the film at the end of a round.
+
+use super::Round;
+use super::points::{add_work, rounding, runs};
+use super::resources::{PhotonBuffers, SceneResources};
+use crate::constants::MAX_GROUPS;
+use crate::error::Result;
+use crate::gpu::kernels::{CrowdSize, FluxToRadiance, GatherVisiblePointsTwoWords, GatherVisiblePointsU64, Resolve};
+use crate::gpu::{Commands, Extent};
+use crate::plan::scene::{MapPlan, TESTS_PER_POINT};
+use crate::records::{CellPush, CrowdSizePush, FluxToRadiancePush, ResolvePush, SceneGatherPush};
+
+/// Adds a chunk of a map to the estimates of all visible points.
+pub fn gather(commands: &mut Commands, round: Round, photons: &PhotonBuffers, map: &MapPlan, cells_push: CellPush) -> Result<()> {
+    let Round { resources, plan, number: round, .. } = round;
+    let PhotonBuffers { cells, sorted_map, crowded, dispatch_args, .. } = photons;
+    let SceneResources { scene, visible_points, estimates, nonfinite_values, .. } = resources;
+    let point_count = plan.visible_points();
+    let (lanes, step) = (map.lanes, plan.points_at_once());
+    let (width, height) = plan.sensor.size();
+    let dispatch = |commands: &mut Commands, push: &SceneGatherPush, extent: Extent| {
+        if commands.facts().int64_atomics {
+            commands.dispatch(
+                GatherVisiblePointsU64 { scene, visible_points, film: estimates, cells, sorted_map, crowded, nonfinite_values },
+                push,
+                extent,
+            )
+        } else {
+            commands.dispatch(
+                GatherVisiblePointsTwoWords { scene, visible_points, film: estimates, cells, sorted_map, crowded, nonfinite_values },
+                push,
+                extent,
+            )
+        }
+    };
+    for (first_point, end_point) in runs(point_count, step) {
+        let push = SceneGatherPush {
+            first_point,
+            end_point,
+            point_count,
+            pixel_count: plan.sensor.pixels(),
+            arrival: map.stored.trailing_zeros(),
+            round,
+            rounding: rounding(plan, round),
+            width,
+            height,
+            first_slice: 0,
+            lanes,
+            radius: plan.radius(map, round) as f32,
+            cells: cells_push,
+        };
+        commands.fill(crowded, 0, 2, 0);
+        let groups = ((end_point - first_point) * lanes).div_ceil(plan.settings.group_size);
+        dispatch(commands, &push, Extent::Groups(groups, 1))?;
+        let size = CrowdSizePush { items_per_group: plan.settings.group_size / lanes, max_groups: MAX_GROUPS };
+        commands.dispatch(CrowdSize { crowded, dispatch_args }, &size, Extent::Groups(1, 1))?;
+        dispatch(commands, &SceneGatherPush { first_slice: 1, ..push }, Extent::Indirect(dispatch_args))?;
+        add_work(commands, plan, TESTS_PER_POINT * u64::from(end_point - first_point))?;
+    }
+    Ok(())
+}
+
+/// Turns what the maps found at all visible points into light; so many photons of the global and of the caustic map were traced.
+pub fn flux_to_radiance(commands: &mut Commands, round: Round, traced: [u32; 2]) -> Result<()> {
+    let Round { resources, geometry, plan, number: round } = round;
+    let SceneResources { scene, visible_points, estimates, one_hits, part_totals, anomalies, nonfinite_values, .. } = resources;
+    let radius = |map: &Option<MapPlan>| map.as_ref().map_or(1.0, |map| plan.radius(map, round)) as f32;
+    let flux =
+        |map: &Option<MapPlan>| map.as_ref().map_or(0.0, |map| map.photon_flux_of(geometry, traced[usize::from(map.caustic_only)])) as f32;
+    let (width, height) = plan.sensor.size();
+    for (first_point, end_point) in runs(plan.visible_points(), plan.pixels_at_once(4)) {
+        let push = FluxToRadiancePush {
+            first_point,
+            end_point,
+            point_count: plan.visible_points(),
+            pixel_count: plan.sensor.pixels(),
+            width,
+            height,
+            arrivals: plan.arrivals,
+            round,
+            rounding: rounding(plan, round),
+            film_scale: plan.film_scale as f32,
+            film_limit: plan.point_limit() as f32,
+            global_radius: radius(&plan.global),
+            caustic_radius: radius(&plan.caustic),
+            global_flux: flux(&plan.global),
+            caustic_flux: flux(&plan.caustic),
+        };
+        let kernel = FluxToRadiance { scene, anomalies, visible_points, estimates, one_hits, part_totals, nonfinite_values };
+        commands.dispatch(kernel, &push, Extent::Items(u64::from(end_point - first_point)))?;
+        add_work(commands, plan, 256 * u64::from(end_point - first_point))?;
+    }
+    Ok(())
+}
+
+/// Ends a round: light that was found goes to the film.
+pub fn resolve(commands: &mut Commands, round: Round) -> Result<()> {
+    let Round { resources, plan, .. } = round;
+    let SceneResources { pass_sums, estimates, film_sums, film_squares, .. } = resources;
+    let pixel_count = plan.sensor.pixels();
+    let points_per_pixel = if resources.photons.is_some() { plan.points_per_pixel } else { 0 };
+    for (first_pixel, end_pixel) in runs(pixel_count, plan.pixels_at_once(1)) {
+        let push = ResolvePush { first_pixel, end_pixel, pixel_count, points_per_pixel };
+        let kernel = Resolve { pass_sums, estimates, film_sums, film_squares };
+        commands.dispatch(kernel, &push, Extent::Items(u64::from(end_pixel - first_pixel)))?;
+        add_work(commands, plan, u64::from(end_pixel - first_pixel) * u64::from(plan.samples() + points_per_pixel))?;
+    }
+    Ok(())
+}

@@ -1,0 +1,50 @@
+//! The index of a map: photons counted by bucket of their cell, prefix sums, and sorted into the buckets' order.
+
+use super::Round;
+use super::resources::PhotonBuffers;
+use crate::constants::MAX_GROUPS;
+use crate::engine::prefix_sum::scan;
+use crate::error::Result;
+use crate::gpu::kernels::{DispatchSize, MapCount, MapScatter, ScanAdd, ScanBlocks};
+use crate::gpu::{Commands, Extent, Kernel, Module};
+use crate::plan::scene::MapPlan;
+use crate::records::{CellPush, DispatchSizePush};
+
+/// Kernels that the index needs.
+pub fn modules() -> Vec<Module> {
+    vec![MapCount::MODULE, MapScatter::MODULE, ScanBlocks::MODULE, ScanAdd::MODULE, DispatchSize::MODULE]
+}
+
+/// The grid of a map in a round: cells as wide as the radius, its corner a little outside of the scene.
+pub fn cells(round: Round, map: &MapPlan) -> CellPush {
+    let radius = round.plan.radius(map, round.number) as f32;
+    CellPush {
+        origin: round.geometry.bounds.0 - 4.0 * radius,
+        cells_per_unit: 1.0 / radius,
+        bucket_mask: map.bucket_count - 1,
+        photon_capacity: map.capacity,
+    }
+}
+
+/// Sorts the map by the buckets of its cells.
+pub fn build(commands: &mut Commands, round: Round, photons: &PhotonBuffers, map_plan: &MapPlan, cells_push: &CellPush) -> Result<()> {
+    let plan = round.plan;
+    let totals = &photons.totals[usize::from(map_plan.caustic_only)];
+    let PhotonBuffers { map, sorted_map, counters, cells, ranks, block_sums, dispatch_args, .. } = photons;
+    let buckets = cells_push.bucket_mask + 1;
+    commands.scope("count", |commands| {
+        commands.fill(cells, 0, u64::from(buckets) + 1, 0);
+        let push = DispatchSizePush {
+            counter: 0,
+            capacity: cells_push.photon_capacity,
+            items_per_group: plan.settings.group_size,
+            max_groups: MAX_GROUPS,
+        };
+        commands.dispatch(DispatchSize { counters, dispatch_args }, &push, Extent::Groups(1, 1))?;
+        commands.dispatch(MapCount { map, counters, cells, ranks }, cells_push, Extent::Indirect(dispatch_args))
+    })?;
+    commands.scope("scan", |commands| scan(commands, cells, block_sums, buckets + 1, plan.settings.group_size))?;
+    commands.scope("sort", |commands| {
+        commands.dispatch(MapScatter { map, counters, cells, sorted_map, ranks, totals }, cells_push, Extent::Indirect(dispatch_args))
+    })
+}
