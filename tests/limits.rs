@@ -150,7 +150,7 @@ fn photons_stored_are_the_length_of_the_map() {
             let mut stored = 0;
             for chunk in map.chunks() {
                 let mut count = |commands: &mut Commands| {
-                    stored += u64::from(commands.read::<u32>(&buffers.counters, 1)?[0]);
+                    stored += u64::from(commands.read(&buffers.counters, 1)?[0]);
                     Ok(())
                 };
                 trace::trace(&mut commands, round, buffers, map, chunk, &mut count).unwrap();

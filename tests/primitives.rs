@@ -15,7 +15,7 @@ use photonmill::engine::room::trace;
 use photonmill::engine::tallies;
 use photonmill::gpu::kernels::DispatchSize;
 use photonmill::gpu::{Commands, Constants, Extent, Memory};
-use photonmill::photon::{Origin, Photon, StoredPhoton};
+use photonmill::photon::{Origin, Photon};
 use photonmill::plan::RoomPlan;
 use photonmill::plan::memory::block_sum_counts;
 use photonmill::records::{DispatchArgs, DispatchSizePush, Tally};
@@ -48,7 +48,7 @@ fn prefix_sums(gpu: &Device, items: &[u32], group_size: u32) -> (Vec<u32>, Vec<u
     commands.fill(&buffer, 0, items.len() as u64 + guards, GUARD);
     commands.upload(&buffer, items).unwrap();
     scan(&mut commands, &buffer, &levels, items.len() as u32, group_size).unwrap();
-    let mut sums = commands.read::<u32>(&buffer, items.len() + guards as usize).unwrap();
+    let mut sums = commands.read(&buffer, items.len() + guards as usize).unwrap();
     let behind = sums.split_off(items.len());
     (sums, behind)
 }
@@ -195,11 +195,11 @@ fn the_index_holds_every_photon_in_its_cell() {
             trace::chunk(&mut commands, &resources, &plan, 0, &plan.chunk(0)).unwrap();
             index::build(&mut commands, &resources, &plan, photon_count).unwrap();
             let map = photons(&gpu, &settings);
-            let begins = commands.read::<u32>(&buffers.cells, plan.grid.cells() as usize + 1).unwrap();
+            let begins = commands.read(&buffers.cells, plan.grid.cells() as usize + 1).unwrap();
             assert_eq!(begins[0], 0);
             // A cell ends where the next one begins.
             let cells = begins[1..].to_vec();
-            let sorted = commands.read::<StoredPhoton>(&buffers.sorted_photons, map.len()).unwrap();
+            let sorted = commands.read(&buffers.sorted_photons, map.len()).unwrap();
             let sorted: Vec<Photon> = sorted.into_iter().map(|photon| photon.photon(Origin::default(), &scene.room_record())).collect();
             assert_holds(format!("{builder:?}, {photon_count} photons, radius {radius}"), index_check(&plan, &cells, &sorted, &map));
 
@@ -266,9 +266,9 @@ fn append(gpu: &Device, scene: &RoomScene, settings: &RoomSettings, capacity: u3
         commands.fill(paths, 0, path_count, GUARD);
     }
     trace::chunk(&mut commands, &resources, &plan, 0, &plan.chunk(0)).unwrap();
-    let map = commands.read::<StoredPhoton>(&resources.photons, entries as usize).unwrap();
+    let map = commands.read(&resources.photons, entries as usize).unwrap();
     let (map, behind) = map.split_at(capacity as usize);
-    let origins = commands.read::<Origin>(&resources.origins, entries as usize).unwrap();
+    let origins = commands.read(&resources.origins, entries as usize).unwrap();
     let (origins, origins_behind) = origins.split_at(capacity as usize);
     let mut guards: Vec<u32> = [bytemuck::cast_slice(behind), bytemuck::cast_slice(origins_behind)].concat();
     for paths in &resources.paths {
@@ -446,7 +446,7 @@ fn dispatch_size(gpu: &Device, items: u32, push: DispatchSizePush) -> DispatchAr
     commands.fill(&counters, u64::from(push.counter), 1, items);
     commands.fill(&dispatch_args, 0, 2, GUARD);
     commands.dispatch(DispatchSize { counters: &counters, dispatch_args: &dispatch_args }, &push, Extent::Groups(1, 1)).unwrap();
-    let sizes = commands.read::<DispatchArgs>(&dispatch_args, 2).unwrap();
+    let sizes = commands.read(&dispatch_args, 2).unwrap();
     assert_eq!(sizes[1], DispatchArgs { x: GUARD, y: GUARD, z: GUARD });
     sizes[0]
 }

@@ -3,8 +3,8 @@
 
 use super::Limits;
 use super::capacity::{self, Persistence};
-use super::radius::FirstRadius;
-use super::scene::{MapPlan, SEGMENT_BOUNCES, Trial};
+use super::radius::{FirstRadius, Trial};
+use super::scene::{MapPlan, SEGMENT_BOUNCES};
 use crate::constants::*;
 use crate::error::{Error, Result};
 use crate::photon::MapPhoton;

@@ -6,7 +6,6 @@ use std::f64::consts::PI;
 use serde::Serialize;
 use statrs::function::gamma::ln_gamma;
 
-use super::scene::Trial;
 use crate::error::{Error, Result};
 use crate::scene::geometry::Geometry;
 
@@ -20,6 +19,20 @@ pub enum RadiusFrom {
     Trial,
     /// The area of the whole scene.
     Area,
+}
+
+/// What a trial round found.
+#[derive(Debug, Clone, Default, PartialEq, Serialize)]
+pub struct Trial {
+    /// Radii of the first round, normalised; `None` where the map has none, or its radius is given.
+    pub global_radius: Option<f64>,
+    pub caustic_radius: Option<f64>,
+    /// Points that were asked, some of those that the run asks about.
+    pub points: u32,
+    /// Share of them that lie in something smaller than the radius: whose way along the surface to the next wall or edge
+    /// is shorter. Of the map with the larger radius.
+    pub too_wide: f64,
+    pub seconds: f64,
 }
 
 /// Radii relative to the scene's normalised extent: from f32's resolution of positions up to all of it.

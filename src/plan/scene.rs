@@ -7,27 +7,13 @@ use serde::Serialize;
 
 use super::capacity::Persistence;
 use super::evidence::EffectDecision;
-use super::radius::{RADIUS_RANGE, RadiusFrom, squared_radius};
+use super::radius::{RADIUS_RANGE, RadiusFrom, Trial, squared_radius};
 use super::sensor::Sensor;
 use crate::constants::*;
 use crate::records::*;
 use crate::scene::geometry::Geometry;
 use crate::settings::Builder;
 use crate::settings::scene::{Effect, SceneSettings};
-
-/// What a trial round found.
-#[derive(Debug, Clone, Default, PartialEq, Serialize)]
-pub struct Trial {
-    /// Radii of the first round, normalised; `None` where the map has none, or its radius is given.
-    pub global_radius: Option<f64>,
-    pub caustic_radius: Option<f64>,
-    /// Points that were asked, some of those that the run asks about.
-    pub points: u32,
-    /// Share of them that lie in something smaller than the radius: whose way along the surface to the next wall or edge
-    /// is shorter. Of the map with the larger radius.
-    pub too_wide: f64,
-    pub seconds: f64,
-}
 
 /// A photon map of each round.
 #[derive(Debug, Clone, PartialEq, Serialize)]

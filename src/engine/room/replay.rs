@@ -16,8 +16,8 @@ use crate::error::Result;
 use crate::gpu::check::strict_math;
 use crate::gpu::{Commands, Gpu};
 use crate::ledger::fate;
-use crate::path::{self, Path, StoredPath};
-use crate::photon::{Origin, Photon, StoredPhoton};
+use crate::path::{self, Path};
+use crate::photon::Photon;
 use crate::plan::{EmissionRange, RoomPlan, photons_of};
 use crate::scene::room::RoomScene;
 use crate::settings::{Math, RoomSettings};
@@ -47,7 +47,7 @@ fn replay_on_gpu(gpu: &Gpu, scene: &RoomScene, settings: &RoomSettings, name: Ph
     let mut commands = Commands::new(gpu, constants(&plan), Instant::now())?;
     let resources = RoomResources::new(gpu, &mut commands, scene, &plan)?;
     trace::emit(&mut commands, &resources, &plan, name.round, &ranges)?;
-    let start = path::unpack(&commands.read::<StoredPath>(&resources.paths[0], 1)?, 0);
+    let start = path::unpack(&commands.read(&resources.paths[0], 1)?, 0);
     let vertices = stored(&mut commands, &resources, scene, &plan, name.round, &ranges)?;
     let tallies = tallies::read(&mut commands, &resources.tallies, settings.bounces)?;
     let nonfinite_values = NonfiniteValues::found(&mut commands, &resources.nonfinite_values, settings.paranoid)?;
@@ -105,9 +105,9 @@ fn stored(
 ) -> Result<Vec<Photon>> {
     trace::chunk(commands, resources, plan, round, ranges)?;
     let capacity = trace::photon_list_capacity(plan, photons_of(ranges));
-    let length = if plan.has_slots() { capacity } else { commands.read::<u32>(&resources.counters, 1)?[0].min(capacity) };
-    let photons = commands.read::<StoredPhoton>(&resources.photons, length as usize)?;
-    let origins = commands.read::<Origin>(&resources.origins, length as usize)?;
+    let length = if plan.has_slots() { capacity } else { commands.read(&resources.counters, 1)?[0].min(capacity) };
+    let photons = commands.read(&resources.photons, length as usize)?;
+    let origins = commands.read(&resources.origins, length as usize)?;
     let room = scene.room_record();
     let stored = photons.into_iter().zip(origins).map(|(photon, origin)| photon.photon(origin, &room));
     Ok(stored.filter(|photon| photon.wall != NO_WALL).collect())

@@ -128,7 +128,7 @@ impl<'a> World for SceneOnGpu<'a> {
         let SceneResources { film_sums, film_squares, one_hits, part_totals, anomalies, .. } = &self.resources;
         let pixels = self.plan.sensor.pixels() as usize;
         let sums = commands.read(film_sums, 3 * pixels)?;
-        let words = commands.read::<u64>(film_squares, 6 * pixels)?;
+        let words = commands.read(film_squares, 6 * pixels)?;
         let squares = words.chunks_exact(2).map(|words| wide(words[0], words[1])).collect();
         let one_hits = commands.read(one_hits, HIT_KINDS as usize * pixels)?;
         let part_totals = commands.copy_out(part_totals, PART_COUNT as usize)?;

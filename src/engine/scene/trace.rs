@@ -71,7 +71,7 @@ pub fn trace(
         if first_bounce == map.bounces {
             return gather(commands);
         }
-        let counters = commands.read::<u32>(&photons.counters, map.counter_count() as usize)?;
+        let counters = commands.read(&photons.counters, map.counter_count() as usize)?;
         let left = counters[if is_persistent(round.plan) { 1 } else { 1 + flights as usize }];
         let stored = counters[0];
         if left == 0 {
@@ -97,8 +97,8 @@ pub fn stored(commands: &mut Commands, round: Round, map: &MapPlan) -> Result<Ve
     let buffers = round.resources.photons.as_ref().expect("a map has photons");
     let mut found = Vec::new();
     let mut take = |commands: &mut Commands| {
-        let count = commands.read::<u32>(&buffers.counters, 1)?[0].min(map.capacity);
-        let entries = commands.read::<MapPhoton>(&buffers.map, count as usize)?;
+        let count = commands.read(&buffers.counters, 1)?[0].min(map.capacity);
+        let entries = commands.read(&buffers.map, count as usize)?;
         found.extend(entries.into_iter().filter(|photon| photon.plane != NONE));
         Ok(())
     };
