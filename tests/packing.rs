@@ -32,7 +32,7 @@ impl Words {
 
     fn end_or<T: Copy, const N: usize>(&mut self, ends: [T; N], otherwise: impl Fn(u32) -> T) -> T {
         let word = self.word();
-        if word % 8 == 0 { ends[(word >> 8) as usize % N] } else { otherwise(self.word()) }
+        if word.is_multiple_of(8) { ends[(word >> 8) as usize % N] } else { otherwise(self.word()) }
     }
 
     /// Any number but those that a device may take for 0.
@@ -79,7 +79,7 @@ fn case(index: u32) -> PackingCase {
         flux: words.share(),
         weight: words.share(),
         colour: words.vector(),
-        normal_code: words.bits() % 65_535 | words.bits() % 65_535 << 16,
+        normal_code: (words.bits() % 65_535) | ((words.bits() % 65_535) << 16),
         room,
     }
 }
@@ -126,7 +126,7 @@ fn node(index: u32) -> CwBvhNode {
     // From 2^-47 to 2^16.
     node.e = [bytes(), bytes(), bytes()].map(|bytes| 80 + bytes[0] % 64);
     node.imask = bytes()[0];
-    node.p = Vec3::new(words.share(), -words.share(), words.share()).into();
+    node.p = Vec3::new(words.share(), -words.share(), words.share());
     (node.child_base_idx, node.primitive_base_idx) = (words.bits(), words.bits());
     node
 }
@@ -251,7 +251,7 @@ fn twins(found: &Found, index: usize, case: &PackingCase, node: &CwBvhNode) -> C
     let child = index & 7;
     let spacing = Vec3::from_array(node.e.map(|exponent| 2f32.powi(i32::from(exponent) - 127)));
     let corner = |x: [u8; 8], y: [u8; 8], z: [u8; 8]| Vec3::from_array([x, y, z].map(|bytes| f32::from(bytes[child]))) * spacing;
-    let p = Vec3::from(node.p);
+    let p = node.p;
     same("a child's low corner", unpacked.low, corner(node.child_min_x, node.child_min_y, node.child_min_z) + p)?;
     same("a child's high corner", unpacked.high, corner(node.child_max_x, node.child_max_y, node.child_max_z) + p)?;
     same("a child's byte", unpacked.meta, u32::from(node.child_meta[child]))?;
@@ -274,7 +274,8 @@ fn what_rust_packs_the_device_unpacks_and_the_other_way_round() {
     }
 
     let on_wall = (0..cases.len()).find(|index| cases[*index].wall == 2).unwrap();
-    let spoils: [(&str, fn(&mut Found, usize)); 9] = [
+    type Spoil = fn(&mut Found, usize);
+    let spoils: [(&str, Spoil); 9] = [
         ("a photon's two coordinates swapped", |found, index| found.photons[index].0.swap(0, 1)),
         ("a photon on the wall across", |found, index| found.photons[index].0[3] ^= 1 << 31),
         ("a path at its neighbour's place", |found, index| {

@@ -61,8 +61,8 @@ pub fn appends_agree(gpu: &Gpu, scene: &Scene, settings: &SceneSettings) -> Chec
         run(gpu, &View { geometry: &geometry, camera: Some(&camera), phases: &[] }, plan)
     };
     let ballot = of(Builder::Ballot);
-    let others = Builder::ON_GPU.into_iter().filter(|builder| *builder != Builder::Ballot);
-    others.map(|builder| same_film(builder.name(), &of(builder), &ballot)).collect()
+    let mut others = Builder::ON_GPU.into_iter().filter(|builder| *builder != Builder::Ballot);
+    others.try_for_each(|builder| same_film(builder.name(), &of(builder), &ballot))
 }
 
 #[test]
