@@ -11,7 +11,7 @@ use shaderc::{CompileOptions, Compiler, EnvVersion, OptimizationLevel, ResolvedI
 /// Kernels that exist in several forms: in the paths of their includes each word stands for one of these.
 const FORMS: &[(&str, &[Word])] = &[
     ("kernels/emit.comp", &[WORLDS]),
-    ("kernels/trace.comp", &[WORLDS, ("BUILDER", &["slots", "atomic", "ballot", "group", "scan"])]),
+    ("kernels/trace.comp", &[WORLDS, ("BUILDER", &["naive", "atomic", "ballot", "group", "scan"])]),
     ("kernels/scan_move.comp", &[WORLDS]),
     ("kernels/trace_persistent.comp", &[WORLDS]),
     ("kernels/gather.comp", &[("INDEX", &["brute", "grid", "tree"]), SUMS]),

@@ -14,6 +14,7 @@ const LINE: &[&[&str]] = &[
     &["cpu", "gpu"],
     &[
         "engine",
+        "engine::error_bound",
         "engine::film",
         "engine::planned",
         "engine::prefix_sum",
@@ -139,7 +140,7 @@ fn forks_in_functions(source: &str) -> Vec<usize> {
     lines
 }
 
-/// The path of a file's module: `plan::memory` of src/plan/memory.rs.
+/// The path of a file's module: `plan::buffers` of src/plan/buffers.rs.
 fn module_path(inside: &Path) -> String {
     let names: Vec<String> = inside.with_extension("").iter().map(|name| name.to_string_lossy().into_owned()).collect();
     names.join("::").trim_end_matches("::mod").to_owned()
@@ -359,7 +360,7 @@ fn the_check_complains_about_arrows_to_the_right() {
     assert!(complains("gpu", "use crate::plan::RoomPlan;"));
     assert!(complains("gpu", "use crate::scene;"));
     assert!(complains("gpu::buffer", "use crate::photon::Photon;"));
-    assert!(complains("plan::memory", "fn f() { crate::gpu::check::run() }"));
+    assert!(complains("plan::buffers", "fn f() { crate::gpu::check::run() }"));
     assert!(complains("scene", "use crate::{error::Result, gpu::{Buffer, Gpu}};"));
     assert!(complains("cpu", "use crate::engine::room::resources::RoomResources;"));
     assert!(complains("verify::judge::path", "use crate::engine::scene::View;"));

@@ -2,12 +2,21 @@
 
 use std::time::Instant;
 
-use crate::common::{Check, assert_complains, assert_holds, device, device_with, open, run, run_on_cpu};
+use crate::common::{Check, assert_complains, assert_holds, device, device_with, open, planted, run, run_on_cpu};
 use photonmill::constants::LOOP_LIMIT;
+use photonmill::engine::choose_builder::choose_builder;
+use photonmill::engine::limits;
 use photonmill::error::Error;
 use photonmill::gpu::clock::LEAST_WARM_UP;
 use photonmill::gpu::{Commands, Constants, Gpu, Memory, Options, check};
+use photonmill::plan::RoomPlan;
+use photonmill::plan::scene::ScenePlan;
+use photonmill::plan::sensor::Sensor;
 use photonmill::rng::Rng;
+use photonmill::scene::Scene;
+use photonmill::scene::geometry::Geometry;
+use photonmill::scene::open_box::open_box;
+use photonmill::settings::scene::SceneSettings;
 use photonmill::settings::{Builder, Gather, RoomSettings};
 use photonmill::timings::{Clock, Row, Timings};
 
@@ -21,6 +30,37 @@ fn the_start_up_check_passes() {
     let lesser = device_with(Options { without_int64_atomics: true, without_timestamps: true, ..Options::default() }).unwrap();
     assert!(!lesser.facts().int64_atomics);
     assert_eq!(lesser.facts().timestamp_bits, 0);
+}
+
+/// Where lanes do not vote right in a loop, the persistent builder is refused, and nothing takes it by itself.
+#[test]
+fn no_run_is_persistent_where_lanes_vote_wrong() {
+    let healthy = device();
+    assert!(healthy.is_none_or(|gpu| gpu.facts().votes_in_loops));
+    let replaced = planted::kernels(
+        &["start_up_u64", "start_up_two_words"],
+        "builder/place.glsl",
+        &[("subgroupBallotExclusiveBitCount(survivors);", "(subgroupBallotExclusiveBitCount(survivors) & 0xfffffffeu);")],
+    );
+    let Some(gpu) = device_with(Options { replaced, ..Options::default() }) else { return };
+    assert!(!gpu.facts().votes_in_loops);
+
+    let settings = RoomSettings { photons: 500, ..RoomSettings::default() };
+    let choice = choose_builder(&gpu, &open_box(&settings), &settings).unwrap();
+    let builders: Vec<Builder> = choice.candidates.iter().map(|candidate| candidate.builder).collect();
+    assert!(builders.len() == 5 && !builders.contains(&Builder::Persistent), "{builders:?}");
+    let asked = RoomSettings { builder: Builder::Persistent, ..settings };
+    let refused = RoomPlan::new(&open_box(&asked), &asked, &limits(gpu.facts())).unwrap_err().to_string();
+    assert!(refused.starts_with("--variant persistent: needs the lanes of a subgroup"), "{refused}");
+
+    let scene = Scene::open("cornell", false).unwrap();
+    let plan = |builder| {
+        let settings = SceneSettings { builder, ..SceneSettings::default() };
+        let geometry = Geometry::new(&scene).unwrap();
+        ScenePlan::new(&scene, &geometry, &settings, Sensor::Picture { width: 8, height: 8 }, &limits(gpu.facts()))
+    };
+    assert_eq!(plan(None).unwrap().builder(), Builder::Ballot);
+    assert_eq!(plan(Some(Builder::Persistent)).unwrap_err().to_string(), refused);
 }
 
 /// Every loop of the kernels stays within what every device counts right; beyond, a device may leave a

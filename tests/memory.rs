@@ -4,7 +4,7 @@ use crate::common::{device, lit, run};
 use photonmill::engine;
 use photonmill::engine::scene::View;
 use photonmill::gpu::Gpu;
-use photonmill::plan::memory::{PlannedBuffer, bytes_of};
+use photonmill::plan::buffers::{PlannedBuffer, bytes_of};
 use photonmill::plan::scene::ScenePlan;
 use photonmill::plan::sensor::Sensor;
 use photonmill::rng::Rng;

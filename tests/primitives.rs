@@ -17,7 +17,7 @@ use photonmill::gpu::kernels::DispatchSize;
 use photonmill::gpu::{Commands, Constants, Extent, Memory};
 use photonmill::photon::{Origin, Photon};
 use photonmill::plan::RoomPlan;
-use photonmill::plan::memory::block_sum_counts;
+use photonmill::plan::buffers::block_sum_counts;
 use photonmill::records::{DispatchArgs, DispatchSizePush, Tally};
 use photonmill::rng::Rng;
 use photonmill::scene::open_box::open_box;

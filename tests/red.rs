@@ -252,10 +252,10 @@ const FAULTS: [Fault; 68] = [
     },
     Fault {
         what: "a survivor's path is forgotten",
-        file: "builder/slots.glsl",
+        file: "builder/naive.glsl",
         from: "store_path(index, path);",
         to: "if (index % 10u != 7u) store_path(index, path);",
-        kernels: &["trace_room_slots"],
+        kernels: &["trace_room_naive"],
         noticed_by: &[(Ledger(Builder::Naive), LedgerOpen), (Photons(Builder::Naive), OtherPhotons)],
     },
     Fault {
@@ -295,7 +295,7 @@ const FAULTS: [Fault; 68] = [
         file: "world/scene/bounce.glsl",
         from: "push.list * photon_count + index",
         to: "(push.list % 2u) * photon_count + index",
-        kernels: &["trace_scene_slots"],
+        kernels: &["trace_scene_naive"],
         noticed_by: &[(Appends, OtherSums)],
     },
     Fault {

@@ -8,10 +8,10 @@ use crate::common::lit::{scene, seen};
 use crate::common::{Check, assert_complains, assert_holds, device};
 use glam::DVec3;
 use photonmill::engine;
+use photonmill::engine::error_bound::error_bound;
 use photonmill::engine::room::film::{estimate_walls, irradiance_weights};
 use photonmill::engine::room::{self, RunResult};
 use photonmill::engine::scene::{self, View};
-use photonmill::engine::watch;
 use photonmill::engine::{Control, End, Progress};
 use photonmill::gpu::Gpu;
 use photonmill::plan::scene::ScenePlan;
@@ -146,7 +146,7 @@ fn irradiances(outcome: &RunResult) -> Vec<DVec3> {
 /// The relative error that a film of the box has not more of.
 fn bound_in_box(outcome: &RunResult) -> f64 {
     let weights = irradiance_weights(&open_box(&outcome.plan.settings), &outcome.plan);
-    watch::error_bound(outcome.film.rounds, outcome.film.relative_error(&weights), CONFIDENCE)
+    error_bound(outcome.film.rounds, outcome.film.relative_error(&weights), CONFIDENCE)
 }
 
 /// The same of the paper's line, whichever way it is built.

@@ -1,6 +1,6 @@
-// One bounce of every path, survivors only stored, side by side. An invocation takes `PLACES` paths through it: a device adds only
-// so often a second to one counter, and more of them share an addition. builder/atomic.glsl, builder/ballot.glsl and
-// builder/group.glsl each define
+// One bounce of every path. Photons that are stored and paths that go on each take the next place, without gaps. An invocation takes
+// `PLACES` paths through it: a device adds only so often a second to one counter, and more of them share an addition.
+// builder/atomic.glsl, builder/ballot.glsl and builder/group.glsl each define
 //
 //   uint[PLACES] take_places(uint counter, bool[PLACES] wanted)
 //       called by all invocations of a work group together; the next free places that `counter` counts, where one is

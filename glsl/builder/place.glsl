@@ -1,5 +1,4 @@
-// The next free place of one counter, by one atomic a subgroup: a ballot finds the survivors, an exclusive bit count their order, and a broadcast tells them where the subgroup's
-// block begins.
+// The next free place of one counter, by one atomic a subgroup: builder/ballot.glsl for one photon, as builder/persistent.glsl takes it.
 
 uint take_place(uint counter, bool wanted)
 {

@@ -6,7 +6,7 @@
 // Both lay the sums out alike, low word first, so nothing else knows which one ran.
 
 layout(constant_id = 6) const uint CHANNEL_COUNT = 1;
-// How the paper's line adds; see f32.glsl and compensated.glsl.
+// How the paper's box adds; see float_two_words.glsl and float_u64.glsl.
 layout(constant_id = 36) const uint SUMS = SUMS_INTEGER;
 
 // What one photon adds to a channel, in the film's fixed-point unit, rounded once: value lies in [0, 1]

@@ -1,4 +1,4 @@
-// How the paper's line adds to a film of two words, behind two_words.glsl: integers, or with SUMS_F32 a 32-bit
+// How the paper's box adds to a film of two words, behind two_words.glsl: integers, or with SUMS_F32 a 32-bit
 // float in the low word, which any device can add to by comparing bits.
 
 // A value more in the sum of one invocation, which is kept as a film sum is. film_scale is a power of two, so

@@ -1,4 +1,4 @@
-// How the paper's line adds to a film of 64-bit words, behind u64.glsl: integers, or with SUMS_COMPENSATED pairs of
+// How the paper's box adds to a film of 64-bit words, behind u64.glsl: integers, or with SUMS_COMPENSATED pairs of
 // 32-bit floats, the sum in the low word and what its rounding lost in the high one.
 
 // (sum, what its rounding lost) and one number more: Knuth's exact sum of two, and what is lost goes back into the

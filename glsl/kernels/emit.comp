@@ -8,12 +8,12 @@
 
 layout(local_size_x_id = 0) in;
 
-#include "world/WORLD/leave.glsl"
+#include "world/WORLD/emit_kernel.glsl"
 
 void main()
 {
     uint index = invocation_index();
     if (index < photon_count()) {
-        emit_photon(index);
+        write_photon(index);
     }
 }

@@ -1,6 +1,6 @@
 // What the photon maps found at each visible point, as light: flux over the area that really lies on the surface, times
 // reflectance, in film units. It takes the place of the point's first sums.
-// Dispatched by src/engine/scene/estimate.rs once a pass. One thread = one visible point.
+// Dispatched by src/engine/scene/estimate.rs once a round. One thread = one visible point.
 #version 460
 #extension GL_GOOGLE_include_directive : require
 #extension GL_EXT_scalar_block_layout : require
@@ -24,7 +24,7 @@ layout(set = 1, binding = 2, scalar) buffer Estimates { uvec2 estimates[]; };
 #include "gather/belongs.glsl"
 #include "gather/cover.glsl"
 #include "film/wide.glsl"
-#include "world/scene/film.glsl"
+#include "world/scene/film_units.glsl"
 #include "world/scene/tiles.glsl"
 #include "world/scene/no_point.glsl"
 #include "world/scene/one_hit.glsl"

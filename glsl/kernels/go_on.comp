@@ -29,7 +29,7 @@ layout(set = 1, binding = 11, scalar) readonly buffer CameraPaths { CameraPath c
 #include "world/scene/lights.glsl"
 #include "world/scene/direct.glsl"
 #include "film/wide.glsl"
-#include "world/scene/film.glsl"
+#include "world/scene/film_units.glsl"
 #include "world/scene/one_hit.glsl"
 #include "world/scene/no_point.glsl"
 #include "world/scene/points.glsl"

@@ -1,6 +1,6 @@
 // The light that arrives at given points: direct light, and a visible point for the photon maps; a point
 // that lies on no surface looks around by a ray instead.
-// Dispatched by src/engine/scene/points.rs once a pass. One thread = one receiver.
+// Dispatched by src/engine/scene/points.rs once a round. One thread = one receiver.
 #version 460
 #extension GL_GOOGLE_include_directive : require
 #extension GL_EXT_scalar_block_layout : require
@@ -28,12 +28,12 @@ layout(set = 1, binding = 12, scalar) readonly buffer Receivers { Receiver recei
 #include "material/scatter.glsl"
 #include "world/scene/areas.glsl"
 #include "world/scene/lights.glsl"
-#include "world/scene/walls.glsl"
+#include "world/scene/off_walls.glsl"
 #include "world/scene/direct.glsl"
 #include "gather/belongs.glsl"
 #include "gather/cover.glsl"
 #include "film/wide.glsl"
-#include "world/scene/film.glsl"
+#include "world/scene/film_units.glsl"
 #include "world/scene/no_point.glsl"
 #include "world/scene/one_hit.glsl"
 #include "world/scene/points.glsl"

@@ -1,6 +1,6 @@
-// Ends a pass: what the paths of each pixel found and what their points were lit by is added up, and the film takes the
+// Ends a round: what the paths of each pixel found and what their points were lit by is added up, and the film takes the
 // sum and its square.
-// Dispatched by src/engine/scene/estimate.rs once a pass. One thread = one pixel or receiver.
+// Dispatched by src/engine/scene/estimate.rs once a round. One thread = one pixel or receiver.
 #version 460
 #extension GL_GOOGLE_include_directive : require
 #extension GL_EXT_scalar_block_layout : require

@@ -1,6 +1,6 @@
 // What each pixel sees: a path from the camera over mirrors and glass to the first surface that
 // scatters, its emission and direct light, and where asked one ray further for a final gather.
-// Dispatched by src/engine/scene/points.rs once a pass. One thread = one sample of a pixel.
+// Dispatched by src/engine/scene/points.rs once a round. One thread = one sample of a pixel.
 #version 460
 #extension GL_GOOGLE_include_directive : require
 #extension GL_EXT_scalar_block_layout : require
@@ -30,7 +30,7 @@ layout(push_constant, scalar) uniform Push { ViewPush push; };
 #include "world/scene/lights.glsl"
 #include "world/scene/direct.glsl"
 #include "film/wide.glsl"
-#include "world/scene/film.glsl"
+#include "world/scene/film_units.glsl"
 #include "world/scene/tiles.glsl"
 #include "world/scene/no_point.glsl"
 #include "world/scene/one_hit.glsl"

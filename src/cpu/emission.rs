@@ -1,4 +1,4 @@
-//! Emission of a disc light flush with its wall. Twin of `glsl/world/room/emission.glsl`.
+//! Emission of a disc light flush with its wall. Twin of `glsl/world/room/disc.glsl`.
 
 use glam::Vec3;
 

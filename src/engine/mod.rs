@@ -1,8 +1,9 @@
 //! The engine: from a plan to light. Both worlds, the paper's box ([`room`]) and scenes of triangles ([`scene`]), trace photons,
-//! index them, and estimate densities with the kernels of `glsl`; what stands beside them here is the same for both.
+//! index them, and estimate densities with the kernels of `glsl` (or, of the box, their twins in `cpu`); what stands beside them here is the same for both.
 
 pub mod bias;
 pub mod choose_builder;
+pub mod error_bound;
 pub mod film;
 pub mod nonfinite_values;
 pub mod planned;

@@ -5,7 +5,7 @@ use serde::Serialize;
 use crate::constants::*;
 use crate::error::Result;
 use crate::gpu::{Buffer, Commands};
-use crate::plan::memory::NONFINITE_KIND_WORDS;
+use crate::plan::buffers::NONFINITE_KIND_WORDS;
 
 /// One nonfinite value, and the photon or pixel it belongs to.
 #[derive(Debug, Clone, Copy, PartialEq, Eq, Serialize)]

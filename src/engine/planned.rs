@@ -4,7 +4,7 @@ use bytemuck::Pod;
 
 use crate::error::Result;
 use crate::gpu::{Buffer, Commands, Gpu, Memory};
-use crate::plan::memory::PlannedBuffer;
+use crate::plan::buffers::PlannedBuffer;
 
 /// What a plan lists, and where it is to be.
 pub struct Planned<'a> {

@@ -1,4 +1,4 @@
-//! Single photons of a run: a photon is (seed, round, number), so that it takes the same path alone as among millions.
+//! `--replay`: the name of a photon, and what both worlds tell of it.
 
 use super::nonfinite_values::NonfiniteValues;
 use crate::error::{Error, Result};

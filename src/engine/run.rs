@@ -1,11 +1,12 @@
-//! The one run of all worlds: rounds of photons until something ends it, with the fate of every photon.
+//! The one loop over rounds, of every run: until something ends it, with the fate of every photon.
 
 use std::sync::atomic::Ordering;
 use std::time::Instant;
 
 use super::bias::Bias;
+use super::error_bound::FilmError;
 use super::nonfinite_values::NonfiniteValues;
-use super::watch::{Control, End, FilmError, Progress, Watch};
+use super::watch::{Control, End, Progress, Watch};
 use crate::error::{Error, Result};
 use crate::gpu::check::strict_math;
 use crate::gpu::{Commands, Constants, DeviceFacts, Gpu, Module};

@@ -1,5 +1,4 @@
-//! What a map's photons lose to limits, and how many photons the map has held, while kernels count them
-//! (`glsl/ledger/totals.glsl`).
+//! What a scene's photons lose to limits, and how many its maps have held: twin of `glsl/ledger/totals.glsl`.
 
 use crate::constants::{TALLY_COPIES, TOTAL_FLUX_BITS, TOTAL_WORDS};
 use crate::gpu::{Buffer, Commands};

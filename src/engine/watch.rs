@@ -1,17 +1,14 @@
-//! When a run has done enough: at its last round, at an error, at a time, or at a number of photons, whichever comes
-//! first.
+//! When a run ends before its last round: at an error (`--error`), at a time, or at a number of photons, whichever comes first.
 
 use std::sync::atomic::AtomicBool;
 use std::time::{Duration, Instant};
 
-use serde::Serialize;
-use statrs::distribution::{ContinuousCDF, StudentsT};
-
-use super::unknown::Unknown;
+use super::error_bound::{FilmError, error_bound};
 use crate::error::{Error, Result};
 use crate::ledger::Ledger;
 use crate::plan::radius::mean_squared_radius;
 use crate::settings::stop::Stop;
+use serde::Serialize;
 
 /// How a caller watches a run and ends it early.
 pub struct Control<'a> {
@@ -79,24 +76,6 @@ pub struct Watch {
     next_look: u32,
     /// The latest look.
     seen: Option<Look>,
-}
-
-/// What a film of so many rounds tells of its error, relative to its light.
-#[derive(Debug, Clone, PartialEq)]
-pub struct FilmError {
-    pub rounds: u32,
-    /// Standard error; infinite of fewer than two rounds.
-    pub noise: f64,
-    /// What nothing has reached.
-    pub unknown: Unknown,
-}
-
-impl FilmError {
-    /// The relative error that the film has not more of, with this confidence: of its noise (see [`error_bound`]), and of what
-    /// nothing has reached. Infinite where that is all there is.
-    pub fn bound(&self, confidence: f64) -> f64 {
-        error_bound(self.rounds, self.noise, confidence).hypot(self.unknown.relative)
-    }
 }
 
 /// What a film told.
@@ -223,17 +202,4 @@ impl Watch {
         }
         more
     }
-}
-
-/// The relative error that the mean of so many rounds has not more of, with this confidence: Student's quantile times
-/// its relative standard error. Infinite where fewer than two rounds leave it unknown.
-///
-/// Pixels share photons, so their errors go together to an extent that nobody has measured; this bound takes them to
-/// go together altogether, and so holds more often than it says. It is of the noise, not of the radius's bias.
-pub fn error_bound(rounds: u32, relative_error: f64, confidence: f64) -> f64 {
-    if rounds < 2 {
-        return f64::INFINITY;
-    }
-    let distribution = StudentsT::new(0.0, 1.0, f64::from(rounds - 1)).expect("there is a degree of freedom");
-    distribution.inverse_cdf(0.5 + 0.5 * confidence) * relative_error
 }

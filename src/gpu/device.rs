@@ -250,10 +250,11 @@ fn facts(instance: &ash::Instance, device: vk::PhysicalDevice, index: usize) -> 
         timestamp_bits: queue_family.map_or(0, |family| families[family as usize].timestamp_valid_bits),
         timestamp_period_ns: limits.timestamp_period,
         int64_atomics: features.shader_int64 == vk::TRUE && f12.shader_buffer_int64_atomics == vk::TRUE,
-        reconvergence: if maximal.shader_maximal_reconvergence == vk::TRUE {
-            Reconvergence::Maximal
-        } else if uniform.shader_subgroup_uniform_control_flow == vk::TRUE {
+        // The older of the two, which all validation layers know, promises enough: all lanes come to the loop together.
+        reconvergence: if uniform.shader_subgroup_uniform_control_flow == vk::TRUE {
             Reconvergence::UniformControlFlow
+        } else if maximal.shader_maximal_reconvergence == vk::TRUE {
+            Reconvergence::Maximal
         } else {
             Reconvergence::None
         },

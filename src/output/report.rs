@@ -1,4 +1,5 @@
-//! What the reports of both worlds say alike: losses, errors and timings, as text and as JSON.
+//! What the reports of both worlds say alike: losses, errors and timings, as text and as JSON. The reports themselves are in
+//! `room_report` and `scene_report`.
 
 use std::fmt::Write;
 
@@ -6,10 +7,11 @@ use serde::Serialize;
 
 use crate::constants::MAX_BOUNCES;
 use crate::engine::bias::Bias;
+use crate::engine::error_bound::FilmError;
 use crate::engine::nonfinite_values::NonfiniteValues;
 use crate::engine::run::RunResult;
 use crate::engine::unknown::Unknown;
-use crate::engine::watch::{End, FilmError};
+use crate::engine::watch::End;
 use crate::gpu::DeviceFacts;
 use crate::ledger::{Ledger, Losses};
 use crate::settings::stop::Stop;

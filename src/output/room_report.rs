@@ -5,9 +5,9 @@ use std::fmt::Write;
 use serde::Serialize;
 
 use super::report::{Common, common, end_in_words, ending, ledger, losses};
+use crate::engine::error_bound::FilmError;
 use crate::engine::room::RunResult;
 use crate::engine::room::film::{WallEstimate, irradiance_weights};
-use crate::engine::watch::FilmError;
 use crate::gpu::DeviceFacts;
 use crate::ledger::{BounceFates, Ledger};
 use crate::plan::Decision;

@@ -1,5 +1,5 @@
-//! How many photons are traced at once: what the device's buffers hold for certain, and what its
-//! gather does in a fraction of a second.
+//! What a device allows ([`Limits`]), and how many photons of the paper's box are traced at once: what its buffers hold for certain,
+//! and what its gather does in a fraction of a second.
 
 use serde::Serialize;
 

@@ -4,9 +4,9 @@ use std::f64::consts::PI;
 use std::time::{Duration, Instant};
 
 use super::Limits;
+use super::buffers::{PlannedBuffer, bytes_of};
 use super::evidence::{EffectDecision, Facts};
 use super::maps::Maps;
-use super::memory::{PlannedBuffer, bytes_of};
 use super::radius::Trial;
 use super::scene::{MapPlan, SEGMENT_BOUNCES, ScenePlan};
 use super::sensor::Sensor;

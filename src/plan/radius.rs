@@ -15,7 +15,7 @@ use crate::scene::geometry::Geometry;
 pub enum RadiusFrom {
     /// `--radius`, `--caustic-radius`.
     User,
-    /// Photons of a trial round around the points that are asked about (`scene::trial`).
+    /// Photons of a trial round around the points that are asked about (`engine::scene::trial`).
     Trial,
     /// The area of the whole scene.
     Area,
@@ -113,6 +113,11 @@ pub fn squared_radius(alpha: f64, round: u32) -> f64 {
         return (1..=round).map(|i| (f64::from(i) + alpha) / (f64::from(i) + 1.0)).product();
     }
     (ln_gamma(n + 1.0 + alpha) - ln_gamma(1.0 + alpha) - ln_gamma(n + 2.0)).exp()
+}
+
+/// The radius of a round, where the first one's is `first`, normalised; never below what positions resolve.
+pub fn of_round(first: f64, alpha: f64, round: u32) -> f64 {
+    (first * squared_radius(alpha, round).sqrt()).max(RADIUS_RANGE.0)
 }
 
 /// Mean over rounds of the squared radius, relative to the first one's: r_(i+1)^2 = r_i^2 (i + alpha) / (i + 1)

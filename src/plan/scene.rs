@@ -1,5 +1,4 @@
-//! What lighting a scene of triangles will do: which effects are kept and why, which maps are traced with
-//! how many photons, the schedule of radii, and the size of every buffer.
+//! The plan of a scene, as [`super::planning`] makes it: effects, maps, the radius of each round, and the sizes of dispatches.
 
 use std::time::Duration;
 
@@ -7,7 +6,7 @@ use serde::Serialize;
 
 use super::capacity::Persistence;
 use super::evidence::EffectDecision;
-use super::radius::{RADIUS_RANGE, RadiusFrom, Trial, squared_radius};
+use super::radius::{self, RADIUS_RANGE, RadiusFrom, Trial};
 use super::sensor::Sensor;
 use crate::constants::*;
 use crate::records::*;
@@ -161,7 +160,7 @@ impl ScenePlan {
     /// Radius of a map in a round, normalised: r_(i+1)^2 = r_i^2 (i + alpha) / (i + 1) with i from 1
     /// (Knaus and Zwicker 2011, equation 15).
     pub fn radius(&self, map: &MapPlan, round: u32) -> f64 {
-        (map.radius * squared_radius(self.settings.alpha, round).sqrt()).max(RADIUS_RANGE.0)
+        radius::of_round(map.radius, self.settings.alpha, round)
     }
 
     /// Bounces whose fates are counted apart.

@@ -170,7 +170,7 @@ pub struct SceneSettings {
     pub bounces: u32,
     pub seed: u64,
     /// Radius of the first pass's density estimate, metres; `None`: by a trial round
-    /// (`scene::trial`), or by the scene's area and the photons where none is made.
+    /// (`engine::scene::trial`), or by the scene's area and the photons where none is made.
     pub radius: Option<f64>,
     /// The same of the caustic map.
     pub caustic_radius: Option<f64>,

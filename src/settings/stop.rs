@@ -1,4 +1,4 @@
-//! What ends a run before its last round, whichever comes first.
+//! What is asked for to end a run before its last round; `engine::watch` ends it.
 
 use serde::Serialize;
 

@@ -1,4 +1,4 @@
-// Photon `index` of a run of photons of one disc light, as it leaves the light.
+// A photon as it leaves a disc light of the box; how it leaves the disc is in world/room/disc.glsl.
 
 layout(set = 0, binding = 2, scalar) readonly buffer Lights { DiscLight lights[]; };
 layout(set = 1, binding = 0, scalar) readonly buffer StreamSeeds { uvec2 stream_seeds[]; };

@@ -1,4 +1,4 @@
-// Where a path leaves a convex room. Twin of src/cpu/room.rs.
+// The wall that a path meets next. Twin of src/cpu/room.rs.
 
 struct Hit {
     vec3 position;

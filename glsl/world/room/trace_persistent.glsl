@@ -12,7 +12,7 @@ layout(push_constant, scalar) uniform Push { TracePersistentPush push; };
 #include "world/room/path.glsl"
 #include "world/room/map.glsl"
 #include "material/phong_weight.glsl"
-#include "world/room/emission.glsl"
+#include "world/room/disc.glsl"
 #include "world/room/step.glsl"
 #include "world/room/emit.glsl"
 

@@ -1,4 +1,4 @@
-// Photons of a caustic map leave their light only towards the spheres that hold all mirrors and glass: projection maps
+// Photons of a caustic map leave their light only towards the spheres that hold the mirrors and glass whose caustics are wanted: projection maps
 // (Jensen 1996, section 3) with spheres for cells. A sphere is chosen in proportion to a bound of what the light sends
 // into its cone, and the photon weighs the density of the light's own law over that of all cones together (the balance
 // heuristic, Veach 1997, section 9.2), so that spheres may overlap. As no law exceeds its bound, no photon weighs

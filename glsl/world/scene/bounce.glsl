@@ -1,4 +1,4 @@
-// The bounce that a dispatch takes all paths through.
+// What a builder asks about the bounce under way: list, slots, capacity, whether another follows.
 
 uint photon_capacity()
 {

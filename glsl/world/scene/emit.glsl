@@ -1,4 +1,4 @@
-// A photon as it leaves the lights of a scene.
+// A photon as it leaves the lights of a scene (world/scene/lights.glsl), aimed where that pays (world/scene/aim.glsl).
 
 LightPath leave_light(uint photon, Draws draws, PhotonEmission emission)
 {

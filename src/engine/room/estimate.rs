@@ -1,4 +1,4 @@
-//! Density estimation: adds to the film what each point receives from a chunk's photons.
+//! Density estimates of the paper's box: adds to the film what each point receives from a chunk's photons, and ends a round.
 
 pub mod tree;
 

@@ -1,12 +1,12 @@
-//! The film: what every point has received, in integers unless the run asks otherwise, so that it does
-//! not matter in which order photons, chunks, rounds or devices add to it.
+//! The film of the paper's box: sums of every point with their standard errors, in integers unless the run asks otherwise, and the
+//! irradiance and radiosity made of them.
 
 use std::f64::consts::PI;
 use std::ops::{Deref, DerefMut};
 
+use crate::engine::error_bound::FilmError;
 use crate::engine::film::RoundSums;
 use crate::engine::unknown::{Unknown, most_hits};
-use crate::engine::watch::FilmError;
 use crate::plan::RoomPlan;
 use crate::scene::room::RoomScene;
 use crate::settings::Sums;

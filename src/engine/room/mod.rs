@@ -19,9 +19,9 @@ pub use on_gpu::{constants, on_gpu};
 pub use replay::{photons_on_cpu, photons_on_gpu, replay};
 
 use crate::engine::Control;
+use crate::engine::error_bound::FilmError;
 use crate::engine::room::film::{RoomFilm, irradiance_weights};
 use crate::engine::run::{self, Task};
-use crate::engine::watch::FilmError;
 use crate::error::Result;
 use crate::gpu::Gpu;
 use crate::ledger::{Fates, Losses};

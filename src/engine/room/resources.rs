@@ -1,4 +1,4 @@
-//! Every buffer of a run on the device, named and sized by the plan.
+//! Makes the buffers of the paper's box that `plan::buffers` lists, and uploads the room.
 
 use glam::UVec2;
 

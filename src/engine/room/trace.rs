@@ -7,7 +7,7 @@ use crate::engine::room::resources::RoomResources;
 use crate::error::Result;
 use crate::gpu::kernels::{
     EmitRoom, EndBounce, FillGaps, ScanAdd, ScanBlocks, ScanMoveRoom, TracePersistentRoom, TraceRoomAtomic, TraceRoomBallot,
-    TraceRoomGroup, TraceRoomScan, TraceRoomSlots,
+    TraceRoomGroup, TraceRoomNaive, TraceRoomScan,
 };
 use crate::gpu::{Commands, Extent, Kernel, Module};
 use crate::plan::{EmissionRange, RoomPlan, photons_of};
@@ -18,7 +18,7 @@ use crate::settings::Builder;
 /// Kernels that tracing needs.
 pub fn modules(plan: &RoomPlan) -> Vec<Module> {
     match plan.settings.builder {
-        Builder::Naive => vec![EmitRoom::MODULE, TraceRoomSlots::MODULE],
+        Builder::Naive => vec![EmitRoom::MODULE, TraceRoomNaive::MODULE],
         Builder::Atomic if plan.counters > 1 => vec![EmitRoom::MODULE, TraceRoomAtomic::MODULE, FillGaps::MODULE, EndBounce::MODULE],
         Builder::Atomic => vec![EmitRoom::MODULE, TraceRoomAtomic::MODULE, EndBounce::MODULE],
         Builder::Ballot => vec![EmitRoom::MODULE, TraceRoomBallot::MODULE, EndBounce::MODULE],
@@ -166,7 +166,7 @@ fn one_bounce(
         };
     }
     match builder {
-        Builder::Naive => trace!(TraceRoomSlots),
+        Builder::Naive => trace!(TraceRoomNaive),
         Builder::Atomic => trace!(TraceRoomAtomic),
         Builder::Ballot => trace!(TraceRoomBallot),
         Builder::Group => trace!(TraceRoomGroup),

@@ -5,10 +5,10 @@ use std::ops::Deref;
 use glam::DVec3;
 
 use crate::constants::{HIT_CAUSTIC_PHOTON, HIT_GLOBAL_PHOTON, HIT_KINDS, HIT_SHADOW_RAY};
+use crate::engine::error_bound::FilmError;
 use crate::engine::film::RoundSums;
 use crate::engine::unknown::{Unknown, most_hits};
-use crate::engine::watch::FilmError;
-use crate::plan::memory::ANOMALY_WORDS;
+use crate::plan::buffers::ANOMALY_WORDS;
 use crate::plan::radius::mean_squared_radius;
 use crate::plan::scene::{MapPlan, ScenePlan};
 

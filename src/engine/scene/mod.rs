@@ -5,11 +5,11 @@
 //! any round could run anywhere.
 //!
 //! ```text
-//! see       paths from the camera over mirrors and glass: visible points, direct light by shadow rays
-//! photons   of the global map: traced, sorted, gathered at every visible point
-//! caustics  the same with photons that took mirrors and glass only, and were aimed at these
-//! radiance  from flux over the area that lies on the surface, times reflectance
-//! resolve   all light of a pixel: to the film
+//! visible points    paths from the camera over mirrors and glass: visible points, direct light by shadow rays
+//! global            photons of the global map: traced, sorted, gathered at every visible point
+//! caustic           the same with photons that took mirrors and glass only, and were aimed at these
+//! flux to radiance  from flux over the area that lies on the surface, times reflectance
+//! resolve           all light of a pixel: to the film
 //! ```
 
 pub mod bias;

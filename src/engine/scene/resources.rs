@@ -1,4 +1,4 @@
-//! Every buffer of lighting a scene of triangles, named and sized by the plan.
+//! Makes the buffers of a scene that `plan::buffers` lists, and uploads the scene.
 
 use crate::engine::planned::Planned;
 use crate::error::Result;

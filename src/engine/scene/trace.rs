@@ -7,11 +7,11 @@ use crate::engine::prefix_sum::scan;
 use crate::error::Result;
 use crate::gpu::kernels::{
     DispatchSize, EmitScene, ScanAdd, ScanBlocks, ScanMoveScene, TracePersistentScene, TraceSceneAtomic, TraceSceneBallot, TraceSceneGroup,
-    TraceSceneScan, TraceSceneSlots,
+    TraceSceneNaive, TraceSceneScan,
 };
 use crate::gpu::{Commands, Extent, Kernel, Module};
 use crate::photon::MapPhoton;
-use crate::plan::memory::survivor_count;
+use crate::plan::buffers::survivor_count;
 use crate::plan::scene::{MapPlan, ScenePlan};
 use crate::records::{DispatchSizePush, Draws, EmissionPush, FlightPush, PhotonEmission, PhotonStore, SceneTracePersistentPush};
 use crate::rng::words;
@@ -21,7 +21,7 @@ use crate::settings::Builder;
 /// Kernels that tracing needs.
 pub fn modules(plan: &ScenePlan) -> Vec<Module> {
     let by_builder = match plan.builder() {
-        Builder::Naive => vec![EmitScene::MODULE, TraceSceneSlots::MODULE],
+        Builder::Naive => vec![EmitScene::MODULE, TraceSceneNaive::MODULE],
         Builder::Atomic => vec![EmitScene::MODULE, TraceSceneAtomic::MODULE],
         Builder::Ballot => vec![EmitScene::MODULE, TraceSceneBallot::MODULE],
         Builder::Group => vec![EmitScene::MODULE, TraceSceneGroup::MODULE],
@@ -288,7 +288,7 @@ pub fn trace_flight(
         };
     }
     match plan.builder() {
-        Builder::Naive => trace!(TraceSceneSlots { next_paths }),
+        Builder::Naive => trace!(TraceSceneNaive { next_paths }),
         Builder::Atomic => trace!(TraceSceneAtomic { next_paths }),
         Builder::Ballot => trace!(TraceSceneBallot { next_paths }),
         Builder::Group => trace!(TraceSceneGroup { next_paths }),

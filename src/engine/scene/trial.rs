@@ -3,7 +3,7 @@
 //!
 //! A radius by the scene's area is right where photons lie everywhere alike. Of a room on a plain it would be wider than the
 //! room. So a few photons are traced, with random numbers that no run has, and each of a few points is given the radius
-//! within which a round of the run will leave about two dozen. The median is taken, in steps of a fourth root of 2:
+//! within which a round of the run will leave 24 photons (6 of the caustic map). The median is taken, in steps of a fourth root of 2:
 //! an integer, so that nothing but these photons and points decides; but no more than the radius by the area. It depends on no
 //! seed, builder or split.
 

@@ -1,6 +1,6 @@
 //! How close every pass comes to the device's limits (roofline).
 //!
-//! [`rates`] measures what the device can do, [`room`] and [`scene`] time the passes of both lines beside what
+//! [`rates`] measures what the device can do, [`room`] and [`scene`] time the passes of both worlds beside what
 //! they cannot do without ([`pass`]), [`experiments`] runs the workloads that the targets name ([`targets`]), and [`scale`]
 //! follows cost and memory over photons and triangles.
 

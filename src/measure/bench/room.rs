@@ -12,7 +12,7 @@ use crate::ledger::Fates;
 use crate::path::StoredPath;
 use crate::photon::StoredPhoton;
 use crate::plan::RoomPlan;
-use crate::plan::memory::{block_sum_counts, group_count};
+use crate::plan::buffers::{block_sum_counts, group_count};
 use crate::records::Point;
 use crate::rng::Rng;
 use crate::scene::open_box::open_box;

@@ -16,7 +16,7 @@ use crate::engine::scene::{self, Round, RunResult, View, points, trace};
 use crate::error::{Error, Result};
 use crate::gpu::{Commands, Gpu};
 use crate::photon::MapPhoton;
-use crate::plan::memory::block_sum_counts;
+use crate::plan::buffers::block_sum_counts;
 use crate::plan::scene::{MapPlan, ScenePlan};
 use crate::plan::sensor::Sensor;
 use crate::records::{LightPath, VisiblePoint};

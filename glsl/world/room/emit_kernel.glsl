@@ -9,7 +9,7 @@ layout(set = 1, binding = 1, scalar) writeonly buffer NextPaths { uvec4 next_pat
 #include "dispatch/dispatch.glsl"
 #include "rng/rng.glsl"
 #include "rng/sampling.glsl"
-#include "world/room/emission.glsl"
+#include "world/room/disc.glsl"
 #include "world/room/path.glsl"
 #include "world/room/emit.glsl"
 
@@ -18,7 +18,7 @@ uint photon_count()
     return push.range.count;
 }
 
-void emit_photon(uint index)
+void write_photon(uint index)
 {
     uvec4[PATH_WORDS] words = pack_path(leave_light(index, push.range));
     for (uint k = 0; k < PATH_WORDS; k++) {

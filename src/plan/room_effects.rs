@@ -1,4 +1,4 @@
-//! Which effects a run simulates, and why: an effect that the scene cannot show costs nothing.
+//! Which effects a run of the paper's box simulates, and why: an effect that the scene cannot show costs nothing.
 
 use serde::Serialize;
 

@@ -1,5 +1,4 @@
-// The film of a picture: for each pixel and channel the sum of all passes and the sum of their squares,
-// exact integers (64 and 128 bits), so that passes add up in any order. One invocation owns a pixel.
+// Light in film units, with counts of what was clamped or was no number, and totals of each part. kernels/resolve.comp adds it up.
 
 #include "world/scene/rounding.glsl"
 

@@ -24,7 +24,7 @@ uint photon_count()
     return push.emission.photon_count;
 }
 
-void emit_photon(uint index)
+void write_photon(uint index)
 {
     next_paths[index] = leave_light(push.emission.first_photon + index, push.draws, push.emission);
 }

@@ -53,7 +53,7 @@ fn nonfinite_values() -> PlannedBuffer {
     buffer::<u32>("nonfinite values", kinds * NONFINITE_KIND_WORDS as u64, "the nonfinite values that --paranoid found")
 }
 
-/// Words that kernels count clamped values and lost camera paths in (`glsl/world/scene/film.glsl`).
+/// Words that kernels count clamped values and lost camera paths in (`glsl/world/scene/film_units.glsl`).
 pub const ANOMALY_WORDS: usize = 8;
 
 /// Sums of each level of a prefix sum over `items`: sums of blocks of the level below, down to one block.

@@ -1,5 +1,5 @@
-// One bounce of every path by the paper's naive builder (section 2.3): a photon has a slot for each bounce, stored or not, and
-// keeps its thread for every bounce.
+// The paper's naive builder (section 2.3), `--variant naive`: one bounce of every path. A photon has a slot of its own for each bounce,
+// stored or not (one slot in a caustic map), and keeps its thread for every bounce.
 
 void trace()
 {
