@@ -56,7 +56,7 @@ fn at_points() -> &'static [f64] {
 fn true_bias_in_box(gpu: Option<&Gpu>, radius: f64) -> f64 {
     let settings = RoomSettings { rounds: 48, ..in_box(radius, 8191, 4711) };
     let scene = open_box(&settings);
-    let mut control = Control { cancelled: &NEVER, progress: &mut |_| {} };
+    let mut control = Control::default();
     let outcome = match gpu {
         Some(gpu) => room::on_gpu(gpu, &scene, &settings, &mut control).unwrap(),
         None => room::on_cpu(&scene, &settings, &mut control).unwrap(),
@@ -230,7 +230,7 @@ fn the_bias_of_a_shrinking_radius_lies_in_the_scaled_interval() {
         let seed = bias::seed(long.plan.settings.seed, number);
         let settings = SceneSettings { rounds: ROUNDS, alpha, seed, ..long.plan.settings.clone() };
         let plan = ScenePlan::new(&long.scene, &long.geometry, &settings, long.plan.sensor, &engine::limits(gpu.facts()))?;
-        let lit = scene::light(&gpu, &long.view(), plan, &mut Control { cancelled: &NEVER, progress: &mut |_| {} })?;
+        let lit = scene::light(&gpu, &long.view(), plan, &mut Control::default())?;
         Ok(Some((0..lit.film.pixels()).flat_map(|pixel| lit.film.mean(pixel, &lit.plan).to_array()).collect()))
     };
     let truth = bias::difference(CONFIDENCE, 0.2, batch).unwrap().unwrap()[1];
@@ -268,7 +268,7 @@ struct RunResult {
 impl RunResult {
     /// `radius` as a share of the scene's extent.
     fn new(scene: Scene, illumination: Illumination, radius: f64, photons: u32, seed: u64, gpu: &Gpu) -> RunResult {
-        let camera = scene.cameras.first().cloned().unwrap_or_else(|| Camera::around(scene.bounds().0, scene.bounds().1));
+        let camera = scene.first_camera();
         let geometry = Geometry::new(&scene).unwrap();
         let (min, max) = scene.bounds();
         let radius = Some(radius * (max - min).max_element());

@@ -2,7 +2,6 @@
 //! split into dispatches, the run or the device's abilities, and hold exactly what lies in reach. Sums
 //! of floats are held against them.
 
-use std::sync::atomic::AtomicBool;
 use std::time::Instant;
 
 use crate::common::{
@@ -632,8 +631,7 @@ fn pairs_are_refused_without_64_bit_atomics() {
     let Some(lesser) = device_with(Options { without_int64_atomics: true, ..Options::default() }) else { return };
     // An even number, so that both lights' photons are of the same flux and the sums whole.
     let settings = RoomSettings { photons: 1000, mesh: 8, ..RoomSettings::default() };
-    let never = AtomicBool::new(false);
-    let mut control = Control { cancelled: &never, progress: &mut |_| {} };
+    let mut control = Control::default();
     let pairs = RoomSettings { sums: Sums::Compensated, ..settings.clone() };
     let error = room::on_gpu(&lesser, &open_box(&pairs), &pairs, &mut control).unwrap_err();
     let line = error.to_string();

@@ -1,6 +1,5 @@
 //! A million triangles: written as a file, loaded, rendered. Large, so it waits for `--ignored`.
 
-use std::sync::atomic::AtomicBool;
 use std::time::Instant;
 
 use crate::common::device;
@@ -54,9 +53,8 @@ fn a_million_triangles_load_and_render() {
     let settings = SceneSettings { photons: 100_000, caustic_photons: 100_000, rounds: 4, ..SceneSettings::default() };
     let sensor = Sensor::Picture { width: 256, height: 256 };
     let plan = ScenePlan::new(&loaded, &geometry, &settings, sensor, &engine::limits(gpu.facts())).unwrap();
-    let never = AtomicBool::new(false);
     let view = View { geometry: &geometry, camera: loaded.cameras.first(), phases: &[] };
-    let lit = scene::light(&gpu, &view, plan, &mut Control { cancelled: &never, progress: &mut |_| {} }).unwrap();
+    let lit = scene::light(&gpu, &view, plan, &mut Control::default()).unwrap();
     let row = |name: &str| lit.timings.row(name).and_then(|row| row.gpu_ms).unwrap_or_default();
     println!("read {read:?}, hierarchy {built:?}, GPU ms: 4 rounds {:.1}, photons {:.1}", row("round"), row("round/global/trace"));
     assert_eq!(lit.film.anomalies[..2], [0, 0]);

@@ -182,7 +182,7 @@ fn radii_take_no_sum_over_earlier_rounds() {
 
 fn run(gpu: &Gpu, scene: &Scene, settings: &SceneSettings, cancelled: &AtomicBool) -> Result<RunResult, Error> {
     let geometry = Geometry::new(scene)?;
-    let camera = scene.cameras.first().cloned().unwrap_or_else(|| Camera::around(scene.bounds().0, scene.bounds().1));
+    let camera = scene.first_camera();
     let sensor = Sensor::Picture { width: 64, height: 64 };
     let plan = ScenePlan::new(scene, &geometry, settings, sensor, &engine::limits(gpu.facts()))?;
     let view = View { geometry: &geometry, camera: Some(&camera), phases: &[] };

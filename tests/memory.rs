@@ -83,8 +83,7 @@ fn scenes_take_what_their_plan_says() {
         let plan = ScenePlan::new(&scene, &geometry, &settings, Sensor::Receivers { count: 9 }, &limits).unwrap();
         let stated = plan.bytes_of(2);
         let view = View { geometry: &geometry, camera: None, phases: &receivers };
-        let never = std::sync::atomic::AtomicBool::new(false);
-        let mut control = engine::Control { cancelled: &never, progress: &mut |_| {} };
+        let mut control = engine::Control::default();
         let (bytes, _) = taken(&gpu, || engine::scene::light(&gpu, &view, plan, &mut control).unwrap());
         crate::common::assert_holds(name, check("two sets of receivers", bytes, stated, &[]));
     }

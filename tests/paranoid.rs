@@ -2,7 +2,6 @@
 //! its photon named; and that photon takes the same path alone as among all others.
 
 use std::collections::BTreeSet;
-use std::sync::atomic::AtomicBool;
 
 use crate::common::{Check, Complaint, assert_holds, device, in_order, nothing_odd, outcome_of, photons, photons_on_cpu, run_on_cpu};
 use glam::Vec3;
@@ -19,7 +18,7 @@ use photonmill::plan::scene::ScenePlan;
 use photonmill::plan::sensor::Sensor;
 use photonmill::scene::geometry::Geometry;
 use photonmill::scene::open_box::open_box;
-use photonmill::scene::{Camera, Scene, built_in};
+use photonmill::scene::{Scene, built_in};
 use photonmill::settings::scene::{Illumination, SceneSettings};
 use photonmill::settings::{Builder, Preset, RoomSettings};
 
@@ -34,11 +33,10 @@ fn plan_of(gpu: &Gpu, scene: &Scene, geometry: &Geometry, settings: &SceneSettin
 }
 
 fn light(gpu: &Gpu, scene: &Scene, geometry: &Geometry, settings: &SceneSettings) -> RunResult {
-    let camera = scene.cameras.first().cloned().unwrap_or_else(|| Camera::around(scene.bounds().0, scene.bounds().1));
+    let camera = scene.first_camera();
     let view = View { geometry, camera: Some(&camera), phases: &[] };
-    let never = AtomicBool::new(false);
     let plan = plan_of(gpu, scene, geometry, settings);
-    scene::light(gpu, &view, plan, &mut Control { cancelled: &never, progress: &mut |_| {} }).unwrap()
+    scene::light(gpu, &view, plan, &mut Control::default()).unwrap()
 }
 
 /// No value of a scene with mirrors and glass is infinite or no number, by either way of lighting it.

@@ -19,7 +19,6 @@ use photonmill::plan::sensor::Sensor;
 use photonmill::rng::Rng;
 use photonmill::scene::geometry::Geometry;
 use photonmill::scene::open_box::open_box;
-use photonmill::scene::{Camera, Scene};
 use photonmill::settings::scene::SceneSettings;
 use photonmill::settings::stop::Stop;
 use photonmill::settings::{Math, RoomSettings};
@@ -40,10 +39,6 @@ const SCENES: [&str; 10] = [
     "disc-over-plane",
     "mirror-corridor",
 ];
-
-fn camera_of(scene: &Scene) -> Camera {
-    scene.cameras.first().cloned().unwrap_or_else(|| Camera::around(scene.bounds().0, scene.bounds().1))
-}
 
 /// A fixed radius: the error in question is noise.
 fn settings(error: f64, seed: u64) -> SceneSettings {
@@ -88,7 +83,7 @@ fn claims_hold(seeds: u64) {
     let Some(gpu) = device() else { return };
     for name in SCENES {
         let scene = scene(name);
-        let camera = camera_of(&scene);
+        let camera = scene.first_camera();
         // Of aimed photons so little noise is left there that the lamp's image in the glass is nearly all of it, and of what
         // one path in thousands meets, runs as short as these know no error: README says how often they claim too little.
         let settings = |error, seed| SceneSettings { aim: name != "caustic-sphere", ..settings(error, seed) };
@@ -239,7 +234,8 @@ fn watched(gpu: &Gpu, name: &str, settings: &SceneSettings) -> (scene::RunResult
     let (never, mut told) = (AtomicBool::new(false), Vec::new());
     let mut tell = |progress: &Progress| told.push(progress.clone());
     let mut control = Control { cancelled: &never, progress: &mut tell };
-    let lit = scene::light(gpu, &View { geometry: &geometry, camera: Some(&camera_of(&scene)), phases: &[] }, plan, &mut control).unwrap();
+    let lit =
+        scene::light(gpu, &View { geometry: &geometry, camera: Some(&scene.first_camera()), phases: &[] }, plan, &mut control).unwrap();
     (lit, told)
 }
 

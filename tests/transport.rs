@@ -32,13 +32,9 @@ fn plan_of(gpu: &Gpu, scene: &Scene, settings: &SceneSettings, sensor: Sensor) -
     (geometry, plan)
 }
 
-fn camera_of(scene: &Scene) -> Camera {
-    scene.cameras.first().cloned().unwrap_or_else(|| Camera::around(scene.bounds().0, scene.bounds().1))
-}
-
 pub fn picture(gpu: &Gpu, scene: &Scene, settings: &SceneSettings) -> RunResult {
     let (geometry, plan) = plan_of(gpu, scene, settings, Sensor::Picture { width: SIZE, height: SIZE });
-    light(gpu, &View { geometry: &geometry, camera: Some(&camera_of(scene)), phases: &[] }, plan)
+    light(gpu, &View { geometry: &geometry, camera: Some(&scene.first_camera()), phases: &[] }, plan)
 }
 
 /// Mean and standard error of the irradiance at points, W/m2.
@@ -54,7 +50,7 @@ fn same_film(what: &str, found: &RunResult, expected: &RunResult) -> Check<Compl
 
 /// Lists of survivors in any order give the same picture. What a list without a survivor shows may be odd in any way.
 pub fn appends_agree(gpu: &Gpu, scene: &Scene, settings: &SceneSettings) -> Check<Complaint> {
-    let camera = camera_of(scene);
+    let camera = scene.first_camera();
     let of = |builder| {
         let settings = SceneSettings { builder: Some(builder), ..settings.clone() };
         let (geometry, plan) = plan_of(gpu, scene, &settings, Sensor::Picture { width: SIZE, height: SIZE });
@@ -114,7 +110,7 @@ fn every_pixel_is_lit_whatever_the_size_of_the_picture() {
     let scene = scene("furnace");
     for (width, height) in [(1, 1), (3, 2), (8, 4), (13, 7), (21, 9)] {
         let (geometry, plan) = plan_of(&gpu, &scene, &small(), Sensor::Picture { width, height });
-        let camera = camera_of(&scene);
+        let camera = scene.first_camera();
         let lit = light(&gpu, &View { geometry: &geometry, camera: Some(&camera), phases: &[] }, plan);
         let pixels: Vec<u64> = lit.film.sums.chunks(3).map(|sums| sums[0]).collect();
         let mean = pixels.iter().sum::<u64>() as f64 / pixels.len() as f64;
@@ -136,7 +132,7 @@ fn every_pixel_of_walls_that_shine_is_the_same() {
     }
     for (width, height) in [(1, 1), (13, 7), (64, 64), (67, 9), (5, 67), (131, 70)] {
         let (geometry, plan) = plan_of(&gpu, &room, &small(), Sensor::Picture { width, height });
-        let camera = camera_of(&room);
+        let camera = room.first_camera();
         let sums = light(&gpu, &View { geometry: &geometry, camera: Some(&camera), phases: &[] }, plan).film.of_rounds.sums;
         assert_eq!(sums.len() as u32, 3 * width * height);
         assert!(sums[0] > 0 && sums.iter().all(|sum| *sum == sums[0]), "{width} x {height}");
@@ -512,7 +508,7 @@ fn pictures_agree_with_the_judge() {
         let scene = scene(name);
         let settings = SceneSettings { photons, caustic_photons: photons, rounds, ..SceneSettings::default() };
         let lit = picture(&gpu, &scene, &settings);
-        let judged = Judge::new(&scene, settings.bounces).image(&camera_of(&scene), SIZE, SIZE, samples, 77);
+        let judged = Judge::new(&scene, settings.bounces).image(&scene.first_camera(), SIZE, SIZE, samples, 77);
         let means: Vec<DVec3> = (0..lit.film.pixels()).map(|pixel| lit.film.mean(pixel, &lit.plan)).collect();
         let errors: Vec<DVec3> = (0..lit.film.pixels()).map(|pixel| lit.film.standard_error(pixel, &lit.plan)).collect();
         let verdict = Verdict::new(&means, &errors, rounds, &judged, None);

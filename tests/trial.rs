@@ -16,8 +16,8 @@ use photonmill::plan::radius::{RadiusFrom, area_radius};
 use photonmill::plan::scene::ScenePlan;
 use photonmill::plan::sensor::Sensor;
 use photonmill::records::Receiver;
+use photonmill::scene::Scene;
 use photonmill::scene::geometry::Geometry;
-use photonmill::scene::{Camera, Scene};
 use photonmill::settings::Builder;
 use photonmill::settings::scene::{Part, SceneSettings};
 use photonmill::verify::judge::Judge;
@@ -78,7 +78,7 @@ fn a_room_on_a_plain_is_lit_as_it_is_without_the_plain() {
 
 /// The plan of a picture, by a trial round.
 fn tried(gpu: &Gpu, scene: &Scene, geometry: &Geometry, settings: &SceneSettings) -> ScenePlan {
-    let camera = scene.cameras.first().cloned().unwrap_or_else(|| Camera::around(scene.bounds().0, scene.bounds().1));
+    let camera = scene.first_camera();
     let view = View { geometry, camera: Some(&camera), phases: &[] };
     trial::plan(gpu, scene, &view, settings, Sensor::Picture { width: 64, height: 48 }).unwrap()
 }

@@ -2,7 +2,7 @@
 
 use photonmill::engine::scene::RunResult;
 use photonmill::gpu::Gpu;
-use photonmill::scene::{Camera, Scene, built_in};
+use photonmill::scene::{Scene, built_in};
 use photonmill::settings::scene::{Illumination, Kernel, SceneSettings};
 use photonmill::settings::{Builder, Math, RoomSettings};
 
@@ -14,7 +14,7 @@ pub fn small() -> SceneSettings {
 }
 
 pub fn picture(gpu: &Gpu, scene: &Scene, settings: &SceneSettings) -> RunResult {
-    let camera = scene.cameras.first().cloned().unwrap_or_else(|| Camera::around(scene.bounds().0, scene.bounds().1));
+    let camera = scene.first_camera();
     seen(gpu, scene, settings, &camera, [24, 24])
 }
 

@@ -1,16 +1,13 @@
 //! Scenes of triangles, lit to the end: irradiance at points, radiance along a ray.
 
-use std::sync::atomic::AtomicBool;
-
 use glam::{DVec3, Vec3};
 use photonmill::engine;
 use photonmill::engine::Control;
-use photonmill::engine::scene::{self, RunResult, View};
+use photonmill::engine::scene::{self, RunResult, Target, View};
 use photonmill::gpu::Gpu;
 use photonmill::plan::Limits;
 use photonmill::plan::scene::ScenePlan;
 use photonmill::plan::sensor::Sensor;
-use photonmill::records::Receiver;
 use photonmill::scene::geometry::Geometry;
 use photonmill::scene::light::LightKind;
 use photonmill::scene::{Camera, Light, Material, Mesh, Scene, Surface, built_in};
@@ -26,8 +23,7 @@ pub const BOTH: [Illumination; 2] = [Illumination::Split, Illumination::Photons]
 
 /// Runs to the end, whatever comes out.
 pub fn run(gpu: &Gpu, view: &View, plan: ScenePlan) -> RunResult {
-    let never = AtomicBool::new(false);
-    scene::light(gpu, view, plan, &mut Control { cancelled: &never, progress: &mut |_| {} }).unwrap()
+    scene::light(gpu, view, plan, &mut Control::default()).unwrap()
 }
 
 /// Runs to the end, with nothing odd.
@@ -62,15 +58,9 @@ fn received_in(
     points: &[(DVec3, DVec3)],
     limits: &Limits,
 ) -> RunResult {
-    let receiver = |(position, normal): &(DVec3, DVec3)| Receiver {
-        position: geometry.to_local(*position),
-        normal: normal.as_vec3(),
-        shading_normal: normal.as_vec3(),
-    };
-    let receivers = points.iter().map(receiver).collect();
-    let sensor = Sensor::Receivers { count: points.len() as u32 };
-    let plan = ScenePlan::new(scene, geometry, &watched(settings), sensor, limits).unwrap();
-    light(gpu, &View { geometry, camera: None, phases: &[receivers] }, plan)
+    let target = Target::Points(points);
+    let plan = ScenePlan::new(scene, geometry, &watched(settings), target.sensor(), limits).unwrap();
+    light(gpu, &View { geometry, camera: None, phases: &target.phases(geometry) }, plan)
 }
 
 /// Fails unless every builder comes to the same fates and sums in a short run: what one of them shows of these settings then

@@ -20,7 +20,6 @@ use std::cmp::Ordering;
 use std::fmt::Display;
 use std::ops::Deref;
 use std::sync::Mutex;
-use std::sync::atomic::AtomicBool;
 
 use glam::UVec2;
 use photonmill::engine;
@@ -105,16 +104,14 @@ pub fn run(gpu: &Gpu, settings: &RoomSettings) -> RunResult {
 
 /// Runs a scene on a device to its end.
 pub fn run_scene(gpu: &Gpu, scene: &RoomScene, settings: &RoomSettings) -> RunResult {
-    let never = AtomicBool::new(false);
-    let mut control = Control { cancelled: &never, progress: &mut |_| {} };
+    let mut control = Control::default();
     let settings = &RoomSettings { paranoid: true, ..settings.clone() };
     sound(room::on_gpu(gpu, scene, settings, &mut control).unwrap_or_else(|error| panic!("{error}\n{settings:?}")))
 }
 
 /// What a run comes to, where it may fail: with `paranoid` no value may be infinite or no number.
 pub fn outcome_of(gpu: &Gpu, scene: &RoomScene, settings: &RoomSettings) -> Result<RunResult, Complaint> {
-    let never = AtomicBool::new(false);
-    let outcome = room::on_gpu(gpu, scene, settings, &mut Control { cancelled: &never, progress: &mut |_| {} })?;
+    let outcome = room::on_gpu(gpu, scene, settings, &mut Control::default())?;
     outcome.nonfinite_values.as_ref().map_or(Ok(()), nothing_odd)?;
     Ok(outcome)
 }
@@ -136,8 +133,7 @@ pub fn run_on_cpu(settings: &RoomSettings) -> RunResult {
 
 /// Runs a scene on the CPU builder to its end.
 pub fn run_scene_on_cpu(scene: &RoomScene, settings: &RoomSettings) -> RunResult {
-    let never = AtomicBool::new(false);
-    let mut control = Control { cancelled: &never, progress: &mut |_| {} };
+    let mut control = Control::default();
     let settings = &RoomSettings { paranoid: true, ..settings.clone() };
     sound(room::on_cpu(scene, settings, &mut control).unwrap_or_else(|error| panic!("{error}\n{settings:?}")))
 }
