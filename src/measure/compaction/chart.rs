@@ -43,9 +43,11 @@ pub fn draw(map: &Map) -> String {
                 let corners = [(left + 1, top + 1), (left + FIELD.0 - 1, top + FIELD.1 - 1)];
                 area.draw(&Rectangle::new(corners, colour(winner).filled()))?;
                 let level: Vec<&str> = cell.winners().skip(1).map(Builder::name).collect();
-                let lines = [(TEXT - 2, winner.name().to_owned()), (TEXT - 3, times(cell.gain())), (TEXT - 7, level.join(" "))];
-                for (line, (size, words)) in lines.into_iter().enumerate() {
-                    area.draw(&Text::new(words, (middle, top + 14 + 19 * line as i32), text(size, HPos::Center, &BLACK)))?;
+                let mut lines = vec![(TEXT - 2, 13, winner.name().to_owned()), (TEXT - 3, 30, times(cell.gain()))];
+                // As many names as a cell is wide.
+                lines.extend(level.chunks(2).zip([43, 52, 60]).map(|(names, y)| (TEXT - 7, y, names.join(" "))));
+                for (size, y, words) in lines {
+                    area.draw(&Text::new(words, (middle, top + y), text(size, HPos::Center, &BLACK)))?;
                 }
             }
         }
