@@ -14,7 +14,6 @@ const LINE: &[&[&str]] = &[
     &["cpu", "gpu"],
     &[
         "engine",
-        "engine::error_bound",
         "engine::film",
         "engine::planned",
         "engine::prefix_sum",
@@ -23,6 +22,7 @@ const LINE: &[&[&str]] = &[
         "engine::unknown",
         "engine::nonfinite_values",
     ],
+    &["engine::error_bound"],
     &["engine::watch", "engine::replay"],
     &["engine::bias"],
     &["engine::run"],

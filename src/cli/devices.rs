@@ -5,7 +5,7 @@ use clap::Args;
 use super::{JsonOrStdoutArg, optional_file, say};
 use crate::constants::LOOP_LIMIT;
 use crate::error::{Error, INSTALL_VULKAN, Result};
-use crate::gpu::{DeviceFacts, Gpu, Options, check};
+use crate::gpu::{DeviceFacts, Gpu, Options, Reconvergence, check};
 use crate::output::destination::write_all;
 
 #[derive(Args)]
@@ -50,6 +50,15 @@ fn description(facts: &DeviceFacts) -> String {
         },
     );
     line("64-bit atomics", if facts.int64_atomics { "yes" } else { "no, photonmill uses two 32-bit words" }.to_owned());
+    line(
+        "lanes reconverge",
+        match facts.reconvergence {
+            Reconvergence::Maximal => "as the source reads (maximal reconvergence)",
+            Reconvergence::UniformControlFlow => "where all went in together (subgroup uniform control flow)",
+            Reconvergence::None => "without a promise",
+        }
+        .to_owned(),
+    );
     line("start-up check", verdict(facts));
     text
 }
@@ -58,9 +67,10 @@ fn description(facts: &DeviceFacts) -> String {
 fn verdict(facts: &DeviceFacts) -> String {
     const WANTED: u32 = 100_000;
     let opened = Gpu::open(&Options { device: Some(facts.index.to_string()), ..Options::default() });
-    match opened.and_then(|gpu| check::loop_count(&gpu, WANTED)) {
-        Ok(count) if count.done == WANTED => "passed".to_owned(),
-        Ok(count) => format!("passed; loops end after {} iterations (photonmill needs at most {LOOP_LIMIT})", count.done),
+    match opened.and_then(|gpu| Ok((check::loop_count(&gpu, WANTED)?, gpu.facts().votes_in_loops))) {
+        Ok((_, false)) => "passed, but lanes do not vote right in loops: no --variant persistent".to_owned(),
+        Ok((count, true)) if count.done == WANTED => "passed".to_owned(),
+        Ok((count, true)) => format!("passed; loops end after {} iterations (photonmill needs at most {LOOP_LIMIT})", count.done),
         Err(error) => error.to_string(),
     }
 }

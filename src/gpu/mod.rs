@@ -22,7 +22,7 @@ use gpu_allocator::vulkan::{Allocator, AllocatorCreateDesc};
 
 pub use buffer::{AnyBuffer, Buffer, HeldMemory, Memory};
 pub use commands::{Commands, Extent, Interrupt};
-pub use device::DeviceFacts;
+pub use device::{DeviceFacts, Reconvergence};
 pub use kernel::{Constants, Kernel, Module};
 
 use crate::error::{Error, Result};
