@@ -1,5 +1,5 @@
-// One bounce of every path. Photons that are stored and paths that go on each take the next place, without gaps. An invocation takes
-// `PLACES` paths through it: a device adds only so often a second to one counter, and more of them share an addition.
+// One bounce of every path. Photons that are stored and paths that go on each take the next place, so that there are no gaps but
+// those of several counters (builder/striped_counters.glsl). An invocation takes `PLACES` paths through it: a device adds only so often a second to one counter, and more of them share an addition.
 // builder/atomic.glsl, builder/ballot.glsl and builder/group.glsl each define
 //
 //   uint[PLACES] take_places(uint counter, bool[PLACES] wanted)

@@ -1,9 +1,9 @@
 // Photons from their light to their end, each in the registers of one invocation: within a dispatch no array of paths is read or
-// written. An invocation whose photon has ended takes its next one in the same step in which its
-// neighbours go on (persistent threads, Aila and Laine 2009), so that a subgroup stays full.
+// written. An invocation whose photon has ended takes its next one in the same step in which its neighbours go on (persistent
+// threads, Aila and Laine 2009), so that a subgroup stays full.
 //
-// The lanes of a subgroup vote in a loop that they come to on different ways, so they must be together again at each vote: that
-// is asked of the device where it offers it (src/gpu/reconvergence.rs), and the start-up check runs this very loop (check/start_up.glsl).
+// The lanes of a subgroup vote in a loop in which they go different ways, so they must be together again at each vote. That is
+// asked of the device where it offers it (src/gpu/reconvergence.rs), and the start-up check runs this very loop (check/start_up.glsl).
 
 #include "builder/place.glsl"
 

@@ -9,13 +9,11 @@ struct LightPath {
     uint photon;
 };
 
-struct Step {
-    bool escaped;
-    bool absorbed;
-    bool stored;
-    bool alive;
-    uint photon;
+struct Photon {
+    uint entry;
 };
+
+#include "world/step.glsl"
 
 uint hash_of(uint number)
 {
@@ -24,7 +22,7 @@ uint hash_of(uint number)
 
 Step no_step()
 {
-    return Step(false, false, false, false, 0);
+    return Step(false, false, false, false, Photon(0));
 }
 
 Step step_path(inout LightPath path, uint bounce)
@@ -35,12 +33,12 @@ Step step_path(inout LightPath path, uint bounce)
         hash = hash_of(hash);
     }
     bool alive = bounce < hash_of(path.photon) % 11u;
-    return Step(!alive && hash == 0xffffffffu, !alive && hash != 0xffffffffu, bounce % 2u == 0, alive, 16u * path.photon + bounce);
+    return Step(!alive && hash == 0xffffffffu, !alive && hash != 0xffffffffu, bounce % 2u == 0, alive, Photon(16u * path.photon + bounce));
 }
 
-void store_photon(uint place, uint photon)
+void store_photon(uint place, Photon photon)
 {
-    entries[place] = photon;
+    entries[place] = photon.entry;
 }
 
 uint photon_capacity()

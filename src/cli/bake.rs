@@ -5,9 +5,9 @@ use std::sync::atomic::AtomicBool;
 
 use clap::Args;
 
-use super::parse::parse_number;
 use super::progress::ProgressReporter;
 use super::transport::{Job, MessageArgs, ReportArgs, SceneArgs, TimedDeviceArgs, TransportArgs, geometry, light, plan};
+use super::values::parse_number;
 use super::{End, complain, say_beside};
 use crate::bake::{self, Layout, PHASE_COUNT, TexelEstimate};
 use crate::engine::scene::RunResult;

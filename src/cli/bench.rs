@@ -6,8 +6,8 @@ use std::time::Duration;
 
 use clap::{Args, ValueEnum};
 
-use super::parse::parse_seconds;
 use super::progress::{ProgressArgs, ProgressReporter};
+use super::values::parse_seconds;
 use super::{DeviceArgs, End, JsonArg, optional_file, say_beside};
 use crate::error::{Error, Result};
 use crate::gpu::Gpu;

@@ -6,7 +6,6 @@ mod devices;
 mod help;
 mod interrupt;
 mod paper;
-mod parse;
 mod picture_size;
 mod plan;
 mod probe;
@@ -18,6 +17,7 @@ mod stop;
 mod study;
 mod transport;
 mod usage;
+mod values;
 
 use std::ffi::OsString;
 use std::io::{ErrorKind, Write};

@@ -5,8 +5,8 @@ use std::sync::atomic::AtomicBool;
 
 use clap::Args;
 
-use super::parse::{parse_integer, parse_seconds, parse_threads};
 use super::progress::{ProgressArgs, ProgressReporter};
+use super::values::{parse_integer, parse_seconds, parse_threads};
 use super::{DeviceArgs, End, complain, say};
 use crate::error::{Error, Result};
 use crate::measure::paper::bench::Bench;

@@ -6,12 +6,12 @@ use std::sync::atomic::AtomicBool;
 use clap::Args;
 use glam::DVec3;
 
-use super::parse::{parse_integer, parse_number, parse_photon_name};
 use super::picture_size::{PictureSize, parse_size};
 use super::progress::ProgressReporter;
 use super::transport::{
     FilterArg, Job, MessageArgs, PartArg, ReportArgs, SceneArgs, TimedDeviceArgs, TransportArgs, camera, geometry, light, plan,
 };
+use super::values::{parse_integer, parse_number, parse_photon_name};
 use super::{End, optional_file, say, say_beside};
 use crate::engine;
 use crate::engine::replay::PhotonName;

@@ -6,9 +6,12 @@ use std::time::Instant;
 
 use clap::{Args, ValueEnum};
 
-use super::parse::{parse_integer, parse_number, parse_numbers, parse_photon_name, parse_shininess, parse_threads, parse_within};
 use super::progress::{ProgressArgs, ProgressReporter};
 use super::stop::{StopArgs, bias_before, goals, rounds_after};
+use super::values::{
+    MathArg, SwitchArg, parse_integer, parse_number, parse_numbers, parse_photon_name, parse_shininess, parse_threads, parse_within,
+    value_enum,
+};
 use super::{DeviceArgs, End, JsonArg, TimingArgs, complain, optional_file, say, say_beside};
 use crate::engine;
 use crate::engine::Control;
@@ -157,22 +160,6 @@ pub(super) struct RunArgs {
     timing: TimingArgs,
 }
 
-/// An enum of the settings as clap values.
-macro_rules! value_enum {
-    ($argument:ident => $setting:ident { $($(#[$doc:meta])* $variant:ident),* $(,)? }) => {
-        #[derive(Clone, Copy, ValueEnum)]
-        pub(super) enum $argument { $($(#[$doc])* $variant),* }
-
-        impl From<$argument> for $setting {
-            fn from(argument: $argument) -> $setting {
-                match argument { $($argument::$variant => $setting::$variant),* }
-            }
-        }
-    };
-}
-
-pub(super) use value_enum;
-
 value_enum!(PresetArg => Preset {
     /// Figure 1: the naive implementation, 2 bounces
     Naive,
@@ -209,12 +196,6 @@ value_enum!(SumsArg => Sums {
     F32,
     /// Pairs of 32-bit floats (compensated summation)
     Compensated,
-});
-value_enum!(MathArg => Math {
-    /// As fast as the device can
-    Fast,
-    /// The same bits on every device that rounds to nearest
-    Strict,
 });
 value_enum!(EmissionArg => EmissionLaw { Uniform, Cosine });
 value_enum!(PhongDirectionArg => PhongDirection { Mirror, Sampled });
@@ -253,12 +234,6 @@ impl BuilderArg {
             BuilderArg::Auto => return None,
         })
     }
-}
-
-#[derive(Clone, Copy, PartialEq, Eq, ValueEnum)]
-pub(super) enum SwitchArg {
-    On,
-    Off,
 }
 
 impl RunArgs {

@@ -2,8 +2,8 @@
 
 use clap::Args;
 
-use super::parse::{parse_percent, parse_seconds, parse_within};
 use super::progress::ProgressReporter;
+use super::values::{parse_percent, parse_seconds, parse_within};
 use crate::engine::bias::Bias;
 use crate::error::{Error, Result};
 use crate::settings::stop::Stop;

@@ -6,8 +6,8 @@ use std::time::Duration;
 
 use clap::Args;
 
-use super::parse::{parse_integer, parse_seconds, parse_within};
 use super::progress::{ProgressArgs, ProgressReporter};
+use super::values::{parse_integer, parse_seconds, parse_within};
 use super::{DeviceArgs, End, complain, help, say};
 use crate::error::{Error, Result};
 use crate::gpu::Gpu;

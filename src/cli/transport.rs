@@ -6,10 +6,9 @@ use std::sync::atomic::AtomicBool;
 use clap::{Args, ValueEnum};
 
 use super::interrupt::interruptible;
-use super::parse::{parse_colour, parse_integer, parse_number, parse_within};
 use super::progress::{ProgressArgs, ProgressReporter};
-use super::run::{MathArg, SwitchArg, value_enum};
 use super::stop::{StopArgs, bias_before, goals, rounds_after};
+use super::values::{MathArg, SwitchArg, parse_colour, parse_integer, parse_number, parse_within, value_enum};
 use super::{DeviceArgs, JsonArg, TimingArgs, complain, help, optional_file};
 use crate::engine::Control;
 use crate::engine::Progress;

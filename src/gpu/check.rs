@@ -19,7 +19,7 @@ pub struct LoopCount {
     pub done: u32,
 }
 
-/// Fails unless the device counts, votes and adds right. Says whether lanes vote right in a loop that they come to on different
+/// Fails unless the device counts, votes and adds right. Says whether lanes vote right in a loop in which they go different
 /// ways: no version of Vulkan promises that, and only the persistent builder needs it.
 pub(super) fn run(gpu: &Gpu) -> Result<bool> {
     let wrong = |what: String| Error::DeviceWrong { device: gpu.facts.name.clone(), what };

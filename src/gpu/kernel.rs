@@ -42,7 +42,7 @@ pub struct Module {
     pub scene_bindings: u32,
     /// Bindings of set 1: its own.
     pub bindings: &'static [Binding],
-    /// Its lanes vote in a loop that they come to on different ways.
+    /// Its lanes vote in a loop in which they go different ways.
     pub votes_in_loops: bool,
     /// Specialization constants: name and id. Id 0 is the work-group size, which has no name.
     pub constants: &'static [(&'static str, u32)],

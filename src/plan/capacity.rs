@@ -30,7 +30,7 @@ pub struct Limits {
     pub lanes: u32,
     /// Counters that serve more work groups than one does.
     pub counters: u32,
-    /// Lanes vote right in a loop that they come to on different ways, as those of the persistent builder do.
+    /// Lanes vote right in a loop in which they go different ways, as those of the persistent builder do.
     pub votes_in_loops: bool,
 }
 

@@ -299,9 +299,7 @@ impl RoomSettings {
             return Err(Error::setting("--eye", format!("{x},{y},{z}"), format!("must be three numbers from -{MAX_EYE:e} to {MAX_EYE:e}")));
         }
         within("--threads", self.threads as u64, 1..=1024, "threads")?;
-        if !(self.group_size.is_power_of_two() && (32..=1024).contains(&self.group_size)) {
-            return Err(Error::setting("--group-size", self.group_size, "must be a power of two from 32 to 1024"));
-        }
+        check_group_size(self.group_size)?;
         if let Some(counters) = self.counters.filter(|counters| !counters.is_power_of_two() || *counters > MAX_COUNTERS) {
             return Err(Error::setting("--counters", counters, format!("must be a power of two up to {MAX_COUNTERS}")));
         }
@@ -441,6 +439,13 @@ pub const MAX_EVENTS: u64 = 1 << 47;
 /// Rounds * nearest photons that a film sum can hold, each scaled up by 2^`NEAREST_GAIN_BITS`, with 10 bits after
 /// the binary point.
 pub const MAX_NEAREST_SUMMED: u64 = 1 << 31;
+
+fn check_group_size(group_size: u32) -> Result<()> {
+    if group_size.is_power_of_two() && (32..=1024).contains(&group_size) {
+        return Ok(());
+    }
+    Err(Error::setting("--group-size", group_size, "must be a power of two from 32 to 1024"))
+}
 
 fn within<T>(option: &'static str, value: T, allowed: std::ops::RangeInclusive<T>, what: &str) -> Result<()>
 where

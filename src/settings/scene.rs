@@ -3,7 +3,7 @@
 use serde::Serialize;
 
 pub use super::stop::Stop;
-use super::{Builder, Math, within};
+use super::{Builder, Math, check_group_size, within};
 use crate::constants;
 use crate::constants::MAX_BOUNCES;
 use crate::error::{Error, Result};
@@ -278,9 +278,7 @@ impl SceneSettings {
             return Err(Error::setting("--alpha", self.alpha, "must be above 0 and at most 1 (1 keeps the radius fixed)"));
         }
         self.stop.validate()?;
-        if !(self.group_size.is_power_of_two() && (32..=1024).contains(&self.group_size)) {
-            return Err(Error::setting("--group-size", self.group_size, "must be a power of two from 32 to 1024"));
-        }
+        check_group_size(self.group_size)?;
         if let Some(chunk) = self.chunk {
             within("--chunk", chunk, 1..=MAX_PHOTONS, "photons traced at once")?;
         }

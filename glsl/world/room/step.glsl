@@ -3,14 +3,7 @@
 layout(set = 0, binding = 0, scalar) readonly buffer Rooms { Room rooms[]; };
 layout(set = 0, binding = 1, scalar) readonly buffer Walls { Wall walls[]; };
 
-// What the wall made of the path. A path that is alive was reflected, and `photon` is stored there.
-struct Step {
-    bool escaped;
-    bool absorbed;
-    bool stored;
-    bool alive;
-    Photon photon;
-};
+#include "world/step.glsl"
 
 Step step_path(inout LightPath path, uint bounce)
 {

@@ -1,13 +1,6 @@
 // One flight of a photon in a scene of triangles: nearest surface, Russian roulette, scatter.
 
-// What the surface made of the path. `photon` is to be stored if `stored`, whatever became of its path.
-struct Step {
-    bool escaped;
-    bool absorbed;
-    bool stored;
-    bool alive;
-    Photon photon;
-};
+#include "world/step.glsl"
 
 Step no_step()
 {

@@ -1,14 +1,44 @@
-//! Values of options: text to numbers, with what is allowed in words. Ranges are the settings' affair.
+//! Values of options that commands share: text to numbers, with what is allowed in words, and choices. Ranges are the settings' affair.
 
 use std::fmt::Display;
 use std::num::IntErrorKind;
 use std::ops::RangeInclusive;
 use std::str::FromStr;
 
+use clap::ValueEnum;
+
 use crate::engine::replay::PhotonName;
-use crate::settings::WALL_NAMES;
+use crate::settings::{Math, WALL_NAMES};
 
 type Parsed<T> = Result<T, String>;
+
+/// An enum of the settings as clap values.
+macro_rules! value_enum {
+    ($argument:ident => $setting:ident { $($(#[$doc:meta])* $variant:ident),* $(,)? }) => {
+        #[derive(Clone, Copy, ValueEnum)]
+        pub(super) enum $argument { $($(#[$doc])* $variant),* }
+
+        impl From<$argument> for $setting {
+            fn from(argument: $argument) -> $setting {
+                match argument { $($argument::$variant => $setting::$variant),* }
+            }
+        }
+    };
+}
+
+pub(super) use value_enum;
+
+value_enum!(MathArg => Math {
+    /// As fast as the device can
+    Fast,
+    /// The same bits on every device that rounds to nearest
+    Strict,
+});
+#[derive(Clone, Copy, PartialEq, Eq, ValueEnum)]
+pub(super) enum SwitchArg {
+    On,
+    Off,
+}
 
 /// A number that `T` does not hold becomes 0 or the largest of `T`. The setting must allow neither: validation, which knows
 /// its range, then refuses both.
