@@ -87,7 +87,7 @@ impl Constants {
 /// A kernel and the constants that it declares: id and value, the work-group size first.
 #[derive(Debug, Clone, PartialEq, Eq, Hash)]
 pub(super) struct PipelineKey {
-    kernel: &'static str,
+    pub(super) kernel: &'static str,
     constants: Vec<(u32, u32)>,
 }
 

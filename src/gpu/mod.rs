@@ -189,6 +189,13 @@ impl Gpu {
         facts
     }
 
+    /// Runs this SPIR-V in place of kernels' own from now on, by the kernel's name, and no other. The start-up check is not repeated.
+    pub fn replace(&mut self, replaced: Vec<(String, Vec<u32>)>) {
+        let before = std::mem::replace(&mut self.replaced, replaced);
+        let changed = |kernel| before.iter().chain(&self.replaced).any(|(name, _)| name == kernel);
+        self.pipelines.get_mut().retain(|key, _| !changed(key.kernel));
+    }
+
     pub fn facts(&self) -> &DeviceFacts {
         &self.facts
     }

@@ -24,16 +24,13 @@ use crate::plan::scene::{MapPlan, ScenePlan};
 use crate::plan::sensor::Sensor;
 use crate::timings::{Clock, Span};
 
-/// Kernels that the plan needs, and no others.
+/// Kernels that the plan needs, and no others. Camera paths seldom go on: the kernel for these is made where one does.
 pub fn modules(plan: &ScenePlan, facts: &DeviceFacts) -> Vec<Module> {
     let mut modules = vec![Resolve::MODULE];
     modules.push(match plan.sensor {
         Sensor::Picture { .. } => crate::gpu::kernels::View::MODULE,
         Sensor::Receivers { .. } => Receive::MODULE,
     });
-    if plan.chains_go_on() {
-        modules.push(GoOn::MODULE);
-    }
     if plan.maps().next().is_some() {
         modules.extend([CrowdSize::MODULE, FluxToRadiance::MODULE]);
         modules.extend([trace::modules(plan), index::modules()].concat());
