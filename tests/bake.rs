@@ -1,18 +1,9 @@
 //! Lightmaps without their light: coordinates that do not overlap, texels that lie on their triangles,
 //! filled gutters, files that hold what they were given and open again.
 
-use std::collections::{BTreeMap, BTreeSet};
-use std::path::Path;
-
-use crate::common::pairs;
-use glam::{DVec2, DVec3, Vec3};
+use crate::common::prelude::*;
 use photonmill::bake::{self, Layout, MAX_SIDE, Map, MeshLightmap, PHASE_COUNT, TexelEstimate};
-use photonmill::error::Error;
 use photonmill::output::destination::Folder;
-use photonmill::scene::light::{Light, LightKind};
-use photonmill::scene::material::TextureUse;
-use photonmill::scene::texture::Wrap;
-use photonmill::scene::{Camera, Material, Mesh, Scene, Surface, Texture};
 
 const BLENDER: &str = concat!(env!("CARGO_MANIFEST_DIR"), "/tests/scenes/blender.glb");
 
@@ -36,8 +27,7 @@ fn torus(rings: u32, sides: u32) -> Mesh {
     let mut mesh = Mesh { name: "torus".into(), ..Mesh::default() };
     for ring in 0..rings {
         for side in 0..sides {
-            let (a, b) =
-                (f64::from(ring) / f64::from(rings) * std::f64::consts::TAU, f64::from(side) / f64::from(sides) * std::f64::consts::TAU);
+            let (a, b) = (f64::from(ring) / f64::from(rings) * TAU, f64::from(side) / f64::from(sides) * TAU);
             let radius = 0.35 * (1.0 + 0.2 * (3.0 * a).sin());
             let out = DVec3::new(a.cos(), 0.0, a.sin());
             mesh.positions.push(out * (1.0 + radius * b.cos()) + DVec3::Y * radius * b.sin());
@@ -597,7 +587,7 @@ fn pictures_hold_what_they_were_given() {
     assert_eq!(extension["texCoord"], 1);
     let intensity = extension["intensity"].as_f64().unwrap();
     let shown = intensity * f64::from(pixel("wall_lightmap.png")[0]) / 255.0;
-    assert!((shown - 0.5 * std::f64::consts::PI).abs() < 0.5 / 255.0 * intensity + 1e-6, "{shown}");
+    assert!((shown - 0.5 * PI).abs() < 0.5 / 255.0 * intensity + 1e-6, "{shown}");
     let texture = extension["index"].as_u64().unwrap() as usize;
     let image = document["textures"][texture]["source"].as_u64().unwrap() as usize;
     assert_eq!(document["images"][image]["uri"], "wall_lightmap.png");

@@ -1,15 +1,10 @@
 //! Physical units: what the film says in W/m2 against closed forms of the direct light, against the
 //! arrivals of the independent f64 model, and against its own photon counts.
 
-use std::f64::consts::{PI, TAU};
-
+use crate::common::prelude::*;
 use crate::common::reference::{Arrival, Emission, HALF_EDGE, MESH, Model, texels_in_reach};
-use crate::common::{Check, assert_complains, assert_holds, device, pairs, run, run_on_cpu, z_check};
 use photonmill::engine::room::RunResult;
 use photonmill::engine::room::film::{WallEstimate, estimate_walls};
-use photonmill::rng::Rng;
-use photonmill::scene::open_box::open_box;
-use photonmill::settings::{EmissionLaw, RoomSettings};
 
 fn walls(outcome: &RunResult) -> Vec<WallEstimate> {
     estimate_walls(&outcome.film, &open_box(&outcome.plan.settings), &outcome.plan)

@@ -1,12 +1,10 @@
 //! The program as a user meets it: refusals in one line with exit code 2, outputs whole or not at
 //! all, help, progress, the CPU builder where there is no Vulkan, and Ctrl-C.
 
-use std::collections::HashMap;
 use std::io::{BufRead, BufReader};
-use std::path::Path;
 use std::process::{Command, Output, Stdio};
 
-use crate::common::pairs;
+use crate::common::prelude::*;
 use serde_json::Value;
 
 /// The program, run in a folder of its own.
@@ -712,7 +710,7 @@ fn help_is_grouped_alike_everywhere() {
             }
         }
         let takes_scene = ["render", "bake", "probe", "plan", "study"].contains(&command);
-        let missing = photonmill::scene::built_in::names().into_iter().find(|scene| !help.contains(scene));
+        let missing = built_in::names().into_iter().find(|scene| !help.contains(scene));
         assert!(!takes_scene || missing.is_none(), "{command}: {missing:?}");
         assert_eq!(help.contains("\nArguments:\n  <SCENE>"), takes_scene, "{command}");
     }

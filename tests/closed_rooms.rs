@@ -1,20 +1,8 @@
 //! Light that is scattered to and fro and cannot leave, against closed forms: an integrating sphere, a furnace, parallel
 //! plates, the geometric series of bounces. `photonmill::verify::selfcheck` has the furnace that is a box.
 
-use std::f64::consts::PI;
-
-use crate::common::family::Family;
-use crate::common::lit::{BOTH, assert_builders_agree, grid, irradiances, level, matt, mirror, received, scene_of, shaft, shining};
-use crate::common::{JUDGED, device, run_scene, run_scene_on_cpu};
-use glam::{DVec3, Vec3};
+use crate::common::prelude::*;
 use photonmill::ledger::Fates;
-use photonmill::rng::Rng;
-use photonmill::scene::light::LightKind;
-use photonmill::scene::open_box::open_box;
-use photonmill::scene::room::Wall;
-use photonmill::scene::{Material, Mesh};
-use photonmill::settings::scene::{Illumination, SceneSettings};
-use photonmill::settings::{Builder, Gather, RoomSettings};
 
 /// A sphere of 1 m of flat triangles, seen from inside.
 fn hollow_sphere(segments: u32) -> Mesh {

@@ -1,22 +1,12 @@
 //! What a run costs in counts, which no clock disturbs: dispatches, submissions, pipelines, events and bytes of a few
 //! small runs beside the numbers that they had. Whoever changes one of them on purpose writes the new one here.
 
-use crate::common::{device, device_with, lit, run};
-use photonmill::engine;
-
+use crate::common::lit;
+use crate::common::prelude::*;
 use photonmill::engine::scene::View;
-use photonmill::gpu::Options;
 use photonmill::measure::bench::room::{self, Counts};
 use photonmill::path::StoredPath;
-use photonmill::photon::{MapPhoton, Origin, StoredPhoton};
-use photonmill::plan::scene::ScenePlan;
-use photonmill::plan::sensor::Sensor;
 use photonmill::records::{CameraPath, LightPath, VisiblePoint};
-use photonmill::rng::Rng;
-use photonmill::scene::built_in;
-use photonmill::scene::geometry::Geometry;
-use photonmill::settings::scene::SceneSettings;
-use photonmill::settings::{Builder, Math, RoomSettings};
 
 /// Counts of a run: dispatches, submissions, events of all photons, bytes on the device, and bytes that the build moves.
 #[derive(Debug, PartialEq)]

@@ -1,19 +1,13 @@
 //! The CPU builder: the same photons and the same film whatever the threads and whatever the vectors; and splatting adds
 //! to each texel what brute force finds there, to the bit.
 
-use crate::common::{Check, assert_complains, assert_holds, equal_sums, plan_for_host, run_on_cpu};
-use glam::{DVec3, Vec3};
+use crate::common::prelude::*;
 use photonmill::constants::NO_WALL;
 use photonmill::cpu::estimate::gather_brute;
 use photonmill::cpu::splat::Splats;
 use photonmill::cpu::trace::{Block, Tracer};
-use photonmill::photon::Photon;
-use photonmill::plan::{Limits, RoomPlan};
 use photonmill::records::Tally;
-use photonmill::rng::{Rng, philox};
-use photonmill::scene::open_box::open_box;
-use photonmill::scene::room::RoomScene;
-use photonmill::settings::{EmissionLaw, PhongDirection, RoomSettings, Sums};
+use photonmill::settings::PhongDirection;
 use pulp::Arch;
 use rayon::ThreadPoolBuilder;
 

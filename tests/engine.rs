@@ -1,23 +1,12 @@
 //! The engine: devices and their choice, the start-up check, validation messages, timings.
 
-use std::time::Instant;
-
-use crate::common::{Check, assert_complains, assert_holds, device, device_with, open, planted, run, run_on_cpu};
+use crate::common::planted;
+use crate::common::prelude::*;
 use photonmill::constants::LOOP_LIMIT;
 use photonmill::engine::choose_builder::choose_builder;
 use photonmill::engine::limits;
-use photonmill::error::Error;
+use photonmill::gpu::check;
 use photonmill::gpu::clock::LEAST_WARM_UP;
-use photonmill::gpu::{Commands, Constants, Gpu, Memory, Options, check};
-use photonmill::plan::RoomPlan;
-use photonmill::plan::scene::ScenePlan;
-use photonmill::plan::sensor::Sensor;
-use photonmill::rng::Rng;
-use photonmill::scene::Scene;
-use photonmill::scene::geometry::Geometry;
-use photonmill::scene::open_box::open_box;
-use photonmill::settings::scene::SceneSettings;
-use photonmill::settings::{Builder, Gather, RoomSettings};
 use photonmill::timings::{Clock, Row, Timings};
 
 /// Opening a device runs the start-up check on it, with 64-bit sums and with sums of two words.

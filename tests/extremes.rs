@@ -1,44 +1,23 @@
 //! Sums, estimates and sizes at their ends: more photons than f32 or 32 bits count, light over many decades, the
 //! least and the largest radius, one photon and none, and plans around every limit.
 
-use std::f64::consts::PI;
-use std::time::Instant;
-
 use crate::common::aimed::mean_and_error;
-use crate::common::family::Family;
-use crate::common::lit::{grid, level, matt, mean_red, means, received, received_within, scene, scene_of, seen};
-use crate::common::{
-    Check, Device, assert_complains, assert_holds, device, device_with, equal_sums, pairs, photons_on_cpu, plan_for, plan_for_host,
-    relative_check, run, run_on_cpu, run_scene, run_scene_on_cpu, share_check, upload_photons, z_check,
-};
-use glam::{DQuat, DVec3, EulerRot, Vec3};
+use crate::common::lit::received_within;
+use crate::common::prelude::*;
+use glam::EulerRot;
 use photonmill::cpu::bsdf::phong_lobe;
 use photonmill::engine::film::RoundSums;
-use photonmill::engine::room::constants;
-use photonmill::engine::room::estimate;
 use photonmill::engine::room::film::{RoomFilm, estimate_walls};
-use photonmill::engine::room::index;
 use photonmill::engine::room::resources::RoomResources;
+use photonmill::engine::room::{constants, estimate, index};
 use photonmill::engine::scene::{RunResult, SceneFilm};
-use photonmill::gpu::{Commands, Gpu, Options};
 use photonmill::ledger::Fates;
-use photonmill::photon::{MapPhoton, Photon, StoredPhoton};
-use photonmill::plan::scene::{SEGMENT_BOUNCES, ScenePlan};
-use photonmill::plan::sensor::Sensor;
-use photonmill::plan::{Limits, RoomPlan};
+use photonmill::plan::scene::SEGMENT_BOUNCES;
 use photonmill::records::Tally;
-use photonmill::rng::Rng;
-use photonmill::scene::geometry::Geometry;
-use photonmill::scene::light::{Light, LightKind};
-use photonmill::scene::material::TextureUse;
-use photonmill::scene::open_box::open_box;
 use photonmill::scene::rectangle::disc_rectangle_area;
-use photonmill::scene::room::Wall;
-use photonmill::scene::texture::{Texture, Wrap};
-use photonmill::scene::{Material, Mesh, Scene};
-use photonmill::settings::scene::{Illumination, Kernel, Part, SceneSettings};
+use photonmill::settings::MAX_EVENTS;
+use photonmill::settings::scene::Kernel;
 use photonmill::settings::stop::Stop;
-use photonmill::settings::{Builder, EmissionLaw, Gather, MAX_EVENTS, RoomSettings};
 use photonmill::verify::selfcheck::measure::irradiance;
 
 /// Half of an f32's spacing below 1.
@@ -178,7 +157,7 @@ fn faint_light_is_right_to_half_a_film_unit() {
         let mut plane = scene("sky-over-plane");
         let albedo = 10f32.powi(exponent);
         plane.materials[0].base_colour = Vec3::splat(albedo);
-        let camera = photonmill::scene::Camera::looking_at("above", DVec3::Y * 1.5, DVec3::ZERO, DVec3::Z, 0.1);
+        let camera = Camera::looking_at("above", DVec3::Y * 1.5, DVec3::ZERO, DVec3::Z, 0.1);
         let lit = seen(&gpu, &plane, &settings, &camera, [8, 8]);
         let (found, expected) = (mean_red(&lit), f64::from(albedo));
         let half_unit = 0.5 / lit.plan.film_scale;
@@ -283,7 +262,7 @@ fn phong_weights_have_their_mean_and_vanish_behind() {
     let Some(gpu) = device() else { return };
     let weights = |shininess: f32| {
         let settings = RoomSettings { shininess: [Some(shininess); 5], photons: 20_001, ..RoomSettings::default() };
-        let map = crate::common::in_order(crate::common::photons(&gpu, &settings));
+        let map = in_order(photons(&gpu, &settings));
         assert!(map.iter().all(|photon| (0.0..=1.0).contains(&photon.weight)), "shininess {shininess}");
         map.iter().map(|photon| photon.weight).collect::<Vec<f32>>()
     };
@@ -302,7 +281,7 @@ fn phong_weights_have_their_mean_and_vanish_behind() {
 /// Numbers in [0, 1), drawn as photons draw them.
 fn first_draws(count: u32) -> Vec<f32> {
     let settings = RoomSettings { rng: Rng::Philox, photons: count, ..RoomSettings::default() };
-    (0..count).map(|photon| crate::common::draws_of(crate::common::streams_of(&settings), 0, photon, 0)[0]).collect()
+    (0..count).map(|photon| draws_of(streams_of(&settings), 0, photon, 0)[0]).collect()
 }
 
 /// From a photon's own place there is no direction to the eye, and from an eye in the wall's plane none but along it.
@@ -317,7 +296,7 @@ fn an_eye_on_a_photon_sees_no_weight_and_no_nan() {
         assert_eq!(map[place].weight, 0.0);
         assert!(map.iter().all(|photon| (0.0..=1.0).contains(&photon.weight)));
         let Some(gpu) = device() else { continue };
-        let on_device = crate::common::in_order(crate::common::photons(&gpu, &settings));
+        let on_device = in_order(photons(&gpu, &settings));
         assert!(on_device.iter().all(|photon| (0.0..=1.0).contains(&photon.weight)));
     }
 }
@@ -426,8 +405,7 @@ fn radii_from_the_whole_scene_to_below_the_photons_spacing_are_right() {
     let furnace = scene("furnace");
     let geometry = Geometry::new(&furnace).unwrap();
     let sensor = Sensor::Receivers { count: 1 };
-    let plan =
-        |radius: f64| ScenePlan::new(&furnace, &geometry, &furnace_settings(radius), sensor, &photonmill::engine::limits(gpu.facts()));
+    let plan = |radius: f64| ScenePlan::new(&furnace, &geometry, &furnace_settings(radius), sensor, &engine::limits(gpu.facts()));
     let least = 1.0 / 32_768.0;
     assert!(plan(2.0).is_ok() && plan(least).is_ok());
     for radius in [2.0f64.next_up(), least.next_down(), 1e-23, f64::MIN_POSITIVE, 1e30, f64::NAN, f64::INFINITY, 0.0, -0.1] {
@@ -639,7 +617,7 @@ fn photons_of_a_second_row_of_groups_reach_the_map() {
     };
     let points = [(DVec3::new(0.5, 0.0, 0.5), DVec3::Y), (DVec3::new(0.5, 0.5, 0.0), DVec3::Z)];
     // A software device counts less memory than it has.
-    let limits = Limits { memory_bytes: 1 << 33, ..photonmill::engine::limits(gpu.facts()) };
+    let limits = Limits { memory_bytes: 1 << 33, ..engine::limits(gpu.facts()) };
     let lit = |settings: &SceneSettings| received_within(&gpu, &scene("furnace"), settings, &points, &limits);
     let whole = lit(&settings);
     assert_eq!(whole.plan.global.as_ref().unwrap().chunk_photons, photons, "the photons do not fit one dispatch here");
@@ -878,7 +856,7 @@ fn a_channel_below_the_films_unit_is_right(gpu: &Gpu, rounds: u32, done: u32) {
     let tint = DVec3::new(1.0, 1e-9, 1e-10);
     let mut plane = scene("sky-over-plane");
     plane.materials[0].base_colour = tint.as_vec3();
-    let camera = photonmill::scene::Camera::looking_at("above", DVec3::Y * 1.5, DVec3::ZERO, DVec3::Z, 0.1);
+    let camera = Camera::looking_at("above", DVec3::Y * 1.5, DVec3::ZERO, DVec3::Z, 0.1);
     let stop = Stop { photons: Some(u64::from(done)), ..Stop::default() };
     let settings = SceneSettings { photons: 1, rounds, shadow_rays: 1, samples: 1, stop, ..SceneSettings::default() };
     let lit = seen(gpu, &plane, &settings, &camera, [16, 16]);

@@ -2,30 +2,14 @@
 //! split into dispatches, the run or the device's abilities, and hold exactly what lies in reach. Sums
 //! of floats are held against them.
 
-use std::time::Instant;
-
-use crate::common::{
-    Check, Complaint, Kind, assert_complains, assert_holds, device, device_with, equal_sums, pairs, photons, photons_on_cpu, plan_for,
-    plan_for_host, run, run_on_cpu, upload_photons,
-};
-use glam::Vec3;
+use crate::common::prelude::*;
 use photonmill::cpu;
 use photonmill::cpu::splat::Splats;
 use photonmill::cpu::trace::Block;
-use photonmill::engine::room::film::RoomFilm;
-use photonmill::gpu::{Commands, Gpu, Options};
-use photonmill::photon::Photon;
-use photonmill::plan::RoomPlan;
-
-use photonmill::engine::Control;
 use photonmill::engine::film::RoundSums;
-use photonmill::engine::room::estimate;
-use photonmill::engine::room::index;
+use photonmill::engine::room::film::RoomFilm;
 use photonmill::engine::room::resources::RoomResources;
-use photonmill::engine::room::{self, constants};
-use photonmill::rng::Rng;
-use photonmill::scene::open_box::open_box;
-use photonmill::settings::{Builder, Gather, Preset, RoomSettings, Sums};
+use photonmill::engine::room::{self, constants, estimate, index};
 use pulp::Arch;
 
 /// What changes the film's channels and its fixed point. A smaller mesh than the paper's, and no

@@ -1,15 +1,9 @@
 //! Scenes from glTF: what a file says is what the scene holds, what it cannot be used for is refused
 //! in one line, and no mutated file makes the loader panic.
 
-use std::path::PathBuf;
-
+use crate::common::prelude::*;
 use base64::Engine;
 use base64::engine::general_purpose::STANDARD as BASE64;
-use glam::{DVec3, Vec3};
-use photonmill::error::Error;
-use photonmill::scene::geometry::Geometry;
-use photonmill::scene::light::LightKind;
-use photonmill::scene::{Scene, Surface};
 use serde_json::{Value, json};
 
 /// A unit square in the plane z = 0: positions, normals, coordinates and indices in one buffer.
@@ -192,7 +186,7 @@ fn views_too_wide_or_too_narrow_are_left_out_by_name() {
         value["cameras"][0]["perspective"]["yfov"] = json!(angle);
         load(&value)
     };
-    for angle in [0.0, 1e-4, -0.7, 3.13, std::f64::consts::PI, 7.0, 1e30] {
+    for angle in [0.0, 1e-4, -0.7, 3.13, PI, 7.0, 1e30] {
         match with(angle) {
             Ok(scene) => {
                 assert!(scene.cameras.is_empty(), "{angle}");

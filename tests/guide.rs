@@ -2,18 +2,14 @@
 //!
 //! `PHOTONMILL_WRITE_GUIDE=1 cargo test --test tests guide::` writes the tables anew.
 
-use std::collections::BTreeSet;
 use std::fs;
-use std::path::{Path, PathBuf};
 use std::process::{Command, Stdio};
 
+use crate::common::prelude::*;
 use photonmill::measure::bench::table::scaled;
 use photonmill::measure::bench::targets::{TARGETS, Target, Wanted};
 use photonmill::output::words::number;
-use photonmill::scene::built_in;
 use serde_json::Value;
-
-use crate::common::{Check, assert_complains, assert_holds, device};
 
 fn root(path: &str) -> PathBuf {
     Path::new(env!("CARGO_MANIFEST_DIR")).join(path)
@@ -174,7 +170,7 @@ fn commands_of_readme_and_guide_run() {
                 seen.insert(*start);
                 assert_holds(&path, parse(folder.path(), &command));
             } else {
-                let began = std::time::Instant::now();
+                let began = Instant::now();
                 assert_holds(&path, run(folder.path(), &command));
                 println!("{path}: {command}: {:.2} s", began.elapsed().as_secs_f64());
             }

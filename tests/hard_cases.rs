@@ -4,24 +4,10 @@
 //!
 //! The tests at the end hold the table of all hard cases (`tests/common/cases.rs`) against the sources, README and the guide.
 
-use std::collections::HashSet;
-use std::f64::consts::PI;
-
 use crate::common::cases::{self, CASES, COUNTS, Case, Shown};
 use crate::common::known::{self, none_returns};
-use crate::common::lit::{BOTH, flights, lamp, mean_red, received, same_light, scene, seen};
-use crate::common::{Check, assert_complains, assert_holds, device, relative_check, z_check};
-use glam::{DQuat, DVec2, DVec3, Vec3};
+use crate::common::prelude::*;
 use photonmill::engine::scene::RunResult;
-use photonmill::plan::RoomPlan;
-use photonmill::plan::scene::ScenePlan;
-use photonmill::plan::sensor::Sensor;
-use photonmill::scene::geometry::Geometry;
-use photonmill::scene::light::{Light, LightKind};
-use photonmill::scene::open_box::open_box;
-use photonmill::scene::{Camera, Material, Mesh, Scene, built_in};
-use photonmill::settings::scene::{Effect, Illumination, SceneSettings};
-use photonmill::settings::{Builder, EmissionLaw, RoomSettings};
 use photonmill::verify::selfcheck::measure::{irradiance, radiance};
 
 fn settings() -> SceneSettings {
@@ -215,20 +201,20 @@ fn contractible(spirv: &[u8], free: &str) -> usize {
 #[test]
 fn every_operation_is_rounded_by_itself() {
     let Some(gpu) = device() else { return };
-    let limits = photonmill::engine::limits(gpu.facts());
+    let limits = engine::limits(gpu.facts());
     let mut modules = Vec::new();
     for illumination in [Illumination::Split, Illumination::Photons] {
         for sensor in [Sensor::Picture { width: 1, height: 1 }, Sensor::Receivers { count: 1 }] {
             let settings = SceneSettings { illumination, ..settings() };
             let plan = ScenePlan::new(&cornell(), &Geometry::new(&cornell()).unwrap(), &settings, sensor, &limits).unwrap();
-            modules.extend(photonmill::engine::scene::modules(&plan, gpu.facts()));
+            modules.extend(engine::scene::modules(&plan, gpu.facts()));
         }
     }
     for builder in Builder::ON_GPU {
         let settings = RoomSettings { builder, ..RoomSettings::default() };
         let plan = RoomPlan::new(&open_box(&settings), &settings, &limits).unwrap();
-        modules.extend(photonmill::engine::room::trace::modules(&plan));
-        modules.extend(photonmill::engine::room::estimate::modules(&plan, gpu.facts()));
+        modules.extend(engine::room::trace::modules(&plan));
+        modules.extend(engine::room::estimate::modules(&plan, gpu.facts()));
     }
     assert!(modules.len() > 20);
     for module in &modules {
@@ -515,11 +501,11 @@ fn the_open_box_of_any_power_of_two_stores_the_same_photons() {
             scene.lights.iter_mut().for_each(|light| light.radius *= factor);
             let settings = RoomSettings { eye: settings.eye.map(|place| place * factor as f32), ..settings.clone() };
             let photons = match (builder, &gpu) {
-                (Builder::Cpu, _) => photonmill::engine::room::photons_on_cpu(&scene, &settings),
-                (_, Some(gpu)) => photonmill::engine::room::photons_on_gpu(gpu, &scene, &settings),
+                (Builder::Cpu, _) => engine::room::photons_on_cpu(&scene, &settings),
+                (_, Some(gpu)) => engine::room::photons_on_gpu(gpu, &scene, &settings),
                 (_, None) => return Vec::new(),
             };
-            let mut photons = crate::common::in_order(photons.unwrap());
+            let mut photons = in_order(photons.unwrap());
             photons.iter_mut().for_each(|photon| photon.position /= factor as f32);
             photons
         };

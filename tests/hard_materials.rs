@@ -1,17 +1,8 @@
 //! Hard cases of materials: ends of reflectance and of bounces, colours, lobes of any width, glass of any index. The
 //! table in `tests/common/cases.rs` names them by case.
 
-use std::f64::consts::PI;
-
-use crate::common::lit::{BOTH, flights, lamp, mean_red, received, same_light, scene, seen};
-use crate::common::{assert_complains, assert_holds, device, known, relative_check, share_check, z_check};
-use glam::{DVec3, Vec3};
-use photonmill::gpu::Gpu;
-use photonmill::scene::light::{Light, LightKind};
-use photonmill::scene::texture::Wrap;
-use photonmill::scene::{Camera, Material, Mesh, Scene, Surface};
-use photonmill::settings::EmissionLaw;
-use photonmill::settings::scene::{Illumination, Part, SceneSettings};
+use crate::common::known;
+use crate::common::prelude::*;
 use photonmill::verify::selfcheck::Estimate;
 use photonmill::verify::selfcheck::measure::{irradiance, radiance};
 

@@ -1,14 +1,7 @@
 //! The judge, judged: scenes whose light is known in closed form.
 
-use std::f64::consts::PI;
-
-use glam::{DVec3, Vec3};
-use photonmill::scene::light::LightKind;
-use photonmill::scene::material::TextureUse;
-use photonmill::scene::texture::Wrap;
-use photonmill::scene::{Camera, Light, Material, Mesh, Scene, Surface, Texture, built_in};
-use photonmill::settings::EmissionLaw;
-use photonmill::verify::judge::{Estimate, Image, Judge, fresnel, random};
+use crate::common::prelude::*;
+use photonmill::verify::judge::{Estimate, Image, fresnel, random};
 
 const NO_LIMIT: u32 = u32::MAX;
 

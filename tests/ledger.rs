@@ -1,16 +1,8 @@
 //! The photon ledger: emitted = absorbed + escaped + cut off + dropped, in integers, with nothing
 //! dropped, and the same for every builder.
 
-use crate::common::{
-    Check, Complaint, Kind, assert_complains, assert_holds, device, outcome_of, pairs, run, run_on_cpu, run_scene_on_cpu, share_check,
-};
-use photonmill::gpu::Gpu;
+use crate::common::prelude::*;
 use photonmill::ledger::{BounceFates, Fates};
-use photonmill::photon::StoredPhoton;
-use photonmill::rng::Rng;
-use photonmill::scene::open_box::open_box;
-use photonmill::scene::room::{RoomScene, Wall};
-use photonmill::settings::{Builder, EmissionLaw, RoomSettings};
 
 /// Every path that entered a bounce has one fate there, and who was stored enters the next.
 fn closes(fates: &Fates, emitted: u64) -> Check {

@@ -1,17 +1,7 @@
 //! Mirrors and glass against closed forms: Snell's and Fresnel's laws along rays from the eye and by photons, total
 //! reflection, a corridor of mirrors, a paraboloid and its focus.
 
-use std::f64::consts::{FRAC_PI_2, PI, TAU};
-
-use crate::common::device;
-use crate::common::family::Family;
-use crate::common::lit::{
-    BOTH, assert_builders_agree, glass, grid, irradiances, level, matt, mirror, radiances, received, scene_of, shaft, shining,
-};
-use glam::{DVec3, Vec3};
-use photonmill::scene::light::LightKind;
-use photonmill::scene::{Mesh, Scene};
-use photonmill::settings::scene::{Illumination, Part, SceneSettings};
+use crate::common::prelude::*;
 
 const IOR: f64 = 1.5;
 

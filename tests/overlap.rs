@@ -1,15 +1,7 @@
 //! Surfaces that lie in one plane, or next to it: their light is that of one, and of each.
 
-use crate::common::lit::{flights, level, matt, means, received, scene_of, seen, shining};
-use crate::common::{assert_holds, device, z_check};
-use glam::{DQuat, DVec3, Vec3};
+use crate::common::prelude::*;
 use photonmill::constants::HIDDEN;
-use photonmill::gpu::Gpu;
-use photonmill::scene::geometry::Geometry;
-use photonmill::scene::light::LightKind;
-use photonmill::scene::{Camera, Mesh, Scene, built_in};
-use photonmill::settings::scene::{Illumination, Part, SceneSettings};
-use photonmill::verify::judge::Judge;
 
 /// A room of 4 x 3 x 4 m around the y axis with a lamp of a square metre below its ceiling.
 fn room() -> Scene {

@@ -1,28 +1,16 @@
 //! Prefix sum, grid index, appending to a full map and the size of an indirect dispatch, each against
 //! the plain way to do it on the host.
 
-use std::collections::HashSet;
-use std::time::Instant;
-
-use crate::common::{Check, Device, assert_complains, assert_holds, device, equal_sums, in_order, photons, plan_for, run};
+use crate::common::prelude::*;
 use bytemuck::Zeroable;
 use photonmill::constants::{NO_WALL, SCAN_ITEMS};
 use photonmill::engine::prefix_sum::scan;
-use photonmill::engine::room::constants;
-use photonmill::engine::room::index;
 use photonmill::engine::room::resources::RoomResources;
-use photonmill::engine::room::trace;
+use photonmill::engine::room::{constants, index, trace};
 use photonmill::engine::tallies;
 use photonmill::gpu::kernels::DispatchSize;
-use photonmill::gpu::{Commands, Constants, Extent, Memory};
-use photonmill::photon::{Origin, Photon};
-use photonmill::plan::RoomPlan;
 use photonmill::plan::buffers::block_sum_counts;
 use photonmill::records::{DispatchArgs, DispatchSizePush, Tally};
-use photonmill::rng::Rng;
-use photonmill::scene::open_box::open_box;
-use photonmill::scene::room::{RoomScene, Wall};
-use photonmill::settings::{Builder, RoomSettings};
 
 /// Words that nothing may touch. As an entry of the photon map they are a photon on some wall.
 const GUARD: u32 = 0x5EAD_BEEF;

@@ -4,18 +4,9 @@
 use std::ops::Range;
 use std::sync::OnceLock;
 
-use crate::common::family::{Family, chi_squared_z};
-use crate::common::lit::irradiances;
-use crate::common::{Device, JUDGED, device, photons, photons_on_cpu, run, run_on_cpu};
-use glam::DVec3;
+use crate::common::family::chi_squared_z;
+use crate::common::prelude::*;
 use photonmill::engine::room::film::estimate_walls;
-use photonmill::photon::Photon;
-use photonmill::rng::Rng;
-use photonmill::scene::built_in;
-use photonmill::scene::light::LightKind;
-use photonmill::scene::open_box::open_box;
-use photonmill::settings::scene::{Illumination, SceneSettings};
-use photonmill::settings::{Builder, EmissionLaw, RoomSettings};
 use photonmill::verify::judge::radiosity::{ByLamp, Law, Radiosity, WALLS, cells_of, exchange, form_factor_from, inward, on_wall};
 
 const ALBEDO: f64 = 0.75;
@@ -311,7 +302,7 @@ fn film_errors(emission: EmissionLaw, photons: f64) -> (Vec<f64>, Vec<f64>) {
         }
     }
     // Both lamps together shine with 2 W.
-    let watts = 2.0 / ALBEDO / (std::f64::consts::PI * DISC_RADIUS * DISC_RADIUS);
+    let watts = 2.0 / ALBEDO / (PI * DISC_RADIUS * DISC_RADIUS);
     let of_sample = f64::from(PHOTONS);
     let error = |sums: &ByPhoton| watts * sums.mean_and_error(of_sample).1 * (of_sample / photons).sqrt();
     (discs.iter().map(error).collect(), walls.iter().map(error).collect())

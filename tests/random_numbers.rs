@@ -1,26 +1,17 @@
 //! Random numbers at their ends: around the generators' periods and the largest photon numbers, neighbours that
 //! must not resemble each other, and directions drawn from the least and the greatest numbers.
 
-use std::collections::HashSet;
-use std::time::Instant;
-
-use crate::common::{
-    Check, assert_complains, assert_holds, device, draws_of, evenness_check, pairs, plan_for, run_on_cpu, streams_of, z_check,
-};
-use glam::{DVec3, UVec2, Vec3};
+use crate::common::evenness_check;
+use crate::common::prelude::*;
 use photonmill::cpu::emission::emit_from_disc;
 use photonmill::cpu::room::intersect_room;
 use photonmill::cpu::sampling::{sample_cosine_hemisphere, sample_uniform_hemisphere};
 use photonmill::cpu::trace::Tracer;
-use photonmill::engine::room::constants;
 use photonmill::engine::room::resources::RoomResources;
-use photonmill::engine::room::trace;
-use photonmill::gpu::Commands;
+use photonmill::engine::room::{constants, trace};
 use photonmill::path::{self, Path};
-use photonmill::plan::{EmissionRange, RoomPlan};
-use photonmill::rng::{self, Affine48, Rng, Streams, owen_scramble, sobol, srand48};
-use photonmill::scene::open_box::open_box;
-use photonmill::settings::{EmissionLaw, RoomSettings};
+use photonmill::plan::EmissionRange;
+use photonmill::rng::{self, Affine48, Streams, owen_scramble, sobol, srand48};
 
 /// Those that imitate chance; Sobol' points are more even than that.
 const GENERATORS: [Rng; 3] = [Rng::Rand48, Rng::Mt, Rng::Philox];
@@ -161,7 +152,7 @@ fn neighbouring_photons_do_not_resemble_each_other() {
 }
 
 /// The paths of some photons as they leave their light, by the device.
-fn emitted(gpu: &crate::common::Device, plan: &RoomPlan, round: u32, range: EmissionRange) -> Vec<Path> {
+fn emitted(gpu: &Device, plan: &RoomPlan, round: u32, range: EmissionRange) -> Vec<Path> {
     let scene = open_box(&plan.settings);
     let mut commands = Commands::new(gpu, constants(plan), Instant::now()).unwrap();
     let resources = RoomResources::new(gpu, &mut commands, &scene, plan).unwrap();
@@ -263,7 +254,7 @@ fn discs_and_hemispheres_have_their_moments() {
             ..RoomSettings::default()
         };
         let scene = open_box(&settings);
-        let host = crate::common::plan_for_host(&settings);
+        let host = plan_for_host(&settings);
         let range = EmissionRange { light: 0, first_photon: 0, count: 200_000 };
         let local = |paths: Vec<Path>| -> Vec<(DVec3, DVec3)> {
             // The floor's light: the axes after its own, then its normal.

@@ -1,30 +1,15 @@
 //! Photons as they leave every kind of light, and every kind of surface, against the densities, shares and weights
 //! that they should have.
 
-use std::f64::consts::{FRAC_PI_2, PI, TAU};
-
 use crate::common::chi_square::{ONE, counts_check, density_check, even};
 use crate::common::densities::{
     AXIS, ULP, angles, disc_check, frame, hemisphere_check, independence_check, is_unit, lobe, lobe_angles, on_sphere, polar, sphere_check,
     triangle_check,
 };
-use crate::common::{Check, assert_complains, assert_holds, device, pairs, share_check, z_check};
-use glam::{DMat3, DVec2, DVec3, Vec3};
+use crate::common::prelude::*;
 use photonmill::constants::EMISSION_BLOCKS;
-use photonmill::engine;
 use photonmill::engine::scene::replay::{Flights, light_paths};
-use photonmill::gpu::Gpu;
-use photonmill::plan::scene::ScenePlan;
-use photonmill::plan::sensor::Sensor;
 use photonmill::records::{LightPath, Tally};
-use photonmill::rng::philox;
-use photonmill::scene::geometry::Geometry;
-use photonmill::scene::light::{Light, LightKind};
-use photonmill::scene::material::TextureUse;
-use photonmill::scene::texture::Wrap;
-use photonmill::scene::{Material, Mesh, Scene, Surface, Texture};
-use photonmill::settings::scene::{Effect, Illumination, SceneSettings};
-use photonmill::settings::{EmissionLaw, Math};
 
 /// Photons of each scene.
 const SAMPLES: u32 = 1 << 17;

@@ -1,10 +1,9 @@
 //! `photonmill render`, `probe` and `plan` as their users meet them.
 
 use std::io::Write;
-use std::path::Path;
 use std::process::{Command, Output, Stdio};
 
-use crate::common::pairs;
+use crate::common::prelude::*;
 use base64::Engine;
 use base64::engine::general_purpose::STANDARD as BASE64;
 use serde_json::{Value, json};

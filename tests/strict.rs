@@ -4,24 +4,13 @@
 use std::f32::consts::{FRAC_PI_2, PI};
 
 use crate::common::bits::{self, BITS, picture, small};
-use crate::common::{
-    Check, Complaint, Kind, assert_complains, assert_complains_of, assert_holds, device, open, outcome_of, pairs, photons_on_cpu, planted,
-    run_on_cpu, same_photons, same_sums,
-};
-use glam::Vec2;
+use crate::common::planted;
+use crate::common::prelude::*;
 use photonmill::cpu;
 use photonmill::engine::room;
 use photonmill::engine::room::film::RoomFilm;
-use photonmill::error::Error;
-use photonmill::gpu::{Gpu, Options, check};
-use photonmill::photon::Photon;
+use photonmill::gpu::check;
 use photonmill::records::MathResults;
-use photonmill::rng::Rng;
-use photonmill::rng::philox;
-use photonmill::scene::built_in;
-use photonmill::scene::open_box::open_box;
-use photonmill::settings::scene::SceneSettings;
-use photonmill::settings::{Builder, EmissionLaw, Math, RoomSettings};
 
 /// Numbers of every size, evenly over exponents and mantissas, and those at which functions change their ways.
 fn operands() -> Vec<Vec2> {

@@ -1,17 +1,6 @@
 //! Small scenes with a caustic under each kind of light, and whether aimed photons light them as others do.
 
-use glam::{DVec3, Vec3};
-use photonmill::gpu::Gpu;
-use photonmill::scene::light::LightKind;
-use photonmill::scene::material::TextureUse;
-use photonmill::scene::texture::{Texture, Wrap};
-use photonmill::scene::{Material, Mesh, Scene};
-use photonmill::settings::EmissionLaw;
-use photonmill::settings::scene::{Part, SceneSettings};
-
-use super::family::Family;
-use super::lit::{glass, grid, irradiances, lamp, level, matt, mirror, scene_of, shining};
-use super::{Check, Complaint};
+use super::prelude::*;
 
 /// What [`scene`] knows.
 pub const KINDS: [&str; 11] = [

@@ -1,20 +1,11 @@
 //! Small scenes whose light is known, each as a check of a device: a test holds it, and `tests/red.rs` shows that it
 //! complains.
 
-use std::f64::consts::{FRAC_PI_3, PI, TAU};
+use std::f64::consts::FRAC_PI_3;
 
-use glam::{DQuat, DVec2, DVec3, Vec3};
+use super::estimate_check;
+use super::prelude::*;
 use photonmill::engine::scene::RunResult;
-use photonmill::gpu::Gpu;
-use photonmill::scene::geometry::Geometry;
-use photonmill::scene::light::LightKind;
-use photonmill::scene::material::TextureUse;
-use photonmill::scene::texture::{Texture, Wrap};
-use photonmill::scene::{Camera, Material, Mesh, Scene};
-use photonmill::settings::scene::{Effect, Illumination, Part, SceneSettings};
-
-use super::lit::{flights, glass, level, matt, mean_red, means, mirror, received, scene, scene_of, seen};
-use super::{Check, Complaint, Kind, estimate_check, pairs, same_sums};
 
 /// The red channel of a point or pixel, sure to three parts in a hundred and right to its error.
 fn check_mean(what: &str, lit: &RunResult, place: usize, expected: f64, tolerance: f64) -> Check<Complaint> {

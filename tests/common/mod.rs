@@ -14,6 +14,7 @@ pub mod known;
 pub mod lit;
 pub mod pairwise;
 pub mod planted;
+pub mod prelude;
 pub mod reference;
 
 use std::cmp::Ordering;
