@@ -15,6 +15,7 @@ pub mod lit;
 pub mod pairwise;
 pub mod planted;
 pub mod prelude;
+pub mod program;
 pub mod reference;
 
 use std::cmp::Ordering;
@@ -85,9 +86,14 @@ pub fn device_with(options: Options) -> Option<Device> {
     open(options).map(|gpu| Device { gpu: Some(gpu), serves_others: false })
 }
 
+/// Whether `PHOTONMILL_NO_GPU=1` asks to go without a device.
+pub fn no_gpu() -> bool {
+    std::env::var("PHOTONMILL_NO_GPU").is_ok_and(|value| value == "1")
+}
+
 /// The same without the promise that validation stays silent, for tests that make it speak.
 pub fn open(options: Options) -> Option<Gpu> {
-    if std::env::var("PHOTONMILL_NO_GPU").is_ok_and(|value| value == "1") {
+    if no_gpu() {
         eprintln!("SKIPPED: PHOTONMILL_NO_GPU=1, so nothing that needs a GPU was tested here");
         return None;
     }

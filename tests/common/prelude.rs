@@ -30,8 +30,9 @@ pub use super::lit::{
     BOTH, assert_builders_agree, flights, glass, grid, irradiances, lamp, level, matt, mean_red, means, mirror, radiances, received,
     same_light, scene, scene_of, seen, shaft, shining,
 };
+pub use super::program::{Place, text};
 pub use super::{
     Check, Complaint, Device, JUDGED, Kind, assert_complains, assert_complains_of, assert_holds, device, device_with, draws_of, equal_sums,
-    in_order, open, outcome_of, pairs, photons, photons_on_cpu, plan_for, plan_for_host, relative_check, run, run_on_cpu, run_scene,
-    run_scene_on_cpu, same_photons, same_sums, share_check, streams_of, upload_photons, z_check,
+    in_order, no_gpu, open, outcome_of, pairs, photons, photons_on_cpu, plan_for, plan_for_host, relative_check, run, run_on_cpu,
+    run_scene, run_scene_on_cpu, same_photons, same_sums, share_check, streams_of, upload_photons, z_check,
 };
