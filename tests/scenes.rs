@@ -4,10 +4,9 @@ use std::fmt::Display;
 use std::io::Write;
 use std::process::Stdio;
 
+use crate::common::gltf_file::{data_uri, floats};
 use crate::common::prelude::*;
 use crate::common::program::on_device;
-use base64::Engine;
-use base64::engine::general_purpose::STANDARD as BASE64;
 use serde_json::{Value, json};
 
 const EFFECTS: &str = "direct indirect glossy reflective-caustics refractive-caustics specular-chains textures environment mesh-lights \
@@ -33,7 +32,6 @@ fn assert_refused<'a>(place: &Place, cases: impl IntoIterator<Item = (impl Displ
 
 /// A square of 2 m in the plane z = 0 that faces +z; `change` makes of it what a test needs.
 fn square(change: impl FnOnce(&mut Value)) -> String {
-    let floats = |numbers: &[f32]| numbers.iter().flat_map(|number| number.to_le_bytes()).collect::<Vec<u8>>();
     let mut bytes = floats(&[-1., -1., 0., 1., -1., 0., 1., 1., 0., -1., 1., 0.]);
     bytes.extend([0u16, 1, 2, 0, 2, 3, 1, 1, 2].iter().flat_map(|index| index.to_le_bytes()));
     let mut value = json!({
@@ -48,7 +46,7 @@ fn square(change: impl FnOnce(&mut Value)) -> String {
         "cameras": [{"type": "perspective", "perspective": {"yfov": 0.7, "znear": 0.1}}],
         "extensionsUsed": ["KHR_lights_punctual"],
         "extensions": {"KHR_lights_punctual": {"lights": [{"type": "point", "intensity": 683}]}},
-        "buffers": [{"byteLength": bytes.len(), "uri": format!("data:application/octet-stream;base64,{}", BASE64.encode(&bytes))}],
+        "buffers": [{"byteLength": bytes.len(), "uri": data_uri("application/octet-stream", &bytes)}],
         "bufferViews": [{"buffer": 0, "byteOffset": 0, "byteLength": 48}, {"buffer": 0, "byteOffset": 48, "byteLength": 18}],
         "accessors": [
             {"bufferView": 0, "componentType": 5126, "count": 4, "type": "VEC3", "min": [-1, -1, 0], "max": [1, 1, 0]},

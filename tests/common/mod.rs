@@ -10,6 +10,7 @@ pub mod cases;
 pub mod chi_square;
 pub mod densities;
 pub mod family;
+pub mod gltf_file;
 pub mod known;
 pub mod lit;
 pub mod pairwise;
