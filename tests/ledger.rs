@@ -110,8 +110,7 @@ fn black_walls_absorb_the_first_flights_hits() {
 fn a_closed_white_room_stores_everything() {
     let Some(gpu) = device() else { return };
     let settings = RoomSettings { reflectance: 1.0, photons: 777, ..small() };
-    let mut scene = open_box(&settings);
-    scene.faces[5] = Some(Wall { name: "front", albedo: 1.0, shininess: None });
+    let mut scene = closed_box(&settings, 1.0);
     let white = fates(&gpu, &scene, &settings).ledger();
     assert_eq!((white.stored, white.cut_off), (777 * 15, 777));
     assert_eq!((white.absorbed, white.escaped), (0, 0));

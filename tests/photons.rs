@@ -76,8 +76,7 @@ fn a_persistent_invocation_takes_photon_after_photon() {
         let many = RoomSettings { photons: MANY_PHOTONS, chunk: Some(MANY_PHOTONS), rng, ..RoomSettings::default() };
         let endless =
             RoomSettings { photons: 257, bounces: if rng == Rng::Mt { 74 } else { 320 }, reflectance: 1.0, rng, ..RoomSettings::default() };
-        let mut closed = open_box(&endless);
-        closed.faces[5] = Some(Wall { name: "front", albedo: 1.0, shininess: None });
+        let closed = closed_box(&endless, 1.0);
         for (scene, settings) in [(open_box(&many), &many), (closed, &endless)] {
             let of = |builder| photons_on_gpu(&gpu, &scene, &RoomSettings { builder, ..settings.clone() }).unwrap();
             let found = of(Builder::Persistent);

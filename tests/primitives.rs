@@ -382,8 +382,7 @@ fn appending_at_survival_none_and_all() {
         for (albedo, stored_each) in [(0.0, 0), (1.0, 3)] {
             for photon_count in [2, 7, 8, 9, 31, 33, 127, 128, 129, 1000] {
                 let settings = RoomSettings { builder, photons: photon_count, bounces: 3, reflectance: albedo, ..RoomSettings::default() };
-                let mut scene = open_box(&settings);
-                scene.faces[5] = Some(Wall { name: "front", albedo, shininess: None });
+                let scene = closed_box(&settings, albedo);
                 let capacity = photon_count * 3;
                 let appended = append(&gpu, &scene, &settings, capacity);
                 let what = format!("{builder:?}, {photon_count} photons, albedo {albedo}");

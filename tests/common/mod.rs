@@ -23,20 +23,21 @@ use std::cmp::Ordering;
 use std::fmt::Display;
 use std::ops::Deref;
 use std::sync::Mutex;
+use std::time::Instant;
 
 use glam::UVec2;
 use photonmill::engine;
 use photonmill::engine::Control;
 use photonmill::engine::nonfinite_values::NonfiniteValues;
 use photonmill::engine::room::resources::RoomResources;
-use photonmill::engine::room::{self, RunResult};
+use photonmill::engine::room::{self, RunResult, estimate, index};
 use photonmill::error::Error;
 use photonmill::gpu::{Commands, Gpu, Options};
 use photonmill::photon::{Origin, Photon, StoredPhoton};
 use photonmill::plan::{Limits, RoomPlan};
 use photonmill::rng::{self, Rng, Streams};
 use photonmill::scene::open_box::open_box;
-use photonmill::scene::room::RoomScene;
+use photonmill::scene::room::{RoomScene, Wall};
 use photonmill::settings::{Builder, RoomSettings};
 
 /// Devices that no test has at the moment: what one test compiled serves the next.
@@ -139,6 +140,13 @@ pub fn run_on_cpu(settings: &RoomSettings) -> RunResult {
     run_scene_on_cpu(&open_box(settings), settings)
 }
 
+/// The paper's box with its opening closed by a sixth wall.
+pub fn closed_box(settings: &RoomSettings, albedo: f32) -> RoomScene {
+    let mut scene = open_box(settings);
+    scene.faces[5] = Some(Wall { name: "front", albedo, shininess: None });
+    scene
+}
+
 /// Runs a scene on the CPU builder to its end.
 pub fn run_scene_on_cpu(scene: &RoomScene, settings: &RoomSettings) -> RunResult {
     let mut control = Control::default();
@@ -161,6 +169,19 @@ pub const MANY_PHOTONS: u32 = 600_001;
 /// The same from the CPU builder.
 pub fn photons_on_cpu(settings: &RoomSettings) -> Vec<Photon> {
     room::photons_on_cpu(&open_box(settings), settings).unwrap_or_else(|error| panic!("{error}\n{settings:?}"))
+}
+
+/// What the device gathers of photons that are handed to it, so many times over, onto film sums or an empty film.
+pub fn gathered(gpu: &Gpu, plan: &RoomPlan, photons: &[Photon], times: u32, film: Option<&[u64]>) -> Vec<u64> {
+    assert!(photons.len() <= plan.photon_capacity as usize);
+    let (scene, chunk) = (open_box(&plan.settings), plan.settings.photons);
+    let mut commands = Commands::new(gpu, room::constants(plan), Instant::now()).unwrap();
+    let resources = RoomResources::new(gpu, &mut commands, &scene, plan).unwrap();
+    upload_photons(&mut commands, &resources, plan, photons);
+    film.into_iter().for_each(|sums| commands.upload(&resources.film, sums).unwrap());
+    index::build(&mut commands, &resources, plan, chunk).unwrap();
+    (0..times).for_each(|_| estimate::gather(&mut commands, &resources, plan, chunk).unwrap());
+    commands.read(&resources.film, plan.points.len() * plan.channel_count as usize).unwrap()
 }
 
 /// Puts photons into the photon map as if they had been traced.

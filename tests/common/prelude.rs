@@ -18,7 +18,7 @@ pub use photonmill::scene::geometry::Geometry;
 pub use photonmill::scene::light::LightKind;
 pub use photonmill::scene::material::TextureUse;
 pub use photonmill::scene::open_box::open_box;
-pub use photonmill::scene::room::{RoomScene, Wall};
+pub use photonmill::scene::room::RoomScene;
 pub use photonmill::scene::texture::Wrap;
 pub use photonmill::scene::{Camera, Light, Material, Mesh, Scene, Surface, Texture, built_in};
 pub use photonmill::settings::scene::{Effect, Illumination, Part, SceneSettings};
@@ -27,12 +27,12 @@ pub use photonmill::verify::judge::Judge;
 
 pub use super::family::Family;
 pub use super::lit::{
-    BOTH, assert_builders_agree, flights, glass, grid, irradiances, lamp, level, matt, mean_red, means, mirror, radiances, received,
-    same_light, scene, scene_of, seen, shaft, shining,
+    BOTH, assert_builders_agree, beam, cone, disc, fixed_radius, flights, glass, grid, irradiances, lamp, level, mapped, matt, mean_red,
+    means, mirror, moved, point, radiances, received, red, same_light, scene, scene_of, seen, shaft, shining, sun, tessellated,
 };
 pub use super::program::{Place, text};
 pub use super::{
-    Check, Complaint, Device, JUDGED, Kind, assert_complains, assert_complains_of, assert_holds, device, device_with, draws_of, equal_sums,
-    in_order, no_gpu, open, outcome_of, pairs, photons, photons_on_cpu, plan_for, plan_for_host, relative_check, run, run_on_cpu,
-    run_scene, run_scene_on_cpu, same_photons, same_sums, share_check, streams_of, upload_photons, z_check,
+    Check, Complaint, Device, JUDGED, Kind, assert_complains, assert_complains_of, assert_holds, closed_box, device, device_with, draws_of,
+    equal_sums, gathered, in_order, no_gpu, open, outcome_of, pairs, photons, photons_on_cpu, plan_for, plan_for_host, relative_check, run,
+    run_on_cpu, run_scene, run_scene_on_cpu, same_photons, same_sums, share_check, streams_of, z_check,
 };
