@@ -43,17 +43,8 @@ fn the_box_costs_what_it_did() {
     let Some(gpu) = device() else { return };
     for (builder, counters) in Builder::ON_GPU.map(|builder| (builder, None)).into_iter().chain([(Builder::Atomic, Some(4))]) {
         // Strict, so that every device traces the same photons to the bit.
-        let settings = RoomSettings {
-            builder,
-            counters,
-            photons: 1000,
-            bounces: 4,
-            rounds: 2,
-            mesh: 8,
-            rng: Rng::Philox,
-            math: Math::Strict,
-            ..RoomSettings::default()
-        };
+        let strict = RoomSettings { mesh: 8, rng: Rng::Philox, math: Math::Strict, ..RoomSettings::default() };
+        let settings = RoomSettings { builder, counters, photons: 1000, bounces: 4, rounds: 2, ..strict };
         let outcome = run(&gpu, &settings);
         let counts = Counts::of(&outcome.fates[0], settings.rounds);
         let work = |pass| room::work(pass, &outcome.plan, &counts, 0.0).unwrap();

@@ -215,17 +215,8 @@ fn timings_nest_and_count() {
         for (rounds, bounces, chunk, gather) in
             [(1, 15, None, Gather::Grid), (7, 2, Some(1000), Gather::Brute), (40, 120, None, Gather::Grid)]
         {
-            let settings = RoomSettings {
-                builder,
-                rounds,
-                bounces,
-                chunk,
-                gather,
-                mesh: 16,
-                photons: 2001,
-                rng: Rng::Philox,
-                ..RoomSettings::default()
-            };
+            let small = RoomSettings { mesh: 16, photons: 2001, rng: Rng::Philox, ..RoomSettings::default() };
+            let settings = RoomSettings { builder, rounds, bounces, chunk, gather, ..small };
             let outcome = run(&gpu, &settings);
             let what = format!("{builder:?}, {rounds} rounds");
             assert_holds(&what, count_check(&outcome.timings, &settings, u64::from(outcome.plan.chunks_per_round)));
@@ -237,22 +228,12 @@ fn timings_nest_and_count() {
                 }
             }
             let wall = outcome.timings.row("run").unwrap().wall_ms.unwrap();
-            let waited: f64 = outcome
-                .timings
-                .rows()
-                .iter()
-                .filter(|row| !row.name.contains('/') && row.name != "run")
-                .filter_map(|row| row.wall_ms)
-                .sum();
+            let top = outcome.timings.rows().iter().filter(|row| !row.name.contains('/') && row.name != "run");
+            let waited: f64 = top.filter_map(|row| row.wall_ms).sum();
             assert!(waited <= wall, "{what}: waited {waited} ms of {wall}");
             // Spans of the trace file add up to the rows.
-            let spans: f64 = outcome
-                .timings
-                .spans()
-                .iter()
-                .filter(|span| span.clock == Clock::Gpu && span.name == "round")
-                .map(|span| span.duration.as_secs_f64() * 1e3)
-                .sum();
+            let spans = outcome.timings.spans().iter().filter(|span| span.clock == Clock::Gpu && span.name == "round");
+            let spans: f64 = spans.map(|span| span.duration.as_secs_f64() * 1e3).sum();
             let row = outcome.timings.row("round").unwrap().gpu_ms.unwrap_or(0.0);
             assert!((spans - row).abs() <= 1e-6 * row.max(1.0), "{spans} and {row}");
         }

@@ -53,16 +53,9 @@ fn scenes_take_what_their_plan_says() {
         let scene: Scene = built_in::by_name(name).unwrap();
         let geometry = Geometry::new(&scene).unwrap();
         for illumination in BOTH {
-            let settings = SceneSettings {
-                photons: 777,
-                caustic_photons: 555,
-                bounces: 5,
-                rounds: 2,
-                chunk: Some(500),
-                illumination,
-                final_gather: illumination == Illumination::Split,
-                ..SceneSettings::default()
-            };
+            let small = SceneSettings { photons: 777, caustic_photons: 555, bounces: 5, rounds: 2, ..SceneSettings::default() };
+            let final_gather = illumination == Illumination::Split;
+            let settings = SceneSettings { chunk: Some(500), illumination, final_gather, ..small };
             let sensor = Sensor::Picture { width: 7, height: 5 };
             let plan = ScenePlan::new(&scene, &geometry, &settings, sensor, &limits).unwrap();
             let stated = plan.bytes;

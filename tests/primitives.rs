@@ -17,13 +17,8 @@ const GUARD: u32 = 0x5EAD_BEEF;
 
 /// Numbers of a linear congruential generator, 0 to `below` - 1.
 fn numbers(count: usize, below: u32) -> Vec<u32> {
-    let mut state = 12_345u64;
-    (0..count)
-        .map(|_| {
-            state = state.wrapping_mul(6_364_136_223_846_793_005).wrapping_add(1_442_695_040_888_963_407);
-            (state >> 33) as u32 % below
-        })
-        .collect()
+    let step = |state: &u64| Some(state.wrapping_mul(6_364_136_223_846_793_005).wrapping_add(1_442_695_040_888_963_407));
+    std::iter::successors(Some(12_345u64), step).skip(1).take(count).map(|state| (state >> 33) as u32 % below).collect()
 }
 
 /// The device's exclusive prefix sums, and the guard words that stand behind them in the same buffer.
@@ -42,14 +37,7 @@ fn prefix_sums(gpu: &Device, items: &[u32], group_size: u32) -> (Vec<u32>, Vec<u
 }
 
 fn running_sums(items: &[u32]) -> Vec<u32> {
-    items
-        .iter()
-        .scan(0u32, |before, item| {
-            let sum = *before;
-            *before = before.wrapping_add(*item);
-            Some(sum)
-        })
-        .collect()
+    items.iter().scan(0u32, |sum, item| Some(std::mem::replace(sum, sum.wrapping_add(*item)))).collect()
 }
 
 fn same_numbers(found: &[u32], expected: &[u32]) -> Check {
@@ -68,24 +56,9 @@ fn the_prefix_sum_is_the_running_sum() {
     for group_size in [32, 128, 1024].into_iter().filter(|size| *size <= gpu.facts().work_group_size) {
         let subgroup = gpu.facts().subgroup_size * SCAN_ITEMS;
         let block = group_size * SCAN_ITEMS;
-        let sizes = [
-            0,
-            1,
-            3,
-            4,
-            5,
-            subgroup - 1,
-            subgroup,
-            subgroup + 1,
-            block - 1,
-            block,
-            block + 1,
-            2 * block + 1,
-            block * block,
-            block * block + 1,
-            1_000_000,
-        ];
-        for size in sizes.into_iter().filter(|size| *size <= 1_100_000) {
+        let around = [subgroup, block].into_iter().flat_map(|size| [size - 1, size, size + 1]);
+        let more = [2 * block + 1, block * block, block * block + 1, 1_000_000];
+        for size in [0, 1, 3, 4, 5].into_iter().chain(around).chain(more).filter(|size| *size <= 1_100_000) {
             let items = numbers(size as usize, 1000);
             let (sums, behind) = prefix_sums(&gpu, &items, group_size);
             let what = format!("{size} items, groups of {group_size}");
@@ -452,22 +425,8 @@ fn indirect_dispatches_are_folded_below_the_limit() {
     let Some(gpu) = device() else { return };
     for group in [32u32, 128, 1024] {
         let row = 65_535 * group;
-        for items in [
-            0,
-            1,
-            group - 1,
-            group,
-            group + 1,
-            row - 1,
-            row,
-            row + 1,
-            row + group,
-            2 * row - 1,
-            2 * row,
-            2 * row + 1,
-            u32::MAX - 1,
-            u32::MAX,
-        ] {
+        let around = [group, row, 2 * row].into_iter().flat_map(|size| [size - 1, size, size + 1]);
+        for items in around.chain([0, 1, row + group, u32::MAX - 1, u32::MAX]) {
             for capacity in [u32::MAX, row, 1000] {
                 for counter in [0, 2] {
                     let push = DispatchSizePush { counter, capacity, items_per_group: group, max_groups: 65_535 };
@@ -500,15 +459,8 @@ fn rounds_around_a_full_row_of_groups_lose_no_photon() {
         // The builders dispatch alike, so one of them tries every count.
         let counts = if builder == Builder::Ballot { &[row - 1, row, row + 1, row + 33][..] } else { &[row + 33] };
         for &photon_count in counts {
-            let settings = RoomSettings {
-                builder,
-                photons: photon_count,
-                bounces: 1,
-                mesh: 1,
-                group_size: 32,
-                rng: Rng::Philox,
-                ..RoomSettings::default()
-            };
+            let of_one_bounce = RoomSettings { bounces: 1, mesh: 1, rng: Rng::Philox, ..RoomSettings::default() };
+            let settings = RoomSettings { builder, photons: photon_count, group_size: 32, ..of_one_bounce };
             let folded = run(&gpu, &settings);
             assert_eq!(folded.plan.chunks_per_round, 1, "{photon_count} photons do not fit one dispatch here");
             let ledger = folded.ledger();

@@ -107,16 +107,8 @@ const PHOTONS: u32 = 1 << 18;
 const SEEDS: u64 = 16;
 
 fn settings(builder: Builder, emission: EmissionLaw) -> RoomSettings {
-    RoomSettings {
-        builder,
-        emission,
-        photons: PHOTONS,
-        rng: Rng::Philox,
-        mesh: MESH as u32,
-        radius: DISC_RADIUS,
-        threads: 2,
-        ..RoomSettings::default()
-    }
+    let discs = RoomSettings { mesh: MESH as u32, radius: DISC_RADIUS, ..RoomSettings::default() };
+    RoomSettings { builder, emission, photons: PHOTONS, rng: Rng::Philox, threads: 2, ..discs }
 }
 
 fn photons_of(gpu: Option<&Device>, settings: &RoomSettings) -> Vec<Photon> {
@@ -367,17 +359,8 @@ fn the_box_of_triangles_has_the_irradiance_of_radiosity() {
                 *of_light = LAWS[law as usize].1;
             }
         }
-        let settings = SceneSettings {
-            illumination,
-            builder: Some(builder),
-            photons: 90_000,
-            bounces: BOUNCES as u32,
-            rounds: 1,
-            shadow_rays: 8,
-            radius: Some(DISC_RADIUS),
-            alpha: 1.0,
-            ..SceneSettings::default()
-        };
+        let settings =
+            SceneSettings { illumination, builder: Some(builder), shadow_rays: 8, ..mapped(90_000, 1, BOUNCES as u32, DISC_RADIUS) };
         let runs = irradiances(&gpu, &scene, &settings, &points, 1..25);
         for wall in 0..WALLS {
             let expected: f64 = disc_middles()

@@ -14,29 +14,11 @@ use photonmill::records::MathResults;
 
 /// Numbers of every size, evenly over exponents and mantissas, and those at which functions change their ways.
 fn operands() -> Vec<Vec2> {
+    #[rustfmt::skip]
     let odd = [
-        0.0,
-        1.0,
-        2.0,
-        3.0,
-        0.5,
-        1.0 - f32::EPSILON / 2.0,
-        1.0 + f32::EPSILON,
-        2.0 - f32::EPSILON,
-        16_777_215.0,
-        16_777_217.0,
-        f32::MIN_POSITIVE,
-        1e-40,
-        f32::from_bits(1),
-        f32::MAX,
-        f32::INFINITY,
-        std::f32::consts::SQRT_2,
-        0.414_213_57,
-        1e-30,
-        1e30,
-        125.5,
-        127.5,
-        128.0,
+        0.0, 1.0, 2.0, 3.0, 0.5, 1.0 - f32::EPSILON / 2.0, 1.0 + f32::EPSILON, 2.0 - f32::EPSILON, 16_777_215.0, 16_777_217.0,
+        f32::MIN_POSITIVE, 1e-40, f32::from_bits(1), f32::MAX, f32::INFINITY, std::f32::consts::SQRT_2, 0.414_213_57, 1e-30, 1e30,
+        125.5, 127.5, 128.0,
     ];
     let signed: Vec<f32> = odd.iter().flat_map(|number| [*number, -number]).collect();
     let pairs = signed.iter().flat_map(|a| signed.iter().map(|b| Vec2::new(*a, *b)));

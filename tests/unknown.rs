@@ -45,14 +45,8 @@ fn no_run_ends_on_a_picture_that_nothing_has_reached() {
     let camera = Camera::looking_at("camera", dvec3(0.0, 1.5, 1.9), DVec3::ZERO, DVec3::Y, 1.2);
     let mut black = 0;
     for seed in 1..=6 {
-        let settings = SceneSettings {
-            photons: 300,
-            rounds: 40,
-            shadow_rays: 1,
-            seed,
-            stop: Stop { error: Some(0.02), ..Stop::default() },
-            ..SceneSettings::default()
-        };
+        let stop = Stop { error: Some(0.02), ..Stop::default() };
+        let settings = SceneSettings { photons: 300, rounds: 40, shadow_rays: 1, seed, stop, ..SceneSettings::default() };
         let lit = seen(&gpu, &scene, &settings, &camera, [6, 6]);
         assert_eq!((lit.end, lit.film.rounds), (End::Rounds, 40), "seed {seed}");
         if is_black(&lit) {

@@ -35,6 +35,7 @@ use photonmill::error::Error;
 use photonmill::gpu::{Commands, Gpu, Options};
 use photonmill::photon::{Origin, Photon, StoredPhoton};
 use photonmill::plan::{Limits, RoomPlan};
+use photonmill::records::RandomKey;
 use photonmill::rng::{self, Rng, Streams};
 use photonmill::scene::open_box::open_box;
 use photonmill::scene::room::{RoomScene, Wall};
@@ -213,11 +214,14 @@ pub fn draws_of(streams: Streams, round: u32, photon: u32, bounces: u32) -> Vec<
         Rng::Sobol => UVec2::new(key.photons_before.wrapping_add(photon), 0),
         _ => rng::words(streams.jump(round, photon + 1).apply(rng::srand48(streams.seed as u32))),
     };
-    let mut stream = rng::open_stream(streams.rng, &key, photon, start);
-    let mut draws = rng::draw_emission(streams.rng, &key, photon, &mut stream).to_vec();
-    for bounce in 0..bounces {
-        draws.extend(rng::draw_bounce(streams.rng, &key, photon, bounce, &mut stream));
-    }
+    draws_from(streams.rng, &key, photon, start, bounces)
+}
+
+/// The same of a stream that starts here.
+pub fn draws_from(rng: Rng, key: &RandomKey, photon: u32, start: UVec2, bounces: u32) -> Vec<f32> {
+    let mut stream = rng::open_stream(rng, key, photon, start);
+    let mut draws = rng::draw_emission(rng, key, photon, &mut stream).to_vec();
+    (0..bounces).for_each(|bounce| draws.extend(rng::draw_bounce(rng, key, photon, bounce, &mut stream)));
     draws
 }
 
