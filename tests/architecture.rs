@@ -1,9 +1,9 @@
 //! The order of the house, read off the sources: a file uses only what stands to its left on the line, no files use each
 //! other in a circle, the device layer knows no photon, and the CPU's twin and the judge know no engine.
 
-use std::collections::{BTreeMap, BTreeSet};
 use std::fs;
-use std::path::{Path, PathBuf};
+
+use crate::common::prelude::*;
 
 /// From left to right; what stands side by side does not know each other. The longest name decides for a file.
 const LINE: &[&[&str]] = &[

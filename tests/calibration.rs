@@ -1,55 +1,41 @@
 //! Physical units: what the film says in W/m2 against closed forms of the direct light, against the
 //! arrivals of the independent f64 model, and against its own photon counts.
 
-use std::f64::consts::{PI, TAU};
-
+use crate::common::prelude::*;
 use crate::common::reference::{Arrival, Emission, HALF_EDGE, MESH, Model, texels_in_reach};
-use crate::common::{Check, assert_complains, assert_holds, device, pairs, run, run_on_cpu, z_check};
 use photonmill::engine::room::RunResult;
 use photonmill::engine::room::film::{WallEstimate, estimate_walls};
-use photonmill::rng::Rng;
-use photonmill::scene::open_box::open_box;
-use photonmill::settings::{EmissionLaw, RoomSettings};
+use photonmill::verify::judge::radiosity::{inward, on_wall};
 
 fn walls(outcome: &RunResult) -> Vec<WallEstimate> {
     estimate_walls(&outcome.film, &open_box(&outcome.plan.settings), &outcome.plan)
 }
 
-/// The point of a wall at the given coordinates along the two axes after the wall's own.
-fn on_wall(wall: usize, s: f64, t: f64) -> [f64; 3] {
-    let axis = wall / 2;
-    let mut point = [0.0; 3];
-    point[axis] = if wall.is_multiple_of(2) { -HALF_EDGE } else { HALF_EDGE };
-    point[(axis + 1) % 3] = s;
-    point[(axis + 2) % 3] = t;
-    point
+fn irradiance_of(outcome: &RunResult) -> Vec<f64> {
+    walls(outcome).into_iter().flat_map(|wall| wall.irradiance).collect()
 }
 
 /// Irradiance at a point of a wall from a disc of light of 1 W in the centre of a wall on the negative
 /// side: the integral of intensity * cosine / distance^2 over the disc, by the midpoint rule on rings
 /// of equal area. The disc lies in its wall, so that wall receives nothing.
-fn direct_from(light_wall: usize, emission: EmissionLaw, receiver_wall: usize, point: [f64; 3], rings: usize, spokes: usize) -> f64 {
+fn direct_from(light_wall: usize, emission: EmissionLaw, receiver_wall: usize, point: DVec3, rings: usize, spokes: usize) -> f64 {
     if light_wall == receiver_wall {
         return 0.0;
     }
     let radius = 0.05;
-    let (light_axis, receiver_axis) = (light_wall / 2, receiver_wall / 2);
-    let inward = if receiver_wall.is_multiple_of(2) { 1.0 } else { -1.0 };
     let mut sum = 0.0;
     for ring in 0..rings {
         let distance = radius * ((ring as f64 + 0.5) / rings as f64).sqrt();
         for spoke in 0..spokes {
             let angle = TAU * (spoke as f64 + 0.5) / spokes as f64;
             let from = on_wall(light_wall, distance * angle.cos(), distance * angle.sin());
-            let ray: [f64; 3] = std::array::from_fn(|axis| point[axis] - from[axis]);
-            let squared = ray.iter().map(|x| x * x).sum::<f64>();
-            let length = squared.sqrt();
+            let ray = point - from;
             let intensity = match emission {
                 EmissionLaw::Uniform => 1.0 / TAU,
-                EmissionLaw::Cosine => ray[light_axis] / length / PI,
+                EmissionLaw::Cosine => ray.dot(inward(light_wall)) / ray.length() / PI,
             };
-            let arriving = -ray[receiver_axis] * inward / length;
-            sum += intensity * arriving.max(0.0) / squared;
+            let arriving = -ray.dot(inward(receiver_wall)) / ray.length();
+            sum += intensity * arriving.max(0.0) / ray.length_squared();
         }
     }
     sum / (rings * spokes) as f64
@@ -121,16 +107,12 @@ fn expected_direct(settings: &RoomSettings) -> Vec<(f64, f64)> {
     let albedo = f64::from(settings.reflectance);
     let texel = |i: usize| (i as f64 + 0.5) / mesh as f64 * 2.0 * HALF_EDGE - HALF_EDGE;
     let mut expected = Vec::new();
-    for wall in 0..5 {
-        for row in 0..mesh {
-            for column in 0..mesh {
-                let (flux, area) = direct_on_disc(settings.emission, wall, [texel(column), texel(row)], settings.radius);
-                let of_light = f64::from(settings.photons) / 2.0;
-                // Each photon of a light is stored in the disc with the probability albedo * flux.
-                let variance: f64 = flux.iter().map(|flux| of_light * albedo * flux * (1.0 - albedo * flux)).sum();
-                expected.push((flux.iter().sum::<f64>() / area, variance.sqrt() / of_light / albedo / area));
-            }
-        }
+    for (wall, place) in (0..5).flat_map(|wall| (0..mesh * mesh).map(move |place| (wall, place))) {
+        let (flux, area) = direct_on_disc(settings.emission, wall, [texel(place % mesh), texel(place / mesh)], settings.radius);
+        let of_light = f64::from(settings.photons) / 2.0;
+        // Each photon of a light is stored in the disc with the probability albedo * flux.
+        let variance: f64 = flux.iter().map(|flux| of_light * albedo * flux * (1.0 - albedo * flux)).sum();
+        expected.push((flux.iter().sum::<f64>() / area, variance.sqrt() / of_light / albedo / area));
     }
     expected
 }
@@ -138,13 +120,8 @@ fn expected_direct(settings: &RoomSettings) -> Vec<(f64, f64)> {
 /// Each texel, and all of them together, against the expected irradiance. Discs must not overlap, so
 /// that the texels' errors are as good as independent.
 fn direct_check(irradiance: &[f64], expected: &[(f64, f64)]) -> Check {
-    let total = |values: &mut dyn Iterator<Item = f64>| values.sum::<f64>();
-    z_check(
-        "all texels",
-        total(&mut irradiance.iter().copied()),
-        total(&mut expected.iter().map(|(mean, _)| *mean)),
-        total(&mut expected.iter().map(|(_, error)| error * error)).sqrt(),
-    )?;
+    let (mean, variance) = expected.iter().fold((0.0, 0.0), |(sum, variance), (mean, error)| (sum + mean, variance + error * error));
+    z_check("all texels", irradiance.iter().sum(), mean, variance.sqrt())?;
     for (texel, (found, (mean, error))) in pairs(irradiance, expected).enumerate() {
         z_check(&format!("texel {texel}"), *found, *mean, *error)?;
     }
@@ -162,7 +139,7 @@ fn direct_light_is_the_closed_form() {
     for emission in [EmissionLaw::Uniform, EmissionLaw::Cosine] {
         let settings = direct_settings(emission);
         let outcome = run(&gpu, &settings);
-        let irradiance: Vec<f64> = walls(&outcome).into_iter().flat_map(|wall| wall.irradiance).collect();
+        let irradiance = irradiance_of(&outcome);
         let expected = expected_direct(&settings);
         assert_holds(format!("{emission:?}"), direct_check(&irradiance, &expected));
 
@@ -170,14 +147,11 @@ fn direct_light_is_the_closed_form() {
         assert_complains("a gain of 1 %", direct_check(&gained, &expected));
         // A gather that looks 1 % too far, divided by the area it should have looked at.
         let wider = RoomSettings { radius: 1.01 * settings.radius, edge_correction: false, ..settings.clone() };
-        let wider: Vec<f64> =
-            walls(&run(&gpu, &wider)).into_iter().flat_map(|wall| wall.irradiance).map(|value| value * 1.01 * 1.01).collect();
+        let wider: Vec<f64> = irradiance_of(&run(&gpu, &wider)).iter().map(|value| value * 1.01 * 1.01).collect();
         assert_complains("a radius 1 % too large", direct_check(&wider, &expected));
         let other = if emission == EmissionLaw::Uniform { EmissionLaw::Cosine } else { EmissionLaw::Uniform };
-        assert_complains(
-            "the other law of emission",
-            direct_check(&irradiance, &expected_direct(&RoomSettings { emission: other, ..settings })),
-        );
+        let by_other = expected_direct(&RoomSettings { emission: other, ..settings });
+        assert_complains("the other law of emission", direct_check(&irradiance, &by_other));
     }
 }
 
@@ -188,9 +162,8 @@ fn power_and_rounds_scale_as_watts_do() {
     let Some(gpu) = device() else { return };
     let settings = RoomSettings { photons: 400_000, ..direct_settings(EmissionLaw::Uniform) };
     let mean = |settings: &RoomSettings| {
-        let walls = walls(&run(&gpu, settings));
-        let texels = walls.len() * walls[0].irradiance.len();
-        walls.iter().flat_map(|wall| &wall.irradiance).sum::<f64>() / texels as f64
+        let irradiance = irradiance_of(&run(&gpu, settings));
+        irradiance.iter().sum::<f64>() / irradiance.len() as f64
     };
     let expected = expected_direct(&settings);
     let one_watt = expected.iter().map(|(mean, _)| mean).sum::<f64>() / expected.len() as f64;
@@ -275,7 +248,7 @@ fn stored_photons_over_albedo_are_the_arriving_ones() {
         Some(gpu) => run(&gpu, &settings),
         None => run_on_cpu(&settings),
     };
-    let irradiance: Vec<f64> = walls(&outcome).into_iter().flat_map(|wall| wall.irradiance).collect();
+    let irradiance = irradiance_of(&outcome);
     let blocks = Blocks { radius: settings.radius };
     let found = blocks.means(&irradiance);
 

@@ -1,200 +1,136 @@
 //! The program as a user meets it: refusals in one line with exit code 2, outputs whole or not at
 //! all, help, progress, the CPU builder where there is no Vulkan, and Ctrl-C.
 
-use std::collections::HashMap;
 use std::io::{BufRead, BufReader};
-use std::path::Path;
-use std::process::{Command, Output, Stdio};
+use std::process::{Command, Stdio};
 
-use crate::common::pairs;
+use crate::common::prelude::*;
+use crate::common::program::{entries, validated, without_vulkan};
 use serde_json::Value;
-
-/// The program, run in a folder of its own.
-fn photonmill(folder: &Path, arguments: &[&str]) -> Command {
-    let mut command = Command::new(env!("CARGO_BIN_EXE_photonmill"));
-    command.current_dir(folder).args(arguments).stdin(Stdio::null());
-    command
-}
-
-fn run(folder: &Path, arguments: &[&str]) -> Output {
-    photonmill(folder, arguments).output().expect("the program starts")
-}
-
-/// Arguments that choose the device under test, with the validation layer on.
-fn on_device(arguments: &[&'static str]) -> Vec<String> {
-    let mut all: Vec<String> = arguments.iter().map(ToString::to_string).collect();
-    if std::env::var_os("PHOTONMILL_NO_GPU").is_none() {
-        all.push("--validate".into());
-    }
-    if let Ok(device) = std::env::var("PHOTONMILL_DEVICE") {
-        all.extend(["--device".into(), device]);
-    }
-    all
-}
-
-fn run_on_device(folder: &Path, arguments: &[&'static str]) -> Output {
-    let arguments = on_device(arguments);
-    run(folder, &arguments.iter().map(String::as_str).collect::<Vec<_>>())
-}
-
-fn text(bytes: &[u8]) -> String {
-    String::from_utf8_lossy(bytes).into_owned()
-}
-
-fn json(path: &Path) -> Value {
-    serde_json::from_slice(&std::fs::read(path).expect("the report was written")).expect("the report is JSON")
-}
-
-fn entries(folder: &Path) -> Vec<String> {
-    std::fs::read_dir(folder).unwrap().map(|entry| entry.unwrap().file_name().to_string_lossy().into_owned()).collect()
-}
 
 /// The bias is measured before the run, so that one line says what is being done and the last one that it was in vain.
 #[test]
 fn an_error_below_the_bias_is_refused() {
-    let folder = tempfile::tempdir().unwrap();
-    let output = run(folder.path(), &["--error", "2%", "--bias", "--radius", "0.2", "--mesh", "8", "--variant", "cpu"]);
+    let place = Place::new();
+    let output = place.run("--error 2% --bias --radius 0.2 --mesh 8 --variant cpu");
     let stderr = text(&output.stderr);
     assert_eq!(output.status.code(), Some(2), "{stderr}");
     let [_device, _plan, measuring, refused] = stderr.lines().collect::<Vec<_>>()[..] else { panic!("four lines expected: {stderr}") };
     assert!(measuring.contains("measuring the bias"), "{stderr}");
     assert!(refused.starts_with("photonmill: --error 2%") && refused.contains("a smaller --radius"), "{stderr}");
     assert!(output.stdout.is_empty(), "{}", text(&output.stdout));
-    assert_eq!(entries(folder.path()), Vec::<String>::new());
+    assert_eq!(place.names(), Vec::<String>::new());
 }
 
 #[test]
 fn bad_input_is_refused_in_one_line() {
     // Arguments, and what the line must name: option, value, what is allowed.
-    let cases: &[(&[&str], [&str; 3])] = &[
-        (&["--photons", "0"], ["--photons", "0", "from 2"]),
-        (&["--photons", "-5"], ["--photons", "-5", "from 2 to 2147483648"]),
-        (&["--photons", "5000000000"], ["--photons", "5000000000", "from 2 to 2147483648"]),
-        (&["--rounds", "-3"], ["--rounds", "-3", "from 1 to 4294967295"]),
-        (&["--rounds", "5000000000"], ["--rounds", "5000000000", "from 1 to 4294967295"]),
-        (&["--bounces", "-99999999999999999999999999999999999999999"], ["--bounces", "-99", "from 1 to 10000"]),
-        (&["--bounces", "99999999999999999999999999999999999999999"], ["--bounces", "99", "from 1 to 10000"]),
-        (&["--threads", "-3"], ["--threads", "-3", "from 1 to 1024"]),
-        (&["--seed", "-1"], ["--seed", "-1", "from 0 to 18446744073709551615"]),
-        (&["render", "cornell", "-o", "a.png", "--rounds", "-3"], ["--rounds", "-3", "from 1 to 1048576"]),
-        (&["study", "cornell", "-o", "s", "--seed", "-1"], ["--seed", "-1", "from 0 to 4294966295"]),
-        (&["--photons", "many"], ["--photons", "many", "whole number"]),
-        (&["--rounds", "0"], ["--rounds", "0", "from 1"]),
-        (&["--bounces", "0"], ["--bounces", "0", "from 1"]),
-        (&["--radius", "0"], ["--radius", "0", "0.5"]),
-        (&["--radius", "0.51"], ["--radius", "0.51", "0.5"]),
-        (&["--radius", "-0.1"], ["--radius", "-0.1", "0.5"]),
-        (&["--radius", "nan"], ["--radius", "nan", "0.5"]),
-        (&["--radius", "inf"], ["--radius", "inf", "0.5"]),
-        (&["--nearest", "5"], ["--nearest", "5", "--gather kdtree"]),
-        (&["--nearest", "5", "--gather", "grid"], ["--nearest", "5", "--gather kdtree"]),
-        (&["--gather", "kdtree", "--nearest", "1"], ["--nearest", "1", "from 2 to 1024"]),
-        (&["--gather", "kdtree", "--nearest", "1025"], ["--nearest", "1025", "from 2 to 1024"]),
-        (&["--gather", "kdtree", "--nearest", "some"], ["--nearest", "some", "whole number"]),
-        (&["--gather", "kdtree", "--nearest", "9", "--chunk", "100"], ["--chunk", "100", "--photons 5000 or more"]),
-        (&["--full-light", "0"], ["--full-light", "0", "from 1e-12"]),
-        (&["--shininess", "-1"], ["--shininess", "-1", "0 or more"]),
-        (&["--shininess", "nan"], ["--shininess", "nan", "0 or more"]),
-        (&["--shininess", "1,2"], ["--shininess", "1,2", "left,right,floor,ceiling,back"]),
-        (&["--reflectance", "1.1"], ["--reflectance", "1.1", "0 to 1"]),
-        (&["--light-power", "1,-1"], ["--light-power", "-1", "from 1e-12"]),
-        (&["--light-radius", "0.3"], ["--light-radius", "0.3", "0.25"]),
-        (&["--variant", "atomik"], ["--variant", "atomik", "naive, atomic, ballot, group, scan, persistent, cpu, auto"]),
-        (&["--rng", "dice"], ["--rng", "dice", "rand48, mt, philox, sobol"]),
-        (&["--rng", "mt", "--bounces", "75"], ["--bounces", "75", "74"]),
-        (&["--rng", "sobol", "--photons", "2147483648", "--rounds", "3"], ["--rng", "sobol", "philox"]),
-        (&["--sums", "double"], ["--sums", "double", "integer, f32, compensated"]),
-        (&["--seed", "4294967296"], ["--seed", "4294967296", "4294967295"]),
-        (&["--group-size", "48"], ["--group-size", "48", "power of two"]),
-        (&["--counters", "3"], ["--counters", "3", "power of two up to 64"]),
-        (&["--threads", "0"], ["--threads", "0", "from 1"]),
-        (&["--chunk", "1"], ["--chunk", "1", "from 2"]),
-        (&["--photons", "2147483648", "--rounds", "100000", "--rng", "rand48"], ["--rng", "rand48", "philox"]),
-        (&["--photons", "2147483648", "--rounds", "100000", "--rng", "philox"], ["--rounds", "100000", "fewer"]),
-        (&["--device", "no such card"], ["--device", "no such card", "available: "]),
-        (&["--device", "0", "--variant", "cpu"], ["--device", "0", "leave one"]),
-        (&["--device", "999"], ["--device", "999", "available: "]),
-        (&["--device", ""], ["--device", "must match exactly one", "available: "]),
-        (&["--validate", "--variant", "cpu"], ["--validate", "on", "leave one"]),
-        (&["--eye", "0,0,1e20"], ["--eye", "0,0,1", "from -1e15"]),
-        (&["--light-power", "1e308,1e308"], ["--light-power", "1", "1e12"]),
-        (&["-o", "new.png/"], ["-o", "new.png", "folder"]),
-        (&["--json", "x", "--trace", "x"], ["--trace x", "--json", "writes it too"]),
-        (&["-o", "d.png", "--json", "./d.png"], ["./d.png", "-o", "writes it too"]),
-        (&["--irradiance", "i", "--radiosity", "i"], ["--radiosity", "left.exr", "--irradiance writes it too"]),
-        (&["--irradiance", ".", "--json", "layout.json"], ["layout.json", "--json", "writes it too"]),
-        (&["-o", "absent/a.png"], ["-o", "absent/a.png", "folder"]),
-        (&["-o", "a.jpg"], ["-o", "a.jpg", ".png or .exr"]),
-        (&["--json", "absent/a.json"], ["--json", "absent/a.json", "folder"]),
-        (&["--json", "."], ["--json", ".", "folder"]),
-        (&["--trace", "absent/a.json"], ["--trace", "absent/a.json", "folder"]),
-        (&["--irradiance", "/dev/null/x"], ["--irradiance", "/dev/null/x", "cannot be written"]),
-        (&["--irradiance", "i", "--reflectance", "0"], ["--reflectance", "0", "above 0"]),
-        (&["--error", "0%"], ["--error", "0", "0.0001 %"]),
-        (&["--error", "few"], ["--error", "few", "per cent"]),
-        (&["--confidence", "10%"], ["--confidence", "10%", "50 %"]),
-        (&["--time", "0s"], ["--time", "0", "1ms"]),
-        (&["--total-photons", "0"], ["--total-photons", "0", "from 1"]),
-        (&["--colour"], ["--colour", "no such option", "--help"]),
-        (&["bakery"], ["bakery", "no such command", "--help"]),
-        (&["paper"], ["--out", "required", "photonmill paper -o paper"]),
-        (&["render", "cornell"], ["required", "--output <FILE>", "photonmill render cornell-spheres -o picture.png"]),
-        (&["render"], ["--output <FILE> and <SCENE>", "photonmill render cornell-spheres", "-o picture.png"]),
-        (&["--size", "64"], ["--size", "is an option of render and plan;", "photonmill render --help"]),
-        (&["devices", "--points", "p"], ["--points", "is an option of probe", "--help"]),
-        (
-            &["render", "cornell", "-o", "a.png", "--mesh", "8"],
-            ["--mesh", "is an option of photonmill without a command", "photonmill --help"],
-        ),
-        (&["render", "absent.glb", "-o", "a.png"], ["photonmill: absent.glb: the file cannot be read", "no such file", ""]),
-        (&["probe", "cornell", "--points", "p", "-o", "-", "--json", "-"], ["--json -", "-o - already is standard output", "name a file"]),
-        (&["--photons", "5", "render", "cornell", "-o", "a.png"], ["render", "options stand after the command", "--photons"]),
-        (&["bake", "cornell", "-o", "-"], ["-o -", "standard output", "several files"]),
-        (&["paper", "--out", "p", "--longest", "0s"], ["--longest", "0s", "above 0"]),
-        (&["paper", "--out", "/dev/null/x"], ["-o", "/dev/null/x", "cannot be written"]),
+    let cases: [(&str, [&str; 3]); 82] = [
+        ("--photons 0", ["--photons", "0", "from 2"]),
+        ("--photons -5", ["--photons", "-5", "from 2 to 2147483648"]),
+        ("--photons 5000000000", ["--photons", "5000000000", "from 2 to 2147483648"]),
+        ("--rounds -3", ["--rounds", "-3", "from 1 to 4294967295"]),
+        ("--rounds 5000000000", ["--rounds", "5000000000", "from 1 to 4294967295"]),
+        ("--bounces -99999999999999999999999999999999999999999", ["--bounces", "-99", "from 1 to 10000"]),
+        ("--bounces 99999999999999999999999999999999999999999", ["--bounces", "99", "from 1 to 10000"]),
+        ("--threads -3", ["--threads", "-3", "from 1 to 1024"]),
+        ("--seed -1", ["--seed", "-1", "from 0 to 18446744073709551615"]),
+        ("render cornell -o a.png --rounds -3", ["--rounds", "-3", "from 1 to 1048576"]),
+        ("study cornell -o s --seed -1", ["--seed", "-1", "from 0 to 4294966295"]),
+        ("--photons many", ["--photons", "many", "whole number"]),
+        ("--rounds 0", ["--rounds", "0", "from 1"]),
+        ("--bounces 0", ["--bounces", "0", "from 1"]),
+        ("--radius 0", ["--radius", "0", "0.5"]),
+        ("--radius 0.51", ["--radius", "0.51", "0.5"]),
+        ("--radius -0.1", ["--radius", "-0.1", "0.5"]),
+        ("--radius nan", ["--radius", "nan", "0.5"]),
+        ("--radius inf", ["--radius", "inf", "0.5"]),
+        ("--nearest 5", ["--nearest", "5", "--gather kdtree"]),
+        ("--nearest 5 --gather grid", ["--nearest", "5", "--gather kdtree"]),
+        ("--gather kdtree --nearest 1", ["--nearest", "1", "from 2 to 1024"]),
+        ("--gather kdtree --nearest 1025", ["--nearest", "1025", "from 2 to 1024"]),
+        ("--gather kdtree --nearest some", ["--nearest", "some", "whole number"]),
+        ("--gather kdtree --nearest 9 --chunk 100", ["--chunk", "100", "--photons 5000 or more"]),
+        ("--full-light 0", ["--full-light", "0", "from 1e-12"]),
+        ("--shininess -1", ["--shininess", "-1", "0 or more"]),
+        ("--shininess nan", ["--shininess", "nan", "0 or more"]),
+        ("--shininess 1,2", ["--shininess", "1,2", "left,right,floor,ceiling,back"]),
+        ("--reflectance 1.1", ["--reflectance", "1.1", "0 to 1"]),
+        ("--light-power 1,-1", ["--light-power", "-1", "from 1e-12"]),
+        ("--light-radius 0.3", ["--light-radius", "0.3", "0.25"]),
+        ("--variant atomik", ["--variant", "atomik", "naive, atomic, ballot, group, scan, persistent, cpu, auto"]),
+        ("--rng dice", ["--rng", "dice", "rand48, mt, philox, sobol"]),
+        ("--rng mt --bounces 75", ["--bounces", "75", "74"]),
+        ("--rng sobol --photons 2147483648 --rounds 3", ["--rng", "sobol", "philox"]),
+        ("--sums double", ["--sums", "double", "integer, f32, compensated"]),
+        ("--seed 4294967296", ["--seed", "4294967296", "4294967295"]),
+        ("--group-size 48", ["--group-size", "48", "power of two"]),
+        ("--counters 3", ["--counters", "3", "power of two up to 64"]),
+        ("--threads 0", ["--threads", "0", "from 1"]),
+        ("--chunk 1", ["--chunk", "1", "from 2"]),
+        ("--photons 2147483648 --rounds 100000 --rng rand48", ["--rng", "rand48", "philox"]),
+        ("--photons 2147483648 --rounds 100000 --rng philox", ["--rounds", "100000", "fewer"]),
+        ("--device 'no such card'", ["--device", "no such card", "available: "]),
+        ("--device 0 --variant cpu", ["--device", "0", "leave one"]),
+        ("--device 999", ["--device", "999", "available: "]),
+        ("--device ''", ["--device", "must match exactly one", "available: "]),
+        ("--validate --variant cpu", ["--validate", "on", "leave one"]),
+        ("--eye 0,0,1e20", ["--eye", "0,0,1", "from -1e15"]),
+        ("--light-power 1e308,1e308", ["--light-power", "1", "1e12"]),
+        ("-o new.png/", ["-o", "new.png", "folder"]),
+        ("--json x --trace x", ["--trace x", "--json", "writes it too"]),
+        ("-o d.png --json ./d.png", ["./d.png", "-o", "writes it too"]),
+        ("--irradiance i --radiosity i", ["--radiosity", "left.exr", "--irradiance writes it too"]),
+        ("--irradiance . --json layout.json", ["layout.json", "--json", "writes it too"]),
+        ("-o absent/a.png", ["-o", "absent/a.png", "folder"]),
+        ("-o a.jpg", ["-o", "a.jpg", ".png or .exr"]),
+        ("--json absent/a.json", ["--json", "absent/a.json", "folder"]),
+        ("--json .", ["--json", ".", "folder"]),
+        ("--trace absent/a.json", ["--trace", "absent/a.json", "folder"]),
+        ("--irradiance /dev/null/x", ["--irradiance", "/dev/null/x", "cannot be written"]),
+        ("--irradiance i --reflectance 0", ["--reflectance", "0", "above 0"]),
+        ("--error 0%", ["--error", "0", "0.0001 %"]),
+        ("--error few", ["--error", "few", "per cent"]),
+        ("--confidence 10%", ["--confidence", "10%", "50 %"]),
+        ("--time 0s", ["--time", "0", "1ms"]),
+        ("--total-photons 0", ["--total-photons", "0", "from 1"]),
+        ("--colour", ["--colour", "no such option", "--help"]),
+        ("bakery", ["bakery", "no such command", "--help"]),
+        ("paper", ["--out", "required", "photonmill paper -o paper"]),
+        ("render cornell", ["required", "--output <FILE>", "photonmill render cornell-spheres -o picture.png"]),
+        ("render", ["--output <FILE> and <SCENE>", "photonmill render cornell-spheres", "-o picture.png"]),
+        ("--size 64", ["--size", "is an option of render and plan;", "photonmill render --help"]),
+        ("devices --points p", ["--points", "is an option of probe", "--help"]),
+        ("render cornell -o a.png --mesh 8", ["--mesh", "is an option of photonmill without a command", "photonmill --help"]),
+        ("render absent.glb -o a.png", ["photonmill: absent.glb: the file cannot be read", "no such file", ""]),
+        ("probe cornell --points p -o - --json -", ["--json -", "-o - already is standard output", "name a file"]),
+        ("--photons 5 render cornell -o a.png", ["render", "options stand after the command", "--photons"]),
+        ("bake cornell -o -", ["-o -", "standard output", "several files"]),
+        ("paper --out p --longest 0s", ["--longest", "0s", "above 0"]),
+        ("paper --out /dev/null/x", ["-o", "/dev/null/x", "cannot be written"]),
     ];
-    let folder = tempfile::tempdir().unwrap();
-    for (arguments, named) in cases {
-        let output = run(folder.path(), arguments);
-        let stderr = text(&output.stderr);
-        assert_eq!(output.status.code(), Some(2), "{arguments:?}: {stderr}");
-        assert_eq!(stderr.trim_end().lines().count(), 1, "{arguments:?}: {stderr}");
-        assert!(stderr.starts_with("photonmill: "), "{arguments:?}: {stderr}");
-        for word in named {
-            assert!(stderr.contains(word), "{arguments:?} must name {word:?}: {stderr}");
-        }
-        assert!(output.stdout.is_empty(), "{arguments:?}: {}", text(&output.stdout));
-        assert_eq!(entries(folder.path()), Vec::<String>::new(), "{arguments:?} left something behind");
-    }
+    Place::new().assert_refused(cases);
+}
+
+#[test]
+fn the_check_of_refusals_complains() {
+    let place = Place::new();
+    assert!(place.refusal("--version").unwrap_err().contains("ends with Some(0)"));
+    let unnamed = std::panic::catch_unwind(|| place.assert_refused([("--photons 0", ["--photons"]), ("--photons 0", ["--rounds"])]));
+    assert!(unnamed.unwrap_err().downcast_ref::<String>().unwrap().contains("must name \"--rounds\""));
 }
 
 #[test]
 fn a_run_writes_everything_it_was_asked_for() {
-    let folder = tempfile::tempdir().unwrap();
-    let at = |name: &str| folder.path().join(name);
-    let arguments = [
-        "--variant",
-        "atomic",
-        "-o",
-        "a.exr",
-        "--json",
-        "a.json",
-        "--trace",
-        "t.json",
-        "--irradiance",
-        "irradiance",
-        "--radiosity",
-        "radiosity",
-    ];
-    let output = run_on_device(folder.path(), &arguments);
-    assert!(output.status.success(), "{}", text(&output.stderr));
-    let stdout = text(&output.stdout);
+    let place = Place::new();
+    let (stdout, _) =
+        place.succeed(&validated("--variant atomic -o a.exr --json a.json --trace t.json --irradiance irradiance --radiosity radiosity"));
     assert!(stdout.contains(": 1 round of 5000 photons, ") && !stdout.contains("(s)"), "{stdout}");
     // What the driver repeats of the device's name is left out.
     let device: Vec<&str> = stdout.lines().next().unwrap().split([' ', ',', '(', ')']).filter(|word| !word.is_empty()).collect();
     assert!((1..device.len()).all(|word| !device[..word].contains(&device[word])), "{device:?}");
     // The CPU builder takes a photon through all its bounces at once.
-    let on_gpu = std::env::var_os("PHOTONMILL_NO_GPU").is_none();
+    let on_gpu = !no_gpu();
     let bounce = on_gpu.then_some("bounce 15");
     for word in ["ledger: 5000 emitted = 2498 absorbed + 2498 escaped + 4 cut off + 0 dropped", "7511 photons stored", "gather"]
         .into_iter()
@@ -203,7 +139,7 @@ fn a_run_writes_everything_it_was_asked_for() {
         assert!(stdout.contains(word), "{word}: {stdout}");
     }
 
-    let report = json(&at("a.json"));
+    let report = place.json("a.json");
     let ledger = &report["ledger"];
     let count = |fate: &str| ledger[fate].as_u64().unwrap();
     assert_eq!(count("emitted"), count("absorbed") + count("escaped") + count("cut_off") + count("dropped"));
@@ -221,19 +157,18 @@ fn a_run_writes_everything_it_was_asked_for() {
     }
     assert!(named("round")["wall_ms"].as_f64().unwrap() > 0.0);
 
-    let trace = json(&at("t.json"));
+    let trace = place.json("t.json");
     let spans = trace["traceEvents"].as_array().unwrap();
     assert!(spans.iter().any(|span| span["name"] == "gather" && span["dur"].as_f64().unwrap() > 0.0), "{spans:?}");
 
-    let layout = json(&at("irradiance/layout.json"));
+    let layout = place.json("irradiance/layout.json");
     let walls = layout["walls"].as_array().unwrap();
     assert_eq!(walls.iter().map(|wall| wall["name"].as_str().unwrap()).collect::<Vec<_>>(), ["left", "right", "floor", "ceiling", "back"]);
     let floor = &walls[2];
     assert_eq!(floor["origin"], serde_json::json!([-0.25, -0.25, -0.25]));
     assert_eq!((&floor["u"], &floor["v"]), (&serde_json::json!([0.0, 0.0, 0.5]), &serde_json::json!([0.5, 0.0, 0.0])));
     assert_eq!((&floor["width"], &floor["height"], &floor["file"]), (&64.into(), &64.into(), &"floor.exr".into()));
-    let texels = |path: &str| image::open(at(path)).unwrap().into_rgb32f().into_raw();
-    let (irradiance, radiosity) = (texels("irradiance/floor.exr"), texels("radiosity/floor.exr"));
+    let (irradiance, radiosity) = (place.pixels("irradiance/floor.exr"), place.pixels("radiosity/floor.exr"));
     assert_eq!(irradiance.len(), 3 * 64 * 64);
     for (irradiance, radiosity) in pairs(&irradiance, &radiosity) {
         assert!((radiosity - 0.75 * irradiance).abs() <= 1e-6 * irradiance, "{radiosity} {irradiance}");
@@ -241,18 +176,16 @@ fn a_run_writes_everything_it_was_asked_for() {
     // 2 W in a box of 1.25 m2 of walls: some watts a square metre.
     let mean = irradiance.iter().sum::<f32>() / irradiance.len() as f32;
     assert!((1.0..4.0).contains(&mean), "{mean}");
-    assert!(image::open(at("a.exr")).is_ok());
+    place.picture("a.exr");
 }
 
 /// How far and how wrong: progress as lines, why the run ended, noise, bias and error images.
 #[test]
 fn a_run_says_how_wrong_it_is() {
-    let folder = tempfile::tempdir().unwrap();
-    let arguments = ["--photons", "501", "--mesh", "8", "--error", "90%", "--bias", "--progress", "json", "--json", "a.json"];
-    let output = run_on_device(folder.path(), &[&arguments[..], &["--irradiance", "i"]].concat());
-    assert!(output.status.success(), "{}", text(&output.stderr));
+    let place = Place::new();
+    let line = "--photons 501 --mesh 8 --error 90% --bias --progress json --json a.json --irradiance i";
+    let (stdout, stderr) = place.succeed(&validated(line));
     // Warnings stay text.
-    let stderr = text(&output.stderr);
     let lines = stderr.lines().filter(|line| !line.starts_with("photonmill: "));
     let lines: Vec<Value> = lines.map(|line| serde_json::from_str(line).expect(line)).collect();
     const STEP: [&str; 8] = ["done", "error", "error_wanted", "ledger", "photons", "seconds", "seconds_left", "total"];
@@ -263,7 +196,7 @@ fn a_run_says_how_wrong_it_is() {
     let last = lines.last().expect("progress is told");
     assert_eq!(last["ledger"]["emitted"], last["photons"]);
     assert!(last["error"].as_f64().unwrap() <= last["error_wanted"].as_f64().unwrap() && last["seconds_left"].is_number(), "{last}");
-    let report = json(&folder.path().join("a.json"));
+    let report = place.json("a.json");
     assert_eq!((&report["end"], &report["rounds"], &report["cancelled"]), (&"error".into(), &30.into(), &false.into()));
     let known = |value: &Value| value.as_f64().unwrap();
     let (noise, bias) = (known(&report["error_bound"]), known(&report["bias"]["upper"]));
@@ -272,27 +205,21 @@ fn a_run_says_how_wrong_it_is() {
         (noise.hypot(bias + lost) - known(&last["error"])).abs() < 1e-9 && lost > 0.0 && noise > known(&report["relative_error"]),
         "{report}"
     );
-    for word in [
-        "ended at the requested error",
-        "noise: ",
-        "bias of the radius: ",
-        "light cut off after 15 bounces: ",
-        "noise, bias and light cut off: ",
-    ] {
-        assert!(text(&output.stdout).contains(word), "{word}: {}", text(&output.stdout));
+    let words =
+        "ended at the requested error|noise: |bias of the radius: |light cut off after 15 bounces: |noise, bias and light cut off: ";
+    for word in words.split('|') {
+        assert!(stdout.contains(word), "{word}: {stdout}");
     }
-    let texels = |name: &str| image::open(folder.path().join(name)).unwrap().into_rgb32f().into_raw();
-    let (light, errors) = (texels("i/floor.exr"), texels("i/floor-error.exr"));
+    let (light, errors) = (place.pixels("i/floor.exr"), place.pixels("i/floor-error.exr"));
     assert!(pairs(&light, &errors).all(|(light, error)| *error > 0.0 && error < light), "{errors:?}");
 }
 
 #[test]
 fn the_builders_write_the_same_picture() {
-    let folder = tempfile::tempdir().unwrap();
-    let picture = |builder: &'static str| {
-        let output = run_on_device(folder.path(), &["--variant", builder, "--rounds", "2", "--rng", "philox", "-o", "a.png"]);
-        assert!(output.status.success(), "{}", text(&output.stderr));
-        std::fs::read(folder.path().join("a.png")).unwrap()
+    let place = Place::new();
+    let picture = |builder: &str| {
+        place.succeed(&validated(&format!("--variant {builder} --rounds 2 --rng philox -o a.png")));
+        std::fs::read(place.at("a.png")).unwrap()
     };
     let naive = picture("naive");
     for builder in ["atomic", "ballot", "group", "scan", "persistent", "auto"] {
@@ -303,13 +230,11 @@ fn the_builders_write_the_same_picture() {
 /// Whoever asks for the fastest gets the one that took least; the times of all are printed.
 #[test]
 fn the_fastest_builder_is_taken() {
-    let folder = tempfile::tempdir().unwrap();
-    let auto = |bounces: &'static str| {
-        let arguments = ["--variant", "auto", "--bounces", bounces, "--photons", "500", "--mesh", "4", "-o", "a.png", "--json", "a.json"];
-        let output = run_on_device(folder.path(), &arguments);
-        assert!(output.status.success(), "{}", text(&output.stderr));
-        let stderr = text(&output.stderr).to_owned();
-        let taken = json(&folder.path().join("a.json"))["settings"]["builder"].as_str().unwrap().to_owned();
+    let place = Place::new();
+    let auto = |bounces: u32| {
+        let line = format!("--variant auto --bounces {bounces} --photons 500 --mesh 4 -o a.png --json a.json");
+        let (_, stderr) = place.succeed(&validated(&line));
+        let taken = place.json("a.json")["settings"]["builder"].as_str().unwrap().to_owned();
         if taken == "cpu" {
             // There is no device here.
             return Vec::new();
@@ -325,32 +250,24 @@ fn the_fastest_builder_is_taken() {
         times
     };
     let holds = |times: &[(String, f64)], builder: &str| times.iter().any(|(name, _)| name == builder);
-    let short = auto("15");
+    let short = auto(15);
     // A persistent invocation would loop too long.
-    let long = auto("1001");
+    let long = auto(1001);
     assert!(short.is_empty() || (short.len() == 6 && long.len() == 5 && holds(&short, "persistent") && !holds(&long, "persistent")));
 }
 
 #[test]
 fn without_vulkan_the_cpu_builder_runs() {
-    let folder = tempfile::tempdir().unwrap();
-    // A loader that knows no driver is a machine without a device.
-    let without = |arguments: &[&str]| {
-        photonmill(folder.path(), arguments)
-            .env("VK_DRIVER_FILES", "/nonexistent")
-            .env("VK_ICD_FILENAMES", "/nonexistent")
-            .output()
-            .unwrap()
-    };
-    let output = without(&["-o", "a.png", "--json", "a.json", "--quiet"]);
+    let place = Place::new();
+    let output = place.run_without_vulkan("-o a.png --json a.json --quiet");
     let stderr = text(&output.stderr);
     assert!(output.status.success(), "{stderr}");
     assert_eq!(stderr.trim_end().lines().count(), 1, "{stderr}");
     assert!(["no Vulkan device", "install", "CPU builder"].iter().all(|word| stderr.contains(word)), "{stderr}");
-    let report = json(&folder.path().join("a.json"));
+    let report = place.json("a.json");
     assert_eq!((&report["device"], &report["ledger"]["stored"]), (&"cpu".into(), &7511.into()));
 
-    let refused = without(&["--device", "0"]);
+    let refused = place.run_without_vulkan("--device 0");
     assert_eq!(refused.status.code(), Some(2));
     assert!(text(&refused.stderr).contains("available: none"), "{}", text(&refused.stderr));
 }
@@ -364,18 +281,11 @@ fn an_interrupt_saves_what_is_finished() {
 }
 
 fn interrupted(signal: &str, code: i32) {
-    let folder = tempfile::tempdir().unwrap();
-    let arguments = on_device(&["--rounds", "4000000", "--rng", "philox", "-o", "a.png", "--json", "a.json", "--progress", "json"]);
+    let place = Place::new();
+    let line = validated("photonmill --rounds 4000000 --rng philox -o a.png --json a.json --progress json");
     // The program leaves alone what it was started to ignore, and tests that nohup or a script's & starts ignore some signals.
-    let mut child = Command::new("env")
-        .args(["--default-signal=INT,TERM,HUP", env!("CARGO_BIN_EXE_photonmill")])
-        .args(&arguments)
-        .current_dir(folder.path())
-        .stdin(Stdio::null())
-        .stdout(Stdio::piped())
-        .stderr(Stdio::piped())
-        .spawn()
-        .unwrap();
+    let mut child = place.shell(&format!("exec env --default-signal=INT,TERM,HUP {line}"));
+    let mut child = child.stdout(Stdio::piped()).stderr(Stdio::piped()).spawn().unwrap();
     // A run that does not end must not hang the test.
     let id = child.id().to_string();
     let guard = Command::new("bash").args(["-c", &format!("sleep 600; kill -9 {id}")]).stdout(Stdio::null()).stderr(Stdio::null()).spawn();
@@ -387,30 +297,27 @@ fn interrupted(signal: &str, code: i32) {
     let output = child.wait_with_output().unwrap();
     let _ = guard.and_then(|mut guard| guard.kill());
     assert_eq!(output.status.code(), Some(code), "{signal}: {rest:?}");
-    let report = json(&folder.path().join("a.json"));
+    let report = place.json("a.json");
     let emitted = report["ledger"]["emitted"].as_u64().unwrap();
     assert!(emitted > 0 && emitted < 4_000_000 * 5000, "{emitted}");
     assert_eq!((&report["cancelled"], &report["ledger"]["dropped"]), (&true.into(), &0.into()));
     // The picture is that of the photons that were emitted, not a dark one.
-    let picture = image::open(folder.path().join("a.png")).unwrap().into_luma8();
+    let picture = place.picture("a.png").into_luma8();
     let brightest = picture.pixels().map(|pixel| pixel.0[0]).max().unwrap();
     assert!(brightest > 100, "{brightest}");
-    let mut names = entries(folder.path());
-    names.sort();
-    assert_eq!(names, ["a.json", "a.png"]);
+    assert_eq!(place.names(), ["a.json", "a.png"]);
 }
 
 /// Device and plan first, then a line every few seconds; --quiet turns all of it off.
 #[test]
 fn a_run_says_what_it_does() {
-    let start = |quiet: &[&str]| {
-        let folder = tempfile::tempdir().unwrap();
-        let arguments = ["--variant", "cpu", "--photons", "300", "--mesh", "4", "--error", "0.0002", "--time", "4s", "-o", "a.png"];
-        let mut command = photonmill(folder.path(), &[&arguments[..], quiet].concat());
-        (command.stdout(Stdio::piped()).stderr(Stdio::piped()).spawn().unwrap(), folder)
+    let start = |quiet: &str| {
+        let place = Place::new();
+        let mut command = place.command(&format!("--variant cpu --photons 300 --mesh 4 --error 0.0002 --time 4s -o a.png {quiet}"));
+        (command.stdout(Stdio::piped()).stderr(Stdio::piped()).spawn().unwrap(), place)
     };
-    let (mut talking, _folder) = start(&[]);
-    let (silent, _other) = start(&["--quiet"]);
+    let (mut talking, _place) = start("");
+    let (silent, _other) = start("--quiet");
     let mut lines = BufReader::new(talking.stderr.take().unwrap()).lines().map_while(Result::ok);
     let [device, plan] = [lines.next().unwrap(), lines.next().unwrap()];
     assert_eq!(device, "photonmill: device: CPU");
@@ -429,177 +336,128 @@ fn a_run_says_what_it_does() {
 /// Refusals name the value as it was typed, not what was made of it.
 #[test]
 fn values_are_shown_as_typed() {
-    let main = [
-        ("--photons", "00"),
-        ("--rounds", "000"),
-        ("--bounces", "010001"),
-        ("--mesh", "01025"),
-        ("--radius", "0.50100"),
-        ("--full-light", "1e-0013"),
-        ("--light-power", "1.0,1e-13"),
-        ("--light-power", "1,1e-9"),
-        ("--light-radius", ".3"),
-        ("--reflectance", "1.10"),
-        ("--shininess", "-1.0"),
-        ("--eye", "0,0,1e+20"),
-        ("--threads", "00"),
-        ("--group-size", "048"),
-        ("--counters", "03"),
-        ("--chunk", "01"),
-        ("--nearest", "05"),
-        ("--seed", "04294967296"),
-        ("--error", "-1%"),
-        ("--error", "-0.5"),
-        ("--error", "1e-5 %"),
-        ("--confidence", "0.95"),
-        ("--confidence", "-5%"),
-        ("--time", "-1m"),
-        ("--time", "0.1ms"),
-        ("--total-photons", "00"),
+    let values_of = [
+        (
+            "",
+            "--photons 00, --rounds 000, --bounces 010001, --mesh 01025, --radius 0.50100, --full-light 1e-0013, \
+            --light-power 1.0,1e-13, --light-power 1,1e-9, --light-radius .3, --reflectance 1.10, --shininess -1.0, \
+            --eye 0,0,1e+20, --threads 00, --group-size 048, --counters 03, --chunk 01, --nearest 05, --seed 04294967296, \
+            --error -1%, --error -0.5, --error 1e-5 %, --confidence 0.95, --confidence -5%, --time -1m, --time 0.1ms, \
+            --total-photons 00",
+        ),
+        (
+            "render cornell -o a.png",
+            "--samples 03, --shadow-rays 065, --alpha 1.50, --radius -1e-1, --caustic-radius -0.0, --exposure 1e3, --judge 01, \
+            --error 200.0%, --size -16x16",
+        ),
+        ("study cornell -o s", "--budget 0.1s, --side 01, --repeats 01"),
+        ("bench", "--time -1h"),
+        ("paper -o p", "--longest -90ms, --large 05000, --repeats 01001"),
     ];
-    let of_render = [
-        ("--samples", "03"),
-        ("--shadow-rays", "065"),
-        ("--alpha", "1.50"),
-        ("--radius", "-1e-1"),
-        ("--caustic-radius", "-0.0"),
-        ("--exposure", "1e3"),
-        ("--judge", "01"),
-        ("--error", "200.0%"),
-        ("--size", "-16x16"),
-    ];
-    let others: [(&[&str], &str, &str); 7] = [
-        (&["study", "cornell", "-o", "s"], "--budget", "0.1s"),
-        (&["study", "cornell", "-o", "s"], "--side", "01"),
-        (&["study", "cornell", "-o", "s"], "--repeats", "01"),
-        (&["bench"], "--time", "-1h"),
-        (&["paper", "-o", "p"], "--longest", "-90ms"),
-        (&["paper", "-o", "p"], "--large", "05000"),
-        (&["paper", "-o", "p"], "--repeats", "01001"),
-    ];
-    let all = main.iter().map(|(option, typed)| (&[][..], *option, *typed));
-    let all = all.chain(of_render.iter().map(|(option, typed)| (&["render", "cornell", "-o", "a.png"][..], *option, *typed)));
-    let folder = tempfile::tempdir().unwrap();
-    for (command, option, typed) in all.chain(others) {
-        let output = run(folder.path(), &[command, &[option, typed]].concat());
-        let stderr = text(&output.stderr);
-        assert_eq!(output.status.code(), Some(2), "{option} {typed}: {stderr}");
-        assert!(
-            stderr.starts_with(&format!("photonmill: {option} {typed}: ")) && stderr.lines().count() == 1,
-            "{option} {typed}: {stderr}"
-        );
+    let place = Place::new();
+    for (command, values) in values_of {
+        for (option, typed) in values.split(", ").map(|value| value.split_once(' ').unwrap()) {
+            let refusal = place.refusal(&format!("{command} {option} '{typed}'")).unwrap();
+            assert!(refusal.starts_with(&format!("photonmill: {option} {typed}: ")), "{option} {typed}: {refusal}");
+        }
     }
-    assert_eq!(entries(folder.path()), Vec::<String>::new());
 }
 
 /// Of a long value a message shows the beginning and the end.
 #[test]
 fn long_values_are_not_repeated_whole() {
     let long = "7".repeat(5000);
-    let [file, scene, option] = [format!("absent/{long}.png"), format!("{long}.glb"), format!("--{long}")];
-    let cases: [&[&str]; 14] = [
-        &["--photons", &long],
-        &["--eye", &long],
-        &["--variant", &long],
-        &["--replay", &long],
-        &["--device", &long],
-        &["-o", &file],
-        &[&option],
-        &[&long],
-        &["render", &long, "-o", "a.png"],
-        &["render", &scene, "-o", "a.png"],
-        &["render", "cornell", "-o", "a.png", "--camera", &long],
-        &["render", "cornell", "-o", "a.png", "--fixed-radius", &long],
-        &["probe", "cornell", "--points", &long, "-o", "a.csv"],
-        &["bench", "--only", &long],
-    ];
-    let folder = tempfile::tempdir().unwrap();
-    for arguments in cases {
-        let output = run(folder.path(), arguments);
-        let stderr = text(&output.stderr);
-        let is_short = stderr.lines().count() == 1 && stderr.len() < 600 && stderr.contains("777...777");
-        assert!(output.status.code() == Some(2) && is_short, "{:?}: {stderr}", arguments[0]);
+    let place = Place::new();
+    for line in [
+        "--photons LONG",
+        "--eye LONG",
+        "--variant LONG",
+        "--replay LONG",
+        "--device LONG",
+        "-o absent/LONG.png",
+        "--LONG",
+        "LONG",
+        "render LONG -o a.png",
+        "render LONG.glb -o a.png",
+        "render cornell -o a.png --camera LONG",
+        "render cornell -o a.png --fixed-radius LONG",
+        "probe cornell --points LONG -o a.csv",
+        "bench --only LONG",
+    ] {
+        let refusal = place.refusal(&line.replace("LONG", &long)).unwrap();
+        assert!(refusal.len() < 600 && refusal.contains("777...777"), "{line}: {refusal}");
     }
-    let line = format!("{long} 0 0 0 1 0\n");
-    std::fs::write(folder.path().join("points.txt"), line).unwrap();
-    let stderr = text(&run(folder.path(), &["probe", "cornell", "--points", "points.txt", "-o", "a.csv"]).stderr);
+    place.write("points.txt", format!("{long} 0 0 0 1 0\n"));
+    let stderr = text(&place.run("probe cornell --points points.txt -o a.csv").stderr);
     assert!(stderr.len() < 600 && stderr.contains("777...777") && stderr.contains("1e15"), "{stderr}");
 }
 
 #[test]
 fn help_takes_help() {
-    let folder = tempfile::tempdir().unwrap();
-    for (asked, meant) in
-        [(&["help", "--help"][..], &["help"][..]), (&["help", "-h"], &["help"]), (&["help", "plan", "--help"], &["help", "plan"])]
-    {
-        let [asked, meant] = [asked, meant].map(|arguments| run(folder.path(), arguments));
+    let place = Place::new();
+    for (asked, meant) in [("help --help", "help"), ("help -h", "help"), ("help plan --help", "help plan")] {
+        let [asked, meant] = [asked, meant].map(|line| place.run(line));
         assert!(asked.status.success() && asked.stdout == meant.stdout && !asked.stdout.is_empty(), "{}", text(&asked.stderr));
     }
 }
 
 #[test]
 fn a_slip_is_answered_with_what_was_meant() {
-    let folder = tempfile::tempdir().unwrap();
-    let cases: [(&[&str], &str); 8] = [
-        (&["render", "cornel", "-o", "a.png"], "did you mean cornell? "),
-        (&["rendr", "cornell"], "did you mean render?"),
-        (&["render", "cornell", "-o", "a.png", "--phtons", "3"], "did you mean --photons?"),
-        (&["--variant", "atomik"], "did you mean atomic?"),
-        (&["scene.glb"], "photonmill render scene.glb -o picture.png"),
-        (&["folder/Scene.GLTF", "-o", "a.png"], "photonmill render folder/Scene.GLTF -o picture.png"),
-        (&["-o", "a.png", "scene.glb"], "photonmill render scene.glb -o picture.png"),
-        (&["cornell-spheres"], "photonmill render cornell-spheres -o picture.png"),
+    let place = Place::new();
+    let cases: [(&str, [&str; 1]); 8] = [
+        ("render cornel -o a.png", ["did you mean cornell? "]),
+        ("rendr cornell", ["did you mean render?"]),
+        ("render cornell -o a.png --phtons 3", ["did you mean --photons?"]),
+        ("--variant atomik", ["did you mean atomic?"]),
+        ("scene.glb", ["photonmill render scene.glb -o picture.png"]),
+        ("folder/Scene.GLTF -o a.png", ["photonmill render folder/Scene.GLTF -o picture.png"]),
+        ("-o a.png scene.glb", ["photonmill render scene.glb -o picture.png"]),
+        ("cornell-spheres", ["photonmill render cornell-spheres -o picture.png"]),
     ];
-    for (arguments, meant) in cases {
-        let output = run(folder.path(), arguments);
-        let stderr = text(&output.stderr);
-        assert!(output.status.code() == Some(2) && stderr.lines().count() == 1 && stderr.contains(meant), "{arguments:?}: {stderr}");
-    }
+    place.assert_refused(cases);
 }
 
 #[test]
 fn without_arguments_it_says_how_to_start() {
-    let folder = tempfile::tempdir().unwrap();
-    let output = run(folder.path(), &[]);
+    let place = Place::new();
+    let output = place.run("");
     let stdout = text(&output.stdout);
     assert!(output.status.success() && output.stderr.is_empty(), "{}", text(&output.stderr));
     for word in ["photonmill render cornell-spheres -o picture.png", "photonmill render scene.glb", "--help"] {
         assert!(stdout.contains(word), "{word}: {stdout}");
     }
-    assert_eq!(entries(folder.path()), Vec::<String>::new());
+    assert_eq!(place.names(), Vec::<String>::new());
 }
 
 /// Before the run, whichever option names the file.
 #[test]
 fn names_that_the_file_system_refuses_are_found_at_once() {
     let long = "n".repeat(300);
-    let [png, exr] = [format!("{long}.png"), format!("{long}.exr")];
-    // With so many photons that a run would not end before the test does.
-    let endless = ["--variant", "cpu", "--rounds", "4000000000", "--photons", "2", "--bounces", "1", "-o", "a.png"];
-    let scene = ["cornell", "--rounds", "1000000", "-o"];
-    let cases: Vec<(Vec<&str>, &str)> = vec![
-        ([&endless[..8], &["-o", &png]].concat(), "-o"),
-        ([&endless[..], &["--json", &long]].concat(), "--json"),
-        ([&endless[..], &["--trace", &long]].concat(), "--trace"),
-        ([&endless[..], &["--irradiance", &long]].concat(), "--irradiance"),
-        ([&endless[..], &["--radiosity", &long]].concat(), "--radiosity"),
-        ([&["render"], &scene[..], &[&png]].concat(), "-o"),
-        ([&["render"], &scene[..], &["a.png", "--error-image", &exr]].concat(), "--error-image"),
-        ([&["render"], &scene[..], &["a.png", "--json", &long]].concat(), "--json"),
-        ([&["bake"], &scene[..], &[&long]].concat(), "-o"),
-        ([&["bake"], &scene[..], &["-"]].concat(), "-o"),
-        ([&["probe"], &scene[..], &[&long, "--points", "-"]].concat(), "-o"),
-        (vec!["plan", "cornell", "--json", &long], "--json"),
-        (vec!["devices", "--json", &long], "--json"),
-        (vec!["selfcheck", "--json", &long], "--json"),
-        (vec!["study", "cornell", "-o", &long], "-o"),
-        (vec!["bench", "-o", &long], "-o"),
-        (vec!["bench", "--json", &long], "--json"),
-        (vec!["paper", "-o", &long], "-o"),
-    ];
-    let folder = tempfile::tempdir().unwrap();
-    for (arguments, option) in cases {
-        let mut child = photonmill(folder.path(), &arguments).stdout(Stdio::piped()).stderr(Stdio::piped()).spawn().unwrap();
+    let place = Place::new();
+    for (line, option) in [
+        ("ENDLESS -o LONG.png", "-o"),
+        ("ENDLESS -o a.png --json LONG", "--json"),
+        ("ENDLESS -o a.png --trace LONG", "--trace"),
+        ("ENDLESS -o a.png --irradiance LONG", "--irradiance"),
+        ("ENDLESS -o a.png --radiosity LONG", "--radiosity"),
+        ("render SCENE -o LONG.png", "-o"),
+        ("render SCENE -o a.png --error-image LONG.exr", "--error-image"),
+        ("render SCENE -o a.png --json LONG", "--json"),
+        ("bake SCENE -o LONG", "-o"),
+        ("bake SCENE -o -", "-o"),
+        ("probe SCENE -o LONG --points -", "-o"),
+        ("plan cornell --json LONG", "--json"),
+        ("devices --json LONG", "--json"),
+        ("selfcheck --json LONG", "--json"),
+        ("study cornell -o LONG", "-o"),
+        ("bench -o LONG", "-o"),
+        ("bench --json LONG", "--json"),
+        ("paper -o LONG", "-o"),
+    ] {
+        // With so many photons that a run would not end before the test does.
+        let endless = line.replace("ENDLESS", "--variant cpu --rounds 4000000000 --photons 2 --bounces 1");
+        let words = endless.replace("SCENE", "cornell --rounds 1000000").replace("LONG", &long);
+        let mut child = place.command(&words).stdout(Stdio::piped()).stderr(Stdio::piped()).spawn().unwrap();
         // What is not refused would run for hours, and say so.
         let mut lines = BufReader::new(child.stderr.take().unwrap()).lines().map_while(Result::ok);
         let first = lines.next().unwrap_or_default();
@@ -608,42 +466,40 @@ fn names_that_the_file_system_refuses_are_found_at_once() {
         }
         let output = child.wait_with_output().unwrap();
         let is_refused = first.starts_with(&format!("photonmill: {option} ")) && first.contains("cannot be written");
-        assert!(output.status.code() == Some(2) && is_refused, "{arguments:?}: {first}");
-        assert_eq!(lines.next(), None, "{arguments:?}: {first}");
+        assert!(output.status.code() == Some(2) && is_refused, "{line}: {first}");
+        assert_eq!(lines.next(), None, "{line}: {first}");
     }
-    assert_eq!(entries(folder.path()), Vec::<String>::new());
+    assert_eq!(place.names(), Vec::<String>::new());
 }
 
 /// A disk that fills up during the run: everything is saved in another folder, which the error names.
 #[test]
 fn results_that_cannot_be_written_are_saved_elsewhere() {
-    let folder = tempfile::tempdir().unwrap();
-    std::os::unix::fs::symlink("/dev/full", folder.path().join("a.exr")).unwrap();
-    std::fs::create_dir(folder.path().join("tmp")).unwrap();
-    let arguments = ["--variant", "cpu", "--mesh", "8", "--json", "a.json", "-o", "a.exr", "--irradiance", "i", "--quiet"];
-    let output = photonmill(folder.path(), &arguments).env("TMPDIR", folder.path().join("tmp")).output().unwrap();
+    let place = Place::new();
+    std::os::unix::fs::symlink("/dev/full", place.at("a.exr")).unwrap();
+    std::fs::create_dir(place.at("tmp")).unwrap();
+    let mut command = place.command("--variant cpu --mesh 8 --json a.json -o a.exr --irradiance i --quiet");
+    let output = command.env("TMPDIR", place.at("tmp")).output().unwrap();
     let stderr = text(&output.stderr);
     assert_eq!((output.status.code(), stderr.lines().count()), (Some(2), 1), "{stderr}");
-    let [saved] = &entries(&folder.path().join("tmp"))[..] else { panic!("one folder expected: {stderr}") };
+    let [saved] = &entries(&place.at("tmp"))[..] else { panic!("one folder expected: {stderr}") };
     assert!(stderr.contains("-o a.exr") && stderr.contains(saved.as_str()), "{stderr}");
-    let saved = folder.path().join("tmp").join(saved);
-    assert_eq!(json(&saved.join("json/a.json"))["ledger"]["emitted"], 5000);
-    assert!(image::open(saved.join("output/a.exr")).is_ok() && image::open(saved.join("irradiance/floor.exr")).is_ok());
+    assert_eq!(place.json(&format!("tmp/{saved}/json/a.json"))["ledger"]["emitted"], 5000);
+    for file in ["output/a.exr", "irradiance/floor.exr"] {
+        place.picture(&format!("tmp/{saved}/{file}"));
+    }
     // The report is printed, and no destination holds a part.
     assert!(text(&output.stdout).contains("ledger: 5000 emitted"), "{}", text(&output.stdout));
-    assert!(!folder.path().join("a.json").exists());
+    assert!(!place.at("a.json").exists());
 }
 
 /// No file at all can grow, as with a full disk everywhere: what was measured is printed.
 #[test]
 fn a_measured_paper_run_is_not_lost_on_a_full_disk() {
-    let folder = tempfile::tempdir().unwrap();
-    let program = env!("CARGO_BIN_EXE_photonmill");
+    let place = Place::new();
     // Without a device it is the CPU builder's, which is the shortest.
-    let line = format!("ulimit -f 1; exec {program} paper -o p --large 5001 --repeats 1 --longest 1ms");
-    let mut command = Command::new("bash");
-    command.args(["-c", &line]).current_dir(folder.path()).stdin(Stdio::null());
-    let output = command.env("VK_DRIVER_FILES", "/nonexistent").env("VK_ICD_FILENAMES", "/nonexistent").output().unwrap();
+    let line = "ulimit -f 1; exec photonmill paper -o p --large 5001 --repeats 1 --longest 1ms";
+    let output = without_vulkan(&mut place.shell(line)).output().unwrap();
     let (stdout, stderr) = (text(&output.stdout), text(&output.stderr));
     assert_eq!(output.status.code(), Some(2), "{stderr}");
     assert!(stderr.lines().last().is_some_and(|line| line.contains("-o p/") && line.contains("cannot be written")), "{stderr}");
@@ -671,30 +527,14 @@ fn groups(help: &str) -> Vec<(String, Vec<String>)> {
 /// One order of headings, one heading and one kind of value for an option of all commands, examples at the end.
 #[test]
 fn help_is_grouped_alike_everywhere() {
-    const HEADINGS: [&str; 15] = [
-        "Commands",
-        "Arguments",
-        "Options",
-        "Output",
-        "Scene",
-        "When to stop",
-        "Measurements",
-        "Photons",
-        "Light transport",
-        "Density estimate",
-        "Implementation",
-        "Checks",
-        "Messages",
-        "Device",
-        "Examples",
-    ];
-    let folder = tempfile::tempdir().unwrap();
+    const HEADINGS: &str = "Commands|Arguments|Options|Output|Scene|When to stop|Measurements|Photons|Light transport|\
+        Density estimate|Implementation|Checks|Messages|Device|Examples";
+    let place = Place::new();
     let mut places: HashMap<String, (String, String)> = HashMap::new();
     for command in ["", "devices", "render", "bake", "probe", "plan", "selfcheck", "study", "bench", "paper"] {
-        let arguments: Vec<&str> = [command, "--help"].into_iter().filter(|word| !word.is_empty()).collect();
-        let help = text(&run(folder.path(), &arguments).stdout);
+        let help = text(&place.run(&format!("{command} --help")).stdout);
         let groups = groups(&help);
-        let order: Vec<_> = groups.iter().map(|(heading, _)| HEADINGS.iter().position(|known| known == heading)).collect();
+        let order: Vec<_> = groups.iter().map(|(heading, _)| HEADINGS.split('|').position(|known| known == heading)).collect();
         assert!(order.iter().all(Option::is_some) && order.is_sorted_by(|a, b| a < b), "{command}: {groups:?}");
         assert_eq!(groups.last().unwrap().0, "Examples", "{command}");
         assert!(help.contains(&format!("photonmill {command}").trim_end().to_owned()), "{command}");
@@ -712,7 +552,7 @@ fn help_is_grouped_alike_everywhere() {
             }
         }
         let takes_scene = ["render", "bake", "probe", "plan", "study"].contains(&command);
-        let missing = photonmill::scene::built_in::names().into_iter().find(|scene| !help.contains(scene));
+        let missing = built_in::names().into_iter().find(|scene| !help.contains(scene));
         assert!(!takes_scene || missing.is_none(), "{command}: {missing:?}");
         assert_eq!(help.contains("\nArguments:\n  <SCENE>"), takes_scene, "{command}");
     }
@@ -722,37 +562,28 @@ fn help_is_grouped_alike_everywhere() {
 /// A reader that goes away, a full disk: one line at most, no panic.
 #[test]
 fn output_that_nobody_takes_is_no_panic() {
-    let folder = tempfile::tempdir().unwrap();
-    let shell = |line: &str| {
-        let line = line.replace("photonmill", env!("CARGO_BIN_EXE_photonmill"));
-        Command::new("bash").args(["-c", &format!("set -o pipefail; {line}")]).current_dir(folder.path()).output().unwrap()
-    };
-    let gone = shell("photonmill --variant cpu -o a.png | true");
+    let place = Place::new();
+    let gone = place.shell("set -o pipefail; photonmill --variant cpu -o a.png | true").output().unwrap();
     assert!(gone.status.success(), "{}", text(&gone.stderr));
-    let full = shell("photonmill --variant cpu -o a.png --quiet > /dev/full");
-    assert_eq!((full.status.code(), text(&full.stderr).lines().count()), (Some(2), 1), "{}", text(&full.stderr));
-    let mute = shell("photonmill --photons 0 2> /dev/full");
-    assert_eq!(mute.status.code(), Some(2));
+    place.assert_shell("photonmill --variant cpu -o a.png --quiet > /dev/full", 2, 1);
+    place.assert_shell("photonmill --photons 0 2> /dev/full", 2, 0);
 }
 
 /// The paper's page, whole, at a large size that is hardly larger than the paper's.
 #[test]
 fn the_paper_is_regenerated() {
-    let folder = tempfile::tempdir().unwrap();
-    let output = run_on_device(folder.path(), &["paper", "--out", "paper", "--large", "5001", "--repeats", "1", "--longest", "9s"]);
-    assert!(output.status.success(), "{}", text(&output.stderr));
-    let mut names = entries(&folder.path().join("paper"));
-    names.sort();
+    let place = Place::new();
+    place.succeed(&validated("paper --out paper --large 5001 --repeats 1 --longest 9s"));
+    let names = entries(&place.at("paper"));
     let figures = ["figure1.png", "figure2.png", "figure3.png", "figure4.png"];
     assert_eq!(names, [&figures[..], &["index.html", "running_times.csv", "table1.csv"]].concat());
-    let page = std::fs::read_to_string(folder.path().join("paper/index.html")).unwrap();
     // Thousands are set apart by narrow spaces.
-    let page = page.replace('\u{202f}', "");
+    let page = place.text("paper/index.html").replace('\u{202f}', "");
     for word in ["still holds", "105640", "7511", "Figure 4", "data:image/png;base64,"] {
         assert!(page.contains(word), "{word}");
     }
     assert!(!page.contains("http://") && !page.contains("src=\"/"), "the page opens without a network");
-    let table = std::fs::read_to_string(folder.path().join("paper/table1.csv")).unwrap();
+    let table = place.text("paper/table1.csv");
     let published: Vec<&str> = table.lines().skip(1).filter_map(|line| line.rsplit(',').next()).collect();
     // By brute force the longest rows are left out on a slow device; the grid's are short.
     assert!(published.windows(5).any(|rows| rows == ["2130", "10670", "20850", "53280", "105640"]), "{published:?}");

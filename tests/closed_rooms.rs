@@ -1,20 +1,8 @@
 //! Light that is scattered to and fro and cannot leave, against closed forms: an integrating sphere, a furnace, parallel
 //! plates, the geometric series of bounces. `photonmill::verify::selfcheck` has the furnace that is a box.
 
-use std::f64::consts::PI;
-
-use crate::common::family::Family;
-use crate::common::lit::{BOTH, assert_builders_agree, grid, irradiances, level, matt, mirror, received, scene_of, shaft, shining};
-use crate::common::{JUDGED, device, run_scene, run_scene_on_cpu};
-use glam::{DVec3, Vec3};
+use crate::common::prelude::*;
 use photonmill::ledger::Fates;
-use photonmill::rng::Rng;
-use photonmill::scene::light::LightKind;
-use photonmill::scene::open_box::open_box;
-use photonmill::scene::room::Wall;
-use photonmill::scene::{Material, Mesh};
-use photonmill::settings::scene::{Illumination, SceneSettings};
-use photonmill::settings::{Builder, Gather, RoomSettings};
 
 /// A sphere of 1 m of flat triangles, seen from inside.
 fn hollow_sphere(segments: u32) -> Mesh {
@@ -91,15 +79,7 @@ fn an_integrating_sphere_multiplies_light() {
     for (albedo, bounces, photons) in [(Vec3::new(1.0, 0.99, 0.9), 60, 800), (Vec3::new(0.9, 0.5, 1.0), 16, 3000)] {
         let material = Material::lambert("wall", albedo);
         let scene = scene_of(vec![sphere.clone()], vec![material], vec![LightKind::Point { position: DVec3::ZERO, intensity }]);
-        let settings = SceneSettings {
-            illumination: Illumination::Photons,
-            photons,
-            bounces,
-            rounds: 1,
-            radius: Some(RADIUS),
-            alpha: 1.0,
-            ..SceneSettings::default()
-        };
+        let settings = mapped(photons, 1, bounces, RADIUS);
         assert_builders_agree(&gpu, &scene, &settings, &points);
         let runs = irradiances(&gpu, &scene, &settings, &points, 1..17);
         for channel in 0..3 {
@@ -122,15 +102,7 @@ fn a_furnace_sphere_is_evenly_lit() {
     let points = evenly_over(&sphere, 1500);
     let scene = scene_of(vec![sphere], vec![shining(0.5)], vec![]);
     let mut family = Family::default();
-    let settings = SceneSettings {
-        illumination: Illumination::Photons,
-        photons: 20_000,
-        bounces: 16,
-        rounds: 1,
-        radius: Some(RADIUS),
-        alpha: 1.0,
-        ..SceneSettings::default()
-    };
+    let settings = mapped(20_000, 1, 16, RADIUS);
     assert_builders_agree(&gpu, &scene, &settings, &points);
     let runs = irradiances(&gpu, &scene, &settings, &points, 1..17);
     let expected = 2.0 * PI * kept_by_horizon(&scene.meshes[0], &points, RADIUS);
@@ -153,17 +125,8 @@ fn parallel_plates_send_light_to_and_fro() {
     let scene = scene_of(meshes, vec![shining(below as f32), matt(above as f32), mirror(1.0)], vec![]);
     let mut family = Family::default();
     for illumination in BOTH {
-        let settings = SceneSettings {
-            illumination,
-            photons: 30_000,
-            caustic_photons: 20_000,
-            bounces: 48,
-            rounds: 1,
-            radius: Some(0.15),
-            caustic_radius: Some(0.15),
-            alpha: 1.0,
-            ..SceneSettings::default()
-        };
+        let shadow_rays = SceneSettings::default().shadow_rays;
+        let settings = SceneSettings { caustic_photons: 20_000, shadow_rays, ..fixed_radius(illumination, 30_000, 1, 48, 0.15) };
         let points = [grid(0.2, DVec3::NEG_Y, 6), grid(-0.2, DVec3::Y, 6)].concat();
         assert_builders_agree(&gpu, &scene, &settings, &points);
         let runs = irradiances(&gpu, &scene, &settings, &points, 1..25);
@@ -195,19 +158,10 @@ fn bounces_in_a_closed_room_are_a_geometric_series() {
     let mut family = Family::default();
     for rho in [0.5f32, 0.9, 0.99] {
         let fates = |builder, photons| {
-            let settings = RoomSettings {
-                builder,
-                reflectance: rho,
-                photons,
-                rng: Rng::Philox,
-                mesh: 1,
-                // So few points need no index of so many photons.
-                gather: Gather::Brute,
-                threads: 2,
-                ..RoomSettings::default()
-            };
-            let mut room = open_box(&settings);
-            room.faces[5] = Some(Wall { name: "front", albedo: rho, shininess: None });
+            // So few points need no index of so many photons.
+            let usual = RoomSettings { rng: Rng::Philox, mesh: 1, gather: Gather::Brute, threads: 2, ..RoomSettings::default() };
+            let settings = RoomSettings { builder, reflectance: rho, photons, ..usual };
+            let room = closed_box(&settings, rho);
             match gpu.as_ref().filter(|_| builder != Builder::Cpu) {
                 Some(gpu) => run_scene(gpu, &room, &settings),
                 None => run_scene_on_cpu(&room, &settings),

@@ -1,22 +1,12 @@
 //! What a run costs in counts, which no clock disturbs: dispatches, submissions, pipelines, events and bytes of a few
 //! small runs beside the numbers that they had. Whoever changes one of them on purpose writes the new one here.
 
-use crate::common::{device, device_with, lit, run};
-use photonmill::engine;
-
+use crate::common::lit;
+use crate::common::prelude::*;
 use photonmill::engine::scene::View;
-use photonmill::gpu::Options;
 use photonmill::measure::bench::room::{self, Counts};
 use photonmill::path::StoredPath;
-use photonmill::photon::{MapPhoton, Origin, StoredPhoton};
-use photonmill::plan::scene::ScenePlan;
-use photonmill::plan::sensor::Sensor;
 use photonmill::records::{CameraPath, LightPath, VisiblePoint};
-use photonmill::rng::Rng;
-use photonmill::scene::built_in;
-use photonmill::scene::geometry::Geometry;
-use photonmill::settings::scene::SceneSettings;
-use photonmill::settings::{Builder, Math, RoomSettings};
 
 /// Counts of a run: dispatches, submissions, events of all photons, bytes on the device, and bytes that the build moves.
 #[derive(Debug, PartialEq)]
@@ -53,17 +43,8 @@ fn the_box_costs_what_it_did() {
     let Some(gpu) = device() else { return };
     for (builder, counters) in Builder::ON_GPU.map(|builder| (builder, None)).into_iter().chain([(Builder::Atomic, Some(4))]) {
         // Strict, so that every device traces the same photons to the bit.
-        let settings = RoomSettings {
-            builder,
-            counters,
-            photons: 1000,
-            bounces: 4,
-            rounds: 2,
-            mesh: 8,
-            rng: Rng::Philox,
-            math: Math::Strict,
-            ..RoomSettings::default()
-        };
+        let strict = RoomSettings { mesh: 8, rng: Rng::Philox, math: Math::Strict, ..RoomSettings::default() };
+        let settings = RoomSettings { builder, counters, photons: 1000, bounces: 4, rounds: 2, ..strict };
         let outcome = run(&gpu, &settings);
         let counts = Counts::of(&outcome.fates[0], settings.rounds);
         let work = |pass| room::work(pass, &outcome.plan, &counts, 0.0).unwrap();

@@ -1,19 +1,13 @@
 //! The CPU builder: the same photons and the same film whatever the threads and whatever the vectors; and splatting adds
 //! to each texel what brute force finds there, to the bit.
 
-use crate::common::{Check, assert_complains, assert_holds, equal_sums, plan_for_host, run_on_cpu};
-use glam::{DVec3, Vec3};
+use crate::common::prelude::*;
 use photonmill::constants::NO_WALL;
 use photonmill::cpu::estimate::gather_brute;
 use photonmill::cpu::splat::Splats;
 use photonmill::cpu::trace::{Block, Tracer};
-use photonmill::photon::Photon;
-use photonmill::plan::{Limits, RoomPlan};
 use photonmill::records::Tally;
-use photonmill::rng::{Rng, philox};
-use photonmill::scene::open_box::open_box;
-use photonmill::scene::room::RoomScene;
-use photonmill::settings::{EmissionLaw, PhongDirection, RoomSettings, Sums};
+use photonmill::settings::PhongDirection;
 use pulp::Arch;
 use rayon::ThreadPoolBuilder;
 
@@ -62,17 +56,10 @@ fn neither_threads_nor_vectors_change_a_photon() {
             [(EmissionLaw::Uniform, [None; 5]), (EmissionLaw::Cosine, [Some(2.0), None, Some(0.5), Some(0.0), Some(50.0)])]
         {
             for photons in [2, 33, 513, 4099, 50_001] {
-                let settings = RoomSettings {
-                    photons,
-                    rounds: 2,
-                    rng,
-                    emission,
-                    shininess,
-                    light_power: [3.0, 0.5],
-                    phong_direction: if photons % 2 == 0 { PhongDirection::Mirror } else { PhongDirection::Sampled },
-                    chunk: Some(photons),
-                    ..RoomSettings::default()
-                };
+                let phong_direction = if photons % 2 == 0 { PhongDirection::Mirror } else { PhongDirection::Sampled };
+                let walls = RoomSettings { shininess, phong_direction, ..RoomSettings::default() };
+                let lights = RoomSettings { emission, light_power: [3.0, 0.5], ..walls };
+                let settings = RoomSettings { photons, rounds: 2, rng, chunk: Some(photons), ..lights };
                 let (scene, plan) = (open_box(&settings), plan_for_host(&settings));
                 let expected = traced(&scene, &plan, Arch::Scalar, 1);
                 assert!(photons < 500 || expected.iter().map(|(photons, _)| photons.len()).sum::<usize>() > photons as usize);
@@ -97,21 +84,12 @@ fn neither_threads_nor_vectors_change_a_photon() {
 
 #[test]
 fn threads_change_no_bit_of_a_film() {
+    let two = || RoomSettings { photons: 5001, rounds: 2, ..RoomSettings::default() };
     for (what, settings) in [
         ("one channel", RoomSettings { photons: 20_001, rounds: 3, rng: Rng::Philox, ..RoomSettings::default() }),
-        (
-            "two channels",
-            RoomSettings {
-                photons: 5001,
-                rounds: 2,
-                shininess: [Some(2.0); 5],
-                light_power: [2.0, 1.0],
-                mesh: 37,
-                ..RoomSettings::default()
-            },
-        ),
-        ("chunks", RoomSettings { photons: 5001, rounds: 2, chunk: Some(700), radius: 0.3, ..RoomSettings::default() }),
-        ("floats", RoomSettings { photons: 5001, rounds: 2, sums: Sums::F32, ..RoomSettings::default() }),
+        ("two channels", RoomSettings { shininess: [Some(2.0); 5], light_power: [2.0, 1.0], mesh: 37, ..two() }),
+        ("chunks", RoomSettings { chunk: Some(700), radius: 0.3, ..two() }),
+        ("floats", RoomSettings { sums: Sums::F32, ..two() }),
     ] {
         let expected = run_on_cpu(&RoomSettings { threads: 1, ..settings.clone() });
         for threads in [2, 3, 8] {
@@ -213,10 +191,8 @@ fn splats_are_the_sums_of_brute_force() {
                 for vectors in &kinds {
                     for threads in [1, 3] {
                         let found = splatted(&plan, &photons, *vectors, threads);
-                        assert_holds(
-                            format!("mesh {mesh}, radius {radius}, {vectors:?}, {threads} threads"),
-                            equal_sums("film", &found, &expected),
-                        );
+                        let what = format!("mesh {mesh}, radius {radius}, {vectors:?}, {threads} threads");
+                        assert_holds(what, equal_sums("film", &found, &expected));
                     }
                 }
                 let mut larger = plan.clone();
@@ -224,10 +200,8 @@ fn splats_are_the_sums_of_brute_force() {
                 if mesh >= 16 && radius >= 0.05 {
                     assert_complains("a larger radius", equal_sums("film", &splatted(&larger, &photons, Arch::Scalar, 1), &expected));
                 }
-                assert_complains(
-                    "a photon less",
-                    equal_sums("film", &splatted(&plan, &photons[..count as usize / 2], Arch::Scalar, 1), &expected),
-                );
+                let less = splatted(&plan, &photons[..count as usize / 2], Arch::Scalar, 1);
+                assert_complains("half of the photons", equal_sums("film", &less, &expected));
             }
         }
     }

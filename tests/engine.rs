@@ -1,23 +1,12 @@
 //! The engine: devices and their choice, the start-up check, validation messages, timings.
 
-use std::time::Instant;
-
-use crate::common::{Check, assert_complains, assert_holds, device, device_with, open, planted, run, run_on_cpu};
+use crate::common::planted;
+use crate::common::prelude::*;
 use photonmill::constants::LOOP_LIMIT;
 use photonmill::engine::choose_builder::choose_builder;
 use photonmill::engine::limits;
-use photonmill::error::Error;
+use photonmill::gpu::check;
 use photonmill::gpu::clock::LEAST_WARM_UP;
-use photonmill::gpu::{Commands, Constants, Gpu, Memory, Options, check};
-use photonmill::plan::RoomPlan;
-use photonmill::plan::scene::ScenePlan;
-use photonmill::plan::sensor::Sensor;
-use photonmill::rng::Rng;
-use photonmill::scene::Scene;
-use photonmill::scene::geometry::Geometry;
-use photonmill::scene::open_box::open_box;
-use photonmill::settings::scene::SceneSettings;
-use photonmill::settings::{Builder, Gather, RoomSettings};
 use photonmill::timings::{Clock, Row, Timings};
 
 /// Opening a device runs the start-up check on it, with 64-bit sums and with sums of two words.
@@ -226,17 +215,8 @@ fn timings_nest_and_count() {
         for (rounds, bounces, chunk, gather) in
             [(1, 15, None, Gather::Grid), (7, 2, Some(1000), Gather::Brute), (40, 120, None, Gather::Grid)]
         {
-            let settings = RoomSettings {
-                builder,
-                rounds,
-                bounces,
-                chunk,
-                gather,
-                mesh: 16,
-                photons: 2001,
-                rng: Rng::Philox,
-                ..RoomSettings::default()
-            };
+            let small = RoomSettings { mesh: 16, photons: 2001, rng: Rng::Philox, ..RoomSettings::default() };
+            let settings = RoomSettings { builder, rounds, bounces, chunk, gather, ..small };
             let outcome = run(&gpu, &settings);
             let what = format!("{builder:?}, {rounds} rounds");
             assert_holds(&what, count_check(&outcome.timings, &settings, u64::from(outcome.plan.chunks_per_round)));
@@ -248,22 +228,12 @@ fn timings_nest_and_count() {
                 }
             }
             let wall = outcome.timings.row("run").unwrap().wall_ms.unwrap();
-            let waited: f64 = outcome
-                .timings
-                .rows()
-                .iter()
-                .filter(|row| !row.name.contains('/') && row.name != "run")
-                .filter_map(|row| row.wall_ms)
-                .sum();
+            let top = outcome.timings.rows().iter().filter(|row| !row.name.contains('/') && row.name != "run");
+            let waited: f64 = top.filter_map(|row| row.wall_ms).sum();
             assert!(waited <= wall, "{what}: waited {waited} ms of {wall}");
             // Spans of the trace file add up to the rows.
-            let spans: f64 = outcome
-                .timings
-                .spans()
-                .iter()
-                .filter(|span| span.clock == Clock::Gpu && span.name == "round")
-                .map(|span| span.duration.as_secs_f64() * 1e3)
-                .sum();
+            let spans = outcome.timings.spans().iter().filter(|span| span.clock == Clock::Gpu && span.name == "round");
+            let spans: f64 = spans.map(|span| span.duration.as_secs_f64() * 1e3).sum();
             let row = outcome.timings.row("round").unwrap().gpu_ms.unwrap_or(0.0);
             assert!((spans - row).abs() <= 1e-6 * row.max(1.0), "{spans} and {row}");
         }

@@ -1,63 +1,25 @@
 //! Sums, estimates and sizes at their ends: more photons than f32 or 32 bits count, light over many decades, the
 //! least and the largest radius, one photon and none, and plans around every limit.
 
-use std::f64::consts::PI;
-use std::time::Instant;
-
 use crate::common::aimed::mean_and_error;
-use crate::common::family::Family;
-use crate::common::lit::{grid, level, matt, mean_red, means, received, received_within, scene, scene_of, seen};
-use crate::common::{
-    Check, Device, assert_complains, assert_holds, device, device_with, equal_sums, pairs, photons_on_cpu, plan_for, plan_for_host,
-    relative_check, run, run_on_cpu, run_scene, run_scene_on_cpu, share_check, upload_photons, z_check,
-};
-use glam::{DQuat, DVec3, EulerRot, Vec3};
+use crate::common::lit::received_within;
+use crate::common::prelude::*;
+use glam::EulerRot;
 use photonmill::cpu::bsdf::phong_lobe;
 use photonmill::engine::film::RoundSums;
-use photonmill::engine::room::constants;
-use photonmill::engine::room::estimate;
 use photonmill::engine::room::film::{RoomFilm, estimate_walls};
-use photonmill::engine::room::index;
-use photonmill::engine::room::resources::RoomResources;
 use photonmill::engine::scene::{RunResult, SceneFilm};
-use photonmill::gpu::{Commands, Gpu, Options};
 use photonmill::ledger::Fates;
-use photonmill::photon::{MapPhoton, Photon, StoredPhoton};
-use photonmill::plan::scene::{SEGMENT_BOUNCES, ScenePlan};
-use photonmill::plan::sensor::Sensor;
-use photonmill::plan::{Limits, RoomPlan};
+use photonmill::plan::scene::SEGMENT_BOUNCES;
 use photonmill::records::Tally;
-use photonmill::rng::Rng;
-use photonmill::scene::geometry::Geometry;
-use photonmill::scene::light::{Light, LightKind};
-use photonmill::scene::material::TextureUse;
-use photonmill::scene::open_box::open_box;
 use photonmill::scene::rectangle::disc_rectangle_area;
-use photonmill::scene::room::Wall;
-use photonmill::scene::texture::{Texture, Wrap};
-use photonmill::scene::{Material, Mesh, Scene};
-use photonmill::settings::scene::{Illumination, Kernel, Part, SceneSettings};
+use photonmill::settings::MAX_EVENTS;
+use photonmill::settings::scene::Kernel;
 use photonmill::settings::stop::Stop;
-use photonmill::settings::{Builder, EmissionLaw, Gather, MAX_EVENTS, RoomSettings};
 use photonmill::verify::selfcheck::measure::irradiance;
 
 /// Half of an f32's spacing below 1.
 const U: f64 = 1.0 / 16_777_216.0;
-
-/// Film sums of a photon list that is gathered again and again.
-fn gathered(gpu: &Device, settings: &RoomSettings, photons: &[Photon], times: u32) -> Vec<u64> {
-    let scene = open_box(settings);
-    let plan = plan_for(gpu, &scene, settings);
-    assert!(photons.len() <= plan.photon_capacity as usize);
-    let mut commands = Commands::new(gpu, constants(&plan), Instant::now()).unwrap();
-    let resources = RoomResources::new(gpu, &mut commands, &scene, &plan).unwrap();
-    upload_photons(&mut commands, &resources, &plan, photons);
-    index::build(&mut commands, &resources, &plan, settings.photons).unwrap();
-    for _ in 0..times {
-        estimate::gather(&mut commands, &resources, &plan, settings.photons).unwrap();
-    }
-    commands.read(&resources.film, plan.points.len() * plan.channel_count as usize).unwrap()
-}
 
 /// 42 million photons on one texel: f32 would stop counting at 2^24.
 #[test]
@@ -69,7 +31,8 @@ fn a_texel_counts_beyond_2_to_the_24() {
         let Some(gpu) = device_with(Options { without_int64_atomics, ..Options::default() }) else { return };
         let settings =
             RoomSettings { photons: count, chunk: Some(count), bounces: 1, mesh: 1, rng: Rng::Philox, ..RoomSettings::default() };
-        let found = gathered(&gpu, &settings, &vec![on_the_back_wall; count as usize], times);
+        let plan = plan_for(&gpu, &open_box(&settings), &settings);
+        let found = gathered(&gpu, &plan, &vec![on_the_back_wall; count as usize], times, None);
         assert_holds(format!("64-bit atomics masked: {without_int64_atomics}"), equal_sums("one texel", &found, &expected));
     }
     let in_f32 = (0..count * times).fold(0.0f32, |sum, _| sum + 1.0);
@@ -178,7 +141,7 @@ fn faint_light_is_right_to_half_a_film_unit() {
         let mut plane = scene("sky-over-plane");
         let albedo = 10f32.powi(exponent);
         plane.materials[0].base_colour = Vec3::splat(albedo);
-        let camera = photonmill::scene::Camera::looking_at("above", DVec3::Y * 1.5, DVec3::ZERO, DVec3::Z, 0.1);
+        let camera = Camera::looking_at("above", DVec3::Y * 1.5, DVec3::ZERO, DVec3::Z, 0.1);
         let lit = seen(&gpu, &plane, &settings, &camera, [8, 8]);
         let (found, expected) = (mean_red(&lit), f64::from(albedo));
         let half_unit = 0.5 / lit.plan.film_scale;
@@ -283,7 +246,7 @@ fn phong_weights_have_their_mean_and_vanish_behind() {
     let Some(gpu) = device() else { return };
     let weights = |shininess: f32| {
         let settings = RoomSettings { shininess: [Some(shininess); 5], photons: 20_001, ..RoomSettings::default() };
-        let map = crate::common::in_order(crate::common::photons(&gpu, &settings));
+        let map = in_order(photons(&gpu, &settings));
         assert!(map.iter().all(|photon| (0.0..=1.0).contains(&photon.weight)), "shininess {shininess}");
         map.iter().map(|photon| photon.weight).collect::<Vec<f32>>()
     };
@@ -302,7 +265,7 @@ fn phong_weights_have_their_mean_and_vanish_behind() {
 /// Numbers in [0, 1), drawn as photons draw them.
 fn first_draws(count: u32) -> Vec<f32> {
     let settings = RoomSettings { rng: Rng::Philox, photons: count, ..RoomSettings::default() };
-    (0..count).map(|photon| crate::common::draws_of(crate::common::streams_of(&settings), 0, photon, 0)[0]).collect()
+    (0..count).map(|photon| draws_of(streams_of(&settings), 0, photon, 0)[0]).collect()
 }
 
 /// From a photon's own place there is no direction to the eye, and from an eye in the wall's plane none but along it.
@@ -317,7 +280,7 @@ fn an_eye_on_a_photon_sees_no_weight_and_no_nan() {
         assert_eq!(map[place].weight, 0.0);
         assert!(map.iter().all(|photon| (0.0..=1.0).contains(&photon.weight)));
         let Some(gpu) = device() else { continue };
-        let on_device = crate::common::in_order(crate::common::photons(&gpu, &settings));
+        let on_device = in_order(photons(&gpu, &settings));
         assert!(on_device.iter().all(|photon| (0.0..=1.0).contains(&photon.weight)));
     }
 }
@@ -328,8 +291,7 @@ fn a_thousand_bounces_store_a_geometric_series() {
     let gpu = device();
     for (albedo, bounces, photons) in [(0.75f32, 200, 100_001), (0.99, 2000, 10_001), (0.999, 9000, 1001)] {
         let settings = RoomSettings { reflectance: albedo, bounces, photons, mesh: 1, rng: Rng::Philox, ..RoomSettings::default() };
-        let mut scene = open_box(&settings);
-        scene.faces[5] = Some(Wall { name: "front", albedo, shininess: None });
+        let scene = closed_box(&settings, albedo);
         let mut ledgers = vec![("cpu", run_scene_on_cpu(&scene, &settings).ledger())];
         if let Some(gpu) = gpu.as_ref().filter(|_| bounces <= 2000) {
             ledgers.push(("device", run_scene(gpu, &scene, &settings).ledger()));
@@ -363,7 +325,7 @@ fn a_billion_photons_have_the_exact_share() {
 
 fn over_plane(kind: LightKind) -> Scene {
     let mut plane = scene("point-over-plane");
-    plane.lights = vec![Light { name: "lamp".into(), kind }];
+    plane.lights = vec![lamp(kind)];
     plane
 }
 
@@ -371,40 +333,21 @@ fn over_plane(kind: LightKind) -> Scene {
 #[test]
 fn a_map_of_one_photon_is_one_disc() {
     let Some(gpu) = device() else { return };
-    let close = LightKind::Disc { centre: DVec3::Y * 1e-3, normal: DVec3::NEG_Y, radius: 1e-3, power: Vec3::ONE, law: EmissionLaw::Cosine };
+    let close = disc(DVec3::Y * 1e-3, DVec3::NEG_Y, 1e-3, EmissionLaw::Cosine);
     for radius in [0.05, 0.2, 1.0] {
-        let settings = SceneSettings {
-            photons: 1,
-            rounds: 1,
-            bounces: 1,
-            radius: Some(radius),
-            alpha: 1.0,
-            illumination: Illumination::Photons,
-            ..SceneSettings::default()
-        };
         let points = [(DVec3::ZERO, DVec3::Y), (DVec3::X * 1.9, DVec3::Y), (DVec3::ZERO, DVec3::NEG_Y)];
-        let lit = received(&gpu, &over_plane(close.clone()), &settings, &points);
+        let lit = received(&gpu, &over_plane(close.clone()), &mapped(1, 1, 1, radius), &points);
         let expected = 1.0 / (PI * radius * radius);
         // The area is known to 2^-24 of the squared radius, and some roundings of f32 follow.
-        assert_holds(radius, relative_check("one photon", lit.film.mean(0, &lit.plan).x, expected, 16.0 * U));
+        let check = |expected: f64| relative_check("one photon", red(&lit, 0).0, expected, 16.0 * U);
+        assert_holds(radius, check(expected));
         assert_eq!([lit.film.mean(1, &lit.plan), lit.film.mean(2, &lit.plan)], [DVec3::ZERO; 2], "radius {radius}");
-        assert_complains(
-            "a radius 1 % too large",
-            relative_check("one photon", lit.film.mean(0, &lit.plan).x, expected / 1.0201, 16.0 * U),
-        );
+        assert_complains("a radius 1 % too large", check(expected / 1.0201));
     }
 }
 
 fn furnace_settings(radius: f64) -> SceneSettings {
-    SceneSettings {
-        photons: 10_000,
-        rounds: 2,
-        bounces: 60,
-        radius: Some(radius),
-        alpha: 1.0,
-        illumination: Illumination::Photons,
-        ..SceneSettings::default()
-    }
+    mapped(10_000, 2, 60, radius)
 }
 
 /// From all of the scene, twice over, down to a two-hundredth of the distance between photons: the estimate stays
@@ -426,8 +369,7 @@ fn radii_from_the_whole_scene_to_below_the_photons_spacing_are_right() {
     let furnace = scene("furnace");
     let geometry = Geometry::new(&furnace).unwrap();
     let sensor = Sensor::Receivers { count: 1 };
-    let plan =
-        |radius: f64| ScenePlan::new(&furnace, &geometry, &furnace_settings(radius), sensor, &photonmill::engine::limits(gpu.facts()));
+    let plan = |radius: f64| ScenePlan::new(&furnace, &geometry, &furnace_settings(radius), sensor, &engine::limits(gpu.facts()));
     let least = 1.0 / 32_768.0;
     assert!(plan(2.0).is_ok() && plan(least).is_ok());
     for radius in [2.0f64.next_up(), least.next_down(), 1e-23, f64::MIN_POSITIVE, 1e30, f64::NAN, f64::INFINITY, 0.0, -0.1] {
@@ -460,7 +402,7 @@ fn edges_and_corners_are_dark_by_what_lies_beyond_them() {
     let mut worst = 0.0f64;
     for (place, (x, z)) in places.iter().enumerate() {
         let share = disc_rectangle_area(1.0, [-x, 5.0 - x], [-z, 5.0 - z]) / PI;
-        let ratio = without.film.mean(place, &without.plan).x / with.film.mean(place, &with.plan).x;
+        let ratio = red(&without, place).0 / red(&with, place).0;
         worst = worst.max((ratio / share - 1.0).abs());
         // An area in f32 is the sum over six edges of some twenty roundings each.
         assert_holds(format!("{x}, {z} radii from the walls"), relative_check("share", ratio, share, 128.0 * U));
@@ -468,7 +410,7 @@ fn edges_and_corners_are_dark_by_what_lies_beyond_them() {
     }
     println!("covered shares off by {worst:.1e} at most");
     for (place, expected) in [(0, 0.5), (1, 0.6575), (2, 0.8045), (3, 0.9279), (4, 1.0), (6, 0.25), (7, 0.63408), (8, 0.89591)] {
-        let share = without.film.mean(place, &without.plan).x / with.film.mean(place, &with.plan).x;
+        let share = red(&without, place).0 / red(&with, place).0;
         assert!((share - expected).abs() < 5e-5, "place {place}: {share} where {expected} is right");
     }
 }
@@ -529,17 +471,11 @@ fn vast() -> Limits {
 /// comes where the next photon's would not be.
 #[test]
 fn slots_of_a_chunk_are_numbered_in_32_bits() {
+    let one_chunk = RoomSettings { photons: 1 << 31, chunk: Some(1 << 31), rng: Rng::Philox, ..RoomSettings::default() };
+    let planned = |settings: &RoomSettings, limits: &Limits| RoomPlan::new(&open_box(settings), settings, limits);
     let plan = |photons: u32, bounces: u32, limits: &Limits| {
-        let settings = RoomSettings {
-            photons,
-            bounces,
-            chunk: Some(1 << 31),
-            mesh: 1,
-            rng: Rng::Philox,
-            builder: Builder::Naive,
-            ..RoomSettings::default()
-        };
-        RoomPlan::new(&open_box(&settings), &settings, limits).unwrap()
+        let naive = RoomSettings { builder: Builder::Naive, mesh: 1, ..one_chunk.clone() };
+        planned(&RoomSettings { photons, bounces, ..naive }, limits).unwrap()
     };
     let check = |plan: &RoomPlan, limits: &Limits| {
         let slots = u64::from(plan.path_capacity) * u64::from(plan.settings.bounces);
@@ -556,16 +492,7 @@ fn slots_of_a_chunk_are_numbered_in_32_bits() {
     for (counters, group_size) in [(None, 32), (None, 1024), (Some(64), 1024), (Some(2), 128)] {
         for (bounces, limits) in [(1, vast()), (15, vast()), (10_000, vast()), (15, Limits { buffer_bytes: 1 << 32, ..vast() })] {
             let limits = Limits { counters: 8, ..limits };
-            let atomic = RoomSettings {
-                photons: 1 << 31,
-                bounces,
-                group_size,
-                counters,
-                chunk: Some(1 << 31),
-                rng: Rng::Philox,
-                ..RoomSettings::default()
-            };
-            let plan = RoomPlan::new(&open_box(&atomic), &atomic, &limits).unwrap();
+            let plan = planned(&RoomSettings { bounces, group_size, counters, ..one_chunk.clone() }, &limits).unwrap();
             check(&plan, &limits);
             let is_wanted = counters.is_some() || plan.path_capacity >= 1 << 21;
             assert_eq!(plan.counters > 1, is_wanted, "{bounces} bounces, {counters:?} counters");
@@ -585,7 +512,7 @@ fn slots_of_a_chunk_are_numbered_in_32_bits() {
     // Room for fewer than two photons is an error that names the bounces.
     let none = Limits { buffer_bytes: 3 * 16 * 15, ..vast() };
     let settings = RoomSettings { mesh: 1, ..RoomSettings::default() };
-    assert!(RoomPlan::new(&open_box(&settings), &settings, &none).unwrap_err().to_string().starts_with("--bounces"));
+    assert!(planned(&settings, &none).unwrap_err().to_string().starts_with("--bounces"));
 }
 
 /// The same for maps of scenes of triangles.
@@ -628,18 +555,10 @@ fn maps_of_a_chunk_are_numbered_in_32_bits() {
 fn photons_of_a_second_row_of_groups_reach_the_map() {
     let Some(gpu) = device() else { return };
     let photons = 65_535 * 32 + 33;
-    let settings = SceneSettings {
-        photons,
-        group_size: 32,
-        rounds: 1,
-        bounces: 1,
-        radius: Some(0.01),
-        illumination: Illumination::Photons,
-        ..SceneSettings::default()
-    };
+    let settings = SceneSettings { group_size: 32, ..mapped(photons, 1, 1, 0.01) };
     let points = [(DVec3::new(0.5, 0.0, 0.5), DVec3::Y), (DVec3::new(0.5, 0.5, 0.0), DVec3::Z)];
     // A software device counts less memory than it has.
-    let limits = Limits { memory_bytes: 1 << 33, ..photonmill::engine::limits(gpu.facts()) };
+    let limits = Limits { memory_bytes: 1 << 33, ..engine::limits(gpu.facts()) };
     let lit = |settings: &SceneSettings| received_within(&gpu, &scene("furnace"), settings, &points, &limits);
     let whole = lit(&settings);
     assert_eq!(whole.plan.global.as_ref().unwrap().chunk_photons, photons, "the photons do not fit one dispatch here");
@@ -751,25 +670,16 @@ fn narrow_spots_shine_as_wide_ones() {
             // Single precision knows a direction to 1e-7 radians.
             let tolerance = 2e-5 + 1e-7 * 8.0 / outer;
             for (k, (_, exact)) in places.iter().enumerate() {
-                let found = lit.film.mean(k, &lit.plan).x;
+                let found = red(&lit, k).0;
                 println!("{what}, {degrees} degrees, at {} of them: {found:.6}, {exact:.6} is right", shares[k]);
                 assert!((found - exact).abs() <= tolerance, "{what}, {degrees} degrees, at {} of them: {found}, not {exact}", shares[k]);
             }
 
             // Within its whole disc, a photon map holds the spot's power.
             let radius = 1.2 * place(outer).0.distance(place(0.0).0).max(2e-4);
-            let settings = SceneSettings {
-                photons: 1000,
-                rounds: 2,
-                bounces: 1,
-                radius: Some(radius),
-                alpha: 1.0,
-                illumination: Illumination::Photons,
-                ..SceneSettings::default()
-            };
-            let lit = received(&gpu, &spot, &settings, &[(place(0.0).0, DVec3::Y)]);
+            let lit = received(&gpu, &spot, &mapped(1000, 2, 1, radius), &[(place(0.0).0, DVec3::Y)]);
             let exact = 2.0 * PI * (versine(inner) + (versine(outer) - versine(inner)) / 3.0) / (PI * radius * radius);
-            assert_holds(format!("{what}, {degrees} degrees"), relative_check("power", lit.film.mean(0, &lit.plan).x, exact, 1e-5));
+            assert_holds(format!("{what}, {degrees} degrees"), relative_check("power", red(&lit, 0).0, exact, 1e-5));
         }
     }
 }
@@ -784,9 +694,8 @@ fn walls_light_the_points_that_touch_them() {
         let settings = SceneSettings { rounds: 16, shadow_rays: 64, part: Part::Direct, ..SceneSettings::default() };
         let lit = received(&gpu, scene, &settings, points);
         for (k, (point, _)) in points.iter().enumerate() {
-            let (found, error, exact) = (lit.film.mean(k, &lit.plan).x, lit.film.standard_error(k, &lit.plan).x, expected(*point));
+            let ((found, error), exact) = (red(&lit, k), expected(*point));
             println!("{what}, {point}: {found:.4} +- {error:.4}, {exact:.4} is right");
-
             family.expect_estimate(format!("{what}, {point}"), found, error.max(2e-3 * exact), settings.rounds, exact);
         }
     };
@@ -830,15 +739,8 @@ fn channels_a_billionth_as_bright_are_right() {
     let down =
         LightKind::Spot { position: DVec3::Y * 0.5, direction: DVec3::NEG_Y, intensity: Vec3::ONE, inner_angle: 0.5, outer_angle: 1.0 };
     let wall = scene_of(vec![level(0.0, [1.0; 2], true, 0), level(1.0, [1.0; 2], false, 1)], vec![floor, matt(0.0)], vec![down]);
-    let settings = |illumination, part| SceneSettings {
-        photons: 20_000,
-        bounces: 4,
-        rounds: 16,
-        radius: Some(0.4),
-        illumination,
-        part,
-        ..SceneSettings::default()
-    };
+    let photons = SceneSettings { photons: 20_000, bounces: 4, rounds: 16, radius: Some(0.4), ..SceneSettings::default() };
+    let settings = |illumination, part| SceneSettings { illumination, part, ..photons.clone() };
     let of_lamp = (lamp, settings(Illumination::Photons, Part::All), DVec3::splat(0.5));
     let of_wall = (wall, settings(Illumination::Split, Part::Indirect), DVec3::Y * 0.5);
     for (what, (scene, settings, middle)) in [("a lamp", of_lamp), ("a wall", of_wall)] {
@@ -878,7 +780,7 @@ fn a_channel_below_the_films_unit_is_right(gpu: &Gpu, rounds: u32, done: u32) {
     let tint = DVec3::new(1.0, 1e-9, 1e-10);
     let mut plane = scene("sky-over-plane");
     plane.materials[0].base_colour = tint.as_vec3();
-    let camera = photonmill::scene::Camera::looking_at("above", DVec3::Y * 1.5, DVec3::ZERO, DVec3::Z, 0.1);
+    let camera = Camera::looking_at("above", DVec3::Y * 1.5, DVec3::ZERO, DVec3::Z, 0.1);
     let stop = Stop { photons: Some(u64::from(done)), ..Stop::default() };
     let settings = SceneSettings { photons: 1, rounds, shadow_rays: 1, samples: 1, stop, ..SceneSettings::default() };
     let lit = seen(gpu, &plane, &settings, &camera, [16, 16]);

@@ -2,30 +2,13 @@
 //! split into dispatches, the run or the device's abilities, and hold exactly what lies in reach. Sums
 //! of floats are held against them.
 
-use std::time::Instant;
-
-use crate::common::{
-    Check, Complaint, Kind, assert_complains, assert_holds, device, device_with, equal_sums, pairs, photons, photons_on_cpu, plan_for,
-    plan_for_host, run, run_on_cpu, upload_photons,
-};
-use glam::Vec3;
+use crate::common::prelude::*;
 use photonmill::cpu;
 use photonmill::cpu::splat::Splats;
 use photonmill::cpu::trace::Block;
-use photonmill::engine::room::film::RoomFilm;
-use photonmill::gpu::{Commands, Gpu, Options};
-use photonmill::photon::Photon;
-use photonmill::plan::RoomPlan;
-
-use photonmill::engine::Control;
 use photonmill::engine::film::RoundSums;
-use photonmill::engine::room::estimate;
-use photonmill::engine::room::index;
-use photonmill::engine::room::resources::RoomResources;
-use photonmill::engine::room::{self, constants};
-use photonmill::rng::Rng;
-use photonmill::scene::open_box::open_box;
-use photonmill::settings::{Builder, Gather, Preset, RoomSettings, Sums};
+use photonmill::engine::room::film::RoomFilm;
+use photonmill::engine::room::{self};
 use pulp::Arch;
 
 /// What changes the film's channels and its fixed point. A smaller mesh than the paper's, and no
@@ -139,18 +122,7 @@ fn gathered_on_cpu(plan: &RoomPlan, photons: &[Photon]) -> Vec<u64> {
 
 /// The device's gather of photons that are handed to it.
 fn gathered_on_gpu(gpu: &Gpu, settings: &RoomSettings, photons: &[Photon]) -> Vec<u64> {
-    gathered_by(gpu, &plan_for(gpu, &open_box(settings), settings), photons)
-}
-
-fn gathered_by(gpu: &Gpu, plan: &RoomPlan, photons: &[Photon]) -> Vec<u64> {
-    let settings = &plan.settings;
-    assert!(photons.len() <= plan.photon_capacity as usize);
-    let mut commands = Commands::new(gpu, constants(plan), Instant::now()).unwrap();
-    let resources = RoomResources::new(gpu, &mut commands, &open_box(settings), plan).unwrap();
-    upload_photons(&mut commands, &resources, plan, photons);
-    index::build(&mut commands, &resources, plan, settings.photons).unwrap();
-    estimate::gather(&mut commands, &resources, plan, settings.photons).unwrap();
-    commands.read(&resources.film, plan.points.len() * plan.channel_count as usize).unwrap()
+    gathered(gpu, &plan_for(gpu, &open_box(settings), settings), photons, 1, None)
 }
 
 #[test]
@@ -182,11 +154,11 @@ fn lanes_and_slices_change_no_bit() {
         for (lanes, slices_candidates) in [1, 2, 8, 32].into_iter().flat_map(|lanes| [(lanes, false), (lanes, true)]) {
             let plan = RoomPlan { lanes, slices_candidates, ..plan.clone() };
             let what = format!("{lanes} lanes, slices {slices_candidates}, groups of {group_size}, radius {radius}");
-            assert_holds(what, equal_sums("film", &gathered_by(&gpu, &plan, &map), &expected));
+            assert_holds(what, equal_sums("film", &gathered(&gpu, &plan, &map, 1, None), &expected));
         }
         // One submission's work a point, so that dispatches are many.
         let plan = RoomPlan { lanes: 32, pair_tests_per_submission: 1, ..plan.clone() };
-        assert_holds("a dispatch for every few points", equal_sums("film", &gathered_by(&gpu, &plan, &map), &expected));
+        assert_holds("a dispatch for every few points", equal_sums("film", &gathered(&gpu, &plan, &map, 1, None), &expected));
     }
 }
 
@@ -309,14 +281,8 @@ fn an_empty_map_and_a_map_of_one() {
 fn long_photon_lists_are_gathered_to_the_end() {
     let Some(gpu) = device() else { return };
     // Few points keep the brute gather short; what is long is the list.
-    let settings = RoomSettings {
-        photons: 200_000,
-        rng: Rng::Philox,
-        mesh: 8,
-        chunk: Some(200_000),
-        builder: Builder::Ballot,
-        ..RoomSettings::default()
-    };
+    let many = RoomSettings { photons: 200_000, chunk: Some(200_000), rng: Rng::Philox, ..RoomSettings::default() };
+    let settings = RoomSettings { mesh: 8, builder: Builder::Ballot, ..many };
     let map = photons(&gpu, &settings);
     assert!(map.len() > 290_000);
     let plan = plan_for(&gpu, &open_box(&settings), &settings);
@@ -460,17 +426,14 @@ fn floats_and_integers_agree_within_rounding() {
         let photons = most_photons(&expected, &settings);
         let is_whole = expected.channel_count == 1;
         for sums in [Sums::F32, Sums::Compensated] {
-            let mut films = Vec::new();
-            for gather in [Gather::Grid, Gather::Brute] {
-                films.push((format!("{gather:?}"), film(&gpu, &RoomSettings { sums, gather, ..settings.clone() })));
-            }
             // The host's film is of its own photons, of which some lie on the other side of a rim.
             let host = run_on_cpu(&settings).film;
             let on_cpu = run_on_cpu(&RoomSettings { sums, threads: 2, ..settings.clone() }).film;
             assert_holds(format!("{what}, cpu, {sums:?}"), near(&on_cpu, &host, rounding(sums, photons, is_whole)));
-            for (how, found) in films {
+            for gather in [Gather::Grid, Gather::Brute] {
+                let found = film(&gpu, &RoomSettings { sums, gather, ..settings.clone() });
                 assert_eq!((found.kind, found.scale), (sums, expected.scale));
-                assert_holds(format!("{what}, {how}, {sums:?}"), near(&found, &expected, rounding(sums, photons, is_whole)));
+                assert_holds(format!("{what}, {gather:?}, {sums:?}"), near(&found, &expected, rounding(sums, photons, is_whole)));
                 let mut spoiled = found.clone();
                 let brightest = (0..found.sums.len()).max_by(|a, b| found.units(*a).total_cmp(&found.units(*b))).unwrap();
                 spoiled.sums[brightest] = u64::from((1.01 * found.units(brightest) as f32).to_bits());
@@ -504,21 +467,12 @@ fn counted_on(gpu: Option<&Gpu>, settings: &RoomSettings, start: f32, count: u32
         Sums::Integer => start as u64,
         Sums::F32 | Sums::Compensated => u64::from(start.to_bits()),
     };
-    let scene = open_box(settings);
     let photon = [photon_at(0.0, 0.0)];
-    let plan = gpu.map_or_else(|| plan_for_host(settings), |gpu| plan_for(gpu, &scene, settings));
+    let plan = gpu.map_or_else(|| plan_for_host(settings), |gpu| plan_for(gpu, &open_box(settings), settings));
     let mut sums = vec![bits; plan.points.len()];
     match gpu {
         None => (0..count).for_each(|_| cpu::estimate::gather_brute(&plan, &photon, &mut sums)),
-        Some(gpu) => {
-            let mut commands = Commands::new(gpu, constants(&plan), Instant::now()).unwrap();
-            let resources = RoomResources::new(gpu, &mut commands, &scene, &plan).unwrap();
-            upload_photons(&mut commands, &resources, &plan, &photon);
-            commands.upload(&resources.film, &sums).unwrap();
-            index::build(&mut commands, &resources, &plan, settings.photons).unwrap();
-            (0..count).for_each(|_| estimate::gather(&mut commands, &resources, &plan, settings.photons).unwrap());
-            sums = commands.read(&resources.film, sums.len()).unwrap();
-        }
+        Some(gpu) => sums = gathered(gpu, &plan, &photon, count, Some(&sums)),
     }
     RoomFilm { of_rounds: RoundSums { sums, ..RoundSums::default() }, ..RoomFilm::new(&plan) }.units(plan.points.len() - 1)
 }
@@ -577,16 +531,8 @@ fn relative_error(found: &RoomFilm, expected: &RoomFilm) -> f64 {
 #[test]
 fn the_error_of_f32_sums_is_measured() {
     let Some(gpu) = device() else { return };
-    let settings = RoomSettings {
-        photons: 1_000_000,
-        rng: Rng::Philox,
-        mesh: 1,
-        radius: 0.5,
-        shininess: [Some(2.0); 5],
-        light_power: [3.0, 0.7],
-        threads: 2,
-        ..RoomSettings::default()
-    };
+    let weights = RoomSettings { shininess: [Some(2.0); 5], light_power: [3.0, 0.7], ..RoomSettings::default() };
+    let settings = RoomSettings { photons: 1_000_000, rng: Rng::Philox, mesh: 1, radius: 0.5, threads: 2, ..weights };
     let films = |sums| {
         let settings = RoomSettings { sums, ..settings.clone() };
         [film(&gpu, &settings), run_on_cpu(&settings).film]
@@ -604,17 +550,8 @@ fn the_error_of_f32_sums_is_measured() {
 #[test]
 #[ignore = "forty million photons three times take the CPU builder over two minutes"]
 fn twenty_million_photons_on_a_texel_are_too_many_for_f32() {
-    let settings = RoomSettings {
-        photons: 20_000_000,
-        rounds: 2,
-        rng: Rng::Philox,
-        reflectance: 1.0,
-        mesh: 1,
-        radius: 0.5,
-        chunk: Some(1_000_000),
-        threads: 2,
-        ..RoomSettings::default()
-    };
+    let white = RoomSettings { reflectance: 1.0, mesh: 1, radius: 0.5, threads: 2, ..RoomSettings::default() };
+    let settings = RoomSettings { photons: 20_000_000, rounds: 2, rng: Rng::Philox, chunk: Some(1_000_000), ..white };
     let of = |sums| run_on_cpu(&RoomSettings { sums, ..settings.clone() }).film;
     let [integer, f32, compensated] = [Sums::Integer, Sums::F32, Sums::Compensated].map(of);
     assert_eq!(relative_error(&compensated, &integer), 0.0);

@@ -7,9 +7,8 @@ use std::path::Path;
 use std::sync::mpsc;
 use std::time::Duration;
 
-use base64::Engine;
-use base64::engine::general_purpose::STANDARD as BASE64;
 use glam::Vec3;
+use image::{ImageFormat, RgbImage};
 use photonmill::plan::scene::ScenePlan;
 use photonmill::plan::sensor::Sensor;
 use photonmill::plan::{Limits, RoomPlan, photons_of};
@@ -19,6 +18,14 @@ use photonmill::scene::open_box::open_box;
 use photonmill::settings::RoomSettings;
 use photonmill::settings::scene::SceneSettings;
 use serde_json::{Value, json};
+
+use change::{Random, change, pack, parts};
+use gltf_file::{data_uri, encoded, floats, set_buffer};
+
+#[path = "../tools/fuzz/src/change.rs"]
+mod change;
+#[path = "common/gltf_file.rs"]
+mod gltf_file;
 
 const BLENDER: &[u8] = include_bytes!("scenes/blender.glb");
 /// The same mutations each time.
@@ -98,151 +105,36 @@ fn assert_refused(what: &str, value: &Value) {
     assert!(matches!(fate, Fate::Refused(_)), "{what}: {fate:?}");
 }
 
-/// Random numbers that are the same on every machine.
-struct Random(u64);
-
-impl Random {
-    fn below(&mut self, limit: usize) -> usize {
-        self.0 = self.0.wrapping_mul(6_364_136_223_846_793_005).wrapping_add(1_442_695_040_888_963_407);
-        ((self.0 >> 33) as usize) % limit.max(1)
-    }
-
-    fn pick<T: Clone>(&mut self, of: &[T]) -> T {
-        of[self.below(of.len())].clone()
-    }
-}
-
-/// JSON and binary part of a glb file.
-fn parts_of(glb: &[u8]) -> (Value, Vec<u8>) {
-    let length = |at: usize| u32::from_le_bytes(glb[at..at + 4].try_into().unwrap()) as usize;
-    let text = 20..20 + length(12);
-    let binary = text.end + 8..text.end + 8 + length(text.end);
-    (serde_json::from_slice(&glb[text]).unwrap(), glb[binary].to_vec())
-}
-
-fn glb_of(value: &Value, binary: &[u8]) -> Vec<u8> {
-    let chunk = |kind: &[u8; 4], content: &[u8], fill: u8| {
-        let mut content = content.to_vec();
-        content.resize(content.len().next_multiple_of(4), fill);
-        [&(content.len() as u32).to_le_bytes(), kind.as_slice(), &content].concat()
-    };
-    let chunks = [chunk(b"JSON", value.to_string().as_bytes(), b' '), chunk(b"BIN\0", binary, 0)].concat();
-    [b"glTF".as_slice(), &2u32.to_le_bytes(), &(12 + chunks.len() as u32).to_le_bytes(), &chunks].concat()
-}
-
-/// Two triangles that shine through a texture, under a lamp of each kind.
+/// The square by hand with more of everything: two triangles that shine through a texture, and glass, under a lamp of each kind.
 fn square() -> Value {
-    let floats = |numbers: &[f32]| numbers.iter().flat_map(|number| number.to_le_bytes()).collect::<Vec<u8>>();
-    let mut bytes = floats(&[0., 0., 0., 1., 0., 0., 1., 1., 0., 0., 1., 0.]);
-    bytes.extend(floats(&[0., 0., 1., 0., 0., 1., 0., 0., 1., 0., 0., 1.]));
-    bytes.extend(floats(&[0., 0., 1., 0., 1., 1., 0., 1.]));
-    bytes.extend([0u16, 1, 2, 0, 2, 3].iter().flat_map(|index| index.to_le_bytes()));
-    let mut png = Vec::new();
-    let picture = image::RgbImage::from_fn(3, 2, |i, j| image::Rgb([(i * 100) as u8, (j * 200) as u8, 50]));
-    picture.write_to(&mut std::io::Cursor::new(&mut png), image::ImageFormat::Png).unwrap();
+    square_with([0., 0., 1., 0., 1., 1., 0., 1.])
+}
+
+/// The same with other texture coordinates.
+fn square_with(coordinates: [f32; 8]) -> Value {
+    let picture = RgbImage::from_fn(3, 2, |i, j| image::Rgb([(i * 100) as u8, (j * 200) as u8, 50]));
+    let (mut bytes, png) = (gltf_file::square_buffer(), encoded(&picture, ImageFormat::Png));
+    bytes[96..128].copy_from_slice(&floats(&coordinates));
     let start = bytes.len();
     bytes.extend(&png);
-    json!({
-        "asset": {"version": "2.0"}, "scene": 0, "scenes": [{"nodes": [0, 1, 2, 3, 4]}],
-        "nodes": [
-            {"name": "wall", "mesh": 0, "translation": [1, 2, 3], "scale": [2, 2, 2]},
-            {"name": "eye", "camera": 0, "translation": [0, 0, 5]},
-            {"name": "bulb", "translation": [0, 4, 0], "extensions": {"KHR_lights_punctual": {"light": 0}}},
-            {"name": "sun", "rotation": [0, 0.6, 0, 0.8], "extensions": {"KHR_lights_punctual": {"light": 1}}},
-            {"name": "beam", "extensions": {"KHR_lights_punctual": {"light": 2}}}
-        ],
-        "meshes": [{"name": "square", "primitives": [
-            {"attributes": {"POSITION": 0, "NORMAL": 1, "TEXCOORD_0": 2}, "indices": 3, "material": 0, "mode": 4},
-            {"attributes": {"POSITION": 0, "TEXCOORD_1": 2}, "material": 1, "mode": 5}
-        ]}],
-        "materials": [
-            {"name": "glow", "emissiveFactor": [1, 0.5, 0.25], "emissiveTexture": {"index": 0},
-             "pbrMetallicRoughness": {"baseColorFactor": [0.5, 0.25, 0.125, 1], "metallicFactor": 0},
-             "extensions": {"KHR_materials_emissive_strength": {"emissiveStrength": 8}}},
-            {"name": "glass", "doubleSided": true, "extensions": {
-                "KHR_materials_ior": {"ior": 1.5}, "KHR_materials_transmission": {"transmissionFactor": 1}},
-             "pbrMetallicRoughness": {"baseColorTexture": {"index": 0, "texCoord": 1}, "roughnessFactor": 0.3}}
-        ],
-        "textures": [{"source": 0, "sampler": 0}], "samplers": [{"wrapS": 33071, "wrapT": 33648}],
-        "images": [{"bufferView": 4, "mimeType": "image/png"}],
-        "cameras": [{"type": "perspective", "perspective": {"yfov": 0.7, "znear": 0.1}}],
-        "extensionsUsed": ["KHR_lights_punctual", "KHR_materials_emissive_strength"],
-        "extensions": {"KHR_lights_punctual": {"lights": [
-            {"type": "point", "color": [1, 0.5, 0.25], "intensity": 683},
-            {"type": "directional", "intensity": 1366},
-            {"type": "spot", "intensity": 68.3, "spot": {"innerConeAngle": 0.2, "outerConeAngle": 0.4}}
-        ]}},
-        "buffers": [{"byteLength": bytes.len(), "uri": data_uri(&bytes)}],
-        "bufferViews": [
-            {"buffer": 0, "byteOffset": 0, "byteLength": 48}, {"buffer": 0, "byteOffset": 48, "byteLength": 48},
-            {"buffer": 0, "byteOffset": 96, "byteLength": 32}, {"buffer": 0, "byteOffset": 128, "byteLength": 12},
-            {"buffer": 0, "byteOffset": start, "byteLength": png.len()}
-        ],
-        "accessors": [
-            {"bufferView": 0, "componentType": 5126, "count": 4, "type": "VEC3", "min": [0, 0, 0], "max": [1, 1, 0]},
-            {"bufferView": 1, "componentType": 5126, "count": 4, "type": "VEC3"},
-            {"bufferView": 2, "componentType": 5126, "count": 4, "type": "VEC2"},
-            {"bufferView": 3, "componentType": 5123, "count": 6, "type": "SCALAR"}
-        ]
-    })
-}
-
-fn data_uri(bytes: &[u8]) -> String {
-    format!("data:application/octet-stream;base64,{}", BASE64.encode(bytes))
-}
-
-/// The square's own numbers changed: 12 positions, 12 normals, 8 coordinates.
-fn square_with(change: impl FnOnce(&mut [f32; 32])) -> Value {
-    let mut value = square();
-    let uri = value["buffers"][0]["uri"].as_str().unwrap().rsplit(',').next().unwrap().to_owned();
-    let mut bytes = BASE64.decode(uri).unwrap();
-    let mut numbers: [f32; 32] = std::array::from_fn(|k| f32::from_le_bytes(bytes[4 * k..4 * k + 4].try_into().unwrap()));
-    change(&mut numbers);
-    numbers.iter().enumerate().for_each(|(k, number)| bytes[4 * k..4 * k + 4].copy_from_slice(&number.to_le_bytes()));
-    value["buffers"][0]["uri"] = json!(data_uri(&bytes));
+    let mut value = gltf_file::square();
+    set_buffer(&mut value, &bytes);
+    let add = |list: &mut Value, item: Value| list.as_array_mut().unwrap().push(item);
+    value["nodes"][3]["rotation"] = json!([0, 0.6, 0, 0.8]);
+    value["meshes"][0]["primitives"][0]["mode"] = json!(4);
+    add(&mut value["meshes"][0]["primitives"], json!({"attributes": {"POSITION": 0, "TEXCOORD_1": 2}, "material": 1, "mode": 5}));
+    value["materials"][0]["emissiveTexture"] = json!({"index": 0});
+    add(
+        &mut value["materials"],
+        json!({"name": "glass", "doubleSided": true, "extensions": {
+            "KHR_materials_ior": {"ior": 1.5}, "KHR_materials_transmission": {"transmissionFactor": 1}},
+         "pbrMetallicRoughness": {"baseColorTexture": {"index": 0, "texCoord": 1}, "roughnessFactor": 0.3}}),
+    );
+    value["textures"] = json!([{"source": 0, "sampler": 0}]);
+    value["samplers"] = json!([{"wrapS": 33071, "wrapT": 33648}]);
+    value["images"] = json!([{"bufferView": 4, "mimeType": "image/png"}]);
+    add(&mut value["bufferViews"], json!({"buffer": 0, "byteOffset": start, "byteLength": png.len()}));
     value
-}
-
-/// Pointers to all values within a value.
-fn pointers(value: &Value, at: &str, found: &mut Vec<String>) {
-    found.push(at.to_owned());
-    match value {
-        Value::Array(items) => items.iter().enumerate().for_each(|(k, item)| pointers(item, &format!("{at}/{k}"), found)),
-        Value::Object(members) => members.iter().for_each(|(key, item)| pointers(item, &format!("{at}/{key}"), found)),
-        _ => {}
-    }
-}
-
-/// One value replaced, taken away, doubled, or taken from another place of the file.
-fn mutate(value: &mut Value, random: &mut Random) {
-    let mut all = Vec::new();
-    pointers(value, "", &mut all);
-    let (place, other) = (random.pick(&all[1..]), random.pick(&all[1..]));
-    // What is embedded is changed byte by byte elsewhere.
-    if place.ends_with("/uri") {
-        return;
-    }
-    let numbers = [0.0, -1.0, 0.5, 1e-38, 1e-20, 1e18, 1e30, 3e38, -3e38, 1e300, 1e-300];
-    let integers = [0, 1, 2, 3, 4, 5, 7, 255, 5120, 5121, 5125, 65_535, 1 << 24, u64::from(u32::MAX), u64::MAX];
-    let new = match random.below(7) {
-        0 | 1 => json!(random.pick(&numbers)),
-        2 | 3 => json!(random.pick(&integers)),
-        4 => value.pointer(&other).unwrap().clone(),
-        5 => random.pick(&[json!(null), json!([]), json!({}), json!(""), json!("VEC4"), json!(true), json!("spot"), json!([0, 0])]),
-        _ => {
-            let (parent, key) = place.rsplit_once('/').unwrap();
-            match value.pointer_mut(parent).unwrap() {
-                Value::Array(items) => {
-                    let item = items[key.parse::<usize>().unwrap()].clone();
-                    items.push(item);
-                }
-                Value::Object(members) => drop(members.remove(key)),
-                _ => unreachable!("only these have members"),
-            }
-            return;
-        }
-    };
-    *value.pointer_mut(&place).unwrap() = new;
 }
 
 /// Most memory that this process has held, bytes.
@@ -250,6 +142,10 @@ fn peak_memory() -> Option<u64> {
     let status = std::fs::read_to_string("/proc/self/status").ok()?;
     let line = status.lines().find(|line| line.starts_with("VmHWM:"))?;
     Some(line.split_whitespace().nth(1)?.parse::<u64>().ok()? * 1024)
+}
+
+fn assert_memory() {
+    assert!(peak_memory().is_none_or(|bytes| bytes < 1 << 30), "{:?} bytes of memory", peak_memory());
 }
 
 /// Cases `make` makes are refused in one line or planned; neither may be all of them.
@@ -281,9 +177,7 @@ fn survive(what: &str, count: usize, mut make: impl FnMut(&mut Random) -> Vec<u8
     }
     assert!(panics.is_empty(), "{what}: cases {panics:?} panic, as said above; the last is in the folder for temporary files");
     assert!(planned > count / 20 && planned < count, "{what}: {planned} of {count} were planned; the mutations must matter");
-    if let Some(bytes) = peak_memory() {
-        assert!(bytes < 1 << 30, "{what}: {bytes} bytes of memory");
-    }
+    assert_memory();
 }
 
 #[test]
@@ -292,25 +186,31 @@ fn mutated_values_of_a_file_by_hand_are_planned_or_refused() {
     assert_eq!(plan_value("as it is", &seed), Fate::Planned(3), "one of four lies on another");
     survive("gltf", 4000, move |random| {
         let mut value = seed.clone();
-        (0..=random.below(3)).for_each(|_| mutate(&mut value, random));
+        (0..=random.below(3)).for_each(|_| change(&mut value, random));
         value.to_string().into_bytes()
     });
 }
 
+/// What Blender wrote: JSON and binary part.
+fn blender() -> (Value, Vec<u8>) {
+    let (text, binary) = parts(BLENDER).unwrap();
+    (serde_json::from_slice(text).unwrap(), binary.to_vec())
+}
+
 #[test]
 fn mutated_values_of_a_blender_file_are_planned_or_refused() {
-    let (value, binary) = parts_of(BLENDER);
+    let (value, binary) = blender();
     survive("values of a glb", 500, move |random| {
         let mut value = value.clone();
-        (0..=random.below(2)).for_each(|_| mutate(&mut value, random));
-        glb_of(&value, &binary)
+        (0..=random.below(2)).for_each(|_| change(&mut value, random));
+        pack(&value, &binary)
     });
 }
 
 /// Vertices, normals, coordinates and indices become extreme numbers.
 #[test]
 fn mutated_numbers_of_a_blender_file_are_planned_or_refused() {
-    let (value, binary) = parts_of(BLENDER);
+    let (value, binary) = blender();
     let words = [0.0f32, -0.0, 1.0, 1e-38, 1e-45, 1e-20, -1e10, 1e18, 3e38, f32::INFINITY].map(f32::to_bits);
     survive("numbers of a glb", 500, move |random| {
         let mut binary = binary.clone();
@@ -323,7 +223,7 @@ fn mutated_numbers_of_a_blender_file_are_planned_or_refused() {
             };
             binary[word..word + 4].copy_from_slice(&new.to_le_bytes());
         }
-        glb_of(&value, &binary)
+        pack(&value, &binary)
     });
 }
 
@@ -439,18 +339,15 @@ fn claims_without_content_take_no_memory() {
 /// One picture that many textures use is unpacked once.
 #[test]
 fn textures_that_share_a_picture_share_its_memory() {
-    let mut png = Vec::new();
-    image::RgbImage::new(1024, 1024).write_to(&mut std::io::Cursor::new(&mut png), image::ImageFormat::Png).unwrap();
+    let png = encoded(&RgbImage::new(1024, 1024), ImageFormat::Png);
     let mut value = square();
-    value["images"] = json!([{"uri": format!("data:image/png;base64,{}", BASE64.encode(&png))}]);
+    value["images"] = json!([{"uri": data_uri("image/png", &png)}]);
     value["textures"] = json!(vec![json!({"source": 0}); 100]);
     let material = |k: usize| json!({"pbrMetallicRoughness": {"baseColorTexture": {"index": k}, "metallicFactor": 0}});
     value["materials"] = json!((0..100).map(material).collect::<Vec<_>>());
     // 100 times 12 bytes a texel would be 1.2 GB.
     plan_value("100 textures of one picture", &value);
-    if let Some(bytes) = peak_memory() {
-        assert!(bytes < 1 << 30, "{bytes} bytes of memory");
-    }
+    assert_memory();
 }
 
 /// The mean of a texture over a triangle whose coordinates lie far apart.
@@ -458,7 +355,7 @@ fn textures_that_share_a_picture_share_its_memory() {
 fn texture_coordinates_of_any_size_are_planned_or_refused() {
     for far in [1e4, 1e9, 1e18, 1e19, 1e30, 3e38] {
         for second in [0.0, -far] {
-            let value = square_with(|numbers| (numbers[24], numbers[26], numbers[31]) = (second, far, -far));
+            let value = square_with([second, 0., far, 0., 1., 1., 0., -far]);
             plan_value(&format!("coordinates from {second} to {far}"), &value);
         }
     }
@@ -544,11 +441,10 @@ fn assert_one_line(what: &str, value: &Value) {
 
 /// The square with a JPEG of eight by eight for its picture, changed.
 fn square_with_jpeg(change: impl FnOnce(&mut Vec<u8>)) -> Value {
-    let mut jpeg = Vec::new();
-    image::RgbImage::new(8, 8).write_to(&mut std::io::Cursor::new(&mut jpeg), image::ImageFormat::Jpeg).unwrap();
+    let mut jpeg = encoded(&RgbImage::new(8, 8), ImageFormat::Jpeg);
     change(&mut jpeg);
     let mut value = square();
-    value["images"][0] = json!({"uri": format!("data:image/jpeg;base64,{}", BASE64.encode(&jpeg))});
+    value["images"][0] = json!({"uri": data_uri("image/jpeg", &jpeg)});
     value
 }
 
@@ -576,7 +472,5 @@ fn pictures_that_claim_too_much_are_refused_before_they_are_decoded() {
     });
     let Fate::Refused(line) = plan_value("16384 by 16384 texels", &value) else { panic!("must be refused") };
     assert!(line.contains("texels"), "{line}");
-    if let Some(bytes) = peak_memory() {
-        assert!(bytes < 1 << 30, "{bytes} bytes of memory");
-    }
+    assert_memory();
 }

@@ -1,70 +1,10 @@
 //! Scenes from glTF: what a file says is what the scene holds, what it cannot be used for is refused
 //! in one line, and no mutated file makes the loader panic.
 
-use std::path::PathBuf;
-
-use base64::Engine;
-use base64::engine::general_purpose::STANDARD as BASE64;
-use glam::{DVec3, Vec3};
-use photonmill::error::Error;
-use photonmill::scene::geometry::Geometry;
-use photonmill::scene::light::LightKind;
-use photonmill::scene::{Scene, Surface};
+use crate::common::gltf_file::{data_uri, encoded, floats, set_buffer, square, square_buffer};
+use crate::common::prelude::*;
+use image::{ImageFormat, RgbImage};
 use serde_json::{Value, json};
-
-/// A unit square in the plane z = 0: positions, normals, coordinates and indices in one buffer.
-fn square_buffer() -> Vec<u8> {
-    let floats = |numbers: &[f32]| numbers.iter().flat_map(|number| number.to_le_bytes()).collect::<Vec<u8>>();
-    let mut bytes = floats(&[0., 0., 0., 1., 0., 0., 1., 1., 0., 0., 1., 0.]);
-    bytes.extend(floats(&[0., 0., 1., 0., 0., 1., 0., 0., 1., 0., 0., 1.]));
-    bytes.extend(floats(&[0., 0., 1., 0., 1., 1., 0., 1.]));
-    bytes.extend([0u16, 1, 2, 0, 2, 3].iter().flat_map(|index| index.to_le_bytes()));
-    bytes
-}
-
-/// A scene of one square, with everything that the tests change.
-fn square() -> Value {
-    let bytes = square_buffer();
-    json!({
-        "asset": {"version": "2.0"},
-        "scene": 0,
-        "scenes": [{"nodes": [0, 1, 2, 3, 4]}],
-        "nodes": [
-            {"name": "wall", "mesh": 0, "translation": [1, 2, 3], "scale": [2, 2, 2]},
-            {"name": "eye", "camera": 0, "translation": [0, 0, 5]},
-            {"name": "bulb", "translation": [0, 4, 0], "extensions": {"KHR_lights_punctual": {"light": 0}}},
-            {"name": "sun", "extensions": {"KHR_lights_punctual": {"light": 1}}},
-            {"name": "beam", "extensions": {"KHR_lights_punctual": {"light": 2}}}
-        ],
-        "meshes": [{"name": "square", "primitives": [{
-            "attributes": {"POSITION": 0, "NORMAL": 1, "TEXCOORD_0": 2}, "indices": 3, "material": 0
-        }]}],
-        "materials": [{
-            "name": "glow", "pbrMetallicRoughness": {"baseColorFactor": [0.5, 0.25, 0.125, 1], "metallicFactor": 0},
-            "emissiveFactor": [1, 0.5, 0.25], "extensions": {"KHR_materials_emissive_strength": {"emissiveStrength": 8}}
-        }],
-        "cameras": [{"type": "perspective", "perspective": {"yfov": 0.7, "znear": 0.1}}],
-        "extensionsUsed": ["KHR_lights_punctual", "KHR_materials_emissive_strength"],
-        "extensions": {"KHR_lights_punctual": {"lights": [
-            {"type": "point", "name": "bulb", "color": [1, 0.5, 0.25], "intensity": 683},
-            {"type": "directional", "intensity": 1366},
-            {"type": "spot", "intensity": 68.3, "spot": {"innerConeAngle": 0.2, "outerConeAngle": 0.4}}
-        ]}},
-        "buffers": [{"byteLength": bytes.len(), "uri": format!("data:application/octet-stream;base64,{}", BASE64.encode(&bytes))}],
-        "bufferViews": [
-            {"buffer": 0, "byteOffset": 0, "byteLength": 48},
-            {"buffer": 0, "byteOffset": 48, "byteLength": 48},
-            {"buffer": 0, "byteOffset": 96, "byteLength": 32},
-            {"buffer": 0, "byteOffset": 128, "byteLength": 12}
-        ],
-        "accessors": [
-            {"bufferView": 0, "componentType": 5126, "count": 4, "type": "VEC3", "min": [0, 0, 0], "max": [1, 1, 0]},
-            {"bufferView": 1, "componentType": 5126, "count": 4, "type": "VEC3"},
-            {"bufferView": 2, "componentType": 5126, "count": 4, "type": "VEC2"},
-            {"bufferView": 3, "componentType": 5123, "count": 6, "type": "SCALAR"}
-        ]
-    })
-}
 
 struct File {
     _folder: tempfile::TempDir,
@@ -138,19 +78,16 @@ fn instances_are_meshes_of_their_own_and_mirrored_ones_keep_their_front() {
 
 #[test]
 fn textures_are_read_as_linear_values() {
-    let mut png = Vec::new();
-    let picture = image::RgbImage::from_fn(2, 1, |i, _| image::Rgb(if i == 0 { [255, 0, 188] } else { [0, 255, 0] }));
-    picture.write_to(&mut std::io::Cursor::new(&mut png), image::ImageFormat::Png).unwrap();
+    let picture = RgbImage::from_fn(2, 1, |i, _| image::Rgb(if i == 0 { [255, 0, 188] } else { [0, 255, 0] }));
+    let png = encoded(&picture, ImageFormat::Png);
     let mut value = square();
-    value["images"] = json!([{"uri": format!("data:image/png;base64,{}", BASE64.encode(&png))}]);
-    value["textures"] = json!([{"source": 0}]);
-    value["materials"][0]["pbrMetallicRoughness"]["baseColorTexture"] = json!({"index": 0});
+    with_image(&mut value, &data_uri("image/png", &png));
     let scene = load(&value).unwrap();
     let texture = &scene.textures[scene.materials[0].base_colour_texture.unwrap().texture];
     assert_eq!((texture.width, texture.height), (2, 1));
     assert!((texture.texels[0] - Vec3::new(1.0, 0.0, 0.502_886)).abs().max_element() < 1e-5, "{:?}", texture.texels);
 
-    value["images"] = json!([{"name": "paint", "uri": format!("data:image/png;base64,{}", BASE64.encode(&png[..30]))}]);
+    value["images"] = json!([{"name": "paint", "uri": data_uri("image/png", &png[..30])}]);
     assert_refused(&value, &["texture image 'paint'", "cannot be decoded"]);
 }
 
@@ -192,7 +129,7 @@ fn views_too_wide_or_too_narrow_are_left_out_by_name() {
         value["cameras"][0]["perspective"]["yfov"] = json!(angle);
         load(&value)
     };
-    for angle in [0.0, 1e-4, -0.7, 3.13, std::f64::consts::PI, 7.0, 1e30] {
+    for angle in [0.0, 1e-4, -0.7, 3.13, PI, 7.0, 1e30] {
         match with(angle) {
             Ok(scene) => {
                 assert!(scene.cameras.is_empty(), "{angle}");
@@ -222,7 +159,7 @@ fn a_scene_without_light_is_read_and_flat_triangles_are_a_warning() {
     bytes[136..138].copy_from_slice(&2u16.to_le_bytes());
     bytes[138..140].copy_from_slice(&2u16.to_le_bytes());
     let mut value = square();
-    value["buffers"][0]["uri"] = json!(format!("data:application/octet-stream;base64,{}", BASE64.encode(&bytes)));
+    set_buffer(&mut value, &bytes);
     let scene = load(&value).unwrap();
     assert_eq!(scene.triangle_count(), 1);
     let wanted = "1 triangle without area left out (mesh 'wall')";
@@ -243,8 +180,9 @@ fn assert_refusal(result: Result<Scene, Error>, named: &[&str]) {
     }
 }
 
-fn with_absent_image(value: &mut Value) {
-    value["images"] = json!([{"uri": "absent.png"}]);
+/// A picture on the square.
+fn with_image(value: &mut Value, uri: &str) {
+    value["images"] = json!([{"uri": uri}]);
     value["textures"] = json!([{"source": 0}]);
     value["materials"][0]["pbrMetallicRoughness"]["baseColorTexture"] = json!({"index": 0});
 }
@@ -261,7 +199,7 @@ fn what_cannot_be_used_is_refused_with_file_and_object() {
         (|v| v["accessors"][3]["componentType"] = json!(5126), &["mesh 'wall'", "indices"]),
         (|v| v["buffers"][0]["byteLength"] = json!(10_000), &["buffer 0", "140 bytes", "10000"]),
         (|v| v["buffers"][0]["uri"] = json!("absent.bin"), &["buffer 0", "absent.bin", "cannot be read"]),
-        (with_absent_image, &["scene.gltf", "texture image 0", "absent.png", "no such file"]),
+        (|v| with_image(v, "absent.png"), &["scene.gltf", "texture image 0", "absent.png", "no such file"]),
         (|v| v["buffers"][0]["uri"] = json!("%zz"), &["buffer 0", "%zz"]),
         (|v| v["buffers"][0]["uri"] = json!("https://example.com/a.bin"), &["buffer 0", "only files beside this one"]),
         (|v| v["buffers"][0]["uri"] = json!("data:x;base64,@@@"), &["buffer 0", "not base64"]),
@@ -288,7 +226,7 @@ fn what_cannot_be_used_is_refused_with_file_and_object() {
     past[130..132].copy_from_slice(&9u16.to_le_bytes());
     for (bytes, named) in [(nan, ["mesh 'wall'", "NaN"]), (past, ["mesh 'wall'", "vertex 9 of 4"])] {
         let mut value = square();
-        value["buffers"][0]["uri"] = json!(format!("data:application/octet-stream;base64,{}", BASE64.encode(&bytes)));
+        set_buffer(&mut value, &bytes);
         assert_refused(&value, &named);
     }
     // Files that are none.
@@ -307,7 +245,7 @@ fn add_accessor(value: &mut Value, bytes: &[u8], component: u32, count: usize, k
         list.push(item);
         list.len() - 1
     };
-    let uri = format!("data:application/octet-stream;base64,{}", BASE64.encode(bytes));
+    let uri = data_uri("application/octet-stream", bytes);
     let buffer = add(&mut value["buffers"], json!({"byteLength": bytes.len(), "uri": uri}));
     let view = add(&mut value["bufferViews"], json!({"buffer": buffer, "byteOffset": 0, "byteLength": bytes.len()}));
     add(&mut value["accessors"], json!({"bufferView": view, "componentType": component, "count": count, "type": kind}))
@@ -317,7 +255,6 @@ fn add_accessor(value: &mut Value, bytes: &[u8], component: u32, count: usize, k
 /// are none.
 fn skinned_square() -> Value {
     let mut value = square();
-    let floats = |numbers: &[f32]| numbers.iter().flat_map(|number| number.to_le_bytes()).collect::<Vec<u8>>();
     let moved = |by: f32| [1.0, 0.0, 0.0, 0.0, 0.0, 1.0, 0.0, 0.0, 0.0, 0.0, 1.0, 0.0, 0.0, 0.0, by, 1.0f32];
     let matrices = add_accessor(&mut value, &floats(&[moved(-7.0), moved(-9.0)].concat()), 5126, 2, "MAT4");
     let joints = add_accessor(&mut value, &[0, 0, 0, 0, 0, 0, 0, 0, 1, 0, 0, 0, 1, 0, 0, 0], 5121, 4, "VEC4");
@@ -446,10 +383,8 @@ fn files_outside_the_folder_are_not_opened() {
 #[test]
 fn loading_reports_its_stages() {
     let mut value = square();
-    let mut png = Vec::new();
-    image::RgbImage::new(2, 2).write_to(&mut std::io::Cursor::new(&mut png), image::ImageFormat::Png).unwrap();
-    value["images"] = json!([{"uri": format!("data:image/png;base64,{}", BASE64.encode(&png))}]);
-    value["textures"] = json!([{"source": 0}]);
+    let png = encoded(&RgbImage::new(2, 2), ImageFormat::Png);
+    with_image(&mut value, &data_uri("image/png", &png));
     value["materials"][0]["emissiveTexture"] = json!({"index": 0});
     let file = file("scene.gltf", value.to_string().as_bytes());
     let mut stages = Vec::new();
@@ -461,18 +396,9 @@ fn loading_reports_its_stages() {
     };
     let scene = Scene::open_with(file.path.to_str().unwrap(), false, &mut report).unwrap();
     Geometry::new_with(&scene, &mut report).unwrap();
-    let wanted = [
-        "reading the file",
-        "decoding textures",
-        "reading meshes",
-        "preparing triangles",
-        "looking for overlaps",
-        "building the hierarchy",
-        "preparing triangles",
-        "packing textures",
-        "collecting lights",
-    ];
-    assert_eq!(stages, wanted);
+    let wanted = "reading the file, decoding textures, reading meshes, preparing triangles, looking for overlaps, \
+        building the hierarchy, preparing triangles, packing textures, collecting lights";
+    assert_eq!(stages.join(", "), wanted);
 }
 
 /// Nodes within themselves, and deeper than any hierarchy.

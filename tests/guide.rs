@@ -2,18 +2,15 @@
 //!
 //! `PHOTONMILL_WRITE_GUIDE=1 cargo test --test tests guide::` writes the tables anew.
 
-use std::collections::BTreeSet;
 use std::fs;
-use std::path::{Path, PathBuf};
 use std::process::{Command, Stdio};
 
+use crate::common::prelude::*;
+use crate::common::program::PROGRAM;
 use photonmill::measure::bench::table::scaled;
 use photonmill::measure::bench::targets::{TARGETS, Target, Wanted};
 use photonmill::output::words::number;
-use photonmill::scene::built_in;
 use serde_json::Value;
-
-use crate::common::{Check, assert_complains, assert_holds, device};
 
 fn root(path: &str) -> PathBuf {
     Path::new(env!("CARGO_MANIFEST_DIR")).join(path)
@@ -108,8 +105,7 @@ fn short(arguments: &[&str]) -> Vec<String> {
 }
 
 fn program(folder: &Path, arguments: &[String]) -> Check {
-    let mut command = Command::new(env!("CARGO_BIN_EXE_photonmill"));
-    let output = command.current_dir(folder).args(arguments).stdin(Stdio::null()).output().expect("the program starts");
+    let output = Command::new(PROGRAM).current_dir(folder).args(arguments).stdin(Stdio::null()).output().expect("the program starts");
     match output.status.code() {
         Some(0) => Ok(()),
         code => Err(format!("{}: exit code {code:?}: {}", arguments.join(" "), String::from_utf8_lossy(&output.stderr).trim())),
@@ -174,7 +170,7 @@ fn commands_of_readme_and_guide_run() {
                 seen.insert(*start);
                 assert_holds(&path, parse(folder.path(), &command));
             } else {
-                let began = std::time::Instant::now();
+                let began = Instant::now();
                 assert_holds(&path, run(folder.path(), &command));
                 println!("{path}: {command}: {:.2} s", began.elapsed().as_secs_f64());
             }
@@ -215,10 +211,9 @@ fn options(text: &str) -> BTreeSet<String> {
 fn options_of_readme_and_guide_exist() {
     let names = ["", "render", "bake", "probe", "plan", "devices", "selfcheck", "study", "bench", "paper"];
     let help = |name: &str| {
-        let mut command = Command::new(env!("CARGO_BIN_EXE_photonmill"));
-        let output = command.args(name.split_whitespace()).arg("--help").output().expect("the program starts");
+        let output = Place::new().run(&format!("{name} --help"));
         assert!(output.status.success(), "{name}");
-        String::from_utf8(output.stdout).unwrap()
+        text(&output.stdout)
     };
     let known = options(&names.map(help).concat());
     assert!(known.len() > 60 && known.contains("--final-gather"), "{known:?}");
@@ -237,18 +232,9 @@ fn readme_is_short_and_in_order() {
     assert!(readme.lines().count() <= 150, "{} lines", readme.lines().count());
     assert!(readme.len() <= 12_000, "{} bytes", readme.len());
     let headings: Vec<&str> = readme.lines().filter(|line| line.starts_with('#')).collect();
-    let wanted = [
-        "# photonmill",
-        "## Try it",
-        "## Your own scene",
-        "## How wrong is it, and when to stop",
-        "## The paper's box",
-        "## What is guaranteed",
-        "## Speed against peers",
-        "## Limits and platforms",
-        "## More",
-    ];
-    assert_eq!(headings, wanted);
+    let wanted = "# photonmill|## Try it|## Your own scene|## How wrong is it, and when to stop|## The paper's box|\
+        ## What is guaranteed|## Speed against peers|## Limits and platforms|## More";
+    assert_eq!(headings.join("|"), wanted);
     let commands = commands(&readme);
     assert_eq!(commands[..2], ["tools/setup && cargo run --release -- --variant atomic", "tools/setup && cargo test"]);
     assert!(fs::metadata(root("src/guide/caustic.png")).unwrap().len() < 100_000);

@@ -4,40 +4,28 @@
 //!
 //! The tests at the end hold the table of all hard cases (`tests/common/cases.rs`) against the sources, README and the guide.
 
-use std::collections::HashSet;
-use std::f64::consts::PI;
-
 use crate::common::cases::{self, CASES, COUNTS, Case, Shown};
 use crate::common::known::{self, none_returns};
-use crate::common::lit::{BOTH, flights, lamp, mean_red, received, same_light, scene, seen};
-use crate::common::{Check, assert_complains, assert_holds, device, relative_check, z_check};
-use glam::{DQuat, DVec2, DVec3, Vec3};
+use crate::common::prelude::*;
 use photonmill::engine::scene::RunResult;
-use photonmill::plan::RoomPlan;
-use photonmill::plan::scene::ScenePlan;
-use photonmill::plan::sensor::Sensor;
-use photonmill::scene::geometry::Geometry;
-use photonmill::scene::light::{Light, LightKind};
-use photonmill::scene::open_box::open_box;
-use photonmill::scene::{Camera, Material, Mesh, Scene, built_in};
-use photonmill::settings::scene::{Effect, Illumination, SceneSettings};
-use photonmill::settings::{Builder, EmissionLaw, RoomSettings};
 use photonmill::verify::selfcheck::measure::{irradiance, radiance};
 
-fn settings() -> SceneSettings {
+/// Short runs of the Cornell box.
+pub fn settings() -> SceneSettings {
     SceneSettings { photons: 4000, caustic_photons: 4000, rounds: 2, shadow_rays: 8, ..SceneSettings::default() }
 }
 
 fn cornell() -> Scene {
-    built_in::by_name("cornell").unwrap()
+    scene("cornell")
 }
 
-const POINTS: [(DVec3, DVec3); 3] =
+/// Of the Cornell box: (position, normal).
+pub const POINTS: [(DVec3, DVec3); 3] =
     [(DVec3::new(0.85, 0.0, 0.9), DVec3::Y), (DVec3::new(0.0, 0.4, 0.6), DVec3::X), (DVec3::new(0.7, 0.8, 0.0), DVec3::Z)];
 
-fn moved(mut scene: Scene, scale: f64, way: DVec3) -> (Scene, Vec<(DVec3, DVec3)>) {
-    scene.meshes.iter_mut().flat_map(|mesh| &mut mesh.positions).for_each(|position| *position = *position * scale + way);
-    (scene, POINTS.iter().map(|(position, normal)| (*position * scale + way, *normal)).collect())
+/// The Cornell box and its points elsewhere.
+fn cornell_at(way: impl Fn(DVec3) -> DVec3) -> (Scene, Vec<(DVec3, DVec3)>) {
+    (moved(cornell(), &way), POINTS.iter().map(|(position, normal)| (way(*position), *normal)).collect())
 }
 
 /// Radiance does not depend on size or place; the file's own coordinates may be far from the origin.
@@ -48,34 +36,20 @@ fn size_and_place_do_not_change_the_light() {
     assert!(expected.mean > 0.5 && expected.standard_error < 0.03 * expected.mean, "{expected:?}");
     let far = DVec3::new(1e4, -2e4, 5e3);
     for (what, scale, way) in [("a thousandth", 1e-3, DVec3::ZERO), ("ten thousand times", 1e4, DVec3::ZERO), ("far away", 1.0, far)] {
-        let (scene, points) = moved(cornell(), scale, way);
+        let (scene, points) = cornell_at(|at| at * scale + way);
         let found = irradiance(&gpu, &scene, &SceneSettings { seed: 99, ..settings() }, &points).unwrap();
         assert_holds(what, same_light(what, found, expected));
     }
-    let (scene, points) = moved(cornell(), 1.0, DVec3::ZERO);
-    let mut brighter = scene;
+    let mut brighter = cornell();
     brighter.materials[3].emission *= 1.3;
-    let found = irradiance(&gpu, &brighter, &settings(), &points).unwrap();
+    let found = irradiance(&gpu, &brighter, &settings(), &POINTS).unwrap();
     assert_complains("a lamp a third brighter", same_light("brighter", found, expected));
 }
 
 /// A parallelogram of `n` x `n` x 2 triangles in place of one of two.
-fn tessellated(mesh: &Mesh, n: u32) -> Mesh {
+fn cut(mesh: &Mesh, n: u32) -> Mesh {
     let [o, a, _, b] = mesh.positions[..] else { panic!("{} is no parallelogram", mesh.name) };
-    let place = |i: u32, j: u32| o + (a - o) * (f64::from(i) / f64::from(n)) + (b - o) * (f64::from(j) / f64::from(n));
-    let vertex = |i: u32, j: u32| j * (n + 1) + i;
-    Mesh {
-        positions: (0..=n).flat_map(|j| (0..=n).map(move |i| place(i, j))).collect(),
-        triangles: (0..n)
-            .flat_map(|j| {
-                (0..n).flat_map(move |i| {
-                    [[vertex(i, j), vertex(i + 1, j), vertex(i + 1, j + 1)], [vertex(i, j), vertex(i + 1, j + 1), vertex(i, j + 1)]]
-                })
-            })
-            .collect(),
-        uvs: [Vec::<DVec2>::new(), Vec::new()],
-        ..mesh.clone()
-    }
+    Mesh { material: mesh.material, ..tessellated(&mesh.name, o, a - o, b - o, n) }
 }
 
 /// Edges, corners and slivers inside a wall are no edges of its light; neither are triangles that lie on it.
@@ -83,14 +57,14 @@ fn tessellated(mesh: &Mesh, n: u32) -> Mesh {
 fn how_a_wall_is_cut_does_not_change_its_light() {
     let Some(gpu) = device() else { return };
     let expected = irradiance(&gpu, &cornell(), &settings(), &POINTS).unwrap();
-    let replace = |cut: &dyn Fn(&Mesh) -> Mesh| {
+    let replace = |other: &dyn Fn(&Mesh) -> Mesh| {
         let mut scene = cornell();
-        scene.meshes.iter_mut().take(5).for_each(|mesh| *mesh = cut(mesh));
+        scene.meshes.iter_mut().take(5).for_each(|mesh| *mesh = other(mesh));
         irradiance(&gpu, &scene, &SceneSettings { seed: 98, ..settings() }, &POINTS).unwrap()
     };
-    let fine = replace(&|mesh| tessellated(mesh, 40));
+    let fine = replace(&|mesh| cut(mesh, 40));
     assert_holds("3200 triangles a wall", same_light("3200 triangles a wall", fine, expected));
-    let finest = replace(&|mesh| if mesh.name == "floor" { tessellated(mesh, 224) } else { mesh.clone() });
+    let finest = replace(&|mesh| if mesh.name == "floor" { cut(mesh, 224) } else { mesh.clone() });
     assert_holds("100 352 triangles a wall", same_light("100 352 triangles a wall", finest, expected));
     let sliver = replace(&|mesh| {
         let mut mesh = mesh.clone();
@@ -118,8 +92,7 @@ fn flat_lamps_light_nothing_of_their_own_plane() {
     };
     for law in [EmissionLaw::Uniform, EmissionLaw::Cosine] {
         let mut room = closed_room(0.0);
-        let disc = LightKind::Disc { centre: DVec3::new(0.5, 0.0, 0.5), normal: DVec3::Y, radius: 0.1, power: Vec3::ONE, law };
-        room.lights = vec![lamp(disc)];
+        room.lights = vec![lamp(disc(DVec3::new(0.5, 0.0, 0.5), DVec3::Y, 0.1, law))];
         let own = received(&gpu, &room, &direct, &grid(DVec3::new(0.5, 0.0, 0.5), DVec3::Y, 0.4));
         assert_eq!(mean_red(&own), 0.0, "{law:?}");
         let opposite = received(&gpu, &room, &direct, &grid(DVec3::new(0.5, 1.0, 0.5), DVec3::NEG_Y, 0.4));
@@ -128,9 +101,9 @@ fn flat_lamps_light_nothing_of_their_own_plane() {
     // The lamp is a part of the ceiling, turned so that no coordinate is a round number.
     let turn = DQuat::from_axis_angle(DVec3::new(0.2, 0.7, -0.4).normalize(), 0.8);
     let mut room = closed_room(0.0);
-    room.materials.push(Material { emission: Vec3::ONE, ..Material::lambert("lamp", Vec3::ZERO) });
+    room.materials.push(shining(0.0));
     room.meshes.push(Mesh::parallelogram("lamp", DVec3::new(0.3, 1.0, 0.3), DVec3::X * 0.4, DVec3::Z * 0.4, 1));
-    room.meshes.iter_mut().flat_map(|mesh| &mut mesh.positions).for_each(|at| *at = turn * *at);
+    let room = moved(room, |at| turn * at);
     let own = grid(turn * DVec3::new(0.5, 1.0, 0.5), turn * DVec3::NEG_Y, 0.8);
     assert_eq!(mean_red(&received(&gpu, &room, &direct, &own)), 0.0);
     let opposite = grid(turn * DVec3::new(0.5, 0.0, 0.5), turn * DVec3::Y, 0.4);
@@ -141,20 +114,13 @@ fn flat_lamps_light_nothing_of_their_own_plane() {
 #[test]
 fn a_light_flush_with_a_wall_shines_into_the_room() {
     let Some(gpu) = device() else { return };
-    let mut scene = built_in::by_name("point-over-plane").unwrap();
-    let kind = |height: f64| LightKind::Disc {
-        centre: DVec3::Y * height,
-        normal: DVec3::Y,
-        radius: 0.1,
-        power: Vec3::ONE,
-        law: EmissionLaw::Cosine,
-    };
-    scene.lights = vec![Light { name: "flush".into(), kind: kind(0.0) }];
+    let mut scene = scene("point-over-plane");
+    scene.lights = vec![lamp(disc(DVec3::ZERO, DVec3::Y, 0.1, EmissionLaw::Cosine))];
     let above = [(DVec3::Y * 2.0, DVec3::NEG_Y)];
     let found = irradiance(&gpu, &scene, &SceneSettings { shadow_rays: 32, ..settings() }, &above).unwrap();
     let exact = 1.0 / (PI * (0.01 + 4.0));
     assert_holds("above", z_check("above", found.mean, exact, found.standard_error.max(1e-4 * exact)));
-    for illumination in [Illumination::Split, Illumination::Photons] {
+    for illumination in BOTH {
         let settings = SceneSettings { illumination, bounces: 1, ..settings() };
         let beside = irradiance(&gpu, &scene, &settings, &[(DVec3::X * 0.3, DVec3::Y)]).unwrap();
         assert_eq!(beside.mean, 0.0, "{illumination:?}: the lamp's own wall");
@@ -164,7 +130,7 @@ fn a_light_flush_with_a_wall_shines_into_the_room() {
 /// A closed cube of 1 m, seen from inside, without light of its own.
 fn closed_room(albedo: f32) -> Scene {
     let mut room = scene("furnace");
-    room.materials[0] = Material::lambert("wall", Vec3::splat(albedo));
+    room.materials[0] = matt(albedo);
     room
 }
 
@@ -215,20 +181,20 @@ fn contractible(spirv: &[u8], free: &str) -> usize {
 #[test]
 fn every_operation_is_rounded_by_itself() {
     let Some(gpu) = device() else { return };
-    let limits = photonmill::engine::limits(gpu.facts());
+    let limits = engine::limits(gpu.facts());
     let mut modules = Vec::new();
-    for illumination in [Illumination::Split, Illumination::Photons] {
+    for illumination in BOTH {
         for sensor in [Sensor::Picture { width: 1, height: 1 }, Sensor::Receivers { count: 1 }] {
             let settings = SceneSettings { illumination, ..settings() };
             let plan = ScenePlan::new(&cornell(), &Geometry::new(&cornell()).unwrap(), &settings, sensor, &limits).unwrap();
-            modules.extend(photonmill::engine::scene::modules(&plan, gpu.facts()));
+            modules.extend(engine::scene::modules(&plan, gpu.facts()));
         }
     }
     for builder in Builder::ON_GPU {
         let settings = RoomSettings { builder, ..RoomSettings::default() };
         let plan = RoomPlan::new(&open_box(&settings), &settings, &limits).unwrap();
-        modules.extend(photonmill::engine::room::trace::modules(&plan));
-        modules.extend(photonmill::engine::room::estimate::modules(&plan, gpu.facts()));
+        modules.extend(engine::room::trace::modules(&plan));
+        modules.extend(engine::room::estimate::modules(&plan, gpu.facts()));
     }
     assert!(modules.len() > 20);
     for module in &modules {
@@ -291,7 +257,7 @@ fn rays_at_edges_and_corners_meet_a_wall() {
         .collect();
     for cells in [1, 40] {
         let mut room = closed_room(0.9);
-        room.meshes.iter_mut().for_each(|mesh| *mesh = tessellated(mesh, cells));
+        room.meshes.iter_mut().for_each(|mesh| *mesh = cut(mesh, cells));
         for (what, places) in [("edges and corners of the room", edges_and_corners()), ("edges and corners of triangles", inner.clone())] {
             room.lights = aimed_at(&places, from);
             let lit = received(&gpu, &room, &flights(200_000, 1), &[(DVec3::new(0.5, 0.0, 0.5), DVec3::Y)]);
@@ -325,7 +291,6 @@ fn photons_on_edges_and_in_corners_stay_in_the_room() {
 #[test]
 fn photons_leave_a_surface_once_and_for_all() {
     let Some(gpu) = device() else { return };
-    let sun = |direction: DVec3| lamp(LightKind::Directional { direction: direction.normalize(), irradiance: Vec3::ONE });
     let tilts = [DQuat::IDENTITY, DQuat::from_axis_angle(DVec3::new(0.3, 0.5, -0.8).normalize(), 1.1), DQuat::from_rotation_z(1e-4)];
     for (number, tilt) in tilts.into_iter().enumerate() {
         for cells in [1, 40] {
@@ -334,9 +299,9 @@ fn photons_leave_a_surface_once_and_for_all() {
             {
                 let mut plane = scene("sun-over-plane");
                 plane.materials[0].base_colour = Vec3::ONE;
-                plane.meshes[0] = tessellated(&plane.meshes[0], cells);
+                plane.meshes[0] = cut(&plane.meshes[0], cells);
                 plane.meshes[0].positions.iter_mut().for_each(|position| *position = tilt * *position * size + place);
-                plane.lights = vec![sun(tilt * DVec3::new(0.3, -1.0, 0.2))];
+                plane.lights = vec![lamp(sun(tilt * DVec3::new(0.3, -1.0, 0.2)))];
                 let settings = SceneSettings { radius: None, ..flights(40_000, 2) };
                 let lit = received(&gpu, &plane, &settings, &[(place, tilt * DVec3::Y)]);
                 let what = format!("tilt {number}, {cells} x {cells} cells, size {size} at {place}");
@@ -344,15 +309,14 @@ fn photons_leave_a_surface_once_and_for_all() {
             }
         }
     }
-    let material = Material::lambert("ball", Vec3::ONE);
     for segments in [8, 64] {
-        let mut ball = Scene { materials: vec![material.clone()], lights: vec![sun(DVec3::new(0.3, -1.0, 0.2))], ..Scene::default() };
-        ball.meshes = vec![Mesh { normals: Vec::new(), ..Mesh::sphere("ball", DVec3::new(0.2, 0.7, -0.4), 0.9, segments, 0) }];
+        let mesh = Mesh { normals: Vec::new(), ..Mesh::sphere("ball", DVec3::new(0.2, 0.7, -0.4), 0.9, segments, 0) };
+        let mut ball = scene_of(vec![mesh], vec![matt(1.0)], vec![sun(DVec3::new(0.3, -1.0, 0.2))]);
         let lit = received(&gpu, &ball, &flights(100_000, 2), &[(DVec3::new(0.2, 1.6, -0.4), DVec3::Y)]);
         assert_holds(segments, none_returns(&format!("ball of {segments} segments"), &lit));
         // A bowl sees itself.
         ball.meshes[0].triangles.iter_mut().for_each(|triangle| triangle.swap(1, 2));
-        ball.lights = vec![lamp(LightKind::Point { position: DVec3::new(0.2, 0.7, -0.4), intensity: Vec3::ONE })];
+        ball.lights = vec![lamp(point(DVec3::new(0.2, 0.7, -0.4)))];
         let lit = received(&gpu, &ball, &flights(100_000, 2), &[(DVec3::new(0.2, -0.2, -0.4), DVec3::Y)]);
         assert_complains("the inside of a ball", none_returns("bowl", &lit));
     }
@@ -382,7 +346,7 @@ fn each_half_of_a_roof_keeps_its_own_light() {
 fn lit_and_dark_room(wall: impl Fn(&mut Scene)) -> Scene {
     let mut rooms = closed_room(0.7);
     rooms.materials.push(Material { two_sided: true, ..Material::lambert("sheet", Vec3::splat(0.7)) });
-    rooms.lights = vec![lamp(LightKind::Point { position: DVec3::new(0.2, 0.6, 0.4), intensity: Vec3::ONE })];
+    rooms.lights = vec![lamp(point(DVec3::new(0.2, 0.6, 0.4)))];
     wall(&mut rooms);
     rooms
 }
@@ -404,14 +368,14 @@ fn thin_walls_and_sheets_let_no_light_through() {
     let points = [(half, DVec3::NEG_X), (thin, DVec3::X), (DVec3::new(0.99, 0.0, 0.4), y), (DVec3::X, DVec3::NEG_X)]
         .map(|(at, normal)| (at + DVec3::new(0.0, 0.5, 0.5) * (y + z - normal.abs()), normal));
     let check = |what: &str, lit: &RunResult| -> Check {
-        let means: Vec<DVec3> = (0..points.len()).map(|point| lit.film.mean(point, &lit.plan)).collect();
+        let means = means(lit);
         assert!(means[0].x > 0.1, "{what}: the lit side has {}", means[0]);
         match means[1..].iter().find(|mean| **mean != DVec3::ZERO) {
             None => Ok(()),
             Some(mean) => Err(format!("{what}: {mean} W/m2 in the dark room")),
         }
     };
-    for illumination in [Illumination::Split, Illumination::Photons] {
+    for illumination in BOTH {
         for radius in [0.3, 0.02] {
             let settings =
                 SceneSettings { illumination, photons: 20_000, rounds: 4, radius: Some(radius), alpha: 1.0, ..SceneSettings::default() };
@@ -435,15 +399,15 @@ fn a_lit_floor_does_not_light_the_foot_of_the_wall() {
     let Some(gpu) = device() else { return };
     let mut corner = scene("sun-over-plane");
     corner.materials[0].base_colour = Vec3::ZERO;
-    corner.lights = vec![lamp(LightKind::Directional { direction: DVec3::NEG_Y, irradiance: Vec3::ONE })];
+    corner.lights = vec![lamp(sun(DVec3::NEG_Y))];
     corner.meshes.push(Mesh::parallelogram("wall", DVec3::new(-2.0, 0.0, -2.0), DVec3::Y * 2.0, DVec3::Z * 4.0, 0));
-    for illumination in [Illumination::Split, Illumination::Photons] {
+    for illumination in BOTH {
         let settings =
             SceneSettings { illumination, photons: 100_000, radius: Some(0.3), alpha: 1.0, rounds: 2, ..SceneSettings::default() };
         let points =
             [(DVec3::new(-1.99, 0.0, 0.0), DVec3::Y), (DVec3::new(-2.0, 0.01, 0.0), DVec3::X), (DVec3::new(-2.0, 0.0, 0.0), DVec3::X)];
         let lit = received(&gpu, &corner, &settings, &points);
-        let [floor, wall, foot] = [0, 1, 2].map(|point| lit.film.mean(point, &lit.plan).x);
+        let [floor, wall, foot] = [0, 1, 2].map(|point| red(&lit, point).0);
         assert!(floor > 0.8, "{illumination:?}: the floor has {floor}");
         assert_eq!((wall, foot), (0.0, 0.0), "{illumination:?}");
     }
@@ -453,7 +417,7 @@ fn a_lit_floor_does_not_light_the_foot_of_the_wall() {
 fn scaled_cornell(k: i32) -> (Scene, Vec<(DVec3, DVec3)>) {
     let factor = 2f64.powi(k);
     let strength = (factor * factor) as f32;
-    let (mut scene, points) = moved(cornell(), factor, DVec3::ZERO);
+    let (mut scene, points) = cornell_at(|at| at * factor);
     let up = DVec3::new(0.5, 0.6, 0.5) * factor;
     scene.lights = vec![
         lamp(LightKind::Point { position: up, intensity: Vec3::splat(0.5) * strength }),
@@ -515,11 +479,11 @@ fn the_open_box_of_any_power_of_two_stores_the_same_photons() {
             scene.lights.iter_mut().for_each(|light| light.radius *= factor);
             let settings = RoomSettings { eye: settings.eye.map(|place| place * factor as f32), ..settings.clone() };
             let photons = match (builder, &gpu) {
-                (Builder::Cpu, _) => photonmill::engine::room::photons_on_cpu(&scene, &settings),
-                (_, Some(gpu)) => photonmill::engine::room::photons_on_gpu(gpu, &scene, &settings),
+                (Builder::Cpu, _) => engine::room::photons_on_cpu(&scene, &settings),
+                (_, Some(gpu)) => engine::room::photons_on_gpu(gpu, &scene, &settings),
                 (_, None) => return Vec::new(),
             };
-            let mut photons = crate::common::in_order(photons.unwrap());
+            let mut photons = in_order(photons.unwrap());
             photons.iter_mut().for_each(|photon| photon.position /= factor as f32);
             photons
         };
@@ -536,9 +500,7 @@ fn ten_thousand_sizes_away_the_light_is_the_same_to_the_bit() {
     let Some(gpu) = device() else { return };
     let settings = SceneSettings { photons: 1500, caustic_photons: 1500, rounds: 2, ..SceneSettings::default() };
     let of = |way: DVec3| {
-        let mut scene = cornell();
-        scene.meshes.iter_mut().flat_map(|mesh| &mut mesh.positions).for_each(|at| *at = (*at * 1_048_576.0).round() / 1_048_576.0 + way);
-        let points: Vec<_> = POINTS.iter().map(|(at, normal)| ((*at * 1_048_576.0).round() / 1_048_576.0 + way, *normal)).collect();
+        let (scene, points) = cornell_at(|at| (at * 1_048_576.0).round() / 1_048_576.0 + way);
         received(&gpu, &scene, &settings, &points)
     };
     let expected = of(DVec3::ZERO);
@@ -558,20 +520,12 @@ fn axis_parallel_rays_meet_the_same_by_tree_and_list() {
     let Some(gpu) = device() else { return };
     let mut room = cornell();
     room.materials.iter_mut().for_each(|material| material.emission = Vec3::ZERO);
-    let sun = |direction| lamp(LightKind::Directional { direction, irradiance: Vec3::ONE });
-    let flush = |centre, normal| lamp(LightKind::Disc { centre, normal, radius: 0.3, power: Vec3::ONE, law: EmissionLaw::Uniform });
-    room.lights = [DVec3::X, DVec3::Y, DVec3::Z].into_iter().flat_map(|axis| [sun(axis), sun(-axis)]).collect();
-    room.lights.extend([flush(DVec3::new(0.5, 0.0, 0.5), DVec3::Y), flush(DVec3::new(0.0, 0.5, 0.5), DVec3::X)]);
+    room.lights = [DVec3::X, DVec3::Y, DVec3::Z].into_iter().flat_map(|axis| [axis, -axis]).map(|way| lamp(sun(way))).collect();
+    let flush = [(DVec3::new(0.5, 0.0, 0.5), DVec3::Y), (DVec3::new(0.0, 0.5, 0.5), DVec3::X)];
+    room.lights.extend(flush.map(|(centre, normal)| lamp(disc(centre, normal, 0.3, EmissionLaw::Uniform))));
     let lit = |with: &[Effect], without: &[Effect], room: &Scene| {
-        let settings = SceneSettings {
-            with: with.to_vec(),
-            without: without.to_vec(),
-            illumination: Illumination::Photons,
-            photons: 60_000,
-            rounds: 2,
-            bounces: 4,
-            ..SceneSettings::default()
-        };
+        let of_photons = SceneSettings { illumination: Illumination::Photons, photons: 60_000, ..SceneSettings::default() };
+        let settings = SceneSettings { with: with.to_vec(), without: without.to_vec(), rounds: 2, bounces: 4, ..of_photons };
         received(&gpu, room, &settings, &POINTS)
     };
     let (tree, list) = (lit(&[Effect::Bvh], &[], &room), lit(&[], &[Effect::Bvh], &room));
@@ -600,7 +554,7 @@ fn flat_doubled_and_reordered_triangles_change_no_bit() {
     // A lamp that is no mesh: numbers choose it alike in whatever order triangles come.
     let mut plain = cornell();
     plain.materials.iter_mut().for_each(|material| material.emission = Vec3::ZERO);
-    plain.lights = vec![lamp(LightKind::Point { position: DVec3::new(0.4, 0.8, 0.6), intensity: Vec3::ONE })];
+    plain.lights = vec![lamp(point(DVec3::new(0.4, 0.8, 0.6)))];
     let settings = SceneSettings { photons: 20_000, rounds: 2, ..SceneSettings::default() };
     let of = |spoil: &dyn Fn(&mut Mesh)| {
         let mut scene = plain.clone();
@@ -633,14 +587,13 @@ fn flat_doubled_and_reordered_triangles_change_no_bit() {
 fn two_sheets_at_one_place_show_each_its_own_side() {
     let Some(gpu) = device() else { return };
     let mut sheets = scene("sun-over-plane");
-    sheets.materials = vec![Material::lambert("above", Vec3::splat(0.8)), Material::lambert("below", Vec3::splat(0.4))];
+    sheets.materials = vec![matt(0.8), matt(0.4)];
     let (u, v) = (DVec3::X * 4.0, DVec3::Z * 4.0);
     // Turned, so that no coordinate is a round number.
     let tilt = DQuat::from_axis_angle(DVec3::new(0.3, 0.5, -0.8).normalize(), 1.1);
     let sheet = |name, a: DVec3, b: DVec3, material| Mesh::parallelogram(name, tilt * (-0.5 * (u + v)), tilt * a, tilt * b, material);
     let faces = [sheet("above", v, u, 0), sheet("below", u, v, 1)];
-    let sun = |y: f64| lamp(LightKind::Directional { direction: tilt * DVec3::new(0.0, y, 0.0), irradiance: Vec3::ONE });
-    sheets.lights = vec![sun(-1.0), sun(1.0)];
+    sheets.lights = [DVec3::NEG_Y, DVec3::Y].map(|way| lamp(sun(tilt * way))).into();
     let settings = SceneSettings { shadow_rays: 8, ..settings() };
     let mut complaints = Vec::new();
     for order in [[0, 1], [1, 0]] {
@@ -660,7 +613,7 @@ fn two_sheets_at_one_place_show_each_its_own_side() {
 fn room_with_lamp(k: i32) -> (Scene, (DVec3, DVec3)) {
     let edge = 2f64.powi(-k);
     let mut room = closed_room(0.0);
-    room.materials.push(Material { emission: Vec3::ONE, ..Material::lambert("lamp", Vec3::ZERO) });
+    room.materials.push(shining(0.0));
     let corner = DVec3::splat(0.5);
     let positions = vec![corner, corner + DVec3::X * edge, corner + DVec3::Z * edge];
     room.meshes.push(Mesh { name: "lamp".into(), positions, triangles: vec![[0, 1, 2]], material: 1, ..Mesh::default() });
@@ -682,16 +635,7 @@ fn small_lamps_shine_by_their_area() {
         println!("lamp of 2^-{k} m: shadow rays see {:.4} of its light", found.mean / expected);
         let error = found.standard_error.max((extent + 1e-4) * expected);
         complaints.extend(z_check(&format!("2^-{k}, shadow rays"), found.mean, expected, error).err());
-        let photons = SceneSettings {
-            photons: 10_000,
-            rounds: 1,
-            bounces: 1,
-            radius: Some(0.1),
-            alpha: 1.0,
-            illumination: Illumination::Photons,
-            ..settings()
-        };
-        let mapped = irradiance(&gpu, &room, &photons, &[below]).unwrap();
+        let mapped = irradiance(&gpu, &room, &mapped(10_000, 1, 1, 0.1), &[below]).unwrap();
         // A disc of radius h below sees A / h^2 (1 - 1 / (1 + (h / d)^2)).
         let mean = area * (1.0 - 1.0 / (1.0 + 0.04)) / 0.01;
         complaints.extend(z_check(&format!("2^-{k}, photons"), mapped.mean, mean, mapped.standard_error.hypot(extent * mean)).err());
@@ -716,12 +660,10 @@ fn the_smallest_lamps_shine_into_the_room_or_are_left_out() {
 #[test]
 fn a_furnace_glows_alike_however_it_is_turned() {
     let Some(gpu) = device() else { return };
-    let settings =
-        SceneSettings { photons: 6000, bounces: 60, radius: Some(0.3), alpha: 1.0, illumination: Illumination::Photons, ..settings() };
+    let settings = mapped(6000, 2, 60, 0.3);
     for e in [1e-2, 1e-4, 1e-6, 0.0] {
         let turn = DQuat::from_rotation_arc(DVec3::Y, DVec3::new(e, 0.0, -1.0).normalize());
-        let mut furnace = scene("furnace");
-        furnace.meshes.iter_mut().flat_map(|mesh| &mut mesh.positions).for_each(|at| *at = turn * *at);
+        let furnace = moved(scene("furnace"), |at| turn * at);
         // Away from the middle of the ceiling and on a wall: skewed directions would miss one and meet the other.
         let points =
             [(DVec3::new(0.2, 1.0, 0.3), DVec3::NEG_Y), (DVec3::new(0.0, 0.2, 0.5), DVec3::X), (DVec3::new(0.5, 0.0, 0.5), DVec3::Y)];

@@ -1,27 +1,11 @@
 //! Hard cases of materials: ends of reflectance and of bounces, colours, lobes of any width, glass of any index. The
 //! table in `tests/common/cases.rs` names them by case.
 
-use std::f64::consts::PI;
-
-use crate::common::lit::{BOTH, flights, lamp, mean_red, received, same_light, scene, seen};
-use crate::common::{assert_complains, assert_holds, device, known, relative_check, share_check, z_check};
-use glam::{DVec3, Vec3};
-use photonmill::gpu::Gpu;
-use photonmill::scene::light::{Light, LightKind};
-use photonmill::scene::texture::Wrap;
-use photonmill::scene::{Camera, Material, Mesh, Scene, Surface};
-use photonmill::settings::EmissionLaw;
-use photonmill::settings::scene::{Illumination, Part, SceneSettings};
+use crate::common::known;
+use crate::common::prelude::*;
+use crate::hard_cases::{POINTS, settings};
 use photonmill::verify::selfcheck::Estimate;
 use photonmill::verify::selfcheck::measure::{irradiance, radiance};
-
-fn settings() -> SceneSettings {
-    SceneSettings { photons: 4000, caustic_photons: 4000, rounds: 2, shadow_rays: 8, ..SceneSettings::default() }
-}
-
-/// Of the Cornell box: (position, normal).
-const POINTS: [(DVec3, DVec3); 3] =
-    [(DVec3::new(0.85, 0.0, 0.9), DVec3::Y), (DVec3::new(0.0, 0.4, 0.6), DVec3::X), (DVec3::new(0.7, 0.8, 0.0), DVec3::Z)];
 
 /// A lamp and a glass pane in a room: an index of refraction of 1 is no pane.
 fn behind_a_pane(ior: Option<f32>) -> Scene {
@@ -56,15 +40,11 @@ fn glass_of_the_air_s_own_index_is_not_there() {
 #[test]
 fn reflectances_and_bounces_at_their_ends_are_right() {
     let Some(gpu) = device() else { return };
-    let furnace = |albedo: f32| {
-        let mut scene = scene("furnace");
-        scene.materials[0].base_colour = Vec3::splat(albedo);
-        scene
-    };
     let points = [(DVec3::new(0.5, 0.0, 0.5), DVec3::Y), (DVec3::new(0.2, 0.0, 0.999), DVec3::Y)];
     let ask = |gpu: &Gpu, albedo, bounces| {
-        let settings = SceneSettings { bounces, radius: Some(0.2), alpha: 1.0, illumination: Illumination::Photons, ..settings() };
-        irradiance(gpu, &furnace(albedo), &settings, &points).unwrap()
+        let mut furnace = scene("furnace");
+        furnace.materials[0].base_colour = Vec3::splat(albedo);
+        irradiance(gpu, &furnace, &mapped(4000, 2, bounces, 0.2), &points).unwrap()
     };
     // b landings: 1 + rho + ... + rho^(b - 1) times pi.
     for (albedo, bounces, exact) in [(0.0, 32, PI), (1.0, 1, PI), (1.0, 7, 7.0 * PI), (0.9, 1000, 10.0 * PI), (0.5, 2, 1.5 * PI)] {
@@ -82,8 +62,7 @@ fn each_channel_has_its_own_reflectance() {
     for colour in [Vec3::new(0.9, 0.1, 0.1), Vec3::new(0.1, 0.9, 0.1), Vec3::new(0.5, 0.5, 0.9)] {
         let mut furnace = scene("furnace");
         furnace.materials[0].base_colour = colour;
-        let settings =
-            SceneSettings { photons: 8000, bounces: 300, radius: Some(0.5), alpha: 1.0, illumination: Illumination::Photons, ..settings() };
+        let settings = mapped(8000, 2, 300, 0.5);
         let exact = PI / (1.0 - f64::from(colour.x));
         let found = irradiance(&gpu, &furnace, &settings, &[(DVec3::new(0.5, 0.0, 0.5), DVec3::Y)]).unwrap();
         assert!(found.standard_error < 0.02 * exact, "{colour}: {found:?}");
@@ -93,10 +72,10 @@ fn each_channel_has_its_own_reflectance() {
     }
 }
 
-fn plate(surface: Surface, lights: Vec<Light>) -> Scene {
+fn plate(surface: Surface, lights: Vec<LightKind>) -> Scene {
     let mut plate = scene("sky-over-plane");
     plate.materials[0] = Material { surface, ..Material::lambert("plate", Vec3::ONE) };
-    plate.lights = lights;
+    plate.lights = lights.into_iter().map(lamp).collect();
     plate
 }
 
@@ -115,7 +94,7 @@ fn lobes_reflect_what_lies_above_the_horizon() {
         (2.0, [1.0, 0.8705, 0.5625, 0.3444]),
         (5.0, [1.0, 0.8663, 0.5194, 0.2693]),
     ];
-    let sky = || vec![lamp(LightKind::Environment { radiance: Vec3::ONE })];
+    let sky = || vec![LightKind::Environment { radiance: Vec3::ONE }];
     for (exponent, albedos) in table {
         for (degrees, albedo) in [0.0f64, 30.0, 60.0, 80.0].into_iter().zip(albedos) {
             let settings = SceneSettings { photons: 1, rounds: 1, shadow_rays: 32, ..settings() };
@@ -146,15 +125,8 @@ fn lobes_of_any_width_throw_their_share() {
         // Half of the light within h.
         let cosine = 0.5f64.powf(1.0 / (n + 2.0));
         let h = (1.0 - cosine * cosine).sqrt() / cosine;
-        let spot = LightKind::Spot {
-            position: DVec3::Y * 0.9,
-            direction: DVec3::NEG_Y,
-            intensity: Vec3::splat(1e7),
-            inner_angle: 3.5e-4,
-            outer_angle: 3.5e-4,
-        };
-        let watts = 2.0 * PI * (1.0 - f64::from(3.5e-4f32).cos()) * 1e7;
-        let mut bench = plate(Surface::Glossy { exponent }, vec![lamp(spot)]);
+        let (beam, watts) = beam(DVec3::Y * 0.9, DVec3::NEG_Y);
+        let mut bench = plate(Surface::Glossy { exponent }, vec![beam]);
         bench.materials.push(Material::lambert("screen", Vec3::ZERO));
         bench.meshes.push(Mesh::parallelogram("screen", DVec3::new(-2.0, 1.0, -2.0), DVec3::X * 4.0, DVec3::Z * 4.0, 1));
         let settings = SceneSettings { photons: 20_000, bounces: 2, radius: Some(h), alpha: 1.0, ..settings() };
@@ -174,7 +146,7 @@ fn lobes_of_any_width_throw_their_share() {
 fn a_sun_in_a_plate_is_a_power_of_the_cosine() {
     let Some(gpu) = device() else { return };
     let incidence = PI / 4.0;
-    let sun = || vec![lamp(LightKind::Directional { direction: -towards(incidence), irradiance: Vec3::splat(2.0) })];
+    let sun = || vec![LightKind::Directional { direction: -towards(incidence), irradiance: Vec3::splat(2.0) }];
     let mut worst = [0.0f64; 2];
     for exponent in [0.0f32, 0.01, 0.5, 2.0, 5.0, 1e4, 48_826.0] {
         let n = f64::from(exponent);
@@ -229,7 +201,7 @@ fn fresnel(cos_i: f64, eta: f64) -> f64 {
 
 /// A surface of glass, 4 m wide, under an even sky and `depth` over a black ground that catches what goes through.
 fn over_glass(ior: f32, depth: f64) -> Scene {
-    let mut scene = plate(Surface::Dielectric { ior }, vec![lamp(LightKind::Environment { radiance: Vec3::ONE })]);
+    let mut scene = plate(Surface::Dielectric { ior }, vec![LightKind::Environment { radiance: Vec3::ONE }]);
     scene.materials.push(Material::lambert("ground", Vec3::ZERO));
     scene.meshes.push(Mesh::parallelogram("ground", DVec3::new(-40.0, -depth, -40.0), DVec3::Z * 80.0, DVec3::X * 80.0, 1));
     scene
@@ -298,11 +270,8 @@ fn an_index_of_one_reflects_nothing_at_any_angle() {
 #[test]
 fn diffuse_light_crosses_glass_by_its_mean_transmittance() {
     let Some(gpu) = device() else { return };
-    let disc = |height: f64, normal| {
-        lamp(LightKind::Disc { centre: DVec3::Y * height, normal, radius: 0.01, power: Vec3::ONE, law: EmissionLaw::Cosine })
-    };
     for (what, height, normal, expected) in [("leaving", -0.1, DVec3::Y, 0.403_654_2), ("entering", 0.1, DVec3::NEG_Y, 0.908_222_0)] {
-        let mut scene = plate(Surface::Dielectric { ior: 1.5 }, vec![disc(height, normal)]);
+        let mut scene = plate(Surface::Dielectric { ior: 1.5 }, vec![disc(DVec3::Y * height, normal, 0.01, EmissionLaw::Cosine)]);
         // So wide that one photon in a hundred thousand misses it.
         scene.meshes[0].positions.iter_mut().for_each(|at| *at *= 16.0);
         scene.materials.push(Material::lambert("ground", Vec3::ZERO));

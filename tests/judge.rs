@@ -1,21 +1,9 @@
 //! The judge, judged: scenes whose light is known in closed form.
 
-use std::f64::consts::PI;
-
-use glam::{DVec3, Vec3};
-use photonmill::scene::light::LightKind;
-use photonmill::scene::material::TextureUse;
-use photonmill::scene::texture::Wrap;
-use photonmill::scene::{Camera, Light, Material, Mesh, Scene, Surface, Texture, built_in};
-use photonmill::settings::EmissionLaw;
-use photonmill::verify::judge::{Estimate, Image, Judge, fresnel, random};
+use crate::common::prelude::*;
+use photonmill::verify::judge::{Estimate, Image, fresnel, random};
 
 const NO_LIMIT: u32 = u32::MAX;
-
-fn scene(meshes: Vec<Mesh>, materials: Vec<Material>, lights: Vec<LightKind>) -> Scene {
-    let lights = lights.into_iter().map(|kind| Light { name: "light".into(), kind }).collect();
-    Scene { meshes, materials, lights, ..Scene::default() }
-}
 
 /// A base colour that differs between channels.
 const COLOUR: Vec3 = Vec3::new(0.75, 0.5, 0.25);
@@ -96,7 +84,7 @@ fn disc_irradiance(distance: f64, law: EmissionLaw) -> DVec3 {
 #[test]
 fn a_disc_lights_the_point_on_its_axis() {
     for law in [EmissionLaw::Cosine, EmissionLaw::Uniform] {
-        let lit = scene(vec![], vec![], vec![disc(1.5, -DVec3::Z, law)]);
+        let lit = scene_of(vec![], vec![], vec![disc(1.5, -DVec3::Z, law)]);
         let estimate = irradiance(&lit, DVec3::ZERO, DVec3::Z, 20_000);
         assert_total("front", &estimate, disc_irradiance(1.5, law));
         assert_eq!(estimate.mean.total(), estimate.mean.direct);
@@ -107,20 +95,20 @@ fn a_disc_lights_the_point_on_its_axis() {
 #[test]
 fn point_lights_fall_off_with_distance_and_cosine() {
     let bulb = LightKind::Point { position: DVec3::new(3.0, 0.0, 4.0), intensity: Vec3::new(50.0, 25.0, 0.0) };
-    let lit = scene(vec![], vec![], vec![bulb.clone()]);
+    let lit = scene_of(vec![], vec![], vec![bulb.clone()]);
     let expected = DVec3::new(50.0, 25.0, 0.0) / 25.0 * 0.8;
     assert_total("alone", &irradiance(&lit, DVec3::ZERO, DVec3::Z, 2), expected);
     // A plate blocks it from either side; the receiver itself, a surface, does not.
     let plates = |height| vec![square(0.0, 9.0, true, 0), square(height, 9.0, true, 0)];
     let black = || vec![Material::lambert("black", Vec3::ZERO)];
-    assert_total("lit", &irradiance(&scene(plates(5.0), black(), vec![bulb.clone()]), DVec3::ZERO, DVec3::Z, 2), expected);
-    assert_total("shadow", &irradiance(&scene(plates(2.0), black(), vec![bulb]), DVec3::ZERO, DVec3::Z, 2), DVec3::ZERO);
+    assert_total("lit", &irradiance(&scene_of(plates(5.0), black(), vec![bulb.clone()]), DVec3::ZERO, DVec3::Z, 2), expected);
+    assert_total("shadow", &irradiance(&scene_of(plates(2.0), black(), vec![bulb]), DVec3::ZERO, DVec3::Z, 2), DVec3::ZERO);
 }
 
 #[test]
 fn two_lights_add_up_whatever_their_power() {
     let bulb = |x: f64, intensity: f32| LightKind::Point { position: DVec3::new(x, 0.0, 1.0), intensity: Vec3::splat(intensity) };
-    let lit = scene(vec![], vec![], vec![bulb(0.0, 1.0), bulb(1.0, 30.0)]);
+    let lit = scene_of(vec![], vec![], vec![bulb(0.0, 1.0), bulb(1.0, 30.0)]);
     let expected = DVec3::splat(1.0 + 30.0 / 2f64.powf(1.5));
     assert_total("both", &irradiance(&lit, DVec3::ZERO, DVec3::Z, 20_000), expected);
 }
@@ -130,7 +118,7 @@ fn spots_fall_off_between_their_cones() {
     let (inner_angle, outer_angle) = (0.3f32, 0.9f32);
     let (inner, outer) = (f64::from(inner_angle).cos(), f64::from(outer_angle).cos());
     let spot = LightKind::Spot { position: DVec3::Z, direction: -DVec3::Z, intensity: Vec3::ONE, inner_angle, outer_angle };
-    let lit = scene(vec![], vec![], vec![spot]);
+    let lit = scene_of(vec![], vec![], vec![spot]);
     for (cosine, falloff) in [(1.0, 1.0), (0.999 * inner + 0.001, 1.0), (0.5 * (inner + outer), 0.25), (0.99 * outer, 0.0)] {
         let point = DVec3::new((1.0f64 / (cosine * cosine) - 1.0).sqrt(), 0.0, 0.0);
         let expected = DVec3::splat(falloff * cosine.powi(3));
@@ -141,7 +129,7 @@ fn spots_fall_off_between_their_cones() {
 #[test]
 fn the_sun_lights_by_its_cosine() {
     let sun = LightKind::Directional { direction: DVec3::new(0.6, 0.0, -0.8), irradiance: COLOUR };
-    let lit = scene(vec![square(0.0, 1.0, true, 0)], vec![material(Surface::Lambert, COLOUR)], vec![sun]);
+    let lit = scene_of(vec![square(0.0, 1.0, true, 0)], vec![material(Surface::Lambert, COLOUR)], vec![sun]);
     let expected = 0.8 * COLOUR.as_dvec3();
     assert_total("irradiance", &irradiance(&lit, DVec3::ZERO, DVec3::Z, 2), expected);
     let seen = expected * COLOUR.as_dvec3() / PI;
@@ -151,7 +139,7 @@ fn the_sun_lights_by_its_cosine() {
 
 #[test]
 fn the_sky_lights_an_open_plane() {
-    let mut lit = scene(vec![square(0.0, 1.0, true, 0)], vec![material(Surface::Lambert, COLOUR)], vec![environment()]);
+    let mut lit = scene_of(vec![square(0.0, 1.0, true, 0)], vec![material(Surface::Lambert, COLOUR)], vec![environment()]);
     assert_total("irradiance", &irradiance(&lit, DVec3::new(0.3, 0.2, 0.0), DVec3::Z, 100), PI * SKY);
     let (above, below, spot) = (DVec3::new(0.0, 1.0, 2.0), DVec3::new(0.0, 1.0, -2.0), DVec3::new(0.3, 0.2, 0.0));
     let seen = radiance(&lit, above, spot, 100);
@@ -166,7 +154,7 @@ fn the_sky_lights_an_open_plane() {
 /// All walls shine and scatter alike, whether as mirrors or not.
 fn furnace(surfaces: [Surface; 6]) -> Scene {
     let shining = |surface| Material { emission: Vec3::new(1.0, 2.0, 3.0), ..material(surface, COLOUR) };
-    scene(faces(DVec3::new(1.0, 0.7, 0.5), true, [0, 1, 2, 3, 4, 5]), surfaces.map(shining).to_vec(), vec![])
+    scene_of(faces(DVec3::new(1.0, 0.7, 0.5), true, [0, 1, 2, 3, 4, 5]), surfaces.map(shining).to_vec(), vec![])
 }
 
 const EMITTED: DVec3 = DVec3::new(1.0, 2.0, 3.0);
@@ -219,13 +207,13 @@ fn bounces_are_a_geometric_series() {
 #[test]
 fn a_lamp_is_seen_in_a_mirror_and_lights_through_it() {
     let materials = || vec![material(Surface::Mirror, COLOUR), lamp(Vec3::new(1.0, 2.0, 3.0))];
-    let lit = scene(vec![square(0.0, 5.0, true, 0), square(2.0, 1.0, false, 1)], materials(), vec![]);
+    let lit = scene_of(vec![square(0.0, 5.0, true, 0), square(2.0, 1.0, false, 1)], materials(), vec![]);
     let seen = radiance(&lit, DVec3::new(3.0, 0.0, 2.0), DVec3::new(1.5, 0.1, 0.0), 2);
     assert_total("lamp", &seen, COLOUR.as_dvec3() * EMITTED);
     assert_eq!(seen.mean.specular, seen.mean.total());
 
     for law in [EmissionLaw::Cosine, EmissionLaw::Uniform] {
-        let lit = scene(vec![square(0.0, 5.0, true, 0)], materials(), vec![disc(1.0, -DVec3::Z, law)]);
+        let lit = scene_of(vec![square(0.0, 5.0, true, 0)], materials(), vec![disc(1.0, -DVec3::Z, law)]);
         // From below its lamp a receiver sees the lamp's image only, as far below the mirror.
         let estimate = irradiance(&lit, DVec3::Z * 0.5, -DVec3::Z, 200_000);
         assert_total("image", &estimate, COLOUR.as_dvec3() * disc_irradiance(1.5, law));
@@ -239,7 +227,7 @@ fn a_lamp_is_seen_in_a_mirror_and_lights_through_it() {
 #[test]
 fn discs_in_walls_shine_into_the_room() {
     // The mirror is the floor, the disc lies in the very plane of the ceiling.
-    let lit = scene(
+    let lit = scene_of(
         vec![square(0.0, 5.0, true, 0), square(1.0, 5.0, false, 1)],
         vec![material(Surface::Mirror, COLOUR), material(Surface::Lambert, Vec3::ZERO)],
         vec![disc(1.0, -DVec3::Z, EmissionLaw::Cosine)],
@@ -274,7 +262,7 @@ fn glass_transmits_what_it_does_not_reflect() {
     let slab = || faces(DVec3::new(5.0, 5.0, 0.1), false, [0; 6]);
     let mut meshes = slab();
     meshes.push(square(-1.0, 5.0, true, 1));
-    let lit = scene(meshes, vec![glass.clone(), lamp(Vec3::ONE)], vec![]);
+    let lit = scene_of(meshes, vec![glass.clone(), lamp(Vec3::ONE)], vec![]);
     let (eye, target) = (DVec3::new(0.3, 0.2, 3.0), DVec3::new(0.3, 0.2, 0.0));
     let transmitted = 0.96 * 0.96 / (1.0 - 0.04 * 0.04);
     let seen = radiance(&lit, eye, target, 20_000);
@@ -282,7 +270,7 @@ fn glass_transmits_what_it_does_not_reflect() {
     assert_eq!(seen.mean.specular, seen.mean.total());
 
     // Nothing is lost: under an even sky glass is invisible, and inside radiance is n^2 times as high.
-    let lit = scene(slab(), vec![glass], vec![environment()]);
+    let lit = scene_of(slab(), vec![glass], vec![environment()]);
     assert_total("slant", &radiance(&lit, eye, DVec3::new(1.0, 0.5, 0.0), 20_000), SKY);
     assert_total("inside", &radiance(&lit, DVec3::ZERO, DVec3::Z, 20_000), 2.25 * SKY);
 }
@@ -291,7 +279,7 @@ fn glass_transmits_what_it_does_not_reflect() {
 fn refraction_obeys_snell() {
     // A lamp no wider than a pencil at the bottom of a pool, seen where Snell's law says.
     let water = material(Surface::Dielectric { ior: 1.25 }, Vec3::ONE);
-    let lit = scene(vec![square(0.0, 5.0, true, 0), square(-1.0, 0.01, true, 1)], vec![water, lamp(Vec3::ONE)], vec![]);
+    let lit = scene_of(vec![square(0.0, 5.0, true, 0), square(-1.0, 0.01, true, 1)], vec![water, lamp(Vec3::ONE)], vec![]);
     let eye_at = |sine: f64| {
         let surface = DVec3::X * (sine / 1.25 / (1.0 - (sine / 1.25).powi(2)).sqrt());
         (surface + DVec3::new(sine, 0.0, (1.0 - sine * sine).sqrt()), surface)
@@ -320,7 +308,7 @@ fn lobes_weigh_the_light_of_a_point() {
         (Surface::Glossy { exponent: 10.0 }, 12.0 / (2.0 * PI) * cosine.powi(10)),
         (Surface::Mirror, 0.0),
     ] {
-        let lit = scene(vec![square(0.0, 1.0, true, 0)], vec![material(surface, COLOUR)], vec![bulb.clone()]);
+        let lit = scene_of(vec![square(0.0, 1.0, true, 0)], vec![material(surface, COLOUR)], vec![bulb.clone()]);
         let seen = radiance(&lit, 3.0 * eye, DVec3::ZERO, 2);
         // The picture is a little wider than a ray.
         assert_meets("lobe", seen.mean.total(), DVec3::splat(1e-8), expected * arriving);
@@ -339,12 +327,12 @@ fn sampling_lobes_and_sampling_lights_agree() {
     ] {
         let mut meshes = vec![square(0.0, 1.0, true, 0)];
         let expected = weight * COLOUR.as_dvec3() * SKY;
-        let open = scene(meshes.clone(), vec![material(surface, COLOUR)], vec![environment()]);
+        let open = scene_of(meshes.clone(), vec![material(surface, COLOUR)], vec![environment()]);
         let sampled_light = radiance(&open, DVec3::Z * 0.5, DVec3::ZERO, 40_000);
         assert_meets("light", sampled_light.mean.direct, sampled_light.standard_error.direct, expected);
         assert_eq!(sampled_light.mean.direct, sampled_light.mean.total());
         meshes.extend(faces(DVec3::splat(2.0), false, [1; 6]));
-        let closed = scene(meshes, vec![material(surface, COLOUR), pane()], vec![environment()]);
+        let closed = scene_of(meshes, vec![material(surface, COLOUR), pane()], vec![environment()]);
         let sampled_lobe = radiance(&closed, DVec3::Z * 0.5, DVec3::ZERO, 40_000);
         assert_meets("lobe", sampled_lobe.mean.caustic, sampled_lobe.standard_error.caustic, expected);
         assert_eq!(sampled_lobe.mean.caustic, sampled_lobe.mean.total());
@@ -353,9 +341,9 @@ fn sampling_lobes_and_sampling_lights_agree() {
     let glossy = material(Surface::Glossy { exponent: 5.0 }, COLOUR);
     let mut meshes = vec![square(0.0, 1.0, true, 0)];
     let eye = DVec3::new(0.9, 0.0, 0.2);
-    let open = radiance(&scene(meshes.clone(), vec![glossy.clone()], vec![environment()]), eye, DVec3::ZERO, 100_000);
+    let open = radiance(&scene_of(meshes.clone(), vec![glossy.clone()], vec![environment()]), eye, DVec3::ZERO, 100_000);
     meshes.extend(faces(DVec3::splat(2.0), false, [1; 6]));
-    let closed = radiance(&scene(meshes, vec![glossy, pane()], vec![environment()]), eye, DVec3::ZERO, 100_000);
+    let closed = radiance(&scene_of(meshes, vec![glossy, pane()], vec![environment()]), eye, DVec3::ZERO, 100_000);
     let noise = (open.total_standard_error.powf(2.0) + closed.total_standard_error.powf(2.0)).map(f64::sqrt);
     assert_meets("slant", open.mean.total(), noise, closed.mean.total());
     assert!(open.mean.total().cmplt(0.9 * COLOUR.as_dvec3() * SKY).all());
@@ -365,7 +353,7 @@ fn sampling_lobes_and_sampling_lights_agree() {
 fn textures_shade_lamps_and_walls() {
     let texture = Texture { name: "ramp".into(), width: 2, height: 1, texels: vec![Vec3::ZERO, Vec3::ONE], wrap: [Wrap::Clamp; 2] };
     let textured = Some(TextureUse { texture: 0, uv_set: 0 });
-    let plain = |material| scene(vec![square(0.0, 1.0, true, 0)], vec![material], vec![]);
+    let plain = |material| scene_of(vec![square(0.0, 1.0, true, 0)], vec![material], vec![]);
     let mut lit = plain(Material { emission_texture: textured, ..lamp(Vec3::new(1.0, 2.0, 3.0)) });
     lit.textures.push(texture.clone());
     for (x, share) in [(-0.75, 0.0), (0.0, 0.5), (0.75, 1.0)] {
@@ -379,7 +367,7 @@ fn textures_shade_lamps_and_walls() {
     assert_total("ramp", &irradiance(&lit, DVec3::Z, -DVec3::Z, 100_000), 0.5 * PI * form_factor * EMITTED);
 
     let wall = Material { base_colour_texture: textured, ..material(Surface::Lambert, COLOUR) };
-    let mut wall = scene(vec![square(0.0, 1.0, true, 0)], vec![wall], vec![environment()]);
+    let mut wall = scene_of(vec![square(0.0, 1.0, true, 0)], vec![wall], vec![environment()]);
     wall.textures.push(texture);
     for (x, share) in [(-0.75, 0.0), (0.0, 0.5), (0.75, 1.0)] {
         let seen = radiance(&wall, DVec3::new(x, 0.3, 1.0), DVec3::new(x, 0.3, 0.0), 20);
@@ -394,14 +382,14 @@ fn shading_normals_bend_reflections() {
     let mut mirror = square(0.0, 1.0, true, 0);
     mirror.normals = vec![DVec3::new(sin, 0.0, cos); 4];
     let side = Mesh::parallelogram("lamp", DVec3::new(2.0, -0.1, 1.9), DVec3::Z * 0.2, DVec3::Y * 0.2, 1);
-    let lit = scene(vec![mirror, side], vec![material(Surface::Mirror, COLOUR), lamp(Vec3::ONE)], vec![]);
+    let lit = scene_of(vec![mirror, side], vec![material(Surface::Mirror, COLOUR), lamp(Vec3::ONE)], vec![]);
     assert_total("lamp", &radiance(&lit, DVec3::Z, DVec3::ZERO, 2), COLOUR.as_dvec3());
 }
 
 #[test]
 fn pictures_stand_upright() {
     let top_left = Mesh::parallelogram("lamp", DVec3::new(-1.0, 0.0, 0.0), DVec3::X, DVec3::Y, 0);
-    let lit = scene(vec![top_left], vec![lamp(Vec3::ONE)], vec![]);
+    let lit = scene_of(vec![top_left], vec![lamp(Vec3::ONE)], vec![]);
     let camera = Camera::looking_at("front", DVec3::Z, DVec3::ZERO, DVec3::Y, PI / 2.0);
     let Image { width, height, pixels } = Judge::new(&lit, 0).image(&camera, 2, 2, 50, 1);
     assert_eq!((width, height, pixels.len()), (2, 2, 4));
@@ -436,7 +424,7 @@ fn results_depend_on_the_seed_and_not_on_threads() {
 
 #[test]
 fn standard_errors_are_what_means_scatter_by() {
-    let lit = scene(vec![], vec![], vec![disc(0.5, -DVec3::Z, EmissionLaw::Cosine)]);
+    let lit = scene_of(vec![], vec![], vec![disc(0.5, -DVec3::Z, EmissionLaw::Cosine)]);
     let estimates = Judge::new(&lit, 0).irradiance_at(&[(DVec3::ZERO, DVec3::Z); 2000], 100, 5);
     let scores = estimates.iter().map(|estimate| {
         assert_eq!(estimate.standard_error.direct, estimate.total_standard_error);
@@ -448,7 +436,7 @@ fn standard_errors_are_what_means_scatter_by() {
     // Parts of a sample depend on each other: a lamp in front of a mirror under as bright a sky.
     let half = Mesh::parallelogram("lamp", DVec3::new(-1.0, -1.0, 0.5), DVec3::X, 2.0 * DVec3::Y, 0);
     let materials = vec![lamp(Vec3::ONE), material(Surface::Mirror, Vec3::ONE)];
-    let lit = scene(vec![half, square(0.0, 1.0, true, 1)], materials, vec![LightKind::Environment { radiance: Vec3::ONE }]);
+    let lit = scene_of(vec![half, square(0.0, 1.0, true, 1)], materials, vec![LightKind::Environment { radiance: Vec3::ONE }]);
     let camera = Camera::looking_at("down", DVec3::Z, DVec3::ZERO, DVec3::Y, 0.5);
     let estimate = Judge::new(&lit, NO_LIMIT).image(&camera, 1, 1, 10_000, 1).pixels[0];
     let binomial = DVec3::splat(0.005);
@@ -462,7 +450,7 @@ fn standard_errors_are_what_means_scatter_by() {
 
 #[test]
 fn the_checks_complain_about_one_percent() {
-    let lit = scene(vec![], vec![], vec![disc(1.5, -DVec3::Z, EmissionLaw::Uniform)]);
+    let lit = scene_of(vec![], vec![], vec![disc(1.5, -DVec3::Z, EmissionLaw::Uniform)]);
     let estimate = irradiance(&lit, DVec3::ZERO, DVec3::Z, 20_000);
     let (mean, error) = (estimate.mean.total(), estimate.total_standard_error);
     assert!(meets(mean, error, disc_irradiance(1.5, EmissionLaw::Uniform)));

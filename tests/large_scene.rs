@@ -1,19 +1,9 @@
 //! A million triangles: written as a file, loaded, rendered. Large, so it waits for `--ignored`.
 
-use std::time::Instant;
-
-use crate::common::device;
-use glam::{DVec3, Vec3};
+use crate::common::prelude::*;
 use photonmill::bake::{self, Layout};
-use photonmill::engine;
-use photonmill::engine::Control;
 use photonmill::engine::scene::{self, View};
 use photonmill::output::destination::Folder;
-use photonmill::plan::scene::ScenePlan;
-use photonmill::plan::sensor::Sensor;
-use photonmill::scene::geometry::Geometry;
-use photonmill::scene::{Camera, Material, Mesh, Scene, Surface};
-use photonmill::settings::scene::SceneSettings;
 
 /// A glass ball of a million triangles over a plane, lit by a lamp.
 fn million() -> Scene {

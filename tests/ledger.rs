@@ -1,16 +1,8 @@
 //! The photon ledger: emitted = absorbed + escaped + cut off + dropped, in integers, with nothing
 //! dropped, and the same for every builder.
 
-use crate::common::{
-    Check, Complaint, Kind, assert_complains, assert_holds, device, outcome_of, pairs, run, run_on_cpu, run_scene_on_cpu, share_check,
-};
-use photonmill::gpu::Gpu;
+use crate::common::prelude::*;
 use photonmill::ledger::{BounceFates, Fates};
-use photonmill::photon::StoredPhoton;
-use photonmill::rng::Rng;
-use photonmill::scene::open_box::open_box;
-use photonmill::scene::room::{RoomScene, Wall};
-use photonmill::settings::{Builder, EmissionLaw, RoomSettings};
 
 /// Every path that entered a bounce has one fate there, and who was stored enters the next.
 fn closes(fates: &Fates, emitted: u64) -> Check {
@@ -118,8 +110,7 @@ fn black_walls_absorb_the_first_flights_hits() {
 fn a_closed_white_room_stores_everything() {
     let Some(gpu) = device() else { return };
     let settings = RoomSettings { reflectance: 1.0, photons: 777, ..small() };
-    let mut scene = open_box(&settings);
-    scene.faces[5] = Some(Wall { name: "front", albedo: 1.0, shininess: None });
+    let mut scene = closed_box(&settings, 1.0);
     let white = fates(&gpu, &scene, &settings).ledger();
     assert_eq!((white.stored, white.cut_off), (777 * 15, 777));
     assert_eq!((white.absorbed, white.escaped), (0, 0));

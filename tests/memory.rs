@@ -1,20 +1,12 @@
 //! Memory stays within what the plan says beforehand, and is that to the byte.
 
-use crate::common::{device, lit, run};
-use photonmill::engine;
+use crate::common::lit;
+use crate::common::prelude::*;
 use photonmill::engine::scene::View;
-use photonmill::gpu::Gpu;
 use photonmill::plan::buffers::{PlannedBuffer, bytes_of};
-use photonmill::plan::scene::ScenePlan;
-use photonmill::plan::sensor::Sensor;
-use photonmill::rng::Rng;
-use photonmill::scene::geometry::Geometry;
-use photonmill::scene::{Scene, built_in};
-use photonmill::settings::scene::{Illumination, SceneSettings};
-use photonmill::settings::{Builder, Gather, Preset, RoomSettings, Sums};
 
 /// Device memory against what a plan lists.
-fn check(what: &str, taken: u64, stated: u64, buffers: &[PlannedBuffer]) -> crate::common::Check {
+fn check(what: &str, taken: u64, stated: u64, buffers: &[PlannedBuffer]) -> Check {
     if taken == stated { Ok(()) } else { Err(format!("{what}: {taken} bytes taken, {stated} stated: {buffers:?}")) }
 }
 
@@ -49,7 +41,7 @@ fn the_papers_line_takes_what_its_plan_says() {
     for settings in cases {
         let (bytes, outcome) = taken(&gpu, || run(&gpu, &settings));
         let plan = &outcome.plan;
-        crate::common::assert_holds(format!("{settings:?}"), check("the paper's line", bytes, plan.bytes(), &plan.buffers()));
+        assert_holds(format!("{settings:?}"), check("the paper's line", bytes, plan.bytes(), &plan.buffers()));
     }
 }
 
@@ -60,32 +52,25 @@ fn scenes_take_what_their_plan_says() {
     for name in ["cornell-spheres", "open-box-phong", "sky-over-plane"] {
         let scene: Scene = built_in::by_name(name).unwrap();
         let geometry = Geometry::new(&scene).unwrap();
-        for illumination in lit::BOTH {
-            let settings = SceneSettings {
-                photons: 777,
-                caustic_photons: 555,
-                bounces: 5,
-                rounds: 2,
-                chunk: Some(500),
-                illumination,
-                final_gather: illumination == Illumination::Split,
-                ..SceneSettings::default()
-            };
+        for illumination in BOTH {
+            let small = SceneSettings { photons: 777, caustic_photons: 555, bounces: 5, rounds: 2, ..SceneSettings::default() };
+            let final_gather = illumination == Illumination::Split;
+            let settings = SceneSettings { chunk: Some(500), illumination, final_gather, ..small };
             let sensor = Sensor::Picture { width: 7, height: 5 };
             let plan = ScenePlan::new(&scene, &geometry, &settings, sensor, &limits).unwrap();
             let stated = plan.bytes;
             let view = View { geometry: &geometry, camera: scene.cameras.first(), phases: &[] };
             let (bytes, _) = taken(&gpu, || lit::light(&gpu, &view, plan));
-            crate::common::assert_holds(name, check("a picture", bytes, stated, &[]));
+            assert_holds(name, check("a picture", bytes, stated, &[]));
         }
         let receivers = [vec![Default::default(); 9], vec![Default::default(); 9]];
         let settings = SceneSettings { photons: 300, rounds: 2, ..SceneSettings::default() };
         let plan = ScenePlan::new(&scene, &geometry, &settings, Sensor::Receivers { count: 9 }, &limits).unwrap();
         let stated = plan.bytes_of(2);
         let view = View { geometry: &geometry, camera: None, phases: &receivers };
-        let mut control = engine::Control::default();
+        let mut control = Control::default();
         let (bytes, _) = taken(&gpu, || engine::scene::light(&gpu, &view, plan, &mut control).unwrap());
-        crate::common::assert_holds(name, check("two sets of receivers", bytes, stated, &[]));
+        assert_holds(name, check("two sets of receivers", bytes, stated, &[]));
     }
 }
 
@@ -98,6 +83,6 @@ fn the_check_complains_about_a_forgotten_buffer() {
     for forgotten in 0..buffers.len() {
         let mut others = buffers.clone();
         let PlannedBuffer { name, .. } = others.remove(forgotten);
-        crate::common::assert_complains(name, check("the paper's line", bytes, bytes_of(&others), &others));
+        assert_complains(name, check("the paper's line", bytes, bytes_of(&others), &others));
     }
 }

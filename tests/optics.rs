@@ -1,17 +1,7 @@
 //! Mirrors and glass against closed forms: Snell's and Fresnel's laws along rays from the eye and by photons, total
 //! reflection, a corridor of mirrors, a paraboloid and its focus.
 
-use std::f64::consts::{FRAC_PI_2, PI, TAU};
-
-use crate::common::device;
-use crate::common::family::Family;
-use crate::common::lit::{
-    BOTH, assert_builders_agree, glass, grid, irradiances, level, matt, mirror, radiances, received, scene_of, shaft, shining,
-};
-use glam::{DVec3, Vec3};
-use photonmill::scene::light::LightKind;
-use photonmill::scene::{Mesh, Scene};
-use photonmill::settings::scene::{Illumination, Part, SceneSettings};
+use crate::common::prelude::*;
 
 const IOR: f64 = 1.5;
 
@@ -168,19 +158,8 @@ fn even_light_crosses_a_surface_of_glass() {
         let (floor, ceiling) = (grid(-0.5, DVec3::Y, 6), grid(0.5, DVec3::NEG_Y, 6));
         let points = if lamp_below { [ceiling, floor] } else { [floor, ceiling] }.concat();
         for illumination in BOTH {
-            let settings = SceneSettings {
-                illumination,
-                radius: Some(0.1),
-                caustic_radius: Some(0.1),
-                alpha: 1.0,
-                photons: 40_000,
-                caustic_photons: 40_000,
-                // More than n hits of the sides lie ahead of a ray with the chance 1.6 / n^2: 4e-4 of the light is left out.
-                bounces: 64,
-                shadow_rays: 1,
-                rounds: 1,
-                ..SceneSettings::default()
-            };
+            // More than n hits of the sides lie ahead of a ray with the chance 1.6 / n^2: 4e-4 of the light is left out.
+            let settings = fixed_radius(illumination, 40_000, 1, 64, 0.1);
             assert_builders_agree(&gpu, &scene, &settings, &points);
             let runs = irradiances(&gpu, &scene, &settings, &points, 1..25);
             for (where_, of_points, expected) in [("beyond", 0..36, share), ("back", 36..72, 1.0 - share)] {
@@ -203,7 +182,7 @@ fn even_light_crosses_a_surface_of_glass() {
 #[test]
 fn images_light_the_end_of_a_corridor() {
     let Some(gpu) = device() else { return };
-    let (z, off, cone) = (1.0, 0.1, 1.0f64);
+    let (z, off, angle) = (1.0, 0.1, 1.0f64);
     let (side, length) = (1.0, 3.0);
     let corner = DVec3::new(-0.5, -side, 0.0);
     let (up, along) = (DVec3::Y * 2.0 * side, DVec3::Z * length);
@@ -214,19 +193,13 @@ fn images_light_the_end_of_a_corridor() {
             Mesh::parallelogram("end", corner, DVec3::X, up, 1),
         ],
         vec![mirror(0.8), matt(0.0)],
-        vec![LightKind::Spot {
-            position: DVec3::new(off, 0.0, z),
-            direction: DVec3::NEG_Z,
-            intensity: Vec3::ONE,
-            inner_angle: cone as f32,
-            outer_angle: cone as f32,
-        }],
+        vec![cone(DVec3::new(off, 0.0, z), DVec3::NEG_Z, angle as f32)],
     );
     let image = |n: i32, x: f64, y: f64| {
         let from = f64::from(n) + if n % 2 == 0 { off } else { -off };
         let squared = (x - from).powi(2) + y * y + z * z;
         let cosine = z / squared.sqrt();
-        if cosine > cone.cos() { 0.8f64.powi(n.abs()) * cosine / squared } else { 0.0 }
+        if cosine > angle.cos() { 0.8f64.powi(n.abs()) * cosine / squared } else { 0.0 }
     };
     let radius = 0.49;
     let over_disc = |images: &dyn Fn(f64, f64) -> f64| {
@@ -244,23 +217,12 @@ fn images_light_the_end_of_a_corridor() {
     let reflected = over_disc(&|x, y| (-9..=9).filter(|n| *n != 0).map(|n| image(n, x, y)).sum());
     let mut family = Family::default();
     for illumination in BOTH {
-        let settings = SceneSettings {
-            illumination,
-            radius: Some(radius),
-            caustic_radius: Some(radius),
-            alpha: 1.0,
-            photons: 40_000,
-            caustic_photons: 80_000,
-            bounces: 8,
-            shadow_rays: 1,
-            rounds: 32,
-            ..SceneSettings::default()
-        };
+        let settings = SceneSettings { caustic_photons: 80_000, ..fixed_radius(illumination, 40_000, 32, 8, radius) };
         let points = [(DVec3::ZERO, DVec3::Z)];
         assert_builders_agree(&gpu, &scene, &settings, &points);
         let lit = received(&gpu, &scene, &settings, &points);
         let own = if illumination == Illumination::Split { image(0, 0.0, 0.0) } else { over_disc(&|x, y| image(0, x, y)) };
-        let (mean, error) = (lit.film.mean(0, &lit.plan).x, lit.film.standard_error(0, &lit.plan).x);
+        let (mean, error) = red(&lit, 0);
         family.expect_estimate(format!("corridor, {illumination:?}"), mean, error, 32, own + reflected);
     }
     family.assert_tells_one_per_cent();
@@ -296,19 +258,7 @@ fn paraboloid(material: usize) -> Mesh {
 }
 
 fn caustics(illumination: Illumination, photons: u32, radius: f64) -> SceneSettings {
-    SceneSettings {
-        illumination,
-        part: Part::Caustic,
-        radius: Some(radius),
-        caustic_radius: Some(radius),
-        alpha: 1.0,
-        photons,
-        caustic_photons: photons,
-        bounces: 4,
-        shadow_rays: 1,
-        rounds: 24,
-        ..SceneSettings::default()
-    }
+    SceneSettings { part: Part::Caustic, ..fixed_radius(illumination, photons, 24, 4, radius) }
 }
 
 /// Light from the focus leaves a paraboloid parallel to its axis, so that a plane across it has the same irradiance at
@@ -322,19 +272,13 @@ fn light_from_a_focus_leaves_in_parallel() {
     let h: f64 = 0.4;
     let expected = 0.9 / (FOCUS * FOCUS) / (1.0 + h * h / (4.0 * FOCUS * FOCUS));
     for distance in [1.0, 4.0] {
-        let lamp = LightKind::Spot {
-            position: DVec3::Y * FOCUS,
-            direction: DVec3::NEG_Y,
-            intensity: Vec3::ONE,
-            inner_angle: 1.0,
-            outer_angle: 1.0,
-        };
+        let lamp = cone(DVec3::Y * FOCUS, DVec3::NEG_Y, 1.0);
         let scene = scene_of(vec![paraboloid(0), level(distance, [2.0; 2], false, 1)], vec![mirror(0.9), matt(0.0)], vec![lamp]);
         for illumination in BOTH {
             let (settings, points) = (caustics(illumination, 12_000, h), [(DVec3::Y * distance, DVec3::NEG_Y)]);
             assert_builders_agree(&gpu, &scene, &settings, &points);
             let lit = received(&gpu, &scene, &settings, &points);
-            let (mean, error) = (lit.film.mean(0, &lit.plan).x, lit.film.standard_error(0, &lit.plan).x);
+            let (mean, error) = red(&lit, 0);
             family.expect_estimate(format!("{distance} m off, {illumination:?}"), mean, error, 24, expected);
         }
     }
@@ -349,15 +293,14 @@ fn sunlight_meets_in_the_focus() {
     let mut family = Family::default();
     let (plate, radius) = (0.06, 0.01);
     let opening = 0.5 * f64::from(SEGMENTS) * APERTURE * APERTURE * (TAU / f64::from(SEGMENTS)).sin();
-    let sun = LightKind::Directional { direction: DVec3::NEG_Y, irradiance: Vec3::ONE };
     // The plate's own back is black, and it takes its light away before the mirror.
-    let scene = scene_of(vec![paraboloid(0), level(FOCUS, [plate; 2], false, 1)], vec![mirror(0.9), matt(0.0)], vec![sun]);
+    let scene = scene_of(vec![paraboloid(0), level(FOCUS, [plate; 2], false, 1)], vec![mirror(0.9), matt(0.0)], vec![sun(DVec3::NEG_Y)]);
     let expected = 0.9 * (opening - plate * plate) / (PI * radius * radius);
     for illumination in BOTH {
         let (settings, points) = (caustics(illumination, 20_000, radius), [(DVec3::Y * FOCUS, DVec3::NEG_Y)]);
         assert_builders_agree(&gpu, &scene, &settings, &points);
         let lit = received(&gpu, &scene, &settings, &points);
-        let (mean, error) = (lit.film.mean(0, &lit.plan).x, lit.film.standard_error(0, &lit.plan).x);
+        let (mean, error) = red(&lit, 0);
         family.expect_estimate(format!("in the focus, {illumination:?}"), mean, error, 24, expected);
     }
     family.assert_tells_one_per_cent();

@@ -1,15 +1,7 @@
 //! Surfaces that lie in one plane, or next to it: their light is that of one, and of each.
 
-use crate::common::lit::{flights, level, matt, means, received, scene_of, seen, shining};
-use crate::common::{assert_holds, device, z_check};
-use glam::{DQuat, DVec3, Vec3};
+use crate::common::prelude::*;
 use photonmill::constants::HIDDEN;
-use photonmill::gpu::Gpu;
-use photonmill::scene::geometry::Geometry;
-use photonmill::scene::light::LightKind;
-use photonmill::scene::{Camera, Mesh, Scene, built_in};
-use photonmill::settings::scene::{Illumination, Part, SceneSettings};
-use photonmill::verify::judge::Judge;
 
 /// A room of 4 x 3 x 4 m around the y axis with a lamp of a square metre below its ceiling.
 fn room() -> Scene {
@@ -32,31 +24,19 @@ fn tilted(at: DVec3) -> DVec3 {
     DQuat::from_axis_angle(DVec3::new(0.3, 0.5, -0.8).normalize(), 1.1) * at + DVec3::new(0.1, -0.7, 0.2)
 }
 
-fn turned(mut scene: Scene) -> Scene {
-    scene.meshes.iter_mut().flat_map(|mesh| &mut mesh.positions).for_each(|at| *at = tilted(*at));
-    scene
-}
-
-fn turned_points(points: &[(DVec3, DVec3)]) -> Vec<(DVec3, DVec3)> {
-    points.iter().map(|(at, normal)| (tilted(*at), tilted(*normal) - tilted(DVec3::ZERO))).collect()
+/// A scene and points of it as they are, or turned.
+fn turned(is_turned: bool, scene: Scene, points: &[(DVec3, DVec3)]) -> (Scene, Vec<(DVec3, DVec3)>) {
+    if !is_turned {
+        return (scene, points.to_vec());
+    }
+    let points = points.iter().map(|(at, normal)| (tilted(*at), tilted(*normal) - tilted(DVec3::ZERO))).collect();
+    (moved(scene, tilted), points)
 }
 
 /// A rug of `cells` x `cells` x 2 triangles around a point of the floor, `height` above it.
 fn rug(middle: DVec3, size: f64, height: f64, cells: u32) -> Mesh {
-    let place = |k: u32| size * (f64::from(k) / f64::from(cells) - 0.5);
-    let vertex = |i: u32, j: u32| j * (cells + 1) + i;
-    Mesh {
-        name: "rug".into(),
-        positions: (0..=cells).flat_map(|j| (0..=cells).map(move |i| middle + DVec3::new(place(i), height, place(j)))).collect(),
-        triangles: (0..cells)
-            .flat_map(|j| {
-                (0..cells).flat_map(move |i| {
-                    [[vertex(i, j), vertex(i, j + 1), vertex(i + 1, j)], [vertex(i + 1, j), vertex(i, j + 1), vertex(i + 1, j + 1)]]
-                })
-            })
-            .collect(),
-        ..Mesh::default()
-    }
+    let corner = middle + DVec3::new(-0.5 * size, height, -0.5 * size);
+    tessellated("rug", corner, DVec3::Z * size, DVec3::X * size, cells)
 }
 
 /// Points of the rug and beside it; the floor below a rug that is a surface of its own is dark, and a radius off its edge
@@ -70,18 +50,11 @@ fn points(height: f64) -> Vec<(DVec3, DVec3)> {
 /// Red irradiance at each point, with its standard error.
 fn irradiance(gpu: &Gpu, scene: &Scene, settings: &SceneSettings, points: &[(DVec3, DVec3)]) -> Vec<(f64, f64)> {
     let lit = received(gpu, scene, settings, points);
-    (0..points.len()).map(|point| (lit.film.mean(point, &lit.plan).x, lit.film.standard_error(point, &lit.plan).x)).collect()
+    (0..points.len()).map(|point| red(&lit, point)).collect()
 }
 
 fn settings() -> SceneSettings {
-    SceneSettings {
-        photons: 20_000,
-        rounds: 16,
-        radius: Some(0.3),
-        alpha: 1.0,
-        illumination: Illumination::Photons,
-        ..SceneSettings::default()
-    }
+    mapped(20_000, 16, SceneSettings::default().bounces, 0.3)
 }
 
 /// Complains where a scene is not lit as another at some points.
@@ -106,10 +79,7 @@ fn a_rug_on_the_floor_is_lit_like_the_floor() {
         for is_turned in [false, true] {
             let mut scene = room();
             scene.meshes.push(rug(DVec3::ZERO, 2.0, height, cells));
-            let (mut scene, mut points) = (scene, points(height));
-            if is_turned {
-                (scene, points) = (turned(scene), turned_points(&points));
-            }
+            let (scene, points) = turned(is_turned, scene, &points(height));
             let what = format!("{height} m above, {cells} x {cells} cells, turned {is_turned}");
             complaints.extend(compare(&gpu, &what, &scene, &points, &expected));
         }
@@ -128,17 +98,17 @@ fn other_diagonal(mut mesh: Mesh) -> Mesh {
 fn a_lamp_that_is_given_twice_shines_once() {
     let Some(gpu) = device() else { return };
     let power = Geometry::new(&room()).unwrap().power;
-    for illumination in [Illumination::Photons, Illumination::Split] {
+    for illumination in BOTH {
         let settings = SceneSettings { illumination, shadow_rays: 8, ..settings() };
         let points = &points(0.0)[..3];
         let expected = irradiance(&gpu, &room(), &settings, points);
         for is_turned in [false, true] {
             let mut scene = room();
             scene.meshes.push(Mesh { name: "lamp.001".into(), ..other_diagonal(scene.meshes[6].clone()) });
-            let (scene, points) = if is_turned { (turned(scene), turned_points(points)) } else { (scene, points.to_vec()) };
+            let (scene, points) = turned(is_turned, scene, points);
             let geometry = Geometry::new(&scene).unwrap();
             // A turned room is another size.
-            let size = if is_turned { Geometry::new(&turned(room())).unwrap().power / power } else { 1.0 };
+            let size = Geometry::new(&turned(is_turned, room(), &[]).0).unwrap().power / power;
             assert!((geometry.power / power / size - 1.0).abs() < 1e-5, "{} instead of {power}", geometry.power);
             let [warning] = &geometry.overlap_warnings(&scene)[..] else { panic!("{:?}", geometry.overlap_warnings(&scene)) };
             assert!(warning.contains("\"lamp\"") && warning.contains("\"lamp.001\""), "{warning}");
@@ -163,10 +133,7 @@ fn a_lamp_in_the_plane_of_the_ceiling_shines() {
     let settings = settings();
     let expected = irradiance(&gpu, &with_lamp(2.9999), &settings, points);
     for is_turned in [false, true] {
-        let (mut scene, mut points) = (with_lamp(3.0), points.to_vec());
-        if is_turned {
-            (scene, points) = (turned(scene), turned_points(&points));
-        }
+        let (scene, points) = turned(is_turned, with_lamp(3.0), points);
         let found = irradiance(&gpu, &scene, &SceneSettings { seed: 99, ..settings.clone() }, &points);
         for ((found, error), (expected, other)) in found.iter().zip(&expected) {
             assert_holds("in the ceiling", z_check("in the ceiling", *found, *expected, error.hypot(*other)));
@@ -199,13 +166,12 @@ fn sheets_in_one_plane_cover_their_union() {
         for is_turned in [false, true] {
             let mut scene = scene_of(vec![level(0.0, [4.0; 2], true, 0)], vec![matt(0.6)], vec![]);
             scene.meshes.extend(rugs.clone());
-            let scene = if is_turned { turned(scene) } else { scene };
+            let (scene, up) = turned(is_turned, scene, &[(DVec3::ZERO, DVec3::Y)]);
             let geometry = Geometry::new(&scene).unwrap();
             let found = geometry.area * geometry.unit * geometry.unit;
             assert!((found / area - 1.0).abs() < 1e-5, "{what}, turned {is_turned}: {found} m2 instead of {area}");
             assert!(!geometry.overlaps.is_empty());
-            let up = turned_points(&[(DVec3::ZERO, DVec3::Y)])[0].1.as_vec3();
-            let up = if is_turned { up } else { DVec3::Y.as_vec3() };
+            let up = up[0].1.as_vec3();
             assert!(geometry.triangles.iter().all(|of| (of.b - of.a).cross(of.c - of.a).dot(up) > 0.0), "{what}: a piece faces down");
         }
     }
@@ -213,7 +179,8 @@ fn sheets_in_one_plane_cover_their_union() {
     let mut closed = room();
     closed.materials[0] = matt(0.9);
     closed.meshes.extend([carpet(0.1, 0.2, 2.0, 7), carpet(0.9, 0.0, 1.5, 3)]);
-    let lit = received(&gpu, &turned(closed), &flights(100_000, 8), &turned_points(&points(0.0)[..1]));
+    let (closed, points) = turned(true, closed, &points(0.0)[..1]);
+    let lit = received(&gpu, &closed, &flights(100_000, 8), &points);
     let fates = lit.fates[0].ledger();
     assert!(fates.escaped == 0, "{} photons of {} left the room", fates.escaped, lit.fates[0].emitted);
 }
@@ -234,7 +201,7 @@ fn neighbours_are_no_overlaps() {
     for other in [stands(0.0), beside, across, ramp, rug(DVec3::ZERO, 1.0, 1e-5, 1), rug(DVec3::ZERO, 1.0, -1e-5, 1)] {
         for is_turned in [false, true] {
             let scene = scene_of(vec![floor.clone(), other.clone()], vec![matt(0.6)], vec![]);
-            let geometry = Geometry::new(&if is_turned { turned(scene) } else { scene }).unwrap();
+            let geometry = Geometry::new(&turned(is_turned, scene, &[]).0).unwrap();
             assert!(geometry.overlaps.is_empty() && geometry.triangles.iter().all(|triangle| triangle.plane < HIDDEN), "{}", other.name);
         }
     }
@@ -275,7 +242,7 @@ fn the_judge_counts_an_overlap_once() {
 #[test]
 fn short_rays_see_what_counts() {
     let Some(gpu) = device() else { return };
-    let lamp = LightKind::Point { position: DVec3::Y * 2.0, intensity: Vec3::ONE };
+    let lamp = point(DVec3::Y * 2.0);
     let settings = SceneSettings { photons: 1, rounds: 1, shadow_rays: 1, ..SceneSettings::default() };
     for (what, lift) in [("on the floor", 0.0), ("above the floor", 3e-6), ("below the floor", -3e-6)] {
         let floor = level(0.0, [10.0; 2], true, 0);

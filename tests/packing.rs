@@ -1,20 +1,14 @@
 //! What is packed by hand, packed by Rust and unpacked by the device and the other way round: to the bit, at random and at the ends.
 
-use std::time::Instant;
-
-use glam::{UVec2, Vec2, Vec3};
+use crate::common::prelude::*;
 use obvhs::cwbvh::node::CwBvhNode;
 use photonmill::constants::{FACE_COUNT, HIT_KINDS, NO_WALL};
+use photonmill::gpu::Buffer;
 use photonmill::gpu::kernels::{CheckPackingRoom, CheckPackingScene};
-use photonmill::gpu::{Buffer, Commands, Constants, Extent, Gpu, Memory};
 use photonmill::path::{self, Path, StoredPath};
-use photonmill::photon::{MapPhoton, Origin, Photon, StoredPhoton};
 use photonmill::records::{BvhNode, PackingCase, Room, UnpackedRoom, UnpackedScene};
-use photonmill::rng::philox;
 use photonmill::scene::bvh;
 use photonmill::scene::geometry::{pack_normal, unpack_normal};
-
-use crate::common::{Check, assert_complains, assert_holds, device};
 
 const CASES: u32 = 100_000;
 

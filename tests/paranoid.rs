@@ -1,26 +1,13 @@
 //! `--paranoid` and `--replay`: no run has a value that is infinite or no number; one that is planted is counted and
 //! its photon named; and that photon takes the same path alone as among all others.
 
-use std::collections::BTreeSet;
-
-use crate::common::{Check, Complaint, assert_holds, device, in_order, nothing_odd, outcome_of, photons, photons_on_cpu, run_on_cpu};
-use glam::Vec3;
-use photonmill::engine;
-use photonmill::engine::Control;
+use crate::common::nothing_odd;
+use crate::common::prelude::*;
 use photonmill::engine::nonfinite_values::{NonfiniteValues, What};
 use photonmill::engine::replay::PhotonName;
 use photonmill::engine::room::{self};
 use photonmill::engine::scene::replay::replay;
 use photonmill::engine::scene::{self, RunResult, View};
-use photonmill::gpu::Gpu;
-use photonmill::photon::Photon;
-use photonmill::plan::scene::ScenePlan;
-use photonmill::plan::sensor::Sensor;
-use photonmill::scene::geometry::Geometry;
-use photonmill::scene::open_box::open_box;
-use photonmill::scene::{Scene, built_in};
-use photonmill::settings::scene::{Illumination, SceneSettings};
-use photonmill::settings::{Builder, Preset, RoomSettings};
 
 const SENSOR: Sensor = Sensor::Picture { width: 24, height: 24 };
 
@@ -122,9 +109,7 @@ fn alone(gpu: Option<&Gpu>, settings: &RoomSettings, photon: u32) -> Vec<Photon>
 #[test]
 fn a_photon_alone_takes_the_path_that_it_takes_among_others() {
     let Some(gpu) = device() else { return };
-    for settings in
-        [RoomSettings::default(), RoomSettings { photons: 20_001, rng: photonmill::rng::Rng::Philox, ..RoomSettings::default() }]
-    {
+    for settings in [RoomSettings::default(), RoomSettings { photons: 20_001, rng: Rng::Philox, ..RoomSettings::default() }] {
         for builder in Builder::ON_GPU {
             let settings = RoomSettings { builder, ..settings.clone() };
             let all = in_order(photons(&gpu, &settings));

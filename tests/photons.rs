@@ -1,20 +1,12 @@
 //! Same photons: whatever stores them, in whatever groups and chunks, the photon map of a seed is the
 //! same set, bit for bit on one device, and the CPU builder agrees photon by photon.
 
-use std::collections::{HashMap, HashSet};
-
+use crate::common::MANY_PHOTONS;
 use crate::common::pairwise::pairwise;
-use crate::common::{
-    Check, Kind, MANY_PHOTONS, assert_complains, assert_complains_of, assert_holds, device, draws_of, photons, photons_on_cpu, plan_for,
-    same_photons, streams_of,
-};
+use crate::common::prelude::*;
 use photonmill::engine::room::photons_on_gpu;
-use photonmill::gpu::Gpu;
-use photonmill::photon::Photon;
-use photonmill::rng::{self, Rng, Streams};
-use photonmill::scene::open_box::open_box;
-use photonmill::scene::room::Wall;
-use photonmill::settings::{Builder, EmissionLaw, PhongDirection, RoomSettings};
+use photonmill::rng::{self, Streams};
+use photonmill::settings::PhongDirection;
 
 const GENERATORS: [Rng; 4] = [Rng::Rand48, Rng::Mt, Rng::Philox, Rng::Sobol];
 /// Around subgroups of 8, 32 and 64, around the work group of 128, and two odd numbers of photons.
@@ -84,8 +76,7 @@ fn a_persistent_invocation_takes_photon_after_photon() {
         let many = RoomSettings { photons: MANY_PHOTONS, chunk: Some(MANY_PHOTONS), rng, ..RoomSettings::default() };
         let endless =
             RoomSettings { photons: 257, bounces: if rng == Rng::Mt { 74 } else { 320 }, reflectance: 1.0, rng, ..RoomSettings::default() };
-        let mut closed = open_box(&endless);
-        closed.faces[5] = Some(Wall { name: "front", albedo: 1.0, shininess: None });
+        let closed = closed_box(&endless, 1.0);
         for (scene, settings) in [(open_box(&many), &many), (closed, &endless)] {
             let of = |builder| photons_on_gpu(&gpu, &scene, &RoomSettings { builder, ..settings.clone() }).unwrap();
             let found = of(Builder::Persistent);
@@ -345,7 +336,7 @@ fn a_photons_draws_are_its_twisters_outputs_in_order() {
     let streams = streams_of(&settings);
     for (round, photon) in [(0, 0), (0, 1), (0, 500), (1, 0), (1, 77)] {
         // The first of the two words that a stream keeps is the first of the twister, its seed.
-        let seed = rng::open_stream(Rng::Mt, &streams.key(round), photon, glam::UVec2::ZERO).x;
+        let seed = rng::open_stream(Rng::Mt, &streams.key(round), photon, UVec2::ZERO).x;
         let draws = draws_of(streams, round, photon, settings.bounces);
         let expected: Vec<f32> = twister(seed, draws.len()).iter().map(|word| (word >> 8) as f32 / 16_777_216.0).collect();
         assert_eq!(draws, expected, "round {round}, photon {photon}");

@@ -1,41 +1,24 @@
 //! Prefix sum, grid index, appending to a full map and the size of an indirect dispatch, each against
 //! the plain way to do it on the host.
 
-use std::collections::HashSet;
-use std::time::Instant;
-
-use crate::common::{Check, Device, assert_complains, assert_holds, device, equal_sums, in_order, photons, plan_for, run};
+use crate::common::prelude::*;
 use bytemuck::Zeroable;
 use photonmill::constants::{NO_WALL, SCAN_ITEMS};
 use photonmill::engine::prefix_sum::scan;
-use photonmill::engine::room::constants;
-use photonmill::engine::room::index;
 use photonmill::engine::room::resources::RoomResources;
-use photonmill::engine::room::trace;
+use photonmill::engine::room::{constants, index, trace};
 use photonmill::engine::tallies;
 use photonmill::gpu::kernels::DispatchSize;
-use photonmill::gpu::{Commands, Constants, Extent, Memory};
-use photonmill::photon::{Origin, Photon};
-use photonmill::plan::RoomPlan;
 use photonmill::plan::buffers::block_sum_counts;
 use photonmill::records::{DispatchArgs, DispatchSizePush, Tally};
-use photonmill::rng::Rng;
-use photonmill::scene::open_box::open_box;
-use photonmill::scene::room::{RoomScene, Wall};
-use photonmill::settings::{Builder, RoomSettings};
 
 /// Words that nothing may touch. As an entry of the photon map they are a photon on some wall.
 const GUARD: u32 = 0x5EAD_BEEF;
 
 /// Numbers of a linear congruential generator, 0 to `below` - 1.
 fn numbers(count: usize, below: u32) -> Vec<u32> {
-    let mut state = 12_345u64;
-    (0..count)
-        .map(|_| {
-            state = state.wrapping_mul(6_364_136_223_846_793_005).wrapping_add(1_442_695_040_888_963_407);
-            (state >> 33) as u32 % below
-        })
-        .collect()
+    let step = |state: &u64| Some(state.wrapping_mul(6_364_136_223_846_793_005).wrapping_add(1_442_695_040_888_963_407));
+    std::iter::successors(Some(12_345u64), step).skip(1).take(count).map(|state| (state >> 33) as u32 % below).collect()
 }
 
 /// The device's exclusive prefix sums, and the guard words that stand behind them in the same buffer.
@@ -54,14 +37,7 @@ fn prefix_sums(gpu: &Device, items: &[u32], group_size: u32) -> (Vec<u32>, Vec<u
 }
 
 fn running_sums(items: &[u32]) -> Vec<u32> {
-    items
-        .iter()
-        .scan(0u32, |before, item| {
-            let sum = *before;
-            *before = before.wrapping_add(*item);
-            Some(sum)
-        })
-        .collect()
+    items.iter().scan(0u32, |sum, item| Some(std::mem::replace(sum, sum.wrapping_add(*item)))).collect()
 }
 
 fn same_numbers(found: &[u32], expected: &[u32]) -> Check {
@@ -80,24 +56,9 @@ fn the_prefix_sum_is_the_running_sum() {
     for group_size in [32, 128, 1024].into_iter().filter(|size| *size <= gpu.facts().work_group_size) {
         let subgroup = gpu.facts().subgroup_size * SCAN_ITEMS;
         let block = group_size * SCAN_ITEMS;
-        let sizes = [
-            0,
-            1,
-            3,
-            4,
-            5,
-            subgroup - 1,
-            subgroup,
-            subgroup + 1,
-            block - 1,
-            block,
-            block + 1,
-            2 * block + 1,
-            block * block,
-            block * block + 1,
-            1_000_000,
-        ];
-        for size in sizes.into_iter().filter(|size| *size <= 1_100_000) {
+        let around = [subgroup, block].into_iter().flat_map(|size| [size - 1, size, size + 1]);
+        let more = [2 * block + 1, block * block, block * block + 1, 1_000_000];
+        for size in [0, 1, 3, 4, 5].into_iter().chain(around).chain(more).filter(|size| *size <= 1_100_000) {
             let items = numbers(size as usize, 1000);
             let (sums, behind) = prefix_sums(&gpu, &items, group_size);
             let what = format!("{size} items, groups of {group_size}");
@@ -394,8 +355,7 @@ fn appending_at_survival_none_and_all() {
         for (albedo, stored_each) in [(0.0, 0), (1.0, 3)] {
             for photon_count in [2, 7, 8, 9, 31, 33, 127, 128, 129, 1000] {
                 let settings = RoomSettings { builder, photons: photon_count, bounces: 3, reflectance: albedo, ..RoomSettings::default() };
-                let mut scene = open_box(&settings);
-                scene.faces[5] = Some(Wall { name: "front", albedo, shininess: None });
+                let scene = closed_box(&settings, albedo);
                 let capacity = photon_count * 3;
                 let appended = append(&gpu, &scene, &settings, capacity);
                 let what = format!("{builder:?}, {photon_count} photons, albedo {albedo}");
@@ -465,22 +425,8 @@ fn indirect_dispatches_are_folded_below_the_limit() {
     let Some(gpu) = device() else { return };
     for group in [32u32, 128, 1024] {
         let row = 65_535 * group;
-        for items in [
-            0,
-            1,
-            group - 1,
-            group,
-            group + 1,
-            row - 1,
-            row,
-            row + 1,
-            row + group,
-            2 * row - 1,
-            2 * row,
-            2 * row + 1,
-            u32::MAX - 1,
-            u32::MAX,
-        ] {
+        let around = [group, row, 2 * row].into_iter().flat_map(|size| [size - 1, size, size + 1]);
+        for items in around.chain([0, 1, row + group, u32::MAX - 1, u32::MAX]) {
             for capacity in [u32::MAX, row, 1000] {
                 for counter in [0, 2] {
                     let push = DispatchSizePush { counter, capacity, items_per_group: group, max_groups: 65_535 };
@@ -513,15 +459,8 @@ fn rounds_around_a_full_row_of_groups_lose_no_photon() {
         // The builders dispatch alike, so one of them tries every count.
         let counts = if builder == Builder::Ballot { &[row - 1, row, row + 1, row + 33][..] } else { &[row + 33] };
         for &photon_count in counts {
-            let settings = RoomSettings {
-                builder,
-                photons: photon_count,
-                bounces: 1,
-                mesh: 1,
-                group_size: 32,
-                rng: Rng::Philox,
-                ..RoomSettings::default()
-            };
+            let of_one_bounce = RoomSettings { bounces: 1, mesh: 1, rng: Rng::Philox, ..RoomSettings::default() };
+            let settings = RoomSettings { builder, photons: photon_count, group_size: 32, ..of_one_bounce };
             let folded = run(&gpu, &settings);
             assert_eq!(folded.plan.chunks_per_round, 1, "{photon_count} photons do not fit one dispatch here");
             let ledger = folded.ledger();

@@ -4,18 +4,9 @@
 use std::ops::Range;
 use std::sync::OnceLock;
 
-use crate::common::family::{Family, chi_squared_z};
-use crate::common::lit::irradiances;
-use crate::common::{Device, JUDGED, device, photons, photons_on_cpu, run, run_on_cpu};
-use glam::DVec3;
+use crate::common::family::chi_squared_z;
+use crate::common::prelude::*;
 use photonmill::engine::room::film::estimate_walls;
-use photonmill::photon::Photon;
-use photonmill::rng::Rng;
-use photonmill::scene::built_in;
-use photonmill::scene::light::LightKind;
-use photonmill::scene::open_box::open_box;
-use photonmill::settings::scene::{Illumination, SceneSettings};
-use photonmill::settings::{Builder, EmissionLaw, RoomSettings};
 use photonmill::verify::judge::radiosity::{ByLamp, Law, Radiosity, WALLS, cells_of, exchange, form_factor_from, inward, on_wall};
 
 const ALBEDO: f64 = 0.75;
@@ -116,16 +107,8 @@ const PHOTONS: u32 = 1 << 18;
 const SEEDS: u64 = 16;
 
 fn settings(builder: Builder, emission: EmissionLaw) -> RoomSettings {
-    RoomSettings {
-        builder,
-        emission,
-        photons: PHOTONS,
-        rng: Rng::Philox,
-        mesh: MESH as u32,
-        radius: DISC_RADIUS,
-        threads: 2,
-        ..RoomSettings::default()
-    }
+    let discs = RoomSettings { mesh: MESH as u32, radius: DISC_RADIUS, ..RoomSettings::default() };
+    RoomSettings { builder, emission, photons: PHOTONS, rng: Rng::Philox, threads: 2, ..discs }
 }
 
 fn photons_of(gpu: Option<&Device>, settings: &RoomSettings) -> Vec<Photon> {
@@ -311,7 +294,7 @@ fn film_errors(emission: EmissionLaw, photons: f64) -> (Vec<f64>, Vec<f64>) {
         }
     }
     // Both lamps together shine with 2 W.
-    let watts = 2.0 / ALBEDO / (std::f64::consts::PI * DISC_RADIUS * DISC_RADIUS);
+    let watts = 2.0 / ALBEDO / (PI * DISC_RADIUS * DISC_RADIUS);
     let of_sample = f64::from(PHOTONS);
     let error = |sums: &ByPhoton| watts * sums.mean_and_error(of_sample).1 * (of_sample / photons).sqrt();
     (discs.iter().map(error).collect(), walls.iter().map(error).collect())
@@ -376,17 +359,8 @@ fn the_box_of_triangles_has_the_irradiance_of_radiosity() {
                 *of_light = LAWS[law as usize].1;
             }
         }
-        let settings = SceneSettings {
-            illumination,
-            builder: Some(builder),
-            photons: 90_000,
-            bounces: BOUNCES as u32,
-            rounds: 1,
-            shadow_rays: 8,
-            radius: Some(DISC_RADIUS),
-            alpha: 1.0,
-            ..SceneSettings::default()
-        };
+        let settings =
+            SceneSettings { illumination, builder: Some(builder), shadow_rays: 8, ..mapped(90_000, 1, BOUNCES as u32, DISC_RADIUS) };
         let runs = irradiances(&gpu, &scene, &settings, &points, 1..25);
         for wall in 0..WALLS {
             let expected: f64 = disc_middles()

@@ -1,26 +1,18 @@
 //! Random numbers at their ends: around the generators' periods and the largest photon numbers, neighbours that
 //! must not resemble each other, and directions drawn from the least and the greatest numbers.
 
-use std::collections::HashSet;
-use std::time::Instant;
-
-use crate::common::{
-    Check, assert_complains, assert_holds, device, draws_of, evenness_check, pairs, plan_for, run_on_cpu, streams_of, z_check,
-};
-use glam::{DVec3, UVec2, Vec3};
+use crate::common::draws_from;
+use crate::common::evenness_check;
+use crate::common::prelude::*;
 use photonmill::cpu::emission::emit_from_disc;
 use photonmill::cpu::room::intersect_room;
 use photonmill::cpu::sampling::{sample_cosine_hemisphere, sample_uniform_hemisphere};
 use photonmill::cpu::trace::Tracer;
-use photonmill::engine::room::constants;
 use photonmill::engine::room::resources::RoomResources;
-use photonmill::engine::room::trace;
-use photonmill::gpu::Commands;
+use photonmill::engine::room::{constants, trace};
 use photonmill::path::{self, Path};
-use photonmill::plan::{EmissionRange, RoomPlan};
-use photonmill::rng::{self, Affine48, Rng, Streams, owen_scramble, sobol, srand48};
-use photonmill::scene::open_box::open_box;
-use photonmill::settings::{EmissionLaw, RoomSettings};
+use photonmill::plan::EmissionRange;
+use photonmill::rng::{Affine48, Streams, owen_scramble, sobol, srand48};
 
 /// Those that imitate chance; Sobol' points are more even than that.
 const GENERATORS: [Rng; 3] = [Rng::Rand48, Rng::Mt, Rng::Philox];
@@ -155,13 +147,12 @@ fn neighbouring_photons_do_not_resemble_each_other() {
     // and a generator started anew with each photon's number.
     let seeded = (0..5000).map(|seed| Affine48::STEP.apply(srand48(seed)) as f64 / PERIOD as f64);
     assert_complains("seeds in a row", evenness_check("first draws", seeded.map(|u| class(u as f32, 100))));
-    let shifted =
-        (0..5000).map(|i| (class(i as f32 * 0.618_034 % 1.0, 100) as f32 / 100.0, class(i as f32 * 0.618_034 % 1.0, 100) as f32 / 100.0));
-    assert_complains("a row against itself", correlation_check("draws", shifted));
+    let row = (0..5000).map(|i| class(i as f32 * 0.618_034 % 1.0, 100) as f32 / 100.0);
+    assert_complains("a row against itself", correlation_check("draws", row.map(|u| (u, u))));
 }
 
 /// The paths of some photons as they leave their light, by the device.
-fn emitted(gpu: &crate::common::Device, plan: &RoomPlan, round: u32, range: EmissionRange) -> Vec<Path> {
+fn emitted(gpu: &Device, plan: &RoomPlan, round: u32, range: EmissionRange) -> Vec<Path> {
     let scene = open_box(&plan.settings);
     let mut commands = Commands::new(gpu, constants(plan), Instant::now()).unwrap();
     let resources = RoomResources::new(gpu, &mut commands, &scene, plan).unwrap();
@@ -222,12 +213,8 @@ fn mean_check(what: &str, values: impl Iterator<Item = f64>, expected: f64, devi
 
 /// Moments of the places on a disc and of the directions of an emission, and their lengths.
 fn emission_check(law: EmissionLaw, radius: f64, starts: &[(DVec3, DVec3)]) -> Check {
-    mean_check(
-        "squared distance",
-        starts.iter().map(|(place, _)| (place.x * place.x + place.y * place.y) / (radius * radius)),
-        0.5,
-        0.288_675,
-    )?;
+    let squared = starts.iter().map(|(place, _)| (place.x * place.x + place.y * place.y) / (radius * radius));
+    mean_check("squared distance", squared, 0.5, 0.288_675)?;
     let (cosine, cosine_deviation, square, square_deviation): (f64, f64, f64, f64) = match law {
         EmissionLaw::Uniform => (0.5, 0.288_675, 1.0 / 3.0, (1.0f64 / 5.0 - 1.0 / 9.0).sqrt()),
         EmissionLaw::Cosine => (2.0 / 3.0, (1.0f64 / 18.0).sqrt(), 0.25, 0.25),
@@ -253,25 +240,15 @@ fn emission_check(law: EmissionLaw, radius: f64, starts: &[(DVec3, DVec3)]) -> C
 fn discs_and_hemispheres_have_their_moments() {
     let gpu = device();
     for law in [EmissionLaw::Uniform, EmissionLaw::Cosine] {
-        let settings = RoomSettings {
-            emission: law,
-            photons: 400_001,
-            rng: Rng::Philox,
-            bounces: 1,
-            mesh: 1,
-            chunk: Some(400_001),
-            ..RoomSettings::default()
-        };
+        let of_one_bounce = RoomSettings { bounces: 1, mesh: 1, rng: Rng::Philox, ..RoomSettings::default() };
+        let settings = RoomSettings { emission: law, photons: 400_001, chunk: Some(400_001), ..of_one_bounce };
         let scene = open_box(&settings);
-        let host = crate::common::plan_for_host(&settings);
+        let host = plan_for_host(&settings);
         let range = EmissionRange { light: 0, first_photon: 0, count: 200_000 };
         let local = |paths: Vec<Path>| -> Vec<(DVec3, DVec3)> {
             // The floor's light: the axes after its own, then its normal.
-            paths
-                .iter()
-                .map(|path| (path.position.as_dvec3(), path.direction.as_dvec3()))
-                .map(|(p, d)| (DVec3::new(p.z, p.x, 0.0), DVec3::new(d.z, d.x, d.y)))
-                .collect()
+            let both = paths.iter().map(|path| (path.position.as_dvec3(), path.direction.as_dvec3()));
+            both.map(|(p, d)| (DVec3::new(p.z, p.x, 0.0), DVec3::new(d.z, d.x, d.y))).collect()
         };
         let mut starts = vec![("cpu", local(Tracer::new(&scene, &host).emit(0, &[range])))];
         if let Some(gpu) = &gpu {
@@ -371,12 +348,7 @@ fn the_checks_of_chance_complain() {
 /// Draws of a light's sample of Sobol' points: four of its emission, three of each bounce.
 fn sobol_draws(seed: u64, light: u32, sample: u32, bounces: u32) -> Vec<f32> {
     let key = Streams { rng: Rng::Sobol, seed, photons: 1, draws_per_photon: 0 }.key(0);
-    let mut stream = rng::open_stream(Rng::Sobol, &key, 0, UVec2::new(sample, light));
-    let mut draws = rng::draw_emission(Rng::Sobol, &key, 0, &mut stream).to_vec();
-    for bounce in 0..bounces {
-        draws.extend(rng::draw_bounce(Rng::Sobol, &key, 0, bounce, &mut stream));
-    }
-    draws
+    draws_from(Rng::Sobol, &key, 0, UVec2::new(sample, light), bounces)
 }
 
 /// One of 2^k numbers in each of 2^k equal intervals.
@@ -455,10 +427,8 @@ fn the_checks_complain_about_spoiled_sobol_points() {
     assert_complains("the dimensions that are no (0, 2)-sequence", both(&spoiled_points(owen_scramble, swapped, owen_scramble)));
     let late: Vec<(f32, f32)> = (1..1025).map(|i| sobol_draws(1, 0, i, 0)).map(|u| (u[0], u[1])).collect();
     assert_complains("a run that is not aligned", both(&late));
-    let chance: Vec<(f32, f32)> = (0..1024)
-        .map(|i| draws_of(streams_of(&RoomSettings { rng: Rng::Philox, ..RoomSettings::default() }), 0, i, 0))
-        .map(|u| (u[0], u[1]))
-        .collect();
+    let philox = streams_of(&RoomSettings { rng: Rng::Philox, ..RoomSettings::default() });
+    let chance: Vec<(f32, f32)> = (0..1024).map(|i| draws_of(philox, 0, i, 0)).map(|u| (u[0], u[1])).collect();
     assert_complains("chance", both(&chance));
 }
 

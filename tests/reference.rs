@@ -1,15 +1,11 @@
 //! Every builder against the independent f64 model, draw by draw with the paper's generator, and
 //! against the exact shares of stored photons with the others.
 
+use crate::common::prelude::*;
 use crate::common::reference::{self, Emission, Model, add_power, power_table};
-use crate::common::{Check, assert_complains, assert_holds, device, pairs, run, run_on_cpu, share_check};
 use photonmill::engine::room::RunResult;
 use photonmill::engine::room::film::{RoomFilm, estimate_walls};
-use photonmill::gpu::Gpu;
 use photonmill::ledger::Fates;
-use photonmill::rng::Rng;
-use photonmill::scene::open_box::open_box;
-use photonmill::settings::{Builder, EmissionLaw, Preset, RoomSettings};
 
 /// Photons stored at bounces 1 to 15 of the paper's run: rand48, seed 1, 5000 photons. Printed by the
 /// independent numpy model `paper_reference.py`, as is every number of the first two tests.

@@ -1,16 +1,11 @@
 //! The functions that sample, as the kernels have them: every density integrates to 1, the samples pass a chi-square
 //! test against it, and the random words at the ends of their range give finite unit directions.
 
-use std::f64::consts::{PI, TAU};
-
 use crate::common::chi_square::{Grid, ONE, counts_check, density_check, even};
 use crate::common::densities::{AXIS, ULP, disc_check, frame, hemisphere_check, is_unit, lobe_check, sphere_check, triangle_check};
-use crate::common::{Check, assert_complains, assert_holds, device, pairs, z_check};
-use glam::{DMat3, DVec2, DVec3, UVec2, Vec3};
-use photonmill::gpu::{Gpu, check};
+use crate::common::prelude::*;
+use photonmill::gpu::check;
 use photonmill::records::{Samples, SamplingCase};
-use photonmill::rng::philox;
-use photonmill::settings::Math;
 use photonmill::settings::scene::Filter;
 
 /// Cases of each function.

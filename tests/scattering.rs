@@ -1,30 +1,15 @@
 //! Photons as they leave every kind of light, and every kind of surface, against the densities, shares and weights
 //! that they should have.
 
-use std::f64::consts::{FRAC_PI_2, PI, TAU};
-
 use crate::common::chi_square::{ONE, counts_check, density_check, even};
 use crate::common::densities::{
     AXIS, ULP, angles, disc_check, frame, hemisphere_check, independence_check, is_unit, lobe, lobe_angles, on_sphere, polar, sphere_check,
     triangle_check,
 };
-use crate::common::{Check, assert_complains, assert_holds, device, pairs, share_check, z_check};
-use glam::{DMat3, DVec2, DVec3, Vec3};
+use crate::common::prelude::*;
 use photonmill::constants::EMISSION_BLOCKS;
-use photonmill::engine;
 use photonmill::engine::scene::replay::{Flights, light_paths};
-use photonmill::gpu::Gpu;
-use photonmill::plan::scene::ScenePlan;
-use photonmill::plan::sensor::Sensor;
 use photonmill::records::{LightPath, Tally};
-use photonmill::rng::philox;
-use photonmill::scene::geometry::Geometry;
-use photonmill::scene::light::{Light, LightKind};
-use photonmill::scene::material::TextureUse;
-use photonmill::scene::texture::Wrap;
-use photonmill::scene::{Material, Mesh, Scene, Surface, Texture};
-use photonmill::settings::scene::{Effect, Illumination, SceneSettings};
-use photonmill::settings::{EmissionLaw, Math};
 
 /// Photons of each scene.
 const SAMPLES: u32 = 1 << 17;
@@ -34,13 +19,7 @@ const BOTH: [Math; 2] = [Math::Fast, Math::Strict];
 fn scene(normal: DVec3, material: Material, kind: LightKind) -> Scene {
     let frame = frame(normal, DVec3::X);
     let (u, v) = (frame.x_axis, frame.y_axis);
-    Scene {
-        name: "sampling".into(),
-        meshes: vec![Mesh::parallelogram("plane", -0.5 * (u + v), u, v, 0)],
-        materials: vec![material],
-        lights: vec![Light { name: "light".into(), kind }],
-        ..Scene::default()
-    }
+    scene_of(vec![Mesh::parallelogram("plane", -0.5 * (u + v), u, v, 0)], vec![material], vec![kind])
 }
 
 /// A device's photons of one scene after another; all effects are on, so that all scenes share their kernels.
@@ -98,7 +77,7 @@ impl Traced {
 }
 
 fn white() -> Material {
-    Material::lambert("white", Vec3::ONE)
+    matt(1.0)
 }
 
 #[test]
@@ -112,7 +91,7 @@ fn triangles_shine_by_the_cosine_from_all_of_their_area() {
         mesh.triangles.truncate(1);
         let emission_texture = textured.then_some(TextureUse { texture: 0, uv_set: 0 });
         let material = Material { emission: Vec3::ONE, emission_texture, two_sided, ..white() };
-        Scene { name: "lamp".into(), meshes: vec![mesh], materials: vec![material], textures: vec![texture.clone()], ..Scene::default() }
+        Scene { textures: vec![texture.clone()], ..scene_of(vec![mesh], vec![material], vec![]) }
     };
     for (what, two_sided, textured) in [("one side", false, false), ("two sides", true, false), ("a textured side", false, true)] {
         let traced = tracer.trace(&lamp(two_sided, textured));
@@ -170,7 +149,7 @@ fn lights_emit_as_their_kinds_have_it() {
     let axis = AXIS.normalize().as_vec3().as_dvec3().normalize();
     let position = DVec3::new(0.25, 0.5, -0.125);
 
-    let point = tracer.trace(&lit(LightKind::Point { position, intensity: Vec3::ONE }));
+    let point = tracer.trace(&lit(point(position)));
     assert!(point.emitted.iter().all(|path| path.position == position.as_vec3()));
     assert_holds("point", sphere_check("point light", &Traced::directions(&point.emitted)));
 
@@ -195,7 +174,7 @@ fn lights_emit_as_their_kinds_have_it() {
         assert_complains("a spot 3 % narrower than its light", spot_check(1.03 * inner, 1.03 * outer));
     }
 
-    let sun = tracer.trace(&lit(LightKind::Directional { direction: AXIS.normalize(), irradiance: Vec3::ONE }));
+    let sun = tracer.trace(&lit(sun(AXIS)));
     assert!(sun.emitted.iter().all(|path| path.direction == AXIS.normalize().as_vec3()));
     let radius = sun.geometry.radius;
     let places: Vec<DVec3> = sun.emitted.iter().map(|path| path.position.as_dvec3() + 2.0 * radius * axis).collect();
@@ -203,7 +182,7 @@ fn lights_emit_as_their_kinds_have_it() {
     assert_complains("a disc 1 % smaller", disc_check("fault", &places, axis, 0.99 * radius));
 
     for (what, law) in [("cosine disc", EmissionLaw::Cosine), ("uniform disc", EmissionLaw::Uniform)] {
-        let disc = tracer.trace(&lit(LightKind::Disc { centre: position, normal: AXIS.normalize(), radius: 0.125, power: Vec3::ONE, law }));
+        let disc = tracer.trace(&lit(disc(position, AXIS.normalize(), 0.125, law)));
         // Rounding lifted them off the disc.
         let flat = |path: &LightPath| {
             let from_centre = path.position.as_dvec3() - position;
@@ -243,12 +222,8 @@ fn lights_are_chosen_by_their_power() {
     let tracer = Tracer { gpu: &gpu, math: Math::Fast };
     let powers = [1.0f32, 20.0, 5.0, 0.01, 8.0];
     let mut scene = lit(LightKind::Environment { radiance: Vec3::ZERO });
-    scene.lights = (0..powers.len())
-        .map(|k| Light {
-            name: format!("light {k}"),
-            kind: LightKind::Point { position: DVec3::Y * k as f64, intensity: Vec3::splat(powers[k]) },
-        })
-        .collect();
+    let bulb = |k: usize| LightKind::Point { position: DVec3::Y * k as f64, intensity: Vec3::splat(powers[k]) };
+    scene.lights = (0..powers.len()).map(bulb).map(lamp).collect();
     let traced = tracer.trace(&scene);
     let counts: Vec<u64> = (0..powers.len())
         .map(|k| traced.emitted.iter().filter(|path| path.position == traced.geometry.to_local(DVec3::Y * k as f64)).count() as u64)
@@ -336,10 +311,7 @@ fn glossy_surfaces_scatter_by_their_lobe() {
         for (albedo, incidence) in albedos.into_iter().zip(INCIDENCES).filter(|(albedo, _)| albedo.is_finite()) {
             // A colour for which the weight f cosine / pdf is the cosine: survivors are distributed by f cosine.
             let colour = (n + 1.0) / (n + 2.0);
-            let glossy = |colour: f64| Material {
-                surface: Surface::Glossy { exponent: n as f32 },
-                ..Material::lambert("glossy", Vec3::splat(colour as f32))
-            };
+            let glossy = |colour: f64| Material { surface: Surface::Glossy { exponent: n as f32 }, ..matt(colour as f32) };
             let what = format!("lobe {n} at {incidence} degrees");
             let tracer = Tracer { gpu: &gpu, math: if incidence == 60.0 { Math::Strict } else { Math::Fast } };
             let traced = tracer.trace(&beam(glossy(colour), incidence, false));
@@ -418,7 +390,6 @@ fn smooth_check(what: &str, traced: &Traced, eta: f64, reflectance: f64) -> Chec
 #[test]
 fn glass_reflects_by_fresnel_and_refracts_by_snell() {
     let Some(gpu) = device() else { return };
-    let glass = |ior: f32| Material { surface: Surface::Dielectric { ior }, ..white() };
     let outside = [0.0, 45.0, 56.31, 80.0, 89.0, 89.9].map(|incidence| (1.5f32, incidence, false));
     // Total reflection begins at 41.81 degrees, with an index of 2.4 at 24.62.
     let inside = [0.0, 30.0, 41.0, 41.7, 41.82, 60.0, 89.9].map(|incidence| (1.5f32, incidence, true));
@@ -443,10 +414,10 @@ fn glass_reflects_by_fresnel_and_refracts_by_snell() {
             assert_holds(incidence, smooth_check(&format!("{math:?}, index 1 at {incidence} degrees"), &traced, 1.0, 0.0));
         }
         for incidence in [0.0, 60.0, 89.9] {
-            let traced = tracer.trace(&beam(Material { surface: Surface::Mirror, ..white() }, incidence, false));
+            let traced = tracer.trace(&beam(mirror(1.0), incidence, false));
             assert_holds(incidence, smooth_check(&format!("{math:?}, mirror at {incidence} degrees"), &traced, 1.0, 1.0));
         }
-        let dim = tracer.trace(&beam(Material { surface: Surface::Mirror, ..Material::lambert("dim", Vec3::splat(0.8)) }, 30.0, false));
+        let dim = tracer.trace(&beam(mirror(0.8), 30.0, false));
         assert_holds("a dim mirror", share_check("survivors", u64::from(dim.tally.stored), u64::from(SAMPLES), f64::from(0.8f32)));
         assert_complains("a mirror 1 % brighter", share_check("fault", u64::from(dim.tally.stored), u64::from(SAMPLES), 0.808));
     }
@@ -463,10 +434,10 @@ fn photons_with_words_at_their_ends_fly_on() {
     let Some(gpu) = device() else { return };
     let tracer = Tracer { gpu: &gpu, math: Math::Fast };
     let axis = AXIS.normalize();
-    let disc = |law| LightKind::Disc { centre: DVec3::ZERO, normal: axis, radius: 0.125, power: Vec3::ONE, law };
+    let disc = |law| disc(DVec3::ZERO, axis, 0.125, law);
     let spot =
         LightKind::Spot { position: DVec3::ZERO, direction: axis, intensity: Vec3::ONE, inner_angle: 0.5, outer_angle: FRAC_PI_2 as f32 };
-    let mut lamp = lit(LightKind::Point { position: DVec3::ZERO, intensity: Vec3::ONE });
+    let mut lamp = lit(point(DVec3::ZERO));
     lamp.materials[0].emission = Vec3::ONE;
     lamp.lights.clear();
     let lights = [
@@ -475,7 +446,7 @@ fn photons_with_words_at_their_ends_fly_on() {
         // Rounding of the frame may turn what all but lies in a surface into it.
         ("uniform disc", lit(disc(EmissionLaw::Uniform)), axis, -2.0 * ULP),
         ("spot", lit(spot), axis, -2.0 * ULP),
-        ("point", lit(LightKind::Point { position: DVec3::ZERO, intensity: Vec3::ONE }), DVec3::ZERO, -1.0),
+        ("point", lit(point(DVec3::ZERO)), DVec3::ZERO, -1.0),
         ("sky", lit(LightKind::Environment { radiance: Vec3::ONE }), DVec3::ZERO, -1.0),
     ];
     for photon in [0, 1].into_iter().flat_map(|word| edge_photons(1, word)) {

@@ -1,119 +1,37 @@
 //! `photonmill render`, `probe` and `plan` as their users meet them.
 
+use std::fmt::Display;
 use std::io::Write;
-use std::path::Path;
-use std::process::{Command, Output, Stdio};
+use std::process::Stdio;
 
-use crate::common::pairs;
-use base64::Engine;
-use base64::engine::general_purpose::STANDARD as BASE64;
+use crate::common::gltf_file::{data_uri, floats};
+use crate::common::prelude::*;
+use crate::common::program::on_device;
 use serde_json::{Value, json};
 
-const EFFECTS: [&str; 16] = [
-    "direct",
-    "indirect",
-    "glossy",
-    "reflective-caustics",
-    "refractive-caustics",
-    "specular-chains",
-    "textures",
-    "environment",
-    "mesh-lights",
-    "point-lights",
-    "spot-lights",
-    "directional-lights",
-    "disc-lights",
-    "bvh",
-    "two-sided",
-    "smooth-normals",
-];
+const EFFECTS: &str = "direct indirect glossy reflective-caustics refractive-caustics specular-chains textures environment mesh-lights \
+    point-lights spot-lights directional-lights disc-lights bvh two-sided smooth-normals";
 const BLENDER: &str = concat!(env!("CARGO_MANIFEST_DIR"), "/tests/scenes/blender.glb");
-const TINY: [&str; 6] = ["--size", "16x16", "--photons", "2000", "--rounds", "2"];
+const TINY: &str = "--size 16x16 --photons 2000 --rounds 2";
 
-/// A folder of its own in which the program runs.
-struct Place(tempfile::TempDir);
-
-impl Place {
-    fn new() -> Place {
-        Place(tempfile::tempdir().unwrap())
-    }
-
-    fn write(&self, name: &str, content: impl AsRef<[u8]>) {
-        std::fs::write(self.0.path().join(name), content).unwrap();
-    }
-
-    fn command(&self, arguments: &[&str]) -> Command {
-        let mut command = Command::new(env!("CARGO_BIN_EXE_photonmill"));
-        command.current_dir(self.0.path()).args(arguments).stdin(Stdio::null());
-        if let (Ok(device), false) = (std::env::var("PHOTONMILL_DEVICE"), arguments.contains(&"--device")) {
-            command.args(["--device", &device]);
-        }
-        command
-    }
-
-    fn run(&self, arguments: &[&str]) -> Output {
-        self.command(arguments).output().expect("the program starts")
-    }
-
-    /// Its stdout and stderr; it must end well.
-    fn succeed(&self, arguments: &[&str]) -> (String, String) {
-        let output = self.run(arguments);
-        assert!(output.status.success(), "{arguments:?}: {}", text(&output.stderr));
-        (text(&output.stdout), text(&output.stderr))
-    }
-
-    /// `render` at a tiny size into a.exr, and its pixels.
-    fn exr(&self, arguments: &[&str]) -> Vec<f32> {
-        self.succeed(&[&["render"], arguments, &TINY, &["-o", "a.exr"]].concat());
-        self.pixels("a.exr")
-    }
-
-    fn pixels(&self, name: &str) -> Vec<f32> {
-        image::open(self.0.path().join(name)).unwrap().into_rgb32f().into_raw()
-    }
-
-    fn json(&self, name: &str) -> Value {
-        serde_json::from_slice(&std::fs::read(self.0.path().join(name)).unwrap()).unwrap()
-    }
-
-    fn names(&self) -> Vec<String> {
-        let mut names: Vec<String> =
-            std::fs::read_dir(self.0.path()).unwrap().map(|entry| entry.unwrap().file_name().to_string_lossy().into_owned()).collect();
-        names.sort();
-        names
-    }
-
-    /// Exit code 2, one line that names each word, nothing on stdout, no new file.
-    fn refuse(&self, arguments: &[&str], named: &[&str]) -> Option<String> {
-        let before = self.names();
-        let output = self.run(&[arguments, &["--quiet"]].concat());
-        let stderr = text(&output.stderr);
-        let fault = if output.status.code() != Some(2) {
-            format!("ends with {:?}", output.status.code())
-        } else if stderr.trim_end().lines().count() != 1 || !stderr.starts_with("photonmill: ") {
-            "is not one line".to_owned()
-        } else if let Some(word) = named.iter().find(|word| !stderr.contains(**word)) {
-            format!("must name {word:?}")
-        } else if !output.stdout.is_empty() || self.names() != before {
-            "left something behind".to_owned()
-        } else {
-            return None;
-        };
-        Some(format!("{arguments:?} {fault}: {}", stderr.lines().take(4).collect::<Vec<_>>().join(" | ")))
-    }
+/// A folder for runs on a device; `None` where `PHOTONMILL_NO_GPU=1` asks to go without.
+fn place_with_device() -> Option<Place> {
+    (!no_gpu()).then(Place::new)
 }
 
-fn text(bytes: &[u8]) -> String {
-    String::from_utf8_lossy(bytes).into_owned()
+/// `render` at a tiny size into a.exr, and its pixels.
+fn exr(place: &Place, line: &str) -> Vec<f32> {
+    place.succeed(&format!("render {line} {TINY} -o a.exr"));
+    place.pixels("a.exr")
 }
 
-fn no_gpu() -> bool {
-    std::env::var("PHOTONMILL_NO_GPU").is_ok_and(|value| value == "1")
+/// With nothing said of device and plan, refusals are all that is said.
+fn assert_refused<'a>(place: &Place, cases: impl IntoIterator<Item = (impl Display, impl AsRef<[&'a str]>)>) {
+    place.assert_refused(cases.into_iter().map(|(line, named)| (format!("{line} --quiet"), named)));
 }
 
 /// A square of 2 m in the plane z = 0 that faces +z; `change` makes of it what a test needs.
 fn square(change: impl FnOnce(&mut Value)) -> String {
-    let floats = |numbers: &[f32]| numbers.iter().flat_map(|number| number.to_le_bytes()).collect::<Vec<u8>>();
     let mut bytes = floats(&[-1., -1., 0., 1., -1., 0., 1., 1., 0., -1., 1., 0.]);
     bytes.extend([0u16, 1, 2, 0, 2, 3, 1, 1, 2].iter().flat_map(|index| index.to_le_bytes()));
     let mut value = json!({
@@ -128,7 +46,7 @@ fn square(change: impl FnOnce(&mut Value)) -> String {
         "cameras": [{"type": "perspective", "perspective": {"yfov": 0.7, "znear": 0.1}}],
         "extensionsUsed": ["KHR_lights_punctual"],
         "extensions": {"KHR_lights_punctual": {"lights": [{"type": "point", "intensity": 683}]}},
-        "buffers": [{"byteLength": bytes.len(), "uri": format!("data:application/octet-stream;base64,{}", BASE64.encode(&bytes))}],
+        "buffers": [{"byteLength": bytes.len(), "uri": data_uri("application/octet-stream", &bytes)}],
         "bufferViews": [{"buffer": 0, "byteOffset": 0, "byteLength": 48}, {"buffer": 0, "byteOffset": 48, "byteLength": 18}],
         "accessors": [
             {"bufferView": 0, "componentType": 5126, "count": 4, "type": "VEC3", "min": [-1, -1, 0], "max": [1, 1, 0]},
@@ -144,57 +62,51 @@ fn srgb(linear: f32) -> f32 {
     255.0 * if linear <= 0.003_130_8 { 12.92 * linear } else { 1.055 * linear.powf(1.0 / 2.4) - 0.055 }
 }
 
-fn assert_none(faults: Vec<Option<String>>) {
-    let faults: Vec<String> = faults.into_iter().flatten().collect();
-    assert!(faults.is_empty(), "{}", faults.join("\n"));
-}
-
 #[test]
 fn bad_options_are_refused_in_one_line() {
     let place = Place::new();
     place.write("scene.gltf", square(|_| {}));
-    let size = |size: &'static str| place.refuse(&["render", "cornell", "-o", "a.exr", "--size", size], &["--size", size]);
-    let on = |arguments: &[&'static str], named: &[&str]| place.refuse(&[&["render"], arguments].concat(), named);
-    let mut faults: Vec<Option<String>> =
-        ["0x16", "0", "16x", "x16", "16x16x16", "16*16", "65537x16", "1.5x2", "-1x4", ""].map(size).into();
-    faults.extend([
-        on(&["cornell", "-o", "a.exr", "--size", "65536x65536"], &["--size 65536x65536"]),
-        on(&["cornell", "-o", "a.exr", "--size", "65536x32768"], &["--size 65536x32768"]),
-        place.refuse(&["plan", "cornell", "--size", "65536x65536"], &["--size 65536x65536"]),
-        on(&["cornell"], &["--output"]),
-        on(&["cornell", "-o", "a.jpg"], &["-o a.jpg", ".png or .exr"]),
-        on(&["cornell", "-o", "absent/a.exr"], &["-o", "absent"]),
-        on(&["cornell", "-o", "a.exr", "--json", "a.exr"], &["--json", "-o writes it too"]),
-        on(&["cornell", "-o", "a.exr", "--exposure", "1"], &["--exposure", "PNG"]),
-        on(&["cornell", "-o", "a.png", "--exposure", "nan"], &["--exposure"]),
-        on(&["cornell", "-o", "a.png", "--exposure", "999"], &["--exposure", "64"]),
-        on(&["cornell", "-o", "a.exr", "--error-image", "e.png"], &["--error-image", ".exr"]),
-        on(&["cornell", "-o", "a.exr", "--camera", "nobody"], &["--camera nobody", "front"]),
-        on(&["scene.gltf", "-o", "a.exr", "--camera", "nobody"], &["--camera nobody", "eye, side"]),
-        on(&["cornell", "-o", "a.exr", "--with", "magic"], &["--with magic", "smooth-normals"]),
-        on(&["cornell", "-o", "a.exr", "--without", "magic"], &["--without magic", "smooth-normals"]),
-        on(&["cornell", "-o", "a.exr", "--with", "glossy", "--without", "direct,glossy"], &["--without glossy", "--with"]),
-        on(&["cornell", "-o", "a.exr", "--part", "half"], &["--part half", "caustic"]),
-        on(&["cornell", "-o", "a.exr", "--photons", "0"], &["--photons 0", "1"]),
-        on(&["cornell", "-o", "a.exr", "--rounds", "0"], &["--rounds 0", "1"]),
-        on(&["cornell", "-o", "a.exr", "--radius", "nan"], &["--radius"]),
-        on(&["cornell", "-o", "a.exr", "--radius", "1000"], &["--radius 1000", "metres"]),
-        on(&["cornell", "-o", "a.exr", "--alpha", "0"], &["--alpha 0"]),
-        on(&["cornell", "-o", "a.exr", "--alpha", "0.5", "--fixed-radius"], &["--alpha", "--fixed-radius"]),
-        on(&["cornell", "-o", "a.exr", "--environment", "red"], &["--environment red"]),
-        on(&["cornell", "-o", "a.exr", "--environment", "1,2"], &["--environment 1,2"]),
-        on(&["cornell", "-o", "a.exr", "--environment", "nan"], &["--environment nan"]),
-        on(&["cornell", "-o", "a.exr", "--environment", "-1"], &["--environment -1", "0 or more"]),
-        on(&["cornell", "-o", "a.exr", "--device", "nonsense"], &["--device nonsense", "available: "]),
-        place.refuse(&["plan", "cornell", "--device", "nonsense"], &["--device nonsense", "available: "]),
-    ]);
-    assert_none(faults);
+    for size in ["0x16", "0", "16x", "x16", "16x16x16", "16*16", "65537x16", "1.5x2", "-1x4", ""] {
+        assert_refused(&place, [(format!("render cornell -o a.exr --size '{size}'"), ["--size", size])]);
+    }
+    let cases: [(&str, &[&str]); 29] = [
+        ("render cornell -o a.exr --size 65536x65536", &["--size 65536x65536"]),
+        ("render cornell -o a.exr --size 65536x32768", &["--size 65536x32768"]),
+        ("plan cornell --size 65536x65536", &["--size 65536x65536"]),
+        ("render cornell", &["--output"]),
+        ("render cornell -o a.jpg", &["-o a.jpg", ".png or .exr"]),
+        ("render cornell -o absent/a.exr", &["-o", "absent"]),
+        ("render cornell -o a.exr --json a.exr", &["--json", "-o writes it too"]),
+        ("render cornell -o a.exr --exposure 1", &["--exposure", "PNG"]),
+        ("render cornell -o a.png --exposure nan", &["--exposure"]),
+        ("render cornell -o a.png --exposure 999", &["--exposure", "64"]),
+        ("render cornell -o a.exr --error-image e.png", &["--error-image", ".exr"]),
+        ("render cornell -o a.exr --camera nobody", &["--camera nobody", "front"]),
+        ("render scene.gltf -o a.exr --camera nobody", &["--camera nobody", "eye, side"]),
+        ("render cornell -o a.exr --with magic", &["--with magic", "smooth-normals"]),
+        ("render cornell -o a.exr --without magic", &["--without magic", "smooth-normals"]),
+        ("render cornell -o a.exr --with glossy --without direct,glossy", &["--without glossy", "--with"]),
+        ("render cornell -o a.exr --part half", &["--part half", "caustic"]),
+        ("render cornell -o a.exr --photons 0", &["--photons 0", "1"]),
+        ("render cornell -o a.exr --rounds 0", &["--rounds 0", "1"]),
+        ("render cornell -o a.exr --radius nan", &["--radius"]),
+        ("render cornell -o a.exr --radius 1000", &["--radius 1000", "metres"]),
+        ("render cornell -o a.exr --alpha 0", &["--alpha 0"]),
+        ("render cornell -o a.exr --alpha 0.5 --fixed-radius", &["--alpha", "--fixed-radius"]),
+        ("render cornell -o a.exr --environment red", &["--environment red"]),
+        ("render cornell -o a.exr --environment 1,2", &["--environment 1,2"]),
+        ("render cornell -o a.exr --environment nan", &["--environment nan"]),
+        ("render cornell -o a.exr --environment -1", &["--environment -1", "0 or more"]),
+        ("render cornell -o a.exr --device nonsense", &["--device nonsense", "available: "]),
+        ("plan cornell --device nonsense", &["--device nonsense", "available: "]),
+    ];
+    assert_refused(&place, cases);
 }
 
 #[test]
 fn bad_scenes_are_refused_in_one_line() {
     let place = Place::new();
-    std::fs::create_dir(place.0.path().join("folder.glb")).unwrap();
+    std::fs::create_dir(place.at("folder.glb")).unwrap();
     let blender = std::fs::read(BLENDER).unwrap();
     place.write("half.glb", &blender[..blender.len() / 2]);
     place.write("empty.glb", "");
@@ -220,13 +132,9 @@ fn bad_scenes_are_refused_in_one_line() {
         ("broken.gltf", &["broken.gltf"]),
         ("lines.gltf", &["lines.gltf", "mesh"]),
     ];
-    let mut faults = Vec::new();
-    for (scene, named) in cases {
-        faults.push(place.refuse(&["render", scene, "-o", "a.exr", "--json", "a.json"], named));
-        faults.push(place.refuse(&["probe", scene, "--points", "points.txt", "-o", "a.csv"], named));
-        faults.push(place.refuse(&["plan", scene], named));
+    for line in ["render SCENE -o a.exr --json a.json", "probe SCENE --points points.txt -o a.csv", "plan SCENE"] {
+        assert_refused(&place, cases.iter().map(|(scene, named)| (line.replace("SCENE", &format!("'{scene}'")), named)));
     }
-    assert_none(faults);
 }
 
 #[test]
@@ -244,38 +152,32 @@ fn bad_points_are_refused_with_their_line() {
         ("zero.txt", format!("{good}\n0 0 0 0 0 0\n"), &["line 3", "normal"]),
         ("words.txt", "x y z nx ny nz\n".into(), &["line 1", "'x'"]),
     ];
-    let mut faults = vec![
-        place.refuse(&["probe", "cornell", "--points", "absent.txt", "-o", "a.csv"], &["--points absent.txt", "cannot be read"]),
-        place.refuse(&["probe", "cornell", "--points", ".", "-o", "a.csv"], &["--points .", "cannot be read"]),
-        place.refuse(&["probe", "cornell", "--points", "-", "-o", "a.csv"], &["--points -", "no point"]),
-        place.refuse(&["probe", "cornell", "-o", "a.csv"], &["--points"]),
-    ];
-    for (name, content, named) in cases {
-        place.write(name, content);
-        let named = [&["--points", name], *named].concat();
-        faults.push(place.refuse(&["probe", "cornell", "--points", name, "-o", "a.csv"], &named));
-    }
     place.write("bytes.txt", [0xff, 0xfe, 0x00]);
-    faults.push(place.refuse(&["probe", "cornell", "--points", "bytes.txt", "-o", "a.csv"], &["--points bytes.txt"]));
-    assert_none(faults);
+    cases.iter().for_each(|(name, content, _)| place.write(name, content));
+    let of_files = cases.iter().map(|(name, _, named)| (*name, *named));
+    let others: [(&str, &[&str]); 4] =
+        [("absent.txt", &["cannot be read"]), (".", &["cannot be read"]), ("-", &["no point"]), ("bytes.txt", &[])];
+    for (name, named) in of_files.chain(others) {
+        let option = format!("--points {name}");
+        let named = [&[option.as_str()], named].concat();
+        assert_refused(&place, [(format!("probe cornell --points {name} -o a.csv"), named)]);
+    }
+    assert_refused(&place, [("probe cornell -o a.csv", ["--points"])]);
 }
 
 /// A row a point in their order, from a file with comments and from standard input, the same to the bit.
 #[test]
 fn a_probe_writes_a_row_a_point() {
-    if no_gpu() {
-        return;
-    }
-    let place = Place::new();
+    let Some(place) = place_with_device() else { return };
     let points = "# floor, and above it\n0.5 0 0.5 0 1 0\n\n  0.2,0,0.2,0,7,0\n0.5\t0\t0.5\t0\t1\t0\n0.5 0 0.5 0 -1 0";
     place.write("points.txt", points);
-    let run = ["probe", "cornell", "--photons", "2000", "--rounds", "4"];
-    place.succeed(&[&run[..], &["--points", "points.txt", "-o", "a.csv"]].concat());
-    let mut child = place.command(&[&run[..], &["--points", "-", "-o", "b.csv"]].concat());
+    let run = "probe cornell --photons 2000 --rounds 4";
+    place.succeed(&format!("{run} --points points.txt -o a.csv"));
+    let mut child = place.command(&on_device(&format!("{run} --points - -o b.csv")));
     let mut child = child.stdin(Stdio::piped()).stdout(Stdio::null()).spawn().unwrap();
     child.stdin.take().unwrap().write_all(points.as_bytes()).unwrap();
     assert!(child.wait().unwrap().success());
-    let table = |name: &str| std::fs::read_to_string(place.0.path().join(name)).unwrap();
+    let table = |name: &str| place.text(name);
     assert_eq!(table("a.csv"), table("b.csv"));
     let lines: Vec<String> = table("a.csv").lines().map(str::to_owned).collect();
     assert_eq!((lines.len(), lines[0].as_str()), (5, "red,green,blue,red_error,green_error,blue_error"));
@@ -286,52 +188,46 @@ fn a_probe_writes_a_row_a_point() {
     assert_eq!(rows[3][..3], [0.0; 3], "{rows:?}");
 
     // The same table on standard output, and the report elsewhere.
-    let (stdout, _) = place.succeed(&[&run[..], &["--points", "points.txt", "-o", "-"]].concat());
+    let (stdout, _) = place.succeed(&format!("{run} --points points.txt -o -"));
     assert_eq!(stdout, table("a.csv"));
-    assert!(!place.0.path().join("-").exists());
+    assert!(!place.at("-").exists());
 
     // Of one round no error is known.
-    place.succeed(&["probe", "cornell", "--points", "points.txt", "--rounds", "1", "--photons", "1000", "-o", "c.csv"]);
+    place.succeed("probe cornell --points points.txt --rounds 1 --photons 1000 -o c.csv");
     assert!(table("c.csv").lines().nth(1).unwrap().ends_with(",inf,inf,inf"), "{}", table("c.csv"));
 }
 
 #[test]
 fn an_exr_is_linear_and_a_png_obeys_its_exposure() {
-    if no_gpu() {
-        return;
-    }
-    let place = Place::new();
-    let linear = place.exr(&["cornell"]);
-    let exr = image::open(place.0.path().join("a.exr")).unwrap();
+    let Some(place) = place_with_device() else { return };
+    let linear = exr(&place, "cornell");
+    let exr = place.picture("a.exr");
     assert!(matches!(exr, image::DynamicImage::ImageRgb32F(_)), "{:?}", exr.color());
     // The lamp's own radiance stands in it, far above what a screen shows.
     assert!(linear.iter().any(|value| *value > 1.0) && linear.iter().all(|value| value.is_finite() && *value >= 0.0));
     for stops in ["-2", "0", "1", "3.5"] {
-        place.succeed(&[&["render", "cornell"], &TINY[..], &["-o", "a.png", "--exposure", stops]].concat());
-        let png = image::open(place.0.path().join("a.png")).unwrap().into_rgb8().into_raw();
+        place.succeed(&format!("render cornell {TINY} -o a.png --exposure {stops}"));
+        let png = place.picture("a.png").into_rgb8().into_raw();
         let factor = stops.parse::<f32>().unwrap().exp2();
         for (code, value) in pairs(&png, &linear) {
             assert!((f32::from(*code) - srgb(value * factor)).abs() <= 0.51, "{stops} stops: {code} for {value}");
         }
     }
     // Left alone, it is neither dark nor burnt out.
-    let (stdout, _) = place.succeed(&[&["render", "cornell"], &TINY[..], &["-o", "a.png"]].concat());
+    let (stdout, _) = place.succeed(&format!("render cornell {TINY} -o a.png"));
     assert!(stdout.contains("wrote a.png at ") && stdout.contains("stops"), "{stdout}");
-    let png = image::open(place.0.path().join("a.png")).unwrap().into_luma8().into_raw();
+    let png = place.picture("a.png").into_luma8().into_raw();
     let mean = png.iter().map(|code| f64::from(*code)).sum::<f64>() / png.len() as f64;
     assert!((40.0..200.0).contains(&mean), "{mean}");
 }
 
 #[test]
 fn a_camera_is_chosen_by_name() {
-    if no_gpu() {
-        return;
-    }
-    let place = Place::new();
+    let Some(place) = place_with_device() else { return };
     place.write("scene.gltf", square(|_| {}));
-    let first = place.exr(&["scene.gltf"]);
-    assert_eq!(place.exr(&["scene.gltf", "--camera", "eye"]), first);
-    assert_ne!(place.exr(&["scene.gltf", "--camera", "side"]), first);
+    let first = exr(&place, "scene.gltf");
+    assert_eq!(exr(&place, "scene.gltf --camera eye"), first);
+    assert_ne!(exr(&place, "scene.gltf --camera side"), first);
 }
 
 /// Of a camera of 2 : 1, whole or as wide or as large as is asked for; the vertical field of view is kept.
@@ -340,41 +236,38 @@ fn a_picture_has_the_aspect_of_its_camera() {
     let place = Place::new();
     let with_aspect = |aspect: f64| square(|v| v["cameras"][0]["perspective"]["aspectRatio"] = json!(aspect));
     place.write("wide.gltf", with_aspect(2.0));
-    let plan = |arguments: &[&str]| place.succeed(&[&["plan"], arguments].concat());
-    let (table, stderr) = plan(&["wide.gltf"]);
+    let plan = |line: &str| place.succeed(&format!("plan {line}"));
+    let (table, stderr) = plan("wide.gltf");
     assert!(table.contains("\n784 x 392 pixels\n") && !stderr.contains("note"), "{table}{stderr}");
-    let (table, stderr) = plan(&["wide.gltf", "--size", "640"]);
+    let (table, stderr) = plan("wide.gltf --size 640");
     assert!(table.contains("\n640 x 320 pixels\n") && !stderr.contains("note"), "{table}{stderr}");
-    let (table, stderr) = plan(&["wide.gltf", "--size", "640x480"]);
+    let (table, stderr) = plan("wide.gltf --size 640x480");
     assert!(table.contains("\n640 x 480 pixels\n") && stderr.contains("vertical field of view is kept"), "{table}{stderr}");
-    assert!(plan(&["cornell"]).0.contains("\n554 x 554 pixels\n"));
+    assert!(plan("cornell").0.contains("\n554 x 554 pixels\n"));
     place.write("open.gltf", square(|_| {}));
-    assert!(plan(&["open.gltf"]).0.contains("\n640 x 480 pixels\n"));
+    assert!(plan("open.gltf").0.contains("\n640 x 480 pixels\n"));
     place.write("wrong.gltf", with_aspect(-1.0));
-    let (table, stderr) = plan(&["wrong.gltf"]);
+    let (table, stderr) = plan("wrong.gltf");
     assert!(table.contains("\n640 x 480 pixels\n") && stderr.contains("aspect ratio"), "{table}{stderr}");
     if no_gpu() {
         return;
     }
-    place.succeed(&["render", "wide.gltf", "--size", "16", "--photons", "10", "--rounds", "1", "-o", "a.exr"]);
-    let picture = image::open(place.0.path().join("a.exr")).unwrap();
+    place.succeed("render wide.gltf --size 16 --photons 10 --rounds 1 -o a.exr");
+    let picture = place.picture("a.exr");
     assert_eq!((picture.width(), picture.height()), (16, 8));
 }
 
 #[test]
 fn four_parts_add_up_to_the_whole() {
-    if no_gpu() {
-        return;
-    }
-    let place = Place::new();
+    let Some(place) = place_with_device() else { return };
     for scene in ["cornell-spheres", BLENDER] {
-        let whole = place.exr(&[scene]);
-        let parts = ["direct", "specular", "caustic", "indirect"].map(|part| place.exr(&[scene, "--part", part]));
+        let whole = exr(&place, scene);
+        let parts = ["direct", "specular", "caustic", "indirect"].map(|part| exr(&place, &format!("{scene} --part {part}")));
         for (pixel, value) in whole.iter().enumerate() {
             let sum: f32 = parts.iter().map(|part| part[pixel]).sum();
             assert!((sum - value).abs() <= 1e-6 * value.max(1e-3), "{scene}, value {pixel}: {sum} instead of {value}");
         }
-        assert_eq!(place.exr(&[scene, "--part", "all"]), whole);
+        assert_eq!(exr(&place, &format!("{scene} --part all")), whole);
     }
 }
 
@@ -385,7 +278,8 @@ fn rows_of(table: &str) -> Vec<(String, bool)> {
         .filter_map(|line| {
             let mut words = line.split_whitespace();
             let (name, verb) = (words.next()?, words.next()?);
-            (EFFECTS.contains(&name) && ["kept", "dropped"].contains(&verb)).then(|| (name.to_owned(), verb == "kept"))
+            (EFFECTS.split(' ').any(|effect| effect == name) && ["kept", "dropped"].contains(&verb))
+                .then(|| (name.to_owned(), verb == "kept"))
         })
         .collect()
 }
@@ -394,14 +288,12 @@ fn rows_of(table: &str) -> Vec<(String, bool)> {
 fn tables_and_json_tell_one_plan_with_a_row_an_effect() {
     let place = Place::new();
     for scene in ["cornell", "cornell-spheres", "open-box", "glass-slab", BLENDER] {
-        for options in
-            [&[][..], &["--part", "direct"], &["--with", "glossy,textures"], &["--without", "mesh-lights", "--illumination", "photons"]]
-        {
-            let (table, _) = place.succeed(&[&["plan", scene], options].concat());
-            let (json, _) = place.succeed(&[&["plan", scene, "--json"], options].concat());
+        for options in ["", "--part direct", "--with glossy,textures", "--without mesh-lights --illumination photons"] {
+            let (table, _) = place.succeed(&format!("plan {scene} {options}"));
+            let (json, _) = place.succeed(&format!("plan {scene} --json {options}"));
             let json: Value = serde_json::from_str(&json).unwrap();
             let rows = rows_of(&table);
-            assert_eq!(rows.iter().map(|(name, _)| name.as_str()).collect::<Vec<_>>(), EFFECTS, "{table}");
+            assert!(rows.iter().map(|(name, _)| name.as_str()).eq(EFFECTS.split(' ')), "{table}");
             for (row, (name, kept)) in pairs(json["effects"].as_array().unwrap(), &rows) {
                 assert_eq!((&row["effect"], &row["kept"]), (&json!(name), &json!(kept)), "{table}");
                 let evidence = row["evidence"].as_str().unwrap();
@@ -419,13 +311,10 @@ fn tables_and_json_tell_one_plan_with_a_row_an_effect() {
 
 #[test]
 fn a_run_explains_itself_and_its_report_closes() {
-    if no_gpu() {
-        return;
-    }
-    let place = Place::new();
-    let run = [&["render", "cornell-spheres"], &TINY[..], &["-o", "a.exr", "--explain", "--json", "a.json", "--trace", "t.json"]].concat();
+    let Some(place) = place_with_device() else { return };
+    let run = format!("render cornell-spheres {TINY} -o a.exr --explain --json a.json --trace t.json");
     let (stdout, _) = place.succeed(&run);
-    assert_eq!(rows_of(&stdout).iter().map(|(name, _)| name.as_str()).collect::<Vec<_>>(), EFFECTS, "{stdout}");
+    assert!(rows_of(&stdout).iter().map(|(name, _)| name.as_str()).eq(EFFECTS.split(' ')), "{stdout}");
     for word in ["GPU ms", "light", "evidence", "noise: ", "global ledger: ", "caustic ledger: ", "wrote a.exr"] {
         assert!(stdout.contains(word), "{word}: {stdout}");
     }
@@ -456,23 +345,7 @@ fn a_run_explains_itself_and_its_report_closes() {
     assert!(!place.json("t.json")["traceEvents"].as_array().unwrap().is_empty());
 
     // What is not asked for is not told; one round knows no error and still is JSON.
-    let (stdout, _) = place.succeed(&[
-        "render",
-        "cornell",
-        "--size",
-        "4x4",
-        "--photons",
-        "10",
-        "--rounds",
-        "1",
-        "--bounces",
-        "9",
-        "--paranoid",
-        "-o",
-        "a.png",
-        "--json",
-        "b.json",
-    ]);
+    let (stdout, _) = place.succeed("render cornell --size 4x4 --photons 10 --rounds 1 --bounces 9 --paranoid -o a.png --json b.json");
     assert!(rows_of(&stdout).is_empty() && stdout.contains("unknown after a single round"), "{stdout}");
     let report = place.json("b.json");
     assert!(report["relative_error"].is_null());
@@ -481,17 +354,14 @@ fn a_run_explains_itself_and_its_report_closes() {
 
 #[test]
 fn effects_are_forced_and_left_out_by_name() {
-    if no_gpu() {
-        return;
-    }
-    let place = Place::new();
-    let reference = place.exr(&["cornell"]);
-    assert_eq!(place.exr(&["cornell", "--with", "glossy,refractive-caustics", "--with", "textures"]), reference);
-    assert_eq!(place.exr(&["cornell", "--without", "glossy,textures"]), reference);
-    assert_ne!(place.exr(&["cornell", "--without", "indirect"]), reference);
-    let run = [&["render", "cornell"], &TINY[..], &["-o", "a.exr", "--without", "indirect", "--without", "glossy"]].concat();
-    for arguments in [run, vec!["plan", "cornell", "--without", "indirect,glossy"]] {
-        let (stdout, _) = place.succeed(&arguments);
+    let Some(place) = place_with_device() else { return };
+    let reference = exr(&place, "cornell");
+    assert_eq!(exr(&place, "cornell --with glossy,refractive-caustics --with textures"), reference);
+    assert_eq!(exr(&place, "cornell --without glossy,textures"), reference);
+    assert_ne!(exr(&place, "cornell --without indirect"), reference);
+    let run = format!("render cornell {TINY} -o a.exr --without indirect --without glossy");
+    for line in [run.as_str(), "plan cornell --without indirect,glossy"] {
+        let (stdout, _) = place.succeed(line);
         let line = stdout.lines().find(|line| line.contains("left out") && !line.starts_with("indirect"));
         assert!(line.is_some_and(|line| line.contains("indirect") && !line.contains("glossy")), "{stdout}");
     }
@@ -499,14 +369,10 @@ fn effects_are_forced_and_left_out_by_name() {
 
 #[test]
 fn punctual_lights_are_photometric_unless_told() {
-    if no_gpu() {
-        return;
-    }
-    let place = Place::new();
+    let Some(place) = place_with_device() else { return };
     place.write("scene.gltf", square(|_| {}));
-    let direct = ["scene.gltf", "--part", "direct"];
-    let lumens = place.exr(&direct);
-    let watts = place.exr(&[&direct[..], &["--radiometric"]].concat());
+    let lumens = exr(&place, "scene.gltf --part direct");
+    let watts = exr(&place, "scene.gltf --part direct --radiometric");
     assert!(lumens.iter().any(|value| *value > 0.1));
     for (watt, lumen) in pairs(&watts, &lumens) {
         assert!((watt - 683.0 * lumen).abs() <= 1e-4 * watt, "{watt} W, {lumen} lm");
@@ -518,12 +384,9 @@ fn punctual_lights_are_photometric_unless_told() {
 
 #[test]
 fn an_environment_lights_the_scene_and_is_seen() {
-    if no_gpu() {
-        return;
-    }
-    let place = Place::new();
+    let Some(place) = place_with_device() else { return };
     place.write("dark.gltf", square(|v| v["scenes"][0]["nodes"] = json!([0, 1])));
-    let run = [&["render", "dark.gltf"], &TINY[..], &["-o", "a.exr", "--environment", "2,1,0.5"]].concat();
+    let run = format!("render dark.gltf {TINY} -o a.exr --environment 2,1,0.5");
     let (_, stderr) = place.succeed(&run);
     assert!(!stderr.contains("has no light"), "it is lit: {stderr}");
     // A white wall under an even sky is as bright as the sky.
@@ -533,58 +396,46 @@ fn an_environment_lights_the_scene_and_is_seen() {
         assert!((mean(channel) / sky - 1.0).abs() < 0.05, "channel {channel}: {} of {sky}", mean(channel));
     }
     // Grey by one number; off the wall the sky alone is seen, untouched.
-    place.succeed(&["render", "mirror-corridor", "--size", "4x4", "--photons", "10", "--rounds", "2", "--environment", "3", "-o", "b.exr"]);
-    assert_eq!(place.exr(&["dark.gltf", "--environment", "0"]), vec![0.0; 3 * 256]);
+    place.succeed("render mirror-corridor --size 4x4 --photons 10 --rounds 2 --environment 3 -o b.exr");
+    assert_eq!(exr(&place, "dark.gltf --environment 0"), vec![0.0; 3 * 256]);
 }
 
 #[test]
 fn a_scene_without_light_is_black_with_one_warning() {
-    if no_gpu() {
-        return;
-    }
-    let place = Place::new();
+    let Some(place) = place_with_device() else { return };
     place.write("dark.gltf", square(|v| v["scenes"][0]["nodes"] = json!([0, 1])));
-    let (_, stderr) = place.succeed(&[&["render", "dark.gltf"], &TINY[..], &["-o", "a.exr"]].concat());
+    let (_, stderr) = place.succeed(&format!("render dark.gltf {TINY} -o a.exr"));
     assert_eq!(stderr.matches("has no light").count(), 1, "{stderr}");
     assert_eq!(place.pixels("a.exr"), vec![0.0; 3 * 256]);
-    place.succeed(&[&["render", "dark.gltf"], &TINY[..], &["-o", "a.png"]].concat());
-    assert!(image::open(place.0.path().join("a.png")).unwrap().into_rgb8().into_raw().iter().all(|code| *code == 0));
+    place.succeed(&format!("render dark.gltf {TINY} -o a.png"));
+    assert!(place.picture("a.png").into_rgb8().into_raw().iter().all(|code| *code == 0));
 }
 
 #[test]
 fn a_scene_without_a_camera_is_seen_whole() {
-    if no_gpu() {
-        return;
-    }
-    let place = Place::new();
+    let Some(place) = place_with_device() else { return };
     place.write("scene.gltf", square(|v| v["scenes"][0]["nodes"] = json!([0, 3])));
-    let pixels = place.exr(&["scene.gltf"]);
+    let pixels = exr(&place, "scene.gltf");
     let lit = |i: usize, j: usize| pixels[3 * (16 * j + i)] > 0.0;
     assert!(lit(8, 8), "the middle is dark");
     assert!((0..16).all(|k| !lit(k, 0) && !lit(k, 15) && !lit(0, k) && !lit(15, k)), "the wall is cut off");
-    assert_none(vec![place.refuse(&["render", "scene.gltf", "-o", "b.exr", "--camera", "eye"], &["--camera eye", "none"])]);
+    assert_refused(&place, [("render scene.gltf -o b.exr --camera eye", ["--camera eye", "none"])]);
 }
 
 #[test]
 fn zero_area_triangles_are_a_warning_and_the_picture_is_right() {
-    if no_gpu() {
-        return;
-    }
-    let place = Place::new();
+    let Some(place) = place_with_device() else { return };
     place.write("plain.gltf", square(|_| {}));
     place.write("flat.gltf", square(|v| v["accessors"][1]["count"] = json!(9)));
-    let (_, stderr) = place.succeed(&[&["render", "flat.gltf"], &TINY[..], &["-o", "flat.exr", "--quiet"]].concat());
+    let (_, stderr) = place.succeed(&format!("render flat.gltf {TINY} -o flat.exr --quiet"));
     assert!(stderr.contains("warning: 1 triangle without area left out") && stderr.lines().count() == 1, "{stderr}");
-    assert_eq!(place.pixels("flat.exr"), place.exr(&["plain.gltf"]));
+    assert_eq!(place.pixels("flat.exr"), exr(&place, "plain.gltf"));
 }
 
 #[test]
 fn a_blender_file_renders_with_all_that_it_holds() {
-    if no_gpu() {
-        return;
-    }
-    let place = Place::new();
-    let (stdout, stderr) = place.succeed(&[&["render", BLENDER], &TINY[..], &["-o", "a.exr", "--explain", "--camera", "eye"]].concat());
+    let Some(place) = place_with_device() else { return };
+    let (stdout, stderr) = place.succeed(&format!("render {BLENDER} {TINY} -o a.exr --explain --camera eye"));
     assert!(!stderr.contains("has no light"), "{stderr}");
     let kept: Vec<String> = rows_of(&stdout).into_iter().filter(|(_, kept)| *kept).map(|(name, _)| name).collect();
     for effect in ["textures", "point-lights", "spot-lights", "directional-lights", "mesh-lights", "refractive-caustics", "bvh"] {
@@ -597,22 +448,16 @@ fn a_blender_file_renders_with_all_that_it_holds() {
 /// Results are of texels here, not of points.
 #[test]
 fn a_bake_speaks_of_texels() {
-    if no_gpu() {
-        return;
-    }
-    let place = Place::new();
-    let (stdout, stderr) = place.succeed(&["bake", "cornell", "-o", "b", "--texels-per-metre", "2", "--photons", "50", "--rounds", "1"]);
+    let Some(place) = place_with_device() else { return };
+    let (stdout, stderr) = place.succeed("bake cornell -o b --texels-per-metre 2 --photons 50 --rounds 1");
     assert!(stderr.contains(" texels; 1 round of 50 global photons"), "{stderr}");
     assert!(stdout.contains(" texels where some may arrive"), "{stdout}");
 }
 
 #[test]
 fn errors_of_pixels_are_written_beside_the_picture() {
-    if no_gpu() {
-        return;
-    }
-    let place = Place::new();
-    place.succeed(&[&["render", "cornell"], &TINY[..], &["-o", "a.exr", "--error-image", "e.exr"]].concat());
+    let Some(place) = place_with_device() else { return };
+    place.succeed(&format!("render cornell {TINY} -o a.exr --error-image e.exr"));
     let errors = place.pixels("e.exr");
     assert!(errors.len() == 3 * 256 && errors.iter().all(|error| error.is_finite() && *error >= 0.0));
     assert_eq!(place.names(), ["a.exr", "e.exr"]);
@@ -622,20 +467,12 @@ fn errors_of_pixels_are_written_beside_the_picture() {
 #[test]
 fn output_that_nobody_takes_is_no_panic() {
     let place = Place::new();
-    let shell = |line: &str| {
-        let line = line.replace("photonmill", env!("CARGO_BIN_EXE_photonmill"));
-        Command::new("bash").args(["-c", &format!("set -o pipefail; {line}")]).current_dir(place.0.path()).output().unwrap()
-    };
-    for line in ["photonmill plan cornell -q | true", "photonmill plan cornell -q --json | head -c 1 > /dev/null"] {
-        let gone = shell(line);
-        assert!(gone.status.success() && gone.stderr.is_empty(), "{line}: {}", text(&gone.stderr));
-    }
-    let full = shell("photonmill plan cornell -q > /dev/full");
-    assert_eq!((full.status.code(), text(&full.stderr).lines().count()), (Some(2), 1), "{}", text(&full.stderr));
+    place.assert_shell("photonmill plan cornell -q | true", 0, 0);
+    place.assert_shell("photonmill plan cornell -q --json | head -c 1 > /dev/null", 0, 0);
+    place.assert_shell("photonmill plan cornell -q > /dev/full", 2, 1);
     if !no_gpu() {
-        let gone = shell("photonmill render cornell --size 4x4 --photons 10 --rounds 1 -q -o a.png | true");
-        assert!(gone.status.success() && gone.stderr.is_empty(), "{}", text(&gone.stderr));
-        assert!(place.0.path().join("a.png").exists());
+        place.assert_shell("photonmill render cornell --size 4x4 --photons 10 --rounds 1 -q -o a.png | true", 0, 0);
+        assert!(place.at("a.png").exists());
     }
 }
 
@@ -643,17 +480,10 @@ fn output_that_nobody_takes_is_no_panic() {
 #[test]
 fn without_vulkan_a_scene_is_planned_but_not_rendered() {
     let place = Place::new();
-    let without = |arguments: &[&str]| {
-        let mut command = place.command(arguments);
-        command.env("VK_DRIVER_FILES", "/nonexistent").env("VK_ICD_FILENAMES", "/nonexistent").env_remove("PHOTONMILL_DEVICE");
-        command.output().unwrap()
-    };
-    if std::env::var_os("PHOTONMILL_DEVICE").is_none() {
-        assert!(without(&["plan", "cornell"]).status.success());
-        let refused = without(&["render", "cornell", "-o", "a.exr", "--quiet"]);
-        let stderr = text(&refused.stderr);
-        assert!(!refused.status.success() && stderr.lines().count() == 1 && stderr.contains("no Vulkan device"), "{stderr}");
-        assert!(stderr.contains("install") && stderr.contains("driver"), "{stderr}");
-        assert!(!Path::exists(&place.0.path().join("a.exr")));
-    }
+    assert!(place.run_without_vulkan("plan cornell").status.success());
+    let refused = place.run_without_vulkan("render cornell -o a.exr --quiet");
+    let stderr = text(&refused.stderr);
+    assert!(!refused.status.success() && stderr.lines().count() == 1 && stderr.contains("no Vulkan device"), "{stderr}");
+    assert!(stderr.contains("install") && stderr.contains("driver"), "{stderr}");
+    assert!(!place.at("a.exr").exists());
 }

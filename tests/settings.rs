@@ -1,12 +1,8 @@
 //! Validation accepts what the documented ranges allow, and nothing else: every field set to the edges of its range,
 //! their neighbours and anything between, alone and together, judged by rules that are written down here again.
 
-use std::collections::BTreeMap;
-
-use photonmill::error::{Error, Result};
-use photonmill::rng::Rng;
-use photonmill::settings::scene::{Effect, SceneSettings};
-use photonmill::settings::{Builder, Gather, Preset, RoomSettings};
+use crate::common::prelude::*;
+use photonmill::error::Result;
 use photonmill::text::echo;
 
 const CASES: usize = 40_000;

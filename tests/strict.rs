@@ -4,50 +4,21 @@
 use std::f32::consts::{FRAC_PI_2, PI};
 
 use crate::common::bits::{self, BITS, picture, small};
-use crate::common::{
-    Check, Complaint, Kind, assert_complains, assert_complains_of, assert_holds, device, open, outcome_of, pairs, photons_on_cpu, planted,
-    run_on_cpu, same_photons, same_sums,
-};
-use glam::Vec2;
+use crate::common::planted;
+use crate::common::prelude::*;
 use photonmill::cpu;
 use photonmill::engine::room;
 use photonmill::engine::room::film::RoomFilm;
-use photonmill::error::Error;
-use photonmill::gpu::{Gpu, Options, check};
-use photonmill::photon::Photon;
+use photonmill::gpu::check;
 use photonmill::records::MathResults;
-use photonmill::rng::Rng;
-use photonmill::rng::philox;
-use photonmill::scene::built_in;
-use photonmill::scene::open_box::open_box;
-use photonmill::settings::scene::SceneSettings;
-use photonmill::settings::{Builder, EmissionLaw, Math, RoomSettings};
 
 /// Numbers of every size, evenly over exponents and mantissas, and those at which functions change their ways.
 fn operands() -> Vec<Vec2> {
+    #[rustfmt::skip]
     let odd = [
-        0.0,
-        1.0,
-        2.0,
-        3.0,
-        0.5,
-        1.0 - f32::EPSILON / 2.0,
-        1.0 + f32::EPSILON,
-        2.0 - f32::EPSILON,
-        16_777_215.0,
-        16_777_217.0,
-        f32::MIN_POSITIVE,
-        1e-40,
-        f32::from_bits(1),
-        f32::MAX,
-        f32::INFINITY,
-        std::f32::consts::SQRT_2,
-        0.414_213_57,
-        1e-30,
-        1e30,
-        125.5,
-        127.5,
-        128.0,
+        0.0, 1.0, 2.0, 3.0, 0.5, 1.0 - f32::EPSILON / 2.0, 1.0 + f32::EPSILON, 2.0 - f32::EPSILON, 16_777_215.0, 16_777_217.0,
+        f32::MIN_POSITIVE, 1e-40, f32::from_bits(1), f32::MAX, f32::INFINITY, std::f32::consts::SQRT_2, 0.414_213_57, 1e-30, 1e30,
+        125.5, 127.5, 128.0,
     ];
     let signed: Vec<f32> = odd.iter().flat_map(|number| [*number, -number]).collect();
     let pairs = signed.iter().flat_map(|a| signed.iter().map(|b| Vec2::new(*a, *b)));

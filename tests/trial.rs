@@ -3,24 +3,14 @@
 
 use std::sync::atomic::AtomicBool;
 
-use glam::{DVec3, dvec3};
-
-use crate::common::lit::{level, light, matt, scene, scene_of, shining};
-use crate::common::{Check, assert_complains, assert_holds, device};
+use crate::common::lit::light;
+use crate::common::prelude::*;
 use crate::unknown::room_without_floor;
-use photonmill::engine;
+use glam::dvec3;
 use photonmill::engine::scene::{self, View, trial};
-use photonmill::gpu::Gpu;
 use photonmill::output::scene_report;
 use photonmill::plan::radius::{RadiusFrom, area_radius};
-use photonmill::plan::scene::ScenePlan;
-use photonmill::plan::sensor::Sensor;
 use photonmill::records::Receiver;
-use photonmill::scene::Scene;
-use photonmill::scene::geometry::Geometry;
-use photonmill::settings::Builder;
-use photonmill::settings::scene::{Part, SceneSettings};
-use photonmill::verify::judge::Judge;
 
 /// A room of 4 x 4 x 3 m with a lamp under its ceiling, on a ground of 800 m.
 fn room_on_a_plain() -> Scene {

@@ -1,21 +1,11 @@
 //! What nothing has reached has an unknown error and an upper bound, and no run ends on it.
 
-use glam::{DVec3, Vec3, dvec3};
-
-use crate::common::lit::{level, matt, mirror, received, scene_of, seen, shining};
-use crate::common::{device, run};
+use crate::common::prelude::*;
+use glam::dvec3;
 use photonmill::engine::End;
 use photonmill::engine::room::film::{estimate_walls, irradiance_weights};
 use photonmill::engine::scene::RunResult;
-use photonmill::rng::Rng;
-use photonmill::scene::geometry::Geometry;
-use photonmill::scene::light::LightKind;
-use photonmill::scene::open_box::open_box;
-use photonmill::scene::{Camera, Mesh, Scene};
-use photonmill::settings::RoomSettings;
-use photonmill::settings::scene::SceneSettings;
 use photonmill::settings::stop::Stop;
-use photonmill::verify::judge::Judge;
 
 /// Walls of a room over [-2, 2] x [-2, 2], as high as 3 m, that face inwards; and its ceiling but for a hole in the middle.
 pub fn room_without_floor(hole: f64) -> Vec<Mesh> {
@@ -55,14 +45,8 @@ fn no_run_ends_on_a_picture_that_nothing_has_reached() {
     let camera = Camera::looking_at("camera", dvec3(0.0, 1.5, 1.9), DVec3::ZERO, DVec3::Y, 1.2);
     let mut black = 0;
     for seed in 1..=6 {
-        let settings = SceneSettings {
-            photons: 300,
-            rounds: 40,
-            shadow_rays: 1,
-            seed,
-            stop: Stop { error: Some(0.02), ..Stop::default() },
-            ..SceneSettings::default()
-        };
+        let stop = Stop { error: Some(0.02), ..Stop::default() };
+        let settings = SceneSettings { photons: 300, rounds: 40, shadow_rays: 1, seed, stop, ..SceneSettings::default() };
         let lit = seen(&gpu, &scene, &settings, &camera, [6, 6]);
         assert_eq!((lit.end, lit.film.rounds), (End::Rounds, 40), "seed {seed}");
         if is_black(&lit) {

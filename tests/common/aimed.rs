@@ -1,17 +1,8 @@
 //! Small scenes with a caustic under each kind of light, and whether aimed photons light them as others do.
 
-use glam::{DVec3, Vec3};
-use photonmill::gpu::Gpu;
-use photonmill::scene::light::LightKind;
-use photonmill::scene::material::TextureUse;
-use photonmill::scene::texture::{Texture, Wrap};
-use photonmill::scene::{Material, Mesh, Scene};
-use photonmill::settings::EmissionLaw;
-use photonmill::settings::scene::{Part, SceneSettings};
-
-use super::family::Family;
-use super::lit::{glass, grid, irradiances, lamp, level, matt, mirror, scene_of, shining};
-use super::{Check, Complaint};
+use super::prelude::*;
+use photonmill::verify::selfcheck::Estimate;
+use photonmill::verify::selfcheck::measure::estimate_of;
 
 /// What [`scene`] knows.
 pub const KINDS: [&str; 11] = [
@@ -36,7 +27,7 @@ fn bench(lights: Vec<LightKind>) -> Scene {
     scene_of(vec![level(0.0, [2.0; 2], true, 0), ball], vec![matt(0.0), glass(1.5), mirror(0.9)], lights)
 }
 
-fn point(position: DVec3) -> LightKind {
+fn bulb(position: DVec3) -> LightKind {
     LightKind::Point { position, intensity: Vec3::new(1.0, 0.5, 0.2) }
 }
 
@@ -49,15 +40,9 @@ fn bowl(centre: DVec3, radius: f64) -> Mesh {
 }
 
 pub fn scene(kind: &str) -> Scene {
-    let disc = |normal: DVec3, law| LightKind::Disc {
-        centre: DVec3::new(0.3, 1.5, 0.1),
-        normal: normal.normalize(),
-        radius: 0.1,
-        power: Vec3::ONE,
-        law,
-    };
+    let disc = |normal: DVec3, law| disc(DVec3::new(0.3, 1.5, 0.1), normal.normalize(), 0.1, law);
     match kind {
-        "point" => bench(vec![point(DVec3::new(0.5, 1.4, 0.2))]),
+        "point" => bench(vec![bulb(DVec3::new(0.5, 1.4, 0.2))]),
         // Its falloff crosses the ball.
         "spot" => bench(vec![LightKind::Spot {
             position: DVec3::new(0.4, 1.5, 0.0),
@@ -69,7 +54,7 @@ pub fn scene(kind: &str) -> Scene {
         "cosine disc" => bench(vec![disc(DVec3::new(0.3, -1.0, 0.0), EmissionLaw::Cosine)]),
         // Its plane cuts the ball.
         "grazing disc" => bench(vec![disc(DVec3::new(0.9, -0.25, 0.0), EmissionLaw::Uniform)]),
-        "sun" => bench(vec![LightKind::Directional { direction: DVec3::new(-0.3, -1.0, 0.2).normalize(), irradiance: Vec3::ONE }]),
+        "sun" => bench(vec![sun(DVec3::new(-0.3, -1.0, 0.2))]),
         "sky" => bench(vec![LightKind::Environment { radiance: Vec3::ONE }]),
         // A textured panel that faces the ball with one side, and two panels that only one side or none shines of.
         "two-sided triangles" => {
@@ -86,22 +71,22 @@ pub fn scene(kind: &str) -> Scene {
             scene
         }
         "overlapping cones" | "overlapping discs" => {
-            let sun = LightKind::Directional { direction: DVec3::new(-0.2, -1.0, 0.0).normalize(), irradiance: Vec3::ONE };
-            let mut scene = bench(vec![if kind == "overlapping cones" { point(DVec3::new(0.2, 1.5, 0.0)) } else { sun }]);
+            let sun = sun(DVec3::new(-0.2, -1.0, 0.0));
+            let mut scene = bench(vec![if kind == "overlapping cones" { bulb(DVec3::new(0.2, 1.5, 0.0)) } else { sun }]);
             scene.meshes.push(Mesh::sphere("small ball", DVec3::new(0.1, 0.95, 0.02), 0.12, 24, 1));
             scene.meshes.push(Mesh::sphere("smaller ball", DVec3::new(0.35, 0.8, 0.0), 0.08, 24, 1));
             scene
         }
         // Of the light of one, all directions are kept.
         "lamps in and out of a bowl" => {
-            let mut scene = bench(vec![point(DVec3::new(-0.5, 1.4, 0.0)), point(DVec3::new(0.45, 1.42, 0.1))]);
+            let mut scene = bench(vec![bulb(DVec3::new(-0.5, 1.4, 0.0)), bulb(DVec3::new(0.45, 1.42, 0.1))]);
             scene.materials.push(Material { two_sided: true, ..mirror(0.9) });
             scene.meshes.push(bowl(DVec3::new(0.5, 1.4, 0.1), 0.12));
             scene
         }
         // The wall's sphere is so large that it holds the ball and nearly the lamp.
         "a ball before a mirror wall" => {
-            let mut scene = bench(vec![point(DVec3::new(0.4, 1.6, 0.0))]);
+            let mut scene = bench(vec![bulb(DVec3::new(0.4, 1.6, 0.0))]);
             let wall = Mesh::parallelogram("wall", DVec3::new(-0.4, 0.0, -0.4), DVec3::Y * 0.9, DVec3::Z * 0.8, 2);
             scene.meshes.push(wall);
             scene
@@ -111,16 +96,8 @@ pub fn scene(kind: &str) -> Scene {
 }
 
 pub fn settings(photons: u32, aim: bool) -> SceneSettings {
-    SceneSettings {
-        caustic_photons: photons,
-        aim,
-        part: Part::Caustic,
-        caustic_radius: Some(0.2),
-        alpha: 1.0,
-        bounces: 12,
-        rounds: 1,
-        ..SceneSettings::default()
-    }
+    let caustic = SceneSettings { part: Part::Caustic, caustic_radius: Some(0.2), alpha: 1.0, ..SceneSettings::default() };
+    SceneSettings { caustic_photons: photons, aim, bounces: 12, rounds: 1, ..caustic }
 }
 
 /// Runs of other seeds on either side.
@@ -128,10 +105,8 @@ const RUNS: u64 = 32;
 
 /// Mean of independent values and its standard error.
 pub fn mean_and_error(values: &[f64]) -> (f64, f64) {
-    let count = values.len() as f64;
-    let mean = values.iter().sum::<f64>() / count;
-    let variance = values.iter().map(|value| (value - mean).powi(2)).sum::<f64>() / (count - 1.0);
-    (mean, (variance / count).sqrt())
+    let Estimate { mean, standard_error } = estimate_of(values);
+    (mean, standard_error)
 }
 
 /// Adds the light of all photons and that of aimed ones: over the floor, in each channel that differs, and at each point
@@ -165,6 +140,5 @@ pub fn same_light(gpu: &Gpu, kind: &str) -> Check<Complaint> {
 pub fn far_lamp() -> [Scene; 2] {
     let way = DVec3::new(30.0, 100.0, 20.0);
     let far = LightKind::Point { position: BALL + way, intensity: Vec3::splat(way.length_squared() as f32) };
-    let sun = LightKind::Directional { direction: -way.normalize(), irradiance: Vec3::ONE };
-    [far, sun].map(|kind| Scene { lights: vec![lamp(kind)], ..bench(vec![]) })
+    [far, sun(-way)].map(|kind| bench(vec![kind]))
 }

@@ -1,13 +1,8 @@
 //! Films of `--math strict`, whose bits are written down here.
 
+use super::prelude::*;
 use photonmill::engine::scene::RunResult;
-use photonmill::gpu::Gpu;
-use photonmill::scene::{Scene, built_in};
-use photonmill::settings::scene::{Illumination, Kernel, SceneSettings};
-use photonmill::settings::{Builder, Math, RoomSettings};
-
-use super::lit::seen;
-use super::{Check, Complaint, Kind, run};
+use photonmill::settings::scene::Kernel;
 
 pub fn small() -> SceneSettings {
     SceneSettings { photons: 2000, caustic_photons: 2000, rounds: 2, shadow_rays: 2, math: Math::Strict, ..SceneSettings::default() }

@@ -1,24 +1,15 @@
 //! Small scenes whose light is known, each as a check of a device: a test holds it, and `tests/red.rs` shows that it
 //! complains.
 
-use std::f64::consts::{FRAC_PI_3, PI, TAU};
+use std::f64::consts::FRAC_PI_3;
 
-use glam::{DQuat, DVec2, DVec3, Vec3};
+use super::estimate_check;
+use super::prelude::*;
 use photonmill::engine::scene::RunResult;
-use photonmill::gpu::Gpu;
-use photonmill::scene::geometry::Geometry;
-use photonmill::scene::light::LightKind;
-use photonmill::scene::material::TextureUse;
-use photonmill::scene::texture::{Texture, Wrap};
-use photonmill::scene::{Camera, Material, Mesh, Scene};
-use photonmill::settings::scene::{Effect, Illumination, Part, SceneSettings};
-
-use super::lit::{flights, glass, level, matt, mean_red, means, mirror, received, scene, scene_of, seen};
-use super::{Check, Complaint, Kind, estimate_check, pairs, same_sums};
 
 /// The red channel of a point or pixel, sure to three parts in a hundred and right to its error.
 fn check_mean(what: &str, lit: &RunResult, place: usize, expected: f64, tolerance: f64) -> Check<Complaint> {
-    let [found, error] = [lit.film.mean(place, &lit.plan).x, lit.film.standard_error(place, &lit.plan).x];
+    let (found, error) = red(lit, place);
     assert!(error < 0.03 * expected, "{what}: {found} +- {error}");
     estimate_check(what, found, expected, error.max(tolerance * expected))
 }
@@ -68,18 +59,9 @@ pub fn shelf(gpu: &Gpu) -> Check<Complaint> {
 pub fn ridge(gpu: &Gpu) -> Check<Complaint> {
     let slope = DVec3::new(FRAC_PI_3.cos(), -FRAC_PI_3.sin(), 0.0);
     let (ridge, z) = (DVec3::NEG_Z, DVec3::Z * 2.0);
-    let sun = LightKind::Directional { direction: DVec3::NEG_Y, irradiance: Vec3::ONE };
     let halves = vec![Mesh::parallelogram("level", ridge, DVec3::NEG_X, z, 0), Mesh::parallelogram("slope", ridge, z, slope, 0)];
-    let roof = scene_of(halves, vec![matt(0.0)], vec![sun]);
-    let settings = SceneSettings {
-        photons: 40_000,
-        rounds: 64,
-        bounces: 1,
-        radius: Some(0.1),
-        alpha: 1.0,
-        illumination: Illumination::Photons,
-        ..SceneSettings::default()
-    };
+    let roof = scene_of(halves, vec![matt(0.0)], vec![sun(DVec3::NEG_Y)]);
+    let settings = mapped(40_000, 64, 1, 0.1);
     let normal = DVec3::new(-slope.y, slope.x, 0.0);
     let lit = received(gpu, &roof, &settings, &[(DVec3::NEG_X * 0.02, DVec3::Y), (slope * 0.02, normal)]);
     check_mean("beside the ridge", &lit, 0, 1.0, 1e-3)?;
@@ -159,8 +141,7 @@ fn leaning(angle: f64) -> Mesh {
 /// eye below them sees the plane as flat, rho E / pi.
 pub fn leaning_plane(gpu: &Gpu, illumination: Illumination) -> Check<Complaint> {
     let lean = 40f64.to_radians();
-    let sun = LightKind::Directional { direction: DVec3::NEG_Y, irradiance: Vec3::ONE };
-    let plane = scene_of(vec![leaning(lean)], vec![matt(0.8)], vec![sun]);
+    let plane = scene_of(vec![leaning(lean)], vec![matt(0.8)], vec![sun(DVec3::NEG_Y)]);
     let settings =
         SceneSettings { photons: 20_000, rounds: 32, bounces: 1, radius: Some(0.5), alpha: 1.0, illumination, ..SceneSettings::default() };
     for (what, degrees, cosine) in [("above", 30f64, lean.cos()), ("below", -70.0, 1.0)] {
@@ -178,26 +159,10 @@ pub fn leaning_plane(gpu: &Gpu, illumination: Illumination) -> Check<Complaint> 
 /// onto a ceiling 1 m above, W cos 40 rho cos^4 / pi of irradiance.
 pub fn leaning_scatterer(gpu: &Gpu) -> Check<Complaint> {
     let lean = 40f64.to_radians();
-    let angle = 3.5e-4f32;
-    let beam = LightKind::Spot {
-        position: DVec3::Y * 0.9,
-        direction: DVec3::NEG_Y,
-        intensity: Vec3::splat(1e7),
-        inner_angle: angle,
-        outer_angle: angle,
-    };
-    let watts = TAU * (1.0 - f64::from(angle.cos())) * 1e7;
+    let (beam, watts) = beam(DVec3::Y * 0.9, DVec3::NEG_Y);
     let bench = scene_of(vec![leaning(lean), level(1.0, [6.0; 2], false, 1)], vec![matt(0.8), matt(0.0)], vec![beam]);
     let radius = 0.3;
-    let settings = SceneSettings {
-        photons: 5000,
-        rounds: 32,
-        bounces: 2,
-        radius: Some(radius),
-        alpha: 1.0,
-        illumination: Illumination::Photons,
-        ..SceneSettings::default()
-    };
+    let settings = mapped(5000, 32, 2, radius);
     let middle = DVec3::new(lean.tan(), 1.0, 0.0);
     let lit = received(gpu, &bench, &settings, &[(middle, DVec3::NEG_Y)]);
     // The mean over the disc of the estimate, by parts of equal area.
@@ -215,16 +180,10 @@ pub fn leaning_scatterer(gpu: &Gpu) -> Check<Complaint> {
 /// last bit: what they scatter meets neither again.
 pub fn patch_in_a_plane(gpu: &Gpu) -> Check<Complaint> {
     let turn = DQuat::from_axis_angle(DVec3::new(0.3, 0.5, -0.8).normalize(), 1.1);
-    let mut meshes = vec![level(0.0, [4.0; 2], false, 0), level(0.0, [0.04; 2], true, 0)];
-    meshes.iter_mut().flat_map(|mesh| &mut mesh.positions).for_each(|at| *at = turn * *at);
-    let spot = LightKind::Spot {
-        position: turn * DVec3::new(0.1, 0.5, 0.2),
-        direction: turn * DVec3::new(-0.1, -0.5, -0.2).normalize(),
-        intensity: Vec3::ONE,
-        inner_angle: 0.04,
-        outer_angle: 0.04,
-    };
-    let lit = received(gpu, &scene_of(meshes, vec![matt(1.0)], vec![spot]), &flights(40_000, 2), &[(DVec3::ZERO, turn * DVec3::Y)]);
+    let meshes = vec![level(0.0, [4.0; 2], false, 0), level(0.0, [0.04; 2], true, 0)];
+    let spot = cone(turn * DVec3::new(0.1, 0.5, 0.2), turn * DVec3::new(-0.1, -0.5, -0.2).normalize(), 0.04);
+    let sheets = moved(scene_of(meshes, vec![matt(1.0)], vec![spot]), |at| turn * at);
+    let lit = received(gpu, &sheets, &flights(40_000, 2), &[(DVec3::ZERO, turn * DVec3::Y)]);
     none_returns("a patch in a plane", &lit)
 }
 
@@ -258,8 +217,7 @@ pub fn sheets_in_one_plane(gpu: &Gpu) -> Check<Complaint> {
         Mesh::parallelogram("sheet", corner, DVec3::Z * size, DVec3::X * size, k)
     };
     let materials = (0..sheets).map(|k| matt(0.04 * k as f32)).collect();
-    let sun = LightKind::Directional { direction: DVec3::NEG_Y, irradiance: Vec3::ONE };
-    let scene = scene_of((0..sheets).map(sheet).collect(), materials, vec![sun]);
+    let scene = scene_of((0..sheets).map(sheet).collect(), materials, vec![sun(DVec3::NEG_Y)]);
     let camera = Camera::looking_at("above", DVec3::new(1.0, 3.0, 1.0), DVec3::new(1.0, 0.0, 1.0), DVec3::Z, 1.0);
     let [tree, list] = by_tree_and_list(gpu, &scene, &camera, 48);
     same_sums("tree and list", &tree.film.sums, &list.film.sums)

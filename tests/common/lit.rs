@@ -1,5 +1,7 @@
 //! Scenes of triangles, lit to the end: irradiance at points, radiance along a ray.
 
+use std::f64::consts::TAU;
+
 use glam::{DVec3, Vec3};
 use photonmill::engine;
 use photonmill::engine::Control;
@@ -7,12 +9,11 @@ use photonmill::engine::scene::{self, RunResult, Target, View};
 use photonmill::gpu::Gpu;
 use photonmill::plan::Limits;
 use photonmill::plan::scene::ScenePlan;
-use photonmill::plan::sensor::Sensor;
 use photonmill::scene::geometry::Geometry;
 use photonmill::scene::light::LightKind;
 use photonmill::scene::{Camera, Light, Material, Mesh, Scene, Surface, built_in};
-use photonmill::settings::Builder;
 use photonmill::settings::scene::{Illumination, SceneSettings};
+use photonmill::settings::{Builder, EmissionLaw};
 use photonmill::verify::selfcheck::Estimate;
 
 use super::{Check, assert_holds, equal_sums, z_check};
@@ -36,11 +37,6 @@ pub fn light(gpu: &Gpu, view: &View, plan: ScenePlan) -> RunResult {
     lit
 }
 
-/// The device looks for values that are no finite number.
-fn watched(settings: &SceneSettings) -> SceneSettings {
-    SceneSettings { paranoid: true, ..settings.clone() }
-}
-
 /// What arrives at points (position, normal) of a scene of triangles.
 pub fn received(gpu: &Gpu, scene: &Scene, settings: &SceneSettings, points: &[(DVec3, DVec3)]) -> RunResult {
     received_within(gpu, scene, settings, points, &engine::limits(gpu.facts()))
@@ -48,19 +44,15 @@ pub fn received(gpu: &Gpu, scene: &Scene, settings: &SceneSettings, points: &[(D
 
 /// The same within other limits than the device's own.
 pub fn received_within(gpu: &Gpu, scene: &Scene, settings: &SceneSettings, points: &[(DVec3, DVec3)], limits: &Limits) -> RunResult {
-    received_in(gpu, (scene, &Geometry::new(scene).unwrap()), settings, points, limits)
+    lit_in(gpu, (scene, &Geometry::new(scene).unwrap()), settings, Target::Points(points), limits)
 }
 
-fn received_in(
-    gpu: &Gpu,
-    (scene, geometry): (&Scene, &Geometry),
-    settings: &SceneSettings,
-    points: &[(DVec3, DVec3)],
-    limits: &Limits,
-) -> RunResult {
-    let target = Target::Points(points);
-    let plan = ScenePlan::new(scene, geometry, &watched(settings), target.sensor(), limits).unwrap();
-    light(gpu, &View { geometry, camera: None, phases: &target.phases(geometry) }, plan)
+/// With radii by the scene's area, and the device looking for values that are no finite number.
+fn lit_in(gpu: &Gpu, scene: (&Scene, &Geometry), settings: &SceneSettings, target: Target, limits: &Limits) -> RunResult {
+    let (scene, geometry) = scene;
+    let settings = SceneSettings { paranoid: true, ..settings.clone() };
+    let plan = ScenePlan::new(scene, geometry, &settings, target.sensor(), limits).unwrap();
+    light(gpu, &View { geometry, camera: target.camera(), phases: &target.phases(geometry) }, plan)
 }
 
 /// Fails unless every builder comes to the same fates and sums in a short run: what one of them shows of these settings then
@@ -78,22 +70,24 @@ pub fn assert_builders_agree(gpu: &Gpu, scene: &Scene, settings: &SceneSettings,
 }
 
 /// What a camera sees of a scene of triangles.
-pub fn seen(gpu: &Gpu, scene: &Scene, settings: &SceneSettings, camera: &Camera, [width, height]: [u32; 2]) -> RunResult {
-    let geometry = Geometry::new(scene).unwrap();
-    let sensor = Sensor::Picture { width, height };
-    let plan = ScenePlan::new(scene, &geometry, &watched(settings), sensor, &engine::limits(gpu.facts())).unwrap();
-    light(gpu, &View { geometry: &geometry, camera: Some(camera), phases: &[] }, plan)
+pub fn seen(gpu: &Gpu, scene: &Scene, settings: &SceneSettings, camera: &Camera, size: [u32; 2]) -> RunResult {
+    let (geometry, target) = (Geometry::new(scene).unwrap(), Target::Picture(camera, size));
+    lit_in(gpu, (scene, &geometry), settings, target, &engine::limits(gpu.facts()))
+}
+
+/// Red mean and standard error of a pixel or point.
+pub fn red(lit: &RunResult, place: usize) -> (f64, f64) {
+    (lit.film.mean(place, &lit.plan).x, lit.film.standard_error(place, &lit.plan).x)
 }
 
 /// Mean of the red channel over all pixels or points.
 pub fn mean_red(lit: &RunResult) -> f64 {
-    let pixels = lit.film.pixels();
-    (0..pixels).map(|pixel| lit.film.mean(pixel, &lit.plan).x).sum::<f64>() / pixels as f64
+    lit.film.means(&lit.plan).map(|mean| mean.x).sum::<f64>() / lit.film.pixels() as f64
 }
 
 /// Mean of every pixel or point.
 pub fn means(lit: &RunResult) -> Vec<DVec3> {
-    (0..lit.film.pixels()).map(|pixel| lit.film.mean(pixel, &lit.plan)).collect()
+    lit.film.means(&lit.plan).collect()
 }
 
 /// Irradiance at points, W/m2, of each of several runs of other seeds.
@@ -106,7 +100,7 @@ pub fn irradiances(
 ) -> Vec<Vec<DVec3>> {
     let (geometry, limits) = (Geometry::new(scene).unwrap(), engine::limits(gpu.facts()));
     let settings_of = |seed| SceneSettings { seed, ..settings.clone() };
-    seeds.map(|seed| means(&received_in(gpu, (scene, &geometry), &settings_of(seed), points, &limits))).collect()
+    seeds.map(|seed| means(&lit_in(gpu, (scene, &geometry), &settings_of(seed), Target::Points(points), &limits))).collect()
 }
 
 /// Radiance along one ray, W/m2/sr, once for each pixel of a picture so narrow that they are all but the same ray;
@@ -118,8 +112,7 @@ pub fn radiances(gpu: &Gpu, scene: &Scene, settings: &SceneSettings, eye: DVec3,
 }
 
 pub fn scene_of(meshes: Vec<Mesh>, materials: Vec<Material>, lights: Vec<LightKind>) -> Scene {
-    let lights = lights.into_iter().map(|kind| Light { name: "light".into(), kind }).collect();
-    Scene { meshes, materials, lights, ..Scene::default() }
+    Scene { meshes, materials, lights: lights.into_iter().map(lamp).collect(), ..Scene::default() }
 }
 
 /// Scatters this share evenly.
@@ -173,13 +166,64 @@ pub fn lamp(kind: LightKind) -> Light {
 
 /// Maps alone, of a radius so small that looking them up takes no time.
 pub fn flights(photons: u32, bounces: u32) -> SceneSettings {
-    SceneSettings {
-        photons,
-        bounces,
-        rounds: 1,
-        radius: Some(1.0 / 1024.0),
-        illumination: Illumination::Photons,
-        ..SceneSettings::default()
+    mapped(photons, 1, bounces, 1.0 / 1024.0)
+}
+
+/// All light from photons within a fixed radius.
+pub fn mapped(photons: u32, rounds: u32, bounces: u32, radius: f64) -> SceneSettings {
+    let radius = Some(radius);
+    SceneSettings { illumination: Illumination::Photons, photons, rounds, bounces, radius, alpha: 1.0, ..SceneSettings::default() }
+}
+
+/// A fixed radius for both maps, which have as many photons.
+pub fn fixed_radius(illumination: Illumination, photons: u32, rounds: u32, bounces: u32, radius: f64) -> SceneSettings {
+    let caustic = SceneSettings { caustic_photons: photons, caustic_radius: Some(radius), shadow_rays: 1, ..SceneSettings::default() };
+    SceneSettings { illumination, photons, rounds, bounces, radius: Some(radius), alpha: 1.0, ..caustic }
+}
+
+/// A sun of 1 W/m2, whatever the length of its direction.
+pub fn sun(direction: DVec3) -> LightKind {
+    LightKind::Directional { direction: direction.normalize(), irradiance: Vec3::ONE }
+}
+
+/// A point light of 1 W/sr.
+pub fn point(position: DVec3) -> LightKind {
+    LightKind::Point { position, intensity: Vec3::ONE }
+}
+
+/// The same light within a cone.
+pub fn cone(position: DVec3, direction: DVec3, angle: f32) -> LightKind {
+    LightKind::Spot { position, direction, intensity: Vec3::ONE, inner_angle: angle, outer_angle: angle }
+}
+
+/// 10 MW/sr in a cone so narrow that all of its directions are nearly one, and its watts.
+pub fn beam(position: DVec3, direction: DVec3) -> (LightKind, f64) {
+    let (angle, intensity) = (3.5e-4f32, 1e7);
+    let kind = LightKind::Spot { position, direction, intensity: Vec3::splat(intensity), inner_angle: angle, outer_angle: angle };
+    (kind, TAU * (1.0 - f64::from(angle).cos()) * f64::from(intensity))
+}
+
+/// A disc of 1 W.
+pub fn disc(centre: DVec3, normal: DVec3, radius: f64, law: EmissionLaw) -> LightKind {
+    LightKind::Disc { centre, normal, radius, power: Vec3::ONE, law }
+}
+
+/// A scene with all its points moved.
+pub fn moved(mut scene: Scene, way: impl Fn(DVec3) -> DVec3) -> Scene {
+    scene.meshes.iter_mut().flat_map(|mesh| &mut mesh.positions).for_each(|at| *at = way(*at));
+    scene
+}
+
+/// A parallelogram of `n` x `n` x 2 triangles.
+pub fn tessellated(name: &str, origin: DVec3, u: DVec3, v: DVec3, n: u32) -> Mesh {
+    let place = |i: u32, j: u32| origin + u * (f64::from(i) / f64::from(n)) + v * (f64::from(j) / f64::from(n));
+    let corners = move |i: u32, j: u32| [(i, j), (i + 1, j), (i + 1, j + 1), (i, j + 1)].map(|(i, j)| j * (n + 1) + i);
+    let halves = |[a, b, c, d]: [u32; 4]| [[a, b, c], [a, c, d]];
+    Mesh {
+        name: name.into(),
+        positions: (0..=n).flat_map(|j| (0..=n).map(move |i| place(i, j))).collect(),
+        triangles: (0..n).flat_map(|j| (0..n).flat_map(move |i| halves(corners(i, j)))).collect(),
+        ..Mesh::default()
     }
 }
 

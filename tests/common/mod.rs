@@ -10,30 +10,35 @@ pub mod cases;
 pub mod chi_square;
 pub mod densities;
 pub mod family;
+pub mod gltf_file;
 pub mod known;
 pub mod lit;
 pub mod pairwise;
 pub mod planted;
+pub mod prelude;
+pub mod program;
 pub mod reference;
 
 use std::cmp::Ordering;
 use std::fmt::Display;
 use std::ops::Deref;
 use std::sync::Mutex;
+use std::time::Instant;
 
 use glam::UVec2;
 use photonmill::engine;
 use photonmill::engine::Control;
 use photonmill::engine::nonfinite_values::NonfiniteValues;
 use photonmill::engine::room::resources::RoomResources;
-use photonmill::engine::room::{self, RunResult};
+use photonmill::engine::room::{self, RunResult, estimate, index};
 use photonmill::error::Error;
 use photonmill::gpu::{Commands, Gpu, Options};
 use photonmill::photon::{Origin, Photon, StoredPhoton};
 use photonmill::plan::{Limits, RoomPlan};
+use photonmill::records::RandomKey;
 use photonmill::rng::{self, Rng, Streams};
 use photonmill::scene::open_box::open_box;
-use photonmill::scene::room::RoomScene;
+use photonmill::scene::room::{RoomScene, Wall};
 use photonmill::settings::{Builder, RoomSettings};
 
 /// Devices that no test has at the moment: what one test compiled serves the next.
@@ -84,9 +89,14 @@ pub fn device_with(options: Options) -> Option<Device> {
     open(options).map(|gpu| Device { gpu: Some(gpu), serves_others: false })
 }
 
+/// Whether `PHOTONMILL_NO_GPU=1` asks to go without a device.
+pub fn no_gpu() -> bool {
+    std::env::var("PHOTONMILL_NO_GPU").is_ok_and(|value| value == "1")
+}
+
 /// The same without the promise that validation stays silent, for tests that make it speak.
 pub fn open(options: Options) -> Option<Gpu> {
-    if std::env::var("PHOTONMILL_NO_GPU").is_ok_and(|value| value == "1") {
+    if no_gpu() {
         eprintln!("SKIPPED: PHOTONMILL_NO_GPU=1, so nothing that needs a GPU was tested here");
         return None;
     }
@@ -131,6 +141,13 @@ pub fn run_on_cpu(settings: &RoomSettings) -> RunResult {
     run_scene_on_cpu(&open_box(settings), settings)
 }
 
+/// The paper's box with its opening closed by a sixth wall.
+pub fn closed_box(settings: &RoomSettings, albedo: f32) -> RoomScene {
+    let mut scene = open_box(settings);
+    scene.faces[5] = Some(Wall { name: "front", albedo, shininess: None });
+    scene
+}
+
 /// Runs a scene on the CPU builder to its end.
 pub fn run_scene_on_cpu(scene: &RoomScene, settings: &RoomSettings) -> RunResult {
     let mut control = Control::default();
@@ -153,6 +170,19 @@ pub const MANY_PHOTONS: u32 = 600_001;
 /// The same from the CPU builder.
 pub fn photons_on_cpu(settings: &RoomSettings) -> Vec<Photon> {
     room::photons_on_cpu(&open_box(settings), settings).unwrap_or_else(|error| panic!("{error}\n{settings:?}"))
+}
+
+/// What the device gathers of photons that are handed to it, so many times over, onto film sums or an empty film.
+pub fn gathered(gpu: &Gpu, plan: &RoomPlan, photons: &[Photon], times: u32, film: Option<&[u64]>) -> Vec<u64> {
+    assert!(photons.len() <= plan.photon_capacity as usize);
+    let (scene, chunk) = (open_box(&plan.settings), plan.settings.photons);
+    let mut commands = Commands::new(gpu, room::constants(plan), Instant::now()).unwrap();
+    let resources = RoomResources::new(gpu, &mut commands, &scene, plan).unwrap();
+    upload_photons(&mut commands, &resources, plan, photons);
+    film.into_iter().for_each(|sums| commands.upload(&resources.film, sums).unwrap());
+    index::build(&mut commands, &resources, plan, chunk).unwrap();
+    (0..times).for_each(|_| estimate::gather(&mut commands, &resources, plan, chunk).unwrap());
+    commands.read(&resources.film, plan.points.len() * plan.channel_count as usize).unwrap()
 }
 
 /// Puts photons into the photon map as if they had been traced.
@@ -184,11 +214,14 @@ pub fn draws_of(streams: Streams, round: u32, photon: u32, bounces: u32) -> Vec<
         Rng::Sobol => UVec2::new(key.photons_before.wrapping_add(photon), 0),
         _ => rng::words(streams.jump(round, photon + 1).apply(rng::srand48(streams.seed as u32))),
     };
-    let mut stream = rng::open_stream(streams.rng, &key, photon, start);
-    let mut draws = rng::draw_emission(streams.rng, &key, photon, &mut stream).to_vec();
-    for bounce in 0..bounces {
-        draws.extend(rng::draw_bounce(streams.rng, &key, photon, bounce, &mut stream));
-    }
+    draws_from(streams.rng, &key, photon, start, bounces)
+}
+
+/// The same of a stream that starts here.
+pub fn draws_from(rng: Rng, key: &RandomKey, photon: u32, start: UVec2, bounces: u32) -> Vec<f32> {
+    let mut stream = rng::open_stream(rng, key, photon, start);
+    let mut draws = rng::draw_emission(rng, key, photon, &mut stream).to_vec();
+    (0..bounces).for_each(|bounce| draws.extend(rng::draw_bounce(rng, key, photon, bounce, &mut stream)));
     draws
 }
 

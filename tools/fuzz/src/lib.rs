@@ -1,5 +1,6 @@
 //! What the targets share.
 
+mod change;
 pub mod mutation;
 
 use photonmill::error::Error;

@@ -1,0 +1,38 @@
+//! What most tests name, in one line: `use crate::common::prelude::*;`. What a test alone is about it names itself.
+
+pub use std::collections::{BTreeMap, BTreeSet, HashMap, HashSet};
+pub use std::f64::consts::{FRAC_PI_2, PI, TAU};
+pub use std::path::{Path, PathBuf};
+pub use std::time::Instant;
+
+pub use glam::{DMat3, DQuat, DVec2, DVec3, UVec2, Vec2, Vec3};
+pub use photonmill::engine::{self, Control};
+pub use photonmill::error::Error;
+pub use photonmill::gpu::{Commands, Constants, Extent, Gpu, Memory, Options};
+pub use photonmill::photon::{MapPhoton, Origin, Photon, StoredPhoton};
+pub use photonmill::plan::scene::ScenePlan;
+pub use photonmill::plan::sensor::Sensor;
+pub use photonmill::plan::{Limits, RoomPlan};
+pub use photonmill::rng::{Rng, philox};
+pub use photonmill::scene::geometry::Geometry;
+pub use photonmill::scene::light::LightKind;
+pub use photonmill::scene::material::TextureUse;
+pub use photonmill::scene::open_box::open_box;
+pub use photonmill::scene::room::RoomScene;
+pub use photonmill::scene::texture::Wrap;
+pub use photonmill::scene::{Camera, Light, Material, Mesh, Scene, Surface, Texture, built_in};
+pub use photonmill::settings::scene::{Effect, Illumination, Part, SceneSettings};
+pub use photonmill::settings::{Builder, EmissionLaw, Gather, Math, Preset, RoomSettings, Sums};
+pub use photonmill::verify::judge::Judge;
+
+pub use super::family::Family;
+pub use super::lit::{
+    BOTH, assert_builders_agree, beam, cone, disc, fixed_radius, flights, glass, grid, irradiances, lamp, level, mapped, matt, mean_red,
+    means, mirror, moved, point, radiances, received, red, same_light, scene, scene_of, seen, shaft, shining, sun, tessellated,
+};
+pub use super::program::{Place, text};
+pub use super::{
+    Check, Complaint, Device, JUDGED, Kind, assert_complains, assert_complains_of, assert_holds, closed_box, device, device_with, draws_of,
+    equal_sums, gathered, in_order, no_gpu, open, outcome_of, pairs, photons, photons_on_cpu, plan_for, plan_for_host, relative_check, run,
+    run_on_cpu, run_scene, run_scene_on_cpu, same_photons, same_sums, share_check, streams_of, z_check,
+};

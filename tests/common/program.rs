@@ -1,0 +1,156 @@
+//! The program as a user starts it: a command line in a folder of its own, and what it leaves there.
+
+use std::path::{Path, PathBuf};
+use std::process::{Command, Output, Stdio};
+
+use serde_json::Value;
+
+use super::no_gpu;
+
+pub const PROGRAM: &str = env!("CARGO_BIN_EXE_photonmill");
+
+/// A folder of its own in which the program runs.
+pub struct Place(tempfile::TempDir);
+
+/// The words of a command line, of which '...' is one.
+fn words(line: &str) -> Vec<&str> {
+    let parts = line.split('\'').enumerate();
+    parts.flat_map(|(k, part)| if k % 2 == 1 { vec![part] } else { part.split_whitespace().collect() }).collect()
+}
+
+/// A command line on the device under test.
+pub fn on_device(line: &str) -> String {
+    std::env::var("PHOTONMILL_DEVICE").map_or(line.to_owned(), |device| format!("{line} --device '{device}'"))
+}
+
+/// The same under the validation layer.
+pub fn validated(line: &str) -> String {
+    on_device(if no_gpu() { line.to_owned() } else { format!("{line} --validate") }.as_str())
+}
+
+impl Place {
+    pub fn new() -> Place {
+        Place(tempfile::tempdir().unwrap())
+    }
+
+    pub fn path(&self) -> &Path {
+        self.0.path()
+    }
+
+    pub fn at(&self, name: &str) -> PathBuf {
+        self.path().join(name)
+    }
+
+    pub fn write(&self, name: &str, content: impl AsRef<[u8]>) {
+        std::fs::write(self.at(name), content).unwrap();
+    }
+
+    pub fn command(&self, line: &str) -> Command {
+        let mut command = Command::new(PROGRAM);
+        command.current_dir(self.path()).args(words(line)).stdin(Stdio::null());
+        command
+    }
+
+    pub fn run(&self, line: &str) -> Output {
+        self.command(line).output().expect("the program starts")
+    }
+
+    /// What a run on the device under test says on stdout and stderr; it must end well.
+    #[track_caller]
+    pub fn succeed(&self, line: &str) -> (String, String) {
+        let output = self.run(&on_device(line));
+        assert!(output.status.success(), "{line}: {}", text(&output.stderr));
+        (text(&output.stdout), text(&output.stderr))
+    }
+
+    /// The one line by which the program refuses a command line, with exit code 2, nothing on stdout and no new file; or what
+    /// it does instead.
+    pub fn refusal(&self, line: &str) -> Result<String, String> {
+        let before = self.names();
+        let output = self.run(line);
+        let stderr = text(&output.stderr);
+        let fault = if output.status.code() != Some(2) {
+            format!("ends with {:?}", output.status.code())
+        } else if stderr.trim_end().lines().count() != 1 || !stderr.starts_with("photonmill: ") {
+            "is not one line".to_owned()
+        } else if !output.stdout.is_empty() || self.names() != before {
+            "left something behind".to_owned()
+        } else {
+            return Ok(stderr);
+        };
+        Err(format!("{line} {fault}: {}", stderr.lines().take(4).collect::<Vec<_>>().join(" | ")))
+    }
+
+    /// Fails unless each line is refused, and the refusal names its words.
+    #[track_caller]
+    pub fn assert_refused<'a>(&self, cases: impl IntoIterator<Item = (impl AsRef<str>, impl AsRef<[&'a str]>)>) {
+        let fault = |line: &str, named: &[&str]| {
+            let refusal = match self.refusal(line) {
+                Ok(refusal) => refusal,
+                Err(fault) => return Some(fault),
+            };
+            let word = named.iter().find(|word| !refusal.contains(**word))?;
+            Some(format!("{line} must name {word:?}: {refusal}"))
+        };
+        let faults: Vec<String> = cases.into_iter().filter_map(|(line, named)| fault(line.as_ref(), named.as_ref())).collect();
+        assert!(faults.is_empty(), "{}", faults.join("\n"));
+    }
+
+    /// A loader that knows no driver is a machine without a device.
+    pub fn run_without_vulkan(&self, line: &str) -> Output {
+        without_vulkan(&mut self.command(line)).output().expect("the program starts")
+    }
+
+    /// A line of a shell, in which the program is called photonmill.
+    pub fn shell(&self, line: &str) -> Command {
+        let mut command = Command::new("bash");
+        command.args(["-c", &line.replace("photonmill", PROGRAM)]).current_dir(self.path()).stdin(Stdio::null());
+        command
+    }
+
+    /// Whether a line whose reader goes away or whose disk is full ends so, with so many lines on stderr.
+    #[track_caller]
+    pub fn assert_shell(&self, line: &str, code: i32, complaints: usize) {
+        let output = self.shell(&format!("set -o pipefail; {line}")).output().unwrap();
+        let stderr = text(&output.stderr);
+        assert_eq!((output.status.code(), stderr.lines().count()), (Some(code), complaints), "{line}: {stderr}");
+    }
+
+    pub fn text(&self, name: &str) -> String {
+        std::fs::read_to_string(self.at(name)).unwrap()
+    }
+
+    pub fn json(&self, name: &str) -> Value {
+        serde_json::from_str(&self.text(name)).expect("it is JSON")
+    }
+
+    pub fn picture(&self, name: &str) -> image::DynamicImage {
+        image::open(self.at(name)).unwrap()
+    }
+
+    /// Values of an .exr, three a pixel.
+    pub fn pixels(&self, name: &str) -> Vec<f32> {
+        self.picture(name).into_rgb32f().into_raw()
+    }
+
+    /// What lies in the folder, sorted.
+    pub fn names(&self) -> Vec<String> {
+        entries(self.path())
+    }
+}
+
+/// What lies in a folder, sorted.
+pub fn entries(folder: &Path) -> Vec<String> {
+    let entries = std::fs::read_dir(folder).unwrap();
+    let mut names: Vec<String> = entries.map(|entry| entry.unwrap().file_name().into_string().unwrap()).collect();
+    names.sort();
+    names
+}
+
+pub fn without_vulkan(command: &mut Command) -> &mut Command {
+    command.env("VK_DRIVER_FILES", "/nonexistent").env("VK_ICD_FILENAMES", "/nonexistent")
+}
+
+pub fn text(bytes: &[u8]) -> String {
+    String::from_utf8_lossy(bytes).into_owned()
+}
