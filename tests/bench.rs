@@ -5,14 +5,15 @@ use std::sync::atomic::AtomicBool;
 use std::sync::{Mutex, MutexGuard, OnceLock, PoisonError};
 use std::time::Duration;
 
-use crate::common::{device, device_with, lit, planted};
+use crate::common::{Device, device, device_with, lit, planted};
 use photonmill::gpu::{Gpu, Options};
 use photonmill::measure::bench::experiment::Experiment;
 use photonmill::measure::bench::rates::{self, Rates};
 use photonmill::measure::bench::room::{self, Timed};
 use photonmill::measure::bench::scene::{self, Job};
 use photonmill::measure::bench::targets::TARGETS;
-use photonmill::measure::bench::{self, Request, Size, table};
+use photonmill::measure::bench::{self, Bench, Request, Size, table};
+use photonmill::output::destination::Folder;
 use photonmill::scene::geometry::Geometry;
 use photonmill::settings::scene::SceneSettings;
 use photonmill::settings::{Builder, RoomSettings};
@@ -31,15 +32,21 @@ fn rates_of(gpu: &Gpu) -> &'static Rates {
     RATES.get_or_init(|| rates::measure(gpu, Size::Small).unwrap())
 }
 
-fn request(experiments: &[Experiment], scale: bool) -> Request {
-    Request {
+/// A small bench, by a request that `change` made of the usual one; nothing without a device.
+fn bench(experiments: &[Experiment], change: impl Fn(&mut Request), cancelled: bool) -> Option<(Device, Bench)> {
+    let _alone = alone();
+    let gpu = device()?;
+    let mut request = Request {
         command: "photonmill bench".to_owned(),
         size: Size::Small,
         experiments: experiments.to_vec(),
-        scene: photonmill::scene::Scene::open("cornell-spheres", false).unwrap(),
-        scale,
+        scene: lit::scene("cornell-spheres"),
+        scale: false,
         budget: Duration::from_secs(36_000),
-    }
+    };
+    change(&mut request);
+    let found = bench::run(&gpu, request, &AtomicBool::new(cancelled), &mut |_| {}).unwrap();
+    Some((gpu, found))
 }
 
 /// Every number below a key.
@@ -56,10 +63,7 @@ fn numbers(value: &Value, key: &str, found: &mut Vec<f64>) {
 
 #[test]
 fn a_small_bench_reports_every_pass_and_target() {
-    let _alone = alone();
-    let Some(gpu) = device() else { return };
-    let never = AtomicBool::new(false);
-    let found = bench::run(&gpu, request(&Experiment::ALL, false), &never, &mut |_| {}).unwrap();
+    let Some((gpu, found)) = bench(&Experiment::ALL, |_| {}, false) else { return };
     let report: Value = serde_json::from_slice(&found.json()).unwrap();
     assert_eq!(report["device"], gpu.facts().name.as_str());
     assert!(!report["driver"].as_str().unwrap().is_empty() && report["left_out"].as_array().unwrap().is_empty(), "{}", report["left_out"]);
@@ -143,13 +147,9 @@ fn measurements_that_come_out_wrong_are_refused() {
 
 #[test]
 fn cost_follows_photons_and_memory_the_plan() {
-    let _alone = alone();
-    let Some(gpu) = device() else { return };
+    let Some((_, found)) = bench(&[], |request| request.scale = true, false) else { return };
     let folder = tempfile::tempdir().unwrap();
-    let never = AtomicBool::new(false);
-    let found = bench::run(&gpu, request(&[], true), &never, &mut |_| {}).unwrap();
-    let out = photonmill::output::destination::Folder::open("--out", folder.path()).unwrap();
-    bench::write(&out, &found).unwrap();
+    bench::write(&Folder::open("--out", folder.path()).unwrap(), &found).unwrap();
     let [photons, triangles] = found.scale.as_ref().unwrap().series.as_slice() else { panic!("two series") };
     for step in photons.steps.iter().chain(&triangles.steps) {
         assert_eq!(step.peak_bytes, step.stated_bytes, "{}", step.size);
@@ -167,19 +167,13 @@ fn cost_follows_photons_and_memory_the_plan() {
 
 #[test]
 fn a_cancelled_bench_says_so() {
-    let _alone = alone();
-    let Some(gpu) = device() else { return };
-    let cancelled = AtomicBool::new(true);
-    let found = bench::run(&gpu, request(&[Experiment::OpenBox], false), &cancelled, &mut |_| {}).unwrap();
+    let Some((_, found)) = bench(&[Experiment::OpenBox], |_| {}, true) else { return };
     assert!(found.passes.is_empty() && found.left_out.iter().any(|line| line.contains("interrupted")), "{:?}", found.left_out);
 }
 
 #[test]
 fn time_that_is_spent_leaves_experiments_out() {
-    let _alone = alone();
-    let Some(gpu) = device() else { return };
-    let never = AtomicBool::new(false);
-    let found = bench::run(&gpu, Request { budget: Duration::ZERO, ..request(&[Experiment::Mesh], false) }, &never, &mut |_| {}).unwrap();
+    let Some((_, found)) = bench(&[Experiment::Mesh], |request| request.budget = Duration::ZERO, false) else { return };
     assert_eq!(found.left_out, ["mesh: no --time left"]);
 }
 

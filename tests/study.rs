@@ -40,13 +40,11 @@ fn run(gpu: &Gpu, folder: &Path, request: Request) -> photonmill::error::Result<
 /// Points by what they are of: quantity, axis, rounds, curve and command.
 fn points_of(study: &Study) -> BTreeMap<(String, String, u32, String, String), &Point> {
     let mut found = BTreeMap::new();
-    for part in &study.parts {
-        for comparison in &part.comparisons {
-            for (curve, point) in comparison.curves.iter().flat_map(|curve| curve.points.iter().map(move |point| (curve, point))) {
-                let axis = format!("{:?}", comparison.axis);
-                let before = found.insert((part.quantity.clone(), axis, point.rounds, curve.label.clone(), point.command.clone()), point);
-                assert_eq!(before, None, "two points of {}", point.command);
-            }
+    for (part, comparison) in study.parts.iter().flat_map(|part| part.comparisons.iter().map(move |comparison| (part, comparison))) {
+        for (curve, point) in comparison.curves.iter().flat_map(|curve| curve.points.iter().map(move |point| (curve, point))) {
+            let axis = format!("{:?}", comparison.axis);
+            let before = found.insert((part.quantity.clone(), axis, point.rounds, curve.label.clone(), point.command.clone()), point);
+            assert_eq!(before, None, "two points of {}", point.command);
         }
     }
     found
@@ -101,44 +99,27 @@ fn the_check_of_errors_complains() {
     assert_complains("no number", error_check("the base", f64::NAN, 0.1));
 }
 
-fn axes_of(study: &Study) -> Vec<Axis> {
-    study.parts.iter().flat_map(|part| part.comparisons.iter().map(|comparison| comparison.axis)).collect()
-}
-
 #[test]
 fn the_open_box_is_studied_against_radiosity_and_goes_on_where_it_ended() {
     let Some(gpu) = device() else { return };
     let folder = tempfile::tempdir().unwrap();
     let first = run(&gpu, folder.path(), request("open-box", 2)).unwrap();
     assert!(first.complete);
-    let axes = axes_of(&first);
-    for axis in [
-        Axis::Builder,
-        Axis::Photons,
-        Axis::Radius,
-        Axis::Schedule,
-        Axis::Kernel,
-        Axis::Edges,
-        Axis::Bounces,
-        Axis::Randomness,
-        Axis::Nearest,
-        Axis::Sums,
-    ] {
+    let axes: Vec<Axis> = first.parts.iter().flat_map(|part| part.comparisons.iter().map(|comparison| comparison.axis)).collect();
+    for axis in [Axis::Builder, Axis::Photons, Axis::Radius, Axis::Schedule, Axis::Kernel, Axis::Edges, Axis::Bounces, Axis::Randomness] {
         assert!(axes.contains(&axis), "{axis:?} of {axes:?}");
     }
-    for axis in [Axis::Arithmetic, Axis::Direct, Axis::Gather, Axis::Index, Axis::Effects, Axis::Paper] {
+    for axis in [Axis::Nearest, Axis::Sums, Axis::Arithmetic, Axis::Direct, Axis::Gather, Axis::Index, Axis::Effects, Axis::Paper] {
         assert!(axes.contains(&axis), "{axis:?} of {axes:?}");
     }
     for part in &first.parts {
         assert!(part.reference.contains("radiosity") && part.reference_error < 0.01, "{} {}", part.reference, part.reference_error);
-        for curve in part.curves() {
-            assert!(!curve.points.is_empty(), "{}: {}", part.quantity, curve.label);
-            for point in &curve.points {
-                let [bias, noise] = [point.bias().value, point.squared_noise.sqrt()];
-                assert_holds(format!("{}: {}", part.quantity, curve.label), error_check(&curve.label, bias, noise));
-                assert!(point.error().value > 1e-4, "{}: {}: no error by chance", part.quantity, curve.label);
-                assert_eq!(point.squared_errors.len(), 3);
-            }
+        assert!(part.curves().all(|curve| !curve.points.is_empty()), "{}", part.quantity);
+        for (curve, point) in part.points() {
+            let what = format!("{}: {}", part.quantity, curve.label);
+            assert!(point.error().value > 1e-4, "{what}: no error by chance");
+            assert_holds(what, error_check(&curve.label, point.bias().value, point.squared_noise.sqrt()));
+            assert_eq!(point.squared_errors.len(), 3);
         }
         // More photons, a smaller error.
         let base = part.base().unwrap();
@@ -153,7 +134,7 @@ fn the_open_box_is_studied_against_radiosity_and_goes_on_where_it_ended() {
     let read = |name: &str| std::fs::read_to_string(folder.path().join(name)).unwrap();
     let page = read("index.html");
     assert!(page.contains("What accuracy costs in time") && page.contains("<svg") && !page.contains("http"));
-    let count: usize = first.parts.iter().flat_map(Part::curves).map(|curve| curve.points.len()).sum();
+    let count = first.parts.iter().flat_map(Part::points).count();
     assert_eq!(read("points.csv").lines().count(), 1 + count);
     assert_eq!(read("points.jsonl").lines().count(), 1 + count);
 

@@ -45,6 +45,11 @@ impl<Plan, Film> RunResult<Plan, Film> {
         self.end == End::Cancelled
     }
 
+    /// Fails if it was.
+    pub fn finished(self) -> Result<Self> {
+        if self.is_cancelled() { Err(Error::Interrupted) } else { Ok(self) }
+    }
+
     /// `cpu` without a device.
     pub fn device_name(&self) -> &str {
         self.device.as_ref().map_or("cpu", |facts| &facts.name)

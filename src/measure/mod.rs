@@ -2,5 +2,6 @@
 
 pub mod bench;
 pub mod compaction;
+pub mod line_fit;
 pub mod paper;
 pub mod study;

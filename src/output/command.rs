@@ -26,7 +26,7 @@ impl Line {
 }
 
 /// Options are spelt as the names of the enums' values.
-fn lower_case(value: impl std::fmt::Debug) -> String {
+pub fn lower_case(value: impl std::fmt::Debug) -> String {
     format!("{value:?}").to_lowercase()
 }
 

@@ -2,9 +2,11 @@
 
 pub mod colour;
 pub mod command;
+pub mod csv_table;
 pub mod destination;
 pub mod image;
 pub mod lightmap;
+pub mod page;
 mod report;
 pub mod room_report;
 pub mod scene_report;

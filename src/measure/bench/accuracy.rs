@@ -10,16 +10,17 @@ use glam::{DVec3, Vec3};
 
 use super::Lab;
 use super::experiment::Found;
-use super::scene::{self, Job};
+use super::scene::{self, Job, named};
 use crate::engine::scene::RunResult;
 use crate::error::Result;
+use crate::measure::study;
 use crate::measure::study::axes::{Configuration, Line};
 use crate::measure::study::point::{Curve, Point};
 use crate::measure::study::reference::Reference;
 use crate::measure::study::subject::Subject;
 use crate::plan::radius::usual_radius;
 use crate::scene::geometry::Geometry;
-use crate::scene::{Scene, Surface, built_in};
+use crate::scene::{Scene, Surface};
 use crate::settings::Builder;
 use crate::settings::scene::SceneSettings;
 use crate::text::counted;
@@ -45,11 +46,10 @@ struct Search<'a> {
 
 /// The shortest time to the error among several settings.
 pub fn measure(lab: &mut Lab, name: &str) -> Result<Found> {
-    let scene = built_in::by_name(name).expect("it is built in");
-    let geometry = Geometry::new(&scene)?;
+    let (scene, geometry) = named(name)?;
     let (size, samples, wanted, seconds) = lab.choose((8, 1024, 0.5, 2), (32, 1024, 0.05, 20), (256, 256, 0.01, 20));
     let patience = Duration::from_secs(seconds);
-    let request = crate::measure::study::Request {
+    let request = study::Request {
         scene: name.to_owned(),
         size,
         photons: 1 << 12,
@@ -57,7 +57,7 @@ pub fn measure(lab: &mut Lab, name: &str) -> Result<Found> {
         seed: FIRST_SEED,
         reference_samples: samples,
         budget: patience,
-        most_rounds: crate::measure::study::MOST_ROUNDS,
+        most_rounds: study::MOST_ROUNDS,
     };
     let subjects = Subject::all(lab.gpu, &scene, &request, lab.cancelled, lab.tell)?;
     let subject = &subjects[0];
@@ -156,8 +156,7 @@ fn leave_out_lamps(lab: &Lab, scene: &Scene, size: u32, reference: &mut Referenc
     for (place, counts) in reference.counts.iter_mut().enumerate() {
         *counts = *counts && !shows[place / 3];
     }
-    let noise = reference.mean_over(|place| reference.standard_errors[place].powi(2));
-    reference.relative_error = (noise / reference.mean_square()).sqrt();
+    *reference = reference.clone().with_own_error();
     Ok(())
 }
 
@@ -181,16 +180,14 @@ fn long_run(lab: &Lab, job: &Job, search: &Search) -> Result<Reference> {
 /// What a run found, with its own standard errors, at the places that count for the judge.
 fn of_film(lit: &RunResult, judge: &Reference) -> Reference {
     let pixels = 0..lit.film.pixels();
-    let mut reference = Reference {
+    let reference = Reference {
         method: String::new(),
         values: lit.film.values(&lit.plan),
         standard_errors: pixels.flat_map(|pixel| lit.film.standard_error(pixel, &lit.plan).to_array()).collect(),
         counts: judge.counts.clone(),
         relative_error: 0.0,
     };
-    let noise = reference.mean_over(|place| reference.standard_errors[place].powi(2));
-    reference.relative_error = (noise / reference.mean_square()).sqrt();
-    reference
+    reference.with_own_error()
 }
 
 /// How a long run differs from the judge. Of caustics of small lamps, paths know their own error badly.
@@ -221,7 +218,7 @@ impl Search<'_> {
     /// Points at rounds that double, until the error is below what is wanted or patience ends.
     fn climb(&self, lab: &Lab, settings: &SceneSettings) -> Result<Curve> {
         let configuration = configuration(settings);
-        let mut curve = Curve { label: configuration.label.clone(), points: Vec::new(), left_out: None };
+        let mut curve = Curve::new(&configuration.label);
         let run = |rounds, seed| self.subject.run(lab.gpu, &configuration, rounds, seed, lab.cancelled);
         // A run that is dropped: it makes pipelines.
         run(8, FIRST_SEED)?;
@@ -230,8 +227,7 @@ impl Search<'_> {
             let mut shots = Vec::new();
             for seed in (FIRST_SEED..).take(REPEATS as usize) {
                 let began = Instant::now();
-                let Some(shot) = run(rounds, seed)? else { return Ok(curve) };
-                shots.push((shot, began.elapsed()));
+                shots.push((run(rounds, seed)?, began.elapsed()));
             }
             let point = Point::of(&shots, &self.reference, self.subject.command(&configuration, rounds, FIRST_SEED), rounds);
             let (is_good, next) = (point.error().value <= self.wanted, 2 * point.spent());

@@ -36,34 +36,26 @@ impl Experiment {
     ];
 
     pub fn name(self) -> &'static str {
-        match self {
-            Experiment::OpenBox => "open-box",
-            Experiment::Builders => "builders",
-            Experiment::Compaction => "compaction",
-            Experiment::Table1 => "table-1",
-            Experiment::Index => "index",
-            Experiment::Gather => "gather",
-            Experiment::Cornell => "cornell",
-            Experiment::CornellSpheres => "cornell-spheres",
-            Experiment::CausticSphere => "caustic-sphere",
-            Experiment::Mesh => "mesh",
-            Experiment::Effects => "effects",
-        }
+        self.words().0
     }
 
     pub fn title(self) -> &'static str {
+        self.words().1
+    }
+
+    fn words(self) -> (&'static str, &'static str) {
         match self {
-            Experiment::OpenBox => "open box, 15 bounces, every builder",
-            Experiment::Builders => "the paper's workload, 2 and 15 bounces, every builder",
-            Experiment::Compaction => "fastest builder by photon count and survival",
-            Experiment::Table1 => "last row of table 1",
-            Experiment::Index => "index of a large photon map",
-            Experiment::Gather => "gather at the points of a picture",
-            Experiment::Cornell => "cornell, 16 bounces",
-            Experiment::CornellSpheres => "cornell-spheres: time to an error",
-            Experiment::CausticSphere => "caustic-sphere: time to an error",
-            Experiment::Mesh => "many triangles",
-            Experiment::Effects => "effects that a scene lacks",
+            Experiment::OpenBox => ("open-box", "open box, 15 bounces, every builder"),
+            Experiment::Builders => ("builders", "the paper's workload, 2 and 15 bounces, every builder"),
+            Experiment::Compaction => ("compaction", "fastest builder by photon count and survival"),
+            Experiment::Table1 => ("table-1", "last row of table 1"),
+            Experiment::Index => ("index", "index of a large photon map"),
+            Experiment::Gather => ("gather", "gather at the points of a picture"),
+            Experiment::Cornell => ("cornell", "cornell, 16 bounces"),
+            Experiment::CornellSpheres => ("cornell-spheres", "cornell-spheres: time to an error"),
+            Experiment::CausticSphere => ("caustic-sphere", "caustic-sphere: time to an error"),
+            Experiment::Mesh => ("mesh", "many triangles"),
+            Experiment::Effects => ("effects", "effects that a scene lacks"),
         }
     }
 }

@@ -24,8 +24,8 @@ use serde::Serialize;
 use crate::error::{Error, Result};
 use crate::gpu::Gpu;
 use crate::measure::compaction::{self, Map};
-use crate::measure::study::chart::alone;
 use crate::output::destination::{Folder, write_all};
+use crate::output::svg::as_file;
 use crate::scene::Scene;
 use experiment::Experiment;
 use pass::Pass;
@@ -107,6 +107,11 @@ impl Lab<'_> {
         }
     }
 
+    /// Of a picture in which the scene matters more than its points.
+    pub fn image_size(&self) -> (u32, u32) {
+        self.choose((32, 32), (128, 128), (512, 512))
+    }
+
     /// Fails once the bench is interrupted.
     pub fn go_on(&self) -> Result<()> {
         if self.cancelled.load(Ordering::Relaxed) { Err(Error::Interrupted) } else { Ok(()) }
@@ -159,12 +164,8 @@ fn measure(lab: &mut Lab, bench: &mut Bench) -> Result<()> {
             continue;
         }
         (lab.tell)(&format!("[{}/{}] {}", number + 1, bench.request.experiments.len(), experiment.title()));
-        match experiments::run(lab, experiment) {
-            Ok(mut results) => {
-                bench.passes.append(&mut results.passes);
-                bench.targets.append(&mut results.findings);
-                bench.compaction = bench.compaction.take().or(results.compaction);
-            }
+        match experiments::run(lab, experiment, bench) {
+            Ok(()) => {}
             // What this device cannot do is no reason to end.
             Err(Error::Setting { option, value, allowed }) => {
                 bench.left_out.push(format!("{}: {option} {value} {allowed}", experiment.name()));
@@ -187,10 +188,10 @@ impl Bench {
 pub fn write(folder: &Folder, bench: &Bench) -> Result<()> {
     let mut files = vec![(folder.file("bench.json"), bench.json()), (folder.file("bench.txt"), table::text(bench).into_bytes())];
     if let Some(map) = &bench.compaction {
-        files.push((folder.file("compaction.svg"), alone(&compaction::chart::draw(map)).into_bytes()));
+        files.push((folder.file("compaction.svg"), as_file(&compaction::chart::draw(map))));
     }
     if let Some(scale) = &bench.scale {
-        files.extend(chart::all(scale).into_iter().map(|(name, drawn)| (folder.file(&name), drawn.into_bytes())));
+        files.extend(chart::all(scale).map(|(name, drawn)| (folder.file(&name), drawn)));
     }
     write_all(files)
 }

@@ -1,13 +1,13 @@
 //! One pass of a workload: its time, its work, and how close it comes to the device's limits.
 
 use std::collections::BTreeMap;
-use std::ops::{Add, Mul};
+use std::ops::Add;
 
 use serde::Serialize;
 
 use super::rates::Rates;
-use crate::timings::Spread;
-use crate::timings::{Clock, Timings};
+use crate::plan::buffers::block_sum_counts;
+use crate::timings::{Clock, Spread, Timings};
 
 /// What a pass cannot do without, whatever the code: the bytes that move when every record is read and written once and
 /// nothing is kept from one dispatch to the next, and the arithmetic of its formulas. Atomics, order of access and
@@ -19,6 +19,16 @@ pub struct Cost {
     pub float_operations: f64,
     /// Products of 32-bit integers to 64 bits.
     pub integer_products: f64,
+}
+
+/// Of a record.
+pub fn bytes<T>() -> f64 {
+    size_of::<T>() as f64
+}
+
+/// Of a prefix sum: down its levels and up again.
+pub fn scan_dispatches(items: u32, group_size: u32) -> f64 {
+    2.0 * block_sum_counts(u64::from(items) + 1, group_size).len() as f64 - 1.0
 }
 
 /// Sums and products that a quotient, a root or an angle is made of, roughly.
@@ -36,14 +46,6 @@ impl Add for Cost {
     }
 }
 
-impl Mul<f64> for Cost {
-    type Output = Cost;
-
-    fn mul(self, times: f64) -> Cost {
-        Cost { bytes: self.bytes * times, float_operations: self.float_operations * times, integer_products: self.integer_products * times }
-    }
-}
-
 /// What bounds a pass.
 #[derive(Debug, Clone, Copy, PartialEq, Eq, Serialize)]
 #[serde(rename_all = "lowercase")]
@@ -52,17 +54,6 @@ pub enum Bound {
     Floats,
     Integers,
     Launches,
-}
-
-impl Bound {
-    pub fn name(self) -> &'static str {
-        match self {
-            Bound::Bytes => "bytes",
-            Bound::Floats => "floats",
-            Bound::Integers => "integers",
-            Bound::Launches => "launches",
-        }
-    }
 }
 
 /// The roofline (Williams, Waterman and Patterson 2009): the least time that the scarcest of a device's means allows.
@@ -185,8 +176,12 @@ pub fn rounds_of(timings: &Timings, rounds: u32, first: u32) -> Vec<(String, Vec
 
 /// Sum of the outermost scopes: all of a round.
 pub fn sum_of_outermost(scopes: &[(String, Vec<f64>)]) -> f64 {
-    let median = |values: &Vec<f64>| Spread::of(values.clone()).map_or(0.0, |spread| spread.median);
-    scopes.iter().filter(|(name, _)| !name.contains('/')).map(|(_, values)| median(values)).sum()
+    scopes.iter().filter(|(name, _)| !name.contains('/')).map(|(_, values)| median(values.clone())).sum()
+}
+
+/// Not a number for no value at all.
+pub fn median(values: Vec<f64>) -> f64 {
+    Spread::of(values).map_or(f64::NAN, |spread| spread.median)
 }
 
 #[cfg(test)]

@@ -11,8 +11,7 @@ use crate::gpu::kernels::{MeasureAtomic, MeasureCopy, MeasureCounter, MeasureFlo
 use crate::gpu::{Buffer, Commands, Constants, Extent, Gpu, Memory, clock};
 use crate::records::MeasurePush;
 use crate::rng::philox;
-use crate::timings::Clock;
-use crate::timings::Spread;
+use crate::timings::{Clock, Spread};
 
 /// Rates of a device, each a second.
 #[derive(Debug, Clone, Copy, PartialEq, Serialize)]
@@ -53,9 +52,9 @@ impl Rates {
 }
 
 /// Products of integers in a block of Philox4x32-10.
-pub const PHILOX_PRODUCTS: u64 = 20;
+pub const PHILOX_PRODUCTS: u32 = 20;
 /// Sums and products of a step of `measure_float.comp`.
-const FLOAT_OPERATIONS: u64 = 16;
+const FLOAT_OPERATIONS: u32 = 16;
 const STEPS: u32 = 1024;
 const PHILOX_STEPS: u32 = 512;
 /// Reads or atomics of an invocation.
@@ -98,60 +97,51 @@ const REPEATS: usize = 11;
 pub fn measure(gpu: &Gpu, size: Size) -> Result<Rates> {
     let Amounts { blocks: block_count, items, accesses, warm_up } = Amounts::of(gpu, size);
     let mut commands = Commands::new(gpu, Constants::new(GROUP_SIZE), Instant::now())?;
-    let blocks = gpu.buffer::<[u32; 4]>("blocks", u64::from(block_count), Memory::Device)?;
-    let copies = gpu.buffer::<[u32; 4]>("copies", u64::from(block_count), Memory::Device)?;
-    let results = gpu.buffer::<f32>("results", u64::from(items), Memory::Device)?;
-    let sums = gpu.buffer::<u32>("sums", u64::from(accesses), Memory::Device)?;
-    let counts = gpu.buffer::<u32>("counts", u64::from(COUNTERS), Memory::Device)?;
+    let blocks = &gpu.buffer::<[u32; 4]>("blocks", u64::from(block_count), Memory::Device)?;
+    let copies = &gpu.buffer::<[u32; 4]>("copies", u64::from(block_count), Memory::Device)?;
+    let results = &gpu.buffer::<f32>("results", u64::from(items), Memory::Device)?;
+    let sums = &gpu.buffer::<u32>("sums", u64::from(accesses), Memory::Device)?;
+    let counts = &gpu.buffer::<u32>("counts", u64::from(COUNTERS), Memory::Device)?;
     // What a run before this one left in the same memory must not pass for a result.
-    commands.clear(&copies);
-    commands.clear(&results);
-    commands.clear(&sums);
+    commands.clear(copies);
+    commands.clear(results);
+    commands.clear(sums);
     let mut bench = Bench { gpu, commands: &mut commands };
     clock::warm_up(gpu, warm_up)?;
 
-    let float_push = push(items, STEPS, 0);
-    let mut float =
-        |commands: &mut Commands| commands.dispatch(MeasureFloat { results: &results }, &float_push, Extent::Items(u64::from(items)));
-    let seconds = bench.seconds("float", REPEATS, &mut float)?;
-    let float_operations = rate(&seconds, u64::from(items) * u64::from(STEPS) * FLOAT_OPERATIONS);
-    let found = bench.commands.read(&results, items as usize)?;
+    let float_operations = bench.rate("float", product([items, STEPS, FLOAT_OPERATIONS]), &mut |commands| {
+        commands.dispatch(MeasureFloat { results }, &push(items, STEPS, 0), Extent::Items(u64::from(items)))
+    })?;
+    let found = bench.commands.read(results, items as usize)?;
     bench.check("sums and products", items, |index| found[index as usize].to_bits() == turned(index, STEPS).to_bits())?;
 
-    let philox_push = push(items, PHILOX_STEPS, 0);
-    let seconds = bench.seconds("integer", REPEATS, &mut |commands| {
-        commands.dispatch(MeasureInteger { blocks: &blocks }, &philox_push, Extent::Items(u64::from(items)))
+    let integer_products = bench.rate("integer", product([items, PHILOX_STEPS, PHILOX_PRODUCTS]), &mut |commands| {
+        commands.dispatch(MeasureInteger { blocks }, &push(items, PHILOX_STEPS, 0), Extent::Items(u64::from(items)))
     })?;
-    let integer_products = rate(&seconds, u64::from(items) * u64::from(PHILOX_STEPS) * PHILOX_PRODUCTS);
-    let found = bench.commands.read(&blocks, items as usize)?;
+    let found = bench.commands.read(blocks, items as usize)?;
     bench.check("products of integers", items, |index| found[index as usize] == block(index, PHILOX_STEPS))?;
 
-    let items = || Extent::Items(u64::from(block_count));
-    bench.commands.dispatch(MeasureInteger { blocks: &blocks }, &push(block_count, 1, 0), items())?;
+    bench.commands.dispatch(MeasureInteger { blocks }, &push(block_count, 1, 0), Extent::Items(u64::from(block_count)))?;
     // The largest last, as what follows reads it.
-    let [small, middle, large] = [6, 3, 0].map(|shift| bench.copy(&blocks, &copies, block_count >> shift));
+    let [small, middle, large] = [6, 3, 0].map(|shift| bench.copy(blocks, copies, block_count >> shift));
     let copy_rates = [large?, middle?, small?];
-    let seconds = bench.seconds("dispatches", REPEATS, &mut |commands| {
-        let copy = push(1, 0, 0);
+    let dispatches = bench.rate("dispatches", u64::from(CHAIN), &mut |commands| {
         (0..CHAIN / 2).try_for_each(|_| {
-            commands.dispatch(MeasureCopy { blocks: &blocks, copies: &copies }, &copy, Extent::Items(1))?;
-            commands.dispatch(MeasureCopy { blocks: &copies, copies: &blocks }, &copy, Extent::Items(1))
+            commands.dispatch(MeasureCopy { blocks, copies }, &push(1, 0, 0), Extent::Items(1))?;
+            commands.dispatch(MeasureCopy { blocks: copies, copies: blocks }, &push(1, 0, 0), Extent::Items(1))
         })
     })?;
-    let dispatches = rate(&seconds, u64::from(CHAIN));
     let mask = block_count / 2 - 1;
-    let read_push = push(accesses, ACCESSES, mask);
-    let seconds = bench.seconds("random reads", REPEATS, &mut |commands| {
-        commands.dispatch(MeasureGather { blocks: &copies, sums: &sums }, &read_push, Extent::Items(u64::from(accesses)))
+    let random_reads = bench.rate("random reads", product([accesses, ACCESSES]), &mut |commands| {
+        commands.dispatch(MeasureGather { blocks: copies, sums }, &push(accesses, ACCESSES, mask), Extent::Items(u64::from(accesses)))
     })?;
-    let random_reads = rate(&seconds, u64::from(accesses) * u64::from(ACCESSES));
-    let found = bench.commands.read(&sums, accesses as usize)?;
+    let found = bench.commands.read(sums, accesses as usize)?;
     // The copy as a whole is held against what it should be by this, at random places.
     bench.check("copied blocks", accesses, |index| found[index as usize] == read_sum(index, ACCESSES, mask))?;
 
-    let spread_atomics = bench.atomics(&counts, &sums, accesses, COUNTERS - 1)?;
-    let single_atomics = bench.atomics(&counts, &sums, accesses, 0)?;
-    let counter_additions = bench.counter(&counts, &sums, accesses)?;
+    let spread_atomics = bench.atomics(counts, sums, accesses, COUNTERS - 1)?;
+    let single_atomics = bench.atomics(counts, sums, accesses, 0)?;
+    let counter_additions = bench.counter(counts, sums, accesses)?;
     gpu.check_validation()?;
     Ok(Rates {
         dispatches,
@@ -169,8 +159,8 @@ fn push(item_count: u32, step_count: u32, mask: u32) -> MeasurePush {
     MeasurePush { item_count, step_count, mask }
 }
 
-fn rate(seconds: &[f64], amount: u64) -> Spread {
-    Spread::of(seconds.iter().map(|seconds| amount as f64 / seconds.max(1e-9)).collect()).expect("something was measured")
+fn product<const COUNT: usize>(factors: [u32; COUNT]) -> u64 {
+    factors.into_iter().map(u64::from).product()
 }
 
 struct Bench<'a, 'gpu> {
@@ -179,63 +169,65 @@ struct Bench<'a, 'gpu> {
 }
 
 impl<'gpu> Bench<'_, 'gpu> {
-    /// Seconds of each of several submissions, on the device where it has a clock, after one that is dropped.
-    fn seconds(&mut self, name: &str, repeats: usize, body: &mut dyn FnMut(&mut Commands<'gpu>) -> Result<()>) -> Result<Vec<f64>> {
-        for _ in 0..=repeats {
+    /// How much of `amount` a second, in each of several submissions after one that is dropped; on the device where it
+    /// has a clock.
+    fn rate(&mut self, name: &str, amount: u64, body: &mut dyn FnMut(&mut Commands<'gpu>) -> Result<()>) -> Result<Spread> {
+        for _ in 0..=REPEATS {
             self.commands.scope(name, &mut *body)?;
             self.commands.submit()?;
         }
         let clock = if self.gpu.facts().timestamp_bits > 0 { Clock::Gpu } else { Clock::Wall };
         let spans = self.commands.timings().spans();
-        let of_name = spans.iter().rev().filter(|span| span.name == name && span.clock == clock);
-        Ok(of_name.take(repeats).map(|span| span.duration.as_secs_f64()).collect())
+        let of_name = spans.iter().rev().filter(|span| span.name == name && span.clock == clock).take(REPEATS);
+        let rates = of_name.map(|span| amount as f64 / span.duration.as_secs_f64().max(1e-9)).collect();
+        Ok(Spread::of(rates).expect("something was measured"))
     }
 
     fn copy(&mut self, blocks: &Buffer<[u32; 4]>, copies: &Buffer<[u32; 4]>, block_count: u32) -> Result<CopyRate> {
-        let push = push(block_count, 0, 0);
-        let seconds = self.seconds("copy", REPEATS, &mut |commands| {
-            commands.dispatch(MeasureCopy { blocks, copies }, &push, Extent::Items(u64::from(block_count)))
+        let moved_bytes = 2 * 16 * u64::from(block_count);
+        let rate = self.rate("copy", moved_bytes, &mut |commands| {
+            commands.dispatch(MeasureCopy { blocks, copies }, &push(block_count, 0, 0), Extent::Items(u64::from(block_count)))
         })?;
         let shown = block_count.min(1 << 12);
         let found = self.commands.read(copies, shown as usize)?;
         self.check("copied blocks", shown, |index| found[index as usize] == block(index, 1))?;
-        let moved_bytes = 2 * 16 * u64::from(block_count);
-        Ok(CopyRate { moved_bytes, rate: rate(&seconds, moved_bytes) })
+        Ok(CopyRate { moved_bytes, rate })
     }
 
     /// Every addition is answered by how many came before it, so that the answers of n at one counter are 0 to n - 1.
     fn atomics(&mut self, counts: &Buffer<u32>, sums: &Buffer<u32>, items: u32, mask: u32) -> Result<Spread> {
-        let push = push(items, ACCESSES, mask);
-        let seconds = self.seconds("atomics", REPEATS, &mut |commands| {
-            commands.dispatch(MeasureAtomic { counts, sums }, &push, Extent::Items(u64::from(items)))
-        })?;
-        self.commands.clear(counts);
-        self.commands.dispatch(MeasureAtomic { counts, sums }, &push, Extent::Items(u64::from(items)))?;
-        let found = self.commands.read(sums, items as usize)?.into_iter().fold(0, u32::wrapping_add);
-        let counted = self.commands.read(counts, COUNTERS as usize)?;
         let mut expected = vec![0u32; COUNTERS as usize];
         (0..items * ACCESSES).for_each(|number| expected[(place(number) & mask) as usize] += 1);
-        let answers = expected.iter().map(|count| u64::from(*count) * u64::from(count.saturating_sub(1)) / 2).sum::<u64>();
-        if counted != expected || found != answers as u32 {
-            return Err(self.wrong("atomic additions"));
-        }
-        Ok(rate(&seconds, u64::from(items) * u64::from(ACCESSES)))
+        self.additions("atomic additions", product([items, ACCESSES]), counts, sums, &expected, &mut |commands| {
+            commands.dispatch(MeasureAtomic { counts, sums }, &push(items, ACCESSES, mask), Extent::Items(u64::from(items)))
+        })
     }
 
     /// Every invocation of `items` gets places of its own, so that those of n are 0 to n - 1.
     fn counter(&mut self, counters: &Buffer<u32>, sums: &Buffer<u32>, items: u32) -> Result<Spread> {
-        let push = push(items, ACCESSES, 0);
-        let seconds = self.seconds("counter", REPEATS, &mut |commands| {
-            commands.dispatch(MeasureCounter { counters, sums }, &push, Extent::Items(u64::from(items)))
-        })?;
-        self.commands.fill(counters, 0, 1, 0);
-        self.commands.dispatch(MeasureCounter { counters, sums }, &push, Extent::Items(u64::from(items)))?;
-        let found = self.commands.read(sums, items as usize)?.into_iter().fold(0, u32::wrapping_add);
-        let places = u64::from(items) * u64::from(ACCESSES);
-        if self.commands.read(counters, 1)? != [places as u32] || found != (places * (places - 1) / 2) as u32 {
-            return Err(self.wrong("additions to one counter"));
-        }
-        Ok(rate(&seconds, places / u64::from(self.gpu.facts().subgroup_size)))
+        let subgroups = product([items, ACCESSES]) / u64::from(self.gpu.facts().subgroup_size);
+        self.additions("additions to one counter", subgroups, counters, sums, &[items * ACCESSES], &mut |commands| {
+            commands.dispatch(MeasureCounter { counters, sums }, &push(items, ACCESSES, 0), Extent::Items(u64::from(items)))
+        })
+    }
+
+    /// The rate of `amount` additions, which leave these counts and sums of their answers.
+    fn additions(
+        &mut self,
+        what: &str,
+        amount: u64,
+        counts: &Buffer<u32>,
+        sums: &Buffer<u32>,
+        expected: &[u32],
+        add: &mut dyn FnMut(&mut Commands<'gpu>) -> Result<()>,
+    ) -> Result<Spread> {
+        let rate = self.rate(what, amount, add)?;
+        self.commands.clear(counts);
+        add(self.commands)?;
+        let found = self.commands.read(sums, sums.count() as usize)?.into_iter().fold(0, u32::wrapping_add);
+        let answers = expected.iter().map(|count| u64::from(*count) * u64::from(count.saturating_sub(1)) / 2).sum::<u64>();
+        let is_right = self.commands.read(counts, expected.len())? == expected && found == answers as u32;
+        if is_right { Ok(rate) } else { Err(self.wrong(what)) }
     }
 
     /// Fails unless all that are looked at are right: a few, from the first to the last.

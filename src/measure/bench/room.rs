@@ -2,17 +2,18 @@
 
 use std::sync::atomic::AtomicBool;
 
-use super::pass::{Cost, Pass, SLOW_OPERATION, Work, rounds_of, sum_of_outermost};
+use super::pass::{Cost, Pass, SLOW_OPERATION, Work, bytes, rounds_of, scan_dispatches, sum_of_outermost};
 use super::rates::{PHILOX_PRODUCTS, Rates};
 use crate::engine::Control;
 use crate::engine::room::{self, RunResult};
+use crate::engine::run;
 use crate::error::{Error, Result};
 use crate::gpu::{Gpu, HeldMemory};
 use crate::ledger::Fates;
 use crate::path::StoredPath;
 use crate::photon::StoredPhoton;
 use crate::plan::RoomPlan;
-use crate::plan::buffers::{block_sum_counts, group_count};
+use crate::plan::buffers::group_count;
 use crate::records::Point;
 use crate::rng::Rng;
 use crate::scene::open_box::open_box;
@@ -63,6 +64,31 @@ pub struct Timed {
 }
 
 impl Timed {
+    /// Of a run's rounds from number `first` on, beside the work that each pass needs.
+    pub fn of<Plan, Film>(
+        run: &run::RunResult<Plan, Film>,
+        (rounds, first): (u32, u32),
+        workload: &str,
+        rates: &Rates,
+        work: impl Fn(&str) -> Option<Work>,
+        memory: HeldMemory,
+    ) -> Timed {
+        let scopes = rounds_of(&run.timings, rounds, first);
+        let pass = |(name, ms): &(String, Vec<f64>)| Some(Pass::new(workload, name, Spread::of(ms.clone())?, work(name), rates));
+        let sum = |scope: &str| run.timings.row(scope).and_then(|row| row.gpu_ms).unwrap_or(0.0);
+        Timed {
+            passes: scopes.iter().filter_map(pass).collect(),
+            counts: Counts::of(&run.fates[0], rounds),
+            round_ms: sum_of_outermost(&scopes),
+            run_ms: sum("set-up") + sum("round"),
+            wall_ms: run.timings.row("run").and_then(|row| row.wall_ms).unwrap_or(f64::NAN),
+            dispatches: run.dispatches as f64 / f64::from(rounds),
+            memory,
+            stated_bytes: 0,
+            counters: 1,
+        }
+    }
+
     pub fn pass(&self, name: &str) -> Option<&Pass> {
         self.passes.iter().find(|pass| pass.name == name)
     }
@@ -95,9 +121,8 @@ pub fn check_clock(gpu: &Gpu) -> Result<()> {
     Ok(())
 }
 
-fn run_once(gpu: &Gpu, settings: &RoomSettings, cancelled: &AtomicBool) -> Result<RunResult> {
-    let outcome = room::on_gpu(gpu, &open_box(settings), settings, &mut Control::quiet(cancelled))?;
-    if outcome.is_cancelled() { Err(Error::Interrupted) } else { Ok(outcome) }
+pub fn run_once(gpu: &Gpu, settings: &RoomSettings, cancelled: &AtomicBool) -> Result<RunResult> {
+    room::on_gpu(gpu, &open_box(settings), settings, &mut Control::quiet(cancelled))?.finished()
 }
 
 /// Times the passes of a builder: [`REPEATS`] rounds of one run, after [`DROPPED`] others.
@@ -123,24 +148,9 @@ fn timed(gpu: &Gpu, rates: &Rates, outcome: &RunResult, rounds: u32, first: u32)
     let plan = &outcome.plan;
     let counts = Counts::of(&outcome.fates[0], rounds);
     let found = photons_per_point(outcome) / f64::from(rounds);
-    let scopes = rounds_of(&outcome.timings, rounds, first);
-    let workload = workload(plan);
-    let passes = scopes
-        .iter()
-        .filter_map(|(name, ms)| Some(Pass::new(&workload, name, Spread::of(ms.clone())?, work(name, plan, &counts, found), rates)))
-        .collect();
-    let sum = |scope: &str| outcome.timings.row(scope).and_then(|row| row.gpu_ms).unwrap_or(0.0);
-    Timed {
-        passes,
-        counts,
-        round_ms: sum_of_outermost(&scopes),
-        run_ms: sum("set-up") + sum("round"),
-        wall_ms: outcome.timings.row("run").and_then(|row| row.wall_ms).unwrap_or(f64::NAN),
-        dispatches: outcome.dispatches as f64 / f64::from(rounds),
-        memory: gpu.held_memory(),
-        stated_bytes: plan.bytes(),
-        counters: plan.counters,
-    }
+    let work = |pass: &str| work(pass, plan, &counts, found);
+    let timed = Timed::of(outcome, (rounds, first), &workload(plan), rates, work, gpu.held_memory());
+    Timed { stated_bytes: plan.bytes(), counters: plan.counters, ..timed }
 }
 
 fn workload(plan: &RoomPlan) -> String {
@@ -154,10 +164,6 @@ fn photons_per_point(outcome: &RunResult) -> f64 {
     let plan = &outcome.plan;
     let sums = outcome.film.sums.iter().step_by(plan.channel_count as usize);
     sums.map(|sum| *sum as f64).sum::<f64>() / plan.film_scale() / plan.points.len() as f64
-}
-
-fn bytes<T>() -> f64 {
-    size_of::<T>() as f64
 }
 
 /// A point and the photon's position on a disc, a direction (two roots, sine and cosine), its turn into the wall's frame.
@@ -174,7 +180,7 @@ const RAND48_PRODUCTS: f64 = 3.0;
 /// Products of random numbers of `draws` draws that lie in one block.
 fn products(rng: Rng, draws: f64) -> f64 {
     match rng {
-        Rng::Philox => PHILOX_PRODUCTS as f64,
+        Rng::Philox => f64::from(PHILOX_PRODUCTS),
         Rng::Rand48 => RAND48_PRODUCTS * draws,
         // Mostly shifts; not counted.
         Rng::Mt | Rng::Sobol => 0.0,
@@ -231,8 +237,7 @@ pub fn work(pass: &str, plan: &RoomPlan, counts: &Counts, found: f64) -> Option<
     let chunks = f64::from(plan.chunks_per_round);
     let emits = chunks * plan.light_photons.len() as f64;
     let bounce_count = f64::from(settings.bounces);
-    // Down the levels of a prefix sum and up again.
-    let scans_of = |items: u32| 2.0 * block_sum_counts(u64::from(items) + 1, settings.group_size).len() as f64 - 1.0;
+    let scans_of = |items: u32| scan_dispatches(items, settings.group_size);
     let flights = match settings.builder {
         Builder::Persistent => 0.0,
         Builder::Naive => chunks * bounce_count,

@@ -1,17 +1,17 @@
 //! Cost and memory over the number of photons and of triangles.
 
+use std::ops::RangeInclusive;
+
 use serde::Serialize;
 
 use super::Lab;
 use super::pass::rounds_of;
-use super::room::DROPPED;
+use super::room::{self, DROPPED};
 use super::scene::{self, Job};
-use crate::engine::Control;
-use crate::engine::room::{self, RunResult};
-use crate::error::{Error, Result};
+use crate::error::Result;
+use crate::measure::line_fit::LineFit;
 use crate::rng::Rng;
 use crate::scene::geometry::Geometry;
-use crate::scene::open_box::open_box;
 use crate::scene::{Mesh, Scene, built_in};
 use crate::settings::scene::SceneSettings;
 use crate::settings::{Builder, RoomSettings};
@@ -63,8 +63,10 @@ pub struct Scale {
 
 /// Sizes for which no time was left are named in `left_out`.
 pub fn measure(lab: &mut Lab, left_out: &mut Vec<String>) -> Result<Scale> {
-    let photons = over_photons(lab, left_out)?;
-    let triangles = over_triangles(lab, left_out)?;
+    let photons = if lab.is_cpu() { lab.choose(3..=6, 3..=7, 3..=7) } else { lab.choose(5..=8, 5..=8, 5..=10) };
+    let triangles = if lab.is_cpu() { lab.choose(1..=4, 1..=6, 1..=6) } else { 1..=6 };
+    let photons = steps(lab, left_out, "photons", photons, of_photons)?;
+    let triangles = steps(lab, left_out, "triangles", triangles, of_triangles)?;
     let series = vec![Series::new("photons", photons, LAUNCH_SHARE), Series::new("triangles", triangles, 0.0)];
     for step in series.iter().flat_map(|series| &series.steps) {
         assert!(step.peak_bytes <= step.stated_bytes, "{} bytes taken, {} stated", step.peak_bytes, step.stated_bytes);
@@ -72,36 +74,68 @@ pub fn measure(lab: &mut Lab, left_out: &mut Vec<String>) -> Result<Scale> {
     Ok(Scale { series })
 }
 
+/// One for each power of ten.
+fn steps(
+    lab: &mut Lab,
+    left_out: &mut Vec<String>,
+    over: &str,
+    decades: RangeInclusive<u32>,
+    measure: fn(&Lab, u64) -> Result<Step>,
+) -> Result<Vec<Step>> {
+    let mut steps = Vec::new();
+    for size in decades.map(|decade| 10u64.pow(decade)) {
+        lab.go_on()?;
+        if lab.is_late() {
+            left_out.push(format!("{size} {over}: no --time left"));
+            continue;
+        }
+        (lab.tell)(&format!("{size} {over}"));
+        steps.push(measure(lab, size)?);
+    }
+    Ok(steps)
+}
+
 /// Time over that of the smallest size below which a size says more of launches than of photons.
 const LAUNCH_SHARE: f64 = 4.0;
 
 impl Series {
     fn new(over: &'static str, steps: Vec<Step>, launch_share: f64) -> Series {
-        let names: Vec<&String> = steps.first().map(|step| step.passes.iter().map(|pass| &pass.pass).collect()).unwrap_or_default();
-        let growth = names
-            .into_iter()
-            .filter_map(|name| {
-                let points: Vec<(f64, f64)> = steps
-                    .iter()
-                    .filter_map(|step| {
-                        let pass = step.passes.iter().find(|pass| pass.pass == *name)?;
-                        Some((step.size as f64, pass.ms.median))
-                    })
-                    .collect();
-                let least = launch_share * points.first()?.1;
-                let grown = points.iter().position(|point| point.1 >= least).unwrap_or(0);
-                // A line through two points says nothing of its own error.
-                let counted = &points[grown.min(points.len().saturating_sub(3))..];
-                Some(Growth {
-                    pass: name.clone(),
-                    from: counted.first()?.0 as u64,
-                    power: power_law(counted)?,
-                    power_off: power_law_off(counted)?,
-                    logarithm_off: logarithm_off(counted)?,
-                })
-            })
-            .collect();
-        Series { over, steps, growth }
+        let passes = steps.first().map_or(&[][..], |step| &step.passes);
+        let growth = passes.iter().filter_map(|PassTime { pass, .. }| {
+            let times = times_of(&steps, pass);
+            let least = launch_share * times.first()?.1;
+            let grown = times.iter().position(|(_, ms)| *ms >= least).unwrap_or(0);
+            Growth::of(pass, &times[grown.min(times.len().saturating_sub(LEAST_POINTS))..])
+        });
+        Series { over, growth: growth.collect(), steps }
+    }
+}
+
+/// Sizes and milliseconds of a pass.
+pub fn times_of(steps: &[Step], pass: &str) -> Vec<(f64, f64)> {
+    let time = |step: &Step| Some((step.size as f64, step.passes.iter().find(|known| known.pass == pass)?.ms.median));
+    steps.iter().filter_map(time).collect()
+}
+
+/// A line through two points says nothing of its own error.
+const LEAST_POINTS: usize = 3;
+
+impl Growth {
+    /// By sizes and milliseconds; `None` of too few.
+    fn of(pass: &str, times: &[(f64, f64)]) -> Option<Growth> {
+        let power = LineFit::of_logarithms(times)?;
+        let logarithm = LineFit::of(&times.iter().map(|(size, ms)| (size.ln(), *ms)).collect::<Vec<_>>())?;
+        let off = |law: &dyn Fn(f64) -> f64| {
+            let squares = times.iter().map(|(size, ms)| (law(*size) / ms - 1.0).powi(2));
+            (squares.sum::<f64>() / times.len() as f64).sqrt()
+        };
+        (times.len() >= LEAST_POINTS).then(|| Growth {
+            pass: pass.to_owned(),
+            from: times[0].0 as u64,
+            power: Slope { value: power.slope, error: power.slope_error },
+            power_off: off(&|size| power.at(size.ln()).exp()),
+            logarithm_off: off(&|size| logarithm.at(size.ln())),
+        })
     }
 }
 
@@ -113,81 +147,59 @@ const REPEATS: u32 = 5;
 const MOST_ROUNDS_ON_CARD: u32 = 500;
 const MOST_ROUNDS_ON_CPU: u32 = 5;
 
-fn over_photons(lab: &mut Lab, left_out: &mut Vec<String>) -> Result<Vec<Step>> {
-    let decades = if lab.is_cpu() { lab.choose(3..=6, 3..=7, 3..=7) } else { lab.choose(5..=8, 5..=8, 5..=10) };
+fn of_photons(lab: &Lab, size: u64) -> Result<Step> {
     let (most, most_rounds) = if lab.is_cpu() { (ROUND_ON_CPU, MOST_ROUNDS_ON_CPU) } else { (ROUND_ON_CARD, MOST_ROUNDS_ON_CARD) };
-    let mut steps = Vec::new();
-    for size in decades.map(|decade| 10u64.pow(decade)) {
-        lab.go_on()?;
-        if lab.is_late() {
-            left_out.push(format!("{size} photons: no --time left"));
-            continue;
-        }
-        (lab.tell)(&format!("{size} photons"));
-        let photons = size.min(most) as u32;
-        let settings =
-            RoomSettings { builder: Builder::Ballot, photons, rng: Rng::Philox, radius: 0.01, mesh: 16, ..RoomSettings::default() };
-        let run = |rounds: u32| -> Result<RunResult> {
-            let control = &mut Control::quiet(lab.cancelled);
-            let outcome = room::on_gpu(lab.gpu, &open_box(&settings), &RoomSettings { rounds, ..settings.clone() }, control)?;
-            if outcome.is_cancelled() { Err(Error::Interrupted) } else { Ok(outcome) }
-        };
-        let rounds = (size / u64::from(photons)) as u32;
-        let all = DROPPED + rounds * (most_rounds / rounds).clamp(1, REPEATS);
-        lab.gpu.forget_peaks();
-        let outcome = run(all)?;
-        let scopes = rounds_of(&outcome.timings, all, DROPPED);
-        let pass = |name: &str| {
-            let (_, ms) = scopes.iter().find(|(scope, _)| scope == name)?;
-            let sums = ms.chunks_exact(rounds as usize).map(|rounds| rounds.iter().sum()).collect();
-            Spread::of(sums).map(|ms| PassTime { pass: name.to_owned(), ms })
-        };
-        steps.push(Step {
-            size,
-            passes: ["build", "index", "gather"].into_iter().filter_map(pass).collect(),
-            peak_bytes: lab.gpu.held_memory().peak_device_bytes,
-            stated_bytes: outcome.plan.bytes(),
-        });
-    }
-    Ok(steps)
+    let photons = size.min(most) as u32;
+    let rounds = (size / u64::from(photons)) as u32;
+    let all = DROPPED + rounds * (most_rounds / rounds).clamp(1, REPEATS);
+    let settings = RoomSettings {
+        builder: Builder::Ballot,
+        photons,
+        rounds: all,
+        rng: Rng::Philox,
+        radius: 0.01,
+        mesh: 16,
+        ..RoomSettings::default()
+    };
+    lab.gpu.forget_peaks();
+    let outcome = room::run_once(lab.gpu, &settings, lab.cancelled)?;
+    let scopes = rounds_of(&outcome.timings, all, DROPPED);
+    let pass = |name: &str| {
+        let (_, ms) = scopes.iter().find(|(scope, _)| scope == name)?;
+        let sums = ms.chunks_exact(rounds as usize).map(|rounds| rounds.iter().sum()).collect();
+        Spread::of(sums).map(|ms| PassTime { pass: name.to_owned(), ms })
+    };
+    Ok(Step {
+        size,
+        passes: ["build", "index", "gather"].into_iter().filter_map(pass).collect(),
+        peak_bytes: lab.gpu.held_memory().peak_device_bytes,
+        stated_bytes: outcome.plan.bytes(),
+    })
 }
 
-fn over_triangles(lab: &mut Lab, left_out: &mut Vec<String>) -> Result<Vec<Step>> {
-    let decades = if lab.is_cpu() { lab.choose(1..=4, 1..=6, 1..=6) } else { 1..=6 };
-    let mut steps = Vec::new();
-    for size in decades.map(|decade| 10u32.pow(decade)) {
-        lab.go_on()?;
-        if lab.is_late() {
-            left_out.push(format!("{size} triangles: no --time left"));
-            continue;
-        }
-        (lab.tell)(&format!("{size} triangles"));
-        let scene = ball_room(size);
-        let geometry = Geometry::new(&scene)?;
-        let settings = SceneSettings { photons: lab.choose(1 << 12, 1 << 15, 1 << 20), ..SceneSettings::default() };
-        let size = (lab.choose(32, 128, 512), lab.choose(32, 128, 512));
-        let job = Job { name: "a ball in a room", scene: &scene, geometry: &geometry, size, settings };
-        let timed = scene::time(lab.gpu, &lab.rates, &job, lab.cancelled)?;
-        steps.push(Step {
-            size: geometry.triangles.len() as u64,
-            passes: timed
-                .passes
-                .iter()
-                .filter(|pass| ["visible points", "global/trace", "global/index", "global/gather"].contains(&pass.name.as_str()))
-                .map(|pass| PassTime { pass: pass.name.clone(), ms: pass.ms })
-                .collect(),
-            peak_bytes: timed.memory.peak_device_bytes,
-            stated_bytes: timed.stated_bytes,
-        });
-    }
-    Ok(steps)
+fn of_triangles(lab: &Lab, size: u64) -> Result<Step> {
+    let scene = ball_room(size as u32);
+    let geometry = Geometry::new(&scene)?;
+    let settings = SceneSettings { photons: lab.choose(1 << 12, 1 << 15, 1 << 20), ..SceneSettings::default() };
+    let job = Job { name: BALL_ROOM, scene: &scene, geometry: &geometry, size: lab.image_size(), settings };
+    let timed = scene::time(lab.gpu, &lab.rates, &job, lab.cancelled)?;
+    let shown = ["visible points", "global/trace", "global/index", "global/gather"];
+    let passes = timed.passes.iter().filter(|pass| shown.contains(&pass.name.as_str()));
+    Ok(Step {
+        size: geometry.triangles.len() as u64,
+        passes: passes.map(|pass| PassTime { pass: pass.name.clone(), ms: pass.ms }).collect(),
+        peak_bytes: timed.memory.peak_device_bytes,
+        stated_bytes: timed.stated_bytes,
+    })
 }
+
+pub const BALL_ROOM: &str = "a ball in a room";
 
 /// The Cornell box with a diffuse ball in place of its blocks, of about so many triangles in all: 12, and s (s - 2) of a
 /// ball of s meridians.
 pub fn ball_room(triangles: u32) -> Scene {
     let mut scene = built_in::by_name("cornell").expect("it is built in");
-    scene.name = "a ball in a room".to_owned();
+    scene.name = BALL_ROOM.to_owned();
     scene.meshes.retain(|mesh| !mesh.name.ends_with("block"));
     let segments = (1.0 + (1.0 + f64::from(triangles.saturating_sub(12))).sqrt()) / 2.0;
     if triangles > 12 {
@@ -203,65 +215,26 @@ pub struct Slope {
     pub error: f64,
 }
 
-/// (slope, intercept, sum of squares left, spread of x) of y over x by least squares.
-fn line(points: &[(f64, f64)]) -> Option<(f64, f64, f64, f64)> {
-    if points.len() < 3 {
-        return None;
-    }
-    let count = points.len() as f64;
-    let (x, y) = points.iter().fold((0.0, 0.0), |(x, y), point| (x + point.0 / count, y + point.1 / count));
-    let (above, below) =
-        points.iter().fold((0.0, 0.0), |(above, below), point| (above + (point.0 - x) * (point.1 - y), below + (point.0 - x).powi(2)));
-    let slope = above / below;
-    let left = points.iter().map(|point| (point.1 - y - slope * (point.0 - x)).powi(2)).sum();
-    Some((slope, y - slope * x, left, below))
-}
-
-fn logarithms(points: &[(f64, f64)]) -> Vec<(f64, f64)> {
-    points.iter().map(|(size, ms)| (size.ln(), ms.max(f64::MIN_POSITIVE).ln())).collect()
-}
-
-/// The power that time goes with.
-pub fn power_law(points: &[(f64, f64)]) -> Option<Slope> {
-    let (value, _, left, below) = line(&logarithms(points))?;
-    Some(Slope { value, error: (left / (points.len() as f64 - 2.0) / below).sqrt() })
-}
-
-/// What the power law is off by: root mean square, relative.
-fn power_law_off(points: &[(f64, f64)]) -> Option<f64> {
-    let (slope, intercept, ..) = line(&logarithms(points))?;
-    Some(off(points, |size| (intercept + slope * size.ln()).exp()))
-}
-
-/// What time = a + b log(size) is off by.
-fn logarithm_off(points: &[(f64, f64)]) -> Option<f64> {
-    let (slope, intercept, ..) = line(&points.iter().map(|(size, ms)| (size.ln(), *ms)).collect::<Vec<_>>())?;
-    Some(off(points, |size| intercept + slope * size.ln()))
-}
-
-fn off(points: &[(f64, f64)], law: impl Fn(f64) -> f64) -> f64 {
-    (points.iter().map(|(size, ms)| (law(*size) / ms - 1.0).powi(2)).sum::<f64>() / points.len() as f64).sqrt()
-}
-
 #[cfg(test)]
 mod tests {
     use super::*;
 
     #[test]
     fn fits_find_the_laws_that_were_put_in() {
+        let decades = |from: i32, to: i32| (from..to).map(|decade| 10f64.powi(decade));
+        let growth = |times: &[(f64, f64)]| Growth::of("build", times);
         for exponent in [0.0, 0.5, 1.0, 2.0] {
-            let points: Vec<(f64, f64)> = (3..9).map(|decade| 10f64.powi(decade)).map(|size| (size, 7.0 * size.powf(exponent))).collect();
-            let found = power_law(&points).unwrap();
-            assert!((found.value - exponent).abs() < 1e-9 && found.error < 1e-6, "{exponent}: {found:?}");
-            assert!(power_law_off(&points).unwrap() < 1e-6);
+            let found = growth(&decades(3, 9).map(|size| (size, 7.0 * size.powf(exponent))).collect::<Vec<_>>()).unwrap();
+            assert!((found.power.value - exponent).abs() < 1e-9 && found.power.error < 1e-6, "{exponent}: {found:?}");
+            assert!(found.power_off < 1e-6);
         }
         // One per cent of noise, up and down in turn: the slope's stated error holds what it is off by.
-        let noisy = |k: i32| (10f64.powi(k), 10f64.powi(k) * if k % 2 == 0 { 1.01 } else { 0.99 });
-        let found = power_law(&(3..11).map(noisy).collect::<Vec<_>>()).unwrap();
+        let noisy = |(k, size): (usize, f64)| (size, size * if k % 2 == 0 { 0.99 } else { 1.01 });
+        let found = growth(&decades(3, 11).enumerate().map(noisy).collect::<Vec<_>>()).unwrap().power;
         assert!((found.value - 1.0).abs() < 3.0 * found.error && (1e-4..1e-2).contains(&found.error), "{found:?}");
-        let logarithmic: Vec<(f64, f64)> = (1..7).map(|k| (10f64.powi(k), 2.0 + 3.0 * f64::from(k))).collect();
-        assert!(logarithm_off(&logarithmic).unwrap() < 1e-9 && power_law_off(&logarithmic).unwrap() > 0.02);
-        assert_eq!(power_law(&[(1.0, 1.0), (2.0, 2.0)]), None, "two points make any line");
+        let logarithmic = growth(&decades(1, 7).map(|size| (size, 2.0 + 3.0 * size.log10())).collect::<Vec<_>>()).unwrap();
+        assert!(logarithmic.logarithm_off < 1e-9 && logarithmic.power_off > 0.02);
+        assert_eq!(growth(&[(1.0, 1.0), (2.0, 2.0)]), None, "two points make any line");
     }
 
     #[test]

@@ -6,25 +6,29 @@ use std::time::Instant;
 
 use rayon::prelude::*;
 
-use super::pass::{Cost, Pass, SLOW_OPERATION, Work, rounds_of, sum_of_outermost};
+use super::pass::{Cost, SLOW_OPERATION, Work, bytes, scan_dispatches};
 use super::rates::{PHILOX_PRODUCTS, Rates};
 use super::room::{Counts, DROPPED, RANK_BYTES, REPEATS, Timed};
-use crate::engine;
-use crate::engine::Control;
 use crate::engine::scene::resources::SceneResources;
 use crate::engine::scene::{self, Round, RunResult, View, points, trace};
-use crate::error::{Error, Result};
+use crate::engine::{self, Control};
+use crate::error::Result;
 use crate::gpu::{Commands, Gpu};
 use crate::photon::MapPhoton;
-use crate::plan::buffers::block_sum_counts;
 use crate::plan::scene::{MapPlan, ScenePlan};
 use crate::plan::sensor::Sensor;
 use crate::records::{LightPath, VisiblePoint};
-use crate::scene::Scene;
 use crate::scene::geometry::Geometry;
+use crate::scene::{Scene, built_in};
 use crate::settings::Builder;
 use crate::settings::scene::{Effect, SceneSettings};
-use crate::timings::Spread;
+
+/// A built-in scene, and its geometry.
+pub fn named(name: &str) -> Result<(Scene, Geometry)> {
+    let scene = built_in::by_name(name).expect("it is built in");
+    let geometry = Geometry::new(&scene)?;
+    Ok((scene, geometry))
+}
 
 /// A scene, what looks at it, and how.
 pub struct Job<'a> {
@@ -47,8 +51,7 @@ impl Job<'_> {
         let plan = self.plan(gpu, &settings)?;
         let camera = self.scene.first_camera();
         let view = View { geometry: self.geometry, camera: Some(&camera), phases: &[] };
-        let lit = scene::light(gpu, &view, plan, &mut Control::quiet(cancelled))?;
-        if lit.is_cancelled() { Err(Error::Interrupted) } else { Ok(lit) }
+        scene::light(gpu, &view, plan, &mut Control::quiet(cancelled))?.finished()
     }
 }
 
@@ -105,14 +108,8 @@ const SAMPLES: usize = 256;
 /// card the fastest of [`RUNS`] counts: its clock may fall for a second or so by what others do on the same machine.
 pub fn time(gpu: &Gpu, rates: &Rates, job: &Job, cancelled: &AtomicBool) -> Result<Timed> {
     let runs = if gpu.facts().kind == "cpu" { 1 } else { RUNS };
-    let mut best: Option<Timed> = None;
-    for _ in 0..runs {
-        let timed = time_once(gpu, rates, job, cancelled)?;
-        if best.as_ref().is_none_or(|best| timed.round_ms < best.round_ms) {
-            best = Some(timed);
-        }
-    }
-    Ok(best.expect("there was a run"))
+    let timed = (0..runs).map(|_| time_once(gpu, rates, job, cancelled)).collect::<Result<Vec<Timed>>>()?;
+    Ok(timed.into_iter().min_by(|a, b| a.round_ms.total_cmp(&b.round_ms)).expect("there was a run"))
 }
 
 const RUNS: u32 = 3;
@@ -126,22 +123,9 @@ fn time_once(gpu: &Gpu, rates: &Rates, job: &Job, cancelled: &AtomicBool) -> Res
     let surveys = [survey(gpu, job, |plan| plan.global.as_ref())?, survey(gpu, job, |plan| plan.caustic.as_ref())?];
     let counts = [0, 1].map(|map: usize| Counts::of(&lit.fates[map], rounds));
     let model = Model { job, plan: &lit.plan, counts, surveys };
-    let scopes = rounds_of(&lit.timings, rounds, DROPPED);
     let workload = format!("{}, {}, {} triangles", job.name, lit.plan.builder().name(), job.geometry.triangles.len());
-    let passes =
-        scopes.iter().filter_map(|(name, ms)| Some(Pass::new(&workload, name, Spread::of(ms.clone())?, model.work(name), rates))).collect();
-    let sum = |scope: &str| lit.timings.row(scope).and_then(|row| row.gpu_ms).unwrap_or(0.0);
-    Ok(Timed {
-        passes,
-        counts: counts[0],
-        round_ms: sum_of_outermost(&scopes),
-        run_ms: sum("set-up") + sum("round"),
-        wall_ms: lit.timings.row("run").and_then(|row| row.wall_ms).unwrap_or(f64::NAN),
-        dispatches: lit.dispatches as f64 / f64::from(rounds),
-        memory,
-        stated_bytes: lit.plan.bytes,
-        counters: 1,
-    })
+    let timed = Timed::of(&lit, (rounds, DROPPED), &workload, rates, |pass| model.work(pass), memory);
+    Ok(Timed { stated_bytes: lit.plan.bytes, ..timed })
 }
 
 /// A node of the hierarchy: six planes of eight children, a product and a sum each, and the nearest and farthest of them.
@@ -165,10 +149,6 @@ struct Model<'a> {
     surveys: [Option<Survey>; 2],
 }
 
-fn bytes<T>() -> f64 {
-    size_of::<T>() as f64
-}
-
 impl Model<'_> {
     /// A ray that meets one leaf of a hierarchy as full as can be; nodes and triangles are taken to stay in caches.
     fn ray_operations(&self) -> f64 {
@@ -181,41 +161,36 @@ impl Model<'_> {
 
     /// What a pass cannot do without in a round.
     fn work(&self, pass: &str) -> Option<Work> {
-        let work = |item, items, cost| Some(Work { item, items, dispatches: 1.0, cost });
         let pixels = f64::from(self.plan.sensor.pixels());
         let samples = pixels * f64::from(self.plan.samples());
         let points = f64::from(self.plan.visible_points());
         let sums = 24.0 * points * f64::from(self.plan.arrival_sets);
-        match pass {
+        let shadow_rays = f64::from(self.plan.constant("SHADOW_RAYS"));
+        let (item, items, cost) = match pass {
             "visible points" => {
-                let shadow_rays = f64::from(self.plan.constant("SHADOW_RAYS"));
                 let cost = Cost {
                     bytes: samples * 24.0 + points * bytes::<VisiblePoint>(),
                     float_operations: samples * ((1.0 + shadow_rays) * self.ray_operations() + shadow_rays * LIGHT_OPERATIONS),
                     // Where a path starts, and where its shadow rays end.
-                    integer_products: samples * 2.0 * PHILOX_PRODUCTS as f64,
+                    integer_products: samples * 2.0 * f64::from(PHILOX_PRODUCTS),
                 };
-                work("samples", samples, cost)
+                ("samples", samples, cost)
             }
             "flux to radiance" => {
-                let cost = Cost {
-                    bytes: points * (bytes::<VisiblePoint>() + 24.0) + sums,
-                    float_operations: points * WEIGH_OPERATIONS,
-                    ..Cost::default()
-                };
-                work("points", points, cost)
+                let bytes = points * (bytes::<VisiblePoint>() + 24.0) + sums;
+                ("points", points, Cost { bytes, float_operations: points * WEIGH_OPERATIONS, ..Cost::default() })
             }
             // Sums and squares are read and written.
             "resolve" => {
                 let read = if self.plan.maps().next().is_some() { points + samples } else { samples };
-                work("pixels", pixels, Cost { bytes: 24.0 * read + pixels * 2.0 * 72.0, ..Cost::default() })
+                ("pixels", pixels, Cost { bytes: 24.0 * read + pixels * 2.0 * 72.0, ..Cost::default() })
             }
             _ => {
                 let (map, stage) = pass.split_once('/').unwrap_or((pass, ""));
-                let which = self.plan.maps().find(|known| known.name == map)?;
-                self.work_of_map(which, stage)
+                return self.work_of_map(self.plan.maps().find(|known| known.name == map)?, stage);
             }
-        }
+        };
+        Some(Work { item, items, dispatches: 1.0, cost })
     }
 
     fn work_of_map(&self, map: &MapPlan, stage: &str) -> Option<Work> {
@@ -230,7 +205,7 @@ impl Model<'_> {
             float_operations: counts.emitted * EMISSION_OPERATIONS
                 + counts.flights * self.ray_operations()
                 + counts.events * SCATTER_OPERATIONS,
-            integer_products: (2.0 * counts.emitted + counts.events) * PHILOX_PRODUCTS as f64,
+            integer_products: (2.0 * counts.emitted + counts.events) * f64::from(PHILOX_PRODUCTS),
         };
         // Photons are counted by their first half and numbered; counts of buckets are cleared, and twice read and written; then
         // photons are read again and written in order.
@@ -246,8 +221,7 @@ impl Model<'_> {
         let chunks = map.chunks().count() as f64;
         // Emission, and flights with what works out the sizes of all but the first: of the first segment, which all have.
         let flights = chunks * if persistent { 1.0 } else { 2.0 * f64::from(map.segment_bounces) };
-        // A prefix sum goes down its levels and up again.
-        let scans = chunks * (2.0 * block_sum_counts(u64::from(map.bucket_count) + 1, self.plan.settings.group_size).len() as f64 - 1.0);
+        let scans = chunks * scan_dispatches(map.bucket_count, self.plan.settings.group_size);
         let sorts = 3.0 * chunks + scans;
         let gathers = chunks * 3.0;
         let (item, items, dispatches, cost) = match stage {

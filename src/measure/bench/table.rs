@@ -1,51 +1,45 @@
 //! A bench as text: the device's rates, every pass with its limit, and the targets.
 
-use std::fmt::Write;
-
 use super::Bench;
-use super::targets::Wanted;
+use super::pass::Pass;
+use super::rates::Rates;
+use super::scale::{Growth, PassTime, Series};
+use super::targets::{Finding, Wanted};
+use crate::output::command::lower_case;
 use crate::timings::Spread;
 
 pub fn text(bench: &Bench) -> String {
     let mut text = format!("{}, driver {}, Vulkan {}\n{}\n\n", bench.device, bench.driver, bench.vulkan, bench.request.command);
-    rates(&mut text, bench);
-    if !bench.passes.is_empty() {
-        passes(&mut text, bench);
-    }
+    rates(&mut text, &bench.rates);
+    passes(&mut text, &bench.passes);
     if !bench.targets.is_empty() {
-        targets(&mut text, bench);
+        targets(&mut text, &bench.targets);
     }
     if let Some(map) = &bench.compaction {
-        write!(text, "\n{}", map.text()).unwrap();
+        text += &format!("\n{}", map.text());
     }
-    if let Some(scale) = &bench.scale {
-        for series in &scale.series {
-            writeln!(text, "\n{:<14} {:>14} {:>16} {:>16}", series.over, "", "bytes used", "bytes planned").unwrap();
-            for step in &series.steps {
-                writeln!(text, "{:<14} {:>14} {:>16} {:>16}", step.size, "", step.peak_bytes, step.stated_bytes).unwrap();
-                for pass in &step.passes {
-                    writeln!(text, "  {:<12} {}", pass.pass, spread_ms(&pass.ms)).unwrap();
-                }
-            }
-            for growth in &series.growth {
-                let (power, from, over) = (growth.power, growth.from, series.over);
-                writeln!(
-                    text,
-                    "{}: time grows as {over} to the power {:.3} +- {:.3} from {from} {over} on (RMS error of this fit {:.1} %, of a logarithmic fit {:.1} %)",
-                    growth.pass,
-                    power.value,
-                    power.error,
-                    100.0 * growth.power_off,
-                    100.0 * growth.logarithm_off
-                )
-                .unwrap();
-            }
+    bench.scale.iter().flat_map(|scale| &scale.series).for_each(|series| growth(&mut text, series));
+    bench.left_out.iter().for_each(|line| text += &format!("not measured: {line}\n"));
+    text
+}
+
+fn growth(text: &mut String, Series { over, steps, growth }: &Series) {
+    *text += &format!("\n{over:<14} {:>14} {:>16} {:>16}\n", "", "bytes used", "bytes planned");
+    for step in steps {
+        *text += &format!("{:<14} {:>14} {:>16} {:>16}\n", step.size, "", step.peak_bytes, step.stated_bytes);
+        for PassTime { pass, ms } in &step.passes {
+            *text += &format!("  {pass:<12} {:>10.4} ms ({:.4} to {:.4}, {} runs)\n", ms.median, ms.min, ms.max, ms.repeats);
         }
     }
-    for line in &bench.left_out {
-        writeln!(text, "not measured: {line}").unwrap();
+    for Growth { pass, from, power, power_off, logarithm_off } in growth {
+        *text += &format!(
+            "{pass}: time grows as {over} to the power {:.3} +- {:.3} from {from} {over} on (RMS error of this fit {:.1} %, of a logarithmic fit {:.1} %)\n",
+            power.value,
+            power.error,
+            100.0 * power_off,
+            100.0 * logarithm_off
+        );
     }
-    text
 }
 
 /// Three significant digits and a thousands' letter: 4.80 T.
@@ -56,13 +50,7 @@ pub fn scaled(value: f64) -> String {
     let (unit, letter) =
         [(1e12, " T"), (1e9, " G"), (1e6, " M"), (1e3, " k")].into_iter().find(|(unit, _)| value >= *unit).unwrap_or((1.0, ""));
     let value = value / unit;
-    let decimals = if value >= 100.0 {
-        0
-    } else if value >= 10.0 {
-        1
-    } else {
-        2
-    };
+    let decimals = (2.0 - value.log10().floor().clamp(0.0, 2.0)) as usize;
     format!("{value:.decimals$}{letter}")
 }
 
@@ -76,76 +64,59 @@ fn quantity(value: f64, unit: &str) -> String {
     }
 }
 
-fn spread_ms(spread: &Spread) -> String {
-    format!("{:>10.4} ms ({:.4} to {:.4}, {} runs)", spread.median, spread.min, spread.max, spread.repeats)
-}
-
-fn rates(text: &mut String, bench: &Bench) {
-    let rates = &bench.rates;
+fn rates(text: &mut String, rates: &Rates) {
+    let mut line = |name: &str, rate: &Spread, unit: &str| {
+        *text += &format!("{name:<34} {:>9}{unit}  ({} to {})\n", scaled(rate.median), scaled(rate.min), scaled(rate.max));
+    };
     for copy in &rates.copies {
-        let (name, rate) = (format!("copy, {}B read and written", scaled(copy.moved_bytes as f64)), &copy.rate);
-        writeln!(text, "{name:<34} {:>9}B/s  ({} to {})", scaled(rate.median), scaled(rate.min), scaled(rate.max)).unwrap();
+        line(&format!("copy, {}B read and written", scaled(copy.moved_bytes as f64)), &copy.rate, "B/s");
     }
-    for (name, rate, unit) in [
-        ("dependent dispatches", &rates.dispatches, "/s"),
-        ("float additions, multiplications", &rates.float_operations, "/s"),
-        ("integer products (32 x 32 bits)", &rates.integer_products, "/s"),
-        ("random reads of 32 bytes", &rates.random_reads, "/s"),
-        ("atomics on many counters", &rates.spread_atomics, "/s"),
-        ("atomics on one counter", &rates.single_atomics, "/s"),
-        ("one counter, atomic per subgroup", &rates.counter_additions, "/s"),
-    ] {
-        writeln!(text, "{name:<34} {:>9}{unit}  ({} to {})", scaled(rate.median), scaled(rate.min), scaled(rate.max)).unwrap();
-    }
+    line("dependent dispatches", &rates.dispatches, "/s");
+    line("float additions, multiplications", &rates.float_operations, "/s");
+    line("integer products (32 x 32 bits)", &rates.integer_products, "/s");
+    line("random reads of 32 bytes", &rates.random_reads, "/s");
+    line("atomics on many counters", &rates.spread_atomics, "/s");
+    line("atomics on one counter", &rates.single_atomics, "/s");
+    line("one counter, atomic per subgroup", &rates.counter_additions, "/s");
 }
 
-fn passes(text: &mut String, bench: &Bench) {
-    let mut workload = "";
-    for pass in &bench.passes {
-        if pass.workload != workload {
-            workload = &pass.workload;
-            writeln!(
-                text,
-                "\n{workload}\n  {:<18} {:>10} {:>19} {:>11} {:>11} {:>10} {:>8} {:<8} items",
-                "pass", "ms", "min to max", "items/s", "bytes/s", "limit ms", "of limit", "bound by"
-            )
-            .unwrap();
+fn passes(text: &mut String, passes: &[Pass]) {
+    let or_dash = |shown: Option<String>| shown.unwrap_or_else(|| "-".to_owned());
+    for of_workload in passes.chunk_by(|a, b| a.workload == b.workload) {
+        *text += &format!(
+            "\n{}\n  {:<18} {:>10} {:>19} {:>11} {:>11} {:>10} {:>8} {:<8} items\n",
+            of_workload[0].workload, "pass", "ms", "min to max", "items/s", "bytes/s", "limit ms", "of limit", "bound by"
+        );
+        for pass in of_workload {
+            *text += &format!(
+                "  {:<18} {:>10.4} {:>19} {:>11} {:>11} {:>10} {:>8} {:<8} {}\n",
+                pass.name,
+                pass.ms.median,
+                format!("{:.4} to {:.4}", pass.ms.min, pass.ms.max),
+                or_dash(pass.items_per_second.map(scaled)),
+                or_dash(pass.bytes_per_second.map(scaled)),
+                or_dash(pass.limit.map(|limit| format!("{:.4}", limit.ms))),
+                or_dash(pass.fraction.map(|fraction| format!("{:.1} %", 100.0 * fraction))),
+                pass.limit.map_or_else(String::new, |limit| lower_case(limit.by)),
+                pass.work.map_or("", |work| work.item),
+            );
         }
-        let range = format!("{:.4} to {:.4}", pass.ms.min, pass.ms.max);
-        let optional = |value: Option<f64>| value.map_or("-".to_owned(), scaled);
-        let (limit, by) = pass.limit.map_or(("-".to_owned(), ""), |limit| (format!("{:.4}", limit.ms), limit.by.name()));
-        writeln!(
-            text,
-            "  {:<18} {:>10.4} {range:>19} {:>11} {:>11} {limit:>10} {:>8} {by:<8} {}",
-            pass.name,
-            pass.ms.median,
-            optional(pass.items_per_second),
-            optional(pass.bytes_per_second),
-            pass.fraction.map_or("-".to_owned(), |fraction| format!("{:.1} %", 100.0 * fraction)),
-            pass.work.map_or("", |work| work.item),
-        )
-        .unwrap();
     }
 }
 
-fn targets(text: &mut String, bench: &Bench) {
-    writeln!(text, "\n{:<14} {:>11} {:>11} {:>9}  work", "target", "found", "limit", "met").unwrap();
-    for finding in &bench.targets {
-        let target = &finding.target;
+fn targets(text: &mut String, findings: &[Finding]) {
+    *text += &format!("\n{:<14} {:>11} {:>11} {:>9}  work\n", "target", "found", "limit", "met");
+    for Finding { target, found, limit, met, how } in findings {
         let value = |value: f64| quantity(value, target.unit);
         let wanted = match target.wanted {
             Wanted::AtLeast(least) => format!(">= {}", value(least)),
             Wanted::AtMost(most) => format!("<= {}", value(most)),
         };
-        let met = match finding.met {
-            Some(true) => "yes",
-            Some(false) => "no",
-            None => "H200 only",
-        };
-        let limit = finding.limit.map_or("-".to_owned(), value);
-        writeln!(text, "{wanted:<14} {:>11} {limit:>11} {met:>9}  {}", value(finding.found), target.work).unwrap();
-        writeln!(text, "{:50}{}{}", "", finding.how, if target.peer == "-" { String::new() } else { format!("; {}", target.peer) })
-            .unwrap();
+        let met = met.map_or("H200 only", |met| if met { "yes" } else { "no" });
+        let limit = limit.map_or("-".to_owned(), value);
+        *text += &format!("{wanted:<14} {:>11} {limit:>11} {met:>9}  {}\n", value(*found), target.work);
+        let peer = if target.peer == "-" { String::new() } else { format!("; {}", target.peer) };
+        *text += &format!("{:50}{how}{peer}\n", "");
     }
 }
 

@@ -16,10 +16,11 @@ use crate::engine::scene::{self, Round, trace as scene_trace};
 use crate::engine::tallies;
 use crate::error::{Error, Result};
 use crate::gpu::{Commands, Gpu};
+use crate::output::command::lower_case;
 use crate::output::words::{count, number};
+use crate::plan::RoomPlan;
 use crate::plan::scene::{MapPlan, ScenePlan};
 use crate::plan::sensor::Sensor;
-use crate::plan::{Limits, RoomPlan};
 use crate::records::Tally;
 use crate::rng::Rng;
 use crate::scene::Scene;
@@ -89,15 +90,6 @@ pub enum Agreed {
     Fates,
 }
 
-impl Agreed {
-    fn name(self) -> &'static str {
-        match self {
-            Agreed::Photons => "photons",
-            Agreed::Fates => "fates",
-        }
-    }
-}
-
 /// What a builder took.
 #[derive(Debug, Clone, PartialEq, Serialize)]
 pub struct Timed {
@@ -144,7 +136,7 @@ pub fn measure(gpu: &Gpu, request: &Request, scene: Option<&Scene>, cancelled: &
                 return if complete == 0 { Err(Error::Interrupted) } else { Ok(map) };
             }
             tell(&format!("compaction: {} photons, {}", count(u64::from(photons)), place.label()));
-            map.cells.push(cell(gpu, request, photons, place)?);
+            map.cells.push(Trial { gpu, request, photons, place }.cell()?);
         }
         (before, last) = (last, (photons, size_began.elapsed()));
     }
@@ -158,31 +150,100 @@ impl Place<'_> {
             Place::Scene(scene, _) => scene.name.clone(),
         }
     }
+}
 
-    /// Milliseconds to trace and store all photons, on the device's clock where it has one, and their fates.
-    fn run(&self, gpu: &Gpu, request: &Request, photons: u32, builder: Builder) -> Result<(Spread, Vec<Tally>)> {
-        match self {
-            Place::Room(survival) => {
-                let settings = room_settings(request, photons, *survival, builder);
-                run_room(gpu, &room(&settings), &settings, request.turns)
-            }
-            Place::Scene(scene, geometry) => {
-                run_scene(gpu, geometry, &scene_plan(gpu, request, photons, scene, geometry, builder)?, request)
-            }
+/// One cell under measurement.
+struct Trial<'a> {
+    gpu: &'a Gpu,
+    request: &'a Request,
+    photons: u32,
+    place: &'a Place<'a>,
+}
+
+impl Trial<'_> {
+    fn cell(&self) -> Result<Cell> {
+        let mut builders = Vec::new();
+        let mut fates: Option<Vec<Tally>> = None;
+        for builder in Builder::ON_GPU {
+            let (ms, tallies) = self.time(builder)?;
+            let expected = fates.get_or_insert_with(|| tallies.clone());
+            self.agree(builder, *expected == tallies)?;
+            builders.push(Timed { builder, ms });
         }
+        let sum = |of: fn(&Tally) -> u32| fates.iter().flatten().map(|tally| u64::from(of(tally))).sum::<u64>();
+        // A room stores what goes on, a scene what arrives: that is what goes on or was absorbed, but for mirrors and glass.
+        let (survivors, others) = (sum(|tally| tally.stored), sum(|tally| tally.absorbed) + sum(|tally| tally.escaped));
+        let mut agreed = Agreed::Fates;
+        if (survivors + others) as f64 <= MOST_COMPARED {
+            let expected = self.stored(Builder::Naive)?;
+            for builder in Builder::ON_GPU {
+                self.agree(builder, self.stored(builder)? == expected)?;
+            }
+            agreed = Agreed::Photons;
+        }
+        builders.sort_by(|a, b| a.ms.median.total_cmp(&b.ms.median));
+        let (scene, survival) = match self.place {
+            Place::Room(survival) => (None, *survival),
+            Place::Scene(scene, _) => (Some(scene.name.clone()), (survivors as f64 / (survivors + others).max(1) as f64) as f32),
+        };
+        Ok(Cell { scene, survival, photons: self.photons, survivors, agreed, builders })
+    }
+
+    fn agree(&self, builder: Builder, same: bool) -> Result<()> {
+        if same {
+            return Ok(());
+        }
+        let what = format!("the photon map of --variant {}, of {} photons at {},", builder.name(), self.photons, self.place.label());
+        Err(Error::Miscalculated { device: self.gpu.facts().name.clone(), what })
+    }
+
+    /// A closed room, whose every wall lets the same share of paths go on.
+    fn room(&self, survival: f32, builder: Builder) -> (RoomScene, RoomSettings) {
+        let settings = RoomSettings {
+            builder,
+            photons: self.photons,
+            // At once, as far as they fit, so that builders differ in nothing else.
+            chunk: Some(self.photons),
+            bounces: self.request.bounces,
+            reflectance: survival,
+            rng: Rng::Philox,
+            mesh: 1,
+            gather: Gather::Brute,
+            ..RoomSettings::default()
+        };
+        let mut room = open_box(&settings);
+        room.faces.fill(Some(Wall { name: "wall", albedo: survival, shininess: None }));
+        (room, settings)
+    }
+
+    /// All light of a scene goes into one map.
+    fn scene_plan(&self, scene: &Scene, geometry: &Geometry, builder: Builder) -> Result<ScenePlan> {
+        let settings = SceneSettings {
+            builder: Some(builder),
+            photons: self.photons,
+            chunk: Some(self.photons),
+            bounces: self.request.bounces,
+            illumination: Illumination::Photons,
+            ..SceneSettings::default()
+        };
+        let plan = ScenePlan::new(scene, geometry, &settings, Sensor::Receivers { count: 1 }, &engine::limits(self.gpu.facts()))?;
+        if plan.global.is_none() {
+            return Err(Error::setting("SCENE", &scene.name, "has no light, and so no photons; name a scene that has some"));
+        }
+        Ok(plan)
     }
 
     /// The photon map, sorted.
-    fn stored(&self, gpu: &Gpu, request: &Request, photons: u32, builder: Builder) -> Result<Vec<[u32; 8]>> {
-        let mut stored: Vec<[u32; 8]> = match self {
+    fn stored(&self, builder: Builder) -> Result<Vec<[u32; 8]>> {
+        let mut stored: Vec<[u32; 8]> = match self.place {
             Place::Room(survival) => {
-                let settings = room_settings(request, photons, *survival, builder);
-                photons_on_gpu(gpu, &room(&settings), &settings)?.into_iter().map(bytemuck::cast).collect()
+                let (room, settings) = self.room(*survival, builder);
+                photons_on_gpu(self.gpu, &room, &settings)?.into_iter().map(bytemuck::cast).collect()
             }
             Place::Scene(scene, geometry) => {
-                let plan = scene_plan(gpu, request, photons, scene, geometry, builder)?;
-                let mut commands = Commands::new(gpu, scene::constants(&plan), Instant::now())?;
-                let resources = SceneResources::new(gpu, &mut commands, geometry, &plan, &[])?;
+                let plan = self.scene_plan(scene, geometry, builder)?;
+                let mut commands = Commands::new(self.gpu, scene::constants(&plan), Instant::now())?;
+                let resources = SceneResources::new(self.gpu, &mut commands, geometry, &plan, &[])?;
                 let round = Round { resources: &resources, geometry, plan: &plan, number: 0 };
                 scene_trace::stored(&mut commands, round, global_map(&plan))?.into_iter().map(bytemuck::cast).collect()
             }
@@ -190,142 +251,66 @@ impl Place<'_> {
         stored.sort_unstable();
         Ok(stored)
     }
-}
 
-fn cell(gpu: &Gpu, request: &Request, photons: u32, place: &Place) -> Result<Cell> {
-    let mut builders = Vec::new();
-    let mut fates: Option<Vec<Tally>> = None;
-    for builder in Builder::ON_GPU {
-        let (ms, tallies) = place.run(gpu, request, photons, builder)?;
-        let expected = fates.get_or_insert_with(|| tallies.clone());
-        agree(gpu, builder, photons, place, *expected == tallies)?;
-        builders.push(Timed { builder, ms });
-    }
-    let sum = |of: fn(&Tally) -> u32| fates.iter().flatten().map(|tally| u64::from(of(tally))).sum::<u64>();
-    // A room stores what goes on, a scene what arrives: that is what goes on or was absorbed, but for mirrors and glass.
-    let (survivors, others) = (sum(|tally| tally.stored), sum(|tally| tally.absorbed) + sum(|tally| tally.escaped));
-    let mut agreed = Agreed::Fates;
-    if (survivors + others) as f64 <= MOST_COMPARED {
-        let expected = place.stored(gpu, request, photons, Builder::Naive)?;
-        for builder in Builder::ON_GPU {
-            agree(gpu, builder, photons, place, place.stored(gpu, request, photons, builder)? == expected)?;
+    /// Milliseconds to trace and store all photons, on the device's clock where it has one, and their fates.
+    fn time(&self, builder: Builder) -> Result<(Spread, Vec<Tally>)> {
+        match self.place {
+            Place::Room(survival) => {
+                let (room, settings) = self.room(*survival, builder);
+                let plan = RoomPlan::new(&room, &settings, &engine::limits(self.gpu.facts()))?;
+                self.gpu.prepare(&trace::modules(&plan), &constants(&plan))?;
+                let mut commands = Commands::new(self.gpu, constants(&plan), Instant::now())?;
+                let resources = RoomResources::new(self.gpu, &mut commands, &room, &plan)?;
+                self.turns(commands, |commands, turn| {
+                    tallies::clear(commands, &resources.tallies);
+                    for ranges in plan.chunks() {
+                        commands.scope(turn, |commands| trace::chunk(commands, &resources, &plan, 0, &ranges))?;
+                        commands.submit()?;
+                    }
+                    tallies::read(commands, &resources.tallies, settings.bounces)
+                })
+            }
+            Place::Scene(scene, geometry) => {
+                let plan = self.scene_plan(scene, geometry, builder)?;
+                self.gpu.prepare(&scene_trace::modules(&plan), &scene::constants(&plan))?;
+                let mut commands = Commands::new(self.gpu, scene::constants(&plan), Instant::now())?;
+                let resources = SceneResources::new(self.gpu, &mut commands, geometry, &plan, &[])?;
+                let (round, map) = (Round { resources: &resources, geometry, plan: &plan, number: 0 }, global_map(&plan));
+                let buffers = resources.photons.as_ref().expect("a map has photons");
+                self.turns(commands, |commands, turn| {
+                    tallies::clear(commands, &buffers.tallies[0]);
+                    for chunk in map.chunks() {
+                        commands.scope(turn, |commands| scene_trace::trace(commands, round, buffers, map, chunk, &mut |_| Ok(())))?;
+                        commands.submit()?;
+                    }
+                    tallies::read(commands, &buffers.tallies[0], plan.tally_rows())
+                })
+            }
         }
-        agreed = Agreed::Photons;
     }
-    builders.sort_by(|a, b| a.ms.median.total_cmp(&b.ms.median));
-    let (scene, survival) = match place {
-        Place::Room(survival) => (None, *survival),
-        Place::Scene(scene, _) => (Some(scene.name.clone()), (survivors as f64 / (survivors + others).max(1) as f64) as f32),
-    };
-    Ok(Cell { scene, survival, photons, survivors, agreed, builders })
-}
 
-fn agree(gpu: &Gpu, builder: Builder, photons: u32, place: &Place, same: bool) -> Result<()> {
-    if same {
-        return Ok(());
-    }
-    let what = format!("the photon map of --variant {}, of {photons} photons at {},", builder.name(), place.label());
-    Err(Error::Miscalculated { device: gpu.facts().name.clone(), what })
-}
-
-fn room_settings(request: &Request, photons: u32, survival: f32, builder: Builder) -> RoomSettings {
-    RoomSettings {
-        builder,
-        photons,
-        // At once, as far as they fit, so that builders differ in nothing else.
-        chunk: Some(photons),
-        bounces: request.bounces,
-        reflectance: survival,
-        rng: Rng::Philox,
-        mesh: 1,
-        gather: Gather::Brute,
-        ..RoomSettings::default()
-    }
-}
-
-fn room(settings: &RoomSettings) -> RoomScene {
-    let mut room = open_box(settings);
-    room.faces.iter_mut().for_each(|face| *face = Some(Wall { name: "wall", albedo: settings.reflectance, shininess: None }));
-    room
-}
-
-fn run_room(gpu: &Gpu, room: &RoomScene, settings: &RoomSettings, turns: usize) -> Result<(Spread, Vec<Tally>)> {
-    let plan = RoomPlan::new(room, settings, &limits(gpu))?;
-    gpu.prepare(&trace::modules(&plan), &constants(&plan))?;
-    let mut commands = Commands::new(gpu, constants(&plan), Instant::now())?;
-    let resources = RoomResources::new(gpu, &mut commands, room, &plan)?;
-    timed(gpu, commands, turns, |commands, name| {
-        tallies::clear(commands, &resources.tallies);
-        for ranges in plan.chunks() {
-            commands.scope(name, |commands| trace::chunk(commands, &resources, &plan, 0, &ranges))?;
-            commands.submit()?;
+    /// Milliseconds of each turn, and the fates of the last; the first turn, which fills caches, does not count.
+    fn turns(
+        &self,
+        mut commands: Commands,
+        mut turn: impl FnMut(&mut Commands, &str) -> Result<Vec<Tally>>,
+    ) -> Result<(Spread, Vec<Tally>)> {
+        commands.warm_up()?;
+        commands.submit()?;
+        let names: Vec<String> = (0..=self.request.turns).map(|number| format!("turn {number}")).collect();
+        let mut fates = Vec::new();
+        for name in &names {
+            fates = turn(&mut commands, name)?;
         }
-        tallies::read(commands, &resources.tallies, settings.bounces)
-    })
-}
-
-/// The plan by which all light of a scene goes into one map.
-fn scene_plan(gpu: &Gpu, request: &Request, photons: u32, scene: &Scene, geometry: &Geometry, builder: Builder) -> Result<ScenePlan> {
-    let settings = SceneSettings {
-        builder: Some(builder),
-        photons,
-        chunk: Some(photons),
-        bounces: request.bounces,
-        illumination: Illumination::Photons,
-        ..SceneSettings::default()
-    };
-    let plan = ScenePlan::new(scene, geometry, &settings, Sensor::Receivers { count: 1 }, &limits(gpu))?;
-    if plan.global.is_none() {
-        return Err(Error::setting("SCENE", &scene.name, "has no light, and so no photons; name a scene that has some"));
+        self.gpu.check_validation()?;
+        let timings = commands.finish("compaction");
+        let times = names[1..].iter().map(|name| timings.best_ms(name).expect("the turn has run"));
+        Ok((Spread::of(times.collect()).expect("there is a turn that counts"), fates))
     }
-    Ok(plan)
 }
 
 fn global_map(plan: &ScenePlan) -> &MapPlan {
     plan.global.as_ref().expect("a plan without the map is refused")
-}
-
-fn run_scene(gpu: &Gpu, geometry: &Geometry, plan: &ScenePlan, request: &Request) -> Result<(Spread, Vec<Tally>)> {
-    gpu.prepare(&scene_trace::modules(plan), &scene::constants(plan))?;
-    let mut commands = Commands::new(gpu, scene::constants(plan), Instant::now())?;
-    let resources = SceneResources::new(gpu, &mut commands, geometry, plan, &[])?;
-    let (round, map) = (Round { resources: &resources, geometry, plan, number: 0 }, global_map(plan));
-    let buffers = resources.photons.as_ref().expect("a map has photons");
-    timed(gpu, commands, request.turns, |commands, name| {
-        tallies::clear(commands, &buffers.tallies[0]);
-        for chunk in map.chunks() {
-            commands.scope(name, |commands| scene_trace::trace(commands, round, buffers, map, chunk, &mut |_| Ok(())))?;
-            commands.submit()?;
-        }
-        tallies::read(commands, &buffers.tallies[0], plan.tally_rows())
-    })
-}
-
-fn limits(gpu: &Gpu) -> Limits {
-    engine::limits(gpu.facts())
-}
-
-/// Milliseconds of each turn, and the fates of the last; the first turn, which fills caches, does not count.
-fn timed(
-    gpu: &Gpu,
-    mut commands: Commands,
-    turns: usize,
-    mut turn: impl FnMut(&mut Commands, &str) -> Result<Vec<Tally>>,
-) -> Result<(Spread, Vec<Tally>)> {
-    commands.warm_up()?;
-    commands.submit()?;
-    let mut fates = Vec::new();
-    for number in 0..=turns {
-        fates = turn(&mut commands, &turn_name(number))?;
-    }
-    gpu.check_validation()?;
-    let timings = commands.finish("compaction");
-    let times = (1..=turns).map(|number| timings.best_ms(&turn_name(number)).expect("the turn has run"));
-    Ok((Spread::of(times.collect()).expect("there is a turn that counts"), fates))
-}
-
-fn turn_name(turn: usize) -> String {
-    format!("turn {turn}")
 }
 
 impl Cell {
@@ -368,26 +353,20 @@ impl Map {
         for cell in &self.cells {
             let best = cell.builders[0].ms.median;
             let winners: Vec<Builder> = cell.winners().collect();
-            let all: Vec<String> = cell
-                .builders
-                .iter()
-                .map(|timed| {
-                    let mark = if winners.contains(&timed.builder) { "*" } else { "" };
-                    format!("{}{mark} {:.2}", timed.builder.name(), timed.ms.median / best)
-                })
-                .collect();
-            let line = format!(
-                "{:>12} {:>8}% {:>14} {:>8} {:>10}  {}{}
-",
+            let relative = |timed: &Timed| {
+                let mark = if winners.contains(&timed.builder) { "*" } else { "" };
+                format!("{}{mark} {:.2}", timed.builder.name(), timed.ms.median / best)
+            };
+            text += &format!(
+                "{:>12} {:>8}% {:>14} {:>8} {:>10}  {}{}\n",
                 count(u64::from(cell.photons)),
                 number(100.0 * f64::from(cell.survival)),
                 count(cell.survivors),
-                cell.agreed.name(),
+                lower_case(cell.agreed),
                 number(best),
-                all.join(", "),
+                cell.builders.iter().map(relative).collect::<Vec<_>>().join(", "),
                 cell.scene.as_ref().map_or_else(String::new, |scene| format!("  ({scene})"))
             );
-            text.push_str(&line);
         }
         if !self.left_out.is_empty() {
             let sizes: Vec<String> = self.left_out.iter().map(|photons| count(u64::from(*photons))).collect();

@@ -12,20 +12,6 @@ use crate::scene::open_box::open_box;
 use crate::settings::{Builder, RoomSettings};
 use crate::text::counted;
 
-/// Why no further experiment runs.
-pub enum Stop {
-    Cancelled,
-    Failed(Error),
-}
-
-pub type Step<T> = std::result::Result<T, Stop>;
-
-impl From<Error> for Stop {
-    fn from(error: Error) -> Stop {
-        Stop::Failed(error)
-    }
-}
-
 /// What the times were measured on.
 #[derive(Debug, Clone)]
 pub struct Machine {
@@ -86,9 +72,9 @@ impl<'a> Bench<'a> {
     }
 
     /// Begins an experiment, unless the user has had enough.
-    pub fn begin(&mut self, title: &str) -> Step<()> {
+    pub fn begin(&mut self, title: &str) -> Result<()> {
         if self.cancelled.load(Ordering::Relaxed) {
-            return Err(Stop::Cancelled);
+            return Err(Error::Interrupted);
         }
         self.begun += 1;
         (self.progress)(&format!("[{}/{}] {title}", self.begun, self.expected));
@@ -96,38 +82,28 @@ impl<'a> Bench<'a> {
     }
 
     /// One run to its last photon.
-    pub fn run(&self, settings: &RoomSettings) -> Step<RunResult> {
-        let outcome = self.run_once(settings)?;
-        if outcome.is_cancelled() { Err(Stop::Cancelled) } else { Ok(outcome) }
-    }
-
-    fn run_once(&self, settings: &RoomSettings) -> Result<RunResult> {
-        let scene = open_box(settings);
-        room::run(self.gpu, &scene, settings, &mut Control::quiet(self.cancelled))
+    pub fn run(&self, settings: &RoomSettings) -> Result<RunResult> {
+        room::run(self.gpu, &open_box(settings), settings, &mut Control::quiet(self.cancelled))?.finished()
     }
 
     /// `repeats` runs of every case after one that is dropped, as it makes pipelines and fills caches; in turn, so that a
     /// clock that drifts touches all alike. A case that is slow is repeated less, and one whose first run alone is slow
     /// keeps that.
-    pub fn repeat_interleaved(&self, cases: &[RoomSettings], repeats: usize) -> Step<Vec<Vec<RunResult>>> {
-        let mut first = Vec::new();
-        let mut spent = Vec::new();
-        for settings in cases {
-            let began = Instant::now();
-            first.push(self.run(settings)?);
-            spent.push(began.elapsed());
-        }
+    pub fn repeat_interleaved(&self, cases: &[RoomSettings], repeats: usize) -> Result<Vec<Vec<RunResult>>> {
         let mut outcomes = vec![Vec::new(); cases.len()];
-        for _ in 0..repeats {
-            for (case, settings) in cases.iter().enumerate().filter(|(case, _)| spent[*case] < PATIENCE).collect::<Vec<_>>() {
-                let began = Instant::now();
-                outcomes[case].push(self.run(settings)?);
-                spent[case] += began.elapsed();
-            }
-        }
-        for (outcomes, first) in outcomes.iter_mut().zip(first) {
-            if outcomes.is_empty() {
-                outcomes.push(first);
+        let mut spent = vec![Duration::ZERO; cases.len()];
+        for turn in 0..=repeats {
+            for (case, settings) in cases.iter().enumerate() {
+                if spent[case] < PATIENCE {
+                    let began = Instant::now();
+                    let outcome = self.run(settings)?;
+                    spent[case] += began.elapsed();
+                    // The first stands until a later one has come.
+                    if turn == 1 {
+                        outcomes[case].clear();
+                    }
+                    outcomes[case].push(outcome);
+                }
             }
         }
         Ok(outcomes)
@@ -152,7 +128,7 @@ mod tests {
         let mut lines = 0;
         let mut count = |_: &str| lines += 1;
         let mut bench = Bench::new(None, &cancelled, &mut count);
-        assert!(matches!(bench.begin("figure 1"), Err(Stop::Cancelled)));
+        assert!(matches!(bench.begin("figure 1"), Err(Error::Interrupted)));
         assert_eq!(lines, 0);
     }
 
@@ -162,9 +138,7 @@ mod tests {
         let bench_settings = RoomSettings { builder: Builder::Cpu, photons: 10, mesh: 2, ..RoomSettings::default() };
         let mut silent = |_: &str| {};
         let bench = Bench::new(None, &cancelled, &mut silent);
-        let Ok(outcomes) = bench.repeat_interleaved(&[bench_settings.clone(), bench_settings], 3) else {
-            panic!("a run of ten photons fails")
-        };
+        let outcomes = bench.repeat_interleaved(&[bench_settings.clone(), bench_settings], 3).unwrap();
         assert_eq!(outcomes.iter().map(Vec::len).collect::<Vec<_>>(), [3, 3]);
     }
 }

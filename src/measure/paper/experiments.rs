@@ -1,16 +1,16 @@
 //! The paper's times, measured again: both passes by builder (section 4.3), and the whole run by
 //! photon count (table 1).
 
-use super::bench::{Bench, Step};
+use super::bench::Bench;
 use super::{Reproduction, Request, published};
 use crate::engine::room::RunResult;
+use crate::error::Result;
 use crate::output::command;
 use crate::output::words;
 use crate::rng::Rng;
 use crate::settings::{Builder, Gather, Preset, RoomSettings};
 use crate::text::counted;
-use crate::timings::Clock;
-use crate::timings::Spread;
+use crate::timings::{Clock, Spread};
 
 /// Who builds the photon map.
 #[derive(Debug, Clone, Copy, PartialEq, Eq)]
@@ -31,6 +31,16 @@ impl Implementation {
             threads => format!("{} x{threads}", self.builder.name()),
         }
     }
+
+    /// The same in the paper's words.
+    pub fn described(self) -> String {
+        match self.builder {
+            Builder::Naive => "naive (slots)".to_owned(),
+            Builder::Atomic => "modified (atomic)".to_owned(),
+            Builder::Cpu => format!("CPU, {}", counted(self.threads, "thread")),
+            builder => builder.name().to_owned(),
+        }
+    }
 }
 
 /// One combination of section 4.3's comparison.
@@ -48,14 +58,21 @@ pub enum Pass {
     /// Emission and bounces: the photon map.
     Map,
     /// Density estimation at every point of the mesh, building the grid included where there is one.
-    Rendering,
+    Rendering(Gather),
 }
 
 impl Pass {
+    pub const ALL: [Pass; 3] = [Pass::Map, Pass::Rendering(Gather::Brute), Pass::Rendering(Gather::Grid)];
+
     pub fn name(self) -> &'static str {
+        if self == Pass::Map { "map" } else { "rendering" }
+    }
+
+    /// `None` for the map pass, which comes before any gathering.
+    pub fn gather(self) -> Option<Gather> {
         match self {
-            Pass::Map => "map",
-            Pass::Rendering => "rendering",
+            Pass::Map => None,
+            Pass::Rendering(gather) => Some(gather),
         }
     }
 }
@@ -67,8 +84,6 @@ pub struct RunningTime {
     pub bounces: u32,
     pub implementation: Implementation,
     pub pass: Pass,
-    /// `None` for the map pass, which comes before any gathering.
-    pub gather: Option<Gather>,
     pub clock: Clock,
     pub ms: Spread,
     /// Photons that the map holds.
@@ -142,31 +157,34 @@ fn at_size(preset: Preset, photons: u32) -> RoomSettings {
 
 /// Small before large, as the small ones predict the large.
 fn cases(bench: &Bench, request: &Request) -> Vec<Case> {
-    let mut implementations = Vec::new();
-    if bench.has_gpu() {
-        // The paper's two, and its second with one atomic a subgroup.
-        implementations.extend([Builder::Naive, Builder::Atomic, Builder::Ballot].map(Implementation::of));
-    }
+    // The paper's two, and its second with one atomic a subgroup.
+    let on_gpu = [Builder::Naive, Builder::Atomic, Builder::Ballot].map(Implementation::of);
+    let mut implementations = if bench.has_gpu() { on_gpu.to_vec() } else { Vec::new() };
     implementations.push(Implementation::of(Builder::Cpu));
     if request.threads > 1 {
         implementations.push(Implementation { builder: Builder::Cpu, threads: request.threads });
     }
     let mut cases = Vec::new();
-    for photons in [published::PHOTONS, request.large] {
-        for bounces in BOUNCES {
-            for gather in [Gather::Grid, Gather::Brute] {
-                let too_much = photons == request.large && gather == Gather::Brute && bounces != published::BOUNCES;
-                if !too_much {
-                    cases.extend(implementations.iter().map(|&implementation| Case { photons, bounces, implementation, gather }));
-                }
+    for (photons, bounces) in sizes(request) {
+        for gather in [Gather::Grid, Gather::Brute] {
+            let too_much = photons == request.large && gather == Gather::Brute && bounces != published::BOUNCES;
+            if !too_much {
+                cases.extend(implementations.iter().map(|&implementation| Case { photons, bounces, implementation, gather }));
             }
         }
     }
     cases
 }
 
+/// (photons, bounces) of all cases, in order.
+fn sizes(request: &Request) -> [(u32, u32); 4] {
+    let [few, many] = BOUNCES;
+    let (small, large) = (published::PHOTONS, request.large);
+    [(small, few), (small, many), (large, few), (large, many)]
+}
+
 /// Both passes of every case. Builders are measured in turn, the GPU's apart from the CPU's, during which a card idles.
-pub fn running_times(bench: &mut Bench, found: &mut Reproduction) -> Step<()> {
+pub fn running_times(bench: &mut Bench, found: &mut Reproduction) -> Result<()> {
     let all = cases(bench, &found.request);
     let alike = |a: &Case, b: &Case| {
         (a.photons, a.bounces, a.gather, a.implementation.builder == Builder::Cpu)
@@ -188,10 +206,9 @@ pub fn running_times(bench: &mut Bench, found: &mut Reproduction) -> Step<()> {
         for ((case, settings), outcomes) in measured.iter().zip(&settings).zip(&outcomes) {
             let command = command::main_job(Preset::Modified, settings);
             // The map does not depend on the gather, and is timed where the gather disturbs least.
-            if case.gather == Gather::Grid {
-                found.running_times.extend(running_time(case, Pass::Map, outcomes, &command));
-            }
-            found.running_times.extend(running_time(case, Pass::Rendering, outcomes, &command));
+            let map = (case.gather == Gather::Grid).then_some(Pass::Map);
+            let passes = map.into_iter().chain([Pass::Rendering(case.gather)]);
+            found.running_times.extend(passes.filter_map(|pass| running_time(case, pass, outcomes, &command)));
         }
     }
     Ok(())
@@ -199,14 +216,11 @@ pub fn running_times(bench: &mut Bench, found: &mut Reproduction) -> Step<()> {
 
 /// `None` on a device without timestamps: passes inside a submission are not seen by the host.
 fn running_time(case: &Case, pass: Pass, outcomes: &[RunResult], command: &str) -> Option<RunningTime> {
-    let scopes: &[&str] = match pass {
-        Pass::Map => &["round/build"],
-        Pass::Rendering => &["round/index", "round/gather"],
-    };
     // Brute force has no index, nor has the CPU builder's splatting.
-    let has_run = |outcome: &RunResult, scope: &str| outcome.timings.row(scope).is_some();
+    let scopes: &[&str] = if pass == Pass::Map { &["round/build"] } else { &["round/index", "round/gather"] };
     let sum = |outcome: &RunResult| {
-        scopes.iter().filter(|scope| has_run(outcome, scope)).map(|scope| outcome.timings.best_ms(scope)).sum::<Option<f64>>()
+        let has_run = |scope: &&&str| outcome.timings.row(scope).is_some();
+        scopes.iter().filter(has_run).map(|scope| outcome.timings.best_ms(scope)).sum::<Option<f64>>()
     };
     let first = outcomes.first()?;
     Some(RunningTime {
@@ -214,7 +228,6 @@ fn running_time(case: &Case, pass: Pass, outcomes: &[RunResult], command: &str) 
         bounces: case.bounces,
         implementation: case.implementation,
         pass,
-        gather: (pass == Pass::Rendering).then_some(case.gather),
         clock: if first.device.is_some() { Clock::Gpu } else { Clock::Wall },
         ms: Spread::of(outcomes.iter().map(sum).collect::<Option<Vec<f64>>>()?)?,
         stored: first.ledger().stored,
@@ -225,17 +238,17 @@ fn running_time(case: &Case, pass: Pass, outcomes: &[RunResult], command: &str) 
 /// Length of the rendering pass at another size: pair tests grow with the photon list, and those a
 /// second are known from the paper's size.
 fn predicted(case: &Case, found: &Reproduction) -> Option<f64> {
-    let known = found.running_time(published::PHOTONS, case.bounces, case.implementation, Pass::Rendering, Some(case.gather))?;
+    let known = found.running_time(published::PHOTONS, case.bounces, case.implementation, Pass::Rendering(case.gather))?;
     Some(known.ms.median * f64::from(case.photons) / f64::from(published::PHOTONS))
 }
 
 /// (photons of a round, gather) of the rows of table 1.
-fn series(request: &Request) -> [(u32, Gather); 3] {
+pub fn series(request: &Request) -> [(u32, Gather); 3] {
     [(published::PHOTONS, Gather::Brute), (published::PHOTONS, Gather::Grid), (request.large, Gather::Grid)]
 }
 
 /// Whole runs of table 1's rounds.
-pub fn totals(bench: &mut Bench, found: &mut Reproduction) -> Step<()> {
+pub fn totals(bench: &mut Bench, found: &mut Reproduction) -> Result<()> {
     for (photons, gather) in series(&found.request) {
         // Wall time of a round, by the latest row.
         let mut a_round = None;
@@ -271,34 +284,19 @@ pub fn totals(bench: &mut Bench, found: &mut Reproduction) -> Step<()> {
 }
 
 impl Reproduction {
-    pub fn running_time(
-        &self,
-        photons: u32,
-        bounces: u32,
-        implementation: Implementation,
-        pass: Pass,
-        gather: Option<Gather>,
-    ) -> Option<&RunningTime> {
-        self.running_times.iter().find(|time| {
-            (time.photons, time.bounces, time.implementation, time.pass, time.gather) == (photons, bounces, implementation, pass, gather)
-        })
-    }
-
-    /// Median of a pass, milliseconds.
-    pub fn median_ms(&self, photons: u32, bounces: u32, implementation: Implementation, pass: Pass, gather: Option<Gather>) -> Option<f64> {
-        self.running_time(photons, bounces, implementation, pass, gather).map(|time| time.ms.median)
+    pub fn running_time(&self, photons: u32, bounces: u32, implementation: Implementation, pass: Pass) -> Option<&RunningTime> {
+        let wanted = (photons, bounces, implementation, pass);
+        self.running_times.iter().find(|time| (time.photons, time.bounces, time.implementation, time.pass) == wanted)
     }
 
     /// (photons, bounces) that were measured, in order.
     pub fn sizes(&self) -> [(u32, u32); 4] {
-        let [few, many] = BOUNCES;
-        let (small, large) = (published::PHOTONS, self.request.large);
-        [(small, few), (small, many), (large, few), (large, many)]
+        sizes(&self.request)
     }
 
     /// Builders that were measured, in order.
     pub fn implementations(&self) -> Vec<Implementation> {
-        let mut implementations: Vec<Implementation> = Vec::new();
+        let mut implementations = Vec::new();
         for time in &self.running_times {
             if !implementations.contains(&time.implementation) {
                 implementations.push(time.implementation);
@@ -319,11 +317,8 @@ impl RunningTime {
         let comparable = self.photons == published::PHOTONS
             && self.bounces == published::BOUNCES
             && self.implementation.threads == 1
-            && self.gather != Some(Gather::Grid);
-        let passes = match self.pass {
-            Pass::Map => published::MAP_MS,
-            Pass::Rendering => published::RENDERING_MS,
-        };
+            && self.pass != Pass::Rendering(Gather::Grid);
+        let passes = if self.pass == Pass::Map { published::MAP_MS } else { published::RENDERING_MS };
         match self.implementation.builder {
             _ if !comparable => None,
             Builder::Naive => Some(passes.naive),
@@ -339,6 +334,11 @@ impl TotalTime {
         u64::from(self.photons_per_round) * u64::from(self.rounds)
     }
 
+    /// Photons and milliseconds, for charts and fits.
+    pub fn point(&self) -> (f64, f64) {
+        (self.photons() as f64, self.best_ms())
+    }
+
     /// The device's time, else the host's.
     pub fn best_ms(&self) -> f64 {
         self.gpu_ms.unwrap_or(self.wall_ms)
@@ -346,6 +346,7 @@ impl TotalTime {
 
     /// What the paper measured for the same rounds.
     pub fn published_ms(&self) -> Option<f64> {
-        (self.photons_per_round == published::PHOTONS).then(|| published::total_ms(self.rounds)).flatten()
+        let is_same = |rounds: u32| (self.photons_per_round, self.rounds) == (published::PHOTONS, rounds);
+        published::TABLE_1.into_iter().find_map(|(rounds, ms)| is_same(rounds).then_some(ms))
     }
 }

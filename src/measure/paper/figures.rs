@@ -1,8 +1,9 @@
 //! The paper's four figures: films of its settings, as pictures side by side.
 
-use super::bench::{Bench, Step};
+use super::bench::Bench;
 use super::published;
 use crate::engine::room::film::{WallEstimate, estimate_walls};
+use crate::error::Result;
 use crate::output::command;
 use crate::output::image::{Format, Picture, overview, view};
 use crate::scene::open_box::open_box;
@@ -30,12 +31,6 @@ pub struct Frame {
     pub walls: Vec<WallEstimate>,
 }
 
-impl Figure {
-    pub fn file_name(&self) -> String {
-        format!("figure{}.png", self.number)
-    }
-}
-
 /// What a figure shows, before it is made.
 struct Exhibit {
     title: &'static str,
@@ -45,22 +40,14 @@ struct Exhibit {
     columns: usize,
 }
 
-pub fn make(bench: &mut Bench, figures: &mut Vec<Figure>) -> Step<()> {
-    for (place, exhibit) in exhibits().into_iter().enumerate() {
-        let number = place + 1;
-        bench.begin(&format!("figure {number}: {}", exhibit.title))?;
-        let frames = exhibit.frames.into_iter().map(|(label, preset, settings)| frame(bench, label, preset, settings));
-        let frames = frames.collect::<Step<Vec<Frame>>>()?;
-        let picture = compose(&frames, exhibit.columns);
-        figures.push(Figure {
-            number,
-            title: exhibit.title,
-            caption: exhibit.caption,
-            width: picture.width,
-            height: picture.height,
-            png: picture.encode(Format::Png),
-            frames,
-        });
+pub fn make(bench: &mut Bench, figures: &mut Vec<Figure>) -> Result<()> {
+    for (number, Exhibit { title, caption, frames, columns }) in (1..).zip(exhibits()) {
+        bench.begin(&format!("figure {number}: {title}"))?;
+        let frames = frames.into_iter().map(|(label, preset, settings)| frame(bench, label, preset, settings));
+        let frames = frames.collect::<Result<Vec<Frame>>>()?;
+        let picture = compose(&frames, columns);
+        let (width, height, png) = (picture.width, picture.height, picture.encode(Format::Png));
+        figures.push(Figure { number, title, caption, frames, width, height, png });
     }
     Ok(())
 }
@@ -111,7 +98,7 @@ fn exhibits() -> [Exhibit; COUNT] {
     ]
 }
 
-fn frame(bench: &Bench, label: String, preset: Preset, settings: RoomSettings) -> Step<Frame> {
+fn frame(bench: &Bench, label: String, preset: Preset, settings: RoomSettings) -> Result<Frame> {
     let settings = RoomSettings { builder: bench.available(settings.builder), ..settings };
     let outcome = bench.run(&settings)?;
     let walls = estimate_walls(&outcome.film, &open_box(&settings), &outcome.plan);

@@ -12,9 +12,9 @@ mod sample;
 pub mod tables;
 pub mod verdicts;
 
-use crate::error::Result;
+use crate::error::{Error, Result};
 use crate::output::destination::{Folder, write_all};
-use bench::{Bench, Machine, Step, Stop};
+use bench::{Bench, Machine};
 use experiments::{LeftOut, RunningTime, TotalTime};
 use figures::Figure;
 
@@ -59,14 +59,16 @@ pub fn reproduce(bench: &mut Bench, request: Request) -> Result<Reproduction> {
     };
     bench.expect(figures::COUNT + experiments::count(bench, &request));
     match run_all(bench, &mut found) {
-        Ok(()) => found.complete = true,
-        Err(Stop::Cancelled) => {}
-        Err(Stop::Failed(error)) => return Err(error),
+        Err(Error::Interrupted) => {}
+        result => {
+            result?;
+            found.complete = true;
+        }
     }
     Ok(found)
 }
 
-fn run_all(bench: &mut Bench, found: &mut Reproduction) -> Step<()> {
+fn run_all(bench: &mut Bench, found: &mut Reproduction) -> Result<()> {
     figures::make(bench, &mut found.figures)?;
     experiments::running_times(bench, found)?;
     experiments::totals(bench, found)
@@ -74,7 +76,8 @@ fn run_all(bench: &mut Bench, found: &mut Reproduction) -> Step<()> {
 
 /// Writes pictures, tables and the page.
 pub fn write(folder: &Folder, found: &Reproduction) -> Result<()> {
-    let mut files: Vec<_> = found.figures.iter().map(|figure| (folder.file(&figure.file_name()), figure.png.clone())).collect();
+    let mut files: Vec<_> =
+        found.figures.iter().map(|figure| (folder.file(&format!("figure{}.png", figure.number)), figure.png.clone())).collect();
     files.push((folder.file("running_times.csv"), tables::running_times(&found.running_times)));
     files.push((folder.file("table1.csv"), tables::totals(&found.totals)));
     files.push((folder.file("index.html"), page::html(found).into_bytes()));

@@ -2,47 +2,36 @@
 
 use base64::Engine;
 use base64::engine::general_purpose::STANDARD;
-use maud::{DOCTYPE, Markup, PreEscaped, html};
+use maud::{Markup, html};
 
 use super::bench::PATIENCE;
-use super::experiments::{Implementation, LARGE_REPEATS, LONGEST_PASS_MS, LeftOut, Pass, RunningTime, TotalTime};
+use super::experiments::{LARGE_REPEATS, LONGEST_PASS_MS, LeftOut, Pass, RunningTime, TotalTime, series};
 use super::figures::Figure;
-use super::verdicts::{self, Standing};
-use super::{Reproduction, chart, published};
+use super::verdicts;
+use super::{Reproduction, chart as charts, published};
+use crate::output::page::{chart, commands, page, software_notice, table};
 use crate::output::words::{count, duration, number, times};
-use crate::settings::{Builder, Gather};
+use crate::settings::Gather;
 use crate::text::counted;
 
+const TITLE: &str = "Photon Mapping On The GPU, measured again";
+
 pub fn html(found: &Reproduction) -> String {
-    let page = html! {
-        (DOCTYPE)
-        html lang="en" {
-            head {
-                meta charset="utf-8";
-                meta name="viewport" content="width=device-width, initial-scale=1";
-                meta name="color-scheme" content="light dark";
-                title { "Photon Mapping On The GPU, measured again" }
-                style { (PreEscaped(include_str!("../../output/page.css"))) }
-            }
-            body {
-                main {
-                    (head(found))
-                    (standing(found))
-                    (figures(found))
-                    (running_times(found))
-                    (table_1(found))
-                    (choices())
-                }
-            }
-        }
+    let content = html! {
+        (head(found))
+        (standing(found))
+        (figures(found))
+        (running_times(found))
+        (table_1(found))
+        (choices())
     };
-    page.into_string()
+    page(TITLE, &content)
 }
 
 fn head(found: &Reproduction) -> Markup {
     html! {
         header {
-            h1 { "Photon Mapping On The GPU, measured again" }
+            h1 { (TITLE) }
             p { "Every figure and table of Scott Grauer-Gray's paper, reproduced with photonmill " (env!("CARGO_PKG_VERSION")) " and compared with the published numbers." }
             @if !found.complete {
                 p.notice { strong { "Incomplete." } " The run was interrupted; this page shows the experiments that were complete." }
@@ -73,7 +62,7 @@ fn device_notice(found: &Reproduction) -> Markup {
             None => p.notice { "No Vulkan device was found. Figures and times come from the CPU builder only." },
             Some(device) => {
                 @if device.is_cpu {
-                    p.notice { strong { "This device is software." } " It runs Vulkan on the CPU: 'GPU' times on this page are CPU times, and a comparison of GPU with CPU compares two programs on one processor." }
+                    (software_notice(" A comparison of GPU with CPU compares two programs on one processor."))
                 }
                 @if !device.has_timestamps {
                     p.notice { "This device has no timestamps. Times of single passes are unknown, and whole runs are timed by the host's clock." }
@@ -96,20 +85,12 @@ fn standing(found: &Reproduction) -> Markup {
                 h3 {
                     (verdict.topic)
                     @if let Some(standing) = verdict.standing {
-                        " " span class={ "standing " (standing_class(standing)) } { (standing.words()) }
+                        " " span class={ "standing " (standing.class()) } { (standing.words()) }
                     }
                 }
                 p { (verdict.text) }
             }
         }
-    }
-}
-
-fn standing_class(standing: Standing) -> &'static str {
-    match standing {
-        Standing::Holds => "holds",
-        Standing::HoldsInPart => "in-part",
-        Standing::NoLonger => "no-longer",
     }
 }
 
@@ -158,12 +139,10 @@ fn running_times(found: &Reproduction) -> Markup {
             h3 { "At the paper's size" }
             p { (count(u64::from(published::PHOTONS))) " photons, " (published::BOUNCES) " bounces, brute force: every point tests the whole photon list, including empty slots." }
             (beside_published(found))
-            @if let Some(chart) = chart::running_times(found) {
-                figure.chart {
-                    div.scroll { (PreEscaped(chart)) }
-                    figcaption { p { "Both passes at the paper's size on a logarithmic scale. Grey: published in 2008. Orange: measured here. The paper has no grid." } }
-                }
-            }
+            (chart(
+                charts::running_times(found),
+                "Both passes at the paper's size on a logarithmic scale. Grey: published in 2008. Orange: measured here. The paper has no grid."
+            ))
             h3 id="all-times" { "All sizes" }
             p {
                 "The large size uses philox. Rand48 gives each of N photons every Nth number (leap-frogging); "
@@ -178,67 +157,49 @@ fn running_times(found: &Reproduction) -> Markup {
 
 /// The paper's comparison: each builder, each pass, then and here.
 fn beside_published(found: &Reproduction) -> Markup {
-    let passes = [(Pass::Map, None), (Pass::Rendering, Some(Gather::Brute))];
-    let time = |implementation: Implementation, (pass, gather): (Pass, Option<Gather>)| {
-        found.running_time(published::PHOTONS, published::BOUNCES, implementation, pass, gather)
+    let passes = [Pass::Map, Pass::Rendering(Gather::Brute)];
+    let head = html! {
+        tr { th.name rowspan="2" { "Implementation" } th colspan="3" { "Map pass, ms" } th colspan="3" { "Rendering pass, ms" } }
+        tr { @for _ in passes { th { "2008" } th { "here" } th { "2008 / here" } } }
     };
-    html! {
-        div.scroll { table {
-            thead {
-                tr { th.name rowspan="2" { "Implementation" } th colspan="3" { "Map pass, ms" } th colspan="3" { "Rendering pass, ms" } }
-                tr { @for _ in passes { th { "2008" } th { "here" } th { "2008 / here" } } }
-            }
-            tbody {
-                @for implementation in found.implementations() {
-                    tr {
-                        th scope="row" { (described(implementation)) }
-                        @for pass in passes {
-                            @let time = time(implementation, pass);
-                            @let then = time.and_then(RunningTime::published_ms);
-                            td { (exact(then)) }
-                            td { (spread(time)) }
-                            td { (ratio(then, time.map(|time| time.ms.median))) }
-                        }
-                    }
+    let body = html! {
+        @for implementation in found.implementations() {
+            tr {
+                th scope="row" { (implementation.described()) }
+                @for pass in passes {
+                    @let time = found.running_time(published::PHOTONS, published::BOUNCES, implementation, pass);
+                    @let then = time.and_then(RunningTime::published_ms);
+                    td { (exact(then)) } td { (spread(time)) } td { (ratio(then, time.map(|time| time.ms.median))) }
                 }
             }
-        } }
-    }
+        }
+    };
+    table(&head, &body)
 }
 
 fn all_times(found: &Reproduction) -> Markup {
-    html! {
-        div.scroll { table {
-            thead {
-                tr {
-                    th { "Photons" } th { "Bounces" } th.name { "Implementation" } th { "Photons stored" }
-                    th { "Map, ms" } th { "Brute force, ms" } th { "Grid, ms" } th { "Runs" }
-                }
-            }
-            tbody {
-                @for (photons, bounces) in found.sizes() {
-                    @for implementation in found.implementations() {
-                        @let time = |pass, gather| found.running_time(photons, bounces, implementation, pass, gather);
-                        @let map = time(Pass::Map, None);
-                        @let brute = time(Pass::Rendering, Some(Gather::Brute));
-                        @let grid = time(Pass::Rendering, Some(Gather::Grid));
-                        @if let Some(map) = map.or(brute).or(grid) {
-                            tr {
-                                td { (count(u64::from(photons))) } td { (bounces) } th scope="row" { (described(implementation)) } td { (count(map.stored)) }
-                                td { (spread(time(Pass::Map, None))) } td { (spread(brute)) } td { (spread(grid)) }
-                                td { (runs([brute, grid])) }
-                            }
-                        }
+    let head = html! {
+        tr {
+            th { "Photons" } th { "Bounces" } th.name { "Implementation" } th { "Photons stored" }
+            th { "Map, ms" } th { "Brute force, ms" } th { "Grid, ms" } th { "Runs" }
+        }
+    };
+    let body = html! {
+        @for (photons, bounces) in found.sizes() {
+            @for implementation in found.implementations() {
+                @let [map, brute, grid] = Pass::ALL.map(|pass| found.running_time(photons, bounces, implementation, pass));
+                @if let Some(any) = map.or(brute).or(grid) {
+                    tr {
+                        td { (count(u64::from(photons))) } td { (bounces) } th scope="row" { (implementation.described()) } td { (count(any.stored)) }
+                        td { (spread(map)) } td { (spread(brute)) } td { (spread(grid)) } td { (runs([brute, grid])) }
                     }
                 }
             }
-        } }
-        details {
-            summary { "Commands" }
-            @for time in found.running_times.iter().filter(|time| time.pass == Pass::Rendering) {
-                p { code { (time.command) } }
-            }
         }
+    };
+    html! {
+        (table(&head, &body))
+        (commands(found.running_times.iter().filter(|time| time.pass != Pass::Map).map(|time| &time.command)))
     }
 }
 
@@ -263,21 +224,20 @@ fn left_out(experiments: &[LeftOut], limit_ms: f64, known: &str) -> Markup {
 }
 
 fn table_1(found: &Reproduction) -> Markup {
-    let (small, large) = (published::PHOTONS, found.request.large);
+    let large = format!("Grid, {} photons per round (philox)", count(u64::from(found.request.large)));
+    let titles = ["Brute force, as in the paper", "The same photons, sorted into a grid", &large];
     html! {
         section id="table-1" {
             h2 { "Table 1: time against photons" }
             p { "The modified implementation with rounds of 5000 photons, 15 bounces, radius 0.025 m and Phong walls of shininess 5. Each row is one run. A short row follows an uncounted run that creates the pipelines. 'GPU' is the device time of all rounds; 'wall' is the time of the whole run, including the creation of buffers." }
-            (totals_of(found, small, Gather::Brute, "Brute force, as in the paper"))
-            (totals_of(found, small, Gather::Grid, "The same photons, sorted into a grid"))
-            (totals_of(found, large, Gather::Grid, &format!("Grid, {} photons per round (philox)", count(u64::from(large)))))
-            (left_out(&found.totals_left_out, found.request.longest_ms, "the time per round of the previous row"))
-            @if let Some(chart) = chart::totals(found) {
-                figure.chart {
-                    div.scroll { (PreEscaped(chart)) }
-                    figcaption { p { "Run time against photons, both scales logarithmic. A slope of 1 means that time is proportional to photons." } }
-                }
+            @for ((photons, gather), title) in series(&found.request).into_iter().zip(titles) {
+                (totals_of(found, photons, gather, title))
             }
+            (left_out(&found.totals_left_out, found.request.longest_ms, "the time per round of the previous row"))
+            (chart(
+                charts::totals(found),
+                "Run time against photons, both scales logarithmic. A slope of 1 means that time is proportional to photons."
+            ))
         }
     }
 }
@@ -285,35 +245,31 @@ fn table_1(found: &Reproduction) -> Markup {
 fn totals_of(found: &Reproduction, photons_per_round: u32, gather: Gather, title: &str) -> Markup {
     let totals: Vec<&TotalTime> = found.totals_of(photons_per_round, gather).collect();
     let has_published = totals.iter().any(|total| total.published_ms().is_some());
+    let head = html! {
+        tr {
+            th { "Photons" } th { "Rounds" }
+            @if has_published { th { "2008, ms" } }
+            th { "GPU, ms" } th { "wall, ms" }
+            @if has_published { th { "2008 / wall" } }
+            th { "photons/s" }
+        }
+    };
+    let body = html! {
+        @for total in &totals {
+            tr {
+                td { (count(total.photons())) } td { (total.rounds) }
+                @if has_published { td { (exact(total.published_ms())) } }
+                td { (total.gpu_ms.map_or_else(|| "–".to_owned(), number)) } td { (number(total.wall_ms)) }
+                @if has_published { td { (ratio(total.published_ms(), Some(total.wall_ms))) } }
+                td { (number(total.photons() as f64 / (total.wall_ms / 1e3))) }
+            }
+        }
+    };
     html! {
         @if !totals.is_empty() {
             h3 { (title) }
-            div.scroll { table {
-                thead { tr {
-                    th { "Photons" } th { "Rounds" }
-                    @if has_published { th { "2008, ms" } }
-                    th { "GPU, ms" } th { "wall, ms" }
-                    @if has_published { th { "2008 / wall" } }
-                    th { "photons/s" }
-                } }
-                tbody {
-                    @for total in &totals {
-                        tr {
-                            td { (count(total.photons())) } td { (total.rounds) }
-                            @if has_published { td { (exact(total.published_ms())) } }
-                            td { (total.gpu_ms.map_or_else(|| "–".to_owned(), number)) } td { (number(total.wall_ms)) }
-                            @if has_published { td { (ratio(total.published_ms(), Some(total.wall_ms))) } }
-                            td { (number(total.photons() as f64 / (total.wall_ms / 1e3))) }
-                        }
-                    }
-                }
-            } }
-            details {
-                summary { "Commands" }
-                @for total in &totals {
-                    p { code { (total.command) } }
-                }
-            }
+            (table(&head, &body))
+            (commands(totals.iter().map(|total| &total.command)))
         }
     }
 }
@@ -331,16 +287,6 @@ fn choices() -> Markup {
                 li { "A photon is stored where it is reflected, at most once per bounce. The illumination of a point is the number of photons within the radius divided by 90 (by 10 per round in figure 4 and table 1); values of 1 and more are shown as white." }
             }
         }
-    }
-}
-
-fn described(implementation: Implementation) -> String {
-    match (implementation.builder, implementation.threads) {
-        (Builder::Naive, _) => "naive (slots)".to_owned(),
-        (Builder::Atomic, _) => "modified (atomic)".to_owned(),
-        (Builder::Cpu, 1) => "CPU, 1 thread".to_owned(),
-        (Builder::Cpu, threads) => format!("CPU, {threads} threads"),
-        (builder, _) => builder.name().to_owned(),
     }
 }
 

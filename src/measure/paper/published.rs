@@ -30,8 +30,3 @@ pub struct Passes {
     pub modified: f64,
     pub cpu: f64,
 }
-
-/// Table 1's time for some rounds of 5000 photons.
-pub fn total_ms(rounds: u32) -> Option<f64> {
-    TABLE_1.iter().find(|(row, _)| *row == rounds).map(|(_, ms)| *ms)
-}

@@ -6,8 +6,7 @@ use super::figures::Figure;
 use super::{Reproduction, Request, published};
 use crate::output::command;
 use crate::settings::{Builder, Gather, Preset, RoomSettings};
-use crate::timings::Clock;
-use crate::timings::Spread;
+use crate::timings::{Clock, Spread};
 
 const LARGE: u32 = 65_536;
 
@@ -40,13 +39,11 @@ fn running_times() -> Vec<RunningTime> {
     for photons in [published::PHOTONS, LARGE] {
         for bounces in [published::BOUNCES, 15] {
             for builder in [Builder::Naive, Builder::Atomic, Builder::Ballot, Builder::Cpu] {
-                let passes = [(Pass::Map, None), (Pass::Rendering, Some(Gather::Brute)), (Pass::Rendering, Some(Gather::Grid))];
-                times.extend(passes.map(|(pass, gather)| RunningTime {
+                times.extend(Pass::ALL.map(|pass| RunningTime {
                     photons,
                     bounces,
                     implementation: Implementation::of(builder),
                     pass,
-                    gather,
                     clock: if builder == Builder::Cpu { Clock::Wall } else { Clock::Gpu },
                     ms: Spread { median: f64::from(photons) / 1000.0, min: 0.5, max: 100.0, repeats: 7 },
                     stored: u64::from(photons),

@@ -2,65 +2,44 @@
 
 use super::experiments::{RunningTime, TotalTime};
 use crate::output::command;
+use crate::output::csv_table::{Column, csv_table};
 use crate::timings::Clock;
 
-const RUNNING_TIMES: [&str; 11] =
-    ["photons", "bounces", "builder", "pass", "gather", "clock", "repeats", "median_ms", "min_ms", "max_ms", "published_ms"];
-const TOTALS: [&str; 7] = ["photons_per_round", "rounds", "photons", "gather", "gpu_ms", "wall_ms", "published_ms"];
+const RUNNING_TIMES: [Column<RunningTime>; 11] = [
+    ("photons", |time| time.photons.to_string()),
+    ("bounces", |time| time.bounces.to_string()),
+    ("builder", |time| time.implementation.name()),
+    ("pass", |time| time.pass.name().to_owned()),
+    ("gather", |time| time.pass.gather().map(command::gather_name).unwrap_or_default()),
+    ("clock", |time| if time.clock == Clock::Gpu { "gpu" } else { "wall" }.to_owned()),
+    ("repeats", |time| time.ms.repeats.to_string()),
+    ("median_ms", |time| milliseconds(time.ms.median)),
+    ("min_ms", |time| milliseconds(time.ms.min)),
+    ("max_ms", |time| milliseconds(time.ms.max)),
+    ("published_ms", |time| time.published_ms().map_or_else(String::new, milliseconds)),
+];
+
+const TOTALS: [Column<TotalTime>; 7] = [
+    ("photons_per_round", |total| total.photons_per_round.to_string()),
+    ("rounds", |total| total.rounds.to_string()),
+    ("photons", |total| total.photons().to_string()),
+    ("gather", |total| command::gather_name(total.gather)),
+    ("gpu_ms", |total| total.gpu_ms.map_or_else(String::new, milliseconds)),
+    ("wall_ms", |total| milliseconds(total.wall_ms)),
+    ("published_ms", |total| total.published_ms().map_or_else(String::new, milliseconds)),
+];
 
 pub fn running_times(times: &[RunningTime]) -> Vec<u8> {
-    table(
-        RUNNING_TIMES,
-        times.iter().map(|time| {
-            [
-                time.photons.to_string(),
-                time.bounces.to_string(),
-                time.implementation.name(),
-                time.pass.name().to_owned(),
-                time.gather.map(command::gather_name).unwrap_or_default(),
-                match time.clock {
-                    Clock::Gpu => "gpu".to_owned(),
-                    Clock::Wall => "wall".to_owned(),
-                },
-                time.ms.repeats.to_string(),
-                milliseconds(Some(time.ms.median)),
-                milliseconds(Some(time.ms.min)),
-                milliseconds(Some(time.ms.max)),
-                milliseconds(time.published_ms()),
-            ]
-        }),
-    )
+    csv_table(&RUNNING_TIMES, times)
 }
 
 pub fn totals(totals: &[TotalTime]) -> Vec<u8> {
-    table(
-        TOTALS,
-        totals.iter().map(|total| {
-            [
-                total.photons_per_round.to_string(),
-                total.rounds.to_string(),
-                total.photons().to_string(),
-                command::gather_name(total.gather),
-                milliseconds(total.gpu_ms),
-                milliseconds(Some(total.wall_ms)),
-                milliseconds(total.published_ms()),
-            ]
-        }),
-    )
+    csv_table(&TOTALS, totals)
 }
 
-/// To the nanosecond, which is as fine as any clock here; empty where there is no value.
-fn milliseconds(value: Option<f64>) -> String {
-    value.map(|value| ((value * 1e6).round() / 1e6).to_string()).unwrap_or_default()
-}
-
-fn table<const COLUMNS: usize>(header: [&str; COLUMNS], rows: impl Iterator<Item = [String; COLUMNS]>) -> Vec<u8> {
-    let mut writer = csv::Writer::from_writer(Vec::new());
-    writer.write_record(header).expect("rows of one length can be written to memory");
-    for row in rows {
-        writer.write_record(row).expect("rows of one length can be written to memory");
-    }
-    writer.into_inner().expect("memory can be flushed")
+/// To the nanosecond, which is as fine as any clock here.
+fn milliseconds(value: f64) -> String {
+    ((value * 1e6).round() / 1e6).to_string()
 }
 
 #[cfg(test)]

@@ -1,9 +1,11 @@
 //! Which of the paper's findings still hold: sentences computed from this run's measurements.
 
-use super::experiments::{Implementation, Pass, TotalTime};
+use super::experiments::{Implementation, Pass, TotalTime, series};
 use super::figures::Frame;
 use super::{Reproduction, published};
 use crate::engine::room::film::WallEstimate;
+use crate::measure::line_fit::LineFit;
+use crate::output::svg::extremes;
 use crate::output::words::{count, duration, list, number, times};
 use crate::scene::open_box::open_box;
 use crate::settings::{Builder, Gather};
@@ -18,20 +20,30 @@ pub enum Standing {
 
 impl Standing {
     /// Of a claim that was tried several times; `None` if never.
-    fn of(trials: &[bool]) -> Option<Standing> {
-        match trials {
-            [] => None,
-            all if all.iter().all(|held| *held) => Some(Standing::Holds),
-            none if none.iter().all(|held| !held) => Some(Standing::NoLonger),
-            _ => Some(Standing::HoldsInPart),
+    fn of(trials: impl IntoIterator<Item = bool>) -> Option<Standing> {
+        let (held, failed): (Vec<bool>, Vec<bool>) = trials.into_iter().partition(|holds| *holds);
+        match (held.is_empty(), failed.is_empty()) {
+            (true, true) => None,
+            (false, true) => Some(Standing::Holds),
+            (true, false) => Some(Standing::NoLonger),
+            (false, false) => Some(Standing::HoldsInPart),
         }
     }
 
     pub fn words(self) -> &'static str {
+        self.words_and_class().0
+    }
+
+    /// Its class in the style sheet.
+    pub fn class(self) -> &'static str {
+        self.words_and_class().1
+    }
+
+    fn words_and_class(self) -> (&'static str, &'static str) {
         match self {
-            Standing::Holds => "still holds",
-            Standing::HoldsInPart => "holds in part",
-            Standing::NoLonger => "no longer holds",
+            Standing::Holds => ("still holds", "holds"),
+            Standing::HoldsInPart => ("holds in part", "in-part"),
+            Standing::NoLonger => ("no longer holds", "no-longer"),
         }
     }
 }
@@ -66,8 +78,8 @@ pub fn all(found: &Reproduction) -> Vec<Verdict> {
         ballot(found),
         empty_slots(found),
         packed(found),
-        map_on_gpu(found),
-        rendering_on_gpu(found),
+        on_gpu(found, Pass::Map),
+        on_gpu(found, BRUTE),
         linear(found),
         table_1(found),
         memory(found),
@@ -85,21 +97,21 @@ struct Ratio {
     bounces: u32,
 }
 
-fn ratios(found: &Reproduction, over: Builder, under: Builder, pass: Pass, gather: Option<Gather>) -> Vec<Ratio> {
-    let sizes = found.sizes().into_iter();
-    sizes
-        .filter_map(|(photons, bounces)| {
-            let ms = |builder| found.median_ms(photons, bounces, Implementation::of(builder), pass, gather);
-            Some(Ratio { value: ms(over)? / ms(under)?, photons, bounces })
-        })
-        .collect()
+const BRUTE: Pass = Pass::Rendering(Gather::Brute);
+
+fn ratios(found: &Reproduction, over: Builder, under: Builder, pass: Pass) -> Vec<Ratio> {
+    let ratio = |(photons, bounces)| {
+        let ms = |builder| Some(found.running_time(photons, bounces, Implementation::of(builder), pass)?.ms.median);
+        Some(Ratio { value: ms(over)? / ms(under)?, photons, bounces })
+    };
+    found.sizes().into_iter().filter_map(ratio).collect()
 }
 
 /// '1.1 × at the paper's size and 0.5 × to 0.9 × at the other sizes'; the page has them all in a table.
 fn listed(ratios: &[Ratio]) -> String {
     let (paper, others): (Vec<&Ratio>, Vec<&Ratio>) =
         ratios.iter().partition(|ratio| (ratio.photons, ratio.bounces) == (published::PHOTONS, published::BOUNCES));
-    let (low, high) = others.iter().fold((f64::INFINITY, 0.0f64), |(low, high), ratio| (low.min(ratio.value), high.max(ratio.value)));
+    let (low, high) = extremes(others.iter().map(|ratio| ratio.value));
     let at_paper = paper.first().map(|ratio| format!("{} at the paper's size", times(ratio.value)));
     let at_others = match others.as_slice() {
         [] => None,
@@ -110,23 +122,26 @@ fn listed(ratios: &[Ratio]) -> String {
     at_paper.into_iter().chain(at_others).collect::<Vec<_>>().join(" and ")
 }
 
-fn held(ratios: &[Ratio], holds: impl Fn(f64) -> bool) -> Option<Standing> {
-    Standing::of(&ratios.iter().map(|ratio| holds(ratio.value)).collect::<Vec<_>>())
+/// What one builder took longer than another in 2008, and here.
+fn slower(topic: &'static str, then: String, ratios: &[Ratio]) -> Option<Verdict> {
+    let standing = Standing::of(ratios.iter().map(|ratio| ratio.value > MARGIN))?;
+    Some(Verdict::new(topic, format!("In 2008 the {then}. Here the factor is {}", listed(ratios)), standing))
 }
 
 fn append(found: &Reproduction) -> Option<Verdict> {
-    let ratios = ratios(found, Builder::Atomic, Builder::Naive, Pass::Map, None);
-    let standing = held(&ratios, |ratio| ratio > MARGIN)?;
-    let text = format!(
-        "In 2008 the map pass took {} as long with atomics as with naive slots. Here the factor is {}",
-        times(published::MAP_MS.modified / published::MAP_MS.naive),
-        listed(&ratios)
-    );
-    Some(Verdict::new("Atomics slow the map pass down", text, standing))
+    let factor = times(published::MAP_MS.modified / published::MAP_MS.naive);
+    let then = format!("map pass took {factor} as long with atomics as with naive slots");
+    slower("Atomics slow the map pass down", then, &ratios(found, Builder::Atomic, Builder::Naive, Pass::Map))
+}
+
+fn packed(found: &Reproduction) -> Option<Verdict> {
+    let factor = times(published::RENDERING_MS.naive / published::RENDERING_MS.modified);
+    let then = format!("rendering pass took {factor} as long over all slots, including empty ones, as over a compact list");
+    slower("A compact list renders faster", then, &ratios(found, Builder::Naive, Builder::Atomic, BRUTE))
 }
 
 fn ballot(found: &Reproduction) -> Option<Verdict> {
-    let ratios = ratios(found, Builder::Ballot, Builder::Atomic, Pass::Map, None);
+    let ratios = ratios(found, Builder::Ballot, Builder::Atomic, Pass::Map);
     if ratios.is_empty() {
         return None;
     }
@@ -154,72 +169,55 @@ fn empty_slots(found: &Reproduction) -> Option<Verdict> {
             Some((bounces, time.stored as f64 / (f64::from(photons) * f64::from(bounces))))
         })
         .collect();
-    let standing = Standing::of(&filled.iter().map(|(_, share)| *share < 0.5).collect::<Vec<_>>())?;
+    let standing = Standing::of(filled.iter().map(|(_, share)| *share < 0.5))?;
     let shares: Vec<String> =
         filled.iter().map(|(bounces, share)| format!("{} % of them with {bounces} bounces", number(share * 100.0))).collect();
     let text = format!("The paper found that most slots of the naive map stay empty. Here photons fill {}", list(&shares));
     Some(Verdict::new("Slots waste memory", text, standing))
 }
 
-fn packed(found: &Reproduction) -> Option<Verdict> {
-    let ratios = ratios(found, Builder::Naive, Builder::Atomic, Pass::Rendering, Some(Gather::Brute));
-    let standing = held(&ratios, |ratio| ratio > MARGIN)?;
-    let text = format!(
-        "In 2008 the rendering pass took {} as long over all slots, including empty ones, as over a compact list. Here the factor is {}",
-        times(published::RENDERING_MS.naive / published::RENDERING_MS.modified),
-        listed(&ratios)
-    );
-    Some(Verdict::new("A compact list renders faster", text, standing))
-}
-
-fn map_on_gpu(found: &Reproduction) -> Option<Verdict> {
-    let [naive, modified] = [Builder::Naive, Builder::Atomic].map(|builder| ratios(found, Builder::Cpu, builder, Pass::Map, None));
-    let published = published::MAP_MS;
-    let text = format!(
-        "In 2008 the CPU's map pass took {} as long as the naive one on the GPU and {} as long as the modified one. \
-         Here the CPU uses one thread. Relative to the naive GPU version it takes {}. Relative to the modified version it takes {}",
-        times(published.cpu / published.naive),
-        times(published.cpu / published.modified),
-        listed(&naive),
-        listed(&modified)
-    );
-    on_gpu(found, "The GPU builds the map faster than the CPU", text, &naive, &modified)
-}
-
-fn rendering_on_gpu(found: &Reproduction) -> Option<Verdict> {
-    let against = |builder, gather| ratios(found, Builder::Cpu, builder, Pass::Rendering, Some(gather));
-    let [naive, modified] = [Builder::Naive, Builder::Atomic].map(|builder| against(builder, Gather::Brute));
-    let published = published::RENDERING_MS;
-    let grid = against(Builder::Atomic, Gather::Grid);
-    let with_grid = if grid.is_empty() { String::new() } else { format!(". With a grid on both CPU and GPU it takes {}", listed(&grid)) };
-    let text = format!(
-        "In 2008 the CPU's rendering pass took {} as long as the naive one on the GPU and {} as long as the modified one. \
-         Here the CPU uses one thread and the same brute force. Relative to the naive GPU version it takes {}. Relative to the modified version it takes {}{with_grid}",
-        times(published.cpu / published.naive),
-        times(published.cpu / published.modified),
-        listed(&naive),
-        listed(&modified)
-    );
-    on_gpu(found, "The GPU renders faster than the CPU", text, &naive, &modified)
-}
-
-fn on_gpu(found: &Reproduction, topic: &'static str, text: String, naive: &[Ratio], modified: &[Ratio]) -> Option<Verdict> {
-    let faster: Vec<bool> = naive.iter().chain(modified).map(|ratio| ratio.value > MARGIN).collect();
+/// A pass of the CPU, relative to both of the paper's builders on the GPU.
+fn on_gpu(found: &Reproduction, pass: Pass) -> Option<Verdict> {
     let device = found.machine.device.as_ref()?;
-    let text = if device.is_cpu { format!("{text}. The 'GPU' is a software device on the same CPU") } else { text };
-    Some(Verdict::new(topic, text, Standing::of(&faster)?))
+    let (topic, published, how) = match pass {
+        Pass::Map => ("The GPU builds the map faster than the CPU", published::MAP_MS, ""),
+        Pass::Rendering(_) => ("The GPU renders faster than the CPU", published::RENDERING_MS, " and the same brute force"),
+    };
+    let [naive, modified] = [Builder::Naive, Builder::Atomic].map(|builder| ratios(found, Builder::Cpu, builder, pass));
+    let mut text = format!(
+        "In 2008 the CPU's {} pass took {} as long as the naive one on the GPU and {} as long as the modified one. \
+         Here the CPU uses one thread{how}. Relative to the naive GPU version it takes {}. Relative to the modified version it takes {}",
+        pass.name(),
+        times(published.cpu / published.naive),
+        times(published.cpu / published.modified),
+        listed(&naive),
+        listed(&modified)
+    );
+    let grid = ratios(found, Builder::Cpu, Builder::Atomic, Pass::Rendering(Gather::Grid));
+    if pass == BRUTE && !grid.is_empty() {
+        text += &format!(". With a grid on both CPU and GPU it takes {}", listed(&grid));
+    }
+    if device.is_cpu {
+        text += ". The 'GPU' is a software device on the same CPU";
+    }
+    let faster = naive.iter().chain(&modified).map(|ratio| ratio.value > MARGIN);
+    Some(Verdict::new(topic, text, Standing::of(faster)?))
 }
 
 fn linear(found: &Reproduction) -> Option<Verdict> {
-    let paper: Vec<(f64, f64)> = published::TABLE_1.iter().map(|(rounds, ms)| (f64::from(rounds * published::PHOTONS), *ms)).collect();
-    let fits: Vec<(f64, String)> = series(found)
+    let exponent = |points: &[(f64, f64)]| LineFit::of_logarithms(points).map(|line| line.slope);
+    let paper = published::TABLE_1.map(|(rounds, ms)| (f64::from(rounds * published::PHOTONS), ms));
+    let large = format!("with the grid and {} photons per round", count(u64::from(found.request.large)));
+    let names = ["with brute force".to_owned(), "with the grid".to_owned(), large];
+    let fits: Vec<(f64, String)> = series(&found.request)
         .into_iter()
-        .filter_map(|(name, totals)| {
-            let points: Vec<(f64, f64)> = totals.iter().map(|total| (total.photons() as f64, total.best_ms())).collect();
+        .zip(names)
+        .filter_map(|((photons, gather), name)| {
+            let points: Vec<(f64, f64)> = found.totals_of(photons, gather).map(TotalTime::point).collect();
             Some((exponent(&points)?, name))
         })
         .collect();
-    let standing = Standing::of(&fits.iter().map(|(exponent, _)| (exponent - 1.0).abs() <= LINEAR_WITHIN).collect::<Vec<_>>())?;
+    let standing = Standing::of(fits.iter().map(|(exponent, _)| (exponent - 1.0).abs() <= LINEAR_WITHIN))?;
     let described: Vec<String> = fits.iter().map(|(exponent, name)| format!("{exponent:.2} {name}")).collect();
     let text = format!(
         "In 2008 the run time was proportional to the number of photons (fitted exponent {:.2}). Here the fitted exponent is {}",
@@ -227,29 +225,6 @@ fn linear(found: &Reproduction) -> Option<Verdict> {
         list(&described)
     );
     Some(Verdict::new("Time grows in proportion to photons", text, standing))
-}
-
-/// Measured series of table 1, named.
-fn series(found: &Reproduction) -> Vec<(String, Vec<&TotalTime>)> {
-    let (small, large) = (published::PHOTONS, found.request.large);
-    [
-        ("with brute force".to_owned(), small, Gather::Brute),
-        ("with the grid".to_owned(), small, Gather::Grid),
-        (format!("with the grid and {} photons per round", count(u64::from(large))), large, Gather::Grid),
-    ]
-    .into_iter()
-    .map(|(name, photons, gather)| (name, found.totals_of(photons, gather).collect()))
-    .collect()
-}
-
-/// Slope of the least-squares line through the logarithms; `None` for fewer than two points.
-fn exponent(points: &[(f64, f64)]) -> Option<f64> {
-    let logs: Vec<(f64, f64)> = points.iter().map(|(x, y)| (x.ln(), y.ln())).collect();
-    let mean = |value: fn(&(f64, f64)) -> f64| logs.iter().map(value).sum::<f64>() / logs.len() as f64;
-    let (x, y) = (mean(|log| log.0), mean(|log| log.1));
-    let variance: f64 = logs.iter().map(|log| (log.0 - x).powi(2)).sum();
-    let covariance: f64 = logs.iter().map(|log| (log.0 - x) * (log.1 - y)).sum();
-    (variance > 0.0).then(|| covariance / variance)
 }
 
 fn table_1(found: &Reproduction) -> Option<Verdict> {
@@ -296,7 +271,7 @@ fn indirect_light(found: &Reproduction) -> Option<Verdict> {
         mean(chosen.flat_map(|wall| wall.illumination.iter().copied()))
     };
     let gain = |lit: bool| unlit(many, lit) / unlit(few, lit);
-    let standing = Standing::of(&[gain(false) > MARGIN, gain(true) > MARGIN])?;
+    let standing = Standing::of([gain(false) > MARGIN, gain(true) > MARGIN])?;
     let text = format!(
         "The paper found areas of indirect light brighter with 15 bounces than with 2. Here the mean illumination of the three walls without a light is {} as high, and that of the two walls with a light {}",
         times(gain(false)),
@@ -334,7 +309,7 @@ fn noise(found: &Reproduction) -> Option<Verdict> {
         times(measured),
         times(independent)
     );
-    Some(Verdict::new("Rounds lower the noise", text, Standing::of(&[measured > MARGIN])?))
+    Some(Verdict::new("Rounds lower the noise", text, Standing::of([measured > MARGIN])?))
 }
 
 fn illumination(walls: &[WallEstimate]) -> impl Iterator<Item = f64> {
@@ -397,6 +372,13 @@ mod tests {
         found
     }
 
+    /// The first size's map pass of one builder takes so long.
+    fn with_another_size(mut found: Reproduction, builder: Builder, ms: f64) -> Reproduction {
+        let mut times = found.running_times.iter_mut();
+        times.find(|time| time.pass == Pass::Map && time.implementation.builder == builder).unwrap().ms.median = ms;
+        found
+    }
+
     #[test]
     fn the_append_is_judged_by_its_ratio() {
         for (atomic, standing) in [(2.0, Standing::Holds), (1.05, Standing::NoLonger), (0.5, Standing::NoLonger)] {
@@ -405,10 +387,10 @@ mod tests {
             assert!(verdict.text.ends_with(&format!(". This {}.", standing.words())), "{}", verdict.text);
             assert!(verdict.text.contains(&times(atomic)) && verdict.text.contains(&times(11.0 / 1.7)), "{}", verdict.text);
         }
-        let mut mixed = with_map_ms(1.0, 2.0, 1.0);
-        let slow = mixed.running_times.iter_mut().find(|time| time.pass == Pass::Map && time.implementation.builder == Builder::Atomic);
-        slow.unwrap().ms.median = 1.0;
-        assert_eq!(append(&mixed).unwrap().standing, Some(Standing::HoldsInPart));
+        assert_eq!(
+            append(&with_another_size(with_map_ms(1.0, 2.0, 1.0), Builder::Atomic, 1.0)).unwrap().standing,
+            Some(Standing::HoldsInPart)
+        );
     }
 
     #[test]
@@ -417,9 +399,7 @@ mod tests {
         assert!(text(0.5).ends_with("this is faster."));
         assert!(text(1.0).contains("no significant difference"));
         assert!(text(2.0).contains("not faster, and slower"));
-        let mut mixed = with_map_ms(1.0, 1.0, 0.5);
-        let slow = mixed.running_times.iter_mut().find(|time| time.pass == Pass::Map && time.implementation.builder == Builder::Ballot);
-        slow.unwrap().ms.median = 2.0;
+        let mixed = with_another_size(with_map_ms(1.0, 1.0, 0.5), Builder::Ballot, 2.0);
         assert!(ballot(&mixed).unwrap().text.ends_with("faster at some sizes and slower at others."));
     }
 
@@ -432,14 +412,7 @@ mod tests {
         assert_eq!(all(&found), []);
         let mut found = sample::reproduction();
         found.running_times.retain(|time| time.implementation.builder == Builder::Cpu);
-        assert!(append(&found).is_none() && packed(&found).is_none() && map_on_gpu(&found).is_none());
-    }
-
-    #[test]
-    fn a_power_law_gives_its_exponent() {
-        let points: Vec<(f64, f64)> = (1..6).map(|x| (f64::from(x), 3.0 * f64::from(x).powf(1.5))).collect();
-        assert!((exponent(&points).unwrap() - 1.5).abs() < 1e-12);
-        assert_eq!(exponent(&points[..1]), None);
+        assert!(append(&found).is_none() && packed(&found).is_none() && on_gpu(&found, Pass::Map).is_none());
     }
 
     #[test]
@@ -458,8 +431,8 @@ mod tests {
     #[test]
     fn a_software_device_is_called_one() {
         let mut found = sample::reproduction();
-        assert!(map_on_gpu(&found).unwrap().text.contains("software device"));
+        assert!(on_gpu(&found, Pass::Map).unwrap().text.contains("software device"));
         found.machine.device.as_mut().unwrap().is_cpu = false;
-        assert!(!map_on_gpu(&found).unwrap().text.contains("software device"));
+        assert!(!on_gpu(&found, Pass::Map).unwrap().text.contains("software device"));
     }
 }

@@ -111,6 +111,28 @@ impl<S: Clone + PartialEq> Sweep<S> {
         let configuration = Configuration { label: label.into(), line: (self.wrap)(settings) };
         self.groups.last_mut().expect("pushed above").configurations.push(configuration);
     }
+
+    /// A choice for each value.
+    fn each<T>(&mut self, axis: Axis, choices: impl IntoIterator<Item = (impl Into<String>, T)>, change: impl Fn(&mut S, T)) {
+        choices.into_iter().for_each(|(label, value)| self.add(axis, label, |settings| change(settings, value)));
+    }
+}
+
+/// Those that are alternatives to the base in both worlds.
+const BUILDERS: [(&str, Builder); 5] = [
+    ("naive slots", Builder::Naive),
+    ("atomic", Builder::Atomic),
+    ("subgroup ballot", Builder::Ballot),
+    ("work-group aggregate", Builder::Group),
+    ("prefix sums, order kept", Builder::Scan),
+];
+
+fn photon_counts(photons: u32) -> [(&'static str, u32); 3] {
+    [("1/16 of the photons", (photons / 16).max(2)), ("1/4 of the photons", (photons / 4).max(2)), ("4 times the photons", photons * 4)]
+}
+
+fn bounce_counts<const COUNT: usize>(bounces: [u32; COUNT]) -> [(String, u32); COUNT] {
+    bounces.map(|bounces| (format!("{bounces} bounces"), bounces))
 }
 
 /// Irradiance of the walls by the paper's line.
@@ -118,36 +140,22 @@ pub fn of_paper(mesh: u32, photons: u32) -> Vec<Group> {
     let base = RoomSettings { mesh, photons, rng: Rng::Philox, radius: 0.025, bounces: 30, ..RoomSettings::default() };
     let base = RoomSettings { full_light: base.full_light_for(photons), ..base };
     let mut sweep = Sweep::new(base, "atomic, grid, radius 0.025 m, 30 bounces, philox", Line::Paper);
-    sweep.add(Axis::Builder, "naive slots", |s| s.builder = Builder::Naive);
-    sweep.add(Axis::Builder, "subgroup ballot", |s| s.builder = Builder::Ballot);
-    sweep.add(Axis::Builder, "work-group aggregate", |s| s.builder = Builder::Group);
-    sweep.add(Axis::Builder, "prefix sums, order kept", |s| s.builder = Builder::Scan);
-    sweep.add(Axis::Builder, "persistent", |s| s.builder = Builder::Persistent);
-    sweep.add(Axis::Builder, "CPU, one thread", |s| s.builder = Builder::Cpu);
-    for (factor, name) in [(16, "1/16 of the photons"), (4, "1/4 of the photons")] {
-        sweep.add(Axis::Photons, name, |s| s.photons = (photons / factor).max(2));
-    }
-    sweep.add(Axis::Photons, "4 times the photons", |s| s.photons = photons * 4);
-    for radius in [0.1, 0.05, 0.0125, 0.00625] {
-        sweep.add(Axis::Radius, format!("radius {radius} m"), |s| s.radius = radius);
-    }
+    let others = [("persistent", Builder::Persistent), ("CPU, one thread", Builder::Cpu)];
+    sweep.each(Axis::Builder, BUILDERS.into_iter().chain(others), |s, builder| s.builder = builder);
+    sweep.each(Axis::Photons, photon_counts(photons), |s, photons| s.photons = photons);
+    sweep.each(Axis::Radius, [0.1, 0.05, 0.0125, 0.00625].map(|radius| (format!("radius {radius} m"), radius)), |s, r| s.radius = r);
     for nearest in [10, 50, 200] {
         sweep.add(Axis::Nearest, format!("the {nearest} nearest photons within 0.1 m, kd-tree"), |s| {
             (s.gather, s.nearest, s.radius) = (Gather::KdTree, Some(nearest), 0.1);
         });
     }
     sweep.add(Axis::Edges, "no edge correction", |s| s.edge_correction = false);
-    for bounces in [2, 5, 15, 60] {
-        sweep.add(Axis::Bounces, format!("{bounces} bounces"), |s| s.bounces = bounces);
-    }
-    sweep.add(Axis::Randomness, "rand48", |s| s.rng = Rng::Rand48);
-    sweep.add(Axis::Randomness, "Mersenne Twister", |s| s.rng = Rng::Mt);
-    sweep.add(Axis::Randomness, "Owen-scrambled Sobol'", |s| s.rng = Rng::Sobol);
-    sweep.add(Axis::Sums, "32-bit floats", |s| s.sums = Sums::F32);
-    sweep.add(Axis::Sums, "compensated floats", |s| s.sums = Sums::Compensated);
+    sweep.each(Axis::Bounces, bounce_counts([2, 5, 15, 60]), |s, bounces| s.bounces = bounces);
+    let generators = [("rand48", Rng::Rand48), ("Mersenne Twister", Rng::Mt), ("Owen-scrambled Sobol'", Rng::Sobol)];
+    sweep.each(Axis::Randomness, generators, |s, rng| s.rng = rng);
+    sweep.each(Axis::Sums, [("32-bit floats", Sums::F32), ("compensated floats", Sums::Compensated)], |s, sums| s.sums = sums);
     sweep.add(Axis::Arithmetic, "strict", |s| s.math = Math::Strict);
-    sweep.add(Axis::Index, "brute force", |s| s.gather = Gather::Brute);
-    sweep.add(Axis::Index, "kd-tree", |s| s.gather = Gather::KdTree);
+    sweep.each(Axis::Index, [("brute force", Gather::Brute), ("kd-tree", Gather::KdTree)], |s, gather| s.gather = gather);
     sweep.groups
 }
 
@@ -156,8 +164,7 @@ pub fn of_paper(mesh: u32, photons: u32) -> Vec<Group> {
 pub fn of_the_papers_rounds(mesh: u32) -> Vec<Group> {
     let base = RoomSettings { mesh, radius: 0.025, rounds: 1, ..RoomSettings::default() };
     let mut sweep = Sweep::new(base, "radius 0.025 m", Line::Paper);
-    sweep.add(Axis::Paper, "radius 0.05 m", |s| s.radius = 0.05);
-    sweep.add(Axis::Paper, "radius 0.0125 m", |s| s.radius = 0.0125);
+    sweep.each(Axis::Paper, [("radius 0.05 m", 0.05), ("radius 0.0125 m", 0.0125)], |s, radius| s.radius = radius);
     let triangles = |alpha: f64| SceneSettings {
         photons: 5000,
         caustic_photons: 5000,
@@ -183,39 +190,22 @@ const REMOVABLE: [Effect; 5] =
 pub fn of_scene(photons: u32, kept: &[Effect], radius: Option<f64>, has_few_triangles: bool, is_picture: bool) -> Vec<Group> {
     let base = SceneSettings { photons, caustic_photons: photons, ..SceneSettings::default() };
     let mut sweep = Sweep::new(base, "persistent, shrinking radius, shadow rays", Line::Scene);
-    sweep.add(Axis::Builder, "naive slots", |s| s.builder = Some(Builder::Naive));
-    sweep.add(Axis::Builder, "atomic", |s| s.builder = Some(Builder::Atomic));
-    sweep.add(Axis::Builder, "subgroup ballot", |s| s.builder = Some(Builder::Ballot));
-    sweep.add(Axis::Builder, "work-group aggregate", |s| s.builder = Some(Builder::Group));
-    sweep.add(Axis::Builder, "prefix sums, order kept", |s| s.builder = Some(Builder::Scan));
-    let of_photons = |s: &mut SceneSettings, photons: u32| (s.photons, s.caustic_photons) = (photons, photons);
-    sweep.add(Axis::Photons, "1/16 of the photons", |s| of_photons(s, (photons / 16).max(1)));
-    sweep.add(Axis::Photons, "1/4 of the photons", |s| of_photons(s, (photons / 4).max(1)));
-    sweep.add(Axis::Photons, "4 times the photons", |s| of_photons(s, photons * 4));
-    for (factor, name) in [(2.0, "twice the radius"), (0.5, "half the radius")] {
-        if let Some(radius) = radius {
-            sweep.add(Axis::Radius, name, |s| s.radius = Some(significant(factor * radius)));
-        }
+    sweep.each(Axis::Builder, BUILDERS, |s, builder| s.builder = Some(builder));
+    sweep.each(Axis::Photons, photon_counts(photons), |s, photons| (s.photons, s.caustic_photons) = (photons, photons));
+    if let Some(radius) = radius {
+        let radii = [("twice the radius", 2.0 * radius), ("half the radius", 0.5 * radius)];
+        sweep.each(Axis::Radius, radii, |s, radius| s.radius = Some(significant(radius)));
     }
-    for alpha in [0.5, 0.8, 1.0] {
-        let label = if alpha == 1.0 { "fixed radius".to_owned() } else { format!("alpha {alpha}") };
-        sweep.add(Axis::Schedule, label, |s| s.alpha = alpha);
-    }
-    sweep.add(Axis::Kernel, "cone", |s| s.kernel = Kernel::Cone);
-    sweep.add(Axis::Kernel, "Epanechnikov", |s| s.kernel = Kernel::Epanechnikov);
+    sweep.each(Axis::Schedule, [("alpha 0.5", 0.5), ("alpha 0.8", 0.8), ("fixed radius", 1.0)], |s, alpha| s.alpha = alpha);
+    sweep.each(Axis::Kernel, [("cone", Kernel::Cone), ("Epanechnikov", Kernel::Epanechnikov)], |s, kernel| s.kernel = kernel);
     sweep.add(Axis::Edges, "no edge correction", |s| s.edge_correction = false);
-    for bounces in [2, 5, 15] {
-        sweep.add(Axis::Bounces, format!("{bounces} bounces"), |s| s.bounces = bounces);
-    }
+    sweep.each(Axis::Bounces, bounce_counts([2, 5, 15]), |s, bounces| s.bounces = bounces);
     sweep.add(Axis::Arithmetic, "strict", |s| s.math = Math::Strict);
-    sweep.add(Axis::Direct, "one shadow ray", |s| s.shadow_rays = 1);
-    sweep.add(Axis::Direct, "16 shadow rays", |s| s.shadow_rays = 16);
+    sweep.each(Axis::Direct, [("one shadow ray", 1), ("16 shadow rays", 16)], |s, rays| s.shadow_rays = rays);
     sweep.add(Axis::Direct, "direct light from photons", |s| s.illumination = Illumination::Photons);
     if is_picture {
-        for samples in [4, 16] {
-            sweep
-                .add(Axis::Paths, format!("{samples} paths per pixel, one shadow ray each"), |s| (s.samples, s.shadow_rays) = (samples, 1));
-        }
+        let paths = [4, 16].map(|samples| (format!("{samples} paths per pixel, one shadow ray each"), samples));
+        sweep.each(Axis::Paths, paths, |s, samples| (s.samples, s.shadow_rays) = (samples, 1));
     }
     sweep.add(Axis::Gather, "final gather", |s| s.final_gather = true);
     if has_few_triangles {

@@ -4,11 +4,12 @@ use super::axes::Axis;
 use super::point::{CONFIDENCE, Curve, Estimate, Point};
 use super::{Comparison, Part, Study};
 use crate::measure::paper::published;
+use crate::output::csv_table::{Column, csv_table};
 use crate::output::words::{count, duration, number};
 use crate::text::counted;
 
 /// Relative errors that people ask for, the largest first.
-pub const ASKED: [f64; 10] = [0.5, 0.2, 0.1, 0.05, 0.02, 0.01, 0.005, 0.002, 0.001, 0.0005];
+const ASKED: [f64; 10] = [0.5, 0.2, 0.1, 0.05, 0.02, 0.01, 0.005, 0.002, 0.001, 0.0005];
 
 pub fn percent(share: f64) -> String {
     format!("{}\u{a0}%", number(100.0 * share))
@@ -37,6 +38,10 @@ impl Part {
         self.comparisons.iter().flat_map(|comparison| &comparison.curves)
     }
 
+    pub fn points(&self) -> impl Iterator<Item = (&Curve, &Point)> {
+        self.curves().flat_map(|curve| curve.points.iter().map(move |point| (curve, point)))
+    }
+
     /// Errors below this say more of the reference than of what it judges.
     pub fn least_error(&self) -> f64 {
         2.0 * self.reference_error
@@ -44,7 +49,7 @@ impl Part {
 
     /// Points that no other beats in both error and time, the fastest first.
     pub fn pareto_front(&self) -> Vec<(&Curve, &Point)> {
-        let mut all: Vec<(&Curve, &Point)> = self.curves().flat_map(|curve| curve.points.iter().map(move |point| (curve, point))).collect();
+        let mut all: Vec<(&Curve, &Point)> = self.points().collect();
         all.sort_by(|(_, a), (_, b)| a.ms().value.total_cmp(&b.ms().value));
         let mut best = f64::INFINITY;
         all.retain(|(_, point)| {
@@ -308,67 +313,50 @@ pub fn equal_error(part: &Part) -> Option<(f64, Vec<Row>)> {
     Some((error, rows(part, |curve| curve.time_to(error).ok_or_else(|| beyond(curve, error)))))
 }
 
-const COLUMNS: [&str; 21] = [
-    "quantity",
-    "axis",
-    "configuration",
-    "rounds",
-    "photons",
-    "seed",
-    "runs",
-    "ms",
-    "ms_least",
-    "ms_most",
-    "clock",
-    "wall_ms",
-    "error",
-    "error_low",
-    "error_high",
-    "noise",
-    "bias",
-    "bias_low",
-    "bias_high",
-    "cut_off",
-    "command",
-];
-
 /// Every point; errors are relative.
 pub fn csv(study: &Study) -> Vec<u8> {
-    let mut table = csv::Writer::from_writer(Vec::new());
-    let mut write = |row: &[String]| table.write_record(row).expect("memory takes what is written");
-    write(&COLUMNS.map(str::to_owned));
+    struct Row<'a> {
+        part: &'a Part,
+        axis: Axis,
+        curve: &'a Curve,
+        point: &'a Point,
+        seed: u64,
+    }
+    fn known(value: f64) -> String {
+        if value.is_finite() { value.to_string() } else { String::new() }
+    }
+    let columns: [Column<Row>; 21] = [
+        ("quantity", |row| row.part.quantity.clone()),
+        ("axis", |row| row.axis.name().to_owned()),
+        ("configuration", |row| row.curve.label.clone()),
+        ("rounds", |row| row.point.rounds.to_string()),
+        ("photons", |row| row.point.photons.to_string()),
+        ("seed", |row| row.seed.to_string()),
+        ("runs", |row| row.point.squared_errors.len().to_string()),
+        ("ms", |row| row.point.ms().value.to_string()),
+        ("ms_least", |row| row.point.ms().low.to_string()),
+        ("ms_most", |row| row.point.ms().high.to_string()),
+        ("clock", |row| clock(row.point).to_owned()),
+        ("wall_ms", |row| row.point.wall().to_string()),
+        ("error", |row| row.point.error().value.to_string()),
+        ("error_low", |row| known(row.point.error().low)),
+        ("error_high", |row| known(row.point.error().high)),
+        ("noise", |row| row.point.noise().to_string()),
+        ("bias", |row| row.point.bias().value.to_string()),
+        ("bias_low", |row| known(row.point.bias().low)),
+        ("bias_high", |row| known(row.point.bias().high)),
+        ("cut_off", |row| row.point.cut_off.to_string()),
+        ("command", |row| row.point.command.clone()),
+    ];
+    let seed = study.request.seed;
+    let mut rows = Vec::new();
     for part in &study.parts {
-        for (axis, curve) in part.comparisons.iter().flat_map(|one| one.curves.iter().map(|curve| (one.axis, curve))) {
-            for point in &curve.points {
-                let (ms, error) = (point.ms(), point.error());
-                let known = |value: f64| if value.is_finite() { value.to_string() } else { String::new() };
-                write(&[
-                    part.quantity.clone(),
-                    axis.name().to_owned(),
-                    curve.label.clone(),
-                    point.rounds.to_string(),
-                    point.photons.to_string(),
-                    study.request.seed.to_string(),
-                    point.squared_errors.len().to_string(),
-                    ms.value.to_string(),
-                    ms.low.to_string(),
-                    ms.high.to_string(),
-                    clock(point).to_owned(),
-                    point.wall().to_string(),
-                    error.value.to_string(),
-                    known(error.low),
-                    known(error.high),
-                    point.noise().to_string(),
-                    point.bias().value.to_string(),
-                    known(point.bias().low),
-                    known(point.bias().high),
-                    point.cut_off.to_string(),
-                    point.command.clone(),
-                ]);
-            }
+        for Comparison { axis, curves } in &part.comparisons {
+            let points = curves.iter().flat_map(|curve| curve.points.iter().map(move |point| (curve, point)));
+            rows.extend(points.map(|(curve, point)| Row { part, axis: *axis, curve, point, seed }));
         }
     }
-    table.into_inner().expect("memory takes what is written")
+    csv_table(&columns, &rows)
 }
 
 pub fn clock(point: &Point) -> &'static str {

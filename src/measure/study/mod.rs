@@ -23,6 +23,7 @@ use crate::error::{Error, Result};
 use crate::gpu::{Gpu, clock};
 use crate::measure::compaction;
 use crate::output::destination::{Folder, write_all};
+use crate::output::svg::as_file;
 use crate::scene::Scene;
 use axes::{Axis, Group};
 use point::{Curve, Point};
@@ -126,33 +127,28 @@ pub fn run(
             begun += group.configurations.len();
             tell(&format!("[{begun}/{count}] {}: {}", subject.quantity, group.axis.name()));
             let mut measuring = Measuring { gpu, subject, group, request: &study.request, share, cancelled, store: &mut store };
-            let (comparison, whole) = measuring.compare()?;
-            study.parts.last_mut().expect("pushed above").comparisons.push(comparison);
-            if !whole {
-                return Ok(study);
+            let mut curves: Vec<Curve> = group.configurations.iter().map(|configuration| Curve::new(&configuration.label)).collect();
+            let ended = measuring.climb(&mut curves);
+            study.parts.last_mut().expect("pushed above").comparisons.push(Comparison { axis: group.axis, curves });
+            match ended {
+                Err(Error::Interrupted) => return Ok(study),
+                result => result?,
             }
         }
     }
-    {
-        let request = &study.request;
-        let most = request.photons.saturating_mul(request.most_rounds).min(MOST_COMPACTED);
-        let wanted = compaction::Request::up_to(most, of_builders);
-        // The paper's box has rooms of every survival beside it, a scene stands for itself.
-        let found = if is_of_paper {
-            compaction::measure(gpu, &wanted, None, cancelled, tell)
-        } else {
-            compaction::measure(gpu, &compaction::Request { survivals: Vec::new(), ..wanted }, Some(scene), cancelled, tell)
-        };
-        match found {
-            Ok(map) => study.compaction = Some(map),
-            // What was measured before is worth its page.
-            Err(error) => tell(&format!("the comparison of builders was not measured: {error}")),
-        }
-        if cancelled.load(Ordering::Relaxed) {
-            return Ok(study);
-        }
+    let most = study.request.photons.saturating_mul(study.request.most_rounds).min(MOST_COMPACTED);
+    let mut wanted = compaction::Request::up_to(most, of_builders);
+    // The paper's box has rooms of every survival beside it, a scene stands for itself.
+    let alone = if is_of_paper { None } else { Some(scene) };
+    if alone.is_some() {
+        wanted.survivals.clear();
     }
-    study.complete = true;
+    match compaction::measure(gpu, &wanted, alone, cancelled, tell) {
+        Ok(map) => study.compaction = Some(map),
+        // What was measured before is worth its page.
+        Err(error) => tell(&format!("the comparison of builders was not measured: {error}")),
+    }
+    study.complete = !cancelled.load(Ordering::Relaxed);
     Ok(study)
 }
 
@@ -169,20 +165,8 @@ struct Measuring<'a> {
 }
 
 impl Measuring<'_> {
-    /// Points of every configuration at numbers of rounds that double until its share of time is spent, and whether
-    /// nobody ended it before.
-    fn compare(&mut self) -> Result<(Comparison, bool)> {
-        let mut curves: Vec<Curve> = self
-            .group
-            .configurations
-            .iter()
-            .map(|configuration| Curve { label: configuration.label.clone(), points: Vec::new(), left_out: None })
-            .collect();
-        let whole = self.climb(&mut curves)?;
-        Ok((Comparison { axis: self.group.axis, curves }, whole))
-    }
-
-    fn climb(&mut self, curves: &mut [Curve]) -> Result<bool> {
+    /// Points of every configuration at numbers of rounds that double until its share of time is spent.
+    fn climb(&mut self, curves: &mut [Curve]) -> Result<()> {
         // First rounds, which no point holds.
         let mut unmeasured = vec![Duration::ZERO; curves.len()];
         for doublings in 0..=self.request.most_rounds.ilog2() as usize {
@@ -197,21 +181,19 @@ impl Measuring<'_> {
                     left_out.is_none() && points.len() == doublings && allowed && spent + next <= self.share
                 })
                 .collect();
-            if !self.level(&going, rounds, curves, &mut unmeasured)? {
-                return Ok(false);
-            }
+            self.level(&going, rounds, curves, &mut unmeasured)?;
         }
-        Ok(true)
+        Ok(())
     }
 
-    /// Adds a point to each of these curves, their runs in turn; false if it was interrupted.
-    fn level(&mut self, going: &[usize], rounds: u32, curves: &mut [Curve], unmeasured: &mut [Duration]) -> Result<bool> {
+    /// Adds a point to each of these curves, their runs in turn.
+    fn level(&mut self, going: &[usize], rounds: u32, curves: &mut [Curve], unmeasured: &mut [Duration]) -> Result<()> {
         let Measuring { gpu, subject, group, request, cancelled, share, .. } = *self;
         let command = |which: usize| subject.command(&group.configurations[which], rounds, request.seed);
         let known: Option<Vec<Point>> = going.iter().map(|which| self.store.find(group.axis, &command(*which))).collect();
         if let Some(known) = known {
             going.iter().zip(known).for_each(|(which, point)| curves[*which].points.push(point));
-            return Ok(true);
+            return Ok(());
         }
         let mut shots = vec![Vec::new(); curves.len()];
         // The first turn of all is dropped: it makes pipelines.
@@ -224,15 +206,14 @@ impl Measuring<'_> {
                 let began = Instant::now();
                 let (rounds, seed) = if turn == 0 { (1, request.seed) } else { (rounds, request.seed + turn - 1) };
                 match subject.run(gpu, &group.configurations[which], rounds, seed, cancelled) {
-                    Ok(Some(_)) if turn == 0 => {
+                    Ok(_) if turn == 0 => {
                         unmeasured[which] += began.elapsed();
                         if began.elapsed() > PATIENCE.max(2 * share) {
                             let seconds = began.elapsed().as_secs_f64();
                             curves[which].left_out = Some(format!("one round takes {seconds:.1} s, too long for the budget"));
                         }
                     }
-                    Ok(Some(shot)) => shots[which].push((shot, began.elapsed())),
-                    Ok(None) => return Ok(false),
+                    Ok(shot) => shots[which].push((shot, began.elapsed())),
                     // What this device cannot do is no reason to end the study.
                     Err(Error::Setting { option, allowed, .. }) => curves[which].left_out = Some(format!("{option} {allowed}")),
                     Err(error) => return Err(error),
@@ -244,7 +225,7 @@ impl Measuring<'_> {
             self.store.keep(group.axis, &point)?;
             curves[which].points.push(point);
         }
-        Ok(true)
+        Ok(())
     }
 }
 
@@ -271,11 +252,11 @@ pub fn write(folder: &Folder, study: &Study) -> Result<()> {
     ];
     for (number, part) in study.parts.iter().enumerate() {
         for (name, drawn) in chart::all(part) {
-            files.push((folder.file(&format!("{}-{name}.svg", number + 1)), chart::alone(&drawn).into_bytes()));
+            files.push((folder.file(&format!("{}-{name}.svg", number + 1)), as_file(&drawn)));
         }
     }
     if let Some(map) = &study.compaction {
-        files.push((folder.file("compaction.svg"), chart::alone(&compaction::chart::draw(map)).into_bytes()));
+        files.push((folder.file("compaction.svg"), as_file(&compaction::chart::draw(map))));
     }
     write_all(files)
 }

@@ -1,53 +1,35 @@
 //! The page: all results in one file that loads nothing.
 
-use maud::{DOCTYPE, Markup, PreEscaped, html};
+use maud::{Markup, html};
 
 use super::findings::{self, Row, clock, equal_error, equal_time, percent};
 use super::point::{Curve, Point};
-use super::{Part, Study, chart};
+use super::{Part, Study, chart as charts};
 use crate::measure::compaction::{self, Map};
-use crate::output::words::{count, duration, number, times};
+use crate::output::page::{chart, page, software_notice, table};
+use crate::output::words::{count, duration, times};
 
 pub fn html(study: &Study) -> String {
-    let page = html! {
-        (DOCTYPE)
-        html lang="en" {
-            head {
-                meta charset="utf-8";
-                meta name="viewport" content="width=device-width, initial-scale=1";
-                meta name="color-scheme" content="light dark";
-                title { "What accuracy costs in time: " (study.request.scene) }
-                style { (PreEscaped(include_str!("../../output/page.css"))) }
-            }
-            body {
-                main {
-                    (head(study))
-                    @for part in &study.parts {
-                        (of_part(part))
-                    }
-                    @if let Some(map) = &study.compaction {
-                        (of_builders(map))
-                    }
-                    (how(study))
-                }
-            }
-        }
+    let title = format!("What accuracy costs in time: {}", study.request.scene);
+    let content = html! {
+        (head(study, &title))
+        @for part in &study.parts { (of_part(part)) }
+        @if let Some(map) = &study.compaction { (of_builders(map)) }
+        (how(study))
     };
-    page.into_string()
+    page(&title, &content)
 }
 
-fn head(study: &Study) -> Markup {
+fn head(study: &Study, title: &str) -> Markup {
     let request = &study.request;
     html! {
         header {
-            h1 { "What accuracy costs in time: " (request.scene) }
+            h1 { (title) }
             p { "Relative RMS error against time, for every option of photonmill " (study.photonmill) " that applies to this scene." }
             @if !study.complete {
                 p.notice { strong { "Incomplete." } " The study was interrupted. The same command continues it." }
             }
-            @if study.is_cpu {
-                p.notice { strong { "This device is software." } " It runs Vulkan on the CPU, so 'GPU' times on this page are CPU times." }
-            }
+            @if study.is_cpu { (software_notice("")) }
             dl {
                 dt { "Device" }
                 dd { (study.device) "; driver " (study.driver) }
@@ -71,7 +53,7 @@ fn of_builders(map: &Map) -> Markup {
                 "Each cell shows the fastest builder, its speed relative to one atomic per thread, and, below, the builders that are not significantly slower. "
                 "All builders gave the same result: bit-identical stored photons up to a million, and above that the same numbers of photons stored and absorbed at each bounce."
             }
-            figure { (PreEscaped(compaction::chart::draw(map))) }
+            (chart(Some(compaction::chart::draw(map)), ""))
             details {
                 summary { "All times" }
                 pre { (map.text()) }
@@ -86,24 +68,20 @@ fn of_part(part: &Part) -> Markup {
             h2 { (part.quantity) }
             p { "Reference: " (part.reference) ". Its own error is " (percent(part.reference_error)) "; smaller errors in this section are not reliable." }
             ul { @for sentence in part.sentences() { li { (sentence) } } }
-            @if let Some(drawn) = chart::overview(part) {
-                figure {
-                    div.scroll { (PreEscaped(drawn)) }
-                    figcaption { "All points. The line is the Pareto front: the points that no other point beats in both time and error." }
-                }
-            }
+            (chart(
+                charts::overview(part),
+                "All points. The line is the Pareto front: the points that no other point beats in both time and error."
+            ))
             (front(part))
             @if let Some((ms, rows)) = equal_time(part) {
-                (table(&format!("Error after {}", duration(ms)), "error", &rows, percent))
+                (equal(&format!("Error after {}", duration(ms)), "error", &rows, percent))
             }
             @if let Some((error, rows)) = equal_error(part) {
-                (table(&format!("Time to reach {}", percent(error)), "time", &rows, duration))
+                (equal(&format!("Time to reach {}", percent(error)), "time", &rows, duration))
             }
             @for comparison in &part.comparisons {
                 h3 { (comparison.axis.name()) }
-                @if let Some(drawn) = chart::of_axis(&comparison.curves) {
-                    figure { div.scroll { (PreEscaped(drawn)) } }
-                }
+                (chart(charts::of_axis(&comparison.curves), ""))
                 @for curve in &comparison.curves { (points(curve)) }
             }
         }
@@ -111,56 +89,46 @@ fn of_part(part: &Part) -> Markup {
 }
 
 fn front(part: &Part) -> Markup {
-    html! {
-        div.scroll {
-            table {
-                thead { tr { th.name { "Pareto front" } th { "rounds" } th { "time" } th { "error" } } }
-                tbody {
-                    @for (curve, point) in part.pareto_front() {
-                        tr { th scope="row" { (curve.label) } td { (point.rounds) } td { (duration(point.ms().value)) } td { (percent(point.error().value)) } }
-                    }
-                }
-            }
+    let head = html! { tr { th.name { "Pareto front" } th { "rounds" } th { "time" } th { "error" } } };
+    let body = html! {
+        @for (curve, point) in part.pareto_front() {
+            tr { th scope="row" { (curve.label) } td { (point.rounds) } td { (duration(point.ms().value)) } td { (percent(point.error().value)) } }
         }
-    }
+    };
+    table(&head, &body)
 }
 
-fn table(title: &str, what: &str, rows: &[Row], show: impl Fn(f64) -> String) -> Markup {
-    html! {
-        div.scroll {
-            table {
-                thead { tr { th.name { (title) } th { (what) } th { (findings::words_of_confidence()) " interval" } th { "relative to base" } } }
-                tbody {
-                    @for Row { name, value, ratio } in rows {
-                        tr {
-                            th scope="row" { (name) }
-                            @match value {
-                                Ok(value) => {
-                                    td { (show(value.value)) }
-                                    td { @if value.low > 0.0 && value.low < value.high && value.high.is_finite() { (show(value.low)) " to " (show(value.high)) } }
-                                },
-                                Err(why) => { td { (why) } td {} },
-                            }
-                            td { (ratio.map_or_else(String::new, times)) }
-                        }
-                    }
+/// All configurations at the same time or the same error.
+fn equal(title: &str, what: &str, rows: &[Row], show: impl Fn(f64) -> String) -> Markup {
+    let head =
+        html! { tr { th.name { (title) } th { (what) } th { (findings::words_of_confidence()) " interval" } th { "relative to base" } } };
+    let body = html! {
+        @for Row { name, value, ratio } in rows {
+            tr {
+                th scope="row" { (name) }
+                @match value {
+                    Ok(value) => {
+                        td { (show(value.value)) }
+                        td { @if value.low > 0.0 && value.low < value.high && value.high.is_finite() { (show(value.low)) " to " (show(value.high)) } }
+                    },
+                    Err(why) => { td { (why) } td {} },
                 }
+                td { (ratio.map_or_else(String::new, times)) }
             }
         }
+    };
+    html! {
+        (table(&head, &body))
         p { "Each option was measured alternately with the base; ratios compare these runs." }
     }
 }
 
 fn points(curve: &Curve) -> Markup {
+    let head = html! { tr { th { "rounds" } th { "photons" } th { "time (median)" } th { "fastest to slowest" } th { "wall" } th { "error" } th { (findings::words_of_confidence()) " interval" } th { "noise" } th { "bias" } } };
     html! {
         details {
             summary { (curve.label) ": all points" }
-            div.scroll {
-                table {
-                    thead { tr { th { "rounds" } th { "photons" } th { "time (median)" } th { "fastest to slowest" } th { "wall" } th { "error" } th { (findings::words_of_confidence()) " interval" } th { "noise" } th { "bias" } } }
-                    tbody { @for point in &curve.points { (row(point)) } }
-                }
-            }
+            (table(&head, &html! { @for point in &curve.points { (row(point)) } }))
             @for point in &curve.points { p { code { (point.command) } } }
         }
     }
@@ -193,7 +161,7 @@ fn how(study: &Study) -> Markup {
                 li { "Time: device time of all rounds by timestamps, without set-up; the CPU builder uses the host's clock. Warm-up work before each run brings the device to its full clock. The time of a point is the median of its runs; the fastest and the slowest run show the drift of the clock." }
                 li { "Times to reach an error are interpolated linearly between points on logarithmic scales, and never extrapolated." }
                 li { "Each command repeats the first run of its point. The other runs use the seeds that follow." }
-                li { "Pixels that show a light source directly are excluded from the error of images. This page has " (number(study.parts.iter().map(|part| part.curves().map(|curve| curve.points.len()).sum::<usize>()).sum::<usize>() as f64)) " points." }
+                li { "Pixels that show a light source directly are excluded from the error of images. This page has " (count(study.parts.iter().flat_map(Part::points).count() as u64)) " points." }
             }
         }
     }

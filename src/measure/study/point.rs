@@ -6,6 +6,7 @@ use serde::{Deserialize, Serialize};
 use statrs::distribution::{ContinuousCDF, StudentsT};
 
 use super::reference::Reference;
+use crate::measure::line_fit::LineFit;
 
 /// What one run left.
 #[derive(Debug, Clone)]
@@ -129,8 +130,7 @@ impl Point {
 
     /// Of all rounds: on the device where it has a clock, else the host's. The middle one, the shortest and the longest.
     pub fn ms(&self) -> Estimate {
-        let mut all: Vec<f64> = (0..self.wall_ms.len()).map(|run| self.ms_of(run)).collect();
-        all.sort_by(f64::total_cmp);
+        let all = sorted((0..self.wall_ms.len()).map(|run| self.ms_of(run)));
         Estimate { value: all[all.len() / 2], low: all[0], high: all[all.len() - 1] }
     }
 
@@ -140,10 +140,14 @@ impl Point {
     }
 
     pub fn wall(&self) -> f64 {
-        let mut all = self.wall_ms.clone();
-        all.sort_by(f64::total_cmp);
-        all[all.len() / 2]
+        sorted(self.wall_ms.iter().copied())[self.wall_ms.len() / 2]
     }
+}
+
+fn sorted(values: impl Iterator<Item = f64>) -> Vec<f64> {
+    let mut all: Vec<f64> = values.collect();
+    all.sort_by(f64::total_cmp);
+    all
 }
 
 /// A value with the interval that the spread of these logarithms makes. Where a run has none, as it never came so far,
@@ -167,19 +171,18 @@ pub struct Curve {
 }
 
 impl Curve {
+    /// Of no point yet.
+    pub fn new(label: &str) -> Curve {
+        Curve { label: label.to_owned(), points: Vec::new(), left_out: None }
+    }
+
     /// Milliseconds to a relative error for one of the runs, or for the mean of all: along straight lines between points
     /// on logarithmic scales, and only as far as was measured.
     fn crossing(points: &[(f64, f64)], error: f64) -> Option<f64> {
-        let mut before: Option<(f64, f64)> = None;
-        for &(ms, found) in points {
-            if found <= error {
-                let (ms_before, found_before) = before?;
-                let share = (found_before / error).ln() / (found_before / found.max(1e-12)).ln();
-                return Some(ms_before * (ms / ms_before).powf(share));
-            }
-            before = Some((ms, found));
-        }
-        None
+        let after = points.iter().position(|(_, found)| *found <= error)?;
+        let ((ms_before, found_before), (ms, found)) = (points[after.checked_sub(1)?], points[after]);
+        let share = (found_before / error).ln() / (found_before / found.max(1e-12)).ln();
+        Some(ms_before * (ms / ms_before).powf(share))
     }
 
     /// The same, with the interval that the single runs give.
@@ -202,19 +205,20 @@ impl Curve {
 
     /// How many times longer than `other` this takes to an error, run by run, with an interval of this confidence.
     pub fn times_longer(&self, other: &Curve, error: f64, confidence: f64) -> Option<Estimate> {
-        let (own, others) = (self.time_to(error)?, other.time_to(error)?);
-        let value = own.value / others.value;
-        let logs = self.logs_of_time_to(error).into_iter().zip(other.logs_of_time_to(error));
-        let each: Vec<Option<f64>> = logs.map(|(own, other)| Some(own? - other?)).collect();
-        Some(around(value, &each, confidence))
+        self.time_ratio(error, other, error, confidence)
     }
 
     /// How many times longer half an error takes.
     pub fn halving(&self, error: f64) -> Option<Estimate> {
-        let value = self.time_to(0.5 * error)?.value / self.time_to(error)?.value;
-        let logs = self.logs_of_time_to(0.5 * error).into_iter().zip(self.logs_of_time_to(error));
-        let each: Vec<Option<f64>> = logs.map(|(half, whole)| Some(half? - whole?)).collect();
-        Some(around(value, &each, CONFIDENCE))
+        self.time_ratio(0.5 * error, self, error, CONFIDENCE)
+    }
+
+    /// Time to `error` over that of `other` to `other_error`.
+    fn time_ratio(&self, error: f64, other: &Curve, other_error: f64, confidence: f64) -> Option<Estimate> {
+        let value = self.time_to(error)?.value / other.time_to(other_error)?.value;
+        let logs = self.logs_of_time_to(error).into_iter().zip(other.logs_of_time_to(other_error));
+        let each: Vec<Option<f64>> = logs.map(|(own, other)| Some(own? - other?)).collect();
+        Some(around(value, &each, confidence))
     }
 
     /// Whether every run by itself, and their mean, crossed an error.
@@ -253,16 +257,9 @@ impl Curve {
             .points
             .iter()
             .filter(|point| point.noise() >= 0.9 * point.error().value && point.noise() > least)
-            .map(|point| ((point.photons as f64).ln(), point.noise().ln()))
+            .map(|point| (point.photons as f64, point.noise()))
             .collect();
-        if noisy.len() < 3 {
-            return None;
-        }
-        let count = noisy.len() as f64;
-        let (x, y) = noisy.iter().fold((0.0, 0.0), |(x, y), point| (x + point.0 / count, y + point.1 / count));
-        let (above, below) =
-            noisy.iter().fold((0.0, 0.0), |(above, below), point| (above + (point.0 - x) * (point.1 - y), below + (point.0 - x).powi(2)));
-        Some(above / below)
+        if noisy.len() < 3 { None } else { Some(LineFit::of_logarithms(&noisy)?.slope) }
     }
 }
 
@@ -321,14 +318,14 @@ pub(super) mod tests {
             let uniform = philox([run, draw, 0, 0], [5, 9]).map(|word| (f64::from(word) + 0.5) / 4_294_967_296.0);
             (-2.0 * uniform[0].ln()).sqrt() * (std::f64::consts::TAU * uniform[1]).cos()
         };
+        const TRIALS: u32 = 4000;
+        let share_held = |truth: f64, estimate: &dyn Fn(u32) -> Estimate| {
+            let holds = |trial: &u32| (estimate(*trial).low..=estimate(*trial).high).contains(&truth);
+            (0..TRIALS).filter(holds).count() as f64 / f64::from(TRIALS)
+        };
         for runs in [2, 3, 5] {
-            let held = (0..4000u32)
-                .filter(|trial| {
-                    let estimate = Estimate::of_mean(&(0..runs).map(|draw| 7.0 + normal(*trial, draw)).collect::<Vec<_>>());
-                    estimate.low <= 7.0 && 7.0 <= estimate.high
-                })
-                .count() as f64
-                / 4000.0;
+            let values = |trial: u32| (0..runs).map(|draw| 7.0 + normal(trial, draw)).collect::<Vec<_>>();
+            let held = share_held(7.0, &|trial| Estimate::of_mean(&values(trial)));
             // Three standard errors of a share of 0.95.
             assert!((held - CONFIDENCE).abs() < 0.0104, "{runs} runs: {held}");
         }
@@ -336,14 +333,7 @@ pub(super) mod tests {
         for (pixels, runs) in [(1, 3), (1, 5), (2, 3), (2, 5), (5, 3), (5, 5), (40, 5)] {
             let square =
                 |trial: u32, run: u32| (0..pixels).map(|pixel| normal(trial, 64 * run + pixel).powi(2)).sum::<f64>() / f64::from(pixels);
-            let held = (0..4000u32)
-                .filter(|trial| {
-                    let estimate = Estimate::of_squares(&(0..runs).map(|run| square(*trial, run)).collect::<Vec<_>>());
-                    estimate.low <= 1.0 && 1.0 <= estimate.high
-                })
-                .count() as f64
-                / 4000.0;
-            println!("{pixels} pixels, {runs} runs: {held}");
+            let held = share_held(1.0, &|trial| Estimate::of_squares(&(0..runs).map(|run| square(trial, run)).collect::<Vec<_>>()));
             assert!(held > 0.87, "{pixels} pixels, {runs} runs: {held}");
         }
     }

@@ -2,7 +2,9 @@
 //! for images.
 
 use std::fmt::Write;
-use std::path::PathBuf;
+use std::fs::File;
+use std::io;
+use std::path::{Path, PathBuf};
 use std::sync::atomic::{AtomicBool, Ordering};
 
 use bytemuck::cast_slice;
@@ -45,6 +47,12 @@ impl Reference {
     /// Of what is off, without what the reference's own noise adds.
     pub fn squared_error(&self, found: &[f64]) -> f64 {
         self.mean_over(|place| (found[place] - self.values[place]).powi(2) - self.standard_errors[place].powi(2))
+    }
+
+    /// With the relative error that its own noise makes at the places that count.
+    pub fn with_own_error(self) -> Reference {
+        let noise = self.mean_over(|place| self.standard_errors[place].powi(2));
+        Reference { relative_error: (noise / self.mean_square()).sqrt(), ..self }
     }
 
     /// Irradiance of the walls of the paper's box at the middle of each texel, of all reflections, W/m2, by radiosity in
@@ -102,9 +110,8 @@ impl Reference {
         cancelled: &AtomicBool,
         tell: &mut dyn FnMut(&str),
     ) -> Result<Reference> {
-        let mut key = Hash(Sha256::new());
-        write!(key, "{JUDGE_VERSION} {scene:?} {camera:?} {size} {samples}").expect("hashing cannot fail");
-        cached(&format!("picture {:x}", key.0.finalize()), || {
+        let key = digest(format_args!("{JUDGE_VERSION} {scene:?} {camera:?} {size} {samples}"));
+        cached(&format!("picture {key}"), || {
             let (batch, batches) = (samples / BATCHES, BATCHES);
             let judge = Judge::new(scene, u32::MAX);
             let places = 3 * (size * size) as usize;
@@ -122,16 +129,14 @@ impl Reference {
                 }
             }
             let shining = Judge::new(scene, 0).image(camera, size, size, 64, SEED);
-            let mut reference = Reference {
+            let reference = Reference {
                 method: String::new(),
                 values,
                 standard_errors: variances.into_iter().map(f64::sqrt).collect(),
                 counts: (0..places).map(|place| shining.pixels[place / 3].mean.direct == DVec3::ZERO).collect(),
                 relative_error: 0.0,
             };
-            let noise = reference.mean_over(|place| reference.standard_errors[place].powi(2));
-            reference.relative_error = (noise / reference.mean_square()).sqrt();
-            Ok(reference)
+            Ok(reference.with_own_error())
         })
         .map(|reference| reference.by(format!("path tracing in float64 on the CPU with {} samples per pixel", samples / BATCHES * BATCHES)))
     }
@@ -166,10 +171,10 @@ pub fn wall_points(mesh: u32) -> Vec<(usize, DVec3)> {
         .collect()
 }
 
-/// Of everything that a scene holds.
-pub fn digest(scene: &Scene) -> String {
+/// Of a text that may be too long to hold.
+pub fn digest(text: std::fmt::Arguments) -> String {
     let mut hash = Hash(Sha256::new());
-    write!(hash, "{scene:?}").expect("hashing cannot fail");
+    hash.write_fmt(text).expect("hashing cannot fail");
     format!("{:x}", hash.0.finalize())
 }
 
@@ -189,45 +194,45 @@ fn cached(key: &str, make: impl FnOnce() -> Result<Reference>) -> Result<Referen
         return Ok(known);
     }
     let made = make()?;
-    let folder = path.parent().expect("the file lies in a folder");
-    let written = std::fs::create_dir_all(folder)
-        .and_then(|()| tempfile::NamedTempFile::new_in(folder))
-        .and_then(|mut file| std::io::Write::write_all(&mut file, &encode(&made)).map(|()| file));
-    if let Ok(file) = written {
-        let _ = file.persist(path);
-    }
+    let _ = replace_file(&path, &encode(&made));
     Ok(made)
+}
+
+/// Writes a file; it stands as it was until the new one is whole.
+pub fn replace_file(path: &Path, content: &[u8]) -> io::Result<File> {
+    let folder = path.parent().expect("the file lies in a folder");
+    std::fs::create_dir_all(folder)?;
+    let mut file = tempfile::NamedTempFile::new_in(folder)?;
+    io::Write::write_all(&mut file, content)?;
+    Ok(file.persist(path)?)
 }
 
 fn path_of(key: &str) -> Option<PathBuf> {
     let folders = directories::ProjectDirs::from("", "", "photonmill")?;
-    Some(folders.cache_dir().join("references").join(format!("{:x}.bin", Sha256::digest(key))))
+    Some(folders.cache_dir().join("references").join(format!("{:x}.f64", Sha256::digest(key))))
 }
 
-/// A digest of the rest, then the numbers of places and of the method's bytes, then all of them.
+/// A digest of the rest, then the relative error, the values, their standard errors, and 1 or 0 for each place that counts
+/// or does not.
 fn encode(reference: &Reference) -> Vec<u8> {
-    let counts: Vec<u8> = reference.counts.iter().map(|counts| u8::from(*counts)).collect();
-    let lengths = [reference.values.len() as u64, reference.method.len() as u64];
-    let numbers = [reference.values.as_slice(), &reference.standard_errors, &[reference.relative_error]].concat();
-    let body = [cast_slice(&lengths), cast_slice(&numbers), &counts, reference.method.as_bytes()].concat();
-    [Sha256::digest(&body).as_slice(), &body].concat()
+    let counts: Vec<f64> = reference.counts.iter().map(|counts| f64::from(u8::from(*counts))).collect();
+    let numbers = [&[reference.relative_error][..], &reference.values, &reference.standard_errors, &counts].concat();
+    let body: &[u8] = cast_slice(&numbers);
+    [Sha256::digest(body).as_slice(), body].concat()
 }
 
 fn decode(bytes: &[u8]) -> Option<Reference> {
     let (digest, body) = bytes.split_at_checked(32)?;
-    if Sha256::digest(body).as_slice() != digest {
-        return None;
-    }
-    let word = |place: usize| <[u8; 8]>::try_from(body.get(8 * place..8 * place + 8)?).ok();
-    let places = u64::from_le_bytes(word(0)?) as usize;
-    let numbers = |first: usize| (first..first + places).map(|place| Some(f64::from_le_bytes(word(place)?))).collect::<Option<Vec<f64>>>();
-    let (counts, method) = body.get(24 + 16 * places..)?.split_at_checked(places)?;
+    let (words, []) = body.as_chunks::<8>() else { return None };
+    let numbers: Vec<f64> = words.iter().map(|word| f64::from_ne_bytes(*word)).collect();
+    let (relative_error, places) = numbers.split_first().filter(|_| Sha256::digest(body).as_slice() == digest)?;
+    let [values, standard_errors, counts] = [0, 1, 2].map(|part| &places[part * places.len() / 3..(part + 1) * places.len() / 3]);
     Some(Reference {
-        values: numbers(2)?,
-        standard_errors: numbers(2 + places)?,
-        relative_error: f64::from_le_bytes(word(2 + 2 * places)?),
-        counts: counts.iter().map(|counts| *counts != 0).collect(),
-        method: String::from_utf8(method.to_vec()).ok()?,
+        method: String::new(),
+        values: values.to_vec(),
+        standard_errors: standard_errors.to_vec(),
+        counts: counts.iter().map(|counts| *counts != 0.0).collect(),
+        relative_error: *relative_error,
     })
 }
 
@@ -237,7 +242,7 @@ mod tests {
 
     fn reference() -> Reference {
         Reference {
-            method: "a method".into(),
+            method: String::new(),
             values: vec![1.0, 2.0, 30.0],
             standard_errors: vec![0.1, 0.2, 3.0],
             counts: vec![true, true, false],

@@ -1,9 +1,10 @@
 //! Finished points on disk, so that an interrupted study can be continued.
 
 use std::collections::HashMap;
-use std::io::Write;
+use std::io::{self, Write};
+use std::path::{Path, PathBuf};
 
-use serde::{Deserialize, Serialize};
+use serde_json::{Value, json};
 
 use super::Request;
 use super::axes::Axis;
@@ -14,22 +15,11 @@ use crate::gpu::DeviceFacts;
 use crate::output::destination::Folder;
 use crate::scene::Scene;
 
-/// What points are of; those of another study are no use.
-#[derive(Debug, PartialEq, Serialize, Deserialize)]
-struct Head {
-    photonmill: String,
-    device: String,
-    driver: String,
-    /// Digest of all that the scene holds.
-    scene: String,
-    request: serde_json::Value,
-}
-
 pub struct Store {
     file: std::fs::File,
     /// Held for as long as this is.
     _lock: std::fs::File,
-    path: std::path::PathBuf,
+    path: PathBuf,
     points: HashMap<(Axis, String), Point>,
 }
 
@@ -48,30 +38,28 @@ const LOCK: &str = "study.lock";
 impl Store {
     pub fn open(folder: &Folder, scene: &Scene, request: &Request, device: &DeviceFacts) -> Result<Store> {
         let path = folder.path().join(NAME);
-        let refuse = |reason: String| Error::Output { option: "-o", path: path.clone(), reason };
-        std::fs::create_dir_all(folder.path()).map_err(|error| refuse(error.kind().to_string()))?;
-        let lock = std::fs::File::create(folder.path().join(LOCK)).map_err(|error| refuse(error.kind().to_string()))?;
+        let refuse = |error: io::Error| refused(&path, error.kind().to_string());
+        std::fs::create_dir_all(folder.path()).map_err(refuse)?;
+        let lock = std::fs::File::create(folder.path().join(LOCK)).map_err(refuse)?;
+        let unusable = |why: String| Error::setting("-o", folder.path().display(), format!("{why} choose another folder"));
         if lock.try_lock().is_err() {
-            return Err(Error::setting("-o", folder.path().display(), "is in use by another study; choose another folder"));
+            return Err(unusable("is in use by another study;".to_owned()));
         }
-        let head = Head {
-            photonmill: env!("CARGO_PKG_VERSION").to_owned(),
-            device: device.name.clone(),
-            driver: device.driver.clone(),
-            scene: reference::digest(scene),
-            request: serde_json::to_value(request).expect("a request is plain data"),
-        };
+        // What points are of; those of another study are no use.
+        let head = json!({
+            "photonmill": env!("CARGO_PKG_VERSION"),
+            "device": device.name,
+            "driver": device.driver,
+            "scene": reference::digest(format_args!("{scene:?}")),
+            "request": request,
+        });
         let mut points = HashMap::new();
         let mut kept = String::new();
         match std::fs::read_to_string(&path) {
             Ok(text) => {
                 let mut lines = text.lines();
-                if lines.next().and_then(|line| serde_json::from_str(line).ok()).as_ref() != Some(&head) {
-                    return Err(Error::setting(
-                        "-o",
-                        folder.path().display(),
-                        format!("holds the {NAME} of a different study or device; choose another folder, or delete that file"),
-                    ));
+                if lines.next().and_then(|line| serde_json::from_str::<Value>(line).ok()).as_ref() != Some(&head) {
+                    return Err(unusable(format!("holds the {NAME} of a different study or device; delete that file, or")));
                 }
                 // A last line that was cut off is measured again.
                 for (line, (axis, point)) in lines.filter_map(|line| Some((line, parse_complete(line, request.repeats)?))) {
@@ -80,15 +68,10 @@ impl Store {
                     points.insert((axis, point.command.clone()), point);
                 }
             }
-            Err(error) if error.kind() == std::io::ErrorKind::NotFound => {}
-            Err(error) => return Err(refuse(format!("the existing file cannot be read: {}", error.kind()))),
+            Err(error) if error.kind() == io::ErrorKind::NotFound => {}
+            Err(error) => return Err(refused(&path, format!("the existing file cannot be read: {}", error.kind()))),
         }
-        let head = serde_json::to_string(&head).expect("a head is plain data");
-        // The file as it was stands until the new one is whole.
-        let file = tempfile::NamedTempFile::new_in(folder.path())
-            .and_then(|mut file| file.write_all(format!("{head}\n{kept}").as_bytes()).map(|()| file))
-            .and_then(|file| file.persist(&path).map_err(|error| error.error))
-            .map_err(|error| refuse(error.kind().to_string()))?;
+        let file = reference::replace_file(&path, format!("{head}\n{kept}").as_bytes()).map_err(refuse)?;
         Ok(Store { file, _lock: lock, path, points })
     }
 
@@ -99,10 +82,11 @@ impl Store {
 
     pub fn keep(&mut self, axis: Axis, point: &Point) -> Result<()> {
         let line = serde_json::to_string(&(axis, point)).expect("a point is plain data") + "\n";
-        self.file.write_all(line.as_bytes()).and_then(|()| self.file.flush()).map_err(|error| Error::Output {
-            option: "-o",
-            path: self.path.clone(),
-            reason: error.kind().to_string(),
-        })
+        let written = self.file.write_all(line.as_bytes()).and_then(|()| self.file.flush());
+        written.map_err(|error| refused(&self.path, error.kind().to_string()))
     }
+}
+
+fn refused(path: &Path, reason: String) -> Error {
+    Error::Output { option: "-o", path: path.to_owned(), reason }
 }

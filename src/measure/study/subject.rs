@@ -9,11 +9,9 @@ use super::Request;
 use super::axes::{self, Configuration, Group, Line};
 use super::point::Shot;
 use super::reference::{Reference, wall_points};
-use crate::engine;
-use crate::engine::Control;
-use crate::engine::room::film::estimate_walls;
-use crate::engine::room::{self};
+use crate::engine::room::{self, film::estimate_walls};
 use crate::engine::scene::{self, RunResult, Target, View};
+use crate::engine::{self, Control};
 use crate::error::{Error, Result};
 use crate::gpu::Gpu;
 use crate::ledger::Ledger;
@@ -52,62 +50,48 @@ impl Subject {
     pub fn all(gpu: &Gpu, scene: &Scene, request: &Request, cancelled: &AtomicBool, tell: &mut dyn FnMut(&str)) -> Result<Vec<Subject>> {
         let Request { scene: name, size, photons, reference_samples, .. } = request.clone();
         let geometry = Rc::new(Geometry::new(scene)?);
-        let subject = |quantity: &str, reference, groups| Subject {
+        let subject = |quantity: &str, reference: &Reference, groups, (camera, receivers)| Subject {
             quantity: quantity.to_owned(),
-            reference,
+            reference: reference.clone(),
             groups,
             scene: scene.clone(),
             geometry: geometry.clone(),
-            camera: None,
-            receivers: Vec::new(),
+            camera,
+            receivers,
             size,
             name: name.clone(),
         };
+        let of_scene = |is_picture| scene_axes(gpu, scene, &geometry, request, is_picture);
         if name == "open-box" {
             tell("reference: radiosity of the box");
-            let usual = RoomSettings::default();
-            let reference = Reference::walls(&usual, size)?;
-            let points = wall_points(size);
-            let receivers = || points.iter().map(|(wall, point)| (*point, inward(*wall))).collect();
-            let papers = axes::of_the_papers_rounds(size);
+            let reference = Reference::walls(&RoomSettings::default(), size)?;
+            let receivers: Vec<_> = wall_points(size).into_iter().map(|(wall, point)| (point, inward(wall))).collect();
             return Ok(vec![
-                subject("Irradiance of the walls: the paper's box", reference.clone(), axes::of_paper(size, photons)),
-                Subject {
-                    receivers: receivers(),
-                    ..subject(
-                        "Irradiance of the walls: the box as triangles",
-                        reference.clone(),
-                        scene_axes(gpu, scene, &geometry, request, false)?,
-                    )
-                },
-                Subject { receivers: receivers(), ..subject("The paper's experiment: rounds of 5000 photons", reference, papers) },
+                subject("Irradiance of the walls: the paper's box", &reference, axes::of_paper(size, photons), (None, Vec::new())),
+                subject("Irradiance of the walls: the box as triangles", &reference, of_scene(false)?, (None, receivers.clone())),
+                subject("The paper's experiment: rounds of 5000 photons", &reference, axes::of_the_papers_rounds(size), (None, receivers)),
             ]);
         }
         if let Some((receivers, reference)) = Reference::floor(&name, size) {
-            let axes = scene_axes(gpu, scene, &geometry, request, false)?;
-            return Ok(vec![Subject { receivers, ..subject("Irradiance of the floor", reference, axes) }]);
+            return Ok(vec![subject("Irradiance of the floor", &reference, of_scene(false)?, (None, receivers))]);
         }
-        let camera = scene.first_camera();
+        let refuse = |why: &str| Err(Error::setting("study", &name, why));
         if unknown_to_paths(scene) {
-            return Err(Error::setting(
-                "study",
-                &name,
+            return refuse(
                 "has a point, spot, directional or disc light with mirrors or glass. Path tracing, the reference, cannot find the caustics of such lights; choose another scene",
-            ));
+            );
         }
         tell(&format!(
             "reference: path tracing of {size} x {size} pixels, {reference_samples} samples per pixel, unless it is in the cache"
         ));
+        let camera = scene.first_camera();
         let reference = Reference::picture(scene, &camera, size, reference_samples, cancelled, tell)?;
         if reference.mean_square() <= f64::MIN_POSITIVE {
-            let why =
-                "shows no light except light sources seen directly, so a relative error is not defined; choose another scene or camera";
-            return Err(Error::setting("study", &name, why));
+            return refuse(
+                "shows no light except light sources seen directly, so a relative error is not defined; choose another scene or camera",
+            );
         }
-        Ok(vec![Subject {
-            camera: Some(camera),
-            ..subject("Radiance of the image", reference, scene_axes(gpu, scene, &geometry, request, true)?)
-        }])
+        Ok(vec![subject("Radiance of the image", &reference, of_scene(true)?, (Some(camera), Vec::new()))])
     }
 
     /// What repeats a run.
@@ -140,8 +124,8 @@ impl Subject {
         self.groups.iter().flat_map(|group| &group.configurations).any(|configuration| matches!(configuration.line, Line::Paper(_)))
     }
 
-    /// One run; `None` if it was interrupted.
-    pub fn run(&self, gpu: &Gpu, configuration: &Configuration, rounds: u32, seed: u64, cancelled: &AtomicBool) -> Result<Option<Shot>> {
+    /// One run.
+    pub fn run(&self, gpu: &Gpu, configuration: &Configuration, rounds: u32, seed: u64, cancelled: &AtomicBool) -> Result<Shot> {
         let mut control = Control::quiet(cancelled);
         let shot = match &configuration.line {
             Line::Paper(settings) => {
@@ -164,7 +148,7 @@ impl Subject {
                 Shot { photons: lit.ledger().emitted, ..shot(values, &lit.timings, global) }
             }
         };
-        Ok((!cancelled.load(Ordering::Relaxed)).then_some(shot))
+        if cancelled.load(Ordering::Relaxed) { Err(Error::Interrupted) } else { Ok(shot) }
     }
 
     fn light(&self, gpu: &Gpu, settings: SceneSettings, control: &mut Control) -> Result<RunResult> {

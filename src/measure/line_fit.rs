@@ -1,0 +1,44 @@
+//! A straight line through points by least squares.
+
+#[derive(Debug, Clone, Copy, PartialEq)]
+pub struct LineFit {
+    pub slope: f64,
+    pub intercept: f64,
+    /// Standard error of the slope; not a number for two points, which any line fits.
+    pub slope_error: f64,
+}
+
+impl LineFit {
+    /// `None` without two points of different x.
+    pub fn of(points: &[(f64, f64)]) -> Option<LineFit> {
+        let count = points.len() as f64;
+        let (x, y) = points.iter().fold((0.0, 0.0), |(x, y), point| (x + point.0 / count, y + point.1 / count));
+        let sum = |of: &dyn Fn(f64, f64) -> f64| points.iter().map(|point| of(point.0 - x, point.1 - y)).sum::<f64>();
+        let spread = sum(&|x, _| x * x);
+        let slope = sum(&|x, y| x * y) / spread;
+        let left = sum(&|x, y| (y - slope * x).powi(2));
+        (spread > 0.0).then(|| LineFit { slope, intercept: y - slope * x, slope_error: (left / (count - 2.0) / spread).sqrt() })
+    }
+
+    /// Through the logarithms of points above 0: the slope is the exponent of a power law.
+    pub fn of_logarithms(points: &[(f64, f64)]) -> Option<LineFit> {
+        LineFit::of(&points.iter().map(|(x, y)| (x.ln(), y.ln())).collect::<Vec<_>>())
+    }
+
+    pub fn at(&self, x: f64) -> f64 {
+        self.intercept + self.slope * x
+    }
+}
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+
+    #[test]
+    fn a_power_law_gives_its_exponent() {
+        let points: Vec<(f64, f64)> = (1..6).map(|x| (f64::from(x), 3.0 * f64::from(x).powf(1.5))).collect();
+        let fit = LineFit::of_logarithms(&points).unwrap();
+        assert!((fit.slope - 1.5).abs() < 1e-12 && (fit.intercept - 3f64.ln()).abs() < 1e-12 && fit.slope_error < 1e-9, "{fit:?}");
+        assert_eq!(LineFit::of_logarithms(&points[..1]), None);
+    }
+}

@@ -1,0 +1,54 @@
+//! Pages as HTML in one file that loads nothing.
+
+use maud::{DOCTYPE, Markup, PreEscaped, html};
+
+/// A whole page.
+pub fn page(title: &str, content: &Markup) -> String {
+    let page = html! {
+        (DOCTYPE)
+        html lang="en" {
+            head {
+                meta charset="utf-8";
+                meta name="viewport" content="width=device-width, initial-scale=1";
+                meta name="color-scheme" content="light dark";
+                title { (title) }
+                style { (PreEscaped(include_str!("page.css"))) }
+            }
+            body { main { (content) } }
+        }
+    };
+    page.into_string()
+}
+
+/// A chart with what it shows; nothing where nothing was drawn.
+pub fn chart(drawn: Option<String>, caption: &str) -> Markup {
+    html! {
+        @if let Some(drawn) = drawn {
+            figure {
+                div.scroll { (PreEscaped(drawn)) }
+                @if !caption.is_empty() { figcaption { p { (caption) } } }
+            }
+        }
+    }
+}
+
+/// Why times of a software device are no times of a GPU, and what `more` follows from it.
+pub fn software_notice(more: &str) -> Markup {
+    html! {
+        p.notice { strong { "This device is software." } " It runs Vulkan on the CPU, so 'GPU' times on this page are CPU times." (more) }
+    }
+}
+
+/// A table that scrolls by itself where the page is narrow.
+pub fn table(head: &Markup, body: &Markup) -> Markup {
+    html! {
+        div.scroll { table { thead { (head) } tbody { (body) } } }
+    }
+}
+
+/// Commands that repeat measurements, folded.
+pub fn commands<'a>(commands: impl Iterator<Item = &'a String>) -> Markup {
+    html! {
+        details { summary { "Commands" } @for command in commands { p { code { (command) } } } }
+    }
+}
