@@ -109,3 +109,8 @@ impl Error {
         Error::Setting { option, value: value.to_string(), allowed: allowed.into() }
     }
 }
+
+/// Refuses the value of an option that is not allowed.
+pub(crate) fn require(is_allowed: bool, option: &'static str, value: impl ToString, allowed: impl Into<String>) -> Result<()> {
+    if is_allowed { Ok(()) } else { Err(Error::setting(option, value, allowed)) }
+}

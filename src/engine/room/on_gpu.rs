@@ -103,19 +103,19 @@ impl<'a> World for RoomOnGpu<'a> {
 pub fn constants(plan: &RoomPlan) -> Constants {
     let settings = &plan.settings;
     Constants::new(settings.group_size)
-        .set("RNG", settings.rng.code())
+        .set("RNG", settings.rng as u32)
         .set("PARANOID", u32::from(settings.paranoid))
-        .set("STRICT_MATH", settings.math.code())
-        .set("EMISSION_LAW", settings.emission.code())
+        .set("STRICT_MATH", settings.math as u32)
+        .set("EMISSION_LAW", settings.emission as u32)
         .set("HAS_PHONG", u32::from(settings.has_phong()))
-        .set("PHONG_DIRECTION", settings.phong_direction.code())
+        .set("PHONG_DIRECTION", settings.phong_direction as u32)
         .set("HAS_SLOTS", u32::from(plan.has_slots()))
         .set("HAS_ORIGINS", u32::from(plan.keeps_origins))
         .set("COUNTERS", plan.counters)
         .set("LANES", plan.lanes)
         .set("HAS_SLICES", u32::from(plan.slices_candidates))
         .set("CHANNEL_COUNT", plan.channel_count)
-        .set("SUMS", settings.sums.code())
+        .set("SUMS", settings.sums as u32)
 }
 
 /// Kernels that the plan needs, and no others.
