@@ -14,10 +14,9 @@ use super::{End, optional_file, say, say_beside};
 use crate::engine;
 use crate::engine::replay::PhotonName;
 use crate::engine::scene::{RunResult, replay};
-use crate::error::{Error, Result};
-use crate::output::colour::ColourPicture;
+use crate::error::{Result, require};
+use crate::output::colour::{ColourPicture, Format};
 use crate::output::destination::{Destination, check_distinct, write_all};
-use crate::output::image::Format;
 use crate::output::scene_report;
 use crate::plan::scene::ScenePlan;
 use crate::scene::{Camera, Scene};
@@ -78,22 +77,18 @@ pub(super) fn run(args: &RenderArgs, cancelled: &AtomicBool) -> Result<End> {
     let output = args.output.as_ref().expect("clap asks for it");
     let format = Format::of("-o", output)?;
     if let Some(samples) = args.judge {
-        if !(2..=MAX_JUDGE_SAMPLES).contains(&samples) {
-            return Err(Error::setting("--judge", samples, format!("must be from 2 to {MAX_JUDGE_SAMPLES} samples per pixel")));
-        }
-        if settings.filter != Filter::Box || settings.rounds < 2 {
-            return Err(Error::setting("--judge", samples, "needs --filter box, and two rounds or more to know the error"));
-        }
+        let range = format!("must be from 2 to {MAX_JUDGE_SAMPLES} samples per pixel");
+        require((2..=MAX_JUDGE_SAMPLES).contains(&samples), "--judge", samples, range)?;
+        let is_known = settings.filter == Filter::Box && settings.rounds >= 2;
+        require(is_known, "--judge", samples, "needs --filter box, and two rounds or more to know the error")?;
     }
-    if let (Format::Exr, Some(exposure)) = (format, args.exposure) {
-        return Err(Error::setting("--exposure", exposure, "is for PNG only: an EXR holds linear radiance"));
+    if let Some(exposure) = args.exposure {
+        require(format == Format::Png, "--exposure", exposure, "is for PNG only: an EXR holds linear radiance")?;
     }
     let picture = Destination::open("-o", output)?;
     let errors = optional_file("--error-image", args.error_image.as_ref())?;
-    if let Some(path) = &args.error_image
-        && Format::of("--error-image", path)? != Format::Exr
-    {
-        return Err(Error::setting("--error-image", path.display(), "must end in .exr"));
+    if let Some(path) = &args.error_image {
+        require(Format::of("--error-image", path)? == Format::Exr, "--error-image", path.display(), "must end in .exr")?;
     }
     let reports = args.report.open()?;
     let all: Vec<Destination> = [vec![picture.clone()], errors.clone().into_iter().collect(), reports.destinations()].concat();

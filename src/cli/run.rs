@@ -13,17 +13,18 @@ use super::values::{
     BuilderArg, SwitchArg, builder_parser, parse_integer, parse_number, parse_numbers, parse_photon_name, parse_shininess, parse_threads,
     parse_within, value_enum,
 };
-use super::{End, complain, say, say_beside};
+use super::{DeviceArgs, End, complain, say, say_beside};
 use crate::engine;
 use crate::engine::Control;
 use crate::engine::choose_builder::{Choice, choose_builder};
 use crate::engine::replay::PhotonName;
 use crate::engine::room::film::estimate_walls;
 use crate::engine::room::{self, RunResult};
-use crate::error::{Error, Result};
+use crate::error::{Result, require};
 use crate::gpu::Gpu;
+use crate::output::colour::Format;
 use crate::output::destination::{Destination, Folder, check_distinct, write_all};
-use crate::output::image::{Format, overview};
+use crate::output::image::overview;
 use crate::output::lightmap::{self, Quantity};
 use crate::output::room_report;
 use crate::plan::{Limits, RoomPlan};
@@ -228,14 +229,13 @@ impl RunArgs {
 pub(super) fn run(args: &RunArgs, cancelled: &AtomicBool) -> Result<End> {
     let settings = args.settings();
     settings.validate()?;
-    if settings.reflectance == 0.0 && args.irradiance.is_some() {
-        return Err(Error::setting("--reflectance", 0, "must be above 0 with --irradiance: the photon map holds only reflected photons"));
-    }
-    if let (Builder::Cpu, Some(device)) = (settings.builder, &args.device.device.device) {
-        return Err(Error::setting("--device", device, "has no effect with --variant cpu; leave one of the two out"));
-    }
-    if settings.builder == Builder::Cpu && args.device.device.validate {
-        return Err(Error::setting("--validate", "on", "has no effect with --variant cpu; leave one of the two out"));
+    let stores_none = settings.reflectance == 0.0 && args.irradiance.is_some();
+    require(!stores_none, "--reflectance", 0, "must be above 0 with --irradiance: the photon map holds only reflected photons")?;
+    let DeviceArgs { device, validate } = &args.device.device;
+    if settings.builder == Builder::Cpu {
+        let idle = "has no effect with --variant cpu; leave one of the two out";
+        require(device.is_none(), "--device", device.as_deref().unwrap_or_default(), idle)?;
+        require(!validate, "--validate", "on", idle)?;
     }
     let scene = open_box(&settings);
     if let Some(name) = args.replay {
@@ -256,9 +256,9 @@ pub(super) fn run(args: &RunArgs, cancelled: &AtomicBool) -> Result<End> {
         None => RoomSettings { builder: Builder::Cpu, ..settings },
         _ => settings,
     };
-    if let (Some(nearest), true) = (settings.nearest, args.stop.bias) {
+    if let Some(nearest) = settings.nearest {
         let why = "has a radius of its own at each point, whose bias --bias cannot measure; leave --bias out";
-        return Err(Error::setting("--nearest", nearest, why));
+        require(!args.stop.bias, "--nearest", nearest, why)?;
     }
     announce(&reporter, gpu.as_ref(), &scene, &settings)?;
     let measure = |settings: &RoomSettings, rounds| room::measure_bias(gpu.as_ref(), &scene, settings, rounds, cancelled);

@@ -2,8 +2,9 @@
 
 use serde::Serialize;
 
+use super::colour::Format;
 use super::destination::{Destination, Folder};
-use super::image::{Format, Picture};
+use super::image::Picture;
 use crate::engine::room::film::WallEstimate;
 use crate::scene::room::RoomScene;
 

@@ -6,7 +6,7 @@ use super::capacity::{self, Persistence};
 use super::radius::{FirstRadius, Trial};
 use super::scene::{MapPlan, SEGMENT_BOUNCES};
 use crate::constants::*;
-use crate::error::{Error, Result};
+use crate::error::{Result, require};
 use crate::photon::MapPhoton;
 use crate::records::{CausticTarget, LightPath};
 use crate::scene::geometry::Geometry;
@@ -175,12 +175,8 @@ fn chunk_photons(photons: u32, landings: u64, settings: &SceneSettings, limits: 
     // Two maps of a chunk, sorted and unsorted, and its paths twice, with room for the film.
     let by_memory = limits.memory_bytes / 2 / (4 * photon * landings + 4 * path);
     let fits = by_buffer.min(by_memory).min(u64::from(u32::MAX) / landings);
-    if fits == 0 {
-        return Err(Error::setting(
-            "--bounces",
-            settings.bounces,
-            format!("the hits of one photon exceed the device's largest buffer, {} bytes; ask for fewer bounces", limits.buffer_bytes),
-        ));
-    }
+    let too_many =
+        format!("the hits of one photon exceed the device's largest buffer, {} bytes; ask for fewer bounces", limits.buffer_bytes);
+    require(fits > 0, "--bounces", settings.bounces, too_many)?;
     Ok(fits.min(settings.chunk.map_or(u64::MAX, u64::from)).min(u64::from(photons)) as u32)
 }

@@ -6,12 +6,10 @@ pub mod builder;
 pub mod scene;
 pub mod stop;
 
-use std::ops::RangeInclusive;
-
 use serde::Serialize;
 
 use crate::constants;
-use crate::error::{Result, require};
+use crate::error::{Result, require, within};
 use crate::rng::{self, Rng};
 pub use builder::Builder;
 use stop::Stop;
@@ -361,9 +359,4 @@ fn check_common((rounds, most_rounds): (u32, u32), group_size: u32, stop: &Stop)
     let is_allowed = group_size.is_power_of_two() && (32..=1024).contains(&group_size);
     require(is_allowed, "--group-size", group_size, "must be a power of two from 32 to 1024")?;
     stop.validate()
-}
-
-fn within<T: PartialOrd + std::fmt::Display>(option: &'static str, value: T, allowed: RangeInclusive<T>, what: &str) -> Result<()> {
-    let (least, most) = (allowed.start(), allowed.end());
-    require(allowed.contains(&value), option, &value, format!("must be from {least} to {most} ({what})"))
 }

@@ -3,9 +3,9 @@
 use serde::Serialize;
 
 pub use super::stop::Stop;
-use super::{Builder, MAX_PHOTONS, Math, check_common, within};
+use super::{Builder, MAX_PHOTONS, Math, check_common};
 use crate::constants::{self, MAX_BOUNCES};
-use crate::error::{Error, Result, require};
+use crate::error::{Error, Result, require, within};
 
 /// Where direct light and caustics come from.
 #[derive(Debug, Clone, Copy, PartialEq, Eq, Serialize)]

@@ -3,8 +3,9 @@
 use super::bench::{Bench, Step};
 use super::published;
 use crate::engine::room::film::{WallEstimate, estimate_walls};
+use crate::output::colour::Format;
 use crate::output::command;
-use crate::output::image::{Format, Picture, overview, view};
+use crate::output::image::{Picture, overview, view};
 use crate::scene::open_box::open_box;
 use crate::settings::{Preset, RoomSettings};
 use crate::text::counted;

@@ -9,7 +9,7 @@
 use glam::UVec2;
 
 use super::add_work;
-use crate::constants::{MAX_GROUPS, TREE_DIGITS, TREE_LEAF};
+use crate::constants::{TREE_DIGITS, TREE_LEAF};
 use crate::engine::prefix_sum::scan_part;
 use crate::engine::room::resources::{RoomResources, TreeBuffers};
 use crate::engine::room::trace::photon_list_capacity;
@@ -54,7 +54,7 @@ pub(super) fn build(
     let capacity = photon_list_capacity(plan, photon_count);
     let push = TreePush { photon_capacity: capacity, axis: 0, digit: 0, height: 0 };
     let one = Extent::Groups(1, 1);
-    let size = DispatchSizePush { counter: 0, capacity, items_per_group: plan.settings.group_size, max_groups: MAX_GROUPS };
+    let size = DispatchSizePush::new(0, capacity, plan.settings.group_size);
     commands.dispatch(TreeSizes { photons, counters, item_args, run_args, scan_args }, &size, one)?;
     let pass_work = plan.work.tree_pass(photon_count);
     commands.scope("sort", |commands| {
