@@ -112,7 +112,7 @@ pub(super) struct RunArgs {
     mesh: Option<u32>,
     /// Builder of the photon map; all GPU builders give bit-identical results [default: atomic; naive with --preset naive]
     #[arg(long, value_name = "BUILDER", help_heading = "Implementation",
-        value_parser = builder_parser(Builder::all(), "The fastest on this device: each builder is timed on the first photons"))]
+        value_parser = builder_parser(Builder::ALL, "The fastest on this device: each builder is timed on the first photons"))]
     variant: Option<BuilderArg>,
     /// How photons near a point are found; all give bit-identical results [default: grid]
     #[arg(long, value_enum, value_name = "SEARCH", help_heading = "Implementation")]

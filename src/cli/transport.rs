@@ -9,7 +9,7 @@ use super::options::CommonArgs;
 use super::picture_size::{PictureSize, parse_size};
 use super::progress::{ProgressArgs, ProgressReporter};
 use super::stop::{StopArgs, bias_before, goals, rounds_after, up_to};
-use super::values::{BuilderArg, SwitchArg, builder_parser, parse_colour, parse_integer, parse_number, value_enum};
+use super::values::{BuilderArg, SwitchArg, builder_parser, effect_parser, parse_colour, parse_integer, parse_number, value_enum};
 use super::{complain, help};
 use crate::engine::Control;
 use crate::engine::scene::{self, RunResult, View};
@@ -71,11 +71,11 @@ pub(super) struct TransportArgs {
     #[arg(long, help_heading = "Light transport")]
     final_gather: bool,
     /// Simulate an effect even if the scene does not need it; `photonmill plan` lists them
-    #[arg(long, value_name = "EFFECT", value_enum, value_delimiter = ',', help_heading = "Light transport")]
-    with: Vec<EffectArg>,
+    #[arg(long, value_name = "EFFECT", value_parser = effect_parser(), value_delimiter = ',', help_heading = "Light transport")]
+    with: Vec<Effect>,
     /// Leave an effect out even if the scene needs it
-    #[arg(long, value_name = "EFFECT", value_enum, value_delimiter = ',', help_heading = "Light transport")]
-    without: Vec<EffectArg>,
+    #[arg(long, value_name = "EFFECT", value_parser = effect_parser(), value_delimiter = ',', help_heading = "Light transport")]
+    without: Vec<Effect>,
 
     /// Radius of the density estimate of the global map in the first round, metres [default: from a trial round,
     /// so that about 24 photons of a round lie within it at the median pixel, texel or point]
@@ -168,11 +168,6 @@ value_enum!(PartArg => Part {
     /// Light that other surfaces scattered onto the surface that is seen
     Indirect,
 });
-value_enum!(EffectArg => Effect {
-    Direct, Indirect, Glossy, ReflectiveCaustics, RefractiveCaustics, SpecularChains, Textures, Environment, MeshLights,
-    PointLights, SpotLights, DirectionalLights, DiscLights, Bvh, TwoSided, SmoothNormals,
-});
-
 /// Most rounds of a run with a stop criterion other than --total-photons.
 const MOST_ROUNDS: u32 = 65_536;
 
@@ -227,8 +222,8 @@ impl TransportArgs {
             paranoid,
             group_size: group_size.unwrap_or(usual.group_size),
             chunk,
-            with: self.with.iter().map(|effect| (*effect).into()).collect(),
-            without: self.without.iter().map(|effect| (*effect).into()).collect(),
+            with: self.with.clone(),
+            without: self.without.clone(),
             ..usual
         }
     }

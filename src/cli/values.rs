@@ -9,6 +9,7 @@ use clap::ValueEnum;
 use clap::builder::{PossibleValue, PossibleValuesParser, TypedValueParser};
 
 use crate::engine::replay::PhotonName;
+use crate::settings::scene::Effect;
 use crate::settings::{Builder, Math, WALL_NAMES};
 
 type Parsed<T> = Result<T, String>;
@@ -57,7 +58,12 @@ pub(super) fn builder_parser(known: impl IntoIterator<Item = Builder>, auto: &'s
     };
     let values = known.into_iter().map(|builder| PossibleValue::new(builder.name()).help(help(builder)));
     PossibleValuesParser::new(values.chain([PossibleValue::new("auto").help(auto)]))
-        .map(|name| Builder::all().find(|builder| builder.name() == name))
+        .map(|name| Builder::ALL.into_iter().find(|builder| builder.name() == name))
+}
+
+pub(super) fn effect_parser() -> impl TypedValueParser<Value = Effect> {
+    let known = |name: String| Effect::ALL.into_iter().find(|effect| effect.name() == name).expect("only names of effects pass");
+    PossibleValuesParser::new(Effect::ALL.map(Effect::name)).map(known)
 }
 
 /// A number that `T` does not hold becomes 0 or the largest of `T`. The setting must allow neither: validation, which knows

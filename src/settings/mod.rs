@@ -2,6 +2,25 @@
 //! that the paper leaves open is a field here, and [`RoomSettings::validate`] is the one place that
 //! judges values.
 
+/// An enum whose values have one name each, in reports and on the command line.
+macro_rules! named {
+    ($(#[$doc:meta])* pub enum $type:ident { $($(#[$note:meta])* $value:ident = $name:literal),* $(,)? }) => {
+        $(#[$doc])*
+        #[derive(Debug, Clone, Copy, PartialEq, Eq, PartialOrd, Ord, Hash, serde::Serialize)]
+        pub enum $type {
+            $($(#[$note])* #[serde(rename = $name)] $value),*
+        }
+
+        impl $type {
+            pub const ALL: [$type; [$($name),*].len()] = [$($type::$value),*];
+
+            pub fn name(self) -> &'static str {
+                match self { $($type::$value => $name),* }
+            }
+        }
+    };
+}
+
 pub mod builder;
 pub mod scene;
 pub mod stop;

@@ -61,69 +61,29 @@ pub enum Filter {
     Gaussian = constants::FILTER_GAUSSIAN,
 }
 
-/// What a scene may call for; each can be forced on or left out.
-#[derive(Debug, Clone, Copy, PartialEq, Eq, PartialOrd, Ord, Hash, Serialize)]
-#[serde(rename_all = "kebab-case")]
-pub enum Effect {
-    Direct,
-    Indirect,
-    Glossy,
-    ReflectiveCaustics,
-    RefractiveCaustics,
-    SpecularChains,
-    Textures,
-    Environment,
-    MeshLights,
-    PointLights,
-    SpotLights,
-    DirectionalLights,
-    DiscLights,
-    Bvh,
-    TwoSided,
-    SmoothNormals,
+named! {
+    /// What a scene may call for; each can be forced on or left out.
+    pub enum Effect {
+        Direct = "direct",
+        Indirect = "indirect",
+        Glossy = "glossy",
+        ReflectiveCaustics = "reflective-caustics",
+        RefractiveCaustics = "refractive-caustics",
+        SpecularChains = "specular-chains",
+        Textures = "textures",
+        Environment = "environment",
+        MeshLights = "mesh-lights",
+        PointLights = "point-lights",
+        SpotLights = "spot-lights",
+        DirectionalLights = "directional-lights",
+        DiscLights = "disc-lights",
+        Bvh = "bvh",
+        TwoSided = "two-sided",
+        SmoothNormals = "smooth-normals",
+    }
 }
 
 impl Effect {
-    pub const ALL: [Effect; 16] = [
-        Effect::Direct,
-        Effect::Indirect,
-        Effect::Glossy,
-        Effect::ReflectiveCaustics,
-        Effect::RefractiveCaustics,
-        Effect::SpecularChains,
-        Effect::Textures,
-        Effect::Environment,
-        Effect::MeshLights,
-        Effect::PointLights,
-        Effect::SpotLights,
-        Effect::DirectionalLights,
-        Effect::DiscLights,
-        Effect::Bvh,
-        Effect::TwoSided,
-        Effect::SmoothNormals,
-    ];
-
-    pub fn name(self) -> &'static str {
-        match self {
-            Effect::Direct => "direct",
-            Effect::Indirect => "indirect",
-            Effect::Glossy => "glossy",
-            Effect::ReflectiveCaustics => "reflective-caustics",
-            Effect::RefractiveCaustics => "refractive-caustics",
-            Effect::SpecularChains => "specular-chains",
-            Effect::Textures => "textures",
-            Effect::Environment => "environment",
-            Effect::MeshLights => "mesh-lights",
-            Effect::PointLights => "point-lights",
-            Effect::SpotLights => "spot-lights",
-            Effect::DirectionalLights => "directional-lights",
-            Effect::DiscLights => "disc-lights",
-            Effect::Bvh => "bvh",
-            Effect::TwoSided => "two-sided",
-            Effect::SmoothNormals => "smooth-normals",
-        }
-    }
-
     pub fn is_caustic(self) -> bool {
         matches!(self, Effect::ReflectiveCaustics | Effect::RefractiveCaustics)
     }
