@@ -21,7 +21,7 @@ use crate::output::scene_report;
 use crate::plan::scene::ScenePlan;
 use crate::scene::{Camera, Scene};
 use crate::settings::scene::{Filter, Part, SceneSettings};
-use crate::verify::judge::{self, Judge, Verdict};
+use crate::verify::judge::{Judge, Verdict};
 
 #[derive(Args)]
 pub(super) struct RenderArgs {
@@ -149,13 +149,7 @@ const MAX_JUDGE_SAMPLES: u32 = 1 << 24;
 /// How the picture compares with a path tracer's.
 fn verdict(lit: &RunResult, scene: &Scene, camera: &Camera, (width, height): (u32, u32), samples: u32) -> Verdict {
     let settings = &lit.plan.settings;
-    let part = match settings.part {
-        Part::All => None,
-        Part::Direct => Some(judge::Part::Direct),
-        Part::Specular => Some(judge::Part::Specular),
-        Part::Caustic => Some(judge::Part::Caustic),
-        Part::Indirect => Some(judge::Part::Indirect),
-    };
+    let part = Some(settings.part).filter(|part| *part != Part::All);
     // Of the same scene, without what was left out, and with other random numbers than the photons'.
     let scene = scene.without(&settings.without);
     let judged = Judge::new(&scene, settings.bounces).image(camera, width, height, samples, !settings.seed);

@@ -51,62 +51,37 @@ impl Maps {
         let caustic_surfaces = (u32::from(keeps(Effect::ReflectiveCaustics)) << SURFACE_MIRROR)
             | (u32::from(keeps(Effect::RefractiveCaustics)) << SURFACE_DIELECTRIC);
         let caustics = caustic_surfaces != 0;
-        let stored = [
-            (keeps(Effect::Direct) && !split, ARRIVED_DIRECT),
-            (caustics && !split, ARRIVED_CAUSTIC),
-            (keeps(Effect::Indirect), ARRIVED_INDIRECT),
-        ]
-        .iter()
-        .map(|(kept, arrival)| if *kept { *arrival } else { 0 })
-        .sum::<u32>();
+        let stored = u32::from(keeps(Effect::Direct) && !split) * ARRIVED_DIRECT
+            | u32::from(caustics && !split) * ARRIVED_CAUSTIC
+            | u32::from(keeps(Effect::Indirect)) * ARRIVED_INDIRECT;
 
         let landings = expected_landings(scene, settings.bounces);
-        let map = |kind: Kind| map(kind, geometry, settings, limits, trial, landings);
+        let map = |caustic_only, stored| map(caustic_only, stored, geometry, settings, limits, trial, landings);
         // Without a light there is nothing to trace.
         let has_light = !geometry.emitters.is_empty();
-        let global = Kind {
-            name: "global",
-            domain: DOMAIN_PHOTONS,
-            photons: settings.photons,
-            stored,
-            caustic_only: false,
-            radius: ("--radius", settings.radius),
-        };
-        let caustic = Kind {
-            name: "caustic",
-            domain: DOMAIN_CAUSTIC_PHOTONS,
-            photons: settings.caustic_photons,
-            stored: ARRIVED_CAUSTIC,
-            caustic_only: true,
-            radius: ("--caustic-radius", settings.caustic_radius),
-        };
-        let global = (has_light && stored != 0).then(|| map(global)).transpose()?;
-        let mut caustic = (has_light && split && caustics).then(|| map(caustic)).transpose()?;
+        let global = (has_light && stored != 0).then(|| map(false, stored)).transpose()?;
+        let mut caustic = (has_light && split && caustics).then(|| map(true, ARRIVED_CAUSTIC)).transpose()?;
         let targets = caustic.as_mut().filter(|_| settings.aim).map_or_else(Vec::new, |map| aim(map, geometry, caustic_surfaces));
         let arrivals = stored | if caustic.is_some() { ARRIVED_CAUSTIC } else { 0 };
         Ok(Maps { global, caustic, caustic_surfaces, targets, arrivals })
     }
 }
 
-/// What tells the global map from the caustic map.
-struct Kind {
-    name: &'static str,
-    domain: u32,
-    photons: u32,
-    stored: u32,
-    caustic_only: bool,
-    /// The option that gives it, and what it gives in metres.
-    radius: (&'static str, Option<f64>),
-}
-
+/// The global map, or the caustic map.
 fn map(
-    Kind { name, domain, photons, stored, caustic_only, radius }: Kind,
+    caustic_only: bool,
+    stored: u32,
     geometry: &Geometry,
     settings: &SceneSettings,
     limits: &Limits,
     trial: Option<&Trial>,
     landings_of_each: f64,
 ) -> Result<MapPlan> {
+    let (name, domain, photons, radius) = if caustic_only {
+        ("caustic", DOMAIN_CAUSTIC_PHOTONS, settings.caustic_photons, ("--caustic-radius", settings.caustic_radius))
+    } else {
+        ("global", DOMAIN_PHOTONS, settings.photons, ("--radius", settings.radius))
+    };
     let FirstRadius { radius, from, expected } = FirstRadius::new(geometry, photons, caustic_only, radius, trial)?;
     // Photons of a round land once at every bounce at most; a caustic's only once.
     let landings = if caustic_only { 1 } else { u64::from(settings.bounces.min(SEGMENT_BOUNCES)) };
