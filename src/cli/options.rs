@@ -9,7 +9,7 @@ use super::values::{MathArg, SwitchArg, parse_integer, parse_within};
 use super::{DeviceArgs, JsonArg, TimingArgs, optional_file};
 use crate::engine::run::RunResult;
 use crate::error::Result;
-use crate::gpu::Gpu;
+use crate::gpu::{Gpu, Options};
 use crate::output::destination::Destination;
 use crate::output::trace_file;
 
@@ -79,15 +79,19 @@ impl Reports {
 #[derive(Args)]
 pub(super) struct TimedDeviceArgs {
     #[command(flatten)]
-    pub(super) device: DeviceArgs,
+    pub(super) chosen: DeviceArgs,
     #[command(flatten)]
-    pub(super) timing: TimingArgs,
+    timing: TimingArgs,
 }
 
 impl TimedDeviceArgs {
+    pub(super) fn options(&self) -> Options {
+        self.timing.options(&self.chosen)
+    }
+
     /// The device; a scene of triangles needs one.
     pub(super) fn open(&self, reporter: &ProgressReporter) -> Result<Gpu> {
-        let gpu = Gpu::open(&self.timing.options(&self.device))?;
+        let gpu = Gpu::open(&self.options())?;
         reporter.device(Some(&gpu));
         Ok(gpu)
     }

@@ -231,7 +231,7 @@ pub(super) fn run(args: &RunArgs, cancelled: &AtomicBool) -> Result<End> {
     settings.validate()?;
     let stores_none = settings.reflectance == 0.0 && args.irradiance.is_some();
     require(!stores_none, "--reflectance", 0, "must be above 0 with --irradiance: the photon map holds only reflected photons")?;
-    let DeviceArgs { device, validate } = &args.device.device;
+    let DeviceArgs { device, validate } = &args.device.chosen;
     if settings.builder == Builder::Cpu {
         let idle = "has no effect with --variant cpu; leave one of the two out";
         require(device.is_none(), "--device", device.as_deref().unwrap_or_default(), idle)?;
@@ -248,7 +248,7 @@ pub(super) fn run(args: &RunArgs, cancelled: &AtomicBool) -> Result<End> {
     let reporter = ProgressReporter::new(&args.progress);
     let gpu = match settings.builder {
         Builder::Cpu => None,
-        _ => args.device.device.open(&args.device.timing.options(&args.device.device))?,
+        _ => args.device.chosen.open(&args.device.options())?,
     };
     reporter.device(gpu.as_ref());
     let settings = match &gpu {
@@ -318,7 +318,7 @@ fn fastest(gpu: &Gpu, scene: &RoomScene, settings: &RoomSettings, reporter: &Pro
 
 /// Where one photon of the run is stored.
 fn show_photon(args: &RunArgs, settings: &RoomSettings, scene: &RoomScene, name: PhotonName) -> Result<End> {
-    let gpu = if settings.builder == Builder::Cpu { None } else { args.device.device.open(&args.device.device.options())? };
+    let gpu = if settings.builder == Builder::Cpu { None } else { args.device.chosen.open(&args.device.chosen.options())? };
     say(&room::replay(gpu.as_ref(), scene, settings, name)?.table(scene, settings.seed))?;
     Ok(End::Finished)
 }

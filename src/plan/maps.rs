@@ -51,9 +51,10 @@ impl Maps {
         let caustic_surfaces = (u32::from(keeps(Effect::ReflectiveCaustics)) << SURFACE_MIRROR)
             | (u32::from(keeps(Effect::RefractiveCaustics)) << SURFACE_DIELECTRIC);
         let caustics = caustic_surfaces != 0;
-        let stored = u32::from(keeps(Effect::Direct) && !split) * ARRIVED_DIRECT
-            | u32::from(caustics && !split) * ARRIVED_CAUSTIC
-            | u32::from(keeps(Effect::Indirect)) * ARRIVED_INDIRECT;
+        let of = |is_kept: bool, arrival: u32| if is_kept { arrival } else { 0 };
+        let stored = of(keeps(Effect::Direct) && !split, ARRIVED_DIRECT)
+            | of(caustics && !split, ARRIVED_CAUSTIC)
+            | of(keeps(Effect::Indirect), ARRIVED_INDIRECT);
 
         let landings = expected_landings(scene, settings.bounces);
         let map = |caustic_only, stored| map(caustic_only, stored, geometry, settings, limits, trial, landings);
