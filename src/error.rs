@@ -1,5 +1,7 @@
 //! Everything that can go wrong, each as one sentence: what, which value, what is allowed.
 
+use std::fmt::Display;
+use std::ops::RangeInclusive;
 use std::path::PathBuf;
 
 use crate::ledger::Ledger;
@@ -108,4 +110,15 @@ impl Error {
     pub(crate) fn setting(option: &'static str, value: impl ToString, allowed: impl Into<String>) -> Error {
         Error::Setting { option, value: value.to_string(), allowed: allowed.into() }
     }
+}
+
+/// Refuses the value of an option that is not allowed.
+pub(crate) fn require(is_allowed: bool, option: &'static str, value: impl ToString, allowed: impl Into<String>) -> Result<()> {
+    if is_allowed { Ok(()) } else { Err(Error::setting(option, value, allowed)) }
+}
+
+/// Refuses what is out of range; `what` says what the numbers are.
+pub(crate) fn within<T: PartialOrd + Display>(option: &'static str, value: T, allowed: RangeInclusive<T>, what: &str) -> Result<()> {
+    let (least, most) = (allowed.start(), allowed.end());
+    require(allowed.contains(&value), option, &value, format!("must be from {least} to {most} ({what})"))
 }

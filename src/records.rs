@@ -7,6 +7,8 @@
 use bytemuck::{Pod, Zeroable};
 use glam::{UVec2, UVec3, Vec2, Vec3};
 
+use crate::constants::MAX_GROUPS;
+
 /// One field of a record, as reflection names it.
 #[derive(Debug, Clone, Copy, PartialEq, Eq)]
 pub struct Field {
@@ -684,5 +686,12 @@ records! {
         step_count: u32,
         /// Of random places, which are below a power of two.
         mask: u32,
+    }
+}
+
+impl DispatchSizePush {
+    /// An invocation for each of what a counter counts, `capacity` at most.
+    pub fn new(counter: u32, capacity: u32, items_per_group: u32) -> DispatchSizePush {
+        DispatchSizePush { counter, capacity, items_per_group, max_groups: MAX_GROUPS }
     }
 }

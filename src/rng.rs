@@ -10,34 +10,24 @@ use serde::Serialize;
 use crate::constants::{self, BOUNCE_DRAWS, EMISSION_DRAWS, MT_MIDDLE};
 use crate::records::RandomKey;
 
-/// Which generator a run draws from.
+/// Which generator a run draws from; each as the kernels' number.
 #[derive(Debug, Clone, Copy, PartialEq, Eq, Serialize)]
 #[serde(rename_all = "lowercase")]
+#[repr(u32)]
 pub enum Rng {
     /// The paper's: the C library's 48-bit generator, one sequence leap-frogged over the photons of
     /// a round (van Meel et al. 2008): photon i draws numbers i, i + N, i + 2N, ... of `srand48(seed)`.
-    Rand48,
+    Rand48 = constants::RNG_RAND48,
     /// The paper's alternative: MT19937, seeded anew for each photon by a bijection of its number in
     /// the run, so that no two photons share a stream.
-    Mt,
+    Mt = constants::RNG_MT,
     /// Philox4x32-10 (Salmon et al. 2011), counter-based.
-    Philox,
+    Philox = constants::RNG_PHILOX,
     /// Owen-scrambled Sobol' points (Burley 2020). The photons of each light, over all rounds, are the
     /// first points of a sequence of the light's own, so that any number of rounds covers its emission
     /// and every bounce more evenly than chance; one sequence dealt out to two lights would leave each
     /// of them a part with gaps.
-    Sobol,
-}
-
-impl Rng {
-    pub fn code(self) -> u32 {
-        match self {
-            Rng::Rand48 => constants::RNG_RAND48,
-            Rng::Mt => constants::RNG_MT,
-            Rng::Philox => constants::RNG_PHILOX,
-            Rng::Sobol => constants::RNG_SOBOL,
-        }
-    }
+    Sobol = constants::RNG_SOBOL,
 }
 
 /// Bounces for which a photon's MT19937 stream suffices: its outputs 0 to 226 need nothing beyond

@@ -23,7 +23,7 @@ fn case(words: [u32; 4]) -> SamplingCase {
 }
 
 fn ask(gpu: &Gpu, math: Math, filter: Filter, cases: &[SamplingCase]) -> Vec<Samples> {
-    check::sampling(gpu, &[("STRICT_MATH", math.code()), ("FILTER", filter.code())], cases).unwrap()
+    check::sampling(gpu, &[("STRICT_MATH", math as u32), ("FILTER", filter as u32)], cases).unwrap()
 }
 
 /// Random words at the ends of their range, in pairs: what is 0 and the largest number below 1, and their neighbours.

@@ -200,7 +200,7 @@ fn any_transport_settings(random: &mut Random) -> SceneSettings {
             8 => settings.group_size = if random.below(2) == 0 { 1 << random.below(12) } else { random.count(32, 1024) },
             9 => settings.chunk = Some(random.count(1, 1 << 31)),
             10 => settings.samples = if random.below(2) == 0 { 1 << random.below(12) } else { random.count(1, 1024) },
-            11 => settings.builder = Some(random.pick(&Builder::all().collect::<Vec<_>>())),
+            11 => settings.builder = Some(random.pick(&Builder::ALL)),
             _ => {
                 settings.with = (0..random.below(4)).map(|_| random.pick(&Effect::ALL)).collect();
                 settings.without = (0..random.below(4)).map(|_| random.pick(&Effect::ALL)).collect();

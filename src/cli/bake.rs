@@ -5,13 +5,14 @@ use std::sync::atomic::AtomicBool;
 
 use clap::Args;
 
+use super::options::{ReportArgs, TimedDeviceArgs};
 use super::progress::ProgressReporter;
-use super::transport::{Job, MessageArgs, ReportArgs, SceneArgs, TimedDeviceArgs, TransportArgs, geometry, light, plan};
-use super::values::parse_number;
+use super::transport::{Job, MessageArgs, SceneArgs, TransportArgs, geometry};
+use super::values::{parse_number, parse_stops};
 use super::{End, complain, say_beside};
 use crate::bake::{self, Layout, PHASE_COUNT, TexelEstimate};
 use crate::engine::scene::RunResult;
-use crate::error::{Error, Result};
+use crate::error::Result;
 use crate::output::colour::ColourPicture;
 use crate::output::destination::{Folder, check_distinct, write_all};
 use crate::output::scene_report;
@@ -29,7 +30,7 @@ pub(super) struct BakeArgs {
     #[command(flatten)]
     report: ReportArgs,
     /// Exposure of the PNGs in stops, each of which doubles the brightness [default: what makes the mean middle grey]
-    #[arg(long, value_name = "STOPS", value_parser = parse_number::<f32>, allow_hyphen_values = true, help_heading = "Output")]
+    #[arg(long, value_name = "STOPS", value_parser = parse_stops, allow_hyphen_values = true, help_heading = "Output")]
     exposure: Option<f32>,
     #[command(flatten)]
     scene: SceneArgs,
@@ -47,9 +48,6 @@ pub(super) struct BakeArgs {
 pub(super) fn run(args: &BakeArgs, cancelled: &AtomicBool) -> Result<End> {
     let settings = args.transport.settings();
     settings.validate()?;
-    if let Some(exposure) = args.exposure.filter(|stops| stops.is_nan() || stops.abs() > 64.0) {
-        return Err(Error::setting("--exposure", exposure, "must be from -64 to 64 stops"));
-    }
     let folder = Folder::open("-o", &args.output)?;
     let reports = args.report.open()?;
     let report_files = reports.destinations();
@@ -65,17 +63,16 @@ pub(super) fn run(args: &BakeArgs, cancelled: &AtomicBool) -> Result<End> {
     let phases: Vec<Vec<Receiver>> =
         (0..PHASE_COUNT.min(settings.rounds as usize)).map(|phase| receivers(&layout, phase, &geometry)).collect();
     let sensor = Sensor::Receivers { count: layout.texel_count() as u32 };
-    let job = Job { scene: &scene, settings: &settings, sensor, camera: None, phases: &phases, point: "texel" };
+    let job = Job { scene: &scene, geometry: &geometry, settings: &settings, sensor, camera: None, phases: &phases, point: "texel" };
     let gpu = args.device.open(&reporter)?;
-    let plan = plan(&gpu, &job, &geometry)?;
-    let lit = light(&gpu, &job, &geometry, plan, args.transport.stop.bias, &reporter, cancelled)?;
+    let lit = job.run(&gpu, &args.transport.stop, &reporter, cancelled)?;
 
     let estimates = estimates(&lit);
     let stops = args.exposure.unwrap_or_else(|| usual_exposure(&estimates));
     let text = scene_report::text(&scene.name, &lit, job.point, args.messages.explain);
     let written = bake::write(&folder, &scene, &layout, &layout.maps(&estimates), stops.exp2());
     reporter.finish();
-    let written = written.and_then(|()| write_all(reports.files(&scene, &lit)));
+    let written = written.and_then(|()| write_all(reports.files(&lit, || scene_report::json(&scene.name, &lit))));
     if let Err(error) = written {
         return say_beside(&report_files, &text).and(Err(error));
     }

@@ -9,7 +9,7 @@ use clap::{Args, ValueEnum};
 use super::progress::{ProgressArgs, ProgressReporter};
 use super::values::parse_seconds;
 use super::{DeviceArgs, End, JsonArg, optional_file, say_beside};
-use crate::error::{Error, Result};
+use crate::error::{Result, require};
 use crate::gpu::Gpu;
 use crate::measure::bench::experiment::Experiment;
 use crate::measure::bench::{self, Request, Size, table};
@@ -61,9 +61,7 @@ fn parse_experiment(name: &str) -> std::result::Result<Experiment, String> {
 }
 
 pub(super) fn run(args: &BenchArgs, cancelled: &AtomicBool) -> Result<End> {
-    if !(1.0..=1e6).contains(&args.time) {
-        return Err(Error::setting("--time", args.time, "must be from 1s to 1000000s"));
-    }
+    require((1.0..=1e6).contains(&args.time), "--time", args.time, "must be from 1s to 1000000s")?;
     let json = optional_file("--json", args.json.json.as_ref())?;
     let folder = args.output.as_ref().map(|path| Folder::open("-o", path)).transpose()?;
     let in_folder = folder.iter().map(|folder| folder.file("bench.json"));

@@ -5,6 +5,7 @@ mod bench;
 mod devices;
 mod help;
 mod interrupt;
+mod options;
 mod paper;
 mod picture_size;
 mod plan;

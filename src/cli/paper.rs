@@ -8,7 +8,7 @@ use clap::Args;
 use super::progress::{ProgressArgs, ProgressReporter};
 use super::values::{parse_integer, parse_seconds, parse_threads};
 use super::{DeviceArgs, End, complain, say};
-use crate::error::{Error, Result};
+use crate::error::{Error, Result, require};
 use crate::measure::paper::bench::Bench;
 use crate::measure::paper::{self, Reproduction, Request, published, tables};
 use crate::output::destination::Folder;
@@ -85,21 +85,14 @@ fn write(folder: &Folder, found: &Reproduction) -> Result<()> {
 impl PaperArgs {
     fn validate(&self) -> Result<()> {
         let smallest = published::PHOTONS + 1;
-        if !(smallest..=MAX_LARGE).contains(&self.large.unwrap_or(smallest)) {
-            let allowed = format!("must be from {smallest} to {MAX_LARGE} photons per round, more than the paper's");
-            return Err(Error::setting("--large", self.large.unwrap_or_default(), allowed));
-        }
-        if !(1..=MAX_REPEATS).contains(&self.repeats) {
-            return Err(Error::setting("--repeats", self.repeats, format!("must be from 1 to {MAX_REPEATS}")));
-        }
-        if !(self.longest.is_finite() && self.longest > 0.0) {
-            return Err(Error::setting("--longest", format!("{}s", self.longest), "must be a time above 0, such as 90s"));
-        }
+        let large = self.large.unwrap_or(smallest);
+        let allowed = format!("must be from {smallest} to {MAX_LARGE} photons per round, more than the paper's");
+        require((smallest..=MAX_LARGE).contains(&large), "--large", large, allowed)?;
+        require((1..=MAX_REPEATS).contains(&self.repeats), "--repeats", self.repeats, format!("must be from 1 to {MAX_REPEATS}"))?;
+        let is_time = self.longest.is_finite() && self.longest > 0.0;
+        require(is_time, "--longest", format!("{}s", self.longest), "must be a time above 0, such as 90s")?;
         let threads = self.threads.unwrap_or(1);
-        if !(1..=MAX_THREADS).contains(&threads) {
-            return Err(Error::setting("--threads", threads, format!("must be from 1 to {MAX_THREADS}, or all")));
-        }
-        Ok(())
+        require((1..=MAX_THREADS).contains(&threads), "--threads", threads, format!("must be from 1 to {MAX_THREADS}, or all"))
     }
 }
 

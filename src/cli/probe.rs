@@ -7,8 +7,9 @@ use std::sync::atomic::AtomicBool;
 use clap::Args;
 use glam::DVec3;
 
+use super::options::{ReportArgs, TimedDeviceArgs};
 use super::progress::ProgressReporter;
-use super::transport::{Job, MessageArgs, ReportArgs, SceneArgs, TimedDeviceArgs, TransportArgs, geometry, light, plan};
+use super::transport::{Job, MessageArgs, SceneArgs, TransportArgs, geometry};
 use super::{End, complain, say_beside};
 use crate::engine::scene::{RunResult, Target};
 use crate::error::{Error, Result};
@@ -68,16 +69,15 @@ pub(super) fn run(args: &ProbeArgs, cancelled: &AtomicBool) -> Result<End> {
     let geometry = geometry(&scene, &settings, &reporter)?;
     let phases = Target::Points(&points).phases(&geometry);
     let sensor = Sensor::Receivers { count: points.len() as u32 };
-    let job = Job { scene: &scene, settings: &settings, sensor, camera: None, phases: &phases, point: "point" };
+    let job = Job { scene: &scene, geometry: &geometry, settings: &settings, sensor, camera: None, phases: &phases, point: "point" };
     let gpu = args.device.open(&reporter)?;
-    let plan = plan(&gpu, &job, &geometry)?;
-    let lit = light(&gpu, &job, &geometry, plan, args.transport.stop.bias, &reporter, cancelled)?;
+    let lit = job.run(&gpu, &args.transport.stop, &reporter, cancelled)?;
     reporter.finish();
 
     let text = scene_report::text(&scene.name, &lit, job.point, args.messages.explain);
     let wrote = if output.is_standard_output() { String::new() } else { format!("\nwrote {}", args.output.display()) };
     let mut files = vec![(output, table(&lit))];
-    files.extend(reports.files(&scene, &lit));
+    files.extend(reports.files(&lit, || scene_report::json(&scene.name, &lit)));
     if let Err(error) = write_all(files) {
         return say_beside(&all, &text).and(Err(error));
     }

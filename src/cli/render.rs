@@ -6,26 +6,22 @@ use std::sync::atomic::AtomicBool;
 use clap::Args;
 use glam::DVec3;
 
-use super::picture_size::{PictureSize, parse_size};
+use super::options::{ReportArgs, TimedDeviceArgs};
 use super::progress::ProgressReporter;
-use super::transport::{
-    FilterArg, Job, MessageArgs, PartArg, ReportArgs, SceneArgs, TimedDeviceArgs, TransportArgs, camera, geometry, light, plan,
-};
-use super::values::{parse_integer, parse_number, parse_photon_name};
+use super::transport::{FilterArg, Job, MessageArgs, PictureArgs, Subject};
+use super::values::{parse_integer, parse_photon_name, parse_stops};
 use super::{End, optional_file, say, say_beside};
 use crate::engine;
 use crate::engine::replay::PhotonName;
 use crate::engine::scene::{RunResult, replay};
-use crate::error::{Error, Result};
-use crate::output::colour::ColourPicture;
+use crate::error::{Result, require};
+use crate::output::colour::{ColourPicture, Format};
 use crate::output::destination::{Destination, check_distinct, write_all};
-use crate::output::image::Format;
 use crate::output::scene_report;
 use crate::plan::scene::ScenePlan;
-use crate::plan::sensor::Sensor;
 use crate::scene::{Camera, Scene};
 use crate::settings::scene::{Filter, Part, SceneSettings};
-use crate::verify::judge::{self, Judge, Verdict};
+use crate::verify::judge::{Judge, Verdict};
 
 #[derive(Args)]
 pub(super) struct RenderArgs {
@@ -39,22 +35,10 @@ pub(super) struct RenderArgs {
     #[arg(long, value_name = "FILE", help_heading = "Output")]
     error_image: Option<PathBuf>,
     /// Exposure of a PNG in stops, each of which doubles the brightness [default: what makes the mean middle grey]
-    #[arg(long, value_name = "STOPS", value_parser = parse_number::<f32>, allow_hyphen_values = true, help_heading = "Output")]
+    #[arg(long, value_name = "STOPS", value_parser = parse_stops, allow_hyphen_values = true, help_heading = "Output")]
     exposure: Option<f32>,
     #[command(flatten)]
-    scene: SceneArgs,
-    /// Camera by name [default: the first one; one that sees the whole scene if it has none]
-    #[arg(long, value_name = "NAME", help_heading = "Scene")]
-    camera: Option<String>,
-    /// Size of the picture in pixels; a width alone takes its height from the camera's aspect ratio [default: about 307200
-    /// pixels in the camera's aspect ratio, 640x480 if it has none]
-    #[arg(long, value_name = "WIDTH[xHEIGHT]", value_parser = parse_size, allow_hyphen_values = true, help_heading = "Scene")]
-    size: Option<PictureSize>,
-    #[command(flatten)]
-    transport: TransportArgs,
-    /// Compute only this part of the light; the four parts sum to `all` exactly
-    #[arg(long, value_enum, value_name = "PART", help_heading = "Light transport")]
-    part: Option<PartArg>,
+    picture: PictureArgs,
     /// Camera paths per pixel and round, a power of two. Every path queries the caustic map; only the first queries the
     /// global map [default: 1]
     #[arg(long, value_name = "N", value_parser = parse_integer::<u32>, allow_hyphen_values = true, help_heading = "Light transport")]
@@ -79,13 +63,8 @@ pub(super) struct RenderArgs {
 
 impl RenderArgs {
     pub(super) fn settings(&self) -> SceneSettings {
-        let usual = self.transport.settings();
-        SceneSettings {
-            part: self.part.map_or(usual.part, Part::from),
-            filter: self.filter.map_or(usual.filter, Filter::from),
-            samples: self.samples.unwrap_or(usual.samples),
-            ..usual
-        }
+        let usual = self.picture.settings();
+        SceneSettings { filter: self.filter.map_or(usual.filter, Filter::from), samples: self.samples.unwrap_or(usual.samples), ..usual }
     }
 }
 
@@ -98,48 +77,39 @@ pub(super) fn run(args: &RenderArgs, cancelled: &AtomicBool) -> Result<End> {
     let output = args.output.as_ref().expect("clap asks for it");
     let format = Format::of("-o", output)?;
     if let Some(samples) = args.judge {
-        if !(2..=MAX_JUDGE_SAMPLES).contains(&samples) {
-            return Err(Error::setting("--judge", samples, format!("must be from 2 to {MAX_JUDGE_SAMPLES} samples per pixel")));
-        }
-        if settings.filter != Filter::Box || settings.rounds < 2 {
-            return Err(Error::setting("--judge", samples, "needs --filter box, and two rounds or more to know the error"));
-        }
+        let range = format!("must be from 2 to {MAX_JUDGE_SAMPLES} samples per pixel");
+        require((2..=MAX_JUDGE_SAMPLES).contains(&samples), "--judge", samples, range)?;
+        let is_known = settings.filter == Filter::Box && settings.rounds >= 2;
+        require(is_known, "--judge", samples, "needs --filter box, and two rounds or more to know the error")?;
     }
-    if let (Format::Exr, Some(exposure)) = (format, args.exposure) {
-        return Err(Error::setting("--exposure", exposure, "is for PNG only: an EXR holds linear radiance"));
-    }
-    if let Some(exposure) = args.exposure.filter(|stops| stops.is_nan() || stops.abs() > 64.0) {
-        return Err(Error::setting("--exposure", exposure, "must be from -64 to 64 stops"));
+    if let Some(exposure) = args.exposure {
+        require(format == Format::Png, "--exposure", exposure, "is for PNG only: an EXR holds linear radiance")?;
     }
     let picture = Destination::open("-o", output)?;
     let errors = optional_file("--error-image", args.error_image.as_ref())?;
-    if let Some(path) = &args.error_image
-        && Format::of("--error-image", path)? != Format::Exr
-    {
-        return Err(Error::setting("--error-image", path.display(), "must end in .exr"));
+    if let Some(path) = &args.error_image {
+        require(Format::of("--error-image", path)? == Format::Exr, "--error-image", path.display(), "must end in .exr")?;
     }
     let reports = args.report.open()?;
     let all: Vec<Destination> = [vec![picture.clone()], errors.clone().into_iter().collect(), reports.destinations()].concat();
     check_distinct(&all)?;
 
     let reporter = ProgressReporter::new(&args.messages.progress);
-    let scene = args.scene.open(&reporter)?;
-    let camera = camera(&scene, args.camera.as_deref())?;
-    let (width, height) = PictureSize::resolve(args.size, &camera, &reporter)?;
-    let job = Job::picture(&scene, &settings, &camera, (width, height));
-    let geometry = geometry(&scene, &settings, &reporter)?;
+    let subject = args.picture.open(&settings, &reporter)?;
+    let Subject { scene, camera, width, height, geometry } = &subject;
+    let job = Job { scene, geometry, settings: &settings, sensor: subject.sensor(), camera: Some(camera), phases: &[], point: "pixel" };
     let gpu = args.device.open(&reporter)?;
-    let plan = plan(&gpu, &job, &geometry)?;
-    let lit = light(&gpu, &job, &geometry, plan, args.transport.stop.bias, &reporter, cancelled)?;
+    let lit = job.run(&gpu, &args.picture.transport.stop, &reporter, cancelled)?;
 
-    let image = radiance(&lit, width, height);
+    let size = (*width, *height);
+    let image = picture_of(&lit, size, |pixel| lit.film.mean(pixel, &lit.plan));
     let stops = args.exposure.unwrap_or_else(|| image.usual_exposure());
     let text = scene_report::text(&scene.name, &lit, job.point, args.messages.explain);
     let mut files = vec![(picture, image.encode(format, stops))];
     if let Some(errors) = errors {
-        files.push((errors, standard_error(&lit, width, height).encode(Format::Exr, 0.0)));
+        files.push((errors, picture_of(&lit, size, |pixel| lit.film.stated_error(pixel, &lit.plan)).encode(Format::Exr, 0.0)));
     }
-    files.extend(reports.files(&scene, &lit));
+    files.extend(reports.files(&lit, || scene_report::json(&scene.name, &lit)));
     let written = write_all(files);
     let shown = match format {
         Format::Png => format!(" at {stops:+.2} stops"),
@@ -154,7 +124,7 @@ pub(super) fn run(args: &RenderArgs, cancelled: &AtomicBool) -> Result<End> {
         // The picture is there, so Ctrl-C may end the program here.
         let reporter = ProgressReporter::new(&args.messages.progress);
         reporter.step(&format!("path tracing {samples} samples per pixel on the CPU for --judge"));
-        let verdict = verdict(&lit, &scene, &camera, (width, height), samples);
+        let verdict = verdict(&lit, scene, camera, size, samples);
         reporter.finish();
         say_beside(&all, &format!("judge: {verdict}"))?;
     }
@@ -164,16 +134,13 @@ pub(super) fn run(args: &RenderArgs, cancelled: &AtomicBool) -> Result<End> {
 /// The path of one photon of the run that these options ask for.
 fn show_photon(args: &RenderArgs, settings: &SceneSettings, name: PhotonName) -> Result<End> {
     let reporter = ProgressReporter::new(&args.messages.progress);
-    let scene = args.scene.open(&reporter)?;
-    let camera = camera(&scene, args.camera.as_deref())?;
-    let (width, height) = PictureSize::resolve(args.size, &camera, &reporter)?;
-    let geometry = geometry(&scene, settings, &reporter)?;
+    let subject = args.picture.open(settings, &reporter)?;
     let gpu = args.device.open(&reporter)?;
     // A photon's path does not depend on the radius.
-    let plan = ScenePlan::new(&scene, &geometry, settings, Sensor::Picture { width, height }, &engine::limits(gpu.facts()))?;
-    let path = replay::replay(&gpu, &geometry, &plan, name)?;
+    let plan = ScenePlan::new(&subject.scene, &subject.geometry, settings, subject.sensor(), &engine::limits(gpu.facts()))?;
+    let path = replay::replay(&gpu, &subject.geometry, &plan, name)?;
     reporter.finish();
-    say(&path.table(&geometry, &plan))?;
+    say(&path.table(&subject.geometry, &plan))?;
     Ok(End::Finished)
 }
 
@@ -182,13 +149,7 @@ const MAX_JUDGE_SAMPLES: u32 = 1 << 24;
 /// How the picture compares with a path tracer's.
 fn verdict(lit: &RunResult, scene: &Scene, camera: &Camera, (width, height): (u32, u32), samples: u32) -> Verdict {
     let settings = &lit.plan.settings;
-    let part = match settings.part {
-        Part::All => None,
-        Part::Direct => Some(judge::Part::Direct),
-        Part::Specular => Some(judge::Part::Specular),
-        Part::Caustic => Some(judge::Part::Caustic),
-        Part::Indirect => Some(judge::Part::Indirect),
-    };
+    let part = Some(settings.part).filter(|part| *part != Part::All);
     // Of the same scene, without what was left out, and with other random numbers than the photons'.
     let scene = scene.without(&settings.without);
     let judged = Judge::new(&scene, settings.bounces).image(camera, width, height, samples, !settings.seed);
@@ -197,13 +158,7 @@ fn verdict(lit: &RunResult, scene: &Scene, camera: &Camera, (width, height): (u3
     Verdict::new(&means, &errors, lit.film.rounds.min(samples), &judged, part)
 }
 
-/// W/m2/sr.
-fn radiance(lit: &RunResult, width: u32, height: u32) -> ColourPicture {
-    let pixels = lit.film.means(&lit.plan).map(DVec3::as_vec3).collect();
-    ColourPicture { width, height, pixels }
-}
-
-fn standard_error(lit: &RunResult, width: u32, height: u32) -> ColourPicture {
-    let pixels = (0..lit.film.pixels()).map(|pixel| lit.film.stated_error(pixel, &lit.plan).as_vec3()).collect();
-    ColourPicture { width, height, pixels }
+/// A value of each pixel.
+fn picture_of(lit: &RunResult, (width, height): (u32, u32), value: impl Fn(usize) -> DVec3) -> ColourPicture {
+    ColourPicture { width, height, pixels: (0..lit.film.pixels()).map(|pixel| value(pixel).as_vec3()).collect() }
 }

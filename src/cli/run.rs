@@ -4,27 +4,29 @@ use std::path::PathBuf;
 use std::sync::atomic::AtomicBool;
 use std::time::Instant;
 
-use clap::{Args, ValueEnum};
+use clap::Args;
 
+use super::options::{CommonArgs, ReportArgs, Reports, TimedDeviceArgs};
 use super::progress::{ProgressArgs, ProgressReporter};
-use super::stop::{StopArgs, bias_before, goals, rounds_after};
+use super::stop::{StopArgs, bias_before, goals, rounds_after, up_to};
 use super::values::{
-    MathArg, SwitchArg, parse_integer, parse_number, parse_numbers, parse_photon_name, parse_shininess, parse_threads, parse_within,
-    value_enum,
+    BuilderArg, SwitchArg, builder_parser, parse_integer, parse_number, parse_numbers, parse_photon_name, parse_shininess, parse_threads,
+    parse_within, value_enum,
 };
-use super::{DeviceArgs, End, JsonArg, TimingArgs, complain, optional_file, say, say_beside};
+use super::{DeviceArgs, End, complain, say, say_beside};
 use crate::engine;
 use crate::engine::Control;
 use crate::engine::choose_builder::{Choice, choose_builder};
 use crate::engine::replay::PhotonName;
 use crate::engine::room::film::estimate_walls;
 use crate::engine::room::{self, RunResult};
-use crate::error::{Error, Result};
+use crate::error::{Result, require};
 use crate::gpu::Gpu;
+use crate::output::colour::Format;
 use crate::output::destination::{Destination, Folder, check_distinct, write_all};
-use crate::output::image::{Format, overview};
+use crate::output::image::overview;
 use crate::output::lightmap::{self, Quantity};
-use crate::output::{room_report, trace_file};
+use crate::output::room_report;
 use crate::plan::{Limits, RoomPlan};
 use crate::rng::Rng;
 use crate::scene::open_box::open_box;
@@ -35,15 +37,13 @@ use crate::text::counted;
 use crate::timings::{Clock, Span};
 
 #[derive(Args)]
+#[command(mut_arg("edge_correction", |argument| argument.help(EDGE_CORRECTION)))]
 pub(super) struct RunArgs {
     /// Picture of the box: a .png shows illumination from 0 to 1, an .exr keeps it unclamped
     #[arg(short, long, alias = "out", value_name = "FILE", default_value = "open-box.png", help_heading = "Output")]
     output: PathBuf,
     #[command(flatten)]
-    json: JsonArg,
-    /// Write the time of every pass as a Chrome trace, for Perfetto or chrome://tracing
-    #[arg(long, value_name = "FILE", help_heading = "Output")]
-    trace: Option<PathBuf>,
+    report: ReportArgs,
     /// Write the irradiance of each wall in W/m2 as <wall>.exr, its standard error as <wall>-error.exr, and layout.json,
     /// into this folder
     #[arg(long, value_name = "DIR", help_heading = "Output")]
@@ -92,9 +92,6 @@ pub(super) struct RunArgs {
     /// Maximum number of bounces of a photon [default: 15; 2 with --preset naive]
     #[arg(long, value_name = "N", value_parser = parse_integer::<u32>, allow_hyphen_values = true, help_heading = "Photons")]
     bounces: Option<u32>,
-    /// Seed of the random numbers [default: 1]
-    #[arg(long, value_name = "N", value_parser = parse_within(0..=u64::MAX), allow_hyphen_values = true, help_heading = "Photons")]
-    seed: Option<u64>,
     /// Random number generator [default: rand48 with the paper's 5000 photons per round, otherwise philox]
     #[arg(long, value_enum, value_name = "GENERATOR", help_heading = "Photons")]
     rng: Option<RngArg>,
@@ -113,29 +110,16 @@ pub(super) struct RunArgs {
     /// Texels along each side of a wall [default: 64]
     #[arg(long, value_name = "N", value_parser = parse_integer::<u32>, allow_hyphen_values = true, help_heading = "Density estimate")]
     mesh: Option<u32>,
-    /// Divide by the part of the search disc that lies on the wall, not by the whole disc, for irradiance and radiosity; the
-    /// paper's illumination stays uncorrected [default: on]
-    #[arg(long, value_enum, value_name = "SWITCH", help_heading = "Density estimate")]
-    edge_correction: Option<SwitchArg>,
-
     /// Builder of the photon map; all GPU builders give bit-identical results [default: atomic; naive with --preset naive]
-    #[arg(long, value_enum, value_name = "BUILDER", help_heading = "Implementation")]
+    #[arg(long, value_name = "BUILDER", help_heading = "Implementation",
+        value_parser = builder_parser(Builder::ALL, "The fastest on this device: each builder is timed on the first photons"))]
     variant: Option<BuilderArg>,
     /// How photons near a point are found; all give bit-identical results [default: grid]
     #[arg(long, value_enum, value_name = "SEARCH", help_heading = "Implementation")]
     gather: Option<GatherArg>,
-    /// Rounding of the arithmetic [default: fast]
-    #[arg(long, value_enum, value_name = "ROUNDING", help_heading = "Implementation")]
-    math: Option<MathArg>,
     /// Number format of the film's sums [default: integer]
     #[arg(long, value_enum, value_name = "NUMBERS", help_heading = "Implementation")]
     sums: Option<SumsArg>,
-    /// Most photons traced at once; the result is the same to the bit [default: what fits on the device]
-    #[arg(long, value_name = "N", value_parser = parse_integer::<u32>, allow_hyphen_values = true, help_heading = "Implementation")]
-    chunk: Option<u32>,
-    /// Invocations per work group, a power of two [default: 128]
-    #[arg(long, value_name = "N", value_parser = parse_integer::<u32>, allow_hyphen_values = true, help_heading = "Implementation")]
-    group_size: Option<u32>,
     /// Counters of --variant atomic, a power of two up to 64, which work groups use round-robin; the result is
     /// the same to the bit [default: 1; on a GPU 8 from two million photons at once]
     #[arg(long, value_name = "N", value_parser = parse_integer::<u32>, allow_hyphen_values = true, help_heading = "Implementation")]
@@ -144,9 +128,8 @@ pub(super) struct RunArgs {
     #[arg(long, value_name = "N|all", value_parser = parse_threads, allow_hyphen_values = true, help_heading = "Implementation")]
     threads: Option<usize>,
 
-    /// Detect NaN and infinity, and print which photon they come from
-    #[arg(long, help_heading = "Checks")]
-    paranoid: bool,
+    #[command(flatten)]
+    common: CommonArgs,
     /// Trace a single photon of this run, print where it is stored, and exit; rounds and photons count from 0
     #[arg(long, value_name = "ROUND:PHOTON", value_parser = parse_photon_name, help_heading = "Checks",
         conflicts_with_all = ["output", "irradiance", "radiosity", "json", "trace", "time_dispatches"])]
@@ -155,9 +138,7 @@ pub(super) struct RunArgs {
     #[command(flatten)]
     progress: ProgressArgs,
     #[command(flatten)]
-    device: DeviceArgs,
-    #[command(flatten)]
-    timing: TimingArgs,
+    device: TimedDeviceArgs,
 }
 
 value_enum!(PresetArg => Preset {
@@ -200,59 +181,28 @@ value_enum!(SumsArg => Sums {
 value_enum!(EmissionArg => EmissionLaw { Uniform, Cosine });
 value_enum!(PhongDirectionArg => PhongDirection { Mirror, Sampled });
 
-#[derive(Clone, Copy, PartialEq, Eq, ValueEnum)]
-enum BuilderArg {
-    /// The paper's first: one slot per photon and bounce, empty slots included
-    Naive,
-    /// The paper's second: only surviving photons, one atomic per thread
-    Atomic,
-    /// Only surviving photons, one atomic per subgroup
-    Ballot,
-    /// Only surviving photons, one atomic per work group
-    Group,
-    /// Only surviving photons, in their original order, by prefix sums
-    Scan,
-    /// One thread traces each photon from emission to its end
-    Persistent,
-    /// The paper's CPU implementation, on one thread or on --threads
-    Cpu,
-    /// The fastest on this device: each builder is timed on the first photons
-    Auto,
-}
-
-impl BuilderArg {
-    /// `None` until the device has been asked.
-    fn builder(self) -> Option<Builder> {
-        Some(match self {
-            BuilderArg::Naive => Builder::Naive,
-            BuilderArg::Atomic => Builder::Atomic,
-            BuilderArg::Ballot => Builder::Ballot,
-            BuilderArg::Group => Builder::Group,
-            BuilderArg::Scan => Builder::Scan,
-            BuilderArg::Persistent => Builder::Persistent,
-            BuilderArg::Cpu => Builder::Cpu,
-            BuilderArg::Auto => return None,
-        })
-    }
-}
+/// The paper's illumination is of this world alone.
+const EDGE_CORRECTION: &str = "Divide by the part of the search disc that lies on the wall, not by the whole disc, for irradiance and \
+     radiosity; the paper's illumination stays uncorrected [default: on]";
 
 impl RunArgs {
     pub(super) fn settings(&self) -> RoomSettings {
         let preset = RoomSettings::preset(self.preset.map_or(Preset::Modified, Preset::from));
         let photons = self.photons.unwrap_or(preset.photons);
+        let CommonArgs { seed, edge_correction, math, chunk, group_size, paranoid } = self.common;
         let settings = RoomSettings {
-            builder: self.variant.and_then(BuilderArg::builder).unwrap_or(preset.builder),
+            builder: self.variant.flatten().unwrap_or(preset.builder),
             photons,
             rounds: self.rounds.unwrap_or(preset.rounds),
             bounces: self.bounces.unwrap_or(preset.bounces),
             radius: self.radius.unwrap_or(preset.radius),
             full_light: self.full_light.unwrap_or_else(|| preset.full_light_for(photons)),
-            seed: self.seed.unwrap_or(preset.seed),
+            seed: seed.unwrap_or(preset.seed),
             rng: self.rng.map_or(if photons == preset.photons { preset.rng } else { Rng::Philox }, Rng::from),
             gather: self.gather.map_or(preset.gather, Gather::from),
             sums: self.sums.map_or(preset.sums, Sums::from),
             nearest: self.nearest.or(preset.nearest),
-            math: self.math.map_or(preset.math, Math::from),
+            math: math.map_or(preset.math, Math::from),
             emission: self.emission.map_or(preset.emission, EmissionLaw::from),
             shininess: self.shininess.map_or(preset.shininess, |all| all.map(Some)),
             phong_direction: self.phong_direction.map_or(preset.phong_direction, PhongDirection::from),
@@ -261,12 +211,12 @@ impl RunArgs {
             light_power: self.light_power.unwrap_or(preset.light_power),
             reflectance: self.reflectance.unwrap_or(preset.reflectance),
             mesh: self.mesh.unwrap_or(preset.mesh),
-            edge_correction: self.edge_correction.map_or(preset.edge_correction, |switch| switch == SwitchArg::On),
+            edge_correction: edge_correction.map_or(preset.edge_correction, |switch| switch == SwitchArg::On),
             threads: self.threads.unwrap_or(preset.threads),
-            paranoid: self.paranoid,
-            group_size: self.group_size.unwrap_or(preset.group_size),
+            paranoid,
+            group_size: group_size.unwrap_or(preset.group_size),
             counters: self.counters.or(preset.counters),
-            chunk: self.chunk.or(preset.chunk),
+            chunk,
             stop: self.stop.stop(),
         };
         match self.rounds {
@@ -279,14 +229,13 @@ impl RunArgs {
 pub(super) fn run(args: &RunArgs, cancelled: &AtomicBool) -> Result<End> {
     let settings = args.settings();
     settings.validate()?;
-    if settings.reflectance == 0.0 && args.irradiance.is_some() {
-        return Err(Error::setting("--reflectance", 0, "must be above 0 with --irradiance: the photon map holds only reflected photons"));
-    }
-    if let (Builder::Cpu, Some(device)) = (settings.builder, &args.device.device) {
-        return Err(Error::setting("--device", device, "has no effect with --variant cpu; leave one of the two out"));
-    }
-    if settings.builder == Builder::Cpu && args.device.validate {
-        return Err(Error::setting("--validate", "on", "has no effect with --variant cpu; leave one of the two out"));
+    let stores_none = settings.reflectance == 0.0 && args.irradiance.is_some();
+    require(!stores_none, "--reflectance", 0, "must be above 0 with --irradiance: the photon map holds only reflected photons")?;
+    let DeviceArgs { device, validate } = &args.device.chosen;
+    if settings.builder == Builder::Cpu {
+        let idle = "has no effect with --variant cpu; leave one of the two out";
+        require(device.is_none(), "--device", device.as_deref().unwrap_or_default(), idle)?;
+        require(!validate, "--validate", "on", idle)?;
     }
     let scene = open_box(&settings);
     if let Some(name) = args.replay {
@@ -299,26 +248,21 @@ pub(super) fn run(args: &RunArgs, cancelled: &AtomicBool) -> Result<End> {
     let reporter = ProgressReporter::new(&args.progress);
     let gpu = match settings.builder {
         Builder::Cpu => None,
-        _ => args.device.open(&args.timing.options(&args.device))?,
+        _ => args.device.chosen.open(&args.device.options())?,
     };
     reporter.device(gpu.as_ref());
     let settings = match &gpu {
-        Some(gpu) if args.variant == Some(BuilderArg::Auto) => {
-            RoomSettings { builder: fastest(gpu, &scene, &settings, &reporter)?, ..settings }
-        }
+        Some(gpu) if args.variant == Some(None) => RoomSettings { builder: fastest(gpu, &scene, &settings, &reporter)?, ..settings },
         None => RoomSettings { builder: Builder::Cpu, ..settings },
         _ => settings,
     };
-    if let (Some(nearest), true) = (settings.nearest, args.stop.bias) {
+    if let Some(nearest) = settings.nearest {
         let why = "has a radius of its own at each point, whose bias --bias cannot measure; leave --bias out";
-        return Err(Error::setting("--nearest", nearest, why));
+        require(!args.stop.bias, "--nearest", nearest, why)?;
     }
     announce(&reporter, gpu.as_ref(), &scene, &settings)?;
     let measure = |settings: &RoomSettings, rounds| room::measure_bias(gpu.as_ref(), &scene, settings, rounds, cancelled);
-    let before = match settings.stop.error.filter(|_| args.stop.bias) {
-        Some(wanted) => bias_before(wanted, (false, false), &reporter, |rounds| measure(&settings, rounds))?,
-        None => None,
-    };
+    let before = bias_before(&settings.stop, args.stop.bias, false, &reporter, |rounds| measure(&settings, rounds))?;
     let settings = RoomSettings { stop: Stop { bias: before.map(|bias| bias.upper), ..settings.stop }, ..settings };
     reporter.status("making the pipelines");
     let mut control = Control { cancelled, progress: &mut |progress| reporter.report(progress, "photon") };
@@ -351,11 +295,10 @@ fn announce(reporter: &ProgressReporter, gpu: Option<&Gpu>, scene: &RoomScene, s
         }
     };
     let RoomSettings { builder, rounds, photons, bounces, radius, mesh, .. } = settings;
-    let up_to = if settings.stop.is_set() { "up to " } else { "" };
     reporter.note(&format!(
-        "plan: open box, {} builder, {up_to}{} of {photons} photons, {}; radius {radius} m; {mesh} x {mesh} texels per wall; {memory}{}",
+        "plan: open box, {} builder, {} of {photons} photons, {}; radius {radius} m; {mesh} x {mesh} texels per wall; {memory}{}",
         builder.name(),
-        counted(rounds, "round"),
+        up_to(&settings.stop, *rounds),
         counted(bounces, "bounce"),
         goals(&settings.stop)
     ));
@@ -375,7 +318,7 @@ fn fastest(gpu: &Gpu, scene: &RoomScene, settings: &RoomSettings, reporter: &Pro
 
 /// Where one photon of the run is stored.
 fn show_photon(args: &RunArgs, settings: &RoomSettings, scene: &RoomScene, name: PhotonName) -> Result<End> {
-    let gpu = if settings.builder == Builder::Cpu { None } else { args.device.open(&args.device.options())? };
+    let gpu = if settings.builder == Builder::Cpu { None } else { args.device.chosen.open(&args.device.chosen.options())? };
     say(&room::replay(gpu.as_ref(), scene, settings, name)?.table(scene, settings.seed))?;
     Ok(End::Finished)
 }
@@ -385,8 +328,7 @@ struct Outputs {
     picture: (Destination, Format),
     irradiance: Option<Folder>,
     radiosity: Option<Folder>,
-    json: Option<Destination>,
-    trace: Option<Destination>,
+    reports: Reports,
 }
 
 impl Outputs {
@@ -394,14 +336,13 @@ impl Outputs {
         let folder = |option, path: &Option<PathBuf>| path.as_ref().map(|path| Folder::open(option, path)).transpose();
         let outputs = Outputs {
             picture: (Destination::open("-o", &args.output)?, Format::of("-o", &args.output)?),
-            json: optional_file("--json", args.json.json.as_ref())?,
-            trace: optional_file("--trace", args.trace.as_ref())?,
+            reports: args.report.open()?,
             irradiance: folder("--irradiance", &args.irradiance)?,
             radiosity: folder("--radiosity", &args.radiosity)?,
         };
         let folders = [&outputs.irradiance, &outputs.radiosity].into_iter().flatten();
         let mut all = vec![outputs.picture.0.clone()];
-        all.extend([&outputs.json, &outputs.trace].into_iter().flatten().cloned());
+        all.extend(outputs.reports.destinations());
         all.extend(folders.flat_map(|folder| lightmap::destinations(folder, scene)));
         check_distinct(&all)?;
         Ok(outputs)
@@ -421,13 +362,7 @@ impl Outputs {
         outcome.timings.count("output");
         outcome.timings.add(Span { name: "output".into(), clock: Clock::Wall, start: run, duration: began.elapsed() });
 
-        if let Some(json) = self.json {
-            files.push((json, room_report::json(&outcome, &walls, &error)));
-        }
-        if let Some(trace) = self.trace {
-            let device = outcome.device.as_ref().map_or("CPU", |facts| &facts.name);
-            files.push((trace, trace_file::chrome_trace(&outcome.timings, device)));
-        }
+        files.extend(self.reports.files(&outcome, || room_report::json(&outcome, &walls, &error)));
         let destinations: Vec<Destination> = files.iter().map(|(destination, _)| destination.clone()).collect();
         let text = room_report::text(&outcome, &error);
         match write_all(files) {

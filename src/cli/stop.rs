@@ -54,6 +54,11 @@ pub(super) fn goals(stop: &Stop) -> String {
     if goals.is_empty() { String::new() } else { format!("; stops at {}", goals.join(" or ")) }
 }
 
+/// Rounds that a run does, or may do at most.
+pub(super) fn up_to(stop: &Stop, rounds: u32) -> String {
+    format!("{}{}", if stop.is_set() { "up to " } else { "" }, counted(rounds, "round"))
+}
+
 /// Rounds of a batch after a run of so many: all batches at both radii together do about as many as the run.
 pub(super) fn rounds_after(rounds: u32) -> u32 {
     rounds.div_ceil(2 * crate::engine::bias::BATCHES).max(1)
@@ -64,14 +69,17 @@ pub(super) fn rounds_after(rounds: u32) -> u32 {
 const FIRST_ROUNDS: u32 = 2;
 const REFINEMENTS: u32 = 4;
 
-/// Measures the bias of the first round's radius for a run that ends at an error, of which the bias is a part. `shrinks`
-/// says whether later radii are smaller, `ends_otherwise` whether something else ends the run.
+/// Measures the bias of the first round's radius if it is asked for and the run ends at an error, of which it is a part.
+/// `shrinks` says whether later radii are smaller.
 pub(super) fn bias_before(
-    wanted: f64,
-    (shrinks, ends_otherwise): (bool, bool),
+    stop: &Stop,
+    is_asked: bool,
+    shrinks: bool,
     reporter: &ProgressReporter,
     mut measure: impl FnMut(u32) -> Result<Option<Bias>>,
 ) -> Result<Option<Bias>> {
+    let Some(wanted) = stop.error.filter(|_| is_asked) else { return Ok(None) };
+    let ends_otherwise = stop.seconds.is_some() || stop.photons.is_some();
     let mut rounds = FIRST_ROUNDS;
     for refinement in 0..=REFINEMENTS {
         reporter.step(&format!(

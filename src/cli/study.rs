@@ -9,7 +9,7 @@ use clap::Args;
 use super::progress::{ProgressArgs, ProgressReporter};
 use super::values::{parse_integer, parse_seconds, parse_within};
 use super::{DeviceArgs, End, complain, help, say};
-use crate::error::{Error, Result};
+use crate::error::{Result, require, within};
 use crate::gpu::Gpu;
 use crate::measure::study::{self, Request};
 use crate::output::destination::Folder;
@@ -108,28 +108,17 @@ const MAX_HELD: u64 = 1 << 27;
 
 impl StudyArgs {
     fn validate(&self) -> Result<()> {
-        let within = |option, value: u64, allowed: std::ops::RangeInclusive<u64>, what: &str| {
-            if allowed.contains(&value) {
-                return Ok(());
-            }
-            Err(Error::setting(option, value, format!("must be from {} to {} ({what})", allowed.start(), allowed.end())))
-        };
         within("--side", u64::from(self.side.unwrap_or(48)), 2..=1024, "pixels or texels along a side")?;
         within("--photons", u64::from(self.photons.unwrap_or(8192)), 64..=1 << 28, "photons per round")?;
         within("--rounds", u64::from(self.rounds), 1..=u64::from(study::MOST_ROUNDS), "rounds of the longest point")?;
         within("--repeats", u64::from(self.repeats), 2..=1000, "runs of a point, whose spread is its error")?;
         within("--reference-samples", u64::from(self.reference_samples), 16..=1 << 24, "samples per pixel")?;
         let held = 3 * u64::from(self.side.unwrap_or(48)).pow(2) * u64::from(self.repeats);
-        if held > MAX_HELD {
-            let allowed = format!(
-                "3 * side^2 * repeats is {held} numbers in memory for each setting, and {MAX_HELD} is the limit; use fewer, or a smaller --side"
-            );
-            return Err(Error::setting("--repeats", self.repeats, allowed));
-        }
-        if !(1.0..=1e6).contains(&self.budget) {
-            return Err(Error::setting("--budget", self.budget, "must be from 1s to 1000000s"));
-        }
-        Ok(())
+        let most = format!(
+            "3 * side^2 * repeats is {held} numbers in memory for each setting, and {MAX_HELD} is the limit; use fewer, or a smaller --side"
+        );
+        require(held <= MAX_HELD, "--repeats", self.repeats, most)?;
+        require((1.0..=1e6).contains(&self.budget), "--budget", self.budget, "must be from 1s to 1000000s")
     }
 }
 

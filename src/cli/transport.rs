@@ -1,25 +1,23 @@
 //! What the commands that light a scene of triangles share: options, the scene, the run.
 
-use std::path::PathBuf;
 use std::sync::atomic::AtomicBool;
 
-use clap::{Args, ValueEnum};
+use clap::Args;
 
 use super::interrupt::interruptible;
+use super::options::CommonArgs;
+use super::picture_size::{PictureSize, parse_size};
 use super::progress::{ProgressArgs, ProgressReporter};
-use super::stop::{StopArgs, bias_before, goals, rounds_after};
-use super::values::{MathArg, SwitchArg, parse_colour, parse_integer, parse_number, parse_within, value_enum};
-use super::{DeviceArgs, JsonArg, TimingArgs, complain, help, optional_file};
+use super::stop::{StopArgs, bias_before, goals, rounds_after, up_to};
+use super::values::{BuilderArg, SwitchArg, builder_parser, effect_parser, parse_colour, parse_integer, parse_number, value_enum};
+use super::{complain, help};
 use crate::engine::Control;
-use crate::engine::Progress;
 use crate::engine::scene::{self, RunResult, View};
 use crate::error::{Error, Result};
 use crate::gpu::Gpu;
-use crate::output::destination::Destination;
 use crate::output::scene_report;
-use crate::output::trace_file;
 use crate::plan::radius::mean_squared_radius;
-use crate::plan::scene::ScenePlan;
+use crate::plan::scene::{MapPlan, ScenePlan};
 use crate::plan::sensor::Sensor;
 use crate::records::Receiver;
 use crate::scene::geometry::Geometry;
@@ -59,9 +57,6 @@ pub(super) struct TransportArgs {
     /// Cut photons off after this many bounces [default: none; Russian roulette ends paths]
     #[arg(long, value_name = "N", value_parser = parse_integer::<u32>, allow_hyphen_values = true, help_heading = "Photons")]
     bounces: Option<u32>,
-    /// Seed of the random numbers [default: 1]
-    #[arg(long, value_name = "N", value_parser = parse_within(0..=u64::MAX), allow_hyphen_values = true, help_heading = "Photons")]
-    seed: Option<u64>,
     /// Emit photons of the caustic map only towards mirrors and glass (projection maps) [default: on]
     #[arg(long, value_enum, value_name = "SWITCH", help_heading = "Photons")]
     aim: Option<SwitchArg>,
@@ -76,11 +71,11 @@ pub(super) struct TransportArgs {
     #[arg(long, help_heading = "Light transport")]
     final_gather: bool,
     /// Simulate an effect even if the scene does not need it; `photonmill plan` lists them
-    #[arg(long, value_name = "EFFECT", value_enum, value_delimiter = ',', help_heading = "Light transport")]
-    with: Vec<EffectArg>,
+    #[arg(long, value_name = "EFFECT", value_parser = effect_parser(), value_delimiter = ',', help_heading = "Light transport")]
+    with: Vec<Effect>,
     /// Leave an effect out even if the scene needs it
-    #[arg(long, value_name = "EFFECT", value_enum, value_delimiter = ',', help_heading = "Light transport")]
-    without: Vec<EffectArg>,
+    #[arg(long, value_name = "EFFECT", value_parser = effect_parser(), value_delimiter = ',', help_heading = "Light transport")]
+    without: Vec<Effect>,
 
     /// Radius of the density estimate of the global map in the first round, metres [default: from a trial round,
     /// so that about 24 photons of a round lie within it at the median pixel, texel or point]
@@ -99,36 +94,40 @@ pub(super) struct TransportArgs {
     /// Kernel of the density estimate: weight of a photon by its distance [default: box]
     #[arg(long, value_enum, value_name = "KERNEL", help_heading = "Density estimate")]
     kernel: Option<KernelArg>,
-    /// Divide by the part of the search disc that lies on the surface, not by the whole disc [default: on]
-    #[arg(long, value_enum, value_name = "SWITCH", help_heading = "Density estimate")]
-    edge_correction: Option<SwitchArg>,
-
     /// Builder of the photon maps; all give bit-identical results [default: auto]
-    #[arg(long, value_enum, value_name = "BUILDER", help_heading = "Implementation")]
+    #[arg(long, value_name = "BUILDER", help_heading = "Implementation", value_parser = builder_parser(Builder::ON_GPU,
+        "Persistent; ballot with --math strict, and where the device fails the check of what persistent needs"))]
     variant: Option<BuilderArg>,
-    /// Rounding of the arithmetic [default: fast]
-    #[arg(long, value_enum, value_name = "ROUNDING", help_heading = "Implementation")]
-    math: Option<MathArg>,
-    /// Most photons traced at once; the result is the same to the bit [default: what fits on the device]
-    #[arg(long, value_name = "N", value_parser = parse_integer::<u32>, allow_hyphen_values = true, help_heading = "Implementation")]
-    chunk: Option<u32>,
-    /// Invocations per work group, a power of two [default: 128]
-    #[arg(long, value_name = "N", value_parser = parse_integer::<u32>, allow_hyphen_values = true, help_heading = "Implementation")]
-    group_size: Option<u32>,
-
-    /// Detect NaN and infinity, and print which photon, pixel, texel or point they come from
-    #[arg(long, help_heading = "Checks")]
-    paranoid: bool,
+    #[command(flatten)]
+    common: CommonArgs,
 }
 
-/// Reports of a run as files.
+/// What a camera sees of a scene, and how it is lit.
 #[derive(Args)]
-pub(super) struct ReportArgs {
+pub(super) struct PictureArgs {
     #[command(flatten)]
-    json: JsonArg,
-    /// Write the time of every pass as a Chrome trace, for Perfetto or chrome://tracing
-    #[arg(long, value_name = "FILE", help_heading = "Output")]
-    trace: Option<PathBuf>,
+    scene: SceneArgs,
+    /// Camera by name [default: the first one; one that sees the whole scene if it has none]
+    #[arg(long, value_name = "NAME", help_heading = "Scene")]
+    camera: Option<String>,
+    /// Size of the picture in pixels; a width alone takes its height from the camera's aspect ratio [default: about 307200
+    /// pixels in the camera's aspect ratio, 640x480 if it has none]
+    #[arg(long, value_name = "WIDTH[xHEIGHT]", value_parser = parse_size, allow_hyphen_values = true, help_heading = "Scene")]
+    size: Option<PictureSize>,
+    #[command(flatten)]
+    pub(super) transport: TransportArgs,
+    /// Compute only this part of the light; the four parts sum to `all` exactly
+    #[arg(long, value_enum, value_name = "PART", help_heading = "Light transport")]
+    part: Option<PartArg>,
+}
+
+/// What a picture is made of.
+pub(super) struct Subject {
+    pub(super) scene: Scene,
+    pub(super) camera: Camera,
+    pub(super) width: u32,
+    pub(super) height: u32,
+    pub(super) geometry: Geometry,
 }
 
 /// What a run prints.
@@ -141,54 +140,12 @@ pub(super) struct MessageArgs {
     pub(super) progress: ProgressArgs,
 }
 
-/// The device of a run and how it is timed.
-#[derive(Args)]
-pub(super) struct TimedDeviceArgs {
-    #[command(flatten)]
-    device: DeviceArgs,
-    #[command(flatten)]
-    timing: TimingArgs,
-}
-
 value_enum!(IlluminationArg => Illumination {
     /// Direct light by shadow rays, caustics from a map of their own, the rest from the global map
     Split,
     /// Everything from one photon map, as in the paper
     Photons,
 });
-
-#[derive(Clone, Copy, ValueEnum)]
-enum BuilderArg {
-    /// Persistent; ballot with --math strict, and where the device fails the check of what persistent needs
-    Auto,
-    /// Bounce by bounce, one slot per photon and bounce, empty slots included
-    Naive,
-    /// Bounce by bounce, one atomic per photon
-    Atomic,
-    /// Bounce by bounce, one atomic per subgroup
-    Ballot,
-    /// Bounce by bounce, one atomic per work group
-    Group,
-    /// Bounce by bounce, photons in their original order, by prefix sums
-    Scan,
-    /// One invocation traces each photon from emission to its end
-    Persistent,
-}
-
-impl BuilderArg {
-    /// `None`: the plan chooses.
-    fn builder(self) -> Option<Builder> {
-        match self {
-            BuilderArg::Auto => None,
-            BuilderArg::Naive => Some(Builder::Naive),
-            BuilderArg::Atomic => Some(Builder::Atomic),
-            BuilderArg::Ballot => Some(Builder::Ballot),
-            BuilderArg::Group => Some(Builder::Group),
-            BuilderArg::Scan => Some(Builder::Scan),
-            BuilderArg::Persistent => Some(Builder::Persistent),
-        }
-    }
-}
 
 value_enum!(KernelArg => Kernel { Box, Cone, Epanechnikov });
 value_enum!(FilterArg => Filter {
@@ -211,11 +168,6 @@ value_enum!(PartArg => Part {
     /// Light that other surfaces scattered onto the surface that is seen
     Indirect,
 });
-value_enum!(EffectArg => Effect {
-    Direct, Indirect, Glossy, ReflectiveCaustics, RefractiveCaustics, SpecularChains, Textures, Environment, MeshLights,
-    PointLights, SpotLights, DirectionalLights, DiscLights, Bvh, TwoSided, SmoothNormals,
-});
-
 /// Most rounds of a run with a stop criterion other than --total-photons.
 const MOST_ROUNDS: u32 = 65_536;
 
@@ -248,64 +200,53 @@ impl TransportArgs {
         let photons = self.photons.unwrap_or(usual.photons);
         let caustic_photons = self.caustic_photons.unwrap_or(photons);
         let stop = self.stop.stop();
+        let CommonArgs { seed, edge_correction, math, chunk, group_size, paranoid } = self.common;
         SceneSettings {
             photons,
             caustic_photons,
             rounds: self.rounds.unwrap_or_else(|| most_rounds(&stop, photons.min(caustic_photons)).unwrap_or(usual.rounds)),
             stop,
             bounces: self.bounces.unwrap_or(usual.bounces),
-            seed: self.seed.unwrap_or(usual.seed),
+            seed: seed.unwrap_or(usual.seed),
             radius: self.radius,
             caustic_radius: self.caustic_radius,
             alpha: if self.fixed_radius { 1.0 } else { self.alpha.unwrap_or(usual.alpha) },
             kernel: self.kernel.map_or(usual.kernel, Kernel::from),
-            edge_correction: self.edge_correction.map_or(usual.edge_correction, |switch| switch == SwitchArg::On),
+            edge_correction: edge_correction.map_or(usual.edge_correction, |switch| switch == SwitchArg::On),
             shadow_rays: self.shadow_rays.unwrap_or(usual.shadow_rays),
             final_gather: self.final_gather,
             aim: self.aim.map_or(usual.aim, |switch| switch == SwitchArg::On),
             illumination: self.illumination.map_or(usual.illumination, Illumination::from),
-            builder: self.variant.map_or(usual.builder, BuilderArg::builder),
-            math: self.math.map_or(usual.math, Math::from),
-            paranoid: self.paranoid,
-            group_size: self.group_size.unwrap_or(usual.group_size),
-            chunk: self.chunk,
-            with: self.with.iter().map(|effect| (*effect).into()).collect(),
-            without: self.without.iter().map(|effect| (*effect).into()).collect(),
+            builder: self.variant.unwrap_or(usual.builder),
+            math: math.map_or(usual.math, Math::from),
+            paranoid,
+            group_size: group_size.unwrap_or(usual.group_size),
+            chunk,
+            with: self.with.clone(),
+            without: self.without.clone(),
             ..usual
         }
     }
 }
 
-/// The outputs of [`ReportArgs`], checked before the run.
-pub(super) struct Reports {
-    json: Option<Destination>,
-    trace: Option<Destination>,
-}
+impl PictureArgs {
+    pub(super) fn settings(&self) -> SceneSettings {
+        let usual = self.transport.settings();
+        SceneSettings { part: self.part.map_or(usual.part, Part::from), ..usual }
+    }
 
-impl ReportArgs {
-    pub(super) fn open(&self) -> Result<Reports> {
-        Ok(Reports { json: optional_file("--json", self.json.json.as_ref())?, trace: optional_file("--trace", self.trace.as_ref())? })
+    pub(super) fn open(&self, settings: &SceneSettings, reporter: &ProgressReporter) -> Result<Subject> {
+        let scene = self.scene.open(reporter)?;
+        let camera = camera(&scene, self.camera.as_deref())?;
+        let (width, height) = PictureSize::resolve(self.size, &camera, reporter)?;
+        let geometry = geometry(&scene, settings, reporter)?;
+        Ok(Subject { scene, camera, width, height, geometry })
     }
 }
 
-impl TimedDeviceArgs {
-    /// The device; a scene of triangles needs one.
-    pub(super) fn open(&self, reporter: &ProgressReporter) -> Result<Gpu> {
-        let gpu = Gpu::open(&self.timing.options(&self.device))?;
-        reporter.device(Some(&gpu));
-        Ok(gpu)
-    }
-}
-
-impl Reports {
-    pub(super) fn destinations(&self) -> Vec<Destination> {
-        [&self.json, &self.trace].into_iter().flatten().cloned().collect()
-    }
-
-    pub(super) fn files(self, scene: &Scene, lit: &RunResult) -> Vec<(Destination, Vec<u8>)> {
-        let json = self.json.map(|json| (json, scene_report::json(&scene.name, lit)));
-        let trace = self.trace.map(|trace| (trace, trace_file::chrome_trace(&lit.timings, lit.device_name())));
-        json.into_iter().chain(trace).collect()
+impl Subject {
+    pub(super) fn sensor(&self) -> Sensor {
+        Sensor::Picture { width: self.width, height: self.height }
     }
 }
 
@@ -313,27 +254,12 @@ impl Reports {
 pub(super) struct Job<'a> {
     pub(super) scene: &'a Scene,
     pub(super) settings: &'a SceneSettings,
+    pub(super) geometry: &'a Geometry,
     pub(super) sensor: Sensor,
     pub(super) camera: Option<&'a Camera>,
     pub(super) phases: &'a [Vec<Receiver>],
     /// What results are of: pixel, texel or point.
     pub(super) point: &'static str,
-}
-
-impl<'a> Job<'a> {
-    pub(super) fn picture(scene: &'a Scene, settings: &'a SceneSettings, camera: &'a Camera, (width, height): (u32, u32)) -> Job<'a> {
-        Job { scene, settings, sensor: Sensor::Picture { width, height }, camera: Some(camera), phases: &[], point: "pixel" }
-    }
-}
-
-/// The plan of a job, its default radii from a trial round.
-pub(super) fn plan(gpu: &Gpu, job: &Job, geometry: &Geometry) -> Result<ScenePlan> {
-    let view = View { geometry, camera: job.camera, phases: job.phases };
-    let plan = scene::trial::plan(gpu, job.scene, &view, job.settings, job.sensor)?;
-    if let Some(warning) = scene_report::radius_warning(&plan, geometry, job.point) {
-        complain(&format!("warning: {warning}"));
-    }
-    Ok(plan)
 }
 
 /// Geometry of a scene without the effects that are left out.
@@ -359,79 +285,72 @@ fn stages<'a>(what: &'a str, reporter: &'a ProgressReporter) -> impl FnMut(&'sta
     }
 }
 
-/// What will be traced, before it is.
-fn announce(job: &Job, geometry: &Geometry, plan: &ScenePlan, reporter: &ProgressReporter) {
-    let what = match plan.sensor {
-        Sensor::Picture { width, height } => format!("{width} x {height} pixels"),
-        Sensor::Receivers { count } => counted(count, job.point),
-    };
-    let maps: Vec<String> = plan.maps().map(|map| counted(map.photons, &format!("{} photon", map.name))).collect();
-    let radii: Vec<String> = plan.maps().map(|map| format!("{:.4} m ({})", map.radius * geometry.unit, map.name)).collect();
-    let rounds = counted(plan.settings.rounds, "round");
-    let up_to = if plan.settings.stop.is_set() { "up to " } else { "" };
-    let (maps, radius) = if maps.is_empty() {
-        ("no photons".to_owned(), String::new())
-    } else {
-        (maps.join(" and "), format!("; first radius {}", radii.join(", ")))
-    };
-    reporter.note(&format!(
-        "plan: {}, {what}; {up_to}{rounds} of {maps}{radius}; {:.1} MiB on the device{}",
-        job.scene.name,
-        plan.bytes as f64 / f64::from(1 << 20),
-        goals(&plan.settings.stop)
-    ));
-}
-
-/// Runs all rounds and reports progress; with `bias`, measures that too.
-pub(super) fn light(
-    gpu: &Gpu,
-    job: &Job,
-    geometry: &Geometry,
-    mut plan: ScenePlan,
-    bias: bool,
-    reporter: &ProgressReporter,
-    cancelled: &AtomicBool,
-) -> Result<RunResult> {
-    announce(job, geometry, &plan, reporter);
-    let view = View { geometry, camera: job.camera, phases: job.phases };
-    let of_first = |plan: &ScenePlan, factor_and_rounds| {
-        interruptible(|| scene::bias::measure(gpu, job.scene, &view, plan, factor_and_rounds, cancelled))
-    };
-    let alpha = plan.settings.alpha;
-    let stop = plan.settings.stop;
-    // The error asked for is noise and bias together, so the bias must be known beforehand.
-    let before = match stop.error.filter(|_| bias) {
-        Some(wanted) => bias_before(wanted, (alpha < 1.0, stop.seconds.is_some() || stop.photons.is_some()), reporter, |rounds| {
-            of_first(&plan, (1.0, rounds))
-        })?,
-        None => None,
-    };
-    plan.settings.stop.bias = before.map(|bias| bias.upper);
-
-    reporter.status("making the pipelines");
-    let mut report = |progress: &Progress| reporter.report(progress, "round");
-    let mut control = Control { cancelled, progress: &mut report };
-    let mut lit = interruptible(|| scene::light(gpu, &view, plan, &mut control))?;
-    if lit.is_cancelled() {
-        complain(&format!("ended early: the results are of {} of {}", counted(lit.film.rounds, "round"), lit.plan.settings.rounds));
-        return Ok(lit);
+impl Job<'_> {
+    /// What will be traced, before it is.
+    fn announce(&self, plan: &ScenePlan, reporter: &ProgressReporter) {
+        let what = match plan.sensor {
+            Sensor::Picture { width, height } => format!("{width} x {height} pixels"),
+            Sensor::Receivers { count } => counted(count, self.point),
+        };
+        let maps: Vec<String> = plan.maps().map(|map| counted(map.photons, &format!("{} photon", map.name))).collect();
+        let radius = |map: &MapPlan| format!("{:.4} m ({})", map.radius * self.geometry.unit, map.name);
+        let radii: Vec<String> = plan.maps().map(radius).collect();
+        let (maps, radius) = if maps.is_empty() {
+            ("no photons".to_owned(), String::new())
+        } else {
+            (maps.join(" and "), format!("; first radius {}", radii.join(", ")))
+        };
+        reporter.note(&format!(
+            "plan: {}, {what}; {} of {maps}{radius}; {:.1} MiB on the device{}",
+            self.scene.name,
+            up_to(&plan.settings.stop, plan.settings.rounds),
+            plan.bytes as f64 / f64::from(1 << 20),
+            goals(&plan.settings.stop)
+        ));
     }
-    let shrunk = mean_squared_radius(alpha, lit.film.rounds);
-    lit.bias = match before {
-        Some(bias) => Some(bias.scaled(shrunk)),
-        // At the radius whose square is the mean of the rounds' squares.
-        None if bias => {
-            reporter.status("measuring the bias");
-            of_first(&lit.plan, (shrunk.sqrt(), rounds_after(lit.film.rounds)))?
+
+    /// Plans the job, its default radii by a trial round, runs all rounds and reports progress; where asked, measures the bias
+    /// too.
+    pub(super) fn run(&self, gpu: &Gpu, stop: &StopArgs, reporter: &ProgressReporter, cancelled: &AtomicBool) -> Result<RunResult> {
+        let Job { scene, geometry, settings, sensor, camera, phases, point } = *self;
+        let view = View { geometry, camera, phases };
+        let mut plan = scene::trial::plan(gpu, scene, &view, settings, sensor)?;
+        if let Some(warning) = scene_report::radius_warning(&plan, geometry, point) {
+            complain(&format!("warning: {warning}"));
         }
-        None => None,
-    };
-    reporter.status("writing the results");
-    Ok(lit)
+        self.announce(&plan, reporter);
+        let measure = |plan: &ScenePlan, factor_and_rounds| {
+            interruptible(|| scene::bias::measure(gpu, scene, &view, plan, factor_and_rounds, cancelled))
+        };
+        let alpha = settings.alpha;
+        // The error asked for is noise and bias together, so the bias must be known beforehand.
+        let before = bias_before(&settings.stop, stop.bias, alpha < 1.0, reporter, |rounds| measure(&plan, (1.0, rounds)))?;
+        plan.settings.stop.bias = before.map(|bias| bias.upper);
+
+        reporter.status("making the pipelines");
+        let mut control = Control { cancelled, progress: &mut |progress| reporter.report(progress, "round") };
+        let mut lit = interruptible(|| scene::light(gpu, &view, plan, &mut control))?;
+        if lit.is_cancelled() {
+            complain(&format!("ended early: the results are of {} of {}", counted(lit.film.rounds, "round"), settings.rounds));
+            return Ok(lit);
+        }
+        let shrunk = mean_squared_radius(alpha, lit.film.rounds);
+        lit.bias = match before {
+            Some(bias) => Some(bias.scaled(shrunk)),
+            // At the radius whose square is the mean of the rounds' squares.
+            None if stop.bias => {
+                reporter.status("measuring the bias");
+                measure(&lit.plan, (shrunk.sqrt(), rounds_after(lit.film.rounds)))?
+            }
+            None => None,
+        };
+        reporter.status("writing the results");
+        Ok(lit)
+    }
 }
 
 /// The camera by name, else the scene's first, else one that sees all of it.
-pub(super) fn camera(scene: &Scene, name: Option<&str>) -> Result<Camera> {
+fn camera(scene: &Scene, name: Option<&str>) -> Result<Camera> {
     match name {
         Some(name) => scene.cameras.iter().find(|camera| camera.name == name).cloned().ok_or_else(|| {
             let names: Vec<&str> = scene.cameras.iter().map(|camera| camera.name.as_str()).collect();

@@ -6,16 +6,18 @@ use std::ops::RangeInclusive;
 use std::str::FromStr;
 
 use clap::ValueEnum;
+use clap::builder::{PossibleValue, PossibleValuesParser, TypedValueParser};
 
 use crate::engine::replay::PhotonName;
-use crate::settings::{Math, WALL_NAMES};
+use crate::settings::scene::Effect;
+use crate::settings::{Builder, Math, WALL_NAMES};
 
 type Parsed<T> = Result<T, String>;
 
 /// An enum of the settings as clap values.
 macro_rules! value_enum {
     ($argument:ident => $setting:ident { $($(#[$doc:meta])* $variant:ident),* $(,)? }) => {
-        #[derive(Clone, Copy, ValueEnum)]
+        #[derive(Clone, Copy, clap::ValueEnum)]
         pub(super) enum $argument { $($(#[$doc])* $variant),* }
 
         impl From<$argument> for $setting {
@@ -38,6 +40,30 @@ value_enum!(MathArg => Math {
 pub(super) enum SwitchArg {
     On,
     Off,
+}
+
+/// What `--variant` names; `None` is auto.
+pub(super) type BuilderArg = Option<Builder>;
+
+/// Reads a [`BuilderArg`] that is one of `known`, or auto, which means what `auto` says.
+pub(super) fn builder_parser(known: impl IntoIterator<Item = Builder>, auto: &'static str) -> impl TypedValueParser<Value = BuilderArg> {
+    let help = |builder| match builder {
+        Builder::Naive => "One slot per photon and bounce, empty slots included (the paper's first)",
+        Builder::Atomic => "Only surviving photons, one atomic per thread (the paper's second)",
+        Builder::Ballot => "Only surviving photons, one atomic per subgroup",
+        Builder::Group => "Only surviving photons, one atomic per work group",
+        Builder::Scan => "Only surviving photons, in their original order, by prefix sums",
+        Builder::Persistent => "One invocation traces each photon from emission to its end",
+        Builder::Cpu => "The paper's CPU implementation, on one thread or on --threads",
+    };
+    let values = known.into_iter().map(|builder| PossibleValue::new(builder.name()).help(help(builder)));
+    PossibleValuesParser::new(values.chain([PossibleValue::new("auto").help(auto)]))
+        .map(|name| Builder::ALL.into_iter().find(|builder| builder.name() == name))
+}
+
+pub(super) fn effect_parser() -> impl TypedValueParser<Value = Effect> {
+    let known = |name: String| Effect::ALL.into_iter().find(|effect| effect.name() == name).expect("only names of effects pass");
+    PossibleValuesParser::new(Effect::ALL.map(Effect::name)).map(known)
 }
 
 /// A number that `T` does not hold becomes 0 or the largest of `T`. The setting must allow neither: validation, which knows
@@ -66,6 +92,12 @@ where
 
 pub(super) fn parse_number<T: FromStr>(text: &str) -> Parsed<T> {
     text.parse().map_err(|_| "must be a number".to_owned())
+}
+
+/// Stops of an exposure.
+pub(super) fn parse_stops(text: &str) -> Parsed<f32> {
+    let stops = parse_number(text)?;
+    if (-64.0..=64.0).contains(&stops) { Ok(stops) } else { Err("must be from -64 to 64 stops".to_owned()) }
 }
 
 /// `1,2,3`.

@@ -6,16 +6,14 @@ use std::time::{Duration, Instant};
 use super::limits;
 use super::room::constants;
 use super::room::on_gpu::modules;
-use crate::engine::room::estimate;
-use crate::engine::room::index;
+use super::run::check_math;
 use crate::engine::room::resources::RoomResources;
-use crate::engine::room::trace;
+use crate::engine::room::{estimate, index, trace};
 use crate::error::{Error, Result};
-use crate::gpu::check::strict_math;
 use crate::gpu::{Commands, Gpu};
 use crate::plan::{RoomPlan, photons_of};
 use crate::scene::room::RoomScene;
-use crate::settings::{Builder, Gather, Math, RoomSettings};
+use crate::settings::{Builder, Gather, RoomSettings};
 use crate::timings::Spread;
 
 /// What the builders took.
@@ -46,9 +44,7 @@ const TURNS: usize = 5;
 const LONG: Duration = Duration::from_secs(1);
 
 pub fn choose_builder(gpu: &Gpu, scene: &RoomScene, settings: &RoomSettings) -> Result<Choice> {
-    if settings.math == Math::Strict {
-        strict_math(gpu)?;
-    }
+    check_math(gpu, settings.math)?;
     let plans = plans(gpu, scene, settings)?;
     let mut times = vec![Vec::new(); plans.len()];
     let began = Instant::now();

@@ -28,12 +28,8 @@ pub fn limits(facts: &DeviceFacts) -> Limits {
         buffer_bytes: facts.storage_buffer_range_bytes.min(facts.allocation_bytes),
         // Half, as the device is not ours alone.
         memory_bytes: facts.device_memory_bytes / 2,
-        pair_tests_per_submission: Limits::pair_tests_of(facts.kind),
         group_size: facts.work_group_size,
-        loop_iterations: Limits::loop_iterations_of(facts.kind),
-        busy_invocations: Limits::busy_invocations_of(facts.kind),
-        lanes: Limits::lanes_of(facts.kind),
-        counters: Limits::counters_of(facts.kind),
         votes_in_loops: facts.votes_in_loops,
+        ..Limits::of_kind(facts.kind)
     }
 }

@@ -6,6 +6,26 @@ use crate::error::Result;
 use crate::gpu::{Buffer, Commands, Gpu, Memory};
 use crate::plan::buffers::PlannedBuffer;
 
+/// Structs of buffers, each field with its type and how it is made of the constructor's arguments.
+macro_rules! buffers {
+    ($(#[$doc:meta])* pub struct $name:ident($($argument:ident: $given:ty),*) {
+        $($(#[$note:meta])* $field:ident: $type:ty = $made:expr),* $(,)?
+    }) => {
+        $(#[$doc])*
+        pub struct $name {
+            $($(#[$note])* pub $field: $type),*
+        }
+
+        impl $name {
+            fn made($($argument: $given),*) -> Result<$name> {
+                Ok($name { $($field: $made),* })
+            }
+        }
+    };
+}
+
+pub(in crate::engine) use buffers;
+
 /// What a plan lists, and where it is to be.
 pub struct Planned<'a> {
     pub gpu: &'a Gpu,

@@ -188,6 +188,11 @@ pub fn run<W: World, Plan: Clone>(
     })
 }
 
+/// Refuses arithmetic that the device does not do.
+pub fn check_math(gpu: &Gpu, math: Math) -> Result<()> {
+    if math == Math::Strict { strict_math(gpu) } else { Ok(()) }
+}
+
 /// The commands of a run on a device that makes these pipelines, and no others; `started` is the zero of its times. With the
 /// pipelines that there were before.
 pub fn commands<'gpu>(
@@ -197,9 +202,7 @@ pub fn commands<'gpu>(
     math: Math,
     started: Instant,
 ) -> Result<(Commands<'gpu>, usize)> {
-    if math == Math::Strict {
-        strict_math(gpu)?;
-    }
+    check_math(gpu, math)?;
     let pipelines_before = gpu.pipeline_count();
     gpu.prepare(modules, &constants)?;
     let mut commands = Commands::new(gpu, constants, started)?;

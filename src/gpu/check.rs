@@ -31,29 +31,26 @@ pub(super) fn run(gpu: &Gpu) -> Result<bool> {
         photon_count: PHOTONS,
         stride: GROUP_SIZE,
     };
-    let answers = ask(gpu, &push)?;
+    let ([iterations, chain, survivors, found_sum, subgroups], film_sum, entries) = ask(gpu, &push)?;
 
     let expected_chain = (0..LOOP_LIMIT).fold(1u32, |chain, _| chain.wrapping_mul(1_664_525).wrapping_add(1_013_904_223));
-    if answers.iterations != LOOP_LIMIT || answers.chain != expected_chain {
-        return Err(wrong(format!("a loop of {LOOP_LIMIT} iterations ended after {}", answers.iterations)));
+    if iterations != LOOP_LIMIT || chain != expected_chain {
+        return Err(wrong(format!("a loop of {LOOP_LIMIT} iterations ended after {iterations}")));
     }
     // Full subgroups of width w have w / 2 odd lanes each, whose exclusive counts are 0, 1, ...
-    let odd_lanes = GROUP_SIZE / answers.subgroups.max(1) / 2;
-    let order_sum = answers.subgroups * (odd_lanes * odd_lanes.saturating_sub(1) / 2);
-    if answers.survivors != GROUP_SIZE / 2 || answers.order_sum != order_sum {
+    let odd_lanes = GROUP_SIZE / subgroups.max(1) / 2;
+    let (half, order_sum) = (GROUP_SIZE / 2, subgroups * (odd_lanes * odd_lanes.saturating_sub(1) / 2));
+    if survivors != half || found_sum != order_sum {
         return Err(wrong(format!(
-            "a subgroup ballot of {} lanes counted {}, with prefix sums that total {} instead of {order_sum}",
-            GROUP_SIZE / 2,
-            answers.survivors,
-            answers.order_sum
+            "a subgroup ballot of {half} lanes counted {survivors}, with prefix sums that total {found_sum} instead of {order_sum}"
         )));
     }
     let addend = u64::from(push.addend_low) | u64::from(push.addend_high) << 32;
     let expected_sum = addend * u64::from(push.add_count) * u64::from(GROUP_SIZE);
-    if answers.film_sum != expected_sum {
-        return Err(wrong(format!("64-bit sums gave {} instead of {expected_sum}", answers.film_sum)));
+    if film_sum != expected_sum {
+        return Err(wrong(format!("64-bit sums gave {film_sum} instead of {expected_sum}")));
     }
-    Ok(answers.entries == expected_entries())
+    Ok(entries == expected_entries())
 }
 
 /// Photons of the loop in which lanes vote: several an invocation.
@@ -68,7 +65,7 @@ fn expected_entries() -> Vec<u32> {
 /// How far a loop of `wanted` iterations really gets.
 pub fn loop_count(gpu: &Gpu, wanted: u32) -> Result<LoopCount> {
     let push = CheckPush { iteration_count: wanted, addend_low: 0, addend_high: 0, add_count: 0, photon_count: 0, stride: 0 };
-    Ok(LoopCount { wanted, done: ask(gpu, &push)?.iterations })
+    Ok(LoopCount { wanted, done: ask(gpu, &push)?.0[0] })
 }
 
 /// What the strict functions of `glsl/math/math.glsl` make of each pair on the device.
@@ -119,16 +116,8 @@ fn sample(k: u32) -> Vec2 {
 /// Invocations of the check's one work group: every device allows 128.
 const GROUP_SIZE: u32 = 128;
 
-struct Answers {
-    iterations: u32,
-    chain: u32,
-    survivors: u32,
-    order_sum: u32,
-    subgroups: u32,
-    film_sum: u64,
-    /// Of the photon map, sorted.
-    entries: Vec<u32>,
-}
+/// Words, sum and photon map, which is sorted, of the check.
+type Answers = ([u32; 5], u64, Vec<u32>);
 
 fn ask(gpu: &Gpu, push: &CheckPush) -> Result<Answers> {
     let mut commands = Commands::new(gpu, Constants::new(GROUP_SIZE), Instant::now())?;
@@ -149,9 +138,8 @@ fn ask(gpu: &Gpu, push: &CheckPush) -> Result<Answers> {
     }
     let words = commands.read(&answers, 5)?;
     let film_sum = commands.read(&film, 1)?[0];
-    let [iterations, chain, survivors, order_sum, subgroups] = words[..] else { unreachable!("five words were read") };
     let stored = commands.read::<u32>(&counters, 1)?[0].min(16 * push.photon_count);
     let mut entries = commands.read::<u32>(&entries, stored as usize)?;
     entries.sort_unstable();
-    Ok(Answers { iterations, chain, survivors, order_sum, subgroups, film_sum, entries })
+    Ok((words.try_into().expect("five words were read"), film_sum, entries))
 }

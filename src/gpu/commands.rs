@@ -170,9 +170,9 @@ impl<'gpu> Commands<'gpu> {
     }
 
     fn close_scope(&mut self) {
-        let scope = self.open_scopes.pop().expect("a scope is open");
+        let OpenScope { name, begin } = self.open_scopes.pop().expect("a scope is open");
         let end = self.timestamps.write(self.command_buffer);
-        self.timed_scopes.push(Timestamps::scope(scope.name, scope.begin, end));
+        self.timed_scopes.push(TimedScope { name, begin, end });
     }
 
     /// Timestamps left in this submission; a scope takes two.

@@ -1,6 +1,7 @@
 //! Modules whose lanes vote in a loop ask the device to bring them together again, where it offers that.
 
 use super::device::Reconvergence;
+use super::specialize::{HEADER_WORDS, instructions, opcode};
 
 /// Numbers of the SPIR-V specification, of SPV_KHR_maximal_reconvergence and SPV_KHR_subgroup_uniform_control_flow.
 const EXTENSION: u32 = 10;
@@ -9,7 +10,6 @@ const EXECUTION_MODE: u32 = 16;
 const CAPABILITY: u32 = 17;
 const SUBGROUP_UNIFORM_CONTROL_FLOW: u32 = 4421;
 const MAXIMALLY_RECONVERGES: u32 = 6023;
-const HEADER_WORDS: usize = 5;
 
 /// The module with the execution mode for its entry point.
 pub(super) fn reconverging(words: &[u32], offered: Reconvergence) -> Vec<u32> {
@@ -20,20 +20,16 @@ pub(super) fn reconverging(words: &[u32], offered: Reconvergence) -> Vec<u32> {
     };
     // Capabilities stand first, then extensions; execution modes follow the entry points.
     let mut result = words[..HEADER_WORDS].to_vec();
-    let mut at = HEADER_WORDS;
     let mut is_declared = false;
-    while at < words.len() {
-        let (opcode, length) = (words[at] & 0xffff, (words[at] >> 16) as usize);
-        let instruction = &words[at..at + length];
-        if opcode != CAPABILITY && !is_declared {
+    for instruction in instructions(words) {
+        if opcode(instruction) != CAPABILITY && !is_declared {
             is_declared = true;
             result.extend(with_text(EXTENSION, extension));
         }
         result.extend_from_slice(instruction);
-        if opcode == ENTRY_POINT {
+        if opcode(instruction) == ENTRY_POINT {
             result.extend([EXECUTION_MODE | 3 << 16, instruction[2], mode]);
         }
-        at += length;
     }
     result
 }

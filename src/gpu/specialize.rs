@@ -22,7 +22,7 @@ mod op {
     pub const BRANCH_CONDITIONAL: u32 = 250;
 }
 
-const HEADER_WORDS: usize = 5;
+pub(super) const HEADER_WORDS: usize = 5;
 /// Of the decoration that gives a constant the number by which it is specialized.
 const SPEC_ID: u32 = 1;
 
@@ -129,7 +129,7 @@ fn without_ways(words: &[u32], closed: &HashSet<(u32, u32)>) -> Vec<u32> {
     result
 }
 
-fn instructions(words: &[u32]) -> impl Iterator<Item = &[u32]> {
+pub(super) fn instructions(words: &[u32]) -> impl Iterator<Item = &[u32]> {
     let mut rest = &words[HEADER_WORDS..];
     std::iter::from_fn(move || {
         let length = (rest.first()? >> 16) as usize;
@@ -139,7 +139,7 @@ fn instructions(words: &[u32]) -> impl Iterator<Item = &[u32]> {
     })
 }
 
-fn opcode(instruction: &[u32]) -> u32 {
+pub(super) fn opcode(instruction: &[u32]) -> u32 {
     instruction[0] & 0xffff
 }
 

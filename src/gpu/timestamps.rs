@@ -14,8 +14,8 @@ pub(super) const QUERY_COUNT: u32 = 4096;
 /// A scope that began and ended in this submission.
 pub(super) struct TimedScope {
     pub(super) name: String,
-    begin: u32,
-    end: u32,
+    pub(super) begin: u32,
+    pub(super) end: u32,
 }
 
 pub(super) struct Timestamps {
@@ -75,10 +75,6 @@ impl Timestamps {
             unsafe { self.context.device.cmd_write_timestamp2(command_buffer, vk::PipelineStageFlags2::ALL_COMMANDS, self.pool, query) };
         }
         query
-    }
-
-    pub(super) fn scope(name: String, begin: u32, end: u32) -> TimedScope {
-        TimedScope { name, begin, end }
     }
 
     /// (start since the submission's first timestamp, duration) of each scope, once the submission

@@ -1,13 +1,33 @@
 //! Colour pictures: linear floats as EXR, or for the eye as PNG.
 
 use std::io::Cursor;
+use std::path::Path;
 
 use glam::Vec3;
 use image::codecs::openexr::OpenExrEncoder;
 use image::codecs::png::PngEncoder;
 use image::{ExtendedColorType, ImageEncoder};
 
-use super::image::Format;
+use crate::error::{Error, Result};
+
+/// File formats, by the name's extension.
+#[derive(Debug, Clone, Copy, PartialEq, Eq)]
+pub enum Format {
+    /// 8 bits, values from 0 to 1 as they are: the paper's illumination is a display value.
+    Png,
+    /// 32-bit floats, values not clamped.
+    Exr,
+}
+
+impl Format {
+    pub fn of(option: &'static str, path: &Path) -> Result<Format> {
+        match path.extension().and_then(|extension| extension.to_str()).map(str::to_lowercase).as_deref() {
+            Some("png") => Ok(Format::Png),
+            Some("exr") => Ok(Format::Exr),
+            _ => Err(Error::setting(option, path.display(), "must be a file name that ends in .png or .exr")),
+        }
+    }
+}
 
 /// Row by row from the top, linear scene-referred values.
 #[derive(Debug, Clone, PartialEq)]
@@ -54,18 +74,20 @@ pub fn exr(width: u32, height: u32, values: &[Vec3]) -> Vec<u8> {
 
 /// Linear values as 8-bit sRGB, clamped to 0 to 1.
 pub fn png(width: u32, height: u32, values: impl Iterator<Item = Vec3>) -> Vec<u8> {
-    eight_bits(width, height, values.map(|value| value.to_array().map(srgb_code)))
+    let codes: Vec<u8> = values.flat_map(|value| value.to_array().map(srgb_code)).collect();
+    eight_bits(width, height, ExtendedColorType::Rgb8, &codes)
 }
 
 /// Linear values as they are in 8 bits, clamped to 0 to 1.
 pub fn linear_png(width: u32, height: u32, values: impl Iterator<Item = Vec3>) -> Vec<u8> {
-    eight_bits(width, height, values.map(|value| value.to_array().map(|channel| (channel.clamp(0.0, 1.0) * 255.0).round() as u8)))
+    let codes: Vec<u8> = values.flat_map(|value| value.to_array().map(|channel| (channel.clamp(0.0, 1.0) * 255.0).round() as u8)).collect();
+    eight_bits(width, height, ExtendedColorType::Rgb8, &codes)
 }
 
-fn eight_bits(width: u32, height: u32, pixels: impl Iterator<Item = [u8; 3]>) -> Vec<u8> {
-    let bytes: Vec<u8> = pixels.flatten().collect();
+/// A PNG of codes, row by row.
+pub(super) fn eight_bits(width: u32, height: u32, kind: ExtendedColorType, codes: &[u8]) -> Vec<u8> {
     let mut file = Vec::new();
-    PngEncoder::new(&mut file).write_image(&bytes, width, height, ExtendedColorType::Rgb8).expect("a picture in memory can be encoded");
+    PngEncoder::new(&mut file).write_image(codes, width, height, kind).expect("a picture in memory can be encoded");
     file
 }
 
@@ -91,6 +113,13 @@ mod tests {
         for code in 0..=255 {
             assert_eq!(srgb_code(crate::scene::texture::linear_of_srgb(code)), code);
         }
+    }
+
+    #[test]
+    fn formats_follow_the_name() {
+        assert_eq!(Format::of("-o", Path::new("a.PNG")).unwrap(), Format::Png);
+        assert_eq!(Format::of("-o", Path::new("b/a.exr")).unwrap(), Format::Exr);
+        assert!(Format::of("-o", Path::new("a.jpg")).is_err());
     }
 
     #[test]

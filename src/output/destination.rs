@@ -74,19 +74,17 @@ impl Folder {
     pub fn open(option: &'static str, path: &Path) -> Result<Folder> {
         let folder = Folder { option, path: path.to_owned() };
         let refuse = |reason: String| Error::Output { option, path: path.to_owned(), reason };
-        if path.exists() && !path.is_dir() {
-            return Err(refuse("it is not a folder".into()));
-        }
-        if path == Path::new("-") {
-            return Err(refuse("it is standard output, and several files are written".into()));
-        }
-        if path.as_os_str().is_empty() {
-            return Err(refuse("it names no folder".into()));
+        let is_file = |path: &Path| path.exists() && !path.is_dir();
+        let faults = [
+            (is_file(path), "it is not a folder"),
+            (path == Path::new("-"), "it is standard output, and several files are written"),
+            (path.as_os_str().is_empty(), "it names no folder"),
+            (path.ancestors().any(is_file), "a part of its path is a file"),
+        ];
+        if let Some((_, fault)) = faults.iter().find(|(is_so, _)| *is_so) {
+            return Err(refuse((*fault).to_owned()));
         }
         let nearest = path.ancestors().find(|ancestor| ancestor.is_dir()).unwrap_or(Path::new("."));
-        if path.ancestors().any(|ancestor| ancestor.exists() && !ancestor.is_dir()) {
-            return Err(refuse("a part of its path is a file".into()));
-        }
         // A name that is too long is refused only by the folder that is to hold it, which may not be there yet.
         for name in path.iter().filter(|_| !path.exists()) {
             check_name(&nearest.join(name)).map_err(|error| refuse(error.kind().to_string()))?;

@@ -1,15 +1,10 @@
 //! The box as a picture, like the paper's figures: the walls unfolded, and seen from several angles.
 
-use std::io::Cursor;
-use std::path::Path;
+use glam::{DVec3, Vec3};
+use image::ExtendedColorType;
 
-use glam::DVec3;
-use image::codecs::openexr::OpenExrEncoder;
-use image::codecs::png::PngEncoder;
-use image::{ExtendedColorType, ImageEncoder};
-
+use super::colour::{Format, eight_bits, exr};
 use crate::engine::room::film::WallEstimate;
-use crate::error::{Error, Result};
 use crate::scene::rectangle::Rectangle;
 use crate::scene::room::{RoomScene, face_axis};
 
@@ -19,25 +14,6 @@ pub struct Picture {
     pub width: usize,
     pub height: usize,
     pub values: Vec<f64>,
-}
-
-/// File formats, by the name's extension.
-#[derive(Debug, Clone, Copy, PartialEq, Eq)]
-pub enum Format {
-    /// 8 bits, values from 0 to 1 as they are: the paper's illumination is a display value.
-    Png,
-    /// 32-bit floats, values not clamped.
-    Exr,
-}
-
-impl Format {
-    pub fn of(option: &'static str, path: &Path) -> Result<Format> {
-        match path.extension().and_then(|extension| extension.to_str()).map(str::to_lowercase).as_deref() {
-            Some("png") => Ok(Format::Png),
-            Some("exr") => Ok(Format::Exr),
-            _ => Err(Error::setting(option, path.display(), "must be a file name that ends in .png or .exr")),
-        }
-    }
 }
 
 /// A wall's texels as a function of position.
@@ -208,24 +184,14 @@ impl Picture {
 
     /// The file's bytes.
     pub fn encode(&self, format: Format) -> Vec<u8> {
+        let (width, height) = (self.width as u32, self.height as u32);
         match format {
             Format::Png => {
-                let bytes: Vec<u8> = self.values.iter().map(|value| (value.clamp(0.0, 1.0) * 255.0).round() as u8).collect();
-                let mut file = Vec::new();
-                PngEncoder::new(&mut file)
-                    .write_image(&bytes, self.width as u32, self.height as u32, ExtendedColorType::L8)
-                    .expect("a picture in memory can be encoded");
-                file
+                let code = |value: &f64| (value.clamp(0.0, 1.0) * 255.0).round() as u8;
+                eight_bits(width, height, ExtendedColorType::L8, &self.values.iter().map(code).collect::<Vec<u8>>())
             }
-            Format::Exr => {
-                // Grey as three equal channels, which every reader of EXR shows.
-                let bytes: Vec<u8> = self.values.iter().flat_map(|value| [*value as f32; 3]).flat_map(f32::to_ne_bytes).collect();
-                let mut file = Cursor::new(Vec::new());
-                OpenExrEncoder::new(&mut file)
-                    .write_image(&bytes, self.width as u32, self.height as u32, ExtendedColorType::Rgb32F)
-                    .expect("a picture in memory can be encoded");
-                file.into_inner()
-            }
+            // Grey as three equal channels, which every reader of EXR shows.
+            Format::Exr => exr(width, height, &self.values.iter().map(|value| Vec3::splat(*value as f32)).collect::<Vec<Vec3>>()),
         }
     }
 }
@@ -262,13 +228,6 @@ mod tests {
         let front = perspective(&scene, &walls, VIEWS[0], 64);
         let at = |i: usize, j: usize| (front.values[j * 64 + i] * 10.0).round() as usize;
         assert_eq!([at(32, 32), at(8, 32), at(55, 32), at(32, 55), at(32, 8)], [5, 1, 2, 3, 4]);
-    }
-
-    #[test]
-    fn formats_follow_the_name() {
-        assert_eq!(Format::of("-o", Path::new("a.PNG")).unwrap(), Format::Png);
-        assert_eq!(Format::of("-o", Path::new("b/a.exr")).unwrap(), Format::Exr);
-        assert!(Format::of("-o", Path::new("a.jpg")).is_err());
     }
 
     #[test]

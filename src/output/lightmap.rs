@@ -2,8 +2,9 @@
 
 use serde::Serialize;
 
+use super::colour::Format;
 use super::destination::{Destination, Folder};
-use super::image::{Format, Picture};
+use super::image::Picture;
 use crate::engine::room::film::WallEstimate;
 use crate::scene::room::RoomScene;
 
@@ -36,18 +37,15 @@ struct WallLayout<'a> {
 
 /// Files of a lightmap, before there is any content.
 pub fn destinations(folder: &Folder, scene: &RoomScene) -> Vec<Destination> {
-    let walls = scene.walls().flat_map(|(_, wall)| [folder.file(&image_name(wall.name)), folder.file(&error_name(wall.name))]);
+    let walls = scene.walls().flat_map(|(_, wall)| names(wall.name)).map(|name| folder.file(&name));
     walls.chain([folder.file(LAYOUT)]).collect()
 }
 
 const LAYOUT: &str = "layout.json";
 
-fn image_name(wall: &str) -> String {
-    format!("{wall}.exr")
-}
-
-fn error_name(wall: &str) -> String {
-    format!("{wall}-error.exr")
+/// Files of a wall: its values, and their standard errors.
+fn names(wall: &str) -> [String; 2] {
+    [format!("{wall}.exr"), format!("{wall}-error.exr")]
 }
 
 /// `<wall>.exr` and `<wall>-error.exr` for every wall, and `layout.json`.
@@ -61,12 +59,13 @@ pub fn files(folder: &Folder, quantity: Quantity, scene: &RoomScene, walls: &[Wa
         };
         let mesh = values.len().isqrt();
         let picture = |values: Vec<f64>| Picture { width: mesh, height: mesh, values }.encode(Format::Exr);
-        files.push((folder.file(&image_name(wall.name)), picture(values.clone())));
-        files.push((folder.file(&error_name(wall.name)), picture(errors.clone())));
+        let [file, error_file] = names(wall.name);
+        files.push((folder.file(&file), picture(values.clone())));
+        files.push((folder.file(&error_file), picture(errors.clone())));
         let rectangle = scene.rectangle(wall.face);
         layout.walls.push(WallLayout {
             name: wall.name,
-            file: image_name(wall.name),
+            file,
             origin: rectangle.origin.to_array(),
             u: rectangle.u.to_array(),
             v: rectangle.v.to_array(),

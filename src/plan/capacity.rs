@@ -4,7 +4,7 @@
 use serde::Serialize;
 
 use crate::constants::{LOOP_LIMIT, MT_MIDDLE};
-use crate::error::{Error, Result};
+use crate::error::{Result, require};
 use crate::path::StoredPath;
 use crate::photon::{Origin, StoredPhoton};
 use crate::rng::Rng;
@@ -52,45 +52,23 @@ impl Limits {
 
     /// Refuses a builder that the device cannot run.
     pub fn check_builder(&self, builder: Builder) -> Result<()> {
-        if builder == Builder::Persistent && !self.votes_in_loops {
-            let why = "needs the lanes of a subgroup to vote together in a loop, which this device's start-up check found wrong; choose another builder, or auto";
-            return Err(Error::setting("--variant", builder.name(), why));
-        }
-        Ok(())
+        let why = "needs the lanes of a subgroup to vote together in a loop, which this device's start-up check found wrong; choose another builder, or auto";
+        require(builder != Builder::Persistent || self.votes_in_loops, "--variant", builder.name(), why)
     }
 
-    /// Pair tests a tenth of a second by kind of device: a slow one of its kind does 2^36 (discrete),
-    /// 2^33 (integrated) or 2^28 (CPU; lavapipe on two cores) a second.
-    pub fn pair_tests_of(kind: &str) -> u64 {
-        match kind {
-            "discrete" => 1 << 33,
-            "cpu" => 1 << 25,
-            _ => 1 << 30,
-        }
-    }
-
-    /// Loop iterations by kind of device: lavapipe leaves loops early, others only after seconds.
-    pub fn loop_iterations_of(kind: &str) -> u32 {
-        if kind == "cpu" { LOOP_LIMIT } else { 1 << 20 }
-    }
-
-    /// Invocations that read together by kind of device: a software device's lanes each read on their own.
-    pub fn lanes_of(kind: &str) -> u32 {
-        if kind == "cpu" { 1 } else { 32 }
-    }
-
-    /// Counters by kind of device: a software device's cores add to one as fast as to many.
-    pub fn counters_of(kind: &str) -> u32 {
-        if kind == "cpu" { 1 } else { 8 }
-    }
-
-    /// Invocations that keep a device of a kind busy: half of what a large GPU holds at a time.
-    pub fn busy_invocations_of(kind: &str) -> u32 {
-        match kind {
-            "discrete" => 1 << 17,
-            "cpu" => 1 << 10,
-            _ => 1 << 14,
-        }
+    /// What a device of a kind is good for; its buffers are as the host's, until the device is asked.
+    pub fn of_kind(kind: &str) -> Limits {
+        // Pair tests a tenth of a second: a slow device of its kind does 2^36 (discrete), 2^33 (integrated) or 2^28 (CPU; lavapipe
+        // on two cores) a second. Half of the invocations that a large GPU holds at a time keep a device busy.
+        let (pair_tests_per_submission, busy_invocations) = match kind {
+            "discrete" => (1 << 33, 1 << 17),
+            "cpu" => (1 << 25, 1 << 10),
+            _ => (1 << 30, 1 << 14),
+        };
+        // Lavapipe leaves loops early, others only after seconds; a software device's lanes each read on their own, and its cores
+        // add to one counter as fast as to many.
+        let (loop_iterations, lanes, counters) = if kind == "cpu" { (LOOP_LIMIT, 1, 1) } else { (1 << 20, 32, 8) };
+        Limits { pair_tests_per_submission, busy_invocations, loop_iterations, lanes, counters, ..Limits::of_host() }
     }
 }
 
@@ -256,16 +234,11 @@ pub fn chunk_photons(settings: &RoomSettings, limits: &Limits, work: &Work) -> R
     // A chunk may hold one photon more than its share of each of the two lights, and gaps up to the end of a work group.
     let has_gaps = counters(settings, limits, fits.min(u64::from(settings.photons)) as u32) > 1;
     let spare = 2 + if has_gaps { u64::from(settings.group_size) } else { 0 };
-    if fits < 2 + spare {
-        return Err(Error::setting(
-            "--bounces",
-            settings.bounces,
-            format!("the hits of two photons exceed the device's largest buffer, {} bytes; ask for fewer bounces", limits.buffer_bytes),
-        ));
-    }
-    if settings.group_size > limits.group_size {
-        return Err(Error::setting("--group-size", settings.group_size, format!("must be at most {} on this device", limits.group_size)));
-    }
+    let too_many =
+        format!("the hits of two photons exceed the device's largest buffer, {} bytes; ask for fewer bounces", limits.buffer_bytes);
+    require(fits >= 2 + spare, "--bounces", settings.bounces, too_many)?;
+    let most = format!("must be at most {} on this device", limits.group_size);
+    require(settings.group_size <= limits.group_size, "--group-size", settings.group_size, most)?;
     // A point's tests are not split further than by work group, nor a chunk by Ctrl-C; who asks for
     // larger chunks gets them.
     let budget = limits.pair_tests_per_submission as f64;
@@ -276,12 +249,10 @@ pub fn chunk_photons(settings: &RoomSettings, limits: &Limits, work: &Work) -> R
     if let Some(nearest) = settings.nearest {
         // The nearest photons of parts of a round are not those of the round.
         let (photons, room) = (u64::from(settings.photons), fits - spare);
-        if photons > room {
-            let allowed = format!(
-                "searches the {photons} photons of a round at once, but the device holds at most {room}; ask for fewer photons and more rounds"
-            );
-            return Err(Error::setting("--nearest", nearest, allowed));
-        }
+        let most = format!(
+            "searches the {photons} photons of a round at once, but the device holds at most {room}; ask for fewer photons and more rounds"
+        );
+        require(photons <= room, "--nearest", nearest, most)?;
         return Ok(settings.photons);
     }
     let wanted = settings.chunk.map_or(by_time, u64::from);

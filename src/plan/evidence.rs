@@ -89,9 +89,14 @@ impl<'a> Facts<'a> {
         let glass = self.named(|material| matches!(material.surface, Surface::Dielectric { .. }));
         // Photons are of use where something scatters them to a sensor.
         let receives = !self.is_picture || self.has(|surface| !surface.is_specular());
-        let lights = |kind: u32, what: &str| match self.emitters[kind as usize] {
-            0 => (false, format!("no {what} light")),
-            count => (true, counted(count, &format!("{what} light"))),
+        let some = |count: usize, what: &str| match count {
+            0 => (false, format!("no {what}")),
+            count => (true, counted(count, what)),
+        };
+        let lights = |kind: u32, what: &str| some(self.emitters[kind as usize], &format!("{what} light"));
+        let found = |what: &str, is: &dyn Fn(&Material) -> bool, absent: &str| match self.named(is) {
+            Some(names) => (true, format!("{what}: {names}")),
+            None => (false, absent.to_owned()),
         };
         let caustic = |found: &Option<String>, what: &str| match found {
             None => (false, format!("no {what} material")),
@@ -114,55 +119,31 @@ impl<'a> Facts<'a> {
             Effect::Indirect if !lit => (false, "no light source".into()),
             Effect::Indirect if !receives => (false, "no diffuse or glossy surface".into()),
             Effect::Indirect if !wants(Part::Indirect) => (false, format!("only {:?} light was asked for", self.part).to_lowercase()),
-            Effect::Indirect => match self.named(|material| !material.surface.is_specular() && material.base_colour.max_element() > 0.0) {
-                Some(names) => (true, format!("diffuse or glossy: {names}")),
-                None => (false, "every diffuse or glossy surface is black".into()),
-            },
-            Effect::Glossy => match self.named(|material| matches!(material.surface, Surface::Glossy { .. })) {
-                Some(names) => (true, format!("glossy: {names}")),
-                None => (false, "no glossy material".into()),
-            },
-            Effect::ReflectiveCaustics => {
-                let both = match (&mirrors, &glass) {
-                    (Some(mirrors), _) => Some(mirrors.clone()),
-                    (None, _) => None,
-                };
-                caustic(&both, "mirror")
+            Effect::Indirect => {
+                let is_bright = |material: &Material| !material.surface.is_specular() && material.base_colour.max_element() > 0.0;
+                found("diffuse or glossy", &is_bright, "every diffuse or glossy surface is black")
             }
+            Effect::Glossy => found("glossy", &|material| matches!(material.surface, Surface::Glossy { .. }), "no glossy material"),
+            Effect::ReflectiveCaustics => caustic(&mirrors, "mirror"),
             Effect::RefractiveCaustics => caustic(&glass, "dielectric"),
-            Effect::SpecularChains => {
-                let found = self.named(|material| material.surface.is_specular());
-                match found {
-                    None => (false, "no mirror and no dielectric material".into()),
-                    Some(names) => (true, format!("specular: {names}")),
-                }
-            }
+            Effect::SpecularChains => found("specular", &|material| material.surface.is_specular(), "no mirror and no dielectric material"),
             Effect::Textures => {
-                match self.named(|material| material.base_colour_texture.is_some() || material.emission_texture.is_some()) {
-                    Some(names) => (true, format!("textured: {names}")),
-                    None => (false, "no textured material".into()),
-                }
+                let is_textured = |of: &Material| of.base_colour_texture.is_some() || of.emission_texture.is_some();
+                found("textured", &is_textured, "no textured material")
             }
             Effect::Environment => lights(EMITTER_ENVIRONMENT, "environment"),
-            Effect::MeshLights => match self.emitters[EMITTER_TRIANGLE as usize] {
-                0 => (false, "no emissive triangle".into()),
-                count => (true, counted(count, "emissive triangle")),
-            },
+            Effect::MeshLights => some(self.emitters[EMITTER_TRIANGLE as usize], "emissive triangle"),
             Effect::PointLights => lights(EMITTER_POINT, "point"),
             Effect::SpotLights => lights(EMITTER_SPOT, "spot"),
             Effect::DirectionalLights => lights(EMITTER_DIRECTIONAL, "directional"),
-            Effect::DiscLights => match self.emitters[EMITTER_DISC_COSINE as usize] + self.emitters[EMITTER_DISC_UNIFORM as usize] {
-                0 => (false, "no disc light".into()),
-                count => (true, counted(count, "disc light")),
-            },
+            Effect::DiscLights => {
+                some(self.emitters[EMITTER_DISC_COSINE as usize] + self.emitters[EMITTER_DISC_UNIFORM as usize], "disc light")
+            }
             Effect::Bvh if self.triangles <= LIST_TRIANGLES => {
                 (false, format!("only {}: testing each of them is as fast", counted(self.triangles, "triangle")))
             }
             Effect::Bvh => (true, counted(self.triangles, "triangle")),
-            Effect::TwoSided => match self.named(|material| material.two_sided) {
-                Some(names) => (true, format!("two-sided: {names}")),
-                None => (false, "no two-sided material".into()),
-            },
+            Effect::TwoSided => found("two-sided", &|material| material.two_sided, "no two-sided material"),
             Effect::SmoothNormals if self.smooth == 0 => (false, "no smooth normals".into()),
             Effect::SmoothNormals => (true, format!("{} with smooth normals", counted(self.smooth, "triangle"))),
         }

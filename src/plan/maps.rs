@@ -6,7 +6,7 @@ use super::capacity::{self, Persistence};
 use super::radius::{FirstRadius, Trial};
 use super::scene::{MapPlan, SEGMENT_BOUNCES};
 use crate::constants::*;
-use crate::error::{Error, Result};
+use crate::error::{Result, require};
 use crate::photon::MapPhoton;
 use crate::records::{CausticTarget, LightPath};
 use crate::scene::geometry::Geometry;
@@ -51,62 +51,38 @@ impl Maps {
         let caustic_surfaces = (u32::from(keeps(Effect::ReflectiveCaustics)) << SURFACE_MIRROR)
             | (u32::from(keeps(Effect::RefractiveCaustics)) << SURFACE_DIELECTRIC);
         let caustics = caustic_surfaces != 0;
-        let stored = [
-            (keeps(Effect::Direct) && !split, ARRIVED_DIRECT),
-            (caustics && !split, ARRIVED_CAUSTIC),
-            (keeps(Effect::Indirect), ARRIVED_INDIRECT),
-        ]
-        .iter()
-        .map(|(kept, arrival)| if *kept { *arrival } else { 0 })
-        .sum::<u32>();
+        let of = |is_kept: bool, arrival: u32| if is_kept { arrival } else { 0 };
+        let stored = of(keeps(Effect::Direct) && !split, ARRIVED_DIRECT)
+            | of(caustics && !split, ARRIVED_CAUSTIC)
+            | of(keeps(Effect::Indirect), ARRIVED_INDIRECT);
 
         let landings = expected_landings(scene, settings.bounces);
-        let map = |kind: Kind| map(kind, geometry, settings, limits, trial, landings);
+        let map = |caustic_only, stored| map(caustic_only, stored, geometry, settings, limits, trial, landings);
         // Without a light there is nothing to trace.
         let has_light = !geometry.emitters.is_empty();
-        let global = Kind {
-            name: "global",
-            domain: DOMAIN_PHOTONS,
-            photons: settings.photons,
-            stored,
-            caustic_only: false,
-            radius: ("--radius", settings.radius),
-        };
-        let caustic = Kind {
-            name: "caustic",
-            domain: DOMAIN_CAUSTIC_PHOTONS,
-            photons: settings.caustic_photons,
-            stored: ARRIVED_CAUSTIC,
-            caustic_only: true,
-            radius: ("--caustic-radius", settings.caustic_radius),
-        };
-        let global = (has_light && stored != 0).then(|| map(global)).transpose()?;
-        let mut caustic = (has_light && split && caustics).then(|| map(caustic)).transpose()?;
+        let global = (has_light && stored != 0).then(|| map(false, stored)).transpose()?;
+        let mut caustic = (has_light && split && caustics).then(|| map(true, ARRIVED_CAUSTIC)).transpose()?;
         let targets = caustic.as_mut().filter(|_| settings.aim).map_or_else(Vec::new, |map| aim(map, geometry, caustic_surfaces));
         let arrivals = stored | if caustic.is_some() { ARRIVED_CAUSTIC } else { 0 };
         Ok(Maps { global, caustic, caustic_surfaces, targets, arrivals })
     }
 }
 
-/// What tells the global map from the caustic map.
-struct Kind {
-    name: &'static str,
-    domain: u32,
-    photons: u32,
-    stored: u32,
-    caustic_only: bool,
-    /// The option that gives it, and what it gives in metres.
-    radius: (&'static str, Option<f64>),
-}
-
+/// The global map, or the caustic map.
 fn map(
-    Kind { name, domain, photons, stored, caustic_only, radius }: Kind,
+    caustic_only: bool,
+    stored: u32,
     geometry: &Geometry,
     settings: &SceneSettings,
     limits: &Limits,
     trial: Option<&Trial>,
     landings_of_each: f64,
 ) -> Result<MapPlan> {
+    let (name, domain, photons, radius) = if caustic_only {
+        ("caustic", DOMAIN_CAUSTIC_PHOTONS, settings.caustic_photons, ("--caustic-radius", settings.caustic_radius))
+    } else {
+        ("global", DOMAIN_PHOTONS, settings.photons, ("--radius", settings.radius))
+    };
     let FirstRadius { radius, from, expected } = FirstRadius::new(geometry, photons, caustic_only, radius, trial)?;
     // Photons of a round land once at every bounce at most; a caustic's only once.
     let landings = if caustic_only { 1 } else { u64::from(settings.bounces.min(SEGMENT_BOUNCES)) };
@@ -175,12 +151,8 @@ fn chunk_photons(photons: u32, landings: u64, settings: &SceneSettings, limits: 
     // Two maps of a chunk, sorted and unsorted, and its paths twice, with room for the film.
     let by_memory = limits.memory_bytes / 2 / (4 * photon * landings + 4 * path);
     let fits = by_buffer.min(by_memory).min(u64::from(u32::MAX) / landings);
-    if fits == 0 {
-        return Err(Error::setting(
-            "--bounces",
-            settings.bounces,
-            format!("the hits of one photon exceed the device's largest buffer, {} bytes; ask for fewer bounces", limits.buffer_bytes),
-        ));
-    }
+    let too_many =
+        format!("the hits of one photon exceed the device's largest buffer, {} bytes; ask for fewer bounces", limits.buffer_bytes);
+    require(fits > 0, "--bounces", settings.bounces, too_many)?;
     Ok(fits.min(settings.chunk.map_or(u64::MAX, u64::from)).min(u64::from(photons)) as u32)
 }

@@ -11,7 +11,7 @@ use super::radius::Trial;
 use super::scene::{MapPlan, SEGMENT_BOUNCES, ScenePlan};
 use super::sensor::Sensor;
 use crate::constants::*;
-use crate::error::{Error, Result};
+use crate::error::{Error, Result, require};
 use crate::photon::MapPhoton;
 use crate::scene::geometry::Geometry;
 use crate::scene::{Scene, Surface};
@@ -43,14 +43,9 @@ impl ScenePlan {
     ) -> Result<ScenePlan> {
         let began = Instant::now();
         settings.validate()?;
-        if settings.leaves_out(Effect::Bvh) && geometry.triangles.len() > MAX_LIST_TRIANGLES {
-            let count = geometry.triangles.len();
-            return Err(Error::setting(
-                "--without",
-                "bvh",
-                format!("is for scenes of {MAX_LIST_TRIANGLES} triangles at most, and this one has {count}"),
-            ));
-        }
+        let count = geometry.triangles.len();
+        let few = format!("is for scenes of {MAX_LIST_TRIANGLES} triangles at most, and this one has {count}");
+        require(!settings.leaves_out(Effect::Bvh) || count <= MAX_LIST_TRIANGLES, "--without", "bvh", few)?;
         let facts = Facts::new(scene, geometry, settings, sensor);
         let decisions: Vec<EffectDecision> = Effect::ALL.iter().map(|effect| facts.decide(*effect, settings)).collect();
         let keeps = |effect: Effect| decisions.iter().any(|decision| decision.effect == effect && decision.kept);
@@ -142,17 +137,11 @@ impl ScenePlan {
             });
         }
         self.bytes = bytes_of(&self.buffers(geometry));
-        if self.bytes > limits.memory_bytes {
-            return Err(Error::setting(
-                "--chunk",
-                self.settings.chunk.map_or("(default)".into(), |chunk| chunk.to_string()),
-                format!(
-                    "the run needs {} bytes of device memory, but the device has {}; ask for smaller chunks or a smaller picture",
-                    self.bytes, limits.memory_bytes
-                ),
-            ));
-        }
-        Ok(())
+        let chunk = self.settings.chunk.map_or("(default)".into(), |chunk| chunk.to_string());
+        let (bytes, most) = (self.bytes, limits.memory_bytes);
+        let too_much =
+            format!("the run needs {bytes} bytes of device memory, but the device has {most}; ask for smaller chunks or a smaller picture");
+        require(bytes <= most, "--chunk", chunk, too_much)
     }
 
     fn aim_in_words(&self) -> String {
@@ -217,14 +206,14 @@ fn constants(
         ("HAS_DISC_LIGHTS", flag(Effect::DiscLights)),
         ("HAS_ENVIRONMENT", flag(Effect::Environment)),
         ("PARANOID", u32::from(settings.paranoid)),
-        ("STRICT_MATH", settings.math.code()),
+        ("STRICT_MATH", settings.math as u32),
         ("SHADOW_RAYS", shadow_rays),
-        ("KERNEL", settings.kernel.code()),
+        ("KERNEL", settings.kernel as u32),
         ("HAS_EDGE_CORRECTION", u32::from(settings.edge_correction)),
         ("HAS_CAUSTIC_MAP", u32::from(maps.caustic.is_some())),
         ("HAS_ALL_ARRIVALS", u32::from(!split)),
-        ("PARTS", settings.part.mask()),
-        ("FILTER", settings.filter.code()),
+        ("PARTS", settings.part as u32),
+        ("FILTER", settings.filter as u32),
         ("HAS_SPECULAR_CHAINS", flag(Effect::SpecularChains)),
         ("HAS_SLOTS", u32::from(settings.builder == Some(Builder::Naive))),
         ("HAS_AIMED_PHOTONS", u32::from(!maps.targets.is_empty())),

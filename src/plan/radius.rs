@@ -6,7 +6,7 @@ use std::f64::consts::PI;
 use serde::Serialize;
 use statrs::function::gamma::ln_gamma;
 
-use crate::error::{Error, Result};
+use crate::error::{Result, require};
 use crate::scene::geometry::Geometry;
 
 /// Where the radius of a map's first round comes from.
@@ -76,9 +76,7 @@ impl FirstRadius {
             });
         };
         let (least, most) = (RADIUS_RANGE.0 * geometry.unit, RADIUS_RANGE.1 * geometry.unit);
-        if !(least..=most).contains(&metres) {
-            return Err(Error::setting(option, metres, format!("must be from {least:e} to {most} metres in this scene")));
-        }
+        require((least..=most).contains(&metres), option, metres, format!("must be from {least:e} to {most} metres in this scene"))?;
         let radius = metres / geometry.unit;
         Ok(FirstRadius { radius, from: RadiusFrom::User, expected: by_area(radius) })
     }

@@ -8,7 +8,7 @@ use serde::Serialize;
 use super::capacity::{self, Limits, Persistence, Work};
 use super::room_effects::{self as effect, Decision};
 use crate::constants::{COUNTER_STRIDE, NEAREST_BITS, NEAREST_GAIN_BITS};
-use crate::error::{Error, Result};
+use crate::error::{Result, require};
 use crate::photon::StoredPhoton;
 use crate::records::{IndexPush, Point};
 use crate::rng::Streams;
@@ -129,11 +129,10 @@ impl RoomPlan {
         let film_shift = if channel_count == 1 && settings.nearest.is_none() { 0 } else { film_shift(settings) };
 
         let faintest = relative_flux.iter().fold(1.0f32, |a, b| a.min(*b));
-        if channel_count == 2 && f64::from(faintest) * ((1u64 << film_shift) as f64) < MIN_FIXED_POINT {
-            let [floor, left] = settings.light_power;
-            let allowed = "differ too much for the film's integer sums over so many photons; choose closer values, or ask for fewer photons * rounds * bounces";
-            return Err(Error::setting("--light-power", format!("{floor},{left}"), allowed));
-        }
+        let is_seen = channel_count == 1 || f64::from(faintest) * ((1u64 << film_shift) as f64) >= MIN_FIXED_POINT;
+        let [floor, left] = settings.light_power;
+        let allowed = "differ too much for the film's integer sums over so many photons; choose closer values, or ask for fewer photons * rounds * bounces";
+        require(is_seen, "--light-power", format!("{floor},{left}"), allowed)?;
 
         let points: Vec<Point> = scene
             .walls()
@@ -346,7 +345,7 @@ mod tests {
         };
         assert_eq!([1000, (1 << 21) - 1, 1 << 21, 1 << 24].map(|photons| counters(photons, Builder::Atomic, None)), [1, 1, 8, 8]);
         assert_eq!([1, 4, 64].map(|number| counters(1000, Builder::Atomic, Some(number))), [1, 4, 64]);
-        for builder in Builder::all().filter(|builder| *builder != Builder::Atomic) {
+        for builder in Builder::ALL.into_iter().filter(|builder| *builder != Builder::Atomic) {
             assert_eq!([None, Some(4)].map(|number| counters(1 << 21, builder, number)), [1, 1], "{builder:?}");
         }
     }

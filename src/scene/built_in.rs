@@ -2,12 +2,10 @@
 
 use glam::{DVec3, Vec3};
 
-use super::closed_forms;
 use super::light::{Light, LightKind};
 use super::material::{Material, Surface};
-use super::open_box;
 use super::room::face_axis;
-use super::{Camera, Mesh, Scene};
+use super::{Camera, Mesh, Scene, closed_forms, open_box};
 use crate::settings::{Preset, RoomSettings};
 
 /// Every built-in scene, those of [`closed_forms`] last.

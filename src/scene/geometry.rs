@@ -68,6 +68,10 @@ const MAX_EMITTERS: usize = 1 << 22;
 /// Values that a random choice of emitter can take.
 const CHOICES: u32 = 1 << 24;
 
+fn refuse(scene: &Scene, object: &str, reason: String) -> Error {
+    Error::Scene { path: (&scene.name).into(), object: object.into(), reason }
+}
+
 impl Geometry {
     pub fn new(scene: &Scene) -> Result<Geometry> {
         Geometry::new_with(scene, &mut |_, _| {})
@@ -75,18 +79,17 @@ impl Geometry {
 
     /// The same, with reports of how far it has come.
     pub fn new_with(scene: &Scene, progress: Progress) -> Result<Geometry> {
-        let refuse = |object: &str, reason: String| Error::Scene { path: (&scene.name).into(), object: object.into(), reason };
         let count = scene.triangle_count();
         if count == 0 {
-            return Err(refuse("the scene", "holds no triangle".into()));
+            return Err(refuse(scene, "the scene", "holds no triangle".into()));
         }
         if count > MAX_TRIANGLES {
-            return Err(refuse("the scene", format!("holds {count} triangles, at most {MAX_TRIANGLES} can be numbered")));
+            return Err(refuse(scene, "the scene", format!("holds {count} triangles, at most {MAX_TRIANGLES} can be numbered")));
         }
         let (min, max) = scene.bounds();
         let extent = (max - min).max_element();
         if !(extent.is_normal() && extent < 1e30) {
-            return Err(refuse("the scene", format!("is {extent} metres wide; allowed is anything above 0 and below 1e30")));
+            return Err(refuse(scene, "the scene", format!("is {extent} metres wide; allowed is anything above 0 and below 1e30")));
         }
         let centre = 0.5 * (min + max);
         let unit = 2f64.powi(extent.log2().ceil() as i32);
@@ -134,7 +137,7 @@ impl Geometry {
         corners.retain(|_| *of_corners.next().expect("one for each"));
         let left_out = count - corners.len();
         if corners.is_empty() {
-            return Err(refuse("the scene", "holds no triangle with an area".into()));
+            return Err(refuse(scene, "the scene", "holds no triangle with an area".into()));
         }
         progress("looking for overlaps", 0.0);
         let mut planes = Planes::of(&corners);
@@ -266,14 +269,10 @@ impl Geometry {
             }
             let emitter = self.emitter_of(&light.kind);
             if !(emitter.emitter.strength.is_finite() && emitter.weight.is_finite() && emitter.emitter.position.is_finite()) {
-                return Err(Error::Scene {
-                    path: (&scene.name).into(),
-                    object: light.name.clone(),
-                    reason: format!(
-                        "leaves the range of numbers: the scene is {} metres wide, which its strength or place does not fit",
-                        self.unit
-                    ),
-                });
+                let wide = self.unit;
+                let reason =
+                    format!("leaves the range of numbers: the scene is {wide} metres wide, which its strength or place does not fit");
+                return Err(refuse(scene, &light.name, reason));
             }
             found.push(emitter);
         }
@@ -281,11 +280,8 @@ impl Geometry {
         found.push(self.emitter_of(&LightKind::Environment { radiance: sky }));
         found.retain(|found| found.weight > 0.0);
         if found.len() > MAX_EMITTERS {
-            return Err(Error::Scene {
-                path: (&scene.name).into(),
-                object: "the scene".into(),
-                reason: format!("has {} triangles and lights that shine, at most {MAX_EMITTERS} can be chosen from", found.len()),
-            });
+            let reason = format!("has {} triangles and lights that shine, at most {MAX_EMITTERS} can be chosen from", found.len());
+            return Err(refuse(scene, "the scene", reason));
         }
         self.power = found.iter().map(|found| found.weight).sum();
         let choices = choices(&found.iter().map(|found| found.weight / self.power).collect::<Vec<_>>());
@@ -306,19 +302,17 @@ impl Geometry {
 
     fn emitter_of(&self, kind: &LightKind) -> Found {
         let area_unit = self.unit * self.unit;
-        let (emitter, flux) = match *kind {
+        let (own, flux) = match *kind {
             LightKind::Point { position, intensity } => {
                 let strength = intensity.as_dvec3() / area_unit;
-                let emitter =
-                    Emitter { kind: EMITTER_POINT, position: self.to_local(position), strength: strength.as_vec3(), ..Emitter::default() };
-                (emitter, 2.0 * TAU * strength)
+                let own = Emitter { position: self.to_local(position), strength: strength.as_vec3(), ..Emitter::default() };
+                (own, 2.0 * TAU * strength)
             }
             LightKind::Spot { position, direction, intensity, inner_angle, outer_angle } => {
                 let strength = intensity.as_dvec3() / area_unit;
                 // f32 holds a solid angle of so much, and its inverse.
                 let (inner, outer) = (versine(inner_angle), versine(outer_angle).max(1e-36));
-                let emitter = Emitter {
-                    kind: EMITTER_SPOT,
+                let own = Emitter {
                     position: self.to_local(position),
                     direction: direction.as_vec3(),
                     strength: strength.as_vec3(),
@@ -327,36 +321,34 @@ impl Geometry {
                     ..Emitter::default()
                 };
                 // The square of a falloff that is linear in the cosine has a third of the ring's light.
-                (emitter, TAU * (inner + (outer - inner) / 3.0) * strength)
+                (own, TAU * (inner + (outer - inner) / 3.0) * strength)
             }
             LightKind::Directional { direction, irradiance } => {
-                let emitter =
-                    Emitter { kind: EMITTER_DIRECTIONAL, direction: direction.as_vec3(), strength: irradiance, ..Emitter::default() };
-                (emitter, PI * self.radius * self.radius * irradiance.as_dvec3())
+                let own = Emitter { direction: direction.as_vec3(), strength: irradiance, ..Emitter::default() };
+                (own, PI * self.radius * self.radius * irradiance.as_dvec3())
             }
             LightKind::Disc { centre, normal, radius, power, law } => {
                 let flux = power.as_dvec3() / area_unit;
                 let radius = radius / self.unit;
                 let disc = PI * radius * radius;
-                let (kind, strength) = match law {
-                    EmissionLaw::Cosine => (EMITTER_DISC_COSINE, flux / (PI * disc)),
-                    EmissionLaw::Uniform => (EMITTER_DISC_UNIFORM, flux / (TAU * disc)),
+                let strength = match law {
+                    EmissionLaw::Cosine => flux / (PI * disc),
+                    EmissionLaw::Uniform => flux / (TAU * disc),
                 };
-                let emitter = Emitter {
-                    kind,
+                let own = Emitter {
                     position: self.to_local(centre),
                     direction: normal.as_vec3(),
                     strength: strength.as_vec3(),
                     size: radius as f32,
                     ..Emitter::default()
                 };
-                (emitter, flux)
+                (own, flux)
             }
             LightKind::Environment { radiance } => {
-                let emitter = Emitter { kind: EMITTER_ENVIRONMENT, strength: radiance, ..Emitter::default() };
-                (emitter, 2.0 * TAU * PI * self.radius * self.radius * radiance.as_dvec3())
+                (Emitter { strength: radiance, ..Emitter::default() }, 2.0 * TAU * PI * self.radius * self.radius * radiance.as_dvec3())
             }
         };
+        let emitter = Emitter { kind: kind.code(), ..own };
         Found { emitter, flux, weight: flux.element_sum(), brightest: 1.0 }
     }
 

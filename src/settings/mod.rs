@@ -2,6 +2,25 @@
 //! that the paper leaves open is a field here, and [`RoomSettings::validate`] is the one place that
 //! judges values.
 
+/// An enum whose values have one name each, in reports and on the command line.
+macro_rules! named {
+    ($(#[$doc:meta])* pub enum $type:ident { $($(#[$note:meta])* $value:ident = $name:literal),* $(,)? }) => {
+        $(#[$doc])*
+        #[derive(Debug, Clone, Copy, PartialEq, Eq, PartialOrd, Ord, Hash, serde::Serialize)]
+        pub enum $type {
+            $($(#[$note])* #[serde(rename = $name)] $value),*
+        }
+
+        impl $type {
+            pub const ALL: [$type; [$($name),*].len()] = [$($type::$value),*];
+
+            pub fn name(self) -> &'static str {
+                match self { $($type::$value => $name),* }
+            }
+        }
+    };
+}
+
 pub mod builder;
 pub mod scene;
 pub mod stop;
@@ -9,7 +28,7 @@ pub mod stop;
 use serde::Serialize;
 
 use crate::constants;
-use crate::error::{Error, Result};
+use crate::error::{Result, require, within};
 use crate::rng::{self, Rng};
 pub use builder::Builder;
 use stop::Stop;
@@ -26,50 +45,33 @@ pub enum Gather {
     KdTree,
 }
 
-/// How the film adds.
+/// How the film adds; each as the kernels' number.
 #[derive(Debug, Clone, Copy, PartialEq, Eq, Serialize)]
 #[serde(rename_all = "lowercase")]
+#[repr(u32)]
 pub enum Sums {
     /// 64-bit fixed point: the same bits in whatever order photons come.
-    Integer,
+    Integer = constants::SUMS_INTEGER,
     /// 32-bit floats: a sum's last digits depend on the order of addition, and it stops growing once
     /// what is added is less than half its last digit.
-    F32,
+    F32 = constants::SUMS_F32,
     /// Pairs of 32-bit floats, the second what the first lost to rounding: some 48 bits, of which the
     /// last depend on the order of addition.
-    Compensated,
+    Compensated = constants::SUMS_COMPENSATED,
 }
 
-impl Sums {
-    pub fn code(self) -> u32 {
-        match self {
-            Sums::Integer => constants::SUMS_INTEGER,
-            Sums::F32 => constants::SUMS_F32,
-            Sums::Compensated => constants::SUMS_COMPENSATED,
-        }
-    }
-}
-
-/// Radiant intensity of a light.
+/// Radiant intensity of a light; each as the kernels' number.
 #[derive(Debug, Clone, Copy, PartialEq, Eq, Serialize)]
 #[serde(rename_all = "lowercase")]
+#[repr(u32)]
 pub enum EmissionLaw {
     /// The same in all directions of the hemisphere.
-    Uniform,
+    Uniform = constants::EMISSION_UNIFORM,
     /// Proportional to the cosine (Lambertian).
-    Cosine,
+    Cosine = constants::EMISSION_COSINE,
 }
 
-impl EmissionLaw {
-    pub fn code(self) -> u32 {
-        match self {
-            EmissionLaw::Uniform => constants::EMISSION_UNIFORM,
-            EmissionLaw::Cosine => constants::EMISSION_COSINE,
-        }
-    }
-}
-
-/// How quotients, roots and logarithms are rounded.
+/// How quotients, roots and logarithms are rounded; each as the kernels' STRICT_MATH.
 #[derive(Debug, Clone, Copy, PartialEq, Eq, Serialize)]
 #[serde(rename_all = "lowercase")]
 pub enum Math {
@@ -79,30 +81,15 @@ pub enum Math {
     Strict,
 }
 
-impl Math {
-    /// Value of the kernels' STRICT_MATH.
-    pub fn code(self) -> u32 {
-        u32::from(self == Math::Strict)
-    }
-}
-
-/// Which direction the Phong weight compares with the direction to the eye.
+/// Which direction the Phong weight compares with the direction to the eye; each as the kernels' number.
 #[derive(Debug, Clone, Copy, PartialEq, Eq, Serialize)]
 #[serde(rename_all = "lowercase")]
+#[repr(u32)]
 pub enum PhongDirection {
     /// The mirror direction of the arriving photon.
-    Mirror,
+    Mirror = constants::PHONG_MIRROR,
     /// The direction in which the photon left.
-    Sampled,
-}
-
-impl PhongDirection {
-    pub fn code(self) -> u32 {
-        match self {
-            PhongDirection::Mirror => constants::PHONG_MIRROR,
-            PhongDirection::Sampled => constants::PHONG_SAMPLED,
-        }
-    }
+    Sampled = constants::PHONG_SAMPLED,
 }
 
 /// The paper's experiments.
@@ -246,104 +233,65 @@ impl RoomSettings {
     pub fn validate(&self) -> Result<()> {
         let width = 2.0 * HALF_WIDTH;
         within("--photons", self.photons, 2..=MAX_PHOTONS, "photons per round, at least one for each of the two lights")?;
-        within("--rounds", self.rounds, 1..=u32::MAX, "rounds")?;
-        within("--bounces", self.bounces, 1..=MAX_BOUNCES, "bounces")?;
-        if self.builder == Builder::Persistent {
-            within("--bounces", self.bounces, 1..=MAX_PERSISTENT_BOUNCES, "bounces with --variant persistent")?;
-        }
+        let most_bounces = if self.builder == Builder::Persistent { MAX_PERSISTENT_BOUNCES } else { MAX_BOUNCES };
+        let of_builder = if self.builder == Builder::Persistent { " with --variant persistent" } else { "" };
+        within("--bounces", self.bounces, 1..=most_bounces, &format!("bounces{of_builder}"))?;
+        check_common((self.rounds, u32::MAX), self.group_size, &self.stop)?;
         within("--mesh", self.mesh, 1..=MAX_MESH, "texels along a wall")?;
-        if !(self.radius >= MIN_RADIUS && self.radius <= width) {
-            return Err(Error::setting(
-                "--radius",
-                self.radius,
-                format!("must be from {MIN_RADIUS:e} to {width} metres (the box's width)"),
-            ));
-        }
-        if !(self.full_light >= 1.0 / MAX_QUANTITY && self.full_light <= MAX_QUANTITY) {
-            let allowed = format!("must be from {:e} to {MAX_QUANTITY:e} (photons within the radius)", 1.0 / MAX_QUANTITY);
-            return Err(Error::setting("--full-light", self.full_light, allowed));
-        }
-        for (light, power) in self.light_power.iter().enumerate() {
-            if !(*power >= 1.0 / MAX_QUANTITY && *power <= MAX_QUANTITY) {
-                let which = ["floor", "left"][light];
-                let allowed = format!("must be from {:e} to {MAX_QUANTITY:e} watts ({which} light)", 1.0 / MAX_QUANTITY);
-                return Err(Error::setting("--light-power", power, allowed));
-            }
-        }
-        let weakest_share = self.light_power.iter().fold(f64::INFINITY, |a, b| a.min(*b)) / self.light_power.iter().sum::<f64>();
-        if weakest_share < 1e-6 {
-            let [floor, left] = self.light_power;
-            return Err(Error::setting(
-                "--light-power",
-                format!("{floor},{left}"),
-                "the weaker light must have at least a millionth of the total power",
-            ));
-        }
-        if !(self.light_radius > 0.0 && self.light_radius <= HALF_WIDTH) {
-            return Err(Error::setting(
-                "--light-radius",
-                self.light_radius,
-                format!("must be above 0 and at most {HALF_WIDTH} metres, so that the disc fits its wall"),
-            ));
-        }
-        if !(0.0..=1.0).contains(&self.reflectance) {
-            return Err(Error::setting("--reflectance", self.reflectance, "must be from 0 to 1"));
-        }
+        let in_box = format!("must be from {MIN_RADIUS:e} to {width} metres (the box's width)");
+        require((MIN_RADIUS..=width).contains(&self.radius), "--radius", self.radius, in_box)?;
+        let quantity = |option, value: f64, unit: &str| {
+            let (least, most) = (1.0 / MAX_QUANTITY, MAX_QUANTITY);
+            require((least..=most).contains(&value), option, value, format!("must be from {least:e} to {most:e} {unit}"))
+        };
+        quantity("--full-light", self.full_light, "(photons within the radius)")?;
+        let [floor, left] = self.light_power;
+        quantity("--light-power", floor, "watts (floor light)")?;
+        quantity("--light-power", left, "watts (left light)")?;
+        let few = "the weaker light must have at least a millionth of the total power";
+        require(floor.min(left) / (floor + left) >= 1e-6, "--light-power", format!("{floor},{left}"), few)?;
+        let fits = format!("must be above 0 and at most {HALF_WIDTH} metres, so that the disc fits its wall");
+        require(self.light_radius > 0.0 && self.light_radius <= HALF_WIDTH, "--light-radius", self.light_radius, fits)?;
+        require((0.0..=1.0).contains(&self.reflectance), "--reflectance", self.reflectance, "must be from 0 to 1")?;
         for shininess in self.shininess.iter().flatten() {
-            if !(shininess.is_finite() && *shininess >= 0.0) {
-                return Err(Error::setting("--shininess", shininess, "must be 0 or more; omit it for Lambertian walls"));
-            }
+            let is_exponent = shininess.is_finite() && *shininess >= 0.0;
+            require(is_exponent, "--shininess", shininess, "must be 0 or more; omit it for Lambertian walls")?;
         }
-        if !self.eye.iter().all(|coordinate| coordinate.abs() <= MAX_EYE) {
-            let [x, y, z] = self.eye;
-            return Err(Error::setting("--eye", format!("{x},{y},{z}"), format!("must be three numbers from -{MAX_EYE:e} to {MAX_EYE:e}")));
-        }
+        let [x, y, z] = self.eye;
+        let is_near = self.eye.iter().all(|coordinate| coordinate.abs() <= MAX_EYE);
+        require(is_near, "--eye", format!("{x},{y},{z}"), format!("must be three numbers from -{MAX_EYE:e} to {MAX_EYE:e}"))?;
         within("--threads", self.threads as u64, 1..=1024, "threads")?;
-        check_group_size(self.group_size)?;
-        if let Some(counters) = self.counters.filter(|counters| !counters.is_power_of_two() || *counters > MAX_COUNTERS) {
-            return Err(Error::setting("--counters", counters, format!("must be a power of two up to {MAX_COUNTERS}")));
+        if let Some(counters) = self.counters {
+            let is_allowed = counters.is_power_of_two() && counters <= MAX_COUNTERS;
+            require(is_allowed, "--counters", counters, format!("must be a power of two up to {MAX_COUNTERS}"))?;
         }
         if let Some(chunk) = self.chunk {
             within("--chunk", chunk, 2..=MAX_PHOTONS, "photons traced at once, at least one for each of the two lights")?;
         }
         self.validate_nearest()?;
-        self.stop.validate()?;
-        if let (Some(error), true) = (self.stop.error, self.sums != Sums::Integer) {
-            return Err(Error::setting("--error", error, "needs --sums integer, because float sums have no error estimate"));
+        if let Some(error) = self.stop.error {
+            let needs = "needs --sums integer, because float sums have no error estimate";
+            require(self.sums == Sums::Integer, "--error", error, needs)?;
         }
         self.validate_random_numbers()?;
         let events = self.total_photons().saturating_mul(u64::from(self.bounces));
-        if events > MAX_EVENTS {
-            return Err(Error::setting(
-                "--rounds",
-                self.rounds,
-                format!("photons * rounds * bounces is {events}, but the film's 64-bit sums hold at most {MAX_EVENTS}; ask for fewer"),
-            ));
-        }
-        Ok(())
+        let most = format!("photons * rounds * bounces is {events}, but the film's 64-bit sums hold at most {MAX_EVENTS}; ask for fewer");
+        require(events <= MAX_EVENTS, "--rounds", self.rounds, most)
     }
 
     fn validate_nearest(&self) -> Result<()> {
         let Some(nearest) = self.nearest else { return Ok(()) };
         within("--nearest", nearest, 2..=constants::MAX_NEAREST, "photons; the farthest of them sets the radius of the disc")?;
-        if self.gather != Gather::KdTree {
-            return Err(Error::setting("--nearest", nearest, "needs --gather kdtree, which finds the nearest photons"));
-        }
-        if self.sums != Sums::Integer {
-            return Err(Error::setting("--nearest", nearest, "always uses integer sums; omit --sums"));
-        }
-        if let Some(chunk) = self.chunk.filter(|chunk| *chunk < self.photons) {
-            let allowed =
-                format!("must be --photons {} or more with --nearest, which searches all photons of a round at once", self.photons);
-            return Err(Error::setting("--chunk", chunk, allowed));
-        }
+        let by_tree = self.gather == Gather::KdTree;
+        require(by_tree, "--nearest", nearest, "needs --gather kdtree, which finds the nearest photons")?;
+        require(self.sums == Sums::Integer, "--nearest", nearest, "always uses integer sums; omit --sums")?;
+        let (photons, chunk) = (self.photons, self.chunk.unwrap_or(self.photons));
+        let whole = format!("must be --photons {photons} or more with --nearest, which searches all photons of a round at once");
+        require(chunk >= photons, "--chunk", chunk, whole)?;
         let wanted = u64::from(self.rounds) * u64::from(nearest);
-        if wanted > MAX_NEAREST_SUMMED {
-            let allowed =
-                format!("rounds * nearest is {wanted}, but the film's 64-bit sums hold at most {MAX_NEAREST_SUMMED}; ask for fewer rounds");
-            return Err(Error::setting("--rounds", self.rounds, allowed));
-        }
-        Ok(())
+        let most =
+            format!("rounds * nearest is {wanted}, but the film's 64-bit sums hold at most {MAX_NEAREST_SUMMED}; ask for fewer rounds");
+        require(wanted <= MAX_NEAREST_SUMMED, "--rounds", self.rounds, most)
     }
 
     /// Rounds of a run that ends by itself: as many as its photons take, or as film and random numbers allow, and no
@@ -363,40 +311,24 @@ impl RoomSettings {
     }
 
     fn validate_random_numbers(&self) -> Result<()> {
+        let few = self.total_photons() <= 1 << 32;
         match self.rng {
             Rng::Philox => Ok(()),
             Rng::Rand48 => {
                 within("--seed", self.seed, 0..=u64::from(u32::MAX), "with --rng rand48, whose seed has 32 bits")?;
                 let draws = u128::from(self.total_photons()) * u128::from(self.draws_per_photon());
-                if draws > 1 << 48 {
-                    return Err(Error::setting(
-                        "--rng",
-                        "rand48",
-                        format!(
-                            "the run draws {draws} numbers, but the generator has a period of 2^48, so its streams would overlap; use --rng philox"
-                        ),
-                    ));
-                }
-                Ok(())
+                let period = format!(
+                    "the run draws {draws} numbers, but the generator has a period of 2^48, so its streams would overlap; use --rng philox"
+                );
+                require(draws <= 1 << 48, "--rng", "rand48", period)
             }
             Rng::Mt => {
                 let most = rng::MT_MAX_BOUNCES;
-                if self.bounces > most {
-                    return Err(Error::setting(
-                        "--bounces",
-                        self.bounces,
-                        format!("must be at most {most} with --rng mt, whose streams hold 227 numbers; use --rng philox"),
-                    ));
-                }
-                if self.total_photons() > 1 << 32 {
-                    return Err(Error::setting("--rng", "mt", "has 2^32 streams, but the run has more photons; use --rng philox"));
-                }
-                Ok(())
+                let short = format!("must be at most {most} with --rng mt, whose streams hold 227 numbers; use --rng philox");
+                require(self.bounces <= most, "--bounces", self.bounces, short)?;
+                require(few, "--rng", "mt", "has 2^32 streams, but the run has more photons; use --rng philox")
             }
-            Rng::Sobol if self.total_photons() > 1 << 32 => {
-                Err(Error::setting("--rng", "sobol", "has 2^32 points, but the run has more photons; use --rng philox"))
-            }
-            Rng::Sobol => Ok(()),
+            Rng::Sobol => require(few, "--rng", "sobol", "has 2^32 points, but the run has more photons; use --rng philox"),
         }
     }
 
@@ -440,19 +372,10 @@ pub const MAX_EVENTS: u64 = 1 << 47;
 /// the binary point.
 pub const MAX_NEAREST_SUMMED: u64 = 1 << 31;
 
-fn check_group_size(group_size: u32) -> Result<()> {
-    if group_size.is_power_of_two() && (32..=1024).contains(&group_size) {
-        return Ok(());
-    }
-    Err(Error::setting("--group-size", group_size, "must be a power of two from 32 to 1024"))
-}
-
-fn within<T>(option: &'static str, value: T, allowed: std::ops::RangeInclusive<T>, what: &str) -> Result<()>
-where
-    T: PartialOrd + Copy + std::fmt::Display,
-{
-    if allowed.contains(&value) {
-        return Ok(());
-    }
-    Err(Error::setting(option, value, format!("must be from {} to {} ({what})", allowed.start(), allowed.end())))
+/// Checks what both worlds have and allow alike, but for the most rounds.
+fn check_common((rounds, most_rounds): (u32, u32), group_size: u32, stop: &Stop) -> Result<()> {
+    within("--rounds", rounds, 1..=most_rounds, "rounds")?;
+    let is_allowed = group_size.is_power_of_two() && (32..=1024).contains(&group_size);
+    require(is_allowed, "--group-size", group_size, "must be a power of two from 32 to 1024")?;
+    stop.validate()
 }

@@ -3,10 +3,9 @@
 use serde::Serialize;
 
 pub use super::stop::Stop;
-use super::{Builder, Math, check_group_size, within};
-use crate::constants;
-use crate::constants::MAX_BOUNCES;
-use crate::error::{Error, Result};
+use super::{Builder, MAX_PHOTONS, Math, check_common};
+use crate::constants::{self, MAX_BOUNCES};
+use crate::error::{Error, Result, require, within};
 
 /// Where direct light and caustics come from.
 #[derive(Debug, Clone, Copy, PartialEq, Eq, Serialize)]
@@ -19,139 +18,72 @@ pub enum Illumination {
     Photons,
 }
 
-/// Parts of a picture.
+/// Parts of a picture; each as the kernels' mask.
 #[derive(Debug, Clone, Copy, PartialEq, Eq, Serialize)]
 #[serde(rename_all = "lowercase")]
+#[repr(u32)]
 pub enum Part {
-    All,
+    All = constants::PART_DIRECT | constants::PART_SPECULAR | constants::PART_CAUSTIC | constants::PART_INDIRECT,
     /// Light that comes straight from a lamp to what the camera sees, and lamps themselves.
-    Direct,
+    Direct = constants::PART_DIRECT,
     /// Whatever is seen in mirrors and through glass.
-    Specular,
+    Specular = constants::PART_SPECULAR,
     /// Light that reached what the camera sees over mirrors and glass alone.
-    Caustic,
+    Caustic = constants::PART_CAUSTIC,
     /// Light that was scattered before.
-    Indirect,
+    Indirect = constants::PART_INDIRECT,
 }
 
 impl Part {
     pub const EACH: [Part; 4] = [Part::Direct, Part::Specular, Part::Caustic, Part::Indirect];
-
-    pub fn mask(self) -> u32 {
-        match self {
-            Part::All => Part::EACH.iter().map(|part| part.mask()).sum(),
-            Part::Direct => constants::PART_DIRECT,
-            Part::Specular => constants::PART_SPECULAR,
-            Part::Caustic => constants::PART_CAUSTIC,
-            Part::Indirect => constants::PART_INDIRECT,
-        }
-    }
 }
 
-/// How a photon's weight falls with its distance.
+/// How a photon's weight falls with its distance; each as the kernels' number.
 #[derive(Debug, Clone, Copy, PartialEq, Eq, Serialize)]
 #[serde(rename_all = "lowercase")]
+#[repr(u32)]
 pub enum Kernel {
-    Box,
-    Cone,
-    Epanechnikov,
+    Box = constants::KERNEL_BOX,
+    Cone = constants::KERNEL_CONE,
+    Epanechnikov = constants::KERNEL_EPANECHNIKOV,
 }
 
-impl Kernel {
-    pub fn code(self) -> u32 {
-        match self {
-            Kernel::Box => constants::KERNEL_BOX,
-            Kernel::Cone => constants::KERNEL_CONE,
-            Kernel::Epanechnikov => constants::KERNEL_EPANECHNIKOV,
-        }
-    }
-}
-
-/// How a pixel weighs the picture around its centre.
+/// How a pixel weighs the picture around its centre; each as the kernels' number.
 #[derive(Debug, Clone, Copy, PartialEq, Eq, Serialize)]
 #[serde(rename_all = "lowercase")]
+#[repr(u32)]
 pub enum Filter {
     /// Its own square.
-    Box,
+    Box = constants::FILTER_BOX,
     /// A tent two pixels wide.
-    Tent,
+    Tent = constants::FILTER_TENT,
     /// A Gaussian of half a pixel's deviation.
-    Gaussian,
+    Gaussian = constants::FILTER_GAUSSIAN,
 }
 
-impl Filter {
-    pub fn code(self) -> u32 {
-        match self {
-            Filter::Box => constants::FILTER_BOX,
-            Filter::Tent => constants::FILTER_TENT,
-            Filter::Gaussian => constants::FILTER_GAUSSIAN,
-        }
+named! {
+    /// What a scene may call for; each can be forced on or left out.
+    pub enum Effect {
+        Direct = "direct",
+        Indirect = "indirect",
+        Glossy = "glossy",
+        ReflectiveCaustics = "reflective-caustics",
+        RefractiveCaustics = "refractive-caustics",
+        SpecularChains = "specular-chains",
+        Textures = "textures",
+        Environment = "environment",
+        MeshLights = "mesh-lights",
+        PointLights = "point-lights",
+        SpotLights = "spot-lights",
+        DirectionalLights = "directional-lights",
+        DiscLights = "disc-lights",
+        Bvh = "bvh",
+        TwoSided = "two-sided",
+        SmoothNormals = "smooth-normals",
     }
-}
-
-/// What a scene may call for; each can be forced on or left out.
-#[derive(Debug, Clone, Copy, PartialEq, Eq, PartialOrd, Ord, Hash, Serialize)]
-#[serde(rename_all = "kebab-case")]
-pub enum Effect {
-    Direct,
-    Indirect,
-    Glossy,
-    ReflectiveCaustics,
-    RefractiveCaustics,
-    SpecularChains,
-    Textures,
-    Environment,
-    MeshLights,
-    PointLights,
-    SpotLights,
-    DirectionalLights,
-    DiscLights,
-    Bvh,
-    TwoSided,
-    SmoothNormals,
 }
 
 impl Effect {
-    pub const ALL: [Effect; 16] = [
-        Effect::Direct,
-        Effect::Indirect,
-        Effect::Glossy,
-        Effect::ReflectiveCaustics,
-        Effect::RefractiveCaustics,
-        Effect::SpecularChains,
-        Effect::Textures,
-        Effect::Environment,
-        Effect::MeshLights,
-        Effect::PointLights,
-        Effect::SpotLights,
-        Effect::DirectionalLights,
-        Effect::DiscLights,
-        Effect::Bvh,
-        Effect::TwoSided,
-        Effect::SmoothNormals,
-    ];
-
-    pub fn name(self) -> &'static str {
-        match self {
-            Effect::Direct => "direct",
-            Effect::Indirect => "indirect",
-            Effect::Glossy => "glossy",
-            Effect::ReflectiveCaustics => "reflective-caustics",
-            Effect::RefractiveCaustics => "refractive-caustics",
-            Effect::SpecularChains => "specular-chains",
-            Effect::Textures => "textures",
-            Effect::Environment => "environment",
-            Effect::MeshLights => "mesh-lights",
-            Effect::PointLights => "point-lights",
-            Effect::SpotLights => "spot-lights",
-            Effect::DirectionalLights => "directional-lights",
-            Effect::DiscLights => "disc-lights",
-            Effect::Bvh => "bvh",
-            Effect::TwoSided => "two-sided",
-            Effect::SmoothNormals => "smooth-normals",
-        }
-    }
-
     pub fn is_caustic(self) -> bool {
         matches!(self, Effect::ReflectiveCaustics | Effect::RefractiveCaustics)
     }
@@ -241,8 +173,6 @@ impl Default for SceneSettings {
     }
 }
 
-/// Photons of a pass: their numbers are 32-bit.
-const MAX_PHOTONS: u32 = 1 << 31;
 pub const MAX_ROUNDS: u32 = 1 << 20;
 /// A visible point's rays are one loop.
 const MAX_SHADOW_RAYS: u32 = 64;
@@ -253,39 +183,30 @@ impl SceneSettings {
     pub fn validate(&self) -> Result<()> {
         within("--photons", self.photons, 1..=MAX_PHOTONS, "photons of the global map, each round")?;
         within("--caustic-photons", self.caustic_photons, 1..=MAX_PHOTONS, "photons of the caustic map, each round")?;
-        within("--rounds", self.rounds, 1..=MAX_ROUNDS, "rounds")?;
         within("--bounces", self.bounces, 1..=MAX_BOUNCES, "bounces")?;
-        if let Some(builder) = self.builder.filter(|builder| !Builder::ON_GPU.contains(builder)) {
+        check_common((self.rounds, MAX_ROUNDS), self.group_size, &self.stop)?;
+        if let Some(builder) = self.builder {
             let known = Builder::ON_GPU.map(Builder::name).join(", ");
-            return Err(Error::setting(
-                "--variant",
-                builder.name(),
-                format!("traces the paper's box only; for a scene choose one of {known}"),
-            ));
+            let allowed = format!("traces the paper's box only; for a scene choose one of {known}");
+            require(Builder::ON_GPU.contains(&builder), "--variant", builder.name(), allowed)?;
         }
         within("--shadow-rays", self.shadow_rays, 1..=MAX_SHADOW_RAYS, "shadow rays from each visible point, each round")?;
-        if !(self.samples.is_power_of_two() && self.samples <= MAX_SAMPLES) {
-            return Err(Error::setting("--samples", self.samples, format!("must be a power of two up to {MAX_SAMPLES}")));
-        }
+        let is_share = self.samples.is_power_of_two() && self.samples <= MAX_SAMPLES;
+        require(is_share, "--samples", self.samples, format!("must be a power of two up to {MAX_SAMPLES}"))?;
         for (option, radius) in [("--radius", self.radius), ("--caustic-radius", self.caustic_radius)] {
-            if let Some(radius) = radius
-                && !(radius.is_finite() && radius > 0.0)
-            {
-                return Err(Error::setting(option, radius, "must be a number of metres above 0"));
+            if let Some(radius) = radius {
+                require(radius.is_finite() && radius > 0.0, option, radius, "must be a number of metres above 0")?;
             }
         }
-        if !(self.alpha > 0.0 && self.alpha <= 1.0) {
-            return Err(Error::setting("--alpha", self.alpha, "must be above 0 and at most 1 (1 keeps the radius fixed)"));
-        }
-        self.stop.validate()?;
-        check_group_size(self.group_size)?;
+        let is_rate = self.alpha > 0.0 && self.alpha <= 1.0;
+        require(is_rate, "--alpha", self.alpha, "must be above 0 and at most 1 (1 keeps the radius fixed)")?;
         if let Some(chunk) = self.chunk {
             within("--chunk", chunk, 1..=MAX_PHOTONS, "photons traced at once")?;
         }
-        if let Some(both) = self.with.iter().find(|effect| self.without.contains(effect)) {
-            return Err(Error::setting("--without", both.name(), "is also in --with; choose one of the two"));
+        match self.with.iter().find(|effect| self.without.contains(effect)) {
+            Some(both) => Err(Error::setting("--without", both.name(), "is also in --with; choose one of the two")),
+            None => Ok(()),
         }
-        Ok(())
     }
 
     pub fn forces(&self, effect: Effect) -> bool {

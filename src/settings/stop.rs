@@ -2,7 +2,7 @@
 
 use serde::Serialize;
 
-use crate::error::{Error, Result};
+use crate::error::{Result, require};
 
 #[derive(Debug, Clone, Copy, PartialEq, Serialize)]
 pub struct Stop {
@@ -32,18 +32,13 @@ impl Stop {
     }
 
     pub fn validate(&self) -> Result<()> {
-        if let Some(error) = self.error.filter(|error| !(1e-6..=1.0).contains(error)) {
-            return Err(Error::setting("--error", error, "must be from 0.0001 % to 100 %"));
+        if let Some(error) = self.error {
+            require((1e-6..=1.0).contains(&error), "--error", error, "must be from 0.0001 % to 100 %")?;
         }
-        if !(0.5..=0.9999).contains(&self.confidence) {
-            return Err(Error::setting("--confidence", self.confidence, "must be from 50 % to 99.99 %"));
+        require((0.5..=0.9999).contains(&self.confidence), "--confidence", self.confidence, "must be from 50 % to 99.99 %")?;
+        if let Some(seconds) = self.seconds {
+            require((1e-3..=1e6).contains(&seconds), "--time", seconds, "must be from 1ms to 1000000s")?;
         }
-        if let Some(seconds) = self.seconds.filter(|seconds| !(1e-3..=1e6).contains(seconds)) {
-            return Err(Error::setting("--time", seconds, "must be from 1ms to 1000000s"));
-        }
-        if self.photons == Some(0) {
-            return Err(Error::setting("--total-photons", 0, "must be 1 or more"));
-        }
-        Ok(())
+        require(self.photons != Some(0), "--total-photons", 0, "must be 1 or more")
     }
 }

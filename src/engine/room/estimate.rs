@@ -6,7 +6,7 @@ use crate::constants::{GATHER_SLICE, MAX_GROUPS};
 use crate::engine::room::index::add_work;
 use crate::engine::room::resources::{IndexBuffers, RoomResources, RoundBuffers};
 use crate::engine::room::trace::photon_list_capacity;
-use crate::error::{Error, Result};
+use crate::error::{Result, require};
 use crate::gpu::kernels::{CandidateCount, EndRound, GatherBruteTwoWords, GatherBruteU64, GatherGridTwoWords, GatherGridU64, SliceCount};
 use crate::gpu::{Commands, DeviceFacts, Extent, Kernel, Module};
 use crate::plan::RoomPlan;
@@ -15,11 +15,9 @@ use crate::settings::Sums;
 
 /// Refuses sums that a device cannot make.
 pub fn check_sums(plan: &RoomPlan, facts: &DeviceFacts) -> Result<()> {
-    if plan.settings.sums == Sums::Compensated && !facts.int64_atomics {
-        let why = format!("needs 64-bit atomics, which {} lacks; use --sums integer or f32", facts.name);
-        return Err(Error::setting("--sums", "compensated", why));
-    }
-    Ok(())
+    let can_add = plan.settings.sums != Sums::Compensated || facts.int64_atomics;
+    let why = format!("needs 64-bit atomics, which {} lacks; use --sums integer or f32", facts.name);
+    require(can_add, "--sums", "compensated", why)
 }
 
 /// Whether kernels see a film sum as one 64-bit word: a float has a 32-bit word of its own.
@@ -124,7 +122,7 @@ fn gather_grid(commands: &mut Commands, resources: &RoomResources, index: &Index
     for (first_point, end_point) in point_ranges(commands, plan, tests_per_point, plan.lanes) {
         let capacity = (end_point - first_point) * plan.lanes;
         let extent = if plan.slices_candidates {
-            let size = DispatchSizePush { counter: 0, capacity, items_per_group: group_size, max_groups: MAX_GROUPS };
+            let size = DispatchSizePush::new(0, capacity, group_size);
             commands.dispatch(SliceCount { longest, dispatch_args }, &size, Extent::Groups(1, 1))?;
             Extent::Indirect(dispatch_args)
         } else {

@@ -2,7 +2,6 @@
 
 pub mod tree;
 
-use crate::constants::MAX_GROUPS;
 use crate::engine::prefix_sum::scan;
 use crate::engine::room::resources::{IndexBuffers, RoomResources};
 use crate::engine::room::trace::photon_list_capacity;
@@ -38,12 +37,7 @@ pub fn build(commands: &mut Commands, resources: &RoomResources, plan: &RoomPlan
         commands.scope("count", |commands| {
             commands.clear(cells);
             if !plan.has_slots() {
-                let size = DispatchSizePush {
-                    counter: 0,
-                    capacity: push.photon_capacity,
-                    items_per_group: plan.settings.group_size,
-                    max_groups: MAX_GROUPS,
-                };
+                let size = DispatchSizePush::new(0, push.photon_capacity, plan.settings.group_size);
                 commands.dispatch(DispatchSize { counters, dispatch_args }, &size, Extent::Groups(1, 1))?;
             }
             commands.dispatch(CellCount { room, photons, counters, cells, ranks }, &push, extent())

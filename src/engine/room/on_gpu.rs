@@ -5,17 +5,14 @@ use std::time::Instant;
 
 use super::RunResult;
 use crate::engine;
-use crate::engine::Control;
 use crate::engine::error_bound::FilmError;
 use crate::engine::film::{RoundSums, wide};
 use crate::engine::nonfinite_values::NonfiniteValues;
-use crate::engine::room::estimate;
 use crate::engine::room::film::RoomFilm;
-use crate::engine::room::index;
 use crate::engine::room::resources::{RoomResources, RoundBuffers};
-use crate::engine::room::trace;
+use crate::engine::room::{estimate, index, trace};
 use crate::engine::run::{self, RunState, World};
-use crate::engine::tallies;
+use crate::engine::{Control, tallies};
 use crate::error::Result;
 use crate::gpu::{Commands, Constants, Gpu, Module};
 use crate::ledger::{Fates, Losses};
@@ -103,19 +100,19 @@ impl<'a> World for RoomOnGpu<'a> {
 pub fn constants(plan: &RoomPlan) -> Constants {
     let settings = &plan.settings;
     Constants::new(settings.group_size)
-        .set("RNG", settings.rng.code())
+        .set("RNG", settings.rng as u32)
         .set("PARANOID", u32::from(settings.paranoid))
-        .set("STRICT_MATH", settings.math.code())
-        .set("EMISSION_LAW", settings.emission.code())
+        .set("STRICT_MATH", settings.math as u32)
+        .set("EMISSION_LAW", settings.emission as u32)
         .set("HAS_PHONG", u32::from(settings.has_phong()))
-        .set("PHONG_DIRECTION", settings.phong_direction.code())
+        .set("PHONG_DIRECTION", settings.phong_direction as u32)
         .set("HAS_SLOTS", u32::from(plan.has_slots()))
         .set("HAS_ORIGINS", u32::from(plan.keeps_origins))
         .set("COUNTERS", plan.counters)
         .set("LANES", plan.lanes)
         .set("HAS_SLICES", u32::from(plan.slices_candidates))
         .set("CHANNEL_COUNT", plan.channel_count)
-        .set("SUMS", settings.sums.code())
+        .set("SUMS", settings.sums as u32)
 }
 
 /// Kernels that the plan needs, and no others.

@@ -11,16 +11,16 @@ use crate::cpu::trace::Tracer;
 use crate::engine;
 use crate::engine::nonfinite_values::NonfiniteValues;
 use crate::engine::replay::{PhotonName, Replayed};
+use crate::engine::run::check_math;
 use crate::engine::tallies;
 use crate::error::Result;
-use crate::gpu::check::strict_math;
 use crate::gpu::{Commands, Gpu};
 use crate::ledger::fate;
 use crate::path::{self, Path};
 use crate::photon::Photon;
 use crate::plan::{EmissionRange, RoomPlan, photons_of};
 use crate::scene::room::RoomScene;
-use crate::settings::{Math, RoomSettings};
+use crate::settings::RoomSettings;
 use crate::text::counted;
 
 /// One photon of a run, on a device or, without one, on the CPU.
@@ -40,9 +40,7 @@ pub fn replay(gpu: Option<&Gpu>, scene: &RoomScene, settings: &RoomSettings, nam
 fn replay_on_gpu(gpu: &Gpu, scene: &RoomScene, settings: &RoomSettings, name: PhotonName) -> Result<Replayed<Path, Photon>> {
     let whole = RoomPlan::new(scene, settings, &engine::limits(gpu.facts()))?;
     let plan = RoomPlan { keeps_origins: true, counters: 1, path_capacity: 1, photon_capacity: settings.bounces, ..whole };
-    if settings.math == Math::Strict {
-        strict_math(gpu)?;
-    }
+    check_math(gpu, settings.math)?;
     let ranges = [plan.range_of(name.photon)];
     let mut commands = Commands::new(gpu, constants(&plan), Instant::now())?;
     let resources = RoomResources::new(gpu, &mut commands, scene, &plan)?;

@@ -2,7 +2,6 @@
 
 use super::Round;
 use super::resources::PhotonBuffers;
-use crate::constants::MAX_GROUPS;
 use crate::engine::prefix_sum::scan;
 use crate::error::Result;
 use crate::gpu::kernels::{DispatchSize, MapCount, MapScatter, ScanAdd, ScanBlocks};
@@ -34,12 +33,7 @@ pub fn build(commands: &mut Commands, round: Round, photons: &PhotonBuffers, map
     let buckets = cells_push.bucket_mask + 1;
     commands.scope("count", |commands| {
         commands.fill(cells, 0, u64::from(buckets) + 1, 0);
-        let push = DispatchSizePush {
-            counter: 0,
-            capacity: cells_push.photon_capacity,
-            items_per_group: plan.settings.group_size,
-            max_groups: MAX_GROUPS,
-        };
+        let push = DispatchSizePush::new(0, cells_push.photon_capacity, plan.settings.group_size);
         commands.dispatch(DispatchSize { counters, dispatch_args }, &push, Extent::Groups(1, 1))?;
         commands.dispatch(MapCount { map, counters, cells, ranks }, cells_push, Extent::Indirect(dispatch_args))
     })?;

@@ -29,8 +29,7 @@ use glam::DVec3;
 pub use film::SceneFilm;
 pub use on_gpu::{constants, light, modules};
 
-use crate::engine::Control;
-use crate::engine::run;
+use crate::engine::{Control, run};
 use crate::error::Result;
 use crate::gpu::Gpu;
 use crate::plan::scene::ScenePlan;

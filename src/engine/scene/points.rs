@@ -30,10 +30,20 @@ pub(super) fn rounding(plan: &ScenePlan, round: u32) -> u32 {
     mix32(seed.x.wrapping_add(mix32(seed.y.wrapping_add(mix32(round)))))
 }
 
+/// A kernel that follows camera paths: what all of these write to, and its own buffers.
+macro_rules! camera_kernel {
+    ($kernel:ident, $resources:ident, $($own:ident: $buffer:expr),*) => {{
+        let SceneResources { scene, visible_points, pass_sums, one_hits, part_totals, anomalies, nonfinite_values, .. } = $resources;
+        let camera_path_counts = &$resources.camera_path_counts;
+        $kernel {
+            scene, visible_points, pass_sums, one_hits, part_totals, anomalies, nonfinite_values, camera_path_counts, $($own: $buffer),*
+        }
+    }};
+}
+
 /// Finds the visible points of a round and writes the light that needs no photons.
 pub fn see(commands: &mut Commands, round: Round, camera: Option<&Camera>) -> Result<()> {
     let Round { resources, geometry, plan, number: round } = round;
-    let SceneResources { scene, visible_points, pass_sums, one_hits, part_totals, anomalies, nonfinite_values, .. } = resources;
     let SceneResources { camera_paths: [camera_paths, _], camera_path_counts, .. } = resources;
     let step = plan.pixels_at_once(plan.rays_per_pixel());
     let goes_on = plan.chains_go_on();
@@ -64,17 +74,7 @@ pub fn see(commands: &mut Commands, round: Round, camera: Option<&Camera>) -> Re
                     film_scale: (plan.film_scale / f64::from(plan.samples())) as f32,
                     film_limit: (plan.film_limit / f64::from(plan.samples())) as f32,
                 };
-                let kernel = View {
-                    scene,
-                    anomalies,
-                    visible_points,
-                    pass_sums,
-                    one_hits,
-                    part_totals,
-                    next_camera_paths: camera_paths,
-                    camera_path_counts,
-                    nonfinite_values,
-                };
+                let kernel = camera_kernel!(View, resources, next_camera_paths: camera_paths);
                 commands.dispatch(kernel, &push, Extent::Items(u64::from(end - first) * u64::from(plan.samples())))?;
             }
             Sensor::Receivers { .. } => {
@@ -91,18 +91,7 @@ pub fn see(commands: &mut Commands, round: Round, camera: Option<&Camera>) -> Re
                     film_limit: plan.film_limit as f32,
                     radius: if radius.is_finite() { radius as f32 } else { 1.0 / 1024.0 },
                 };
-                let kernel = Receive {
-                    scene,
-                    receivers,
-                    anomalies,
-                    visible_points,
-                    pass_sums,
-                    one_hits,
-                    part_totals,
-                    next_camera_paths: camera_paths,
-                    camera_path_counts,
-                    nonfinite_values,
-                };
+                let kernel = camera_kernel!(Receive, resources, receivers: receivers, next_camera_paths: camera_paths);
                 commands.dispatch(kernel, &push, Extent::Items(u64::from(end - first)))?;
             }
         }
@@ -116,8 +105,7 @@ pub fn see(commands: &mut Commands, round: Round, camera: Option<&Camera>) -> Re
 
 /// Follows camera paths that are still under way over mirrors and glass, until none is left.
 fn go_on(commands: &mut Commands, resources: &SceneResources, geometry: &Geometry, plan: &ScenePlan, round: u32) -> Result<()> {
-    let SceneResources { scene, visible_points, pass_sums, one_hits, part_totals, anomalies, nonfinite_values, camera_path_counts, .. } =
-        resources;
+    let camera_path_counts = &resources.camera_path_counts;
     let domain = if matches!(plan.sensor, Sensor::Picture { .. }) { DOMAIN_CAMERA } else { DOMAIN_RECEIVERS };
     for parity in [0, 1].into_iter().cycle() {
         let path_count = commands.read(camera_path_counts, 1)?[0];
@@ -134,18 +122,7 @@ fn go_on(commands: &mut Commands, resources: &SceneResources, geometry: &Geometr
             film_limit: (plan.film_limit / f64::from(plan.samples())) as f32,
             rounding: rounding(plan, round),
         };
-        let kernel = GoOn {
-            scene,
-            anomalies,
-            visible_points,
-            pass_sums,
-            one_hits,
-            part_totals,
-            camera_paths: &resources.camera_paths[parity],
-            next_camera_paths: &resources.camera_paths[1 - parity],
-            camera_path_counts,
-            nonfinite_values,
-        };
+        let kernel = camera_kernel!(GoOn, resources, camera_paths: &resources.camera_paths[parity], next_camera_paths: &resources.camera_paths[1 - parity]);
         commands.dispatch(kernel, &push, Extent::Items(u64::from(path_count)))?;
     }
     Ok(())

@@ -8,15 +8,14 @@ use super::{Round, constants, trace};
 use crate::constants::{DOMAIN_CAUSTIC_PHOTONS, DOMAIN_PHOTONS, TALLY_ROWS};
 use crate::engine::nonfinite_values::NonfiniteValues;
 use crate::engine::replay::{PhotonName, Replayed};
+use crate::engine::run::check_math;
 use crate::engine::tallies;
 use crate::error::Result;
-use crate::gpu::check::strict_math;
 use crate::gpu::{Commands, Extent, Gpu};
 use crate::ledger::fate;
 use crate::plan::scene::{MapPlan, ScenePlan};
 use crate::records::{LightPath, Tally};
 use crate::scene::geometry::Geometry;
-use crate::settings::Math;
 
 /// The photon as it left its light source and then each surface, normalised as in the kernels.
 pub fn replay(gpu: &Gpu, geometry: &Geometry, plan: &ScenePlan, name: PhotonName) -> Result<Replayed<LightPath, LightPath>> {
@@ -24,9 +23,7 @@ pub fn replay(gpu: &Gpu, geometry: &Geometry, plan: &ScenePlan, name: PhotonName
     name.check_round(plan.settings.rounds)?;
     let map = plan.maps().find(|map| map.domain == domain).ok_or_else(|| name.refused(format!("this run has no {kind} map")))?;
     name.check_photon(map.photons, &format!(" in the {kind} map"))?;
-    if plan.settings.math == Math::Strict {
-        strict_math(gpu)?;
-    }
+    check_math(gpu, plan.settings.math)?;
     let Flights { paths, tallies, nonfinite_values } = light_paths(gpu, geometry, plan, map, name.round, (name.photon, 1), map.bounces)?;
     let mut vertices = paths.concat();
     Ok(Replayed { name, start: vertices.remove(0), vertices, fate: fate(&tallies), nonfinite_values })

@@ -2,7 +2,7 @@
 
 use super::Round;
 use super::resources::{OrderBuffers, PhotonBuffers, SceneResources};
-use crate::constants::{MAX_GROUPS, NONE};
+use crate::constants::NONE;
 use crate::engine::prefix_sum::scan;
 use crate::error::Result;
 use crate::gpu::kernels::{
@@ -308,6 +308,6 @@ pub fn trace_flight(
 
 fn dispatch_size(commands: &mut Commands, photons: &PhotonBuffers, plan: &ScenePlan, counter: u32, capacity: u32) -> Result<()> {
     let PhotonBuffers { counters, dispatch_args, .. } = photons;
-    let push = DispatchSizePush { counter, capacity, items_per_group: plan.settings.group_size, max_groups: MAX_GROUPS };
+    let push = DispatchSizePush::new(counter, capacity, plan.settings.group_size);
     commands.dispatch(DispatchSize { counters, dispatch_args }, &push, Extent::Groups(1, 1))
 }

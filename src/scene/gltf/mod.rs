@@ -215,12 +215,7 @@ impl Loader {
         let mut encoded = Vec::with_capacity(wanted.len());
         for texture in &wanted {
             let (what, bytes) = self.encoded_image(texture)?;
-            let undecodable = |error: image::ImageError| self.undecodable(&what, &error);
-            let (width, height) = image_reader(&bytes)
-                .map_err(|error| self.refuse(&what, error.to_string()))?
-                .into_decoder()
-                .map_err(undecodable)?
-                .dimensions();
+            let (width, height) = self.decoder(&what, &bytes)?.dimensions();
             texel_count += u64::from(width) * u64::from(height);
             if texel_count > MAX_TEXELS {
                 return Err(
@@ -246,10 +241,7 @@ impl Loader {
     /// Its name in complaints, and the bytes of the picture's file.
     fn encoded_image(&self, texture: &gltf::Texture) -> Result<(String, Cow<'_, [u8]>)> {
         let source = texture.source();
-        let what = format!(
-            "texture image {}",
-            source.name().map(printable).map_or_else(|| source.index().to_string(), |name| format!("'{name}'"))
-        );
+        let what = called("texture image", source.name(), source.index());
         let bytes = match source.source() {
             gltf::image::Source::View { view, .. } => Cow::Borrowed(accessor::view_bytes(self, &view, &what)?),
             gltf::image::Source::Uri { uri, .. } => Cow::Owned(self.read_uri(uri, &what)?),
@@ -261,9 +253,17 @@ impl Loader {
         self.refuse(what, format!("cannot be decoded ({})", one_line(&error.to_string())))
     }
 
+    /// Of a picture's file.
+    fn decoder<'b>(&self, what: &str, bytes: &'b [u8]) -> Result<impl ImageDecoder + use<'b>> {
+        let reader = image::ImageReader::new(std::io::Cursor::new(bytes)).with_guessed_format();
+        let mut reader = reader.map_err(|error| self.refuse(what, error.to_string()))?;
+        reader.limits(image_limits());
+        reader.into_decoder().map_err(|error| self.undecodable(what, &error))
+    }
+
     fn read_texture(&self, texture: &gltf::Texture, what: &str, bytes: &[u8]) -> Result<Texture> {
         let undecodable = |error: image::ImageError| self.undecodable(what, &error);
-        let decoder = image_reader(bytes).map_err(|error| self.refuse(what, error.to_string()))?.into_decoder().map_err(undecodable)?;
+        let decoder = self.decoder(what, bytes)?;
         image_limits().reserve(decoder.total_bytes()).map_err(undecodable)?;
         let picture = DynamicImage::from_decoder(decoder).map_err(undecodable)?.into_rgb8();
         let wrap = |mode: gltf::texture::WrappingMode| match mode {
@@ -424,7 +424,7 @@ impl Loader {
     /// What takes a vertex that follows one joint alone into the world. The transform of the node that has the mesh
     /// is none of it.
     fn joint_matrices(&self, skin: &gltf::Skin, to_world: &HashMap<usize, DMat4>) -> Result<Vec<DMat4>> {
-        let what = format!("skin {}", skin.name().map(printable).map_or_else(|| skin.index().to_string(), |name| format!("'{name}'")));
+        let what = called("skin", skin.name(), skin.index());
         let to_joint = match skin.inverse_bind_matrices() {
             Some(matrices) => {
                 accessor::read(self, &matrices, &Vertices::All, &what, |matrix: [f32; 16]| DMat4::from_cols_array(&matrix.map(f64::from)))?
@@ -472,12 +472,9 @@ impl Loader {
         let what = part.what();
         let positions = primitive.get(&Semantic::Positions).expect("what is listed has positions");
         let vertex_count = positions.count();
-        let of_vertices = |accessor: &gltf::Accessor, kind: &str| {
-            if accessor.count() == vertex_count {
-                Ok(())
-            } else {
-                Err(self.refuse(&what, format!("has {} {kind} for {vertex_count} vertices", accessor.count())))
-            }
+        let of_vertices = |accessor: &gltf::Accessor, kind: &str| match accessor.count() {
+            count if count == vertex_count => Ok(()),
+            count => Err(self.refuse(&what, format!("has {count} {kind} for {vertex_count} vertices"))),
         };
         let (indices, vertices) = self.indices_and_vertices(primitive, vertex_count, &what)?;
 
@@ -496,22 +493,21 @@ impl Loader {
         if positions.iter().any(|position| !position.is_finite()) {
             return Err(self.refuse(&what, "has a vertex that is not finite once transformed"));
         }
-        let normals = match primitive.get(&Semantic::Normals) {
-            Some(normals) => {
-                of_vertices(&normals, "normals")?;
-                match &matrices {
-                    Some(matrices) => {
-                        let own = accessor::read(self, &normals, &vertices, &what, vector)?;
-                        own.par_iter().zip(matrices).map(|(normal, matrix)| (normal_matrix(matrix) * *normal).normalize_or_zero()).collect()
-                    }
-                    None => {
-                        let matrix = normal_matrix(to_world);
-                        accessor::read(self, &normals, &vertices, &what, |numbers| (matrix * vector(numbers)).normalize_or_zero())?
-                    }
+        let mut normals = Vec::new();
+        if let Some(own) = primitive.get(&Semantic::Normals) {
+            of_vertices(&own, "normals")?;
+            let turned = |matrix: &DMat3, normal: DVec3| (*matrix * normal).normalize_or_zero();
+            normals = match &matrices {
+                Some(matrices) => {
+                    let own = accessor::read(self, &own, &vertices, &what, vector)?;
+                    own.par_iter().zip(matrices).map(|(normal, matrix)| turned(&normal_matrix(matrix), *normal)).collect()
                 }
-            }
-            None => Vec::new(),
-        };
+                None => {
+                    let matrix = normal_matrix(to_world);
+                    accessor::read(self, &own, &vertices, &what, |numbers| turned(&matrix, vector(numbers)))?
+                }
+            };
+        }
         let mut uvs = [Vec::new(), Vec::new()];
         for (set, uvs) in uvs.iter_mut().enumerate() {
             if let Some(coordinates) = primitive.get(&Semantic::TexCoords(set as u32)) {
@@ -655,14 +651,8 @@ impl Loader {
         let (min, max) = self.scene.bounds();
         let extent = (max - min).max_element();
         let dropped: Vec<usize> = self.scene.meshes.par_iter_mut().map(|mesh| mesh.drop_degenerate_triangles(extent)).collect();
-        let flat: BTreeSet<String> = self
-            .scene
-            .meshes
-            .iter()
-            .zip(&dropped)
-            .filter(|(_, dropped)| **dropped > 0)
-            .map(|(mesh, _)| format!("mesh '{}'", mesh.name))
-            .collect();
+        let with_flat = self.scene.meshes.iter().zip(&dropped).filter(|(_, dropped)| **dropped > 0);
+        let flat: BTreeSet<String> = with_flat.map(|(mesh, _)| format!("mesh '{}'", mesh.name)).collect();
         self.scene.meshes.retain(|mesh| !mesh.triangles.is_empty());
         if self.scene.triangle_count() == 0 {
             return Err(self.refuse("the scene", "holds no triangle"));
@@ -701,7 +691,12 @@ impl Part<'_> {
 }
 
 fn node_name(node: &gltf::Node) -> String {
-    format!("node {}", node.name().map(printable).map_or_else(|| node.index().to_string(), |name| format!("'{name}'")))
+    called("node", node.name(), node.index())
+}
+
+/// An object in complaints: its name, or its number.
+fn called(kind: &str, name: Option<&str>, number: usize) -> String {
+    name.map_or_else(|| format!("{kind} {number}"), |name| format!("{kind} '{}'", printable(name)))
 }
 
 /// The first few of some names.
@@ -716,12 +711,6 @@ fn image_limits() -> image::Limits {
     // A picture of a few bytes must not unfold into gigabytes.
     limits.max_alloc = Some(1 << 30);
     limits
-}
-
-fn image_reader(bytes: &[u8]) -> std::io::Result<image::ImageReader<std::io::Cursor<&[u8]>>> {
-    let mut reader = image::ImageReader::new(std::io::Cursor::new(bytes)).with_guessed_format()?;
-    reader.limits(image_limits());
-    Ok(reader)
 }
 
 /// Whether a relative name leads out of the folder that it starts from.

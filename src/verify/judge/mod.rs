@@ -17,36 +17,32 @@ mod verdict;
 
 use std::ops::{Add, Index, IndexMut};
 
+use bytemuck::{Pod, Zeroable};
 use glam::DVec3;
 use rand_pcg::rand_core::{Rng, SeedableRng};
 use rayon::prelude::*;
 
 use crate::scene::{Camera, Scene};
+pub use crate::settings::scene::Part;
 use geometry::Geometry;
 use light::Emitters;
 pub use material::fresnel;
 pub use verdict::Verdict;
 
-/// A camera path runs through specular surfaces (mirrors, glass) to the first one that is not: x. Light
-/// is told apart by what lies before and behind x.
-#[derive(Debug, Clone, Copy, PartialEq, Eq)]
-pub enum Part {
-    /// Emission that is seen as such, and light that reaches x straight from where it is emitted.
-    Direct,
-    /// All that is seen through specular surfaces.
-    Specular,
-    /// What reaches x from its emitter through specular surfaces only, one or more.
-    Caustic,
-    /// All else that reaches x.
-    Indirect,
-}
-
 /// Radiance (W/m2/sr) or irradiance (W/m2) by [`Part`], linear RGB. Irradiance has no specular part.
-#[derive(Debug, Clone, Copy, PartialEq, Default)]
+///
+/// A camera path runs through specular surfaces (mirrors, glass) to the first one that is not: x. Light is told apart by what
+/// lies before and behind x.
+#[derive(Debug, Clone, Copy, PartialEq, Default, Pod, Zeroable)]
+#[repr(C)]
 pub struct Parts {
+    /// Emission that is seen as such, and light that reaches x straight from where it is emitted.
     pub direct: DVec3,
+    /// All that is seen through specular surfaces.
     pub specular: DVec3,
+    /// What reaches x from its emitter through specular surfaces only, one or more.
     pub caustic: DVec3,
+    /// All else that reaches x.
     pub indirect: DVec3,
 }
 
@@ -149,12 +145,8 @@ impl Parts {
     }
 
     fn zip(self, other: Parts, f: impl Fn(DVec3, DVec3) -> DVec3) -> Parts {
-        Parts {
-            direct: f(self.direct, other.direct),
-            specular: f(self.specular, other.specular),
-            caustic: f(self.caustic, other.caustic),
-            indirect: f(self.indirect, other.indirect),
-        }
+        let [one, two]: [[DVec3; 4]; 2] = [self, other].map(bytemuck::cast);
+        bytemuck::cast::<[DVec3; 4], Parts>(std::array::from_fn(|part| f(one[part], two[part])))
     }
 }
 
@@ -166,26 +158,21 @@ impl Add for Parts {
     }
 }
 
+/// Where a part stands among [`Parts`].
+fn place(part: Part) -> usize {
+    Part::EACH.iter().position(|each| *each == part).expect("one part, not all of them")
+}
+
 impl Index<Part> for Parts {
     type Output = DVec3;
 
     fn index(&self, part: Part) -> &DVec3 {
-        match part {
-            Part::Direct => &self.direct,
-            Part::Specular => &self.specular,
-            Part::Caustic => &self.caustic,
-            Part::Indirect => &self.indirect,
-        }
+        &bytemuck::cast_ref::<Parts, [DVec3; 4]>(self)[place(part)]
     }
 }
 
 impl IndexMut<Part> for Parts {
     fn index_mut(&mut self, part: Part) -> &mut DVec3 {
-        match part {
-            Part::Direct => &mut self.direct,
-            Part::Specular => &mut self.specular,
-            Part::Caustic => &mut self.caustic,
-            Part::Indirect => &mut self.indirect,
-        }
+        &mut bytemuck::cast_mut::<Parts, [DVec3; 4]>(self)[place(part)]
     }
 }

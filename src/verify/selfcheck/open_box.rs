@@ -17,7 +17,7 @@ const PHOTONS: u32 = 1 << 20;
 
 pub(super) fn cases() -> Vec<Case> {
     let laws = [(EmissionLaw::Uniform, STORED_UNIFORM), (EmissionLaw::Cosine, STORED_COSINE)];
-    Builder::all().flat_map(|builder| laws.map(|(law, expected)| case(builder, law, expected))).collect()
+    Builder::ALL.into_iter().flat_map(|builder| laws.map(|(law, expected)| case(builder, law, expected))).collect()
 }
 
 fn case(builder: Builder, emission: EmissionLaw, expected: f64) -> Case {

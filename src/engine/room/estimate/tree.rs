@@ -1,7 +1,7 @@
 //! Density estimation over the kd-tree: with all photons within the radius, or with the nearest of them.
 
 use super::{adds_in_one_word, point_ranges, push_for_all_points};
-use crate::constants::{GATHER_SLICE, MAX_GROUPS};
+use crate::constants::GATHER_SLICE;
 use crate::engine::room::index::add_work;
 use crate::engine::room::resources::{RoomResources, SearchBuffers, TreeBuffers};
 use crate::error::Result;
@@ -40,12 +40,7 @@ fn gather_radius(commands: &mut Commands, resources: &RoomResources, tree: &Tree
     let whole = push_for_all_points(plan, photon_count);
     let tests_per_point = plan.work.tests_per_point(photon_count);
     for (first_point, end_point) in point_ranges(commands, plan, tests_per_point, 1) {
-        let size = DispatchSizePush {
-            counter: 0,
-            capacity: end_point - first_point,
-            items_per_group: plan.settings.group_size,
-            max_groups: MAX_GROUPS,
-        };
+        let size = DispatchSizePush::new(0, end_point - first_point, plan.settings.group_size);
         commands.dispatch(SliceCount { longest, dispatch_args }, &size, Extent::Groups(1, 1))?;
         let push = GatherPush { first_point, end_point, ..whole };
         let extent = Extent::Indirect(dispatch_args);

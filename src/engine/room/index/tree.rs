@@ -9,7 +9,7 @@
 use glam::UVec2;
 
 use super::add_work;
-use crate::constants::{MAX_GROUPS, TREE_DIGITS, TREE_LEAF};
+use crate::constants::{TREE_DIGITS, TREE_LEAF};
 use crate::engine::prefix_sum::scan_part;
 use crate::engine::room::resources::{RoomResources, TreeBuffers};
 use crate::engine::room::trace::photon_list_capacity;
@@ -41,6 +41,16 @@ pub fn modules() -> Vec<Module> {
 /// Timestamps that must be left before a pass, where every dispatch takes two.
 const TIMESTAMP_RESERVE: u32 = 64;
 
+/// What all steps share.
+#[derive(Clone, Copy)]
+struct Step<'a> {
+    resources: &'a RoomResources,
+    tree: &'a TreeBuffers,
+    plan: &'a RoomPlan,
+    /// Pair tests of a pass over the photons.
+    work: u64,
+}
+
 /// Builds the tree of a chunk's photons.
 pub(super) fn build(
     commands: &mut Commands,
@@ -54,22 +64,22 @@ pub(super) fn build(
     let capacity = photon_list_capacity(plan, photon_count);
     let push = TreePush { photon_capacity: capacity, axis: 0, digit: 0, height: 0 };
     let one = Extent::Groups(1, 1);
-    let size = DispatchSizePush { counter: 0, capacity, items_per_group: plan.settings.group_size, max_groups: MAX_GROUPS };
+    let size = DispatchSizePush::new(0, capacity, plan.settings.group_size);
     commands.dispatch(TreeSizes { photons, counters, item_args, run_args, scan_args }, &size, one)?;
-    let pass_work = plan.work.tree_pass(photon_count);
+    let step = Step { resources, tree, plan, work: plan.work.tree_pass(photon_count) };
     commands.scope("sort", |commands| {
         // The last pass ends in the first list, then in the second.
-        sort(commands, resources, tree, plan, &TreePush { axis: 0, ..push }, [&lists[1], &lists[0]], pass_work)?;
-        sort(commands, resources, tree, plan, &TreePush { axis: 1, ..push }, [&lists[2], &lists[1]], pass_work)
+        sort(commands, step, &TreePush { axis: 0, ..push }, [&lists[1], &lists[0]])?;
+        sort(commands, step, &TreePush { axis: 1, ..push }, [&lists[2], &lists[1]])
     })?;
     commands.scope("split", |commands| {
         let (mut along, mut spare) = ([&lists[0], &lists[1]], &lists[2]);
         for height in (1..=heights(capacity)).rev() {
             let push = TreePush { height, ..push };
             let axis = (height % 2) as usize;
-            split(commands, tree, plan, &push, along[axis], along[1 - axis], spare)?;
+            split(commands, step, &push, [along[axis], along[1 - axis]], spare)?;
             std::mem::swap(&mut along[1 - axis], &mut spare);
-            make_room(commands, plan, pass_work)?;
+            make_room(commands, step)?;
         }
         let leaves = TreeLeaves { photons, origins, wall_begins, keys: along[0], tree_photons, tree_origins };
         commands.dispatch(leaves, &(), Extent::Indirect(item_args))
@@ -81,26 +91,18 @@ fn heights(capacity: u32) -> u32 {
     capacity.div_ceil(TREE_LEAF).max(1).next_power_of_two().ilog2()
 }
 
-fn make_room(commands: &mut Commands, plan: &RoomPlan, pass_work: u64) -> Result<()> {
+fn make_room(commands: &mut Commands, Step { plan, work, .. }: Step) -> Result<()> {
     if commands.timestamps_left() < TIMESTAMP_RESERVE {
         commands.submit()?;
     }
-    add_work(commands, plan, pass_work)
+    add_work(commands, plan, work)
 }
 
 /// Sorts the photons by wall and along an axis; starts in the first list and ends in the second.
-fn sort(
-    commands: &mut Commands,
-    resources: &RoomResources,
-    tree: &TreeBuffers,
-    plan: &RoomPlan,
-    push: &TreePush,
-    lists: [&Buffer<UVec2>; 2],
-    pass_work: u64,
-) -> Result<()> {
+fn sort(commands: &mut Commands, step: Step, push: &TreePush, [mut keys, mut next_keys]: [&Buffer<UVec2>; 2]) -> Result<()> {
+    let Step { resources, tree, plan, .. } = step;
     let RoomResources { photons, counters, .. } = resources;
     let TreeBuffers { counts, item_args, run_args, wall_begins, longest, .. } = tree;
-    let [mut keys, mut next_keys] = lists;
     commands.dispatch(TreeKeys { photons, counters, keys }, push, Extent::Indirect(item_args))?;
     for digit in 0..=TREE_DIGITS {
         let push = TreePush { digit, ..*push };
@@ -111,7 +113,7 @@ fn sort(
         }
         commands.dispatch(TreeOrder { photons, counters, keys, counts, next_keys }, &push, Extent::Indirect(run_args))?;
         std::mem::swap(&mut keys, &mut next_keys);
-        make_room(commands, plan, pass_work)?;
+        make_room(commands, step)?;
     }
     Ok(())
 }
@@ -125,11 +127,9 @@ fn sum_counts(commands: &mut Commands, tree: &TreeBuffers, plan: &RoomPlan) -> R
 /// another list.
 fn split(
     commands: &mut Commands,
-    tree: &TreeBuffers,
-    plan: &RoomPlan,
+    Step { tree, plan, .. }: Step,
     push: &TreePush,
-    along: &Buffer<UVec2>,
-    across: &Buffer<UVec2>,
+    [along, across]: [&Buffer<UVec2>; 2],
     next_keys: &Buffer<UVec2>,
 ) -> Result<()> {
     let TreeBuffers { wall_begins, longest, ranks, counts, planes, item_args, .. } = tree;
