@@ -1,20 +1,10 @@
 //! Photons of a caustic map that are aimed at what makes caustics bring the same light with less noise.
 
-use crate::common::aimed::{KINDS, compare, far_lamp, mean_and_error, scene, settings};
-use crate::common::family::Family;
-use crate::common::lit::{self, grid, irradiances, received};
-use crate::common::{assert_complains, assert_holds, device, equal_sums};
-use glam::DVec3;
-use photonmill::engine;
+use crate::common::aimed::{KINDS, compare, far_lamp, scene, settings};
+use crate::common::lit;
+use crate::common::prelude::*;
 use photonmill::engine::scene::RunResult;
 use photonmill::engine::scene::replay::{Flights, light_paths};
-use photonmill::gpu::Gpu;
-use photonmill::plan::scene::ScenePlan;
-use photonmill::plan::sensor::Sensor;
-use photonmill::scene::Scene;
-use photonmill::scene::geometry::Geometry;
-use photonmill::settings::scene::{Illumination, Part, SceneSettings};
-use photonmill::settings::{Builder, Math};
 
 fn plan_of(gpu: &Gpu, scene: &Scene, settings: &SceneSettings) -> (Geometry, ScenePlan) {
     let geometry = Geometry::new(scene).unwrap();
@@ -113,11 +103,9 @@ fn aimed_photons_meet_what_they_are_aimed_at() {
 fn lamps_within_a_target_shine_in_all_directions() {
     let Some(gpu) = device() else { return };
     let mut room = lit::scene("furnace");
-    room.materials = vec![lit::mirror(0.5), lit::matt(0.5), lit::glass(1.5)];
+    room.materials = vec![mirror(0.5), matt(0.5), glass(1.5)];
     room.meshes[0].material = 1;
-    room.meshes.push(photonmill::scene::Mesh::sphere("ball", DVec3::new(0.5, 0.2, 0.5), 0.1, 16, 2));
-    let kind = photonmill::scene::light::LightKind::Point { position: DVec3::new(0.4, 0.6, 0.5), intensity: glam::Vec3::ONE };
-    room.lights = vec![lit::lamp(kind)];
+    room.lights = vec![lamp(point(DVec3::new(0.4, 0.6, 0.5)))];
     let found = |aim| received(&gpu, &room, &settings(5000, aim), &[(DVec3::new(0.5, 0.0, 0.5), DVec3::Y)]);
     let [all, aimed] = [false, true].map(found);
     assert!(all.plan.targets.is_empty() && aimed.plan.targets.is_empty());
@@ -167,7 +155,7 @@ fn pictures_agree(photons: u32, pairs: u64, share: f64) {
         let scene = lit::scene(name);
         let total = |aim, photons, seed| {
             let settings = SceneSettings { seed, caustic_radius: Some(0.05), bounces: 32, ..settings(photons, aim) };
-            let lit = lit::seen(&gpu, &scene, &settings, &scene.cameras[0], [48, 48]);
+            let lit = seen(&gpu, &scene, &settings, &scene.cameras[0], [48, 48]);
             lit.film.part_totals[2] as f64 / lit.plan.film_scale
         };
         let pairs: Vec<[f64; 2]> = (0..pairs).map(|seed| [total(false, photons, 1 + seed), total(true, photons / 10, 1 + seed)]).collect();

@@ -5,8 +5,8 @@ use std::sync::atomic::AtomicBool;
 use std::sync::{Mutex, MutexGuard, OnceLock, PoisonError};
 use std::time::Duration;
 
-use crate::common::{Device, device, device_with, lit, planted};
-use photonmill::gpu::{Gpu, Options};
+use crate::common::planted;
+use crate::common::prelude::*;
 use photonmill::measure::bench::experiment::Experiment;
 use photonmill::measure::bench::rates::{self, Rates};
 use photonmill::measure::bench::room::{self, Timed};
@@ -14,9 +14,6 @@ use photonmill::measure::bench::scene::{self, Job};
 use photonmill::measure::bench::targets::TARGETS;
 use photonmill::measure::bench::{self, Bench, Request, Size, table};
 use photonmill::output::destination::Folder;
-use photonmill::scene::geometry::Geometry;
-use photonmill::settings::scene::SceneSettings;
-use photonmill::settings::{Builder, RoomSettings};
 use serde_json::Value;
 
 /// Measurements of one device do not disturb each other.
@@ -40,7 +37,7 @@ fn bench(experiments: &[Experiment], change: impl Fn(&mut Request), cancelled: b
         command: "photonmill bench".to_owned(),
         size: Size::Small,
         experiments: experiments.to_vec(),
-        scene: lit::scene("cornell-spheres"),
+        scene: scene("cornell-spheres"),
         scale: false,
         budget: Duration::from_secs(36_000),
     };
@@ -113,9 +110,9 @@ fn the_roofline_counts_every_dispatch() {
         let settings = RoomSettings { builder, photons: 600, mesh: 4, bounces: 3, chunk: Some(300), ..RoomSettings::default() };
         check(builder.name(), &room::time(&gpu, rates, &settings, &never).unwrap());
     }
-    let scene = lit::scene("cornell-spheres");
+    let scene = scene("cornell-spheres");
     let geometry = Geometry::new(&scene).unwrap();
-    for illumination in lit::BOTH {
+    for illumination in BOTH {
         let settings =
             SceneSettings { photons: 600, caustic_photons: 500, bounces: 3, chunk: Some(400), illumination, ..SceneSettings::default() };
         let job = Job { name: "cornell-spheres", scene: &scene, geometry: &geometry, size: (8, 8), settings };

@@ -3,24 +3,12 @@
 use std::sync::OnceLock;
 use std::sync::atomic::AtomicBool;
 
-use crate::common::lit::scene;
-use crate::common::{Check, assert_complains, assert_holds, device, pairs};
-use photonmill::engine;
-use photonmill::engine::Control;
+use crate::common::prelude::*;
 use photonmill::engine::bias::{self, Batches, Bias};
+use photonmill::engine::room;
 use photonmill::engine::room::film::estimate_walls;
-use photonmill::engine::room::{self};
 use photonmill::engine::scene::{self, View};
-use photonmill::gpu::Gpu;
 use photonmill::plan::radius::mean_squared_radius;
-use photonmill::plan::scene::ScenePlan;
-use photonmill::plan::sensor::Sensor;
-use photonmill::rng::Rng;
-use photonmill::scene::geometry::Geometry;
-use photonmill::scene::open_box::open_box;
-use photonmill::scene::{Camera, Scene};
-use photonmill::settings::RoomSettings;
-use photonmill::settings::scene::{Illumination, SceneSettings};
 use photonmill::settings::stop::Stop;
 use photonmill::verify::judge::radiosity::{Law, Radiosity, WALLS, on_wall};
 

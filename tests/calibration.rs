@@ -262,9 +262,9 @@ fn stored_photons_over_albedo_are_the_arriving_ones() {
     let (mean_found, mean_expected) = (mean(&mut found.iter().copied()), mean(&mut arriving.iter().map(|(mean, _)| *mean)));
     let check = |gain: f64| -> Check {
         // All blocks together tell a percent or two, as errors of neighbours are not independent.
-        if (gain * mean_found / mean_expected - 1.0).abs() > 0.015 {
-            return Err(format!("{} W/m2 over all blocks where {mean_expected} arrive", gain * mean_found));
-        }
+        require((gain * mean_found / mean_expected - 1.0).abs() <= 0.015, || {
+            format!("{} W/m2 over all blocks where {mean_expected} arrive", gain * mean_found)
+        })?;
         (0..BLOCKS).try_for_each(|block| {
             let (expected, variance) = arriving[block];
             let error = (variance + fewer * reflected[block].1).sqrt();

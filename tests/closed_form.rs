@@ -2,19 +2,12 @@
 //! `tests/closed_rooms.rs` has light that is scattered to and fro, `tests/optics.rs` mirrors and glass,
 //! `tests/radiosity.rs` the paper's box.
 
-use std::f64::consts::PI;
 use std::sync::atomic::AtomicBool;
 
-use crate::common::family::{FALSE_ALARM, Family, normal_p_value};
-use crate::common::lit::{assert_builders_agree, irradiances, level, matt, received, scene, scene_of, shining};
-use crate::common::{Check, Complaint, Kind, assert_complains, assert_holds, device, known, pairs};
-use glam::{DVec3, Vec3};
-use photonmill::gpu::Gpu;
+use crate::common::family::{FALSE_ALARM, normal_p_value};
+use crate::common::known;
+use crate::common::prelude::*;
 use photonmill::scene::closed_forms::NAMES;
-use photonmill::scene::light::LightKind;
-use photonmill::scene::{Mesh, Scene};
-use photonmill::settings::EmissionLaw;
-use photonmill::settings::scene::{Illumination, SceneSettings};
 use photonmill::verify::judge::radiosity::{cells_of, form_factor_from, on_wall};
 use photonmill::verify::selfcheck::measure::{irradiance, radiance};
 use photonmill::verify::selfcheck::{self, Estimate, Finding};

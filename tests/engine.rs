@@ -201,9 +201,7 @@ fn count_check(timings: &Timings, settings: &RoomSettings, chunks: u64) -> Check
         }
     }
     let rows = timings.rows().iter().filter(|row| row.name.contains("bounce")).count();
-    if rows != bounces as usize {
-        return Err(format!("{rows} rows of bounces instead of {bounces}"));
-    }
+    require(rows == bounces as usize, || format!("{rows} rows of bounces instead of {bounces}"))?;
     Ok(())
 }
 

@@ -1,7 +1,6 @@
 //! Sums, estimates and sizes at their ends: more photons than f32 or 32 bits count, light over many decades, the
 //! least and the largest radius, one photon and none, and plans around every limit.
 
-use crate::common::aimed::mean_and_error;
 use crate::common::lit::received_within;
 use crate::common::prelude::*;
 use glam::EulerRot;
@@ -25,14 +24,13 @@ const U: f64 = 1.0 / 16_777_216.0;
 #[test]
 fn a_texel_counts_beyond_2_to_the_24() {
     let (count, times) = (1 << 20, 40);
-    let on_the_back_wall = Photon { position: Vec3::new(0.0, 0.0, -0.25), wall: 4, flux: 1.0, weight: 1.0, photon: 0, bounce: 0 };
     let expected = [0, 0, 0, 0, u64::from(count * times)];
     for without_int64_atomics in [false, true] {
         let Some(gpu) = device_with(Options { without_int64_atomics, ..Options::default() }) else { return };
         let settings =
             RoomSettings { photons: count, chunk: Some(count), bounces: 1, mesh: 1, rng: Rng::Philox, ..RoomSettings::default() };
         let plan = plan_for(&gpu, &open_box(&settings), &settings);
-        let found = gathered(&gpu, &plan, &vec![on_the_back_wall; count as usize], times, None);
+        let found = gathered(&gpu, &plan, &vec![on_back_wall(0.0, 0.0, 0); count as usize], times, None);
         assert_holds(format!("64-bit atomics masked: {without_int64_atomics}"), equal_sums("one texel", &found, &expected));
     }
     let in_f32 = (0..count * times).fold(0.0f32, |sum, _| sum + 1.0);

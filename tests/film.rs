@@ -222,17 +222,12 @@ fn the_cpu_builders_film_agrees_to_single_counts() {
     }
 }
 
-/// One photon at a place on the back wall, where x and y lie along the wall.
-fn photon_at(x: f32, y: f32) -> Photon {
-    Photon { position: Vec3::new(x, y, -0.25), wall: 4, flux: 1.0, weight: 1.0, photon: 0, bounce: 0 }
-}
-
 /// (radius in texels, photon, texels in reach): a radius is inclusive, and in these units every number
 /// is exact, so that ties are ties.
 fn ties() -> Vec<(f64, Photon, u64)> {
     let pitch = 0.5 / 64.0;
-    let centre = photon_at(0.5 * pitch, 0.5 * pitch);
-    let corner = photon_at(0.0, 0.0);
+    let centre = on_back_wall(0.5 * pitch, 0.5 * pitch, 0);
+    let corner = on_back_wall(0.0, 0.0, 0);
     // Twelve texels lie exactly 5 away (5 + 0 and 3 + 4), and would be missed by a strict test: 69.
     vec![(5.0, centre, 81), (6.4, centre, 129), (3.2, centre, 37), (6.4, corner, 124)]
 }
@@ -262,7 +257,7 @@ fn an_empty_map_and_a_map_of_one() {
         assert!(gathered_on_gpu(&gpu, &settings, &[]).iter().all(|sum| *sum == 0));
         let plan = plan_for(&gpu, &open_box(&settings), &settings);
         for (x, y) in [(0.25, 0.25), (-0.25, -0.25), (0.25, -0.25), (0.1, 0.25), (0.0, 0.0)] {
-            let photon = photon_at(x, y);
+            let photon = on_back_wall(x, y, 0);
             let found = gathered_on_gpu(&gpu, &settings, &[photon]);
             assert_holds(format!("{gather:?}"), equal_sums("one photon", &found, &gathered_on_cpu(&plan, &[photon])));
             assert_eq!(found.iter().sum::<u64>(), texels_in_reach(&plan, &[photon]));
@@ -392,11 +387,7 @@ fn near(found: &RoomFilm, expected: &RoomFilm, allowed: impl Fn(f64) -> f64) -> 
     assert_eq!(found.sums.len(), expected.sums.len());
     for sum in 0..found.sums.len() {
         let (a, b) = (found.units(sum), expected.units(sum));
-        // Written so that NaN complains.
-        let is_near = (a - b).abs() <= allowed(b);
-        if !is_near {
-            return Err(format!("sum {sum} is {a} where {b} +- {} is right", allowed(b)));
-        }
+        require((a - b).abs() <= allowed(b), || format!("sum {sum} is {a} where {b} +- {} is right", allowed(b)))?;
     }
     Ok(())
 }
@@ -467,7 +458,7 @@ fn counted_on(gpu: Option<&Gpu>, settings: &RoomSettings, start: f32, count: u32
         Sums::Integer => start as u64,
         Sums::F32 | Sums::Compensated => u64::from(start.to_bits()),
     };
-    let photon = [photon_at(0.0, 0.0)];
+    let photon = [on_back_wall(0.0, 0.0, 0)];
     let plan = gpu.map_or_else(|| plan_for_host(settings), |gpu| plan_for(gpu, &open_box(settings), settings));
     let mut sums = vec![bits; plan.points.len()];
     match gpu {

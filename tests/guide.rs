@@ -123,9 +123,9 @@ fn outputs<'a>(arguments: &[&'a str]) -> Vec<&'a str> {
 fn run(folder: &Path, command: &str) -> Check {
     let line = command.replace("tools/setup && cargo run --release --", "photonmill");
     let mut words = line.split_whitespace();
-    if words.next() != Some("photonmill") || line.contains(['|', '>', '<', ';', '&', '$', '"', '\'', '\\']) {
-        return Err(format!("{command}: is neither run nor listed as not run"));
-    }
+    require(words.next() == Some("photonmill") && !line.contains(['|', '>', '<', ';', '&', '$', '"', '\'', '\\']), || {
+        format!("{command}: is neither run nor listed as not run")
+    })?;
     let arguments: Vec<&str> = words.collect();
     let mut run = short(&arguments);
     match std::env::var("PHOTONMILL_DEVICE") {
@@ -254,9 +254,7 @@ fn guide_links_check(path: &str, text: &str, for_rustdoc: &[(String, String)], b
         return Err(format!("{path}: rustdoc cannot follow ({target})"));
     }
     for (label, target) in &defined {
-        if !root("src/guide").join(target).is_file() {
-            return Err(format!("{path}: there is no {target}"));
-        }
+        require(root("src/guide").join(target).is_file(), || format!("{path}: there is no {target}"))?;
         let has_twin = match target.strip_suffix(".md") {
             Some(page) => for_rustdoc.contains(&(label.clone(), format!("crate::guide::{page}"))),
             None => {
@@ -264,16 +262,12 @@ fn guide_links_check(path: &str, text: &str, for_rustdoc: &[(String, String)], b
                 chart.ends_with(label.as_str()) && build.contains(&format!("\"{chart}\""))
             }
         };
-        if !has_twin {
-            return Err(format!("{path}: rustdoc knows no [{label}]"));
-        }
+        require(has_twin, || format!("{path}: rustdoc knows no [{label}]"))?;
     }
     let in_brackets = text.split('[').skip(1).filter_map(|rest| Some(rest.split_once(']')?.0));
     let is_label = |label: &&str| !label.is_empty() && label.chars().all(|letter| letter.is_ascii_lowercase() || letter == '-');
     for label in in_brackets.filter(is_label) {
-        if !defined.iter().any(|(known, _)| known == label) {
-            return Err(format!("{path}: [{label}] is not defined"));
-        }
+        require(defined.iter().any(|(known, _)| known == label), || format!("{path}: [{label}] is not defined"))?;
     }
     Ok(())
 }

@@ -723,9 +723,7 @@ fn table_check(cases: &[Case], tests: &[String], program: &[String]) -> Check {
     if let Some(case) = all.iter().find(|number| cases.iter().filter(|case| case.number == **number).count() != 1) {
         return Err(format!("{case} does not stand in the table once"));
     }
-    if cases.len() != all.len() {
-        return Err(format!("{} cases instead of {}", cases.len(), all.len()));
-    }
+    require(cases.len() == all.len(), || format!("{} cases instead of {}", cases.len(), all.len()))?;
     let is_test = |name: &&str| {
         let head = format!("fn {name}()");
         tests.iter().any(|source| {

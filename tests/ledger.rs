@@ -6,27 +6,21 @@ use photonmill::ledger::{BounceFates, Fates};
 
 /// Every path that entered a bounce has one fate there, and who was stored enters the next.
 fn closes(fates: &Fates, emitted: u64) -> Check {
-    if fates.emitted != emitted {
-        return Err(format!("{} photons emitted instead of {emitted}", fates.emitted));
-    }
+    require(fates.emitted == emitted, || format!("{} photons emitted instead of {emitted}", fates.emitted))?;
     let mut entering = emitted;
     for (bounce, BounceFates { stored, absorbed, escaped, dropped }) in fates.bounces.iter().enumerate() {
-        if stored + absorbed + escaped + dropped != entering {
-            return Err(format!("bounce {}: {entering} paths had {stored} + {absorbed} + {escaped} + {dropped} fates", bounce + 1));
-        }
-        if *dropped != 0 {
-            return Err(format!("bounce {}: {dropped} photons dropped", bounce + 1));
-        }
+        require(stored + absorbed + escaped + dropped == entering, || {
+            format!("bounce {}: {entering} paths had {stored} + {absorbed} + {escaped} + {dropped} fates", bounce + 1)
+        })?;
+        require(*dropped == 0, || format!("bounce {}: {dropped} photons dropped", bounce + 1))?;
         entering = *stored;
     }
     let ledger = fates.ledger();
     let sum = ledger.absorbed + ledger.escaped + ledger.cut_off + ledger.dropped;
-    if !ledger.closes() || sum != emitted || ledger.cut_off != entering {
-        return Err(format!("{ledger:?} does not close"));
-    }
-    if ledger.stored != fates.bounces.iter().map(|bounce| bounce.stored).sum::<u64>() {
-        return Err(format!("{ledger:?} does not hold what the bounces stored"));
-    }
+    require(ledger.closes() && sum == emitted && ledger.cut_off == entering, || format!("{ledger:?} does not close"))?;
+    require(ledger.stored == fates.bounces.iter().map(|bounce| bounce.stored).sum::<u64>(), || {
+        format!("{ledger:?} does not hold what the bounces stored")
+    })?;
     Ok(())
 }
 

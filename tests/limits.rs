@@ -1,28 +1,15 @@
 //! Limits of a run: no light is lost to them without being counted, and a run ends soon after it is asked to.
 
 use std::sync::atomic::{AtomicBool, Ordering};
-use std::time::{Duration, Instant};
+use std::time::Duration;
 
-use crate::common::lit::{BOTH, glass, level, matt, mean_red, mirror, received, scene, scene_of, seen, shaft, shining};
-use crate::common::{assert_complains, assert_holds, device, z_check};
-use glam::{DVec3, Vec3};
+use crate::common::prelude::*;
 use photonmill::constants::MAX_BOUNCES;
-use photonmill::engine;
-use photonmill::engine::Control;
 use photonmill::engine::End;
 use photonmill::engine::scene::resources::SceneResources;
 use photonmill::engine::scene::{self, Round, RunResult, View, trace};
-use photonmill::error::Error;
-use photonmill::gpu::{Commands, Gpu};
 use photonmill::output::scene_report;
 use photonmill::plan::radius::{mean_squared_radius, squared_radius};
-use photonmill::plan::scene::ScenePlan;
-use photonmill::plan::sensor::Sensor;
-use photonmill::scene::geometry::Geometry;
-use photonmill::scene::light::LightKind;
-use photonmill::scene::{Camera, Scene};
-use photonmill::settings::Builder;
-use photonmill::settings::scene::{Illumination, SceneSettings};
 use photonmill::settings::stop::Stop;
 
 fn settings() -> SceneSettings {
@@ -43,7 +30,7 @@ const POINT: [(DVec3, DVec3); 1] = [(DVec3::new(0.5, 0.0, 0.5), DVec3::Y)];
 fn bright_rooms_lose_no_light() {
     let Some(gpu) = device() else { return };
     for albedo in [0.95f32, 0.99] {
-        let exact = std::f64::consts::PI / (1.0 - f64::from(albedo));
+        let exact = PI / (1.0 - f64::from(albedo));
         for builder in [Builder::Atomic, Builder::Ballot, Builder::Persistent] {
             let what = format!("albedo {albedo}, {}", builder.name());
             let settings = SceneSettings { builder: Some(builder), radius: Some(0.4), alpha: 1.0, ..settings() };
@@ -79,7 +66,7 @@ fn what_a_cap_cuts_off_is_counted() {
         let error = (survivors * (1.0 - survivors) / emitted).sqrt();
         assert_holds(&what, z_check(&what, losses.share(), survivors, error));
         assert_holds(&what, z_check(&what, fates[0].ledger().cut_off as f64 / emitted, survivors, error));
-        let exact = std::f64::consts::PI / (1.0 - f64::from(albedo));
+        let exact = PI / (1.0 - f64::from(albedo));
         let lost = 1.0 - mean_red(&lit) / exact;
         assert!(losses.relative >= lost, "{what}: {lost} is lost, at most {} is stated", losses.relative);
     }
@@ -121,7 +108,7 @@ fn light_trapped_for_ever_is_counted() {
     let scene = scene_of(meshes, vec![mirror(1.0), matt(0.5), glass(1.5)], vec![lamp]);
     let settings = SceneSettings { rounds: 1, photons: 40, illumination: Illumination::Photons, ..settings() };
     let camera = Camera::looking_at("ray", DVec3::new(0.0, 0.5, 0.1), DVec3::new(0.4, 0.8, 0.2), DVec3::Y, 0.5);
-    let lit = seen(&gpu, &scene, &SceneSettings { with: vec![photonmill::settings::scene::Effect::Indirect], ..settings }, &camera, [2, 1]);
+    let lit = seen(&gpu, &scene, &SceneSettings { with: vec![Effect::Indirect], ..settings }, &camera, [2, 1]);
     // Roulette ends what the eye sees there.
     assert_eq!(lit.losses.camera_paths, 0);
     let ledger = lit.fates[0].ledger();

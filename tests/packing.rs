@@ -182,11 +182,7 @@ fn ask(gpu: &Gpu, packed: &[PackingCase], nodes: &[BvhNode]) -> Found {
 }
 
 fn same<T: bytemuck::Pod + std::fmt::Debug>(what: &str, found: T, expected: T) -> Check {
-    if bytemuck::bytes_of(&found) == bytemuck::bytes_of(&expected) {
-        Ok(())
-    } else {
-        Err(format!("{what}: {found:?} instead of {expected:?}"))
-    }
+    require(bytemuck::bytes_of(&found) == bytemuck::bytes_of(&expected), || format!("{what}: {found:?} instead of {expected:?}"))
 }
 
 /// Everything that Rust and the device make of a case.
@@ -194,9 +190,9 @@ fn twins(found: &Found, index: usize, case: &PackingCase, node: &CwBvhNode) -> C
     let unpacked = found.room[index];
     // The place of an empty slot means nothing.
     let first = if case.wall == NO_WALL { 2 } else { 0 };
-    if found.photons[index].0[first..] != photon(case).stored().0[first..] {
-        return Err(format!("a packed photon: {:?} instead of {:?}", found.photons[index], photon(case).stored()));
-    }
+    require(found.photons[index].0[first..] == photon(case).stored().0[first..], || {
+        format!("a packed photon: {:?} instead of {:?}", found.photons[index], photon(case).stored())
+    })?;
     same("an unpacked wall", unpacked.wall, case.wall)?;
     if case.wall != NO_WALL {
         same("an unpacked place", unpacked.place, case.position)?;
@@ -238,9 +234,9 @@ fn twins(found: &Found, index: usize, case: &PackingCase, node: &CwBvhNode) -> C
     let number = index as u32 & 3;
     same("a packed direction", unpacked.direction_code, octahedral(case.direction, 16_383.0, 15) | number << 30)?;
     let normal = unpack_normal(case.normal_code);
-    if (unpacked.normal - normal).abs().max_element() > 4.0 * f32::EPSILON {
-        return Err(format!("an unpacked normal: {:?} instead of {normal:?}", unpacked.normal));
-    }
+    require((unpacked.normal - normal).abs().max_element() <= 4.0 * f32::EPSILON, || {
+        format!("an unpacked normal: {:?} instead of {normal:?}", unpacked.normal)
+    })?;
 
     let child = index & 7;
     let spacing = Vec3::from_array(node.e.map(|exponent| 2f32.powi(i32::from(exponent) - 127)));

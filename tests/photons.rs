@@ -16,16 +16,14 @@ const COUNTS: [u32; 12] = [2, 3, 7, 8, 9, 31, 63, 64, 65, 129, 1000, 5001];
 /// outside the numbers of the round.
 fn each_once(found: &[Photon], photon_count: u32, bounces: u32) -> Check {
     let seen: HashSet<(u32, u32)> = found.iter().map(|photon| (photon.photon, photon.bounce)).collect();
-    if seen.len() != found.len() {
-        return Err(format!("{} of {} photons are there twice", found.len() - seen.len(), found.len()));
-    }
+    require(seen.len() == found.len(), || format!("{} of {} photons are there twice", found.len() - seen.len(), found.len()))?;
     for &(photon, bounce) in &seen {
-        if photon >= photon_count || bounce >= bounces {
-            return Err(format!("photon {photon} at bounce {bounce} is none of {photon_count} with {bounces} bounces"));
-        }
-        if bounce > 0 && !seen.contains(&(photon, bounce - 1)) {
-            return Err(format!("photon {photon} was stored at bounce {bounce} and not before"));
-        }
+        require(photon < photon_count && bounce < bounces, || {
+            format!("photon {photon} at bounce {bounce} is none of {photon_count} with {bounces} bounces")
+        })?;
+        require(bounce == 0 || seen.contains(&(photon, bounce - 1)), || {
+            format!("photon {photon} was stored at bounce {bounce} and not before")
+        })?;
     }
     Ok(())
 }

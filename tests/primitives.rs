@@ -41,9 +41,7 @@ fn running_sums(items: &[u32]) -> Vec<u32> {
 }
 
 fn same_numbers(found: &[u32], expected: &[u32]) -> Check {
-    if found.len() != expected.len() {
-        return Err(format!("{} numbers instead of {}", found.len(), expected.len()));
-    }
+    require(found.len() == expected.len(), || format!("{} numbers instead of {}", found.len(), expected.len()))?;
     match (0..found.len()).find(|&place| found[place] != expected[place]) {
         None => Ok(()),
         Some(place) => Err(format!("number {place} is {} instead of {}", found[place], expected[place])),
@@ -112,26 +110,18 @@ fn index_check(plan: &RoomPlan, cells: &[u32], sorted: &[Photon], map: &[Photon]
     let mut found: Vec<[u32; 6]> = sorted.iter().map(sorted_bits).collect();
     expected.sort_unstable();
     found.sort_unstable();
-    if found != expected {
-        return Err("the sorted photons are not the photons of the map".to_owned());
-    }
-    if cells.last() != Some(&(map.len() as u32)) {
-        return Err(format!("the last cell ends at {:?} of {}", cells.last(), map.len()));
-    }
+    require(found == expected, || "the sorted photons are not the photons of the map")?;
+    require(cells.last() == Some(&(map.len() as u32)), || format!("the last cell ends at {:?} of {}", cells.last(), map.len()))?;
     let mut begin = 0;
     for (cell, &end) in cells.iter().enumerate() {
-        if end < begin {
-            return Err(format!("cell {cell} ends at {end} before it begins at {begin}"));
-        }
+        require(end >= begin, || format!("cell {cell} ends at {end} before it begins at {begin}"))?;
         for photon in &sorted[begin as usize..end as usize] {
             let place: [u32; 3] = std::array::from_fn(|axis| {
                 let along = (photon.position[axis] - grid.origin[axis]) * grid.cells_per_metre;
                 (along.floor().max(0.0) as u32).min(grid.cell_count[axis] - 1)
             });
             let number = (place[2] * grid.cell_count[1] + place[1]) * grid.cell_count[0] + place[0];
-            if number as usize != cell {
-                return Err(format!("{photon:?} of cell {number} lies in cell {cell}"));
-            }
+            require(number as usize == cell, || format!("{photon:?} of cell {number} lies in cell {cell}"))?;
         }
         begin = end;
     }
@@ -249,71 +239,63 @@ fn append(gpu: &Device, scene: &RoomScene, settings: &RoomSettings, capacity: u3
 
 /// Everything that must hold of a map with too little room; `all` are the photons that exist.
 fn overflow_check(appended: &Appended, settings: &RoomSettings, capacity: u32, all: &[Photon]) -> Check {
-    let fail = |complaint: String| Err(complaint);
     if let Some(word) = appended.guards.iter().find(|word| **word != GUARD) {
-        return fail(format!("a guard word became {word:#x}"));
+        return Err(format!("a guard word became {word:#x}"));
     }
     let entries = appended.entries(settings);
     let stored: Vec<Photon> = appended.stored(settings).copied().collect();
     let told: u32 = appended.tallies.iter().map(|tally| tally.stored).sum();
-    if stored.len() as u32 != told {
-        return fail(format!("{} photons are in the map, {told} were counted", stored.len()));
-    }
+    require(stored.len() as u32 == told, || format!("{} photons are in the map, {told} were counted", stored.len()))?;
     let exist: HashSet<Vec<u8>> = all.iter().map(|photon| bytemuck::bytes_of(photon).to_vec()).collect();
     if let Some(stranger) = stored.iter().find(|photon| !exist.contains(bytemuck::bytes_of(*photon))) {
-        return fail(format!("{stranger:?} is no photon of this run"));
+        return Err(format!("{stranger:?} is no photon of this run"));
     }
-    if stored.iter().map(|photon| (photon.photon, photon.bounce)).collect::<HashSet<_>>().len() != stored.len() {
-        return fail("a photon is there twice".to_owned());
-    }
+    require(
+        stored.iter().map(|photon| (photon.photon, photon.bounce)).collect::<HashSet<_>>().len() == stored.len(),
+        || "a photon is there twice",
+    )?;
     let mut entering = settings.photons;
     for (bounce, tally) in appended.tallies.iter().enumerate() {
-        if tally.stored + tally.absorbed + tally.escaped + tally.dropped != entering {
-            return fail(format!("bounce {}: {entering} entered, {tally:?}", bounce + 1));
-        }
+        require(tally.stored + tally.absorbed + tally.escaped + tally.dropped == entering, || {
+            format!("bounce {}: {entering} entered, {tally:?}", bounce + 1)
+        })?;
         entering = tally.stored;
     }
     let survivors: u32 = appended.tallies.iter().map(|tally| tally.stored + tally.dropped).sum();
     let first = &appended.tallies[0];
     let needed = all.iter().filter(|photon| photon.bounce == 0).count() as u32;
-    if first.stored + first.dropped != needed {
-        return fail(format!("{} + {} survivors of the first bounce, {needed} are right", first.stored, first.dropped));
-    }
+    require(first.stored + first.dropped == needed, || {
+        format!("{} + {} survivors of the first bounce, {needed} are right", first.stored, first.dropped)
+    })?;
     if settings.builder == Builder::Naive {
         // Slot = number of the photon, so it is known which ones find no room.
         let fits = all.iter().filter(|photon| photon.bounce * settings.photons + photon.photon < capacity);
         // A photon that was dropped at one bounce has no later ones.
         let kept: Vec<Photon> = fits.filter(|photon| photon.photon < capacity).copied().collect();
-        if in_order(stored) != in_order(kept) {
-            return fail("other photons than those of the slots that exist".to_owned());
-        }
+        require(in_order(stored) == in_order(kept), || "other photons than those of the slots that exist")?;
         return Ok(());
     }
     // Gaps take places, too.
     let has_gaps = appended.has_gaps;
-    if told != capacity.min(survivors) && !has_gaps {
-        return fail(format!("{told} of {capacity} places taken by {survivors} survivors"));
-    }
-    if told < survivors && appended.counters[0] <= capacity {
-        return fail(format!("{survivors} survivors, {told} of them stored, and room was left"));
-    }
-    if appended.counters[0] < survivors || appended.counters[0] > survivors && !has_gaps {
-        return fail(format!("the counter says {} instead of the need, {survivors}", appended.counters[0]));
-    }
+    require(told == capacity.min(survivors) || has_gaps, || format!("{told} of {capacity} places taken by {survivors} survivors"))?;
+    require(told >= survivors || appended.counters[0] > capacity, || {
+        format!("{survivors} survivors, {told} of them stored, and room was left")
+    })?;
+    require(appended.counters[0] >= survivors && (appended.counters[0] <= survivors || has_gaps), || {
+        format!("the counter says {} instead of the need, {survivors}", appended.counters[0])
+    })?;
     if settings.builder == Builder::Persistent {
         // No bounce hands paths to the next.
         return Ok(());
     }
     let places: u32 = appended.counters[2..].iter().sum();
-    if places != entries {
-        return fail(format!("{places} places of paths, {entries} of photons"));
-    }
+    require(places == entries, || format!("{places} places of paths, {entries} of photons"))?;
     for (bounce, tally) in appended.tallies.iter().enumerate() {
         let paths = appended.counters[2 + bounce];
         let most = if has_gaps { appended.counters[1 + bounce].next_multiple_of(settings.group_size) } else { tally.stored };
-        if !(tally.stored..=most).contains(&paths) {
-            return fail(format!("{} paths leave bounce {}, {} were stored", appended.counters[2 + bounce], bounce + 1, tally.stored));
-        }
+        require((tally.stored..=most).contains(&paths), || {
+            format!("{} paths leave bounce {}, {} were stored", appended.counters[2 + bounce], bounce + 1, tally.stored)
+        })?;
     }
     Ok(())
 }

@@ -165,16 +165,12 @@ fn emitted(gpu: &Device, plan: &RoomPlan, round: u32, range: EmissionRange) -> V
 /// roundings (radius, square root, polynomial, two products).
 fn same_start(found: &[Path], expected: &[Path]) -> Check {
     for (a, b) in pairs(found, expected) {
-        if (a.photon, a.stream, a.wall) != (b.photon, b.stream, b.wall) {
-            return Err(format!("{a:?} instead of {b:?}"));
-        }
+        require((a.photon, a.stream, a.wall) == (b.photon, b.stream, b.wall), || format!("{a:?} instead of {b:?}"))?;
         // Sums carry what is no number, and a maximum would not.
         let off = f64::from((a.position - b.position).abs().element_sum() + (a.direction - b.direction).abs().element_sum());
-        if off.is_nan() || off > 8.0 * U {
-            return Err(format!("{a:?} is {off:e} off {b:?}"));
-        }
+        require(off <= 8.0 * U, || format!("{a:?} is {off:e} off {b:?}"))?;
     }
-    if found.len() == expected.len() { Ok(()) } else { Err(format!("{} photons instead of {}", found.len(), expected.len())) }
+    require(found.len() == expected.len(), || format!("{} photons instead of {}", found.len(), expected.len()))
 }
 
 /// Numbers that f32 does not tell apart (2^24), the last of the largest round, and rounds so late that 2^47
@@ -355,7 +351,7 @@ fn sobol_draws(seed: u64, light: u32, sample: u32, bounces: u32) -> Vec<f32> {
 fn one_in_each_interval(numbers: impl ExactSizeIterator<Item = f32>) -> Check {
     let count = numbers.len();
     let distinct: HashSet<usize> = numbers.map(|u| class(u, count)).collect();
-    if distinct.len() == count { Ok(()) } else { Err(format!("{} of {count} intervals are hit", distinct.len())) }
+    require(distinct.len() == count, || format!("{} of {count} intervals are hit", distinct.len()))
 }
 
 /// One of 2^k points in each of 2^k equal boxes, whatever their shape: a (0, k, 2)-net.
@@ -364,9 +360,7 @@ fn one_in_each_box(points: &[(f32, f32)]) -> Check {
     for columns in (0..=count.ilog2()).map(|log| 1usize << log) {
         let rows = count / columns;
         let distinct: HashSet<usize> = points.iter().map(|(x, y)| class(*x, columns) * rows + class(*y, rows)).collect();
-        if distinct.len() != count {
-            return Err(format!("{} of {columns} x {rows} boxes are hit", distinct.len()));
-        }
+        require(distinct.len() == count, || format!("{} of {columns} x {rows} boxes are hit", distinct.len()))?;
     }
     Ok(())
 }
@@ -454,9 +448,7 @@ fn sobol_scrambles_are_uniform_and_independent() {
         let mut counts = [0u32; 100];
         a.iter().zip(b).for_each(|(a, b)| counts[10 * class(a[j], 10) + class(b[k], 10)] += 1);
         let chi_square: f64 = counts.iter().map(|count| (f64::from(*count) - 200.0).powi(2) / 200.0).sum();
-        if chi_square > 183.7 {
-            return Err(format!("pairs: chi-square {chi_square:.1} of 99 degrees of freedom"));
-        }
+        require(chi_square <= 183.7, || format!("pairs: chi-square {chi_square:.1} of 99 degrees of freedom"))?;
         correlation_check("draws", a.iter().zip(b).map(|(a, b)| (a[j], b[k])))
     };
     for dimension in 0..3 {
@@ -536,9 +528,9 @@ fn sobol_photons_are_as_many_with_less_noise() {
             println!("{what}: {mean:.1} photons, {:.1} times less variance than by chance", chance / variance);
             // With the error that chance would have: the points' own is smaller.
             z_check(what, mean, trials * probability, (chance / f64::from(seeds)).sqrt())?;
-            if chance < least * variance {
-                return Err(format!("{what}: {:.1} times less variance than by chance, where {least} are asked", chance / variance));
-            }
+            require(chance >= least * variance, || {
+                format!("{what}: {:.1} times less variance than by chance, where {least} are asked", chance / variance)
+            })?;
         }
         Ok(())
     };

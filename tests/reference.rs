@@ -125,23 +125,17 @@ const FLIPS: f64 = 2e-5;
 /// Power tables texel by texel: a texel may differ by one photon, a share [`FLIPS`] of the pairs in
 /// all; beyond that a weight may be off by `tolerance` of its size.
 fn same_power(film: &RoomFilm, expected: &[f64], counts: &[f64], tolerance: f64) -> Check {
-    if film.point_count() != expected.len() {
-        return Err(format!("{} points instead of {}", film.point_count(), expected.len()));
-    }
+    require(film.point_count() == expected.len(), || format!("{} points instead of {}", film.point_count(), expected.len()))?;
     let mut flipped = 0;
     for (texel, (&expected, &count)) in pairs(expected, counts).enumerate() {
         let difference = (film.power(texel) - expected).abs();
         // Every photon in reach may be off by the tolerance.
         let rounding = tolerance * count;
-        if difference > 1.0 + rounding {
-            return Err(format!("texel {texel}: {} instead of {expected}", film.power(texel)));
-        }
+        require(difference <= 1.0 + rounding, || format!("texel {texel}: {} instead of {expected}", film.power(texel)))?;
         flipped += usize::from(difference > rounding);
     }
     let allowed = FLIPS * counts.iter().sum::<f64>();
-    if flipped as f64 > allowed {
-        return Err(format!("{flipped} texels differ where {allowed:.1} may"));
-    }
+    require(flipped as f64 <= allowed, || format!("{flipped} texels differ where {allowed:.1} may"))?;
     Ok(())
 }
 

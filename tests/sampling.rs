@@ -179,17 +179,13 @@ fn spherical_triangle_check(what: &str, triangle: [DVec3; 3], directions: &[Vec3
     let parts = parts(triangle, 3);
     let whole = solid_angle(triangle);
     let sum: f64 = parts.iter().map(|part| solid_angle(*part)).sum();
-    if (sum / whole - 1.0).abs() > 1e-6 {
-        return Err(format!("{what}: the parts make {sum}, the whole is {whole}"));
-    }
+    require((sum / whole - 1.0).abs() <= 1e-6, || format!("{what}: the parts make {sum}, the whole is {whole}"))?;
     let planes: Vec<[DVec3; 3]> = parts.iter().map(|[a, b, c]| [a.cross(*b), b.cross(*c), c.cross(*a)].map(DVec3::normalize)).collect();
     let mut counts = vec![0u64; parts.len()];
     for direction in directions {
         let depth = |planes: &[DVec3; 3]| planes.iter().map(|normal| normal.dot(direction.as_dvec3())).fold(f64::INFINITY, f64::min);
         let (place, deepest) = planes.iter().map(depth).enumerate().max_by(|a, b| a.1.total_cmp(&b.1)).unwrap();
-        if deepest < -2048.0 * ULP || !direction.is_finite() {
-            return Err(format!("{what}: {direction:?} lies {deepest:e} outside"));
-        }
+        require(deepest >= -2048.0 * ULP && direction.is_finite(), || format!("{what}: {direction:?} lies {deepest:e} outside"))?;
         counts[place] += 1;
     }
     counts_check(what, &counts, &parts.iter().map(|part| solid_angle(*part) / whole).collect::<Vec<_>>())

@@ -372,13 +372,9 @@ fn smooth_check(what: &str, traced: &Traced, eta: f64, reflectance: f64) -> Chec
         let off = (wi - if reflected { mirror } else { refracted }).length();
         // The angle of what grazes the surface is known to the root of what its cosine's square is.
         let bound = 8.0 * ULP / if reflected { 1.0 } else { cos_t.max(1e-3) };
-        if off > bound {
-            return Err(format!("{what}: {wi}, {off:e} off"));
-        }
+        require(off <= bound, || format!("{what}: {wi}, {off:e} off"))?;
     }
-    if traced.survivors.len() as u32 != SAMPLES {
-        return Err(format!("{what}: {} of {SAMPLES} go on", traced.survivors.len()));
-    }
+    require(traced.survivors.len() as u32 == SAMPLES, || format!("{what}: {} of {SAMPLES} go on", traced.survivors.len()))?;
     println!("{what}: {:.6} reflected, {reflectance:.6} expected", reflected_count as f64 / f64::from(SAMPLES));
     if reflectance == 0.0 || reflectance == 1.0 {
         let exact = u64::from(SAMPLES) * u64::from(reflectance == 1.0);

@@ -2,26 +2,14 @@
 //! time; and predictions of the end.
 
 use std::sync::atomic::AtomicBool;
-use std::time::Instant;
 
-use crate::common::lit::{scene, seen};
-use crate::common::{Check, assert_complains, assert_holds, device};
-use glam::DVec3;
-use photonmill::engine;
+use crate::common::prelude::*;
 use photonmill::engine::error_bound::error_bound;
 use photonmill::engine::room::film::{estimate_walls, irradiance_weights};
 use photonmill::engine::room::{self, RunResult};
 use photonmill::engine::scene::{self, View};
-use photonmill::engine::{Control, End, Progress};
-use photonmill::gpu::Gpu;
-use photonmill::plan::scene::ScenePlan;
-use photonmill::plan::sensor::Sensor;
-use photonmill::rng::Rng;
-use photonmill::scene::geometry::Geometry;
-use photonmill::scene::open_box::open_box;
-use photonmill::settings::scene::SceneSettings;
+use photonmill::engine::{End, Progress};
 use photonmill::settings::stop::Stop;
-use photonmill::settings::{Math, RoomSettings};
 
 const SIZE: u32 = 8;
 const CONFIDENCE: f64 = 0.9;

@@ -1,13 +1,10 @@
 //! `photonmill study`: points against a reference of another method, a page that loads nothing, and a study that goes on
 //! where it was cut off.
 
-use std::collections::BTreeMap;
-use std::path::Path;
 use std::sync::atomic::AtomicBool;
 use std::time::Duration;
 
-use crate::common::{Check, assert_complains, assert_holds, device, lit, pairs};
-use photonmill::gpu::Gpu;
+use crate::common::prelude::*;
 use photonmill::measure::compaction::Agreed;
 use photonmill::measure::study::axes::Axis;
 use photonmill::measure::study::point::Point;
@@ -31,7 +28,7 @@ fn request(scene: &str, most_rounds: u32) -> Request {
 fn run(gpu: &Gpu, folder: &Path, request: Request) -> photonmill::error::Result<Study> {
     let never = AtomicBool::new(false);
     let folder = Folder::open("-o", folder)?;
-    let scene = lit::scene(&request.scene);
+    let scene = scene(&request.scene);
     let study = study::run(gpu, &scene, request, &folder, &never, &mut |_| {})?;
     study::write(&folder, &study)?;
     Ok(study)
@@ -64,14 +61,12 @@ fn resumed_check(resumed: &Study, whole: &Study, kept: &[(Axis, Point)]) -> Chec
         let stands = expected.keys().filter(of_group).all(|(_, axis, _, _, command)| is_kept(axis, command));
         // A number that is read from text may be a rounding off.
         let same = |a: &[f64], b: &[f64], allowed: f64| a.len() == b.len() && pairs(a, b).all(|(a, b)| (a - b).abs() <= allowed * b.abs());
-        if stands && !same(&point.wall_ms, &expected[key].wall_ms, 1e-9) {
-            return Err(format!("{key:?} was measured again"));
-        }
+        require(!stands || same(&point.wall_ms, &expected[key].wall_ms, 1e-9), || format!("{key:?} was measured again"))?;
         // Floats are summed in another order each time.
         let allowed = if axis == "Sums" { 1e-3 } else { 1e-9 };
-        if !same(&point.squared_errors, &expected[key].squared_errors, allowed) {
-            return Err(format!("{key:?} has other errors: {:?} instead of {:?}", point.squared_errors, expected[key].squared_errors));
-        }
+        require(same(&point.squared_errors, &expected[key].squared_errors, allowed), || {
+            format!("{key:?} has other errors: {:?} instead of {:?}", point.squared_errors, expected[key].squared_errors)
+        })?;
     }
     Ok(())
 }
@@ -229,7 +224,7 @@ fn a_study_that_is_cancelled_keeps_what_it_has() {
     let folder = tempfile::tempdir().unwrap();
     let cancelled = AtomicBool::new(false);
     let mut told = 0;
-    let scene = lit::scene("open-box");
+    let scene = scene("open-box");
     let out = Folder::open("-o", folder.path()).unwrap();
     let study = study::run(&gpu, &scene, request("open-box", 2), &out, &cancelled, &mut |_| {
         told += 1;

@@ -3,22 +3,15 @@
 
 use std::cell::LazyCell;
 
-use crate::common::lit::{light, received, run, scene};
+use crate::common::known;
+use crate::common::lit::{light, run};
 use crate::common::pairwise::pairwise;
-use crate::common::{Check, Complaint, Kind, assert_complains, assert_holds, device, device_with, known, pairs, same_sums, z_check};
-use glam::{DVec3, Vec3};
+use crate::common::prelude::*;
 use photonmill::constants::GATHER_SLICE;
-use photonmill::engine;
 use photonmill::engine::scene::{self, RunResult, View};
-use photonmill::gpu::{Gpu, Options};
-use photonmill::plan::scene::ScenePlan;
-use photonmill::plan::sensor::Sensor;
-use photonmill::scene::geometry::Geometry;
-use photonmill::scene::light::{Light, LightKind};
-use photonmill::scene::{Camera, Material, Mesh, Scene, Surface};
-use photonmill::settings::scene::{Effect, Illumination, Kernel, Part, SceneSettings};
-use photonmill::settings::{Builder, EmissionLaw};
-use photonmill::verify::judge::{Judge, Verdict};
+use photonmill::scene::light::Light;
+use photonmill::settings::scene::Kernel;
+use photonmill::verify::judge::Verdict;
 
 const SIZE: u32 = 24;
 
@@ -204,13 +197,13 @@ fn rich_scene() -> Scene {
     scene.materials[0].surface = Surface::Glossy { exponent: 20.0 };
     scene.materials[1].two_sided = true;
     scene.materials.push(Material {
-        base_colour_texture: Some(photonmill::scene::material::TextureUse { texture: 0, uv_set: 0 }),
+        base_colour_texture: Some(TextureUse { texture: 0, uv_set: 0 }),
         two_sided: true,
         ..Material::lambert("tiles", Vec3::ONE)
     });
     let texels = vec![Vec3::splat(0.9), Vec3::splat(0.05), Vec3::splat(0.05), Vec3::splat(0.9)];
-    let wrap = [photonmill::scene::texture::Wrap::Repeat; 2];
-    scene.textures.push(photonmill::scene::Texture { name: "tiles".into(), width: 2, height: 2, texels, wrap });
+    let wrap = [Wrap::Repeat; 2];
+    scene.textures.push(Texture { name: "tiles".into(), width: 2, height: 2, texels, wrap });
     let tiles = scene.materials.len() - 1;
     scene.meshes[2].material = tiles;
     // Coarse enough for its smooth normals to matter.
@@ -357,7 +350,7 @@ fn a_furnace_is_equally_bright_everywhere() {
     for kernel in [Kernel::Box, Kernel::Cone, Kernel::Epanechnikov] {
         for illumination in [Illumination::Split, Illumination::Photons] {
             let settings = SceneSettings { kernel, illumination, ..settings.clone() };
-            let exact = std::f64::consts::PI / (1.0 - 0.5);
+            let exact = PI / (1.0 - 0.5);
             let found = irradiance(&gpu, &scene("furnace"), &settings, &points);
             for ((point, _), (mean, error)) in pairs(&points, &found) {
                 let what = format!("{kernel:?}, {illumination:?}, {point}");
@@ -373,7 +366,7 @@ fn a_furnace_is_equally_bright_everywhere() {
         &points,
     );
     let edge = wrong[1];
-    assert_complains("an edge without correction", z_check("edge", edge.0.x, std::f64::consts::PI / 0.5, edge.1.x));
+    assert_complains("an edge without correction", z_check("edge", edge.0.x, PI / 0.5, edge.1.x));
 }
 
 /// L = rho E / pi on one wall, by camera and by receiver.
@@ -394,7 +387,7 @@ fn radiance_and_irradiance_of_a_wall_agree() {
         let other = SceneSettings { seed: 9, ..settings };
         let (irradiance, irradiance_error) = irradiance(&gpu, &scene, &other, &[(target, DVec3::Z)])[0];
         for channel in 0..3 {
-            let share = albedo[channel] / std::f64::consts::PI;
+            let share = albedo[channel] / PI;
             let error = radiance_error[channel].hypot(share * irradiance_error[channel]);
             assert!(error < 0.08 * radiance[channel], "error {error} of {radiance}");
             let what = format!("channel {channel}, final gather {final_gather}");
@@ -449,7 +442,7 @@ fn no_light_leaks_from_one_shelf_to_the_next() {
 #[test]
 fn radii_shrink_as_published() {
     let geometry = Geometry::new(&scene("cornell")).unwrap();
-    let limits = photonmill::plan::Limits::of_host();
+    let limits = Limits::of_host();
     let settings = SceneSettings { radius: Some(0.25), ..small() };
     let sensor = Sensor::Picture { width: 4, height: 4 };
     let plan = ScenePlan::new(&scene("cornell"), &geometry, &settings, sensor, &limits).unwrap();

@@ -1,28 +1,11 @@
 //! The kd-tree: the film that it gives is that of the grid and of brute force, to the bit; and `--nearest` takes the
 //! photons that f64 finds by looking at all of them, whatever order they come in.
 
-use std::time::Instant;
-
-use crate::common::{
-    Check, assert_complains, assert_holds, device, device_with, equal_sums, photons, plan_for, plan_for_host, run, run_on_cpu,
-    upload_photons, z_check,
-};
-use glam::{DVec3, Vec3};
+use crate::common::prelude::*;
 use photonmill::cpu;
 use photonmill::cpu::tree::Tree;
-use photonmill::engine::room::film::{RoomFilm, estimate_walls};
-use photonmill::gpu::{Commands, Gpu, Options};
-use photonmill::photon::Photon;
-use photonmill::plan::{Limits, RoomPlan};
-
 use photonmill::engine::film::RoundSums;
-use photonmill::engine::room::constants;
-use photonmill::engine::room::estimate;
-use photonmill::engine::room::index;
-use photonmill::engine::room::resources::RoomResources;
-use photonmill::rng::{Rng, philox};
-use photonmill::scene::open_box::open_box;
-use photonmill::settings::{Builder, Gather, Math, RoomSettings};
+use photonmill::engine::room::film::{RoomFilm, estimate_walls};
 
 fn by_tree(settings: &RoomSettings) -> RoomSettings {
     RoomSettings { gather: Gather::KdTree, ..settings.clone() }
@@ -36,15 +19,9 @@ fn room_for(photons: &[Photon], settings: &RoomSettings) -> RoomSettings {
 
 /// The device's gather of photons that are handed to it.
 fn gathered_on_gpu(gpu: &Gpu, settings: &RoomSettings, photons: &[Photon]) -> Vec<u64> {
-    let scene = open_box(settings);
-    let plan = plan_for(gpu, &scene, settings);
-    assert!(photons.len() <= plan.photon_capacity as usize && plan.chunks_per_round == 1);
-    let mut commands = Commands::new(gpu, constants(&plan), Instant::now()).unwrap();
-    let resources = RoomResources::new(gpu, &mut commands, &scene, &plan).unwrap();
-    upload_photons(&mut commands, &resources, &plan, photons);
-    index::build(&mut commands, &resources, &plan, settings.photons).unwrap();
-    estimate::gather(&mut commands, &resources, &plan, settings.photons).unwrap();
-    commands.read(&resources.film, plan.points.len() * plan.channel_count as usize).unwrap()
+    let plan = plan_for(gpu, &open_box(settings), settings);
+    assert_eq!(plan.chunks_per_round, 1);
+    gathered(gpu, &plan, photons, 1, None)
 }
 
 fn gathered_on_cpu(plan: &RoomPlan, photons: &[Photon]) -> Vec<u64> {
@@ -190,12 +167,8 @@ fn nearest_check(plan: &RoomPlan, photons: &[Photon], nearest: usize, sums: &[u6
     for point in 0..plan.points.len() {
         for (channel, expected) in expected_flux(plan, photons, nearest, point).into_iter().enumerate() {
             let found = sums[point * 2 + channel] as f64 / plan.film_scale();
-            let allowed = 1e-5 * expected + 1.0 / plan.film_scale();
-            // Written so that NaN complains.
-            if (found - expected).abs() <= allowed {
-                continue;
-            }
-            return Err(format!("point {point}, channel {channel}: {found} instead of {expected}"));
+            let is_right = (found - expected).abs() <= 1e-5 * expected + 1.0 / plan.film_scale();
+            require(is_right, || format!("point {point}, channel {channel}: {found} instead of {expected}"))?;
         }
     }
     Ok(())
@@ -240,19 +213,11 @@ fn ties_are_broken_by_the_photons_number_in_any_order() {
         .map(|photon| {
             // On the texels' own lattice every distance is exact.
             let (x, y) = ((photon % 5) as f32 - 2.0, (photon / 5 % 5) as f32 - 2.0);
-            let position = Vec3::new((x + 0.5) * pitch, (y + 0.5) * pitch, -0.25);
-            Photon {
-                position,
-                wall: 4,
-                flux: (photon % 97 + 1) as f32 / 97.0,
-                weight: 1.0 / (photon % 13 + 1) as f32,
-                photon: photon / 3,
-                bounce: photon % 3,
-            }
+            let (flux, weight) = ((photon % 97 + 1) as f32 / 97.0, 1.0 / (photon % 13 + 1) as f32);
+            Photon { flux, weight, bounce: photon % 3, ..on_back_wall((x + 0.5) * pitch, (y + 0.5) * pitch, photon / 3) }
         })
         .collect();
-    let mut reversed = map.clone();
-    reversed.reverse();
+    let reversed: Vec<Photon> = map.iter().rev().copied().collect();
     let mut shuffled = map.clone();
     shuffled.sort_by_key(|photon| philox([photon.photon, photon.bounce, 0, 0], [3, 4])[0]);
     for nearest in [2, 5, 37, 100, 901] {
@@ -277,14 +242,7 @@ fn ties_are_broken_by_the_photons_number_in_any_order() {
 #[test]
 fn a_search_goes_on_for_as_long_as_it_takes() {
     let Some(gpu) = device() else { return };
-    let at = |photon: u32| Photon {
-        position: Vec3::new(0.01, 0.02, -0.25),
-        wall: 4,
-        flux: (photon % 7 + 1) as f32 / 7.0,
-        weight: 1.0,
-        photon,
-        bounce: 0,
-    };
+    let at = |photon: u32| Photon { flux: (photon % 7 + 1) as f32 / 7.0, ..on_back_wall(0.01, 0.02, photon) };
     let map: Vec<Photon> = (0..70_000).rev().map(at).collect();
     for nearest in [2, 1024] {
         let settings = RoomSettings { nearest: Some(nearest), radius: 0.5, mesh: 2, math: Math::Strict, ..by_tree(&two_channels()) };
@@ -342,14 +300,7 @@ fn the_estimate_has_no_bias() {
                 let place = |photon: u32| {
                     let words = philox([photon, round, 0, 0], [5, 6]);
                     let along = |word: u32| (f64::from(word) / 2f64.powi(32) * 1.0 - 0.5) as f32;
-                    Photon {
-                        position: Vec3::new(along(words[0]), along(words[1]), -0.25),
-                        wall: 4,
-                        flux: 1.0,
-                        weight: 1.0,
-                        photon,
-                        bounce: 0,
-                    }
+                    on_back_wall(along(words[0]), along(words[1]), photon)
                 };
                 let map: Vec<Photon> =
                     (0..4000).map(place).filter(|photon| photon.position.truncate().abs().max_element() <= 0.25).collect();
@@ -360,9 +311,7 @@ fn the_estimate_has_no_bias() {
                 back.radiosity.iter().sum::<f64>() / 9.0 / 2.0
             })
             .collect();
-        let mean = means.iter().sum::<f64>() / f64::from(rounds);
-        let variance = means.iter().map(|value| (value - mean).powi(2)).sum::<f64>() / f64::from(rounds - 1);
-        let error = (variance / f64::from(rounds)).sqrt();
+        let (mean, error) = mean_and_error(&means);
         assert!(error < 0.02, "{error}");
         assert_holds(format!("{nearest} nearest, radius {radius}"), z_check("light", mean, 1.0, error));
         assert_complains("the K-th photon counted", z_check("light", mean * f64::from(nearest) / f64::from(nearest - 1), 1.0, error));

@@ -4,7 +4,7 @@
 
 use statrs::distribution::{ChiSquared, ContinuousCDF};
 
-use super::Check;
+use super::{Check, require};
 
 /// Probability that a check's limits are exceeded by chance, on each side: samples too far from their density, and
 /// samples that lie closer to it than random ones do.
@@ -92,12 +92,10 @@ pub fn counts_check(what: &str, counts: &[u64], probabilities: &[f64]) -> Check 
     let degrees = large.len() - 1;
     let (less, more) = tails(chi_square, degrees);
     println!("{what}: chi-square {chi_square:.1} at {degrees} degrees of freedom, p = {more:.2e}");
-    // Written so that NaN complains.
-    if less >= CHANCE && more >= CHANCE {
-        return Ok(());
-    }
     let side = if more < CHANCE { "too far from" } else { "too close to" };
-    Err(format!("{what}: chi-square {chi_square:.1} at {degrees} degrees of freedom: {trials} samples lie {side} their density"))
+    require(less >= CHANCE && more >= CHANCE, || {
+        format!("{what}: chi-square {chi_square:.1} at {degrees} degrees of freedom: {trials} samples lie {side} their density")
+    })
 }
 
 /// The samples that `trials` gave against a density, which must integrate to `total` within a bound: the share of the
@@ -112,11 +110,7 @@ pub fn density_check(
 ) -> Check {
     let mut probabilities = grid.probabilities(density);
     let sum: f64 = probabilities.iter().sum();
-    // Written so that NaN complains.
-    let sums_up = (sum - total.0).abs() <= total.1;
-    if !sums_up {
-        return Err(format!("{what}: the density integrates to {sum}, not to {}", total.0));
-    }
+    require((sum - total.0).abs() <= total.1, || format!("{what}: the density integrates to {sum}, not to {}", total.0))?;
     let mut counts = grid.counts(places).map_err(|outside| format!("{what}: {outside}"))?;
     if total.0 < 1.0 {
         counts.push((trials - places.len()) as u64);

@@ -4,8 +4,8 @@ use std::f64::consts::{FRAC_PI_2, PI, TAU};
 
 use glam::{DMat3, DVec2, DVec3, Vec3};
 
-use super::Check;
 use super::chi_square::{Grid, ONE, density_check, even};
+use super::{Check, require};
 
 /// An axis of no special place, near where frames are hard to make.
 pub const AXIS: DVec3 = DVec3::new(0.3, -0.5, -0.8);
@@ -56,8 +56,7 @@ pub fn lobe(cosine: f64, exponent: f64) -> f64 {
 /// Off unit length by no more than `bound`.
 pub fn is_unit(what: &str, direction: Vec3, bound: f64) -> Check {
     let off = (direction.as_dvec3().length() - 1.0).abs();
-    // Written so that NaN complains.
-    if off <= bound { Ok(()) } else { Err(format!("{what}: {direction:?} is {off:e} longer or shorter than 1")) }
+    require(off <= bound, || format!("{what}: {direction:?} is {off:e} longer or shorter than 1"))
 }
 
 /// Directions over a hemisphere against their density per solid angle.
@@ -88,9 +87,7 @@ pub fn disc_check(what: &str, points: &[DVec3], axis: DVec3, radius: f64) -> Che
     let mut places = Vec::new();
     for point in points {
         let local = frame.transpose() * *point;
-        if local.z.abs() > 8.0 * ULP {
-            return Err(format!("{what}: {point} lies {} above the disc", local.z));
-        }
+        require(local.z.abs() <= 8.0 * ULP, || format!("{what}: {point} lies {} above the disc", local.z))?;
         places.push((local.truncate().length(), local.y.atan2(local.x)));
     }
     let grid = Grid { x: even(0.0, radius, 20), y: even(-PI, PI, 12) };

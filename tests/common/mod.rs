@@ -25,7 +25,7 @@ use std::ops::Deref;
 use std::sync::Mutex;
 use std::time::Instant;
 
-use glam::UVec2;
+use glam::{UVec2, Vec3};
 use photonmill::engine;
 use photonmill::engine::Control;
 use photonmill::engine::nonfinite_values::NonfiniteValues;
@@ -160,6 +160,11 @@ pub fn photons(gpu: &Gpu, settings: &RoomSettings) -> Vec<Photon> {
     room::photons_on_gpu(gpu, &open_box(settings), settings).unwrap_or_else(|error| panic!("{error}\n{settings:?}"))
 }
 
+/// One photon on the back wall, where x and y lie along the wall, of all the flux and weight that one may have.
+pub fn on_back_wall(x: f32, y: f32, photon: u32) -> Photon {
+    Photon { position: Vec3::new(x, y, -0.25), wall: 4, flux: 1.0, weight: 1.0, photon, bounce: 0 }
+}
+
 /// Builders whose photons are checked against closed forms: one of the device, as all of those store the same photons to the
 /// bit (tests/photons.rs), and the CPU's.
 pub const JUDGED: [Builder; 2] = [Builder::Atomic, Builder::Cpu];
@@ -230,15 +235,15 @@ pub fn streams_of(settings: &RoomSettings) -> Streams {
     Streams { rng: settings.rng, seed: settings.seed, photons: settings.photons, draws_per_photon: settings.draws_per_photon() }
 }
 
+/// Complains unless this holds, as no comparison with NaN does.
+pub fn require<T: Into<String>>(holds: bool, complaint: impl FnOnce() -> T) -> Check {
+    if holds { Ok(()) } else { Err(complaint().into()) }
+}
+
 /// A relative error against what is allowed.
 pub fn relative_check(what: &str, found: f64, expected: f64, allowed: f64) -> Check {
     let error = (found / expected - 1.0).abs();
-    // Written so that NaN complains.
-    if error <= allowed {
-        Ok(())
-    } else {
-        Err(format!("{what}: {found} where {expected} is right, {error:e} off where {allowed:e} may be"))
-    }
+    require(error <= allowed, || format!("{what}: {found} where {expected} is right, {error:e} off where {allowed:e} may be"))
 }
 
 /// Counts of 100 classes that are equally likely, by chi-square on both sides: 99 degrees of freedom leave
@@ -248,11 +253,8 @@ pub fn evenness_check(what: &str, classes: impl Iterator<Item = usize>) -> Check
     classes.for_each(|class| counts[class] += 1);
     let expected = counts.iter().sum::<u64>() as f64 / 100.0;
     let chi_square: f64 = counts.iter().map(|count| (*count as f64 - expected).powi(2) / expected).sum();
-    if 44.7 < chi_square && chi_square < 183.7 {
-        Ok(())
-    } else {
-        Err(format!("{what}: chi-square {chi_square:.1} of 99 degrees of freedom"))
-    }
+    let is_usual = 44.7 < chi_square && chi_square < 183.7;
+    require(is_usual, || format!("{what}: chi-square {chi_square:.1} of 99 degrees of freedom"))
 }
 
 /// Sorted by photon and bounce, which no two entries of a photon map share.

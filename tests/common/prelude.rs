@@ -25,6 +25,7 @@ pub use photonmill::settings::scene::{Effect, Illumination, Part, SceneSettings}
 pub use photonmill::settings::{Builder, EmissionLaw, Gather, Math, Preset, RoomSettings, Sums};
 pub use photonmill::verify::judge::Judge;
 
+pub use super::aimed::mean_and_error;
 pub use super::family::Family;
 pub use super::lit::{
     BOTH, assert_builders_agree, beam, cone, disc, fixed_radius, flights, glass, grid, irradiances, lamp, level, mapped, matt, mean_red,
@@ -33,6 +34,6 @@ pub use super::lit::{
 pub use super::program::{Place, text};
 pub use super::{
     Check, Complaint, Device, JUDGED, Kind, assert_complains, assert_complains_of, assert_holds, closed_box, device, device_with, draws_of,
-    equal_sums, gathered, in_order, no_gpu, open, outcome_of, pairs, photons, photons_on_cpu, plan_for, plan_for_host, relative_check, run,
-    run_on_cpu, run_scene, run_scene_on_cpu, same_photons, same_sums, share_check, streams_of, z_check,
+    equal_sums, gathered, in_order, no_gpu, on_back_wall, open, outcome_of, pairs, photons, photons_on_cpu, plan_for, plan_for_host,
+    relative_check, require, run, run_on_cpu, run_scene, run_scene_on_cpu, same_photons, same_sums, share_check, streams_of, z_check,
 };
