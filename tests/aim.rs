@@ -6,16 +6,9 @@ use crate::common::prelude::*;
 use photonmill::engine::scene::RunResult;
 use photonmill::engine::scene::replay::{Flights, light_paths};
 
-fn plan_of(gpu: &Gpu, scene: &Scene, settings: &SceneSettings) -> (Geometry, ScenePlan) {
-    let geometry = Geometry::new(scene).unwrap();
-    let sensor = Sensor::Receivers { count: 1 };
-    let plan = ScenePlan::new(scene, &geometry, settings, sensor, &engine::limits(gpu.facts())).unwrap();
-    (geometry, plan)
-}
-
 /// Photons of round 0 of the caustic map as they leave their lights, and after their first flight.
 fn first_flight(gpu: &Gpu, scene: &Scene, settings: &SceneSettings) -> (ScenePlan, Flights) {
-    let (geometry, plan) = plan_of(gpu, scene, settings);
+    let (geometry, plan) = scene_plan(gpu, scene, settings, Sensor::Receivers { count: 1 }).unwrap();
     let map = plan.caustic.clone().unwrap();
     let flights = light_paths(gpu, &geometry, &plan, &map, 0, (0, map.photons), 1).unwrap();
     (plan, flights)
@@ -66,7 +59,7 @@ fn a_millionth_of_a_lamps_light_lights_as_the_sun_does() {
     let Some(gpu) = device() else { return };
     let points = grid(0.0, DVec3::Y, 4);
     let [far, sun] = far_lamp().map(|scene| {
-        let (_, plan) = plan_of(&gpu, &scene, &settings(1, true));
+        let (_, plan) = scene_plan(&gpu, &scene, &settings(1, true), Sensor::Receivers { count: 1 }).unwrap();
         let runs = irradiances(&gpu, &scene, &settings(20_000, true), &points, 1..17);
         (runs.iter().map(|run| run.iter().map(|light| light.x).sum::<f64>()).collect::<Vec<_>>(), plan.caustic.unwrap().flux_gain)
     });
@@ -130,14 +123,11 @@ fn no_builder_and_no_split_changes_a_bit() {
         for math in [Math::Fast, Math::Strict] {
             let usual = SceneSettings { math, rounds: 2, ..settings(3001, true) };
             let reference = film(&gpu, kind, &usual);
-            for (what, settings) in [
-                ("atomic", SceneSettings { builder: Some(Builder::Atomic), ..usual.clone() }),
-                ("ballot", SceneSettings { builder: Some(Builder::Ballot), ..usual.clone() }),
-                ("persistent", SceneSettings { builder: Some(Builder::Persistent), ..usual.clone() }),
-                ("chunks", SceneSettings { chunk: Some(701), ..usual.clone() }),
-            ] {
-                let found = film(&gpu, kind, &settings);
-                assert_holds(format!("{kind}, {what}, {math:?}"), equal_sums(what, &found.film.sums, &reference.film.sums));
+            let builders = [Builder::Atomic, Builder::Ballot, Builder::Persistent].map(|builder| (Some(builder), None));
+            for (builder, chunk) in builders.into_iter().chain([(None, Some(701))]) {
+                let found = film(&gpu, kind, &SceneSettings { builder, chunk, ..usual.clone() });
+                let what = format!("{kind}, {builder:?}, chunks of {chunk:?}, {math:?}");
+                assert_holds(what, equal_sums("light", &found.film.sums, &reference.film.sums));
                 assert_eq!(found.fates, reference.fates);
             }
             let off = film(&gpu, kind, &SceneSettings { aim: false, ..usual });
@@ -183,7 +173,7 @@ fn only_caustic_maps_are_aimed() {
     let Some(gpu) = device() else { return };
     for (illumination, part) in [(Illumination::Photons, Part::All), (Illumination::Split, Part::Indirect)] {
         let settings = SceneSettings { illumination, part, ..settings(100, true) };
-        let (_, plan) = plan_of(&gpu, &scene("point"), &settings);
+        let (_, plan) = scene_plan(&gpu, &scene("point"), &settings, Sensor::Receivers { count: 1 }).unwrap();
         assert!(plan.caustic.is_none() && plan.targets.is_empty());
         assert!(plan.maps().all(|map| map.target_count == 0 && map.flux_gain == 1.0));
     }

@@ -217,9 +217,9 @@ fn the_bias_of_a_shrinking_radius_lies_in_the_scaled_interval() {
         }
         let seed = bias::seed(long.plan.settings.seed, number);
         let settings = SceneSettings { rounds: ROUNDS, alpha, seed, ..long.plan.settings.clone() };
-        let plan = ScenePlan::new(&long.scene, &long.geometry, &settings, long.plan.sensor, &engine::limits(gpu.facts()))?;
+        let (_, plan) = scene_plan(&gpu, &long.scene, &settings, long.plan.sensor)?;
         let lit = scene::light(&gpu, &long.view(), plan, &mut Control::default())?;
-        Ok(Some((0..lit.film.pixels()).flat_map(|pixel| lit.film.mean(pixel, &lit.plan).to_array()).collect()))
+        Ok(Some(means(&lit).iter().flat_map(DVec3::to_array).collect()))
     };
     let truth = bias::difference(CONFIDENCE, 0.2, batch).unwrap().unwrap()[1];
     let of_seed = |seed| RunResult::new(scene("disc-over-plane"), Illumination::Photons, 0.15, 4000, seed, &gpu).bias(&gpu, 2);
@@ -257,22 +257,11 @@ impl RunResult {
     /// `radius` as a share of the scene's extent.
     fn new(scene: Scene, illumination: Illumination, radius: f64, photons: u32, seed: u64, gpu: &Gpu) -> RunResult {
         let camera = scene.first_camera();
-        let geometry = Geometry::new(&scene).unwrap();
         let (min, max) = scene.bounds();
         let radius = Some(radius * (max - min).max_element());
-        let settings = SceneSettings {
-            photons,
-            caustic_photons: photons,
-            illumination,
-            radius,
-            caustic_radius: radius,
-            shadow_rays: 1,
-            seed,
-            stop: stop(),
-            ..SceneSettings::default()
-        };
-        let sensor = Sensor::Picture { width: 16, height: 16 };
-        let plan = ScenePlan::new(&scene, &geometry, &settings, sensor, &engine::limits(gpu.facts())).unwrap();
+        let radii = SceneSettings { radius, caustic_radius: radius, shadow_rays: 1, stop: stop(), ..SceneSettings::default() };
+        let settings = SceneSettings { photons, caustic_photons: photons, illumination, seed, ..radii };
+        let (geometry, plan) = scene_plan(gpu, &scene, &settings, square_picture(16)).unwrap();
         RunResult { scene, camera, geometry, plan }
     }
 

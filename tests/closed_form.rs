@@ -190,8 +190,7 @@ fn a_plate_lights_a_parallel_and_a_perpendicular_one() {
 #[test]
 fn a_point_light_falls_off_with_distance_and_cosine() {
     let Some(gpu) = device() else { return };
-    let lamp = LightKind::Point { position: DVec3::ZERO, intensity: Vec3::ONE };
-    let scene_at = |d: f64| scene_of(vec![level(-d, [4.0; 2], true, 0)], vec![matt(0.0)], vec![lamp.clone()]);
+    let scene_at = |d: f64| scene_of(vec![level(-d, [4.0; 2], true, 0)], vec![matt(0.0)], vec![point(DVec3::ZERO)]);
     let mut family = Family::default();
     for d in [0.5, 1.0, 2.0] {
         for degrees in [0.0, 20.0, 40.0] {
@@ -199,22 +198,13 @@ fn a_point_light_falls_off_with_distance_and_cosine() {
             let point = DVec3::new(d * f64::to_radians(degrees).tan(), -d, 0.0);
             let found = received(&gpu, &scene_at(d), &settings(), &[(point, DVec3::Y)]);
             let exact = cosine.powi(3) / (d * d);
-            family.expect(format!("{d} m, {degrees} degrees"), found.film.mean(0, &found.plan).x, exact, 0.0);
+            family.expect(format!("{d} m, {degrees} degrees"), red(&found, 0).0, exact, 0.0);
         }
         let h: f64 = 1.9;
-        let photons = SceneSettings {
-            illumination: Illumination::Photons,
-            photons: 50_000,
-            bounces: 1,
-            rounds: 32,
-            radius: Some(h),
-            alpha: 1.0,
-            ..settings()
-        };
+        let photons = mapped(50_000, 32, 1, h);
         let points = [(DVec3::NEG_Y * d, DVec3::Y)];
         assert_builders_agree(&gpu, &scene_at(d), &photons, &points);
-        let found = received(&gpu, &scene_at(d), &photons, &points);
-        let (mean, error) = (found.film.mean(0, &found.plan).x, found.film.standard_error(0, &found.plan).x);
+        let (mean, error) = red(&received(&gpu, &scene_at(d), &photons, &points), 0);
         family.expect_estimate(format!("{d} m, photons"), mean, error, 32, 2.0 / (h * h) * (1.0 - d / d.hypot(h)));
     }
     family.assert_tells_one_per_cent();

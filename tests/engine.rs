@@ -45,8 +45,7 @@ fn no_run_is_persistent_where_lanes_vote_wrong() {
     let scene = Scene::open("cornell", false).unwrap();
     let plan = |builder| {
         let settings = SceneSettings { builder, ..SceneSettings::default() };
-        let geometry = Geometry::new(&scene).unwrap();
-        ScenePlan::new(&scene, &geometry, &settings, Sensor::Picture { width: 8, height: 8 }, &limits(gpu.facts()))
+        scene_plan_within(&limits(gpu.facts()), &scene, &settings, square_picture(8))
     };
     assert_eq!(plan(None).unwrap().builder(), Builder::Ballot);
     assert_eq!(plan(Some(Builder::Persistent)).unwrap_err().to_string(), refused);

@@ -154,9 +154,7 @@ fn faint_light_is_right_to_half_a_film_unit() {
 fn standard_errors_survive_a_mean_far_above_them() {
     let furnace = scene("furnace");
     let settings = SceneSettings { rounds: 1_000_000, ..SceneSettings::default() };
-    let geometry = Geometry::new(&furnace).unwrap();
-    let sensor = Sensor::Picture { width: 1, height: 1 };
-    let plan = ScenePlan::new(&furnace, &geometry, &settings, sensor, &Limits::of_host()).unwrap();
+    let plan = scene_plan_within(&Limits::of_host(), &furnace, &settings, square_picture(1)).unwrap();
     let units = |value: f64| (value * plan.film_scale).round() as u64;
     let (low, high) = (units(999.9), units(1000.1));
     let half = u64::from(settings.rounds) / 2;
@@ -365,9 +363,7 @@ fn radii_from_the_whole_scene_to_below_the_photons_spacing_are_right() {
         }
     }
     let furnace = scene("furnace");
-    let geometry = Geometry::new(&furnace).unwrap();
-    let sensor = Sensor::Receivers { count: 1 };
-    let plan = |radius: f64| ScenePlan::new(&furnace, &geometry, &furnace_settings(radius), sensor, &engine::limits(gpu.facts()));
+    let plan = |radius: f64| scene_plan(&gpu, &furnace, &furnace_settings(radius), Sensor::Receivers { count: 1 });
     let least = 1.0 / 32_768.0;
     assert!(plan(2.0).is_ok() && plan(least).is_ok());
     for radius in [2.0f64.next_up(), least.next_down(), 1e-23, f64::MIN_POSITIVE, 1e30, f64::NAN, f64::INFINITY, 0.0, -0.1] {
@@ -432,9 +428,8 @@ fn every_kernel_of_every_radius_integrates_to_one() {
 #[test]
 fn radii_of_ten_thousand_rounds_follow_the_gamma_function() {
     let furnace = scene("furnace");
-    let geometry = Geometry::new(&furnace).unwrap();
     let settings = SceneSettings { rounds: 10_000, alpha: 2.0 / 3.0, ..furnace_settings(0.25) };
-    let plan = ScenePlan::new(&furnace, &geometry, &settings, Sensor::Receivers { count: 1 }, &Limits::of_host()).unwrap();
+    let plan = scene_plan_within(&Limits::of_host(), &furnace, &settings, Sensor::Receivers { count: 1 }).unwrap();
     let map = plan.global.as_ref().unwrap();
     // ln Gamma(n + a) - ln n! - ln Gamma(1 + a) as a product of the first terms and Stirling's series of the rest.
     let alpha = 2.0 / 3.0;
@@ -517,14 +512,13 @@ fn slots_of_a_chunk_are_numbered_in_32_bits() {
 #[test]
 fn maps_of_a_chunk_are_numbered_in_32_bits() {
     let furnace = scene("furnace");
-    let geometry = Geometry::new(&furnace).unwrap();
     // A storage buffer's range is a 32-bit number of bytes.
     for buffer_bytes in [1 << 27, u64::from(u32::MAX)] {
         let limits = Limits { buffer_bytes, ..vast() };
         for bounces in [1, 2, 15, 10_000] {
             for photons in [1, 300_000_000, 1 << 31] {
                 let settings = SceneSettings { photons, bounces, illumination: Illumination::Photons, ..SceneSettings::default() };
-                let plan = ScenePlan::new(&furnace, &geometry, &settings, Sensor::Receivers { count: 1 }, &limits).unwrap();
+                let plan = scene_plan_within(&limits, &furnace, &settings, Sensor::Receivers { count: 1 }).unwrap();
                 let map = plan.global.as_ref().unwrap();
                 // More bounces go in segments.
                 let landings = u64::from(map.chunk_photons) * u64::from(bounces.min(SEGMENT_BOUNCES));
@@ -540,7 +534,7 @@ fn maps_of_a_chunk_are_numbered_in_32_bits() {
     // Pictures up to what a buffer holds, and one row more.
     let limits = Limits { buffer_bytes: 1 << 27, ..vast() };
     let settings = SceneSettings { photons: 1, ..SceneSettings::default() };
-    let size = |width, height| ScenePlan::new(&furnace, &geometry, &settings, Sensor::Picture { width, height }, &limits);
+    let size = |width, height| scene_plan_within(&limits, &furnace, &settings, Sensor::Picture { width, height });
     assert!(size(1, 1).is_ok() && size(65_536, 1).is_ok());
     // Film sums and estimates take 48 bytes a pixel.
     let rows = (1 << 27) / 48 / 1024;

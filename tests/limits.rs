@@ -35,14 +35,14 @@ fn bright_rooms_lose_no_light() {
             let what = format!("albedo {albedo}, {}", builder.name());
             let settings = SceneSettings { builder: Some(builder), radius: Some(0.4), alpha: 1.0, ..settings() };
             let lit = received(&gpu, &furnace(albedo), &settings, &POINT);
-            let (mean, error) = (lit.film.mean(0, &lit.plan).x, lit.film.standard_error(0, &lit.plan).x);
+            let (mean, error) = red(&lit, 0);
             assert!(error < 0.04 * exact, "{what}: {mean} +- {error}");
             assert_holds(&what, z_check(&what, mean, exact, error));
             assert_eq!((lit.fates[0].ledger().cut_off, lit.losses.cut_off), (0, 0.0), "{what}");
 
             // With the cap that was the default.
             let capped = received(&gpu, &furnace(albedo), &SceneSettings { bounces: 32, ..settings }, &POINT);
-            let (mean, error) = (capped.film.mean(0, &capped.plan).x, capped.film.standard_error(0, &capped.plan).x);
+            let (mean, error) = red(&capped, 0);
             assert_complains("32 bounces", z_check(&what, mean, exact, error));
             assert!(capped.losses.relative >= 1.0 - mean / exact - 3.0 * error / exact, "{what}: {mean}, {:?}", capped.losses);
         }
@@ -168,11 +168,8 @@ fn radii_take_no_sum_over_earlier_rounds() {
 }
 
 fn run(gpu: &Gpu, scene: &Scene, settings: &SceneSettings, cancelled: &AtomicBool) -> Result<RunResult, Error> {
-    let geometry = Geometry::new(scene)?;
-    let camera = scene.first_camera();
-    let sensor = Sensor::Picture { width: 64, height: 64 };
-    let plan = ScenePlan::new(scene, &geometry, settings, sensor, &engine::limits(gpu.facts()))?;
-    let view = View { geometry: &geometry, camera: Some(&camera), phases: &[] };
+    let (geometry, plan) = scene_plan(gpu, scene, settings, square_picture(64))?;
+    let view = View { geometry: &geometry, camera: Some(&scene.first_camera()), phases: &[] };
     scene::light(gpu, &view, plan, &mut Control { cancelled, progress: &mut |_| {} })
 }
 

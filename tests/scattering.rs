@@ -39,7 +39,6 @@ struct Traced {
 
 impl Tracer<'_> {
     fn trace_photons(&self, scene: &Scene, photons: (u32, u32)) -> Traced {
-        let geometry = Geometry::new(scene).unwrap();
         let settings = SceneSettings {
             photons: photons.0 + photons.1,
             chunk: Some(photons.1),
@@ -50,8 +49,7 @@ impl Tracer<'_> {
             with: Effect::ALL.to_vec(),
             ..SceneSettings::default()
         };
-        let limits = engine::limits(self.gpu.facts());
-        let plan = ScenePlan::new(scene, &geometry, &settings, Sensor::Receivers { count: 1 }, &limits).unwrap();
+        let (geometry, plan) = scene_plan(self.gpu, scene, &settings, Sensor::Receivers { count: 1 }).unwrap();
         let map = plan.global.as_ref().expect("a lit scene has a map");
         let Flights { mut paths, tallies, .. } = light_paths(self.gpu, &geometry, &plan, map, 0, photons, 1).unwrap();
         let survivors = if paths.len() == 2 { paths.pop().unwrap() } else { Vec::new() };

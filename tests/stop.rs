@@ -42,10 +42,6 @@ fn settings(error: f64, seed: u64) -> SceneSettings {
     }
 }
 
-fn means(lit: &scene::RunResult) -> Vec<DVec3> {
-    (0..lit.film.pixels()).map(|pixel| lit.film.mean(pixel, &lit.plan)).collect()
-}
-
 fn root_mean_square(values: impl Iterator<Item = DVec3>) -> f64 {
     values.map(DVec3::length_squared).sum::<f64>().sqrt()
 }
@@ -216,15 +212,12 @@ fn bias_counts_in_the_error_that_is_wanted() {
 
 fn watched(gpu: &Gpu, name: &str, settings: &SceneSettings) -> (scene::RunResult, Vec<Progress>) {
     let scene = scene(name);
-    let geometry = Geometry::new(&scene).unwrap();
-    let sensor = Sensor::Picture { width: 16, height: 16 };
-    let plan = ScenePlan::new(&scene, &geometry, settings, sensor, &engine::limits(gpu.facts())).unwrap();
+    let (geometry, plan) = scene_plan(gpu, &scene, settings, square_picture(16)).unwrap();
     let (never, mut told) = (AtomicBool::new(false), Vec::new());
     let mut tell = |progress: &Progress| told.push(progress.clone());
     let mut control = Control { cancelled: &never, progress: &mut tell };
-    let lit =
-        scene::light(gpu, &View { geometry: &geometry, camera: Some(&scene.first_camera()), phases: &[] }, plan, &mut control).unwrap();
-    (lit, told)
+    let view = View { geometry: &geometry, camera: Some(&scene.first_camera()), phases: &[] };
+    (scene::light(gpu, &view, plan, &mut control).unwrap(), told)
 }
 
 #[test]

@@ -9,7 +9,6 @@ use crate::common::pairwise::pairwise;
 use crate::common::prelude::*;
 use photonmill::constants::GATHER_SLICE;
 use photonmill::engine::scene::{self, RunResult, View};
-use photonmill::scene::light::Light;
 use photonmill::settings::scene::Kernel;
 use photonmill::verify::judge::Verdict;
 
@@ -19,21 +18,15 @@ fn small() -> SceneSettings {
     SceneSettings { photons: 3000, caustic_photons: 3000, rounds: 3, shadow_rays: 2, ..SceneSettings::default() }
 }
 
-fn plan_of(gpu: &Gpu, scene: &Scene, settings: &SceneSettings, sensor: Sensor) -> (Geometry, ScenePlan) {
-    let geometry = Geometry::new(&scene.without(&settings.without)).unwrap();
-    let plan = ScenePlan::new(scene, &geometry, settings, sensor, &engine::limits(gpu.facts())).unwrap();
-    (geometry, plan)
-}
-
 pub fn picture(gpu: &Gpu, scene: &Scene, settings: &SceneSettings) -> RunResult {
-    let (geometry, plan) = plan_of(gpu, scene, settings, Sensor::Picture { width: SIZE, height: SIZE });
+    let (geometry, plan) = scene_plan(gpu, scene, settings, square_picture(SIZE)).unwrap();
     light(gpu, &View { geometry: &geometry, camera: Some(&scene.first_camera()), phases: &[] }, plan)
 }
 
 /// Mean and standard error of the irradiance at points, W/m2.
 fn irradiance(gpu: &Gpu, scene: &Scene, settings: &SceneSettings, points: &[(DVec3, DVec3)]) -> Vec<(DVec3, DVec3)> {
     let lit = received(gpu, scene, settings, points);
-    (0..points.len()).map(|point| (lit.film.mean(point, &lit.plan), lit.film.standard_error(point, &lit.plan))).collect()
+    pairs(means(&lit), standard_errors(&lit)).collect()
 }
 
 fn same_film(what: &str, found: &RunResult, expected: &RunResult) -> Check<Complaint> {
@@ -46,7 +39,7 @@ pub fn appends_agree(gpu: &Gpu, scene: &Scene, settings: &SceneSettings) -> Chec
     let camera = scene.first_camera();
     let of = |builder| {
         let settings = SceneSettings { builder: Some(builder), ..settings.clone() };
-        let (geometry, plan) = plan_of(gpu, scene, &settings, Sensor::Picture { width: SIZE, height: SIZE });
+        let (geometry, plan) = scene_plan(gpu, scene, &settings, square_picture(SIZE)).unwrap();
         run(gpu, &View { geometry: &geometry, camera: Some(&camera), phases: &[] }, plan)
     };
     let ballot = of(Builder::Ballot);
@@ -102,9 +95,7 @@ fn every_pixel_is_lit_whatever_the_size_of_the_picture() {
     let Some(gpu) = device() else { return };
     let scene = scene("furnace");
     for (width, height) in [(1, 1), (3, 2), (8, 4), (13, 7), (21, 9)] {
-        let (geometry, plan) = plan_of(&gpu, &scene, &small(), Sensor::Picture { width, height });
-        let camera = scene.first_camera();
-        let lit = light(&gpu, &View { geometry: &geometry, camera: Some(&camera), phases: &[] }, plan);
+        let lit = seen(&gpu, &scene, &small(), &scene.first_camera(), [width, height]);
         let pixels: Vec<u64> = lit.film.sums.chunks(3).map(|sums| sums[0]).collect();
         let mean = pixels.iter().sum::<u64>() as f64 / pixels.len() as f64;
         for (pixel, sum) in pixels.iter().enumerate() {
@@ -124,9 +115,7 @@ fn every_pixel_of_walls_that_shine_is_the_same() {
         material.emission = Vec3::ONE;
     }
     for (width, height) in [(1, 1), (13, 7), (64, 64), (67, 9), (5, 67), (131, 70)] {
-        let (geometry, plan) = plan_of(&gpu, &room, &small(), Sensor::Picture { width, height });
-        let camera = room.first_camera();
-        let sums = light(&gpu, &View { geometry: &geometry, camera: Some(&camera), phases: &[] }, plan).film.of_rounds.sums;
+        let sums = seen(&gpu, &room, &small(), &room.first_camera(), [width, height]).film.of_rounds.sums;
         assert_eq!(sums.len() as u32, 3 * width * height);
         assert!(sums[0] > 0 && sums.iter().all(|sum| *sum == sums[0]), "{width} x {height}");
     }
@@ -211,21 +200,7 @@ fn rich_scene() -> Scene {
     *mirror = Mesh::sphere("mirror sphere", DVec3::new(0.3, 0.19, 0.34), 0.18, 10, mirror.material);
     // Turned away from the camera: only its second side is seen.
     scene.meshes.push(Mesh::parallelogram("screen", DVec3::new(0.4, 0.5, 0.6), DVec3::Y * 0.3, DVec3::X * 0.3, tiles));
-    let up = DVec3::new(0.5, 0.6, 0.5);
-    let light = |kind| Light { name: "light".into(), kind };
-    scene.lights = vec![
-        light(LightKind::Point { position: up, intensity: Vec3::splat(0.5) }),
-        light(LightKind::Spot { position: up, direction: DVec3::NEG_Y, intensity: Vec3::splat(6.0), inner_angle: 0.3, outer_angle: 0.6 }),
-        light(LightKind::Directional { direction: DVec3::new(0.0, -0.3, -1.0).normalize(), irradiance: Vec3::splat(2.0) }),
-        light(LightKind::Disc {
-            centre: DVec3::new(0.5, 0.0, 0.8),
-            normal: DVec3::Y,
-            radius: 0.05,
-            power: Vec3::splat(2.0),
-            law: EmissionLaw::Cosine,
-        }),
-        light(LightKind::Environment { radiance: Vec3::splat(0.1) }),
-    ];
+    scene.lights = every_kind_of_light(1.0, 2.0, EmissionLaw::Cosine);
     scene
 }
 
@@ -242,9 +217,7 @@ fn an_effect_that_the_scene_needs_is_missed_when_it_is_left_out() {
         if effect == Effect::Bvh {
             // So many triangles cannot be a list; of few the bits are the same, as the test above shows.
             let settings = SceneSettings { without: vec![effect], ..settings.clone() };
-            let geometry = Geometry::new(&scene).unwrap();
-            let refused = ScenePlan::new(&scene, &geometry, &settings, reference.plan.sensor, &engine::limits(gpu.facts()));
-            assert!(refused.unwrap_err().to_string().starts_with("--without bvh"));
+            assert!(scene_plan(&gpu, &scene, &settings, reference.plan.sensor).unwrap_err().to_string().starts_with("--without bvh"));
             continue;
         }
         // Faint caustics show best by themselves.
@@ -359,13 +332,8 @@ fn a_furnace_is_equally_bright_everywhere() {
             }
         }
     }
-    let wrong = irradiance(
-        &gpu,
-        &scene("furnace"),
-        &SceneSettings { edge_correction: false, illumination: Illumination::Photons, ..settings },
-        &points,
-    );
-    let edge = wrong[1];
+    let uncorrected = SceneSettings { edge_correction: false, illumination: Illumination::Photons, ..settings };
+    let edge = irradiance(&gpu, &scene("furnace"), &uncorrected, &points)[1];
     assert_complains("an edge without correction", z_check("edge", edge.0.x, PI / 0.5, edge.1.x));
 }
 
@@ -381,8 +349,7 @@ fn radiance_and_irradiance_of_a_wall_agree() {
     let settings = SceneSettings { rounds: 60, photons: 4000, shadow_rays: 8, ..SceneSettings::default() };
     for final_gather in [false, true] {
         let settings = SceneSettings { final_gather, ..settings.clone() };
-        let (geometry, plan) = plan_of(&gpu, &scene, &settings, Sensor::Picture { width: 1, height: 1 });
-        let lit = light(&gpu, &View { geometry: &geometry, camera: scene.cameras.first(), phases: &[] }, plan);
+        let lit = seen(&gpu, &scene, &settings, &scene.cameras[0], [1, 1]);
         let (radiance, radiance_error) = (lit.film.mean(0, &lit.plan), lit.film.standard_error(0, &lit.plan));
         let other = SceneSettings { seed: 9, ..settings };
         let (irradiance, irradiance_error) = irradiance(&gpu, &scene, &other, &[(target, DVec3::Z)])[0];
@@ -404,10 +371,7 @@ fn radiance_and_irradiance_of_a_wall_agree() {
 fn no_light_leaks_through_thin_walls() {
     let Some(gpu) = device() else { return };
     let mut scene = scene("furnace");
-    scene.materials = vec![
-        Material::lambert("wall", Vec3::splat(0.7)),
-        Material { emission: Vec3::splat(10.0), ..Material::lambert("lamp", Vec3::splat(0.5)) },
-    ];
+    scene.materials = vec![matt(0.7), Material { emission: Vec3::splat(10.0), ..matt(0.5) }];
     let (y, z) = (DVec3::Y, DVec3::Z);
     // The wall is a fiftieth of the radius thick and faces both rooms.
     scene.meshes.push(Mesh::parallelogram("thin, lit side", DVec3::X * 0.5, z, y, 0));
@@ -441,11 +405,9 @@ fn no_light_leaks_from_one_shelf_to_the_next() {
 /// The radii of Knaus and Zwicker's schedule, and their mean over a million passes where it is known.
 #[test]
 fn radii_shrink_as_published() {
-    let geometry = Geometry::new(&scene("cornell")).unwrap();
-    let limits = Limits::of_host();
     let settings = SceneSettings { radius: Some(0.25), ..small() };
-    let sensor = Sensor::Picture { width: 4, height: 4 };
-    let plan = ScenePlan::new(&scene("cornell"), &geometry, &settings, sensor, &limits).unwrap();
+    let planned = |settings: &SceneSettings| scene_plan_within(&Limits::of_host(), &scene("cornell"), settings, square_picture(4)).unwrap();
+    let plan = planned(&settings);
     let map = plan.global.as_ref().unwrap();
     let mut squared = map.radius * map.radius;
     for round in 0..40 {
@@ -454,8 +416,7 @@ fn radii_shrink_as_published() {
         let i = f64::from(round + 1);
         squared *= (i + 2.0 / 3.0) / (i + 1.0);
     }
-    let fixed = ScenePlan::new(&scene("cornell"), &geometry, &SceneSettings { alpha: 1.0, ..settings }, sensor, &limits).unwrap();
-    assert_eq!(fixed.radius(map, 39), map.radius);
+    assert_eq!(planned(&SceneSettings { alpha: 1.0, ..settings }).radius(map, 39), map.radius);
 }
 
 #[test]
@@ -502,8 +463,7 @@ fn pictures_agree_with_the_judge() {
         let settings = SceneSettings { photons, caustic_photons: photons, rounds, ..SceneSettings::default() };
         let lit = picture(&gpu, &scene, &settings);
         let judged = Judge::new(&scene, settings.bounces).image(&scene.first_camera(), SIZE, SIZE, samples, 77);
-        let means: Vec<DVec3> = (0..lit.film.pixels()).map(|pixel| lit.film.mean(pixel, &lit.plan)).collect();
-        let errors: Vec<DVec3> = (0..lit.film.pixels()).map(|pixel| lit.film.standard_error(pixel, &lit.plan)).collect();
+        let (means, errors) = (means(&lit), standard_errors(&lit));
         let verdict = Verdict::new(&means, &errors, rounds, &judged, None);
         assert!(verdict.agrees(), "{name}: {verdict}");
         let brighter: Vec<DVec3> = means.iter().map(|mean| 1.3 * *mean).collect();

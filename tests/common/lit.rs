@@ -1,26 +1,29 @@
 //! Scenes of triangles, lit to the end: irradiance at points, radiance along a ray.
 
-use std::f64::consts::TAU;
-
-use glam::{DVec3, Vec3};
-use photonmill::engine;
-use photonmill::engine::Control;
+use super::prelude::*;
 use photonmill::engine::scene::{self, RunResult, Target, View};
-use photonmill::gpu::Gpu;
-use photonmill::plan::Limits;
-use photonmill::plan::scene::ScenePlan;
-use photonmill::scene::geometry::Geometry;
-use photonmill::scene::light::LightKind;
-use photonmill::scene::{Camera, Light, Material, Mesh, Scene, Surface, built_in};
-use photonmill::settings::scene::{Illumination, SceneSettings};
-use photonmill::settings::{Builder, EmissionLaw};
 use photonmill::verify::selfcheck::Estimate;
-
-use super::{Check, assert_holds, equal_sums, z_check};
 
 /// Builders of a scene that trace in ways of their own.
 const SCENE_BUILDERS: [Builder; 2] = [Builder::Ballot, Builder::Persistent];
 pub const BOTH: [Illumination; 2] = [Illumination::Split, Illumination::Photons];
+
+/// The geometry of a scene and what a device would do with it, or why not.
+pub fn scene_plan(gpu: &Gpu, scene: &Scene, settings: &SceneSettings, sensor: Sensor) -> Result<(Geometry, ScenePlan), Error> {
+    let geometry = Geometry::new(&scene.without(&settings.without))?;
+    let plan = ScenePlan::new(scene, &geometry, settings, sensor, &engine::limits(gpu.facts()))?;
+    Ok((geometry, plan))
+}
+
+/// What devices within these limits would do, or why not.
+pub fn scene_plan_within(limits: &Limits, scene: &Scene, settings: &SceneSettings, sensor: Sensor) -> Result<ScenePlan, Error> {
+    ScenePlan::new(scene, &Geometry::new(scene)?, settings, sensor, limits)
+}
+
+/// A picture of a square of so many pixels.
+pub fn square_picture(side: u32) -> Sensor {
+    Sensor::Picture { width: side, height: side }
+}
 
 /// Runs to the end, whatever comes out.
 pub fn run(gpu: &Gpu, view: &View, plan: ScenePlan) -> RunResult {
@@ -83,6 +86,11 @@ pub fn red(lit: &RunResult, place: usize) -> (f64, f64) {
 /// Mean of the red channel over all pixels or points.
 pub fn mean_red(lit: &RunResult) -> f64 {
     lit.film.means(&lit.plan).map(|mean| mean.x).sum::<f64>() / lit.film.pixels() as f64
+}
+
+/// Standard error of every pixel or point.
+pub fn standard_errors(lit: &RunResult) -> Vec<DVec3> {
+    (0..lit.film.pixels()).map(|place| lit.film.standard_error(place, &lit.plan)).collect()
 }
 
 /// Mean of every pixel or point.
@@ -157,6 +165,22 @@ pub fn grid(height: f64, normal: DVec3, n: usize) -> Vec<(DVec3, DVec3)> {
 /// A built-in scene.
 pub fn scene(name: &str) -> Scene {
     built_in::by_name(name).unwrap_or_else(|| panic!("there is no scene {name}"))
+}
+
+/// A light of every kind above the floor of a room of this size, m: intensities and watts go with its square.
+pub fn every_kind_of_light(size: f64, of_sun: f32, law: EmissionLaw) -> Vec<Light> {
+    let (position, strength) = (DVec3::new(0.5, 0.6, 0.5) * size, (size * size) as f32);
+    let [bulb, spot, watts] = [0.5, 6.0, 2.0].map(|share| Vec3::splat(share) * strength);
+    let sun = LightKind::Directional { direction: DVec3::new(0.0, -0.3, -1.0).normalize(), irradiance: Vec3::splat(of_sun) };
+    let centre = DVec3::new(0.5, 0.0, 0.8) * size;
+    let kinds = [
+        LightKind::Point { position, intensity: bulb },
+        LightKind::Spot { position, direction: DVec3::NEG_Y, intensity: spot, inner_angle: 0.3, outer_angle: 0.6 },
+        sun,
+        LightKind::Disc { centre, normal: DVec3::Y, radius: 0.05 * size, power: watts, law },
+        LightKind::Environment { radiance: Vec3::splat(0.1) },
+    ];
+    kinds.map(lamp).into()
 }
 
 /// A light without a name of its own.

@@ -23,23 +23,14 @@ use std::cmp::Ordering;
 use std::fmt::Display;
 use std::ops::Deref;
 use std::sync::Mutex;
-use std::time::Instant;
 
-use glam::{UVec2, Vec3};
-use photonmill::engine;
-use photonmill::engine::Control;
 use photonmill::engine::nonfinite_values::NonfiniteValues;
 use photonmill::engine::room::resources::RoomResources;
 use photonmill::engine::room::{self, RunResult, estimate, index};
-use photonmill::error::Error;
-use photonmill::gpu::{Commands, Gpu, Options};
-use photonmill::photon::{Origin, Photon, StoredPhoton};
-use photonmill::plan::{Limits, RoomPlan};
 use photonmill::records::RandomKey;
-use photonmill::rng::{self, Rng, Streams};
-use photonmill::scene::open_box::open_box;
-use photonmill::scene::room::{RoomScene, Wall};
-use photonmill::settings::{Builder, RoomSettings};
+use photonmill::rng::{self, Streams};
+use photonmill::scene::room::Wall;
+use prelude::*;
 
 /// Devices that no test has at the moment: what one test compiled serves the next.
 static IDLE: Mutex<Vec<Gpu>> = Mutex::new(Vec::new());
