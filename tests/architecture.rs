@@ -1,9 +1,9 @@
 //! The order of the house, read off the sources: a file uses only what stands to its left on the line, no files use each
 //! other in a circle, the device layer knows no photon, and the CPU's twin and the judge know no engine.
 
-use std::fs;
-
 use crate::common::prelude::*;
+use crate::common::program::entries;
+use crate::common::sources::{files, read, root};
 
 /// From left to right; what stands side by side does not know each other. The longest name decides for a file.
 const LINE: &[&[&str]] = &[
@@ -102,24 +102,7 @@ fn code_of(source: &str) -> String {
     code
 }
 
-fn root(folder: &str) -> PathBuf {
-    Path::new(env!("CARGO_MANIFEST_DIR")).join(folder)
-}
-
-/// Files below a folder, with their content.
-fn files(folder: &Path) -> Vec<(PathBuf, String)> {
-    let mut found = Vec::new();
-    for entry in fs::read_dir(folder).unwrap() {
-        let path = entry.unwrap().path();
-        if path.is_dir() {
-            found.extend(files(&path));
-        } else if path.extension().is_some_and(|extension| ["rs", "glsl", "comp"].iter().any(|known| extension == *known)) {
-            let source = fs::read_to_string(&path).unwrap();
-            found.push((path, source));
-        }
-    }
-    found
-}
+const SHADERS: [&str; 2] = [".glsl", ".comp"];
 
 fn has_word(code: &str, word: &str) -> bool {
     code.split(|c: char| !(c.is_alphanumeric() || c == '_')).any(|found| found == word)
@@ -141,8 +124,8 @@ fn forks_in_functions(source: &str) -> Vec<usize> {
 }
 
 /// The path of a file's module: `plan::buffers` of src/plan/buffers.rs.
-fn module_path(inside: &Path) -> String {
-    let names: Vec<String> = inside.with_extension("").iter().map(|name| name.to_string_lossy().into_owned()).collect();
+fn module_path(inside: &str) -> String {
+    let names: Vec<String> = Path::new(inside).with_extension("").iter().map(|name| name.to_string_lossy().into_owned()).collect();
     names.join("::").trim_end_matches("::mod").to_owned()
 }
 
@@ -246,8 +229,7 @@ fn no_files_use_each_other_in_a_circle() {
 
 /// Files by module.
 fn sources() -> BTreeMap<String, String> {
-    let folder = root("src");
-    files(&folder).into_iter().map(|(path, source)| (module_path(path.strip_prefix(&folder).unwrap()), source)).collect()
+    files("src", &[".rs"]).into_iter().map(|(path, source)| (module_path(path.strip_prefix("src/").unwrap()), source)).collect()
 }
 
 /// Arrows to the right.
@@ -276,8 +258,8 @@ fn no_arrow_points_to_the_right() {
 fn files_that_are_named_exist() {
     let is_path = |symbol: char| symbol.is_ascii_alphanumeric() || "_/.*".contains(symbol);
     let pages = ["README.md", "src/guide/architecture.md", "src/guide/performance.md"];
-    let pages = pages.map(|page| (root(page), fs::read_to_string(root(page)).unwrap()));
-    for (path, text) in files(&root("src")).into_iter().chain(files(&root("glsl"))).chain(pages) {
+    let pages = pages.map(|page| (page.to_owned(), read(page)));
+    for (path, text) in files("src", &[".rs"]).into_iter().chain(files("glsl", &SHADERS)).chain(pages) {
         for named in text.split(|symbol| !is_path(symbol)) {
             let named = named.trim_end_matches('.');
             let is_ours = ["src/", "glsl/"].iter().any(|folder| named.starts_with(folder));
@@ -285,7 +267,7 @@ fn files_that_are_named_exist() {
                 continue;
             }
             let worlds = ["room", "scene"].map(|world| root(&named.replace("WORLD", world)));
-            assert!(worlds.iter().all(|file| file.exists()), "{} names {named}", path.display());
+            assert!(worlds.iter().all(|file| file.exists()), "{path} names {named}");
         }
     }
 }
@@ -293,10 +275,8 @@ fn files_that_are_named_exist() {
 /// A file of tests that no program names would never run.
 #[test]
 fn every_file_of_tests_is_run() {
-    let folder = Path::new(env!("CARGO_MANIFEST_DIR"));
-    let [modules, programs] = ["tests/main.rs", "Cargo.toml"].map(|file| fs::read_to_string(folder.join(file)).unwrap());
-    let found = fs::read_dir(folder.join("tests")).unwrap().map(|entry| entry.unwrap().file_name().into_string().unwrap());
-    let names: Vec<String> = found.filter_map(|file| Some(file.strip_suffix(".rs")?.to_owned())).collect();
+    let [modules, programs] = ["tests/main.rs", "Cargo.toml"].map(read);
+    let names: Vec<String> = entries(&root("tests")).into_iter().filter_map(|file| Some(file.strip_suffix(".rs")?.to_owned())).collect();
     assert!(names.len() > 30, "{names:?}");
     for name in names {
         let is_run = modules.contains(&format!("\nmod {name};\n")) || programs.contains(&format!("path = \"tests/{name}.rs\""));
@@ -306,23 +286,20 @@ fn every_file_of_tests_is_run() {
 
 #[test]
 fn vulkan_and_unsafe_stay_in_the_engine() {
-    for (path, source) in files(&root("src")) {
-        if path.starts_with(root("src/gpu")) {
-            continue;
-        }
+    for (path, source) in files("src", &[".rs"]).into_iter().filter(|(path, _)| !path.starts_with("src/gpu/")) {
         let code = code_of(&source);
-        assert!(!has_word(&code, "unsafe"), "{}: unsafe", path.display());
-        assert!(!has_word(&code, "ash"), "{}: ash", path.display());
+        assert!(!has_word(&code, "unsafe"), "{path}: unsafe");
+        assert!(!has_word(&code, "ash"), "{path}: ash");
     }
 }
 
 #[test]
 fn no_kernel_forks_inside_a_function() {
-    let sources = files(&root("glsl"));
+    let sources = files("glsl", &SHADERS);
     assert!(sources.len() > 30, "{} sources", sources.len());
     for (path, source) in sources {
         let lines = forks_in_functions(&source);
-        assert!(lines.is_empty(), "{}: lines {lines:?}", path.display());
+        assert!(lines.is_empty(), "{path}: lines {lines:?}");
     }
 }
 
@@ -341,9 +318,9 @@ const LOCK_FREE: [&str; 2] = ["film/float_two_words.glsl", "film/float_u64.glsl"
 
 #[test]
 fn no_kernel_waits_for_another_invocation() {
-    for (path, source) in files(&root("glsl")) {
+    for (path, source) in files("glsl", &SHADERS) {
         let allowed: &[&str] = if LOCK_FREE.iter().any(|file| path.ends_with(file)) { &["atomicCompSwap"] } else { &[] };
-        assert_eq!(waits(&source), allowed, "{}", path.display());
+        assert_eq!(waits(&source), allowed, "{path}");
     }
     assert_eq!(waits("while (atomicCompSwap(lock, 0, 1) != 0) {}").len(), 2);
     assert!(waits("// atomicExchange would wait\natomicAdd(count, 1);").is_empty());

@@ -1,6 +1,5 @@
 //! `photonmill bench`: its measurements on the device under test, its report, its refusals.
 
-use std::process::Command;
 use std::sync::atomic::AtomicBool;
 use std::sync::{Mutex, MutexGuard, OnceLock, PoisonError};
 use std::time::Duration;
@@ -33,14 +32,8 @@ fn rates_of(gpu: &Gpu) -> &'static Rates {
 fn bench(experiments: &[Experiment], change: impl Fn(&mut Request), cancelled: bool) -> Option<(Device, Bench)> {
     let _alone = alone();
     let gpu = device()?;
-    let mut request = Request {
-        command: "photonmill bench".to_owned(),
-        size: Size::Small,
-        experiments: experiments.to_vec(),
-        scene: scene("cornell-spheres"),
-        scale: false,
-        budget: Duration::from_secs(36_000),
-    };
+    let (command, scene, budget) = ("photonmill bench".to_owned(), scene("cornell-spheres"), Duration::from_secs(36_000));
+    let mut request = Request { command, size: Size::Small, experiments: experiments.to_vec(), scene, scale: false, budget };
     change(&mut request);
     let found = bench::run(&gpu, request, &AtomicBool::new(cancelled), &mut |_| {}).unwrap();
     Some((gpu, found))
@@ -145,8 +138,8 @@ fn measurements_that_come_out_wrong_are_refused() {
 #[test]
 fn cost_follows_photons_and_memory_the_plan() {
     let Some((_, found)) = bench(&[], |request| request.scale = true, false) else { return };
-    let folder = tempfile::tempdir().unwrap();
-    bench::write(&Folder::open("--out", folder.path()).unwrap(), &found).unwrap();
+    let place = Place::new();
+    bench::write(&Folder::open("--out", place.path()).unwrap(), &found).unwrap();
     let [photons, triangles] = found.scale.as_ref().unwrap().series.as_slice() else { panic!("two series") };
     for step in photons.steps.iter().chain(&triangles.steps) {
         assert_eq!(step.peak_bytes, step.stated_bytes, "{}", step.size);
@@ -157,7 +150,7 @@ fn cost_follows_photons_and_memory_the_plan() {
         assert!(growth.power.value.is_finite() && growth.power.error >= 0.0, "{pass}: {:?}", growth.power);
     }
     for file in ["bench.json", "bench.txt", "scale-photons.svg", "scale-triangles.svg"] {
-        let content = std::fs::read_to_string(folder.path().join(file)).unwrap();
+        let content = place.text(file);
         assert!(content.len() > 500, "{file}: {content}");
     }
 }
@@ -178,30 +171,14 @@ fn time_that_is_spent_leaves_experiments_out() {
 fn the_program_writes_its_report() {
     let _alone = alone();
     let Some(gpu) = device() else { return };
-    let folder = tempfile::tempdir().unwrap();
-    let program = |arguments: &[&str]| {
-        let mut command = Command::new(env!("CARGO_BIN_EXE_photonmill"));
-        command.current_dir(folder.path()).arg("bench").args(arguments);
-        if let Ok(device) = std::env::var("PHOTONMILL_DEVICE") {
-            command.args(["--device", &device]);
-        }
-        command.output().unwrap()
-    };
-    let output = program(&["--size", "small", "--only", "open-box,table-1", "--json", "a.json"]);
-    let stderr = String::from_utf8_lossy(&output.stderr).into_owned();
-    assert_eq!(output.status.code(), Some(0), "{stderr}");
-    let report: Value = serde_json::from_slice(&std::fs::read(folder.path().join("a.json")).unwrap()).unwrap();
+    let place = Place::new();
+    place.succeed("bench --size small --only open-box,table-1 --json a.json");
+    let report = place.json("a.json");
     assert_eq!(report["device"], gpu.facts().name.as_str());
     assert!(report["request"]["command"].as_str().unwrap().contains("--only open-box,table-1"));
-
-    for (arguments, allowed) in [
-        (&["--only", "box"][..], "must be one of open-box, builders"),
-        (&["--time", "0s"], "must be from 1s"),
-        (&["--json", "absent/a.json"], "there is no folder"),
-    ] {
-        let output = program(arguments);
-        let stderr = String::from_utf8_lossy(&output.stderr).into_owned();
-        assert_eq!(output.status.code(), Some(2), "{arguments:?}: {stderr}");
-        assert!(stderr.lines().count() == 1 && stderr.contains(allowed), "{arguments:?}: {stderr}");
-    }
+    place.assert_refused([
+        ("bench --only box", ["must be one of open-box, builders"]),
+        ("bench --time 0s", ["must be from 1s"]),
+        ("bench --json absent/a.json", ["there is no folder"]),
+    ]);
 }

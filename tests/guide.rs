@@ -7,26 +7,17 @@ use std::process::{Command, Stdio};
 
 use crate::common::prelude::*;
 use crate::common::program::PROGRAM;
+use crate::common::sources::{files, read, root};
 use photonmill::measure::bench::table::scaled;
 use photonmill::measure::bench::targets::{TARGETS, Target, Wanted};
 use photonmill::output::words::number;
 use serde_json::Value;
 
-fn root(path: &str) -> PathBuf {
-    Path::new(env!("CARGO_MANIFEST_DIR")).join(path)
-}
-
-fn read(path: &str) -> String {
-    fs::read_to_string(root(path)).unwrap_or_else(|error| panic!("{path}: {error}"))
-}
-
 /// Pages of the guide by path, without `links.md`, which is no page.
 fn pages() -> Vec<(String, String)> {
-    let names = fs::read_dir(root("src/guide")).unwrap().map(|entry| entry.unwrap().file_name().into_string().unwrap());
-    let mut paths: Vec<String> = names.filter(|name| name.ends_with(".md") && name != "links.md").collect();
-    paths.sort();
-    assert!(paths.len() >= 9, "{paths:?}");
-    paths.iter().map(|name| format!("src/guide/{name}")).map(|path| (path.clone(), read(&path))).collect()
+    let pages: Vec<_> = files("src/guide", &[".md"]).into_iter().filter(|(path, _)| !path.ends_with("/links.md")).collect();
+    assert!(pages.len() >= 9, "{} pages", pages.len());
+    pages
 }
 
 fn all_texts() -> Vec<(String, String)> {

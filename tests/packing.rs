@@ -202,20 +202,9 @@ fn twins(found: &Found, index: usize, case: &PackingCase, node: &CwBvhNode) -> C
     same("unpacked flux", [unpacked.flux, unpacked.weight], [case.flux, case.weight])?;
     // Neither -0 nor infinity is lost, so paths are compared by their words.
     let of_device = path::unpack(&found.paths, index);
-    for (what, found) in [
-        ("a path that Rust unpacks", of_device),
-        (
-            "a path that the device unpacks",
-            Path {
-                position: unpacked.position,
-                wall: unpacked.path_wall,
-                direction: unpacked.direction,
-                photon: unpacked.photon,
-                stream: unpacked.stream,
-                flux: unpacked.path_flux,
-            },
-        ),
-    ] {
+    let UnpackedRoom { position, path_wall: wall, direction, photon, stream, path_flux: flux, .. } = unpacked;
+    let by_device = Path { position, wall, direction, photon, stream, flux };
+    for (what, found) in [("a path that Rust unpacks", of_device), ("a path that the device unpacks", by_device)] {
         let expected = path(case);
         same(what, found.position, expected.position)?;
         same(what, found.direction, expected.direction)?;

@@ -69,12 +69,8 @@ use Question::*;
 impl Question {
     /// Whether another test, the same for every device, shows that a device without a fault answers it right.
     fn has_a_test_of_its_own(self) -> bool {
-        match self {
-            Photons(_) | StripedCounters | RoomFilm(_) | Ledger(_) | Appends | Builders | StrictMath | Finite | FiniteBox | Nearest
-            | Pairs | Crowds | AimedLight(_) => false,
-            ClosedForm(_) | Bits(_) | LampInBox(_) | Shelf | Ridge | Spot | Texture(_) => true,
-            LeaningPlane(_) | LeaningScatterer | PatchInPlane | StackFromAfar | GlassInFurnace(..) => true,
-        }
+        matches!(self, ClosedForm(_) | Bits(_) | LampInBox(_) | Shelf | Ridge | Spot | Texture(_) | LeaningPlane(_))
+            || matches!(self, LeaningScatterer | PatchInPlane | StackFromAfar | GlassInFurnace(..))
     }
 }
 
@@ -178,7 +174,8 @@ const FAULTS: [Fault; 68] = [
         kernels: &["gather_grid_u64", "gather_grid_two_words"], noticed_by: &[(RoomFilm(Gather::Grid), SumsTooLarge)] },
     Fault { what: "a photon in fifty is stored twice",
         file: "builder/compact.glsl", from: "            store_photon(photon_place, taken[k].photon);",
-        to: "            store_photon(photon_place, taken[k].photon);\n            if (path[k].photon % 50u == 0u) store_photon(atomicAdd(counters[0], 1), taken[k].photon);",
+        to: "            store_photon(photon_place, taken[k].photon);\n\
+            if (path[k].photon % 50u == 0u) store_photon(atomicAdd(counters[0], 1), taken[k].photon);",
         kernels: &["trace_scene_atomic"], noticed_by: &[(Appends, SumsTooLarge)] },
     Fault { what: "a photon that flies to its end begins with its second bounce's random numbers",
         file: "builder/persistent.glsl", from: "bounce = first_bounce();", to: "bounce = first_bounce() + 1;",
@@ -228,12 +225,14 @@ const FAULTS: [Fault; 68] = [
     Fault { what: "shadow rays count the cosine twice",
         file: "world/scene/direct.glsl", from: "(cosine * lobe_weight", to: "(cosine * cosine * lobe_weight",
         kernels: &["receive", "view"],
-        noticed_by: &[(ClosedForm("point light, 0.5 m off axis: irradiance"), TooDark), (ClosedForm("point light: radiance of the plane"), TooDark)] },
+        noticed_by: &[(ClosedForm("point light, 0.5 m off axis: irradiance"), TooDark),
+                      (ClosedForm("point light: radiance of the plane"), TooDark)] },
     Fault { what: "reflected directions have the cosine thrice",
         file: "rng/sampling.glsl", from: "direction_at(sqrt(u), 1.0 - u, azimuth)",
         to: "direction_at(sqrt(sqrt(u)), 1.0 - sqrt(u), azimuth)",
         kernels: &["trace_persistent_scene", "trace_room_ballot", "emit_scene", "trace_scene_ballot"],
-        noticed_by: &[(ClosedForm("open box, ballot builder, uniform lights: hits stored per photon"), TooDark), (ClosedForm("disc light, photons: irradiance"), TooBright)] },
+        noticed_by: &[(ClosedForm("open box, ballot builder, uniform lights: hits stored per photon"), TooDark),
+                      (ClosedForm("disc light, photons: irradiance"), TooBright)] },
     Fault { what: "the probability of a light is taken for twice its value",
         file: "world/scene/lights.glsl", from: "divide(light.strength, light.probability)",
         to: "divide(light.strength, 2.0 * light.probability)",
@@ -271,7 +270,8 @@ const FAULTS: [Fault; 68] = [
     Fault { what: "edges are not corrected",
         file: "kernels/flux_to_radiance.comp", from: "if (HAS_EDGE_CORRECTION) {", to: "if (false) {",
         kernels: &["flux_to_radiance"],
-        noticed_by: &[(ClosedForm("furnace, Photons, Ballot: irradiance"), TooDark), (ClosedForm("sun-over-plane, Photons: irradiance"), TooDark)] },
+        noticed_by: &[(ClosedForm("furnace, Photons, Ballot: irradiance"), TooDark),
+                      (ClosedForm("sun-over-plane, Photons: irradiance"), TooDark)] },
     Fault { what: "rays start a fixed length off their surface",
         file: "world/scene/bvh.glsl", from: "precise vec3 start = position + way;",
         to: "precise vec3 start = position + 1e-3 * normal * (dot(direction, normal) < 0.0 ? -1.0 : 1.0);",
@@ -293,7 +293,8 @@ const FAULTS: [Fault; 68] = [
         kernels: &["trace_persistent_scene", "trace_scene_ballot"], noticed_by: &[(Finite, NoNumber)] },
     Fault { what: "a photon in 500 carries no number into the map",
         file: "builder/compact.glsl", from: "store_photon(photon_place, taken[k].photon);",
-        to: "if (path[k].photon % 500u == 7u) taken[k].photon.flux.y = uintBitsToFloat(0x7fc00000u);\n            store_photon(photon_place, taken[k].photon);",
+        to: "if (path[k].photon % 500u == 7u) taken[k].photon.flux.y = uintBitsToFloat(0x7fc00000u);\n\
+            store_photon(photon_place, taken[k].photon);",
         kernels: &["trace_scene_ballot"], noticed_by: &[(Finite, NoNumber)] },
     Fault { what: "a path from the eye goes on nowhere",
         file: "world/scene/camera_path.glsl", from: "chain.direction = scatter.direction;",
@@ -339,7 +340,8 @@ const FAULTS: [Fault; 68] = [
     Fault { what: "a mirrored texture is a texel off",
         file: "material/surface.glsl", from: "period - 1 - folded", to: "period - folded",
         kernels: &["view"],
-        noticed_by: &[(Texture([Wrap::MirroredRepeat, Wrap::Repeat]), WrongTexel), (Texture([Wrap::Clamp, Wrap::MirroredRepeat]), WrongTexel)] },
+        noticed_by: &[(Texture([Wrap::MirroredRepeat, Wrap::Repeat]), WrongTexel),
+                      (Texture([Wrap::Clamp, Wrap::MirroredRepeat]), WrongTexel)] },
     Fault { what: "a shading normal is kept where it is seen from below",
         file: "material/surface.glsl", from: "dot(smooth_normal, wo) > 0.0 ? smooth_normal : surface.ng", to: "smooth_normal",
         kernels: &["view"], noticed_by: &[(LeaningPlane(Illumination::Photons), TooDark)] },

@@ -52,30 +52,18 @@ fn the_judge_counts_what_the_numpy_model_counts() {
 #[test]
 fn the_judge_gathers_what_the_numpy_model_gathers() {
     let table = |shininess, bounces| power_table(&Model { shininess, bounces, ..Model::default() }.trace(0), 0.05);
-    assert_printed(
-        &table(None, 2),
+    let runs = [(None, 2), (None, 15), (Some(2.0), 15), (Some(0.5), 15), (Some(0.01), 15), (Some(5.0), 15)];
+    let printed: [WallPowers; 6] = [
         [(25.2280, 2.0, 64.0), (26.8435, 3.0, 60.0), (23.8416, 1.0, 58.0), (27.6904, 1.0, 68.0), (32.8901, 1.0, 68.0)],
-    );
-    assert_printed(
-        &table(None, 15),
         [(40.5923, 2.0, 87.0), (43.5544, 5.0, 86.0), (40.3311, 3.0, 84.0), (43.9578, 4.0, 92.0), (50.0378, 9.0, 91.0)],
-    );
-    assert_printed(
-        &table(Some(2.0), 15),
         [(9.9478, 1.194, 24.505), (8.3880, 0.557, 23.103), (9.5132, 0.248, 25.867), (8.7488, 1.036, 23.006), (23.6533, 1.880, 55.124)],
-    );
-    assert_printed(
-        &table(Some(0.5), 15),
         [(20.6275, 1.749, 51.907), (19.9596, 1.977, 50.940), (19.9034, 1.393, 44.996), (20.3406, 2.741, 50.657), (39.3002, 5.394, 76.383)],
-    );
-    assert_printed(
-        &table(Some(0.01), 15),
         [(30.7586, 1.995, 75.354), (31.8622, 3.938, 75.338), (29.3753, 2.949, 73.094), (31.7865, 3.970, 86.948), (49.4759, 7.957, 90.642)],
-    );
-    assert_printed(
-        &table(Some(5.0), 15),
         [(4.7114, 0.425, 16.657), (3.4463, 0.166, 9.470), (4.1808, 0.013, 13.052), (3.5316, 0.119, 11.227), (12.8142, 0.228, 43.669)],
-    );
+    ];
+    for ((shininess, bounces), printed) in pairs(runs, printed) {
+        assert_printed(&table(shininess, bounces), printed);
+    }
 
     let model = Model { shininess: Some(5.0), ..Model::default() };
     let mut table = vec![0.0; 5 * 64 * 64];

@@ -39,16 +39,9 @@ struct Traced {
 
 impl Tracer<'_> {
     fn trace_photons(&self, scene: &Scene, photons: (u32, u32)) -> Traced {
-        let settings = SceneSettings {
-            photons: photons.0 + photons.1,
-            chunk: Some(photons.1),
-            // One more than is traced: what the last one leaves is cut off.
-            bounces: 2,
-            illumination: Illumination::Photons,
-            math: self.math,
-            with: Effect::ALL.to_vec(),
-            ..SceneSettings::default()
-        };
+        // One bounce more than is traced: what the last one leaves is cut off. All effects are there.
+        let all = SceneSettings { bounces: 2, illumination: Illumination::Photons, with: Effect::ALL.to_vec(), ..SceneSettings::default() };
+        let settings = SceneSettings { photons: photons.0 + photons.1, chunk: Some(photons.1), math: self.math, ..all };
         let (geometry, plan) = scene_plan(self.gpu, scene, &settings, Sensor::Receivers { count: 1 }).unwrap();
         let map = plan.global.as_ref().expect("a lit scene has a map");
         let Flights { mut paths, tallies, .. } = light_paths(self.gpu, &geometry, &plan, map, 0, photons, 1).unwrap();

@@ -30,16 +30,9 @@ const SCENES: [&str; 10] = [
 
 /// A fixed radius: the error in question is noise.
 fn settings(error: f64, seed: u64) -> SceneSettings {
-    SceneSettings {
-        photons: 300,
-        caustic_photons: 300,
-        rounds: 20_000,
-        shadow_rays: 1,
-        alpha: 1.0,
-        seed,
-        stop: Stop { error: Some(error), confidence: CONFIDENCE, ..Stop::default() },
-        ..SceneSettings::default()
-    }
+    let stop = Stop { error: Some(error), confidence: CONFIDENCE, ..Stop::default() };
+    let few = SceneSettings { photons: 300, caustic_photons: 300, shadow_rays: 1, alpha: 1.0, ..SceneSettings::default() };
+    SceneSettings { rounds: 20_000, seed, stop, ..few }
 }
 
 fn root_mean_square(values: impl Iterator<Item = DVec3>) -> f64 {
@@ -154,15 +147,8 @@ fn errors_of_the_box_lie_within_the_claim_as_often_as_claimed() {
 fn a_run_of_the_box_ends_at_what_is_reached_first() {
     let gpu = device();
     for gpu in [None, gpu.as_deref()] {
-        let settings = |stop| RoomSettings {
-            photons: 1001,
-            rounds: 1000,
-            mesh: 8,
-            rng: Rng::Philox,
-            chunk: Some(100),
-            stop,
-            ..RoomSettings::default()
-        };
+        let small = RoomSettings { photons: 1001, mesh: 8, rng: Rng::Philox, chunk: Some(100), ..RoomSettings::default() };
+        let settings = |stop| RoomSettings { rounds: 1000, stop, ..small.clone() };
         let (outcome, told) = run_box(gpu, &settings(Stop { photons: Some(5100), error: Some(1e-6), ..Stop::default() }));
         assert_eq!((outcome.end, outcome.film.rounds, outcome.is_cancelled()), (End::Photons, 5, false));
         let emitted = outcome.fates[0].emitted;

@@ -259,16 +259,8 @@ fn builders_and_the_cpu_take_the_same_nearest_photons() {
     let lesser = device_with(Options { without_int64_atomics: true, ..Options::default() }).unwrap();
     let glossy = [Some(2.0), None, Some(0.5), Some(0.01), Some(5.0)];
     for (nearest, rounds) in [(40, 1), (6, 3)] {
-        let settings = RoomSettings {
-            nearest: Some(nearest),
-            rounds,
-            mesh: 33,
-            shininess: glossy,
-            light_power: [3.0, 0.2],
-            math: Math::Strict,
-            threads: 2,
-            ..by_tree(&RoomSettings::default())
-        };
+        let uneven = RoomSettings { mesh: 33, shininess: glossy, light_power: [3.0, 0.2], ..RoomSettings::default() };
+        let settings = RoomSettings { nearest: Some(nearest), rounds, math: Math::Strict, threads: 2, ..by_tree(&uneven) };
         let expected = run_on_cpu(&settings).film;
         for (place, builder) in Builder::ON_GPU.into_iter().enumerate() {
             let other = RoomSettings { builder, group_size: [128, 32, 64][place % 3], ..settings.clone() };

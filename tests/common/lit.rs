@@ -1,5 +1,7 @@
 //! Scenes of triangles, lit to the end: irradiance at points, radiance along a ray.
 
+use std::ops::Range;
+
 use super::prelude::*;
 use photonmill::engine::scene::{self, RunResult, Target, View};
 use photonmill::verify::selfcheck::Estimate;
@@ -99,13 +101,7 @@ pub fn means(lit: &RunResult) -> Vec<DVec3> {
 }
 
 /// Irradiance at points, W/m2, of each of several runs of other seeds.
-pub fn irradiances(
-    gpu: &Gpu,
-    scene: &Scene,
-    settings: &SceneSettings,
-    points: &[(DVec3, DVec3)],
-    seeds: std::ops::Range<u64>,
-) -> Vec<Vec<DVec3>> {
+pub fn irradiances(gpu: &Gpu, scene: &Scene, settings: &SceneSettings, points: &[(DVec3, DVec3)], seeds: Range<u64>) -> Vec<Vec<DVec3>> {
     let (geometry, limits) = (Geometry::new(scene).unwrap(), engine::limits(gpu.facts()));
     let settings_of = |seed| SceneSettings { seed, ..settings.clone() };
     seeds.map(|seed| means(&lit_in(gpu, (scene, &geometry), &settings_of(seed), Target::Points(points), &limits))).collect()

@@ -18,6 +18,7 @@ pub mod planted;
 pub mod prelude;
 pub mod program;
 pub mod reference;
+pub mod sources;
 
 use std::cmp::Ordering;
 use std::fmt::Display;
