@@ -1,14 +1,11 @@
 // Camera paths, or paths from receivers, that an earlier dispatch left on their way over mirrors and glass.
 // Dispatched by src/engine/scene/points.rs until none is left. One thread = one path.
 #version 460
-#extension GL_GOOGLE_include_directive : require
-#extension GL_EXT_scalar_block_layout : require
 #extension GL_EXT_control_flow_attributes : require
 #extension GL_KHR_shader_subgroup_basic : require
 #extension GL_KHR_shader_subgroup_arithmetic : require
 #include "records.glsl"
 
-layout(local_size_x_id = 0) in;
 layout(push_constant, scalar) uniform Push { GoOnPush push; };
 layout(set = 1, binding = 11, scalar) readonly buffer CameraPaths { CameraPath camera_paths[]; };
 

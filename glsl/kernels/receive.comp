@@ -2,14 +2,11 @@
 // that lies on no surface looks around by a ray instead.
 // Dispatched by src/engine/scene/points.rs once a round. One thread = one receiver.
 #version 460
-#extension GL_GOOGLE_include_directive : require
-#extension GL_EXT_scalar_block_layout : require
 #extension GL_EXT_control_flow_attributes : require
 #extension GL_KHR_shader_subgroup_basic : require
 #extension GL_KHR_shader_subgroup_arithmetic : require
 #include "records.glsl"
 
-layout(local_size_x_id = 0) in;
 layout(push_constant, scalar) uniform Push { ReceivePush push; };
 layout(set = 1, binding = 12, scalar) readonly buffer Receivers { Receiver receivers[]; };
 

@@ -2,11 +2,8 @@
 // sum and its square.
 // Dispatched by src/engine/scene/estimate.rs once a round. One thread = one pixel or receiver.
 #version 460
-#extension GL_GOOGLE_include_directive : require
-#extension GL_EXT_scalar_block_layout : require
 #include "records.glsl"
 
-layout(local_size_x_id = 0) in;
 layout(push_constant, scalar) uniform Push { ResolvePush push; };
 layout(set = 1, binding = 0, scalar) readonly buffer PassSums { uvec2 pass_sums[]; };
 layout(set = 1, binding = 1, scalar) readonly buffer Estimates { uvec2 estimates[]; };

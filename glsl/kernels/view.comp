@@ -2,14 +2,11 @@
 // scatters, its emission and direct light, and where asked one ray further for a final gather.
 // Dispatched by src/engine/scene/points.rs once a round. One thread = one sample of a pixel.
 #version 460
-#extension GL_GOOGLE_include_directive : require
-#extension GL_EXT_scalar_block_layout : require
 #extension GL_EXT_control_flow_attributes : require
 #extension GL_KHR_shader_subgroup_basic : require
 #extension GL_KHR_shader_subgroup_arithmetic : require
 #include "records.glsl"
 
-layout(local_size_x_id = 0) in;
 layout(push_constant, scalar) uniform Push { ViewPush push; };
 
 #include "math/math.glsl"
