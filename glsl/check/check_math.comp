@@ -1,6 +1,5 @@
 // The functions of math/math.glsl at given numbers.
 // Dispatched by src/gpu/check.rs. One thread = one pair of operands.
-#version 460
 #include "records.glsl"
 
 layout(set = 1, binding = 0, scalar) readonly buffer Operands { vec2 operands[]; };

@@ -1,6 +1,5 @@
 // The functions that sample, at given random words.
 // Dispatched by src/gpu/check.rs. One thread = one case.
-#version 460
 #include "records.glsl"
 
 layout(set = 1, binding = 0, scalar) readonly buffer Cases { SamplingCase cases[]; };

@@ -1,6 +1,5 @@
 // The rate of atomic additions whose answer is used, at random counters up to number `mask`, or with mask 0 at one.
 // Dispatched by src/measure/bench/rates.rs. One thread = `step_count` additions.
-#version 460
 #include "records.glsl"
 
 layout(push_constant, scalar) uniform Push { MeasurePush push; };

@@ -1,6 +1,5 @@
 // The bandwidth of memory: 16 bytes an invocation from one buffer to another.
 // Dispatched by src/measure/bench/rates.rs. One thread = one block.
-#version 460
 #include "records.glsl"
 
 layout(push_constant, scalar) uniform Push { MeasurePush push; };

@@ -1,6 +1,5 @@
 // The rate of additions to one counter, one a subgroup, whose answer all its invocations use.
 // Dispatched by src/measure/bench/rates.rs. One thread = `step_count` additions by its subgroup.
-#version 460
 #extension GL_KHR_shader_subgroup_basic : require
 #extension GL_KHR_shader_subgroup_ballot : require
 #include "records.glsl"

@@ -1,7 +1,6 @@
 // The rate of single-precision sums and products, each rounded by itself as everywhere else here.
 // Dispatched by src/measure/bench/rates.rs. One thread = four points that turn around the origin, which neither settle nor
 // wait for each other; a step takes 16 sums and products.
-#version 460
 #include "records.glsl"
 
 layout(push_constant, scalar) uniform Push { MeasurePush push; };

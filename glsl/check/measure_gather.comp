@@ -1,6 +1,5 @@
 // The rate of reads of 32 bytes, a record's size, at random places of a large buffer.
 // Dispatched by src/measure/bench/rates.rs. One thread = `step_count` reads, at pairs of blocks up to number `mask`.
-#version 460
 #include "records.glsl"
 
 layout(push_constant, scalar) uniform Push { MeasurePush push; };

@@ -1,7 +1,6 @@
 // The rate of 32-bit multiplications, and with one step the content of the buffer that the other measurements move:
 // Philox on itself, `step_count` times.
 // Dispatched by src/measure/bench/rates.rs. One thread = one block of four words, whose counter begins with its number.
-#version 460
 #include "records.glsl"
 
 layout(push_constant, scalar) uniform Push { MeasurePush push; };

@@ -1,6 +1,5 @@
 // The start-up check of a device.
 // Dispatched by src/gpu/check.rs as one work group.
-#version 460
 #extension GL_KHR_shader_subgroup_basic : require
 #extension GL_KHR_shader_subgroup_ballot : require
 #extension GL_EXT_shader_explicit_arithmetic_types_int64 : require

@@ -1,7 +1,6 @@
 // The longest candidate list of any point, which decides how many slices the grid gather needs.
 // Dispatched by src/engine/room/estimate.rs once a chunk. One thread = one point.
 // After it longest[0] = candidates of the busiest point.
-#version 460
 #extension GL_KHR_shader_subgroup_basic : require
 #extension GL_KHR_shader_subgroup_arithmetic : require
 #include "records.glsl"

@@ -2,7 +2,6 @@
 // Dispatched by src/engine/room/index.rs once a chunk. One thread = one entry of the photon map.
 // After it cells[c] = photons in cell c; ranks[i] = photons that came to the cell of entry i before it. That order
 // varies from run to run; the integer sums of the film do not see it.
-#version 460
 #include "records.glsl"
 
 layout(push_constant, scalar) uniform Push { IndexPush push; };

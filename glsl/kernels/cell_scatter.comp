@@ -1,7 +1,6 @@
 // Writes each photon to its place in cell order.
 // Dispatched by src/engine/room/index.rs once a chunk. One thread = one entry of the photon map.
 // cells[c] = first place of cell c; ranks from cell_count.comp.
-#version 460
 #include "records.glsl"
 
 layout(push_constant, scalar) uniform Push { IndexPush push; };

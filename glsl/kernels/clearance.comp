@@ -1,7 +1,6 @@
 // How far it is from each visible point, along its surface, to what stands on it or ends it: the median of 8 directions. A
 // density estimate of a larger radius would look past walls and over edges.
 // Dispatched by src/engine/scene/trial.rs once, before a run. One thread = one visible point.
-#version 460
 #extension GL_EXT_control_flow_attributes : require
 #include "records.glsl"
 

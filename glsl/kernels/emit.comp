@@ -1,6 +1,5 @@
 // Photons as they leave their lights.
 // Dispatched by src/engine/WORLD/trace.rs once a chunk, in the paper's box once a light and chunk. One thread = one photon.
-#version 460
 #extension GL_EXT_control_flow_attributes : require
 #include "records.glsl"
 

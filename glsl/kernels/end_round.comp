@@ -2,7 +2,6 @@
 // squares, and the film is empty for the next round.
 // Dispatched by src/engine/room/estimate.rs once a round. One thread = one film sum.
 // Squares lie in two buffers, 64 bits each, so that none is larger than twice the film.
-#version 460
 #include "records.glsl"
 
 layout(push_constant, scalar) uniform Push { EndRoundPush push; };

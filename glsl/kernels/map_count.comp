@@ -2,7 +2,6 @@
 // Dispatched by src/engine/scene/index.rs once a chunk. One thread = one photon.
 // After it cells[b] = photons in bucket b; ranks[i] = photons that came to the bucket of photon i before it. That order
 // varies from run to run; the integer sums of the lookup do not see it.
-#version 460
 #extension GL_EXT_control_flow_attributes : require
 #include "records.glsl"
 

@@ -1,7 +1,6 @@
 // Writes each photon of a map to its place in bucket order, and adds their number to the photons stored.
 // Dispatched by src/engine/scene/index.rs once a chunk. One thread = half a photon, twice.
 // cells[b] = first place of bucket b; ranks from map_count.comp.
-#version 460
 #extension GL_EXT_control_flow_attributes : require
 #include "records.glsl"
 

@@ -1,6 +1,5 @@
 // Density estimation by the nearest photons of every point (gather/nearest.glsl), summed by film/SUMS.glsl.
 // Dispatched by src/engine/room/estimate/tree.rs until all searches are done. One thread = one point.
-#version 460
 #extension GL_EXT_shader_explicit_arithmetic_types_int64 : require
 #extension GL_EXT_shader_atomic_int64 : require
 #include "records.glsl"

@@ -1,7 +1,6 @@
 // Ends a round: what the paths of each pixel found and what their points were lit by is added up, and the film takes the
 // sum and its square.
 // Dispatched by src/engine/scene/estimate.rs once a round. One thread = one pixel or receiver.
-#version 460
 #include "records.glsl"
 
 layout(push_constant, scalar) uniform Push { ResolvePush push; };

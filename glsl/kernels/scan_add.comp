@@ -1,7 +1,6 @@
 // Adds what stands before each block to the block's own prefix sums.
 // Dispatched by src/engine/prefix_sum.rs once a level. One thread = SCAN_ITEMS neighbouring items.
 // `block_sums` holds exclusive prefix sums by now.
-#version 460
 #include "records.glsl"
 
 layout(push_constant, scalar) uniform Push { ScanPush push; };

@@ -1,6 +1,5 @@
 // Exclusive prefix sum inside blocks of group size * SCAN_ITEMS items, and the sum of each block.
 // Dispatched by src/engine/prefix_sum.rs once a level. One thread = SCAN_ITEMS neighbouring items.
-#version 460
 #extension GL_KHR_shader_subgroup_basic : require
 #extension GL_KHR_shader_subgroup_arithmetic : require
 #include "records.glsl"

@@ -1,6 +1,5 @@
 // The second half of a bounce by builder/scan.glsl: survivors move together.
 // Dispatched by src/engine/WORLD/trace.rs once a bounce. One thread = one incoming path.
-#version 460
 #extension GL_EXT_control_flow_attributes : require
 #extension GL_KHR_shader_subgroup_basic : require
 #extension GL_KHR_shader_subgroup_ballot : require

@@ -1,6 +1,5 @@
 // Size of a gather in slices: invocations for the points along x, slices of their candidates along y.
 // Dispatched by src/engine/room/estimate.rs as one thread.
-#version 460
 #include "records.glsl"
 
 layout(local_size_x = 1) in;

@@ -1,6 +1,5 @@
 // One bounce of every path, by each bounce-wise builder in each world.
 // Dispatched by src/engine/WORLD/trace.rs once a bounce. One thread = one incoming path, or PATHS_EACH.
-#version 460
 #extension GL_EXT_control_flow_attributes : require
 #extension GL_KHR_shader_subgroup_basic : require
 #extension GL_KHR_shader_subgroup_ballot : require

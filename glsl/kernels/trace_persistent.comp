@@ -1,6 +1,5 @@
 // Photons, each from its emission to its end.
 // Dispatched by src/engine/WORLD/trace.rs once a chunk. One thread = every `stride`th photon.
-#version 460
 #extension GL_EXT_control_flow_attributes : require
 #extension GL_KHR_shader_subgroup_basic : require
 #extension GL_KHR_shader_subgroup_ballot : require

@@ -1,6 +1,5 @@
 // What the kd-tree sorts its photons by along one axis of their walls.
 // Dispatched by src/engine/room/index/tree.rs once an axis. One thread = one entry of the photon map.
-#version 460
 #include "records.glsl"
 
 layout(push_constant, scalar) uniform Push { TreePush push; };

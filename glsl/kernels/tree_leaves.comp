@@ -1,6 +1,5 @@
 // Writes each photon to its place in the leaves of the kd-tree.
 // Dispatched by src/engine/room/index/tree.rs once a chunk. One thread = one photon of a leaf.
-#version 460
 #include "records.glsl"
 
 layout(set = 1, binding = 0, scalar) readonly buffer Photons { uvec4 photons[]; };

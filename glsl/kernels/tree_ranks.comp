@@ -1,7 +1,6 @@
 // Splits the nodes of one height along one axis: notes the place of every photon in the order along it, and
 // the planes.
 // Dispatched by src/engine/room/index/tree.rs once a height. One thread = one photon of a node.
-#version 460
 #include "records.glsl"
 
 layout(push_constant, scalar) uniform Push { TreePush push; };

@@ -1,7 +1,6 @@
 // Says which photons go to the left half of their node, in the order along the other axis.
 // Dispatched by src/engine/room/index/tree.rs once a height. One thread = one photon of a node.
 // After it counts[i] = 1 where photon i goes left.
-#version 460
 #include "records.glsl"
 
 layout(push_constant, scalar) uniform Push { TreePush push; };

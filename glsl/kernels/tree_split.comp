@@ -2,7 +2,6 @@
 // that no node is ever sorted again.
 // Dispatched by src/engine/room/index/tree.rs once a height. One thread = one photon of a node.
 // counts[i] = photons before i that go left.
-#version 460
 #include "records.glsl"
 
 layout(push_constant, scalar) uniform Push { TreePush push; };
