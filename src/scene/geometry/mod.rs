@@ -16,7 +16,8 @@ use half::slice::HalfFloatSliceExt as _;
 use rayon::prelude::*;
 
 use super::bvh::Bvh;
-use super::overlap::{self, Planes, for_equals, hash_of};
+use super::overlap;
+use super::planes::{Planes, for_equals, hash_of};
 use super::texture::Wrap;
 use super::{Material, Mesh, Progress, Scene, Surface};
 use crate::constants::*;
