@@ -6,7 +6,7 @@ use std::collections::BTreeSet;
 use std::fs;
 use std::path::{Path, PathBuf};
 
-use shaderc::{CompileOptions, Compiler, EnvVersion, OptimizationLevel, ResolvedInclude, ShaderKind, TargetEnv};
+use shaderc::{CompileOptions, Compiler, EnvVersion, GlslProfile, OptimizationLevel, ResolvedInclude, ShaderKind, TargetEnv};
 
 /// Kernels that exist in several forms: in the paths of their includes each word stands for one of these.
 const FORMS: &[(&str, &[Word])] = &[
@@ -81,6 +81,7 @@ pub fn compile(glsl: &Path, kernel: &Source, macros: &[(&str, u32)], edit: &dyn 
     let files = RefCell::new(BTreeSet::from([glsl.join(&kernel.path)]));
     let compiler = Compiler::new().expect("shaderc starts");
     let mut options = CompileOptions::new().expect("shaderc starts");
+    options.set_forced_version_profile(460, GlslProfile::None);
     options.set_target_env(TargetEnv::Vulkan, EnvVersion::Vulkan1_3 as u32);
     options.set_optimization_level(OptimizationLevel::Zero);
     options.set_warnings_as_errors();

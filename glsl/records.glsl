@@ -1,5 +1,6 @@
 // Records that Rust and GLSL share, in `scalar` layout. Twin of src/records.rs, which explains the
-// fields; tests/layout.rs compares the two field by field.
+// fields; tests/layout.rs compares the two field by field. Every kernel includes it first.
+#extension GL_EXT_scalar_block_layout : require
 
 struct Room {
     vec3 min_corner;

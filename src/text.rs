@@ -25,6 +25,14 @@ pub fn echo(typed: impl Display) -> String {
     format!("{}...{}", part(&letters[..MOST_ECHOED - END]), part(&letters[letters.len() - END..]))
 }
 
+/// The first few of some names.
+pub fn some_of(names: impl ExactSizeIterator<Item = impl ToString>) -> String {
+    const MOST: usize = 5;
+    let more = names.len().saturating_sub(MOST);
+    let first: Vec<String> = names.take(MOST).map(|name| name.to_string()).collect();
+    first.join(", ") + &if more > 0 { format!(" and {more} more") } else { String::new() }
+}
+
 /// Why the system refuses a file.
 pub fn refusal(error: &io::Error) -> String {
     match error.kind() {

@@ -1,11 +1,7 @@
 // The functions of math/math.glsl at given numbers.
 // Dispatched by src/gpu/check.rs. One thread = one pair of operands.
-#version 460
-#extension GL_GOOGLE_include_directive : require
-#extension GL_EXT_scalar_block_layout : require
 #include "records.glsl"
 
-layout(local_size_x_id = 0) in;
 layout(set = 1, binding = 0, scalar) readonly buffer Operands { vec2 operands[]; };
 layout(set = 1, binding = 1, scalar) writeonly buffer Results { MathResults results[]; };
 

@@ -1,11 +1,7 @@
 // The room's photons and paths, packed and unpacked.
 // Dispatched by tests/packing.rs. One thread = one case, which stands beside what Rust packed of it.
-#version 460
-#extension GL_GOOGLE_include_directive : require
-#extension GL_EXT_scalar_block_layout : require
 #include "records.glsl"
 
-layout(local_size_x_id = 0) in;
 layout(set = 1, binding = 0, scalar) readonly buffer Cases { PackingCase cases[]; };
 layout(set = 1, binding = 1, scalar) readonly buffer Photons { uvec4 photons[]; };
 layout(set = 1, binding = 2, scalar) readonly buffer Paths { uvec4 paths[]; };

@@ -1,11 +1,7 @@
 // The rate of atomic additions whose answer is used, at random counters up to number `mask`, or with mask 0 at one.
 // Dispatched by src/measure/bench/rates.rs. One thread = `step_count` additions.
-#version 460
-#extension GL_GOOGLE_include_directive : require
-#extension GL_EXT_scalar_block_layout : require
 #include "records.glsl"
 
-layout(local_size_x_id = 0) in;
 layout(push_constant, scalar) uniform Push { MeasurePush push; };
 layout(set = 1, binding = 0, scalar) buffer Counts { uint counts[]; };
 layout(set = 1, binding = 1, scalar) writeonly buffer Sums { uint sums[]; };

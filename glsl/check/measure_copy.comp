@@ -1,11 +1,7 @@
 // The bandwidth of memory: 16 bytes an invocation from one buffer to another.
 // Dispatched by src/measure/bench/rates.rs. One thread = one block.
-#version 460
-#extension GL_GOOGLE_include_directive : require
-#extension GL_EXT_scalar_block_layout : require
 #include "records.glsl"
 
-layout(local_size_x_id = 0) in;
 layout(push_constant, scalar) uniform Push { MeasurePush push; };
 layout(set = 1, binding = 0, scalar) readonly buffer Blocks { uvec4 blocks[]; };
 layout(set = 1, binding = 1, scalar) writeonly buffer Copies { uvec4 copies[]; };

@@ -1,13 +1,9 @@
 // The rate of additions to one counter, one a subgroup, whose answer all its invocations use.
 // Dispatched by src/measure/bench/rates.rs. One thread = `step_count` additions by its subgroup.
-#version 460
-#extension GL_GOOGLE_include_directive : require
-#extension GL_EXT_scalar_block_layout : require
 #extension GL_KHR_shader_subgroup_basic : require
 #extension GL_KHR_shader_subgroup_ballot : require
 #include "records.glsl"
 
-layout(local_size_x_id = 0) in;
 layout(push_constant, scalar) uniform Push { MeasurePush push; };
 layout(set = 1, binding = 0, scalar) buffer Counters { uint counters[]; };
 layout(set = 1, binding = 1, scalar) writeonly buffer Sums { uint sums[]; };

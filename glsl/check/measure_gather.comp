@@ -1,11 +1,7 @@
 // The rate of reads of 32 bytes, a record's size, at random places of a large buffer.
 // Dispatched by src/measure/bench/rates.rs. One thread = `step_count` reads, at pairs of blocks up to number `mask`.
-#version 460
-#extension GL_GOOGLE_include_directive : require
-#extension GL_EXT_scalar_block_layout : require
 #include "records.glsl"
 
-layout(local_size_x_id = 0) in;
 layout(push_constant, scalar) uniform Push { MeasurePush push; };
 layout(set = 1, binding = 0, scalar) readonly buffer Blocks { uvec4 blocks[]; };
 layout(set = 1, binding = 1, scalar) writeonly buffer Sums { uint sums[]; };

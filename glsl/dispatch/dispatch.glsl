@@ -1,5 +1,6 @@
 // Which item an invocation works on: its index in a dispatch that is folded into rows, because a
-// device may allow no more than 65 535 work groups along x.
+// device may allow no more than 65 535 work groups along x. The size of a work group is constant 0, which the host sets.
+layout(local_size_x_id = 0) in;
 
 uint work_group_index()
 {

@@ -159,42 +159,28 @@ bool cover_triangles(inout Cover cover)
 {
     uint seen = 0;
     if (HAS_BVH) {
-        // Siblings to visit: the first of them, and a bit for each in reach above the mask of those that are
+        // Siblings to visit: the first of them, and bits 24 to 31 for each in reach above the mask of those that are
         // nodes at all.
-        uvec2 group = uvec2(0, 0x100u);
+        uvec2 group = uvec2(0, 0x01000000u);
         uvec2 stack[BVH_STACK];
         uint depth = 0;
         for (;;) {
-            uint slot = findLSB(group.y >> 8);
-            group.y &= ~(0x100u << slot);
-            if (group.y > 0xffu) {
+            uint slot = findLSB(group.y >> 24);
+            group.y &= ~(0x01000000u << slot);
+            if (group.y > 0x00ffffffu) {
                 stack[depth++] = group;
             }
-            uint place = group.x + bitCount(group.y & ((1u << slot) - 1u));
-            BvhNode node = nodes[place];
-            uint child_nodes = child_nodes_of(node);
-            uint near_nodes = 0;
-            uint near_leaves = 0;
-            [[unroll]] for (uint child = 0; child < 8; child++) {
-                vec3 low = low_corner(node, child);
-                vec3 high = high_corner(node, child);
-                uint meta = byte_of(node.meta, child);
-                if (meta != 0 && all(lessThanEqual(low, cover.position + cover.reach)) && all(greaterThanEqual(high, cover.position - cover.reach))) {
-                    bool is_node = ((child_nodes >> child) & 1u) != 0;
-                    near_nodes |= is_node ? 1u << child : 0;
-                    near_leaves |= is_node ? 0 : (meta >> 5) << (meta & 31u);
-                }
-            }
-            while (near_leaves != 0) {
-                cover_triangle(cover, node.first_triangle + findLSB(near_leaves));
-                near_leaves &= near_leaves - 1;
+            BvhNode node = nodes[group.x + bitCount(group.y & ((1u << slot) - 1u))];
+            uint near = children_in_box(node, cover.position - cover.reach, cover.position + cover.reach);
+            for (uint leaves = near & 0x00ffffffu; leaves != 0; leaves &= leaves - 1) {
+                cover_triangle(cover, node.first_triangle + findLSB(leaves));
                 seen++;
             }
             if (seen > MAX_COVERED && (cover.plane != NONE || cover.nearest != NONE)) {
                 return true;
             }
-            group = uvec2(node.first_child, (near_nodes << 8) | child_nodes);
-            if (near_nodes == 0) {
+            group = uvec2(node.first_child, (near & 0xff000000u) | child_nodes_of(node));
+            if (group.y <= 0x00ffffffu) {
                 if (depth == 0) {
                     break;
                 }

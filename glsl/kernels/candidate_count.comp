@@ -1,14 +1,10 @@
 // The longest candidate list of any point, which decides how many slices the grid gather needs.
 // Dispatched by src/engine/room/estimate.rs once a chunk. One thread = one point.
 // After it longest[0] = candidates of the busiest point.
-#version 460
-#extension GL_GOOGLE_include_directive : require
-#extension GL_EXT_scalar_block_layout : require
 #extension GL_KHR_shader_subgroup_basic : require
 #extension GL_KHR_shader_subgroup_arithmetic : require
 #include "records.glsl"
 
-layout(local_size_x_id = 0) in;
 layout(push_constant, scalar) uniform Push { GatherPush push; };
 layout(set = 0, binding = 3, scalar) readonly buffer Points { Point points[]; };
 layout(set = 1, binding = 0, scalar) buffer Longest { uint longest[]; };

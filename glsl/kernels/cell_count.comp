@@ -2,12 +2,8 @@
 // Dispatched by src/engine/room/index.rs once a chunk. One thread = one entry of the photon map.
 // After it cells[c] = photons in cell c; ranks[i] = photons that came to the cell of entry i before it. That order
 // varies from run to run; the integer sums of the film do not see it.
-#version 460
-#extension GL_GOOGLE_include_directive : require
-#extension GL_EXT_scalar_block_layout : require
 #include "records.glsl"
 
-layout(local_size_x_id = 0) in;
 layout(push_constant, scalar) uniform Push { IndexPush push; };
 layout(set = 0, binding = 0, scalar) readonly buffer Rooms { Room rooms[]; };
 #include "index/photon_list.glsl"

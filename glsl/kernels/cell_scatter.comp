@@ -1,12 +1,8 @@
 // Writes each photon to its place in cell order.
 // Dispatched by src/engine/room/index.rs once a chunk. One thread = one entry of the photon map.
 // cells[c] = first place of cell c; ranks from cell_count.comp.
-#version 460
-#extension GL_GOOGLE_include_directive : require
-#extension GL_EXT_scalar_block_layout : require
 #include "records.glsl"
 
-layout(local_size_x_id = 0) in;
 layout(push_constant, scalar) uniform Push { IndexPush push; };
 layout(set = 0, binding = 0, scalar) readonly buffer Rooms { Room rooms[]; };
 #include "index/photon_list.glsl"

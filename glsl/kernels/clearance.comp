@@ -1,13 +1,9 @@
 // How far it is from each visible point, along its surface, to what stands on it or ends it: the median of 8 directions. A
 // density estimate of a larger radius would look past walls and over edges.
 // Dispatched by src/engine/scene/trial.rs once, before a run. One thread = one visible point.
-#version 460
-#extension GL_GOOGLE_include_directive : require
-#extension GL_EXT_scalar_block_layout : require
 #extension GL_EXT_control_flow_attributes : require
 #include "records.glsl"
 
-layout(local_size_x_id = 0) in;
 layout(push_constant, scalar) uniform Push { ClearancePush push; };
 layout(set = 1, binding = 1, scalar) readonly buffer VisiblePoints { VisiblePoint visible_points[]; };
 layout(set = 1, binding = 2, scalar) writeonly buffer Clearances { float clearances[]; };

@@ -1,8 +1,5 @@
 // Size of the second part of a lookup: points with more candidates than one slice along x, their other slices along y.
 // Dispatched by src/engine/scene/estimate.rs as one thread.
-#version 460
-#extension GL_GOOGLE_include_directive : require
-#extension GL_EXT_scalar_block_layout : require
 #include "records.glsl"
 
 layout(local_size_x = 1) in;

@@ -1,9 +1,6 @@
 // Turns a counter on the device into the size of the next indirect dispatch, so that the host need
 // not wait for it.
 // Dispatched by src/engine/room/index.rs and src/engine/scene/trace.rs as one thread.
-#version 460
-#extension GL_GOOGLE_include_directive : require
-#extension GL_EXT_scalar_block_layout : require
 #include "records.glsl"
 
 layout(local_size_x = 1) in;

@@ -1,12 +1,8 @@
 // Photons as they leave their lights.
 // Dispatched by src/engine/WORLD/trace.rs once a chunk, in the paper's box once a light and chunk. One thread = one photon.
-#version 460
-#extension GL_GOOGLE_include_directive : require
-#extension GL_EXT_scalar_block_layout : require
 #extension GL_EXT_control_flow_attributes : require
 #include "records.glsl"
 
-layout(local_size_x_id = 0) in;
 
 #include "world/WORLD/emit_kernel.glsl"
 

@@ -1,9 +1,6 @@
 // Counts the places that the survivors of a bounce have taken: length of the photon map, paths entering the next bounce,
 // and the size of its dispatch.
 // Dispatched by src/engine/room/trace.rs once a bounce, as one thread.
-#version 460
-#extension GL_GOOGLE_include_directive : require
-#extension GL_EXT_scalar_block_layout : require
 #include "records.glsl"
 
 layout(local_size_x = 1) in;

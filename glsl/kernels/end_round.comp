@@ -2,12 +2,8 @@
 // squares, and the film is empty for the next round.
 // Dispatched by src/engine/room/estimate.rs once a round. One thread = one film sum.
 // Squares lie in two buffers, 64 bits each, so that none is larger than twice the film.
-#version 460
-#extension GL_GOOGLE_include_directive : require
-#extension GL_EXT_scalar_block_layout : require
 #include "records.glsl"
 
-layout(local_size_x_id = 0) in;
 layout(push_constant, scalar) uniform Push { EndRoundPush push; };
 layout(set = 1, binding = 0, scalar) buffer Film { uvec2 film[]; };
 layout(set = 1, binding = 1, scalar) buffer FilmTotals { uvec2 film_totals[]; };

@@ -1,15 +1,11 @@
 // What the photon maps found at each visible point, as light: flux over the area that really lies on the surface, times
 // reflectance, in film units. It takes the place of the point's first sums.
 // Dispatched by src/engine/scene/estimate.rs once a round. One thread = one visible point.
-#version 460
-#extension GL_GOOGLE_include_directive : require
-#extension GL_EXT_scalar_block_layout : require
 #extension GL_EXT_control_flow_attributes : require
 #extension GL_KHR_shader_subgroup_basic : require
 #extension GL_KHR_shader_subgroup_arithmetic : require
 #include "records.glsl"
 
-layout(local_size_x_id = 0) in;
 layout(push_constant, scalar) uniform Push { FluxToRadiancePush push; };
 layout(set = 1, binding = 1, scalar) readonly buffer VisiblePoints { VisiblePoint visible_points[]; };
 layout(set = 1, binding = 2, scalar) buffer Estimates { uvec2 estimates[]; };

@@ -1,9 +1,6 @@
 // Density estimation at every point of the paper's box, by each index and each kind of the film's sums.
 // Dispatched by src/engine/room/estimate.rs once a chunk. One thread = one point and one slice of its photons; of a grid LANES
 // threads = one point.
-#version 460
-#extension GL_GOOGLE_include_directive : require
-#extension GL_EXT_scalar_block_layout : require
 #extension GL_EXT_shader_explicit_arithmetic_types_int64 : require
 #extension GL_EXT_shader_atomic_int64 : require
 #include "records.glsl"

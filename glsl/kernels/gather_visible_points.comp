@@ -1,9 +1,6 @@
 // Density estimation of a photon map, sums added by film/SUMS.glsl.
 // Dispatched by src/engine/scene/estimate.rs twice a map and chunk. One thread = one slice of a point's
 // candidates: points along x, slices along y.
-#version 460
-#extension GL_GOOGLE_include_directive : require
-#extension GL_EXT_scalar_block_layout : require
 #extension GL_EXT_control_flow_attributes : require
 #extension GL_EXT_shader_explicit_arithmetic_types_int64 : require
 #extension GL_EXT_shader_atomic_int64 : require

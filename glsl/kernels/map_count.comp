@@ -2,13 +2,9 @@
 // Dispatched by src/engine/scene/index.rs once a chunk. One thread = one photon.
 // After it cells[b] = photons in bucket b; ranks[i] = photons that came to the bucket of photon i before it. That order
 // varies from run to run; the integer sums of the lookup do not see it.
-#version 460
-#extension GL_GOOGLE_include_directive : require
-#extension GL_EXT_scalar_block_layout : require
 #extension GL_EXT_control_flow_attributes : require
 #include "records.glsl"
 
-layout(local_size_x_id = 0) in;
 layout(push_constant, scalar) uniform Push { CellPush push; };
 layout(set = 1, binding = 0, scalar) readonly buffer Map { uvec4 map[]; };
 layout(set = 1, binding = 1, scalar) readonly buffer Counters { uint counters[]; };

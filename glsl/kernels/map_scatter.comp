@@ -1,13 +1,9 @@
 // Writes each photon of a map to its place in bucket order, and adds their number to the photons stored.
 // Dispatched by src/engine/scene/index.rs once a chunk. One thread = half a photon, twice.
 // cells[b] = first place of bucket b; ranks from map_count.comp.
-#version 460
-#extension GL_GOOGLE_include_directive : require
-#extension GL_EXT_scalar_block_layout : require
 #extension GL_EXT_control_flow_attributes : require
 #include "records.glsl"
 
-layout(local_size_x_id = 0) in;
 layout(push_constant, scalar) uniform Push { CellPush push; };
 layout(set = 1, binding = 0, scalar) readonly buffer Map { uvec4 map[]; };
 layout(set = 1, binding = 1, scalar) readonly buffer Counters { uint counters[]; };

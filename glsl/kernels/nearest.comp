@@ -1,13 +1,9 @@
 // Density estimation by the nearest photons of every point (gather/nearest.glsl), summed by film/SUMS.glsl.
 // Dispatched by src/engine/room/estimate/tree.rs until all searches are done. One thread = one point.
-#version 460
-#extension GL_GOOGLE_include_directive : require
-#extension GL_EXT_scalar_block_layout : require
 #extension GL_EXT_shader_explicit_arithmetic_types_int64 : require
 #extension GL_EXT_shader_atomic_int64 : require
 #include "records.glsl"
 
-layout(local_size_x_id = 0) in;
 layout(push_constant, scalar) uniform Push { NearestPush push; };
 
 #include "math/math.glsl"

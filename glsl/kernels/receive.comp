@@ -1,43 +1,18 @@
 // The light that arrives at given points: direct light, and a visible point for the photon maps; a point
 // that lies on no surface looks around by a ray instead.
 // Dispatched by src/engine/scene/points.rs once a round. One thread = one receiver.
-#version 460
-#extension GL_GOOGLE_include_directive : require
-#extension GL_EXT_scalar_block_layout : require
 #extension GL_EXT_control_flow_attributes : require
 #extension GL_KHR_shader_subgroup_basic : require
 #extension GL_KHR_shader_subgroup_arithmetic : require
 #include "records.glsl"
 
-layout(local_size_x_id = 0) in;
 layout(push_constant, scalar) uniform Push { ReceivePush push; };
 layout(set = 1, binding = 12, scalar) readonly buffer Receivers { Receiver receivers[]; };
 
-#include "math/math.glsl"
-#include "ledger/nonfinite_values.glsl"
-#include "dispatch/dispatch.glsl"
-#include "rng/philox.glsl"
-#include "rng/sobol.glsl"
-#include "rng/sampling.glsl"
-#include "world/scene/effects.glsl"
-#include "world/scene/samples.glsl"
-#include "math/directions.glsl"
-#include "world/scene/bvh.glsl"
-#include "material/surface.glsl"
-#include "material/lobes.glsl"
-#include "material/scatter.glsl"
-#include "world/scene/areas.glsl"
-#include "world/scene/lights.glsl"
+#include "world/scene/camera_kernel.glsl"
 #include "world/scene/off_walls.glsl"
-#include "world/scene/direct.glsl"
 #include "gather/belongs.glsl"
 #include "gather/cover.glsl"
-#include "film/wide.glsl"
-#include "world/scene/film_units.glsl"
-#include "world/scene/no_point.glsl"
-#include "world/scene/one_hit.glsl"
-#include "world/scene/points.glsl"
-#include "world/scene/camera_path.glsl"
 
 void main()
 {

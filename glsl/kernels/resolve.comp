@@ -1,12 +1,8 @@
 // Ends a round: what the paths of each pixel found and what their points were lit by is added up, and the film takes the
 // sum and its square.
 // Dispatched by src/engine/scene/estimate.rs once a round. One thread = one pixel or receiver.
-#version 460
-#extension GL_GOOGLE_include_directive : require
-#extension GL_EXT_scalar_block_layout : require
 #include "records.glsl"
 
-layout(local_size_x_id = 0) in;
 layout(push_constant, scalar) uniform Push { ResolvePush push; };
 layout(set = 1, binding = 0, scalar) readonly buffer PassSums { uvec2 pass_sums[]; };
 layout(set = 1, binding = 1, scalar) readonly buffer Estimates { uvec2 estimates[]; };

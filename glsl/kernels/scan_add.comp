@@ -1,12 +1,8 @@
 // Adds what stands before each block to the block's own prefix sums.
 // Dispatched by src/engine/prefix_sum.rs once a level. One thread = SCAN_ITEMS neighbouring items.
 // `block_sums` holds exclusive prefix sums by now.
-#version 460
-#extension GL_GOOGLE_include_directive : require
-#extension GL_EXT_scalar_block_layout : require
 #include "records.glsl"
 
-layout(local_size_x_id = 0) in;
 layout(push_constant, scalar) uniform Push { ScanPush push; };
 layout(set = 1, binding = 0, scalar) buffer Items { uint items[]; };
 layout(set = 1, binding = 1, scalar) readonly buffer BlockSums { uint block_sums[]; };

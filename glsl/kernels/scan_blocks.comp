@@ -1,13 +1,9 @@
 // Exclusive prefix sum inside blocks of group size * SCAN_ITEMS items, and the sum of each block.
 // Dispatched by src/engine/prefix_sum.rs once a level. One thread = SCAN_ITEMS neighbouring items.
-#version 460
-#extension GL_GOOGLE_include_directive : require
-#extension GL_EXT_scalar_block_layout : require
 #extension GL_KHR_shader_subgroup_basic : require
 #extension GL_KHR_shader_subgroup_arithmetic : require
 #include "records.glsl"
 
-layout(local_size_x_id = 0) in;
 layout(push_constant, scalar) uniform Push { ScanPush push; };
 layout(set = 1, binding = 0, scalar) buffer Items { uint items[]; };
 layout(set = 1, binding = 1, scalar) writeonly buffer BlockSums { uint block_sums[]; };

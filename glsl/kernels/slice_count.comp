@@ -1,8 +1,5 @@
 // Size of a gather in slices: invocations for the points along x, slices of their candidates along y.
 // Dispatched by src/engine/room/estimate.rs as one thread.
-#version 460
-#extension GL_GOOGLE_include_directive : require
-#extension GL_EXT_scalar_block_layout : require
 #include "records.glsl"
 
 layout(local_size_x = 1) in;

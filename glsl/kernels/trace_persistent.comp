@@ -1,14 +1,10 @@
 // Photons, each from its emission to its end.
 // Dispatched by src/engine/WORLD/trace.rs once a chunk. One thread = every `stride`th photon.
-#version 460
-#extension GL_GOOGLE_include_directive : require
-#extension GL_EXT_scalar_block_layout : require
 #extension GL_EXT_control_flow_attributes : require
 #extension GL_KHR_shader_subgroup_basic : require
 #extension GL_KHR_shader_subgroup_ballot : require
 #include "records.glsl"
 
-layout(local_size_x_id = 0) in;
 layout(set = 1, binding = 3, scalar) buffer Counters { uint counters[]; };
 layout(set = 1, binding = 4, scalar) buffer Tallies { Tally tallies[]; };
 

@@ -1,11 +1,7 @@
 // What the kd-tree sorts its photons by along one axis of their walls.
 // Dispatched by src/engine/room/index/tree.rs once an axis. One thread = one entry of the photon map.
-#version 460
-#extension GL_GOOGLE_include_directive : require
-#extension GL_EXT_scalar_block_layout : require
 #include "records.glsl"
 
-layout(local_size_x_id = 0) in;
 layout(push_constant, scalar) uniform Push { TreePush push; };
 #include "index/photon_list.glsl"
 layout(set = 1, binding = 2, scalar) writeonly buffer Keys { uvec2 keys[]; };

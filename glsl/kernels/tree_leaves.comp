@@ -1,11 +1,7 @@
 // Writes each photon to its place in the leaves of the kd-tree.
 // Dispatched by src/engine/room/index/tree.rs once a chunk. One thread = one photon of a leaf.
-#version 460
-#extension GL_GOOGLE_include_directive : require
-#extension GL_EXT_scalar_block_layout : require
 #include "records.glsl"
 
-layout(local_size_x_id = 0) in;
 layout(set = 1, binding = 0, scalar) readonly buffer Photons { uvec4 photons[]; };
 layout(set = 1, binding = 1, scalar) readonly buffer WallBegins { uint wall_begins[]; };
 layout(set = 1, binding = 2, scalar) readonly buffer Keys { uvec2 keys[]; };

@@ -1,12 +1,8 @@
 // Moves photons to their places of a pass of the radix sort of index/tree_digits.glsl.
 // Dispatched by src/engine/room/index/tree.rs once a digit. One thread = a run of TREE_RUN photons.
 // counts[d * runs + r] = first place of the photons of run r with the digit d.
-#version 460
-#extension GL_GOOGLE_include_directive : require
-#extension GL_EXT_scalar_block_layout : require
 #include "records.glsl"
 
-layout(local_size_x_id = 0) in;
 layout(push_constant, scalar) uniform Push { TreePush push; };
 #include "world/room/photon.glsl"
 #include "index/photon_list.glsl"

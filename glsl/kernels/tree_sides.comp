@@ -1,12 +1,8 @@
 // Says which photons go to the left half of their node, in the order along the other axis.
 // Dispatched by src/engine/room/index/tree.rs once a height. One thread = one photon of a node.
 // After it counts[i] = 1 where photon i goes left.
-#version 460
-#extension GL_GOOGLE_include_directive : require
-#extension GL_EXT_scalar_block_layout : require
 #include "records.glsl"
 
-layout(local_size_x_id = 0) in;
 layout(push_constant, scalar) uniform Push { TreePush push; };
 #include "index/tree_nodes.glsl"
 layout(set = 1, binding = 2, scalar) readonly buffer Keys { uvec2 keys[]; }; // in order along the other axis

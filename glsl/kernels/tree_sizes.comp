@@ -1,8 +1,5 @@
 // Sizes of the dispatches that build the kd-tree: a photon, a run of them, a share of a prefix sum an invocation.
 // Dispatched by src/engine/room/index/tree.rs as one thread.
-#version 460
-#extension GL_GOOGLE_include_directive : require
-#extension GL_EXT_scalar_block_layout : require
 #include "records.glsl"
 
 layout(local_size_x = 1) in;

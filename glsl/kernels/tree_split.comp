@@ -2,12 +2,8 @@
 // that no node is ever sorted again.
 // Dispatched by src/engine/room/index/tree.rs once a height. One thread = one photon of a node.
 // counts[i] = photons before i that go left.
-#version 460
-#extension GL_GOOGLE_include_directive : require
-#extension GL_EXT_scalar_block_layout : require
 #include "records.glsl"
 
-layout(local_size_x_id = 0) in;
 layout(push_constant, scalar) uniform Push { TreePush push; };
 #include "index/tree_nodes.glsl"
 layout(set = 1, binding = 2, scalar) readonly buffer Keys { uvec2 keys[]; };

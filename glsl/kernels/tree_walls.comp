@@ -1,8 +1,5 @@
 // Where the photons of each wall begin once they are sorted, and how many the fullest wall has.
 // Dispatched by src/engine/room/index/tree.rs as one thread, before the last pass of a sort moves its photons.
-#version 460
-#extension GL_GOOGLE_include_directive : require
-#extension GL_EXT_scalar_block_layout : require
 #include "records.glsl"
 
 layout(local_size_x = 1) in;

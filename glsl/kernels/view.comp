@@ -1,41 +1,16 @@
 // What each pixel sees: a path from the camera over mirrors and glass to the first surface that
 // scatters, its emission and direct light, and where asked one ray further for a final gather.
 // Dispatched by src/engine/scene/points.rs once a round. One thread = one sample of a pixel.
-#version 460
-#extension GL_GOOGLE_include_directive : require
-#extension GL_EXT_scalar_block_layout : require
 #extension GL_EXT_control_flow_attributes : require
 #extension GL_KHR_shader_subgroup_basic : require
 #extension GL_KHR_shader_subgroup_arithmetic : require
 #include "records.glsl"
 
-layout(local_size_x_id = 0) in;
 layout(push_constant, scalar) uniform Push { ViewPush push; };
 
-#include "math/math.glsl"
-#include "ledger/nonfinite_values.glsl"
-#include "dispatch/dispatch.glsl"
-#include "rng/philox.glsl"
-#include "rng/sobol.glsl"
-#include "rng/sampling.glsl"
-#include "world/scene/effects.glsl"
-#include "world/scene/samples.glsl"
+#include "world/scene/camera_kernel.glsl"
 #include "world/scene/filter.glsl"
-#include "math/directions.glsl"
-#include "world/scene/bvh.glsl"
-#include "material/surface.glsl"
-#include "material/lobes.glsl"
-#include "material/scatter.glsl"
-#include "world/scene/areas.glsl"
-#include "world/scene/lights.glsl"
-#include "world/scene/direct.glsl"
-#include "film/wide.glsl"
-#include "world/scene/film_units.glsl"
 #include "world/scene/tiles.glsl"
-#include "world/scene/no_point.glsl"
-#include "world/scene/one_hit.glsl"
-#include "world/scene/points.glsl"
-#include "world/scene/camera_path.glsl"
 
 void main()
 {

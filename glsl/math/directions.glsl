@@ -1,5 +1,5 @@
 // Unit vectors: packed in 32 bits, and as frames. Packing is octahedral (Cigolle et al. 2014): 16 bits
-// a coordinate place a normal to 7e-5 radians. Twin of src/scene/geometry.rs.
+// a coordinate place a normal to 7e-5 radians. Twin of src/scene/geometry/mod.rs.
 
 vec2 octahedral(vec3 v)
 {

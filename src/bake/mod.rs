@@ -60,6 +60,7 @@ pub use texels::{CoveredTexel, SurfacePoint};
 use crate::error::{Error, Result};
 use crate::scene::light::LightKind;
 use crate::scene::{Mesh, Scene};
+use crate::text::some_of;
 
 /// Points in which each texel is looked at.
 pub const PHASE_COUNT: usize = 4;
@@ -223,23 +224,24 @@ impl MeshLightmap {
 /// One line a subject, however many meshes it concerns.
 fn warnings(scene: &Scene, unwrapped: &[Option<unwrap::Unwrapped>]) -> Vec<String> {
     let mut warnings = Vec::new();
-    let mut refused: BTreeMap<&str, Vec<&str>> = BTreeMap::new();
+    let mut refused: BTreeMap<&str, Vec<String>> = BTreeMap::new();
     let mut coarse = Vec::new();
     for mesh in unwrapped.iter().flatten() {
+        let name = format!("'{}'", mesh.mesh.name);
         if let Some(reason) = mesh.refused {
-            refused.entry(reason).or_default().push(&mesh.mesh.name);
+            refused.entry(reason).or_default().push(name.clone());
         }
         if mesh.is_coarse {
-            coarse.push(mesh.mesh.name.as_str());
+            coarse.push(name);
         }
     }
     for (reason, names) in refused {
-        warnings.push(format!("new lightmap UVs for {}: the second UV set {reason}", listed(&names)));
+        warnings.push(format!("new lightmap UVs for {}: the second UV set {reason}", some_of(names.iter())));
     }
     if !coarse.is_empty() {
         warnings.push(format!(
             "lightmaps are limited to {MAX_SIDE} texels per side: fewer texels per metre than requested on {}",
-            listed(&coarse)
+            some_of(coarse.iter())
         ));
     }
     if unwrapped.iter().all(Option::is_none) {
@@ -249,14 +251,4 @@ fn warnings(scene: &Scene, unwrapped: &[Option<unwrap::Unwrapped>]) -> Vec<Strin
         warnings.push("glTF has no disc or environment lights: the lightmaps contain their light, but scene.gltf omits them".into());
     }
     warnings
-}
-
-/// The first few names.
-fn listed(names: &[&str]) -> String {
-    const SHOWN: usize = 5;
-    let mut text = names.iter().take(SHOWN).map(|name| format!("'{name}'")).collect::<Vec<_>>().join(", ");
-    if names.len() > SHOWN {
-        text += &format!(" and {} more", names.len() - SHOWN);
-    }
-    text
 }

@@ -41,10 +41,16 @@ where
             }
         }
     };
+    at_points(plan, sums, one_point);
+}
+
+/// Calls `add` with each point and its sums, on the threads of the current pool.
+pub(super) fn at_points(plan: &RoomPlan, sums: &mut [u64], add: impl Fn((&Point, &mut [u64])) + Send + Sync) {
+    let channels = plan.channel_count as usize;
     if rayon::current_num_threads() == 1 {
-        plan.points.iter().zip(sums.chunks_mut(channels)).for_each(one_point);
+        plan.points.iter().zip(sums.chunks_mut(channels)).for_each(add);
     } else {
-        plan.points.par_iter().zip(sums.par_chunks_mut(channels)).with_min_len(64).for_each(one_point);
+        plan.points.par_iter().zip(sums.par_chunks_mut(channels)).with_min_len(64).for_each(add);
     }
 }
 

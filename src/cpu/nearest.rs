@@ -3,9 +3,7 @@
 
 use std::collections::BinaryHeap;
 
-use rayon::prelude::*;
-
-use super::estimate::{squared_distance, to_fixed_point};
+use super::estimate::{at_points, squared_distance, to_fixed_point};
 use super::math::angle_of;
 use super::tree::Tree;
 use crate::constants::{NEAREST_BITS, NEAREST_GAIN_BITS};
@@ -18,16 +16,11 @@ const LEAST_DISC: f32 = 1.0 / 1_048_576.0;
 
 /// Adds to `sums` what the `count` photons nearest to each point say that the disc of the full radius holds.
 pub fn gather(plan: &RoomPlan, scene: &RoomScene, tree: &Tree, count: u32, sums: &mut [u64]) {
-    let channels = plan.channel_count as usize;
     let room = scene.room_record();
     let one_point = |(point, sums): (&Point, &mut [u64])| {
         sums.iter_mut().zip(of_point(plan, &room, tree, count as usize, point)).for_each(|(sum, amount)| *sum += amount);
     };
-    if rayon::current_num_threads() == 1 {
-        plan.points.iter().zip(sums.chunks_mut(channels)).for_each(one_point);
-    } else {
-        plan.points.par_iter().zip(sums.par_chunks_mut(channels)).with_min_len(64).for_each(one_point);
-    }
+    at_points(plan, sums, one_point);
 }
 
 /// What one point adds to its two channels.

@@ -97,8 +97,10 @@ pub(super) fn instance(validate: bool) -> Result<(ash::Entry, ash::Instance, Opt
     Ok((entry, instance, messages))
 }
 
+type Found = (vk::PhysicalDevice, DeviceFacts);
+
 /// Every physical device, in the loader's order.
-pub(super) fn all(instance: &ash::Instance) -> Result<Vec<(vk::PhysicalDevice, DeviceFacts)>> {
+pub(super) fn all(instance: &ash::Instance) -> Result<Vec<Found>> {
     // SAFETY: plain enumeration.
     let devices = unsafe { instance.enumerate_physical_devices() }
         .map_err(|code| Error::NoVulkan { reason: format!("vkEnumeratePhysicalDevices says {code}") })?;
@@ -106,24 +108,21 @@ pub(super) fn all(instance: &ash::Instance) -> Result<Vec<(vk::PhysicalDevice, D
 }
 
 /// The device that `wanted` names by index or part of a name, else the best one.
-pub(super) fn choose(instance: &ash::Instance, wanted: Option<&str>) -> Result<(vk::PhysicalDevice, DeviceFacts)> {
+pub(super) fn choose(instance: &ash::Instance, wanted: Option<&str>) -> Result<Found> {
     let devices = all(instance)?;
+    let rank = |facts: &DeviceFacts| KINDS.iter().position(|(_, name)| *name == facts.kind).unwrap_or(KINDS.len());
     if devices.is_empty() && wanted.is_none() {
         return Err(Error::NoVulkan { reason: "the Vulkan loader finds no device".into() });
     }
     let chosen = match wanted {
         Some(wanted) => named(&devices, wanted)?,
-        None => {
-            devices.iter().min_by_key(|(_, facts)| (!facts.lacks.is_empty(), rank(facts.kind), facts.index)).expect("there is a device")
-        }
+        None => devices.iter().min_by_key(|(_, facts)| (!facts.lacks.is_empty(), rank(facts), facts.index)).expect("there is a device"),
     };
     if let Some(what) = chosen.1.lacks.first() {
         return Err(Error::DeviceLacks { device: chosen.1.name.clone(), what: what.clone() });
     }
     Ok(chosen.clone())
 }
-
-type Found = (vk::PhysicalDevice, DeviceFacts);
 
 /// The device of that index, else the one whose name holds `wanted`.
 fn named<'a>(devices: &'a [Found], wanted: &str) -> Result<&'a Found> {
@@ -139,20 +138,18 @@ fn named<'a>(devices: &'a [Found], wanted: &str) -> Result<&'a Found> {
     }
 }
 
-fn describe(devices: &[(vk::PhysicalDevice, DeviceFacts)]) -> String {
+fn describe(devices: &[Found]) -> String {
     let list: Vec<String> = devices.iter().map(|(_, facts)| format!("{} '{}'", facts.index, facts.name)).collect();
     if list.is_empty() { "none".to_owned() } else { list.join(", ") }
 }
 
-fn rank(kind: &str) -> u32 {
-    match kind {
-        "discrete" => 0,
-        "integrated" => 1,
-        "virtual" => 2,
-        "cpu" => 3,
-        _ => 4,
-    }
-}
+/// What devices are called, the best first; any other is the last choice.
+const KINDS: [(vk::PhysicalDeviceType, &str); 4] = [
+    (vk::PhysicalDeviceType::DISCRETE_GPU, "discrete"),
+    (vk::PhysicalDeviceType::INTEGRATED_GPU, "integrated"),
+    (vk::PhysicalDeviceType::VIRTUAL_GPU, "virtual"),
+    (vk::PhysicalDeviceType::CPU, "cpu"),
+];
 
 fn facts(instance: &ash::Instance, device: vk::PhysicalDevice, index: usize) -> DeviceFacts {
     let mut v11 = vk::PhysicalDeviceVulkan11Properties::default();
@@ -222,28 +219,18 @@ fn facts(instance: &ash::Instance, device: vk::PhysicalDevice, index: usize) -> 
     let driver = format!("{} {}", text(v12.driver_name_as_c_str()), text(v12.driver_info_as_c_str()));
     let is_new = |word: &&str| !name.to_lowercase().contains(&word.to_lowercase().replace(['(', ')', ','], ""));
     let driver: Vec<&str> = driver.split_whitespace().filter(is_new).collect();
-    let heaps = &memory.memory_heaps[..memory.memory_heap_count as usize];
+    let heaps = memory.memory_heaps_as_slice().iter();
+    let of_device = heaps.filter(|heap| heap.flags.contains(vk::MemoryHeapFlags::DEVICE_LOCAL));
     DeviceFacts {
         index,
         driver: driver.join(" "),
         name,
-        kind: match properties.device_type {
-            vk::PhysicalDeviceType::DISCRETE_GPU => "discrete",
-            vk::PhysicalDeviceType::INTEGRATED_GPU => "integrated",
-            vk::PhysicalDeviceType::VIRTUAL_GPU => "virtual",
-            vk::PhysicalDeviceType::CPU => "cpu",
-            _ => "other",
-        },
+        kind: KINDS.iter().find(|(kind, _)| *kind == properties.device_type).map_or("other", |(_, name)| name),
         vulkan: version(properties.api_version),
         subgroup_size: v11.subgroup_size,
         storage_buffer_range_bytes: u64::from(limits.max_storage_buffer_range),
         allocation_bytes: v11.max_memory_allocation_size.min(v13.max_buffer_size),
-        device_memory_bytes: heaps
-            .iter()
-            .filter(|heap| heap.flags.contains(vk::MemoryHeapFlags::DEVICE_LOCAL))
-            .map(|heap| heap.size)
-            .max()
-            .unwrap_or(0),
+        device_memory_bytes: of_device.map(|heap| heap.size).max().unwrap_or(0),
         storage_buffers_per_stage: limits.max_per_stage_descriptor_storage_buffers,
         work_group_count_x: limits.max_compute_work_group_count[0],
         work_group_count_y: limits.max_compute_work_group_count[1],

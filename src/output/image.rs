@@ -5,6 +5,7 @@ use image::ExtendedColorType;
 
 use super::colour::{Format, eight_bits, exr};
 use crate::engine::room::film::WallEstimate;
+use crate::scene::Camera;
 use crate::scene::rectangle::Rectangle;
 use crate::scene::room::{RoomScene, face_axis};
 
@@ -125,9 +126,7 @@ fn perspective(scene: &RoomScene, walls: &[WallEstimate], eye: [f64; 3], pixels:
     let centre = 0.5 * (scene.min_corner + scene.max_corner);
     let half = 0.5 * (scene.max_corner - scene.min_corner).max_element();
     let eye = centre + half * DVec3::from(eye);
-    let forward = (centre - eye).normalize();
-    let right = forward.cross(DVec3::Y).normalize();
-    let up = right.cross(forward);
+    let Camera { forward, right, up, .. } = Camera::looking_at("view", eye, centre, DVec3::Y, 1.0);
     // The picture fits the corner that stands out most.
     let reach = |corner: usize| {
         let side = |axis: usize| if corner >> axis & 1 == 1 { scene.max_corner[axis] } else { scene.min_corner[axis] };

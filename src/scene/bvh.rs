@@ -1,7 +1,7 @@
 //! The bounding volume hierarchy: triangles in, nodes of a compressed wide BVH and the order of its
 //! leaves out. `glsl/world/scene/bvh.glsl` traverses it.
 
-use glam::{UVec2, Vec3, Vec3A};
+use glam::{Vec3, Vec3A};
 use obvhs::aabb::Aabb;
 use obvhs::bvh2::node::Bvh2Node;
 use obvhs::bvh2::reinsertion::ReinsertionOptimizer;
@@ -158,25 +158,9 @@ fn levels(tree: &CwBvh) -> usize {
     deepest
 }
 
-/// The node as kernels read it.
+/// The node as kernels read it: the same bytes.
 pub fn record(node: &CwBvhNode) -> BvhNode {
-    let words = |bytes: [u8; 8]| {
-        let word = |first: usize| u32::from_le_bytes([bytes[first], bytes[first + 1], bytes[first + 2], bytes[first + 3]]);
-        UVec2::new(word(0), word(4))
-    };
-    BvhNode {
-        origin: node.p,
-        spacing: u32::from_le_bytes([node.e[0], node.e[1], node.e[2], node.imask]),
-        first_child: node.child_base_idx,
-        first_triangle: node.primitive_base_idx,
-        meta: words(node.child_meta),
-        min_x: words(node.child_min_x),
-        max_x: words(node.child_max_x),
-        min_y: words(node.child_min_y),
-        max_y: words(node.child_max_y),
-        min_z: words(node.child_min_z),
-        max_z: words(node.child_max_z),
-    }
+    bytemuck::cast(*node)
 }
 
 #[cfg(test)]

@@ -12,6 +12,7 @@ pub mod material;
 pub mod mesh;
 pub mod open_box;
 pub mod overlap;
+mod planes;
 pub mod rectangle;
 pub mod room;
 pub mod targets;

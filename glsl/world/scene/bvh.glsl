@@ -148,6 +148,21 @@ uint intersect_children(BvhNode node, vec3 origin, vec3 inverse, uint octant, fl
     return hits;
 }
 
+// Children whose boxes meet the box from `low` to `high`: nodes as bits 24 to 31, triangles as bits 0 to 23.
+uint children_in_box(BvhNode node, vec3 low, vec3 high)
+{
+    uint child_nodes = child_nodes_of(node);
+    uint found = 0;
+    [[unroll]] for (uint child = 0; child < 8; child++) {
+        uint meta = byte_of(node.meta, child);
+        if (meta != 0 && all(lessThanEqual(low_corner(node, child), high)) && all(greaterThanEqual(high_corner(node, child), low))) {
+            bool is_node = ((child_nodes >> child) & 1u) != 0;
+            found |= is_node ? 0x01000000u << child : (meta >> 5) << (meta & 31u);
+        }
+    }
+    return found;
+}
+
 // The nearest hit before t_max, or any hit if `any`.
 Hit traverse(vec3 origin, vec3 direction, float t_max, bool any)
 {

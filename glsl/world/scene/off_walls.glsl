@@ -32,34 +32,23 @@ vec3 off_the_walls(vec3 position, vec3 normal)
     if (HAS_BVH) {
         // Coordinates lie within 1.
         float reach = 2.5 * (position_error(position) + 1.0 / 1048576.0);
-        uvec2 group = uvec2(0, 0x100u);
+        // As in gather/cover.glsl.
+        uvec2 group = uvec2(0, 0x01000000u);
         uvec2 stack[BVH_STACK];
         uint depth = 0;
         for (;;) {
-            uint slot = findLSB(group.y >> 8);
-            group.y &= ~(0x100u << slot);
-            if (group.y > 0xffu) {
+            uint slot = findLSB(group.y >> 24);
+            group.y &= ~(0x01000000u << slot);
+            if (group.y > 0x00ffffffu) {
                 stack[depth++] = group;
             }
             BvhNode node = nodes[group.x + bitCount(group.y & ((1u << slot) - 1u))];
-            uint child_nodes = child_nodes_of(node);
-            uint near_nodes = 0;
-            uint near_leaves = 0;
-            for (uint child = 0; child < 8; child++) {
-                vec3 low = low_corner(node, child);
-                vec3 high = high_corner(node, child);
-                uint meta = byte_of(node.meta, child);
-                if (meta != 0 && all(lessThanEqual(low, position + reach)) && all(greaterThanEqual(high, position - reach))) {
-                    bool is_node = ((child_nodes >> child) & 1u) != 0;
-                    near_nodes |= is_node ? 1u << child : 0;
-                    near_leaves |= is_node ? 0 : (meta >> 5) << (meta & 31u);
-                }
+            uint near = children_in_box(node, position - reach, position + reach);
+            for (uint leaves = near & 0x00ffffffu; leaves != 0; leaves &= leaves - 1) {
+                position = off_the_wall(node.first_triangle + findLSB(leaves), position, normal);
             }
-            for (; near_leaves != 0; near_leaves &= near_leaves - 1) {
-                position = off_the_wall(node.first_triangle + findLSB(near_leaves), position, normal);
-            }
-            group = uvec2(node.first_child, (near_nodes << 8) | child_nodes);
-            if (near_nodes == 0) {
+            group = uvec2(node.first_child, (near & 0xff000000u) | child_nodes_of(node));
+            if (group.y <= 0x00ffffffu) {
                 if (depth == 0) {
                     break;
                 }

@@ -3,15 +3,7 @@
 
 layout(push_constant, scalar) uniform Push { FlightPush push; };
 
-#include "math/math.glsl"
-#include "ledger/nonfinite_values.glsl"
-#include "dispatch/dispatch.glsl"
-#include "rng/philox.glsl"
-#include "rng/sampling.glsl"
-#include "world/scene/effects.glsl"
-#include "math/directions.glsl"
-#include "world/scene/bvh.glsl"
-#include "material/surface.glsl"
+#include "world/scene/rays.glsl"
 #include "material/lobes.glsl"
 #include "material/scatter.glsl"
 #include "ledger/totals.glsl"

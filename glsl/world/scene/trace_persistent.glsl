@@ -4,15 +4,7 @@
 
 layout(push_constant, scalar) uniform Push { SceneTracePersistentPush push; };
 
-#include "math/math.glsl"
-#include "ledger/nonfinite_values.glsl"
-#include "dispatch/dispatch.glsl"
-#include "rng/philox.glsl"
-#include "rng/sampling.glsl"
-#include "world/scene/effects.glsl"
-#include "math/directions.glsl"
-#include "world/scene/bvh.glsl"
-#include "material/surface.glsl"
+#include "world/scene/rays.glsl"
 #include "world/scene/areas.glsl"
 #include "world/scene/lights.glsl"
 #include "world/scene/path.glsl"

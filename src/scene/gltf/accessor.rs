@@ -68,18 +68,16 @@ pub(super) fn read<const N: usize, T: Send>(
 
 /// Indices of vertices.
 pub(super) fn read_indices(loader: &Loader, accessor: &Accessor, what: &str) -> Result<Vec<u32>> {
-    if !matches!(accessor.data_type(), DataType::U8 | DataType::U16 | DataType::U32) {
-        return Err(loader.refuse(what, "has indices that are no unsigned integers"));
-    }
+    let are_unsigned = matches!(accessor.data_type(), DataType::U8 | DataType::U16 | DataType::U32);
+    loader.require(are_unsigned, what, || "has indices that are no unsigned integers".into())?;
     let elements = elements(loader, accessor, Dimensions::Scalar, what)?;
     Ok((0..elements.count).into_par_iter().with_min_len(MIN_PIECE).map(|index| integer(elements.element(index))).collect())
 }
 
 /// Four unsigned integers an element: the joints of a skinned vertex.
 pub(super) fn read_joints(loader: &Loader, accessor: &Accessor, vertices: &Vertices, what: &str) -> Result<Vec<[u16; 4]>> {
-    if !matches!(accessor.data_type(), DataType::U8 | DataType::U16) {
-        return Err(loader.refuse(what, "has joints that are no unsigned integers of 8 or 16 bits"));
-    }
+    let are_unsigned = matches!(accessor.data_type(), DataType::U8 | DataType::U16);
+    loader.require(are_unsigned, what, || "has joints that are no unsigned integers of 8 or 16 bits".into())?;
     read(loader, accessor, vertices, what, |numbers: [f32; 4]| numbers.map(|number| number as u16))
 }
 
@@ -132,9 +130,8 @@ fn number(bytes: &[u8], kind: DataType, normalized: bool) -> f32 {
 
 /// The bytes of every element, sparse replacements made.
 fn elements<'a>(loader: &'a Loader, accessor: &Accessor, dimensions: Dimensions, what: &str) -> Result<Elements<'a>> {
-    if accessor.dimensions() != dimensions {
-        return Err(loader.refuse(what, format!("is of type {:?} where {dimensions:?} is wanted", accessor.dimensions())));
-    }
+    let found = accessor.dimensions();
+    loader.require(found == dimensions, what, || format!("is of type {found:?} where {dimensions:?} is wanted"))?;
     let size = number_bytes(accessor.data_type()) * dimensions.multiplicity();
     let count = accessor.count();
     let mut elements = match accessor.view() {
@@ -154,9 +151,7 @@ fn elements<'a>(loader: &'a Loader, accessor: &Accessor, dimensions: Dimensions,
         let by = slice(loader, &values.view(), values.offset(), sparse.count(), size, what)?;
         for k in 0..sparse.count() {
             let index = integer(replaced.element(k)) as usize;
-            if index >= count {
-                return Err(loader.refuse(what, format!("replaces element {index} of {count}")));
-            }
+            loader.require(index < count, what, || format!("replaces element {index} of {count}"))?;
             elements.replaced.insert(index, by.element(k));
         }
     }

@@ -63,8 +63,19 @@ fn all_walls() -> Vec<(DVec3, DVec3)> {
     (0..3).flat_map(of_axis).collect()
 }
 
-fn case(name: String, expected: f64, measure: impl Fn(&Gpu) -> Result<Estimate> + 'static) -> Case {
-    Case { name, expected, on_gpu: true, measure: Box::new(move |gpu| measure(gpu.expect("this case runs on a device only"))) }
+fn case(name: impl Into<String>, expected: f64, measure: impl Fn(&Gpu) -> Result<Estimate> + 'static) -> Case {
+    let measure = Box::new(move |gpu: Option<&Gpu>| measure(gpu.expect("this case runs on a device only")));
+    Case { name: name.into(), expected, on_gpu: true, measure }
+}
+
+/// Irradiance at points (position, normal) of a built-in scene.
+fn arriving(name: impl Into<String>, expected: f64, in_scene: &'static str, settings: SceneSettings, points: Vec<(DVec3, DVec3)>) -> Case {
+    case(format!("{}: irradiance", name.into()), expected, move |gpu| irradiance(gpu, &scene(in_scene), &settings, &points))
+}
+
+/// Radiance that an eye sees in a point of a built-in scene.
+fn seen(name: impl Into<String>, expected: f64, in_scene: &'static str, settings: SceneSettings, [eye, point]: [DVec3; 2]) -> Case {
+    case(name, expected, move |gpu| radiance(gpu, &scene(in_scene), &settings, eye, point))
 }
 
 pub fn cases() -> Vec<Case> {
@@ -74,97 +85,85 @@ pub fn cases() -> Vec<Case> {
 /// Irradiance pi / (1 - albedo), radiance 1 / (1 - albedo), wherever one looks.
 fn furnace() -> Vec<Case> {
     let share = 1.0 - f64::from(WALL_ALBEDO);
-    WAYS.into_iter()
-        .flat_map(|(illumination, builder)| {
-            // More bounces than 24 have 1e-7 of the light.
-            let settings = SceneSettings { builder: Some(builder), bounces: 24, ..settings(illumination, 0.2) };
-            let other = settings.clone();
-            let what = format!("furnace, {illumination:?}, {builder:?}");
-            [
-                case(format!("{what}: irradiance"), PI / share, move |gpu| irradiance(gpu, &scene("furnace"), &settings, &all_walls())),
-                case(format!("{what}: radiance"), 1.0 / share, move |gpu| {
-                    let camera = Camera::looking_at("wide", DVec3::splat(0.5), DVec3::new(0.3, 0.4, 0.0), DVec3::Y, 2.2);
-                    mean_radiance(gpu, &scene("furnace"), &other, &camera)
-                }),
-            ]
-        })
-        .collect()
+    let of_way = |(illumination, builder): (Illumination, Builder)| {
+        // More bounces than 24 have 1e-7 of the light.
+        let settings = SceneSettings { builder: Some(builder), bounces: 24, ..settings(illumination, 0.2) };
+        let what = format!("furnace, {illumination:?}, {builder:?}");
+        [
+            arriving(&what, PI / share, "furnace", settings.clone(), all_walls()),
+            case(format!("{what}: radiance"), 1.0 / share, move |gpu| {
+                let camera = Camera::looking_at("wide", DVec3::splat(0.5), DVec3::new(0.3, 0.4, 0.0), DVec3::Y, 2.2);
+                mean_radiance(gpu, &scene("furnace"), &settings, &camera)
+            }),
+        ]
+    };
+    WAYS.into_iter().flat_map(of_way).collect()
 }
 
 /// 1 / (4 pi) straight from the lamp, albedo / (1 - albedo) / (4 pi) by scattering.
 fn integrating_sphere() -> Vec<Case> {
     let expected = 1.0 / (1.0 - f64::from(WALL_ALBEDO)) / (4.0 * PI);
-    BOTH.into_iter()
-        .map(|illumination| {
-            case(format!("integrating sphere, {illumination:?}: irradiance"), expected, move |gpu| {
-                let sphere = scene("integrating-sphere");
-                let mesh = &sphere.meshes[0];
-                let points: Vec<(DVec3, DVec3)> = (0..60)
-                    .map(|k| {
-                        let triangle = (2 * k + 1) * mesh.triangles.len() / 121;
-                        (mesh.corners(triangle).iter().sum::<DVec3>() / 3.0, mesh.normal(triangle))
-                    })
-                    .collect();
-                let settings = SceneSettings { bounces: 24, ..settings(illumination, 0.2) };
-                let found = irradiance(gpu, &sphere, &settings, &points)?;
-                // The sphere is of facets, a little smaller and nearer to the lamp.
-                Ok(Estimate { standard_error: found.standard_error.max(0.001 * expected), ..found })
-            })
+    let of = |illumination: Illumination| {
+        case(format!("integrating sphere, {illumination:?}: irradiance"), expected, move |gpu| {
+            let sphere = scene("integrating-sphere");
+            let mesh = &sphere.meshes[0];
+            let triangles = (0..60).map(|k| (2 * k + 1) * mesh.triangles.len() / 121);
+            let middle = |triangle: usize| mesh.corners(triangle).iter().sum::<DVec3>() / 3.0;
+            let points: Vec<(DVec3, DVec3)> = triangles.map(|triangle| (middle(triangle), mesh.normal(triangle))).collect();
+            let settings = SceneSettings { bounces: 24, ..settings(illumination, 0.2) };
+            let found = irradiance(gpu, &sphere, &settings, &points)?;
+            // The sphere is of facets, a little smaller and nearer to the lamp.
+            Ok(Estimate { standard_error: found.standard_error.max(0.001 * expected), ..found })
         })
-        .collect()
+    };
+    BOTH.map(of).into()
 }
 
 /// 1 / (1 + r^2)^(3/2); photons tell its mean over the disc of their estimate, of radius h,
 /// (2 / h^2) (1 - 1 / sqrt(1 + h^2)) straight below; L = albedo E / pi to the eye.
 fn point() -> Vec<Case> {
-    let at = |r: f64| [(DVec3::new(r, 0.0, 0.0), DVec3::Y)];
-    let mut cases: Vec<Case> = [0.0, 0.5, 1.7]
-        .into_iter()
-        .map(|r: f64| {
-            case(format!("point light, {r} m off axis: irradiance"), (1.0 + r * r).powf(-1.5), move |gpu| {
-                irradiance(gpu, &scene("point-over-plane"), &settings(Illumination::Split, 0.1), &at(r))
-            })
-        })
-        .collect();
+    const SCENE: &str = "point-over-plane";
+    let split = || settings(Illumination::Split, 0.1);
+    let off_axis = |r: f64| {
+        let name = format!("point light, {r} m off axis");
+        arriving(name, (1.0 + r * r).powf(-1.5), SCENE, split(), vec![(DVec3::X * r, DVec3::Y)])
+    };
     // The wider, the more photons.
     let h: f64 = 1.9;
-    cases.push(case("point light, photons: irradiance".into(), 2.0 / (h * h) * (1.0 - 1.0 / (1.0 + h * h).sqrt()), move |gpu| {
-        let photons = SceneSettings { photons: 60_000, bounces: 2, ..settings(Illumination::Photons, h) };
-        irradiance(gpu, &scene("point-over-plane"), &photons, &at(0.0))
-    }));
-    cases.push(case("point light: radiance of the plane".into(), 0.8 / PI * 1.25f64.powf(-1.5), |gpu| {
-        let split = settings(Illumination::Split, 0.1);
-        radiance(gpu, &scene("point-over-plane"), &split, DVec3::new(0.4, 1.0, 1.5), DVec3::X * 0.5)
-    }));
-    cases
+    let over_disc = 2.0 / (h * h) * (1.0 - 1.0 / (1.0 + h * h).sqrt());
+    let photons = SceneSettings { photons: 60_000, bounces: 2, ..settings(Illumination::Photons, h) };
+    let rays = [DVec3::new(0.4, 1.0, 1.5), DVec3::X * 0.5];
+    let others = [
+        arriving("point light, photons", over_disc, SCENE, photons, vec![(DVec3::ZERO, DVec3::Y)]),
+        seen("point light: radiance of the plane", 0.8 / PI * 1.25f64.powf(-1.5), SCENE, split(), rays),
+    ];
+    [0.0, 0.5, 1.7].map(off_axis).into_iter().chain(others).collect()
 }
 
 /// 1 / (pi (R^2 + 1)) straight below, and for equal intensity in all directions the disc's solid angle over
 /// 2 pi (pi R^2), (1 - 1 / sqrt(1 + R^2)) / (pi R^2); photons tell the mean over a disc of radius h, from the form factor of two
 /// discs that face each other.
 fn disc() -> Vec<Case> {
+    const SCENE: &str = "disc-over-plane";
     let below = [(DVec3::ZERO, DVec3::Y)];
+    let split = settings(Illumination::Split, 0.1);
     let r = DISC_RADIUS;
     let h: f64 = 0.5;
     let x = 1.0 + (1.0 + h * h) / (r * r);
     let mean = 0.5 * (x - (x * x - 4.0 * (h / r).powi(2)).sqrt()) / (PI * h * h);
+    let photons = SceneSettings { photons: 60_000, bounces: 2, ..settings(Illumination::Photons, h) };
     let by_intensity = (1.0 - 1.0 / (1.0 + r * r).sqrt()) / (PI * r * r);
     vec![
-        case("disc light, uniform intensity: irradiance".into(), by_intensity, move |gpu| {
-            let mut scene = scene("disc-over-plane");
+        arriving("disc light", 1.0 / (PI * (r * r + 1.0)), SCENE, split.clone(), below.into()),
+        arriving("disc light, photons", mean, SCENE, photons, below.into()),
+        case("disc light, uniform intensity: irradiance", by_intensity, move |gpu| {
+            let mut scene = scene(SCENE);
             for light in &mut scene.lights {
                 if let LightKind::Disc { law, .. } = &mut light.kind {
                     *law = EmissionLaw::Uniform;
                 }
             }
-            irradiance(gpu, &scene, &settings(Illumination::Split, 0.1), &below)
-        }),
-        case("disc light: irradiance".into(), 1.0 / (PI * (r * r + 1.0)), move |gpu| {
-            irradiance(gpu, &scene("disc-over-plane"), &settings(Illumination::Split, 0.1), &below)
-        }),
-        case("disc light, photons: irradiance".into(), mean, move |gpu| {
-            let photons = SceneSettings { photons: 60_000, bounces: 2, ..settings(Illumination::Photons, h) };
-            irradiance(gpu, &scene("disc-over-plane"), &photons, &below)
+            irradiance(gpu, &scene, &split, &below)
         }),
     ]
 }
@@ -174,44 +173,37 @@ fn sun_and_sky() -> Vec<Case> {
     let mut cases = Vec::new();
     for (name, expected) in [("sun-over-plane", 1.6), ("sky-over-plane", PI)] {
         for illumination in BOTH {
-            cases.push(case(format!("{name}, {illumination:?}: irradiance"), expected, move |gpu| {
-                // A sixth of the sky's photons meets the plane.
-                let settings = SceneSettings { bounces: 2, photons: 120_000, ..settings(illumination, 0.25) };
-                irradiance(gpu, &scene(name), &settings, &floor(DVec3::ZERO, 4.4))
-            }));
+            // A sixth of the sky's photons meets the plane.
+            let settings = SceneSettings { bounces: 2, photons: 120_000, ..settings(illumination, 0.25) };
+            cases.push(arriving(format!("{name}, {illumination:?}"), expected, name, settings, floor(DVec3::ZERO, 4.4)));
         }
     }
-    cases.push(case("sky: radiance".into(), 1.0, |gpu| {
-        radiance(gpu, &scene("sky-over-plane"), &settings(Illumination::Split, 0.1), DVec3::Y, DVec3::Y * 2.0)
-    }));
+    let up = [DVec3::Y, DVec3::Y * 2.0];
+    cases.push(seen("sky: radiance", 1.0, "sky-over-plane", settings(Illumination::Split, 0.1), up));
     cases
 }
 
 /// Each mirror takes 0.2: a ray that meets them n times sees 0.8^n.
 fn mirrors() -> Vec<Case> {
-    [1, 3, 6]
-        .into_iter()
-        .map(|n: i32| {
-            case(format!("mirror corridor, {}: radiance", counted(n, "mirror")), 0.8f64.powi(n), move |gpu| {
-                // Unfolded, the end wall lies straight on: the ray goes to the middle of its nth image.
-                let target = DVec3::new(f64::from(n), 0.0, -10.0);
-                radiance(gpu, &scene("mirror-corridor"), &settings(Illumination::Split, 0.1), DVec3::ZERO, target)
-            })
-        })
-        .collect()
+    let of = |n: i32| {
+        // Unfolded, the end wall lies straight on: the ray goes to the middle of its nth image.
+        let ray = [DVec3::ZERO, DVec3::new(f64::from(n), 0.0, -10.0)];
+        let name = format!("mirror corridor, {}: radiance", counted(n, "mirror"));
+        seen(name, 0.8f64.powi(n), "mirror-corridor", settings(Illumination::Split, 0.1), ray)
+    };
+    [1, 3, 6].map(of).into()
 }
 
 /// (1 - F) / (1 + F): the sum over all reflections within the slab; F = 0.04 straight on.
 fn glass() -> Vec<Case> {
-    let of = |name: &str, degrees: f64| {
+    let of = |(name, degrees): (&str, f64)| {
         let fresnel = reflectance(degrees.to_radians(), 1.5);
-        case(format!("glass slab, {name}: radiance"), (1.0 - fresnel) / (1.0 + fresnel), move |gpu| {
-            let rays = SceneSettings { photons: 1, caustic_photons: 1, rounds: 16, ..settings(Illumination::Split, 0.1) };
-            let (sin, cos) = degrees.to_radians().sin_cos();
-            radiance(gpu, &scene("glass-slab"), &rays, 2.0 * DVec3::new(sin, 0.0, cos), DVec3::ZERO)
-        })
+        let (sin, cos) = degrees.to_radians().sin_cos();
+        let rays = SceneSettings { photons: 1, caustic_photons: 1, rounds: 16, ..settings(Illumination::Split, 0.1) };
+        let ray = [2.0 * DVec3::new(sin, 0.0, cos), DVec3::ZERO];
+        seen(format!("glass slab, {name}: radiance"), (1.0 - fresnel) / (1.0 + fresnel), "glass-slab", rays, ray)
     };
-    vec![of("normal incidence", 0.0), of("at 60 degrees", 60.0)]
+    [("normal incidence", 0.0), ("at 60 degrees", 60.0)].map(of).into()
 }
 
 /// What a smooth surface reflects of unpolarised light (Fresnel; Born and Wolf 1.5.2).

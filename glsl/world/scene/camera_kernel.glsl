@@ -1,0 +1,16 @@
+// What the kernels are made of that follow paths from cameras and receivers, and leave visible points.
+
+#include "world/scene/rays.glsl"
+#include "rng/sobol.glsl"
+#include "world/scene/samples.glsl"
+#include "material/lobes.glsl"
+#include "material/scatter.glsl"
+#include "world/scene/areas.glsl"
+#include "world/scene/lights.glsl"
+#include "world/scene/direct.glsl"
+#include "film/wide.glsl"
+#include "world/scene/film_units.glsl"
+#include "world/scene/no_point.glsl"
+#include "world/scene/one_hit.glsl"
+#include "world/scene/points.glsl"
+#include "world/scene/camera_path.glsl"

@@ -1,0 +1,310 @@
+//! What emits light: shining triangles and lights without geometry, each with the probability that a photon starts there.
+
+use std::f64::consts::{PI, TAU};
+
+use glam::{DVec2, DVec3, Vec2, Vec3};
+use rayon::prelude::*;
+
+use super::{Geometry, area, refuse};
+use crate::constants::*;
+use crate::error::Result;
+use crate::records::{Emitter, Triangle, TriangleUvs};
+use crate::scene::light::LightKind;
+use crate::scene::{Scene, Texture, work};
+use crate::settings::EmissionLaw;
+
+const MAX_EMITTERS: usize = 1 << 22;
+/// Values that a random choice of emitter can take.
+const CHOICES: u32 = 1 << 24;
+
+impl Geometry {
+    pub(super) fn add_emitters(&mut self, scene: &Scene) -> Result<()> {
+        let summaries = summaries_of_emission(scene);
+        let found_in = |(index, triangle): (usize, &Triangle)| {
+            if triangle.plane >= HIDDEN {
+                return None;
+            }
+            let material = &scene.materials[triangle.material as usize];
+            if !material.is_emissive() {
+                return None;
+            }
+            let sides = if material.two_sided { 2.0 } else { 1.0 };
+            let flux = PI * sides * area(triangle) * material.emission.as_dvec3();
+            let (mean, brightest) = match material.emission_texture.and_then(|of| Some((of.texture, summaries[of.texture]?))) {
+                Some((texture, summary)) => (mean_over(&scene.textures[texture], summary.mean, &self.uvs[index]), summary.brightest),
+                None => (DVec3::ONE, 1.0),
+            };
+            let emitter = Emitter { kind: EMITTER_TRIANGLE, triangle: index as u32, strength: material.emission, ..Emitter::default() };
+            Some(Found { emitter, flux, weight: (flux * mean).element_sum(), brightest })
+        };
+        let mut found: Vec<Found> = self.triangles.par_iter().enumerate().filter_map(found_in).collect();
+        let mut sky = Vec3::ZERO;
+        for light in &scene.lights {
+            if let LightKind::Environment { radiance } = light.kind {
+                sky += radiance;
+                continue;
+            }
+            let emitter = self.emitter_of(&light.kind);
+            if !(emitter.emitter.strength.is_finite() && emitter.weight.is_finite() && emitter.emitter.position.is_finite()) {
+                let wide = self.unit;
+                let reason =
+                    format!("leaves the range of numbers: the scene is {wide} metres wide, which its strength or place does not fit");
+                return Err(refuse(scene, &light.name, reason));
+            }
+            found.push(emitter);
+        }
+        // One environment, the sum of all, comes last, where the kernels look for it.
+        found.push(self.emitter_of(&LightKind::Environment { radiance: sky }));
+        found.retain(|found| found.weight > 0.0);
+        if found.len() > MAX_EMITTERS {
+            let reason = format!("has {} triangles and lights that shine, at most {MAX_EMITTERS} can be chosen from", found.len());
+            return Err(refuse(scene, "the scene", reason));
+        }
+        self.power = found.iter().map(|found| found.weight).sum();
+        let choices = choices(&found.iter().map(|found| found.weight / self.power).collect::<Vec<_>>());
+        let mut before = 0;
+        for (found, choices) in found.iter_mut().zip(&choices) {
+            found.emitter.probability = *choices as f32 / CHOICES as f32;
+            found.flux /= f64::from(found.emitter.probability);
+            before += choices;
+            found.emitter.cumulative = before as f32 / CHOICES as f32;
+        }
+        self.flux_unit = found.iter().map(|found| found.flux.max_element() * found.brightest).fold(0.0, f64::max);
+        if self.flux_unit == 0.0 {
+            self.flux_unit = 1.0;
+        }
+        self.emitters = found.into_iter().map(|found| Emitter { flux: (found.flux / self.flux_unit).as_vec3(), ..found.emitter }).collect();
+        Ok(())
+    }
+
+    fn emitter_of(&self, kind: &LightKind) -> Found {
+        let area_unit = self.unit * self.unit;
+        let (own, flux) = match *kind {
+            LightKind::Point { position, intensity } => {
+                let strength = intensity.as_dvec3() / area_unit;
+                let own = Emitter { position: self.to_local(position), strength: strength.as_vec3(), ..Emitter::default() };
+                (own, 2.0 * TAU * strength)
+            }
+            LightKind::Spot { position, direction, intensity, inner_angle, outer_angle } => {
+                let strength = intensity.as_dvec3() / area_unit;
+                // f32 holds a solid angle of so much, and its inverse.
+                let (inner, outer) = (versine(inner_angle), versine(outer_angle).max(1e-36));
+                let own = Emitter {
+                    position: self.to_local(position),
+                    direction: direction.as_vec3(),
+                    strength: strength.as_vec3(),
+                    size: inner as f32,
+                    outer_versine: outer as f32,
+                    ..Emitter::default()
+                };
+                // The square of a falloff that is linear in the cosine has a third of the ring's light.
+                (own, TAU * (inner + (outer - inner) / 3.0) * strength)
+            }
+            LightKind::Directional { direction, irradiance } => {
+                let own = Emitter { direction: direction.as_vec3(), strength: irradiance, ..Emitter::default() };
+                (own, PI * self.radius * self.radius * irradiance.as_dvec3())
+            }
+            LightKind::Disc { centre, normal, radius, power, law } => {
+                let flux = power.as_dvec3() / area_unit;
+                let radius = radius / self.unit;
+                let disc = PI * radius * radius;
+                let strength = match law {
+                    EmissionLaw::Cosine => flux / (PI * disc),
+                    EmissionLaw::Uniform => flux / (TAU * disc),
+                };
+                let own = Emitter {
+                    position: self.to_local(centre),
+                    direction: normal.as_vec3(),
+                    strength: strength.as_vec3(),
+                    size: radius as f32,
+                    ..Emitter::default()
+                };
+                (own, flux)
+            }
+            LightKind::Environment { radiance } => {
+                (Emitter { strength: radiance, ..Emitter::default() }, 2.0 * TAU * PI * self.radius * self.radius * radiance.as_dvec3())
+            }
+        };
+        let emitter = Emitter { kind: kind.code(), ..own };
+        Found { emitter, flux, weight: flux.element_sum(), brightest: 1.0 }
+    }
+
+    /// Radiance of the brightest thing that a camera can see, W/m2/sr, or the irradiance a sixteenth of the scene's
+    /// unit from a point or spot light: what a narrow spot lights is far brighter than its power over the scene's area.
+    pub fn brightest(&self) -> f64 {
+        let shines = self.materials.iter().map(|material| material.emission);
+        let environment = self.emitters.iter().filter(|emitter| emitter.kind == EMITTER_ENVIRONMENT).map(|emitter| emitter.strength);
+        let small = self.emitters.iter().filter(|emitter| matches!(emitter.kind, EMITTER_POINT | EMITTER_SPOT));
+        let irradiance = small.map(|emitter| 2f64.powi(8) * f64::from(emitter.strength.max_element()));
+        shines.chain(environment).map(|radiance| f64::from(radiance.max_element())).chain(irradiance).fold(0.0, f64::max)
+    }
+}
+
+/// 1 - cosine of an angle, with all digits of a small one.
+fn versine(angle: f32) -> f64 {
+    2.0 * (0.5 * f64::from(angle)).sin().powi(2)
+}
+
+/// An emitter before its probability is known.
+struct Found {
+    emitter: Emitter,
+    /// Per channel, texture left out.
+    flux: DVec3,
+    weight: f64,
+    /// Largest value of its texture.
+    brightest: f64,
+}
+
+/// Deals the choices of a random number to emitters by their share, at least one to each, so that the
+/// probability that a kernel divides by is the one with which it chose.
+fn choices(shares: &[f64]) -> Vec<u32> {
+    if shares.is_empty() {
+        return Vec::new();
+    }
+    let free = f64::from(CHOICES - shares.len() as u32);
+    let mut dealt = 0u32;
+    let mut sum = 0.0;
+    let mut choices: Vec<u32> = shares
+        .iter()
+        .map(|share| {
+            sum += share;
+            let until = (sum * free).round().min(free) as u32;
+            let own = until.saturating_sub(dealt);
+            dealt += own;
+            own + 1
+        })
+        .collect();
+    // What rounding of the shares' sum left over.
+    *choices.last_mut().expect("there is a share") += free as u32 - dealt;
+    choices
+}
+
+/// A texture as a whole.
+#[derive(Clone, Copy)]
+struct TextureSummary {
+    mean: DVec3,
+    /// No sample is brighter.
+    brightest: f64,
+}
+
+/// Of each texture of what shines.
+fn summaries_of_emission(scene: &Scene) -> Vec<Option<TextureSummary>> {
+    let mut summaries = vec![None; scene.textures.len()];
+    for material in scene.materials.iter().filter(|material| material.is_emissive()) {
+        if let Some(of) = material.emission_texture {
+            summaries[of.texture].get_or_insert_with(|| TextureSummary::of(&scene.textures[of.texture]));
+        }
+    }
+    summaries
+}
+
+impl TextureSummary {
+    fn of(texture: &Texture) -> TextureSummary {
+        work::add(|| texture.texels.len());
+        // Sums of pieces of one length do not depend on the number of threads.
+        let of_piece = |piece: &[Vec3]| {
+            let sum: DVec3 = piece.iter().map(|texel| texel.as_dvec3()).sum();
+            (sum, piece.iter().map(|texel| texel.max_element()).fold(0.0, f32::max))
+        };
+        let pieces: Vec<(DVec3, f32)> = texture.texels.par_chunks(1 << 16).map(of_piece).collect();
+        let sum: DVec3 = pieces.iter().map(|(sum, _)| *sum).sum();
+        let brightest = pieces.iter().map(|(_, brightest)| *brightest).fold(0.0, f32::max);
+        // The kernels sample half floats.
+        TextureSummary { mean: sum / texture.texels.len() as f64, brightest: half::f16::from_f32(brightest).to_f64() }
+    }
+}
+
+/// Mean of a texture over a triangle, from about as many samples as it has texels there, 64 at most. It only steers
+/// choices; a hundredth of the whole texture's is in it, so that what falls between the samples keeps its chance.
+fn mean_over(texture: &Texture, mean_of_all: DVec3, uvs: &TriangleUvs) -> DVec3 {
+    const MOST_STEPS: f64 = 8.0;
+    let [a, b, c] = [uvs.emission_a, uvs.emission_b, uvs.emission_c].map(Vec2::as_dvec2);
+    let size = DVec2::new(f64::from(texture.width), f64::from(texture.height));
+    let texels = 0.5 * ((b - a) * size).perp_dot((c - a) * size).abs();
+    let steps = texels.sqrt().ceil().clamp(1.0, MOST_STEPS) as u32;
+    let mut sum = DVec3::ZERO;
+    for i in 0..steps {
+        for j in 0..steps {
+            let root = ((f64::from(i) + 0.5) / f64::from(steps)).sqrt();
+            let (u, v) = (root * (1.0 - (f64::from(j) + 0.5) / f64::from(steps)), root * (f64::from(j) + 0.5) / f64::from(steps));
+            sum += texture.sample(a + u * (b - a) + v * (c - a)).as_dvec3();
+        }
+    }
+    0.99 * sum / f64::from(steps * steps) + 0.01 * mean_of_all
+}
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+    use crate::scene::texture::Wrap;
+    use crate::scene::{Material, Mesh, built_in};
+
+    #[test]
+    fn choices_follow_the_shares_and_leave_none_out() {
+        let mut shares = vec![1e-12; 1000];
+        shares.push(0.25);
+        shares.push(0.75 - 1e-9);
+        let dealt = choices(&shares);
+        assert_eq!(dealt.iter().map(|choices| u64::from(*choices)).sum::<u64>(), u64::from(CHOICES));
+        assert!(dealt.iter().all(|choices| *choices >= 1));
+        assert!((f64::from(dealt[1000]) / f64::from(CHOICES) - 0.25).abs() < 1e-4);
+        assert!(choices(&[]).is_empty());
+        assert_eq!(choices(&[1.0]), [CHOICES]);
+    }
+
+    /// A strip of so many triangles that shines by a texture.
+    fn textured_lamp(triangles: u32, texture: Texture) -> Scene {
+        let mut lamp = Mesh { name: "lamp".into(), ..Mesh::default() };
+        for k in 0..triangles {
+            let at = f64::from(k) / f64::from(triangles);
+            lamp.positions.extend([DVec3::X * at, DVec3::new(at, 1.0, 0.0), DVec3::new(at + 1.0 / f64::from(triangles), 1.0, 0.0)]);
+            lamp.uvs[0].extend([DVec2::new(at, 0.0), DVec2::new(at, 1.0), DVec2::new(at, 1.0)]);
+            lamp.triangles.push([3 * k, 3 * k + 1, 3 * k + 2]);
+        }
+        let mut material = Material::lambert("lamp", Vec3::ONE);
+        material.emission = Vec3::ONE;
+        material.emission_texture = Some(crate::scene::material::TextureUse { texture: 0, uv_set: 0 });
+        Scene { meshes: vec![lamp], materials: vec![material], textures: vec![texture], ..Scene::default() }
+    }
+
+    /// A texture is summed once and not for every triangle.
+    #[test]
+    fn many_triangles_shine_by_a_large_texture() {
+        let texture =
+            Texture { name: "t".into(), width: 2048, height: 2048, texels: vec![Vec3::splat(0.25); 1 << 22], wrap: [Wrap::Repeat; 2] };
+        let scene = textured_lamp(6036, texture);
+        let (geometry, summed) = work::of(|| Geometry::new(&scene).unwrap());
+        assert_eq!(geometry.emitters.len(), 6036);
+        let watts = geometry.power * geometry.unit * geometry.unit;
+        assert!((watts / (3.0 * PI * 0.25 * 0.5) - 1.0).abs() < 1e-4, "{watts} W");
+        assert!((1 << 22..2 << 22).contains(&summed), "{summed} texels summed");
+    }
+
+    /// No sample of a texture, whose half floats may be rounded up, exceeds what photons' fluxes are scaled by.
+    #[test]
+    fn no_sample_is_brighter_than_the_brightest() {
+        let texels: Vec<Vec3> = (0..70_000u32).map(|k| Vec3::new(0.1, 0.2 + 0.7 * (k % 997) as f32 / 997.0, 0.3)).collect();
+        let texture = Texture { name: "t".into(), width: 700, height: 100, texels, wrap: [Wrap::Repeat; 2] };
+        let summary = TextureSummary::of(&texture);
+        let packed = |texel: &Vec3| half::f16::from_f32(texel.y).to_f64();
+        let brightest = texture.texels.iter().map(packed).fold(0.0, f64::max);
+        assert_eq!(summary.brightest, brightest);
+        let mean: DVec3 = texture.texels.iter().map(|texel| texel.as_dvec3()).sum::<DVec3>() / 70_000.0;
+        assert!((summary.mean - mean).abs().max_element() < 1e-12, "{} {mean}", summary.mean);
+        let geometry = Geometry::new(&textured_lamp(3, texture)).unwrap();
+        assert!(geometry.emitters.iter().all(|emitter| f64::from(emitter.flux.max_element()) * brightest <= 1.0 + 1e-6));
+    }
+
+    #[test]
+    fn emitters_hold_all_power() {
+        let scene = built_in::by_name("cornell").unwrap();
+        let geometry = Geometry::new(&scene).unwrap();
+        let watts = geometry.power * geometry.unit * geometry.unit;
+        let exact = PI * 0.09 * (17.0 + 12.0 + 4.0);
+        assert!((watts / exact - 1.0).abs() < 1e-5, "{watts} W, {exact} W");
+        // Every photon of these two equal triangles carries the same.
+        assert_eq!(geometry.emitters.len(), 2);
+        assert!(geometry.emitters.iter().all(|emitter| (emitter.flux.max_element() - 1.0).abs() < 1e-6));
+        assert_eq!(geometry.emitters[1].cumulative, 1.0);
+    }
+}

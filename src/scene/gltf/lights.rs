@@ -1,0 +1,64 @@
+//! Lights without geometry, and cameras.
+
+use glam::{DMat4, DVec3, Vec3};
+use gltf::khr_lights_punctual::Kind;
+
+use super::{Loader, printable};
+use crate::error::Result;
+use crate::scene::Camera;
+use crate::scene::light::{Light, LightKind};
+
+impl Loader {
+    pub(super) fn read_camera(&mut self, camera: &gltf::Camera, node: &gltf::Node, to_world: DMat4) {
+        let name = node.name().or(camera.name()).map_or_else(|| format!("camera {}", camera.index()), printable);
+        let gltf::camera::Projection::Perspective(perspective) = camera.projection() else {
+            self.leave_out("orthographic cameras", &format!("camera '{name}'"));
+            return;
+        };
+        let vertical_view = f64::from(perspective.yfov());
+        // Within the angles for which a pinhole picture means something.
+        if !(0.002..3.12).contains(&vertical_view) {
+            self.leave_out(format!("a camera with a vertical view of {vertical_view} radians"), &format!("camera '{name}'"));
+            return;
+        }
+        let eye = to_world.transform_point3(DVec3::ZERO);
+        let target = eye + to_world.transform_vector3(DVec3::NEG_Z).normalize_or(DVec3::NEG_Z);
+        let up = to_world.transform_vector3(DVec3::Y);
+        // Where the file leaves the aspect open, so does the camera.
+        let aspect = perspective.aspect_ratio().map(f64::from);
+        let is_usable = |aspect: &f64| aspect.is_finite() && *aspect > 0.0;
+        if let Some(aspect) = aspect.filter(|aspect| !is_usable(aspect)) {
+            self.leave_out(format!("an aspect ratio of {aspect}"), &format!("camera '{name}'"));
+        }
+        let camera = Camera::looking_at(&name, eye, target, up, vertical_view);
+        self.scene.cameras.push(Camera { aspect: aspect.filter(is_usable), ..camera });
+    }
+
+    pub(super) fn read_light(&mut self, light: &gltf::khr_lights_punctual::Light, node: &str, to_world: DMat4) -> Result<()> {
+        let what = format!("light {}", light.name().map(printable).map_or_else(|| format!("of {node}"), |name| format!("'{name}'")));
+        let strength = Vec3::from(light.color()) * light.intensity() * self.unit;
+        let reason = || format!("has the intensity {} and colour {:?}; both must be 0 or more", light.intensity(), light.color());
+        self.require(strength.is_finite() && strength.min_element() >= 0.0, &what, reason)?;
+        if light.range().is_some() {
+            self.leave_out("ranges of lights (they reach as far as light does)", &what);
+        }
+        let position = to_world.transform_point3(DVec3::ZERO);
+        let direction = to_world.transform_vector3(DVec3::NEG_Z).normalize_or(DVec3::NEG_Z);
+        let kind = match light.kind() {
+            Kind::Point => LightKind::Point { position, intensity: strength },
+            Kind::Directional => LightKind::Directional { direction, irradiance: strength },
+            Kind::Spot { inner_cone_angle, outer_cone_angle } => {
+                let (inner_angle, outer_angle) = (inner_cone_angle, outer_cone_angle);
+                let is_cone = inner_angle >= 0.0 && inner_angle < outer_angle && outer_angle <= std::f32::consts::FRAC_PI_2 + 1e-6;
+                self.require(is_cone, &what, || {
+                    format!("has cones of {inner_angle} and {outer_angle} radians; the inner must be smaller, the outer at most half pi")
+                })?;
+                LightKind::Spot { position, direction, intensity: strength, inner_angle, outer_angle }
+            }
+        };
+        if strength.max_element() > 0.0 {
+            self.scene.lights.push(Light { name: what, kind });
+        }
+        Ok(())
+    }
+}

@@ -1,0 +1,214 @@
+//! Primitives of meshes where nodes or skins put them.
+
+use std::collections::HashMap;
+use std::sync::Arc;
+
+use glam::{DMat3, DMat4, DVec2, DVec3, Vec3};
+use gltf::Semantic;
+use gltf::mesh::Mode;
+use rayon::prelude::*;
+
+use super::accessor::{self, Vertices};
+use super::{Loader, called, node_name};
+use crate::error::Result;
+use crate::scene::Mesh;
+
+/// Of all instances together: as many as the GPU's buffers of 4 GiB hold.
+const MAX_TRIANGLES: usize = 100_000_000;
+/// Texture coordinates beyond that have no digits left for a place in the picture.
+const MAX_UV: f64 = 1e6;
+
+/// A primitive of a node.
+pub(super) struct Part<'a> {
+    pub(super) primitive: gltf::Primitive<'a>,
+    /// Of its node, or of its mesh.
+    pub(super) name: String,
+    pub(super) to_world: DMat4,
+    /// Its joints' matrices.
+    pub(super) skin: Option<Arc<Vec<DMat4>>>,
+}
+
+impl Part<'_> {
+    /// Its name in complaints.
+    fn what(&self) -> String {
+        format!("mesh '{}', primitive {}", self.name, self.primitive.index())
+    }
+}
+
+impl Loader {
+    /// What takes a vertex that follows one joint alone into the world. The transform of the node that has the mesh
+    /// is none of it.
+    pub(super) fn joint_matrices(&self, skin: &gltf::Skin, to_world: &HashMap<usize, DMat4>) -> Result<Vec<DMat4>> {
+        let what = called("skin", skin.name(), skin.index());
+        let to_joint = match skin.inverse_bind_matrices() {
+            Some(matrices) => {
+                accessor::read(self, &matrices, &Vertices::All, &what, |matrix: [f32; 16]| DMat4::from_cols_array(&matrix.map(f64::from)))?
+            }
+            None => vec![DMat4::IDENTITY; skin.joints().len()],
+        };
+        let reason = || format!("has {} matrices for {} joints", to_joint.len(), skin.joints().len());
+        self.require(to_joint.len() >= skin.joints().len(), &what, reason)?;
+        let matrix = |(joint, to_joint): (gltf::Node, &DMat4)| match to_world.get(&joint.index()) {
+            Some(to_world) => Ok(*to_world * *to_joint),
+            None => Err(self.refuse(&what, format!("has the joint {}, which is not in the scene", node_name(&joint)))),
+        };
+        skin.joints().zip(&to_joint).map(matrix).collect()
+    }
+
+    /// Takes note of a primitive if it makes triangles, and of what it has that is not read.
+    pub(super) fn list_primitive<'a>(&mut self, part: Part<'a>, parts: &mut Vec<Part<'a>>) -> Result<()> {
+        let owner = format!("mesh '{}'", part.name);
+        let primitive = &part.primitive;
+        if matches!(primitive.mode(), Mode::Points | Mode::Lines | Mode::LineLoop | Mode::LineStrip) {
+            self.leave_out("points and lines", &owner);
+            return Ok(());
+        }
+        if primitive.morph_targets().len() > 0 {
+            self.leave_out("morph targets (meshes are taken in their base shape)", &owner);
+        }
+        if primitive.get(&Semantic::Colors(0)).is_some() {
+            self.leave_out("vertex colours", &owner);
+        }
+        let Some(positions) = primitive.get(&Semantic::Positions) else {
+            return Err(self.refuse(&part.what(), "has no positions"));
+        };
+        let corners = primitive.indices().map_or(positions.count(), |indices| indices.count());
+        self.triangle_count = self.triangle_count.saturating_add(corners / 3).saturating_add(positions.count().min(corners) / 4);
+        let reason = || format!("brings the scene over {MAX_TRIANGLES} triangles, the most that are read");
+        self.require(self.triangle_count <= MAX_TRIANGLES, &part.what(), reason)?;
+        parts.push(part);
+        Ok(())
+    }
+
+    pub(super) fn read_primitive(&self, part: &Part) -> Result<Mesh> {
+        let Part { primitive, name, to_world, .. } = part;
+        let what = part.what();
+        let positions = primitive.get(&Semantic::Positions).expect("what is listed has positions");
+        let vertex_count = positions.count();
+        let of_vertices = |accessor: &gltf::Accessor, kind: &str| {
+            let count = accessor.count();
+            self.require(count == vertex_count, &what, || format!("has {count} {kind} for {vertex_count} vertices"))
+        };
+        let (indices, vertices) = self.indices_and_vertices(primitive, vertex_count, &what)?;
+
+        let vector = |numbers: [f32; 3]| Vec3::from(numbers).as_dvec3();
+        let matrices = match &part.skin {
+            Some(joints) => self.vertex_matrices(primitive, joints, vertex_count, &vertices, &what)?,
+            None => None,
+        };
+        let positions: Vec<DVec3> = match &matrices {
+            Some(matrices) => {
+                let own = accessor::read(self, &positions, &vertices, &what, vector)?;
+                own.par_iter().zip(matrices).map(|(position, matrix)| matrix.transform_point3(*position)).collect()
+            }
+            None => accessor::read(self, &positions, &vertices, &what, |numbers| to_world.transform_point3(vector(numbers)))?,
+        };
+        let are_finite = positions.iter().all(|position| position.is_finite());
+        self.require(are_finite, &what, || "has a vertex that is not finite once transformed".into())?;
+        let mut normals = Vec::new();
+        if let Some(own) = primitive.get(&Semantic::Normals) {
+            of_vertices(&own, "normals")?;
+            let turned = |matrix: &DMat3, normal: DVec3| (*matrix * normal).normalize_or_zero();
+            normals = match &matrices {
+                Some(matrices) => {
+                    let own = accessor::read(self, &own, &vertices, &what, vector)?;
+                    own.par_iter().zip(matrices).map(|(normal, matrix)| turned(&normal_matrix(matrix), *normal)).collect()
+                }
+                None => {
+                    let matrix = normal_matrix(to_world);
+                    accessor::read(self, &own, &vertices, &what, |numbers| turned(&matrix, vector(numbers)))?
+                }
+            };
+        }
+        let mut uvs = [Vec::new(), Vec::new()];
+        for (set, uvs) in uvs.iter_mut().enumerate() {
+            if let Some(coordinates) = primitive.get(&Semantic::TexCoords(set as u32)) {
+                of_vertices(&coordinates, "texture coordinates")?;
+                *uvs = accessor::read(self, &coordinates, &vertices, &what, |[u, v]: [f32; 2]| DVec2::new(f64::from(u), f64::from(v)))?;
+                if let Some(uv) = uvs.iter().find(|uv| uv.is_nan() || uv.abs().max_element() > MAX_UV) {
+                    return Err(self.refuse(&what, format!("has the texture coordinates {uv}; they must be within {MAX_UV:e}")));
+                }
+            }
+        }
+        let indices = indices.unwrap_or_else(|| (0..positions.len() as u32).collect());
+        let mut triangles = triangles_of(primitive.mode(), &indices);
+        if matrices.as_ref().and_then(|matrices| matrices.first()).unwrap_or(to_world).determinant() < 0.0 {
+            // A mirrored instance would show its back.
+            triangles.iter_mut().for_each(|triangle| triangle.swap(1, 2));
+        }
+        let material = primitive.material().index().unwrap_or(self.scene.materials.len() - 1);
+        Ok(Mesh { name: name.clone(), positions, normals, uvs, triangles, material })
+    }
+
+    /// Indices into those of the vertices that the primitive uses, as many primitives may share one list of vertices;
+    /// `None`: all vertices, in their order.
+    fn indices_and_vertices(&self, primitive: &gltf::Primitive, vertex_count: usize, what: &str) -> Result<(Option<Vec<u32>>, Vertices)> {
+        let Some(indices) = primitive.indices() else {
+            return Ok((None, Vertices::All));
+        };
+        let indices = accessor::read_indices(self, &indices, what)?;
+        if let Some(index) = indices.iter().find(|index| **index as usize >= vertex_count) {
+            return Err(self.refuse(what, format!("uses vertex {index} of {vertex_count}")));
+        }
+        if indices.len() >= vertex_count {
+            return Ok((Some(indices), Vertices::All));
+        }
+        let mut used = indices.clone();
+        used.sort_unstable();
+        used.dedup();
+        let place = |index: &u32| used.binary_search(index).expect("every index is there") as u32;
+        Ok((Some(indices.iter().map(place).collect()), Vertices::Some(used)))
+    }
+
+    /// Of each vertex, the mean of its joints' matrices by their weights; `None` where vertices follow no joints.
+    fn vertex_matrices(
+        &self,
+        primitive: &gltf::Primitive,
+        joints: &[DMat4],
+        vertex_count: usize,
+        vertices: &Vertices,
+        what: &str,
+    ) -> Result<Option<Vec<DMat4>>> {
+        let mut sums: Option<Vec<(DMat4, f64)>> = None;
+        for set in 0.. {
+            let (Some(numbers), Some(weights)) = (primitive.get(&Semantic::Joints(set)), primitive.get(&Semantic::Weights(set))) else {
+                break;
+            };
+            let reason = || format!("has joints or weights that are not as many as its {vertex_count} vertices");
+            self.require(numbers.count() == vertex_count && weights.count() == vertex_count, what, reason)?;
+            let numbers = accessor::read_joints(self, &numbers, vertices, what)?;
+            let weights: Vec<[f32; 4]> = accessor::read(self, &weights, vertices, what, |weights| weights)?;
+            let sums = sums.get_or_insert_with(|| vec![(DMat4::ZERO, 0.0); numbers.len()]);
+            for (sum, (numbers, weights)) in sums.iter_mut().zip(numbers.iter().zip(&weights)) {
+                for (number, weight) in numbers.iter().zip(weights.map(f64::from)).filter(|(_, weight)| *weight > 0.0) {
+                    let Some(matrix) = joints.get(usize::from(*number)) else {
+                        return Err(self.refuse(what, format!("uses joint {number} of {}", joints.len())));
+                    };
+                    *sum = (sum.0 + *matrix * weight, sum.1 + weight);
+                }
+            }
+        }
+        let mean = |(sum, weight): &(DMat4, f64)| if *weight > 0.0 { *sum * (1.0 / weight) } else { DMat4::IDENTITY };
+        Ok(sums.map(|sums| sums.iter().map(mean).collect()))
+    }
+}
+
+/// What turns normals: the inverse transpose. The cofactors are that times the determinant, and stay finite where a
+/// scale is zero.
+fn normal_matrix(to_world: &DMat4) -> DMat3 {
+    let DMat3 { x_axis, y_axis, z_axis } = DMat3::from_mat4(*to_world);
+    DMat3::from_cols(y_axis.cross(z_axis), z_axis.cross(x_axis), x_axis.cross(y_axis)) * to_world.determinant().signum()
+}
+
+fn triangles_of(mode: Mode, indices: &[u32]) -> Vec<[u32; 3]> {
+    match mode {
+        Mode::TriangleStrip => {
+            let turned = |(k, window): (usize, &[u32])| {
+                if k % 2 == 0 { [window[0], window[1], window[2]] } else { [window[1], window[0], window[2]] }
+            };
+            indices.windows(3).enumerate().map(turned).collect()
+        }
+        Mode::TriangleFan => indices.get(1..).unwrap_or_default().windows(2).map(|pair| [indices[0], pair[0], pair[1]]).collect(),
+        _ => indices.par_chunks_exact(3).with_min_len(accessor::MIN_PIECE).map(|of| [of[0], of[1], of[2]]).collect(),
+    }
+}
