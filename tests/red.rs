@@ -58,6 +58,7 @@ enum Question {
     LeaningScatterer,
     PatchInPlane,
     StackFromAfar,
+    CoarseMirror,
     /// With so many samples a pixel, and with a final gather or not.
     GlassInFurnace(u32, bool),
     /// Aimed photons bring as much light as others: a scene of `common::aimed`.
@@ -70,7 +71,7 @@ impl Question {
     /// Whether another test, the same for every device, shows that a device without a fault answers it right.
     fn has_a_test_of_its_own(self) -> bool {
         matches!(self, ClosedForm(_) | Bits(_) | LampInBox(_) | Shelf | Ridge | Spot | Texture(_) | LeaningPlane(_))
-            || matches!(self, LeaningScatterer | PatchInPlane | StackFromAfar | GlassInFurnace(..))
+            || matches!(self, LeaningScatterer | PatchInPlane | StackFromAfar | CoarseMirror | GlassInFurnace(..))
     }
 }
 
@@ -89,7 +90,7 @@ impl Question {
             | FiniteBox => Subject::Room,
             AimedLight(_) => Subject::Aiming,
             Appends | Finite | Crowds | Bits(_) | LampInBox(_) | Shelf | Ridge | Spot | Texture(_) => Subject::Scenes,
-            LeaningPlane(_) | LeaningScatterer | PatchInPlane | StackFromAfar | GlassInFurnace(..) => Subject::Scenes,
+            LeaningPlane(_) | LeaningScatterer | PatchInPlane | StackFromAfar | CoarseMirror | GlassInFurnace(..) => Subject::Scenes,
         }
     }
 }
@@ -107,7 +108,7 @@ struct Fault {
 }
 
 #[rustfmt::skip]
-const FAULTS: [Fault; 68] = [
+const FAULTS: [Fault; 69] = [
     Fault { what: "what rounding takes from a pair of floats is forgotten",
         file: "film/float_u64.glsl", from: "precise float rest = sum.y + (", to: "precise float rest = 0.0 * (",
         kernels: &["gather_brute_u64", "gather_grid_u64"], noticed_by: &[(Pairs, SumsTooSmall)] },
@@ -334,6 +335,10 @@ const FAULTS: [Fault; 68] = [
     Fault { what: "a scattered photon knows no shading normal",
         file: "material/lobes.glsl", from: SHADING_GAIN, to: "return 1.0;",
         kernels: &["trace_persistent_scene", "trace_scene_ballot"], noticed_by: &[(LeaningScatterer, TooBright)] },
+    Fault { what: "rays that smooth normals send to the wrong side of a triangle are lost",
+        file: "material/scatter.glsl", from: "return direction - 2.0 * min(dot(direction, side), 0.0) * side;", to: "return direction;",
+        kernels: &["view"],
+        noticed_by: &[(CoarseMirror, TooDark)] },
     Fault { what: "a spot falls off by its share, not by the square of it",
         file: "world/scene/lights.glsl", from: "return share * share;", to: "return share;",
         kernels: &["receive"], noticed_by: &[(Spot, TooBright)] },
@@ -434,6 +439,7 @@ fn ask(gpu: &Gpu, question: Question) -> Check<Complaint> {
         LeaningScatterer => known::leaning_scatterer(gpu),
         PatchInPlane => known::patch_in_a_plane(gpu),
         StackFromAfar => known::stack_from_afar(gpu),
+        CoarseMirror => known::coarse_sphere_in_a_furnace(gpu, mirror(1.0), 8),
         AimedLight(kind) => aimed::same_light(gpu, kind),
     }
 }

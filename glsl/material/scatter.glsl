@@ -14,6 +14,13 @@ float fresnel(float cos_i, float cos_t, float eta)
     return 0.5 * (parallel * parallel + perpendicular * perpendicular);
 }
 
+// A direction on the side that a unit vector points to. A shading normal may send a mirrored or refracted ray to the wrong side
+// of its triangle; mirrored in the triangle's plane, as if it met the surface once more, it leaves with all of its light.
+vec3 on_side(vec3 direction, vec3 side)
+{
+    return direction - 2.0 * min(dot(direction, side), 0.0) * side;
+}
+
 // Samples where a path goes on that came from wo; u = (choice, two for the direction). A camera path
 // carries radiance, which refraction compresses; a photon carries flux. Glass that reflects some light and refracts some
 // does the first with the chance `mirror_chance`; 0: as much as it reflects.
@@ -22,7 +29,7 @@ Scatter sample_scatter(Surface surface, vec3 wo, vec3 u, bool carries_radiance, 
     vec3 ns = surface.ns;
     if (HAS_MIRROR) {
         if (surface.kind == SURFACE_MIRROR) {
-            vec3 wi = mirrored(wo, ns);
+            vec3 wi = on_side(mirrored(wo, ns), surface.ng);
             return Scatter(wi, surface.base_colour, dot(wi, surface.ng) > 0.0);
         }
     }
@@ -37,11 +44,11 @@ Scatter sample_scatter(Surface surface, vec3 wo, vec3 u, bool carries_radiance, 
             bool as_much = mirror_chance == 0.0 || reflectance == 0.0 || reflectance == 1.0;
             float chance = as_much ? reflectance : mirror_chance;
             if (u.x < chance) {
-                vec3 wi = mirrored(wo, ns);
+                vec3 wi = on_side(mirrored(wo, ns), surface.ng);
                 float weight = as_much ? 1.0 : divide(reflectance, chance);
                 return Scatter(wi, weight * surface.base_colour, dot(wi, surface.ng) > 0.0);
             }
-            vec3 wi = normalize((eta * cos_i - cos_t) * ns - eta * wo);
+            vec3 wi = on_side(normalize((eta * cos_i - cos_t) * ns - eta * wo), -surface.ng);
             float weight = as_much ? 1.0 : divide(1.0 - reflectance, 1.0 - chance);
             weight *= carries_radiance ? eta * eta : 1.0;
             return Scatter(wi, weight * surface.base_colour, dot(wi, surface.ng) < 0.0);

@@ -251,6 +251,66 @@ pub fn stack_from_afar(gpu: &Gpu) -> Check<Complaint> {
     Ok(())
 }
 
+/// A sphere with smooth normals of so many segments, and a speck of matt ground that calls for photons.
+fn coarse_sphere(material: Material, segments: u32, light: LightKind) -> Scene {
+    let speck = Mesh::parallelogram("speck", DVec3::new(3.0, -3.0, 3.0), DVec3::Z * 0.01, DVec3::X * 0.01, 1);
+    Scene {
+        materials: vec![material, matt(1.0)],
+        meshes: vec![Mesh::sphere("sphere", DVec3::ZERO, 1.0, segments, 0), speck],
+        lights: vec![Light { name: "light".into(), kind: light }],
+        ..Scene::default()
+    }
+}
+
+/// Under a sky that is 1 everywhere a coarse mirror sphere or glass sphere that keeps all light is not to be seen, as the sky is
+/// behind every path however smooth normals turn it; a mirror at no pixel.
+pub fn coarse_sphere_in_a_furnace(gpu: &Gpu, material: Material, segments: u32) -> Check<Complaint> {
+    let is_mirror = material.surface == Surface::Mirror;
+    let scene = coarse_sphere(material, segments, LightKind::Environment { radiance: Vec3::ONE });
+    let camera = Camera::looking_at("front", DVec3::new(0.3, 0.4, 4.0), DVec3::ZERO, DVec3::Y, 0.55);
+    let settings = SceneSettings { samples: 4, rounds: 4, photons: 1000, ..SceneSettings::default() };
+    let lit = seen(gpu, &scene, &settings, &camera, [48, 48]);
+    let pixels = (0..lit.film.pixels()).map(|pixel| lit.film.mean(pixel, &lit.plan).x);
+    let darkest = pixels.fold(f64::INFINITY, f64::min);
+    println!("{segments} segments: {} on the mean, {darkest} at the darkest pixel", mean_red(&lit));
+    estimate_check("the sphere", mean_red(&lit), 1.0, 0.001)?;
+    if is_mirror { estimate_check("its darkest pixel", darkest, 1.0, 0.0001) } else { Ok(()) }
+}
+
+/// No photon of the sun ends on it either.
+pub fn coarse_mirror_in_the_sun(gpu: &Gpu, segments: u32) -> Check<Complaint> {
+    let sun = LightKind::Directional { direction: DVec3::new(0.2, -1.0, 0.3).normalize(), irradiance: Vec3::ONE };
+    let scene = coarse_sphere(mirror(1.0), segments, sun);
+    let settings = SceneSettings { photons: 50_000, rounds: 1, illumination: Illumination::Photons, ..SceneSettings::default() };
+    let ledger = received(gpu, &scene, &settings, &[(DVec3::new(3.005, -3.0, 3.005), DVec3::Y)]).fates[0].ledger();
+    let ended = ledger.absorbed as f64 / ledger.emitted as f64;
+    println!("{segments} segments: {ended} of the photons end");
+    let lost = || Complaint::new(Kind::PhotonsLost, format!("{ended} of the photons end on a mirror that keeps all"));
+    if ended < 1e-4 { Ok(()) } else { Err(lost()) }
+}
+
+/// Photons that such a sphere mirrors light the ground about it as paths from the ground do, which turn the other way.
+pub fn ground_by_a_coarse_mirror(gpu: &Gpu, segments: u32) -> Check<Complaint> {
+    let mut scene = coarse_sphere(mirror(1.0), segments, LightKind::Environment { radiance: Vec3::splat(1e-6) });
+    scene.materials.push(Material { emission: Vec3::splat(10.0), ..matt(0.0) });
+    let (x, z) = (DVec3::X, DVec3::Z);
+    scene.meshes.push(Mesh::parallelogram("ground", DVec3::new(-3.0, -1.2, -3.0), z * 6.0, x * 6.0, 1));
+    scene.meshes.push(Mesh::parallelogram("lamp", DVec3::new(-4.0, 3.0, -4.0), x * 8.0, z * 8.0, 2));
+    let places = [-2.0, -1.0, 0.0, 1.0, 2.0];
+    let points: Vec<_> = places.iter().flat_map(|x| places.map(|z| (DVec3::new(*x, -1.2, z), DVec3::Y))).collect();
+    let settings =
+        SceneSettings { caustic_photons: 200_000, caustic_radius: Some(0.3), rounds: 8, part: Part::Caustic, ..SceneSettings::default() };
+    let lit = received(gpu, &scene, &settings, &points);
+    let truth = Judge::new(&scene, 64).irradiance_at(&points, 40_000, 1);
+    let count = points.len() as f64;
+    let expected = truth.iter().map(|point| point.mean.caustic.x).sum::<f64>() / count;
+    let error = (0..points.len()).map(|place| red(&lit, place).1.powi(2)).sum::<f64>();
+    let error = (error + truth.iter().map(|point| point.standard_error.caustic.x.powi(2)).sum::<f64>()).sqrt() / count;
+    println!("{segments} segments: {} on the ground, {expected} +- {error} expected", mean_red(&lit));
+    assert!(error < 0.02 * expected, "{error} of {expected}");
+    estimate_check("the ground", mean_red(&lit), expected, error)
+}
+
 /// A block of glass and a mirror in a furnace are not to be seen: all directions are equally bright, whatever way a path
 /// takes, and however many paths a pixel has.
 pub fn glass_in_a_furnace(gpu: &Gpu, samples: u32, final_gather: bool) -> Check<Complaint> {
