@@ -245,7 +245,7 @@ const FAULTS: [Fault; 69] = [
     Fault { what: "one photon in sixteen is sorted into the cell beside its own",
         file: "kernels/cell_scatter.comp", from: "cell_number(cell, push.cell_count)",
         to: "(cell_number(cell, push.cell_count) ^ uint(index % 16 == 11))",
-        kernels: &["cell_scatter"], noticed_by: &[(RoomFilm(Gather::Grid), SumsTooSmall)] },
+        kernels: &["cell_scatter"], noticed_by: &[(RoomFilm(Gather::Grid), OtherSums)] },
     Fault { what: "nodes of the kd-tree are taken to be split along the wrong axis",
         file: "index/tree.glsl", from: "(wall / 2 + 1 + (height & 1)) % 3", to: "(wall / 2 + 1 + (height >> 1 & 1)) % 3",
         kernels: &["gather_tree_u64", "gather_tree_two_words", "nearest_u64", "nearest_two_words"],
@@ -335,7 +335,7 @@ const FAULTS: [Fault; 69] = [
     Fault { what: "a scattered photon knows no shading normal",
         file: "material/lobes.glsl", from: SHADING_GAIN, to: "return 1.0;",
         kernels: &["trace_persistent_scene", "trace_scene_ballot"], noticed_by: &[(LeaningScatterer, TooBright)] },
-    Fault { what: "rays that smooth normals send to the wrong side of a triangle are lost",
+    Fault { what: "rays that a mirror's smooth normals send to the wrong side of a triangle are lost",
         file: "material/scatter.glsl", from: "return direction - 2.0 * min(dot(direction, side), 0.0) * side;", to: "return direction;",
         kernels: &["view"],
         noticed_by: &[(CoarseMirror, TooDark)] },
@@ -439,7 +439,7 @@ fn ask(gpu: &Gpu, question: Question) -> Check<Complaint> {
         LeaningScatterer => known::leaning_scatterer(gpu),
         PatchInPlane => known::patch_in_a_plane(gpu),
         StackFromAfar => known::stack_from_afar(gpu),
-        CoarseMirror => known::coarse_sphere_in_a_furnace(gpu, mirror(1.0), 8),
+        CoarseMirror => known::coarse_mirror_in_a_furnace(gpu, 8),
         AimedLight(kind) => aimed::same_light(gpu, kind),
     }
 }

@@ -14,8 +14,9 @@ float fresnel(float cos_i, float cos_t, float eta)
     return 0.5 * (parallel * parallel + perpendicular * perpendicular);
 }
 
-// A direction on the side that a unit vector points to. A shading normal may send a mirrored or refracted ray to the wrong side
-// of its triangle; mirrored in the triangle's plane, as if it met the surface once more, it leaves with all of its light.
+// A direction on the side that a unit vector points to. A shading normal may send a mirrored ray to the wrong side of its
+// triangle; mirrored in the triangle's plane, as if it met the surface once more, it leaves with all of its light. Not so in
+// glass: there such rays would be caught between coarse facets for thousands of bounces, and are lost instead.
 vec3 on_side(vec3 direction, vec3 side)
 {
     return direction - 2.0 * min(dot(direction, side), 0.0) * side;
@@ -44,11 +45,11 @@ Scatter sample_scatter(Surface surface, vec3 wo, vec3 u, bool carries_radiance, 
             bool as_much = mirror_chance == 0.0 || reflectance == 0.0 || reflectance == 1.0;
             float chance = as_much ? reflectance : mirror_chance;
             if (u.x < chance) {
-                vec3 wi = on_side(mirrored(wo, ns), surface.ng);
+                vec3 wi = mirrored(wo, ns);
                 float weight = as_much ? 1.0 : divide(reflectance, chance);
                 return Scatter(wi, weight * surface.base_colour, dot(wi, surface.ng) > 0.0);
             }
-            vec3 wi = on_side(normalize((eta * cos_i - cos_t) * ns - eta * wo), -surface.ng);
+            vec3 wi = normalize((eta * cos_i - cos_t) * ns - eta * wo);
             float weight = as_much ? 1.0 : divide(1.0 - reflectance, 1.0 - chance);
             weight *= carries_radiance ? eta * eta : 1.0;
             return Scatter(wi, weight * surface.base_colour, dot(wi, surface.ng) < 0.0);

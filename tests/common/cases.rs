@@ -98,7 +98,7 @@ pub const CASES: [Case; 98] = [
     Case { number: "B4", failure: "The normalisation of a lobe", shown: Tests(&["lobes_reflect_what_lies_above_the_horizon"]) },
     Case { number: "B5", failure: "Powers of numbers near 1", shown: Tests(&["phong_weights_are_powers_of_the_cosine", "a_sun_in_a_plate_is_a_power_of_the_cosine"]) },
     Case { number: "B6", failure: "A material that reflects more than arrives", shown: Tests(&["lobes_reflect_what_lies_above_the_horizon"]) },
-    Case { number: "B7", failure: "Smooth normals that send mirrored rays to the wrong side of a coarse mesh", shown: Tests(&["coarse_spheres_with_smooth_normals_lose_no_light"]) },
+    Case { number: "B7", failure: "Smooth normals that send a mirror's rays to the wrong side of a coarse mesh", shown: Tests(&["coarse_mirrors_with_smooth_normals_lose_no_light"]) },
     Case { number: "I1", failure: "Slot numbers beyond 32 bits", shown: Tests(&["slots_of_a_chunk_are_numbered_in_32_bits", "maps_of_a_chunk_are_numbered_in_32_bits"]) },
     Case { number: "I2", failure: "More work groups than one dispatch may have", shown: Tests(&["rounds_around_a_full_row_of_groups_lose_no_photon", "photons_of_a_second_row_of_groups_reach_the_map"]) },
     Case { number: "I3", failure: "A buffer larger than a shader may address", shown: Tests(&["slots_of_a_chunk_are_numbered_in_32_bits", "a_round_larger_than_a_buffer_splits_and_drops_nothing"]) },

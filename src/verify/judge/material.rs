@@ -89,10 +89,9 @@ impl Vertex {
                 }
             }
         };
-        // A specular ray that its shading normal sends to the wrong side is mirrored in the triangle's plane.
+        // What a mirror's shading normal sends to the wrong side is mirrored in the triangle's plane.
         let height = wi.dot(self.ng);
-        let is_specular = matches!(self.surface, Surface::Mirror | Surface::Dielectric { .. });
-        let wi = if is_specular && (height < 0.0) != is_transmitted { wi - 2.0 * height * self.ng } else { wi };
+        let wi = if self.surface == Surface::Mirror && height < 0.0 { wi - 2.0 * height * self.ng } else { wi };
         let is_below = wi.dot(self.ng) < 0.0;
         (weight > 0.0 && is_below == is_transmitted).then_some((wi, weight * self.base_colour))
     }
