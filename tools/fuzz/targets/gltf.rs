@@ -7,10 +7,11 @@ use std::sync::LazyLock;
 
 use libfuzzer_sys::{fuzz_mutator, fuzz_target, fuzzer_mutate};
 use photonmill::plan::Limits;
-use photonmill::plan::scene::{Sensor, TransportPlan};
+use photonmill::plan::scene::ScenePlan;
+use photonmill::plan::sensor::Sensor;
 use photonmill::scene::Scene;
 use photonmill::scene::geometry::Geometry;
-use photonmill::settings::scene::TransportSettings;
+use photonmill::settings::scene::SceneSettings;
 use photonmill_fuzz::{mutation, panics_are_caught, refused};
 
 /// The file that the loader opens; `run` lays it into memory.
@@ -22,7 +23,7 @@ fuzz_target!(init: panics_are_caught(), |bytes: &[u8]| {
     let outcome = Scene::open(FILE.to_str().expect("a name in letters"), false).and_then(|scene| {
         let geometry = Geometry::new(&scene)?;
         let limits = Limits::of_host();
-        let plan = TransportPlan::new(&scene, &geometry, &TransportSettings::default(), Sensor::Picture { width: 16, height: 16 }, &limits)?;
+        let plan = ScenePlan::new(&scene, &geometry, &SceneSettings::default(), Sensor::Picture { width: 16, height: 16 }, &limits)?;
         check(&scene, &geometry);
         assert!(plan.film_scale.is_finite() && plan.film_scale > 0.0, "film scale {}", plan.film_scale);
         assert!(plan.bytes <= limits.memory_bytes, "{} bytes", plan.bytes);

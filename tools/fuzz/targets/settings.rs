@@ -1,4 +1,4 @@
-//! Settings of any value -> validation -> plan: a plan whose sizes hold, or one line that says why not.
+//! RoomSettings of any value -> validation -> plan: a plan whose sizes hold, or one line that says why not.
 
 #![no_main]
 
@@ -6,15 +6,16 @@ use std::sync::LazyLock;
 
 use arbitrary::{Arbitrary, Result, Unstructured};
 use libfuzzer_sys::fuzz_target;
-use photonmill::plan::scene::{MapPlan, Sensor, TransportPlan};
-use photonmill::plan::{Limits, Plan, photons_of};
+use photonmill::plan::scene::{MapPlan, ScenePlan};
+use photonmill::plan::sensor::Sensor;
+use photonmill::plan::{Limits, RoomPlan, photons_of};
 use photonmill::rng::Rng;
 use photonmill::scene::geometry::Geometry;
 use photonmill::scene::open_box::open_box;
 use photonmill::scene::{Scene, built_in};
 use photonmill::settings::stop::Stop;
-use photonmill::settings::scene::{Builder, Effect, Filter, Illumination, Kernel, Part, TransportSettings};
-use photonmill::settings::{EmissionLaw, Gather, Math, PhongDirection, Preset, Settings, Sums, Builder};
+use photonmill::settings::scene::{Effect, Filter, Illumination, Kernel, Part, SceneSettings};
+use photonmill::settings::{EmissionLaw, Gather, Math, PhongDirection, Preset, RoomSettings, Sums, Builder};
 use photonmill_fuzz::{panics_are_caught, refused};
 
 static SCENES: LazyLock<Vec<(Scene, Geometry)>> = LazyLock::new(|| {
@@ -24,13 +25,13 @@ static SCENES: LazyLock<Vec<(Scene, Geometry)>> = LazyLock::new(|| {
 });
 
 #[derive(Debug)]
-struct Room(Settings);
+struct Room(RoomSettings);
 
 #[derive(Debug)]
 struct Triangles {
     scene: usize,
     sensor: Sensor,
-    settings: TransportSettings,
+    settings: SceneSettings,
 }
 
 #[derive(Debug, Arbitrary)]
@@ -49,10 +50,10 @@ fuzz_target!(init: panics_are_caught(), |request: Request| {
     }
 });
 
-fn plan_room(settings: &Settings) -> photonmill::error::Result<()> {
+fn plan_room(settings: &RoomSettings) -> photonmill::error::Result<()> {
     let limits = Limits::of_host();
     let accepted = settings.validate();
-    let plan = Plan::new(&open_box(settings), settings, &limits);
+    let plan = RoomPlan::new(&open_box(settings), settings, &limits);
     if let Err(error) = accepted {
         assert!(plan.is_err(), "planned though refused: {error}");
         return Err(error);
@@ -75,7 +76,7 @@ fn plan_triangles(request: &Triangles) -> photonmill::error::Result<()> {
     let (scene, geometry) = &SCENES[*scene];
     let limits = Limits::of_host();
     let accepted = settings.validate();
-    let plan = TransportPlan::new(scene, geometry, settings, *sensor, &limits);
+    let plan = ScenePlan::new(scene, geometry, settings, *sensor, &limits);
     if let Err(error) = accepted {
         assert!(plan.is_err(), "planned though refused: {error}");
         return Err(error);
@@ -88,7 +89,7 @@ fn plan_triangles(request: &Triangles) -> photonmill::error::Result<()> {
     Ok(())
 }
 
-fn check_map(plan: &TransportPlan, map: &MapPlan, limits: &Limits) {
+fn check_map(plan: &ScenePlan, map: &MapPlan, limits: &Limits) {
     assert!(map.chunk_photons >= 1 && map.chunk_photons <= map.photons && map.bucket_count.is_power_of_two(), "{map:?}");
     assert!(u64::from(map.capacity) * 32 <= 2 * limits.memory_bytes && map.capacity >= map.chunk_photons, "{map:?}");
     let chunks = map.chunks();
@@ -114,8 +115,8 @@ fn stop(u: &mut Unstructured) -> Result<Stop> {
 impl<'a> Arbitrary<'a> for Room {
     fn arbitrary(u: &mut Unstructured<'a>) -> Result<Room> {
         let preset = *u.choose(&[Preset::Naive, Preset::Modified, Preset::Phong, Preset::Rounds])?;
-        let usual = Settings::preset(preset);
-        Ok(Room(Settings {
+        let usual = RoomSettings::preset(preset);
+        Ok(Room(RoomSettings {
             builder: *u.choose(&[Builder::Naive, Builder::Atomic, Builder::Ballot, Builder::Cpu])?,
             photons: count(u, usual.photons)?,
             rounds: count(u, usual.rounds)?,
@@ -140,6 +141,7 @@ impl<'a> Arbitrary<'a> for Room {
             edge_correction: u.arbitrary()?,
             threads: count(u, 1)? as usize,
             group_size: count(u, usual.group_size)?,
+            counters: if u.arbitrary()? { Some(count(u, 8)?) } else { None },
             chunk: if u.arbitrary()? { Some(count(u, 64)?) } else { None },
             stop: stop(u)?,
         }))
@@ -148,12 +150,12 @@ impl<'a> Arbitrary<'a> for Room {
 
 impl<'a> Arbitrary<'a> for Triangles {
     fn arbitrary(u: &mut Unstructured<'a>) -> Result<Triangles> {
-        let usual = TransportSettings::default();
+        let usual = SceneSettings::default();
         let sensor = match u.arbitrary()? {
             true => Sensor::Picture { width: count(u, 64)?, height: count(u, 64)? },
             false => Sensor::Receivers { count: count(u, 64)? },
         };
-        let settings = TransportSettings {
+        let settings = SceneSettings {
             photons: count(u, usual.photons)?,
             caustic_photons: count(u, usual.caustic_photons)?,
             rounds: count(u, usual.rounds)?,
@@ -171,7 +173,7 @@ impl<'a> Arbitrary<'a> for Triangles {
             illumination: *u.choose(&[Illumination::Split, Illumination::Photons])?,
             part: *u.choose(&[Part::All, Part::Direct, Part::Specular, Part::Caustic, Part::Indirect])?,
             filter: *u.choose(&[Filter::Box, Filter::Tent, Filter::Gaussian])?,
-            append: *u.choose(&[Builder::Auto, Builder::Atomic, Builder::Ballot, Builder::Persistent])?,
+            builder: if u.arbitrary()? { Some(*u.choose(&Builder::ON_GPU)?) } else { None },
             math: *u.choose(&[Math::Fast, Math::Strict])?,
             paranoid: u.arbitrary()?,
             group_size: count(u, usual.group_size)?,
