@@ -1,10 +1,10 @@
 //! Compiles every kernel of `glsl/kernels` to SPIR-V and writes `kernels.rs`: for each kernel a
-//! struct whose fields are its buffers, with everything else that reflection knows of it. Writes `charts.md` too: the
-//! charts of the guide.
+//! struct whose fields are its buffers, with everything else that reflection knows of it. Writes `records.rs` too, the records
+//! that Rust and GLSL share, and `charts.md`, the charts of the guide.
 
 use std::collections::{BTreeMap, BTreeSet};
 use std::fmt::Write as _;
-use std::path::PathBuf;
+use std::path::{Path, PathBuf};
 use std::{env, fs};
 
 use base64::Engine;
@@ -63,7 +63,38 @@ fn main() {
         "{structs}\n{buffer_count}\n/// Every struct in a buffer or push-constant block of a kernel.\npub const STRUCTS: &[(&str, ReflectedStruct)] = &[\n{layouts}];\n"
     );
     fs::write(out.join("kernels.rs"), source).expect("OUT_DIR can be written");
+    fs::write(out.join("records.rs"), records(&glsl)).expect("OUT_DIR can be written");
     fs::write(out.join("charts.md"), charts()).expect("OUT_DIR can be written");
+}
+
+/// Files of `glsl` whose structs are records of Rust too.
+const RECORDS: [&str; 2] = ["records.glsl", "world/scene/path.glsl"];
+
+/// Their structs with their comments, as the macro `records!` of `src/records.rs` takes them.
+fn records(glsl: &Path) -> String {
+    let text = RECORDS.map(|name| fs::read_to_string(glsl.join(name)).unwrap_or_else(|error| panic!("glsl/{name}: {error}"))).concat();
+    // What stands between structs is no comment of one.
+    let blocks = text.split("\n\n").filter(|block| block.contains("struct "));
+    let rust = blocks.flat_map(str::lines).map(|line| match line.trim().split([' ', ';']).collect::<Vec<_>>()[..] {
+        ["//", ..] => line.replacen("//", "///", 1),
+        ["struct", name, "{"] => format!("{name} {{"),
+        ["}", ""] => "}".to_owned(),
+        [kind, field, ""] => format!("    {field}: {},", rust_type(kind)),
+        _ => panic!("{line}: a record has a field a line"),
+    });
+    format!("records! {{\n{}\n}}\n", rust.collect::<Vec<_>>().join("\n"))
+}
+
+fn rust_type(glsl: &str) -> &str {
+    match glsl {
+        "uint" => "u32",
+        "float" => "f32",
+        "vec2" => "Vec2",
+        "vec3" => "Vec3",
+        "uvec2" => "UVec2",
+        "uvec3" => "UVec3",
+        record => record,
+    }
 }
 
 /// Charts of the guide, under `tools`.

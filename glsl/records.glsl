@@ -1,33 +1,42 @@
-// Records that Rust and GLSL share, in `scalar` layout. Twin of src/records.rs, which explains the
-// fields; tests/layout.rs compares the two field by field. Every kernel includes it first.
+// Records that Rust and GLSL share, in `scalar` layout; build.rs makes Rust's of them. Every kernel includes this file first.
 #extension GL_EXT_scalar_block_layout : require
 
+// The axis-aligned room that holds the walls.
 struct Room {
     vec3 min_corner;
     vec3 max_corner;
 };
 
+// One face of the room: a diffuse wall, or an opening.
 struct Wall {
+    // Into the room.
     vec3 normal;
+    // Share of arriving photons that is reflected.
     float albedo;
     vec3 tangent;
+    // Exponent of the Phong lobe; below 0 the wall is Lambertian.
     float shininess;
     vec3 bitangent;
+    // 1: photons leave the scene here.
     uint is_open;
 };
 
+// A disc of light flush with a wall.
 struct DiscLight {
     vec3 centre;
     float radius;
     uint wall;
+    // Relative flux of each of its photons, in (0, 1].
     float flux;
 };
 
+// A point at which light is estimated.
 struct Point {
     vec3 position;
     uint wall;
 };
 
+// Fates of the paths that entered one bounce.
 struct Tally {
     uint stored;
     uint absorbed;
@@ -35,25 +44,34 @@ struct Tally {
     uint dropped;
 };
 
+// `VkDispatchIndirectCommand`.
 struct DispatchArgs {
     uint x;
     uint y;
     uint z;
 };
 
+// What a photon's random numbers depend on beside its number.
 struct RandomKey {
     uvec2 seed;
     uint round;
+    // Photons of the rounds before this one, mod 2^32; mt seeds by the number in the run.
     uint photons_before;
+    // rand48: multiplier and increment, 48 bits each, that lead from one draw of a photon to
+    // its next.
     uvec2 leap_multiplier;
     uvec2 leap_increment;
 };
 
+// Photons of one light, in the order of their numbers.
 struct PhotonRange {
     uint light;
     uint first_photon;
     uint count;
+    // Number of `first_photon` among its light's photons of the run, mod 2^32.
     uint first_sample;
+    // rand48: from the prepared state of photon i to the first state of photon
+    // `first_photon` + i in this round.
     uvec2 jump_multiplier;
     uvec2 jump_increment;
 };
@@ -91,6 +109,7 @@ struct EndBouncePush {
 struct TracePersistentPush {
     RandomKey key;
     PhotonRange range;
+    // Invocations that take photons: each every so many.
     uint stride;
     uint bounces;
     uint photon_capacity;
@@ -125,45 +144,67 @@ struct ScanPush {
 };
 
 struct GatherPush {
+    // Points `first_point` to `end_point` - 1 and slices from `first_slice` on: what one dispatch
+    // covers.
     uint first_point;
     uint end_point;
     uint first_slice;
     uint photon_capacity;
     float radius_squared;
+    // A little over the radius: how far from the point a cell may lie.
     float reach;
+    // Fixed-point units in 1.
     float film_scale;
     vec3 origin;
     float cells_per_metre;
     uvec3 cell_count;
 };
 
+// A step of building the kd-tree.
 struct TreePush {
     uint photon_capacity;
+    // 0: along the first axis of each wall, 1: along the second.
     uint axis;
+    // Digit of the radix sort, `TREE_DIGITS`: the wall.
     uint digit;
+    // Of the nodes that are split: they hold `TREE_LEAF` << `height` photons.
     uint height;
 };
 
 struct NearestPush {
+    // Points `first_point` to `end_point` - 1.
     uint first_point;
     uint end_point;
+    // How many photons are wanted.
     uint nearest;
+    // 1: the searches begin.
     uint is_first;
+    // Of the full radius: how far the nearest photons are looked for.
     float radius_squared;
+    // log2 of the film's units in 1.
     uint film_shift;
 };
 
+// A search for a point's nearest photons, between two dispatches.
 struct Search {
+    // Leaves before it are done; `NONE`: all are.
     uint next_leaf;
+    // Photons found.
     uint found;
+    // Squared distance beyond which no photon is wanted.
     float limit;
 };
 
+// Node of a compressed wide BVH (Ylitie, Karras and Laine 2017): eight children in boxes of 8-bit
+// planes.
 struct BvhNode {
     vec3 origin;
+    // Exponents of the planes' spacing along x, y, z, and the mask of children that are nodes, a
+    // byte each.
     uint spacing;
     uint first_child;
     uint first_triangle;
+    // A byte a child: where it is, or how many triangles it holds.
     uvec2 meta;
     uvec2 min_x;
     uvec2 max_x;
@@ -173,20 +214,25 @@ struct BvhNode {
     uvec2 max_z;
 };
 
+// In the order of the BVH's leaves; its front is where it runs counter-clockwise.
 struct Triangle {
     vec3 a;
     vec3 b;
     vec3 c;
     uint material;
+    // Number of its front's plane; plus `HIDDEN` if others that lie in it hide a part: then it counts as no surface,
+    // triangles of their own stand for what is visible of it, and rays meet it only between those.
     uint plane;
 };
 
+// Shading normals at a triangle's corners, octahedral; all `NONE` on a flat triangle.
 struct TriangleNormals {
     uint a;
     uint b;
     uint c;
 };
 
+// Texture coordinates at a triangle's corners.
 struct TriangleUvs {
     vec2 base_a;
     vec2 base_b;
@@ -198,8 +244,11 @@ struct TriangleUvs {
 
 struct SurfaceMaterial {
     vec3 base_colour;
+    // `SURFACE_...`.
     uint surface;
+    // Radiance of the front, W/m2/sr.
     vec3 emission;
+    // Exponent or index of refraction.
     float parameter;
     uint base_texture;
     uint emission_texture;
@@ -210,71 +259,102 @@ struct TextureInfo {
     uint width;
     uint height;
     uint first_texel;
+    // 0 repeat, 1 mirrored, 2 clamp: of u, and of v times 4.
     uint wrap;
 };
 
+// A light, or a triangle that shines. Lengths are those of the normalised scene.
 struct Emitter {
+    // `EMITTER_...`.
     uint kind;
     uint triangle;
+    // Share of the emitters up to and with this one.
     float cumulative;
     float probability;
+    // Relative flux of each of its photons.
     vec3 flux;
+    // Radiance, radiant intensity or irradiance, as its kind has it; of a uniform disc the
+    // intensity of a unit of area.
     vec3 strength;
     vec3 position;
+    // Its axis or normal; a directional light's flight.
     vec3 direction;
+    // Radius of a disc; versine (1 - cosine) of a spot's inner cone, of which a narrow one keeps its digits.
     float size;
+    // Versine of a spot's outer cone.
     float outer_versine;
 };
 
+// A sphere around surfaces that make caustics, which photons are aimed at.
 struct CausticTarget {
     vec3 centre;
     float radius;
 };
 
+// A path from the camera or a receiver, under way over mirrors and glass.
 struct CameraPath {
     vec3 position;
+    // Of its sample among all of all pixels.
     uint place;
     vec3 direction;
+    // Bits 0 to 3: it saw a specular surface, it gathers, it starts at no surface, emission counts at its next one; bits 4
+    // and 5: visible points found; from bit 8 on: surfaces that it has met.
     uint state;
     vec3 weight;
 };
 
+// A point whose light the photon maps are asked for.
 struct VisiblePoint {
     vec3 position;
+    // That it lies in: twice its number, plus 1 on its back.
     uint plane;
+    // What a unit of flux density that arrives adds to the pixel, W/m2/sr per W/m2.
     vec3 weight;
+    // Octahedral; `NONE`: the plane's.
     uint shading_normal;
+    // Towards the eye, octahedral.
     uint wo;
     float exponent;
     uint surface;
+    // Mask of the arrivals that count, and `SEEN_...`; 0: no point.
     uint arrivals;
 };
 
+// A point and its normals, of which irradiance is asked.
 struct Receiver {
     vec3 position;
     vec3 normal;
     vec3 shading_normal;
 };
 
+// Whose random numbers are drawn: seed, round, and a `DOMAIN_...`.
 struct Draws {
     uvec2 seed;
     uint round;
     uint domain;
 };
 
+// Photons that leave the lights of a scene.
 struct PhotonEmission {
     uint first_photon;
     uint photon_count;
     uint emitter_count;
+    // Of a sphere around the scene.
     float scene_radius;
+    // Spheres that they are aimed at; 0: at none.
     uint target_count;
+    // What aimed photons' flux is multiplied by; see [`crate::plan::scene::MapPlan::flux_gain`].
     float flux_gain;
 };
 
+// Which photons a map holds.
 struct PhotonStore {
     uint photon_capacity;
+    // Mask of the arrivals that are stored.
     uint stored;
+    // 1: photons end where they scatter, as those of a caustic map do.
     uint caustic_only;
+    // Mask of the surfaces (1 << `SURFACE_...`) whose caustics are wanted.
     uint caustic_surfaces;
 };
 
@@ -287,8 +367,11 @@ struct FlightPush {
     Draws draws;
     PhotonStore map;
     uint bounce;
+    // Number of the list that its paths come from: [`crate::engine::scene::trace`] counts them from 0 in each segment.
     uint list;
+    // 1: no path goes on after it.
     uint is_last;
+    // 1: the naive builder says how many paths are left.
     uint counts_left;
     uint path_capacity;
 };
@@ -297,9 +380,13 @@ struct SceneTracePersistentPush {
     Draws draws;
     PhotonEmission emission;
     PhotonStore map;
+    // Bounces after which photons are cut off.
     uint bounces;
+    // Bounces that its photons have behind them; 0: they come from their lights.
     uint first_bounce;
+    // Most flights of a photon in this dispatch.
     uint flights;
+    // Invocations that take photons: each every so many.
     uint stride;
 };
 
@@ -315,6 +402,7 @@ struct GoOnPush {
 
 struct ViewPush {
     Draws draws;
+    // Hash of the seed and the round that decides what is rounded up.
     uint rounding;
     uint width;
     uint height;
@@ -322,15 +410,19 @@ struct ViewPush {
     uint end_pixel;
     vec3 eye;
     vec3 forward;
+    // To the picture's right and upper edge, at unit distance.
     vec3 right;
     vec3 up;
     uint emitter_count;
+    // Film units in 1 W/m2/sr.
     float film_scale;
+    // Largest sum of one pass, film units.
     float film_limit;
 };
 
 struct ReceivePush {
     Draws draws;
+    // Hash of the seed and the round that decides what is rounded up.
     uint rounding;
     uint first_point;
     uint end_point;
@@ -338,9 +430,11 @@ struct ReceivePush {
     uint emitter_count;
     float film_scale;
     float film_limit;
+    // Within which a surface makes a point one of its own.
     float radius;
 };
 
+// A hashed grid: cells of a row lie side by side.
 struct CellPush {
     vec3 origin;
     float cells_per_unit;
@@ -353,12 +447,17 @@ struct SceneGatherPush {
     uint end_point;
     uint point_count;
     uint pixel_count;
+    // Index of the arrival that the map holds, where it holds one only: where its sums stand.
     uint arrival;
     uint round;
+    // Hash of the seed and the round that decides what is rounded up.
     uint rounding;
+    // Of the picture; 0 where points are receivers, in an order of their own.
     uint width;
     uint height;
+    // 0: the first slice of candidates of every point; 1: all others of those that have more.
     uint first_slice;
+    // Invocations that share a point.
     uint lanes;
     float radius;
     CellPush cells;
@@ -369,15 +468,19 @@ struct FluxToRadiancePush {
     uint end_point;
     uint point_count;
     uint pixel_count;
+    // Of the picture; 0 where points are receivers, in an order of their own.
     uint width;
     uint height;
+    // Mask of the arrivals that some map holds.
     uint arrivals;
     uint round;
+    // Hash of the seed and the round that decides what is rounded up.
     uint rounding;
     float film_scale;
     float film_limit;
     float global_radius;
     float caustic_radius;
+    // Flux of a photon of relative flux 1, over the photons of the round.
     float global_flux;
     float caustic_flux;
 };
@@ -386,6 +489,7 @@ struct ResolvePush {
     uint first_pixel;
     uint end_pixel;
     uint pixel_count;
+    // Visible points that photons may have lit.
     uint points_per_pixel;
 };
 
@@ -398,60 +502,84 @@ struct CheckPush {
     uint addend_low;
     uint addend_high;
     uint add_count;
+    // Photons of a loop in which lanes vote, and invocations that take them.
     uint photon_count;
     uint stride;
 };
 
+// Functions of `glsl/math/math.glsl` at (a, b).
 struct MathResults {
+    // The bits of a, taken for an integer.
     float converted;
+    // a b + a
     float sum_of_product;
+    // a / b
     float quotient;
+    // Of a.
     float root;
     float inverse_root;
     float exp2;
     float log2;
+    // Angle of (b, a).
     float angle;
     float asinh;
 };
 
+// What the functions that sample are asked at.
 struct SamplingCase {
+    // Two random words, as the generator gives them.
     uvec2 words;
+    // Of a disc, and of what is made into a frame or packed; a unit vector.
     vec3 normal;
+    // Of a lobe.
     float exponent;
+    // Unit vectors: corners of a spherical triangle.
     vec3 a;
     vec3 b;
     vec3 c;
 };
 
+// What the functions of `glsl/rng/sampling.glsl`, `glsl/world/scene/filter.glsl` and `glsl/world/scene` make of a case.
 struct Samples {
+    // Around the z axis.
     vec3 cosine_hemisphere;
     vec3 uniform_hemisphere;
     vec3 sphere;
     vec3 lobe;
+    // A point of the unit disc around the origin.
     vec3 disc;
+    // Barycentric.
     vec2 triangle;
     vec2 filter_offset;
+    // A direction within the spherical triangle, and the angle that it was chosen from.
     vec3 in_triangle;
     float solid_angle;
     vec3 tangent;
     vec3 bitangent;
+    // The normal, packed in 2 x 16 and in 2 x 15 bits.
     vec3 unpacked_normal;
     vec3 unpacked_direction;
 };
 
+// What `glsl/check/check_packing_...` pack.
 struct PackingCase {
+    // In the plane of its wall, where it has one.
     vec3 position;
     uint wall;
+    // A unit vector.
     vec3 direction;
     uint photon;
     uvec2 stream;
     float flux;
     float weight;
+    // Flux of a map's photon, and what one hit adds.
     vec3 colour;
+    // Of a normal that is only unpacked.
     uint normal_code;
     Room room;
 };
 
+// An entry of the room's photon map and a path, unpacked.
 struct UnpackedRoom {
     vec3 place;
     uint wall;
@@ -465,6 +593,7 @@ struct UnpackedRoom {
     float path_flux;
 };
 
+// An entry of the map of a scene of triangles, unit vectors packed and unpacked, and a child of a node.
 struct UnpackedScene {
     vec3 position;
     uint plane;
@@ -479,8 +608,11 @@ struct UnpackedScene {
     uint child_nodes;
 };
 
+// A measurement of a device's limits; see `glsl/kernels/measure_...`.
 struct MeasurePush {
     uint item_count;
+    // What one invocation does, times over.
     uint step_count;
+    // Of random places, which are below a power of two.
     uint mask;
 };

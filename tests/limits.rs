@@ -1,6 +1,7 @@
 //! Limits of a run: no light is lost to them without being counted, and a run ends soon after it is asked to.
 
 use std::sync::atomic::{AtomicBool, Ordering};
+use std::sync::mpsc::{self, RecvTimeoutError};
 use std::time::Duration;
 
 use crate::common::prelude::*;
@@ -174,6 +175,22 @@ fn run(gpu: &Gpu, scene: &Scene, settings: &SceneSettings, cancelled: &AtomicBoo
 }
 
 /// Rounds that would take many minutes end in their middle when they are asked to.
+/// The result of a run that would go on for hours if nothing ended it: after a minute it is cancelled, which fails.
+fn ended_by_itself(run: impl FnOnce(&AtomicBool) -> photonmill::error::Result<RunResult>) -> RunResult {
+    let cancelled = &AtomicBool::new(false);
+    let (ended, end) = mpsc::channel::<()>();
+    std::thread::scope(|scope| {
+        scope.spawn(move || {
+            if end.recv_timeout(Duration::from_secs(60)) == Err(RecvTimeoutError::Timeout) {
+                cancelled.store(true, Ordering::Relaxed);
+            }
+        });
+        let result = run(cancelled);
+        drop(ended);
+        result.unwrap()
+    })
+}
+
 #[test]
 fn long_rounds_end_soon_after_they_are_asked_to() {
     let Some(gpu) = device() else { return };
@@ -197,7 +214,7 @@ fn long_rounds_end_soon_after_they_are_asked_to() {
     // In its first round a run ends with the photons that it has.
     let wanted = Duration::from_millis(1500);
     let stop = Stop { seconds: Some(wanted.as_secs_f64()), ..Stop::default() };
-    let lit = run(&gpu, &scene, &SceneSettings { stop, ..wide(&long) }, &AtomicBool::new(false)).unwrap();
+    let lit = ended_by_itself(|cancelled| run(&gpu, &scene, &SceneSettings { stop, ..wide(&long) }, cancelled));
     assert_eq!((lit.end, lit.film.rounds), (End::Time, 1));
     assert!(lit.fates[0].emitted < u64::from(long.photons) && lit.fates[1].emitted > 0);
     let report = scene_report::text("cornell-spheres", &lit, "pixel", false);

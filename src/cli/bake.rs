@@ -5,9 +5,10 @@ use std::sync::atomic::AtomicBool;
 
 use clap::Args;
 
+use super::job::{Job, MessageArgs};
 use super::options::{ReportArgs, TimedDeviceArgs};
 use super::progress::ProgressReporter;
-use super::transport::{Job, MessageArgs, SceneArgs, TransportArgs, geometry};
+use super::scene::{SceneArgs, TransportArgs, geometry};
 use super::values::{parse_number, parse_stops};
 use super::{End, complain, say_beside};
 use crate::bake::{self, Layout, PHASE_COUNT, TexelEstimate};

@@ -3,7 +3,7 @@
 use clap::Args;
 
 use super::progress::{ProgressArgs, ProgressReporter};
-use super::transport::{PictureArgs, Subject};
+use super::scene::{PictureArgs, Subject};
 use super::{DeviceArgs, JsonOrStdoutArg, optional_file, say};
 use crate::engine;
 use crate::error::Result;

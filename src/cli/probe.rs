@@ -7,9 +7,10 @@ use std::sync::atomic::AtomicBool;
 use clap::Args;
 use glam::DVec3;
 
+use super::job::{Job, MessageArgs};
 use super::options::{ReportArgs, TimedDeviceArgs};
 use super::progress::ProgressReporter;
-use super::transport::{Job, MessageArgs, SceneArgs, TransportArgs, geometry};
+use super::scene::{SceneArgs, TransportArgs, geometry};
 use super::{End, complain, say_beside};
 use crate::engine::scene::{RunResult, Target};
 use crate::error::{Error, Result};

@@ -6,9 +6,10 @@ use std::sync::atomic::AtomicBool;
 use clap::Args;
 use glam::DVec3;
 
+use super::job::{Job, MessageArgs};
 use super::options::{ReportArgs, TimedDeviceArgs};
 use super::progress::ProgressReporter;
-use super::transport::{FilterArg, Job, MessageArgs, PictureArgs, Subject};
+use super::scene::{FilterArg, PictureArgs, Subject};
 use super::values::{parse_integer, parse_photon_name, parse_stops};
 use super::{End, optional_file, say, say_beside};
 use crate::engine;

@@ -189,7 +189,8 @@ impl Gpu {
         facts
     }
 
-    /// Runs this SPIR-V in place of kernels' own from now on, by the kernel's name, and no other. The start-up check is not repeated.
+    /// From now on runs this SPIR-V in place of the kernels' own, by the kernel's name. Kernels that were replaced before and are
+    /// not named now get their own back. The start-up check is not repeated.
     pub fn replace(&mut self, replaced: Vec<(String, Vec<u32>)>) {
         let before = std::mem::replace(&mut self.replaced, replaced);
         let changed = |kernel| before.iter().chain(&self.replaced).any(|(name, _)| name == kernel);

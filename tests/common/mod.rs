@@ -23,7 +23,6 @@ pub mod sources;
 use std::cmp::Ordering;
 use std::fmt::Display;
 use std::ops::Deref;
-use std::sync::Mutex;
 
 use photonmill::engine::nonfinite_values::NonfiniteValues;
 use photonmill::engine::room::resources::RoomResources;
@@ -33,24 +32,14 @@ use photonmill::rng::{self, Streams};
 use photonmill::scene::room::Wall;
 use prelude::*;
 
-/// Devices that no test has at the moment: what one test compiled serves the next.
-static IDLE: Mutex<Vec<Gpu>> = Mutex::new(Vec::new());
-
-/// Pipelines that an idle device may have: a software device takes several MiB for each.
-const MOST_PIPELINES: usize = 100;
-
 /// A device under the validation layer, which must not have said a word by the end of the test, nor may anything be held.
-pub struct Device {
-    /// `None` at the very end.
-    gpu: Option<Gpu>,
-    serves_others: bool,
-}
+pub struct Device(Gpu);
 
 impl Deref for Device {
     type Target = Gpu;
 
     fn deref(&self) -> &Gpu {
-        self.gpu.as_ref().expect("it is taken at the very end")
+        &self.0
     }
 }
 
@@ -62,23 +51,18 @@ impl Drop for Device {
         }
         self.check_validation().unwrap();
         assert_eq!((self.held_memory().device_bytes, self.held_memory().staging_bytes), (0, 0), "buffers are left");
-        if let Some(gpu) = self.gpu.take().filter(|gpu| self.serves_others && gpu.pipeline_count() <= MOST_PIPELINES) {
-            IDLE.lock().unwrap().push(gpu);
-        }
     }
 }
 
-/// The device of the tests; `None` where `PHOTONMILL_NO_GPU=1` asks to go without.
+/// The device of the tests; `None` where `PHOTONMILL_NO_GPU=1` asks to go without. Each test has one of its own: what idle ones
+/// would keep for it, gigabytes on a software device, saves no time.
 pub fn device() -> Option<Device> {
-    let idle = IDLE.lock().unwrap().pop();
-    let gpu = idle.or_else(|| open(Options::default()))?;
-    gpu.forget_peaks();
-    Some(Device { gpu: Some(gpu), serves_others: true })
+    device_with(Options::default())
 }
 
-/// One of its own that nothing was compiled for, with some of its abilities masked off or not.
+/// The same with some of its abilities masked off.
 pub fn device_with(options: Options) -> Option<Device> {
-    open(options).map(|gpu| Device { gpu: Some(gpu), serves_others: false })
+    open(options).map(Device)
 }
 
 /// Whether `PHOTONMILL_NO_GPU=1` asks to go without a device.

@@ -1,9 +1,10 @@
-// A photon in flight through a scene of triangles, and its path between bounces.
-
+// A photon in flight through a scene of triangles.
 struct LightPath {
     vec3 position;
+    // Number within its round.
     uint photon;
     vec3 direction;
+    // `ARRIVED_...`, were it stored at its next hit.
     uint arrival;
     vec3 flux;
 };

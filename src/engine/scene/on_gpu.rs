@@ -22,7 +22,8 @@ use crate::plan::scene::{MapPlan, ScenePlan};
 use crate::plan::sensor::Sensor;
 use crate::timings::{Clock, Span};
 
-/// Kernels that the plan needs, and no others. Camera paths seldom go on: the kernel for these is made where one does.
+/// Kernels that the plan needs, and no others. `go_on` is not among them: few camera paths outlast a dispatch, so its pipeline is
+/// made at its first use.
 pub fn modules(plan: &ScenePlan, facts: &DeviceFacts) -> Vec<Module> {
     let mut modules = vec![Resolve::MODULE];
     modules.push(match plan.sensor {

@@ -1,0 +1,109 @@
+//! The run of a command that lights a scene of triangles: planned, announced, interruptible, with its bias where asked.
+
+use std::sync::atomic::AtomicBool;
+
+use clap::Args;
+
+use super::complain;
+use super::interrupt::interruptible;
+use super::progress::{ProgressArgs, ProgressReporter};
+use super::stop::{StopArgs, bias_before, goals, rounds_after, up_to};
+use crate::engine::Control;
+use crate::engine::scene::{self, RunResult, View};
+use crate::error::Result;
+use crate::gpu::Gpu;
+use crate::output::scene_report;
+use crate::plan::radius::mean_squared_radius;
+use crate::plan::scene::{MapPlan, ScenePlan};
+use crate::plan::sensor::Sensor;
+use crate::records::Receiver;
+use crate::scene::geometry::Geometry;
+use crate::scene::{Camera, Scene};
+use crate::settings::scene::SceneSettings;
+use crate::text::counted;
+
+/// What a run prints.
+#[derive(Args)]
+pub(super) struct MessageArgs {
+    /// Also print which effects were kept or dropped and why, with the time and the light of each
+    #[arg(long, help_heading = "Messages")]
+    pub(super) explain: bool,
+    #[command(flatten)]
+    pub(super) progress: ProgressArgs,
+}
+
+/// What a run is about.
+pub(super) struct Job<'a> {
+    pub(super) scene: &'a Scene,
+    pub(super) settings: &'a SceneSettings,
+    pub(super) geometry: &'a Geometry,
+    pub(super) sensor: Sensor,
+    pub(super) camera: Option<&'a Camera>,
+    pub(super) phases: &'a [Vec<Receiver>],
+    /// What results are of: pixel, texel or point.
+    pub(super) point: &'static str,
+}
+
+impl Job<'_> {
+    /// What will be traced, before it is.
+    fn announce(&self, plan: &ScenePlan, reporter: &ProgressReporter) {
+        let what = match plan.sensor {
+            Sensor::Picture { width, height } => format!("{width} x {height} pixels"),
+            Sensor::Receivers { count } => counted(count, self.point),
+        };
+        let maps: Vec<String> = plan.maps().map(|map| counted(map.photons, &format!("{} photon", map.name))).collect();
+        let radius = |map: &MapPlan| format!("{:.4} m ({})", map.radius * self.geometry.unit, map.name);
+        let radii: Vec<String> = plan.maps().map(radius).collect();
+        let (maps, radius) = if maps.is_empty() {
+            ("no photons".to_owned(), String::new())
+        } else {
+            (maps.join(" and "), format!("; first radius {}", radii.join(", ")))
+        };
+        reporter.note(&format!(
+            "plan: {}, {what}; {} of {maps}{radius}; {:.1} MiB on the device{}",
+            self.scene.name,
+            up_to(&plan.settings.stop, plan.settings.rounds),
+            plan.bytes as f64 / f64::from(1 << 20),
+            goals(&plan.settings.stop)
+        ));
+    }
+
+    /// Plans the job, its default radii by a trial round, runs all rounds and reports progress; where asked, measures the bias
+    /// too.
+    pub(super) fn run(&self, gpu: &Gpu, stop: &StopArgs, reporter: &ProgressReporter, cancelled: &AtomicBool) -> Result<RunResult> {
+        let Job { scene, geometry, settings, sensor, camera, phases, point } = *self;
+        let view = View { geometry, camera, phases };
+        let mut plan = scene::trial::plan(gpu, scene, &view, settings, sensor)?;
+        if let Some(warning) = scene_report::radius_warning(&plan, geometry, point) {
+            complain(&format!("warning: {warning}"));
+        }
+        self.announce(&plan, reporter);
+        let measure = |plan: &ScenePlan, factor_and_rounds| {
+            interruptible(|| scene::bias::measure(gpu, scene, &view, plan, factor_and_rounds, cancelled))
+        };
+        let alpha = settings.alpha;
+        // The error asked for is noise and bias together, so the bias must be known beforehand.
+        let before = bias_before(&settings.stop, stop.bias, alpha < 1.0, reporter, |rounds| measure(&plan, (1.0, rounds)))?;
+        plan.settings.stop.bias = before.map(|bias| bias.upper);
+
+        reporter.status("making the pipelines");
+        let mut control = Control { cancelled, progress: &mut |progress| reporter.report(progress, "round") };
+        let mut lit = interruptible(|| scene::light(gpu, &view, plan, &mut control))?;
+        if lit.is_cancelled() {
+            complain(&format!("ended early: the results are of {} of {}", counted(lit.film.rounds, "round"), settings.rounds));
+            return Ok(lit);
+        }
+        let shrunk = mean_squared_radius(alpha, lit.film.rounds);
+        lit.bias = match before {
+            Some(bias) => Some(bias.scaled(shrunk)),
+            // At the radius whose square is the mean of the rounds' squares.
+            None if stop.bias => {
+                reporter.status("measuring the bias");
+                measure(&lit.plan, (shrunk.sqrt(), rounds_after(lit.film.rounds)))?
+            }
+            None => None,
+        };
+        reporter.status("writing the results");
+        Ok(lit)
+    }
+}
