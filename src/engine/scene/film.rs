@@ -158,6 +158,9 @@ impl SceneFilm {
     /// Root mean square over pixels and channels of standard error and of the mean; of pixels that nothing has reached see
     /// [`SceneFilm::unknown`].
     pub fn relative_error(&self, plan: &ScenePlan) -> f64 {
+        if self.rounds < 2 {
+            return if self.sums.iter().all(|sum| *sum == 0) { 0.0 } else { f64::INFINITY };
+        }
         let (mut errors, mut means) = (0.0, 0.0);
         for pixel in 0..self.pixels() {
             errors += self.standard_error(pixel, plan).length_squared();
