@@ -149,7 +149,7 @@ impl<'gpu> Commands<'gpu> {
         let info = vk::CommandBufferBeginInfo::default().flags(vk::CommandBufferUsageFlags::ONE_TIME_SUBMIT);
         // SAFETY: the last submission has ended, so the command buffer may be recorded again.
         call("vkBeginCommandBuffer", unsafe { self.context.device.begin_command_buffer(self.command_buffer, &info) })?;
-        self.timestamps.reset(self.command_buffer);
+        self.timestamps.forget();
         // The fence of the last submission made its writes available; this makes them visible here.
         self.barrier();
         Ok(())

@@ -10,6 +10,9 @@ use crate::error::Result;
 
 /// Queries of one submission; a scope takes two.
 pub(super) const QUERY_COUNT: u32 = 4096;
+/// Queries that are reset together, as writing comes to them: few runs need them all, and the validation layer keeps some bytes of
+/// each reset for ever.
+const RESET_STEP: u32 = 64;
 
 /// A scope that began and ended in this submission.
 pub(super) struct TimedScope {
@@ -24,8 +27,8 @@ pub(super) struct Timestamps {
     valid_bits: u32,
     period_ns: f64,
     used: u32,
-    /// Queries from the first on that are to be reset before they are written: at first all.
-    stale: u32,
+    /// Queries from the first on that were reset in this submission.
+    ready: u32,
     context: Arc<Context>,
 }
 
@@ -44,7 +47,7 @@ impl Timestamps {
             valid_bits,
             period_ns: f64::from(gpu.facts.timestamp_period_ns),
             used: 0,
-            stale: QUERY_COUNT,
+            ready: 0,
             context: gpu.context.clone(),
         })
     }
@@ -55,14 +58,8 @@ impl Timestamps {
     }
 
     /// Forgets the queries of the last submission.
-    pub(super) fn reset(&mut self, command_buffer: vk::CommandBuffer) {
-        self.stale = self.stale.max(self.used);
-        self.used = 0;
-        if self.valid_bits != 0 && self.stale != 0 {
-            // SAFETY: the command buffer is recording, and the last submission has ended.
-            unsafe { self.context.device.cmd_reset_query_pool(command_buffer, self.pool, 0, self.stale) };
-        }
-        self.stale = 0;
+    pub(super) fn forget(&mut self) {
+        (self.used, self.ready) = (0, 0);
     }
 
     /// Records the time at which everything before has ended.
@@ -71,8 +68,15 @@ impl Timestamps {
         let query = self.used;
         self.used += 1;
         if self.valid_bits != 0 {
-            // SAFETY: the command buffer is recording, the query was reset in it and not yet used.
-            unsafe { self.context.device.cmd_write_timestamp2(command_buffer, vk::PipelineStageFlags2::ALL_COMMANDS, self.pool, query) };
+            // SAFETY: the command buffer is recording, the last submission has ended, and the query is not used in this one before
+            // it was reset.
+            unsafe {
+                if query == self.ready {
+                    self.context.device.cmd_reset_query_pool(command_buffer, self.pool, query, RESET_STEP);
+                    self.ready += RESET_STEP;
+                }
+                self.context.device.cmd_write_timestamp2(command_buffer, vk::PipelineStageFlags2::ALL_COMMANDS, self.pool, query);
+            }
         }
         query
     }
