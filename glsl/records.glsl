@@ -124,7 +124,10 @@ struct DispatchSizePush {
 };
 
 struct ClearancePush {
-    uint point_count;
+    uint first_point;
+    uint end_point;
+    // Which of the distances in 8 directions is taken, in ascending order from 0.
+    uint rank;
 };
 
 struct CrowdSizePush {
@@ -316,7 +319,7 @@ struct VisiblePoint {
     uint wo;
     float exponent;
     uint surface;
-    // Mask of the arrivals that count, and `SEEN_...`; 0: no point.
+    // Mask of the arrivals that count, and `SEEN...`; 0: no point.
     uint arrivals;
 };
 
@@ -440,6 +443,8 @@ struct CellPush {
     float cells_per_unit;
     uint bucket_mask;
     uint photon_capacity;
+    // 1: photons that it sorts count as stored; another grid of the same photons has 0.
+    uint counts_stored;
 };
 
 struct SceneGatherPush {
@@ -459,7 +464,34 @@ struct SceneGatherPush {
     uint first_slice;
     // Invocations that share a point.
     uint lanes;
+    // Of class 0.
     float radius;
+    // `GLOBAL_CLASS` or `CAUSTIC_CLASS`, and the classes that this grid serves: `first_class` to `end_class` - 1.
+    uint map_class;
+    uint first_class;
+    uint end_class;
+    CellPush cells;
+};
+
+// Which radius each visible point has, by photons of a trial around it.
+struct RadiusClassPush {
+    uint first_point;
+    uint end_point;
+    // `GLOBAL_CLASS` or `CAUSTIC_CLASS`, the first of the classes that this grid serves, and how many there are.
+    uint map_class;
+    uint first_class;
+    uint class_count;
+    // Where nothing tells.
+    uint usual_class;
+    // Of class 0.
+    float radius;
+    // Photons of the trial within a radius that is to hold as many of a round as wanted.
+    float wanted;
+    // Of what is clear around a point: larger radii are halved, once or twice.
+    float clearance_share;
+    // No radius need be smaller than this share of a point's distance from the eye: half a pixel.
+    vec3 eye;
+    float pixel_share;
     CellPush cells;
 };
 
@@ -478,6 +510,7 @@ struct FluxToRadiancePush {
     uint rounding;
     float film_scale;
     float film_limit;
+    // Of class 0.
     float global_radius;
     float caustic_radius;
     // Flux of a photon of relative flux 1, over the photons of the round.

@@ -102,6 +102,8 @@ constants! {
     SEEN_OVER_SPECULAR = 256;
     SEEN_BY_GATHER = 512;
     SEEN_FOR_ALL = 1024;
+    /// There is a visible point, whatever is asked of it.
+    SEEN = 2048;
 
     /// `GATHER_RAYS`: which visible points take their indirect light from a ray of a final gather.
     GATHER_NONE = 0;
@@ -154,6 +156,15 @@ constants! {
     LOOP_LIMIT = 16_384;
     /// Photons that one invocation of a gather tests; a longer list is shared by several invocations.
     GATHER_SLICE = 4_096;
+    /// Classes of radii that the points of a map may have, each half of the one before it; and classes that one grid serves.
+    RADIUS_CLASSES = 16;
+    CLASSES_OF_GRID = 2;
+    /// What stands for the class of a point that is not known yet: 8 bits of it.
+    NO_CLASS = 0xff;
+    /// No radius is below 2 to the power of minus this, of the scene's normalised extent.
+    LEAST_RADIUS_BITS = 15;
+    /// Photons of the trial around a point that tell their density there.
+    CLASS_PHOTONS = 8;
     /// Photons of a leaf of the kd-tree.
     TREE_LEAF = 8;
     /// Photons that one invocation of the tree's radix sort counts or moves, in their order.

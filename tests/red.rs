@@ -59,6 +59,7 @@ enum Question {
     PatchInPlane,
     StackFromAfar,
     CoarseMirror,
+    RoomBesideHall,
     /// With so many samples a pixel, and with a final gather or not.
     GlassInFurnace(u32, bool),
     /// Aimed photons bring as much light as others: a scene of `common::aimed`.
@@ -71,7 +72,7 @@ impl Question {
     /// Whether another test, the same for every device, shows that a device without a fault answers it right.
     fn has_a_test_of_its_own(self) -> bool {
         matches!(self, ClosedForm(_) | Bits(_) | LampInBox(_) | Shelf | Ridge | Spot | Texture(_) | LeaningPlane(_))
-            || matches!(self, LeaningScatterer | PatchInPlane | StackFromAfar | CoarseMirror | GlassInFurnace(..))
+            || matches!(self, LeaningScatterer | PatchInPlane | StackFromAfar | CoarseMirror | RoomBesideHall | GlassInFurnace(..))
     }
 }
 
@@ -90,7 +91,9 @@ impl Question {
             | FiniteBox => Subject::Room,
             AimedLight(_) => Subject::Aiming,
             Appends | Finite | Crowds | Bits(_) | LampInBox(_) | Shelf | Ridge | Spot | Texture(_) => Subject::Scenes,
-            LeaningPlane(_) | LeaningScatterer | PatchInPlane | StackFromAfar | CoarseMirror | GlassInFurnace(..) => Subject::Scenes,
+            LeaningPlane(_) | LeaningScatterer | PatchInPlane | StackFromAfar | CoarseMirror | RoomBesideHall | GlassInFurnace(..) => {
+                Subject::Scenes
+            }
         }
     }
 }
@@ -108,7 +111,7 @@ struct Fault {
 }
 
 #[rustfmt::skip]
-const FAULTS: [Fault; 69] = [
+const FAULTS: [Fault; 70] = [
     Fault { what: "what rounding takes from a pair of floats is forgotten",
         file: "film/float_u64.glsl", from: "precise float rest = sum.y + (", to: "precise float rest = 0.0 * (",
         kernels: &["gather_brute_u64", "gather_grid_u64"], noticed_by: &[(Pairs, SumsTooSmall)] },
@@ -219,8 +222,8 @@ const FAULTS: [Fault; 69] = [
         to: "distance_squared <= 0.9801 * push.radius_squared",
         kernels: &["gather_brute_u64", "gather_brute_two_words"], noticed_by: &[(RoomFilm(Gather::Brute), SumsTooSmall)] },
     Fault { what: "the radius of a lookup is 1 % too small",
-        file: "gather/visible_points.glsl", from: "distance_squared <= push.radius * push.radius &&",
-        to: "distance_squared <= 0.9801 * push.radius * push.radius &&",
+        file: "gather/visible_points.glsl", from: "distance_squared <= radius * radius &&",
+        to: "distance_squared <= 0.9801 * radius * radius &&",
         kernels: &["gather_visible_points_u64", "gather_visible_points_two_words"],
         noticed_by: &[(ClosedForm("furnace, Photons, Ballot: irradiance"), TooDark)] },
     Fault { what: "shadow rays count the cosine twice",
@@ -339,6 +342,9 @@ const FAULTS: [Fault; 69] = [
         file: "material/scatter.glsl", from: "return direction - 2.0 * min(dot(direction, side), 0.0) * side;", to: "return direction;",
         kernels: &["view"],
         noticed_by: &[(CoarseMirror, TooDark)] },
+    Fault { what: "photons within a radius of its own are spread over the widest's area",
+        file: "kernels/flux_to_radiance.comp", from: "radius = radius_of_class(widest,", to: "radius = radius_of_class(widest, 0 * ",
+        kernels: &["flux_to_radiance"], noticed_by: &[(RoomBesideHall, TooDark)] },
     Fault { what: "a spot falls off by its share, not by the square of it",
         file: "world/scene/lights.glsl", from: "return share * share;", to: "return share;",
         kernels: &["receive"], noticed_by: &[(Spot, TooBright)] },
@@ -440,6 +446,7 @@ fn ask(gpu: &Gpu, question: Question) -> Check<Complaint> {
         PatchInPlane => known::patch_in_a_plane(gpu),
         StackFromAfar => known::stack_from_afar(gpu),
         CoarseMirror => known::coarse_mirror_in_a_furnace(gpu, 8),
+        RoomBesideHall => known::room_beside_a_hall(gpu, true),
         AimedLight(kind) => aimed::same_light(gpu, kind),
     }
 }

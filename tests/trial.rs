@@ -3,11 +3,12 @@
 
 use std::sync::atomic::AtomicBool;
 
+use crate::common::known;
 use crate::common::lit::light;
 use crate::common::prelude::*;
 use crate::unknown::room_without_floor;
 use glam::dvec3;
-use photonmill::engine::scene::{self, View, trial};
+use photonmill::engine::scene::{self, Target, View, trial};
 use photonmill::output::scene_report;
 use photonmill::plan::radius::{RadiusFrom, area_radius};
 use photonmill::records::Receiver;
@@ -168,5 +169,55 @@ fn a_room_too_small_for_its_scene_has_an_unknown_bias() {
         assert_eq!(bias.is_known(), is_known, "{width} m: {bias:?}");
         let warning = scene_report::radius_warning(&plan, &geometry, "point").unwrap_or_default();
         assert_eq!(warning.contains("use --final-gather"), !is_known, "{width} m: {warning}");
+    }
+}
+
+#[test]
+fn a_room_has_radii_of_its_own_beside_a_hall() {
+    let Some(gpu) = device() else { return };
+    assert_holds("radii by the density", known::room_beside_a_hall(&gpu, true));
+    assert_complains("the median's radius everywhere", known::room_beside_a_hall(&gpu, false));
+}
+
+/// Radii by density know no builder, chunk or part: films are the same to the bit, and parts add up to the whole.
+#[test]
+fn radii_by_density_change_no_bit_by_builder_chunk_or_part() {
+    let Some(gpu) = device() else { return };
+    let scene = scene("cornell-spheres");
+    let camera = scene.first_camera();
+    let settings = SceneSettings { photons: 4000, caustic_photons: 2000, rounds: 2, ..SceneSettings::default() };
+    let lit = |settings: SceneSettings| scene::render(&gpu, &scene, &settings, Target::Picture(&camera, [24, 18])).unwrap();
+    let whole = lit(settings.clone());
+    assert!(whole.plan.has_classes() && whole.plan.maps().any(|map| whole.film.classes(map).is_some_and(|(first, last)| first < last)));
+    for (builder, chunk) in [(Builder::Atomic, None), (Builder::Naive, Some(700)), (Builder::Persistent, Some(1300))] {
+        let other = lit(SceneSettings { builder: Some(builder), chunk, ..settings.clone() });
+        assert!(other.film == whole.film && other.film.class_counts == whole.film.class_counts, "{builder:?}, {chunk:?}");
+    }
+    let mut sums = vec![0; whole.film.sums.len()];
+    for part in [Part::Direct, Part::Specular, Part::Caustic, Part::Indirect] {
+        let of_part = lit(SceneSettings { part, ..settings.clone() });
+        sums.iter_mut().zip(&of_part.film.sums).for_each(|(sum, of_part)| *sum += of_part);
+    }
+    assert!(sums == whole.film.sums);
+}
+
+/// A radius that is given for one map leaves the other's to the trial, and neither loses its light.
+#[test]
+fn one_radius_may_be_given() {
+    let Some(gpu) = device() else { return };
+    let scene = scene("cornell-spheres");
+    let camera = scene.first_camera();
+    let settings = SceneSettings { photons: 20_000, caustic_photons: 20_000, rounds: 4, ..SceneSettings::default() };
+    let part_totals = |settings: SceneSettings| {
+        let lit = scene::render(&gpu, &scene, &settings, Target::Picture(&camera, [32, 24])).unwrap();
+        lit.film.part_totals.iter().map(|total| *total as f64).collect::<Vec<_>>()
+    };
+    let expected = part_totals(settings.clone());
+    let global = part_totals(SceneSettings { radius: Some(0.1), ..settings.clone() });
+    let caustic = part_totals(SceneSettings { caustic_radius: Some(0.02), ..settings });
+    for (what, part) in [("caustics", 2), ("indirect light", 3)] {
+        for found in [&global, &caustic] {
+            assert!((found[part] / expected[part] - 1.0).abs() < 0.2, "{what}: {found:?}, {expected:?}");
+        }
     }
 }

@@ -16,10 +16,10 @@ struct CellRange {
     float reach;
 };
 
-CellRange cells_near(vec3 position)
+CellRange cells_near(vec3 position, float radius)
 {
     // A little over the radius, so that rounding never costs a photon at the rim.
-    float reach = push.radius * (1.0 + 1.0 / 1024.0);
+    float reach = radius * (1.0 + 1.0 / 1024.0);
     vec3 place = place_in_grid(position, push.cells);
     // What places of point and photon, and cells and distances made of them, may be off: at most ten times half a unit in
     // the last digit; here sixteen.

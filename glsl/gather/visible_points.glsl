@@ -40,12 +40,20 @@ void gather_photons()
     if ((point.arrivals & wanted) == 0) {
         return;
     }
+    float radius = push.radius;
+    if (HAS_RADIUS_CLASSES) {
+        uint own_class = radius_class(index, push.map_class);
+        if (own_class < push.first_class || own_class >= push.end_class) {
+            return;
+        }
+        radius = radius_of_class(push.radius, own_class);
+    }
     vec3 normal = plane_normal(point.plane);
     bool is_flat = point.shading_normal == NONE;
     vec3 ns = is_flat ? normal : unpack_normal(point.shading_normal);
     vec3 wo = unpack_direction(point.wo);
     bool is_even = is_flat && !has_lobe(point.surface);
-    CellRange range = cells_near(point.position);
+    CellRange range = cells_near(point.position, radius);
     uint photon_count = map_length();
     uint slice_begin = slice * GATHER_SLICE;
     uint slice_end = slice_begin + GATHER_SLICE;
@@ -70,7 +78,7 @@ void gather_photons()
                 vec3 position = uintBitsToFloat(words.xyz);
                 precise vec3 way = position - point.position;
                 precise float distance_squared = way.x * way.x + way.y * way.y + way.z * way.z;
-                if (distance_squared <= push.radius * push.radius && cell_at(position, push.cells).yz == ivec2(y, z)) {
+                if (distance_squared <= radius * radius && cell_at(position, push.cells).yz == ivec2(y, z)) {
                     uvec4 light = sorted_map[2 * place + 1];
                     // Most photons lie in the point's plane: nothing of theirs is to be unpacked but their flux.
                     bool is_alike = words.w == point.plane;
@@ -80,7 +88,7 @@ void gather_photons()
                         photon_normal = plane_normal(words.w);
                         height = plane_height(words.w, point.position);
                     }
-                    bool counts = (is_alike || belongs(normal, photon_normal, height, push.radius))
+                    bool counts = (is_alike || belongs(normal, photon_normal, height, radius))
                                   && ((point.arrivals >> (light.w >> 30)) & 1u) != 0;
                     vec3 wi = ns;
                     float cosine = 1.0;
@@ -92,7 +100,7 @@ void gather_photons()
                         float weight = lobe_weight(point.surface, point.exponent, ns, wo, wi);
                         if (KERNEL != KERNEL_BOX) {
                             float height_squared = height * height;
-                            weight *= kernel_weight(clamp(divide(distance_squared - height_squared, push.radius * push.radius - height_squared), 0.0, 1.0));
+                            weight *= kernel_weight(clamp(divide(distance_squared - height_squared, radius * radius - height_squared), 0.0, 1.0));
                         }
                         if (HAS_SMOOTH_NORMALS) {
                             weight *= is_flat ? 1.0 : shading_gain(cosine, dot(wi, photon_normal));

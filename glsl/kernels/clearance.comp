@@ -1,6 +1,6 @@
-// How far it is from each visible point, along its surface, to what stands on it or ends it: the median of 8 directions. A
-// density estimate of a larger radius would look past walls and over edges.
-// Dispatched by src/engine/scene/trial.rs once, before a run. One thread = one visible point.
+// How far it is from each visible point, along its surface, to what stands on it or ends it, in the direction of a rank among 8.
+// A density estimate of a larger radius would look past walls and over edges.
+// Dispatched by src/engine/scene/trial.rs once, before a run, and by radius_class.rs once, in its first round. One thread = one visible point.
 #extension GL_EXT_control_flow_attributes : require
 #include "records.glsl"
 
@@ -22,8 +22,8 @@ const float RISE = 0.1;
 
 void main()
 {
-    uint index = invocation_index();
-    if (index >= push.point_count) {
+    uint index = push.first_point + invocation_index();
+    if (index >= push.end_point) {
         return;
     }
     VisiblePoint point = visible_points[index];
@@ -45,5 +45,5 @@ void main()
         }
         distances[place] = distance;
     }
-    clearances[index] = distances[4];
+    clearances[index] = distances[push.rank];
 }

@@ -19,6 +19,7 @@ layout(set = 1, binding = 2, scalar) buffer Estimates { uvec2 estimates[]; };
 #include "material/surface.glsl"
 #include "gather/belongs.glsl"
 #include "gather/cover.glsl"
+#include "gather/radius_class.glsl"
 #include "film/wide.glsl"
 #include "world/scene/film_units.glsl"
 #include "world/scene/tiles.glsl"
@@ -100,15 +101,19 @@ void main()
             note_hit(pixel, kind);
         }
         float area = is_caustic ? 0.0 : global_area;
+        float widest = is_caustic ? push.caustic_radius : push.global_radius;
         if (area == 0.0) {
-            area = estimate_area(point, pixel, is_caustic ? push.caustic_radius : push.global_radius);
+            float radius = widest;
+            if (HAS_RADIUS_CLASSES) {
+                radius = radius_of_class(widest, radius_class(place, is_caustic ? CAUSTIC_CLASS : GLOBAL_CLASS));
+            }
+            area = estimate_area(point, pixel, radius);
         }
         global_area = is_caustic ? global_area : area;
         float for_all = !is_caustic && (point.arrivals & SEEN_FOR_ALL) != 0 ? float(SAMPLES) : 1.0;
         float density = divide(is_caustic ? push.caustic_flux : push.global_flux, area);
         if (flux == vec3(0.0)) {
-            float radius = is_caustic ? push.caustic_radius : push.global_radius;
-            note_miss(pixel, kind, for_all * point.weight * (density * radius * radius));
+            note_miss(pixel, kind, for_all * point.weight * (density * widest * widest));
             continue;
         }
         vec3 radiance = for_all * point.weight * (flux * density);

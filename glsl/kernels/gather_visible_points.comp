@@ -21,6 +21,7 @@ layout(push_constant, scalar) uniform Push { SceneGatherPush push; };
 #include "world/scene/rounding.glsl"
 #include "world/scene/tiles.glsl"
 #include "gather/bucket_rows.glsl"
+#include "gather/radius_class.glsl"
 #include "gather/visible_points.glsl"
 
 void main()

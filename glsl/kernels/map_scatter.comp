@@ -20,7 +20,7 @@ layout(constant_id = 5) const bool HAS_SLOTS = false;
 void main()
 {
     // Behind the last bucket stands the number of all photons.
-    if (invocation_index() == 0) {
+    if (invocation_index() == 0 && push.counts_stored != 0) {
         uint stored = cells[push.bucket_mask + 1];
         if (totals[TOTAL_STORED] > 0xffffffffu - stored) {
             totals[TOTAL_STORED + 1]++;

@@ -39,7 +39,7 @@ void main()
         uint arrivals = arrivals_wanted(chain, gathers);
         vec3 on_plane = receiver.position - plane_height(plane, receiver.position) * planes[plane >> 1].xyz;
         chain.points[chain.point_count++] =
-            VisiblePoint(on_plane, plane, vec3(1.0), ns == ng ? NONE : pack_normal(ns), 0, 0.0, SURFACE_RECEIVER, arrivals);
+            VisiblePoint(on_plane, plane, vec3(1.0), ns == ng ? NONE : pack_normal(ns), 0, 0.0, SURFACE_RECEIVER, arrivals | SEEN);
     }
     if (gathers) {
         // Irradiance is pi times the radiance that arrives from cosine-weighted directions.

@@ -113,6 +113,20 @@ pub fn radius_warning(plan: &ScenePlan, geometry: &Geometry, point: &str) -> Opt
     ))
 }
 
+/// One line on radii that differ from point to point.
+fn radii(lit: &RunResult) -> Option<String> {
+    let in_words = |map: &MapPlan| {
+        let (classes, (first, last)) = (map.classes?, lit.film.classes(map)?);
+        let times = |class: u32| match class.checked_sub(classes.usual) {
+            None | Some(0) => (1u32 << (classes.usual - class)).to_string(),
+            Some(halvings) => format!("1/{}", 1u32 << halvings),
+        };
+        (first != last).then(|| format!("{} to {} times the first radius ({})", times(last), times(first), map.name))
+    };
+    let maps: Vec<String> = lit.plan.maps().filter_map(in_words).collect();
+    (!maps.is_empty()).then(|| format!("radii by the density of photons: {}", maps.join(", ")))
+}
+
 /// The JSON report of a run.
 #[derive(Serialize)]
 struct Report<'a> {
@@ -121,7 +135,7 @@ struct Report<'a> {
     common: Common<'a, SceneSettings>,
     plan: PlanReport<'a>,
     ledgers: Ledgers,
-    film: FilmReport,
+    film: FilmReport<'a>,
 }
 
 /// Of the photons of each map.
@@ -133,11 +147,14 @@ struct Ledgers {
 
 /// What the film could not add as it was, but for `losses`.
 #[derive(Serialize)]
-struct FilmReport {
+struct FilmReport<'a> {
     /// Counted as 0.
     nonfinite_values: u32,
     /// Estimates that cover too many triangles for an edge correction.
     uncorrected_estimates: u32,
+    /// Visible points of each class of radii, of which class 0 has the largest and each has half of the one before: of the global
+    /// map, then of the caustic map. Of the maps' `classes` the usual one has the map's `radius`.
+    radius_classes: [&'a [u32]; 2],
 }
 
 #[derive(Serialize)]
@@ -175,7 +192,11 @@ pub fn json(scene: &str, lit: &RunResult) -> Vec<u8> {
         common: common(lit, &plan.settings, &error, confidence, ""),
         plan: plan_report(plan, Some((timings, &film.part_totals))),
         ledgers: Ledgers { global: fates[0].ledger(), caustic: fates[1].ledger() },
-        film: FilmReport { nonfinite_values: film.anomalies[0], uncorrected_estimates: film.anomalies[2] },
+        film: FilmReport {
+            nonfinite_values: film.anomalies[0],
+            uncorrected_estimates: film.anomalies[2],
+            radius_classes: film.class_counts.split_at(film.class_counts.len() / 2).into(),
+        },
     };
     serde_json::to_vec_pretty(&report).expect("a report is plain data")
 }
@@ -215,6 +236,9 @@ pub fn text(scene: &str, lit: &RunResult, point: &str, explain: bool) -> String 
         if let Some(open) = fates.totals.map(|totals| totals.interrupted).filter(|open| *open > 0) {
             writeln!(text, "        {open} of those cut off were under way when the run ended, in a round that does not count").unwrap();
         }
+    }
+    if let Some(line) = radii(lit) {
+        writeln!(text, "{line}").unwrap();
     }
     text.push_str(&losses(&lit.losses, settings.bounces));
     if lit.film.anomalies[0] > 0 {

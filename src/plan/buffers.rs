@@ -7,7 +7,8 @@ use super::RoomPlan;
 use super::scene::{MapPlan, ScenePlan};
 use super::sensor::Sensor;
 use crate::constants::{
-    FACE_COUNT, HIT_KINDS, MAX_NONFINITE_VALUES, NONFINITE_ESTIMATE, PART_COUNT, SCAN_ITEMS, TALLY_COPIES, TOTAL_WORDS, TREE_LEAF, TREE_RUN,
+    FACE_COUNT, HIT_KINDS, MAX_NONFINITE_VALUES, NONFINITE_ESTIMATE, PART_COUNT, RADIUS_CLASSES, SCAN_ITEMS, TALLY_COPIES, TOTAL_WORDS,
+    TREE_LEAF, TREE_RUN,
 };
 use crate::path::StoredPath;
 use crate::photon::{MapPhoton, Origin, StoredPhoton};
@@ -212,6 +213,12 @@ impl ScenePlan {
             buffer::<VisiblePoint>("visible points", points, "where photons are looked up"),
             buffer::<u64>("estimates", 3 * points * u64::from(self.arrival_sets), "what photons add there"),
         ];
+        let classed = if self.has_classes() { points } else { 0 };
+        buffers.extend([
+            buffer::<u32>("radius classes", classed, "which radius each visible point has"),
+            buffer::<f32>("clearances", classed, "how far it is from there to the next wall or edge"),
+            buffer::<u32>("class counts", 2 * u64::from(RADIUS_CLASSES), "visible points of each class"),
+        ]);
         let camera_paths = buffer::<CameraPath>("camera paths", self.camera_path_capacity(), "paths that one dispatch leaves");
         buffers.extend([camera_paths; 2]);
         if let Sensor::Receivers { count } = self.sensor {
@@ -224,7 +231,10 @@ impl ScenePlan {
     fn photon_buffers(&self) -> Vec<PlannedBuffer> {
         let Some(counters) = self.maps().map(MapPlan::counter_count).max() else { return Vec::new() };
         let most = |size: fn(&MapPlan) -> u32| self.maps().map(size).max().map_or(0, u64::from);
-        let (paths, capacity, buckets) = (most(|map| map.path_array_length), most(|map| map.capacity), most(|map| map.bucket_count));
+        let (paths, buckets) = (most(|map| map.path_array_length), most(|map| map.bucket_count));
+        // In the first round the map holds the trial's photons first.
+        let of_trial = self.trial.iter().flat_map(|trial| &trial.photons).map(|photons| photons.kept.len() as u64).max();
+        let capacity = most(|map| map.capacity).max(of_trial.unwrap_or(0));
         let tallies = u64::from(self.tally_rows() * TALLY_COPIES);
         let totals = u64::from(TOTAL_WORDS * TALLY_COPIES);
         let mut buffers = vec![

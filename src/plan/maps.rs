@@ -83,7 +83,7 @@ fn map(
     } else {
         ("global", DOMAIN_PHOTONS, settings.photons, ("--radius", settings.radius))
     };
-    let FirstRadius { radius, from, expected } = FirstRadius::new(geometry, photons, caustic_only, radius, trial)?;
+    let FirstRadius { radius, from, expected, classes } = FirstRadius::new(geometry, photons, caustic_only, radius, trial)?;
     // Photons of a round land once at every bounce at most; a caustic's only once.
     let landings = if caustic_only { 1 } else { u64::from(settings.bounces.min(SEGMENT_BOUNCES)) };
     let chunk_photons = chunk_photons(photons, landings, settings, limits)?;
@@ -111,6 +111,7 @@ fn map(
         bucket_count: chunk_photons.clamp(1 << 10, 1 << 24).next_power_of_two(),
         radius,
         radius_from: from,
+        classes,
         lanes: capacity::lanes_of(expected / FOUND_BY_LANE, limits),
         target_count: 0,
         flux_gain: 1.0,

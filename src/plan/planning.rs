@@ -68,7 +68,7 @@ impl ScenePlan {
         let mut plan = ScenePlan {
             settings,
             sensor,
-            trial: None,
+            trial,
             decisions,
             constants,
             global,
@@ -88,7 +88,6 @@ impl ScenePlan {
         plan.set_film(geometry);
         plan.check_sizes(geometry, limits)?;
         plan.decisions = plan.decisions.iter().map(|decision| plan.given(decision, geometry)).collect();
-        plan.trial = trial;
         plan.planned_in = began.elapsed();
         Ok(plan)
     }
@@ -217,5 +216,6 @@ fn constants(
         ("HAS_SPECULAR_CHAINS", flag(Effect::SpecularChains)),
         ("HAS_SLOTS", u32::from(settings.builder == Some(Builder::Naive))),
         ("HAS_AIMED_PHOTONS", u32::from(!maps.targets.is_empty())),
+        ("HAS_RADIUS_CLASSES", u32::from(maps.global.iter().chain(&maps.caustic).any(|map| map.classes.is_some()))),
     ]
 }

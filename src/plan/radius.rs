@@ -2,11 +2,15 @@
 //! round to round.
 
 use std::f64::consts::PI;
+use std::sync::Arc;
 
 use serde::Serialize;
 use statrs::function::gamma::ln_gamma;
 
+use crate::constants::{LEAST_RADIUS_BITS, LOOP_LIMIT, RADIUS_CLASSES};
 use crate::error::{Result, require};
+use crate::photon::MapPhoton;
+use crate::rng::mix32;
 use crate::scene::geometry::Geometry;
 
 /// Where the radius of a map's first round comes from.
@@ -24,9 +28,15 @@ pub enum RadiusFrom {
 /// What a trial round found.
 #[derive(Debug, Clone, Default, PartialEq, Serialize)]
 pub struct Trial {
-    /// Radii of the first round, normalised; `None` where the map has none, or its radius is given.
+    /// Radii of the first round at the median point, normalised; `None` where the map has none, or its radius is given.
     pub global_radius: Option<f64>,
     pub caustic_radius: Option<f64>,
+    /// Its photons, of the global and of the caustic map: their density around a point tells the radius there.
+    #[serde(skip)]
+    pub photons: [TrialPhotons; 2],
+    /// What the run multiplies all radii by.
+    #[serde(skip)]
+    pub factor: Option<f64>,
     /// Points that were asked, some of those that the run asks about.
     pub points: u32,
     /// Share of them that lie in something smaller than the radius: whose way along the surface to the next wall or edge
@@ -35,8 +45,32 @@ pub struct Trial {
     pub seconds: f64,
 }
 
+/// Photons of a trial, no more than a loop of a kernel may take.
+#[derive(Debug, Clone, Default, PartialEq)]
+pub struct TrialPhotons {
+    pub kept: Arc<Vec<MapPhoton>>,
+    /// How many of all were kept.
+    pub share: f64,
+}
+
+impl TrialPhotons {
+    /// Those whose positions have the least hashes: the same ones whatever order they come in.
+    pub fn some_of(mut photons: Vec<MapPhoton>) -> TrialPhotons {
+        let all = photons.len();
+        let hash = |photon: &MapPhoton| {
+            let [x, y, z] = photon.position.to_array().map(f32::to_bits);
+            (mix32(x.wrapping_add(mix32(y.wrapping_add(mix32(z.wrapping_add(photon.plane)))))), x, y, z)
+        };
+        photons.sort_unstable_by_key(hash);
+        photons.truncate(LOOP_LIMIT as usize);
+        TrialPhotons { share: photons.len() as f64 / all.max(1) as f64, kept: Arc::new(photons) }
+    }
+}
+
 /// Radii relative to the scene's normalised extent: from f32's resolution of positions up to all of it.
-pub const RADIUS_RANGE: (f64, f64) = (1.0 / 32_768.0, 2.0);
+pub const RADIUS_RANGE: (f64, f64) = (1.0 / (1 << LEAST_RADIUS_BITS) as f64, 2.0);
+/// How often the median point's radius may double where photons are rare, as long as it does not exceed that by the scene's area.
+const MOST_DOUBLINGS: u32 = 3;
 /// Largest radius that is taken by default, relative to the scene's normalised extent.
 pub const MAX_DEFAULT_RADIUS: f64 = 0.125;
 /// Photons within the first radius of the global map, on average.
@@ -52,6 +86,29 @@ pub(super) struct FirstRadius {
     pub(super) from: RadiusFrom,
     /// Photons of a round that it holds, on average.
     pub(super) expected: f64,
+    pub(super) classes: Option<Classes>,
+}
+
+/// Radii that differ from point to point: each class has half the radius of the one before it.
+#[derive(Debug, Clone, Copy, PartialEq, Eq, Serialize)]
+pub struct Classes {
+    pub count: u32,
+    /// That of the median point.
+    pub usual: u32,
+}
+
+impl Classes {
+    /// From up to 8 times `radius` to the least that is allowed.
+    fn around(radius: f64, by_area: f64) -> Classes {
+        let usual = (by_area / radius).log2().floor().clamp(0.0, f64::from(MOST_DOUBLINGS)) as u32;
+        let smaller = (radius / RADIUS_RANGE.0).log2().floor().max(0.0) as u32;
+        Classes { count: (usual + 1 + smaller).min(RADIUS_CLASSES), usual }
+    }
+
+    /// How much larger the radius of class 0 is than the usual one.
+    pub fn widest(self) -> f64 {
+        f64::from(1 << self.usual)
+    }
 }
 
 impl FirstRadius {
@@ -69,16 +126,20 @@ impl FirstRadius {
             PHOTONS_PER_ESTIMATE * (radius / usual).powi(2)
         };
         let Some(metres) = asked else {
-            let radius = tried.unwrap_or_else(|| area_radius(geometry, photons, caustic_only));
+            let of_area = area_radius(geometry, photons, caustic_only);
             return Ok(match tried {
-                Some(_) => FirstRadius { radius, from: RadiusFrom::Trial, expected: PHOTONS_PER_ESTIMATE },
-                None => FirstRadius { radius, from: RadiusFrom::Area, expected: by_area(radius) },
+                Some(tried) => {
+                    let radius = tried * trial.and_then(|trial| trial.factor).unwrap_or(1.0);
+                    let classes = Some(Classes::around(tried, of_area));
+                    FirstRadius { radius, from: RadiusFrom::Trial, expected: PHOTONS_PER_ESTIMATE, classes }
+                }
+                None => FirstRadius { radius: of_area, from: RadiusFrom::Area, expected: by_area(of_area), classes: None },
             });
         };
         let (least, most) = (RADIUS_RANGE.0 * geometry.unit, RADIUS_RANGE.1 * geometry.unit);
         require((least..=most).contains(&metres), option, metres, format!("must be from {least:e} to {most} metres in this scene"))?;
         let radius = metres / geometry.unit;
-        Ok(FirstRadius { radius, from: RadiusFrom::User, expected: by_area(radius) })
+        Ok(FirstRadius { radius, from: RadiusFrom::User, expected: by_area(radius), classes: None })
     }
 }
 

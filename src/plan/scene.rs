@@ -6,7 +6,7 @@ use serde::Serialize;
 
 use super::capacity::Persistence;
 use super::evidence::EffectDecision;
-use super::radius::{self, RADIUS_RANGE, RadiusFrom, Trial};
+use super::radius::{self, Classes, RADIUS_RANGE, RadiusFrom, Trial};
 use super::sensor::Sensor;
 use crate::constants::*;
 use crate::records::*;
@@ -38,9 +38,11 @@ pub struct MapPlan {
     /// Photons end where they scatter.
     pub caustic_only: bool,
     pub bucket_count: u32,
-    /// Of the first round, normalised.
+    /// Of the first round, normalised; where it differs from point to point, that of the median one.
     pub radius: f64,
     pub radius_from: RadiusFrom,
+    /// `None` where all points have the same radius.
+    pub classes: Option<Classes>,
     /// Invocations that share the candidates of a visible point.
     pub lanes: u32,
     /// Spheres that its photons are aimed at; 0: they leave their lights in all directions.
@@ -155,6 +157,16 @@ impl ScenePlan {
             }
         }
         plan
+    }
+
+    /// Whether radii differ from point to point.
+    pub fn has_classes(&self) -> bool {
+        self.maps().any(|map| map.classes.is_some())
+    }
+
+    /// Radius of class 0 in a round, normalised; of all points where there are no classes.
+    pub fn widest_radius(&self, map: &MapPlan, round: u32) -> f64 {
+        radius::of_round(map.radius * map.classes.map_or(1.0, Classes::widest), self.settings.alpha, round)
     }
 
     /// Radius of a map in a round, normalised: r_(i+1)^2 = r_i^2 (i + alpha) / (i + 1) with i from 1

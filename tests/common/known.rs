@@ -4,8 +4,10 @@
 use std::f64::consts::FRAC_PI_3;
 
 use super::estimate_check;
+use super::lit::light;
 use super::prelude::*;
-use photonmill::engine::scene::RunResult;
+use crate::unknown::room_without_floor;
+use photonmill::engine::scene::{RunResult, Target, View, trial};
 
 /// The red channel of a point or pixel, sure to three parts in a hundred and right to its error.
 fn check_mean(what: &str, lit: &RunResult, place: usize, expected: f64, tolerance: f64) -> Check<Complaint> {
@@ -329,4 +331,43 @@ pub fn glass_in_a_furnace(gpu: &Gpu, samples: u32, final_gather: bool) -> Check<
     println!("{samples} samples, gather {final_gather}: {} +- {error}, {expected} expected", mean_red(&lit));
     assert!(error < 0.005 * expected, "{error}");
     estimate_check("a furnace with glass", mean_red(&lit), expected, error.max(0.003 * expected))
+}
+
+/// A room and a hall of its shape, 50 times as large, each with a lamp of as much power, and points on their floors.
+fn hall_and_room() -> (Scene, [Vec<(DVec3, DVec3)>; 2]) {
+    let mut scene = scene_of(Vec::new(), vec![matt(0.5), shining(0.0), shining(0.0)], vec![]);
+    scene.materials[2].emission *= 2500.0;
+    let places = [-1.6, -0.5, 0.7, 1.8].iter().flat_map(|x| [-1.9, -0.8, 0.9, 1.4].map(|z| DVec3::new(*x, 0.0, z)));
+    let points = [(50.0, DVec3::ZERO, 1), (1.0, DVec3::new(150.0, 0.0, 0.0), 2)].map(|(scale, way, lamp)| {
+        let mut meshes = room_without_floor(0.0);
+        meshes.extend([level(0.0, [4.0, 4.0], true, 0), level(2.9, [1.0, 1.0], false, lamp)]);
+        meshes.iter_mut().flat_map(|mesh| &mut mesh.positions).for_each(|at| *at = *at * scale + way);
+        scene.meshes.extend(meshes);
+        places.clone().map(|at| (at * scale + way, DVec3::Y)).collect()
+    });
+    (scene, points)
+}
+
+/// All light of the photon map, point by point in the room and in the hall, of whose points four times as many are asked: by radii
+/// that follow the density of photons, or by that of the median point. The light is the same but for a factor.
+pub fn room_beside_a_hall(gpu: &Gpu, by_density: bool) -> Check<Complaint> {
+    let (scene, [hall, room]) = hall_and_room();
+    let points = [vec![hall.clone(); 4].concat(), room.clone()].concat();
+    let geometry = Geometry::new(&scene).unwrap();
+    let target = Target::Points(&points);
+    let view = View { geometry: &geometry, camera: None, phases: &target.phases(&geometry) };
+    let settings = SceneSettings { photons: 1 << 15, rounds: 48, illumination: Illumination::Photons, ..SceneSettings::default() };
+    let mut plan = trial::plan(gpu, &scene, &view, &settings, target.sensor())?;
+    if !by_density {
+        plan.global.as_mut().expect("photons are asked for").classes = None;
+        plan.constants.iter_mut().filter(|(name, _)| *name == "HAS_RADIUS_CLASSES").for_each(|(_, value)| *value = 0);
+    }
+    let lit = light(gpu, &view, plan);
+    let mean = |point: usize| lit.film.mean(point, &lit.plan).x;
+    let ratios: Vec<f64> = (0..room.len()).map(|point| mean(4 * hall.len() + point) / mean(point) / 2500.0).collect();
+    let count = ratios.len() as f64;
+    let (ratio, deviation) = (ratios.iter().sum::<f64>() / count, (ratios.iter().map(|r| (r - 1.0).powi(2)).sum::<f64>() / count).sqrt());
+    println!("{ratio:.4} of the hall's light, off by {deviation:.4} at a point");
+    estimate_check("the room", ratio, 1.0, 0.02)?;
+    estimate_check("a point's deviation", deviation, 0.0, 0.025)
 }

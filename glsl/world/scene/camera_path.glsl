@@ -133,8 +133,8 @@ bool follow(inout Chain chain, uint index, uint number, Draws draws, uint emitte
                 for_others = ARRIVED_CAUSTIC;
             }
             arrivals = leads ? arrivals : arrivals & for_others;
-            arrivals |= arrivals == 0 ? 0
-                                      : (chain.saw_specular ? SEEN_OVER_SPECULAR : 0) | (chain.gathers ? SEEN_BY_GATHER : 0)
+            arrivals |= arrivals == 0 ? SEEN
+                                      : SEEN | (chain.saw_specular ? SEEN_OVER_SPECULAR : 0) | (chain.gathers ? SEEN_BY_GATHER : 0)
                                             | (for_all ? SEEN_FOR_ALL : 0);
             chain.points[chain.point_count++] = VisiblePoint(surface.position, surface.plane, divide(chain.weight * scale, float(SAMPLES)),
                                                              surface.ns == surface.ng ? NONE : pack_normal(surface.ns), pack_direction(wo, 0), surface.parameter,

@@ -36,3 +36,5 @@ layout(constant_id = 27) const uint PARTS = 15;
 layout(constant_id = 28) const uint FILTER = FILTER_BOX;
 layout(constant_id = 29) const bool HAS_SPECULAR_CHAINS = true;
 layout(constant_id = 40) const bool HAS_AIMED_PHOTONS = true;
+// Radii differ from point to point.
+layout(constant_id = 48) const bool HAS_RADIUS_CLASSES = false;

@@ -8,7 +8,7 @@ use crate::engine::bias::{Batch, Batches, Bias};
 use crate::engine::{Control, End};
 use crate::error::Result;
 use crate::gpu::Gpu;
-use crate::plan::radius::RADIUS_RANGE;
+use crate::plan::radius::{RADIUS_RANGE, RadiusFrom, Trial};
 use crate::plan::scene::{MapPlan, ScenePlan};
 use crate::scene::Scene;
 use crate::settings::ROOM_BELOW;
@@ -46,17 +46,19 @@ pub fn batch(
     &Batch { factor, rounds, seed, stop }: &Batch,
     control: &mut Control,
 ) -> Result<(End, Vec<f64>)> {
-    let metres = |map: &MapPlan| factor * map.radius * view.geometry.unit;
+    let given = |map: &MapPlan| (map.radius_from != RadiusFrom::Trial).then(|| factor * map.radius * view.geometry.unit);
     let settings = SceneSettings {
         rounds,
         alpha: 1.0,
         seed,
-        radius: plan.global.as_ref().map(metres),
-        caustic_radius: plan.caustic.as_ref().map(metres),
+        radius: plan.global.as_ref().and_then(given),
+        caustic_radius: plan.caustic.as_ref().and_then(given),
         stop,
         ..plan.settings.clone()
     };
-    let plan = ScenePlan::new(scene, view.geometry, &settings, plan.sensor, &engine::limits(gpu.facts()))?;
+    // Radii of the trial's keep their classes.
+    let trial = plan.trial.as_ref().map(|trial| Trial { factor: Some(factor), ..trial.clone() });
+    let plan = ScenePlan::with_trial(scene, view.geometry, &settings, plan.sensor, &engine::limits(gpu.facts()), trial)?;
     let lit = light(gpu, view, plan, control)?;
     Ok((lit.end, lit.film.values(&lit.plan)))
 }

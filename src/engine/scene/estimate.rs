@@ -1,7 +1,10 @@
 //! Density estimates from the maps at the visible points, and the film at the end of a round.
 
+use std::ops::Range;
+
 use super::Round;
 use super::points::{add_work, rounding, runs};
+use super::radius_class::map_class;
 use super::resources::{PhotonBuffers, SceneResources};
 use crate::constants::MAX_GROUPS;
 use crate::error::Result;
@@ -10,24 +13,49 @@ use crate::gpu::{Commands, Extent};
 use crate::plan::scene::{MapPlan, TESTS_PER_POINT};
 use crate::records::{CellPush, CrowdSizePush, FluxToRadiancePush, ResolvePush, SceneGatherPush};
 
-/// Adds a chunk of a map to the estimates of all visible points.
-pub fn gather(commands: &mut Commands, round: Round, photons: &PhotonBuffers, map: &MapPlan, cells_push: CellPush) -> Result<()> {
+/// Adds a chunk of a map to the estimates of all visible points whose class this grid serves, all where radii have no classes.
+pub fn gather(
+    commands: &mut Commands,
+    round: Round,
+    photons: &PhotonBuffers,
+    map: &MapPlan,
+    classes: Range<u32>,
+    cells_push: CellPush,
+) -> Result<()> {
     let Round { resources, plan, number: round, .. } = round;
     let PhotonBuffers { cells, sorted_map, crowded, dispatch_args, .. } = photons;
-    let SceneResources { scene, visible_points, estimates, nonfinite_values, .. } = resources;
+    let SceneResources { scene, visible_points, estimates, radius_classes, nonfinite_values, .. } = resources;
     let point_count = plan.visible_points();
     let (lanes, step) = (map.lanes, plan.points_at_once());
     let (width, height) = plan.sensor.size();
     let dispatch = |commands: &mut Commands, push: &SceneGatherPush, extent: Extent| {
         if commands.facts().int64_atomics {
             commands.dispatch(
-                GatherVisiblePointsU64 { scene, visible_points, film: estimates, cells, sorted_map, crowded, nonfinite_values },
+                GatherVisiblePointsU64 {
+                    scene,
+                    visible_points,
+                    film: estimates,
+                    cells,
+                    sorted_map,
+                    crowded,
+                    radius_classes,
+                    nonfinite_values,
+                },
                 push,
                 extent,
             )
         } else {
             commands.dispatch(
-                GatherVisiblePointsTwoWords { scene, visible_points, film: estimates, cells, sorted_map, crowded, nonfinite_values },
+                GatherVisiblePointsTwoWords {
+                    scene,
+                    visible_points,
+                    film: estimates,
+                    cells,
+                    sorted_map,
+                    crowded,
+                    radius_classes,
+                    nonfinite_values,
+                },
                 push,
                 extent,
             )
@@ -46,7 +74,10 @@ pub fn gather(commands: &mut Commands, round: Round, photons: &PhotonBuffers, ma
             height,
             first_slice: 0,
             lanes,
-            radius: plan.radius(map, round) as f32,
+            radius: plan.widest_radius(map, round) as f32,
+            map_class: map_class(map),
+            first_class: classes.start,
+            end_class: classes.end,
             cells: cells_push,
         };
         commands.fill(crowded, 0, 2, 0);
@@ -63,8 +94,9 @@ pub fn gather(commands: &mut Commands, round: Round, photons: &PhotonBuffers, ma
 /// Turns what the maps found at all visible points into light; so many photons of the global and of the caustic map were traced.
 pub fn flux_to_radiance(commands: &mut Commands, round: Round, traced: [u32; 2]) -> Result<()> {
     let Round { resources, geometry, plan, number: round } = round;
-    let SceneResources { scene, visible_points, estimates, one_hits, part_totals, anomalies, nonfinite_values, .. } = resources;
-    let radius = |map: &Option<MapPlan>| map.as_ref().map_or(1.0, |map| plan.radius(map, round)) as f32;
+    let SceneResources { scene, visible_points, estimates, radius_classes, one_hits, part_totals, anomalies, nonfinite_values, .. } =
+        resources;
+    let radius = |map: &Option<MapPlan>| map.as_ref().map_or(1.0, |map| plan.widest_radius(map, round)) as f32;
     let flux =
         |map: &Option<MapPlan>| map.as_ref().map_or(0.0, |map| map.photon_flux_of(geometry, traced[usize::from(map.caustic_only)])) as f32;
     let (width, height) = plan.sensor.size();
@@ -86,7 +118,8 @@ pub fn flux_to_radiance(commands: &mut Commands, round: Round, traced: [u32; 2])
             global_flux: flux(&plan.global),
             caustic_flux: flux(&plan.caustic),
         };
-        let kernel = FluxToRadiance { scene, anomalies, visible_points, estimates, one_hits, part_totals, nonfinite_values };
+        let kernel =
+            FluxToRadiance { scene, anomalies, visible_points, estimates, radius_classes, one_hits, part_totals, nonfinite_values };
         commands.dispatch(kernel, &push, Extent::Items(u64::from(end_point - first_point)))?;
         add_work(commands, plan, 256 * u64::from(end_point - first_point))?;
     }

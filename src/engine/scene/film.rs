@@ -4,7 +4,7 @@ use std::ops::Deref;
 
 use glam::DVec3;
 
-use crate::constants::{HIT_CAUSTIC_PHOTON, HIT_GLOBAL_PHOTON, HIT_KINDS, HIT_SHADOW_RAY};
+use crate::constants::{HIT_CAUSTIC_PHOTON, HIT_GLOBAL_PHOTON, HIT_KINDS, HIT_SHADOW_RAY, RADIUS_CLASSES};
 use crate::engine::error_bound::FilmError;
 use crate::engine::film::RoundSums;
 use crate::engine::unknown::{Unknown, most_hits};
@@ -29,6 +29,8 @@ pub struct SceneFilm {
     /// Values that were no number, values clamped to the film's largest, estimates on a mesh too dense for the area within the
     /// radius to be found, camera paths that were cut off; then what was clamped and what was cut off, 64 bits each.
     pub anomalies: [u32; ANOMALY_WORDS],
+    /// Visible points of each class of radii in the first round: of the global map, then of the caustic map.
+    pub class_counts: Vec<u32>,
 }
 
 /// Films are equal that hold the same light, whatever else was asked for and not found.
@@ -55,6 +57,14 @@ impl SceneFilm {
     pub fn mean(&self, pixel: usize, plan: &ScenePlan) -> DVec3 {
         let unit = plan.film_scale * f64::from(self.rounds.max(1));
         DVec3::from_array([0, 1, 2].map(|channel| self.sums[3 * pixel + channel] as f64 / unit))
+    }
+
+    /// The first and the last class that a point of this map has.
+    pub fn classes(&self, map: &MapPlan) -> Option<(u32, u32)> {
+        let first = if map.caustic_only { RADIUS_CLASSES as usize } else { 0 };
+        let counts = self.class_counts.get(first..first + RADIUS_CLASSES as usize)?;
+        let is_used = |count: &u32| *count > 0;
+        Some((counts.iter().position(is_used)? as u32, counts.iter().rposition(is_used)? as u32))
     }
 
     /// Of every pixel.
@@ -108,7 +118,7 @@ impl SceneFilm {
     pub fn unknown(&self, plan: &ScenePlan, confidence: f64) -> Unknown {
         // Rounds with larger discs would have had more hits.
         let shrunk = mean_squared_radius(plan.settings.alpha, self.rounds);
-        let per_disc = |map: &Option<MapPlan>| map.as_ref().map_or(0.0, |map| 1.0 / (map.radius * map.radius * shrunk));
+        let per_disc = |map: &Option<MapPlan>| map.as_ref().map_or(0.0, |map| 1.0 / (plan.widest_radius(map, 0).powi(2) * shrunk));
         let mut scales = [most_hits(confidence) / f64::from(self.rounds.max(1)); KINDS.len()];
         scales[HIT_CAUSTIC_PHOTON as usize] *= per_disc(&plan.caustic);
         scales[HIT_GLOBAL_PHOTON as usize] *= per_disc(&plan.global);

@@ -14,14 +14,14 @@ pub fn modules() -> Vec<Module> {
     vec![MapCount::MODULE, MapScatter::MODULE, ScanBlocks::MODULE, ScanAdd::MODULE, DispatchSize::MODULE]
 }
 
-/// The grid of a map in a round: cells as wide as the radius, its corner a little outside of the scene.
-pub fn cells(round: Round, map: &MapPlan) -> CellPush {
-    let radius = round.plan.radius(map, round.number) as f32;
+/// The grid of a map for points of this radius and smaller ones: cells as wide, its corner a little outside of the scene.
+pub fn cells(round: Round, map: &MapPlan, radius: f32) -> CellPush {
     CellPush {
         origin: round.geometry.bounds.0 - 4.0 * radius,
         cells_per_unit: 1.0 / radius,
         bucket_mask: map.bucket_count - 1,
         photon_capacity: map.capacity,
+        counts_stored: 1,
     }
 }
 

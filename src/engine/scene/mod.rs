@@ -19,6 +19,7 @@ pub mod index;
 pub mod losses;
 mod on_gpu;
 pub mod points;
+pub mod radius_class;
 pub mod replay;
 pub mod resources;
 pub mod trace;

@@ -1,13 +1,14 @@
 //! A scene on the GPU.
 
+use std::ops::Range;
 use std::sync::atomic::AtomicBool;
 use std::time::{Duration, Instant};
 
 use super::film::SceneFilm;
 use super::losses::losses;
 use super::resources::{PhotonBuffers, SceneResources};
-use super::{Round, RunResult, View, estimate, index, points, trace};
-use crate::constants::{HIT_KINDS, PART_COUNT, TALLY_COPIES};
+use super::{Round, RunResult, View, estimate, index, points, radius_class, trace};
+use crate::constants::{HIT_KINDS, PART_COUNT, RADIUS_CLASSES, TALLY_COPIES};
 use crate::engine::error_bound::FilmError;
 use crate::engine::film::{RoundSums, wide};
 use crate::engine::nonfinite_values::NonfiniteValues;
@@ -20,6 +21,7 @@ use crate::ledger::{Fates, Losses};
 use crate::plan::buffers::ANOMALY_WORDS;
 use crate::plan::scene::{MapPlan, ScenePlan};
 use crate::plan::sensor::Sensor;
+use crate::records::CellPush;
 use crate::timings::{Clock, Span};
 
 /// Kernels that the plan needs, and no others. `go_on` is not among them: few camera paths outlast a dispatch, so its pipeline is
@@ -34,6 +36,9 @@ pub fn modules(plan: &ScenePlan, facts: &DeviceFacts) -> Vec<Module> {
         modules.extend([CrowdSize::MODULE, FluxToRadiance::MODULE]);
         modules.extend([trace::modules(plan), index::modules()].concat());
         modules.push(if facts.int64_atomics { GatherVisiblePointsU64::MODULE } else { GatherVisiblePointsTwoWords::MODULE });
+        if plan.has_classes() {
+            modules.extend(radius_class::modules());
+        }
     }
     modules
 }
@@ -43,13 +48,16 @@ pub fn constants(plan: &ScenePlan) -> Constants {
     plan.constants.iter().fold(Constants::new(plan.settings.group_size), |constants, (name, value)| constants.set(name, *value))
 }
 
-/// Timestamps that a round may need.
+/// Timestamps that a round may need, and those that one grid of its maps does.
 const TIMESTAMPS_PER_ROUND: u32 = 64;
+const TIMESTAMPS_PER_GRID: u32 = 32;
 
 struct SceneOnGpu<'a> {
     view: &'a View<'a>,
     plan: &'a ScenePlan,
     resources: SceneResources,
+    /// Grids that the points of the global and of the caustic map need, each by the classes of radii that it serves.
+    grids: [Vec<Range<u32>>; 2],
     cancelled: &'a AtomicBool,
 }
 
@@ -79,7 +87,13 @@ pub fn light(gpu: &Gpu, view: &View, plan: ScenePlan, control: &mut Control) -> 
         // Of the global map and of the caustic map.
         fates: vec![Fates::of_scene(plan.settings.bounces); 2],
     };
-    let world = SceneOnGpu { view, plan: &plan, resources, cancelled: control.cancelled };
+    let world = SceneOnGpu {
+        view,
+        plan: &plan,
+        resources,
+        grids: [vec![0..RADIUS_CLASSES], vec![0..RADIUS_CLASSES]],
+        cancelled: control.cancelled,
+    };
     run::run(world, commands, &plan, task, control)
 }
 
@@ -121,7 +135,7 @@ impl<'a> World for SceneOnGpu<'a> {
     }
 
     fn film(&mut self, commands: &mut Commands<'a>, state: &RunState) -> Result<SceneFilm> {
-        let SceneResources { film_sums, film_squares, one_hits, part_totals, anomalies, .. } = &self.resources;
+        let SceneResources { film_sums, film_squares, one_hits, part_totals, anomalies, class_counts, .. } = &self.resources;
         let pixels = self.plan.sensor.pixels() as usize;
         let sums = commands.read(film_sums, 3 * pixels)?;
         let words = commands.read(film_squares, 6 * pixels)?;
@@ -129,12 +143,14 @@ impl<'a> World for SceneOnGpu<'a> {
         let one_hits = commands.read(one_hits, HIT_KINDS as usize * pixels)?;
         let part_totals = commands.copy_out(part_totals, PART_COUNT as usize)?;
         let anomalies = commands.copy_out(anomalies, ANOMALY_WORDS)?;
+        let class_counts = commands.copy_out(class_counts, 2 * RADIUS_CLASSES as usize)?;
         commands.submit()?;
         Ok(SceneFilm {
             of_rounds: RoundSums { rounds: state.rounds, sums, squares },
             one_hits,
             part_totals: part_totals.take(),
             anomalies: anomalies.take().try_into().expect("so many words were read"),
+            class_counts: class_counts.take(),
         })
     }
 
@@ -153,16 +169,20 @@ impl<'a> World for SceneOnGpu<'a> {
 
 impl SceneOnGpu<'_> {
     /// One round. When its time is up, it takes no further chunk of photons.
-    fn one_round(&self, commands: &mut Commands, deadline: Option<Instant>, state: &mut RunState) -> Result<()> {
-        let SceneOnGpu { view, plan, resources, .. } = self;
+    fn one_round(&mut self, commands: &mut Commands, deadline: Option<Instant>, state: &mut RunState) -> Result<()> {
+        let SceneOnGpu { view, plan, resources, grids, .. } = self;
         let round = Round { resources, geometry: view.geometry, plan, number: state.rounds };
         commands.scope("visible points", |commands| points::see(commands, round, view.camera))?;
         if let Some(photons) = &resources.photons {
             let sums = 3 * u64::from(plan.visible_points()) * u64::from(plan.arrival_sets);
             commands.fill(&resources.estimates, 0, sums, 0);
+            if state.rounds == 0 && plan.has_classes() {
+                *grids = commands.scope("radii", |commands| radius_class::find(commands, round, photons, view))?;
+            }
             let mut traced = [0; 2];
             for map in plan.maps() {
-                let of_map = commands.scope(map.name, |commands| one_map(commands, round, photons, map, deadline, state))?;
+                let in_round = MapInRound { photons, map, grids: &grids[usize::from(map.caustic_only)] };
+                let of_map = commands.scope(map.name, |commands| one_map(commands, round, &in_round, deadline, state))?;
                 traced[usize::from(map.caustic_only)] = of_map;
             }
             commands.scope("flux to radiance", |commands| estimate::flux_to_radiance(commands, round, traced))?;
@@ -177,15 +197,16 @@ impl SceneOnGpu<'_> {
 const FIRST_TIMED_CHUNK: u32 = 1 << 12;
 const TIMED_CHUNK: Duration = Duration::from_millis(40);
 
+/// A map, and the grids that its points need.
+struct MapInRound<'a> {
+    photons: &'a PhotonBuffers,
+    map: &'a MapPlan,
+    grids: &'a [Range<u32>],
+}
+
 /// The photons of a map; says how many. Where the time may be up, chunks grow only as long as they take little of it.
-fn one_map(
-    commands: &mut Commands,
-    round: Round,
-    photons: &PhotonBuffers,
-    map: &MapPlan,
-    deadline: Option<Instant>,
-    state: &mut RunState,
-) -> Result<u32> {
+fn one_map(commands: &mut Commands, round: Round, in_round: &MapInRound, deadline: Option<Instant>, state: &mut RunState) -> Result<u32> {
+    let map = in_round.map;
     let mut traced = 0;
     let mut most = if deadline.is_some() { FIRST_TIMED_CHUNK } else { map.chunk_photons };
     while traced < map.photons {
@@ -195,7 +216,7 @@ fn one_map(
         }
         let count = most.min(map.chunk_photons).min(map.photons - traced);
         state.hand_out(usize::from(map.caustic_only), count);
-        one_chunk(commands, round, photons, map, (traced, count))?;
+        one_chunk(commands, round, in_round, (traced, count))?;
         traced += count;
         if deadline.is_some() {
             commands.submit()?;
@@ -205,13 +226,19 @@ fn one_map(
     Ok(traced)
 }
 
-fn one_chunk(commands: &mut Commands, round: Round, photons: &PhotonBuffers, map: &MapPlan, chunk: (u32, u32)) -> Result<()> {
-    if commands.timestamps_left() < TIMESTAMPS_PER_ROUND || commands.work() >= commands.paced(round.plan.work_per_submission) {
-        commands.submit()?;
-    }
-    let cells = index::cells(round, map);
+/// Points of radii that differ much look photons up in grids of their own.
+fn one_chunk(commands: &mut Commands, round: Round, map: &MapInRound, chunk: (u32, u32)) -> Result<()> {
+    let MapInRound { photons, map, grids } = *map;
     trace::trace(commands, round, photons, map, chunk, &mut |commands| {
-        commands.scope("index", |commands| index::build(commands, round, photons, map, &cells))?;
-        commands.scope("gather", |commands| estimate::gather(commands, round, photons, map, cells))
+        for (grid, classes) in grids.iter().enumerate() {
+            if commands.timestamps_left() < TIMESTAMPS_PER_GRID || commands.work() >= commands.paced(round.plan.work_per_submission) {
+                commands.submit()?;
+            }
+            let radius = radius_class::radius_of_class(round.plan.widest_radius(map, round.number), classes.start);
+            let cells = CellPush { counts_stored: u32::from(grid == 0), ..index::cells(round, map, radius) };
+            commands.scope("index", |commands| index::build(commands, round, photons, map, &cells))?;
+            commands.scope("gather", |commands| estimate::gather(commands, round, photons, map, classes.clone(), cells))?;
+        }
+        Ok(())
     })
 }

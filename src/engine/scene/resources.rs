@@ -38,6 +38,10 @@ buffers! {
         camera_paths: [Buffer<CameraPath>; 2] = planned.several("camera paths")?,
         camera_path_counts: Buffer<u32> = planned.one("camera path counts")?,
         estimates: Buffer<u64> = planned.one("estimates")?,
+        /// Found in the first round.
+        radius_classes: Buffer<u32> = planned.one("radius classes")?,
+        clearances: Buffer<f32> = planned.one("clearances")?,
+        class_counts: Buffer<u32> = planned.zeroed(commands, "class counts")?,
         // All rounds.
         film_sums: Buffer<u64> = planned.zeroed(commands, "film sums")?,
         film_squares: Buffer<u64> = planned.zeroed(commands, "film squares")?,

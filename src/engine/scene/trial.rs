@@ -21,8 +21,8 @@ use crate::gpu::kernels::Clearance;
 use crate::gpu::{Commands, Extent, Gpu, Kernel, Memory};
 use crate::photon::MapPhoton;
 use crate::plan::Limits;
-use crate::plan::radius::{MAX_DEFAULT_RADIUS, RADIUS_RANGE, RadiusFrom, Trial, area_radius};
-use crate::plan::scene::ScenePlan;
+use crate::plan::radius::{MAX_DEFAULT_RADIUS, RADIUS_RANGE, RadiusFrom, Trial, TrialPhotons, area_radius};
+use crate::plan::scene::{MapPlan, ScenePlan};
 use crate::plan::sensor::Sensor;
 use crate::records::{ClearancePush, VisiblePoint};
 use crate::scene::Scene;
@@ -43,10 +43,18 @@ const CAUSTIC_PHOTONS_AT_POINT: f64 = 6.0;
 /// Steps of a radius in a factor of 2.
 const STEPS: f64 = 4.0;
 /// Of the clearance of points: a radius that is no larger reaches round few corners.
-const CLEARANCE_SHARE: f64 = 0.25;
+pub(super) const CLEARANCE_SHARE: f64 = 0.25;
+/// Of 8 directions from a point.
+const MEDIAN: u32 = 4;
 /// Over the radius by the scene's area: points with so few photons about them are not reached by this map's light.
 const REACH: f64 = 4.0;
 const SEED: u64 = 0x7472_6961;
+
+/// Photons of the trial, of which this share was kept, within the radius that holds as many of a round of the run as wanted.
+pub(super) fn photons_wanted(map: &MapPlan, share: f64) -> f64 {
+    let of_round = if map.caustic_only { CAUSTIC_PHOTONS_AT_POINT } else { PHOTONS_AT_POINT };
+    share * of_round * f64::from(PHOTONS) / f64::from(map.photons)
+}
 
 /// The plan of a run, its default radii by a trial round.
 pub fn plan(gpu: &Gpu, scene: &Scene, view: &View, settings: &SceneSettings, sensor: Sensor) -> Result<ScenePlan> {
@@ -96,7 +104,11 @@ fn run(gpu: &Gpu, scene: &Scene, view: &View, run: &ScenePlan, limits: &Limits) 
     let clearances = gpu.buffer::<f32>("clearances", u64::from(point_count), Memory::Device)?;
     let SceneResources { scene, visible_points, .. } = &resources;
     let kernel = Clearance { scene, visible_points, clearances: &clearances };
-    commands.dispatch(kernel, &ClearancePush { point_count }, Extent::Items(u64::from(point_count)))?;
+    commands.dispatch(
+        kernel,
+        &ClearancePush { first_point: 0, end_point: point_count, rank: MEDIAN },
+        Extent::Items(u64::from(point_count)),
+    )?;
     let visible_points = commands.read(visible_points, point_count as usize)?;
     let clearances = commands.read(&clearances, point_count as usize)?;
 
@@ -119,6 +131,7 @@ fn run(gpu: &Gpu, scene: &Scene, view: &View, run: &ScenePlan, limits: &Limits) 
         let by_area = area_radius(view.geometry, of_run.photons, map.caustic_only);
         let radius = radius(&own, &clear, by_area);
         *(if map.caustic_only { &mut trial.caustic_radius } else { &mut trial.global_radius }) = Some(radius);
+        trial.photons[usize::from(map.caustic_only)] = TrialPhotons::some_of(found);
         if radius > largest {
             largest = radius;
             trial.too_wide = clear.iter().filter(|clear| **clear < radius).count() as f64 / clear.len() as f64;
