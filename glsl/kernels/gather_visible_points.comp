@@ -1,5 +1,5 @@
 // Density estimation of a photon map, sums added by film/SUMS.glsl.
-// Dispatched by src/engine/scene/estimate.rs twice a map and chunk. One thread = one slice of a point's
+// Dispatched by src/engine/scene/estimate.rs twice a chunk and grid. One thread = one slice of a point's
 // candidates: points along x, slices along y.
 #extension GL_EXT_control_flow_attributes : require
 #extension GL_EXT_shader_explicit_arithmetic_types_int64 : require

@@ -1,5 +1,5 @@
 // Counts the photons of each bucket of a map, and numbers them in it.
-// Dispatched by src/engine/scene/index.rs once a chunk. One thread = one photon.
+// Dispatched by src/engine/scene/index.rs once a chunk and grid. One thread = one photon.
 // After it cells[b] = photons in bucket b; ranks[i] = photons that came to the bucket of photon i before it. That order
 // varies from run to run; the integer sums of the lookup do not see it.
 #extension GL_EXT_control_flow_attributes : require

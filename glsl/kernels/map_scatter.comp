@@ -1,5 +1,5 @@
 // Writes each photon of a map to its place in bucket order, and adds their number to the photons stored.
-// Dispatched by src/engine/scene/index.rs once a chunk. One thread = half a photon, twice.
+// Dispatched by src/engine/scene/index.rs once a chunk and grid. One thread = half a photon, twice.
 // cells[b] = first place of bucket b; ranks from map_count.comp.
 #extension GL_EXT_control_flow_attributes : require
 #include "records.glsl"

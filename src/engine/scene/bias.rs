@@ -46,7 +46,7 @@ pub fn batch(
     &Batch { factor, rounds, seed, stop }: &Batch,
     control: &mut Control,
 ) -> Result<(End, Vec<f64>)> {
-    let given = |map: &MapPlan| (map.radius_from != RadiusFrom::Trial).then(|| factor * map.radius * view.geometry.unit);
+    let given = |map: &MapPlan| (map.radius_from != RadiusFrom::Trial).then_some(factor * map.radius * view.geometry.unit);
     let settings = SceneSettings {
         rounds,
         alpha: 1.0,

@@ -91,7 +91,7 @@ pub fn light(gpu: &Gpu, view: &View, plan: ScenePlan, control: &mut Control) -> 
         view,
         plan: &plan,
         resources,
-        grids: [vec![0..RADIUS_CLASSES], vec![0..RADIUS_CLASSES]],
+        grids: [radius_class::one_grid(), radius_class::one_grid()],
         cancelled: control.cancelled,
     };
     run::run(world, commands, &plan, task, control)

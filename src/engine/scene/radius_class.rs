@@ -64,6 +64,11 @@ pub fn find(commands: &mut Commands, round: Round, photons: &PhotonBuffers, view
     Ok([grids(global, usual(&plan.global)), grids(caustic, usual(&plan.caustic))])
 }
 
+/// That of points which all have the same radius.
+pub fn one_grid() -> Vec<Range<u32>> {
+    std::iter::once(0..RADIUS_CLASSES).collect()
+}
+
 /// The grids for so many points of each class: one for every few classes, but few points look their photons up in the next wider
 /// grid, where there are more to pass over, rather than have another sorted for them.
 fn grids(counts: &[u32], usual: u32) -> Vec<Range<u32>> {
@@ -142,11 +147,12 @@ mod tests {
             used.iter().for_each(|(class, points)| counts[*class] = *points);
             counts
         };
-        assert_eq!(grids(&counts(&[(1, 1000)]), 1), [0..4]);
-        assert_eq!(grids(&counts(&[(0, 1000), (3, 3)]), 0), [0..4]);
-        assert_eq!(grids(&counts(&[(0, 1000), (3, 4), (4, 2), (9, 1)]), 0), [0..2, 2..6, 8..12]);
+        let pairs = |used, usual| grids(&counts(used), usual).into_iter().map(|grid| (grid.start, grid.end)).collect::<Vec<_>>();
+        assert_eq!(pairs(&[(1, 1000)], 1), [(0, 4)]);
+        assert_eq!(pairs(&[(0, 1000), (3, 3)], 0), [(0, 4)]);
+        assert_eq!(pairs(&[(0, 1000), (3, 4), (4, 2), (9, 1)], 0), [(0, 2), (2, 6), (8, 12)]);
         // Points that no round has seen yet.
-        assert_eq!(grids(&counts(&[(9, 1000)]), 2), [2..6, 8..12]);
+        assert_eq!(pairs(&[(9, 1000)], 2), [(2, 6), (8, 12)]);
         for seed in 0..1000u32 {
             let counts: Vec<u32> = (0..RADIUS_CLASSES).map(|class| if (seed >> (class % 10)) & 1 == 1 { 1 << class } else { 0 }).collect();
             let served = |class: u32| grids(&counts, 5).iter().filter(|grid| grid.contains(&class)).count();
