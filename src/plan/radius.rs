@@ -147,7 +147,7 @@ fn share(caustic_only: bool) -> f64 {
     if caustic_only { CAUSTIC_RADIUS_SHARE } else { 1.0 }
 }
 
-/// Radius, normalised, in which so many photons from lamps leave [`PHOTONS_PER_ESTIMATE`] on average: each lands about twice.
+/// Radius, normalised, in which so many photons from lamps leave `PHOTONS_PER_ESTIMATE` on average: each lands about twice.
 pub fn usual_radius(geometry: &Geometry, photons: f64) -> f64 {
     (PHOTONS_PER_ESTIMATE * geometry.area / (PI * 2.0 * photons)).sqrt()
 }

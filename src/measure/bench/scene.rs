@@ -105,7 +105,7 @@ pub fn survey(gpu: &Gpu, job: &Job, map: impl Fn(&ScenePlan) -> Option<&MapPlan>
 const SAMPLES: usize = 256;
 
 /// Times the passes of a scene: [`REPEATS`] rounds of one run, after [`DROPPED`] others. Radii stay. On a
-/// card the fastest of [`RUNS`] counts: its clock may fall for a second or so by what others do on the same machine.
+/// card the fastest of `RUNS` counts: its clock may fall for a second or so by what others do on the same machine.
 pub fn time(gpu: &Gpu, rates: &Rates, job: &Job, cancelled: &AtomicBool) -> Result<Timed> {
     let runs = if gpu.facts().kind == "cpu" { 1 } else { RUNS };
     let timed = (0..runs).map(|_| time_once(gpu, rates, job, cancelled)).collect::<Result<Vec<Timed>>>()?;
