@@ -48,3 +48,4 @@ mod transport;
 mod tree;
 mod trial;
 mod unknown;
+mod walls;

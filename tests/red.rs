@@ -60,6 +60,8 @@ enum Question {
     StackFromAfar,
     CoarseMirror,
     RoomBesideHall,
+    BehindWall,
+    BesideBox,
     /// With so many samples a pixel, and with a final gather or not.
     GlassInFurnace(u32, bool),
     /// Aimed photons bring as much light as others: a scene of `common::aimed`.
@@ -72,7 +74,17 @@ impl Question {
     /// Whether another test, the same for every device, shows that a device without a fault answers it right.
     fn has_a_test_of_its_own(self) -> bool {
         matches!(self, ClosedForm(_) | Bits(_) | LampInBox(_) | Shelf | Ridge | Spot | Texture(_) | LeaningPlane(_))
-            || matches!(self, LeaningScatterer | PatchInPlane | StackFromAfar | CoarseMirror | RoomBesideHall | GlassInFurnace(..))
+            || matches!(
+                self,
+                LeaningScatterer
+                    | PatchInPlane
+                    | StackFromAfar
+                    | CoarseMirror
+                    | RoomBesideHall
+                    | BehindWall
+                    | BesideBox
+                    | GlassInFurnace(..)
+            )
     }
 }
 
@@ -91,9 +103,8 @@ impl Question {
             | FiniteBox => Subject::Room,
             AimedLight(_) => Subject::Aiming,
             Appends | Finite | Crowds | Bits(_) | LampInBox(_) | Shelf | Ridge | Spot | Texture(_) => Subject::Scenes,
-            LeaningPlane(_) | LeaningScatterer | PatchInPlane | StackFromAfar | CoarseMirror | RoomBesideHall | GlassInFurnace(..) => {
-                Subject::Scenes
-            }
+            LeaningPlane(_) | LeaningScatterer | PatchInPlane | StackFromAfar | CoarseMirror | RoomBesideHall | BehindWall | BesideBox
+            | GlassInFurnace(..) => Subject::Scenes,
         }
     }
 }
@@ -111,7 +122,7 @@ struct Fault {
 }
 
 #[rustfmt::skip]
-const FAULTS: [Fault; 70] = [
+const FAULTS: [Fault; 72] = [
     Fault { what: "what rounding takes from a pair of floats is forgotten",
         file: "film/float_u64.glsl", from: "precise float rest = sum.y + (", to: "precise float rest = 0.0 * (",
         kernels: &["gather_brute_u64", "gather_grid_u64"], noticed_by: &[(Pairs, SumsTooSmall)] },
@@ -342,9 +353,15 @@ const FAULTS: [Fault; 70] = [
         file: "material/scatter.glsl", from: "return direction - 2.0 * min(dot(direction, side), 0.0) * side;", to: "return direction;",
         kernels: &["view"],
         noticed_by: &[(CoarseMirror, TooDark)] },
-    Fault { what: "photons within a radius of its own are spread over the widest's area",
-        file: "kernels/flux_to_radiance.comp", from: "radius = radius_of_class(widest,", to: "radius = radius_of_class(widest, 0 * ",
-        kernels: &["flux_to_radiance"], noticed_by: &[(RoomBesideHall, TooDark)] },
+    Fault { what: "all points have the widest radius",
+        file: "gather/radius_class.glsl", from: "uintBitsToFloat((127u - own_class) << 23)", to: "1.0",
+        kernels: &["disc_cuts", "gather_visible_points_u64", "gather_visible_points_two_words", "flux_to_radiance"], noticed_by: &[(RoomBesideHall, TooBright)] },
+    Fault { what: "photons behind a wall count before it",
+        file: "gather/cuts.glsl", from: "return beyond;", to: "return false;",
+        kernels: &["gather_visible_points_u64", "gather_visible_points_two_words"], noticed_by: &[(BehindWall, Leak)] },
+    Fault { what: "the floor behind a wall is taken for floor before it",
+        file: "gather/cover.glsl", from: "if (line.w < cuts.reach) {", to: "if (false) {",
+        kernels: &["flux_to_radiance"], noticed_by: &[(BesideBox, TooDark)] },
     Fault { what: "a spot falls off by its share, not by the square of it",
         file: "world/scene/lights.glsl", from: "return share * share;", to: "return share;",
         kernels: &["receive"], noticed_by: &[(Spot, TooBright)] },
@@ -447,6 +464,8 @@ fn ask(gpu: &Gpu, question: Question) -> Check<Complaint> {
         StackFromAfar => known::stack_from_afar(gpu),
         CoarseMirror => known::coarse_mirror_in_a_furnace(gpu, 8),
         RoomBesideHall => known::room_beside_a_hall(gpu, true),
+        BehindWall => known::behind_a_wall(gpu, known::sheet(), Some(0.1)),
+        BesideBox => known::beside_a_box(gpu, Some(0.1)),
         AimedLight(kind) => aimed::same_light(gpu, kind),
     }
 }

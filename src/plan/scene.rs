@@ -164,6 +164,16 @@ impl ScenePlan {
         self.maps().any(|map| map.classes.is_some())
     }
 
+    /// Whether density estimates end at walls.
+    pub fn cuts_discs(&self) -> bool {
+        self.settings.edge_correction && self.maps().next().is_some()
+    }
+
+    /// Where the cuts of a map's discs begin among those of all.
+    pub fn first_cut(&self, caustic_only: bool) -> u32 {
+        if caustic_only && self.global.is_some() { self.visible_points() } else { 0 }
+    }
+
     /// Radius of class 0 in a round, normalised; of all points where there are no classes.
     pub fn widest_radius(&self, map: &MapPlan, round: u32) -> f64 {
         radius::of_round(map.radius * map.classes.map_or(1.0, Classes::widest), self.settings.alpha, round)
