@@ -59,6 +59,7 @@ enum Question {
     PatchInPlane,
     StackFromAfar,
     CoarseMirror,
+    CoarseGlass,
     RoomBesideHall,
     /// With so many samples a pixel, and with a final gather or not.
     GlassInFurnace(u32, bool),
@@ -72,7 +73,10 @@ impl Question {
     /// Whether another test, the same for every device, shows that a device without a fault answers it right.
     fn has_a_test_of_its_own(self) -> bool {
         matches!(self, ClosedForm(_) | Bits(_) | LampInBox(_) | Shelf | Ridge | Spot | Texture(_) | LeaningPlane(_))
-            || matches!(self, LeaningScatterer | PatchInPlane | StackFromAfar | CoarseMirror | RoomBesideHall | GlassInFurnace(..))
+            || matches!(
+                self,
+                LeaningScatterer | PatchInPlane | StackFromAfar | CoarseMirror | CoarseGlass | RoomBesideHall | GlassInFurnace(..)
+            )
     }
 }
 
@@ -91,9 +95,8 @@ impl Question {
             | FiniteBox => Subject::Room,
             AimedLight(_) => Subject::Aiming,
             Appends | Finite | Crowds | Bits(_) | LampInBox(_) | Shelf | Ridge | Spot | Texture(_) => Subject::Scenes,
-            LeaningPlane(_) | LeaningScatterer | PatchInPlane | StackFromAfar | CoarseMirror | RoomBesideHall | GlassInFurnace(..) => {
-                Subject::Scenes
-            }
+            LeaningPlane(_) | LeaningScatterer | PatchInPlane | StackFromAfar | CoarseMirror | CoarseGlass | RoomBesideHall
+            | GlassInFurnace(..) => Subject::Scenes,
         }
     }
 }
@@ -111,7 +114,7 @@ struct Fault {
 }
 
 #[rustfmt::skip]
-const FAULTS: [Fault; 70] = [
+const FAULTS: [Fault; 71] = [
     Fault { what: "what rounding takes from a pair of floats is forgotten",
         file: "film/float_u64.glsl", from: "precise float rest = sum.y + (", to: "precise float rest = 0.0 * (",
         kernels: &["gather_brute_u64", "gather_grid_u64"], noticed_by: &[(Pairs, SumsTooSmall)] },
@@ -338,10 +341,14 @@ const FAULTS: [Fault; 70] = [
     Fault { what: "a scattered photon knows no shading normal",
         file: "material/lobes.glsl", from: SHADING_GAIN, to: "return 1.0;",
         kernels: &["trace_persistent_scene", "trace_scene_ballot"], noticed_by: &[(LeaningScatterer, TooBright)] },
-    Fault { what: "rays that a mirror's smooth normals send to the wrong side of a triangle are lost",
+    Fault { what: "rays that smooth normals send to the wrong side of a triangle are lost",
         file: "material/scatter.glsl", from: "return direction - 2.0 * min(dot(direction, side), 0.0) * side;", to: "return direction;",
         kernels: &["view"],
-        noticed_by: &[(CoarseMirror, TooDark)] },
+        noticed_by: &[(CoarseMirror, TooDark), (CoarseGlass, TooDark)] },
+    Fault { what: "smooth normals alone reflect totally in glass for ever",
+        file: "material/scatter.glsl", from: "&& depth >= SMOOTH_TOTAL_REFLECTIONS", to: "&& false",
+        kernels: &["view"],
+        noticed_by: &[(CoarseGlass, TooDark)] },
     Fault { what: "photons within a radius of its own are spread over the widest's area",
         file: "kernels/flux_to_radiance.comp", from: "radius = radius_of_class(widest,", to: "radius = radius_of_class(widest, 0 * ",
         kernels: &["flux_to_radiance"], noticed_by: &[(RoomBesideHall, TooDark)] },
@@ -445,7 +452,8 @@ fn ask(gpu: &Gpu, question: Question) -> Check<Complaint> {
         LeaningScatterer => known::leaning_scatterer(gpu),
         PatchInPlane => known::patch_in_a_plane(gpu),
         StackFromAfar => known::stack_from_afar(gpu),
-        CoarseMirror => known::coarse_mirror_in_a_furnace(gpu, 8),
+        CoarseMirror => known::coarse_sphere_in_a_furnace(gpu, mirror(1.0), 8),
+        CoarseGlass => known::coarse_sphere_in_a_furnace(gpu, glass(1.5), 8),
         RoomBesideHall => known::room_beside_a_hall(gpu, true),
         AimedLight(kind) => aimed::same_light(gpu, kind),
     }

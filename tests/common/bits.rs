@@ -26,8 +26,8 @@ pub const BITS: [(&str, u64); 17] = [
     ("open-box", 0xd4d4_aa55_d7b8_88d0),
     ("open-box-phong", 0xd2f9_f91a_834c_dea8),
     ("cornell", 0x5ebf_f634_9887_4c59),
-    ("cornell-spheres", 0x8d21_bc48_e6c7_d180),
-    ("caustic-sphere", 0xa584_26c5_eac1_6b92),
+    ("cornell-spheres", 0x65a6_32c5_ade8_f877),
+    ("caustic-sphere", 0x29e0_0016_bad7_1d80),
     ("furnace", 0x3309_f425_5fa3_6e7c),
     ("integrating-sphere", 0x6dd7_9903_c8c9_5d18),
     ("point-over-plane", 0xcfc6_d1b4_2452_985d),
@@ -36,9 +36,9 @@ pub const BITS: [(&str, u64); 17] = [
     ("sky-over-plane", 0x2819_8564_ee91_e27a),
     ("mirror-corridor", 0xd601_3a78_78a1_837c),
     ("glass-slab", 0x8dd4_c912_ee49_24f1),
-    ("cornell-spheres from photons", 0xa4c7_4e70_ebbf_42e5),
-    ("cornell-spheres gathered", 0xd4c3_f182_b7a5_d940),
-    ("blender.glb", 0x79c2_183e_71a8_811a),
+    ("cornell-spheres from photons", 0x84c6_3016_c646_897f),
+    ("cornell-spheres gathered", 0x0d68_a9b8_af31_bbe0),
+    ("blender.glb", 0x6801_1dbf_f89e_b970),
     ("the paper's box", 0x52ea_c413_af81_4929),
 ];
 
