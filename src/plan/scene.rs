@@ -100,6 +100,9 @@ pub struct ScenePlan {
     /// Film units in 1 W/m2/sr or W/m2, a power of two, and the most that one round may add.
     pub film_scale: f64,
     pub film_limit: f64,
+    /// Radiance of the brightest that a camera path may meet over mirrors and glass, W/m2/sr, all channels together; 0 where none
+    /// can. Such hits are rare and bright: they are the tail of the noise.
+    pub rare_radiance: f64,
     /// Rays or pair tests after which commands are handed to the device.
     pub work_per_submission: u64,
     /// Bytes of all buffers, with one set of receivers; see [`ScenePlan::bytes_of`].
