@@ -6,6 +6,7 @@ use serde::Serialize;
 
 use super::capacity::Persistence;
 use super::evidence::EffectDecision;
+use super::light_choice::LightChoice;
 use super::radius::{self, Classes, RADIUS_RANGE, RadiusFrom, Trial};
 use super::sensor::Sensor;
 use crate::constants::*;
@@ -162,6 +163,11 @@ impl ScenePlan {
     /// Whether radii differ from point to point.
     pub fn has_classes(&self) -> bool {
         self.maps().any(|map| map.classes.is_some())
+    }
+
+    /// How shadow rays choose lights; `None` where they do by power.
+    pub fn lights(&self) -> Option<&LightChoice> {
+        self.trial.as_ref()?.lights.as_deref().filter(|_| self.constant("LIGHT_CLUSTERS") != 0)
     }
 
     /// Radius of class 0 in a round, normalised; of all points where there are no classes.

@@ -7,13 +7,14 @@
 //! an integer, so that nothing but these photons and points decides; but no more than the radius by the area. It depends on no
 //! seed, builder or split.
 
+use std::sync::Arc;
 use std::time::Instant;
 
 use glam::Vec4;
 use rayon::prelude::*;
 
 use super::resources::SceneResources;
-use super::{Round, View, constants, modules, points, trace};
+use super::{Round, View, constants, light_trial, modules, points, trace};
 use crate::engine;
 use crate::engine::bias;
 use crate::error::Result;
@@ -21,11 +22,13 @@ use crate::gpu::kernels::Clearance;
 use crate::gpu::{Commands, Extent, Gpu, Kernel, Memory};
 use crate::photon::MapPhoton;
 use crate::plan::Limits;
+use crate::plan::light_choice::LightChoice;
 use crate::plan::radius::{MAX_DEFAULT_RADIUS, RADIUS_RANGE, RadiusFrom, Trial, TrialPhotons, area_radius};
 use crate::plan::scene::{MapPlan, ScenePlan};
 use crate::plan::sensor::Sensor;
 use crate::records::{ClearancePush, VisiblePoint};
 use crate::scene::Scene;
+use crate::scene::light_tree::{self, LightTree};
 use crate::settings::scene::{Part, SceneSettings};
 use crate::settings::stop::Stop;
 
@@ -60,14 +63,16 @@ pub(super) fn photons_wanted(map: &MapPlan, share: f64) -> f64 {
 pub fn plan(gpu: &Gpu, scene: &Scene, view: &View, settings: &SceneSettings, sensor: Sensor) -> Result<ScenePlan> {
     let limits = engine::limits(gpu.facts());
     let plan = ScenePlan::new(scene, view.geometry, settings, sensor, &limits)?;
-    if plan.maps().all(|map| map.radius_from == RadiusFrom::User) {
+    let chooses_lights = plan.constant("SHADOW_RAYS") > 0 && !light_tree::is_one_lamp(view.geometry);
+    if plan.maps().all(|map| map.radius_from == RadiusFrom::User) && !chooses_lights {
         return Ok(plan);
     }
-    let trial = run(gpu, scene, view, &plan, &limits)?;
+    let lights = chooses_lights.then(|| LightTree::new(view.geometry));
+    let trial = run(gpu, scene, view, &plan, lights, &limits)?;
     ScenePlan::with_trial(scene, view.geometry, settings, sensor, &limits, Some(trial))
 }
 
-fn run(gpu: &Gpu, scene: &Scene, view: &View, run: &ScenePlan, limits: &Limits) -> Result<Trial> {
+fn run(gpu: &Gpu, scene: &Scene, view: &View, run: &ScenePlan, lights: Option<LightTree>, limits: &Limits) -> Result<Trial> {
     let settings = SceneSettings {
         photons: PHOTONS,
         caustic_photons: PHOTONS,
@@ -91,10 +96,11 @@ fn run(gpu: &Gpu, scene: &Scene, view: &View, run: &ScenePlan, limits: &Limits) 
             (Sensor::Receivers { count: some.len() as u32 }, vec![some])
         }
     };
-    let plan = ScenePlan::new(scene, view.geometry, &settings, sensor, limits)?;
+    let by_power = lights.clone().map(|lights| Trial { lights: Some(Arc::new(LightChoice::by_power(lights))), ..Trial::default() });
+    let plan = ScenePlan::with_trial(scene, view.geometry, &settings, sensor, limits, by_power)?;
 
     // All pipelines of the run, which they are made for, but where it shows a part alone.
-    gpu.prepare(&[modules(&plan, gpu.facts()), vec![Clearance::MODULE]].concat(), &constants(&plan))?;
+    gpu.prepare(&[modules(&plan, gpu.facts()), vec![Clearance::MODULE], light_trial::modules(&plan)].concat(), &constants(&plan))?;
     let began = Instant::now();
     let mut commands = Commands::new(gpu, constants(&plan), began)?;
     let resources = SceneResources::new(gpu, &mut commands, view.geometry, &plan, &phases)?;
@@ -113,6 +119,10 @@ fn run(gpu: &Gpu, scene: &Scene, view: &View, run: &ScenePlan, limits: &Limits) 
     let clearances = commands.read(&clearances, point_count as usize)?;
 
     let mut trial = Trial::default();
+    if let Some(lights) = lights {
+        let points = light_trial::points(&phases, &visible_points, &view.geometry.planes);
+        trial.lights = Some(Arc::new(light_trial::learn(gpu, &mut commands, round, lights, &points)?));
+    }
     let mut largest = 0.0;
     for of_run in run.maps() {
         let Some(map) = plan.maps().find(|map| map.caustic_only == of_run.caustic_only) else { continue };

@@ -1,0 +1,220 @@
+//! Which light a shadow ray asks: regions of the scene, and in each the share of rays that each cluster of lights has, learned from
+//! what the clusters did at points of a trial (Vevoda, Kondapaneni and Krivanek 2018) and then frozen.
+//! `glsl/world/scene/light_choice.glsl` looks it up.
+//!
+//! Clusters that the trial saw from a region share its shadow rays, so that a lamp in the next room costs a point none. For the
+//! others, which a few rays may have missed, a quarter of the points cast a ray more, so that no light is impossible.
+//!
+//! Regions are leaves of a decision tree over positions and normals (Breiman et al. 1984), cut where the light to both sides is most
+//! different: first at the wall between two rooms, or between its two faces.
+
+use std::collections::BinaryHeap;
+
+use crate::constants::NONE;
+use crate::records::{LightNode, LightRegion, Receiver};
+use crate::scene::light_tree::LightTree;
+use crate::text::counted;
+
+/// Units of a share: exact in f32, as is each sum of them.
+const UNITS: u32 = 1 << 16;
+/// Units of what a cluster does at a point, as integers decide.
+const LIGHT_UNITS: f32 = 4096.0;
+/// Part of the shares that follows power and number, not what was learned.
+const PRIOR: f64 = 0.125;
+const MOST_REGIONS: usize = 256;
+/// Points that tell the shares of a region; fewer do where they have next to nothing in common with those beside them: by cosine.
+const POINTS_OF_REGION: usize = 8;
+const IN_COMMON: f64 = 0.1;
+/// Squared distance of the mean directions of two regions that are worth telling apart.
+const WORTH: f64 = 0.02;
+/// Normals that differ by less are cut nowhere.
+const NORMAL_STEP: f32 = 1.0 / 16.0;
+
+#[derive(Debug, Clone, PartialEq)]
+pub struct LightChoice {
+    pub nodes: Vec<LightNode>,
+    pub clusters: u32,
+    pub regions: Vec<LightRegion>,
+    /// Cumulative; two rows of clusters for each leaf of `regions`: those that the trial saw there, and the others. A row of none is
+    /// all 0.
+    pub shares: Vec<f32>,
+}
+
+/// What clusters do at a point: its coordinates and those of its normal, shares of its light, and these as a unit vector.
+struct Sample {
+    place: [f32; 6],
+    shares: Vec<u32>,
+    direction: Vec<f64>,
+}
+
+impl Sample {
+    /// `None` where no light arrived.
+    fn new(point: &Receiver, found: &[f32]) -> Option<Sample> {
+        let sum: f32 = found.iter().sum();
+        if !(sum > 0.0 && sum.is_finite()) {
+            return None;
+        }
+        let shares: Vec<u32> = found.iter().map(|light| (light / sum * LIGHT_UNITS).ceil() as u32).collect();
+        let length = shares.iter().map(|share| f64::from(*share).powi(2)).sum::<f64>().sqrt();
+        let direction = shares.iter().map(|share| f64::from(*share) / length).collect();
+        let (at, normal) = (point.position, point.normal);
+        Some(Sample { place: [at.x, at.y, at.z, normal.x, normal.y, normal.z], shares, direction })
+    }
+}
+
+/// A cut of some samples, which are given by their numbers.
+#[derive(Debug, Clone, PartialEq)]
+struct Cut {
+    /// By how much less their directions differ within both sides than in all.
+    gain: f64,
+    axis: usize,
+    split: f32,
+}
+
+impl LightChoice {
+    /// By power and number alone, everywhere.
+    pub fn by_power(tree: LightTree) -> LightChoice {
+        LightChoice::learned(tree, &[], &[])
+    }
+
+    /// From what each cluster did at each point, point after point.
+    pub fn learned(tree: LightTree, points: &[Receiver], found: &[f32]) -> LightChoice {
+        let clusters = tree.cluster_count;
+        let samples: Vec<Sample> =
+            points.iter().zip(found.chunks_exact(clusters)).filter_map(|(point, found)| Sample::new(point, found)).collect();
+        let power: Vec<f64> = tree.nodes[..clusters].iter().map(|node| f64::from(node.power)).collect();
+        let (regions, leaves) = regions(&samples);
+        let shares = leaves.iter().flat_map(|leaf| rows(&samples, leaf, &power)).collect();
+        LightChoice { nodes: tree.nodes, clusters: clusters as u32, regions, shares }
+    }
+
+    fn region_count(&self) -> usize {
+        self.shares.len() / (2 * self.clusters as usize)
+    }
+
+    pub(super) fn in_words(&self) -> String {
+        let (clusters, regions) = (counted(self.clusters, "cluster"), counted(self.region_count(), "region"));
+        format!("; chosen among {clusters} by what a trial saw of them in {regions}")
+    }
+
+    /// Device memory that exists for it.
+    pub(super) fn bytes(&self) -> u64 {
+        (size_of_val(self.nodes.as_slice()) + size_of_val(self.regions.as_slice()) + size_of_val(self.shares.as_slice())) as u64
+    }
+}
+
+/// The tree of regions, and the samples of each leaf by its number.
+fn regions(samples: &[Sample]) -> (Vec<LightRegion>, Vec<Vec<usize>>) {
+    let leaf = LightRegion { axis: NONE, split: 0.0, next: 0 };
+    let mut regions = vec![leaf];
+    // Of each node.
+    let mut members: Vec<Vec<usize>> = vec![(0..samples.len()).collect()];
+    let mut cuts = vec![best_cut(samples, &members[0])];
+    let mut open = BinaryHeap::new();
+    let entry = |cuts: &[Option<Cut>], node: usize| cuts[node].as_ref().map(|cut| (cut.gain.to_bits(), std::cmp::Reverse(node)));
+    open.extend(entry(&cuts, 0));
+    let mut leaf_count = 1;
+    while leaf_count < MOST_REGIONS
+        && let Some((_, std::cmp::Reverse(node))) = open.pop()
+    {
+        let Cut { axis, split, .. } = cuts[node].clone().expect("it is open");
+        regions[node] = LightRegion { axis: axis as u32, split, next: regions.len() as u32 };
+        let (below, above): (Vec<usize>, Vec<usize>) = members[node].iter().partition(|sample| samples[**sample].place[axis] < split);
+        for side in [below, above] {
+            cuts.push(best_cut(samples, &side));
+            members.push(side);
+            regions.push(leaf);
+            open.extend(entry(&cuts, regions.len() - 1));
+        }
+        leaf_count += 1;
+    }
+    let mut leaves = Vec::new();
+    for (region, members) in regions.iter_mut().zip(members).filter(|(region, _)| region.axis == NONE) {
+        region.next = leaves.len() as u32;
+        leaves.push(members);
+    }
+    (regions, leaves)
+}
+
+fn best_cut(samples: &[Sample], members: &[usize]) -> Option<Cut> {
+    let count = members.len();
+    let clusters = samples.first()?.direction.len();
+    let mut sum = vec![0.0; clusters];
+    members.iter().for_each(|member| add(&mut sum, &samples[*member].direction));
+    let squared = |vector: &[f64]| vector.iter().map(|x| x * x).sum::<f64>();
+    let mut best: Option<Cut> = None;
+    for axis in 0..6 {
+        let at = |member: usize| samples[member].place[axis];
+        let least_step = if axis < 3 { 0.0 } else { NORMAL_STEP };
+        let mut order = members.to_vec();
+        order.sort_by(|a, b| at(*a).total_cmp(&at(*b)).then(a.cmp(b)));
+        let mut below = vec![0.0; clusters];
+        for (k, pair) in order.windows(2).enumerate() {
+            add(&mut below, &samples[pair[0]].direction);
+            let (first, second) = (at(pair[0]), at(pair[1]));
+            if second - first <= least_step {
+                continue;
+            }
+            let (of_below, of_above) = ((k + 1) as f64, (count - k - 1) as f64);
+            let dot: f64 = below.iter().zip(&sum).map(|(below, all)| below * (all - below)).sum();
+            let (low, high) = (squared(&below), below.iter().zip(&sum).map(|(below, all)| (all - below).powi(2)).sum::<f64>());
+            let apart = low / of_below.powi(2) + high / of_above.powi(2) - 2.0 * dot / (of_below * of_above);
+            let gain = of_below * of_above / count as f64 * apart;
+            let many = (k + 1).min(count - k - 1) >= POINTS_OF_REGION;
+            let allowed = if many { apart > WORTH } else { dot <= IN_COMMON * (low * high).sqrt() };
+            if allowed && best.as_ref().is_none_or(|best| gain > best.gain) {
+                let middle = 0.5 * (first + second);
+                best = Some(Cut { gain, axis, split: if middle > first { middle } else { second } });
+            }
+        }
+    }
+    best
+}
+
+fn add(sum: &mut [f64], of: &[f64]) {
+    sum.iter_mut().zip(of).for_each(|(sum, of)| *sum += of);
+}
+
+/// The two rows of a region. The variance of a point's light is least for shares in proportion to the root of the mean square of
+/// what each cluster adds.
+fn rows(samples: &[Sample], members: &[usize], power: &[f64]) -> Vec<f32> {
+    let mut squares = vec![0.0; power.len()];
+    for member in members {
+        squares.iter_mut().zip(&samples[*member].shares).for_each(|(sum, share)| *sum += f64::from(*share).powi(2));
+    }
+    let is_blind = squares.iter().all(|square| *square == 0.0);
+    let seen: Vec<bool> = squares.iter().map(|square| is_blind || *square > 0.0).collect();
+    let of = |seen_or_not: bool| {
+        let only = |value: &dyn Fn(usize) -> f64| -> Vec<f64> {
+            let values: Vec<f64> = seen.iter().enumerate().map(|(k, seen)| if *seen == seen_or_not { value(k) } else { 0.0 }).collect();
+            let sum: f64 = values.iter().sum();
+            values.into_iter().map(|value| if sum > 0.0 { value / sum } else { 0.0 }).collect()
+        };
+        let (by_power, by_number) = (only(&|k| power[k]), only(&|_| 1.0));
+        let learned = only(&|k| squares[k].sqrt());
+        let prior = if seen_or_not && !is_blind { PRIOR } else { 1.0 };
+        let weights = (0..power.len()).map(|k| (1.0 - prior) * learned[k] + prior * 0.5 * (by_power[k] + by_number[k]));
+        dealt(&weights.collect::<Vec<_>>())
+    };
+    [of(true), of(false)].concat()
+}
+
+/// Cumulative shares in proportion to weights, at least one unit to each that is not 0.
+fn dealt(weights: &[f64]) -> Vec<f32> {
+    let count = weights.iter().filter(|weight| **weight > 0.0).count() as u32;
+    if count == 0 {
+        return vec![0.0; weights.len()];
+    }
+    let all: f64 = weights.iter().sum();
+    let free = f64::from(UNITS - count);
+    let (mut sum, mut least) = (0.0, 0);
+    let last = weights.iter().rposition(|weight| *weight > 0.0).expect("one is not 0");
+    (0..weights.len())
+        .map(|k| {
+            sum += weights[k];
+            least += u32::from(weights[k] > 0.0);
+            let units = if k >= last { UNITS } else { least + (sum / all * free).round().min(free) as u32 };
+            units as f32 / UNITS as f32
+        })
+        .collect()
+}
