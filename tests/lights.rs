@@ -18,7 +18,7 @@ fn rooms(ratio: Option<f32>) -> Scene {
     let lamp = |radiance: f32| Material { emission: Vec3::splat(radiance), ..matt(0.0) };
     let mut scene = scene_of(room(DVec3::ZERO, 1), vec![matt(0.5), lamp(1.0)], vec![]);
     if let Some(ratio) = ratio {
-        scene.meshes.extend(room(4.02 * DVec3::X, 2));
+        scene.meshes.extend(room(6.0 * DVec3::X, 2));
         scene.materials.push(lamp(ratio));
     }
     scene
@@ -35,7 +35,7 @@ fn points() -> Vec<(DVec3, DVec3)> {
 
 /// Points of the dim room, then the same of the bright one.
 fn both() -> Vec<(DVec3, DVec3)> {
-    let there = points().into_iter().map(|(at, normal)| (at + 4.02 * DVec3::X, normal));
+    let there = points().into_iter().map(|(at, normal)| (at + 6.0 * DVec3::X, normal));
     points().into_iter().chain(there).collect()
 }
 
@@ -56,14 +56,25 @@ fn explore() {
         for ratio in [1.0, 1e2, 1e3, 1e6] {
             let began = std::time::Instant::now();
             let two = lit(&gpu, &rooms(Some(ratio)), &settings, &both());
-            println!("  {:?} trial {:?}; {:?}", began.elapsed(), two.plan.trial.as_ref().map(|t| t.seconds), two.plan.decisions[0].evidence);
+            println!(
+                "  {:?} trial {:?}; {:?}",
+                began.elapsed(),
+                two.plan.trial.as_ref().map(|t| t.seconds),
+                two.plan.decisions[0].evidence
+            );
             let sum = |lit: &RunResult, of: &dyn Fn(&RunResult, usize) -> f64| (0..n).map(|k| of(lit, k)).sum::<f64>();
             let var = |lit: &RunResult, k: usize| (red(lit, k).1 / red(&alone, k).0).powi(2);
             let black = (0..n).filter(|k| red(&two, *k).0 == 0.0).count();
-            let z: Vec<f64> = (0..n).map(|k| (red(&two, k).0 - red(&alone, k).0) / (red(&two, k).1.powi(2) + red(&alone, k).1.powi(2)).sqrt()).collect();
+            let z: Vec<f64> =
+                (0..n).map(|k| (red(&two, k).0 - red(&alone, k).0) / (red(&two, k).1.powi(2) + red(&alone, k).1.powi(2)).sqrt()).collect();
             let worst = z.iter().fold(0.0f64, |a, b| a.max(b.abs()));
-            println!("{part:?} 1:{ratio}: variance ratio {:.3}, black {black}, mean {:.5} vs {:.5}, worst z {worst:.2}, rel err {:.4}",
-                sum(&two, &var) / sum(&alone, &var), sum(&two, &|l, k| red(l, k).0), sum(&alone, &|l, k| red(l, k).0), (sum(&alone, &var) / n as f64).sqrt());
+            println!(
+                "{part:?} 1:{ratio}: variance ratio {:.3}, black {black}, mean {:.5} vs {:.5}, worst z {worst:.2}, rel err {:.4}",
+                sum(&two, &var) / sum(&alone, &var),
+                sum(&two, &|l, k| red(l, k).0),
+                sum(&alone, &|l, k| red(l, k).0),
+                (sum(&alone, &var) / n as f64).sqrt()
+            );
         }
     }
 }

@@ -11,7 +11,8 @@
 use std::collections::BinaryHeap;
 
 use crate::constants::NONE;
-use crate::records::{LightNode, LightRegion, Receiver};
+use crate::records::{Emitter, LightNode, LightRegion, Receiver};
+use crate::scene::geometry::Geometry;
 use crate::scene::light_tree::LightTree;
 use crate::text::counted;
 
@@ -20,11 +21,20 @@ const UNITS: u32 = 1 << 16;
 /// Units of what a cluster does at a point, as integers decide.
 const LIGHT_UNITS: f32 = 4096.0;
 /// Part of the shares that follows power and number, not what was learned.
-const PRIOR: f64 = 0.125;
+const PRIOR: f64 = 1.0 / 32.0;
+/// Part of the photons that leave lights by what these add at the points of the trial. What only lights what lights them has no more
+/// than a half fewer.
+const EMISSION_BY_SIGHT: f64 = 0.5;
 const MOST_REGIONS: usize = 256;
-/// Points that tell the shares of a region; fewer do where they have next to nothing in common with those beside them: by cosine.
-const POINTS_OF_REGION: usize = 8;
+/// Shadow rays to a cluster that tell its share in a region, and points that do at least; fewer do where they have next to nothing in
+/// common with those beside them: by cosine.
+const RAYS_OF_REGION: u32 = 32;
+const POINTS_OF_REGION: u32 = 2;
 const IN_COMMON: f64 = 0.1;
+/// So many times as many points are the surroundings of a region, whose squared light has this part of the region's own: a shadow
+/// may end between two points.
+const SURROUNDINGS: usize = 8;
+const OF_SURROUNDINGS: f64 = 1.0 / 64.0;
 /// Squared distance of the mean directions of two regions that are worth telling apart.
 const WORTH: f64 = 0.02;
 /// Normals that differ by less are cut nowhere.
@@ -38,6 +48,10 @@ pub struct LightChoice {
     /// Cumulative; two rows of clusters for each leaf of `regions`: those that the trial saw there, and the others. A row of none is
     /// all 0.
     pub shares: Vec<f32>,
+    /// As photons choose them: half by power, half by what their clusters add at the points of the trial.
+    pub emitters: Vec<Emitter>,
+    /// By how much more a photon of relative flux 1 carries than where all choose by power.
+    pub flux_scale: f64,
 }
 
 /// What clusters do at a point: its coordinates and those of its normal, shares of its light, and these as a unit vector.
@@ -67,25 +81,29 @@ impl Sample {
 struct Cut {
     /// By how much less their directions differ within both sides than in all.
     gain: f64,
+    /// Both sides have next to nothing in common.
+    is_apart: bool,
     axis: usize,
     split: f32,
 }
 
 impl LightChoice {
     /// By power and number alone, everywhere.
-    pub fn by_power(tree: LightTree) -> LightChoice {
-        LightChoice::learned(tree, &[], &[])
+    pub fn by_power(geometry: &Geometry, tree: LightTree) -> LightChoice {
+        LightChoice::learned(geometry, tree, &[], &[], 1)
     }
 
-    /// From what each cluster did at each point, point after point.
-    pub fn learned(tree: LightTree, points: &[Receiver], found: &[f32]) -> LightChoice {
+    /// From what each cluster did at each point, point after point, by so many rays.
+    pub fn learned(geometry: &Geometry, tree: LightTree, points: &[Receiver], found: &[f32], rays: u32) -> LightChoice {
         let clusters = tree.cluster_count;
         let samples: Vec<Sample> =
             points.iter().zip(found.chunks_exact(clusters)).filter_map(|(point, found)| Sample::new(point, found)).collect();
         let power: Vec<f64> = tree.nodes[..clusters].iter().map(|node| f64::from(node.power)).collect();
-        let (regions, leaves) = regions(&samples);
-        let shares = leaves.iter().flat_map(|leaf| rows(&samples, leaf, &power)).collect();
-        LightChoice { nodes: tree.nodes, clusters: clusters as u32, regions, shares }
+        let least = RAYS_OF_REGION.div_ceil(rays).max(POINTS_OF_REGION) as usize;
+        let (regions, leaves) = regions(&samples, least);
+        let shares = leaves.iter().flat_map(|[leaf, around]| rows(&samples, leaf, around, &power)).collect();
+        let (emitters, flux_scale) = geometry.emitters_by(&emission_shares(geometry, &tree, &samples, &power));
+        LightChoice { nodes: tree.nodes, clusters: clusters as u32, regions, shares, emitters, flux_scale }
     }
 
     fn region_count(&self) -> usize {
@@ -103,13 +121,33 @@ impl LightChoice {
     }
 }
 
-/// The tree of regions, and the samples of each leaf by its number.
-fn regions(samples: &[Sample]) -> (Vec<LightRegion>, Vec<Vec<usize>>) {
+/// Shares of photons that leave each emitter.
+fn emission_shares(geometry: &Geometry, tree: &LightTree, samples: &[Sample], power: &[f64]) -> Vec<f64> {
+    let by_power: Vec<f64> = geometry.emitters.iter().map(|emitter| f64::from(emitter.probability)).collect();
+    if samples.is_empty() {
+        return by_power;
+    }
+    let mut units = vec![0u64; power.len()];
+    for sample in samples {
+        units.iter_mut().zip(&sample.shares).for_each(|(sum, share)| *sum += u64::from(*share));
+    }
+    let all = units.iter().sum::<u64>() as f64;
+    let mut shares = by_power.clone();
+    for (emitter, cluster) in tree.clusters_of_emitters() {
+        let seen = by_power[emitter] * units[cluster] as f64 / (all * power[cluster]);
+        shares[emitter] = (1.0 - EMISSION_BY_SIGHT) * by_power[emitter] + EMISSION_BY_SIGHT * seen;
+    }
+    shares
+}
+
+/// The tree of regions of at least so many samples, and by the number of each leaf its samples and those of its surroundings.
+fn regions(samples: &[Sample], least: usize) -> (Vec<LightRegion>, Vec<[Vec<usize>; 2]>) {
     let leaf = LightRegion { axis: NONE, split: 0.0, next: 0 };
     let mut regions = vec![leaf];
-    // Of each node.
+    // Of each node, and the node that is its surroundings.
     let mut members: Vec<Vec<usize>> = vec![(0..samples.len()).collect()];
-    let mut cuts = vec![best_cut(samples, &members[0])];
+    let mut around = vec![0];
+    let mut cuts = vec![best_cut(samples, &members[0], least)];
     let mut open = BinaryHeap::new();
     let entry = |cuts: &[Option<Cut>], node: usize| cuts[node].as_ref().map(|cut| (cut.gain.to_bits(), std::cmp::Reverse(node)));
     open.extend(entry(&cuts, 0));
@@ -117,11 +155,13 @@ fn regions(samples: &[Sample]) -> (Vec<LightRegion>, Vec<Vec<usize>>) {
     while leaf_count < MOST_REGIONS
         && let Some((_, std::cmp::Reverse(node))) = open.pop()
     {
-        let Cut { axis, split, .. } = cuts[node].clone().expect("it is open");
+        let Cut { axis, split, is_apart, .. } = cuts[node].clone().expect("it is open");
         regions[node] = LightRegion { axis: axis as u32, split, next: regions.len() as u32 };
         let (below, above): (Vec<usize>, Vec<usize>) = members[node].iter().partition(|sample| samples[**sample].place[axis] < split);
         for side in [below, above] {
-            cuts.push(best_cut(samples, &side));
+            cuts.push(best_cut(samples, &side, least));
+            let is_surroundings = is_apart || side.len() >= SURROUNDINGS * least;
+            around.push(if is_surroundings { regions.len() } else { around[node] });
             members.push(side);
             regions.push(leaf);
             open.extend(entry(&cuts, regions.len() - 1));
@@ -129,14 +169,14 @@ fn regions(samples: &[Sample]) -> (Vec<LightRegion>, Vec<Vec<usize>>) {
         leaf_count += 1;
     }
     let mut leaves = Vec::new();
-    for (region, members) in regions.iter_mut().zip(members).filter(|(region, _)| region.axis == NONE) {
+    for (node, region) in regions.iter_mut().enumerate().filter(|(_, region)| region.axis == NONE) {
         region.next = leaves.len() as u32;
-        leaves.push(members);
+        leaves.push([node, around[node]].map(|node| members[node].clone()));
     }
     (regions, leaves)
 }
 
-fn best_cut(samples: &[Sample], members: &[usize]) -> Option<Cut> {
+fn best_cut(samples: &[Sample], members: &[usize], least: usize) -> Option<Cut> {
     let count = members.len();
     let clusters = samples.first()?.direction.len();
     let mut sum = vec![0.0; clusters];
@@ -160,11 +200,11 @@ fn best_cut(samples: &[Sample], members: &[usize]) -> Option<Cut> {
             let (low, high) = (squared(&below), below.iter().zip(&sum).map(|(below, all)| (all - below).powi(2)).sum::<f64>());
             let apart = low / of_below.powi(2) + high / of_above.powi(2) - 2.0 * dot / (of_below * of_above);
             let gain = of_below * of_above / count as f64 * apart;
-            let many = (k + 1).min(count - k - 1) >= POINTS_OF_REGION;
-            let allowed = if many { apart > WORTH } else { dot <= IN_COMMON * (low * high).sqrt() };
+            let is_apart = dot <= IN_COMMON * (low * high).sqrt();
+            let allowed = is_apart || (apart > WORTH && (k + 1).min(count - k - 1) >= least);
             if allowed && best.as_ref().is_none_or(|best| gain > best.gain) {
                 let middle = 0.5 * (first + second);
-                best = Some(Cut { gain, axis, split: if middle > first { middle } else { second } });
+                best = Some(Cut { gain, is_apart, axis, split: if middle > first { middle } else { second } });
             }
         }
     }
@@ -177,10 +217,13 @@ fn add(sum: &mut [f64], of: &[f64]) {
 
 /// The two rows of a region. The variance of a point's light is least for shares in proportion to the root of the mean square of
 /// what each cluster adds.
-fn rows(samples: &[Sample], members: &[usize], power: &[f64]) -> Vec<f32> {
+fn rows(samples: &[Sample], members: &[usize], around: &[usize], power: &[f64]) -> Vec<f32> {
     let mut squares = vec![0.0; power.len()];
-    for member in members {
-        squares.iter_mut().zip(&samples[*member].shares).for_each(|(sum, share)| *sum += f64::from(*share).powi(2));
+    for (members, weight) in [(members, 1.0), (around, OF_SURROUNDINGS)] {
+        for member in members {
+            let add = |(sum, share): (&mut f64, &u32)| *sum += weight / members.len() as f64 * f64::from(*share).powi(2);
+            squares.iter_mut().zip(&samples[*member].shares).for_each(add);
+        }
     }
     let is_blind = squares.iter().all(|square| *square == 0.0);
     let seen: Vec<bool> = squares.iter().map(|square| is_blind || *square > 0.0).collect();

@@ -51,6 +51,8 @@ pub struct MapPlan {
     /// A power of two by which its photons carry more than they stand for: aimed ones stand for a share of their
     /// light's, and their sums have a fixed point.
     pub flux_gain: f64,
+    /// By how much more a photon of relative flux 1 carries than where lights are chosen by power.
+    pub flux_scale: f64,
 }
 
 impl MapPlan {
@@ -66,7 +68,7 @@ impl MapPlan {
 
     /// The same in a round of so many photons.
     pub fn photon_flux_of(&self, geometry: &Geometry, photons: u32) -> f64 {
-        geometry.flux_unit / (f64::from(photons.max(1)) * self.flux_gain)
+        geometry.flux_unit * self.flux_scale / (f64::from(photons.max(1)) * self.flux_gain)
     }
 
     /// (first photon, count) of each chunk.

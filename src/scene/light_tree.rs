@@ -153,6 +153,18 @@ impl LightTree {
         }
         LightTree { nodes, cluster_count: clusters.len() }
     }
+
+    /// Each emitter with its cluster.
+    pub fn clusters_of_emitters(&self) -> Vec<(usize, usize)> {
+        let mut clusters: Vec<usize> = (0..self.cluster_count).collect();
+        let mut found = Vec::new();
+        for (node, LightNode { child, .. }) in self.nodes.iter().enumerate() {
+            let cluster = clusters[node];
+            // Children follow in the order of their parents.
+            if child & LIGHT_LEAF == 0 { clusters.extend([cluster; 2]) } else { found.push(((child & !LIGHT_LEAF) as usize, cluster)) }
+        }
+        found
+    }
 }
 
 /// The parts that are clusters, in the order of their places.

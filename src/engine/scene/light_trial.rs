@@ -16,7 +16,7 @@ use crate::rng::words;
 use crate::scene::light_tree::LightTree;
 
 /// Shadow rays of a trial, and of a point and a cluster.
-const RAYS: u32 = 1 << 17;
+const RAYS: u32 = 1 << 18;
 const RAYS_OF_PAIR: (u32, u32) = (4, 32);
 
 /// Kernels that it takes.
@@ -40,7 +40,7 @@ pub fn points(receivers: &[Vec<Receiver>], visible_points: &[VisiblePoint], plan
 /// Learns how to choose lights at these points and round about.
 pub fn learn(gpu: &Gpu, commands: &mut Commands, round: Round, tree: LightTree, points: &[Receiver]) -> Result<LightChoice> {
     if points.is_empty() {
-        return Ok(LightChoice::by_power(tree));
+        return Ok(LightChoice::by_power(round.geometry, tree));
     }
     let pair_count = (points.len() * tree.cluster_count) as u32;
     let ray_count = (RAYS / pair_count).clamp(RAYS_OF_PAIR.0, RAYS_OF_PAIR.1);
@@ -57,5 +57,5 @@ pub fn learn(gpu: &Gpu, commands: &mut Commands, round: Round, tree: LightTree, 
         add_work(commands, round.plan, 64 * u64::from(end_pair - first_pair) * u64::from(ray_count))?;
     }
     let found = commands.read(&found, pair_count as usize)?;
-    Ok(LightChoice::learned(tree, points, &found))
+    Ok(LightChoice::learned(round.geometry, tree, points, &found, ray_count))
 }

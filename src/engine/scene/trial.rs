@@ -63,7 +63,8 @@ pub(super) fn photons_wanted(map: &MapPlan, share: f64) -> f64 {
 pub fn plan(gpu: &Gpu, scene: &Scene, view: &View, settings: &SceneSettings, sensor: Sensor) -> Result<ScenePlan> {
     let limits = engine::limits(gpu.facts());
     let plan = ScenePlan::new(scene, view.geometry, settings, sensor, &limits)?;
-    let chooses_lights = plan.constant("SHADOW_RAYS") > 0 && !light_tree::is_one_lamp(view.geometry);
+    // Whatever part of the picture is asked for, so that all parts have the same photons.
+    let chooses_lights = !light_tree::is_one_lamp(view.geometry);
     if plan.maps().all(|map| map.radius_from == RadiusFrom::User) && !chooses_lights {
         return Ok(plan);
     }
@@ -96,7 +97,8 @@ fn run(gpu: &Gpu, scene: &Scene, view: &View, run: &ScenePlan, lights: Option<Li
             (Sensor::Receivers { count: some.len() as u32 }, vec![some])
         }
     };
-    let by_power = lights.clone().map(|lights| Trial { lights: Some(Arc::new(LightChoice::by_power(lights))), ..Trial::default() });
+    let by_power =
+        lights.clone().map(|lights| Trial { lights: Some(Arc::new(LightChoice::by_power(view.geometry, lights))), ..Trial::default() });
     let plan = ScenePlan::with_trial(scene, view.geometry, &settings, sensor, limits, by_power)?;
 
     // All pipelines of the run, which they are made for, but where it shows a part alone.
@@ -121,7 +123,9 @@ fn run(gpu: &Gpu, scene: &Scene, view: &View, run: &ScenePlan, lights: Option<Li
     let mut trial = Trial::default();
     if let Some(lights) = lights {
         let points = light_trial::points(&phases, &visible_points, &view.geometry.planes);
-        trial.lights = Some(Arc::new(light_trial::learn(gpu, &mut commands, round, lights, &points)?));
+        let lights = light_trial::learn(gpu, &mut commands, round, lights, &points)?;
+        commands.upload(&resources.scene.emitters, &lights.emitters)?;
+        trial.lights = Some(Arc::new(lights));
     }
     let mut largest = 0.0;
     for of_run in run.maps() {
