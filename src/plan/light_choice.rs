@@ -261,3 +261,88 @@ fn dealt(weights: &[f64]) -> Vec<f32> {
         })
         .collect()
 }
+
+#[cfg(test)]
+mod tests {
+    use glam::Vec3;
+
+    use super::*;
+
+    #[test]
+    fn shares_follow_the_weights_and_none_is_lost() {
+        let shares = dealt(&[0.0, 1e-9, 3.0, 0.0, 1.0, 1e-12, 0.0]);
+        let own: Vec<u32> = std::iter::once(0.0)
+            .chain(shares.iter().copied())
+            .zip(&shares)
+            .map(|(before, share)| ((share - before) * UNITS as f32) as u32)
+            .collect();
+        assert_eq!(own.iter().sum::<u32>(), UNITS);
+        assert_eq!((own[0], own[1], own[3], own[5], own[6]), (0, 1, 0, 1, 0));
+        assert!(own[2].abs_diff(3 * UNITS / 4) <= 2 && own[4].abs_diff(UNITS / 4) <= 2, "{own:?}");
+        assert_eq!(dealt(&[0.0; 3]), [0.0; 3]);
+        assert_eq!(dealt(&[0.0, 5.0]), [0.0, 1.0]);
+    }
+
+    /// Samples with these shares of light, in a row along x.
+    fn row(shares: &[[f32; 3]], normal: Vec3) -> Vec<Sample> {
+        let point = |k: usize| Receiver { position: Vec3::X * k as f32, normal, shading_normal: normal };
+        shares.iter().enumerate().filter_map(|(k, found)| Sample::new(&point(k), found)).collect()
+    }
+
+    fn region_of(regions: &[LightRegion], place: [f32; 6]) -> u32 {
+        let mut region = regions[0];
+        while region.axis != NONE {
+            region = regions[(region.next + u32::from(place[region.axis as usize] >= region.split)) as usize];
+        }
+        region.next
+    }
+
+    /// Two points in a room of their own are told apart from a hundred beside them, and none of those from each other.
+    #[test]
+    fn rooms_are_regions() {
+        let samples = row(&[vec![[0.0, 1.0, 1e-6]; 2], vec![[1.0, 0.0, 1e-6]; 100]].concat(), Vec3::Y);
+        let (regions, leaves) = regions(&samples, 8);
+        assert_eq!(leaves.len(), 2);
+        assert_eq!((regions[0].axis, regions[0].split), (0, 1.5));
+        assert_eq!([leaves[0][0].len(), leaves[1][0].len()], [2, 100]);
+        // What they have nothing in common with is not around them.
+        assert!(leaves.iter().all(|[own, around]| own == around));
+        let shares = rows(&samples, &leaves[0][0], &leaves[0][1], &[0.9, 0.05, 0.05]);
+        // The third cluster was seen, if faintly; the first was not.
+        assert!(shares[0] == 0.0 && shares[1] > 0.9 && shares[2] == 1.0, "{shares:?}");
+        assert_eq!(shares[3..], [1.0, 1.0, 1.0]);
+    }
+
+    /// Both faces of a wall without thickness.
+    #[test]
+    fn the_faces_of_a_wall_are_regions() {
+        let left = row(&[[0.0, 1.0, 0.0]; 10], Vec3::NEG_Z);
+        let samples: Vec<Sample> = left.into_iter().chain(row(&[[1.0, 0.0, 0.0]; 10], Vec3::Z)).collect();
+        let (regions, leaves) = regions(&samples, 8);
+        assert_eq!((leaves.len(), regions[0].axis, regions[0].split), (2, 5, 0.0));
+        assert_ne!(region_of(&regions, [3.0, 0.0, 0.0, 0.0, 0.0, -1.0]), region_of(&regions, [3.0, 0.0, 0.0, 0.0, 0.0, 1.0]));
+    }
+
+    /// Where the light changes little by little, a region knows what there is round about it.
+    #[test]
+    fn shadows_that_end_beyond_a_region_are_not_unseen() {
+        let found: Vec<[f32; 3]> = (0..64).map(|k| if k % 32 < 16 { [1.0, 0.5, 0.0] } else { [0.1, 0.5, 0.0] }).collect();
+        let found: Vec<[f32; 3]> =
+            found.into_iter().enumerate().map(|(k, [a, b, c])| if k < 8 { [0.0, b, c] } else { [a, b, c] }).collect();
+        let samples = row(&found, Vec3::Y);
+        let (regions, leaves) = regions(&samples, 8);
+        let first = &leaves[region_of(&regions, [0.0; 6]) as usize];
+        assert_eq!((first[0].len(), first[1].len()), (8, 64));
+        let shares = rows(&samples, &first[0], &first[1], &[0.5, 0.4, 0.1]);
+        assert!(shares[0] > 0.02 && shares[0] < 0.3, "{shares:?}");
+        // Nobody has seen the third.
+        assert_eq!(shares, [shares[0], 1.0, 1.0, 0.0, 0.0, 1.0]);
+    }
+
+    #[test]
+    fn what_saw_nothing_follows_power_and_number() {
+        let shares = rows(&[], &[], &[], &[0.9, 0.1]);
+        assert!((shares[0] - 0.7).abs() < 1e-3 && shares[1] == 1.0 && shares[2..] == [0.0; 2], "{shares:?}");
+        assert!(row(&[[0.0; 3], [f32::NAN; 3], [f32::INFINITY; 3]], Vec3::Y).is_empty());
+    }
+}

@@ -1,5 +1,6 @@
 //! A trial round, from which the default radii are taken: the density of photons around the points that are asked about,
-//! and how far it is from these to the next wall.
+//! and how far it is from these to the next wall. Where there are several lamps, it first learns how to choose among them
+//! (`engine::scene::light_trial`), for shadow rays and photons.
 //!
 //! A radius by the scene's area is right where photons lie everywhere alike. Of a room on a plain it would be wider than the
 //! room. So a few photons are traced, with random numbers that no run has, and each of a few points is given the radius
@@ -59,7 +60,7 @@ pub(super) fn photons_wanted(map: &MapPlan, share: f64) -> f64 {
     share * of_round * f64::from(PHOTONS) / f64::from(map.photons)
 }
 
-/// The plan of a run, its default radii by a trial round.
+/// The plan of a run, its default radii and its choice of lights by a trial round.
 pub fn plan(gpu: &Gpu, scene: &Scene, view: &View, settings: &SceneSettings, sensor: Sensor) -> Result<ScenePlan> {
     let limits = engine::limits(gpu.facts());
     let plan = ScenePlan::new(scene, view.geometry, settings, sensor, &limits)?;
@@ -79,12 +80,17 @@ fn run(gpu: &Gpu, scene: &Scene, view: &View, run: &ScenePlan, lights: Option<Li
         caustic_photons: PHOTONS,
         rounds: 1,
         seed: bias::seed(SEED, 0),
-        // Parts of a picture have the radii of the whole, so that they add up to it.
+        // Parts of a picture have the radii and lights of the whole, so that they add up to it.
         part: Part::All,
         stop: Stop::default(),
         ..run.settings.clone()
     };
-    let most_points = (POINTS / run.points_per_pixel).max(1);
+    // Of the whole too.
+    let points_per_pixel = match run.settings.part {
+        Part::All => run.points_per_pixel,
+        _ => ScenePlan::new(scene, view.geometry, &settings, run.sensor, limits)?.points_per_pixel,
+    };
+    let most_points = (POINTS / points_per_pixel).max(1);
     let (sensor, phases) = match run.sensor {
         Sensor::Picture { width, height } => {
             let smaller = (f64::from(most_points) / (f64::from(width) * f64::from(height))).sqrt().min(1.0);
