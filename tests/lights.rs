@@ -1,12 +1,16 @@
 //! Shadow rays and photons choose lights by what these do where it is asked.
 
+use crate::common::chi_square::counts_check;
 use crate::common::lamps::{ROOM, cut_lamp, dark_room, dim_room, lit, many_lamps, missed_lamp, points, rooms, scattered_light};
+use crate::common::planted;
 use crate::common::prelude::*;
 use photonmill::constants::{LIGHT_LEAF, NONE};
+use photonmill::engine::scene::resources::SceneResources;
 use photonmill::engine::scene::{self, Target};
+use photonmill::gpu::kernels::TryLights;
 use photonmill::output::scene_report;
 use photonmill::plan::light_choice::LightChoice;
-use photonmill::records::LightNode;
+use photonmill::records::{Draws, LightNode, Receiver, TryLightsPush};
 
 #[test]
 fn a_dim_room_beside_a_bright_one_is_lit_as_if_it_were_alone() {
@@ -120,6 +124,78 @@ fn rows(lights: &LightChoice, place: [f32; 6]) -> usize {
         region = lights.regions[(region.next + u32::from(above)) as usize];
     }
     2 * (region.next * lights.clusters) as usize
+}
+
+/// Lights at three places, as many times as each of 64 clusters has a thread for each of so many receivers: by `choose_light`, from the
+/// row of what the trial saw or from the other, in a kernel that says so in place of what a trial asks it. With the probability that
+/// it states.
+fn picks(gpu: &Gpu, geometry: &Geometry, plan: &ScenePlan, receivers: &[Receiver], unseen: bool) -> Vec<(usize, f64)> {
+    let mut commands = Commands::new(gpu, scene::constants(plan), Instant::now()).unwrap();
+    let resources = SceneResources::new(gpu, &mut commands, geometry, plan, &[]).unwrap();
+    let pairs = receivers.len() * 64;
+    let points = gpu.buffer::<Receiver>("points", receivers.len() as u64, Memory::Device).unwrap();
+    let found = gpu.buffer::<f32>("found", pairs as u64, Memory::Device).unwrap();
+    commands.upload(&points, receivers).unwrap();
+    let mut ask = |what: u32| {
+        let SceneResources { scene, nonfinite_values, .. } = &resources;
+        let kernel = TryLights { scene, receivers: &points, found: &found, nonfinite_values };
+        let draws = Draws { seed: UVec2::new(5, 6), round: 0, domain: 0 };
+        let push = TryLightsPush { draws, first_pair: 0, end_pair: pairs as u32, ray_count: what };
+        commands.dispatch(kernel, &push, Extent::Items(pairs as u64)).unwrap();
+        commands.read(&found, pairs).unwrap()
+    };
+    let (lights, probabilities) = (ask(2 * u32::from(unseen)), ask(2 * u32::from(unseen) + 1));
+    lights.into_iter().zip(probabilities).map(|(light, probability)| (light as usize, f64::from(probability))).collect()
+}
+
+const PICK: &str = "ChosenLight pick = choose_light(row_of_shares(here.position, here.ng, push.ray_count < 2), here.position, \
+    stratified(0, 1, words_of(pair, 1, push.draws)).x, mix32(words.w));\n    \
+    found[pair] = (push.ray_count & 1) == 0 ? float(pick.emitter) : pick.probability;";
+
+/// A kernel chooses lights as often as it says, and as its twin here does.
+#[test]
+fn lights_are_chosen_as_often_as_is_said() {
+    let Some(mut gpu) = open(Options::default()) else { return };
+    let mut scene = cut_lamp(20);
+    scene.meshes.extend(rooms(&[1.0]).meshes.into_iter().map(|mut mesh| {
+        mesh.positions.iter_mut().for_each(|position| *position += ROOM);
+        mesh
+    }));
+    let settings = SceneSettings { rounds: 1, photons: 1000, ..SceneSettings::default() };
+    let plan = lit(&gpu, &scene, &settings, &points(), Some(&|_| {})).plan;
+    let geometry = Geometry::new(&scene).unwrap();
+    let lights = plan.lights().expect("there are many lights");
+    assert_eq!(lights.clusters, 64);
+    let last = "found[pair] = largest * sqrt(divide(sum, float(push.ray_count)));";
+    gpu.replace(planted::kernels(&["try_lights"], "kernels/try_lights.comp", &[(last, PICK)]));
+    let mut chosen = BTreeSet::new();
+    for (position, normal) in [points()[0], points()[12], points()[30]] {
+        let receiver = scene::receiver(&geometry, (position, normal));
+        let place = [receiver.position.to_array(), receiver.normal.to_array()].concat();
+        let row = rows(lights, place.try_into().unwrap());
+        for (unseen, row) in [(false, row), (true, row + 64)] {
+            let mut expected = vec![0.0; lights.emitters.len()];
+            for cluster in 0..64 {
+                let before = if cluster == 0 { 0.0 } else { lights.shares[row + cluster - 1] };
+                let share = f64::from(lights.shares[row + cluster] - before);
+                add_probabilities(lights, cluster as u32, share, receiver.position, &mut expected);
+            }
+            let found = picks(&gpu, &geometry, &plan, &vec![receiver; 1024], unseen);
+            let mut counts = vec![0u64; expected.len()];
+            for (light, stated) in &found {
+                counts[*light] += 1;
+                assert!((stated / expected[*light] - 1.0).abs() < 1e-2, "{stated} is said, {} is right", expected[*light]);
+            }
+            assert_holds(format!("{position}"), counts_check("lights", &counts, &expected));
+            chosen.extend(found.iter().map(|(light, _)| *light));
+            let twisted: Vec<f64> = expected.iter().enumerate().map(|(k, share)| share * if k % 2 == 0 { 1.1 } else { 0.9 }).collect();
+            let sum: f64 = twisted.iter().sum();
+            let twisted: Vec<f64> = twisted.iter().map(|share| share / sum).collect();
+            let is_one = expected.iter().filter(|share| **share > 1e-3).count() < 4;
+            assert!(is_one || counts_check("other shares", &counts, &twisted).is_err(), "{position}");
+        }
+    }
+    assert_eq!(chosen.len(), lights.emitters.len(), "lights that were chosen from somewhere");
 }
 
 /// From anywhere every light may be chosen, in one of two ways, whose probabilities add up to 1 each.
