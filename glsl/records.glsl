@@ -288,6 +288,25 @@ struct Emitter {
     float outer_versine;
 };
 
+// A node of the tree of lights (`scene::light_tree`): those within a sphere.
+struct LightNode {
+    vec3 centre;
+    float radius_squared;
+    // Share of all lights' power.
+    float power;
+    // Of its children, which lie side by side, the first; of a leaf `LIGHT_LEAF` and its emitter.
+    uint child;
+};
+
+// A node of the tree of regions, in each of which shadow rays choose lights alike (`plan::light_choice`).
+struct LightRegion {
+    // 0 to 2: a coordinate of the position, 3 to 5: of the normal; `NONE`: a leaf.
+    uint axis;
+    float split;
+    // Of what lies below `split`, after which comes what lies above; of a leaf its number.
+    uint next;
+};
+
 // A sphere around surfaces that make caustics, which photons are aimed at.
 struct CausticTarget {
     vec3 centre;
@@ -391,6 +410,16 @@ struct SceneTracePersistentPush {
     uint flights;
     // Invocations that take photons: each every so many.
     uint stride;
+};
+
+// What each cluster of lights adds at some points.
+struct TryLightsPush {
+    Draws draws;
+    // Pairs of a point and a cluster, cluster by cluster of each point.
+    uint first_pair;
+    uint end_pair;
+    // Shadow rays of each.
+    uint ray_count;
 };
 
 struct GoOnPush {

@@ -25,6 +25,7 @@ mod judge;
 mod large_scene;
 mod layout;
 mod ledger;
+mod lights;
 mod limits;
 mod memory;
 mod optics;

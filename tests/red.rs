@@ -8,7 +8,7 @@ use std::time::Duration;
 use crate::closed_form::closed_form_check;
 use crate::common::Kind::*;
 use crate::common::prelude::*;
-use crate::common::{MANY_PHOTONS, aimed, bits, estimate_check, known, noticed_as, planted};
+use crate::common::{MANY_PHOTONS, aimed, bits, estimate_check, known, lamps, noticed_as, planted};
 use crate::film::pairs_count_on;
 use crate::hard_cases::readme_and_guide;
 use crate::ledger::closed_fates;
@@ -65,6 +65,10 @@ enum Question {
     BesideBox,
     /// With so many samples a pixel, and with a final gather or not.
     GlassInFurnace(u32, bool),
+    // The checks of `common::lamps`: a room beside one whose lamp is so many times as strong, a lamp in so many squares a side.
+    DimRoom(f32),
+    ManyLamps(u32),
+    MissedLamp,
     /// Aimed photons bring as much light as others: a scene of `common::aimed`.
     AimedLight(&'static str),
 }
@@ -75,7 +79,7 @@ impl Question {
     /// Whether another test, the same for every device, shows that a device without a fault answers it right.
     fn has_a_test_of_its_own(self) -> bool {
         let of_room = matches!(self, Photons(_) | RoomFilm(_) | Nearest | StripedCounters | Ledger(_) | FiniteBox | Pairs | StrictMath);
-        !of_room && !matches!(self, Appends | Builders | Finite | Crowds | AimedLight(_))
+        !of_room && !matches!(self, Appends | Builders | Finite | Crowds | ManyLamps(_) | AimedLight(_))
     }
 }
 
@@ -84,6 +88,7 @@ impl Question {
 enum Subject {
     Room,
     Scenes,
+    Lamps,
     Aiming,
 }
 
@@ -93,6 +98,7 @@ impl Question {
             Photons(_) | StripedCounters | RoomFilm(_) | Ledger(_) | ClosedForm(_) | Builders | StrictMath | Nearest | Pairs
             | FiniteBox => Subject::Room,
             AimedLight(_) => Subject::Aiming,
+            DimRoom(_) | ManyLamps(_) | MissedLamp => Subject::Lamps,
             _ => Subject::Scenes,
         }
     }
@@ -111,7 +117,7 @@ struct Fault {
 }
 
 #[rustfmt::skip]
-const FAULTS: [Fault; 73] = [
+const FAULTS: [Fault; 78] = [
     Fault { what: "what rounding takes from a pair of floats is forgotten",
         file: "film/float_u64.glsl", from: "precise float rest = sum.y + (", to: "precise float rest = 0.0 * (",
         kernels: &["gather_brute_u64", "gather_grid_u64"], noticed_by: &[(Pairs, SumsTooSmall)] },
@@ -288,8 +294,8 @@ const FAULTS: [Fault; 73] = [
         file: "math/math.glsl", from: "quotient += uint(off) + uint(2 * remainder > d);", to: "quotient += uint(off);",
         kernels: &["check_math"], noticed_by: &[(StrictMath, Misrounded)] },
     Fault { what: "a light in 50 shines with no number",
-        file: "world/scene/direct.glsl", from: "float cosine = dot(arriving.wi, point.ns);",
-        to: "if (u.y < 0.02) arriving.radiance.x = uintBitsToFloat(0x7fc00000u);\n        float cosine = dot(arriving.wi, point.ns);",
+        file: "world/scene/lights.glsl", from: "    return arriving;",
+        to: "    if (u.y < 0.02) arriving.radiance.x = uintBitsToFloat(0x7fc00000u);\n    return arriving;",
         kernels: &["view"], noticed_by: &[(Finite, NoNumber)] },
     Fault { what: "a photon in 500 starts nowhere",
         file: "world/scene/step.glsl", from: "surface.ng, scatter.direction);",
@@ -369,6 +375,21 @@ const FAULTS: [Fault; 73] = [
     Fault { what: "large integers are cut instead of rounded",
         file: "check/check_math.comp", from: "float(floatBitsToUint(a))", to: "float(floatBitsToUint(a) & ~0xffu)",
         kernels: &["check_math"], noticed_by: &[(StrictMath, Misrounded)] },
+    Fault { what: "a light of a cluster is weighed as if its cluster had no other",
+        file: "world/scene/light_choice.glsl", from: "chosen.probability *= is_left ? share : 1.0 - share;", to: "",
+        kernels: &["receive"], noticed_by: &[(ManyLamps(16), TooDark)] },
+    Fault { what: "a cluster's share is taken with those before it",
+        file: "world/scene/light_choice.glsl", from: "light_shares[row + low] - before", to: "light_shares[row + low]",
+        kernels: &["receive"], noticed_by: &[(ManyLamps(16), TooDark)] },
+    Fault { what: "one of two lights is as likely from afar as from near by",
+        file: "world/scene/light_choice.glsl", from: "vec3 way = node.centre - position;", to: "vec3 way = node.centre - vec3(0.3);",
+        kernels: &["receive"], noticed_by: &[(ManyLamps(224), TooNoisy)] },
+    Fault { what: "rays to lights that the trial has not seen count once, though one place in four casts them",
+        file: "world/scene/direct.glsl", from: "count = float(SAMPLES_PER_UNSEEN * SHADOW_RAYS);", to: "count = float(SHADOW_RAYS);",
+        kernels: &["receive"], noticed_by: &[(MissedLamp, TooDark)] },
+    Fault { what: "a trial sees lights through walls",
+        file: "kernels/try_lights.comp", from: "&& !shadow_ray.is_hidden && added > 0.0", to: "&& added > 0.0",
+        kernels: &["try_lights"], noticed_by: &[(DimRoom(1e3), TooNoisy)] },
     Fault { what: "directions within two cones are weighed as if only one could have chosen them",
         file: "world/scene/aim.glsl", from: "k == chosen || versine_between(emission.direction, other.axis) <= other.versine",
         to: "k == chosen",
@@ -460,6 +481,9 @@ fn ask(gpu: &Gpu, question: Question) -> Check<Complaint> {
         RoomBesideHall => known::room_beside_a_hall(gpu, true),
         BehindWall => known::behind_a_wall(gpu, known::sheet(), Some(0.1)),
         BesideBox => known::beside_a_box(gpu, Some(0.1)),
+        DimRoom(ratio) => lamps::dim_room(gpu, ratio, true),
+        ManyLamps(side) => lamps::many_lamps(gpu, side, true),
+        MissedLamp => lamps::missed_lamp(gpu),
         AimedLight(kind) => aimed::same_light(gpu, kind),
     }
 }
@@ -498,6 +522,11 @@ fn faults_of_the_room_are_noticed() {
 #[test]
 fn faults_of_scenes_are_noticed() {
     faults_are_noticed(Subject::Scenes);
+}
+
+#[test]
+fn faults_of_lamps_are_noticed() {
+    faults_are_noticed(Subject::Lamps);
 }
 
 #[test]

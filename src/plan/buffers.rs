@@ -188,6 +188,7 @@ impl ScenePlan {
             buffer::<T>(name, if is_kept { content.len() as u64 } else { 0 }, why)
         }
         let textured = self.keeps(Effect::Textures);
+        let (nodes, regions, shares) = self.lights().map_or((0, 0, 0), |of| (of.nodes.len(), of.regions.len(), of.shares.len()));
         vec![
             of("nodes", &geometry.nodes, self.keeps(Effect::Bvh), "the triangles' hierarchy"),
             of("triangles", &geometry.triangles, true, "triangles"),
@@ -199,6 +200,9 @@ impl ScenePlan {
             of::<UVec2>("texels", &geometry.texels, textured, "textures"),
             of("emitters", &geometry.emitters, true, "emitters"),
             of("caustic targets", &self.targets, true, "spheres that photons are aimed at"),
+            buffer::<LightNode>("light nodes", nodes as u64, "the tree of lights"),
+            buffer::<LightRegion>("light regions", regions as u64, "regions in which lights are chosen alike"),
+            buffer::<f32>("light shares", shares as u64, "shares of lights in each region"),
         ]
     }
 

@@ -17,6 +17,7 @@ pub mod bias;
 pub mod estimate;
 pub mod film;
 pub mod index;
+mod light_trial;
 pub mod losses;
 mod on_gpu;
 pub mod points;

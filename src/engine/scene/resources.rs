@@ -23,8 +23,11 @@ buffers! {
             materials: planned.filled(commands, "materials", &geometry.materials)?,
             textures: planned.filled(commands, "textures", &geometry.textures)?,
             texels: planned.filled(commands, "texels", &geometry.texels)?,
-            emitters: planned.filled(commands, "emitters", &geometry.emitters)?,
+            emitters: planned.filled(commands, "emitters", plan.lights().map_or(&geometry.emitters, |lights| &lights.emitters))?,
             caustic_targets: planned.filled(commands, "caustic targets", &plan.targets)?,
+            light_nodes: planned.filled(commands, "light nodes", plan.lights().map_or(&[], |lights| &lights.nodes))?,
+            light_regions: planned.filled(commands, "light regions", plan.lights().map_or(&[], |lights| &lights.regions))?,
+            light_shares: planned.filled(commands, "light shares", plan.lights().map_or(&[], |lights| &lights.shares))?,
         },
         /// Points of all phases; empty for a picture.
         receivers: Vec<Buffer<Receiver>> =
