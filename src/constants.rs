@@ -35,6 +35,7 @@ constants! {
     DOMAIN_CAUSTIC_PHOTONS = 1;
     DOMAIN_CAMERA = 2;
     DOMAIN_RECEIVERS = 3;
+    DOMAIN_LIGHTS = 4;
     /// Philox blocks of an emission in a scene of triangles; bounce b has block `EMISSION_BLOCKS` + b.
     EMISSION_BLOCKS = 2;
     /// Philox blocks of one vertex of a path from the camera: one to go on, the other for light.
@@ -64,6 +65,8 @@ constants! {
     NONE = 0xffff_ffff;
     /// Bit of a triangle's plane: others hide a part of the triangle.
     HIDDEN = 0x8000_0000;
+    /// Bit of what stands below a node of the tree of lights: it is an emitter.
+    LIGHT_LEAF = 0x8000_0000;
     /// What is nearer to a plane than the inverse lies in it: 16 units in the last place of a coordinate of 0.5, where
     /// normalised scenes end. Rounding of positions and of their heights takes half of that (`glsl/gather/belongs.glsl`).
     IN_PLANE_INVERSE = 2_097_152;

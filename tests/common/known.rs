@@ -3,11 +3,13 @@
 
 use std::f64::consts::FRAC_PI_3;
 
+use glam::dvec3;
+
 use super::estimate_check;
 use super::lit::light;
 use super::prelude::*;
 use crate::unknown::room_without_floor;
-use photonmill::engine::scene::{RunResult, Target, View, trial};
+use photonmill::engine::scene::{RunResult, Target, View, render, trial};
 
 /// The red channel of a point or pixel, sure to three parts in a hundred and right to its error.
 fn check_mean(what: &str, lit: &RunResult, place: usize, expected: f64, tolerance: f64) -> Check<Complaint> {
@@ -379,4 +381,51 @@ pub fn room_beside_a_hall(gpu: &Gpu, by_density: bool) -> Check<Complaint> {
     println!("{ratio:.4} of the hall's light, off by {deviation:.4} at a point");
     estimate_check("the room", ratio, 1.0, 0.02)?;
     estimate_check("a point's deviation", deviation, 0.0, 0.025)
+}
+
+/// A room of 1 m, lit on one side of what `walls` makes, which part it at x = 1/2: the brightest place of the other side's floor, right
+/// behind the wall.
+pub fn behind_a_wall(gpu: &Gpu, walls: Vec<Mesh>, radius: Option<f64>) -> Check<Complaint> {
+    let mut room = scene("furnace");
+    room.materials = vec![matt(0.7), shining(0.5), Material { two_sided: true, ..matt(0.7) }];
+    room.meshes.extend(walls);
+    room.meshes.push(Mesh::parallelogram("lamp", dvec3(0.1, 0.9, 0.3), DVec3::X * 0.2, DVec3::Z * 0.2, 1));
+    let behind = [1e-5, 1e-4, 1e-3, 1e-2, 0.05];
+    let points: Vec<_> =
+        behind.iter().flat_map(|behind| [0.01, 0.3, 0.6, 0.999].map(|z| (dvec3(0.5 + behind, 0.0, z), DVec3::Y))).collect();
+    let settings = SceneSettings { photons: 30_000, rounds: 4, radius, ..SceneSettings::default() };
+    let found = means(&render(gpu, &room, &settings, Target::Points(&points))?);
+    let (point, leaked) = pairs(&points, &found).max_by(|a, b| a.1.x.total_cmp(&b.1.x)).expect("points are asked for");
+    if *leaked == DVec3::ZERO { Ok(()) } else { Err(Complaint::new(Kind::Leak, format!("{leaked} W/m2 at {}", point.0))) }
+}
+
+/// A sheet across the room at x = 1/2.
+pub fn sheet() -> Vec<Mesh> {
+    vec![Mesh::parallelogram("wall", DVec3::X * 0.5, DVec3::Z, DVec3::Y, 2)]
+}
+
+/// In a furnace all light is the same everywhere, and half of it has been scattered: that half, around a box that stands on a floor which
+/// goes on below it.
+pub fn beside_a_box(gpu: &Gpu, radius: Option<f64>) -> Check<Complaint> {
+    let mut room = scene("furnace");
+    let (low, high) = (dvec3(0.35, 0.0, 0.4), dvec3(0.6, 0.3, 0.7));
+    let size = high - low;
+    let (x, y, z) = (DVec3::X * size.x, DVec3::Y * size.y, DVec3::Z * size.z);
+    for (origin, u, v) in [(low, y, x), (low, z, y), (high, -y, -z), (high, -x, -y), (high, -z, -x)] {
+        room.meshes.push(Mesh::parallelogram("box", origin, u, v, 0));
+    }
+    let around = |aside: f64| {
+        let (before, behind) = (low - aside, high + aside);
+        [(before.x, 0.55), (0.5, before.z), (behind.x, 0.5), (behind.x, behind.z), (before.x, low.z)]
+            .map(|(x, z)| (dvec3(x, 0.0, z), DVec3::Y))
+    };
+    let points: Vec<_> = [0.001, 0.004, 0.01, 0.02].into_iter().flat_map(around).collect();
+    let settings = SceneSettings { photons: 30_000, rounds: 32, radius, part: Part::Indirect, ..SceneSettings::default() };
+    let lit = render(gpu, &room, &settings, Target::Points(&points))?;
+    for (place, (point, _)) in points.iter().enumerate() {
+        let error = lit.film.stated_error(place, &lit.plan).x;
+        estimate_check(&format!("{point}, radius {radius:?}"), lit.film.mean(place, &lit.plan).x, PI, error)?;
+    }
+    // The points lie within each other's discs, so that their mean is little better known than one of them.
+    estimate_check("all around the box", mean_red(&lit), PI, 0.02 * PI)
 }
