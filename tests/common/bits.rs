@@ -26,8 +26,8 @@ pub const BITS: [(&str, u64); 17] = [
     ("open-box", 0x7b30_9fe8_dcd7_4236),
     ("open-box-phong", 0xea93_ae5c_b527_79cf),
     ("cornell", 0xcbc2_b412_2593_3532),
-    ("cornell-spheres", 0x6446_9a96_1b01_8e8b),
-    ("caustic-sphere", 0xa584_26c5_eac1_6b92),
+    ("cornell-spheres", 0xff1b_c641_2175_aed3),
+    ("caustic-sphere", 0x29e0_0016_bad7_1d80),
     ("furnace", 0xb09f_7dd3_ac63_0ddb),
     ("integrating-sphere", 0x6dd7_9903_c8c9_5d18),
     ("point-over-plane", 0xcfc6_d1b4_2452_985d),
@@ -36,9 +36,9 @@ pub const BITS: [(&str, u64); 17] = [
     ("sky-over-plane", 0x2819_8564_ee91_e27a),
     ("mirror-corridor", 0xd601_3a78_78a1_837c),
     ("glass-slab", 0x8dd4_c912_ee49_24f1),
-    ("cornell-spheres from photons", 0xff6c_379b_da1a_9503),
-    ("cornell-spheres gathered", 0x166e_57b0_cc8a_184a),
-    ("blender.glb", 0x5f95_761a_09c6_679f),
+    ("cornell-spheres from photons", 0x38c3_f88c_57e5_f49d),
+    ("cornell-spheres gathered", 0x7a88_f0e8_583e_bff3),
+    ("blender.glb", 0x97d8_634c_21b4_3438),
     ("the paper's box", 0x52ea_c413_af81_4929),
 ];
 
