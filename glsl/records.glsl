@@ -499,6 +499,8 @@ struct SceneGatherPush {
     uint map_class;
     uint first_class;
     uint end_class;
+    // Where the map's cuts begin.
+    uint first_cut;
     CellPush cells;
 };
 
@@ -524,6 +526,23 @@ struct RadiusClassPush {
     CellPush cells;
 };
 
+// Where walls cut the discs of density estimates off.
+struct DiscCutsPush {
+    uint first_point;
+    uint end_point;
+    uint pixel_count;
+    // Of the picture; 0 where points are receivers, in an order of their own.
+    uint width;
+    uint height;
+    // Mask of the arrivals that the map holds.
+    uint arrivals;
+    // `GLOBAL_CLASS` or `CAUSTIC_CLASS`, and where its cuts begin.
+    uint map_class;
+    uint first_cut;
+    // Of class 0.
+    float radius;
+};
+
 struct FluxToRadiancePush {
     uint first_point;
     uint end_point;
@@ -542,6 +561,8 @@ struct FluxToRadiancePush {
     // Of class 0.
     float global_radius;
     float caustic_radius;
+    // Where the caustic map's cuts begin.
+    uint first_caustic_cut;
     // Flux of a photon of relative flux 1, over the photons of the round.
     float global_flux;
     float caustic_flux;

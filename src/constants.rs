@@ -146,6 +146,9 @@ constants! {
     /// which it may end any: a path that lossless glass traps would cost as much time as a whole round.
     ROULETTE_DEPTH = 32;
     LOSSLESS_DEPTH = 128;
+    /// Surfaces of a path after which a smooth normal alone makes no total reflection in glass: coarse facets would catch
+    /// light that the smooth shape lets out.
+    SMOOTH_TOTAL_REFLECTIONS = 8;
     /// Bounces of a scene's photons of which fates are counted apart; the last count takes in all later ones.
     TALLY_ROWS = 64;
     /// Words of one copy of a map's totals (`glsl/ledger/totals.glsl`), and the bits of flux after the binary point.

@@ -49,3 +49,4 @@ mod transport;
 mod tree;
 mod trial;
 mod unknown;
+mod walls;

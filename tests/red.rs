@@ -59,7 +59,10 @@ enum Question {
     PatchInPlane,
     StackFromAfar,
     CoarseMirror,
+    CoarseGlass,
     RoomBesideHall,
+    BehindWall,
+    BesideBox,
     /// With so many samples a pixel, and with a final gather or not.
     GlassInFurnace(u32, bool),
     // The checks of `common::lamps`: a room beside one whose lamp is so many times as strong, a lamp in so many squares a side.
@@ -75,9 +78,8 @@ use Question::*;
 impl Question {
     /// Whether another test, the same for every device, shows that a device without a fault answers it right.
     fn has_a_test_of_its_own(self) -> bool {
-        matches!(self, ClosedForm(_) | Bits(_) | LampInBox(_) | Shelf | Ridge | Spot | Texture(_) | LeaningPlane(_))
-            || matches!(self, LeaningScatterer | PatchInPlane | StackFromAfar | CoarseMirror | RoomBesideHall | GlassInFurnace(..))
-            || matches!(self, DimRoom(_) | MissedLamp)
+        let of_room = matches!(self, Photons(_) | RoomFilm(_) | Nearest | StripedCounters | Ledger(_) | FiniteBox | Pairs | StrictMath);
+        !of_room && !matches!(self, Appends | Builders | Finite | Crowds | ManyLamps(_) | AimedLight(_))
     }
 }
 
@@ -96,11 +98,8 @@ impl Question {
             Photons(_) | StripedCounters | RoomFilm(_) | Ledger(_) | ClosedForm(_) | Builders | StrictMath | Nearest | Pairs
             | FiniteBox => Subject::Room,
             AimedLight(_) => Subject::Aiming,
-            Appends | Finite | Crowds | Bits(_) | LampInBox(_) | Shelf | Ridge | Spot | Texture(_) => Subject::Scenes,
-            LeaningPlane(_) | LeaningScatterer | PatchInPlane | StackFromAfar | CoarseMirror | RoomBesideHall | GlassInFurnace(..) => {
-                Subject::Scenes
-            }
             DimRoom(_) | ManyLamps(_) | MissedLamp => Subject::Lamps,
+            _ => Subject::Scenes,
         }
     }
 }
@@ -118,7 +117,7 @@ struct Fault {
 }
 
 #[rustfmt::skip]
-const FAULTS: [Fault; 75] = [
+const FAULTS: [Fault; 78] = [
     Fault { what: "what rounding takes from a pair of floats is forgotten",
         file: "film/float_u64.glsl", from: "precise float rest = sum.y + (", to: "precise float rest = 0.0 * (",
         kernels: &["gather_brute_u64", "gather_grid_u64"], noticed_by: &[(Pairs, SumsTooSmall)] },
@@ -345,13 +344,23 @@ const FAULTS: [Fault; 75] = [
     Fault { what: "a scattered photon knows no shading normal",
         file: "material/lobes.glsl", from: SHADING_GAIN, to: "return 1.0;",
         kernels: &["trace_persistent_scene", "trace_scene_ballot"], noticed_by: &[(LeaningScatterer, TooBright)] },
-    Fault { what: "rays that a mirror's smooth normals send to the wrong side of a triangle are lost",
+    Fault { what: "rays that smooth normals send to the wrong side of a triangle are lost",
         file: "material/scatter.glsl", from: "return direction - 2.0 * min(dot(direction, side), 0.0) * side;", to: "return direction;",
         kernels: &["view"],
-        noticed_by: &[(CoarseMirror, TooDark)] },
-    Fault { what: "photons within a radius of its own are spread over the widest's area",
-        file: "kernels/flux_to_radiance.comp", from: "radius = radius_of_class(widest,", to: "radius = radius_of_class(widest, 0 * ",
-        kernels: &["flux_to_radiance"], noticed_by: &[(RoomBesideHall, TooDark)] },
+        noticed_by: &[(CoarseMirror, TooDark), (CoarseGlass, TooDark)] },
+    Fault { what: "all points have the widest radius",
+        file: "gather/radius_class.glsl", from: "uintBitsToFloat((127u - own_class) << 23)", to: "1.0",
+        kernels: &["disc_cuts", "gather_visible_points_u64", "gather_visible_points_two_words", "flux_to_radiance"], noticed_by: &[(RoomBesideHall, TooBright)] },
+    Fault { what: "photons behind a wall count before it",
+        file: "gather/cuts.glsl", from: "return beyond;", to: "return false;",
+        kernels: &["gather_visible_points_u64", "gather_visible_points_two_words"], noticed_by: &[(BehindWall, Leak)] },
+    Fault { what: "the floor behind a wall is taken for floor before it",
+        file: "gather/cover.glsl", from: "if (line.w < cuts.reach) {", to: "if (false) {",
+        kernels: &["flux_to_radiance"], noticed_by: &[(BesideBox, TooDark)] },
+    Fault { what: "smooth normals alone reflect totally in glass for ever",
+        file: "material/scatter.glsl", from: "&& depth >= SMOOTH_TOTAL_REFLECTIONS", to: "&& false",
+        kernels: &["view"],
+        noticed_by: &[(CoarseGlass, TooDark)] },
     Fault { what: "a spot falls off by its share, not by the square of it",
         file: "world/scene/lights.glsl", from: "return share * share;", to: "return share;",
         kernels: &["receive"], noticed_by: &[(Spot, TooBright)] },
@@ -467,11 +476,14 @@ fn ask(gpu: &Gpu, question: Question) -> Check<Complaint> {
         LeaningScatterer => known::leaning_scatterer(gpu),
         PatchInPlane => known::patch_in_a_plane(gpu),
         StackFromAfar => known::stack_from_afar(gpu),
-        CoarseMirror => known::coarse_mirror_in_a_furnace(gpu, 8),
+        CoarseMirror => known::coarse_sphere_in_a_furnace(gpu, mirror(1.0), 8),
+        CoarseGlass => known::coarse_sphere_in_a_furnace(gpu, glass(1.5), 8),
         RoomBesideHall => known::room_beside_a_hall(gpu, true),
         DimRoom(ratio) => lamps::dim_room(gpu, ratio, true),
         ManyLamps(side) => lamps::many_lamps(gpu, side, true),
         MissedLamp => lamps::missed_lamp(gpu),
+        BehindWall => known::behind_a_wall(gpu, known::sheet(), Some(0.1)),
+        BesideBox => known::beside_a_box(gpu, Some(0.1)),
         AimedLight(kind) => aimed::same_light(gpu, kind),
     }
 }

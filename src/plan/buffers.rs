@@ -223,6 +223,8 @@ impl ScenePlan {
             buffer::<f32>("clearances", classed, "how far it is from there to the next wall or edge"),
             buffer::<u32>("class counts", 2 * u64::from(RADIUS_CLASSES), "visible points of each class"),
         ]);
+        let cuts = if self.cuts_discs() { points * self.maps().count() as u64 } else { 0 };
+        buffers.push(buffer::<[u32; 4]>("disc cuts", cuts, "where walls end what a visible point looks through"));
         let camera_paths = buffer::<CameraPath>("camera paths", self.camera_path_capacity(), "paths that one dispatch leaves");
         buffers.extend([camera_paths; 2]);
         if let Sensor::Receivers { count } = self.sensor {

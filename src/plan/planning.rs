@@ -84,11 +84,16 @@ impl ScenePlan {
             chain_steps,
             film_scale: 1.0,
             film_limit: 1.0,
+            rare_radiance: 0.0,
             work_per_submission: limits.pair_tests_per_submission,
             bytes: 0,
             planned_in: Duration::ZERO,
         };
         plan.set_film(geometry);
+        let shows_lamps = plan.keeps(Effect::SpecularChains) && facts.has(Surface::is_specular);
+        if shows_lamps && matches!(sensor, Sensor::Picture { .. }) && plan.settings.part as u32 & PART_SPECULAR != 0 {
+            plan.rare_radiance = geometry.brightest_shown();
+        }
         plan.check_sizes(geometry, limits)?;
         plan.decisions = plan.decisions.iter().map(|decision| plan.given(decision, geometry)).collect();
         plan.planned_in = began.elapsed();

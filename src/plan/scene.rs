@@ -103,6 +103,9 @@ pub struct ScenePlan {
     /// Film units in 1 W/m2/sr or W/m2, a power of two, and the most that one round may add.
     pub film_scale: f64,
     pub film_limit: f64,
+    /// Radiance of the brightest that a camera path may meet over mirrors and glass, W/m2/sr, all channels together; 0 where none
+    /// can. Such hits are rare and bright: they are the tail of the noise.
+    pub rare_radiance: f64,
     /// Rays or pair tests after which commands are handed to the device.
     pub work_per_submission: u64,
     /// Bytes of all buffers, with one set of receivers; see [`ScenePlan::bytes_of`].
@@ -170,6 +173,16 @@ impl ScenePlan {
     /// How shadow rays choose lights; `None` where they do by power.
     pub fn lights(&self) -> Option<&LightChoice> {
         self.trial.as_ref()?.lights.as_deref().filter(|_| self.constant("LIGHT_CLUSTERS") != 0)
+    }
+
+    /// Whether density estimates end at walls.
+    pub fn cuts_discs(&self) -> bool {
+        self.settings.edge_correction && self.maps().next().is_some()
+    }
+
+    /// Where the cuts of a map's discs begin among those of all.
+    pub fn first_cut(&self, caustic_only: bool) -> u32 {
+        if caustic_only && self.global.is_some() { self.visible_points() } else { 0 }
     }
 
     /// Radius of class 0 in a round, normalised; of all points where there are no classes.

@@ -45,6 +45,8 @@ buffers! {
         radius_classes: Buffer<u32> = planned.one("radius classes")?,
         clearances: Buffer<f32> = planned.one("clearances")?,
         class_counts: Buffer<u32> = planned.zeroed(commands, "class counts")?,
+        /// Of the round under way.
+        disc_cuts: Buffer<[u32; 4]> = planned.one("disc cuts")?,
         // All rounds.
         film_sums: Buffer<u64> = planned.zeroed(commands, "film sums")?,
         film_squares: Buffer<u64> = planned.zeroed(commands, "film squares")?,

@@ -149,11 +149,20 @@ impl Geometry {
     /// Radiance of the brightest thing that a camera can see, W/m2/sr, or the irradiance a sixteenth of the scene's
     /// unit from a point or spot light: what a narrow spot lights is far brighter than its power over the scene's area.
     pub fn brightest(&self) -> f64 {
-        let shines = self.materials.iter().map(|material| material.emission);
-        let environment = self.emitters.iter().filter(|emitter| emitter.kind == EMITTER_ENVIRONMENT).map(|emitter| emitter.strength);
         let small = self.emitters.iter().filter(|emitter| matches!(emitter.kind, EMITTER_POINT | EMITTER_SPOT));
         let irradiance = small.map(|emitter| 2f64.powi(8) * f64::from(emitter.strength.max_element()));
-        shines.chain(environment).map(|radiance| f64::from(radiance.max_element())).chain(irradiance).fold(0.0, f64::max)
+        self.shown_radiances().map(|radiance| f64::from(radiance.max_element())).chain(irradiance).fold(0.0, f64::max)
+    }
+
+    /// Radiance of the brightest surface or sky that a path can meet, W/m2/sr, the root of the sum of its channels' squares.
+    pub fn brightest_shown(&self) -> f64 {
+        self.shown_radiances().map(|radiance| f64::from(radiance.length())).fold(0.0, f64::max)
+    }
+
+    fn shown_radiances(&self) -> impl Iterator<Item = Vec3> {
+        let shines = self.materials.iter().map(|material| material.emission);
+        let environment = self.emitters.iter().filter(|emitter| emitter.kind == EMITTER_ENVIRONMENT);
+        shines.chain(environment.map(|emitter| emitter.strength))
     }
 }
 
