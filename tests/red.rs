@@ -479,11 +479,11 @@ fn ask(gpu: &Gpu, question: Question) -> Check<Complaint> {
         CoarseMirror => known::coarse_sphere_in_a_furnace(gpu, mirror(1.0), 8),
         CoarseGlass => known::coarse_sphere_in_a_furnace(gpu, glass(1.5), 8),
         RoomBesideHall => known::room_beside_a_hall(gpu, true),
+        BehindWall => known::behind_a_wall(gpu, known::sheet(), Some(0.1)),
+        BesideBox => known::beside_a_box(gpu, Some(0.1)),
         DimRoom(ratio) => lamps::dim_room(gpu, ratio, true),
         ManyLamps(side) => lamps::many_lamps(gpu, side, true),
         MissedLamp => lamps::missed_lamp(gpu),
-        BehindWall => known::behind_a_wall(gpu, known::sheet(), Some(0.1)),
-        BesideBox => known::beside_a_box(gpu, Some(0.1)),
         AimedLight(kind) => aimed::same_light(gpu, kind),
     }
 }

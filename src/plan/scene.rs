@@ -170,11 +170,6 @@ impl ScenePlan {
         self.maps().any(|map| map.classes.is_some())
     }
 
-    /// How shadow rays choose lights; `None` where they do by power.
-    pub fn lights(&self) -> Option<&LightChoice> {
-        self.trial.as_ref()?.lights.as_deref().filter(|_| self.constant("LIGHT_CLUSTERS") != 0)
-    }
-
     /// Whether density estimates end at walls.
     pub fn cuts_discs(&self) -> bool {
         self.settings.edge_correction && self.maps().next().is_some()
@@ -183,6 +178,11 @@ impl ScenePlan {
     /// Where the cuts of a map's discs begin among those of all.
     pub fn first_cut(&self, caustic_only: bool) -> u32 {
         if caustic_only && self.global.is_some() { self.visible_points() } else { 0 }
+    }
+
+    /// How shadow rays choose lights; `None` where they do by power.
+    pub fn lights(&self) -> Option<&LightChoice> {
+        self.trial.as_ref()?.lights.as_deref().filter(|_| self.constant("LIGHT_CLUSTERS") != 0)
     }
 
     /// Radius of class 0 in a round, normalised; of all points where there are no classes.
