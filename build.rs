@@ -161,6 +161,7 @@ const WORLDS: [(&str, &[&str]); 2] = [
             "light_nodes",
             "light_regions",
             "light_shares",
+            "openings",
         ],
     ),
 ];

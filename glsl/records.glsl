@@ -313,6 +313,21 @@ struct CausticTarget {
     float radius;
 };
 
+// A ray that may leave the scene.
+struct OpeningRay {
+    vec3 origin;
+    vec3 direction;
+    // 1: it does.
+    uint escapes;
+};
+
+struct TryOpeningsPush {
+    uvec2 seed;
+    uint first_ray;
+    uint end_ray;
+    uint rays_of_point;
+};
+
 // A path from the camera or a receiver, under way over mirrors and glass.
 struct CameraPath {
     vec3 position;
@@ -365,6 +380,8 @@ struct PhotonEmission {
     float scene_radius;
     // Spheres that they are aimed at; 0: at none.
     uint target_count;
+    // 1: those from beyond the scene are aimed at its openings.
+    uint through_openings;
     // What aimed photons' flux is multiplied by; see [`crate::plan::scene::MapPlan::flux_gain`].
     float flux_gain;
 };

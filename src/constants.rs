@@ -108,6 +108,9 @@ constants! {
     /// There is a visible point, whatever is asked of it.
     SEEN = 2048;
 
+    /// Openings, at most, that shadow rays and photons from beyond the scene are aimed at.
+    MAX_OPENINGS = 8;
+
     /// `GATHER_RAYS`: which visible points take their indirect light from a ray of a final gather.
     GATHER_NONE = 0;
     GATHER_GLOSSY = 1;

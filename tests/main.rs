@@ -28,6 +28,7 @@ mod ledger;
 mod lights;
 mod limits;
 mod memory;
+mod openings;
 mod optics;
 mod overlap;
 mod packing;

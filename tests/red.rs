@@ -12,6 +12,7 @@ use crate::common::{MANY_PHOTONS, aimed, bits, estimate_check, known, lamps, not
 use crate::film::pairs_count_on;
 use crate::hard_cases::readme_and_guide;
 use crate::ledger::closed_fates;
+use crate::openings::light_through_a_window;
 use crate::paranoid::{box_is_finite, scene_is_finite};
 use crate::strict::{film_agrees, photons_agree, rounding_check};
 use crate::transport::{appends_agree, crowd_check};
@@ -69,6 +70,8 @@ enum Question {
     DimRoom(f32),
     ManyLamps(u32),
     MissedLamp,
+    /// Light through a window of `openings`.
+    Window,
     /// Aimed photons bring as much light as others: a scene of `common::aimed`.
     AimedLight(&'static str),
 }
@@ -117,7 +120,7 @@ struct Fault {
 }
 
 #[rustfmt::skip]
-const FAULTS: [Fault; 78] = [
+const FAULTS: [Fault; 80] = [
     Fault { what: "what rounding takes from a pair of floats is forgotten",
         file: "film/float_u64.glsl", from: "precise float rest = sum.y + (", to: "precise float rest = 0.0 * (",
         kernels: &["gather_brute_u64", "gather_grid_u64"], noticed_by: &[(Pairs, SumsTooSmall)] },
@@ -361,6 +364,12 @@ const FAULTS: [Fault; 78] = [
         file: "material/scatter.glsl", from: "&& depth >= SMOOTH_TOTAL_REFLECTIONS", to: "&& false",
         kernels: &["view"],
         noticed_by: &[(CoarseGlass, TooDark)] },
+    Fault { what: "a ray to the sky weighs as if only openings were aimed at",
+        file: "world/scene/openings.glsl", from: "float density = (1.0 - share) *", to: "float density = 0.0 *",
+        kernels: &["receive"], noticed_by: &[(Window, TooBright)] },
+    Fault { what: "photons aimed at openings carry as much as any",
+        file: "world/scene/openings.glsl", from: "emission.flux *= divide(1.0, 1.0 - OPENING_SHARE + divide(OPENING_SHARE * discs * whole, sum));", to: "",
+        kernels: &["trace_persistent_scene", "emit_scene"], noticed_by: &[(Window, TooBright)] },
     Fault { what: "a spot falls off by its share, not by the square of it",
         file: "world/scene/lights.glsl", from: "return share * share;", to: "return share;",
         kernels: &["receive"], noticed_by: &[(Spot, TooBright)] },
@@ -484,6 +493,7 @@ fn ask(gpu: &Gpu, question: Question) -> Check<Complaint> {
         DimRoom(ratio) => lamps::dim_room(gpu, ratio, true),
         ManyLamps(side) => lamps::many_lamps(gpu, side, true),
         MissedLamp => lamps::missed_lamp(gpu),
+        Window => light_through_a_window(gpu),
         AimedLight(kind) => aimed::same_light(gpu, kind),
     }
 }

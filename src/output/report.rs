@@ -122,7 +122,7 @@ fn errors(error: &FilmError, bias: Option<&Bias>, lost: f64, confidence: f64) ->
     } else if let Some(Bias { relative, lower, upper, batches, rounds_per_batch, seconds, .. }) = bias {
         writeln!(
             text,
-            "bias of the radius: {:.2} %, from {:.2} % to {:.2} % ({sure} % confidence; measured in {seconds:.2} s from {batches} batches of {} at two radii)",
+            "bias of the radius: {:.2} %, from {:.2} % to {:.2} % ({sure} % confidence; measured in {seconds:.2} s from {batches} batches of {} at two radii, which do not show what is much narrower than both)",
             percent(*relative),
             percent(*lower),
             percent(*upper),

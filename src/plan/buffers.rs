@@ -199,6 +199,7 @@ impl ScenePlan {
             of("textures", &geometry.textures, textured, "sizes of textures"),
             of::<UVec2>("texels", &geometry.texels, textured, "textures"),
             of("emitters", &geometry.emitters, true, "emitters"),
+            of("openings", &self.openings(), true, "openings that light comes in through"),
             of("caustic targets", &self.targets, true, "spheres that photons are aimed at"),
             buffer::<LightNode>("light nodes", nodes as u64, "the tree of lights"),
             buffer::<LightRegion>("light regions", regions as u64, "regions in which lights are chosen alike"),

@@ -10,6 +10,7 @@ use crate::error::{Result, require};
 use crate::photon::MapPhoton;
 use crate::records::{CausticTarget, LightPath};
 use crate::scene::geometry::Geometry;
+use crate::scene::openings::OPENING_SHARE;
 use crate::scene::targets::{aimed_shares, caustic_targets};
 use crate::scene::{Scene, Surface};
 use crate::settings::Builder;
@@ -93,6 +94,7 @@ fn map(
         let photons = f64::from(chunk_photons);
         2.0 * landings_of_each * (photons + 10.0 * photons.sqrt()) <= f64::from(capacity)
     };
+    let through_openings = !caustic_only && trial.is_some_and(|trial| !trial.openings.is_empty());
     let is_persistent = settings.builder == Some(Builder::Persistent);
     let in_one = is_persistent && fits && settings.bounces <= flights_of_an_invocation(limits);
     let segment_bounces = if in_one { settings.bounces } else { settings.bounces.min(SEGMENT_BOUNCES) };
@@ -114,7 +116,9 @@ fn map(
         classes,
         lanes: capacity::lanes_of(expected / FOUND_BY_LANE, limits),
         target_count: 0,
-        flux_gain: 1.0,
+        through_openings,
+        // Photons that are not aimed carry the most: what their share is taken for.
+        flux_gain: if through_openings { 1.0 - OPENING_SHARE } else { 1.0 },
         flux_scale: trial.and_then(|trial| trial.lights.as_ref()).map_or(1.0, |lights| lights.flux_scale),
     })
 }

@@ -15,7 +15,7 @@ use crate::constants::*;
 use crate::error::{Error, Result, require};
 use crate::photon::MapPhoton;
 use crate::scene::geometry::Geometry;
-use crate::scene::{Scene, Surface};
+use crate::scene::{Scene, Surface, openings};
 use crate::settings::scene::{Effect, Illumination, SceneSettings};
 use crate::settings::{Builder, Math};
 
@@ -160,6 +160,13 @@ impl ScenePlan {
         }
     }
 
+    fn openings_in_words(&self) -> String {
+        match self.trial.as_ref().map_or(0, |trial| trial.openings.len()) {
+            0 => String::new(),
+            count => format!("; rays and photons aimed at {}", crate::text::counted(count as u32, "opening")),
+        }
+    }
+
     /// A decision with the photons and bytes that exist for its effect, and what became of it.
     fn given(&self, decision: &EffectDecision, geometry: &Geometry) -> EffectDecision {
         let mut decision = decision.clone();
@@ -177,6 +184,10 @@ impl ScenePlan {
                 let lights = self.lights();
                 decision.evidence.push_str(&lights.map_or_else(String::new, LightChoice::in_words));
                 (0, lights.map_or(0, LightChoice::bytes))
+            }
+            Effect::Environment | Effect::DirectionalLights => {
+                decision.evidence.push_str(&self.openings_in_words());
+                (0, 0)
             }
             Effect::Textures => (0, size_of_val(geometry.uvs.as_slice()) as u64 + size_of_val(geometry.texels.as_slice()) as u64),
             Effect::SmoothNormals => (0, size_of_val(geometry.normals.as_slice()) as u64),
@@ -229,6 +240,7 @@ fn constants(
         ("HAS_SPECULAR_CHAINS", flag(Effect::SpecularChains)),
         ("HAS_SLOTS", u32::from(settings.builder == Some(Builder::Naive))),
         ("HAS_AIMED_PHOTONS", u32::from(!maps.targets.is_empty())),
+        ("HAS_OPENINGS", u32::from(settings.aim && openings::light_from_beyond(geometry))),
         ("HAS_RADIUS_CLASSES", u32::from(maps.global.iter().chain(&maps.caustic).any(|map| map.classes.is_some()))),
     ]
 }

@@ -11,6 +11,7 @@ use super::light_choice::LightChoice;
 use crate::constants::{LEAST_RADIUS_BITS, LOOP_LIMIT, RADIUS_CLASSES};
 use crate::error::{Result, require};
 use crate::photon::MapPhoton;
+use crate::records::CausticTarget;
 use crate::rng::mix32;
 use crate::scene::geometry::Geometry;
 
@@ -38,6 +39,9 @@ pub struct Trial {
     /// How shadow rays choose lights; `None` where they choose one lamp, or none.
     #[serde(skip)]
     pub lights: Option<Arc<LightChoice>>,
+    /// Where light from beyond the scene comes in.
+    #[serde(skip)]
+    pub openings: Vec<CausticTarget>,
     /// What the run multiplies all radii by.
     #[serde(skip)]
     pub factor: Option<f64>,

@@ -48,6 +48,8 @@ pub struct MapPlan {
     pub lanes: u32,
     /// Spheres that its photons are aimed at; 0: they leave their lights in all directions.
     pub target_count: u32,
+    /// Those from beyond the scene are aimed at its openings.
+    pub through_openings: bool,
     /// A power of two by which its photons carry more than they stand for: aimed ones stand for a share of their
     /// light's, and their sums have a fixed point.
     pub flux_gain: f64,
@@ -178,6 +180,13 @@ impl ScenePlan {
     /// Where the cuts of a map's discs begin among those of all.
     pub fn first_cut(&self, caustic_only: bool) -> u32 {
         if caustic_only && self.global.is_some() { self.visible_points() } else { 0 }
+    }
+
+    /// Openings that a trial found, and as many of radius 0 as there may be more; none where no light comes from beyond the scene.
+    pub fn openings(&self) -> Vec<CausticTarget> {
+        let mut openings = self.trial.as_ref().map_or_else(Vec::new, |trial| trial.openings.clone());
+        openings.resize(if self.constant("HAS_OPENINGS") != 0 { MAX_OPENINGS as usize } else { 0 }, CausticTarget::default());
+        openings
     }
 
     /// How shadow rays choose lights; `None` where they do by power.

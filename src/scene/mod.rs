@@ -12,6 +12,7 @@ pub mod light_tree;
 pub mod material;
 pub mod mesh;
 pub mod open_box;
+pub mod openings;
 pub mod overlap;
 mod planes;
 pub mod rectangle;

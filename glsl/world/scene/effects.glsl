@@ -36,6 +36,8 @@ layout(constant_id = 27) const uint PARTS = 15;
 layout(constant_id = 28) const uint FILTER = FILTER_BOX;
 layout(constant_id = 29) const bool HAS_SPECULAR_CHAINS = true;
 layout(constant_id = 40) const bool HAS_AIMED_PHOTONS = true;
+// Light comes from beyond the scene, perhaps through openings.
+layout(constant_id = 50) const bool HAS_OPENINGS = false;
 // Radii differ from point to point.
 layout(constant_id = 48) const bool HAS_RADIUS_CLASSES = false;
 // Clusters of lights, of which a shadow ray chooses one by what they did in a trial; 0: it chooses a light by its power.

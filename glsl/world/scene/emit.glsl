@@ -16,6 +16,14 @@ LightPath leave_light(uint photon, Draws draws, PhotonEmission emission)
             emitted.flux *= emission.flux_gain;
         }
     }
+    if (HAS_OPENINGS) {
+        if (emission.through_openings != 0) {
+            if (emitted.is_far) {
+                aim_at_openings(emitted, emission.scene_radius, vec3(w.z, u.yz));
+            }
+            emitted.flux *= emission.flux_gain;
+        }
+    }
     note_unless(is_finite(emitted.position) && is_finite(emitted.direction) && is_finite(emitted.flux), NONFINITE_PHOTON, draws.domain,
                 draws.round, photon);
     return LightPath(emitted.position, photon, emitted.direction, ARRIVED_DIRECT, emitted.flux);

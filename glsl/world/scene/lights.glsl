@@ -138,6 +138,8 @@ bool is_before(float height, vec3 position, float error)
     return abs(height) > 2.0 * (position_error(position) + error);
 }
 
+#include "world/scene/openings.glsl"
+
 // What one light adds at a point: `radiance` is what arrives along wi, over the probability density of
 // this sample; the light ends at `target`, or comes from beyond the scene.
 struct Arriving {
@@ -209,9 +211,19 @@ Arriving sample_light(Emitter light, vec3 position, vec3 ns, vec2 u)
     if (HAS_ENVIRONMENT) {
         if (light.kind == EMITTER_ENVIRONMENT) {
             arriving.is_far = true;
-            vec3 local = sample_cosine_hemisphere(u.x, u.y);
-            arriving.wi = to_frame(local, ns);
-            arriving.radiance *= divide(3.14159265358979324, max(local.z, 1e-6));
+            bool is_open = true;
+            if (HAS_OPENINGS) {
+                is_open = openings[0].radius == 0.0;
+            }
+            if (is_open) {
+                vec3 local = sample_cosine_hemisphere(u.x, u.y);
+                arriving.wi = to_frame(local, ns);
+                arriving.radiance *= divide(3.14159265358979324, max(local.z, 1e-6));
+            } else {
+                SampledSky sampled = sample_sky(position, ns, u.xy);
+                arriving.wi = sampled.wi;
+                arriving.radiance *= divide(1.0, max(sampled.density, 1e-6));
+            }
         }
     }
     if (!arriving.is_far) {

@@ -20,6 +20,7 @@ pub mod index;
 mod light_trial;
 pub mod losses;
 mod on_gpu;
+mod opening_trial;
 pub mod points;
 pub mod radius_class;
 pub mod replay;

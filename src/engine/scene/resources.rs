@@ -27,6 +27,7 @@ buffers! {
             caustic_targets: planned.filled(commands, "caustic targets", &plan.targets)?,
             light_nodes: planned.filled(commands, "light nodes", plan.lights().map_or(&[], |lights| &lights.nodes))?,
             light_regions: planned.filled(commands, "light regions", plan.lights().map_or(&[], |lights| &lights.regions))?,
+            openings: planned.filled(commands, "openings", &plan.openings())?,
             light_shares: planned.filled(commands, "light shares", plan.lights().map_or(&[], |lights| &lights.shares))?,
         },
         /// Points of all phases; empty for a picture.

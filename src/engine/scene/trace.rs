@@ -160,6 +160,7 @@ fn emission(geometry: &Geometry, map: &MapPlan, (first_photon, photon_count): (u
         emitter_count: geometry.emitters.len() as u32,
         scene_radius: geometry.radius as f32,
         target_count: map.target_count,
+        through_openings: u32::from(map.through_openings),
         flux_gain: map.flux_gain as f32,
     }
 }

@@ -15,7 +15,7 @@ use glam::Vec4;
 use rayon::prelude::*;
 
 use super::resources::SceneResources;
-use super::{Round, View, constants, light_trial, modules, points, trace};
+use super::{Round, View, constants, light_trial, modules, opening_trial, points, trace};
 use crate::engine;
 use crate::engine::bias;
 use crate::error::Result;
@@ -66,7 +66,7 @@ pub fn plan(gpu: &Gpu, scene: &Scene, view: &View, settings: &SceneSettings, sen
     let plan = ScenePlan::new(scene, view.geometry, settings, sensor, &limits)?;
     // Whatever part of the picture is asked for, so that all parts have the same photons.
     let chooses_lights = !light_tree::is_one_lamp(view.geometry);
-    if plan.maps().all(|map| map.radius_from == RadiusFrom::User) && !chooses_lights {
+    if plan.maps().all(|map| map.radius_from == RadiusFrom::User) && !chooses_lights && plan.openings().is_empty() {
         return Ok(plan);
     }
     let lights = chooses_lights.then(|| LightTree::new(view.geometry));
@@ -108,7 +108,10 @@ fn run(gpu: &Gpu, scene: &Scene, view: &View, run: &ScenePlan, lights: Option<Li
     let plan = ScenePlan::with_trial(scene, view.geometry, &settings, sensor, limits, by_power)?;
 
     // All pipelines of the run, which they are made for, but where it shows a part alone.
-    gpu.prepare(&[modules(&plan, gpu.facts()), vec![Clearance::MODULE], light_trial::modules(&plan)].concat(), &constants(&plan))?;
+    gpu.prepare(
+        &[modules(&plan, gpu.facts()), vec![Clearance::MODULE], light_trial::modules(&plan), opening_trial::modules(&plan)].concat(),
+        &constants(&plan),
+    )?;
     let began = Instant::now();
     let mut commands = Commands::new(gpu, constants(&plan), began)?;
     let resources = SceneResources::new(gpu, &mut commands, view.geometry, &plan, &phases)?;
@@ -127,8 +130,11 @@ fn run(gpu: &Gpu, scene: &Scene, view: &View, run: &ScenePlan, lights: Option<Li
     let clearances = commands.read(&clearances, point_count as usize)?;
 
     let mut trial = Trial::default();
+    let points = light_trial::points(&phases, &visible_points, &view.geometry.planes);
+    if !plan.openings().is_empty() {
+        trial.openings = opening_trial::find(gpu, &mut commands, round, &points)?;
+    }
     if let Some(lights) = lights {
-        let points = light_trial::points(&phases, &visible_points, &view.geometry.planes);
         let lights = light_trial::learn(gpu, &mut commands, round, lights, &points)?;
         commands.upload(&resources.scene.emitters, &lights.emitters)?;
         trial.lights = Some(Arc::new(lights));

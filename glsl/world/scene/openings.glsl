@@ -1,0 +1,95 @@
+// Openings that light from beyond the scene comes through: a few spheres that a trial found (src/scene/openings.rs). Shadow rays and photons
+// are aimed at them, but for a share that is not: so none is impossible, and each weighs by the density of both ways together (the balance
+// heuristic, Veach 1997, section 9.2).
+
+// Of radius 0: there are no more.
+layout(set = 0, binding = 13, scalar) readonly buffer Openings { CausticTarget openings[]; };
+
+// Of what is aimed. Twin of src/scene/openings.rs.
+const float OPENING_SHARE = 0.75;
+
+// Versine of half the angle that an opening takes up as seen from a place; 0 if the place lies in it.
+float opening_versine(uint opening, vec3 position)
+{
+    vec3 way = openings[opening].centre - position;
+    float squared = dot(way, way);
+    float radius = openings[opening].radius;
+    float sine_squared = divide(radius * radius, max(squared, 1e-30));
+    return sine_squared < 1.0 ? divide(sine_squared, 1.0 + sqrt(1.0 - sine_squared)) : 0.0;
+}
+
+// A direction, and its density, 1/sr.
+struct SampledSky {
+    vec3 wi;
+    float density;
+};
+
+// Towards the openings or, by the cosine, anywhere.
+SampledSky sample_sky(vec3 position, vec3 ns, vec2 u)
+{
+    float sum = 0.0;
+    for (uint k = 0; k < MAX_OPENINGS && openings[k].radius > 0.0; k++) {
+        sum += opening_versine(k, position);
+    }
+    float share = sum > 0.0 ? OPENING_SHARE : 0.0;
+    vec3 wi = vec3(0.0);
+    if (u.x < share) {
+        float left = divide(u.x, share) * sum;
+        uint chosen = 0;
+        float versine = 0.0;
+        for (uint k = 0; k < MAX_OPENINGS && openings[k].radius > 0.0; k++) {
+            float own = opening_versine(k, position);
+            if (own > 0.0 && (versine == 0.0 || left >= 0.0)) {
+                chosen = k;
+                versine = own;
+                u.x = clamp(divide(left, own), 0.0, 1.0);
+            }
+            left -= own;
+        }
+        versine *= u.x;
+        wi = to_frame(direction_at(1.0 - versine, versine * (2.0 - versine), u.y), normalize(openings[chosen].centre - position));
+    } else {
+        wi = to_frame(sample_cosine_hemisphere(divide(u.x - share, 1.0 - share), u.y), ns);
+    }
+    float density = (1.0 - share) * max(dot(wi, ns), 0.0) * 0.31830988618379067;
+    if (share > 0.0) {
+        float cones = 0.0;
+        for (uint k = 0; k < MAX_OPENINGS && openings[k].radius > 0.0; k++) {
+            float own = opening_versine(k, position);
+            cones += own > 0.0 && versine_between(wi, normalize(openings[k].centre - position)) <= own ? 1.0 : 0.0;
+        }
+        density += divide(share * cones, 6.28318530717958648 * sum);
+    }
+    return SampledSky(wi, density);
+}
+
+// Moves a photon from beyond the scene, which keeps its direction: it starts on the discs that cover the openings, or stays.
+// u = (which, two for the disc).
+void aim_at_openings(inout Emission emission, float scene_radius, vec3 u)
+{
+    float whole = scene_radius * scene_radius;
+    float sum = 0.0;
+    for (uint k = 0; k < MAX_OPENINGS && openings[k].radius > 0.0; k++) {
+        sum += openings[k].radius * openings[k].radius;
+    }
+    if (sum == 0.0 || sum >= whole) {
+        return;
+    }
+    if (u.x < OPENING_SHARE) {
+        float left = divide(u.x, OPENING_SHARE) * sum;
+        uint chosen = 0;
+        for (uint k = 0; k < MAX_OPENINGS && openings[k].radius > 0.0; k++) {
+            chosen = left >= 0.0 ? k : chosen;
+            left -= openings[k].radius * openings[k].radius;
+        }
+        CausticTarget opening = openings[chosen];
+        vec3 centre = opening.centre - (dot(opening.centre, emission.direction) + 2.0 * scene_radius) * emission.direction;
+        emission.position = sample_disc(centre, emission.direction, opening.radius, u.yz);
+    }
+    float discs = 0.0;
+    for (uint k = 0; k < MAX_OPENINGS && openings[k].radius > 0.0; k++) {
+        vec3 off = cross(emission.position - openings[k].centre, emission.direction);
+        discs += dot(off, off) <= openings[k].radius * openings[k].radius ? 1.0 : 0.0;
+    }
+    emission.flux *= divide(1.0, 1.0 - OPENING_SHARE + divide(OPENING_SHARE * discs * whole, sum));
+}

@@ -1,0 +1,93 @@
+//! Light from beyond the scene that comes in through a small opening: rays and photons are aimed at it.
+
+use crate::common::estimate_check;
+use crate::common::prelude::*;
+use crate::unknown::room_without_floor;
+use glam::dvec3;
+use photonmill::engine::scene::{RunResult, Target, render};
+
+/// A room of 4 x 4 x 3 m under a sky of 1 W/m2/sr that it sees through a square hole in its ceiling; of 80 m2 of walls the hole is 1 %
+/// with a half edge of 0.447 m.
+fn room_under_the_sky(hole: f64) -> Scene {
+    let meshes = [room_without_floor(hole), vec![level(0.0, [4.0, 4.0], true, 0)]].concat();
+    scene_of(meshes, vec![matt(0.5)], vec![LightKind::Environment { radiance: Vec3::ONE }])
+}
+
+/// Irradiance on the floor below the middle of the hole, at a quarter of it from each side: four corners of a rectangle that is parallel
+/// (Howell's catalogue of radiation configuration factors, B-3).
+fn below_the_hole(half: f64, height: f64) -> f64 {
+    let a = half / height;
+    let root = (1.0 + a * a).sqrt();
+    4.0 * PI * (1.0 / TAU) * 2.0 * (a / root) * (a / root).atan()
+}
+
+/// Mean of scattered light over the points, by the path tracer with 40 000 samples of each.
+const SCATTERED: f64 = 0.0285;
+
+fn points() -> Vec<(DVec3, DVec3)> {
+    [-1.5, -0.5, 0.0, 0.5, 1.5].iter().flat_map(|x| [-1.5, 0.0, 1.5].map(|z| (dvec3(*x, 0.0, z), DVec3::Y))).collect()
+}
+
+fn lit(gpu: &Gpu, scene: &Scene, settings: &SceneSettings) -> RunResult {
+    render(gpu, scene, settings, Target::Points(&points())).unwrap()
+}
+
+fn settings(part: Part, aim: bool) -> SceneSettings {
+    SceneSettings { photons: 20_000, rounds: 32, part, aim, ..SceneSettings::default() }
+}
+
+/// The light is what a path tracer finds, and its variance less than a tenth of that of rays and photons that are not aimed.
+#[test]
+fn a_small_window_lights_a_room_in_a_tenth_of_the_time() {
+    let Some(gpu) = device() else { return };
+    let scene = room_under_the_sky(0.447);
+    let judged = Judge::new(&scene, 32).irradiance_at(&points(), 40_000, 1);
+    let scattered = judged.iter().map(|point| point.mean.indirect.x).sum::<f64>() / judged.len() as f64;
+    assert!((scattered / SCATTERED - 1.0).abs() < 0.02, "{scattered}");
+    for part in [Part::Direct, Part::Indirect] {
+        let [aimed, other] = [true, false].map(|aim| lit(&gpu, &scene, &settings(part, aim)));
+        assert_eq!(aimed.plan.trial.as_ref().map(|trial| trial.openings.len()), Some(1), "{part:?}");
+        let [little, much] = [&aimed, &other].map(|lit| lit.film.relative_error(&lit.plan));
+        println!("{part:?}: {:.2} % and {:.2} %", 100.0 * little, 100.0 * much);
+        assert!((much / little).powi(2) > 10.0, "{part:?}: {little} and {much}");
+        for (point, judged) in judged.iter().enumerate() {
+            let (found, error) = red(&aimed, point);
+            let (expected, judges_error) = match part {
+                Part::Direct => (judged.mean.direct.x, judged.standard_error.direct.x),
+                _ => (judged.mean.indirect.x, judged.standard_error.indirect.x),
+            };
+            assert!(judges_error < 0.1 * expected, "{part:?}, point {point}: {expected} +- {judges_error}");
+            assert_holds(format!("{part:?}, point {point}"), z_check("aimed", found, expected, error.hypot(judges_error)));
+        }
+    }
+}
+
+/// Direct light below the middle of the hole is that of the closed form, and the light of all points that of the photons of many more
+/// rounds.
+pub fn light_through_a_window(gpu: &Gpu) -> Check<Complaint> {
+    let scene = room_under_the_sky(0.447);
+    let direct = lit(gpu, &scene, &SceneSettings { shadow_rays: 64, ..settings(Part::Direct, true) });
+    let ((found, error), exact) = (red(&direct, 7), below_the_hole(0.447, 3.0));
+    assert!(error < 0.02 * found, "{found} +- {error}");
+    estimate_check("below the hole", found, exact, error)?;
+    let indirect = lit(gpu, &scene, &settings(Part::Indirect, true));
+    let errors: f64 = (0..points().len()).map(|point| red(&indirect, point).1).sum();
+    estimate_check("scattered light", mean_red(&indirect), SCATTERED, errors / points().len() as f64)
+}
+
+#[test]
+fn a_sky_through_a_window_is_as_light_as_the_closed_form_says() {
+    let Some(gpu) = device() else { return };
+    assert_holds("the window", light_through_a_window(&gpu));
+}
+
+/// Where nothing is gained nothing changes: under the open sky.
+#[test]
+fn an_open_scene_has_no_openings_and_the_same_bits() {
+    let Some(gpu) = device() else { return };
+    let mut scene = scene("sky-over-plane");
+    scene.meshes.push(Mesh::sphere("ball", dvec3(0.0, 0.3, 0.0), 0.2, 16, 0));
+    let [aimed, other] = [true, false].map(|aim| lit(&gpu, &scene, &settings(Part::All, aim)));
+    assert!(aimed.plan.trial.as_ref().is_none_or(|trial| trial.openings.is_empty()));
+    assert_eq!(aimed.film.sums, other.film.sums);
+}
