@@ -1,12 +1,14 @@
 //! Shadow rays and photons choose lights by what these do where it is asked.
 
 use crate::common::chi_square::counts_check;
-use crate::common::lamps::{ROOM, cut_lamp, dark_room, dim_room, lit, many_lamps, missed_lamp, points, rooms, scattered_light};
+use crate::common::lamps::{
+    ROOM, cut_lamp, dark_room, dim_room, lit, many_lamps, missed_lamp, points, rooms, same_light_and_noise, scattered_light,
+};
 use crate::common::planted;
 use crate::common::prelude::*;
 use photonmill::constants::{LIGHT_LEAF, NONE};
 use photonmill::engine::scene::resources::SceneResources;
-use photonmill::engine::scene::{self, Target};
+use photonmill::engine::scene::{self, RunResult, Target};
 use photonmill::gpu::kernels::TryLights;
 use photonmill::output::scene_report;
 use photonmill::plan::light_choice::LightChoice;
@@ -28,6 +30,30 @@ fn scattered_light_of_a_dim_room_has_photons_of_its_own() {
         assert_holds(format!("1:{ratio}"), scattered_light(&gpu, ratio, true));
     }
     assert_complains("photons by power", scattered_light(&gpu, 1e3, false));
+}
+
+/// Photons that choose lights otherwise bring the same light: within a radius that is given, nothing else differs.
+#[test]
+fn photons_by_sight_bring_as_much_light_as_by_power() {
+    let Some(gpu) = device() else { return };
+    let mut scene = rooms(&[1.0, 3.0]);
+    // A lamp that faces the wall, so that little of it is seen, and a small one that is strong.
+    let (corner, x, y) = (DVec3::new(-1.0, 1.0, -1.7), DVec3::X * 0.5, DVec3::Y * 0.5);
+    scene.meshes.push(Mesh::parallelogram("cove", corner, y, x, 2));
+    scene.meshes.push(Mesh::parallelogram("small", DVec3::new(1.0, 2.5, 1.0), DVec3::X * 0.1, DVec3::Z * 0.1, 3));
+    scene.materials.push(Material { emission: Vec3::splat(50.0), ..matt(0.0) });
+    let usual = SceneSettings { photons: 1 << 14, rounds: 96, radius: Some(0.3), alpha: 1.0, ..SceneSettings::default() };
+    for settings in
+        [SceneSettings { part: Part::Indirect, ..usual.clone() }, SceneSettings { illumination: Illumination::Photons, ..usual }]
+    {
+        let by_power = lit(&gpu, &scene, &settings, &points(), None);
+        let by_sight = lit(&gpu, &scene, &settings, &points(), Some(&|_| {}));
+        let scale = |lit: &RunResult| lit.plan.global.as_ref().unwrap().flux_scale;
+        assert!(scale(&by_power) == 1.0 && scale(&by_sight) > 1.5 && scale(&by_sight) < 2.1, "{}", scale(&by_sight));
+        assert_holds("photons by sight", same_light_and_noise("photons by sight", &by_sight, &by_power, 2.0));
+        let more = lit(&gpu, &scene, &settings, &points(), Some(&|plan| plan.global.as_mut().unwrap().flux_scale *= 1.25));
+        assert_complains("photons that carry a quarter more", same_light_and_noise("a quarter more", &more, &by_power, 2.0));
+    }
 }
 
 #[test]
