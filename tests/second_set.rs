@@ -446,7 +446,10 @@ fn hold(family: &str) {
         let (began, setup) = (Instant::now(), (case.setup)());
         let values = found(&gpu, &setup);
         let verdict = judge(&values, setup.sure, setup.settings.rounds);
-        let off = |[expected, found, stated]: &[f64; 3]| if found == expected { 0.0 } else { ((found - expected) / stated).abs() };
+        let off = |[expected, found, stated]: &[f64; 3]| match stated.is_infinite() {
+            true => f64::INFINITY,
+            false => ((found - expected) / stated.max(f64::MIN_POSITIVE)).abs(),
+        };
         let [expected, found, stated] = values.iter().max_by(|a, b| off(a).total_cmp(&off(b))).unwrap();
         println!(
             "{} {} | {} | {} |  {:.1} s",
