@@ -145,7 +145,24 @@ const PACKED: [(&str, &[&str]); 5] = [
 /// Set 0 of each world: the buffers of its scene, in the order of their bindings.
 const WORLDS: [(&str, &[&str]); 2] = [
     ("Room", &["rooms", "walls", "lights", "points"]),
-    ("Scene", &["nodes", "triangles", "normals", "uvs", "materials", "textures", "texels", "emitters", "caustic_targets", "planes"]),
+    (
+        "Scene",
+        &[
+            "nodes",
+            "triangles",
+            "normals",
+            "uvs",
+            "materials",
+            "textures",
+            "texels",
+            "emitters",
+            "caustic_targets",
+            "planes",
+            "light_nodes",
+            "light_regions",
+            "light_shares",
+        ],
+    ),
 ];
 
 fn element_type(buffer: &str, element: &Type) -> String {

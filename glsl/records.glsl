@@ -288,6 +288,25 @@ struct Emitter {
     float outer_versine;
 };
 
+// A node of the tree of lights (`scene::light_tree`): those within a sphere.
+struct LightNode {
+    vec3 centre;
+    float radius_squared;
+    // Share of all lights' power.
+    float power;
+    // Of its children, which lie side by side, the first; of a leaf `LIGHT_LEAF` and its emitter.
+    uint child;
+};
+
+// A node of the tree of regions, in each of which shadow rays choose lights alike (`plan::light_choice`).
+struct LightRegion {
+    // 0 to 2: a coordinate of the position, 3 to 5: of the normal; `NONE`: a leaf.
+    uint axis;
+    float split;
+    // Of what lies below `split`, after which comes what lies above; of a leaf its number.
+    uint next;
+};
+
 // A sphere around surfaces that make caustics, which photons are aimed at.
 struct CausticTarget {
     vec3 centre;
@@ -393,6 +412,16 @@ struct SceneTracePersistentPush {
     uint stride;
 };
 
+// What each cluster of lights adds at some points.
+struct TryLightsPush {
+    Draws draws;
+    // Pairs of a point and a cluster, cluster by cluster of each point.
+    uint first_pair;
+    uint end_pair;
+    // Shadow rays of each.
+    uint ray_count;
+};
+
 struct GoOnPush {
     Draws draws;
     uint path_count;
@@ -470,6 +499,8 @@ struct SceneGatherPush {
     uint map_class;
     uint first_class;
     uint end_class;
+    // Where the map's cuts begin.
+    uint first_cut;
     CellPush cells;
 };
 
@@ -495,6 +526,23 @@ struct RadiusClassPush {
     CellPush cells;
 };
 
+// Where walls cut the discs of density estimates off.
+struct DiscCutsPush {
+    uint first_point;
+    uint end_point;
+    uint pixel_count;
+    // Of the picture; 0 where points are receivers, in an order of their own.
+    uint width;
+    uint height;
+    // Mask of the arrivals that the map holds.
+    uint arrivals;
+    // `GLOBAL_CLASS` or `CAUSTIC_CLASS`, and where its cuts begin.
+    uint map_class;
+    uint first_cut;
+    // Of class 0.
+    float radius;
+};
+
 struct FluxToRadiancePush {
     uint first_point;
     uint end_point;
@@ -513,6 +561,8 @@ struct FluxToRadiancePush {
     // Of class 0.
     float global_radius;
     float caustic_radius;
+    // Where the caustic map's cuts begin.
+    uint first_caustic_cut;
     // Flux of a photon of relative flux 1, over the photons of the round.
     float global_flux;
     float caustic_flux;

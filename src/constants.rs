@@ -35,6 +35,7 @@ constants! {
     DOMAIN_CAUSTIC_PHOTONS = 1;
     DOMAIN_CAMERA = 2;
     DOMAIN_RECEIVERS = 3;
+    DOMAIN_LIGHTS = 4;
     /// Philox blocks of an emission in a scene of triangles; bounce b has block `EMISSION_BLOCKS` + b.
     EMISSION_BLOCKS = 2;
     /// Philox blocks of one vertex of a path from the camera: one to go on, the other for light.
@@ -64,6 +65,8 @@ constants! {
     NONE = 0xffff_ffff;
     /// Bit of a triangle's plane: others hide a part of the triangle.
     HIDDEN = 0x8000_0000;
+    /// Bit of what stands below a node of the tree of lights: it is an emitter.
+    LIGHT_LEAF = 0x8000_0000;
     /// What is nearer to a plane than the inverse lies in it: 16 units in the last place of a coordinate of 0.5, where
     /// normalised scenes end. Rounding of positions and of their heights takes half of that (`glsl/gather/belongs.glsl`).
     IN_PLANE_INVERSE = 2_097_152;
@@ -143,6 +146,9 @@ constants! {
     /// which it may end any: a path that lossless glass traps would cost as much time as a whole round.
     ROULETTE_DEPTH = 32;
     LOSSLESS_DEPTH = 128;
+    /// Surfaces of a path after which a smooth normal alone makes no total reflection in glass: coarse facets would catch
+    /// light that the smooth shape lets out.
+    SMOOTH_TOTAL_REFLECTIONS = 8;
     /// Bounces of a scene's photons of which fates are counted apart; the last count takes in all later ones.
     TALLY_ROWS = 64;
     /// Words of one copy of a map's totals (`glsl/ledger/totals.glsl`), and the bits of flux after the binary point.

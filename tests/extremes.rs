@@ -399,14 +399,14 @@ fn edges_and_corners_are_dark_by_what_lies_beyond_them() {
         let share = disc_rectangle_area(1.0, [-x, 5.0 - x], [-z, 5.0 - z]) / PI;
         let ratio = red(&without, place).0 / red(&with, place).0;
         worst = worst.max((ratio / share - 1.0).abs());
-        // An area in f32 is the sum over six edges of some twenty roundings each.
-        assert_holds(format!("{x}, {z} radii from the walls"), relative_check("share", ratio, share, 128.0 * U));
-        assert_complains("a share 0.1 % larger", relative_check("share", 1.001 * ratio, share, 128.0 * U));
+        // Where a wall ends a disc, its last ten-thousandth is left out, with its photons.
+        assert_holds(format!("{x}, {z} radii from the walls"), relative_check("share", ratio, share, 3e-4));
+        assert_complains("a share 0.1 % larger", relative_check("share", 1.001 * ratio, share, 3e-4));
     }
     println!("covered shares off by {worst:.1e} at most");
     for (place, expected) in [(0, 0.5), (1, 0.6575), (2, 0.8045), (3, 0.9279), (4, 1.0), (6, 0.25), (7, 0.63408), (8, 0.89591)] {
         let share = red(&without, place).0 / red(&with, place).0;
-        assert!((share - expected).abs() < 5e-5, "place {place}: {share} where {expected} is right");
+        assert!((share - expected).abs() < 3e-4, "place {place}: {share} where {expected} is right");
     }
 }
 

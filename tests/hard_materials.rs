@@ -304,13 +304,23 @@ fn shading_normals_turn_light_and_no_more() {
     assert_holds("the scatterer", known::leaning_scatterer(&gpu));
 }
 
-/// Of mirrors so coarse that smooth normals send rays to the wrong side of their triangles, no light is lost.
+/// Of spheres so coarse that smooth normals send rays to the wrong side of their triangles, no light is lost.
+fn coarse_spheres_lose_no_light(material: &Material, ground_segments: u32) {
+    let Some(gpu) = device() else { return };
+    for segments in [8, 16, 32] {
+        assert_holds("in a furnace", known::coarse_sphere_in_a_furnace(&gpu, material.clone(), segments));
+        assert_holds("in the sun", known::coarse_sphere_in_the_sun(&gpu, material.clone(), segments));
+    }
+    assert_holds("the ground", known::ground_by_a_coarse_sphere(&gpu, material.clone(), ground_segments));
+}
+
 #[test]
 fn coarse_mirrors_with_smooth_normals_lose_no_light() {
-    let Some(gpu) = device() else { return };
-    for segments in [8, 16] {
-        assert_holds("in a furnace", known::coarse_mirror_in_a_furnace(&gpu, segments));
-        assert_holds("in the sun", known::coarse_mirror_in_the_sun(&gpu, segments));
-    }
-    assert_holds("the ground", known::ground_by_a_coarse_mirror(&gpu, 32));
+    coarse_spheres_lose_no_light(&mirror(1.0), 32);
+}
+
+/// Nor does any of it stay in the glass for long.
+#[test]
+fn coarse_glass_with_smooth_normals_loses_no_light() {
+    coarse_spheres_lose_no_light(&glass(1.5), 16);
 }

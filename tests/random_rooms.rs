@@ -292,6 +292,12 @@ impl Found {
     fn z(&self) -> f64 {
         (self.found - self.expected) / self.noise.hypot(self.tolerance).hypot(self.bias)
     }
+
+    fn line(&self) -> String {
+        let Found { seed, point, place, expected, tolerance, found, noise, .. } = self;
+        let what = format!("PHOTONMILL_ROOM={seed}, point {point}, {place:?}");
+        format!("{what}: {found:.5} +- {noise:.5} where {expected:.5} +- {tolerance:.5} is right, z = {:.2}\n", self.z())
+    }
 }
 
 const ROUNDS: u32 = 16;
@@ -372,8 +378,7 @@ fn judge(found: &[Found]) -> Check {
     let z: Vec<f64> = found.iter().map(Found::z).collect();
     let mut worst: Vec<&Found> = found.iter().collect();
     worst.sort_by(|a, b| b.z().abs().total_cmp(&a.z().abs()));
-    let lines = worst.iter().take(5).map(|found| format!("PHOTONMILL_ROOM={}: z = {:.2}, {found:?}\n", found.seed, found.z()));
-    let lines: String = lines.collect();
+    let lines: String = worst.iter().take(5).map(|found| found.line()).collect();
     Statistics::new(&z).check().map_err(|complaint| format!("{complaint}; the worst:\n{lines}"))?;
     require(z.iter().all(|z| z.abs() < MOST), || format!("a point is off by more than {MOST}:\n{lines}"))
 }
@@ -415,7 +420,7 @@ fn show(seed: u64, found: &[Found]) {
         room.shown.iter().for_each(|rectangle| println!("{rectangle:?}"));
         room.points.iter().for_each(|point| println!("{point:?}"));
     }
-    found.iter().for_each(|found| println!("z = {:.2}, {found:?}", found.z()));
+    found.iter().for_each(|found| print!("{}", found.line()));
 }
 
 #[test]

@@ -8,7 +8,7 @@ use std::time::Duration;
 use crate::closed_form::closed_form_check;
 use crate::common::Kind::*;
 use crate::common::prelude::*;
-use crate::common::{MANY_PHOTONS, aimed, bits, estimate_check, known, noticed_as, planted};
+use crate::common::{MANY_PHOTONS, aimed, bits, estimate_check, known, lamps, noticed_as, planted};
 use crate::film::pairs_count_on;
 use crate::hard_cases::readme_and_guide;
 use crate::ledger::closed_fates;
@@ -59,9 +59,16 @@ enum Question {
     PatchInPlane,
     StackFromAfar,
     CoarseMirror,
+    CoarseGlass,
     RoomBesideHall,
+    BehindWall,
+    BesideBox,
     /// With so many samples a pixel, and with a final gather or not.
     GlassInFurnace(u32, bool),
+    // The checks of `common::lamps`: a room beside one whose lamp is so many times as strong, a lamp in so many squares a side.
+    DimRoom(f32),
+    ManyLamps(u32),
+    MissedLamp,
     /// Aimed photons bring as much light as others: a scene of `common::aimed`.
     AimedLight(&'static str),
 }
@@ -71,8 +78,8 @@ use Question::*;
 impl Question {
     /// Whether another test, the same for every device, shows that a device without a fault answers it right.
     fn has_a_test_of_its_own(self) -> bool {
-        matches!(self, ClosedForm(_) | Bits(_) | LampInBox(_) | Shelf | Ridge | Spot | Texture(_) | LeaningPlane(_))
-            || matches!(self, LeaningScatterer | PatchInPlane | StackFromAfar | CoarseMirror | RoomBesideHall | GlassInFurnace(..))
+        let of_room = matches!(self, Photons(_) | RoomFilm(_) | Nearest | StripedCounters | Ledger(_) | FiniteBox | Pairs | StrictMath);
+        !of_room && !matches!(self, Appends | Builders | Finite | Crowds | ManyLamps(_) | AimedLight(_))
     }
 }
 
@@ -81,6 +88,7 @@ impl Question {
 enum Subject {
     Room,
     Scenes,
+    Lamps,
     Aiming,
 }
 
@@ -90,10 +98,8 @@ impl Question {
             Photons(_) | StripedCounters | RoomFilm(_) | Ledger(_) | ClosedForm(_) | Builders | StrictMath | Nearest | Pairs
             | FiniteBox => Subject::Room,
             AimedLight(_) => Subject::Aiming,
-            Appends | Finite | Crowds | Bits(_) | LampInBox(_) | Shelf | Ridge | Spot | Texture(_) => Subject::Scenes,
-            LeaningPlane(_) | LeaningScatterer | PatchInPlane | StackFromAfar | CoarseMirror | RoomBesideHall | GlassInFurnace(..) => {
-                Subject::Scenes
-            }
+            DimRoom(_) | ManyLamps(_) | MissedLamp => Subject::Lamps,
+            _ => Subject::Scenes,
         }
     }
 }
@@ -111,7 +117,7 @@ struct Fault {
 }
 
 #[rustfmt::skip]
-const FAULTS: [Fault; 70] = [
+const FAULTS: [Fault; 78] = [
     Fault { what: "what rounding takes from a pair of floats is forgotten",
         file: "film/float_u64.glsl", from: "precise float rest = sum.y + (", to: "precise float rest = 0.0 * (",
         kernels: &["gather_brute_u64", "gather_grid_u64"], noticed_by: &[(Pairs, SumsTooSmall)] },
@@ -288,8 +294,8 @@ const FAULTS: [Fault; 70] = [
         file: "math/math.glsl", from: "quotient += uint(off) + uint(2 * remainder > d);", to: "quotient += uint(off);",
         kernels: &["check_math"], noticed_by: &[(StrictMath, Misrounded)] },
     Fault { what: "a light in 50 shines with no number",
-        file: "world/scene/direct.glsl", from: "float cosine = dot(arriving.wi, point.ns);",
-        to: "if (u.y < 0.02) arriving.radiance.x = uintBitsToFloat(0x7fc00000u);\n        float cosine = dot(arriving.wi, point.ns);",
+        file: "world/scene/lights.glsl", from: "    return arriving;",
+        to: "    if (u.y < 0.02) arriving.radiance.x = uintBitsToFloat(0x7fc00000u);\n    return arriving;",
         kernels: &["view"], noticed_by: &[(Finite, NoNumber)] },
     Fault { what: "a photon in 500 starts nowhere",
         file: "world/scene/step.glsl", from: "surface.ng, scatter.direction);",
@@ -338,13 +344,23 @@ const FAULTS: [Fault; 70] = [
     Fault { what: "a scattered photon knows no shading normal",
         file: "material/lobes.glsl", from: SHADING_GAIN, to: "return 1.0;",
         kernels: &["trace_persistent_scene", "trace_scene_ballot"], noticed_by: &[(LeaningScatterer, TooBright)] },
-    Fault { what: "rays that a mirror's smooth normals send to the wrong side of a triangle are lost",
+    Fault { what: "rays that smooth normals send to the wrong side of a triangle are lost",
         file: "material/scatter.glsl", from: "return direction - 2.0 * min(dot(direction, side), 0.0) * side;", to: "return direction;",
         kernels: &["view"],
-        noticed_by: &[(CoarseMirror, TooDark)] },
-    Fault { what: "photons within a radius of its own are spread over the widest's area",
-        file: "kernels/flux_to_radiance.comp", from: "radius = radius_of_class(widest,", to: "radius = radius_of_class(widest, 0 * ",
-        kernels: &["flux_to_radiance"], noticed_by: &[(RoomBesideHall, TooDark)] },
+        noticed_by: &[(CoarseMirror, TooDark), (CoarseGlass, TooDark)] },
+    Fault { what: "all points have the widest radius",
+        file: "gather/radius_class.glsl", from: "uintBitsToFloat((127u - own_class) << 23)", to: "1.0",
+        kernels: &["disc_cuts", "gather_visible_points_u64", "gather_visible_points_two_words", "flux_to_radiance"], noticed_by: &[(RoomBesideHall, TooBright)] },
+    Fault { what: "photons behind a wall count before it",
+        file: "gather/cuts.glsl", from: "return beyond;", to: "return false;",
+        kernels: &["gather_visible_points_u64", "gather_visible_points_two_words"], noticed_by: &[(BehindWall, Leak)] },
+    Fault { what: "the floor behind a wall is taken for floor before it",
+        file: "gather/cover.glsl", from: "if (line.w < cuts.reach) {", to: "if (false) {",
+        kernels: &["flux_to_radiance"], noticed_by: &[(BesideBox, TooDark)] },
+    Fault { what: "smooth normals alone reflect totally in glass for ever",
+        file: "material/scatter.glsl", from: "&& depth >= SMOOTH_TOTAL_REFLECTIONS", to: "&& false",
+        kernels: &["view"],
+        noticed_by: &[(CoarseGlass, TooDark)] },
     Fault { what: "a spot falls off by its share, not by the square of it",
         file: "world/scene/lights.glsl", from: "return share * share;", to: "return share;",
         kernels: &["receive"], noticed_by: &[(Spot, TooBright)] },
@@ -359,6 +375,21 @@ const FAULTS: [Fault; 70] = [
     Fault { what: "large integers are cut instead of rounded",
         file: "check/check_math.comp", from: "float(floatBitsToUint(a))", to: "float(floatBitsToUint(a) & ~0xffu)",
         kernels: &["check_math"], noticed_by: &[(StrictMath, Misrounded)] },
+    Fault { what: "a light of a cluster is weighed as if its cluster had no other",
+        file: "world/scene/light_choice.glsl", from: "chosen.probability *= is_left ? share : 1.0 - share;", to: "",
+        kernels: &["receive"], noticed_by: &[(ManyLamps(16), TooDark)] },
+    Fault { what: "a cluster's share is taken with those before it",
+        file: "world/scene/light_choice.glsl", from: "light_shares[row + low] - before", to: "light_shares[row + low]",
+        kernels: &["receive"], noticed_by: &[(ManyLamps(16), TooDark)] },
+    Fault { what: "one of two lights is as likely from afar as from near by",
+        file: "world/scene/light_choice.glsl", from: "vec3 way = node.centre - position;", to: "vec3 way = node.centre - vec3(0.3);",
+        kernels: &["receive"], noticed_by: &[(ManyLamps(224), TooNoisy)] },
+    Fault { what: "rays to lights that the trial has not seen count once, though one place in four casts them",
+        file: "world/scene/direct.glsl", from: "count = float(SAMPLES_PER_UNSEEN * SHADOW_RAYS);", to: "count = float(SHADOW_RAYS);",
+        kernels: &["receive"], noticed_by: &[(MissedLamp, TooDark)] },
+    Fault { what: "a trial sees lights through walls",
+        file: "kernels/try_lights.comp", from: "&& !shadow_ray.is_hidden && added > 0.0", to: "&& added > 0.0",
+        kernels: &["try_lights"], noticed_by: &[(DimRoom(1e3), TooNoisy)] },
     Fault { what: "directions within two cones are weighed as if only one could have chosen them",
         file: "world/scene/aim.glsl", from: "k == chosen || versine_between(emission.direction, other.axis) <= other.versine",
         to: "k == chosen",
@@ -445,8 +476,14 @@ fn ask(gpu: &Gpu, question: Question) -> Check<Complaint> {
         LeaningScatterer => known::leaning_scatterer(gpu),
         PatchInPlane => known::patch_in_a_plane(gpu),
         StackFromAfar => known::stack_from_afar(gpu),
-        CoarseMirror => known::coarse_mirror_in_a_furnace(gpu, 8),
+        CoarseMirror => known::coarse_sphere_in_a_furnace(gpu, mirror(1.0), 8),
+        CoarseGlass => known::coarse_sphere_in_a_furnace(gpu, glass(1.5), 8),
         RoomBesideHall => known::room_beside_a_hall(gpu, true),
+        BehindWall => known::behind_a_wall(gpu, known::sheet(), Some(0.1)),
+        BesideBox => known::beside_a_box(gpu, Some(0.1)),
+        DimRoom(ratio) => lamps::dim_room(gpu, ratio, true),
+        ManyLamps(side) => lamps::many_lamps(gpu, side, true),
+        MissedLamp => lamps::missed_lamp(gpu),
         AimedLight(kind) => aimed::same_light(gpu, kind),
     }
 }
@@ -485,6 +522,11 @@ fn faults_of_the_room_are_noticed() {
 #[test]
 fn faults_of_scenes_are_noticed() {
     faults_are_noticed(Subject::Scenes);
+}
+
+#[test]
+fn faults_of_lamps_are_noticed() {
+    faults_are_noticed(Subject::Lamps);
 }
 
 #[test]

@@ -80,6 +80,7 @@ struct Cover {
     uint sum; // kernel's integral, in units of 2^-24 of the squared radius: integers add up alike in whatever order
     uint nearest; // plane of the nearest surface
     float distance; // to it
+    Cuts cuts;
 };
 
 // Whether photons of a plane, or the receiver itself, may lie on it for this place.
@@ -91,6 +92,74 @@ bool may_cover(Cover cover, uint plane, vec3 side, float height)
     float cosine = dot(cover.normal, side);
     float sine = sqrt(max(1.0 - cosine * cosine, 0.0));
     return cosine >= RECEIVER_NORMAL_COSINE && abs(height) <= cover.radius * (sine + 1.0 / 1024.0);
+}
+
+const uint MOST_CORNERS = 3 + CUT_LINES;
+
+// A triangle, and what lines leave of it.
+struct Polygon {
+    uint count;
+    vec2 corners[MOST_CORNERS];
+};
+
+vec2 flat_place(vec3 way, vec3 x, vec3 y, float unit)
+{
+    return divide(vec2(dot(way, x), dot(way, y)), unit);
+}
+
+// Keeps the part whose product with `normal` is at most `most` (Sutherland and Hodgman 1974). Loops over corners are unrolled: the
+// triangles of a fine mesh are as many as a device's loops may turn.
+void cut_off(inout Polygon polygon, vec2 normal, float most)
+{
+    vec2 kept[MOST_CORNERS];
+    uint kept_count = 0;
+    [[unroll]] for (uint k = 0; k < MOST_CORNERS; k++) {
+        if (k < polygon.count) {
+            vec2 from = polygon.corners[k], to = polygon.corners[k + 1 < polygon.count ? k + 1 : 0];
+            float from_beyond = dot(from, normal) - most, to_beyond = dot(to, normal) - most;
+            if (from_beyond <= 0.0) {
+                kept[kept_count++] = from;
+            }
+            if ((from_beyond <= 0.0) != (to_beyond <= 0.0)) {
+                kept[kept_count++] = from + (to - from) * divide(from_beyond, from_beyond - to_beyond);
+            }
+        }
+    }
+    // One by one: Mesa 22.3 loses the copy of the whole array.
+    [[unroll]] for (uint k = 0; k < MOST_CORNERS; k++) {
+        polygon.corners[k] = kept[k];
+    }
+    polygon.count = kept_count;
+}
+
+// Keeps what no line cuts off of a polygon in the plane of x and y, in units of `unit`; `rise` leads from its origin to the place that
+// the lines belong to.
+void cut_off_walls(inout Polygon polygon, Cuts cuts, vec3 x, vec3 y, float unit, vec3 rise)
+{
+    [[unroll]] for (uint k = 0; k < CUT_LINES; k++) {
+        vec4 line = cuts.lines[k];
+        if (line.w < cuts.reach) {
+            cut_off(polygon, vec2(dot(line.xyz, x), dot(line.xyz, y)) * unit, line.w + dot(line.xyz, rise));
+        }
+    }
+}
+
+// Integral of the kernel over a convex polygon, within the unit disc. Says how far the middle lies at least to the left of its edges.
+float kernel_over(Polygon polygon, out float left)
+{
+    bool enters = false;
+    float sum = 0.0;
+    left = polygon.count == 0 ? -1.0 : 1.0;
+    [[unroll]] for (uint k = 0; k < MOST_CORNERS; k++) {
+        if (k < polygon.count) {
+            sum += kernel_over_edge(polygon.corners[k], polygon.corners[k + 1 < polygon.count ? k + 1 : 0], enters, left);
+        }
+    }
+    // No edge in the disc: all of it or nothing, not the rounding of sectors that cancel.
+    if (!enters) {
+        return left > 0.0 ? 3.14159265358979324 * kernel_norm() : 0.0;
+    }
+    return sum;
 }
 
 uint saturated_sum(uint a, uint b)
@@ -123,18 +192,11 @@ void cover_triangle(inout Cover cover, uint index)
     vec3 centre = cover.position - height * front;
     vec3 x = normalize(triangle.b - triangle.a);
     vec3 y = cross(front, x);
-    vec2 a = divide(vec2(dot(triangle.a - centre, x), dot(triangle.a - centre, y)), disc);
-    vec2 b = divide(vec2(dot(triangle.b - centre, x), dot(triangle.b - centre, y)), disc);
-    vec2 c = divide(vec2(dot(triangle.c - centre, x), dot(triangle.c - centre, y)), disc);
-    bool enters = false;
-    float left = 1.0;
-    float whole = kernel_over_edge(a, b, enters, left);
-    whole += kernel_over_edge(b, c, enters, left);
-    whole += kernel_over_edge(c, a, enters, left);
-    // No edge in the disc: all of it or nothing, not the rounding of sectors that cancel.
-    if (!enters) {
-        whole = left > 0.0 ? 3.14159265358979324 * kernel_norm() : 0.0;
-    }
+    Polygon part = Polygon(3, vec2[](flat_place(triangle.a - centre, x, y, disc), flat_place(triangle.b - centre, x, y, disc),
+                                     flat_place(triangle.c - centre, x, y, disc), vec2(0.0), vec2(0.0), vec2(0.0)));
+    cut_off_walls(part, cover.cuts, x, y, disc, height * front);
+    float left;
+    float whole = kernel_over(part, left);
     float share = divide(disc, radius);
     uint sum = uint(roundEven(max(whole, 0.0) * share * share * 16777216.0));
     cover.sum = saturated_sum(cover.sum, sum);
@@ -158,62 +220,46 @@ const uint MAX_COVERED = 8192;
 bool cover_triangles(inout Cover cover)
 {
     uint seen = 0;
-    if (HAS_BVH) {
-        // Siblings to visit: the first of them, and bits 24 to 31 for each in reach above the mask of those that are
-        // nodes at all.
-        uvec2 group = uvec2(0, 0x01000000u);
-        uvec2 stack[BVH_STACK];
-        uint depth = 0;
-        for (;;) {
-            uint slot = findLSB(group.y >> 24);
-            group.y &= ~(0x01000000u << slot);
-            if (group.y > 0x00ffffffu) {
-                stack[depth++] = group;
-            }
-            BvhNode node = nodes[group.x + bitCount(group.y & ((1u << slot) - 1u))];
-            uint near = children_in_box(node, cover.position - cover.reach, cover.position + cover.reach);
-            for (uint leaves = near & 0x00ffffffu; leaves != 0; leaves &= leaves - 1) {
-                cover_triangle(cover, node.first_triangle + findLSB(leaves));
-                seen++;
-            }
-            if (seen > MAX_COVERED && (cover.plane != NONE || cover.nearest != NONE)) {
-                return true;
-            }
-            group = uvec2(node.first_child, (near & 0xff000000u) | child_nodes_of(node));
-            if (group.y <= 0x00ffffffu) {
-                if (depth == 0) {
-                    break;
-                }
-                group = stack[--depth];
-            }
+    uint first_triangle, leaves;
+    begin_walk();
+    while (next_leaves(cover.position - cover.reach, cover.position + cover.reach, first_triangle, leaves)) {
+        for (; leaves != 0; leaves &= leaves - 1) {
+            cover_triangle(cover, first_triangle + findLSB(leaves));
+            seen++;
         }
-    } else {
-        for (uint index = 0; index < triangles.length(); index++) {
-            cover_triangle(cover, index);
+        if (seen > MAX_COVERED && (cover.plane != NONE || cover.nearest != NONE)) {
+            return true;
         }
     }
     return false;
 }
 
-Cover around(vec3 position, vec3 normal, uint plane, float radius)
+Cover around(vec3 position, vec3 normal, uint plane, float radius, Cuts cuts)
 {
     // A little wider than the sphere, for the rounding of the boxes.
-    return Cover(position, normal, plane, radius, radius * (1.0 + 1.0 / 1024.0), 0, NONE, 2.0 * radius);
+    return Cover(position, normal, plane, radius, radius * (1.0 + 1.0 / 1024.0), 0, NONE, 2.0 * radius, cuts);
 }
 
 // Integral of the kernel over all surface that belongs to an estimate: the area, with the box kernel. Whole is set
-// if it could not be found: then the whole disc stands for it.
-float covered_area(vec3 position, uint plane, float radius, out bool whole)
+// if it could not be found: then the whole disc stands for it, up to the walls.
+float covered_area(vec3 position, uint plane, float radius, Cuts cuts, out bool whole)
 {
-    Cover cover = around(position, plane_normal(plane), plane, radius);
+    Cover cover = around(position, plane_normal(plane), plane, radius, cuts);
     whole = cover_triangles(cover);
-    return whole ? 3.14159265358979324 * kernel_norm() * radius * radius : float(cover.sum) * (1.0 / 16777216.0) * radius * radius;
+    if (whole) {
+        // A triangle around the disc.
+        Polygon part = Polygon(3, vec2[](vec2(4.0, 0.0), vec2(-4.0, 6.0), vec2(-4.0, -6.0), vec2(0.0), vec2(0.0), vec2(0.0)));
+        cut_off_walls(part, cuts, to_frame(vec3(1.0, 0.0, 0.0), cover.normal), to_frame(vec3(0.0, 1.0, 0.0), cover.normal), radius, vec3(0.0));
+        float left;
+        return kernel_over(part, left) * radius * radius;
+    }
+    return float(cover.sum) * (1.0 / 16777216.0) * radius * radius;
 }
 
 // Plane of the surface that a receiver lies on; NONE: it lies on none.
 uint plane_below(vec3 position, vec3 normal, float radius)
 {
-    Cover cover = around(position, normal, NONE, radius);
+    Cover cover = around(position, normal, NONE, radius, no_cuts(radius));
     cover_triangles(cover);
     return cover.nearest;
 }

@@ -49,11 +49,13 @@ void gather_photons()
         radius = radius_of_class(push.radius, own_class);
     }
     vec3 normal = plane_normal(point.plane);
+    Cuts cuts = cuts_of(push.first_cut + index, normal, radius);
+    CellRange range = cells_near(point.position, radius);
+    radius = min(radius, cuts.reach);
     bool is_flat = point.shading_normal == NONE;
     vec3 ns = is_flat ? normal : unpack_normal(point.shading_normal);
     vec3 wo = unpack_direction(point.wo);
     bool is_even = is_flat && !has_lobe(point.surface);
-    CellRange range = cells_near(point.position, radius);
     uint photon_count = map_length();
     uint slice_begin = slice * GATHER_SLICE;
     uint slice_end = slice_begin + GATHER_SLICE;
@@ -88,7 +90,7 @@ void gather_photons()
                         photon_normal = plane_normal(words.w);
                         height = plane_height(words.w, point.position);
                     }
-                    bool counts = (is_alike || belongs(normal, photon_normal, height, radius))
+                    bool counts = (is_alike || belongs(normal, photon_normal, height, radius)) && !is_cut_off(cuts, way)
                                   && ((point.arrivals >> (light.w >> 30)) & 1u) != 0;
                     vec3 wi = ns;
                     float cosine = 1.0;

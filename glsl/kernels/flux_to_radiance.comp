@@ -17,7 +17,9 @@ layout(set = 1, binding = 2, scalar) buffer Estimates { uvec2 estimates[]; };
 #include "math/directions.glsl"
 #include "world/scene/bvh.glsl"
 #include "material/surface.glsl"
+#include "world/scene/box_walk.glsl"
 #include "gather/belongs.glsl"
+#include "gather/disc_cuts.glsl"
 #include "gather/cover.glsl"
 #include "gather/radius_class.glsl"
 #include "film/wide.glsl"
@@ -37,12 +39,14 @@ vec3 gathered_flux(uint place)
 }
 
 // Area in which photons were looked for, weighted by the kernel.
-float estimate_area(VisiblePoint point, uint pixel, float radius)
+float estimate_area(VisiblePoint point, uint pixel, uint cut, float radius)
 {
+    Cuts cuts = cuts_of(cut, plane_normal(point.plane), radius);
+    radius = min(radius, cuts.reach);
     float area = 3.14159265358979324 * kernel_norm() * radius * radius;
     if (HAS_EDGE_CORRECTION) {
         bool whole;
-        float covered = covered_area(point.position, point.plane, radius, whole);
+        float covered = covered_area(point.position, point.plane, radius, cuts, whole);
         note_unless(is_finite(covered), NONFINITE_ESTIMATE, 0, push.round, pixel);
         if (whole) {
             atomicAdd(anomalies[2], 1);
@@ -107,7 +111,7 @@ void main()
             if (HAS_RADIUS_CLASSES) {
                 radius = radius_of_class(widest, radius_class(place, is_caustic ? CAUSTIC_CLASS : GLOBAL_CLASS));
             }
-            area = estimate_area(point, pixel, radius);
+            area = estimate_area(point, pixel, place + (is_caustic ? push.first_caustic_cut : 0), radius);
         }
         global_area = is_caustic ? global_area : area;
         float for_all = !is_caustic && (point.arrivals & SEEN_FOR_ALL) != 0 ? float(SAMPLES) : 1.0;

@@ -22,6 +22,7 @@ layout(push_constant, scalar) uniform Push { SceneGatherPush push; };
 #include "world/scene/tiles.glsl"
 #include "gather/bucket_rows.glsl"
 #include "gather/radius_class.glsl"
+#include "gather/disc_cuts.glsl"
 #include "gather/visible_points.glsl"
 
 void main()

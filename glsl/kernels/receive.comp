@@ -10,8 +10,10 @@ layout(push_constant, scalar) uniform Push { ReceivePush push; };
 layout(set = 1, binding = 12, scalar) readonly buffer Receivers { Receiver receivers[]; };
 
 #include "world/scene/camera_kernel.glsl"
+#include "world/scene/box_walk.glsl"
 #include "world/scene/off_walls.glsl"
 #include "gather/belongs.glsl"
+#include "gather/cuts.glsl"
 #include "gather/cover.glsl"
 
 void main()

@@ -14,9 +14,14 @@ float fresnel(float cos_i, float cos_t, float eta)
     return 0.5 * (parallel * parallel + perpendicular * perpendicular);
 }
 
-// A direction on the side that a unit vector points to. A shading normal may send a mirrored ray to the wrong side of its
-// triangle; mirrored in the triangle's plane, as if it met the surface once more, it leaves with all of its light. Not so in
-// glass: there such rays would be caught between coarse facets for thousands of bounces, and are lost instead.
+// Square of the refracted ray's cosine, exact where the index is 1; 0 or less in total internal reflection.
+float refracted_cosine_squared(float cos_i, float eta)
+{
+    return eta * eta * cos_i * cos_i + (1.0 - eta) * (1.0 + eta);
+}
+
+// A direction on the side that a unit vector points to. A shading normal may send a mirrored or refracted ray to the wrong side
+// of its triangle; mirrored in the triangle's plane, as if it met the surface once more, it leaves with all of its light.
 vec3 on_side(vec3 direction, vec3 side)
 {
     return direction - 2.0 * min(dot(direction, side), 0.0) * side;
@@ -24,8 +29,8 @@ vec3 on_side(vec3 direction, vec3 side)
 
 // Samples where a path goes on that came from wo; u = (choice, two for the direction). A camera path
 // carries radiance, which refraction compresses; a photon carries flux. Glass that reflects some light and refracts some
-// does the first with the chance `mirror_chance`; 0: as much as it reflects.
-Scatter sample_scatter(Surface surface, vec3 wo, vec3 u, bool carries_radiance, float mirror_chance)
+// does the first with the chance `mirror_chance`; 0: as much as it reflects. The path has met `depth` surfaces before.
+Scatter sample_scatter(Surface surface, vec3 wo, vec3 u, uint depth, bool carries_radiance, float mirror_chance)
 {
     vec3 ns = surface.ns;
     if (HAS_MIRROR) {
@@ -38,18 +43,26 @@ Scatter sample_scatter(Surface surface, vec3 wo, vec3 u, bool carries_radiance, 
         if (surface.kind == SURFACE_DIELECTRIC) {
             float eta = surface.front ? divide(1.0, surface.parameter) : surface.parameter;
             float cos_i = min(dot(wo, ns), 1.0);
-            // Exact where the index is 1.
-            float cos_t_squared = eta * eta * cos_i * cos_i + (1.0 - eta) * (1.0 + eta);
+            float cos_t_squared = refracted_cosine_squared(cos_i, eta);
+            if (HAS_SMOOTH_NORMALS) {
+                // Smooth normals do not keep phase space: without an end, some of what enters a coarse sphere is reflected in it
+                // for ever. What enters a solid by its triangles alone also leaves it.
+                if (cos_t_squared <= 0.0 && depth >= SMOOTH_TOTAL_REFLECTIONS) {
+                    ns = surface.ng;
+                    cos_i = min(dot(wo, ns), 1.0);
+                    cos_t_squared = refracted_cosine_squared(cos_i, eta);
+                }
+            }
             float cos_t = sqrt(max(cos_t_squared, 0.0));
             float reflectance = cos_t_squared > 0.0 ? fresnel(cos_i, cos_t, eta) : 1.0;
             bool as_much = mirror_chance == 0.0 || reflectance == 0.0 || reflectance == 1.0;
             float chance = as_much ? reflectance : mirror_chance;
             if (u.x < chance) {
-                vec3 wi = mirrored(wo, ns);
+                vec3 wi = on_side(mirrored(wo, ns), surface.ng);
                 float weight = as_much ? 1.0 : divide(reflectance, chance);
                 return Scatter(wi, weight * surface.base_colour, dot(wi, surface.ng) > 0.0);
             }
-            vec3 wi = normalize((eta * cos_i - cos_t) * ns - eta * wo);
+            vec3 wi = on_side(normalize((eta * cos_i - cos_t) * ns - eta * wo), -surface.ng);
             float weight = as_much ? 1.0 : divide(1.0 - reflectance, 1.0 - chance);
             weight *= carries_radiance ? eta * eta : 1.0;
             return Scatter(wi, weight * surface.base_colour, dot(wi, surface.ng) < 0.0);

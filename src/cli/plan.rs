@@ -13,6 +13,7 @@ use crate::output::scene_report;
 use crate::plan::Limits;
 use crate::plan::radius::RadiusFrom;
 use crate::plan::scene::ScenePlan;
+use crate::scene::light_tree::is_one_lamp;
 use crate::text::counted;
 
 #[derive(Args)]
@@ -61,6 +62,8 @@ pub(super) fn run(args: &PlanArgs) -> Result<()> {
             format!("{} map: {photons} per round in {chunks}, first radius {radius}", map.name)
         })
         .collect();
+    let lights =
+        if is_one_lamp(&subject.geometry) { "" } else { "lights chosen by what they do, from a trial round at the start of the run\n" };
     let Subject { width, height, .. } = subject;
-    say(&format!("{text}{}\n{width} x {height} pixels\n{} bytes of device memory", maps.join("\n"), plan.bytes))
+    say(&format!("{text}{}\n{lights}{width} x {height} pixels\n{} bytes of device memory", maps.join("\n"), plan.bytes))
 }

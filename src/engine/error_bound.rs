@@ -12,6 +12,9 @@ pub struct FilmError {
     pub noise: f64,
     /// What nothing has reached.
     pub unknown: Unknown,
+    /// What light may add that is so rare that no round may have shown it, with the confidence that was asked for: as many hits
+    /// of the brightest lamp in mirrors and glass as a run may miss. Infinite where all else is black.
+    pub unseen: f64,
 }
 
 impl FilmError {
@@ -19,6 +22,13 @@ impl FilmError {
     /// nothing has reached. Infinite where that is all there is.
     pub fn bound(&self, confidence: f64) -> f64 {
         error_bound(self.rounds, self.noise, confidence).hypot(self.unknown.relative)
+    }
+
+    /// Whether rounds have shown the tail of the noise: what they may not have shown is no more than the bound of what they have.
+    /// The spread of rounds says nothing of hits that none of them had. `unseen` falls as 1 / rounds and noise as the root of it,
+    /// so that every tail is known in the end.
+    pub fn tail_is_known(&self, confidence: f64) -> bool {
+        self.unseen <= error_bound(self.rounds, self.noise, confidence)
     }
 }
 
@@ -33,4 +43,24 @@ pub fn error_bound(rounds: u32, relative_error: f64, confidence: f64) -> f64 {
     }
     let distribution = StudentsT::new(0.0, 1.0, f64::from(rounds - 1)).expect("there is a degree of freedom");
     distribution.inverse_cdf(0.5 + 0.5 * confidence) * relative_error
+}
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+
+    #[test]
+    fn a_tail_is_known_once_the_noise_covers_what_is_unseen() {
+        let error = |rounds: u32| FilmError {
+            rounds,
+            noise: 0.4 / f64::from(rounds).sqrt(),
+            unknown: Unknown::default(),
+            unseen: 8.0 / f64::from(rounds),
+        };
+        assert!(!error(16).tail_is_known(0.95) && error(256).tail_is_known(0.95));
+        // The bound itself is of what rounds have shown.
+        assert!(error(16).bound(0.95) < error(16).unseen);
+        assert!(FilmError { unseen: 0.0, noise: 0.0, ..error(16) }.tail_is_known(0.95));
+        assert!(!FilmError { unseen: f64::INFINITY, noise: 0.0, ..error(16) }.tail_is_known(0.95));
+    }
 }

@@ -85,6 +85,8 @@ struct Look {
     /// Bound of the noise.
     noise: f64,
     unknown: f64,
+    /// What is too rare to have been seen.
+    unseen: f64,
     /// What limits have kept from the result ([`crate::ledger::Losses`]).
     lost: f64,
 }
@@ -112,15 +114,17 @@ impl Watch {
 
     /// Takes what a film tells, and what limits kept from it, relative to it.
     pub fn look(&mut self, error: &FilmError, lost: f64) {
-        let FilmError { rounds, noise, ref unknown } = *error;
+        let FilmError { rounds, noise, ref unknown, unseen } = *error;
         let noise = error_bound(rounds, noise, self.stop.confidence);
-        self.seen = Some(Look { rounds, noise, unknown: unknown.relative, lost });
+        self.seen = Some(Look { rounds, noise, unknown: unknown.relative, unseen, lost });
         self.next_look = rounds + (rounds / 4).max(1);
     }
 
-    /// Noise, bias and what is unknown together at the latest look.
+    /// Noise, bias, what is unknown and what is unseen together at the latest look.
     fn error(&self) -> Option<(u32, f64)> {
-        self.seen.map(|Look { rounds, noise, unknown, lost }| (rounds, noise.hypot(unknown).hypot(self.bias(rounds) + lost)))
+        self.seen.map(|Look { rounds, noise, unknown, unseen, lost }| {
+            (rounds, noise.hypot(unknown).hypot(unseen).hypot(self.bias(rounds) + lost))
+        })
     }
 
     /// Refuses an error that cannot be reached, as limits alone keep more light from the result, and that nothing else would end.
@@ -184,12 +188,15 @@ impl Watch {
     }
 
     /// Rounds after which the error will be what is wanted: the square of the noise falls as 1 / rounds, the bias as
-    /// rounds^(alpha - 1), and what nothing has reached as 1 / (rounds and area of the discs).
-    fn rounds_wanted(&self, wanted: f64, Look { rounds, noise, unknown, lost }: Look, most: f64) -> f64 {
+    /// rounds^(alpha - 1), what nothing has reached as 1 / (rounds and area of the discs), and what is unseen as 1 / rounds.
+    fn rounds_wanted(&self, wanted: f64, Look { rounds, noise, unknown, unseen, lost }: Look, most: f64) -> f64 {
         let (at, bias) = (f64::from(rounds), self.bias(rounds));
         let error = |rounds: f64| {
             let unknown = unknown * (at / rounds).powf(self.alpha);
-            (noise * (at / rounds).sqrt()).hypot(unknown).hypot(bias * (at / rounds).powf(1.0 - self.alpha) + lost)
+            (noise * (at / rounds).sqrt())
+                .hypot(unknown)
+                .hypot(unseen * at / rounds)
+                .hypot(bias * (at / rounds).powf(1.0 - self.alpha) + lost)
         };
         let (mut less, mut more) = (at.min(most), most);
         if error(less) <= wanted {

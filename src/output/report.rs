@@ -37,6 +37,7 @@ pub(super) struct Common<'a, Settings> {
     error_bound: Option<f64>,
     /// What nothing has reached.
     unknown: &'a Unknown,
+    tail: Tail,
     /// Of the radius, relative to the result; null without `--bias`.
     bias: Option<Bias>,
     /// Nonfinite values that `--paranoid` found; null without it.
@@ -44,6 +45,14 @@ pub(super) struct Common<'a, Settings> {
     timings: &'a [Row],
     dispatches: u64,
     submissions: u64,
+}
+
+/// Of the noise: whether the rounds have shown how far it reaches, and what may be missing from them, relative to the result; null
+/// while all is black.
+#[derive(Serialize)]
+struct Tail {
+    known: bool,
+    unseen: f64,
 }
 
 /// `driver` is that of a run without a device.
@@ -65,6 +74,7 @@ pub(super) fn common<'a, Plan, Film, Settings>(
         relative_error: error.noise,
         error_bound: Some(error.bound(confidence)).filter(|bound| bound.is_finite()),
         unknown: &error.unknown,
+        tail: Tail { known: error.tail_is_known(confidence), unseen: error.unseen },
         bias: run.bias,
         nonfinite_values: run.nonfinite_values.as_ref(),
         timings: run.timings.rows(),
@@ -94,6 +104,14 @@ fn errors(error: &FilmError, bias: Option<&Bias>, lost: f64, confidence: f64) ->
         }
         None if error.rounds == 1 => text.push_str("noise: unknown after a single round\n"),
         None => text.push_str("noise: unknown\n"),
+    }
+    if !error.tail_is_known(confidence) {
+        let most = if error.unseen.is_finite() { format!("{:.2} %", percent(error.unseen)) } else { "any share".to_owned() };
+        writeln!(
+            text,
+            "tail of the noise: not known yet. A lamp in mirrors or glass, too rare to have been seen, may add {most} ({sure} % confidence)"
+        )
+        .unwrap();
     }
     if bias.is_some_and(|bias| !bias.is_known()) {
         writeln!(text, "bias of the radius: unknown, because {}", Bias::UNKNOWN).unwrap();
@@ -188,4 +206,17 @@ fn timing_table(timings: &Timings, device: Option<&DeviceFacts>) -> String {
         text.push_str("This device has no timestamps: GPU times are unknown.\n");
     }
     text
+}
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+
+    #[test]
+    fn a_report_says_that_the_tail_is_not_known() {
+        let text = |unseen| errors(&FilmError { rounds: 16, noise: 0.1, unknown: Unknown::default(), unseen }, None, 0.0, 0.95);
+        assert!(text(0.5).contains("not known yet") && text(0.5).contains("may add 50.00 % (95 % confidence)"), "{}", text(0.5));
+        assert!(text(f64::INFINITY).contains("may add any share"), "{}", text(f64::INFINITY));
+        assert!(!text(0.1).contains("tail"), "{}", text(0.1));
+    }
 }

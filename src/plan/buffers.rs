@@ -188,6 +188,7 @@ impl ScenePlan {
             buffer::<T>(name, if is_kept { content.len() as u64 } else { 0 }, why)
         }
         let textured = self.keeps(Effect::Textures);
+        let (nodes, regions, shares) = self.lights().map_or((0, 0, 0), |of| (of.nodes.len(), of.regions.len(), of.shares.len()));
         vec![
             of("nodes", &geometry.nodes, self.keeps(Effect::Bvh), "the triangles' hierarchy"),
             of("triangles", &geometry.triangles, true, "triangles"),
@@ -199,6 +200,9 @@ impl ScenePlan {
             of::<UVec2>("texels", &geometry.texels, textured, "textures"),
             of("emitters", &geometry.emitters, true, "emitters"),
             of("caustic targets", &self.targets, true, "spheres that photons are aimed at"),
+            buffer::<LightNode>("light nodes", nodes as u64, "the tree of lights"),
+            buffer::<LightRegion>("light regions", regions as u64, "regions in which lights are chosen alike"),
+            buffer::<f32>("light shares", shares as u64, "shares of lights in each region"),
         ]
     }
 
@@ -219,6 +223,8 @@ impl ScenePlan {
             buffer::<f32>("clearances", classed, "how far it is from there to the next wall or edge"),
             buffer::<u32>("class counts", 2 * u64::from(RADIUS_CLASSES), "visible points of each class"),
         ]);
+        let cuts = if self.cuts_discs() { points * self.maps().count() as u64 } else { 0 };
+        buffers.push(buffer::<[u32; 4]>("disc cuts", cuts, "where walls end what a visible point looks through"));
         let camera_paths = buffer::<CameraPath>("camera paths", self.camera_path_capacity(), "paths that one dispatch leaves");
         buffers.extend([camera_paths; 2]);
         if let Sensor::Receivers { count } = self.sensor {

@@ -115,6 +115,7 @@ fn map(
         lanes: capacity::lanes_of(expected / FOUND_BY_LANE, limits),
         target_count: 0,
         flux_gain: 1.0,
+        flux_scale: trial.and_then(|trial| trial.lights.as_ref()).map_or(1.0, |lights| lights.flux_scale),
     })
 }
 

@@ -6,6 +6,7 @@ use std::time::{Duration, Instant};
 use super::Limits;
 use super::buffers::{PlannedBuffer, bytes_of};
 use super::evidence::{EffectDecision, Facts};
+use super::light_choice::LightChoice;
 use super::maps::Maps;
 use super::radius::Trial;
 use super::scene::{MapPlan, SEGMENT_BOUNCES, ScenePlan};
@@ -64,6 +65,8 @@ impl ScenePlan {
         let chain_steps = if limits.loop_iterations > LOOP_LIMIT { MAX_BOUNCES } else { SEGMENT_BOUNCES };
         let mut constants = constants(geometry, &settings, &facts, &maps, &keeps);
         constants.extend([("SAMPLES", samples), ("GATHER_RAYS", gather_rays), ("CHAIN_STEPS", chain_steps)]);
+        let clusters = trial.as_ref().and_then(|trial| trial.lights.as_ref()).map_or(0, |lights| lights.clusters);
+        constants.push(("LIGHT_CLUSTERS", clusters));
         let Maps { global, caustic, caustic_surfaces, targets, arrivals } = maps;
         let mut plan = ScenePlan {
             settings,
@@ -81,11 +84,16 @@ impl ScenePlan {
             chain_steps,
             film_scale: 1.0,
             film_limit: 1.0,
+            rare_radiance: 0.0,
             work_per_submission: limits.pair_tests_per_submission,
             bytes: 0,
             planned_in: Duration::ZERO,
         };
         plan.set_film(geometry);
+        let shows_lamps = plan.keeps(Effect::SpecularChains) && facts.has(Surface::is_specular);
+        if shows_lamps && matches!(sensor, Sensor::Picture { .. }) && plan.settings.part as u32 & PART_SPECULAR != 0 {
+            plan.rare_radiance = geometry.brightest_shown();
+        }
         plan.check_sizes(geometry, limits)?;
         plan.decisions = plan.decisions.iter().map(|decision| plan.given(decision, geometry)).collect();
         plan.planned_in = began.elapsed();
@@ -164,6 +172,11 @@ impl ScenePlan {
             effect if effect.is_caustic() => {
                 decision.evidence.push_str(&self.aim_in_words());
                 self.caustic.as_ref().map_or((0, 0), |map| (u64::from(map.photons), map_bytes(map)))
+            }
+            Effect::Direct => {
+                let lights = self.lights();
+                decision.evidence.push_str(&lights.map_or_else(String::new, LightChoice::in_words));
+                (0, lights.map_or(0, LightChoice::bytes))
             }
             Effect::Textures => (0, size_of_val(geometry.uvs.as_slice()) as u64 + size_of_val(geometry.texels.as_slice()) as u64),
             Effect::SmoothNormals => (0, size_of_val(geometry.normals.as_slice()) as u64),

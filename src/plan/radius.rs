@@ -7,6 +7,7 @@ use std::sync::Arc;
 use serde::Serialize;
 use statrs::function::gamma::ln_gamma;
 
+use super::light_choice::LightChoice;
 use crate::constants::{LEAST_RADIUS_BITS, LOOP_LIMIT, RADIUS_CLASSES};
 use crate::error::{Result, require};
 use crate::photon::MapPhoton;
@@ -34,6 +35,9 @@ pub struct Trial {
     /// Its photons, of the global and of the caustic map: their density around a point tells the radius there.
     #[serde(skip)]
     pub photons: [TrialPhotons; 2],
+    /// How shadow rays choose lights; `None` where they choose one lamp, or none.
+    #[serde(skip)]
+    pub lights: Option<Arc<LightChoice>>,
     /// What the run multiplies all radii by.
     #[serde(skip)]
     pub factor: Option<f64>,

@@ -6,6 +6,7 @@ use serde::Serialize;
 
 use super::capacity::Persistence;
 use super::evidence::EffectDecision;
+use super::light_choice::LightChoice;
 use super::radius::{self, Classes, RADIUS_RANGE, RadiusFrom, Trial};
 use super::sensor::Sensor;
 use crate::constants::*;
@@ -50,6 +51,8 @@ pub struct MapPlan {
     /// A power of two by which its photons carry more than they stand for: aimed ones stand for a share of their
     /// light's, and their sums have a fixed point.
     pub flux_gain: f64,
+    /// By how much more a photon of relative flux 1 carries than where lights are chosen by power.
+    pub flux_scale: f64,
 }
 
 impl MapPlan {
@@ -65,7 +68,7 @@ impl MapPlan {
 
     /// The same in a round of so many photons.
     pub fn photon_flux_of(&self, geometry: &Geometry, photons: u32) -> f64 {
-        geometry.flux_unit / (f64::from(photons.max(1)) * self.flux_gain)
+        geometry.flux_unit * self.flux_scale / (f64::from(photons.max(1)) * self.flux_gain)
     }
 
     /// (first photon, count) of each chunk.
@@ -100,6 +103,9 @@ pub struct ScenePlan {
     /// Film units in 1 W/m2/sr or W/m2, a power of two, and the most that one round may add.
     pub film_scale: f64,
     pub film_limit: f64,
+    /// Radiance of the brightest that a camera path may meet over mirrors and glass, W/m2/sr, all channels together; 0 where none
+    /// can. Such hits are rare and bright: they are the tail of the noise.
+    pub rare_radiance: f64,
     /// Rays or pair tests after which commands are handed to the device.
     pub work_per_submission: u64,
     /// Bytes of all buffers, with one set of receivers; see [`ScenePlan::bytes_of`].
@@ -162,6 +168,21 @@ impl ScenePlan {
     /// Whether radii differ from point to point.
     pub fn has_classes(&self) -> bool {
         self.maps().any(|map| map.classes.is_some())
+    }
+
+    /// Whether density estimates end at walls.
+    pub fn cuts_discs(&self) -> bool {
+        self.settings.edge_correction && self.maps().next().is_some()
+    }
+
+    /// Where the cuts of a map's discs begin among those of all.
+    pub fn first_cut(&self, caustic_only: bool) -> u32 {
+        if caustic_only && self.global.is_some() { self.visible_points() } else { 0 }
+    }
+
+    /// How shadow rays choose lights; `None` where they do by power.
+    pub fn lights(&self) -> Option<&LightChoice> {
+        self.trial.as_ref()?.lights.as_deref().filter(|_| self.constant("LIGHT_CLUSTERS") != 0)
     }
 
     /// Radius of class 0 in a round, normalised; of all points where there are no classes.

@@ -8,6 +8,7 @@ pub mod closed_forms;
 pub mod geometry;
 pub mod gltf;
 pub mod light;
+pub mod light_tree;
 pub mod material;
 pub mod mesh;
 pub mod open_box;

@@ -38,7 +38,7 @@ pub fn caustic_targets(geometry: &Geometry, surfaces: u32) -> Vec<CausticTarget>
 }
 
 /// Corners of the triangles, those that share corners together.
-fn connected(triangles: &[[Vec3; 3]]) -> Vec<Vec<DVec3>> {
+pub(super) fn connected(triangles: &[[Vec3; 3]]) -> Vec<Vec<DVec3>> {
     fn root(parents: &mut [usize], mut place: usize) -> usize {
         while parents[place] != place {
             parents[place] = parents[parents[place]];

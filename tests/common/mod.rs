@@ -12,6 +12,7 @@ pub mod densities;
 pub mod family;
 pub mod gltf_file;
 pub mod known;
+pub mod lamps;
 pub mod lit;
 pub mod pairwise;
 pub mod planted;
@@ -264,6 +265,8 @@ pub enum Kind {
     /// An estimate lies below what is right by more than its error, or above.
     TooDark,
     TooBright,
+    /// An estimate varies by more than it may.
+    TooNoisy,
     /// Light is where none can be.
     Leak,
     /// A picture of a texture shows another texel.

@@ -161,7 +161,7 @@ bool follow(inout Chain chain, uint index, uint number, Draws draws, uint emitte
             mirror_chance = MIRROR_CHANCES[depth];
             u.x = chain.choices[depth];
         }
-        Scatter scatter = sample_scatter(surface, wo, u, true, mirror_chance);
+        Scatter scatter = sample_scatter(surface, wo, u, depth, true, mirror_chance);
         if (!scatter.alive) {
             return false;
         }

@@ -11,11 +11,38 @@ struct Target {
     float exponent;
 };
 
+// What a shadow ray found: light times lobe and cosine, irradiance where there is no lobe, and whether something stands before it.
+struct ShadowRay {
+    vec3 light;
+    bool is_asked; // light may arrive from there
+    bool is_hidden;
+};
+
+ShadowRay cast_shadow_ray(Target point, Arriving arriving, Draws draws, uint index)
+{
+    ShadowRay ray = ShadowRay(vec3(0.0), false, false);
+    float cosine = dot(arriving.wi, point.ns);
+    // Before the guards below, which would drop what is no number.
+    note_unless(is_finite(cosine) && is_finite(arriving.radiance) && (arriving.is_far || is_finite(arriving.target)), NONFINITE_LIGHT,
+                draws.domain, draws.round, index);
+    if (cosine > 0.0 && dot(arriving.wi, point.ng) > 0.0 && max(arriving.radiance.x, max(arriving.radiance.y, arriving.radiance.z)) > 0.0) {
+        vec3 start = offset_origin(point.position, point.error, point.ng, point.ng);
+        ray.is_asked = true;
+        ray.is_hidden = arriving.is_far ? traverse(start, arriving.wi, uintBitsToFloat(0x7f7fffffu), true).triangle != NONE
+                                        : is_occluded(start, arriving.target - start);
+        ray.light = arriving.radiance * (cosine * lobe_weight(point.kind, point.exponent, point.ns, point.wo, arriving.wi));
+    }
+    return ray;
+}
+
 // Of the place that was asked last: the most that one shadow ray would have added which something stopped, and whether some
 // light arrived. A ray to a point or along a direction finds the same each time, so that one that is stopped is no chance
 // missed.
 vec3 stopped_light = vec3(0.0);
 bool light_arrived = false;
+
+// One sample in so many casts a ray more, to the lights that a trial has not seen from round about.
+const uint SAMPLES_PER_UNSEEN = 4;
 
 // What arrives straight from lights, times lobe and cosine: irradiance where there is no lobe. The rays of all samples of
 // the place `index` share a block of random numbers.
@@ -28,25 +55,39 @@ vec3 direct_light(Target point, uint emitter_count, Draws draws, uint index, uin
         return sum;
     }
     uvec4 words = words_of(index, block, draws);
-    for (uint ray = 0; ray < SHADOW_RAYS; ray++) {
+    uint ray_count = SHADOW_RAYS;
+    uint unseen_row = 0;
+    if (LIGHT_CLUSTERS != 0) {
+        unseen_row = row_of_shares(point.position, point.ng, false);
+        bool asks_unseen = ((number + mix32(words.x + words.y)) & (SAMPLES_PER_UNSEEN - 1)) == 0 && !is_empty(unseen_row);
+        ray_count += uint(asks_unseen);
+    }
+    for (uint ray = 0; ray < ray_count; ray++) {
         vec3 u = stratified(number * SHADOW_RAYS + ray, SAMPLES * SHADOW_RAYS, words);
-        Arriving arriving = sample_light(emitter_count, point.position, point.ns, u);
-        float cosine = dot(arriving.wi, point.ns);
-        // Before the guards below, which would drop what is no number.
-        note_unless(is_finite(cosine) && is_finite(arriving.radiance) && (arriving.is_far || is_finite(arriving.target)), NONFINITE_LIGHT,
-                    draws.domain, draws.round, index);
-        if (cosine > 0.0 && dot(arriving.wi, point.ng) > 0.0 && max(arriving.radiance.x, max(arriving.radiance.y, arriving.radiance.z)) > 0.0) {
-            vec3 start = offset_origin(point.position, point.error, point.ng, point.ng);
-            bool hidden = arriving.is_far ? traverse(start, arriving.wi, uintBitsToFloat(0x7f7fffffu), true).triangle != NONE
-                                          : is_occluded(start, arriving.target - start);
-            vec3 light = arriving.radiance * (cosine * lobe_weight(point.kind, point.exponent, point.ns, point.wo, arriving.wi));
-            if (!hidden) {
-                sum += light;
+        Emitter light;
+        float count = 1.0;
+        if (LIGHT_CLUSTERS != 0) {
+            uint row = unseen_row - LIGHT_CLUSTERS;
+            if (ray == SHADOW_RAYS) {
+                row = unseen_row;
+                u = stratified(number, SAMPLES, uvec4(mix32(words.x), mix32(words.y), mix32(words.z), mix32(words.w)));
+                // For the samples that cast none.
+                count = float(SAMPLES_PER_UNSEEN * SHADOW_RAYS);
+            }
+            ChosenLight chosen = choose_light(row, point.position, u.z, mix32(words.w + (number * (SHADOW_RAYS + 1) + ray)));
+            light = emitters[chosen.emitter];
+            light.probability = chosen.probability;
+        } else {
+            light = emitters[pick_emitter(emitter_count, u.z)];
+        }
+        ShadowRay found = cast_shadow_ray(point, sample_light(light, point.position, point.ns, u.xy), draws, index);
+        if (found.is_asked) {
+            if (!found.is_hidden) {
+                sum += count * found.light;
                 light_arrived = true;
             } else {
-                uint kind = emitters[pick_emitter(emitter_count, u.z)].kind;
-                bool is_certain = kind == EMITTER_POINT || kind == EMITTER_SPOT || kind == EMITTER_DIRECTIONAL;
-                stopped_light = is_certain ? stopped_light : max(stopped_light, divide(light, float(SHADOW_RAYS)));
+                bool is_certain = light.kind == EMITTER_POINT || light.kind == EMITTER_SPOT || light.kind == EMITTER_DIRECTIONAL;
+                stopped_light = is_certain ? stopped_light : max(stopped_light, divide(count * found.light, float(SHADOW_RAYS)));
             }
         }
     }

@@ -38,3 +38,5 @@ layout(constant_id = 29) const bool HAS_SPECULAR_CHAINS = true;
 layout(constant_id = 40) const bool HAS_AIMED_PHOTONS = true;
 // Radii differ from point to point.
 layout(constant_id = 48) const bool HAS_RADIUS_CLASSES = false;
+// Clusters of lights, of which a shadow ray chooses one by what they did in a trial; 0: it chooses a light by its power.
+layout(constant_id = 49) const uint LIGHT_CLUSTERS = 0;

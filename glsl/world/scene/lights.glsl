@@ -147,10 +147,9 @@ struct Arriving {
     bool is_far;
 };
 
-// u = (two for its area, light).
-Arriving sample_light(uint emitter_count, vec3 position, vec3 ns, vec3 u)
+// `light` has the probability with which it was chosen; u is for its area.
+Arriving sample_light(Emitter light, vec3 position, vec3 ns, vec2 u)
 {
-    Emitter light = emitters[pick_emitter(emitter_count, u.z)];
     Arriving arriving = Arriving(vec3(0.0), divide(light.strength, light.probability), light.position, false);
     float cos_light = 1.0;
     bool by_direction = false;
@@ -158,7 +157,7 @@ Arriving sample_light(uint emitter_count, vec3 position, vec3 ns, vec3 u)
         if (light.kind == EMITTER_TRIANGLE) {
             Triangle triangle = triangles[light.triangle];
             SurfaceMaterial material = materials[triangle.material];
-            vec2 at = sample_triangle(u.xy);
+            vec2 at = sample_triangle(u);
             vec3 normal = triangle_normal(triangle);
             vec3 point = triangle_point(triangle, at.x, at.y);
             float side = dot(normal, position - point);
@@ -170,7 +169,7 @@ Arriving sample_light(uint emitter_count, vec3 position, vec3 ns, vec3 u)
             cos_light = is_before(side, position, triangle_error(triangle)) ? max(dot(normal, normalize(position - point)), 0.0) : 0.0;
             if (cos_light > 0.0) {
                 vec4 direction = sample_spherical_triangle(normalize(triangle.a - position), normalize(triangle.b - position),
-                                                           normalize(triangle.c - position), u.xy);
+                                                           normalize(triangle.c - position), u);
                 float approach = -dot(direction.xyz, normal);
                 if (direction.w > 0.0 && approach > 0.0) {
                     by_direction = true;
@@ -193,7 +192,7 @@ Arriving sample_light(uint emitter_count, vec3 position, vec3 ns, vec3 u)
     }
     if (HAS_DISC_LIGHTS) {
         if (light.kind == EMITTER_DISC_COSINE || light.kind == EMITTER_DISC_UNIFORM) {
-            vec3 point = sample_disc(light.position, light.direction, light.size, u.xy);
+            vec3 point = sample_disc(light.position, light.direction, light.size, u);
             arriving.target = offset_origin(point, position_error(point), light.direction, light.direction);
             arriving.radiance *= 3.14159265358979324 * light.size * light.size;
             float cosine = dot(light.direction, normalize(position - point));

@@ -29,35 +29,13 @@ vec3 off_the_wall(uint index, vec3 position, vec3 normal)
 // (see is_before), and its rays would pass between the two sides.
 vec3 off_the_walls(vec3 position, vec3 normal)
 {
-    if (HAS_BVH) {
-        // Coordinates lie within 1.
-        float reach = 2.5 * (position_error(position) + 1.0 / 1048576.0);
-        // As in gather/cover.glsl.
-        uvec2 group = uvec2(0, 0x01000000u);
-        uvec2 stack[BVH_STACK];
-        uint depth = 0;
-        for (;;) {
-            uint slot = findLSB(group.y >> 24);
-            group.y &= ~(0x01000000u << slot);
-            if (group.y > 0x00ffffffu) {
-                stack[depth++] = group;
-            }
-            BvhNode node = nodes[group.x + bitCount(group.y & ((1u << slot) - 1u))];
-            uint near = children_in_box(node, position - reach, position + reach);
-            for (uint leaves = near & 0x00ffffffu; leaves != 0; leaves &= leaves - 1) {
-                position = off_the_wall(node.first_triangle + findLSB(leaves), position, normal);
-            }
-            group = uvec2(node.first_child, (near & 0xff000000u) | child_nodes_of(node));
-            if (group.y <= 0x00ffffffu) {
-                if (depth == 0) {
-                    break;
-                }
-                group = stack[--depth];
-            }
-        }
-    } else {
-        for (uint index = 0; index < triangles.length(); index++) {
-            position = off_the_wall(index, position, normal);
+    // Coordinates lie within 1.
+    float reach = 2.5 * (position_error(position) + 1.0 / 1048576.0);
+    uint first_triangle, leaves;
+    begin_walk();
+    while (next_leaves(position - reach, position + reach, first_triangle, leaves)) {
+        for (; leaves != 0; leaves &= leaves - 1) {
+            position = off_the_wall(first_triangle + findLSB(leaves), position, normal);
         }
     }
     return position;

@@ -20,11 +20,11 @@ Step step_path(inout LightPath path, uint bounce)
         taken.photon = Photon(surface.position, surface.plane, path.flux, pack_direction(wo, findLSB(path.arrival)));
 
         vec4 u = philox_floats(uvec4(path.photon, push.draws.round, EMISSION_BLOCKS + bounce, push.draws.domain), push.draws.seed);
-        Scatter scatter = sample_scatter(surface, wo, u.yzw, false, 0.0);
+        Scatter scatter = sample_scatter(surface, wo, u.yzw, bounce, false, 0.0);
         vec3 flux = path.flux * scatter.weight;
         if (HAS_SMOOTH_NORMALS) {
-            // A mirror keeps a photon's flux whatever its normals: all that meets the mesh goes on.
-            if (surface.ns != surface.ng && surface.kind != SURFACE_MIRROR) {
+            // Mirrors and glass keep a photon's flux whatever their normals: all that meets the mesh goes on.
+            if (surface.ns != surface.ng && !specular) {
                 float gain = shading_gain(dot(wo, surface.ns), dot(wo, surface.ng));
                 float back_gain = shading_gain(dot(scatter.direction, surface.ng), dot(scatter.direction, surface.ns));
                 flux *= min(gain * back_gain, float(MAX_SHADING_GAIN));

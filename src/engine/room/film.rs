@@ -106,7 +106,12 @@ impl RoomFilm {
 
     /// What it tells of its error; `unit` makes W/m2 of flux times weight.
     pub fn error(&self, weights: &[f64], unit: f64, confidence: f64) -> FilmError {
-        FilmError { rounds: self.rounds, noise: self.relative_error(weights), unknown: self.unknown(weights, unit, confidence) }
+        FilmError {
+            rounds: self.rounds,
+            noise: self.relative_error(weights),
+            unknown: self.unknown(weights, unit, confidence),
+            unseen: 0.0,
+        }
     }
 
     /// Points of walls that reflect, but where no photon was stored: what is known of them is a bound. Of relative flux, a

@@ -8,10 +8,34 @@ use super::radius_class::map_class;
 use super::resources::{PhotonBuffers, SceneResources};
 use crate::constants::MAX_GROUPS;
 use crate::error::Result;
-use crate::gpu::kernels::{CrowdSize, FluxToRadiance, GatherVisiblePointsTwoWords, GatherVisiblePointsU64, Resolve};
+use crate::gpu::kernels::{CrowdSize, DiscCuts, FluxToRadiance, GatherVisiblePointsTwoWords, GatherVisiblePointsU64, Resolve};
 use crate::gpu::{Commands, Extent};
 use crate::plan::scene::{MapPlan, TESTS_PER_POINT};
-use crate::records::{CellPush, CrowdSizePush, FluxToRadiancePush, ResolvePush, SceneGatherPush};
+use crate::records::{CellPush, CrowdSizePush, DiscCutsPush, FluxToRadiancePush, ResolvePush, SceneGatherPush};
+
+/// Finds the walls at which each visible point's density estimates from a map end.
+pub fn cut_discs(commands: &mut Commands, round: Round, map: &MapPlan) -> Result<()> {
+    let Round { resources, plan, .. } = round;
+    let SceneResources { scene, visible_points, radius_classes, disc_cuts, .. } = resources;
+    let (width, height) = plan.sensor.size();
+    for (first_point, end_point) in runs(plan.visible_points(), plan.pixels_at_once(4)) {
+        let push = DiscCutsPush {
+            first_point,
+            end_point,
+            pixel_count: plan.sensor.pixels(),
+            width,
+            height,
+            arrivals: map.stored,
+            map_class: map_class(map),
+            first_cut: plan.first_cut(map.caustic_only),
+            radius: plan.widest_radius(map, round.number) as f32,
+        };
+        let kernel = DiscCuts { scene, visible_points, radius_classes, disc_cuts };
+        commands.dispatch(kernel, &push, Extent::Items(u64::from(end_point - first_point)))?;
+        add_work(commands, plan, 256 * u64::from(end_point - first_point))?;
+    }
+    Ok(())
+}
 
 /// Adds a chunk of a map to the estimates of all visible points whose class this grid serves, all where radii have no classes.
 pub fn gather(
@@ -24,7 +48,7 @@ pub fn gather(
 ) -> Result<()> {
     let Round { resources, plan, number: round, .. } = round;
     let PhotonBuffers { cells, sorted_map, crowded, dispatch_args, .. } = photons;
-    let SceneResources { scene, visible_points, estimates, radius_classes, nonfinite_values, .. } = resources;
+    let SceneResources { scene, visible_points, estimates, radius_classes, disc_cuts, nonfinite_values, .. } = resources;
     let point_count = plan.visible_points();
     let (lanes, step) = (map.lanes, plan.points_at_once());
     let (width, height) = plan.sensor.size();
@@ -39,6 +63,7 @@ pub fn gather(
                     sorted_map,
                     crowded,
                     radius_classes,
+                    disc_cuts,
                     nonfinite_values,
                 },
                 push,
@@ -54,6 +79,7 @@ pub fn gather(
                     sorted_map,
                     crowded,
                     radius_classes,
+                    disc_cuts,
                     nonfinite_values,
                 },
                 push,
@@ -78,6 +104,7 @@ pub fn gather(
             map_class: map_class(map),
             first_class: classes.start,
             end_class: classes.end,
+            first_cut: plan.first_cut(map.caustic_only),
             cells: cells_push,
         };
         commands.fill(crowded, 0, 2, 0);
@@ -93,10 +120,20 @@ pub fn gather(
 
 /// Turns what the maps found at all visible points into light; so many photons of the global and of the caustic map were traced.
 pub fn flux_to_radiance(commands: &mut Commands, round: Round, traced: [u32; 2]) -> Result<()> {
-    let Round { resources, geometry, plan, number: round } = round;
-    let SceneResources { scene, visible_points, estimates, radius_classes, one_hits, part_totals, anomalies, nonfinite_values, .. } =
-        resources;
-    let radius = |map: &Option<MapPlan>| map.as_ref().map_or(1.0, |map| plan.widest_radius(map, round)) as f32;
+    let Round { resources, geometry, plan, .. } = round;
+    let SceneResources {
+        scene,
+        visible_points,
+        estimates,
+        radius_classes,
+        disc_cuts,
+        one_hits,
+        part_totals,
+        anomalies,
+        nonfinite_values,
+        ..
+    } = resources;
+    let radius = |map: &Option<MapPlan>| map.as_ref().map_or(1.0, |map| plan.widest_radius(map, round.number)) as f32;
     let flux =
         |map: &Option<MapPlan>| map.as_ref().map_or(0.0, |map| map.photon_flux_of(geometry, traced[usize::from(map.caustic_only)])) as f32;
     let (width, height) = plan.sensor.size();
@@ -109,17 +146,27 @@ pub fn flux_to_radiance(commands: &mut Commands, round: Round, traced: [u32; 2])
             width,
             height,
             arrivals: plan.arrivals,
-            round,
-            rounding: rounding(plan, round),
+            round: round.number,
+            rounding: rounding(plan, round.number),
             film_scale: plan.film_scale as f32,
             film_limit: plan.point_limit() as f32,
             global_radius: radius(&plan.global),
             caustic_radius: radius(&plan.caustic),
+            first_caustic_cut: plan.first_cut(true),
             global_flux: flux(&plan.global),
             caustic_flux: flux(&plan.caustic),
         };
-        let kernel =
-            FluxToRadiance { scene, anomalies, visible_points, estimates, radius_classes, one_hits, part_totals, nonfinite_values };
+        let kernel = FluxToRadiance {
+            scene,
+            anomalies,
+            visible_points,
+            estimates,
+            radius_classes,
+            disc_cuts,
+            one_hits,
+            part_totals,
+            nonfinite_values,
+        };
         commands.dispatch(kernel, &push, Extent::Items(u64::from(end_point - first_point)))?;
         add_work(commands, plan, 256 * u64::from(end_point - first_point))?;
     }

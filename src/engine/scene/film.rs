@@ -160,9 +160,17 @@ impl SceneFilm {
         unknown.relative_to(bounds, result)
     }
 
+    /// The most that hits of the brightest lamp in mirrors and glass may add to one pixel, where no round had any, relative to the
+    /// result.
+    fn unseen(&self, plan: &ScenePlan, confidence: f64) -> f64 {
+        let hit = plan.rare_radiance / (f64::from(plan.samples()) * f64::from(self.rounds.max(1)));
+        if hit == 0.0 { 0.0 } else { most_hits(confidence) * hit / self.means(plan).map(DVec3::length_squared).sum::<f64>().sqrt() }
+    }
+
     /// What it tells of its error.
     pub fn error(&self, plan: &ScenePlan, confidence: f64) -> FilmError {
-        FilmError { rounds: self.rounds, noise: self.relative_error(plan), unknown: self.unknown(plan, confidence) }
+        let (noise, unknown) = (self.relative_error(plan), self.unknown(plan, confidence));
+        FilmError { rounds: self.rounds, noise, unknown, unseen: self.unseen(plan, confidence) }
     }
 
     /// Root mean square over pixels and channels of standard error and of the mean; of pixels that nothing has reached see

@@ -19,7 +19,7 @@ pub fn losses(geometry: &Geometry, plan: &ScenePlan, fates: &[Fates], film: &Sce
         let Some(totals) = of_map.totals.filter(|_| of_map.emitted > 0) else { continue };
         // Sums over all photons traced, each of which stands for that share of a round.
         let watts = |flux: RelativeFlux| {
-            let unit = geometry.flux_unit / (of_map.emitted as f64 * map.flux_gain) * area_unit;
+            let unit = geometry.flux_unit * map.flux_scale / (of_map.emitted as f64 * map.flux_gain) * area_unit;
             flux.iter().sum::<f64>() * unit
         };
         let (cut_off, clamped) = (watts(totals.cut_flux), watts(totals.clamped_flux));

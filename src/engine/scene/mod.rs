@@ -7,7 +7,7 @@
 //! ```text
 //! visible points    paths from the camera over mirrors and glass: visible points, direct light by shadow rays
 //! radii             in the first round: each point's, by the density of the trial's photons
-//! global            photons of the global map: traced, sorted, gathered at every visible point
+//! global            where walls end what a visible point looks through; photons of the global map: traced, sorted, gathered there
 //! caustic           the same with photons that took mirrors and glass only, and were aimed at these
 //! flux to radiance  from flux over the area that lies on the surface, times reflectance
 //! resolve           all light of a pixel: to the film
@@ -17,6 +17,7 @@ pub mod bias;
 pub mod estimate;
 pub mod film;
 pub mod index;
+mod light_trial;
 pub mod losses;
 mod on_gpu;
 pub mod points;

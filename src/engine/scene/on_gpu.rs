@@ -36,6 +36,9 @@ pub fn modules(plan: &ScenePlan, facts: &DeviceFacts) -> Vec<Module> {
         modules.extend([CrowdSize::MODULE, FluxToRadiance::MODULE]);
         modules.extend([trace::modules(plan), index::modules()].concat());
         modules.push(if facts.int64_atomics { GatherVisiblePointsU64::MODULE } else { GatherVisiblePointsTwoWords::MODULE });
+        if plan.cuts_discs() {
+            modules.push(DiscCuts::MODULE);
+        }
         if plan.has_classes() {
             modules.extend(radius_class::modules());
         }
@@ -207,6 +210,9 @@ struct MapInRound<'a> {
 /// The photons of a map; says how many. Where the time may be up, chunks grow only as long as they take little of it.
 fn one_map(commands: &mut Commands, round: Round, in_round: &MapInRound, deadline: Option<Instant>, state: &mut RunState) -> Result<u32> {
     let map = in_round.map;
+    if round.plan.cuts_discs() {
+        commands.scope("cuts", |commands| estimate::cut_discs(commands, round, map))?;
+    }
     let mut traced = 0;
     let mut most = if deadline.is_some() { FIRST_TIMED_CHUNK } else { map.chunk_photons };
     while traced < map.photons {

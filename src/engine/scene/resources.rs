@@ -23,8 +23,11 @@ buffers! {
             materials: planned.filled(commands, "materials", &geometry.materials)?,
             textures: planned.filled(commands, "textures", &geometry.textures)?,
             texels: planned.filled(commands, "texels", &geometry.texels)?,
-            emitters: planned.filled(commands, "emitters", &geometry.emitters)?,
+            emitters: planned.filled(commands, "emitters", plan.lights().map_or(&geometry.emitters, |lights| &lights.emitters))?,
             caustic_targets: planned.filled(commands, "caustic targets", &plan.targets)?,
+            light_nodes: planned.filled(commands, "light nodes", plan.lights().map_or(&[], |lights| &lights.nodes))?,
+            light_regions: planned.filled(commands, "light regions", plan.lights().map_or(&[], |lights| &lights.regions))?,
+            light_shares: planned.filled(commands, "light shares", plan.lights().map_or(&[], |lights| &lights.shares))?,
         },
         /// Points of all phases; empty for a picture.
         receivers: Vec<Buffer<Receiver>> =
@@ -42,6 +45,8 @@ buffers! {
         radius_classes: Buffer<u32> = planned.one("radius classes")?,
         clearances: Buffer<f32> = planned.one("clearances")?,
         class_counts: Buffer<u32> = planned.zeroed(commands, "class counts")?,
+        /// Of the round under way.
+        disc_cuts: Buffer<[u32; 4]> = planned.one("disc cuts")?,
         // All rounds.
         film_sums: Buffer<u64> = planned.zeroed(commands, "film sums")?,
         film_squares: Buffer<u64> = planned.zeroed(commands, "film squares")?,

@@ -1,5 +1,6 @@
 //! A trial round, from which the default radii are taken: the density of photons around the points that are asked about,
-//! and how far it is from these to the next wall.
+//! and how far it is from these to the next wall. Where there are several lamps, it first learns how to choose among them
+//! (`engine::scene::light_trial`), for shadow rays and photons.
 //!
 //! A radius by the scene's area is right where photons lie everywhere alike. Of a room on a plain it would be wider than the
 //! room. So a few photons are traced, with random numbers that no run has, and each of a few points is given the radius
@@ -7,13 +8,14 @@
 //! an integer, so that nothing but these photons and points decides; but no more than the radius by the area. It depends on no
 //! seed, builder or split.
 
+use std::sync::Arc;
 use std::time::Instant;
 
 use glam::Vec4;
 use rayon::prelude::*;
 
 use super::resources::SceneResources;
-use super::{Round, View, constants, modules, points, trace};
+use super::{Round, View, constants, light_trial, modules, points, trace};
 use crate::engine;
 use crate::engine::bias;
 use crate::error::Result;
@@ -21,11 +23,13 @@ use crate::gpu::kernels::Clearance;
 use crate::gpu::{Commands, Extent, Gpu, Kernel, Memory};
 use crate::photon::MapPhoton;
 use crate::plan::Limits;
+use crate::plan::light_choice::LightChoice;
 use crate::plan::radius::{MAX_DEFAULT_RADIUS, RADIUS_RANGE, RadiusFrom, Trial, TrialPhotons, area_radius};
 use crate::plan::scene::{MapPlan, ScenePlan};
 use crate::plan::sensor::Sensor;
 use crate::records::{ClearancePush, VisiblePoint};
 use crate::scene::Scene;
+use crate::scene::light_tree::{self, LightTree};
 use crate::settings::scene::{Part, SceneSettings};
 use crate::settings::stop::Stop;
 
@@ -56,29 +60,37 @@ pub(super) fn photons_wanted(map: &MapPlan, share: f64) -> f64 {
     share * of_round * f64::from(PHOTONS) / f64::from(map.photons)
 }
 
-/// The plan of a run, its default radii by a trial round.
+/// The plan of a run, its default radii and its choice of lights by a trial round.
 pub fn plan(gpu: &Gpu, scene: &Scene, view: &View, settings: &SceneSettings, sensor: Sensor) -> Result<ScenePlan> {
     let limits = engine::limits(gpu.facts());
     let plan = ScenePlan::new(scene, view.geometry, settings, sensor, &limits)?;
-    if plan.maps().all(|map| map.radius_from == RadiusFrom::User) {
+    // Whatever part of the picture is asked for, so that all parts have the same photons.
+    let chooses_lights = !light_tree::is_one_lamp(view.geometry);
+    if plan.maps().all(|map| map.radius_from == RadiusFrom::User) && !chooses_lights {
         return Ok(plan);
     }
-    let trial = run(gpu, scene, view, &plan, &limits)?;
+    let lights = chooses_lights.then(|| LightTree::new(view.geometry));
+    let trial = run(gpu, scene, view, &plan, lights, &limits)?;
     ScenePlan::with_trial(scene, view.geometry, settings, sensor, &limits, Some(trial))
 }
 
-fn run(gpu: &Gpu, scene: &Scene, view: &View, run: &ScenePlan, limits: &Limits) -> Result<Trial> {
+fn run(gpu: &Gpu, scene: &Scene, view: &View, run: &ScenePlan, lights: Option<LightTree>, limits: &Limits) -> Result<Trial> {
     let settings = SceneSettings {
         photons: PHOTONS,
         caustic_photons: PHOTONS,
         rounds: 1,
         seed: bias::seed(SEED, 0),
-        // Parts of a picture have the radii of the whole, so that they add up to it.
+        // Parts of a picture have the radii and lights of the whole, so that they add up to it.
         part: Part::All,
         stop: Stop::default(),
         ..run.settings.clone()
     };
-    let most_points = (POINTS / run.points_per_pixel).max(1);
+    // Of the whole too.
+    let points_per_pixel = match run.settings.part {
+        Part::All => run.points_per_pixel,
+        _ => ScenePlan::new(scene, view.geometry, &settings, run.sensor, limits)?.points_per_pixel,
+    };
+    let most_points = (POINTS / points_per_pixel).max(1);
     let (sensor, phases) = match run.sensor {
         Sensor::Picture { width, height } => {
             let smaller = (f64::from(most_points) / (f64::from(width) * f64::from(height))).sqrt().min(1.0);
@@ -91,10 +103,12 @@ fn run(gpu: &Gpu, scene: &Scene, view: &View, run: &ScenePlan, limits: &Limits) 
             (Sensor::Receivers { count: some.len() as u32 }, vec![some])
         }
     };
-    let plan = ScenePlan::new(scene, view.geometry, &settings, sensor, limits)?;
+    let by_power =
+        lights.clone().map(|lights| Trial { lights: Some(Arc::new(LightChoice::by_power(view.geometry, lights))), ..Trial::default() });
+    let plan = ScenePlan::with_trial(scene, view.geometry, &settings, sensor, limits, by_power)?;
 
     // All pipelines of the run, which they are made for, but where it shows a part alone.
-    gpu.prepare(&[modules(&plan, gpu.facts()), vec![Clearance::MODULE]].concat(), &constants(&plan))?;
+    gpu.prepare(&[modules(&plan, gpu.facts()), vec![Clearance::MODULE], light_trial::modules(&plan)].concat(), &constants(&plan))?;
     let began = Instant::now();
     let mut commands = Commands::new(gpu, constants(&plan), began)?;
     let resources = SceneResources::new(gpu, &mut commands, view.geometry, &plan, &phases)?;
@@ -113,6 +127,12 @@ fn run(gpu: &Gpu, scene: &Scene, view: &View, run: &ScenePlan, limits: &Limits) 
     let clearances = commands.read(&clearances, point_count as usize)?;
 
     let mut trial = Trial::default();
+    if let Some(lights) = lights {
+        let points = light_trial::points(&phases, &visible_points, &view.geometry.planes);
+        let lights = light_trial::learn(gpu, &mut commands, round, lights, &points)?;
+        commands.upload(&resources.scene.emitters, &lights.emitters)?;
+        trial.lights = Some(Arc::new(lights));
+    }
     let mut largest = 0.0;
     for of_run in run.maps() {
         let Some(map) = plan.maps().find(|map| map.caustic_only == of_run.caustic_only) else { continue };

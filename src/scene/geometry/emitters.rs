@@ -77,6 +77,24 @@ impl Geometry {
         Ok(())
     }
 
+    /// The emitters where photons choose them by other shares, and by how much more than now a photon of relative flux 1 then carries.
+    pub fn emitters_by(&self, shares: &[f64]) -> (Vec<Emitter>, f64) {
+        let mut emitters = self.emitters.clone();
+        let mut before = 0;
+        for (emitter, choices) in emitters.iter_mut().zip(choices(shares)) {
+            before += choices;
+            let probability = choices as f32 / CHOICES as f32;
+            emitter.flux *= emitter.probability / probability;
+            emitter.probability = probability;
+            emitter.cumulative = before as f32 / CHOICES as f32;
+        }
+        let gains = emitters.iter().zip(&self.emitters).map(|(new, old)| f64::from(old.probability) / f64::from(new.probability));
+        // A power of two: no flux is rounded for it.
+        let scale = gains.fold(1.0, f64::max).log2().ceil().exp2();
+        emitters.iter_mut().for_each(|emitter| emitter.flux /= scale as f32);
+        (emitters, scale)
+    }
+
     fn emitter_of(&self, kind: &LightKind) -> Found {
         let area_unit = self.unit * self.unit;
         let (own, flux) = match *kind {
@@ -132,11 +150,20 @@ impl Geometry {
     /// Radiance of the brightest thing that a camera can see, W/m2/sr, or the irradiance a sixteenth of the scene's
     /// unit from a point or spot light: what a narrow spot lights is far brighter than its power over the scene's area.
     pub fn brightest(&self) -> f64 {
-        let shines = self.materials.iter().map(|material| material.emission);
-        let environment = self.emitters.iter().filter(|emitter| emitter.kind == EMITTER_ENVIRONMENT).map(|emitter| emitter.strength);
         let small = self.emitters.iter().filter(|emitter| matches!(emitter.kind, EMITTER_POINT | EMITTER_SPOT));
         let irradiance = small.map(|emitter| 2f64.powi(8) * f64::from(emitter.strength.max_element()));
-        shines.chain(environment).map(|radiance| f64::from(radiance.max_element())).chain(irradiance).fold(0.0, f64::max)
+        self.shown_radiances().map(|radiance| f64::from(radiance.max_element())).chain(irradiance).fold(0.0, f64::max)
+    }
+
+    /// Radiance of the brightest surface or sky that a path can meet, W/m2/sr, the root of the sum of its channels' squares.
+    pub fn brightest_shown(&self) -> f64 {
+        self.shown_radiances().map(|radiance| f64::from(radiance.length())).fold(0.0, f64::max)
+    }
+
+    fn shown_radiances(&self) -> impl Iterator<Item = Vec3> {
+        let shines = self.materials.iter().map(|material| material.emission);
+        let environment = self.emitters.iter().filter(|emitter| emitter.kind == EMITTER_ENVIRONMENT);
+        shines.chain(environment.map(|emitter| emitter.strength))
     }
 }
 
@@ -293,6 +320,22 @@ mod tests {
         assert!((summary.mean - mean).abs().max_element() < 1e-12, "{} {mean}", summary.mean);
         let geometry = Geometry::new(&textured_lamp(3, texture)).unwrap();
         assert!(geometry.emitters.iter().all(|emitter| f64::from(emitter.flux.max_element()) * brightest <= 1.0 + 1e-6));
+    }
+
+    /// Photons that choose lights otherwise carry the same flux together, and none carries more than 1.
+    #[test]
+    fn other_shares_leave_the_flux() {
+        let texture = Texture { name: "t".into(), width: 2, height: 2, texels: vec![Vec3::ONE; 4], wrap: [Wrap::Repeat; 2] };
+        let geometry = Geometry::new(&textured_lamp(5, texture)).unwrap();
+        let (emitters, scale) = geometry.emitters_by(&[0.5, 0.25, 0.125, 0.125 - 1e-12, 1e-12]);
+        assert!(emitters[0].probability > 0.49 && emitters[4].probability < 1e-6 && emitters[4].cumulative == 1.0);
+        for (old, new) in geometry.emitters.iter().zip(&emitters) {
+            let flux = |emitter: &Emitter, unit: f64| f64::from(emitter.flux.x) * f64::from(emitter.probability) * unit;
+            assert!((flux(new, scale) / flux(old, 1.0) - 1.0).abs() < 1e-5, "{old:?}, {new:?}");
+            assert!(new.flux.max_element() <= 1.0);
+        }
+        let (same, scale) = geometry.emitters_by(&[0.2; 5]);
+        assert_eq!((same, scale), (geometry.emitters.clone(), 1.0));
     }
 
     #[test]

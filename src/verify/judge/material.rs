@@ -6,6 +6,7 @@ use glam::DVec3;
 
 use super::geometry::Vertex;
 use super::{Random, uniform};
+use crate::constants::SMOOTH_TOTAL_REFLECTIONS;
 use crate::scene::Surface;
 
 /// `w` reflected about a unit normal; both point away from the surface.
@@ -61,9 +62,9 @@ impl Vertex {
         share * self.base_colour
     }
 
-    /// Where the path goes on, and its weight: BRDF times cosine over the density of the direction.
-    /// `None`: the direction lies on the wrong side, and the path ends.
-    pub fn scatter(&self, towards_eye: bool, rng: &mut Random) -> Option<(DVec3, DVec3)> {
+    /// Where a path goes on that has met `depth` surfaces before, and its weight: BRDF times cosine over the density of the
+    /// direction. `None`: the direction lies on the wrong side, and the path ends.
+    pub fn scatter(&self, depth: u32, towards_eye: bool, rng: &mut Random) -> Option<(DVec3, DVec3)> {
         let (wi, weight, is_transmitted) = match self.surface {
             Surface::Lambert => (sample_lobe(self.ns, 1.0, rng), 1.0, false),
             Surface::PaperPhong { exponent } => {
@@ -78,20 +79,23 @@ impl Vertex {
             Surface::Mirror => (mirrored(self.wo, self.ns), 1.0, false),
             Surface::Dielectric { ior } => {
                 let (n_i, n_t) = if self.is_front { (1.0, f64::from(ior)) } else { (f64::from(ior), 1.0) };
-                let cos_i = self.wo.dot(self.ns);
+                // Total reflection by a shading normal alone has an end: glass would keep light that its triangles let out.
+                let is_total = fresnel(self.wo.dot(self.ns), n_i, n_t) == 1.0;
+                let normal = if is_total && depth >= SMOOTH_TOTAL_REFLECTIONS { self.ng } else { self.ns };
+                let cos_i = self.wo.dot(normal);
                 if uniform(rng) < fresnel(cos_i, n_i, n_t) {
-                    (mirrored(self.wo, self.ns), 1.0, false)
+                    (mirrored(self.wo, normal), 1.0, false)
                 } else {
                     let eta = n_i / n_t;
                     let cos_t = (1.0 - eta * eta * (1.0 - cos_i * cos_i)).max(0.0).sqrt();
                     // Radiance over n^2 is what refraction leaves as it is.
-                    ((eta * cos_i - cos_t) * self.ns - eta * self.wo, eta * eta, true)
+                    ((eta * cos_i - cos_t) * normal - eta * self.wo, eta * eta, true)
                 }
             }
         };
-        // What a mirror's shading normal sends to the wrong side is mirrored in the triangle's plane.
+        // A specular ray that its shading normal sends to the wrong side is mirrored in the triangle's plane.
         let height = wi.dot(self.ng);
-        let wi = if self.surface == Surface::Mirror && height < 0.0 { wi - 2.0 * height * self.ng } else { wi };
+        let wi = if self.surface.is_specular() && (height < 0.0) != is_transmitted { wi - 2.0 * height * self.ng } else { wi };
         let is_below = wi.dot(self.ng) < 0.0;
         (weight > 0.0 && is_below == is_transmitted).then_some((wi, weight * self.base_colour))
     }

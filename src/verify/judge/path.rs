@@ -94,7 +94,7 @@ impl Judge<'_> {
                 parts[prefix.part_of_sampled_light()] += prefix.beta * light;
                 prefix.rough_count += 1;
             }
-            let Some((wi, weight)) = vertex.scatter(towards_eye, rng) else { break };
+            let Some((wi, weight)) = vertex.scatter(bounce, towards_eye, rng) else { break };
             prefix.beta *= weight;
             if bounce >= FREE_BOUNCES {
                 let survival = prefix.beta.max_element().min(MAX_SURVIVAL);

@@ -1,0 +1,166 @@
+//! Rooms with lamps of which only some are seen from a place, each as a check of a device.
+
+use std::sync::Arc;
+
+use glam::dvec3;
+
+use super::prelude::*;
+use crate::unknown::room_without_floor;
+use photonmill::engine::scene::{self, RunResult, Target, View, trial};
+
+fn lamp_of(radiance: f32) -> Material {
+    Material { emission: Vec3::splat(radiance), ..matt(0.0) }
+}
+
+/// A closed room of 4 x 4 x 3 m around a place, without a lamp.
+pub fn dark_room(at: DVec3) -> Vec<Mesh> {
+    let mut meshes = [room_without_floor(0.0), vec![level(0.0, [4.0, 4.0], true, 0)]].concat();
+    meshes.iter_mut().flat_map(|mesh| &mut mesh.positions).for_each(|position| *position += at);
+    meshes
+}
+
+fn square_lamp(at: DVec3, width: f64, material: usize) -> Mesh {
+    let mut lamp = level(0.0, [width; 2], false, material);
+    lamp.positions.iter_mut().for_each(|position| *position += at);
+    lamp
+}
+
+/// From one room to the next.
+pub const ROOM: DVec3 = DVec3::new(6.0, 0.0, 0.0);
+
+/// Rooms side by side, each with a lamp of this radiance.
+pub fn rooms(radiances: &[f32]) -> Scene {
+    let mut scene = scene_of(Vec::new(), vec![matt(0.5)], vec![]);
+    for (number, radiance) in radiances.iter().enumerate() {
+        let at = number as f64 * ROOM;
+        scene.meshes.extend(dark_room(at));
+        scene.meshes.push(square_lamp(at + 2.9 * DVec3::Y, 1.0, number + 1));
+        scene.materials.push(lamp_of(*radiance));
+    }
+    scene
+}
+
+/// Points on the floor and two walls of the first room.
+pub fn points() -> Vec<(DVec3, DVec3)> {
+    let places = [-1.9, -1.0, 0.1, 1.2, 1.9];
+    let floor = places.iter().flat_map(|x| places.map(|z| (dvec3(*x, 0.0, z), DVec3::Y)));
+    let right = places.iter().flat_map(|y| places.map(|z| (dvec3(2.0, 1.4 + 0.7 * y, z), DVec3::NEG_X)));
+    let back = places.iter().flat_map(|x| [0.2, 1.6].map(|y| (dvec3(*x, y, -2.0), DVec3::Z)));
+    floor.chain(right).chain(back).collect()
+}
+
+/// Irradiance at points, with a plan by a trial that may be changed, or without one.
+pub fn lit(
+    gpu: &Gpu,
+    scene: &Scene,
+    settings: &SceneSettings,
+    points: &[(DVec3, DVec3)],
+    change: Option<&dyn Fn(&mut ScenePlan)>,
+) -> RunResult {
+    let geometry = Geometry::new(scene).unwrap();
+    let target = Target::Points(points);
+    let view = View { geometry: &geometry, camera: None, phases: &target.phases(&geometry) };
+    let plan = match change {
+        Some(change) => {
+            let mut plan = trial::plan(gpu, scene, &view, settings, target.sensor()).unwrap();
+            change(&mut plan);
+            plan
+        }
+        None => ScenePlan::new(scene, &geometry, settings, target.sensor(), &engine::limits(gpu.facts())).unwrap(),
+    };
+    super::lit::light(gpu, &view, plan)
+}
+
+pub fn direct(rounds: u32) -> SceneSettings {
+    SceneSettings { rounds, part: Part::Direct, paranoid: true, ..SceneSettings::default() }
+}
+
+/// Whether the first points of a run have the light of another run within both errors, and no more than so many times its variance,
+/// relative to the light, on average.
+pub fn same_light_and_noise(what: &str, found: &RunResult, expected: &RunResult, most: f64) -> Check<Complaint> {
+    let mut family = Family::default();
+    let (mut variance, mut allowed) = (0.0, 0.0);
+    for point in 0..expected.film.pixels() {
+        let ((mean, error), (other, other_error)) = (red(found, point), red(expected, point));
+        family.expect(format!("{what}, point {point}"), mean, other, error.hypot(other_error));
+        variance += (error / other).powi(2);
+        allowed += (other_error / other).powi(2);
+    }
+    family.complaint()?;
+    let ratio = variance / allowed;
+    println!("{what}: {ratio:.3} times the variance");
+    if ratio <= most { Ok(()) } else { Err(Complaint::new(Kind::TooNoisy, format!("{what}: {ratio} times the variance, {most} may be"))) }
+}
+
+/// Direct light of a room beside one whose lamp is so many times as strong, compared with that of the room alone.
+pub fn dim_room(gpu: &Gpu, ratio: f32, by_sight: bool) -> Check<Complaint> {
+    let change: &dyn Fn(&mut ScenePlan) = &|_| {};
+    let alone = lit(gpu, &rooms(&[1.0]), &direct(128), &points(), None);
+    let both = [points(), points().into_iter().map(|(at, normal)| (at + ROOM, normal)).collect()].concat();
+    let found = lit(gpu, &rooms(&[1.0, ratio]), &direct(128), &both, by_sight.then_some(change));
+    same_light_and_noise(&format!("a room beside one of {ratio:e}"), &found, &alone, 3.0)
+}
+
+/// A room under a lamp of 3 m that is cut into so many squares a side, each by itself.
+pub fn cut_lamp(side: u32) -> Scene {
+    let width = 3.0 / f64::from(side);
+    let place = |k: u32| (f64::from(k) + 0.5) * width - 1.5;
+    let mut lamps = Mesh { name: "lamps".into(), material: 1, ..Mesh::default() };
+    for k in 0..side * side {
+        let square = square_lamp(dvec3(place(k % side), 2.9, place(k / side)), width, 1);
+        let first = lamps.positions.len() as u32;
+        lamps.triangles.extend(square.triangles.iter().map(|triangle| triangle.map(|corner| corner + first)));
+        lamps.positions.extend(square.positions);
+        lamps.uvs[0].extend(&square.uvs[0]);
+    }
+    scene_of([dark_room(DVec3::ZERO), vec![lamps]].concat(), vec![matt(0.5), lamp_of(1.0)], vec![])
+}
+
+/// Direct light of a lamp of many pieces, compared with that of the lamp as one.
+pub fn many_lamps(gpu: &Gpu, side: u32, by_sight: bool) -> Check<Complaint> {
+    let change: &dyn Fn(&mut ScenePlan) = &|_| {};
+    let whole = lit(gpu, &cut_lamp(1), &direct(128), &points(), None);
+    let found = lit(gpu, &cut_lamp(side), &direct(128), &points(), by_sight.then_some(change));
+    same_light_and_noise(&format!("{side} x {side} lamps"), &found, &whole, 2.0)
+}
+
+/// Two lamps in a room, one of which the trial is made to have missed: it lights as before.
+pub fn missed_lamp(gpu: &Gpu) -> Check<Complaint> {
+    let lamps = [-1.0, 1.0].map(|x| square_lamp(dvec3(x, 2.9, 0.5), 0.6, 1)).to_vec();
+    let scene = scene_of([dark_room(DVec3::ZERO), lamps].concat(), vec![matt(0.5), lamp_of(1.0)], vec![]);
+    let floor: Vec<_> = points().into_iter().take(25).collect();
+    let by_power = lit(gpu, &scene, &direct(256), &floor, None);
+    let missed = lit(
+        gpu,
+        &scene,
+        &direct(256),
+        &floor,
+        Some(&|plan| {
+            let lights = Arc::make_mut(plan.trial.as_mut().and_then(|trial| trial.lights.as_mut()).expect("a trial learned of lights"));
+            assert_eq!(lights.clusters, 4);
+            lights.shares = [0.5, 1.0, 1.0, 1.0, 0.0, 0.0, 0.5, 1.0].repeat(lights.shares.len() / 8);
+        }),
+    );
+    // One place in four asks for it, so that it has far more noise.
+    same_light_and_noise("a lamp that the trial missed", &missed, &by_power, f64::INFINITY)
+}
+
+/// All light of the first of these rooms, from defaults but for fewer photons, compared with that of the room alone.
+pub fn scattered_light(gpu: &Gpu, ratio: f32, by_sight: bool) -> Check<Complaint> {
+    let settings = SceneSettings { photons: 1 << 15, paranoid: true, ..SceneSettings::default() };
+    let all = |scene: &Scene| match by_sight {
+        true => scene::render(gpu, scene, &settings, Target::Points(&points())).unwrap(),
+        false => lit(gpu, scene, &settings, &points(), None),
+    };
+    let [alone, found] = [all(&rooms(&[1.0])), all(&rooms(&[1.0, ratio]))];
+    let unknown = found.film.unknown(&found.plan, 0.95);
+    if unknown.unreached > 0 || !unknown.absent.is_empty() {
+        return Err(Complaint::new(Kind::TooDark, unknown.text("point", "W/m2", 0.95, found.film.rounds)));
+    }
+    let sums = |lit: &RunResult, of: &dyn Fn(&RunResult, usize) -> f64| (0..points().len()).map(|point| of(lit, point)).sum::<f64>();
+    let means = [&alone, &found].map(|lit| sums(lit, &|lit, point| red(lit, point).0));
+    let noise = [&alone, &found].map(|lit| sums(lit, &|lit, point| (red(lit, point).1 / red(&alone, point).0).powi(2)));
+    println!("1:{ratio:e}: {:.4} of the light, {:.3} times the variance", means[1] / means[0], noise[1] / noise[0]);
+    relative_check("all light", means[1], means[0], 0.03).map_err(|text| Complaint::new(Kind::TooDark, text))?;
+    relative_check("variance", noise[1].max(noise[0]), noise[0], 2.0).map_err(|text| Complaint::new(Kind::TooNoisy, text))
+}

@@ -1,0 +1,248 @@
+//! Shadow rays and photons choose lights by what these do where it is asked.
+
+use crate::common::chi_square::counts_check;
+use crate::common::lamps::{ROOM, cut_lamp, dark_room, dim_room, lit, many_lamps, missed_lamp, points, rooms, scattered_light};
+use crate::common::planted;
+use crate::common::prelude::*;
+use photonmill::constants::{LIGHT_LEAF, NONE};
+use photonmill::engine::scene::resources::SceneResources;
+use photonmill::engine::scene::{self, Target};
+use photonmill::gpu::kernels::TryLights;
+use photonmill::output::scene_report;
+use photonmill::plan::light_choice::LightChoice;
+use photonmill::records::{Draws, LightNode, Receiver, TryLightsPush};
+
+#[test]
+fn a_dim_room_beside_a_bright_one_is_lit_as_if_it_were_alone() {
+    let Some(gpu) = device() else { return };
+    for ratio in [1e2, 1e3, 1e6] {
+        assert_holds(format!("1:{ratio}"), dim_room(&gpu, ratio, true));
+    }
+    assert_complains("lights by power", dim_room(&gpu, 1e2, false));
+}
+
+#[test]
+fn scattered_light_of_a_dim_room_has_photons_of_its_own() {
+    let Some(gpu) = device() else { return };
+    for ratio in [1e3, 1e6] {
+        assert_holds(format!("1:{ratio}"), scattered_light(&gpu, ratio, true));
+    }
+    assert_complains("photons by power", scattered_light(&gpu, 1e3, false));
+}
+
+#[test]
+fn a_hundred_thousand_lamps_light_as_one_does() {
+    let Some(gpu) = device() else { return };
+    assert_holds("100 352 triangles", many_lamps(&gpu, 224, true));
+    assert_complains("lights by power", many_lamps(&gpu, 224, false));
+}
+
+#[test]
+fn a_light_that_the_trial_missed_is_not_lost() {
+    let Some(gpu) = device() else { return };
+    assert_holds("a lamp", missed_lamp(&gpu));
+}
+
+/// What nothing has reached stays unknown beside a room that is lit.
+#[test]
+fn a_dark_room_beside_a_bright_one_is_not_known_to_be_dark() {
+    let Some(gpu) = device() else { return };
+    let mut scene = rooms(&[1.0, 100.0]);
+    scene.meshes.extend(dark_room(2.0 * ROOM));
+    let dark = points().into_iter().map(|(at, normal)| (at + 2.0 * ROOM, normal));
+    let all: Vec<_> = points().into_iter().chain(dark).collect();
+    let found = lit(&gpu, &scene, &SceneSettings { rounds: 4, photons: 3000, ..SceneSettings::default() }, &all, Some(&|_| {}));
+    let unknown = found.film.unknown(&found.plan, 0.95);
+    println!("{unknown:?}");
+    assert_eq!((unknown.asked, unknown.unreached), (120, 60));
+    assert!(unknown.upper_bound > 0.0 && (60..120).all(|point| found.film.stated_error(point, &found.plan) == DVec3::INFINITY));
+}
+
+/// The choice knows no builder, chunk or part: films are the same to the bit, and parts add up to the whole.
+#[test]
+fn lights_are_chosen_alike_by_every_builder_chunk_and_part() {
+    let Some(gpu) = device() else { return };
+    let mut scene = rooms(&[1.0, 30.0]);
+    scene.materials[0].surface = Surface::Glossy { exponent: 20.0 };
+    let camera = Camera::looking_at("camera", DVec3::new(-1.8, 1.7, 1.9), DVec3::Y, DVec3::Y, 1.2);
+    let settings = SceneSettings { photons: 4000, rounds: 2, samples: 2, ..SceneSettings::default() };
+    let lit = |settings: SceneSettings| scene::render(&gpu, &scene, &settings, Target::Picture(&camera, [24, 18])).unwrap();
+    let whole = lit(settings.clone());
+    assert_eq!(whole.plan.lights().map(|lights| lights.clusters), Some(4));
+    for (builder, chunk) in [(Builder::Atomic, None), (Builder::Naive, Some(700)), (Builder::Persistent, Some(1300))] {
+        let other = lit(SceneSettings { builder: Some(builder), chunk, ..settings.clone() });
+        assert!(other.film == whole.film, "{builder:?}, {chunk:?}");
+        assert!(other.plan.trial.unwrap().lights == whole.plan.trial.as_ref().unwrap().lights, "{builder:?}, {chunk:?}");
+    }
+    let mut sums = vec![0; whole.film.sums.len()];
+    for part in Part::EACH {
+        let of_part = lit(SceneSettings { part, ..settings.clone() });
+        sums.iter_mut().zip(&of_part.film.sums).for_each(|(sum, of_part)| *sum += of_part);
+    }
+    assert!(sums == whole.film.sums);
+    let other_seed = lit(SceneSettings { seed: 7, ..settings });
+    assert!(other_seed.plan.trial.unwrap().lights == whole.plan.trial.unwrap().lights);
+}
+
+/// What a scene of one lamp does not need is in no plan of it, and reports say what others have.
+#[test]
+fn one_lamp_is_not_chosen() {
+    let Some(gpu) = device() else { return };
+    let settings = SceneSettings { rounds: 1, photons: 1000, caustic_photons: 1000, ..SceneSettings::default() };
+    for (name, scene, clusters) in [("cornell", scene("cornell"), 0), ("two rooms", rooms(&[1.0, 2.0]), 4), ("pieces", cut_lamp(9), 64)] {
+        let camera = scene.first_camera();
+        let lit = scene::render(&gpu, &scene, &settings, Target::Picture(&camera, [8, 8])).unwrap();
+        assert_eq!(lit.plan.constant("LIGHT_CLUSTERS"), clusters, "{name}");
+        let table = scene_report::plan_table(&lit.plan, None);
+        assert_eq!(table.contains("by what a trial saw of them"), clusters > 0, "{table}");
+    }
+}
+
+/// Twin of `light_importance` in `glsl/world/scene/light_choice.glsl`.
+fn importance(node: &LightNode, position: Vec3) -> f32 {
+    node.power / (node.centre - position).length_squared().max(node.radius_squared).max(1e-12)
+}
+
+/// The probability of each light below a node, at a place: twin of `choose_within`.
+fn add_probabilities(lights: &LightChoice, node: u32, probability: f64, position: Vec3, of: &mut [f64]) {
+    let child = lights.nodes[node as usize].child;
+    if child & LIGHT_LEAF != 0 {
+        of[(child & !LIGHT_LEAF) as usize] += probability;
+        return;
+    }
+    let [left, right] = [child, child + 1].map(|half| importance(&lights.nodes[half as usize], position));
+    let share = f64::from((65536.0 * left / (left + right)).round() / 65536.0).clamp(1.0 / 64.0, 63.0 / 64.0);
+    add_probabilities(lights, child, share * probability, position, of);
+    add_probabilities(lights, child + 1, (1.0 - share) * probability, position, of);
+}
+
+/// Where the rows of a place begin: twin of `row_of_shares`.
+fn rows(lights: &LightChoice, place: [f32; 6]) -> usize {
+    let mut region = lights.regions[0];
+    while region.axis != NONE {
+        let above = place[region.axis as usize] >= region.split;
+        region = lights.regions[(region.next + u32::from(above)) as usize];
+    }
+    2 * (region.next * lights.clusters) as usize
+}
+
+/// Lights at three places, as many times as each of 64 clusters has a thread for each of so many receivers: by `choose_light`, from the
+/// row of what the trial saw or from the other, in a kernel that says so in place of what a trial asks it. With the probability that
+/// it states.
+fn picks(gpu: &Gpu, geometry: &Geometry, plan: &ScenePlan, receivers: &[Receiver], unseen: bool) -> Vec<(usize, f64)> {
+    let mut commands = Commands::new(gpu, scene::constants(plan), Instant::now()).unwrap();
+    let resources = SceneResources::new(gpu, &mut commands, geometry, plan, &[]).unwrap();
+    let pairs = receivers.len() * 64;
+    let points = gpu.buffer::<Receiver>("points", receivers.len() as u64, Memory::Device).unwrap();
+    let found = gpu.buffer::<f32>("found", pairs as u64, Memory::Device).unwrap();
+    commands.upload(&points, receivers).unwrap();
+    let mut ask = |what: u32| {
+        let SceneResources { scene, nonfinite_values, .. } = &resources;
+        let kernel = TryLights { scene, receivers: &points, found: &found, nonfinite_values };
+        let draws = Draws { seed: UVec2::new(5, 6), round: 0, domain: 0 };
+        let push = TryLightsPush { draws, first_pair: 0, end_pair: pairs as u32, ray_count: what };
+        commands.dispatch(kernel, &push, Extent::Items(pairs as u64)).unwrap();
+        commands.read(&found, pairs).unwrap()
+    };
+    let (lights, probabilities) = (ask(2 * u32::from(unseen)), ask(2 * u32::from(unseen) + 1));
+    lights.into_iter().zip(probabilities).map(|(light, probability)| (light as usize, f64::from(probability))).collect()
+}
+
+const PICK: &str = "ChosenLight pick = choose_light(row_of_shares(here.position, here.ng, push.ray_count < 2), here.position, \
+    stratified(0, 1, words_of(pair, 1, push.draws)).x, mix32(words.w));\n    \
+    found[pair] = (push.ray_count & 1) == 0 ? float(pick.emitter) : pick.probability;";
+
+/// A kernel chooses lights as often as it says, and as its twin here does.
+#[test]
+fn lights_are_chosen_as_often_as_is_said() {
+    let Some(mut gpu) = open(Options::default()) else { return };
+    let mut scene = cut_lamp(20);
+    scene.meshes.extend(rooms(&[1.0]).meshes.into_iter().map(|mut mesh| {
+        mesh.positions.iter_mut().for_each(|position| *position += ROOM);
+        mesh
+    }));
+    let settings = SceneSettings { rounds: 1, photons: 1000, ..SceneSettings::default() };
+    let plan = lit(&gpu, &scene, &settings, &points(), Some(&|_| {})).plan;
+    let geometry = Geometry::new(&scene).unwrap();
+    let lights = plan.lights().expect("there are many lights");
+    assert_eq!(lights.clusters, 64);
+    let last = "found[pair] = largest * sqrt(divide(sum, float(push.ray_count)));";
+    gpu.replace(planted::kernels(&["try_lights"], "kernels/try_lights.comp", &[(last, PICK)]));
+    let mut chosen = BTreeSet::new();
+    for (position, normal) in [points()[0], points()[12], points()[30]] {
+        let receiver = scene::receiver(&geometry, (position, normal));
+        let place = [receiver.position.to_array(), receiver.normal.to_array()].concat();
+        let row = rows(lights, place.try_into().unwrap());
+        for (unseen, row) in [(false, row), (true, row + 64)] {
+            let mut expected = vec![0.0; lights.emitters.len()];
+            for cluster in 0..64 {
+                let before = if cluster == 0 { 0.0 } else { lights.shares[row + cluster - 1] };
+                let share = f64::from(lights.shares[row + cluster] - before);
+                add_probabilities(lights, cluster as u32, share, receiver.position, &mut expected);
+            }
+            let found = picks(&gpu, &geometry, &plan, &vec![receiver; 1024], unseen);
+            let mut counts = vec![0u64; expected.len()];
+            for (light, stated) in &found {
+                counts[*light] += 1;
+                assert!((stated / expected[*light] - 1.0).abs() < 1e-2, "{stated} is said, {} is right", expected[*light]);
+            }
+            assert_holds(format!("{position}"), counts_check("lights", &counts, &expected));
+            chosen.extend(found.iter().map(|(light, _)| *light));
+            let twisted: Vec<f64> = expected.iter().enumerate().map(|(k, share)| share * if k % 2 == 0 { 1.1 } else { 0.9 }).collect();
+            let sum: f64 = twisted.iter().sum();
+            let twisted: Vec<f64> = twisted.iter().map(|share| share / sum).collect();
+            let is_one = expected.iter().filter(|share| **share > 1e-3).count() < 4;
+            assert!(is_one || counts_check("other shares", &counts, &twisted).is_err(), "{position}");
+        }
+    }
+    assert_eq!(chosen.len(), lights.emitters.len(), "lights that were chosen from somewhere");
+}
+
+/// From anywhere every light may be chosen, in one of two ways, whose probabilities add up to 1 each.
+#[test]
+fn no_light_is_impossible_and_probabilities_add_up_to_one() {
+    let Some(gpu) = device() else { return };
+    let mut scene = rooms(&[1.0, 1e-6, 1e6]);
+    let mut lamps = cut_lamp(30).meshes.pop().unwrap();
+    lamps.positions.iter_mut().for_each(|position| *position += DVec3::new(0.0, 1.5, 6.0));
+    scene.meshes.push(lamps);
+    scene.lights = every_kind_of_light(1.0, 1e-3, EmissionLaw::Cosine);
+    let settings = SceneSettings { rounds: 1, photons: 1000, ..SceneSettings::default() };
+    let below_lamps = grid(1.0, DVec3::Y, 6).into_iter().map(|(at, normal)| (at + DVec3::Z * 6.0, normal));
+    let all: Vec<_> = points().into_iter().chain(below_lamps).collect();
+    let plan = lit(&gpu, &scene, &settings, &all, Some(&|_| {})).plan;
+    let lights = plan.lights().expect("there are many lights");
+    let emitter_count = lights.emitters.len();
+    println!("{emitter_count} lights, {} clusters, {} shares", lights.clusters, lights.shares.len());
+    assert!(emitter_count > 1800 && lights.clusters == 64 && lights.shares.len() > 4 * 2 * 64);
+    let mut seen_from_some = BTreeSet::new();
+    for k in 0..200u32 {
+        let words = [philox([k, 0, 0, 0], [3, 4]), philox([k, 1, 0, 0], [3, 4])].concat();
+        let place: [f32; 6] =
+            std::array::from_fn(|axis| (f64::from(words[axis]) / 2f64.powi(31) - 1.0) as f32 * if axis < 3 { 0.5 } else { 1.0 });
+        let position = Vec3::from_slice(&place);
+        let row = rows(lights, place);
+        let mut reached = vec![0.0; emitter_count];
+        for (which, row) in [row, row + 64].into_iter().enumerate() {
+            let shares = &lights.shares[row..row + 64];
+            let mut own = vec![0.0; emitter_count];
+            for cluster in 0..64 {
+                let before = if cluster == 0 { 0.0 } else { shares[cluster - 1] };
+                add_probabilities(lights, cluster as u32, f64::from(shares[cluster] - before), position, &mut own);
+            }
+            let sum: f64 = own.iter().sum();
+            assert!((sum - 1.0).abs() < 1e-9 || (which == 1 && sum == 0.0), "{place:?}: {sum}");
+            if which == 0 {
+                seen_from_some.extend(own.iter().enumerate().filter(|(_, share)| **share > 0.0).map(|(light, _)| light));
+            }
+            // No light is chosen in both ways.
+            assert!(own.iter().zip(&reached).all(|(own, before)| *own == 0.0 || *before == 0.0), "{place:?}");
+            reached.iter_mut().zip(&own).for_each(|(sum, own)| *sum += own);
+        }
+        assert!(reached.iter().all(|probability| *probability > 0.0), "{place:?}");
+    }
+    assert!(seen_from_some.len() > 1000 && seen_from_some.len() < emitter_count, "{}", seen_from_some.len());
+    // Photons, too, may leave any.
+    let sum: f64 = lights.emitters.iter().map(|emitter| f64::from(emitter.probability)).sum();
+    assert!((sum - 1.0).abs() < 1e-6 && lights.emitters.iter().all(|emitter| emitter.probability > 0.0), "{sum}");
+}
