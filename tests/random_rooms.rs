@@ -443,10 +443,9 @@ fn ten_random_rooms_are_right_within_their_errors() {
     assert_complains("half the noise", judge(&spoiled(&clear, 1.0, 0.5)));
 }
 
-/// Where errors are known to be stated too small. At the foot of what stands on a surface photons of its other side count, or
-/// are missing below it, and where light ends the radius reaches beyond it, which the noise does not say. And lamps of one room
-/// take the photons and shadow rays of the other. What mends these takes the marks away.
-const KNOWN_FAULTS: [Place; 2] = [Place::Edge, Place::Beside];
+/// Where errors are known to be stated too small: dim points of one room of two are found too dark. What mends this takes the
+/// mark away. At edges the radius reaches beyond the light, which the noise does not say: they are shown and not judged.
+const KNOWN_FAULTS: [Place; 1] = [Place::Beside];
 
 #[test]
 #[ignore = "200 rooms: a quarter of an hour on a software device"]
