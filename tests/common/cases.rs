@@ -5,7 +5,7 @@
 #[derive(Debug, Clone, Copy, PartialEq)]
 pub struct Case {
     /// Of a catalogue: rays and triangles (G), sampling (S), random numbers (R), accumulation (A), density estimation (E),
-    /// lobes (B), indices (I), scheduling (D), cameras (C), glass (L), many photons (M).
+    /// lobes (B), indices (I), scheduling (D), cameras (C), glass (L), many photons (M), families of scenes (F).
     pub number: &'static str,
     pub failure: &'static str,
     pub shown: Shown,
@@ -24,11 +24,11 @@ pub enum Shown {
 use Shown::{Absent, Tests};
 
 /// Cases of each group.
-pub const COUNTS: [(char, usize); 11] =
-    [('G', 15), ('S', 17), ('R', 9), ('A', 11), ('E', 17), ('B', 7), ('I', 8), ('D', 7), ('C', 3), ('L', 8), ('M', 3)];
+pub const COUNTS: [(char, usize); 12] =
+    [('G', 15), ('S', 17), ('R', 9), ('A', 11), ('E', 17), ('B', 7), ('I', 8), ('D', 7), ('C', 3), ('L', 8), ('M', 3), ('F', 10)];
 
 #[rustfmt::skip]
-pub const CASES: [Case; 105] = [
+pub const CASES: [Case; 115] = [
     Case { number: "G1", failure: "Rays start at a fixed distance from the surface they leave", shown: Tests(&["photons_leave_a_surface_once_and_for_all", "a_patch_in_a_plane_is_left_with_the_plane", "photons_on_edges_and_in_corners_stay_in_the_room"]) },
     Case { number: "G2", failure: "Rays start on the surface they leave", shown: Tests(&["grazing_and_straight_directions_end_in_the_room"]) },
     Case { number: "G3", failure: "Ray offsets too large for a small scene", shown: Tests(&["thin_walls_and_sheets_let_no_light_through", "a_lamp_in_a_flat_box_lights_nothing_outside", "small_lamps_shine_by_their_area"]) },
@@ -134,6 +134,16 @@ pub const CASES: [Case; 105] = [
     Case { number: "M1", failure: "Parts of a run of unequal size that are averaged as equal", shown: Tests(&["work_groups_and_chunks_give_the_same_bits"]) },
     Case { number: "M2", failure: "A part of a run that is counted twice", shown: Absent { why: "runs cannot be merged; a study reads earlier results, each point once", words: &["shard", "merge_runs"] } },
     Case { number: "M3", failure: "Photon numbers beyond 32 bits", shown: Tests(&["photons_of_the_largest_numbers_are_their_own", "a_billion_photons_have_the_exact_share"]) },
+    Case { number: "F1", failure: "Lamps, walls and points too near each other", shown: Tests(&["what_is_too_near_is_right_within_what_is_stated"]) },
+    Case { number: "F2", failure: "Lamps and objects too far apart, or too small for their scene", shown: Tests(&["what_is_too_far_is_right_within_what_is_stated"]) },
+    Case { number: "F3", failure: "Slits, corridors, strips and needles", shown: Tests(&["what_is_too_thin_is_right_within_what_is_stated"]) },
+    Case { number: "F4", failure: "Lamps too bright and too dim beside each other", shown: Tests(&["what_is_too_bright_or_too_dim_is_right_within_what_is_stated"]) },
+    Case { number: "F5", failure: "Thousands of lamps and blocks", shown: Tests(&["what_is_too_many_is_right_within_what_is_stated"]) },
+    Case { number: "F6", failure: "Lamps and blocks that touch, hide or cross each other", shown: Tests(&["what_touches_or_overlaps_is_right_within_what_is_stated"]) },
+    Case { number: "F7", failure: "Rooms within rooms, and inside out", shown: Tests(&["what_is_nested_is_right_within_what_is_stated"]) },
+    Case { number: "F8", failure: "Single triangles, grazing suns, mirrored and squeezed instances", shown: Tests(&["what_is_degenerate_is_right_within_what_is_stated", "a_squeezed_mirrored_instance_is_as_bright_as_ever"]) },
+    Case { number: "F9", failure: "Options at their ends", shown: Tests(&["extreme_options_are_right_within_what_is_stated"]) },
+    Case { number: "F10", failure: "A room that nobody thought of", shown: Tests(&["ten_random_rooms_are_right_within_their_errors", "two_hundred_random_rooms_are_right_within_their_errors"]) },
 ];
 
 /// Cases that tests show, and cases that cannot occur.

@@ -18,6 +18,7 @@ pub mod pairwise;
 pub mod planted;
 pub mod prelude;
 pub mod program;
+pub mod rectangles;
 pub mod reference;
 pub mod sources;
 
