@@ -109,24 +109,41 @@ impl SceneFilm {
         self.sums[3 * pixel..][..3] == [0; 3] && kinds.iter().any(|kind| *kind != 0) && !kinds.contains(&REACHED)
     }
 
-    /// The standard error to be shown: infinite where it is not known, as nothing has reached the pixel.
+    /// The error to be shown: infinite where it is not known, as nothing has reached the pixel. Of a kind of light that has not, though
+    /// others have, the spread over rounds says nothing: its upper bound is part of the error.
     pub fn stated_error(&self, pixel: usize, plan: &ScenePlan) -> DVec3 {
-        if self.is_unreached(pixel) { DVec3::INFINITY } else { self.standard_error(pixel, plan) }
+        if self.is_unreached(pixel) {
+            return DVec3::INFINITY;
+        }
+        let scales = self.bound_scales(plan, plan.settings.stop.confidence);
+        let unknown: f64 = (0..KINDS.len()).map(|kind| self.most_light(pixel, kind, &scales).powi(2)).sum();
+        self.standard_error(pixel, plan).map(|error| (error * error + unknown).sqrt())
     }
 
-    /// Pixels, and kinds of light, of which no hit is all that is known.
-    pub fn unknown(&self, plan: &ScenePlan, confidence: f64) -> Unknown {
+    /// The most hits that no hit leaves possible, over the rounds and, of photons, their discs: times what one hit would add, the most light
+    /// of each kind.
+    fn bound_scales(&self, plan: &ScenePlan, confidence: f64) -> [f64; KINDS.len()] {
         // Rounds with larger discs would have had more hits.
         let shrunk = mean_squared_radius(plan.settings.alpha, self.rounds);
         let per_disc = |map: &Option<MapPlan>| map.as_ref().map_or(0.0, |map| 1.0 / (plan.widest_radius(map, 0).powi(2) * shrunk));
         let mut scales = [most_hits(confidence) / f64::from(self.rounds.max(1)); KINDS.len()];
         scales[HIT_CAUSTIC_PHOTON as usize] *= per_disc(&plan.caustic);
         scales[HIT_GLOBAL_PHOTON as usize] *= per_disc(&plan.global);
-        // The most light of a kind at a pixel, as far as no hit tells.
-        let bound = |pixel: usize, kind: usize| match self.kinds(pixel)[kind] {
+        scales
+    }
+
+    /// The most light of a kind at a pixel, as far as no hit tells; 0 where there was one.
+    fn most_light(&self, pixel: usize, kind: usize, scales: &[f64]) -> f64 {
+        match self.kinds(pixel)[kind] {
             REACHED => 0.0,
             bits => scales[kind] * f64::from(f32::from_bits(bits)),
-        };
+        }
+    }
+
+    /// Pixels, and kinds of light, of which no hit is all that is known.
+    pub fn unknown(&self, plan: &ScenePlan, confidence: f64) -> Unknown {
+        let scales = self.bound_scales(plan, confidence);
+        let bound = |pixel: usize, kind: usize| self.most_light(pixel, kind, &scales);
         let pixels = || 0..self.pixels();
         let is_absent = |kind: usize| {
             let of_kind = || pixels().map(|pixel| self.kinds(pixel)[kind]);
