@@ -106,11 +106,9 @@ fn receivers(layout: &Layout, phase: usize, geometry: &Geometry) -> Vec<Receiver
 }
 
 fn estimates(lit: &RunResult) -> Vec<TexelEstimate> {
+    let errors = lit.film.stated_errors(&lit.plan);
     (0..lit.film.pixels())
-        .map(|texel| TexelEstimate {
-            irradiance: lit.film.mean(texel, &lit.plan).as_vec3(),
-            standard_error: lit.film.stated_error(texel, &lit.plan).as_vec3(),
-        })
+        .map(|texel| TexelEstimate { irradiance: lit.film.mean(texel, &lit.plan).as_vec3(), standard_error: errors(texel).as_vec3() })
         .collect()
 }
 

@@ -90,8 +90,9 @@ pub(super) fn run(args: &ProbeArgs, cancelled: &AtomicBool) -> Result<End> {
 fn table(lit: &RunResult) -> Vec<u8> {
     let mut table = csv::Writer::from_writer(Vec::new());
     table.write_record(["red", "green", "blue", "red_error", "green_error", "blue_error"]).expect("memory takes what is written");
+    let errors = lit.film.stated_errors(&lit.plan);
     for point in 0..lit.film.pixels() {
-        let (mean, error) = (lit.film.mean(point, &lit.plan), lit.film.stated_error(point, &lit.plan));
+        let (mean, error) = (lit.film.mean(point, &lit.plan), errors(point));
         table
             .write_record([mean.x, mean.y, mean.z, error.x, error.y, error.z].map(|value| value.to_string()))
             .expect("memory takes what is written");

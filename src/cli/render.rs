@@ -108,7 +108,7 @@ pub(super) fn run(args: &RenderArgs, cancelled: &AtomicBool) -> Result<End> {
     let text = scene_report::text(&scene.name, &lit, job.point, args.messages.explain);
     let mut files = vec![(picture, image.encode(format, stops))];
     if let Some(errors) = errors {
-        files.push((errors, picture_of(&lit, size, |pixel| lit.film.stated_error(pixel, &lit.plan)).encode(Format::Exr, 0.0)));
+        files.push((errors, picture_of(&lit, size, lit.film.stated_errors(&lit.plan)).encode(Format::Exr, 0.0)));
     }
     files.extend(reports.files(&lit, || scene_report::json(&scene.name, &lit)));
     let written = write_all(files);

@@ -109,15 +109,32 @@ impl SceneFilm {
         self.sums[3 * pixel..][..3] == [0; 3] && kinds.iter().any(|kind| *kind != 0) && !kinds.contains(&REACHED)
     }
 
-    /// The error to be shown: infinite where it is not known, as nothing has reached the pixel. Of a kind of light that has not, though
-    /// others have, the spread over rounds says nothing: its upper bound is part of the error.
-    pub fn stated_error(&self, pixel: usize, plan: &ScenePlan) -> DVec3 {
-        if self.is_unreached(pixel) {
-            return DVec3::INFINITY;
+    /// The errors to be shown: infinite where nothing has reached the pixel. Of a kind of light that has reached others, but not this
+    /// one, the spread over rounds says nothing: its upper bound is part of the error. (Of one that has reached none, the report says
+    /// so.)
+    pub fn stated_errors<'a>(&'a self, plan: &'a ScenePlan) -> impl Fn(usize) -> DVec3 + 'a {
+        let mut scales = self.bound_scales(plan, plan.settings.stop.confidence);
+        self.absent().into_iter().for_each(|kind| scales[kind] = 0.0);
+        move |pixel| {
+            if self.is_unreached(pixel) {
+                return DVec3::INFINITY;
+            }
+            let unknown: f64 = (0..KINDS.len()).map(|kind| self.most_light(pixel, kind, &scales).powi(2)).sum();
+            self.standard_error(pixel, plan).map(|error| (error * error + unknown).sqrt())
         }
-        let scales = self.bound_scales(plan, plan.settings.stop.confidence);
-        let unknown: f64 = (0..KINDS.len()).map(|kind| self.most_light(pixel, kind, &scales).powi(2)).sum();
-        self.standard_error(pixel, plan).map(|error| (error * error + unknown).sqrt())
+    }
+
+    pub fn stated_error(&self, pixel: usize, plan: &ScenePlan) -> DVec3 {
+        self.stated_errors(plan)(pixel)
+    }
+
+    /// Kinds of light that some pixels ask for, and that have reached none.
+    fn absent(&self) -> Vec<usize> {
+        let is_absent = |kind: &usize| {
+            let of_kind = || (0..self.pixels()).map(|pixel| self.kinds(pixel)[*kind]);
+            of_kind().any(|bits| bits != 0) && of_kind().all(|bits| bits != REACHED)
+        };
+        (0..KINDS.len()).filter(is_absent).collect()
     }
 
     /// The most hits that no hit leaves possible, over the rounds and, of photons, their discs: times what one hit would add, the most light
@@ -145,11 +162,7 @@ impl SceneFilm {
         let scales = self.bound_scales(plan, confidence);
         let bound = |pixel: usize, kind: usize| self.most_light(pixel, kind, &scales);
         let pixels = || 0..self.pixels();
-        let is_absent = |kind: usize| {
-            let of_kind = || pixels().map(|pixel| self.kinds(pixel)[kind]);
-            of_kind().any(|bits| bits != 0) && of_kind().all(|bits| bits != REACHED)
-        };
-        let absent: Vec<usize> = (0..KINDS.len()).filter(|kind| is_absent(*kind)).collect();
+        let absent = self.absent();
         let mut unknown = Unknown { absent: absent.iter().map(|kind| KINDS[*kind]).collect(), ..Unknown::default() };
         let (mut bounds, mut result, mut shadow_rays) = (0.0, 0.0, 0.0);
         for pixel in pixels() {
