@@ -51,6 +51,7 @@ void gather_photons()
     vec3 normal = plane_normal(point.plane);
     Cuts cuts = cuts_of(push.first_cut + index, normal, radius);
     CellRange range = cells_near(point.position, radius);
+    bool has_cuts = cuts.lines[0].w < cuts.reach;
     radius = min(radius, cuts.reach);
     bool is_flat = point.shading_normal == NONE;
     vec3 ns = is_flat ? normal : unpack_normal(point.shading_normal);
@@ -90,7 +91,7 @@ void gather_photons()
                         photon_normal = plane_normal(words.w);
                         height = plane_height(words.w, point.position);
                     }
-                    bool counts = (is_alike || belongs(normal, photon_normal, height, radius)) && !is_cut_off(cuts, way)
+                    bool counts = (is_alike || belongs(normal, photon_normal, height, radius)) && !(has_cuts && is_cut_off(cuts, way))
                                   && ((point.arrivals >> (light.w >> 30)) & 1u) != 0;
                     vec3 wi = ns;
                     float cosine = 1.0;

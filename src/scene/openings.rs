@@ -106,8 +106,9 @@ pub fn openings(rays: &[OpeningRay]) -> Vec<CausticTarget> {
     while found.len() < MAX_OPENINGS as usize && lines.len() >= LEAST_LINES.max((LEFT_OVER * some.len() as f64) as usize) {
         let Some((centre, radius)) = opening(&lines) else { break };
         let centre = (centre / STEP).round() * STEP;
-        let radius = ((1.02 * radius / STEP).ceil() + 1.0) * STEP;
         let before = lines.len();
+        // The corners of an opening that no line has met: what comes in there unaimed is rare and bright.
+        let radius = (((1.0 + 2.5 / (before as f64).sqrt()) * radius / STEP).ceil() + 1.0) * STEP;
         lines.retain(|line| line.squared_distance(centre) > radius * radius);
         if lines.len() == before {
             break;
