@@ -138,6 +138,8 @@ const SCATTER_OPERATIONS: f64 = 5.0 * SLOW_OPERATION + 40.0;
 const PAIR_OPERATIONS: f64 = 24.0;
 /// Of a shadow ray: a point on a lamp, its distance, two cosines.
 const LIGHT_OPERATIONS: f64 = 3.0 * SLOW_OPERATION + 20.0;
+/// Of the frame in which walls around a visible point are looked for.
+const CUT_OPERATIONS: f64 = 2.0 * SLOW_OPERATION + 20.0;
 /// Of a visible point's light at the end of a round: area of the disc and three channels.
 const WEIGH_OPERATIONS: f64 = 4.0 * SLOW_OPERATION + 20.0;
 
@@ -218,6 +220,14 @@ impl Model<'_> {
             float_operations: found * PAIR_OPERATIONS,
             ..Cost::default()
         };
+        // Where walls end each point's disc: the point, four words, and the disc's own plane and frame.
+        let cuts = if self.plan.cuts_discs() {
+            let points = survey.asking_points;
+            Cost { bytes: points * (bytes::<VisiblePoint>() + 16.0), float_operations: points * CUT_OPERATIONS, ..Cost::default() }
+        } else {
+            Cost::default()
+        };
+        let cut_dispatches = f64::from(u8::from(self.plan.cuts_discs()));
         let chunks = map.chunks().count() as f64;
         // Emission, and flights with what works out the sizes of all but the first: of the first segment, which all have.
         let flights = chunks * if persistent { 1.0 } else { 2.0 * f64::from(map.segment_bounces) };
@@ -225,7 +235,8 @@ impl Model<'_> {
         let sorts = 3.0 * chunks + scans;
         let gathers = chunks * 3.0;
         let (item, items, dispatches, cost) = match stage {
-            "" => ("photons", counts.emitted, flights + sorts + gathers, trace + count + scan + sort + gather),
+            "" => ("photons", counts.emitted, cut_dispatches + flights + sorts + gathers, cuts + trace + count + scan + sort + gather),
+            "cuts" => ("points", survey.asking_points, cut_dispatches, cuts),
             "trace" => ("events", counts.events, flights, trace),
             "index" => ("photons", survey.stored, sorts, count + scan + sort),
             "index/count" => ("photons", survey.stored, 2.0 * chunks, count),
