@@ -159,3 +159,20 @@ fn texels_of_the_box_that_no_photon_has_found_have_no_error() {
     let expected = (bounds / square(&|texel| outcome.film.flux(texel))).sqrt();
     assert!((unknown.relative / expected - 1.0).abs() < 1e-9, "{unknown:?}: {expected}");
 }
+
+/// In a furnace of which few photons reach few points, shadow rays reach all: half of the light is missing where no photon came, and
+/// the spread of the other half is no error of that.
+#[test]
+fn points_that_no_photon_has_reached_say_so_in_their_error() {
+    let Some(gpu) = device() else { return };
+    let places = || (0..36).map(|k| (f64::from(k % 6) / 6.0 + 0.08, f64::from(k / 6) / 6.0 + 0.08));
+    let points: Vec<_> = places().map(|(x, z)| (dvec3(x, 1.0, z), DVec3::NEG_Y)).collect();
+    let settings = SceneSettings { photons: 10, rounds: 16, radius: Some(0.05), shadow_rays: 64, ..SceneSettings::default() };
+    let lit = received(&gpu, &scene("furnace"), &settings, &points);
+    let most = |error: &dyn Fn(usize) -> DVec3| {
+        (0..points.len()).map(|point| (lit.film.mean(point, &lit.plan).x - TAU).abs() / error(point).x).fold(0.0, f64::max)
+    };
+    let (stated, spread) = (most(&lit.film.stated_errors(&lit.plan)), most(&|point| lit.film.standard_error(point, &lit.plan)));
+    println!("at most {stated:.1} stated errors off, {spread:.1} by the spread alone");
+    assert!(stated < 5.0 && spread > 10.0, "{stated} and {spread}");
+}

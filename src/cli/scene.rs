@@ -47,7 +47,7 @@ pub(super) struct TransportArgs {
     /// Cut photons off after this many bounces [default: none; Russian roulette ends paths]
     #[arg(long, value_name = "N", value_parser = parse_integer::<u32>, allow_hyphen_values = true, help_heading = "Photons")]
     bounces: Option<u32>,
-    /// Emit photons of the caustic map only towards mirrors and glass (projection maps), and most photons and shadow rays of a sky or sun through the openings that a trial found [default: on]
+    /// Aim photons of the caustic map at mirrors and glass (projection maps), and light of a sky or sun at the openings that it comes in through [default: on]
     #[arg(long, value_enum, value_name = "SWITCH", help_heading = "Photons")]
     aim: Option<SwitchArg>,
 

@@ -117,7 +117,7 @@ fn map(
         lanes: capacity::lanes_of(expected / FOUND_BY_LANE, limits),
         target_count: 0,
         through_openings,
-        // Photons that are not aimed carry the most: what their share is taken for.
+        // Photons that are not aimed carry the most: 1 / (1 - OPENING_SHARE) times what they would if none were.
         flux_gain: if through_openings { 1.0 - OPENING_SHARE } else { 1.0 },
         flux_scale: trial.and_then(|trial| trial.lights.as_ref()).map_or(1.0, |lights| lights.flux_scale),
     })

@@ -52,39 +52,16 @@ pub fn gather(
     let point_count = plan.visible_points();
     let (lanes, step) = (map.lanes, plan.points_at_once());
     let (width, height) = plan.sensor.size();
+    macro_rules! kernel {
+        ($kernel:ident) => {
+            $kernel { scene, visible_points, film: estimates, cells, sorted_map, crowded, radius_classes, disc_cuts, nonfinite_values }
+        };
+    }
     let dispatch = |commands: &mut Commands, push: &SceneGatherPush, extent: Extent| {
         if commands.facts().int64_atomics {
-            commands.dispatch(
-                GatherVisiblePointsU64 {
-                    scene,
-                    visible_points,
-                    film: estimates,
-                    cells,
-                    sorted_map,
-                    crowded,
-                    radius_classes,
-                    disc_cuts,
-                    nonfinite_values,
-                },
-                push,
-                extent,
-            )
+            commands.dispatch(kernel!(GatherVisiblePointsU64), push, extent)
         } else {
-            commands.dispatch(
-                GatherVisiblePointsTwoWords {
-                    scene,
-                    visible_points,
-                    film: estimates,
-                    cells,
-                    sorted_map,
-                    crowded,
-                    radius_classes,
-                    disc_cuts,
-                    nonfinite_values,
-                },
-                push,
-                extent,
-            )
+            commands.dispatch(kernel!(GatherVisiblePointsTwoWords), push, extent)
         }
     };
     for (first_point, end_point) in runs(point_count, step) {

@@ -109,9 +109,9 @@ impl SceneFilm {
         self.sums[3 * pixel..][..3] == [0; 3] && kinds.iter().any(|kind| *kind != 0) && !kinds.contains(&REACHED)
     }
 
-    /// The errors to be shown: infinite where nothing has reached the pixel. Of a kind of light that has reached others, but not this
-    /// one, the spread over rounds says nothing: its upper bound is part of the error. (Of one that has reached none, the report says
-    /// so.)
+    /// The errors to be shown, by pixel: infinite where nothing has reached the pixel. The spread over rounds says nothing of a kind of
+    /// light that has reached other pixels, but not this one: its upper bound is part of the error. The report names the kinds that
+    /// have reached no pixel at all.
     pub fn stated_errors<'a>(&'a self, plan: &'a ScenePlan) -> impl Fn(usize) -> DVec3 + 'a {
         let mut scales = self.bound_scales(plan, plan.settings.stop.confidence);
         self.absent().into_iter().for_each(|kind| scales[kind] = 0.0);
@@ -137,8 +137,8 @@ impl SceneFilm {
         (0..KINDS.len()).filter(is_absent).collect()
     }
 
-    /// The most hits that no hit leaves possible, over the rounds and, of photons, their discs: times what one hit would add, the most light
-    /// of each kind.
+    /// Factors, by kind of light, that make an upper bound of what one hit would add, where there was none: the most hits that may be
+    /// expected, over the rounds and, for photons, the squares of their radii.
     fn bound_scales(&self, plan: &ScenePlan, confidence: f64) -> [f64; KINDS.len()] {
         // Rounds with larger discs would have had more hits.
         let shrunk = mean_squared_radius(plan.settings.alpha, self.rounds);
