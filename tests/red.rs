@@ -362,7 +362,7 @@ const FAULTS: [Fault; 80] = [
         kernels: &["flux_to_radiance"], noticed_by: &[(BesideBox, TooDark)] },
     Fault { what: "smooth normals alone reflect totally in glass for ever",
         file: "material/scatter.glsl", from: "&& depth >= SMOOTH_TOTAL_REFLECTIONS", to: "&& false",
-        kernels: &["view"],
+        kernels: &["view", "go_on"],
         noticed_by: &[(CoarseGlass, TooDark)] },
     Fault { what: "a ray to the sky weighs as if half as many were aimed at openings",
         file: "world/scene/openings.glsl", from: "density += divide(share * cones,", to: "density += divide(0.5 * share * cones,",
