@@ -313,15 +313,17 @@ struct CausticTarget {
     float radius;
 };
 
-// A ray that may leave the scene.
-struct OpeningRay {
+// A ray of a trial, and the place that it meets with the normal of its side.
+struct TrialRay {
     vec3 origin;
     vec3 direction;
-    // 1: it does.
+    vec3 met;
+    vec3 normal;
+    // 1: it leaves the scene, and meets nothing.
     uint escapes;
 };
 
-struct TryOpeningsPush {
+struct TrialRaysPush {
     uvec2 seed;
     uint first_ray;
     uint end_ray;

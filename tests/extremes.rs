@@ -161,8 +161,14 @@ fn standard_errors_survive_a_mean_far_above_them() {
     let square = |value: u64| u128::from(value) * u128::from(value);
     let squares = u128::from(half) * (square(low) + square(high));
     let of_rounds = RoundSums { rounds: settings.rounds, sums: vec![half * (low + high); 3], squares: vec![squares; 3] };
-    let film =
-        SceneFilm { of_rounds, one_hits: vec![0; 3], part_totals: Vec::new(), anomalies: Default::default(), class_counts: Vec::new() };
+    let film = SceneFilm {
+        of_rounds,
+        one_hits: vec![0; 3],
+        part_totals: Vec::new(),
+        anomalies: Default::default(),
+        class_counts: Vec::new(),
+        stored: [0; 3],
+    };
     let exact = 0.1 / (f64::from(settings.rounds) - 1.0).sqrt();
     assert_holds("mean", relative_check("mean", film.mean(0, &plan).x, 1000.0, 1e-6));
     assert_holds("error", relative_check("standard error", film.standard_error(0, &plan).x, exact, 1e-3));

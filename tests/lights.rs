@@ -2,7 +2,7 @@
 
 use crate::common::chi_square::counts_check;
 use crate::common::lamps::{
-    ROOM, cut_lamp, dark_room, dim_room, lit, many_lamps, missed_lamp, points, rooms, same_light_and_noise, scattered_light,
+    ROOM, cut_lamp, dark_room, dim_room, hidden_lamp, lit, many_lamps, missed_lamp, points, rooms, same_light_and_noise, scattered_light,
 };
 use crate::common::planted;
 use crate::common::prelude::*;
@@ -30,6 +30,13 @@ fn scattered_light_of_a_dim_room_has_photons_of_its_own() {
         assert_holds(format!("1:{ratio}"), scattered_light(&gpu, ratio, true));
     }
     assert_complains("photons by power", scattered_light(&gpu, 1e3, false));
+}
+
+#[test]
+fn a_lamp_that_lights_what_lights_the_points_has_photons_too() {
+    let Some(gpu) = device() else { return };
+    assert_holds("a screened lamp", hidden_lamp(&gpu, 1e4, true));
+    assert_complains("photons by power", hidden_lamp(&gpu, 1e4, false));
 }
 
 /// Photons that choose lights otherwise bring the same light: within a radius that is given, nothing else differs.

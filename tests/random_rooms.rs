@@ -443,10 +443,19 @@ fn ten_random_rooms_are_right_within_their_errors() {
     assert_complains("half the noise", judge(&spoiled(&clear, 1.0, 0.5)));
 }
 
-/// Where errors are known to be stated too small: dim points of one room of two are found too dark. What mends this takes the
-/// mark away. At edges the radius reaches beyond the light, which the noise does not say: they are shown and not judged.
-const KNOWN_FAULTS: [Place; 1] = [Place::Beside];
+/// A point of a box of 1 mm, which two or three photons have found that have almost no blue: its right blue, 40 times what they have,
+/// lies within what is stated, and 70 times further off than their spread.
+#[test]
+fn few_hits_say_little_of_colours_that_they_lack() {
+    let Some(gpu) = device() else { return };
+    let found = lit_rooms(&gpu, 105, false);
+    assert_holds("room 105", judge(&found));
+    let rare: Vec<Found> = found.iter().filter(|found| found.found < 0.1 * found.expected).copied().collect();
+    assert!(!rare.is_empty(), "all colours were found: look for another room");
+    assert_complains("the error of what was found", judge(&spoiled(&rare, 1.0, 0.01)));
+}
 
+/// At edges the radius reaches beyond the light, which the noise does not say: they are shown and not judged.
 #[test]
 #[ignore = "200 rooms: a quarter of an hour on a software device"]
 fn two_hundred_random_rooms_are_right_within_their_errors() {
@@ -462,13 +471,11 @@ fn two_hundred_random_rooms_are_right_within_their_errors() {
         }
     }
     let clear = of(Place::Clear, &plain);
-    assert_holds("200 rooms", judge(&clear));
+    assert_holds("rooms alone", judge(&clear));
+    assert_holds("rooms beside rooms", judge(&of(Place::Beside, &plain)));
     assert!(found.iter().all(|found| found.place == Place::Beside || found.noise.is_finite()), "light of a single room is not found");
     assert_complains("light of 1.04", judge(&spoiled(&clear, 1.04, 1.0)));
     assert_complains("noise of 0.8", judge(&spoiled(&clear, 1.0, 0.8)));
-    for place in KNOWN_FAULTS {
-        assert_complains(&format!("{place:?}, which is right now: take away the mark"), judge(&of(place, &plain)));
-    }
 }
 
 /// Nothing is seen twice, and nothing is missing.

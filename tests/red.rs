@@ -68,6 +68,8 @@ enum Question {
     GlassInFurnace(u32, bool),
     // The checks of `common::lamps`: a room beside one whose lamp is so many times as strong, a lamp in so many squares a side.
     DimRoom(f32),
+    HiddenLamp,
+    TinyPlates,
     ManyLamps(u32),
     MissedLamp,
     /// Light through a window of `openings`.
@@ -101,7 +103,7 @@ impl Question {
             Photons(_) | StripedCounters | RoomFilm(_) | Ledger(_) | ClosedForm(_) | Builders | StrictMath | Nearest | Pairs
             | FiniteBox => Subject::Room,
             AimedLight(_) => Subject::Aiming,
-            DimRoom(_) | ManyLamps(_) | MissedLamp => Subject::Lamps,
+            DimRoom(_) | ManyLamps(_) | MissedLamp | HiddenLamp => Subject::Lamps,
             _ => Subject::Scenes,
         }
     }
@@ -120,7 +122,7 @@ struct Fault {
 }
 
 #[rustfmt::skip]
-const FAULTS: [Fault; 80] = [
+const FAULTS: [Fault; 82] = [
     Fault { what: "what rounding takes from a pair of floats is forgotten",
         file: "film/float_u64.glsl", from: "precise float rest = sum.y + (", to: "precise float rest = 0.0 * (",
         kernels: &["gather_brute_u64", "gather_grid_u64"], noticed_by: &[(Pairs, SumsTooSmall)] },
@@ -399,6 +401,12 @@ const FAULTS: [Fault; 80] = [
     Fault { what: "a trial sees lights through walls",
         file: "kernels/try_lights.comp", from: "&& !shadow_ray.is_hidden && added > 0.0", to: "&& added > 0.0",
         kernels: &["try_lights"], noticed_by: &[(DimRoom(1e3), TooNoisy)] },
+    Fault { what: "rays of a trial are taken to meet nothing",
+        file: "kernels/trial_rays.comp", from: "position, normal, uint(escapes));", to: "position, normal, 1);",
+        kernels: &["trial_rays"], noticed_by: &[(HiddenLamp, TooDark)] },
+    Fault { what: "a surface that is tiny beside the radius is taken for a larger one",
+        file: "kernels/flux_to_radiance.comp", from: "area * (1.0 / 262144.0)", to: "area * (1.0 / 4096.0)",
+        kernels: &["flux_to_radiance"], noticed_by: &[(TinyPlates, TooDark)] },
     Fault { what: "directions within two cones are weighed as if only one could have chosen them",
         file: "world/scene/aim.glsl", from: "k == chosen || versine_between(emission.direction, other.axis) <= other.versine",
         to: "k == chosen",
@@ -491,6 +499,8 @@ fn ask(gpu: &Gpu, question: Question) -> Check<Complaint> {
         BehindWall => known::behind_a_wall(gpu, known::sheet(), Some(0.1)),
         BesideBox => known::beside_a_box(gpu, Some(0.1)),
         DimRoom(ratio) => lamps::dim_room(gpu, ratio, true),
+        HiddenLamp => lamps::hidden_lamp(gpu, 1e4, true),
+        TinyPlates => known::tiny_plates(gpu),
         ManyLamps(side) => lamps::many_lamps(gpu, side, true),
         MissedLamp => lamps::missed_lamp(gpu),
         Window => light_through_a_window(gpu),

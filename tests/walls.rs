@@ -29,6 +29,13 @@ fn a_dark_half_of_a_room_is_dark_right_behind_the_wall() {
     }
 }
 
+/// However little of the disc a surface is, its photons lie on its own area.
+#[test]
+fn what_is_tiny_beside_the_radius_is_as_light_as_all_of_the_furnace() {
+    let Some(gpu) = device() else { return };
+    assert_holds("tiny plates", known::tiny_plates(&gpu));
+}
+
 #[test]
 fn the_floor_beside_a_box_is_as_light_as_all_of_the_furnace() {
     let Some(gpu) = device() else { return };

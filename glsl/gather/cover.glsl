@@ -200,9 +200,10 @@ void cover_triangle(inout Cover cover, uint index)
     float share = divide(disc, radius);
     uint sum = uint(roundEven(max(whole, 0.0) * share * share * 16777216.0));
     cover.sum = saturated_sum(cover.sum, sum);
-    if (cover.plane == NONE && sum != 0) {
-        // A triangle that the place lies on, or within rounding of its edge, is nearer than any that it lies beside.
-        bool is_below = left > -1.0 / 1024.0;
+    // A triangle that the place lies on, or within rounding of its edge, is nearer than any that it lies beside, and below it however
+    // little of the disc it is.
+    bool is_below = left > -1.0 / 1024.0;
+    if (cover.plane == NONE && (is_below || sum != 0)) {
         float distance = abs(height) + (is_below ? 0.0 : radius);
         if (distance < cover.distance || (distance == cover.distance && plane < cover.nearest)) {
             cover.distance = distance;

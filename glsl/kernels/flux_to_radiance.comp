@@ -52,7 +52,7 @@ float estimate_area(VisiblePoint point, uint pixel, uint cut, float radius)
             atomicAdd(anomalies[2], 1);
         }
         // Photons were found, so some surface is there; rounding may call a sliver nothing.
-        return max(covered, area * (1.0 / 4096.0));
+        return max(covered, area * (1.0 / 262144.0));
     }
     return area;
 }

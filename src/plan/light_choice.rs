@@ -22,8 +22,8 @@ const UNITS: u32 = 1 << 16;
 const LIGHT_UNITS: f32 = 4096.0;
 /// Part of the shares that follows power and number, not what was learned.
 const PRIOR: f64 = 1.0 / 32.0;
-/// Part of the photons that leave lights by what these add at the points of the trial. What only lights what lights them has no more
-/// than a half fewer.
+/// Part of the photons that leave lights by what these add at the points of the trial and at what lights these. What is further away
+/// has no more than a half fewer.
 const EMISSION_BY_SIGHT: f64 = 0.5;
 const MOST_REGIONS: usize = 256;
 /// Shadow rays to a cluster that tell its share in a region, and points that do at least; fewer do where they have next to nothing in
@@ -48,7 +48,7 @@ pub struct LightChoice {
     /// Cumulative; two rows of clusters for each leaf of `regions`: those that the trial saw there, and the others. A row of none is
     /// all 0.
     pub shares: Vec<f32>,
-    /// As photons choose them: half by power, half by what their clusters add at the points of the trial.
+    /// As photons choose them: half by power, half by what their clusters add at all points of the trial.
     pub emitters: Vec<Emitter>,
     /// By how much more a photon of relative flux 1 carries than where all choose by power.
     pub flux_scale: f64,
@@ -90,19 +90,28 @@ struct Cut {
 impl LightChoice {
     /// By power and number alone, everywhere.
     pub fn by_power(geometry: &Geometry, tree: LightTree) -> LightChoice {
-        LightChoice::learned(geometry, tree, &[], &[], 1)
+        LightChoice::learned(geometry, tree, (&[], &[]), (&[], &[]), 1)
     }
 
-    /// From what each cluster did at each point, point after point, by so many rays.
-    pub fn learned(geometry: &Geometry, tree: LightTree, points: &[Receiver], found: &[f32], rays: u32) -> LightChoice {
+    /// From what each cluster did at points, point after point: at those that are asked about, by so many rays, and at places that
+    /// light these, which photons alone follow.
+    pub fn learned(
+        geometry: &Geometry,
+        tree: LightTree,
+        asked: (&[Receiver], &[f32]),
+        places: (&[Receiver], &[f32]),
+        rays: u32,
+    ) -> LightChoice {
         let clusters = tree.cluster_count;
-        let samples: Vec<Sample> =
-            points.iter().zip(found.chunks_exact(clusters)).filter_map(|(point, found)| Sample::new(point, found)).collect();
+        let samples = |(points, found): (&[Receiver], &[f32])| -> Vec<Sample> {
+            points.iter().zip(found.chunks_exact(clusters)).filter_map(|(point, found)| Sample::new(point, found)).collect()
+        };
+        let [samples, places] = [asked, places].map(samples);
         let power: Vec<f64> = tree.nodes[..clusters].iter().map(|node| f64::from(node.power)).collect();
         let least = RAYS_OF_REGION.div_ceil(rays).max(POINTS_OF_REGION) as usize;
         let (regions, leaves) = regions(&samples, least);
         let shares = leaves.iter().flat_map(|[leaf, around]| rows(&samples, leaf, around, &power)).collect();
-        let (emitters, flux_scale) = geometry.emitters_by(&emission_shares(geometry, &tree, &samples, &power));
+        let (emitters, flux_scale) = geometry.emitters_by(&emission_shares(geometry, &tree, &[&samples, &places], &power));
         LightChoice { nodes: tree.nodes, clusters: clusters as u32, regions, shares, emitters, flux_scale }
     }
 
@@ -122,13 +131,13 @@ impl LightChoice {
 }
 
 /// Shares of photons that leave each emitter.
-fn emission_shares(geometry: &Geometry, tree: &LightTree, samples: &[Sample], power: &[f64]) -> Vec<f64> {
+fn emission_shares(geometry: &Geometry, tree: &LightTree, samples: &[&[Sample]], power: &[f64]) -> Vec<f64> {
     let by_power: Vec<f64> = geometry.emitters.iter().map(|emitter| f64::from(emitter.probability)).collect();
-    if samples.is_empty() {
+    if samples.iter().all(|samples| samples.is_empty()) {
         return by_power;
     }
     let mut units = vec![0u64; power.len()];
-    for sample in samples {
+    for sample in samples.iter().copied().flatten() {
         units.iter_mut().zip(&sample.shares).for_each(|(sum, share)| *sum += u64::from(*share));
     }
     let all = units.iter().sum::<u64>() as f64;

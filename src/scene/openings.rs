@@ -4,7 +4,7 @@
 use glam::DVec3;
 
 use crate::constants::{EMITTER_DIRECTIONAL, EMITTER_ENVIRONMENT, MAX_OPENINGS};
-use crate::records::{CausticTarget, OpeningRay};
+use crate::records::{CausticTarget, TrialRay};
 use crate::rng::mix32;
 use crate::scene::geometry::Geometry;
 
@@ -40,7 +40,7 @@ struct Line {
 }
 
 impl Line {
-    fn of(ray: &OpeningRay) -> Line {
+    fn of(ray: &TrialRay) -> Line {
         Line { origin: ray.origin.as_dvec3(), direction: ray.direction.as_dvec3().normalize() }
     }
 
@@ -94,7 +94,7 @@ fn opening(lines: &[Line]) -> Option<(DVec3, f64)> {
 
 /// At most [`MAX_OPENINGS`] spheres, normalised, that most of the rays that escape pass through; none where that is no narrower than all
 /// directions.
-pub fn openings(rays: &[OpeningRay]) -> Vec<CausticTarget> {
+pub fn openings(rays: &[TrialRay]) -> Vec<CausticTarget> {
     let all: Vec<Line> = rays.iter().filter(|ray| ray.escapes != 0).map(Line::of).collect();
     if all.len() < LEAST_LINES || all.len() as f64 > OPEN * rays.len() as f64 {
         return Vec::new();
@@ -130,6 +130,8 @@ pub fn openings(rays: &[OpeningRay]) -> Vec<CausticTarget> {
 
 #[cfg(test)]
 mod tests {
+    use bytemuck::Zeroable;
+
     use super::*;
     use crate::rng::words;
 
@@ -139,7 +141,7 @@ mod tests {
 
     /// Rays from the walls of a cube of half an edge of 0.25, in all directions, of which those escape that `leaves` says of where they
     /// meet the plane x = 0.25.
-    fn rays(leaves: impl Fn(DVec3) -> bool) -> Vec<OpeningRay> {
+    fn rays(leaves: impl Fn(DVec3) -> bool) -> Vec<TrialRay> {
         let ray = |number: u32| {
             let u = |which: u32| unit(words(7).x + which, number);
             let (height, turn) = (2.0 * u(0) - 1.0, std::f64::consts::TAU * u(1));
@@ -148,7 +150,7 @@ mod tests {
             let origin = DVec3::new(0.4 * u(2) - 0.24, 0.5 * u(3) - 0.25, 0.5 * u(4) - 0.25);
             let meets = origin + direction * ((0.25 - origin.x) / direction.x);
             let escapes = direction.x > 0.0 && meets.abs().max_element() <= 0.25 + 1e-9 && leaves(meets);
-            OpeningRay { origin: origin.as_vec3(), direction: direction.as_vec3(), escapes: u32::from(escapes) }
+            TrialRay { origin: origin.as_vec3(), direction: direction.as_vec3(), escapes: u32::from(escapes), ..Zeroable::zeroed() }
         };
         (0..60_000).map(ray).collect()
     }

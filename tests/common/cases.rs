@@ -25,10 +25,10 @@ use Shown::{Absent, Tests};
 
 /// Cases of each group.
 pub const COUNTS: [(char, usize); 12] =
-    [('G', 15), ('S', 17), ('R', 9), ('A', 11), ('E', 17), ('B', 7), ('I', 8), ('D', 7), ('C', 3), ('L', 8), ('M', 3), ('F', 10)];
+    [('G', 15), ('S', 18), ('R', 9), ('A', 11), ('E', 19), ('B', 7), ('I', 8), ('D', 7), ('C', 3), ('L', 8), ('M', 3), ('F', 10)];
 
 #[rustfmt::skip]
-pub const CASES: [Case; 115] = [
+pub const CASES: [Case; 118] = [
     Case { number: "G1", failure: "Rays start at a fixed distance from the surface they leave", shown: Tests(&["photons_leave_a_surface_once_and_for_all", "a_patch_in_a_plane_is_left_with_the_plane", "photons_on_edges_and_in_corners_stay_in_the_room"]) },
     Case { number: "G2", failure: "Rays start on the surface they leave", shown: Tests(&["grazing_and_straight_directions_end_in_the_room"]) },
     Case { number: "G3", failure: "Ray offsets too large for a small scene", shown: Tests(&["thin_walls_and_sheets_let_no_light_through", "a_lamp_in_a_flat_box_lights_nothing_outside", "small_lamps_shine_by_their_area"]) },
@@ -61,6 +61,7 @@ pub const CASES: [Case; 115] = [
     Case { number: "S15", failure: "Lamps behind a wall that are a million times as strong", shown: Tests(&["a_dim_room_beside_a_bright_one_is_lit_as_if_it_were_alone", "scattered_light_of_a_dim_room_has_photons_of_its_own"]) },
     Case { number: "S16", failure: "A hundred thousand lamps, of which each shadow ray asks one", shown: Tests(&["a_hundred_thousand_lamps_light_as_one_does", "no_light_is_impossible_and_probabilities_add_up_to_one"]) },
     Case { number: "S17", failure: "A sky that is seen through a small window", shown: Tests(&["a_small_window_lights_a_room_in_a_tenth_of_the_time", "a_sky_through_a_window_is_as_light_as_the_closed_form_says"]) },
+    Case { number: "S18", failure: "A lamp that lights no point itself, but what lights it", shown: Tests(&["a_lamp_that_lights_what_lights_the_points_has_photons_too"]) },
     Case { number: "R1", failure: "48-bit arithmetic in two words", shown: Tests(&["rand48_gives_the_c_librarys_numbers", "rand48_jumps_and_steps_meet_across_2_to_the_48"]) },
     Case { number: "R2", failure: "Low bits of a linear congruential generator", shown: Tests(&["draws_are_even_alone_in_pairs_and_in_triples"]) },
     Case { number: "R3", failure: "Leapfrogging with a stride that is a power of two", shown: Tests(&["neighbouring_photons_do_not_resemble_each_other"]) },
@@ -98,6 +99,8 @@ pub const CASES: [Case; 115] = [
     Case { number: "E15", failure: "One radius for a hall and for a room 50 times as small", shown: Tests(&["a_room_has_radii_of_its_own_beside_a_hall"]) },
     Case { number: "E16", failure: "Light from before a wall on the floor behind it, and floor below a box that no photon reaches", shown: Tests(&["a_dark_half_of_a_room_is_dark_right_behind_the_wall", "the_floor_beside_a_box_is_as_light_as_all_of_the_furnace"]) },
     Case { number: "E17", failure: "Error bars of runs that have not met the brightest light yet", shown: Tests(&["claims_hold_once_the_tail_is_known", "a_run_goes_on_while_what_is_unseen_may_be_more_than_is_wanted"]) },
+    Case { number: "E18", failure: "A surface that is tiny beside the radius", shown: Tests(&["what_is_tiny_beside_the_radius_is_as_light_as_all_of_the_furnace"]) },
+    Case { number: "E19", failure: "Error bars of few photons, none of which had the colour that is missing", shown: Tests(&["few_hits_say_little_of_colours_that_they_lack"]) },
     Case { number: "B1", failure: "A power of a negative cosine", shown: Tests(&["phong_weights_have_their_mean_and_vanish_behind", "a_sun_in_a_plate_is_a_power_of_the_cosine"]) },
     Case { number: "B2", failure: "An exponent of 0: pow(0, 0)", shown: Tests(&["phong_weights_have_their_mean_and_vanish_behind"]) },
     Case { number: "B3", failure: "Weights that grow with the exponent", shown: Tests(&["phong_weights_have_their_mean_and_vanish_behind"]) },

@@ -399,6 +399,30 @@ pub fn behind_a_wall(gpu: &Gpu, walls: Vec<Mesh>, radius: Option<f64>) -> Check<
     if *leaked == DVec3::ZERO { Ok(()) } else { Err(Complaint::new(Kind::Leak, format!("{leaked} W/m2 at {}", point.0))) }
 }
 
+/// Plates, each a two-hundredth of the radius wide and in a plane of its own, in a furnace whose light all comes by photons.
+pub fn tiny_plates(gpu: &Gpu) -> Check<Complaint> {
+    let mut room = scene("furnace");
+    let side = 10u32;
+    let place = |k: u32| dvec3(f64::from(k % side), f64::from(k), f64::from(k / side % side)) / dvec3(10.0, 330.0, 10.0) + 0.0437;
+    let width = 0.002;
+    let places: Vec<DVec3> = (0..300).map(place).collect();
+    room.materials.push(matt(0.0));
+    room.meshes.extend(places.iter().map(|at| Mesh::parallelogram("plate", *at, DVec3::Z * width, DVec3::X * width, 1)));
+    let points: Vec<_> = places.iter().map(|at| (*at + dvec3(0.4, 0.0, 0.3) * width, DVec3::Y)).collect();
+    let settings = SceneSettings {
+        photons: 100_000,
+        rounds: 4,
+        radius: Some(0.4),
+        alpha: 1.0,
+        illumination: Illumination::Photons,
+        ..SceneSettings::default()
+    };
+    let lit = render(gpu, &room, &settings, Target::Points(&points))?;
+    println!("plates: {} of 2 pi", mean_red(&lit) / TAU);
+    // Five hundred photons in all.
+    estimate_check("the mean plate", mean_red(&lit), TAU, 0.045 * TAU)
+}
+
 /// A sheet across the room at x = 1/2.
 pub fn sheet() -> Vec<Mesh> {
     vec![Mesh::parallelogram("wall", DVec3::X * 0.5, DVec3::Z, DVec3::Y, 2)]

@@ -145,6 +145,14 @@ pub fn missed_lamp(gpu: &Gpu) -> Check<Complaint> {
     same_light_and_noise("a lamp that the trial missed", &missed, &by_power, f64::INFINITY)
 }
 
+/// The same rooms, in which a screen below the first lamp hides it from the floor.
+pub fn screened(mut rooms: Scene) -> Scene {
+    let material = rooms.materials.len();
+    rooms.materials.push(Material { two_sided: true, ..matt(0.5) });
+    rooms.meshes.push(level(2.6, [2.4; 2], true, material));
+    rooms
+}
+
 /// All light of the first of these rooms, from defaults but for fewer photons, compared with that of the room alone.
 pub fn scattered_light(gpu: &Gpu, ratio: f32, by_sight: bool) -> Check<Complaint> {
     let settings = SceneSettings { photons: 1 << 15, paranoid: true, ..SceneSettings::default() };
@@ -163,4 +171,14 @@ pub fn scattered_light(gpu: &Gpu, ratio: f32, by_sight: bool) -> Check<Complaint
     println!("1:{ratio:e}: {:.4} of the light, {:.3} times the variance", means[1] / means[0], noise[1] / noise[0]);
     relative_check("all light", means[1], means[0], 0.03).map_err(|text| Complaint::new(Kind::TooDark, text))?;
     relative_check("variance", noise[1].max(noise[0]), noise[0], 2.0).map_err(|text| Complaint::new(Kind::TooNoisy, text))
+}
+
+/// A lamp that lights no point itself, but the ceiling that lights them, beside a room whose lamp is so many times as strong.
+pub fn hidden_lamp(gpu: &Gpu, ratio: f32, by_sight: bool) -> Check<Complaint> {
+    let floor: Vec<_> = points().into_iter().take(25).collect();
+    let settings = SceneSettings { photons: 1 << 14, rounds: 24, radius: Some(0.4), part: Part::Indirect, ..SceneSettings::default() };
+    let change: &dyn Fn(&mut ScenePlan) = &|_| {};
+    let alone = lit(gpu, &screened(rooms(&[1.0])), &settings, &floor, None);
+    let found = lit(gpu, &screened(rooms(&[1.0, ratio])), &settings, &floor, by_sight.then_some(change));
+    same_light_and_noise(&format!("a hidden lamp beside one of {ratio:e}"), &found, &alone, 4.0)
 }

@@ -31,6 +31,8 @@ pub struct SceneFilm {
     pub anomalies: [u32; ANOMALY_WORDS],
     /// Visible points of each class of radii in the first round: of the global map, then of the caustic map.
     pub class_counts: Vec<u32>,
+    /// Photons stored anywhere in the scene, by kind of light.
+    pub stored: [u64; KINDS.len()],
 }
 
 /// Films are equal that hold the same light, whatever else was asked for and not found.
@@ -109,19 +111,30 @@ impl SceneFilm {
         self.sums[3 * pixel..][..3] == [0; 3] && kinds.iter().any(|kind| *kind != 0) && !kinds.contains(&REACHED)
     }
 
-    /// The errors to be shown, by pixel: infinite where nothing has reached the pixel. The spread over rounds says nothing of a kind of
-    /// light that has reached other pixels, but not this one: its upper bound is part of the error. The report names the kinds that
-    /// have reached no pixel at all.
+    /// The errors to be shown, by pixel: infinite where nothing has reached the pixel, and where a value may have been clamped. The
+    /// spread over rounds says nothing of a kind of light that has arrived elsewhere, but not here: its upper bound is part of the
+    /// error. Nor does it say much of few hits: the next one may have in any channel what those had in the brightest, so that much
+    /// is part of the error too. The report names the kinds that have reached no pixel at all.
     pub fn stated_errors<'a>(&'a self, plan: &'a ScenePlan) -> impl Fn(usize) -> DVec3 + 'a {
         let mut scales = self.bound_scales(plan, plan.settings.stop.confidence);
-        self.absent().into_iter().for_each(|kind| scales[kind] = 0.0);
+        let is_nowhere = |kind: &usize| self.stored[*kind] == 0;
+        self.absent().into_iter().filter(is_nowhere).for_each(|kind| scales[kind] = 0.0);
         move |pixel| {
-            if self.is_unreached(pixel) {
+            if self.is_unreached(pixel) || self.may_be_clamped(pixel, plan) {
                 return DVec3::INFINITY;
             }
             let unknown: f64 = (0..KINDS.len()).map(|kind| self.most_light(pixel, kind, &scales).powi(2)).sum();
-            self.standard_error(pixel, plan).map(|error| (error * error + unknown).sqrt())
+            let (mean, error) = (self.mean(pixel, plan), self.standard_error(pixel, plan));
+            // Of n hits the relative variance of the mean is about 1 / n.
+            let one_hit = (error * error / mean).to_array().into_iter().filter(|hit| hit.is_finite()).fold(0.0, f64::max);
+            error.map(|error| (error * error + one_hit * one_hit + unknown).sqrt())
         }
+    }
+
+    /// Whether the run clamped values, and this pixel has as much light as one of them.
+    fn may_be_clamped(&self, pixel: usize, plan: &ScenePlan) -> bool {
+        let largest = plan.point_limit().min(plan.film_limit / f64::from(plan.samples()));
+        self.anomalies[1] > 0 && self.sums[3 * pixel..][..3].iter().any(|sum| *sum as f64 >= largest)
     }
 
     pub fn stated_error(&self, pixel: usize, plan: &ScenePlan) -> DVec3 {

@@ -11,13 +11,15 @@ use crate::gpu::kernels::TryLights;
 use crate::gpu::{Commands, Extent, Gpu, Kernel, Memory, Module};
 use crate::plan::light_choice::LightChoice;
 use crate::plan::scene::ScenePlan;
-use crate::records::{Draws, Receiver, TryLightsPush, VisiblePoint};
+use crate::records::{Draws, Receiver, TrialRay, TryLightsPush, VisiblePoint};
 use crate::rng::words;
 use crate::scene::light_tree::LightTree;
 
 /// Shadow rays of a trial, and of a point and a cluster.
 const RAYS: u32 = 1 << 18;
 const RAYS_OF_PAIR: (u32, u32) = (4, 32);
+/// Places at most that light the points.
+const PLACES: usize = 1 << 10;
 
 /// Kernels that it takes.
 pub fn modules(plan: &ScenePlan) -> Vec<Module> {
@@ -37,10 +39,34 @@ pub fn points(receivers: &[Vec<Receiver>], visible_points: &[VisiblePoint], plan
     receivers.copied().chain(visible_points.iter().filter(is_asked).map(on_surface)).collect()
 }
 
-/// Learns how to choose lights at these points and round about.
-pub fn learn(gpu: &Gpu, commands: &mut Commands, round: Round, tree: LightTree, points: &[Receiver]) -> Result<LightChoice> {
+/// What rays of the trial met: from there light comes to its points.
+fn places(rays: &[TrialRay]) -> impl Iterator<Item = Receiver> {
+    let met = |ray: &&TrialRay| ray.escapes == 0;
+    let step = rays.iter().filter(met).count().div_ceil(PLACES).max(1);
+    let place = |ray: &TrialRay| Receiver { position: ray.met, normal: ray.normal, shading_normal: ray.normal };
+    rays.iter().filter(met).step_by(step).map(place)
+}
+
+/// Learns how shadow rays choose lights at these points and round about, and photons at what rays from there met too: a lamp that
+/// lights no point lights what lights it.
+pub fn learn(
+    gpu: &Gpu,
+    commands: &mut Commands,
+    round: Round,
+    tree: LightTree,
+    asked: &[Receiver],
+    rays: &[TrialRay],
+) -> Result<LightChoice> {
+    let (of_asked, ray_count) = what_clusters_add(gpu, commands, round, &tree, asked)?;
+    let places: Vec<Receiver> = places(rays).collect();
+    let (of_places, _) = what_clusters_add(gpu, commands, round, &tree, &places)?;
+    Ok(LightChoice::learned(round.geometry, tree, (asked, &of_asked), (&places, &of_places), ray_count))
+}
+
+/// Of each point and cluster, by so many shadow rays.
+fn what_clusters_add(gpu: &Gpu, commands: &mut Commands, round: Round, tree: &LightTree, points: &[Receiver]) -> Result<(Vec<f32>, u32)> {
     if points.is_empty() {
-        return Ok(LightChoice::by_power(round.geometry, tree));
+        return Ok((Vec::new(), 1));
     }
     let pair_count = (points.len() * tree.cluster_count) as u32;
     let ray_count = (RAYS / pair_count).clamp(RAYS_OF_PAIR.0, RAYS_OF_PAIR.1);
@@ -56,6 +82,5 @@ pub fn learn(gpu: &Gpu, commands: &mut Commands, round: Round, tree: LightTree, 
         commands.dispatch(kernel, &push, Extent::Items(u64::from(end_pair - first_pair)))?;
         add_work(commands, round.plan, 64 * u64::from(end_pair - first_pair) * u64::from(ray_count))?;
     }
-    let found = commands.read(&found, pair_count as usize)?;
-    Ok(LightChoice::learned(round.geometry, tree, points, &found, ray_count))
+    Ok((commands.read(&found, pair_count as usize)?, ray_count))
 }

@@ -20,13 +20,13 @@ pub mod index;
 mod light_trial;
 pub mod losses;
 mod on_gpu;
-mod opening_trial;
 pub mod points;
 pub mod radius_class;
 pub mod replay;
 pub mod resources;
 pub mod trace;
 pub mod trial;
+mod trial_rays;
 
 use glam::DVec3;
 

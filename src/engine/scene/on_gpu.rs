@@ -8,7 +8,7 @@ use super::film::SceneFilm;
 use super::losses::losses;
 use super::resources::{PhotonBuffers, SceneResources};
 use super::{Round, RunResult, View, estimate, index, points, radius_class, trace};
-use crate::constants::{HIT_KINDS, PART_COUNT, RADIUS_CLASSES, TALLY_COPIES};
+use crate::constants::{HIT_CAUSTIC_PHOTON, HIT_GLOBAL_PHOTON, HIT_KINDS, PART_COUNT, RADIUS_CLASSES, TALLY_COPIES};
 use crate::engine::error_bound::FilmError;
 use crate::engine::film::{RoundSums, wide};
 use crate::engine::nonfinite_values::NonfiniteValues;
@@ -148,12 +148,17 @@ impl<'a> World for SceneOnGpu<'a> {
         let anomalies = commands.copy_out(anomalies, ANOMALY_WORDS)?;
         let class_counts = commands.copy_out(class_counts, 2 * RADIUS_CLASSES as usize)?;
         commands.submit()?;
+        let mut stored = [0; HIT_KINDS as usize];
+        for (map, fates) in self.plan.maps().zip(&state.fates) {
+            stored[if map.caustic_only { HIT_CAUSTIC_PHOTON } else { HIT_GLOBAL_PHOTON } as usize] = fates.ledger().stored;
+        }
         Ok(SceneFilm {
             of_rounds: RoundSums { rounds: state.rounds, sums, squares },
             one_hits,
             part_totals: part_totals.take(),
             anomalies: anomalies.take().try_into().expect("so many words were read"),
             class_counts: class_counts.take(),
+            stored,
         })
     }
 

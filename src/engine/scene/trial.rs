@@ -15,11 +15,11 @@ use glam::Vec4;
 use rayon::prelude::*;
 
 use super::resources::SceneResources;
-use super::{Round, View, constants, light_trial, modules, opening_trial, points, trace};
+use super::{Round, View, constants, light_trial, modules, points, trace, trial_rays};
 use crate::engine;
 use crate::engine::bias;
 use crate::error::Result;
-use crate::gpu::kernels::Clearance;
+use crate::gpu::kernels::{Clearance, TrialRays};
 use crate::gpu::{Commands, Extent, Gpu, Kernel, Memory};
 use crate::photon::MapPhoton;
 use crate::plan::Limits;
@@ -30,6 +30,7 @@ use crate::plan::sensor::Sensor;
 use crate::records::{ClearancePush, VisiblePoint};
 use crate::scene::Scene;
 use crate::scene::light_tree::{self, LightTree};
+use crate::scene::openings::openings;
 use crate::settings::scene::{Part, SceneSettings};
 use crate::settings::stop::Stop;
 
@@ -107,9 +108,11 @@ fn run(gpu: &Gpu, scene: &Scene, view: &View, run: &ScenePlan, lights: Option<Li
         lights.clone().map(|lights| Trial { lights: Some(Arc::new(LightChoice::by_power(view.geometry, lights))), ..Trial::default() });
     let plan = ScenePlan::with_trial(scene, view.geometry, &settings, sensor, limits, by_power)?;
 
+    let casts_rays = lights.is_some() || !plan.openings().is_empty();
+    let rays_of_trial = if casts_rays { vec![TrialRays::MODULE] } else { Vec::new() };
     // All pipelines of the run, which they are made for, but where it shows a part alone.
     gpu.prepare(
-        &[modules(&plan, gpu.facts()), vec![Clearance::MODULE], light_trial::modules(&plan), opening_trial::modules(&plan)].concat(),
+        &[modules(&plan, gpu.facts()), vec![Clearance::MODULE], light_trial::modules(&plan), rays_of_trial].concat(),
         &constants(&plan),
     )?;
     let began = Instant::now();
@@ -131,11 +134,16 @@ fn run(gpu: &Gpu, scene: &Scene, view: &View, run: &ScenePlan, lights: Option<Li
 
     let mut trial = Trial::default();
     let points = light_trial::points(&phases, &visible_points, &view.geometry.planes);
+    let rays = if casts_rays { trial_rays::cast(gpu, &mut commands, round, &points)? } else { Vec::new() };
     if !plan.openings().is_empty() {
-        trial.openings = opening_trial::find(gpu, &mut commands, round, &points)?;
+        trial.openings = openings(&rays);
+        // The scene's from here on.
+        if !trial.openings.is_empty() {
+            commands.upload(&resources.scene.openings, &trial.openings)?;
+        }
     }
     if let Some(lights) = lights {
-        let lights = light_trial::learn(gpu, &mut commands, round, lights, &points)?;
+        let lights = light_trial::learn(gpu, &mut commands, round, lights, &points, &rays)?;
         commands.upload(&resources.scene.emitters, &lights.emitters)?;
         trial.lights = Some(Arc::new(lights));
     }
