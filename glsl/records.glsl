@@ -593,10 +593,14 @@ struct ResolvePush {
     uint pixel_count;
     // Visible points that photons may have lit.
     uint points_per_pixel;
+    uint round;
 };
 
 struct EndRoundPush {
     uint sum_count;
+    // Sums of each point.
+    uint channel_count;
+    uint round;
 };
 
 struct CheckPush {

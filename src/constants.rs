@@ -25,6 +25,9 @@ constants! {
     RNG_PHILOX = 2;
     /// `RNG`: Owen-scrambled Sobol' points.
     RNG_SOBOL = 3;
+    /// Rounds of which some places are kept, and places that are.
+    KEPT_ROUNDS = 256;
+    KEPT_PLACES = 1024;
     /// Draws of one emission: disc radius, disc angle, cosine, azimuth.
     EMISSION_DRAWS = 4;
     /// Draws of one bounce: roulette, cosine, azimuth.

@@ -14,7 +14,7 @@ const LINE: &[&[&str]] = &[
     &["cpu", "gpu"],
     &[
         "engine",
-        "engine::film",
+        "engine::degrees_of_freedom",
         "engine::planned",
         "engine::prefix_sum",
         "engine::tallies",
@@ -22,7 +22,7 @@ const LINE: &[&[&str]] = &[
         "engine::unknown",
         "engine::nonfinite_values",
     ],
-    &["engine::error_bound"],
+    &["engine::film", "engine::error_bound"],
     &["engine::watch", "engine::replay"],
     &["engine::bias"],
     &["engine::run"],

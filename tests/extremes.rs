@@ -160,7 +160,8 @@ fn standard_errors_survive_a_mean_far_above_them() {
     let half = u64::from(settings.rounds) / 2;
     let square = |value: u64| u128::from(value) * u128::from(value);
     let squares = u128::from(half) * (square(low) + square(high));
-    let of_rounds = RoundSums { rounds: settings.rounds, sums: vec![half * (low + high); 3], squares: vec![squares; 3] };
+    let of_rounds =
+        RoundSums { rounds: settings.rounds, sums: vec![half * (low + high); 3], squares: vec![squares; 3], latest: Vec::new() };
     let film = SceneFilm {
         of_rounds,
         one_hits: vec![0; 3],

@@ -12,6 +12,8 @@ layout(set = 1, binding = 3, scalar) buffer HighSquares { uvec2 high_squares[]; 
 
 #include "dispatch/dispatch.glsl"
 #include "film/wide.glsl"
+#include "rng/hash.glsl"
+#include "film/latest_rounds.glsl"
 
 void main()
 {
@@ -25,4 +27,9 @@ void main()
     uvec4 square = add128(uvec4(low_squares[sum], high_squares[sum]), square64(of_round));
     low_squares[sum] = square.xy;
     high_squares[sum] = square.zw;
+    uint point_count = push.sum_count / push.channel_count;
+    uint kept = kept_number(sum / push.channel_count, point_count);
+    if (sum % push.channel_count == 0 && kept != NONE) {
+        latest_rounds[first_of_round(push.round, point_count) + kept] = float_of(of_round);
+    }
 }

@@ -12,6 +12,8 @@ layout(set = 1, binding = 3, scalar) buffer FilmSquares { uvec4 film_squares[]; 
 #include "dispatch/dispatch.glsl"
 #include "world/scene/effects.glsl"
 #include "film/wide.glsl"
+#include "rng/hash.glsl"
+#include "film/latest_rounds.glsl"
 
 void main()
 {
@@ -19,6 +21,7 @@ void main()
     if (pixel >= push.end_pixel) {
         return;
     }
+    uint kept = kept_number(pixel, push.pixel_count);
     for (uint channel = 0; channel < 3; channel++) {
         uvec2 sum = uvec2(0);
         for (uint number = 0; number < SAMPLES; number++) {
@@ -30,5 +33,8 @@ void main()
         uint place = 3 * pixel + channel;
         film_sums[place] = add64(film_sums[place], sum);
         film_squares[place] = add128(film_squares[place], square64(sum));
+        if (kept != NONE) {
+            latest_rounds[3 * (first_of_round(push.round, push.pixel_count) + kept) + channel] = float_of(sum);
+        }
     }
 }

@@ -1,7 +1,8 @@
 //! The error of a result: what a film tells of it, and the bound that it has not more of, with a confidence.
 
-use statrs::distribution::{ContinuousCDF, StudentsT};
+use statrs::distribution::{ContinuousCDF, FisherSnedecor};
 
+use super::degrees_of_freedom::DegreesOfFreedom;
 use super::unknown::Unknown;
 
 /// What a film of so many rounds tells of its error, relative to its light.
@@ -10,6 +11,7 @@ pub struct FilmError {
     pub rounds: u32,
     /// Standard error; infinite of fewer than two rounds.
     pub noise: f64,
+    pub freedom: DegreesOfFreedom,
     /// What nothing has reached.
     pub unknown: Unknown,
     /// What light may add that is so rare that no round may have shown it, with the confidence that was asked for: as many hits
@@ -21,28 +23,27 @@ impl FilmError {
     /// The relative error that the film has not more of, with this confidence: of its noise (see [`error_bound`]), and of what
     /// nothing has reached. Infinite where that is all there is.
     pub fn bound(&self, confidence: f64) -> f64 {
-        error_bound(self.rounds, self.noise, confidence).hypot(self.unknown.relative)
+        error_bound(self.noise, self.freedom, confidence).hypot(self.unknown.relative)
     }
 
     /// Whether rounds have shown the tail of the noise: what they may not have shown is no more than the bound of what they have.
     /// The spread of rounds says nothing of hits that none of them had. `unseen` falls as 1 / rounds and noise as the root of it,
     /// so that every tail is known in the end.
     pub fn tail_is_known(&self, confidence: f64) -> bool {
-        self.unseen <= error_bound(self.rounds, self.noise, confidence)
+        self.unseen <= error_bound(self.noise, self.freedom, confidence)
     }
 }
 
-/// The relative error that the mean of so many rounds has not more of, with this confidence: Student's quantile times
-/// its relative standard error. Infinite where fewer than two rounds leave it unknown.
+/// The relative error that a mean has not more of, with this confidence, of its relative standard error: the root of a quantile of F
+/// (Fisher 1924), which with one degree of freedom of the error is Student's. Infinite where nothing tells the error.
 ///
-/// Pixels share photons, so their errors go together to an extent that nobody has measured; this bound takes them to
-/// go together altogether, and so holds more often than it says. It is of the noise, not of the radius's bias.
-pub fn error_bound(rounds: u32, relative_error: f64, confidence: f64) -> f64 {
-    if rounds < 2 {
-        return f64::INFINITY;
+/// It is of the noise, not of the radius's bias.
+pub fn error_bound(relative_error: f64, freedom: DegreesOfFreedom, confidence: f64) -> f64 {
+    if relative_error == 0.0 || relative_error.is_infinite() {
+        return relative_error;
     }
-    let distribution = StudentsT::new(0.0, 1.0, f64::from(rounds - 1)).expect("there is a degree of freedom");
-    distribution.inverse_cdf(0.5 + 0.5 * confidence) * relative_error
+    let distribution = FisherSnedecor::new(freedom.error, freedom.estimate).expect("there are degrees of freedom");
+    distribution.inverse_cdf(confidence).sqrt() * relative_error
 }
 
 #[cfg(test)]
@@ -54,6 +55,7 @@ mod tests {
         let error = |rounds: u32| FilmError {
             rounds,
             noise: 0.4 / f64::from(rounds).sqrt(),
+            freedom: DegreesOfFreedom::least(rounds),
             unknown: Unknown::default(),
             unseen: 8.0 / f64::from(rounds),
         };

@@ -3,6 +3,7 @@
 
 pub mod bias;
 pub mod choose_builder;
+pub mod degrees_of_freedom;
 pub mod error_bound;
 pub mod film;
 pub mod nonfinite_values;

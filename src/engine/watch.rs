@@ -114,8 +114,8 @@ impl Watch {
 
     /// Takes what a film tells, and what limits kept from it, relative to it.
     pub fn look(&mut self, error: &FilmError, lost: f64) {
-        let FilmError { rounds, noise, ref unknown, unseen } = *error;
-        let noise = error_bound(rounds, noise, self.stop.confidence);
+        let FilmError { rounds, noise, freedom, ref unknown, unseen } = *error;
+        let noise = error_bound(noise, freedom, self.stop.confidence);
         self.seen = Some(Look { rounds, noise, unknown: unknown.relative, unseen, lost });
         self.next_look = rounds + (rounds / 4).max(1);
     }

@@ -211,10 +211,14 @@ fn timing_table(timings: &Timings, device: Option<&DeviceFacts>) -> String {
 #[cfg(test)]
 mod tests {
     use super::*;
+    use crate::engine::degrees_of_freedom::DegreesOfFreedom;
 
     #[test]
     fn a_report_says_that_the_tail_is_not_known() {
-        let text = |unseen| errors(&FilmError { rounds: 16, noise: 0.1, unknown: Unknown::default(), unseen }, None, 0.0, 0.95);
+        let text = |unseen| {
+            let freedom = DegreesOfFreedom::least(16);
+            errors(&FilmError { rounds: 16, noise: 0.1, freedom, unknown: Unknown::default(), unseen }, None, 0.0, 0.95)
+        };
         assert!(text(0.5).contains("not known yet") && text(0.5).contains("may add 50.00 % (95 % confidence)"), "{}", text(0.5));
         assert!(text(f64::INFINITY).contains("may add any share"), "{}", text(f64::INFINITY));
         assert!(!text(0.1).contains("tail"), "{}", text(0.1));

@@ -4,6 +4,7 @@ use bytemuck::Pod;
 use glam::{UVec2, Vec4};
 
 use super::RoomPlan;
+use super::latest_rounds::kept_values;
 use super::scene::{MapPlan, ScenePlan};
 use super::sensor::Sensor;
 use crate::constants::{
@@ -165,6 +166,11 @@ impl RoomPlan {
                 buffer::<u64>("film totals", sums, "sums of all rounds"),
                 buffer::<u64>("low squares", sums, "lower halves of their squares"),
                 buffer::<u64>("high squares", sums, "upper halves of their squares"),
+                buffer::<f32>(
+                    "latest rounds",
+                    kept_values(self.points.len(), self.settings.rounds) as u64,
+                    "some points of the latest rounds",
+                ),
             ]);
         }
         buffers
@@ -213,6 +219,11 @@ impl ScenePlan {
         let mut buffers = vec![
             buffer::<u64>("film sums", 3 * pixels, "sums of all rounds"),
             buffer::<u64>("film squares", 6 * pixels, "sums of their squares"),
+            buffer::<f32>(
+                "latest rounds",
+                3 * kept_values(pixels as usize, self.settings.rounds) as u64,
+                "some pixels of the latest rounds",
+            ),
             buffer::<u32>("one hits", u64::from(HIT_KINDS) * pixels, "what one hit would add where none has"),
             buffer::<u64>("pass sums", 3 * pixels * u64::from(self.samples()), "samples of pixels in a round"),
             buffer::<VisiblePoint>("visible points", points, "where photons are looked up"),

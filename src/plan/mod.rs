@@ -4,6 +4,7 @@
 pub mod buffers;
 pub mod capacity;
 pub mod evidence;
+pub mod latest_rounds;
 pub mod light_choice;
 mod maps;
 pub mod planning;

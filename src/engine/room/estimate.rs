@@ -140,11 +140,11 @@ fn gather_grid(commands: &mut Commands, resources: &RoomResources, index: &Index
 }
 
 /// Moves what a round left on the film to the sums and squares of all rounds, of which there are several.
-pub fn end_round(commands: &mut Commands, resources: &RoomResources, plan: &RoomPlan) -> Result<()> {
-    let RoomResources { film, rounds: Some(RoundBuffers { totals, low_squares, high_squares }), .. } = resources else {
+pub fn end_round(commands: &mut Commands, resources: &RoomResources, plan: &RoomPlan, round: u32) -> Result<()> {
+    let RoomResources { film, rounds: Some(RoundBuffers { totals, low_squares, high_squares, latest_rounds }), .. } = resources else {
         return Ok(());
     };
-    let sum_count = plan.points.len() as u32 * plan.channel_count;
-    let kernel = EndRound { film, film_totals: totals, low_squares, high_squares };
-    commands.scope("film", |commands| commands.dispatch(kernel, &EndRoundPush { sum_count }, Extent::Items(u64::from(sum_count))))
+    let push = EndRoundPush { sum_count: plan.points.len() as u32 * plan.channel_count, channel_count: plan.channel_count, round };
+    let kernel = EndRound { film, film_totals: totals, low_squares, high_squares, latest_rounds };
+    commands.scope("film", |commands| commands.dispatch(kernel, &push, Extent::Items(u64::from(push.sum_count))))
 }

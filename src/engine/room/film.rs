@@ -8,6 +8,7 @@ use crate::engine::error_bound::FilmError;
 use crate::engine::film::RoundSums;
 use crate::engine::unknown::{Unknown, most_hits};
 use crate::plan::RoomPlan;
+use crate::plan::latest_rounds::kept_values;
 use crate::scene::room::RoomScene;
 use crate::settings::Sums;
 
@@ -51,8 +52,9 @@ impl RoomFilm {
     pub fn new(plan: &RoomPlan) -> RoomFilm {
         let count = plan.points.len() * plan.channel_count as usize;
         let squares = if plan.keeps_squares() { vec![0; count] } else { Vec::new() };
+        let latest = if plan.keeps_squares() { vec![0.0; kept_values(plan.points.len(), plan.settings.rounds)] } else { Vec::new() };
         RoomFilm {
-            of_rounds: RoundSums { rounds: 0, sums: vec![0; count], squares },
+            of_rounds: RoundSums { rounds: 0, sums: vec![0; count], squares, latest },
             unfinished: Vec::new(),
             kind: plan.settings.sums,
             channel_count: plan.channel_count,
@@ -65,14 +67,12 @@ impl RoomFilm {
     /// Adds what a whole round left, and empties it for the next. Twin of `glsl/kernels/end_round.comp`. Sums of floats
     /// go on over all rounds instead, as their additions are what is looked at.
     pub fn end_round(&mut self, of_round: &mut [u64]) {
-        self.rounds += 1;
         if self.kind != Sums::Integer {
+            self.rounds += 1;
             self.sums.copy_from_slice(of_round);
             return;
         }
-        let RoundSums { sums, squares, .. } = &mut self.of_rounds;
-        sums.iter_mut().zip(&*of_round).for_each(|(sum, of_round)| *sum += of_round);
-        squares.iter_mut().zip(&*of_round).for_each(|(squares, of_round)| *squares += u128::from(*of_round).pow(2));
+        self.of_rounds.end_round(of_round, self.channel_count as usize);
         of_round.fill(0);
     }
 
@@ -109,6 +109,7 @@ impl RoomFilm {
         FilmError {
             rounds: self.rounds,
             noise: self.relative_error(weights),
+            freedom: self.degrees_of_freedom(1, weights.len(), |point| weights[point]),
             unknown: self.unknown(weights, unit, confidence),
             unseen: 0.0,
         }

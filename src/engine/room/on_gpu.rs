@@ -51,7 +51,7 @@ impl<'a> World for RoomOnGpu<'a> {
         index::build(commands, resources, plan, photons_of(&ranges))?;
         estimate::gather(commands, resources, plan, photons_of(&ranges))?;
         state.hand_out(0, photons_of(&ranges));
-        if chunk + 1 == plan.chunks_per_round { estimate::end_round(commands, resources, plan) } else { Ok(()) }
+        if chunk + 1 == plan.chunks_per_round { estimate::end_round(commands, resources, plan, state.rounds) } else { Ok(()) }
     }
 
     fn is_full(&self, commands: &Commands<'a>) -> bool {
@@ -69,14 +69,16 @@ impl<'a> World for RoomOnGpu<'a> {
         let RoomOnGpu { resources, plan, .. } = self;
         let mut film = RoomFilm { emitted: state.emitted, ..RoomFilm::new(plan) };
         let count = film.sums.len();
-        let Some(RoundBuffers { totals, low_squares, high_squares }) = &resources.rounds else {
-            film.of_rounds = RoundSums { rounds: state.rounds, sums: commands.read(&resources.film, count)?, squares: Vec::new() };
+        let Some(RoundBuffers { totals, low_squares, high_squares, latest_rounds }) = &resources.rounds else {
+            film.of_rounds = RoundSums { rounds: state.rounds, sums: commands.read(&resources.film, count)?, ..RoundSums::default() };
             return Ok(film);
         };
-        let sums = commands.read(totals, count)?;
-        let (low, high) = (commands.read(low_squares, count)?, commands.read(high_squares, count)?);
-        let squares = low.into_iter().zip(high).map(|(low, high)| wide(low, high)).collect();
-        film.of_rounds = RoundSums { rounds: state.rounds, sums, squares };
+        let sums = commands.copy_out(totals, count)?;
+        let (low, high) = (commands.copy_out(low_squares, count)?, commands.copy_out(high_squares, count)?);
+        let latest = commands.copy_out(latest_rounds, film.latest.len())?;
+        commands.submit()?;
+        let squares = low.take().into_iter().zip(high.take()).map(|(low, high)| wide(low, high)).collect();
+        film.of_rounds = RoundSums { rounds: state.rounds, sums: sums.take(), squares, latest: latest.take() };
         if !state.is_whole() {
             film.add_unfinished(commands.read(&resources.film, count)?);
         }

@@ -74,6 +74,7 @@ buffers! {
         /// Lower and upper 64 bits of the sums of squares.
         low_squares: Buffer<u64> = planned.zeroed(commands, "low squares")?,
         high_squares: Buffer<u64> = planned.zeroed(commands, "high squares")?,
+        latest_rounds: Buffer<f32> = planned.zeroed(commands, "latest rounds")?,
     }
 }
 

@@ -153,12 +153,12 @@ pub fn flux_to_radiance(commands: &mut Commands, round: Round, traced: [u32; 2])
 /// Ends a round: light that was found goes to the film.
 pub fn resolve(commands: &mut Commands, round: Round) -> Result<()> {
     let Round { resources, plan, .. } = round;
-    let SceneResources { pass_sums, estimates, film_sums, film_squares, .. } = resources;
+    let SceneResources { pass_sums, estimates, film_sums, film_squares, latest_rounds, .. } = resources;
     let pixel_count = plan.sensor.pixels();
     let points_per_pixel = if resources.photons.is_some() { plan.points_per_pixel } else { 0 };
     for (first_pixel, end_pixel) in runs(pixel_count, plan.pixels_at_once(1)) {
-        let push = ResolvePush { first_pixel, end_pixel, pixel_count, points_per_pixel };
-        let kernel = Resolve { pass_sums, estimates, film_sums, film_squares };
+        let push = ResolvePush { first_pixel, end_pixel, pixel_count, points_per_pixel, round: round.number };
+        let kernel = Resolve { pass_sums, estimates, film_sums, film_squares, latest_rounds };
         commands.dispatch(kernel, &push, Extent::Items(u64::from(end_pixel - first_pixel)))?;
         add_work(commands, plan, u64::from(end_pixel - first_pixel) * u64::from(plan.samples() + points_per_pixel))?;
     }

@@ -213,7 +213,8 @@ impl SceneFilm {
     /// What it tells of its error.
     pub fn error(&self, plan: &ScenePlan, confidence: f64) -> FilmError {
         let (noise, unknown) = (self.relative_error(plan), self.unknown(plan, confidence));
-        FilmError { rounds: self.rounds, noise, unknown, unseen: self.unseen(plan, confidence) }
+        let freedom = self.degrees_of_freedom(3, self.pixels(), |_| 1.0);
+        FilmError { rounds: self.rounds, noise, freedom, unknown, unseen: self.unseen(plan, confidence) }
     }
 
     /// Root mean square over pixels and channels of standard error and of the mean; of pixels that nothing has reached see

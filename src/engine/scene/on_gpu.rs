@@ -19,6 +19,7 @@ use crate::gpu::kernels::*;
 use crate::gpu::{Commands, Constants, DeviceFacts, Gpu, Interrupt, Kernel, Module};
 use crate::ledger::{Fates, Losses};
 use crate::plan::buffers::ANOMALY_WORDS;
+use crate::plan::latest_rounds::kept_values;
 use crate::plan::scene::{MapPlan, ScenePlan};
 use crate::plan::sensor::Sensor;
 use crate::records::CellPush;
@@ -138,12 +139,12 @@ impl<'a> World for SceneOnGpu<'a> {
     }
 
     fn film(&mut self, commands: &mut Commands<'a>, state: &RunState) -> Result<SceneFilm> {
-        let SceneResources { film_sums, film_squares, one_hits, part_totals, anomalies, class_counts, .. } = &self.resources;
+        let SceneResources { film_sums, film_squares, latest_rounds, one_hits, part_totals, anomalies, class_counts, .. } = &self.resources;
         let pixels = self.plan.sensor.pixels() as usize;
-        let sums = commands.read(film_sums, 3 * pixels)?;
-        let words = commands.read(film_squares, 6 * pixels)?;
-        let squares = words.chunks_exact(2).map(|words| wide(words[0], words[1])).collect();
-        let one_hits = commands.read(one_hits, HIT_KINDS as usize * pixels)?;
+        let sums = commands.copy_out(film_sums, 3 * pixels)?;
+        let words = commands.copy_out(film_squares, 6 * pixels)?;
+        let latest = commands.copy_out(latest_rounds, 3 * kept_values(pixels, self.plan.settings.rounds))?;
+        let one_hits = commands.copy_out(one_hits, HIT_KINDS as usize * pixels)?;
         let part_totals = commands.copy_out(part_totals, PART_COUNT as usize)?;
         let anomalies = commands.copy_out(anomalies, ANOMALY_WORDS)?;
         let class_counts = commands.copy_out(class_counts, 2 * RADIUS_CLASSES as usize)?;
@@ -153,8 +154,13 @@ impl<'a> World for SceneOnGpu<'a> {
             stored[if map.caustic_only { HIT_CAUSTIC_PHOTON } else { HIT_GLOBAL_PHOTON } as usize] = fates.ledger().stored;
         }
         Ok(SceneFilm {
-            of_rounds: RoundSums { rounds: state.rounds, sums, squares },
-            one_hits,
+            of_rounds: RoundSums {
+                rounds: state.rounds,
+                sums: sums.take(),
+                squares: words.take().chunks_exact(2).map(|words| wide(words[0], words[1])).collect(),
+                latest: latest.take(),
+            },
+            one_hits: one_hits.take(),
             part_totals: part_totals.take(),
             anomalies: anomalies.take().try_into().expect("so many words were read"),
             class_counts: class_counts.take(),

@@ -51,6 +51,7 @@ buffers! {
         // All rounds.
         film_sums: Buffer<u64> = planned.zeroed(commands, "film sums")?,
         film_squares: Buffer<u64> = planned.zeroed(commands, "film squares")?,
+        latest_rounds: Buffer<f32> = planned.zeroed(commands, "latest rounds")?,
         /// What is known of pixels that some kind of light has not reached; see `glsl/world/scene/one_hit.glsl`.
         one_hits: Buffer<u32> = planned.zeroed(commands, "one hits")?,
         part_totals: Buffer<u64> = planned.zeroed(commands, "part totals")?,

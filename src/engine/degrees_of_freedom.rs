@@ -1,0 +1,96 @@
+//! How far the errors of a film's places go together.
+//!
+//! The error of a picture is the root mean square of its pixels' errors. If these were independent, it would be almost the same in
+//! every run; if all came from the same photons, it would vary as a single number does. In between its square is distributed as that
+//! of fewer independent numbers (Satterthwaite 1946). How many there are follows from what each of the latest rounds left at some
+//! places, e_r after their mean is taken away, with covariance S between places: from e_r . e_s of two rounds, whose mean square is
+//! tr(S^2), and from the spread of |e_r|^2 between rounds, which also knows rare bright hits.
+
+/// Of a film's squared error, and of what the rounds tell of it.
+#[derive(Debug, Clone, Copy, PartialEq)]
+pub struct DegreesOfFreedom {
+    pub error: f64,
+    pub estimate: f64,
+}
+
+/// Rounds that are multiplied lie no further apart.
+const LAGS: usize = 4;
+
+impl DegreesOfFreedom {
+    /// All errors go together, as far as anybody knows.
+    pub fn least(rounds: u32) -> DegreesOfFreedom {
+        DegreesOfFreedom { error: 1.0, estimate: (f64::from(rounds) - 1.0).max(1.0) }
+    }
+
+    /// Of so many rounds, of which `latest` has what some left.
+    pub fn of(latest: &[Vec<f64>], rounds: u32) -> DegreesOfFreedom {
+        let least = DegreesOfFreedom::least(rounds);
+        let kept = latest.len() as f64;
+        if latest.len() < 4 {
+            return least;
+        }
+        let places = latest[0].len();
+        let mean: Vec<f64> = (0..places).map(|place| latest.iter().map(|values| values[place]).sum::<f64>() / kept).collect();
+        let errors: Vec<Vec<f64>> =
+            latest.iter().map(|values| values.iter().zip(&mean).map(|(value, mean)| value - mean).collect()).collect();
+        let dot = |a: &[f64], b: &[f64]| a.iter().zip(b).map(|(a, b)| a * b).sum::<f64>();
+        let squares: Vec<f64> = errors.iter().map(|errors| dot(errors, errors)).collect();
+        let mean_square = squares.iter().sum::<f64>() / kept;
+        // tr(S), as the mean of so few took some of it away.
+        let trace = mean_square * kept / (kept - 1.0);
+        if trace == 0.0 {
+            return least;
+        }
+        let products = (1..=LAGS.min(latest.len() - 1)).flat_map(|lag| errors.iter().zip(&errors[lag..]));
+        let products: Vec<f64> = products.map(|(a, b)| (dot(a, b) + trace / kept) / trace).collect();
+        // Relative variances of the square of a round's error: as far as it is normal, and in all.
+        let normal = 2.0 * products.iter().map(|product| product * product).sum::<f64>() / products.len() as f64;
+        let spread = squares.iter().map(|square| (square / mean_square - 1.0).powi(2)).sum::<f64>() / (kept - 1.0);
+        let all = spread.max(normal);
+        let rounds = f64::from(rounds);
+        DegreesOfFreedom { error: (2.0 / (normal + (all - normal) / rounds)).max(1.0), estimate: (2.0 * (rounds - 1.0) / all).max(1.0) }
+    }
+}
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+    use crate::rng::mix32;
+
+    /// A normal number (Box and Muller 1958).
+    fn normal(number: u32) -> f64 {
+        let unit = |word: u32| (f64::from(mix32(word) >> 8) + 0.5) / f64::from(1 << 24);
+        (-2.0 * unit(2 * number).ln()).sqrt() * (std::f64::consts::TAU * unit(2 * number + 1)).cos()
+    }
+
+    /// Rounds whose places have as many independent errors as `sources`, each seen at as many of them.
+    fn rounds(count: u32, places: u32, sources: u32) -> Vec<Vec<f64>> {
+        let round = |round: u32| (0..places).map(|place| 7.0 + normal(round * sources + place % sources)).collect();
+        (1..=count).map(round).collect()
+    }
+
+    #[test]
+    fn as_many_are_found_as_there_are_sources() {
+        for sources in [1, 4, 30, 240] {
+            let found = DegreesOfFreedom::of(&rounds(256, 240, sources), 256);
+            let ratio = [found.error, found.estimate / 255.0].map(|found| found / f64::from(sources));
+            assert!(ratio.iter().all(|ratio| (0.7..1.45).contains(ratio)), "{sources}: {found:?}");
+        }
+    }
+
+    #[test]
+    fn rare_hits_leave_little_known_of_the_spread() {
+        // One round in 32 has a bright place, each time another one.
+        let mut rare = rounds(256, 240, 240);
+        (0..8).for_each(|hit| rare[32 * hit + 5][31 * hit % 240] += 500.0);
+        let found = DegreesOfFreedom::of(&rare, 256);
+        assert!(found.estimate < 20.0 && found.error < 20.0, "{found:?}");
+    }
+
+    #[test]
+    fn of_few_rounds_and_of_no_noise_nothing_is_known() {
+        assert_eq!(DegreesOfFreedom::of(&rounds(3, 10, 10), 3), DegreesOfFreedom { error: 1.0, estimate: 2.0 });
+        assert_eq!(DegreesOfFreedom::of(&vec![vec![1.0; 5]; 9], 9), DegreesOfFreedom::least(9));
+        assert_eq!(DegreesOfFreedom::of(&[], 1), DegreesOfFreedom { error: 1.0, estimate: 1.0 });
+    }
+}

@@ -1,0 +1,41 @@
+//! What is kept of the latest rounds of a film, from which follows how far errors of its places go together
+//! ([`crate::engine::degrees_of_freedom`]): some places, evenly spread. Twin of `glsl/film/latest_rounds.glsl`.
+
+use crate::constants::{KEPT_PLACES, KEPT_ROUNDS};
+use crate::rng::mix32;
+
+fn kept_step(places: usize) -> usize {
+    places.div_ceil(KEPT_PLACES as usize).max(1)
+}
+
+/// Places that are kept.
+pub fn kept_count(places: usize) -> usize {
+    places.div_ceil(kept_step(places))
+}
+
+/// The place with this number among them, one of every so many at random; `None` beyond the film's end.
+pub fn kept_place(number: usize, places: usize) -> Option<usize> {
+    let step = kept_step(places);
+    let place = number * step + mix32(number as u32) as usize % step;
+    (place < places).then_some(place)
+}
+
+/// Values of a channel that are kept of a run.
+pub fn kept_values(places: usize, rounds: u32) -> usize {
+    kept_count(places) * rounds.min(KEPT_ROUNDS) as usize
+}
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+
+    #[test]
+    fn kept_places_are_spread_and_no_two_are_the_same() {
+        for places in [1, 64, 1024, 1025, 5000, 1 << 20] {
+            let kept: Vec<usize> = (0..kept_count(places)).filter_map(|number| kept_place(number, places)).collect();
+            assert!(kept.is_sorted_by(|a, b| a < b) && kept.len() >= kept_count(places) - 1, "{places}");
+            assert!(kept_count(places) <= KEPT_PLACES as usize && kept_count(places) >= places.min(KEPT_PLACES as usize) / 2);
+        }
+        assert_eq!(kept_values(64, 1000), 64 * 256);
+    }
+}
