@@ -35,7 +35,8 @@ impl FilmError {
 }
 
 /// The relative error that a mean has not more of, with this confidence, of its relative standard error: the root of a quantile of F
-/// (Fisher 1924), which with one degree of freedom of the error is Student's. Infinite where nothing tells the error.
+/// (Fisher 1924), which with one degree of freedom of the error is Student's, of that error and one standard error of its own: runs
+/// that end at an error end sooner where it is found too small by chance. Infinite where nothing tells the error.
 ///
 /// It is of the noise, not of the radius's bias.
 pub fn error_bound(relative_error: f64, freedom: DegreesOfFreedom, confidence: f64) -> f64 {
@@ -43,7 +44,7 @@ pub fn error_bound(relative_error: f64, freedom: DegreesOfFreedom, confidence: f
         return relative_error;
     }
     let distribution = FisherSnedecor::new(freedom.error, freedom.estimate).expect("there are degrees of freedom");
-    distribution.inverse_cdf(confidence).sqrt() * relative_error
+    distribution.inverse_cdf(confidence).sqrt() * relative_error * (1.0 + (0.5 / freedom.estimate).sqrt())
 }
 
 #[cfg(test)]
