@@ -403,6 +403,8 @@ fn assert_same_materials(written: &Scene, scene: &Scene) {
         }
         let textures = |of: &Material| [of.base_colour_texture, of.emission_texture].into_iter().flatten().collect::<Vec<_>>();
         for (new, old) in pairs(&textures(new), textures(old)) {
+            let (from, to) = (new.transform, old.transform);
+            assert!((from.scale - to.scale).length() + (from.offset - to.offset).length() + (from.rotation - to.rotation).abs() < 1e-6);
             let (new, old) = (&written.textures[new.texture], &scene.textures[old.texture]);
             assert_eq!((new.width, new.height, new.wrap, &new.texels), (old.width, old.height, old.wrap, &old.texels));
         }
@@ -442,7 +444,7 @@ fn written_scenes_open_again() {
         let shining = read(folder.path(), "scene.gltf");
         for (mesh, lightmap) in pairs(&shining.meshes, &layout.meshes) {
             let material = &shining.materials[mesh.material];
-            let Some(TextureUse { texture, uv_set }) = material.emission_texture.filter(|_| lightmap.is_some()) else {
+            let Some(TextureUse { texture, uv_set, .. }) = material.emission_texture.filter(|_| lightmap.is_some()) else {
                 assert!(lightmap.is_none(), "{}: no radiance", mesh.name);
                 continue;
             };
@@ -485,9 +487,10 @@ fn zoo() -> Scene {
         mesh
     };
     let material = |name: &str, surface: Surface| Material { surface, ..Material::lambert(name, Vec3::new(0.5, 0.25, 1.0)) };
-    let used = |texture, uv_set| Some(TextureUse { texture, uv_set });
+    let used = |texture, uv_set| Some(TextureUse::of(texture, uv_set));
     let mut lamp = Material { emission: Vec3::new(0.5, 8.0, 2.0), two_sided: true, ..material("lamp", Surface::Lambert) };
-    (lamp.base_colour_texture, lamp.emission_texture) = (used(2, 0), used(1, 1));
+    let transform = UvTransform { scale: DVec2::new(2.0, -0.5), rotation: 0.75, offset: DVec2::new(0.25, 3.0) };
+    (lamp.base_colour_texture, lamp.emission_texture) = (used(2, 0), Some(TextureUse { transform, ..TextureUse::of(1, 1) }));
     let second = Material { base_colour_texture: used(2, 1), ..material("second", Surface::Lambert) };
     let texture = |name: &str, texels: Vec<Vec3>, wrap| Texture { name: name.into(), width: texels.len() as u32, height: 1, texels, wrap };
     let light = |name: &str, kind| Light { name: format!("light '{name}'"), kind };
@@ -585,7 +588,7 @@ fn a_texture_is_seen_in_the_radiance() {
     let texels = vec![Vec3::X, Vec3::Y];
     scene.textures.push(Texture { name: "halves".into(), width: 2, height: 1, texels, wrap: [Wrap::Clamp; 2] });
     scene.materials[0].base_colour = Vec3::ONE;
-    scene.materials[0].base_colour_texture = Some(TextureUse { texture: 0, uv_set: 0 });
+    scene.materials[0].base_colour_texture = Some(TextureUse::of(0, 0));
     let layout = Layout::new(&scene, 32.0).unwrap();
     let results = vec![TexelEstimate { irradiance: Vec3::splat(std::f32::consts::PI), ..TexelEstimate::default() }; layout.texel_count()];
     let (folder, _) = write(&scene, &layout, &results, 1.0);

@@ -709,7 +709,7 @@ fn walls_light_the_points_that_touch_them() {
     // One wall, of plain or textured light, aslant to all axes.
     let turn = DQuat::from_euler(EulerRot::XYZ, 0.3, 0.7, -0.4);
     for textured in [false, true] {
-        let emission_texture = textured.then_some(TextureUse { texture: 0, uv_set: 0 });
+        let emission_texture = textured.then_some(TextureUse::of(0, 0));
         let lamp = Material { emission: Vec3::ONE, emission_texture, ..matt(0.0) };
         let wall = Mesh::parallelogram("wall", DVec3::ZERO, turn * DVec3::Y, turn * DVec3::Z, 1);
         let floor = Mesh::parallelogram("floor", turn * DVec3::NEG_X, turn * DVec3::Z, turn * (DVec3::X * 2.0), 0);

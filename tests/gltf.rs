@@ -303,6 +303,85 @@ fn a_skinned_mesh_follows_its_joints_and_not_its_node() {
     assert_refused(&value, &["skin 0", "node 'hip'", "not in the scene"]);
 }
 
+/// Morph targets shift a mesh at rest by the weights of its node, or else of the mesh, before joints move it.
+#[test]
+fn morph_targets_shift_vertices_by_their_weights_at_rest() {
+    let mut value = square();
+    let up = add_accessor(&mut value, &floats(&[0.0, 0.0, 2.0].repeat(4)), 5126, 4, "VEC3");
+    let aside = add_accessor(&mut value, &floats(&[4.0, 0.0, 0.0].repeat(4)), 5126, 4, "VEC3");
+    let lean = add_accessor(&mut value, &floats(&[1.0, 0.0, 0.0].repeat(4)), 5126, 4, "VEC3");
+    value["meshes"][0]["primitives"][0]["targets"] = json!([{"POSITION": up, "NORMAL": lean}, {"POSITION": aside}]);
+    let first = |value: &Value| {
+        let scene = load(value).unwrap();
+        assert_eq!(scene.warnings, Vec::<String>::new());
+        (scene.meshes[0].positions[0], scene.meshes[0].normals[0])
+    };
+    // The node scales by 2 and moves by 1, 2, 3.
+    assert_eq!(first(&value), (DVec3::new(1.0, 2.0, 3.0), DVec3::Z));
+    value["meshes"][0]["weights"] = json!([0.5, 0.0]);
+    let (position, normal) = first(&value);
+    assert_eq!(position, DVec3::new(1.0, 2.0, 5.0));
+    assert!((normal - DVec3::new(0.5, 0.0, 1.0).normalize()).length() < 1e-12, "{normal}");
+    value["nodes"][0]["weights"] = json!([1.0, -0.25]);
+    assert_eq!(first(&value).0, DVec3::new(-1.0, 2.0, 7.0));
+
+    let mut skinned = skinned_square();
+    let up = add_accessor(&mut skinned, &floats(&[0.0, 0.0, 2.0].repeat(4)), 5126, 4, "VEC3");
+    skinned["meshes"][0]["primitives"][0]["targets"] = json!([{"POSITION": up}]);
+    skinned["meshes"][0]["weights"] = json!([1.0]);
+    skinned["nodes"][5]["scale"] = json!([1, 1, 3]);
+    // The joint's own 7 m are not scaled, the target's 2 m are.
+    assert_eq!(load(&skinned).unwrap().meshes[0].positions[0].z, 7.0 + 3.0 * (2.0 - 7.0));
+
+    let few = add_accessor(&mut value, &floats(&[0.0; 9]), 5126, 3, "VEC3");
+    value["meshes"][0]["primitives"][0]["targets"] = json!([{"POSITION": few}, {}]);
+    assert_refused(&value, &["mesh 'wall'", "3 positions in a morph target for 4 vertices"]);
+}
+
+/// Integers stand for themselves, or for parts of their range.
+#[test]
+fn quantized_meshes_are_read() {
+    let mut value = square();
+    value["extensionsUsed"].as_array_mut().unwrap().push(json!("KHR_mesh_quantization"));
+    value["extensionsRequired"] = json!(["KHR_mesh_quantization"]);
+    let shorts = |numbers: &[i16]| numbers.iter().flat_map(|number| number.to_le_bytes()).collect::<Vec<u8>>();
+    // Each vertex takes a multiple of four bytes.
+    let positions = add_accessor(&mut value, &shorts(&[0, 0, 0, 0, 300, 0, 0, 0, 300, 300, 0, 0, 0, 300, -5, 0]), 5122, 4, "VEC3");
+    value["bufferViews"][4]["byteStride"] = json!(8);
+    let uvs = add_accessor(&mut value, &shorts(&[0, 0, -1, 0, -1, -1, 0, -1]), 5123, 4, "VEC2");
+    value["accessors"][uvs]["normalized"] = json!(true);
+    value["accessors"][positions]["min"] = json!([0, 0, -5]);
+    value["accessors"][positions]["max"] = json!([300, 300, 0]);
+    value["meshes"][0]["primitives"][0]["attributes"]["POSITION"] = json!(positions);
+    value["meshes"][0]["primitives"][0]["attributes"]["TEXCOORD_0"] = json!(uvs);
+    value["nodes"][0]["scale"] = json!([0.01, 0.01, 0.01]);
+    let mesh = load(&value).unwrap().meshes.remove(0);
+    assert!((mesh.positions[3] - DVec3::new(1.0, 5.0, 2.95)).length() < 1e-7, "{:?}", mesh.positions);
+    assert_eq!(mesh.uvs[0], [[0.0, 0.0], [1.0, 0.0], [1.0, 1.0], [0.0, 1.0]].map(DVec2::from));
+}
+
+/// The specification's matrices: scaled, then turned, then moved; another set may be named.
+#[test]
+fn texture_coordinates_are_transformed() {
+    let png = encoded(&RgbImage::new(2, 2), ImageFormat::Png);
+    let mut value = square();
+    with_image(&mut value, &data_uri("image/png", &png));
+    value["extensionsUsed"].as_array_mut().unwrap().push(json!("KHR_texture_transform"));
+    value["extensionsRequired"] = json!(["KHR_texture_transform"]);
+    let transform = json!({"offset": [0.5, 0.25], "rotation": FRAC_PI_2, "scale": [2.0, 3.0], "texCoord": 1});
+    value["materials"][0]["pbrMetallicRoughness"]["baseColorTexture"]["extensions"] = json!({"KHR_texture_transform": transform});
+    let scene = load(&value).unwrap();
+    assert_eq!(scene.warnings, Vec::<String>::new());
+    let used = scene.materials[0].base_colour_texture.unwrap();
+    assert_eq!(used.uv_set, 1);
+    for (uv, expected) in [([0.0, 0.0], [0.5, 0.25]), ([1.0, 0.0], [0.5, -1.75]), ([0.0, 1.0], [3.5, 0.25])] {
+        let found = used.transform.apply(DVec2::from(uv));
+        assert!((found - DVec2::from(expected)).length() < 1e-6, "{uv:?}: {found}");
+    }
+    value["materials"][0]["pbrMetallicRoughness"]["baseColorTexture"]["extensions"]["KHR_texture_transform"]["scale"] = json!([1e30, 1]);
+    assert_refused(&value, &["material 'glow'", "texture transform", "1e30"]);
+}
+
 /// Primitives that share vertices each take those that they use.
 #[test]
 fn shared_vertices_are_read_once_for_each_use() {
@@ -330,7 +409,6 @@ fn extensions_that_are_needed_and_not_read_are_one_line() {
     for (extension, remedy) in [
         ("KHR_draco_mesh_compression", "untick Data > Compression"),
         ("EXT_meshopt_compression", "gltfpack: without -c"),
-        ("KHR_mesh_quantization", "-noq"),
         ("KHR_texture_basisu", "PNG or JPEG"),
         ("EXT_unheard_of", "export it without"),
     ] {

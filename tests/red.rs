@@ -488,7 +488,7 @@ fn ask(gpu: &Gpu, question: Question) -> Check<Complaint> {
         Ridge => known::ridge(gpu),
         GlassInFurnace(samples, gather) => known::glass_in_a_furnace(gpu, samples, gather),
         Spot => known::spot(gpu),
-        Texture(wrap) => known::wrapped_texture(gpu, wrap),
+        Texture(wrap) => known::wrapped_texture(gpu, wrap, false),
         LeaningPlane(illumination) => known::leaning_plane(gpu, illumination),
         LeaningScatterer => known::leaning_scatterer(gpu),
         PatchInPlane => known::patch_in_a_plane(gpu),

@@ -80,7 +80,7 @@ fn triangles_shine_by_the_cosine_from_all_of_their_area() {
     let lamp = |two_sided: bool, textured: bool| {
         let mut mesh = Mesh::parallelogram("lamp", DVec3::ZERO, DVec3::new(0.6, 0.1, -0.2), DVec3::new(0.1, 0.3, 0.5), 0);
         mesh.triangles.truncate(1);
-        let emission_texture = textured.then_some(TextureUse { texture: 0, uv_set: 0 });
+        let emission_texture = textured.then_some(TextureUse::of(0, 0));
         let material = Material { emission: Vec3::ONE, emission_texture, two_sided, ..white() };
         Scene { textures: vec![texture.clone()], ..scene_of(vec![mesh], vec![material], vec![]) }
     };

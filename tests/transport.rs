@@ -186,7 +186,7 @@ fn rich_scene() -> Scene {
     scene.materials[0].surface = Surface::Glossy { exponent: 20.0 };
     scene.materials[1].two_sided = true;
     scene.materials.push(Material {
-        base_colour_texture: Some(TextureUse { texture: 0, uv_set: 0 }),
+        base_colour_texture: Some(TextureUse::of(0, 0)),
         two_sided: true,
         ..Material::lambert("tiles", Vec3::ONE)
     });

@@ -8,7 +8,7 @@ use serde_json::{Map, Value, json};
 use super::names::{GEOMETRY, Names};
 use super::{Layout, MeshLightmap};
 use crate::scene::light::{LUMENS_PER_WATT, LightKind};
-use crate::scene::material::TextureUse;
+use crate::scene::material::{TextureUse, UvTransform};
 use crate::scene::texture::Wrap;
 use crate::scene::{Camera, Light, Material, Mesh, Scene, Surface};
 
@@ -166,7 +166,18 @@ pub fn document(scene: &Scene, layout: &Layout, geometry: &Geometry, names: &Nam
     let mut meshes = Vec::new();
     for (index, mesh) in scene.meshes.iter().enumerate() {
         let material = &scene.materials[mesh.material];
-        let of_texture = |used: TextureUse| json!({"index": place(used.texture), "texCoord": geometry.uv_sets[index][used.uv_set]});
+        let of_texture = |used: TextureUse| {
+            let mut value = json!({"index": place(used.texture), "texCoord": geometry.uv_sets[index][used.uv_set]});
+            let UvTransform { scale, rotation, offset } = used.transform;
+            if used.transform != UvTransform::NONE {
+                value["extensions"]["KHR_texture_transform"] =
+                    json!({"scale": scale.to_array(), "rotation": rotation, "offset": offset.to_array()});
+            }
+            value
+        };
+        if textures_of(material).any(|used| used.transform != UvTransform::NONE) {
+            document.extensions.insert("KHR_texture_transform");
+        }
         let value = match (&layout.meshes[index], kind) {
             (None, _) => document.material(material, of_texture),
             (Some(_), Kind::Radiance) => {

@@ -1,6 +1,6 @@
 //! What surfaces are made of.
 
-use glam::Vec3;
+use glam::{DVec2, Vec3};
 
 /// How a surface scatters light. Its base colour is the share it scatters, per channel.
 #[derive(Debug, Clone, Copy, PartialEq)]
@@ -24,11 +24,42 @@ pub enum Surface {
     },
 }
 
-/// A texture and the set of coordinates that it is looked up with.
-#[derive(Debug, Clone, Copy, PartialEq, Eq)]
+/// A texture, the set of coordinates that it is looked up with, and where these lead.
+#[derive(Debug, Clone, Copy, PartialEq)]
 pub struct TextureUse {
     pub texture: usize,
     pub uv_set: usize,
+    pub transform: UvTransform,
+}
+
+/// What becomes of texture coordinates before a texture is looked up: they are scaled, then turned, then moved
+/// (KHR_texture_transform).
+#[derive(Debug, Clone, Copy, PartialEq)]
+pub struct UvTransform {
+    pub scale: DVec2,
+    /// Radians, from u = 1 towards v = -1.
+    pub rotation: f64,
+    pub offset: DVec2,
+}
+
+impl UvTransform {
+    pub const NONE: UvTransform = UvTransform { scale: DVec2::ONE, rotation: 0.0, offset: DVec2::ZERO };
+
+    pub fn apply(&self, uv: DVec2) -> DVec2 {
+        if *self == UvTransform::NONE {
+            return uv;
+        }
+        let (sine, cosine) = self.rotation.sin_cos();
+        let DVec2 { x: u, y: v } = self.scale * uv;
+        self.offset + DVec2::new(cosine * u + sine * v, cosine * v - sine * u)
+    }
+}
+
+impl TextureUse {
+    /// As coordinates have it.
+    pub fn of(texture: usize, uv_set: usize) -> TextureUse {
+        TextureUse { texture, uv_set, transform: UvTransform::NONE }
+    }
 }
 
 #[derive(Debug, Clone, PartialEq)]

@@ -59,7 +59,7 @@ pub fn scene(kind: &str) -> Scene {
         // A textured panel that faces the ball with one side, and two panels that only one side or none shines of.
         "two-sided triangles" => {
             let mut scene = bench(vec![]);
-            let emission_texture = Some(TextureUse { texture: 0, uv_set: 0 });
+            let emission_texture = Some(TextureUse::of(0, 0));
             scene.materials.push(Material { two_sided: true, emission_texture, ..shining(0.0) });
             scene.materials.push(shining(0.0));
             let texels = vec![Vec3::ONE, Vec3::new(0.1, 0.4, 0.2)];

@@ -104,13 +104,21 @@ fn texel_at(wrap: Wrap, place: i32, size: i32) -> i32 {
 
 /// A lamp that wears a picture of 3 x 2 texels five times along each side, from -2 to 3: at the middle of every texel
 /// shines that texel.
-pub fn wrapped_texture(gpu: &Gpu, wrap: [Wrap; 2]) -> Check<Complaint> {
+pub fn wrapped_texture(gpu: &Gpu, wrap: [Wrap; 2], is_transformed: bool) -> Check<Complaint> {
     // Any two are 1 apart in some channel.
     let texels = vec![Vec3::ZERO, Vec3::X, Vec3::Y, Vec3::Z, Vec3::new(1.0, 1.0, 0.0), Vec3::ONE];
     let size = [3, 2];
     let mut mesh = Mesh::parallelogram("lamp", DVec3::new(-7.5, -5.0, 0.0), DVec3::X * 15.0, DVec3::Y * 10.0, 0);
-    mesh.uvs[0].iter_mut().for_each(|uv| *uv = *uv * 5.0 - DVec2::splat(2.0));
-    let emission_texture = Some(TextureUse { texture: 0, uv_set: 0 });
+    let transform = UvTransform { scale: DVec2::splat(5.0), rotation: 0.0, offset: DVec2::splat(-2.0) };
+    let mut used = TextureUse::of(0, 0);
+    if is_transformed {
+        // The same, turned by a right angle and back.
+        mesh.uvs[0].iter_mut().for_each(|uv| *uv = DVec2::new(-uv.y, uv.x));
+        used.transform = UvTransform { rotation: FRAC_PI_2, ..transform };
+    } else {
+        mesh.uvs[0].iter_mut().for_each(|uv| *uv = transform.apply(*uv));
+    }
+    let emission_texture = Some(used);
     let mut sign = scene_of(vec![mesh], vec![Material { emission: Vec3::ONE, emission_texture, ..matt(0.0) }], vec![]);
     sign.textures = vec![Texture { name: "six".into(), width: 3, height: 2, texels: texels.clone(), wrap }];
     // Five pixels a texel: the middle one of a row is within a tenth of the texel's middle.

@@ -16,7 +16,7 @@ pub use photonmill::plan::{Limits, RoomPlan};
 pub use photonmill::rng::{Rng, philox};
 pub use photonmill::scene::geometry::Geometry;
 pub use photonmill::scene::light::LightKind;
-pub use photonmill::scene::material::TextureUse;
+pub use photonmill::scene::material::{TextureUse, UvTransform};
 pub use photonmill::scene::open_box::open_box;
 pub use photonmill::scene::room::RoomScene;
 pub use photonmill::scene::texture::Wrap;

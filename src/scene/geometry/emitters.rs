@@ -289,7 +289,7 @@ mod tests {
         }
         let mut material = Material::lambert("lamp", Vec3::ONE);
         material.emission = Vec3::ONE;
-        material.emission_texture = Some(crate::scene::material::TextureUse { texture: 0, uv_set: 0 });
+        material.emission_texture = Some(crate::scene::material::TextureUse::of(0, 0));
         Scene { meshes: vec![lamp], materials: vec![material], textures: vec![texture], ..Scene::default() }
     }
 

@@ -16,6 +16,7 @@ use half::slice::HalfFloatSliceExt as _;
 use rayon::prelude::*;
 
 use super::bvh::Bvh;
+use super::material::TextureUse;
 use super::overlap;
 use super::planes::{Planes, for_equals, hash_of};
 use super::texture::Wrap;
@@ -278,11 +279,12 @@ fn corner_normals(mesh: &Mesh, triangle: usize, part: Option<&[DVec3; 3]>) -> Tr
 }
 
 fn corner_uvs(mesh: &Mesh, material: &Material, triangle: usize, part: Option<&[DVec3; 3]>) -> TriangleUvs {
-    let of_set = |set: Option<usize>| -> [Vec2; 3] {
-        match set {
-            Some(set) if !mesh.uvs[set].is_empty() => {
+    let of = |used: Option<TextureUse>| -> [Vec2; 3] {
+        match used {
+            Some(TextureUse { uv_set, transform, .. }) => {
+                let own = |vertex: u32| mesh.uvs[uv_set].get(vertex as usize).copied().unwrap_or_default();
                 // Whole turns mean nothing and would cost digits.
-                let uvs = mesh.triangles[triangle].map(|vertex| mesh.uvs[set][vertex as usize]);
+                let uvs = mesh.triangles[triangle].map(|vertex| transform.apply(own(vertex)));
                 let is_far = uvs[0].abs().max_element() > 64.0;
                 let base: DVec2 = if is_far { uvs[0].floor() - uvs[0].floor() % 2.0 } else { DVec2::ZERO };
                 at_corners(uvs, part).map(|uv| (uv - if base.abs().max_element() > 64.0 { base } else { DVec2::ZERO }).as_vec2())
@@ -290,8 +292,8 @@ fn corner_uvs(mesh: &Mesh, material: &Material, triangle: usize, part: Option<&[
             _ => [Vec2::ZERO; 3],
         }
     };
-    let [base_a, base_b, base_c] = of_set(material.base_colour_texture.map(|texture| texture.uv_set));
-    let [emission_a, emission_b, emission_c] = of_set(material.emission_texture.map(|texture| texture.uv_set));
+    let [base_a, base_b, base_c] = of(material.base_colour_texture);
+    let [emission_a, emission_b, emission_c] = of(material.emission_texture);
     TriangleUvs { base_a, base_b, base_c, emission_a, emission_b, emission_c }
 }
 

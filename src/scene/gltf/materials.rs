@@ -4,7 +4,7 @@ use std::borrow::Cow;
 use std::collections::hash_map::Entry;
 use std::collections::{BTreeSet, HashMap};
 
-use glam::{Vec3, Vec4};
+use glam::{DVec2, Vec3, Vec4};
 use gltf::Document;
 use image::{DynamicImage, ImageDecoder};
 use rayon::prelude::*;
@@ -12,9 +12,11 @@ use rayon::prelude::*;
 use super::{Loader, accessor, called, one_line, printable};
 use crate::error::{Error, Result};
 use crate::scene::Progress;
-use crate::scene::material::{Material, TextureUse, surface_of};
+use crate::scene::material::{Material, TextureUse, UvTransform, surface_of};
 use crate::scene::texture::{Texture, Wrap, linear_of_srgb};
 
+/// Texture coordinates that are moved or scaled by more have no digits left.
+const MAX_TRANSFORM: f32 = 1e6;
 /// Of all textures together: 1.5 GiB.
 const MAX_TEXELS: u64 = 1 << 27;
 
@@ -152,14 +154,37 @@ impl Loader {
         self.require(are_in_range(emission, f32::MAX), &object, || format!("emits {emission}; each channel must be 0 or more and finite"))?;
         let reason = || format!("has the index of refraction {ior}; it must be from 1 to 100");
         self.require(in_range(ior, 1.0, 100.0), &object, reason)?;
+        for info in [pbr.base_color_texture(), material.emissive_texture()].into_iter().flatten() {
+            if let Some(transform) = info.texture_transform() {
+                let ([ox, oy], [sx, sy], turn) = (transform.offset(), transform.scale(), transform.rotation());
+                let is_ok = [ox, oy, sx, sy, turn].iter().all(|number| number.abs() <= MAX_TRANSFORM);
+                let reason = || {
+                    format!(
+                        "has a texture transform of offset {ox:e} {oy:e}, scale {sx:e} {sy:e} and rotation {turn:e}; each must be within {MAX_TRANSFORM:e}"
+                    )
+                };
+                self.require(is_ok, &object, reason)?;
+            }
+        }
         let factors = Vec3::new(pbr.metallic_factor(), pbr.roughness_factor(), factor);
         self.require(are_in_range(factors, 1.0), &object, || "has a metallic, roughness or transmission factor outside 0 to 1".into())?;
+        let vector = |[x, y]: [f32; 2]| DVec2::new(f64::from(x), f64::from(y));
         let mut texture_use = |info: Option<gltf::texture::Info>| {
             info.map(|info| {
-                if info.tex_coord() > 1 {
+                let transform = info.texture_transform();
+                let set = transform.as_ref().and_then(|transform| transform.tex_coord()).unwrap_or(info.tex_coord());
+                if set > 1 {
                     self.leave_out("texture coordinates beyond the second set (the first is used)", &object);
                 }
-                TextureUse { texture: self.texture_places[&info.texture().index()], uv_set: if info.tex_coord() == 1 { 1 } else { 0 } }
+                TextureUse {
+                    texture: self.texture_places[&info.texture().index()],
+                    uv_set: if set == 1 { 1 } else { 0 },
+                    transform: transform.map_or(UvTransform::NONE, |transform| UvTransform {
+                        scale: vector(transform.scale()),
+                        rotation: f64::from(transform.rotation()),
+                        offset: vector(transform.offset()),
+                    }),
+                }
             })
         };
         Ok(Material {

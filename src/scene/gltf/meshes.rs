@@ -26,6 +26,8 @@ pub(super) struct Part<'a> {
     pub(super) to_world: DMat4,
     /// Its joints' matrices.
     pub(super) skin: Option<Arc<Vec<DMat4>>>,
+    /// By how much each morph target shifts it at rest.
+    pub(super) weights: Vec<f32>,
 }
 
 impl Part<'_> {
@@ -63,9 +65,6 @@ impl Loader {
             self.leave_out("points and lines", &owner);
             return Ok(());
         }
-        if primitive.morph_targets().len() > 0 {
-            self.leave_out("morph targets (meshes are taken in their base shape)", &owner);
-        }
         if primitive.get(&Semantic::Colors(0)).is_some() {
             self.leave_out("vertex colours", &owner);
         }
@@ -96,29 +95,31 @@ impl Loader {
             Some(joints) => self.vertex_matrices(primitive, joints, vertex_count, &vertices, &what)?,
             None => None,
         };
-        let positions: Vec<DVec3> = match &matrices {
-            Some(matrices) => {
-                let own = accessor::read(self, &positions, &vertices, &what, vector)?;
-                own.par_iter().zip(matrices).map(|(position, matrix)| matrix.transform_point3(*position)).collect()
-            }
-            None => accessor::read(self, &positions, &vertices, &what, |numbers| to_world.transform_point3(vector(numbers)))?,
+        let matrix = |vertex: usize| matrices.as_ref().map_or(to_world, |matrices| &matrices[vertex]);
+        let read_vectors = |accessor: &gltf::Accessor, kind: &str| {
+            of_vertices(accessor, kind)?;
+            accessor::read(self, accessor, &vertices, &what, vector)
         };
+        // Morph targets shift vertices before joints and nodes move them.
+        let shifted = |mut own: Vec<DVec3>, shifts: Vec<(gltf::Accessor, f64)>, kind: &str| {
+            for (shift, weight) in shifts {
+                own.par_iter_mut().zip(read_vectors(&shift, kind)?).for_each(|(own, shift)| *own += weight * shift);
+            }
+            Ok(own)
+        };
+        let targets = || primitive.morph_targets().zip(part.weights.iter().map(|weight| f64::from(*weight))).filter(|(_, w)| *w != 0.0);
+        let shifts = targets().filter_map(|(target, weight)| Some((target.positions()?, weight))).collect();
+        let mut positions = shifted(read_vectors(&positions, "positions")?, shifts, "positions in a morph target")?;
+        positions.par_iter_mut().enumerate().for_each(|(vertex, position)| *position = matrix(vertex).transform_point3(*position));
         let are_finite = positions.iter().all(|position| position.is_finite());
         self.require(are_finite, &what, || "has a vertex that is not finite once transformed".into())?;
         let mut normals = Vec::new();
         if let Some(own) = primitive.get(&Semantic::Normals) {
-            of_vertices(&own, "normals")?;
-            let turned = |matrix: &DMat3, normal: DVec3| (*matrix * normal).normalize_or_zero();
-            normals = match &matrices {
-                Some(matrices) => {
-                    let own = accessor::read(self, &own, &vertices, &what, vector)?;
-                    own.par_iter().zip(matrices).map(|(normal, matrix)| turned(&normal_matrix(matrix), *normal)).collect()
-                }
-                None => {
-                    let matrix = normal_matrix(to_world);
-                    accessor::read(self, &own, &vertices, &what, |numbers| turned(&matrix, vector(numbers)))?
-                }
-            };
+            let shifts = targets().filter_map(|(target, weight)| Some((target.normals()?, weight))).collect();
+            normals = shifted(read_vectors(&own, "normals")?, shifts, "normals in a morph target")?;
+            let of_node = normal_matrix(to_world);
+            let turn = |vertex: usize| matrices.as_ref().map_or(of_node, |matrices| normal_matrix(&matrices[vertex]));
+            normals.par_iter_mut().enumerate().for_each(|(vertex, normal)| *normal = (turn(vertex) * *normal).normalize_or_zero());
         }
         let mut uvs = [Vec::new(), Vec::new()];
         for (set, uvs) in uvs.iter_mut().enumerate() {

@@ -1,8 +1,8 @@
 //! Scenes from `.gltf` and `.glb` files (glTF 2.0).
 //!
-//! Read: meshes with node transforms and instances, skins in the pose of their nodes, smooth normals, two sets of texture coordinates,
-//! base colour and emission with textures, metallic-roughness (mapped by
-//! [`super::material::surface_of`]), KHR_materials_emissive_strength, _ior, _transmission,
+//! Read: meshes with node transforms and instances, skins in the pose of their nodes and morph targets by their weights at rest,
+//! quantized or not, smooth normals, two sets of texture coordinates and their transforms, base colour and emission with textures,
+//! metallic-roughness (mapped by [`super::material::surface_of`]), KHR_materials_emissive_strength, _ior, _transmission,
 //! KHR_lights_punctual, perspective cameras. Whatever else the file holds is named in a warning.
 
 mod accessor;
@@ -30,8 +30,14 @@ use meshes::Part;
 
 /// Larger files are refused: their triangles would not fit a device's buffers either.
 const MAX_FILE_BYTES: u64 = 4 << 30;
-const READ_EXTENSIONS: [&str; 4] =
-    ["KHR_lights_punctual", "KHR_materials_emissive_strength", "KHR_materials_ior", "KHR_materials_transmission"];
+const READ_EXTENSIONS: [&str; 6] = [
+    "KHR_lights_punctual",
+    "KHR_materials_emissive_strength",
+    "KHR_materials_ior",
+    "KHR_materials_transmission",
+    "KHR_mesh_quantization",
+    "KHR_texture_transform",
+];
 /// Nodes within nodes; deeper ones would be a cycle.
 const MAX_DEPTH: usize = 512;
 
@@ -45,7 +51,7 @@ pub fn load(path: &Path, radiometric: bool, progress: Progress) -> Result<Scene>
     malformed::binary_length(content).map_err(refuse)?;
     let Gltf { document, blob } =
         Gltf::from_slice_without_validation(content).map_err(|error| refuse(format!("is not valid glTF: {error}")))?;
-    let root = document.into_json();
+    let mut root = document.into_json();
     let version = root.asset.version.as_str();
     if !version.starts_with("2.") {
         return Err(refuse(format!("is of glTF version {version}; 2.0 is read")));
@@ -57,6 +63,8 @@ pub fn load(path: &Path, radiometric: bool, progress: Progress) -> Result<Scene>
         let remedies: Vec<&str> = remedies.into_iter().collect();
         return Err(refuse(format!("needs {}, which is not supported; {}", unread.join(", "), remedies.join("; "))));
     }
+    // The crate knows fewer of them.
+    root.extensions_required.clear();
     malformed::missing_members(&root).map_err(refuse)?;
     let document = Document::from_json(root).map_err(|error| refuse(error.to_string()))?;
     let mut loader = Loader {
@@ -82,7 +90,6 @@ fn remedy(extension: &str) -> &'static str {
     match extension {
         "KHR_draco_mesh_compression" => "export it without compression (in Blender's glTF export: untick Data > Compression)",
         "EXT_meshopt_compression" | "KHR_meshopt_compression" => "write it without compression (gltfpack: without -c, -cc and -cz)",
-        "KHR_mesh_quantization" => "write its vertices as floats (gltfpack: with -noq)",
         "KHR_texture_basisu" | "EXT_texture_webp" | "EXT_texture_avif" | "MSFT_texture_dds" => "export its textures as PNG or JPEG",
         _ => "export it without",
     }
@@ -205,8 +212,10 @@ impl Loader {
                     }),
                     None => None,
                 };
+                let weights = node.weights().or(mesh.weights()).unwrap_or_default().to_vec();
                 for primitive in mesh.primitives() {
-                    self.list_primitive(Part { primitive, name: name.clone(), to_world: own, skin: skin.clone() }, &mut parts)?;
+                    let part = Part { primitive, name: name.clone(), to_world: own, skin: skin.clone(), weights: weights.clone() };
+                    self.list_primitive(part, &mut parts)?;
                 }
             }
             if let Some(camera) = node.camera() {

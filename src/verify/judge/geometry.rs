@@ -2,13 +2,13 @@
 
 use std::time::Duration;
 
-use glam::{DVec2, DVec3, Vec3A};
+use glam::{DMat2, DVec2, DVec3, Vec3A};
 use obvhs::BvhBuildParams;
 use obvhs::aabb::Aabb;
 use obvhs::bvh2::Bvh2;
 use obvhs::bvh2::builder::build_bvh2;
 
-use crate::scene::material::TextureUse;
+use crate::scene::material::{TextureUse, UvTransform};
 use crate::scene::{Material, Mesh, Scene, Surface, overlap};
 
 /// Rays start this share of the scene's largest coordinate off the surface that they leave: some 10^5
@@ -196,10 +196,12 @@ impl<'a> Geometry<'a> {
 
     /// A colour's texture at a point of a triangle; 1 without one.
     fn texture(&self, texture: Option<TextureUse>, triangle: &Triangle, weights: DVec3) -> DVec3 {
-        let Some(TextureUse { texture, uv_set }) = texture else { return DVec3::ONE };
+        let Some(TextureUse { texture, uv_set, transform: UvTransform { scale, rotation, offset } }) = texture else { return DVec3::ONE };
         let uvs = &triangle.mesh.uvs[uv_set];
         let uv = if uvs.is_empty() { DVec2::ZERO } else { mix(triangle.vertices.map(|vertex| uvs[vertex]), triangle.of_vertices(weights)) };
-        self.scene.textures[texture].sample(uv).as_dvec3()
+        // A turn of the plane's points by minus the angle, v being its second axis.
+        let turned = DMat2::from_angle(-rotation) * DMat2::from_diagonal(scale);
+        self.scene.textures[texture].sample(turned * uv + offset).as_dvec3()
     }
 
     /// Radiance that leaves a triangle's shining side.
