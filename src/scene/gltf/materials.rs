@@ -172,7 +172,7 @@ impl Loader {
         let mut texture_use = |info: Option<gltf::texture::Info>| {
             info.map(|info| {
                 let transform = info.texture_transform();
-                let set = transform.as_ref().and_then(|transform| transform.tex_coord()).unwrap_or(info.tex_coord());
+                let set = transform.as_ref().and_then(gltf::texture::TextureTransform::tex_coord).unwrap_or(info.tex_coord());
                 if set > 1 {
                     self.leave_out("texture coordinates beyond the second set (the first is used)", &object);
                 }
