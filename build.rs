@@ -162,6 +162,7 @@ const WORLDS: [(&str, &[&str]); 2] = [
             "light_regions",
             "light_shares",
             "openings",
+            "colours",
         ],
     ),
 ];

@@ -245,6 +245,13 @@ struct TriangleUvs {
     vec2 emission_c;
 };
 
+// Linear colours at a triangle's corners, which multiply the material's base colour.
+struct TriangleColours {
+    vec3 a;
+    vec3 b;
+    vec3 c;
+};
+
 struct SurfaceMaterial {
     vec3 base_colour;
     // `SURFACE_...`.

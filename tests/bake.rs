@@ -484,6 +484,9 @@ fn zoo() -> Scene {
     let square = |place: usize, material: usize| {
         let mut mesh = Mesh::parallelogram("a square", DVec3::X * (2 * place) as f64, DVec3::X, DVec3::Y, material);
         mesh.uvs[1] = [[0.25, 0.0], [0.75, 0.0], [0.75, 3.0], [0.25, 3.0]].map(DVec2::from).to_vec();
+        if place == 1 {
+            mesh.colours = [Vec3::X, Vec3::Y, Vec3::Z, Vec3::ONE].to_vec();
+        }
         mesh
     };
     let material = |name: &str, surface: Surface| Material { surface, ..Material::lambert(name, Vec3::new(0.5, 0.25, 1.0)) };
@@ -532,6 +535,14 @@ fn every_surface_light_and_texture_round_trips() {
     pairs(&read(folder.path(), "scene.gltf").lights, &scene.lights).for_each(|(written, light)| assert_same_light(written, light));
     assert!(!folder.path().join("texture_0.png").exists(), "nothing uses it");
 
+    let colour_at = |mesh: &Mesh, at: DVec3| {
+        let vertex = mesh.positions.iter().position(|position| position.distance(at) < 1e-6).unwrap();
+        mesh.colours.get(vertex).copied()
+    };
+    for position in &scene.meshes[1].positions {
+        assert_eq!(colour_at(&written.meshes[1], *position), colour_at(&scene.meshes[1], *position));
+    }
+    assert!(written.meshes[0].colours.is_empty());
     // Only the second set is used: it is the first one now.
     let second = &written.meshes[1];
     assert_eq!(written.materials[second.material].base_colour_texture.unwrap().uv_set, 0);

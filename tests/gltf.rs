@@ -99,7 +99,7 @@ fn what_is_left_out_is_named_once() {
     value["animations"] = json!([{"channels": [], "samplers": []}]);
     value["extensionsUsed"].as_array_mut().unwrap().push(json!("KHR_materials_clearcoat"));
     value["cameras"][0] = json!({"type": "orthographic", "orthographic": {"xmag": 1, "ymag": 1, "zfar": 9, "znear": 0.1}});
-    value["meshes"][0]["primitives"][0]["attributes"]["COLOR_0"] = json!(1);
+    value["meshes"][0]["primitives"][0]["attributes"]["COLOR_1"] = json!(1);
     let scene = load(&value).unwrap();
     let [warning] = scene.warnings.as_slice() else { panic!("{:?}", scene.warnings) };
     let wanted = [
@@ -107,7 +107,7 @@ fn what_is_left_out_is_named_once() {
         "animations",
         "KHR_materials_clearcoat",
         "orthographic cameras: camera 'eye'",
-        "vertex colours: mesh 'wall'",
+        "second sets of vertex colours: mesh 'wall'",
     ];
     for words in wanted {
         assert_eq!(warning.matches(words).count(), 1, "{words}: {warning}");
@@ -358,6 +358,26 @@ fn quantized_meshes_are_read() {
     let mesh = load(&value).unwrap().meshes.remove(0);
     assert!((mesh.positions[3] - DVec3::new(1.0, 5.0, 2.95)).length() < 1e-7, "{:?}", mesh.positions);
     assert_eq!(mesh.uvs[0], [[0.0, 0.0], [1.0, 0.0], [1.0, 1.0], [0.0, 1.0]].map(DVec2::from));
+}
+
+#[test]
+fn vertex_colours_are_read() {
+    let mut value = square();
+    let bytes = [[255, 0, 51, 0], [0, 255, 0, 0], [0, 0, 255, 255], [255; 4]].concat();
+    let colours = add_accessor(&mut value, &bytes, 5121, 4, "VEC4");
+    value["accessors"][colours]["normalized"] = json!(true);
+    value["meshes"][0]["primitives"][0]["attributes"]["COLOR_0"] = json!(colours);
+    let scene = load(&value).unwrap();
+    assert_eq!(scene.warnings, Vec::<String>::new());
+    assert_eq!(scene.meshes[0].colours, [Vec3::new(1.0, 0.0, 0.2), Vec3::Y, Vec3::Z, Vec3::ONE]);
+
+    let mut bright = value.clone();
+    let colours = add_accessor(&mut bright, &floats(&[0.5, 0.5, 1.5].repeat(4)), 5126, 4, "VEC3");
+    bright["meshes"][0]["primitives"][0]["attributes"]["COLOR_0"] = json!(colours);
+    assert_refused(&bright, &["mesh 'wall'", "vertex colour 0.5 0.5 1.5", "from 0 to 1"]);
+    let few = add_accessor(&mut value, &floats(&[0.5; 9]), 5126, 3, "VEC3");
+    value["meshes"][0]["primitives"][0]["attributes"]["COLOR_0"] = json!(few);
+    assert_refused(&value, &["mesh 'wall'", "3 vertex colours for 4 vertices"]);
 }
 
 /// The specification's matrices: scaled, then turned, then moved; another set may be named.

@@ -286,6 +286,12 @@ fn diffuse_light_crosses_glass_by_its_mean_transmittance() {
 }
 
 #[test]
+fn vertex_colours_multiply_the_base_colour() {
+    let Some(gpu) = device() else { return };
+    assert_holds("a coloured floor", known::vertex_colours(&gpu));
+}
+
+#[test]
 fn textures_go_on_beyond_their_edges_as_their_wrapping_says() {
     let Some(gpu) = device() else { return };
     for u in [Wrap::Repeat, Wrap::MirroredRepeat, Wrap::Clamp] {

@@ -70,6 +70,7 @@ enum Question {
     DimRoom(f32),
     HiddenLamp,
     TinyPlates,
+    VertexColours,
     ManyLamps(u32),
     MissedLamp,
     /// Light through a window of `openings`.
@@ -122,7 +123,7 @@ struct Fault {
 }
 
 #[rustfmt::skip]
-const FAULTS: [Fault; 82] = [
+const FAULTS: [Fault; 83] = [
     Fault { what: "what rounding takes from a pair of floats is forgotten",
         file: "film/float_u64.glsl", from: "precise float rest = sum.y + (", to: "precise float rest = 0.0 * (",
         kernels: &["gather_brute_u64", "gather_grid_u64"], noticed_by: &[(Pairs, SumsTooSmall)] },
@@ -407,6 +408,9 @@ const FAULTS: [Fault; 82] = [
     Fault { what: "a surface that is tiny beside the radius is taken for a larger one",
         file: "kernels/flux_to_radiance.comp", from: "area * (1.0 / 262144.0)", to: "area * (1.0 / 4096.0)",
         kernels: &["flux_to_radiance"], noticed_by: &[(TinyPlates, TooDark)] },
+    Fault { what: "a triangle has the vertex colour of its first corner",
+        file: "material/surface.glsl", from: "at.a + hit.u * (at.b - at.a) + hit.v * (at.c - at.a);", to: "at.a;",
+        kernels: &["view"], noticed_by: &[(VertexColours, WrongTexel)] },
     Fault { what: "directions within two cones are weighed as if only one could have chosen them",
         file: "world/scene/aim.glsl", from: "k == chosen || versine_between(emission.direction, other.axis) <= other.versine",
         to: "k == chosen",
@@ -501,6 +505,7 @@ fn ask(gpu: &Gpu, question: Question) -> Check<Complaint> {
         DimRoom(ratio) => lamps::dim_room(gpu, ratio, true),
         HiddenLamp => lamps::hidden_lamp(gpu, 1e4, true),
         TinyPlates => known::tiny_plates(gpu),
+        VertexColours => known::vertex_colours(gpu),
         ManyLamps(side) => lamps::many_lamps(gpu, side, true),
         MissedLamp => lamps::missed_lamp(gpu),
         Window => light_through_a_window(gpu),

@@ -5,6 +5,8 @@ layout(set = 0, binding = 3, scalar) readonly buffer Uvs { TriangleUvs uvs[]; };
 layout(set = 0, binding = 4, scalar) readonly buffer Materials { SurfaceMaterial materials[]; };
 layout(set = 0, binding = 5, scalar) readonly buffer Textures { TextureInfo textures[]; };
 layout(set = 0, binding = 6, scalar) readonly buffer Texels { uvec2 texels[]; };
+// One for all triangles where no mesh has any.
+layout(set = 0, binding = 14, scalar) readonly buffer Colours { TriangleColours colours[]; };
 
 struct Surface {
     vec3 position;
@@ -143,6 +145,11 @@ Surface surface_at(Hit hit, vec3 wo)
             TriangleUvs at = uvs[hit.triangle];
             surface.base_colour *= sample_texture(material.base_texture, mixed_uv(at.base_a, at.base_b, at.base_c, hit.u, hit.v));
         }
+    }
+    if (HAS_VERTEX_COLOURS) {
+        TriangleColours at = colours[min(hit.triangle, uint(colours.length()) - 1)];
+        // Exactly 1 where all three are.
+        surface.base_colour *= at.a + hit.u * (at.b - at.a) + hit.v * (at.c - at.a);
     }
     surface.emission = shown ? emitted_radiance(material, hit.triangle, hit.u, hit.v) : vec3(0.0);
     return surface;

@@ -72,6 +72,10 @@ impl Geometry {
             let normals = mesh.normals.iter().flat_map(|normal| normal.normalize_or(DVec3::Y).as_vec3().to_array());
             attributes.insert("NORMAL".into(), json!(self.floats("VEC3", normals, mesh.normals.len())));
         }
+        if !mesh.colours.is_empty() {
+            let colours = mesh.colours.iter().flat_map(Vec3::to_array);
+            attributes.insert("COLOR_0".into(), json!(self.floats("VEC3", colours, mesh.colours.len())));
+        }
         let (sets, uv_sets) = texture_coordinates(mesh, lightmap, material);
         for (set, uvs) in sets.into_iter().enumerate() {
             let floats = uvs.iter().flat_map(|uv| uv.as_vec2().to_array());

@@ -3,7 +3,7 @@
 
 use std::collections::BTreeMap;
 
-use glam::{DVec2, DVec3};
+use glam::{DVec2, DVec3, Vec3};
 use rayon::prelude::*;
 
 use super::raster::{Lattice, Triangle};
@@ -136,6 +136,14 @@ impl SurfacePoint {
     /// Texture coordinates; zero where the mesh has none.
     pub fn uv(&self, mesh: &Mesh, uv_set: usize) -> DVec2 {
         if mesh.uvs[uv_set].is_empty() { DVec2::ZERO } else { self.mix(mesh, &mesh.uvs[uv_set]) }
+    }
+
+    /// What multiplies the material's base colour.
+    pub fn colour(&self, mesh: &Mesh) -> Vec3 {
+        let [a, b, c] =
+            mesh.triangles[self.triangle as usize].map(|vertex| mesh.colours.get(vertex as usize).copied().unwrap_or(Vec3::ONE));
+        let [v, w] = self.weights;
+        a * (1.0 - v - w) + b * v + c * w
     }
 
     pub fn sample(&self, mesh: &Mesh) -> TexelSample {

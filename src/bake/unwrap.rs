@@ -175,6 +175,10 @@ fn charts(mesh: &Mesh, texels_per_metre: f64) -> Result<Unwrapped, String> {
                 false => output.vertices.iter().map(|vertex| mesh.normals[source(vertex)]).collect(),
             },
             uvs: mesh.uvs.each_ref().map(of_set),
+            colours: match mesh.colours.is_empty() {
+                true => Vec::new(),
+                false => output.vertices.iter().map(|vertex| mesh.colours[source(vertex)]).collect(),
+            },
             triangles: output.indices.chunks_exact(3).map(|corners| [corners[0], corners[1], corners[2]]).collect(),
             material: mesh.material,
         },

@@ -201,6 +201,7 @@ impl ScenePlan {
             of::<Vec4>("planes", &geometry.planes, true, "the triangles' planes"),
             of("normals", &geometry.normals, self.keeps(Effect::SmoothNormals), "the triangles' normals"),
             of("texture coordinates", &geometry.uvs, textured, "the triangles' texture coordinates"),
+            of("vertex colours", &geometry.colours, self.keeps(Effect::VertexColours), "the triangles' vertex colours"),
             of("materials", &geometry.materials, true, "materials"),
             of("textures", &geometry.textures, textured, "sizes of textures"),
             of::<UVec2>("texels", &geometry.texels, textured, "textures"),

@@ -31,6 +31,7 @@ pub(super) struct Facts<'a> {
     emitters: [usize; 7],
     triangles: usize,
     smooth: usize,
+    coloured: usize,
     part: Part,
     is_picture: bool,
     /// Some indirect light comes by a gather ray, at whose end there is light of all kinds.
@@ -51,6 +52,7 @@ impl<'a> Facts<'a> {
             emitters,
             triangles: geometry.triangles.len(),
             smooth: geometry.normals.iter().filter(|normals| normals.a != NONE).count(),
+            coloured: scene.meshes.iter().filter(|mesh| !mesh.colours.is_empty()).map(|mesh| mesh.triangles.len()).sum(),
             part: settings.part,
             is_picture: matches!(sensor, Sensor::Picture { .. }),
             gathers: settings.final_gather || glossy && settings.illumination == Illumination::Split,
@@ -131,6 +133,7 @@ impl<'a> Facts<'a> {
                 let is_textured = |of: &Material| of.base_colour_texture.is_some() || of.emission_texture.is_some();
                 found("textured", &is_textured, "no textured material")
             }
+            Effect::VertexColours => some(self.coloured, "triangle with vertex colours"),
             Effect::Environment => lights(EMITTER_ENVIRONMENT, "environment"),
             Effect::MeshLights => some(self.emitters[EMITTER_TRIANGLE as usize], "emissive triangle"),
             Effect::PointLights => lights(EMITTER_POINT, "point"),

@@ -190,6 +190,7 @@ impl ScenePlan {
                 (0, 0)
             }
             Effect::Textures => (0, size_of_val(geometry.uvs.as_slice()) as u64 + size_of_val(geometry.texels.as_slice()) as u64),
+            Effect::VertexColours => (0, size_of_val(geometry.colours.as_slice()) as u64),
             Effect::SmoothNormals => (0, size_of_val(geometry.normals.as_slice()) as u64),
             Effect::Bvh => (0, size_of_val(geometry.nodes.as_slice()) as u64),
             _ => (0, 0),
@@ -214,6 +215,7 @@ fn constants(
         ("HAS_OVERLAPS", u32::from(geometry.triangles.iter().any(|triangle| triangle.plane >= HIDDEN))),
         ("HAS_SMOOTH_NORMALS", flag(Effect::SmoothNormals)),
         ("HAS_TEXTURES", flag(Effect::Textures)),
+        ("HAS_VERTEX_COLOURS", flag(Effect::VertexColours)),
         ("HAS_TWO_SIDED", flag(Effect::TwoSided)),
         ("HAS_GLOSSY", flag(Effect::Glossy)),
         ("HAS_MIRROR", u32::from(facts.has(|surface| surface == Surface::Mirror) || settings.forces(Effect::SpecularChains))),

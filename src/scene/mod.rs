@@ -92,6 +92,9 @@ impl Scene {
             LightKind::Disc { .. } => lacks(Effect::DiscLights),
             LightKind::Environment { .. } => lacks(Effect::Environment),
         });
+        if lacks(Effect::VertexColours) {
+            scene.meshes.iter_mut().for_each(|mesh| mesh.colours.clear());
+        }
         for material in &mut scene.materials {
             if lacks(Effect::MeshLights) {
                 material.emission = Vec3::ZERO;

@@ -71,6 +71,7 @@ named! {
         RefractiveCaustics = "refractive-caustics",
         SpecularChains = "specular-chains",
         Textures = "textures",
+        VertexColours = "vertex-colours",
         Environment = "environment",
         MeshLights = "mesh-lights",
         PointLights = "point-lights",

@@ -144,6 +144,39 @@ pub fn wrapped_texture(gpu: &Gpu, wrap: [Wrap; 2], is_transformed: bool) -> Chec
     Ok(())
 }
 
+/// Under a sky of 1 W/m2/sr a floor shows its own colour: that of its material times those of its corners, between which it is even.
+pub fn vertex_colours(gpu: &Gpu) -> Check<Complaint> {
+    let corners = [Vec3::X, Vec3::Y, Vec3::new(0.0, 0.5, 1.0), Vec3::ONE];
+    let floor = Mesh { colours: corners.to_vec(), ..level(0.0, [2.0; 2], true, 0) };
+    let mut scene = scene_of(vec![floor], vec![matt(0.8)], vec![LightKind::Environment { radiance: Vec3::ONE }]);
+    scene.meshes.push(level(-1.0, [1.0; 2], true, 0));
+    // A square of 2 m fills the picture, seen from far so that all pixels are looked at straight.
+    let camera = Camera::looking_at("above", DVec3::Y * 200.0, DVec3::ZERO, DVec3::Z, 2.0 * (1.0f64 / 200.0).atan());
+    let settings = SceneSettings { rounds: 4, part: Part::Direct, ..SceneSettings::default() };
+    let lit = seen(gpu, &scene, &settings, &camera, [8, 8]);
+    let Mesh { positions, triangles, colours, .. } = &scene.meshes[0];
+    for pixel in 0..64u32 {
+        let place = |k: u32| (f64::from(k) + 0.5) / 4.0 - 1.0;
+        let at = camera.right * place(pixel % 8) - camera.up * place(pixel / 8);
+        // Pixels across the diagonal see both triangles.
+        let on_diagonal = (at.x - at.z).abs() < 0.3 || (at.x + at.z).abs() < 0.3;
+        let expected = triangles.iter().find_map(|triangle| {
+            let [a, b, c] = triangle.map(|vertex| positions[vertex as usize]);
+            let whole = (b - a).cross(c - a).y;
+            let [v, w] = [(at - a).cross(c - a).y / whole, (b - a).cross(at - a).y / whole];
+            let [a, b, c] = triangle.map(|vertex| colours[vertex as usize].as_dvec3());
+            (v >= 0.0 && w >= 0.0 && v + w <= 1.0).then(|| 0.8 * (a * (1.0 - v - w) + b * v + c * w))
+        });
+        let (found, expected) = (lit.film.mean(pixel as usize, &lit.plan), expected.expect("the floor fills the picture"));
+        // A pixel is an eighth of the floor, over which the filter takes the mean of four rounds' places.
+        let off = (found - expected).abs().max_element();
+        if !on_diagonal && !(off <= 0.08) {
+            return Err(Complaint::new(Kind::WrongTexel, format!("pixel {pixel}: {found} instead of {expected}")));
+        }
+    }
+    Ok(())
+}
+
 /// A level plane whose shading normals lean by an angle towards x.
 fn leaning(angle: f64) -> Mesh {
     Mesh { normals: vec![DVec3::new(angle.sin(), angle.cos(), 0.0); 4], ..level(0.0, [4.0; 2], true, 0) }

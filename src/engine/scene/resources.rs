@@ -20,6 +20,7 @@ buffers! {
             planes: planned.filled(commands, "planes", &geometry.planes)?,
             normals: planned.filled(commands, "normals", &geometry.normals)?,
             uvs: planned.filled(commands, "texture coordinates", &geometry.uvs)?,
+            colours: planned.filled(commands, "vertex colours", &geometry.colours)?,
             materials: planned.filled(commands, "materials", &geometry.materials)?,
             textures: planned.filled(commands, "textures", &geometry.textures)?,
             texels: planned.filled(commands, "texels", &geometry.texels)?,

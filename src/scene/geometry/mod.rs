@@ -23,7 +23,7 @@ use super::texture::Wrap;
 use super::{Material, Mesh, Progress, Scene, Surface};
 use crate::constants::*;
 use crate::error::{Error, Result};
-use crate::records::{BvhNode, Emitter, SurfaceMaterial, TextureInfo, Triangle, TriangleNormals, TriangleUvs};
+use crate::records::{BvhNode, Emitter, SurfaceMaterial, TextureInfo, Triangle, TriangleColours, TriangleNormals, TriangleUvs};
 use crate::text::counted;
 
 #[derive(Debug, Clone)]
@@ -45,6 +45,8 @@ pub struct Geometry {
     pub sources: Vec<(u32, u32)>,
     pub normals: Vec<TriangleNormals>,
     pub uvs: Vec<TriangleUvs>,
+    /// One for all triangles where no mesh has any.
+    pub colours: Vec<TriangleColours>,
     pub materials: Vec<SurfaceMaterial>,
     pub textures: Vec<TextureInfo>,
     pub texels: Vec<UVec2>,
@@ -175,6 +177,13 @@ impl Geometry {
             corner_uvs(mesh, &scene.materials[mesh.material], triangle as usize, part_of(place))
         };
         let uvs = order.par_iter().zip(&sources).map(uvs_of).collect();
+        let colours_of = |(&place, &(mesh, triangle)): (&u32, &(u32, u32))| {
+            corner_colours(&scene.meshes[mesh as usize], triangle as usize, part_of(place))
+        };
+        let colours = match scene.meshes.iter().all(|mesh| mesh.colours.is_empty()) {
+            true => vec![TriangleColours { a: Vec3::ONE, b: Vec3::ONE, c: Vec3::ONE }],
+            false => order.par_iter().zip(&sources).map(colours_of).collect(),
+        };
         progress("packing textures", 0.0);
         let (textures, texels) = pack_textures(scene);
 
@@ -190,6 +199,7 @@ impl Geometry {
             sources,
             normals,
             uvs,
+            colours,
             materials: scene.materials.iter().map(material_record).collect(),
             textures,
             texels,
@@ -276,6 +286,12 @@ fn corner_normals(mesh: &Mesh, triangle: usize, part: Option<&[DVec3; 3]>) -> Tr
     }
     let [a, b, c] = at_corners(normals, part).map(|normal| pack_normal(normal.as_vec3()));
     TriangleNormals { a, b, c }
+}
+
+fn corner_colours(mesh: &Mesh, triangle: usize, part: Option<&[DVec3; 3]>) -> TriangleColours {
+    let colour = |vertex: u32| mesh.colours.get(vertex as usize).map_or(DVec3::ONE, |colour| colour.as_dvec3());
+    let [a, b, c] = at_corners(mesh.triangles[triangle].map(colour), part).map(|colour| colour.as_vec3());
+    TriangleColours { a, b, c }
 }
 
 fn corner_uvs(mesh: &Mesh, material: &Material, triangle: usize, part: Option<&[DVec3; 3]>) -> TriangleUvs {

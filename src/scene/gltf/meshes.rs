@@ -5,6 +5,7 @@ use std::sync::Arc;
 
 use glam::{DMat3, DMat4, DVec2, DVec3, Vec3};
 use gltf::Semantic;
+use gltf::accessor::Dimensions;
 use gltf::mesh::Mode;
 use rayon::prelude::*;
 
@@ -65,8 +66,8 @@ impl Loader {
             self.leave_out("points and lines", &owner);
             return Ok(());
         }
-        if primitive.get(&Semantic::Colors(0)).is_some() {
-            self.leave_out("vertex colours", &owner);
+        if primitive.get(&Semantic::Colors(1)).is_some() {
+            self.leave_out("second sets of vertex colours", &owner);
         }
         let Some(positions) = primitive.get(&Semantic::Positions) else {
             return Err(self.refuse(&part.what(), "has no positions"));
@@ -131,6 +132,19 @@ impl Loader {
                 }
             }
         }
+        let mut colours = Vec::new();
+        if let Some(own) = primitive.get(&Semantic::Colors(0)) {
+            of_vertices(&own, "vertex colours")?;
+            // Alpha is no part of the base colour.
+            colours = match own.dimensions() {
+                Dimensions::Vec3 => accessor::read(self, &own, &vertices, &what, |[r, g, b]: [f32; 3]| Vec3::new(r, g, b))?,
+                _ => accessor::read(self, &own, &vertices, &what, |[r, g, b, _]: [f32; 4]| Vec3::new(r, g, b))?,
+            };
+            if let Some(colour) = colours.iter().find(|colour| colour.min_element() < 0.0 || colour.max_element() > 1.0) {
+                let Vec3 { x, y, z } = *colour;
+                return Err(self.refuse(&what, format!("has the vertex colour {x} {y} {z}; each channel must be from 0 to 1")));
+            }
+        }
         let indices = indices.unwrap_or_else(|| (0..positions.len() as u32).collect());
         let mut triangles = triangles_of(primitive.mode(), &indices);
         if matrices.as_ref().and_then(|matrices| matrices.first()).unwrap_or(to_world).determinant() < 0.0 {
@@ -138,7 +152,7 @@ impl Loader {
             triangles.iter_mut().for_each(|triangle| triangle.swap(1, 2));
         }
         let material = primitive.material().index().unwrap_or(self.scene.materials.len() - 1);
-        Ok(Mesh { name: name.clone(), positions, normals, uvs, triangles, material })
+        Ok(Mesh { name: name.clone(), positions, normals, uvs, colours, triangles, material })
     }
 
     /// Indices into those of the vertices that the primitive uses, as many primitives may share one list of vertices;

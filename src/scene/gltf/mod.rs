@@ -1,7 +1,7 @@
 //! Scenes from `.gltf` and `.glb` files (glTF 2.0).
 //!
 //! Read: meshes with node transforms and instances, skins in the pose of their nodes and morph targets by their weights at rest,
-//! quantized or not, smooth normals, two sets of texture coordinates and their transforms, base colour and emission with textures,
+//! quantized or not, smooth normals, two sets of texture coordinates and their transforms, base colour and emission with textures, vertex colours,
 //! metallic-roughness (mapped by [`super::material::surface_of`]), KHR_materials_emissive_strength, _ior, _transmission,
 //! KHR_lights_punctual, perspective cameras. Whatever else the file holds is named in a warning.
 

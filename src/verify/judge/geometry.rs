@@ -224,10 +224,20 @@ impl<'a> Geometry<'a> {
             is_front,
             surface: material.surface,
             scatters: shown || matches!(material.surface, Surface::Dielectric { .. }),
-            base_colour: material.base_colour.as_dvec3() * self.texture(material.base_colour_texture, triangle, hit.weights),
+            base_colour: material.base_colour.as_dvec3()
+                * self.texture(material.base_colour_texture, triangle, hit.weights)
+                * vertex_colour(triangle, hit.weights),
             emission: if shown { self.emission(triangle, hit.weights) } else { DVec3::ZERO },
         }
     }
+}
+
+fn vertex_colour(triangle: &Triangle, weights: DVec3) -> DVec3 {
+    let colours = &triangle.mesh.colours;
+    if colours.is_empty() {
+        return DVec3::ONE;
+    }
+    mix(triangle.vertices.map(|vertex| colours[vertex].as_dvec3()), triangle.of_vertices(weights))
 }
 
 /// On the side of `ng`; `ng` itself where there is no other, or where it would be seen from below.
