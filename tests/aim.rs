@@ -29,7 +29,7 @@ fn kinds_bring_the_same_light(photons: u32, [precise_share, share]: [f64; 2]) {
 
 #[test]
 fn aimed_photons_bring_the_same_light() {
-    kinds_bring_the_same_light(80_000, [0.05, 0.1]);
+    kinds_bring_the_same_light(56_000, [0.05, 0.1]);
 }
 
 #[test]
