@@ -1,8 +1,6 @@
 //! Lighting scenes of triangles: bits that no split, builder or unused effect may change, parts that add
 //! up, radiometry, leaks, and plans that the device's work is counted against.
 
-use std::cell::LazyCell;
-
 use crate::common::known;
 use crate::common::lit::{light, run};
 use crate::common::pairwise::pairwise;
@@ -156,28 +154,41 @@ fn the_four_parts_add_up_to_the_whole_to_the_bit() {
     }
 }
 
+/// Effects that a scene does not need change nothing where they are forced on: all of them at once, or each with and without each
+/// other.
+fn unneeded_effects_change_no_bit(gpu: &Gpu, name: &str, each: bool) {
+    let scene = scene(name);
+    let reference = picture(gpu, &scene, &small());
+    let unneeded: Vec<Effect> =
+        reference.plan.decisions.iter().filter(|decision| !decision.needed).map(|decision| decision.effect).collect();
+    assert!(unneeded.len() > 5, "{name}: {unneeded:?}");
+    let rows = if each { pairwise(&vec![2; unneeded.len()]) } else { vec![vec![1; unneeded.len()]] };
+    for row in rows {
+        let with: Vec<Effect> = unneeded.iter().zip(row).filter(|(_, forced)| *forced == 1).map(|(effect, _)| *effect).collect();
+        let forced = picture(gpu, &scene, &SceneSettings { with: with.clone(), ..small() });
+        assert!(with.iter().all(|effect| forced.plan.keeps(*effect)), "{with:?}");
+        assert_holds(format!("{with:?}"), same_film(&format!("{name} with {with:?}"), &forced, &reference));
+    }
+    // A list instead of a tree finds the same.
+    if name == "cornell" {
+        let list = picture(gpu, &scene, &SceneSettings { without: vec![Effect::Bvh], ..small() });
+        assert_holds("list", same_film("list", &list, &reference));
+    }
+}
+
+/// Each combination has kernels of its own, and making them is what takes time.
 #[test]
 fn an_effect_that_the_scene_lacks_changes_no_bit() {
     let Some(gpu) = device() else { return };
-    for name in ["cornell", "cornell-spheres"] {
-        let scene = scene(name);
-        let reference = picture(&gpu, &scene, &small());
-        let unneeded: Vec<Effect> =
-            reference.plan.decisions.iter().filter(|decision| !decision.needed).map(|decision| decision.effect).collect();
-        assert!(unneeded.len() > 5, "{name}: {unneeded:?}");
-        // Each with and without each other.
-        for row in pairwise(&vec![2; unneeded.len()]) {
-            let with: Vec<Effect> = unneeded.iter().zip(row).filter(|(_, forced)| *forced == 1).map(|(effect, _)| *effect).collect();
-            let forced = picture(&gpu, &scene, &SceneSettings { with: with.clone(), ..small() });
-            assert!(with.iter().all(|effect| forced.plan.keeps(*effect)), "{with:?}");
-            assert_holds(format!("{with:?}"), same_film(&format!("{name} with {with:?}"), &forced, &reference));
-        }
-        // A list instead of a tree finds the same.
-        if name == "cornell" {
-            let list = picture(&gpu, &scene, &SceneSettings { without: vec![Effect::Bvh], ..small() });
-            assert_holds("list", same_film("list", &list, &reference));
-        }
-    }
+    unneeded_effects_change_no_bit(&gpu, "cornell", true);
+    unneeded_effects_change_no_bit(&gpu, "cornell-spheres", false);
+}
+
+#[test]
+#[ignore = "half a minute on a software device"]
+fn pairs_of_effects_that_spheres_lack_change_no_bit() {
+    let Some(gpu) = device() else { return };
+    unneeded_effects_change_no_bit(&gpu, "cornell-spheres", true);
 }
 
 /// A scene in which every effect shows.
@@ -205,27 +216,39 @@ fn rich_scene() -> Scene {
     scene
 }
 
+/// The part of a picture in which an effect shows by itself. A part needs fewer kernels than all light, and the same error has less
+/// light to hide in.
+fn part_that_shows(effect: Effect) -> Part {
+    match effect {
+        Effect::ReflectiveCaustics | Effect::RefractiveCaustics => Part::Caustic,
+        // The sky is not seen from the camera but in the mirror.
+        Effect::SpecularChains | Effect::SmoothNormals | Effect::Environment => Part::Specular,
+        Effect::Indirect => Part::Indirect,
+        _ => Part::Direct,
+    }
+}
+
 #[test]
 fn an_effect_that_the_scene_needs_is_missed_when_it_is_left_out() {
     let Some(gpu) = device() else { return };
     let scene = rich_scene();
     let settings = SceneSettings { rounds: 12, ..small() };
-    let reference = picture(&gpu, &scene, &settings);
-    let caustics = LazyCell::new(|| picture(&gpu, &scene, &SceneSettings { part: Part::Caustic, ..settings.clone() }));
+    let (_, whole) = scene_plan(&gpu, &scene, &settings, square_picture(SIZE)).unwrap();
+    // Direct light flies no photons, so that rounds of it are cheap, and a spot lights few pixels.
+    let of = |part| SceneSettings { part, rounds: if part == Part::Direct { 96 } else { 12 }, ..settings.clone() };
+    let references = Part::EACH.map(|part| picture(&gpu, &scene, &of(part)));
     for effect in Effect::ALL {
-        let decision = reference.plan.decisions.iter().find(|decision| decision.effect == effect).unwrap();
+        let decision = whole.decisions.iter().find(|decision| decision.effect == effect).unwrap();
         assert!(decision.needed && decision.kept, "{}: {}", effect.name(), decision.evidence);
         if effect == Effect::Bvh {
             // So many triangles cannot be a list; of few the bits are the same, as the test above shows.
             let settings = SceneSettings { without: vec![effect], ..settings.clone() };
-            assert!(scene_plan(&gpu, &scene, &settings, reference.plan.sensor).unwrap_err().to_string().starts_with("--without bvh"));
+            assert!(scene_plan(&gpu, &scene, &settings, whole.sensor).unwrap_err().to_string().starts_with("--without bvh"));
             continue;
         }
-        // Faint caustics show best by themselves.
-        let is_caustic = matches!(effect, Effect::ReflectiveCaustics | Effect::RefractiveCaustics);
-        let settings = SceneSettings { part: if is_caustic { Part::Caustic } else { Part::All }, ..settings.clone() };
-        let reference = if is_caustic { &*caustics } else { &reference };
-        let without = picture(&gpu, &scene, &SceneSettings { without: vec![effect], ..settings });
+        let part = part_that_shows(effect);
+        let reference = references.iter().find(|reference| reference.plan.settings.part == part).unwrap();
+        let without = picture(&gpu, &scene, &SceneSettings { without: vec![effect], ..of(part) });
         assert_eq!(without.plan.missing(), [effect]);
         // Somewhere, or over the whole picture, the two differ by more than their errors.
         let (mut worst, mut sum, mut variance) = (0.0f64, 0.0, 0.0);
@@ -237,6 +260,7 @@ fn an_effect_that_the_scene_needs_is_missed_when_it_is_left_out() {
             variance += error.length_squared();
         }
         let whole = sum.abs() / variance.sqrt();
+        println!("without {}: {worst:.2} and {whole:.2} errors apart", effect.name());
         assert!(worst > 3.0 || whole > 3.0, "without {}: {worst:.2} and {whole:.2} errors apart", effect.name());
     }
 }

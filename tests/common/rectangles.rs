@@ -120,16 +120,24 @@ impl Shadow {
         Shadow { planes: [side(0), side(1), side(2), side(3), own] }
     }
 
+    fn side(&self, plane: usize, at: DVec3) -> f64 {
+        self.planes[plane].0.dot(at) + self.planes[plane].1
+    }
+
+    /// Whether it surely hides nothing of a polygon.
+    fn spares(&self, polygon: &[DVec3]) -> bool {
+        (0..5).any(|plane| polygon.iter().all(|at| self.side(plane, *at) <= 0.0))
+    }
+
     /// Adds what is left of a polygon.
     fn cast(&self, polygon: Polygon, left: &mut Vec<Polygon>) {
-        let side = |k: usize, at: DVec3| self.planes[k].0.dot(at) + self.planes[k].1;
-        if (0..5).any(|k| polygon.iter().all(|at| side(k, *at) <= 0.0)) {
+        if self.spares(&polygon) {
             left.push(polygon);
             return;
         }
         let mut hidden = polygon;
         for k in 0..5 {
-            let (inside, outside) = cut(&hidden, |at| side(k, at));
+            let (inside, outside) = cut(&hidden, |at| self.side(k, at));
             if outside.len() > 2 {
                 left.push(outside);
             }
@@ -143,7 +151,13 @@ impl Shadow {
 
 /// Share of what leaves a small surface in the origin evenly that meets a polygon, by the sum over its edges (Lambert 1760).
 fn form_factor(polygon: &[DVec3], normal: DVec3) -> f64 {
-    let (above, _) = cut(polygon, |at| normal.dot(at));
+    let cut_off;
+    let above = if polygon.iter().all(|at| normal.dot(*at) >= 0.0) {
+        polygon
+    } else {
+        cut_off = cut(polygon, |at| normal.dot(at)).0;
+        &cut_off
+    };
     let edge = |k: usize| {
         let (a, b) = (above[k], above[(k + 1) % above.len()]);
         let cross = a.cross(b);
@@ -179,6 +193,10 @@ impl Viewpoint {
         let least = 1e-12 * of.diagonal();
         if -of.normal().dot(corners[0]) <= least || corners.iter().all(|corner| self.normal.dot(*corner) <= least) {
             return 0.0;
+        }
+        // Most of a room is not hidden, and needs no polygons of its own.
+        if self.shadows.iter().all(|shadow| shadow.spares(&corners)) {
+            return form_factor(&corners, self.normal);
         }
         let mut seen = vec![corners.to_vec()];
         let mut left = Vec::new();
