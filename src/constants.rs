@@ -101,7 +101,9 @@ constants! {
     HIT_SHADOW_RAY = 0;
     HIT_CAUSTIC_PHOTON = 1;
     HIT_GLOBAL_PHOTON = 2;
-    HIT_KINDS = 3;
+    /// Shadow rays to lights that the trial did not see from there.
+    HIT_HIDDEN_LIGHT = 3;
+    HIT_KINDS = 4;
 
     /// Bits of a visible point's arrivals: it lies behind a mirror or glass, or behind a gather ray; or neither, so that
     /// one of a pixel's samples looks the global map up for all (each looks caustics up for itself).

@@ -69,6 +69,7 @@ enum Question {
     // The checks of `common::lamps`: a room beside one whose lamp is so many times as strong, a lamp in so many squares a side.
     DimRoom(f32),
     HiddenLamp,
+    LampBehindHole,
     TinyPlates,
     VertexColours,
     ManyLamps(u32),
@@ -104,7 +105,7 @@ impl Question {
             Photons(_) | StripedCounters | RoomFilm(_) | Ledger(_) | ClosedForm(_) | Builders | StrictMath | Nearest | Pairs
             | FiniteBox => Subject::Room,
             AimedLight(_) => Subject::Aiming,
-            DimRoom(_) | ManyLamps(_) | MissedLamp | HiddenLamp => Subject::Lamps,
+            DimRoom(_) | ManyLamps(_) | MissedLamp | HiddenLamp | LampBehindHole => Subject::Lamps,
             _ => Subject::Scenes,
         }
     }
@@ -123,7 +124,7 @@ struct Fault {
 }
 
 #[rustfmt::skip]
-const FAULTS: [Fault; 83] = [
+const FAULTS: [Fault; 84] = [
     Fault { what: "what rounding takes from a pair of floats is forgotten",
         file: "film/float_u64.glsl", from: "precise float rest = sum.y + (", to: "precise float rest = 0.0 * (",
         kernels: &["gather_brute_u64", "gather_grid_u64"], noticed_by: &[(Pairs, SumsTooSmall)] },
@@ -411,6 +412,9 @@ const FAULTS: [Fault; 83] = [
     Fault { what: "a triangle has the vertex colour of its first corner",
         file: "material/surface.glsl", from: "at.a + hit.u * (at.b - at.a) + hit.v * (at.c - at.a);", to: "at.a;",
         kernels: &["view"], noticed_by: &[(VertexColours, WrongTexel)] },
+    Fault { what: "what stands before hidden lamps is forgotten",
+        file: "world/scene/direct.glsl", from: "stopped_hidden_light = asks_hidden ? stopped : stopped_hidden_light;", to: "",
+        kernels: &["receive"], noticed_by: &[(LampBehindHole, TooDark)] },
     Fault { what: "directions within two cones are weighed as if only one could have chosen them",
         file: "world/scene/aim.glsl", from: "k == chosen || versine_between(emission.direction, other.axis) <= other.versine",
         to: "k == chosen",
@@ -505,6 +509,7 @@ fn ask(gpu: &Gpu, question: Question) -> Check<Complaint> {
         DimRoom(ratio) => lamps::dim_room(gpu, ratio, true),
         HiddenLamp => lamps::hidden_lamp(gpu, 1e4, true),
         TinyPlates => known::tiny_plates(gpu),
+        LampBehindHole => crate::unknown::hidden_lamp(gpu),
         VertexColours => known::vertex_colours(gpu),
         ManyLamps(side) => lamps::many_lamps(gpu, side, true),
         MissedLamp => lamps::missed_lamp(gpu),

@@ -4,7 +4,7 @@ use crate::common::prelude::*;
 use glam::dvec3;
 use photonmill::engine::End;
 use photonmill::engine::room::film::{estimate_walls, irradiance_weights};
-use photonmill::engine::scene::RunResult;
+use photonmill::engine::scene::{RunResult, Target, render};
 use photonmill::settings::stop::Stop;
 
 /// Walls of a room over [-2, 2] x [-2, 2], as high as 3 m, that face inwards; and its ceiling but for a hole in the middle.
@@ -175,4 +175,48 @@ fn points_that_no_photon_has_reached_say_so_in_their_error() {
     let (stated, spread) = (most(&lit.film.stated_errors(&lit.plan)), most(&|point| lit.film.standard_error(point, &lit.plan)));
     println!("at most {stated:.1} stated errors off, {spread:.1} by the spread alone");
     assert!(stated < 5.0 && spread > 10.0, "{stated} and {spread}");
+}
+
+/// A lamp that is seen through a gap which every ray misses: another lamp lights the points, so that their spread is no error of it. The
+/// report says what it may add.
+pub fn hidden_lamp(gpu: &Gpu) -> Check<Complaint> {
+    // A black sheet 1 m above the floor with a hole of 1 cm, and a bright lamp above it.
+    let half = 0.005;
+    let piece = |x: [f64; 2], z: [f64; 2]| {
+        Mesh::parallelogram("sheet", DVec3::new(x[0], 1.0, z[0]), DVec3::Z * (z[1] - z[0]), DVec3::X * (x[1] - x[0]), 3)
+    };
+    let sheet = [
+        piece([-2.0, 2.0], [-2.0, -half]),
+        piece([-2.0, 2.0], [half, 2.0]),
+        piece([-2.0, -half], [-half, half]),
+        piece([half, 2.0], [-half, half]),
+    ];
+    let dim = Mesh::parallelogram("dim", DVec3::new(0.6, 0.5, 0.6), DVec3::X * 0.2, DVec3::Z * 0.2, 1);
+    let meshes = [vec![level(0.0, [4.0; 2], true, 0), level(2.0, [2.0; 2], false, 2), dim], sheet.to_vec()].concat();
+    let shining = |radiance: f32| Material { emission: Vec3::splat(radiance), ..matt(0.0) };
+    let scene = scene_of(meshes, vec![matt(0.5), shining(1.0), shining(1000.0), Material { two_sided: true, ..matt(0.0) }], vec![]);
+    let points: Vec<_> = (0..16).map(|k| (DVec3::new(f64::from(k % 4), 0.0, f64::from(k / 4)) * 0.1, DVec3::Y)).collect();
+    let lit = render(gpu, &scene, &SceneSettings { part: Part::Direct, ..SceneSettings::default() }, Target::Points(&points)).unwrap();
+    let unknown = lit.film.unknown(&lit.plan, 0.95);
+    // Of the hole below the lamp's middle: radiance times its area over the squared distance, both seen straight.
+    let missing = 1000.0 * 4.0 * half * half;
+    println!("{:?}, {missing} are missing", unknown.hidden);
+    let (found, error) = (lit.film.mean(0, &lit.plan).x, lit.film.stated_error(0, &lit.plan).x);
+    assert!(missing - found > 5.0 * error, "some ray has met it: look for a smaller hole");
+    let is_said = unknown.text("point", "W/m2", 0.95, 16).contains("hidden: ");
+    if unknown.hidden.upper_bound < missing || !is_said {
+        return Err(Complaint::new(Kind::TooDark, format!("{missing} W/m2 are missing, and {:?} is known", unknown.hidden)));
+    }
+    let open = Scene { meshes: scene.meshes[..3].to_vec(), ..scene };
+    let lit = render(gpu, &open, &SceneSettings { part: Part::Direct, ..SceneSettings::default() }, Target::Points(&points)).unwrap();
+    match lit.film.unknown(&lit.plan, 0.95).hidden.points {
+        0 => Ok(()),
+        points => Err(Complaint::new(Kind::TooDark, format!("lamps in full sight are hidden from {points} points"))),
+    }
+}
+
+#[test]
+fn lamps_that_no_ray_has_met_are_said_to_be_hidden() {
+    let Some(gpu) = device() else { return };
+    assert_holds("a lamp behind a hole", hidden_lamp(&gpu));
 }

@@ -27,7 +27,23 @@ pub struct Unknown {
     pub relative: f64,
     /// What reached no point at all, though some asked for it; its bounds count in `relative` too.
     pub absent: Vec<&'static str>,
+    pub hidden: Hidden,
 }
+
+/// Lights that neither the trial nor any ray of the run has seen from some points. Mostly walls hide them altogether, as lamps of
+/// another room; where they are seen through a gap, all rays may have missed it. No error counts them.
+#[derive(Debug, Clone, Default, PartialEq, Serialize)]
+pub struct Hidden {
+    /// From which they are not seen.
+    pub points: u64,
+    /// The most light that they may add to one of these, in the result's unit.
+    pub upper_bound: f64,
+    /// The most that they may add to all of these together, over all light of the result.
+    pub of_mean: f64,
+}
+
+/// Of the result's light, what hidden lights may add that is worth a line.
+const WORTH_A_LINE: f64 = 0.01;
 
 impl Unknown {
     /// Sets the relative error from the sums of squares of all bounds and of the result.
@@ -42,7 +58,7 @@ impl Unknown {
 
     /// A line each for points and kinds of light; `unit` is the result's.
     pub fn text(&self, point: &str, unit: &str, confidence: f64, rounds: u32) -> String {
-        let Unknown { asked, unreached, upper_bound, relative, absent } = self;
+        let Unknown { asked, unreached, upper_bound, relative, absent, hidden } = self;
         let sure = 100.0 * confidence;
         let mut text = String::new();
         if *unreached > 0 {
@@ -56,6 +72,13 @@ impl Unknown {
             text.push_str(&format!(
                 "unknown: no light has reached {unreached} of {} where some may arrive. Each of them has at most {upper_bound:.3e} {unit} ({sure} % confidence).{share}\n",
                 counted(asked, point)
+            ));
+        }
+        if hidden.of_mean > WORTH_A_LINE {
+            let Hidden { points, upper_bound, .. } = hidden;
+            text.push_str(&format!(
+                "hidden: something stands between {} and other lamps or the sky, as far as all shadow rays tell. If they are seen through a gap that all rays missed, they add at most {upper_bound:.3e} {unit} to one of these ({sure} % confidence). The noise bound does not include it.\n",
+                counted(points, point)
             ));
         }
         for kind in absent {

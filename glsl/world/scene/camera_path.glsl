@@ -49,6 +49,13 @@ void note_shadow_rays(uint pixel, vec3 weight)
     } else {
         note_miss(pixel, HIT_SHADOW_RAY, weight * stopped_light);
     }
+    if (LIGHT_CLUSTERS != 0) {
+        if (hidden_light_arrived) {
+            note_hit(pixel, HIT_HIDDEN_LIGHT);
+        } else {
+            note_miss(pixel, HIT_HIDDEN_LIGHT, weight * stopped_hidden_light);
+        }
+    }
 }
 
 // The arrivals at the current vertex that some part asks for by photons: shadow rays see to direct light, and a gather

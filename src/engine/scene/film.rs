@@ -4,16 +4,16 @@ use std::ops::Deref;
 
 use glam::DVec3;
 
-use crate::constants::{HIT_CAUSTIC_PHOTON, HIT_GLOBAL_PHOTON, HIT_KINDS, HIT_SHADOW_RAY, RADIUS_CLASSES};
+use crate::constants::{HIT_CAUSTIC_PHOTON, HIT_GLOBAL_PHOTON, HIT_HIDDEN_LIGHT, HIT_KINDS, HIT_SHADOW_RAY, RADIUS_CLASSES};
 use crate::engine::error_bound::FilmError;
 use crate::engine::film::RoundSums;
-use crate::engine::unknown::{Unknown, most_hits};
+use crate::engine::unknown::{Hidden, Unknown, most_hits};
 use crate::plan::buffers::ANOMALY_WORDS;
 use crate::plan::radius::mean_squared_radius;
 use crate::plan::scene::{MapPlan, ScenePlan};
 
-/// Names of the kinds of `HIT_...`.
-const KINDS: [&str; HIT_KINDS as usize] = ["shadow ray", "photon of the caustic map", "photon of the global map"];
+/// Names of the kinds of `HIT_...`, but for hidden lights.
+const KINDS: [&str; 3] = ["shadow ray", "photon of the caustic map", "photon of the global map"];
 /// In place of a bound: something has hit (`glsl/world/scene/one_hit.glsl`).
 const REACHED: u32 = u32::MAX;
 
@@ -102,7 +102,7 @@ impl SceneFilm {
     }
 
     fn kinds(&self, pixel: usize) -> &[u32] {
-        &self.one_hits[KINDS.len() * pixel..][..KINDS.len()]
+        &self.one_hits[HIT_KINDS as usize * pixel..][..KINDS.len()]
     }
 
     /// Whether a pixel asked for light and nothing has reached it: its spread of 0 is no error.
@@ -170,13 +170,25 @@ impl SceneFilm {
         }
     }
 
+    /// Lights that the trial has not seen from a pixel, and whose rays walls have stopped ever since.
+    fn hidden(&self, plan: &ScenePlan, confidence: f64) -> Hidden {
+        let of_pixel = |pixel: usize| self.one_hits[HIT_KINDS as usize * pixel + HIT_HIDDEN_LIGHT as usize];
+        let stopped = || (0..self.pixels()).map(of_pixel).filter(|bits| *bits != 0 && *bits != REACHED).map(f32::from_bits);
+        let most = most_hits(confidence) / f64::from(self.rounds.max(1)) * f64::from(stopped().fold(0.0, f32::max));
+        let result = self.means(plan).map(|mean| mean.max_element()).sum::<f64>();
+        // All of them together have as few hits as one.
+        let of_mean = if most > 0.0 { most / result } else { 0.0 };
+        Hidden { points: stopped().count() as u64, upper_bound: most, of_mean }
+    }
+
     /// Pixels, and kinds of light, of which no hit is all that is known.
     pub fn unknown(&self, plan: &ScenePlan, confidence: f64) -> Unknown {
         let scales = self.bound_scales(plan, confidence);
         let bound = |pixel: usize, kind: usize| self.most_light(pixel, kind, &scales);
         let pixels = || 0..self.pixels();
         let absent = self.absent();
-        let mut unknown = Unknown { absent: absent.iter().map(|kind| KINDS[*kind]).collect(), ..Unknown::default() };
+        let names = absent.iter().map(|kind| KINDS[*kind]).collect();
+        let mut unknown = Unknown { absent: names, hidden: self.hidden(plan, confidence), ..Unknown::default() };
         let (mut bounds, mut result, mut shadow_rays) = (0.0, 0.0, 0.0);
         for pixel in pixels() {
             result += self.mean(pixel, plan).length_squared();

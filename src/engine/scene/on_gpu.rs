@@ -149,7 +149,7 @@ impl<'a> World for SceneOnGpu<'a> {
         let anomalies = commands.copy_out(anomalies, ANOMALY_WORDS)?;
         let class_counts = commands.copy_out(class_counts, 2 * RADIUS_CLASSES as usize)?;
         commands.submit()?;
-        let mut stored = [0; HIT_KINDS as usize];
+        let mut stored = [0; 3];
         for (map, fates) in self.plan.maps().zip(&state.fates) {
             stored[if map.caustic_only { HIT_CAUSTIC_PHOTON } else { HIT_GLOBAL_PHOTON } as usize] = fates.ledger().stored;
         }
