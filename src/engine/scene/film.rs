@@ -175,7 +175,7 @@ impl SceneFilm {
         let of_pixel = |pixel: usize| self.one_hits[HIT_KINDS as usize * pixel + HIT_HIDDEN_LIGHT as usize];
         let stopped = || (0..self.pixels()).map(of_pixel).filter(|bits| *bits != 0 && *bits != REACHED).map(f32::from_bits);
         let most = most_hits(confidence) / f64::from(self.rounds.max(1)) * f64::from(stopped().fold(0.0, f32::max));
-        let result = self.means(plan).map(|mean| mean.max_element()).sum::<f64>();
+        let result = self.means(plan).map(DVec3::max_element).sum::<f64>();
         // All of them together have as few hits as one.
         let of_mean = if most > 0.0 { most / result } else { 0.0 };
         Hidden { points: stopped().count() as u64, upper_bound: most, of_mean }
