@@ -102,7 +102,7 @@ constants! {
     HIT_CAUSTIC_PHOTON = 1;
     HIT_GLOBAL_PHOTON = 2;
     /// Shadow rays to lights that the trial did not see from there.
-    HIT_HIDDEN_LIGHT = 3;
+    HIT_UNSEEN_LIGHT = 3;
     HIT_KINDS = 4;
 
     /// Bits of a visible point's arrivals: it lies behind a mirror or glass, or behind a gather ray; or neither, so that

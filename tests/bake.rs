@@ -485,7 +485,7 @@ fn zoo() -> Scene {
         let mut mesh = Mesh::parallelogram("a square", DVec3::X * (2 * place) as f64, DVec3::X, DVec3::Y, material);
         mesh.uvs[1] = [[0.25, 0.0], [0.75, 0.0], [0.75, 3.0], [0.25, 3.0]].map(DVec2::from).to_vec();
         if place == 1 {
-            mesh.colours = [Vec3::X, Vec3::Y, Vec3::Z, Vec3::ONE].to_vec();
+            mesh.colours = [DVec3::X, DVec3::Y, DVec3::Z, DVec3::ONE].to_vec();
         }
         mesh
     };

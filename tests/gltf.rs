@@ -369,7 +369,7 @@ fn vertex_colours_are_read() {
     value["meshes"][0]["primitives"][0]["attributes"]["COLOR_0"] = json!(colours);
     let scene = load(&value).unwrap();
     assert_eq!(scene.warnings, Vec::<String>::new());
-    assert_eq!(scene.meshes[0].colours, [Vec3::new(1.0, 0.0, 0.2), Vec3::Y, Vec3::Z, Vec3::ONE]);
+    assert_eq!(scene.meshes[0].colours, [DVec3::new(1.0, 0.0, 0.2f32.into()), DVec3::Y, DVec3::Z, DVec3::ONE]);
 
     let mut bright = value.clone();
     let colours = add_accessor(&mut bright, &floats(&[0.5, 0.5, 1.5].repeat(4)), 5126, 4, "VEC3");

@@ -379,7 +379,7 @@ fn textures_shade_lamps_and_walls() {
 fn vertex_colours_shade_walls() {
     let mut wall = scene_of(vec![square(0.0, 1.0, true, 0)], vec![material(Surface::Lambert, COLOUR)], vec![environment()]);
     // Dark at one side, where x is least.
-    wall.meshes[0].colours = wall.meshes[0].positions.iter().map(|at| Vec3::splat(at.x as f32 * 0.5 + 0.5)).collect();
+    wall.meshes[0].colours = wall.meshes[0].positions.iter().map(|at| DVec3::splat(at.x * 0.5 + 0.5)).collect();
     for (x, share) in [(-0.75, 0.125), (0.0, 0.5), (0.75, 0.875)] {
         let seen = radiance(&wall, DVec3::new(x, 0.3, 1.0), DVec3::new(x, 0.3, 0.0), 20);
         assert_meets("wall", seen.mean.total(), DVec3::splat(1e-6), share * COLOUR.as_dvec3() * SKY);

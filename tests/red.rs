@@ -413,7 +413,7 @@ const FAULTS: [Fault; 84] = [
         file: "material/surface.glsl", from: "at.a + hit.u * (at.b - at.a) + hit.v * (at.c - at.a);", to: "at.a;",
         kernels: &["view"], noticed_by: &[(VertexColours, WrongTexel)] },
     Fault { what: "what stands before hidden lamps is forgotten",
-        file: "world/scene/direct.glsl", from: "stopped_hidden_light = asks_hidden ? stopped : stopped_hidden_light;", to: "",
+        file: "world/scene/direct.glsl", from: "stopped_unseen_light = is_unseen ? stopped : stopped_unseen_light;", to: "",
         kernels: &["receive"], noticed_by: &[(LampBehindHole, TooDark)] },
     Fault { what: "directions within two cones are weighed as if only one could have chosen them",
         file: "world/scene/aim.glsl", from: "k == chosen || versine_between(emission.direction, other.axis) <= other.versine",

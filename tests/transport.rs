@@ -206,7 +206,7 @@ fn rich_scene() -> Scene {
     scene.textures.push(Texture { name: "tiles".into(), width: 2, height: 2, texels, wrap });
     let tiles = scene.materials.len() - 1;
     scene.meshes[2].material = tiles;
-    scene.meshes[3].colours = [0.0, 0.3, 0.6, 0.1].map(Vec3::splat).to_vec();
+    scene.meshes[3].colours = [0.0, 0.3, 0.6, 0.1].map(DVec3::splat).to_vec();
     // Coarse enough for its smooth normals to matter.
     let mirror = scene.meshes.iter_mut().find(|mesh| mesh.name == "mirror sphere").unwrap();
     *mirror = Mesh::sphere("mirror sphere", DVec3::new(0.3, 0.19, 0.34), 0.18, 10, mirror.material);

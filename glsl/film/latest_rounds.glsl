@@ -1,11 +1,17 @@
 // What each of the latest rounds left at some places of a film: how far the errors of places go together follows from it
-// (src/engine/degrees_of_freedom.rs). Twin of `kept_place` in src/engine/film.rs.
+// (src/engine/degrees_of_freedom.rs). Twin of src/plan/latest_rounds.rs.
 layout(set = 1, binding = 4, scalar) writeonly buffer LatestRounds { float latest_rounds[]; };
 
-// The number of a place among those that are kept, of every so many one at random; NONE: it is not kept.
+// One of so many places is kept.
+uint kept_step(uint place_count)
+{
+    return (place_count + KEPT_PLACES - 1) / KEPT_PLACES;
+}
+
+// The number of a place among those that are kept, which lie at random; NONE: it is not kept.
 uint kept_number(uint place, uint place_count)
 {
-    uint step = (place_count + KEPT_PLACES - 1) / KEPT_PLACES;
+    uint step = kept_step(place_count);
     uint number = place / step;
     return place == number * step + mix32(number) % step ? number : NONE;
 }
@@ -13,7 +19,7 @@ uint kept_number(uint place, uint place_count)
 // Where a round's values of kept places begin.
 uint first_of_round(uint round, uint place_count)
 {
-    uint step = (place_count + KEPT_PLACES - 1) / KEPT_PLACES;
+    uint step = kept_step(place_count);
     return round % KEPT_ROUNDS * ((place_count + step - 1) / step);
 }
 

@@ -1,5 +1,5 @@
 // Ends a round of the paper's box: what it left on the film joins the sums of all rounds, its square the sums of
-// squares, and the film is empty for the next round.
+// squares, and the film is empty for the next round. Of some points the sum itself is kept, for the latest rounds.
 // Dispatched by src/engine/room/estimate.rs once a round. One thread = one film sum.
 // Squares lie in two buffers, 64 bits each, so that none is larger than twice the film.
 #include "records.glsl"

@@ -51,7 +51,8 @@ float estimate_area(VisiblePoint point, uint pixel, uint cut, float radius)
         if (whole) {
             atomicAdd(anomalies[2], 1);
         }
-        // Photons were found, so some surface is there; rounding may call a sliver nothing.
+        // Photons were found, so some surface is there; rounding may call a sliver nothing. The least area is
+        // 200 of the units that gather/cover.glsl sums areas in.
         return max(covered, area * (1.0 / 262144.0));
     }
     return area;

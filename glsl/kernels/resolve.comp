@@ -1,5 +1,5 @@
 // Ends a round: what the paths of each pixel found and what their points were lit by is added up, and the film takes the
-// sum and its square.
+// sum and its square. Of some pixels the sum itself is kept, for the latest rounds.
 // Dispatched by src/engine/scene/estimate.rs once a round. One thread = one pixel or receiver.
 #include "records.glsl"
 

@@ -73,7 +73,7 @@ impl Geometry {
             attributes.insert("NORMAL".into(), json!(self.floats("VEC3", normals, mesh.normals.len())));
         }
         if !mesh.colours.is_empty() {
-            let colours = mesh.colours.iter().flat_map(Vec3::to_array);
+            let colours = mesh.colours.iter().flat_map(|colour| colour.as_vec3().to_array());
             attributes.insert("COLOR_0".into(), json!(self.floats("VEC3", colours, mesh.colours.len())));
         }
         let (sets, uv_sets) = texture_coordinates(mesh, lightmap, material);

@@ -72,7 +72,8 @@ fn radiance(scene: &Scene, lightmap: &MeshLightmap, map: &Map) -> Vec<Vec3> {
                 Some(used) => scene.textures[used.texture].sample(used.transform.apply(point.uv(&lightmap.mesh, used.uv_set))),
                 None => Vec3::ONE,
             };
-            base_colour * point.colour(&lightmap.mesh) * colour(base_colour_texture) * irradiance / PI + emission * colour(emission_texture)
+            base_colour * point.colour(&lightmap.mesh).as_vec3() * colour(base_colour_texture) * irradiance / PI
+                + emission * colour(emission_texture)
         });
         of_points.sum::<Vec3>() / texel.points.len() as f32
     });

@@ -3,7 +3,7 @@
 
 use std::collections::BTreeMap;
 
-use glam::{DVec2, DVec3, Vec3};
+use glam::{DVec2, DVec3};
 use rayon::prelude::*;
 
 use super::raster::{Lattice, Triangle};
@@ -139,11 +139,8 @@ impl SurfacePoint {
     }
 
     /// What multiplies the material's base colour.
-    pub fn colour(&self, mesh: &Mesh) -> Vec3 {
-        let [a, b, c] =
-            mesh.triangles[self.triangle as usize].map(|vertex| mesh.colours.get(vertex as usize).copied().unwrap_or(Vec3::ONE));
-        let [v, w] = self.weights;
-        a * (1.0 - v - w) + b * v + c * w
+    pub fn colour(&self, mesh: &Mesh) -> DVec3 {
+        if mesh.colours.is_empty() { DVec3::ONE } else { self.mix(mesh, &mesh.colours) }
     }
 
     pub fn sample(&self, mesh: &Mesh) -> TexelSample {

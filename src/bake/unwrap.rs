@@ -165,20 +165,18 @@ fn charts(mesh: &Mesh, texels_per_metre: f64) -> Result<Unwrapped, String> {
     let shrink = DVec2::new(f64::from(atlas.width) / f64::from(width), f64::from(atlas.height) / f64::from(height));
     let output = &atlas.meshes[0];
     let source = |vertex: &uvunwrap::OutputVertex| vertex.xref as usize;
+    let kept = |of_vertices: &[DVec3]| match of_vertices.is_empty() {
+        true => Vec::new(),
+        false => output.vertices.iter().map(|vertex| of_vertices[source(vertex)]).collect(),
+    };
     let of_set = |set: &Vec<DVec2>| if set.is_empty() { Vec::new() } else { output.vertices.iter().map(|v| set[source(v)]).collect() };
     Ok(Unwrapped {
         mesh: Mesh {
             name: mesh.name.clone(),
-            positions: output.vertices.iter().map(|vertex| mesh.positions[source(vertex)]).collect(),
-            normals: match mesh.normals.is_empty() {
-                true => Vec::new(),
-                false => output.vertices.iter().map(|vertex| mesh.normals[source(vertex)]).collect(),
-            },
+            positions: kept(&mesh.positions),
+            normals: kept(&mesh.normals),
             uvs: mesh.uvs.each_ref().map(of_set),
-            colours: match mesh.colours.is_empty() {
-                true => Vec::new(),
-                false => output.vertices.iter().map(|vertex| mesh.colours[source(vertex)]).collect(),
-            },
+            colours: kept(&mesh.colours),
             triangles: output.indices.chunks_exact(3).map(|corners| [corners[0], corners[1], corners[2]]).collect(),
             material: mesh.material,
         },

@@ -34,11 +34,11 @@ impl FilmError {
     }
 }
 
-/// The relative error that a mean has not more of, with this confidence, of its relative standard error: the root of a quantile of F
-/// (Fisher 1924), which with one degree of freedom of the error is Student's, of that error and one standard error of its own: runs
-/// that end at an error end sooner where it is found too small by chance. Infinite where nothing tells the error.
+/// Upper bound of a mean's relative error, with this confidence, from its relative standard error: that error times the root of a
+/// quantile of the F distribution (Fisher 1924). With one degree of freedom of the error the root is Student's quantile.
 ///
-/// It is of the noise, not of the radius's bias.
+/// The standard error is taken one standard error of its own larger, because runs that end at an error end sooner where it is too
+/// small by chance. The bound is infinite where nothing tells the error. The bias of the radius is not part of it.
 pub fn error_bound(relative_error: f64, freedom: DegreesOfFreedom, confidence: f64) -> f64 {
     if relative_error == 0.0 || relative_error.is_infinite() {
         return relative_error;

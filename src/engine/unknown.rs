@@ -77,7 +77,7 @@ impl Unknown {
         if hidden.of_mean > WORTH_A_LINE {
             let Hidden { points, upper_bound, .. } = hidden;
             text.push_str(&format!(
-                "hidden: something stands between {} and other lamps or the sky, as far as all shadow rays tell. If they are seen through a gap that all rays missed, they add at most {upper_bound:.3e} {unit} to one of these ({sure} % confidence). The noise bound does not include it.\n",
+                "hidden: from {} no shadow ray has met some lamp or the sky. Walls may hide it. If all rays missed a gap, it adds at most {upper_bound:.3e} {unit} to one of them ({sure} % confidence). The noise bound does not include this.\n",
                 counted(points, point)
             ));
         }

@@ -1,6 +1,6 @@
 //! Triangle meshes in world space.
 
-use glam::{DVec2, DVec3, Vec3};
+use glam::{DVec2, DVec3};
 use rayon::prelude::*;
 
 /// One primitive of one node: vertices, triangles, one material.
@@ -15,7 +15,7 @@ pub struct Mesh {
     /// Texture coordinates, one a vertex, of up to two sets; empty where there are none.
     pub uvs: [Vec<DVec2>; 2],
     /// Linear, one a vertex, each channel from 0 to 1; they multiply the material's base colour. Empty where there are none.
-    pub colours: Vec<Vec3>,
+    pub colours: Vec<DVec3>,
     /// Counter-clockwise from the front.
     pub triangles: Vec<[u32; 3]>,
     pub material: usize,

@@ -146,7 +146,7 @@ pub fn wrapped_texture(gpu: &Gpu, wrap: [Wrap; 2], is_transformed: bool) -> Chec
 
 /// Under a sky of 1 W/m2/sr a floor shows its own colour: that of its material times those of its corners, between which it is even.
 pub fn vertex_colours(gpu: &Gpu) -> Check<Complaint> {
-    let corners = [Vec3::X, Vec3::Y, Vec3::new(0.0, 0.5, 1.0), Vec3::ONE];
+    let corners = [DVec3::X, DVec3::Y, dvec3(0.0, 0.5, 1.0), DVec3::ONE];
     let floor = Mesh { colours: corners.to_vec(), ..level(0.0, [2.0; 2], true, 0) };
     let mut scene = scene_of(vec![floor], vec![matt(0.8)], vec![LightKind::Environment { radiance: Vec3::ONE }]);
     scene.meshes.push(level(-1.0, [1.0; 2], true, 0));
@@ -164,7 +164,7 @@ pub fn vertex_colours(gpu: &Gpu) -> Check<Complaint> {
             let [a, b, c] = triangle.map(|vertex| positions[vertex as usize]);
             let whole = (b - a).cross(c - a).y;
             let [v, w] = [(at - a).cross(c - a).y / whole, (b - a).cross(at - a).y / whole];
-            let [a, b, c] = triangle.map(|vertex| colours[vertex as usize].as_dvec3());
+            let [a, b, c] = triangle.map(|vertex| colours[vertex as usize]);
             (v >= 0.0 && w >= 0.0 && v + w <= 1.0).then(|| 0.8 * (a * (1.0 - v - w) + b * v + c * w))
         });
         let (found, expected) = (lit.film.mean(pixel as usize, &lit.plan), expected.expect("the floor fills the picture"));

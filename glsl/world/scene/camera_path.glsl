@@ -50,10 +50,10 @@ void note_shadow_rays(uint pixel, vec3 weight)
         note_miss(pixel, HIT_SHADOW_RAY, weight * stopped_light);
     }
     if (LIGHT_CLUSTERS != 0) {
-        if (hidden_light_arrived) {
-            note_hit(pixel, HIT_HIDDEN_LIGHT);
+        if (unseen_light_arrived && !is_reached(pixel, HIT_UNSEEN_LIGHT)) {
+            note_hit(pixel, HIT_UNSEEN_LIGHT);
         } else {
-            note_miss(pixel, HIT_HIDDEN_LIGHT, weight * stopped_hidden_light);
+            note_miss(pixel, HIT_UNSEEN_LIGHT, weight * stopped_unseen_light);
         }
     }
 }

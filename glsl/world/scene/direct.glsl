@@ -41,8 +41,8 @@ ShadowRay cast_shadow_ray(Target point, Arriving arriving, Draws draws, uint ind
 vec3 stopped_light = vec3(0.0);
 bool light_arrived = false;
 // The same of the lights that a trial has not seen from round about.
-vec3 stopped_hidden_light = vec3(0.0);
-bool hidden_light_arrived = false;
+vec3 stopped_unseen_light = vec3(0.0);
+bool unseen_light_arrived = false;
 
 // One sample in so many casts a ray more, to the lights that a trial has not seen from round about.
 const uint SAMPLES_PER_UNSEEN = 4;
@@ -54,8 +54,8 @@ vec3 direct_light(Target point, uint emitter_count, Draws draws, uint index, uin
     vec3 sum = vec3(0.0);
     stopped_light = vec3(0.0);
     light_arrived = false;
-    stopped_hidden_light = vec3(0.0);
-    hidden_light_arrived = false;
+    stopped_unseen_light = vec3(0.0);
+    unseen_light_arrived = false;
     if (emitter_count == 0) {
         return sum;
     }
@@ -87,16 +87,16 @@ vec3 direct_light(Target point, uint emitter_count, Draws draws, uint index, uin
         }
         ShadowRay found = cast_shadow_ray(point, sample_light(light, point.position, point.ns, u.xy), draws, index);
         if (found.is_asked) {
-            bool asks_hidden = ray == SHADOW_RAYS;
+            bool is_unseen = ray == SHADOW_RAYS;
             if (!found.is_hidden) {
                 sum += count * found.light;
                 light_arrived = true;
-                hidden_light_arrived = hidden_light_arrived || asks_hidden;
+                unseen_light_arrived = unseen_light_arrived || is_unseen;
             } else {
                 bool is_certain = light.kind == EMITTER_POINT || light.kind == EMITTER_SPOT || light.kind == EMITTER_DIRECTIONAL;
                 vec3 stopped = is_certain ? vec3(0.0) : divide(count * found.light, float(SHADOW_RAYS));
                 stopped_light = max(stopped_light, stopped);
-                stopped_hidden_light = asks_hidden ? stopped : stopped_hidden_light;
+                stopped_unseen_light = is_unseen ? stopped : stopped_unseen_light;
             }
         }
     }

@@ -4,7 +4,7 @@ use std::ops::Deref;
 
 use glam::DVec3;
 
-use crate::constants::{HIT_CAUSTIC_PHOTON, HIT_GLOBAL_PHOTON, HIT_HIDDEN_LIGHT, HIT_KINDS, HIT_SHADOW_RAY, RADIUS_CLASSES};
+use crate::constants::{HIT_CAUSTIC_PHOTON, HIT_GLOBAL_PHOTON, HIT_KINDS, HIT_SHADOW_RAY, HIT_UNSEEN_LIGHT, RADIUS_CLASSES};
 use crate::engine::error_bound::FilmError;
 use crate::engine::film::RoundSums;
 use crate::engine::unknown::{Hidden, Unknown, most_hits};
@@ -31,7 +31,7 @@ pub struct SceneFilm {
     pub anomalies: [u32; ANOMALY_WORDS],
     /// Visible points of each class of radii in the first round: of the global map, then of the caustic map.
     pub class_counts: Vec<u32>,
-    /// Photons stored anywhere in the scene, by kind of light.
+    /// Photons stored anywhere in the scene, by kind of light; 0 for shadow rays.
     pub stored: [u64; KINDS.len()],
 }
 
@@ -170,9 +170,9 @@ impl SceneFilm {
         }
     }
 
-    /// Lights that the trial has not seen from a pixel, and whose rays walls have stopped ever since.
+    /// Lights that the trial has not seen from a pixel, and towards which surfaces have stopped every ray since.
     fn hidden(&self, plan: &ScenePlan, confidence: f64) -> Hidden {
-        let of_pixel = |pixel: usize| self.one_hits[HIT_KINDS as usize * pixel + HIT_HIDDEN_LIGHT as usize];
+        let of_pixel = |pixel: usize| self.one_hits[HIT_KINDS as usize * pixel + HIT_UNSEEN_LIGHT as usize];
         let stopped = || (0..self.pixels()).map(of_pixel).filter(|bits| *bits != 0 && *bits != REACHED).map(f32::from_bits);
         let most = most_hits(confidence) / f64::from(self.rounds.max(1)) * f64::from(stopped().fold(0.0, f32::max));
         let result = self.means(plan).map(DVec3::max_element).sum::<f64>();

@@ -289,7 +289,7 @@ fn corner_normals(mesh: &Mesh, triangle: usize, part: Option<&[DVec3; 3]>) -> Tr
 }
 
 fn corner_colours(mesh: &Mesh, triangle: usize, part: Option<&[DVec3; 3]>) -> TriangleColours {
-    let colour = |vertex: u32| mesh.colours.get(vertex as usize).map_or(DVec3::ONE, |colour| colour.as_dvec3());
+    let colour = |vertex: u32| mesh.colours.get(vertex as usize).copied().unwrap_or(DVec3::ONE);
     let [a, b, c] = at_corners(mesh.triangles[triangle].map(colour), part).map(DVec3::as_vec3);
     TriangleColours { a, b, c }
 }

@@ -137,12 +137,12 @@ impl Loader {
             of_vertices(&own, "vertex colours")?;
             // Alpha is no part of the base colour.
             colours = match own.dimensions() {
-                Dimensions::Vec3 => accessor::read(self, &own, &vertices, &what, |[r, g, b]: [f32; 3]| Vec3::new(r, g, b))?,
-                _ => accessor::read(self, &own, &vertices, &what, |[r, g, b, _]: [f32; 4]| Vec3::new(r, g, b))?,
+                Dimensions::Vec3 => accessor::read(self, &own, &vertices, &what, vector)?,
+                _ => accessor::read(self, &own, &vertices, &what, |[r, g, b, _]: [f32; 4]| vector([r, g, b]))?,
             };
             if let Some(colour) = colours.iter().find(|colour| colour.min_element() < 0.0 || colour.max_element() > 1.0) {
-                let Vec3 { x, y, z } = *colour;
-                return Err(self.refuse(&what, format!("has the vertex colour {x} {y} {z}; each channel must be from 0 to 1")));
+                let [red, green, blue] = colour.as_vec3().to_array();
+                return Err(self.refuse(&what, format!("has the vertex colour {red} {green} {blue}; each channel must be from 0 to 1")));
             }
         }
         let indices = indices.unwrap_or_else(|| (0..positions.len() as u32).collect());

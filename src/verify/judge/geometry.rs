@@ -237,7 +237,7 @@ fn vertex_colour(triangle: &Triangle, weights: DVec3) -> DVec3 {
     if colours.is_empty() {
         return DVec3::ONE;
     }
-    mix(triangle.vertices.map(|vertex| colours[vertex].as_dvec3()), triangle.of_vertices(weights))
+    mix(triangle.vertices.map(|vertex| colours[vertex]), triangle.of_vertices(weights))
 }
 
 /// On the side of `ng`; `ng` itself where there is no other, or where it would be seen from below.
