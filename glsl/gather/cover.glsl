@@ -94,52 +94,59 @@ bool may_cover(Cover cover, uint plane, vec3 side, float height)
     return cosine >= RECEIVER_NORMAL_COSINE && abs(height) <= cover.radius * (sine + 1.0 / 1024.0);
 }
 
-const uint MOST_CORNERS = 3 + CUT_LINES;
+const uint MOST_EDGES = 3 + CUT_LINES;
 
-// A triangle, and what lines leave of it.
+// A triangle, and what lines leave of it. Each edge has a place of its own, those of the triangle first: no index depends on what
+// is cut, which takes compilers long to make code of. An edge that is gone has no length.
 struct Polygon {
-    uint count;
-    vec2 corners[MOST_CORNERS];
+    vec2 from[MOST_EDGES];
+    vec2 to[MOST_EDGES];
 };
+
+Polygon as_polygon(vec2 a, vec2 b, vec2 c)
+{
+    vec2 none = vec2(0.0);
+    return Polygon(vec2[](a, b, c, none, none, none), vec2[](b, c, a, none, none, none));
+}
 
 vec2 flat_place(vec3 way, vec3 x, vec3 y, float unit)
 {
     return divide(vec2(dot(way, x), dot(way, y)), unit);
 }
 
-// Keeps the part whose product with `normal` is at most `most` (Sutherland and Hodgman 1974). Loops over corners are unrolled: the
-// triangles of a fine mesh are as many as a device's loops may turn.
-void cut_off(inout Polygon polygon, vec2 normal, float most)
+// Keeps the part whose product with `normal` is at most `most` (Sutherland and Hodgman 1974) of a polygon of so many edges; one more
+// leads along the line. Loops over edges are unrolled: the triangles of a fine mesh are as many as a device's loops may turn.
+void cut_off(inout Polygon polygon, uint edges, vec2 normal, float most)
 {
-    vec2 kept[MOST_CORNERS];
-    uint kept_count = 0;
-    [[unroll]] for (uint k = 0; k < MOST_CORNERS; k++) {
-        if (k < polygon.count) {
-            vec2 from = polygon.corners[k], to = polygon.corners[k + 1 < polygon.count ? k + 1 : 0];
-            float from_beyond = dot(from, normal) - most, to_beyond = dot(to, normal) - most;
+    vec2 leaves = vec2(0.0), returns = vec2(0.0);
+    [[unroll]] for (uint k = 0; k < edges; k++) {
+        vec2 from = polygon.from[k], to = polygon.to[k];
+        float from_beyond = dot(from, normal) - most, to_beyond = dot(to, normal) - most;
+        if ((from_beyond <= 0.0) != (to_beyond <= 0.0)) {
+            vec2 crossing = from + (to - from) * divide(from_beyond, from_beyond - to_beyond);
             if (from_beyond <= 0.0) {
-                kept[kept_count++] = from;
+                leaves = crossing;
+                polygon.to[k] = crossing;
+            } else {
+                returns = crossing;
+                polygon.from[k] = crossing;
             }
-            if ((from_beyond <= 0.0) != (to_beyond <= 0.0)) {
-                kept[kept_count++] = from + (to - from) * divide(from_beyond, from_beyond - to_beyond);
-            }
+        } else if (from_beyond > 0.0) {
+            polygon.to[k] = from;
         }
     }
-    // One by one: Mesa 22.3 loses the copy of the whole array.
-    [[unroll]] for (uint k = 0; k < MOST_CORNERS; k++) {
-        polygon.corners[k] = kept[k];
-    }
-    polygon.count = kept_count;
+    polygon.from[edges] = leaves;
+    polygon.to[edges] = returns;
 }
 
-// Keeps what no line cuts off of a polygon in the plane of x and y, in units of `unit`; `rise` leads from its origin to the place that
+// Keeps what no line cuts off of a triangle in the plane of x and y, in units of `unit`; `rise` leads from its origin to the place that
 // the lines belong to.
 void cut_off_walls(inout Polygon polygon, Cuts cuts, vec3 x, vec3 y, float unit, vec3 rise)
 {
     [[unroll]] for (uint k = 0; k < CUT_LINES; k++) {
         vec4 line = cuts.lines[k];
         if (line.w < cuts.reach) {
-            cut_off(polygon, vec2(dot(line.xyz, x), dot(line.xyz, y)) * unit, line.w + dot(line.xyz, rise));
+            cut_off(polygon, 3 + k, vec2(dot(line.xyz, x), dot(line.xyz, y)) * unit, line.w + dot(line.xyz, rise));
         }
     }
 }
@@ -147,14 +154,14 @@ void cut_off_walls(inout Polygon polygon, Cuts cuts, vec3 x, vec3 y, float unit,
 // Integral of the kernel over a convex polygon, within the unit disc. Says how far the middle lies at least to the left of its edges.
 float kernel_over(Polygon polygon, out float left)
 {
-    bool enters = false;
+    bool enters = false, is_empty = true;
     float sum = 0.0;
-    left = polygon.count == 0 ? -1.0 : 1.0;
-    [[unroll]] for (uint k = 0; k < MOST_CORNERS; k++) {
-        if (k < polygon.count) {
-            sum += kernel_over_edge(polygon.corners[k], polygon.corners[k + 1 < polygon.count ? k + 1 : 0], enters, left);
-        }
+    left = 1.0;
+    [[unroll]] for (uint k = 0; k < MOST_EDGES; k++) {
+        is_empty = is_empty && polygon.from[k] == polygon.to[k];
+        sum += kernel_over_edge(polygon.from[k], polygon.to[k], enters, left);
     }
+    left = is_empty ? -1.0 : left;
     // No edge in the disc: all of it or nothing, not the rounding of sectors that cancel.
     if (!enters) {
         return left > 0.0 ? 3.14159265358979324 * kernel_norm() : 0.0;
@@ -192,8 +199,8 @@ void cover_triangle(inout Cover cover, uint index)
     vec3 centre = cover.position - height * front;
     vec3 x = normalize(triangle.b - triangle.a);
     vec3 y = cross(front, x);
-    Polygon part = Polygon(3, vec2[](flat_place(triangle.a - centre, x, y, disc), flat_place(triangle.b - centre, x, y, disc),
-                                     flat_place(triangle.c - centre, x, y, disc), vec2(0.0), vec2(0.0), vec2(0.0)));
+    Polygon part = as_polygon(flat_place(triangle.a - centre, x, y, disc), flat_place(triangle.b - centre, x, y, disc),
+                              flat_place(triangle.c - centre, x, y, disc));
     cut_off_walls(part, cover.cuts, x, y, disc, height * front);
     float left;
     float whole = kernel_over(part, left);
@@ -249,7 +256,7 @@ float covered_area(vec3 position, uint plane, float radius, Cuts cuts, out bool 
     whole = cover_triangles(cover);
     if (whole) {
         // A triangle around the disc.
-        Polygon part = Polygon(3, vec2[](vec2(4.0, 0.0), vec2(-4.0, 6.0), vec2(-4.0, -6.0), vec2(0.0), vec2(0.0), vec2(0.0)));
+        Polygon part = as_polygon(vec2(4.0, 0.0), vec2(-4.0, 6.0), vec2(-4.0, -6.0));
         cut_off_walls(part, cuts, to_frame(vec3(1.0, 0.0, 0.0), cover.normal), to_frame(vec3(0.0, 1.0, 0.0), cover.normal), radius, vec3(0.0));
         float left;
         return kernel_over(part, left) * radius * radius;
