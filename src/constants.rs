@@ -103,7 +103,10 @@ constants! {
     HIT_GLOBAL_PHOTON = 2;
     /// Shadow rays to lights that the trial did not see from there.
     HIT_UNSEEN_LIGHT = 3;
-    HIT_KINDS = 4;
+    /// Photons of the global map that together carry at least the inverse of `DIM_PHOTONS` of what the brightest may carry.
+    HIT_BRIGHT_PHOTON = 4;
+    HIT_KINDS = 5;
+    DIM_PHOTONS = 16;
 
     /// Bits of a visible point's arrivals: it lies behind a mirror or glass, or behind a gather ray; or neither, so that
     /// one of a pixel's samples looks the global map up for all (each looks caustics up for itself).

@@ -220,3 +220,57 @@ fn lamps_that_no_ray_has_met_are_said_to_be_hidden() {
     let Some(gpu) = device() else { return };
     assert_holds("a lamp behind a hole", hidden_lamp(&gpu));
 }
+
+/// A box that stands in the middle of the floor of a furnace of 2 m, points of its sides, and what they receive.
+fn box_in_a_furnace(gpu: &Gpu, width: f64) -> Result<RunResult, Error> {
+    let cube = |corner: DVec3, size: f64, faces_in: bool| {
+        let [x, y, z] = [DVec3::X * size, DVec3::Y * size, DVec3::Z * size];
+        let far = corner + size;
+        [(corner, z, x), (far, -x, -z), (corner, x, y), (far, -y, -x), (corner, y, z), (far, -z, -y)].map(|(origin, u, v)| {
+            let (u, v) = if faces_in { (u, v) } else { (v, u) };
+            Mesh::parallelogram("side", origin, u, v, 0)
+        })
+    };
+    let corner = dvec3(1.0 - 0.5 * width, 0.0, 1.0 - 0.5 * width);
+    let glowing = Material { emission: Vec3::splat(0.5), ..matt(0.5) };
+    let scene = scene_of([cube(DVec3::ZERO, 2.0, true), cube(corner, width, false)].concat(), vec![glowing], vec![]);
+    let heights = [0.25, 0.5, 0.75].into_iter();
+    let points: Vec<_> = heights
+        .flat_map(|height| {
+            let at = dvec3(1.0, height * width, 1.0);
+            [DVec3::X, DVec3::NEG_X, DVec3::Z, DVec3::NEG_Z].map(|normal| (at + 0.5 * width * normal, normal))
+        })
+        .collect();
+    render(gpu, &scene, &SceneSettings::default(), Target::Points(&points))
+}
+
+/// A box so small that next to no photon of the walls meets it, and many of its own do, each of which carries little: their spread is no
+/// error of the light that is missing. The report says that brighter photons may be missing, and how much they may add.
+pub fn dim_photons(gpu: &Gpu) -> Check<Complaint> {
+    let lit = box_in_a_furnace(gpu, 0.002)?;
+    let missing = |point: usize| PI - lit.film.mean(point, &lit.plan).x;
+    let is_silent = |point: &usize| missing(*point) > 5.0 * lit.film.stated_error(*point, &lit.plan).x;
+    let silent: Vec<usize> = (0..lit.film.pixels()).filter(is_silent).collect();
+    let most = silent.iter().map(|point| missing(*point)).fold(0.0, f64::max);
+    let unknown = lit.film.unknown(&lit.plan, 0.95);
+    println!("{} of 12 points lack up to {most} W/m2 without an error of it: {:?}", silent.len(), unknown.dim);
+    assert!(silent.len() > 4, "bright photons have met the box: look for a smaller one");
+    let is_said = unknown.text("point", "W/m2", 0.95, 16).contains("dim: ");
+    if unknown.dim.points < silent.len() as u64 || unknown.dim.upper_bound < most || !is_said {
+        return Err(Complaint::new(
+            Kind::TooDark,
+            format!("{} points lack up to {most} W/m2, and {:?} is known", silent.len(), unknown.dim),
+        ));
+    }
+    let lit = box_in_a_furnace(gpu, 0.4)?;
+    match lit.film.unknown(&lit.plan, 0.95).dim.points {
+        0 => Ok(()),
+        points => Err(Complaint::new(Kind::TooDark, format!("{points} points among bright photons have met none of them"))),
+    }
+}
+
+#[test]
+fn points_that_only_dim_photons_have_met_are_said_to_be_so() {
+    let Some(gpu) = device() else { return };
+    assert_holds("a tiny box in a furnace", dim_photons(&gpu));
+}
