@@ -274,3 +274,31 @@ fn points_that_only_dim_photons_have_met_are_said_to_be_so() {
     let Some(gpu) = device() else { return };
     assert_holds("a tiny box in a furnace", dim_photons(&gpu));
 }
+
+/// Photons that are aimed at a window are dim; those that the ground scatters into it are bright and rare. Without them a room is too dark
+/// for its error, and the report says so.
+#[test]
+fn light_that_the_ground_scatters_into_a_room_is_said_to_be_missing() {
+    let Some(gpu) = device() else { return };
+    let mut meshes = room_without_floor(0.0);
+    let pane = |y: [f64; 2], z: [f64; 2]| {
+        Mesh::parallelogram("right", dvec3(2.0, y[0], z[0]), (z[1] - z[0]) * DVec3::Z, (y[1] - y[0]) * DVec3::Y, 0)
+    };
+    let sides = [[-2.0, -0.5], [0.5, 2.0]].map(|z| pane([1.0, 2.0], z));
+    meshes.splice(3..4, [pane([0.0, 1.0], [-2.0, 2.0]), pane([2.0, 3.0], [-2.0, 2.0])].into_iter().chain(sides));
+    meshes.extend([level(0.0, [4.0; 2], true, 0), level(-0.01, [100.0; 2], true, 0)]);
+    let scene = scene_of(meshes, vec![matt(0.5)], vec![LightKind::Environment { radiance: Vec3::ONE }]);
+    let both = |(x, z): (f64, f64)| [(dvec3(x, 3.0, z), DVec3::NEG_Y), (dvec3(x, 0.0, z), DVec3::Y)];
+    let points: Vec<_> = (0..9).flat_map(|k| both((f64::from(k / 3) - 1.5, f64::from(k % 3) - 1.0))).collect();
+    let lit = render(&gpu, &scene, &SceneSettings { part: Part::Indirect, ..SceneSettings::default() }, Target::Points(&points)).unwrap();
+    let truth = Judge::new(&scene, 16).irradiance_at(&points, 40_000, 1);
+    let found: f64 = (0..points.len()).map(|point| red(&lit, point).0).sum();
+    let missing = truth.iter().map(|point| point.mean.indirect.x).sum::<f64>() - found;
+    let errors: f64 =
+        (0..points.len()).map(|point| lit.film.stated_error(point, &lit.plan).x + truth[point].standard_error.indirect.x).sum();
+    let dim = lit.film.unknown(&lit.plan, 0.95).dim;
+    println!("{missing:.4} is missing beside {found:.4} +- {errors:.4}: {dim:?}");
+    // Though all errors are taken to go the same way.
+    assert!(missing > 1.5 * errors, "light of the ground has been found: the test needs a larger one");
+    assert!(dim.points == points.len() as u64 && dim.of_mean > missing / found, "{missing} of {found} is missing, and {dim:?} is known");
+}

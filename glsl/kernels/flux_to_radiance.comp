@@ -58,7 +58,7 @@ float estimate_area(VisiblePoint point, uint pixel, uint cut, float radius)
     return area;
 }
 
-// The brightest photon of the global map carries 1.
+// The brightest photon of the global map carries 1. Caustics are left out: they are local, so that most points lack those of some lamp.
 void note_brightness(uint pixel, vec3 flux, vec3 one_photon)
 {
     if (max(flux.x, max(flux.y, flux.z)) * float(DIM_PHOTONS) >= 1.0) {

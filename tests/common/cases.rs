@@ -102,7 +102,7 @@ pub const CASES: [Case; 120] = [
     Case { number: "E18", failure: "A surface that is tiny beside the radius", shown: Tests(&["what_is_tiny_beside_the_radius_is_as_light_as_all_of_the_furnace"]) },
     Case { number: "E19", failure: "Error bars of few photons, none of which had the colour that is missing", shown: Tests(&["few_hits_say_little_of_colours_that_they_lack"]) },
     Case { number: "E20", failure: "A lamp seen through a gap that every ray misses, where another lamp lights the place", shown: Tests(&["lamps_that_no_ray_has_met_are_said_to_be_hidden"]) },
-    Case { number: "E21", failure: "A place that many dim photons reach and bright ones almost never", shown: Tests(&["points_that_only_dim_photons_have_met_are_said_to_be_so"]) },
+    Case { number: "E21", failure: "A place that many dim photons reach and bright ones almost never", shown: Tests(&["points_that_only_dim_photons_have_met_are_said_to_be_so", "light_that_the_ground_scatters_into_a_room_is_said_to_be_missing"]) },
     Case { number: "B1", failure: "A power of a negative cosine", shown: Tests(&["phong_weights_have_their_mean_and_vanish_behind", "a_sun_in_a_plate_is_a_power_of_the_cosine"]) },
     Case { number: "B2", failure: "An exponent of 0: pow(0, 0)", shown: Tests(&["phong_weights_have_their_mean_and_vanish_behind"]) },
     Case { number: "B3", failure: "Weights that grow with the exponent", shown: Tests(&["phong_weights_have_their_mean_and_vanish_behind"]) },
