@@ -286,6 +286,8 @@ struct Emitter {
     // Radiance, radiant intensity or irradiance, as its kind has it; of a uniform disc the
     // intensity of a unit of area.
     vec3 strength;
+    // Of a triangle the weights of its second and third corner where the piece that shines begins, and the piece's width over the
+    // triangle's (`scene::geometry::lamp_pieces`).
     vec3 position;
     // Its axis or normal; a directional light's flight.
     vec3 direction;

@@ -2,7 +2,8 @@
 
 use crate::common::chi_square::counts_check;
 use crate::common::lamps::{
-    ROOM, cut_lamp, dark_room, dim_room, hidden_lamp, lit, many_lamps, missed_lamp, points, rooms, same_light_and_noise, scattered_light,
+    ROOM, bright_spot, cut_lamp, dark_room, dim_room, hidden_lamp, lit, many_lamps, missed_lamp, points, rooms, same_light_and_noise,
+    scattered_light,
 };
 use crate::common::planted;
 use crate::common::prelude::*;
@@ -37,6 +38,16 @@ fn a_lamp_that_lights_what_lights_the_points_has_photons_too() {
     let Some(gpu) = device() else { return };
     assert_holds("a screened lamp", hidden_lamp(&gpu, 1e4, true));
     assert_complains("photons by power", hidden_lamp(&gpu, 1e4, false));
+}
+
+#[test]
+fn a_small_bright_spot_of_a_textured_lamp_is_found() {
+    let Some(gpu) = device() else { return };
+    for wrap in [Wrap::Repeat, Wrap::MirroredRepeat, Wrap::Clamp] {
+        for illumination in [Illumination::Split, Illumination::Photons] {
+            assert_holds("a bright spot", bright_spot(&gpu, wrap, illumination));
+        }
+    }
 }
 
 /// Photons that choose lights otherwise bring the same light: within a radius that is given, nothing else differs.

@@ -110,7 +110,7 @@ fn a_lamp_that_is_given_twice_shines_once() {
             // A turned room is another size.
             let size = Geometry::new(&turned(is_turned, room(), &[]).0).unwrap().power / power;
             assert!((geometry.power / power / size - 1.0).abs() < 1e-5, "{} instead of {power}", geometry.power);
-            let [warning] = &geometry.overlap_warnings(&scene)[..] else { panic!("{:?}", geometry.overlap_warnings(&scene)) };
+            let [warning] = &geometry.warnings(&scene)[..] else { panic!("{:?}", geometry.warnings(&scene)) };
             assert!(warning.contains("\"lamp\"") && warning.contains("\"lamp.001\""), "{warning}");
             let found = irradiance(&gpu, &scene, &SceneSettings { seed: 99, ..settings.clone() }, &points);
             for ((found, error), (expected, other)) in found.iter().zip(&expected) {

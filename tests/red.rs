@@ -67,6 +67,7 @@ enum Question {
     /// With so many samples a pixel, and with a final gather or not.
     GlassInFurnace(u32, bool),
     // The checks of `common::lamps`: a room beside one whose lamp is so many times as strong, a lamp in so many squares a side.
+    BrightSpot,
     DimRoom(f32),
     HiddenLamp,
     LampBehindHole,
@@ -106,7 +107,7 @@ impl Question {
             Photons(_) | StripedCounters | RoomFilm(_) | Ledger(_) | ClosedForm(_) | Builders | StrictMath | Nearest | Pairs
             | FiniteBox => Subject::Room,
             AimedLight(_) => Subject::Aiming,
-            DimRoom(_) | ManyLamps(_) | MissedLamp | HiddenLamp | LampBehindHole | DimPhotons => Subject::Lamps,
+            BrightSpot | DimRoom(_) | ManyLamps(_) | MissedLamp | HiddenLamp | LampBehindHole | DimPhotons => Subject::Lamps,
             _ => Subject::Scenes,
         }
     }
@@ -125,7 +126,7 @@ struct Fault {
 }
 
 #[rustfmt::skip]
-const FAULTS: [Fault; 85] = [
+const FAULTS: [Fault; 86] = [
     Fault { what: "what rounding takes from a pair of floats is forgotten",
         file: "film/float_u64.glsl", from: "precise float rest = sum.y + (", to: "precise float rest = 0.0 * (",
         kernels: &["gather_brute_u64", "gather_grid_u64"], noticed_by: &[(Pairs, SumsTooSmall)] },
@@ -401,6 +402,9 @@ const FAULTS: [Fault; 85] = [
     Fault { what: "rays to lights that the trial has not seen count once, though one place in four casts them",
         file: "world/scene/direct.glsl", from: "count = float(SAMPLES_PER_UNSEEN * SHADOW_RAYS);", to: "count = float(SHADOW_RAYS);",
         kernels: &["receive"], noticed_by: &[(MissedLamp, TooDark)] },
+    Fault { what: "shadow rays to a part of a textured lamp go to all of it",
+        file: "world/scene/lights.glsl", from: "return light.position.xy + light.position.z * at;", to: "return at;",
+        kernels: &["receive"], noticed_by: &[(BrightSpot, TooDark)] },
     Fault { what: "a trial sees lights through walls",
         file: "kernels/try_lights.comp", from: "&& !shadow_ray.is_hidden && added > 0.0", to: "&& added > 0.0",
         kernels: &["try_lights"], noticed_by: &[(DimRoom(1e3), TooNoisy)] },
@@ -510,6 +514,7 @@ fn ask(gpu: &Gpu, question: Question) -> Check<Complaint> {
         RoomBesideHall => known::room_beside_a_hall(gpu, true),
         BehindWall => known::behind_a_wall(gpu, known::sheet(), Some(0.1)),
         BesideBox => known::beside_a_box(gpu, Some(0.1)),
+        BrightSpot => lamps::bright_spot(gpu, Wrap::Repeat, Illumination::Split),
         DimRoom(ratio) => lamps::dim_room(gpu, ratio, true),
         HiddenLamp => lamps::hidden_lamp(gpu, 1e4, true),
         TinyPlates => known::tiny_plates(gpu),

@@ -298,7 +298,7 @@ fn light_that_the_ground_scatters_into_a_room_is_said_to_be_missing() {
         (0..points.len()).map(|point| lit.film.stated_error(point, &lit.plan).x + truth[point].standard_error.indirect.x).sum();
     let dim = lit.film.unknown(&lit.plan, 0.95).dim;
     println!("{missing:.4} is missing beside {found:.4} +- {errors:.4}: {dim:?}");
-    // Though all errors are taken to go the same way.
-    assert!(missing > 1.5 * errors, "light of the ground has been found: the test needs a larger one");
+    // Even if all errors went the same way.
+    assert!(missing > errors, "light of the ground has been found: the test needs a larger one");
     assert!(dim.points == points.len() as u64 && dim.of_mean > missing / found, "{missing} of {found} is missing, and {dim:?} is known");
 }

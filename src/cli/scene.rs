@@ -240,7 +240,7 @@ pub(super) fn geometry(scene: &Scene, settings: &SceneSettings, reporter: &Progr
         let count = counted(geometry.left_out, "triangle");
         complain(&format!("warning: {count} without area in single precision, or on others, left out"));
     }
-    geometry.overlap_warnings(scene).iter().for_each(|line| complain(&format!("warning: {line}")));
+    geometry.warnings(scene).iter().for_each(|line| complain(&format!("warning: {line}")));
     Ok(geometry)
 }
 

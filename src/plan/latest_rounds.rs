@@ -27,6 +27,8 @@ pub fn kept_values(places: usize, rounds: u32) -> usize {
 
 #[cfg(test)]
 mod tests {
+    use std::collections::BTreeSet;
+
     use super::*;
 
     #[test]
@@ -36,6 +38,9 @@ mod tests {
             assert!(kept.is_sorted_by(|a, b| a < b) && kept.len() >= kept_count(places) - 1, "{places}");
             assert!(kept_count(places) <= KEPT_PLACES as usize && kept_count(places) >= places.min(KEPT_PLACES as usize) / 2);
         }
+        // Of a picture of 1024 x 1024 in no order of columns.
+        let columns: BTreeSet<usize> = (0..1024).filter_map(|number| kept_place(number, 1 << 20)).map(|place| place % 1024).collect();
+        assert!(columns.len() > 512, "{} columns", columns.len());
         assert_eq!(kept_values(64, 1000), 64 * 256);
     }
 }

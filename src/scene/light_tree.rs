@@ -57,8 +57,8 @@ impl Place {
     fn of(geometry: &Geometry, (emitter, light): (usize, &Emitter)) -> Place {
         let (min, max) = match light.kind {
             EMITTER_TRIANGLE => {
-                let triangle = &geometry.triangles[light.triangle as usize];
-                (triangle.a.min(triangle.b).min(triangle.c), triangle.a.max(triangle.b).max(triangle.c))
+                let [a, b, c] = geometry.lamp_corners(light);
+                (a.min(b).min(c), a.max(b).max(c))
             }
             EMITTER_DIRECTIONAL | EMITTER_ENVIRONMENT => (Vec3::splat(-FAR), Vec3::splat(FAR)),
             // Of a point or spot light the size is none of a disc.

@@ -25,10 +25,10 @@ use Shown::{Absent, Tests};
 
 /// Cases of each group.
 pub const COUNTS: [(char, usize); 12] =
-    [('G', 15), ('S', 18), ('R', 9), ('A', 11), ('E', 21), ('B', 7), ('I', 8), ('D', 7), ('C', 3), ('L', 8), ('M', 3), ('F', 10)];
+    [('G', 15), ('S', 19), ('R', 9), ('A', 11), ('E', 21), ('B', 7), ('I', 8), ('D', 7), ('C', 3), ('L', 8), ('M', 3), ('F', 10)];
 
 #[rustfmt::skip]
-pub const CASES: [Case; 120] = [
+pub const CASES: [Case; 121] = [
     Case { number: "G1", failure: "Rays start at a fixed distance from the surface they leave", shown: Tests(&["photons_leave_a_surface_once_and_for_all", "a_patch_in_a_plane_is_left_with_the_plane", "photons_on_edges_and_in_corners_stay_in_the_room"]) },
     Case { number: "G2", failure: "Rays start on the surface they leave", shown: Tests(&["grazing_and_straight_directions_end_in_the_room"]) },
     Case { number: "G3", failure: "Ray offsets too large for a small scene", shown: Tests(&["thin_walls_and_sheets_let_no_light_through", "a_lamp_in_a_flat_box_lights_nothing_outside", "small_lamps_shine_by_their_area"]) },
@@ -62,6 +62,7 @@ pub const CASES: [Case; 120] = [
     Case { number: "S16", failure: "A hundred thousand lamps, of which each shadow ray asks one", shown: Tests(&["a_hundred_thousand_lamps_light_as_one_does", "no_light_is_impossible_and_probabilities_add_up_to_one"]) },
     Case { number: "S17", failure: "A sky that is seen through a small window", shown: Tests(&["a_small_window_lights_a_room_in_a_tenth_of_the_time", "a_sky_through_a_window_is_as_light_as_the_closed_form_says"]) },
     Case { number: "S18", failure: "A lamp that lights no point itself, but what lights it", shown: Tests(&["a_lamp_that_lights_what_lights_the_points_has_photons_too"]) },
+    Case { number: "S19", failure: "A small bright spot of a lamp's texture", shown: Tests(&["a_small_bright_spot_of_a_textured_lamp_is_found", "pieces_are_as_bright_as_they_say"]) },
     Case { number: "R1", failure: "48-bit arithmetic in two words", shown: Tests(&["rand48_gives_the_c_librarys_numbers", "rand48_jumps_and_steps_meet_across_2_to_the_48"]) },
     Case { number: "R2", failure: "Low bits of a linear congruential generator", shown: Tests(&["draws_are_even_alone_in_pairs_and_in_triples"]) },
     Case { number: "R3", failure: "Leapfrogging with a stride that is a power of two", shown: Tests(&["neighbouring_photons_do_not_resemble_each_other"]) },

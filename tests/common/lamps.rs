@@ -182,3 +182,46 @@ pub fn hidden_lamp(gpu: &Gpu, ratio: f32, by_sight: bool) -> Check<Complaint> {
     let found = lit(gpu, &screened(rooms(&[1.0, ratio])), &settings, &floor, by_sight.then_some(change));
     same_light_and_noise(&format!("a hidden lamp beside one of {ratio:e}"), &found, &alone, 4.0)
 }
+
+/// A screen of 2 x 2 m, 1.5 m above a floor, that wears a picture of 256 x 256 texels twice along each side. Four texels are 6e4 times
+/// as bright as the others and give four fifths of the light.
+fn screen(wrap: Wrap) -> Scene {
+    let mut texels = vec![Vec3::splat(1.0); 1 << 16];
+    [(70, 201), (71, 201), (70, 202), (71, 202)].into_iter().for_each(|(i, j)| texels[j * 256 + i] = Vec3::splat(6e4));
+    let mut mesh = level(1.5, [2.0; 2], false, 1);
+    mesh.uvs[0].iter_mut().for_each(|uv| *uv = 2.0 * *uv - DVec2::splat(0.5));
+    let lamp = Material { emission_texture: Some(TextureUse::of(0, 0)), ..lamp_of(1.0) };
+    let mut scene = scene_of(vec![level(0.0, [4.0; 2], true, 0), mesh], vec![matt(0.0), lamp], vec![]);
+    scene.textures = vec![Texture { name: "screen".into(), width: 256, height: 256, texels, wrap: [wrap; 2] }];
+    scene
+}
+
+/// Points under a screen with a small bright spot have its light, and the error is as small as the light is even there.
+pub fn bright_spot(gpu: &Gpu, wrap: Wrap, illumination: Illumination) -> Check<Complaint> {
+    let scene = screen(wrap);
+    let (texture, mesh) = (&scene.textures[0], &scene.meshes[1]);
+    let points: Vec<_> = [(0.1, 0.0), (-0.9, 0.4), (0.6, 0.8)].map(|(x, z)| (dvec3(x, 0.0, z), DVec3::Y)).into();
+    let settings = SceneSettings { illumination, photons: 1 << 14, rounds: 64, radius: Some(0.1), alpha: 1.0, ..SceneSettings::default() };
+    let found = lit(gpu, &scene, &settings, &points, None);
+    // Between four places a texel samples are linear.
+    let steps = 1024;
+    let (origin, u, v) = (mesh.positions[0], mesh.positions[1] - mesh.positions[0], mesh.positions[3] - mesh.positions[0]);
+    for (number, (point, _)) in points.iter().enumerate() {
+        let of_place = |place: usize| {
+            let at = DVec2::new((place % steps) as f64 + 0.5, (place / steps) as f64 + 0.5) / steps as f64;
+            let (a, b, d) = (mesh.uvs[0][0], mesh.uvs[0][1], mesh.uvs[0][3]);
+            let way = origin + at.x * u + at.y * v - *point;
+            let radiance = texture.sample(a + at.x * (b - a) + at.y * (d - a));
+            f64::from(radiance.x) * way.y * way.y / way.length_squared().powi(2)
+        };
+        let right = (0..steps * steps).map(of_place).sum::<f64>() * 4.0 / (steps * steps) as f64;
+        let (mean, error) = (found.film.mean(number, &found.plan).x, found.film.stated_error(number, &found.plan).x);
+        println!("{wrap:?}, {illumination:?}: {mean:.4} +- {error:.4}, {right:.4} is right");
+        // Written so that NaN complains.
+        if !((mean - right).abs() <= 4.0 * error && error < 0.1 * right) {
+            let text = format!("{wrap:?}, {illumination:?}: {mean} +- {error} at {point} instead of {right}");
+            return Err(Complaint::new(if mean < right { Kind::TooDark } else { Kind::TooBright }, text));
+        }
+    }
+    Ok(())
+}

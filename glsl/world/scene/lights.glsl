@@ -31,6 +31,23 @@ float triangle_area(Triangle triangle)
     return 0.5 * norm(cross(triangle.b - triangle.a, triangle.c - triangle.a));
 }
 
+// The corners of a triangle that shines, or of the piece of it that a light is; the rest is the triangle's.
+Triangle lamp_corners(Emitter light, Triangle triangle)
+{
+    vec3 ab = triangle.b - triangle.a, ac = triangle.c - triangle.a;
+    Triangle piece = triangle;
+    piece.a = triangle.a + light.position.x * ab + light.position.y * ac;
+    piece.b = piece.a + light.position.z * ab;
+    piece.c = piece.a + light.position.z * ac;
+    return piece;
+}
+
+// Weights of the second and third corner of its triangle, from those of the piece that a light is.
+vec2 weights_in_triangle(Emitter light, vec2 at)
+{
+    return light.position.xy + light.position.z * at;
+}
+
 // 1 - cosine of the angle between unit vectors, with all digits of a small angle.
 float versine_between(vec3 a, vec3 b)
 {
@@ -71,6 +88,9 @@ Emission sample_emission(Emitter light, float scene_radius, vec4 u, vec4 w)
             Triangle triangle = triangles[light.triangle];
             SurfaceMaterial material = materials[triangle.material];
             vec2 at = sample_triangle(u.yz);
+            if (HAS_TEXTURES) {
+                at = weights_in_triangle(light, at);
+            }
             vec3 normal = triangle_normal(triangle);
             if (HAS_TWO_SIDED) {
                 normal = material.two_sided != 0 && u.w < 0.5 ? -normal : normal;
@@ -159,7 +179,14 @@ Arriving sample_light(Emitter light, vec3 position, vec3 ns, vec2 u)
         if (light.kind == EMITTER_TRIANGLE) {
             Triangle triangle = triangles[light.triangle];
             SurfaceMaterial material = materials[triangle.material];
+            Triangle shining = triangle;
+            float area = triangle_area(triangle);
             vec2 at = sample_triangle(u);
+            if (HAS_TEXTURES) {
+                shining = lamp_corners(light, triangle);
+                area *= light.position.z * light.position.z;
+                at = weights_in_triangle(light, at);
+            }
             vec3 normal = triangle_normal(triangle);
             vec3 point = triangle_point(triangle, at.x, at.y);
             float side = dot(normal, position - point);
@@ -167,11 +194,11 @@ Arriving sample_light(Emitter light, vec3 position, vec3 ns, vec2 u)
                 normal = material.two_sided != 0 && side < 0.0 ? -normal : normal;
             }
             arriving.target = offset_origin(point, position_error(point) + triangle_error(triangle), normal, normal);
-            arriving.radiance = emitted_radiance(material, light.triangle, at.x, at.y) * divide(triangle_area(triangle), light.probability);
+            arriving.radiance = emitted_radiance(material, light.triangle, at.x, at.y) * divide(area, light.probability);
             cos_light = is_before(side, position, triangle_error(triangle)) ? max(dot(normal, normalize(position - point)), 0.0) : 0.0;
             if (cos_light > 0.0) {
-                vec4 direction = sample_spherical_triangle(normalize(triangle.a - position), normalize(triangle.b - position),
-                                                           normalize(triangle.c - position), u);
+                vec4 direction = sample_spherical_triangle(normalize(shining.a - position), normalize(shining.b - position),
+                                                           normalize(shining.c - position), u);
                 float approach = -dot(direction.xyz, normal);
                 if (direction.w > 0.0 && approach > 0.0) {
                     by_direction = true;

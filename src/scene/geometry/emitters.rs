@@ -1,16 +1,18 @@
 //! What emits light: shining triangles and lights without geometry, each with the probability that a photon starts there.
 
+use std::collections::{BTreeMap, BTreeSet};
 use std::f64::consts::{PI, TAU};
 
-use glam::{DVec2, DVec3, Vec2, Vec3};
+use glam::{DVec3, Vec2, Vec3};
 use rayon::prelude::*;
 
+use super::lamp_pieces::{Brightness, Cut, Lamp, Piece, Shining, cut};
 use super::{Geometry, area, refuse};
 use crate::constants::*;
 use crate::error::Result;
-use crate::records::{Emitter, Triangle, TriangleUvs};
+use crate::records::{Emitter, Triangle};
+use crate::scene::Scene;
 use crate::scene::light::LightKind;
-use crate::scene::{Scene, Texture, work};
 use crate::settings::EmissionLaw;
 
 const MAX_EMITTERS: usize = 1 << 22;
@@ -19,25 +21,7 @@ const CHOICES: u32 = 1 << 24;
 
 impl Geometry {
     pub(super) fn add_emitters(&mut self, scene: &Scene) -> Result<()> {
-        let summaries = summaries_of_emission(scene);
-        let found_in = |(index, triangle): (usize, &Triangle)| {
-            if triangle.plane >= HIDDEN {
-                return None;
-            }
-            let material = &scene.materials[triangle.material as usize];
-            if !material.is_emissive() {
-                return None;
-            }
-            let sides = if material.two_sided { 2.0 } else { 1.0 };
-            let flux = PI * sides * area(triangle) * material.emission.as_dvec3();
-            let (mean, brightest) = match material.emission_texture.and_then(|of| Some((of.texture, summaries[of.texture]?))) {
-                Some((texture, summary)) => (mean_over(&scene.textures[texture], summary.mean, &self.uvs[index]), summary.brightest),
-                None => (DVec3::ONE, 1.0),
-            };
-            let emitter = Emitter { kind: EMITTER_TRIANGLE, triangle: index as u32, strength: material.emission, ..Emitter::default() };
-            Some(Found { emitter, flux, weight: (flux * mean).element_sum(), brightest })
-        };
-        let mut found: Vec<Found> = self.triangles.par_iter().enumerate().filter_map(found_in).collect();
+        let mut found = self.shining_triangles(scene);
         let mut sky = Vec3::ZERO;
         for light in &scene.lights {
             if let LightKind::Environment { radiance } = light.kind {
@@ -92,6 +76,58 @@ impl Geometry {
         let scale = gains.fold(1.0, f64::max);
         emitters.iter_mut().for_each(|emitter| emitter.flux /= scale as f32);
         (emitters, scale)
+    }
+
+    /// Those that shine by a texture in pieces, each by how bright it is.
+    fn shining_triangles(&mut self, scene: &Scene) -> Vec<Found> {
+        let shining = shining_textures(scene);
+        let found_in = |(index, triangle): (usize, &Triangle)| {
+            let material = &scene.materials[triangle.material as usize];
+            if triangle.plane >= HIDDEN || !material.is_emissive() {
+                return None;
+            }
+            let sides = if material.two_sided { 2.0 } else { 1.0 };
+            let flux = PI * sides * area(triangle) * material.emission.as_dvec3();
+            let (position, strength) = (piece_record(Piece::WHOLE), material.emission);
+            let emitter = Emitter { kind: EMITTER_TRIANGLE, triangle: index as u32, strength, position, ..Emitter::default() };
+            Some(Found { emitter, flux, weight: flux.element_sum(), brightest: 1.0 })
+        };
+        let found: Vec<Found> = self.triangles.par_iter().enumerate().filter_map(found_in).collect();
+        if shining.is_empty() {
+            return found;
+        }
+        let texture_of = |found: &Found| {
+            let triangle = &self.triangles[found.emitter.triangle as usize];
+            shining.get(&scene.materials[triangle.material as usize].emission_texture?.texture)
+        };
+        let textured = found.iter().filter_map(|found| {
+            let uvs = &self.uvs[found.emitter.triangle as usize];
+            let uvs = [uvs.emission_a, uvs.emission_b, uvs.emission_c].map(Vec2::as_dvec2);
+            Some(Lamp { shining: texture_of(found)?, uvs, flux: found.weight })
+        });
+        let Cut { pieces, left } = cut(&textured.collect::<Vec<_>>());
+        let mut pieces = pieces.into_iter();
+        let in_pieces = |found: Found| {
+            let Some(shining) = texture_of(&found) else { return vec![found] };
+            let of_piece = |(piece, brightness): (Piece, Brightness)| {
+                let flux = found.flux * piece.width * piece.width;
+                // A hundredth of the whole texture's steers a choice, so that no part is without a chance.
+                let mean = 0.99 * brightness.mean + 0.01 * shining.all.mean;
+                let emitter = Emitter { position: piece_record(piece), ..found.emitter };
+                Found { emitter, flux, weight: (flux * mean).element_sum(), brightest: brightness.most }
+            };
+            pieces.next().into_iter().flatten().map(of_piece).collect()
+        };
+        let found = found.into_iter().flat_map(in_pieces).collect();
+        self.coarse_pieces = left;
+        found
+    }
+
+    /// Of a triangle that shines, or the piece of it that an emitter is.
+    pub fn lamp_corners(&self, light: &Emitter) -> [Vec3; 3] {
+        let Triangle { a, b, c, .. } = self.triangles[light.triangle as usize];
+        let piece = Piece { corner: light.position.as_dvec3().truncate(), width: f64::from(light.position.z) };
+        if piece == Piece::WHOLE { [a, b, c] } else { piece.corners([a, b, c].map(Vec3::as_dvec3)).map(DVec3::as_vec3) }
     }
 
     fn emitter_of(&self, kind: &LightKind) -> Found {
@@ -205,65 +241,25 @@ fn choices(shares: &[f64]) -> Vec<u32> {
     choices
 }
 
-/// A texture as a whole.
-#[derive(Clone, Copy)]
-struct TextureSummary {
-    mean: DVec3,
-    /// No sample is brighter.
-    brightest: f64,
+/// How an emitter's record holds a piece of a triangle.
+fn piece_record(piece: Piece) -> Vec3 {
+    piece.corner.extend(piece.width).as_vec3()
 }
 
-/// Of each texture of what shines.
-fn summaries_of_emission(scene: &Scene) -> Vec<Option<TextureSummary>> {
-    let mut summaries = vec![None; scene.textures.len()];
-    for material in scene.materials.iter().filter(|material| material.is_emissive()) {
-        if let Some(of) = material.emission_texture {
-            summaries[of.texture].get_or_insert_with(|| TextureSummary::of(&scene.textures[of.texture]));
-        }
-    }
-    summaries
-}
-
-impl TextureSummary {
-    fn of(texture: &Texture) -> TextureSummary {
-        work::add(|| texture.texels.len());
-        // Sums of pieces of one length do not depend on the number of threads.
-        let of_piece = |piece: &[Vec3]| {
-            let sum: DVec3 = piece.iter().map(|texel| texel.as_dvec3()).sum();
-            (sum, piece.iter().map(|texel| texel.max_element()).fold(0.0, f32::max))
-        };
-        let pieces: Vec<(DVec3, f32)> = texture.texels.par_chunks(1 << 16).map(of_piece).collect();
-        let sum: DVec3 = pieces.iter().map(|(sum, _)| *sum).sum();
-        let brightest = pieces.iter().map(|(_, brightest)| *brightest).fold(0.0, f32::max);
-        // The kernels sample half floats.
-        TextureSummary { mean: sum / texture.texels.len() as f64, brightest: half::f16::from_f32(brightest).to_f64() }
-    }
-}
-
-/// Mean of a texture over a triangle, from about as many samples as it has texels there, 64 at most. It only steers
-/// choices; a hundredth of the whole texture's is in it, so that what falls between the samples keeps its chance.
-fn mean_over(texture: &Texture, mean_of_all: DVec3, uvs: &TriangleUvs) -> DVec3 {
-    const MOST_STEPS: f64 = 8.0;
-    let [a, b, c] = [uvs.emission_a, uvs.emission_b, uvs.emission_c].map(Vec2::as_dvec2);
-    let size = DVec2::new(f64::from(texture.width), f64::from(texture.height));
-    let texels = 0.5 * ((b - a) * size).perp_dot((c - a) * size).abs();
-    let steps = texels.sqrt().ceil().clamp(1.0, MOST_STEPS) as u32;
-    let mut sum = DVec3::ZERO;
-    for i in 0..steps {
-        for j in 0..steps {
-            let root = ((f64::from(i) + 0.5) / f64::from(steps)).sqrt();
-            let (u, v) = (root * (1.0 - (f64::from(j) + 0.5) / f64::from(steps)), root * (f64::from(j) + 0.5) / f64::from(steps));
-            sum += texture.sample(a + u * (b - a) + v * (c - a)).as_dvec3();
-        }
-    }
-    0.99 * sum / f64::from(steps * steps) + 0.01 * mean_of_all
+/// Those that something shines by, by number.
+fn shining_textures(scene: &Scene) -> BTreeMap<usize, Shining<'_>> {
+    let emissive = scene.materials.iter().filter(|material| material.is_emissive());
+    let textures: BTreeSet<usize> = emissive.filter_map(|material| Some(material.emission_texture?.texture)).collect();
+    textures.into_iter().map(|texture| (texture, Shining::new(&scene.textures[texture]))).collect()
 }
 
 #[cfg(test)]
 mod tests {
+    use glam::DVec2;
+
     use super::*;
     use crate::scene::texture::Wrap;
-    use crate::scene::{Material, Mesh, built_in};
+    use crate::scene::{Material, Mesh, Texture, built_in, work};
 
     #[test]
     fn choices_follow_the_shares_and_leave_none_out() {
@@ -311,10 +307,10 @@ mod tests {
     fn no_sample_is_brighter_than_the_brightest() {
         let texels: Vec<Vec3> = (0..70_000u32).map(|k| Vec3::new(0.1, 0.2 + 0.7 * (k % 997) as f32 / 997.0, 0.3)).collect();
         let texture = Texture { name: "t".into(), width: 700, height: 100, texels, wrap: [Wrap::Repeat; 2] };
-        let summary = TextureSummary::of(&texture);
+        let summary = Shining::new(&texture).all;
         let packed = |texel: &Vec3| half::f16::from_f32(texel.y).to_f64();
         let brightest = texture.texels.iter().map(packed).fold(0.0, f64::max);
-        assert_eq!(summary.brightest, brightest);
+        assert_eq!(summary.most, brightest);
         let mean: DVec3 = texture.texels.iter().map(|texel| texel.as_dvec3()).sum::<DVec3>() / 70_000.0;
         assert!((summary.mean - mean).abs().max_element() < 1e-12, "{} {mean}", summary.mean);
         let geometry = Geometry::new(&textured_lamp(3, texture)).unwrap();

@@ -6,6 +6,7 @@
 //! irradiance keep their units; a flux in W is divided by `unit`^2.
 
 mod emitters;
+mod lamp_pieces;
 
 use std::cell::LazyCell;
 use std::collections::BTreeSet;
@@ -62,6 +63,8 @@ pub struct Geometry {
     pub overlaps: Vec<(u32, u32)>,
     /// Triangles that more others overlap than are cut out of one.
     pub crowded: usize,
+    /// Pieces of textured lamps that have spots much smaller and brighter than they are.
+    pub coarse_pieces: usize,
 }
 
 /// Most triangles: their numbers and those of the BVH's nodes are 32-bit, and a photon's choice of
@@ -209,6 +212,7 @@ impl Geometry {
             left_out,
             overlaps: overlaps.into_iter().collect(),
             crowded,
+            coarse_pieces: 0,
         };
         progress("collecting lights", 0.0);
         geometry.add_emitters(scene)?;
@@ -224,8 +228,8 @@ impl Geometry {
         ((position - self.centre) / self.unit).as_vec3()
     }
 
-    /// A line for each pair of meshes that overlap in one plane.
-    pub fn overlap_warnings(&self, scene: &Scene) -> Vec<String> {
+    /// A line for each pair of meshes that overlap in one plane, and for what is too many to be treated as it should.
+    pub fn warnings(&self, scene: &Scene) -> Vec<String> {
         const MOST: usize = 5;
         let name = |mesh: u32| &scene.meshes[mesh as usize].name;
         let line = |&(hidden, seen): &(u32, u32)| {
@@ -239,6 +243,12 @@ impl Geometry {
             lines.push(format!(
                 "{} among more than 64 others that overlap each other in one plane; light there may count more than once",
                 counted(self.crowded, "triangle")
+            ));
+        }
+        if self.coarse_pieces > 0 {
+            lines.push(format!(
+                "lamps shine by textures with so many small bright spots that {} of their triangles have spots too small to be found by chance; light from these may be missed, and more rounds find more of it",
+                counted(self.coarse_pieces, "part")
             ));
         }
         if self.overlaps.len() > MOST {
