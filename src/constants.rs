@@ -103,7 +103,11 @@ constants! {
     HIT_GLOBAL_PHOTON = 2;
     /// Shadow rays to lights that the trial did not see from there.
     HIT_UNSEEN_LIGHT = 3;
-    HIT_KINDS = 4;
+    /// Photons of the global map that are not dim.
+    HIT_BRIGHT_PHOTON = 4;
+    HIT_KINDS = 5;
+    /// What a point gathers in a round is dim where it is less than the inverse of this, of the flux of the brightest photon.
+    DIM_PHOTONS = 16;
 
     /// Bits of a visible point's arrivals: it lies behind a mirror or glass, or behind a gather ray; or neither, so that
     /// one of a pixel's samples looks the global map up for all (each looks caustics up for itself).

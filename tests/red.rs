@@ -71,6 +71,7 @@ enum Question {
     DimRoom(f32),
     HiddenLamp,
     LampBehindHole,
+    DimPhotons,
     TinyPlates,
     VertexColours,
     ManyLamps(u32),
@@ -106,7 +107,7 @@ impl Question {
             Photons(_) | StripedCounters | RoomFilm(_) | Ledger(_) | ClosedForm(_) | Builders | StrictMath | Nearest | Pairs
             | FiniteBox => Subject::Room,
             AimedLight(_) => Subject::Aiming,
-            BrightSpot | DimRoom(_) | ManyLamps(_) | MissedLamp | HiddenLamp | LampBehindHole => Subject::Lamps,
+            BrightSpot | DimRoom(_) | ManyLamps(_) | MissedLamp | HiddenLamp | LampBehindHole | DimPhotons => Subject::Lamps,
             _ => Subject::Scenes,
         }
     }
@@ -125,7 +126,7 @@ struct Fault {
 }
 
 #[rustfmt::skip]
-const FAULTS: [Fault; 85] = [
+const FAULTS: [Fault; 86] = [
     Fault { what: "what rounding takes from a pair of floats is forgotten",
         file: "film/float_u64.glsl", from: "precise float rest = sum.y + (", to: "precise float rest = 0.0 * (",
         kernels: &["gather_brute_u64", "gather_grid_u64"], noticed_by: &[(Pairs, SumsTooSmall)] },
@@ -419,6 +420,9 @@ const FAULTS: [Fault; 85] = [
     Fault { what: "what stands before hidden lamps is forgotten",
         file: "world/scene/direct.glsl", from: "stopped_unseen_light = is_unseen ? stopped : stopped_unseen_light;", to: "",
         kernels: &["receive"], noticed_by: &[(LampBehindHole, TooDark)] },
+    Fault { what: "dim photons count as bright ones",
+        file: "kernels/flux_to_radiance.comp", from: "* float(DIM_PHOTONS) >= 1.0", to: "* float(DIM_PHOTONS) >= 0.0",
+        kernels: &["flux_to_radiance"], noticed_by: &[(DimPhotons, TooDark)] },
     Fault { what: "directions within two cones are weighed as if only one could have chosen them",
         file: "world/scene/aim.glsl", from: "k == chosen || versine_between(emission.direction, other.axis) <= other.versine",
         to: "k == chosen",
@@ -515,6 +519,7 @@ fn ask(gpu: &Gpu, question: Question) -> Check<Complaint> {
         HiddenLamp => lamps::hidden_lamp(gpu, 1e4, true),
         TinyPlates => known::tiny_plates(gpu),
         LampBehindHole => crate::unknown::hidden_lamp(gpu),
+        DimPhotons => crate::unknown::dim_photons(gpu),
         VertexColours => known::vertex_colours(gpu),
         ManyLamps(side) => lamps::many_lamps(gpu, side, true),
         MissedLamp => lamps::missed_lamp(gpu),

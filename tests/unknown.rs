@@ -220,3 +220,85 @@ fn lamps_that_no_ray_has_met_are_said_to_be_hidden() {
     let Some(gpu) = device() else { return };
     assert_holds("a lamp behind a hole", hidden_lamp(&gpu));
 }
+
+/// A box that stands in the middle of the floor of a furnace of 2 m, points of its sides, and what they receive.
+fn box_in_a_furnace(gpu: &Gpu, width: f64) -> Result<RunResult, Error> {
+    let cube = |corner: DVec3, size: f64, faces_in: bool| {
+        let [x, y, z] = [DVec3::X * size, DVec3::Y * size, DVec3::Z * size];
+        let far = corner + size;
+        [(corner, z, x), (far, -x, -z), (corner, x, y), (far, -y, -x), (corner, y, z), (far, -z, -y)].map(|(origin, u, v)| {
+            let (u, v) = if faces_in { (u, v) } else { (v, u) };
+            Mesh::parallelogram("side", origin, u, v, 0)
+        })
+    };
+    let corner = dvec3(1.0 - 0.5 * width, 0.0, 1.0 - 0.5 * width);
+    let glowing = Material { emission: Vec3::splat(0.5), ..matt(0.5) };
+    let scene = scene_of([cube(DVec3::ZERO, 2.0, true), cube(corner, width, false)].concat(), vec![glowing], vec![]);
+    let heights = [0.25, 0.5, 0.75].into_iter();
+    let points: Vec<_> = heights
+        .flat_map(|height| {
+            let at = dvec3(1.0, height * width, 1.0);
+            [DVec3::X, DVec3::NEG_X, DVec3::Z, DVec3::NEG_Z].map(|normal| (at + 0.5 * width * normal, normal))
+        })
+        .collect();
+    render(gpu, &scene, &SceneSettings::default(), Target::Points(&points))
+}
+
+/// A box so small that next to no photon of the walls meets it, and many of its own do, each of which carries little: their spread is no
+/// error of the light that is missing. The report says that brighter photons may be missing, and how much they may add.
+pub fn dim_photons(gpu: &Gpu) -> Check<Complaint> {
+    let lit = box_in_a_furnace(gpu, 0.002)?;
+    let missing = |point: usize| PI - lit.film.mean(point, &lit.plan).x;
+    let is_silent = |point: &usize| missing(*point) > 5.0 * lit.film.stated_error(*point, &lit.plan).x;
+    let silent: Vec<usize> = (0..lit.film.pixels()).filter(is_silent).collect();
+    let most = silent.iter().map(|point| missing(*point)).fold(0.0, f64::max);
+    let unknown = lit.film.unknown(&lit.plan, 0.95);
+    println!("{} of 12 points lack up to {most} W/m2 without an error of it: {:?}", silent.len(), unknown.dim);
+    assert!(silent.len() > 4, "bright photons have met the box: look for a smaller one");
+    let is_said = unknown.text("point", "W/m2", 0.95, 16).contains("dim: ");
+    if unknown.dim.points < silent.len() as u64 || unknown.dim.upper_bound < most || !is_said {
+        return Err(Complaint::new(
+            Kind::TooDark,
+            format!("{} points lack up to {most} W/m2, and {:?} is known", silent.len(), unknown.dim),
+        ));
+    }
+    let lit = box_in_a_furnace(gpu, 0.4)?;
+    match lit.film.unknown(&lit.plan, 0.95).dim.points {
+        0 => Ok(()),
+        points => Err(Complaint::new(Kind::TooDark, format!("{points} points among bright photons have met none of them"))),
+    }
+}
+
+#[test]
+fn points_that_only_dim_photons_have_met_are_said_to_be_so() {
+    let Some(gpu) = device() else { return };
+    assert_holds("a tiny box in a furnace", dim_photons(&gpu));
+}
+
+/// Photons that are aimed at a window are dim; those that the ground scatters into it are bright and rare. Without them a room is too dark
+/// for its error, and the report says so.
+#[test]
+fn light_that_the_ground_scatters_into_a_room_is_said_to_be_missing() {
+    let Some(gpu) = device() else { return };
+    let mut meshes = room_without_floor(0.0);
+    let pane = |y: [f64; 2], z: [f64; 2]| {
+        Mesh::parallelogram("right", dvec3(2.0, y[0], z[0]), (z[1] - z[0]) * DVec3::Z, (y[1] - y[0]) * DVec3::Y, 0)
+    };
+    let sides = [[-2.0, -0.5], [0.5, 2.0]].map(|z| pane([1.0, 2.0], z));
+    meshes.splice(3..4, [pane([0.0, 1.0], [-2.0, 2.0]), pane([2.0, 3.0], [-2.0, 2.0])].into_iter().chain(sides));
+    meshes.extend([level(0.0, [4.0; 2], true, 0), level(-0.01, [100.0; 2], true, 0)]);
+    let scene = scene_of(meshes, vec![matt(0.5)], vec![LightKind::Environment { radiance: Vec3::ONE }]);
+    let both = |(x, z): (f64, f64)| [(dvec3(x, 3.0, z), DVec3::NEG_Y), (dvec3(x, 0.0, z), DVec3::Y)];
+    let points: Vec<_> = (0..9).flat_map(|k| both((f64::from(k / 3) - 1.5, f64::from(k % 3) - 1.0))).collect();
+    let lit = render(&gpu, &scene, &SceneSettings { part: Part::Indirect, ..SceneSettings::default() }, Target::Points(&points)).unwrap();
+    let truth = Judge::new(&scene, 16).irradiance_at(&points, 40_000, 1);
+    let found: f64 = (0..points.len()).map(|point| red(&lit, point).0).sum();
+    let missing = truth.iter().map(|point| point.mean.indirect.x).sum::<f64>() - found;
+    let errors: f64 =
+        (0..points.len()).map(|point| lit.film.stated_error(point, &lit.plan).x + truth[point].standard_error.indirect.x).sum();
+    let dim = lit.film.unknown(&lit.plan, 0.95).dim;
+    println!("{missing:.4} is missing beside {found:.4} +- {errors:.4}: {dim:?}");
+    // Even if all errors went the same way.
+    assert!(missing > errors, "light of the ground has been found: the test needs a larger one");
+    assert!(dim.points == points.len() as u64 && dim.of_mean > missing / found, "{missing} of {found} is missing, and {dim:?} is known");
+}

@@ -58,6 +58,16 @@ float estimate_area(VisiblePoint point, uint pixel, uint cut, float radius)
     return area;
 }
 
+// The brightest photon of the global map carries 1. Caustics are left out: they are local, so that most points lack those of some lamp.
+void note_brightness(uint pixel, vec3 flux, vec3 one_photon)
+{
+    if (max(flux.x, max(flux.y, flux.z)) * float(DIM_PHOTONS) >= 1.0) {
+        note_hit(pixel, HIT_BRIGHT_PHOTON);
+    } else {
+        note_miss(pixel, HIT_BRIGHT_PHOTON, one_photon);
+    }
+}
+
 // Part of the picture (direct, specular, caustic, indirect) that an arrival adds to.
 uint part_number(uint seen, uint arrival)
 {
@@ -117,9 +127,13 @@ void main()
         global_area = is_caustic ? global_area : area;
         float for_all = !is_caustic && (point.arrivals & SEEN_FOR_ALL) != 0 ? float(SAMPLES) : 1.0;
         float density = divide(is_caustic ? push.caustic_flux : push.global_flux, area);
+        vec3 one_photon = for_all * point.weight * (density * widest * widest);
         if (flux == vec3(0.0)) {
-            note_miss(pixel, kind, for_all * point.weight * (density * widest * widest));
+            note_miss(pixel, kind, one_photon);
             continue;
+        }
+        if (!is_caustic && !is_reached(pixel, HIT_BRIGHT_PHOTON)) {
+            note_brightness(pixel, flux, one_photon);
         }
         vec3 radiance = for_all * point.weight * (flux * density);
         note_unless(is_finite(radiance), NONFINITE_ESTIMATE, 0, push.round, pixel);

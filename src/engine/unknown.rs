@@ -7,6 +7,7 @@
 
 use serde::Serialize;
 
+use crate::constants::DIM_PHOTONS;
 use crate::text::counted;
 
 /// Hits that a run may expect at most, with this confidence, where it had none.
@@ -27,22 +28,25 @@ pub struct Unknown {
     pub relative: f64,
     /// What reached no point at all, though some asked for it; its bounds count in `relative` too.
     pub absent: Vec<&'static str>,
-    pub hidden: Hidden,
+    /// Lights that neither the trial nor any ray of the run has seen from some points. Mostly walls hide them altogether, as lamps of
+    /// another room; where they are seen through a gap, all rays may have missed it.
+    pub hidden: Uncounted,
+    /// Points that only photons of a small part of the brightest's flux have met. Mostly no others get there; where they do so too
+    /// rarely for this run, their light is missing.
+    pub dim: Uncounted,
 }
 
-/// Lights that neither the trial nor any ray of the run has seen from some points. Mostly walls hide them altogether, as lamps of
-/// another room; where they are seen through a gap, all rays may have missed it. No error counts them.
+/// Light that may be missing at some points, or not exist. No error counts it.
 #[derive(Debug, Clone, Default, PartialEq, Serialize)]
-pub struct Hidden {
-    /// From which they are not seen.
+pub struct Uncounted {
     pub points: u64,
-    /// The most light that they may add to one of these, in the result's unit.
+    /// The most light that it may add to one of these, in the result's unit.
     pub upper_bound: f64,
-    /// The most that they may add to all of these together, over all light of the result.
+    /// The most that it may add to all of these together, over all light of the result.
     pub of_mean: f64,
 }
 
-/// Of the result's light, what hidden lights may add that is worth a line.
+/// Of the result's light, what is worth a line where no error counts it.
 const WORTH_A_LINE: f64 = 0.01;
 
 impl Unknown {
@@ -58,7 +62,7 @@ impl Unknown {
 
     /// A line each for points and kinds of light; `unit` is the result's.
     pub fn text(&self, point: &str, unit: &str, confidence: f64, rounds: u32) -> String {
-        let Unknown { asked, unreached, upper_bound, relative, absent, hidden } = self;
+        let Unknown { asked, unreached, upper_bound, relative, absent, hidden, dim } = self;
         let sure = 100.0 * confidence;
         let mut text = String::new();
         if *unreached > 0 {
@@ -75,10 +79,17 @@ impl Unknown {
             ));
         }
         if hidden.of_mean > WORTH_A_LINE {
-            let Hidden { points, upper_bound, .. } = hidden;
+            let Uncounted { points, upper_bound, .. } = hidden;
             text.push_str(&format!(
                 "hidden: from {} no shadow ray has met some lamp or the sky. Walls may hide it. If all rays missed a gap, it adds at most {upper_bound:.3e} {unit} to one of them ({sure} % confidence). The noise bound does not include this.\n",
                 counted(points, point)
+            ));
+        }
+        if dim.of_mean > WORTH_A_LINE {
+            let Uncounted { points, upper_bound, .. } = dim;
+            text.push_str(&format!(
+                "dim: {points} of {} have met only photons of less than 1/{DIM_PHOTONS} of the brightest's flux. If brighter ones reach them too rarely to have been met, those add at most {upper_bound:.3e} {unit} to one of them ({sure} % confidence). The noise bound does not include this.\n",
+                counted(asked, point)
             ));
         }
         for kind in absent {

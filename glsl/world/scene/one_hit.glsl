@@ -1,6 +1,6 @@
 // What is known of a pixel, or receiver, that some kind of light has not reached.
 
-// For each pixel and kind (shadow rays, caustic map, global map) the bits of the most light that one hit would have added in a
+// For each pixel and kind of `HIT_...` the bits of the most light that one hit would have added in a
 // round, where nothing has hit so far; REACHED once something has; 0 where nothing was asked. Of a map it is that times the
 // squared radius, so that rounds compare. The bits of floats above 0 have the floats' order.
 layout(set = 1, binding = 3, scalar) buffer OneHits { uint one_hits[]; };

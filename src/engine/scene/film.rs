@@ -4,18 +4,22 @@ use std::ops::Deref;
 
 use glam::DVec3;
 
-use crate::constants::{HIT_CAUSTIC_PHOTON, HIT_GLOBAL_PHOTON, HIT_KINDS, HIT_SHADOW_RAY, HIT_UNSEEN_LIGHT, RADIUS_CLASSES};
+use crate::constants::{
+    HIT_BRIGHT_PHOTON, HIT_CAUSTIC_PHOTON, HIT_GLOBAL_PHOTON, HIT_KINDS, HIT_SHADOW_RAY, HIT_UNSEEN_LIGHT, RADIUS_CLASSES,
+};
 use crate::engine::error_bound::FilmError;
 use crate::engine::film::RoundSums;
-use crate::engine::unknown::{Hidden, Unknown, most_hits};
+use crate::engine::unknown::{Uncounted, Unknown, most_hits};
 use crate::plan::buffers::ANOMALY_WORDS;
 use crate::plan::radius::mean_squared_radius;
 use crate::plan::scene::{MapPlan, ScenePlan};
 
-/// Names of the kinds of `HIT_...`, but for hidden lights.
+/// Names of the kinds of `HIT_...`, but for those of light that no error counts.
 const KINDS: [&str; 3] = ["shadow ray", "photon of the caustic map", "photon of the global map"];
 /// In place of a bound: something has hit (`glsl/world/scene/one_hit.glsl`).
 const REACHED: u32 = u32::MAX;
+/// Of a pixel's light, what bright photons may add that is worth counting.
+const WORTH_COUNTING: f64 = 0.1;
 
 /// Exact sums over rounds, three channels a pixel, in film units, and what else a run leaves of its light.
 #[derive(Debug, Clone)]
@@ -170,15 +174,37 @@ impl SceneFilm {
         }
     }
 
+    /// What one hit of a kind of light that no error counts would have added to each pixel that it has not hit.
+    fn missed(&self, kind: u32) -> impl Iterator<Item = (usize, f64)> {
+        let of_pixel = move |pixel: usize| (pixel, self.one_hits[HIT_KINDS as usize * pixel + kind as usize]);
+        let is_missed = |(_, bits): &(usize, u32)| *bits != 0 && *bits != REACHED;
+        (0..self.pixels()).map(of_pixel).filter(is_missed).map(|(pixel, bits)| (pixel, f64::from(f32::from_bits(bits))))
+    }
+
     /// Lights that the trial has not seen from a pixel, and towards which surfaces have stopped every ray since.
-    fn hidden(&self, plan: &ScenePlan, confidence: f64) -> Hidden {
-        let of_pixel = |pixel: usize| self.one_hits[HIT_KINDS as usize * pixel + HIT_UNSEEN_LIGHT as usize];
-        let stopped = || (0..self.pixels()).map(of_pixel).filter(|bits| *bits != 0 && *bits != REACHED).map(f32::from_bits);
-        let most = most_hits(confidence) / f64::from(self.rounds.max(1)) * f64::from(stopped().fold(0.0, f32::max));
-        let result = self.means(plan).map(DVec3::max_element).sum::<f64>();
+    fn hidden(&self, plan: &ScenePlan, confidence: f64) -> Uncounted {
+        let stopped = || self.missed(HIT_UNSEEN_LIGHT).map(|(_, hit)| hit);
+        let most = most_hits(confidence) / f64::from(self.rounds.max(1)) * stopped().fold(0.0, f64::max);
         // All of them together have as few hits as one.
-        let of_mean = if most > 0.0 { most / result } else { 0.0 };
-        Hidden { points: stopped().count() as u64, upper_bound: most, of_mean }
+        Uncounted { points: stopped().count() as u64, upper_bound: most, of_mean: over(most, self.total(plan)) }
+    }
+
+    /// Pixels that only dim photons have met, where bright ones may add what is worth counting. Photons are shared: the same hit may be
+    /// missing in all of them.
+    fn dim(&self, plan: &ScenePlan, scales: &[f64; KINDS.len()]) -> Uncounted {
+        let bound = |(pixel, hit): (usize, f64)| (pixel, scales[HIT_GLOBAL_PHOTON as usize] * hit);
+        let is_worth_it = |(pixel, most): &(usize, f64)| *most > WORTH_COUNTING * self.mean(*pixel, plan).max_element();
+        let bounds = || self.missed(HIT_BRIGHT_PHOTON).map(bound).filter(is_worth_it).map(|(_, most)| most);
+        Uncounted {
+            points: bounds().count() as u64,
+            upper_bound: bounds().fold(0.0, f64::max),
+            of_mean: over(bounds().sum(), self.total(plan)),
+        }
+    }
+
+    /// Light of all pixels, each in its brightest channel.
+    fn total(&self, plan: &ScenePlan) -> f64 {
+        self.means(plan).map(DVec3::max_element).sum()
     }
 
     /// Pixels, and kinds of light, of which no hit is all that is known.
@@ -188,7 +214,8 @@ impl SceneFilm {
         let pixels = || 0..self.pixels();
         let absent = self.absent();
         let names = absent.iter().map(|kind| KINDS[*kind]).collect();
-        let mut unknown = Unknown { absent: names, hidden: self.hidden(plan, confidence), ..Unknown::default() };
+        let (hidden, dim) = (self.hidden(plan, confidence), self.dim(plan, &scales));
+        let mut unknown = Unknown { absent: names, hidden, dim, ..Unknown::default() };
         let (mut bounds, mut result, mut shadow_rays) = (0.0, 0.0, 0.0);
         for pixel in pixels() {
             result += self.mean(pixel, plan).length_squared();
@@ -242,4 +269,9 @@ impl SceneFilm {
         }
         if means > 0.0 { (errors / means).sqrt() } else { 0.0 }
     }
+}
+
+/// Of a result, which may be black.
+fn over(light: f64, result: f64) -> f64 {
+    if light > 0.0 { light / result } else { 0.0 }
 }
