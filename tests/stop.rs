@@ -7,7 +7,7 @@ use crate::common::prelude::*;
 use photonmill::engine::error_bound::error_bound;
 use photonmill::engine::room::film::{estimate_walls, irradiance_weights};
 use photonmill::engine::room::{self, RunResult};
-use photonmill::engine::scene::{self, View, trial};
+use photonmill::engine::scene::{self, Target, View, trial};
 use photonmill::engine::{End, Progress};
 use photonmill::plan::scene::ScenePlan;
 use photonmill::settings::stop::Stop;
@@ -166,7 +166,7 @@ fn claims_hold_once_the_tail_is_known() {
     let Some(gpu) = device() else { return };
     let lit = |rounds, seed| {
         let settings = SceneSettings { rounds, stop: Stop { confidence: CONFIDENCE, ..Stop::default() }, ..settings(1.0, seed) };
-        seen(&gpu, &mirror_ball(), &settings, &mirror_ball().first_camera(), [2 * SIZE; 2])
+        scene::render(&gpu, &mirror_ball(), &settings, Target::Picture(&mirror_ball().first_camera(), [2 * SIZE; 2])).unwrap()
     };
     let truth = means(&lit(800, 1000));
     for (rounds, least_known) in [(16, 1), (64, 15)] {
@@ -309,11 +309,12 @@ fn bias_counts_in_the_error_that_is_wanted() {
 
 fn watched(gpu: &Gpu, name: &str, settings: &SceneSettings) -> (scene::RunResult, Vec<Progress>) {
     let scene = scene(name);
-    let (geometry, plan) = scene_plan(gpu, &scene, settings, square_picture(16)).unwrap();
+    let geometry = Geometry::new(&scene).unwrap();
     let (never, mut told) = (AtomicBool::new(false), Vec::new());
     let mut tell = |progress: &Progress| told.push(progress.clone());
     let mut control = Control { cancelled: &never, progress: &mut tell };
     let view = View { geometry: &geometry, camera: Some(&scene.first_camera()), phases: &[] };
+    let plan = trial::plan(gpu, &scene, &view, settings, square_picture(16)).unwrap();
     (scene::light(gpu, &view, plan, &mut control).unwrap(), told)
 }
 
