@@ -163,6 +163,9 @@ const WORLDS: [(&str, &[&str]); 2] = [
             "light_shares",
             "openings",
             "colours",
+            "texels_1",
+            "texels_2",
+            "texels_3",
         ],
     ),
 ];

@@ -271,6 +271,8 @@ struct TextureInfo {
     uint first_texel;
     // 0 repeat, 1 mirrored, 2 clamp: of u, and of v times 4.
     uint wrap;
+    // Of each texel's three channels, instead of 8-bit codes.
+    uint shares_exponent;
 };
 
 // A light, or a triangle that shines. Lengths are those of the normalised scene.

@@ -116,6 +116,8 @@ constants! {
     SEEN_FOR_ALL = 1024;
     /// There is a visible point, whatever is asked of it.
     SEEN = 2048;
+    /// 128 MiB, the least that devices promise of one buffer.
+    TEXELS_PER_BUFFER = 33_554_432;
 
     /// Openings, at most, that shadow rays and photons from beyond the scene are aimed at.
     MAX_OPENINGS = 8;

@@ -85,7 +85,7 @@ fn textures_are_read_as_linear_values() {
     let scene = load(&value).unwrap();
     let texture = &scene.textures[scene.materials[0].base_colour_texture.unwrap().texture];
     assert_eq!((texture.width, texture.height), (2, 1));
-    assert!((texture.texels[0] - Vec3::new(1.0, 0.0, 0.502_886)).abs().max_element() < 1e-5, "{:?}", texture.texels);
+    assert!((texture.texels.at(0) - Vec3::new(1.0, 0.0, 0.502_886)).abs().max_element() < 1e-5, "{:?}", texture.texels);
 
     value["images"] = json!([{"name": "paint", "uri": data_uri("image/png", &png[..30])}]);
     assert_refused(&value, &["texture image 'paint'", "cannot be decoded"]);
@@ -339,6 +339,45 @@ fn morph_targets_shift_vertices_by_their_weights_at_rest() {
 }
 
 /// Integers stand for themselves, or for parts of their range.
+/// Most files have their metalness in a texture, and a factor of 1.
+#[test]
+fn metalness_and_roughness_of_textures_count_by_their_mean() {
+    for (codes, expected) in [
+        ([[0, 255, 0], [0, 255, 0]], Surface::Lambert),
+        ([[255, 0, 255], [0, 0, 200]], Surface::Mirror),
+        // Alpha is a quarter.
+        ([[0, 255, 255], [7, 0, 255]], Surface::Glossy { exponent: 30.0 }),
+    ] {
+        let picture = RgbImage::from_fn(2, 1, |i, _| image::Rgb(codes[i as usize]));
+        let mut value = square();
+        with_image(&mut value, &data_uri("image/png", &encoded(&picture, ImageFormat::Png)));
+        value["materials"][0]["pbrMetallicRoughness"] = json!({"metallicRoughnessTexture": {"index": 0}});
+        let scene = load(&value).unwrap();
+        assert_eq!(scene.materials[0].surface, expected);
+        assert!(scene.textures.is_empty() && scene.warnings[0].contains("taken as their mean"), "{:?}", scene.warnings);
+    }
+    // A picture that cannot be read is no reason to refuse a file that needs it for this alone.
+    let mut value = square();
+    with_image(&mut value, &data_uri("image/png", b"no picture"));
+    value["materials"][0]["pbrMetallicRoughness"] = json!({"metallicRoughnessTexture": {"index": 0}, "metallicFactor": 0.25});
+    let scene = load(&value).unwrap();
+    assert_eq!(scene.materials[0].surface, Surface::Lambert);
+    assert!(scene.warnings[0].contains("metallic-roughness textures that cannot be decoded"), "{:?}", scene.warnings);
+}
+
+/// A surface without its coat is a surface still.
+#[test]
+fn what_a_file_needs_for_looks_alone_is_left_out_by_name() {
+    let mut value = square();
+    for extension in ["KHR_materials_clearcoat", "KHR_materials_iridescence"] {
+        value["extensionsUsed"].as_array_mut().unwrap().push(json!(extension));
+    }
+    value["extensionsRequired"] = json!(["KHR_materials_iridescence"]);
+    let scene = load(&value).unwrap();
+    let [warning] = &scene.warnings[..] else { panic!("{:?}", scene.warnings) };
+    assert!(warning.contains("the extension KHR_materials_clearcoat; the extension KHR_materials_iridescence"), "{warning}");
+}
+
 #[test]
 fn quantized_meshes_are_read() {
     let mut value = square();

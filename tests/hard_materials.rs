@@ -302,6 +302,30 @@ fn textures_go_on_beyond_their_edges_as_their_wrapping_says() {
     }
 }
 
+/// More than one buffer of 128 MiB holds, and more than two.
+#[test]
+fn twenty_large_textures_are_read_each_from_its_own_buffer() {
+    let Some(gpu) = device() else { return };
+    let side = 2048;
+    let code = |k: usize| [12 * k as u8, 255 - 12 * k as u8, 7 * k as u8, 255];
+    let mut wall = Scene::default();
+    for k in 0..20 {
+        wall.meshes.push(Mesh::parallelogram("square", DVec3::X * k as f64, DVec3::X, DVec3::Y, k));
+        wall.materials.push(Material { emission: Vec3::ONE, emission_texture: Some(TextureUse::of(k, 0)), ..matt(0.0) });
+        let texels = Texels::Srgb(vec![code(k); side * side]);
+        let texture = Texture { name: format!("picture {k}"), width: side as u32, height: side as u32, texels, wrap: [Wrap::Repeat; 2] };
+        wall.textures.push(texture);
+    }
+    // Three pixels a square.
+    let camera = Camera::looking_at("eye", DVec3::new(10.0, 0.5, 60.0), DVec3::new(10.0, 0.5, 0.0), DVec3::Y, 2.0 * (0.5f64 / 60.0).atan());
+    let settings = SceneSettings { rounds: 1, part: Part::Direct, ..SceneSettings::default() };
+    let found = means(&seen(&gpu, &wall, &settings, &camera, [60, 3]));
+    for k in 0..20 {
+        let (found, expected) = (found[60 + 3 * k + 1], wall.textures[k].texels.at(0).as_dvec3());
+        assert!((found - expected).abs().max_element() < 1e-5, "picture {k}: {found} instead of {expected}");
+    }
+}
+
 #[test]
 fn shading_normals_turn_light_and_no_more() {
     let Some(gpu) = device() else { return };

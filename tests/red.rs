@@ -126,7 +126,7 @@ struct Fault {
 }
 
 #[rustfmt::skip]
-const FAULTS: [Fault; 86] = [
+const FAULTS: [Fault; 87] = [
     Fault { what: "what rounding takes from a pair of floats is forgotten",
         file: "film/float_u64.glsl", from: "precise float rest = sum.y + (", to: "precise float rest = 0.0 * (",
         kernels: &["gather_brute_u64", "gather_grid_u64"], noticed_by: &[(Pairs, SumsTooSmall)] },
@@ -414,6 +414,9 @@ const FAULTS: [Fault; 86] = [
     Fault { what: "a surface that is tiny beside the radius is taken for a larger one",
         file: "kernels/flux_to_radiance.comp", from: "area * (1.0 / 262144.0)", to: "area * (1.0 / 4096.0)",
         kernels: &["flux_to_radiance"], noticed_by: &[(TinyPlates, TooDark)] },
+    Fault { what: "8-bit codes of textures are taken for linear values",
+        file: "material/surface.glsl", from: "return uintBitsToFloat(texels[code & 255]);", to: "return float(code & 255) * (1.0 / 255.0);",
+        kernels: &["view"], noticed_by: &[(Texture([Wrap::Repeat; 2]), WrongTexel)] },
     Fault { what: "a triangle has the vertex colour of its first corner",
         file: "material/surface.glsl", from: "at.a + hit.u * (at.b - at.a) + hit.v * (at.c - at.a);", to: "at.a;",
         kernels: &["view"], noticed_by: &[(VertexColours, WrongTexel)] },

@@ -4,7 +4,11 @@ layout(set = 0, binding = 2, scalar) readonly buffer Normals { TriangleNormals n
 layout(set = 0, binding = 3, scalar) readonly buffer Uvs { TriangleUvs uvs[]; };
 layout(set = 0, binding = 4, scalar) readonly buffer Materials { SurfaceMaterial materials[]; };
 layout(set = 0, binding = 5, scalar) readonly buffer Textures { TextureInfo textures[]; };
-layout(set = 0, binding = 6, scalar) readonly buffer Texels { uvec2 texels[]; };
+// The linear values of 8-bit codes, then texels; more of them in the next buffers, as devices may bound the size of one.
+layout(set = 0, binding = 6, scalar) readonly buffer Texels { uint texels[]; };
+layout(set = 0, binding = 15, scalar) readonly buffer Texels1 { uint texels_1[]; };
+layout(set = 0, binding = 16, scalar) readonly buffer Texels2 { uint texels_2[]; };
+layout(set = 0, binding = 17, scalar) readonly buffer Texels3 { uint texels_3[]; };
 // One for all triangles where no mesh has any.
 layout(set = 0, binding = 14, scalar) readonly buffer Colours { TriangleColours colours[]; };
 
@@ -34,11 +38,31 @@ uint wrapped(int place, uint size, uint wrap)
     return uint(folded < extent ? folded : period - 1 - folded);
 }
 
+uint texel_word(uint place)
+{
+    if (HAS_MANY_TEXELS) {
+        uint part = place / TEXELS_PER_BUFFER, within = place % TEXELS_PER_BUFFER;
+        return part == 0 ? texels[within] : (part == 1 ? texels_1[within] : (part == 2 ? texels_2[within] : texels_3[within]));
+    }
+    return texels[place];
+}
+
+float linear_of_code(uint code)
+{
+    return uintBitsToFloat(texels[code & 255]);
+}
+
+// Twin of src/scene/texture.rs.
 vec3 texel(TextureInfo info, int i, int j)
 {
     uint place = wrapped(j, info.height, info.wrap >> 2) * info.width + wrapped(i, info.width, info.wrap & 3u);
-    uvec2 halves = texels[info.first_texel + place];
-    return vec3(unpackHalf2x16(halves.x), unpackHalf2x16(halves.y).x);
+    uint word = texel_word(info.first_texel + place);
+    if (info.shares_exponent != 0) {
+        // A power of two: 2^(exponent - 24).
+        float unit = uintBitsToFloat(((word >> 27) + (127 - 24)) << 23);
+        return vec3(word & 511, (word >> 9) & 511, (word >> 18) & 511) * unit;
+    }
+    return vec3(linear_of_code(word), linear_of_code(word >> 8), linear_of_code(word >> 16));
 }
 
 // Bilinear between texel centres.

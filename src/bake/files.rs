@@ -22,7 +22,7 @@ pub fn write(folder: &Folder, scene: &Scene, layout: &Layout, maps: &[Map], expo
     let intensities: HashMap<usize, f32> = maps.iter().map(|map| (map.mesh, ceiling(map) * exposure)).collect();
     let texture = |index: usize| {
         let texture = &scene.textures[index];
-        (names.texture(index), colour::png(texture.width, texture.height, texture.texels.iter().copied()))
+        (names.texture(index), colour::texture_png(texture))
     };
     let textures = document::textures_used(scene).into_iter().map(texture);
     let pictures = maps.iter().flat_map(|map| {

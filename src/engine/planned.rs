@@ -57,6 +57,18 @@ impl Planned<'_> {
             .unwrap_or_else(|found: Vec<_>| panic!("the plan has {} buffers of the name {name} instead of {N}", found.len())))
     }
 
+    /// As many as the content has parts, each with its own, of which the plan keeps all or nothing.
+    pub fn filled_parts<T: Pod, const N: usize>(&self, commands: &mut Commands, name: &str, parts: [&[T]; N]) -> Result<[Buffer<T>; N]> {
+        let buffers = self.several(name)?;
+        for ((buffer, part), planned) in buffers.iter().zip(parts).zip(self.listed::<T>(name)) {
+            if planned.count > 0 {
+                assert_eq!(part.len() as u64, buffer.count(), "elements of {name}");
+                commands.upload(buffer, part)?;
+            }
+        }
+        Ok(buffers)
+    }
+
     /// The only one of a name, set to zero.
     pub fn zeroed<T: Pod>(&self, commands: &mut Commands, name: &str) -> Result<Buffer<T>> {
         let buffer = self.one(name)?;

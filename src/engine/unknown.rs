@@ -88,7 +88,7 @@ impl Unknown {
         if dim.of_mean > WORTH_A_LINE {
             let Uncounted { points, upper_bound, .. } = dim;
             text.push_str(&format!(
-                "dim: {points} of {} have met only photons of less than 1/{DIM_PHOTONS} of the brightest's flux. If brighter ones reach them too rarely to have been met, those add at most {upper_bound:.3e} {unit} to one of them ({sure} % confidence). The noise bound does not include this.\n",
+                "dim: rare bright light may be missing at {points} of {}, which only photons of less than 1/{DIM_PHOTONS} of the brightest's flux have met. If there is such light, it adds at most {upper_bound:.3e} {unit} to one of them ({sure} % confidence). The noise bound does not include this.\n",
                 counted(asked, point)
             ));
         }

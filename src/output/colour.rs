@@ -9,6 +9,8 @@ use image::codecs::png::PngEncoder;
 use image::{ExtendedColorType, ImageEncoder};
 
 use crate::error::{Error, Result};
+use crate::scene::Texture;
+use crate::scene::texture::Texels;
 
 /// File formats, by the name's extension.
 #[derive(Debug, Clone, Copy, PartialEq, Eq)]
@@ -70,6 +72,17 @@ pub fn exr(width: u32, height: u32, values: &[Vec3]) -> Vec<u8> {
         .write_image(&bytes, width, height, ExtendedColorType::Rgb32F)
         .expect("a picture in memory can be encoded");
     file.into_inner()
+}
+
+/// A texture, with its own codes where it has some.
+pub fn texture_png(texture: &Texture) -> Vec<u8> {
+    match &texture.texels {
+        Texels::Srgb(codes) => {
+            let codes: Vec<u8> = codes.iter().flat_map(|[red, green, blue, _]| [*red, *green, *blue]).collect();
+            eight_bits(texture.width, texture.height, ExtendedColorType::Rgb8, &codes)
+        }
+        texels => png(texture.width, texture.height, (0..texels.count()).map(|place| texels.at(place))),
+    }
 }
 
 /// Linear values as 8-bit sRGB, clamped to 0 to 1.

@@ -204,7 +204,6 @@ impl ScenePlan {
             of("vertex colours", &geometry.colours, self.keeps(Effect::VertexColours), "the triangles' vertex colours"),
             of("materials", &geometry.materials, true, "materials"),
             of("textures", &geometry.textures, textured, "sizes of textures"),
-            of::<UVec2>("texels", &geometry.texels, textured, "textures"),
             of("emitters", &geometry.emitters, true, "emitters"),
             of("openings", &self.openings(), true, "openings that light comes in through"),
             of("caustic targets", &self.targets, true, "spheres that photons are aimed at"),
@@ -212,6 +211,9 @@ impl ScenePlan {
             buffer::<LightRegion>("light regions", regions as u64, "regions in which lights are chosen alike"),
             buffer::<f32>("light shares", shares as u64, "shares of lights in each region"),
         ]
+        .into_iter()
+        .chain(geometry.texel_parts().map(|part| of::<u32>("texels", part, textured, "textures")))
+        .collect()
     }
 
     /// What grows with the pixels or receivers.

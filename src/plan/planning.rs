@@ -215,6 +215,7 @@ fn constants(
         ("HAS_OVERLAPS", u32::from(geometry.triangles.iter().any(|triangle| triangle.plane >= HIDDEN))),
         ("HAS_SMOOTH_NORMALS", flag(Effect::SmoothNormals)),
         ("HAS_TEXTURES", flag(Effect::Textures)),
+        ("HAS_MANY_TEXELS", u32::from(geometry.texels.len() > TEXELS_PER_BUFFER as usize)),
         ("HAS_VERTEX_COLOURS", flag(Effect::VertexColours)),
         ("HAS_TWO_SIDED", flag(Effect::TwoSided)),
         ("HAS_GLOSSY", flag(Effect::Glossy)),

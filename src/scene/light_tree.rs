@@ -2,7 +2,7 @@
 //! (Conty Estevez and Kulla 2018). `glsl/world/scene/light_choice.glsl` descends in it. Which way lights face, and what stands
 //! before them, a trial finds out cluster by cluster ([`crate::plan::light_choice`]).
 
-use std::collections::BinaryHeap;
+use std::collections::{BTreeSet, BinaryHeap};
 use std::ops::Range;
 
 use glam::Vec3;
@@ -35,10 +35,15 @@ pub fn is_one_lamp(geometry: &Geometry) -> bool {
     if emitters.len() < 2 {
         return true;
     }
-    if emitters.len() > LAMP_TRIANGLES || emitters.iter().any(|emitter| emitter.kind != EMITTER_TRIANGLE) {
+    if emitters.iter().any(|emitter| emitter.kind != EMITTER_TRIANGLE) {
         return false;
     }
-    let triangles = || emitters.iter().map(|emitter| &geometry.triangles[emitter.triangle as usize]);
+    // In pieces or whole.
+    let numbers: BTreeSet<u32> = emitters.iter().map(|emitter| emitter.triangle).collect();
+    if numbers.len() > LAMP_TRIANGLES {
+        return false;
+    }
+    let triangles = || numbers.iter().map(|number| &geometry.triangles[*number as usize]);
     let plane = geometry.triangles[emitters[0].triangle as usize].plane;
     triangles().all(|triangle| triangle.plane == plane)
         && connected(&triangles().map(|triangle| [triangle.a, triangle.b, triangle.c]).collect::<Vec<_>>()).len() == 1

@@ -1,6 +1,9 @@
-//! Colour textures, as linear values.
+//! Colour textures: four bytes a texel, as in most files, and linear values where they are sampled.
+
+use std::sync::LazyLock;
 
 use glam::{DVec2, Vec3};
+use rayon::prelude::*;
 
 /// What lies beyond the picture's edges.
 #[derive(Debug, Clone, Copy, PartialEq, Eq)]
@@ -15,9 +18,79 @@ pub struct Texture {
     pub name: String,
     pub width: u32,
     pub height: u32,
-    /// Linear colour, row by row from v = 0.
-    pub texels: Vec<Vec3>,
+    /// Row by row from v = 0.
+    pub texels: Texels,
     pub wrap: [Wrap; 2],
+}
+
+/// Of a texture, as the kernels read them too (`glsl/material/surface.glsl`).
+#[derive(Debug, Clone, PartialEq, Eq)]
+pub enum Texels {
+    /// Red, green and blue by the sRGB curve, then alpha, which is not used.
+    Srgb(Vec<[u8; 4]>),
+    /// Linear: nine bits of red, of green and of blue from the lowest, then an exponent of five bits for all three
+    /// (OpenGL's RGB9_E5, EXT_texture_shared_exponent).
+    SharedExponent(Vec<u32>),
+}
+
+/// Linear value of each 8-bit code.
+pub static LINEAR_OF_SRGB: LazyLock<[f32; 256]> = LazyLock::new(|| std::array::from_fn(|code| linear_of_srgb(code as u8)));
+
+impl Texels {
+    pub fn count(&self) -> usize {
+        match self {
+            Texels::Srgb(codes) => codes.len(),
+            Texels::SharedExponent(words) => words.len(),
+        }
+    }
+
+    /// A texel's linear colour.
+    pub fn at(&self, place: usize) -> Vec3 {
+        match self {
+            Texels::Srgb(codes) => {
+                let [red, green, blue, _] = codes[place].map(|code| LINEAR_OF_SRGB[usize::from(code)]);
+                Vec3::new(red, green, blue)
+            }
+            Texels::SharedExponent(words) => of_shared_exponent(words[place]),
+        }
+    }
+
+    /// All of them, as the kernels have them.
+    pub fn words(&self) -> impl IndexedParallelIterator<Item = u32> + '_ {
+        let word = |place: usize| match self {
+            Texels::Srgb(codes) => u32::from_le_bytes(codes[place]),
+            Texels::SharedExponent(words) => words[place],
+        };
+        (0..self.count()).into_par_iter().map(word)
+    }
+}
+
+/// Linear colours, each channel from 0 to 65408, to a 512th of the largest channel of each.
+impl From<Vec<Vec3>> for Texels {
+    fn from(colours: Vec<Vec3>) -> Texels {
+        Texels::SharedExponent(colours.into_par_iter().map(shared_exponent).collect())
+    }
+}
+
+/// Of the exponents, and bits of each channel.
+const EXPONENT_BIAS: i32 = 15;
+const MANTISSA_BITS: i32 = 9;
+
+fn shared_exponent(colour: Vec3) -> u32 {
+    let most = (511.0 / 512.0) * 65_536.0;
+    let colour = colour.clamp(Vec3::ZERO, Vec3::splat(most));
+    let unit = |exponent: i32| 2f32.powi(exponent - EXPONENT_BIAS - MANTISSA_BITS);
+    let largest = colour.max_element();
+    let power = if largest > 0.0 { largest.log2().floor() as i32 + 1 + EXPONENT_BIAS } else { 0 };
+    // The logarithm is rounded, and the largest channel may round up to the next power.
+    let exponent = (power.max(1) - 1..).find(|exponent| (largest / unit(*exponent)).round() < 512.0).expect("the last one is large enough");
+    let [red, green, blue] = (colour / unit(exponent)).round().to_array().map(|mantissa| mantissa as u32);
+    red | green << 9 | blue << 18 | (exponent as u32) << 27
+}
+
+fn of_shared_exponent(word: u32) -> Vec3 {
+    let mantissa = |shift: u32| (word >> shift & 511) as f32;
+    Vec3::new(mantissa(0), mantissa(9), mantissa(18)) * 2f32.powi((word >> 27) as i32 - EXPONENT_BIAS - MANTISSA_BITS)
 }
 
 impl Wrap {
@@ -48,7 +121,7 @@ impl Texture {
         let texel = |di: i64, dj: i64| {
             let i = self.wrap[0].index(corner.x as i64 + di, self.width);
             let j = self.wrap[1].index(corner.y as i64 + dj, self.height);
-            self.texels[j * self.width as usize + i]
+            self.texels.at(j * self.width as usize + i)
         };
         texel(0, 0).lerp(texel(1, 0), share.x).lerp(texel(0, 1).lerp(texel(1, 1), share.x), share.y)
     }
@@ -66,7 +139,7 @@ mod tests {
 
     fn checker(wrap: Wrap) -> Texture {
         let texels = vec![Vec3::ZERO, Vec3::ONE, Vec3::ONE, Vec3::ZERO];
-        Texture { name: "checker".into(), width: 2, height: 2, texels, wrap: [wrap; 2] }
+        Texture { name: "checker".into(), width: 2, height: 2, texels: texels.into(), wrap: [wrap; 2] }
     }
 
     #[test]
@@ -81,6 +154,23 @@ mod tests {
         assert_eq!(checker(Wrap::Repeat).sample(beyond), Vec3::ZERO);
         assert_eq!(checker(Wrap::MirroredRepeat).sample(beyond), Vec3::ONE);
         assert_eq!(checker(Wrap::Clamp).sample(beyond), Vec3::ONE);
+    }
+
+    #[test]
+    fn shared_exponents_keep_nine_bits() {
+        let texel = |colour: Vec3| Texels::from(vec![colour]).at(0);
+        for exact in [Vec3::ZERO, Vec3::ONE, Vec3::new(0.5, 0.25, 2f32.powi(-9)), Vec3::splat(65_408.0), Vec3::new(3.0, 0.75, 1.5)] {
+            assert_eq!(texel(exact), exact);
+        }
+        assert_eq!(texel(Vec3::new(1e9, -1.0, f32::NAN)), Vec3::new(65_408.0, 0.0, 0.0));
+        for k in 1..4000 {
+            let colour = 1.013f32.powi(k % 1500 - 700) * Vec3::new(1.0, 0.001 * k as f32, 0.3).clamp(Vec3::ZERO, Vec3::ONE);
+            let largest = colour.max_element();
+            if largest < 65_000.0 {
+                let off = (texel(colour) - colour).abs().max_element();
+                assert!(off <= largest / 510.0 || off <= 2f32.powi(-25), "{colour} {}", texel(colour));
+            }
+        }
     }
 
     #[test]

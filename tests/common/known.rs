@@ -105,8 +105,9 @@ fn texel_at(wrap: Wrap, place: i32, size: i32) -> i32 {
 /// A lamp that wears a picture of 3 x 2 texels five times along each side, from -2 to 3: at the middle of every texel
 /// shines that texel.
 pub fn wrapped_texture(gpu: &Gpu, wrap: [Wrap; 2], is_transformed: bool) -> Check<Complaint> {
-    // Any two are 1 apart in some channel.
-    let texels = vec![Vec3::ZERO, Vec3::X, Vec3::Y, Vec3::Z, Vec3::new(1.0, 1.0, 0.0), Vec3::ONE];
+    // Any two are half apart in some channel; 188 is the code of 0.503.
+    let codes = [[0, 0, 0], [255, 0, 0], [0, 255, 0], [0, 0, 255], [255, 255, 0], [188, 188, 188]];
+    let texels = Texels::Srgb(codes.map(|[red, green, blue]| [red, green, blue, 255]).to_vec());
     let size = [3, 2];
     let mut mesh = Mesh::parallelogram("lamp", DVec3::new(-7.5, -5.0, 0.0), DVec3::X * 15.0, DVec3::Y * 10.0, 0);
     let transform = UvTransform { scale: DVec2::splat(5.0), rotation: 0.0, offset: DVec2::splat(-2.0) };
@@ -129,7 +130,7 @@ pub fn wrapped_texture(gpu: &Gpu, wrap: [Wrap; 2], is_transformed: bool) -> Chec
     for j in 0..10 {
         for i in 0..15 {
             let [column, row] = [texel_at(wrap[0], i - 6, size[0]), texel_at(wrap[1], j - 4, size[1])];
-            let expected = texels[(row * size[0] + column) as usize].as_dvec3();
+            let expected = texels.at((row * size[0] + column) as usize).as_dvec3();
             // Rows of pixels from the top, of texels from v = 0.
             let pixel = (49 - (5 * j + 2)) * 75 + 5 * i + 2;
             let found = found[pixel as usize];

@@ -19,7 +19,7 @@ pub use photonmill::scene::light::LightKind;
 pub use photonmill::scene::material::{TextureUse, UvTransform};
 pub use photonmill::scene::open_box::open_box;
 pub use photonmill::scene::room::RoomScene;
-pub use photonmill::scene::texture::Wrap;
+pub use photonmill::scene::texture::{Texels, Wrap};
 pub use photonmill::scene::{Camera, Light, Material, Mesh, Scene, Surface, Texture, built_in};
 pub use photonmill::settings::scene::{Effect, Illumination, Part, SceneSettings};
 pub use photonmill::settings::{Builder, EmissionLaw, Gather, Math, Preset, RoomSettings, Sums};

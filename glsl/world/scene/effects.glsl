@@ -7,6 +7,8 @@ layout(constant_id = 7) const bool HAS_BVH = true;
 layout(constant_id = 47) const bool HAS_OVERLAPS = true;
 layout(constant_id = 8) const bool HAS_SMOOTH_NORMALS = true;
 layout(constant_id = 9) const bool HAS_TEXTURES = true;
+// More texels than one buffer holds.
+layout(constant_id = 52) const bool HAS_MANY_TEXELS = false;
 layout(constant_id = 51) const bool HAS_VERTEX_COLOURS = true;
 layout(constant_id = 10) const bool HAS_TWO_SIDED = true;
 layout(constant_id = 11) const bool HAS_GLOSSY = true;

@@ -14,7 +14,9 @@ buffers! {
         planned: &Planned, commands: &mut Commands, geometry: &Geometry, plan: &ScenePlan, phases: &[Vec<Receiver>]
     ) {
         /// Written once; what the plan dropped has one empty element.
-        scene: kernels::Scene = kernels::Scene {
+        scene: kernels::Scene = {
+            let [texels, texels_1, texels_2, texels_3] = planned.filled_parts(commands, "texels", geometry.texel_parts())?;
+            kernels::Scene {
             nodes: planned.filled(commands, "nodes", &geometry.nodes)?,
             triangles: planned.filled(commands, "triangles", &geometry.triangles)?,
             planes: planned.filled(commands, "planes", &geometry.planes)?,
@@ -23,13 +25,17 @@ buffers! {
             colours: planned.filled(commands, "vertex colours", &geometry.colours)?,
             materials: planned.filled(commands, "materials", &geometry.materials)?,
             textures: planned.filled(commands, "textures", &geometry.textures)?,
-            texels: planned.filled(commands, "texels", &geometry.texels)?,
+            texels,
+            texels_1,
+            texels_2,
+            texels_3,
             emitters: planned.filled(commands, "emitters", plan.lights().map_or(&geometry.emitters, |lights| &lights.emitters))?,
             caustic_targets: planned.filled(commands, "caustic targets", &plan.targets)?,
             light_nodes: planned.filled(commands, "light nodes", plan.lights().map_or(&[], |lights| &lights.nodes))?,
             light_regions: planned.filled(commands, "light regions", plan.lights().map_or(&[], |lights| &lights.regions))?,
             openings: planned.filled(commands, "openings", &plan.openings())?,
             light_shares: planned.filled(commands, "light shares", plan.lights().map_or(&[], |lights| &lights.shares))?,
+            }
         },
         /// Points of all phases; empty for a picture.
         receivers: Vec<Buffer<Receiver>> =

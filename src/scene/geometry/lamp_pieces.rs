@@ -24,6 +24,8 @@ pub struct Piece {
 const MOST_CUTS: usize = 1 << 16;
 /// No piece is cut in which the texture is nowhere so many times as bright as on the mean ..
 const CONTRAST: f64 = 4.0;
+/// .. or so many times where the piece has all of the texture, which most others then have too ..
+const CONTRAST_OF_ALL: f64 = 64.0;
 /// .. nor one that is smaller, in texels.
 const LEAST_TEXELS: f64 = 0.25;
 /// Weights of 32 bits are evenly spread over no much smaller one.
@@ -89,7 +91,7 @@ pub struct Shining<'a> {
 
 impl<'a> Shining<'a> {
     pub fn new(texture: &'a Texture) -> Shining<'a> {
-        work::add(|| texture.texels.len());
+        work::add(|| texture.texels.count());
         let mut levels: Vec<Level> = Vec::new();
         let (mut columns, mut rows) = (texture.width as usize, texture.height as usize);
         while levels.is_empty() || columns * rows > 1 {
@@ -99,13 +101,13 @@ impl<'a> Shining<'a> {
             let cell = |place: usize| {
                 let (i, j) = (place % columns * 2, place / columns * 2);
                 let own = (j..(j + 2).min(height)).flat_map(|j| (i..(i + 2).min(width)).map(move |i| j * width + i));
-                own.map(|place| below.map_or_else(|| Cell::of(texture.texels[place]), |level| level.cells[place]))
+                own.map(|place| below.map_or_else(|| Cell::of(texture.texels.at(place)), |level| level.cells[place]))
                     .fold(Cell::NONE, Cell::and)
             };
             let cells = (0..columns * rows).into_par_iter().with_min_len(1 << 12).map(cell).collect();
             levels.push(Level { columns, cells });
         }
-        let all = brightness(levels[levels.len() - 1].cells[0], texture.texels.len() as f64);
+        let all = brightness(levels[levels.len() - 1].cells[0], texture.texels.count() as f64);
         Shining { texture, levels, all }
     }
 
@@ -149,7 +151,7 @@ impl<'a> Shining<'a> {
                 most = most.max(value.max_element());
             }
         }
-        Brightness { mean, most: as_sampled(most) }
+        Brightness { mean, most }
     }
 
     /// From the smallest cells of which not too many lie there.
@@ -181,12 +183,7 @@ impl<'a> Shining<'a> {
 }
 
 fn brightness(cell: Cell, count: f64) -> Brightness {
-    Brightness { mean: cell.sum / count, most: as_sampled(f64::from(cell.most)) }
-}
-
-/// The kernels sample half floats.
-fn as_sampled(value: f64) -> f64 {
-    half::f16::from_f64(value).to_f64().max(value)
+    Brightness { mean: cell.sum / count, most: f64::from(cell.most) }
 }
 
 /// The first and last texels of the parts of a row that samples from `low` to `high` come from.
@@ -234,8 +231,11 @@ impl Lamp<'_> {
 
     fn is_worth_cutting(&self, piece: Piece, brightness: &Brightness) -> bool {
         let (low, high) = self.shining.texels_of(self.uvs);
-        brightness.most > CONTRAST * brightness.mean.max_element()
-            && piece.width.abs() * (high - low).max_element() > LEAST_TEXELS
+        let texels = piece.width.abs() * (high - low);
+        let Texture { width, height, .. } = *self.shining.texture;
+        let has_all = texels.x >= f64::from(width) && texels.y >= f64::from(height);
+        brightness.most > if has_all { CONTRAST_OF_ALL } else { CONTRAST } * brightness.mean.max_element()
+            && texels.max_element() > LEAST_TEXELS
             && piece.width.abs() > LEAST_WIDTH
     }
 }
@@ -272,7 +272,7 @@ impl Ord for Open {
 /// Pieces of each lamp, with the brightness of each.
 pub struct Cut {
     pub pieces: Vec<Vec<(Piece, Brightness)>>,
-    /// Pieces with brighter spots than their mean tells, of which there were too many to cut all.
+    /// Pieces with spots much brighter than their mean, of which there were too many to cut all.
     pub left: usize,
 }
 
@@ -289,7 +289,7 @@ pub fn cut(lamps: &[Lamp]) -> Cut {
     while let Some(Open { lamp, piece, brightness, .. }) = queue.pop() {
         let is_worth_cutting = lamps[lamp].is_worth_cutting(piece, &brightness);
         if cuts + 3 > MOST_CUTS || !is_worth_cutting {
-            left += usize::from(is_worth_cutting);
+            left += usize::from(is_worth_cutting && brightness.most > CONTRAST_OF_ALL * brightness.mean.max_element());
             pieces[lamp].push((piece, brightness));
             continue;
         }
@@ -307,7 +307,7 @@ mod tests {
     /// Mostly dark, with one texel in so many bright.
     fn speckled(width: u32, height: u32, one_in: u32, wrap: Wrap) -> Texture {
         let texel = |k: u32| if mix32(k).is_multiple_of(one_in) { Vec3::new(700.0, 0.5, 31.0) } else { Vec3::splat(0.1) };
-        let texels = (0..width * height).map(texel).collect();
+        let texels = (0..width * height).map(texel).collect::<Vec<_>>().into();
         Texture { name: "speckled".into(), width, height, texels, wrap: [wrap; 2] }
     }
 
@@ -347,13 +347,13 @@ mod tests {
     /// A texel among a million gets its share, and even light needs no pieces.
     #[test]
     fn a_bright_texel_has_a_piece_of_its_own() {
-        let mut texture = speckled(1024, 1024, u32::MAX, Wrap::Clamp);
-        texture.texels[..].fill(Vec3::ONE);
+        let mut texels = vec![Vec3::ONE; 1 << 20];
+        let even = Texture { texels: texels.clone().into(), ..speckled(1024, 1024, 1, Wrap::Clamp) };
         let uvs = [DVec2::ZERO, DVec2::X, DVec2::Y];
         let cut_one = |texture: &Texture| cut(&[Lamp { shining: &Shining::new(texture), uvs, flux: 1.0 }]);
-        assert_eq!(cut_one(&texture).pieces[0].len(), 1);
-        texture.texels[300 * 1024 + 200] = Vec3::splat(1e4);
-        let Cut { pieces, .. } = cut_one(&texture);
+        assert_eq!(cut_one(&even).pieces[0].len(), 1);
+        texels[300 * 1024 + 200] = Vec3::splat(1e4);
+        let Cut { pieces, .. } = cut_one(&Texture { texels: texels.into(), ..even });
         let share = |(piece, brightness): &(Piece, Brightness)| brightness.mean.x * piece.width * piece.width;
         let all: f64 = pieces[0].iter().map(share).sum();
         let bright: f64 = pieces[0].iter().filter(|(piece, _)| piece.width.abs() < 1.0 / 256.0).map(share).sum();
@@ -363,7 +363,7 @@ mod tests {
 
     #[test]
     fn what_is_too_much_to_cut_is_counted() {
-        let texture = speckled(1024, 1024, 20, Wrap::Clamp);
+        let texture = speckled(1024, 1024, 400, Wrap::Clamp);
         let shining = Shining::new(&texture);
         let lamp = || Lamp { shining: &shining, uvs: [DVec2::ZERO, DVec2::X, DVec2::Y], flux: 1.0 };
         let Cut { pieces, left } = cut(&[lamp(), lamp()]);

@@ -12,15 +12,14 @@ use std::cell::LazyCell;
 use std::collections::BTreeSet;
 use std::ops::{Add, Mul};
 
-use glam::{DVec2, DVec3, UVec2, Vec2, Vec2Swizzles as _, Vec3, Vec4};
-use half::slice::HalfFloatSliceExt as _;
+use glam::{DVec2, DVec3, Vec2, Vec2Swizzles as _, Vec3, Vec4};
 use rayon::prelude::*;
 
 use super::bvh::Bvh;
 use super::material::TextureUse;
 use super::overlap;
 use super::planes::{Planes, for_equals, hash_of};
-use super::texture::Wrap;
+use super::texture::{LINEAR_OF_SRGB, Texels, Wrap};
 use super::{Material, Mesh, Progress, Scene, Surface};
 use crate::constants::*;
 use crate::error::{Error, Result};
@@ -50,7 +49,8 @@ pub struct Geometry {
     pub colours: Vec<TriangleColours>,
     pub materials: Vec<SurfaceMaterial>,
     pub textures: Vec<TextureInfo>,
-    pub texels: Vec<UVec2>,
+    /// Those that the kernels look 8-bit codes up in, then those of all textures.
+    pub texels: Vec<u32>,
     /// What shines, the environment last.
     pub emitters: Vec<Emitter>,
     /// W of a photon of relative flux 1 that stands for all light, over `unit`^2.
@@ -70,6 +70,10 @@ pub struct Geometry {
 /// Most triangles: their numbers and those of the BVH's nodes are 32-bit, and a photon's choice of
 /// emitter has 24 bits.
 const MAX_TRIANGLES: usize = 1 << 28;
+/// With the 256 linear values of 8-bit codes before them.
+pub const MAX_TEXELS: usize = TEXEL_BUFFERS * TEXELS_PER_BUFFER as usize;
+/// As many as `glsl/material/surface.glsl` looks into, so that none is larger than 128 MiB, the least that devices promise.
+pub const TEXEL_BUFFERS: usize = 4;
 fn refuse(scene: &Scene, object: &str, reason: String) -> Error {
     Error::Scene { path: (&scene.name).into(), object: object.into(), reason }
 }
@@ -189,6 +193,10 @@ impl Geometry {
         };
         progress("packing textures", 0.0);
         let (textures, texels) = pack_textures(scene);
+        if texels.len() > MAX_TEXELS {
+            let reason = format!("has textures of {} texels in all; at most {MAX_TEXELS} can be kept", texels.len());
+            return Err(refuse(scene, "the scene", reason));
+        }
 
         let mut geometry = Geometry {
             centre,
@@ -219,6 +227,12 @@ impl Geometry {
         Ok(geometry)
     }
 
+    /// The texels in the buffers that hold them.
+    pub fn texel_parts(&self) -> [&[u32]; TEXEL_BUFFERS] {
+        let mut parts = self.texels.chunks(TEXELS_PER_BUFFER as usize);
+        std::array::from_fn(|_| parts.next().unwrap_or(&[]))
+    }
+
     /// A normalised position in metres of the scene.
     pub fn to_world(&self, position: Vec3) -> DVec3 {
         position.as_dvec3() * self.unit + self.centre
@@ -247,7 +261,7 @@ impl Geometry {
         }
         if self.coarse_pieces > 0 {
             lines.push(format!(
-                "lamps shine by textures with so many small bright spots that {} of their triangles have spots too small to be found by chance; light from these may be missed, and more rounds find more of it",
+                "{} of textured lamps have spots much brighter than their mean, more than can be told apart; their light is noisy, and may be missed in few rounds",
                 counted(self.coarse_pieces, "part")
             ));
         }
@@ -342,27 +356,21 @@ fn material_record(material: &Material) -> SurfaceMaterial {
     }
 }
 
-/// Textures that a material uses, as half floats.
-fn pack_textures(scene: &Scene) -> (Vec<TextureInfo>, Vec<UVec2>) {
+/// Textures that a material uses, behind the linear values of 8-bit codes.
+fn pack_textures(scene: &Scene) -> (Vec<TextureInfo>, Vec<u32>) {
     let mut is_used = vec![false; scene.textures.len()];
     for material in &scene.materials {
         for of in [material.base_colour_texture, material.emission_texture].into_iter().flatten() {
             is_used[of.texture] = true;
         }
     }
-    let pack = |texel: &Vec3| {
-        // Four at once, as CPUs convert them in one instruction.
-        let mut halves = [half::f16::ZERO; 4];
-        halves.convert_from_f32_slice(&texel.extend(0.0).to_array());
-        let [x, y, z, _] = halves.map(|half| u32::from(half.to_bits()));
-        UVec2::new(x | y << 16, z)
-    };
     let code = |wrap: Wrap| match wrap {
         Wrap::Repeat => 0,
         Wrap::MirroredRepeat => 1,
         Wrap::Clamp => 2,
     };
-    let mut texels = Vec::new();
+    let codes = if scene.textures.is_empty() { &[][..] } else { &LINEAR_OF_SRGB[..] };
+    let mut texels: Vec<u32> = codes.iter().map(|value| value.to_bits()).collect();
     let mut infos = Vec::with_capacity(scene.textures.len());
     for (texture, is_used) in scene.textures.iter().zip(is_used) {
         infos.push(TextureInfo {
@@ -370,9 +378,10 @@ fn pack_textures(scene: &Scene) -> (Vec<TextureInfo>, Vec<UVec2>) {
             height: texture.height,
             first_texel: texels.len() as u32,
             wrap: code(texture.wrap[0]) | code(texture.wrap[1]) << 2,
+            shares_exponent: u32::from(matches!(texture.texels, Texels::SharedExponent(_))),
         });
         if is_used {
-            texels.par_extend(texture.texels.par_iter().map(pack));
+            texels.par_extend(texture.texels.words());
         }
     }
     (infos, texels)

@@ -6,23 +6,23 @@ use std::collections::{BTreeSet, HashMap};
 
 use glam::{DVec2, Vec3, Vec4};
 use gltf::Document;
-use image::{DynamicImage, ImageDecoder};
+use image::{DynamicImage, ImageDecoder, RgbaImage};
 use rayon::prelude::*;
 
 use super::{Loader, accessor, called, one_line, printable};
 use crate::error::{Error, Result};
-use crate::scene::Progress;
 use crate::scene::material::{Material, TextureUse, UvTransform, surface_of};
-use crate::scene::texture::{Texture, Wrap, linear_of_srgb};
+use crate::scene::texture::{Texels, Texture, Wrap};
+use crate::scene::{Progress, geometry};
 
 /// Texture coordinates that are moved or scaled by more have no digits left.
 const MAX_TRANSFORM: f32 = 1e6;
-/// Of all textures together: 1.5 GiB.
-const MAX_TEXELS: u64 = 1 << 27;
+/// Of all textures together: half a GiB.
+const MAX_TEXELS: u64 = geometry::MAX_TEXELS as u64 - 256;
 
 impl Loader {
     pub(super) fn read_textures(&mut self, document: &Document, progress: Progress) -> Result<()> {
-        // Pictures that only normal or roughness maps use are not looked at.
+        // Pictures that only other maps use are no textures of the scene.
         let mut used = BTreeSet::new();
         for material in document.materials() {
             used.extend(material.pbr_metallic_roughness().base_color_texture().map(|info| info.texture().index()));
@@ -89,23 +89,49 @@ impl Loader {
         reader.into_decoder().map_err(|error| self.undecodable(what, &error))
     }
 
-    fn read_texture(&self, texture: &gltf::Texture, what: &str, bytes: &[u8]) -> Result<Texture> {
+    fn decoded(&self, what: &str, bytes: &[u8]) -> Result<RgbaImage> {
         let undecodable = |error: image::ImageError| self.undecodable(what, &error);
         let decoder = self.decoder(what, bytes)?;
         image_limits().reserve(decoder.total_bytes()).map_err(undecodable)?;
-        let picture = DynamicImage::from_decoder(decoder).map_err(undecodable)?.into_rgb8();
+        Ok(DynamicImage::from_decoder(decoder).map_err(undecodable)?.into_rgba8())
+    }
+
+    /// Means of roughness and metalness over a whole picture; 1 where it cannot be read.
+    fn mean_roughness_and_metalness(&mut self, texture: &gltf::Texture, object: &str) -> [f32; 2] {
+        let source = texture.source().index();
+        if let Some(means) = self.mean_materials.get(&source) {
+            return *means;
+        }
+        let read = self.encoded_image(texture).and_then(|(what, bytes)| self.decoded(&what, &bytes));
+        let means = match read {
+            Ok(picture) => {
+                // Sums of whole numbers depend on no order.
+                let codes = picture.as_raw().par_chunks_exact(4).map(|texel| [u64::from(texel[1]), u64::from(texel[2])]);
+                let sums = codes.reduce(|| [0; 2], |a, b| [a[0] + b[0], a[1] + b[1]]);
+                sums.map(|sum| (sum as f64 / (255.0 * f64::from(picture.width()) * f64::from(picture.height()))) as f32)
+            }
+            Err(_) => {
+                self.leave_out("metallic-roughness textures that cannot be decoded", object);
+                [1.0; 2]
+            }
+        };
+        self.mean_materials.insert(source, means);
+        means
+    }
+
+    fn read_texture(&self, texture: &gltf::Texture, what: &str, bytes: &[u8]) -> Result<Texture> {
+        let picture = self.decoded(what, bytes)?;
         let wrap = |mode: gltf::texture::WrappingMode| match mode {
             gltf::texture::WrappingMode::ClampToEdge => Wrap::Clamp,
             gltf::texture::WrappingMode::MirroredRepeat => Wrap::MirroredRepeat,
             gltf::texture::WrappingMode::Repeat => Wrap::Repeat,
         };
-        let linear: [f32; 256] = std::array::from_fn(|code| linear_of_srgb(code as u8));
-        let texel = |rgb: &[u8]| Vec3::new(linear[usize::from(rgb[0])], linear[usize::from(rgb[1])], linear[usize::from(rgb[2])]);
+        let (width, height) = picture.dimensions();
         Ok(Texture {
             name: what.to_owned(),
-            width: picture.width(),
-            height: picture.height(),
-            texels: picture.as_raw().par_chunks_exact(3).map(texel).collect(),
+            width,
+            height,
+            texels: Texels::Srgb(bytemuck::allocation::cast_vec(picture.into_raw())),
             wrap: [wrap(texture.sampler().wrap_s()), wrap(texture.sampler().wrap_t())],
         })
     }
@@ -127,19 +153,24 @@ impl Loader {
         let factor = transmission.as_ref().map_or(0.0, gltf::material::Transmission::transmission_factor);
         let ior = material.ior().unwrap_or(1.5);
         let object = format!("material '{name}'");
+        let [roughness, metallic] = match pbr.metallic_roughness_texture() {
+            Some(info) => self.mean_roughness_and_metalness(&info.texture(), &object),
+            None => [1.0; 2],
+        };
+        let (roughness, metallic) = (roughness * pbr.roughness_factor(), metallic * pbr.metallic_factor());
         for (what, present) in [
             ("normal textures", material.normal_texture().is_some()),
             ("occlusion textures", material.occlusion_texture().is_some()),
-            ("metallic-roughness textures", pbr.metallic_roughness_texture().is_some()),
+            ("metallic-roughness textures (taken as their mean)", pbr.metallic_roughness_texture().is_some()),
             ("transmission textures", transmission.as_ref().is_some_and(|t| t.transmission_texture().is_some())),
             ("transparency by alpha", material.alpha_mode() != gltf::material::AlphaMode::Opaque),
-            ("rough transmission (taken as smooth)", factor >= 0.5 && pbr.roughness_factor() > 0.05),
+            ("rough transmission (taken as smooth)", factor >= 0.5 && roughness > 0.05),
         ] {
             if present {
                 self.leave_out(what, &object);
             }
         }
-        for (what, share) in [("metallic", pbr.metallic_factor()), ("transmission", factor)] {
+        for (what, share) in [("metallic", metallic), ("transmission", factor)] {
             if share > 0.0 && share < 1.0 {
                 self.leave_out(format!("partly {what} surfaces (taken as the nearer of both)"), &object);
             }
@@ -188,7 +219,7 @@ impl Loader {
             })
         };
         Ok(Material {
-            surface: surface_of(pbr.metallic_factor(), pbr.roughness_factor(), factor, ior),
+            surface: surface_of(metallic, roughness, factor, ior),
             base_colour,
             base_colour_texture: texture_use(pbr.base_color_texture()),
             emission,

@@ -38,6 +38,17 @@ const READ_EXTENSIONS: [&str; 6] = [
     "KHR_mesh_quantization",
     "KHR_texture_transform",
 ];
+/// What a surface has besides its base: a file that needs one of these is read without it, and a warning says so.
+const OPTIONAL_EXTENSIONS: [&str; 8] = [
+    "KHR_materials_anisotropy",
+    "KHR_materials_clearcoat",
+    "KHR_materials_diffuse_transmission",
+    "KHR_materials_dispersion",
+    "KHR_materials_iridescence",
+    "KHR_materials_sheen",
+    "KHR_materials_specular",
+    "KHR_materials_volume",
+];
 /// Nodes within nodes; deeper ones would be a cycle.
 const MAX_DEPTH: usize = 512;
 
@@ -57,7 +68,8 @@ pub fn load(path: &Path, radiometric: bool, progress: Progress) -> Result<Scene>
         return Err(refuse(format!("is of glTF version {version}; 2.0 is read")));
     }
     // Before anything else: what a file needs an extension for may look missing without it.
-    let unread: Vec<&str> = root.extensions_required.iter().map(String::as_str).filter(|name| !READ_EXTENSIONS.contains(name)).collect();
+    let is_unread = |name: &&str| !READ_EXTENSIONS.contains(name) && !OPTIONAL_EXTENSIONS.contains(name);
+    let unread: Vec<&str> = root.extensions_required.iter().map(String::as_str).filter(is_unread).collect();
     if !unread.is_empty() {
         let remedies: BTreeSet<&str> = unread.iter().map(|name| remedy(name)).collect();
         let remedies: Vec<&str> = remedies.into_iter().collect();
@@ -75,6 +87,7 @@ pub fn load(path: &Path, radiometric: bool, progress: Progress) -> Result<Scene>
         left_out: BTreeMap::new(),
         triangle_count: 0,
         texture_places: HashMap::new(),
+        mean_materials: HashMap::new(),
         unit: if radiometric { 1.0 } else { 1.0 / LUMENS_PER_WATT },
     };
     loader.read_buffers(&document, blob)?;
@@ -130,6 +143,8 @@ pub(super) struct Loader {
     triangle_count: usize,
     /// Where a texture of the file stands in the scene.
     texture_places: HashMap<usize, usize>,
+    /// Mean roughness and metalness of pictures, by their number in the file.
+    mean_materials: HashMap<usize, [f32; 2]>,
     /// Watts in one unit of a punctual light.
     unit: f32,
 }
