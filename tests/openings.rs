@@ -81,6 +81,55 @@ fn a_sky_through_a_window_is_as_light_as_the_closed_form_says() {
     assert_holds("the window", light_through_a_window(&gpu));
 }
 
+/// A niche with a hole of its own, three centimetres wide, that one point of two hundred sees beside the window: rays are aimed at the
+/// window, and of the hole's light it is said that it may be missing.
+pub fn second_opening(gpu: &Gpu) -> Check<Complaint> {
+    let mut room = room_under_the_sky(0.447);
+    room.materials[0] = Material { two_sided: true, ..matt(0.0) };
+    room.meshes.retain(|mesh| mesh.name != "right");
+    let sheet = |origin: DVec3, u: DVec3, v: DVec3| Mesh::parallelogram("sheet", origin, u, v, 0);
+    let (x, y, z) = (DVec3::X, DVec3::Y, DVec3::Z);
+    // The wall about a hole of 3 cm, and a screen before it.
+    room.meshes.extend([
+        sheet(dvec3(2.0, 0.0, -2.0), y * 0.11, z * 4.0),
+        sheet(dvec3(2.0, 0.14, -2.0), y * 2.86, z * 4.0),
+        sheet(dvec3(2.0, 0.11, -2.0), y * 0.03, z * 1.985),
+        sheet(dvec3(2.0, 0.11, 0.015), y * 0.03, z * 1.985),
+        sheet(dvec3(1.7, 0.0, -0.3), y * 0.2, z * 0.6),
+        sheet(dvec3(1.7, 0.0, -0.3), x * 0.3, y * 0.2),
+        sheet(dvec3(1.7, 0.0, 0.3), x * 0.3, y * 0.2),
+    ]);
+    let mut points: Vec<_> =
+        (0..200).map(|k| (dvec3(-1.9 + 0.33 * f64::from(k % 10), 0.0, -1.9 + 0.19 * f64::from(k / 10)), DVec3::Y)).collect();
+    points.push((dvec3(1.85, 0.0, 0.0), DVec3::Y));
+    // Of the hole: from the middle of the point's view of it.
+    let way = dvec3(0.15, 0.125, 0.0);
+    let missing = 0.0009 * way.x * way.y / way.length_squared().powi(2);
+    let lit = render(gpu, &room, &SceneSettings::default(), Target::Points(&points)).unwrap();
+    let hidden = lit.film.unknown(&lit.plan, 0.95).hidden;
+    println!("{hidden:?}, {missing} may be missing; {:?}", red(&lit, 200));
+    assert_eq!(lit.plan.trial.as_ref().map(|trial| trial.openings.len()), Some(1));
+    let (found, error) = red(&lit, 200);
+    assert!(found > 0.01 && error < 0.5 * missing, "the window alone: {found} +- {error}");
+    if hidden.points < 150 || hidden.upper_bound < missing {
+        return Err(Complaint::new(Kind::TooDark, format!("{missing} W/m2 may be missing, and {hidden:?} is known")));
+    }
+    assert!(lit.film.unknown(&lit.plan, 0.95).text("point", "W/m2", 0.95, 16).contains("some part of the sky"));
+    Ok(())
+}
+
+#[test]
+fn a_second_opening_that_few_points_see_is_said_to_be_hidden() {
+    let Some(gpu) = device() else { return };
+    assert_holds("a niche", second_opening(&gpu));
+    // In a picture it is next to nothing beside the light of all pixels.
+    let eye = Camera::looking_at("eye", dvec3(-1.9, 2.0, -1.9), dvec3(0.5, 0.5, 0.5), DVec3::Y, 1.0);
+    let bright = Scene { materials: vec![matt(0.5)], ..room_under_the_sky(0.447) };
+    let seen = render(&gpu, &bright, &SceneSettings::default(), Target::Picture(&eye, [64, 64])).unwrap();
+    let hidden = seen.film.unknown(&seen.plan, 0.95).hidden;
+    assert!(hidden.of_mean < 0.01, "{hidden:?}");
+}
+
 /// Where nothing is gained nothing changes: under the open sky.
 #[test]
 fn an_open_scene_has_no_openings_and_the_same_bits() {

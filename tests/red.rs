@@ -71,6 +71,7 @@ enum Question {
     DimRoom(f32),
     HiddenLamp,
     LampBehindHole,
+    SecondOpening,
     DimPhotons,
     TinyPlates,
     VertexColours,
@@ -107,7 +108,9 @@ impl Question {
             Photons(_) | StripedCounters | RoomFilm(_) | Ledger(_) | ClosedForm(_) | Builders | StrictMath | Nearest | Pairs
             | FiniteBox => Subject::Room,
             AimedLight(_) => Subject::Aiming,
-            BrightSpot | DimRoom(_) | ManyLamps(_) | MissedLamp | HiddenLamp | LampBehindHole | DimPhotons => Subject::Lamps,
+            BrightSpot | DimRoom(_) | ManyLamps(_) | MissedLamp | HiddenLamp | LampBehindHole | SecondOpening | DimPhotons => {
+                Subject::Lamps
+            }
             _ => Subject::Scenes,
         }
     }
@@ -126,7 +129,7 @@ struct Fault {
 }
 
 #[rustfmt::skip]
-const FAULTS: [Fault; 87] = [
+const FAULTS: [Fault; 88] = [
     Fault { what: "what rounding takes from a pair of floats is forgotten",
         file: "film/float_u64.glsl", from: "precise float rest = sum.y + (", to: "precise float rest = 0.0 * (",
         kernels: &["gather_brute_u64", "gather_grid_u64"], noticed_by: &[(Pairs, SumsTooSmall)] },
@@ -420,8 +423,11 @@ const FAULTS: [Fault; 87] = [
     Fault { what: "a triangle has the vertex colour of its first corner",
         file: "material/surface.glsl", from: "at.a + hit.u * (at.b - at.a) + hit.v * (at.c - at.a);", to: "at.a;",
         kernels: &["view"], noticed_by: &[(VertexColours, WrongTexel)] },
+    Fault { what: "the sky beside the openings that are known counts as seen",
+        file: "world/scene/lights.glsl", from: "arriving.is_beside = !sampled.is_aimed;", to: "",
+        kernels: &["receive"], noticed_by: &[(SecondOpening, TooDark)] },
     Fault { what: "what stands before hidden lamps is forgotten",
-        file: "world/scene/direct.glsl", from: "stopped_unseen_light = is_unseen ? stopped : stopped_unseen_light;", to: "",
+        file: "world/scene/direct.glsl", from: "stopped_unseen_light = is_unseen ? max(stopped_unseen_light, stopped) : stopped_unseen_light;", to: "",
         kernels: &["receive"], noticed_by: &[(LampBehindHole, TooDark)] },
     Fault { what: "dim photons count as bright ones",
         file: "kernels/flux_to_radiance.comp", from: "* float(DIM_PHOTONS) >= 1.0", to: "* float(DIM_PHOTONS) >= 0.0",
@@ -522,6 +528,7 @@ fn ask(gpu: &Gpu, question: Question) -> Check<Complaint> {
         HiddenLamp => lamps::hidden_lamp(gpu, 1e4, true),
         TinyPlates => known::tiny_plates(gpu),
         LampBehindHole => crate::unknown::hidden_lamp(gpu),
+        SecondOpening => crate::openings::second_opening(gpu),
         DimPhotons => crate::unknown::dim_photons(gpu),
         VertexColours => known::vertex_colours(gpu),
         ManyLamps(side) => lamps::many_lamps(gpu, side, true),

@@ -81,7 +81,7 @@ impl Unknown {
         if hidden.of_mean > WORTH_A_LINE {
             let Uncounted { points, upper_bound, .. } = hidden;
             text.push_str(&format!(
-                "hidden: from {} no shadow ray has met some lamp or the sky. Walls may hide it. If all rays missed a gap, it adds at most {upper_bound:.3e} {unit} to one of them ({sure} % confidence). The noise bound does not include this.\n",
+                "hidden: from {} no shadow ray has met some lamp or some part of the sky. Walls may hide it. If all rays missed a gap, it adds at most {upper_bound:.3e} {unit} to one of them ({sure} % confidence). The noise bound does not include this.\n",
                 counted(points, point)
             ));
         }

@@ -49,7 +49,11 @@ void note_shadow_rays(uint pixel, vec3 weight)
     } else {
         note_miss(pixel, HIT_SHADOW_RAY, weight * stopped_light);
     }
-    if (LIGHT_CLUSTERS != 0) {
+    bool may_be_unseen = LIGHT_CLUSTERS != 0;
+    if (HAS_OPENINGS) {
+        may_be_unseen = true;
+    }
+    if (may_be_unseen) {
         if (unseen_light_arrived && !is_reached(pixel, HIT_UNSEEN_LIGHT)) {
             note_hit(pixel, HIT_UNSEEN_LIGHT);
         } else {

@@ -40,7 +40,7 @@ ShadowRay cast_shadow_ray(Target point, Arriving arriving, Draws draws, uint ind
 // missed.
 vec3 stopped_light = vec3(0.0);
 bool light_arrived = false;
-// The same of the lights that a trial has not seen from round about.
+// The same of the lights that a trial has not seen from round about, and of the sky beside the openings that it has found.
 vec3 stopped_unseen_light = vec3(0.0);
 bool unseen_light_arrived = false;
 
@@ -85,9 +85,10 @@ vec3 direct_light(Target point, uint emitter_count, Draws draws, uint index, uin
         } else {
             light = emitters[pick_emitter(emitter_count, u.z)];
         }
-        ShadowRay found = cast_shadow_ray(point, sample_light(light, point.position, point.ns, u.xy), draws, index);
+        Arriving arriving = sample_light(light, point.position, point.ns, u.xy);
+        ShadowRay found = cast_shadow_ray(point, arriving, draws, index);
         if (found.is_asked) {
-            bool is_unseen = ray == SHADOW_RAYS;
+            bool is_unseen = ray == SHADOW_RAYS || arriving.is_beside;
             if (!found.is_hidden) {
                 sum += count * found.light;
                 light_arrived = true;
@@ -96,7 +97,7 @@ vec3 direct_light(Target point, uint emitter_count, Draws draws, uint index, uin
                 bool is_certain = light.kind == EMITTER_POINT || light.kind == EMITTER_SPOT || light.kind == EMITTER_DIRECTIONAL;
                 vec3 stopped = is_certain ? vec3(0.0) : divide(count * found.light, float(SHADOW_RAYS));
                 stopped_light = max(stopped_light, stopped);
-                stopped_unseen_light = is_unseen ? stopped : stopped_unseen_light;
+                stopped_unseen_light = is_unseen ? max(stopped_unseen_light, stopped) : stopped_unseen_light;
             }
         }
     }

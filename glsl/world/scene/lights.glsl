@@ -167,12 +167,13 @@ struct Arriving {
     vec3 radiance;
     vec3 target;
     bool is_far;
+    bool is_beside; // from the sky, and through none of the openings that a trial found
 };
 
 // `light` has the probability with which it was chosen; u is for its area.
 Arriving sample_light(Emitter light, vec3 position, vec3 ns, vec2 u)
 {
-    Arriving arriving = Arriving(vec3(0.0), divide(light.strength, light.probability), light.position, false);
+    Arriving arriving = Arriving(vec3(0.0), divide(light.strength, light.probability), light.position, false, false);
     float cos_light = 1.0;
     bool by_direction = false;
     if (HAS_TRIANGLE_LIGHTS) {
@@ -249,6 +250,7 @@ Arriving sample_light(Emitter light, vec3 position, vec3 ns, vec2 u)
             } else {
                 SampledSky sampled = sample_sky(position, ns, u.xy);
                 arriving.wi = sampled.wi;
+                arriving.is_beside = !sampled.is_aimed;
                 arriving.radiance *= divide(1.0, max(sampled.density, 1e-6));
             }
         }

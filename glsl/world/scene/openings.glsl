@@ -22,6 +22,7 @@ float opening_versine(uint opening, vec3 position)
 struct SampledSky {
     vec3 wi;
     float density;
+    bool is_aimed; // it leads to an opening, by whichever way it was found
 };
 
 // Towards the openings or, by the cosine, anywhere.
@@ -52,6 +53,7 @@ SampledSky sample_sky(vec3 position, vec3 ns, vec2 u)
         wi = to_frame(sample_cosine_hemisphere(divide(u.x - share, 1.0 - share), u.y), ns);
     }
     float density = (1.0 - share) * max(dot(wi, ns), 0.0) * 0.31830988618379067;
+    bool is_aimed = false;
     if (share > 0.0) {
         float cones = 0.0;
         for (uint k = 0; k < MAX_OPENINGS && openings[k].radius > 0.0; k++) {
@@ -59,8 +61,9 @@ SampledSky sample_sky(vec3 position, vec3 ns, vec2 u)
             cones += own > 0.0 && versine_between(wi, normalize(openings[k].centre - position)) <= own ? 1.0 : 0.0;
         }
         density += divide(share * cones, 6.28318530717958648 * sum);
+        is_aimed = cones > 0.0;
     }
-    return SampledSky(wi, density);
+    return SampledSky(wi, density, is_aimed);
 }
 
 // Moves a photon from beyond the scene, which keeps its direction: it starts on the discs that cover the openings, or stays.
