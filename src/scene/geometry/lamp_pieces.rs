@@ -363,7 +363,7 @@ mod tests {
 
     #[test]
     fn what_is_too_much_to_cut_is_counted() {
-        let texture = speckled(1024, 1024, 400, Wrap::Clamp);
+        let texture = speckled(1024, 1024, 100, Wrap::Clamp);
         let shining = Shining::new(&texture);
         let lamp = || Lamp { shining: &shining, uvs: [DVec2::ZERO, DVec2::X, DVec2::Y], flux: 1.0 };
         let Cut { pieces, left } = cut(&[lamp(), lamp()]);
