@@ -1,5 +1,5 @@
 // What the photon maps found at each visible point, as light: flux over the area that really lies on the surface, times
-// reflectance, in film units. It takes the place of the point's first sums.
+// reflectance, in film units. It takes the place of the point's first sums. Notes which pixels photons have reached, and bright ones.
 // Dispatched by src/engine/scene/estimate.rs once a round. One thread = one visible point.
 #extension GL_EXT_control_flow_attributes : require
 #extension GL_KHR_shader_subgroup_basic : require

@@ -96,26 +96,20 @@ impl Loader {
         Ok(DynamicImage::from_decoder(decoder).map_err(undecodable)?.into_rgba8())
     }
 
-    /// Means of roughness and metalness over a whole picture; 1 where it cannot be read.
-    fn mean_roughness_and_metalness(&mut self, texture: &gltf::Texture, object: &str) -> [f32; 2] {
+    /// Means of roughness and metalness over a whole picture; `None` where it cannot be read.
+    fn mean_roughness_and_metalness(&mut self, texture: &gltf::Texture) -> Option<[f32; 2]> {
         let source = texture.source().index();
-        if let Some(means) = self.mean_materials.get(&source) {
+        if let Some(means) = self.mean_roughness_and_metalness.get(&source) {
             return *means;
         }
-        let read = self.encoded_image(texture).and_then(|(what, bytes)| self.decoded(&what, &bytes));
-        let means = match read {
-            Ok(picture) => {
-                // Sums of whole numbers depend on no order.
-                let codes = picture.as_raw().par_chunks_exact(4).map(|texel| [u64::from(texel[1]), u64::from(texel[2])]);
-                let sums = codes.reduce(|| [0; 2], |a, b| [a[0] + b[0], a[1] + b[1]]);
-                sums.map(|sum| (sum as f64 / (255.0 * f64::from(picture.width()) * f64::from(picture.height()))) as f32)
-            }
-            Err(_) => {
-                self.leave_out("metallic-roughness textures that cannot be decoded", object);
-                [1.0; 2]
-            }
-        };
-        self.mean_materials.insert(source, means);
+        let picture = self.encoded_image(texture).and_then(|(what, bytes)| self.decoded(&what, &bytes)).ok();
+        let means = picture.map(|picture| {
+            // Sums of whole numbers depend on no order.
+            let codes = picture.as_raw().par_chunks_exact(4).map(|texel| [u64::from(texel[1]), u64::from(texel[2])]);
+            let sums = codes.reduce(|| [0; 2], |a, b| [a[0] + b[0], a[1] + b[1]]);
+            sums.map(|sum| (sum as f64 / (255.0 * f64::from(picture.width()) * f64::from(picture.height()))) as f32)
+        });
+        self.mean_roughness_and_metalness.insert(source, means);
         means
     }
 
@@ -153,15 +147,14 @@ impl Loader {
         let factor = transmission.as_ref().map_or(0.0, gltf::material::Transmission::transmission_factor);
         let ior = material.ior().unwrap_or(1.5);
         let object = format!("material '{name}'");
-        let [roughness, metallic] = match pbr.metallic_roughness_texture() {
-            Some(info) => self.mean_roughness_and_metalness(&info.texture(), &object),
-            None => [1.0; 2],
-        };
+        let means = pbr.metallic_roughness_texture().map(|info| self.mean_roughness_and_metalness(&info.texture()));
+        let [roughness, metallic] = means.flatten().unwrap_or([1.0; 2]);
         let (roughness, metallic) = (roughness * pbr.roughness_factor(), metallic * pbr.metallic_factor());
         for (what, present) in [
             ("normal textures", material.normal_texture().is_some()),
             ("occlusion textures", material.occlusion_texture().is_some()),
-            ("metallic-roughness textures (taken as their mean)", pbr.metallic_roughness_texture().is_some()),
+            ("metallic-roughness textures (taken as their mean)", matches!(means, Some(Some(_)))),
+            ("metallic-roughness textures that cannot be read (the factors alone count)", matches!(means, Some(None))),
             ("transmission textures", transmission.as_ref().is_some_and(|t| t.transmission_texture().is_some())),
             ("transparency by alpha", material.alpha_mode() != gltf::material::AlphaMode::Opaque),
             ("rough transmission (taken as smooth)", factor >= 0.5 && roughness > 0.05),

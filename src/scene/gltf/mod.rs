@@ -1,9 +1,10 @@
 //! Scenes from `.gltf` and `.glb` files (glTF 2.0).
 //!
 //! Read: meshes with node transforms and instances, skins in the pose of their nodes and morph targets by their weights at rest,
-//! quantized or not, smooth normals, two sets of texture coordinates and their transforms, base colour and emission with textures, vertex colours,
-//! metallic-roughness (mapped by [`super::material::surface_of`]), KHR_materials_emissive_strength, _ior, _transmission,
-//! KHR_lights_punctual, perspective cameras. Whatever else the file holds is named in a warning.
+//! quantized or not, smooth normals, two sets of texture coordinates and their transforms, base colour and emission with textures,
+//! vertex colours, metallic-roughness (mapped by [`super::material::surface_of`], textures by their mean),
+//! KHR_materials_emissive_strength, _ior, _transmission, KHR_lights_punctual, perspective cameras. Whatever else the file holds is
+//! named in a warning.
 
 mod accessor;
 mod lights;
@@ -87,7 +88,7 @@ pub fn load(path: &Path, radiometric: bool, progress: Progress) -> Result<Scene>
         left_out: BTreeMap::new(),
         triangle_count: 0,
         texture_places: HashMap::new(),
-        mean_materials: HashMap::new(),
+        mean_roughness_and_metalness: HashMap::new(),
         unit: if radiometric { 1.0 } else { 1.0 / LUMENS_PER_WATT },
     };
     loader.read_buffers(&document, blob)?;
@@ -143,8 +144,8 @@ pub(super) struct Loader {
     triangle_count: usize,
     /// Where a texture of the file stands in the scene.
     texture_places: HashMap<usize, usize>,
-    /// Mean roughness and metalness of pictures, by their number in the file.
-    mean_materials: HashMap<usize, [f32; 2]>,
+    /// Mean roughness and metalness of pictures, by their number in the file; `None` where one cannot be read.
+    mean_roughness_and_metalness: HashMap<usize, Option<[f32; 2]>>,
     /// Watts in one unit of a punctual light.
     unit: f32,
 }
