@@ -62,8 +62,13 @@ constants! {
     SURFACE_GLOSSY = 2;
     SURFACE_MIRROR = 3;
     SURFACE_DIELECTRIC = 4;
+    SURFACE_LAYERED = 6;
     /// No surface: a point that receives, of which irradiance is asked.
     SURFACE_RECEIVER = 5;
+    /// GGX lobes with an alpha of so many thousandths or more take part in photon maps; rays follow sharper ones.
+    MAP_ALPHA_PER_MILLE = 250;
+    /// GGX lobes with an alpha below the inverse are deltas.
+    DELTA_ALPHA_INVERSE = 10_000;
     /// A material without a texture, a triangle without smooth normals, a ray without a hit.
     NONE = 0xffff_ffff;
     /// Bit of a triangle's plane: others hide a part of the triangle.

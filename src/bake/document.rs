@@ -267,7 +267,7 @@ impl Document {
         self.textures.len() - 1
     }
 
-    /// The inverse of [`crate::scene::material::surface_of`]. The paper's Phong has no counterpart and
+    /// The paper's Phong has no counterpart and
     /// becomes Lambertian, as which it scatters.
     fn material(&mut self, material: &Material, of_texture: impl Fn(TextureUse) -> Value) -> Value {
         let (metallic, roughness) = match material.surface {
@@ -275,6 +275,7 @@ impl Document {
             Surface::Glossy { exponent } => (1.0, (2.0 / (exponent + 2.0)).powf(0.25)),
             Surface::Mirror => (1.0, 0.0),
             Surface::Dielectric { .. } => (0.0, 0.0),
+            Surface::Layered => (material.layers.metallic, material.layers.roughness),
         };
         let [red, green, blue] = material.base_colour.to_array();
         let mut value = json!({

@@ -69,7 +69,7 @@ fn radiance(scene: &Scene, lightmap: &MeshLightmap, map: &Map) -> Vec<Vec3> {
         let irradiance = map.irradiance[(texel.y * map.width + texel.x) as usize];
         let of_points = texel.points.iter().map(|point| {
             let colour = |texture: Option<TextureUse>| match texture {
-                Some(used) => scene.textures[used.texture].sample(used.transform.apply(point.uv(&lightmap.mesh, used.uv_set))),
+                Some(used) => scene.textures[used.texture].sample(used.transform.apply(point.uv(&lightmap.mesh, used.uv_set))).truncate(),
                 None => Vec3::ONE,
             };
             base_colour * point.colour(&lightmap.mesh).as_vec3() * colour(base_colour_texture) * irradiance / PI

@@ -177,6 +177,10 @@ fn charts(mesh: &Mesh, texels_per_metre: f64) -> Result<Unwrapped, String> {
             normals: kept(&mesh.normals),
             uvs: mesh.uvs.each_ref().map(of_set),
             colours: kept(&mesh.colours),
+            alphas: if mesh.alphas.is_empty() { Vec::new() } else { output.vertices.iter().map(|v| mesh.alphas[source(v)]).collect() },
+            // Triangles keep their order.
+            tangents: mesh.tangents.clone(),
+            coat_tangents: mesh.coat_tangents.clone(),
             triangles: output.indices.chunks_exact(3).map(|corners| [corners[0], corners[1], corners[2]]).collect(),
             material: mesh.material,
         },

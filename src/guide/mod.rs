@@ -13,6 +13,10 @@ pub mod paper {}
 pub mod scenes {}
 
 #[doc = include_str!("links.md")]
+#[doc = include_str!("materials.md")]
+pub mod materials {}
+
+#[doc = include_str!("links.md")]
 #[doc = include_str!("accuracy.md")]
 pub mod accuracy {}
 

@@ -81,7 +81,7 @@ pub fn texture_png(texture: &Texture) -> Vec<u8> {
             let codes: Vec<u8> = codes.iter().flat_map(|[red, green, blue, _]| [*red, *green, *blue]).collect();
             eight_bits(texture.width, texture.height, ExtendedColorType::Rgb8, &codes)
         }
-        texels => png(texture.width, texture.height, (0..texels.count()).map(|place| texels.at(place))),
+        texels => png(texture.width, texture.height, (0..texels.count()).map(|place| texels.at(place).truncate())),
     }
 }
 

@@ -22,6 +22,8 @@ pub enum Surface {
     Dielectric {
         ior: f32,
     },
+    /// glTF's: a mixture of the lobes of [`Material::layers`].
+    Layered,
 }
 
 /// A texture, the set of coordinates that it is looked up with, and where these lead.
@@ -62,6 +64,97 @@ impl TextureUse {
     }
 }
 
+/// Normals in the frame of tangent, bitangent and normal, as codes from -1 to 1; `scale` multiplies the first two.
+#[derive(Debug, Clone, Copy, PartialEq)]
+pub struct NormalMap {
+    pub texture: TextureUse,
+    pub scale: f32,
+}
+
+/// How much of a surface is there: the share of light that it stops.
+#[derive(Debug, Clone, Copy, PartialEq)]
+pub enum Coverage {
+    Whole,
+    /// All where alpha is at least `cutoff`, else nothing.
+    Mask { alpha: f32, cutoff: f32 },
+    /// Alpha itself.
+    Blend { alpha: f32 },
+}
+
+/// What a transmissive surface encloses.
+#[derive(Debug, Clone, Copy, PartialEq)]
+pub struct Medium {
+    /// Share of the light that is left after each metre, per channel; 1: all of it.
+    pub transmittance: Vec3,
+}
+
+/// glTF's metallic-roughness model and what its extensions add. Factors multiply textures; the guide's page
+/// [materials](crate::guide::materials) has the formulas.
+#[derive(Debug, Clone, Copy, PartialEq)]
+pub struct Layers {
+    pub metallic: f32,
+    pub roughness: f32,
+    /// Roughness in green, metalness in blue.
+    pub metallic_roughness_texture: Option<TextureUse>,
+    /// Of the dielectric; 0: it reflects as if the index were infinite.
+    pub ior: f32,
+    /// Scales what the dielectric reflects; the texture has it in alpha.
+    pub specular: f32,
+    pub specular_texture: Option<TextureUse>,
+    /// Tints what the dielectric reflects along the normal.
+    pub specular_colour: Vec3,
+    pub specular_colour_texture: Option<TextureUse>,
+    /// Share of what enters the dielectric that it lets through; the texture has it in red.
+    pub transmission: f32,
+    pub transmission_texture: Option<TextureUse>,
+    /// `None`: a thin wall.
+    pub medium: Option<Medium>,
+    /// Share of the surface under a clear coat; the texture has it in red.
+    pub coat: f32,
+    pub coat_texture: Option<TextureUse>,
+    pub coat_roughness: f32,
+    /// In green.
+    pub coat_roughness_texture: Option<TextureUse>,
+    /// The coat's own; without one it has the normals of the mesh.
+    pub coat_normal_map: Option<NormalMap>,
+    pub sheen_colour: Vec3,
+    pub sheen_colour_texture: Option<TextureUse>,
+    pub sheen_roughness: f32,
+    /// In alpha.
+    pub sheen_roughness_texture: Option<TextureUse>,
+    /// The base colour is shown to the eye as radiance, W/m2/sr; no lobe is left.
+    pub is_unlit: bool,
+}
+
+impl Default for Layers {
+    /// What a glTF material is that says nothing.
+    fn default() -> Layers {
+        Layers {
+            metallic: 1.0,
+            roughness: 1.0,
+            metallic_roughness_texture: None,
+            ior: 1.5,
+            specular: 1.0,
+            specular_texture: None,
+            specular_colour: Vec3::ONE,
+            specular_colour_texture: None,
+            transmission: 0.0,
+            transmission_texture: None,
+            medium: None,
+            coat: 0.0,
+            coat_texture: None,
+            coat_roughness: 0.0,
+            coat_roughness_texture: None,
+            coat_normal_map: None,
+            sheen_colour: Vec3::ZERO,
+            sheen_colour_texture: None,
+            sheen_roughness: 0.0,
+            sheen_roughness_texture: None,
+            is_unlit: false,
+        }
+    }
+}
+
 #[derive(Debug, Clone, PartialEq)]
 pub struct Material {
     pub name: String,
@@ -76,6 +169,10 @@ pub struct Material {
     pub emission_texture: Option<TextureUse>,
     /// The back scatters (and shines) as the front does.
     pub two_sided: bool,
+    /// Of [`Surface::Layered`], as all below. The texture of the base colour has alpha, too.
+    pub coverage: Coverage,
+    pub normal_map: Option<NormalMap>,
+    pub layers: Layers,
 }
 
 impl Surface {
@@ -95,49 +192,18 @@ impl Material {
             emission: Vec3::ZERO,
             emission_texture: None,
             two_sided: false,
+            coverage: Coverage::Whole,
+            normal_map: None,
+            layers: Layers::default(),
         }
+    }
+
+    /// A layered one without textures.
+    pub fn layered(name: &str, base_colour: Vec3, layers: Layers) -> Material {
+        Material { surface: Surface::Layered, layers, ..Material::lambert(name, base_colour) }
     }
 
     pub fn is_emissive(&self) -> bool {
         self.emission.max_element() > 0.0
-    }
-}
-
-/// Roughness up to which a metal counts as a mirror: its lobe is narrower than half a degree.
-const MIRROR_ROUGHNESS: f32 = 0.08;
-
-/// glTF's metallic-roughness model as one of the surfaces above.
-///
-/// - transmission of one half or more: a smooth dielectric of the material's index of refraction;
-/// - metallic of one half or more: a mirror, or from roughness 0.08 up a modified Phong lobe with the
-///   exponent 2 / alpha^2 - 2, alpha = roughness^2, the usual match of Phong and microfacet widths
-///   (Walter et al. 2007);
-/// - else Lambertian: the faint specular coat of glTF's non-metals is left out.
-pub fn surface_of(metallic: f32, roughness: f32, transmission: f32, ior: f32) -> Surface {
-    if transmission >= 0.5 {
-        return Surface::Dielectric { ior };
-    }
-    if metallic < 0.5 {
-        return Surface::Lambert;
-    }
-    if roughness < MIRROR_ROUGHNESS {
-        return Surface::Mirror;
-    }
-    let alpha = roughness * roughness;
-    Surface::Glossy { exponent: (2.0 / (alpha * alpha) - 2.0).max(0.0) }
-}
-
-#[cfg(test)]
-mod tests {
-    use super::*;
-
-    #[test]
-    fn metallic_roughness_becomes_one_surface() {
-        assert_eq!(surface_of(0.0, 0.0, 1.0, 1.33), Surface::Dielectric { ior: 1.33 });
-        assert_eq!(surface_of(0.0, 0.3, 0.0, 1.5), Surface::Lambert);
-        assert_eq!(surface_of(1.0, 0.0, 0.0, 1.5), Surface::Mirror);
-        assert_eq!(surface_of(1.0, 1.0, 0.0, 1.5), Surface::Glossy { exponent: 0.0 });
-        let Surface::Glossy { exponent } = surface_of(1.0, 0.5, 0.0, 1.5) else { panic!("rough metal is glossy") };
-        assert!((exponent - 30.0).abs() < 1e-4, "{exponent}");
     }
 }

@@ -1,6 +1,6 @@
 //! Triangle meshes in world space.
 
-use glam::{DVec2, DVec3};
+use glam::{DVec2, DVec3, DVec4};
 use rayon::prelude::*;
 
 /// One primitive of one node: vertices, triangles, one material.
@@ -16,6 +16,13 @@ pub struct Mesh {
     pub uvs: [Vec<DVec2>; 2],
     /// Linear, one a vertex, each channel from 0 to 1; they multiply the material's base colour. Empty where there are none.
     pub colours: Vec<DVec3>,
+    /// Alpha, one a vertex, which multiplies the material's. Empty where all are 1.
+    pub alphas: Vec<f64>,
+    /// Of each triangle's corners, for the texture of the material's normal map: a unit tangent and the sign of the bitangent,
+    /// sign * (normal x tangent). Empty where the material has no normal map.
+    pub tangents: Vec<[DVec4; 3]>,
+    /// The same for the normal map of its coat.
+    pub coat_tangents: Vec<[DVec4; 3]>,
     /// Counter-clockwise from the front.
     pub triangles: Vec<[u32; 3]>,
     pub material: usize,
@@ -59,7 +66,15 @@ impl Mesh {
         };
         // On all cores, as there seldom is one.
         if !self.triangles.par_iter().with_min_len(MIN_PIECE).all(has_area) {
-            self.triangles.retain(has_area);
+            let kept: Vec<bool> = self.triangles.par_iter().map(has_area).collect();
+            fn retain<T>(of_triangles: &mut Vec<T>, kept: &[bool]) {
+                let mut kept = kept.iter();
+                of_triangles.retain(|_| *kept.next().expect("one for each"));
+            }
+            retain(&mut self.triangles, &kept);
+            for tangents in [&mut self.tangents, &mut self.coat_tangents].into_iter().filter(|tangents| !tangents.is_empty()) {
+                retain(tangents, &kept);
+            }
         }
         before - self.triangles.len()
     }

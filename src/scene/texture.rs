@@ -2,7 +2,7 @@
 
 use std::sync::LazyLock;
 
-use glam::{DVec2, Vec3};
+use glam::{DVec2, Vec3, Vec4};
 use rayon::prelude::*;
 
 /// What lies beyond the picture's edges.
@@ -13,6 +13,15 @@ pub enum Wrap {
     Clamp,
 }
 
+/// What a place between texel centres has.
+#[derive(Debug, Clone, Copy, PartialEq, Eq, Default)]
+pub enum Filter {
+    #[default]
+    Bilinear,
+    /// The value of the nearest texel.
+    Nearest,
+}
+
 #[derive(Debug, Clone)]
 pub struct Texture {
     pub name: String,
@@ -21,13 +30,16 @@ pub struct Texture {
     /// Row by row from v = 0.
     pub texels: Texels,
     pub wrap: [Wrap; 2],
+    pub filter: Filter,
 }
 
 /// Of a texture, as the kernels read them too (`glsl/material/surface.glsl`).
 #[derive(Debug, Clone, PartialEq, Eq)]
 pub enum Texels {
-    /// Red, green and blue by the sRGB curve, then alpha, which is not used.
+    /// Red, green and blue by the sRGB curve, then alpha, which is linear.
     Srgb(Vec<[u8; 4]>),
+    /// Red, green, blue and alpha, linear: 255 is 1.
+    Linear(Vec<[u8; 4]>),
     /// Linear: nine bits of red, of green and of blue from the lowest, then an exponent of five bits for all three
     /// (OpenGL's RGB9_E5, EXT_texture_shared_exponent).
     SharedExponent(Vec<u32>),
@@ -39,30 +51,36 @@ pub static LINEAR_OF_SRGB: LazyLock<[f32; 256]> = LazyLock::new(|| std::array::f
 impl Texels {
     pub fn count(&self) -> usize {
         match self {
-            Texels::Srgb(codes) => codes.len(),
+            Texels::Srgb(codes) | Texels::Linear(codes) => codes.len(),
             Texels::SharedExponent(words) => words.len(),
         }
     }
 
-    /// A texel's linear colour.
-    pub fn at(&self, place: usize) -> Vec3 {
+    /// A texel's linear colour, and its alpha.
+    pub fn at(&self, place: usize) -> Vec4 {
         match self {
             Texels::Srgb(codes) => {
-                let [red, green, blue, _] = codes[place].map(|code| LINEAR_OF_SRGB[usize::from(code)]);
-                Vec3::new(red, green, blue)
+                let [red, green, blue, alpha] = codes[place];
+                let [red, green, blue] = [red, green, blue].map(|code| LINEAR_OF_SRGB[usize::from(code)]);
+                Vec4::new(red, green, blue, share_of_code(alpha))
             }
-            Texels::SharedExponent(words) => of_shared_exponent(words[place]),
+            Texels::Linear(codes) => Vec4::from(codes[place].map(share_of_code)),
+            Texels::SharedExponent(words) => of_shared_exponent(words[place]).extend(1.0),
         }
     }
 
     /// All of them, as the kernels have them.
     pub fn words(&self) -> impl IndexedParallelIterator<Item = u32> + '_ {
         let word = |place: usize| match self {
-            Texels::Srgb(codes) => u32::from_le_bytes(codes[place]),
+            Texels::Srgb(codes) | Texels::Linear(codes) => u32::from_le_bytes(codes[place]),
             Texels::SharedExponent(words) => words[place],
         };
         (0..self.count()).into_par_iter().map(word)
     }
+}
+
+fn share_of_code(code: u8) -> f32 {
+    f32::from(code) * (1.0 / 255.0)
 }
 
 /// Linear colours, each channel from 0 to 65408, to a 512th of the largest channel of each.
@@ -112,8 +130,8 @@ impl Wrap {
 }
 
 impl Texture {
-    /// Bilinear between texel centres.
-    pub fn sample(&self, uv: DVec2) -> Vec3 {
+    /// Linear colour and alpha at a place.
+    pub fn sample(&self, uv: DVec2) -> Vec4 {
         let place = DVec2::new(uv.x * f64::from(self.width) - 0.5, uv.y * f64::from(self.height) - 0.5);
         // Beyond that a coordinate has no fraction left, and its place no meaning.
         let place = place.clamp(DVec2::splat(-1e15), DVec2::splat(1e15));
@@ -123,6 +141,10 @@ impl Texture {
             let j = self.wrap[1].index(corner.y as i64 + dj, self.height);
             self.texels.at(j * self.width as usize + i)
         };
+        if self.filter == Filter::Nearest {
+            // To the side of the centre that the place lies on.
+            return texel(i64::from(share.x >= 0.5), i64::from(share.y >= 0.5));
+        }
         texel(0, 0).lerp(texel(1, 0), share.x).lerp(texel(0, 1).lerp(texel(1, 1), share.x), share.y)
     }
 }
@@ -139,26 +161,37 @@ mod tests {
 
     fn checker(wrap: Wrap) -> Texture {
         let texels = vec![Vec3::ZERO, Vec3::ONE, Vec3::ONE, Vec3::ZERO];
-        Texture { name: "checker".into(), width: 2, height: 2, texels: texels.into(), wrap: [wrap; 2] }
+        Texture { name: "checker".into(), width: 2, height: 2, texels: texels.into(), wrap: [wrap; 2], filter: Filter::Bilinear }
     }
 
     #[test]
     fn textures_meet_their_texels_and_wrap() {
         for wrap in [Wrap::Repeat, Wrap::MirroredRepeat, Wrap::Clamp] {
             let texture = checker(wrap);
-            assert_eq!(texture.sample(DVec2::new(0.25, 0.25)), Vec3::ZERO);
-            assert_eq!(texture.sample(DVec2::new(0.75, 0.25)), Vec3::ONE);
-            assert_eq!(texture.sample(DVec2::new(0.5, 0.5)), Vec3::splat(0.5));
+            assert_eq!(texture.sample(DVec2::new(0.25, 0.25)), Vec4::W);
+            assert_eq!(texture.sample(DVec2::new(0.75, 0.25)), Vec4::ONE);
+            assert_eq!(texture.sample(DVec2::new(0.5, 0.5)), Vec3::splat(0.5).extend(1.0));
         }
         let beyond = DVec2::new(1.25, 0.25);
-        assert_eq!(checker(Wrap::Repeat).sample(beyond), Vec3::ZERO);
-        assert_eq!(checker(Wrap::MirroredRepeat).sample(beyond), Vec3::ONE);
-        assert_eq!(checker(Wrap::Clamp).sample(beyond), Vec3::ONE);
+        assert_eq!(checker(Wrap::Repeat).sample(beyond), Vec4::W);
+        assert_eq!(checker(Wrap::MirroredRepeat).sample(beyond), Vec4::ONE);
+        assert_eq!(checker(Wrap::Clamp).sample(beyond), Vec4::ONE);
+    }
+
+    #[test]
+    fn nearest_texels_and_alpha() {
+        let texels = Texels::Linear(vec![[0, 51, 102, 153], [255, 0, 51, 204]]);
+        let texture = Texture { name: "two".into(), width: 2, height: 1, texels, wrap: [Wrap::Repeat; 2], filter: Filter::Nearest };
+        for (u, texel) in [(0.01, [0.0, 0.2, 0.4, 0.6]), (0.49, [0.0, 0.2, 0.4, 0.6]), (0.51, [1.0, 0.0, 0.2, 0.8]), (1.2, [0.0, 0.2, 0.4, 0.6])] {
+            assert!(texture.sample(DVec2::new(u, 0.3)).abs_diff_eq(Vec4::from(texel), 1e-6), "{u}");
+        }
+        let filtered = Texture { filter: Filter::Bilinear, ..texture }.sample(DVec2::new(0.5, 0.5));
+        assert!(filtered.abs_diff_eq(Vec4::new(0.5, 0.1, 0.3, 0.7), 1e-6));
     }
 
     #[test]
     fn shared_exponents_keep_nine_bits() {
-        let texel = |colour: Vec3| Texels::from(vec![colour]).at(0);
+        let texel = |colour: Vec3| Texels::from(vec![colour]).at(0).truncate();
         for exact in [Vec3::ZERO, Vec3::ONE, Vec3::new(0.5, 0.25, 2f32.powi(-9)), Vec3::splat(65_408.0), Vec3::new(3.0, 0.75, 1.5)] {
             assert_eq!(texel(exact), exact);
         }

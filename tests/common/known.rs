@@ -121,7 +121,7 @@ pub fn wrapped_texture(gpu: &Gpu, wrap: [Wrap; 2], is_transformed: bool) -> Chec
     }
     let emission_texture = Some(used);
     let mut sign = scene_of(vec![mesh], vec![Material { emission: Vec3::ONE, emission_texture, ..matt(0.0) }], vec![]);
-    sign.textures = vec![Texture { name: "six".into(), width: 3, height: 2, texels: texels.clone(), wrap }];
+    sign.textures = vec![Texture { name: "six".into(), width: 3, height: 2, texels: texels.clone(), wrap, filter: Default::default() }];
     // Five pixels a texel: the middle one of a row is within a tenth of the texel's middle.
     let eye = DVec3::Z * 20.0;
     let camera = Camera::looking_at("eye", eye, DVec3::ZERO, DVec3::Y, 2.0 * (5.0f64 / 20.0).atan());

@@ -101,7 +101,7 @@ impl<'a> Shining<'a> {
             let cell = |place: usize| {
                 let (i, j) = (place % columns * 2, place / columns * 2);
                 let own = (j..(j + 2).min(height)).flat_map(|j| (i..(i + 2).min(width)).map(move |i| j * width + i));
-                own.map(|place| below.map_or_else(|| Cell::of(texture.texels.at(place)), |level| level.cells[place]))
+                own.map(|place| below.map_or_else(|| Cell::of(texture.texels.at(place).truncate()), |level| level.cells[place]))
                     .fold(Cell::NONE, Cell::and)
             };
             let cells = (0..columns * rows).into_par_iter().with_min_len(1 << 12).map(cell).collect();
@@ -137,7 +137,7 @@ impl<'a> Shining<'a> {
         };
         let (columns, rows) = (ends(low.x, high.x), ends(low.y, high.y));
         let size = DVec2::new(f64::from(self.texture.width), f64::from(self.texture.height));
-        let sample = |x: f64, y: f64| self.texture.sample((DVec2::new(x, y) + 0.5) / size).as_dvec3();
+        let sample = |x: f64, y: f64| self.texture.sample((DVec2::new(x, y) + 0.5) / size).truncate().as_dvec3();
         let share = |ends: &[f64], k: usize| {
             let before = if k > 0 { ends[k] - ends[k - 1] } else { 0.0 };
             let after = if k + 1 < ends.len() { ends[k + 1] - ends[k] } else { 0.0 };
@@ -308,7 +308,7 @@ mod tests {
     fn speckled(width: u32, height: u32, one_in: u32, wrap: Wrap) -> Texture {
         let texel = |k: u32| if mix32(k).is_multiple_of(one_in) { Vec3::new(700.0, 0.5, 31.0) } else { Vec3::splat(0.1) };
         let texels = (0..width * height).map(texel).collect::<Vec<_>>().into();
-        Texture { name: "speckled".into(), width, height, texels, wrap: [wrap; 2] }
+        Texture { name: "speckled".into(), width, height, texels, wrap: [wrap; 2], filter: Default::default() }
     }
 
     /// Pieces cover their triangle once, no sample of one is brighter than it says, and all together are about as bright.
@@ -330,7 +330,7 @@ mod tests {
                     for k in 0..32 {
                         let (u, v) = (random(2 * k), random(2 * k + 1));
                         let (u, v) = if u + v > 1.0 { (1.0 - u, 1.0 - v) } else { (u, v) };
-                        let sample = texture.sample(a + u * (b - a) + v * (c - a)).as_dvec3();
+                        let sample = texture.sample(a + u * (b - a) + v * (c - a)).truncate().as_dvec3();
                         assert!(
                             sample.max_element() <= (1.0 + 1e-6) * brightness.most,
                             "{wrap:?} {width} x {height}: {sample} in {piece:?}, {brightness:?}"

@@ -344,6 +344,7 @@ fn material_record(material: &Material) -> SurfaceMaterial {
         Surface::Glossy { exponent } => (SURFACE_GLOSSY, exponent),
         Surface::Mirror => (SURFACE_MIRROR, 0.0),
         Surface::Dielectric { ior } => (SURFACE_DIELECTRIC, ior),
+        Surface::Layered => (SURFACE_LAYERED, 0.0),
     };
     SurfaceMaterial {
         base_colour: material.base_colour,

@@ -11,9 +11,9 @@ use rayon::prelude::*;
 
 use super::{Loader, accessor, called, one_line, printable};
 use crate::error::{Error, Result};
-use crate::scene::material::{Material, TextureUse, UvTransform, surface_of};
-use crate::scene::texture::{Texels, Texture, Wrap};
-use crate::scene::{Progress, geometry};
+use crate::scene::material::{Layers, Material, Medium, TextureUse, UvTransform};
+use crate::scene::texture::{Filter, Texels, Texture, Wrap};
+use crate::scene::{Progress, Surface, geometry};
 
 /// Texture coordinates that are moved or scaled by more have no digits left.
 const MAX_TRANSFORM: f32 = 1e6;
@@ -127,6 +127,7 @@ impl Loader {
             height,
             texels: Texels::Srgb(bytemuck::allocation::cast_vec(picture.into_raw())),
             wrap: [wrap(texture.sampler().wrap_s()), wrap(texture.sampler().wrap_t())],
+            filter: Filter::Bilinear,
         })
     }
 
@@ -212,13 +213,21 @@ impl Loader {
             })
         };
         Ok(Material {
-            surface: surface_of(metallic, roughness, factor, ior),
+            surface: Surface::Layered,
             base_colour,
             base_colour_texture: texture_use(pbr.base_color_texture()),
             emission,
             emission_texture: texture_use(material.emissive_texture()),
             two_sided: material.double_sided(),
-            name,
+            layers: Layers {
+                metallic,
+                roughness,
+                ior,
+                transmission: factor,
+                medium: (factor > 0.0).then_some(Medium { transmittance: Vec3::ONE }),
+                ..Layers::default()
+            },
+            ..Material::lambert(&name, base_colour)
         })
     }
 }

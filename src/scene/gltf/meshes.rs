@@ -152,7 +152,7 @@ impl Loader {
             triangles.iter_mut().for_each(|triangle| triangle.swap(1, 2));
         }
         let material = primitive.material().index().unwrap_or(self.scene.materials.len() - 1);
-        Ok(Mesh { name: name.clone(), positions, normals, uvs, colours, triangles, material })
+        Ok(Mesh { name: name.clone(), positions, normals, uvs, colours, triangles, material, ..Mesh::default() })
     }
 
     /// Indices into those of the vertices that the primitive uses, as many primitives may share one list of vertices;

@@ -201,7 +201,7 @@ impl<'a> Geometry<'a> {
         let uv = if uvs.is_empty() { DVec2::ZERO } else { mix(triangle.vertices.map(|vertex| uvs[vertex]), triangle.of_vertices(weights)) };
         // A turn of the plane's points by minus the angle, v being its second axis.
         let turned = DMat2::from_angle(-rotation) * DMat2::from_diagonal(scale);
-        self.scene.textures[texture].sample(turned * uv + offset).as_dvec3()
+        self.scene.textures[texture].sample(turned * uv + offset).truncate().as_dvec3()
     }
 
     /// Radiance that leaves a triangle's shining side.

@@ -57,7 +57,7 @@ impl Vertex {
             Surface::PaperPhong { exponent } if towards_eye => FRAC_1_PI * lobe(cosine, exponent),
             Surface::PaperPhong { .. } => FRAC_1_PI,
             Surface::Glossy { exponent } => (f64::from(exponent) + 2.0) / TAU * lobe(cosine, exponent),
-            Surface::Mirror | Surface::Dielectric { .. } => 0.0,
+            Surface::Mirror | Surface::Dielectric { .. } | Surface::Layered => 0.0,
         };
         share * self.base_colour
     }
@@ -66,7 +66,7 @@ impl Vertex {
     /// direction. `None`: the direction lies on the wrong side, and the path ends.
     pub fn scatter(&self, depth: u32, towards_eye: bool, rng: &mut Random) -> Option<(DVec3, DVec3)> {
         let (wi, weight, is_transmitted) = match self.surface {
-            Surface::Lambert => (sample_lobe(self.ns, 1.0, rng), 1.0, false),
+            Surface::Lambert | Surface::Layered => (sample_lobe(self.ns, 1.0, rng), 1.0, false),
             Surface::PaperPhong { exponent } => {
                 let wi = sample_lobe(self.ns, 1.0, rng);
                 (wi, if towards_eye { lobe(mirrored(wi, self.ns).dot(self.wo), exponent) } else { 1.0 }, false)
