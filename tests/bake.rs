@@ -502,6 +502,7 @@ fn zoo() -> Scene {
         height: 1,
         texels: texels.into(),
         wrap,
+        filter: Default::default(),
     };
     let light = |name: &str, kind| Light { name: format!("light '{name}'"), kind };
     let (position, direction, intensity) = (DVec3::ONE, DVec3::Z, Vec3::splat(0.5));

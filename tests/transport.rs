@@ -203,7 +203,7 @@ fn rich_scene() -> Scene {
     });
     let texels = vec![Vec3::splat(0.9), Vec3::splat(0.05), Vec3::splat(0.05), Vec3::splat(0.9)];
     let wrap = [Wrap::Repeat; 2];
-    scene.textures.push(Texture { name: "tiles".into(), width: 2, height: 2, texels: texels.into(), wrap });
+    scene.textures.push(Texture { name: "tiles".into(), width: 2, height: 2, texels: texels.into(), wrap, filter: Default::default() });
     let tiles = scene.materials.len() - 1;
     scene.meshes[2].material = tiles;
     scene.meshes[3].colours = [0.0, 0.3, 0.6, 0.1].map(DVec3::splat).to_vec();
