@@ -166,6 +166,9 @@ const WORLDS: [(&str, &[&str]); 2] = [
             "texels_1",
             "texels_2",
             "texels_3",
+            "triangle_layers",
+            "layered_materials",
+            "albedos",
         ],
     ),
 ];

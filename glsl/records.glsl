@@ -245,11 +245,75 @@ struct TriangleUvs {
     vec2 emission_c;
 };
 
-// Linear colours at a triangle's corners, which multiply the material's base colour.
+// Linear colours at a triangle's corners, which multiply the material's base colour, and alphas.
 struct TriangleColours {
     vec3 a;
     vec3 b;
     vec3 c;
+    vec3 alphas;
+};
+
+// What layered materials need at a triangle's corners: texture coordinates of the mesh's first and second set; tangents, octahedral, for
+// the normal map and for that of the coat. Bits 0 and 3 of `turned`: their bitangents are -(normal x tangent).
+struct TriangleLayers {
+    vec2 first_a;
+    vec2 first_b;
+    vec2 first_c;
+    vec2 second_a;
+    vec2 second_b;
+    vec2 second_c;
+    uint tangent_a;
+    uint tangent_b;
+    uint tangent_c;
+    uint coat_tangent_a;
+    uint coat_tangent_b;
+    uint coat_tangent_c;
+    uint turned;
+};
+
+// A texture as a material looks it up: at (dot(row_u, uv), dot(row_v, uv)) + offset.
+struct TextureLookup {
+    // `NONE`: 1 everywhere.
+    uint texture;
+    uint uv_set;
+    vec2 row_u;
+    vec2 row_v;
+    vec2 offset;
+};
+
+// What a layered material adds to its `SurfaceMaterial`. Textures multiply the factor before them.
+struct LayeredMaterial {
+    float metallic;
+    float roughness;
+    TextureLookup metallic_roughness_texture;
+    float ior;
+    float specular;
+    TextureLookup specular_texture;
+    vec3 specular_colour;
+    TextureLookup specular_colour_texture;
+    float transmission;
+    TextureLookup transmission_texture;
+    // It encloses a medium; else it is a thin wall.
+    uint is_solid;
+    // Of the medium, for each unit of length.
+    vec3 absorption;
+    float coat;
+    TextureLookup coat_texture;
+    float coat_roughness;
+    TextureLookup coat_roughness_texture;
+    vec3 sheen_colour;
+    TextureLookup sheen_colour_texture;
+    float sheen_roughness;
+    TextureLookup sheen_roughness_texture;
+    TextureLookup normal_texture;
+    float normal_scale;
+    TextureLookup coat_normal_texture;
+    float coat_normal_scale;
+    // `COVERAGE_...`.
+    uint coverage;
+    float alpha;
+    float cutoff;
+    uint is_unlit;
 };
 
 struct SurfaceMaterial {
@@ -269,10 +333,10 @@ struct TextureInfo {
     uint width;
     uint height;
     uint first_texel;
-    // 0 repeat, 1 mirrored, 2 clamp: of u, and of v times 4.
+    // 0 repeat, 1 mirrored, 2 clamp: of u, and of v times 4; plus 16 where the nearest texel alone counts.
     uint wrap;
-    // Of each texel's three channels, instead of 8-bit codes.
-    uint shares_exponent;
+    // `TEXELS_...`.
+    uint encoding;
 };
 
 // A light, or a triangle that shines. Lengths are those of the normalised scene.
@@ -351,6 +415,10 @@ struct CameraPath {
     // and 5: visible points found; from bit 8 on: surfaces that it has met.
     uint state;
     vec3 weight;
+    // Of a direction that a sharp lobe gave it, 1/sr, and the point and the normal there; 0: none.
+    float density;
+    vec3 from;
+    vec3 from_normal;
 };
 
 // A point whose light the photon maps are asked for.
@@ -368,6 +436,33 @@ struct VisiblePoint {
     uint surface;
     // Mask of the arrivals that count, and `SEEN...`; 0: no point.
     uint arrivals;
+};
+
+// How the matt lobes of a layered visible point weigh light (glsl/material/matt_lobes.glsl). Those that are none have weight 0.
+struct MattLobes {
+    // All of the diffuse lobe but the factors of where light comes from.
+    vec3 diffuse;
+    // What the dielectric reflects along its normal and at the horizon, in the largest channel.
+    float e0;
+    float e90;
+    // Of the base's reflection.
+    float alpha;
+    vec3 f0;
+    float f90;
+};
+
+// What lies over them.
+struct MattCover {
+    float coat;
+    float coat_alpha;
+    // It is no sharp lobe.
+    uint has_coat_lobe;
+    uint coat_normal;
+    // Shares that coat and sheen leave to what is under them, as seen by the eye.
+    float below_coat;
+    float below_sheen;
+    vec3 sheen;
+    float sheen_alpha;
 };
 
 // A point and its normals, of which irradiance is asked.

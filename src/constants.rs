@@ -69,6 +69,17 @@ constants! {
     MAP_ALPHA_PER_MILLE = 250;
     /// GGX lobes with an alpha below the inverse are deltas.
     DELTA_ALPHA_INVERSE = 10_000;
+    /// How much of a layered surface is there; see `scene::material::Coverage`.
+    COVERAGE_WHOLE = 0;
+    COVERAGE_MASK = 1;
+    COVERAGE_BLEND = 2;
+    /// What a texel's four bytes are; see `scene::texture::Texels`.
+    TEXELS_SRGB = 0;
+    TEXELS_SHARED_EXPONENT = 1;
+    TEXELS_LINEAR = 2;
+    /// Rows and columns of the tables of directional albedos (`scene::albedo`): roughnesses, and roots of cosines.
+    ALBEDO_ROUGHNESSES = 32;
+    ALBEDO_COSINES = 64;
     /// A material without a texture, a triangle without smooth normals, a ray without a hit.
     NONE = 0xffff_ffff;
     /// Bit of a triangle's plane: others hide a part of the triangle.

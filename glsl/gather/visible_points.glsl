@@ -22,6 +22,9 @@ uint point_of(uint item, uint slice)
     return point_in_tiles(place, push.width, push.height, push.pixel_count);
 }
 
+layout(set = 1, binding = 14, scalar) readonly buffer MattLobesOfPoints { MattLobes matt_lobes[]; };
+layout(set = 1, binding = 16, scalar) readonly buffer MattCoversOfPoints { MattCover matt_covers[]; };
+
 void gather_photons()
 {
     uint slice = push.first_slice + gl_WorkGroupID.y;
@@ -57,6 +60,22 @@ void gather_photons()
     vec3 ns = is_flat ? normal : unpack_normal(point.shading_normal);
     vec3 wo = unpack_direction(point.wo);
     bool is_even = is_flat && !has_lobe(point.surface);
+    bool is_layered = false;
+    MattLobes lobes;
+    MattCover cover = no_cover();
+    if (HAS_LAYERS) {
+        is_layered = point.surface == SURFACE_LAYERED;
+        if (is_layered) {
+            lobes = matt_lobes[index];
+            bool has_cover = HAS_COATS;
+            if (HAS_SHEEN) {
+                has_cover = true;
+            }
+            if (has_cover) {
+                cover = matt_covers[index];
+            }
+        }
+    }
     uint photon_count = map_length();
     uint slice_begin = slice * GATHER_SLICE;
     uint slice_end = slice_begin + GATHER_SLICE;
@@ -108,7 +127,11 @@ void gather_photons()
                         if (HAS_SMOOTH_NORMALS) {
                             weight *= is_flat ? 1.0 : shading_gain(cosine, dot(wi, photon_normal));
                         }
-                        precise vec3 flux = uintBitsToFloat(light.xyz) * weight;
+                        vec3 arrived = uintBitsToFloat(light.xyz);
+                        if (is_layered) {
+                            arrived *= 3.14159265358979324 * matt_brdf(lobes, cover, ns, wo, wi);
+                        }
+                        precise vec3 flux = arrived * weight;
                         note_unless(is_finite(flux), NONFINITE_ESTIMATE, 0, push.round, index % push.pixel_count);
                         float chance = chance_of(mix32(point_bits + position_bits(position)));
                         [[unroll]] for (uint channel = 0; channel < 3; channel++) {

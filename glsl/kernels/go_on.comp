@@ -25,9 +25,12 @@ void main()
     chain.gathers = (path.state & 2u) != 0;
     chain.starts_nowhere = (path.state & 4u) != 0;
     chain.sees_emission = (path.state & 8u) != 0;
+    chain.density = path.density;
+    chain.from = path.from;
+    chain.from_normal = path.from_normal;
     chain.point_count = (path.state >> 4) & 3u;
     uint first_point = chain.point_count;
-    if (follow(chain, index, number, push.draws, push.emitter_count, depth)) {
+    if (follow(chain, index, number, push.pixel_count, push.draws, push.emitter_count, depth)) {
         put_off(chain, path.place, depth + CHAIN_STEPS);
     }
     note_unless(is_finite(chain.light[0]) && is_finite(chain.light[1]) && is_finite(chain.light[2]), NONFINITE_LIGHT, push.draws.domain,

@@ -26,7 +26,7 @@ void main()
     vec3 ng = receiver.normal;
     vec3 ns = receiver.shading_normal;
     vec3 position = off_the_walls(receiver.position, ng);
-    Target here = Target(position, position_error(position), ng, ns, ns, SURFACE_RECEIVER, 0.0);
+    Target here = plain_target(position, position_error(position), ng, ns, ns, SURFACE_RECEIVER, 0.0);
     Chain chain = new_chain(position, ns, vec3(1.0), vec2(0.0));
     if (SHADOW_RAYS != 0) {
         add_light(chain, direct_light(here, push.emitter_count, push.draws, index, 0, RECEIVER_BLOCK));
@@ -56,7 +56,7 @@ void main()
         if (HAS_ALL_ARRIVALS) {
             chain.sees_emission = !on_surface;
         }
-        if (follow(chain, index, 0, push.draws, push.emitter_count, 0)) {
+        if (follow(chain, index, 0, push.point_count, push.draws, push.emitter_count, 0)) {
             put_off(chain, index, CHAIN_STEPS);
         }
     }

@@ -13,6 +13,7 @@ layout(set = 1, binding = 0, scalar) writeonly buffer Found { float found[]; };
 #include "rng/sobol.glsl"
 #include "world/scene/samples.glsl"
 #include "material/lobes.glsl"
+#include "material/scatter.glsl"
 #include "world/scene/areas.glsl"
 #include "world/scene/lights.glsl"
 #include "world/scene/light_choice.glsl"
@@ -27,7 +28,7 @@ void main()
     uint cluster = pair % LIGHT_CLUSTERS;
     Receiver receiver = receivers[pair / LIGHT_CLUSTERS];
     // It may lie on a triangle whose corners are known no better than the point.
-    Target here = Target(receiver.position, 4.0 * position_error(receiver.position), receiver.normal, receiver.shading_normal,
+    Target here = plain_target(receiver.position, 4.0 * position_error(receiver.position), receiver.normal, receiver.shading_normal,
                          receiver.shading_normal, SURFACE_RECEIVER, 0.0);
     uvec4 words = words_of(pair, 0, push.draws);
     // Of the squares, in units of the largest.

@@ -27,7 +27,7 @@ void main()
     vec3 direction = normalize(push.forward + picture.x * push.right + picture.y * push.up);
 
     Chain chain = new_chain(push.eye, direction, vec3(1.0), u.zw);
-    if (follow(chain, pixel, number, push.draws, push.emitter_count, 0)) {
+    if (follow(chain, pixel, number, push.width * push.height, push.draws, push.emitter_count, 0)) {
         put_off(chain, SAMPLES * pixel + number, CHAIN_STEPS);
     }
     note_unless(is_finite(chain.light[0]) && is_finite(chain.light[1]) && is_finite(chain.light[2]), NONFINITE_LIGHT, push.draws.domain,

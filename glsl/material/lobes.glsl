@@ -23,13 +23,17 @@ bool has_lobe(uint kind)
     if (HAS_PAPER_PHONG) {
         has = has || kind == SURFACE_PAPER_PHONG;
     }
+    if (HAS_LAYERS) {
+        has = has || kind == SURFACE_LAYERED;
+    }
     return has;
 }
 
 // How a lobe weighs light from wi towards wo; 1 on a Lambertian surface.
 float lobe_weight(uint kind, float exponent, vec3 ns, vec3 wo, vec3 wi)
 {
-    if (!has_lobe(kind)) {
+    // Layered surfaces weigh light by matt_brdf().
+    if (!has_lobe(kind) || kind == SURFACE_LAYERED) {
         return 1.0;
     }
     vec3 mirror = mirrored(wi, ns);

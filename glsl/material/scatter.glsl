@@ -4,6 +4,9 @@ struct Scatter {
     vec3 direction;
     vec3 weight; // f * cosine / pdf
     bool alive;
+    bool is_specular; // by a lobe that rays follow; photon maps know the others
+    bool passes; // straight, as if no surface were there
+    float density; // of the direction, 1/sr; 0: that of a delta, or of a lobe that photon maps know
 };
 
 // Fresnel reflectance of unpolarised light; eta = n_i / n_t.
@@ -27,6 +30,8 @@ vec3 on_side(vec3 direction, vec3 side)
     return direction - 2.0 * min(dot(direction, side), 0.0) * side;
 }
 
+#include "material/layered_lobes.glsl"
+
 // Samples where a path goes on that came from wo; u = (choice, two for the direction). A camera path
 // carries radiance, which refraction compresses; a photon carries flux. Glass that reflects some light and refracts some
 // does the first with the chance `mirror_chance`; 0: as much as it reflects. The path has met `depth` surfaces before.
@@ -36,7 +41,7 @@ Scatter sample_scatter(Surface surface, vec3 wo, vec3 u, uint depth, bool carrie
     if (HAS_MIRROR) {
         if (surface.kind == SURFACE_MIRROR) {
             vec3 wi = on_side(mirrored(wo, ns), surface.ng);
-            return Scatter(wi, surface.base_colour, dot(wi, surface.ng) > 0.0);
+            return Scatter(wi, surface.base_colour, dot(wi, surface.ng) > 0.0, true, false, 0.0);
         }
     }
     if (HAS_DIELECTRIC) {
@@ -60,12 +65,12 @@ Scatter sample_scatter(Surface surface, vec3 wo, vec3 u, uint depth, bool carrie
             if (u.x < chance) {
                 vec3 wi = on_side(mirrored(wo, ns), surface.ng);
                 float weight = as_much ? 1.0 : divide(reflectance, chance);
-                return Scatter(wi, weight * surface.base_colour, dot(wi, surface.ng) > 0.0);
+                return Scatter(wi, weight * surface.base_colour, dot(wi, surface.ng) > 0.0, true, false, 0.0);
             }
             vec3 wi = on_side(normalize((eta * cos_i - cos_t) * ns - eta * wo), -surface.ng);
             float weight = as_much ? 1.0 : divide(1.0 - reflectance, 1.0 - chance);
             weight *= carries_radiance ? eta * eta : 1.0;
-            return Scatter(wi, weight * surface.base_colour, dot(wi, surface.ng) < 0.0);
+            return Scatter(wi, weight * surface.base_colour, dot(wi, surface.ng) < 0.0, true, false, 0.0);
         }
     }
     if (HAS_GLOSSY) {
@@ -74,9 +79,9 @@ Scatter sample_scatter(Surface surface, vec3 wo, vec3 u, uint depth, bool carrie
             vec3 wi = to_frame(sample_lobe(n, u.y, u.z), mirrored(wo, ns));
             float cos_out = dot(wi, ns);
             vec3 weight = surface.base_colour * (divide(n + 2.0, n + 1.0) * max(cos_out, 0.0));
-            return Scatter(wi, weight, cos_out > 0.0 && dot(wi, surface.ng) > 0.0);
+            return Scatter(wi, weight, cos_out > 0.0 && dot(wi, surface.ng) > 0.0, false, false, 0.0);
         }
     }
     vec3 wi = to_frame(sample_cosine_hemisphere(u.y, u.z), ns);
-    return Scatter(wi, surface.base_colour, dot(wi, surface.ng) > 0.0);
+    return Scatter(wi, surface.base_colour, dot(wi, surface.ng) > 0.0, false, false, 0.0);
 }

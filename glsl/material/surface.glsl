@@ -11,6 +11,12 @@ layout(set = 0, binding = 16, scalar) readonly buffer Texels2 { uint texels_2[];
 layout(set = 0, binding = 17, scalar) readonly buffer Texels3 { uint texels_3[]; };
 // One for all triangles where no mesh has any.
 layout(set = 0, binding = 14, scalar) readonly buffer Colours { TriangleColours colours[]; };
+// One for all triangles where no layered material has a texture of its own, or a normal map.
+layout(set = 0, binding = 18, scalar) readonly buffer LayersOfTriangles { TriangleLayers triangle_layers[]; };
+// One for each material.
+layout(set = 0, binding = 19, scalar) readonly buffer LayeredMaterials { LayeredMaterial layered_materials[]; };
+
+#include "material/layers.glsl"
 
 struct Surface {
     vec3 position;
@@ -24,6 +30,7 @@ struct Surface {
     float parameter;
     vec3 base_colour;
     vec3 emission; // radiance towards wo
+    Layers layers; // of SURFACE_LAYERED
 };
 
 uint wrapped(int place, uint size, uint wrap)
@@ -53,28 +60,35 @@ float linear_of_code(uint code)
 }
 
 // Twin of src/scene/texture.rs.
-vec3 texel(TextureInfo info, int i, int j)
+vec4 texel(TextureInfo info, int i, int j)
 {
-    uint place = wrapped(j, info.height, info.wrap >> 2) * info.width + wrapped(i, info.width, info.wrap & 3u);
+    uint place = wrapped(j, info.height, (info.wrap >> 2) & 3u) * info.width + wrapped(i, info.width, info.wrap & 3u);
     uint word = texel_word(info.first_texel + place);
-    if (info.shares_exponent != 0) {
+    if (info.encoding == TEXELS_SHARED_EXPONENT) {
         // A power of two: 2^(exponent - 24).
         float unit = uintBitsToFloat(((word >> 27) + (127 - 24)) << 23);
-        return vec3(word & 511, (word >> 9) & 511, (word >> 18) & 511) * unit;
+        return vec4(vec3(word & 511, (word >> 9) & 511, (word >> 18) & 511) * unit, 1.0);
     }
-    return vec3(linear_of_code(word), linear_of_code(word >> 8), linear_of_code(word >> 16));
+    vec4 shares = vec4(word & 255, (word >> 8) & 255, (word >> 16) & 255, word >> 24) * (1.0 / 255.0);
+    if (info.encoding == TEXELS_LINEAR) {
+        return shares;
+    }
+    return vec4(linear_of_code(word), linear_of_code(word >> 8), linear_of_code(word >> 16), shares.w);
 }
 
-// Bilinear between texel centres.
-vec3 sample_texture(uint texture_index, vec2 uv)
+// Linear colour and alpha: bilinear between texel centres, or the nearest one's.
+vec4 sample_texture(uint texture_index, vec2 uv)
 {
     TextureInfo info = textures[texture_index];
     vec2 place = uv * vec2(info.width, info.height) - 0.5;
     vec2 corner = floor(place);
     vec2 share = place - corner;
     int i = int(corner.x), j = int(corner.y);
-    vec3 lower = (1.0 - share.x) * texel(info, i, j) + share.x * texel(info, i + 1, j);
-    vec3 upper = (1.0 - share.x) * texel(info, i, j + 1) + share.x * texel(info, i + 1, j + 1);
+    if ((info.wrap & 16u) != 0) {
+        return texel(info, i + int(share.x >= 0.5), j + int(share.y >= 0.5));
+    }
+    vec4 lower = (1.0 - share.x) * texel(info, i, j) + share.x * texel(info, i + 1, j);
+    vec4 upper = (1.0 - share.x) * texel(info, i, j + 1) + share.x * texel(info, i + 1, j + 1);
     return (1.0 - share.y) * lower + share.y * upper;
 }
 
@@ -128,10 +142,136 @@ vec3 emitted_radiance(SurfaceMaterial material, uint index, float u, float v)
     if (HAS_TEXTURES) {
         if (material.emission_texture != NONE) {
             TriangleUvs at = uvs[index];
-            emission *= sample_texture(material.emission_texture, mixed_uv(at.emission_a, at.emission_b, at.emission_c, u, v));
+            emission *= sample_texture(material.emission_texture, mixed_uv(at.emission_a, at.emission_b, at.emission_c, u, v)).rgb;
         }
     }
     return emission;
+}
+
+// How much of a layered surface is there.
+float coverage_of(SurfaceMaterial material, uint index, float u, float v, float vertex_alpha)
+{
+    LayeredMaterial layered = layered_materials[triangles[index].material];
+    float alpha = layered.alpha * vertex_alpha;
+    if (layered.coverage == COVERAGE_WHOLE) {
+        return 1.0;
+    }
+    if (HAS_TEXTURES) {
+        if (material.base_texture != NONE) {
+            TriangleUvs at = uvs[index];
+            alpha *= sample_texture(material.base_texture, mixed_uv(at.base_a, at.base_b, at.base_c, u, v)).a;
+        }
+    }
+    return layered.coverage == COVERAGE_MASK ? (alpha >= layered.cutoff ? 1.0 : 0.0) : clamp(alpha, 0.0, 1.0);
+}
+
+float vertex_alpha_at(uint index, float u, float v)
+{
+    if (HAS_VERTEX_COLOURS) {
+        TriangleColours at = colours[min(index, uint(colours.length()) - 1)];
+        return at.alphas.x + u * (at.alphas.y - at.alphas.x) + v * (at.alphas.z - at.alphas.x);
+    }
+    return 1.0;
+}
+
+// The light that a lamp sends out at one of its points: there is as much of it as of the surface.
+vec3 lamp_radiance(SurfaceMaterial material, uint index, float u, float v)
+{
+    vec3 radiance = emitted_radiance(material, index, u, v);
+    if (HAS_PASSING) {
+        if (material.surface == SURFACE_LAYERED) {
+            radiance *= coverage_of(material, index, u, v, vertex_alpha_at(index, u, v));
+        }
+    }
+    return radiance;
+}
+
+TriangleLayers layers_of_triangle(uint index)
+{
+    return triangle_layers[min(index, uint(triangle_layers.length()) - 1)];
+}
+
+// Texture coordinates of both sets at a point of a triangle.
+vec4 both_uvs(uint index, float u, float v)
+{
+    TriangleLayers at = layers_of_triangle(index);
+    return vec4(mixed_uv(at.first_a, at.first_b, at.first_c, u, v), mixed_uv(at.second_a, at.second_b, at.second_c, u, v));
+}
+
+// A texture's value, or 1.
+vec4 looked_up(TextureLookup use, vec4 uv)
+{
+    if (HAS_TEXTURES) {
+        if (use.texture != NONE) {
+            vec2 own = use.uv_set == 0 ? uv.xy : uv.zw;
+            return sample_texture(use.texture, vec2(dot(use.row_u, own), dot(use.row_v, own)) + use.offset);
+        }
+    }
+    return vec4(1.0);
+}
+
+// A normal map's normal about the unit normal n on the side of wo; `tangents` are those of the corners.
+vec3 mapped_normal(TextureLookup use, float scale, vec4 uv, vec3 n, uvec3 tangents, bool is_turned, float u, float v, vec3 wo, bool front)
+{
+    vec3 code = 2.0 * looked_up(use, uv).rgb - 1.0;
+    vec3 normal = front ? n : -n;
+    vec3 tangent = (1.0 - u - v) * unpack_normal(tangents.x) + u * unpack_normal(tangents.y) + v * unpack_normal(tangents.z);
+    vec3 bitangent = is_turned ? cross(tangent, normal) : cross(normal, tangent);
+    vec3 way = scale * code.x * tangent + scale * code.y * bitangent + code.z * normal;
+    float squared = dot(way, way);
+    vec3 mapped = squared > 0.0 ? way * inversesqrt(squared) : normal;
+    mapped = front ? mapped : -mapped;
+    // Towards the eye, where it would look away.
+    float cosine = dot(mapped, wo);
+    return cosine < LEAST_MAPPED_COSINE ? normalize(mapped + (LEAST_MAPPED_COSINE - cosine) * wo) : mapped;
+}
+
+Layers layers_at(Hit hit, uint material_index, vec3 smooth_normal, vec3 wo, bool front)
+{
+    LayeredMaterial material = layered_materials[material_index];
+    vec4 uv = vec4(0.0);
+    if (HAS_TEXTURES) {
+        uv = both_uvs(hit.triangle, hit.u, hit.v);
+    }
+    vec4 rough_metal = looked_up(material.metallic_roughness_texture, uv);
+    Layers layers;
+    layers.metallic = material.metallic * rough_metal.b;
+    float roughness = material.roughness * rough_metal.g;
+    layers.alpha = roughness * roughness;
+    layers.ior = material.ior;
+    layers.specular = material.specular * looked_up(material.specular_texture, uv).a;
+    layers.specular_colour = material.specular_colour * looked_up(material.specular_colour_texture, uv).rgb;
+    layers.transmission = 0.0;
+    layers.is_solid = false;
+    if (HAS_TRANSMISSION) {
+        layers.transmission = material.transmission * looked_up(material.transmission_texture, uv).r;
+        layers.is_solid = material.is_solid != 0;
+    }
+    layers.coat = 0.0;
+    layers.coat_alpha = 1.0;
+    layers.coat_normal = smooth_normal;
+    if (HAS_COATS) {
+        layers.coat = material.coat * looked_up(material.coat_texture, uv).r;
+        float coat_roughness = material.coat_roughness * looked_up(material.coat_roughness_texture, uv).g;
+        layers.coat_alpha = coat_roughness * coat_roughness;
+        if (HAS_NORMAL_MAPS) {
+            if (material.coat_normal_texture.texture != NONE) {
+                TriangleLayers at = layers_of_triangle(hit.triangle);
+                layers.coat_normal = mapped_normal(material.coat_normal_texture, material.coat_normal_scale, uv, smooth_normal,
+                                                   uvec3(at.coat_tangent_a, at.coat_tangent_b, at.coat_tangent_c), (at.turned & 8u) != 0, hit.u, hit.v, wo, front);
+            }
+        }
+    }
+    layers.sheen = vec3(0.0);
+    layers.sheen_alpha = 1.0;
+    if (HAS_SHEEN) {
+        layers.sheen = material.sheen_colour * looked_up(material.sheen_colour_texture, uv).rgb;
+        float sheen_roughness = material.sheen_roughness * looked_up(material.sheen_roughness_texture, uv).a;
+        layers.sheen_alpha = max(sheen_roughness * sheen_roughness, LEAST_SHEEN_ALPHA);
+    }
+    layers.coverage = 1.0;
+    layers.is_unlit = material.is_unlit != 0;
+    return layers;
 }
 
 Surface surface_at(Hit hit, vec3 wo)
@@ -156,6 +296,7 @@ Surface surface_at(Hit hit, vec3 wo)
             surface.ns = dot(smooth_normal, wo) > 0.0 ? smooth_normal : surface.ng;
         }
     }
+    vec3 smooth_ns = surface.ns;
     surface.kind = material.surface;
     surface.parameter = material.parameter;
     bool shown = surface.front;
@@ -167,7 +308,7 @@ Surface surface_at(Hit hit, vec3 wo)
     if (HAS_TEXTURES) {
         if (material.base_texture != NONE) {
             TriangleUvs at = uvs[hit.triangle];
-            surface.base_colour *= sample_texture(material.base_texture, mixed_uv(at.base_a, at.base_b, at.base_c, hit.u, hit.v));
+            surface.base_colour *= sample_texture(material.base_texture, mixed_uv(at.base_a, at.base_b, at.base_c, hit.u, hit.v)).rgb;
         }
     }
     if (HAS_VERTEX_COLOURS) {
@@ -176,7 +317,31 @@ Surface surface_at(Hit hit, vec3 wo)
         surface.base_colour *= at.a + hit.u * (at.b - at.a) + hit.v * (at.c - at.a);
     }
     surface.emission = shown ? emitted_radiance(material, hit.triangle, hit.u, hit.v) : vec3(0.0);
+    if (HAS_LAYERS) {
+        if (surface.kind == SURFACE_LAYERED) {
+            surface.layers = layers_at(hit, triangle.material, smooth_ns, wo, surface.front);
+            if (HAS_NORMAL_MAPS) {
+                LayeredMaterial layered = layered_materials[triangle.material];
+                if (layered.normal_texture.texture != NONE) {
+                    TriangleLayers at = layers_of_triangle(hit.triangle);
+                    surface.ns = mapped_normal(layered.normal_texture, layered.normal_scale, both_uvs(hit.triangle, hit.u, hit.v), smooth_ns,
+                                               uvec3(at.tangent_a, at.tangent_b, at.tangent_c), (at.turned & 1u) != 0, hit.u, hit.v, wo, surface.front);
+                }
+            }
+            if (HAS_PASSING) {
+                surface.layers.coverage =
+                    coverage_of(material, hit.triangle, hit.u, hit.v, vertex_alpha_at(hit.triangle, hit.u, hit.v));
+            }
+        }
+    }
     return surface;
+}
+
+// Index of refraction where the ray came from over that beyond, of a solid.
+float index_ratio(Surface surface)
+{
+    float ior = max(surface.layers.ior, 1e-3);
+    return surface.front ? divide(1.0, ior) : ior;
 }
 
 bool is_specular(Surface surface)

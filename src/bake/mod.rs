@@ -136,12 +136,13 @@ impl Layout {
         if !(texels_per_metre.is_finite() && texels_per_metre > 0.0) {
             return Err(Error::setting(OPTION, texels_per_metre, "must be above 0"));
         }
+        let kinds = scene.lobe_kinds();
         let unwrapped: Vec<Option<unwrap::Unwrapped>> = scene
             .meshes
             .par_iter()
-            .map(|mesh| match scene.materials[mesh.material].surface.is_specular() {
-                true => Ok(None),
-                false => unwrap::unwrap(mesh, texels_per_metre).map(Some),
+            .map(|mesh| match kinds[mesh.material].matt {
+                false => Ok(None),
+                true => unwrap::unwrap(mesh, texels_per_metre).map(Some),
             })
             .zip(&scene.meshes)
             .map(|(unwrapped, mesh)| {

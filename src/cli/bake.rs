@@ -88,7 +88,8 @@ pub(super) fn run(args: &BakeArgs, cancelled: &AtomicBool) -> Result<End> {
 const USUAL_TEXELS: f64 = 65_536.0;
 
 fn usual_density(scene: &Scene) -> f64 {
-    let baked = scene.meshes.iter().filter(|mesh| !scene.materials[mesh.material].surface.is_specular());
+    let kinds = scene.lobe_kinds();
+    let baked = scene.meshes.iter().filter(|mesh| kinds[mesh.material].matt);
     let area: f64 = baked.map(|mesh| (0..mesh.triangles.len()).map(|triangle| mesh.area(triangle)).sum::<f64>()).sum();
     (USUAL_TEXELS / area.max(f64::MIN_POSITIVE)).sqrt()
 }

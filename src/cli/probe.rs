@@ -59,7 +59,8 @@ pub(super) fn run(args: &ProbeArgs, cancelled: &AtomicBool) -> Result<End> {
 
     let reporter = ProgressReporter::new(&args.messages.progress);
     let scene = args.scene.open(&reporter)?;
-    let is_specular = |mesh: &Mesh| scene.materials[mesh.material].surface.is_specular();
+    let kinds = scene.lobe_kinds();
+    let is_specular = |mesh: &Mesh| kinds[mesh.material].is_sharp();
     let is_point_like = |light: &Light| !matches!(light.kind, LightKind::Environment { .. });
     if scene.lights.iter().any(is_point_like) && scene.meshes.iter().any(is_specular) {
         complain("warning: points that lie on no surface receive no caustics of point, spot, directional and disc lights");

@@ -1,7 +1,7 @@
 //! The buffers of a plan, each listed once: resources are made from this list, and what a run takes is said and checked by it.
 
 use bytemuck::Pod;
-use glam::{UVec2, Vec4};
+use glam::{UVec2, Vec2, Vec4};
 
 use super::RoomPlan;
 use super::latest_rounds::kept_values;
@@ -14,6 +14,7 @@ use crate::constants::{
 use crate::path::StoredPath;
 use crate::photon::{MapPhoton, Origin, StoredPhoton};
 use crate::records::*;
+use crate::scene::albedo;
 use crate::scene::geometry::Geometry;
 use crate::settings::Builder;
 use crate::settings::scene::Effect;
@@ -193,7 +194,7 @@ impl ScenePlan {
         fn of<T: Pod>(name: &'static str, content: &[T], is_kept: bool, why: &'static str) -> PlannedBuffer {
             buffer::<T>(name, if is_kept { content.len() as u64 } else { 0 }, why)
         }
-        let textured = self.keeps(Effect::Textures);
+        let (textured, layered) = (self.keeps(Effect::Textures), self.keeps(Effect::Layers));
         let (nodes, regions, shares) = self.lights().map_or((0, 0, 0), |of| (of.nodes.len(), of.regions.len(), of.shares.len()));
         vec![
             of("nodes", &geometry.nodes, self.keeps(Effect::Bvh), "the triangles' hierarchy"),
@@ -203,6 +204,9 @@ impl ScenePlan {
             of("texture coordinates", &geometry.uvs, textured, "the triangles' texture coordinates"),
             of("vertex colours", &geometry.colours, self.keeps(Effect::VertexColours), "the triangles' vertex colours"),
             of("materials", &geometry.materials, true, "materials"),
+            of("layered materials", &geometry.layered_materials, layered, "layers of materials"),
+            of("layers of triangles", &geometry.triangle_layers, layered && textured, "texture coordinates and tangents of layers"),
+            buffer::<Vec2>("albedos", if layered { albedo::TABLE.len() as u64 } else { 0 }, "directional albedos"),
             of("textures", &geometry.textures, textured, "sizes of textures"),
             of("emitters", &geometry.emitters, true, "emitters"),
             of("openings", &self.openings(), true, "openings that light comes in through"),
@@ -214,6 +218,10 @@ impl ScenePlan {
         .into_iter()
         .chain(geometry.texel_parts().map(|part| of::<u32>("texels", part, textured, "textures")))
         .collect()
+    }
+
+    fn has_covers(&self) -> bool {
+        self.keeps(Effect::ClearCoat) || self.keeps(Effect::Sheen)
     }
 
     /// What grows with the pixels or receivers.
@@ -230,6 +238,8 @@ impl ScenePlan {
             buffer::<u32>("one hits", u64::from(HIT_KINDS) * pixels, "what one hit would add where none has"),
             buffer::<u64>("pass sums", 3 * pixels * u64::from(self.samples()), "samples of pixels in a round"),
             buffer::<VisiblePoint>("visible points", points, "where photons are looked up"),
+            buffer::<MattLobes>("matt lobes", if self.keeps(Effect::Layers) { points } else { 0 }, "how layered points weigh light"),
+            buffer::<MattCover>("matt covers", if self.has_covers() { points } else { 0 }, "coats and sheen of visible points"),
             buffer::<u64>("estimates", 3 * points * u64::from(self.arrival_sets), "what photons add there"),
         ];
         let classed = if self.has_classes() { points } else { 0 };

@@ -1,11 +1,13 @@
 //! The effects that a scene of triangles needs: each with the evidence for keeping or dropping it.
 
+use glam::Vec3;
 use serde::Serialize;
 
 use super::sensor::Sensor;
 use crate::constants::*;
 use crate::scene::geometry::Geometry;
-use crate::scene::{Material, Scene, Surface};
+use crate::scene::material::{Coverage, Layers};
+use crate::scene::{LobeKinds, Material, Scene, Surface};
 use crate::settings::scene::{Effect, Illumination, Part, SceneSettings};
 use crate::text::counted;
 
@@ -27,7 +29,8 @@ pub struct EffectDecision {
 const LIST_TRIANGLES: usize = 24;
 /// What the scene holds and the request asks for.
 pub(super) struct Facts<'a> {
-    materials: Vec<&'a Material>,
+    /// Those that some triangle has.
+    materials: Vec<(&'a Material, LobeKinds)>,
     emitters: [usize; 7],
     triangles: usize,
     smooth: usize,
@@ -48,7 +51,7 @@ impl<'a> Facts<'a> {
         scene.lights.iter().for_each(|light| emitters[light.kind.code() as usize] += 1);
         let glossy = scene.materials.iter().zip(&used).any(|(material, used)| *used && matches!(material.surface, Surface::Glossy { .. }));
         Facts {
-            materials: scene.materials.iter().zip(used).filter(|(_, used)| *used).map(|(material, _)| material).collect(),
+            materials: scene.materials.iter().zip(scene.lobe_kinds()).zip(used).filter(|(_, used)| *used).map(|(of, _)| of).collect(),
             emitters,
             triangles: geometry.triangles.len(),
             smooth: geometry.normals.iter().filter(|normals| normals.a != NONE).count(),
@@ -60,12 +63,17 @@ impl<'a> Facts<'a> {
     }
 
     pub(super) fn has(&self, is: impl Fn(Surface) -> bool) -> bool {
-        self.materials.iter().any(|material| is(material.surface))
+        self.materials.iter().any(|(material, _)| is(material.surface))
+    }
+
+    pub(super) fn has_kind(&self, is: impl Fn(LobeKinds) -> bool) -> bool {
+        self.materials.iter().any(|(_, kinds)| is(*kinds))
     }
 
     /// Names of the materials that `is` holds for, at most three of them.
-    fn named(&self, is: impl Fn(&Material) -> bool) -> Option<String> {
-        let names: Vec<&str> = self.materials.iter().filter(|material| is(material)).map(|material| material.name.as_str()).collect();
+    fn named(&self, is: impl Fn(&Material, LobeKinds) -> bool) -> Option<String> {
+        let found = self.materials.iter().filter(|(material, kinds)| is(material, *kinds));
+        let names: Vec<&str> = found.map(|(material, _)| material.name.as_str()).collect();
         match names.as_slice() {
             [] => None,
             [first, second, _, _, ..] => Some(format!("{first}, {second} and {} more", names.len() - 2)),
@@ -87,16 +95,16 @@ impl<'a> Facts<'a> {
     fn evidence(&self, effect: Effect) -> (bool, String) {
         let lit = self.emitters.iter().sum::<usize>() > 0;
         let wants = |part: Part| self.part == Part::All || self.part == part || (self.is_picture && self.part == Part::Specular);
-        let mirrors = self.named(|material| material.surface == Surface::Mirror);
-        let glass = self.named(|material| matches!(material.surface, Surface::Dielectric { .. }));
+        let mirrors = self.named(|material, kinds| kinds.sharp_reflection && !matches!(material.surface, Surface::Dielectric { .. }));
+        let glass = self.named(|_, kinds| kinds.sharp_transmission);
         // Photons are of use where something scatters them to a sensor.
-        let receives = !self.is_picture || self.has(|surface| !surface.is_specular());
+        let receives = !self.is_picture || self.has_kind(|kinds| kinds.matt);
         let some = |count: usize, what: &str| match count {
             0 => (false, format!("no {what}")),
             count => (true, counted(count, what)),
         };
         let lights = |kind: u32, what: &str| some(self.emitters[kind as usize], &format!("{what} light"));
-        let found = |what: &str, is: &dyn Fn(&Material) -> bool, absent: &str| match self.named(is) {
+        let found = |what: &str, is: &dyn Fn(&Material) -> bool, absent: &str| match self.named(|material, _| is(material)) {
             Some(names) => (true, format!("{what}: {names}")),
             None => (false, absent.to_owned()),
         };
@@ -122,17 +130,39 @@ impl<'a> Facts<'a> {
             Effect::Indirect if !receives => (false, "no diffuse or glossy surface".into()),
             Effect::Indirect if !wants(Part::Indirect) => (false, format!("only {:?} light was asked for", self.part).to_lowercase()),
             Effect::Indirect => {
-                let is_bright = |material: &Material| !material.surface.is_specular() && material.base_colour.max_element() > 0.0;
-                found("diffuse or glossy", &is_bright, "every diffuse or glossy surface is black")
+                // What a layered surface reflects beside its colour is light, too.
+                let is_bright = |material: &Material| material.surface == Surface::Layered || material.base_colour.max_element() > 0.0;
+                match self.named(|material, kinds| kinds.matt && is_bright(material)) {
+                    Some(names) => (true, format!("diffuse or glossy: {names}")),
+                    None => (false, "every diffuse or glossy surface is black".into()),
+                }
             }
             Effect::Glossy => found("glossy", &|material| matches!(material.surface, Surface::Glossy { .. }), "no glossy material"),
             Effect::ReflectiveCaustics => caustic(&mirrors, "mirror"),
             Effect::RefractiveCaustics => caustic(&glass, "dielectric"),
-            Effect::SpecularChains => found("specular", &|material| material.surface.is_specular(), "no mirror and no dielectric material"),
-            Effect::Textures => {
-                let is_textured = |of: &Material| of.base_colour_texture.is_some() || of.emission_texture.is_some();
-                found("textured", &is_textured, "no textured material")
+            Effect::Layers => found("layered", &|material| material.surface == Surface::Layered, "no glTF material"),
+            Effect::Transmission => found("transmissive", &|material| is_layered_with(material, |of| of.transmission > 0.0), "no transmission"),
+            Effect::Media => {
+                let absorbs = |of: &Layers| of.transmission > 0.0 && of.medium.is_some_and(|medium| medium.transmittance != Vec3::ONE);
+                found("absorbing", &|material| is_layered_with(material, absorbs), "no medium that absorbs")
             }
+            Effect::ClearCoat => found("clear-coated", &|material| is_layered_with(material, |of| of.coat > 0.0), "no clear coat"),
+            Effect::Sheen => found("with sheen", &|material| is_layered_with(material, |of| of.sheen_colour != Vec3::ZERO), "no sheen"),
+            Effect::NormalMaps => {
+                let has_map = |material: &Material| {
+                    is_layered_with(material, |of| material.normal_map.is_some() || (of.coat > 0.0 && of.coat_normal_map.is_some()))
+                };
+                found("with normal maps", &has_map, "no normal map")
+            }
+            Effect::Alpha => {
+                let has_gaps = |material: &Material| is_layered_with(material, |_| material.coverage != Coverage::Whole);
+                found("with alpha", &has_gaps, "no transparency by alpha")
+            }
+            Effect::SpecularChains => match self.named(|_, kinds| kinds.is_sharp()) {
+                Some(names) => (true, format!("specular: {names}")),
+                None => (false, "no mirror and no dielectric material".into()),
+            },
+            Effect::Textures => found("textured", &|material| material.textures().next().is_some(), "no textured material"),
             Effect::VertexColours => some(self.coloured, "triangle with vertex colours"),
             Effect::Environment => lights(EMITTER_ENVIRONMENT, "environment"),
             Effect::MeshLights => some(self.emitters[EMITTER_TRIANGLE as usize], "emissive triangle"),
@@ -147,8 +177,14 @@ impl<'a> Facts<'a> {
             }
             Effect::Bvh => (true, counted(self.triangles, "triangle")),
             Effect::TwoSided => found("two-sided", &|material| material.two_sided, "no two-sided material"),
+            // A mapped normal is none of the triangle's, as a smooth one.
+            Effect::SmoothNormals if self.evidence(Effect::NormalMaps).0 => (true, "normal maps".into()),
             Effect::SmoothNormals if self.smooth == 0 => (false, "no smooth normals".into()),
             Effect::SmoothNormals => (true, format!("{} with smooth normals", counted(self.smooth, "triangle"))),
         }
     }
+}
+
+fn is_layered_with(material: &Material, has: impl Fn(&Layers) -> bool) -> bool {
+    material.surface == Surface::Layered && !material.layers.is_unlit && has(&material.layers)
 }

@@ -12,7 +12,7 @@ use crate::records::{CausticTarget, LightPath};
 use crate::scene::geometry::Geometry;
 use crate::scene::openings::OPENING_SHARE;
 use crate::scene::targets::{aimed_shares, caustic_targets};
-use crate::scene::{Scene, Surface};
+use crate::scene::{LobeKinds, Material, Scene, Surface};
 use crate::settings::Builder;
 use crate::settings::scene::{Effect, Illumination, SceneSettings};
 
@@ -63,7 +63,7 @@ impl Maps {
         let has_light = !geometry.emitters.is_empty();
         let global = (has_light && stored != 0).then(|| map(false, stored)).transpose()?;
         let mut caustic = (has_light && split && caustics).then(|| map(true, ARRIVED_CAUSTIC)).transpose()?;
-        let targets = caustic.as_mut().filter(|_| settings.aim).map_or_else(Vec::new, |map| aim(map, geometry, caustic_surfaces));
+        let targets = caustic.as_mut().filter(|_| settings.aim).map_or_else(Vec::new, |map| aim(map, scene, geometry, caustic_surfaces));
         let arrivals = stored | if caustic.is_some() { ARRIVED_CAUSTIC } else { 0 };
         Ok(Maps { global, caustic, caustic_surfaces, targets, arrivals })
     }
@@ -123,9 +123,19 @@ fn map(
     })
 }
 
+/// Materials that make caustics of the wanted kinds, a mask of `SURFACE_...`.
+fn makes_caustics(scene: &Scene, caustic_surfaces: u32) -> Vec<bool> {
+    let wants = |surface: u32| caustic_surfaces >> surface & 1 != 0;
+    let of = |(material, kinds): (&Material, LobeKinds)| match material.surface {
+        Surface::Dielectric { .. } => wants(SURFACE_DIELECTRIC),
+        _ => kinds.sharp_reflection && wants(SURFACE_MIRROR) || kinds.sharp_transmission && wants(SURFACE_DIELECTRIC),
+    };
+    scene.materials.iter().zip(scene.lobe_kinds()).map(of).collect()
+}
+
 /// What the photons of a caustic map are aimed at; nothing where that would leave none, or none out.
-fn aim(map: &mut MapPlan, geometry: &Geometry, caustic_surfaces: u32) -> Vec<CausticTarget> {
-    let targets = caustic_targets(geometry, caustic_surfaces);
+fn aim(map: &mut MapPlan, scene: &Scene, geometry: &Geometry, caustic_surfaces: u32) -> Vec<CausticTarget> {
+    let targets = caustic_targets(geometry, &makes_caustics(scene, caustic_surfaces));
     let (least, most) = aimed_shares(geometry, &targets);
     if least >= 1.0 || most <= 0.0 {
         return Vec::new();
@@ -139,9 +149,15 @@ fn aim(map: &mut MapPlan, geometry: &Geometry, caustic_surfaces: u32) -> Vec<Cau
 /// Landings of a photon in a map, at most on average: roulette keeps as large a share of photons as the brightest channel of the
 /// brightest surface that scatters; shading normals and rounding have room in what the plan makes of it.
 fn expected_landings(scene: &Scene, bounces: u32) -> f64 {
-    let is_specular = |surface: &Surface| matches!(surface, Surface::Mirror | Surface::Dielectric { .. });
-    let scatterers = scene.materials.iter().filter(|material| !is_specular(&material.surface));
-    let most = scatterers.map(|material| f64::from(material.base_colour.max_element())).fold(0.0, f64::max);
+    let brightest = |(material, kinds): (&Material, LobeKinds)| match material.surface {
+        // Each sheet that light passes is a landing.
+        _ if kinds.passing => 1.0,
+        // Reflection is at most some share of what a colour leaves.
+        Surface::Layered => 0.7 * f64::from(material.base_colour.max_element()) + 0.3,
+        _ => f64::from(material.base_colour.max_element()),
+    };
+    let scatterers = scene.materials.iter().zip(scene.lobe_kinds()).filter(|(_, kinds)| kinds.matt);
+    let most = scatterers.map(brightest).fold(0.0, f64::max);
     (1.0 / (1.0 - most).max(1e-9)).min(f64::from(bounces))
 }
 

@@ -15,7 +15,7 @@ use crate::constants::*;
 use crate::error::{Error, Result, require};
 use crate::photon::MapPhoton;
 use crate::scene::geometry::Geometry;
-use crate::scene::{Scene, Surface, openings};
+use crate::scene::{LobeKinds, Scene, Surface, openings};
 use crate::settings::scene::{Effect, Illumination, SceneSettings};
 use crate::settings::{Builder, Math};
 
@@ -90,7 +90,7 @@ impl ScenePlan {
             planned_in: Duration::ZERO,
         };
         plan.set_film(geometry);
-        let shows_lamps = plan.keeps(Effect::SpecularChains) && facts.has(Surface::is_specular);
+        let shows_lamps = plan.keeps(Effect::SpecularChains) && facts.has_kind(LobeKinds::is_sharp);
         if shows_lamps && matches!(sensor, Sensor::Picture { .. }) && plan.settings.part as u32 & PART_SPECULAR != 0 {
             plan.rare_radiance = geometry.brightest_shown();
         }
@@ -219,6 +219,12 @@ fn constants(
         ("HAS_VERTEX_COLOURS", flag(Effect::VertexColours)),
         ("HAS_TWO_SIDED", flag(Effect::TwoSided)),
         ("HAS_GLOSSY", flag(Effect::Glossy)),
+        ("HAS_LAYERS", flag(Effect::Layers)),
+        ("HAS_TRANSMISSION", flag(Effect::Transmission)),
+        ("HAS_COATS", flag(Effect::ClearCoat)),
+        ("HAS_SHEEN", flag(Effect::Sheen)),
+        ("HAS_NORMAL_MAPS", flag(Effect::NormalMaps)),
+        ("HAS_PASSING", u32::from(keeps(Effect::Layers) && facts.has_kind(|kinds| kinds.passing))),
         ("HAS_MIRROR", u32::from(facts.has(|surface| surface == Surface::Mirror) || settings.forces(Effect::SpecularChains))),
         (
             "HAS_DIELECTRIC",

@@ -2,6 +2,9 @@
 
 use glam::{DVec2, Vec3};
 
+use super::Texture;
+use crate::constants::{DELTA_ALPHA_INVERSE, MAP_ALPHA_PER_MILLE};
+
 /// How a surface scatters light. Its base colour is the share it scatters, per channel.
 #[derive(Debug, Clone, Copy, PartialEq)]
 pub enum Surface {
@@ -126,6 +129,28 @@ pub struct Layers {
     pub is_unlit: bool,
 }
 
+impl Layers {
+    /// Every texture but those of normal maps.
+    pub fn textures_mut(&mut self) -> [&mut Option<TextureUse>; 8] {
+        [
+            &mut self.metallic_roughness_texture,
+            &mut self.specular_texture,
+            &mut self.specular_colour_texture,
+            &mut self.transmission_texture,
+            &mut self.coat_texture,
+            &mut self.coat_roughness_texture,
+            &mut self.sheen_colour_texture,
+            &mut self.sheen_roughness_texture,
+        ]
+    }
+
+    /// Factors alone are left.
+    pub fn forget_textures(&mut self) {
+        self.textures_mut().into_iter().for_each(|texture| *texture = None);
+        self.coat_normal_map = None;
+    }
+}
+
 impl Default for Layers {
     /// What a glTF material is that says nothing.
     fn default() -> Layers {
@@ -175,6 +200,70 @@ pub struct Material {
     pub layers: Layers,
 }
 
+/// Which kinds of lobes a material may have somewhere on its surface, whatever its textures have within their range; the guide's page
+/// [materials](crate::guide::materials) says what each is.
+#[derive(Debug, Clone, Copy, PartialEq, Eq, Default)]
+pub struct LobeKinds {
+    /// Photon maps know these.
+    pub matt: bool,
+    /// Rays follow these.
+    pub sharp_reflection: bool,
+    pub sharp_transmission: bool,
+    /// Light goes straight on as if nothing were there.
+    pub passing: bool,
+}
+
+impl LobeKinds {
+    pub fn is_sharp(self) -> bool {
+        self.sharp_reflection || self.sharp_transmission
+    }
+
+    pub fn of(material: &Material, textures: &[Texture]) -> LobeKinds {
+        let none = LobeKinds::default();
+        match material.surface {
+            Surface::Lambert | Surface::PaperPhong { .. } | Surface::Glossy { .. } => LobeKinds { matt: true, ..none },
+            Surface::Mirror => LobeKinds { sharp_reflection: true, ..none },
+            Surface::Dielectric { .. } => LobeKinds { sharp_reflection: true, sharp_transmission: true, ..none },
+            Surface::Layered => LobeKinds::of_layered(material, textures),
+        }
+    }
+
+    fn of_layered(material: &Material, textures: &[Texture]) -> LobeKinds {
+        let of = &material.layers;
+        let range = |factor: f32, used: Option<TextureUse>, channel: usize| match used {
+            Some(used) if factor > 0.0 => {
+                let (least, most) = textures[used.texture].texels.range(channel);
+                (factor * least, factor * most)
+            }
+            _ => (factor, factor),
+        };
+        let squared = |(least, most): (f32, f32)| (least * least, most * most);
+        let map_alpha = MAP_ALPHA_PER_MILLE as f32 / 1000.0;
+        let delta_alpha = 1.0 / DELTA_ALPHA_INVERSE as f32;
+        let alpha = squared(range(of.roughness, of.metallic_roughness_texture, 1));
+        let coat_alpha = squared(range(of.coat_roughness, of.coat_roughness_texture, 1));
+        let metallic = range(of.metallic, of.metallic_roughness_texture, 2);
+        let transmission = range(of.transmission, of.transmission_texture, 0);
+        let reflects = metallic.1 > 0.0 || of.specular > 0.0;
+        let transmits = metallic.0 < 1.0 && transmission.1 > 0.0 && material.base_colour != Vec3::ZERO;
+        let is_diffuse = metallic.0 < 1.0 && transmission.0 < 1.0 && material.base_colour != Vec3::ZERO;
+        let is_pane = of.medium.is_none();
+        let is_covered = material.coverage == Coverage::Whole;
+        if of.is_unlit {
+            return LobeKinds { passing: !is_covered, ..LobeKinds::default() };
+        }
+        LobeKinds {
+            matt: is_diffuse
+                || of.sheen_colour != Vec3::ZERO
+                || (reflects && alpha.1 >= map_alpha)
+                || (of.coat > 0.0 && coat_alpha.1 >= map_alpha),
+            sharp_reflection: (reflects && alpha.0 < map_alpha) || (of.coat > 0.0 && coat_alpha.0 < map_alpha),
+            sharp_transmission: transmits && !(is_pane && alpha.1 < delta_alpha),
+            passing: !is_covered || (transmits && is_pane && alpha.0 < delta_alpha),
+        }
+    }
+}
+
 impl Surface {
     /// Whether light leaves in single directions, so that no density estimate can see it.
     pub fn is_specular(self) -> bool {
@@ -201,6 +290,16 @@ impl Material {
     /// A layered one without textures.
     pub fn layered(name: &str, base_colour: Vec3, layers: Layers) -> Material {
         Material { surface: Surface::Layered, layers, ..Material::lambert(name, base_colour) }
+    }
+
+    /// Every texture that it uses.
+    pub fn textures(&self) -> impl Iterator<Item = TextureUse> {
+        let mut layers = self.layers;
+        let maps = [self.normal_map, layers.coat_normal_map].map(|map| map.map(|map| map.texture));
+        let of_layers = layers.textures_mut().map(|texture| *texture);
+        let is_layered = self.surface == Surface::Layered;
+        let of_layers = of_layers.into_iter().chain(maps).filter(move |_| is_layered);
+        [self.base_colour_texture, self.emission_texture].into_iter().chain(of_layers).flatten()
     }
 
     pub fn is_emissive(&self) -> bool {

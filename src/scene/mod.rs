@@ -1,6 +1,7 @@
 //! What is lit: triangle meshes with materials, lights and cameras ([`Scene`]), read from glTF or
 //! built in; and the paper's box, a convex room ([`room::RoomScene`]).
 
+pub mod albedo;
 pub mod built_in;
 pub mod bvh;
 pub mod camera;
@@ -29,12 +30,13 @@ use rayon::prelude::*;
 
 pub use camera::Camera;
 pub use light::{Light, LightKind};
-pub use material::{Material, Surface};
+pub use material::{LobeKinds, Material, Surface};
 pub use mesh::Mesh;
 pub use texture::Texture;
 
 use crate::error::{Error, Result};
 use crate::settings::scene::Effect;
+use material::{Coverage, Medium};
 
 /// Called with what is being done while a scene is opened, and the share of it that is done.
 pub type Progress<'a> = &'a mut dyn FnMut(&'static str, f64);
@@ -102,15 +104,44 @@ impl Scene {
             if lacks(Effect::Glossy) && matches!(material.surface, Surface::Glossy { .. }) {
                 material.surface = Surface::Lambert;
             }
+            if lacks(Effect::Layers) && material.surface == Surface::Layered {
+                material.surface = Surface::Lambert;
+            }
+            if lacks(Effect::Transmission) {
+                material.layers.transmission = 0.0;
+            }
+            if lacks(Effect::Media) {
+                material.layers.medium = material.layers.medium.map(|_| Medium { transmittance: Vec3::ONE });
+            }
+            if lacks(Effect::ClearCoat) {
+                material.layers.coat = 0.0;
+            }
+            if lacks(Effect::Sheen) {
+                material.layers.sheen_colour = Vec3::ZERO;
+            }
+            if lacks(Effect::NormalMaps) {
+                material.normal_map = None;
+                material.layers.coat_normal_map = None;
+            }
+            if lacks(Effect::Alpha) {
+                material.coverage = Coverage::Whole;
+            }
             if lacks(Effect::TwoSided) {
                 material.two_sided = false;
             }
             if lacks(Effect::Textures) {
                 material.base_colour_texture = None;
                 material.emission_texture = None;
+                material.normal_map = None;
+                material.layers.forget_textures();
             }
         }
         Cow::Owned(scene)
+    }
+
+    /// Which lobes each material may have.
+    pub fn lobe_kinds(&self) -> Vec<LobeKinds> {
+        self.materials.iter().map(|material| LobeKinds::of(material, &self.textures)).collect()
     }
 
     /// Its first camera, or one that sees all of it.

@@ -25,13 +25,12 @@ struct Sphere {
     radius: f64,
 }
 
-/// At most 16 spheres, normalised, that hold all triangles of these surfaces, a mask of `1 << SURFACE_...`.
+/// At most 16 spheres, normalised, that hold all triangles of the wanted materials.
 ///
 /// Connected triangles stay together, and pairs are merged for as long as that leaves less to aim at: the sum of the
 /// squared radii, as a cone's solid angle goes with that.
-pub fn caustic_targets(geometry: &Geometry, surfaces: u32) -> Vec<CausticTarget> {
-    let is_wanted = |material: u32| surfaces >> geometry.materials[material as usize].surface & 1 != 0;
-    let wanted = geometry.triangles.iter().filter(|triangle| triangle.plane < HIDDEN && is_wanted(triangle.material));
+pub fn caustic_targets(geometry: &Geometry, is_wanted: &[bool]) -> Vec<CausticTarget> {
+    let wanted = geometry.triangles.iter().filter(|triangle| triangle.plane < HIDDEN && is_wanted[triangle.material as usize]);
     let mut groups = Vec::new();
     gathered(connected(&wanted.map(|triangle| [triangle.a, triangle.b, triangle.c]).collect::<Vec<_>>()), MAX_GROUPS_MERGED, &mut groups);
     merged(groups).iter().map(|points| target(points)).collect()
@@ -195,7 +194,10 @@ mod tests {
     use super::*;
     use crate::scene::{Material, Mesh, Scene, Surface, built_in};
 
-    const MIRRORS_AND_GLASS: u32 = 1 << SURFACE_MIRROR | 1 << SURFACE_DIELECTRIC;
+    /// Those of a geometry's materials that are mirrors or glass.
+    fn mirrors_and_glass(geometry: &Geometry) -> Vec<bool> {
+        geometry.materials.iter().map(|material| matches!(material.surface, SURFACE_MIRROR | SURFACE_DIELECTRIC)).collect()
+    }
 
     fn of_balls(balls: &[(DVec3, f64)]) -> Geometry {
         let mirror = Material { surface: Surface::Mirror, ..Material::lambert("mirror", Vec3::ONE) };
@@ -222,17 +224,18 @@ mod tests {
     fn each_ball_has_a_tight_sphere_of_its_own() {
         for (name, balls) in [("cornell-spheres", 2), ("caustic-sphere", 1), ("cornell", 0)] {
             let geometry = Geometry::new(&built_in::by_name(name).unwrap()).unwrap();
-            let targets = caustic_targets(&geometry, MIRRORS_AND_GLASS);
+            let targets = caustic_targets(&geometry, &mirrors_and_glass(&geometry));
             assert_eq!(targets.len(), balls, "{name}");
             assert_held(&geometry, &targets);
         }
         let spheres = Geometry::new(&built_in::by_name("cornell-spheres").unwrap()).unwrap();
-        for target in caustic_targets(&spheres, MIRRORS_AND_GLASS) {
+        for target in caustic_targets(&spheres, &mirrors_and_glass(&spheres)) {
             let radius = f64::from(target.radius) * spheres.unit;
             assert!((0.18..0.1802).contains(&radius), "{radius}");
         }
-        assert_eq!(caustic_targets(&spheres, 1 << SURFACE_MIRROR).len(), 1);
-        assert!(caustic_targets(&spheres, 0).is_empty());
+        let mirrors: Vec<bool> = spheres.materials.iter().map(|material| material.surface == SURFACE_MIRROR).collect();
+        assert_eq!(caustic_targets(&spheres, &mirrors).len(), 1);
+        assert!(caustic_targets(&spheres, &vec![false; mirrors.len()]).is_empty());
     }
 
     /// Eight balls in the corners of a cube have one each; packed side by side they share.
@@ -244,7 +247,7 @@ mod tests {
         };
         for (edge, count) in [(2.0, 8), (0.05, 1)] {
             let geometry = of_balls(&cube(edge));
-            let targets = caustic_targets(&geometry, MIRRORS_AND_GLASS);
+            let targets = caustic_targets(&geometry, &mirrors_and_glass(&geometry));
             assert_eq!(targets.len(), count, "{edge} m apart");
             assert_held(&geometry, &targets);
         }
@@ -254,13 +257,13 @@ mod tests {
     fn many_balls_are_held_by_few_spheres() {
         let place = |k: u32| DVec3::new(f64::from(k % 7), f64::from(k / 7 % 5), f64::from(k / 35));
         let geometry = of_balls(&(0..175).map(|k| (place(k), 0.05 + 0.002 * f64::from(k % 13))).collect::<Vec<_>>());
-        assert_held(&geometry, &caustic_targets(&geometry, MIRRORS_AND_GLASS));
+        assert_held(&geometry, &caustic_targets(&geometry, &mirrors_and_glass(&geometry)));
     }
 
     #[test]
     fn a_lamp_far_off_sends_a_small_share_and_one_within_sends_all() {
         let geometry = Geometry::new(&built_in::by_name("caustic-sphere").unwrap()).unwrap();
-        let targets = caustic_targets(&geometry, MIRRORS_AND_GLASS);
+        let targets = caustic_targets(&geometry, &mirrors_and_glass(&geometry));
         let (least, most) = aimed_shares(&geometry, &targets);
         // About the solid angle over pi of a ball of 0.25 m, 1.2 m off.
         assert!(0.035 < least && least <= most && most < 0.055, "{least}, {most}");

@@ -149,6 +149,15 @@ impl Texture {
     }
 }
 
+impl Texels {
+    /// Least and largest value of a channel: 0 to 2 are the colours, 3 is alpha.
+    pub fn range(&self, channel: usize) -> (f32, f32) {
+        let one = |place: usize| self.at(place)[channel];
+        let joined = |a: (f32, f32), b: (f32, f32)| (a.0.min(b.0), a.1.max(b.1));
+        (0..self.count()).into_par_iter().map(|place| (one(place), one(place))).reduce(|| (f32::INFINITY, f32::NEG_INFINITY), joined)
+    }
+}
+
 /// The sRGB transfer function (IEC 61966-2-1), from 8-bit code to linear.
 pub fn linear_of_srgb(code: u8) -> f32 {
     let value = f32::from(code) / 255.0;

@@ -10,6 +10,11 @@ struct Chain {
     bool gathers; // the first visible point, or a receiver, lies behind
     bool starts_nowhere; // at a receiver that no photon can reach
     bool sees_emission; // what shines at the next vertex has not been counted yet
+    // Of a path that a sharp lobe sent on which light samples know too: the density of its direction, 1/sr, and from where; 0: no light
+    // sample has counted what it meets.
+    float density;
+    vec3 from;
+    vec3 from_normal;
     uint point_count;
     VisiblePoint points[2];
     vec3 light[3]; // direct, specular, indirect
@@ -17,7 +22,7 @@ struct Chain {
 
 Chain new_chain(vec3 position, vec3 direction, vec3 weight, vec2 choices)
 {
-    Chain chain = Chain(position, direction, weight, choices, false, false, false, true, 0, VisiblePoint[](no_point(), no_point()),
+    Chain chain = Chain(position, direction, weight, choices, false, false, false, true, 0.0, vec3(0.0), vec3(0.0), 0, VisiblePoint[](no_point(), no_point()),
                         vec3[](vec3(0.0), vec3(0.0), vec3(0.0)));
     return chain;
 }
@@ -78,6 +83,18 @@ uint arrivals_wanted(Chain chain, bool gathers)
     return wanted;
 }
 
+// Adds what shines at the end of a ray, where light samples have not counted all of it; `light_density` is theirs.
+void add_emission(inout Chain chain, vec3 radiance, float light_density)
+{
+    float share = 1.0;
+    if (HAS_LAYERS) {
+        if (chain.density > 0.0) {
+            share = divide(chain.density, chain.density + float(SHADOW_RAYS) * light_density);
+        }
+    }
+    add_light(chain, share * radiance);
+}
+
 bool gathers_here(Surface surface)
 {
     if (HAS_GLOSSY) {
@@ -103,7 +120,7 @@ const uint ROULETTE_BLOCK = RECEIVER_BLOCK + 1;
 
 // Follows the chain of sample `number` of a place, which is over `first_depth` surfaces already. Says whether it is still under
 // way. Random numbers: block 1 + VERTEX_BLOCKS * depth goes on, the one after it is for direct light.
-bool follow(inout Chain chain, uint index, uint number, Draws draws, uint emitter_count, uint first_depth)
+bool follow(inout Chain chain, uint index, uint number, uint pixel_count, Draws draws, uint emitter_count, uint first_depth)
 {
     uint end_depth = min(first_depth + CHAIN_STEPS, MAX_BOUNCES);
     for (uint depth = first_depth; depth < end_depth; depth++) {
@@ -113,29 +130,99 @@ bool follow(inout Chain chain, uint index, uint number, Draws draws, uint emitte
         Hit hit = closest_hit(chain.position, chain.direction);
         if (hit.triangle == NONE) {
             if (chain.sees_emission) {
-                add_light(chain, environment_radiance(emitter_count));
+                float light_density = 0.0;
+                if (HAS_LAYERS) {
+                    light_density = sky_light_density(emitter_count, chain.from, chain.from_normal, chain.direction);
+                }
+                add_emission(chain, environment_radiance(emitter_count), light_density);
             }
             return false;
         }
         Surface surface = surface_at(hit, wo);
+        uint block = 1 + VERTEX_BLOCKS * depth;
+        bool is_layered = false;
+        if (HAS_LAYERS) {
+            is_layered = surface.kind == SURFACE_LAYERED;
+        }
+        Lobes lobes;
+        Scatter scatter;
+        float matt = 1.0;
+        if (is_layered) {
+            lobes = lobes_of(surface, wo, index_ratio(surface));
+            // The eye does not see the back of what has one side.
+            bool is_culled = !surface.scatters && !chain.gathers;
+            scatter = sample_layered(surface, lobes, wo, stratified(number, SAMPLES, words_of(index, block, draws)).zxy, depth, true);
+            if (HAS_PASSING) {
+                if (is_culled || scatter.passes) {
+                    chain.weight *= is_culled ? vec3(1.0) : scatter.weight;
+                    chain.position = offset_origin(surface.position, surface.error, surface.ng, chain.direction);
+                    continue;
+                }
+                chain.weight *= divide(surface.layers.coverage, 1.0 - lobes.pass_chance);
+            }
+            matt = matt_chance(lobes, surface.layers);
+            if (surface.layers.is_unlit && !chain.gathers) {
+                add_light(chain, surface.base_colour);
+            }
+        }
         if (chain.sees_emission) {
-            add_light(chain, surface.emission);
+            float light_density = 0.0;
+            if (HAS_LAYERS) {
+                if (chain.density > 0.0 && surface.emission != vec3(0.0)) {
+                    light_density = lamp_light_density(emitter_count, hit, chain.from, surface.position);
+                }
+            }
+            add_emission(chain, surface.emission, light_density);
         }
         if (!surface.scatters) {
             return false;
         }
-        uint block = 1 + VERTEX_BLOCKS * depth;
         bool specular = is_specular(surface);
+        if (is_layered) {
+            specular = scatter.is_specular;
+            chain.density = 0.0;
+            // Of what a gather ray meets the caustic map has counted the light of sharp lobes.
+            bool counts_sharp = !chain.gathers || chain.starts_nowhere;
+            if (SHADOW_RAYS != 0) {
+                Target here = plain_target(surface.position, surface.error, surface.ng, surface.ns, wo, surface.kind, 0.0);
+                here.surface = surface;
+                here.lobes = lobes;
+                vec3 light = direct_light(here, emitter_count, draws, index, number, block + 1);
+                if ((PARTS & part_of(chain, ARRIVED_DIRECT)) != 0) {
+                    add_light(chain, light);
+                }
+                if (counts_sharp) {
+                    bool saw_specular = chain.saw_specular;
+                    chain.saw_specular = saw_specular || !chain.gathers;
+                    add_light(chain, sharp_light);
+                    chain.saw_specular = saw_specular;
+                    chain.density = scatter.density;
+                    chain.from = surface.position;
+                    chain.from_normal = surface.ns;
+                }
+                note_shadow_rays(index, divide(chain.weight, float(SAMPLES)));
+            }
+            // Matt lobes are followed no further but for a gather.
+            if (!specular && matt == 0.0) {
+                return false;
+            }
+        }
         if (!specular) {
             vec3 scale = surface.base_colour * scatter_scale(surface.kind, surface.parameter);
-            if (SHADOW_RAYS != 0) {
+            bool asks_lights = SHADOW_RAYS != 0;
+            if (is_layered) {
+                asks_lights = false;
+                scale = vec3(divide(0.31830988618379067, matt));
+            }
+            if (asks_lights) {
                 if ((PARTS & part_of(chain, ARRIVED_DIRECT)) != 0) {
-                    Target here = Target(surface.position, surface.error, surface.ng, surface.ns, wo, surface.kind, surface.parameter);
+                    Target here = plain_target(surface.position, surface.error, surface.ng, surface.ns, wo, surface.kind, surface.parameter);
                     add_light(chain, scale * direct_light(here, emitter_count, draws, index, number, block + 1));
                     note_shadow_rays(index, divide(chain.weight * scale, float(SAMPLES)));
                 }
             }
-            bool for_all = !chain.saw_specular && !chain.gathers;
+            // Where it is by chance that a path gets here, each counts for itself.
+            bool for_all = !chain.saw_specular && !chain.gathers && matt == 1.0;
             bool leads = !for_all || number == 0;
             bool gathers = leads && !chain.gathers && gathers_here(surface) && (PARTS & part_of(chain, ARRIVED_INDIRECT)) != 0;
             uint arrivals = arrivals_wanted(chain, gathers);
@@ -147,6 +234,9 @@ bool follow(inout Chain chain, uint index, uint number, Draws draws, uint emitte
             arrivals |= arrivals == 0 ? SEEN
                                       : SEEN | (chain.saw_specular ? SEEN_OVER_SPECULAR : 0) | (chain.gathers ? SEEN_BY_GATHER : 0)
                                             | (for_all ? SEEN_FOR_ALL : 0);
+            if (HAS_LAYERS) {
+                write_matt_lobes(chain.point_count, index, number, pixel_count, lobes);
+            }
             chain.points[chain.point_count++] = VisiblePoint(surface.position, surface.plane, divide(chain.weight * scale, float(SAMPLES)),
                                                              surface.ns == surface.ng ? NONE : pack_normal(surface.ns), pack_direction(wo, 0), surface.parameter,
                                                              surface.kind, arrivals);
@@ -172,7 +262,9 @@ bool follow(inout Chain chain, uint index, uint number, Draws draws, uint emitte
             mirror_chance = MIRROR_CHANCES[depth];
             u.x = chain.choices[depth];
         }
-        Scatter scatter = sample_scatter(surface, wo, u, depth, true, mirror_chance);
+        if (!is_layered) {
+            scatter = sample_scatter(surface, wo, u, depth, true, mirror_chance);
+        }
         if (!scatter.alive) {
             return false;
         }
@@ -190,6 +282,9 @@ bool follow(inout Chain chain, uint index, uint number, Draws draws, uint emitte
         chain.weight *= scatter.weight;
         // No caustic map holds what reaches a receiver in the air over mirrors and glass.
         chain.sees_emission = chain.sees_emission || (chain.starts_nowhere && specular);
+        if (is_layered && !specular) {
+            chain.density = 0.0;
+        }
         chain.saw_specular = chain.saw_specular || (specular && !chain.gathers);
         chain.position = offset_origin(surface.position, surface.error, surface.ng, scatter.direction);
         chain.direction = scatter.direction;
@@ -211,7 +306,8 @@ void put_off(Chain chain, uint place, uint depth)
 {
     uint flags = uint(chain.saw_specular) | uint(chain.gathers) << 1 | uint(chain.starts_nowhere) << 2 | uint(chain.sees_emission) << 3;
     next_camera_paths[atomicAdd(camera_path_counts[0], 1)] =
-        CameraPath(chain.position, place, chain.direction, flags | chain.point_count << 4 | depth << 8, chain.weight);
+        CameraPath(chain.position, place, chain.direction, flags | chain.point_count << 4 | depth << 8, chain.weight, chain.density, chain.from,
+                   chain.from_normal);
 }
 
 // All pixels' first points stand first, so that neighbours in memory are neighbours in the picture. Points before `first` stay.

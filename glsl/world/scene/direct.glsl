@@ -9,28 +9,99 @@ struct Target {
     vec3 wo;
     uint kind;
     float exponent;
+    // Of a layered surface.
+    Surface surface;
+    Lobes lobes;
 };
+
+Target plain_target(vec3 position, float error, vec3 ng, vec3 ns, vec3 wo, uint kind, float exponent)
+{
+    Target target;
+    target.position = position;
+    target.error = error;
+    target.ng = ng;
+    target.ns = ns;
+    target.wo = wo;
+    target.kind = kind;
+    target.exponent = exponent;
+    return target;
+}
+
+// What passes straight along a way that ends at t_max of it: all, nothing, or the share that thin walls and gaps of alpha leave.
+vec3 light_through(vec3 start, vec3 way, float t_max)
+{
+    if (HAS_PASSING) {
+        vec3 share = vec3(1.0);
+        vec3 wo = -normalize(way);
+        for (uint sheet = 0; sheet < MAX_BOUNCES; sheet++) {
+            Hit hit = traverse(start, way, t_max, false);
+            if (hit.triangle == NONE) {
+                return share;
+            }
+            if (materials[triangles[hit.triangle].material].surface != SURFACE_LAYERED) {
+                return vec3(0.0);
+            }
+            Surface surface = surface_at(hit, wo);
+            share *= lobes_of(surface, wo, index_ratio(surface)).passing;
+            if (largest(share) == 0.0) {
+                return share;
+            }
+            vec3 next = offset_origin(surface.position, surface.error, surface.ng, way);
+            // To the same end.
+            if (t_max == 1.0) {
+                way = start + way - next;
+            }
+            start = next;
+        }
+        return vec3(0.0);
+    }
+    return vec3(traverse(start, way, t_max, true).triangle == NONE ? 1.0 : 0.0);
+}
 
 // What a shadow ray found: light times lobe and cosine, irradiance where there is no lobe, and whether something stands before it.
 struct ShadowRay {
     vec3 light;
+    vec3 sharp_light; // by lobes that rays follow
     bool is_asked; // light may arrive from there
     bool is_hidden;
 };
 
 ShadowRay cast_shadow_ray(Target point, Arriving arriving, Draws draws, uint index)
 {
-    ShadowRay ray = ShadowRay(vec3(0.0), false, false);
+    ShadowRay ray = ShadowRay(vec3(0.0), vec3(0.0), false, false);
     float cosine = dot(arriving.wi, point.ns);
     // Before the guards below, which would drop what is no number.
     note_unless(is_finite(cosine) && is_finite(arriving.radiance) && (arriving.is_far || is_finite(arriving.target)), NONFINITE_LIGHT,
                 draws.domain, draws.round, index);
+    if (HAS_LAYERS) {
+        if (point.kind == SURFACE_LAYERED) {
+            if (largest(arriving.radiance) > 0.0) {
+                LobeLight light = weigh_light(point.surface, point.lobes, point.wo, arriving.wi, float(SHADOW_RAYS) * arriving.density);
+                ray.light = arriving.radiance * light.matt;
+                ray.sharp_light = arriving.radiance * light.sharp;
+                ray.is_asked = largest(ray.light) > 0.0 || largest(ray.sharp_light) > 0.0;
+                if (ray.is_asked) {
+                    vec3 start = offset_origin(point.position, point.error, point.ng, arriving.wi);
+                    vec3 share = arriving.is_far ? light_through(start, arriving.wi, uintBitsToFloat(0x7f7fffffu))
+                                                 : light_through(start, arriving.target - start, 1.0);
+                    ray.is_hidden = share == vec3(0.0);
+                    ray.light *= ray.is_hidden ? vec3(1.0) : share;
+                    ray.sharp_light *= ray.is_hidden ? vec3(1.0) : share;
+                }
+            }
+            return ray;
+        }
+    }
     if (cosine > 0.0 && dot(arriving.wi, point.ng) > 0.0 && max(arriving.radiance.x, max(arriving.radiance.y, arriving.radiance.z)) > 0.0) {
         vec3 start = offset_origin(point.position, point.error, point.ng, point.ng);
         ray.is_asked = true;
-        ray.is_hidden = arriving.is_far ? traverse(start, arriving.wi, uintBitsToFloat(0x7f7fffffu), true).triangle != NONE
-                                        : is_occluded(start, arriving.target - start);
+        vec3 share = arriving.is_far ? light_through(start, arriving.wi, uintBitsToFloat(0x7f7fffffu))
+                                     : light_through(start, arriving.target - start, 1.0);
+        ray.is_hidden = share == vec3(0.0);
         ray.light = arriving.radiance * (cosine * lobe_weight(point.kind, point.exponent, point.ns, point.wo, arriving.wi));
+        if (HAS_PASSING) {
+            ray.light *= ray.is_hidden ? vec3(1.0) : share;
+        }
     }
     return ray;
 }
@@ -47,6 +118,9 @@ bool unseen_light_arrived = false;
 // One sample in so many casts a ray more, to the lights that a trial has not seen from round about.
 const uint SAMPLES_PER_UNSEEN = 4;
 
+// What sharp lobes make of it.
+vec3 sharp_light = vec3(0.0);
+
 // What arrives straight from lights, times lobe and cosine: irradiance where there is no lobe. The rays of all samples of
 // the place `index` share a block of random numbers.
 vec3 direct_light(Target point, uint emitter_count, Draws draws, uint index, uint number, uint block)
@@ -56,6 +130,7 @@ vec3 direct_light(Target point, uint emitter_count, Draws draws, uint index, uin
     light_arrived = false;
     stopped_unseen_light = vec3(0.0);
     unseen_light_arrived = false;
+    sharp_light = vec3(0.0);
     if (emitter_count == 0) {
         return sum;
     }
@@ -70,6 +145,7 @@ vec3 direct_light(Target point, uint emitter_count, Draws draws, uint index, uin
     for (uint ray = 0; ray < ray_count; ray++) {
         vec3 u = stratified(number * SHADOW_RAYS + ray, SAMPLES * SHADOW_RAYS, words);
         Emitter light;
+        float by_power = 0.0;
         float count = 1.0;
         if (LIGHT_CLUSTERS != 0) {
             uint row = unseen_row - LIGHT_CLUSTERS;
@@ -81,25 +157,33 @@ vec3 direct_light(Target point, uint emitter_count, Draws draws, uint index, uin
             }
             ChosenLight chosen = choose_light(row, point.position, u.z, mix32(words.w + (number * (SHADOW_RAYS + 1) + ray)));
             light = emitters[chosen.emitter];
+            by_power = light.probability;
             light.probability = chosen.probability;
         } else {
             light = emitters[pick_emitter(emitter_count, u.z)];
+            by_power = light.probability;
         }
         Arriving arriving = sample_light(light, point.position, point.ns, u.xy);
+        if (HAS_LAYERS) {
+            // Both samplings weigh each other as if lights were chosen by power everywhere: shares that add up to 1 make no bias.
+            arriving.density *= by_power;
+        }
         ShadowRay found = cast_shadow_ray(point, arriving, draws, index);
         if (found.is_asked) {
             bool is_unseen = ray == SHADOW_RAYS || arriving.is_beside;
             if (!found.is_hidden) {
                 sum += count * found.light;
+                sharp_light += count * found.sharp_light;
                 light_arrived = true;
                 unseen_light_arrived = unseen_light_arrived || is_unseen;
             } else {
                 bool is_certain = light.kind == EMITTER_POINT || light.kind == EMITTER_SPOT || light.kind == EMITTER_DIRECTIONAL;
-                vec3 stopped = is_certain ? vec3(0.0) : divide(count * found.light, float(SHADOW_RAYS));
+                vec3 stopped = is_certain ? vec3(0.0) : divide(count * (found.light + found.sharp_light), float(SHADOW_RAYS));
                 stopped_light = max(stopped_light, stopped);
                 stopped_unseen_light = is_unseen ? max(stopped_unseen_light, stopped) : stopped_unseen_light;
             }
         }
     }
+    sharp_light = divide(sharp_light, float(SHADOW_RAYS));
     return divide(sum, float(SHADOW_RAYS));
 }

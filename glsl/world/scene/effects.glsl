@@ -10,6 +10,16 @@ layout(constant_id = 9) const bool HAS_TEXTURES = true;
 // More texels than one buffer holds.
 layout(constant_id = 52) const bool HAS_MANY_TEXELS = false;
 layout(constant_id = 51) const bool HAS_VERTEX_COLOURS = true;
+// glTF's materials, and what each may have.
+layout(constant_id = 53) const bool HAS_LAYERS = false;
+layout(constant_id = 54) const bool HAS_TRANSMISSION = false;
+layout(constant_id = 55) const bool HAS_COATS = false;
+layout(constant_id = 56) const bool HAS_SHEEN = false;
+layout(constant_id = 57) const bool HAS_NORMAL_MAPS = false;
+// Surfaces that light passes straight as if nothing were there: gaps of alpha, thin smooth walls, backs that the eye does not see.
+layout(constant_id = 58) const bool HAS_PASSING = false;
+// Media that absorb, or lie in one another.
+layout(constant_id = 59) const bool HAS_MEDIA = false;
 layout(constant_id = 10) const bool HAS_TWO_SIDED = true;
 layout(constant_id = 11) const bool HAS_GLOSSY = true;
 layout(constant_id = 12) const bool HAS_MIRROR = true;

@@ -104,7 +104,12 @@ Emission sample_emission(Emitter light, float scene_radius, vec4 u, vec4 w)
                 if (material.emission_texture != NONE) {
                     TriangleUvs uv = uvs[light.triangle];
                     emission.flux *=
-                        sample_texture(material.emission_texture, mixed_uv(uv.emission_a, uv.emission_b, uv.emission_c, at.x, at.y));
+                        sample_texture(material.emission_texture, mixed_uv(uv.emission_a, uv.emission_b, uv.emission_c, at.x, at.y)).rgb;
+                }
+            }
+            if (HAS_PASSING) {
+                if (material.surface == SURFACE_LAYERED) {
+                    emission.flux *= coverage_of(material, light.triangle, at.x, at.y, vertex_alpha_at(light.triangle, at.x, at.y));
                 }
             }
         }
@@ -168,12 +173,35 @@ struct Arriving {
     vec3 target;
     bool is_far;
     bool is_beside; // from the sky, and through none of the openings that a trial found
+    float density; // of this direction where lights are chosen by power, 1/sr; 0: no ray meets the light by chance
 };
+
+// Density with which sample_light() takes a point of a lamp, 1/sr, from a place that the lamp faces.
+float lamp_density(Triangle shining, vec3 normal, vec3 position, vec3 point, float area)
+{
+    float angle = sample_spherical_triangle(normalize(shining.a - position), normalize(shining.b - position), normalize(shining.c - position),
+                                            vec2(0.5)).w;
+    vec3 way = point - position;
+    float squared = dot(way, way);
+    float cosine = abs(dot(normal, way)) * inversesqrt(max(squared, 1e-30));
+    return angle > 0.0 ? divide(1.0, angle) : divide(squared, max(cosine * area, 1e-30));
+}
+
+float environment_density(vec3 position, vec3 ns, vec3 wi)
+{
+    if (HAS_OPENINGS) {
+        if (openings[0].radius != 0.0) {
+            float sum = sum_of_versines(position);
+            return sky_density(position, ns, wi, sum > 0.0 ? OPENING_SHARE : 0.0, sum).density;
+        }
+    }
+    return max(dot(wi, ns), 0.0) * 0.31830988618379067;
+}
 
 // `light` has the probability with which it was chosen; u is for its area.
 Arriving sample_light(Emitter light, vec3 position, vec3 ns, vec2 u)
 {
-    Arriving arriving = Arriving(vec3(0.0), divide(light.strength, light.probability), light.position, false, false);
+    Arriving arriving = Arriving(vec3(0.0), divide(light.strength, light.probability), light.position, false, false, 0.0);
     float cos_light = 1.0;
     bool by_direction = false;
     if (HAS_TRIANGLE_LIGHTS) {
@@ -195,7 +223,7 @@ Arriving sample_light(Emitter light, vec3 position, vec3 ns, vec2 u)
                 normal = material.two_sided != 0 && side < 0.0 ? -normal : normal;
             }
             arriving.target = offset_origin(point, position_error(point) + triangle_error(triangle), normal, normal);
-            arriving.radiance = emitted_radiance(material, light.triangle, at.x, at.y) * divide(area, light.probability);
+            arriving.radiance = lamp_radiance(material, light.triangle, at.x, at.y) * divide(area, light.probability);
             cos_light = is_before(side, position, triangle_error(triangle)) ? max(dot(normal, normalize(position - point)), 0.0) : 0.0;
             if (cos_light > 0.0) {
                 vec4 direction = sample_spherical_triangle(normalize(shining.a - position), normalize(shining.b - position),
@@ -209,7 +237,7 @@ Arriving sample_light(Emitter light, vec3 position, vec3 ns, vec2 u)
                     if (HAS_TEXTURES) {
                         at = triangle_weights(triangle, point);
                     }
-                    arriving.radiance = emitted_radiance(material, light.triangle, at.x, at.y) * divide(direction.w, light.probability);
+                    arriving.radiance = lamp_radiance(material, light.triangle, at.x, at.y) * divide(direction.w, light.probability);
                     arriving.wi = direction.xyz;
                 }
             }
@@ -255,6 +283,25 @@ Arriving sample_light(Emitter light, vec3 position, vec3 ns, vec2 u)
             }
         }
     }
+    if (HAS_LAYERS) {
+        if (HAS_ENVIRONMENT) {
+            if (light.kind == EMITTER_ENVIRONMENT) {
+                arriving.density = environment_density(position, ns, arriving.wi);
+            }
+        }
+        if (HAS_TRIANGLE_LIGHTS) {
+            if (light.kind == EMITTER_TRIANGLE) {
+                Triangle triangle = triangles[light.triangle];
+                float width = 1.0;
+                Triangle shining = triangle;
+                if (HAS_TEXTURES) {
+                    shining = lamp_corners(light, triangle);
+                    width = light.position.z;
+                }
+                arriving.density = lamp_density(shining, triangle_normal(triangle), position, arriving.target, triangle_area(triangle) * width * width);
+            }
+        }
+    }
     if (!arriving.is_far) {
         vec3 way = arriving.target - position;
         float distance_squared = dot(way, way);
@@ -275,4 +322,50 @@ vec3 environment_radiance(uint emitter_count)
         return light.kind == EMITTER_ENVIRONMENT ? light.strength : vec3(0.0);
     }
     return vec3(0.0);
+}
+
+// Density, 1/sr, of light samples towards the sky where lights are chosen by power.
+float sky_light_density(uint emitter_count, vec3 position, vec3 ns, vec3 wi)
+{
+    if (HAS_ENVIRONMENT && emitter_count != 0) {
+        Emitter light = emitters[emitter_count - 1];
+        return light.kind == EMITTER_ENVIRONMENT ? light.probability * environment_density(position, ns, wi) : 0.0;
+    }
+    return 0.0;
+}
+
+// The same towards a point that a ray has met; 0 if no emitter is there.
+float lamp_light_density(uint emitter_count, Hit hit, vec3 position, vec3 point)
+{
+    // Emitters that are triangles come first, in their order.
+    uint low = 0, high = emitter_count;
+    while (low < high) {
+        uint middle = (low + high) / 2;
+        Emitter light = emitters[middle];
+        if (light.kind == EMITTER_TRIANGLE && light.triangle < hit.triangle) {
+            low = middle + 1;
+        } else {
+            high = middle;
+        }
+    }
+    Triangle triangle = triangles[hit.triangle];
+    for (uint k = low; k < emitter_count; k++) {
+        Emitter light = emitters[k];
+        if (light.kind != EMITTER_TRIANGLE || light.triangle != hit.triangle) {
+            break;
+        }
+        Triangle shining = triangle;
+        float width = 1.0;
+        bool is_within = true;
+        if (HAS_TEXTURES) {
+            shining = lamp_corners(light, triangle);
+            width = light.position.z;
+            vec2 at = divide(vec2(hit.u, hit.v) - light.position.xy, width);
+            is_within = at.x >= 0.0 && at.y >= 0.0 && at.x + at.y <= 1.0;
+        }
+        if (is_within) {
+            return light.probability * lamp_density(shining, triangle_normal(triangle), position, point, triangle_area(triangle) * width * width);
+        }
+    }
+    return 0.0;
 }

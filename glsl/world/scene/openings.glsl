@@ -25,13 +25,36 @@ struct SampledSky {
     bool is_aimed; // it leads to an opening, by whichever way it was found
 };
 
-// Towards the openings or, by the cosine, anywhere.
-SampledSky sample_sky(vec3 position, vec3 ns, vec2 u)
+// Density of that sampling in a direction, 1/sr, and whether it leads to an opening.
+SampledSky sky_density(vec3 position, vec3 ns, vec3 wi, float share, float sum)
+{
+    float density = (1.0 - share) * max(dot(wi, ns), 0.0) * 0.31830988618379067;
+    bool is_aimed = false;
+    if (share > 0.0) {
+        float cones = 0.0;
+        for (uint k = 0; k < MAX_OPENINGS && openings[k].radius > 0.0; k++) {
+            float own = opening_versine(k, position);
+            cones += own > 0.0 && versine_between(wi, normalize(openings[k].centre - position)) <= own ? 1.0 : 0.0;
+        }
+        density += divide(share * cones, 6.28318530717958648 * sum);
+        is_aimed = cones > 0.0;
+    }
+    return SampledSky(wi, density, is_aimed);
+}
+
+float sum_of_versines(vec3 position)
 {
     float sum = 0.0;
     for (uint k = 0; k < MAX_OPENINGS && openings[k].radius > 0.0; k++) {
         sum += opening_versine(k, position);
     }
+    return sum;
+}
+
+// Towards the openings or, by the cosine, anywhere.
+SampledSky sample_sky(vec3 position, vec3 ns, vec2 u)
+{
+    float sum = sum_of_versines(position);
     float share = sum > 0.0 ? OPENING_SHARE : 0.0;
     vec3 wi = vec3(0.0);
     if (u.x < share) {
@@ -52,18 +75,7 @@ SampledSky sample_sky(vec3 position, vec3 ns, vec2 u)
     } else {
         wi = to_frame(sample_cosine_hemisphere(divide(u.x - share, 1.0 - share), u.y), ns);
     }
-    float density = (1.0 - share) * max(dot(wi, ns), 0.0) * 0.31830988618379067;
-    bool is_aimed = false;
-    if (share > 0.0) {
-        float cones = 0.0;
-        for (uint k = 0; k < MAX_OPENINGS && openings[k].radius > 0.0; k++) {
-            float own = opening_versine(k, position);
-            cones += own > 0.0 && versine_between(wi, normalize(openings[k].centre - position)) <= own ? 1.0 : 0.0;
-        }
-        density += divide(share * cones, 6.28318530717958648 * sum);
-        is_aimed = cones > 0.0;
-    }
-    return SampledSky(wi, density, is_aimed);
+    return sky_density(position, ns, wi, share, sum);
 }
 
 // Moves a photon from beyond the scene, which keeps its direction: it starts on the discs that cover the openings, or stays.

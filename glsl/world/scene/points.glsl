@@ -5,6 +5,28 @@ layout(set = 1, binding = 1, scalar) writeonly buffer VisiblePoints { VisiblePoi
 // For each sample of a pixel, or receiver, and each channel, film units of this pass so far.
 layout(set = 1, binding = 2, scalar) buffer PassSums { uvec2 pass_sums[]; };
 
+// Of layered surfaces, beside the visible point of the same number.
+layout(set = 1, binding = 14, scalar) writeonly buffer MattLobesOfPoints { MattLobes matt_lobes[]; };
+layout(set = 1, binding = 16, scalar) writeonly buffer MattCoversOfPoints { MattCover matt_covers[]; };
+
+// Of point `k` of sample `number`.
+void write_matt_lobes(uint k, uint pixel, uint number, uint pixel_count, Lobes lobes)
+{
+    uint per_path = 1;
+    if (GATHER_RAYS != GATHER_NONE) {
+        per_path = 2;
+    }
+    uint place = (per_path * number + k) * pixel_count + pixel;
+    matt_lobes[place] = lobes.matt;
+    bool has_cover = HAS_COATS;
+    if (HAS_SHEEN) {
+        has_cover = true;
+    }
+    if (has_cover) {
+        matt_covers[place] = lobes.cover;
+    }
+}
+
 // `scale` and `limit` are those of a share of the pixel's light, `rounding` is the round's. Adds to what is there, or replaces it.
 void write_pass_sum(uint place, vec3 light[3], float scale, float limit, uint rounding, bool adds)
 {

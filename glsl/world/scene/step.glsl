@@ -15,16 +15,36 @@ Step step_path(inout LightPath path, uint bounce)
     if (!taken.escaped) {
         vec3 wo = -path.direction;
         Surface surface = surface_at(hit, wo);
-        bool specular = is_specular(surface);
-        taken.stored = !specular && (path.arrival & push.map.stored) != 0;
+        bool is_layered = false;
+        if (HAS_LAYERS) {
+            is_layered = surface.kind == SURFACE_LAYERED;
+        }
+        Lobes lobes;
+        bool has_matt = !is_specular(surface);
+        if (is_layered) {
+            lobes = lobes_of(surface, wo, index_ratio(surface));
+            has_matt = surface.scatters && matt_chance(lobes, surface.layers) > 0.0;
+        }
+        // Also where alpha has a gap: the light there is that of the surface about it, whose area the density estimate counts.
+        taken.stored = has_matt && (path.arrival & push.map.stored) != 0;
         taken.photon = Photon(surface.position, surface.plane, path.flux, pack_direction(wo, findLSB(path.arrival)));
 
         vec4 u = philox_floats(uvec4(path.photon, push.draws.round, EMISSION_BLOCKS + bounce, push.draws.domain), push.draws.seed);
-        Scatter scatter = sample_scatter(surface, wo, u.yzw, bounce, false, 0.0);
+        Scatter scatter;
+        if (is_layered) {
+            scatter = sample_layered(surface, lobes, wo, u.yzw, bounce, false);
+            if (HAS_PASSING) {
+                scatter.weight *= scatter.passes ? 1.0 : divide(surface.layers.coverage, 1.0 - lobes.pass_chance);
+            }
+        } else {
+            scatter = sample_scatter(surface, wo, u.yzw, bounce, false, 0.0);
+        }
+        bool specular = scatter.is_specular;
         vec3 flux = path.flux * scatter.weight;
         if (HAS_SMOOTH_NORMALS) {
             // Mirrors and glass keep a photon's flux whatever their normals: all that meets the mesh goes on.
-            if (surface.ns != surface.ng && !specular) {
+            bool keeps_flux = scatter.passes || (specular && scatter.density == 0.0);
+            if (surface.ns != surface.ng && !keeps_flux) {
                 float gain = shading_gain(dot(wo, surface.ns), dot(wo, surface.ng));
                 float back_gain = shading_gain(dot(scatter.direction, surface.ng), dot(scatter.direction, surface.ns));
                 flux *= min(gain * back_gain, float(MAX_SHADING_GAIN));
@@ -38,7 +58,8 @@ Step step_path(inout LightPath path, uint bounce)
         float after = max(flux.x, max(flux.y, flux.z));
         // Survival in proportion to the flux that is left, so that survivors carry about what they did.
         float survival = before > 0.0 ? min(divide(after, before), 1.0) : 0.0;
-        taken.alive = surface.scatters && scatter.alive && u.x < survival && (specular || push.map.caustic_only == 0);
+        bool may_scatter = surface.scatters || scatter.passes;
+        taken.alive = may_scatter && scatter.alive && u.x < survival && (specular || scatter.passes || push.map.caustic_only == 0);
         taken.absorbed = !taken.alive;
         flux = divide(flux, max(survival, 1e-12));
         if (HAS_SMOOTH_NORMALS) {
@@ -50,8 +71,14 @@ Step step_path(inout LightPath path, uint bounce)
         }
 
         uint onward = ARRIVED_INDIRECT;
-        if (specular) {
-            bool wanted = ((push.map.caustic_surfaces >> surface.kind) & 1u) != 0;
+        if (scatter.passes) {
+            onward = path.arrival;
+        } else if (specular) {
+            uint kind = surface.kind;
+            if (is_layered) {
+                kind = dot(scatter.direction, surface.ng) < 0.0 ? SURFACE_DIELECTRIC : SURFACE_MIRROR;
+            }
+            bool wanted = ((push.map.caustic_surfaces >> kind) & 1u) != 0;
             onward = path.arrival >= ARRIVED_INDIRECT ? path.arrival : (wanted ? ARRIVED_CAUSTIC : ARRIVED_UNWANTED);
         }
         path = LightPath(start, path.photon, scatter.direction, onward, flux);

@@ -33,10 +33,13 @@ pub(super) fn rounding(plan: &ScenePlan, round: u32) -> u32 {
 /// A kernel that follows camera paths: what all of these write to, and its own buffers.
 macro_rules! camera_kernel {
     ($kernel:ident, $resources:ident, $($own:ident: $buffer:expr),*) => {{
-        let SceneResources { scene, visible_points, pass_sums, one_hits, part_totals, anomalies, nonfinite_values, .. } = $resources;
+        let SceneResources {
+            scene, visible_points, matt_lobes, matt_covers, pass_sums, one_hits, part_totals, anomalies, nonfinite_values, ..
+        } = $resources;
         let camera_path_counts = &$resources.camera_path_counts;
         $kernel {
-            scene, visible_points, pass_sums, one_hits, part_totals, anomalies, nonfinite_values, camera_path_counts, $($own: $buffer),*
+            scene, visible_points, matt_lobes, matt_covers, pass_sums, one_hits, part_totals, anomalies, nonfinite_values,
+            camera_path_counts, $($own: $buffer),*
         }
     }};
 }

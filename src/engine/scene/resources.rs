@@ -6,8 +6,10 @@ use crate::gpu::{Buffer, Commands, Gpu, kernels};
 use crate::photon::MapPhoton;
 use crate::plan::scene::ScenePlan;
 use crate::records::*;
+use crate::scene::albedo;
 use crate::scene::geometry::Geometry;
 use crate::settings::Builder;
+use crate::settings::scene::Effect;
 
 buffers! {
     pub struct SceneResources(
@@ -24,6 +26,9 @@ buffers! {
             uvs: planned.filled(commands, "texture coordinates", &geometry.uvs)?,
             colours: planned.filled(commands, "vertex colours", &geometry.colours)?,
             materials: planned.filled(commands, "materials", &geometry.materials)?,
+            layered_materials: planned.filled(commands, "layered materials", &geometry.layered_materials)?,
+            triangle_layers: planned.filled(commands, "layers of triangles", &geometry.triangle_layers)?,
+            albedos: planned.filled(commands, "albedos", if plan.keeps(Effect::Layers) { &albedo::TABLE } else { &[] })?,
             textures: planned.filled(commands, "textures", &geometry.textures)?,
             texels,
             texels_1,
@@ -44,6 +49,8 @@ buffers! {
         photons: Option<PhotonBuffers> = plan.maps().next().map(|_| PhotonBuffers::made(planned, commands, plan)).transpose()?,
         // What the sensor sees in the round under way.
         visible_points: Buffer<VisiblePoint> = planned.one("visible points")?,
+        matt_lobes: Buffer<MattLobes> = planned.one("matt lobes")?,
+        matt_covers: Buffer<MattCover> = planned.one("matt covers")?,
         pass_sums: Buffer<u64> = planned.one("pass sums")?,
         /// Camera paths that one dispatch leaves to the next, which leaves its own in the other; and how many.
         camera_paths: [Buffer<CameraPath>; 2] = planned.several("camera paths")?,

@@ -171,7 +171,8 @@ fn quoted(name: &str) -> String {
 
 /// Whether light goes from lamps that no path meets over mirrors or through glass.
 fn unknown_to_paths(scene: &Scene) -> bool {
-    let is_specular = |mesh: &Mesh| scene.materials[mesh.material].surface.is_specular();
+    let kinds = scene.lobe_kinds();
+    let is_specular = |mesh: &Mesh| kinds[mesh.material].is_sharp();
     let is_point_like = |light: &Light| !matches!(light.kind, LightKind::Environment { .. });
     scene.lights.iter().any(is_point_like) && scene.meshes.iter().any(is_specular)
 }

@@ -10,7 +10,7 @@ use super::lamp_pieces::{Brightness, Cut, Lamp, Piece, Shining, cut};
 use super::{Geometry, area, refuse};
 use crate::constants::*;
 use crate::error::Result;
-use crate::records::{Emitter, Triangle};
+use crate::records::{Emitter, LayeredMaterial, SurfaceMaterial, Triangle};
 use crate::scene::Scene;
 use crate::scene::light::LightKind;
 use crate::settings::EmissionLaw;
@@ -196,7 +196,11 @@ impl Geometry {
     }
 
     fn shown_radiances(&self) -> impl Iterator<Item = Vec3> {
-        let shines = self.materials.iter().map(|material| material.emission);
+        let of_material = |(material, layered): (&SurfaceMaterial, &LayeredMaterial)| {
+            let shown = if layered.is_unlit != 0 { material.base_colour } else { Vec3::ZERO };
+            material.emission + shown
+        };
+        let shines = self.materials.iter().zip(&self.layered_materials).map(of_material);
         let environment = self.emitters.iter().filter(|emitter| emitter.kind == EMITTER_ENVIRONMENT);
         shines.chain(environment.map(|emitter| emitter.strength))
     }

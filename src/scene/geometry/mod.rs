@@ -7,6 +7,7 @@
 
 mod emitters;
 mod lamp_pieces;
+mod layered;
 
 use std::cell::LazyCell;
 use std::collections::BTreeSet;
@@ -19,11 +20,13 @@ use super::bvh::Bvh;
 use super::material::TextureUse;
 use super::overlap;
 use super::planes::{Planes, for_equals, hash_of};
-use super::texture::{LINEAR_OF_SRGB, Texels, Wrap};
+use super::texture::{Filter, LINEAR_OF_SRGB, Texels, Wrap};
 use super::{Material, Mesh, Progress, Scene, Surface};
 use crate::constants::*;
 use crate::error::{Error, Result};
-use crate::records::{BvhNode, Emitter, SurfaceMaterial, TextureInfo, Triangle, TriangleColours, TriangleNormals, TriangleUvs};
+use crate::records::{
+    BvhNode, Emitter, LayeredMaterial, SurfaceMaterial, TextureInfo, Triangle, TriangleColours, TriangleLayers, TriangleNormals, TriangleUvs,
+};
 use crate::text::counted;
 
 #[derive(Debug, Clone)]
@@ -48,6 +51,10 @@ pub struct Geometry {
     /// One for all triangles where no mesh has any.
     pub colours: Vec<TriangleColours>,
     pub materials: Vec<SurfaceMaterial>,
+    /// One a material.
+    pub layered_materials: Vec<LayeredMaterial>,
+    /// One for all triangles where no layered material has a texture of its own, or a normal map.
+    pub triangle_layers: Vec<TriangleLayers>,
     pub textures: Vec<TextureInfo>,
     /// Those that the kernels look 8-bit codes up in, then those of all textures.
     pub texels: Vec<u32>,
@@ -187,9 +194,16 @@ impl Geometry {
         let colours_of = |(&place, &(mesh, triangle)): (&u32, &(u32, u32))| {
             corner_colours(&scene.meshes[mesh as usize], triangle as usize, part_of(place))
         };
-        let colours = match scene.meshes.iter().all(|mesh| mesh.colours.is_empty()) {
-            true => vec![TriangleColours { a: Vec3::ONE, b: Vec3::ONE, c: Vec3::ONE }],
+        let colours = match scene.meshes.iter().all(|mesh| mesh.colours.is_empty() && mesh.alphas.is_empty()) {
+            true => vec![TriangleColours { a: Vec3::ONE, b: Vec3::ONE, c: Vec3::ONE, alphas: Vec3::ONE }],
             false => order.par_iter().zip(&sources).map(colours_of).collect(),
+        };
+        let layers_of = |(&place, &(mesh, triangle)): (&u32, &(u32, u32))| {
+            layered::of_triangle(&scene.meshes[mesh as usize], triangle as usize, part_of(place))
+        };
+        let triangle_layers = match layered::is_needed(scene) {
+            false => vec![TriangleLayers::default()],
+            true => order.par_iter().zip(&sources).map(layers_of).collect(),
         };
         progress("packing textures", 0.0);
         let (textures, texels) = pack_textures(scene);
@@ -212,6 +226,8 @@ impl Geometry {
             uvs,
             colours,
             materials: scene.materials.iter().map(material_record).collect(),
+            layered_materials: scene.materials.iter().map(|material| layered::record(material, unit)).collect(),
+            triangle_layers,
             textures,
             texels,
             emitters: Vec::new(),
@@ -315,7 +331,9 @@ fn corner_normals(mesh: &Mesh, triangle: usize, part: Option<&[DVec3; 3]>) -> Tr
 fn corner_colours(mesh: &Mesh, triangle: usize, part: Option<&[DVec3; 3]>) -> TriangleColours {
     let colour = |vertex: u32| mesh.colours.get(vertex as usize).copied().unwrap_or(DVec3::ONE);
     let [a, b, c] = at_corners(mesh.triangles[triangle].map(colour), part).map(DVec3::as_vec3);
-    TriangleColours { a, b, c }
+    let alpha = |vertex: u32| mesh.alphas.get(vertex as usize).copied().unwrap_or(1.0);
+    let alphas = DVec3::from(at_corners(mesh.triangles[triangle].map(alpha), part)).as_vec3();
+    TriangleColours { a, b, c, alphas }
 }
 
 fn corner_uvs(mesh: &Mesh, material: &Material, triangle: usize, part: Option<&[DVec3; 3]>) -> TriangleUvs {
@@ -353,7 +371,8 @@ fn material_record(material: &Material) -> SurfaceMaterial {
         parameter,
         base_texture: material.base_colour_texture.map_or(NONE, |texture| texture.texture as u32),
         emission_texture: material.emission_texture.map_or(NONE, |texture| texture.texture as u32),
-        two_sided: u32::from(material.two_sided),
+        // Glass has two sides: light leaves it by the back.
+        two_sided: u32::from(material.two_sided || (surface == SURFACE_LAYERED && material.layers.transmission > 0.0)),
     }
 }
 
@@ -361,9 +380,7 @@ fn material_record(material: &Material) -> SurfaceMaterial {
 fn pack_textures(scene: &Scene) -> (Vec<TextureInfo>, Vec<u32>) {
     let mut is_used = vec![false; scene.textures.len()];
     for material in &scene.materials {
-        for of in [material.base_colour_texture, material.emission_texture].into_iter().flatten() {
-            is_used[of.texture] = true;
-        }
+        material.textures().for_each(|of| is_used[of.texture] = true);
     }
     let code = |wrap: Wrap| match wrap {
         Wrap::Repeat => 0,
@@ -378,8 +395,12 @@ fn pack_textures(scene: &Scene) -> (Vec<TextureInfo>, Vec<u32>) {
             width: texture.width,
             height: texture.height,
             first_texel: texels.len() as u32,
-            wrap: code(texture.wrap[0]) | code(texture.wrap[1]) << 2,
-            shares_exponent: u32::from(matches!(texture.texels, Texels::SharedExponent(_))),
+            wrap: code(texture.wrap[0]) | code(texture.wrap[1]) << 2 | u32::from(texture.filter == Filter::Nearest) << 4,
+            encoding: match texture.texels {
+                Texels::Srgb(_) => TEXELS_SRGB,
+                Texels::SharedExponent(_) => TEXELS_SHARED_EXPONENT,
+                Texels::Linear(_) => TEXELS_LINEAR,
+            },
         });
         if is_used {
             texels.par_extend(texture.texels.words());

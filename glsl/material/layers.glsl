@@ -1,0 +1,25 @@
+// What a layered material is at a point: factors times textures. The guide's page on materials has the symbols.
+
+// Lobes of GGX sharper than that are deltas; those that are broader than the other belong to photon maps.
+const float DELTA_ALPHA = 1.0 / float(DELTA_ALPHA_INVERSE);
+const float MAP_ALPHA = float(MAP_ALPHA_PER_MILLE) / 1000.0;
+const float LEAST_SHEEN_ALPHA = 0.01;
+// No mapped normal looks further away from the eye.
+const float LEAST_MAPPED_COSINE = 0.01;
+
+struct Layers {
+    float metallic;
+    float alpha;
+    float ior;
+    float specular;
+    vec3 specular_colour;
+    float transmission;
+    bool is_solid;
+    float coat;
+    float coat_alpha;
+    vec3 coat_normal;
+    vec3 sheen;
+    float sheen_alpha;
+    float coverage;
+    bool is_unlit;
+};

@@ -1,0 +1,187 @@
+//! Directional albedos of GGX and of sheen, as tables that the kernels interpolate (`glsl/material/albedo.glsl`): a surface's
+//! diffuse lobe gets what reflection leaves (Kelemen and Szirmay-Kalos 2001).
+
+use std::f64::consts::PI;
+use std::sync::LazyLock;
+
+use glam::{DVec2, DVec3, Vec2};
+use rayon::prelude::*;
+
+use crate::constants::{ALBEDO_COSINES, ALBEDO_ROUGHNESSES, DELTA_ALPHA_INVERSE};
+
+const ROUGHNESSES: usize = ALBEDO_ROUGHNESSES as usize;
+const COSINES: usize = ALBEDO_COSINES as usize;
+/// Of the square of uniform numbers that a direction is sampled by.
+const STEPS: usize = 64;
+/// Least alpha of sheen.
+const LEAST_SHEEN: f64 = 0.01;
+
+/// Row by row of equal roughness: (A, B) of GGX at the squares of evenly spaced roots of cosines, A with the weight 1 - (1 - v.h)^5 and
+/// B with (1 - v.h)^5; then of each roughness the means of both over the hemisphere; then of each pair of roughnesses the means of
+/// (A A', A B') and (B A', B B'); then rows of sheen, each twice.
+pub static TABLE: LazyLock<Vec<Vec2>> = LazyLock::new(table);
+
+fn roughness(row: usize) -> f64 {
+    row as f64 / (ROUGHNESSES - 1) as f64
+}
+
+fn cosine(column: usize) -> f64 {
+    let root = column as f64 / (COSINES - 1) as f64;
+    root * root
+}
+
+fn table() -> Vec<Vec2> {
+    let places: Vec<(usize, usize)> = (0..ROUGHNESSES * COSINES).map(|place| (place / COSINES, place % COSINES)).collect();
+    let ggx: Vec<DVec2> = places.par_iter().map(|&(row, column)| ggx(roughness(row).powi(2), cosine(column))).collect();
+    let sheen: Vec<DVec2> =
+        places.par_iter().map(|&(row, column)| DVec2::splat(sheen(roughness(row).powi(2).max(LEAST_SHEEN), cosine(column)))).collect();
+    let row = |row: usize| &ggx[row * COSINES..(row + 1) * COSINES];
+    let means = (0..ROUGHNESSES).map(|of| mean(|k| row(of)[k]));
+    let pairs = (0..ROUGHNESSES * ROUGHNESSES).flat_map(|pair| {
+        let (first, second) = (row(pair / ROUGHNESSES), row(pair % ROUGHNESSES));
+        [mean(|k| first[k].x * second[k]), mean(|k| first[k].y * second[k])]
+    });
+    ggx.iter().copied().chain(means).chain(pairs).chain(sheen.iter().copied()).map(DVec2::as_vec2).collect()
+}
+
+/// Over the hemisphere, weighted by the cosine, of what is linear in the cosine's root between the columns, as the kernels have it.
+fn mean(of_column: impl Fn(usize) -> DVec2) -> DVec2 {
+    // 2 c dc = 4 s^3 ds, with s the root; Simpson's rule is exact for that times a line.
+    let last = COSINES - 1;
+    (0..last)
+        .map(|k| {
+            let [low, high] = [k, k + 1].map(|column| (column as f64 / last as f64, of_column(column)));
+            let middle = (0.5 * (low.0 + high.0), 0.5 * (low.1 + high.1));
+            let term = |(root, value): (f64, DVec2)| 4.0 * root.powi(3) * value;
+            (term(low) + 4.0 * term(middle) + term(high)) / (6.0 * last as f64)
+        })
+        .sum()
+}
+
+/// By visible normals (Dupuy and Benyoub 2023) on a grid: what is left is the ratio of both maskings to that of the eye's.
+fn ggx(alpha: f64, cosine: f64) -> DVec2 {
+    let grazing = |cosine: f64| (1.0 - cosine).powi(5);
+    if alpha < 1.0 / f64::from(DELTA_ALPHA_INVERSE) {
+        return DVec2::new(1.0 - grazing(cosine), grazing(cosine));
+    }
+    // At the horizon itself the visible normals are those of a direction next to it.
+    let cosine = cosine.max(1e-5);
+    let v = DVec3::new((1.0 - cosine * cosine).sqrt(), 0.0, cosine);
+    let stretched = DVec3::new(alpha * v.x, 0.0, v.z).normalize();
+    let lambda = |c: f64| (alpha * alpha + (1.0 - alpha * alpha) * c * c).sqrt();
+    let sum: DVec2 = (0..STEPS * STEPS)
+        .map(|place| {
+            let (u, turn) = (((place / STEPS) as f64 + 0.5) / STEPS as f64, ((place % STEPS) as f64 + 0.5) / STEPS as f64);
+            let z = (1.0 - u) * (1.0 + stretched.z) - stretched.z;
+            // Both halves of the circle are alike.
+            let (sine, azimuth) = ((1.0 - z * z).max(0.0).sqrt(), PI * turn);
+            let h = DVec3::new(sine * azimuth.cos(), sine * azimuth.sin(), z) + stretched;
+            let h = DVec3::new(alpha * h.x, alpha * h.y, h.z.max(0.0)).normalize();
+            let along = v.dot(h).max(0.0);
+            let l = 2.0 * along * h.z - v.z;
+            if l <= 0.0 {
+                return DVec2::ZERO;
+            }
+            // G2 / G1.
+            let ratio = l * (cosine + lambda(cosine)) / (l * lambda(cosine) + cosine * lambda(l));
+            ratio * DVec2::new(1.0 - grazing(along), grazing(along))
+        })
+        .sum();
+    sum / (STEPS * STEPS) as f64
+}
+
+/// The logarithm of sheen's masking, fitted by Estevez and Kulla (2017).
+fn sheen_lambda(alpha: f64, cosine: f64) -> f64 {
+    let share = 1.0 - (1.0 - alpha).powi(2);
+    let fitted = |rough: f64, smooth: f64| smooth + (rough - smooth) * share;
+    let [a, b, c] = [fitted(21.5473, 25.3245), fitted(3.82987, 3.32435), fitted(0.19823, 0.16801)];
+    let [d, e] = [fitted(-1.97760, -1.27393), fitted(-4.32054, -4.85967)];
+    let fit = |x: f64| a / (1.0 + b * x.powf(c)) + d * x + e;
+    (if cosine < 0.5 { fit(cosine) } else { 2.0 * fit(0.5) - fit(1.0 - cosine) }).exp()
+}
+
+fn sheen(alpha: f64, cosine: f64) -> f64 {
+    let cosine = cosine.max(1e-4);
+    let v = DVec3::new((1.0 - cosine * cosine).sqrt(), 0.0, cosine);
+    let sum: f64 = (0..STEPS * STEPS)
+        .map(|place| {
+            let (u, turn) = (((place / STEPS) as f64 + 0.5) / STEPS as f64, ((place % STEPS) as f64 + 0.5) / STEPS as f64);
+            // Cosines are squares, as much happens at the horizon.
+            let (z, azimuth) = (u * u, PI * turn);
+            let sine = (1.0 - z * z).sqrt();
+            let l = DVec3::new(sine * azimuth.cos(), sine * azimuth.sin(), z);
+            let h = (v + l).normalize();
+            let d = (2.0 + 1.0 / alpha) * (1.0 - h.z * h.z).max(0.0).powf(0.5 / alpha) / (2.0 * PI);
+            let masking = 1.0 / ((1.0 + sheen_lambda(alpha, cosine) + sheen_lambda(alpha, z)) * 4.0 * z * cosine);
+            // Times the cosine, over the density 1 / (2 pi * 2 u).
+            d * masking * z * 4.0 * PI * u
+        })
+        .sum();
+    sum / (STEPS * STEPS) as f64
+}
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+
+    /// (A, B) of GGX as the kernels interpolate them.
+    fn looked_up(alpha: f64, cosine: f64) -> DVec2 {
+        let (row, column) = (alpha.sqrt() * (ROUGHNESSES - 1) as f64, cosine.sqrt() * (COSINES - 1) as f64);
+        let (i, j) = ((row as usize).min(ROUGHNESSES - 2), (column as usize).min(COSINES - 2));
+        let at = |i: usize, j: usize| TABLE[i * COSINES + j].as_dvec2();
+        let line = |i: usize| at(i, j).lerp(at(i, j + 1), column - j as f64);
+        line(i).lerp(line(i + 1), row - i as f64)
+    }
+
+    #[test]
+    fn albedos_agree_with_quadrature() {
+        // Of F = 1, by quadrature over the hemisphere and by sampling of visible normals, which agree to four digits.
+        const COSINES: [f64; 5] = [1.0, 0.8, 0.5, 0.2, 0.05];
+        const KNOWN: [(f64, [f64; 5]); 7] = [
+            (0.01, [1.0000, 1.0000, 0.9998, 0.9986, 0.9763]),
+            (0.05, [0.9972, 0.9964, 0.9927, 0.9626, 0.8899]),
+            (0.1, [0.9883, 0.9846, 0.9692, 0.9046, 0.9118]),
+            (0.25, [0.9158, 0.8973, 0.8573, 0.8482, 0.9331]),
+            (0.5, [0.6878, 0.6820, 0.6983, 0.7899, 0.9125]),
+            (0.75, [0.4639, 0.4923, 0.5646, 0.7155, 0.8806]),
+            (1.0, [0.3069, 0.3513, 0.4507, 0.6416, 0.8478]),
+        ];
+        for (alpha, known) in KNOWN {
+            for (cosine, known) in COSINES.into_iter().zip(known) {
+                let (table, direct) = (looked_up(alpha, cosine).element_sum(), ggx(alpha, cosine).element_sum());
+                assert!((direct - known).abs() <= 1e-3 * known, "alpha {alpha}, cosine {cosine}: {direct} instead of {known}");
+                assert!((table - known).abs() <= 1e-3 * known, "alpha {alpha}, cosine {cosine}: {table} in the table, not {known}");
+            }
+        }
+        let means = |alpha: f64| {
+            let row = alpha.sqrt() * (ROUGHNESSES - 1) as f64;
+            let at = |row: usize| TABLE[ROUGHNESSES * super::COSINES + row].as_dvec2().element_sum();
+            at(row as usize) + (at((row as usize + 1).min(ROUGHNESSES - 1)) - at(row as usize)) * row.fract()
+        };
+        for (alpha, known) in [(0.1, 0.9721), (0.25, 0.8823), (0.5, 0.7002), (1.0, 0.4091)] {
+            assert!((means(alpha) - known).abs() <= 1e-3 * known, "alpha {alpha}: {} instead of {known}", means(alpha));
+        }
+    }
+
+    /// The worst place of the table between its rows and columns.
+    #[test]
+    fn the_table_is_fine_enough() {
+        let mut worst = (0.0, 0.0, 0.0);
+        for row in 0..62 {
+            for column in 0..40 {
+                let (alpha, cosine) = (((row as f64 + 0.5) / 62.0f64).powi(2), ((column as f64 + 0.5) / 40.0f64).powi(2));
+                let off = (looked_up(alpha, cosine) - ggx(alpha, cosine)).abs().max_element();
+                worst = if off > worst.0 { (off, alpha, cosine) } else { worst };
+            }
+        }
+        assert!(worst.0 < 4e-3, "{worst:?}");
+    }
+
+    #[test]
+    fn sheen_gives_no_light() {
+        for place in 0..ROUGHNESSES * COSINES {
+            let albedo = TABLE[TABLE.len() - ROUGHNESSES * COSINES + place].x;
+            assert!((0.0..=1.0).contains(&albedo), "{place}: {albedo}");
+        }
+    }
+}

@@ -1,0 +1,105 @@
+//! Records of layered materials: their factors, where their textures are looked up, and what triangles have for these.
+
+use glam::{DMat2, DVec2, DVec3, DVec4, Vec3};
+
+use super::{at_corners, pack_normal};
+use crate::constants::*;
+use crate::records::{LayeredMaterial, TextureLookup, TriangleLayers};
+use crate::scene::material::{Coverage, NormalMap, TextureUse};
+use crate::scene::{Material, Mesh, Scene};
+
+pub(super) fn record(material: &Material, unit: f64) -> LayeredMaterial {
+    let of = &material.layers;
+    let texture = |used: Option<TextureUse>| used.map_or(TextureLookup { texture: NONE, ..TextureLookup::default() }, lookup);
+    let map = |map: Option<NormalMap>| (texture(map.map(|map| map.texture)), map.map_or(1.0, |map| map.scale));
+    let (normal_texture, normal_scale) = map(material.normal_map);
+    let (coat_normal_texture, coat_normal_scale) = map(of.coat_normal_map);
+    let (coverage, alpha, cutoff) = match material.coverage {
+        Coverage::Whole => (COVERAGE_WHOLE, 1.0, 0.0),
+        Coverage::Mask { alpha, cutoff } => (COVERAGE_MASK, alpha, cutoff),
+        Coverage::Blend { alpha } => (COVERAGE_BLEND, alpha, 0.0),
+    };
+    // Black after a metre is black after any way: the largest float keeps products finite.
+    let absorption = |transmittance: f32| (-f64::from(transmittance).ln() * unit).clamp(0.0, 1e30) as f32;
+    LayeredMaterial {
+        metallic: of.metallic,
+        roughness: of.roughness,
+        metallic_roughness_texture: texture(of.metallic_roughness_texture),
+        ior: of.ior,
+        specular: of.specular,
+        specular_texture: texture(of.specular_texture),
+        specular_colour: of.specular_colour,
+        specular_colour_texture: texture(of.specular_colour_texture),
+        transmission: of.transmission,
+        transmission_texture: texture(of.transmission_texture),
+        is_solid: u32::from(of.medium.is_some()),
+        absorption: of.medium.map_or(Vec3::ZERO, |medium| Vec3::from(medium.transmittance.to_array().map(absorption))),
+        coat: of.coat,
+        coat_texture: texture(of.coat_texture),
+        coat_roughness: of.coat_roughness,
+        coat_roughness_texture: texture(of.coat_roughness_texture),
+        sheen_colour: of.sheen_colour,
+        sheen_colour_texture: texture(of.sheen_colour_texture),
+        sheen_roughness: of.sheen_roughness,
+        sheen_roughness_texture: texture(of.sheen_roughness_texture),
+        normal_texture,
+        normal_scale,
+        coat_normal_texture,
+        coat_normal_scale,
+        coverage,
+        alpha,
+        cutoff,
+        is_unlit: u32::from(of.is_unlit),
+    }
+}
+
+fn lookup(used: TextureUse) -> TextureLookup {
+    let offset = used.transform.apply(DVec2::ZERO);
+    let turn = DMat2::from_cols(used.transform.apply(DVec2::X) - offset, used.transform.apply(DVec2::Y) - offset).transpose();
+    TextureLookup {
+        texture: used.texture as u32,
+        uv_set: used.uv_set as u32,
+        row_u: turn.x_axis.as_vec2(),
+        row_v: turn.y_axis.as_vec2(),
+        offset: offset.as_vec2(),
+    }
+}
+
+/// Whether any triangle has something for them.
+pub(super) fn is_needed(scene: &Scene) -> bool {
+    let has_textures = |material: &Material| {
+        let plain = usize::from(material.base_colour_texture.is_some()) + usize::from(material.emission_texture.is_some());
+        material.textures().count() > plain
+    };
+    scene.materials.iter().any(has_textures)
+}
+
+pub(super) fn of_triangle(mesh: &Mesh, triangle: usize, part: Option<&[DVec3; 3]>) -> TriangleLayers {
+    let corners = |set: usize| {
+        let uvs = mesh.triangles[triangle].map(|vertex| mesh.uvs[set].get(vertex as usize).copied().unwrap_or_default());
+        at_corners(uvs, part).map(DVec2::as_vec2)
+    };
+    let tangents = |tangents: &[[DVec4; 3]]| {
+        let corners = tangents.get(triangle).copied().unwrap_or([DVec4::new(1.0, 0.0, 0.0, 1.0); 3]);
+        let packed = at_corners(corners.map(DVec4::truncate), part).map(|tangent| pack_normal(tangent.normalize_or(DVec3::X).as_vec3()));
+        (packed, u32::from(corners[0].w < 0.0))
+    };
+    let ([first_a, first_b, first_c], [second_a, second_b, second_c]) = (corners(0), corners(1));
+    let ([tangent_a, tangent_b, tangent_c], turned) = tangents(&mesh.tangents);
+    let ([coat_tangent_a, coat_tangent_b, coat_tangent_c], coat_turned) = tangents(&mesh.coat_tangents);
+    TriangleLayers {
+        first_a,
+        first_b,
+        first_c,
+        second_a,
+        second_b,
+        second_c,
+        tangent_a,
+        tangent_b,
+        tangent_c,
+        coat_tangent_a,
+        coat_tangent_b,
+        coat_tangent_c,
+        turned: turned | coat_turned << 3,
+    }
+}
