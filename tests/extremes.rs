@@ -713,7 +713,14 @@ fn walls_light_the_points_that_touch_them() {
         let lamp = Material { emission: Vec3::ONE, emission_texture, ..matt(0.0) };
         let wall = Mesh::parallelogram("wall", DVec3::ZERO, turn * DVec3::Y, turn * DVec3::Z, 1);
         let floor = Mesh::parallelogram("floor", turn * DVec3::NEG_X, turn * DVec3::Z, turn * (DVec3::X * 2.0), 0);
-        let texture = Texture { name: "white".into(), width: 1, height: 1, texels: vec![Vec3::ONE].into(), wrap: [Wrap::Clamp; 2], filter: Default::default() };
+        let texture = Texture {
+            name: "white".into(),
+            width: 1,
+            height: 1,
+            texels: vec![Vec3::ONE].into(),
+            wrap: [Wrap::Clamp; 2],
+            filter: Default::default(),
+        };
         let room = Scene { textures: vec![texture], ..scene_of(vec![wall, floor], vec![matt(0.0), lamp], vec![]) };
         let points = distances.map(|distance| (turn * DVec3::new(distance, 0.0, 0.4), turn * DVec3::Y));
         let exact = |point: DVec3| {

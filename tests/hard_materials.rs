@@ -313,7 +313,14 @@ fn twenty_large_textures_are_read_each_from_its_own_buffer() {
         wall.meshes.push(Mesh::parallelogram("square", DVec3::X * k as f64, DVec3::X, DVec3::Y, k));
         wall.materials.push(Material { emission: Vec3::ONE, emission_texture: Some(TextureUse::of(k, 0)), ..matt(0.0) });
         let texels = Texels::Srgb(vec![code(k); side * side]);
-        let texture = Texture { name: format!("picture {k}"), width: side as u32, height: side as u32, texels, wrap: [Wrap::Repeat; 2], filter: Default::default() };
+        let texture = Texture {
+            name: format!("picture {k}"),
+            width: side as u32,
+            height: side as u32,
+            texels,
+            wrap: [Wrap::Repeat; 2],
+            filter: Default::default(),
+        };
         wall.textures.push(texture);
     }
     // Three pixels a square.

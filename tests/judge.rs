@@ -351,7 +351,14 @@ fn sampling_lobes_and_sampling_lights_agree() {
 
 #[test]
 fn textures_shade_lamps_and_walls() {
-    let texture = Texture { name: "ramp".into(), width: 2, height: 1, texels: vec![Vec3::ZERO, Vec3::ONE].into(), wrap: [Wrap::Clamp; 2], filter: Default::default() };
+    let texture = Texture {
+        name: "ramp".into(),
+        width: 2,
+        height: 1,
+        texels: vec![Vec3::ZERO, Vec3::ONE].into(),
+        wrap: [Wrap::Clamp; 2],
+        filter: Default::default(),
+    };
     let textured = Some(TextureUse::of(0, 0));
     let plain = |material| scene_of(vec![square(0.0, 1.0, true, 0)], vec![material], vec![]);
     let mut lit = plain(Material { emission_texture: textured, ..lamp(Vec3::new(1.0, 2.0, 3.0)) });

@@ -76,7 +76,14 @@ fn triangles_shine_by_the_cosine_from_all_of_their_area() {
     let Some(gpu) = device() else { return };
     let tracer = Tracer { gpu: &gpu, math: Math::Fast };
     let texels = vec![Vec3::new(1.0, 0.25, 0.5), Vec3::new(0.125, 1.0, 0.5), Vec3::new(0.5, 0.75, 0.0), Vec3::new(0.25, 0.5, 2.0)];
-    let texture = Texture { name: "four texels".into(), width: 2, height: 2, texels: texels.into(), wrap: [Wrap::Clamp; 2], filter: Default::default() };
+    let texture = Texture {
+        name: "four texels".into(),
+        width: 2,
+        height: 2,
+        texels: texels.into(),
+        wrap: [Wrap::Clamp; 2],
+        filter: Default::default(),
+    };
     let lamp = |two_sided: bool, textured: bool| {
         let mut mesh = Mesh::parallelogram("lamp", DVec3::ZERO, DVec3::new(0.6, 0.1, -0.2), DVec3::new(0.1, 0.3, 0.5), 0);
         mesh.triangles.truncate(1);

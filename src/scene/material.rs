@@ -79,9 +79,14 @@ pub struct NormalMap {
 pub enum Coverage {
     Whole,
     /// All where alpha is at least `cutoff`, else nothing.
-    Mask { alpha: f32, cutoff: f32 },
+    Mask {
+        alpha: f32,
+        cutoff: f32,
+    },
     /// Alpha itself.
-    Blend { alpha: f32 },
+    Blend {
+        alpha: f32,
+    },
 }
 
 /// What a transmissive surface encloses.

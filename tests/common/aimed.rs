@@ -63,7 +63,14 @@ pub fn scene(kind: &str) -> Scene {
             scene.materials.push(Material { two_sided: true, emission_texture, ..shining(0.0) });
             scene.materials.push(shining(0.0));
             let texels = vec![Vec3::ONE, Vec3::new(0.1, 0.4, 0.2)];
-            scene.textures = vec![Texture { name: "two".into(), width: 2, height: 1, texels: texels.into(), wrap: [Wrap::Clamp; 2], filter: Default::default() }];
+            scene.textures = vec![Texture {
+                name: "two".into(),
+                width: 2,
+                height: 1,
+                texels: texels.into(),
+                wrap: [Wrap::Clamp; 2],
+                filter: Default::default(),
+            }];
             let (y, z) = (DVec3::Y * 0.4, DVec3::Z * 0.4);
             scene.meshes.push(Mesh::parallelogram("panel", DVec3::new(0.6, 0.8, -0.2), y, z, 3));
             scene.meshes.push(Mesh::parallelogram("towards", DVec3::new(-0.7, 0.8, -0.2), y, z, 4));

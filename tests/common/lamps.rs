@@ -192,7 +192,14 @@ fn screen(wrap: Wrap) -> Scene {
     mesh.uvs[0].iter_mut().for_each(|uv| *uv = 2.0 * *uv - DVec2::splat(0.5));
     let lamp = Material { emission_texture: Some(TextureUse::of(0, 0)), ..lamp_of(1.0) };
     let mut scene = scene_of(vec![level(0.0, [4.0; 2], true, 0), mesh], vec![matt(0.0), lamp], vec![]);
-    scene.textures = vec![Texture { name: "screen".into(), width: 256, height: 256, texels: texels.into(), wrap: [wrap; 2], filter: Default::default() }];
+    scene.textures = vec![Texture {
+        name: "screen".into(),
+        width: 256,
+        height: 256,
+        texels: texels.into(),
+        wrap: [wrap; 2],
+        filter: Default::default(),
+    }];
     scene
 }
 

@@ -316,7 +316,14 @@ mod tests {
     #[test]
     fn no_sample_is_brighter_than_the_brightest() {
         let texels: Vec<Vec3> = (0..70_000u32).map(|k| Vec3::new(0.1, 0.2 + 0.7 * (k % 997) as f32 / 997.0, 0.3)).collect();
-        let texture = Texture { name: "t".into(), width: 700, height: 100, texels: texels.clone().into(), wrap: [Wrap::Repeat; 2], filter: Default::default() };
+        let texture = Texture {
+            name: "t".into(),
+            width: 700,
+            height: 100,
+            texels: texels.clone().into(),
+            wrap: [Wrap::Repeat; 2],
+            filter: Default::default(),
+        };
         let summary = Shining::new(&texture).all;
         let texels = || (0..70_000).map(|place| texture.texels.at(place).truncate().as_dvec3());
         let brightest = texels().map(|texel| texel.y).fold(0.0, f64::max);
@@ -330,7 +337,14 @@ mod tests {
     /// Photons that choose lights otherwise carry the same flux together, and none carries more than 1.
     #[test]
     fn other_shares_leave_the_flux() {
-        let texture = Texture { name: "t".into(), width: 2, height: 2, texels: vec![Vec3::ONE; 4].into(), wrap: [Wrap::Repeat; 2], filter: Default::default() };
+        let texture = Texture {
+            name: "t".into(),
+            width: 2,
+            height: 2,
+            texels: vec![Vec3::ONE; 4].into(),
+            wrap: [Wrap::Repeat; 2],
+            filter: Default::default(),
+        };
         let geometry = Geometry::new(&textured_lamp(5, texture)).unwrap();
         let (emitters, scale) = geometry.emitters_by(&[0.5, 0.25, 0.125, 0.125 - 1e-12, 1e-12]);
         assert!(emitters[0].probability > 0.49 && emitters[4].probability < 1e-6 && emitters[4].cumulative == 1.0);

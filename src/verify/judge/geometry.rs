@@ -2,12 +2,13 @@
 
 use std::time::Duration;
 
-use glam::{DMat2, DVec2, DVec3, Vec3A};
+use glam::{DMat2, DVec2, DVec3, DVec4, Vec3A};
 use obvhs::BvhBuildParams;
 use obvhs::aabb::Aabb;
 use obvhs::bvh2::Bvh2;
 use obvhs::bvh2::builder::build_bvh2;
 
+use super::layered::has_two_sides;
 use crate::scene::material::{TextureUse, UvTransform};
 use crate::scene::{Material, Mesh, Scene, Surface, overlap};
 
@@ -26,7 +27,9 @@ pub struct Ray {
 }
 
 pub struct Triangle<'a> {
-    mesh: &'a Mesh,
+    pub mesh: &'a Mesh,
+    /// Among the mesh's triangles.
+    pub index: usize,
     vertices: [usize; 3],
     /// Weights of the vertices at the corners of a triangle of which others hide a part.
     part: Option<[DVec3; 3]>,
@@ -94,6 +97,17 @@ impl Triangle<'_> {
         self.part.map_or(weights, |part| mix(part, weights))
     }
 
+    /// What a place has of the values of the triangle's own corners.
+    pub fn mixed<T: std::ops::Mul<f64, Output = T> + std::ops::Add<Output = T>>(&self, of_corners: [T; 3], weights: DVec3) -> T {
+        mix(of_corners, self.of_vertices(weights))
+    }
+
+    /// Of the vertices' colours.
+    pub fn alpha(&self, weights: DVec3) -> f64 {
+        let alphas = &self.mesh.alphas;
+        if alphas.is_empty() { 1.0 } else { self.mixed(self.vertices.map(|vertex| alphas[vertex]), weights) }
+    }
+
     pub fn point(&self, weights: DVec3) -> DVec3 {
         mix(self.corners, weights)
     }
@@ -123,6 +137,7 @@ impl<'a> Geometry<'a> {
             for index in (0..mesh.triangles.len()).filter(|index| mesh.area(*index) > 0.0) {
                 let whole = Triangle {
                     mesh,
+                    index,
                     vertices: mesh.triangles[index].map(|vertex| vertex as usize),
                     part: None,
                     corners: mesh.corners(index),
@@ -194,20 +209,20 @@ impl<'a> Geometry<'a> {
         nearest
     }
 
-    /// A colour's texture at a point of a triangle; 1 without one.
-    fn texture(&self, texture: Option<TextureUse>, triangle: &Triangle, weights: DVec3) -> DVec3 {
-        let Some(TextureUse { texture, uv_set, transform: UvTransform { scale, rotation, offset } }) = texture else { return DVec3::ONE };
+    /// A texture at a point of a triangle; 1 without one.
+    pub fn texel(&self, texture: Option<TextureUse>, triangle: &Triangle, weights: DVec3) -> DVec4 {
+        let Some(TextureUse { texture, uv_set, transform: UvTransform { scale, rotation, offset } }) = texture else { return DVec4::ONE };
         let uvs = &triangle.mesh.uvs[uv_set];
-        let uv = if uvs.is_empty() { DVec2::ZERO } else { mix(triangle.vertices.map(|vertex| uvs[vertex]), triangle.of_vertices(weights)) };
+        let uv = if uvs.is_empty() { DVec2::ZERO } else { triangle.mixed(triangle.vertices.map(|vertex| uvs[vertex]), weights) };
         // A turn of the plane's points by minus the angle, v being its second axis.
         let turned = DMat2::from_angle(-rotation) * DMat2::from_diagonal(scale);
-        self.scene.textures[texture].sample(turned * uv + offset).truncate().as_dvec3()
+        self.scene.textures[texture].sample(turned * uv + offset).as_dvec4()
     }
 
     /// Radiance that leaves a triangle's shining side.
     pub fn emission(&self, triangle: &Triangle, weights: DVec3) -> DVec3 {
         let material = triangle.material;
-        material.emission.as_dvec3() * self.texture(material.emission_texture, triangle, weights)
+        material.emission.as_dvec3() * self.texel(material.emission_texture, triangle, weights).truncate()
     }
 
     pub fn vertex(&self, hit: &Hit, wo: DVec3) -> Vertex {
@@ -215,7 +230,7 @@ impl<'a> Geometry<'a> {
         let material = triangle.material;
         let is_front = wo.dot(triangle.normal) > 0.0;
         let ng = if is_front { triangle.normal } else { -triangle.normal };
-        let shown = is_front || material.two_sided;
+        let shown = is_front || has_two_sides(material);
         Vertex {
             position: triangle.point(hit.weights),
             ng,
@@ -225,9 +240,9 @@ impl<'a> Geometry<'a> {
             surface: material.surface,
             scatters: shown || matches!(material.surface, Surface::Dielectric { .. }),
             base_colour: material.base_colour.as_dvec3()
-                * self.texture(material.base_colour_texture, triangle, hit.weights)
+                * self.texel(material.base_colour_texture, triangle, hit.weights).truncate()
                 * vertex_colour(triangle, hit.weights),
-            emission: if shown { self.emission(triangle, hit.weights) } else { DVec3::ZERO },
+            emission: if shown && !material.layers.is_unlit { self.emission(triangle, hit.weights) } else { DVec3::ZERO },
         }
     }
 }
@@ -237,7 +252,7 @@ fn vertex_colour(triangle: &Triangle, weights: DVec3) -> DVec3 {
     if colours.is_empty() {
         return DVec3::ONE;
     }
-    mix(triangle.vertices.map(|vertex| colours[vertex]), triangle.of_vertices(weights))
+    triangle.mixed(triangle.vertices.map(|vertex| colours[vertex]), weights)
 }
 
 /// On the side of `ng`; `ng` itself where there is no other, or where it would be seen from below.
@@ -246,7 +261,7 @@ fn shading_normal(triangle: &Triangle, weights: DVec3, ng: DVec3, wo: DVec3) -> 
     if normals.is_empty() {
         return ng;
     }
-    let normal = mix(triangle.vertices.map(|vertex| normals[vertex]), triangle.of_vertices(weights)).normalize_or(ng);
+    let normal = triangle.mixed(triangle.vertices.map(|vertex| normals[vertex]), weights).normalize_or(ng);
     let ns = if normal.dot(ng) < 0.0 { -normal } else { normal };
     if ns.dot(wo) > 0.0 { ns } else { ng }
 }

@@ -4,7 +4,8 @@ use std::f64::consts::PI;
 
 use glam::{DVec3, Vec3};
 
-use super::geometry::{Geometry, Ray};
+use super::geometry::{Geometry, Hit, Ray};
+use super::layered::has_two_sides;
 use super::material::{around, sample_lobe};
 use super::{Random, uniform};
 use crate::scene::Scene;
@@ -21,6 +22,27 @@ pub struct Emitters<'a> {
     emitters: Vec<Emitter<'a>>,
     /// The share of power of this emitter and all before it.
     cumulative: Vec<f64>,
+    /// The probability that a triangle is chosen.
+    of_triangles: Vec<f64>,
+}
+
+/// The last place where a path was scattered, as far as it matters to the light that its ray meets.
+#[derive(Clone, Copy)]
+pub struct Scattering {
+    pub position: DVec3,
+    /// Of the lobe's cosine.
+    pub axis: DVec3,
+    /// Of the ray's direction, per solid angle: infinite for deltas and for the eye, where no light is sampled; 0 where all
+    /// light is sampled.
+    pub density: f64,
+}
+
+impl Scattering {
+    /// The weight of light that the ray meets, which would have been sampled with this density (balance heuristic, Veach and
+    /// Guibas 1995).
+    fn weight(&self, of_light: f64) -> f64 {
+        if self.density.is_infinite() { 1.0 } else { self.density / (self.density + of_light).max(f64::MIN_POSITIVE) }
+    }
 }
 
 /// What arrives at a point from one sampled place.
@@ -31,6 +53,15 @@ pub struct Arriving {
     pub irradiance: DVec3,
     /// The place; `None` beyond the scene.
     pub place: Option<DVec3>,
+    /// Density of the direction per solid angle; infinite where no ray meets the light by chance.
+    pub density: f64,
+}
+
+impl Arriving {
+    /// Its weight where rays of this density may meet the light as well.
+    pub fn weight(&self, of_ray: f64) -> f64 {
+        if self.density.is_infinite() { 1.0 } else { self.density / (self.density + of_ray) }
+    }
 }
 
 fn sum(colour: Vec3) -> f64 {
@@ -74,18 +105,30 @@ impl<'a> Emitters<'a> {
         let (min, max) = scene.bounds();
         let radius = if geometry.triangles.is_empty() { 1.0 } else { 0.5 * (max - min).length() };
         let of_triangles = geometry.triangles.iter().enumerate().map(|(number, triangle)| {
-            let sides = if triangle.material.two_sided { 2.0 } else { 1.0 };
-            (Emitter::Triangle(number), sides * PI * triangle.area * sum(triangle.material.emission))
+            let material = triangle.material;
+            let sides = if has_two_sides(material) { 2.0 } else { 1.0 };
+            let emission = if material.layers.is_unlit { 0.0 } else { sum(material.emission) };
+            (Emitter::Triangle(number), sides * PI * triangle.area * emission)
         });
         let of_lights = scene.lights.iter().map(|light| (Emitter::Light(&light.kind), power(&light.kind, radius)));
         let (emitters, powers): (Vec<_>, Vec<_>) = of_triangles.chain(of_lights).filter(|(_, power)| *power > 0.0).unzip();
         let total: f64 = powers.iter().sum();
+        let mut of_triangles = vec![0.0; geometry.triangles.len()];
+        for (emitter, power) in emitters.iter().zip(&powers) {
+            if let Emitter::Triangle(number) = emitter {
+                of_triangles[*number] = power / total;
+            }
+        }
         let mut below = 0.0;
         let cumulative = powers.iter().map(|power| {
             below += power / total;
             below
         });
-        Emitters { cumulative: cumulative.collect(), emitters }
+        Emitters { cumulative: cumulative.collect(), emitters, of_triangles }
+    }
+
+    fn probability(&self, emitter: usize) -> f64 {
+        self.cumulative[emitter] - if emitter > 0 { self.cumulative[emitter - 1] } else { 0.0 }
     }
 
     /// Light straight from one emitter, chosen by power, at a point with this shading normal. `None`
@@ -95,10 +138,10 @@ impl<'a> Emitters<'a> {
         let u = uniform(rng);
         // The last sum may round to less than 1.
         let choice = self.cumulative.partition_point(|share| *share <= u).min(last);
-        let probability = self.cumulative[choice] - if choice > 0 { self.cumulative[choice - 1] } else { 0.0 };
+        let probability = self.probability(choice);
         let from = |place: DVec3, intensity: &dyn Fn(DVec3) -> DVec3| {
             let (wi, distance) = (place - position).normalize_and_length();
-            Arriving { wi, irradiance: intensity(-wi) / (distance * distance), place: Some(place) }
+            Arriving { wi, irradiance: intensity(-wi) / (distance * distance), place: Some(place), density: f64::INFINITY }
         };
         let mut arriving = match self.emitters[choice] {
             Emitter::Triangle(number) => {
@@ -107,12 +150,13 @@ impl<'a> Emitters<'a> {
                 let weights = DVec3::new(1.0 - root, root * (1.0 - share), root * share);
                 let point = triangle.point(weights);
                 let is_front = (position - point).dot(triangle.normal) > 0.0;
-                if !is_front && !triangle.material.two_sided {
+                if !is_front && !has_two_sides(triangle.material) {
                     return None;
                 }
                 let normal = if is_front { triangle.normal } else { -triangle.normal };
-                let radiance = geometry.emission(triangle, weights);
-                from(point + geometry.offset * normal, &|w| radiance * triangle.area * w.dot(normal).max(0.0))
+                let radiance = geometry.coverage(triangle, weights) * geometry.emission(triangle, weights);
+                let arriving = from(point + geometry.offset * normal, &|w| radiance * triangle.area * w.dot(normal).max(0.0));
+                Arriving { density: area_density(triangle.area, position, point, normal), ..arriving }
             }
             Emitter::Light(light) => match light {
                 LightKind::Point { position: place, intensity } => from(*place, &|_| intensity.as_dvec3()),
@@ -120,47 +164,68 @@ impl<'a> Emitters<'a> {
                     from(*place, &|w| intensity.as_dvec3() * spot_falloff(w, *direction, *inner_angle, *outer_angle))
                 }
                 LightKind::Directional { direction, irradiance } => {
-                    Arriving { wi: -*direction, irradiance: irradiance.as_dvec3(), place: None }
+                    Arriving { wi: -*direction, irradiance: irradiance.as_dvec3(), place: None, density: f64::INFINITY }
                 }
                 LightKind::Disc { centre, normal, radius, power, law } => {
                     let (distance, azimuth) = (radius * uniform(rng).sqrt(), 2.0 * PI * uniform(rng));
                     let place = centre + around(*normal, DVec3::new(distance * azimuth.cos(), distance * azimuth.sin(), geometry.offset));
-                    from(place, &|w| power.as_dvec3() * disc_intensity(*law, w.dot(*normal)))
+                    let arriving = from(place, &|w| power.as_dvec3() * disc_intensity(*law, w.dot(*normal)));
+                    Arriving { density: area_density(PI * radius * radius, position, place, *normal), ..arriving }
                 }
                 LightKind::Environment { radiance } => {
                     let wi = sample_lobe(ns, 1.0, rng);
-                    Arriving { wi, irradiance: PI / wi.dot(ns) * radiance.as_dvec3(), place: None }
+                    let cosine = wi.dot(ns);
+                    Arriving { wi, irradiance: PI / cosine * radiance.as_dvec3(), place: None, density: cosine / PI }
                 }
             },
         };
         arriving.irradiance /= probability;
+        arriving.density *= probability;
         Some(arriving)
     }
 
-    /// Radiance that arrives from beyond the scene.
-    pub fn environment(&self) -> DVec3 {
-        let radiance = |emitter: &Emitter| match emitter {
-            Emitter::Light(LightKind::Environment { radiance }) => radiance.as_dvec3(),
-            _ => DVec3::ZERO,
-        };
-        self.emitters.iter().map(radiance).sum()
+    /// The weight of emission that a ray meets on a triangle.
+    pub fn weight_of_triangle(&self, geometry: &Geometry, hit: &Hit, from: &Scattering) -> f64 {
+        let triangle = &geometry.triangles[hit.triangle];
+        let point = triangle.point(hit.weights);
+        from.weight(self.of_triangles[hit.triangle] * area_density(triangle.area, from.position, point, triangle.normal))
     }
 
-    /// Radiance of all discs whose front a ray crosses before `t_max`.
-    pub fn discs_along(&self, geometry: &Geometry, ray: &Ray, t_max: f64) -> DVec3 {
-        let radiance = |emitter: &Emitter| {
+    /// Radiance that arrives from beyond the scene, with its weights.
+    pub fn environment(&self, direction: DVec3, from: &Scattering) -> DVec3 {
+        let radiance = |(number, emitter): (usize, &Emitter)| match emitter {
+            Emitter::Light(LightKind::Environment { radiance }) => {
+                let density = direction.dot(from.axis).max(0.0) / PI;
+                from.weight(self.probability(number) * density) * radiance.as_dvec3()
+            }
+            _ => DVec3::ZERO,
+        };
+        self.emitters.iter().enumerate().map(radiance).sum()
+    }
+
+    /// Radiance of all discs whose front a ray crosses before `t_max`, with its weights and what is left of it after its way.
+    pub fn discs_along(&self, geometry: &Geometry, ray: &Ray, t_max: f64, from: &Scattering, left: impl Fn(f64) -> DVec3) -> DVec3 {
+        let radiance = |(number, emitter): (usize, &Emitter)| {
             let Emitter::Light(LightKind::Disc { centre, normal, radius, power, law }) = emitter else { return DVec3::ZERO };
             // A hair in front of the wall that it may lie in.
             let centre = centre + geometry.offset * normal;
             let cosine = -ray.direction.dot(*normal);
             let t = (ray.origin - centre).dot(*normal) / cosine;
             let crosses = cosine > 0.0 && t > 0.0 && t < t_max;
-            if crosses && (ray.origin + t * ray.direction).distance(centre) <= *radius {
-                power.as_dvec3() * disc_intensity(*law, cosine) / (cosine * PI * radius * radius)
+            let (place, area) = (ray.origin + t * ray.direction, PI * radius * radius);
+            if crosses && place.distance(centre) <= *radius {
+                let weight = from.weight(self.probability(number) * area_density(area, from.position, place, *normal));
+                weight * left(t) * power.as_dvec3() * disc_intensity(*law, cosine) / (cosine * area)
             } else {
                 DVec3::ZERO
             }
         };
-        self.emitters.iter().map(radiance).sum()
+        self.emitters.iter().enumerate().map(radiance).sum()
     }
+}
+
+/// Density per solid angle, as `from` sees it, of a place that is even over an area with this normal.
+fn area_density(area: f64, from: DVec3, place: DVec3, normal: DVec3) -> f64 {
+    let to = place - from;
+    to.length().powi(3) / (area * to.dot(normal).abs()).max(f64::MIN_POSITIVE)
 }

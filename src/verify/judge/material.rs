@@ -10,7 +10,7 @@ use crate::constants::SMOOTH_TOTAL_REFLECTIONS;
 use crate::scene::Surface;
 
 /// `w` reflected about a unit normal; both point away from the surface.
-fn mirrored(w: DVec3, normal: DVec3) -> DVec3 {
+pub fn mirrored(w: DVec3, normal: DVec3) -> DVec3 {
     2.0 * w.dot(normal) * normal - w
 }
 
@@ -66,7 +66,7 @@ impl Vertex {
     /// direction. `None`: the direction lies on the wrong side, and the path ends.
     pub fn scatter(&self, depth: u32, towards_eye: bool, rng: &mut Random) -> Option<(DVec3, DVec3)> {
         let (wi, weight, is_transmitted) = match self.surface {
-            Surface::Lambert | Surface::Layered => (sample_lobe(self.ns, 1.0, rng), 1.0, false),
+            Surface::Lambert => (sample_lobe(self.ns, 1.0, rng), 1.0, false),
             Surface::PaperPhong { exponent } => {
                 let wi = sample_lobe(self.ns, 1.0, rng);
                 (wi, if towards_eye { lobe(mirrored(wi, self.ns).dot(self.wo), exponent) } else { 1.0 }, false)
@@ -92,6 +92,8 @@ impl Vertex {
                     ((eta * cos_i - cos_t) * normal - eta * self.wo, eta * eta, true)
                 }
             }
+            // It has lobes of its own.
+            Surface::Layered => return None,
         };
         // A specular ray that its shading normal sends to the wrong side is mirrored in the triangle's plane.
         let height = wi.dot(self.ng);

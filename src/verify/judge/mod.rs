@@ -8,9 +8,13 @@
 //! Standard errors tell little where few samples carry the light: in caustics of small lamps, and next
 //! to shining triangles that meet other surfaces, where 1 / distance^2 has no bound.
 
+mod albedo;
 mod geometry;
+mod layered;
 mod light;
+pub mod lobes;
 mod material;
+mod media;
 mod path;
 pub mod radiosity;
 mod verdict;
@@ -27,6 +31,7 @@ pub use crate::settings::scene::Part;
 use geometry::Geometry;
 use light::Emitters;
 pub use material::fresnel;
+use media::is_solid;
 pub use verdict::Verdict;
 
 /// Radiance (W/m2/sr) or irradiance (W/m2) by [`Part`], linear RGB. Irradiance has no specular part.
@@ -67,6 +72,8 @@ pub struct Image {
 pub struct Judge<'a> {
     geometry: Geometry<'a>,
     emitters: Emitters<'a>,
+    /// Some material encloses a medium.
+    has_solids: bool,
     max_bounces: u32,
 }
 
@@ -89,7 +96,8 @@ impl<'a> Judge<'a> {
     pub fn new(scene: &'a Scene, max_bounces: u32) -> Judge<'a> {
         let geometry = Geometry::new(scene);
         let emitters = Emitters::new(scene, &geometry);
-        Judge { geometry, emitters, max_bounces }
+        let has_solids = scene.materials.iter().any(is_solid);
+        Judge { geometry, emitters, has_solids, max_bounces }
     }
 
     /// A picture. Samples are spread evenly over each pixel's square.

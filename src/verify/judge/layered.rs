@@ -1,0 +1,104 @@
+//! Layered materials at a point of a scene: what their textures, coverage and normal maps come to.
+
+use glam::{DVec3, DVec4};
+
+use super::geometry::{Geometry, Hit, Triangle, Vertex};
+use super::lobes::{Frame, Inputs, Lobes, Wall, is_delta};
+use super::material::fresnel;
+use super::media::{Media, is_solid};
+use crate::constants::SMOOTH_TOTAL_REFLECTIONS;
+use crate::scene::material::{Coverage, NormalMap, TextureUse};
+use crate::scene::{Material, Surface};
+
+/// No eye sees a turned normal at less than this cosine.
+const LEAST_COSINE: f64 = 0.01;
+/// What sheen's squared roughness is at least.
+const LEAST_SHEEN: f64 = 0.01;
+
+/// Whether a back scatters, shines and lets light through as the front does.
+pub fn has_two_sides(material: &Material) -> bool {
+    material.two_sided || (material.surface == Surface::Layered && material.layers.transmission > 0.0)
+}
+
+/// A normal that the eye sees: moved towards it where it would face away.
+fn towards_eye(n: DVec3, wo: DVec3) -> DVec3 {
+    let cosine = n.dot(wo);
+    if cosine < LEAST_COSINE { (n + (LEAST_COSINE - cosine) * wo).normalize() } else { n }
+}
+
+impl<'a> Geometry<'a> {
+    /// The share of a surface that is there.
+    pub fn coverage(&self, triangle: &Triangle, weights: DVec3) -> f64 {
+        let material = triangle.material;
+        let alpha =
+            |factor: f32| f64::from(factor) * self.texel(material.base_colour_texture, triangle, weights).w * triangle.alpha(weights);
+        match material.coverage {
+            _ if material.surface != Surface::Layered => 1.0,
+            Coverage::Whole => 1.0,
+            Coverage::Mask { alpha: factor, cutoff } => f64::from(u8::from(alpha(factor) >= f64::from(cutoff))),
+            Coverage::Blend { alpha: factor } => alpha(factor).clamp(0.0, 1.0),
+        }
+    }
+
+    /// The normal that a map gives to the side with `normal`, the front's being `front`.
+    fn mapped(
+        &self,
+        map: Option<NormalMap>,
+        tangents: &[[DVec4; 3]],
+        (triangle, weights): (&Triangle, DVec3),
+        normal: DVec3,
+        is_front: bool,
+    ) -> DVec3 {
+        let (Some(map), false) = (map, tangents.is_empty()) else { return normal };
+        let front = if is_front { normal } else { -normal };
+        let tangent = triangle.mixed(tangents[triangle.index], weights);
+        let Some(along) = tangent.truncate().try_normalize() else { return normal };
+        let across = tangent.w.signum() * front.cross(along);
+        let code = 2.0 * self.texel(Some(map.texture), triangle, weights).truncate() - 1.0;
+        let scale = f64::from(map.scale);
+        let turned = (scale * (code.x * along + code.y * across) + code.z * front).normalize_or(front);
+        if is_front { turned } else { -turned }
+    }
+
+    /// The lobes of a layered surface that is seen from within `media`, by a path that has met `depth` surfaces before.
+    pub fn lobes(&self, hit: &Hit, vertex: &Vertex, media: &Media<'a>, depth: u32) -> Lobes {
+        let (triangle, wo) = (&self.triangles[hit.triangle], vertex.wo);
+        let (material, layers) = (triangle.material, &triangle.material.layers);
+        let texel = |texture: Option<TextureUse>| self.texel(texture, triangle, hit.weights);
+        let metallic_roughness = texel(layers.metallic_roughness_texture);
+        let squared = |roughness: f32, texel: f64| (f64::from(roughness) * texel).powi(2);
+        let alpha = squared(layers.roughness, metallic_roughness.y);
+        let wall = if is_solid(material) {
+            let before = media.clone().before(material, vertex.is_front);
+            Wall::Solid { from: before.index(), to: before.beyond(material, vertex.is_front).index() }
+        } else {
+            Wall::Thin
+        };
+        let place = (triangle, hit.weights);
+        let mut n = towards_eye(self.mapped(material.normal_map, &triangle.mesh.tangents, place, vertex.ns, vertex.is_front), wo);
+        let coat_n = towards_eye(self.mapped(layers.coat_normal_map, &triangle.mesh.coat_tangents, place, vertex.ns, vertex.is_front), wo);
+        // Total reflection by a shading normal alone has an end: glass would keep light that its triangles let out.
+        if let Wall::Solid { from, to } = wall
+            && depth >= SMOOTH_TOTAL_REFLECTIONS
+            && is_delta(alpha)
+            && fresnel(n.dot(wo), from, to) == 1.0
+        {
+            n = towards_eye(vertex.ng, wo);
+        }
+        let inputs = Inputs {
+            base_colour: vertex.base_colour,
+            metalness: f64::from(layers.metallic) * metallic_roughness.z,
+            alpha,
+            ior: f64::from(layers.ior),
+            specular: f64::from(layers.specular) * texel(layers.specular_texture).w,
+            specular_colour: layers.specular_colour.as_dvec3() * texel(layers.specular_colour_texture).truncate(),
+            transmission: f64::from(layers.transmission) * texel(layers.transmission_texture).x,
+            wall,
+            coat: f64::from(layers.coat) * texel(layers.coat_texture).x,
+            coat_alpha: squared(layers.coat_roughness, texel(layers.coat_roughness_texture).y),
+            sheen_colour: layers.sheen_colour.as_dvec3() * texel(layers.sheen_colour_texture).truncate(),
+            sheen_s: squared(layers.sheen_roughness, texel(layers.sheen_roughness_texture).w).max(LEAST_SHEEN),
+        };
+        Lobes::new(inputs, Frame { wo, ng: vertex.ng, n, coat_n })
+    }
+}

@@ -1,0 +1,493 @@
+//! The lobes of a layered surface at a point: what each scatters, how it is sampled, with which density. The guide's page on
+//! materials has the formulas.
+
+use std::f64::consts::{FRAC_1_PI, PI, TAU};
+use std::sync::LazyLock;
+
+use glam::DVec3;
+
+use super::albedo::{gauss_legendre, ggx, sheen};
+use super::material::{around, fresnel, mirrored, sample_lobe};
+use super::{Random, uniform};
+use crate::constants::{DELTA_ALPHA_INVERSE, MAP_ALPHA_PER_MILLE};
+
+/// What F0 and F90 of a clear coat are.
+const COAT_F0: f64 = 0.04;
+
+/// Rough lobes have at least this share of the largest lobe's chance: their albedos are estimates.
+const LEAST_CHANCE: f64 = 0.02;
+
+#[derive(Debug, Clone, Copy, PartialEq, Eq)]
+pub enum Kind {
+    Diffuse,
+    Reflection,
+    Transmission,
+    Coat,
+    Sheen,
+}
+
+/// What a lobe is to a path that follows it.
+#[derive(Debug, Clone, Copy, PartialEq, Eq)]
+pub enum Class {
+    /// The path goes straight on as if nothing were there.
+    Passing,
+    Sharp,
+    Matt,
+}
+
+/// What lies beyond a transmissive surface.
+#[derive(Debug, Clone, Copy, PartialEq)]
+pub enum Wall {
+    Thin,
+    /// Indices of refraction on the side of `wo` and on the other one.
+    Solid {
+        from: f64,
+        to: f64,
+    },
+}
+
+/// A material at a point, its textures included.
+#[derive(Debug, Clone, Copy, PartialEq)]
+pub struct Inputs {
+    pub base_colour: DVec3,
+    pub metalness: f64,
+    /// Squared roughness.
+    pub alpha: f64,
+    pub ior: f64,
+    pub specular: f64,
+    pub specular_colour: DVec3,
+    pub transmission: f64,
+    pub wall: Wall,
+    pub coat: f64,
+    /// Squared roughness.
+    pub coat_alpha: f64,
+    pub sheen_colour: DVec3,
+    /// Squared roughness.
+    pub sheen_s: f64,
+}
+
+/// Unit vectors: towards the eye, and normals on its side.
+#[derive(Debug, Clone, Copy, PartialEq)]
+pub struct Frame {
+    pub wo: DVec3,
+    /// Of the triangle.
+    pub ng: DVec3,
+    pub n: DVec3,
+    pub coat_n: DVec3,
+}
+
+pub struct Lobes {
+    inputs: Inputs,
+    frame: Frame,
+    /// F0d and F0t.
+    f0: DVec3,
+    f0_transmission: DVec3,
+    /// (1 - E(n.v)) (1 - C(n.v)) / N.
+    diffuse: f64,
+    /// 1 - C and 1 - S towards the eye.
+    coat_leaves: f64,
+    sheen_leaves: f64,
+    /// Of being chosen.
+    chances: [(Kind, f64); 5],
+}
+
+/// Where a path goes on.
+pub struct Scattered {
+    pub wi: DVec3,
+    /// BSDF times cosine over the density.
+    pub weight: DVec3,
+    /// Per solid angle; infinite for a delta.
+    pub density: f64,
+}
+
+/// Whether a lobe of this alpha is a delta.
+pub fn is_delta(alpha: f64) -> bool {
+    alpha * f64::from(DELTA_ALPHA_INVERSE) < 1.0
+}
+
+/// (1 - cosine)^5.
+pub fn schlick(cosine: f64) -> f64 {
+    (1.0 - cosine).clamp(0.0, 1.0).powi(5)
+}
+
+/// V of GGX with correlated Smith masking, from the cosines of both directions.
+pub fn ggx_visibility(alpha: f64, n_v: f64, n_l: f64) -> f64 {
+    0.5 / (n_l * slant(alpha, n_v) + n_v * slant(alpha, n_l))
+}
+
+fn slant(alpha: f64, cosine: f64) -> f64 {
+    let squared = alpha * alpha;
+    (squared + (1.0 - squared) * cosine * cosine).sqrt()
+}
+
+/// D of GGX. The sine comes from the cross product, which keeps the digits of small angles.
+fn ggx_distribution(alpha: f64, n: DVec3, h: DVec3) -> f64 {
+    let squared = alpha * alpha;
+    let width = n.cross(h).length_squared() + squared * n.dot(h).powi(2);
+    squared / (PI * width * width)
+}
+
+/// Density of half vectors that are sampled as they are seen from the eye, over 4 v.h: that of their mirror directions.
+fn mirrored_density(alpha: f64, n: DVec3, h: DVec3, n_v: f64) -> f64 {
+    0.5 * ggx_distribution(alpha, n, h) / (n_v + slant(alpha, n_v))
+}
+
+/// A half vector as it is seen from the eye (Dupuy and Benyoub 2023).
+fn visible_normal(alpha: f64, n: DVec3, wo: DVec3, rng: &mut Random) -> DVec3 {
+    let (x, y) = n.any_orthonormal_pair();
+    let stretched = DVec3::new(alpha * wo.dot(x), alpha * wo.dot(y), wo.dot(n)).normalize();
+    let azimuth = TAU * uniform(rng);
+    let height = (1.0 - uniform(rng)) * (1.0 + stretched.z) - stretched.z;
+    let sine = (1.0 - height * height).max(0.0).sqrt();
+    let h = stretched + DVec3::new(sine * azimuth.cos(), sine * azimuth.sin(), height);
+    around(n, DVec3::new(alpha * h.x, alpha * h.y, h.z).normalize())
+}
+
+/// D of sheen, from the squared sine of the half vector.
+pub fn sheen_distribution(s: f64, sine_squared: f64) -> f64 {
+    (2.0 + 1.0 / s) * sine_squared.powf(0.5 / s) * 0.5 * FRAC_1_PI
+}
+
+/// L of sheen.
+pub fn sheen_masking(s: f64, cosine: f64) -> f64 {
+    const AT_0: [f64; 5] = [25.3245, 3.32435, 0.16801, -1.27393, -4.85967];
+    const AT_1: [f64; 5] = [21.5473, 3.82987, 0.19823, -1.97760, -4.32054];
+    let weight = 1.0 - (1.0 - s) * (1.0 - s);
+    let p: [f64; 5] = std::array::from_fn(|k| AT_0[k] + (AT_1[k] - AT_0[k]) * weight);
+    let l = |x: f64| p[0] / (1.0 + p[1] * x.powf(p[2])) + p[3] * x + p[4];
+    if cosine < 0.5 { l(cosine).exp() } else { (2.0 * l(0.5) - l(1.0 - cosine)).exp() }
+}
+
+/// (1 - E) (1 - C) is smooth enough for few places.
+static COSINES: LazyLock<Vec<(f64, f64)>> = LazyLock::new(|| gauss_legendre(16));
+
+impl Inputs {
+    /// F0 of a dielectric whose reflectance along the normal is this.
+    fn f0(&self, along_normal: f64) -> DVec3 {
+        (along_normal * self.specular_colour).min(DVec3::ONE) * self.specular
+    }
+
+    /// What a coat of these reflects at a cosine: C.
+    fn coat_albedo(&self, cosine: f64) -> f64 {
+        if self.coat == 0.0 {
+            return 0.0;
+        }
+        let albedo = ggx(cosine, self.coat_alpha);
+        self.coat * (COAT_F0 * albedo.a + albedo.b)
+    }
+
+    /// S.
+    fn sheen_albedo(&self, cosine: f64) -> f64 {
+        let colour = self.sheen_colour.max_element();
+        if colour == 0.0 { 0.0 } else { colour * sheen(cosine, self.sheen_s) }
+    }
+}
+
+/// Reflectance along the normal.
+fn along_normal(from: f64, to: f64) -> f64 {
+    ((from - to) / (from + to)).powi(2)
+}
+
+impl Lobes {
+    pub fn new(inputs: Inputs, frame: Frame) -> Lobes {
+        // An ior of 0 stands for an infinite one.
+        let f0 = inputs.f0(if inputs.ior == 0.0 { 1.0 } else { along_normal(inputs.ior, 1.0) });
+        let f0_transmission = match inputs.wall {
+            Wall::Thin => f0,
+            Wall::Solid { from, to } => inputs.f0(along_normal(from, to)),
+        };
+        let coat_leaves = (1.0 - inputs.coat_albedo(frame.coat_n.dot(frame.wo))).max(0.0);
+        let sheen_leaves = (1.0 - inputs.sheen_albedo(frame.n.dot(frame.wo))).max(0.0);
+        let mut lobes =
+            Lobes { inputs, frame, f0, f0_transmission, diffuse: 0.0, coat_leaves, sheen_leaves, chances: [(Kind::Diffuse, 0.0); 5] };
+        let n_v = frame.n.dot(frame.wo);
+        if (1.0 - inputs.metalness) * (1.0 - inputs.transmission) * inputs.base_colour.max_element() > 0.0 {
+            let norm: f64 = COSINES.iter().map(|(cosine, weight)| 2.0 * weight * cosine * lobes.reaches_diffuse(*cosine)).sum();
+            lobes.diffuse = if norm > 0.0 { lobes.reaches_diffuse(n_v) / norm } else { 0.0 };
+        }
+        lobes.set_chances(n_v);
+        lobes
+    }
+
+    /// In proportion to albedos towards the eye.
+    fn set_chances(&mut self, n_v: f64) {
+        let Inputs { base_colour, metalness, transmission, .. } = self.inputs;
+        let albedo = ggx(n_v, self.inputs.alpha);
+        let dielectric = 1.0 - metalness;
+        let both = albedo.a + albedo.b;
+        let through = self.fresnel_of_transmission(n_v);
+        let reflection = metalness * (base_colour * albedo.a + albedo.b)
+            + dielectric * (1.0 - transmission) * (self.f0 * albedo.a + self.inputs.specular * albedo.b)
+            + dielectric * transmission * through * both;
+        let transmitted = dielectric * transmission * base_colour * (1.0 - through) * both;
+        // The norm of diffuse reflection is left out here.
+        let diffuse = dielectric * (1.0 - transmission) * base_colour * self.reaches_diffuse(n_v);
+        let under_coat = self.coat_leaves;
+        let under = under_coat * self.sheen_leaves;
+        let albedos = [
+            (Kind::Diffuse, if self.diffuse > 0.0 { diffuse.max_element() * self.sheen_leaves } else { 0.0 }),
+            (Kind::Reflection, reflection.max_element() * under),
+            (Kind::Transmission, transmitted.max_element() * under),
+            (Kind::Coat, self.inputs.coat_albedo(self.frame.coat_n.dot(self.frame.wo))),
+            (Kind::Sheen, self.inputs.sheen_albedo(n_v) * under_coat),
+        ];
+        let largest = albedos.iter().fold(0.0f64, |largest, (_, albedo)| largest.max(*albedo));
+        let raised = albedos.map(|(kind, albedo)| {
+            let is_there = match kind {
+                Kind::Diffuse => self.diffuse > 0.0,
+                Kind::Reflection => reflection.max_element() > 0.0,
+                Kind::Transmission => dielectric * transmission * base_colour.max_element() > 0.0,
+                Kind::Coat => self.inputs.coat > 0.0,
+                Kind::Sheen => self.inputs.sheen_colour.max_element() > 0.0,
+            };
+            // What deltas scatter is known exactly.
+            (kind, if is_there && !self.is_delta(kind) { albedo.max(LEAST_CHANCE * largest) } else { albedo })
+        });
+        let sum: f64 = raised.iter().map(|(_, albedo)| albedo).sum();
+        self.chances = raised.map(|(kind, albedo)| (kind, if sum > 0.0 { albedo / sum } else { 0.0 }));
+    }
+
+    /// What reaches the diffuse lobe at a cosine, or gets out of it: (1 - E) (1 - C).
+    fn reaches_diffuse(&self, cosine: f64) -> f64 {
+        let albedo = ggx(cosine, self.inputs.alpha);
+        let reflected = self.f0.max_element() * albedo.a + self.inputs.specular * albedo.b;
+        (1.0 - reflected).max(0.0) * (1.0 - self.inputs.coat_albedo(cosine)).max(0.0)
+    }
+
+    /// What the coat leaves to all but the diffuse lobe.
+    fn under_coat(&self, wi: DVec3) -> f64 {
+        self.coat_leaves.min((1.0 - self.inputs.coat_albedo(self.frame.coat_n.dot(wi).abs())).max(0.0))
+    }
+
+    fn under_sheen(&self, wi: DVec3) -> f64 {
+        self.sheen_leaves.min((1.0 - self.inputs.sheen_albedo(self.frame.n.dot(wi).abs())).max(0.0))
+    }
+
+    /// Ft.
+    fn fresnel_of_transmission(&self, v_h: f64) -> DVec3 {
+        let (f0, f90) = (self.f0_transmission, self.inputs.specular);
+        match self.inputs.wall {
+            Wall::Thin => f0 + (f90 - f0) * schlick(v_h),
+            Wall::Solid { from, to } if from == to => DVec3::ZERO,
+            Wall::Solid { from, to } => {
+                let (reflected, least) = (fresnel(v_h, from, to), along_normal(from, to));
+                // In total reflection, and for an index of 0, which reflects all.
+                if reflected >= 1.0 || least >= 1.0 { DVec3::ONE } else { f0 + (f90 - f0) * ((reflected - least) / (1.0 - least)) }
+            }
+        }
+    }
+
+    /// The bracket of base reflection.
+    fn reflectance(&self, v_h: f64) -> DVec3 {
+        let Inputs { base_colour, metalness, transmission, specular, .. } = self.inputs;
+        let grazing = schlick(v_h);
+        let metal = base_colour + (1.0 - base_colour) * grazing;
+        let opaque = self.f0 + (specular - self.f0) * grazing;
+        let clear = if transmission > 0.0 { self.fresnel_of_transmission(v_h) } else { DVec3::ZERO };
+        metalness * metal + (1.0 - metalness) * ((1.0 - transmission) * opaque + transmission * clear)
+    }
+
+    /// (1 - m) t b (1 - Ft).
+    fn transmittance(&self, v_h: f64) -> DVec3 {
+        let Inputs { base_colour, metalness, transmission, .. } = self.inputs;
+        (1.0 - metalness) * transmission * base_colour * (1.0 - self.fresnel_of_transmission(v_h))
+    }
+
+    fn coat_reflectance(&self, v_h: f64) -> f64 {
+        self.inputs.coat * (COAT_F0 + (1.0 - COAT_F0) * schlick(v_h))
+    }
+
+    /// Lobes and the probabilities with which a path chooses them.
+    pub fn chances(&self) -> impl Iterator<Item = (Kind, f64)> {
+        self.chances.into_iter().filter(|(_, chance)| *chance > 0.0)
+    }
+
+    /// A lobe and its probability; `None` where all is black.
+    pub fn choose(&self, rng: &mut Random) -> Option<(Kind, f64)> {
+        let mut left = uniform(rng);
+        let mut chosen = None;
+        for (kind, chance) in self.chances() {
+            // The last one stays where rounding leaves a rest.
+            chosen = Some((kind, chance));
+            left -= chance;
+            if left < 0.0 {
+                break;
+            }
+        }
+        chosen
+    }
+
+    pub fn is_delta(&self, kind: Kind) -> bool {
+        match kind {
+            Kind::Diffuse | Kind::Sheen => false,
+            Kind::Reflection => is_delta(self.inputs.alpha),
+            Kind::Transmission => is_delta(self.inputs.alpha) || self.same_index(),
+            Kind::Coat => is_delta(self.inputs.coat_alpha),
+        }
+    }
+
+    fn same_index(&self) -> bool {
+        matches!(self.inputs.wall, Wall::Solid { from, to } if from == to)
+    }
+
+    pub fn class(&self, kind: Kind) -> Class {
+        let by_alpha = |alpha: f64| if alpha * 1000.0 < f64::from(MAP_ALPHA_PER_MILLE) { Class::Sharp } else { Class::Matt };
+        match kind {
+            Kind::Diffuse | Kind::Sheen => Class::Matt,
+            Kind::Reflection => by_alpha(self.inputs.alpha),
+            Kind::Coat => by_alpha(self.inputs.coat_alpha),
+            Kind::Transmission if self.inputs.wall == Wall::Thin && self.is_delta(kind) => Class::Passing,
+            Kind::Transmission => Class::Sharp,
+        }
+    }
+
+    /// The normal that a lobe's cosine is taken with, on the side that it scatters to.
+    pub fn axis(&self, kind: Kind) -> DVec3 {
+        match kind {
+            Kind::Coat => self.frame.coat_n,
+            Kind::Transmission => -self.frame.n,
+            _ => self.frame.n,
+        }
+    }
+
+    /// Whether a lobe scatters that way at all.
+    fn reaches(&self, kind: Kind, wi: DVec3) -> bool {
+        let ng = if kind == Kind::Transmission { -self.frame.ng } else { self.frame.ng };
+        wi.dot(ng) > 0.0 && wi.dot(self.axis(kind)) > 0.0
+    }
+
+    /// The half vector on the side of the eye, for a lobe that may scatter light that way.
+    fn half(&self, kind: Kind, wi: DVec3) -> Option<DVec3> {
+        let Frame { wo, n, .. } = self.frame;
+        match (kind, self.inputs.wall) {
+            (Kind::Transmission, Wall::Thin) => Some((wo + mirrored_in(wi, n)).normalize()),
+            (Kind::Transmission, Wall::Solid { from, to }) => {
+                let h = (from * wo + to * wi).normalize();
+                let h = if h.dot(n) < 0.0 { -h } else { h };
+                (wo.dot(h) > 0.0 && wi.dot(h) < 0.0).then_some(h)
+            }
+            _ => Some((wo + wi).normalize()),
+        }
+    }
+
+    /// BSDF of a lobe that is no delta, 1/sr.
+    pub fn evaluate(&self, kind: Kind, wi: DVec3) -> DVec3 {
+        if !self.reaches(kind, wi) || self.is_delta(kind) {
+            return DVec3::ZERO;
+        }
+        let Frame { wo, n, coat_n, .. } = self.frame;
+        let Inputs { base_colour, metalness, transmission, alpha, coat_alpha, sheen_colour, sheen_s, .. } = self.inputs;
+        let (n_v, n_l) = (n.dot(wo), n.dot(wi).abs());
+        let Some(h) = self.half(kind, wi) else { return DVec3::ZERO };
+        let v_h = wo.dot(h);
+        let d_v = || ggx_distribution(alpha, n, h) * ggx_visibility(alpha, n_v, n_l);
+        let under = || self.under_coat(wi) * self.under_sheen(wi);
+        match kind {
+            Kind::Diffuse => {
+                let share = self.diffuse * self.reaches_diffuse(n_l) * self.under_sheen(wi);
+                (1.0 - metalness) * (1.0 - transmission) * FRAC_1_PI * share * base_colour
+            }
+            Kind::Reflection => d_v() * under() * self.reflectance(v_h),
+            Kind::Transmission => {
+                let stretch = match self.inputs.wall {
+                    Wall::Thin => 1.0,
+                    Wall::Solid { from, to } => {
+                        let l_h = wi.dot(h);
+                        4.0 * v_h * -l_h * (from / (from * v_h + to * l_h)).powi(2)
+                    }
+                };
+                d_v() * under() * stretch * self.transmittance(v_h)
+            }
+            Kind::Coat => {
+                let visibility = ggx_visibility(coat_alpha, coat_n.dot(wo), coat_n.dot(wi));
+                DVec3::splat(ggx_distribution(coat_alpha, coat_n, h) * visibility * self.coat_reflectance(v_h))
+            }
+            Kind::Sheen => {
+                let masking = 1.0 + sheen_masking(sheen_s, n_v) + sheen_masking(sheen_s, n_l);
+                let distribution = sheen_distribution(sheen_s, n.cross(h).length_squared());
+                distribution / (masking * 4.0 * n_v * n_l) * self.under_coat(wi) * sheen_colour
+            }
+        }
+    }
+
+    /// Density of a lobe's samples per solid angle; 0 for a delta.
+    pub fn density(&self, kind: Kind, wi: DVec3) -> f64 {
+        if !self.reaches(kind, wi) || self.is_delta(kind) {
+            return 0.0;
+        }
+        let Frame { wo, n, coat_n, .. } = self.frame;
+        let Some(h) = self.half(kind, wi) else { return 0.0 };
+        let (alpha, n_v) = (self.inputs.alpha, n.dot(wo));
+        match (kind, self.inputs.wall) {
+            (Kind::Diffuse, _) => FRAC_1_PI * n.dot(wi),
+            (Kind::Sheen, _) => 0.5 * FRAC_1_PI,
+            (Kind::Coat, _) => mirrored_density(self.inputs.coat_alpha, coat_n, h, coat_n.dot(wo)),
+            (Kind::Transmission, Wall::Solid { from, to }) => {
+                let (v_h, l_h) = (wo.dot(h), wi.dot(h));
+                mirrored_density(alpha, n, h, n_v) * 4.0 * v_h * -l_h * (to / (from * v_h + to * l_h)).powi(2)
+            }
+            _ => mirrored_density(alpha, n, h, n_v),
+        }
+    }
+
+    /// A direction of a lobe; `None` where the sample lies on the wrong side.
+    pub fn sample(&self, kind: Kind, rng: &mut Random) -> Option<Scattered> {
+        if self.is_delta(kind) {
+            return self.follow_delta(kind);
+        }
+        let Frame { wo, n, coat_n, .. } = self.frame;
+        let alpha = self.inputs.alpha;
+        let wi = match (kind, self.inputs.wall) {
+            (Kind::Diffuse, _) => sample_lobe(n, 1.0, rng),
+            (Kind::Sheen, _) => {
+                let (height, azimuth) = (1.0 - uniform(rng), TAU * uniform(rng));
+                let sine = (1.0 - height * height).max(0.0).sqrt();
+                around(n, DVec3::new(sine * azimuth.cos(), sine * azimuth.sin(), height))
+            }
+            (Kind::Coat, _) => mirrored(wo, visible_normal(self.inputs.coat_alpha, coat_n, wo, rng)),
+            (Kind::Reflection, _) => mirrored(wo, visible_normal(alpha, n, wo, rng)),
+            (Kind::Transmission, Wall::Thin) => mirrored_in(mirrored(wo, visible_normal(alpha, n, wo, rng)), n),
+            (Kind::Transmission, Wall::Solid { from, to }) => refracted(wo, visible_normal(alpha, n, wo, rng), from / to)?,
+        };
+        let density = self.density(kind, wi);
+        let weight = self.evaluate(kind, wi) * (wi.dot(self.axis(kind)) / density);
+        (density > 0.0 && weight.max_element() > 0.0).then_some(Scattered { wi, weight, density })
+    }
+
+    fn follow_delta(&self, kind: Kind) -> Option<Scattered> {
+        let Frame { wo, ng, n, coat_n } = self.frame;
+        let n_v = n.dot(wo);
+        let (wi, weight) = match (kind, self.inputs.wall) {
+            (Kind::Coat, _) => (mirrored(wo, coat_n), DVec3::splat(self.coat_reflectance(coat_n.dot(wo)))),
+            (Kind::Transmission, Wall::Solid { from, to }) if from != to => {
+                (refracted(wo, n, from / to)?, (from / to).powi(2) * self.transmittance(n_v))
+            }
+            (Kind::Transmission, _) => (-wo, self.transmittance(n_v)),
+            _ => (mirrored(wo, n), self.reflectance(n_v)),
+        };
+        // What a turned normal sends to the wrong side is mirrored in the triangle's plane.
+        let height = wi.dot(ng);
+        let wi = if (height < 0.0) != (kind == Kind::Transmission) { wi - 2.0 * height * ng } else { wi };
+        let under = if kind == Kind::Coat { 1.0 } else { self.under_coat(wi) * self.under_sheen(wi) };
+        (under * weight.max_element() > 0.0).then_some(Scattered { wi, weight: under * weight, density: f64::INFINITY })
+    }
+
+    /// What a shadow ray keeps: the share of a thin smooth wall.
+    pub fn passed(&self) -> DVec3 {
+        let passing = Kind::Transmission;
+        let passes = self.class(passing) == Class::Passing;
+        passes.then(|| self.follow_delta(passing)).flatten().map_or(DVec3::ZERO, |straight| straight.weight)
+    }
+}
+
+/// Mirrored in the plane with this unit normal.
+fn mirrored_in(w: DVec3, normal: DVec3) -> DVec3 {
+    w - 2.0 * w.dot(normal) * normal
+}
+
+/// The direction beyond a boundary, by the index on the side of `wo` over the other one; `None` in total reflection.
+fn refracted(wo: DVec3, normal: DVec3, eta: f64) -> Option<DVec3> {
+    let cosine = wo.dot(normal);
+    let squared = 1.0 - eta * eta * (1.0 - cosine * cosine);
+    (squared > 0.0).then(|| (eta * cosine - squared.sqrt()) * normal - eta * wo)
+}

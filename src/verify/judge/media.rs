@@ -1,0 +1,87 @@
+//! Which solids a path is inside of.
+
+use glam::DVec3;
+
+use super::geometry::{Geometry, Ray};
+use crate::scene::{Material, Surface};
+
+/// Solids that are known at a time; of more the one entered first is forgotten.
+const MOST: usize = 4;
+
+/// Towards what a point looks for the solids around it: no axis of a scene.
+const OUTWARDS: DVec3 = DVec3::new(0.290_380_3, 0.829_658_1, 0.476_861_2);
+
+/// The solids around a point, the one entered last at the end: it fills the place.
+#[derive(Clone, Default)]
+pub struct Media<'a>(Vec<&'a Material>);
+
+/// Whether a material encloses a medium.
+pub fn is_solid(material: &Material) -> bool {
+    let layers = &material.layers;
+    material.surface == Surface::Layered && layers.transmission > 0.0 && layers.medium.is_some() && !layers.is_unlit
+}
+
+impl<'a> Media<'a> {
+    /// Index of refraction.
+    pub fn index(&self) -> f64 {
+        self.0.last().map_or(1.0, |solid| f64::from(solid.layers.ior))
+    }
+
+    /// Share of light that is left after a way.
+    pub fn transmittance(&self, metres: f64) -> DVec3 {
+        let medium = self.0.last().and_then(|solid| solid.layers.medium);
+        medium.map_or(DVec3::ONE, |medium| medium.transmittance.as_dvec3().map(|share| share.powf(metres)))
+    }
+
+    fn place(&self, solid: &Material) -> Option<usize> {
+        self.0.iter().rposition(|known| std::ptr::eq(*known, solid))
+    }
+
+    /// On the side from which a solid's surface is seen: whoever sees its back is inside.
+    pub fn before(mut self, solid: &'a Material, is_front: bool) -> Media<'a> {
+        if !is_front && self.place(solid).is_none() {
+            self.enter(solid);
+        }
+        self
+    }
+
+    /// On its other side.
+    pub fn beyond(&self, solid: &'a Material, is_front: bool) -> Media<'a> {
+        let mut media = self.clone();
+        if is_front {
+            media.enter(solid);
+        } else if let Some(place) = media.place(solid) {
+            media.0.remove(place);
+        }
+        media
+    }
+
+    fn enter(&mut self, solid: &'a Material) {
+        if self.0.len() == MOST {
+            self.0.remove(0);
+        }
+        self.0.push(solid);
+    }
+
+    /// Around a point: the solids that a ray from there leaves without having entered them.
+    pub fn around(geometry: &Geometry<'a>, position: DVec3) -> Media<'a> {
+        let (mut entered, mut left) = (Media::default(), Vec::new());
+        let mut ray = Ray { origin: position, direction: OUTWARDS.normalize() };
+        while let Some(hit) = geometry.closest_hit(&ray, f64::INFINITY) {
+            let triangle = &geometry.triangles[hit.triangle];
+            let is_front = ray.direction.dot(triangle.normal) < 0.0;
+            if is_solid(triangle.material) {
+                if is_front || entered.place(triangle.material).is_some() {
+                    entered = entered.beyond(triangle.material, is_front);
+                } else {
+                    left.push(triangle.material);
+                }
+            }
+            ray = geometry.leaving(triangle.point(hit.weights), triangle.normal, ray.direction);
+        }
+        // The one left first is the innermost.
+        left.truncate(MOST);
+        left.reverse();
+        Media(left)
+    }
+}
