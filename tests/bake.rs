@@ -605,7 +605,14 @@ fn pictures_hold_what_they_were_given() {
 fn a_texture_is_seen_in_the_radiance() {
     let mut scene = scene_of(Mesh::parallelogram("wall", DVec3::ZERO, DVec3::X, DVec3::Y, 0));
     let texels = vec![Vec3::X, Vec3::Y];
-    scene.textures.push(Texture { name: "halves".into(), width: 2, height: 1, texels: texels.into(), wrap: [Wrap::Clamp; 2], filter: Default::default() });
+    scene.textures.push(Texture {
+        name: "halves".into(),
+        width: 2,
+        height: 1,
+        texels: texels.into(),
+        wrap: [Wrap::Clamp; 2],
+        filter: Default::default(),
+    });
     scene.materials[0].base_colour = Vec3::ONE;
     scene.materials[0].base_colour_texture = Some(TextureUse::of(0, 0));
     let layout = Layout::new(&scene, 32.0).unwrap();

@@ -62,6 +62,11 @@ impl TextureUse {
     pub fn of(texture: usize, uv_set: usize) -> TextureUse {
         TextureUse { texture, uv_set, transform: UvTransform::NONE }
     }
+
+    /// Whether both are looked up at the same place.
+    pub fn has_coordinates_of(&self, other: &TextureUse) -> bool {
+        (self.uv_set, self.transform) == (other.uv_set, other.transform)
+    }
 }
 
 /// Normals in the frame of tangent, bitangent and normal, as codes from -1 to 1; `scale` multiplies the first two.
@@ -76,9 +81,14 @@ pub struct NormalMap {
 pub enum Coverage {
     Whole,
     /// All where alpha is at least `cutoff`, else nothing.
-    Mask { alpha: f32, cutoff: f32 },
+    Mask {
+        alpha: f32,
+        cutoff: f32,
+    },
     /// Alpha itself.
-    Blend { alpha: f32 },
+    Blend {
+        alpha: f32,
+    },
 }
 
 /// What a transmissive surface encloses.
@@ -201,6 +211,25 @@ impl Material {
     /// A layered one without textures.
     pub fn layered(name: &str, base_colour: Vec3, layers: Layers) -> Material {
         Material { surface: Surface::Layered, layers, ..Material::lambert(name, base_colour) }
+    }
+
+    /// Every use of a texture.
+    pub fn textures(&self) -> impl Iterator<Item = TextureUse> + use<> {
+        let layers = &self.layers;
+        let maps = [self.normal_map, layers.coat_normal_map].map(|map| map.map(|map| map.texture));
+        let textures = [
+            self.base_colour_texture,
+            self.emission_texture,
+            layers.metallic_roughness_texture,
+            layers.specular_texture,
+            layers.specular_colour_texture,
+            layers.transmission_texture,
+            layers.coat_texture,
+            layers.coat_roughness_texture,
+            layers.sheen_colour_texture,
+            layers.sheen_roughness_texture,
+        ];
+        textures.into_iter().chain(maps).flatten()
     }
 
     pub fn is_emissive(&self) -> bool {

@@ -6,7 +6,7 @@ use glam::{DVec2, Vec3, Vec4};
 use rayon::prelude::*;
 
 /// What lies beyond the picture's edges.
-#[derive(Debug, Clone, Copy, PartialEq, Eq)]
+#[derive(Debug, Clone, Copy, PartialEq, Eq, Hash)]
 pub enum Wrap {
     Repeat,
     MirroredRepeat,
@@ -14,7 +14,7 @@ pub enum Wrap {
 }
 
 /// What a place between texel centres has.
-#[derive(Debug, Clone, Copy, PartialEq, Eq, Default)]
+#[derive(Debug, Clone, Copy, PartialEq, Eq, Hash, Default)]
 pub enum Filter {
     #[default]
     Bilinear,
@@ -182,7 +182,9 @@ mod tests {
     fn nearest_texels_and_alpha() {
         let texels = Texels::Linear(vec![[0, 51, 102, 153], [255, 0, 51, 204]]);
         let texture = Texture { name: "two".into(), width: 2, height: 1, texels, wrap: [Wrap::Repeat; 2], filter: Filter::Nearest };
-        for (u, texel) in [(0.01, [0.0, 0.2, 0.4, 0.6]), (0.49, [0.0, 0.2, 0.4, 0.6]), (0.51, [1.0, 0.0, 0.2, 0.8]), (1.2, [0.0, 0.2, 0.4, 0.6])] {
+        for (u, texel) in
+            [(0.01, [0.0, 0.2, 0.4, 0.6]), (0.49, [0.0, 0.2, 0.4, 0.6]), (0.51, [1.0, 0.0, 0.2, 0.8]), (1.2, [0.0, 0.2, 0.4, 0.6])]
+        {
             assert!(texture.sample(DVec2::new(u, 0.3)).abs_diff_eq(Vec4::from(texel), 1e-6), "{u}");
         }
         let filtered = Texture { filter: Filter::Bilinear, ..texture }.sample(DVec2::new(0.5, 0.5));
