@@ -299,6 +299,15 @@ fn a_skinned_mesh_follows_its_joints_and_not_its_node() {
     let mirrored = load(&posed).unwrap();
     assert_eq!((mirrored.meshes[0].positions[1], mirrored.meshes[0].normal(0)), (-DVec3::X, DVec3::Z));
 
+    // Weights count as shares of their sum.
+    let mut halves = skinned_square();
+    let weights = add_accessor(&mut halves, &floats(&[0.25, 0.25, 0.0, 0.0].repeat(4)), 5126, 4, "VEC4");
+    let joints = add_accessor(&mut halves, &[0, 1, 0, 0].repeat(4), 5121, 4, "VEC4");
+    halves["meshes"][0]["primitives"][0]["attributes"]["WEIGHTS_0"] = json!(weights);
+    halves["meshes"][0]["primitives"][0]["attributes"]["JOINTS_0"] = json!(joints);
+    halves["nodes"][6]["translation"] = json!([0, 3, 2]);
+    assert_eq!(load(&halves).unwrap().meshes[0].positions, corners.map(|corner| corner + 1.5 * DVec3::Y));
+
     for path in ["/nodes/0/skin", "/skins/0/joints/1", "/skins/0/inverseBindMatrices"] {
         let mut value = skinned_square();
         *value.pointer_mut(path).unwrap() = json!(99);
@@ -342,6 +351,15 @@ fn morph_targets_shift_vertices_by_their_weights_at_rest() {
     // The joint's own 7 m are not scaled, the target's 2 m are.
     assert_eq!(load(&skinned).unwrap().meshes[0].positions[0].z, 7.0 + 3.0 * (2.0 - 7.0));
 
+    for weights in [json!([1.0]), json!([1.0, 0.0, 0.5])] {
+        value["nodes"][0]["weights"] = weights;
+        let scene = load(&value).unwrap();
+        assert_eq!(scene.meshes[0].positions[0].z, 3.0 + 2.0 * 2.0);
+        let [warning] = &scene.warnings[..] else { panic!("{:?}", scene.warnings) };
+        assert!(warning.contains("weights that are not as many as morph targets") && warning.contains("mesh 'wall'"), "{warning}");
+    }
+    value["nodes"][0]["weights"] = json!([1.0, -0.25]);
+
     let few = add_accessor(&mut value, &floats(&[0.0; 9]), 5126, 3, "VEC3");
     value["meshes"][0]["primitives"][0]["targets"] = json!([{"POSITION": few}, {}]);
     assert_refused(&value, &["mesh 'wall'", "3 positions in a morph target for 4 vertices"]);
@@ -377,7 +395,18 @@ fn quantized_meshes_are_read() {
     value["meshes"][0]["primitives"][0]["attributes"]["POSITION"] = json!(positions);
     value["meshes"][0]["primitives"][0]["attributes"]["TEXCOORD_0"] = json!(uvs);
     value["nodes"][0]["scale"] = json!([0.01, 0.01, 0.01]);
-    let mesh = load(&value).unwrap().meshes.remove(0);
+    let mut scene = load(&value).unwrap();
+    assert!(scene.warnings.is_empty(), "{:?}", scene.warnings);
+    let mesh = scene.meshes.remove(0);
+    value["extensionsUsed"] = json!(["KHR_lights_punctual", "KHR_materials_emissive_strength"]);
+    value.as_object_mut().unwrap().remove("extensionsRequired");
+    let scene = load(&value).unwrap();
+    assert!(
+        scene.warnings[0].contains("KHR_mesh_quantization is not named") && scene.warnings[0].contains("mesh 'wall'"),
+        "{:?}",
+        scene.warnings
+    );
+    assert_eq!(scene.meshes[0].positions, mesh.positions);
     assert!((mesh.positions[3] - DVec3::new(1.0, 5.0, 2.95)).length() < 1e-7, "{:?}", mesh.positions);
     assert_eq!(mesh.uvs[0], [[0.0, 0.0], [1.0, 0.0], [1.0, 1.0], [0.0, 1.0]].map(DVec2::from));
 }
@@ -1016,9 +1045,17 @@ fn tangents_are_never_without_direction() {
     }
 }
 
-/// A fan of more triangles than the crate can group in one stack has tangents, too.
+/// More triangles at one vertex than the crate can group in one stack, or in a time that ends.
 #[test]
 fn a_vertex_of_many_triangles_has_tangents() {
+    let mut value = with_material(json!({"normalTexture": {"index": 0}}));
+    let indices = add_accessor(&mut value, &[0, 1, 2].repeat(200_000), 5121, 600_000, "SCALAR");
+    value["meshes"][0]["primitives"][0]["indices"] = json!(indices);
+    let mesh = load(&value).unwrap().meshes.remove(0);
+    assert_eq!(mesh.tangents.len(), 200_000);
+    assert_all_near(&mesh.tangents, DVec4::new(1.0, 0.0, 0.0, -1.0));
+
+    // A fan.
     for count in [8u32, 20_000] {
         let ring = (0..=count).map(|k| TAU * f64::from(k) / f64::from(count)).map(|angle| [angle.cos() as f32, angle.sin() as f32]);
         let places: Vec<[f32; 2]> = std::iter::once([0.0; 2]).chain(ring).collect();
