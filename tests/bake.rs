@@ -4,6 +4,8 @@
 use crate::common::prelude::*;
 use photonmill::bake::{self, Layout, MAX_SIDE, Map, MeshLightmap, PHASE_COUNT, TexelEstimate};
 use photonmill::output::destination::Folder;
+use photonmill::scene::material::{Coverage, Layers, Medium, NormalMap};
+use photonmill::scene::texture::Filter;
 
 const BLENDER: &str = concat!(env!("CARGO_MANIFEST_DIR"), "/tests/scenes/blender.glb");
 
@@ -392,23 +394,69 @@ fn assert_same_geometry(written: &Scene, scene: &Scene) {
     assert_eq!(written.cameras.len(), scene.cameras.len());
 }
 
+/// What is nearest to a material among those of glTF.
+fn as_gltf(material: &Material) -> Material {
+    let layers = match material.surface {
+        Surface::Layered => material.layers,
+        Surface::Lambert | Surface::PaperPhong { .. } => Layers { metallic: 0.0, specular: 0.0, ..Layers::default() },
+        Surface::Glossy { exponent } => Layers { roughness: (2.0 / (exponent + 2.0)).powf(0.25), ..Layers::default() },
+        Surface::Mirror => Layers { roughness: 0.0, ..Layers::default() },
+        Surface::Dielectric { ior } => {
+            let medium = Some(Medium { transmittance: Vec3::ONE });
+            Layers { metallic: 0.0, roughness: 0.0, transmission: 1.0, ior, medium, ..Layers::default() }
+        }
+    };
+    Material { surface: Surface::Layered, layers, ..material.clone() }
+}
+
+/// The uses of textures that a material has, taken out of it.
+fn take_textures(material: &mut Material) -> [Option<TextureUse>; 12] {
+    let layers = &mut material.layers;
+    let one = |map: &mut Option<NormalMap>| map.as_mut().map(|map| std::mem::replace(&mut map.texture, TextureUse::of(0, 0)));
+    [
+        one(&mut material.normal_map),
+        one(&mut layers.coat_normal_map),
+        material.base_colour_texture.take(),
+        material.emission_texture.take(),
+        layers.metallic_roughness_texture.take(),
+        layers.specular_texture.take(),
+        layers.specular_colour_texture.take(),
+        layers.transmission_texture.take(),
+        layers.coat_texture.take(),
+        layers.coat_roughness_texture.take(),
+        layers.sheen_colour_texture.take(),
+        layers.sheen_roughness_texture.take(),
+    ]
+}
+
 fn assert_same_materials(written: &Scene, scene: &Scene) {
     for (written_mesh, mesh) in pairs(&written.meshes, &scene.meshes) {
-        let (new, old) = (&written.materials[written_mesh.material], &scene.materials[mesh.material]);
-        assert_eq!((&new.name, new.base_colour, new.two_sided), (&old.name, old.base_colour, old.two_sided));
-        assert!((new.emission - old.emission).abs().max_element() <= 1e-6 * old.emission.max_element(), "{}", old.name);
-        match (new.surface, old.surface) {
-            (Surface::Glossy { exponent: new }, Surface::Glossy { exponent: old }) => assert!((new - old).abs() <= 1e-3 * (old + 1.0)),
-            (new, old) => assert_eq!(new, old),
-        }
-        let textures = |of: &Material| [of.base_colour_texture, of.emission_texture].into_iter().flatten().collect::<Vec<_>>();
-        for (new, old) in pairs(&textures(new), textures(old)) {
+        let (mut new, mut old) = (written.materials[written_mesh.material].clone(), as_gltf(&scene.materials[mesh.material]));
+        let coordinates = |mesh: &Mesh, used: TextureUse| {
+            let uv = |vertex: &u32| mesh.uvs[used.uv_set].get(*vertex as usize).copied().unwrap_or_default();
+            mesh.triangles.as_flattened().iter().map(uv).collect::<Vec<DVec2>>()
+        };
+        // A lightmap takes the place of the second set, and no third is read.
+        let are_both_used = [0, 1].iter().all(|set| old.textures().any(|used| used.uv_set == *set));
+        for (slot, (new, old)) in pairs(take_textures(&mut new), take_textures(&mut old)).enumerate() {
+            let (Some(new), Some(old)) = (new, old) else {
+                assert_eq!(new, old, "{}: {slot}", mesh.name);
+                continue;
+            };
             let (from, to) = (new.transform, old.transform);
             assert!((from.scale - to.scale).length() + (from.offset - to.offset).length() + (from.rotation - to.rotation).abs() < 1e-6);
+            assert!(are_both_used || coordinates(written_mesh, new) == coordinates(mesh, old), "{}: {slot}", mesh.name);
             let (new, old) = (&written.textures[new.texture], &scene.textures[old.texture]);
-            assert_eq!((new.width, new.height, new.wrap), (old.width, old.height, old.wrap));
-            assert!((0..old.texels.count()).all(|place| new.texels.at(place) == old.texels.at(place)), "{}", old.name);
+            assert_eq!((new.width, new.height, new.wrap, new.filter), (old.width, old.height, old.wrap, old.filter));
+            match &old.texels {
+                // Written as colours of eight bits each.
+                Texels::SharedExponent(_) => assert!((0..old.texels.count()).all(|k| new.texels.at(k) == old.texels.at(k)), "{slot}"),
+                texels => assert_eq!(new.texels, *texels, "{}: {slot}", mesh.name),
+            }
         }
+        assert!((new.emission - old.emission).abs().max_element() <= 1e-6 * old.emission.max_element(), "{}", old.name);
+        new.emission = old.emission;
+        assert_eq!(new, old);
     }
 }
 
@@ -564,6 +612,119 @@ fn every_surface_light_and_texture_round_trips() {
     assert_eq!(lamp.material().pbr_metallic_roughness().base_color_texture().unwrap().tex_coord(), 0);
 }
 
+/// Every field of a layered material, and tangents, alphas and samplers of the meshes, come back.
+#[test]
+fn layered_materials_round_trip() {
+    let mut textures = Vec::new();
+    let mut used = |is_colour: bool| {
+        let place = textures.len();
+        let codes = (0..4u8).map(|k| [k, place as u8, 7 * k, 255 - (place % 3) as u8 * k]).collect();
+        textures.push(Texture {
+            name: format!("{place}"),
+            width: 2,
+            height: 2,
+            texels: if is_colour { Texels::Srgb(codes) } else { Texels::Linear(codes) },
+            wrap: [[Wrap::Repeat, Wrap::Clamp], [Wrap::MirroredRepeat, Wrap::Repeat]][place % 2],
+            filter: [Filter::Bilinear, Filter::Nearest][place % 2],
+        });
+        let transform = UvTransform { scale: DVec2::new(1.0, place as f64 + 1.0), rotation: 0.25, offset: DVec2::new(0.5, 0.0) };
+        Some(TextureUse { transform, ..TextureUse::of(place, 0) })
+    };
+    let layers = Layers {
+        metallic: 0.25,
+        roughness: 0.3,
+        metallic_roughness_texture: used(false),
+        ior: 1.1,
+        specular: 0.9,
+        specular_texture: used(false),
+        specular_colour: Vec3::new(0.1, 2.0, 0.7),
+        specular_colour_texture: used(true),
+        transmission: 0.4,
+        transmission_texture: used(false),
+        medium: Some(Medium { transmittance: Vec3::new(0.1, 0.0, 1.0) }),
+        coat: 0.6,
+        coat_texture: used(false),
+        coat_roughness: 0.05,
+        coat_roughness_texture: used(false),
+        coat_normal_map: used(false).map(|texture| NormalMap { texture, scale: 0.7 }),
+        sheen_colour: Vec3::new(0.2, 0.4, 0.6),
+        sheen_colour_texture: used(true),
+        sheen_roughness: 0.8,
+        sheen_roughness_texture: used(false),
+        is_unlit: false,
+    };
+    let everything = Material {
+        base_colour_texture: used(true),
+        emission: Vec3::new(0.5, 80.0, 2.0),
+        emission_texture: used(true),
+        two_sided: true,
+        coverage: Coverage::Mask { alpha: 0.7, cutoff: 0.3 },
+        normal_map: used(false).map(|texture| NormalMap { texture, scale: -1.3 }),
+        ..Material::layered("everything", Vec3::new(0.1, 0.2, 0.3), layers)
+    };
+    // Each part alone, so that what decides whether an extension is written does.
+    let usual = Layers::default();
+    let tinted = Vec3::new(0.2, 0.4, 0.6);
+    let medium = Some(Medium { transmittance: tinted });
+    let alone = [
+        Layers { ior: 0.0, ..usual },
+        Layers { specular: 0.5, ..usual },
+        Layers { specular_colour: tinted, ..usual },
+        Layers { specular_texture: layers.specular_texture, ..usual },
+        Layers { transmission: 0.5, ..usual },
+        Layers { transmission: 0.5, medium, ..usual },
+        Layers { coat: 0.5, ..usual },
+        Layers { coat_normal_map: layers.coat_normal_map, coat: 1.0, ..usual },
+        Layers { sheen_colour: tinted, ..usual },
+        Layers { is_unlit: true, ..usual },
+    ];
+    let material = |(k, layers): (usize, &Layers)| Material {
+        coverage: Coverage::Blend { alpha: 0.5 },
+        ..Material::layered(&k.to_string(), tinted, *layers)
+    };
+    let materials: Vec<Material> = std::iter::once(everything).chain(alone.iter().enumerate().map(material)).collect();
+    let mesh = |(k, material): (usize, &Material)| {
+        let mut mesh = Mesh::parallelogram(&format!("square {k}"), DVec3::X * (2 * k) as f64, DVec3::X, DVec3::Y, k);
+        mesh.normals = vec![DVec3::Z; 4];
+        mesh.alphas = vec![1.0, 0.5, 0.25, 0.0];
+        // The first mesh has colours beside alphas. Its tangents are not those of its texture coordinates.
+        if k == 0 {
+            mesh.colours = vec![DVec3::X, DVec3::Y, DVec3::Z, DVec3::ONE];
+        }
+        if material.normal_map.is_some() {
+            mesh.tangents = vec![[DVec4::new(0.6, 0.8, 0.0, -1.0); 3]; 2];
+        }
+        mesh
+    };
+    let meshes = materials.iter().enumerate().map(mesh).collect();
+    let scene = Scene { name: "layers".into(), meshes, materials: materials.clone(), textures, ..Scene::default() };
+    let layout = Layout::new(&scene, 8.0).unwrap();
+    let (folder, _) = write(&scene, &layout, &numbered(&layout), 1.0);
+    let written = read(folder.path(), "scene_lightmap.gltf");
+    assert_same_materials(&written, &scene);
+    assert!(written.warnings.iter().all(|warning| warning.contains("MOZ_lightmap")), "{:?}", written.warnings);
+    for (new, old) in pairs(&written.meshes, &scene.meshes) {
+        for (new_vertex, old_vertex) in pairs(new.triangles.as_flattened(), old.triangles.as_flattened()) {
+            let (new_vertex, old_vertex) = (*new_vertex as usize, *old_vertex as usize);
+            assert_eq!(new.alphas[new_vertex], old.alphas[old_vertex], "{}", old.name);
+            assert_eq!(new.colours[new_vertex], old.colours.get(old_vertex).copied().unwrap_or(DVec3::ONE), "{}", old.name);
+        }
+        let near = |new: &DVec4, old: &DVec4| new.distance(*old) < 1e-6;
+        assert_eq!(new.tangents.len(), old.tangents.len(), "{}", old.name);
+        assert!(new.tangents.as_flattened().iter().zip(old.tangents.as_flattened()).all(|(new, old)| near(new, old)), "{}", old.name);
+    }
+    // Corners of one vertex that have several tangents are told from the texture coordinates when the file is read.
+    let mut torn = scene.clone();
+    torn.meshes[0].tangents[1] = [DVec4::new(1.0, 0.0, 0.0, 1.0); 3];
+    let (folder, _) = write(&torn, &layout_of(&torn), &numbered(&layout_of(&torn)), 1.0);
+    let written = read(folder.path(), "scene_lightmap.gltf");
+    assert!(written.meshes[0].tangents[0][0].distance(scene.meshes[0].tangents[0][0]) > 0.1, "{:?}", written.meshes[0].tangents);
+}
+
+fn layout_of(scene: &Scene) -> Layout {
+    Layout::new(scene, 8.0).unwrap()
+}
+
 #[test]
 fn pictures_hold_what_they_were_given() {
     let mut scene = scene_of(Mesh::parallelogram("wall", DVec3::ZERO, DVec3::X, DVec3::Y, 0));
@@ -598,7 +759,8 @@ fn pictures_hold_what_they_were_given() {
     let texture = extension["index"].as_u64().unwrap() as usize;
     let image = document["textures"][texture]["source"].as_u64().unwrap() as usize;
     assert_eq!(document["images"][image]["uri"], "wall_lightmap.png");
-    assert_eq!(document["extensionsUsed"], serde_json::json!(["MOZ_lightmap"]));
+    // A matt wall is one that reflects nothing.
+    assert_eq!(document["extensionsUsed"], serde_json::json!(["KHR_materials_specular", "MOZ_lightmap"]));
 }
 
 #[test]

@@ -7,14 +7,14 @@ use std::path::Path;
 use std::sync::mpsc;
 use std::time::Duration;
 
-use glam::Vec3;
+use glam::{DVec4, Vec3};
 use image::{ImageFormat, RgbImage};
 use photonmill::plan::scene::ScenePlan;
 use photonmill::plan::sensor::Sensor;
 use photonmill::plan::{Limits, RoomPlan, photons_of};
-use photonmill::scene::Scene;
 use photonmill::scene::geometry::Geometry;
 use photonmill::scene::open_box::open_box;
+use photonmill::scene::{Material, Scene};
 use photonmill::settings::RoomSettings;
 use photonmill::settings::scene::SceneSettings;
 use serde_json::{Value, json};
@@ -45,6 +45,7 @@ fn plan(folder: &Path, name: &str, content: &[u8]) -> Fate {
     let path = folder.join(name);
     std::fs::write(&path, content).unwrap();
     let outcome = Scene::open(path.to_str().unwrap(), false).and_then(|scene| {
+        check_scene(&scene);
         let geometry = Geometry::new(&scene)?;
         let sensor = Sensor::Picture { width: 16, height: 16 };
         let plan = ScenePlan::new(&scene, &geometry, &SceneSettings::default(), sensor, &Limits::of_host())?;
@@ -61,6 +62,35 @@ fn plan(folder: &Path, name: &str, content: &[u8]) -> Fate {
             Fate::Refused(line)
         }
     }
+}
+
+fn check_scene(scene: &Scene) {
+    for mesh in &scene.meshes {
+        let name = &mesh.name;
+        let has_one_each = |count: usize, of: usize| count == 0 || count == of;
+        let (vertices, material) = (mesh.positions.len(), &scene.materials[mesh.material]);
+        for count in [mesh.normals.len(), mesh.uvs[0].len(), mesh.uvs[1].len(), mesh.colours.len(), mesh.alphas.len()] {
+            assert!(has_one_each(count, vertices), "{name}: {count} of {vertices}");
+        }
+        assert!(mesh.alphas.iter().all(|alpha| (0.0..=1.0).contains(alpha)), "{name}: alphas");
+        for (map, tangents) in [(material.normal_map, &mesh.tangents), (material.layers.coat_normal_map, &mesh.coat_tangents)] {
+            assert_eq!(tangents.len(), if map.is_some() { mesh.triangles.len() } else { 0 }, "{name}");
+            let is_unit = |tangent: &DVec4| tangent.truncate().is_normalized() && tangent.w.abs() == 1.0;
+            assert!(tangents.as_flattened().iter().all(is_unit), "{name}: tangents");
+        }
+    }
+    for material in &scene.materials {
+        let Material { name, layers, base_colour, emission, .. } = material;
+        let shares = [layers.metallic, layers.roughness, layers.specular, layers.transmission, layers.coat];
+        let more = [layers.coat_roughness, layers.sheen_roughness].into_iter().chain(base_colour.to_array());
+        let more =
+            more.chain(layers.sheen_colour.to_array()).chain(layers.medium.map_or([1.0; 3], |medium| medium.transmittance.to_array()));
+        assert!(shares.into_iter().chain(more).all(|share| (0.0..=1.0).contains(&share)), "{name}: {layers:?}");
+        let rest = [layers.ior].into_iter().chain(layers.specular_colour.to_array()).chain(emission.to_array());
+        assert!(rest.into_iter().all(|factor| factor.is_finite() && factor >= 0.0), "{name}: {layers:?}");
+        assert!(material.textures().all(|used| used.texture < scene.textures.len() && used.uv_set < 2), "{name}");
+    }
+    assert!(scene.textures.iter().all(|texture| texture.texels.count() == texture.width as usize * texture.height as usize));
 }
 
 fn check_records(geometry: &Geometry) {
@@ -105,7 +135,8 @@ fn assert_refused(what: &str, value: &Value) {
     assert!(matches!(fate, Fate::Refused(_)), "{what}: {fate:?}");
 }
 
-/// The square by hand with more of everything: two triangles that shine through a texture, and glass, under a lamp of each kind.
+/// The square by hand with more of everything: two triangles that shine through a texture, and glass, under a lamp of each kind,
+/// and all that a material may have.
 fn square() -> Value {
     square_with([0., 0., 1., 0., 1., 1., 0., 1.])
 }
@@ -117,23 +148,45 @@ fn square_with(coordinates: [f32; 8]) -> Value {
     bytes[96..128].copy_from_slice(&floats(&coordinates));
     let start = bytes.len();
     bytes.extend(&png);
+    bytes.resize(bytes.len().next_multiple_of(4), 0);
+    let tangents_start = bytes.len();
+    bytes.extend(floats(&[0.6, 0.8, 0.0, 1.0].repeat(4)));
     let mut value = gltf_file::square();
     set_buffer(&mut value, &bytes);
     let add = |list: &mut Value, item: Value| list.as_array_mut().unwrap().push(item);
     value["nodes"][3]["rotation"] = json!([0, 0.6, 0, 0.8]);
     value["meshes"][0]["primitives"][0]["mode"] = json!(4);
     add(&mut value["meshes"][0]["primitives"], json!({"attributes": {"POSITION": 0, "TEXCOORD_1": 2}, "material": 1, "mode": 5}));
-    value["materials"][0]["emissiveTexture"] = json!({"index": 0});
+    let turned = json!({"index": 0, "extensions": {"KHR_texture_transform": {"offset": [0, 1], "rotation": 0.5, "scale": [2, 1]}}});
+    let glow = &mut value["materials"][0];
+    glow["emissiveTexture"] = json!({"index": 0});
+    glow["normalTexture"] = turned.clone();
+    glow["alphaMode"] = json!("BLEND");
+    glow["extensions"]["KHR_materials_clearcoat"] = json!({"clearcoatFactor": 0.5, "clearcoatNormalTexture": {"index": 0}});
+    glow["extensions"]["KHR_materials_sheen"] = json!({"sheenColorFactor": [1, 0, 0.5], "sheenRoughnessTexture": turned});
     add(
         &mut value["materials"],
-        json!({"name": "glass", "doubleSided": true, "extensions": {
-            "KHR_materials_ior": {"ior": 1.5}, "KHR_materials_transmission": {"transmissionFactor": 1}},
+        json!({"name": "glass", "doubleSided": true, "alphaMode": "MASK", "alphaCutoff": 0.25, "extensions": {
+            "KHR_materials_ior": {"ior": 1.5}, "KHR_materials_transmission": {"transmissionFactor": 1},
+            "KHR_materials_volume": {"thicknessFactor": 1, "attenuationDistance": 2, "attenuationColor": [1, 0.5, 0]},
+            "KHR_materials_specular": {"specularFactor": 0.5, "specularColorTexture": {"index": 0}}},
          "pbrMetallicRoughness": {"baseColorTexture": {"index": 0, "texCoord": 1}, "roughnessFactor": 0.3}}),
     );
+    add(
+        &mut value["materials"],
+        json!({"name": "old", "extensions": {"KHR_materials_pbrSpecularGlossiness": {
+            "diffuseFactor": [1, 1, 1, 1], "specularGlossinessTexture": {"index": 0}, "glossinessFactor": 0.5}}}),
+    );
+    add(&mut value["materials"], json!({"name": "sign", "extensions": {"KHR_materials_unlit": {}}}));
+    // Tangents are colours as well.
+    let attributes = &mut value["meshes"][0]["primitives"][0]["attributes"];
+    (attributes["TANGENT"], attributes["COLOR_0"]) = (json!(4), json!(4));
+    add(&mut value["accessors"], json!({"bufferView": 5, "componentType": 5126, "count": 4, "type": "VEC4"}));
     value["textures"] = json!([{"source": 0, "sampler": 0}]);
     value["samplers"] = json!([{"wrapS": 33071, "wrapT": 33648}]);
     value["images"] = json!([{"bufferView": 4, "mimeType": "image/png"}]);
     add(&mut value["bufferViews"], json!({"buffer": 0, "byteOffset": start, "byteLength": png.len()}));
+    add(&mut value["bufferViews"], json!({"buffer": 0, "byteOffset": tangents_start, "byteLength": 64}));
     value
 }
 
@@ -191,10 +244,14 @@ fn mutated_values_of_a_file_by_hand_are_planned_or_refused() {
     });
 }
 
-/// What Blender wrote: JSON and binary part.
+/// What Blender wrote: JSON and binary part; with a normal map on every material.
 fn blender() -> (Value, Vec<u8>) {
     let (text, binary) = parts(BLENDER).unwrap();
-    (serde_json::from_slice(text).unwrap(), binary.to_vec())
+    let mut value: Value = serde_json::from_slice(text).unwrap();
+    for material in value["materials"].as_array_mut().unwrap() {
+        material["normalTexture"] = json!({"index": 0});
+    }
+    (value, binary.to_vec())
 }
 
 #[test]
@@ -448,6 +505,14 @@ fn square_with_jpeg(change: impl FnOnce(&mut Vec<u8>)) -> Value {
     value
 }
 
+/// The picture says that it is larger.
+fn claim(jpeg: &mut [u8], width: u16, height: u16) {
+    // Start of frame: marker, length, precision, then height and width.
+    let frame = jpeg.windows(2).position(|marker| marker == [0xff, 0xc0]).unwrap();
+    jpeg[frame + 5..frame + 7].copy_from_slice(&height.to_be_bytes());
+    jpeg[frame + 7..frame + 9].copy_from_slice(&width.to_be_bytes());
+}
+
 /// What the JPEG decoder says of a file that was cut off ends in a line break.
 #[test]
 fn pictures_cut_off_are_refused_in_one_line() {
@@ -462,14 +527,66 @@ fn pictures_cut_off_are_refused_in_one_line() {
     assert!(refused.count() > whole * 3 / 4);
 }
 
+/// A picture is read in several ways, each of which takes memory of its own: all of them count before it is decoded.
+#[test]
+fn every_use_of_a_large_picture_counts() {
+    let fate = |kinds: &[&str], samplers: usize| {
+        let mut value = square_with_jpeg(|jpeg| claim(jpeg, 0x1000, 0x1000));
+        let wraps = [10497, 33071, 33648];
+        value["samplers"] = (0..samplers).map(|k| json!({"wrapS": wraps[k % 3], "wrapT": wraps[k / 3]})).collect();
+        value["textures"] = (0..samplers).map(|k| json!({"source": 0, "sampler": k})).collect();
+        let material = |k: usize| kinds.iter().map(|kind| ((*kind).to_owned(), json!({"index": k}))).collect::<Value>();
+        value["materials"] = (0..samplers.max(2)).map(|k| material(k % samplers)).collect();
+        plan_value(&format!("4096 by 4096 texels as {kinds:?} with {samplers} samplers"), &value)
+    };
+    // Eight are 2^27 texels, and some of those are kept free. Uses that are alike are one.
+    assert_eq!(fate(&["emissiveTexture"], 1), Fate::Planned(3));
+    for (kinds, samplers) in [(&["emissiveTexture"] as &[&str], 8), (&["emissiveTexture", "normalTexture"], 4)] {
+        let Fate::Refused(line) = fate(kinds, samplers) else { panic!("{kinds:?} must be refused") };
+        assert!(line.contains("texels, the most that are read"), "{line}");
+    }
+    assert_memory();
+}
+
+/// A picture as long as may be is a picture.
+#[test]
+fn long_pictures_are_planned() {
+    for (width, height) in [(100_000, 1), (1, 100_000)] {
+        let mut value = square();
+        value["images"][0] = json!({"uri": data_uri("image/png", &encoded(&RgbImage::new(width, height), ImageFormat::Png))});
+        assert_eq!(plan_value(&format!("{width} by {height} texels"), &value), Fate::Planned(3));
+    }
+    assert_memory();
+}
+
+/// Members of the wrong kind are refused, or are as if they said nothing; they end nothing.
+#[test]
+fn members_of_the_wrong_kind_are_refused_or_say_nothing() {
+    let places = [
+        "/materials/0/normalTexture/extensions/KHR_texture_transform",
+        "/materials/0/extensions/KHR_materials_sheen/sheenRoughnessTexture/extensions/KHR_texture_transform",
+        "/materials/0/extensions/KHR_materials_sheen/sheenRoughnessTexture",
+        "/materials/0/extensions/KHR_materials_clearcoat",
+        "/materials/0/extensions/KHR_materials_clearcoat/clearcoatNormalTexture",
+        "/materials/1/extensions/KHR_materials_volume",
+        "/materials/1/extensions/KHR_materials_volume/attenuationColor",
+        "/materials/2/extensions/KHR_materials_pbrSpecularGlossiness",
+        "/materials/3/extensions/KHR_materials_unlit",
+        "/materials/0/extensions",
+    ];
+    for place in places {
+        for new in [json!([]), json!({}), json!(null), json!("much"), json!(-1), json!([1, 2, 3, 4, 5, 6, 7, 8]), json!({"index": 99})] {
+            let mut value = square();
+            *value.pointer_mut(place).unwrap() = new.clone();
+            plan_value(&format!("{new} at {place}"), &value);
+        }
+    }
+}
+
 /// A few bytes that claim a picture whose numbers would take 3 GiB: it is refused for its size before it is unfolded.
 #[test]
 fn pictures_that_claim_too_much_are_refused_before_they_are_decoded() {
-    let value = square_with_jpeg(|jpeg| {
-        // Start of frame: marker, length, precision, then height and width.
-        let frame = jpeg.windows(2).position(|marker| marker == [0xff, 0xc0]).unwrap();
-        jpeg[frame + 5..frame + 9].copy_from_slice(&[0x40, 0, 0x40, 0]);
-    });
+    let value = square_with_jpeg(|jpeg| claim(jpeg, 0x4000, 0x4000));
     let Fate::Refused(line) = plan_value("16384 by 16384 texels", &value) else { panic!("must be refused") };
     assert!(line.contains("texels"), "{line}");
     assert_memory();

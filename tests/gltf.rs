@@ -3,7 +3,9 @@
 
 use crate::common::gltf_file::{data_uri, encoded, floats, set_buffer, square, square_buffer};
 use crate::common::prelude::*;
-use image::{ImageFormat, RgbImage};
+use image::{ImageFormat, RgbImage, Rgba, RgbaImage};
+use photonmill::scene::material::{Coverage, Layers, Medium, NormalMap};
+use photonmill::scene::texture::Filter;
 use serde_json::{Value, json};
 
 struct File {
@@ -47,7 +49,8 @@ fn a_file_says_what_the_scene_holds() {
         assert_eq!((mesh.normals[0], mesh.normal(0), mesh.area(0)), (DVec3::Z, DVec3::Z, 2.0));
         assert_eq!(mesh.triangles, [[0, 1, 2], [0, 2, 3]]);
         let material = &scene.materials[mesh.material];
-        assert_eq!((material.surface, material.base_colour), (Surface::Lambert, Vec3::new(0.5, 0.25, 0.125)));
+        assert_eq!((material.surface, material.base_colour), (Surface::Layered, Vec3::new(0.5, 0.25, 0.125)));
+        assert_eq!(material.layers, Layers { metallic: 0.0, ..Layers::default() });
         // Factor times strength is radiance, untouched.
         assert_eq!(material.emission, Vec3::new(8.0, 4.0, 2.0));
         assert_eq!((scene.cameras[0].name.as_str(), scene.cameras[0].eye), ("eye", DVec3::new(0.0, 0.0, 5.0)));
@@ -94,18 +97,23 @@ fn textures_are_read_as_linear_values() {
 #[test]
 fn what_is_left_out_is_named_once() {
     let mut value = square();
-    value["materials"][0]["alphaMode"] = json!("BLEND");
-    value["materials"].as_array_mut().unwrap().push(json!({"alphaMode": "MASK"}));
+    with_image(&mut value, &data_uri("image/png", &encoded(&RgbImage::new(1, 1), ImageFormat::Png)));
+    value["materials"][0]["occlusionTexture"] = json!({"index": 0});
+    let iridescence =
+        json!({"KHR_materials_iridescence": {"iridescenceFactor": 1}, "KHR_materials_volume": {"thicknessTexture": {"index": 0}}});
+    value["materials"].as_array_mut().unwrap().push(json!({"occlusionTexture": {"index": 0}, "extensions": iridescence}));
     value["animations"] = json!([{"channels": [], "samplers": []}]);
-    value["extensionsUsed"].as_array_mut().unwrap().push(json!("KHR_materials_clearcoat"));
+    value["extensionsUsed"].as_array_mut().unwrap().extend([json!("KHR_materials_iridescence"), json!("EXT_unheard_of")]);
     value["cameras"][0] = json!({"type": "orthographic", "orthographic": {"xmag": 1, "ymag": 1, "zfar": 9, "znear": 0.1}});
     value["meshes"][0]["primitives"][0]["attributes"]["COLOR_1"] = json!(1);
     let scene = load(&value).unwrap();
     let [warning] = scene.warnings.as_slice() else { panic!("{:?}", scene.warnings) };
     let wanted = [
-        "transparency by alpha: material 'glow', material 'material 1'",
+        "occlusion textures (what they guess is computed): material 'glow', material 'material 1'",
+        "thickness textures (rays measure the thickness): material 'material 1'",
         "animations",
-        "KHR_materials_clearcoat",
+        "the extension KHR_materials_iridescence: material 'material 1'",
+        "the extension EXT_unheard_of",
         "orthographic cameras: camera 'eye'",
         "second sets of vertex colours: mesh 'wall'",
     ];
@@ -114,7 +122,8 @@ fn what_is_left_out_is_named_once() {
     }
 
     // Of many names the first few.
-    let materials: Vec<Value> = (0..40).map(|k| json!({"name": format!("m{k:02}"), "alphaMode": "BLEND"})).collect();
+    let dispersion = json!({"KHR_materials_dispersion": {"dispersion": 1}});
+    let materials: Vec<Value> = (0..40).map(|k| json!({"name": format!("m{k:02}"), "extensions": dispersion})).collect();
     let mut value = square();
     value["materials"] = json!(materials);
     let warnings = load(&value).unwrap().warnings.join(" ");
@@ -290,6 +299,15 @@ fn a_skinned_mesh_follows_its_joints_and_not_its_node() {
     let mirrored = load(&posed).unwrap();
     assert_eq!((mirrored.meshes[0].positions[1], mirrored.meshes[0].normal(0)), (-DVec3::X, DVec3::Z));
 
+    // Weights count as shares of their sum.
+    let mut halves = skinned_square();
+    let weights = add_accessor(&mut halves, &floats(&[0.25, 0.25, 0.0, 0.0].repeat(4)), 5126, 4, "VEC4");
+    let joints = add_accessor(&mut halves, &[0, 1, 0, 0].repeat(4), 5121, 4, "VEC4");
+    halves["meshes"][0]["primitives"][0]["attributes"]["WEIGHTS_0"] = json!(weights);
+    halves["meshes"][0]["primitives"][0]["attributes"]["JOINTS_0"] = json!(joints);
+    halves["nodes"][6]["translation"] = json!([0, 3, 2]);
+    assert_eq!(load(&halves).unwrap().meshes[0].positions, corners.map(|corner| corner + 1.5 * DVec3::Y));
+
     for path in ["/nodes/0/skin", "/skins/0/joints/1", "/skins/0/inverseBindMatrices"] {
         let mut value = skinned_square();
         *value.pointer_mut(path).unwrap() = json!(99);
@@ -333,52 +351,34 @@ fn morph_targets_shift_vertices_by_their_weights_at_rest() {
     // The joint's own 7 m are not scaled, the target's 2 m are.
     assert_eq!(load(&skinned).unwrap().meshes[0].positions[0].z, 7.0 + 3.0 * (2.0 - 7.0));
 
+    for weights in [json!([1.0]), json!([1.0, 0.0, 0.5])] {
+        value["nodes"][0]["weights"] = weights;
+        let scene = load(&value).unwrap();
+        assert_eq!(scene.meshes[0].positions[0].z, 3.0 + 2.0 * 2.0);
+        let [warning] = &scene.warnings[..] else { panic!("{:?}", scene.warnings) };
+        assert!(warning.contains("weights that are not as many as morph targets") && warning.contains("mesh 'wall'"), "{warning}");
+    }
+    value["nodes"][0]["weights"] = json!([1.0, -0.25]);
+
     let few = add_accessor(&mut value, &floats(&[0.0; 9]), 5126, 3, "VEC3");
     value["meshes"][0]["primitives"][0]["targets"] = json!([{"POSITION": few}, {}]);
     assert_refused(&value, &["mesh 'wall'", "3 positions in a morph target for 4 vertices"]);
 }
 
-/// Integers stand for themselves, or for parts of their range.
-/// Most files have their metalness in a texture, and a factor of 1.
-#[test]
-fn metalness_and_roughness_of_textures_count_by_their_mean() {
-    for (codes, expected) in [
-        ([[0, 255, 0], [0, 255, 0]], Surface::Lambert),
-        ([[255, 0, 255], [0, 0, 200]], Surface::Mirror),
-        // Alpha is a quarter.
-        ([[0, 255, 255], [7, 0, 255]], Surface::Glossy { exponent: 30.0 }),
-    ] {
-        let picture = RgbImage::from_fn(2, 1, |i, _| image::Rgb(codes[i as usize]));
-        let mut value = square();
-        with_image(&mut value, &data_uri("image/png", &encoded(&picture, ImageFormat::Png)));
-        value["materials"][0]["pbrMetallicRoughness"] = json!({"metallicRoughnessTexture": {"index": 0}});
-        let scene = load(&value).unwrap();
-        assert_eq!(scene.materials[0].surface, expected);
-        assert!(scene.textures.is_empty() && scene.warnings[0].contains("taken as their mean"), "{:?}", scene.warnings);
-    }
-    // A picture that cannot be read is no reason to refuse a file that needs it for this alone.
-    let mut value = square();
-    with_image(&mut value, &data_uri("image/png", b"no picture"));
-    value["materials"][0]["pbrMetallicRoughness"] = json!({"metallicRoughnessTexture": {"index": 0}, "metallicFactor": 0.25});
-    let scene = load(&value).unwrap();
-    assert_eq!(scene.materials[0].surface, Surface::Lambert);
-    let [warning] = &scene.warnings[..] else { panic!("{:?}", scene.warnings) };
-    assert!(warning.contains("textures that cannot be read (the factors alone count)") && !warning.contains("mean"), "{warning}");
-}
-
-/// A surface without its coat is a surface still.
+/// A surface without its film is a surface still.
 #[test]
 fn what_a_file_needs_for_looks_alone_is_left_out_by_name() {
     let mut value = square();
-    for extension in ["KHR_materials_clearcoat", "KHR_materials_iridescence"] {
+    for extension in ["KHR_materials_anisotropy", "KHR_materials_iridescence"] {
         value["extensionsUsed"].as_array_mut().unwrap().push(json!(extension));
     }
     value["extensionsRequired"] = json!(["KHR_materials_iridescence"]);
     let scene = load(&value).unwrap();
     let [warning] = &scene.warnings[..] else { panic!("{:?}", scene.warnings) };
-    assert!(warning.contains("the extension KHR_materials_clearcoat; the extension KHR_materials_iridescence"), "{warning}");
+    assert!(warning.contains("the extension KHR_materials_anisotropy; the extension KHR_materials_iridescence"), "{warning}");
 }
 
+/// Integers stand for themselves, or for parts of their range.
 #[test]
 fn quantized_meshes_are_read() {
     let mut value = square();
@@ -395,7 +395,18 @@ fn quantized_meshes_are_read() {
     value["meshes"][0]["primitives"][0]["attributes"]["POSITION"] = json!(positions);
     value["meshes"][0]["primitives"][0]["attributes"]["TEXCOORD_0"] = json!(uvs);
     value["nodes"][0]["scale"] = json!([0.01, 0.01, 0.01]);
-    let mesh = load(&value).unwrap().meshes.remove(0);
+    let mut scene = load(&value).unwrap();
+    assert!(scene.warnings.is_empty(), "{:?}", scene.warnings);
+    let mesh = scene.meshes.remove(0);
+    value["extensionsUsed"] = json!(["KHR_lights_punctual", "KHR_materials_emissive_strength"]);
+    value.as_object_mut().unwrap().remove("extensionsRequired");
+    let scene = load(&value).unwrap();
+    assert!(
+        scene.warnings[0].contains("KHR_mesh_quantization is not named") && scene.warnings[0].contains("mesh 'wall'"),
+        "{:?}",
+        scene.warnings
+    );
+    assert_eq!(scene.meshes[0].positions, mesh.positions);
     assert!((mesh.positions[3] - DVec3::new(1.0, 5.0, 2.95)).length() < 1e-7, "{:?}", mesh.positions);
     assert_eq!(mesh.uvs[0], [[0.0, 0.0], [1.0, 0.0], [1.0, 1.0], [0.0, 1.0]].map(DVec2::from));
 }
@@ -410,6 +421,18 @@ fn vertex_colours_are_read() {
     let scene = load(&value).unwrap();
     assert_eq!(scene.warnings, Vec::<String>::new());
     assert_eq!(scene.meshes[0].colours, [DVec3::new(1.0, 0.0, 0.2f32.into()), DVec3::Y, DVec3::Z, DVec3::ONE]);
+    assert_eq!(scene.meshes[0].alphas, [0.0, 0.0, 1.0, 1.0]);
+
+    // Alpha that is 1 everywhere is none.
+    let mut whole = value.clone();
+    let colours = add_accessor(&mut whole, &floats(&[0.5, 0.25, 0.125, 1.0].repeat(4)), 5126, 4, "VEC4");
+    whole["meshes"][0]["primitives"][0]["attributes"]["COLOR_0"] = json!(colours);
+    assert!(load(&whole).unwrap().meshes[0].alphas.is_empty());
+    for (bad, named) in [(1.5, "alpha 1.5; each must be from 0 to 1"), (f32::NAN, "NaN")] {
+        let colours = add_accessor(&mut whole, &floats(&[0.5, 0.25, 0.125, bad].repeat(4)), 5126, 4, "VEC4");
+        whole["meshes"][0]["primitives"][0]["attributes"]["COLOR_0"] = json!(colours);
+        assert_refused(&whole, &["mesh 'wall'", named]);
+    }
 
     let mut bright = value.clone();
     let colours = add_accessor(&mut bright, &floats(&[0.5, 0.5, 1.5].repeat(4)), 5126, 4, "VEC3");
@@ -428,6 +451,7 @@ fn texture_coordinates_are_transformed() {
     with_image(&mut value, &data_uri("image/png", &png));
     value["extensionsUsed"].as_array_mut().unwrap().push(json!("KHR_texture_transform"));
     value["extensionsRequired"] = json!(["KHR_texture_transform"]);
+    value["meshes"][0]["primitives"][0]["attributes"]["TEXCOORD_1"] = json!(2);
     let transform = json!({"offset": [0.5, 0.25], "rotation": FRAC_PI_2, "scale": [2.0, 3.0], "texCoord": 1});
     value["materials"][0]["pbrMetallicRoughness"]["baseColorTexture"]["extensions"] = json!({"KHR_texture_transform": transform});
     let scene = load(&value).unwrap();
@@ -588,9 +612,10 @@ fn a_blender_file_loads() {
         let mesh = scene.meshes.iter().find(|candidate| candidate.name.starts_with(mesh)).unwrap_or_else(|| panic!("no mesh {mesh}"));
         &scene.materials[mesh.material]
     };
-    assert_eq!(material_of("mirror").surface, Surface::Mirror);
-    let Surface::Dielectric { ior } = material_of("glass").surface else { panic!("{:?}", material_of("glass")) };
-    assert!((ior - 1.45).abs() < 1e-6, "{ior}");
+    assert_eq!((material_of("mirror").layers.metallic, material_of("mirror").layers.roughness), (1.0, 0.0));
+    let glass = material_of("glass").layers;
+    assert_eq!((glass.transmission, glass.roughness, glass.medium), (1.0, 0.0, None));
+    assert!((glass.ior - 1.45).abs() < 1e-6, "{glass:?}");
     assert!(material_of("tiles").base_colour_texture.is_some());
     assert!((material_of("panel").emission - Vec3::new(12.0, 9.6, 7.2)).abs().max_element() < 1e-4, "{:?}", material_of("panel"));
     assert_eq!(scene.cameras[0].name, "eye");
@@ -601,4 +626,452 @@ fn a_blender_file_loads() {
     assert!(kinds.iter().any(|kind| matches!(kind, LightKind::Spot { .. })), "{kinds:?}");
     assert!(kinds.iter().any(|kind| matches!(kind, LightKind::Directional { .. })), "{kinds:?}");
     assert_eq!(scene.triangle_count(), 3 * 2 + 2 * (32 * 16 * 2 - 2 * 32));
+}
+
+fn rgba_png(width: u32, height: u32, of: impl Fn(u32, u32) -> [u8; 4]) -> String {
+    let mut bytes = std::io::Cursor::new(Vec::new());
+    RgbaImage::from_fn(width, height, |i, j| Rgba(of(i, j))).write_to(&mut bytes, ImageFormat::Png).unwrap();
+    data_uri("image/png", &bytes.into_inner())
+}
+
+/// The square with one material, textures 0 to 15 of one picture each, and no warning of extensions.
+fn with_material(material: Value) -> Value {
+    let mut value = square();
+    value["images"] = (0..16u8).map(|k| json!({"uri": rgba_png(1, 1, |_, _| [k, 2 * k, 3 * k, 200])})).collect();
+    value["textures"] = (0..16).map(|k| json!({"source": k})).collect();
+    value["materials"] = json!([material]);
+    value["extensionsUsed"] = json!(["KHR_lights_punctual"]);
+    value
+}
+
+/// Every factor and every texture is where it belongs, colours by the sRGB curve and numbers as they are.
+#[test]
+fn everything_of_a_material_is_read() {
+    let transform = json!({"KHR_texture_transform": {"offset": [0.5, 0.25], "rotation": 0.75, "scale": [2, -3], "texCoord": 1}});
+    let texture = |k: usize| json!({"index": k, "extensions": transform});
+    let scene = load(&with_material(json!({
+        "name": "all", "doubleSided": true, "alphaMode": "BLEND", "emissiveFactor": [0.5, 0.25, 1.0], "emissiveTexture": texture(0),
+        "normalTexture": {"index": 1, "scale": -0.5, "extensions": transform},
+        "pbrMetallicRoughness": {"baseColorFactor": [0.125, 0.25, 0.5, 0.75], "baseColorTexture": texture(2),
+            "metallicFactor": 0.25, "roughnessFactor": 0.75, "metallicRoughnessTexture": texture(3)},
+        "extensions": {
+            "KHR_materials_emissive_strength": {"emissiveStrength": 4},
+            "KHR_materials_ior": {"ior": 1.25},
+            "KHR_materials_specular": {"specularFactor": 0.5, "specularTexture": texture(4),
+                "specularColorFactor": [0.25, 3.0, 0.75], "specularColorTexture": texture(5)},
+            "KHR_materials_transmission": {"transmissionFactor": 0.625, "transmissionTexture": texture(6)},
+            "KHR_materials_volume": {"thicknessFactor": 2, "attenuationDistance": 0.5, "attenuationColor": [0.5, 1.0, 0.0]},
+            "KHR_materials_clearcoat": {"clearcoatFactor": 0.875, "clearcoatTexture": texture(7), "clearcoatRoughnessFactor": 0.375,
+                "clearcoatRoughnessTexture": texture(8), "clearcoatNormalTexture": {"index": 9, "scale": 2, "extensions": transform}},
+            "KHR_materials_sheen": {"sheenColorFactor": [0.25, 0.5, 1.0], "sheenColorTexture": texture(10),
+                "sheenRoughnessFactor": 0.125, "sheenRoughnessTexture": texture(11)}
+        }
+    })))
+    .unwrap();
+    // The square has no second set.
+    let [warning] = &scene.warnings[..] else { panic!("{:?}", scene.warnings) };
+    assert!(warning.contains("normal maps on meshes without texture coordinates: material 'all' on mesh 'wall'"), "{warning}");
+    assert!(warning.contains("(its textures have their value at 0 0): material 'all' on mesh 'wall'"), "{warning}");
+
+    let material = &scene.materials[0];
+    let used = |texture: Option<TextureUse>, k: u8, is_colour: bool| {
+        let TextureUse { texture, uv_set, transform } = texture.unwrap();
+        let codes = vec![[k, 2 * k, 3 * k, 200]];
+        assert_eq!(scene.textures[texture].texels, if is_colour { Texels::Srgb(codes) } else { Texels::Linear(codes) }, "{k}");
+        let (scale, offset) = (DVec2::new(2.0, -3.0), DVec2::new(0.5, 0.25));
+        assert_eq!((uv_set, transform), (1, UvTransform { scale, rotation: 0.75, offset }), "{k}");
+    };
+    let layers = material.layers;
+    let normal_map = |map: Option<NormalMap>, k: u8, scale: f32| {
+        assert_eq!(map.unwrap().scale, scale);
+        used(map.map(|map| map.texture), k, false);
+    };
+    used(material.emission_texture, 0, true);
+    normal_map(material.normal_map, 1, -0.5);
+    used(material.base_colour_texture, 2, true);
+    used(layers.metallic_roughness_texture, 3, false);
+    used(layers.specular_texture, 4, false);
+    used(layers.specular_colour_texture, 5, true);
+    used(layers.transmission_texture, 6, false);
+    used(layers.coat_texture, 7, false);
+    used(layers.coat_roughness_texture, 8, false);
+    normal_map(layers.coat_normal_map, 9, 2.0);
+    used(layers.sheen_colour_texture, 10, true);
+    used(layers.sheen_roughness_texture, 11, false);
+    assert_eq!((scene.textures.len(), material.textures().count()), (12, 12));
+
+    assert_eq!((material.surface, material.two_sided, material.coverage), (Surface::Layered, true, Coverage::Blend { alpha: 0.75 }));
+    assert_eq!((material.base_colour, material.emission), (Vec3::new(0.125, 0.25, 0.5), Vec3::new(2.0, 1.0, 4.0)));
+    // Half is left after half a metre.
+    assert_eq!(layers.medium, Some(Medium { transmittance: Vec3::new(0.25, 1.0, 0.0) }));
+    let factors = [layers.metallic, layers.roughness, layers.ior, layers.specular, layers.transmission, layers.coat];
+    assert_eq!(factors, [0.25, 0.75, 1.25, 0.5, 0.625, 0.875]);
+    assert_eq!((layers.coat_roughness, layers.sheen_roughness, layers.is_unlit), (0.375, 0.125, false));
+    assert_eq!((layers.specular_colour, layers.sheen_colour), (Vec3::new(0.25, 3.0, 0.75), Vec3::new(0.25, 0.5, 1.0)));
+
+    // What this mesh has no coordinates for is taken from its own copy of the material alone.
+    let own = &scene.materials[scene.meshes[0].material];
+    let without = Material { normal_map: None, layers: Layers { coat_normal_map: None, ..layers }, ..material.clone() };
+    assert_eq!(*own, without);
+}
+
+/// What a material leaves out has the specification's defaults.
+#[test]
+fn materials_that_say_nothing_have_the_defaults() {
+    let scene = load(&with_material(json!({"name": "plain"}))).unwrap();
+    assert_eq!(scene.materials[0], Material::layered("plain", Vec3::ONE, Layers::default()));
+    let empty = ["volume", "specular", "clearcoat", "sheen", "ior", "transmission"];
+    let empty: serde_json::Map<String, Value> = empty.iter().map(|name| (format!("KHR_materials_{name}"), json!({}))).collect();
+    let scene = load(&with_material(json!({"name": "empty", "extensions": empty}))).unwrap();
+    assert_eq!(scene.materials[0], Material::layered("empty", Vec3::ONE, Layers::default()));
+    assert!(scene.warnings.is_empty(), "{:?}", scene.warnings);
+
+    let mut value = with_material(json!({}));
+    value["meshes"][0]["primitives"][0].as_object_mut().unwrap().remove("material");
+    let scene = load(&value).unwrap();
+    let default = &scene.materials[scene.meshes[0].material];
+    assert_eq!(*default, Material::layered("default", Vec3::ONE, Layers::default()));
+    assert_eq!((default.layers.metallic, default.layers.roughness, default.two_sided), (1.0, 1.0, false));
+}
+
+/// A thickness above 0 makes a solid; without it the surface is a thin wall.
+#[test]
+fn volumes_have_a_transmittance_a_metre() {
+    let medium = |volume: Value, transmission: f32| {
+        let scene = load(&with_material(json!({"name": "jar", "extensions": {
+            "KHR_materials_volume": volume, "KHR_materials_transmission": {"transmissionFactor": transmission}}})))
+        .unwrap();
+        (scene.materials[0].layers.medium.map(|medium| medium.transmittance), scene.warnings.join(" "))
+    };
+    let grey = |value: f32| Some(Vec3::splat(value));
+    for (volume, transmittance) in [
+        (json!({}), None),
+        (json!({"thicknessFactor": 0, "attenuationColor": [0.5, 0.5, 0.5], "attenuationDistance": 1}), None),
+        (json!({"thicknessFactor": 0.01}), grey(1.0)),
+        // Without a distance nothing is taken.
+        (json!({"thicknessFactor": 1, "attenuationColor": [0.5, 0.5, 0.5]}), grey(1.0)),
+        (json!({"thicknessFactor": 1, "attenuationColor": [0.25, 0.25, 0.25], "attenuationDistance": 2}), grey(0.5)),
+        (json!({"thicknessFactor": 1, "attenuationColor": [0, 0, 0], "attenuationDistance": 2}), grey(0.0)),
+    ] {
+        assert_eq!(medium(volume.clone(), 1.0), (transmittance, String::new()), "{volume}");
+    }
+    assert_eq!(medium(json!({"thicknessFactor": 1}), 0.0).0, None);
+    // No number of single precision is left after a metre, but the medium is not black.
+    let (transmittance, warning) =
+        medium(json!({"thicknessFactor": 1, "attenuationColor": [0.5, 1, 0], "attenuationDistance": 0.001}), 1.0);
+    assert_eq!(transmittance, Some(Vec3::new(f32::MIN_POSITIVE, 1.0, 0.0)));
+    assert!(warning.contains("less than 1e-38") && warning.contains("material 'jar'"), "{warning}");
+}
+
+#[test]
+fn unlit_materials_have_a_base_colour_and_nothing_else() {
+    let mut value =
+        with_material(json!({"name": "sign", "alphaMode": "MASK", "emissiveFactor": [1, 1, 1], "emissiveTexture": {"index": 3},
+        "normalTexture": {"index": 4},
+        "pbrMetallicRoughness": {"baseColorFactor": [0.5, 0.25, 1, 0.75], "baseColorTexture": {"index": 2}, "metallicFactor": 0.5},
+        "extensions": {"KHR_materials_unlit": {}, "KHR_materials_clearcoat": {"clearcoatFactor": 1}}}));
+    value["extensionsRequired"] = json!(["KHR_materials_unlit"]);
+    let scene = load(&value).unwrap();
+    let base_colour_texture = Some(TextureUse::of(0, 0));
+    let coverage = Coverage::Mask { alpha: 0.75, cutoff: 0.5 };
+    let layers = Layers { is_unlit: true, ..Layers::default() };
+    let unlit = Material { base_colour_texture, coverage, ..Material::layered("sign", Vec3::new(0.5, 0.25, 1.0), layers) };
+    assert_eq!((scene.materials[0].clone(), scene.textures.len()), (unlit, 1));
+}
+
+/// KHR_materials_pbrSpecularGlossiness is a dielectric whose reflectance along the normal is its specular colour.
+#[test]
+fn specular_and_glossiness_have_their_equivalent() {
+    let material = |glossiness: Value| {
+        let mut value = with_material(json!({"name": "old", "pbrMetallicRoughness": {"baseColorFactor": [1, 0, 0, 1]},
+            "extensions": {"KHR_materials_pbrSpecularGlossiness": glossiness}}));
+        value["images"][1] = json!({"uri": rgba_png(2, 1, |i, _| [10, 20, 30, [0, 100][i as usize]])});
+        value["extensionsRequired"] = json!(["KHR_materials_pbrSpecularGlossiness"]);
+        load(&value).unwrap()
+    };
+    let scene = material(json!({"diffuseFactor": [0.5, 0.25, 0.125, 0.5], "specularFactor": [0.25, 0.5, 0.75], "glossinessFactor": 0.75}));
+    let layers = Layers { metallic: 0.0, roughness: 0.25, ior: 0.0, specular_colour: Vec3::new(0.25, 0.5, 0.75), ..Layers::default() };
+    assert_eq!(scene.materials[0], Material::layered("old", Vec3::new(0.5, 0.25, 0.125), layers));
+
+    let scene = material(json!({"diffuseTexture": {"index": 0}, "specularGlossinessTexture": {"index": 1}, "glossinessFactor": 0.5}));
+    let layers = scene.materials[0].layers;
+    assert_eq!((layers.roughness, layers.metallic, layers.specular_colour), (1.0, 0.0, Vec3::ONE));
+    let texels = |used: Option<TextureUse>| scene.textures[used.unwrap().texture].texels.clone();
+    assert_eq!(texels(scene.materials[0].base_colour_texture), Texels::Srgb(vec![[0, 0, 0, 200]]));
+    assert_eq!(texels(layers.specular_colour_texture), Texels::Srgb(vec![[10, 20, 30, 0], [10, 20, 30, 100]]));
+    // 1 - glossiness, of which the factor is a part.
+    assert_eq!(texels(layers.metallic_roughness_texture), Texels::Linear(vec![[255, 255, 255, 255], [255, 205, 255, 255]]));
+}
+
+#[test]
+fn alpha_modes_are_read() {
+    for (mode, coverage) in [
+        (json!({}), Coverage::Whole),
+        (json!({"alphaMode": "OPAQUE", "alphaCutoff": 0.9}), Coverage::Whole),
+        (json!({"alphaMode": "MASK"}), Coverage::Mask { alpha: 0.25, cutoff: 0.5 }),
+        (json!({"alphaMode": "MASK", "alphaCutoff": 1.5}), Coverage::Mask { alpha: 0.25, cutoff: 1.5 }),
+        (json!({"alphaMode": "BLEND"}), Coverage::Blend { alpha: 0.25 }),
+    ] {
+        let mut material = mode.clone();
+        material["pbrMetallicRoughness"] = json!({"baseColorFactor": [1, 1, 1, 0.25], "baseColorTexture": {"index": 3}});
+        let scene = load(&with_material(material)).unwrap();
+        assert_eq!(scene.materials[0].coverage, coverage, "{mode}");
+        let texture = scene.materials[0].base_colour_texture.unwrap().texture;
+        assert!((scene.textures[texture].texels.at(0).w - 200.0 / 255.0).abs() < 1e-6);
+    }
+}
+
+/// A picture is one texture for each way in which it is read.
+#[test]
+fn pictures_are_shared_where_they_are_read_alike() {
+    let mut value =
+        with_material(json!({"pbrMetallicRoughness": {"baseColorTexture": {"index": 0}, "metallicRoughnessTexture": {"index": 0}},
+        "emissiveTexture": {"index": 1}, "extensions": {"KHR_materials_specular": {"specularTexture": {"index": 2}}}}));
+    // Two samplers that say the same, and one that does not.
+    value["samplers"] = json!([{"wrapS": 33071}, {"wrapS": 33071, "minFilter": 9729}, {"magFilter": 9728, "wrapS": 33071}]);
+    value["textures"] = json!([{"source": 5, "sampler": 0}, {"source": 5, "sampler": 1}, {"source": 5, "sampler": 2}]);
+    let scene = load(&value).unwrap();
+    let material = &scene.materials[0];
+    let place = |used: Option<TextureUse>| used.unwrap().texture;
+    let (base, glow) = (place(material.base_colour_texture), place(material.emission_texture));
+    let (rough, specular) = (place(material.layers.metallic_roughness_texture), place(material.layers.specular_texture));
+    assert_eq!((scene.textures.len(), base, [base, rough, specular].iter().collect::<BTreeSet<_>>().len()), (3, glow, 3));
+    assert!(scene.textures.iter().all(|texture| texture.wrap == [Wrap::Clamp, Wrap::Repeat]));
+    assert_eq!([base, rough, specular].map(|place| scene.textures[place].filter), [Filter::Bilinear, Filter::Bilinear, Filter::Nearest]);
+    let codes = vec![[5, 10, 15, 200]];
+    assert_eq!((&scene.textures[base].texels, &scene.textures[rough].texels), (&Texels::Srgb(codes.clone()), &Texels::Linear(codes)));
+}
+
+/// Factors outside their range are refused, with the material, the value and the range.
+#[test]
+fn factors_out_of_range_are_refused() {
+    let pbr = |name: &str, value: Value| json!({"name": "odd", "pbrMetallicRoughness": {name: value}});
+    let with = |extension: &str, name: &str, value: Value| json!({"name": "odd", "extensions": {format!("KHR_materials_{extension}"): {name: value}}});
+    let gloss = "pbrSpecularGlossiness";
+    let cases: &[(Value, &[&str])] = &[
+        (pbr("metallicFactor", json!(1.5)), &["metallic factor 1.5", "from 0 to 1"]),
+        (pbr("roughnessFactor", json!(-0.5)), &["roughness factor -0.5", "from 0 to 1"]),
+        (pbr("baseColorFactor", json!([1, 1, 1, 1.25])), &["alpha 1.25", "from 0 to 1"]),
+        (pbr("baseColorFactor", json!([1, 1e40, 1, 1])), &["base colour 1 inf 1", "from 0 to 1"]),
+        (json!({"name": "odd", "alphaMode": "MASK", "alphaCutoff": -1}), &["alpha cutoff -1", "0 or more"]),
+        (with("ior", "ior", json!(0.5)), &["index of refraction 0.5", "must be 0, or from 1 to 100"]),
+        (with("ior", "ior", json!(-1)), &["index of refraction -1"]),
+        (with("transmission", "transmissionFactor", json!(2)), &["transmission factor 2", "from 0 to 1"]),
+        (with("volume", "thicknessFactor", json!(-1)), &["thickness -1", "0 or more"]),
+        (with("volume", "attenuationDistance", json!(0)), &["attenuation distance 0", "above 0"]),
+        (with("volume", "attenuationColor", json!([1, 2, 1])), &["attenuation colour 1 2 1", "from 0 to 1"]),
+        (with("specular", "specularFactor", json!(2)), &["specular factor 2", "from 0 to 1"]),
+        (with("specular", "specularColorFactor", json!([-1, 0, 0])), &["specular colour -1 0 0", "0 or more"]),
+        (with("clearcoat", "clearcoatFactor", json!(2)), &["clear coat factor 2", "from 0 to 1"]),
+        (with("clearcoat", "clearcoatRoughnessFactor", json!(2)), &["clear coat roughness 2", "from 0 to 1"]),
+        (with("clearcoat", "clearcoatFactor", json!("much")), &["KHR_materials_clearcoat that cannot be read", "much"]),
+        (with("clearcoat", "clearcoatTexture", json!({"index": 99})), &["texture 99 of 16"]),
+        (with("clearcoat", "clearcoatNormalTexture", json!({"index": 0, "scale": 1e9})), &["normal scale 1e9", "within 1e6"]),
+        (with("sheen", "sheenColorFactor", json!([0, 0, 2])), &["sheen colour 0 0 2", "from 0 to 1"]),
+        (with("sheen", "sheenRoughnessFactor", json!(-1)), &["sheen roughness -1", "from 0 to 1"]),
+        (with(gloss, "glossinessFactor", json!(7)), &["glossiness 7", "from 0 to 1"]),
+        (with(gloss, "specularFactor", json!([2, 0, 0])), &["specular colour 2 0 0", "from 0 to 1"]),
+        (with(gloss, "diffuseFactor", json!([2, 0, 0, 1])), &["base colour 2 0 0", "from 0 to 1"]),
+    ];
+    for (material, named) in cases {
+        assert_refused(&with_material(material.clone()), &[&["scene.gltf", "material 'odd'"], *named].concat());
+    }
+}
+
+/// The square with a normal map, changed, and its tangents.
+fn tangents_of(change: impl FnOnce(&mut Value)) -> (Mesh, Vec<[DVec4; 3]>) {
+    let mut value = with_material(json!({"name": "bumpy", "normalTexture": {"index": 0}}));
+    change(&mut value);
+    let mut scene = load(&value).unwrap();
+    let mesh = scene.meshes.remove(0);
+    let material = &scene.materials[mesh.material];
+    assert_eq!(mesh.tangents.len(), if material.normal_map.is_some() { mesh.triangles.len() } else { 0 });
+    assert_eq!(mesh.coat_tangents.len(), if material.layers.coat_normal_map.is_some() { mesh.triangles.len() } else { 0 });
+    for (triangle, tangents) in [&mesh.tangents, &mesh.coat_tangents].into_iter().flat_map(|all| mesh.triangles.iter().zip(all)) {
+        for (vertex, tangent) in pairs(triangle, tangents) {
+            let normal = mesh.normals.get(*vertex as usize).copied().unwrap_or(mesh.normal(0));
+            let direction = tangent.truncate();
+            assert!(direction.is_normalized() && direction.dot(normal).abs() < 1e-9 && tangent.w.abs() == 1.0, "{tangent}");
+        }
+    }
+    let tangents = mesh.tangents.clone();
+    (mesh, tangents)
+}
+
+fn assert_all_near(tangents: &[[DVec4; 3]], expected: DVec4) {
+    let far = tangents.as_flattened().iter().find(|tangent| tangent.distance(expected) > 1e-6);
+    assert!(far.is_none() && !tangents.is_empty(), "{far:?}, not {expected}");
+}
+
+fn uvs(value: &mut Value, uvs: &[f32]) {
+    let accessor = add_accessor(value, &floats(uvs), 5126, uvs.len() / 2, "VEC2");
+    value["meshes"][0]["primitives"][0]["attributes"]["TEXCOORD_0"] = json!(accessor);
+}
+
+/// Tangents point where u grows. glTF's v runs down the picture: the bitangent, sign * (normal x tangent), points where v falls.
+#[test]
+fn tangents_follow_texture_coordinates() {
+    let upright = [0., 1., 1., 1., 1., 0., 0., 0.];
+    let mirrored = [1., 1., 0., 1., 0., 0., 1., 0.];
+    let turned = [0., 0., 0., 1., -1., 1., -1., 0.];
+    // The square's own coordinates stand upside down.
+    assert_all_near(&tangents_of(|_| ()).1, DVec4::new(1.0, 0.0, 0.0, -1.0));
+    assert_all_near(&tangents_of(|value| uvs(value, &upright)).1, DVec4::new(1.0, 0.0, 0.0, 1.0));
+    assert_all_near(&tangents_of(|value| uvs(value, &mirrored)).1, DVec4::new(-1.0, 0.0, 0.0, -1.0));
+    // u falls where y grows, v grows where x does.
+    assert_all_near(&tangents_of(|value| uvs(value, &turned)).1, DVec4::new(0.0, -1.0, 0.0, -1.0));
+
+    // Half a picture and its mirror image, which share an edge.
+    let (_, halves) = tangents_of(|value| uvs(value, &[0., 1., 1., 1., 1., 0., 2., 1.]));
+    assert_all_near(&halves[..1], DVec4::new(1.0, 0.0, 0.0, 1.0));
+    assert_eq!(halves[1][2].w, -1.0, "{halves:?}");
+
+    // A quarter of a turn of the picture: u of the picture is v of the mesh. It is (cos u + sin v, cos v - sin u).
+    let transform = json!({"KHR_texture_transform": {"rotation": FRAC_PI_2, "scale": [1, 1]}});
+    let turn = |value: &mut Value| {
+        uvs(value, &upright);
+        value["materials"][0]["normalTexture"]["extensions"] = transform.clone();
+    };
+    assert_all_near(&tangents_of(turn).1, DVec4::new(0.0, -1.0, 0.0, 1.0));
+    let flip = |value: &mut Value| {
+        turn(value);
+        value["materials"][0]["normalTexture"]["extensions"]["KHR_texture_transform"] = json!({"scale": [-1, 1]});
+    };
+    assert_all_near(&tangents_of(flip).1, DVec4::new(-1.0, 0.0, 0.0, -1.0));
+    // Read as if it said nothing.
+    let empty = |value: &mut Value| {
+        turn(value);
+        value["materials"][0]["normalTexture"]["extensions"]["KHR_texture_transform"] = json!([]);
+    };
+    assert_all_near(&tangents_of(empty).1, DVec4::new(1.0, 0.0, 0.0, 1.0));
+}
+
+/// Under a mirror the normal keeps to the front, so tangent, bitangent and normal change hands.
+#[test]
+fn tangents_of_mirrored_and_skewed_nodes_follow_the_surface() {
+    let node = |value: &mut Value, scale: [f64; 3]| {
+        uvs(value, &[0., 1., 1., 1., 1., 0., 0., 0.]);
+        value["nodes"][0]["scale"] = json!(scale);
+    };
+    for (scale, expected) in [
+        ([-1.0, 1.0, 1.0], DVec4::new(-1.0, 0.0, 0.0, -1.0)),
+        ([1.0, -3.0, 1.0], DVec4::new(1.0, 0.0, 0.0, -1.0)),
+        ([1.0, 1.0, -1.0], DVec4::new(1.0, 0.0, 0.0, -1.0)),
+        ([-2.0, -3.0, 1.0], DVec4::new(-1.0, 0.0, 0.0, 1.0)),
+    ] {
+        let (mesh, tangents) = tangents_of(|value| node(value, scale));
+        assert_all_near(&tangents, expected);
+        let [tangent, normal] = [tangents[0][0].truncate(), mesh.normals[0]];
+        // It points up the picture, to the mesh's third vertex from its second.
+        let bitangent = tangents[0][0].w * normal.cross(tangent);
+        assert!(bitangent.dot(mesh.positions[2] - mesh.positions[1]) > 0.0 && mesh.normal(0).dot(normal) > 0.0, "{scale:?}");
+        // The file's own come to the same.
+        let own = tangents_of(|value| {
+            node(value, scale);
+            with_tangents(value, [1.0, 0.0, 0.0, 1.0]);
+        });
+        assert_all_near(&own.1, expected);
+    }
+}
+
+fn with_tangents(value: &mut Value, tangent: [f32; 4]) {
+    let accessor = add_accessor(value, &floats(&tangent.repeat(4)), 5126, 4, "VEC4");
+    value["meshes"][0]["primitives"][0]["attributes"]["TANGENT"] = json!(accessor);
+}
+
+/// The file's tangents count before what texture coordinates give, with what morph targets add.
+#[test]
+fn tangents_of_the_file_are_taken() {
+    let diagonal = [0.6, 0.8, 0.0, 1.0f32];
+    let expected = Vec4::from(diagonal).as_dvec4();
+    assert_all_near(&tangents_of(|value| with_tangents(value, diagonal)).1, expected);
+    // They are made perpendicular to the normal.
+    assert_all_near(&tangents_of(|value| with_tangents(value, [0.6, 0.8, 3.0, 1.0])).1, expected);
+    let morphed = tangents_of(|value| {
+        with_tangents(value, diagonal);
+        let shift = add_accessor(value, &floats(&[-1.2, 0.0, 0.0].repeat(4)), 5126, 4, "VEC3");
+        value["meshes"][0]["primitives"][0]["targets"] = json!([{"TANGENT": shift}]);
+        value["meshes"][0]["weights"] = json!([1.0]);
+    });
+    assert_all_near(&morphed.1, DVec4::new(-0.6, 0.8, 0.0, 1.0));
+    // A mesh without normals is flat, and its tangents are to be ignored.
+    let flat = tangents_of(|value| {
+        with_tangents(value, diagonal);
+        value["meshes"][0]["primitives"][0]["attributes"].as_object_mut().unwrap().remove("NORMAL");
+    });
+    assert!(flat.0.normals.is_empty());
+    assert_all_near(&flat.1, DVec4::new(1.0, 0.0, 0.0, -1.0));
+
+    let coat = |value: &mut Value, transform: Value| {
+        with_tangents(value, diagonal);
+        value["materials"][0]["extensions"] = json!({"KHR_materials_clearcoat": {"clearcoatFactor": 1,
+            "clearcoatNormalTexture": {"index": 1, "extensions": {"KHR_texture_transform": transform}}}});
+    };
+    // The coat has them where its coordinates are those of the base, or the base has no normal map.
+    assert_all_near(&tangents_of(|value| coat(value, json!({}))).0.coat_tangents, expected);
+    assert_all_near(&tangents_of(|value| coat(value, json!({"scale": [-1, 1]}))).0.coat_tangents, DVec4::new(-1.0, 0.0, 0.0, 1.0));
+    let alone = tangents_of(|value| {
+        coat(value, json!({"scale": [-1, 1]}));
+        value["materials"][0].as_object_mut().unwrap().remove("normalTexture");
+    });
+    assert_all_near(&alone.0.coat_tangents, expected);
+
+    for (tangent, named) in [([f32::NAN, 0.0, 0.0, 1.0], "NaN"), ([0.0, f32::INFINITY, 0.0, 1.0], "inf")] {
+        let mut value = with_material(json!({"normalTexture": {"index": 0}}));
+        with_tangents(&mut value, tangent);
+        assert_refused(&value, &["mesh 'wall'", named]);
+    }
+}
+
+/// Where there is no tangent any one will do that is perpendicular to the normal.
+#[test]
+fn tangents_are_never_without_direction() {
+    // What is checked is in tangents_of: one texel for all, texture coordinates on a line, tangents of no length or along the normal.
+    tangents_of(|value| uvs(value, &[0.5; 8]));
+    tangents_of(|value| uvs(value, &[0., 0., 1., 0., 2., 0., 3., 0.]));
+    tangents_of(|value| uvs(value, &[1e6, 0., -1e6, 1e-30, 2e-38, 1e6, 3., 0.]));
+    tangents_of(|value| with_tangents(value, [0.0; 4]));
+    tangents_of(|value| with_tangents(value, [0.0, 0.0, 5.0, 1.0]));
+    for scale in [1e-30, 1e30] {
+        let scaled = |value: &mut Value| value["nodes"][0] = json!({"mesh": 0, "scale": [scale, scale, scale]});
+        assert_all_near(&tangents_of(scaled).1, DVec4::new(1.0, 0.0, 0.0, -1.0));
+        let mut positions = floats(&[0., 0., 0., 1., 0., 0., 1., 1., 0., 0., 1., 0.].map(|number: f32| number * scale));
+        positions.extend(&square_buffer()[48..]);
+        let small_or_large = |value: &mut Value| {
+            set_buffer(value, &positions);
+            value["nodes"][0] = json!({"mesh": 0});
+        };
+        assert_all_near(&tangents_of(small_or_large).1, DVec4::new(1.0, 0.0, 0.0, -1.0));
+    }
+}
+
+/// More triangles at one vertex than the crate can group in one stack, or in a time that ends.
+#[test]
+fn a_vertex_of_many_triangles_has_tangents() {
+    let mut value = with_material(json!({"normalTexture": {"index": 0}}));
+    let indices = add_accessor(&mut value, &[0, 1, 2].repeat(200_000), 5121, 600_000, "SCALAR");
+    value["meshes"][0]["primitives"][0]["indices"] = json!(indices);
+    let mesh = load(&value).unwrap().meshes.remove(0);
+    assert_eq!(mesh.tangents.len(), 200_000);
+    assert_all_near(&mesh.tangents, DVec4::new(1.0, 0.0, 0.0, -1.0));
+
+    // A fan.
+    for count in [8u32, 20_000] {
+        let ring = (0..=count).map(|k| TAU * f64::from(k) / f64::from(count)).map(|angle| [angle.cos() as f32, angle.sin() as f32]);
+        let places: Vec<[f32; 2]> = std::iter::once([0.0; 2]).chain(ring).collect();
+        let mut value = with_material(json!({"normalTexture": {"index": 0}}));
+        let vertices = places.len();
+        let of = |each: &dyn Fn(&[f32; 2]) -> Vec<f32>| floats(&places.iter().flat_map(each).collect::<Vec<_>>());
+        let positions = add_accessor(&mut value, &of(&|[x, y]| vec![*x, *y, 0.0]), 5126, vertices, "VEC3");
+        value["accessors"][positions]["min"] = json!([-1, -1, 0]);
+        value["accessors"][positions]["max"] = json!([1, 1, 0]);
+        let normals = add_accessor(&mut value, &of(&|_| vec![0.0, 0.0, 1.0]), 5126, vertices, "VEC3");
+        let uvs = add_accessor(&mut value, &of(&|[x, y]| vec![*x, *y]), 5126, vertices, "VEC2");
+        let primitive = json!({"attributes": {"POSITION": positions, "NORMAL": normals, "TEXCOORD_0": uvs}, "material": 0, "mode": 6});
+        value["meshes"][0]["primitives"] = json!([primitive]);
+        let mesh = load(&value).unwrap().meshes.remove(0);
+        assert_eq!(mesh.tangents.len(), count as usize);
+        let far = mesh.tangents.as_flattened().iter().find(|tangent| tangent.distance(DVec4::new(1.0, 0.0, 0.0, -1.0)) > 1e-2);
+        assert!(far.is_none(), "{far:?}");
+    }
 }

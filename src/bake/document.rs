@@ -2,14 +2,14 @@
 
 use std::collections::BTreeSet;
 
-use glam::{DMat3, DQuat, DVec2, DVec3, Vec3};
+use glam::{DMat3, DQuat, DVec2, DVec3, DVec4, Vec3};
 use serde_json::{Map, Value, json};
 
 use super::names::{GEOMETRY, Names};
 use super::{Layout, MeshLightmap};
 use crate::scene::light::{LUMENS_PER_WATT, LightKind};
-use crate::scene::material::{TextureUse, UvTransform};
-use crate::scene::texture::Wrap;
+use crate::scene::material::{Coverage, Layers, Medium, NormalMap, TextureUse, UvTransform};
+use crate::scene::texture::{Filter, Wrap};
 use crate::scene::{Camera, Light, Material, Mesh, Scene, Surface};
 
 /// How a document shows the baked light.
@@ -26,6 +26,7 @@ const FLOAT: u32 = 5126;
 const UNSIGNED_INT: u32 = 5125;
 const ARRAY_BUFFER: u32 = 34962;
 const ELEMENT_ARRAY_BUFFER: u32 = 34963;
+const NEAREST: u32 = 9728;
 const LINEAR: u32 = 9729;
 const CLAMP_TO_EDGE: u32 = 33071;
 const MIRRORED_REPEAT: u32 = 33648;
@@ -33,6 +34,9 @@ const REPEAT: u32 = 10497;
 
 /// The set of coordinates that lightmaps are looked up with.
 const LIGHTMAP_SET: usize = 1;
+
+/// Tangents that are nearer to one another are rounded.
+const MAX_TANGENT_DIFFERENCE: f64 = 1e-5;
 
 /// The meshes of a scene: what both documents share.
 #[derive(Default)]
@@ -72,9 +76,18 @@ impl Geometry {
             let normals = mesh.normals.iter().flat_map(|normal| normal.normalize_or(DVec3::Y).as_vec3().to_array());
             attributes.insert("NORMAL".into(), json!(self.floats("VEC3", normals, mesh.normals.len())));
         }
-        if !mesh.colours.is_empty() {
-            let colours = mesh.colours.iter().flat_map(|colour| colour.as_vec3().to_array());
-            attributes.insert("COLOR_0".into(), json!(self.floats("VEC3", colours, mesh.colours.len())));
+        if let Some(tangents) = vertex_tangents(mesh) {
+            let floats = tangents.iter().flat_map(|tangent| tangent.as_vec4().to_array());
+            attributes.insert("TANGENT".into(), json!(self.floats("VEC4", floats, tangents.len())));
+        }
+        let colour = |vertex: usize| mesh.colours.get(vertex).copied().unwrap_or(DVec3::ONE).as_vec3();
+        let count = mesh.positions.len();
+        if !mesh.alphas.is_empty() {
+            let colours = (0..count).flat_map(|vertex| colour(vertex).extend(mesh.alphas[vertex] as f32).to_array());
+            attributes.insert("COLOR_0".into(), json!(self.floats("VEC4", colours, count)));
+        } else if !mesh.colours.is_empty() {
+            let colours = (0..count).flat_map(|vertex| colour(vertex).to_array());
+            attributes.insert("COLOR_0".into(), json!(self.floats("VEC3", colours, count)));
         }
         let (sets, uv_sets) = texture_coordinates(mesh, lightmap, material);
         for (set, uvs) in sets.into_iter().enumerate() {
@@ -102,11 +115,28 @@ impl Geometry {
     }
 }
 
+/// Tangents as glTF has them, one a vertex; `None` where corners that meet at a vertex have several: they are computed again
+/// where the file is read.
+fn vertex_tangents(mesh: &Mesh) -> Option<Vec<DVec4>> {
+    let of_corners = if mesh.tangents.is_empty() { &mesh.coat_tangents } else { &mesh.tangents };
+    // Without normals glTF ignores them.
+    if of_corners.is_empty() || mesh.normals.is_empty() {
+        return None;
+    }
+    let mut tangents: Vec<Option<DVec4>> = vec![None; mesh.positions.len()];
+    for (vertex, tangent) in mesh.triangles.iter().flatten().zip(of_corners.as_flattened()) {
+        let known = tangents[*vertex as usize].get_or_insert(*tangent);
+        if known.distance(*tangent) > MAX_TANGENT_DIFFERENCE {
+            return None;
+        }
+    }
+    Some(tangents.into_iter().map(|tangent| tangent.unwrap_or(DVec4::new(1.0, 0.0, 0.0, 1.0))).collect())
+}
+
 /// Coordinates to be written as TEXCOORD_0, _1 and so on, without a gap as glTF wants it, and where
 /// the mesh's own two sets went.
 fn texture_coordinates(mesh: &Mesh, lightmap: Option<&MeshLightmap>, material: &Material) -> (Vec<Vec<DVec2>>, [usize; 2]) {
-    let textures = [material.base_colour_texture, material.emission_texture];
-    let is_used = |set: usize| textures.iter().flatten().any(|used| used.uv_set == set);
+    let is_used = |set: usize| material.textures().any(|used| used.uv_set == set);
     // A texture that has no coordinates is looked up at the origin.
     let own = |set: usize| match mesh.uvs[set].is_empty() {
         true => vec![DVec2::ZERO; mesh.positions.len()],
@@ -131,13 +161,9 @@ fn texture_coordinates(mesh: &Mesh, lightmap: Option<&MeshLightmap>, material: &
 
 /// Indices of the textures that a material of a mesh uses.
 pub fn textures_used(scene: &Scene) -> Vec<usize> {
-    let used: BTreeSet<usize> =
-        scene.meshes.iter().flat_map(|mesh| textures_of(&scene.materials[mesh.material])).map(|used| used.texture).collect();
+    let textures = scene.meshes.iter().flat_map(|mesh| scene.materials[mesh.material].textures());
+    let used: BTreeSet<usize> = textures.map(|used| used.texture).collect();
     used.into_iter().collect()
-}
-
-fn textures_of(material: &Material) -> impl Iterator<Item = TextureUse> {
-    [material.base_colour_texture, material.emission_texture].into_iter().flatten()
 }
 
 /// The document's parts that grow with materials, textures and nodes.
@@ -156,14 +182,21 @@ struct Document {
 pub fn document(scene: &Scene, layout: &Layout, geometry: &Geometry, names: &Names, kind: Kind, intensity: impl Fn(usize) -> f32) -> Value {
     let mut document = Document::default();
     let used = textures_used(scene);
-    for texture in &used {
-        let [wrap_s, wrap_t] = scene.textures[*texture].wrap.map(|wrap| match wrap {
+    for index in &used {
+        let texture = &scene.textures[*index];
+        let [wrap_s, wrap_t] = texture.wrap.map(|wrap| match wrap {
             Wrap::Repeat => REPEAT,
             Wrap::MirroredRepeat => MIRRORED_REPEAT,
             Wrap::Clamp => CLAMP_TO_EDGE,
         });
-        document.texture(names.texture(*texture), wrap_s, wrap_t, &[]);
+        let filter = match texture.filter {
+            Filter::Bilinear => LINEAR,
+            Filter::Nearest => NEAREST,
+        };
+        document.texture(names.texture(*index), json!({"magFilter": filter, "wrapS": wrap_s, "wrapT": wrap_t}));
     }
+    // Not mipmapped: smaller levels would mix charts.
+    let of_charts = || json!({"magFilter": LINEAR, "minFilter": LINEAR, "wrapS": CLAMP_TO_EDGE, "wrapT": CLAMP_TO_EDGE});
     // Textures are numbered anew, without those that nothing uses.
     let place = |texture: usize| used.binary_search(&texture).expect("the material's mesh uses the texture");
 
@@ -179,14 +212,13 @@ pub fn document(scene: &Scene, layout: &Layout, geometry: &Geometry, names: &Nam
             }
             value
         };
-        if textures_of(material).any(|used| used.transform != UvTransform::NONE) {
+        if material.textures().any(|used| used.transform != UvTransform::NONE) {
             document.extensions.insert("KHR_texture_transform");
         }
         let value = match (&layout.meshes[index], kind) {
             (None, _) => document.material(material, of_texture),
             (Some(_), Kind::Radiance) => {
-                // Not mipmapped: smaller levels would mix charts.
-                let texture = document.texture(names.radiance(index), CLAMP_TO_EDGE, CLAMP_TO_EDGE, &[("minFilter", LINEAR)]);
+                let texture = document.texture(names.radiance(index), of_charts());
                 document.extensions.insert("KHR_materials_specular");
                 json!({
                     "name": material.name,
@@ -200,7 +232,7 @@ pub fn document(scene: &Scene, layout: &Layout, geometry: &Geometry, names: &Nam
             }
             (Some(_), Kind::Lightmap) => {
                 let mut value = document.material(material, of_texture);
-                let texture = document.texture(names.lightmap(index), CLAMP_TO_EDGE, CLAMP_TO_EDGE, &[("minFilter", LINEAR)]);
+                let texture = document.texture(names.lightmap(index), of_charts());
                 document.extensions.insert("MOZ_lightmap");
                 value["extensions"]["MOZ_lightmap"] = json!({"index": texture, "texCoord": LIGHTMAP_SET, "intensity": intensity(index)});
                 value
@@ -253,11 +285,7 @@ pub fn document(scene: &Scene, layout: &Layout, geometry: &Geometry, names: &Nam
 }
 
 impl Document {
-    fn texture(&mut self, uri: String, wrap_s: u32, wrap_t: u32, filters: &[(&str, u32)]) -> usize {
-        let mut sampler = json!({"magFilter": LINEAR, "wrapS": wrap_s, "wrapT": wrap_t});
-        for (name, filter) in filters {
-            sampler[*name] = json!(filter);
-        }
+    fn texture(&mut self, uri: String, sampler: Value) -> usize {
         let sampler = self.samplers.iter().position(|known| *known == sampler).unwrap_or_else(|| {
             self.samplers.push(sampler);
             self.samplers.len() - 1
@@ -267,40 +295,105 @@ impl Document {
         self.textures.len() - 1
     }
 
-    /// The paper's Phong has no counterpart and
-    /// becomes Lambertian, as which it scatters.
+    /// The material's own, or what is nearest to it among those of glTF.
     fn material(&mut self, material: &Material, of_texture: impl Fn(TextureUse) -> Value) -> Value {
-        let (metallic, roughness) = match material.surface {
-            Surface::Lambert | Surface::PaperPhong { .. } => (0.0, 1.0),
-            Surface::Glossy { exponent } => (1.0, (2.0 / (exponent + 2.0)).powf(0.25)),
-            Surface::Mirror => (1.0, 0.0),
-            Surface::Dielectric { .. } => (0.0, 0.0),
-            Surface::Layered => (material.layers.metallic, material.layers.roughness),
+        let Material { coverage, normal_map, base_colour, .. } = *material;
+        let layers = layers(material);
+        let (alpha, alpha_mode) = match coverage {
+            Coverage::Whole => (1.0, "OPAQUE"),
+            Coverage::Mask { alpha, .. } => (alpha, "MASK"),
+            Coverage::Blend { alpha } => (alpha, "BLEND"),
         };
-        let [red, green, blue] = material.base_colour.to_array();
         let mut value = json!({
             "name": material.name,
-            "pbrMetallicRoughness": {"baseColorFactor": [red, green, blue, 1.0], "metallicFactor": metallic, "roughnessFactor": roughness},
+            "pbrMetallicRoughness": {
+                "baseColorFactor": base_colour.extend(alpha).to_array(),
+                "metallicFactor": layers.metallic,
+                "roughnessFactor": layers.roughness,
+            },
+            "alphaMode": alpha_mode,
             "doubleSided": material.two_sided,
         });
-        if let Some(used) = material.base_colour_texture {
-            value["pbrMetallicRoughness"]["baseColorTexture"] = of_texture(used);
+        if let Coverage::Mask { cutoff, .. } = coverage {
+            value["alphaCutoff"] = json!(cutoff);
         }
+        let set = |object: &mut Value, name: &str, used: Option<TextureUse>| {
+            if let Some(used) = used {
+                object[name] = of_texture(used);
+            }
+        };
+        let set_normal_map = |object: &mut Value, name: &str, map: Option<NormalMap>| {
+            if let Some(map) = map {
+                object[name] = of_texture(map.texture);
+                object[name]["scale"] = json!(map.scale);
+            }
+        };
+        set(&mut value["pbrMetallicRoughness"], "baseColorTexture", material.base_colour_texture);
+        set(&mut value["pbrMetallicRoughness"], "metallicRoughnessTexture", layers.metallic_roughness_texture);
+        set(&mut value, "emissiveTexture", material.emission_texture);
+        set_normal_map(&mut value, "normalTexture", normal_map);
+
+        let mut extensions = Map::new();
+        let mut add = |name: &'static str, content: Value| {
+            self.extensions.insert(name);
+            extensions.insert(name.to_owned(), content);
+        };
         if material.is_emissive() {
             let strength = material.emission.max_element().max(1.0);
             value["emissiveFactor"] = json!((material.emission / strength).to_array());
-            if let Some(used) = material.emission_texture {
-                value["emissiveTexture"] = of_texture(used);
-            }
             if strength > 1.0 {
-                self.extensions.insert("KHR_materials_emissive_strength");
-                value["extensions"]["KHR_materials_emissive_strength"] = json!({"emissiveStrength": strength});
+                add("KHR_materials_emissive_strength", json!({"emissiveStrength": strength}));
             }
         }
-        if let Surface::Dielectric { ior } = material.surface {
-            self.extensions.extend(["KHR_materials_ior", "KHR_materials_transmission"]);
-            value["extensions"]["KHR_materials_ior"] = json!({"ior": ior});
-            value["extensions"]["KHR_materials_transmission"] = json!({"transmissionFactor": 1.0});
+        if layers.is_unlit {
+            add("KHR_materials_unlit", json!({}));
+        }
+        if let Some(Medium { transmittance }) = layers.medium {
+            // Rays measure the thickness; any above 0 makes a solid.
+            let after_a_metre = json!({"thicknessFactor": 1.0, "attenuationDistance": 1.0, "attenuationColor": transmittance.to_array()});
+            add("KHR_materials_volume", after_a_metre);
+        }
+        let ior = |of: &Layers| json!({"ior": of.ior});
+        let specular = |of: &Layers| {
+            let mut value = json!({"specularFactor": of.specular, "specularColorFactor": of.specular_colour.to_array()});
+            set(&mut value, "specularTexture", of.specular_texture);
+            set(&mut value, "specularColorTexture", of.specular_colour_texture);
+            value
+        };
+        let transmission = |of: &Layers| {
+            let mut value = json!({"transmissionFactor": of.transmission});
+            set(&mut value, "transmissionTexture", of.transmission_texture);
+            value
+        };
+        let coat = |of: &Layers| {
+            let mut value = json!({"clearcoatFactor": of.coat, "clearcoatRoughnessFactor": of.coat_roughness});
+            set(&mut value, "clearcoatTexture", of.coat_texture);
+            set(&mut value, "clearcoatRoughnessTexture", of.coat_roughness_texture);
+            set_normal_map(&mut value, "clearcoatNormalTexture", of.coat_normal_map);
+            value
+        };
+        let sheen = |of: &Layers| {
+            let mut value = json!({"sheenColorFactor": of.sheen_colour.to_array(), "sheenRoughnessFactor": of.sheen_roughness});
+            set(&mut value, "sheenColorTexture", of.sheen_colour_texture);
+            set(&mut value, "sheenRoughnessTexture", of.sheen_roughness_texture);
+            value
+        };
+        let usual = Layers::default();
+        let parts: [(&str, &dyn Fn(&Layers) -> Value); 5] = [
+            ("KHR_materials_ior", &ior),
+            ("KHR_materials_specular", &specular),
+            ("KHR_materials_transmission", &transmission),
+            ("KHR_materials_clearcoat", &coat),
+            ("KHR_materials_sheen", &sheen),
+        ];
+        for (name, part) in parts {
+            let own = part(&layers);
+            if own != part(&usual) {
+                add(name, own);
+            }
+        }
+        if !extensions.is_empty() {
+            value["extensions"] = extensions.into();
         }
         value
     }
@@ -311,6 +404,22 @@ impl Document {
             "name": camera.name, "camera": index, "translation": camera.eye.to_array(), "rotation": rotation.to_array(),
         }));
         json!({"name": camera.name, "type": "perspective", "perspective": {"yfov": camera.vertical_view, "znear": near}})
+    }
+}
+
+/// glTF's layers of a material. The paper's Phong has no counterpart and becomes Lambertian, as which it scatters.
+fn layers(material: &Material) -> Layers {
+    let usual = Layers::default();
+    match material.surface {
+        Surface::Layered => material.layers,
+        // Nothing is reflected, so that all light reaches what is matt.
+        Surface::Lambert | Surface::PaperPhong { .. } => Layers { metallic: 0.0, specular: 0.0, ..usual },
+        Surface::Glossy { exponent } => Layers { roughness: (2.0 / (exponent + 2.0)).powf(0.25), ..usual },
+        Surface::Mirror => Layers { roughness: 0.0, ..usual },
+        Surface::Dielectric { ior } => {
+            let medium = Some(Medium { transmittance: Vec3::ONE });
+            Layers { metallic: 0.0, roughness: 0.0, transmission: 1.0, ior, medium, ..usual }
+        }
     }
 }
 

@@ -74,14 +74,18 @@ pub fn exr(width: u32, height: u32, values: &[Vec3]) -> Vec<u8> {
     file.into_inner()
 }
 
-/// A texture, with its own codes where it has some.
+/// A texture, with its own codes where it has some; without alpha where that is 1.
 pub fn texture_png(texture: &Texture) -> Vec<u8> {
+    let (width, height) = (texture.width, texture.height);
     match &texture.texels {
-        Texels::Srgb(codes) => {
-            let codes: Vec<u8> = codes.iter().flat_map(|[red, green, blue, _]| [*red, *green, *blue]).collect();
-            eight_bits(texture.width, texture.height, ExtendedColorType::Rgb8, &codes)
+        Texels::Srgb(codes) | Texels::Linear(codes) if codes.iter().any(|code| code[3] < 255) => {
+            eight_bits(width, height, ExtendedColorType::Rgba8, codes.as_flattened())
         }
-        texels => png(texture.width, texture.height, (0..texels.count()).map(|place| texels.at(place).truncate())),
+        Texels::Srgb(codes) | Texels::Linear(codes) => {
+            let codes: Vec<u8> = codes.iter().flat_map(|[red, green, blue, _]| [*red, *green, *blue]).collect();
+            eight_bits(width, height, ExtendedColorType::Rgb8, &codes)
+        }
+        texels => png(width, height, (0..texels.count()).map(|place| texels.at(place).truncate())),
     }
 }
 

@@ -65,6 +65,11 @@ impl TextureUse {
     pub fn of(texture: usize, uv_set: usize) -> TextureUse {
         TextureUse { texture, uv_set, transform: UvTransform::NONE }
     }
+
+    /// Whether both are looked up at the same place.
+    pub fn has_coordinates_of(&self, other: &TextureUse) -> bool {
+        (self.uv_set, self.transform) == (other.uv_set, other.transform)
+    }
 }
 
 /// Normals in the frame of tangent, bitangent and normal, as codes from -1 to 1; `scale` multiplies the first two.
@@ -135,24 +140,20 @@ pub struct Layers {
 }
 
 impl Layers {
-    /// Every texture but those of normal maps.
-    pub fn textures_mut(&mut self) -> [&mut Option<TextureUse>; 8] {
-        [
-            &mut self.metallic_roughness_texture,
-            &mut self.specular_texture,
-            &mut self.specular_colour_texture,
-            &mut self.transmission_texture,
-            &mut self.coat_texture,
-            &mut self.coat_roughness_texture,
-            &mut self.sheen_colour_texture,
-            &mut self.sheen_roughness_texture,
-        ]
-    }
-
-    /// Factors alone are left.
-    pub fn forget_textures(&mut self) {
-        self.textures_mut().into_iter().for_each(|texture| *texture = None);
-        self.coat_normal_map = None;
+    /// The factors alone.
+    pub fn without_textures(&self) -> Layers {
+        Layers {
+            metallic_roughness_texture: None,
+            specular_texture: None,
+            specular_colour_texture: None,
+            transmission_texture: None,
+            coat_texture: None,
+            coat_roughness_texture: None,
+            coat_normal_map: None,
+            sheen_colour_texture: None,
+            sheen_roughness_texture: None,
+            ..*self
+        }
     }
 }
 
@@ -297,14 +298,23 @@ impl Material {
         Material { surface: Surface::Layered, layers, ..Material::lambert(name, base_colour) }
     }
 
-    /// Every texture that it uses.
-    pub fn textures(&self) -> impl Iterator<Item = TextureUse> {
-        let mut layers = self.layers;
+    /// Every use of a texture.
+    pub fn textures(&self) -> impl Iterator<Item = TextureUse> + use<> {
+        let layers = &self.layers;
         let maps = [self.normal_map, layers.coat_normal_map].map(|map| map.map(|map| map.texture));
-        let of_layers = layers.textures_mut().map(|texture| *texture);
-        let is_layered = self.surface == Surface::Layered;
-        let of_layers = of_layers.into_iter().chain(maps).filter(move |_| is_layered);
-        [self.base_colour_texture, self.emission_texture].into_iter().chain(of_layers).flatten()
+        let textures = [
+            self.base_colour_texture,
+            self.emission_texture,
+            layers.metallic_roughness_texture,
+            layers.specular_texture,
+            layers.specular_colour_texture,
+            layers.transmission_texture,
+            layers.coat_texture,
+            layers.coat_roughness_texture,
+            layers.sheen_colour_texture,
+            layers.sheen_roughness_texture,
+        ];
+        textures.into_iter().chain(maps).flatten()
     }
 
     pub fn is_emissive(&self) -> bool {

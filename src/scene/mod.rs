@@ -133,7 +133,7 @@ impl Scene {
                 material.base_colour_texture = None;
                 material.emission_texture = None;
                 material.normal_map = None;
-                material.layers.forget_textures();
+                material.layers = material.layers.without_textures();
             }
         }
         Cow::Owned(scene)

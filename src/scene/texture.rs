@@ -6,7 +6,7 @@ use glam::{DVec2, Vec3, Vec4};
 use rayon::prelude::*;
 
 /// What lies beyond the picture's edges.
-#[derive(Debug, Clone, Copy, PartialEq, Eq)]
+#[derive(Debug, Clone, Copy, PartialEq, Eq, Hash)]
 pub enum Wrap {
     Repeat,
     MirroredRepeat,
@@ -14,7 +14,7 @@ pub enum Wrap {
 }
 
 /// What a place between texel centres has.
-#[derive(Debug, Clone, Copy, PartialEq, Eq, Default)]
+#[derive(Debug, Clone, Copy, PartialEq, Eq, Hash, Default)]
 pub enum Filter {
     #[default]
     Bilinear,

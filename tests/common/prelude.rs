@@ -5,7 +5,7 @@ pub use std::f64::consts::{FRAC_PI_2, PI, TAU};
 pub use std::path::{Path, PathBuf};
 pub use std::time::Instant;
 
-pub use glam::{DMat3, DQuat, DVec2, DVec3, UVec2, Vec2, Vec3};
+pub use glam::{DMat3, DQuat, DVec2, DVec3, DVec4, UVec2, Vec2, Vec3, Vec4};
 pub use photonmill::engine::{self, Control};
 pub use photonmill::error::Error;
 pub use photonmill::gpu::{Commands, Constants, Extent, Gpu, Memory, Options};

@@ -1,240 +1,272 @@
-//! Materials and their textures.
+//! Materials: each becomes a layered one, with every factor and texture that the scene simulates.
 
-use std::borrow::Cow;
-use std::collections::hash_map::Entry;
-use std::collections::{BTreeSet, HashMap};
-
-use glam::{DVec2, Vec3, Vec4};
+use glam::{DVec2, Vec3};
 use gltf::Document;
-use image::{DynamicImage, ImageDecoder, RgbaImage};
-use rayon::prelude::*;
+use gltf::json::extensions::material::{Material as Extensions, Volume};
+use gltf::json::extensions::texture::TextureTransform;
+use gltf::json::material::{AlphaMode, NormalTexture};
+use gltf::json::texture::Info;
+use gltf::json::validation::Checked;
+use serde::Deserialize;
+use serde::de::DeserializeOwned;
+use serde_json::Value;
 
-use super::{Loader, accessor, called, one_line, printable};
-use crate::error::{Error, Result};
-use crate::scene::material::{Layers, Material, Medium, TextureUse, UvTransform};
-use crate::scene::texture::{Filter, Texels, Texture, Wrap};
-use crate::scene::{Progress, Surface, geometry};
+use super::textures::Meaning;
+use super::{Loader, READ_EXTENSIONS, printable};
+use crate::error::Result;
+use crate::scene::Surface;
+use crate::scene::material::{Coverage, Layers, Material, Medium, NormalMap, TextureUse, UvTransform};
 
-/// Texture coordinates that are moved or scaled by more have no digits left.
+/// Texture coordinates that are moved or scaled by more have no digits left, nor has a normal that is.
 const MAX_TRANSFORM: f32 = 1e6;
-/// Of all textures together: half a GiB.
-const MAX_TEXELS: u64 = geometry::MAX_TEXELS as u64 - 256;
+/// Of factors without an upper limit of their own.
+const ANY: f32 = f32::MAX;
+
+/// KHR_materials_clearcoat, which the `gltf` crate leaves as it stands in the file, as it does the next.
+#[derive(Default, Deserialize)]
+#[serde(default, rename_all = "camelCase")]
+struct ClearCoat {
+    clearcoat_factor: f32,
+    clearcoat_texture: Option<Info>,
+    clearcoat_roughness_factor: f32,
+    clearcoat_roughness_texture: Option<Info>,
+    clearcoat_normal_texture: Option<NormalTexture>,
+}
+
+/// KHR_materials_sheen.
+#[derive(Default, Deserialize)]
+#[serde(default, rename_all = "camelCase")]
+struct Sheen {
+    sheen_color_factor: [f32; 3],
+    sheen_color_texture: Option<Info>,
+    sheen_roughness_factor: f32,
+    sheen_roughness_texture: Option<Info>,
+}
 
 impl Loader {
-    pub(super) fn read_textures(&mut self, document: &Document, progress: Progress) -> Result<()> {
-        // Pictures that only other maps use are no textures of the scene.
-        let mut used = BTreeSet::new();
-        for material in document.materials() {
-            used.extend(material.pbr_metallic_roughness().base_color_texture().map(|info| info.texture().index()));
-            used.extend(material.emissive_texture().map(|info| info.texture().index()));
-        }
-        // Materials that use the same picture in the same way share it.
-        let mut places: HashMap<(usize, Option<usize>), usize> = HashMap::new();
-        let mut wanted = Vec::new();
-        for texture in document.textures().filter(|texture| used.contains(&texture.index())) {
-            let place = match places.entry((texture.source().index(), texture.sampler().index())) {
-                Entry::Occupied(place) => *place.get(),
-                Entry::Vacant(free) => {
-                    wanted.push(texture.clone());
-                    *free.insert(wanted.len() - 1)
-                }
-            };
-            self.texture_places.insert(texture.index(), place);
-        }
-        // Asked before they are decoded: as numbers they take many times the memory.
-        let mut texel_count = 0;
-        let mut encoded = Vec::with_capacity(wanted.len());
-        for texture in &wanted {
-            let (what, bytes) = self.encoded_image(texture)?;
-            let (width, height) = self.decoder(&what, &bytes)?.dimensions();
-            texel_count += u64::from(width) * u64::from(height);
-            let reason = || format!("makes more than {MAX_TEXELS} texels, the most that are read; use smaller pictures");
-            self.require(texel_count <= MAX_TEXELS, &what, reason)?;
-            encoded.push((texture, what, bytes));
-        }
-        let mut textures = Vec::with_capacity(encoded.len());
-        for batch in encoded.chunks(2 * rayon::current_num_threads()) {
-            progress("decoding textures", textures.len() as f64 / encoded.len() as f64);
-            let read: Vec<Result<Texture>> =
-                batch.par_iter().map(|(texture, what, bytes)| self.read_texture(texture, what, bytes)).collect();
-            for texture in read {
-                textures.push(texture?);
-            }
-        }
-        drop(encoded);
-        self.scene.textures = textures;
-        Ok(())
-    }
-
-    /// Its name in complaints, and the bytes of the picture's file.
-    fn encoded_image(&self, texture: &gltf::Texture) -> Result<(String, Cow<'_, [u8]>)> {
-        let source = texture.source();
-        let what = called("texture image", source.name(), source.index());
-        let bytes = match source.source() {
-            gltf::image::Source::View { view, .. } => Cow::Borrowed(accessor::view_bytes(self, &view, &what)?),
-            gltf::image::Source::Uri { uri, .. } => Cow::Owned(self.read_uri(uri, &what)?),
-        };
-        Ok((what, bytes))
-    }
-
-    fn undecodable(&self, what: &str, error: &image::ImageError) -> Error {
-        self.refuse(what, format!("cannot be decoded ({})", one_line(&error.to_string())))
-    }
-
-    /// Of a picture's file.
-    fn decoder<'b>(&self, what: &str, bytes: &'b [u8]) -> Result<impl ImageDecoder + use<'b>> {
-        let reader = image::ImageReader::new(std::io::Cursor::new(bytes)).with_guessed_format();
-        let mut reader = reader.map_err(|error| self.refuse(what, error.to_string()))?;
-        reader.limits(image_limits());
-        reader.into_decoder().map_err(|error| self.undecodable(what, &error))
-    }
-
-    fn decoded(&self, what: &str, bytes: &[u8]) -> Result<RgbaImage> {
-        let undecodable = |error: image::ImageError| self.undecodable(what, &error);
-        let decoder = self.decoder(what, bytes)?;
-        image_limits().reserve(decoder.total_bytes()).map_err(undecodable)?;
-        Ok(DynamicImage::from_decoder(decoder).map_err(undecodable)?.into_rgba8())
-    }
-
-    /// Means of roughness and metalness over a whole picture; `None` where it cannot be read.
-    fn mean_roughness_and_metalness(&mut self, texture: &gltf::Texture) -> Option<[f32; 2]> {
-        let source = texture.source().index();
-        if let Some(means) = self.mean_roughness_and_metalness.get(&source) {
-            return *means;
-        }
-        let picture = self.encoded_image(texture).and_then(|(what, bytes)| self.decoded(&what, &bytes)).ok();
-        let means = picture.map(|picture| {
-            // Sums of whole numbers depend on no order.
-            let codes = picture.as_raw().par_chunks_exact(4).map(|texel| [u64::from(texel[1]), u64::from(texel[2])]);
-            let sums = codes.reduce(|| [0; 2], |a, b| [a[0] + b[0], a[1] + b[1]]);
-            sums.map(|sum| (sum as f64 / (255.0 * f64::from(picture.width()) * f64::from(picture.height()))) as f32)
-        });
-        self.mean_roughness_and_metalness.insert(source, means);
-        means
-    }
-
-    fn read_texture(&self, texture: &gltf::Texture, what: &str, bytes: &[u8]) -> Result<Texture> {
-        let picture = self.decoded(what, bytes)?;
-        let wrap = |mode: gltf::texture::WrappingMode| match mode {
-            gltf::texture::WrappingMode::ClampToEdge => Wrap::Clamp,
-            gltf::texture::WrappingMode::MirroredRepeat => Wrap::MirroredRepeat,
-            gltf::texture::WrappingMode::Repeat => Wrap::Repeat,
-        };
-        let (width, height) = picture.dimensions();
-        Ok(Texture {
-            name: what.to_owned(),
-            width,
-            height,
-            texels: Texels::Srgb(bytemuck::allocation::cast_vec(picture.into_raw())),
-            wrap: [wrap(texture.sampler().wrap_s()), wrap(texture.sampler().wrap_t())],
-            filter: Filter::Bilinear,
-        })
-    }
-
     pub(super) fn read_materials(&mut self, document: &Document) -> Result<()> {
-        for material in document.materials() {
-            let read = self.read_material(&material)?;
+        for (number, material) in document.as_json().materials.iter().enumerate() {
+            let name = material.name.as_deref().map_or_else(|| format!("material {number}"), printable);
+            let object = format!("material '{name}'");
+            let read = Reader { loader: self, document, object }.material(&name, material)?;
             self.scene.materials.push(read);
         }
         // The material of primitives that name none.
-        self.scene.materials.push(Material::lambert("default", Vec3::ONE));
+        self.default_material = self.scene.materials.len();
+        self.scene.materials.push(Material::layered("default", Vec3::ONE, Layers::default()));
         Ok(())
-    }
-
-    fn read_material(&mut self, material: &gltf::Material) -> Result<Material> {
-        let pbr = material.pbr_metallic_roughness();
-        let name = material.name().map_or_else(|| format!("material {}", material.index().unwrap_or(0)), printable);
-        let transmission = material.transmission();
-        let factor = transmission.as_ref().map_or(0.0, gltf::material::Transmission::transmission_factor);
-        let ior = material.ior().unwrap_or(1.5);
-        let object = format!("material '{name}'");
-        let means = pbr.metallic_roughness_texture().map(|info| self.mean_roughness_and_metalness(&info.texture()));
-        let [roughness, metallic] = means.flatten().unwrap_or([1.0; 2]);
-        let (roughness, metallic) = (roughness * pbr.roughness_factor(), metallic * pbr.metallic_factor());
-        for (what, present) in [
-            ("normal textures", material.normal_texture().is_some()),
-            ("occlusion textures", material.occlusion_texture().is_some()),
-            ("metallic-roughness textures (taken as their mean)", matches!(means, Some(Some(_)))),
-            ("metallic-roughness textures that cannot be read (the factors alone count)", matches!(means, Some(None))),
-            ("transmission textures", transmission.as_ref().is_some_and(|t| t.transmission_texture().is_some())),
-            ("transparency by alpha", material.alpha_mode() != gltf::material::AlphaMode::Opaque),
-            ("rough transmission (taken as smooth)", factor >= 0.5 && roughness > 0.05),
-        ] {
-            if present {
-                self.leave_out(what, &object);
-            }
-        }
-        for (what, share) in [("metallic", metallic), ("transmission", factor)] {
-            if share > 0.0 && share < 1.0 {
-                self.leave_out(format!("partly {what} surfaces (taken as the nearer of both)"), &object);
-            }
-        }
-        let in_range = |value: f32, low: f32, high: f32| value.is_finite() && value >= low && value <= high;
-        let are_in_range = |colour: Vec3, high: f32| colour.to_array().iter().all(|channel| in_range(*channel, 0.0, high));
-        let base_colour = Vec4::from(pbr.base_color_factor()).truncate();
-        let emission = Vec3::from(material.emissive_factor()) * material.emissive_strength().unwrap_or(1.0);
-        let Vec3 { x: red, y: green, z: blue } = base_colour;
-        let reason = || format!("has the base colour {red} {green} {blue}; each must be from 0 to 1");
-        self.require(are_in_range(base_colour, 1.0), &object, reason)?;
-        self.require(are_in_range(emission, f32::MAX), &object, || format!("emits {emission}; each channel must be 0 or more and finite"))?;
-        let reason = || format!("has the index of refraction {ior}; it must be from 1 to 100");
-        self.require(in_range(ior, 1.0, 100.0), &object, reason)?;
-        for info in [pbr.base_color_texture(), material.emissive_texture()].into_iter().flatten() {
-            if let Some(transform) = info.texture_transform() {
-                let ([ox, oy], [sx, sy], turn) = (transform.offset(), transform.scale(), transform.rotation());
-                let is_ok = [ox, oy, sx, sy, turn].iter().all(|number| number.abs() <= MAX_TRANSFORM);
-                let reason = || {
-                    format!(
-                        "has a texture transform of offset {ox:e} {oy:e}, scale {sx:e} {sy:e} and rotation {turn:e}; each must be within {MAX_TRANSFORM:e}"
-                    )
-                };
-                self.require(is_ok, &object, reason)?;
-            }
-        }
-        let factors = Vec3::new(pbr.metallic_factor(), pbr.roughness_factor(), factor);
-        self.require(are_in_range(factors, 1.0), &object, || "has a metallic, roughness or transmission factor outside 0 to 1".into())?;
-        let vector = |[x, y]: [f32; 2]| DVec2::new(f64::from(x), f64::from(y));
-        let mut texture_use = |info: Option<gltf::texture::Info>| {
-            info.map(|info| {
-                let transform = info.texture_transform();
-                let set = transform.as_ref().and_then(gltf::texture::TextureTransform::tex_coord).unwrap_or(info.tex_coord());
-                if set > 1 {
-                    self.leave_out("texture coordinates beyond the second set (the first is used)", &object);
-                }
-                TextureUse {
-                    texture: self.texture_places[&info.texture().index()],
-                    uv_set: if set == 1 { 1 } else { 0 },
-                    transform: transform.map_or(UvTransform::NONE, |transform| UvTransform {
-                        scale: vector(transform.scale()),
-                        rotation: f64::from(transform.rotation()),
-                        offset: vector(transform.offset()),
-                    }),
-                }
-            })
-        };
-        Ok(Material {
-            surface: Surface::Layered,
-            base_colour,
-            base_colour_texture: texture_use(pbr.base_color_texture()),
-            emission,
-            emission_texture: texture_use(material.emissive_texture()),
-            two_sided: material.double_sided(),
-            layers: Layers {
-                metallic,
-                roughness,
-                ior,
-                transmission: factor,
-                medium: (factor > 0.0).then_some(Medium { transmittance: Vec3::ONE }),
-                ..Layers::default()
-            },
-            ..Material::lambert(&name, base_colour)
-        })
     }
 }
 
-fn image_limits() -> image::Limits {
-    let mut limits = image::Limits::default();
-    // A picture of a few bytes must not unfold into gigabytes.
-    limits.max_alloc = Some(1 << 30);
-    limits
+/// Of one material.
+struct Reader<'a> {
+    loader: &'a mut Loader,
+    document: &'a Document,
+    /// Its name in complaints.
+    object: String,
+}
+
+impl Reader<'_> {
+    fn material(mut self, name: &str, json: &gltf::json::Material) -> Result<Material> {
+        let no_extensions = Extensions::default();
+        let extensions = json.extensions.as_ref().unwrap_or(&no_extensions);
+        self.name_what_is_left_out(json, extensions);
+        let is_unlit = extensions.unlit.is_some();
+        let pbr = &json.pbr_metallic_roughness;
+        // Where a file has both models, it prefers this one.
+        let glossy = extensions.pbr_specular_glossiness.as_ref().filter(|_| !is_unlit);
+        let ([red, green, blue, alpha], texture) = match glossy {
+            Some(glossy) => (glossy.diffuse_factor.0, &glossy.diffuse_texture),
+            None => (pbr.base_color_factor.0, &pbr.base_color_texture),
+        };
+        let base_colour = self.colour("base colour", [red, green, blue], 1.0)?;
+        let alpha = self.factor("alpha", alpha, 1.0)?;
+        let read = Material {
+            surface: Surface::Layered,
+            base_colour_texture: self.texture(texture.as_ref(), Meaning::Colours)?,
+            two_sided: json.double_sided,
+            coverage: match json.alpha_mode {
+                Checked::Valid(AlphaMode::Mask) => {
+                    Coverage::Mask { alpha, cutoff: self.factor("alpha cutoff", json.alpha_cutoff.unwrap_or_default().0, ANY)? }
+                }
+                Checked::Valid(AlphaMode::Blend) => Coverage::Blend { alpha },
+                _ => Coverage::Whole,
+            },
+            ..Material::lambert(name, base_colour)
+        };
+        if is_unlit {
+            return Ok(Material { layers: Layers { is_unlit, ..Layers::default() }, ..read });
+        }
+
+        let strength = extensions.emissive_strength.as_ref().map_or(1.0, |extension| extension.emissive_strength.0);
+        let emission = Vec3::from(json.emissive_factor.0) * strength;
+        let reason = || format!("emits {emission}; each channel must be 0 or more and finite");
+        self.loader.require(emission.is_finite() && emission.min_element() >= 0.0, &self.object, reason)?;
+        let ior = extensions.ior.as_ref().map_or(1.5, |extension| extension.ior.0);
+        let reason = || format!("has the index of refraction {ior}; it must be 0, or from 1 to 100");
+        self.loader.require(ior == 0.0 || (1.0..=100.0).contains(&ior), &self.object, reason)?;
+        let mut layers = Layers { ior, ..Layers::default() };
+        match glossy {
+            Some(glossy) => {
+                let glossiness = self.factor("glossiness", glossy.glossiness_factor.0, 1.0)?;
+                let texture = glossy.specular_glossiness_texture.as_ref();
+                layers.metallic = 0.0;
+                layers.ior = 0.0;
+                layers.specular_colour = self.colour("specular colour", glossy.specular_factor.0, 1.0)?;
+                layers.specular_colour_texture = self.texture(texture, Meaning::Colours)?;
+                layers.metallic_roughness_texture = self.texture(texture, Meaning::Glossiness(glossiness.to_bits()))?;
+                layers.roughness = if texture.is_some() { 1.0 } else { 1.0 - glossiness };
+            }
+            None => {
+                layers.metallic = self.factor("metallic factor", pbr.metallic_factor.0, 1.0)?;
+                layers.roughness = self.factor("roughness factor", pbr.roughness_factor.0, 1.0)?;
+                layers.metallic_roughness_texture = self.texture(pbr.metallic_roughness_texture.as_ref(), Meaning::Numbers)?;
+            }
+        }
+        if let Some(specular) = extensions.specular.as_ref().filter(|_| glossy.is_none()) {
+            layers.specular = self.factor("specular factor", specular.specular_factor.0, 1.0)?;
+            layers.specular_texture = self.texture(specular.specular_texture.as_ref(), Meaning::Numbers)?;
+            layers.specular_colour = self.colour("specular colour", specular.specular_color_factor.0, ANY)?;
+            layers.specular_colour_texture = self.texture(specular.specular_color_texture.as_ref(), Meaning::Colours)?;
+        }
+        if let Some(transmission) = &extensions.transmission {
+            layers.transmission = self.factor("transmission factor", transmission.transmission_factor.0, 1.0)?;
+            layers.transmission_texture = self.texture(transmission.transmission_texture.as_ref(), Meaning::Numbers)?;
+        }
+        if let Some(volume) = &extensions.volume {
+            let medium = self.medium(volume)?;
+            // No light goes into an opaque surface.
+            layers.medium = medium.filter(|_| layers.transmission > 0.0);
+        }
+        if let Some(coat) = self.extension::<ClearCoat>(extensions, "KHR_materials_clearcoat")? {
+            layers.coat = self.factor("clear coat factor", coat.clearcoat_factor, 1.0)?;
+            layers.coat_texture = self.texture(coat.clearcoat_texture.as_ref(), Meaning::Numbers)?;
+            layers.coat_roughness = self.factor("clear coat roughness", coat.clearcoat_roughness_factor, 1.0)?;
+            layers.coat_roughness_texture = self.texture(coat.clearcoat_roughness_texture.as_ref(), Meaning::Numbers)?;
+            layers.coat_normal_map = self.normal_map(coat.clearcoat_normal_texture.as_ref())?;
+        }
+        if let Some(sheen) = self.extension::<Sheen>(extensions, "KHR_materials_sheen")? {
+            layers.sheen_colour = self.colour("sheen colour", sheen.sheen_color_factor, 1.0)?;
+            layers.sheen_colour_texture = self.texture(sheen.sheen_color_texture.as_ref(), Meaning::Colours)?;
+            layers.sheen_roughness = self.factor("sheen roughness", sheen.sheen_roughness_factor, 1.0)?;
+            layers.sheen_roughness_texture = self.texture(sheen.sheen_roughness_texture.as_ref(), Meaning::Numbers)?;
+        }
+        Ok(Material {
+            emission,
+            emission_texture: self.texture(json.emissive_texture.as_ref(), Meaning::Colours)?,
+            normal_map: self.normal_map(json.normal_texture.as_ref())?,
+            layers,
+            ..read
+        })
+    }
+
+    fn name_what_is_left_out(&mut self, json: &gltf::json::Material, extensions: &Extensions) {
+        let has_thickness = extensions.volume.as_ref().is_some_and(|volume| volume.thickness_texture.is_some());
+        for (what, is_there) in [
+            ("occlusion textures (what they guess is computed)", json.occlusion_texture.is_some()),
+            ("thickness textures (rays measure the thickness)", has_thickness),
+        ] {
+            if is_there {
+                self.loader.leave_out(what, &self.object);
+            }
+        }
+        for extension in extensions.others.keys().filter(|name| !READ_EXTENSIONS.contains(&name.as_str())) {
+            self.loader.leave_out(format!("the extension {extension}"), &self.object);
+        }
+    }
+
+    /// A factor from 0 to `high`.
+    fn factor(&self, what: &str, value: f32, high: f32) -> Result<f32> {
+        let reason = || format!("has the {what} {value}; it must be {}", range(high));
+        self.loader.require(value.is_finite() && (0.0..=high).contains(&value), &self.object, reason)?;
+        Ok(value)
+    }
+
+    /// A colour with each channel from 0 to `high`.
+    fn colour(&self, what: &str, value: [f32; 3], high: f32) -> Result<Vec3> {
+        let [red, green, blue] = value;
+        let is_ok = value.iter().all(|channel| channel.is_finite() && (0.0..=high).contains(channel));
+        self.loader.require(is_ok, &self.object, || format!("has the {what} {red} {green} {blue}; each must be {}", range(high)))?;
+        Ok(value.into())
+    }
+
+    /// `None`: a thin wall.
+    fn medium(&mut self, volume: &Volume) -> Result<Option<Medium>> {
+        let thickness = self.factor("thickness", volume.thickness_factor.0, ANY)?;
+        let distance = volume.attenuation_distance.0;
+        let reason = || format!("has the attenuation distance {distance}; it must be above 0");
+        self.loader.require(distance > 0.0, &self.object, reason)?;
+        let colour = self.colour("attenuation colour", volume.attenuation_color.0, 1.0)?;
+        if thickness == 0.0 {
+            return Ok(None);
+        }
+        let transmittance = colour.as_dvec3().powf(1.0 / f64::from(distance)).as_vec3();
+        // Beyond that a number of single precision is 0, and the medium would be black.
+        let is_lost = (0..3).any(|channel| colour[channel] > 0.0 && transmittance[channel] < f32::MIN_POSITIVE);
+        if is_lost {
+            self.loader.leave_out("attenuation that leaves less than 1e-38 of the light after a metre (taken as 1e-38)", &self.object);
+        }
+        let least = Vec3::from(colour.to_array().map(|channel| if channel > 0.0 { f32::MIN_POSITIVE } else { 0.0 }));
+        Ok(Some(Medium { transmittance: transmittance.max(least) }))
+    }
+
+    fn texture(&mut self, info: Option<&Info>, meaning: Meaning) -> Result<Option<TextureUse>> {
+        let Some(info) = info else { return Ok(None) };
+        let transform = info.extensions.as_ref().and_then(|extensions| extensions.texture_transform.as_ref());
+        self.texture_use(info.index.value(), info.tex_coord, transform, meaning).map(Some)
+    }
+
+    fn normal_map(&mut self, info: Option<&NormalTexture>) -> Result<Option<NormalMap>> {
+        let Some(info) = info else { return Ok(None) };
+        let transform = info.extensions.as_ref().and_then(|extensions| extensions.others.get("KHR_texture_transform"));
+        let transform: Option<TextureTransform> = transform.map(|value| self.parsed("KHR_texture_transform", value)).transpose()?;
+        let texture = self.texture_use(info.index.value(), info.tex_coord, transform.as_ref(), Meaning::Numbers)?;
+        let scale = info.scale;
+        let reason = || format!("has the normal scale {scale:e}; it must be within {MAX_TRANSFORM:e}");
+        self.loader.require(scale.abs() <= MAX_TRANSFORM, &self.object, reason)?;
+        Ok(Some(NormalMap { texture, scale }))
+    }
+
+    fn texture_use(&mut self, number: usize, set: u32, transform: Option<&TextureTransform>, meaning: Meaning) -> Result<TextureUse> {
+        let Some(texture) = self.document.textures().nth(number) else {
+            let count = self.document.textures().len();
+            return Err(self.loader.refuse(&self.object, format!("uses texture {number} of {count}")));
+        };
+        let set = transform.and_then(|transform| transform.tex_coord).unwrap_or(set);
+        if set > 1 {
+            self.loader.leave_out("texture coordinates beyond the second set (the first is used)", &self.object);
+        }
+        Ok(TextureUse {
+            texture: self.loader.texture_place(&texture, meaning),
+            uv_set: if set == 1 { 1 } else { 0 },
+            transform: transform.map_or(Ok(UvTransform::NONE), |transform| self.uv_transform(transform))?,
+        })
+    }
+
+    fn uv_transform(&self, transform: &TextureTransform) -> Result<UvTransform> {
+        let ([ox, oy], [sx, sy], turn) = (transform.offset.0, transform.scale.0, transform.rotation.0);
+        let is_ok = [ox, oy, sx, sy, turn].iter().all(|number| number.abs() <= MAX_TRANSFORM);
+        let reason = || {
+            format!(
+                "has a texture transform of offset {ox:e} {oy:e}, scale {sx:e} {sy:e} and rotation {turn:e}; each must be within {MAX_TRANSFORM:e}"
+            )
+        };
+        self.loader.require(is_ok, &self.object, reason)?;
+        let vector = |x: f32, y: f32| DVec2::new(x.into(), y.into());
+        Ok(UvTransform { scale: vector(sx, sy), rotation: turn.into(), offset: vector(ox, oy) })
+    }
+
+    /// An extension that the `gltf` crate leaves as it stands in the file.
+    fn extension<T: DeserializeOwned>(&self, extensions: &Extensions, name: &str) -> Result<Option<T>> {
+        extensions.others.get(name).map(|value| self.parsed(name, value)).transpose()
+    }
+
+    fn parsed<T: DeserializeOwned>(&self, name: &str, value: &Value) -> Result<T> {
+        T::deserialize(value).map_err(|error| self.loader.refuse(&self.object, format!("has a {name} that cannot be read ({error})")))
+    }
+}
+
+/// From 0.
+fn range(high: f32) -> String {
+    if high == ANY { "0 or more and finite".to_owned() } else { format!("from 0 to {high}") }
 }

@@ -3,16 +3,18 @@
 use std::collections::HashMap;
 use std::sync::Arc;
 
-use glam::{DMat3, DMat4, DVec2, DVec3, Vec3};
+use glam::{DMat3, DMat4, DVec2, DVec3, DVec4, Vec3, Vec4};
 use gltf::Semantic;
-use gltf::accessor::Dimensions;
+use gltf::accessor::{DataType, Dimensions};
 use gltf::mesh::Mode;
 use rayon::prelude::*;
 
 use super::accessor::{self, Vertices};
+use super::tangents::{self, Surface};
 use super::{Loader, called, node_name};
 use crate::error::Result;
 use crate::scene::Mesh;
+use crate::scene::material::TextureUse;
 
 /// Of all instances together: as many as the GPU's buffers of 4 GiB hold.
 const MAX_TRIANGLES: usize = 100_000_000;
@@ -29,6 +31,8 @@ pub(super) struct Part<'a> {
     pub(super) skin: Option<Arc<Vec<DMat4>>>,
     /// By how much each morph target shifts it at rest.
     pub(super) weights: Vec<f32>,
+    /// Its place in the scene.
+    pub(super) material: usize,
 }
 
 impl Part<'_> {
@@ -59,7 +63,7 @@ impl Loader {
     }
 
     /// Takes note of a primitive if it makes triangles, and of what it has that is not read.
-    pub(super) fn list_primitive<'a>(&mut self, part: Part<'a>, parts: &mut Vec<Part<'a>>) -> Result<()> {
+    pub(super) fn list_primitive<'a>(&mut self, mut part: Part<'a>, parts: &mut Vec<Part<'a>>) -> Result<()> {
         let owner = format!("mesh '{}'", part.name);
         let primitive = &part.primitive;
         if matches!(primitive.mode(), Mode::Points | Mode::Lines | Mode::LineLoop | Mode::LineStrip) {
@@ -72,12 +76,41 @@ impl Loader {
         let Some(positions) = primitive.get(&Semantic::Positions) else {
             return Err(self.refuse(&part.what(), "has no positions"));
         };
+        if positions.data_type() != DataType::F32 && !self.is_quantized {
+            self.leave_out("that KHR_mesh_quantization is not named (positions of whole numbers are read all the same)", &owner);
+        }
+        if part.weights.len() != primitive.morph_targets().len() && !part.weights.is_empty() {
+            self.leave_out("weights that are not as many as morph targets (those that are missing are 0)", &owner);
+        }
         let corners = primitive.indices().map_or(positions.count(), |indices| indices.count());
         self.triangle_count = self.triangle_count.saturating_add(corners / 3).saturating_add(positions.count().min(corners) / 4);
         let reason = || format!("brings the scene over {MAX_TRIANGLES} triangles, the most that are read");
         self.require(self.triangle_count <= MAX_TRIANGLES, &part.what(), reason)?;
+        part.material = self.material_of(primitive, &owner);
         parts.push(part);
         Ok(())
+    }
+
+    /// The place of a primitive's material; of one without those normal maps that it has no texture coordinates for.
+    fn material_of(&mut self, primitive: &gltf::Primitive, owner: &str) -> usize {
+        let place = primitive.material().index().unwrap_or(self.default_material);
+        let lacks = |used: TextureUse| primitive.get(&Semantic::TexCoords(used.uv_set as u32)).is_none();
+        let mut material = self.scene.materials[place].clone();
+        let named = format!("material '{}' on {owner}", material.name);
+        let maps = [&mut material.normal_map, &mut material.layers.coat_normal_map];
+        let is_useless = maps.map(|map| map.take_if(|map| lacks(map.texture)).is_some());
+        if material.textures().any(lacks) {
+            self.leave_out("texture coordinates that a mesh has not (its textures have their value at 0 0)", &named);
+        }
+        if is_useless == [false; 2] {
+            return place;
+        }
+        self.leave_out("normal maps on meshes without texture coordinates", &named);
+        let materials = &mut self.scene.materials;
+        *self.without_normal_maps.entry((place, is_useless)).or_insert_with(|| {
+            materials.push(material);
+            materials.len() - 1
+        })
     }
 
     pub(super) fn read_primitive(&self, part: &Part) -> Result<Mesh> {
@@ -111,16 +144,10 @@ impl Loader {
         let targets = || primitive.morph_targets().zip(part.weights.iter().map(|weight| f64::from(*weight))).filter(|(_, w)| *w != 0.0);
         let shifts = targets().filter_map(|(target, weight)| Some((target.positions()?, weight))).collect();
         let mut positions = shifted(read_vectors(&positions, "positions")?, shifts, "positions in a morph target")?;
-        positions.par_iter_mut().enumerate().for_each(|(vertex, position)| *position = matrix(vertex).transform_point3(*position));
-        let are_finite = positions.iter().all(|position| position.is_finite());
-        self.require(are_finite, &what, || "has a vertex that is not finite once transformed".into())?;
         let mut normals = Vec::new();
         if let Some(own) = primitive.get(&Semantic::Normals) {
             let shifts = targets().filter_map(|(target, weight)| Some((target.normals()?, weight))).collect();
             normals = shifted(read_vectors(&own, "normals")?, shifts, "normals in a morph target")?;
-            let of_node = normal_matrix(to_world);
-            let turn = |vertex: usize| matrices.as_ref().map_or(of_node, |matrices| normal_matrix(&matrices[vertex]));
-            normals.par_iter_mut().enumerate().for_each(|(vertex, normal)| *normal = (turn(vertex) * *normal).normalize_or_zero());
         }
         let mut uvs = [Vec::new(), Vec::new()];
         for (set, uvs) in uvs.iter_mut().enumerate() {
@@ -132,27 +159,80 @@ impl Loader {
                 }
             }
         }
-        let mut colours = Vec::new();
-        if let Some(own) = primitive.get(&Semantic::Colors(0)) {
-            of_vertices(&own, "vertex colours")?;
-            // Alpha is no part of the base colour.
-            colours = match own.dimensions() {
-                Dimensions::Vec3 => accessor::read(self, &own, &vertices, &what, vector)?,
-                _ => accessor::read(self, &own, &vertices, &what, |[r, g, b, _]: [f32; 4]| vector([r, g, b]))?,
-            };
-            if let Some(colour) = colours.iter().find(|colour| colour.min_element() < 0.0 || colour.max_element() > 1.0) {
-                let [red, green, blue] = colour.as_vec3().to_array();
-                return Err(self.refuse(&what, format!("has the vertex colour {red} {green} {blue}; each channel must be from 0 to 1")));
-            }
-        }
         let indices = indices.unwrap_or_else(|| (0..positions.len() as u32).collect());
         let mut triangles = triangles_of(primitive.mode(), &indices);
-        if matrices.as_ref().and_then(|matrices| matrices.first()).unwrap_or(to_world).determinant() < 0.0 {
+
+        // Tangents belong to the mesh's own space, as normal maps were made there.
+        let material = &self.scene.materials[part.material];
+        let maps = [material.normal_map, material.layers.coat_normal_map].map(|map| map.map(|map| map.texture));
+        let mut of_file: Option<Vec<DVec4>> = None;
+        // Those of a mesh without normals are to be ignored.
+        if let Some(own) = primitive.get(&Semantic::Tangents).filter(|_| maps != [None; 2] && !normals.is_empty()) {
+            of_vertices(&own, "tangents")?;
+            let own = accessor::read(self, &own, &vertices, &what, |tangent: [f32; 4]| Vec4::from(tangent).as_dvec4())?;
+            let shifts = targets().filter_map(|(target, weight)| Some((target.tangents()?, weight))).collect();
+            let directions = shifted(own.iter().map(|tangent| tangent.truncate()).collect(), shifts, "tangents in a morph target")?;
+            of_file = Some(directions.iter().zip(&own).map(|(direction, own)| direction.extend(own.w)).collect());
+        }
+        let surface = Surface { positions: &positions, normals: &normals, triangles: &triangles };
+        let tangents = |map: Option<TextureUse>| match (map, &of_file) {
+            (None, _) => Vec::new(),
+            // The file's are those of the first map.
+            (Some(map), Some(tangents)) if maps[0].is_none_or(|first| first.has_coordinates_of(&map)) => {
+                triangles.iter().map(|triangle| triangle.map(|vertex| tangents[vertex as usize])).collect()
+            }
+            (Some(map), _) => surface.tangents(&uvs[map.uv_set], map.transform),
+        };
+        let mut tangents = maps.map(tangents);
+
+        positions.par_iter_mut().enumerate().for_each(|(vertex, position)| *position = matrix(vertex).transform_point3(*position));
+        let are_finite = positions.iter().all(|position| position.is_finite());
+        self.require(are_finite, &what, || "has a vertex that is not finite once transformed".into())?;
+        let of_node = normal_matrix(to_world);
+        let turn = |vertex: usize| matrices.as_ref().map_or(of_node, |matrices| normal_matrix(&matrices[vertex]));
+        normals.par_iter_mut().enumerate().for_each(|(vertex, normal)| *normal = (turn(vertex) * *normal).normalize_or_zero());
+        let is_mirrored = matrices.as_ref().and_then(|matrices| matrices.first()).unwrap_or(to_world).determinant() < 0.0;
+        if is_mirrored {
             // A mirrored instance would show its back.
             triangles.iter_mut().for_each(|triangle| triangle.swap(1, 2));
+            tangents.iter_mut().flatten().for_each(|triangle| triangle.swap(1, 2));
         }
-        let material = primitive.material().index().unwrap_or(self.scene.materials.len() - 1);
-        Ok(Mesh { name: name.clone(), positions, normals, uvs, colours, triangles, material, ..Mesh::default() })
+        let surface = Surface { positions: &positions, normals: &normals, triangles: &triangles };
+        let turned = |vertex: usize, tangent: DVec3| matrix(vertex).transform_vector3(tangent);
+        let [tangents, coat_tangents] = tangents.map(|tangents| tangents::in_world(&tangents, &surface, is_mirrored, turned));
+
+        let (mut colours, mut alphas) = (Vec::new(), Vec::new());
+        if let Some(own) = primitive.get(&Semantic::Colors(0)) {
+            of_vertices(&own, "vertex colours")?;
+            (colours, alphas) = match own.dimensions() {
+                Dimensions::Vec3 => (accessor::read(self, &own, &vertices, &what, vector)?, Vec::new()),
+                _ => accessor::read(self, &own, &vertices, &what, |[r, g, b, a]: [f32; 4]| (vector([r, g, b]), f64::from(a)))?
+                    .into_iter()
+                    .unzip(),
+            };
+            let with_alpha = |vertex: usize| colours[vertex].extend(alphas.get(vertex).copied().unwrap_or(1.0));
+            let mut all = (0..colours.len()).map(with_alpha);
+            if let Some(colour) = all.find(|colour| colour.min_element() < 0.0 || colour.max_element() > 1.0) {
+                let [red, green, blue, alpha] = colour.as_vec4().to_array();
+                let reason = format!("has the vertex colour {red} {green} {blue}, alpha {alpha}; each must be from 0 to 1");
+                return Err(self.refuse(&what, reason));
+            }
+            if alphas.iter().all(|alpha| *alpha == 1.0) {
+                alphas = Vec::new();
+            }
+        }
+        Ok(Mesh {
+            name: name.clone(),
+            positions,
+            normals,
+            uvs,
+            colours,
+            alphas,
+            tangents,
+            coat_tangents,
+            triangles,
+            material: part.material,
+        })
     }
 
     /// Indices into those of the vertices that the primitive uses, as many primitives may share one list of vertices;

@@ -1,16 +1,17 @@
 //! Scenes from `.gltf` and `.glb` files (glTF 2.0).
 //!
 //! Read: meshes with node transforms and instances, skins in the pose of their nodes and morph targets by their weights at rest,
-//! quantized or not, smooth normals, two sets of texture coordinates and their transforms, base colour and emission with textures,
-//! vertex colours, metallic-roughness (mapped by [`super::material::surface_of`], textures by their mean),
-//! KHR_materials_emissive_strength, _ior, _transmission, KHR_lights_punctual, perspective cameras. Whatever else the file holds is
-//! named in a warning.
+//! quantized or not, smooth normals, tangents, two sets of texture coordinates and their transforms, vertex colours, materials as
+//! [`super::Surface::Layered`] with all that [`super::material::Layers`] has, KHR_lights_punctual, perspective cameras. Whatever
+//! else the file holds is named in a warning.
 
 mod accessor;
 mod lights;
 mod malformed;
 mod materials;
 mod meshes;
+mod tangents;
+mod textures;
 
 use std::collections::hash_map::Entry;
 use std::collections::{BTreeMap, BTreeSet, HashMap};
@@ -28,27 +29,31 @@ use super::{Mesh, Progress, Scene};
 use crate::error::{Error, Result};
 use crate::text::{counted, refusal, some_of};
 use meshes::Part;
+use textures::Wanted;
 
 /// Larger files are refused: their triangles would not fit a device's buffers either.
 const MAX_FILE_BYTES: u64 = 4 << 30;
-const READ_EXTENSIONS: [&str; 6] = [
+const READ_EXTENSIONS: [&str; 12] = [
     "KHR_lights_punctual",
+    "KHR_materials_clearcoat",
     "KHR_materials_emissive_strength",
     "KHR_materials_ior",
+    "KHR_materials_pbrSpecularGlossiness",
+    "KHR_materials_sheen",
+    "KHR_materials_specular",
     "KHR_materials_transmission",
+    "KHR_materials_unlit",
+    "KHR_materials_volume",
     "KHR_mesh_quantization",
     "KHR_texture_transform",
 ];
 /// What a surface has besides its base: a file that needs one of these is read without it, and a warning says so.
-const OPTIONAL_EXTENSIONS: [&str; 8] = [
+const OPTIONAL_EXTENSIONS: [&str; 5] = [
     "KHR_materials_anisotropy",
-    "KHR_materials_clearcoat",
     "KHR_materials_diffuse_transmission",
     "KHR_materials_dispersion",
     "KHR_materials_iridescence",
-    "KHR_materials_sheen",
-    "KHR_materials_specular",
-    "KHR_materials_volume",
+    "KHR_materials_variants",
 ];
 /// Nodes within nodes; deeper ones would be a cycle.
 const MAX_DEPTH: usize = 512;
@@ -87,13 +92,16 @@ pub fn load(path: &Path, radiometric: bool, progress: Progress) -> Result<Scene>
         scene: Scene { name: path.file_stem().unwrap_or_default().to_string_lossy().into_owned(), ..Scene::default() },
         left_out: BTreeMap::new(),
         triangle_count: 0,
+        wanted_textures: Vec::new(),
         texture_places: HashMap::new(),
-        mean_roughness_and_metalness: HashMap::new(),
+        default_material: 0,
+        without_normal_maps: HashMap::new(),
+        is_quantized: document.extensions_used().any(|extension| extension == "KHR_mesh_quantization"),
         unit: if radiometric { 1.0 } else { 1.0 / LUMENS_PER_WATT },
     };
     loader.read_buffers(&document, blob)?;
-    loader.read_textures(&document, progress)?;
     loader.read_materials(&document)?;
+    loader.read_textures(&document, progress)?;
     loader.read_nodes(&document, progress)?;
     loader.name_what_is_left_out(&document);
     loader.finish()
@@ -142,10 +150,15 @@ pub(super) struct Loader {
     left_out: BTreeMap<String, BTreeSet<String>>,
     /// Triangles and vertices of all instances so far.
     triangle_count: usize,
-    /// Where a texture of the file stands in the scene.
-    texture_places: HashMap<usize, usize>,
-    /// Mean roughness and metalness of pictures, by their number in the file; `None` where one cannot be read.
-    mean_roughness_and_metalness: HashMap<usize, Option<[f32; 2]>>,
+    /// The scene's textures, in order.
+    wanted_textures: Vec<Wanted>,
+    texture_places: HashMap<Wanted, usize>,
+    /// The place of the material of primitives that name none.
+    default_material: usize,
+    /// Places of copies of a material, by its place and which of its two normal maps they are without.
+    without_normal_maps: HashMap<(usize, [bool; 2]), usize>,
+    /// Whether the file says that vertices may be whole numbers.
+    is_quantized: bool,
     /// Watts in one unit of a punctual light.
     unit: f32,
 }
@@ -230,7 +243,8 @@ impl Loader {
                 };
                 let weights = node.weights().or(mesh.weights()).unwrap_or_default().to_vec();
                 for primitive in mesh.primitives() {
-                    let part = Part { primitive, name: name.clone(), to_world: own, skin: skin.clone(), weights: weights.clone() };
+                    let (name, skin, weights) = (name.clone(), skin.clone(), weights.clone());
+                    let part = Part { primitive, name, to_world: own, skin, weights, material: self.default_material };
                     self.list_primitive(part, &mut parts)?;
                 }
             }
