@@ -27,6 +27,7 @@ mod layout;
 mod ledger;
 mod lights;
 mod limits;
+mod materials;
 mod memory;
 mod openings;
 mod optics;

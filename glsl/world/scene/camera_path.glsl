@@ -118,176 +118,185 @@ const float MAX_SURVIVAL = 0.95;
 const uint RECEIVER_BLOCK = 1 + VERTEX_BLOCKS * MAX_BOUNCES;
 const uint ROULETTE_BLOCK = RECEIVER_BLOCK + 1;
 
-// Follows the chain of sample `number` of a place, which is over `first_depth` surfaces already. Says whether it is still under
-// way. Random numbers: block 1 + VERTEX_BLOCKS * depth goes on, the one after it is for direct light.
+// Takes the chain of sample `number` of a place over the next surface, behind `depth` others. Says whether it goes on. Random numbers:
+// block 1 + VERTEX_BLOCKS * depth goes on, the one after it is for direct light.
+bool step_chain(inout Chain chain, uint index, uint number, uint pixel_count, Draws draws, uint emitter_count, uint depth)
+{
+    note_unless(is_finite(chain.position) && is_finite(chain.direction) && is_finite(chain.weight), NONFINITE_LIGHT, draws.domain,
+                draws.round, index);
+    vec3 wo = -chain.direction;
+    Hit hit = closest_hit(chain.position, chain.direction);
+    if (hit.triangle == NONE) {
+        if (chain.sees_emission) {
+            float light_density = 0.0;
+            if (HAS_LAYERS) {
+                light_density = sky_light_density(emitter_count, chain.from, chain.from_normal, chain.direction);
+            }
+            add_emission(chain, environment_radiance(emitter_count), light_density);
+        }
+        return false;
+    }
+    Surface surface = surface_at(hit, wo);
+    uint block = 1 + VERTEX_BLOCKS * depth;
+    bool is_layered = false;
+    if (HAS_LAYERS) {
+        is_layered = surface.kind == SURFACE_LAYERED;
+    }
+    Lobes lobes;
+    Scatter scatter;
+    float matt = 1.0;
+    if (is_layered) {
+        lobes = lobes_of(surface, wo, index_ratio(surface));
+        // The eye does not see the back of what has one side.
+        bool is_culled = !surface.scatters && !chain.gathers;
+        scatter = sample_layered(surface, lobes, wo, stratified(number, SAMPLES, words_of(index, block, draws)).zxy, depth, true);
+        if (HAS_PASSING) {
+            if (is_culled || scatter.passes) {
+                chain.weight *= is_culled ? vec3(1.0) : scatter.weight;
+                chain.position = offset_origin(surface.position, surface.error, surface.ng, chain.direction);
+                return true;
+            }
+            chain.weight *= divide(surface.layers.coverage, 1.0 - lobes.pass_chance);
+        }
+        matt = matt_chance(lobes, surface.layers);
+        if (surface.layers.is_unlit && !chain.gathers) {
+            add_light(chain, surface.base_colour);
+        }
+    }
+    if (chain.sees_emission) {
+        float light_density = 0.0;
+        if (HAS_LAYERS) {
+            if (chain.density > 0.0 && surface.emission != vec3(0.0)) {
+                light_density = lamp_light_density(emitter_count, hit, chain.from, surface.position);
+            }
+        }
+        add_emission(chain, surface.emission, light_density);
+    }
+    if (!surface.scatters) {
+        return false;
+    }
+    bool specular = is_specular(surface);
+    if (is_layered) {
+        specular = scatter.is_specular;
+        chain.density = 0.0;
+        // Of what a gather ray meets the caustic map has counted the light of sharp lobes.
+        bool counts_sharp = !chain.gathers || chain.starts_nowhere;
+        if (SHADOW_RAYS != 0) {
+            Target here = plain_target(surface.position, surface.error, surface.ng, surface.ns, wo, surface.kind, 0.0);
+            here.surface = surface;
+            here.lobes = lobes;
+            vec3 light = direct_light(here, emitter_count, draws, index, number, block + 1);
+            if ((PARTS & part_of(chain, ARRIVED_DIRECT)) != 0) {
+                add_light(chain, light);
+            }
+            if (counts_sharp) {
+                bool saw_specular = chain.saw_specular;
+                chain.saw_specular = saw_specular || !chain.gathers;
+                add_light(chain, sharp_light);
+                chain.saw_specular = saw_specular;
+                chain.density = scatter.density;
+                chain.from = surface.position;
+                chain.from_normal = surface.ns;
+            }
+            note_shadow_rays(index, divide(chain.weight, float(SAMPLES)));
+        }
+        // Matt lobes are followed no further but for a gather.
+        if (!specular && matt == 0.0) {
+            return false;
+        }
+    }
+    if (!specular) {
+        vec3 scale = surface.base_colour * scatter_scale(surface.kind, surface.parameter);
+        bool asks_lights = SHADOW_RAYS != 0;
+        if (is_layered) {
+            asks_lights = false;
+            scale = vec3(divide(0.31830988618379067, matt));
+        }
+        if (asks_lights) {
+            if ((PARTS & part_of(chain, ARRIVED_DIRECT)) != 0) {
+                Target here = plain_target(surface.position, surface.error, surface.ng, surface.ns, wo, surface.kind, surface.parameter);
+                add_light(chain, scale * direct_light(here, emitter_count, draws, index, number, block + 1));
+                note_shadow_rays(index, divide(chain.weight * scale, float(SAMPLES)));
+            }
+        }
+        // Where it is by chance that a path gets here, each counts for itself.
+        bool for_all = !chain.saw_specular && !chain.gathers && matt == 1.0;
+        bool leads = !for_all || number == 0;
+        bool gathers = leads && !chain.gathers && gathers_here(surface) && (PARTS & part_of(chain, ARRIVED_INDIRECT)) != 0;
+        uint arrivals = arrivals_wanted(chain, gathers);
+        uint for_others = 0;
+        if (HAS_CAUSTIC_MAP) {
+            for_others = ARRIVED_CAUSTIC;
+        }
+        arrivals = leads ? arrivals : arrivals & for_others;
+        arrivals |= arrivals == 0 ? SEEN
+                                  : SEEN | (chain.saw_specular ? SEEN_OVER_SPECULAR : 0) | (chain.gathers ? SEEN_BY_GATHER : 0)
+                                        | (for_all ? SEEN_FOR_ALL : 0);
+        if (HAS_LAYERS) {
+            write_matt_lobes(chain.point_count, index, number, pixel_count, lobes);
+        }
+        chain.points[chain.point_count++] = VisiblePoint(surface.position, surface.plane, divide(chain.weight * scale, float(SAMPLES)),
+                                                         surface.ns == surface.ng ? NONE : pack_normal(surface.ns), pack_direction(wo, 0), surface.parameter,
+                                                         surface.kind, arrivals);
+        if (!gathers) {
+            return false;
+        }
+        chain.gathers = true;
+        chain.weight *= for_all ? float(SAMPLES) : 1.0;
+        // Shadow rays and the caustic map have counted what shines from here on.
+        chain.sees_emission = false;
+    }
+    bool ends = specular && !chain.gathers;
+    if (HAS_SPECULAR_CHAINS) {
+        ends = false;
+    }
+    if (ends) {
+        return false;
+    }
+    uint count = SAMPLES; // build.rs cannot reflect a constant that is compared with `>=`
+    vec3 u = stratified(number, count, words_of(index, block, draws)).zxy;
+    float mirror_chance = 0.0;
+    if (count >= MIRROR_SAMPLES && specular && depth < 2 && !chain.gathers) {
+        mirror_chance = MIRROR_CHANCES[depth];
+        u.x = chain.choices[depth];
+    }
+    if (!is_layered) {
+        scatter = sample_scatter(surface, wo, u, depth, true, mirror_chance);
+    }
+    if (!scatter.alive) {
+        return false;
+    }
+    if (depth >= ROULETTE_DEPTH) {
+        float most = depth < LOSSLESS_DEPTH ? 1.0 : MAX_SURVIVAL;
+        float survival = min(max(scatter.weight.x, max(scatter.weight.y, scatter.weight.z)), most);
+        if (stratified(number, count, words_of(index, ROULETTE_BLOCK + depth, draws)).x >= survival) {
+            return false;
+        }
+        scatter.weight = divide(scatter.weight, survival);
+    }
+    if (surface.kind == SURFACE_PAPER_PHONG) {
+        scatter.weight *= lobe_weight(surface.kind, surface.parameter, surface.ns, wo, scatter.direction);
+    }
+    chain.weight *= scatter.weight;
+    // No caustic map holds what reaches a receiver in the air over mirrors and glass.
+    chain.sees_emission = chain.sees_emission || (chain.starts_nowhere && specular);
+    if (is_layered && !specular) {
+        chain.density = 0.0;
+    }
+    chain.saw_specular = chain.saw_specular || (specular && !chain.gathers);
+    chain.position = offset_origin(surface.position, surface.error, surface.ng, scatter.direction);
+    chain.direction = scatter.direction;
+    return true;
+}
+
+// Follows a chain that is over `first_depth` surfaces already. Says whether it is still under way.
 bool follow(inout Chain chain, uint index, uint number, uint pixel_count, Draws draws, uint emitter_count, uint first_depth)
 {
     uint end_depth = min(first_depth + CHAIN_STEPS, MAX_BOUNCES);
     for (uint depth = first_depth; depth < end_depth; depth++) {
-        note_unless(is_finite(chain.position) && is_finite(chain.direction) && is_finite(chain.weight), NONFINITE_LIGHT, draws.domain,
-                    draws.round, index);
-        vec3 wo = -chain.direction;
-        Hit hit = closest_hit(chain.position, chain.direction);
-        if (hit.triangle == NONE) {
-            if (chain.sees_emission) {
-                float light_density = 0.0;
-                if (HAS_LAYERS) {
-                    light_density = sky_light_density(emitter_count, chain.from, chain.from_normal, chain.direction);
-                }
-                add_emission(chain, environment_radiance(emitter_count), light_density);
-            }
+        if (!step_chain(chain, index, number, pixel_count, draws, emitter_count, depth)) {
             return false;
         }
-        Surface surface = surface_at(hit, wo);
-        uint block = 1 + VERTEX_BLOCKS * depth;
-        bool is_layered = false;
-        if (HAS_LAYERS) {
-            is_layered = surface.kind == SURFACE_LAYERED;
-        }
-        Lobes lobes;
-        Scatter scatter;
-        float matt = 1.0;
-        if (is_layered) {
-            lobes = lobes_of(surface, wo, index_ratio(surface));
-            // The eye does not see the back of what has one side.
-            bool is_culled = !surface.scatters && !chain.gathers;
-            scatter = sample_layered(surface, lobes, wo, stratified(number, SAMPLES, words_of(index, block, draws)).zxy, depth, true);
-            if (HAS_PASSING) {
-                if (is_culled || scatter.passes) {
-                    chain.weight *= is_culled ? vec3(1.0) : scatter.weight;
-                    chain.position = offset_origin(surface.position, surface.error, surface.ng, chain.direction);
-                    continue;
-                }
-                chain.weight *= divide(surface.layers.coverage, 1.0 - lobes.pass_chance);
-            }
-            matt = matt_chance(lobes, surface.layers);
-            if (surface.layers.is_unlit && !chain.gathers) {
-                add_light(chain, surface.base_colour);
-            }
-        }
-        if (chain.sees_emission) {
-            float light_density = 0.0;
-            if (HAS_LAYERS) {
-                if (chain.density > 0.0 && surface.emission != vec3(0.0)) {
-                    light_density = lamp_light_density(emitter_count, hit, chain.from, surface.position);
-                }
-            }
-            add_emission(chain, surface.emission, light_density);
-        }
-        if (!surface.scatters) {
-            return false;
-        }
-        bool specular = is_specular(surface);
-        if (is_layered) {
-            specular = scatter.is_specular;
-            chain.density = 0.0;
-            // Of what a gather ray meets the caustic map has counted the light of sharp lobes.
-            bool counts_sharp = !chain.gathers || chain.starts_nowhere;
-            if (SHADOW_RAYS != 0) {
-                Target here = plain_target(surface.position, surface.error, surface.ng, surface.ns, wo, surface.kind, 0.0);
-                here.surface = surface;
-                here.lobes = lobes;
-                vec3 light = direct_light(here, emitter_count, draws, index, number, block + 1);
-                if ((PARTS & part_of(chain, ARRIVED_DIRECT)) != 0) {
-                    add_light(chain, light);
-                }
-                if (counts_sharp) {
-                    bool saw_specular = chain.saw_specular;
-                    chain.saw_specular = saw_specular || !chain.gathers;
-                    add_light(chain, sharp_light);
-                    chain.saw_specular = saw_specular;
-                    chain.density = scatter.density;
-                    chain.from = surface.position;
-                    chain.from_normal = surface.ns;
-                }
-                note_shadow_rays(index, divide(chain.weight, float(SAMPLES)));
-            }
-            // Matt lobes are followed no further but for a gather.
-            if (!specular && matt == 0.0) {
-                return false;
-            }
-        }
-        if (!specular) {
-            vec3 scale = surface.base_colour * scatter_scale(surface.kind, surface.parameter);
-            bool asks_lights = SHADOW_RAYS != 0;
-            if (is_layered) {
-                asks_lights = false;
-                scale = vec3(divide(0.31830988618379067, matt));
-            }
-            if (asks_lights) {
-                if ((PARTS & part_of(chain, ARRIVED_DIRECT)) != 0) {
-                    Target here = plain_target(surface.position, surface.error, surface.ng, surface.ns, wo, surface.kind, surface.parameter);
-                    add_light(chain, scale * direct_light(here, emitter_count, draws, index, number, block + 1));
-                    note_shadow_rays(index, divide(chain.weight * scale, float(SAMPLES)));
-                }
-            }
-            // Where it is by chance that a path gets here, each counts for itself.
-            bool for_all = !chain.saw_specular && !chain.gathers && matt == 1.0;
-            bool leads = !for_all || number == 0;
-            bool gathers = leads && !chain.gathers && gathers_here(surface) && (PARTS & part_of(chain, ARRIVED_INDIRECT)) != 0;
-            uint arrivals = arrivals_wanted(chain, gathers);
-            uint for_others = 0;
-            if (HAS_CAUSTIC_MAP) {
-                for_others = ARRIVED_CAUSTIC;
-            }
-            arrivals = leads ? arrivals : arrivals & for_others;
-            arrivals |= arrivals == 0 ? SEEN
-                                      : SEEN | (chain.saw_specular ? SEEN_OVER_SPECULAR : 0) | (chain.gathers ? SEEN_BY_GATHER : 0)
-                                            | (for_all ? SEEN_FOR_ALL : 0);
-            if (HAS_LAYERS) {
-                write_matt_lobes(chain.point_count, index, number, pixel_count, lobes);
-            }
-            chain.points[chain.point_count++] = VisiblePoint(surface.position, surface.plane, divide(chain.weight * scale, float(SAMPLES)),
-                                                             surface.ns == surface.ng ? NONE : pack_normal(surface.ns), pack_direction(wo, 0), surface.parameter,
-                                                             surface.kind, arrivals);
-            if (!gathers) {
-                return false;
-            }
-            chain.gathers = true;
-            chain.weight *= for_all ? float(SAMPLES) : 1.0;
-            // Shadow rays and the caustic map have counted what shines from here on.
-            chain.sees_emission = false;
-        }
-        bool ends = specular && !chain.gathers;
-        if (HAS_SPECULAR_CHAINS) {
-            ends = false;
-        }
-        if (ends) {
-            return false;
-        }
-        uint count = SAMPLES; // build.rs cannot reflect a constant that is compared with `>=`
-        vec3 u = stratified(number, count, words_of(index, block, draws)).zxy;
-        float mirror_chance = 0.0;
-        if (count >= MIRROR_SAMPLES && specular && depth < 2 && !chain.gathers) {
-            mirror_chance = MIRROR_CHANCES[depth];
-            u.x = chain.choices[depth];
-        }
-        if (!is_layered) {
-            scatter = sample_scatter(surface, wo, u, depth, true, mirror_chance);
-        }
-        if (!scatter.alive) {
-            return false;
-        }
-        if (depth >= ROULETTE_DEPTH) {
-            float most = depth < LOSSLESS_DEPTH ? 1.0 : MAX_SURVIVAL;
-            float survival = min(max(scatter.weight.x, max(scatter.weight.y, scatter.weight.z)), most);
-            if (stratified(number, count, words_of(index, ROULETTE_BLOCK + depth, draws)).x >= survival) {
-                return false;
-            }
-            scatter.weight = divide(scatter.weight, survival);
-        }
-        if (surface.kind == SURFACE_PAPER_PHONG) {
-            scatter.weight *= lobe_weight(surface.kind, surface.parameter, surface.ns, wo, scatter.direction);
-        }
-        chain.weight *= scatter.weight;
-        // No caustic map holds what reaches a receiver in the air over mirrors and glass.
-        chain.sees_emission = chain.sees_emission || (chain.starts_nowhere && specular);
-        if (is_layered && !specular) {
-            chain.density = 0.0;
-        }
-        chain.saw_specular = chain.saw_specular || (specular && !chain.gathers);
-        chain.position = offset_origin(surface.position, surface.error, surface.ng, scatter.direction);
-        chain.direction = scatter.direction;
     }
     if (end_depth == MAX_BOUNCES) {
         note_cut_path(max(chain.weight.x, max(chain.weight.y, chain.weight.z)));
