@@ -1,7 +1,8 @@
 //! The judge, judged: scenes whose light is known in closed form.
 
 use crate::common::prelude::*;
-use photonmill::verify::judge::{Estimate, Image, fresnel, random};
+use photonmill::scene::material::{Coverage, Layers, Medium, NormalMap};
+use photonmill::verify::judge::{Estimate, Image, fresnel, lobes, random};
 
 const NO_LIMIT: u32 = u32::MAX;
 
@@ -476,4 +477,564 @@ fn the_checks_complain_about_one_percent() {
     assert!(!meets(mean, error, disc_irradiance(1.5, EmissionLaw::Cosine)));
     assert!(!meets(DVec3::NAN, DVec3::NAN, DVec3::ONE));
     assert!(!meets(DVec3::INFINITY, DVec3::INFINITY, DVec3::ONE));
+}
+
+/// What scatters as Lambert does: a dielectric that reflects nothing.
+fn plain(base_colour: Vec3) -> Material {
+    layered(base_colour, &Layers { metallic: 0.0, specular: 0.0, ..Layers::default() })
+}
+
+fn layered(base_colour: Vec3, layers: &Layers) -> Material {
+    Material { two_sided: true, ..Material::layered("layered", base_colour, *layers) }
+}
+
+fn metal(roughness: f32) -> Layers {
+    Layers { roughness, ..Layers::default() }
+}
+
+fn dielectric(roughness: f32) -> Layers {
+    Layers { metallic: 0.0, roughness, ..Layers::default() }
+}
+
+fn clear(roughness: f32, ior: f32) -> Layers {
+    Layers { transmission: 1.0, ior, ..dielectric(roughness) }
+}
+
+fn solid(roughness: f32, ior: f32, transmittance: Vec3) -> Layers {
+    Layers { medium: Some(Medium { transmittance }), ..clear(roughness, ior) }
+}
+
+/// A plate under nothing but this light, seen at this cosine.
+fn plate(material: Material, light: LightKind, cosine: f64, samples: u32) -> Estimate {
+    let lit = scene_of(vec![square(0.0, 1.0, true, 0)], vec![material], vec![light]);
+    radiance(&lit, 0.5 * DVec3::new((1.0 - cosine * cosine).sqrt(), 0.0, cosine), DVec3::ZERO, samples)
+}
+
+#[test]
+fn layered_plates_return_their_albedo_of_the_sky() {
+    // GGX with correlated Smith masking and F = 1; sharp lobes belong to the specular part.
+    for (alpha, cosine, albedo) in [(0.05f32, 0.5, 0.9927), (0.1, 0.2, 0.9046), (0.5, 0.5, 0.6983), (0.5, 0.05, 0.9125), (1.0, 1.0, 0.3069)]
+    {
+        let seen = plate(layered(Vec3::ONE, &metal(alpha.sqrt())), environment(), cosine, 20_000);
+        assert_meets("metal", seen.mean.total(), seen.total_standard_error + 5e-5, albedo * SKY);
+        let part = if alpha < 0.25 { seen.mean.specular } else { seen.mean.direct };
+        assert_eq!(seen.mean.total(), part);
+    }
+    // White plastic returns all of it, whatever its roughness; so does what is smoothly coated, and smooth glass.
+    for layers in [dielectric(0.0), dielectric(0.3), dielectric(1.0), Layers { coat: 1.0, ..dielectric(0.0) }, clear(0.0, 1.5)] {
+        for cosine in [0.9, 0.3] {
+            let seen = plate(layered(Vec3::ONE, &layers), environment(), cosine, 40_000);
+            assert_meets("white", seen.mean.total(), seen.total_standard_error + 1e-4, SKY);
+        }
+    }
+    let smooth = plate(layered(Vec3::ONE, &dielectric(0.0)), environment(), 1.0, 40_000);
+    assert_meets("reflected", smooth.mean.specular, smooth.standard_error.specular, 0.04 * SKY);
+    let tinted = plate(layered(COLOUR, &clear(0.0, 1.5)), environment(), 1.0, 40_000);
+    // What passes a thin wall is seen as if nothing were there.
+    assert_meets("passed", tinted.mean.direct, tinted.standard_error.direct, 0.96 * COLOUR.as_dvec3() * SKY);
+    assert_meets("reflected", tinted.mean.specular, tinted.standard_error.specular, 0.04 * SKY);
+}
+
+/// A small lamp and a lobe that is much wider, and the other way round: sampling either alone would be noise.
+#[test]
+fn lamps_of_all_sizes_light_lobes_of_all_widths() {
+    let (wo, emitted) = (DVec3::new(0.6, 0.0, 0.8), DVec3::new(1.0, 2.0, 3.0));
+    for roughness in [0.1f32, 0.3, 0.7] {
+        for (half, samples, count) in [(0.02, 20_000, 40), (0.3, 40_000, 400), (2.0, 40_000, 2000)] {
+            let centre = DVec3::new(-0.75, 0.0, 1.0);
+            let corner = centre - DVec3::new(half, half, 0.0);
+            let above = Mesh::parallelogram("lamp", corner, 2.0 * half * DVec3::Y, 2.0 * half * DVec3::X, 1);
+            let lit =
+                scene_of(vec![square(0.0, 0.1, true, 0), above], vec![layered(COLOUR, &metal(roughness)), lamp(emitted.as_vec3())], vec![]);
+            let seen = radiance(&lit, 0.5 * wo, DVec3::ZERO, samples);
+            let alpha = f64::from(roughness) * f64::from(roughness);
+            let inputs = lobes::Inputs {
+                base_colour: COLOUR.as_dvec3(),
+                metalness: 1.0,
+                alpha,
+                ior: 1.5,
+                specular: 1.0,
+                specular_colour: DVec3::ONE,
+                transmission: 0.0,
+                wall: lobes::Wall::Thin,
+                coat: 0.0,
+                coat_alpha: 0.0,
+                sheen_colour: DVec3::ZERO,
+                sheen_s: 0.01,
+            };
+            let lobe = lobes::Lobes::new(inputs, lobes::Frame { wo, ng: DVec3::Z, n: DVec3::Z, coat_n: DVec3::Z });
+            let mut sum = DVec3::ZERO;
+            for place in 0..count * count {
+                let [x, y] = [place % count, place / count].map(|at| (f64::from(at) + 0.5) / f64::from(count));
+                let (wi, distance) = (corner + 2.0 * half * DVec3::new(x, y, 0.0)).normalize_and_length();
+                sum += lobe.evaluate(lobes::Kind::Reflection, wi) * wi.z * wi.z / (distance * distance);
+            }
+            let expected = sum * emitted * (2.0 * half / f64::from(count)).powi(2);
+            assert_meets(
+                &format!("roughness {roughness}, lamp {half}"),
+                seen.mean.total(),
+                seen.total_standard_error + 1e-3 * expected,
+                expected,
+            );
+            let noise = (seen.total_standard_error / expected).max_element() * f64::from(samples).sqrt();
+            assert!(noise < 3.0, "roughness {roughness}, lamp {half}: a sample scatters by {noise}");
+        }
+    }
+}
+
+/// Layered walls, all of which shine alike, and what they scatter in all.
+fn layered_furnace(walls: [Material; 6]) -> Scene {
+    let shining = |material: Material| Material { emission: Vec3::new(1.0, 2.0, 3.0), ..material };
+    scene_of(faces(DVec3::new(1.0, 0.7, 0.5), true, [0, 1, 2, 3, 4, 5]), walls.map(shining).to_vec(), vec![])
+}
+
+#[test]
+fn layered_furnaces_glow_evenly_and_in_the_right_parts() {
+    let (eye, floor) = (DVec3::new(0.2, 0.1, -0.1), DVec3::new(0.3, 0.5, -0.5));
+    let colour = COLOUR.as_dvec3();
+    let expected = EMITTED / (1.0 - colour);
+    let matt = || plain(COLOUR);
+    let all_matt = layered_furnace([(); 6].map(|()| matt()));
+    let seen = radiance(&all_matt, eye, floor, 20_000);
+    assert_total("matt", &seen, expected);
+    assert_meets("direct", seen.mean.direct, seen.standard_error.direct, EMITTED * (1.0 + colour));
+    assert_eq!((seen.mean.specular, seen.mean.caustic), (DVec3::ZERO, DVec3::ZERO));
+    let on_floor = irradiance(&all_matt, floor, DVec3::Z, 20_000);
+    assert_total("irradiance", &on_floor, PI * expected);
+    assert_meets("direct", on_floor.mean.direct, on_floor.standard_error.direct, PI * EMITTED);
+
+    // Metal reflects its base colour along the normal alone: a smooth wall of F0 = F90 comes from an ior of 0.
+    let mirror = || layered(Vec3::ZERO, &Layers { ior: 0.0, specular_colour: COLOUR, specular: 1.0, ..dielectric(0.0) });
+    let mut walls = [(); 6].map(|()| matt());
+    walls[1] = mirror();
+    let shiny = layered_furnace(walls);
+    let seen = radiance(&shiny, eye, floor, 40_000);
+    assert!(seen.mean.caustic.min_element() > 0.01 && seen.mean.indirect.min_element() > 0.01, "{seen:?}");
+    assert_eq!(seen.mean.specular, DVec3::ZERO);
+    let above = radiance(&shiny, eye, DVec3::new(0.3, 0.5, 0.5), 20_000);
+    assert_eq!(above.mean.direct, EMITTED);
+    assert_eq!(above.mean.caustic + above.mean.indirect, DVec3::ZERO);
+    // Rough lobes of the same kinds: what is sharp and what is not.
+    for (roughness, is_sharp) in [(0.499f32, true), (0.5, false)] {
+        let mut walls = [(); 6].map(|()| matt());
+        walls[0] = layered(COLOUR, &metal(roughness));
+        let lit = layered_furnace(walls);
+        let seen = radiance(&lit, eye, floor, 2000).mean;
+        assert_eq!(seen.direct == EMITTED, is_sharp, "{seen:?}");
+        assert_eq!(seen.specular == DVec3::ZERO, !is_sharp, "{seen:?}");
+        assert_eq!(seen.indirect == DVec3::ZERO, is_sharp, "{seen:?}");
+        let from_wall = radiance(&lit, eye, DVec3::new(0.3, 0.7, 0.1), 20_000).mean;
+        assert_eq!(from_wall.caustic == DVec3::ZERO, !is_sharp, "{from_wall:?}");
+    }
+}
+
+#[test]
+fn layered_bounces_are_a_geometric_series() {
+    let lit = layered_furnace([(); 6].map(|()| plain(COLOUR)));
+    let camera = Camera::looking_at("ray", DVec3::ZERO, DVec3::new(0.3, 0.5, -0.5), DVec3::Z, 1.0);
+    let (mut expected, mut term) = (DVec3::ZERO, EMITTED);
+    for max_bounces in 0..5 {
+        expected += term;
+        term *= COLOUR.as_dvec3();
+        assert_total("radiance", &Judge::new(&lit, max_bounces).image(&camera, 1, 1, 10_000, 3).pixels[0], expected);
+    }
+    // A thin pane scatters nothing.
+    let lit = scene_of(
+        vec![square(0.0, 1.0, true, 0), square(-1.0, 1.0, true, 1)],
+        vec![layered(COLOUR, &clear(0.0, 1.5)), lamp(Vec3::ONE)],
+        vec![],
+    );
+    let camera = Camera::looking_at("down", DVec3::Z, DVec3::ZERO, DVec3::Y, 1e-9);
+    let seen = Judge::new(&lit, 0).image(&camera, 1, 1, 10_000, 3).pixels[0];
+    assert_total("pane", &seen, 0.96 * COLOUR.as_dvec3());
+    assert_eq!(seen.mean.direct, seen.mean.total());
+}
+
+#[test]
+fn thin_walls_let_shadow_rays_pass() {
+    let sun = LightKind::Directional { direction: DVec3::new(0.6, 0.0, -0.8), irradiance: Vec3::ONE };
+    let pane = |layers| scene_of(vec![square(1.0, 5.0, true, 0)], vec![layered(COLOUR, &layers)], vec![sun.clone()]);
+    let below = |layers| irradiance(&pane(layers), DVec3::ZERO, DVec3::Z, 2).mean;
+    let schlick = 0.04 + 0.96 * 0.2f64.powi(5);
+    let passed = 0.8 * (1.0 - schlick) * COLOUR.as_dvec3();
+    let smooth = below(clear(0.0, 1.5));
+    assert_meets("smooth", smooth.direct, DVec3::splat(1e-8), passed);
+    assert_eq!(smooth.total(), smooth.direct);
+    // A smooth coat takes its share on both sides of the light's way at once.
+    assert_meets("coated", below(Layers { coat: 1.0, ..clear(0.0, 1.5) }).direct, DVec3::splat(1e-8), (1.0 - schlick) * passed);
+    assert_meets("half", below(Layers { transmission: 0.5, ..clear(0.0, 1.5) }).direct, DVec3::splat(1e-8), 0.5 * passed);
+    // Rough ones scatter it, and solids refract it.
+    assert_eq!(below(clear(0.1, 1.5)).direct, DVec3::ZERO);
+    assert_eq!(below(solid(0.0, 1.5, Vec3::ONE)).direct, DVec3::ZERO);
+
+    // The sky behind a rough pane comes by its lobe, whose light is caustic; nothing is lost where nothing is reflected.
+    let under = |layers| {
+        let lit = scene_of(
+            vec![square(0.01, 90.0, true, 0), square(-0.1, 90.0, true, 1)],
+            vec![layered(Vec3::ONE, &layers), plain(Vec3::ZERO)],
+            vec![environment()],
+        );
+        irradiance(&lit, DVec3::ZERO, DVec3::Z, 40_000)
+    };
+    let rough = under(Layers { specular: 0.0, ..clear(0.3, 1.5) });
+    assert_eq!(rough.mean.caustic, rough.mean.total());
+    let ratio = rough.mean.total() / (PI * SKY);
+    assert!(ratio.max_element() < 1.0 && ratio.min_element() > 0.96, "{ratio}");
+}
+
+fn slab(half_thickness: f64, material: usize) -> Vec<Mesh> {
+    faces(DVec3::new(50.0, 50.0, half_thickness), false, [material; 6])
+}
+
+/// Above a lamp that fills the plane below, through what lies between, at this sine.
+fn through(meshes: Vec<Mesh>, materials: Vec<Material>, sine: f64) -> Estimate {
+    let mut meshes = meshes;
+    meshes.push(square(-3.0, 90.0, true, materials.len()));
+    let materials = materials.into_iter().chain([lamp(Vec3::ONE)]).collect();
+    let lit = scene_of(meshes, materials, vec![]);
+    let direction = DVec3::new(sine, 0.0, (1.0 - sine * sine).sqrt());
+    radiance(&lit, DVec3::new(0.3, 0.2, 0.0) + 2.0 * direction, DVec3::new(0.3, 0.2, 0.0), 40_000)
+}
+
+/// Transmitted by a slab, `kept` of the light being left after one crossing.
+fn slab_transmits(reflectance: f64, kept: DVec3) -> DVec3 {
+    (1.0 - reflectance).powi(2) * kept / (1.0 - reflectance * reflectance * kept * kept)
+}
+
+#[test]
+fn slabs_of_glass_reflect_and_absorb() {
+    let transmittance = Vec3::new(1.0, 0.3, 0.05);
+    for sine in [0.0, 0.5, 0.9f64] {
+        let inside = (1.0 - (sine / 1.5f64).powi(2)).sqrt();
+        let way = 0.2 / inside;
+        let kept = transmittance.as_dvec3().map(|share| share.powf(way));
+        let reflectance = fresnel((1.0 - sine * sine).sqrt(), 1.0, 1.5);
+        let seen = through(slab(0.1, 0), vec![layered(Vec3::ONE, &solid(0.0, 1.5, transmittance))], sine);
+        assert_total(&format!("slab at {sine}"), &seen, slab_transmits(reflectance, kept));
+        assert_eq!(seen.mean.specular, seen.mean.total());
+        // The base colour tints at each surface.
+        let tinted = through(slab(0.1, 0), vec![layered(COLOUR, &solid(0.0, 1.5, transmittance))], sine);
+        let colour = COLOUR.as_dvec3();
+        let expected = colour * colour * (1.0 - reflectance).powi(2) * kept / (1.0 - (reflectance * kept).powf(2.0));
+        assert_total("tinted", &tinted, expected);
+    }
+    // Glass that is all but smooth, with lobes of its own instead of deltas.
+    let rough = through(slab(0.1, 0), vec![layered(Vec3::ONE, &solid(0.03, 1.5, transmittance))], 0.0);
+    let expected = slab_transmits(0.04, transmittance.as_dvec3().map(|share| share.powf(0.2)));
+    assert_meets("rough", rough.mean.specular, rough.standard_error.specular + 1e-3, expected);
+    // Nothing is lost under an even sky, and inside radiance is n^2 times as high.
+    let lit = scene_of(slab(0.1, 0), vec![layered(Vec3::ONE, &solid(0.0, 1.5, Vec3::ONE))], vec![environment()]);
+    assert_total("slant", &radiance(&lit, DVec3::new(0.3, 0.2, 3.0), DVec3::new(1.0, 0.5, 0.0), 20_000), SKY);
+    assert_total("inside", &radiance(&lit, DVec3::ZERO, DVec3::Z, 20_000), 2.25 * SKY);
+}
+
+#[test]
+fn layered_glass_is_the_glass_of_old() {
+    let ball = |material: Material| {
+        let mut lit = scene_of(vec![Mesh::sphere("ball", DVec3::ZERO, 0.5, 24, 0)], vec![material], vec![environment()]);
+        lit.meshes.push(square(-0.6, 3.0, true, 1));
+        lit.materials.push(Material::lambert("floor", COLOUR));
+        let camera = Camera::looking_at("ball", DVec3::new(1.0, 0.5, 2.0), DVec3::ZERO, DVec3::Z, 0.6);
+        let image = Judge::new(&lit, 24).image(&camera, 4, 4, 4000, 1);
+        image.pixels
+    };
+    let old = ball(material(Surface::Dielectric { ior: 1.5 }, Vec3::ONE));
+    let new = ball(layered(Vec3::ONE, &solid(0.0, 1.5, Vec3::ONE)));
+    for (old, new) in old.iter().zip(&new) {
+        for part in Part::EACH {
+            let noise = (old.standard_error[part].powf(2.0) + new.standard_error[part].powf(2.0)).map(f64::sqrt);
+            assert_meets(&format!("{part:?}"), new.mean[part], noise, old.mean[part]);
+        }
+    }
+}
+
+#[test]
+fn nested_media_see_each_other() {
+    let glass = |transmittance| layered(Vec3::ONE, &solid(0.0, 1.5, transmittance));
+    let tinted = Vec3::new(1.0, 0.3, 0.05);
+    let reflectance = 0.04;
+    // A slab within a slab of the same index is its medium and nothing else, and so is one that reaches out of it.
+    let nested = |materials: [Material; 2], [outer, inner]: [f64; 2]| {
+        let mut meshes = slab(outer, 0);
+        meshes.extend(slab(inner, 1));
+        through(meshes, materials.into(), 0.0)
+    };
+    let kept = |way: f64| tinted.as_dvec3().map(|share| share.powf(way));
+    assert_total("tinted within", &nested([glass(Vec3::ONE), glass(tinted)], [0.2, 0.1]), slab_transmits(reflectance, kept(0.2)));
+    assert_total("clear within", &nested([glass(tinted), glass(Vec3::ONE)], [0.2, 0.1]), slab_transmits(reflectance, kept(0.2)));
+    // Rough boundaries between media of one index vanish, too.
+    let rough = layered(Vec3::ONE, &solid(0.6, 1.5, tinted));
+    assert_total("rough within", &nested([glass(Vec3::ONE), rough], [0.2, 0.1]), slab_transmits(reflectance, kept(0.2)));
+    // Where two overlap, the one entered last fills the place: on the way down it is the lower one, on the way up the other.
+    let mut meshes = slab(0.15, 0);
+    meshes.iter_mut().flat_map(|mesh| &mut mesh.positions).for_each(|at| at.z -= 0.05);
+    meshes.extend(
+        slab(0.15, 1).into_iter().map(|mesh| Mesh { positions: mesh.positions.iter().map(|at| at + 0.05 * DVec3::Z).collect(), ..mesh }),
+    );
+    let expected = 0.96 * 0.96 * kept(0.3) / (1.0 - 0.0016 * kept(0.3) * kept(0.1));
+    assert_total("overlapping", &through(meshes, vec![glass(tinted), glass(Vec3::ONE)], 0.0), expected);
+    // Glass of 1.5 in a liquid of 1.2: the outer and the inner boundaries reflect by the media on both sides.
+    let liquid = layered(Vec3::ONE, &solid(0.0, 1.2, Vec3::ONE));
+    let [outer, inner] = [(0.2f64 / 2.2).powi(2), (0.3f64 / 2.7).powi(2)];
+    let incoherent = |layers: &[f64]| 1.0 / (1.0 + layers.iter().map(|reflectance| reflectance / (1.0 - reflectance)).sum::<f64>());
+    let expected = incoherent(&[outer, inner, inner, outer]);
+    assert_total("immersed", &nested([liquid, glass(Vec3::ONE)], [0.2, 0.1]), DVec3::splat(expected));
+}
+
+#[test]
+fn eyes_and_receivers_know_what_they_are_in() {
+    let tinted = Vec3::new(1.0, 0.3, 0.05);
+    let kept = |way: f64| tinted.as_dvec3().map(|share| share.powf(way));
+    // A lamp within the solid, and within another one of the same index in it.
+    let mut meshes = faces(DVec3::splat(2.0), false, [0; 6]);
+    meshes.push(square(-1.0, 0.5, true, 2));
+    let glass = |transmittance| layered(Vec3::ONE, &solid(0.0, 1.5, transmittance));
+    let materials = vec![glass(tinted), glass(Vec3::ONE), lamp(Vec3::ONE)];
+    let lit = scene_of(meshes.clone(), materials.clone(), vec![]);
+    assert_total("one", &radiance(&lit, DVec3::ZERO, -DVec3::Z, 2), kept(1.0));
+    meshes.extend(faces(DVec3::splat(0.25), false, [1; 6]));
+    let lit = scene_of(meshes, materials, vec![]);
+    let seen = radiance(&lit, DVec3::new(0.01, 0.02, 0.0), DVec3::new(0.01, 0.02, -1.0), 2);
+    assert_total("two", &seen, kept(0.75));
+
+    // Shadow rays within a medium lose light on their way.
+    let mut meshes = faces(DVec3::splat(2.0), false, [0; 6]);
+    meshes.push(square(-1.0, 1.0, true, 1));
+    let bulb = LightKind::Point { position: DVec3::Z * 0.5, intensity: Vec3::ONE };
+    let lit = scene_of(meshes, vec![glass(tinted), plain(Vec3::ZERO)], vec![bulb]);
+    let received = irradiance(&lit, DVec3::Z * -1.0, DVec3::Z, 2).mean.direct;
+    assert_meets("bulb", received, DVec3::splat(1e-8), kept(1.5) / 2.25);
+}
+
+#[test]
+fn alpha_covers_its_share() {
+    let sheet = |coverage: Coverage| Material { coverage, two_sided: true, ..plain(Vec3::ZERO) };
+    let stack = |coverage, count: u32| {
+        let sheets = (0..count).map(|index| square(0.5 + 0.1 * f64::from(index), 5.0, index % 2 == 0, 0));
+        let mut lit = scene_of(sheets.collect(), vec![sheet(coverage), lamp(Vec3::new(1.0, 2.0, 3.0))], vec![]);
+        lit.meshes.push(square(-1.0, 5.0, true, 1));
+        lit.lights.push(light(LightKind::Directional { direction: -DVec3::Z, irradiance: Vec3::new(1.0, 2.0, 3.0) }));
+        lit
+    };
+    for count in [1, 3, 6] {
+        for alpha in [0.0f32, 0.25, 0.5, 1.0] {
+            let lit = stack(Coverage::Blend { alpha }, count);
+            let expected = (1.0 - f64::from(alpha)).powi(count as i32) * EMITTED;
+            let seen = radiance(&lit, DVec3::Z * 3.0, DVec3::ZERO, 20_000);
+            assert_total("seen", &seen, expected);
+            assert_eq!(seen.mean.direct, seen.mean.total());
+            assert_total("shadow", &irradiance(&lit, DVec3::ZERO, DVec3::Z, 200), expected);
+        }
+    }
+    for (alpha, expected) in [(0.49, EMITTED), (0.5, DVec3::ZERO)] {
+        let lit = stack(Coverage::Mask { alpha, cutoff: 0.5 }, 2);
+        assert_total("mask", &irradiance(&lit, DVec3::ZERO, DVec3::Z, 2), expected);
+        assert_total("mask", &radiance(&lit, DVec3::Z * 3.0, DVec3::ZERO, 2), expected);
+    }
+    // Factors, textures and vertices multiply.
+    let mut lit = stack(Coverage::Blend { alpha: 0.8 }, 1);
+    let texels = Texels::Srgb(vec![[255, 255, 255, 51]]);
+    lit.textures.push(Texture { name: "alpha".into(), width: 1, height: 1, texels, wrap: [Wrap::Repeat; 2], filter: Default::default() });
+    lit.materials[0].base_colour_texture = Some(TextureUse::of(0, 0));
+    lit.meshes[0].alphas = vec![0.5; 4];
+    assert_total("all", &irradiance(&lit, DVec3::ZERO, DVec3::Z, 2), (1.0 - 0.8f32 as f64 * 0.2 * 0.5) * EMITTED);
+    // A lamp that is half there gives half its light, to lobes and to shadow rays.
+    let lamp = Material { emission: Vec3::new(1.0, 2.0, 3.0), ..sheet(Coverage::Blend { alpha: 0.5 }) };
+    let lit = scene_of(vec![square(1.0, 1.0, false, 0), square(0.0, 1.0, true, 1)], vec![lamp, plain(COLOUR)], vec![]);
+    let form_factor = 4.0 / (2f64.sqrt() * PI) * (1.0 / 2f64.sqrt()).atan();
+    let expected = 0.5 * form_factor * EMITTED;
+    assert_total("receiver", &irradiance(&lit, DVec3::ZERO, DVec3::Z, 100_000), PI * expected);
+    let lobe = radiance(&lit, DVec3::new(0.0, 0.3, 0.5), DVec3::ZERO, 100_000);
+    assert_meets("lobe", lobe.mean.direct, lobe.standard_error.direct, COLOUR.as_dvec3() * expected);
+}
+
+#[test]
+fn backs_are_not_there_for_the_eye_alone() {
+    let one_sided = Material { two_sided: false, emission: Vec3::ONE, ..plain(COLOUR) };
+    // Seen from below, its back; a mirror below shows it to an eye above.
+    let sky = environment();
+    let lit = scene_of(vec![square(0.0, 5.0, true, 0)], vec![one_sided.clone()], vec![sky.clone()]);
+    assert_eq!(radiance(&lit, -DVec3::Z, DVec3::ZERO, 2).mean.direct, SKY);
+    assert_total("receiver", &irradiance(&lit, -DVec3::Z, DVec3::Z, 200), DVec3::ZERO);
+    let mut lit =
+        scene_of(vec![square(0.0, 500.0, true, 0), square(-1.0, 5.0, true, 1)], vec![one_sided, layered(Vec3::ONE, &metal(0.0))], vec![]);
+    lit.lights.push(light(sky));
+    assert_total("mirrored", &radiance(&lit, DVec3::Z * -0.5, -DVec3::Z, 2), SKY);
+    // The same for a lobe that is sampled by lamps and by itself: white metal loses nothing at such a roughness.
+    lit.materials[1].layers.roughness = 0.1;
+    let seen = radiance(&lit, DVec3::Z * -0.5, -DVec3::Z, 2000);
+    assert_meets("rough", seen.mean.specular, seen.total_standard_error + 1e-3, SKY);
+    // Matt lobes see the back, which is black.
+    lit.materials[1].layers.roughness = 1.0;
+    let seen = radiance(&lit, DVec3::Z * -0.5, -DVec3::Z, 200);
+    assert!(seen.mean.total().max_element() < 0.01, "{seen:?}");
+    // What transmits has two sides.
+    let pane = Material { two_sided: false, ..layered(Vec3::ONE, &clear(0.0, 1.5)) };
+    let lit = scene_of(vec![square(0.0, 5.0, true, 0)], vec![pane], vec![environment()]);
+    let seen = radiance(&lit, -DVec3::Z, DVec3::ZERO, 20_000);
+    assert_meets("pane", seen.mean.specular, seen.standard_error.specular, 0.04 * SKY);
+}
+
+#[test]
+fn unlit_surfaces_are_seen_and_light_nothing() {
+    let unlit = layered(COLOUR, &Layers { is_unlit: true, ..Layers::default() });
+    let colour = COLOUR.as_dvec3();
+    let meshes = || vec![square(1.0, 1.0, false, 0), square(0.0, 5.0, true, 1)];
+    let with = |floor: Layers, lights| {
+        scene_of(meshes(), vec![Material { emission: Vec3::ONE, ..unlit.clone() }, layered(Vec3::ONE, &floor)], lights)
+    };
+    let lit = with(metal(0.0), vec![]);
+    assert_eq!(radiance(&lit, DVec3::Z * 0.5, DVec3::Z, 2).mean.direct, colour);
+    assert_eq!(radiance(&lit, DVec3::Z * 0.5, DVec3::ZERO, 2).mean.specular, colour);
+    assert_eq!(irradiance(&lit, DVec3::Z * 0.5, DVec3::Z, 2).mean.total(), DVec3::ZERO);
+    // Sharp lobes show it, matt ones do not.
+    let rough = radiance(&with(metal(0.1), vec![]), DVec3::Z * 0.5, DVec3::ZERO, 2000).mean;
+    assert!(((rough.specular - colour) / colour).abs().max_element() < 2e-3, "{rough:?}");
+    assert_eq!(radiance(&with(metal(1.0), vec![]), DVec3::Z * 0.5, DVec3::ZERO, 200).mean.total(), DVec3::ZERO);
+    // Shadow rays end there.
+    let sun = LightKind::Directional { direction: -DVec3::Z, irradiance: Vec3::ONE };
+    assert_eq!(irradiance(&with(metal(1.0), vec![sun]), DVec3::Z * 0.5, DVec3::Z, 2).mean.total(), DVec3::ZERO);
+}
+
+fn light(kind: LightKind) -> Light {
+    Light { name: "light".into(), kind }
+}
+
+fn texture(texel: [u8; 4]) -> Texture {
+    Texture {
+        name: "one".into(),
+        width: 1,
+        height: 1,
+        texels: Texels::Linear(vec![texel]),
+        wrap: [Wrap::Repeat; 2],
+        filter: Default::default(),
+    }
+}
+
+#[test]
+fn normal_maps_turn_the_light() {
+    let sun = DVec3::new(0.48, -0.36, -0.8);
+    let code = [204u8, 153, 230, 255];
+    let [x, y, z] = [code[0], code[1], code[2]].map(|code| 2.0 * f64::from(code) / 255.0 - 1.0);
+    let tangents = |tangent: DVec3, sign: f64| vec![[tangent.extend(sign); 3]; 2];
+    for (tangent, sign, scale) in [(DVec3::X, 1.0, 1.0f32), (DVec3::X, -1.0, 1.0), (DVec3::new(0.6, 0.8, 0.0), 1.0, 0.5)] {
+        for above in [1.0, -1.0] {
+            let mut lit = scene_of(
+                vec![Mesh { tangents: tangents(tangent, sign), ..square(0.0, 1.0, true, 0) }],
+                vec![Material { normal_map: Some(NormalMap { texture: TextureUse::of(0, 0), scale }), ..plain(COLOUR) }],
+                vec![LightKind::Directional { direction: above * sun, irradiance: Vec3::ONE }],
+            );
+            lit.textures.push(texture(code));
+            let bitangent = sign * DVec3::Z.cross(tangent);
+            let turned = (f64::from(scale) * (x * tangent + y * bitangent) + z * DVec3::Z).normalize();
+            // Seen from behind, the plate has the same shape; seen from where its normal faces away, that is moved to the eye.
+            for eye in [DVec3::Z, DVec3::new(-0.96, 0.0, 0.28), DVec3::new(0.0, 0.96, 0.28)] {
+                let eye = eye * DVec3::new(1.0, 1.0, above);
+                let n = above * turned;
+                let n = (n + (0.01 - n.dot(eye)).max(0.0) * eye).normalize();
+                let expected = COLOUR.as_dvec3() / PI * (-above * sun).dot(n).max(0.0);
+                let target = DVec3::new(0.1, 0.2, 0.0);
+                let seen = radiance(&lit, target + 3.0 * eye, target, 2);
+                assert_meets("turned", seen.mean.total(), DVec3::splat(1e-6), expected);
+            }
+        }
+    }
+    // A coat's map turns the coat alone, and the coat without one keeps the normals of the mesh.
+    let coat = Layers { coat: 1.0, ..metal(0.0) };
+    let with = |coat_map: bool| {
+        let map = Some(NormalMap { texture: TextureUse::of(0, 0), scale: 1.0 });
+        let mut plate = Material::layered("coated", Vec3::ZERO, Layers { specular: 0.0, metallic: 0.0, ..coat });
+        if coat_map {
+            plate.layers.coat_normal_map = map;
+        } else {
+            plate.normal_map = map;
+        }
+        let mesh = Mesh { tangents: tangents(DVec3::X, 1.0), coat_tangents: tangents(DVec3::X, 1.0), ..square(0.0, 1.0, true, 0) };
+        let n = DVec3::new(x, y, z).normalize();
+        let n = if coat_map { n } else { DVec3::Z };
+        let wi = 2.0 * n.z * n - DVec3::Z;
+        let (u, v) = (0.02 * wi).any_orthonormal_pair();
+        let (u, v) = (u.normalize() * 0.02, v.normalize() * 0.02);
+        let lamp_mesh = Mesh::parallelogram("lamp", 0.5 * wi - 0.5 * (u + v), u, v, 1);
+        let mut lit = scene_of(vec![mesh, lamp_mesh], vec![plate, Material { two_sided: true, ..lamp(Vec3::ONE) }], vec![]);
+        lit.textures.push(texture(code));
+        let expected = 0.04 + 0.96 * (1.0 - n.z).powi(5);
+        let eye = if coat_map { DVec3::Z } else { DVec3::Z * 0.4 };
+        let seen = radiance(&lit, eye, DVec3::ZERO, 2).mean;
+        // Texels are f32.
+        assert_meets("coat", seen.specular, DVec3::splat(1e-7), DVec3::splat(expected));
+    };
+    with(true);
+    with(false);
+}
+
+#[test]
+fn textures_of_layers_have_their_channels() {
+    // 51, 102 and 153 are 0.2, 0.4 and 0.6 of 255. A texture is the same as factors; channels that do not count are 255.
+    type SetTexture = fn(&mut Layers, Option<TextureUse>);
+    type Case = (&'static str, [u8; 4], SetTexture, fn(&mut Layers));
+    let cases: [Case; 10] = [
+        (
+            "roughness",
+            [255, 102, 255, 255],
+            |layers, texture| layers.metallic_roughness_texture = texture,
+            |layers| layers.roughness *= 0.4,
+        ),
+        ("metalness", [255, 255, 51, 255], |layers, texture| layers.metallic_roughness_texture = texture, |layers| layers.metallic *= 0.2),
+        ("specular", [255, 255, 255, 51], |layers, texture| layers.specular_texture = texture, |layers| layers.specular *= 0.2),
+        (
+            "specular colour",
+            [51, 102, 153, 255],
+            |layers, texture| layers.specular_colour_texture = texture,
+            |layers| layers.specular_colour *= Vec3::new(0.2, 0.4, 0.6),
+        ),
+        ("transmission", [51, 255, 255, 255], |layers, texture| layers.transmission_texture = texture, |layers| layers.transmission *= 0.2),
+        ("coat", [51, 255, 255, 255], |layers, texture| layers.coat_texture = texture, |layers| layers.coat *= 0.2),
+        (
+            "coat roughness",
+            [255, 102, 255, 255],
+            |layers, texture| layers.coat_roughness_texture = texture,
+            |layers| layers.coat_roughness *= 0.4,
+        ),
+        (
+            "sheen",
+            [51, 102, 153, 255],
+            |layers, texture| layers.sheen_colour_texture = texture,
+            |layers| layers.sheen_colour *= Vec3::new(0.2, 0.4, 0.6),
+        ),
+        (
+            "sheen roughness",
+            [255, 255, 255, 102],
+            |layers, texture| layers.sheen_roughness_texture = texture,
+            |layers| layers.sheen_roughness *= 0.4,
+        ),
+        ("none", [255; 4], |_, _| {}, |_| {}),
+    ];
+    let all = Layers {
+        metallic: 0.5,
+        roughness: 0.9,
+        specular_colour: Vec3::splat(2.0),
+        transmission: 0.5,
+        coat: 0.8,
+        coat_roughness: 0.8,
+        sheen_colour: Vec3::splat(0.7),
+        sheen_roughness: 0.8,
+        ..Layers::default()
+    };
+    let seen = |layers: Layers, texel: [u8; 4]| {
+        let sun = LightKind::Directional { direction: DVec3::new(0.6, 0.0, -0.8), irradiance: Vec3::ONE };
+        let mut lit = scene_of(vec![square(0.0, 1.0, true, 0)], vec![layered(COLOUR, &layers)], vec![environment(), sun]);
+        lit.textures.push(texture(texel));
+        radiance(&lit, DVec3::new(0.3, 0.0, 0.5), DVec3::ZERO, 4000).mean.total()
+    };
+    let plain = seen(all, [255; 4]);
+    for (what, texel, set_texture, set_factor) in cases {
+        let (mut textured, mut scaled) = (all, all);
+        set_texture(&mut textured, Some(TextureUse::of(0, 0)));
+        set_factor(&mut scaled);
+        // The same random numbers make the same paths.
+        let (by_texture, by_factor) = (seen(textured, texel), seen(scaled, texel));
+        assert_meets(what, by_texture, 1e-5 * by_factor, by_factor);
+        assert_eq!((by_factor - plain).abs().max_element() < 1e-3, what == "none", "{what} changes nothing: {plain}, {by_factor}");
+    }
 }

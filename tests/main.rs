@@ -27,6 +27,7 @@ mod layout;
 mod ledger;
 mod lights;
 mod limits;
+mod lobes;
 mod materials;
 mod memory;
 mod openings;

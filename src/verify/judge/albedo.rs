@@ -3,7 +3,7 @@
 use std::f64::consts::{FRAC_PI_2, PI};
 use std::sync::LazyLock;
 
-use super::lobes::{ggx_visibility, is_delta, schlick, sheen_distribution, sheen_masking};
+use super::microfacets::{ggx_visibility, is_delta, schlick, sheen_distribution, sheen_masking};
 use crate::constants::DELTA_ALPHA_INVERSE;
 
 /// Albedos at a cosine: A and B of the guide's page on materials.

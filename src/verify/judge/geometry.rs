@@ -8,7 +8,6 @@ use obvhs::aabb::Aabb;
 use obvhs::bvh2::Bvh2;
 use obvhs::bvh2::builder::build_bvh2;
 
-use super::layered::has_two_sides;
 use crate::scene::material::{TextureUse, UvTransform};
 use crate::scene::{Material, Mesh, Scene, Surface, overlap};
 
@@ -75,6 +74,11 @@ pub struct Geometry<'a> {
 
 fn mix<T: std::ops::Mul<f64, Output = T> + std::ops::Add<Output = T>>([a, b, c]: [T; 3], weights: DVec3) -> T {
     a * weights.x + b * weights.y + c * weights.z
+}
+
+/// Whether a back scatters, shines and lets light through as the front does.
+pub fn has_two_sides(material: &Material) -> bool {
+    material.two_sided || (material.surface == Surface::Layered && material.layers.transmission > 0.0)
 }
 
 /// A box of f32 around a triangle, wider by `slack` on all sides.

@@ -3,22 +3,18 @@
 use glam::{DVec3, DVec4};
 
 use super::geometry::{Geometry, Hit, Triangle, Vertex};
-use super::lobes::{Frame, Inputs, Lobes, Wall, is_delta};
+use super::lobes::{Frame, Inputs, Lobes, Wall};
 use super::material::fresnel;
 use super::media::{Media, is_solid};
+use super::microfacets::is_delta;
 use crate::constants::SMOOTH_TOTAL_REFLECTIONS;
+use crate::scene::Surface;
 use crate::scene::material::{Coverage, NormalMap, TextureUse};
-use crate::scene::{Material, Surface};
 
 /// No eye sees a turned normal at less than this cosine.
 const LEAST_COSINE: f64 = 0.01;
 /// What sheen's squared roughness is at least.
 const LEAST_SHEEN: f64 = 0.01;
-
-/// Whether a back scatters, shines and lets light through as the front does.
-pub fn has_two_sides(material: &Material) -> bool {
-    material.two_sided || (material.surface == Surface::Layered && material.layers.transmission > 0.0)
-}
 
 /// A normal that the eye sees: moved towards it where it would face away.
 fn towards_eye(n: DVec3, wo: DVec3) -> DVec3 {
@@ -40,24 +36,24 @@ impl<'a> Geometry<'a> {
         }
     }
 
-    /// The normal that a map gives to the side with `normal`, the front's being `front`.
+    /// The normal that a map makes of `normal`, which is on the side of `wo`. Seen from behind, a surface has the same shape.
     fn mapped(
         &self,
         map: Option<NormalMap>,
         tangents: &[[DVec4; 3]],
         (triangle, weights): (&Triangle, DVec3),
         normal: DVec3,
-        is_front: bool,
+        (wo, is_front): (DVec3, bool),
     ) -> DVec3 {
         let (Some(map), false) = (map, tangents.is_empty()) else { return normal };
         let front = if is_front { normal } else { -normal };
         let tangent = triangle.mixed(tangents[triangle.index], weights);
-        let Some(along) = tangent.truncate().try_normalize() else { return normal };
+        let along = tangent.truncate();
         let across = tangent.w.signum() * front.cross(along);
         let code = 2.0 * self.texel(Some(map.texture), triangle, weights).truncate() - 1.0;
         let scale = f64::from(map.scale);
         let turned = (scale * (code.x * along + code.y * across) + code.z * front).normalize_or(front);
-        if is_front { turned } else { -turned }
+        towards_eye(if is_front { turned } else { -turned }, wo)
     }
 
     /// The lobes of a layered surface that is seen from within `media`, by a path that has met `depth` surfaces before.
@@ -75,15 +71,16 @@ impl<'a> Geometry<'a> {
             Wall::Thin
         };
         let place = (triangle, hit.weights);
-        let mut n = towards_eye(self.mapped(material.normal_map, &triangle.mesh.tangents, place, vertex.ns, vertex.is_front), wo);
-        let coat_n = towards_eye(self.mapped(layers.coat_normal_map, &triangle.mesh.coat_tangents, place, vertex.ns, vertex.is_front), wo);
+        let seen = (wo, vertex.is_front);
+        let mut n = self.mapped(material.normal_map, &triangle.mesh.tangents, place, vertex.ns, seen);
+        let coat_n = self.mapped(layers.coat_normal_map, &triangle.mesh.coat_tangents, place, vertex.ns, seen);
         // Total reflection by a shading normal alone has an end: glass would keep light that its triangles let out.
         if let Wall::Solid { from, to } = wall
             && depth >= SMOOTH_TOTAL_REFLECTIONS
             && is_delta(alpha)
             && fresnel(n.dot(wo), from, to) == 1.0
         {
-            n = towards_eye(vertex.ng, wo);
+            n = vertex.ng;
         }
         let inputs = Inputs {
             base_colour: vertex.base_colour,

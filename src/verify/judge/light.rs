@@ -4,8 +4,7 @@ use std::f64::consts::PI;
 
 use glam::{DVec3, Vec3};
 
-use super::geometry::{Geometry, Hit, Ray};
-use super::layered::has_two_sides;
+use super::geometry::{Geometry, Hit, Ray, has_two_sides};
 use super::material::{around, sample_lobe};
 use super::{Random, uniform};
 use crate::scene::Scene;

@@ -1,15 +1,16 @@
 //! The lobes of a layered surface at a point: what each scatters, how it is sampled, with which density. The guide's page on
 //! materials has the formulas.
 
-use std::f64::consts::{FRAC_1_PI, PI, TAU};
+use std::f64::consts::{FRAC_1_PI, TAU};
 use std::sync::LazyLock;
 
 use glam::DVec3;
 
 use super::albedo::{gauss_legendre, ggx, sheen};
 use super::material::{around, fresnel, mirrored, sample_lobe};
+use super::microfacets::{ggx_distribution, ggx_visibility, is_delta, schlick, sheen_distribution, sheen_masking, slant};
 use super::{Random, uniform};
-use crate::constants::{DELTA_ALPHA_INVERSE, MAP_ALPHA_PER_MILLE};
+use crate::constants::MAP_ALPHA_PER_MILLE;
 
 /// What F0 and F90 of a clear coat are.
 const COAT_F0: f64 = 0.04;
@@ -84,7 +85,7 @@ pub struct Lobes {
     f0_transmission: DVec3,
     /// (1 - E(n.v)) (1 - C(n.v)) / N.
     diffuse: f64,
-    /// 1 - C and 1 - S towards the eye.
+    /// 1 - C and 1 - S towards the eye. S has no bound at grazing angles, and nothing is left where it is above 1.
     coat_leaves: f64,
     sheen_leaves: f64,
     /// Of being chosen.
@@ -98,33 +99,6 @@ pub struct Scattered {
     pub weight: DVec3,
     /// Per solid angle; infinite for a delta.
     pub density: f64,
-}
-
-/// Whether a lobe of this alpha is a delta.
-pub fn is_delta(alpha: f64) -> bool {
-    alpha * f64::from(DELTA_ALPHA_INVERSE) < 1.0
-}
-
-/// (1 - cosine)^5.
-pub fn schlick(cosine: f64) -> f64 {
-    (1.0 - cosine).clamp(0.0, 1.0).powi(5)
-}
-
-/// V of GGX with correlated Smith masking, from the cosines of both directions.
-pub fn ggx_visibility(alpha: f64, n_v: f64, n_l: f64) -> f64 {
-    0.5 / (n_l * slant(alpha, n_v) + n_v * slant(alpha, n_l))
-}
-
-fn slant(alpha: f64, cosine: f64) -> f64 {
-    let squared = alpha * alpha;
-    (squared + (1.0 - squared) * cosine * cosine).sqrt()
-}
-
-/// D of GGX. The sine comes from the cross product, which keeps the digits of small angles.
-fn ggx_distribution(alpha: f64, n: DVec3, h: DVec3) -> f64 {
-    let squared = alpha * alpha;
-    let width = n.cross(h).length_squared() + squared * n.dot(h).powi(2);
-    squared / (PI * width * width)
 }
 
 /// Density of half vectors that are sampled as they are seen from the eye, over 4 v.h: that of their mirror directions.
@@ -141,21 +115,6 @@ fn visible_normal(alpha: f64, n: DVec3, wo: DVec3, rng: &mut Random) -> DVec3 {
     let sine = (1.0 - height * height).max(0.0).sqrt();
     let h = stretched + DVec3::new(sine * azimuth.cos(), sine * azimuth.sin(), height);
     around(n, DVec3::new(alpha * h.x, alpha * h.y, h.z).normalize())
-}
-
-/// D of sheen, from the squared sine of the half vector.
-pub fn sheen_distribution(s: f64, sine_squared: f64) -> f64 {
-    (2.0 + 1.0 / s) * sine_squared.powf(0.5 / s) * 0.5 * FRAC_1_PI
-}
-
-/// L of sheen.
-pub fn sheen_masking(s: f64, cosine: f64) -> f64 {
-    const AT_0: [f64; 5] = [25.3245, 3.32435, 0.16801, -1.27393, -4.85967];
-    const AT_1: [f64; 5] = [21.5473, 3.82987, 0.19823, -1.97760, -4.32054];
-    let weight = 1.0 - (1.0 - s) * (1.0 - s);
-    let p: [f64; 5] = std::array::from_fn(|k| AT_0[k] + (AT_1[k] - AT_0[k]) * weight);
-    let l = |x: f64| p[0] / (1.0 + p[1] * x.powf(p[2])) + p[3] * x + p[4];
-    if cosine < 0.5 { l(cosine).exp() } else { (2.0 * l(0.5) - l(1.0 - cosine)).exp() }
 }
 
 /// (1 - E) (1 - C) is smooth enough for few places.
@@ -196,7 +155,7 @@ impl Lobes {
             Wall::Thin => f0,
             Wall::Solid { from, to } => inputs.f0(along_normal(from, to)),
         };
-        let coat_leaves = (1.0 - inputs.coat_albedo(frame.coat_n.dot(frame.wo))).max(0.0);
+        let coat_leaves = (1.0 - inputs.coat_albedo(frame.n.dot(frame.wo))).max(0.0);
         let sheen_leaves = (1.0 - inputs.sheen_albedo(frame.n.dot(frame.wo))).max(0.0);
         let mut lobes =
             Lobes { inputs, frame, f0, f0_transmission, diffuse: 0.0, coat_leaves, sheen_leaves, chances: [(Kind::Diffuse, 0.0); 5] };
@@ -254,9 +213,9 @@ impl Lobes {
         (1.0 - reflected).max(0.0) * (1.0 - self.inputs.coat_albedo(cosine)).max(0.0)
     }
 
-    /// What the coat leaves to all but the diffuse lobe.
+    /// What the coat leaves to all but the diffuse lobe, by the cosines to the base's normal.
     fn under_coat(&self, wi: DVec3) -> f64 {
-        self.coat_leaves.min((1.0 - self.inputs.coat_albedo(self.frame.coat_n.dot(wi).abs())).max(0.0))
+        self.coat_leaves.min((1.0 - self.inputs.coat_albedo(self.frame.n.dot(wi).abs())).max(0.0))
     }
 
     fn under_sheen(&self, wi: DVec3) -> f64 {
@@ -377,7 +336,8 @@ impl Lobes {
         }
         let Frame { wo, n, coat_n, .. } = self.frame;
         let Inputs { base_colour, metalness, transmission, alpha, coat_alpha, sheen_colour, sheen_s, .. } = self.inputs;
-        let (n_v, n_l) = (n.dot(wo), n.dot(wi).abs());
+        // Sheen has no bound at the horizon.
+        let (n_v, n_l) = (n.dot(wo).max(1e-9), n.dot(wi).abs());
         let Some(h) = self.half(kind, wi) else { return DVec3::ZERO };
         let v_h = wo.dot(h);
         let d_v = || ggx_distribution(alpha, n, h) * ggx_visibility(alpha, n_v, n_l);

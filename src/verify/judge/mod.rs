@@ -1,9 +1,10 @@
 //! A reference path tracer that shares no code with the photon maps that it checks.
 //!
 //! A scene goes in; estimates of radiance and irradiance come out, each with its standard error. It is
-//! unidirectional (from the eye, with light sampling at every surface that is not specular), in f64,
-//! and without bias but for two limits: paths of more than `max_bounces` bounces are left out, and so
-//! are caustics of point, spot and directional lights, which no path from the eye can meet.
+//! unidirectional (from the eye, with light sampling at every surface that is not specular, and at layered
+//! ones multiple importance sampling), in f64, and without bias but for two limits: paths of more than
+//! `max_bounces` bounces are left out, and so are caustics of point, spot and directional lights, which no
+//! path from the eye can meet.
 //!
 //! Standard errors tell little where few samples carry the light: in caustics of small lamps, and next
 //! to shining triangles that meet other surfaces, where 1 / distance^2 has no bound.
@@ -15,6 +16,7 @@ mod light;
 pub mod lobes;
 mod material;
 mod media;
+mod microfacets;
 mod path;
 pub mod radiosity;
 mod verdict;
@@ -37,7 +39,7 @@ pub use verdict::Verdict;
 /// Radiance (W/m2/sr) or irradiance (W/m2) by [`Part`], linear RGB. Irradiance has no specular part.
 ///
 /// A camera path runs through specular surfaces (mirrors, glass) to the first one that is not: x. Light is told apart by what
-/// lies before and behind x.
+/// lies before and behind x. Of layered surfaces it is the lobe that counts, sharp or matt: see the guide's page on materials.
 #[derive(Debug, Clone, Copy, PartialEq, Default, Pod, Zeroable)]
 #[repr(C)]
 pub struct Parts {

@@ -1,0 +1,362 @@
+//! The lobes of layered materials in f64, as the path tracer in f64 has them: albedos, reciprocity, densities.
+
+use crate::common::chi_square::{Grid, density_check, even};
+use crate::common::prelude::*;
+use photonmill::verify::judge::lobes::{Frame, Inputs, Kind, Lobes, Wall};
+use photonmill::verify::judge::{Random, random};
+
+const COSINES: [f64; 5] = [1.0, 0.8, 0.5, 0.2, 0.05];
+const KINDS: [Kind; 5] = [Kind::Diffuse, Kind::Reflection, Kind::Transmission, Kind::Coat, Kind::Sheen];
+
+/// A white dielectric without anything else, of this roughness.
+fn plastic(roughness: f64) -> Inputs {
+    Inputs {
+        base_colour: DVec3::ONE,
+        metalness: 0.0,
+        alpha: roughness * roughness,
+        ior: 1.5,
+        specular: 1.0,
+        specular_colour: DVec3::ONE,
+        transmission: 0.0,
+        wall: Wall::Thin,
+        coat: 0.0,
+        coat_alpha: 0.0,
+        sheen_colour: DVec3::ZERO,
+        sheen_s: 0.01,
+    }
+}
+
+fn metal(roughness: f64) -> Inputs {
+    Inputs { metalness: 1.0, ..plastic(roughness) }
+}
+
+fn glass(roughness: f64, wall: Wall) -> Inputs {
+    Inputs { transmission: 1.0, wall, ..plastic(roughness) }
+}
+
+fn solid(roughness: f64, from: f64, to: f64) -> Inputs {
+    glass(roughness, Wall::Solid { from, to })
+}
+
+fn wo(cosine: f64) -> DVec3 {
+    DVec3::new((1.0 - cosine * cosine).sqrt(), 0.0, cosine)
+}
+
+fn lobes(inputs: Inputs, wo: DVec3) -> Lobes {
+    Lobes::new(inputs, Frame { wo, ng: DVec3::Z, n: DVec3::Z, coat_n: DVec3::Z })
+}
+
+/// Of every lobe alone and of mixtures.
+fn materials() -> Vec<(&'static str, Inputs)> {
+    let tinted = DVec3::new(0.9, 0.5, 0.1);
+    let sheen = |roughness: f64| Inputs { sheen_colour: DVec3::ONE, sheen_s: roughness * roughness, ..plastic(0.5) };
+    vec![
+        ("plastic", plastic(0.45)),
+        ("rough plastic", plastic(1.0)),
+        ("smooth plastic", plastic(0.0)),
+        ("ior 0", Inputs { ior: 0.0, ..plastic(0.6) }),
+        ("tinted specular", Inputs { specular_colour: tinted * 30.0, specular: 0.7, ior: 1.8, ..plastic(0.6) }),
+        ("metal", metal(0.5)),
+        ("half metal", Inputs { metalness: 0.5, base_colour: tinted, ..plastic(0.7) }),
+        ("thin glass", glass(0.0, Wall::Thin)),
+        ("rough thin glass", glass(0.5, Wall::Thin)),
+        ("half thin glass", Inputs { transmission: 0.5, metalness: 0.2, ..glass(0.7, Wall::Thin) }),
+        ("glass", solid(0.0, 1.0, 1.5)),
+        ("rough glass", solid(0.6, 1.0, 1.5)),
+        ("rough glass from inside", solid(0.6, 1.5, 1.0)),
+        ("rough glass in oil", Inputs { specular: 0.5, transmission: 0.7, ..solid(0.8, 1.2, 1.8) }),
+        ("coat over metal", Inputs { coat: 1.0, coat_alpha: 0.2, ..metal(0.6) }),
+        ("coat over plastic", Inputs { coat: 1.0, coat_alpha: 0.25, ..plastic(0.7) }),
+        ("smooth coat over plastic", Inputs { coat: 1.0, ..plastic(0.5) }),
+        ("coat over glass", Inputs { coat: 0.5, coat_alpha: 0.3, ..glass(0.5, Wall::Thin) }),
+        ("sheen", sheen(1.0)),
+        ("sharper sheen", sheen(0.4)),
+        ("all", Inputs { coat: 0.7, coat_alpha: 0.2, metalness: 0.3, transmission: 0.4, base_colour: tinted, ..sheen(0.7) }),
+    ]
+}
+
+/// The integral of a function over the hemisphere around z, or around -z: by the midpoint rule on a grid that is denser at the
+/// horizon and at the pole.
+fn over_hemisphere(side: f64, count: usize, f: impl Fn(DVec3) -> DVec3) -> DVec3 {
+    let mut sum = DVec3::ZERO;
+    for row in 0..count {
+        let (sin, cos) = (FRAC_PI_2 * (row as f64 + 0.5) / count as f64).sin_cos();
+        let height = sin * sin;
+        let ring: DVec3 = (0..count)
+            .map(|column| {
+                let azimuth = PI * (column as f64 + 0.5) / count as f64;
+                let sine = (1.0 - height * height).sqrt();
+                f(DVec3::new(sine * azimuth.cos(), sine * azimuth.sin(), side * height))
+            })
+            .sum();
+        sum += PI * sin * cos * ring;
+    }
+    // The eye lies in the plane of x and z, and both sides of it are alike.
+    sum * TAU / (count * count) as f64
+}
+
+/// Directional albedo of a lobe that is no delta, by quadrature of its BSDF.
+fn albedo(lobes: &Lobes, kind: Kind, count: usize) -> DVec3 {
+    let side = if kind == Kind::Transmission { -1.0 } else { 1.0 };
+    over_hemisphere(side, count, |wi| wi.z.abs() * lobes.evaluate(kind, wi))
+}
+
+/// The same of reflection, over half vectors, for the sharpest lobes.
+fn reflection_albedo(alpha: f64, cosine: f64, count: usize) -> f64 {
+    let wo = wo(cosine);
+    let lobes = lobes(Inputs { alpha, ..metal(0.0) }, wo);
+    let step = |index: usize| (index as f64 + 0.5) / count as f64;
+    let mut sum = 0.0;
+    for psi in (0..count).map(|index| FRAC_PI_2 * step(index)) {
+        let tangent = alpha * psi.tan();
+        let cos = 1.0 / (1.0 + tangent * tangent).sqrt();
+        // Of the polar angle by psi.
+        let slope = cos * cos * alpha / psi.cos().powi(2);
+        for azimuth in (0..count).map(|index| PI * step(index)) {
+            let h = cos * DVec3::new(tangent * azimuth.cos(), tangent * azimuth.sin(), 1.0);
+            let wi = 2.0 * wo.dot(h) * h - wo;
+            if wo.dot(h) > 0.0 && wi.z > 0.0 {
+                sum += lobes.evaluate(Kind::Reflection, wi).x * wi.z * 4.0 * wo.dot(h) * cos * tangent * slope;
+            }
+        }
+    }
+    sum * TAU * FRAC_PI_2 / (count * count) as f64
+}
+
+#[test]
+fn reflection_has_the_albedos_of_the_table() {
+    // GGX with correlated Smith masking and F = 1, at the cosines of COSINES.
+    for (alpha, expected) in [
+        (0.01, [1.0, 1.0, 0.9998, 0.9986, 0.9763]),
+        (0.05, [0.9972, 0.9964, 0.9927, 0.9626, 0.8899]),
+        (0.1, [0.9883, 0.9846, 0.9692, 0.9046, 0.9118]),
+        (0.25, [0.9158, 0.8973, 0.8573, 0.8482, 0.9331]),
+        (0.5, [0.6878, 0.6820, 0.6983, 0.7899, 0.9125]),
+        (0.75, [0.4639, 0.4923, 0.5646, 0.7155, 0.8806]),
+        (1.0, [0.3069, 0.3513, 0.4507, 0.6416, 0.8478]),
+    ] {
+        for (cosine, expected) in COSINES.into_iter().zip(expected) {
+            assert_holds(
+                format!("alpha {alpha} at {cosine}"),
+                relative_check("albedo", reflection_albedo(alpha, cosine, 400), expected, 1e-3),
+            );
+        }
+    }
+}
+
+/// Means of the three channels of a lobe's samples, and their standard errors.
+fn sampled(lobes: &Lobes, kind: Kind, count: u32, rng: &mut Random) -> (DVec3, DVec3) {
+    let (mut sum, mut squares) = (DVec3::ZERO, DVec3::ZERO);
+    for _ in 0..count {
+        let weight = lobes.sample(kind, rng).map_or(DVec3::ZERO, |scattered| scattered.weight);
+        sum += weight;
+        squares += weight * weight;
+    }
+    let n = f64::from(count);
+    (sum / n, ((squares / n - (sum / n) * (sum / n)).max(DVec3::ZERO) / n).map(f64::sqrt))
+}
+
+#[test]
+fn samples_have_the_albedo_of_their_lobe_and_nothing_is_won() {
+    let mut rng = random(1, 1);
+    for (what, inputs) in materials() {
+        // Radiance over the squared index is what refraction leaves as it is.
+        let scale = match inputs.wall {
+            Wall::Solid { from, to } => (to / from).powi(2),
+            Wall::Thin => 1.0,
+        };
+        for cosine in COSINES {
+            let lobes = lobes(inputs, wo(cosine));
+            let mut total = DVec3::ZERO;
+            for kind in KINDS {
+                let (mean, error) = sampled(&lobes, kind, 20_000, &mut rng);
+                let expected = if lobes.is_delta(kind) { mean } else { albedo(&lobes, kind, 200) };
+                let off = (mean - expected).abs();
+                assert!(off.cmple(4.5 * error + 1e-3).all(), "{what}, {kind:?} at {cosine}: {mean} +- {error}, expected {expected}");
+                total += expected * if kind == Kind::Transmission { scale } else { 1.0 };
+                let is_chosen = lobes.chances().any(|(chosen, _)| chosen == kind);
+                assert!(is_chosen || expected.max_element() < 1e-12, "{what}: {kind:?} is never chosen at {cosine}, albedo {expected}");
+            }
+            println!("{what} at {cosine}: {total}");
+            assert!(total.max_element() < 1.0 + 1e-3, "{what} at {cosine}: {total}");
+            let chances: f64 = lobes.chances().map(|(_, chance)| chance).sum();
+            assert!((chances - 1.0).abs() < 1e-12, "{what}: {chances}");
+        }
+    }
+}
+
+#[test]
+fn white_surfaces_return_all_that_single_scattering_leaves() {
+    let whole = |inputs: Inputs, cosine: f64| -> f64 {
+        let lobes = lobes(inputs, wo(cosine));
+        let of = |kind| match lobes.is_delta(kind) {
+            true => lobes.sample(kind, &mut random(1, 1)).map_or(0.0, |scattered| scattered.weight.x),
+            // Reflection may be sharp.
+            false => albedo(&lobes, kind, if kind == Kind::Reflection { 1000 } else { 100 }).x,
+        };
+        KINDS.into_iter().map(of).sum()
+    };
+    for cosine in COSINES {
+        for roughness in [0.0, 0.3, 0.6, 1.0] {
+            let returned = whole(plastic(roughness), cosine);
+            assert!((returned - 1.0).abs() < 3e-4, "plastic of roughness {roughness} at {cosine}: {returned}");
+        }
+        let returned = whole(Inputs { coat: 1.0, ..plastic(0.0) }, cosine);
+        assert!((returned - 1.0).abs() < 3e-4, "smooth coat at {cosine}: {returned}");
+        let returned = whole(Inputs { metalness: 1.0, coat: 1.0, ..plastic(0.0) }, cosine);
+        assert!((returned - 1.0).abs() < 1e-9, "coated mirror at {cosine}: {returned}");
+        // Lossless thin walls, smooth ones, and solids.
+        for (inputs, scale) in [(glass(0.0, Wall::Thin), 1.0), (solid(0.0, 1.0, 1.5), 2.25), (solid(0.0, 1.5, 1.0), 1.0 / 2.25)] {
+            let lobes = lobes(inputs, wo(cosine));
+            let of = |kind| lobes.sample(kind, &mut random(1, 1)).map_or(0.0, |scattered| scattered.weight.x);
+            let returned = of(Kind::Reflection) + scale * of(Kind::Transmission);
+            assert!((returned - 1.0).abs() < 1e-12, "{inputs:?} at {cosine}: {returned}");
+        }
+    }
+}
+
+/// A direction on a side of the plane of x and y.
+fn direction(side: f64, rng: &mut Random) -> DVec3 {
+    let mut uniform = || (rand_word(rng) as f64 + 0.5) / 4_294_967_296.0;
+    let (height, azimuth) = (uniform(), TAU * uniform());
+    let sine = (1.0 - height * height).sqrt();
+    DVec3::new(sine * azimuth.cos(), sine * azimuth.sin(), side * height)
+}
+
+fn rand_word(rng: &mut Random) -> u32 {
+    rand_pcg::rand_core::Rng::next_u32(rng)
+}
+
+#[test]
+fn lobes_are_reciprocal() {
+    let mut rng = random(2, 1);
+    let mut tested = 0;
+    for (what, inputs) in materials() {
+        for _ in 0..200 {
+            for kind in KINDS {
+                let side = if kind == Kind::Transmission { -1.0 } else { 1.0 };
+                let (v, l) = (direction(1.0, &mut rng), direction(side, &mut rng));
+                let there = lobes(inputs, v).evaluate(kind, l);
+                let (swapped, scale) = match inputs.wall {
+                    Wall::Solid { from, to } => {
+                        let scale = if kind == Kind::Transmission { (to / from).powi(2) } else { 1.0 };
+                        (
+                            if kind == Kind::Transmission { Inputs { wall: Wall::Solid { from: to, to: from }, ..inputs } } else { inputs },
+                            scale,
+                        )
+                    }
+                    Wall::Thin => (inputs, 1.0),
+                };
+                let n = side * DVec3::Z;
+                let back = Lobes::new(swapped, Frame { wo: l, ng: n, n, coat_n: n }).evaluate(kind, v);
+                let off = (scale * there - back).abs();
+                assert!(off.cmple(1e-9 * (back.abs() + 1e-3)).all(), "{what}, {kind:?}: {there} and {back} between {v} and {l}");
+                tested += u32::from(there.max_element() > 0.0);
+            }
+        }
+    }
+    assert!(tested > 3000, "{tested}");
+}
+
+/// Half vectors of an eye in the plane of x and z: a share of the largest slope whose mirror direction is above the surface, as
+/// GGX spreads them, and an azimuth.
+struct HalfVectors {
+    wo: DVec3,
+    alpha: f64,
+}
+
+impl HalfVectors {
+    fn share(&self, tangent: f64) -> f64 {
+        tangent * tangent / (self.alpha * self.alpha + tangent * tangent)
+    }
+
+    fn most(&self, azimuth: f64) -> f64 {
+        let angle = 0.25 * PI + 0.5 * (self.wo.x * azimuth.cos()).atan2(self.wo.z);
+        self.share(angle.tan())
+    }
+
+    fn place(&self, wi: DVec3) -> (f64, f64) {
+        let h = self.wo + wi;
+        let azimuth = h.y.atan2(h.x);
+        (self.share(h.truncate().length() / h.z) / self.most(azimuth), azimuth)
+    }
+
+    /// The mirror direction of a place, and its solid angle over the place's area.
+    fn direction(&self, x: f64, azimuth: f64) -> (DVec3, f64) {
+        let most = self.most(azimuth);
+        let share = x * most;
+        let squared = self.alpha * self.alpha;
+        let tangent = (squared * share / (1.0 - share)).sqrt();
+        let h = DVec3::new(tangent * azimuth.cos(), tangent * azimuth.sin(), 1.0).normalize();
+        let v_h = self.wo.dot(h);
+        let solid_angle = (squared + tangent * tangent).powi(2) / (2.0 * squared) * h.z.powi(3);
+        (2.0 * v_h * h - self.wo, 4.0 * v_h * solid_angle * most)
+    }
+}
+
+#[test]
+fn samples_follow_their_density() {
+    let mut rng = random(3, 1);
+    let grid = Grid { x: even(0.0, 1.0, 10), y: even(-PI, PI, 12) };
+    // From 1e-4 to 1 by even ratios.
+    for alpha in (0..20).map(|k| 1e-4f64.powf(1.0 - f64::from(k) / 19.0) * (1.0 + 1e-12)) {
+        for cosine in COSINES {
+            let wo = wo(cosine);
+            // A coat, a metal and a rough pane sample the same normals.
+            for (kind, inputs) in [
+                (Kind::Reflection, Inputs { alpha, ..metal(0.0) }),
+                (Kind::Coat, Inputs { coat: 1.0, coat_alpha: alpha, ..plastic(0.5) }),
+                (Kind::Transmission, Inputs { alpha, ..glass(0.0, Wall::Thin) }),
+            ] {
+                let lobes = lobes(inputs, wo);
+                let up = |wi: DVec3| if kind == Kind::Transmission { wi.with_z(-wi.z) } else { wi };
+                let of = HalfVectors { wo, alpha };
+                let trials = 3000;
+                let places: Vec<(f64, f64)> =
+                    (0..trials).filter_map(|_| lobes.sample(kind, &mut rng)).map(|scattered| of.place(up(scattered.wi))).collect();
+                let density = |x: f64, azimuth: f64| {
+                    let (wi, solid_angle) = of.direction(x, azimuth);
+                    lobes.density(kind, up(wi)) * solid_angle
+                };
+                let total: f64 = grid.probabilities(&density).iter().sum();
+                assert!(total < 1.0 + 1e-6 && total > 0.4, "{kind:?}, alpha {alpha} at {cosine}: {total}");
+                // All that is lost is one more cell.
+                let total = if trials == places.len() { 1.0 } else { total };
+                let check =
+                    density_check(&format!("{kind:?}, alpha {alpha:.5} at {cosine}"), &places, trials, &grid, (total, 1e-3), &density);
+                assert_holds("visible normals", check);
+            }
+        }
+    }
+}
+
+#[test]
+fn wide_lobes_follow_their_density() {
+    let mut rng = random(4, 1);
+    let grid = Grid { x: even(0.0, 1.0, 36), y: even(-PI, PI, 36) };
+    for (kind, inputs) in [
+        (Kind::Diffuse, plastic(0.5)),
+        (Kind::Sheen, Inputs { sheen_colour: DVec3::ONE, sheen_s: 0.2, ..plastic(0.5) }),
+        (Kind::Transmission, solid(0.6, 1.0, 1.5)),
+        (Kind::Transmission, solid(0.7, 1.5, 1.0)),
+        (Kind::Transmission, solid(0.8, 1.0, 1.8)),
+    ] {
+        for cosine in COSINES {
+            let lobes = lobes(inputs, wo(cosine));
+            let side = if kind == Kind::Transmission { -1.0 } else { 1.0 };
+            let trials = 20_000;
+            let places: Vec<(f64, f64)> = (0..trials)
+                .filter_map(|_| lobes.sample(kind, &mut rng))
+                .map(|scattered| (scattered.wi.z.abs(), scattered.wi.y.atan2(scattered.wi.x)))
+                .collect();
+            let density = |height: f64, azimuth: f64| {
+                let sine = (1.0 - height * height).sqrt();
+                lobes.density(kind, DVec3::new(sine * azimuth.cos(), sine * azimuth.sin(), side * height))
+            };
+            let sum: f64 = grid.probabilities(&density).iter().sum();
+            let total = if trials == places.len() { 1.0 } else { sum };
+            let check = density_check(&format!("{kind:?} at {cosine}: {inputs:?}"), &places, trials, &grid, (total, 3e-3), &density);
+            assert_holds("directions", check);
+        }
+    }
+}
