@@ -135,14 +135,19 @@ warnings
     let json: Value = serde_json::from_slice(&place.run("info a.gltf --json").stdout).unwrap();
     assert_eq!((&json["mesh_count"], &json["triangle_count"], &json["texture_bytes"]), (&json!(1), &json!(2), &json!(1024)));
     assert_eq!(json["materials"][1], json!({"name": "film", "description": "metal, roughness 1", "triangle_count": 0}));
-    let wood = json!({"name": "texture image 'wood'", "width": 16, "height": 8, "texels": "sRGB colours", "filter": "bilinear", "bytes": 512});
+    let wood =
+        json!({"name": "texture image 'wood'", "width": 16, "height": 8, "texels": "sRGB colours", "filter": "bilinear", "bytes": 512});
     assert_eq!((&json["textures"][0], &json["lights"][0]), (&wood, &json!({"name": "light 'bulb'", "kind": "point"})));
     assert_eq!((&json["cameras"], json["warnings"].as_array().unwrap().len()), (&json!(["eye"]), 1));
     assert_eq!(json["extensions_used"], value["extensionsUsed"]);
 
     // Built-in scenes have other surfaces, and nothing to leave out.
     let built_in = text(&place.run("info cornell-spheres").stdout);
-    for line in ["    white: matt, base colour 0.725 0.71 0.68\n", "    glass: smooth glass, ior 1.5\n", "    nothing that the file holds is left out\n"] {
+    for line in [
+        "    white: matt, base colour 0.725 0.71 0.68\n",
+        "    glass: smooth glass, ior 1.5\n",
+        "    nothing that the file holds is left out\n",
+    ] {
         assert!(built_in.contains(line), "{line}{built_in}");
     }
     assert!(place.refusal("info absent.glb").unwrap().contains("no such file"));
