@@ -576,7 +576,7 @@ fn zoo() -> Scene {
             light("beam", LightKind::Spot { position, direction, intensity, inner_angle: 0.25, outer_angle: 0.5 }),
         ],
         cameras: vec![Camera::looking_at("eye", DVec3::new(3.0, 4.0, 5.0), DVec3::ZERO, DVec3::Y, 0.8)],
-        warnings: Vec::new(),
+        ..Scene::default()
     }
 }
 

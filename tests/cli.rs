@@ -536,7 +536,7 @@ fn help_is_grouped_alike_everywhere() {
         Density estimate|Implementation|Checks|Messages|Device|Examples";
     let place = Place::new();
     let mut places: HashMap<String, (String, String)> = HashMap::new();
-    for command in ["", "devices", "render", "bake", "probe", "plan", "selfcheck", "study", "bench", "paper"] {
+    for command in ["", "devices", "render", "bake", "probe", "plan", "info", "selfcheck", "study", "bench", "paper"] {
         let help = text(&place.run(&format!("{command} --help")).stdout);
         let groups = groups(&help);
         let order: Vec<_> = groups.iter().map(|(heading, _)| HEADINGS.split('|').position(|known| known == heading)).collect();
@@ -556,7 +556,7 @@ fn help_is_grouped_alike_everywhere() {
                 assert_eq!(*first, place, "{command}: --{name}");
             }
         }
-        let takes_scene = ["render", "bake", "probe", "plan", "study"].contains(&command);
+        let takes_scene = ["render", "bake", "probe", "plan", "info", "study"].contains(&command);
         let missing = built_in::names().into_iter().find(|scene| !help.contains(scene));
         assert!(!takes_scene || missing.is_none(), "{command}: {missing:?}");
         assert_eq!(help.contains("\nArguments:\n  <SCENE>"), takes_scene, "{command}");

@@ -21,6 +21,7 @@ mod gltf;
 mod guide;
 mod hard_cases;
 mod hard_materials;
+mod info;
 mod judge;
 mod large_scene;
 mod layout;

@@ -378,17 +378,16 @@ impl Document {
             set(&mut value, "sheenRoughnessTexture", of.sheen_roughness_texture);
             value
         };
-        let usual = Layers::default();
-        let parts: [(&str, &dyn Fn(&Layers) -> Value); 5] = [
-            ("KHR_materials_ior", &ior),
-            ("KHR_materials_specular", &specular),
-            ("KHR_materials_transmission", &transmission),
-            ("KHR_materials_clearcoat", &coat),
-            ("KHR_materials_sheen", &sheen),
-        ];
-        for (name, part) in parts {
-            let own = part(&layers);
-            if own != part(&usual) {
+        // What is as usual is left out.
+        let own_and_usual = |part: &dyn Fn(&Layers) -> Value| [layers, Layers::default()].map(|of| part(&of));
+        for (name, [own, usual]) in [
+            ("KHR_materials_ior", own_and_usual(&ior)),
+            ("KHR_materials_specular", own_and_usual(&specular)),
+            ("KHR_materials_transmission", own_and_usual(&transmission)),
+            ("KHR_materials_clearcoat", own_and_usual(&coat)),
+            ("KHR_materials_sheen", own_and_usual(&sheen)),
+        ] {
+            if own != usual {
                 add(name, own);
             }
         }

@@ -62,6 +62,13 @@ Examples:
   photonmill plan cornell --size 1920x1080 --json plan.json
       The same as JSON";
 
+pub(super) const INFO: &str = "\
+Examples:
+  photonmill info scene.glb
+      Meshes, textures, lights, what became of every material, and what is not simulated
+  photonmill info scene.glb --json info.json
+      The same as JSON";
+
 pub(super) const DEVICES: &str = "\
 Examples:
   photonmill devices

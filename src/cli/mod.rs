@@ -4,6 +4,7 @@ mod bake;
 mod bench;
 mod devices;
 mod help;
+mod info;
 mod interrupt;
 mod job;
 mod options;
@@ -62,6 +63,9 @@ enum Command {
     /// Print which effects a scene needs, and why
     #[command(after_help = help::PLAN)]
     Plan(plan::PlanArgs),
+    /// Print what a scene's file holds, and what became of its materials
+    #[command(after_help = help::INFO)]
+    Info(info::InfoArgs),
     /// List the Vulkan devices and their limits
     #[command(after_help = help::DEVICES)]
     Devices(devices::DevicesArgs),
@@ -196,6 +200,7 @@ pub fn main() -> u8 {
         Some(Command::Bake(args)) => bake::run(&args, &cancelled),
         Some(Command::Probe(args)) => probe::run(&args, &cancelled),
         Some(Command::Plan(args)) => plan::run(&args).map(|()| End::Finished),
+        Some(Command::Info(args)) => info::run(&args).map(|()| End::Finished),
         Some(Command::Selfcheck(args)) => interruptible(|| selfcheck::run(&args, &cancelled)),
         Some(Command::Study(args)) => interruptible(|| study::run(&args, &cancelled)),
         Some(Command::Bench(args)) => interruptible(|| bench::run(&args, &cancelled)),

@@ -245,7 +245,7 @@ pub(super) fn geometry(scene: &Scene, settings: &SceneSettings, reporter: &Progr
 }
 
 /// Reports the stages of loading `what`, each at its start and at every tenth of it.
-fn stages<'a>(what: &'a str, reporter: &'a ProgressReporter) -> impl FnMut(&'static str, f64) + 'a {
+pub(super) fn stages<'a>(what: &'a str, reporter: &'a ProgressReporter) -> impl FnMut(&'static str, f64) + 'a {
     let mut reported = None;
     move |stage, done| {
         let step = (stage, (10.0 * done) as u32);

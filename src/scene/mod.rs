@@ -51,6 +51,8 @@ pub struct Scene {
     /// Lights that are no mesh; meshes of an emissive material shine as well.
     pub lights: Vec<Light>,
     pub cameras: Vec<Camera>,
+    /// Extensions that the file uses.
+    pub extensions: Vec<String>,
     /// What the file holds and this program leaves out, each once.
     pub warnings: Vec<String>,
 }

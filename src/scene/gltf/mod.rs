@@ -89,7 +89,11 @@ pub fn load(path: &Path, radiometric: bool, progress: Progress) -> Result<Scene>
         path: path.to_owned(),
         file_bytes: content.len(),
         buffers: Vec::new(),
-        scene: Scene { name: path.file_stem().unwrap_or_default().to_string_lossy().into_owned(), ..Scene::default() },
+        scene: Scene {
+            name: path.file_stem().unwrap_or_default().to_string_lossy().into_owned(),
+            extensions: document.extensions_used().map(printable).collect(),
+            ..Scene::default()
+        },
         left_out: BTreeMap::new(),
         triangle_count: 0,
         wanted_textures: Vec::new(),

@@ -1,0 +1,154 @@
+//! `photonmill info`: what a file holds, what became of every material in words, and what is left out.
+
+use crate::common::gltf_file::{data_uri, encoded, square};
+use crate::common::prelude::*;
+use image::{ImageFormat, RgbImage};
+use serde_json::{Value, json};
+
+/// The square with these materials on as many squares, and one picture.
+fn square_with(materials: &Value) -> Value {
+    let mut value = square();
+    let count = materials.as_array().unwrap().len();
+    let mut primitive = value["meshes"][0]["primitives"][0].clone();
+    let primitives = (0..count).map(|k| {
+        primitive["material"] = json!(k);
+        primitive.clone()
+    });
+    value["meshes"][0]["primitives"] = primitives.collect();
+    value["images"] = json!([{"name": "wood", "uri": data_uri("image/png", &encoded(&RgbImage::new(16, 8), ImageFormat::Png))}]);
+    value["textures"] = json!([{"source": 0}]);
+    value["materials"] = materials.clone();
+    value
+}
+
+/// What is printed of a material.
+fn described(material: Value) -> String {
+    let place = Place::new();
+    let mut material = material;
+    material["name"] = json!("thing");
+    place.write("a.gltf", square_with(&json!([material])).to_string());
+    let output = place.run("info a.gltf");
+    assert!(output.status.success(), "{}", text(&output.stderr));
+    let stdout = text(&output.stdout);
+    let line = stdout.lines().find_map(|line| line.strip_prefix("    thing: ").map(ToOwned::to_owned));
+    line.unwrap_or_else(|| panic!("no line of the material: {stdout}"))
+}
+
+#[test]
+fn materials_are_described_in_words() {
+    let texture = json!({"index": 0});
+    let of = |extension: &str, content: Value| (format!("KHR_materials_{extension}"), content);
+    let glass = |volume: Option<Value>| {
+        let mut extensions: serde_json::Map<String, Value> = [of("transmission", json!({"transmissionFactor": 1}))].into_iter().collect();
+        extensions.extend(volume.map(|volume| of("volume", volume)));
+        json!({"pbrMetallicRoughness": {"metallicFactor": 0, "roughnessFactor": 0}, "extensions": extensions})
+    };
+    let with = |name: &str, content: Value| json!({"pbrMetallicRoughness": {"metallicFactor": 0}, "extensions": {format!("KHR_materials_{name}"): content}});
+    let cases = [
+        (json!({}), "metal, roughness 1"),
+        (
+            json!({"pbrMetallicRoughness": {"metallicFactor": 0, "roughnessFactor": 0.4, "baseColorTexture": texture,
+                "metallicRoughnessTexture": texture}}),
+            "dielectric, ior 1.5, roughness 0.4 (texture), base colour texture 'wood' 16x8",
+        ),
+        (
+            json!({"pbrMetallicRoughness": {"metallicFactor": 0.25, "baseColorFactor": [0.012345, 1, 0.5, 1]}, "doubleSided": true}),
+            "dielectric and metal, metallic 0.25, ior 1.5, roughness 1, base colour 0.0123 1 0.5, two-sided",
+        ),
+        (
+            json!({"pbrMetallicRoughness": {"metallicRoughnessTexture": texture}}),
+            "dielectric and metal, metallic 1 (texture), ior 1.5, roughness 1 (texture)",
+        ),
+        (glass(None), "thin wall of glass, ior 1.5, roughness 0"),
+        (glass(Some(json!({"thicknessFactor": 0}))), "thin wall of glass, ior 1.5, roughness 0"),
+        (
+            glass(Some(json!({"thicknessFactor": 1, "attenuationColor": [0.25, 0.25, 1], "attenuationDistance": 2}))),
+            "solid glass, ior 1.5, roughness 0, 0.5 0.5 1 of the light left after a metre",
+        ),
+        (
+            with("transmission", json!({"transmissionFactor": 0.5, "transmissionTexture": texture})),
+            "thin wall of glass, ior 1.5, roughness 1, transmission 0.5 (texture)",
+        ),
+        (with("ior", json!({"ior": 0})), "dielectric, ior infinite, roughness 1"),
+        (
+            with("specular", json!({"specularFactor": 0.5, "specularColorTexture": texture})),
+            "dielectric, ior 1.5, roughness 1, specular 0.5, specular colour 1 (texture)",
+        ),
+        (
+            with("clearcoat", json!({"clearcoatFactor": 0.5, "clearcoatRoughnessFactor": 0.1, "clearcoatNormalTexture": texture})),
+            "dielectric, ior 1.5, roughness 1, clear coat 0.5 of roughness 0.1, normal map of the coat",
+        ),
+        (
+            with("sheen", json!({"sheenColorFactor": [1, 0.5, 0], "sheenRoughnessFactor": 0.3, "sheenRoughnessTexture": texture})),
+            "dielectric, ior 1.5, roughness 1, sheen 1 0.5 0 of roughness 0.3 (texture)",
+        ),
+        (
+            json!({"alphaMode": "MASK", "normalTexture": {"index": 0, "scale": 0.5}, "emissiveFactor": [0.6, 0.6, 0.6]}),
+            "metal, roughness 1, cut out where alpha is below 0.5, normal map of scale 0.5, emits 0.6 W/m2/sr",
+        ),
+        (
+            json!({"alphaMode": "BLEND", "pbrMetallicRoughness": {"baseColorFactor": [1, 1, 1, 0.25]}, "extensions": {"KHR_materials_unlit": {}}}),
+            "unlit: the eye sees its base colour as it is, blended by alpha 0.25",
+        ),
+        (
+            with("pbrSpecularGlossiness", json!({"specularFactor": [0.2, 0.2, 0.2], "glossinessFactor": 0.75})),
+            "dielectric, ior infinite, roughness 0.25, specular colour 0.2",
+        ),
+    ];
+    for (material, expected) in cases {
+        assert_eq!(described(material.clone()), expected, "{material}");
+    }
+}
+
+#[test]
+fn a_file_is_described_as_text_and_as_json() {
+    let place = Place::new();
+    let mut value = square_with(&json!([
+        {"name": "floor", "pbrMetallicRoughness": {"baseColorTexture": {"index": 0}, "metallicRoughnessTexture": {"index": 0}}},
+        {"name": "film", "extensions": {"KHR_materials_iridescence": {}}}
+    ]));
+    value["meshes"][0]["primitives"].as_array_mut().unwrap().pop();
+    place.write("a.gltf", value.to_string());
+    let (stdout, stderr) = (text(&place.run("info a.gltf").stdout), text(&place.run("info a.gltf").stderr));
+    assert_eq!(stderr, "");
+    let expected = "\
+a: 1 mesh, 2 triangles, 2 x 2 x 0 m, 2 materials, 2 textures (0.000977 MiB), 3 lights, 1 camera
+extensions
+    KHR_lights_punctual, KHR_materials_emissive_strength
+materials
+    floor: dielectric and metal, metallic 1 (texture), ior 1.5, roughness 1 (texture), base colour texture 'wood' 16x8
+    film: metal, roughness 1; on no mesh
+textures
+    texture image 'wood': 16x8, sRGB colours, bilinear, 0.000488 MiB
+    texture image 'wood': 16x8, linear numbers, bilinear, 0.000488 MiB
+lights, beside materials that emit
+    light 'bulb': point
+    light of node 'sun': directional
+    light of node 'beam': spot
+cameras
+    eye
+warnings
+    ignored: the extension KHR_materials_iridescence: material 'film'
+";
+    assert_eq!(stdout, expected);
+
+    let json: Value = serde_json::from_slice(&place.run("info a.gltf --json").stdout).unwrap();
+    assert_eq!((&json["mesh_count"], &json["triangle_count"], &json["texture_bytes"]), (&json!(1), &json!(2), &json!(1024)));
+    assert_eq!(json["materials"][1], json!({"name": "film", "description": "metal, roughness 1", "triangle_count": 0}));
+    let wood =
+        json!({"name": "texture image 'wood'", "width": 16, "height": 8, "texels": "sRGB colours", "filter": "bilinear", "bytes": 512});
+    assert_eq!((&json["textures"][0], &json["lights"][0]), (&wood, &json!({"name": "light 'bulb'", "kind": "point"})));
+    assert_eq!((&json["cameras"], json["warnings"].as_array().unwrap().len()), (&json!(["eye"]), 1));
+    assert_eq!(json["extensions_used"], value["extensionsUsed"]);
+
+    // Built-in scenes have other surfaces, and nothing to leave out.
+    let built_in = text(&place.run("info cornell-spheres").stdout);
+    for line in [
+        "    white: matt, base colour 0.725 0.71 0.68\n",
+        "    glass: smooth glass, ior 1.5\n",
+        "    nothing that the file holds is left out\n",
+    ] {
+        assert!(built_in.contains(line), "{line}{built_in}");
+    }
+    assert!(place.refusal("info absent.glb").unwrap().contains("no such file"));
+}
