@@ -46,9 +46,8 @@ fn runs(gpu: &Gpu, scene: &Scene, settings: &SceneSettings) -> Runs {
     let squared = |place: usize| all.iter().map(|lit| lit.film.standard_error(place, &lit.plan).powf(2.0)).sum::<DVec3>();
     let errors = (0..pixels).map(|place| share * squared(place).map(f64::sqrt)).collect();
     let parts = std::array::from_fn(|part| {
-        let of_run = |lit: &RunResult| {
-            lit.film.part_totals[part] as f64 / (lit.plan.film_scale * f64::from(lit.film.rounds) * pixels as f64)
-        };
+        let of_run =
+            |lit: &RunResult| lit.film.part_totals[part] as f64 / (lit.plan.film_scale * f64::from(lit.film.rounds) * pixels as f64);
         let values: Vec<f64> = all.iter().map(of_run).collect();
         mean_and_error(&values)
     });
@@ -63,7 +62,8 @@ fn compare(name: &str, runs: &Runs, judged: &Image) -> Result<(), String> {
     for (place, part) in Part::EACH.into_iter().enumerate() {
         let pixels = judged.pixels.len() as f64;
         let expected = judged.pixels.iter().map(|pixel| pixel.mean[part].element_sum()).sum::<f64>() / pixels;
-        let variance = judged.pixels.iter().map(|pixel| pixel.standard_error[part].powf(2.0).element_sum()).sum::<f64>() / (pixels * pixels);
+        let variance =
+            judged.pixels.iter().map(|pixel| pixel.standard_error[part].powf(2.0).element_sum()).sum::<f64>() / (pixels * pixels);
         let (found, error) = runs.parts[place];
         let z = (found - expected) / (error * error + variance + 1e-12).sqrt();
         println!("  {part:?}: {found:.5} +- {error:.5}, judge {expected:.5} +- {:.5}, z {z:.2}", variance.sqrt());

@@ -326,7 +326,8 @@ Scatter refract_smoothly(Surface surface, Lobes lobes, vec3 wo, uint depth, bool
 {
     float eta = lobes.eta;
     if (abs(eta - 1.0) < SAME_INDEX) {
-        return Scatter(-wo, divide(lobes.transmitted, chance), true, true, false, 0.0);
+        vec3 weight = lobes.transmitted * divide(below_both(lobes, abs(dot(wo, surface.ns))), chance);
+        return Scatter(-wo, weight, true, true, false, 0.0);
     }
     vec3 ns = surface.ns;
     float cos_i = min(dot(wo, ns), 1.0);

@@ -29,7 +29,9 @@ float sheen_lobe(float alpha, vec3 wo, vec3 wi, vec3 n)
     float sine_squared = h.x * h.x + h.y * h.y;
     float power = sine_squared > 0.0 ? exp2(divide(0.5, alpha) * log2(sine_squared)) : 0.0;
     float density = (2.0 + divide(1.0, alpha)) * power * 0.15915494309189535;
-    return divide(density, (1.0 + sheen_lambda(alpha, cos_v) + sheen_lambda(alpha, cos_l)) * 4.0 * cos_l * cos_v);
+    // Where fitted masking would return more than it receives.
+    float excess = max(1.0, max(sheen_albedo(alpha, cos_v), sheen_albedo(alpha, cos_l)));
+    return divide(density, (1.0 + sheen_lambda(alpha, cos_v) + sheen_lambda(alpha, cos_l)) * 4.0 * cos_l * cos_v * excess);
 }
 
 // D V (F0 + (F90 - F0) (1 - v.h)^5); 0 from behind.
@@ -53,7 +55,7 @@ float coat_albedo(float coat, float alpha, float cosine)
 
 float sheen_share(vec3 sheen, float alpha, float cosine)
 {
-    return max(sheen.x, max(sheen.y, sheen.z)) * sheen_albedo(alpha, cosine);
+    return max(sheen.x, max(sheen.y, sheen.z)) * min(sheen_albedo(alpha, cosine), 1.0);
 }
 
 MattCover no_cover()

@@ -141,7 +141,9 @@ impl<'a> Facts<'a> {
             Effect::ReflectiveCaustics => caustic(&mirrors, "mirror"),
             Effect::RefractiveCaustics => caustic(&glass, "dielectric"),
             Effect::Layers => found("layered", &|material| material.surface == Surface::Layered, "no glTF material"),
-            Effect::Transmission => found("transmissive", &|material| is_layered_with(material, |of| of.transmission > 0.0), "no transmission"),
+            Effect::Transmission => {
+                found("transmissive", &|material| is_layered_with(material, |of| of.transmission > 0.0), "no transmission")
+            }
             Effect::Media => {
                 let absorbs = |of: &Layers| of.transmission > 0.0 && of.medium.is_some_and(|medium| medium.transmittance != Vec3::ONE);
                 found("absorbing", &|material| is_layered_with(material, absorbs), "no medium that absorbs")

@@ -48,13 +48,26 @@ pub fn gather(
 ) -> Result<()> {
     let Round { resources, plan, number: round, .. } = round;
     let PhotonBuffers { cells, sorted_map, crowded, dispatch_args, .. } = photons;
-    let SceneResources { scene, visible_points, matt_lobes, matt_covers, estimates, radius_classes, disc_cuts, nonfinite_values, .. } = resources;
+    let SceneResources { scene, visible_points, matt_lobes, matt_covers, estimates, radius_classes, disc_cuts, nonfinite_values, .. } =
+        resources;
     let point_count = plan.visible_points();
     let (lanes, step) = (map.lanes, plan.points_at_once());
     let (width, height) = plan.sensor.size();
     macro_rules! kernel {
         ($kernel:ident) => {
-            $kernel { scene, visible_points, matt_lobes, matt_covers, film: estimates, cells, sorted_map, crowded, radius_classes, disc_cuts, nonfinite_values }
+            $kernel {
+                scene,
+                visible_points,
+                matt_lobes,
+                matt_covers,
+                film: estimates,
+                cells,
+                sorted_map,
+                crowded,
+                radius_classes,
+                disc_cuts,
+                nonfinite_values,
+            }
         };
     }
     let dispatch = |commands: &mut Commands, push: &SceneGatherPush, extent: Extent| {

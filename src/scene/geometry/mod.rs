@@ -25,7 +25,8 @@ use super::{Material, Mesh, Progress, Scene, Surface};
 use crate::constants::*;
 use crate::error::{Error, Result};
 use crate::records::{
-    BvhNode, Emitter, LayeredMaterial, SurfaceMaterial, TextureInfo, Triangle, TriangleColours, TriangleLayers, TriangleNormals, TriangleUvs,
+    BvhNode, Emitter, LayeredMaterial, SurfaceMaterial, TextureInfo, Triangle, TriangleColours, TriangleLayers, TriangleNormals,
+    TriangleUvs,
 };
 use crate::text::counted;
 

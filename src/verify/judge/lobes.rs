@@ -138,7 +138,7 @@ impl Inputs {
     /// S.
     fn sheen_albedo(&self, cosine: f64) -> f64 {
         let colour = self.sheen_colour.max_element();
-        if colour == 0.0 { 0.0 } else { colour * sheen(cosine, self.sheen_s) }
+        if colour == 0.0 { 0.0 } else { colour * sheen(cosine, self.sheen_s).min(1.0) }
     }
 }
 
@@ -365,7 +365,9 @@ impl Lobes {
             Kind::Sheen => {
                 let masking = 1.0 + sheen_masking(sheen_s, n_v) + sheen_masking(sheen_s, n_l);
                 let distribution = sheen_distribution(sheen_s, n.cross(h).length_squared());
-                distribution / (masking * 4.0 * n_v * n_l) * self.under_coat(wi) * sheen_colour
+                // Where fitted masking would return more than it receives.
+                let excess = sheen(n_v, sheen_s).max(sheen(n_l, sheen_s)).max(1.0);
+                distribution / (masking * 4.0 * n_v * n_l * excess) * self.under_coat(wi) * sheen_colour
             }
         }
     }
