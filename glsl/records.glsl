@@ -295,8 +295,11 @@ struct LayeredMaterial {
     TextureLookup transmission_texture;
     // It encloses a medium; else it is a thin wall.
     uint is_solid;
-    // Of the medium, for each unit of length.
-    vec3 absorption;
+    // Number of its medium, from 1; 0: it is no solid, or media do not matter.
+    uint medium;
+    // Of the medium whose number is this record's place plus 1, for each unit of length.
+    vec3 medium_absorption;
+    float medium_ior;
     float coat;
     TextureLookup coat_texture;
     float coat_roughness;
@@ -415,6 +418,8 @@ struct CameraPath {
     // and 5: visible points found; from bit 8 on: surfaces that it has met.
     uint state;
     vec3 weight;
+    // What it runs through (glsl/material/media.glsl).
+    uint media;
     // Of a direction that a sharp lobe gave it, 1/sr, and the point and the normal there; 0: none.
     float density;
     vec3 from;

@@ -30,6 +30,7 @@ mod lights;
 mod limits;
 mod lobes;
 mod materials;
+mod media;
 mod memory;
 mod openings;
 mod optics;

@@ -28,6 +28,10 @@ void main()
     vec3 position = off_the_walls(receiver.position, ng);
     Target here = plain_target(position, position_error(position), ng, ns, ns, SURFACE_RECEIVER, 0.0);
     Chain chain = new_chain(position, ns, vec3(1.0), vec2(0.0));
+    if (HAS_MEDIA) {
+        chain.media = media_at(position);
+        here.media = chain.media;
+    }
     if (SHADOW_RAYS != 0) {
         add_light(chain, direct_light(here, push.emitter_count, push.draws, index, 0, RECEIVER_BLOCK));
         note_shadow_rays(index, vec3(1.0));

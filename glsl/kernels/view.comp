@@ -27,6 +27,9 @@ void main()
     vec3 direction = normalize(push.forward + picture.x * push.right + picture.y * push.up);
 
     Chain chain = new_chain(push.eye, direction, vec3(1.0), u.zw);
+    if (HAS_MEDIA) {
+        chain.media = media_at(push.eye);
+    }
     if (follow(chain, pixel, number, push.width * push.height, push.draws, push.emitter_count, 0)) {
         put_off(chain, SAMPLES * pixel + number, CHAIN_STEPS);
     }

@@ -15,6 +15,7 @@ struct Layers {
     vec3 specular_colour;
     float transmission;
     bool is_solid;
+    uint medium; // its number; 0: none
     float coat;
     float coat_alpha;
     vec3 coat_normal;

@@ -243,6 +243,7 @@ Layers layers_at(Hit hit, uint material_index, vec3 smooth_normal, vec3 wo, bool
     layers.specular_colour = material.specular_colour * looked_up(material.specular_colour_texture, uv).rgb;
     layers.transmission = 0.0;
     layers.is_solid = false;
+    layers.medium = material.medium;
     if (HAS_TRANSMISSION) {
         layers.transmission = material.transmission * looked_up(material.transmission_texture, uv).r;
         layers.is_solid = material.is_solid != 0;
@@ -337,12 +338,7 @@ Surface surface_at(Hit hit, vec3 wo)
     return surface;
 }
 
-// Index of refraction where the ray came from over that beyond, of a solid.
-float index_ratio(Surface surface)
-{
-    float ior = max(surface.layers.ior, 1e-3);
-    return surface.front ? divide(1.0, ior) : ior;
-}
+#include "material/media.glsl"
 
 bool is_specular(Surface surface)
 {

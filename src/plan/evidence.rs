@@ -1,13 +1,13 @@
 //! The effects that a scene of triangles needs: each with the evidence for keeping or dropping it.
 
-use glam::Vec3;
+use glam::{DVec3, Vec3};
 use serde::Serialize;
 
 use super::sensor::Sensor;
 use crate::constants::*;
 use crate::scene::geometry::Geometry;
 use crate::scene::material::{Coverage, Layers};
-use crate::scene::{LobeKinds, Material, Scene, Surface};
+use crate::scene::{LobeKinds, Material, Mesh, Scene, Surface};
 use crate::settings::scene::{Effect, Illumination, Part, SceneSettings};
 use crate::text::counted;
 
@@ -35,6 +35,8 @@ pub(super) struct Facts<'a> {
     triangles: usize,
     smooth: usize,
     coloured: usize,
+    /// Bounds of transmissive solids overlap.
+    nested_solids: bool,
     part: Part,
     is_picture: bool,
     /// Some indirect light comes by a gather ray, at whose end there is light of all kinds.
@@ -56,6 +58,7 @@ impl<'a> Facts<'a> {
             triangles: geometry.triangles.len(),
             smooth: geometry.normals.iter().filter(|normals| normals.a != NONE).count(),
             coloured: scene.meshes.iter().filter(|mesh| !mesh.colours.is_empty()).map(|mesh| mesh.triangles.len()).sum(),
+            nested_solids: has_nested_solids(scene),
             part: settings.part,
             is_picture: matches!(sensor, Sensor::Picture { .. }),
             gathers: settings.final_gather || glossy && settings.illumination == Illumination::Split,
@@ -144,10 +147,11 @@ impl<'a> Facts<'a> {
             Effect::Transmission => {
                 found("transmissive", &|material| is_layered_with(material, |of| of.transmission > 0.0), "no transmission")
             }
-            Effect::Media => {
-                let absorbs = |of: &Layers| of.transmission > 0.0 && of.medium.is_some_and(|medium| medium.transmittance != Vec3::ONE);
-                found("absorbing", &|material| is_layered_with(material, absorbs), "no medium that absorbs")
-            }
+            Effect::Media => match self.named(|material, _| material.enclosed_medium().is_some_and(|of| of.transmittance != Vec3::ONE)) {
+                Some(names) => (true, format!("absorbing: {names}")),
+                None if self.nested_solids => (true, "solids that may lie in one another".into()),
+                None => (false, "no medium that absorbs, and no solids in one another".into()),
+            },
             Effect::ClearCoat => found("clear-coated", &|material| is_layered_with(material, |of| of.coat > 0.0), "no clear coat"),
             Effect::Sheen => found("with sheen", &|material| is_layered_with(material, |of| of.sheen_colour != Vec3::ZERO), "no sheen"),
             Effect::NormalMaps => {
@@ -188,6 +192,22 @@ impl<'a> Facts<'a> {
             Effect::SmoothNormals => (true, format!("{} with smooth normals", counted(self.smooth, "triangle"))),
         }
     }
+}
+
+/// Whether the bounds of two meshes that enclose media overlap.
+fn has_nested_solids(scene: &Scene) -> bool {
+    let solids = scene.meshes.iter().filter(|mesh| scene.materials[mesh.material].enclosed_medium().is_some());
+    let bounds = |mesh: &Mesh| {
+        let nothing = (DVec3::INFINITY, DVec3::NEG_INFINITY);
+        mesh.positions.iter().fold(nothing, |(min, max), at| (min.min(*at), max.max(*at)))
+    };
+    let mut bounds: Vec<(DVec3, DVec3)> = solids.map(bounds).collect();
+    // Along one axis, those that begin before another ends.
+    bounds.sort_by(|a, b| a.0.x.total_cmp(&b.0.x));
+    bounds.iter().enumerate().any(|(place, (_, max))| {
+        let after = bounds[place + 1..].iter().take_while(|other| other.0.x <= max.x);
+        after.into_iter().any(|other| other.0.cmple(*max).all() && bounds[place].0.cmple(other.1).all())
+    })
 }
 
 fn is_layered_with(material: &Material, has: impl Fn(&Layers) -> bool) -> bool {

@@ -221,6 +221,7 @@ fn constants(
         ("HAS_GLOSSY", flag(Effect::Glossy)),
         ("HAS_LAYERS", flag(Effect::Layers)),
         ("HAS_TRANSMISSION", flag(Effect::Transmission)),
+        ("HAS_MEDIA", flag(Effect::Media)),
         ("HAS_COATS", flag(Effect::ClearCoat)),
         ("HAS_SHEEN", flag(Effect::Sheen)),
         ("HAS_NORMAL_MAPS", flag(Effect::NormalMaps)),

@@ -298,6 +298,12 @@ impl Material {
         Material { surface: Surface::Layered, layers, ..Material::lambert(name, base_colour) }
     }
 
+    /// What lies behind the surface, of a solid that light enters.
+    pub fn enclosed_medium(&self) -> Option<Medium> {
+        let is_entered = self.surface == Surface::Layered && self.layers.transmission > 0.0 && !self.layers.is_unlit;
+        self.layers.medium.filter(|_| is_entered)
+    }
+
     /// Every use of a texture.
     pub fn textures(&self) -> impl Iterator<Item = TextureUse> + use<> {
         let layers = &self.layers;

@@ -10,6 +10,7 @@ struct Chain {
     bool gathers; // the first visible point, or a receiver, lies behind
     bool starts_nowhere; // at a receiver that no photon can reach
     bool sees_emission; // what shines at the next vertex has not been counted yet
+    uint media; // what it runs through
     // Of a path that a sharp lobe sent on which light samples know too: the density of its direction, 1/sr, and from where; 0: no light
     // sample has counted what it meets.
     float density;
@@ -22,7 +23,7 @@ struct Chain {
 
 Chain new_chain(vec3 position, vec3 direction, vec3 weight, vec2 choices)
 {
-    Chain chain = Chain(position, direction, weight, choices, false, false, false, true, 0.0, vec3(0.0), vec3(0.0), 0, VisiblePoint[](no_point(), no_point()),
+    Chain chain = Chain(position, direction, weight, choices, false, false, false, true, 0, 0.0, vec3(0.0), vec3(0.0), 0, VisiblePoint[](no_point(), no_point()),
                         vec3[](vec3(0.0), vec3(0.0), vec3(0.0)));
     return chain;
 }
@@ -136,6 +137,9 @@ bool step_chain(inout Chain chain, uint index, uint number, uint pixel_count, Dr
         }
         return false;
     }
+    if (HAS_MEDIA) {
+        chain.weight *= transmittance(chain.media, hit.t);
+    }
     Surface surface = surface_at(hit, wo);
     uint block = 1 + VERTEX_BLOCKS * depth;
     bool is_layered = false;
@@ -146,7 +150,7 @@ bool step_chain(inout Chain chain, uint index, uint number, uint pixel_count, Dr
     Scatter scatter;
     float matt = 1.0;
     if (is_layered) {
-        lobes = lobes_of(surface, wo, index_ratio(surface));
+        lobes = lobes_of(surface, wo, index_ratio(surface, chain.media));
         // The eye does not see the back of what has one side.
         bool is_culled = !surface.scatters && !chain.gathers;
         scatter = sample_layered(surface, lobes, wo, stratified(number, SAMPLES, words_of(index, block, draws)).zxy, depth, true);
@@ -185,6 +189,7 @@ bool step_chain(inout Chain chain, uint index, uint number, uint pixel_count, Dr
             Target here = plain_target(surface.position, surface.error, surface.ng, surface.ns, wo, surface.kind, 0.0);
             here.surface = surface;
             here.lobes = lobes;
+            here.media = chain.media;
             vec3 light = direct_light(here, emitter_count, draws, index, number, block + 1);
             if ((PARTS & part_of(chain, ARRIVED_DIRECT)) != 0) {
                 add_light(chain, light);
@@ -215,6 +220,7 @@ bool step_chain(inout Chain chain, uint index, uint number, uint pixel_count, Dr
         if (asks_lights) {
             if ((PARTS & part_of(chain, ARRIVED_DIRECT)) != 0) {
                 Target here = plain_target(surface.position, surface.error, surface.ng, surface.ns, wo, surface.kind, surface.parameter);
+                here.media = chain.media;
                 add_light(chain, scale * direct_light(here, emitter_count, draws, index, number, block + 1));
                 note_shadow_rays(index, divide(chain.weight * scale, float(SAMPLES)));
             }
@@ -284,6 +290,11 @@ bool step_chain(inout Chain chain, uint index, uint number, uint pixel_count, Dr
         chain.density = 0.0;
     }
     chain.saw_specular = chain.saw_specular || (specular && !chain.gathers);
+    if (HAS_MEDIA) {
+        if (is_layered && surface.layers.medium != 0 && dot(scatter.direction, surface.ng) < 0.0) {
+            chain.media = media_beyond(surface, chain.media);
+        }
+    }
     chain.position = offset_origin(surface.position, surface.error, surface.ng, scatter.direction);
     chain.direction = scatter.direction;
     return true;
@@ -315,7 +326,7 @@ void put_off(Chain chain, uint place, uint depth)
 {
     uint flags = uint(chain.saw_specular) | uint(chain.gathers) << 1 | uint(chain.starts_nowhere) << 2 | uint(chain.sees_emission) << 3;
     next_camera_paths[atomicAdd(camera_path_counts[0], 1)] =
-        CameraPath(chain.position, place, chain.direction, flags | chain.point_count << 4 | depth << 8, chain.weight, chain.density, chain.from,
+        CameraPath(chain.position, place, chain.direction, flags | chain.point_count << 4 | depth << 8, chain.weight, chain.media, chain.density, chain.from,
                    chain.from_normal);
 }
 

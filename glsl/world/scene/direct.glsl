@@ -9,6 +9,7 @@ struct Target {
     vec3 wo;
     uint kind;
     float exponent;
+    uint media; // on the side of wo
     // Of a layered surface.
     Surface surface;
     Lobes lobes;
@@ -24,14 +25,20 @@ Target plain_target(vec3 position, float error, vec3 ng, vec3 ns, vec3 wo, uint 
     target.wo = wo;
     target.kind = kind;
     target.exponent = exponent;
+    target.media = 0;
     return target;
 }
 
 // What passes straight along a way that ends at t_max of it: all, nothing, or the share that thin walls and gaps of alpha leave.
-vec3 light_through(vec3 start, vec3 way, float t_max)
+vec3 light_through(vec3 start, vec3 way, float t_max, uint media)
 {
+    vec3 left = vec3(1.0);
+    if (HAS_MEDIA) {
+        // What has no end leaves the medium through a wall, which hides it.
+        left = t_max == 1.0 ? transmittance(media, norm(way)) : left;
+    }
     if (HAS_PASSING) {
-        vec3 share = vec3(1.0);
+        vec3 share = left;
         vec3 wo = -normalize(way);
         for (uint sheet = 0; sheet < MAX_BOUNCES; sheet++) {
             Hit hit = traverse(start, way, t_max, false);
@@ -42,7 +49,7 @@ vec3 light_through(vec3 start, vec3 way, float t_max)
                 return vec3(0.0);
             }
             Surface surface = surface_at(hit, wo);
-            share *= lobes_of(surface, wo, index_ratio(surface)).passing;
+            share *= lobes_of(surface, wo, index_ratio(surface, media)).passing;
             if (largest(share) == 0.0) {
                 return share;
             }
@@ -55,7 +62,7 @@ vec3 light_through(vec3 start, vec3 way, float t_max)
         }
         return vec3(0.0);
     }
-    return vec3(traverse(start, way, t_max, true).triangle == NONE ? 1.0 : 0.0);
+    return traverse(start, way, t_max, true).triangle == NONE ? left : vec3(0.0);
 }
 
 // What a shadow ray found: light times lobe and cosine, irradiance where there is no lobe, and whether something stands before it.
@@ -82,8 +89,13 @@ ShadowRay cast_shadow_ray(Target point, Arriving arriving, Draws draws, uint ind
                 ray.is_asked = largest(ray.light) > 0.0 || largest(ray.sharp_light) > 0.0;
                 if (ray.is_asked) {
                     vec3 start = offset_origin(point.position, point.error, point.ng, arriving.wi);
-                    vec3 share = arriving.is_far ? light_through(start, arriving.wi, uintBitsToFloat(0x7f7fffffu))
-                                                 : light_through(start, arriving.target - start, 1.0);
+                    uint media = point.media;
+                    if (HAS_MEDIA) {
+                        bool is_beyond = point.surface.layers.medium != 0 && dot(arriving.wi, point.ng) < 0.0;
+                        media = is_beyond ? media_beyond(point.surface, media) : media;
+                    }
+                    vec3 share = arriving.is_far ? light_through(start, arriving.wi, uintBitsToFloat(0x7f7fffffu), media)
+                                                 : light_through(start, arriving.target - start, 1.0, media);
                     ray.is_hidden = share == vec3(0.0);
                     ray.light *= ray.is_hidden ? vec3(1.0) : share;
                     ray.sharp_light *= ray.is_hidden ? vec3(1.0) : share;
@@ -95,11 +107,15 @@ ShadowRay cast_shadow_ray(Target point, Arriving arriving, Draws draws, uint ind
     if (cosine > 0.0 && dot(arriving.wi, point.ng) > 0.0 && max(arriving.radiance.x, max(arriving.radiance.y, arriving.radiance.z)) > 0.0) {
         vec3 start = offset_origin(point.position, point.error, point.ng, point.ng);
         ray.is_asked = true;
-        vec3 share = arriving.is_far ? light_through(start, arriving.wi, uintBitsToFloat(0x7f7fffffu))
-                                     : light_through(start, arriving.target - start, 1.0);
+        vec3 share = arriving.is_far ? light_through(start, arriving.wi, uintBitsToFloat(0x7f7fffffu), point.media)
+                                     : light_through(start, arriving.target - start, 1.0, point.media);
         ray.is_hidden = share == vec3(0.0);
         ray.light = arriving.radiance * (cosine * lobe_weight(point.kind, point.exponent, point.ns, point.wo, arriving.wi));
-        if (HAS_PASSING) {
+        bool may_dim = HAS_PASSING;
+        if (HAS_MEDIA) {
+            may_dim = true;
+        }
+        if (may_dim) {
             ray.light *= ray.is_hidden ? vec3(1.0) : share;
         }
     }

@@ -26,5 +26,11 @@ LightPath leave_light(uint photon, Draws draws, PhotonEmission emission)
     }
     note_unless(is_finite(emitted.position) && is_finite(emitted.direction) && is_finite(emitted.flux), NONFINITE_PHOTON, draws.domain,
                 draws.round, photon);
-    return LightPath(emitted.position, photon, emitted.direction, ARRIVED_DIRECT, emitted.flux);
+    uint media = 0;
+    if (HAS_MEDIA) {
+        if (!emitted.is_far) {
+            media = media_at(emitted.position);
+        }
+    }
+    return LightPath(emitted.position, photon, emitted.direction, ARRIVED_DIRECT, emitted.flux, media);
 }

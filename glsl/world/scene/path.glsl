@@ -7,4 +7,6 @@ struct LightPath {
     // `ARRIVED_...`, were it stored at its next hit.
     uint arrival;
     vec3 flux;
+    // What it runs through (glsl/material/media.glsl).
+    uint media;
 };

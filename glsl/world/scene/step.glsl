@@ -13,6 +13,10 @@ Step step_path(inout LightPath path, uint bounce)
     Hit hit = closest_hit(path.position, path.direction);
     taken.escaped = hit.triangle == NONE;
     if (!taken.escaped) {
+        vec3 arriving = path.flux;
+        if (HAS_MEDIA) {
+            arriving *= transmittance(path.media, hit.t);
+        }
         vec3 wo = -path.direction;
         Surface surface = surface_at(hit, wo);
         bool is_layered = false;
@@ -22,12 +26,12 @@ Step step_path(inout LightPath path, uint bounce)
         Lobes lobes;
         bool has_matt = !is_specular(surface);
         if (is_layered) {
-            lobes = lobes_of(surface, wo, index_ratio(surface));
+            lobes = lobes_of(surface, wo, index_ratio(surface, path.media));
             has_matt = surface.scatters && matt_chance(lobes, surface.layers) > 0.0;
         }
         // Also where alpha has a gap: the light there is that of the surface about it, whose area the density estimate counts.
         taken.stored = has_matt && (path.arrival & push.map.stored) != 0;
-        taken.photon = Photon(surface.position, surface.plane, path.flux, pack_direction(wo, findLSB(path.arrival)));
+        taken.photon = Photon(surface.position, surface.plane, arriving, pack_direction(wo, findLSB(path.arrival)));
 
         vec4 u = philox_floats(uvec4(path.photon, push.draws.round, EMISSION_BLOCKS + bounce, push.draws.domain), push.draws.seed);
         Scatter scatter;
@@ -40,7 +44,7 @@ Step step_path(inout LightPath path, uint bounce)
             scatter = sample_scatter(surface, wo, u.yzw, bounce, false, 0.0);
         }
         bool specular = scatter.is_specular;
-        vec3 flux = path.flux * scatter.weight;
+        vec3 flux = arriving * scatter.weight;
         if (HAS_SMOOTH_NORMALS) {
             // Mirrors and glass keep a photon's flux whatever their normals: all that meets the mesh goes on.
             bool keeps_flux = scatter.passes || (specular && scatter.density == 0.0);
@@ -81,7 +85,12 @@ Step step_path(inout LightPath path, uint bounce)
             bool wanted = ((push.map.caustic_surfaces >> kind) & 1u) != 0;
             onward = path.arrival >= ARRIVED_INDIRECT ? path.arrival : (wanted ? ARRIVED_CAUSTIC : ARRIVED_UNWANTED);
         }
-        path = LightPath(start, path.photon, scatter.direction, onward, flux);
+        uint media = path.media;
+        if (HAS_MEDIA) {
+            bool is_refracted = specular && !scatter.passes && surface.layers.medium != 0 && dot(scatter.direction, surface.ng) < 0.0;
+            media = is_layered && is_refracted ? media_beyond(surface, media) : media;
+        }
+        path = LightPath(start, path.photon, scatter.direction, onward, flux, media);
     }
     return taken;
 }

@@ -5,10 +5,37 @@ use glam::{DMat2, DVec2, DVec3, DVec4, Vec3};
 use super::{at_corners, pack_normal};
 use crate::constants::*;
 use crate::records::{LayeredMaterial, TextureLookup, TriangleLayers};
-use crate::scene::material::{Coverage, NormalMap, TextureUse};
+use crate::scene::material::{Coverage, Medium, NormalMap, TextureUse};
 use crate::scene::{Material, Mesh, Scene};
 
-pub(super) fn record(material: &Material, unit: f64) -> LayeredMaterial {
+/// Most media: a path keeps their numbers in eight bits each.
+const MAX_MEDIA: usize = 255;
+
+/// A record for each material; an error says how many media there are, if these are too many.
+pub(super) fn records(scene: &Scene, unit: f64) -> Result<Vec<LayeredMaterial>, usize> {
+    let mut records: Vec<LayeredMaterial> = scene.materials.iter().map(record).collect();
+    // Solids of equal media share a number.
+    let mut media: Vec<(f32, Medium)> = Vec::new();
+    for (material, record) in scene.materials.iter().zip(&mut records) {
+        if let Some(medium) = material.enclosed_medium() {
+            let own = (material.layers.ior, medium);
+            let known = media.iter().position(|of| *of == own).unwrap_or_else(|| {
+                media.push(own);
+                media.len() - 1
+            });
+            record.medium = known as u32 + 1;
+        }
+    }
+    // Black after a metre is black after any way: the limit keeps products finite.
+    let absorption = |transmittance: f32| (-f64::from(transmittance).ln() * unit).clamp(0.0, 1e30) as f32;
+    for ((ior, medium), record) in media.iter().zip(&mut records) {
+        record.medium_ior = ior.max(1e-3);
+        record.medium_absorption = Vec3::from(medium.transmittance.to_array().map(absorption));
+    }
+    if media.len() <= MAX_MEDIA { Ok(records) } else { Err(media.len()) }
+}
+
+fn record(material: &Material) -> LayeredMaterial {
     let of = &material.layers;
     let texture = |used: Option<TextureUse>| used.map_or(TextureLookup { texture: NONE, ..TextureLookup::default() }, lookup);
     let map = |map: Option<NormalMap>| (texture(map.map(|map| map.texture)), map.map_or(1.0, |map| map.scale));
@@ -19,8 +46,6 @@ pub(super) fn record(material: &Material, unit: f64) -> LayeredMaterial {
         Coverage::Mask { alpha, cutoff } => (COVERAGE_MASK, alpha, cutoff),
         Coverage::Blend { alpha } => (COVERAGE_BLEND, alpha, 0.0),
     };
-    // Black after a metre is black after any way: the largest float keeps products finite.
-    let absorption = |transmittance: f32| (-f64::from(transmittance).ln() * unit).clamp(0.0, 1e30) as f32;
     LayeredMaterial {
         metallic: of.metallic,
         roughness: of.roughness,
@@ -33,7 +58,10 @@ pub(super) fn record(material: &Material, unit: f64) -> LayeredMaterial {
         transmission: of.transmission,
         transmission_texture: texture(of.transmission_texture),
         is_solid: u32::from(of.medium.is_some()),
-        absorption: of.medium.map_or(Vec3::ZERO, |medium| Vec3::from(medium.transmittance.to_array().map(absorption))),
+        // Of all materials together.
+        medium: 0,
+        medium_absorption: Vec3::ZERO,
+        medium_ior: 1.0,
         coat: of.coat,
         coat_texture: texture(of.coat_texture),
         coat_roughness: of.coat_roughness,
