@@ -81,9 +81,12 @@ fn stacks() -> Vec<Stack> {
     ]
 }
 
-/// Whoever looks at the floor below each stack along a direction looks at its middle.
+/// Stacks in a row.
+const COLUMNS: usize = 5;
+
+/// Middles of the floors of the stacks.
 fn points(stacks: &[Stack]) -> Vec<(DVec3, DVec3)> {
-    (0..stacks.len()).map(|k| (DVec3::X * PITCH * k as f64, DVec3::Y)).collect()
+    (0..stacks.len()).map(|k| (PITCH * DVec3::new((k % COLUMNS) as f64, 0.0, (k / COLUMNS) as f64), DVec3::Y)).collect()
 }
 
 /// Stacks on their floors, each for itself, so that the sheets' middles are in line with a direction through the floor's.
@@ -114,28 +117,32 @@ pub fn sun_through_sheets(gpu: &Gpu, illumination: Illumination) -> Check<Compla
     let cosine = SUN.normalize().y;
     let irradiance = Vec3::splat((1.0 / cosine) as f32);
     let scene = scene_with(&stacks, matt(0.0), SUN, vec![LightKind::Directional { direction: -SUN.normalize(), irradiance }]);
-    let settings = SceneSettings { shadow_rays: 1, illumination, part: Part::Direct, ..mapped(60_000, 8, 8, 0.2) };
+    let settings = SceneSettings { shadow_rays: 1, illumination, part: Part::Direct, ..mapped(100_000, 8, 8, 0.35) };
     let lit = received(gpu, &scene, &settings, &points(&stacks));
-    println!("{:?}", lit.timings);
-    compare(&format!("{illumination:?}"), &stacks, &lit, 1, cosine)
+    compare(&format!("{illumination:?}"), &stacks, &lit, &(0..stacks.len()).collect::<Vec<_>>(), cosine)
 }
 
 /// A shining floor through every stack, seen straight from above.
 pub fn floor_through_sheets(gpu: &Gpu) -> Check<Complaint> {
     let stacks = stacks();
     let scene = scene_with(&stacks, Material { emission: Vec3::ONE, ..matt(0.0) }, DVec3::Y, vec![]);
-    // Every eighth pixel sees the middle of a stack, and no more than that.
-    let middle = DVec3::X * (0.5 * PITCH * (stacks.len() - 1) as f64);
-    let camera = Camera::looking_at("above", middle + DVec3::Y * 1e3, middle, DVec3::NEG_Z, 2.0 * (PITCH / 16.0 / 1e3).atan());
-    let settings = SceneSettings { samples: 128, rounds: 8, shadow_rays: 1, part: Part::Direct, ..SceneSettings::default() };
-    let lit = seen(gpu, &scene, &settings, &camera, [8 * stacks.len() as u32 - 7, 1]);
-    compare("the floor", &stacks, &lit, 8, 1.0)
+    // Every fourth pixel sees the middle of a stack.
+    let rows = stacks.len().div_ceil(COLUMNS);
+    let size = [COLUMNS, rows].map(|count| 4 * count - 3);
+    let middle = 0.5 * PITCH * DVec3::new((COLUMNS - 1) as f64, 0.0, (rows - 1) as f64);
+    let half_height = 0.125 * PITCH * size[1] as f64;
+    let camera = Camera::looking_at("above", middle + DVec3::Y * 1e3, middle, DVec3::NEG_Z, 2.0 * (half_height / 1e3).atan());
+    let without = vec![Effect::Direct];
+    let settings = SceneSettings { samples: 64, rounds: 32, part: Part::Direct, without, ..SceneSettings::default() };
+    let lit = seen(gpu, &scene, &settings, &camera, size.map(|pixels| pixels as u32));
+    let pixels: Vec<usize> = (0..stacks.len()).map(|k| 4 * (k / COLUMNS) * size[0] + 4 * (k % COLUMNS)).collect();
+    compare("the floor", &stacks, &lit, &pixels, 1.0)
 }
 
 /// All of it is direct light.
-fn compare(what: &str, stacks: &[Stack], lit: &RunResult, step: usize, cosine: f64) -> Check<Complaint> {
-    for (k, stack) in stacks.iter().enumerate() {
-        let (found, error) = (lit.film.mean(step * k, &lit.plan), lit.film.standard_error(step * k, &lit.plan));
+fn compare(what: &str, stacks: &[Stack], lit: &RunResult, places: &[usize], cosine: f64) -> Check<Complaint> {
+    for (stack, &place) in pairs(stacks, places) {
+        let (found, error) = (lit.film.mean(place, &lit.plan), lit.film.standard_error(place, &lit.plan));
         let expected = (stack.share)(cosine);
         println!("{what}, {}: {found} +- {error}, {expected} expected", stack.what);
         assert!(error.max_element() < 0.04, "{error}");
