@@ -48,3 +48,11 @@ fn sheets_let_their_share_pass() {
     }
     assert_holds("the eye", sheets::floor_through_sheets(&gpu));
 }
+
+#[test]
+fn plates_return_what_the_sky_sends() {
+    let Some(gpu) = device() else { return };
+    for within_a_dome in [false, true] {
+        assert_holds("the sky", layered::furnace(&gpu, within_a_dome));
+    }
+}

@@ -6,6 +6,7 @@ use super::plates::{COSINES, Place, Plates};
 use super::prelude::*;
 use photonmill::scene::material::{Layers, Medium, NormalMap};
 use photonmill::scene::texture::Filter;
+use photonmill::verify::judge::random;
 use photonmill::verify::judge::lobes::{Frame, Inputs, Kind as Lobe, Lobes, Wall};
 
 pub const LOBES: [Lobe; 5] = [Lobe::Diffuse, Lobe::Reflection, Lobe::Transmission, Lobe::Coat, Lobe::Sheen];
@@ -318,4 +319,76 @@ pub fn backs_in_the_sun(gpu: &Gpu) -> Check<Complaint> {
         expected.push(if two_sided { back } else { DVec3::splat(0.3) });
     }
     compare("backs", &plates.seen(gpu, &straight()).0, &expected, 1e-4)
+}
+
+/// Materials under a sky of 1 W/m2/sr: opaque ones, and what each sends back of it.
+fn opaque() -> Vec<Material> {
+    let mixtures = mixtures().into_iter().filter(|material| material.layers.transmission == 0.0);
+    let white = [plastic(0.0), plastic(0.3), plastic(0.6), plastic(1.0), Layers { coat: 1.0, ..plastic(0.0) }];
+    let metals = METALS.map(|(alpha, _)| metal(alpha.sqrt() as f32));
+    mixtures.chain(white.into_iter().chain(metals).map(|layers| layered(Vec3::ONE, layers))).collect()
+}
+
+/// Alpha of white metals, and what they send back at each of [`COSINES`], by quadrature.
+const METALS: [(f64, [f64; 5]); 8] = [
+    (0.0, [1.0; 5]),
+    (0.01, [1.0000, 1.0000, 0.9998, 0.9986, 0.9763]),
+    (0.05, [0.9972, 0.9964, 0.9927, 0.9626, 0.8899]),
+    (0.1, [0.9883, 0.9846, 0.9692, 0.9046, 0.9118]),
+    (0.25, [0.9158, 0.8973, 0.8573, 0.8482, 0.9331]),
+    (0.5, [0.6878, 0.6820, 0.6983, 0.7899, 0.9125]),
+    (0.75, [0.4639, 0.4923, 0.5646, 0.7155, 0.8806]),
+    (1.0, [0.3069, 0.3513, 0.4507, 0.6416, 0.8478]),
+];
+
+/// What comes of a white sky, by samples of the path tracer's lobes, and its error.
+fn under_the_sky(lobes: &Lobes) -> (DVec3, DVec3) {
+    const SAMPLES: u32 = 4000;
+    let mut rng = random(1, 1);
+    let of = |kind: Lobe| {
+        let weights: Vec<DVec3> =
+            (0..SAMPLES).map(|_| lobes.sample(kind, &mut rng).map_or(DVec3::ZERO, |scattered| scattered.weight)).collect();
+        let mean = weights.iter().sum::<DVec3>() / f64::from(SAMPLES);
+        let squares = weights.iter().map(|weight| (*weight - mean).powf(2.0)).sum::<DVec3>();
+        (mean, squares / f64::from(SAMPLES).powi(2))
+    };
+    let all = LOBES.map(of);
+    (all.iter().map(|(mean, _)| *mean).sum(), all.iter().map(|(_, squared)| *squared).sum::<DVec3>().map(f64::sqrt))
+}
+
+/// Opaque plates under a sky that is 1 everywhere, or within a dome that shines as much: white dielectrics send all of it back, white
+/// metals what single scattering leaves, and none more than there is.
+pub fn furnace(gpu: &Gpu, within_a_dome: bool) -> Check<Complaint> {
+    let materials = opaque();
+    let mut plates = Plates::new(materials.len(), Vec::new());
+    materials.iter().for_each(|material| plates.add_to_all(material));
+    if within_a_dome {
+        let mut dome = Mesh::sphere("dome", DVec3::ZERO, 200.0, 8, plates.scene.materials.len());
+        dome.normals.clear();
+        dome.triangles.iter_mut().for_each(|corners| corners.swap(1, 2));
+        plates.scene.meshes.push(dome);
+        plates.scene.materials.push(shining(0.0));
+    } else {
+        plates.scene.lights = vec![lamp(LightKind::Environment { radiance: Vec3::ONE })];
+    }
+    let without = vec![Effect::Indirect, Effect::ReflectiveCaustics];
+    let settings = SceneSettings { samples: 16, rounds: 8, shadow_rays: 4, without, ..SceneSettings::default() };
+    let (found, errors) = plates.seen(gpu, &settings);
+    for (k, ((found, error), place)) in pairs(pairs(found, errors), &plates.places).enumerate() {
+        let (material, row) = (&materials[k / COSINES.len()], k % COSINES.len());
+        let metal = METALS.iter().find(|(alpha, _)| material.layers.metallic == 1.0 && (alpha.sqrt() as f32) == material.layers.roughness);
+        let is_white = material.base_colour == Vec3::ONE;
+        let (expected, own_error) = match metal {
+            _ if is_white && material.layers.metallic == 0.0 => (DVec3::ONE, DVec3::ZERO),
+            Some((_, albedos)) if is_white => (DVec3::splat(albedos[row]), DVec3::ZERO),
+            _ => under_the_sky(&lobes_at(material, place, place.normal)),
+        };
+        println!("{k} {:?} {row}: {found} +- {error}, {expected} expected", material.layers.roughness);
+        for channel in 0..3 {
+            // Tables are interpolated.
+            let error = error[channel].hypot(own_error[channel]).max(6e-4 * expected[channel]);
+            estimate_check(&format!("plate {k} under the sky, {within_a_dome}"), found[channel], expected[channel], error)?;
+        }
+    }
+    Ok(())
 }
