@@ -38,6 +38,7 @@ mod overlap;
 mod packing;
 mod paranoid;
 mod photons;
+mod plates;
 mod primitives;
 mod radiosity;
 mod random_numbers;

@@ -5,18 +5,19 @@ use photonmill::engine::scene::{self, RunResult, Target};
 use photonmill::scene::material::{Coverage, Layers, Medium};
 use photonmill::verify::judge::{Image, Verdict};
 
-const SIZE: u32 = 24;
-
-/// A ball of a material over a grey floor, before a red wall, under a lamp and a dim sky.
-fn stage(material: Material) -> Scene {
-    let meshes = vec![
+/// Balls over a grey floor, before a red wall, under a lamp and a dim sky.
+fn stage(balls: Vec<(Material, DVec3, f64)>) -> Scene {
+    let mut meshes = vec![
         level(0.0, [3.0, 3.0], true, 0),
         Mesh::parallelogram("wall", DVec3::new(-1.5, 0.0, -0.8), 3.0 * DVec3::X, 2.0 * DVec3::Y, 1),
         level(1.8, [0.7, 0.7], false, 2),
-        Mesh::sphere("ball", DVec3::new(0.0, 0.45, 0.1), 0.4, 32, 3),
     ];
     let lamp = Material { emission: Vec3::splat(12.0), ..matt(0.0) };
-    let materials = vec![matt(0.5), Material::lambert("red", Vec3::new(0.7, 0.2, 0.1)), lamp, material];
+    let mut materials = vec![matt(0.5), Material::lambert("red", Vec3::new(0.7, 0.2, 0.1)), lamp];
+    for (material, middle, radius) in balls {
+        meshes.push(Mesh::sphere("ball", middle, radius, 32, materials.len()));
+        materials.push(material);
+    }
     let mut scene = scene_of(meshes, materials, vec![LightKind::Environment { radiance: Vec3::splat(0.2) }]);
     scene.cameras.push(Camera::looking_at("camera", DVec3::new(0.3, 1.0, 2.2), DVec3::new(0.0, 0.4, 0.0), DVec3::Y, 0.8));
     scene
@@ -33,11 +34,11 @@ struct Runs {
 
 const SEEDS: u32 = 4;
 
-fn runs(gpu: &Gpu, scene: &Scene, settings: &SceneSettings) -> Runs {
+fn runs(gpu: &Gpu, scene: &Scene, settings: &SceneSettings, size: [u32; 2]) -> Runs {
     let camera = scene.first_camera();
     let of = |seed: u32| {
         let settings = SceneSettings { seed: u64::from(seed), ..settings.clone() };
-        scene::render(gpu, scene, &settings, Target::Picture(&camera, [SIZE; 2])).unwrap()
+        scene::render(gpu, scene, &settings, Target::Picture(&camera, size)).unwrap()
     };
     let all: Vec<RunResult> = (1..=SEEDS).map(of).collect();
     let pixels = all[0].film.pixels();
@@ -113,17 +114,57 @@ fn balls() -> Vec<(&'static str, Material)> {
     ]
 }
 
+/// Each by itself: more than four minutes of two cores.
 #[test]
+#[ignore = "the next test has all lobes in one picture"]
 fn pictures_of_each_lobe_agree_with_the_judge() {
     let Some(gpu) = device() else { return };
     let only = std::env::var("BALL").ok();
     let mut wrong = Vec::new();
     for (name, material) in balls().into_iter().filter(|(name, _)| only.as_ref().is_none_or(|only| only == name)) {
-        let scene = stage(material);
+        let scene = stage(vec![(material, DVec3::new(0.0, 0.45, 0.1), 0.4)]);
         let settings = SceneSettings { photons: 10_000, caustic_photons: 10_000, rounds: 16, ..SceneSettings::default() };
-        let found = runs(&gpu, &scene, &settings);
-        let judged = Judge::new(&scene, 64).image(&scene.first_camera(), SIZE, SIZE, 512, 77);
+        let size = [24, 24];
+        let found = runs(&gpu, &scene, &settings, size);
+        let judged = Judge::new(&scene, 64).image(&scene.first_camera(), size[0], size[1], 512, 77);
         wrong.extend(compare(name, &found, &judged).err());
     }
     assert!(wrong.is_empty(), "{}", wrong.join("\n"));
+}
+
+/// Each pair of lobes, one over or beside the other.
+fn pairs_of_lobes() -> Vec<Material> {
+    let clear = Some(Medium { transmittance: Vec3::ONE });
+    let (coat, coat_roughness) = (1.0, 0.55);
+    let (sheen_colour, sheen_roughness) = (Vec3::new(0.2, 0.4, 0.9), 0.5);
+    let of = [
+        Layers { coat: 0.8, coat_roughness: 0.1, ..plastic() },
+        Layers { coat, coat_roughness, roughness: 0.4, ..Layers::default() },
+        Layers { sheen_colour, sheen_roughness, metallic: 0.5, roughness: 0.3, ..plastic() },
+        Layers { sheen_colour, sheen_roughness, coat, coat_roughness, ..plastic() },
+        Layers { transmission: 1.0, roughness: 0.0, sheen_colour, sheen_roughness, ..plastic() },
+        Layers { transmission: 0.5, roughness: 0.5, coat: 0.6, metallic: 0.3, ..plastic() },
+        Layers { transmission: 1.0, roughness: 0.4, medium: clear, coat, coat_roughness, ..plastic() },
+        Layers { transmission: 0.7, roughness: 0.0, medium: clear, sheen_colour, sheen_roughness, ..plastic() },
+    ];
+    let blended = Material { coverage: Coverage::Blend { alpha: 0.6 }, ..coloured(Layers { coat, roughness: 0.2, ..Layers::default() }) };
+    of.into_iter().map(coloured).chain([blended]).collect()
+}
+
+#[test]
+fn a_picture_of_all_lobes_agrees_with_the_judge() {
+    let Some(gpu) = device() else { return };
+    // Two rows, so that they light each other.
+    let place = |k: usize| DVec3::new(0.42 * (k % 5) as f64 - 0.84 + 0.21 * (k / 5) as f64, 0.2 + 0.42 * (k / 5) as f64, 0.3 - 0.3 * (k / 5) as f64);
+    let scene = stage(pairs_of_lobes().into_iter().enumerate().map(|(k, material)| (material, place(k), 0.2)).collect());
+    let settings = SceneSettings { photons: 10_000, caustic_photons: 10_000, rounds: 8, ..SceneSettings::default() };
+    let size = [32, 24];
+    let found = runs(&gpu, &scene, &settings, size);
+    let judged = Judge::new(&scene, 64).image(&scene.first_camera(), size[0], size[1], 256, 77);
+    assert_holds("a picture", compare("all lobes", &found, &judged));
+    // The check can fail.
+    let mut bare = scene.clone();
+    bare.materials.iter_mut().for_each(|Material { layers, .. }| *layers = Layers { coat: 0.0, sheen_colour: Vec3::ZERO, ..*layers });
+    let judged = Judge::new(&bare, 64).image(&scene.first_camera(), size[0], size[1], 256, 77);
+    assert_complains("balls without coat and sheen", compare("fault", &found, &judged));
 }

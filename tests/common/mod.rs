@@ -12,14 +12,17 @@ pub mod densities;
 pub mod family;
 pub mod gltf_file;
 pub mod known;
+pub mod layered;
 pub mod lamps;
 pub mod lit;
 pub mod pairwise;
 pub mod planted;
+pub mod plates;
 pub mod prelude;
 pub mod program;
 pub mod rectangles;
 pub mod reference;
+pub mod sheets;
 pub mod sources;
 
 use std::cmp::Ordering;

@@ -1,0 +1,394 @@
+//! Layered materials whose light is known, each as a check of a device: `tests/plates.rs` and `tests/sheets.rs` hold it, and
+//! `tests/red.rs` shows that it complains.
+
+use super::estimate_check;
+use super::plates::{COSINES, Place, Plates};
+use super::prelude::*;
+use photonmill::scene::material::{Layers, Medium, NormalMap};
+use photonmill::scene::texture::Filter;
+use photonmill::verify::judge::random;
+use photonmill::verify::judge::lobes::{Frame, Inputs, Kind as Lobe, Lobes, Wall};
+
+pub const LOBES: [Lobe; 5] = [Lobe::Diffuse, Lobe::Reflection, Lobe::Transmission, Lobe::Coat, Lobe::Sheen];
+
+/// A dielectric that reflects nothing by itself: a Lambertian surface of this albedo, if no more is asked for.
+pub fn dull(albedo: f32) -> Material {
+    layered(Vec3::splat(albedo), Layers { metallic: 0.0, specular: 0.0, ..Layers::default() })
+}
+
+pub fn layered(base_colour: Vec3, layers: Layers) -> Material {
+    Material::layered("plate", base_colour, layers)
+}
+
+pub fn plastic(roughness: f32) -> Layers {
+    Layers { metallic: 0.0, roughness, ..Layers::default() }
+}
+
+pub fn metal(roughness: f32) -> Layers {
+    Layers { roughness, ..Layers::default() }
+}
+
+/// What the path tracer makes of a material without textures, of which the front is seen.
+pub fn inputs(material: &Material) -> Inputs {
+    let of = &material.layers;
+    let squared = |roughness: f32| f64::from(roughness).powi(2);
+    Inputs {
+        base_colour: material.base_colour.as_dvec3(),
+        metalness: f64::from(of.metallic),
+        alpha: squared(of.roughness),
+        ior: f64::from(of.ior),
+        specular: f64::from(of.specular),
+        specular_colour: of.specular_colour.as_dvec3(),
+        transmission: f64::from(of.transmission),
+        wall: of.medium.map_or(Wall::Thin, |_| Wall::Solid { from: 1.0, to: f64::from(of.ior) }),
+        coat: f64::from(of.coat),
+        coat_alpha: squared(of.coat_roughness),
+        sheen_colour: of.sheen_colour.as_dvec3(),
+        sheen_s: squared(of.sheen_roughness).max(0.01),
+    }
+}
+
+/// Its lobes where a normal map, of the coat too, has turned the normal.
+pub fn lobes_at(material: &Material, place: &Place, n: DVec3) -> Lobes {
+    Lobes::new(inputs(material), Frame { wo: place.wo, ng: place.normal, n, coat_n: n })
+}
+
+/// Radiance towards the eye under a sun of 1 W/m2 in this direction: each lobe times the cosine to its own normal.
+fn in_the_sun(lobes: &Lobes, sun: DVec3) -> DVec3 {
+    LOBES.into_iter().map(|kind| lobes.evaluate(kind, sun) * lobes.axis(kind).dot(sun).max(0.0)).sum()
+}
+
+/// Of each lobe alone, at several roughnesses, and of each pair of them.
+pub fn mixtures() -> Vec<Material> {
+    let base = Vec3::new(0.8, 0.5, 0.2);
+    let sheen_colour = Vec3::new(0.2, 0.4, 0.9);
+    let of = [
+        plastic(0.3),
+        plastic(0.6),
+        plastic(1.0),
+        metal(0.2),
+        metal(0.45),
+        metal(0.7),
+        metal(1.0),
+        Layers { metallic: 0.5, ..plastic(0.4) },
+        Layers { ior: 0.0, ..plastic(0.6) },
+        Layers { ior: 2.0, specular: 0.7, specular_colour: Vec3::new(1.0, 3.0, 0.4), ..plastic(0.5) },
+        Layers { coat: 1.0, coat_roughness: 0.3, ..metal(0.7) },
+        Layers { coat: 0.8, coat_roughness: 0.6, ..plastic(0.4) },
+        Layers { coat: 0.5, ..plastic(0.6) },
+        Layers { sheen_colour, sheen_roughness: 0.3, ..plastic(0.8) },
+        Layers { sheen_colour, sheen_roughness: 1.0, ..metal(0.4) },
+        Layers { sheen_colour, sheen_roughness: 0.6, coat: 0.7, coat_roughness: 0.5, metallic: 0.3, ..plastic(0.5) },
+        Layers { transmission: 0.6, ..plastic(0.5) },
+        Layers { transmission: 1.0, coat: 1.0, coat_roughness: 0.4, ..plastic(0.35) },
+        Layers { transmission: 0.8, medium: CLEAR, ..plastic(0.4) },
+        Layers { transmission: 1.0, medium: CLEAR, sheen_colour, sheen_roughness: 0.5, ior: 1.8, ..plastic(0.3) },
+    ];
+    of.map(|layers| layered(base, layers)).to_vec()
+}
+
+/// Solids so rough that photon maps know what they reflect.
+pub fn rough_solids() -> Vec<Material> {
+    let of = [
+        Layers { transmission: 0.8, medium: CLEAR, ..plastic(0.6) },
+        Layers { transmission: 1.0, medium: CLEAR, ior: 1.8, ..plastic(0.9) },
+        Layers { transmission: 1.0, medium: CLEAR, coat: 1.0, ..plastic(1.0) },
+    ];
+    of.map(|layers| layered(Vec3::new(0.8, 0.5, 0.2), layers)).to_vec()
+}
+
+pub const CLEAR: Option<Medium> = Some(Medium { transmittance: Vec3::ONE });
+
+/// Towards the suns: before all plates, below them, and behind them. No plate is in the way of another's light.
+const SUNS: [DVec3; 3] = [DVec3::new(0.35, 0.92, 0.17), DVec3::new(0.6, -0.75, -0.2), DVec3::new(0.1, -0.3, -1.0)];
+
+/// Only light that comes straight from the sun, nothing of which is random.
+fn straight() -> SceneSettings {
+    let without = vec![Effect::Indirect, Effect::ReflectiveCaustics, Effect::RefractiveCaustics, Effect::SpecularChains];
+    SceneSettings { rounds: 1, shadow_rays: 1, without, ..SceneSettings::default() }
+}
+
+/// What is seen of each plate against what should be, channel by channel. Nothing of it is random.
+fn compare(what: &str, found: &[DVec3], expected: &[DVec3], tolerance: f64) -> Check<Complaint> {
+    let off = |found: DVec3, expected: DVec3| (found - expected) / expected.max(DVec3::splat(1e-3));
+    let worst = pairs(found, expected).map(|(found, expected)| off(*found, *expected).abs().max_element()).fold(0.0, f64::max);
+    println!("{what}: up to {worst:.1e} off");
+    for (k, (found, expected)) in pairs(found, expected).enumerate() {
+        for channel in 0..3 {
+            let what = format!("{what}, plate {k}, channel {channel}");
+            // A check allows five standard errors.
+            estimate_check(&what, found[channel], expected[channel], 0.2 * tolerance * expected[channel].max(1e-3))?;
+        }
+    }
+    Ok(())
+}
+
+/// Every mixture at every angle, before the sun and behind it, has the BSDF of the guide.
+pub fn lobes_in_the_sun(gpu: &Gpu, mixtures: Vec<Material>) -> Check<Complaint> {
+    let mut plates = Plates::new(mixtures.len(), Vec::new());
+    mixtures.iter().for_each(|material| plates.add_to_all(material));
+    for way in SUNS {
+        plates.scene.lights = vec![lamp(sun(-way))];
+        let found = plates.seen(gpu, &straight()).0;
+        let of = |(k, place): (usize, &Place)| in_the_sun(&lobes_at(&mixtures[k / COSINES.len()], place, place.normal), way.normalize());
+        let expected: Vec<DVec3> = plates.places.iter().enumerate().map(of).collect();
+        // What the kernels interpolate in tables, and reflection at grazing angles in single precision.
+        compare(&format!("the sun at {way}"), &found, &expected, 3e-3)?;
+    }
+    Ok(())
+}
+
+/// A texture of one row, linear.
+fn row_of_texels(texels: &[[u8; 4]], filter: Filter) -> Texture {
+    let wrap = [Wrap::Repeat; 2];
+    Texture { name: "row".into(), width: texels.len() as u32, height: 1, texels: Texels::Linear(texels.to_vec()), wrap, filter }
+}
+
+/// A normal map's normal as the guide has it.
+fn mapped_normal(texel: [u8; 4], scale: f64, (x, y, normal): (DVec3, DVec3, DVec3), wo: DVec3) -> DVec3 {
+    let code = |k: usize| 2.0 * f64::from(texel[k]) / 255.0 - 1.0;
+    let n = (scale * (code(0) * x + code(1) * y) + code(2) * normal).normalize();
+    let cosine = n.dot(wo);
+    if cosine < 0.01 { (n + (0.01 - cosine) * wo).normalize() } else { n }
+}
+
+/// Codes of normal maps: level, leaning, in the surface along each axis, and away from it.
+const LEANS: [[u8; 4]; 6] =
+    [[128, 128, 255, 255], [220, 100, 230, 255], [255, 128, 128, 255], [128, 0, 128, 255], [250, 60, 170, 255], [150, 255, 90, 255]];
+
+fn map_of(texture: usize, scale: f32) -> NormalMap {
+    NormalMap { texture: TextureUse::of(texture, 0), scale }
+}
+
+/// Plates whose normal maps have one texel each, on one side of the seam of a mirrored texture or on the other: what a sun in front
+/// and one behind make of them, matt or glossy, is in closed form. None is black where its own normal sees the sun.
+pub fn normal_maps_in_the_sun(gpu: &Gpu) -> Check<Complaint> {
+    let mut plates = Plates::new(2 * LEANS.len() + 5, Vec::new());
+    plates.scene.textures = LEANS.map(|texel| row_of_texels(&[texel], Filter::Bilinear)).to_vec();
+    let mut lobes = Vec::new();
+    let mut add = |row: usize, texture: usize, scale: f32, sign: f64, material: Material| {
+        let (place, mesh) = plates.add(row, Material { normal_map: Some(map_of(texture, scale)), ..material.clone() });
+        mesh.tangents = vec![[place.x.extend(sign); 3]; 2];
+        let n = mapped_normal(LEANS[texture], f64::from(scale), (place.x, sign * place.y, place.normal), place.wo);
+        lobes.push(lobes_at(&material, &place, n));
+    };
+    let shiny = layered(Vec3::new(0.9, 0.6, 0.3), Layers { metallic: 0.5, ..plastic(0.6) });
+    for row in 0..4 {
+        for texture in 0..LEANS.len() {
+            for sign in [1.0, -1.0] {
+                add(row, texture, 1.0, sign, dull(0.6));
+            }
+        }
+        for scale in [0.0, 0.5, -1.0, 2.5] {
+            add(row, 1, scale, 1.0, dull(0.6));
+        }
+        add(row, 1, 1.0, 1.0, shiny.clone());
+    }
+    for way in SUNS {
+        plates.scene.lights = vec![lamp(sun(-way))];
+        let found = plates.seen(gpu, &straight()).0;
+        let expected: Vec<DVec3> = lobes.iter().map(|lobes| in_the_sun(lobes, way.normalize())).collect();
+        compare(&format!("normal maps, the sun at {way}"), &found, &expected, 3e-3)?;
+    }
+    Ok(())
+}
+
+/// A ball of one leaning normal, at places of its front and its rim.
+pub fn mapped_ball_in_the_sun(gpu: &Gpu) -> Check<Complaint> {
+    let mut ball = Mesh::sphere("ball", DVec3::ZERO, 1.0, 256, 0);
+    // Along the parallels; the second ball is mirrored.
+    let tangent = |normal: DVec3| DVec3::new(-normal.z, 0.0, normal.x).try_normalize().unwrap_or(DVec3::X);
+    for sign in [1.0, -1.0] {
+        ball.tangents = ball.triangles.iter().map(|corners| corners.map(|k| tangent(ball.normals[k as usize]).extend(sign))).collect();
+        let material = Material { normal_map: Some(map_of(0, 1.0)), ..dull(0.6) };
+        let way = DVec3::new(0.5, 0.7, 0.6).normalize();
+        let mut scene = Scene { meshes: vec![ball.clone()], ..Scene::default() };
+        scene.materials = vec![material.clone()];
+        scene.lights = vec![lamp(sun(-way))];
+        scene.textures = vec![row_of_texels(&[LEANS[1]], Filter::Bilinear)];
+        for at in [DVec3::Z, DVec3::new(0.6, 0.3, 0.8), DVec3::new(-0.3, 0.7, 0.6), DVec3::new(0.5, -0.4, 0.3), DVec3::new(0.9, 0.1, 0.1)] {
+            let normal = at.normalize();
+            // From straight before it, and aslant.
+            for wo in [normal, (normal + 1.2 * tangent(normal)).normalize()] {
+                let place = Place::of_normal(normal, wo);
+                let camera = Camera::looking_at("eye", normal + 3.0 * wo, normal, DVec3::Y, 1e-4);
+                let found = means(&seen(gpu, &scene, &straight(), &camera, [1, 1]))[0].x;
+                let x = tangent(normal);
+                let n = mapped_normal(LEANS[1], 1.0, (x, sign * normal.cross(x), normal), wo);
+                let expected = in_the_sun(&lobes_at(&material, &place, n), way).x;
+                // The mesh is a polyhedron of 256 meridians.
+                estimate_check(&format!("the ball at {at}, sign {sign}, seen from {wo}"), found, expected, 1e-4)?;
+            }
+        }
+    }
+    Ok(())
+}
+
+/// Textures of all that a material may have, each looked up in its own way; vertex colours; unlit plates.
+pub fn textures_in_the_sun(gpu: &Gpu) -> Check<Complaint> {
+    let mut plates = Plates::new(8, Vec::new());
+    let halves = [[51, 102, 204, 255], [230, 178, 76, 128]];
+    plates.scene.textures = vec![row_of_texels(&halves, Filter::Nearest), row_of_texels(&halves, Filter::Bilinear)];
+    let share = |texel: [u8; 4], channel: usize| f32::from(texel[channel]) / 255.0;
+    let base = Vec3::new(0.9, 0.6, 0.3);
+    let at_u = |mesh: &mut Mesh, set: usize, u: f64| mesh.uvs[set] = vec![DVec2::new(u, 0.5); 4];
+    let mut lobes: Vec<(Lobes, DVec3)> = Vec::new();
+    let of_first = Some(TextureUse::of(0, 0));
+    let mut expect = |plain: &Material, place: Place, shown: DVec3| lobes.push((lobes_at(plain, &place, place.normal), shown));
+    for row in 0..4 {
+        // Roughness and metalness from the second texel, found by the second set of coordinates; the first one leads to the first texel.
+        let transform = UvTransform { scale: DVec2::new(0.5, 1.0), rotation: 0.0, offset: DVec2::new(0.25, 0.0) };
+        let plain = |texel: usize| {
+            layered(base, Layers { metallic: 0.8 * share(halves[texel], 2), roughness: 0.9 * share(halves[texel], 1), ..plastic(1.0) })
+        };
+        let of_set = |uv_set: usize, transform: UvTransform| {
+            let metallic_roughness_texture = Some(TextureUse { texture: 0, uv_set, transform });
+            layered(base, Layers { metallic: 0.8, roughness: 0.9, metallic_roughness_texture, ..Layers::default() })
+        };
+        for (used, texel) in [
+            (of_set(0, UvTransform::NONE), 0),
+            (of_set(1, UvTransform::NONE), 1),
+            // 0.4 becomes 0.45, 0.9 becomes 0.7.
+            (of_set(0, transform), 0),
+            (of_set(1, transform), 1),
+            // A turn by half a circle about the origin, and back by one: 1 - 0.4.
+            (of_set(0, UvTransform { rotation: PI, offset: DVec2::new(1.0, 1.0), ..UvTransform::NONE }), 1),
+        ] {
+            let (place, mesh) = plates.add(row, used);
+            at_u(mesh, 0, 0.4);
+            at_u(mesh, 1, 0.9);
+            expect(&plain(texel), place, DVec3::ZERO);
+        }
+        // Three tenths of the way from the first texel's middle to the second's.
+        let mixed = Vec3::from_array([0, 1, 2].map(|k| 0.7 * share(halves[0], k) + 0.3 * share(halves[1], k)));
+        let (place, mesh) = plates.add(row, Material { base_colour_texture: Some(TextureUse::of(1, 0)), ..dull(0.9) });
+        at_u(mesh, 0, 0.4);
+        expect(&Material { base_colour: 0.9 * mixed, ..dull(1.0) }, place, DVec3::ZERO);
+        // The factors of a coat and of sheen.
+        let coated = Layers { coat: 0.9, coat_roughness: 0.8, sheen_colour: Vec3::ONE, sheen_roughness: 0.9, ..plastic(0.6) };
+        let textured = Layers {
+            coat_texture: of_first,
+            coat_roughness_texture: of_first,
+            sheen_colour_texture: of_first,
+            sheen_roughness_texture: of_first,
+            specular_texture: of_first,
+            specular_colour_texture: of_first,
+            ..coated
+        };
+        let (place, mesh) = plates.add(row, layered(base, textured));
+        at_u(mesh, 0, 0.9);
+        let texel = halves[1];
+        let colour = Vec3::from_array([0, 1, 2].map(|k| share(texel, k)));
+        let plain = Layers {
+            coat: 0.9 * share(texel, 0),
+            coat_roughness: 0.8 * share(texel, 1),
+            sheen_colour: colour,
+            sheen_roughness: 0.9 * share(texel, 3),
+            specular: share(texel, 3),
+            specular_colour: colour,
+            ..coated
+        };
+        expect(&layered(base, plain), place, DVec3::ZERO);
+        // Unlit: its colour whatever the light, that of its corners included.
+        let (place, mesh) = plates.add(row, layered(base, Layers { is_unlit: true, coat: 1.0, ..metal(0.5) }));
+        mesh.colours = vec![DVec3::new(0.5, 1.0, 0.25); 4];
+        expect(&dull(0.0), place, base.as_dvec3() * DVec3::new(0.5, 1.0, 0.25));
+    }
+    for way in SUNS {
+        plates.scene.lights = vec![lamp(sun(-way))];
+        let found = plates.seen(gpu, &straight()).0;
+        let expected: Vec<DVec3> = lobes.iter().map(|(lobes, shown)| *shown + in_the_sun(lobes, way.normalize())).collect();
+        compare(&format!("textures, the sun at {way}"), &found, &expected, 3e-3)?;
+    }
+    Ok(())
+}
+
+/// The back of a two-sided surface is as its front. To the eye that of a single-sided one is not there: what lies behind it is seen.
+pub fn backs_in_the_sun(gpu: &Gpu) -> Check<Complaint> {
+    let mut plates = Plates::new(2, vec![sun(-SUNS[0])]);
+    let mut expected = Vec::new();
+    for two_sided in [true, false] {
+        let (place, mesh) = plates.add(1, Material { two_sided, ..dull(0.7) });
+        mesh.triangles.iter_mut().for_each(|corners| corners.swap(1, 2));
+        let mut behind = mesh.clone();
+        behind.positions.iter_mut().for_each(|at| *at -= 0.01 * place.wo);
+        behind.material = plates.scene.materials.len();
+        plates.scene.materials.push(Material { two_sided: true, ..layered(Vec3::splat(0.3), Layers { is_unlit: true, ..metal(1.0) }) });
+        plates.scene.meshes.push(behind);
+        let back = in_the_sun(&lobes_at(&dull(0.7), &place, place.normal), SUNS[0].normalize());
+        expected.push(if two_sided { back } else { DVec3::splat(0.3) });
+    }
+    compare("backs", &plates.seen(gpu, &straight()).0, &expected, 1e-4)
+}
+
+/// Materials under a sky of 1 W/m2/sr: opaque ones, and what each sends back of it.
+fn opaque() -> Vec<Material> {
+    let mixtures = mixtures().into_iter().filter(|material| material.layers.transmission == 0.0);
+    let white = [plastic(0.0), plastic(0.3), plastic(0.6), plastic(1.0), Layers { coat: 1.0, ..plastic(0.0) }];
+    let metals = METALS.map(|(alpha, _)| metal(alpha.sqrt() as f32));
+    mixtures.chain(white.into_iter().chain(metals).map(|layers| layered(Vec3::ONE, layers))).collect()
+}
+
+/// Alpha of white metals, and what they send back at each of [`COSINES`], by quadrature.
+const METALS: [(f64, [f64; 5]); 8] = [
+    (0.0, [1.0; 5]),
+    (0.01, [1.0000, 1.0000, 0.9998, 0.9986, 0.9763]),
+    (0.05, [0.9972, 0.9964, 0.9927, 0.9626, 0.8899]),
+    (0.1, [0.9883, 0.9846, 0.9692, 0.9046, 0.9118]),
+    (0.25, [0.9158, 0.8973, 0.8573, 0.8482, 0.9331]),
+    (0.5, [0.6878, 0.6820, 0.6983, 0.7899, 0.9125]),
+    (0.75, [0.4639, 0.4923, 0.5646, 0.7155, 0.8806]),
+    (1.0, [0.3069, 0.3513, 0.4507, 0.6416, 0.8478]),
+];
+
+/// What comes of a white sky, by samples of the path tracer's lobes, and its error.
+fn under_the_sky(lobes: &Lobes) -> (DVec3, DVec3) {
+    const SAMPLES: u32 = 4000;
+    let mut rng = random(1, 1);
+    let of = |kind: Lobe| {
+        let weights: Vec<DVec3> =
+            (0..SAMPLES).map(|_| lobes.sample(kind, &mut rng).map_or(DVec3::ZERO, |scattered| scattered.weight)).collect();
+        let mean = weights.iter().sum::<DVec3>() / f64::from(SAMPLES);
+        let squares = weights.iter().map(|weight| (*weight - mean).powf(2.0)).sum::<DVec3>();
+        (mean, squares / f64::from(SAMPLES).powi(2))
+    };
+    let all = LOBES.map(of);
+    (all.iter().map(|(mean, _)| *mean).sum(), all.iter().map(|(_, squared)| *squared).sum::<DVec3>().map(f64::sqrt))
+}
+
+/// Opaque plates under a sky that is 1 everywhere, or within a dome that shines as much: white dielectrics send all of it back, white
+/// metals what single scattering leaves, and none more than there is.
+pub fn furnace(gpu: &Gpu, within_a_dome: bool) -> Check<Complaint> {
+    let materials = opaque();
+    let mut plates = Plates::new(materials.len(), Vec::new());
+    materials.iter().for_each(|material| plates.add_to_all(material));
+    if within_a_dome {
+        let mut dome = Mesh::sphere("dome", DVec3::ZERO, 200.0, 8, plates.scene.materials.len());
+        dome.normals.clear();
+        dome.triangles.iter_mut().for_each(|corners| corners.swap(1, 2));
+        plates.scene.meshes.push(dome);
+        plates.scene.materials.push(shining(0.0));
+    } else {
+        plates.scene.lights = vec![lamp(LightKind::Environment { radiance: Vec3::ONE })];
+    }
+    let without = vec![Effect::Indirect, Effect::ReflectiveCaustics];
+    let settings = SceneSettings { samples: 16, rounds: 8, shadow_rays: 4, without, ..SceneSettings::default() };
+    let (found, errors) = plates.seen(gpu, &settings);
+    for (k, ((found, error), place)) in pairs(pairs(found, errors), &plates.places).enumerate() {
+        let (material, row) = (&materials[k / COSINES.len()], k % COSINES.len());
+        let metal = METALS.iter().find(|(alpha, _)| material.layers.metallic == 1.0 && (alpha.sqrt() as f32) == material.layers.roughness);
+        let is_white = material.base_colour == Vec3::ONE;
+        let (expected, own_error) = match metal {
+            _ if is_white && material.layers.metallic == 0.0 => (DVec3::ONE, DVec3::ZERO),
+            Some((_, albedos)) if is_white => (DVec3::splat(albedos[row]), DVec3::ZERO),
+            _ => under_the_sky(&lobes_at(material, place, place.normal)),
+        };
+        println!("{k} {:?} {row}: {found} +- {error}, {expected} expected", material.layers.roughness);
+        for channel in 0..3 {
+            // Tables are interpolated.
+            let error = error[channel].hypot(own_error[channel]).max(6e-4 * expected[channel]);
+            estimate_check(&format!("plate {k} under the sky, {within_a_dome}"), found[channel], expected[channel], error)?;
+        }
+    }
+    Ok(())
+}
