@@ -7,6 +7,7 @@ use crate::common::pairwise::pairwise;
 use crate::common::prelude::*;
 use photonmill::constants::GATHER_SLICE;
 use photonmill::engine::scene::{self, RunResult, View};
+use photonmill::scene::material::{Coverage, Layers, Medium, NormalMap};
 use photonmill::settings::scene::Kernel;
 use photonmill::verify::judge::Verdict;
 
@@ -212,8 +213,43 @@ fn rich_scene() -> Scene {
     *mirror = Mesh::sphere("mirror sphere", DVec3::new(0.3, 0.19, 0.34), 0.18, 10, mirror.material);
     // Turned away from the camera: only its second side is seen.
     scene.meshes.push(Mesh::parallelogram("screen", DVec3::new(0.4, 0.5, 0.6), DVec3::Y * 0.3, DVec3::X * 0.3, tiles));
+    add_layered_plates(&mut scene);
     scene.lights = every_kind_of_light(1.0, 2.0, EmissionLaw::Cosine);
     scene
+}
+
+/// Plates before the camera, each with something that no other has.
+fn add_layered_plates(scene: &mut Scene) {
+    let plastic = Layers { metallic: 0.0, roughness: 0.7, ..Layers::default() };
+    let bump = Texels::Linear(vec![[230, 128, 190, 255]]);
+    scene.textures.push(Texture { name: "bump".into(), width: 1, height: 1, texels: bump, wrap: [Wrap::Repeat; 2], filter: Default::default() });
+    let map = NormalMap { texture: TextureUse::of(scene.textures.len() - 1, 0), scale: 1.0 };
+    let glass = Layers {
+        roughness: 0.0,
+        transmission: 1.0,
+        ior: 1.0,
+        medium: Some(Medium { transmittance: Vec3::splat(1e-3) }),
+        ..plastic
+    };
+    let grey = |layers| Material::layered("plate", Vec3::splat(0.6), layers);
+    let materials = [
+        grey(Layers { coat: 1.0, coat_roughness: 0.7, ..plastic }),
+        grey(Layers { sheen_colour: Vec3::ONE, sheen_roughness: 0.6, ..plastic }),
+        Material { coverage: Coverage::Blend { alpha: 0.3 }, ..grey(plastic) },
+        Material { normal_map: Some(map), ..grey(plastic) },
+        grey(glass),
+    ];
+    for (place, material) in materials.into_iter().enumerate() {
+        let corner = DVec3::new(0.08 + 0.17 * place as f64, 0.7, 0.6);
+        let number = scene.materials.len();
+        let plate = Mesh::parallelogram("plate", corner, DVec3::X * 0.15, DVec3::Y * 0.15, number);
+        let behind = Mesh::parallelogram("plate", corner - DVec3::Z * 0.3, DVec3::Y * 0.15, DVec3::X * 0.15, number);
+        let tangents = vec![[DVec4::new(1.0, 0.0, 0.0, 1.0); 3]; 2];
+        scene.meshes.push(Mesh { tangents: if material.normal_map.is_some() { tangents } else { Vec::new() }, ..plate });
+        // The back of the slab.
+        scene.meshes.extend(material.enclosed_medium().map(|_| behind));
+        scene.materials.push(material);
+    }
 }
 
 /// The part of a picture in which an effect shows by itself. A part needs fewer kernels than all light, and the same error has less
@@ -222,7 +258,7 @@ fn part_that_shows(effect: Effect) -> Part {
     match effect {
         Effect::ReflectiveCaustics | Effect::RefractiveCaustics => Part::Caustic,
         // The sky is not seen from the camera but in the mirror.
-        Effect::SpecularChains | Effect::SmoothNormals | Effect::Environment => Part::Specular,
+        Effect::SpecularChains | Effect::SmoothNormals | Effect::Environment | Effect::Transmission | Effect::Media => Part::Specular,
         Effect::Indirect => Part::Indirect,
         _ => Part::Direct,
     }

@@ -201,7 +201,7 @@ vec4 both_uvs(uint index, float u, float v)
 // A texture's value, or 1.
 vec4 looked_up(TextureLookup use, vec4 uv)
 {
-    if (HAS_TEXTURES) {
+    if (HAS_LAYER_TEXTURES) {
         if (use.texture != NONE) {
             vec2 own = use.uv_set == 0 ? uv.xy : uv.zw;
             return sample_texture(use.texture, vec2(dot(use.row_u, own), dot(use.row_v, own)) + use.offset);
@@ -230,7 +230,7 @@ Layers layers_at(Hit hit, uint material_index, vec3 smooth_normal, vec3 wo, bool
 {
     LayeredMaterial material = layered_materials[material_index];
     vec4 uv = vec4(0.0);
-    if (HAS_TEXTURES) {
+    if (HAS_LAYER_TEXTURES) {
         uv = both_uvs(hit.triangle, hit.u, hit.v);
     }
     vec4 rough_metal = looked_up(material.metallic_roughness_texture, uv);

@@ -69,6 +69,10 @@ impl<'a> Facts<'a> {
         self.materials.iter().any(|(material, _)| is(material.surface))
     }
 
+    pub(super) fn has_layer_textures(&self) -> bool {
+        self.materials.iter().any(|(material, _)| material.has_layer_textures())
+    }
+
     pub(super) fn has_kind(&self, is: impl Fn(LobeKinds) -> bool) -> bool {
         self.materials.iter().any(|(_, kinds)| is(*kinds))
     }

@@ -221,6 +221,8 @@ fn constants(
         ("HAS_GLOSSY", flag(Effect::Glossy)),
         ("HAS_LAYERS", flag(Effect::Layers)),
         ("HAS_TRANSMISSION", flag(Effect::Transmission)),
+        ("HAS_LAYER_TEXTURES", u32::from(keeps(Effect::Layers) && keeps(Effect::Textures) && facts.has_layer_textures())),
+        ("HAS_PANES", u32::from(keeps(Effect::Transmission) && facts.has_kind(|kinds| kinds.pane))),
         ("HAS_MEDIA", flag(Effect::Media)),
         ("HAS_COATS", flag(Effect::ClearCoat)),
         ("HAS_SHEEN", flag(Effect::Sheen)),

@@ -215,8 +215,10 @@ pub struct LobeKinds {
     /// Rays follow these.
     pub sharp_reflection: bool,
     pub sharp_transmission: bool,
-    /// Light goes straight on as if nothing were there.
+    /// Light goes straight on as if nothing were there: through gaps of alpha or a thin smooth wall.
     pub passing: bool,
+    /// It is such a wall.
+    pub pane: bool,
 }
 
 impl LobeKinds {
@@ -266,6 +268,7 @@ impl LobeKinds {
             sharp_reflection: (reflects && alpha.0 < map_alpha) || (of.coat > 0.0 && coat_alpha.0 < map_alpha),
             sharp_transmission: transmits && !(is_pane && alpha.1 < delta_alpha),
             passing: !is_covered || (transmits && is_pane && alpha.0 < delta_alpha),
+            pane: transmits && is_pane && alpha.0 < delta_alpha,
         }
     }
 }
@@ -321,6 +324,12 @@ impl Material {
             layers.sheen_roughness_texture,
         ];
         textures.into_iter().chain(maps).flatten()
+    }
+
+    /// Whether it uses textures beside those of base colour and emission.
+    pub fn has_layer_textures(&self) -> bool {
+        let plain = usize::from(self.base_colour_texture.is_some()) + usize::from(self.emission_texture.is_some());
+        self.surface == Surface::Layered && self.textures().count() > plain
     }
 
     pub fn is_emissive(&self) -> bool {

@@ -154,12 +154,12 @@ bool step_chain(inout Chain chain, uint index, uint number, uint pixel_count, Dr
         // The eye does not see the back of what has one side.
         bool is_culled = !surface.scatters && !chain.gathers;
         scatter = sample_layered(surface, lobes, wo, stratified(number, SAMPLES, words_of(index, block, draws)).zxy, depth, true);
+        if (is_culled || scatter.passes) {
+            chain.weight *= is_culled ? vec3(1.0) : scatter.weight;
+            chain.position = offset_origin(surface.position, surface.error, surface.ng, chain.direction);
+            return true;
+        }
         if (HAS_PASSING) {
-            if (is_culled || scatter.passes) {
-                chain.weight *= is_culled ? vec3(1.0) : scatter.weight;
-                chain.position = offset_origin(surface.position, surface.error, surface.ng, chain.direction);
-                return true;
-            }
             chain.weight *= divide(surface.layers.coverage, 1.0 - lobes.pass_chance);
         }
         matt = matt_chance(lobes, surface.layers);

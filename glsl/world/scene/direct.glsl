@@ -29,6 +29,19 @@ Target plain_target(vec3 position, float error, vec3 ng, vec3 ns, vec3 wo, uint 
     return target;
 }
 
+// What a layered surface lets pass straight.
+vec3 passing_at(Hit hit, vec3 wo, uint media)
+{
+    if (HAS_PANES) {
+        if (layered_materials[triangles[hit.triangle].material].transmission > 0.0) {
+            Surface surface = surface_at(hit, wo);
+            return lobes_of(surface, wo, index_ratio(surface, media)).passing;
+        }
+    }
+    SurfaceMaterial material = materials[triangles[hit.triangle].material];
+    return vec3(1.0 - coverage_of(material, hit.triangle, hit.u, hit.v, vertex_alpha_at(hit.triangle, hit.u, hit.v)));
+}
+
 // What passes straight along a way that ends at t_max of it: all, nothing, or the share that thin walls and gaps of alpha leave.
 vec3 light_through(vec3 start, vec3 way, float t_max, uint media)
 {
@@ -48,12 +61,12 @@ vec3 light_through(vec3 start, vec3 way, float t_max, uint media)
             if (materials[triangles[hit.triangle].material].surface != SURFACE_LAYERED) {
                 return vec3(0.0);
             }
-            Surface surface = surface_at(hit, wo);
-            share *= lobes_of(surface, wo, index_ratio(surface, media)).passing;
+            share *= passing_at(hit, wo, media);
             if (largest(share) == 0.0) {
                 return share;
             }
-            vec3 next = offset_origin(surface.position, surface.error, surface.ng, way);
+            Triangle triangle = triangles[hit.triangle];
+            vec3 next = offset_origin(triangle_point(triangle, hit.u, hit.v), triangle_error(triangle), triangle_normal(triangle), way);
             // To the same end.
             if (t_max == 1.0) {
                 way = start + way - next;

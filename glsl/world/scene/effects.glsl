@@ -16,7 +16,11 @@ layout(constant_id = 54) const bool HAS_TRANSMISSION = false;
 layout(constant_id = 55) const bool HAS_COATS = false;
 layout(constant_id = 56) const bool HAS_SHEEN = false;
 layout(constant_id = 57) const bool HAS_NORMAL_MAPS = false;
-// Surfaces that light passes straight as if nothing were there: gaps of alpha, thin smooth walls, backs that the eye does not see.
+// Textures of layers, beside those of base colour and emission.
+layout(constant_id = 60) const bool HAS_LAYER_TEXTURES = false;
+// Thin walls that may be smooth.
+layout(constant_id = 61) const bool HAS_PANES = false;
+// Surfaces that light passes straight as if nothing were there: gaps of alpha, thin smooth walls.
 layout(constant_id = 58) const bool HAS_PASSING = false;
 // Media that absorb, or lie in one another.
 layout(constant_id = 59) const bool HAS_MEDIA = false;

@@ -95,11 +95,7 @@ fn lookup(used: TextureUse) -> TextureLookup {
 
 /// Whether any triangle has something for them.
 pub(super) fn is_needed(scene: &Scene) -> bool {
-    let has_textures = |material: &Material| {
-        let plain = usize::from(material.base_colour_texture.is_some()) + usize::from(material.emission_texture.is_some());
-        material.textures().count() > plain
-    };
-    scene.materials.iter().any(has_textures)
+    scene.materials.iter().any(Material::has_layer_textures)
 }
 
 pub(super) fn of_triangle(mesh: &Mesh, triangle: usize, part: Option<&[DVec3; 3]>) -> TriangleLayers {
