@@ -72,7 +72,7 @@ fn clear_balls_are_not_to_be_seen_in_a_furnace() {
 fn coarse_layered_glass_loses_no_light() {
     let Some(gpu) = device() else { return };
     for segments in [32, 16, 8] {
-        let glass = layered::layered(Vec3::ONE, layered::smooth_glass());
+        let glass = layered::layered(Vec3::ONE, &layered::smooth_glass());
         assert_holds("glass", known::coarse_sphere_in_a_furnace(&gpu, glass.clone(), segments));
         assert_holds("glass", known::coarse_sphere_in_the_sun(&gpu, glass, segments));
     }

@@ -13,11 +13,11 @@ pub const LOBES: [Lobe; 5] = [Lobe::Diffuse, Lobe::Reflection, Lobe::Transmissio
 
 /// A dielectric that reflects nothing by itself: a Lambertian surface of this albedo, if no more is asked for.
 pub fn dull(albedo: f32) -> Material {
-    layered(Vec3::splat(albedo), Layers { metallic: 0.0, specular: 0.0, ..Layers::default() })
+    layered(Vec3::splat(albedo), &Layers { metallic: 0.0, specular: 0.0, ..Layers::default() })
 }
 
-pub fn layered(base_colour: Vec3, layers: Layers) -> Material {
-    Material::layered("plate", base_colour, layers)
+pub fn layered(base_colour: Vec3, layers: &Layers) -> Material {
+    Material::layered("plate", base_colour, *layers)
 }
 
 pub fn plastic(roughness: f32) -> Layers {
@@ -88,7 +88,7 @@ pub fn mixtures() -> Vec<Material> {
         Layers { transmission: 0.8, medium: CLEAR, ..plastic(0.4) },
         Layers { transmission: 1.0, medium: CLEAR, sheen_colour, sheen_roughness: 0.5, ior: 1.2, ..plastic(0.3) },
     ];
-    of.map(|layers| layered(base, layers)).to_vec()
+    of.map(|layers| layered(base, &layers)).to_vec()
 }
 
 /// Solids so rough that photon maps know what they reflect.
@@ -100,7 +100,7 @@ pub fn rough_solids() -> Vec<Material> {
         Layers { transmission: 1.0, medium: CLEAR, ior: 1.8, ..plastic(0.9) },
         Layers { transmission: 1.0, medium: CLEAR, coat: 1.0, ..plastic(1.0) },
     ];
-    of.map(|layers| layered(Vec3::new(0.8, 0.5, 0.2), layers)).to_vec()
+    of.map(|layers| layered(Vec3::new(0.8, 0.5, 0.2), &layers)).to_vec()
 }
 
 pub const CLEAR: Option<Medium> = Some(Medium { transmittance: Vec3::ONE });
@@ -154,8 +154,8 @@ pub fn lobes_in_the_sun(gpu: &Gpu, materials: &[Material], is_inside: bool) -> C
         plates.scene.lights = vec![lamp(sun(-way))];
         let found = plates.seen(gpu, &straight()).0;
         let expected: Vec<DVec3> = lobes.iter().map(|lobes| in_the_sun(lobes, way.normalize())).collect();
-        // What the kernels interpolate in tables.
-        compare(&format!("the sun at {way}, from inside: {is_inside}"), &found, &expected, 3e-3)?;
+        // What the kernels interpolate in tables, and refraction within the width of a pixel.
+        compare(&format!("the sun at {way}, from inside: {is_inside}"), &found, &expected, 5e-3)?;
     }
     Ok(())
 }
@@ -194,7 +194,7 @@ pub fn normal_maps_in_the_sun(gpu: &Gpu) -> Check<Complaint> {
         let n = mapped_normal(LEANS[texture], f64::from(scale), (place.x, sign * place.y, place.normal), place.wo);
         lobes.push(lobes_at(&material, &place, n));
     };
-    let shiny = layered(Vec3::new(0.9, 0.6, 0.3), Layers { metallic: 0.5, ..plastic(0.6) });
+    let shiny = layered(Vec3::new(0.9, 0.6, 0.3), &Layers { metallic: 0.5, ..plastic(0.6) });
     for row in 0..4 {
         for texture in 0..LEANS.len() {
             for sign in [1.0, -1.0] {
@@ -261,11 +261,11 @@ pub fn textures_in_the_sun(gpu: &Gpu) -> Check<Complaint> {
         // Roughness and metalness from the second texel, found by the second set of coordinates; the first one leads to the first texel.
         let transform = UvTransform { scale: DVec2::new(0.5, 1.0), rotation: 0.0, offset: DVec2::new(0.25, 0.0) };
         let plain = |texel: usize| {
-            layered(base, Layers { metallic: 0.8 * share(halves[texel], 2), roughness: 0.9 * share(halves[texel], 1), ..plastic(1.0) })
+            layered(base, &Layers { metallic: 0.8 * share(halves[texel], 2), roughness: 0.9 * share(halves[texel], 1), ..plastic(1.0) })
         };
         let of_set = |uv_set: usize, transform: UvTransform| {
             let metallic_roughness_texture = Some(TextureUse { texture: 0, uv_set, transform });
-            layered(base, Layers { metallic: 0.8, roughness: 0.9, metallic_roughness_texture, ..Layers::default() })
+            layered(base, &Layers { metallic: 0.8, roughness: 0.9, metallic_roughness_texture, ..Layers::default() })
         };
         for (used, texel) in [
             (of_set(0, UvTransform::NONE), 0),
@@ -297,7 +297,7 @@ pub fn textures_in_the_sun(gpu: &Gpu) -> Check<Complaint> {
             specular_colour_texture: of_first,
             ..coated
         };
-        let (place, mesh) = plates.add(row, layered(base, textured));
+        let (place, mesh) = plates.add(row, layered(base, &textured));
         at_u(mesh, 0, 0.9);
         let texel = halves[1];
         let colour = Vec3::from_array([0, 1, 2].map(|k| share(texel, k)));
@@ -310,9 +310,9 @@ pub fn textures_in_the_sun(gpu: &Gpu) -> Check<Complaint> {
             specular_colour: colour,
             ..coated
         };
-        expect(&layered(base, plain), place, DVec3::ZERO);
+        expect(&layered(base, &plain), place, DVec3::ZERO);
         // Unlit: its colour whatever the light, that of its corners included.
-        let (place, mesh) = plates.add(row, layered(base, Layers { is_unlit: true, coat: 1.0, ..metal(0.5) }));
+        let (place, mesh) = plates.add(row, layered(base, &Layers { is_unlit: true, coat: 1.0, ..metal(0.5) }));
         mesh.colours = vec![DVec3::new(0.5, 1.0, 0.25); 4];
         expect(&dull(0.0), place, base.as_dvec3() * DVec3::new(0.5, 1.0, 0.25));
     }
@@ -335,7 +335,7 @@ pub fn backs_in_the_sun(gpu: &Gpu) -> Check<Complaint> {
         let mut behind = mesh.clone();
         behind.positions.iter_mut().for_each(|at| *at -= 0.01 * place.wo);
         behind.material = plates.scene.materials.len();
-        plates.scene.materials.push(Material { two_sided: true, ..layered(Vec3::splat(0.3), Layers { is_unlit: true, ..metal(1.0) }) });
+        plates.scene.materials.push(Material { two_sided: true, ..layered(Vec3::splat(0.3), &Layers { is_unlit: true, ..metal(1.0) }) });
         plates.scene.meshes.push(behind);
         let back = in_the_sun(&lobes_at(&dull(0.7), &place, place.normal), SUNS[0].normalize());
         expected.push(if two_sided { back } else { DVec3::splat(0.3) });
@@ -350,7 +350,7 @@ fn opaque() -> Vec<Material> {
     });
     let white = [plastic(0.0), plastic(0.3), plastic(0.6), plastic(1.0), Layers { coat: 1.0, ..plastic(0.0) }];
     let metals = METALS.map(|(alpha, _)| metal(alpha.sqrt() as f32));
-    mixed.chain(white.into_iter().chain(metals).map(|layers| layered(Vec3::ONE, layers))).collect()
+    mixed.chain(white.into_iter().chain(metals).map(|layers| layered(Vec3::ONE, &layers))).collect()
 }
 
 /// Alpha of white metals, and what they send back at each of [`COSINES`], by quadrature.
@@ -423,12 +423,12 @@ pub fn furnace(gpu: &Gpu, within_a_dome: bool) -> Check<Complaint> {
 
 /// Balls that let light through, in a row under a sky that is 1 everywhere.
 fn clear_balls() -> Vec<Material> {
-    let clear = |layers: Layers| layered(Vec3::ONE, Layers { transmission: 1.0, ..layers });
+    let clear = |layers: Layers| layered(Vec3::ONE, &Layers { transmission: 1.0, ..layers });
     vec![
         clear(plastic(0.0)),
         clear(Layers { medium: CLEAR, ..plastic(0.0) }),
         clear(Layers { medium: CLEAR, ior: 2.4, coat: 1.0, ..plastic(0.0) }),
-        Material { coverage: Coverage::Blend { alpha: 0.5 }, ..layered(Vec3::ONE, metal(0.0)) },
+        Material { coverage: Coverage::Blend { alpha: 0.5 }, ..layered(Vec3::ONE, &metal(0.0)) },
         Material { coverage: Coverage::Blend { alpha: 0.5 }, ..clear(plastic(0.0)) },
         clear(plastic(0.4)),
         clear(Layers { medium: CLEAR, ..plastic(0.3) }),

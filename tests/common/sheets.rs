@@ -31,7 +31,7 @@ fn masked(alpha: f32, material: Material) -> Material {
 }
 
 fn pane() -> Material {
-    layered(TINT, Layers { transmission: 1.0, ..plastic(0.0) })
+    layered(TINT, &Layers { transmission: 1.0, ..plastic(0.0) })
 }
 
 const TINT: Vec3 = Vec3::new(0.9, 0.6, 0.3);
@@ -59,7 +59,7 @@ fn stacks() -> Vec<Stack> {
         stack("alpha 1", of(1, blended(1.0, black())), |_| DVec3::ZERO),
         stack("half", of(1, blended(0.5, black())), |_| DVec3::splat(0.5)),
         stack("three halves", of(3, blended(0.5, black())), |_| DVec3::splat(0.125)),
-        stack("two of 0.3, of metal", of(2, blended(0.3, layered(TINT, metal(0.0)))), |_| DVec3::splat(0.49)),
+        stack("two of 0.3, of metal", of(2, blended(0.3, layered(TINT, &metal(0.0)))), |_| DVec3::splat(0.49)),
         stack("a hole", of(2, masked(0.49, black())), |_| DVec3::ONE),
         stack("no hole", of(1, masked(0.5, black())), |_| DVec3::ZERO),
         stack("no gap", of(1, Material { coverage: Coverage::Whole, ..black() }), |_| DVec3::ZERO),
