@@ -82,8 +82,8 @@ fn plastic() -> Layers {
     Layers { metallic: 0.0, roughness: 0.6, ..Layers::default() }
 }
 
-fn coloured(layers: Layers) -> Material {
-    Material::layered("ball", Vec3::new(0.8, 0.5, 0.2), layers)
+fn coloured(layers: &Layers) -> Material {
+    Material::layered("ball", Vec3::new(0.8, 0.5, 0.2), *layers)
 }
 
 fn balls() -> Vec<(&'static str, Material)> {
@@ -91,26 +91,26 @@ fn balls() -> Vec<(&'static str, Material)> {
     let tinted = Some(Medium { transmittance: Vec3::new(0.9, 0.3, 0.5) });
     let blend = |alpha| Coverage::Blend { alpha };
     vec![
-        ("rough plastic", coloured(plastic())),
-        ("plastic", coloured(Layers { roughness: 0.3, ..plastic() })),
-        ("polished plastic", coloured(Layers { roughness: 0.0, ..plastic() })),
-        ("rough metal", coloured(Layers { roughness: 0.7, ..Layers::default() })),
-        ("metal", coloured(Layers { roughness: 0.3, ..Layers::default() })),
-        ("polished metal", coloured(Layers { roughness: 0.0, ..Layers::default() })),
-        ("half metal", coloured(Layers { metallic: 0.5, roughness: 0.4, ..Layers::default() })),
-        ("tinted reflection", coloured(Layers { specular: 0.7, specular_colour: Vec3::new(1.0, 3.0, 0.4), ior: 2.0, ..plastic() })),
-        ("coat over plastic", coloured(Layers { coat: 0.8, coat_roughness: 0.1, ..plastic() })),
-        ("rough coat over metal", coloured(Layers { coat: 1.0, coat_roughness: 0.6, roughness: 0.4, ..Layers::default() })),
-        ("sheen", coloured(Layers { sheen_colour: Vec3::new(0.2, 0.4, 0.9), sheen_roughness: 0.5, ..plastic() })),
-        ("smooth thin wall", coloured(Layers { transmission: 1.0, roughness: 0.0, ..plastic() })),
-        ("rough thin wall", coloured(Layers { transmission: 1.0, roughness: 0.4, ..plastic() })),
-        ("half a thin wall", coloured(Layers { transmission: 0.5, roughness: 0.5, ..plastic() })),
-        ("glass", coloured(Layers { transmission: 1.0, roughness: 0.0, medium: clear, ..plastic() })),
-        ("rough glass", coloured(Layers { transmission: 1.0, roughness: 0.4, medium: clear, ..plastic() })),
-        ("tinted glass", coloured(Layers { transmission: 1.0, roughness: 0.0, medium: tinted, ..plastic() })),
-        ("blended", Material { coverage: blend(0.4), ..coloured(plastic()) }),
-        ("blended metal", Material { coverage: blend(0.7), ..coloured(Layers { roughness: 0.2, ..Layers::default() }) }),
-        ("unlit", coloured(Layers { is_unlit: true, ..plastic() })),
+        ("rough plastic", coloured(&plastic())),
+        ("plastic", coloured(&Layers { roughness: 0.3, ..plastic() })),
+        ("polished plastic", coloured(&Layers { roughness: 0.0, ..plastic() })),
+        ("rough metal", coloured(&Layers { roughness: 0.7, ..Layers::default() })),
+        ("metal", coloured(&Layers { roughness: 0.3, ..Layers::default() })),
+        ("polished metal", coloured(&Layers { roughness: 0.0, ..Layers::default() })),
+        ("half metal", coloured(&Layers { metallic: 0.5, roughness: 0.4, ..Layers::default() })),
+        ("tinted reflection", coloured(&Layers { specular: 0.7, specular_colour: Vec3::new(1.0, 3.0, 0.4), ior: 2.0, ..plastic() })),
+        ("coat over plastic", coloured(&Layers { coat: 0.8, coat_roughness: 0.1, ..plastic() })),
+        ("rough coat over metal", coloured(&Layers { coat: 1.0, coat_roughness: 0.6, roughness: 0.4, ..Layers::default() })),
+        ("sheen", coloured(&Layers { sheen_colour: Vec3::new(0.2, 0.4, 0.9), sheen_roughness: 0.5, ..plastic() })),
+        ("smooth thin wall", coloured(&Layers { transmission: 1.0, roughness: 0.0, ..plastic() })),
+        ("rough thin wall", coloured(&Layers { transmission: 1.0, roughness: 0.4, ..plastic() })),
+        ("half a thin wall", coloured(&Layers { transmission: 0.5, roughness: 0.5, ..plastic() })),
+        ("glass", coloured(&Layers { transmission: 1.0, roughness: 0.0, medium: clear, ..plastic() })),
+        ("rough glass", coloured(&Layers { transmission: 1.0, roughness: 0.4, medium: clear, ..plastic() })),
+        ("tinted glass", coloured(&Layers { transmission: 1.0, roughness: 0.0, medium: tinted, ..plastic() })),
+        ("blended", Material { coverage: blend(0.4), ..coloured(&plastic()) }),
+        ("blended metal", Material { coverage: blend(0.7), ..coloured(&Layers { roughness: 0.2, ..Layers::default() }) }),
+        ("unlit", coloured(&Layers { is_unlit: true, ..plastic() })),
     ]
 }
 
@@ -147,15 +147,17 @@ fn pairs_of_lobes() -> Vec<Material> {
         Layers { transmission: 1.0, roughness: 0.4, medium: clear, coat, coat_roughness, ..plastic() },
         Layers { transmission: 0.7, roughness: 0.0, medium: clear, sheen_colour, sheen_roughness, ..plastic() },
     ];
-    let blended = Material { coverage: Coverage::Blend { alpha: 0.6 }, ..coloured(Layers { coat, roughness: 0.2, ..Layers::default() }) };
-    of.into_iter().map(coloured).chain([blended]).collect()
+    let blended = Material { coverage: Coverage::Blend { alpha: 0.6 }, ..coloured(&Layers { coat, roughness: 0.2, ..Layers::default() }) };
+    of.into_iter().map(|layers| coloured(&layers)).chain([blended]).collect()
 }
 
 #[test]
 fn a_picture_of_all_lobes_agrees_with_the_judge() {
     let Some(gpu) = device() else { return };
     // Two rows, so that they light each other.
-    let place = |k: usize| DVec3::new(0.42 * (k % 5) as f64 - 0.84 + 0.21 * (k / 5) as f64, 0.2 + 0.42 * (k / 5) as f64, 0.3 - 0.3 * (k / 5) as f64);
+    let place = |k: usize| {
+        DVec3::new(0.42 * (k % 5) as f64 - 0.84 + 0.21 * (k / 5) as f64, 0.2 + 0.42 * (k / 5) as f64, 0.3 - 0.3 * (k / 5) as f64)
+    };
     let scene = stage(pairs_of_lobes().into_iter().enumerate().map(|(k, material)| (material, place(k), 0.2)).collect());
     let settings = SceneSettings { photons: 10_000, caustic_photons: 10_000, rounds: 8, ..SceneSettings::default() };
     let size = [32, 24];

@@ -4,20 +4,20 @@
 use super::estimate_check;
 use super::plates::{COSINES, Place, Plates};
 use super::prelude::*;
-use photonmill::scene::material::{Layers, Medium, NormalMap};
+use photonmill::scene::material::{Coverage, Layers, Medium, NormalMap};
 use photonmill::scene::texture::Filter;
-use photonmill::verify::judge::random;
 use photonmill::verify::judge::lobes::{Frame, Inputs, Kind as Lobe, Lobes, Wall};
+use photonmill::verify::judge::random;
 
 pub const LOBES: [Lobe; 5] = [Lobe::Diffuse, Lobe::Reflection, Lobe::Transmission, Lobe::Coat, Lobe::Sheen];
 
 /// A dielectric that reflects nothing by itself: a Lambertian surface of this albedo, if no more is asked for.
 pub fn dull(albedo: f32) -> Material {
-    layered(Vec3::splat(albedo), Layers { metallic: 0.0, specular: 0.0, ..Layers::default() })
+    layered(Vec3::splat(albedo), &Layers { metallic: 0.0, specular: 0.0, ..Layers::default() })
 }
 
-pub fn layered(base_colour: Vec3, layers: Layers) -> Material {
-    Material::layered("plate", base_colour, layers)
+pub fn layered(base_colour: Vec3, layers: &Layers) -> Material {
+    Material::layered("plate", base_colour, *layers)
 }
 
 pub fn plastic(roughness: f32) -> Layers {
@@ -26,6 +26,10 @@ pub fn plastic(roughness: f32) -> Layers {
 
 pub fn metal(roughness: f32) -> Layers {
     Layers { roughness, ..Layers::default() }
+}
+
+pub fn smooth_glass() -> Layers {
+    Layers { transmission: 1.0, medium: CLEAR, ..plastic(0.0) }
 }
 
 /// What the path tracer makes of a material without textures, of which the front is seen.
@@ -82,19 +86,21 @@ pub fn mixtures() -> Vec<Material> {
         Layers { transmission: 0.6, ..plastic(0.5) },
         Layers { transmission: 1.0, coat: 1.0, coat_roughness: 0.4, ..plastic(0.35) },
         Layers { transmission: 0.8, medium: CLEAR, ..plastic(0.4) },
-        Layers { transmission: 1.0, medium: CLEAR, sheen_colour, sheen_roughness: 0.5, ior: 1.8, ..plastic(0.3) },
+        Layers { transmission: 1.0, medium: CLEAR, sheen_colour, sheen_roughness: 0.5, ior: 1.2, ..plastic(0.3) },
     ];
-    of.map(|layers| layered(base, layers)).to_vec()
+    of.map(|layers| layered(base, &layers)).to_vec()
 }
 
 /// Solids so rough that photon maps know what they reflect.
 pub fn rough_solids() -> Vec<Material> {
     let of = [
+        // From inside, this one sends light through beyond the angle at which a smooth one would reflect all.
+        Layers { transmission: 1.0, medium: CLEAR, ior: 1.8, ..plastic(0.3) },
         Layers { transmission: 0.8, medium: CLEAR, ..plastic(0.6) },
         Layers { transmission: 1.0, medium: CLEAR, ior: 1.8, ..plastic(0.9) },
         Layers { transmission: 1.0, medium: CLEAR, coat: 1.0, ..plastic(1.0) },
     ];
-    of.map(|layers| layered(Vec3::new(0.8, 0.5, 0.2), layers)).to_vec()
+    of.map(|layers| layered(Vec3::new(0.8, 0.5, 0.2), &layers)).to_vec()
 }
 
 pub const CLEAR: Option<Medium> = Some(Medium { transmittance: Vec3::ONE });
@@ -123,17 +129,33 @@ fn compare(what: &str, found: &[DVec3], expected: &[DVec3], tolerance: f64) -> C
     Ok(())
 }
 
-/// Every mixture at every angle, before the sun and behind it, has the BSDF of the guide.
-pub fn lobes_in_the_sun(gpu: &Gpu, mixtures: Vec<Material>) -> Check<Complaint> {
-    let mut plates = Plates::new(mixtures.len(), Vec::new());
-    mixtures.iter().for_each(|material| plates.add_to_all(material));
+/// The same seen from inside a solid.
+fn from_inside(material: &Material) -> Inputs {
+    let Inputs { ior, .. } = inputs(material);
+    Inputs { wall: Wall::Solid { from: ior, to: 1.0 }, ..inputs(material) }
+}
+
+/// Every material at every angle, from the front or from inside, before the sun and behind it, has the BSDF of the guide.
+pub fn lobes_in_the_sun(gpu: &Gpu, materials: &[Material], is_inside: bool) -> Check<Complaint> {
+    let mut plates = Plates::new(materials.len(), Vec::new());
+    let mut lobes = Vec::new();
+    for row in 0..COSINES.len() {
+        for material in materials {
+            let (place, mesh) = plates.add(row, material.clone());
+            let n = place.normal;
+            if is_inside {
+                mesh.triangles.iter_mut().for_each(|corners| corners.swap(1, 2));
+            }
+            let inputs = if is_inside { from_inside(material) } else { inputs(material) };
+            lobes.push(Lobes::new(inputs, Frame { wo: place.wo, ng: n, n, coat_n: n }));
+        }
+    }
     for way in SUNS {
         plates.scene.lights = vec![lamp(sun(-way))];
         let found = plates.seen(gpu, &straight()).0;
-        let of = |(k, place): (usize, &Place)| in_the_sun(&lobes_at(&mixtures[k / COSINES.len()], place, place.normal), way.normalize());
-        let expected: Vec<DVec3> = plates.places.iter().enumerate().map(of).collect();
-        // What the kernels interpolate in tables, and reflection at grazing angles in single precision.
-        compare(&format!("the sun at {way}"), &found, &expected, 3e-3)?;
+        let expected: Vec<DVec3> = lobes.iter().map(|lobes| in_the_sun(lobes, way.normalize())).collect();
+        // What the kernels interpolate in tables, and refraction within the width of a pixel.
+        compare(&format!("the sun at {way}, from inside: {is_inside}"), &found, &expected, 5e-3)?;
     }
     Ok(())
 }
@@ -172,7 +194,7 @@ pub fn normal_maps_in_the_sun(gpu: &Gpu) -> Check<Complaint> {
         let n = mapped_normal(LEANS[texture], f64::from(scale), (place.x, sign * place.y, place.normal), place.wo);
         lobes.push(lobes_at(&material, &place, n));
     };
-    let shiny = layered(Vec3::new(0.9, 0.6, 0.3), Layers { metallic: 0.5, ..plastic(0.6) });
+    let shiny = layered(Vec3::new(0.9, 0.6, 0.3), &Layers { metallic: 0.5, ..plastic(0.6) });
     for row in 0..4 {
         for texture in 0..LEANS.len() {
             for sign in [1.0, -1.0] {
@@ -239,11 +261,11 @@ pub fn textures_in_the_sun(gpu: &Gpu) -> Check<Complaint> {
         // Roughness and metalness from the second texel, found by the second set of coordinates; the first one leads to the first texel.
         let transform = UvTransform { scale: DVec2::new(0.5, 1.0), rotation: 0.0, offset: DVec2::new(0.25, 0.0) };
         let plain = |texel: usize| {
-            layered(base, Layers { metallic: 0.8 * share(halves[texel], 2), roughness: 0.9 * share(halves[texel], 1), ..plastic(1.0) })
+            layered(base, &Layers { metallic: 0.8 * share(halves[texel], 2), roughness: 0.9 * share(halves[texel], 1), ..plastic(1.0) })
         };
         let of_set = |uv_set: usize, transform: UvTransform| {
             let metallic_roughness_texture = Some(TextureUse { texture: 0, uv_set, transform });
-            layered(base, Layers { metallic: 0.8, roughness: 0.9, metallic_roughness_texture, ..Layers::default() })
+            layered(base, &Layers { metallic: 0.8, roughness: 0.9, metallic_roughness_texture, ..Layers::default() })
         };
         for (used, texel) in [
             (of_set(0, UvTransform::NONE), 0),
@@ -275,7 +297,7 @@ pub fn textures_in_the_sun(gpu: &Gpu) -> Check<Complaint> {
             specular_colour_texture: of_first,
             ..coated
         };
-        let (place, mesh) = plates.add(row, layered(base, textured));
+        let (place, mesh) = plates.add(row, layered(base, &textured));
         at_u(mesh, 0, 0.9);
         let texel = halves[1];
         let colour = Vec3::from_array([0, 1, 2].map(|k| share(texel, k)));
@@ -288,9 +310,9 @@ pub fn textures_in_the_sun(gpu: &Gpu) -> Check<Complaint> {
             specular_colour: colour,
             ..coated
         };
-        expect(&layered(base, plain), place, DVec3::ZERO);
+        expect(&layered(base, &plain), place, DVec3::ZERO);
         // Unlit: its colour whatever the light, that of its corners included.
-        let (place, mesh) = plates.add(row, layered(base, Layers { is_unlit: true, coat: 1.0, ..metal(0.5) }));
+        let (place, mesh) = plates.add(row, layered(base, &Layers { is_unlit: true, coat: 1.0, ..metal(0.5) }));
         mesh.colours = vec![DVec3::new(0.5, 1.0, 0.25); 4];
         expect(&dull(0.0), place, base.as_dvec3() * DVec3::new(0.5, 1.0, 0.25));
     }
@@ -313,7 +335,7 @@ pub fn backs_in_the_sun(gpu: &Gpu) -> Check<Complaint> {
         let mut behind = mesh.clone();
         behind.positions.iter_mut().for_each(|at| *at -= 0.01 * place.wo);
         behind.material = plates.scene.materials.len();
-        plates.scene.materials.push(Material { two_sided: true, ..layered(Vec3::splat(0.3), Layers { is_unlit: true, ..metal(1.0) }) });
+        plates.scene.materials.push(Material { two_sided: true, ..layered(Vec3::splat(0.3), &Layers { is_unlit: true, ..metal(1.0) }) });
         plates.scene.meshes.push(behind);
         let back = in_the_sun(&lobes_at(&dull(0.7), &place, place.normal), SUNS[0].normalize());
         expected.push(if two_sided { back } else { DVec3::splat(0.3) });
@@ -321,12 +343,14 @@ pub fn backs_in_the_sun(gpu: &Gpu) -> Check<Complaint> {
     compare("backs", &plates.seen(gpu, &straight()).0, &expected, 1e-4)
 }
 
-/// Materials under a sky of 1 W/m2/sr: opaque ones, and what each sends back of it.
+/// Opaque ones: mixtures of more than one lobe, white dielectrics, and white metals.
 fn opaque() -> Vec<Material> {
-    let mixtures = mixtures().into_iter().filter(|material| material.layers.transmission == 0.0);
+    let mixed = mixtures().into_iter().filter(|Material { layers, .. }| {
+        layers.transmission == 0.0 && (layers.coat > 0.0 || layers.sheen_colour != Vec3::ZERO || layers.metallic == 0.5)
+    });
     let white = [plastic(0.0), plastic(0.3), plastic(0.6), plastic(1.0), Layers { coat: 1.0, ..plastic(0.0) }];
     let metals = METALS.map(|(alpha, _)| metal(alpha.sqrt() as f32));
-    mixtures.chain(white.into_iter().chain(metals).map(|layers| layered(Vec3::ONE, layers))).collect()
+    mixed.chain(white.into_iter().chain(metals).map(|layers| layered(Vec3::ONE, &layers))).collect()
 }
 
 /// Alpha of white metals, and what they send back at each of [`COSINES`], by quadrature.
@@ -357,7 +381,7 @@ fn under_the_sky(lobes: &Lobes) -> (DVec3, DVec3) {
 }
 
 /// Opaque plates under a sky that is 1 everywhere, or within a dome that shines as much: white dielectrics send all of it back, white
-/// metals what single scattering leaves, and none more than there is.
+/// metals what single scattering leaves.
 pub fn furnace(gpu: &Gpu, within_a_dome: bool) -> Check<Complaint> {
     let materials = opaque();
     let mut plates = Plates::new(materials.len(), Vec::new());
@@ -372,23 +396,71 @@ pub fn furnace(gpu: &Gpu, within_a_dome: bool) -> Check<Complaint> {
         plates.scene.lights = vec![lamp(LightKind::Environment { radiance: Vec3::ONE })];
     }
     let without = vec![Effect::Indirect, Effect::ReflectiveCaustics];
-    let settings = SceneSettings { samples: 16, rounds: 8, shadow_rays: 4, without, ..SceneSettings::default() };
+    let settings = SceneSettings { samples: 16, rounds: 24, shadow_rays: 4, without, ..SceneSettings::default() };
     let (found, errors) = plates.seen(gpu, &settings);
     for (k, ((found, error), place)) in pairs(pairs(found, errors), &plates.places).enumerate() {
         let (material, row) = (&materials[k / COSINES.len()], k % COSINES.len());
-        let metal = METALS.iter().find(|(alpha, _)| material.layers.metallic == 1.0 && (alpha.sqrt() as f32) == material.layers.roughness);
+        let Layers { metallic, roughness, coat, coat_roughness, .. } = material.layers;
         let is_white = material.base_colour == Vec3::ONE;
+        let metal = METALS.iter().find(|(alpha, _)| is_white && metallic == 1.0 && alpha.sqrt() as f32 == roughness);
         let (expected, own_error) = match metal {
-            _ if is_white && material.layers.metallic == 0.0 => (DVec3::ONE, DVec3::ZERO),
-            Some((_, albedos)) if is_white => (DVec3::splat(albedos[row]), DVec3::ZERO),
-            _ => under_the_sky(&lobes_at(material, place, place.normal)),
+            Some((_, albedos)) => (DVec3::splat(albedos[row]), DVec3::ZERO),
+            None if is_white => (DVec3::ONE, DVec3::ZERO),
+            None => under_the_sky(&lobes_at(material, place, place.normal)),
         };
-        println!("{k} {:?} {row}: {found} +- {error}, {expected} expected", material.layers.roughness);
+        println!("plate {k}: {found:.4} +- {error:.4}, {expected:.4} expected");
+        // Few paths follow a delta that sends little back: rounds that all count as many of them do not show how uncertain that is.
+        let one_path = 1.0 / f64::from(settings.samples * settings.rounds);
+        let least = if metal.is_none() && (roughness == 0.0 || coat > 0.0 && coat_roughness == 0.0) { one_path } else { 0.0 };
         for channel in 0..3 {
             // Tables are interpolated.
-            let error = error[channel].hypot(own_error[channel]).max(6e-4 * expected[channel]);
-            estimate_check(&format!("plate {k} under the sky, {within_a_dome}"), found[channel], expected[channel], error)?;
+            let error = error[channel].hypot(own_error[channel]).max(6e-4 * expected[channel]).max(least);
+            estimate_check(&format!("plate {k}, within a dome: {within_a_dome}"), found[channel], expected[channel], error)?;
         }
+    }
+    Ok(())
+}
+
+/// Balls that let light through, in a row under a sky that is 1 everywhere.
+fn clear_balls() -> Vec<Material> {
+    let clear = |layers: Layers| layered(Vec3::ONE, &Layers { transmission: 1.0, ..layers });
+    vec![
+        clear(plastic(0.0)),
+        clear(Layers { medium: CLEAR, ..plastic(0.0) }),
+        clear(Layers { medium: CLEAR, ior: 2.4, coat: 1.0, ..plastic(0.0) }),
+        Material { coverage: Coverage::Blend { alpha: 0.5 }, ..layered(Vec3::ONE, &metal(0.0)) },
+        Material { coverage: Coverage::Blend { alpha: 0.5 }, ..clear(plastic(0.0)) },
+        clear(plastic(0.4)),
+        clear(Layers { medium: CLEAR, ..plastic(0.3) }),
+        clear(Layers { medium: CLEAR, coat: 0.5, coat_roughness: 0.2, ..plastic(0.0) }),
+    ]
+}
+
+/// Of these so many lose nothing.
+const LOSSLESS: usize = 5;
+
+/// What loses no light is not to be seen in a furnace; the others are as dark as the path tracer has them.
+pub fn clear_furnace(gpu: &Gpu) -> Check<Complaint> {
+    let materials = clear_balls();
+    let count = materials.len();
+    let middle = |k: usize| DVec3::X * (2.0 * k as f64 - (count - 1) as f64);
+    let meshes = (0..count).map(|k| Mesh::sphere("ball", middle(k), 0.9, 32, k)).collect();
+    let scene = scene_of(meshes, materials, vec![LightKind::Environment { radiance: Vec3::ONE }]);
+    let camera = Camera::looking_at("front", DVec3::Z * 100.0, DVec3::ZERO, DVec3::Y, 0.02);
+    let without = vec![Effect::Indirect, Effect::ReflectiveCaustics, Effect::RefractiveCaustics];
+    let settings = SceneSettings { samples: 16, rounds: 16, shadow_rays: 2, without, ..SceneSettings::default() };
+    let size = [8 * count as u32, 8];
+    let lit = seen(gpu, &scene, &settings, &camera, size);
+    let judged = Judge::new(&scene, 64).image(&camera, size[0], size[1], 64, 5);
+    for k in 0..count {
+        let pixels = || (0..8).flat_map(move |row| (0..8).map(move |column| 8 * (row * count + k) + column));
+        let mean = pixels().map(|at| lit.film.mean(at, &lit.plan).x).sum::<f64>() / 64.0;
+        let error = pixels().map(|at| lit.film.standard_error(at, &lit.plan).x.powi(2)).sum::<f64>().sqrt() / 64.0;
+        let of = |at: usize| judged.pixels[at].mean.direct.x + judged.pixels[at].mean.specular.x + judged.pixels[at].mean.caustic.x;
+        let expected = if k < LOSSLESS { 1.0 } else { pixels().map(of).sum::<f64>() / 64.0 };
+        let own = pixels().map(|at| judged.pixels[at].total_standard_error.x.powi(2)).sum::<f64>().sqrt() / 64.0;
+        println!("ball {k}: {mean} +- {error}, {expected} expected, +- {own}");
+        estimate_check(&format!("ball {k}"), mean, expected, if k < LOSSLESS { error.max(1e-4) } else { error.hypot(own) })?;
     }
     Ok(())
 }

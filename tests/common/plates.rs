@@ -66,7 +66,9 @@ impl Plates {
 
     /// One of these in each row.
     pub fn add_to_all(&mut self, material: &Material) {
-        (0..COSINES.len()).for_each(|row| drop(self.add(row, material.clone())));
+        for row in 0..COSINES.len() {
+            self.add(row, material.clone());
+        }
     }
 
     /// Means and standard errors of what is seen in the middle of each plate, in the order in which they were added.

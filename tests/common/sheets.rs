@@ -12,10 +12,13 @@ const SUN: DVec3 = DVec3::new(0.3, 1.0, 0.15);
 /// From one stack to the next; a sheet takes half of it.
 const PITCH: f64 = 2.0;
 
+/// What a sheet is made of, and what is done to its mesh.
+type Sheet = (Material, fn(&mut Mesh));
+
 /// Sheets above one another, and the share of light of this cosine that gets through all of them.
 struct Stack {
     what: &'static str,
-    sheets: Vec<(Material, fn(&mut Mesh))>,
+    sheets: Vec<Sheet>,
     share: fn(f64) -> DVec3,
 }
 
@@ -28,7 +31,7 @@ fn masked(alpha: f32, material: Material) -> Material {
 }
 
 fn pane() -> Material {
-    layered(TINT, Layers { transmission: 1.0, ..plastic(0.0) })
+    layered(TINT, &Layers { transmission: 1.0, ..plastic(0.0) })
 }
 
 const TINT: Vec3 = Vec3::new(0.9, 0.6, 0.3);
@@ -56,17 +59,21 @@ fn stacks() -> Vec<Stack> {
         stack("alpha 1", of(1, blended(1.0, black())), |_| DVec3::ZERO),
         stack("half", of(1, blended(0.5, black())), |_| DVec3::splat(0.5)),
         stack("three halves", of(3, blended(0.5, black())), |_| DVec3::splat(0.125)),
-        stack("two of 0.3, of metal", of(2, blended(0.3, layered(TINT, metal(0.0)))), |_| DVec3::splat(0.49)),
+        stack("two of 0.3, of metal", of(2, blended(0.3, layered(TINT, &metal(0.0)))), |_| DVec3::splat(0.49)),
         stack("a hole", of(2, masked(0.49, black())), |_| DVec3::ONE),
         stack("no hole", of(1, masked(0.5, black())), |_| DVec3::ZERO),
         stack("no gap", of(1, Material { coverage: Coverage::Whole, ..black() }), |_| DVec3::ZERO),
-        stack("alpha of the corners", vec![(blended(0.8, black()), |mesh| (mesh.alphas, mesh.colours) = (vec![0.25; 4], vec![DVec3::ONE; 4]))], |_| DVec3::splat(0.8)),
         stack(
-            "alpha of a texture",
-            vec![(textured(blended(0.8, black())), |mesh| mesh.uvs[0] = vec![DVec2::new(0.7, 0.5); 4])],
-            |_| DVec3::splat(1.0 - 0.8 * 191.0 / 255.0),
+            "alpha of the corners",
+            vec![(blended(0.8, black()), |mesh| (mesh.alphas, mesh.colours) = (vec![0.25; 4], vec![DVec3::ONE; 4]))],
+            |_| DVec3::splat(0.8),
         ),
-        stack("a masked texture", vec![(textured(masked(1.0, black())), |mesh| mesh.uvs[0] = vec![DVec2::new(0.3, 0.5); 4])], |_| DVec3::ONE),
+        stack("alpha of a texture", vec![(textured(blended(0.8, black())), |mesh| mesh.uvs[0] = vec![DVec2::new(0.7, 0.5); 4])], |_| {
+            DVec3::splat(1.0 - 0.8 * 191.0 / 255.0)
+        }),
+        stack("a masked texture", vec![(textured(masked(1.0, black())), |mesh| mesh.uvs[0] = vec![DVec2::new(0.3, 0.5); 4])], |_| {
+            DVec3::ONE
+        }),
         stack("a pane", of(1, pane()), through_a_pane),
         stack("three panes", of(3, pane()), |cosine| through_a_pane(cosine).powf(3.0)),
         stack("a pane with gaps", of(1, blended(0.25, pane())), |cosine| 0.75 + 0.25 * through_a_pane(cosine)),
@@ -75,9 +82,11 @@ fn stacks() -> Vec<Stack> {
             of(1, Material { layers: Layers { coat: 0.7, metallic: 0.5, ..pane().layers }, ..pane() }),
             |cosine| 0.5 * (1.0 - 0.7 * schlick(cosine)) * through_a_pane(cosine),
         ),
-        stack("a pane of which half is opaque", of(1, Material { layers: Layers { transmission: 0.5, ..pane().layers }, ..pane() }), |cosine| {
-            0.5 * through_a_pane(cosine)
-        }),
+        stack(
+            "a pane of which half is opaque",
+            of(1, Material { layers: Layers { transmission: 0.5, ..pane().layers }, ..pane() }),
+            |cosine| 0.5 * through_a_pane(cosine),
+        ),
     ]
 }
 
