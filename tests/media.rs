@@ -6,14 +6,8 @@ use photonmill::scene::material::{Layers, Medium};
 use photonmill::verify::judge::Verdict;
 
 fn solid(name: &str, ior: f32, transmittance: Vec3) -> Material {
-    let layers = Layers {
-        metallic: 0.0,
-        roughness: 0.0,
-        transmission: 1.0,
-        ior,
-        medium: Some(Medium { transmittance }),
-        ..Layers::default()
-    };
+    let layers =
+        Layers { metallic: 0.0, roughness: 0.0, transmission: 1.0, ior, medium: Some(Medium { transmittance }), ..Layers::default() };
     Material::layered(name, Vec3::ONE, layers)
 }
 
@@ -21,14 +15,7 @@ fn cuboid(name: &str, low: DVec3, high: DVec3, material: usize) -> Vec<Mesh> {
     let size = high - low;
     let [x, y, z] = [DVec3::X * size.x, DVec3::Y * size.y, DVec3::Z * size.z];
     let side = |origin, u, v| Mesh::parallelogram(name, origin, u, v, material);
-    vec![
-        side(low, y, x),
-        side(low, z, y),
-        side(low, x, z),
-        side(high, -x, -y),
-        side(high, -y, -z),
-        side(high, -z, -x),
-    ]
+    vec![side(low, y, x), side(low, z, y), side(low, x, z), side(high, -x, -y), side(high, -y, -z), side(high, -z, -x)]
 }
 
 fn reflectance(cos_i: f64, ior: f64) -> f64 {
@@ -42,7 +29,13 @@ fn through_slab(gpu: &Gpu, materials: Vec<Material>, slabs: Vec<Mesh>, angle: f6
     let lamp = Material { emission: Vec3::ONE, ..Material::lambert("lamp", Vec3::ZERO) };
     let mut scene = Scene { materials, meshes: slabs, ..Scene::default() };
     scene.materials.push(lamp);
-    scene.meshes.push(Mesh::parallelogram("lamp", DVec3::new(-20.0, -20.0, -4.0), 40.0 * DVec3::X, 40.0 * DVec3::Y, scene.materials.len() - 1));
+    scene.meshes.push(Mesh::parallelogram(
+        "lamp",
+        DVec3::new(-20.0, -20.0, -4.0),
+        40.0 * DVec3::X,
+        40.0 * DVec3::Y,
+        scene.materials.len() - 1,
+    ));
     let eye = DVec3::new(4.0 * angle.tan(), 0.0, 4.0);
     let camera = Camera::looking_at("ray", eye, DVec3::ZERO, DVec3::Y, 1e-3);
     let settings = SceneSettings { rounds: 64, photons: 100, caustic_photons: 100, ..SceneSettings::default() };

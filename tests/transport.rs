@@ -222,15 +222,17 @@ fn rich_scene() -> Scene {
 fn add_layered_plates(scene: &mut Scene) {
     let plastic = Layers { metallic: 0.0, roughness: 0.7, ..Layers::default() };
     let bump = Texels::Linear(vec![[230, 128, 190, 255]]);
-    scene.textures.push(Texture { name: "bump".into(), width: 1, height: 1, texels: bump, wrap: [Wrap::Repeat; 2], filter: Default::default() });
+    scene.textures.push(Texture {
+        name: "bump".into(),
+        width: 1,
+        height: 1,
+        texels: bump,
+        wrap: [Wrap::Repeat; 2],
+        filter: Default::default(),
+    });
     let map = NormalMap { texture: TextureUse::of(scene.textures.len() - 1, 0), scale: 1.0 };
-    let glass = Layers {
-        roughness: 0.0,
-        transmission: 1.0,
-        ior: 1.0,
-        medium: Some(Medium { transmittance: Vec3::splat(1e-3) }),
-        ..plastic
-    };
+    let glass =
+        Layers { roughness: 0.0, transmission: 1.0, ior: 1.0, medium: Some(Medium { transmittance: Vec3::splat(1e-3) }), ..plastic };
     let grey = |layers| Material::layered("plate", Vec3::splat(0.6), layers);
     let materials = [
         grey(Layers { coat: 1.0, coat_roughness: 0.7, ..plastic }),

@@ -20,6 +20,16 @@ def material(name, colour=(0.8, 0.8, 0.8), **inputs):
     return made
 
 
+def solid(made):
+    """Glass with an inside: Blender writes a volume only where a thickness is given."""
+    group = bpy.data.node_groups.new("glTF Material Output", "ShaderNodeTree")
+    group.interface.new_socket("Thickness", in_out="INPUT", socket_type="NodeSocketFloat")
+    node = made.node_tree.nodes.new("ShaderNodeGroup")
+    node.node_tree = group
+    node.inputs["Thickness"].default_value = 1.0
+    return made
+
+
 def assign(thing, made):
     thing.data.materials.append(made)
     thing.name = made.name + " object"
@@ -61,7 +71,7 @@ bpy.ops.object.shade_smooth()
 assign(bpy.context.object, material("mirror", (0.9, 0.9, 0.9), Metallic=1.0, Roughness=0.0))
 primitives.primitive_uv_sphere_add(radius=0.5, location=(0.7, -0.4, 0.5), segments=32, ring_count=16)
 bpy.ops.object.shade_smooth()
-assign(bpy.context.object, material("glass", (1, 1, 1), Transmission_Weight=1.0, IOR=1.45, Roughness=0.0))
+assign(bpy.context.object, solid(material("glass", (1, 1, 1), Transmission_Weight=1.0, IOR=1.45, Roughness=0.0)))
 primitives.primitive_plane_add(size=0.5, location=(0, 0, 2.5), rotation=(math.pi, 0, 0))
 assign(bpy.context.object, material("panel", Emission_Color=(1, 0.8, 0.6, 1), Emission_Strength=12.0))
 

@@ -87,6 +87,24 @@ bool is_matt(float alpha)
     return alpha >= MAP_ALPHA;
 }
 
+// Rays follow what a solid reflects however rough it is: what it transmits they follow too.
+bool is_matt_reflection(Lobes lobes, Layers layers)
+{
+    return is_matt(layers.alpha) && lobes.exact_share == 0.0;
+}
+
+// Smooth normals do not keep phase space: without an end, some of what enters a coarse ball of glass is reflected in it for ever. What
+// enters a solid by its triangles alone also leaves it. The path has met `depth` surfaces before.
+vec3 normal_of_refraction(Surface surface, vec3 wo, float eta, uint depth)
+{
+    bool is_trapped = false;
+    if (HAS_SMOOTH_NORMALS) {
+        is_trapped = depth >= SMOOTH_TOTAL_REFLECTIONS && surface.layers.is_solid && surface.layers.transmission > 0.0
+                  && surface.layers.alpha < DELTA_ALPHA && refracted_cosine_squared(min(dot(wo, surface.ns), 1.0), eta) <= 0.0;
+    }
+    return is_trapped ? surface.ng : surface.ns;
+}
+
 // `eta`: index where wo is over that beyond, of a solid.
 Lobes lobes_of(Surface surface, vec3 wo, float eta)
 {
@@ -151,9 +169,9 @@ Lobes lobes_of(Surface surface, vec3 wo, float eta)
     lobes.matt.e90 = e90;
     lobes.matt.alpha = layers.alpha;
     lobes.matt.diffuse = opaque_share * base * (0.31830988618379067 * divide(below_diffuse, max(left, 1e-6)));
-    bool is_matt_reflection = is_matt(layers.alpha);
-    lobes.matt.f0 = is_matt_reflection ? lobes.f0 : vec3(0.0);
-    lobes.matt.f90 = is_matt_reflection ? lobes.f90 : 0.0;
+    bool is_in_map = is_matt_reflection(lobes, layers);
+    lobes.matt.f0 = is_in_map ? lobes.f0 : vec3(0.0);
+    lobes.matt.f90 = is_in_map ? lobes.f90 : 0.0;
 
     // Of what is under the coat and the sheen.
     float below = cover.below_coat * cover.below_sheen;
@@ -164,6 +182,10 @@ Lobes lobes_of(Surface surface, vec3 wo, float eta)
         if (layers.transmission > 0.0) {
             reflected += lobes.exact_share * exact_fresnel(lobes, cosine);
             transmitted = transmission_colour(lobes, layers, cosine);
+            if (layers.is_solid && layers.alpha >= DELTA_ALPHA) {
+                // Facets let light through where the surface as a whole would not.
+                transmitted = max(transmitted, 0.125 * lobes.transmitted);
+            }
         }
     }
     float reflection = largest(reflected) * below;
@@ -202,7 +224,7 @@ Lobes lobes_of(Surface surface, vec3 wo, float eta)
 // Probability of the matt lobes together, where the path does not pass.
 float matt_chance(Lobes lobes, Layers layers)
 {
-    return lobes.diffuse_chance + lobes.sheen_chance + (is_matt(layers.alpha) ? lobes.reflection_chance : 0.0)
+    return lobes.diffuse_chance + lobes.sheen_chance + (is_matt_reflection(lobes, layers) ? lobes.reflection_chance : 0.0)
          + (is_matt(layers.coat_alpha) ? lobes.coat_chance : 0.0);
 }
 
@@ -281,7 +303,7 @@ LobeLight weigh_light(Surface surface, Lobes lobes, vec3 wo, vec3 wi, float ligh
     if (dot(wi, surface.ng) > 0.0) {
         light.matt = matt_brdf(lobes.matt, lobes.cover, surface.ns, wo, wi) * max(cosine, 0.0);
         // Its own cosine is that to its own normal, which only a map makes another one.
-        if (layers.alpha >= DELTA_ALPHA && !is_matt(layers.alpha) && lobes.reflection_chance > 0.0) {
+        if (layers.alpha >= DELTA_ALPHA && !is_matt_reflection(lobes, layers) && lobes.reflection_chance > 0.0) {
             Weighed found = weigh_reflection(layers.alpha, surface.ns, wo, wi);
             if (found.density > 0.0) {
                 vec3 colour = reflection_colour(lobes, dot(wo, normalize(wo + wi))) * below_both(lobes, cosine);
@@ -322,7 +344,7 @@ LobeLight weigh_light(Surface surface, Lobes lobes, vec3 wo, vec3 wi, float ligh
 const float SAME_INDEX = 1e-4;
 
 // Refraction at a smooth boundary, and total reflection where the index makes it.
-Scatter refract_smoothly(Surface surface, Lobes lobes, vec3 wo, uint depth, bool carries_radiance, float chance)
+Scatter refract_smoothly(Surface surface, Lobes lobes, vec3 wo, bool carries_radiance, float chance)
 {
     float eta = lobes.eta;
     if (abs(eta - 1.0) < SAME_INDEX) {
@@ -332,18 +354,11 @@ Scatter refract_smoothly(Surface surface, Lobes lobes, vec3 wo, uint depth, bool
     vec3 ns = surface.ns;
     float cos_i = min(dot(wo, ns), 1.0);
     float cos_t_squared = refracted_cosine_squared(cos_i, eta);
-    if (HAS_SMOOTH_NORMALS) {
-        if (cos_t_squared <= 0.0 && depth >= SMOOTH_TOTAL_REFLECTIONS) {
-            ns = surface.ng;
-            cos_i = min(dot(wo, ns), 1.0);
-            cos_t_squared = refracted_cosine_squared(cos_i, eta);
-        }
-    }
     if (cos_t_squared <= 0.0) {
         return Scatter(-wo, vec3(0.0), false, true, false, 0.0);
     }
     vec3 wi = on_side(normalize((eta * cos_i - sqrt(cos_t_squared)) * ns - eta * wo), -surface.ng);
-    vec3 weight = transmission_colour(lobes, surface.layers, cos_i) * (below_both(lobes, cos_i) * divide(1.0, chance));
+    vec3 weight = transmission_colour(lobes, surface.layers, cos_i) * (below_both(lobes, abs(dot(wi, ns))) * divide(1.0, chance));
     weight *= carries_radiance ? eta * eta : 1.0;
     return Scatter(wi, weight, dot(wi, surface.ng) < 0.0, true, false, 0.0);
 }
@@ -370,7 +385,7 @@ Scatter sample_reflection(float alpha, vec3 n, vec3 ng, vec3 wo, vec2 u, out flo
 
 // Where a path goes on from a layered surface that came from wo: u.x chooses the lobe, the others the direction. A path that does not
 // pass keeps the share `coverage` over one less the probability of passing, which the weight leaves to the caller.
-Scatter sample_layered(Surface surface, Lobes lobes, vec3 wo, vec3 u, uint depth, bool carries_radiance)
+Scatter sample_layered(Surface surface, Lobes lobes, vec3 wo, vec3 u, bool carries_radiance)
 {
     Layers layers = surface.layers;
     if (HAS_PASSING) {
@@ -392,6 +407,7 @@ Scatter sample_layered(Surface surface, Lobes lobes, vec3 wo, vec3 u, uint depth
         Scatter scatter = sample_reflection(layers.alpha, surface.ns, surface.ng, wo, u.yz, along);
         scatter.weight *= reflection_colour(lobes, along) * (below_both(lobes, max(dot(scatter.direction, surface.ns), 0.0)) * divide(1.0, chance));
         scatter.density *= chance;
+        scatter.is_specular = !is_matt_reflection(lobes, layers);
         return scatter;
     }
     before += is_diffuse ? 0.0 : chance;
@@ -410,7 +426,7 @@ Scatter sample_layered(Surface surface, Lobes lobes, vec3 wo, vec3 u, uint depth
         chance = is_diffuse ? chance : lobes.transmission_chance;
         if (!is_diffuse && u.x < before + chance) {
             if (layers.is_solid && (layers.alpha < DELTA_ALPHA || abs(lobes.eta - 1.0) < SAME_INDEX)) {
-                return refract_smoothly(surface, lobes, wo, depth, carries_radiance, chance);
+                return refract_smoothly(surface, lobes, wo, carries_radiance, chance);
             }
             vec3 v = to_local(wo, surface.ns);
             vec3 h = sample_visible_normal(v, layers.alpha, u.yz);

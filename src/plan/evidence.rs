@@ -57,7 +57,12 @@ impl<'a> Facts<'a> {
             emitters,
             triangles: geometry.triangles.len(),
             smooth: geometry.normals.iter().filter(|normals| normals.a != NONE).count(),
-            coloured: scene.meshes.iter().filter(|mesh| !mesh.colours.is_empty()).map(|mesh| mesh.triangles.len()).sum(),
+            coloured: scene
+                .meshes
+                .iter()
+                .filter(|mesh| !mesh.colours.is_empty() || !mesh.alphas.is_empty())
+                .map(|mesh| mesh.triangles.len())
+                .sum(),
             nested_solids: has_nested_solids(scene),
             part: settings.part,
             is_picture: matches!(sensor, Sensor::Picture { .. }),

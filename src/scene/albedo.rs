@@ -180,9 +180,9 @@ mod tests {
     /// The kernels divide by what the table has above 1.
     #[test]
     fn only_smooth_sheen_returns_more_than_it_receives() {
-        for place in 0..ROUGHNESSES * super::COSINES {
-            let albedo = TABLE[TABLE.len() - ROUGHNESSES * super::COSINES + place].x;
-            let is_smooth = roughness(place / super::COSINES) < 0.3;
+        for place in 0..ROUGHNESSES * COSINES {
+            let albedo = TABLE[TABLE.len() - ROUGHNESSES * COSINES + place].x;
+            let is_smooth = roughness(place / COSINES) < 0.3;
             assert!(albedo >= 0.0 && (is_smooth || albedo <= 1.0), "{place}: {albedo}");
         }
     }

@@ -263,9 +263,9 @@ impl LobeKinds {
         LobeKinds {
             matt: is_diffuse
                 || of.sheen_colour != Vec3::ZERO
-                || (reflects && alpha.1 >= map_alpha)
+                || (reflects && alpha.1 >= map_alpha && !(transmits && !is_pane && transmission.0 >= 1.0))
                 || (of.coat > 0.0 && coat_alpha.1 >= map_alpha),
-            sharp_reflection: (reflects && alpha.0 < map_alpha) || (of.coat > 0.0 && coat_alpha.0 < map_alpha),
+            sharp_reflection: (reflects && (alpha.0 < map_alpha || (transmits && !is_pane))) || (of.coat > 0.0 && coat_alpha.0 < map_alpha),
             sharp_transmission: transmits && !(is_pane && alpha.1 < delta_alpha),
             passing: !is_covered || (transmits && is_pane && alpha.0 < delta_alpha),
             pane: transmits && is_pane && alpha.0 < delta_alpha,

@@ -150,10 +150,12 @@ bool step_chain(inout Chain chain, uint index, uint number, uint pixel_count, Dr
     Scatter scatter;
     float matt = 1.0;
     if (is_layered) {
-        lobes = lobes_of(surface, wo, index_ratio(surface, chain.media));
+        float eta = index_ratio(surface, chain.media);
+        surface.ns = normal_of_refraction(surface, wo, eta, depth);
+        lobes = lobes_of(surface, wo, eta);
         // The eye does not see the back of what has one side.
         bool is_culled = !surface.scatters && !chain.gathers;
-        scatter = sample_layered(surface, lobes, wo, stratified(number, SAMPLES, words_of(index, block, draws)).zxy, depth, true);
+        scatter = sample_layered(surface, lobes, wo, stratified(number, SAMPLES, words_of(index, block, draws)).zxy, true);
         if (is_culled || scatter.passes) {
             chain.weight *= is_culled ? vec3(1.0) : scatter.weight;
             chain.position = offset_origin(surface.position, surface.error, surface.ng, chain.direction);

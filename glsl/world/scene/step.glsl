@@ -26,7 +26,9 @@ Step step_path(inout LightPath path, uint bounce)
         Lobes lobes;
         bool has_matt = !is_specular(surface);
         if (is_layered) {
-            lobes = lobes_of(surface, wo, index_ratio(surface, path.media));
+            float eta = index_ratio(surface, path.media);
+            surface.ns = normal_of_refraction(surface, wo, eta, bounce);
+            lobes = lobes_of(surface, wo, eta);
             has_matt = surface.scatters && matt_chance(lobes, surface.layers) > 0.0;
         }
         // Also where alpha has a gap: the light there is that of the surface about it, whose area the density estimate counts.
@@ -36,7 +38,7 @@ Step step_path(inout LightPath path, uint bounce)
         vec4 u = philox_floats(uvec4(path.photon, push.draws.round, EMISSION_BLOCKS + bounce, push.draws.domain), push.draws.seed);
         Scatter scatter;
         if (is_layered) {
-            scatter = sample_layered(surface, lobes, wo, u.yzw, bounce, false);
+            scatter = sample_layered(surface, lobes, wo, u.yzw, false);
             if (HAS_PASSING) {
                 scatter.weight *= scatter.passes ? 1.0 : divide(surface.layers.coverage, 1.0 - lobes.pass_chance);
             }

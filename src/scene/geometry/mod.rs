@@ -199,9 +199,8 @@ impl Geometry {
             true => vec![TriangleColours { a: Vec3::ONE, b: Vec3::ONE, c: Vec3::ONE, alphas: Vec3::ONE }],
             false => order.par_iter().zip(&sources).map(colours_of).collect(),
         };
-        let layered_materials = layered::records(scene, unit).map_err(|count| {
-            refuse(scene, "the scene", format!("has solids of {count} different media; at most 255 can be told apart"))
-        })?;
+        let layered_materials = layered::records(scene, unit)
+            .map_err(|count| refuse(scene, "the scene", format!("has solids of {count} different media; at most 255 can be told apart")))?;
         let layers_of = |(&place, &(mesh, triangle)): (&u32, &(u32, u32))| {
             layered::of_triangle(&scene.meshes[mesh as usize], triangle as usize, part_of(place))
         };

@@ -121,6 +121,11 @@ fn visible_normal(alpha: f64, n: DVec3, wo: DVec3, rng: &mut Random) -> DVec3 {
 static COSINES: LazyLock<Vec<(f64, f64)>> = LazyLock::new(|| gauss_legendre(16));
 
 impl Inputs {
+    /// Whether light enters what lies behind.
+    fn transmits(&self) -> bool {
+        self.transmission > 0.0 && self.metalness < 1.0
+    }
+
     /// F0 of a dielectric whose reflectance along the normal is this.
     fn f0(&self, along_normal: f64) -> DVec3 {
         (along_normal * self.specular_colour).min(DVec3::ONE) * self.specular
@@ -293,6 +298,8 @@ impl Lobes {
         let by_alpha = |alpha: f64| if alpha * 1000.0 < f64::from(MAP_ALPHA_PER_MILLE) { Class::Sharp } else { Class::Matt };
         match kind {
             Kind::Diffuse | Kind::Sheen => Class::Matt,
+            // Rays follow all that a solid does.
+            Kind::Reflection if matches!(self.inputs.wall, Wall::Solid { .. }) && self.inputs.transmits() => Class::Sharp,
             Kind::Reflection => by_alpha(self.inputs.alpha),
             Kind::Coat => by_alpha(self.inputs.coat_alpha),
             Kind::Transmission if self.inputs.wall == Wall::Thin && self.is_delta(kind) => Class::Passing,
