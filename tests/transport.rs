@@ -235,9 +235,9 @@ fn add_layered_plates(scene: &mut Scene) {
         Layers { roughness: 0.0, transmission: 1.0, ior: 1.0, medium: Some(Medium { transmittance: Vec3::splat(1e-3) }), ..plastic };
     let grey = |layers| Material::layered("plate", Vec3::splat(0.6), layers);
     let materials = [
-        // Over black: what a coat reflects is about what it takes from a surface under it.
+        // Over black: what coat and sheen reflect is about what they take from a surface under them.
         Material::layered("plate", Vec3::ZERO, Layers { coat: 1.0, coat_roughness: 0.6, specular: 0.0, ..plastic }),
-        grey(Layers { sheen_colour: Vec3::ONE, sheen_roughness: 0.6, ..plastic }),
+        Material::layered("plate", Vec3::ZERO, Layers { sheen_colour: Vec3::ONE, sheen_roughness: 0.6, specular: 0.0, ..plastic }),
         Material { coverage: Coverage::Blend { alpha: 0.3 }, ..grey(plastic) },
         Material { normal_map: Some(map), ..grey(plastic) },
         grey(glass),
