@@ -271,28 +271,14 @@ struct TriangleLayers {
     uint turned;
 };
 
-// A texture as a material looks it up: at (dot(row_u, uv), dot(row_v, uv)) + offset.
-struct TextureLookup {
-    // `NONE`: 1 everywhere.
-    uint texture;
-    uint uv_set;
-    vec2 row_u;
-    vec2 row_v;
-    vec2 offset;
-};
-
-// What a layered material adds to its `SurfaceMaterial`. Textures multiply the factor before them.
+// What a layered material adds to its `SurfaceMaterial`.
 struct LayeredMaterial {
     float metallic;
     float roughness;
-    TextureLookup metallic_roughness_texture;
     float ior;
     float specular;
-    TextureLookup specular_texture;
     vec3 specular_colour;
-    TextureLookup specular_colour_texture;
     float transmission;
-    TextureLookup transmission_texture;
     // It encloses a medium; else it is a thin wall.
     uint is_solid;
     // Number of its medium, from 1; 0: it is no solid, or media do not matter.
@@ -301,22 +287,19 @@ struct LayeredMaterial {
     vec3 medium_absorption;
     float medium_ior;
     float coat;
-    TextureLookup coat_texture;
     float coat_roughness;
-    TextureLookup coat_roughness_texture;
     vec3 sheen_colour;
-    TextureLookup sheen_colour_texture;
     float sheen_roughness;
-    TextureLookup sheen_roughness_texture;
-    TextureLookup normal_texture;
     float normal_scale;
-    TextureLookup coat_normal_texture;
     float coat_normal_scale;
     // `COVERAGE_...`.
     uint coverage;
     float alpha;
     float cutoff;
     uint is_unlit;
+    // Its lookups, among the records of textures.
+    uint first_lookup;
+    uint end_lookup;
 };
 
 struct SurfaceMaterial {
@@ -332,6 +315,7 @@ struct SurfaceMaterial {
     uint two_sided;
 };
 
+// A texture; behind those of the scene, each that a layered material looks up, for which the rest counts.
 struct TextureInfo {
     uint width;
     uint height;
@@ -340,6 +324,13 @@ struct TextureInfo {
     uint wrap;
     // `TEXELS_...`.
     uint encoding;
+    // `LAYER_...`: what it multiplies, or says.
+    uint layer;
+    uint uv_set;
+    // It is looked up at (dot(row_u, uv), dot(row_v, uv)) + offset.
+    vec2 row_u;
+    vec2 row_v;
+    vec2 offset;
 };
 
 // A light, or a triangle that shines. Lengths are those of the normalised scene.
@@ -463,9 +454,9 @@ struct MattCover {
     // It is no sharp lobe.
     uint has_coat_lobe;
     uint coat_normal;
-    // Shares that coat and sheen leave to what is under them, as seen by the eye.
-    float below_coat;
-    float below_sheen;
+    // What the coat reflects of all light towards the eye, and what white sheen would.
+    float coat_albedo;
+    float sheen_albedo;
     vec3 sheen;
     float sheen_alpha;
 };

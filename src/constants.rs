@@ -73,6 +73,18 @@ constants! {
     COVERAGE_WHOLE = 0;
     COVERAGE_MASK = 1;
     COVERAGE_BLEND = 2;
+    /// What a texture of a layered material is: a factor, or a normal map.
+    LAYER_METALLIC_ROUGHNESS = 0;
+    LAYER_SPECULAR = 1;
+    LAYER_SPECULAR_COLOUR = 2;
+    LAYER_TRANSMISSION = 3;
+    LAYER_COAT = 4;
+    LAYER_COAT_ROUGHNESS = 5;
+    LAYER_COAT_NORMAL = 6;
+    LAYER_SHEEN_COLOUR = 7;
+    LAYER_SHEEN_ROUGHNESS = 8;
+    LAYER_NORMAL = 9;
+    LAYER_COUNT = 10;
     /// What a texel's four bytes are; see `scene::texture::Texels`.
     TEXELS_SRGB = 0;
     TEXELS_SHARED_EXPONENT = 1;

@@ -129,7 +129,7 @@ void gather_photons()
                         }
                         vec3 arrived = uintBitsToFloat(light.xyz);
                         if (is_layered) {
-                            arrived *= 3.14159265358979324 * matt_brdf(lobes, cover, ns, wo, wi);
+                            arrived *= 3.14159265358979324 * matt_brdf(lobes, cover, albedos_at(lobes.alpha, cover, cosine), ns, wo, wi);
                         }
                         precise vec3 flux = arrived * weight;
                         note_unless(is_finite(flux), NONFINITE_ESTIMATE, 0, push.round, index % push.pixel_count);

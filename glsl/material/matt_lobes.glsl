@@ -18,8 +18,8 @@ float sheen_lambda(float alpha, float cosine)
     return exp2(1.44269504088896341 * logarithm);
 }
 
-// D V of sheen.
-float sheen_lobe(float alpha, vec3 wo, vec3 wi, vec3 n)
+// D V of sheen; `albedos` are its own, towards both directions.
+float sheen_lobe(float alpha, vec3 wo, vec3 wi, vec3 n, vec2 albedos)
 {
     float cos_l = dot(wi, n), cos_v = dot(wo, n);
     if (cos_l <= 0.0 || cos_v <= 0.0) {
@@ -30,7 +30,7 @@ float sheen_lobe(float alpha, vec3 wo, vec3 wi, vec3 n)
     float power = sine_squared > 0.0 ? exp2(divide(0.5, alpha) * log2(sine_squared)) : 0.0;
     float density = (2.0 + divide(1.0, alpha)) * power * 0.15915494309189535;
     // Where fitted masking would return more than it receives.
-    float excess = max(1.0, max(sheen_albedo(alpha, cos_v), sheen_albedo(alpha, cos_l)));
+    float excess = max(1.0, max(albedos.x, albedos.y));
     return divide(density, (1.0 + sheen_lambda(alpha, cos_v) + sheen_lambda(alpha, cos_l)) * 4.0 * cos_l * cos_v * excess);
 }
 
@@ -46,71 +46,107 @@ vec3 ggx_lobe(float alpha, vec3 f0, float f90, vec3 wo, vec3 wi, vec3 n)
     return ggx_density(to_local(h, n), alpha) * ggx_visibility(alpha, cos_l, cos_v) * (f0 + (f90 - f0) * grazing);
 }
 
-// What a coat, or sheen, reflects of all light from a direction.
-float coat_albedo(float coat, float alpha, float cosine)
-{
-    vec2 albedo = ggx_albedo(alpha, cosine);
-    return coat * (0.04 * albedo.x + albedo.y);
-}
-
-float sheen_share(vec3 sheen, float alpha, float cosine)
-{
-    return max(sheen.x, max(sheen.y, sheen.z)) * min(sheen_albedo(alpha, cosine), 1.0);
-}
-
 MattCover no_cover()
 {
-    return MattCover(0.0, 1.0, 0, 0, 1.0, 1.0, vec3(0.0), 1.0);
+    return MattCover(0.0, 1.0, 0, 0, 0.0, 0.0, vec3(0.0), 1.0);
+}
+
+// What layers reflect of all light from a direction at a cosine to the normal.
+struct LayerAlbedos {
+    vec2 base; // factors of F0 and F90
+    float coat;
+    float sheen; // of white sheen
+};
+
+LayerAlbedos albedos_at(float alpha, MattCover cover, float cosine)
+{
+    LayerAlbedos albedos = LayerAlbedos(ggx_albedo(alpha, cosine), 0.0, 0.0);
+    if (HAS_COATS) {
+        if (cover.coat > 0.0) {
+            vec2 of_coat = ggx_albedo(cover.coat_alpha, cosine);
+            albedos.coat = cover.coat * (0.04 * of_coat.x + of_coat.y);
+        }
+    }
+    if (HAS_SHEEN) {
+        if (cover.sheen != vec3(0.0)) {
+            albedos.sheen = sheen_albedo(cover.sheen_alpha, cosine);
+        }
+    }
+    return albedos;
+}
+
+float largest(vec3 v)
+{
+    return max(v.x, max(v.y, v.z));
+}
+
+// What sheen leaves to what is under it.
+float below_sheen(vec3 sheen, float albedo)
+{
+    return 1.0 - largest(sheen) * min(albedo, 1.0);
+}
+
+// What reflection leaves to the diffuse lobe, of e0 and e90.
+float below_base(float e0, float e90, vec2 albedo)
+{
+    return max(1.0 - (e0 * albedo.x + e90 * albedo.y), 0.0);
+}
+
+// What coat and sheen leave, seen along one direction and lit along another.
+float below_cover(MattCover cover, LayerAlbedos lit)
+{
+    float below = 1.0;
+    if (HAS_COATS) {
+        below = 1.0 - max(cover.coat_albedo, lit.coat);
+    }
+    if (HAS_SHEEN) {
+        below *= below_sheen(cover.sheen, max(cover.sheen_albedo, lit.sheen));
+    }
+    return below;
 }
 
 // The diffuse lobe under coat and sheen, 1/sr.
-vec3 diffuse_brdf(MattLobes lobes, MattCover cover, vec3 n, vec3 wi)
+vec3 diffuse_brdf(MattLobes lobes, MattCover cover, LayerAlbedos lit)
 {
-    float cosine = dot(wi, n);
-    if (cosine <= 0.0) {
-        return vec3(0.0);
-    }
-    vec2 albedo = ggx_albedo(lobes.alpha, cosine);
-    vec3 diffuse = lobes.diffuse * max(1.0 - (lobes.e0 * albedo.x + lobes.e90 * albedo.y), 0.0);
+    vec3 diffuse = lobes.diffuse * below_base(lobes.e0, lobes.e90, lit.base);
     if (HAS_COATS) {
-        diffuse *= cover.coat > 0.0 ? 1.0 - coat_albedo(cover.coat, cover.coat_alpha, cosine) : 1.0;
+        diffuse *= 1.0 - lit.coat;
     }
     if (HAS_SHEEN) {
-        diffuse *= cover.sheen != vec3(0.0) ? min(cover.below_sheen, 1.0 - sheen_share(cover.sheen, cover.sheen_alpha, cosine)) : 1.0;
+        diffuse *= below_sheen(cover.sheen, max(cover.sheen_albedo, lit.sheen));
     }
     return diffuse;
 }
 
-// The BRDF of all matt lobes together, 1/sr.
-vec3 matt_brdf(MattLobes lobes, MattCover cover, vec3 n, vec3 wo, vec3 wi)
+// Sheen under a coat, 1/sr.
+vec3 sheen_brdf(MattCover cover, LayerAlbedos lit, vec3 n, vec3 wo, vec3 wi)
 {
-    float cosine = dot(wi, n);
-    if (cosine <= 0.0) {
-        return vec3(0.0);
-    }
-    vec3 diffuse = diffuse_brdf(lobes, cover, n, wi);
-    vec3 reflected = vec3(0.0);
-    if (lobes.f90 > 0.0 || max(lobes.f0.x, max(lobes.f0.y, lobes.f0.z)) > 0.0) {
-        reflected = ggx_lobe(lobes.alpha, lobes.f0, lobes.f90, wo, wi, n);
-    }
-    vec3 over = vec3(0.0);
-    float below_coat = 1.0;
-    if (HAS_COATS) {
-        if (cover.coat > 0.0) {
-            below_coat = min(cover.below_coat, 1.0 - coat_albedo(cover.coat, cover.coat_alpha, cosine));
-            if (cover.has_coat_lobe != 0) {
-                vec3 coat_normal = unpack_normal(cover.coat_normal);
-                // BRDFs are weighed with the cosine to n, and the coat's lobe has its own.
-                over = cover.coat * ggx_lobe(cover.coat_alpha, vec3(0.04), 1.0, wo, wi, coat_normal) * divide(max(dot(wi, coat_normal), 0.0), cosine);
+    vec3 sheen = vec3(0.0);
+    if (HAS_SHEEN) {
+        if (cover.sheen != vec3(0.0)) {
+            sheen = cover.sheen * sheen_lobe(cover.sheen_alpha, wo, wi, n, vec2(cover.sheen_albedo, lit.sheen));
+            if (HAS_COATS) {
+                sheen *= 1.0 - max(cover.coat_albedo, lit.coat);
             }
         }
     }
-    reflected *= below_coat;
-    if (HAS_SHEEN) {
-        if (cover.sheen != vec3(0.0)) {
-            reflected *= min(cover.below_sheen, 1.0 - sheen_share(cover.sheen, cover.sheen_alpha, cosine));
-            reflected += below_coat * cover.sheen * sheen_lobe(cover.sheen_alpha, wo, wi, n);
+    return sheen;
+}
+
+// The BRDF of all matt lobes together, 1/sr, from above the surface; `lit` are the albedos towards wi.
+vec3 matt_brdf(MattLobes lobes, MattCover cover, LayerAlbedos lit, vec3 n, vec3 wo, vec3 wi)
+{
+    vec3 sum = diffuse_brdf(lobes, cover, lit) + sheen_brdf(cover, lit, n, wo, wi);
+    if (lobes.f90 > 0.0 || largest(lobes.f0) > 0.0) {
+        sum += ggx_lobe(lobes.alpha, lobes.f0, lobes.f90, wo, wi, n) * below_cover(cover, lit);
+    }
+    if (HAS_COATS) {
+        if (cover.has_coat_lobe != 0) {
+            vec3 coat_normal = unpack_normal(cover.coat_normal);
+            // BRDFs are weighed with the cosine to n, and the coat's lobe has its own.
+            sum += cover.coat * ggx_lobe(cover.coat_alpha, vec3(0.04), 1.0, wo, wi, coat_normal)
+                 * divide(max(dot(wi, coat_normal), 0.0), max(dot(wi, n), 1e-6));
         }
     }
-    return diffuse + reflected + over;
+    return sum;
 }

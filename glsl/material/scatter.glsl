@@ -31,6 +31,7 @@ vec3 on_side(vec3 direction, vec3 side)
 }
 
 #include "material/layered_lobes.glsl"
+#include "material/layered_sampling.glsl"
 
 // Samples where a path goes on that came from wo; u = (choice, two for the direction). A camera path
 // carries radiance, which refraction compresses; a photon carries flux. Glass that reflects some light and refracts some

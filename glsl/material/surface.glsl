@@ -76,20 +76,23 @@ vec4 texel(TextureInfo info, int i, int j)
     return vec4(linear_of_code(word), linear_of_code(word >> 8), linear_of_code(word >> 16), shares.w);
 }
 
-// Linear colour and alpha: bilinear between texel centres, or the nearest one's.
-vec4 sample_texture(uint texture_index, vec2 uv)
+// Linear colour and alpha: bilinear between texel centres, or the nearest one's. A loop, as drivers take long to compile what stands four
+// times.
+vec4 sample_texture(TextureInfo info, vec2 uv)
 {
-    TextureInfo info = textures[texture_index];
     vec2 place = uv * vec2(info.width, info.height) - 0.5;
     vec2 corner = floor(place);
     vec2 share = place - corner;
-    int i = int(corner.x), j = int(corner.y);
     if ((info.wrap & 16u) != 0) {
-        return texel(info, i + int(share.x >= 0.5), j + int(share.y >= 0.5));
+        share = vec2(greaterThanEqual(share, vec2(0.5)));
     }
-    vec4 lower = (1.0 - share.x) * texel(info, i, j) + share.x * texel(info, i + 1, j);
-    vec4 upper = (1.0 - share.x) * texel(info, i, j + 1) + share.x * texel(info, i + 1, j + 1);
-    return (1.0 - share.y) * lower + share.y * upper;
+    vec4 row = vec4(0.0), sum = vec4(0.0);
+    [[dont_unroll]] for (int k = 0; k < 4; k++) {
+        vec4 value = texel(info, int(corner.x) + (k & 1), int(corner.y) + (k >> 1));
+        row = (k & 1) == 0 ? (1.0 - share.x) * value : row + share.x * value;
+        sum = k == 1 ? (1.0 - share.y) * row : (k == 3 ? sum + share.y * row : sum);
+    }
+    return sum;
 }
 
 vec2 mixed_uv(vec2 a, vec2 b, vec2 c, float u, float v)
@@ -135,34 +138,27 @@ vec2 off_the_edges(Triangle triangle, vec2 weights, float error)
     return divide(all_weights.yz, all_weights.x + all_weights.y + all_weights.z);
 }
 
-// Radiance that leaves a triangle's shining side.
-vec3 emitted_radiance(SurfaceMaterial material, uint index, float u, float v)
+// What a texture leaves of the light that leaves a triangle's shining side.
+vec3 emission_texel(SurfaceMaterial material, uint index, float u, float v)
 {
-    vec3 emission = material.emission;
     if (HAS_TEXTURES) {
         if (material.emission_texture != NONE) {
             TriangleUvs at = uvs[index];
-            emission *= sample_texture(material.emission_texture, mixed_uv(at.emission_a, at.emission_b, at.emission_c, u, v)).rgb;
+            return sample_texture(textures[material.emission_texture], mixed_uv(at.emission_a, at.emission_b, at.emission_c, u, v)).rgb;
         }
     }
-    return emission;
+    return vec3(1.0);
 }
 
-// How much of a layered surface is there.
-float coverage_of(SurfaceMaterial material, uint index, float u, float v, float vertex_alpha)
+vec4 base_texel(SurfaceMaterial material, uint index, float u, float v)
 {
-    LayeredMaterial layered = layered_materials[triangles[index].material];
-    float alpha = layered.alpha * vertex_alpha;
-    if (layered.coverage == COVERAGE_WHOLE) {
-        return 1.0;
-    }
     if (HAS_TEXTURES) {
         if (material.base_texture != NONE) {
             TriangleUvs at = uvs[index];
-            alpha *= sample_texture(material.base_texture, mixed_uv(at.base_a, at.base_b, at.base_c, u, v)).a;
+            return sample_texture(textures[material.base_texture], mixed_uv(at.base_a, at.base_b, at.base_c, u, v));
         }
     }
-    return layered.coverage == COVERAGE_MASK ? (alpha >= layered.cutoff ? 1.0 : 0.0) : clamp(alpha, 0.0, 1.0);
+    return vec4(1.0);
 }
 
 float vertex_alpha_at(uint index, float u, float v)
@@ -174,16 +170,32 @@ float vertex_alpha_at(uint index, float u, float v)
     return 1.0;
 }
 
-// The light that a lamp sends out at one of its points: there is as much of it as of the surface.
-vec3 lamp_radiance(SurfaceMaterial material, uint index, float u, float v)
+// How much of a layered surface is there; `alpha` is its texture's.
+float coverage_by(uint index, float alpha, float u, float v)
 {
-    vec3 radiance = emitted_radiance(material, index, u, v);
+    LayeredMaterial layered = layered_materials[triangles[index].material];
+    if (layered.coverage == COVERAGE_WHOLE) {
+        return 1.0;
+    }
+    alpha *= layered.alpha * vertex_alpha_at(index, u, v);
+    return layered.coverage == COVERAGE_MASK ? (alpha >= layered.cutoff ? 1.0 : 0.0) : clamp(alpha, 0.0, 1.0);
+}
+
+float coverage_of(SurfaceMaterial material, uint index, float u, float v)
+{
+    return coverage_by(index, base_texel(material, index, u, v).a, u, v);
+}
+
+// What is left of the light of a lamp at one of its points: there is as much of it as of the surface.
+vec3 lamp_share(SurfaceMaterial material, uint index, float u, float v)
+{
+    vec3 share = emission_texel(material, index, u, v);
     if (HAS_PASSING) {
         if (material.surface == SURFACE_LAYERED) {
-            radiance *= coverage_of(material, index, u, v, vertex_alpha_at(index, u, v));
+            share *= coverage_of(material, index, u, v);
         }
     }
-    return radiance;
+    return share;
 }
 
 TriangleLayers layers_of_triangle(uint index)
@@ -191,29 +203,10 @@ TriangleLayers layers_of_triangle(uint index)
     return triangle_layers[min(index, uint(triangle_layers.length()) - 1)];
 }
 
-// Texture coordinates of both sets at a point of a triangle.
-vec4 both_uvs(uint index, float u, float v)
-{
-    TriangleLayers at = layers_of_triangle(index);
-    return vec4(mixed_uv(at.first_a, at.first_b, at.first_c, u, v), mixed_uv(at.second_a, at.second_b, at.second_c, u, v));
-}
-
-// A texture's value, or 1.
-vec4 looked_up(TextureLookup use, vec4 uv)
-{
-    if (HAS_LAYER_TEXTURES) {
-        if (use.texture != NONE) {
-            vec2 own = use.uv_set == 0 ? uv.xy : uv.zw;
-            return sample_texture(use.texture, vec2(dot(use.row_u, own), dot(use.row_v, own)) + use.offset);
-        }
-    }
-    return vec4(1.0);
-}
-
 // A normal map's normal about the unit normal n on the side of wo; `tangents` are those of the corners.
-vec3 mapped_normal(TextureLookup use, float scale, vec4 uv, vec3 n, uvec3 tangents, bool is_turned, float u, float v, vec3 wo, bool front)
+vec3 mapped_normal(vec3 texel, float scale, vec3 n, uvec3 tangents, bool is_turned, float u, float v, vec3 wo, bool front)
 {
-    vec3 code = 2.0 * looked_up(use, uv).rgb - 1.0;
+    vec3 code = 2.0 * texel - 1.0;
     vec3 normal = front ? n : -n;
     vec3 tangent = (1.0 - u - v) * unpack_normal(tangents.x) + u * unpack_normal(tangents.y) + v * unpack_normal(tangents.z);
     vec3 bitangent = is_turned ? cross(tangent, normal) : cross(normal, tangent);
@@ -226,53 +219,81 @@ vec3 mapped_normal(TextureLookup use, float scale, vec4 uv, vec3 n, uvec3 tangen
     return cosine < LEAST_MAPPED_COSINE ? normalize(mapped + (LEAST_MAPPED_COSINE - cosine) * wo) : mapped;
 }
 
-Layers layers_at(Hit hit, uint material_index, vec3 smooth_normal, vec3 wo, bool front)
+// What a material's textures say, by layer: 1 where it has none. Returns a bit for each that it has. A loop, as in sample_texture().
+uint look_up_layers(LayeredMaterial material, Hit hit, out vec4 values[LAYER_COUNT])
+{
+    uint found = 0;
+    for (uint layer = 0; layer < LAYER_COUNT; layer++) {
+        values[layer] = vec4(1.0);
+    }
+    if (HAS_LAYER_TEXTURES) {
+        TriangleLayers at = layers_of_triangle(hit.triangle);
+        vec2 first = mixed_uv(at.first_a, at.first_b, at.first_c, hit.u, hit.v);
+        vec2 second = mixed_uv(at.second_a, at.second_b, at.second_c, hit.u, hit.v);
+        [[dont_unroll]] for (uint k = material.first_lookup; k < material.end_lookup; k++) {
+            TextureInfo lookup = textures[k];
+            vec2 uv = lookup.uv_set == 0 ? first : second;
+            values[lookup.layer] = sample_texture(lookup, vec2(dot(lookup.row_u, uv), dot(lookup.row_v, uv)) + lookup.offset);
+            found |= 1u << lookup.layer;
+        }
+    }
+    return found;
+}
+
+// Layers and shading normal of a layered surface, whose other fields are known; `alpha` is that of its base colour's texture.
+void add_layers(inout Surface surface, Hit hit, uint material_index, vec3 wo, float alpha)
 {
     LayeredMaterial material = layered_materials[material_index];
-    vec4 uv = vec4(0.0);
-    if (HAS_LAYER_TEXTURES) {
-        uv = both_uvs(hit.triangle, hit.u, hit.v);
-    }
-    vec4 rough_metal = looked_up(material.metallic_roughness_texture, uv);
+    vec4 values[LAYER_COUNT];
+    uint found = look_up_layers(material, hit, values);
     Layers layers;
-    layers.metallic = material.metallic * rough_metal.b;
-    float roughness = material.roughness * rough_metal.g;
+    layers.metallic = material.metallic * values[LAYER_METALLIC_ROUGHNESS].b;
+    float roughness = material.roughness * values[LAYER_METALLIC_ROUGHNESS].g;
     layers.alpha = roughness * roughness;
     layers.ior = material.ior;
-    layers.specular = material.specular * looked_up(material.specular_texture, uv).a;
-    layers.specular_colour = material.specular_colour * looked_up(material.specular_colour_texture, uv).rgb;
+    layers.specular = material.specular * values[LAYER_SPECULAR].a;
+    layers.specular_colour = material.specular_colour * values[LAYER_SPECULAR_COLOUR].rgb;
     layers.transmission = 0.0;
     layers.is_solid = false;
     layers.medium = material.medium;
     if (HAS_TRANSMISSION) {
-        layers.transmission = material.transmission * looked_up(material.transmission_texture, uv).r;
+        layers.transmission = material.transmission * values[LAYER_TRANSMISSION].r;
         layers.is_solid = material.is_solid != 0;
     }
     layers.coat = 0.0;
     layers.coat_alpha = 1.0;
-    layers.coat_normal = smooth_normal;
+    layers.coat_normal = surface.ns;
     if (HAS_COATS) {
-        layers.coat = material.coat * looked_up(material.coat_texture, uv).r;
-        float coat_roughness = material.coat_roughness * looked_up(material.coat_roughness_texture, uv).g;
+        layers.coat = material.coat * values[LAYER_COAT].r;
+        float coat_roughness = material.coat_roughness * values[LAYER_COAT_ROUGHNESS].g;
         layers.coat_alpha = coat_roughness * coat_roughness;
-        if (HAS_NORMAL_MAPS) {
-            if (material.coat_normal_texture.texture != NONE) {
-                TriangleLayers at = layers_of_triangle(hit.triangle);
-                layers.coat_normal = mapped_normal(material.coat_normal_texture, material.coat_normal_scale, uv, smooth_normal,
-                                                   uvec3(at.coat_tangent_a, at.coat_tangent_b, at.coat_tangent_c), (at.turned & 8u) != 0, hit.u, hit.v, wo, front);
-            }
-        }
     }
     layers.sheen = vec3(0.0);
     layers.sheen_alpha = 1.0;
     if (HAS_SHEEN) {
-        layers.sheen = material.sheen_colour * looked_up(material.sheen_colour_texture, uv).rgb;
-        float sheen_roughness = material.sheen_roughness * looked_up(material.sheen_roughness_texture, uv).a;
+        layers.sheen = material.sheen_colour * values[LAYER_SHEEN_COLOUR].rgb;
+        float sheen_roughness = material.sheen_roughness * values[LAYER_SHEEN_ROUGHNESS].a;
         layers.sheen_alpha = max(sheen_roughness * sheen_roughness, LEAST_SHEEN_ALPHA);
     }
     layers.coverage = 1.0;
+    if (HAS_PASSING) {
+        layers.coverage = coverage_by(hit.triangle, alpha, hit.u, hit.v);
+    }
     layers.is_unlit = material.is_unlit != 0;
-    return layers;
+    if (HAS_NORMAL_MAPS) {
+        TriangleLayers at = layers_of_triangle(hit.triangle);
+        vec3 smooth_ns = surface.ns;
+        if ((found & (1u << LAYER_NORMAL)) != 0) {
+            surface.ns = mapped_normal(values[LAYER_NORMAL].rgb, material.normal_scale, smooth_ns, uvec3(at.tangent_a, at.tangent_b, at.tangent_c),
+                                       (at.turned & 1u) != 0, hit.u, hit.v, wo, surface.front);
+        }
+        if ((found & (1u << LAYER_COAT_NORMAL)) != 0) {
+            layers.coat_normal = mapped_normal(values[LAYER_COAT_NORMAL].rgb, material.coat_normal_scale, smooth_ns,
+                                               uvec3(at.coat_tangent_a, at.coat_tangent_b, at.coat_tangent_c), (at.turned & 8u) != 0, hit.u, hit.v, wo,
+                                               surface.front);
+        }
+    }
+    surface.layers = layers;
 }
 
 Surface surface_at(Hit hit, vec3 wo)
@@ -297,7 +318,6 @@ Surface surface_at(Hit hit, vec3 wo)
             surface.ns = dot(smooth_normal, wo) > 0.0 ? smooth_normal : surface.ng;
         }
     }
-    vec3 smooth_ns = surface.ns;
     surface.kind = material.surface;
     surface.parameter = material.parameter;
     bool shown = surface.front;
@@ -305,34 +325,17 @@ Surface surface_at(Hit hit, vec3 wo)
         shown = shown || material.two_sided != 0;
     }
     surface.scatters = shown || surface.kind == SURFACE_DIELECTRIC;
-    surface.base_colour = material.base_colour;
-    if (HAS_TEXTURES) {
-        if (material.base_texture != NONE) {
-            TriangleUvs at = uvs[hit.triangle];
-            surface.base_colour *= sample_texture(material.base_texture, mixed_uv(at.base_a, at.base_b, at.base_c, hit.u, hit.v)).rgb;
-        }
-    }
+    vec4 base = base_texel(material, hit.triangle, hit.u, hit.v);
+    surface.base_colour = material.base_colour * base.rgb;
     if (HAS_VERTEX_COLOURS) {
         TriangleColours at = colours[min(hit.triangle, uint(colours.length()) - 1)];
         // Exactly 1 where all three are.
         surface.base_colour *= at.a + hit.u * (at.b - at.a) + hit.v * (at.c - at.a);
     }
-    surface.emission = shown ? emitted_radiance(material, hit.triangle, hit.u, hit.v) : vec3(0.0);
+    surface.emission = shown ? material.emission * emission_texel(material, hit.triangle, hit.u, hit.v) : vec3(0.0);
     if (HAS_LAYERS) {
         if (surface.kind == SURFACE_LAYERED) {
-            surface.layers = layers_at(hit, triangle.material, smooth_ns, wo, surface.front);
-            if (HAS_NORMAL_MAPS) {
-                LayeredMaterial layered = layered_materials[triangle.material];
-                if (layered.normal_texture.texture != NONE) {
-                    TriangleLayers at = layers_of_triangle(hit.triangle);
-                    surface.ns = mapped_normal(layered.normal_texture, layered.normal_scale, both_uvs(hit.triangle, hit.u, hit.v), smooth_ns,
-                                               uvec3(at.tangent_a, at.tangent_b, at.tangent_c), (at.turned & 1u) != 0, hit.u, hit.v, wo, surface.front);
-                }
-            }
-            if (HAS_PASSING) {
-                surface.layers.coverage =
-                    coverage_of(material, hit.triangle, hit.u, hit.v, vertex_alpha_at(hit.triangle, hit.u, hit.v));
-            }
+            add_layers(surface, hit, triangle.material, wo, base.a);
         }
     }
     return surface;

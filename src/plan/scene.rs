@@ -245,7 +245,7 @@ impl ScenePlan {
 
     /// Whether a camera path may be under way when its dispatch ends.
     pub fn chains_go_on(&self) -> bool {
-        self.chain_steps < MAX_BOUNCES && (self.constant("HAS_MIRROR") | self.constant("HAS_DIELECTRIC")) != 0
+        self.chain_steps < MAX_BOUNCES && (self.constant("HAS_SPECULAR_CHAINS") | self.constant("HAS_PASSING")) != 0
     }
 
     /// Camera paths that one dispatch may leave.

@@ -181,51 +181,44 @@ bool step_chain(inout Chain chain, uint index, uint number, uint pixel_count, Dr
     if (!surface.scatters) {
         return false;
     }
-    bool specular = is_specular(surface);
+    bool specular = is_layered ? scatter.is_specular : is_specular(surface);
+    vec3 scale = is_layered ? vec3(1.0) : surface.base_colour * scatter_scale(surface.kind, surface.parameter);
+    bool wants_direct = (PARTS & part_of(chain, ARRIVED_DIRECT)) != 0;
+    bool asks_lights = false;
+    if (SHADOW_RAYS != 0) {
+        asks_lights = is_layered || (!specular && wants_direct);
+    }
     if (is_layered) {
-        specular = scatter.is_specular;
         chain.density = 0.0;
+    }
+    if (asks_lights) {
+        Target here = plain_target(surface.position, surface.error, surface.ng, surface.ns, wo, surface.kind, surface.parameter);
+        here.surface = surface;
+        here.lobes = lobes;
+        here.media = chain.media;
+        vec3 light = scale * direct_light(here, emitter_count, draws, index, number, block + 1);
+        if (wants_direct) {
+            add_light(chain, light);
+        }
         // Of what a gather ray meets the caustic map has counted the light of sharp lobes.
-        bool counts_sharp = !chain.gathers || chain.starts_nowhere;
-        if (SHADOW_RAYS != 0) {
-            Target here = plain_target(surface.position, surface.error, surface.ng, surface.ns, wo, surface.kind, 0.0);
-            here.surface = surface;
-            here.lobes = lobes;
-            here.media = chain.media;
-            vec3 light = direct_light(here, emitter_count, draws, index, number, block + 1);
-            if ((PARTS & part_of(chain, ARRIVED_DIRECT)) != 0) {
-                add_light(chain, light);
-            }
-            if (counts_sharp) {
-                bool saw_specular = chain.saw_specular;
-                chain.saw_specular = saw_specular || !chain.gathers;
-                add_light(chain, sharp_light);
-                chain.saw_specular = saw_specular;
-                chain.density = scatter.density;
-                chain.from = surface.position;
-                chain.from_normal = surface.ns;
-            }
-            note_shadow_rays(index, divide(chain.weight, float(SAMPLES)));
+        if (is_layered && (!chain.gathers || chain.starts_nowhere)) {
+            bool saw_specular = chain.saw_specular;
+            chain.saw_specular = saw_specular || !chain.gathers;
+            add_light(chain, sharp_light);
+            chain.saw_specular = saw_specular;
+            chain.density = scatter.density;
+            chain.from = surface.position;
+            chain.from_normal = surface.ns;
         }
-        // Matt lobes are followed no further but for a gather.
-        if (!specular && matt == 0.0) {
-            return false;
-        }
+        note_shadow_rays(index, divide(chain.weight * scale, float(SAMPLES)));
+    }
+    // Matt lobes are followed no further but for a gather.
+    if (is_layered && !specular && matt == 0.0) {
+        return false;
     }
     if (!specular) {
-        vec3 scale = surface.base_colour * scatter_scale(surface.kind, surface.parameter);
-        bool asks_lights = SHADOW_RAYS != 0;
         if (is_layered) {
-            asks_lights = false;
             scale = vec3(divide(0.31830988618379067, matt));
-        }
-        if (asks_lights) {
-            if ((PARTS & part_of(chain, ARRIVED_DIRECT)) != 0) {
-                Target here = plain_target(surface.position, surface.error, surface.ng, surface.ns, wo, surface.kind, surface.parameter);
-                here.media = chain.media;
-                add_light(chain, scale * direct_light(here, emitter_count, draws, index, number, block + 1));
-                note_shadow_rays(index, divide(chain.weight * scale, float(SAMPLES)));
-            }
         }
         // Where it is by chance that a path gets here, each counts for itself.
         bool for_all = !chain.saw_specular && !chain.gathers && matt == 1.0;

@@ -39,7 +39,7 @@ vec3 passing_at(Hit hit, vec3 wo, uint media)
         }
     }
     SurfaceMaterial material = materials[triangles[hit.triangle].material];
-    return vec3(1.0 - coverage_of(material, hit.triangle, hit.u, hit.v, vertex_alpha_at(hit.triangle, hit.u, hit.v)));
+    return vec3(1.0 - coverage_of(material, hit.triangle, hit.u, hit.v));
 }
 
 // What passes straight along a way that ends at t_max of it: all, nothing, or the share that thin walls and gaps of alpha leave.
@@ -93,44 +93,36 @@ ShadowRay cast_shadow_ray(Target point, Arriving arriving, Draws draws, uint ind
     // Before the guards below, which would drop what is no number.
     note_unless(is_finite(cosine) && is_finite(arriving.radiance) && (arriving.is_far || is_finite(arriving.target)), NONFINITE_LIGHT,
                 draws.domain, draws.round, index);
+    bool is_layered = false;
     if (HAS_LAYERS) {
-        if (point.kind == SURFACE_LAYERED) {
-            if (largest(arriving.radiance) > 0.0) {
-                LobeLight light = weigh_light(point.surface, point.lobes, point.wo, arriving.wi, float(SHADOW_RAYS) * arriving.density);
-                ray.light = arriving.radiance * light.matt;
-                ray.sharp_light = arriving.radiance * light.sharp;
-                ray.is_asked = largest(ray.light) > 0.0 || largest(ray.sharp_light) > 0.0;
-                if (ray.is_asked) {
-                    vec3 start = offset_origin(point.position, point.error, point.ng, arriving.wi);
-                    uint media = point.media;
-                    if (HAS_MEDIA) {
-                        bool is_beyond = point.surface.layers.medium != 0 && dot(arriving.wi, point.ng) < 0.0;
-                        media = is_beyond ? media_beyond(point.surface, media) : media;
-                    }
-                    vec3 share = arriving.is_far ? light_through(start, arriving.wi, uintBitsToFloat(0x7f7fffffu), media)
-                                                 : light_through(start, arriving.target - start, 1.0, media);
-                    ray.is_hidden = share == vec3(0.0);
-                    ray.light *= ray.is_hidden ? vec3(1.0) : share;
-                    ray.sharp_light *= ray.is_hidden ? vec3(1.0) : share;
-                }
+        is_layered = point.kind == SURFACE_LAYERED;
+    }
+    vec3 leaves_along = point.ng;
+    uint media = point.media;
+    if (largest(arriving.radiance) > 0.0) {
+        if (is_layered) {
+            LobeLight light = weigh_light(point.surface, point.lobes, point.wo, arriving.wi, float(SHADOW_RAYS) * arriving.density);
+            ray.light = arriving.radiance * light.matt;
+            ray.sharp_light = arriving.radiance * light.sharp;
+            ray.is_asked = largest(ray.light) > 0.0 || largest(ray.sharp_light) > 0.0;
+            leaves_along = arriving.wi;
+            if (HAS_MEDIA) {
+                bool is_beyond = point.surface.layers.medium != 0 && dot(arriving.wi, point.ng) < 0.0;
+                media = is_beyond ? media_beyond(point.surface, media) : media;
             }
-            return ray;
+        } else if (cosine > 0.0 && dot(arriving.wi, point.ng) > 0.0) {
+            ray.light = arriving.radiance * (cosine * lobe_weight(point.kind, point.exponent, point.ns, point.wo, arriving.wi));
+            ray.is_asked = true;
         }
     }
-    if (cosine > 0.0 && dot(arriving.wi, point.ng) > 0.0 && max(arriving.radiance.x, max(arriving.radiance.y, arriving.radiance.z)) > 0.0) {
-        vec3 start = offset_origin(point.position, point.error, point.ng, point.ng);
-        ray.is_asked = true;
-        vec3 share = arriving.is_far ? light_through(start, arriving.wi, uintBitsToFloat(0x7f7fffffu), point.media)
-                                     : light_through(start, arriving.target - start, 1.0, point.media);
+    if (ray.is_asked) {
+        vec3 start = offset_origin(point.position, point.error, point.ng, leaves_along);
+        vec3 share = light_through(start, arriving.is_far ? arriving.wi : arriving.target - start, arriving.is_far ? uintBitsToFloat(0x7f7fffffu) : 1.0, media);
         ray.is_hidden = share == vec3(0.0);
-        ray.light = arriving.radiance * (cosine * lobe_weight(point.kind, point.exponent, point.ns, point.wo, arriving.wi));
-        bool may_dim = HAS_PASSING;
-        if (HAS_MEDIA) {
-            may_dim = true;
-        }
-        if (may_dim) {
-            ray.light *= ray.is_hidden ? vec3(1.0) : share;
-        }
+        // What is hidden still has its light: that which was stopped.
+        share = ray.is_hidden ? vec3(1.0) : share;
+        ray.light *= share;
+        ray.sharp_light *= share;
     }
     return ray;
 }

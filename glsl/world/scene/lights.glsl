@@ -100,18 +100,7 @@ Emission sample_emission(Emitter light, float scene_radius, vec4 u, vec4 w)
             float error = triangle_error(triangle);
             vec2 inside = off_the_edges(triangle, at, error);
             emission.position = offset_origin(triangle_point(triangle, inside.x, inside.y), error, normal, normal);
-            if (HAS_TEXTURES) {
-                if (material.emission_texture != NONE) {
-                    TriangleUvs uv = uvs[light.triangle];
-                    emission.flux *=
-                        sample_texture(material.emission_texture, mixed_uv(uv.emission_a, uv.emission_b, uv.emission_c, at.x, at.y)).rgb;
-                }
-            }
-            if (HAS_PASSING) {
-                if (material.surface == SURFACE_LAYERED) {
-                    emission.flux *= coverage_of(material, light.triangle, at.x, at.y, vertex_alpha_at(light.triangle, at.x, at.y));
-                }
-            }
+            emission.flux *= lamp_share(material, light.triangle, at.x, at.y);
         }
     }
     if (HAS_POINT_LIGHTS) {
@@ -223,7 +212,7 @@ Arriving sample_light(Emitter light, vec3 position, vec3 ns, vec2 u)
                 normal = material.two_sided != 0 && side < 0.0 ? -normal : normal;
             }
             arriving.target = offset_origin(point, position_error(point) + triangle_error(triangle), normal, normal);
-            arriving.radiance = lamp_radiance(material, light.triangle, at.x, at.y) * divide(area, light.probability);
+            float spread = divide(area, light.probability);
             cos_light = is_before(side, position, triangle_error(triangle)) ? max(dot(normal, normalize(position - point)), 0.0) : 0.0;
             if (cos_light > 0.0) {
                 vec4 direction = sample_spherical_triangle(normalize(shining.a - position), normalize(shining.b - position),
@@ -237,10 +226,11 @@ Arriving sample_light(Emitter light, vec3 position, vec3 ns, vec2 u)
                     if (HAS_TEXTURES) {
                         at = triangle_weights(triangle, point);
                     }
-                    arriving.radiance = lamp_radiance(material, light.triangle, at.x, at.y) * divide(direction.w, light.probability);
+                    spread = divide(direction.w, light.probability);
                     arriving.wi = direction.xyz;
                 }
             }
+            arriving.radiance = material.emission * lamp_share(material, light.triangle, at.x, at.y) * spread;
         }
     }
     if (HAS_SPOT_LIGHTS) {

@@ -4,7 +4,7 @@ use glam::{DMat2, DVec2, DVec3, DVec4, Vec3};
 
 use super::{at_corners, pack_normal};
 use crate::constants::*;
-use crate::records::{LayeredMaterial, TextureLookup, TriangleLayers};
+use crate::records::{LayeredMaterial, TextureInfo, TriangleLayers};
 use crate::scene::material::{Coverage, Medium, NormalMap, TextureUse};
 use crate::scene::{Material, Mesh, Scene};
 
@@ -37,10 +37,7 @@ pub(super) fn records(scene: &Scene, unit: f64) -> Result<Vec<LayeredMaterial>, 
 
 fn record(material: &Material) -> LayeredMaterial {
     let of = &material.layers;
-    let texture = |used: Option<TextureUse>| used.map_or(TextureLookup { texture: NONE, ..TextureLookup::default() }, lookup);
-    let map = |map: Option<NormalMap>| (texture(map.map(|map| map.texture)), map.map_or(1.0, |map| map.scale));
-    let (normal_texture, normal_scale) = map(material.normal_map);
-    let (coat_normal_texture, coat_normal_scale) = map(of.coat_normal_map);
+    let scale = |map: Option<NormalMap>| map.map_or(1.0, |map| map.scale);
     let (coverage, alpha, cutoff) = match material.coverage {
         Coverage::Whole => (COVERAGE_WHOLE, 1.0, 0.0),
         Coverage::Mask { alpha, cutoff } => (COVERAGE_MASK, alpha, cutoff),
@@ -49,47 +46,69 @@ fn record(material: &Material) -> LayeredMaterial {
     LayeredMaterial {
         metallic: of.metallic,
         roughness: of.roughness,
-        metallic_roughness_texture: texture(of.metallic_roughness_texture),
         ior: of.ior,
         specular: of.specular,
-        specular_texture: texture(of.specular_texture),
         specular_colour: of.specular_colour,
-        specular_colour_texture: texture(of.specular_colour_texture),
         transmission: of.transmission,
-        transmission_texture: texture(of.transmission_texture),
         is_solid: u32::from(of.medium.is_some()),
         // Of all materials together.
         medium: 0,
         medium_absorption: Vec3::ZERO,
         medium_ior: 1.0,
         coat: of.coat,
-        coat_texture: texture(of.coat_texture),
         coat_roughness: of.coat_roughness,
-        coat_roughness_texture: texture(of.coat_roughness_texture),
         sheen_colour: of.sheen_colour,
-        sheen_colour_texture: texture(of.sheen_colour_texture),
         sheen_roughness: of.sheen_roughness,
-        sheen_roughness_texture: texture(of.sheen_roughness_texture),
-        normal_texture,
-        normal_scale,
-        coat_normal_texture,
-        coat_normal_scale,
+        normal_scale: scale(material.normal_map),
+        coat_normal_scale: scale(of.coat_normal_map),
         coverage,
         alpha,
         cutoff,
         is_unlit: u32::from(of.is_unlit),
+        // Of all materials together, too.
+        first_lookup: 0,
+        end_lookup: 0,
     }
 }
 
-fn lookup(used: TextureUse) -> TextureLookup {
+/// Adds what each material looks up behind the textures of the scene.
+pub(super) fn add_lookups(scene: &Scene, records: &mut [LayeredMaterial], textures: &mut Vec<TextureInfo>) {
+    for (material, record) in scene.materials.iter().zip(records) {
+        let of = &material.layers;
+        let map = |map: Option<NormalMap>| map.map(|map| map.texture);
+        let lookups = [
+            (LAYER_METALLIC_ROUGHNESS, of.metallic_roughness_texture),
+            (LAYER_SPECULAR, of.specular_texture),
+            (LAYER_SPECULAR_COLOUR, of.specular_colour_texture),
+            (LAYER_TRANSMISSION, of.transmission_texture),
+            (LAYER_COAT, of.coat_texture),
+            (LAYER_COAT_ROUGHNESS, of.coat_roughness_texture),
+            (LAYER_COAT_NORMAL, map(of.coat_normal_map)),
+            (LAYER_SHEEN_COLOUR, of.sheen_colour_texture),
+            (LAYER_SHEEN_ROUGHNESS, of.sheen_roughness_texture),
+            (LAYER_NORMAL, map(material.normal_map)),
+        ];
+        record.first_lookup = textures.len() as u32;
+        for (layer, used) in lookups {
+            if let Some(used) = used {
+                let lookup = lookup(textures[used.texture], layer, used);
+                textures.push(lookup);
+            }
+        }
+        record.end_lookup = textures.len() as u32;
+    }
+}
+
+fn lookup(texture: TextureInfo, layer: u32, used: TextureUse) -> TextureInfo {
     let offset = used.transform.apply(DVec2::ZERO);
     let turn = DMat2::from_cols(used.transform.apply(DVec2::X) - offset, used.transform.apply(DVec2::Y) - offset).transpose();
-    TextureLookup {
-        texture: used.texture as u32,
+    TextureInfo {
+        layer,
         uv_set: used.uv_set as u32,
         row_u: turn.x_axis.as_vec2(),
         row_v: turn.y_axis.as_vec2(),
         offset: offset.as_vec2(),
+        ..texture
     }
 }
 

@@ -199,7 +199,7 @@ impl Geometry {
             true => vec![TriangleColours { a: Vec3::ONE, b: Vec3::ONE, c: Vec3::ONE, alphas: Vec3::ONE }],
             false => order.par_iter().zip(&sources).map(colours_of).collect(),
         };
-        let layered_materials = layered::records(scene, unit)
+        let mut layered_materials = layered::records(scene, unit)
             .map_err(|count| refuse(scene, "the scene", format!("has solids of {count} different media; at most 255 can be told apart")))?;
         let layers_of = |(&place, &(mesh, triangle)): (&u32, &(u32, u32))| {
             layered::of_triangle(&scene.meshes[mesh as usize], triangle as usize, part_of(place))
@@ -209,7 +209,8 @@ impl Geometry {
             true => order.par_iter().zip(&sources).map(layers_of).collect(),
         };
         progress("packing textures", 0.0);
-        let (textures, texels) = pack_textures(scene);
+        let (mut textures, texels) = pack_textures(scene);
+        layered::add_lookups(scene, &mut layered_materials, &mut textures);
         if texels.len() > MAX_TEXELS {
             let reason = format!("has textures of {} texels in all; at most {MAX_TEXELS} can be kept", texels.len());
             return Err(refuse(scene, "the scene", reason));
@@ -404,6 +405,7 @@ fn pack_textures(scene: &Scene) -> (Vec<TextureInfo>, Vec<u32>) {
                 Texels::SharedExponent(_) => TEXELS_SHARED_EXPONENT,
                 Texels::Linear(_) => TEXELS_LINEAR,
             },
+            ..TextureInfo::default()
         });
         if is_used {
             texels.par_extend(texture.texels.words());
