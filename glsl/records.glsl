@@ -297,6 +297,8 @@ struct LayeredMaterial {
     float alpha;
     float cutoff;
     uint is_unlit;
+    // Somewhere it has a lobe that photon maps know. Density estimates beside such a place count photons elsewhere, too.
+    uint is_matt;
     // Its lookups, among the records of textures.
     uint first_lookup;
     uint end_lookup;

@@ -57,6 +57,12 @@ fn plates_return_what_the_sky_sends() {
 }
 
 #[test]
+fn photons_land_where_no_lobe_is() {
+    let Some(gpu) = device() else { return };
+    assert_holds("photons", layered::photons_land_beside_lobes(&gpu));
+}
+
+#[test]
 fn clear_balls_are_not_to_be_seen_in_a_furnace() {
     let Some(gpu) = device() else { return };
     for is_lossless in [true, false] {

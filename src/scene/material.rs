@@ -260,11 +260,14 @@ impl LobeKinds {
         if of.is_unlit {
             return LobeKinds { passing: !is_covered, ..LobeKinds::default() };
         }
+        let matt = is_diffuse
+            || of.sheen_colour != Vec3::ZERO
+            || (reflects && alpha.1 >= map_alpha && !(transmits && !is_pane && transmission.0 >= 1.0))
+            || (of.coat > 0.0 && coat_alpha.1 >= map_alpha);
+        // What has no lobe is black, and still lies in the light.
+        let is_black = !matt && !reflects && !transmits && of.coat == 0.0;
         LobeKinds {
-            matt: is_diffuse
-                || of.sheen_colour != Vec3::ZERO
-                || (reflects && alpha.1 >= map_alpha && !(transmits && !is_pane && transmission.0 >= 1.0))
-                || (of.coat > 0.0 && coat_alpha.1 >= map_alpha),
+            matt: matt || is_black,
             sharp_reflection: (reflects && (alpha.0 < map_alpha || (transmits && !is_pane))) || (of.coat > 0.0 && coat_alpha.0 < map_alpha),
             sharp_transmission: transmits && !(is_pane && alpha.1 < delta_alpha),
             passing: !is_covered || (transmits && is_pane && alpha.0 < delta_alpha),

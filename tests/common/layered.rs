@@ -421,6 +421,29 @@ pub fn furnace(gpu: &Gpu, within_a_dome: bool) -> Check<Complaint> {
     Ok(())
 }
 
+/// Irradiance by photons does not ask what becomes of them: at the edge of a smooth metal, and on what is black.
+pub fn photons_land_beside_lobes(gpu: &Gpu) -> Check<Complaint> {
+    let mut scene = scene_of(vec![level(0.0, [2.0; 2], true, 0), level(-1.0, [8.0; 2], true, 1)], vec![], vec![sun(DVec3::NEG_Y)]);
+    // Metalness and roughness: a smooth metal, and a matt dielectric.
+    scene.textures = vec![row_of_texels(&[[0, 0, 255, 255], [0, 255, 0, 255]], Filter::Nearest)];
+    let metallic_roughness_texture = Some(TextureUse::of(0, 0));
+    scene.materials = vec![layered(Vec3::ONE, &Layers { metallic_roughness_texture, ..metal(1.0) }), dull(0.0)];
+    scene.meshes[0].uvs[0] = scene.meshes[0].positions.iter().map(|place| DVec2::new(0.5 + 0.5 * place.x, 0.5)).collect();
+    let settings = SceneSettings {
+        illumination: Illumination::Photons,
+        photons: 100_000,
+        rounds: 4,
+        radius: Some(0.1),
+        ..SceneSettings::default()
+    };
+    let points = [DVec3::X * 0.01, DVec3::new(2.0, -1.0, 2.0)].map(|point| (point, DVec3::Y));
+    let lit = received(gpu, &scene, &settings, &points);
+    for (place, (found, error)) in pairs(means(&lit), standard_errors(&lit)).enumerate() {
+        estimate_check(&format!("point {place}"), found.x, 1.0, error.x)?;
+    }
+    Ok(())
+}
+
 /// Balls that let light through and keep all of it, and others that lose some.
 fn clear_balls(is_lossless: bool) -> Vec<Material> {
     let clear = |layers: Layers| layered(Vec3::ONE, &Layers { transmission: 1.0, ..layers });

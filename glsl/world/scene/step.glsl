@@ -29,7 +29,7 @@ Step step_path(inout LightPath path, uint bounce)
             float eta = index_ratio(surface, path.media);
             surface.ns = normal_of_refraction(surface, wo, eta, bounce);
             lobes = lobes_of(surface, wo, eta);
-            has_matt = surface.scatters && matt_chance(lobes, surface.layers) > 0.0;
+            has_matt = surface.scatters && layered_materials[triangles[hit.triangle].material].is_matt != 0;
         }
         // Also where alpha has a gap: the light there is that of the surface about it, whose area the density estimate counts.
         taken.stored = has_matt && (path.arrival & push.map.stored) != 0;

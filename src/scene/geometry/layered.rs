@@ -5,7 +5,7 @@ use glam::{DMat2, DVec2, DVec3, DVec4, Vec3};
 use super::{at_corners, pack_normal};
 use crate::constants::*;
 use crate::records::{LayeredMaterial, TextureInfo, TriangleLayers};
-use crate::scene::material::{Coverage, Medium, NormalMap, TextureUse};
+use crate::scene::material::{Coverage, LobeKinds, Medium, NormalMap, TextureUse};
 use crate::scene::{Material, Mesh, Scene};
 
 /// Most media: a path keeps their numbers in eight bits each.
@@ -13,7 +13,7 @@ const MAX_MEDIA: usize = 255;
 
 /// A record for each material; an error says how many media there are, if these are too many.
 pub(super) fn records(scene: &Scene, unit: f64) -> Result<Vec<LayeredMaterial>, usize> {
-    let mut records: Vec<LayeredMaterial> = scene.materials.iter().map(record).collect();
+    let mut records: Vec<LayeredMaterial> = scene.materials.iter().zip(scene.lobe_kinds()).map(record).collect();
     // Solids of equal media share a number.
     let mut media: Vec<(f32, Medium)> = Vec::new();
     for (material, record) in scene.materials.iter().zip(&mut records) {
@@ -35,7 +35,7 @@ pub(super) fn records(scene: &Scene, unit: f64) -> Result<Vec<LayeredMaterial>, 
     if media.len() <= MAX_MEDIA { Ok(records) } else { Err(media.len()) }
 }
 
-fn record(material: &Material) -> LayeredMaterial {
+fn record((material, kinds): (&Material, LobeKinds)) -> LayeredMaterial {
     let of = &material.layers;
     let scale = |map: Option<NormalMap>| map.map_or(1.0, |map| map.scale);
     let (coverage, alpha, cutoff) = match material.coverage {
@@ -65,6 +65,7 @@ fn record(material: &Material) -> LayeredMaterial {
         alpha,
         cutoff,
         is_unlit: u32::from(of.is_unlit),
+        is_matt: u32::from(kinds.matt),
         // Of all materials together, too.
         first_lookup: 0,
         end_lookup: 0,
