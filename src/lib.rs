@@ -2,9 +2,9 @@
 //! the work is split, and a ledger of every photon.
 //!
 //! The [`guide`] holds what a user needs: [the paper's box](guide::paper), [scenes](guide::scenes),
-//! [accuracy](guide::accuracy), a [study](guide::study) of what accuracy costs, [performance](guide::performance),
-//! [hard cases](guide::hard_cases) and [file formats](guide::formats). [Architecture](guide::architecture) explains how
-//! the program is built, why its results repeat, and how it is tested.
+//! [materials](guide::materials), [accuracy](guide::accuracy), a [study](guide::study) of what accuracy costs,
+//! [performance](guide::performance), [hard cases](guide::hard_cases) and [file formats](guide::formats).
+//! [Architecture](guide::architecture) explains how the program is built, why its results repeat, and how it is tested.
 //!
 //! ```no_run
 //! use photonmill::engine::scene::{Target, render};
