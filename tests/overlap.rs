@@ -2,6 +2,7 @@
 
 use crate::common::prelude::*;
 use photonmill::constants::HIDDEN;
+use photonmill::scene::material::{Coverage, Layers, Medium};
 
 /// A room of 4 x 3 x 4 m around the y axis with a lamp of a square metre below its ceiling.
 fn room() -> Scene {
@@ -263,4 +264,27 @@ fn short_rays_see_what_counts() {
             down(0.2, DVec3::X * 3.0);
         }
     }
+}
+
+/// Also of a glTF file's glass: the table's top shows through the block.
+#[test]
+fn a_block_of_glass_on_a_table_hides_no_top() {
+    let solid = Layers { transmission: 1.0, medium: Some(Medium { transmittance: Vec3::ONE }), metallic: 0.0, ..Layers::default() };
+    let pane = Layers { medium: None, ..solid };
+    let leaves = Material { coverage: Coverage::Blend { alpha: 0.5 }, ..matt(0.5) };
+    let layered = |layers: Layers| Material::layered("glass", Vec3::ONE, layers);
+    let top_beside = |block: Material, faces_up: bool| {
+        let meshes = vec![level(0.0, [2.0; 2], true, 0), level(0.0, [1.0; 2], faces_up, 1)];
+        let table = Material { two_sided: true, ..matt(0.5) };
+        let lights = vec![LightKind::Environment { radiance: Vec3::ONE }];
+        let geometry = Geometry::new(&scene_of(meshes, vec![table, block], lights)).unwrap();
+        geometry.triangles.iter().filter(|triangle| triangle.material == 0 && triangle.plane < HIDDEN).count()
+    };
+    // The block's lower side.
+    assert_eq!(top_beside(layered(solid), false), 2);
+    // What lets light through lies under what does not, and cuts nothing out of it.
+    for (material, name) in [(layered(solid), "solid"), (layered(pane), "pane"), (Material { surface: Surface::Layered, ..leaves }, "leaves")] {
+        assert_eq!(top_beside(material, true), 2, "{name}");
+    }
+    assert!(top_beside(matt(0.5), true) > 2);
 }

@@ -306,8 +306,23 @@ impl Material {
 
     /// What lies behind the surface, of a solid that light enters.
     pub fn enclosed_medium(&self) -> Option<Medium> {
-        let is_entered = self.surface == Surface::Layered && self.layers.transmission > 0.0 && !self.layers.is_unlit;
-        self.layers.medium.filter(|_| is_entered)
+        self.layers.medium.filter(|_| self.transmits())
+    }
+
+    /// Of a layered one.
+    fn transmits(&self) -> bool {
+        self.surface == Surface::Layered && self.layers.transmission > 0.0 && !self.layers.is_unlit
+    }
+
+    /// Whether it bounds a solid that refracts.
+    pub fn is_entered(&self) -> bool {
+        matches!(self.surface, Surface::Dielectric { .. }) || self.enclosed_medium().is_some()
+    }
+
+    /// Into a solid, through a thin wall, or where alpha has gaps.
+    pub fn lets_light_through(&self) -> bool {
+        let has_gaps = self.surface == Surface::Layered && self.coverage != Coverage::Whole;
+        self.is_entered() || self.transmits() || has_gaps
     }
 
     /// Every use of a texture.

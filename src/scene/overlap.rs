@@ -12,7 +12,7 @@ use i_triangle::float::triangulatable::Triangulatable as _;
 use rayon::prelude::*;
 
 use super::planes::{IN_PLANE, NUMBER, NUMBER_BITS};
-use super::{Material, Scene, Surface, work};
+use super::{Material, Scene, work};
 
 /// Overlaps and triangles that are no wider are rounding of edges that only touch.
 const WIDTH: f64 = 1.0 / 1_048_576.0;
@@ -48,14 +48,14 @@ const BATCH: usize = 1 << 16;
 const PAIRS_SHARE: f64 = 0.5;
 
 /// Which of two overlapping surfaces counts, by mesh: the smaller number. What shines wins over what does not, so that a
-/// lamp in a ceiling's plane is seen; what is opaque over glass, as nothing would be lit through it; a small mesh over a
+/// lamp in a ceiling's plane is seen; what is opaque over glass and gaps of alpha, as nothing would be lit through it; a small mesh over a
 /// large one, as rugs lie on floors; and at last the first. What is hidden is so from both sides: from behind, a rug with
 /// one side on a floor with two is the rug's back.
 pub fn ranks(scene: &Scene) -> Vec<u32> {
     const PIECE: usize = 1 << 14;
     let class = |material: &Material| match material.surface {
         _ if material.is_emissive() => 0,
-        Surface::Dielectric { .. } => 2,
+        _ if material.lets_light_through() => 2,
         _ => 1,
     };
     let key = |mesh: usize| {
@@ -95,7 +95,7 @@ impl Sheet<'_> {
             return false;
         }
         // A block of glass that stands on a table and the table's top are a boundary with two sides.
-        let is_clear = |sheet: &Sheet| matches!(sheet.material.surface, Surface::Dielectric { .. });
+        let is_clear = |sheet: &Sheet| sheet.material.is_entered();
         let shows_both = cosine > 0.0 || (!is_clear(self) && !is_clear(other) && (self.material.two_sided || other.material.two_sided));
         let (wide, narrow) = if self.altitude > other.altitude { (self, other) } else { (other, self) };
         shows_both && narrow.corners.iter().all(|corner| wide.height(*corner).abs() <= IN_PLANE)
