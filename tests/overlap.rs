@@ -283,7 +283,9 @@ fn a_block_of_glass_on_a_table_hides_no_top() {
     // The block's lower side.
     assert_eq!(top_beside(layered(solid), false), 2);
     // What lets light through lies under what does not, and cuts nothing out of it.
-    for (material, name) in [(layered(solid), "solid"), (layered(pane), "pane"), (Material { surface: Surface::Layered, ..leaves }, "leaves")] {
+    for (material, name) in
+        [(layered(solid), "solid"), (layered(pane), "pane"), (Material { surface: Surface::Layered, ..leaves }, "leaves")]
+    {
         assert_eq!(top_beside(material, true), 2, "{name}");
     }
     assert!(top_beside(matt(0.5), true) > 2);

@@ -219,16 +219,18 @@ pub fn document(scene: &Scene, layout: &Layout, geometry: &Geometry, names: &Nam
             (None, _) => document.material(material, of_texture),
             (Some(_), Kind::Radiance) => {
                 let texture = document.texture(names.radiance(index), of_charts());
-                document.extensions.insert("KHR_materials_specular");
-                json!({
-                    "name": material.name,
-                    "pbrMetallicRoughness": {"baseColorFactor": [0.0, 0.0, 0.0, 1.0], "metallicFactor": 0.0, "roughnessFactor": 1.0},
-                    "emissiveFactor": [1.0, 1.0, 1.0],
-                    "emissiveTexture": {"index": texture, "texCoord": LIGHTMAP_SET},
-                    "doubleSided": material.two_sided,
-                    // No highlights on top of the baked light either.
-                    "extensions": {"KHR_materials_specular": {"specularFactor": 0.0}},
-                })
+                // No highlights on top of the baked light either. Alpha is as it was.
+                let base_colour_texture = material.base_colour_texture.filter(|_| material.coverage != Coverage::Whole);
+                let black = Material {
+                    base_colour_texture,
+                    coverage: material.coverage,
+                    two_sided: material.two_sided,
+                    ..Material::layered(&material.name, Vec3::ZERO, Layers { metallic: 0.0, specular: 0.0, ..Layers::default() })
+                };
+                let mut value = document.material(&black, of_texture);
+                value["emissiveFactor"] = json!([1.0, 1.0, 1.0]);
+                value["emissiveTexture"] = json!({"index": texture, "texCoord": LIGHTMAP_SET});
+                value
             }
             (Some(_), Kind::Lightmap) => {
                 let mut value = document.material(material, of_texture);

@@ -11,7 +11,7 @@
 //! surface; the mean over the phases is the mean over the texel. What no triangle covers is filled
 //! from the nearest texel that is covered, so that bilinear filtering finds nothing black at a seam.
 //!
-//! - Mirrors and dielectrics get no map: irradiance says nothing about what they send to the eye.
+//! - Surfaces that only reflect sharply or let light through get no map: irradiance says nothing about what they send to the eye.
 //! - Of a two-sided surface the front is baked. Both sides show it, so a thin sheet looks lit from
 //!   behind as it is from the front.
 //!
@@ -29,8 +29,8 @@
 //!
 //! and the scene written again, twice, because glTF has no place for a lightmap:
 //!
-//! - `scene.gltf` shows the baked light in every viewer and in Blender. Its diffuse and glossy
-//!   materials are black and shine with `NAME_radiance.png`, so that lamps and environments of the
+//! - `scene.gltf` shows the baked light in every viewer and in Blender. The materials that
+//!   have a map are black and shine with `NAME_radiance.png`, so that lamps and environments of the
 //!   viewer add nothing to them. A texture finer than the lightmap is as coarse as the lightmap there.
 //! - `scene_lightmap.gltf` is for engines. Its materials are the scene's, with `NAME_lightmap.png` as
 //!   MOZ_lightmap, read as three.js reads it: texel times intensity is irradiance (times the

@@ -40,8 +40,8 @@ pub(super) struct RenderArgs {
     exposure: Option<f32>,
     #[command(flatten)]
     picture: PictureArgs,
-    /// Camera paths per pixel and round, a power of two. Every path queries the caustic map; only the first queries the
-    /// global map [default: 1]
+    /// Camera paths per pixel and round, a power of two. Every path queries the caustic map; where all of them
+    /// end on the first surface, only one queries the global map [default: 1]
     #[arg(long, value_name = "N", value_parser = parse_integer::<u32>, allow_hyphen_values = true, help_heading = "Light transport")]
     samples: Option<u32>,
     /// Reconstruction filter of the pixels [default: box]

@@ -97,7 +97,10 @@ impl Scene {
             LightKind::Environment { .. } => lacks(Effect::Environment),
         });
         if lacks(Effect::VertexColours) {
-            scene.meshes.iter_mut().for_each(|mesh| mesh.colours.clear());
+            scene.meshes.iter_mut().for_each(|mesh| {
+                mesh.colours.clear();
+                mesh.alphas.clear();
+            });
         }
         for material in &mut scene.materials {
             if lacks(Effect::MeshLights) {
