@@ -341,7 +341,7 @@ const FAULTS: [Fault; 88] = [
         file: "world/scene/bvh.glsl", from: "t < hit.t || (t == hit.t && index < hit.triangle)", to: "t < hit.t",
         kernels: &["view"], noticed_by: &[(StackFromAfar, OtherSums)] },
     Fault { what: "shadow rays end 0.5 % before their lamp",
-        file: "world/scene/direct.glsl", from: "arriving.target - start, 1.0, point.media)", to: "0.995 * (arriving.target - start), 1.0, point.media)",
+        file: "world/scene/direct.glsl", from: "arriving.wi : arriving.target - start;", to: "arriving.wi : 0.995 * (arriving.target - start);",
         kernels: &["receive"], noticed_by: &[(LampInBox(Illumination::Split), Leak)] },
     Fault { what: "what lies a sixteenth of the radius below belongs to an estimate",
         file: "gather/belongs.glsl", from: "+ HEIGHT_ERROR;", to: "+ radius * (1.0 / 16.0);",

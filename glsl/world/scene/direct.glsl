@@ -117,7 +117,8 @@ ShadowRay cast_shadow_ray(Target point, Arriving arriving, Draws draws, uint ind
     }
     if (ray.is_asked) {
         vec3 start = offset_origin(point.position, point.error, point.ng, leaves_along);
-        vec3 share = light_through(start, arriving.is_far ? arriving.wi : arriving.target - start, arriving.is_far ? uintBitsToFloat(0x7f7fffffu) : 1.0, media);
+        vec3 way = arriving.is_far ? arriving.wi : arriving.target - start;
+        vec3 share = light_through(start, way, arriving.is_far ? uintBitsToFloat(0x7f7fffffu) : 1.0, media);
         ray.is_hidden = share == vec3(0.0);
         // What is hidden still has its light: that which was stopped.
         share = ray.is_hidden ? vec3(1.0) : share;
