@@ -794,6 +794,8 @@ struct LobeCase {
     uint lobe;
     // Radiance is carried, as by a camera path, and no flux.
     uint carries_radiance;
+    // Of random numbers.
+    uint seed;
 };
 
 // A sample of its lobes, and how they weigh light from there.

@@ -44,6 +44,7 @@ fn plastic(alpha: f32, cosine: f64) -> LobeCase {
         sheen_alpha: 1.0,
         coverage: 1.0,
         lobe: NONE,
+        seed: 100,
         carries_radiance: 1,
         ..LobeCase::default()
     }
@@ -258,11 +259,9 @@ fn cells_check(what: &str, counts: &[u64], probabilities: &[f64]) -> Check {
     counts_check(what, counts, probabilities)
 }
 
-/// What f32 loses: relative errors are bounded by so many units of its rounding, times what the geometry multiplies them by.
-const WEIGHT_ERROR: f64 = 16.0;
-const DENSITY_ERROR: f64 = 16.0;
-const OWN_ERROR: f64 = 16.0;
-
+/// What f32 loses: relative errors are bounded by so many units of its rounding, times what the geometry multiplies them by. The worst
+/// that lavapipe has is 8.6.
+const ROUNDINGS: f64 = 16.0;
 /// Radians that packing turns the normal of a matt coat by.
 const PACKED_NORMAL: f64 = 7e-5;
 
@@ -308,10 +307,11 @@ fn value_errors(case: &LobeCase, of: &Facets, sample: &LobeSample) -> Worst {
     let half = of.half(wi);
     let v_h = of.wo.dot(half) / half.length();
     let (cos_v, cos_l) = (of.wo.dot(of.n), wi.dot(of.n).abs());
-    let l_h = wi.dot(half) / half.length();
-    let smooth = 1.0 / cos_v + 1.0 / cos_l + if of.eta.is_some() { 1.0 / (l_h * l_h) } else { 1.0 / v_h };
-    // The half vector has the error of the direction, over its own length.
-    let sharp = smooth + 1.0 / (of.alpha * half.length());
+    // Exact reflectance has a root that ends where total reflection begins.
+    let root = 1.0 - f64::from(case.eta).powi(2) * (1.0 - v_h * v_h);
+    let smooth = 1.0 / cos_v + 1.0 / cos_l + 1.0 / v_h + if case.is_solid == 0 { 0.0 } else { 1.0 / root.abs() };
+    // The half vector has the error of the kernel's frame, and that of the direction over its own length.
+    let sharp = smooth + (1.0 + 1.0 / half.length()) / of.alpha;
     if smooth * ULP > 1e-3 {
         return Worst { left_out: 1, ..Worst::default() };
     }
@@ -377,9 +377,10 @@ fn ask(gpu: &Gpu, math: Math, passing: bool, cases: &[LobeCase], samples: usize)
 }
 
 /// All checks of a lobe at these roughnesses, by itself and over all of them.
-fn subject_check(gpu: &Gpu, subject: &Subject, alphas: &[f32]) -> Check {
-    let Subject { what, kind, cosines, case } = subject;
-    let with = |alpha: f32| cosines.iter().map(move |cosine| LobeCase { lobe: number(*kind), ..case(alpha, *cosine) });
+fn subject_check(gpu: &Gpu, subject: usize, alphas: &[f32]) -> Check {
+    let Subject { what, kind, cosines, case } = &SUBJECTS[subject];
+    let (seed, lobe) = (subject as u32, number(*kind));
+    let with = |alpha: f32| cosines.iter().map(move |cosine| LobeCase { seed, lobe, ..case(alpha, *cosine) });
     let cases: Vec<LobeCase> = alphas.iter().flat_map(|alpha| with(*alpha)).collect();
     let samples = ask(gpu, Math::Fast, false, &cases, SAMPLES);
     let (mut worst, mut all_counts, mut all_probabilities) = (Worst::default(), Vec::new(), Vec::new());
@@ -387,18 +388,19 @@ fn subject_check(gpu: &Gpu, subject: &Subject, alphas: &[f32]) -> Check {
         let lobes = judged(case);
         let of = Facets::new(case, &lobes, *kind);
         let what = format!("{what}, alpha {:.3e}, cosine {:.2}", of.alpha, of.wo.dot(of.n));
+        let mut of_case = Worst::default();
         for sample in samples {
-            require(sample.lobe == number(*kind) && sample.passes == 0, || format!("{what}: {sample:?} is of another lobe"))?;
+            require(sample.lobe == lobe && sample.passes == 0, || format!("{what}: {sample:?} is of another lobe"))?;
             require((sample.is_sharp != 0) == (lobes.class(*kind) == Class::Sharp), || format!("{what}: {sample:?} is of another class"))?;
             if sample.is_alive != 0 {
-                is_unit(&what, sample.direction, 16.0 * ULP)?;
-                let errors = value_errors(case, &of, sample);
-                require(errors.weight <= WEIGHT_ERROR, || format!("{what}: {sample:?}: the weight is off, {errors:?}"))?;
-                require(errors.density <= DENSITY_ERROR, || format!("{what}: {sample:?}: the density is off, {errors:?}"))?;
-                require(errors.own <= OWN_ERROR, || format!("{what}: {sample:?}: the BRDF is off, {errors:?}"))?;
-                worst.add(errors);
+                is_unit(&what, sample.direction, 32.0 * ULP)?;
+                of_case.add(value_errors(case, &of, sample));
             }
         }
+        worst.add(of_case);
+        require(of_case.weight <= ROUNDINGS, || format!("{what}: weights are off, {of_case:?}"))?;
+        require(of_case.density <= ROUNDINGS, || format!("{what}: densities are off, {of_case:?}"))?;
+        require(of_case.own <= ROUNDINGS, || format!("{what}: the BRDF is off, {of_case:?}"))?;
         let counts = of.counts(&samples.iter().collect::<Vec<_>>())?;
         let probabilities = of.probabilities();
         cells_check(&what, &counts, &probabilities)?;
@@ -416,8 +418,8 @@ fn subject_check(gpu: &Gpu, subject: &Subject, alphas: &[f32]) -> Check {
 #[test]
 fn lobes_by_themselves_follow_their_densities() {
     let Some(gpu) = device() else { return };
-    for subject in &SUBJECTS {
-        assert_holds(subject.what, subject_check(&gpu, subject, &alphas()));
+    for (number, subject) in SUBJECTS.iter().enumerate() {
+        assert_holds(subject.what, subject_check(&gpu, number, &alphas()));
     }
 }
 
@@ -449,8 +451,8 @@ fn mixtures() -> [(&'static str, LobeCase); 3] {
     ]
 }
 
-/// Of weights that rest on the tables of albedos.
-const TABLE_ERROR: f64 = 0.02;
+/// Of weights that rest on the tables of albedos. The worst is 0.0011.
+const TABLE_ERROR: f64 = 0.004;
 /// Below this cosine the tables are coarse.
 const LEAST_COSINE: f64 = 0.02;
 
@@ -515,12 +517,10 @@ fn mixture_check(gpu: &Gpu, math: Math) -> Check {
 #[test]
 fn all_lobes_of_a_surface_are_sampled_in_turn() {
     let Some(gpu) = device() else { return };
-    for math in BOTH_MATHS {
+    for math in [Math::Fast, Math::Strict] {
         assert_holds(format!("{math:?}"), mixture_check(&gpu, math));
     }
 }
-
-const BOTH_MATHS: [Math; 2] = [Math::Fast, Math::Strict];
 
 /// A change of a file of the kernel, and which check must notice it: that of a subject, or of mixtures.
 struct Fault {
@@ -529,6 +529,8 @@ struct Fault {
     from: &'static str,
     to: &'static str,
     subject: Option<usize>,
+    /// Part of the complaint.
+    noticed: &'static str,
 }
 
 const SAMPLING: &str = "material/layered_sampling.glsl";
@@ -540,6 +542,7 @@ const FAULTS: [Fault; 9] = [
         from: "return normalize(vec3(alpha * h.xy,",
         to: "return normalize(vec3(1.02 * alpha * h.xy,",
         subject: Some(0),
+        noticed: "chi-square",
     },
     Fault {
         what: "facets that are seen from the normal",
@@ -547,6 +550,7 @@ const FAULTS: [Fault; 9] = [
         from: "vec3 stretched = normalize(vec3(alpha * v.xy, v.z));",
         to: "vec3 stretched = vec3(0.0, 0.0, 1.0);",
         subject: Some(1),
+        noticed: "chi-square",
     },
     Fault {
         what: "a weight with the masking of an alpha 1 % too large",
@@ -554,14 +558,23 @@ const FAULTS: [Fault; 9] = [
         from: "4.0 * ggx_visibility(alpha,",
         to: "4.0 * ggx_visibility(1.01 * alpha,",
         subject: Some(1),
+        noticed: "weights are off",
     },
-    Fault { what: "a density 1 % too large", file: SAMPLING, from: "density *= 0.25;", to: "density *= 0.2525;", subject: Some(2) },
+    Fault {
+        what: "a density 1 % too large",
+        file: SAMPLING,
+        from: "density *= 0.25;",
+        to: "density *= 0.2525;",
+        subject: Some(2),
+        noticed: "densities are off",
+    },
     Fault {
         what: "refraction by an index 1 % too large",
         file: SAMPLING,
         from: "refracted_cosine_squared(along, lobes.eta);",
         to: "refracted_cosine_squared(along, 1.01 * lobes.eta);",
         subject: Some(3),
+        noticed: "weights are off",
     },
     Fault {
         what: "a density without the cosine of what is refracted",
@@ -569,6 +582,7 @@ const FAULTS: [Fault; 9] = [
         from: "density *= along * divide(l_h,",
         to: "density *= along * divide(1.0,",
         subject: Some(4),
+        noticed: "densities are off",
     },
     Fault {
         what: "a BTDF without the squared index",
@@ -576,6 +590,7 @@ const FAULTS: [Fault; 9] = [
         from: "return Weighed(eta * eta * both",
         to: "return Weighed(both",
         subject: Some(4),
+        noticed: "the BRDF is off",
     },
     Fault {
         what: "a number that chooses the lobe and the direction",
@@ -583,6 +598,7 @@ const FAULTS: [Fault; 9] = [
         from: "return sample_facet(surface, lobes, wo, u.yz,",
         to: "return sample_facet(surface, lobes, wo, u.xz,",
         subject: None,
+        noticed: "chi-square",
     },
     Fault {
         what: "a number that chooses the gap and the direction",
@@ -590,6 +606,7 @@ const FAULTS: [Fault; 9] = [
         from: "u.y = divide(u.y - lobes.pass_chance, 1.0 - lobes.pass_chance);",
         to: "",
         subject: None,
+        noticed: "chi-square",
     },
 ];
 
@@ -597,13 +614,14 @@ const FAULTS: [Fault; 9] = [
 fn faults_of_the_sampling_are_noticed() {
     let Some(mut gpu) = open(Options::default()) else { return };
     let alphas: Vec<f32> = alphas().into_iter().step_by(2).collect();
-    for Fault { what, file, from, to, subject } in FAULTS {
+    for Fault { what, file, from, to, subject, noticed } in FAULTS {
         gpu.replace(planted::kernels(&["check_lobes"], file, &[(from, to)]));
         let check = match subject {
-            Some(subject) => subject_check(&gpu, &SUBJECTS[subject], &alphas),
+            Some(subject) => subject_check(&gpu, subject, &alphas),
             None => mixture_check(&gpu, Math::Fast),
         };
         println!("{what}: {check:?}");
-        assert_complains(what, check);
+        let is_noticed = check.as_ref().is_err_and(|complaint| complaint.contains(noticed));
+        assert!(is_noticed, "{what} is to be noticed because {noticed}: {check:?}");
     }
 }

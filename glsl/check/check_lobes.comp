@@ -53,7 +53,7 @@ void main()
         lobes.coat_chance = at.lobe == LOBE_COAT ? lobes.coat_chance : 0.0;
         lobes.transmission_chance = at.lobe == LOBE_TRANSMISSION ? lobes.transmission_chance : 0.0;
     }
-    vec3 u = philox_floats(uvec4(index, 0, 0, 0), uvec2(17, 4)).xyz;
+    vec3 u = philox_floats(uvec4(index, 0, 0, 0), uvec2(at.seed, 4)).xyz;
     Scatter scatter = sample_layered(surface, lobes, at.wo, u, at.carries_radiance != 0);
     ChosenLobe chosen = choose_lobe(lobes, u.x);
     LobeLight light = weigh_light(surface, lobes, at.wo, scatter.direction, 0.0);
