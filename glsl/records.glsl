@@ -771,6 +771,51 @@ struct Samples {
     vec3 unpacked_direction;
 };
 
+// A layered surface as `glsl/check/check_lobes.comp` sees it.
+struct LobeCase {
+    // Unit vectors: towards the eye, and normals on its side.
+    vec3 wo;
+    vec3 ng;
+    vec3 ns;
+    vec3 coat_normal;
+    vec3 base_colour;
+    float metallic;
+    float alpha;
+    float ior;
+    float specular;
+    float transmission;
+    uint is_solid;
+    // Index of refraction where wo is, over that beyond.
+    float eta;
+    float coat;
+    float coat_alpha;
+    vec3 sheen;
+    float sheen_alpha;
+    float coverage;
+    // The only lobe that has a chance; NONE: all have.
+    uint lobe;
+    // Radiance is carried, as by a camera path, and no flux.
+    uint carries_radiance;
+    // Of random numbers.
+    uint seed;
+};
+
+// A sample of its lobes, and how they weigh light from there.
+struct LobeSample {
+    vec3 direction;
+    vec3 weight;
+    float density;
+    uint is_alive;
+    uint is_sharp;
+    uint passes;
+    // The chosen one, where the path does not pass, and its probability.
+    uint lobe;
+    float chance;
+    // BRDF times cosine.
+    vec3 matt;
+    vec3 sharp;
+};
+
 // What `glsl/check/check_packing_...` pack.
 struct PackingCase {
     // In the plane of its wall, where it has one.

@@ -28,6 +28,7 @@ mod layout;
 mod ledger;
 mod lights;
 mod limits;
+mod lobe_sampling;
 mod lobes;
 mod materials;
 mod media;

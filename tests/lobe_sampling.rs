@@ -1,0 +1,631 @@
+//! The lobes of layered materials as the kernels sample them: directions pass a two-sided chi-square test against the densities of
+//! the judge, which has the guide's formulas in f64; weights and densities are those of the judge and of the kernels' own BRDFs.
+
+use std::cell::Cell;
+
+use crate::common::chi_square::{Grid, counts_check, even};
+use crate::common::densities::{AXIS, ULP, frame, hemisphere_check, is_unit};
+use crate::common::planted;
+use crate::common::prelude::*;
+use crate::common::share_check;
+use photonmill::constants::NONE;
+use photonmill::gpu::kernels::{self, CheckLobes};
+use photonmill::records::{LobeCase, LobeSample};
+use photonmill::scene::albedo;
+use photonmill::verify::judge::lobes::{Class, Frame, Inputs, Kind, Lobes, Wall};
+
+const COSINES: [f64; 5] = [1.0, 0.8, 0.5, 0.2, 0.05];
+/// In the order of the kernels' numbers.
+const KINDS: [Kind; 5] = [Kind::Diffuse, Kind::Reflection, Kind::Coat, Kind::Transmission, Kind::Sheen];
+/// Of each case.
+const SAMPLES: usize = 8192;
+
+/// Roughnesses from the sharpest lobe that is no delta on, by even ratios.
+fn alphas() -> Vec<f32> {
+    (0..20).map(|k| (1.000_001 * 1e-4f64.powf(1.0 - f64::from(k) / 19.0)).min(1.0) as f32).collect()
+}
+
+/// A dielectric, seen at a cosine. Its normal has no special direction.
+fn plastic(alpha: f32, cosine: f64) -> LobeCase {
+    let sine = (1.0 - cosine * cosine).sqrt();
+    let wo = frame(AXIS, DVec3::X) * DVec3::new(0.6 * sine, 0.8 * sine, cosine);
+    let normal = AXIS.normalize().as_vec3();
+    LobeCase {
+        wo: wo.normalize().as_vec3(),
+        ng: normal,
+        ns: normal,
+        coat_normal: normal,
+        base_colour: Vec3::new(0.9, 0.4, 0.1),
+        alpha,
+        ior: 1.5,
+        specular: 1.0,
+        eta: 1.0,
+        coat_alpha: 1.0,
+        sheen_alpha: 1.0,
+        coverage: 1.0,
+        lobe: NONE,
+        seed: 100,
+        carries_radiance: 1,
+        ..LobeCase::default()
+    }
+}
+
+/// The same as a thin wall of glass.
+fn pane(alpha: f32, cosine: f64) -> LobeCase {
+    LobeCase { transmission: 1.0, ..plastic(alpha, cosine) }
+}
+
+/// A lobe by itself.
+struct Subject {
+    what: &'static str,
+    kind: Kind,
+    cosines: &'static [f64],
+    case: fn(f32, f64) -> LobeCase,
+}
+
+const SUBJECTS: [Subject; 6] = [
+    Subject {
+        what: "reflection of a metal",
+        kind: Kind::Reflection,
+        cosines: &COSINES,
+        case: |alpha, cosine| LobeCase { metallic: 1.0, ..plastic(alpha, cosine) },
+    },
+    Subject {
+        what: "coat",
+        kind: Kind::Coat,
+        cosines: &COSINES,
+        // Over black, of which nothing comes back.
+        case: |alpha, cosine| LobeCase { coat: 0.8, coat_alpha: alpha, specular: 0.0, base_colour: Vec3::ZERO, ..plastic(0.5, cosine) },
+    },
+    Subject { what: "thin transmission", kind: Kind::Transmission, cosines: &COSINES, case: pane },
+    Subject {
+        what: "refraction into glass",
+        kind: Kind::Transmission,
+        cosines: &COSINES,
+        case: |alpha, cosine| LobeCase { is_solid: 1, eta: 1.0 / 1.5, ..pane(alpha, cosine) },
+    },
+    Subject {
+        what: "refraction out of glass",
+        kind: Kind::Transmission,
+        // Total reflection begins at 0.745.
+        cosines: &[1.0, 0.8, 0.76, 0.5, 0.2, 0.05],
+        case: |alpha, cosine| LobeCase { is_solid: 1, eta: 1.5, carries_radiance: 0, ..pane(alpha, cosine) },
+    },
+    Subject {
+        what: "reflection in glass",
+        kind: Kind::Reflection,
+        cosines: &COSINES,
+        case: |alpha, cosine| LobeCase { is_solid: 1, eta: 1.5, ..pane(alpha, cosine) },
+    },
+];
+
+fn unit(v: Vec3) -> DVec3 {
+    v.as_dvec3().normalize()
+}
+
+fn number(kind: Kind) -> u32 {
+    KINDS.iter().position(|other| *other == kind).expect("every kind has a number") as u32
+}
+
+/// What the judge has for a case.
+fn judged(case: &LobeCase) -> Lobes {
+    let wall = if case.is_solid == 0 { Wall::Thin } else { Wall::Solid { from: f64::from(case.eta), to: 1.0 } };
+    let inputs = Inputs {
+        base_colour: case.base_colour.as_dvec3(),
+        metalness: case.metallic.into(),
+        alpha: case.alpha.into(),
+        ior: case.ior.into(),
+        specular: case.specular.into(),
+        specular_colour: DVec3::ONE,
+        transmission: case.transmission.into(),
+        wall,
+        coat: case.coat.into(),
+        coat_alpha: case.coat_alpha.into(),
+        sheen_colour: case.sheen.as_dvec3(),
+        sheen_s: case.sheen_alpha.into(),
+    };
+    Lobes::new(inputs, Frame { wo: unit(case.wo), ng: unit(case.ng), n: unit(case.ns), coat_n: unit(case.coat_normal) })
+}
+
+/// A direction with the digits that rounding took from its largest component.
+fn sharpened(w: Vec3) -> DVec3 {
+    let mut w = w.as_dvec3();
+    let largest = w.abs().max_position();
+    let rest = w.length_squared() - w[largest] * w[largest];
+    w[largest] = w[largest].signum() * (1.0 - rest).max(0.0).sqrt();
+    w
+}
+
+/// A lobe of GGX as the half vectors see it. Their place is (psi / (pi / 2), azimuth) with tan(angle) = alpha tan(psi): lobes of every
+/// width are equally wide there.
+struct Facets<'a> {
+    lobes: &'a Lobes,
+    kind: Kind,
+    wo: DVec3,
+    n: DVec3,
+    frame: DMat3,
+    alpha: f64,
+    /// Index on this side over the other one, where light is refracted.
+    eta: Option<f64>,
+}
+
+impl Facets<'_> {
+    fn new<'a>(case: &LobeCase, lobes: &'a Lobes, kind: Kind) -> Facets<'a> {
+        let (n, alpha) = if kind == Kind::Coat { (case.coat_normal, case.coat_alpha) } else { (case.ns, case.alpha) };
+        let (wo, n) = (unit(case.wo), unit(n));
+        let is_refracted = kind == Kind::Transmission && case.is_solid != 0;
+        Facets { lobes, kind, wo, n, frame: frame(n, wo), alpha: alpha.into(), eta: is_refracted.then(|| case.eta.into()) }
+    }
+
+    /// Of any length.
+    fn half(&self, wi: DVec3) -> DVec3 {
+        match (self.eta, self.kind) {
+            (Some(eta), _) => {
+                let h = eta * self.wo + wi;
+                if h.dot(self.n) < 0.0 { -h } else { h }
+            }
+            (None, Kind::Transmission) => self.wo + wi - 2.0 * wi.dot(self.n) * self.n,
+            _ => self.wo + wi,
+        }
+    }
+
+    fn place(&self, wi: DVec3) -> (f64, f64) {
+        let h = self.frame.transpose() * self.half(wi);
+        (h.truncate().length().atan2(self.alpha * h.z) / FRAC_PI_2, h.y.atan2(h.x))
+    }
+
+    /// Where a half vector sends light, and the solid angle there over its own.
+    fn lit(&self, h: DVec3) -> Option<(DVec3, f64)> {
+        let v_h = self.wo.dot(h);
+        if v_h <= 0.0 {
+            return None;
+        }
+        match self.eta {
+            Some(eta) => {
+                let squared = 1.0 - eta * eta * (1.0 - v_h * v_h);
+                let spread = eta * v_h - squared.max(0.0).sqrt();
+                (squared > 0.0).then(|| (spread * h - eta * self.wo, spread * spread / squared.sqrt()))
+            }
+            None => {
+                let wi = 2.0 * v_h * h - self.wo;
+                let is_beyond = self.kind == Kind::Transmission;
+                Some((if is_beyond { wi - 2.0 * wi.dot(self.n) * self.n } else { wi }, 4.0 * v_h))
+            }
+        }
+    }
+
+    /// The judge's density, per area of places.
+    fn density(&self, x: f64, azimuth: f64) -> f64 {
+        let (psi_sin, psi_cos) = (FRAC_PI_2 * x).sin_cos();
+        let slope = self.alpha * psi_sin / psi_cos;
+        let cos = 1.0 / (1.0 + slope * slope).sqrt();
+        let local = cos * DVec3::new(slope * azimuth.cos(), slope * azimuth.sin(), 1.0);
+        let solid_angle = slope * cos.powi(3) * self.alpha / (psi_cos * psi_cos) * FRAC_PI_2;
+        self.lit(self.frame * local).map_or(0.0, |(wi, spread)| self.lobes.density(self.kind, wi) * spread * solid_angle)
+    }
+
+    /// Probabilities of the cells, and that no light goes on.
+    fn probabilities(&self) -> Vec<f64> {
+        let grid = cells();
+        let mut probabilities = Vec::new();
+        for y in grid.y.windows(2) {
+            for x in grid.x.windows(2) {
+                let (has_light, has_none) = (Cell::new(false), Cell::new(false));
+                let density = |x: f64, azimuth: f64| {
+                    let density = self.density(x, azimuth);
+                    if density > 0.0 { &has_light } else { &has_none }.set(true);
+                    density
+                };
+                let cell = |count| Grid { x: even(x[0], x[1], count), y: even(y[0], y[1], count) };
+                let mut probability: f64 = cell(1).probabilities(&density).iter().sum();
+                // The density ends within the cell.
+                if has_light.get() && has_none.get() && probability > 1e-6 {
+                    probability = cell(6).probabilities(&density).iter().sum();
+                }
+                probabilities.push(probability);
+            }
+        }
+        let sum: f64 = probabilities.iter().sum();
+        probabilities.push((1.0 - sum).max(0.0));
+        probabilities
+    }
+
+    /// Samples in each cell, and those of no light.
+    fn counts(&self, samples: &[&LobeSample]) -> Result<Vec<u64>, String> {
+        let alive = samples.iter().filter(|sample| sample.is_alive != 0);
+        let places: Vec<(f64, f64)> = alive.map(|sample| self.place(sharpened(sample.direction))).collect();
+        let mut counts = cells().counts(&places)?;
+        counts.push((samples.len() - places.len()) as u64);
+        Ok(counts)
+    }
+}
+
+/// The last ones are small: out of glass at grazing angles only facets that are tilted far let light through.
+fn cells() -> Grid {
+    let x = even(0.0, 0.9, 9).into_iter().chain([0.95, 0.98, 0.99, 0.995, 0.998, 0.999, 0.9995, 1.0]);
+    Grid { x: x.collect(), y: even(-PI, PI, 12) }
+}
+
+/// Chi-square, or where nearly no sample goes on whether there are too many.
+fn cells_check(what: &str, counts: &[u64], probabilities: &[f64]) -> Check {
+    let sum: f64 = probabilities.iter().sum();
+    require((sum - 1.0).abs() < 1e-3, || format!("{what}: the density integrates to {sum}"))?;
+    let trials = counts.iter().sum::<u64>();
+    let alive = trials - counts[counts.len() - 1];
+    let expected = trials as f64 * (1.0 - probabilities[probabilities.len() - 1]);
+    if expected < 20.0 {
+        return require(alive as f64 <= expected + 6.0 * expected.sqrt() + 6.0, || {
+            format!("{what}: {alive} samples instead of {expected}")
+        });
+    }
+    counts_check(what, counts, probabilities)
+}
+
+/// What f32 loses: relative errors are bounded by so many units of its rounding, times what the geometry multiplies them by. The worst
+/// that lavapipe has is 9.
+const ROUNDINGS: f64 = 24.0;
+/// Radians that packing turns the normal of a matt coat by.
+const PACKED_NORMAL: f64 = 7e-5;
+
+/// The largest relative differences, in units of [`ULP`] times what the geometry multiplies them by, from the judge: of weights, of
+/// densities; and of their product from the kernel's own BRDF times cosine.
+#[derive(Debug, Default, Clone, Copy)]
+struct Worst {
+    weight: f64,
+    density: f64,
+    own: f64,
+    /// Next to the horizon nothing can be said.
+    left_out: usize,
+}
+
+impl Worst {
+    fn add(&mut self, other: Worst) {
+        self.weight = self.weight.max(other.weight);
+        self.density = self.density.max(other.density);
+        self.own = self.own.max(other.own);
+        self.left_out += other.left_out;
+    }
+}
+
+fn relative_error(found: f64, expected: f64) -> f64 {
+    let error = (found - expected).abs() / found.abs().max(expected.abs());
+    if found == expected {
+        0.0
+    } else if error.is_nan() {
+        f64::INFINITY
+    } else {
+        error
+    }
+}
+
+/// The largest of three channels.
+fn largest_relative_error(found: Vec3, expected: DVec3) -> f64 {
+    (0..3).map(|channel| relative_error(found[channel].into(), expected[channel])).fold(0.0, f64::max)
+}
+
+/// A living sample of a lobe of GGX.
+fn value_errors(case: &LobeCase, of: &Facets, sample: &LobeSample) -> Worst {
+    let wi = sharpened(sample.direction);
+    let half = of.half(wi);
+    let v_h = of.wo.dot(half) / half.length();
+    let (cos_v, cos_l) = (of.wo.dot(of.n), wi.dot(of.n).abs());
+    // Exact reflectance has a root that ends where total reflection begins.
+    let root = 1.0 - f64::from(case.eta).powi(2) * (1.0 - v_h * v_h);
+    let smooth = 1.0 / cos_v + 1.0 / cos_l + 1.0 / v_h + if case.is_solid == 0 { 0.0 } else { 1.0 / root.abs() };
+    // The half vector has the error of the kernel's frame, and that of the direction over its own length.
+    let sharp = smooth + (1.0 + 1.0 / half.length()) / of.alpha;
+    if smooth * ULP > 1e-3 {
+        return Worst { left_out: 1, ..Worst::default() };
+    }
+    let chance = f64::from(sample.chance);
+    let (density, value) = (of.lobes.density(of.kind, wi), of.lobes.evaluate(of.kind, wi) * wi.dot(of.lobes.axis(of.kind)));
+    // Refraction compresses radiance, and no flux.
+    let flux = if case.carries_radiance == 0 && of.eta.is_some() { f64::from(case.eta).powi(-2) } else { 1.0 };
+    let is_matt = sample.is_sharp == 0;
+    let own = if is_matt { sample.matt } else { sample.sharp };
+    let own_unit = if is_matt && of.kind == Kind::Coat { PACKED_NORMAL } else { ULP };
+    Worst {
+        weight: largest_relative_error(sample.weight, value * flux / (density * chance)) / (smooth * ULP),
+        density: relative_error(sample.density.into(), density * chance) / (sharp * ULP),
+        own: largest_relative_error(own, sample.weight.as_dvec3() * f64::from(sample.density) / flux) / (sharp * own_unit),
+        left_out: 0,
+    }
+}
+
+/// On a scene of nothing but the table of albedos.
+fn ask(gpu: &Gpu, math: Math, passing: bool, cases: &[LobeCase], samples: usize) -> Vec<LobeSample> {
+    let constants = Constants::new(128)
+        .set("STRICT_MATH", math as u32)
+        .set("HAS_LAYERS", 1)
+        .set("HAS_TRANSMISSION", 1)
+        .set("HAS_COATS", 1)
+        .set("HAS_SHEEN", 1)
+        .set("HAS_PASSING", u32::from(passing));
+    let commands = &mut Commands::new(gpu, constants, Instant::now()).unwrap();
+    fn one<T: bytemuck::Pod>(gpu: &Gpu) -> photonmill::gpu::Buffer<T> {
+        gpu.buffer("nothing", 1, Memory::Device).unwrap()
+    }
+    let albedos = gpu.buffer("albedos", albedo::TABLE.len() as u64, Memory::Device).unwrap();
+    commands.upload(&albedos, &albedo::TABLE).unwrap();
+    let scene = &kernels::Scene {
+        nodes: one(gpu),
+        triangles: one(gpu),
+        normals: one(gpu),
+        uvs: one(gpu),
+        materials: one(gpu),
+        textures: one(gpu),
+        texels: one(gpu),
+        emitters: one(gpu),
+        caustic_targets: one(gpu),
+        planes: one(gpu),
+        light_nodes: one(gpu),
+        light_regions: one(gpu),
+        light_shares: one(gpu),
+        openings: one(gpu),
+        colours: one(gpu),
+        texels_1: one(gpu),
+        texels_2: one(gpu),
+        texels_3: one(gpu),
+        triangle_layers: one(gpu),
+        layered_materials: one(gpu),
+        albedos,
+    };
+    let inputs = gpu.buffer("lobe cases", cases.len() as u64, Memory::Device).unwrap();
+    commands.upload(&inputs, cases).unwrap();
+    let count = cases.len() * samples;
+    let results = gpu.buffer("lobe samples", count as u64, Memory::Device).unwrap();
+    commands.dispatch(CheckLobes { scene, cases: &inputs, results: &results }, &(), Extent::Items(count as u64)).unwrap();
+    commands.read(&results, count).unwrap()
+}
+
+/// All checks of a lobe at these roughnesses, by itself and over all of them.
+fn subject_check(gpu: &Gpu, subject: usize, alphas: &[f32]) -> Check {
+    let Subject { what, kind, cosines, case } = &SUBJECTS[subject];
+    let (seed, lobe) = (subject as u32, number(*kind));
+    let with = |alpha: f32| cosines.iter().map(move |cosine| LobeCase { seed, lobe, ..case(alpha, *cosine) });
+    let cases: Vec<LobeCase> = alphas.iter().flat_map(|alpha| with(*alpha)).collect();
+    let samples = ask(gpu, Math::Fast, false, &cases, SAMPLES);
+    let (mut worst, mut all_counts, mut all_probabilities) = (Worst::default(), Vec::new(), Vec::new());
+    for (case, samples) in pairs(&cases, samples.chunks(SAMPLES)) {
+        let lobes = judged(case);
+        let of = Facets::new(case, &lobes, *kind);
+        let what = format!("{what}, alpha {:.3e}, cosine {:.2}", of.alpha, of.wo.dot(of.n));
+        let mut of_case = Worst::default();
+        for sample in samples {
+            require(sample.lobe == lobe && sample.passes == 0, || format!("{what}: {sample:?} is of another lobe"))?;
+            require((sample.is_sharp != 0) == (lobes.class(*kind) == Class::Sharp), || format!("{what}: {sample:?} is of another class"))?;
+            if sample.is_alive != 0 {
+                is_unit(&what, sample.direction, 32.0 * ULP)?;
+                of_case.add(value_errors(case, &of, sample));
+            }
+        }
+        worst.add(of_case);
+        require(of_case.weight <= ROUNDINGS, || format!("{what}: weights are off, {of_case:?}"))?;
+        require(of_case.density <= ROUNDINGS, || format!("{what}: densities are off, {of_case:?}"))?;
+        require(of_case.own <= ROUNDINGS, || format!("{what}: the BRDF is off, {of_case:?}"))?;
+        let counts = of.counts(&samples.iter().collect::<Vec<_>>())?;
+        let probabilities = of.probabilities();
+        cells_check(&what, &counts, &probabilities)?;
+        all_counts.resize(counts.len(), 0);
+        all_probabilities.resize(counts.len(), 0.0);
+        all_counts.iter_mut().zip(counts).for_each(|(sum, count)| *sum += count);
+        all_probabilities.iter_mut().zip(probabilities).for_each(|(sum, share)| *sum += share / cases.len() as f64);
+    }
+    println!("{what}: {worst:?}");
+    let share = worst.left_out as f64 / (cases.len() * SAMPLES) as f64;
+    require(share < 1e-4, || format!("{what}: {share} of all samples lie too near the horizon"))?;
+    cells_check(&format!("{what}, all together"), &all_counts, &all_probabilities)
+}
+
+#[test]
+fn lobes_by_themselves_follow_their_densities() {
+    let Some(gpu) = device() else { return };
+    for (number, subject) in SUBJECTS.iter().enumerate() {
+        assert_holds(subject.what, subject_check(&gpu, number, &alphas()));
+    }
+}
+
+/// A unit vector off another by a tenth or so.
+fn tilted(normal: Vec3, aside: Vec3) -> Vec3 {
+    (unit(normal) + 0.15 * aside.as_dvec3()).normalize().as_vec3()
+}
+
+/// Surfaces of many lobes.
+fn mixtures() -> [(&'static str, LobeCase); 3] {
+    let sheen = Vec3::new(0.3, 0.25, 0.1);
+    let all = LobeCase {
+        coat: 0.7,
+        coat_alpha: 0.2,
+        metallic: 0.3,
+        transmission: 0.4,
+        sheen,
+        sheen_alpha: 0.3,
+        coverage: 0.7,
+        ..plastic(0.1, 0.6)
+    };
+    [
+        ("a thin wall of all lobes", LobeCase { ng: tilted(all.ng, Vec3::X), coat_normal: tilted(all.ns, Vec3::Z), ..all }),
+        ("matt lobes", LobeCase { alpha: 0.5, coat_alpha: 0.4, transmission: 0.0, sheen_alpha: 0.1, coverage: 0.2, ..all }),
+        (
+            "coated glass",
+            LobeCase { is_solid: 1, eta: 1.0 / 1.5, transmission: 0.8, coat: 0.4, sheen: Vec3::ZERO, coverage: 1.0, ..plastic(0.3, 0.8) },
+        ),
+    ]
+}
+
+/// Of weights that rest on the tables of albedos. The worst is 0.0011.
+const TABLE_ERROR: f64 = 0.004;
+/// Below this cosine the tables are coarse.
+const LEAST_COSINE: f64 = 0.02;
+
+/// All lobes, as a path chooses among them.
+fn mixture_check(gpu: &Gpu, math: Math) -> Check {
+    let samples_of_each = 16 * SAMPLES;
+    let (names, cases): (Vec<_>, Vec<_>) = mixtures().into_iter().unzip();
+    let samples = ask(gpu, math, true, &cases, samples_of_each);
+    for ((what, case), samples) in pairs(pairs(names, &cases), samples.chunks(samples_of_each)) {
+        let lobes = judged(case);
+        let (passed, met): (Vec<&LobeSample>, Vec<&LobeSample>) = samples.iter().partition(|sample| sample.passes != 0);
+        let gap = f64::from(1.0 - case.coverage);
+        if gap > 0.0 {
+            share_check(what, passed.len() as u64, samples.len() as u64, gap)?;
+        }
+        for sample in &passed {
+            let is_right = sample.direction == -case.wo && sample.is_alive != 0 && sample.density == 0.0;
+            require(is_right && largest_relative_error(sample.weight, DVec3::ONE) < 4.0 * ULP, || {
+                format!("{what}: {sample:?} does not pass")
+            })?;
+        }
+        let chance = |kind| met.iter().find(|sample| sample.lobe == number(kind)).map_or(0.0, |sample| f64::from(sample.chance));
+        let chances = KINDS.map(chance);
+        let sum: f64 = chances.iter().sum();
+        require((sum - 1.0).abs() < 8.0 * ULP, || format!("{what}: {chances:?} make {sum}"))?;
+        let of_kinds = KINDS.map(|kind| met.iter().copied().filter(|sample| sample.lobe == number(kind)).collect::<Vec<_>>());
+        counts_check(what, &of_kinds.each_ref().map(|of| of.len() as u64), &chances)?;
+
+        let mut worst = [0.0f64; 2];
+        for (kind, samples) in KINDS.into_iter().zip(of_kinds) {
+            if samples.is_empty() {
+                continue;
+            }
+            let of = Facets::new(case, &lobes, kind);
+            let what = format!("{math:?}, {what}, {kind:?}");
+            if matches!(kind, Kind::Diffuse | Kind::Sheen) {
+                let directions: Vec<Vec3> = samples.iter().map(|sample| sample.direction).collect();
+                hemisphere_check(&what, &directions, of.frame, |wi| wi.dot(of.n) / PI)?;
+            } else {
+                cells_check(&what, &of.counts(&samples)?, &of.probabilities())?;
+            }
+            for sample in samples {
+                let wi = sharpened(sample.direction);
+                let cosine = wi.dot(lobes.axis(kind));
+                if sample.is_alive == 0 || wi.dot(of.n).abs().min(cosine) < LEAST_COSINE {
+                    continue;
+                }
+                let is_broad = matches!(kind, Kind::Diffuse | Kind::Sheen);
+                let density = if is_broad { cosine / PI } else { lobes.density(kind, wi) };
+                let expected = lobes.evaluate(kind, wi) * cosine / (density * f64::from(sample.chance));
+                let weight = largest_relative_error(sample.weight, expected);
+                let all: DVec3 = KINDS.into_iter().map(|kind| lobes.evaluate(kind, wi) * wi.dot(lobes.axis(kind)).max(0.0)).sum();
+                let together = largest_relative_error(sample.matt + sample.sharp, all);
+                require(weight < TABLE_ERROR, || format!("{what}: {sample:?}: the weight is {weight} off {expected}"))?;
+                require(together < TABLE_ERROR, || format!("{what}: {sample:?}: the BRDF is {together} off {all}"))?;
+                worst = [worst[0].max(weight), worst[1].max(together)];
+            }
+        }
+        println!("{math:?}, {what}: weights up to {:.1e} off, BRDFs {:.1e}", worst[0], worst[1]);
+    }
+    Ok(())
+}
+
+#[test]
+fn surfaces_of_many_lobes_are_sampled_as_they_weigh_light() {
+    let Some(gpu) = device() else { return };
+    for math in [Math::Fast, Math::Strict] {
+        assert_holds(format!("{math:?}"), mixture_check(&gpu, math));
+    }
+}
+
+/// A change of a file of the kernel, and which check must notice it: that of a subject, or of mixtures.
+struct Fault {
+    what: &'static str,
+    file: &'static str,
+    from: &'static str,
+    to: &'static str,
+    subject: Option<usize>,
+    /// Part of the complaint.
+    noticed: &'static str,
+}
+
+const SAMPLING: &str = "material/layered_sampling.glsl";
+
+const FAULTS: [Fault; 9] = [
+    Fault {
+        what: "facets of an alpha 2 % too large",
+        file: "material/ggx.glsl",
+        from: "return normalize(vec3(alpha * h.xy,",
+        to: "return normalize(vec3(1.02 * alpha * h.xy,",
+        subject: Some(0),
+        noticed: "chi-square",
+    },
+    Fault {
+        what: "facets that are seen from the normal",
+        file: "material/ggx.glsl",
+        from: "vec3 stretched = normalize(vec3(alpha * v.xy, v.z));",
+        to: "vec3 stretched = vec3(0.0, 0.0, 1.0);",
+        subject: Some(1),
+        noticed: "chi-square",
+    },
+    Fault {
+        what: "a weight with the masking of an alpha 1 % too large",
+        file: SAMPLING,
+        from: "4.0 * ggx_visibility(alpha,",
+        to: "4.0 * ggx_visibility(1.01 * alpha,",
+        subject: Some(1),
+        noticed: "weights are off",
+    },
+    Fault {
+        what: "a density 1 % too large",
+        file: SAMPLING,
+        from: "density *= 0.25;",
+        to: "density *= 0.2525;",
+        subject: Some(2),
+        noticed: "densities are off",
+    },
+    Fault {
+        what: "refraction by an index 1 % too large",
+        file: SAMPLING,
+        from: "refracted_cosine_squared(along, lobes.eta);",
+        to: "refracted_cosine_squared(along, 1.01 * lobes.eta);",
+        subject: Some(3),
+        noticed: "weights are off",
+    },
+    Fault {
+        what: "a density without the cosine of what is refracted",
+        file: SAMPLING,
+        from: "density *= along * divide(l_h,",
+        to: "density *= along * divide(1.0,",
+        subject: Some(4),
+        noticed: "densities are off",
+    },
+    Fault {
+        what: "a BTDF without the squared index",
+        file: "material/layered_lobes.glsl",
+        from: "return Weighed(eta * eta * both",
+        to: "return Weighed(both",
+        subject: Some(4),
+        noticed: "the BRDF is off",
+    },
+    Fault {
+        what: "a number that chooses the lobe and the direction",
+        file: SAMPLING,
+        from: "return sample_facet(surface, lobes, wo, u.yz,",
+        to: "return sample_facet(surface, lobes, wo, u.xz,",
+        subject: None,
+        noticed: "chi-square",
+    },
+    Fault {
+        what: "a number that chooses the gap and the direction",
+        file: SAMPLING,
+        from: "u.y = divide(u.y - lobes.pass_chance, 1.0 - lobes.pass_chance);",
+        to: "",
+        subject: None,
+        noticed: "chi-square",
+    },
+];
+
+#[test]
+fn faults_of_the_sampling_are_noticed() {
+    let Some(mut gpu) = open(Options::default()) else { return };
+    let alphas: Vec<f32> = alphas().into_iter().step_by(2).collect();
+    for Fault { what, file, from, to, subject, noticed } in FAULTS {
+        gpu.replace(planted::kernels(&["check_lobes"], file, &[(from, to)]));
+        let check = match subject {
+            Some(subject) => subject_check(&gpu, subject, &alphas),
+            None => mixture_check(&gpu, Math::Fast),
+        };
+        println!("{what}: {check:?}");
+        let is_noticed = check.as_ref().is_err_and(|complaint| complaint.contains(noticed));
+        assert!(is_noticed, "{what} is to be noticed because {noticed}: {check:?}");
+    }
+}
