@@ -625,7 +625,17 @@ fn a_blender_file_loads() {
     assert!(kinds.iter().any(|kind| matches!(kind, LightKind::Point { .. })), "{kinds:?}");
     assert!(kinds.iter().any(|kind| matches!(kind, LightKind::Spot { .. })), "{kinds:?}");
     assert!(kinds.iter().any(|kind| matches!(kind, LightKind::Directional { .. })), "{kinds:?}");
-    assert_eq!(scene.triangle_count(), 3 * 2 + 2 * (32 * 16 * 2 - 2 * 32));
+    let ball = |segments: usize| segments * segments - 2 * segments;
+    assert_eq!(scene.triangle_count(), 6 * 2 + 2 * ball(32) + 5 * ball(16));
+    let parts = |mesh: &str| material_of(mesh).layers;
+    assert_eq!((parts("lacquer").coat, parts("velvet").sheen_colour), (1.0, Vec3::ONE));
+    assert!(material_of("worn").normal_map.is_some() && parts("worn").metallic_roughness_texture.is_some());
+    assert!(parts("amber").medium.unwrap().transmittance.z < 1e-3, "{:?}", parts("amber").medium);
+    assert_eq!((parts("frosted").transmission, parts("frosted").medium), (1.0, None));
+    assert!(matches!(material_of("leaf").coverage, Coverage::Mask { .. }));
+    assert!(matches!(material_of("net").coverage, Coverage::Blend { .. }));
+    assert!(scene.meshes.iter().any(|mesh| mesh.name.starts_with("shell") && !mesh.colours.is_empty()));
+    assert!(parts("shell").specular_colour.y < 1.0);
 }
 
 fn rgba_png(width: u32, height: u32, of: impl Fn(u32, u32) -> [u8; 4]) -> String {

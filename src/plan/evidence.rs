@@ -178,7 +178,10 @@ impl<'a> Facts<'a> {
                 None => (false, "no mirror and no dielectric material".into()),
             },
             Effect::Textures => found("textured", &|material| material.textures().next().is_some(), "no textured material"),
-            Effect::VertexColours => some(self.coloured, "triangle with vertex colours"),
+            Effect::VertexColours => match self.coloured {
+                0 => (false, "no vertex colours".into()),
+                count => (true, format!("vertex colours on {}", counted(count, "triangle"))),
+            },
             Effect::Environment => lights(EMITTER_ENVIRONMENT, "environment"),
             Effect::MeshLights => some(self.emitters[EMITTER_TRIANGLE as usize], "emissive triangle"),
             Effect::PointLights => lights(EMITTER_POINT, "point"),
