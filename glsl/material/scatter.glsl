@@ -6,7 +6,7 @@ struct Scatter {
     bool alive;
     bool is_specular; // by a lobe that rays follow; photon maps know the others
     bool passes; // straight, as if no surface were there
-    float density; // of the direction, 1/sr; 0: that of a delta, or of a lobe that photon maps know
+    float density; // of the direction, 1/sr; 0: that of a delta, of the diffuse lobe or of sheen
 };
 
 // Fresnel reflectance of unpolarised light; eta = n_i / n_t.
