@@ -90,14 +90,19 @@ impl Contents {
             triangle_counts[mesh.material] += mesh.triangles.len();
         }
         let (low, high) = scene.bounds();
-        let material = |(material, triangle_count): (&Material, usize)| MaterialEntry {
+        let mut is_coloured = vec![false; scene.materials.len()];
+        for mesh in &scene.meshes {
+            is_coloured[mesh.material] |= !mesh.colours.is_empty() || !mesh.alphas.is_empty();
+        }
+        let material = |((material, triangle_count), is_coloured): ((&Material, usize), bool)| MaterialEntry {
             name: material.name.clone(),
-            description: description(material, &scene.textures),
+            description: description(material, &scene.textures) + if is_coloured { ", times vertex colours" } else { "" },
             triangle_count,
         };
         // The reader's own, which most files need not.
         let is_own = |material: &Material| *material == Material::layered("default", Vec3::ONE, Layers::default());
-        let materials = scene.materials.iter().zip(triangle_counts).filter(|(material, count)| *count > 0 || !is_own(material));
+        let counted_materials = scene.materials.iter().zip(triangle_counts).zip(is_coloured);
+        let materials = counted_materials.filter(|((material, count), _)| *count > 0 || !is_own(material));
         Contents {
             name: scene.name.clone(),
             mesh_count: scene.meshes.len(),
