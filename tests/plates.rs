@@ -45,6 +45,7 @@ fn sheets_let_their_share_pass() {
     for illumination in BOTH {
         assert_holds("the sun", sheets::sun_through_sheets(&gpu, illumination));
     }
+    assert_holds("a lamp", sheets::lamp_between_sheets(&gpu));
     assert_holds("the eye", sheets::floor_through_sheets(&gpu));
 }
 
@@ -52,8 +53,20 @@ fn sheets_let_their_share_pass() {
 fn plates_return_what_the_sky_sends() {
     let Some(gpu) = device() else { return };
     for within_a_dome in [false, true] {
-        assert_holds("the sky", layered::furnace(&gpu, within_a_dome));
+        assert_holds("the sky", layered::furnace(&gpu, &layered::opaque(), within_a_dome));
     }
+}
+
+#[test]
+fn rough_plates_let_the_light_of_a_dome_through() {
+    let Some(gpu) = device() else { return };
+    assert_holds("rough plates", layered::transmission_in_a_dome(&gpu));
+}
+
+#[test]
+fn photon_maps_have_the_lobes_of_the_guide() {
+    let Some(gpu) = device() else { return };
+    assert_holds("photons", layered::photons_on_a_plate(&gpu));
 }
 
 #[test]

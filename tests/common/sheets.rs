@@ -131,6 +131,17 @@ pub fn sun_through_sheets(gpu: &Gpu, illumination: Illumination) -> Check<Compla
     compare(&format!("{illumination:?}"), &stacks, &lit, &(0..stacks.len()).collect::<Vec<_>>(), cosine)
 }
 
+/// A lamp of 1 W/sr, 1 m above a floor, through two sheets, with a third one above it.
+pub fn lamp_between_sheets(gpu: &Gpu) -> Check<Complaint> {
+    let meshes = [0.0, 0.3, 0.6, 1.2].map(|height| level(height, [1.0; 2], true, usize::from(height > 0.0)));
+    let half = Material { two_sided: true, ..blended(0.5, dull(0.0)) };
+    let scene = scene_of(meshes.into(), vec![matt(0.0), half], vec![point(DVec3::Y)]);
+    let settings = SceneSettings { rounds: 1, part: Part::Direct, ..SceneSettings::default() };
+    let found = means(&received(gpu, &scene, &settings, &[(DVec3::ZERO, DVec3::Y)]))[0].x;
+    // Nothing is random.
+    estimate_check("a lamp between sheets", found, 0.25, 1e-5)
+}
+
 /// A shining floor through every stack, seen straight from above.
 pub fn floor_through_sheets(gpu: &Gpu) -> Check<Complaint> {
     let stacks = stacks();
