@@ -86,7 +86,6 @@ enum Question {
     // The checks of `common::layered`, `common::sheets` and `media`.
     PlatesInTheSun(Mixtures),
     MetalsUnderTheSky,
-    MetalsInADome,
     NormalMaps,
     LayerTextures,
     ClearBalls,
@@ -95,12 +94,15 @@ enum Question {
     AbsorbingSlab,
     NestedSlabs,
     OverlappingSlabs,
-    TransmissionInADome,
+    TransmissionInHalfADome,
     PhotonsOnAPlate,
     EyeInGlass,
     PhotonsThroughASlab,
     LampInAMedium,
     LampBetweenSheets,
+    CoatsAndBacks,
+    PhotonsOffAPane,
+    BlendedLamp,
 }
 
 use Question::*;
@@ -109,7 +111,7 @@ impl Question {
     /// Whether another test, the same for every device, shows that a device without a fault answers it right.
     fn has_a_test_of_its_own(self) -> bool {
         let of_room = matches!(self, Photons(_) | RoomFilm(_) | Nearest | StripedCounters | Ledger(_) | FiniteBox | Pairs | StrictMath);
-        let of_layers = matches!(self, PlatesInTheSun(_) | MetalsUnderTheSky | MetalsInADome);
+        let of_layers = matches!(self, PlatesInTheSun(_) | MetalsUnderTheSky);
         !of_room && !of_layers && !matches!(self, Appends | Builders | Finite | Crowds | ManyLamps(_) | AimedLight(_))
     }
 }
@@ -130,9 +132,25 @@ impl Question {
             Photons(_) | StripedCounters | RoomFilm(_) | Ledger(_) | ClosedForm(_) | Builders | StrictMath | Nearest | Pairs
             | FiniteBox => Subject::Room,
             AimedLight(_) => Subject::Aiming,
-            PlatesInTheSun(_) | MetalsUnderTheSky | MetalsInADome | NormalMaps | LayerTextures | ClearBalls | FloorThroughSheets
-            | SolidsFromInside | AbsorbingSlab | NestedSlabs | OverlappingSlabs | TransmissionInADome | PhotonsOnAPlate | EyeInGlass
-            | PhotonsThroughASlab | LampInAMedium | LampBetweenSheets => Subject::Layers,
+            PlatesInTheSun(_)
+            | MetalsUnderTheSky
+            | NormalMaps
+            | LayerTextures
+            | ClearBalls
+            | FloorThroughSheets
+            | SolidsFromInside
+            | AbsorbingSlab
+            | NestedSlabs
+            | OverlappingSlabs
+            | TransmissionInHalfADome
+            | PhotonsOnAPlate
+            | EyeInGlass
+            | PhotonsThroughASlab
+            | LampInAMedium
+            | LampBetweenSheets
+            | CoatsAndBacks
+            | PhotonsOffAPane
+            | BlendedLamp => Subject::Layers,
             BrightSpot | DimRoom(_) | ManyLamps(_) | MissedLamp | HiddenLamp | LampBehindHole | SecondOpening | DimPhotons => {
                 Subject::Lamps
             }
@@ -154,7 +172,7 @@ struct Fault {
 }
 
 #[rustfmt::skip]
-const FAULTS: [Fault; 122] = [
+const FAULTS: [Fault; 129] = [
     Fault { what: "what rounding takes from a pair of floats is forgotten",
         file: "film/float_u64.glsl", from: "precise float rest = sum.y + (", to: "precise float rest = 0.0 * (",
         kernels: &["gather_brute_u64", "gather_grid_u64"], noticed_by: &[(Pairs, SumsTooSmall)] },
@@ -530,7 +548,7 @@ const FAULTS: [Fault; 122] = [
         kernels: &["view"], noticed_by: &[(MetalsUnderTheSky, TooBright)] },
     Fault { what: "paths that meet a lamp are weighed as if it were the only one",
         file: "world/scene/lights.glsl", from: "return light.probability * lamp_density(", to: "return lamp_density(",
-        kernels: &["view"], noticed_by: &[(MetalsInADome, TooDark)] },
+        kernels: &["view"], noticed_by: &[(TransmissionInHalfADome, TooDark)] },
     Fault { what: "media absorb nothing on the way from the eye",
         file: "world/scene/camera_path.glsl", from: "chain.weight *= transmittance(chain.media, hit.t);", to: "",
         kernels: &["view"], noticed_by: &[(AbsorbingSlab, TooBright)] },
@@ -576,7 +594,7 @@ const FAULTS: [Fault; 122] = [
         kernels: &["view"], noticed_by: &[(FloorThroughSheets, TooBright)] },
     Fault { what: "rough refraction has the density of its facets",
         file: "material/layered_sampling.glsl", from: "density *= along * divide(l_h, max(spread * spread, 1e-12));", to: "",
-        kernels: &["view"], noticed_by: &[(TransmissionInADome, TooDark)] },
+        kernels: &["view"], noticed_by: &[(TransmissionInHalfADome, TooDark)] },
     Fault { what: "photons on a coated plate are weighed as if it were bare",
         file: "gather/visible_points.glsl", from: "albedos_at(lobes.alpha, cover, cosine)", to: "albedos_at(lobes.alpha, no_cover(), cosine)",
         kernels: &["gather_visible_points_u64", "gather_visible_points_two_words"], noticed_by: &[(PhotonsOnAPlate, TooBright)] },
@@ -595,6 +613,28 @@ const FAULTS: [Fault; 122] = [
     Fault { what: "shadow rays through sheets end beyond their lamp",
         file: "world/scene/direct.glsl", from: "way = start + way - next;", to: "",
         kernels: &["receive"], noticed_by: &[(LampBetweenSheets, TooDark)] },
+    Fault { what: "normal maps are not turned over on the back",
+        file: "material/surface.glsl", from: "vec3 normal = front ? n : -n;", to: "vec3 normal = n;\n    front = true;",
+        kernels: &["view"], noticed_by: &[(CoatsAndBacks, TooBright)] },
+    Fault { what: "a coat has the normal of what lies below it",
+        file: "material/surface.glsl", from: "if ((found & (1u << LAYER_COAT_NORMAL)) != 0) {", to: "layers.coat_normal = surface.ns;\n        if (false) {",
+        kernels: &["view"], noticed_by: &[(CoatsAndBacks, TooBright)] },
+    Fault { what: "a coat counts the cosine to what lies below it",
+        file: "material/matt_lobes.glsl", from: "* divide(max(dot(wi, coat_normal), 0.0), max(dot(wi, n), 1e-6))", to: "",
+        kernels: &["view"], noticed_by: &[(CoatsAndBacks, TooDark)] },
+    Fault { what: "transmission is looked up in the wrong channel",
+        file: "material/surface.glsl", from: "values[LAYER_TRANSMISSION].r", to: "values[LAYER_TRANSMISSION].g",
+        kernels: &["view"], noticed_by: &[(LayerTextures, TooBright)] },
+    Fault { what: "paths through thin rough walls turn by half a circle",
+        file: "material/layered_sampling.glsl", from: "wi = is_beyond ? wi - 2.0 * dot(wi, n) * n : wi;", to: "wi = is_beyond ? -wi : wi;",
+        kernels: &["view"], noticed_by: &[(TransmissionInHalfADome, TooDark)] },
+    Fault { what: "photons that do not pass weigh as if none did",
+        file: "world/scene/step.glsl",
+        from: "scatter.weight *= scatter.passes ? 1.0 : divide(surface.layers.coverage, 1.0 - lobes.pass_chance);", to: "",
+        kernels: &["trace_persistent_scene", "trace_scene_ballot"], noticed_by: &[(PhotonsOffAPane, TooDark)] },
+    Fault { what: "gaps of alpha shine",
+        file: "material/surface.glsl", from: "share *= coverage_of(material, index, u, v);", to: "",
+        kernels: &["receive"], noticed_by: &[(BlendedLamp, TooBright)] },
 ];
 
 /// Of `shading_gain`.
@@ -688,7 +728,6 @@ fn ask(gpu: &Gpu, question: Question) -> Check<Complaint> {
         AimedLight(kind) => aimed::same_light(gpu, kind),
         PlatesInTheSun(mixtures) => layered::lobes_in_the_sun(gpu, &mixtures.materials(), false),
         MetalsUnderTheSky => layered::furnace(gpu, &layered::glossy_metals(), false),
-        MetalsInADome => layered::furnace(gpu, &layered::glossy_metals(), true),
         NormalMaps => layered::normal_maps_in_the_sun(gpu),
         LayerTextures => layered::textures_in_the_sun(gpu),
         ClearBalls => layered::clear_furnace(gpu, true),
@@ -697,12 +736,15 @@ fn ask(gpu: &Gpu, question: Question) -> Check<Complaint> {
         AbsorbingSlab => media::absorbing_slab(gpu, 1.0, 0.5, 1.0),
         NestedSlabs => media::nested_slabs(gpu),
         OverlappingSlabs => media::overlapping_slabs(gpu),
-        TransmissionInADome => layered::transmission_in_a_dome(gpu),
+        TransmissionInHalfADome => layered::transmission_in_half_a_dome(gpu),
         PhotonsOnAPlate => layered::photons_on_a_plate(gpu),
         EyeInGlass => media::eye_in_glass(gpu),
         PhotonsThroughASlab => media::photons_through_a_slab(gpu),
         LampInAMedium => media::lamp_in_a_medium(gpu),
         LampBetweenSheets => sheets::lamp_between_sheets(gpu),
+        CoatsAndBacks => layered::coats_and_backs_in_the_sun(gpu),
+        PhotonsOffAPane => sheets::photons_off_a_pane(gpu),
+        BlendedLamp => sheets::blended_lamp(gpu, Illumination::Split),
     }
 }
 
