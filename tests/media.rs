@@ -1,5 +1,6 @@
 //! Solids with media: what they absorb, and solids in one another.
 
+use crate::common::estimate_check;
 use crate::common::prelude::*;
 use photonmill::engine::scene::{self, Target};
 use photonmill::scene::material::{Layers, Medium};
@@ -24,8 +25,9 @@ fn reflectance(cos_i: f64, ior: f64) -> f64 {
     0.5 * (p * p + s * s)
 }
 
-/// The radiance that arrives from beyond a slab, which shines with 1 on one side only: a white lamp behind, black before.
-fn through_slab(gpu: &Gpu, materials: Vec<Material>, slabs: Vec<Mesh>, angle: f64) -> (f64, f64) {
+/// The radiance that arrives from beyond slabs of one index, which shines with 1 on one side only: a white lamp behind, black before.
+/// Of what enters they keep the share `down`, and of what is reflected back through them the share `up`.
+fn slab_check(gpu: &Gpu, materials: Vec<Material>, slabs: Vec<Mesh>, angle: f64, [down, up]: [f64; 2]) -> Check<Complaint> {
     let lamp = Material { emission: Vec3::ONE, ..Material::lambert("lamp", Vec3::ZERO) };
     let mut scene = Scene { materials, meshes: slabs, ..Scene::default() };
     scene.materials.push(lamp);
@@ -38,36 +40,123 @@ fn through_slab(gpu: &Gpu, materials: Vec<Material>, slabs: Vec<Mesh>, angle: f6
     ));
     let eye = DVec3::new(4.0 * angle.tan(), 0.0, 4.0);
     let camera = Camera::looking_at("ray", eye, DVec3::ZERO, DVec3::Y, 1e-3);
-    let settings = SceneSettings { rounds: 64, photons: 100, caustic_photons: 100, ..SceneSettings::default() };
+    // No photon map knows any of it.
+    let without = vec![Effect::Indirect, Effect::ReflectiveCaustics, Effect::RefractiveCaustics];
+    let settings = SceneSettings { rounds: 64, without, ..SceneSettings::default() };
     let lit = scene::render(gpu, &scene, &settings, Target::Picture(&camera, [8, 8])).unwrap();
-    mean_and_error(&means(&lit).iter().map(|mean| mean.x).collect::<Vec<_>>())
+    let (found, error) = mean_and_error(&means(&lit).iter().map(|mean| mean.x).collect::<Vec<_>>());
+    let r = reflectance(angle.cos(), 1.5);
+    let expected = (1.0 - r).powi(2) * down / (1.0 - r * r * down * up);
+    println!("at {angle}: {found} +- {error}, {expected} expected");
+    estimate_check(&format!("slabs at {angle}"), found, expected, error.max(2e-5))
 }
 
-/// T = (1 - R)^2 a / (1 - R^2 a^2), a of the way d / cos t inside.
+/// Between two heights, `width` wide.
+fn slab(width: f64, bottom: f64, top: f64, material: usize) -> Vec<Mesh> {
+    cuboid("slab", DVec3::new(-width, -width, bottom), DVec3::new(width, width, top), material)
+}
+
+pub fn absorbing_slab(gpu: &Gpu, angle: f64, transmittance: f32, thickness: f64) -> Check<Complaint> {
+    let cos_t = (1.0 - (angle.sin() / 1.5).powi(2)).sqrt();
+    let left = f64::from(transmittance).powf(thickness / cos_t);
+    slab_check(gpu, vec![solid("slab", 1.5, Vec3::splat(transmittance))], slab(9.0, -thickness, 0.0, 0), angle, [left; 2])
+}
+
 #[test]
 fn slabs_absorb_by_the_way_inside() {
     let Some(gpu) = device() else { return };
-    for (angle, transmittance, thickness) in [(0.0f64, 0.5f32, 1.0), (1.0, 0.5, 1.0), (0.6, 0.1, 0.4)] {
-        let slab = cuboid("slab", DVec3::new(-9.0, -9.0, -thickness), DVec3::new(9.0, 9.0, 0.0), 0);
-        let (found, error) = through_slab(&gpu, vec![solid("slab", 1.5, Vec3::splat(transmittance))], slab, angle);
-        let cos_t = (1.0 - (angle.sin() / 1.5).powi(2)).sqrt();
-        let (a, r) = (f64::from(transmittance).powf(thickness / cos_t), reflectance(angle.cos(), 1.5));
-        let expected = (1.0 - r).powi(2) * a / (1.0 - (r * a).powi(2));
-        assert!((found - expected).abs() < 4.0 * error + 1e-4, "angle {angle}: {found} +- {error} instead of {expected}");
+    for (angle, transmittance, thickness) in [(0.0, 0.5, 1.0), (1.0, 0.5, 1.0), (0.6, 0.1, 0.4)] {
+        assert_holds("a slab", absorbing_slab(&gpu, angle, transmittance, thickness));
     }
+}
+
+fn two_media() -> Vec<Material> {
+    vec![solid("pale", 1.5, Vec3::splat(0.5)), solid("dark", 1.5, Vec3::splat(0.1))]
+}
+
+pub fn nested_slabs(gpu: &Gpu) -> Check<Complaint> {
+    let left = 0.5f64.powf(0.6) * 0.1f64.powf(0.4);
+    slab_check(gpu, two_media(), [slab(9.0, -1.0, 0.0, 0), slab(8.0, -0.7, -0.3, 1)].concat(), 0.0, [left; 2])
 }
 
 /// A solid within another of the same index is seen by its absorption alone; the inner medium counts where both are.
 #[test]
 fn nested_solids_of_one_index_make_one_slab() {
     let Some(gpu) = device() else { return };
-    let outer = cuboid("outer", DVec3::new(-9.0, -9.0, -1.0), DVec3::new(9.0, 9.0, 0.0), 0);
-    let inner = cuboid("inner", DVec3::new(-8.0, -8.0, -0.7), DVec3::new(8.0, 8.0, -0.3), 1);
-    let materials = vec![solid("outer", 1.5, Vec3::splat(0.5)), solid("inner", 1.5, Vec3::splat(0.1))];
-    let (found, error) = through_slab(&gpu, materials, [outer, inner].concat(), 0.0);
-    let (a, r) = (0.5f64.powf(0.6) * 0.1f64.powf(0.4), reflectance(1.0, 1.5));
-    let expected = (1.0 - r).powi(2) * a / (1.0 - (r * a).powi(2));
-    assert!((found - expected).abs() < 4.0 * error + 1e-4, "{found} +- {error} instead of {expected}");
+    assert_holds("nested slabs", nested_slabs(&gpu));
+}
+
+/// Whoever comes from above leaves the pale one first, and from below the dark one.
+pub fn overlapping_slabs(gpu: &Gpu) -> Check<Complaint> {
+    let left = |pale: f64, dark: f64| 0.5f64.powf(pale) * 0.1f64.powf(dark);
+    slab_check(gpu, two_media(), [slab(9.0, -1.0, 0.0, 0), slab(8.0, -1.5, -0.5, 1)].concat(), 0.0, [left(0.5, 1.0), left(1.0, 0.5)])
+}
+
+/// Where solids overlap, the one that was entered last counts.
+#[test]
+fn overlapping_solids_of_one_index_make_one_slab() {
+    let Some(gpu) = device() else { return };
+    assert_holds("overlapping slabs", overlapping_slabs(&gpu));
+}
+
+/// Under a sky of 1, radiance in clear glass is the square of its index wherever one looks: refraction compresses it.
+pub fn eye_in_glass(gpu: &Gpu) -> Check<Complaint> {
+    let materials = vec![solid("glass", 1.5, Vec3::ONE)];
+    let scene = scene_of(slab(9.0, -1.0, 1.0, 0), materials, vec![LightKind::Environment { radiance: Vec3::ONE }]);
+    let camera = Camera::looking_at("eye", DVec3::ZERO, DVec3::new(0.3, 0.1, 1.0), DVec3::Y, 0.1);
+    let settings = SceneSettings { rounds: 4, ..SceneSettings::default() };
+    let lit = scene::render(gpu, &scene, &settings, Target::Picture(&camera, [8, 8])).unwrap();
+    estimate_check("an eye in glass", mean_red(&lit), 2.25, 1e-4)
+}
+
+#[test]
+fn radiance_in_glass_is_the_square_of_its_index() {
+    let Some(gpu) = device() else { return };
+    assert_holds("an eye in glass", eye_in_glass(&gpu));
+}
+
+/// With y for z.
+fn lying(mut slab: Vec<Mesh>) -> Vec<Mesh> {
+    slab.iter_mut().flat_map(|mesh| &mut mesh.positions).for_each(|at| *at = DVec3::new(at.x, at.z, -at.y));
+    slab
+}
+
+/// A lamp of 1 W/sr and a black floor in a dark solid within a pale one.
+pub fn lamp_in_a_medium(gpu: &Gpu) -> Check<Complaint> {
+    let mut meshes = lying([slab(3.0, -2.0, 2.0, 0), slab(2.0, -1.0, 1.0, 1)].concat());
+    meshes.push(level(-0.5, [1.0; 2], true, 2));
+    let materials = two_media().into_iter().chain([matt(0.0)]).collect();
+    let scene = scene_of(meshes, materials, vec![point(DVec3::Y * 0.3)]);
+    let settings = SceneSettings { rounds: 1, part: Part::Direct, ..SceneSettings::default() };
+    let found = means(&received(gpu, &scene, &settings, &[(DVec3::Y * -0.5, DVec3::Y)]))[0].x;
+    // Nothing is random.
+    estimate_check("a lamp in a medium", found, 0.1f64.powf(0.8) / 0.64, 1e-5)
+}
+
+#[test]
+fn shadow_rays_know_the_medium_that_they_run_through() {
+    let Some(gpu) = device() else { return };
+    assert_holds("a lamp in a medium", lamp_in_a_medium(&gpu));
+}
+
+/// Photons of a sun straight above an absorbing slab, on a black floor below it.
+pub fn photons_through_a_slab(gpu: &Gpu) -> Check<Complaint> {
+    let mut meshes = lying(slab(1.5, 0.5, 1.5, 1));
+    meshes.push(level(0.0, [2.0; 2], true, 0));
+    let scene = scene_of(meshes, vec![matt(0.0), solid("slab", 1.5, Vec3::splat(0.5))], vec![sun(DVec3::NEG_Y)]);
+    let lit = received(gpu, &scene, &mapped(20_000, 16, 16, 0.5), &[(DVec3::ZERO, DVec3::Y)]);
+    let (found, error) = red(&lit, 0);
+    let r = reflectance(1.0, 1.5);
+    let expected = 0.5 * (1.0 - r).powi(2) / (1.0 - (0.5 * r).powi(2));
+    println!("photons through a slab: {found} +- {error}, {expected} expected");
+    assert!(error < 0.02 * expected, "{error}");
+    estimate_check("photons through a slab", found, expected, error)
+}
+
+#[test]
+fn slabs_absorb_photons() {
+    let Some(gpu) = device() else { return };
+    assert_holds("a slab", photons_through_a_slab(&gpu));
 }
 
 /// An eye, a lamp and a matt ball in water, and a ball of glass in it.

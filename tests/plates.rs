@@ -21,6 +21,7 @@ fn rough_solids_in_the_sun_have_the_lobes_of_the_guide() {
 fn normal_maps_and_textures_are_looked_up_as_gltf_has_it() {
     let Some(gpu) = device() else { return };
     assert_holds("normal maps", layered::normal_maps_in_the_sun(&gpu));
+    assert_holds("coats and backs", layered::coats_and_backs_in_the_sun(&gpu));
     assert_holds("a ball", layered::mapped_ball_in_the_sun(&gpu));
     assert_holds("textures", layered::textures_in_the_sun(&gpu));
 }
@@ -45,6 +46,11 @@ fn sheets_let_their_share_pass() {
     for illumination in BOTH {
         assert_holds("the sun", sheets::sun_through_sheets(&gpu, illumination));
     }
+    assert_holds("photons", sheets::photons_off_a_pane(&gpu));
+    for illumination in BOTH {
+        assert_holds("a lamp with gaps", sheets::blended_lamp(&gpu, illumination));
+    }
+    assert_holds("a lamp", sheets::lamp_between_sheets(&gpu));
     assert_holds("the eye", sheets::floor_through_sheets(&gpu));
 }
 
@@ -52,7 +58,7 @@ fn sheets_let_their_share_pass() {
 fn plates_return_what_the_sky_sends() {
     let Some(gpu) = device() else { return };
     for within_a_dome in [false, true] {
-        assert_holds("the sky", layered::furnace(&gpu, within_a_dome));
+        assert_holds("the sky", layered::furnace(&gpu, &layered::opaque(), within_a_dome));
     }
 }
 
@@ -60,6 +66,18 @@ fn plates_return_what_the_sky_sends() {
 fn photons_land_where_no_lobe_is() {
     let Some(gpu) = device() else { return };
     assert_holds("photons", layered::photons_land_beside_lobes(&gpu));
+}
+
+#[test]
+fn rough_plates_let_the_light_of_half_a_dome_through() {
+    let Some(gpu) = device() else { return };
+    assert_holds("rough plates", layered::transmission_in_half_a_dome(&gpu));
+}
+
+#[test]
+fn photon_maps_have_the_lobes_of_the_guide() {
+    let Some(gpu) = device() else { return };
+    assert_holds("photons", layered::photons_on_a_plate(&gpu));
 }
 
 #[test]

@@ -7,11 +7,13 @@ use std::time::Duration;
 
 use crate::closed_form::closed_form_check;
 use crate::common::Kind::*;
+use crate::common::layered::{self, Mixtures};
 use crate::common::prelude::*;
-use crate::common::{MANY_PHOTONS, aimed, bits, estimate_check, known, lamps, noticed_as, planted};
+use crate::common::{MANY_PHOTONS, aimed, bits, estimate_check, known, lamps, noticed_as, planted, sheets};
 use crate::film::pairs_count_on;
 use crate::hard_cases::readme_and_guide;
 use crate::ledger::closed_fates;
+use crate::media;
 use crate::openings::light_through_a_window;
 use crate::paranoid::{box_is_finite, scene_is_finite};
 use crate::strict::{film_agrees, photons_agree, rounding_check};
@@ -81,6 +83,26 @@ enum Question {
     Window,
     /// Aimed photons bring as much light as others: a scene of `common::aimed`.
     AimedLight(&'static str),
+    // The checks of `common::layered`, `common::sheets` and `media`.
+    PlatesInTheSun(Mixtures),
+    MetalsUnderTheSky,
+    NormalMaps,
+    LayerTextures,
+    ClearBalls,
+    FloorThroughSheets,
+    SolidsFromInside,
+    AbsorbingSlab,
+    NestedSlabs,
+    OverlappingSlabs,
+    TransmissionInHalfADome,
+    PhotonsOnAPlate,
+    EyeInGlass,
+    PhotonsThroughASlab,
+    LampInAMedium,
+    LampBetweenSheets,
+    CoatsAndBacks,
+    PhotonsOffAPane,
+    BlendedLamp,
 }
 
 use Question::*;
@@ -89,7 +111,8 @@ impl Question {
     /// Whether another test, the same for every device, shows that a device without a fault answers it right.
     fn has_a_test_of_its_own(self) -> bool {
         let of_room = matches!(self, Photons(_) | RoomFilm(_) | Nearest | StripedCounters | Ledger(_) | FiniteBox | Pairs | StrictMath);
-        !of_room && !matches!(self, Appends | Builders | Finite | Crowds | ManyLamps(_) | AimedLight(_))
+        let of_layers = matches!(self, PlatesInTheSun(_) | MetalsUnderTheSky);
+        !of_room && !of_layers && !matches!(self, Appends | Builders | Finite | Crowds | ManyLamps(_) | AimedLight(_))
     }
 }
 
@@ -100,6 +123,7 @@ enum Subject {
     Scenes,
     Lamps,
     Aiming,
+    Layers,
 }
 
 impl Question {
@@ -108,6 +132,25 @@ impl Question {
             Photons(_) | StripedCounters | RoomFilm(_) | Ledger(_) | ClosedForm(_) | Builders | StrictMath | Nearest | Pairs
             | FiniteBox => Subject::Room,
             AimedLight(_) => Subject::Aiming,
+            PlatesInTheSun(_)
+            | MetalsUnderTheSky
+            | NormalMaps
+            | LayerTextures
+            | ClearBalls
+            | FloorThroughSheets
+            | SolidsFromInside
+            | AbsorbingSlab
+            | NestedSlabs
+            | OverlappingSlabs
+            | TransmissionInHalfADome
+            | PhotonsOnAPlate
+            | EyeInGlass
+            | PhotonsThroughASlab
+            | LampInAMedium
+            | LampBetweenSheets
+            | CoatsAndBacks
+            | PhotonsOffAPane
+            | BlendedLamp => Subject::Layers,
             BrightSpot | DimRoom(_) | ManyLamps(_) | MissedLamp | HiddenLamp | LampBehindHole | SecondOpening | DimPhotons => {
                 Subject::Lamps
             }
@@ -129,7 +172,7 @@ struct Fault {
 }
 
 #[rustfmt::skip]
-const FAULTS: [Fault; 88] = [
+const FAULTS: [Fault; 129] = [
     Fault { what: "what rounding takes from a pair of floats is forgotten",
         file: "film/float_u64.glsl", from: "precise float rest = sum.y + (", to: "precise float rest = 0.0 * (",
         kernels: &["gather_brute_u64", "gather_grid_u64"], noticed_by: &[(Pairs, SumsTooSmall)] },
@@ -444,6 +487,154 @@ const FAULTS: [Fault; 88] = [
         to: "return cosine > 0.0 ? 0.31830988618379067 : 0.0;",
         kernels: &["trace_persistent_scene", "emit_scene"],
         noticed_by: &[(AimedLight("cosine disc"), TooBright), (AimedLight("two-sided triangles"), TooBright)] },
+    Fault { what: "facets are as dense as if alpha were its square root",
+        file: "material/ggx.glsl", from: "float squared = alpha * alpha;", to: "float squared = alpha;",
+        kernels: &["view"], noticed_by: &[(PlatesInTheSun(Mixtures::Bare), TooBright)] },
+    Fault { what: "facets that hide from the eye and from the light are taken for others",
+        file: "material/ggx.glsl",
+        from: "divide(0.5, cos_l * ggx_root(alpha, cos_v) + cos_v * ggx_root(alpha, cos_l))",
+        to: "divide(1.0, (cos_l + ggx_root(alpha, cos_l)) * (cos_v + ggx_root(alpha, cos_v)))",
+        kernels: &["view"], noticed_by: &[(PlatesInTheSun(Mixtures::Bare), TooDark)] },
+    Fault { what: "the diffuse lobe forgets what reflection takes from it on the way out",
+        file: "material/layered_lobes.glsl",
+        from: "(0.31830988618379067 * divide(below_diffuse, max(left, 1e-6)))",
+        to: "0.31830988618379067",
+        kernels: &["view"], noticed_by: &[(PlatesInTheSun(Mixtures::Bare), TooDark)] },
+    Fault { what: "metals keep the diffuse lobe",
+        file: "material/layered_lobes.glsl",
+        from: "float opaque_share = dielectric * (1.0 - layers.transmission);",
+        to: "float opaque_share = 1.0 - layers.transmission;",
+        kernels: &["view"], noticed_by: &[(PlatesInTheSun(Mixtures::Bare), TooBright)] },
+    Fault { what: "all dielectrics reflect as one of index 1.5",
+        file: "material/layered_lobes.glsl", from: "along * along * layers.specular_colour", to: "0.04 * layers.specular_colour",
+        kernels: &["view"], noticed_by: &[(PlatesInTheSun(Mixtures::Bare), TooBright)] },
+    Fault { what: "a coat takes nothing from what lies below it",
+        file: "material/matt_lobes.glsl", from: "below = 1.0 - max(cover.coat_albedo, lit.coat);", to: "below = 1.0;",
+        kernels: &["view"], noticed_by: &[(PlatesInTheSun(Mixtures::Covered), TooBright)] },
+    Fault { what: "the fibres of sheen are spread by the square of their sine",
+        file: "material/matt_lobes.glsl",
+        from: "exp2(divide(0.5, alpha) * log2(sine_squared))",
+        to: "exp2(divide(1.0, alpha) * log2(sine_squared))",
+        kernels: &["view"], noticed_by: &[(PlatesInTheSun(Mixtures::Covered), TooDark)] },
+    Fault { what: "thin walls turn what they transmit by half a circle instead of mirroring it",
+        file: "material/layered_lobes.glsl", from: "wi - 2.0 * cosine * surface.ns : wi;", to: "-wi : wi;",
+        kernels: &["view"], noticed_by: &[(PlatesInTheSun(Mixtures::Transmissive), TooBright)] },
+    Fault { what: "thin walls and solids transmit what they reflect",
+        file: "material/layered_lobes.glsl", from: "lobes.transmitted * (1.0 - exact) :", to: "lobes.transmitted :",
+        kernels: &["view"], noticed_by: &[(PlatesInTheSun(Mixtures::Transmissive), TooBright)] },
+    Fault { what: "refraction does not compress radiance",
+        file: "material/layered_lobes.glsl", from: "return Weighed(eta * eta * both", to: "return Weighed(both",
+        kernels: &["view"], noticed_by: &[(PlatesInTheSun(Mixtures::Transmissive), TooBright)] },
+    Fault { what: "the jacobian of refraction has the wrong sign",
+        file: "material/layered_lobes.glsl", from: "float spread = eta * v_h - l_h;", to: "float spread = eta * v_h + l_h;",
+        kernels: &["view"], noticed_by: &[(PlatesInTheSun(Mixtures::Transmissive), TooDark)] },
+    Fault { what: "solids reflect by the approximation instead of Fresnel's equations",
+        file: "material/layered_lobes.glsl",
+        from: "        share = clamp(divide(reflectance_at(cosine, lobes.eta) - along, 1.0 - along), 0.0, 1.0);\n",
+        to: "",
+        kernels: &["view"], noticed_by: &[(SolidsFromInside, TooDark)] },
+    Fault { what: "normals of facets are sampled from a view that is not stretched",
+        file: "material/ggx.glsl", from: "vec3 stretched = normalize(vec3(alpha * v.xy, v.z));", to: "vec3 stretched = v;",
+        kernels: &["view"], noticed_by: &[(MetalsUnderTheSky, TooDark)] },
+    Fault { what: "light samples count in full beside paths that meet the same light",
+        file: "material/layered_lobes.glsl",
+        from: "return light_density > 0.0 ? divide(light_density, light_density + lobe_density) : 1.0;",
+        to: "return 1.0;",
+        kernels: &["view"], noticed_by: &[(MetalsUnderTheSky, TooBright)] },
+    Fault { what: "paths that meet a light take several shadow rays for one",
+        file: "world/scene/camera_path.glsl",
+        from: "chain.density + float(SHADOW_RAYS) * light_density",
+        to: "chain.density + light_density",
+        kernels: &["view"], noticed_by: &[(MetalsUnderTheSky, TooBright)] },
+    Fault { what: "paths that meet a lamp are weighed as if it were the only one",
+        file: "world/scene/lights.glsl", from: "return light.probability * lamp_density(", to: "return lamp_density(",
+        kernels: &["view"], noticed_by: &[(TransmissionInHalfADome, TooDark)] },
+    Fault { what: "media absorb nothing on the way from the eye",
+        file: "world/scene/camera_path.glsl", from: "chain.weight *= transmittance(chain.media, hit.t);", to: "",
+        kernels: &["view"], noticed_by: &[(AbsorbingSlab, TooBright)] },
+    Fault { what: "who leaves a solid leaves those around it",
+        file: "material/media.glsl", from: "return (media & below) | above;", to: "return media & below;",
+        kernels: &["view"], noticed_by: &[(NestedSlabs, TooBright)] },
+    Fault { what: "who leaves a solid leaves the one entered last",
+        file: "material/media.glsl", from: "if (((media >> place) & 255u) == medium) {", to: "if (((media >> place) & 255u) != 0) {",
+        kernels: &["view"], noticed_by: &[(OverlappingSlabs, TooBright)] },
+    Fault { what: "mirrored normal maps are not mirrored",
+        file: "material/surface.glsl",
+        from: "is_turned ? cross(tangent, normal) : cross(normal, tangent);",
+        to: "cross(normal, tangent);",
+        kernels: &["view"], noticed_by: &[(NormalMaps, TooBright)] },
+    Fault { what: "textures are looked up by the first set of coordinates alone",
+        file: "material/surface.glsl", from: "vec2 uv = lookup.uv_set == 0 ? first : second;", to: "vec2 uv = first;",
+        kernels: &["view"], noticed_by: &[(LayerTextures, TooDark)] },
+    Fault { what: "rows of a texture's transform are swapped",
+        file: "material/surface.glsl",
+        from: "vec2(dot(lookup.row_u, uv), dot(lookup.row_v, uv))",
+        to: "vec2(dot(lookup.row_v, uv), dot(lookup.row_u, uv))",
+        kernels: &["view"], noticed_by: &[(LayerTextures, TooBright)] },
+    Fault { what: "unlit surfaces are lit",
+        file: "material/layered_lobes.glsl",
+        from: "lobes.matt.diffuse = lobes.matt.f0 = vec3(0.0);\n        lobes.matt.f90 = 0.0;",
+        to: "",
+        kernels: &["view"], noticed_by: &[(LayerTextures, TooBright)] },
+    Fault { what: "panes pass light in the gaps of alpha, too",
+        file: "material/layered_lobes.glsl",
+        from: "lobes.passing += layers.coverage * below * transmitted;",
+        to: "lobes.passing += below * transmitted;",
+        kernels: &["view"], noticed_by: &[(FloorThroughSheets, TooBright)] },
+    Fault { what: "paths that do not pass weigh as if none did",
+        file: "world/scene/camera_path.glsl",
+        from: "            chain.weight *= divide(surface.layers.coverage, 1.0 - lobes.pass_chance);\n",
+        to: "",
+        kernels: &["view"], noticed_by: &[(ClearBalls, TooDark)] },
+    Fault { what: "of several sheets shadow rays count the last one",
+        file: "world/scene/direct.glsl", from: "share *= passing_at(hit, wo, media);", to: "share = passing_at(hit, wo, media);",
+        kernels: &["receive"], noticed_by: &[(LampBetweenSheets, TooBright)] },
+    Fault { what: "alpha at the cutoff is a hole",
+        file: "material/surface.glsl", from: "(alpha >= layered.cutoff ? 1.0 : 0.0)", to: "(alpha > layered.cutoff ? 1.0 : 0.0)",
+        kernels: &["view"], noticed_by: &[(FloorThroughSheets, TooBright)] },
+    Fault { what: "rough refraction has the density of its facets",
+        file: "material/layered_sampling.glsl", from: "density *= along * divide(l_h, max(spread * spread, 1e-12));", to: "",
+        kernels: &["view"], noticed_by: &[(TransmissionInHalfADome, TooDark)] },
+    Fault { what: "photons on a coated plate are weighed as if it were bare",
+        file: "gather/visible_points.glsl", from: "albedos_at(lobes.alpha, cover, cosine)", to: "albedos_at(lobes.alpha, no_cover(), cosine)",
+        kernels: &["gather_visible_points_u64", "gather_visible_points_two_words"], noticed_by: &[(PhotonsOnAPlate, TooBright)] },
+    Fault { what: "refraction does not compress the radiance of paths",
+        file: "material/layered_sampling.glsl", from: "weight *= carries_radiance && is_refracted ? lobes.eta * lobes.eta : 1.0;", to: "",
+        kernels: &["view"], noticed_by: &[(EyeInGlass, TooDark)] },
+    Fault { what: "media absorb no photons",
+        file: "world/scene/step.glsl", from: "arriving *= transmittance(path.media, hit.t);", to: "",
+        kernels: &["trace_persistent_scene", "trace_scene_ballot"], noticed_by: &[(PhotonsThroughASlab, TooBright)] },
+    Fault { what: "shadow rays run through media as through air",
+        file: "world/scene/direct.glsl", from: "left = t_max == 1.0 ? transmittance(media, norm(way)) : left;", to: "",
+        kernels: &["receive"], noticed_by: &[(LampInAMedium, TooBright)] },
+    Fault { what: "of the solids around a point the outermost counts",
+        file: "material/media.glsl", from: "media |= medium << count;", to: "media = (media << 8) | medium;",
+        kernels: &["receive"], noticed_by: &[(LampInAMedium, TooBright)] },
+    Fault { what: "shadow rays through sheets end beyond their lamp",
+        file: "world/scene/direct.glsl", from: "way = start + way - next;", to: "",
+        kernels: &["receive"], noticed_by: &[(LampBetweenSheets, TooDark)] },
+    Fault { what: "normal maps are not turned over on the back",
+        file: "material/surface.glsl", from: "vec3 normal = front ? n : -n;", to: "vec3 normal = n;\n    front = true;",
+        kernels: &["view"], noticed_by: &[(CoatsAndBacks, TooBright)] },
+    Fault { what: "a coat has the normal of what lies below it",
+        file: "material/surface.glsl", from: "if ((found & (1u << LAYER_COAT_NORMAL)) != 0) {", to: "layers.coat_normal = surface.ns;\n        if (false) {",
+        kernels: &["view"], noticed_by: &[(CoatsAndBacks, TooBright)] },
+    Fault { what: "a coat counts the cosine to what lies below it",
+        file: "material/matt_lobes.glsl", from: "* divide(max(dot(wi, coat_normal), 0.0), max(dot(wi, n), 1e-6))", to: "",
+        kernels: &["view"], noticed_by: &[(CoatsAndBacks, TooDark)] },
+    Fault { what: "transmission is looked up in the wrong channel",
+        file: "material/surface.glsl", from: "values[LAYER_TRANSMISSION].r", to: "values[LAYER_TRANSMISSION].g",
+        kernels: &["view"], noticed_by: &[(LayerTextures, TooBright)] },
+    Fault { what: "paths through thin rough walls turn by half a circle",
+        file: "material/layered_sampling.glsl", from: "wi = is_beyond ? wi - 2.0 * dot(wi, n) * n : wi;", to: "wi = is_beyond ? -wi : wi;",
+        kernels: &["view"], noticed_by: &[(TransmissionInHalfADome, TooDark)] },
+    Fault { what: "photons that do not pass weigh as if none did",
+        file: "world/scene/step.glsl",
+        from: "scatter.weight *= scatter.passes ? 1.0 : divide(surface.layers.coverage, 1.0 - lobes.pass_chance);", to: "",
+        kernels: &["trace_persistent_scene", "trace_scene_ballot"], noticed_by: &[(PhotonsOffAPane, TooDark)] },
+    Fault { what: "gaps of alpha shine",
+        file: "material/surface.glsl", from: "share *= coverage_of(material, index, u, v);", to: "",
+        kernels: &["receive"], noticed_by: &[(BlendedLamp, TooBright)] },
 ];
 
 /// Of `shading_gain`.
@@ -535,6 +726,25 @@ fn ask(gpu: &Gpu, question: Question) -> Check<Complaint> {
         MissedLamp => lamps::missed_lamp(gpu),
         Window => light_through_a_window(gpu),
         AimedLight(kind) => aimed::same_light(gpu, kind),
+        PlatesInTheSun(mixtures) => layered::lobes_in_the_sun(gpu, &mixtures.materials(), false),
+        MetalsUnderTheSky => layered::furnace(gpu, &layered::glossy_metals(), false),
+        NormalMaps => layered::normal_maps_in_the_sun(gpu),
+        LayerTextures => layered::textures_in_the_sun(gpu),
+        ClearBalls => layered::clear_furnace(gpu, true),
+        FloorThroughSheets => sheets::floor_through_sheets(gpu),
+        SolidsFromInside => layered::lobes_in_the_sun(gpu, &layered::rough_solids(), true),
+        AbsorbingSlab => media::absorbing_slab(gpu, 1.0, 0.5, 1.0),
+        NestedSlabs => media::nested_slabs(gpu),
+        OverlappingSlabs => media::overlapping_slabs(gpu),
+        TransmissionInHalfADome => layered::transmission_in_half_a_dome(gpu),
+        PhotonsOnAPlate => layered::photons_on_a_plate(gpu),
+        EyeInGlass => media::eye_in_glass(gpu),
+        PhotonsThroughASlab => media::photons_through_a_slab(gpu),
+        LampInAMedium => media::lamp_in_a_medium(gpu),
+        LampBetweenSheets => sheets::lamp_between_sheets(gpu),
+        CoatsAndBacks => layered::coats_and_backs_in_the_sun(gpu),
+        PhotonsOffAPane => sheets::photons_off_a_pane(gpu),
+        BlendedLamp => sheets::blended_lamp(gpu, Illumination::Split),
     }
 }
 
@@ -582,6 +792,11 @@ fn faults_of_lamps_are_noticed() {
 #[test]
 fn faults_of_aiming_are_noticed() {
     faults_are_noticed(Subject::Aiming);
+}
+
+#[test]
+fn faults_of_layered_materials_are_noticed() {
+    faults_are_noticed(Subject::Layers);
 }
 
 /// Whoever says how many faults are planted has the number.

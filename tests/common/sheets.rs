@@ -131,6 +131,45 @@ pub fn sun_through_sheets(gpu: &Gpu, illumination: Illumination) -> Check<Compla
     compare(&format!("{illumination:?}"), &stacks, &lit, &(0..stacks.len()).collect::<Vec<_>>(), cosine)
 }
 
+/// A lamp of 1 W/sr, 1 m above a floor, through two sheets, with a third one above it.
+pub fn lamp_between_sheets(gpu: &Gpu) -> Check<Complaint> {
+    let meshes = [0.0, 0.3, 0.6, 1.2].map(|height| level(height, [1.0; 2], true, usize::from(height > 0.0)));
+    let half = Material { two_sided: true, ..blended(0.5, dull(0.0)) };
+    let scene = scene_of(meshes.into(), vec![matt(0.0), half], vec![point(DVec3::Y)]);
+    let settings = SceneSettings { rounds: 1, part: Part::Direct, ..SceneSettings::default() };
+    let found = means(&received(gpu, &scene, &settings, &[(DVec3::ZERO, DVec3::Y)]))[0].x;
+    // Nothing is random.
+    estimate_check("a lamp between sheets", found, 0.25, 1e-5)
+}
+
+/// Photons of a sun from below, mirrored onto a floor by a pane of which half is metal and half lets them pass.
+pub fn photons_off_a_pane(gpu: &Gpu) -> Check<Complaint> {
+    let pane = Material { two_sided: true, layers: Layers { metallic: 0.5, ..pane().layers }, base_colour: Vec3::ONE, ..pane() };
+    let direction = DVec3::new(1.0, 1.0, 0.0);
+    // What reaches the floor passed 2 m beside it on the way up.
+    let scene = scene_of(vec![level(0.0, [1.0; 2], true, 0), level(1.0, [3.0; 2], true, 1)], vec![matt(0.0), pane], vec![sun(direction)]);
+    let lit = received(gpu, &scene, &mapped(20_000, 32, 4, 0.3), &[(DVec3::ZERO, DVec3::Y)]);
+    let cosine = direction.normalize().y;
+    let expected = cosine * (0.5 + 0.5 * schlick(cosine));
+    let (found, error) = red(&lit, 0);
+    println!("photons off a pane: {found} +- {error}, {expected} expected");
+    assert!(error < 0.02 * expected, "{error}");
+    estimate_check("photons off a pane", found, expected, error)
+}
+
+/// A lamp with gaps of alpha shines with what is there of it.
+pub fn blended_lamp(gpu: &Gpu, illumination: Illumination) -> Check<Complaint> {
+    let lamp = Material { emission: Vec3::ONE, ..blended(0.5, dull(0.0)) };
+    let scene = scene_of(vec![level(0.0, [1.0; 2], true, 0), level(1.0, [0.1; 2], false, 1)], vec![matt(0.0), lamp], vec![]);
+    let settings = SceneSettings { shadow_rays: 4, illumination, part: Part::Direct, ..mapped(20_000, 32, 1, 0.05) };
+    let (found, error) = red(&received(gpu, &scene, &settings, &[(DVec3::ZERO, DVec3::Y)]), 0);
+    // It is small and far away, and what is within the radius sees all but the same.
+    let expected = 0.5 * 0.01;
+    println!("a lamp with gaps, {illumination:?}: {found} +- {error}, {expected} expected");
+    assert!(error < 0.04 * expected, "{error}");
+    estimate_check("a lamp with gaps", found, expected, error.max(1e-3 * expected))
+}
+
 /// A shining floor through every stack, seen straight from above.
 pub fn floor_through_sheets(gpu: &Gpu) -> Check<Complaint> {
     let stacks = stacks();
