@@ -2,7 +2,6 @@
 
 use glam::{DVec2, Vec3};
 
-use super::Texture;
 use crate::constants::{DELTA_ALPHA_INVERSE, MAP_ALPHA_PER_MILLE};
 
 /// How a surface scatters light. Its base colour is the share it scatters, per channel.
@@ -226,21 +225,22 @@ impl LobeKinds {
         self.sharp_reflection || self.sharp_transmission
     }
 
-    pub fn of(material: &Material, textures: &[Texture]) -> LobeKinds {
+    /// `range` gives the least and largest value of a texture's channel.
+    pub fn of(material: &Material, range: &mut impl FnMut(usize, usize) -> (f32, f32)) -> LobeKinds {
         let none = LobeKinds::default();
         match material.surface {
             Surface::Lambert | Surface::PaperPhong { .. } | Surface::Glossy { .. } => LobeKinds { matt: true, ..none },
             Surface::Mirror => LobeKinds { sharp_reflection: true, ..none },
             Surface::Dielectric { .. } => LobeKinds { sharp_reflection: true, sharp_transmission: true, ..none },
-            Surface::Layered => LobeKinds::of_layered(material, textures),
+            Surface::Layered => LobeKinds::of_layered(material, range),
         }
     }
 
-    fn of_layered(material: &Material, textures: &[Texture]) -> LobeKinds {
+    fn of_layered(material: &Material, range: &mut impl FnMut(usize, usize) -> (f32, f32)) -> LobeKinds {
         let of = &material.layers;
-        let range = |factor: f32, used: Option<TextureUse>, channel: usize| match used {
+        let mut range = |factor: f32, used: Option<TextureUse>, channel: usize| match used {
             Some(used) if factor > 0.0 => {
-                let (least, most) = textures[used.texture].texels.range(channel);
+                let (least, most) = range(used.texture, channel);
                 (factor * least, factor * most)
             }
             _ => (factor, factor),

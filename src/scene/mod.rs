@@ -23,6 +23,7 @@ pub mod texture;
 mod work;
 
 use std::borrow::Cow;
+use std::collections::HashMap;
 use std::path::Path;
 
 use glam::{DVec3, Vec3};
@@ -146,7 +147,12 @@ impl Scene {
 
     /// Which lobes each material may have.
     pub fn lobe_kinds(&self) -> Vec<LobeKinds> {
-        self.materials.iter().map(|material| LobeKinds::of(material, &self.textures)).collect()
+        // Materials share textures, and looking through a large one takes a while.
+        let mut known = HashMap::new();
+        let mut range = |texture: usize, channel: usize| {
+            *known.entry((texture, channel)).or_insert_with(|| self.textures[texture].texels.range(channel))
+        };
+        self.materials.iter().map(|material| LobeKinds::of(material, &mut range)).collect()
     }
 
     /// Its first camera, or one that sees all of it.

@@ -152,9 +152,18 @@ impl Texture {
 impl Texels {
     /// Least and largest value of a channel: 0 to 2 are the colours, 3 is alpha.
     pub fn range(&self, channel: usize) -> (f32, f32) {
+        // Of codes, whose values grow with them.
+        if let Texels::Srgb(codes) | Texels::Linear(codes) = self {
+            let join = |a: (u8, u8), b: (u8, u8)| (a.0.min(b.0), a.1.max(b.1));
+            let (least, most) = codes.par_iter().map(|code| (code[channel], code[channel])).reduce(|| (u8::MAX, u8::MIN), join);
+            return match self {
+                Texels::Srgb(_) if channel < 3 => (LINEAR_OF_SRGB[usize::from(least)], LINEAR_OF_SRGB[usize::from(most)]),
+                _ => (share_of_code(least), share_of_code(most)),
+            };
+        }
         let one = |place: usize| self.at(place)[channel];
-        let joined = |a: (f32, f32), b: (f32, f32)| (a.0.min(b.0), a.1.max(b.1));
-        (0..self.count()).into_par_iter().map(|place| (one(place), one(place))).reduce(|| (f32::INFINITY, f32::NEG_INFINITY), joined)
+        let join = |a: (f32, f32), b: (f32, f32)| (a.0.min(b.0), a.1.max(b.1));
+        (0..self.count()).into_par_iter().map(|place| (one(place), one(place))).reduce(|| (f32::INFINITY, f32::NEG_INFINITY), join)
     }
 }
 
