@@ -402,7 +402,7 @@ fn as_gltf(material: &Material) -> Material {
         Surface::Glossy { exponent } => Layers { roughness: (2.0 / (exponent + 2.0)).powf(0.25), ..Layers::default() },
         Surface::Mirror => Layers { roughness: 0.0, ..Layers::default() },
         Surface::Dielectric { ior } => {
-            let medium = Some(Medium { transmittance: Vec3::ONE });
+            let medium = Some(Medium::CLEAR);
             Layers { metallic: 0.0, roughness: 0.0, transmission: 1.0, ior, medium, ..Layers::default() }
         }
     };
@@ -641,7 +641,7 @@ fn layered_materials_round_trip() {
         specular_colour_texture: used(true),
         transmission: 0.4,
         transmission_texture: used(false),
-        medium: Some(Medium { transmittance: Vec3::new(0.1, 0.0, 1.0) }),
+        medium: Some(Medium { transmittance: Vec3::new(0.1, 0.0, 1.0), metres: 1.0 }),
         coat: 0.6,
         coat_texture: used(false),
         coat_roughness: 0.05,
@@ -665,7 +665,7 @@ fn layered_materials_round_trip() {
     // Each part alone, so that what decides whether an extension is written does.
     let usual = Layers::default();
     let tinted = Vec3::new(0.2, 0.4, 0.6);
-    let medium = Some(Medium { transmittance: tinted });
+    let medium = Some(Medium { transmittance: tinted, metres: 1.0 });
     let alone = [
         Layers { ior: 0.0, ..usual },
         Layers { specular: 0.5, ..usual },

@@ -63,7 +63,7 @@ fn materials_are_described_in_words() {
         (glass(Some(json!({"thicknessFactor": 0}))), "thin wall of glass, ior 1.5, roughness 0"),
         (
             glass(Some(json!({"thicknessFactor": 1, "attenuationColor": [0.25, 0.25, 1], "attenuationDistance": 2}))),
-            "solid glass, ior 1.5, roughness 0, 0.5 0.5 1 of the light left after a metre",
+            "solid glass, ior 1.5, roughness 0, 0.25 0.25 1 of the light left after 2 m",
         ),
         (
             with("transmission", json!({"transmissionFactor": 0.5, "transmissionTexture": texture})),

@@ -501,7 +501,7 @@ fn clear(roughness: f32, ior: f32) -> Layers {
 }
 
 fn solid(roughness: f32, ior: f32, transmittance: Vec3) -> Layers {
-    Layers { medium: Some(Medium { transmittance }), ..clear(roughness, ior) }
+    Layers { medium: Some(Medium { transmittance, metres: 1.0 }), ..clear(roughness, ior) }
 }
 
 /// A plate under nothing but this light, seen at this cosine.

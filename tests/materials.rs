@@ -87,8 +87,8 @@ fn coloured(layers: &Layers) -> Material {
 }
 
 fn balls() -> Vec<(&'static str, Material)> {
-    let clear = Some(Medium { transmittance: Vec3::ONE });
-    let tinted = Some(Medium { transmittance: Vec3::new(0.9, 0.3, 0.5) });
+    let clear = Some(Medium::CLEAR);
+    let tinted = Some(Medium { transmittance: Vec3::new(0.9, 0.3, 0.5), metres: 1.0 });
     let blend = |alpha| Coverage::Blend { alpha };
     vec![
         ("rough plastic", coloured(&plastic())),
@@ -134,7 +134,7 @@ fn pictures_of_each_lobe_agree_with_the_judge() {
 
 /// Each pair of lobes, one over or beside the other.
 fn pairs_of_lobes() -> Vec<Material> {
-    let clear = Some(Medium { transmittance: Vec3::ONE });
+    let clear = Some(Medium::CLEAR);
     let (coat, coat_roughness) = (1.0, 0.55);
     let (sheen_colour, sheen_roughness) = (Vec3::new(0.2, 0.4, 0.9), 0.5);
     let of = [

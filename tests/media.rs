@@ -7,8 +7,14 @@ use photonmill::scene::material::{Layers, Medium};
 use photonmill::verify::judge::Verdict;
 
 fn solid(name: &str, ior: f32, transmittance: Vec3) -> Material {
-    let layers =
-        Layers { metallic: 0.0, roughness: 0.0, transmission: 1.0, ior, medium: Some(Medium { transmittance }), ..Layers::default() };
+    let layers = Layers {
+        metallic: 0.0,
+        roughness: 0.0,
+        transmission: 1.0,
+        ior,
+        medium: Some(Medium { transmittance, metres: 1.0 }),
+        ..Layers::default()
+    };
     Material::layered(name, Vec3::ONE, layers)
 }
 
@@ -68,6 +74,12 @@ fn slabs_absorb_by_the_way_inside() {
     for (angle, transmittance, thickness) in [(0.0, 0.5, 1.0), (1.0, 0.5, 1.0), (0.6, 0.1, 0.4)] {
         assert_holds("a slab", absorbing_slab(&gpu, angle, transmittance, thickness));
     }
+    // So strong a tint that no number of single precision is left after a metre.
+    let ink = Material {
+        layers: Layers { medium: Some(Medium { transmittance: Vec3::splat(0.1), metres: 0.02 }), ..solid("slab", 1.5, Vec3::ONE).layers },
+        ..solid("slab", 1.5, Vec3::ONE)
+    };
+    assert_holds("ink", slab_check(&gpu, vec![ink], slab(9.0, -0.01, 0.0, 0), 0.0, [0.1f64.sqrt(); 2]));
 }
 
 fn two_media() -> Vec<Material> {

@@ -269,7 +269,7 @@ fn short_rays_see_what_counts() {
 /// Also of a glTF file's glass: the table's top shows through the block.
 #[test]
 fn a_block_of_glass_on_a_table_hides_no_top() {
-    let solid = Layers { transmission: 1.0, medium: Some(Medium { transmittance: Vec3::ONE }), metallic: 0.0, ..Layers::default() };
+    let solid = Layers { transmission: 1.0, medium: Some(Medium::CLEAR), metallic: 0.0, ..Layers::default() };
     let pane = Layers { medium: None, ..solid };
     let leaves = Material { coverage: Coverage::Blend { alpha: 0.5 }, ..matt(0.5) };
     let layered = |layers: Layers| Material::layered("glass", Vec3::ONE, layers);

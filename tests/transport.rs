@@ -233,8 +233,13 @@ fn layered_scene() -> Scene {
         filter: Default::default(),
     });
     let map = NormalMap { texture: TextureUse::of(scene.textures.len() - 1, 0), scale: 1.0 };
-    let glass =
-        Layers { roughness: 0.0, transmission: 1.0, ior: 1.0, medium: Some(Medium { transmittance: Vec3::splat(1e-3) }), ..plastic };
+    let glass = Layers {
+        roughness: 0.0,
+        transmission: 1.0,
+        ior: 1.0,
+        medium: Some(Medium { transmittance: Vec3::splat(1e-3), metres: 1.0 }),
+        ..plastic
+    };
     let grey = |layers| Material::layered("plate", Vec3::splat(0.6), layers);
     let materials = [
         // Over black: what coat and sheen reflect is about what they take from a surface under them.

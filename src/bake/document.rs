@@ -350,9 +350,10 @@ impl Document {
         if layers.is_unlit {
             add("KHR_materials_unlit", json!({}));
         }
-        if let Some(Medium { transmittance }) = layers.medium {
+        if let Some(Medium { transmittance, metres }) = layers.medium {
             // Rays measure the thickness; any above 0 makes a solid.
-            let after_a_metre = json!({"thicknessFactor": 1.0, "attenuationDistance": 1.0, "attenuationColor": transmittance.to_array()});
+            let after_a_metre =
+                json!({"thicknessFactor": 1.0, "attenuationDistance": metres, "attenuationColor": transmittance.to_array()});
             add("KHR_materials_volume", after_a_metre);
         }
         let ior = |of: &Layers| json!({"ior": of.ior});
@@ -418,7 +419,7 @@ fn layers(material: &Material) -> Layers {
         Surface::Glossy { exponent } => Layers { roughness: (2.0 / (exponent + 2.0)).powf(0.25), ..usual },
         Surface::Mirror => Layers { roughness: 0.0, ..usual },
         Surface::Dielectric { ior } => {
-            let medium = Some(Medium { transmittance: Vec3::ONE });
+            let medium = Some(Medium::CLEAR);
             Layers { metallic: 0.0, roughness: 0.0, transmission: 1.0, ior, medium, ..usual }
         }
     }

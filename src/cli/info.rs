@@ -273,8 +273,9 @@ fn of_base(layers: &Layers) -> Vec<String> {
     if layers.transmission > 0.0 && (layers.transmission < 1.0 || layers.transmission_texture.is_some()) {
         parts.push(format!("transmission {}{}", number(layers.transmission), by_texture(layers.transmission_texture)));
     }
-    if let Some(Medium { transmittance }) = layers.medium.filter(|medium| medium.transmittance != Vec3::ONE) {
-        parts.push(format!("{} of the light left after a metre", colour(transmittance)));
+    if let Some(Medium { transmittance, metres }) = layers.medium.filter(|medium| medium.transmittance != Vec3::ONE) {
+        let way = if metres == 1.0 { "a metre".to_owned() } else { format!("{} m", number(metres)) };
+        parts.push(format!("{} of the light left after {way}", colour(transmittance)));
     }
     parts
 }

@@ -96,8 +96,13 @@ pub enum Coverage {
 /// What a transmissive surface encloses.
 #[derive(Debug, Clone, Copy, PartialEq)]
 pub struct Medium {
-    /// Share of the light that is left after each metre, per channel; 1: all of it.
+    /// Share of the light that is left after so many metres, per channel; 1: all of it.
     pub transmittance: Vec3,
+    pub metres: f32,
+}
+
+impl Medium {
+    pub const CLEAR: Medium = Medium { transmittance: Vec3::ONE, metres: 1.0 };
 }
 
 /// glTF's metallic-roughness model and what its extensions add. Factors multiply textures; the guide's page

@@ -117,7 +117,7 @@ impl Scene {
                 material.layers.transmission = 0.0;
             }
             if lacks(Effect::Media) {
-                material.layers.medium = material.layers.medium.map(|_| Medium { transmittance: Vec3::ONE });
+                material.layers.medium = material.layers.medium.map(|_| Medium::CLEAR);
             }
             if lacks(Effect::ClearCoat) {
                 material.layers.coat = 0.0;

@@ -129,7 +129,7 @@ impl Mixtures {
     }
 }
 
-pub const CLEAR: Option<Medium> = Some(Medium { transmittance: Vec3::ONE });
+pub const CLEAR: Option<Medium> = Some(Medium::CLEAR);
 
 /// Towards the suns: before all plates, below them, and behind them. No plate is in the way of another's light.
 const SUNS: [DVec3; 3] = [DVec3::new(0.35, 0.92, 0.17), DVec3::new(0.6, -0.75, -0.2), DVec3::new(0.1, -0.3, -1.0)];

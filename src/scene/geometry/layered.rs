@@ -26,11 +26,11 @@ pub(super) fn records(scene: &Scene, unit: f64) -> Result<Vec<LayeredMaterial>, 
             record.medium = known as u32 + 1;
         }
     }
-    // Black after a metre is black after any way: the limit keeps products finite.
-    let absorption = |transmittance: f32| (-f64::from(transmittance).ln() * unit).clamp(0.0, 1e30) as f32;
+    // Black after some way is black after any: the limit keeps products finite.
+    let absorption = |transmittance: f32, metres: f32| (-f64::from(transmittance).ln() / f64::from(metres) * unit).clamp(0.0, 1e30) as f32;
     for ((ior, medium), record) in media.iter().zip(&mut records) {
         record.medium_ior = ior.max(1e-3);
-        record.medium_absorption = Vec3::from(medium.transmittance.to_array().map(absorption));
+        record.medium_absorption = Vec3::from(medium.transmittance.to_array().map(|share| absorption(share, medium.metres)));
     }
     if media.len() <= MAX_MEDIA { Ok(records) } else { Err(media.len()) }
 }

@@ -200,14 +200,9 @@ impl Reader<'_> {
         if thickness == 0.0 {
             return Ok(None);
         }
-        let transmittance = colour.as_dvec3().powf(1.0 / f64::from(distance)).as_vec3();
-        // Beyond that a number of single precision is 0, and the medium would be black.
-        let is_lost = (0..3).any(|channel| colour[channel] > 0.0 && transmittance[channel] < f32::MIN_POSITIVE);
-        if is_lost {
-            self.loader.leave_out("attenuation that leaves less than 1e-38 of the light after a metre (taken as 1e-38)", &self.object);
-        }
-        let least = Vec3::from(colour.to_array().map(|channel| if channel > 0.0 { f32::MIN_POSITIVE } else { 0.0 }));
-        Ok(Some(Medium { transmittance: transmittance.max(least) }))
+        // Without a distance nothing is absorbed.
+        let is_clear = distance.is_infinite() || colour == Vec3::ONE;
+        Ok(Some(if is_clear { Medium::CLEAR } else { Medium { transmittance: colour, metres: distance } }))
     }
 
     fn texture(&mut self, info: Option<&Info>, meaning: Meaning) -> Result<Option<TextureUse>> {

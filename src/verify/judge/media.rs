@@ -30,7 +30,7 @@ impl<'a> Media<'a> {
     /// Share of light that is left after a way.
     pub fn transmittance(&self, metres: f64) -> DVec3 {
         let medium = self.0.last().and_then(|solid| solid.layers.medium);
-        medium.map_or(DVec3::ONE, |medium| medium.transmittance.as_dvec3().map(|share| share.powf(metres)))
+        medium.map_or(DVec3::ONE, |medium| medium.transmittance.as_dvec3().map(|share| share.powf(metres / f64::from(medium.metres))))
     }
 
     fn place(&self, solid: &Material) -> Option<usize> {
