@@ -491,6 +491,9 @@ fn written_scenes_open_again() {
         assert!(with_lightmaps.lights.is_empty());
 
         let shining = read(folder.path(), "scene.gltf");
+        for (mesh, before) in pairs(&shining.meshes, &scene.meshes) {
+            assert_eq!(shining.materials[mesh.material].coverage, scene.materials[before.material].coverage, "{}", mesh.name);
+        }
         for (mesh, lightmap) in pairs(&shining.meshes, &layout.meshes) {
             let material = &shining.materials[mesh.material];
             let Some(TextureUse { texture, uv_set, .. }) = material.emission_texture.filter(|_| lightmap.is_some()) else {

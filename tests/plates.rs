@@ -38,6 +38,7 @@ fn alphas_of_vertices_are_looked_up_without_colours() {
     let scene = scene_of(vec![sheet], vec![layered::dull(0.5)], vec![sun(DVec3::NEG_Y)]);
     let plan = scene_plan_within(&Limits::of_host(), &scene, &SceneSettings::default(), square_picture(1)).unwrap();
     assert!(plan.keeps(Effect::VertexColours));
+    assert!(scene.without(&[Effect::VertexColours]).meshes[0].alphas.is_empty());
 }
 
 #[test]

@@ -3,12 +3,6 @@
 layout(set = 0, binding = 2, scalar) readonly buffer Normals { TriangleNormals normals[]; };
 layout(set = 0, binding = 3, scalar) readonly buffer Uvs { TriangleUvs uvs[]; };
 layout(set = 0, binding = 4, scalar) readonly buffer Materials { SurfaceMaterial materials[]; };
-layout(set = 0, binding = 5, scalar) readonly buffer Textures { TextureInfo textures[]; };
-// The linear values of 8-bit codes, then texels; more of them in the next buffers, as devices may bound the size of one.
-layout(set = 0, binding = 6, scalar) readonly buffer Texels { uint texels[]; };
-layout(set = 0, binding = 15, scalar) readonly buffer Texels1 { uint texels_1[]; };
-layout(set = 0, binding = 16, scalar) readonly buffer Texels2 { uint texels_2[]; };
-layout(set = 0, binding = 17, scalar) readonly buffer Texels3 { uint texels_3[]; };
 // One for all triangles where no mesh has any.
 layout(set = 0, binding = 14, scalar) readonly buffer Colours { TriangleColours colours[]; };
 // One for all triangles where no layered material has a texture of its own, or a normal map.
@@ -17,6 +11,7 @@ layout(set = 0, binding = 18, scalar) readonly buffer LayersOfTriangles { Triang
 layout(set = 0, binding = 19, scalar) readonly buffer LayeredMaterials { LayeredMaterial layered_materials[]; };
 
 #include "material/layers.glsl"
+#include "material/textures.glsl"
 
 struct Surface {
     vec3 position;
@@ -32,68 +27,6 @@ struct Surface {
     vec3 emission; // radiance towards wo
     Layers layers; // of SURFACE_LAYERED
 };
-
-uint wrapped(int place, uint size, uint wrap)
-{
-    int extent = int(size);
-    if (wrap == 2) {
-        return uint(clamp(place, 0, extent - 1));
-    }
-    int period = wrap == 1 ? 2 * extent : extent;
-    int folded = place - period * int(floor(divide(float(place), float(period))));
-    folded = folded < 0 ? folded + period : (folded >= period ? folded - period : folded);
-    return uint(folded < extent ? folded : period - 1 - folded);
-}
-
-uint texel_word(uint place)
-{
-    if (HAS_MANY_TEXELS) {
-        uint part = place / TEXELS_PER_BUFFER, within = place % TEXELS_PER_BUFFER;
-        return part == 0 ? texels[within] : (part == 1 ? texels_1[within] : (part == 2 ? texels_2[within] : texels_3[within]));
-    }
-    return texels[place];
-}
-
-float linear_of_code(uint code)
-{
-    return uintBitsToFloat(texels[code & 255]);
-}
-
-// Twin of src/scene/texture.rs.
-vec4 texel(TextureInfo info, int i, int j)
-{
-    uint place = wrapped(j, info.height, (info.wrap >> 2) & 3u) * info.width + wrapped(i, info.width, info.wrap & 3u);
-    uint word = texel_word(info.first_texel + place);
-    if (info.encoding == TEXELS_SHARED_EXPONENT) {
-        // A power of two: 2^(exponent - 24).
-        float unit = uintBitsToFloat(((word >> 27) + (127 - 24)) << 23);
-        return vec4(vec3(word & 511, (word >> 9) & 511, (word >> 18) & 511) * unit, 1.0);
-    }
-    vec4 shares = vec4(word & 255, (word >> 8) & 255, (word >> 16) & 255, word >> 24) * (1.0 / 255.0);
-    if (info.encoding == TEXELS_LINEAR) {
-        return shares;
-    }
-    return vec4(linear_of_code(word), linear_of_code(word >> 8), linear_of_code(word >> 16), shares.w);
-}
-
-// Linear colour and alpha: bilinear between texel centres, or the nearest one's. A loop, as drivers take long to compile what stands four
-// times.
-vec4 sample_texture(TextureInfo info, vec2 uv)
-{
-    vec2 place = uv * vec2(info.width, info.height) - 0.5;
-    vec2 corner = floor(place);
-    vec2 share = place - corner;
-    if ((info.wrap & 16u) != 0) {
-        share = vec2(greaterThanEqual(share, vec2(0.5)));
-    }
-    vec4 row = vec4(0.0), sum = vec4(0.0);
-    [[dont_unroll]] for (int k = 0; k < 4; k++) {
-        vec4 value = texel(info, int(corner.x) + (k & 1), int(corner.y) + (k >> 1));
-        row = (k & 1) == 0 ? (1.0 - share.x) * value : row + share.x * value;
-        sum = k == 1 ? (1.0 - share.y) * row : (k == 3 ? sum + share.y * row : sum);
-    }
-    return sum;
-}
 
 vec2 mixed_uv(vec2 a, vec2 b, vec2 c, float u, float v)
 {
@@ -138,7 +71,7 @@ vec2 off_the_edges(Triangle triangle, vec2 weights, float error)
     return divide(all_weights.yz, all_weights.x + all_weights.y + all_weights.z);
 }
 
-// What a texture leaves of the light that leaves a triangle's shining side.
+// The value of the emission's texture, or 1.
 vec3 emission_texel(SurfaceMaterial material, uint index, float u, float v)
 {
     if (HAS_TEXTURES) {
@@ -150,6 +83,7 @@ vec3 emission_texel(SurfaceMaterial material, uint index, float u, float v)
     return vec3(1.0);
 }
 
+// The value of the base colour's texture, or 1.
 vec4 base_texel(SurfaceMaterial material, uint index, float u, float v)
 {
     if (HAS_TEXTURES) {
@@ -186,7 +120,7 @@ float coverage_of(SurfaceMaterial material, uint index, float u, float v)
     return coverage_by(index, base_texel(material, index, u, v).a, u, v);
 }
 
-// What is left of the light of a lamp at one of its points: there is as much of it as of the surface.
+// The share of a lamp's light at one of its points: of its texture, and of alpha.
 vec3 lamp_share(SurfaceMaterial material, uint index, float u, float v)
 {
     vec3 share = emission_texel(material, index, u, v);

@@ -269,7 +269,7 @@ impl LobeKinds {
             || of.sheen_colour != Vec3::ZERO
             || (reflects && alpha.1 >= map_alpha && !(transmits && !is_pane && transmission.0 >= 1.0))
             || (of.coat > 0.0 && coat_alpha.1 >= map_alpha);
-        // What has no lobe is black, and still lies in the light.
+        // A surface without a lobe is black; light still arrives there.
         let is_black = !matt && !reflects && !transmits && of.coat == 0.0;
         LobeKinds {
             matt: matt || is_black,

@@ -419,7 +419,7 @@ pub fn opaque() -> Vec<Material> {
 }
 
 /// Alpha of white metals, and what they send back at each of [`COSINES`], by quadrature.
-const METALS: [(f64, [f64; 5]); 8] = [
+pub const METALS: [(f64, [f64; 5]); 8] = [
     (0.0, [1.0; 5]),
     (0.01, [1.0000, 1.0000, 0.9998, 0.9986, 0.9763]),
     (0.05, [0.9972, 0.9964, 0.9927, 0.9626, 0.8899]),
