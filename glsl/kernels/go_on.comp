@@ -20,7 +20,7 @@ void main()
     uint index = path.place / SAMPLES;
     uint number = path.place % SAMPLES;
     uint depth = path.state >> 8;
-    Chain chain = new_chain(path.position, path.direction, path.weight, vec2(0.0));
+    start_chain(path.position, path.direction, path.weight, vec2(0.0));
     chain.saw_specular = (path.state & 1u) != 0;
     chain.gathers = (path.state & 2u) != 0;
     chain.starts_nowhere = (path.state & 4u) != 0;
@@ -30,12 +30,11 @@ void main()
     chain.from = path.from;
     chain.from_normal = path.from_normal;
     chain.point_count = (path.state >> 4) & 3u;
-    uint first_point = chain.point_count;
-    if (follow(chain, index, number, push.pixel_count, push.draws, push.emitter_count, depth)) {
-        put_off(chain, path.place, depth + CHAIN_STEPS);
+    if (follow(index, number, push.pixel_count, push.draws, push.emitter_count, depth)) {
+        put_off(path.place, depth + CHAIN_STEPS);
     }
     note_unless(is_finite(chain.light[0]) && is_finite(chain.light[1]) && is_finite(chain.light[2]), NONFINITE_LIGHT, push.draws.domain,
                 push.draws.round, index);
     write_pass_sum(path.place, chain.light, push.film_scale, push.film_limit, mix32(push.rounding + depth), true);
-    write_points(chain, index, number, push.pixel_count, first_point);
+    write_missing_points(index, number, push.pixel_count);
 }

@@ -27,13 +27,13 @@ void main()
     vec3 ns = receiver.shading_normal;
     vec3 position = off_the_walls(receiver.position, ng);
     Target here = plain_target(position, position_error(position), ng, ns, ns, SURFACE_RECEIVER, 0.0);
-    Chain chain = new_chain(position, ns, vec3(1.0), vec2(0.0));
+    start_chain(position, ns, vec3(1.0), vec2(0.0));
     if (HAS_MEDIA) {
         chain.media = media_at(position);
         here.media = chain.media;
     }
     if (SHADOW_RAYS != 0) {
-        add_light(chain, direct_light(here, push.emitter_count, push.draws, index, 0, RECEIVER_BLOCK));
+        add_light(direct_light(here, push.emitter_count, push.draws, index, 0, RECEIVER_BLOCK));
         note_shadow_rays(index, vec3(1.0));
     }
     // Photons only ever land on surfaces, and tell the irradiance of those: any other point, or direction, looks
@@ -42,9 +42,9 @@ void main()
     bool on_surface = plane != NONE;
     bool gathers = GATHER_RAYS == GATHER_ALL || !on_surface;
     if (on_surface) {
-        uint arrivals = arrivals_wanted(chain, gathers);
+        uint arrivals = arrivals_wanted(gathers);
         vec3 on_plane = receiver.position - plane_height(plane, receiver.position) * planes[plane >> 1].xyz;
-        chain.points[chain.point_count++] =
+        visible_points[place_of_point(chain.point_count++, index, 0, push.point_count)] =
             VisiblePoint(on_plane, plane, vec3(1.0), ns == ng ? NONE : pack_normal(ns), 0, 0.0, SURFACE_RECEIVER, arrivals | SEEN);
     }
     if (gathers) {
@@ -60,12 +60,12 @@ void main()
         if (HAS_ALL_ARRIVALS) {
             chain.sees_emission = !on_surface;
         }
-        if (follow(chain, index, 0, push.point_count, push.draws, push.emitter_count, 0)) {
-            put_off(chain, index, CHAIN_STEPS);
+        if (follow(index, 0, push.point_count, push.draws, push.emitter_count, 0)) {
+            put_off(index, CHAIN_STEPS);
         }
     }
     note_unless(is_finite(chain.light[0]) && is_finite(chain.light[1]) && is_finite(chain.light[2]), NONFINITE_LIGHT, push.draws.domain,
                 push.draws.round, index);
     write_pass_sum(index, chain.light, push.film_scale, push.film_limit, push.rounding, false);
-    write_points(chain, index, 0, push.point_count, 0);
+    write_missing_points(index, 0, push.point_count);
 }

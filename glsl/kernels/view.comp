@@ -26,15 +26,15 @@ void main()
     vec2 picture = vec2(divide(2.0 * place.x, push.width) - 1.0, 1.0 - divide(2.0 * place.y, push.height));
     vec3 direction = normalize(push.forward + picture.x * push.right + picture.y * push.up);
 
-    Chain chain = new_chain(push.eye, direction, vec3(1.0), u.zw);
+    start_chain(push.eye, direction, vec3(1.0), u.zw);
     if (HAS_MEDIA) {
         chain.media = media_at(push.eye);
     }
-    if (follow(chain, pixel, number, push.width * push.height, push.draws, push.emitter_count, 0)) {
-        put_off(chain, SAMPLES * pixel + number, CHAIN_STEPS);
+    if (follow(pixel, number, push.width * push.height, push.draws, push.emitter_count, 0)) {
+        put_off(SAMPLES * pixel + number, CHAIN_STEPS);
     }
     note_unless(is_finite(chain.light[0]) && is_finite(chain.light[1]) && is_finite(chain.light[2]), NONFINITE_LIGHT, push.draws.domain,
                 push.draws.round, pixel);
     write_pass_sum(SAMPLES * pixel + number, chain.light, push.film_scale, push.film_limit, push.rounding, false);
-    write_points(chain, pixel, number, push.width * push.height, 0);
+    write_missing_points(pixel, number, push.width * push.height);
 }

@@ -16,29 +16,30 @@ struct Chain {
     float density;
     vec3 from;
     vec3 from_normal;
-    uint point_count;
-    VisiblePoint points[2];
+    uint point_count; // visible points found
     vec3 light[3]; // direct, specular, indirect
 };
 
-Chain new_chain(vec3 position, vec3 direction, vec3 weight, vec2 choices)
+// The path of this thread. No argument: drivers keep copies of one that has arrays.
+Chain chain;
+
+void start_chain(vec3 position, vec3 direction, vec3 weight, vec2 choices)
 {
-    Chain chain = Chain(position, direction, weight, choices, false, false, false, true, 0, 0.0, vec3(0.0), vec3(0.0), 0, VisiblePoint[](no_point(), no_point()),
-                        vec3[](vec3(0.0), vec3(0.0), vec3(0.0)));
-    return chain;
+    chain = Chain(position, direction, weight, choices, false, false, false, true, 0, 0.0, vec3(0.0), vec3(0.0), 0,
+                  vec3[](vec3(0.0), vec3(0.0), vec3(0.0)));
 }
 
 // The part of the picture that light of the current vertex belongs to, when it arrived in this way.
-uint part_of(Chain chain, uint arrival)
+uint part_of(uint arrival)
 {
     return chain.saw_specular ? PART_SPECULAR
          : chain.gathers      ? PART_INDIRECT
                               : (arrival == ARRIVED_DIRECT ? PART_DIRECT : (arrival == ARRIVED_CAUSTIC ? PART_CAUSTIC : PART_INDIRECT));
 }
 
-void add_light(inout Chain chain, vec3 radiance)
+void add_light(vec3 radiance)
 {
-    uint part = part_of(chain, ARRIVED_DIRECT);
+    uint part = part_of(ARRIVED_DIRECT);
     if ((PARTS & part) != 0) {
         uint place = part == PART_DIRECT ? 0 : (part == PART_SPECULAR ? 1 : 2);
         chain.light[place] += chain.weight * radiance;
@@ -70,7 +71,7 @@ void note_shadow_rays(uint pixel, vec3 weight)
 
 // The arrivals at the current vertex that some part asks for by photons: shadow rays see to direct light, and a gather
 // ray to indirect.
-uint arrivals_wanted(Chain chain, bool gathers)
+uint arrivals_wanted(bool gathers)
 {
     uint wanted = 0;
     uint first = ARRIVED_DIRECT;
@@ -79,13 +80,13 @@ uint arrivals_wanted(Chain chain, bool gathers)
     }
     uint last = gathers ? ARRIVED_CAUSTIC : ARRIVED_INDIRECT;
     for (uint arrival = first; arrival <= last; arrival *= 2) {
-        wanted |= (PARTS & part_of(chain, arrival)) != 0 ? arrival : 0;
+        wanted |= (PARTS & part_of(arrival)) != 0 ? arrival : 0;
     }
     return wanted;
 }
 
 // Adds what shines at the end of a ray, where light samples have not counted all of it; `light_density` is theirs.
-void add_emission(inout Chain chain, vec3 radiance, float light_density)
+void add_emission(vec3 radiance, float light_density)
 {
     float share = 1.0;
     if (HAS_LAYERS) {
@@ -93,7 +94,7 @@ void add_emission(inout Chain chain, vec3 radiance, float light_density)
             share = divide(chain.density, chain.density + float(SHADOW_RAYS) * light_density);
         }
     }
-    add_light(chain, share * radiance);
+    add_light(share * radiance);
 }
 
 bool gathers_here(Surface surface)
@@ -119,56 +120,21 @@ const float MAX_SURVIVAL = 0.95;
 const uint RECEIVER_BLOCK = 1 + VERTEX_BLOCKS * MAX_BOUNCES;
 const uint ROULETTE_BLOCK = RECEIVER_BLOCK + 1;
 
-// Takes the chain of sample `number` of a place over the next surface, behind `depth` others. Says whether it goes on. Random numbers:
-// block 1 + VERTEX_BLOCKS * depth goes on, the one after it is for direct light.
-bool step_chain(inout Chain chain, uint index, uint number, uint pixel_count, Draws draws, uint emitter_count, uint depth)
+// What shines where the path leaves the scene.
+void see_sky(uint emitter_count)
 {
-    note_unless(is_finite(chain.position) && is_finite(chain.direction) && is_finite(chain.weight), NONFINITE_LIGHT, draws.domain,
-                draws.round, index);
-    vec3 wo = -chain.direction;
-    Hit hit = closest_hit(chain.position, chain.direction);
-    if (hit.triangle == NONE) {
-        if (chain.sees_emission) {
-            float light_density = 0.0;
-            if (HAS_LAYERS) {
-                light_density = sky_light_density(emitter_count, chain.from, chain.from_normal, chain.direction);
-            }
-            add_emission(chain, environment_radiance(emitter_count), light_density);
+    if (chain.sees_emission) {
+        float light_density = 0.0;
+        if (HAS_LAYERS) {
+            light_density = sky_light_density(emitter_count, chain.from, chain.from_normal, chain.direction);
         }
-        return false;
+        add_emission(environment_radiance(emitter_count), light_density);
     }
-    if (HAS_MEDIA) {
-        chain.weight *= transmittance(chain.media, hit.t);
-    }
-    Surface surface = surface_at(hit, wo);
-    uint block = 1 + VERTEX_BLOCKS * depth;
-    bool is_layered = false;
-    if (HAS_LAYERS) {
-        is_layered = surface.kind == SURFACE_LAYERED;
-    }
-    Lobes lobes;
-    Scatter scatter;
-    float matt = 1.0;
-    if (is_layered) {
-        float eta = index_ratio(surface, chain.media);
-        surface.ns = normal_of_refraction(surface, wo, eta, depth);
-        lobes = lobes_of(surface, wo, eta);
-        // The eye does not see the back of what has one side.
-        bool is_culled = !surface.scatters && !chain.gathers;
-        scatter = sample_layered(surface, lobes, wo, stratified(number, SAMPLES, words_of(index, block, draws)).zxy, true);
-        if (is_culled || scatter.passes) {
-            chain.weight *= is_culled ? vec3(1.0) : scatter.weight;
-            chain.position = offset_origin(surface.position, surface.error, surface.ng, chain.direction);
-            return true;
-        }
-        if (HAS_PASSING) {
-            chain.weight *= divide(surface.layers.coverage, 1.0 - lobes.pass_chance);
-        }
-        matt = matt_chance(lobes, surface.layers);
-        if (surface.layers.is_unlit && !chain.gathers) {
-            add_light(chain, surface.base_colour);
-        }
-    }
+}
+
+// What shines where the path meets a surface.
+void see_lamp(Surface surface, Hit hit, uint emitter_count)
+{
     if (chain.sees_emission) {
         float light_density = 0.0;
         if (HAS_LAYERS) {
@@ -176,133 +142,178 @@ bool step_chain(inout Chain chain, uint index, uint number, uint pixel_count, Dr
                 light_density = lamp_light_density(emitter_count, hit, chain.from, surface.position);
             }
         }
-        add_emission(chain, surface.emission, light_density);
+        add_emission(surface.emission, light_density);
     }
-    if (!surface.scatters) {
-        return false;
-    }
-    bool specular = is_layered ? scatter.is_specular : is_specular(surface);
-    vec3 scale = is_layered ? vec3(1.0) : surface.base_colour * scatter_scale(surface.kind, surface.parameter);
-    bool wants_direct = (PARTS & part_of(chain, ARRIVED_DIRECT)) != 0;
-    bool asks_lights = false;
-    if (SHADOW_RAYS != 0) {
-        asks_lights = is_layered || (!specular && wants_direct);
-    }
-    if (is_layered) {
-        chain.density = 0.0;
-    }
-    if (asks_lights) {
-        Target here = plain_target(surface.position, surface.error, surface.ng, surface.ns, wo, surface.kind, surface.parameter);
-        here.surface = surface;
-        here.lobes = lobes;
-        here.media = chain.media;
-        vec3 light = scale * direct_light(here, emitter_count, draws, index, number, block + 1);
-        if (wants_direct) {
-            add_light(chain, light);
-        }
-        // Of what a gather ray meets the caustic map has counted the light of sharp lobes.
-        if (is_layered && (!chain.gathers || chain.starts_nowhere)) {
-            bool saw_specular = chain.saw_specular;
-            chain.saw_specular = saw_specular || !chain.gathers;
-            add_light(chain, sharp_light);
-            chain.saw_specular = saw_specular;
-            chain.density = scatter.density;
-            chain.from = surface.position;
-            chain.from_normal = surface.ns;
-        }
-        note_shadow_rays(index, divide(chain.weight * scale, float(SAMPLES)));
-    }
-    // Matt lobes are followed no further but for a gather.
-    if (is_layered && !specular && matt == 0.0) {
-        return false;
-    }
-    if (!specular) {
-        if (is_layered) {
-            scale = vec3(divide(0.31830988618379067, matt));
-        }
-        // Where it is by chance that a path gets here, each counts for itself.
-        bool for_all = !chain.saw_specular && !chain.gathers && matt == 1.0;
-        bool leads = !for_all || number == 0;
-        bool gathers = leads && !chain.gathers && gathers_here(surface) && (PARTS & part_of(chain, ARRIVED_INDIRECT)) != 0;
-        uint arrivals = arrivals_wanted(chain, gathers);
-        uint for_others = 0;
-        if (HAS_CAUSTIC_MAP) {
-            for_others = ARRIVED_CAUSTIC;
-        }
-        arrivals = leads ? arrivals : arrivals & for_others;
-        arrivals |= arrivals == 0 ? SEEN
-                                  : SEEN | (chain.saw_specular ? SEEN_OVER_SPECULAR : 0) | (chain.gathers ? SEEN_BY_GATHER : 0)
-                                        | (for_all ? SEEN_FOR_ALL : 0);
-        if (HAS_LAYERS) {
-            write_matt_lobes(chain.point_count, index, number, pixel_count, lobes);
-        }
-        chain.points[chain.point_count++] = VisiblePoint(surface.position, surface.plane, divide(chain.weight * scale, float(SAMPLES)),
-                                                         surface.ns == surface.ng ? NONE : pack_normal(surface.ns), pack_direction(wo, 0), surface.parameter,
-                                                         surface.kind, arrivals);
-        if (!gathers) {
-            return false;
-        }
-        chain.gathers = true;
-        chain.weight *= for_all ? float(SAMPLES) : 1.0;
-        // Shadow rays and the caustic map have counted what shines from here on.
-        chain.sees_emission = false;
-    }
-    bool ends = specular && !chain.gathers;
-    if (HAS_SPECULAR_CHAINS) {
-        ends = false;
-    }
-    if (ends) {
-        return false;
-    }
-    uint count = SAMPLES; // build.rs cannot reflect a constant that is compared with `>=`
-    vec3 u = stratified(number, count, words_of(index, block, draws)).zxy;
-    float mirror_chance = 0.0;
-    if (count >= MIRROR_SAMPLES && specular && depth < 2 && !chain.gathers) {
-        mirror_chance = MIRROR_CHANCES[depth];
-        u.x = chain.choices[depth];
-    }
-    if (!is_layered) {
-        scatter = sample_scatter(surface, wo, u, depth, true, mirror_chance);
-    }
-    if (!scatter.alive) {
-        return false;
-    }
-    if (depth >= ROULETTE_DEPTH) {
-        float most = depth < LOSSLESS_DEPTH ? 1.0 : MAX_SURVIVAL;
-        float survival = min(max(scatter.weight.x, max(scatter.weight.y, scatter.weight.z)), most);
-        if (stratified(number, count, words_of(index, ROULETTE_BLOCK + depth, draws)).x >= survival) {
-            return false;
-        }
-        scatter.weight = divide(scatter.weight, survival);
-    }
-    if (surface.kind == SURFACE_PAPER_PHONG) {
-        scatter.weight *= lobe_weight(surface.kind, surface.parameter, surface.ns, wo, scatter.direction);
-    }
-    chain.weight *= scatter.weight;
-    // No caustic map holds what reaches a receiver in the air over mirrors and glass.
-    chain.sees_emission = chain.sees_emission || (chain.starts_nowhere && specular);
-    if (is_layered && !specular) {
-        chain.density = 0.0;
-    }
-    chain.saw_specular = chain.saw_specular || (specular && !chain.gathers);
-    if (HAS_MEDIA) {
-        if (is_layered && surface.layers.medium != 0 && dot(scatter.direction, surface.ng) < 0.0) {
-            chain.media = media_beyond(surface, chain.media);
-        }
-    }
-    chain.position = offset_origin(surface.position, surface.error, surface.ng, scatter.direction);
-    chain.direction = scatter.direction;
-    return true;
 }
 
-// Follows a chain that is over `first_depth` surfaces already. Says whether it is still under way.
-bool follow(inout Chain chain, uint index, uint number, uint pixel_count, Draws draws, uint emitter_count, uint first_depth)
+// Leaves a visible point, of whose light `scale` goes on to the eye. Says whether a gather ray leaves it.
+bool leave_point(Surface surface, Lobes lobes, vec3 wo, vec3 scale, bool for_all, uint index, uint number, uint pixel_count)
+{
+    bool leads = !for_all || number == 0;
+    bool gathers = leads && !chain.gathers && gathers_here(surface) && (PARTS & part_of(ARRIVED_INDIRECT)) != 0;
+    uint arrivals = arrivals_wanted(gathers);
+    uint for_others = 0;
+    if (HAS_CAUSTIC_MAP) {
+        for_others = ARRIVED_CAUSTIC;
+    }
+    arrivals = leads ? arrivals : arrivals & for_others;
+    arrivals |= arrivals == 0 ? SEEN
+                              : SEEN | (chain.saw_specular ? SEEN_OVER_SPECULAR : 0) | (chain.gathers ? SEEN_BY_GATHER : 0)
+                                    | (for_all ? SEEN_FOR_ALL : 0);
+    uint place = place_of_point(chain.point_count++, index, number, pixel_count);
+    visible_points[place] = VisiblePoint(surface.position, surface.plane, divide(chain.weight * scale, float(SAMPLES)),
+                                         surface.ns == surface.ng ? NONE : pack_normal(surface.ns), pack_direction(wo, 0), surface.parameter,
+                                         surface.kind, arrivals);
+    if (HAS_LAYERS) {
+        write_matt_lobes(place, lobes);
+    }
+    return gathers;
+}
+
+// Follows the path of sample `number` of a place, which is over `first_depth` surfaces already. Says whether it is still under way. Random
+// numbers: block 1 + VERTEX_BLOCKS * depth goes on, the one after it is for direct light.
+bool follow(uint index, uint number, uint pixel_count, Draws draws, uint emitter_count, uint first_depth)
 {
     uint end_depth = min(first_depth + CHAIN_STEPS, MAX_BOUNCES);
     for (uint depth = first_depth; depth < end_depth; depth++) {
-        if (!step_chain(chain, index, number, pixel_count, draws, emitter_count, depth)) {
+        note_unless(is_finite(chain.position) && is_finite(chain.direction) && is_finite(chain.weight), NONFINITE_LIGHT, draws.domain,
+                    draws.round, index);
+        vec3 wo = -chain.direction;
+        Hit hit = closest_hit(chain.position, chain.direction);
+        if (hit.triangle == NONE) {
+            see_sky(emitter_count);
             return false;
         }
+        if (HAS_MEDIA) {
+            chain.weight *= transmittance(chain.media, hit.t);
+        }
+        Surface surface = surface_at(hit, wo);
+        uint block = 1 + VERTEX_BLOCKS * depth;
+        bool is_layered = false;
+        if (HAS_LAYERS) {
+            is_layered = surface.kind == SURFACE_LAYERED;
+        }
+        Lobes lobes;
+        Scatter scatter;
+        float matt = 1.0;
+        if (is_layered) {
+            float eta = index_ratio(surface, chain.media);
+            surface.ns = normal_of_refraction(surface, wo, eta, depth);
+            lobes = lobes_of(surface, wo, eta);
+            // The eye does not see the back of what has one side.
+            bool is_culled = !surface.scatters && !chain.gathers;
+            scatter = sample_layered(surface, lobes, wo, stratified(number, SAMPLES, words_of(index, block, draws)).zxy, true);
+            if (is_culled || scatter.passes) {
+                chain.weight *= is_culled ? vec3(1.0) : scatter.weight;
+                chain.position = offset_origin(surface.position, surface.error, surface.ng, chain.direction);
+                continue;
+            }
+            if (HAS_PASSING) {
+                chain.weight *= divide(surface.layers.coverage, 1.0 - lobes.pass_chance);
+            }
+            matt = matt_chance(lobes, surface.layers);
+            if (surface.layers.is_unlit && !chain.gathers) {
+                add_light(surface.base_colour);
+            }
+        }
+        see_lamp(surface, hit, emitter_count);
+        if (!surface.scatters) {
+            return false;
+        }
+        bool specular = is_layered ? scatter.is_specular : is_specular(surface);
+        vec3 scale = is_layered ? vec3(1.0) : surface.base_colour * scatter_scale(surface.kind, surface.parameter);
+        bool wants_direct = (PARTS & part_of(ARRIVED_DIRECT)) != 0;
+        bool asks_lights = false;
+        if (SHADOW_RAYS != 0) {
+            asks_lights = is_layered || (!specular && wants_direct);
+        }
+        if (is_layered) {
+            chain.density = 0.0;
+        }
+        if (asks_lights) {
+            Target here = plain_target(surface.position, surface.error, surface.ng, surface.ns, wo, surface.kind, surface.parameter);
+            here.surface = surface;
+            here.lobes = lobes;
+            here.media = chain.media;
+            vec3 light = scale * direct_light(here, emitter_count, draws, index, number, block + 1);
+            if (wants_direct) {
+                add_light(light);
+            }
+            // Of what a gather ray meets the caustic map has counted the light of sharp lobes.
+            if (is_layered && (!chain.gathers || chain.starts_nowhere)) {
+                bool saw_specular = chain.saw_specular;
+                chain.saw_specular = saw_specular || !chain.gathers;
+                add_light(sharp_light);
+                chain.saw_specular = saw_specular;
+                chain.density = scatter.density;
+                chain.from = surface.position;
+                chain.from_normal = surface.ns;
+            }
+            note_shadow_rays(index, divide(chain.weight * scale, float(SAMPLES)));
+        }
+        // Matt lobes are followed no further but for a gather.
+        if (is_layered && !specular && matt == 0.0) {
+            return false;
+        }
+        if (!specular) {
+            if (is_layered) {
+                scale = vec3(divide(0.31830988618379067, matt));
+            }
+            // Where it is by chance that a path gets here, each counts for itself.
+            bool for_all = !chain.saw_specular && !chain.gathers && matt == 1.0;
+            if (!leave_point(surface, lobes, wo, scale, for_all, index, number, pixel_count)) {
+                return false;
+            }
+            chain.gathers = true;
+            chain.weight *= for_all ? float(SAMPLES) : 1.0;
+            // Shadow rays and the caustic map have counted what shines from here on.
+            chain.sees_emission = false;
+        }
+        bool ends = specular && !chain.gathers;
+        if (HAS_SPECULAR_CHAINS) {
+            ends = false;
+        }
+        if (ends) {
+            return false;
+        }
+        uint count = SAMPLES; // build.rs cannot reflect a constant that is compared with `>=`
+        vec3 u = stratified(number, count, words_of(index, block, draws)).zxy;
+        float mirror_chance = 0.0;
+        if (count >= MIRROR_SAMPLES && specular && depth < 2 && !chain.gathers) {
+            mirror_chance = MIRROR_CHANCES[depth];
+            u.x = chain.choices[depth];
+        }
+        if (!is_layered) {
+            scatter = sample_scatter(surface, wo, u, depth, true, mirror_chance);
+        }
+        if (!scatter.alive) {
+            return false;
+        }
+        if (depth >= ROULETTE_DEPTH) {
+            float most = depth < LOSSLESS_DEPTH ? 1.0 : MAX_SURVIVAL;
+            float survival = min(max(scatter.weight.x, max(scatter.weight.y, scatter.weight.z)), most);
+            if (stratified(number, count, words_of(index, ROULETTE_BLOCK + depth, draws)).x >= survival) {
+                return false;
+            }
+            scatter.weight = divide(scatter.weight, survival);
+        }
+        if (surface.kind == SURFACE_PAPER_PHONG) {
+            scatter.weight *= lobe_weight(surface.kind, surface.parameter, surface.ns, wo, scatter.direction);
+        }
+        chain.weight *= scatter.weight;
+        // No caustic map holds what reaches a receiver in the air over mirrors and glass.
+        chain.sees_emission = chain.sees_emission || (chain.starts_nowhere && specular);
+        if (is_layered && !specular) {
+            chain.density = 0.0;
+        }
+        chain.saw_specular = chain.saw_specular || (specular && !chain.gathers);
+        if (HAS_MEDIA) {
+            if (is_layered && surface.layers.medium != 0 && dot(scatter.direction, surface.ng) < 0.0) {
+                chain.media = media_beyond(surface, chain.media);
+            }
+        }
+        chain.position = offset_origin(surface.position, surface.error, surface.ng, scatter.direction);
+        chain.direction = scatter.direction;
     }
     if (end_depth == MAX_BOUNCES) {
         note_cut_path(max(chain.weight.x, max(chain.weight.y, chain.weight.z)));
@@ -317,7 +328,7 @@ layout(set = 1, binding = 9, scalar) writeonly buffer NextCameraPaths { CameraPa
 layout(set = 1, binding = 10, scalar) buffer CameraPathCounts { uint camera_path_counts[]; };
 
 // `place` is that of the sample among all samples.
-void put_off(Chain chain, uint place, uint depth)
+void put_off(uint place, uint depth)
 {
     uint flags = uint(chain.saw_specular) | uint(chain.gathers) << 1 | uint(chain.starts_nowhere) << 2 | uint(chain.sees_emission) << 3;
     next_camera_paths[atomicAdd(camera_path_counts[0], 1)] =
@@ -325,14 +336,10 @@ void put_off(Chain chain, uint place, uint depth)
                    chain.from_normal);
 }
 
-// All pixels' first points stand first, so that neighbours in memory are neighbours in the picture. Points before `first` stay.
-void write_points(Chain chain, uint pixel, uint number, uint pixel_count, uint first)
+// Of what the path has not found.
+void write_missing_points(uint pixel, uint number, uint pixel_count)
 {
-    uint per_path = 1;
-    if (GATHER_RAYS != GATHER_NONE) {
-        per_path = 2;
-    }
-    for (uint k = first; k < per_path; k++) {
-        visible_points[(per_path * number + k) * pixel_count + pixel] = chain.points[k];
+    for (uint k = chain.point_count; k < points_per_path(); k++) {
+        visible_points[place_of_point(k, pixel, number, pixel_count)] = no_point();
     }
 }
