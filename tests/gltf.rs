@@ -428,16 +428,21 @@ fn vertex_colours_are_read() {
     let colours = add_accessor(&mut whole, &floats(&[0.5, 0.25, 0.125, 1.0].repeat(4)), 5126, 4, "VEC4");
     whole["meshes"][0]["primitives"][0]["attributes"]["COLOR_0"] = json!(colours);
     assert!(load(&whole).unwrap().meshes[0].alphas.is_empty());
-    for (bad, named) in [(1.5, "alpha 1.5; each must be from 0 to 1"), (f32::NAN, "NaN")] {
-        let colours = add_accessor(&mut whole, &floats(&[0.5, 0.25, 0.125, bad].repeat(4)), 5126, 4, "VEC4");
+    // What is out of range by rounding, or by far, is cut off, and named.
+    let mut with_value = |value: f32| {
+        let colours = add_accessor(&mut whole, &floats(&[0.5, 0.25, value, value].repeat(4)), 5126, 4, "VEC4");
         whole["meshes"][0]["primitives"][0]["attributes"]["COLOR_0"] = json!(colours);
-        assert_refused(&whole, &["mesh 'wall'", named]);
+        load(&whole)
+    };
+    for (value, cut) in [(1.0 + f32::EPSILON, 1.0), (1.5, 1.0), (-1e-9, 0.0)] {
+        let scene = with_value(value).unwrap();
+        assert_eq!(scene.meshes[0].colours, [DVec3::new(0.5, 0.25, cut); 4]);
+        assert_eq!(scene.meshes[0].alphas, if cut == 1.0 { vec![] } else { vec![cut; 4] });
+        assert_eq!(scene.warnings, ["ignored: what vertex colours have below 0 or above 1: mesh 'wall'"]);
     }
-
-    let mut bright = value.clone();
-    let colours = add_accessor(&mut bright, &floats(&[0.5, 0.5, 1.5].repeat(4)), 5126, 4, "VEC3");
-    bright["meshes"][0]["primitives"][0]["attributes"]["COLOR_0"] = json!(colours);
-    assert_refused(&bright, &["mesh 'wall'", "vertex colour 0.5 0.5 1.5", "from 0 to 1"]);
+    for value in [f32::NAN, f32::INFINITY] {
+        assert_refusal(with_value(value), &["mesh 'wall'", "every number must be finite"]);
+    }
     let few = add_accessor(&mut value, &floats(&[0.5; 9]), 5126, 3, "VEC3");
     value["meshes"][0]["primitives"][0]["attributes"]["COLOR_0"] = json!(few);
     assert_refused(&value, &["mesh 'wall'", "3 vertex colours for 4 vertices"]);
@@ -680,7 +685,8 @@ fn everything_of_a_material_is_read() {
     })))
     .unwrap();
     // The square has no second set.
-    let [warning] = &scene.warnings[..] else { panic!("{:?}", scene.warnings) };
+    let [hole, warning] = &scene.warnings[..] else { panic!("{:?}", scene.warnings) };
+    assert!(hole.starts_with("solids with holes (mesh 'wall')"), "{hole}");
     assert!(warning.contains("normal maps on meshes without texture coordinates: material 'all' on mesh 'wall'"), "{warning}");
     assert!(warning.contains("(its textures have their value at 0 0): material 'all' on mesh 'wall'"), "{warning}");
 
@@ -766,7 +772,10 @@ fn volumes_have_a_transmittance_over_a_distance() {
         // After a metre no number of single precision would be left.
         (json!({"thicknessFactor": 1, "attenuationColor": [0.5, 0.5, 0.5], "attenuationDistance": 0.001}), grey(0.5, 0.001)),
     ] {
-        assert_eq!(medium(volume.clone(), 1.0), (transmittance, String::new()), "{volume}");
+        let (found, warnings) = medium(volume.clone(), 1.0);
+        assert_eq!(found, transmittance, "{volume}");
+        // The square is no solid.
+        assert_eq!(warnings.contains("solids with holes (mesh 'wall')"), found.is_some(), "{volume}: {warnings}");
     }
     assert_eq!(medium(json!({"thicknessFactor": 1}), 0.0).0, None);
 }

@@ -1,5 +1,7 @@
 //! Triangle meshes in world space.
 
+use std::collections::HashMap;
+
 use glam::{DVec2, DVec3, DVec4};
 use rayon::prelude::*;
 
@@ -53,6 +55,33 @@ impl Mesh {
     /// Unit normal of a triangle's front.
     pub fn normal(&self, triangle: usize) -> DVec3 {
         Mesh::doubled_area(self.corners(triangle)).normalize()
+    }
+
+    /// Brings vertex colours and alphas into 0 to 1, and says whether any was outside. Alphas that are all 1 are none.
+    pub fn clamp_colours(&mut self) -> bool {
+        let colours = self.colours.iter_mut().flat_map(DVec3::as_mut);
+        let mut is_cut = false;
+        for value in colours.chain(&mut self.alphas) {
+            is_cut |= !(0.0..=1.0).contains(value);
+            *value = value.clamp(0.0, 1.0);
+        }
+        if self.alphas.iter().all(|alpha| *alpha == 1.0) {
+            self.alphas = Vec::new();
+        }
+        is_cut
+    }
+
+    /// Whether its triangles bound a volume: each edge is walked as often one way as the other. What lies at one place is one corner.
+    pub fn is_closed(&self) -> bool {
+        // Of both zeros one.
+        let place = |vertex: u32| (self.positions[vertex as usize] + DVec3::ZERO).to_array().map(f64::to_bits);
+        let mut surplus: HashMap<_, i64> = HashMap::new();
+        for [a, b, c] in self.triangles.iter().map(|triangle| triangle.map(place)) {
+            for (from, to) in [(a, b), (b, c), (c, a)] {
+                *surplus.entry((from.min(to), from.max(to))).or_default() += if from < to { 1 } else { -i64::from(from > to) };
+            }
+        }
+        surplus.values().all(|surplus| *surplus == 0)
     }
 
     /// Takes away triangles without area and returns their number.
@@ -127,6 +156,40 @@ impl Mesh {
 #[cfg(test)]
 mod tests {
     use super::*;
+
+    #[test]
+    fn meshes_with_holes_are_not_closed() {
+        let tetrahedron = || Mesh {
+            positions: vec![DVec3::ZERO, DVec3::X, DVec3::Y, DVec3::Z],
+            triangles: vec![[0, 2, 1], [0, 1, 3], [0, 3, 2], [1, 2, 3]],
+            ..Mesh::default()
+        };
+        assert!(tetrahedron().is_closed());
+        // A vertex for each triangle's corner, and zeros of both signs.
+        let split = tetrahedron().triangles.concat();
+        let corner = |vertex: &u32| tetrahedron().positions[*vertex as usize];
+        let mut seams = Mesh {
+            positions: split.iter().map(corner).collect(),
+            triangles: (0..4).map(|k| [3 * k, 3 * k + 1, 3 * k + 2]).collect(),
+            ..Mesh::default()
+        };
+        seams.positions[0] = -DVec3::ZERO;
+        assert!(seams.is_closed());
+        // A triangle without area between others.
+        let mut halved = tetrahedron();
+        halved.positions.push(DVec3::new(0.5, 0.5, 0.0));
+        halved.triangles[3] = [1, 4, 3];
+        halved.triangles.extend([[4, 2, 3], [1, 2, 4]]);
+        assert!(halved.is_closed());
+        let change = |change: fn(&mut Mesh)| {
+            let mut mesh = tetrahedron();
+            change(&mut mesh);
+            mesh.is_closed()
+        };
+        assert!(!change(|mesh| mesh.triangles.truncate(3)));
+        assert!(!change(|mesh| mesh.triangles[0].swap(0, 1)));
+        assert!(!change(|mesh| mesh.triangles[0][1] = 3));
+    }
 
     #[test]
     fn spheres_face_outwards_and_have_their_area() {

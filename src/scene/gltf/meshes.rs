@@ -210,16 +210,6 @@ impl Loader {
                     .into_iter()
                     .unzip(),
             };
-            let with_alpha = |vertex: usize| colours[vertex].extend(alphas.get(vertex).copied().unwrap_or(1.0));
-            let mut all = (0..colours.len()).map(with_alpha);
-            if let Some(colour) = all.find(|colour| colour.min_element() < 0.0 || colour.max_element() > 1.0) {
-                let [red, green, blue, alpha] = colour.as_vec4().to_array();
-                let reason = format!("has the vertex colour {red} {green} {blue}, alpha {alpha}; each must be from 0 to 1");
-                return Err(self.refuse(&what, reason));
-            }
-            if alphas.iter().all(|alpha| *alpha == 1.0) {
-                alphas = Vec::new();
-            }
         }
         Ok(Mesh {
             name: name.clone(),

@@ -300,6 +300,24 @@ impl Loader {
 
     /// The scene, degenerate triangles gone, with its warnings.
     fn finish(mut self) -> Result<Scene> {
+        let cut: Vec<bool> = self.scene.meshes.par_iter_mut().map(Mesh::clamp_colours).collect();
+        let with_cut: Vec<String> =
+            self.scene.meshes.iter().zip(cut).filter(|(_, cut)| *cut).map(|(mesh, _)| format!("mesh '{}'", mesh.name)).collect();
+        for name in with_cut {
+            self.leave_out("what vertex colours have below 0 or above 1", &name);
+        }
+        // Before triangles without area go, which may stand between others.
+        let materials = &self.scene.materials;
+        let is_open_solid = |mesh: &&Mesh| materials[mesh.material].is_entered() && !mesh.is_closed();
+        let open: BTreeSet<String> =
+            self.scene.meshes.par_iter().filter(is_open_solid).map(|mesh| format!("mesh '{}'", mesh.name)).collect();
+        if !open.is_empty() {
+            self.scene.warnings.push(format!(
+                "solids with holes ({}): light that enters one may never leave it; close it, or set its material's thicknessFactor to 0 for a \
+                 thin wall",
+                some_of(open.iter())
+            ));
+        }
         let (min, max) = self.scene.bounds();
         let extent = (max - min).max_element();
         let dropped: Vec<usize> = self.scene.meshes.par_iter_mut().map(|mesh| mesh.drop_degenerate_triangles(extent)).collect();
