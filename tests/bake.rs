@@ -705,7 +705,9 @@ fn layered_materials_round_trip() {
     let (folder, _) = write(&scene, &layout, &numbered(&layout), 1.0);
     let written = read(folder.path(), "scene_lightmap.gltf");
     assert_same_materials(&written, &scene);
-    assert!(written.warnings.iter().all(|warning| warning.contains("MOZ_lightmap")), "{:?}", written.warnings);
+    // Squares are no solids.
+    let is_expected = |warning: &String| ["MOZ_lightmap", "solids with holes"].iter().any(|part| warning.contains(part));
+    assert!(written.warnings.iter().all(is_expected), "{:?}", written.warnings);
     for (new, old) in pairs(&written.meshes, &scene.meshes) {
         for (new_vertex, old_vertex) in pairs(new.triangles.as_flattened(), old.triangles.as_flattened()) {
             let (new_vertex, old_vertex) = (*new_vertex as usize, *old_vertex as usize);

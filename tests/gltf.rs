@@ -247,6 +247,36 @@ fn what_cannot_be_used_is_refused_with_file_and_object() {
     assert_refusal(Scene::open("cornel", false), &["SCENE cornel", "cornell-spheres"]);
 }
 
+/// What is cut off would be read as grey.
+#[test]
+fn pictures_are_whole_and_of_the_kinds_that_gltf_has() {
+    let picture = |format: ImageFormat| {
+        let mut bytes = std::io::Cursor::new(Vec::new());
+        let noise = RgbImage::from_fn(64, 64, |i, j| image::Rgb([(37 * i * j) as u8, (91 * i + j) as u8, (i ^ j) as u8]));
+        match format {
+            ImageFormat::OpenExr => image::DynamicImage::ImageRgb8(noise).into_rgb32f().write_to(&mut bytes, format).unwrap(),
+            _ => noise.write_to(&mut bytes, format).unwrap(),
+        }
+        bytes.into_inner()
+    };
+    let read = |bytes: &[u8]| {
+        let mut value = square();
+        with_image(&mut value, &data_uri("image/jpeg", bytes));
+        load(&value)
+    };
+    let jpeg = picture(ImageFormat::Jpeg);
+    assert_eq!(read(&jpeg).unwrap().textures[0].width, 64);
+    // Some writers pad their files.
+    assert!(read(&[&jpeg[..], &[0; 3]].concat()).is_ok());
+    for left in [jpeg.len() - 1, jpeg.len() - 2, jpeg.len() / 2] {
+        assert_refusal(read(&jpeg[..left]), &["texture image 0", "is cut off"]);
+    }
+    let png = picture(ImageFormat::Png);
+    assert!(read(&png).is_ok());
+    assert_refusal(read(&png[..png.len() / 2]), &["texture image 0", "cannot be decoded"]);
+    assert_refusal(read(&picture(ImageFormat::OpenExr)), &["texture image 0", "neither PNG nor JPEG"]);
+}
+
 /// Adds an accessor of numbers in a buffer of its own, and returns its number.
 fn add_accessor(value: &mut Value, bytes: &[u8], component: u32, count: usize, kind: &str) -> usize {
     let add = |list: &mut Value, item: Value| {

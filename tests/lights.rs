@@ -14,6 +14,8 @@ use photonmill::gpu::kernels::TryLights;
 use photonmill::output::scene_report;
 use photonmill::plan::light_choice::LightChoice;
 use photonmill::records::{Draws, LightNode, Receiver, TryLightsPush};
+use photonmill::scene::material::Layers;
+use photonmill::verify::judge::Verdict;
 
 #[test]
 fn a_dim_room_beside_a_bright_one_is_lit_as_if_it_were_alone() {
@@ -289,4 +291,25 @@ fn no_light_is_impossible_and_probabilities_add_up_to_one() {
     // Photons, too, may leave any.
     let sum: f64 = lights.emitters.iter().map(|emitter| f64::from(emitter.probability)).sum();
     assert!((sum - 1.0).abs() < 1e-6 && lights.emitters.iter().all(|emitter| emitter.probability > 0.0), "{sum}");
+}
+
+/// What transmits has two sides, also where it shines: photons carry as much from its back as rays see there.
+#[test]
+fn glowing_panes_shine_both_ways() {
+    let Some(gpu) = device() else { return };
+    let layers = Layers { metallic: 0.0, transmission: 1.0, ..Layers::default() };
+    let pane = Material { emission: Vec3::ONE, ..Material::layered("pane", Vec3::splat(0.5), layers) };
+    let floor = Material { two_sided: true, ..Material::lambert("floor", Vec3::splat(0.6)) };
+    // Its front looks up, away from the floor.
+    let meshes = vec![level(0.0, [2.0, 2.0], true, 0), level(1.0, [0.8, 0.8], true, 1)];
+    let mut scene = scene_of(meshes, vec![floor, pane], vec![]);
+    scene.cameras.push(Camera::looking_at("camera", DVec3::new(0.0, 0.5, 3.0), DVec3::new(0.0, 0.0, 0.3), DVec3::Y, 0.6));
+    let camera = scene.first_camera();
+    let judged = Judge::new(&scene, 64).image(&camera, 16, 16, 512, 5);
+    for illumination in [Illumination::Photons, Illumination::Split] {
+        let settings = SceneSettings { photons: 20_000, rounds: 32, radius: Some(0.1), illumination, ..SceneSettings::default() };
+        let lit = scene::render(&gpu, &scene, &settings, Target::Picture(&camera, [16; 2])).unwrap();
+        let verdict = Verdict::new(&means(&lit), &standard_errors(&lit), 32, &judged, None);
+        assert!(verdict.agrees(), "{illumination:?}: {verdict}");
+    }
 }

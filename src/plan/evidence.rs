@@ -194,10 +194,7 @@ impl<'a> Facts<'a> {
                 (false, format!("only {}: testing each of them is as fast", counted(self.triangles, "triangle")))
             }
             Effect::Bvh => (true, counted(self.triangles, "triangle")),
-            Effect::TwoSided => {
-                let has_two_sides = |material: &Material| material.two_sided || is_layered_with(material, |of| of.transmission > 0.0);
-                found("two-sided", &has_two_sides, "no two-sided material")
-            }
+            Effect::TwoSided => found("two-sided", &Material::has_two_sides, "no two-sided material"),
             // A mapped normal is none of the triangle's, as a smooth one.
             Effect::SmoothNormals if self.evidence(Effect::NormalMaps).0 => (true, "normal maps".into()),
             Effect::SmoothNormals if self.smooth == 0 => (false, "no smooth normals".into()),

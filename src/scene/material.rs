@@ -314,6 +314,11 @@ impl Material {
         self.layers.medium.filter(|_| self.transmits())
     }
 
+    /// Whether its back scatters and shines as the front does: what transmits lets light out there.
+    pub fn has_two_sides(&self) -> bool {
+        self.two_sided || self.transmits()
+    }
+
     /// Of a layered one.
     fn transmits(&self) -> bool {
         self.surface == Surface::Layered && self.layers.transmission > 0.0 && !self.layers.is_unlit

@@ -33,7 +33,7 @@ pub struct Texture {
     pub filter: Filter,
 }
 
-/// Of a texture, as the kernels read them too (`glsl/material/surface.glsl`).
+/// Of a texture, as the kernels read them too (`glsl/material/textures.glsl`).
 #[derive(Debug, Clone, PartialEq, Eq)]
 pub enum Texels {
     /// Red, green and blue by the sRGB curve, then alpha, which is linear.

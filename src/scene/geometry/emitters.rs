@@ -86,7 +86,7 @@ impl Geometry {
             if triangle.plane >= HIDDEN || !material.is_emissive() {
                 return None;
             }
-            let sides = if material.two_sided { 2.0 } else { 1.0 };
+            let sides = if material.has_two_sides() { 2.0 } else { 1.0 };
             let flux = PI * sides * area(triangle) * material.emission.as_dvec3();
             let (position, strength) = (piece_record(Piece::WHOLE), material.emission);
             let emitter = Emitter { kind: EMITTER_TRIANGLE, triangle: index as u32, strength, position, ..Emitter::default() };

@@ -80,7 +80,7 @@ pub struct Geometry {
 const MAX_TRIANGLES: usize = 1 << 28;
 /// With the 256 linear values of 8-bit codes before them.
 pub const MAX_TEXELS: usize = TEXEL_BUFFERS * TEXELS_PER_BUFFER as usize;
-/// As many as `glsl/material/surface.glsl` looks into, so that none is larger than 128 MiB, the least that devices promise.
+/// As many as `glsl/material/textures.glsl` looks into, so that none is larger than 128 MiB, the least that devices promise.
 pub const TEXEL_BUFFERS: usize = 4;
 fn refuse(scene: &Scene, object: &str, reason: String) -> Error {
     Error::Scene { path: (&scene.name).into(), object: object.into(), reason }
@@ -375,8 +375,7 @@ fn material_record(material: &Material) -> SurfaceMaterial {
         parameter,
         base_texture: material.base_colour_texture.map_or(NONE, |texture| texture.texture as u32),
         emission_texture: material.emission_texture.map_or(NONE, |texture| texture.texture as u32),
-        // Glass has two sides: light leaves it by the back.
-        two_sided: u32::from(material.two_sided || (surface == SURFACE_LAYERED && material.layers.transmission > 0.0)),
+        two_sided: u32::from(material.has_two_sides()),
     }
 }
 

@@ -5,7 +5,7 @@ use std::collections::BTreeMap;
 
 use gltf::Document;
 use gltf::texture::{MagFilter, WrappingMode};
-use image::{DynamicImage, ImageDecoder, RgbaImage};
+use image::{DynamicImage, ImageDecoder, ImageFormat, RgbaImage};
 use rayon::prelude::*;
 
 use super::{Loader, accessor, called, one_line};
@@ -121,6 +121,9 @@ impl Loader {
     fn decoder<'b>(&self, what: &str, bytes: &'b [u8]) -> Result<impl ImageDecoder + use<'b>> {
         let reader = image::ImageReader::new(std::io::Cursor::new(bytes)).with_guessed_format();
         let mut reader = reader.map_err(|error| self.refuse(what, error.to_string()))?;
+        let is_read = matches!(reader.format(), Some(ImageFormat::Png | ImageFormat::Jpeg));
+        self.require(is_read, what, || "cannot be decoded: it is neither PNG nor JPEG, which glTF files have; convert it".into())?;
+        self.require(has_its_end(bytes), what, || "is cut off: a JPEG without its end; export it again".into())?;
         reader.limits(image_limits());
         reader.into_decoder().map_err(|error| self.undecodable(what, &error))
     }
@@ -166,4 +169,13 @@ fn image_limits() -> image::Limits {
     // A picture of a few bytes must not unfold into gigabytes.
     limits.max_alloc = Some(1 << 30);
     limits
+}
+
+/// Whether no end of a JPEG is missing: decoders make grey of what is not there. The mark of the end stands behind the last scan.
+fn has_its_end(bytes: &[u8]) -> bool {
+    const START: [u8; 2] = [0xff, 0xd8];
+    const END: [u8; 2] = [0xff, 0xd9];
+    const SCAN: [u8; 2] = [0xff, 0xda];
+    let last = |mark: [u8; 2]| bytes.windows(2).rposition(|pair| pair == mark);
+    !bytes.starts_with(&START) || last(END) > last(SCAN)
 }

@@ -76,11 +76,6 @@ fn mix<T: std::ops::Mul<f64, Output = T> + std::ops::Add<Output = T>>([a, b, c]:
     a * weights.x + b * weights.y + c * weights.z
 }
 
-/// Whether a back scatters, shines and lets light through as the front does.
-pub fn has_two_sides(material: &Material) -> bool {
-    material.two_sided || (material.surface == Surface::Layered && material.layers.transmission > 0.0)
-}
-
 /// A box of f32 around a triangle, wider by `slack` on all sides.
 fn bounds([a, b, c]: [DVec3; 3], slack: f64) -> Aabb {
     let (min, max) = (a.min(b).min(c) - slack, a.max(b).max(c) + slack);
@@ -234,7 +229,7 @@ impl<'a> Geometry<'a> {
         let material = triangle.material;
         let is_front = wo.dot(triangle.normal) > 0.0;
         let ng = if is_front { triangle.normal } else { -triangle.normal };
-        let shown = is_front || has_two_sides(material);
+        let shown = is_front || material.has_two_sides();
         Vertex {
             position: triangle.point(hit.weights),
             ng,

@@ -4,7 +4,7 @@ use std::f64::consts::PI;
 
 use glam::{DVec3, Vec3};
 
-use super::geometry::{Geometry, Hit, Ray, has_two_sides};
+use super::geometry::{Geometry, Hit, Ray};
 use super::material::{around, sample_lobe};
 use super::{Random, uniform};
 use crate::scene::Scene;
@@ -105,7 +105,7 @@ impl<'a> Emitters<'a> {
         let radius = if geometry.triangles.is_empty() { 1.0 } else { 0.5 * (max - min).length() };
         let of_triangles = geometry.triangles.iter().enumerate().map(|(number, triangle)| {
             let material = triangle.material;
-            let sides = if has_two_sides(material) { 2.0 } else { 1.0 };
+            let sides = if material.has_two_sides() { 2.0 } else { 1.0 };
             let emission = if material.layers.is_unlit { 0.0 } else { sum(material.emission) };
             (Emitter::Triangle(number), sides * PI * triangle.area * emission)
         });
@@ -149,7 +149,7 @@ impl<'a> Emitters<'a> {
                 let weights = DVec3::new(1.0 - root, root * (1.0 - share), root * share);
                 let point = triangle.point(weights);
                 let is_front = (position - point).dot(triangle.normal) > 0.0;
-                if !is_front && !has_two_sides(triangle.material) {
+                if !is_front && !triangle.material.has_two_sides() {
                     return None;
                 }
                 let normal = if is_front { triangle.normal } else { -triangle.normal };
