@@ -152,7 +152,7 @@ impl Contents {
         list("textures", self.textures.iter().map(texture).collect());
         list("lights, beside materials that emit", self.lights.iter().map(|light| format!("{}: {}", light.name, light.kind)).collect());
         list("cameras", self.cameras.clone());
-        let nothing = || vec!["nothing that the file holds is left out".to_owned()];
+        let nothing = || vec!["none".to_owned()];
         list("warnings", if self.warnings.is_empty() { nothing() } else { self.warnings.clone() });
         text
     }

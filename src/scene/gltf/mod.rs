@@ -84,7 +84,8 @@ pub fn load(path: &Path, radiometric: bool, progress: Progress) -> Result<Scene>
     // The crate knows fewer of them.
     root.extensions_required.clear();
     malformed::missing_members(&root).map_err(refuse)?;
-    let document = Document::from_json(root).map_err(|error| refuse(error.to_string()))?;
+    let document =
+        Document::from_json(root).map_err(|error| refuse(format!("is not valid glTF: {error}").replace("invalid glTF: ", "")))?;
     let mut loader = Loader {
         path: path.to_owned(),
         file_bytes: content.len(),
