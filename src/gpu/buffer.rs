@@ -12,9 +12,6 @@ use serde::Serialize;
 use super::{Context, Gpu, call};
 use crate::error::{Error, Result};
 
-/// Bytes: a multiple of the cache lines of known devices.
-const BUFFER_ALIGNMENT: u64 = 256;
-
 /// Who touches a buffer's memory.
 #[derive(Debug, Clone, Copy, PartialEq, Eq)]
 pub enum Memory {
@@ -107,10 +104,7 @@ impl Gpu {
         let raw = call("vkCreateBuffer", unsafe { device.create_buffer(&info, None) })?;
         let mut buffer = AnyBuffer { name: name.to_owned(), memory, size_bytes, raw, allocation: None, context: self.context.clone() };
         // SAFETY: the buffer was just made.
-        let mut requirements = unsafe { device.get_buffer_memory_requirements(raw) };
-        // Devices ask for less than a cache line, and a small buffer before large ones would shift their records across lines: reading
-        // them then takes up to a third longer.
-        requirements.alignment = requirements.alignment.max(BUFFER_ALIGNMENT);
+        let requirements = unsafe { device.get_buffer_memory_requirements(raw) };
         let allocation = self
             .context
             .allocator()

@@ -71,14 +71,17 @@ impl Mesh {
         is_cut
     }
 
-    /// Whether its triangles bound a volume: each edge is walked as often one way as the other. What lies at one place is one corner.
-    pub fn is_closed(&self) -> bool {
-        // Of both zeros one.
-        let place = |vertex: u32| (self.positions[vertex as usize] + DVec3::ZERO).to_array().map(f64::to_bits);
+    /// Whether the triangles of meshes bound a volume together: as many have an edge in one direction as in the other. Corners at one
+    /// place are one corner.
+    pub fn are_closed<'m>(meshes: impl IntoIterator<Item = &'m Mesh>) -> bool {
+        // The sum turns -0 into 0.
+        let place = |corner: DVec3| (corner + DVec3::ZERO).to_array().map(f64::to_bits);
         let mut surplus: HashMap<_, i64> = HashMap::new();
-        for [a, b, c] in self.triangles.iter().map(|triangle| triangle.map(place)) {
-            for (from, to) in [(a, b), (b, c), (c, a)] {
-                *surplus.entry((from.min(to), from.max(to))).or_default() += if from < to { 1 } else { -i64::from(from > to) };
+        for mesh in meshes {
+            for [a, b, c] in (0..mesh.triangles.len()).map(|triangle| mesh.corners(triangle).map(place)) {
+                for (from, to) in [(a, b), (b, c), (c, a)] {
+                    *surplus.entry((from.min(to), from.max(to))).or_default() += i64::from(from < to) - i64::from(from > to);
+                }
             }
         }
         surplus.values().all(|surplus| *surplus == 0)
@@ -164,7 +167,7 @@ mod tests {
             triangles: vec![[0, 2, 1], [0, 1, 3], [0, 3, 2], [1, 2, 3]],
             ..Mesh::default()
         };
-        assert!(tetrahedron().is_closed());
+        assert!(Mesh::are_closed([&tetrahedron()]));
         // A vertex for each triangle's corner, and zeros of both signs.
         let split = tetrahedron().triangles.concat();
         let corner = |vertex: &u32| tetrahedron().positions[*vertex as usize];
@@ -174,21 +177,26 @@ mod tests {
             ..Mesh::default()
         };
         seams.positions[0] = -DVec3::ZERO;
-        assert!(seams.is_closed());
+        assert!(Mesh::are_closed([&seams]));
         // A triangle without area between others.
         let mut halved = tetrahedron();
         halved.positions.push(DVec3::new(0.5, 0.5, 0.0));
         halved.triangles[3] = [1, 4, 3];
         halved.triangles.extend([[4, 2, 3], [1, 2, 4]]);
-        assert!(halved.is_closed());
+        assert!(Mesh::are_closed([&halved]));
         let change = |change: fn(&mut Mesh)| {
             let mut mesh = tetrahedron();
             change(&mut mesh);
-            mesh.is_closed()
+            Mesh::are_closed([&mesh])
         };
         assert!(!change(|mesh| mesh.triangles.truncate(3)));
         assert!(!change(|mesh| mesh.triangles[0].swap(0, 1)));
         assert!(!change(|mesh| mesh.triangles[0][1] = 3));
+        // Halves are open, and closed together.
+        let half = |triangles: &[[u32; 3]]| Mesh { triangles: triangles.to_vec(), ..tetrahedron() };
+        let halves = tetrahedron().triangles;
+        let halves = [half(&halves[..2]), half(&halves[2..])];
+        assert!(halves.iter().all(|half| !Mesh::are_closed([half])) && Mesh::are_closed(&halves));
     }
 
     #[test]

@@ -336,7 +336,7 @@ void put_off(uint place, uint depth)
                    chain.from_normal);
 }
 
-// Of what the path has not found.
+// Visible points that the path has not found: nothing arrives there.
 void write_missing_points(uint pixel, uint number, uint pixel_count)
 {
     for (uint k = chain.point_count; k < points_per_path(); k++) {

@@ -299,6 +299,18 @@ impl Loader {
         }
     }
 
+    /// Meshes that bound a medium and are not closed, alone or with others of their material.
+    fn solids_with_holes(&self) -> BTreeSet<String> {
+        let is_open = |mesh: &&Mesh| self.scene.materials[mesh.material].is_entered() && !Mesh::are_closed([*mesh]);
+        let open: Vec<&Mesh> = self.scene.meshes.par_iter().filter(is_open).collect();
+        let mut by_material: BTreeMap<usize, Vec<&Mesh>> = BTreeMap::new();
+        for mesh in open {
+            by_material.entry(mesh.material).or_default().push(mesh);
+        }
+        by_material.retain(|_, meshes| !Mesh::are_closed(meshes.iter().copied()));
+        by_material.values().flatten().map(|mesh| format!("mesh '{}'", mesh.name)).collect()
+    }
+
     /// The scene, degenerate triangles gone, with its warnings.
     fn finish(mut self) -> Result<Scene> {
         let cut: Vec<bool> = self.scene.meshes.par_iter_mut().map(Mesh::clamp_colours).collect();
@@ -308,10 +320,7 @@ impl Loader {
             self.leave_out("what vertex colours have below 0 or above 1", &name);
         }
         // Before triangles without area go, which may stand between others.
-        let materials = &self.scene.materials;
-        let is_open_solid = |mesh: &&Mesh| materials[mesh.material].is_entered() && !mesh.is_closed();
-        let open: BTreeSet<String> =
-            self.scene.meshes.par_iter().filter(is_open_solid).map(|mesh| format!("mesh '{}'", mesh.name)).collect();
+        let open = self.solids_with_holes();
         if !open.is_empty() {
             self.scene.warnings.push(format!(
                 "solids with holes ({}): light that enters one may never leave it; close it, or set its material's thicknessFactor to 0 for a \

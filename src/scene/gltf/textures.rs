@@ -122,7 +122,7 @@ impl Loader {
         let reader = image::ImageReader::new(std::io::Cursor::new(bytes)).with_guessed_format();
         let mut reader = reader.map_err(|error| self.refuse(what, error.to_string()))?;
         let is_read = matches!(reader.format(), Some(ImageFormat::Png | ImageFormat::Jpeg));
-        self.require(is_read, what, || "cannot be decoded: it is neither PNG nor JPEG, which glTF files have; convert it".into())?;
+        self.require(is_read, what, || "cannot be decoded: it is neither PNG nor JPEG, the formats that glTF allows; convert it".into())?;
         self.require(has_its_end(bytes), what, || "is cut off: a JPEG without its end; export it again".into())?;
         reader.limits(image_limits());
         reader.into_decoder().map_err(|error| self.undecodable(what, &error))
