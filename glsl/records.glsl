@@ -408,7 +408,7 @@ struct CameraPath {
     uint place;
     vec3 direction;
     // Bits 0 to 3: it saw a specular surface, it gathers, it starts at no surface, emission counts at its next one; bits 4
-    // and 5: visible points found; from bit 8 on: surfaces that it has met.
+    // and 5: visible points found; bit 6: it ends there; from bit 8 on: surfaces that it has met.
     uint state;
     vec3 weight;
     // What it runs through (glsl/material/media.glsl).

@@ -56,7 +56,7 @@ void main()
     vec3 u = philox_floats(uvec4(index, 0, 0, 0), uvec2(at.seed, 4)).xyz;
     Scatter scatter = sample_layered(surface, lobes, at.wo, u, at.carries_radiance != 0);
     ChosenLobe chosen = choose_lobe(lobes, u.x);
-    LobeLight light = weigh_light(surface, lobes, at.wo, scatter.direction, 0.0);
+    LobeLight light = weigh_light(surface, lobes, at.wo, scatter.direction, 0.0, false);
     results[index] = LobeSample(scatter.direction, scatter.weight, scatter.density, uint(scatter.alive), uint(scatter.is_specular),
                                 uint(scatter.passes), chosen.lobe, chosen.chance, light.matt, light.sharp);
 }

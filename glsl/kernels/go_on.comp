@@ -25,6 +25,7 @@ void main()
     chain.gathers = (path.state & 2u) != 0;
     chain.starts_nowhere = (path.state & 4u) != 0;
     chain.sees_emission = (path.state & 8u) != 0;
+    chain.ends_at_light = (path.state & 64u) != 0;
     chain.media = path.media;
     chain.density = path.density;
     chain.from = path.from;

@@ -273,7 +273,24 @@ float light_share(float light_density, float lobe_density)
     return light_density > 0.0 ? divide(light_density, light_density + lobe_density) : 1.0;
 }
 
-LobeLight weigh_light(Surface surface, Lobes lobes, vec3 wo, vec3 wi, float light_density)
+// Density with which the matt lobes together send a path along wi, 1/sr.
+float density_of_matt_lobes(Surface surface, Lobes lobes, vec3 wo, vec3 wi)
+{
+    Layers layers = surface.layers;
+    float density = (lobes.diffuse_chance + lobes.sheen_chance) * (0.31830988618379067 * max(dot(wi, surface.ns), 0.0));
+    if (is_matt_reflection(lobes, layers)) {
+        density += lobes.reflection_chance * weigh_reflection(layers.alpha, surface.ns, wo, wi).density;
+    }
+    if (HAS_COATS) {
+        if (is_matt(layers.coat_alpha)) {
+            density += lobes.coat_chance * weigh_reflection(layers.coat_alpha, layers.coat_normal, wo, wi).density;
+        }
+    }
+    return density;
+}
+
+// `asks_matt`: rays of the matt lobes see the light, too.
+LobeLight weigh_light(Surface surface, Lobes lobes, vec3 wo, vec3 wi, float light_density, bool asks_matt)
 {
     Layers layers = surface.layers;
     LobeLight light = LobeLight(vec3(0.0), vec3(0.0));
@@ -282,6 +299,9 @@ LobeLight weigh_light(Surface surface, Lobes lobes, vec3 wo, vec3 wi, float ligh
     LayerAlbedos lit = albedos_at(layers.alpha, lobes.cover, abs(cosine));
     if (!is_beyond && cosine > 0.0) {
         light.matt = matt_brdf(lobes.matt, lobes.cover, lit, surface.ns, wo, wi) * cosine;
+        if (asks_matt) {
+            light.matt *= light_share(light_density, density_of_matt_lobes(surface, lobes, wo, wi));
+        }
     }
     float chance = is_beyond || is_matt_reflection(lobes, layers) ? 0.0 : lobes.reflection_chance;
     bool is_refracted = false;

@@ -10,9 +10,10 @@ struct Chain {
     bool gathers; // the first visible point, or a receiver, lies behind
     bool starts_nowhere; // at a receiver that no photon can reach
     bool sees_emission; // what shines at the next vertex has not been counted yet
+    bool ends_at_light; // matt lobes sent it, and follow no light but what shines at the next vertex
     uint media; // what it runs through
-    // Of a path that a sharp lobe sent on which light samples know too: the density of its direction, 1/sr, and from where; 0: no light
-    // sample has counted what it meets.
+    // Of a path whose direction light samples know too: the density of that direction, 1/sr, and from where; 0: no light sample has
+    // counted what it meets.
     float density;
     vec3 from;
     vec3 from_normal;
@@ -25,7 +26,7 @@ Chain chain;
 
 void start_chain(vec3 position, vec3 direction, vec3 weight, vec2 choices)
 {
-    chain = Chain(position, direction, weight, choices, false, false, false, true, 0, 0.0, vec3(0.0), vec3(0.0), 0,
+    chain = Chain(position, direction, weight, choices, false, false, false, true, false, 0, 0.0, vec3(0.0), vec3(0.0), 0,
                   vec3[](vec3(0.0), vec3(0.0), vec3(0.0)));
 }
 
@@ -146,6 +147,16 @@ void see_lamp(Surface surface, Hit hit, uint emitter_count)
     }
 }
 
+// Whether a ray leaves matt lobes of the eye's paths to see what shines. A gather ray would leave them for other light.
+bool seeks_light()
+{
+    bool seeks = false;
+    if (GATHER_RAYS == GATHER_NONE) {
+        seeks = !chain.gathers && (PARTS & part_of(ARRIVED_DIRECT)) != 0;
+    }
+    return seeks;
+}
+
 // Leaves a visible point, of whose light `scale` goes on to the eye. Says whether a gather ray leaves it.
 bool leave_point(Surface surface, Lobes lobes, vec3 wo, vec3 scale, bool for_all, uint index, uint number, uint pixel_count)
 {
@@ -201,10 +212,12 @@ bool follow(uint index, uint number, uint pixel_count, Draws draws, uint emitter
             surface.ns = normal_of_refraction(surface, wo, eta, depth);
             lobes = lobes_of(surface, wo, eta);
             // The eye does not see the back of what has one side.
-            bool is_culled = !surface.scatters && !chain.gathers;
+            bool is_culled = !surface.scatters && !chain.gathers && !chain.ends_at_light;
             scatter = sample_layered(surface, lobes, wo, stratified(number, SAMPLES, words_of(index, block, draws)).zxy, true);
             if (is_culled || scatter.passes) {
                 chain.weight *= is_culled ? vec3(1.0) : scatter.weight;
+                // It stops light samples.
+                chain.density = is_culled ? 0.0 : chain.density;
                 chain.position = offset_origin(surface.position, surface.error, surface.ng, chain.direction);
                 continue;
             }
@@ -212,12 +225,12 @@ bool follow(uint index, uint number, uint pixel_count, Draws draws, uint emitter
                 chain.weight *= divide(surface.layers.coverage, 1.0 - lobes.pass_chance);
             }
             matt = matt_chance(lobes, surface.layers);
-            if (surface.layers.is_unlit && !chain.gathers) {
+            if (surface.layers.is_unlit && !chain.gathers && !chain.ends_at_light) {
                 add_light(surface.base_colour);
             }
         }
         see_lamp(surface, hit, emitter_count);
-        if (!surface.scatters) {
+        if (!surface.scatters || chain.ends_at_light) {
             return false;
         }
         bool specular = is_layered ? scatter.is_specular : is_specular(surface);
@@ -235,6 +248,7 @@ bool follow(uint index, uint number, uint pixel_count, Draws draws, uint emitter
             here.surface = surface;
             here.lobes = lobes;
             here.media = chain.media;
+            here.asks_lobes = is_layered && seeks_light();
             vec3 light = scale * direct_light(here, emitter_count, draws, index, number, block + 1);
             if (wants_direct) {
                 add_light(light);
@@ -261,13 +275,18 @@ bool follow(uint index, uint number, uint pixel_count, Draws draws, uint emitter
             }
             // Where it is by chance that a path gets here, each counts for itself.
             bool for_all = !chain.saw_specular && !chain.gathers && matt == 1.0;
-            if (!leave_point(surface, lobes, wo, scale, for_all, index, number, pixel_count)) {
+            if (leave_point(surface, lobes, wo, scale, for_all, index, number, pixel_count)) {
+                chain.gathers = true;
+                chain.density = 0.0;
+                chain.weight *= for_all ? float(SAMPLES) : 1.0;
+                // Shadow rays and the caustic map have counted what shines from here on.
+                chain.sees_emission = false;
+            } else if (asks_lights && is_layered && seeks_light()) {
+                chain.ends_at_light = true;
+                chain.density = density_of_matt_lobes(surface, lobes, wo, scatter.direction);
+            } else {
                 return false;
             }
-            chain.gathers = true;
-            chain.weight *= for_all ? float(SAMPLES) : 1.0;
-            // Shadow rays and the caustic map have counted what shines from here on.
-            chain.sees_emission = false;
         }
         bool ends = specular && !chain.gathers;
         if (HAS_SPECULAR_CHAINS) {
@@ -303,9 +322,6 @@ bool follow(uint index, uint number, uint pixel_count, Draws draws, uint emitter
         chain.weight *= scatter.weight;
         // No caustic map holds what reaches a receiver in the air over mirrors and glass.
         chain.sees_emission = chain.sees_emission || (chain.starts_nowhere && specular);
-        if (is_layered && !specular) {
-            chain.density = 0.0;
-        }
         chain.saw_specular = chain.saw_specular || (specular && !chain.gathers);
         if (HAS_MEDIA) {
             if (is_layered && surface.layers.medium != 0 && dot(scatter.direction, surface.ng) < 0.0) {
@@ -330,7 +346,8 @@ layout(set = 1, binding = 10, scalar) buffer CameraPathCounts { uint camera_path
 // `place` is that of the sample among all samples.
 void put_off(uint place, uint depth)
 {
-    uint flags = uint(chain.saw_specular) | uint(chain.gathers) << 1 | uint(chain.starts_nowhere) << 2 | uint(chain.sees_emission) << 3;
+    uint flags = uint(chain.saw_specular) | uint(chain.gathers) << 1 | uint(chain.starts_nowhere) << 2 | uint(chain.sees_emission) << 3
+               | uint(chain.ends_at_light) << 6;
     next_camera_paths[atomicAdd(camera_path_counts[0], 1)] =
         CameraPath(chain.position, place, chain.direction, flags | chain.point_count << 4 | depth << 8, chain.weight, chain.media, chain.density, chain.from,
                    chain.from_normal);

@@ -13,6 +13,7 @@ struct Target {
     // Of a layered surface.
     Surface surface;
     Lobes lobes;
+    bool asks_lobes; // a ray of its matt lobes sees lights, too
 };
 
 Target plain_target(vec3 position, float error, vec3 ng, vec3 ns, vec3 wo, uint kind, float exponent)
@@ -26,6 +27,7 @@ Target plain_target(vec3 position, float error, vec3 ng, vec3 ns, vec3 wo, uint 
     target.kind = kind;
     target.exponent = exponent;
     target.media = 0;
+    target.asks_lobes = false;
     return target;
 }
 
@@ -101,7 +103,7 @@ ShadowRay cast_shadow_ray(Target point, Arriving arriving, Draws draws, uint ind
     uint media = point.media;
     if (largest(arriving.radiance) > 0.0) {
         if (is_layered) {
-            LobeLight light = weigh_light(point.surface, point.lobes, point.wo, arriving.wi, float(SHADOW_RAYS) * arriving.density);
+            LobeLight light = weigh_light(point.surface, point.lobes, point.wo, arriving.wi, float(SHADOW_RAYS) * arriving.density, point.asks_lobes);
             ray.light = arriving.radiance * light.matt;
             ray.sharp_light = arriving.radiance * light.sharp;
             ray.is_asked = largest(ray.light) > 0.0 || largest(ray.sharp_light) > 0.0;
