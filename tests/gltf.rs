@@ -790,6 +790,57 @@ fn a_blender_file_loads() {
     assert!(parts("shell").specular_colour.y < 1.0);
 }
 
+/// What is left out or has no effect, each by its own words.
+#[test]
+fn what_has_no_effect_is_a_warning() {
+    let warnings = |value: &Value| load(value).unwrap().warnings.join(" ");
+    let mut value = square();
+    assert_eq!(warnings(&value), "");
+    value["meshes"][0]["primitives"][0]["targets"] = json!([{"POSITION": 0, "TEXCOORD_0": 2}]);
+    assert_eq!(warnings(&value), "ignored: texture coordinates and colours of morph targets: mesh 'wall'");
+    value["meshes"][0]["primitives"][0]["targets"] = json!([{"COLOR_0": 0}]);
+    assert_eq!(warnings(&value), "ignored: texture coordinates and colours of morph targets: mesh 'wall'");
+    // Not in the list of what the file uses.
+    let mut value = square();
+    value["nodes"][0]["extensions"] = json!({"EXT_mesh_gpu_instancing": {"attributes": {"TRANSLATION": 0}}});
+    assert_eq!(warnings(&value), "ignored: the extension EXT_mesh_gpu_instancing: node 'wall'");
+
+    let nowhere = "ignored: surfaces that are nowhere seen (their alpha is 0, or below the cutoff): material 'pane'";
+    for (mode, cutoff, alpha, expected) in [
+        ("MASK", 1.5, 1.0, nowhere),
+        ("MASK", 0.5, 0.25, nowhere),
+        ("MASK", 0.5, 0.5, ""),
+        ("MASK", 0.0, 0.0, ""),
+        ("BLEND", 0.5, 0.0, nowhere),
+        ("BLEND", 0.5, 0.25, ""),
+        ("OPAQUE", 2.0, 0.0, ""),
+    ] {
+        let pbr = json!({"baseColorFactor": [1, 1, 1, alpha]});
+        let value = with_material(json!({"name": "pane", "alphaMode": mode, "alphaCutoff": cutoff, "pbrMetallicRoughness": pbr}));
+        assert_eq!(warnings(&value), expected, "{mode} {cutoff} {alpha}");
+    }
+
+    let anyhow =
+        "ignored: that normal maps lie on meshes without tangents (they turn normals in any direction): material 'bumpy' on mesh 'wall'";
+    for (coordinates, expected) in [
+        ([0.5; 8], anyhow),
+        ([0., 0., 1., 0., 2., 0., 3., 0.], anyhow),
+        ([0., 0., 0.1, 0.3, 0.2, 0.6, 0.7, 2.1], anyhow),
+        // One triangle of two.
+        ([0., 0., 1., 0., 2., 0., 0., 1.], ""),
+        ([0., 0., 1., 0., 1., 1e-3, 0., 1e-3], ""),
+    ] {
+        let mut value = with_material(json!({"name": "bumpy", "normalTexture": {"index": 0}}));
+        uvs(&mut value, &coordinates);
+        assert_eq!(warnings(&value), expected, "{coordinates:?}");
+        with_tangents(&mut value, [1.0, 0.0, 0.0, 1.0]);
+        assert_eq!(warnings(&value), "");
+    }
+    let mut value = with_material(json!({"name": "bumpy", "normalTexture": {"index": 0}}));
+    value["materials"][0]["normalTexture"]["extensions"] = json!({"KHR_texture_transform": {"scale": [1, 0]}});
+    assert_eq!(warnings(&value), anyhow);
+}
+
 /// Numbers as a file has them, names without what turns the order of a line.
 #[test]
 fn messages_have_short_numbers_and_plain_names() {

@@ -90,6 +90,14 @@ impl Reader<'_> {
             },
             ..Material::lambert(name, base_colour)
         };
+        let is_gone = match read.coverage {
+            Coverage::Whole => false,
+            Coverage::Mask { alpha, cutoff } => alpha < cutoff,
+            Coverage::Blend { alpha } => alpha == 0.0,
+        };
+        if is_gone {
+            self.loader.leave_out("surfaces that are nowhere seen (their alpha is 0, or below the cutoff)", &self.object);
+        }
         if is_unlit {
             return Ok(Material { layers: Layers { is_unlit, ..Layers::default() }, ..read });
         }

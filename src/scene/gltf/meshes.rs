@@ -119,7 +119,8 @@ impl Loader {
         }))
     }
 
-    pub(super) fn read_primitive(&self, part: &Part) -> Result<Mesh> {
+    /// And whether a normal map of it turns normals in any direction, as nothing says in which.
+    pub(super) fn read_primitive(&self, part: &Part) -> Result<(Mesh, bool)> {
         let Part { primitive, name, to_world, .. } = part;
         let what = part.what();
         let positions = primitive.get(&Semantic::Positions).expect("what is listed has positions");
@@ -181,13 +182,17 @@ impl Loader {
             of_file = Some(directions.iter().zip(&own).map(|(direction, own)| direction.extend(own.w)).collect());
         }
         let surface = Surface { positions: &positions, normals: &normals, triangles: &triangles };
+        let mut is_turned_anyhow = false;
         let tangents = |map: Option<TextureUse>| match (map, &of_file) {
             (None, _) => Vec::new(),
             // The file's are those of the first map.
             (Some(map), Some(tangents)) if maps[0].is_none_or(|first| first.has_coordinates_of(&map)) => {
                 triangles.iter().map(|triangle| triangle.map(|vertex| tangents[vertex as usize])).collect()
             }
-            (Some(map), _) => surface.tangents(&uvs[map.uv_set], map.transform),
+            (Some(map), _) => {
+                is_turned_anyhow |= !surface.has_directions(&uvs[map.uv_set], map.transform);
+                surface.tangents(&uvs[map.uv_set], map.transform)
+            }
         };
         let mut tangents = maps.map(tangents);
 
@@ -218,7 +223,8 @@ impl Loader {
             };
         }
         let (name, material) = (name.clone(), part.material);
-        Ok(Mesh { name, positions, normals, uvs, colours, alphas, tangents, coat_tangents, triangles, material })
+        let mesh = Mesh { name, positions, normals, uvs, colours, alphas, tangents, coat_tangents, triangles, material };
+        Ok((mesh, is_turned_anyhow))
     }
 
     /// Indices into those of the vertices that the primitive uses, as many primitives may share one list of vertices;

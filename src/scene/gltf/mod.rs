@@ -283,9 +283,13 @@ impl Loader {
     fn read_meshes(&mut self, parts: &[Part], progress: Progress) -> Result<()> {
         for batch in parts.chunks((parts.len() / 100).max(16 * rayon::current_num_threads())) {
             progress("reading meshes", self.scene.meshes.len() as f64 / parts.len() as f64);
-            let read: Vec<Result<Mesh>> = batch.par_iter().map(|part| self.read_primitive(part)).collect();
+            let read: Vec<Result<(Mesh, bool)>> = batch.par_iter().map(|part| self.read_primitive(part)).collect();
             for read in read {
-                let mesh = read?;
+                let (mesh, is_turned_anyhow) = read?;
+                if is_turned_anyhow {
+                    let owner = format!("material '{}' on mesh '{}'", self.scene.materials[mesh.material].name, mesh.name);
+                    self.leave_out("that normal maps lie on meshes without tangents (they turn normals in any direction)", &owner);
+                }
                 self.scene.meshes.push(mesh);
             }
         }

@@ -25,6 +25,10 @@ pub(super) fn take_out(root: &mut Value, left_out: &mut LeftOut) {
         for primitive in items(&root["meshes"][mesh]["primitives"]) {
             materials.extend(number(&primitive["material"]));
             name_unread_extensions(primitive, &owner, left_out);
+            let mut shifted = items(&primitive["targets"]).flat_map(|target| target.as_object().into_iter().flatten());
+            if shifted.any(|(name, _)| name.starts_with("TEXCOORD_") || name.starts_with("COLOR_")) {
+                left_out.add("texture coordinates and colours of morph targets", &owner);
+            }
         }
     }
     let mut textures = BTreeSet::new();
