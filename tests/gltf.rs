@@ -1031,6 +1031,62 @@ fn specular_and_glossiness_have_their_equivalent() {
     assert_eq!(texels(layers.metallic_roughness_texture), Texels::Linear(vec![[255, 255, 255, 255], [255, 205, 255, 255]]));
 }
 
+/// Each of these extensions says that it must not stand beside specular and glossiness.
+#[test]
+fn specular_and_glossiness_stand_alone() {
+    let gloss = |others: Value| {
+        let mut extensions = others;
+        extensions["KHR_materials_pbrSpecularGlossiness"] = json!({"specularFactor": [0.25, 0.5, 0.75]});
+        load(&with_material(json!({"name": "old", "extensions": extensions}))).unwrap()
+    };
+    let alone = gloss(json!({}));
+    assert!(alone.warnings.is_empty(), "{:?}", alone.warnings);
+    let others = [
+        ("clearcoat", json!({"clearcoatFactor": 1})),
+        ("ior", json!({"ior": 2})),
+        ("sheen", json!({"sheenColorFactor": [1, 1, 1]})),
+        ("specular", json!({"specularFactor": 0})),
+        ("transmission", json!({"transmissionFactor": 1})),
+        ("volume", json!({"thicknessFactor": 1, "attenuationDistance": -1})),
+    ];
+    for (name, content) in others {
+        let scene = gloss(json!({format!("KHR_materials_{name}"): content}));
+        assert_eq!(scene.materials, alone.materials, "{name}");
+        let expected = format!(
+            "ignored: the extension KHR_materials_{name} beside KHR_materials_pbrSpecularGlossiness, where glTF forbids it: material 'old'"
+        );
+        assert_eq!(scene.warnings, [expected]);
+    }
+}
+
+/// The fraction of the ior 0 is 1 whatever stands beside it: a specular factor s reflects s of the light along the normal, and the
+/// rest goes on.
+#[test]
+fn surfaces_of_ior_zero_reflect_their_specular_factor() {
+    let Some(gpu) = device() else { return };
+    for specular in [1.0f32, 0.25] {
+        let mut scene = load(&with_material(json!({"name": "old", "pbrMetallicRoughness": {"metallicFactor": 0, "roughnessFactor": 0},
+            "extensions": {"KHR_materials_ior": {"ior": 0}, "KHR_materials_transmission": {"transmissionFactor": 1},
+                "KHR_materials_specular": {"specularFactor": specular},
+                "KHR_materials_volume": {"thicknessFactor": 1, "attenuationDistance": 0.1, "attenuationColor": [0, 0, 0]}}})))
+        .unwrap();
+        assert_eq!(scene.warnings.len(), 1, "{:?}", scene.warnings);
+        assert!(scene.warnings[0].contains("volumes behind the ior 0"), "{:?}", scene.warnings);
+        // A sky of 1 before it, a wall of 2 behind it.
+        scene.lights = vec![Light { name: "sky".into(), kind: LightKind::Environment { radiance: Vec3::ONE } }];
+        scene.materials.push(Material { emission: Vec3::splat(2.0), ..Material::lambert("wall", Vec3::ZERO) });
+        let wall = scene.materials.len() - 1;
+        scene.meshes.push(Mesh::parallelogram("wall", DVec3::new(-8.0, -8.0, 2.0), 20.0 * DVec3::X, 20.0 * DVec3::Y, wall));
+        let camera = Camera::looking_at("ray", DVec3::new(2.1, 3.2, 8.0), DVec3::new(2.1, 3.2, 3.0), DVec3::Y, 0.003);
+        let settings = SceneSettings { photons: 1000, rounds: 4, ..SceneSettings::default() };
+        let found = mean_red(&seen(&gpu, &scene, &settings, &camera, [32, 32]));
+        let expected = f64::from(specular + 2.0 * (1.0 - specular));
+        // Deltas are chosen by chance where there are two.
+        let error = 0.5 * f64::from(specular * (1.0 - specular)).sqrt() / 32.0 + 1e-5;
+        assert_holds(specular, z_check("radiance", found, expected, error));
+    }
+}
+
 #[test]
 fn alpha_modes_are_read() {
     for (mode, coverage) in [

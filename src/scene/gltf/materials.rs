@@ -127,7 +127,7 @@ impl Reader<'_> {
                 layers.metallic_roughness_texture = self.texture(pbr.metallic_roughness_texture.as_ref(), Meaning::Numbers)?;
             }
         }
-        if let Some(specular) = extensions.specular.as_ref().filter(|_| glossy.is_none()) {
+        if let Some(specular) = &extensions.specular {
             layers.specular = self.factor("specular factor", specular.specular_factor.0, 1.0)?;
             layers.specular_texture = self.texture(specular.specular_texture.as_ref(), Meaning::Numbers)?;
             layers.specular_colour = self.colour("specular colour", specular.specular_color_factor.0, ANY)?;
@@ -141,6 +141,10 @@ impl Reader<'_> {
             let medium = self.medium(volume)?;
             // No light goes into an opaque surface.
             layers.medium = medium.filter(|_| layers.transmission > 0.0);
+            // The index 0 stands for one without end: there is no angle of refraction, and but for a specular factor or colour no light.
+            if ior == 0.0 && layers.medium.take().is_some() {
+                self.loader.leave_out("volumes behind the ior 0 (nothing is refracted there; such a surface is a thin wall)", &self.object);
+            }
         }
         if let Some(coat) = self.extension::<ClearCoat>(extensions, "KHR_materials_clearcoat")? {
             layers.coat = self.factor("clear coat factor", coat.clearcoat_factor, 1.0)?;

@@ -8,6 +8,17 @@ use serde_json::{Value, json};
 use super::{LeftOut, READ_EXTENSIONS, called, named};
 use crate::text::echo;
 
+const SPEC_GLOSS: &str = "KHR_materials_pbrSpecularGlossiness";
+/// Each of these says that it must not stand beside [`SPEC_GLOSS`].
+const NOT_BESIDE_SPEC_GLOSS: [&str; 6] = [
+    "KHR_materials_clearcoat",
+    "KHR_materials_ior",
+    "KHR_materials_sheen",
+    "KHR_materials_specular",
+    "KHR_materials_transmission",
+    "KHR_materials_volume",
+];
+
 /// Lists keep their length, as their members are named by numbers.
 pub(super) fn take_out(root: &mut Value, left_out: &mut LeftOut) {
     let animations = root.as_object_mut().and_then(|root| root.remove("animations"));
@@ -85,6 +96,15 @@ fn take_out_of_material(material: &mut Value, owner: &str, left_out: &mut LeftOu
     name_unread_extensions(material, owner, left_out);
     let Some(extensions) = material.get_mut("extensions").and_then(Value::as_object_mut) else { return };
     extensions.retain(|name, _| is_read(name));
+    if extensions.contains_key(SPEC_GLOSS) && !extensions.contains_key("KHR_materials_unlit") {
+        for name in NOT_BESIDE_SPEC_GLOSS {
+            if extensions.remove(name).is_some() {
+                left_out.add(format!("the extension {name} beside {SPEC_GLOSS}, where glTF forbids it"), owner);
+            }
+        }
+        // What it stands in for.
+        take(material, "", "pbrMetallicRoughness");
+    }
 }
 
 fn name_unread_extensions(object: &Value, owner: &str, left_out: &mut LeftOut) {
