@@ -102,6 +102,7 @@ fn what_is_left_out_is_named_once() {
     let iridescence =
         json!({"KHR_materials_iridescence": {"iridescenceFactor": 1}, "KHR_materials_volume": {"thicknessTexture": {"index": 0}}});
     value["materials"].as_array_mut().unwrap().push(json!({"occlusionTexture": {"index": 0}, "extensions": iridescence}));
+    use_material(&mut value, 1);
     value["animations"] = json!([{"channels": [], "samplers": []}]);
     value["extensionsUsed"].as_array_mut().unwrap().extend([json!("KHR_materials_iridescence"), json!("EXT_unheard_of")]);
     value["cameras"][0] = json!({"type": "orthographic", "orthographic": {"xmag": 1, "ymag": 1, "zfar": 9, "znear": 0.1}});
@@ -126,6 +127,7 @@ fn what_is_left_out_is_named_once() {
     let materials: Vec<Value> = (0..40).map(|k| json!({"name": format!("m{k:02}"), "extensions": dispersion})).collect();
     let mut value = square();
     value["materials"] = json!(materials);
+    (1..40).for_each(|k| use_material(&mut value, k));
     let warnings = load(&value).unwrap().warnings.join(" ");
     assert!(warnings.contains("material 'm00', ") && warnings.contains(" and 35 more") && !warnings.contains("m05"), "{warnings}");
 }
@@ -173,6 +175,120 @@ fn a_scene_without_light_is_read_and_flat_triangles_are_a_warning() {
     assert_eq!(scene.triangle_count(), 1);
     let wanted = "1 triangle without area left out (mesh 'wall')";
     assert!(scene.warnings.iter().any(|warning| warning.contains(wanted)), "{:?}", scene.warnings);
+}
+
+/// The square once more, with another material.
+fn use_material(value: &mut Value, material: usize) {
+    let primitives = value["meshes"][0]["primitives"].as_array_mut().unwrap();
+    primitives.push(primitives[0].clone());
+    primitives.last_mut().unwrap()["material"] = json!(material);
+}
+
+/// What is wrong where no mesh of the scene looks is no matter.
+#[test]
+fn what_no_mesh_uses_refuses_nothing() {
+    type Spoil = fn(&mut Value);
+    let spoils: &[Spoil] = &[
+        |v| v["images"][7] = json!({"uri": "absent.png"}),
+        |v| v["images"][7] = json!({}),
+        |v| v["images"][7] = json!({"bufferView": 99, "mimeType": "image/png"}),
+        |v| v["textures"][7] = json!({"source": 99}),
+        |v| v["textures"][7] = json!({"source": "seven", "sampler": 3}),
+        |v| v["textures"][7] = json!({}),
+        |v| v["samplers"] = json!([{"wrapS": 5}]),
+        |v| v["materials"][1] = json!({"pbrMetallicRoughness": {"baseColorTexture": {"index": 99}}}),
+        |v| v["materials"][1] = json!({"pbrMetallicRoughness": {"roughnessFactor": "rough"}, "alphaMode": 3}),
+        |v| v["materials"][1] = json!({"pbrMetallicRoughness": {"roughnessFactor": 5, "baseColorTexture": {"index": 7}}}),
+        |v| v["animations"] = json!([{"channels": [{"sampler": 9, "target": {"node": 99, "path": "nowhere"}}], "samplers": 5}]),
+        |v| v["materials"][0]["occlusionTexture"] = json!({"index": 99}),
+        |v| v["materials"][0]["occlusionTexture"] = json!({"index": 7, "strength": []}),
+        |v| v["materials"][0]["extensions"] = json!({"KHR_materials_volume": {"thicknessTexture": {"index": 99}}}),
+        |v| v["materials"][0]["extensions"] = json!({"KHR_materials_iridescence": {"iridescenceTexture": {"index": 99}}}),
+    ];
+    let picture = |v: &mut Value| v["images"][7] = json!({"uri": data_uri("image/png", b"no picture")});
+    for (place, spoil) in spoils.iter().enumerate() {
+        let mut value = with_material(json!({"name": "used", "pbrMetallicRoughness": {"baseColorTexture": {"index": 3}}}));
+        value["materials"].as_array_mut().unwrap().push(json!({"name": "spare"}));
+        // On a mesh, but not of the scene.
+        value["meshes"].as_array_mut().unwrap().push(json!({"primitives": [{"attributes": {"POSITION": 0}, "material": 1}]}));
+        value["nodes"].as_array_mut().unwrap().push(json!({"mesh": 1}));
+        picture(&mut value);
+        spoil(&mut value);
+        let scene = load(&value).unwrap_or_else(|error| panic!("{place}: {error}"));
+        assert_eq!((scene.materials.len(), scene.textures.len()), (1, 1), "{place}");
+        assert_eq!(scene.textures[0].texels, Texels::Srgb(vec![[3, 6, 9, 200]]), "{place}");
+        assert!(scene.warnings[0].contains("materials on no mesh: material '"), "{place}: {:?}", scene.warnings);
+        // With the node in the scene the same is refused, unless it is nothing that is read.
+        if place < 10 && place != 6 {
+            value["scenes"][0]["nodes"].as_array_mut().unwrap().push(json!(5));
+            value["materials"][1]["emissiveTexture"] = json!({"index": 7});
+            assert_refused(&value, &["scene.gltf"]);
+        }
+    }
+}
+
+/// Where a fault is, what stands there, what is allowed, what to do.
+#[test]
+fn faults_of_the_json_have_place_value_and_remedy() {
+    type Spoil = fn(&mut Value);
+    let textured = |spoil: Spoil| {
+        let mut value = with_material(json!({"name": "used", "pbrMetallicRoughness": {"baseColorTexture": {"index": 3}}}));
+        value["samplers"] = json!([{}]);
+        value["textures"][3]["sampler"] = json!(0);
+        spoil(&mut value);
+        value
+    };
+    let cases: &[(Spoil, &[&str])] = &[
+        (|v| v["samplers"][0]["wrapS"] = json!(12), &["samplers[0].wrapS is 12", "must be one of [33071, 33648, 10497]"]),
+        (|v| v["samplers"][0]["wrapT"] = json!("repeat"), &["samplers[0].wrapT", "string \"repeat\"", "[33071, 33648, 10497]"]),
+        (|v| v["materials"][0]["alphaMode"] = json!("GLASS"), &["materials[0].alphaMode is \"GLASS\"", "\"OPAQUE\", \"MASK\", \"BLEND\""]),
+        (|v| v["meshes"][0]["primitives"][0]["mode"] = json!(9), &["meshes[0].primitives[0].mode is 9", "[0, 1, 2, 3, 4, 5, 6]"]),
+        (|v| v["accessors"][0]["type"] = json!("VEC9"), &["accessors[0].type is \"VEC9\"", "\"VEC3\""]),
+        (|v| v["accessors"][0]["componentType"] = json!(1), &["accessors[0].componentType is 1", "5126"]),
+        (|v| v["accessors"][0]["bufferView"] = json!(44), &["accessors[0].bufferView is 44", "bufferViews has 4 members, counted from 0"]),
+        (|v| v["meshes"][0]["primitives"][0]["material"] = json!(7), &["primitives[0].material is 7", "list materials has 1 members"]),
+        (|v| v["textures"][3]["sampler"] = json!(4), &["textures[3].sampler is 4", "list samplers has 1 members"]),
+        (
+            |v| v["materials"][0]["pbrMetallicRoughness"]["baseColorTexture"]["index"] = json!(30),
+            &["baseColorTexture.index is 30", "list textures has 16 members"],
+        ),
+        (|v| v["accessors"][0]["min"] = json!(null), &[".min is missing", "add it"]),
+        (
+            |v| v["materials"][0]["pbrMetallicRoughness"]["roughnessFactor"] = json!("red"),
+            &["materials[0].pbrMetallicRoughness.roughnessFactor", "\"red\"", "expected f32"],
+        ),
+        (|v| v["nodes"][0]["scale"] = json!([1, 2]), &["nodes[0].scale", "length 2", "array of length 3"]),
+        (|v| v["nodes"][0]["mesh"] = json!(-1), &["nodes[0].mesh", "`-1`", "expected index"]),
+    ];
+    for (spoil, named) in cases {
+        assert_refused(&textured(*spoil), &[&["scene.gltf", "not valid glTF", "export the file again"], *named].concat());
+    }
+    let text = square().to_string();
+    for number in ["NaN", "01", "+1", "Infinity"] {
+        let spoiled = text.replace("\"yfov\":0.7", &format!("\"yfov\":{number}"));
+        assert_ne!(spoiled, text);
+        assert_refusal(
+            open("a.gltf", spoiled.as_bytes()),
+            &["not valid JSON", "line 1 column", &format!("\"yfov\":{number}"), "export the file again"],
+        );
+    }
+}
+
+/// How a picture is made smaller is not asked for, and without a word on how it is made larger there is the usual way.
+#[test]
+fn filters_that_gltf_does_not_have_are_a_warning() {
+    let mut value = with_material(json!({"pbrMetallicRoughness": {"baseColorTexture": {"index": 3}}}));
+    value["samplers"] = json!([{"magFilter": 1, "minFilter": "fine"}]);
+    value["textures"][3]["sampler"] = json!(0);
+    let scene = load(&value).unwrap();
+    assert_eq!(scene.textures[0].filter, Filter::Bilinear);
+    let [warning] = &scene.warnings[..] else { panic!("{:?}", scene.warnings) };
+    for words in [
+        "magFilter must be one of [9728, 9729]): sampler 0 with 1",
+        "minFilter must be one of [9728, 9729, 9984, 9985, 9986, 9987]): sampler 0 with \"fine\"",
+    ] {
+        assert!(warning.contains(words), "{warning}");
+    }
 }
 
 fn assert_refused(value: &Value, named: &[&str]) {
@@ -674,6 +790,67 @@ fn a_blender_file_loads() {
     assert!(parts("shell").specular_colour.y < 1.0);
 }
 
+/// What is left out or has no effect, each by its own words.
+#[test]
+fn what_has_no_effect_is_a_warning() {
+    let warnings = |value: &Value| load(value).unwrap().warnings.join(" ");
+    let mut value = square();
+    assert_eq!(warnings(&value), "");
+    value["meshes"][0]["primitives"][0]["targets"] = json!([{"POSITION": 0, "TEXCOORD_0": 2}]);
+    assert_eq!(warnings(&value), "ignored: texture coordinates and colours of morph targets: mesh 'wall'");
+    value["meshes"][0]["primitives"][0]["targets"] = json!([{"COLOR_0": 0}]);
+    assert_eq!(warnings(&value), "ignored: texture coordinates and colours of morph targets: mesh 'wall'");
+    // Not in the list of what the file uses.
+    let mut value = square();
+    value["nodes"][0]["extensions"] = json!({"EXT_mesh_gpu_instancing": {"attributes": {"TRANSLATION": 0}}});
+    assert_eq!(warnings(&value), "ignored: the extension EXT_mesh_gpu_instancing: node 'wall'");
+
+    let nowhere = "ignored: surfaces that are nowhere seen (their alpha is 0, or below the cutoff): material 'pane'";
+    for (mode, cutoff, alpha, expected) in [
+        ("MASK", 1.5, 1.0, nowhere),
+        ("MASK", 0.5, 0.25, nowhere),
+        ("MASK", 0.5, 0.5, ""),
+        ("MASK", 0.0, 0.0, ""),
+        ("BLEND", 0.5, 0.0, nowhere),
+        ("BLEND", 0.5, 0.25, ""),
+        ("OPAQUE", 2.0, 0.0, ""),
+    ] {
+        let pbr = json!({"baseColorFactor": [1, 1, 1, alpha]});
+        let value = with_material(json!({"name": "pane", "alphaMode": mode, "alphaCutoff": cutoff, "pbrMetallicRoughness": pbr}));
+        assert_eq!(warnings(&value), expected, "{mode} {cutoff} {alpha}");
+    }
+
+    let anyhow =
+        "ignored: that normal maps lie on meshes without tangents (they turn normals in any direction): material 'bumpy' on mesh 'wall'";
+    for (coordinates, expected) in [
+        ([0.5; 8], anyhow),
+        ([0., 0., 1., 0., 2., 0., 3., 0.], anyhow),
+        ([0., 0., 0.1, 0.3, 0.2, 0.6, 0.7, 2.1], anyhow),
+        // One triangle of two.
+        ([0., 0., 1., 0., 2., 0., 0., 1.], ""),
+        ([0., 0., 1., 0., 1., 1e-3, 0., 1e-3], ""),
+    ] {
+        let mut value = with_material(json!({"name": "bumpy", "normalTexture": {"index": 0}}));
+        uvs(&mut value, &coordinates);
+        assert_eq!(warnings(&value), expected, "{coordinates:?}");
+        with_tangents(&mut value, [1.0, 0.0, 0.0, 1.0]);
+        assert_eq!(warnings(&value), "");
+    }
+    let mut value = with_material(json!({"name": "bumpy", "normalTexture": {"index": 0}}));
+    value["materials"][0]["normalTexture"]["extensions"] = json!({"KHR_texture_transform": {"scale": [1, 0]}});
+    assert_eq!(warnings(&value), anyhow);
+}
+
+/// Numbers as a file has them, names without what turns the order of a line.
+#[test]
+fn messages_have_short_numbers_and_plain_names() {
+    let mut value = square();
+    value["cameras"][0]["perspective"]["yfov"] = json!(0.001_1);
+    value["nodes"][1]["name"] = json!("a\u{202e}b\u{2066}c\u{200f}d\u{1b}e\u{2028}f \u{e9}");
+    let warning = load(&value).unwrap().warnings.join(" ");
+    assert_eq!(warning, "ignored: a camera with a vertical view of 0.0011 radians: camera 'a b c d e f \u{e9}'");
+}
+
 fn rgba_png(width: u32, height: u32, of: impl Fn(u32, u32) -> [u8; 4]) -> String {
     let mut bytes = std::io::Cursor::new(Vec::new());
     RgbaImage::from_fn(width, height, |i, j| Rgba(of(i, j))).write_to(&mut bytes, ImageFormat::Png).unwrap();
@@ -695,7 +872,7 @@ fn with_material(material: Value) -> Value {
 fn everything_of_a_material_is_read() {
     let transform = json!({"KHR_texture_transform": {"offset": [0.5, 0.25], "rotation": 0.75, "scale": [2, -3], "texCoord": 1}});
     let texture = |k: usize| json!({"index": k, "extensions": transform});
-    let scene = load(&with_material(json!({
+    let mut value = with_material(json!({
         "name": "all", "doubleSided": true, "alphaMode": "BLEND", "emissiveFactor": [0.5, 0.25, 1.0], "emissiveTexture": texture(0),
         "normalTexture": {"index": 1, "scale": -0.5, "extensions": transform},
         "pbrMetallicRoughness": {"baseColorFactor": [0.125, 0.25, 0.5, 0.75], "baseColorTexture": texture(2),
@@ -712,15 +889,19 @@ fn everything_of_a_material_is_read() {
             "KHR_materials_sheen": {"sheenColorFactor": [0.25, 0.5, 1.0], "sheenColorTexture": texture(10),
                 "sheenRoughnessFactor": 0.125, "sheenRoughnessTexture": texture(11)}
         }
-    })))
-    .unwrap();
+    }));
     // The square has no second set.
-    let [hole, warning] = &scene.warnings[..] else { panic!("{:?}", scene.warnings) };
+    let without = load(&value).unwrap();
+    let [hole, warning] = &without.warnings[..] else { panic!("{:?}", without.warnings) };
     assert!(hole.starts_with("solids with holes (mesh 'wall')"), "{hole}");
     assert!(warning.contains("normal maps on meshes without texture coordinates: material 'all' on mesh 'wall'"), "{warning}");
     assert!(warning.contains("(its textures have their value at 0 0): material 'all' on mesh 'wall'"), "{warning}");
+    // Another one has.
+    use_material(&mut value, 0);
+    value["meshes"][0]["primitives"][1]["attributes"]["TEXCOORD_1"] = json!(2);
+    let scene = load(&value).unwrap();
 
-    let material = &scene.materials[0];
+    let material = &scene.materials[scene.meshes[1].material];
     let used = |texture: Option<TextureUse>, k: u8, is_colour: bool| {
         let TextureUse { texture, uv_set, transform } = texture.unwrap();
         let codes = vec![[k, 2 * k, 3 * k, 200]];
@@ -848,6 +1029,62 @@ fn specular_and_glossiness_have_their_equivalent() {
     assert_eq!(texels(layers.specular_colour_texture), Texels::Srgb(vec![[10, 20, 30, 0], [10, 20, 30, 100]]));
     // 1 - glossiness, of which the factor is a part.
     assert_eq!(texels(layers.metallic_roughness_texture), Texels::Linear(vec![[255, 255, 255, 255], [255, 205, 255, 255]]));
+}
+
+/// Each of these extensions says that it must not stand beside specular and glossiness.
+#[test]
+fn specular_and_glossiness_stand_alone() {
+    let gloss = |others: Value| {
+        let mut extensions = others;
+        extensions["KHR_materials_pbrSpecularGlossiness"] = json!({"specularFactor": [0.25, 0.5, 0.75]});
+        load(&with_material(json!({"name": "old", "extensions": extensions}))).unwrap()
+    };
+    let alone = gloss(json!({}));
+    assert!(alone.warnings.is_empty(), "{:?}", alone.warnings);
+    let others = [
+        ("clearcoat", json!({"clearcoatFactor": 1})),
+        ("ior", json!({"ior": 2})),
+        ("sheen", json!({"sheenColorFactor": [1, 1, 1]})),
+        ("specular", json!({"specularFactor": 0})),
+        ("transmission", json!({"transmissionFactor": 1})),
+        ("volume", json!({"thicknessFactor": 1, "attenuationDistance": -1})),
+    ];
+    for (name, content) in others {
+        let scene = gloss(json!({format!("KHR_materials_{name}"): content}));
+        assert_eq!(scene.materials, alone.materials, "{name}");
+        let expected = format!(
+            "ignored: the extension KHR_materials_{name} beside KHR_materials_pbrSpecularGlossiness, where glTF forbids it: material 'old'"
+        );
+        assert_eq!(scene.warnings, [expected]);
+    }
+}
+
+/// The fraction of the ior 0 is 1 whatever stands beside it: a specular factor s reflects s of the light along the normal, and the
+/// rest goes on.
+#[test]
+fn surfaces_of_ior_zero_reflect_their_specular_factor() {
+    let Some(gpu) = device() else { return };
+    for specular in [1.0f32, 0.25] {
+        let mut scene = load(&with_material(json!({"name": "old", "pbrMetallicRoughness": {"metallicFactor": 0, "roughnessFactor": 0},
+            "extensions": {"KHR_materials_ior": {"ior": 0}, "KHR_materials_transmission": {"transmissionFactor": 1},
+                "KHR_materials_specular": {"specularFactor": specular},
+                "KHR_materials_volume": {"thicknessFactor": 1, "attenuationDistance": 0.1, "attenuationColor": [0, 0, 0]}}})))
+        .unwrap();
+        assert_eq!(scene.warnings.len(), 1, "{:?}", scene.warnings);
+        assert!(scene.warnings[0].contains("volumes behind the ior 0"), "{:?}", scene.warnings);
+        // A sky of 1 before it, a wall of 2 behind it.
+        scene.lights = vec![Light { name: "sky".into(), kind: LightKind::Environment { radiance: Vec3::ONE } }];
+        scene.materials.push(Material { emission: Vec3::splat(2.0), ..Material::lambert("wall", Vec3::ZERO) });
+        let wall = scene.materials.len() - 1;
+        scene.meshes.push(Mesh::parallelogram("wall", DVec3::new(-8.0, -8.0, 2.0), 20.0 * DVec3::X, 20.0 * DVec3::Y, wall));
+        let camera = Camera::looking_at("ray", DVec3::new(2.1, 3.2, 8.0), DVec3::new(2.1, 3.2, 3.0), DVec3::Y, 0.003);
+        let settings = SceneSettings { photons: 1000, rounds: 4, ..SceneSettings::default() };
+        let found = mean_red(&seen(&gpu, &scene, &settings, &camera, [32, 32]));
+        let expected = f64::from(specular + 2.0 * (1.0 - specular));
+        // Deltas are chosen by chance where there are two.
+        let error = 0.5 * f64::from(specular * (1.0 - specular)).sqrt() / 32.0 + 1e-5;
+        assert_holds(specular, z_check("radiance", found, expected, error));
+    }
 }
 
 #[test]

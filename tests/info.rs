@@ -49,7 +49,7 @@ fn materials_are_described_in_words() {
         (
             json!({"pbrMetallicRoughness": {"metallicFactor": 0, "roughnessFactor": 0.4, "baseColorTexture": texture,
                 "metallicRoughnessTexture": texture}}),
-            "dielectric, ior 1.5, roughness 0.4 (texture), base colour texture 'wood' 16x8",
+            "dielectric, ior 1.5, roughness 0.4 (texture 'wood'), base colour texture 'wood'",
         ),
         (
             json!({"pbrMetallicRoughness": {"metallicFactor": 0.25, "baseColorFactor": [0.012345, 1, 0.5, 1]}, "doubleSided": true}),
@@ -57,7 +57,7 @@ fn materials_are_described_in_words() {
         ),
         (
             json!({"pbrMetallicRoughness": {"metallicRoughnessTexture": texture}}),
-            "dielectric and metal, metallic 1 (texture), ior 1.5, roughness 1 (texture)",
+            "dielectric and metal, metallic 1 (texture 'wood'), ior 1.5, roughness 1 (texture 'wood')",
         ),
         (glass(None), "thin wall of glass, ior 1.5, roughness 0"),
         (glass(Some(json!({"thicknessFactor": 0}))), "thin wall of glass, ior 1.5, roughness 0"),
@@ -67,24 +67,24 @@ fn materials_are_described_in_words() {
         ),
         (
             with("transmission", json!({"transmissionFactor": 0.5, "transmissionTexture": texture})),
-            "thin wall of glass, ior 1.5, roughness 1, transmission 0.5 (texture)",
+            "thin wall of glass, ior 1.5, roughness 1, transmission 0.5 (texture 'wood')",
         ),
         (with("ior", json!({"ior": 0})), "dielectric, ior infinite, roughness 1"),
         (
             with("specular", json!({"specularFactor": 0.5, "specularColorTexture": texture})),
-            "dielectric, ior 1.5, roughness 1, specular 0.5, specular colour 1 (texture)",
+            "dielectric, ior 1.5, roughness 1, specular 0.5, specular colour 1 (texture 'wood')",
         ),
         (
             with("clearcoat", json!({"clearcoatFactor": 0.5, "clearcoatRoughnessFactor": 0.1, "clearcoatNormalTexture": texture})),
-            "dielectric, ior 1.5, roughness 1, clear coat 0.5 of roughness 0.1, normal map of the coat",
+            "dielectric, ior 1.5, roughness 1, clear coat 0.5 of roughness 0.1, normal map of the coat (texture 'wood')",
         ),
         (
             with("sheen", json!({"sheenColorFactor": [1, 0.5, 0], "sheenRoughnessFactor": 0.3, "sheenRoughnessTexture": texture})),
-            "dielectric, ior 1.5, roughness 1, sheen 1 0.5 0 of roughness 0.3 (texture)",
+            "dielectric, ior 1.5, roughness 1, sheen 1 0.5 0 of roughness 0.3 (texture 'wood')",
         ),
         (
             json!({"alphaMode": "MASK", "normalTexture": {"index": 0, "scale": 0.5}, "emissiveFactor": [0.6, 0.6, 0.6]}),
-            "metal, roughness 1, cut out where alpha is below 0.5, normal map of scale 0.5, emits 0.6 W/m2/sr",
+            "metal, roughness 1, cut out where alpha is below 0.5, normal map of scale 0.5 (texture 'wood'), emits 0.6 W/m2/sr",
         ),
         (
             json!({"alphaMode": "BLEND", "pbrMetallicRoughness": {"baseColorFactor": [1, 1, 1, 0.25]}, "extensions": {"KHR_materials_unlit": {}}}),
@@ -101,13 +101,45 @@ fn materials_are_described_in_words() {
 }
 
 #[test]
+fn textures_are_named_with_what_is_unusual_about_them() {
+    let place = Place::new();
+    let transformed = |transform: Value| json!({"index": 1, "extensions": {"KHR_texture_transform": transform}});
+    let mut value = square_with(&json!([
+        {"name": "same", "pbrMetallicRoughness": {"baseColorTexture": {"index": 0, "texCoord": 1}}},
+        {"name": "same", "pbrMetallicRoughness": {"metallicFactor": 0.3, "baseColorTexture": {"index": 1}}},
+        {"name": "other", "normalTexture": transformed(json!({"scale": [0.3, -2], "rotation": 0.75, "offset": [0.1, 0]})),
+            "emissiveFactor": [1, 1, 1], "emissiveTexture": {"index": 2}}
+    ]));
+    let nameless = json!({"uri": value["images"][0]["uri"]});
+    value["images"].as_array_mut().unwrap().push(nameless);
+    value["samplers"] = json!([{"wrapS": 33071, "wrapT": 33071}, {"wrapS": 33648}]);
+    value["textures"] = json!([{"source": 0}, {"source": 0, "sampler": 0}, {"source": 1, "sampler": 1}]);
+    value["meshes"][0]["primitives"][0]["attributes"]["TEXCOORD_1"] = json!(2);
+    value["nodes"][0]["scale"] = json!([0.3, 0.3, 0.3]);
+    place.write("a.gltf", value.to_string());
+    let stdout = text(&place.run("info a.gltf").stdout);
+    for line in [
+        "    same #0: metal, roughness 1, base colour texture 'wood', UV set 1\n",
+        "    same #1: dielectric and metal, metallic 0.3, ior 1.5, roughness 1, base colour texture 'wood', clamped\n",
+        "    other: metal, roughness 1, normal map (texture 'wood', clamped, scaled by 0.3 -2, turned by 0.75 rad, moved by 0.1 0), \
+         emits 1 W/m2/sr (texture 1, mirrored in u, repeated in v)\n",
+    ] {
+        assert!(stdout.contains(line), "{line}{stdout}");
+    }
+    let json = text(&place.run("info a.gltf --json").stdout);
+    assert!(json.contains("0.3,") && !json.contains("0.30000"), "{json}");
+}
+
+#[test]
 fn a_file_is_described_as_text_and_as_json() {
     let place = Place::new();
     let mut value = square_with(&json!([
         {"name": "floor", "pbrMetallicRoughness": {"baseColorTexture": {"index": 0}, "metallicRoughnessTexture": {"index": 0}}},
         {"name": "film", "extensions": {"KHR_materials_iridescence": {}}}
     ]));
-    value["meshes"][0]["primitives"].as_array_mut().unwrap().pop();
+    // Its indices are the zeros that the first position has.
+    value["meshes"][0]["primitives"][1]["indices"] = json!(4);
+    value["accessors"].as_array_mut().unwrap().push(json!({"bufferView": 0, "componentType": 5123, "count": 3, "type": "SCALAR"}));
     place.write("a.gltf", value.to_string());
     let (stdout, stderr) = (text(&place.run("info a.gltf").stdout), text(&place.run("info a.gltf").stderr));
     assert_eq!(stderr, "");
@@ -116,7 +148,7 @@ a: 1 mesh, 2 triangles, 2 x 2 x 0 m, 2 materials, 2 textures (0.000977 MiB), 3 l
 extensions
     KHR_lights_punctual, KHR_materials_emissive_strength
 materials
-    floor: dielectric and metal, metallic 1 (texture), ior 1.5, roughness 1 (texture), base colour texture 'wood' 16x8
+    floor: dielectric and metal, metallic 1 (texture 'wood'), ior 1.5, roughness 1 (texture 'wood'), base colour texture 'wood'
     film: metal, roughness 1; on no mesh
 textures
     texture image 'wood': 16x8, sRGB colours, bilinear, 0.000488 MiB
@@ -128,6 +160,7 @@ lights, beside materials that emit
 cameras
     eye
 warnings
+    1 triangle without area left out (mesh 'wall')
     ignored: the extension KHR_materials_iridescence: material 'film'
 ";
     assert_eq!(stdout, expected);
@@ -138,7 +171,7 @@ warnings
     let wood =
         json!({"name": "texture image 'wood'", "width": 16, "height": 8, "texels": "sRGB colours", "filter": "bilinear", "bytes": 512});
     assert_eq!((&json["textures"][0], &json["lights"][0]), (&wood, &json!({"name": "light 'bulb'", "kind": "point"})));
-    assert_eq!((&json["cameras"], json["warnings"].as_array().unwrap().len()), (&json!(["eye"]), 1));
+    assert_eq!((&json["cameras"], json["warnings"].as_array().unwrap().len()), (&json!(["eye"]), 2));
     assert_eq!(json["extensions_used"], value["extensionsUsed"]);
 
     // Built-in scenes have other surfaces, and nothing to leave out.

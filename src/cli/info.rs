@@ -1,5 +1,6 @@
 //! `photonmill info`: what a file holds, and what became of it.
 
+use std::collections::HashMap;
 use std::fmt::Write;
 
 use clap::Args;
@@ -12,8 +13,8 @@ use super::{JsonOrStdoutArg, help, optional_file, say};
 use crate::error::Result;
 use crate::output::destination::write_all;
 use crate::scene::light::LightKind;
-use crate::scene::material::{Coverage, Layers, Material, Medium, NormalMap, Surface, TextureUse};
-use crate::scene::texture::{Filter, Texels, Texture};
+use crate::scene::material::{Coverage, Layers, Material, Medium, NormalMap, Surface, TextureUse, UvTransform};
+use crate::scene::texture::{Filter, Texels, Texture, Wrap};
 use crate::scene::{Light, Scene};
 use crate::text::counted;
 
@@ -33,8 +34,8 @@ struct Contents {
     name: String,
     mesh_count: usize,
     triangle_count: usize,
-    /// Metres along x, y and z.
-    size: [f64; 3],
+    /// Metres along x, y and z, to the digits that a file has.
+    size: [f32; 3],
     texture_bytes: u64,
     extensions_used: Vec<String>,
     materials: Vec<MaterialEntry>,
@@ -47,6 +48,7 @@ struct Contents {
 
 #[derive(Serialize)]
 struct MaterialEntry {
+    /// With its place in this list where others have the same.
     name: String,
     /// What it became.
     description: String,
@@ -94,20 +96,19 @@ impl Contents {
         for mesh in &scene.meshes {
             is_coloured[mesh.material] |= !mesh.colours.is_empty() || !mesh.alphas.is_empty();
         }
-        let material = |((material, triangle_count), is_coloured): ((&Material, usize), bool)| MaterialEntry {
-            name: material.name.clone(),
+        let mut name_counts: HashMap<&str, usize> = HashMap::new();
+        scene.materials.iter().for_each(|material| *name_counts.entry(&material.name).or_default() += 1);
+        let material = |((place, material), (triangle_count, is_coloured)): ((usize, &Material), (usize, bool))| MaterialEntry {
+            name: if name_counts[&*material.name] > 1 { format!("{} #{place}", material.name) } else { material.name.clone() },
             description: description(material, &scene.textures) + if is_coloured { ", times vertex colours" } else { "" },
             triangle_count,
         };
-        // The reader's own, which most files need not.
-        let is_own = |material: &Material| *material == Material::layered("default", Vec3::ONE, Layers::default());
-        let counted_materials = scene.materials.iter().zip(triangle_counts).zip(is_coloured);
-        let materials = counted_materials.filter(|((material, count), _)| *count > 0 || !is_own(material));
+        let materials = scene.materials.iter().enumerate().zip(triangle_counts.into_iter().zip(is_coloured));
         Contents {
             name: scene.name.clone(),
             mesh_count: scene.meshes.len(),
             triangle_count: scene.triangle_count(),
-            size: (high - low).to_array(),
+            size: (high - low).as_vec3().to_array(),
             texture_bytes: scene.textures.iter().map(bytes).sum(),
             extensions_used: scene.extensions.clone(),
             materials: materials.map(material).collect(),
@@ -214,29 +215,24 @@ fn description(material: &Material, textures: &[Texture]) -> String {
         Surface::Mirror => vec!["mirror".to_owned()],
         Surface::Dielectric { ior } => vec!["smooth glass".to_owned(), format!("ior {}", number(ior))],
         Surface::Layered if material.layers.is_unlit => vec!["unlit: the eye sees its base colour as it is".to_owned()],
-        Surface::Layered => of_base(&material.layers),
+        Surface::Layered => of_base(&material.layers, textures),
     };
     if material.base_colour != Vec3::ONE {
         parts.push(format!("base colour {}", colour(material.base_colour)));
     }
-    if let Some(used) = material.base_colour_texture {
-        let texture = &textures[used.texture];
-        // The reader's word for a picture that cannot be read.
-        let name = texture.name.strip_prefix("texture image ").unwrap_or(&texture.name);
-        parts.push(format!("base colour texture {name} {}x{}", texture.width, texture.height));
-    }
+    parts.extend(material.base_colour_texture.map(|used| format!("base colour {}", texture(used, textures))));
     match material.coverage {
         Coverage::Whole => {}
         Coverage::Mask { cutoff, .. } => parts.push(format!("cut out where alpha is below {}", number(cutoff))),
         Coverage::Blend { alpha: 1.0 } => parts.push("blended by alpha".to_owned()),
         Coverage::Blend { alpha } => parts.push(format!("blended by alpha {}", number(alpha))),
     }
-    parts.extend(normal_map("normal map", material.normal_map));
+    parts.extend(normal_map("normal map", material.normal_map, textures));
     if material.surface == Surface::Layered && !material.layers.is_unlit {
-        parts.extend(of_layers_above(&material.layers));
+        parts.extend(of_layers_above(&material.layers, textures));
     }
     if material.is_emissive() {
-        parts.push(format!("emits {} W/m2/sr{}", colour(material.emission), by_texture(material.emission_texture)));
+        parts.push(format!("emits {} W/m2/sr{}", colour(material.emission), by_texture(material.emission_texture, textures)));
     }
     if material.two_sided {
         parts.push("two-sided".to_owned());
@@ -245,8 +241,8 @@ fn description(material: &Material, textures: &[Texture]) -> String {
 }
 
 /// Metal, dielectric or glass.
-fn of_base(layers: &Layers) -> Vec<String> {
-    let (metallic, of_texture) = (number(layers.metallic), by_texture(layers.metallic_roughness_texture));
+fn of_base(layers: &Layers, textures: &[Texture]) -> Vec<String> {
+    let (metallic, of_texture) = (number(layers.metallic), by_texture(layers.metallic_roughness_texture, textures));
     let has_dielectric = layers.metallic < 1.0 || layers.metallic_roughness_texture.is_some();
     let mut parts = vec![match (layers.metallic, layers.transmission > 0.0, layers.medium) {
         (1.0, _, _) if !has_dielectric => "metal".to_owned(),
@@ -265,13 +261,13 @@ fn of_base(layers: &Layers) -> Vec<String> {
         return parts;
     }
     if layers.specular != 1.0 || layers.specular_texture.is_some() {
-        parts.push(format!("specular {}{}", number(layers.specular), by_texture(layers.specular_texture)));
+        parts.push(format!("specular {}{}", number(layers.specular), by_texture(layers.specular_texture, textures)));
     }
     if layers.specular_colour != Vec3::ONE || layers.specular_colour_texture.is_some() {
-        parts.push(format!("specular colour {}{}", colour(layers.specular_colour), by_texture(layers.specular_colour_texture)));
+        parts.push(format!("specular colour {}{}", colour(layers.specular_colour), by_texture(layers.specular_colour_texture, textures)));
     }
     if layers.transmission > 0.0 && (layers.transmission < 1.0 || layers.transmission_texture.is_some()) {
-        parts.push(format!("transmission {}{}", number(layers.transmission), by_texture(layers.transmission_texture)));
+        parts.push(format!("transmission {}{}", number(layers.transmission), by_texture(layers.transmission_texture, textures)));
     }
     if let Some(Medium { transmittance, metres }) = layers.medium.filter(|medium| medium.transmittance != Vec3::ONE) {
         let way = if metres == 1.0 { "a metre".to_owned() } else { format!("{} m", number(metres)) };
@@ -281,26 +277,58 @@ fn of_base(layers: &Layers) -> Vec<String> {
 }
 
 /// Coat and sheen.
-fn of_layers_above(layers: &Layers) -> Vec<String> {
+fn of_layers_above(layers: &Layers, textures: &[Texture]) -> Vec<String> {
     let mut parts = Vec::new();
     if layers.coat > 0.0 {
-        let (coat, roughness) = (by_texture(layers.coat_texture), by_texture(layers.coat_roughness_texture));
+        let (coat, roughness) = (by_texture(layers.coat_texture, textures), by_texture(layers.coat_roughness_texture, textures));
         parts.push(format!("clear coat {}{coat} of roughness {}{roughness}", number(layers.coat), number(layers.coat_roughness)));
-        parts.extend(normal_map("normal map of the coat", layers.coat_normal_map));
+        parts.extend(normal_map("normal map of the coat", layers.coat_normal_map, textures));
     }
     if layers.sheen_colour != Vec3::ZERO {
-        let (sheen, roughness) = (by_texture(layers.sheen_colour_texture), by_texture(layers.sheen_roughness_texture));
+        let (sheen, roughness) = (by_texture(layers.sheen_colour_texture, textures), by_texture(layers.sheen_roughness_texture, textures));
         parts.push(format!("sheen {}{sheen} of roughness {}{roughness}", colour(layers.sheen_colour), number(layers.sheen_roughness)));
     }
     parts
 }
 
-fn normal_map(what: &str, map: Option<NormalMap>) -> Option<String> {
-    map.map(|map| if map.scale == 1.0 { what.to_owned() } else { format!("{what} of scale {}", number(map.scale)) })
+fn normal_map(what: &str, map: Option<NormalMap>, textures: &[Texture]) -> Option<String> {
+    let scale = |map: NormalMap| if map.scale == 1.0 { String::new() } else { format!(" of scale {}", number(map.scale)) };
+    map.map(|map| format!("{what}{}{}", scale(map), by_texture(Some(map.texture), textures)))
 }
 
-fn by_texture(used: Option<TextureUse>) -> &'static str {
-    if used.is_some() { " (texture)" } else { "" }
+fn by_texture(used: Option<TextureUse>, textures: &[Texture]) -> String {
+    used.map_or_else(String::new, |used| format!(" ({})", texture(used, textures)))
+}
+
+/// Which picture it is, and how it is looked up where that is not as usual.
+fn texture(used: TextureUse, textures: &[Texture]) -> String {
+    let texture = &textures[used.texture];
+    // The reader's word for a picture that cannot be read.
+    let mut text = format!("texture {}", texture.name.strip_prefix("texture image ").unwrap_or(&texture.name));
+    if used.uv_set != 0 {
+        let _ = write!(text, ", UV set {}", used.uv_set);
+    }
+    let wrap = |wrap: Wrap| match wrap {
+        Wrap::Repeat => "repeated",
+        Wrap::MirroredRepeat => "mirrored",
+        Wrap::Clamp => "clamped",
+    };
+    match texture.wrap {
+        [Wrap::Repeat, Wrap::Repeat] => {}
+        [u, v] if u == v => drop(write!(text, ", {}", wrap(u))),
+        [u, v] => drop(write!(text, ", {} in u, {} in v", wrap(u), wrap(v))),
+    }
+    let UvTransform { scale, rotation, offset } = used.transform;
+    if scale != UvTransform::NONE.scale {
+        let _ = write!(text, ", scaled by {} {}", number(scale.x), number(scale.y));
+    }
+    if rotation != 0.0 {
+        let _ = write!(text, ", turned by {} rad", number(rotation));
+    }
+    if offset != UvTransform::NONE.offset {
+        let _ = write!(text, ", moved by {} {}", number(offset.x), number(offset.y));
+    }
+    text
 }
 
 /// Three channels, or one where they are equal.

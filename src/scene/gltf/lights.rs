@@ -3,19 +3,19 @@
 use glam::{DMat4, DVec3, Vec3};
 use gltf::khr_lights_punctual::Kind;
 
-use super::{Loader, printable};
+use super::{Loader, named, printable};
 use crate::error::Result;
 use crate::scene::Camera;
 use crate::scene::light::{Light, LightKind};
 
 impl Loader {
     pub(super) fn read_camera(&mut self, camera: &gltf::Camera, node: &gltf::Node, to_world: DMat4) {
-        let name = node.name().or(camera.name()).map_or_else(|| format!("camera {}", camera.index()), printable);
+        let name = named("camera", node.name().or(camera.name()), camera.index());
         let gltf::camera::Projection::Perspective(perspective) = camera.projection() else {
             self.leave_out("orthographic cameras", &format!("camera '{name}'"));
             return;
         };
-        let vertical_view = f64::from(perspective.yfov());
+        let vertical_view = perspective.yfov();
         // Within the angles for which a pinhole picture means something.
         if !(0.002..3.12).contains(&vertical_view) {
             self.leave_out(format!("a camera with a vertical view of {vertical_view} radians"), &format!("camera '{name}'"));
@@ -25,13 +25,13 @@ impl Loader {
         let target = eye + to_world.transform_vector3(DVec3::NEG_Z).normalize_or(DVec3::NEG_Z);
         let up = to_world.transform_vector3(DVec3::Y);
         // Where the file leaves the aspect open, so does the camera.
-        let aspect = perspective.aspect_ratio().map(f64::from);
-        let is_usable = |aspect: &f64| aspect.is_finite() && *aspect > 0.0;
+        let aspect = perspective.aspect_ratio();
+        let is_usable = |aspect: &f32| aspect.is_finite() && *aspect > 0.0;
         if let Some(aspect) = aspect.filter(|aspect| !is_usable(aspect)) {
             self.leave_out(format!("an aspect ratio of {aspect}"), &format!("camera '{name}'"));
         }
-        let camera = Camera::looking_at(&name, eye, target, up, vertical_view);
-        self.scene.cameras.push(Camera { aspect: aspect.filter(is_usable), ..camera });
+        let camera = Camera::looking_at(&name, eye, target, up, vertical_view.into());
+        self.scene.cameras.push(Camera { aspect: aspect.filter(is_usable).map(f64::from), ..camera });
     }
 
     pub(super) fn read_light(&mut self, light: &gltf::khr_lights_punctual::Light, node: &str, to_world: DMat4) -> Result<()> {

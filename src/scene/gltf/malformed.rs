@@ -1,10 +1,108 @@
-//! Faults of a file that the `gltf` crate would overlook, or end the program for.
+//! From a file's bytes to glTF, with every fault named: where it is, what stands there, what is allowed and what to do.
+
+use std::borrow::Cow;
+
+use gltf::json::validation::{Error as Fault, Validate};
+use gltf::json::{Path, Root};
+use gltf::json::{accessor, camera, material, mesh, texture};
+use serde_json::Value;
+
+use crate::text::echo;
+
+const REMEDY: &str = "correct it, or export the file again";
+/// Which list a member's number is a place in.
+const LISTS: [(&str, &str); 16] = [
+    ("buffer", "buffers"),
+    ("bufferView", "bufferViews"),
+    ("camera", "cameras"),
+    ("children", "nodes"),
+    ("index", "textures"),
+    ("indices", "accessors"),
+    ("inverseBindMatrices", "accessors"),
+    ("joints", "nodes"),
+    ("material", "materials"),
+    ("mesh", "meshes"),
+    ("nodes", "nodes"),
+    ("sampler", "samplers"),
+    ("scene", "scenes"),
+    ("skeleton", "nodes"),
+    ("skin", "skins"),
+    ("source", "images"),
+];
+
+/// Of a `.gltf` file, or of a `.glb` one, which may have a binary part.
+pub(super) struct Parts<'a> {
+    pub(super) json: Cow<'a, [u8]>,
+    pub(super) binary: Option<Vec<u8>>,
+}
+
+pub(super) fn parts(content: &[u8]) -> Result<Parts<'_>, String> {
+    if !content.starts_with(b"glTF") {
+        return Ok(Parts { json: Cow::Borrowed(content), binary: None });
+    }
+    binary_length(content)?;
+    let glb = gltf::Glb::from_slice(content).map_err(|error| format!("is not valid glTF: {error}; export it again"))?;
+    Ok(Parts { json: glb.json, binary: glb.bin.map(Cow::into_owned) })
+}
+
+pub(super) fn json(text: &[u8]) -> Result<Value, String> {
+    serde_json::from_slice(text).map_err(|error| {
+        const AROUND: usize = 25;
+        let line = text.split(|byte| *byte == b'\n').nth(error.line().saturating_sub(1)).unwrap_or_default();
+        let place = error.column().min(line.len());
+        let found = String::from_utf8_lossy(&line[place.saturating_sub(AROUND)..(place + AROUND).min(line.len())]);
+        format!("is not valid JSON: {error}, near '{}'; {REMEDY} (JSON has no NaN and no infinity)", found.trim())
+    })
+}
+
+pub(super) fn root(json: Value) -> Result<Root, String> {
+    serde_path_to_error::deserialize(json).map_err(|error| format!("is not valid glTF: at {}: {}; {REMEDY}", error.path(), error.inner()))
+}
+
+/// Numbers of objects that are not there, values that glTF has not, and members that are missing. `text` is the file's JSON.
+pub(super) fn faults(root: &Root, text: &[u8]) -> Result<(), String> {
+    let mut first = None;
+    root.validate(root, Path::new, &mut |path, fault| {
+        first.get_or_insert_with(|| (path().0, fault));
+    });
+    let Some((path, fault)) = first else { return Ok(()) };
+    let json = json(text)?;
+    let pointer = format!("/{}", path.replace(['.', '['], "/").replace([']', '"'], ""));
+    let found = json.pointer(&pointer).map_or_else(|| "a name that glTF does not have".to_owned(), echo);
+    // The last name of `meshes[0].primitives[1].mode` is `mode`.
+    let member = pointer.rsplit('/').find(|part| part.parse::<usize>().is_err()).unwrap_or_default();
+    let reason = match fault {
+        Fault::Missing => format!("{path} is missing; add it"),
+        Fault::IndexOutOfBounds => {
+            let list = LISTS.iter().find(|(name, _)| *name == member).map_or(member, |(_, list)| *list);
+            let count = json[list].as_array().map_or(0, Vec::len);
+            format!("{path} is {found}, and the list {list} has {count} members, counted from 0; correct the number")
+        }
+        Fault::Invalid => match allowed(&path, member) {
+            Some(allowed) => format!("{path} is {found}; it must be one of {allowed}; correct it"),
+            None => format!("{path} is {found}, which glTF does not allow; correct it"),
+        },
+        Fault::Oversize | Fault::Unsupported => format!("{path} is {found}: {}; correct it", fault.to_string().to_lowercase()),
+    };
+    Err(format!("is not valid glTF: {reason}, or export the file again"))
+}
+
+/// The values of a member.
+fn allowed(path: &str, member: &str) -> Option<String> {
+    Some(match member {
+        "alphaMode" => format!("{:?}", material::VALID_ALPHA_MODES),
+        "componentType" if path.contains("sparse") => format!("{:?}", accessor::VALID_INDEX_TYPES),
+        "componentType" => format!("{:?}", accessor::VALID_COMPONENT_TYPES),
+        "mode" => format!("{:?}", mesh::VALID_MODES),
+        "type" if path.starts_with("cameras") => format!("{:?}", camera::VALID_CAMERA_TYPES),
+        "type" if path.starts_with("accessors") => format!("{:?}", accessor::VALID_ACCESSOR_TYPES),
+        "wrapS" | "wrapT" => format!("{:?}", texture::VALID_WRAPPING_MODES),
+        _ => return None,
+    })
+}
 
 /// Checks the length that a .glb announces: a file that was cut off is not to be read as far as it goes.
-pub(super) fn binary_length(content: &[u8]) -> Result<(), String> {
-    if !content.starts_with(b"glTF") {
-        return Ok(());
-    }
+fn binary_length(content: &[u8]) -> Result<(), String> {
     let announced = content.get(8..12).map_or(0, |bytes| u32::from_le_bytes([bytes[0], bytes[1], bytes[2], bytes[3]]) as usize);
     if announced != content.len() {
         return Err(format!("announces {announced} bytes and has {}", content.len()));
@@ -13,7 +111,7 @@ pub(super) fn binary_length(content: &[u8]) -> Result<(), String> {
 }
 
 /// Members without which the `gltf` crate would stop the program.
-pub(super) fn missing_members(root: &gltf::json::Root) -> Result<(), String> {
+pub(super) fn missing_members(root: &Root) -> Result<(), String> {
     use gltf::json::validation::Checked;
     for (number, mesh) in root.meshes.iter().enumerate() {
         for (place, primitive) in mesh.primitives.iter().enumerate() {
@@ -30,8 +128,8 @@ pub(super) fn missing_members(root: &gltf::json::Root) -> Result<(), String> {
     }
     for (number, camera) in root.cameras.iter().enumerate() {
         let whole = match camera.type_ {
-            Checked::Valid(gltf::json::camera::Type::Perspective) => camera.perspective.is_some(),
-            Checked::Valid(gltf::json::camera::Type::Orthographic) => camera.orthographic.is_some(),
+            Checked::Valid(camera::Type::Perspective) => camera.perspective.is_some(),
+            Checked::Valid(camera::Type::Orthographic) => camera.orthographic.is_some(),
             Checked::Invalid => true,
         };
         if !whole {

@@ -12,7 +12,7 @@ use serde::de::DeserializeOwned;
 use serde_json::Value;
 
 use super::textures::Meaning;
-use super::{Loader, READ_EXTENSIONS, printable};
+use super::{Loader, named};
 use crate::error::Result;
 use crate::scene::Surface;
 use crate::scene::material::{Coverage, Layers, Material, Medium, NormalMap, TextureUse, UvTransform};
@@ -44,17 +44,14 @@ struct Sheen {
 }
 
 impl Loader {
-    pub(super) fn read_materials(&mut self, document: &Document) -> Result<()> {
-        for (number, material) in document.as_json().materials.iter().enumerate() {
-            let name = material.name.as_deref().map_or_else(|| format!("material {number}"), printable);
-            let object = format!("material '{name}'");
-            let read = Reader { loader: self, document, object }.material(&name, material)?;
-            self.scene.materials.push(read);
-        }
-        // The material of primitives that name none.
-        self.default_material = self.scene.materials.len();
-        self.scene.materials.push(Material::layered("default", Vec3::ONE, Layers::default()));
-        Ok(())
+    /// A material by its number in the file; `None`: that of primitives that name none.
+    pub(super) fn read_material(&mut self, document: &Document, number: Option<usize>) -> Result<Material> {
+        let Some((number, material)) = number.and_then(|number| Some((number, document.as_json().materials.get(number)?))) else {
+            return Ok(Material::layered("default", Vec3::ONE, Layers::default()));
+        };
+        let name = named("material", material.name.as_deref(), number);
+        let object = format!("material '{name}'");
+        Reader { loader: self, document, object }.material(&name, material)
     }
 }
 
@@ -70,7 +67,6 @@ impl Reader<'_> {
     fn material(mut self, name: &str, json: &gltf::json::Material) -> Result<Material> {
         let no_extensions = Extensions::default();
         let extensions = json.extensions.as_ref().unwrap_or(&no_extensions);
-        self.name_what_is_left_out(json, extensions);
         let is_unlit = extensions.unlit.is_some();
         let pbr = &json.pbr_metallic_roughness;
         // Where a file has both models, it prefers this one.
@@ -94,6 +90,14 @@ impl Reader<'_> {
             },
             ..Material::lambert(name, base_colour)
         };
+        let is_gone = match read.coverage {
+            Coverage::Whole => false,
+            Coverage::Mask { alpha, cutoff } => alpha < cutoff,
+            Coverage::Blend { alpha } => alpha == 0.0,
+        };
+        if is_gone {
+            self.loader.leave_out("surfaces that are nowhere seen (their alpha is 0, or below the cutoff)", &self.object);
+        }
         if is_unlit {
             return Ok(Material { layers: Layers { is_unlit, ..Layers::default() }, ..read });
         }
@@ -123,7 +127,7 @@ impl Reader<'_> {
                 layers.metallic_roughness_texture = self.texture(pbr.metallic_roughness_texture.as_ref(), Meaning::Numbers)?;
             }
         }
-        if let Some(specular) = extensions.specular.as_ref().filter(|_| glossy.is_none()) {
+        if let Some(specular) = &extensions.specular {
             layers.specular = self.factor("specular factor", specular.specular_factor.0, 1.0)?;
             layers.specular_texture = self.texture(specular.specular_texture.as_ref(), Meaning::Numbers)?;
             layers.specular_colour = self.colour("specular colour", specular.specular_color_factor.0, ANY)?;
@@ -137,6 +141,10 @@ impl Reader<'_> {
             let medium = self.medium(volume)?;
             // No light goes into an opaque surface.
             layers.medium = medium.filter(|_| layers.transmission > 0.0);
+            // The index 0 stands for one without end: there is no angle of refraction, and but for a specular factor or colour no light.
+            if ior == 0.0 && layers.medium.take().is_some() {
+                self.loader.leave_out("volumes behind the ior 0 (nothing is refracted there; such a surface is a thin wall)", &self.object);
+            }
         }
         if let Some(coat) = self.extension::<ClearCoat>(extensions, "KHR_materials_clearcoat")? {
             layers.coat = self.factor("clear coat factor", coat.clearcoat_factor, 1.0)?;
@@ -158,21 +166,6 @@ impl Reader<'_> {
             layers,
             ..read
         })
-    }
-
-    fn name_what_is_left_out(&mut self, json: &gltf::json::Material, extensions: &Extensions) {
-        let has_thickness = extensions.volume.as_ref().is_some_and(|volume| volume.thickness_texture.is_some());
-        for (what, is_there) in [
-            ("occlusion textures (what they guess is computed)", json.occlusion_texture.is_some()),
-            ("thickness textures (rays measure the thickness)", has_thickness),
-        ] {
-            if is_there {
-                self.loader.leave_out(what, &self.object);
-            }
-        }
-        for extension in extensions.others.keys().filter(|name| !READ_EXTENSIONS.contains(&name.as_str())) {
-            self.loader.leave_out(format!("the extension {extension}"), &self.object);
-        }
     }
 
     /// A factor from 0 to `high`.
@@ -227,12 +220,17 @@ impl Reader<'_> {
             let count = self.document.textures().len();
             return Err(self.loader.refuse(&self.object, format!("uses texture {number} of {count}")));
         };
+        let Some(texture) = self.loader.texture_place(&texture, meaning) else {
+            return Err(self
+                .loader
+                .refuse(&self.object, format!("uses texture {number}, which has no PNG or JPEG picture; export it with one")));
+        };
         let set = transform.and_then(|transform| transform.tex_coord).unwrap_or(set);
         if set > 1 {
             self.loader.leave_out("texture coordinates beyond the second set (the first is used)", &self.object);
         }
         Ok(TextureUse {
-            texture: self.loader.texture_place(&texture, meaning),
+            texture,
             uv_set: if set == 1 { 1 } else { 0 },
             transform: transform.map_or(Ok(UvTransform::NONE), |transform| self.uv_transform(transform))?,
         })

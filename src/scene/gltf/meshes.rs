@@ -4,9 +4,9 @@ use std::collections::HashMap;
 use std::sync::Arc;
 
 use glam::{DMat3, DMat4, DVec2, DVec3, DVec4, Vec3, Vec4};
-use gltf::Semantic;
 use gltf::accessor::{DataType, Dimensions};
 use gltf::mesh::Mode;
+use gltf::{Document, Semantic};
 use rayon::prelude::*;
 
 use super::accessor::{self, Vertices};
@@ -63,7 +63,7 @@ impl Loader {
     }
 
     /// Takes note of a primitive if it makes triangles, and of what it has that is not read.
-    pub(super) fn list_primitive<'a>(&mut self, mut part: Part<'a>, parts: &mut Vec<Part<'a>>) -> Result<()> {
+    pub(super) fn list_primitive<'a>(&mut self, document: &Document, mut part: Part<'a>, parts: &mut Vec<Part<'a>>) -> Result<()> {
         let owner = format!("mesh '{}'", part.name);
         let primitive = &part.primitive;
         if matches!(primitive.mode(), Mode::Points | Mode::Lines | Mode::LineLoop | Mode::LineStrip) {
@@ -86,34 +86,41 @@ impl Loader {
         self.triangle_count = self.triangle_count.saturating_add(corners / 3).saturating_add(positions.count().min(corners) / 4);
         let reason = || format!("brings the scene over {MAX_TRIANGLES} triangles, the most that are read");
         self.require(self.triangle_count <= MAX_TRIANGLES, &part.what(), reason)?;
-        part.material = self.material_of(primitive, &owner);
+        part.material = self.material_of(document, primitive, &owner)?;
         parts.push(part);
         Ok(())
     }
 
     /// The place of a primitive's material; of one without those normal maps that it has no texture coordinates for.
-    fn material_of(&mut self, primitive: &gltf::Primitive, owner: &str) -> usize {
-        let place = primitive.material().index().unwrap_or(self.default_material);
+    fn material_of(&mut self, document: &Document, primitive: &gltf::Primitive, owner: &str) -> Result<usize> {
+        let number = primitive.material().index();
+        let mut material = match self.materials.get(&number) {
+            Some(material) => material.clone(),
+            None => {
+                let material = self.read_material(document, number)?;
+                self.materials.insert(number, material.clone());
+                material
+            }
+        };
         let lacks = |used: TextureUse| primitive.get(&Semantic::TexCoords(used.uv_set as u32)).is_none();
-        let mut material = self.scene.materials[place].clone();
         let named = format!("material '{}' on {owner}", material.name);
         let maps = [&mut material.normal_map, &mut material.layers.coat_normal_map];
         let is_useless = maps.map(|map| map.take_if(|map| lacks(map.texture)).is_some());
         if material.textures().any(lacks) {
             self.leave_out("texture coordinates that a mesh has not (its textures have their value at 0 0)", &named);
         }
-        if is_useless == [false; 2] {
-            return place;
+        if is_useless != [false; 2] {
+            self.leave_out("normal maps on meshes without texture coordinates", &named);
         }
-        self.leave_out("normal maps on meshes without texture coordinates", &named);
         let materials = &mut self.scene.materials;
-        *self.without_normal_maps.entry((place, is_useless)).or_insert_with(|| {
+        Ok(*self.material_places.entry((number, is_useless)).or_insert_with(|| {
             materials.push(material);
             materials.len() - 1
-        })
+        }))
     }
 
-    pub(super) fn read_primitive(&self, part: &Part) -> Result<Mesh> {
+    /// And whether a normal map of it turns normals in any direction, as nothing says in which.
+    pub(super) fn read_primitive(&self, part: &Part) -> Result<(Mesh, bool)> {
         let Part { primitive, name, to_world, .. } = part;
         let what = part.what();
         let positions = primitive.get(&Semantic::Positions).expect("what is listed has positions");
@@ -155,7 +162,7 @@ impl Loader {
                 of_vertices(&coordinates, "texture coordinates")?;
                 *uvs = accessor::read(self, &coordinates, &vertices, &what, |[u, v]: [f32; 2]| DVec2::new(f64::from(u), f64::from(v)))?;
                 if let Some(uv) = uvs.iter().find(|uv| uv.is_nan() || uv.abs().max_element() > MAX_UV) {
-                    return Err(self.refuse(&what, format!("has the texture coordinates {uv}; they must be within {MAX_UV:e}")));
+                    return Err(self.refuse(&what, format!("has the texture coordinates {}; they must be within {MAX_UV:e}", uv.as_vec2())));
                 }
             }
         }
@@ -175,13 +182,17 @@ impl Loader {
             of_file = Some(directions.iter().zip(&own).map(|(direction, own)| direction.extend(own.w)).collect());
         }
         let surface = Surface { positions: &positions, normals: &normals, triangles: &triangles };
+        let mut is_turned_anyhow = false;
         let tangents = |map: Option<TextureUse>| match (map, &of_file) {
             (None, _) => Vec::new(),
             // The file's are those of the first map.
             (Some(map), Some(tangents)) if maps[0].is_none_or(|first| first.has_coordinates_of(&map)) => {
                 triangles.iter().map(|triangle| triangle.map(|vertex| tangents[vertex as usize])).collect()
             }
-            (Some(map), _) => surface.tangents(&uvs[map.uv_set], map.transform),
+            (Some(map), _) => {
+                is_turned_anyhow |= !surface.has_directions(&uvs[map.uv_set], map.transform);
+                surface.tangents(&uvs[map.uv_set], map.transform)
+            }
         };
         let mut tangents = maps.map(tangents);
 
@@ -211,18 +222,9 @@ impl Loader {
                     .unzip(),
             };
         }
-        Ok(Mesh {
-            name: name.clone(),
-            positions,
-            normals,
-            uvs,
-            colours,
-            alphas,
-            tangents,
-            coat_tangents,
-            triangles,
-            material: part.material,
-        })
+        let (name, material) = (name.clone(), part.material);
+        let mesh = Mesh { name, positions, normals, uvs, colours, alphas, tangents, coat_tangents, triangles, material };
+        Ok((mesh, is_turned_anyhow))
     }
 
     /// Indices into those of the vertices that the primitive uses, as many primitives may share one list of vertices;

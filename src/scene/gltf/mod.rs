@@ -12,6 +12,7 @@ mod materials;
 mod meshes;
 mod tangents;
 mod textures;
+mod unread;
 
 use std::collections::hash_map::Entry;
 use std::collections::{BTreeMap, BTreeSet, HashMap};
@@ -21,11 +22,11 @@ use std::sync::Arc;
 use base64::Engine;
 use base64::engine::general_purpose::STANDARD as BASE64;
 use glam::DMat4;
-use gltf::{Document, Gltf};
+use gltf::Document;
 use rayon::prelude::*;
 
 use super::light::LUMENS_PER_WATT;
-use super::{Mesh, Progress, Scene};
+use super::{Material, Mesh, Progress, Scene};
 use crate::error::{Error, Result};
 use crate::text::{counted, refusal, some_of};
 use meshes::Part;
@@ -65,10 +66,11 @@ pub fn load(path: &Path, radiometric: bool, progress: Progress) -> Result<Scene>
     let content = read_file(path).map_err(refuse)?;
     // The mark that some editors write in front of a text.
     let content = content.strip_prefix(b"\xef\xbb\xbf").unwrap_or(&content);
-    malformed::binary_length(content).map_err(refuse)?;
-    let Gltf { document, blob } =
-        Gltf::from_slice_without_validation(content).map_err(|error| refuse(format!("is not valid glTF: {error}")))?;
-    let mut root = document.into_json();
+    let malformed::Parts { json: text, binary } = malformed::parts(content).map_err(refuse)?;
+    let mut json = malformed::json(&text).map_err(refuse)?;
+    let mut left_out = LeftOut::default();
+    unread::take_out(&mut json, &mut left_out);
+    let mut root = malformed::root(json).map_err(refuse)?;
     let version = root.asset.version.as_str();
     if !version.starts_with("2.") {
         return Err(refuse(format!("is of glTF version {version}; 2.0 is read")));
@@ -84,31 +86,33 @@ pub fn load(path: &Path, radiometric: bool, progress: Progress) -> Result<Scene>
     // The crate knows fewer of them.
     root.extensions_required.clear();
     malformed::missing_members(&root).map_err(refuse)?;
-    let document =
-        Document::from_json(root).map_err(|error| refuse(format!("is not valid glTF: {error}").replace("invalid glTF: ", "")))?;
+    malformed::faults(&root, &text).map_err(refuse)?;
+    let document = Document::from_json_without_validation(root);
     let mut loader = Loader {
         path: path.to_owned(),
         file_bytes: content.len(),
         buffers: Vec::new(),
         scene: Scene {
-            name: path.file_stem().unwrap_or_default().to_string_lossy().into_owned(),
+            name: printable(&path.file_stem().unwrap_or_default().to_string_lossy()),
             extensions: document.extensions_used().map(printable).collect(),
             ..Scene::default()
         },
-        left_out: BTreeMap::new(),
+        left_out,
         triangle_count: 0,
         wanted_textures: Vec::new(),
         texture_places: HashMap::new(),
-        default_material: 0,
-        without_normal_maps: HashMap::new(),
+        materials: HashMap::new(),
+        material_places: HashMap::new(),
         is_quantized: document.extensions_used().any(|extension| extension == "KHR_mesh_quantization"),
         unit: if radiometric { 1.0 } else { 1.0 / LUMENS_PER_WATT },
     };
-    loader.read_buffers(&document, blob)?;
-    loader.read_materials(&document)?;
+    loader.read_buffers(&document, binary)?;
+    let parts = loader.read_nodes(&document)?;
     loader.read_textures(&document, progress)?;
-    loader.read_nodes(&document, progress)?;
-    loader.name_what_is_left_out(&document);
+    loader.read_meshes(&parts, progress)?;
+    for extension in document.extensions_used().filter(|extension| !READ_EXTENSIONS.contains(extension)) {
+        loader.leave_out(format!("the extension {extension}"), "");
+    }
     loader.finish()
 }
 
@@ -122,9 +126,13 @@ fn remedy(extension: &str) -> &'static str {
     }
 }
 
-/// A name without line breaks and other control characters.
+/// A name without line breaks and other control characters, nor those that are not seen and change the order of what is.
 fn printable(name: &str) -> String {
-    name.chars().map(|letter| if letter.is_control() { ' ' } else { letter }).collect()
+    let is_unseen = |letter: char| {
+        letter.is_control()
+            || matches!(letter, '\u{61c}' | '\u{200b}'..='\u{200f}' | '\u{2028}'..='\u{202e}' | '\u{2060}'..='\u{206f}' | '\u{feff}')
+    };
+    name.chars().map(|letter| if is_unseen(letter) { ' ' } else { letter }).collect()
 }
 
 /// What a file or a decoder says, without its line breaks.
@@ -145,23 +153,36 @@ fn read_file(path: &Path) -> std::result::Result<Vec<u8>, String> {
     std::fs::read(path).map_err(unreadable)
 }
 
+/// What the file holds and the scene does not, and which materials, meshes, ... have it.
+#[derive(Default)]
+struct LeftOut(BTreeMap<String, BTreeSet<String>>);
+
+impl LeftOut {
+    /// `owner`: what has it, as `material 'glow'`; empty for the file itself.
+    fn add(&mut self, what: impl Into<String>, owner: &str) {
+        let owners = self.0.entry(one_line(&what.into())).or_default();
+        if !owner.is_empty() {
+            owners.insert(owner.to_owned());
+        }
+    }
+}
+
 /// A file being read.
 pub(super) struct Loader {
     path: PathBuf,
     file_bytes: usize,
     buffers: Vec<Vec<u8>>,
     scene: Scene,
-    /// What the file holds and the scene does not, and which materials, meshes, ... have it.
-    left_out: BTreeMap<String, BTreeSet<String>>,
+    left_out: LeftOut,
     /// Triangles and vertices of all instances so far.
     triangle_count: usize,
     /// The scene's textures, in order.
     wanted_textures: Vec<Wanted>,
     texture_places: HashMap<Wanted, usize>,
-    /// The place of the material of primitives that name none.
-    default_material: usize,
-    /// Places of copies of a material, by its place and which of its two normal maps they are without.
-    without_normal_maps: HashMap<(usize, [bool; 2]), usize>,
+    /// Materials that meshes use, by their number in the file; `None`: that of primitives that name none.
+    materials: HashMap<Option<usize>, Material>,
+    /// Their places in the scene, by which of their two normal maps they are without.
+    material_places: HashMap<(Option<usize>, [bool; 2]), usize>,
     /// Whether the file says that vertices may be whole numbers.
     is_quantized: bool,
     /// Watts in one unit of a punctual light.
@@ -179,12 +200,8 @@ impl Loader {
         if is_so { Ok(()) } else { Err(self.refuse(object, reason())) }
     }
 
-    /// `owner`: what has it, as `material 'glow'`; empty for the file itself.
     fn leave_out(&mut self, what: impl Into<String>, owner: &str) {
-        let owners = self.left_out.entry(one_line(&what.into())).or_default();
-        if !owner.is_empty() {
-            owners.insert(owner.to_owned());
-        }
+        self.left_out.add(what, owner);
     }
 
     fn read_buffers(&mut self, document: &Document, mut blob: Option<Vec<u8>>) -> Result<()> {
@@ -220,7 +237,8 @@ impl Loader {
         read_file(&place).map_err(|reason| self.refuse(what, format!("lies at {uri}, which {reason}")))
     }
 
-    fn read_nodes(&mut self, document: &Document, progress: Progress) -> Result<()> {
+    /// Reads cameras, lights and the materials of the primitives that it lists.
+    fn read_nodes<'a>(&mut self, document: &'a Document) -> Result<Vec<Part<'a>>> {
         let Some(scene) = document.default_scene().or_else(|| document.scenes().next()) else {
             return Err(self.refuse("the file", "holds no scene"));
         };
@@ -238,7 +256,7 @@ impl Loader {
             let what = node_name(node);
             let own = to_world[&node.index()];
             if let Some(mesh) = node.mesh() {
-                let name = node.name().or(mesh.name()).map_or_else(|| format!("mesh {}", mesh.index()), printable);
+                let name = named("mesh", node.name().or(mesh.name()), mesh.index());
                 let skin = match node.skin() {
                     Some(skin) => Some(match skins.entry(skin.index()) {
                         Entry::Occupied(known) => Arc::clone(known.get()),
@@ -249,8 +267,7 @@ impl Loader {
                 let weights = node.weights().or(mesh.weights()).unwrap_or_default().to_vec();
                 for primitive in mesh.primitives() {
                     let (name, skin, weights) = (name.clone(), skin.clone(), weights.clone());
-                    let part = Part { primitive, name, to_world: own, skin, weights, material: self.default_material };
-                    self.list_primitive(part, &mut parts)?;
+                    self.list_primitive(document, Part { primitive, name, to_world: own, skin, weights, material: 0 }, &mut parts)?;
                 }
             }
             if let Some(camera) = node.camera() {
@@ -260,11 +277,20 @@ impl Loader {
                 self.read_light(&light, &what, own)?;
             }
         }
+        Ok(parts)
+    }
+
+    fn read_meshes(&mut self, parts: &[Part], progress: Progress) -> Result<()> {
         for batch in parts.chunks((parts.len() / 100).max(16 * rayon::current_num_threads())) {
             progress("reading meshes", self.scene.meshes.len() as f64 / parts.len() as f64);
-            let read: Vec<Result<Mesh>> = batch.par_iter().map(|part| self.read_primitive(part)).collect();
-            for mesh in read {
-                self.scene.meshes.push(mesh?);
+            let read: Vec<Result<(Mesh, bool)>> = batch.par_iter().map(|part| self.read_primitive(part)).collect();
+            for read in read {
+                let (mesh, is_turned_anyhow) = read?;
+                if is_turned_anyhow {
+                    let owner = format!("material '{}' on mesh '{}'", self.scene.materials[mesh.material].name, mesh.name);
+                    self.leave_out("that normal maps lie on meshes without tangents (they turn normals in any direction)", &owner);
+                }
+                self.scene.meshes.push(mesh);
             }
         }
         Ok(())
@@ -288,15 +314,6 @@ impl Loader {
         self.require(is_new, &what, || "has two parents; a node has one place in a scene".into())?;
         nodes.push(node.clone());
         node.children().try_for_each(|child| self.place_node(child, own, depth + 1, nodes, to_world))
-    }
-
-    fn name_what_is_left_out(&mut self, document: &Document) {
-        if document.animations().len() > 0 {
-            self.leave_out("animations", "");
-        }
-        for extension in document.extensions_used().filter(|extension| !READ_EXTENSIONS.contains(extension)) {
-            self.leave_out(format!("the extension {extension}"), "");
-        }
     }
 
     /// Meshes that bound a medium and are not closed, alone or with others of their material.
@@ -339,12 +356,12 @@ impl Loader {
             let count: usize = dropped.iter().sum();
             self.scene.warnings.push(format!("{} without area left out ({})", counted(count, "triangle"), some_of(flat.iter())));
         }
-        if !self.left_out.is_empty() {
+        if !self.left_out.0.is_empty() {
             let named = |(what, owners): (&String, &BTreeSet<String>)| match owners.is_empty() {
                 true => what.clone(),
                 false => format!("{what}: {}", some_of(owners.iter())),
             };
-            let list: Vec<String> = self.left_out.iter().map(named).collect();
+            let list: Vec<String> = self.left_out.0.iter().map(named).collect();
             self.scene.warnings.push(format!("ignored: {}", list.join("; ")));
         }
         Ok(self.scene)
@@ -353,6 +370,11 @@ impl Loader {
 
 fn node_name(node: &gltf::Node) -> String {
     called("node", node.name(), node.index())
+}
+
+/// An object's name, or its kind and number.
+fn named(kind: &str, name: Option<&str>, number: usize) -> String {
+    name.map_or_else(|| format!("{kind} {number}"), printable)
 }
 
 /// An object in complaints: its name, or its number.

@@ -11,6 +11,8 @@ use crate::scene::material::UvTransform;
 /// A vertex of more triangles than that has tangents of each triangle's own: the crate's time grows with the square of that
 /// number, and its stack with the number.
 const MAX_TRIANGLES_OF_VERTEX: u32 = 1000;
+/// Sine of the smallest angle of a triangle in the picture: of less no direction is known.
+const MIN_ANGLE: f64 = 1e-6;
 /// Of a unit tangent, what must be left of it beside the normal.
 const MIN_BESIDE_NORMAL: f64 = 1e-6;
 
@@ -39,6 +41,16 @@ impl Surface<'_> {
     fn normal_of_triangle(&self, triangle: usize) -> DVec3 {
         let [a, b, c] = self.triangles[triangle].map(|vertex| self.positions[vertex as usize]);
         (b - a).cross(c - a)
+    }
+
+    /// Whether texture coordinates tell on any triangle where u and v grow: not if they lie in one place or on a line.
+    pub(super) fn has_directions(&self, uvs: &[DVec2], transform: UvTransform) -> bool {
+        self.triangles.is_empty()
+            || self.triangles.iter().any(|triangle| {
+                let [a, b, c] = triangle.map(|vertex| transform.apply(uvs[vertex as usize]));
+                let (s, t) = (b - a, c - a);
+                s.perp_dot(t).abs() > MIN_ANGLE * s.length() * t.length()
+            })
     }
 
     /// MikkTSpace's tangents of all corners, not always of unit length. Those without one are 0.

@@ -48,8 +48,8 @@ struct Encoded<'a> {
 }
 
 impl Loader {
-    /// Place in the scene of a texture of the file, read in one way. Uses that are the same share it.
-    pub(super) fn texture_place(&mut self, texture: &gltf::Texture, meaning: Meaning) -> usize {
+    /// Place in the scene of a texture of the file, read in one way; `None` if it has no picture. Uses that are the same share it.
+    pub(super) fn texture_place(&mut self, texture: &gltf::Texture, meaning: Meaning) -> Option<usize> {
         let wrap = |mode: WrappingMode| match mode {
             WrappingMode::ClampToEdge => Wrap::Clamp,
             WrappingMode::MirroredRepeat => Wrap::MirroredRepeat,
@@ -57,15 +57,15 @@ impl Loader {
         };
         let sampler = texture.sampler();
         let wanted = Wanted {
-            image: texture.source().index(),
+            image: texture.source()?.index(),
             wrap: [wrap(sampler.wrap_s()), wrap(sampler.wrap_t())],
             filter: if sampler.mag_filter() == Some(MagFilter::Nearest) { Filter::Nearest } else { Filter::Bilinear },
             meaning,
         };
-        *self.texture_places.entry(wanted).or_insert_with(|| {
+        Some(*self.texture_places.entry(wanted).or_insert_with(|| {
             self.wanted_textures.push(wanted);
             self.wanted_textures.len() - 1
-        })
+        }))
     }
 
     /// Decodes every picture that materials use.

@@ -1,0 +1,146 @@
+//! Takes out of a file's JSON what no mesh of the scene uses and what is not read, so that no mistake in these refuses the file.
+
+use std::collections::BTreeSet;
+
+use gltf::json::texture::{VALID_MAG_FILTERS, VALID_MIN_FILTERS};
+use serde_json::{Value, json};
+
+use super::{LeftOut, READ_EXTENSIONS, called, named};
+use crate::text::echo;
+
+const SPEC_GLOSS: &str = "KHR_materials_pbrSpecularGlossiness";
+/// Each of these says that it must not stand beside [`SPEC_GLOSS`].
+const NOT_BESIDE_SPEC_GLOSS: [&str; 6] = [
+    "KHR_materials_clearcoat",
+    "KHR_materials_ior",
+    "KHR_materials_sheen",
+    "KHR_materials_specular",
+    "KHR_materials_transmission",
+    "KHR_materials_volume",
+];
+
+/// Lists keep their length, as their members are named by numbers.
+pub(super) fn take_out(root: &mut Value, left_out: &mut LeftOut) {
+    let animations = root.as_object_mut().and_then(|root| root.remove("animations"));
+    if animations.is_some_and(|animations| items(&animations).next().is_some()) {
+        left_out.add("animations", "");
+    }
+    let nodes = nodes_of_scene(root);
+    let mut materials = BTreeSet::new();
+    for node in nodes {
+        let json = &root["nodes"][node];
+        name_unread_extensions(json, &called("node", json["name"].as_str(), node), left_out);
+        let Some(mesh) = number(&json["mesh"]) else { continue };
+        let name = json["name"].as_str().or(root["meshes"][mesh]["name"].as_str());
+        let owner = format!("mesh '{}'", named("mesh", name, mesh));
+        for primitive in items(&root["meshes"][mesh]["primitives"]) {
+            materials.extend(number(&primitive["material"]));
+            name_unread_extensions(primitive, &owner, left_out);
+            let mut shifted = items(&primitive["targets"]).flat_map(|target| target.as_object().into_iter().flatten());
+            if shifted.any(|(name, _)| name.starts_with("TEXCOORD_") || name.starts_with("COLOR_")) {
+                left_out.add("texture coordinates and colours of morph targets", &owner);
+            }
+        }
+    }
+    let mut textures = BTreeSet::new();
+    for (place, material) in items_mut(root, "materials") {
+        let owner = format!("material '{}'", named("material", material["name"].as_str(), place));
+        if materials.contains(&place) {
+            take_out_of_material(material, &owner, left_out);
+            find_textures(material, &mut textures);
+        } else {
+            left_out.add("materials on no mesh", &owner);
+            *material = json!({});
+        }
+    }
+    let of_textures =
+        |member: &str| -> BTreeSet<usize> { textures.iter().filter_map(|texture| number(&root["textures"][*texture][member])).collect() };
+    let (images, samplers) = (of_textures("source"), of_textures("sampler"));
+    for (list, used, blank) in
+        [("textures", &textures, json!({})), ("images", &images, json!({"uri": ""})), ("samplers", &samplers, json!({}))]
+    {
+        for (_, unused) in items_mut(root, list).filter(|(place, _)| !used.contains(place)) {
+            *unused = blank.clone();
+        }
+    }
+    for (place, sampler) in items_mut(root, "samplers") {
+        for (member, allowed) in [("magFilter", VALID_MAG_FILTERS), ("minFilter", VALID_MIN_FILTERS)] {
+            let is_valid = |value: &Value| allowed.iter().any(|allowed| value.as_u64() == Some(u64::from(*allowed)));
+            let Some(filter) = sampler.get(member).filter(|filter| !is_valid(filter)) else { continue };
+            let what = format!("filters of samplers that glTF does not have ({member} must be one of {allowed:?})");
+            left_out.add(what, &format!("sampler {place} with {}", echo(filter)));
+            take(sampler, "", member);
+        }
+    }
+}
+
+fn nodes_of_scene(root: &Value) -> BTreeSet<usize> {
+    let scene = number(&root["scene"]).unwrap_or(0);
+    let mut found = BTreeSet::new();
+    let mut next: Vec<usize> = items(&root["scenes"][scene]["nodes"]).filter_map(number).collect();
+    while let Some(node) = next.pop() {
+        if found.insert(node) {
+            next.extend(items(&root["nodes"][node]["children"]).filter_map(number));
+        }
+    }
+    found
+}
+
+fn take_out_of_material(material: &mut Value, owner: &str, left_out: &mut LeftOut) {
+    if take(material, "", "occlusionTexture") {
+        left_out.add("occlusion textures (what they guess is computed)", owner);
+    }
+    if take(material, "/extensions/KHR_materials_volume", "thicknessTexture") {
+        left_out.add("thickness textures (rays measure the thickness)", owner);
+    }
+    name_unread_extensions(material, owner, left_out);
+    let Some(extensions) = material.get_mut("extensions").and_then(Value::as_object_mut) else { return };
+    extensions.retain(|name, _| is_read(name));
+    if extensions.contains_key(SPEC_GLOSS) && !extensions.contains_key("KHR_materials_unlit") {
+        for name in NOT_BESIDE_SPEC_GLOSS {
+            if extensions.remove(name).is_some() {
+                left_out.add(format!("the extension {name} beside {SPEC_GLOSS}, where glTF forbids it"), owner);
+            }
+        }
+        // What it stands in for.
+        take(material, "", "pbrMetallicRoughness");
+    }
+}
+
+fn name_unread_extensions(object: &Value, owner: &str, left_out: &mut LeftOut) {
+    for name in object["extensions"].as_object().into_iter().flat_map(|extensions| extensions.keys()).filter(|name| !is_read(name)) {
+        left_out.add(format!("the extension {name}"), owner);
+    }
+}
+
+fn is_read(extension: &str) -> bool {
+    READ_EXTENSIONS.contains(&extension)
+}
+
+/// The numbers of all textures that a material names.
+fn find_textures(value: &Value, found: &mut BTreeSet<usize>) {
+    for (name, member) in value.as_object().into_iter().flatten() {
+        if name.ends_with("Texture") {
+            found.extend(number(&member["index"]));
+        }
+        find_textures(member, found);
+    }
+}
+
+fn number(value: &Value) -> Option<usize> {
+    value.as_u64().and_then(|number| number.try_into().ok())
+}
+
+fn items(list: &Value) -> impl Iterator<Item = &Value> {
+    list.as_array().into_iter().flatten()
+}
+
+/// With their places.
+fn items_mut<'a>(root: &'a mut Value, list: &str) -> impl Iterator<Item = (usize, &'a mut Value)> + use<'a> {
+    root.get_mut(list).and_then(Value::as_array_mut).into_iter().flatten().enumerate()
+}
+
+/// Whether it was there.
+fn take(value: &mut Value, pointer: &str, member: &str) -> bool {
+    value.pointer_mut(pointer).and_then(Value::as_object_mut).and_then(|object| object.remove(member)).is_some()
+}
