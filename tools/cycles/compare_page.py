@@ -1,6 +1,6 @@
 """compare_page.py PICTURES REFS OUT.html: photonmill's pictures beside Cycles' references, as one page.
 
-PICTURES holds NAME.sky.exr, NAME.lamp.exr and NAME.sun.exr:
+PICTURES holds NAME.sky.exr, NAME.lamp.exr, NAME.sun.exr, and NAME.own.exr of files under their own light:
 
     photonmill render NAME.glb      --size 96x96 --error 1% --environment 1    -o PICTURES/NAME.sky.exr
     photonmill render NAME.lamp.glb --size 96x96 --error 1%                    -o PICTURES/NAME.lamp.exr
@@ -25,7 +25,7 @@ import sys
 import numpy as np
 
 MEANS, BLOCKS, HIGHLIGHTS = 0.03, 0.08, 0.15
-LIGHTS = ("sky", "lamp", "sun")
+LIGHTS = (".sky", ".lamp", ".sun", ".own")
 SHOWN = 288  # pixels of a picture on the page
 
 
@@ -81,7 +81,7 @@ def main(pictures, references, out):
     rows, shown, wrong = [], [], 0
     names = sorted(os.path.basename(path)[:-4] for path in glob.glob(references + "/*.npz"))
     names = [name for name in names if name.endswith(LIGHTS)]
-    names.sort(key=lambda name: (name.rsplit(".", 1)[0], LIGHTS.index(name.rsplit(".", 1)[1])))
+    names.sort(key=lambda name: (name.rsplit(".", 1)[0], LIGHTS.index(name[name.rindex("."):])))
     for name in names:
         reference = dict(np.load(f"{references}/{name}.npz"))
         image, noise, path = reference["image"].astype(float), reference["noise"], f"{pictures}/{name}.exr"

@@ -13,18 +13,23 @@ Cycles' own GGX, diffuse, refraction, textures, normal maps and light transport 
     transmission takes the root of the base colour     the base colour
     a volume absorbs (1 - colour) / distance           -ln(colour) / distance
     backs are shown                                    not to the camera if single-sided, and black to all other rays
+    sheen by fitted linear cosines                     Estevez and Kulla's
     unlit surfaces let light pass                      stop it
-    normals are bent where they reflect into the       light that would go there is lost
-    surface
+    normals are bent where they reflect into the       light that would go there is lost, but for what mirrors and clear
+    surface                                            glass without normal maps reflect
     8-bit colours are filtered before decoding         after
 
 Cycles does not tell a material where light comes from. So n.l of K and of the coat is that of the reference lamp of with_lamp.py. The
 sky's and the indirect light get the lamp's factor too, where they should get one that is 1 in the mean. It is at most 1.1, and falls
 to 0 where the lamp's light grazes. Without a reference lamp it is 1.
 
-What stays different: a rough thin wall transmits as a smooth one; mirrors show the backs of single-sided surfaces black. Sheen is
-refused. The importer ignores iridescence and dispersion.
+Sheen where the lamp shines is a diffuse closure that has its value towards the lamp, for indirect light too. Other sheen and rough thin
+walls are ray portals with a direction by chance: only paths find lamps there, no shadow rays.
+
+What stays different: mirrors show the backs of single-sided surfaces black. The importer ignores iridescence and dispersion.
 """
+
+import math
 
 import bpy
 import numpy as np
@@ -63,6 +68,32 @@ def albedos():
     return a, b
 
 
+def sheens():
+    """l[roughness, cosine] of the guide's masking, the albedo of white sheen, and 2 * integral over c of the larger one of the albedo, at
+    most 1, at c and at the cosine, times c."""
+    steps = np.arange(TABLE + 1) / TABLE
+    height, turn = np.meshgrid((np.arange(256) + 0.5) / 256, (np.arange(128) + 0.5) / 128 * np.pi, indexing="ij")
+    masking = np.zeros((TABLE + 1, TABLE + 1))
+    albedo = np.zeros_like(masking)
+    for row, roughness in enumerate(steps):
+        s = max(roughness**2, 0.01)
+        p = np.array([25.3245, 3.32435, 0.16801, -1.27393, -4.85967]) * (1 - s) ** 2
+        p += np.array([21.5473, 3.82987, 0.19823, -1.97760, -4.32054]) * (1 - (1 - s) ** 2)
+        small = lambda x: p[0] / (1 + p[1] * x ** p[2]) + p[3] * x + p[4]
+        l = lambda x: np.where(x < 0.5, small(x), 2 * small(0.5) - small(1 - x))
+        masking[row] = l(steps)
+        for column, cosine in enumerate(np.maximum(steps, 1e-3)):
+            half = height + cosine, np.sqrt(1 - height**2) * np.cos(turn) + np.sqrt(1 - cosine**2), np.sqrt(1 - height**2) * np.sin(turn)
+            aside = np.clip(1 - half[0] ** 2 / (half[0] ** 2 + half[1] ** 2 + half[2] ** 2), 0, 1)
+            d = (2 + 1 / s) * aside ** (0.5 / s) / (2 * np.pi)
+            v = 1 / ((1 + np.exp(l(height)) + np.exp(l(cosine))) * 4 * cosine)  # times n.l
+            albedo[row, column] = (d * v).mean() * 2 * np.pi
+    weight = 2 * steps / TABLE
+    weight[-1] /= 2
+    least = np.minimum(albedo, 1)
+    return masking, albedo, np.maximum(least[:, :, None], least[:, None, :]) @ weight
+
+
 def image_of(name, *channels):
     """A float image that holds the arrays as its red, green and blue."""
     height, width = channels[0].shape
@@ -84,7 +115,8 @@ def tables():
     weight[-1] /= 2
     mean = [np.repeat((table @ weight)[:, None], TABLE + 1, 1) for table in (a, b)]
     pairs = [np.einsum("ic,jc,c->ij", one, other, weight) for one, other in ((a, a), (a, b), (b, b))]
-    return {"AB": image_of("AB", a, b), "mean": image_of("mean", *mean), "pairs": image_of("pairs", *pairs)}
+    return {"AB": image_of("AB", a, b), "mean": image_of("mean", *mean), "pairs": image_of("pairs", *pairs),
+            "sheen": image_of("sheen", *sheens())}
 
 
 # ---- Node trees as arithmetic
@@ -122,6 +154,7 @@ class Value:
     __sub__ = lambda self, other: self.operate("SUBTRACT", other)
     __rsub__ = lambda self, other: Value(self.graph, other).operate("SUBTRACT", self)
     __truediv__ = lambda self, other: self.operate("DIVIDE", other)
+    __rtruediv__ = lambda self, other: Value(self.graph, other).operate("DIVIDE", self)
     least = lambda self, other: self.operate("MINIMUM", other)
     most = lambda self, other: self.operate("MAXIMUM", other)
     power = lambda self, other: self.operate("POWER", other)
@@ -206,16 +239,49 @@ def backs(graph, closure):
     return graph.mix(graph.read("ShaderNodeNewGeometry", "Backfacing"), hidden, closure)
 
 
+def chance(graph):
+    """Three numbers by chance: a hash of the place that a ray meets."""
+    noise = graph.node("ShaderNodeTexWhiteNoise", noise_dimensions="3D")
+    graph.read("ShaderNodeNewGeometry", "Position").into(noise.inputs["Vector"])
+    return Value(graph, noise.outputs["Color"]).parts()
+
+
+def around(normal, turn, height):
+    """The direction of that height over a plane; turn from 0 to 1."""
+    across = normal.operate("CROSS_PRODUCT", (0.36, 0.48, 0.8)).operate("NORMALIZE")
+    up = normal.operate("CROSS_PRODUCT", across)
+    sine, turn = (1.0 - height * height).most(0.0).power(0.5), turn * (2 * math.pi)
+    return across * (sine * turn.operate("COSINE")) + up * (sine * turn.operate("SINE")) + normal * height
+
+
+def portal(graph, colour, roughness, normal, eye, f0, specular):
+    """A rough thin wall: a half vector out of those that the eye sees (Dupuy and Benyoub 2023), and the direction that it sends light to."""
+    u1, u2, _ = chance(graph)
+    dot = lambda a, b: a.operate("DOT_PRODUCT", b)
+    alpha = roughness * roughness
+    stretched = lambda v: v * alpha + normal * (dot(v, normal) * (1.0 - alpha))
+    seen = stretched(eye).operate("NORMALIZE")
+    cap = around(normal, u1, (1.0 - u2) * (1.0 + dot(seen, normal)) - dot(seen, normal))
+    half = stretched(cap + seen).operate("NORMALIZE")
+    cosine = dot(eye, half)
+    light = half * (cosine * 2.0) - eye
+    height = dot(light, normal)
+    smith = lambda c: ((1.0 + alpha * alpha * (1.0 / (c * c).most(1e-12) - 1.0)).power(0.5) - 1.0) * 0.5
+    one = 1.0 + smith(dot(eye, normal))
+    kept = height.operate("GREATER_THAN", 0.0) * one / (one + smith(height))
+    schlick = f0 + (1.0 - f0) * (1.0 - cosine).most(0.0).power(5.0)
+    return graph.shader("ShaderNodeBsdfRayPortal", Color=colour * (1.0 - specular * schlick) * kept,
+                        Direction=light - normal * (height * 2.0))
+
+
 def principled(graph, node, solid, single_sided, lamp):
-    """The closure of the guide's lobes for an imported Principled BSDF. `lamp` is the reference lamp's place, or None."""
+    """The closure of the guide's lobes for an imported Principled BSDF. `lamp` is as in as_in_the_guide."""
     get = lambda name: graph.input(node.inputs[name])
-    if node.inputs["Sheen Weight"].default_value > 0:
-        raise ValueError("sheen is not supported")
     colour, metal, roughness, t = get("Base Color"), get("Metallic"), get("Roughness"), get("Transmission Weight")
     coat, coat_roughness, specular = get("Coat Weight"), get("Coat Roughness"), get("Specular IOR Level") * 2.0
     ior = node.inputs["IOR"].default_value
     has = lambda name: node.inputs[name].is_linked or node.inputs[name].default_value > 0
-    has_coat, transmits = has("Coat Weight"), has("Transmission Weight")
+    has_coat, transmits, has_sheen = has("Coat Weight"), has("Transmission Weight"), has("Sheen Weight")
 
     normal_of = lambda name: get(name) if node.inputs[name].is_linked else None
     plain_normal = graph.read("ShaderNodeNewGeometry", "Normal")
@@ -241,7 +307,9 @@ def principled(graph, node, solid, single_sided, lamp):
     if has_coat:
         kept = kept * dimmed
     if lamp is not None:
-        towards = (Value(graph, tuple(lamp)) - graph.read("ShaderNodeNewGeometry", "Position")).operate("NORMALIZE")
+        towards = Value(graph, tuple(lamp)[:3])
+        if len(lamp) == 3:
+            towards = (towards - graph.read("ShaderNodeNewGeometry", "Position")).operate("NORMALIZE")
         light, coat_light = facing(normal, towards), facing(coat_normal, towards)
         lit = light.operate("GREATER_THAN", 0.0)
         factor = under_reflection(light.most(0.0))
@@ -249,13 +317,38 @@ def principled(graph, node, solid, single_sided, lamp):
         mean = 1.0 - specular * (f0.largest() * a + b)
         if has_coat:
             coat_dimmed = under_coat(coat_light.most(0.0))
-            factor, dimmed = factor * coat_dimmed, dimmed.least(coat_dimmed)
+            # Where the lamp does not shine, what comes from elsewhere is dimmed by the eye's angle alone.
+            factor, dimmed = factor * coat_dimmed, dimmed + lit * (dimmed.least(coat_dimmed) - dimmed)
             a1, b1, _ = graph.look_up("mean", Value(graph, 0.5), coat_roughness)
             aa, ab, bb = graph.look_up("pairs", coat_roughness, roughness)
             _, ba, _ = graph.look_up("pairs", roughness, coat_roughness)
             both = f0.largest() * (aa * 0.04 + ab) + ba * 0.04 + bb
             mean = mean - coat * (a1 * 0.04 + b1) + coat * specular * both
         kept = kept * (1.0 + lit * (factor / mean - 1.0))
+
+    if has_sheen:
+        cloth, cloth_roughness = get("Sheen Tint") * get("Sheen Weight"), get("Sheen Roughness")
+        masking, albedo, largest = graph.look_up("sheen", view, cloth_roughness)
+
+        def sheen(direction, cosine):
+            """Without its colour, and what is left of its albedo."""
+            masking_there, albedo_there, _ = graph.look_up("sheen", cosine, cloth_roughness)
+            s = (cloth_roughness * cloth_roughness).most(0.01)
+            half = facing(normal, (eye + direction).operate("NORMALIZE"))
+            d = (2.0 + 1.0 / s) * (1.0 - half * half).most(0.0).power(0.5 / s) * (0.5 / np.pi)
+            exp = lambda value: Value(graph, math.e).power(value)
+            f = d / ((1.0 + exp(masking) + exp(masking_there)) * view * cosine.most(1e-3) * 4.0)
+            return f / albedo.most(albedo_there).most(1.0), 1.0 - cloth.largest() * albedo.most(albedo_there).least(1.0)
+
+        u1, u2, _ = chance(graph)
+        direction = around(normal or plain_normal, u1, u2)
+        f, _ = sheen(direction, u2)
+        under_sheen = 1.0 - cloth.largest() * largest
+        shining = graph.shader("ShaderNodeBsdfRayPortal", Color=cloth * (f * u2 * (2 * math.pi)), Direction=direction)
+        if lamp is not None:
+            f, under_lamp = sheen(towards, light.most(0.0))
+            under_sheen = under_sheen + lit * (under_lamp - under_sheen)
+            shining = graph.mix(lit, graph.shader("ShaderNodeBsdfDiffuse", Color=cloth * (f * math.pi), Normal=normal), shining)
 
     ggx = {"distribution": "GGX"}
     metallic = {"distribution": "GGX", "fresnel_type": "F82"}  # with a white edge this is Schlick's
@@ -269,6 +362,8 @@ def principled(graph, node, solid, single_sided, lamp):
         glass = graph.shader("ShaderNodeBsdfPrincipled", ggx, Base_Color=colour * colour, Roughness=roughness, IOR=ior,
                              Transmission_Weight=1.0, Normal=normal)
         dielectric = graph.mix(t, glass, dielectric)
+    elif transmits and has("Roughness") and (node.inputs["Roughness"].is_linked or node.inputs["Roughness"].default_value >= 0.01):
+        dielectric = graph.add(dielectric, graph.mix(t, portal(graph, colour, roughness, normal or plain_normal, eye, f0, specular)))
     elif transmits:
         schlick = f0 + (1.0 - f0) * (1.0 - view).most(0.0).power(5.0)
         passing = graph.shader("ShaderNodeBsdfTransparent", Color=colour * (1.0 - specular * schlick))
@@ -278,6 +373,8 @@ def principled(graph, node, solid, single_sided, lamp):
         mirrors = graph.mix(dimmed, mirrors)
     diffuse = graph.shader("ShaderNodeBsdfDiffuse", Color=colour * kept, Normal=normal)
     layers = [mirrors, graph.mix((1.0 - metal) * (1.0 - t), diffuse)]
+    if has_sheen:
+        layers = [graph.mix(under_sheen, graph.add(*layers)), graph.mix(dimmed, shining) if has_coat else shining]
     if has_coat:
         layers.append(graph.mix(coat, reflect((0.04, 0.04, 0.04), coat_roughness, coat_normal)))
     if has("Emission Strength"):
@@ -304,7 +401,7 @@ def unlit(graph, emission, mix, single_sided):
 
 
 def as_in_the_guide(lamp):
-    """Changes all materials. `lamp` is the place of the reference lamp, or None."""
+    """Changes all materials. `lamp` is the place of the lamp, or the direction to it and a 0, or None."""
     images = tables()
     for image in list(bpy.data.images):
         if image.colorspace_settings.name == "sRGB" and not image.is_float and image.users and image.size[0]:
@@ -333,7 +430,16 @@ def as_in_the_guide(lamp):
             density.default_value *= absorbed.max()
             colour.default_value = (*(1 - absorbed / max(absorbed.max(), 1e-9)), 1)
         material.use_backface_culling = False
-        material.cycles.use_bump_map_correction = False
+        material.cycles.use_bump_map_correction = top.type == "BSDF_PRINCIPLED" and keeps_light(top)
+
+
+def keeps_light(node):
+    """Whether what its shading normals reflect into the surface is to go on outside of it, as the guide has it for mirrors and clear
+    glass. Without Cycles' correction the inside of clear glass with smooth normals is black where they lean, as at the rim of a vase."""
+    plain = lambda name: not node.inputs[name].is_linked
+    smooth = lambda name: plain(name) and node.inputs[name].default_value < 0.01
+    has_coat = not smooth("Coat Weight")
+    return smooth("Roughness") and plain("Normal") and (not has_coat or smooth("Coat Roughness") and plain("Coat Normal"))
 
 
 def decode(image):

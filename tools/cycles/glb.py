@@ -1,5 +1,6 @@
 """Reads and writes binary glTF files (.glb), and finds where things are in them: for the scripts beside this one."""
 
+import copy
 import json
 import struct
 
@@ -56,6 +57,47 @@ def add_accessor(gltf, binary, array):
     if kind == "VEC3":
         accessor |= {"min": array.min(0).tolist(), "max": array.max(0).tolist()}
     return add(gltf, "accessors", accessor)
+
+
+def read_accessor(gltf, binary, index):
+    """The numbers of an accessor, a row each, as floats. Normalized whole numbers become what they stand for."""
+    accessor = gltf["accessors"][index]
+    width = {"SCALAR": 1, "VEC2": 2, "VEC3": 3, "VEC4": 4}[accessor["type"]]
+
+    def rows(part, component, count, width):
+        kind = np.dtype({5120: "i1", 5121: "u1", 5122: "<i2", USHORT: "<u2", UINT: "<u4", FLOAT: "<f4"}[component])
+        view = gltf["bufferViews"][part["bufferView"]]
+        start, step = view.get("byteOffset", 0) + part.get("byteOffset", 0), view.get("byteStride", width * kind.itemsize)
+        return np.ndarray((count, width), kind, bytes(binary), start, (step, kind.itemsize))
+
+    component, count = accessor["componentType"], accessor["count"]
+    values = np.zeros((count, width)) if "bufferView" not in accessor else rows(accessor, component, count, width).astype(float)
+    if sparse := accessor.get("sparse"):
+        places = rows(sparse["indices"], sparse["indices"]["componentType"], sparse["count"], 1)[:, 0]
+        values[places] = rows(sparse["values"], component, sparse["count"], width)
+    if accessor.get("normalized"):
+        values = np.maximum(values / {5120: 127, 5121: 255, 5122: 32767, USHORT: 65535}[component], -1)
+    return values
+
+
+def put_at_rest(gltf, binary):
+    """Adds the morph targets to all meshes by their weights at rest, and takes them out: positions, normals and tangents."""
+    for node in gltf["nodes"]:
+        if "mesh" not in node or not any("targets" in p for p in gltf["meshes"][node["mesh"]]["primitives"]):
+            continue
+        mesh = copy.deepcopy(gltf["meshes"][node["mesh"]])  # other nodes may have other weights
+        weights = node.pop("weights", mesh.pop("weights", []))
+        for primitive in mesh["primitives"]:
+            targets = primitive.pop("targets", [])
+            for name in {name for target in targets for name in target}:
+                own = read_accessor(gltf, binary, primitive["attributes"][name])
+                for weight, target in zip(weights, targets):
+                    if name in target:
+                        own[:, :3] += weight * read_accessor(gltf, binary, target[name])
+                if name != "POSITION":
+                    own[:, :3] /= np.maximum(np.linalg.norm(own[:, :3], axis=1, keepdims=True), 1e-30)
+                primitive["attributes"][name] = add_accessor(gltf, binary, own)
+        node["mesh"] = add(gltf, "meshes", mesh)
 
 
 def add_node(gltf, node):

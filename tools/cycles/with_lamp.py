@@ -1,4 +1,5 @@
 """with_lamp.py IN.glb OUT.glb lamp|sun: the scene with one emissive square added, so that Cycles and photonmill have the same light.
+with_lamp.py IN.glb OUT.glb sky: the scene without its own lights.
 
 lamp: a twentieth of the scene's size, at 1.1 scene sizes from its centre, up, left and in front as the camera sees it.
 sun: 2 degrees wide as seen from the centre, at 20 scene radii, up, right and behind the camera.
@@ -59,9 +60,24 @@ def add_lamp(gltf, binary, kind):
     gltf["extensionsUsed"] = sorted({*gltf.get("extensionsUsed", []), *material["extensions"]})
 
 
+def take_lights_out(gltf):
+    for thing in (gltf, *gltf["nodes"]):
+        thing.get("extensions", {}).pop("KHR_lights_punctual", None)
+    for key in ("extensionsUsed", "extensionsRequired"):
+        gltf[key] = [name for name in gltf.get(key, []) if name != "KHR_lights_punctual"]
+        if not gltf[key]:
+            del gltf[key]
+    for material in gltf.get("materials", []):
+        material.pop("emissiveFactor", None)
+        material.pop("emissiveTexture", None)
+
+
 if __name__ == "__main__":
-    if len(sys.argv) != 4 or sys.argv[3] not in KINDS:
-        raise SystemExit("usage: with_lamp.py IN.glb OUT.glb lamp|sun")
+    if len(sys.argv) != 4 or sys.argv[3] not in (*KINDS, "sky"):
+        raise SystemExit("usage: with_lamp.py IN.glb OUT.glb lamp|sun|sky")
     scene, data = glb.read(sys.argv[1])
-    add_lamp(scene, data, sys.argv[3])
+    if sys.argv[3] == "sky":
+        take_lights_out(scene)
+    else:
+        add_lamp(scene, data, sys.argv[3])
     glb.write(sys.argv[2], scene, data)
