@@ -172,7 +172,7 @@ struct Fault {
 }
 
 #[rustfmt::skip]
-const FAULTS: [Fault; 129] = [
+const FAULTS: [Fault; 130] = [
     Fault { what: "what rounding takes from a pair of floats is forgotten",
         file: "film/float_u64.glsl", from: "precise float rest = sum.y + (", to: "precise float rest = 0.0 * (",
         kernels: &["gather_brute_u64", "gather_grid_u64"], noticed_by: &[(Pairs, SumsTooSmall)] },
@@ -540,6 +540,9 @@ const FAULTS: [Fault; 129] = [
         file: "material/layered_lobes.glsl",
         from: "return light_density > 0.0 ? divide(light_density, light_density + lobe_density) : 1.0;",
         to: "return 1.0;",
+        kernels: &["view"], noticed_by: &[(MetalsUnderTheSky, TooBright)] },
+    Fault { what: "light samples of matt lobes count in full beside rays of these lobes",
+        file: "material/layered_lobes.glsl", from: "        if (asks_matt) {", to: "        if (false) {",
         kernels: &["view"], noticed_by: &[(MetalsUnderTheSky, TooBright)] },
     Fault { what: "paths that meet a light take several shadow rays for one",
         file: "world/scene/camera_path.glsl",

@@ -38,7 +38,7 @@ pub const BITS: [(&str, u64); 17] = [
     ("glass-slab", 0x8dd4_c912_ee49_24f1),
     ("cornell-spheres from photons", 0xe1e4_2586_dc9d_502c),
     ("cornell-spheres gathered", 0xbe78_65cf_4f87_db4a),
-    ("blender.glb", 0x8482_6121_6e0a_283c),
+    ("blender.glb", 0xe896_5a0e_2120_9912),
     ("the paper's box", 0x52ea_c413_af81_4929),
 ];
 

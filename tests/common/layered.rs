@@ -430,7 +430,7 @@ pub const METALS: [(f64, [f64; 5]); 8] = [
     (1.0, [0.3069, 0.3513, 0.4507, 0.6416, 0.8478]),
 ];
 
-/// White metals: rough ones that light samples alone find, and others that paths find, too.
+/// White metals, matt and sharp.
 pub fn glossy_metals() -> Vec<Material> {
     METALS
         .iter()
