@@ -286,6 +286,19 @@ struct LayeredMaterial {
     // Of the medium whose number is this record's place plus 1, for each unit of length.
     vec3 medium_absorption;
     float medium_ior;
+    // Half of what lies between the indices for red and for blue, of its solid, and of that medium.
+    float ior_spread;
+    float medium_spread;
+    // Of a thin film: how much of it is there, its index, its thickness, nanometres, from where a texture is 0 to where it is 1, and the
+    // least F0 with which Schlick's formula is above all that it reflects.
+    float iridescence;
+    float film_ior;
+    float film_least;
+    float film_most;
+    float film_bound;
+    // Share of what enters it that is scattered evenly beyond, and its colour.
+    float diffuse_transmission;
+    vec3 diffuse_transmission_colour;
     float coat;
     float coat_roughness;
     vec3 sheen_colour;
@@ -449,6 +462,19 @@ struct MattLobes {
     float f90;
 };
 
+// A thin film on the base: how much of it is there, and shares of dielectric and metal in what is reflected below it, with their F0.
+struct MattFilm {
+    float share;
+    float ior;
+    float thickness;
+    float dielectric;
+    vec3 f0;
+    float metal;
+    vec3 metal_f0;
+    // What it reflects is no sharp lobe.
+    uint is_matt;
+};
+
 // What lies over them.
 struct MattCover {
     float coat;
@@ -461,6 +487,8 @@ struct MattCover {
     float sheen_albedo;
     vec3 sheen;
     float sheen_alpha;
+    // Under them; here for it to be stored (drivers allow few buffers).
+    MattFilm film;
 };
 
 // A point and its normals, of which irradiance is asked.
@@ -565,9 +593,14 @@ struct ViewPush {
     uint end_pixel;
     vec3 eye;
     vec3 forward;
-    // To the picture's right and upper edge, at unit distance.
+    // To the picture's right and upper edge: at unit distance, or where parallel rays start.
     vec3 right;
     vec3 up;
+    uint is_orthographic;
+    // 0: a pinhole.
+    float lens_radius;
+    // Distance of the plane in focus along the view.
+    float focus;
     uint emitter_count;
     // Film units in 1 W/m2/sr.
     float film_scale;
@@ -791,6 +824,12 @@ struct LobeCase {
     float coat_alpha;
     vec3 sheen;
     float sheen_alpha;
+    float diffuse_transmission;
+    vec3 diffuse_transmission_colour;
+    float iridescence;
+    float film_ior;
+    float film_thickness;
+    float film_bound;
     float coverage;
     // The only lobe that has a chance; NONE: all have.
     uint lobe;

@@ -84,7 +84,11 @@ constants! {
     LAYER_SHEEN_COLOUR = 7;
     LAYER_SHEEN_ROUGHNESS = 8;
     LAYER_NORMAL = 9;
-    LAYER_COUNT = 10;
+    LAYER_DIFFUSE_TRANSMISSION = 10;
+    LAYER_DIFFUSE_TRANSMISSION_COLOUR = 11;
+    LAYER_IRIDESCENCE = 12;
+    LAYER_IRIDESCENCE_THICKNESS = 13;
+    LAYER_COUNT = 14;
     /// What a texel's four bytes are; see `scene::texture::Texels`.
     TEXELS_SRGB = 0;
     TEXELS_SHARED_EXPONENT = 1;

@@ -389,7 +389,7 @@ fn assert_same_geometry(written: &Scene, scene: &Scene) {
     for (written, camera) in pairs(&written.cameras, &scene.cameras) {
         assert_eq!(written.name, camera.name);
         assert!(written.eye.distance(camera.eye) < 1e-5 * extent && written.forward.distance(camera.forward) < 1e-5, "{}", camera.name);
-        assert!(written.up.distance(camera.up) < 1e-5 && (written.vertical_view - camera.vertical_view).abs() < 1e-6, "{}", camera.name);
+        assert!(written.up.distance(camera.up) < 1e-5 && (written.half_height() - camera.half_height()).abs() < 1e-6, "{}", camera.name);
     }
     assert_eq!(written.cameras.len(), scene.cameras.len());
 }
@@ -410,7 +410,7 @@ fn as_gltf(material: &Material) -> Material {
 }
 
 /// The uses of textures that a material has, taken out of it.
-fn take_textures(material: &mut Material) -> [Option<TextureUse>; 12] {
+fn take_textures(material: &mut Material) -> [Option<TextureUse>; 16] {
     let layers = &mut material.layers;
     let one = |map: &mut Option<NormalMap>| map.as_mut().map(|map| std::mem::replace(&mut map.texture, TextureUse::of(0, 0)));
     [
@@ -425,6 +425,10 @@ fn take_textures(material: &mut Material) -> [Option<TextureUse>; 12] {
         layers.coat_texture.take(),
         layers.coat_roughness_texture.take(),
         layers.sheen_colour_texture.take(),
+        layers.diffuse_transmission_texture.take(),
+        layers.iridescence_texture.take(),
+        layers.film_thickness_texture.take(),
+        layers.diffuse_transmission_colour_texture.take(),
         layers.sheen_roughness_texture.take(),
     ]
 }
@@ -644,6 +648,16 @@ fn layered_materials_round_trip() {
         specular_colour_texture: used(true),
         transmission: 0.4,
         transmission_texture: used(false),
+        diffuse_transmission: 0.7,
+        diffuse_transmission_texture: used(false),
+        diffuse_transmission_colour: Vec3::new(0.3, 0.6, 0.5),
+        diffuse_transmission_colour_texture: used(true),
+        dispersion: 2.5,
+        iridescence: 0.35,
+        iridescence_texture: used(false),
+        film_ior: 1.7,
+        film_thickness: [50.0, 900.0],
+        film_thickness_texture: used(false),
         medium: Some(Medium { transmittance: Vec3::new(0.1, 0.0, 1.0), metres: 1.0 }),
         coat: 0.6,
         coat_texture: used(false),
@@ -671,6 +685,11 @@ fn layered_materials_round_trip() {
     let medium = Some(Medium { transmittance: tinted, metres: 1.0 });
     let alone = [
         Layers { ior: 0.0, ..usual },
+        Layers { diffuse_transmission: 0.5, ..usual },
+        Layers { iridescence: 0.5, ..usual },
+        Layers { film_thickness: [0.0, 400.0], ..usual },
+        Layers { diffuse_transmission_colour: tinted, ..usual },
+        Layers { dispersion: 0.5, transmission: 0.5, medium, ..usual },
         Layers { specular: 0.5, ..usual },
         Layers { specular_colour: tinted, ..usual },
         Layers { specular_texture: layers.specular_texture, ..usual },

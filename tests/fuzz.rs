@@ -14,7 +14,8 @@ use photonmill::plan::sensor::Sensor;
 use photonmill::plan::{Limits, RoomPlan, photons_of};
 use photonmill::scene::geometry::Geometry;
 use photonmill::scene::open_box::open_box;
-use photonmill::scene::{Material, Scene};
+use photonmill::scene::sky::Sky;
+use photonmill::scene::{Material, Reading, Scene};
 use photonmill::settings::RoomSettings;
 use photonmill::settings::scene::SceneSettings;
 use serde_json::{Value, json};
@@ -26,6 +27,8 @@ use gltf_file::{data_uri, encoded, floats, set_buffer};
 mod change;
 #[path = "common/gltf_file.rs"]
 mod gltf_file;
+#[path = "common/rich_file.rs"]
+mod rich_file;
 
 const BLENDER: &[u8] = include_bytes!("scenes/blender.glb");
 /// The same mutations each time.
@@ -81,12 +84,20 @@ fn check_scene(scene: &Scene) {
     }
     for material in &scene.materials {
         let Material { name, layers, base_colour, emission, .. } = material;
-        let shares = [layers.metallic, layers.roughness, layers.specular, layers.transmission, layers.coat];
+        let shares = [
+            layers.metallic,
+            layers.roughness,
+            layers.specular,
+            layers.transmission,
+            layers.diffuse_transmission,
+            layers.iridescence,
+            layers.coat,
+        ];
         let more = [layers.coat_roughness, layers.sheen_roughness].into_iter().chain(base_colour.to_array());
         let more =
             more.chain(layers.sheen_colour.to_array()).chain(layers.medium.map_or([1.0; 3], |medium| medium.transmittance.to_array()));
         assert!(shares.into_iter().chain(more).all(|share| (0.0..=1.0).contains(&share)), "{name}: {layers:?}");
-        let rest = [layers.ior].into_iter().chain(layers.specular_colour.to_array()).chain(emission.to_array());
+        let rest = [layers.ior, layers.ior_spread()].into_iter().chain(layers.specular_colour.to_array()).chain(emission.to_array());
         assert!(rest.into_iter().all(|factor| factor.is_finite() && factor >= 0.0), "{name}: {layers:?}");
         assert!(material.textures().all(|used| used.texture < scene.textures.len() && used.uv_set < 2), "{name}");
     }
@@ -163,11 +174,15 @@ fn square_with(coordinates: [f32; 8]) -> Value {
     glow["normalTexture"] = turned.clone();
     glow["alphaMode"] = json!("BLEND");
     glow["extensions"]["KHR_materials_clearcoat"] = json!({"clearcoatFactor": 0.5, "clearcoatNormalTexture": {"index": 0}});
+    glow["extensions"]["KHR_materials_iridescence"] = json!({"iridescenceFactor": 1, "iridescenceIor": 1,
+        "iridescenceThicknessMinimum": 0, "iridescenceThicknessMaximum": 1e30, "iridescenceThicknessTexture": {"index": 0}});
+    glow["extensions"]["KHR_materials_diffuse_transmission"] =
+        json!({"diffuseTransmissionFactor": 1, "diffuseTransmissionColorTexture": {"index": 0}});
     glow["extensions"]["KHR_materials_sheen"] = json!({"sheenColorFactor": [1, 0, 0.5], "sheenRoughnessTexture": turned});
     add(
         &mut value["materials"],
         json!({"name": "glass", "doubleSided": true, "alphaMode": "MASK", "alphaCutoff": 0.25, "extensions": {
-            "KHR_materials_ior": {"ior": 1.5}, "KHR_materials_transmission": {"transmissionFactor": 1},
+            "KHR_materials_ior": {"ior": 1.5}, "KHR_materials_dispersion": {"dispersion": 1000}, "KHR_materials_transmission": {"transmissionFactor": 1},
             "KHR_materials_volume": {"thicknessFactor": 1, "attenuationDistance": 2, "attenuationColor": [1, 0.5, 0]},
             "KHR_materials_specular": {"specularFactor": 0.5, "specularColorTexture": {"index": 0}}},
          "pbrMetallicRoughness": {"baseColorTexture": {"index": 0, "texCoord": 1}, "roughnessFactor": 0.3}}),
@@ -599,4 +614,117 @@ fn pictures_that_claim_too_much_are_refused_before_they_are_decoded() {
     let Fate::Refused(line) = plan_value("16384 by 16384 texels", &value) else { panic!("must be refused") };
     assert!(line.contains("texels"), "{line}");
     assert_memory();
+}
+
+/// Skies from bytes that were changed or cut off: a picture without odd numbers, or one line.
+#[test]
+fn skies_of_any_bytes_are_read_or_refused() {
+    let folder = tempfile::tempdir().unwrap();
+    let colours = image::Rgb32FImage::from_fn(32, 16, |i, j| image::Rgb([0.1 * i as f32, j as f32, 1e4]));
+    let picture = image::DynamicImage::ImageRgb32F(colours);
+    for (name, format) in [("a.hdr", ImageFormat::Hdr), ("a.exr", ImageFormat::OpenExr)] {
+        let mut whole = std::io::Cursor::new(Vec::new());
+        picture.write_to(&mut whole, format).unwrap();
+        let whole = whole.into_inner();
+        let path = folder.path().join(name);
+        let read = |content: &[u8]| {
+            std::fs::write(&path, content).unwrap();
+            let path = path.clone();
+            in_time(name, move || match Sky::read(&path) {
+                Ok(sky) => {
+                    let table = sky.table();
+                    assert!(table.integral.is_finite() && table.most_over_density.is_finite());
+                    true
+                }
+                Err(error) => {
+                    assert_eq!(error.to_string().lines().count(), 1, "{error}");
+                    false
+                }
+            })
+        };
+        assert!(read(&whole));
+        let cut = (0..whole.len()).step_by(7).filter(|length| read(&whole[..*length])).count();
+        assert!(cut < whole.len() / 14, "{name}: {cut}");
+        let mut random = Random(SEED);
+        let mut sound = 0;
+        for _ in 0..400 {
+            let mut content = whole.clone();
+            for _ in 0..1 + random.below(3) {
+                // Half of them in the head, where sizes stand.
+                let place = if random.below(2) == 0 { random.below(content.len().min(300)) } else { random.below(content.len()) };
+                content[place] = random.below(256) as u8;
+            }
+            sound += usize::from(read(&content));
+        }
+        assert!(sound > 0, "{name}");
+    }
+    assert_memory();
+}
+
+/// What extensions bring, with changed members: a scene, or one line.
+#[test]
+fn extensions_with_changed_members_are_read_or_refused() {
+    let folder = tempfile::tempdir().unwrap();
+    let path = folder.path().join("a.gltf");
+    let files = [
+        rich_file::animated(),
+        rich_file::instanced(),
+        rich_file::compressed("EXT_meshopt_compression"),
+        rich_file::with_webp(),
+        rich_file::draco_square(),
+        rich_file::with_image_light(),
+        rich_file::with_ktx2(&rich_file::ktx2(&[[1, 2, 3, 4], [5, 6, 7, 8]])),
+    ];
+    let mut random = Random(SEED);
+    let mut read = 0;
+    for case in 0..1200 {
+        let mut value = files[case % files.len()].clone();
+        for _ in 0..1 + random.below(2) {
+            change(&mut value, &mut random);
+        }
+        std::fs::write(&path, value.to_string()).unwrap();
+        let path = path.clone();
+        read += usize::from(in_time(&format!("case {case}: {value}"), move || {
+            let reading = Reading { radiometric: false, at: (case % 4 == 0).then_some(1.5) };
+            match Scene::open_with(path.to_str().unwrap(), reading, &mut |_, _| {}) {
+                Ok(scene) => {
+                    assert!(scene.meshes.iter().flat_map(|mesh| &mesh.positions).all(|position| position.is_finite()));
+                    true
+                }
+                Err(error) => {
+                    assert_eq!(error.to_string().lines().count(), 1, "{error}");
+                    false
+                }
+            }
+        }));
+    }
+    assert!((200..1150).contains(&read), "{read}");
+    assert_memory();
+}
+
+/// The bytes of compressed views, changed and cut off.
+#[test]
+fn compressed_views_of_any_bytes_are_read_or_refused() {
+    let folder = tempfile::tempdir().unwrap();
+    let path = folder.path().join("a.gltf");
+    let whole = rich_file::compressed("KHR_meshopt_compression");
+    let encoded = whole["buffers"][0]["uri"].as_str().unwrap().split_once("base64,").unwrap().1;
+    let bytes = base64::Engine::decode(&base64::engine::general_purpose::STANDARD, encoded).unwrap();
+    let mut random = Random(SEED);
+    let mut read = 0;
+    for case in 0..400 {
+        let (mut value, mut changed) = (whole.clone(), bytes.clone());
+        for _ in 0..1 + random.below(4) {
+            let place = random.below(changed.len());
+            changed[place] = random.below(256) as u8;
+        }
+        set_buffer(&mut value, &changed);
+        std::fs::write(&path, value.to_string()).unwrap();
+        let path = path.clone();
+        read += usize::from(in_time(&format!("case {case}"), move || {
+            let scene = Scene::open_with(path.to_str().unwrap(), Reading::default(), &mut |_, _| {});
+            scene.inspect_err(|error| assert_eq!(error.to_string().lines().count(), 1, "{error}")).is_ok()
+        }));
+    }
+    assert!((5..400).contains(&read), "{read}");
 }

@@ -66,8 +66,22 @@ fn materials_are_described_in_words() {
             "solid glass, ior 1.5, roughness 0, 0.25 0.25 1 of the light left after 2 m",
         ),
         (
+            json!({"pbrMetallicRoughness": {"metallicFactor": 0}, "extensions": {
+                "KHR_materials_transmission": {"transmissionFactor": 1}, "KHR_materials_volume": {"thicknessFactor": 1},
+                "KHR_materials_dispersion": {"dispersion": 0.5}}}),
+            "solid glass, ior 1.5, dispersion 0.5, roughness 1",
+        ),
+        (
             with("transmission", json!({"transmissionFactor": 0.5, "transmissionTexture": texture})),
             "thin wall of glass, ior 1.5, roughness 1, transmission 0.5 (texture 'wood')",
+        ),
+        (
+            with("diffuse_transmission", json!({"diffuseTransmissionFactor": 0.5, "diffuseTransmissionColorTexture": texture})),
+            "dielectric, ior 1.5, roughness 1, diffuse transmission 0.5 of colour 1 (texture 'wood')",
+        ),
+        (
+            with("iridescence", json!({"iridescenceFactor": 0.5, "iridescenceThicknessTexture": texture})),
+            "dielectric, ior 1.5, roughness 1, iridescence 0.5, a film of 100 to 400 nm (texture 'wood') and ior 1.3",
         ),
         (with("ior", json!({"ior": 0})), "dielectric, ior infinite, roughness 1"),
         (
@@ -135,7 +149,7 @@ fn a_file_is_described_as_text_and_as_json() {
     let place = Place::new();
     let mut value = square_with(&json!([
         {"name": "floor", "pbrMetallicRoughness": {"baseColorTexture": {"index": 0}, "metallicRoughnessTexture": {"index": 0}}},
-        {"name": "film", "extensions": {"KHR_materials_iridescence": {}}}
+        {"name": "brushed", "extensions": {"KHR_materials_anisotropy": {}}}
     ]));
     // Its indices are the zeros that the first position has.
     value["meshes"][0]["primitives"][1]["indices"] = json!(4);
@@ -149,7 +163,7 @@ extensions
     KHR_lights_punctual, KHR_materials_emissive_strength
 materials
     floor: dielectric and metal, metallic 1 (texture 'wood'), ior 1.5, roughness 1 (texture 'wood'), base colour texture 'wood'
-    film: metal, roughness 1; on no mesh
+    brushed: metal, roughness 1; on no mesh
 textures
     texture image 'wood': 16x8, sRGB colours, bilinear, 0.000488 MiB
     texture image 'wood': 16x8, linear numbers, bilinear, 0.000488 MiB
@@ -161,13 +175,13 @@ cameras
     eye
 warnings
     1 triangle without area left out (mesh 'wall')
-    ignored: the extension KHR_materials_iridescence: material 'film'
+    ignored: the extension KHR_materials_anisotropy: material 'brushed'
 ";
     assert_eq!(stdout, expected);
 
     let json: Value = serde_json::from_slice(&place.run("info a.gltf --json").stdout).unwrap();
     assert_eq!((&json["mesh_count"], &json["triangle_count"], &json["texture_bytes"]), (&json!(1), &json!(2), &json!(1024)));
-    assert_eq!(json["materials"][1], json!({"name": "film", "description": "metal, roughness 1", "triangle_count": 0}));
+    assert_eq!(json["materials"][1], json!({"name": "brushed", "description": "metal, roughness 1", "triangle_count": 0}));
     let wood =
         json!({"name": "texture image 'wood'", "width": 16, "height": 8, "texels": "sRGB colours", "filter": "bilinear", "bytes": 512});
     assert_eq!((&json["textures"][0], &json["lights"][0]), (&wood, &json!({"name": "light 'bulb'", "kind": "point"})));

@@ -12,11 +12,11 @@ use photonmill::constants::NONE;
 use photonmill::gpu::kernels::{self, CheckLobes};
 use photonmill::records::{LobeCase, LobeSample};
 use photonmill::scene::albedo;
-use photonmill::verify::judge::lobes::{Class, Frame, Inputs, Kind, Lobes, Wall};
+use photonmill::verify::judge::lobes::{Class, Film, Frame, Inputs, Kind, Lobes, Wall};
 
 const COSINES: [f64; 5] = [1.0, 0.8, 0.5, 0.2, 0.05];
 /// In the order of the kernels' numbers.
-const KINDS: [Kind; 5] = [Kind::Diffuse, Kind::Reflection, Kind::Coat, Kind::Transmission, Kind::Sheen];
+const KINDS: [Kind; 6] = [Kind::Diffuse, Kind::Reflection, Kind::Coat, Kind::Transmission, Kind::Sheen, Kind::DiffuseTransmission];
 /// Of each case.
 const SAMPLES: usize = 8192;
 
@@ -118,6 +118,14 @@ fn judged(case: &LobeCase) -> Lobes {
         specular: case.specular.into(),
         specular_colour: DVec3::ONE,
         transmission: case.transmission.into(),
+        diffuse_transmission: case.diffuse_transmission.into(),
+        diffuse_transmission_colour: case.diffuse_transmission_colour.as_dvec3(),
+        film: Film {
+            share: case.iridescence.into(),
+            ior: case.film_ior.into(),
+            thickness: case.film_thickness.into(),
+            bound: case.film_bound.into(),
+        },
         wall,
         coat: case.coat.into(),
         coat_alpha: case.coat_alpha.into(),
@@ -340,6 +348,8 @@ fn ask(gpu: &Gpu, math: Math, passing: bool, cases: &[LobeCase], samples: usize)
         .set("HAS_TRANSMISSION", 1)
         .set("HAS_COATS", 1)
         .set("HAS_SHEEN", 1)
+        .set("HAS_DIFFUSE_TRANSMISSION", 1)
+        .set("HAS_IRIDESCENCE", 1)
         .set("HAS_PASSING", u32::from(passing));
     let commands = &mut Commands::new(gpu, constants, Instant::now()).unwrap();
     fn one<T: bytemuck::Pod>(gpu: &Gpu) -> photonmill::gpu::Buffer<T> {
@@ -440,6 +450,8 @@ fn mixtures() -> [(&'static str, LobeCase); 3] {
         transmission: 0.4,
         sheen,
         sheen_alpha: 0.3,
+        diffuse_transmission: 0.4,
+        diffuse_transmission_colour: Vec3::new(0.2, 0.7, 0.5),
         coverage: 0.7,
         ..plastic(0.1, 0.6)
     };
@@ -490,8 +502,10 @@ fn mixture_check(gpu: &Gpu, math: Math) -> Check {
             }
             let of = Facets::new(case, &lobes, kind);
             let what = format!("{math:?}, {what}, {kind:?}");
-            if matches!(kind, Kind::Diffuse | Kind::Sheen) {
-                let directions: Vec<Vec3> = samples.iter().map(|sample| sample.direction).collect();
+            let is_broad = matches!(kind, Kind::Diffuse | Kind::Sheen | Kind::DiffuseTransmission);
+            if is_broad {
+                let side = if kind.is_beyond() { -1.0 } else { 1.0 };
+                let directions: Vec<Vec3> = samples.iter().map(|sample| side * sample.direction).collect();
                 hemisphere_check(&what, &directions, of.frame, |wi| wi.dot(of.n) / PI)?;
             } else {
                 cells_check(&what, &of.counts(&samples)?, &of.probabilities())?;
@@ -502,7 +516,6 @@ fn mixture_check(gpu: &Gpu, math: Math) -> Check {
                 if sample.is_alive == 0 || wi.dot(of.n).abs().min(cosine) < LEAST_COSINE {
                     continue;
                 }
-                let is_broad = matches!(kind, Kind::Diffuse | Kind::Sheen);
                 let density = if is_broad { cosine / PI } else { lobes.density(kind, wi) };
                 let expected = lobes.evaluate(kind, wi) * cosine / (density * f64::from(sample.chance));
                 let weight = largest_relative_error(sample.weight, expected);

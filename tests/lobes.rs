@@ -3,11 +3,11 @@
 use crate::common::chi_square::{Grid, density_check, even};
 use crate::common::layered;
 use crate::common::prelude::*;
-use photonmill::verify::judge::lobes::{Frame, Inputs, Kind, Lobes, Wall};
+use photonmill::verify::judge::lobes::{Film, Frame, Inputs, Kind, Lobes, Wall};
 use photonmill::verify::judge::{Random, random};
 
 const COSINES: [f64; 5] = [1.0, 0.8, 0.5, 0.2, 0.05];
-const KINDS: [Kind; 5] = [Kind::Diffuse, Kind::Reflection, Kind::Transmission, Kind::Coat, Kind::Sheen];
+const KINDS: [Kind; 6] = [Kind::Diffuse, Kind::Reflection, Kind::Transmission, Kind::Coat, Kind::Sheen, Kind::DiffuseTransmission];
 
 /// A white dielectric without anything else, of this roughness.
 fn plastic(roughness: f64) -> Inputs {
@@ -19,6 +19,9 @@ fn plastic(roughness: f64) -> Inputs {
         specular: 1.0,
         specular_colour: DVec3::ONE,
         transmission: 0.0,
+        diffuse_transmission: 0.0,
+        diffuse_transmission_colour: DVec3::ONE,
+        film: Film::NONE,
         wall: Wall::Thin,
         coat: 0.0,
         coat_alpha: 0.0,
@@ -37,6 +40,10 @@ fn glass(roughness: f64, wall: Wall) -> Inputs {
 
 fn solid(roughness: f64, from: f64, to: f64) -> Inputs {
     glass(roughness, Wall::Solid { from, to })
+}
+
+fn film(ior: f64, thickness: f64, bound: f64) -> Film {
+    Film { share: 1.0, ior, thickness, bound }
 }
 
 fn wo(cosine: f64) -> DVec3 {
@@ -72,6 +79,13 @@ fn materials() -> Vec<(&'static str, Inputs)> {
         ("coat over glass", Inputs { coat: 0.5, coat_alpha: 0.3, ..glass(0.5, Wall::Thin) }),
         ("sheen", sheen(1.0)),
         ("sharper sheen", sheen(0.4)),
+        ("paper", Inputs { diffuse_transmission: 0.6, diffuse_transmission_colour: tinted, ..plastic(0.6) }),
+        ("a leaf", Inputs { diffuse_transmission: 1.0, transmission: 0.3, coat: 0.5, coat_alpha: 0.2, ..sheen(0.6) }),
+        ("oil on plastic", Inputs { film: film(1.4, 380.0, 0.1), ..plastic(0.5) }),
+        ("a film on metal", Inputs { film: film(1.9, 250.0, 0.0), ..metal(0.4) }),
+        ("a bubble", Inputs { film: film(1.33, 500.0, 0.0), ..glass(0.5, Wall::Thin) }),
+        ("coated glass of lenses", Inputs { film: film(1.38, 100.0, 0.0), ..solid(0.5, 1.0, 1.5) }),
+        ("the same from inside", Inputs { film: film(1.38, 100.0, 0.0), ..solid(0.5, 1.5, 1.0) }),
         ("all", Inputs { coat: 0.7, coat_alpha: 0.2, metalness: 0.3, transmission: 0.4, base_colour: tinted, ..sheen(0.7) }),
     ]
 }
@@ -98,7 +112,7 @@ fn over_hemisphere(side: f64, count: usize, f: impl Fn(DVec3) -> DVec3) -> DVec3
 
 /// Directional albedo of a lobe that is no delta, by quadrature of its BSDF.
 fn albedo(lobes: &Lobes, kind: Kind, count: usize) -> DVec3 {
-    let side = if kind == Kind::Transmission { -1.0 } else { 1.0 };
+    let side = if kind.is_beyond() { -1.0 } else { 1.0 };
     over_hemisphere(side, count, |wi| wi.z.abs() * lobes.evaluate(kind, wi))
 }
 
@@ -227,7 +241,7 @@ fn lobes_are_reciprocal() {
     for (what, inputs) in materials() {
         for _ in 0..200 {
             for kind in KINDS {
-                let side = if kind == Kind::Transmission { -1.0 } else { 1.0 };
+                let side = if kind.is_beyond() { -1.0 } else { 1.0 };
                 let (v, l) = (direction(1.0, &mut rng), direction(side, &mut rng));
                 let there = lobes(inputs, v).evaluate(kind, l);
                 let (swapped, scale) = match inputs.wall {
@@ -336,7 +350,7 @@ fn wide_lobes_follow_their_density() {
     ] {
         for cosine in COSINES {
             let lobes = lobes(inputs, wo(cosine));
-            let side = if kind == Kind::Transmission { -1.0 } else { 1.0 };
+            let side = if kind.is_beyond() { -1.0 } else { 1.0 };
             let trials = 20_000;
             let places: Vec<(f64, f64)> = (0..trials)
                 .filter_map(|_| lobes.sample(kind, &mut rng))

@@ -5,8 +5,12 @@ use std::ops::Range;
 use std::sync::OnceLock;
 
 use crate::common::family::chi_squared_z;
+use crate::common::lit::light;
 use crate::common::prelude::*;
+use photonmill::bake::{Layout, Map, TexelEstimate};
 use photonmill::engine::room::film::estimate_walls;
+use photonmill::engine::scene::View;
+use photonmill::records::Receiver;
 use photonmill::verify::judge::radiosity::{ByLamp, Law, Radiosity, WALLS, cells_of, exchange, form_factor_from, inward, on_wall};
 
 const ALBEDO: f64 = 0.75;
@@ -376,5 +380,201 @@ fn the_box_of_triangles_has_the_irradiance_of_radiosity() {
             family.expect_mean(format!("{law:?}, {illumination:?}, {builder:?}, wall {wall}"), &means, expected);
         }
         family.assert_tells_one_per_cent();
+    }
+}
+
+/// Texels along a wall of a baked box, and how many there are a metre.
+const TEXELS: usize = 16;
+const TEXELS_PER_METRE: f64 = TEXELS as f64 / 0.5;
+
+/// The box baked: its layout, and what was found for each texel.
+struct BakedBox {
+    layout: Layout,
+    estimates: Vec<TexelEstimate>,
+}
+
+/// With the walls' own coordinates as lightmap coordinates, or with new charts.
+fn baked_box(gpu: &Device, illumination: Illumination, has_set: bool) -> BakedBox {
+    let mut scene = built_in::by_name("open-box").unwrap();
+    if has_set {
+        scene.meshes.iter_mut().for_each(|mesh| mesh.uvs[1] = mesh.uvs[0].clone());
+    }
+    let layout = Layout::new(&scene, TEXELS_PER_METRE).unwrap();
+    assert!(layout.objects.len() == WALLS && layout.objects.iter().all(|object| object.set.is_some() == has_set));
+    let settings = SceneSettings {
+        illumination,
+        photons: 1 << 17,
+        rounds: 16,
+        bounces: BOUNCES as u32,
+        radius: Some(DISC_RADIUS),
+        caustic_radius: Some(DISC_RADIUS),
+        alpha: 1.0,
+        shadow_rays: 16,
+        ..SceneSettings::default()
+    };
+    let geometry = Geometry::new(&scene).unwrap();
+    let receiver = |sample: &photonmill::bake::TexelSample| Receiver {
+        position: geometry.to_local(sample.position),
+        normal: sample.geometric_normal.as_vec3(),
+        shading_normal: sample.shading_normal.as_vec3(),
+    };
+    let phases: Vec<Vec<Receiver>> = layout.phases().iter().map(|phase| phase.iter().map(receiver).collect()).collect();
+    let sensor = Sensor::Receivers { count: layout.texel_count() as u32 };
+    let plan = ScenePlan::new(&scene, &geometry, &settings, sensor, &engine::limits(gpu.facts())).unwrap();
+    let lit = light(gpu, &View { geometry: &geometry, camera: None, phases: &phases }, plan);
+    let errors = lit.film.stated_errors(&lit.plan);
+    let estimate =
+        |texel: usize| TexelEstimate { irradiance: lit.film.mean(texel, &lit.plan).as_vec3(), standard_error: errors(texel).as_vec3() };
+    let estimates = (0..layout.texel_count()).map(estimate).collect();
+    BakedBox { layout, estimates }
+}
+
+/// Texels of all walls, each with the points that it is looked at in.
+fn texels(layout: &Layout) -> Vec<(usize, Vec<DVec3>)> {
+    let of_wall = |(wall, lightmap): (usize, &photonmill::bake::MeshLightmap)| {
+        let points =
+            |texel: &photonmill::bake::CoveredTexel| texel.points.iter().map(|point| point.sample(&lightmap.mesh).position).collect();
+        lightmap.texels.iter().map(|texel| (wall, points(texel))).collect::<Vec<_>>()
+    };
+    layout.lightmaps().flat_map(of_wall).collect()
+}
+
+/// Every texel within five standard errors and 4 % of what is right, and the mean of every wall within 1 %.
+fn agrees(wanted: &[(usize, f64, f64)], found: &[f64], errors: &[f64]) -> Check {
+    require(wanted.len() == found.len(), || format!("{} texels of {}", found.len(), wanted.len()))?;
+    for (texel, ((wall, wanted, own_error), (found, error))) in wanted.iter().zip(found.iter().zip(errors)).enumerate() {
+        let allowed = 5.0 * own_error.hypot(*error) + 0.04 * wanted;
+        require((found - wanted).abs() <= allowed, || {
+            format!("texel {texel} of wall {wall}: {found} instead of {wanted} within {allowed}")
+        })?;
+    }
+    for wall in 0..WALLS {
+        let of_wall = |values: &dyn Fn(usize) -> f64| (0..wanted.len()).filter(|texel| wanted[*texel].0 == wall).map(values).sum::<f64>();
+        let (sum, right) = (of_wall(&|texel| found[texel]), of_wall(&|texel| wanted[texel].1));
+        require((sum / right - 1.0).abs() < 0.01, || format!("wall {wall}: {} of the light", sum / right))?;
+    }
+    Ok(())
+}
+
+/// What a picture shows at a place, filtered as engines do it.
+fn bilinear(map: &Map, at: DVec2) -> f64 {
+    let place = at * DVec2::new(map.width.into(), map.height.into()) - 0.5;
+    let (low, part) = (place.floor(), place - place.floor());
+    let value = |x: f64, y: f64| {
+        let column = x.clamp(0.0, f64::from(map.width - 1)) as usize;
+        let row = y.clamp(0.0, f64::from(map.height - 1)) as usize;
+        f64::from(map.irradiance[row * map.width as usize + column].x)
+    };
+    let row = |y: f64| (1.0 - part.x) * value(low.x, y) + part.x * value(low.x + 1.0, y);
+    (1.0 - part.y) * row(low.y) + part.y * row(low.y + 1.0)
+}
+
+/// The box baked on its five walls, texel by texel, borders and gutters too: what the room's own film has there, and what radiosity says.
+#[test]
+fn the_baked_box_has_the_irradiance_of_the_room_and_of_radiosity() {
+    let Some(gpu) = device() else { return };
+    let room_settings = RoomSettings {
+        mesh: TEXELS as u32,
+        radius: DISC_RADIUS,
+        photons: PHOTONS,
+        rounds: 16,
+        seed: 3,
+        rng: Rng::Philox,
+        ..RoomSettings::default()
+    };
+    let (law, _) = LAWS.into_iter().find(|(_, emission)| *emission == room_settings.emission).unwrap();
+    let solution = solution(law);
+    let columns = |baked: &BakedBox| -> (Vec<f64>, Vec<f64>) {
+        baked.estimates.iter().map(|texel| (f64::from(texel.irradiance.x), f64::from(texel.standard_error.x))).unzip()
+    };
+    // Light by photons within a radius is what the room's film has.
+    let outcome = run(&gpu, &room_settings);
+    let room = open_box(&room_settings);
+    let walls = estimate_walls(&outcome.film, &room, &outcome.plan);
+    let baked = baked_box(&gpu, Illumination::Photons, true);
+    let in_room = |(wall, points): &(usize, Vec<DVec3>)| {
+        let rectangle = room.rectangle(walls[*wall].face);
+        let middle = points.iter().sum::<DVec3>() / points.len() as f64 - rectangle.origin;
+        let place = |along: DVec3| (middle.dot(along) / along.length_squared() * TEXELS as f64) as usize;
+        let texel = place(rectangle.v) * TEXELS + place(rectangle.u);
+        (*wall, walls[*wall].irradiance[texel], walls[*wall].irradiance_error[texel])
+    };
+    let wanted: Vec<(usize, f64, f64)> = texels(&baked.layout).iter().map(in_room).collect();
+    assert_eq!(wanted.len(), WALLS * TEXELS * TEXELS);
+    let (found, errors) = columns(&baked);
+    let worst = wanted.iter().zip(&found).map(|((_, wanted, _), found)| (found / wanted - 1.0).abs()).fold(0.0, f64::max);
+    println!("from the room's film texels differ by {worst:.3} at most");
+    assert_holds("the room's film", agrees(&wanted, &found, &errors));
+    let mut shifted = found.clone();
+    shifted.rotate_left(2);
+    assert_complains("a shift by two texels", agrees(&wanted, &shifted, &errors));
+
+    // Direct light by shadow rays and the rest by photons is that of the points themselves.
+    for has_set in [true, false] {
+        let baked = baked_box(&gpu, Illumination::Split, has_set);
+        let at = |(wall, points): &(usize, Vec<DVec3>)| {
+            let light = |point: &DVec3| solution.direct_at(*wall, *point) + solution.reflected_at(*wall, *point);
+            (*wall, points.iter().map(light).sum::<f64>() / points.len() as f64, 0.0)
+        };
+        let all = texels(&baked.layout);
+        let wanted: Vec<(usize, f64, f64)> = all.iter().map(at).collect();
+        let (found, errors) = columns(&baked);
+        let squares = wanted.iter().zip(&found).map(|((_, wanted, _), found)| (found / wanted - 1.0).powi(2));
+        println!(
+            "new charts: {}; from radiosity {} texels differ by {:.4} (RMS)",
+            !has_set,
+            all.len(),
+            (squares.sum::<f64>() / all.len() as f64).sqrt()
+        );
+        assert_holds("radiosity", agrees(&wanted, &found, &errors));
+        // Along the edges of walls it is darker than that by a quarter without an edge correction.
+        let is_border = |points: &[DVec3]| {
+            points.iter().any(|point| point.abs().to_array().iter().filter(|x| **x > 0.25 - 0.5 / TEXELS as f64).count() > 1)
+        };
+        let border = all.iter().filter(|(_, points)| is_border(points)).count();
+        assert!(border >= WALLS * (4 * TEXELS - 4), "{border} texels at borders");
+        let dark: Vec<f64> =
+            all.iter().zip(&found).map(|((_, points), found)| if is_border(points) { 0.75 * found } else { *found }).collect();
+        assert_complains("dark borders", agrees(&wanted, &dark, &errors));
+
+        // A filter at the very edge mixes the border with the gutter.
+        let edges = |maps: &[Map]| -> Check {
+            let (mut shown, mut right) = (0.0, 0.0);
+            for (wall, lightmap) in baked.layout.lightmaps() {
+                let corners: Vec<(DVec3, DVec2)> = [
+                    lightmap.mesh.triangles[0][0],
+                    lightmap.mesh.triangles[0][1],
+                    lightmap.mesh.triangles[0][2],
+                    lightmap.mesh.triangles[1][2],
+                ]
+                .map(|vertex| (lightmap.mesh.positions[vertex as usize], lightmap.uvs[vertex as usize]))
+                .into();
+                let centre = corners.iter().map(|(corner, _)| corner).sum::<DVec3>() / 4.0;
+                for k in 0..4 {
+                    let ((from, uv_from), (to, uv_to)) = (corners[k], corners[(k + 1) % 4]);
+                    let inwards = (centre - 0.5 * (from + to)).normalize();
+                    for step in 1..TEXELS {
+                        let share = step as f64 / TEXELS as f64;
+                        // Beyond the middle of the last texel a map shows that texel.
+                        let point = from.lerp(to, share) + 0.5 / TEXELS_PER_METRE * inwards;
+                        shown += bilinear(&maps[wall], uv_from.lerp(uv_to, share));
+                        right += solution.direct_at(wall, point) + solution.reflected_at(wall, point);
+                    }
+                }
+            }
+            println!("at edges {:.4} of the light of radiosity", shown / right);
+            require((shown / right - 1.0).abs() < 0.05, || format!("at edges {} of the light", shown / right))
+        };
+        let maps = baked.layout.maps(&baked.estimates);
+        assert_holds("edges", edges(&maps));
+        if !has_set {
+            let mut black = maps.clone();
+            for (wall, lightmap) in baked.layout.lightmaps() {
+                let covered: HashSet<usize> = lightmap.texels.iter().map(|texel| (texel.y * lightmap.width + texel.x) as usize).collect();
+                let gutters = black[wall].irradiance.iter_mut().enumerate().filter(|(place, _)| !covered.contains(place));
+                gutters.for_each(|(_, value)| *value = Vec3::ZERO);
+            }
+            assert_complains("black gutters", edges(&black));
+        }
     }
 }

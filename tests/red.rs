@@ -10,13 +10,16 @@ use crate::common::Kind::*;
 use crate::common::layered::{self, Mixtures};
 use crate::common::prelude::*;
 use crate::common::{MANY_PHOTONS, aimed, bits, estimate_check, known, lamps, noticed_as, planted, sheets};
+use crate::dispersion;
 use crate::film::pairs_count_on;
 use crate::hard_cases::readme_and_guide;
 use crate::ledger::closed_fates;
 use crate::media;
 use crate::openings::light_through_a_window;
 use crate::paranoid::{box_is_finite, scene_is_finite};
+use crate::skies::{facing_all_ways, photons_and_rays};
 use crate::strict::{film_agrees, photons_agree, rounding_check};
+use crate::translucent;
 use crate::transport::{appends_agree, crowd_check};
 use photonmill::engine::room::film;
 use photonmill::measure::compaction;
@@ -81,6 +84,9 @@ enum Question {
     MissedLamp,
     /// Light through a window of `openings`.
     Window,
+    /// The checks of `skies`.
+    SkyAllWays,
+    SkyPhotons,
     /// Aimed photons bring as much light as others: a scene of `common::aimed`.
     AimedLight(&'static str),
     // The checks of `common::layered`, `common::sheets` and `media`.
@@ -99,6 +105,9 @@ enum Question {
     EyeInGlass,
     PhotonsThroughASlab,
     LampInAMedium,
+    Prism,
+    PrismPhotons,
+    SheetOverAFloor,
     LampBetweenSheets,
     CoatsAndBacks,
     PhotonsOffAPane,
@@ -147,6 +156,9 @@ impl Question {
             | EyeInGlass
             | PhotonsThroughASlab
             | LampInAMedium
+            | Prism
+            | PrismPhotons
+            | SheetOverAFloor
             | LampBetweenSheets
             | CoatsAndBacks
             | PhotonsOffAPane
@@ -172,7 +184,7 @@ struct Fault {
 }
 
 #[rustfmt::skip]
-const FAULTS: [Fault; 130] = [
+const FAULTS: [Fault; 138] = [
     Fault { what: "what rounding takes from a pair of floats is forgotten",
         file: "film/float_u64.glsl", from: "precise float rest = sum.y + (", to: "precise float rest = 0.0 * (",
         kernels: &["gather_brute_u64", "gather_grid_u64"], noticed_by: &[(Pairs, SumsTooSmall)] },
@@ -422,6 +434,12 @@ const FAULTS: [Fault; 130] = [
     Fault { what: "photons aimed at openings carry as much as any",
         file: "world/scene/openings.glsl", from: "emission.flux *= divide(1.0, 1.0 - OPENING_SHARE + divide(OPENING_SHARE * discs * whole, sum));", to: "",
         kernels: &["trace_persistent_scene", "emit_scene"], noticed_by: &[(Window, TooBright)] },
+    Fault { what: "rays to a picture of the sky weigh by the table alone",
+        file: "world/scene/sky.glsl", from: "found.density = (1.0 - by_table) * cosine_density(ns, found.wi) + by_table * found.density;", to: "",
+        kernels: &["receive"], noticed_by: &[(SkyAllWays, TooDark)] },
+    Fault { what: "photons of a picture of the sky come from where it is not bright",
+        file: "world/scene/sky.glsl", from: "turns < 0.5 ? turns + 0.5 : turns - 0.5", to: "turns",
+        kernels: &["trace_persistent_scene", "emit_scene"], noticed_by: &[(SkyPhotons, TooDark)] },
     Fault { what: "a spot falls off by its share, not by the square of it",
         file: "world/scene/lights.glsl", from: "return share * share;", to: "return share;",
         kernels: &["receive"], noticed_by: &[(Spot, TooBright)] },
@@ -607,6 +625,24 @@ const FAULTS: [Fault; 130] = [
     Fault { what: "media absorb no photons",
         file: "world/scene/step.glsl", from: "arriving *= transmittance(path.media, hit.t);", to: "",
         kernels: &["trace_persistent_scene", "trace_scene_ballot"], noticed_by: &[(PhotonsThroughASlab, TooBright)] },
+    Fault { what: "red has the index of blue",
+        file: "material/media.glsl", from: "(float(channel) - 1.0) * spread", to: "(1.0 - float(channel)) * spread",
+        kernels: &["view"], noticed_by: &[(Prism, TooDark)] },
+    Fault { what: "the channel that a path keeps stands for itself alone",
+        file: "material/media.glsl", from: "kept[channel] = count * light[channel];", to: "kept[channel] = light[channel];",
+        kernels: &["trace_persistent_scene", "trace_scene_ballot"], noticed_by: &[(PrismPhotons, TooDark)] },
+    Fault { what: "diffuse transmission weighs as if no other lobe had a chance",
+        file: "material/layered_sampling.glsl", from: "btdf * divide(3.14159265358979324, chosen.chance)", to: "btdf * 3.14159265358979324",
+        kernels: &["trace_persistent_scene", "trace_scene_ballot"], noticed_by: &[(SheetOverAFloor, TooDark)] },
+    Fault { what: "films add to what lies under them",
+        file: "material/film.glsl", from: "return (1.0 - film.share) * colour + film.share * interference;", to: "return colour + film.share * interference;",
+        kernels: &["view"], noticed_by: &[(PlatesInTheSun(Mixtures::Bare), TooBright)] },
+    Fault { what: "the diffuse lobe has what its film reflects",
+        file: "material/layered_lobes.glsl", from: "e0 += layers.iridescence * (layers.film_bound - e0);", to: "",
+        kernels: &["view"], noticed_by: &[(PlatesInTheSun(Mixtures::Bare), TooBright)] },
+    Fault { what: "light samples behind paper lose a tenth",
+        file: "material/layered_lobes.glsl", from: "(-cosine * light_share(light_density, density))", to: "(-0.9 * cosine * light_share(light_density, density))",
+        kernels: &["view"], noticed_by: &[(PlatesInTheSun(Mixtures::Transmissive), TooDark)] },
     Fault { what: "shadow rays run through media as through air",
         file: "world/scene/direct.glsl", from: "left = t_max == 1.0 ? transmittance(media, norm(way)) : left;", to: "",
         kernels: &["receive"], noticed_by: &[(LampInAMedium, TooBright)] },
@@ -728,6 +764,8 @@ fn ask(gpu: &Gpu, question: Question) -> Check<Complaint> {
         ManyLamps(side) => lamps::many_lamps(gpu, side, true),
         MissedLamp => lamps::missed_lamp(gpu),
         Window => light_through_a_window(gpu),
+        SkyAllWays => facing_all_ways(gpu),
+        SkyPhotons => photons_and_rays(gpu),
         AimedLight(kind) => aimed::same_light(gpu, kind),
         PlatesInTheSun(mixtures) => layered::lobes_in_the_sun(gpu, &mixtures.materials(), false),
         MetalsUnderTheSky => layered::furnace(gpu, &layered::glossy_metals(), false),
@@ -744,6 +782,9 @@ fn ask(gpu: &Gpu, question: Question) -> Check<Complaint> {
         EyeInGlass => media::eye_in_glass(gpu),
         PhotonsThroughASlab => media::photons_through_a_slab(gpu),
         LampInAMedium => media::lamp_in_a_medium(gpu),
+        Prism => dispersion::prism_check(gpu, 1.0),
+        PrismPhotons => dispersion::prism_photons(gpu),
+        SheetOverAFloor => translucent::sheet_over_a_floor(gpu),
         LampBetweenSheets => sheets::lamp_between_sheets(gpu),
         CoatsAndBacks => layered::coats_and_backs_in_the_sun(gpu),
         PhotonsOffAPane => sheets::photons_off_a_pane(gpu),

@@ -9,7 +9,7 @@ use crate::common::prelude::*;
 use crate::common::program::on_device;
 use serde_json::{Value, json};
 
-const EFFECTS: &str = "direct indirect glossy layers transmission media clear-coat sheen normal-maps alpha reflective-caustics \
+const EFFECTS: &str = "direct indirect glossy layers transmission diffuse-transmission iridescence media dispersion clear-coat sheen normal-maps alpha reflective-caustics \
     refractive-caustics specular-chains textures vertex-colours environment mesh-lights point-lights spot-lights directional-lights disc-lights bvh two-sided smooth-normals";
 const BLENDER: &str = concat!(env!("CARGO_MANIFEST_DIR"), "/tests/scenes/blender.glb");
 const TINY: &str = "--size 16x16 --photons 2000 --rounds 2";
@@ -208,13 +208,19 @@ fn an_exr_is_linear_and_a_png_obeys_its_exposure() {
     // The lamp's own radiance stands in it, far above what a screen shows.
     assert!(linear.iter().any(|value| *value > 1.0) && linear.iter().all(|value| value.is_finite() && *value >= 0.0));
     for stops in ["-2", "0", "1", "3.5"] {
-        place.succeed(&format!("render cornell {TINY} -o a.png --exposure {stops}"));
+        place.succeed(&format!("render cornell {TINY} -o a.png --exposure {stops} --tone linear"));
         let png = place.picture("a.png").into_rgb8().into_raw();
         let factor = stops.parse::<f32>().unwrap().exp2();
         for (code, value) in pairs(&png, &linear) {
             assert!((f32::from(*code) - srgb(value * factor)).abs() <= 0.51, "{stops} stops: {code} for {value}");
         }
     }
+    // By the tone curve the lamp is white, and not cut off at the same value as its surroundings.
+    place.succeed(&format!("render cornell {TINY} -o a.png --exposure 2"));
+    let toned = place.picture("a.png").into_rgb8().into_raw();
+    place.succeed(&format!("render cornell {TINY} -o a.png --exposure 2 --tone linear"));
+    let cut = place.picture("a.png").into_rgb8().into_raw();
+    assert!(toned.iter().filter(|code| **code == 255).count() < cut.iter().filter(|code| **code == 255).count());
     // Left alone, it is neither dark nor burnt out.
     let (stdout, _) = place.succeed(&format!("render cornell {TINY} -o a.png"));
     assert!(stdout.contains("wrote a.png at ") && stdout.contains("stops"), "{stdout}");
@@ -394,7 +400,7 @@ fn an_environment_lights_the_scene_and_is_seen() {
     place.write("dark.gltf", square(|v| v["scenes"][0]["nodes"] = json!([0, 1])));
     let run = format!("render dark.gltf {TINY} -o a.exr --environment 2,1,0.5");
     let (_, stderr) = place.succeed(&run);
-    assert!(!stderr.contains("has no light"), "it is lit: {stderr}");
+    assert!(!stderr.contains("nothing in this scene shines"), "it is lit: {stderr}");
     // A white wall under an even sky is as bright as the sky.
     let pixels = place.pixels("a.exr");
     let mean = |channel: usize| pixels.iter().skip(channel).step_by(3).sum::<f32>() / 256.0;
@@ -407,13 +413,16 @@ fn an_environment_lights_the_scene_and_is_seen() {
 }
 
 #[test]
-fn a_scene_without_light_is_black_with_one_warning() {
+fn a_scene_without_light_has_a_sky_and_a_line_says_so() {
     let Some(place) = place_with_device() else { return };
     place.write("dark.gltf", square(|v| v["scenes"][0]["nodes"] = json!([0, 1])));
     let (_, stderr) = place.succeed(&format!("render dark.gltf {TINY} -o a.exr"));
-    assert_eq!(stderr.matches("has no light").count(), 1, "{stderr}");
-    assert_eq!(place.pixels("a.exr"), vec![0.0; 3 * 256]);
-    place.succeed(&format!("render dark.gltf {TINY} -o a.png"));
+    assert_eq!(stderr.matches("nothing in this scene shines").count(), 1, "{stderr}");
+    let pixels = place.pixels("a.exr");
+    let mean = pixels.iter().sum::<f32>() / pixels.len() as f32;
+    assert!((mean - 1.0).abs() < 0.05, "a white wall under a sky of 1: {mean}");
+    let (_, stderr) = place.succeed(&format!("render dark.gltf {TINY} -o a.png --environment 0"));
+    assert!(!stderr.contains("shines"), "{stderr}");
     assert!(place.picture("a.png").into_rgb8().into_raw().iter().all(|code| *code == 0));
 }
 
@@ -494,4 +503,51 @@ fn without_vulkan_a_scene_is_planned_but_not_rendered() {
     assert!(!refused.status.success() && stderr.lines().count() == 1 && stderr.contains("no Vulkan device"), "{stderr}");
     assert!(stderr.contains("install") && stderr.contains("driver"), "{stderr}");
     assert!(!place.at("a.exr").exists());
+}
+
+/// A picture of the sky by its options, and what is said of wrong ones.
+#[test]
+fn a_picture_of_the_sky_is_turned_scaled_and_refused() {
+    let Some(place) = place_with_device() else { return };
+    place.write("dark.gltf", square(|v| v["scenes"][0]["nodes"] = json!([0, 1])));
+    let sky = image::Rgb32FImage::from_fn(8, 4, |i, _| image::Rgb(if i < 4 { [4.0, 0.0, 1.0] } else { [0.0, 2.0, 1.0] }));
+    for name in ["sky.exr", "sky.hdr"] {
+        sky.save(place.at(name)).unwrap();
+    }
+    let mean = |options: &str| -> [f32; 3] {
+        place.succeed(&format!("render dark.gltf {TINY} -o a.exr {options}"));
+        let pixels = place.pixels("a.exr");
+        [0, 1, 2].map(|channel| pixels.iter().skip(channel).step_by(3).sum::<f32>() / 256.0)
+    };
+    // The wall faces +z, the middle of the right half, and sees no more than that half.
+    let near = |found: [f32; 3], expected: [f32; 3]| {
+        assert!(
+            found.iter().zip(expected).all(|(found, expected)| (found - expected).abs() < 0.12 + 0.05 * expected),
+            "{found:?}, not {expected:?}"
+        );
+    };
+    for name in ["sky.exr", "sky.hdr"] {
+        near(mean(&format!("--environment {name}")), [0.05, 1.975, 1.0]);
+    }
+    near(mean("--environment sky.exr --environment-rotate 180 --environment-strength 0.5"), [1.975, 0.025, 0.5]);
+    // A wall that faces the sun: 100 klx and less, of which a white wall returns 1 / pi, over 683 lm/W.
+    let bright = mean("--sun 180,30")[1];
+    assert!((20.0..80.0).contains(&bright), "{bright}");
+    std::fs::write(place.at("text.hdr"), "no picture").unwrap();
+    for (options, words) in [
+        ("--environment none.exr", "none.exr"),
+        ("--sun 30", "AZIMUTH,ELEVATION"),
+        ("--sun 30,-5", "above 0"),
+        ("--environment text.hdr", "neither a Radiance (.hdr) nor an OpenEXR (.exr)"),
+        ("--environment sky.jpg", ".hdr or .exr"),
+        ("--environment 1 --environment-rotate 5", "turns a picture"),
+        ("--environment sky.exr --environment-strength -1", "must be 0 to 1e9"),
+        ("--aperture -1", "must be 0 or more"),
+        ("--aperture 0.1 --focus 0", "more than 0"),
+        ("--at 1", "has none"),
+    ] {
+        let line = place.refusal(&format!("render dark.gltf {TINY} -o b.exr {options}")).unwrap();
+        assert!(line.contains(words), "{options}: {line}");
+    }
+    assert!(!place.at("b.exr").exists());
 }

@@ -248,12 +248,19 @@ fn layered_scene() -> Scene {
         Material { coverage: Coverage::Blend { alpha: 0.3 }, ..grey(plastic) },
         Material { normal_map: Some(map), ..grey(plastic) },
         grey(glass),
+        grey(Layers { diffuse_transmission: 1.0, specular: 0.0, ..plastic }),
+        Material::layered("plate", Vec3::ZERO, Layers { iridescence: 1.0, film_ior: 2.0, film_thickness: [0.0, 300.0], ..plastic }),
+        grey(Layers { ior: 1.5, dispersion: 20.0, medium: Some(Medium::CLEAR), ..glass }),
     ];
     for (place, material) in materials.into_iter().enumerate() {
-        let corner = DVec3::new(0.08 + 0.17 * place as f64, 0.7, 0.6);
+        // A large wedge, where colours part.
+        let is_wedge = material.layers.dispersion > 0.0;
+        let (size, tilt) = if is_wedge { (0.42, DVec3::Z * 0.15) } else { (0.15, DVec3::ZERO) };
+        let y = if is_wedge { 0.2 } else { 0.7 - 0.2 * (place / 5) as f64 };
+        let corner = DVec3::new(0.08 + 0.17 * (place % 5) as f64, y, 0.6);
         let number = scene.materials.len();
-        let plate = Mesh::parallelogram("plate", corner, DVec3::X * 0.15, DVec3::Y * 0.15, number);
-        let behind = Mesh::parallelogram("plate", corner - DVec3::Z * 0.3, DVec3::Y * 0.15, DVec3::X * 0.15, number);
+        let plate = Mesh::parallelogram("plate", corner, DVec3::X * size, DVec3::Y * size, number);
+        let behind = Mesh::parallelogram("plate", corner - DVec3::Z * 0.3, DVec3::Y * size, DVec3::X * size + tilt, number);
         let tangents = vec![[DVec4::new(1.0, 0.0, 0.0, 1.0); 3]; 2];
         scene.meshes.push(Mesh { tangents: if material.normal_map.is_some() { tangents } else { Vec::new() }, ..plate });
         // The back of the slab.
@@ -269,7 +276,12 @@ fn part_that_shows(effect: Effect) -> Part {
     match effect {
         Effect::ReflectiveCaustics | Effect::RefractiveCaustics => Part::Caustic,
         // The sky is not seen from the camera but in the mirror.
-        Effect::SpecularChains | Effect::SmoothNormals | Effect::Environment | Effect::Transmission | Effect::Media => Part::Specular,
+        Effect::SpecularChains
+        | Effect::SmoothNormals
+        | Effect::Environment
+        | Effect::Transmission
+        | Effect::Media
+        | Effect::Dispersion => Part::Specular,
         Effect::Indirect => Part::Indirect,
         _ => Part::Direct,
     }
@@ -284,8 +296,18 @@ fn an_effect_that_the_scene_needs_is_missed_when_it_is_left_out() {
     effects_are_missed(&gpu, &layered_scene(), &of_layers);
 }
 
-const OF_LAYERS: [Effect; 7] =
-    [Effect::Layers, Effect::Transmission, Effect::Media, Effect::ClearCoat, Effect::Sheen, Effect::NormalMaps, Effect::Alpha];
+const OF_LAYERS: [Effect; 10] = [
+    Effect::Layers,
+    Effect::Transmission,
+    Effect::DiffuseTransmission,
+    Effect::Iridescence,
+    Effect::Media,
+    Effect::Dispersion,
+    Effect::ClearCoat,
+    Effect::Sheen,
+    Effect::NormalMaps,
+    Effect::Alpha,
+];
 
 fn effects_are_missed(gpu: &Gpu, scene: &Scene, effects: &[Effect]) {
     let settings = SceneSettings { rounds: 12, ..small() };

@@ -31,8 +31,10 @@ Surface surface_of(LobeCase at)
     surface.parameter = 0.0;
     surface.base_colour = at.base_colour;
     surface.emission = vec3(0.0);
-    surface.layers = Layers(at.metallic, at.alpha, at.ior, at.specular, vec3(1.0), at.transmission, at.is_solid != 0, 0, at.coat, at.coat_alpha,
-                            at.coat_normal, at.sheen, at.sheen_alpha, at.coverage, false);
+    surface.layers = Layers(at.metallic, at.alpha, at.ior, 0.0, at.specular, vec3(1.0), at.transmission, at.is_solid != 0, 0,
+                            at.diffuse_transmission, at.diffuse_transmission_colour, at.iridescence, at.film_ior, at.film_thickness, at.film_bound,
+                            at.coat, at.coat_alpha, at.coat_normal, at.sheen,
+                            at.sheen_alpha, at.coverage, false);
     return surface;
 }
 
@@ -51,6 +53,7 @@ void main()
         lobes.sheen_chance = at.lobe == LOBE_SHEEN ? lobes.sheen_chance : 0.0;
         lobes.reflection_chance = at.lobe == LOBE_REFLECTION ? lobes.reflection_chance : 0.0;
         lobes.coat_chance = at.lobe == LOBE_COAT ? lobes.coat_chance : 0.0;
+        lobes.beyond_chance = at.lobe == LOBE_DIFFUSE_TRANSMISSION ? lobes.beyond_chance : 0.0;
         lobes.transmission_chance = at.lobe == LOBE_TRANSMISSION ? lobes.transmission_chance : 0.0;
     }
     vec3 u = philox_floats(uvec4(index, 0, 0, 0), uvec2(at.seed, 4)).xyz;

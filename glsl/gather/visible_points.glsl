@@ -63,6 +63,7 @@ void gather_photons()
     bool is_layered = false;
     MattLobes lobes;
     MattCover cover = no_cover();
+    MattFilm film = no_film();
     if (HAS_LAYERS) {
         is_layered = point.surface == SURFACE_LAYERED;
         if (is_layered) {
@@ -71,8 +72,12 @@ void gather_photons()
             if (HAS_SHEEN) {
                 has_cover = true;
             }
+            if (HAS_IRIDESCENCE) {
+                has_cover = true;
+            }
             if (has_cover) {
                 cover = matt_covers[index];
+                film = cover.film;
             }
         }
     }
@@ -129,7 +134,7 @@ void gather_photons()
                         }
                         vec3 arrived = uintBitsToFloat(light.xyz);
                         if (is_layered) {
-                            arrived *= 3.14159265358979324 * matt_brdf(lobes, cover, albedos_at(lobes.alpha, cover, cosine), ns, wo, wi);
+                            arrived *= 3.14159265358979324 * matt_brdf(lobes, cover, film, albedos_at(lobes.alpha, cover, cosine), ns, wo, wi);
                         }
                         precise vec3 flux = arrived * weight;
                         note_unless(is_finite(flux), NONFINITE_ESTIMATE, 0, push.round, index % push.pixel_count);

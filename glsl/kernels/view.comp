@@ -24,11 +24,23 @@ void main()
     vec4 u = stratified_start(number, pixel, push.draws);
     vec2 place = vec2(pixel % push.width, pixel / push.width) + 0.5 + filter_offsets(u.xy);
     vec2 picture = vec2(divide(2.0 * place.x, push.width) - 1.0, 1.0 - divide(2.0 * place.y, push.height));
-    vec3 direction = normalize(push.forward + picture.x * push.right + picture.y * push.up);
+    vec3 origin = push.eye;
+    vec3 way = push.forward + picture.x * push.right + picture.y * push.up;
+    if (push.is_orthographic != 0) {
+        origin += picture.x * push.right + picture.y * push.up;
+        way = push.forward;
+    }
+    if (push.lens_radius > 0.0) {
+        vec2 at = stratified(number, SAMPLES, words_of(pixel, LENS_BLOCK, push.draws)).xy;
+        vec3 start = sample_disc(vec3(0.0), push.forward, push.lens_radius, at);
+        origin += start;
+        way = push.focus * way - start;
+    }
+    vec3 direction = normalize(way);
 
-    start_chain(push.eye, direction, vec3(1.0), u.zw);
+    start_chain(origin, direction, vec3(1.0), u.zw);
     if (HAS_MEDIA) {
-        chain.media = media_at(push.eye);
+        chain.media = media_at(origin);
     }
     if (follow(pixel, number, push.width * push.height, push.draws, push.emitter_count, 0)) {
         put_off(SAMPLES * pixel + number, CHAIN_STEPS);

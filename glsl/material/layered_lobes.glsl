@@ -8,6 +8,7 @@
 struct Lobes {
     MattLobes matt;
     MattCover cover;
+    MattFilm film;
     // With the sharp ones.
     vec3 f0;
     float f90;
@@ -17,6 +18,8 @@ struct Lobes {
     float exact_share;
     // (1 - m) t b
     vec3 transmitted;
+    // All of diffuse transmission but the factors of where light comes from.
+    vec3 beyond;
     // Index of refraction where the eye is, over that beyond; 1 for a thin wall.
     float eta;
     // Light that goes straight on, and the probability with which a path does.
@@ -28,6 +31,7 @@ struct Lobes {
     float reflection_chance;
     float coat_chance;
     float transmission_chance;
+    float beyond_chance;
 };
 
 // Exact Fresnel reflectance at a cosine; 1 in total reflection.
@@ -50,13 +54,27 @@ vec3 dielectric_reflectance(Lobes lobes, bool is_solid, float cosine)
         along *= along;
         share = clamp(divide(reflectance_at(cosine, lobes.eta) - along, 1.0 - along), 0.0, 1.0);
     }
-    return lobes.exact_f0 + (lobes.exact_f90 - lobes.exact_f0) * share;
+    vec3 exact = lobes.exact_f0 + (lobes.exact_f90 - lobes.exact_f0) * share;
+    if (HAS_IRIDESCENCE) {
+        if (lobes.film.share > 0.0) {
+            // The same from both sides: it is asked where the ray is in the rarer medium.
+            float outside = is_solid && lobes.eta > 1.0 ? sqrt(max(refracted_cosine_squared(cosine, lobes.eta), 0.0)) : cosine;
+            vec3 film = film_reflectance(lobes.exact_f0, lobes.film.ior, lobes.film.thickness, outside);
+            exact = (1.0 - lobes.film.share) * exact + lobes.film.share * film;
+        }
+    }
+    return exact;
 }
 
 // Colour of what the base reflects, or transmits, at v.h.
 vec3 base_lobe_colour(Lobes lobes, bool is_solid, float cosine, bool is_beyond)
 {
     vec3 colour = lobes.f0 + (lobes.f90 - lobes.f0) * fifth_power(clamp(1.0 - cosine, 0.0, 1.0));
+    if (HAS_IRIDESCENCE) {
+        if (lobes.film.share > 0.0) {
+            colour = under_film(colour, lobes.film, cosine);
+        }
+    }
     if (HAS_TRANSMISSION) {
         if (is_beyond || lobes.exact_share > 0.0) {
             vec3 exact = dielectric_reflectance(lobes, is_solid, cosine);
@@ -126,6 +144,7 @@ Lobes lobes_of(Surface surface, vec3 wo, float eta)
     lobes.f0 = layers.metallic * base + schlick_share * f0;
     lobes.f90 = layers.metallic + schlick_share * f90;
 
+    lobes.film = no_film();
     MattCover cover = no_cover();
     if (HAS_COATS) {
         cover.coat = layers.coat;
@@ -137,12 +156,19 @@ Lobes lobes_of(Surface surface, vec3 wo, float eta)
         cover.sheen = layers.sheen;
         cover.sheen_alpha = layers.sheen_alpha;
     }
+    if (HAS_IRIDESCENCE) {
+        lobes.film = MattFilm(layers.iridescence, layers.film_ior, layers.film_thickness, schlick_share, f0, layers.metallic, base, 0);
+    }
     LayerAlbedos seen = albedos_at(layers.alpha, cover, cosine);
     cover.coat_albedo = seen.coat;
     cover.sheen_albedo = seen.sheen;
     lobes.cover = cover;
 
     float e0 = largest(f0), e90 = f90;
+    if (HAS_IRIDESCENCE) {
+        e0 += layers.iridescence * (layers.film_bound - e0);
+        e90 += layers.iridescence * (1.0 - e90);
+    }
     float below_diffuse = below_base(e0, e90, seen.base) * (1.0 - seen.coat);
     vec2 mean = mean_albedo(layers.alpha);
     float left = 1.0 - (e0 * mean.x + e90 * mean.y);
@@ -157,8 +183,18 @@ Lobes lobes_of(Surface surface, vec3 wo, float eta)
     lobes.matt.e0 = e0;
     lobes.matt.e90 = e90;
     lobes.matt.alpha = layers.alpha;
-    lobes.matt.diffuse = opaque_share * base * (0.31830988618379067 * divide(below_diffuse, max(left, 1e-6)));
+    float left_over = (0.31830988618379067 * divide(below_diffuse, max(left, 1e-6)));
+    lobes.beyond = vec3(0.0);
+    if (HAS_DIFFUSE_TRANSMISSION) {
+        vec3 beyond = opaque_share * layers.diffuse_transmission * layers.diffuse_transmission_colour;
+        lobes.beyond = beyond * left_over;
+        base *= 1.0 - layers.diffuse_transmission;
+    }
+    lobes.matt.diffuse = opaque_share * base * left_over;
     bool is_in_map = is_matt_reflection(lobes, layers);
+    if (HAS_IRIDESCENCE) {
+        lobes.film.is_matt = uint(is_in_map);
+    }
     lobes.matt.f0 = is_in_map ? lobes.f0 : vec3(0.0);
     lobes.matt.f90 = is_in_map ? lobes.f90 : 0.0;
 
@@ -166,7 +202,18 @@ Lobes lobes_of(Surface surface, vec3 wo, float eta)
     float left_by_sheen = below_sheen(cover.sheen, seen.sheen);
     float below = (1.0 - seen.coat) * left_by_sheen;
     float diffuse = largest(opaque_share * base) * below_diffuse * left_by_sheen;
+    float beyond = 0.0;
+    if (HAS_DIFFUSE_TRANSMISSION) {
+        beyond = opaque_share * layers.diffuse_transmission * largest(layers.diffuse_transmission_colour) * below_diffuse * left_by_sheen;
+    }
     vec3 reflected = lobes.f0 * seen.base.x + lobes.f90 * seen.base.y;
+    if (HAS_IRIDESCENCE) {
+        if (layers.iridescence > 0.0) {
+            // Elsewhere the film may reflect what it does not here.
+            vec3 film = max(under_film(vec3(0.0), lobes.film, cosine), vec3(0.02 * layers.iridescence * (layers.metallic + schlick_share)));
+            reflected = (1.0 - layers.iridescence) * reflected + (seen.base.x + seen.base.y) * film;
+        }
+    }
     vec3 transmitted = vec3(0.0);
     if (HAS_TRANSMISSION) {
         if (layers.transmission > 0.0) {
@@ -198,16 +245,23 @@ Lobes lobes_of(Surface surface, vec3 wo, float eta)
         lobes.pass_chance = min(largest(lobes.passing), 1.0);
     }
     float sum = diffuse + sheen + reflection + coat + transmission;
+    if (HAS_DIFFUSE_TRANSMISSION) {
+        sum += beyond;
+    }
     float share = sum > 0.0 ? divide(1.0, sum) : 0.0;
     lobes.diffuse_chance = diffuse * share;
     lobes.sheen_chance = sheen * share;
     lobes.reflection_chance = reflection * share;
     lobes.coat_chance = coat * share;
     lobes.transmission_chance = transmission * share;
+    lobes.beyond_chance = beyond * share;
     if (layers.is_unlit) {
-        lobes.diffuse_chance = lobes.sheen_chance = lobes.reflection_chance = lobes.coat_chance = lobes.transmission_chance = 0.0;
+        lobes.diffuse_chance = lobes.sheen_chance = lobes.reflection_chance = lobes.coat_chance = lobes.transmission_chance = lobes.beyond_chance = 0.0;
         lobes.matt.diffuse = lobes.matt.f0 = vec3(0.0);
         lobes.matt.f90 = 0.0;
+        if (HAS_IRIDESCENCE) {
+            lobes.film.is_matt = 0;
+        }
     }
     return lobes;
 }
@@ -298,7 +352,7 @@ LobeLight weigh_light(Surface surface, Lobes lobes, vec3 wo, vec3 wi, float ligh
     bool is_beyond = dot(wi, surface.ng) <= 0.0;
     LayerAlbedos lit = albedos_at(layers.alpha, lobes.cover, abs(cosine));
     if (!is_beyond && cosine > 0.0) {
-        light.matt = matt_brdf(lobes.matt, lobes.cover, lit, surface.ns, wo, wi) * cosine;
+        light.matt = matt_brdf(lobes.matt, lobes.cover, lobes.film, lit, surface.ns, wo, wi) * cosine;
         if (asks_matt) {
             light.matt *= light_share(light_density, density_of_matt_lobes(surface, lobes, wo, wi));
         }
@@ -321,6 +375,12 @@ LobeLight weigh_light(Surface surface, Lobes lobes, vec3 wo, vec3 wi, float ligh
         if (found.density > 0.0) {
             vec3 colour = base_lobe_colour(lobes, layers.is_solid, found.along, is_beyond) * below_cover(lobes.cover, lit);
             light.sharp += colour * (found.value * light_share(light_density, chance * found.density));
+        }
+    }
+    if (HAS_DIFFUSE_TRANSMISSION) {
+        if (is_beyond && cosine < 0.0 && lobes.beyond_chance > 0.0) {
+            float density = lobes.beyond_chance * (0.31830988618379067 * -cosine);
+            light.sharp += below_all(lobes.beyond, lobes.matt, lobes.cover, lit) * (-cosine * light_share(light_density, density));
         }
     }
     if (HAS_COATS) {

@@ -5,6 +5,7 @@ const uint LOBE_REFLECTION = 1;
 const uint LOBE_COAT = 2;
 const uint LOBE_TRANSMISSION = 3;
 const uint LOBE_SHEEN = 4;
+const uint LOBE_DIFFUSE_TRANSMISSION = 5;
 
 const float SAME_INDEX = 1e-4;
 
@@ -37,6 +38,9 @@ ChosenLobe choose_lobe(Lobes lobes, float u)
     if (HAS_SHEEN) {
         consider(chosen, LOBE_SHEEN, lobes.sheen_chance, u);
     }
+    if (HAS_DIFFUSE_TRANSMISSION) {
+        consider(chosen, LOBE_DIFFUSE_TRANSMISSION, lobes.beyond_chance, u);
+    }
     return chosen;
 }
 
@@ -48,6 +52,17 @@ Scatter sample_broad_lobe(Surface surface, Lobes lobes, vec3 wo, vec2 u, ChosenL
     vec3 brdf = chosen.lobe == LOBE_SHEEN ? sheen_brdf(lobes.cover, lit, surface.ns, wo, wi) : diffuse_brdf(lobes.matt, lobes.cover, lit);
     bool is_alive = dot(wi, surface.ng) > 0.0;
     return Scatter(wi, brdf * divide(3.14159265358979324, chosen.chance), is_alive, false, false, 0.0);
+}
+
+// The same on the other side.
+Scatter sample_beyond(Surface surface, Lobes lobes, vec2 u, ChosenLobe chosen)
+{
+    vec3 wi = to_frame(sample_cosine_hemisphere(u.x, u.y), -surface.ns);
+    float cosine = max(-dot(wi, surface.ns), 0.0);
+    LayerAlbedos lit = albedos_at(surface.layers.alpha, lobes.cover, cosine);
+    vec3 btdf = below_all(lobes.beyond, lobes.matt, lobes.cover, lit);
+    float density = chosen.chance * (0.31830988618379067 * cosine);
+    return Scatter(wi, btdf * divide(3.14159265358979324, chosen.chance), dot(wi, surface.ng) < 0.0 && density > 0.0, true, false, density);
 }
 
 // Light that a facet reflects or transmits. The normals of facets are sampled as often as they are seen.
@@ -121,6 +136,11 @@ Scatter sample_layered(Surface surface, Lobes lobes, vec3 wo, vec3 u, bool carri
     }
     if (chosen.lobe == LOBE_DIFFUSE || chosen.lobe == LOBE_SHEEN) {
         return sample_broad_lobe(surface, lobes, wo, u.yz, chosen);
+    }
+    if (HAS_DIFFUSE_TRANSMISSION) {
+        if (chosen.lobe == LOBE_DIFFUSE_TRANSMISSION) {
+            return sample_beyond(surface, lobes, u.yz, chosen);
+        }
     }
     return sample_facet(surface, lobes, wo, u.yz, chosen, carries_radiance);
 }

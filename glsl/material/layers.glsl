@@ -11,11 +11,18 @@ struct Layers {
     float metallic;
     float alpha;
     float ior;
+    float ior_spread;
     float specular;
     vec3 specular_colour;
     float transmission;
     bool is_solid;
     uint medium; // its number; 0: none
+    float diffuse_transmission;
+    vec3 diffuse_transmission_colour;
+    float iridescence;
+    float film_ior;
+    float film_thickness;
+    float film_bound;
     float coat;
     float coat_alpha;
     vec3 coat_normal;

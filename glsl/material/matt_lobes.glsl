@@ -46,9 +46,16 @@ vec3 ggx_lobe(float alpha, vec3 f0, float f90, vec3 wo, vec3 wi, vec3 n)
     return ggx_density(to_local(h, n), alpha) * ggx_visibility(alpha, cos_l, cos_v) * (f0 + (f90 - f0) * grazing);
 }
 
+#include "material/film.glsl"
+
+MattFilm no_film()
+{
+    return MattFilm(0.0, 1.0, 0.0, 0.0, vec3(0.0), 0.0, vec3(0.0), 0);
+}
+
 MattCover no_cover()
 {
-    return MattCover(0.0, 1.0, 0, 0, 0.0, 0.0, vec3(0.0), 1.0);
+    return MattCover(0.0, 1.0, 0, 0, 0.0, 0.0, vec3(0.0), 1.0, no_film());
 }
 
 // What layers reflect of all light from a direction at a cosine to the normal.
@@ -105,10 +112,10 @@ float below_cover(MattCover cover, LayerAlbedos lit)
     return below;
 }
 
-// The diffuse lobe under coat and sheen, 1/sr.
-vec3 diffuse_brdf(MattLobes lobes, MattCover cover, LayerAlbedos lit)
+// A diffuse lobe below the base's reflection, coat and sheen.
+vec3 below_all(vec3 diffuse, MattLobes lobes, MattCover cover, LayerAlbedos lit)
 {
-    vec3 diffuse = lobes.diffuse * below_base(lobes.e0, lobes.e90, lit.base);
+    diffuse *= below_base(lobes.e0, lobes.e90, lit.base);
     if (HAS_COATS) {
         diffuse *= 1.0 - lit.coat;
     }
@@ -116,6 +123,12 @@ vec3 diffuse_brdf(MattLobes lobes, MattCover cover, LayerAlbedos lit)
         diffuse *= below_sheen(cover.sheen, max(cover.sheen_albedo, lit.sheen));
     }
     return diffuse;
+}
+
+// The diffuse lobe under coat and sheen, 1/sr.
+vec3 diffuse_brdf(MattLobes lobes, MattCover cover, LayerAlbedos lit)
+{
+    return below_all(lobes.diffuse, lobes, cover, lit);
 }
 
 // Sheen under a coat, 1/sr.
@@ -134,10 +147,21 @@ vec3 sheen_brdf(MattCover cover, LayerAlbedos lit, vec3 n, vec3 wo, vec3 wi)
 }
 
 // The BRDF of all matt lobes together, 1/sr, from above the surface; `lit` are the albedos towards wi.
-vec3 matt_brdf(MattLobes lobes, MattCover cover, LayerAlbedos lit, vec3 n, vec3 wo, vec3 wi)
+vec3 matt_brdf(MattLobes lobes, MattCover cover, MattFilm film, LayerAlbedos lit, vec3 n, vec3 wo, vec3 wi)
 {
     vec3 sum = diffuse_brdf(lobes, cover, lit) + sheen_brdf(cover, lit, n, wo, wi);
-    if (lobes.f90 > 0.0 || largest(lobes.f0) > 0.0) {
+    bool is_bare = true;
+    if (HAS_IRIDESCENCE) {
+        if (film.share > 0.0) {
+            is_bare = false;
+            if (film.is_matt != 0) {
+                float along = dot(wo, normalize(wo + wi));
+                vec3 colour = lobes.f0 + (lobes.f90 - lobes.f0) * fifth_power(clamp(1.0 - along, 0.0, 1.0));
+                sum += ggx_lobe(lobes.alpha, vec3(1.0), 1.0, wo, wi, n).x * under_film(colour, film, along) * below_cover(cover, lit);
+            }
+        }
+    }
+    if (is_bare && (lobes.f90 > 0.0 || largest(lobes.f0) > 0.0)) {
         sum += ggx_lobe(lobes.alpha, lobes.f0, lobes.f90, wo, wi, n) * below_cover(cover, lit);
     }
     if (HAS_COATS) {

@@ -14,10 +14,23 @@ uint medium_removed(uint media, uint medium)
     return media;
 }
 
-float index_in(uint media)
+const float MAX_IOR = 100.0;
+
+// Index of refraction for a channel, 0 to 2: red has least.
+float index_for(float ior, float spread, uint channel)
+{
+    if (HAS_DISPERSION) {
+        if (spread > 0.0) {
+            return clamp(ior + (float(channel) - 1.0) * spread, 1.0, MAX_IOR);
+        }
+    }
+    return ior;
+}
+
+float index_in(uint media, uint channel)
 {
     uint medium = media & 255u;
-    return medium == 0 ? 1.0 : layered_materials[medium - 1].medium_ior;
+    return medium == 0 ? 1.0 : index_for(layered_materials[medium - 1].medium_ior, layered_materials[medium - 1].medium_spread, channel);
 }
 
 // Behind a boundary.
@@ -27,15 +40,58 @@ uint media_beyond(Surface surface, uint media)
     return surface.front ? (media << 8) | medium : medium_removed(media, medium);
 }
 
-// Index of refraction where the ray came from over that beyond, of a solid.
-float index_ratio(Surface surface, uint media)
+float spread_in(uint media)
 {
-    float ior = max(surface.layers.ior, 1e-3);
+    uint medium = media & 255u;
+    return medium == 0 ? 0.0 : layered_materials[medium - 1].medium_spread;
+}
+
+// Whether colours part at a surface.
+bool is_dispersive(Surface surface, uint media)
+{
+    if (!surface.layers.is_solid || surface.layers.transmission == 0.0) {
+        return false;
+    }
+    float spread = surface.layers.ior_spread;
+    if (HAS_MEDIA) {
+        spread = max(spread, max(spread_in(media), spread_in(media_beyond(surface, media))));
+    }
+    return spread > 0.0;
+}
+
+// One of the channels that a path has light in, each as likely. Without light it is the middle one.
+uint choose_channel(vec3 light, float u)
+{
+    uint count = uint(light.x > 0.0) + uint(light.y > 0.0) + uint(light.z > 0.0);
+    uint left = min(uint(u * float(count)), max(count, 1u) - 1);
+    uint chosen = 1;
+    for (uint channel = 0; channel < 3; channel++) {
+        if (light[channel] > 0.0) {
+            chosen = left == 0 ? channel : chosen;
+            left--;
+        }
+    }
+    return chosen;
+}
+
+// The light of that channel, which stands for all that had as good a chance.
+vec3 light_of_channel(vec3 light, uint channel)
+{
+    float count = float(uint(light.x > 0.0) + uint(light.y > 0.0) + uint(light.z > 0.0));
+    vec3 kept = vec3(0.0);
+    kept[channel] = count * light[channel];
+    return kept;
+}
+
+// Index of refraction where the ray came from over that beyond, of a solid, for light of a channel.
+float index_ratio(Surface surface, uint media, uint channel)
+{
+    float ior = max(index_for(surface.layers.ior, surface.layers.ior_spread, channel), 1e-3);
     if (HAS_MEDIA) {
         if (surface.layers.medium != 0) {
             // Who sees the back of a solid is inside it.
             bool is_known = surface.front || medium_removed(media, surface.layers.medium) != media;
-            return divide(is_known ? index_in(media) : ior, index_in(media_beyond(surface, media)));
+            return divide(is_known ? index_in(media, channel) : ior, index_in(media_beyond(surface, media), channel));
         }
     }
     return surface.front ? divide(1.0, ior) : ior;

@@ -185,6 +185,7 @@ void add_layers(inout Surface surface, Hit hit, uint material_index, vec3 wo, fl
     float roughness = material.roughness * values[LAYER_METALLIC_ROUGHNESS].g;
     layers.alpha = roughness * roughness;
     layers.ior = material.ior;
+    layers.ior_spread = 0.0;
     layers.specular = material.specular * values[LAYER_SPECULAR].a;
     layers.specular_colour = material.specular_colour * values[LAYER_SPECULAR_COLOUR].rgb;
     layers.transmission = 0.0;
@@ -193,6 +194,26 @@ void add_layers(inout Surface surface, Hit hit, uint material_index, vec3 wo, fl
     if (HAS_TRANSMISSION) {
         layers.transmission = material.transmission * values[LAYER_TRANSMISSION].r;
         layers.is_solid = material.is_solid != 0;
+    }
+    if (HAS_DISPERSION) {
+        layers.ior_spread = material.ior_spread;
+    }
+    layers.diffuse_transmission = 0.0;
+    layers.diffuse_transmission_colour = vec3(0.0);
+    if (HAS_DIFFUSE_TRANSMISSION) {
+        layers.diffuse_transmission = material.diffuse_transmission * values[LAYER_DIFFUSE_TRANSMISSION].a;
+        layers.diffuse_transmission_colour = material.diffuse_transmission_colour * values[LAYER_DIFFUSE_TRANSMISSION_COLOUR].rgb;
+        layers.is_solid = material.is_solid != 0;
+    }
+    layers.iridescence = 0.0;
+    layers.film_ior = 1.0;
+    layers.film_thickness = 0.0;
+    layers.film_bound = 0.0;
+    if (HAS_IRIDESCENCE) {
+        layers.iridescence = material.iridescence * values[LAYER_IRIDESCENCE].r;
+        layers.film_ior = material.film_ior;
+        layers.film_thickness = material.film_least + (material.film_most - material.film_least) * values[LAYER_IRIDESCENCE_THICKNESS].g;
+        layers.film_bound = material.film_bound;
     }
     layers.coat = 0.0;
     layers.coat_alpha = 1.0;

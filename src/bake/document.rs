@@ -10,7 +10,7 @@ use super::{Layout, MeshLightmap};
 use crate::scene::light::{LUMENS_PER_WATT, LightKind};
 use crate::scene::material::{Coverage, Layers, Medium, NormalMap, TextureUse, UvTransform};
 use crate::scene::texture::{Filter, Wrap};
-use crate::scene::{Camera, Light, Material, Mesh, Scene, Surface};
+use crate::scene::{Camera, Light, Material, Mesh, Projection, Scene, Surface};
 
 /// How a document shows the baked light.
 #[derive(Debug, Clone, Copy, PartialEq, Eq)]
@@ -357,6 +357,7 @@ impl Document {
             add("KHR_materials_volume", after_a_metre);
         }
         let ior = |of: &Layers| json!({"ior": of.ior});
+        let dispersion = |of: &Layers| json!({"dispersion": of.dispersion});
         let specular = |of: &Layers| {
             let mut value = json!({"specularFactor": of.specular, "specularColorFactor": of.specular_colour.to_array()});
             set(&mut value, "specularTexture", of.specular_texture);
@@ -366,6 +367,21 @@ impl Document {
         let transmission = |of: &Layers| {
             let mut value = json!({"transmissionFactor": of.transmission});
             set(&mut value, "transmissionTexture", of.transmission_texture);
+            value
+        };
+        let beyond = |of: &Layers| {
+            let mut value = json!({"diffuseTransmissionFactor": of.diffuse_transmission,
+                "diffuseTransmissionColorFactor": of.diffuse_transmission_colour.to_array()});
+            set(&mut value, "diffuseTransmissionTexture", of.diffuse_transmission_texture);
+            set(&mut value, "diffuseTransmissionColorTexture", of.diffuse_transmission_colour_texture);
+            value
+        };
+        let film = |of: &Layers| {
+            let [least, most] = of.film_thickness;
+            let mut value = json!({"iridescenceFactor": of.iridescence, "iridescenceIor": of.film_ior,
+                "iridescenceThicknessMinimum": least, "iridescenceThicknessMaximum": most});
+            set(&mut value, "iridescenceTexture", of.iridescence_texture);
+            set(&mut value, "iridescenceThicknessTexture", of.film_thickness_texture);
             value
         };
         let coat = |of: &Layers| {
@@ -385,8 +401,11 @@ impl Document {
         let own_and_usual = |part: &dyn Fn(&Layers) -> Value| [layers, Layers::default()].map(|of| part(&of));
         for (name, [own, usual]) in [
             ("KHR_materials_ior", own_and_usual(&ior)),
+            ("KHR_materials_dispersion", own_and_usual(&dispersion)),
             ("KHR_materials_specular", own_and_usual(&specular)),
             ("KHR_materials_transmission", own_and_usual(&transmission)),
+            ("KHR_materials_diffuse_transmission", own_and_usual(&beyond)),
+            ("KHR_materials_iridescence", own_and_usual(&film)),
             ("KHR_materials_clearcoat", own_and_usual(&coat)),
             ("KHR_materials_sheen", own_and_usual(&sheen)),
         ] {
@@ -405,7 +424,14 @@ impl Document {
         self.nodes.push(json!({
             "name": camera.name, "camera": index, "translation": camera.eye.to_array(), "rotation": rotation.to_array(),
         }));
-        json!({"name": camera.name, "type": "perspective", "perspective": {"yfov": camera.vertical_view, "znear": near}})
+        match camera.projection {
+            Projection::Perspective { vertical_view } => {
+                json!({"name": camera.name, "type": "perspective", "perspective": {"yfov": vertical_view, "znear": near}})
+            }
+            Projection::Orthographic { half_height } => json!({"name": camera.name, "type": "orthographic", "orthographic": {
+                "xmag": half_height * camera.aspect.unwrap_or(1.0), "ymag": half_height, "znear": 0, "zfar": 1e4 * near,
+            }}),
+        }
     }
 }
 
@@ -439,7 +465,7 @@ fn light_of(light: &Light) -> Option<(Value, Value)> {
             Some(json!({"innerConeAngle": inner_angle, "outerConeAngle": outer_angle})),
         ),
         LightKind::Directional { direction, irradiance } => ("directional", irradiance, json!({"rotation": towards(direction)}), None),
-        LightKind::Disc { .. } | LightKind::Environment { .. } => return None,
+        LightKind::Disc { .. } | LightKind::Environment { .. } | LightKind::Sky(_) => return None,
     };
     let brightest = strength.max_element().max(f32::MIN_POSITIVE);
     let mut value = json!({

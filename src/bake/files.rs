@@ -1,33 +1,41 @@
 //! The files of a bake: what each is called and what it holds.
 
-use std::collections::HashMap;
+use std::collections::{HashMap, HashSet};
 use std::f32::consts::PI;
 
 use glam::Vec3;
+use serde_json::{Value, json};
 
 use super::document::{self, Geometry, Kind};
-use super::names::{ENDINGS, ERROR, GEOMETRY, IRRADIANCE, LIGHTMAP, LIGHTMAP_SCENE, Names, RADIANCE, RADIANCE_SCENE};
-use super::{Layout, Map, MeshLightmap};
-use crate::error::Result;
+use super::names::{self, ENDINGS, ERROR, GEOMETRY, IRRADIANCE, LIGHTMAP, LIGHTMAP_SCENE, Names, PAGE_ENDINGS, RADIANCE, RADIANCE_SCENE};
+use super::original::{self, Extended};
+use super::pages::Pages;
+use super::{Layout, Map, MeshLightmap, Object};
+use crate::error::{Error, Result};
 use crate::output::colour;
 use crate::output::destination::{Folder, write_all};
+use crate::scene::gltf::source::{Beside, File, binary_file};
 use crate::scene::material::TextureUse;
 use crate::scene::{Material, Scene};
 
-/// Writes all files of a bake, or none. `exposure` multiplies radiance (and irradiance / pi) in every
+/// A file that was written, and what it is for.
+pub struct Written {
+    pub name: String,
+    pub purpose: String,
+}
+
+/// Writes all files of a built-in scene's bake, or none. `exposure` multiplies radiance (and irradiance / pi) in every
 /// PNG and in the scenes; EXR files hold values untouched. `maps` are all of [`Layout::maps`].
 pub fn write(folder: &Folder, scene: &Scene, layout: &Layout, maps: &[Map], exposure: f32) -> Result<()> {
     let names = Names::new(scene, layout);
     let geometry = Geometry::new(scene, layout);
-    let intensities: HashMap<usize, f32> = maps.iter().map(|map| (map.mesh, ceiling(map) * exposure)).collect();
-    let texture = |index: usize| {
-        let texture = &scene.textures[index];
-        (names.texture(index), colour::texture_png(texture))
-    };
-    let textures = document::textures_used(scene).into_iter().map(texture);
+    let intensities: HashMap<usize, f32> =
+        maps.iter().flat_map(|map| layout.objects[map.object].meshes.iter().map(|mesh| (*mesh, ceiling(map) * exposure))).collect();
+    let textures =
+        document::textures_used(scene).into_iter().map(|index| (names.texture(index), colour::texture_png(&scene.textures[index])));
     let pictures = maps.iter().flat_map(|map| {
-        let stem = names.stem(map.mesh);
-        let lightmap = layout.meshes[map.mesh].as_ref().expect("a map belongs to a mesh that has one");
+        let stem = names.stem(map.object);
+        let object = &layout.objects[map.object];
         // Encoded only when it is their turn: pictures of a large scene need not lie in memory together.
         let encode = move |ending: &str| match ending {
             IRRADIANCE => colour::exr(map.width, map.height, &map.irradiance),
@@ -36,7 +44,7 @@ pub fn write(folder: &Folder, scene: &Scene, layout: &Layout, maps: &[Map], expo
                 let ceiling = ceiling(map);
                 colour::linear_png(map.width, map.height, map.irradiance.iter().map(|value| *value / ceiling))
             }
-            RADIANCE => colour::png(map.width, map.height, radiance(scene, lightmap, map).into_iter().map(|value| value * exposure)),
+            RADIANCE => radiance_png(scene, layout, object, map, exposure),
             _ => colour::png(map.width, map.height, map.irradiance.iter().map(|value| *value * (exposure / PI))),
         };
         ENDINGS.into_iter().map(move |ending| (format!("{stem}{ending}"), encode(ending)))
@@ -47,6 +55,138 @@ pub fn write(folder: &Folder, scene: &Scene, layout: &Layout, maps: &[Map], expo
     });
     let files = pictures.chain(textures).chain([(GEOMETRY.to_owned(), geometry.bytes.clone())]).chain(documents);
     write_all(files.map(|(name, content)| (folder.file(&name), content)))
+}
+
+/// The user's file with lightmap coordinates, ready to be written with the light. What is wrong with the file is found here, before
+/// there is light.
+pub struct IntoFile<'a> {
+    file: &'a File,
+    scene: &'a Scene,
+    layout: &'a Layout,
+    pages: &'a Pages,
+    extended: Extended,
+    beside: Vec<Beside>,
+    /// Its name, which the copy has too.
+    name: String,
+    /// Of what a `.gltf` file needs beside it.
+    buffer_name: String,
+    preview_name: String,
+    /// Of the pages.
+    pictures: Vec<String>,
+    errors: Vec<String>,
+    pub warnings: Vec<String>,
+}
+
+impl<'a> IntoFile<'a> {
+    pub fn new(folder: &Folder, file: &'a File, scene: &'a Scene, layout: &'a Layout, pages: &'a Pages) -> Result<IntoFile<'a>> {
+        let [name, stem] =
+            [file.path.file_name(), file.path.file_stem()].map(|part| part.unwrap_or_default().to_string_lossy().into_owned());
+        let target = folder.path().join(&name);
+        if matches!((target.canonicalize(), file.path.canonicalize()), (Ok(target), Ok(own)) if target == own) {
+            let allowed = format!("holds the scene itself ({name}), which is never overwritten; name another folder");
+            return Err(Error::setting("-o", folder.path().display(), allowed));
+        }
+        let beside = file.beside();
+        let mut taken: HashSet<String> = beside.iter().map(|beside| beside.name.to_lowercase()).chain([name.to_lowercase()]).collect();
+        let mut one = |ending: &str, extension: &str| {
+            let wanted = format!("{stem}_{ending}");
+            let name = names::stems([wanted.as_str()].into_iter(), &[extension], taken.clone()).remove(0) + extension;
+            taken.insert(name.to_lowercase());
+            name
+        };
+        let (preview_name, buffer_name) = (one("preview", ".glb"), one("lightmap", ".bin"));
+        let are_alone =
+            pages.sizes.len() == layout.objects.len() && pages.places.iter().enumerate().all(|(object, place)| place.page == object);
+        let wanted = (0..pages.sizes.len()).map(|page| if are_alone { layout.objects[page].name.as_str() } else { "lightmap" });
+        let stems = names::stems(wanted, &PAGE_ENDINGS, taken);
+        let [pictures, errors] = PAGE_ENDINGS.map(|ending| stems.iter().map(|stem| format!("{stem}{ending}")).collect::<Vec<String>>());
+        let extended = original::extended(file, scene, layout, pages, &pictures, &errors)?;
+        let lost = beside.iter().filter_map(|beside| beside.content.as_ref().err());
+        let lost = lost.map(|reason| format!("a file that the scene names {reason}: it is not copied"));
+        let warnings = extended.warnings.iter().cloned().chain(lost).collect();
+        Ok(IntoFile { file, scene, layout, pages, extended, beside, name, buffer_name, preview_name, pictures, errors, warnings })
+    }
+
+    /// Writes everything, or nothing. With `preview_exposure` also a copy for viewers that shows the radiance times that.
+    pub fn write(self, folder: &Folder, maps: &[Map], preview_exposure: Option<f32>) -> Result<Vec<Written>> {
+        let mut written = Vec::new();
+        let mut say = |name: &str, purpose: String| written.push(Written { name: name.to_owned(), purpose });
+        let mut files = Vec::new();
+        // The new coordinates belong to single vertices, which compression would number anew.
+        let unpacked = if self.file.is_unpacked { " its meshes no longer compressed," } else { "" };
+        for (own, content) in original::files(self.file, &self.extended, &self.name, &self.buffer_name) {
+            let purpose = match own == self.name {
+                true => format!("your file,{unpacked} with lightmap coordinates; extras of nodes name the lightmap ({})", original::KEY),
+                false => "the coordinates that were added to your file".to_owned(),
+            };
+            say(&own, purpose);
+            files.push((own, content));
+        }
+        for (name, content) in self.beside.into_iter().filter_map(|beside| Some((beside.name, beside.content.ok()?))) {
+            say(&name, "a copy of what your file needs".to_owned());
+            files.push((name, content));
+        }
+        for (page, (picture, error)) in self.pictures.iter().zip(&self.errors).enumerate() {
+            let objects: Vec<&Object> = self
+                .pages
+                .places
+                .iter()
+                .zip(&self.layout.objects)
+                .filter(|(place, _)| place.page == page)
+                .map(|(_, object)| object)
+                .collect();
+            let of = match objects[..] {
+                [object] => format!("'{}'", object.name),
+                _ => format!("{} objects", objects.len()),
+            };
+            say(picture, format!("irradiance of {of}, W/m2, linear: for engines"));
+            say(error, "its standard error, W/m2".to_owned());
+        }
+        let preview = preview_exposure.map(|exposure| {
+            say(&self.preview_name, "shows the baked light in any viewer; not for engines".to_owned());
+            (self.preview_name.clone(), preview(self.scene, self.layout, maps, exposure))
+        });
+        let of_pages = self.pages.pictures(maps);
+        let exrs = of_pages.iter().zip(self.pictures.iter().zip(&self.errors)).flat_map(|(page, (picture, error))| {
+            let exr = |name: &String, values: &[Vec3]| (name.clone(), colour::exr(page.width, page.height, values));
+            [exr(picture, &page.irradiance), exr(error, &page.error)]
+        });
+        write_all(files.into_iter().chain(exrs).chain(preview).map(|(name, content)| (folder.file(&name), content)))?;
+        Ok(written)
+    }
+}
+
+/// A copy of a scene that shows the baked light in any viewer, as one `.glb` file.
+pub fn preview(scene: &Scene, layout: &Layout, maps: &[Map], exposure: f32) -> Vec<u8> {
+    let names = Names::new(scene, layout);
+    let geometry = Geometry::new(scene, layout);
+    let mut json = document::document(scene, layout, &geometry, &names, Kind::Radiance, |_| 1.0);
+    let mut pictures: HashMap<String, Vec<u8>> = document::textures_used(scene)
+        .into_iter()
+        .map(|index| (names.texture(index), colour::texture_png(&scene.textures[index])))
+        .collect();
+    for map in maps {
+        let object = &layout.objects[map.object];
+        pictures.insert(names.radiance(object.meshes[0]), radiance_png(scene, layout, object, map, exposure));
+    }
+    let mut bytes = geometry.bytes;
+    let mut views: Vec<Value> = json["bufferViews"].as_array().cloned().unwrap_or_default();
+    for image in json.get_mut("images").and_then(Value::as_array_mut).into_iter().flatten() {
+        let picture = image["uri"].as_str().and_then(|name| pictures.get(name)).expect("every picture is there");
+        bytes.resize(bytes.len().next_multiple_of(4), 0);
+        views.push(json!({"buffer": 0, "byteOffset": bytes.len(), "byteLength": picture.len()}));
+        bytes.extend(picture);
+        *image = json!({"bufferView": views.len() - 1, "mimeType": "image/png"});
+    }
+    json["bufferViews"] = views.into();
+    json["buffers"] = json!([{"byteLength": bytes.len()}]);
+    binary_file(&json, &bytes, &[])
+}
+
+/// What leaves the front of an object's texels, times the exposure, as sRGB.
+fn radiance_png(scene: &Scene, layout: &Layout, object: &Object, map: &Map, exposure: f32) -> Vec<u8> {
+    let values: Vec<Vec3> = object.meshes.iter().flat_map(|mesh| radiance(scene, layout.part(*mesh), map)).collect();
+    colour::png(map.width, map.height, object.spread(&values).into_iter().map(|value| value * exposure))
 }
 
 /// Irradiance that is white in the map's linear PNG: the brightest, but for the brightest thousandth
@@ -61,7 +201,7 @@ fn ceiling(map: &Map) -> f32 {
     *values.select_nth_unstable_by(place, f32::total_cmp).1
 }
 
-/// What leaves the front of every texel, W/m2/sr: irradiance by the base colour, and the emission.
+/// What leaves the front of every covered texel, W/m2/sr: irradiance by the base colour, and the emission.
 /// For a glossy surface that is the mean over all directions.
 fn radiance(scene: &Scene, lightmap: &MeshLightmap, map: &Map) -> Vec<Vec3> {
     let Material { base_colour, base_colour_texture, emission, emission_texture, .. } = scene.materials[lightmap.mesh.material];
@@ -77,7 +217,7 @@ fn radiance(scene: &Scene, lightmap: &MeshLightmap, map: &Map) -> Vec<Vec3> {
         });
         of_points.sum::<Vec3>() / texel.points.len() as f32
     });
-    lightmap.spread(&radiance.collect::<Vec<_>>())
+    radiance.collect()
 }
 
 #[cfg(test)]
@@ -88,7 +228,7 @@ mod tests {
     fn a_few_bright_texels_do_not_set_the_scale() {
         let mut irradiance = vec![Vec3::splat(2.0); 4000];
         irradiance[7] = Vec3::splat(500.0);
-        let map = Map { mesh: 0, width: 40, height: 100, error: Vec::new(), irradiance };
+        let map = Map { object: 0, width: 40, height: 100, error: Vec::new(), irradiance };
         assert_eq!(ceiling(&map), 2.0);
         assert_eq!(ceiling(&Map { irradiance: vec![Vec3::ZERO; 4], ..map.clone() }), 1.0);
         assert_eq!(ceiling(&Map { irradiance: vec![Vec3::new(0.5, 3.0, 0.0)], ..map }), 3.0);

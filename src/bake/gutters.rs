@@ -2,17 +2,15 @@
 
 use rayon::prelude::*;
 
-use super::CoveredTexel;
-
 const NONE: u32 = u32::MAX;
 
-/// For every texel, row by row, the index in `texels` of the nearest one: exact Euclidean distances
+/// For every texel, row by row, the index in `texels` (columns and rows) of the nearest one: exact Euclidean distances
 /// between centres, by the lower envelope of parabolas (Felzenszwalb and Huttenlocher 2012).
-pub fn nearest(width: u32, height: u32, texels: &[CoveredTexel]) -> Vec<u32> {
+pub fn nearest(width: u32, height: u32, texels: impl IntoIterator<Item = (u32, u32)>) -> Vec<u32> {
     let (columns, rows) = (width as usize, height as usize);
     let mut covered = vec![NONE; columns * rows];
-    for (index, texel) in texels.iter().enumerate() {
-        covered[texel.y as usize * columns + texel.x as usize] = index as u32;
+    for (index, (x, y)) in texels.into_iter().enumerate() {
+        covered[y as usize * columns + x as usize] = index as u32;
     }
     // Row of the nearest covered texel in the same column; of two equally near ones the upper.
     let mut in_column = vec![NONE; columns * rows];
@@ -73,19 +71,18 @@ fn square(x: f64) -> f64 {
 #[cfg(test)]
 mod tests {
     use super::*;
-    use crate::bake::SurfacePoint;
 
     #[test]
     fn gutters_take_the_nearest_texel() {
         let (width, height) = (29, 17);
-        let texels: Vec<CoveredTexel> = (0..width * height)
+        let texels: Vec<(u32, u32)> = (0..width * height)
             .filter(|place| place * 7919 % 101 < 3 || (4..7).contains(&(place % width)) && place / width > 9)
-            .map(|place| CoveredTexel { x: place % width, y: place / width, points: [SurfacePoint { triangle: 0, weights: [0.0; 2] }; 4] })
+            .map(|place| (place % width, place / width))
             .collect();
         assert!(texels.len() > 20 && texels.len() < 100, "{}", texels.len());
-        let found = nearest(width, height, &texels);
+        let found = nearest(width, height, texels.iter().copied());
         for place in 0..width * height {
-            let distance = |texel: &CoveredTexel| (texel.x.abs_diff(place % width)).pow(2) + (texel.y.abs_diff(place / width)).pow(2);
+            let distance = |(x, y): &(u32, u32)| x.abs_diff(place % width).pow(2) + y.abs_diff(place / width).pow(2);
             let least = texels.iter().map(distance).min().unwrap();
             assert_eq!(distance(&texels[found[place as usize] as usize]), least, "texel {place}");
         }

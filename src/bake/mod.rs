@@ -1,11 +1,12 @@
 //! Lightmaps: a scene goes in, and where on its surfaces irradiance is wanted comes out ([`Layout`]);
-//! the irradiance found there goes in, and maps ([`Map`]) and files ([`write()`]) come out. Between the
+//! the irradiance found there goes in, and maps ([`Map`]) and files come out. Between the
 //! two stands whoever finds the light.
 //!
 //! # Texels
 //!
-//! Every mesh has a map of its own. Where the mesh brings a second set of texture coordinates that is
-//! fit for a lightmap, that is taken; else the mesh is unwrapped ([`unwrap`]). Texel (x, y) covers
+//! Every object has a map of its own: the primitives that one node of a file has, or one mesh of a built-in scene. Where the
+//! object brings a second set of texture coordinates (or a third, ...) that is fit for a lightmap, that is taken; else it is
+//! unwrapped ([`unwrap`]). Objects that are instances of one mesh, alike in shape, share their new coordinates. Texel (x, y) covers
 //! u from x / width to (x + 1) / width and v from y / height to (y + 1) / height; y = 0 is the
 //! picture's uppermost row, as in glTF. A texel is looked at in up to [`PHASE_COUNT`] points of the
 //! surface; the mean over the phases is the mean over the texel. What no triangle covers is filled
@@ -15,9 +16,14 @@
 //! - Of a two-sided surface the front is baked. Both sides show it, so a thin sheet looks lit from
 //!   behind as it is from the front.
 //!
-//! # Files
+//! # Files of a scene from a file
 //!
-//! For each mesh, in the folder named:
+//! [`IntoFile`] writes the file again with lightmap coordinates and, beside it, lightmaps as EXR: a picture an object, or
+//! pages that several share ([`pages`]). [`original`] says what is added to the file. The guide's page on lightmaps is the reference.
+//!
+//! # Files of a built-in scene
+//!
+//! [`write()`] writes for each mesh, in the folder named:
 //!
 //! | file | holds |
 //! |---|---|
@@ -27,11 +33,12 @@
 //! | `NAME_radiance.png` | the radiance that leaves the mesh, times the exposure, sRGB |
 //! | `NAME_lightmap.png` | irradiance over the mesh's own brightest, linear: for engines |
 //!
-//! and the scene written again, twice, because glTF has no place for a lightmap:
+//! and the scene, twice, because glTF has no place for a lightmap:
 //!
 //! - `scene.gltf` shows the baked light in every viewer and in Blender. The materials that
 //!   have a map are black and shine with `NAME_radiance.png`, so that lamps and environments of the
 //!   viewer add nothing to them. A texture finer than the lightmap is as coarse as the lightmap there.
+//!   [`preview`] is the same in one file.
 //! - `scene_lightmap.gltf` is for engines. Its materials are the scene's, with `NAME_lightmap.png` as
 //!   MOZ_lightmap, read as three.js reads it: texel times intensity is irradiance (times the
 //!   exposure), to be multiplied with base colour / pi. It has no punctual lights: the lightmap holds
@@ -45,6 +52,9 @@ mod document;
 mod files;
 mod gutters;
 mod names;
+mod objects;
+pub mod original;
+pub mod pages;
 mod raster;
 mod texels;
 pub mod unwrap;
@@ -54,10 +64,11 @@ use std::collections::BTreeMap;
 use glam::{DVec2, DVec3, Vec3};
 use rayon::prelude::*;
 
-pub use files::write;
+pub use files::{IntoFile, Written, preview, write};
 pub use texels::{CoveredTexel, SurfacePoint};
 
 use crate::error::{Error, Result};
+use crate::scene::gltf::source::File;
 use crate::scene::light::LightKind;
 use crate::scene::{Mesh, Scene};
 use crate::text::some_of;
@@ -76,11 +87,33 @@ const MAX_TEXELS: u64 = 1 << 26;
 pub struct Layout {
     /// One a mesh of the scene; none where it is a mirror or a dielectric.
     pub meshes: Vec<Option<MeshLightmap>>,
+    /// What has a map.
+    pub objects: Vec<Object>,
     /// What the user should know, each once.
     pub warnings: Vec<String>,
 }
 
-/// The lightmap of one mesh, without its light.
+/// Meshes that share a map, without its light.
+#[derive(Debug, Clone)]
+pub struct Object {
+    pub name: String,
+    /// Their indices in the scene.
+    pub meshes: Vec<usize>,
+    /// Texels.
+    pub width: u32,
+    pub height: u32,
+    /// Which of the file's sets the coordinates are; `None` for new ones.
+    pub set: Option<usize>,
+    /// What takes coordinates of that set to those of the map: offset + scale * uv.
+    pub offset: DVec2,
+    pub scale: DVec2,
+    /// The object that it shares new coordinates with: itself, or another instance of the same mesh.
+    pub charts_of: usize,
+    /// For every texel of the map, row by row, the index among the covered ones of all meshes of the nearest.
+    nearest: Vec<u32>,
+}
+
+/// The part of a map that is of one mesh.
 #[derive(Debug, Clone)]
 pub struct MeshLightmap {
     /// The scene's mesh: the same triangles in the same order, vertices doubled along seams.
@@ -89,13 +122,11 @@ pub struct MeshLightmap {
     pub uvs: Vec<DVec2>,
     /// Whether the coordinates are the mesh's own second set.
     pub is_second_set: bool,
-    /// Texels.
+    /// Texels of the object's map.
     pub width: u32,
     pub height: u32,
     /// What triangles cover, row by row.
     pub texels: Vec<CoveredTexel>,
-    /// For every texel of the map, row by row, the index in `texels` of the nearest covered one.
-    nearest: Vec<u32>,
 }
 
 /// A point of a surface whose irradiance is wanted.
@@ -116,11 +147,11 @@ pub struct TexelEstimate {
     pub standard_error: Vec3,
 }
 
-/// The lightmap of one mesh, row by row, gutters filled.
+/// The lightmap of one object, row by row, gutters filled.
 #[derive(Debug, Clone, PartialEq)]
 pub struct Map {
-    /// Index of the mesh in the scene.
-    pub mesh: usize,
+    /// Index of the object in the layout.
+    pub object: usize,
     pub width: u32,
     pub height: u32,
     /// W/m2.
@@ -132,35 +163,31 @@ pub struct Map {
 impl Layout {
     /// Unwraps what needs it and finds the covered texels.
     pub fn new(scene: &Scene, texels_per_metre: f64) -> Result<Layout> {
+        Layout::of_file(scene, None, texels_per_metre, MAX_SIDE)
+    }
+
+    /// The same for a scene from a file, which may have more sets of coordinates than a scene. No side of a map is longer than
+    /// `max_side`.
+    pub fn of_file(scene: &Scene, file: Option<&File>, texels_per_metre: f64, max_side: u32) -> Result<Layout> {
         const OPTION: &str = "--texels-per-metre";
         if !(texels_per_metre.is_finite() && texels_per_metre > 0.0) {
             return Err(Error::setting(OPTION, texels_per_metre, "must be above 0"));
         }
-        let kinds = scene.lobe_kinds();
-        let unwrapped: Vec<Option<unwrap::Unwrapped>> = scene
-            .meshes
-            .par_iter()
-            .map(|mesh| match kinds[mesh.material].matt {
-                false => Ok(None),
-                true => unwrap::unwrap(mesh, texels_per_metre).map(Some),
-            })
-            .zip(&scene.meshes)
-            .map(|(unwrapped, mesh)| {
-                unwrapped.map_err(|reason| Error::Scene {
-                    path: scene.name.clone().into(),
-                    object: format!("mesh '{}'", mesh.name),
-                    reason,
-                })
-            })
-            .collect::<Result<_>>()?;
-        let texel_count: u64 = unwrapped.iter().flatten().map(|mesh| u64::from(mesh.width) * u64::from(mesh.height)).sum();
+        let unwrapped = objects::unwrap(scene, file, texels_per_metre, max_side)?;
+        let texel_count: u64 = unwrapped.iter().map(|object| u64::from(object.charts.width) * u64::from(object.charts.height)).sum();
         if texel_count > MAX_TEXELS {
             let allowed = format!("needs {texel_count} texels in all, but at most {MAX_TEXELS} can be baked; choose a smaller value");
             return Err(Error::setting(OPTION, texels_per_metre, allowed));
         }
-        let warnings = warnings(scene, &unwrapped);
-        let meshes = unwrapped.into_iter().map(|mesh| mesh.map(MeshLightmap::new)).collect();
-        Ok(Layout { meshes, warnings })
+        let warnings = warnings(scene, &unwrapped, max_side);
+        let mut meshes: Vec<Option<MeshLightmap>> = vec![None; scene.meshes.len()];
+        let mut layout_objects = Vec::new();
+        let with_maps: Vec<(Object, Vec<MeshLightmap>)> = unwrapped.into_par_iter().map(|object| object.with_texels(scene)).collect();
+        for (object, lightmaps) in with_maps {
+            object.meshes.iter().zip(lightmaps).for_each(|(mesh, lightmap)| meshes[*mesh] = Some(lightmap));
+            layout_objects.push(object);
+        }
+        Ok(Layout { meshes, objects: layout_objects, warnings })
     }
 
     /// The maps in the order of the scene's meshes, with the meshes' indices.
@@ -189,33 +216,35 @@ impl Layout {
     /// [`Layout::phase`].
     pub fn maps(&self, results: &[TexelEstimate]) -> Vec<Map> {
         assert_eq!(results.len(), self.texel_count(), "one result a covered texel");
-        let mut rest = results;
-        let mut maps = Vec::new();
+        let mut first = vec![0; self.meshes.len()];
+        let mut count = 0;
         for (mesh, lightmap) in self.lightmaps() {
-            let (own, after) = rest.split_at(lightmap.texels.len());
-            rest = after;
-            let spread = |value: fn(&TexelEstimate) -> Vec3| lightmap.spread(&own.iter().map(value).collect::<Vec<_>>());
-            maps.push(Map {
-                mesh,
-                width: lightmap.width,
-                height: lightmap.height,
+            first[mesh] = count;
+            count += lightmap.texels.len();
+        }
+        let map = |(index, object): (usize, &Object)| {
+            let of_mesh = |mesh: &usize| &results[first[*mesh]..][..self.part(*mesh).texels.len()];
+            let own: Vec<TexelEstimate> = object.meshes.iter().flat_map(of_mesh).copied().collect();
+            let spread = |value: fn(&TexelEstimate) -> Vec3| object.spread(&own.iter().map(value).collect::<Vec<_>>());
+            Map {
+                object: index,
+                width: object.width,
+                height: object.height,
                 irradiance: spread(|texel| texel.irradiance),
                 error: spread(|texel| texel.standard_error),
-            });
-        }
-        maps
+            }
+        };
+        self.objects.iter().enumerate().map(map).collect()
+    }
+
+    /// The lightmap of a mesh that an object has.
+    fn part(&self, mesh: usize) -> &MeshLightmap {
+        self.meshes[mesh].as_ref().expect("the meshes of an object have a lightmap")
     }
 }
 
-impl MeshLightmap {
-    fn new(unwrapped: unwrap::Unwrapped) -> MeshLightmap {
-        let unwrap::Unwrapped { mesh, uvs, width, height, is_second_set, .. } = unwrapped;
-        let texels = texels::covered(&mesh, &uvs, width, height);
-        let nearest = gutters::nearest(width, height, &texels);
-        MeshLightmap { mesh, uvs, is_second_set, width, height, texels, nearest }
-    }
-
-    /// Values of the covered texels laid out as a picture, each uncovered texel as the nearest
+impl Object {
+    /// Values of the covered texels, mesh after mesh, laid out as a picture, each uncovered texel as the nearest
     /// covered one.
     fn spread(&self, values: &[Vec3]) -> Vec<Vec3> {
         self.nearest.iter().map(|texel| values[*texel as usize]).collect()
@@ -223,16 +252,16 @@ impl MeshLightmap {
 }
 
 /// One line a subject, however many meshes it concerns.
-fn warnings(scene: &Scene, unwrapped: &[Option<unwrap::Unwrapped>]) -> Vec<String> {
+fn warnings(scene: &Scene, unwrapped: &[objects::Unwrapped], max_side: u32) -> Vec<String> {
     let mut warnings = Vec::new();
     let mut refused: BTreeMap<&str, Vec<String>> = BTreeMap::new();
     let mut coarse = Vec::new();
-    for mesh in unwrapped.iter().flatten() {
-        let name = format!("'{}'", mesh.mesh.name);
-        if let Some(reason) = mesh.refused {
+    for object in unwrapped {
+        let name = format!("'{}'", object.name);
+        if let Some(reason) = object.charts.refused {
             refused.entry(reason).or_default().push(name.clone());
         }
-        if mesh.is_coarse {
+        if object.charts.is_coarse {
             coarse.push(name);
         }
     }
@@ -241,14 +270,14 @@ fn warnings(scene: &Scene, unwrapped: &[Option<unwrap::Unwrapped>]) -> Vec<Strin
     }
     if !coarse.is_empty() {
         warnings.push(format!(
-            "lightmaps are limited to {MAX_SIDE} texels per side: fewer texels per metre than requested on {}",
+            "lightmaps are limited to {max_side} texels per side: fewer texels per metre than requested on {}",
             some_of(coarse.iter())
         ));
     }
-    if unwrapped.iter().all(Option::is_none) {
+    if unwrapped.is_empty() {
         warnings.push("every surface is a mirror or a dielectric: there is nothing to bake".into());
     }
-    if scene.lights.iter().any(|light| matches!(light.kind, LightKind::Disc { .. } | LightKind::Environment { .. })) {
+    if scene.lights.iter().any(|light| matches!(light.kind, LightKind::Disc { .. } | LightKind::Environment { .. } | LightKind::Sky(_))) {
         warnings.push("glTF has no disc or environment lights: the lightmaps contain their light, but scene.gltf omits them".into());
     }
     warnings

@@ -16,50 +16,67 @@ pub const RADIANCE: &str = "_radiance.png";
 pub const LIGHTMAP: &str = "_lightmap.png";
 pub const ENDINGS: [&str; 5] = [IRRADIANCE, ERROR, PREVIEW, RADIANCE, LIGHTMAP];
 
+/// Endings of the two files of a page.
+pub const PAGE_ENDINGS: [&str; 2] = [".exr", "_error.exr"];
+
 /// File names, each once even where case does not count.
 pub struct Names {
-    /// One a mesh of the scene; empty where it has no map.
+    /// One an object.
     stems: Vec<String>,
+    /// The object of each mesh that has a map.
+    of_meshes: Vec<usize>,
 }
 
 impl Names {
+    /// Those of a built-in scene, one an object.
     pub fn new(scene: &Scene, layout: &Layout) -> Names {
         let mut taken: HashSet<String> = [GEOMETRY, RADIANCE_SCENE, LIGHTMAP_SCENE].map(str::to_owned).into();
         taken.extend((0..scene.textures.len()).map(texture_name));
-        let mut stems = vec![String::new(); scene.meshes.len()];
-        // Meshes of one name are told apart by numbers that go on, so that many of them cost no search.
-        let mut counts = HashMap::new();
-        for (mesh, lightmap) in layout.lightmaps() {
-            let wanted = sanitised(&lightmap.mesh.name);
-            let count = counts.entry(wanted.to_lowercase()).or_insert(0);
-            stems[mesh] = loop {
-                *count += 1;
-                let stem = if *count == 1 { wanted.clone() } else { format!("{wanted}_{count}") };
-                let files = ENDINGS.map(|ending| format!("{stem}{ending}").to_lowercase());
-                if files.iter().all(|file| !taken.contains(file)) {
-                    taken.extend(files);
-                    break stem;
-                }
-            };
+        let stems = stems(layout.objects.iter().map(|object| object.name.as_str()), &ENDINGS, taken);
+        let mut of_meshes = vec![usize::MAX; scene.meshes.len()];
+        for (index, object) in layout.objects.iter().enumerate() {
+            object.meshes.iter().for_each(|mesh| of_meshes[*mesh] = index);
         }
-        Names { stems }
+        Names { stems, of_meshes }
     }
 
-    pub fn stem(&self, mesh: usize) -> &str {
-        &self.stems[mesh]
+    /// Of an object.
+    pub fn stem(&self, object: usize) -> &str {
+        &self.stems[object]
     }
 
+    /// Of a mesh that has a map.
     pub fn radiance(&self, mesh: usize) -> String {
-        format!("{}{RADIANCE}", self.stem(mesh))
+        format!("{}{RADIANCE}", self.stem(self.of_meshes[mesh]))
     }
 
     pub fn lightmap(&self, mesh: usize) -> String {
-        format!("{}{LIGHTMAP}", self.stem(mesh))
+        format!("{}{LIGHTMAP}", self.stem(self.of_meshes[mesh]))
     }
 
     pub fn texture(&self, texture: usize) -> String {
         texture_name(texture)
     }
+}
+
+/// Beginnings of file names, so that with each ending they are unlike all others and those taken, which are lower case.
+pub fn stems<'a>(wanted: impl Iterator<Item = &'a str>, endings: &[&str], mut taken: HashSet<String>) -> Vec<String> {
+    // Those of one name are told apart by numbers that go on, so that many of them cost no search.
+    let mut counts = HashMap::new();
+    let mut unlike = |wanted: &str| {
+        let wanted = sanitised(wanted);
+        let count = counts.entry(wanted.to_lowercase()).or_insert(0);
+        loop {
+            *count += 1;
+            let stem = if *count == 1 { wanted.clone() } else { format!("{wanted}_{count}") };
+            let files: Vec<String> = endings.iter().map(|ending| format!("{stem}{ending}").to_lowercase()).collect();
+            if files.iter().all(|file| !taken.contains(file)) {
+                taken.extend(files);
+                return stem;
+            }
+        }
+    };
+    wanted.map(&mut unlike).collect()
 }
 
 fn texture_name(texture: usize) -> String {

@@ -1,5 +1,5 @@
-//! Lightmap coordinates of a mesh: its own second set where that is fit for a lightmap, else charts
-//! by the crate `uvunwrap` (conformal maps, split where they distort, packed with padding).
+//! Lightmap coordinates of an object: a set of its own that is fit for a lightmap, else charts by the crate `uvunwrap`
+//! (conformal maps, split where they distort, packed with padding).
 
 use glam::{DVec2, DVec3};
 use uvunwrap::{Density, MeshInput, Options, Packing};
@@ -8,25 +8,64 @@ use super::raster::Lattice;
 use super::{MAX_SIDE, MIN_SIDE};
 use crate::scene::Mesh;
 
-/// A mesh with lightmap coordinates.
+/// The meshes of an object with lightmap coordinates that share one map.
 #[derive(Debug, Clone)]
 pub struct Unwrapped {
-    /// The same triangles in the same order, vertices doubled along seams.
-    pub mesh: Mesh,
-    /// From 0 to 1, one a vertex.
-    pub uvs: Vec<DVec2>,
+    pub parts: Vec<Part>,
     /// Texels.
     pub width: u32,
     pub height: u32,
-    pub is_second_set: bool,
+    /// Which of the file's sets the coordinates are; `None` for new ones.
+    pub set: Option<usize>,
+    /// What takes coordinates of the set to those of the map: offset + scale * uv.
+    pub offset: DVec2,
+    pub scale: DVec2,
     /// Why the second set, where there is one, was not taken.
     pub refused: Option<&'static str>,
     /// The map is as large as may be and has fewer texels per metre than asked for.
     pub is_coarse: bool,
 }
 
+/// One mesh of it.
+#[derive(Debug, Clone)]
+pub struct Part {
+    /// The vertex that each vertex was before vertices were doubled along seams; empty where none was.
+    pub vertices: Vec<u32>,
+    /// The same triangles in the same order.
+    pub triangles: Vec<[u32; 3]>,
+    /// Coordinates of the map, from 0 to 1, one a vertex.
+    pub uvs: Vec<DVec2>,
+}
+
+impl Part {
+    /// A mesh with vertices doubled.
+    pub fn of(&self, mesh: &Mesh) -> Mesh {
+        if self.vertices.is_empty() {
+            return mesh.clone();
+        }
+        fn kept<T: Copy>(of_vertices: &[T], vertices: &[u32]) -> Vec<T> {
+            if of_vertices.is_empty() { Vec::new() } else { vertices.iter().map(|vertex| of_vertices[*vertex as usize]).collect() }
+        }
+        let vertices = &self.vertices;
+        Mesh {
+            name: mesh.name.clone(),
+            positions: kept(&mesh.positions, vertices),
+            normals: kept(&mesh.normals, vertices),
+            uvs: mesh.uvs.each_ref().map(|set| kept(set, vertices)),
+            colours: kept(&mesh.colours, vertices),
+            alphas: kept(&mesh.alphas, vertices),
+            // Triangles keep their order.
+            tangents: mesh.tangents.clone(),
+            coat_tangents: mesh.coat_tangents.clone(),
+            triangles: self.triangles.clone(),
+            material: mesh.material,
+            source: None,
+        }
+    }
+}
+
 /// Free texels around each chart; so charts are twice as far apart.
-const PADDING: u32 = 2;
+pub const PADDING: u32 = 2;
 /// A chart is split where one of its triangles gets more (or less) texels than its share by this
 /// factor.
 const MAX_DISTORTION: f32 = 2.0;
@@ -36,37 +75,44 @@ const MANY_TRIANGLES: usize = 20_000;
 /// Triangles that a chart of such a mesh has, were all of one size.
 const CHART_TRIANGLES: usize = 1500;
 
-/// The second set if it can be used, else new charts. Fails with what is wrong with the mesh.
-pub fn unwrap(mesh: &Mesh, texels_per_metre: f64) -> Result<Unwrapped, String> {
-    if mesh.uvs[1].is_empty() {
-        return charts(mesh, texels_per_metre);
+/// The first of the sets that can be used, else new charts. `sets`: numbers of sets, and coordinates for each mesh. Fails with
+/// what is wrong with the meshes.
+pub fn unwrap(meshes: &[&Mesh], sets: &[(usize, Vec<Vec<DVec2>>)], texels_per_metre: f64, max_side: u32) -> Result<Unwrapped, String> {
+    let mut refused = None;
+    for (set, uvs) in sets {
+        match existing_set(meshes, *set, uvs, texels_per_metre, max_side) {
+            Ok(unwrapped) => return Ok(unwrapped),
+            Err(reason) => refused = refused.or(Some(reason)),
+        }
     }
-    match second_set(mesh, texels_per_metre) {
-        Ok(unwrapped) => Ok(unwrapped),
-        Err(reason) => Ok(Unwrapped { refused: Some(reason), ..charts(mesh, texels_per_metre)? }),
-    }
+    Ok(Unwrapped { refused, ..charts(meshes, texels_per_metre, max_side)? })
 }
 
 /// How far outside [0, 1] coordinates may lie: less than a texel of the largest map.
 const SLACK: f64 = 1.0 / (2 * MAX_SIDE) as f64;
-/// Share of the surface, or of the map, in which a second set may fail: rounding, not intent.
+/// Share of the surface, or of the map, in which an existing set may fail: rounding, not intent.
 const TOLERATED: f64 = 1e-3;
+/// A set that fills less than this share of its range is one of a map that many objects share: the object's map is that part.
+const LEAST_SHARE: f64 = 0.5;
 
-/// The second set of coordinates, or why it cannot be used.
-fn second_set(mesh: &Mesh, texels_per_metre: f64) -> Result<Unwrapped, &'static str> {
-    let uvs = &mesh.uvs[1];
-    let used = || mesh.triangles.iter().flatten().map(|vertex| uvs[*vertex as usize]);
-    if used().any(|uv| !uv.is_finite()) {
+/// A set of coordinates that the meshes have, or why it cannot be used.
+fn existing_set(meshes: &[&Mesh], set: usize, uvs: &[Vec<DVec2>], texels_per_metre: f64, max_side: u32) -> Result<Unwrapped, &'static str> {
+    let triangles = || meshes.iter().zip(uvs).flat_map(|(mesh, uvs)| (0..mesh.triangles.len()).map(move |triangle| (*mesh, uvs, triangle)));
+    let corners = |(mesh, uvs, triangle): (&Mesh, &Vec<DVec2>, usize)| mesh.triangles[triangle].map(|vertex| uvs[vertex as usize]);
+    if triangles().flat_map(corners).any(|uv| !uv.is_finite()) {
         return Err("is not finite");
     }
-    if used().any(|uv| uv.min_element() < -SLACK || uv.max_element() > 1.0 + SLACK) {
+    let (low, high) =
+        triangles().flat_map(corners).fold((DVec2::INFINITY, DVec2::NEG_INFINITY), |(low, high), uv| (low.min(uv), high.max(uv)));
+    if low.min_element() < -SLACK || high.max_element() > 1.0 + SLACK {
         return Err("leaves the range from 0 to 1");
     }
     // Metres along u and v, the mean over the surface.
     let (mut area, mut flat, mut metres) = (0.0, 0.0, DVec2::ZERO);
-    for (triangle, vertices) in mesh.triangles.iter().enumerate() {
+    for place in triangles() {
+        let (mesh, _, triangle) = place;
         let [a, b, c] = mesh.corners(triangle);
-        let [uv_a, uv_b, uv_c] = vertices.map(|vertex| uvs[vertex as usize]);
+        let [uv_a, uv_b, uv_c] = corners(place);
         let (p, q, s, t) = (b - a, c - a, uv_b - uv_a, uv_c - uv_a);
         let (own, determinant) = (mesh.area(triangle), s.perp_dot(t));
         area += own;
@@ -80,26 +126,34 @@ fn second_set(mesh: &Mesh, texels_per_metre: f64) -> Result<Unwrapped, &'static 
     if flat > TOLERATED * area {
         return Err("gives triangles no area");
     }
-    let sides = texels_per_metre * metres / (area - flat);
-    let side = |wanted: f64| wanted.ceil().clamp(MIN_SIDE.into(), MAX_SIDE.into()) as u32;
+    let extent = high - low;
+    let is_part = extent.x * extent.y < LEAST_SHARE;
+    let (low, extent) = if is_part { (low, extent) } else { (DVec2::ZERO, DVec2::ONE) };
+    let sides = texels_per_metre * extent * metres / (area - flat);
+    let side = |wanted: f64| wanted.ceil().clamp(MIN_SIDE.into(), max_side.into()) as u32;
     let (width, height) = (side(sides.x), side(sides.y));
-    if overlaps(mesh, width, height) {
+    let in_map = |uv: &DVec2| ((*uv - low) / extent).clamp(DVec2::ZERO, DVec2::ONE);
+    let part = |(mesh, uvs): (&&Mesh, &Vec<DVec2>)| Part {
+        vertices: Vec::new(),
+        triangles: mesh.triangles.clone(),
+        uvs: uvs.iter().map(in_map).collect(),
+    };
+    let parts: Vec<Part> = meshes.iter().zip(uvs).map(part).collect();
+    if overlap(&parts, width, height) {
         return Err("overlaps itself");
     }
-    let uvs = uvs.iter().map(|uv| uv.clamp(DVec2::ZERO, DVec2::ONE)).collect();
-    let is_coarse = sides.max_element() > MAX_SIDE.into();
-    Ok(Unwrapped { mesh: mesh.clone(), uvs, width, height, is_second_set: true, refused: None, is_coarse })
+    let is_coarse = sides.max_element() > max_side.into();
+    Ok(Unwrapped { parts, width, height, set: Some(set), offset: -low / extent, scale: 1.0 / extent, refused: None, is_coarse })
 }
 
-/// Whether two triangles of the second set claim the same place, seen four times as finely as the
-/// map's texels.
-fn overlaps(mesh: &Mesh, width: u32, height: u32) -> bool {
+/// Whether two triangles claim the same place, seen four times as finely as the map's texels.
+fn overlap(parts: &[Part], width: u32, height: u32) -> bool {
     let fine = |side: u32| (4 * side).min(MAX_SIDE);
     let lattice = Lattice { columns: fine(width), rows: fine(height) };
     let mut is_taken = vec![false; lattice.columns as usize * lattice.rows as usize];
     let (mut taken, mut doubled) = (0u64, 0u64);
-    for vertices in &mesh.triangles {
-        let Some(triangle) = lattice.triangle(vertices.map(|vertex| mesh.uvs[1][vertex as usize])) else { continue };
+    for (part, vertices) in parts.iter().flat_map(|part| part.triangles.iter().map(move |vertices| (part, vertices))) {
+        let Some(triangle) = lattice.triangle(vertices.map(|vertex| part.uvs[vertex as usize])) else { continue };
         for row in triangle.rows() {
             for column in triangle.columns(row) {
                 // Neighbours share what lies on their edge.
@@ -117,78 +171,59 @@ fn overlaps(mesh: &Mesh, width: u32, height: u32) -> bool {
 }
 
 /// New charts.
-fn charts(mesh: &Mesh, texels_per_metre: f64) -> Result<Unwrapped, String> {
-    let (low, high) = mesh.triangles.iter().flatten().fold((DVec3::INFINITY, DVec3::NEG_INFINITY), |(low, high), vertex| {
-        let position = mesh.positions[*vertex as usize];
-        (low.min(position), high.max(position))
-    });
+fn charts(meshes: &[&Mesh], texels_per_metre: f64, max_side: u32) -> Result<Unwrapped, String> {
+    let used = meshes.iter().flat_map(|mesh| mesh.triangles.iter().flatten().map(|vertex| mesh.positions[*vertex as usize]));
+    let (low, high) = used.fold((DVec3::INFINITY, DVec3::NEG_INFINITY), |(low, high), position| (low.min(position), high.max(position)));
     // Around the origin and of size one, so that 32-bit floats hold a mesh of any size anywhere.
     let (centre, extent) = (0.5 * (low + high), (high - low).max_element());
-    let positions: Vec<[f32; 3]> = mesh.positions.iter().map(|position| ((position - centre) / extent).as_vec3().to_array()).collect();
-    let indices: Vec<u32> = mesh.triangles.iter().flatten().copied().collect();
-    let area: f64 = (0..mesh.triangles.len()).map(|triangle| mesh.area(triangle)).sum();
+    let positions = |mesh: &&Mesh| -> Vec<[f32; 3]> {
+        mesh.positions.iter().map(|position| ((position - centre) / extent).as_vec3().to_array()).collect()
+    };
+    let positions: Vec<Vec<[f32; 3]>> = meshes.iter().map(positions).collect();
+    let indices: Vec<&[u32]> = meshes.iter().map(|mesh| mesh.triangles.as_flattened()).collect();
+    let inputs: Vec<MeshInput> = positions.iter().zip(indices).map(|(positions, indices)| MeshInput::new(positions, indices)).collect();
+    let area: f64 = meshes.iter().map(|mesh| (0..mesh.triangles.len()).map(|triangle| mesh.area(triangle)).sum::<f64>()).sum();
+    let triangle_count: usize = meshes.iter().map(|mesh| mesh.triangles.len()).sum();
 
     let wanted = (texels_per_metre * extent).max(MIN_SIDE.into());
-    let is_large = mesh.triangles.len() > MANY_TRIANGLES;
-    let share = CHART_TRIANGLES as f64 / mesh.triangles.len() as f64;
+    let is_large = triangle_count > MANY_TRIANGLES;
+    let share = CHART_TRIANGLES as f64 / triangle_count as f64;
     let options = Options {
         padding: PADDING,
         packing: if is_large { Packing::Fast } else { Packing::Shape },
         max_chart_area: if is_large { (share * area / (extent * extent)) as f32 } else { 0.0 },
         max_area_distortion: MAX_DISTORTION,
-        max_chart_size: MAX_SIDE - 2 * PADDING,
+        max_chart_size: max_side - 2 * PADDING,
         ..Options::default()
     };
     let generate = |density: Density| {
-        uvunwrap::generate(&[MeshInput::new(&positions, &indices)], &Options { density, ..options })
-            .map_err(|error| format!("cannot be unwrapped ({error})"))
+        uvunwrap::generate(&inputs, &Options { density, ..options }).map_err(|error| format!("cannot be unwrapped ({error})"))
     };
-    let largest = Density::Auto { page_size: MAX_SIDE };
+    let largest = Density::Auto { page_size: max_side };
     // What cannot fit is not tried: the map would be of any size.
-    let fits = texels_per_metre * area.sqrt() < MAX_SIDE.into();
+    let fits = texels_per_metre * area.sqrt() < max_side.into();
     let (atlas, is_coarse) = match fits {
         true => {
             let atlas = generate(Density::Fixed { texels_per_unit: wanted as f32, page_size: None })?;
             // A map as long as the longest chart may be has charts that were made smaller.
-            if atlas.width.max(atlas.height) < MAX_SIDE { (atlas, false) } else { (generate(largest)?, true) }
+            if atlas.width.max(atlas.height) < max_side { (atlas, false) } else { (generate(largest)?, true) }
         }
         false => (generate(largest)?, true),
     };
     if atlas.page_count > 1 {
         return Err(format!(
-            "unwraps into {} pieces, too many for a lightmap of {MAX_SIDE} texels per side; split the mesh",
+            "unwraps into {} pieces, too many for a lightmap of {max_side} texels per side; split the mesh",
             atlas.chart_count
         ));
     }
     // Texels that a map gains on its way to the smallest one allowed lie beyond its charts.
     let (width, height) = (atlas.width.max(MIN_SIDE), atlas.height.max(MIN_SIDE));
     let shrink = DVec2::new(f64::from(atlas.width) / f64::from(width), f64::from(atlas.height) / f64::from(height));
-    let output = &atlas.meshes[0];
-    let source = |vertex: &uvunwrap::OutputVertex| vertex.xref as usize;
-    let kept = |of_vertices: &[DVec3]| match of_vertices.is_empty() {
-        true => Vec::new(),
-        false => output.vertices.iter().map(|vertex| of_vertices[source(vertex)]).collect(),
-    };
-    let of_set = |set: &Vec<DVec2>| if set.is_empty() { Vec::new() } else { output.vertices.iter().map(|v| set[source(v)]).collect() };
-    Ok(Unwrapped {
-        mesh: Mesh {
-            name: mesh.name.clone(),
-            positions: kept(&mesh.positions),
-            normals: kept(&mesh.normals),
-            uvs: mesh.uvs.each_ref().map(of_set),
-            colours: kept(&mesh.colours),
-            alphas: if mesh.alphas.is_empty() { Vec::new() } else { output.vertices.iter().map(|v| mesh.alphas[source(v)]).collect() },
-            // Triangles keep their order.
-            tangents: mesh.tangents.clone(),
-            coat_tangents: mesh.coat_tangents.clone(),
-            triangles: output.indices.chunks_exact(3).map(|corners| [corners[0], corners[1], corners[2]]).collect(),
-            material: mesh.material,
-        },
+    let part = |output: &uvunwrap::OutputMesh| Part {
+        vertices: output.vertices.iter().map(|vertex| vertex.xref).collect(),
+        triangles: output.indices.as_chunks().0.to_vec(),
         uvs: output.vertices.iter().map(|vertex| DVec2::from(vertex.uv.map(f64::from)) * shrink).collect(),
-        width,
-        height,
-        is_second_set: false,
-        refused: None,
-        is_coarse,
-    })
+    };
+    let parts = atlas.meshes.iter().map(part).collect();
+    Ok(Unwrapped { parts, width, height, set: None, offset: DVec2::ZERO, scale: DVec2::ONE, refused: None, is_coarse })
 }

@@ -44,9 +44,11 @@ Examples:
 pub(super) const BAKE: &str = "\
 Examples:
   photonmill bake scene.glb -o baked
-      Lightmaps of all surfaces, and the scene with these lightmaps
+      Lightmaps of all surfaces, and your file with coordinates for them
   photonmill bake scene.glb -o baked --texels-per-metre 64 --error 5%
-      A finer lightmap, until the error is at most 5 %";
+      A finer lightmap, until the error is at most 5 %
+  photonmill bake scene.glb -o baked --atlas 2048 --preview
+      All lightmaps in pictures of 2048 x 2048 texels, and a copy for viewers";
 
 pub(super) const PROBE: &str = "\
 Examples:

@@ -15,7 +15,7 @@ use crate::output::destination::write_all;
 use crate::scene::light::LightKind;
 use crate::scene::material::{Coverage, Layers, Material, Medium, NormalMap, Surface, TextureUse, UvTransform};
 use crate::scene::texture::{Filter, Texels, Texture, Wrap};
-use crate::scene::{Light, Scene};
+use crate::scene::{Light, Reading, Scene};
 use crate::text::counted;
 
 #[derive(Args)]
@@ -75,7 +75,7 @@ struct LightEntry {
 pub(super) fn run(args: &InfoArgs) -> Result<()> {
     let json = optional_file("--json", args.json.json.as_ref())?;
     let reporter = ProgressReporter::new(&args.progress);
-    let scene = Scene::open_with(&args.scene, false, &mut stages(&args.scene, &reporter))?;
+    let scene = Scene::open_with(&args.scene, Reading::default(), &mut stages(&args.scene, &reporter))?;
     reporter.finish();
     let contents = Contents::of(&scene);
     if let Some(json) = json {
@@ -200,7 +200,7 @@ impl LightEntry {
             LightKind::Spot { .. } => "spot",
             LightKind::Directional { .. } => "directional",
             LightKind::Disc { .. } => "disc",
-            LightKind::Environment { .. } => "environment",
+            LightKind::Environment { .. } | LightKind::Sky(_) => "environment",
         };
         LightEntry { name: light.name.clone(), kind }
     }
@@ -256,6 +256,9 @@ fn of_base(layers: &Layers, textures: &[Texture]) -> Vec<String> {
     if has_dielectric {
         parts.push(if layers.ior == 0.0 { "ior infinite".to_owned() } else { format!("ior {}", number(layers.ior)) });
     }
+    if layers.dispersion > 0.0 {
+        parts.push(format!("dispersion {}", number(layers.dispersion)));
+    }
     parts.push(format!("roughness {}{of_texture}", number(layers.roughness)));
     if !has_dielectric {
         return parts;
@@ -269,6 +272,12 @@ fn of_base(layers: &Layers, textures: &[Texture]) -> Vec<String> {
     if layers.transmission > 0.0 && (layers.transmission < 1.0 || layers.transmission_texture.is_some()) {
         parts.push(format!("transmission {}{}", number(layers.transmission), by_texture(layers.transmission_texture, textures)));
     }
+    if layers.diffuse_transmission > 0.0 {
+        let [share, tint] =
+            [layers.diffuse_transmission_texture, layers.diffuse_transmission_colour_texture].map(|used| by_texture(used, textures));
+        let (factor, of) = (number(layers.diffuse_transmission), colour(layers.diffuse_transmission_colour));
+        parts.push(format!("diffuse transmission {factor}{share} of colour {of}{tint}"));
+    }
     if let Some(Medium { transmittance, metres }) = layers.medium.filter(|medium| medium.transmittance != Vec3::ONE) {
         let way = if metres == 1.0 { "a metre".to_owned() } else { format!("{} m", number(metres)) };
         parts.push(format!("{} of the light left after {way}", colour(transmittance)));
@@ -276,9 +285,16 @@ fn of_base(layers: &Layers, textures: &[Texture]) -> Vec<String> {
     parts
 }
 
-/// Coat and sheen.
+/// Film, coat and sheen.
 fn of_layers_above(layers: &Layers, textures: &[Texture]) -> Vec<String> {
     let mut parts = Vec::new();
+    if layers.iridescence > 0.0 {
+        let [share, shades] = [layers.iridescence_texture, layers.film_thickness_texture].map(|used| by_texture(used, textures));
+        let [least, most] = layers.film_thickness.map(number);
+        let thickness = if shades.is_empty() { most.to_string() } else { format!("{least} to {most}") };
+        let (factor, ior) = (number(layers.iridescence), number(layers.film_ior));
+        parts.push(format!("iridescence {factor}{share}, a film of {thickness} nm{shades} and ior {ior}"));
+    }
     if layers.coat > 0.0 {
         let (coat, roughness) = (by_texture(layers.coat_texture, textures), by_texture(layers.coat_roughness_texture, textures));
         parts.push(format!("clear coat {}{coat} of roughness {}{roughness}", number(layers.coat), number(layers.coat_roughness)));

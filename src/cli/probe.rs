@@ -17,7 +17,7 @@ use crate::error::{Error, Result};
 use crate::output::destination::{Destination, check_distinct, write_all};
 use crate::output::scene_report;
 use crate::plan::sensor::Sensor;
-use crate::scene::{Light, LightKind, Mesh};
+use crate::scene::{Light, Mesh};
 use crate::settings::scene::{Illumination, SceneSettings};
 use crate::text::{counted, echo, refusal};
 
@@ -61,7 +61,7 @@ pub(super) fn run(args: &ProbeArgs, cancelled: &AtomicBool) -> Result<End> {
     let scene = args.scene.open(&reporter)?;
     let kinds = scene.lobe_kinds();
     let is_specular = |mesh: &Mesh| kinds[mesh.material].is_sharp();
-    let is_point_like = |light: &Light| !matches!(light.kind, LightKind::Environment { .. });
+    let is_point_like = |light: &Light| !light.kind.is_environment();
     if scene.lights.iter().any(is_point_like) && scene.meshes.iter().any(is_specular) {
         complain("warning: points that lie on no surface receive no caustics of point, spot, directional and disc lights");
     }

@@ -9,14 +9,14 @@ use glam::DVec3;
 use super::job::{Job, MessageArgs};
 use super::options::{ReportArgs, TimedDeviceArgs};
 use super::progress::ProgressReporter;
-use super::scene::{FilterArg, PictureArgs, Subject};
+use super::scene::{FilterArg, PictureArgs, Subject, ToneArg};
 use super::values::{parse_integer, parse_photon_name, parse_stops};
 use super::{End, optional_file, say, say_beside};
 use crate::engine;
 use crate::engine::replay::PhotonName;
 use crate::engine::scene::{RunResult, replay};
 use crate::error::{Result, require};
-use crate::output::colour::{ColourPicture, Format};
+use crate::output::colour::{ColourPicture, Format, Tone};
 use crate::output::destination::{Destination, check_distinct, write_all};
 use crate::output::scene_report;
 use crate::plan::scene::ScenePlan;
@@ -26,7 +26,7 @@ use crate::verify::judge::{Judge, Verdict};
 
 #[derive(Args)]
 pub(super) struct RenderArgs {
-    /// Picture: an .exr holds linear radiance in W/m2/sr, a .png is sRGB at --exposure
+    /// Picture: an .exr holds linear radiance in W/m2/sr, a .png is sRGB, for the eye
     #[arg(short, long, alias = "out", value_name = "FILE", required_unless_present = "replay", help_heading = "Output")]
     output: Option<PathBuf>,
     #[command(flatten)]
@@ -38,6 +38,9 @@ pub(super) struct RenderArgs {
     /// Exposure of a PNG in stops, each of which doubles the brightness [default: what makes the mean middle grey]
     #[arg(long, value_name = "STOPS", value_parser = parse_stops, allow_hyphen_values = true, help_heading = "Output")]
     exposure: Option<f32>,
+    /// Tone curve of a PNG [default: neutral]
+    #[arg(long, value_enum, value_name = "CURVE", help_heading = "Output")]
+    tone: Option<ToneArg>,
     #[command(flatten)]
     picture: PictureArgs,
     /// Camera paths per pixel and round, a power of two. Every path queries the caustic map; where all of them
@@ -54,7 +57,7 @@ pub(super) struct RenderArgs {
     /// Trace a single photon of this run, print its path, and exit; rounds and photons count from 0, and `:caustic` at the
     /// end takes a photon of the caustic map
     #[arg(long, value_name = "ROUND:PHOTON", value_parser = parse_photon_name, help_heading = "Checks",
-        conflicts_with_all = ["output", "error_image", "exposure", "judge", "explain", "json", "trace", "time_dispatches"])]
+        conflicts_with_all = ["output", "error_image", "exposure", "tone", "judge", "explain", "json", "trace", "time_dispatches"])]
     replay: Option<PhotonName>,
     #[command(flatten)]
     messages: MessageArgs,
@@ -86,6 +89,9 @@ pub(super) fn run(args: &RenderArgs, cancelled: &AtomicBool) -> Result<End> {
     if let Some(exposure) = args.exposure {
         require(format == Format::Png, "--exposure", exposure, "is for PNG only: an EXR holds linear radiance")?;
     }
+    if args.tone.is_some() {
+        require(format == Format::Png, "--tone", output.display(), "is for PNG only: an EXR holds linear radiance")?;
+    }
     let picture = Destination::open("-o", output)?;
     let errors = optional_file("--error-image", args.error_image.as_ref())?;
     if let Some(path) = &args.error_image {
@@ -106,9 +112,9 @@ pub(super) fn run(args: &RenderArgs, cancelled: &AtomicBool) -> Result<End> {
     let image = picture_of(&lit, size, |pixel| lit.film.mean(pixel, &lit.plan));
     let stops = args.exposure.unwrap_or_else(|| image.usual_exposure());
     let text = scene_report::text(&scene.name, &lit, job.point, args.messages.explain);
-    let mut files = vec![(picture, image.encode(format, stops))];
+    let mut files = vec![(picture, image.encode(format, stops, args.tone.map_or(Tone::default(), Tone::from)))];
     if let Some(errors) = errors {
-        files.push((errors, picture_of(&lit, size, lit.film.stated_errors(&lit.plan)).encode(Format::Exr, 0.0)));
+        files.push((errors, picture_of(&lit, size, lit.film.stated_errors(&lit.plan)).encode(Format::Exr, 0.0, Tone::Linear)));
     }
     files.extend(reports.files(&lit, || scene_report::json(&scene.name, &lit)));
     let written = write_all(files);

@@ -1,6 +1,10 @@
 //! Options of the commands that light a scene of triangles: the scene, how it is lit, what a camera sees of it.
 
+use std::path::{Path, PathBuf};
+use std::sync::Arc;
+
 use clap::Args;
+use glam::{DVec2, Vec3};
 
 use super::options::CommonArgs;
 use super::picture_size::{PictureSize, parse_size};
@@ -8,11 +12,14 @@ use super::progress::ProgressReporter;
 use super::stop::StopArgs;
 use super::values::{BuilderArg, SwitchArg, builder_parser, effect_parser, parse_colour, parse_integer, parse_number, value_enum};
 use super::{complain, help};
-use crate::error::{Error, Result};
+use crate::error::{Error, Result, require};
+use crate::output::colour::Tone;
 use crate::plan::sensor::Sensor;
+use crate::scene::daylight;
 use crate::scene::geometry::Geometry;
 use crate::scene::light::{Light, LightKind};
-use crate::scene::{Camera, Scene};
+use crate::scene::sky::Sky;
+use crate::scene::{Camera, Lens, Reading, Scene};
 use crate::settings::scene::{Effect, Filter, Illumination, Kernel, MAX_ROUNDS, Part, SceneSettings, Stop};
 use crate::settings::{Builder, Math};
 use crate::text::counted;
@@ -24,9 +31,49 @@ pub(super) struct SceneArgs {
     /// Take the intensities of the lights of a glTF file as W/sr and W/m2 [default: candela and lux, divided by 683 lm/W]
     #[arg(long, help_heading = "Scene")]
     radiometric: bool,
-    /// Uniform light from the environment, W/m2/sr: one number, or three for red, green and blue
-    #[arg(long, value_name = "R,G,B", value_parser = parse_colour, allow_hyphen_values = true, help_heading = "Scene")]
-    environment: Option<[f32; 3]>,
+    /// Take nodes, skins and morph targets as the file's first animation has them at this time [default: at rest]
+    #[arg(long, value_name = "SECONDS", value_parser = parse_number::<f64>, allow_hyphen_values = true, help_heading = "Scene")]
+    at: Option<f64>,
+    /// Light from beyond the scene in place of the file's own: W/m2/sr, one number or three for red, green and blue, or a picture of
+    /// all directions (equirectangular, .hdr or .exr) [default: the file's; 1 if nothing in the file shines]
+    #[arg(long, value_name = "R,G,B|FILE", value_parser = parse_environment, allow_hyphen_values = true, help_heading = "Scene")]
+    environment: Option<EnvironmentArg>,
+    /// Add a sun, degrees clockwise from -z as seen from above and above the horizon, and the clear sky that belongs to it unless
+    /// --environment is given
+    #[arg(long, value_name = "AZIMUTH,ELEVATION", value_parser = parse_sun, allow_hyphen_values = true, help_heading = "Scene")]
+    sun: Option<[f64; 2]>,
+    /// Turn the environment's picture about the vertical, degrees, counter-clockwise as seen from above
+    #[arg(long, value_name = "DEGREES", value_parser = parse_number::<f64>, allow_hyphen_values = true, help_heading = "Scene")]
+    environment_rotate: Option<f64>,
+    /// Multiply the environment's light
+    #[arg(long, value_name = "FACTOR", value_parser = parse_number::<f32>, allow_hyphen_values = true, help_heading = "Scene")]
+    environment_strength: Option<f32>,
+}
+
+#[derive(Debug, Clone)]
+enum EnvironmentArg {
+    Colour([f32; 3]),
+    Picture(PathBuf),
+}
+
+fn parse_sun(text: &str) -> std::result::Result<[f64; 2], String> {
+    let degrees: Vec<f64> = text.split(',').filter_map(|number| number.trim().parse().ok()).collect();
+    match degrees[..] {
+        [azimuth, elevation] if text.split(',').count() == 2 && azimuth.is_finite() && elevation > 0.0 && elevation <= 90.0 => {
+            Ok([azimuth, elevation])
+        }
+        _ => Err("must be two numbers, AZIMUTH,ELEVATION in degrees; the elevation above 0 and at most 90".into()),
+    }
+}
+
+fn parse_environment(text: &str) -> std::result::Result<EnvironmentArg, String> {
+    let path = Path::new(text);
+    let is_picture =
+        path.extension().is_some_and(|extension| extension.eq_ignore_ascii_case("hdr") || extension.eq_ignore_ascii_case("exr"));
+    match is_picture {
+        true => Ok(EnvironmentArg::Picture(path.to_owned())),
+        false => parse_colour(text).map(EnvironmentArg::Colour).map_err(|reason| format!("{reason}; or a file that ends in .hdr or .exr")),
+    }
 }
 
 #[derive(Args)]
@@ -105,6 +152,12 @@ pub(super) struct PictureArgs {
     /// pixels in the camera's aspect ratio, 640x480 if it has none]
     #[arg(long, value_name = "WIDTH[xHEIGHT]", value_parser = parse_size, allow_hyphen_values = true, help_heading = "Scene")]
     size: Option<PictureSize>,
+    /// Diameter of the camera's lens, metres: what is not in focus is blurred [default: 0, a pinhole]
+    #[arg(long, value_name = "METRES", value_parser = parse_number::<f64>, allow_hyphen_values = true, help_heading = "Scene")]
+    aperture: Option<f64>,
+    /// Distance of the plane in focus, metres [default: that of what the middle of the picture shows]
+    #[arg(long, value_name = "METRES", value_parser = parse_number::<f64>, allow_hyphen_values = true, requires = "aperture", help_heading = "Scene")]
+    focus: Option<f64>,
     #[command(flatten)]
     pub(super) transport: TransportArgs,
     /// Compute only this part of the light; the four parts sum to `all` exactly
@@ -137,6 +190,12 @@ value_enum!(FilterArg => Filter {
     /// A Gaussian with a standard deviation of half a pixel
     Gaussian,
 });
+value_enum!(ToneArg => Tone {
+    /// Highlights keep their shape: Khronos PBR Neutral
+    Neutral,
+    /// What is brighter than white is white
+    Linear,
+});
 value_enum!(PartArg => Part {
     /// The whole picture
     All,
@@ -162,17 +221,66 @@ fn most_rounds(stop: &Stop, photons: u32) -> Option<u32> {
 impl SceneArgs {
     /// The scene; prints its warnings.
     pub(super) fn open(&self, reporter: &ProgressReporter) -> Result<Scene> {
-        let mut scene = Scene::open_with(&self.scene, self.radiometric, &mut stages(&self.scene, reporter))?;
-        if let Some(radiance) = self.environment {
-            scene.lights.push(Light { name: "--environment".into(), kind: LightKind::Environment { radiance: radiance.into() } });
+        if let Some(time) = self.at {
+            require(time.is_finite(), "--at", time, "must be finite")?;
         }
+        if let Some(degrees) = self.environment_rotate {
+            require(degrees.is_finite(), "--environment-rotate", degrees, "must be finite")?;
+        }
+        if let Some(factor) = self.environment_strength {
+            require((0.0..=1e9).contains(&factor), "--environment-strength", factor, "must be 0 to 1e9")?;
+        }
+        let reading = Reading { radiometric: self.radiometric, at: self.at };
+        let mut scene = Scene::open_with(&self.scene, reading, &mut stages(&self.scene, reporter))?;
+        let is_lit = scene.is_lit();
+        self.set_environment(&mut scene)?;
         for warning in &scene.warnings {
             complain(&format!("warning: {warning}"));
         }
-        if !scene.is_lit() {
-            complain("warning: this scene has no light and is dark; add a light, an emissive material, or --environment 1");
+        if !is_lit && self.environment.is_none() && self.sun.is_none() {
+            complain("note: nothing in this scene shines; a sky of 1 W/m2/sr lights it (--environment 0 for black)");
         }
         Ok(scene)
+    }
+
+    fn set_environment(&self, scene: &mut Scene) -> Result<()> {
+        let own = match &self.environment {
+            Some(EnvironmentArg::Colour(radiance)) => Some(LightKind::Environment { radiance: Vec3::from(*radiance) }),
+            Some(EnvironmentArg::Picture(path)) => {
+                let sky = Sky::read(path)?;
+                scene.warnings.extend(sky.warnings.iter().cloned());
+                Some(LightKind::Sky(Arc::new(sky)))
+            }
+            None if self.sun.is_some() => self.sun.map(|[azimuth, elevation]| LightKind::Sky(Arc::new(daylight::sky(azimuth, elevation)))),
+            None if !scene.is_lit() => Some(LightKind::Environment { radiance: Vec3::ONE }),
+            None => None,
+        };
+        if let Some(kind) = own {
+            scene.lights.retain(|light| !light.kind.is_environment());
+            scene.lights.push(Light { name: "--environment".into(), kind });
+        }
+        if let Some([azimuth, elevation]) = self.sun {
+            scene.lights.push(Light { name: "--sun".into(), kind: daylight::sun(azimuth, elevation) });
+        }
+        let mut environment = scene.lights.iter_mut().map(|light| &mut light.kind).find(|kind| kind.is_environment());
+        if let Some(degrees) = self.environment_rotate {
+            let Some(LightKind::Sky(sky)) = &mut environment else {
+                let reason = "turns a picture, and the environment is none; give --environment FILE";
+                return Err(Error::setting("--environment-rotate", degrees, reason));
+            };
+            *sky = Arc::new(Sky::clone(sky).turned(degrees));
+        }
+        if let Some(factor) = self.environment_strength {
+            match environment {
+                Some(LightKind::Environment { radiance }) => *radiance *= factor,
+                Some(LightKind::Sky(sky)) => *sky = Arc::new(Sky { strength: sky.strength * factor, ..Sky::clone(sky) }),
+                _ => {
+                    let reason = "multiplies an environment, and there is none; give --environment";
+                    return Err(Error::setting("--environment-strength", factor, reason));
+                }
+            }
+        }
+        Ok(())
     }
 }
 
@@ -218,11 +326,39 @@ impl PictureArgs {
     }
 
     pub(super) fn open(&self, settings: &SceneSettings, reporter: &ProgressReporter) -> Result<Subject> {
+        self.check_lens()?;
         let scene = self.scene.open(reporter)?;
-        let camera = camera(&scene, self.camera.as_deref())?;
+        let mut camera = camera(&scene, self.camera.as_deref())?;
+        camera.lens = self.lens(&scene, &camera, reporter)?;
         let (width, height) = PictureSize::resolve(self.size, &camera, reporter)?;
         let geometry = geometry(&scene, settings, reporter)?;
         Ok(Subject { scene, camera, width, height, geometry })
+    }
+}
+
+impl PictureArgs {
+    /// Before a scene is read, which may take long.
+    fn check_lens(&self) -> Result<()> {
+        if let Some(aperture) = self.aperture {
+            require(aperture.is_finite() && aperture >= 0.0, "--aperture", aperture, "must be 0 or more metres")?;
+        }
+        if let Some(focus) = self.focus {
+            require(focus.is_finite() && focus > 0.0, "--focus", focus, "must be more than 0 metres")?;
+        }
+        Ok(())
+    }
+
+    fn lens(&self, scene: &Scene, camera: &Camera, reporter: &ProgressReporter) -> Result<Option<Lens>> {
+        let Some(aperture) = self.aperture.filter(|aperture| *aperture > 0.0) else { return Ok(None) };
+        let in_the_middle = || {
+            let (origin, direction) = camera.ray(0.0, 0.0, 1.0, DVec2::ZERO);
+            let focus = scene.distance_along(origin, direction).ok_or_else(|| {
+                Error::setting("--aperture", aperture, "needs --focus: the middle of the picture shows nothing to focus on")
+            })?;
+            reporter.status(&format!("focus at {focus:.4} m, on what the middle of the picture shows"));
+            Ok(focus)
+        };
+        Ok(Some(Lens { radius: 0.5 * aperture, focus: self.focus.map_or_else(in_the_middle, Ok)? }))
     }
 }
 

@@ -31,6 +31,40 @@ impl Format {
     }
 }
 
+/// What becomes of values from 0 to any size where a picture shows 0 to 1.
+#[derive(Debug, Clone, Copy, PartialEq, Eq, Default)]
+pub enum Tone {
+    /// Highlights are compressed and lose their colour, the rest keeps it: the Khronos PBR Neutral tone mapper (Khronos Group 2024).
+    #[default]
+    Neutral,
+    /// What exceeds 1 is cut off.
+    Linear,
+}
+
+impl Tone {
+    fn of(self, colour: Vec3) -> Vec3 {
+        if self == Tone::Linear {
+            return colour;
+        }
+        /// Where compression begins, less a surface's reflection at normal incidence, which is taken off.
+        const FRESNEL: f32 = 0.04;
+        const START: f32 = 0.8 - FRESNEL;
+        const DESATURATION: f32 = 0.15;
+        let colour = if colour.is_finite() { colour.max(Vec3::ZERO) } else { return colour };
+        let least = colour.min_element();
+        let offset = if least < 2.0 * FRESNEL { least - least * least / (4.0 * FRESNEL) } else { FRESNEL };
+        let colour = colour - offset;
+        let peak = colour.max_element();
+        if peak < START {
+            return colour;
+        }
+        let rest = 1.0 - START;
+        let new_peak = 1.0 - rest * rest / (peak + rest - START);
+        let white = 1.0 - 1.0 / (DESATURATION * (peak - new_peak) + 1.0);
+        (colour * (new_peak / peak)).lerp(Vec3::splat(new_peak), white)
+    }
+}
+
 /// Row by row from the top, linear scene-referred values.
 #[derive(Debug, Clone, PartialEq)]
 pub struct ColourPicture {
@@ -40,11 +74,11 @@ pub struct ColourPicture {
 }
 
 impl ColourPicture {
-    /// `stops` doubles the brightness of a PNG so many times; an EXR holds the values untouched.
-    pub fn encode(&self, format: Format, stops: f32) -> Vec<u8> {
+    /// `stops` doubles the brightness of a PNG so many times, before the tone curve; an EXR holds the values untouched.
+    pub fn encode(&self, format: Format, stops: f32, tone: Tone) -> Vec<u8> {
         match format {
             Format::Exr => exr(self.width, self.height, &self.pixels),
-            Format::Png => png(self.width, self.height, self.pixels.iter().map(|pixel| *pixel * stops.exp2())),
+            Format::Png => png(self.width, self.height, self.pixels.iter().map(|pixel| tone.of(*pixel * stops.exp2()))),
         }
     }
 
@@ -132,6 +166,26 @@ mod tests {
         }
     }
 
+    /// Values of the specification's formula, by hand.
+    #[test]
+    fn the_tone_curve_is_the_published_one() {
+        let near = |colour: [f32; 3], expected: [f32; 3]| {
+            let found = Tone::Neutral.of(Vec3::from(colour));
+            assert!((found - Vec3::from(expected)).abs().max_element() < 1e-4, "{colour:?}: {found}");
+        };
+        near([0.0; 3], [0.0; 3]);
+        near([0.04; 3], [0.01; 3]);
+        near([0.5, 0.3, 0.18], [0.46, 0.26, 0.14]);
+        near([0.8; 3], [0.76; 3]);
+        // 1.96 less START leaves 1.2: 1 - 0.24^2 / (1.2 + 0.24).
+        near([2.0; 3], [0.96; 3]);
+        // Pure red of 100 loses its colour.
+        near([100.0, 0.0, 0.0], [0.99942, 0.93637, 0.93637]);
+        let values: Vec<f32> = (0..10_000).map(|k| Tone::Neutral.of(Vec3::splat(0.01 * k as f32)).x).collect();
+        assert!(values.is_sorted() && values.iter().all(|value| *value < 1.0));
+        assert_eq!(Tone::Linear.of(Vec3::splat(7.0)), Vec3::splat(7.0));
+    }
+
     #[test]
     fn formats_follow_the_name() {
         assert_eq!(Format::of("-o", Path::new("a.PNG")).unwrap(), Format::Png);
@@ -143,7 +197,7 @@ mod tests {
     fn exr_values_come_back_untouched() {
         let pixels = vec![Vec3::new(0.0, 1e-6, 12345.678), Vec3::splat(3.0)];
         let picture = ColourPicture { width: 2, height: 1, pixels: pixels.clone() };
-        let read = image::load_from_memory(&picture.encode(Format::Exr, 5.0)).unwrap().into_rgb32f();
+        let read = image::load_from_memory(&picture.encode(Format::Exr, 5.0, Tone::Neutral)).unwrap().into_rgb32f();
         let values: Vec<f32> = pixels.iter().flat_map(Vec3::to_array).collect();
         assert_eq!(read.into_raw(), values);
     }

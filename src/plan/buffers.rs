@@ -195,6 +195,7 @@ impl ScenePlan {
             buffer::<T>(name, if is_kept { content.len() as u64 } else { 0 }, why)
         }
         let (textured, layered) = (self.keeps(Effect::Textures), self.keeps(Effect::Layers));
+        let has_texels = textured || (self.keeps(Effect::Environment) && geometry.has_sky_picture());
         let (nodes, regions, shares) = self.lights().map_or((0, 0, 0), |of| (of.nodes.len(), of.regions.len(), of.shares.len()));
         vec![
             of("nodes", &geometry.nodes, self.keeps(Effect::Bvh), "the triangles' hierarchy"),
@@ -207,7 +208,7 @@ impl ScenePlan {
             of("layered materials", &geometry.layered_materials, layered, "layers of materials"),
             of("layers of triangles", &geometry.triangle_layers, layered && textured, "texture coordinates and tangents of layers"),
             buffer::<Vec2>("albedos", if layered { albedo::TABLE.len() as u64 } else { 0 }, "directional albedos"),
-            of("textures", &geometry.textures, textured, "sizes of textures"),
+            of("textures", &geometry.textures, has_texels, "sizes of textures"),
             of("emitters", &geometry.emitters, true, "emitters"),
             of("openings", &self.openings(), true, "openings that light comes in through"),
             of("caustic targets", &self.targets, true, "spheres that photons are aimed at"),
@@ -216,12 +217,12 @@ impl ScenePlan {
             buffer::<f32>("light shares", shares as u64, "shares of lights in each region"),
         ]
         .into_iter()
-        .chain(geometry.texel_parts().map(|part| of::<u32>("texels", part, textured, "textures")))
+        .chain(geometry.texel_parts().map(|part| of::<u32>("texels", part, has_texels, "textures")))
         .collect()
     }
 
     fn has_covers(&self) -> bool {
-        self.keeps(Effect::ClearCoat) || self.keeps(Effect::Sheen)
+        self.keeps(Effect::ClearCoat) || self.keeps(Effect::Sheen) || self.keeps(Effect::Iridescence)
     }
 
     /// What grows with the pixels or receivers.
@@ -239,7 +240,7 @@ impl ScenePlan {
             buffer::<u64>("pass sums", 3 * pixels * u64::from(self.samples()), "samples of pixels in a round"),
             buffer::<VisiblePoint>("visible points", points, "where photons are looked up"),
             buffer::<MattLobes>("matt lobes", if self.keeps(Effect::Layers) { points } else { 0 }, "how layered points weigh light"),
-            buffer::<MattCover>("matt covers", if self.has_covers() { points } else { 0 }, "coats and sheen of visible points"),
+            buffer::<MattCover>("matt covers", if self.has_covers() { points } else { 0 }, "coats, sheen and films of visible points"),
             buffer::<u64>("estimates", 3 * points * u64::from(self.arrival_sets), "what photons add there"),
         ];
         let classed = if self.has_classes() { points } else { 0 };

@@ -161,6 +161,12 @@ impl<'a> Facts<'a> {
                 None if self.nested_solids => (true, "solids that may lie in one another".into()),
                 None => (false, "no medium that absorbs, and no solids in one another".into()),
             },
+            Effect::DiffuseTransmission => {
+                let is_found = |material: &Material| is_layered_with(material, |of| of.diffuse_transmission > 0.0);
+                found("translucent", &is_found, "no diffuse transmission")
+            }
+            Effect::Iridescence => found("iridescent", &|material| is_layered_with(material, |of| of.iridescence > 0.0), "no iridescence"),
+            Effect::Dispersion => found("dispersive", &Material::is_dispersive, "no dispersion"),
             Effect::ClearCoat => found("clear-coated", &|material| is_layered_with(material, |of| of.coat > 0.0), "no clear coat"),
             Effect::Sheen => found("with sheen", &|material| is_layered_with(material, |of| of.sheen_colour != Vec3::ZERO), "no sheen"),
             Effect::NormalMaps => {

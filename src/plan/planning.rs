@@ -92,7 +92,9 @@ impl ScenePlan {
         plan.set_film(geometry);
         let shows_lamps = plan.keeps(Effect::SpecularChains) && facts.has_kind(LobeKinds::is_sharp);
         if shows_lamps && matches!(sensor, Sensor::Picture { .. }) && plan.settings.part as u32 & PART_SPECULAR != 0 {
-            plan.rare_radiance = geometry.brightest_shown();
+            // A path of one channel stands for three.
+            let of_channel = if plan.keeps(Effect::Dispersion) { 3.0 } else { 1.0 };
+            plan.rare_radiance = of_channel * geometry.brightest_shown();
         }
         plan.check_sizes(geometry, limits)?;
         plan.decisions = plan.decisions.iter().map(|decision| plan.given(decision, geometry)).collect();
@@ -224,6 +226,9 @@ fn constants(
         ("HAS_LAYER_TEXTURES", u32::from(keeps(Effect::Layers) && keeps(Effect::Textures) && facts.has_layer_textures())),
         ("HAS_PANES", u32::from(keeps(Effect::Transmission) && facts.has_kind(|kinds| kinds.pane))),
         ("HAS_MEDIA", flag(Effect::Media)),
+        ("HAS_DIFFUSE_TRANSMISSION", flag(Effect::DiffuseTransmission)),
+        ("HAS_IRIDESCENCE", flag(Effect::Iridescence)),
+        ("HAS_DISPERSION", flag(Effect::Dispersion)),
         ("HAS_COATS", flag(Effect::ClearCoat)),
         ("HAS_SHEEN", flag(Effect::Sheen)),
         ("HAS_NORMAL_MAPS", flag(Effect::NormalMaps)),
@@ -240,6 +245,7 @@ fn constants(
         ("HAS_DIRECTIONAL_LIGHTS", flag(Effect::DirectionalLights)),
         ("HAS_DISC_LIGHTS", flag(Effect::DiscLights)),
         ("HAS_ENVIRONMENT", flag(Effect::Environment)),
+        ("HAS_SKY_PICTURE", u32::from(keeps(Effect::Environment) && geometry.has_sky_picture())),
         ("PARANOID", u32::from(settings.paranoid)),
         ("STRICT_MATH", settings.math as u32),
         ("SHADOW_RAYS", shadow_rays),

@@ -1,6 +1,23 @@
-//! Pinhole cameras.
+//! Cameras: pinholes and thin lenses, in perspective or orthographic.
 
-use glam::DVec3;
+use glam::{DVec2, DVec3};
+
+#[derive(Debug, Clone, Copy, PartialEq)]
+pub enum Projection {
+    /// Angle between the picture's lower and upper edge, radians.
+    Perspective { vertical_view: f64 },
+    /// Rays are parallel; metres from the picture's middle to its upper edge.
+    Orthographic { half_height: f64 },
+}
+
+/// What lies further or nearer than the plane in focus is blurred.
+#[derive(Debug, Clone, Copy, PartialEq)]
+pub struct Lens {
+    /// Metres.
+    pub radius: f64,
+    /// Distance of that plane along the view, metres.
+    pub focus: f64,
+}
 
 #[derive(Debug, Clone, PartialEq)]
 pub struct Camera {
@@ -11,8 +28,8 @@ pub struct Camera {
     pub forward: DVec3,
     pub right: DVec3,
     pub up: DVec3,
-    /// Angle between the picture's lower and upper edge, radians.
-    pub vertical_view: f64,
+    pub projection: Projection,
+    pub lens: Option<Lens>,
     /// Width over height of the picture that it was set up for; `None` leaves that open.
     pub aspect: Option<f64>,
 }
@@ -24,7 +41,8 @@ impl Camera {
         let side = forward.cross(up);
         let side = if side.length_squared() < 1.0 / 1_048_576.0 { forward.cross(forward.any_orthonormal_vector()) } else { side };
         let right = side.normalize();
-        Camera { name: name.to_owned(), eye, forward, right, up: right.cross(forward), vertical_view, aspect: None }
+        let projection = Projection::Perspective { vertical_view };
+        Camera { name: name.to_owned(), eye, forward, right, up: right.cross(forward), projection, lens: None, aspect: None }
     }
 
     pub fn with_aspect(self, aspect: f64) -> Camera {
@@ -41,10 +59,25 @@ impl Camera {
         Camera::looking_at("default", centre + distance * direction, centre, DVec3::Y, vertical_view)
     }
 
-    /// Unit direction through a point of the picture, both coordinates from -1 to 1, y up.
-    pub fn direction(&self, x: f64, y: f64, aspect: f64) -> DVec3 {
-        let half_height = (0.5 * self.vertical_view).tan();
-        (self.forward + half_height * (x * aspect * self.right + y * self.up)).normalize()
+    /// Half the picture's height: metres at a distance of 1 m, or of all rays where they are parallel.
+    pub fn half_height(&self) -> f64 {
+        match self.projection {
+            Projection::Perspective { vertical_view } => (0.5 * vertical_view).tan(),
+            Projection::Orthographic { half_height } => half_height,
+        }
+    }
+
+    /// Start and unit direction of the ray through a point of the picture, both coordinates from -1 to 1, y up, and through a point
+    /// of the lens, in parts of its radius.
+    pub fn ray(&self, x: f64, y: f64, aspect: f64, on_lens: DVec2) -> (DVec3, DVec3) {
+        let across = self.half_height() * (x * aspect * self.right + y * self.up);
+        let (origin, way) = match self.projection {
+            Projection::Perspective { .. } => (self.eye, self.forward + across),
+            Projection::Orthographic { .. } => (self.eye + across, self.forward),
+        };
+        let Some(lens) = self.lens else { return (origin, way.normalize()) };
+        let start = lens.radius * (on_lens.x * self.right + on_lens.y * self.up);
+        (origin + start, (lens.focus * way - start).normalize())
     }
 }
 
@@ -71,7 +104,27 @@ mod tests {
         for corner in 0..8 {
             let side = |axis: usize| if corner >> axis & 1 == 1 { max[axis] } else { min[axis] };
             let to = (DVec3::new(side(0), side(1), side(2)) - camera.eye).normalize();
-            assert!(to.dot(camera.forward).acos() < 0.5 * camera.vertical_view, "corner {corner}");
+            assert!(to.dot(camera.forward).acos() < camera.half_height().atan(), "corner {corner}");
+        }
+    }
+
+    /// All rays through one point of the picture meet in the plane in focus.
+    #[test]
+    fn lenses_focus_on_a_plane() {
+        for projection in [Projection::Perspective { vertical_view: 1.0 }, Projection::Orthographic { half_height: 2.0 }] {
+            let camera = Camera::looking_at("c", DVec3::ONE, DVec3::new(4.0, 2.0, -1.0), DVec3::Y, 1.0);
+            let camera = Camera { projection, lens: Some(Lens { radius: 0.2, focus: 3.0 }), ..camera };
+            let meets = |on_lens: DVec2| {
+                let (origin, direction) = camera.ray(0.4, -0.7, 1.5, on_lens);
+                origin + direction * ((3.0 - (origin - camera.eye).dot(camera.forward)) / direction.dot(camera.forward))
+            };
+            let through_middle = meets(DVec2::ZERO);
+            for on_lens in [DVec2::X, DVec2::NEG_Y, DVec2::new(0.5, 0.5)] {
+                assert!(meets(on_lens).distance(through_middle) < 1e-12, "{projection:?}");
+            }
+            let pinhole = Camera { lens: None, ..camera.clone() };
+            let (origin, direction) = pinhole.ray(0.4, -0.7, 1.5, DVec2::ONE);
+            assert!((through_middle - origin).normalize().distance(direction) < 1e-12);
         }
     }
 }

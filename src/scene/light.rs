@@ -1,7 +1,10 @@
 //! Lights that are no mesh.
 
+use std::sync::Arc;
+
 use glam::{DVec3, Vec3};
 
+use super::sky::Sky;
 use crate::constants::*;
 use crate::settings::EmissionLaw;
 
@@ -25,12 +28,19 @@ pub enum LightKind {
     Disc { centre: DVec3, normal: DVec3, radius: f64, power: Vec3, law: EmissionLaw },
     /// The same radiance in W/m2/sr from everywhere beyond the scene.
     Environment { radiance: Vec3 },
+    /// Radiance from beyond the scene by a picture; a scene has at most one, and no other environment beside it.
+    Sky(Arc<Sky>),
 }
 
 /// Lumens in a watt at 555 nm: what turns glTF's photometric lights into radiometric ones.
 pub const LUMENS_PER_WATT: f32 = 683.0;
 
 impl LightKind {
+    /// Whether it shines from beyond the scene, in all directions.
+    pub fn is_environment(&self) -> bool {
+        matches!(self, LightKind::Environment { .. } | LightKind::Sky(_))
+    }
+
     /// `EMITTER_...`.
     pub fn code(&self) -> u32 {
         match self {
@@ -39,7 +49,7 @@ impl LightKind {
             LightKind::Directional { .. } => EMITTER_DIRECTIONAL,
             LightKind::Disc { law: EmissionLaw::Cosine, .. } => EMITTER_DISC_COSINE,
             LightKind::Disc { law: EmissionLaw::Uniform, .. } => EMITTER_DISC_UNIFORM,
-            LightKind::Environment { .. } => EMITTER_ENVIRONMENT,
+            LightKind::Environment { .. } | LightKind::Sky(_) => EMITTER_ENVIRONMENT,
         }
     }
 }

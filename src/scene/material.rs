@@ -124,8 +124,22 @@ pub struct Layers {
     /// Share of what enters the dielectric that it lets through; the texture has it in red.
     pub transmission: f32,
     pub transmission_texture: Option<TextureUse>,
+    /// Share of the diffuse lobe that scatters to the other side; the texture has it in alpha.
+    pub diffuse_transmission: f32,
+    pub diffuse_transmission_texture: Option<TextureUse>,
+    pub diffuse_transmission_colour: Vec3,
+    pub diffuse_transmission_colour_texture: Option<TextureUse>,
     /// `None`: a thin wall.
     pub medium: Option<Medium>,
+    /// 20 over the Abbe number of what it encloses; 0: all colours have the same index.
+    pub dispersion: f32,
+    /// Share of the surface under a thin film; the texture has it in red.
+    pub iridescence: f32,
+    pub iridescence_texture: Option<TextureUse>,
+    pub film_ior: f32,
+    /// Nanometres, where the texture is 0 and where it is 1, or missing; it has them in green.
+    pub film_thickness: [f32; 2],
+    pub film_thickness_texture: Option<TextureUse>,
     /// Share of the surface under a clear coat; the texture has it in red.
     pub coat: f32,
     pub coat_texture: Option<TextureUse>,
@@ -144,6 +158,12 @@ pub struct Layers {
 }
 
 impl Layers {
+    /// Half of what lies between its indices of refraction for red and for blue (KHR_materials_dispersion).
+    pub fn ior_spread(&self) -> f32 {
+        // Of more than the range of indices nothing is left to see.
+        (0.5 * (self.ior - 1.0).max(0.0) * (self.dispersion / 20.0)).min(100.0)
+    }
+
     /// The factors alone.
     pub fn without_textures(&self) -> Layers {
         Layers {
@@ -151,6 +171,10 @@ impl Layers {
             specular_texture: None,
             specular_colour_texture: None,
             transmission_texture: None,
+            diffuse_transmission_texture: None,
+            diffuse_transmission_colour_texture: None,
+            iridescence_texture: None,
+            film_thickness_texture: None,
             coat_texture: None,
             coat_roughness_texture: None,
             coat_normal_map: None,
@@ -175,7 +199,17 @@ impl Default for Layers {
             specular_colour_texture: None,
             transmission: 0.0,
             transmission_texture: None,
+            diffuse_transmission: 0.0,
+            diffuse_transmission_texture: None,
+            diffuse_transmission_colour: Vec3::ONE,
+            diffuse_transmission_colour_texture: None,
             medium: None,
+            dispersion: 0.0,
+            iridescence: 0.0,
+            iridescence_texture: None,
+            film_ior: 1.3,
+            film_thickness: [100.0, 400.0],
+            film_thickness_texture: None,
             coat: 0.0,
             coat_texture: None,
             coat_roughness: 0.0,
@@ -257,9 +291,12 @@ impl LobeKinds {
         let coat_alpha = squared(range(of.coat_roughness, of.coat_roughness_texture, 1));
         let metallic = range(of.metallic, of.metallic_roughness_texture, 2);
         let transmission = range(of.transmission, of.transmission_texture, 0);
-        let reflects = metallic.1 > 0.0 || of.specular > 0.0;
+        let reflects = metallic.1 > 0.0 || of.specular > 0.0 || of.iridescence > 0.0;
         let transmits = metallic.0 < 1.0 && transmission.1 > 0.0 && material.base_colour != Vec3::ZERO;
-        let is_diffuse = metallic.0 < 1.0 && transmission.0 < 1.0 && material.base_colour != Vec3::ZERO;
+        let beyond = range(of.diffuse_transmission, of.diffuse_transmission_texture, 3);
+        let has_diffuse = metallic.0 < 1.0 && transmission.0 < 1.0;
+        let is_diffuse = has_diffuse && beyond.0 < 1.0 && material.base_colour != Vec3::ZERO;
+        let is_beyond = has_diffuse && beyond.1 > 0.0 && of.diffuse_transmission_colour != Vec3::ZERO;
         let is_pane = of.medium.is_none();
         let is_covered = material.coverage == Coverage::Whole;
         if of.is_unlit {
@@ -270,11 +307,11 @@ impl LobeKinds {
             || (reflects && alpha.1 >= map_alpha && !(transmits && !is_pane && transmission.0 >= 1.0))
             || (of.coat > 0.0 && coat_alpha.1 >= map_alpha);
         // A surface without a lobe is black; light still arrives there.
-        let is_black = !matt && !reflects && !transmits && of.coat == 0.0;
+        let is_black = !matt && !reflects && !transmits && !is_beyond && of.coat == 0.0;
         LobeKinds {
             matt: matt || is_black,
             sharp_reflection: (reflects && (alpha.0 < map_alpha || (transmits && !is_pane))) || (of.coat > 0.0 && coat_alpha.0 < map_alpha),
-            sharp_transmission: transmits && !(is_pane && alpha.1 < delta_alpha),
+            sharp_transmission: is_beyond || (transmits && !(is_pane && alpha.1 < delta_alpha)),
             passing: !is_covered || (transmits && is_pane && alpha.0 < delta_alpha),
             pane: transmits && is_pane && alpha.0 < delta_alpha,
         }
@@ -314,6 +351,11 @@ impl Material {
         self.layers.medium.filter(|_| self.transmits())
     }
 
+    /// Whether the solid that it encloses parts colours.
+    pub fn is_dispersive(&self) -> bool {
+        self.enclosed_medium().is_some() && self.layers.transmission > 0.0 && self.layers.ior_spread() > 0.0
+    }
+
     /// Whether its back scatters and shines as the front does: what transmits lets light out there.
     pub fn has_two_sides(&self) -> bool {
         self.two_sided || self.transmits()
@@ -321,7 +363,8 @@ impl Material {
 
     /// Of a layered one.
     fn transmits(&self) -> bool {
-        self.surface == Surface::Layered && self.layers.transmission > 0.0 && !self.layers.is_unlit
+        let Layers { transmission, diffuse_transmission, is_unlit, .. } = self.layers;
+        self.surface == Surface::Layered && (transmission > 0.0 || diffuse_transmission > 0.0) && !is_unlit
     }
 
     /// Whether it bounds a solid that refracts.
@@ -346,6 +389,10 @@ impl Material {
             layers.specular_texture,
             layers.specular_colour_texture,
             layers.transmission_texture,
+            layers.diffuse_transmission_texture,
+            layers.diffuse_transmission_colour_texture,
+            layers.iridescence_texture,
+            layers.film_thickness_texture,
             layers.coat_texture,
             layers.coat_roughness_texture,
             layers.sheen_colour_texture,

@@ -28,6 +28,25 @@ pub struct Mesh {
     /// Counter-clockwise from the front.
     pub triangles: Vec<[u32; 3]>,
     pub material: usize,
+    /// `None` where it is not from a file.
+    pub source: Option<Source>,
+}
+
+/// Which part of a glTF file a mesh was made of.
+#[derive(Debug, Clone, PartialEq, Eq)]
+pub struct Source {
+    pub node: usize,
+    pub mesh: usize,
+    pub primitive: usize,
+    /// The vertex of the primitive that each vertex was; empty where they are the same.
+    pub vertices: Vec<u32>,
+}
+
+impl Source {
+    /// The vertex of the primitive that a vertex of the mesh was.
+    pub fn vertex(&self, vertex: u32) -> u32 {
+        if self.vertices.is_empty() { vertex } else { self.vertices[vertex as usize] }
+    }
 }
 
 /// Triangles whose area is below this share of the scene's squared extent are lines: rounding of their corners

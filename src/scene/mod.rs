@@ -6,6 +6,8 @@ pub mod built_in;
 pub mod bvh;
 pub mod camera;
 pub mod closed_forms;
+pub mod daylight;
+pub mod film;
 pub mod geometry;
 pub mod gltf;
 pub mod light;
@@ -18,6 +20,7 @@ pub mod overlap;
 mod planes;
 pub mod rectangle;
 pub mod room;
+pub mod sky;
 pub mod targets;
 pub mod texture;
 mod work;
@@ -29,7 +32,7 @@ use std::path::Path;
 use glam::{DVec3, Vec3};
 use rayon::prelude::*;
 
-pub use camera::Camera;
+pub use camera::{Camera, Lens, Projection};
 pub use light::{Light, LightKind};
 pub use material::{LobeKinds, Material, Surface};
 pub use mesh::Mesh;
@@ -41,6 +44,15 @@ use material::{Coverage, Medium};
 
 /// Called with what is being done while a scene is opened, and the share of it that is done.
 pub type Progress<'a> = &'a mut dyn FnMut(&'static str, f64);
+
+/// How a file is read.
+#[derive(Debug, Clone, Copy, Default)]
+pub struct Reading {
+    /// Punctual lights are given in W/sr and W/m2 instead of candela and lux.
+    pub radiometric: bool,
+    /// Seconds into the first animation, for the pose of its nodes; `None`: the pose at rest.
+    pub at: Option<f64>,
+}
 
 /// Meshes in world space, metres, y up, with what they are made of and what lights them.
 #[derive(Debug, Clone, Default)]
@@ -62,17 +74,20 @@ impl Scene {
     /// A built-in scene by name, else a `.gltf` or `.glb` file. `radiometric`: punctual lights are
     /// given in W/sr and W/m2 instead of candela and lux.
     pub fn open(name: &str, radiometric: bool) -> Result<Scene> {
-        Scene::open_with(name, radiometric, &mut |_, _| {})
+        Scene::open_with(name, Reading { radiometric, at: None }, &mut |_, _| {})
     }
 
     /// The same, with reports of how far it has come.
-    pub fn open_with(name: &str, radiometric: bool, progress: Progress) -> Result<Scene> {
+    pub fn open_with(name: &str, reading: Reading, progress: Progress) -> Result<Scene> {
         if let Some(scene) = built_in::by_name(name) {
+            if let Some(time) = reading.at {
+                return Err(Error::setting("--at", time, "is a time of a file's animation; built-in scenes have none"));
+            }
             return Ok(scene);
         }
         let path = Path::new(name);
         match path.extension().and_then(|extension| extension.to_str()).map(str::to_lowercase).as_deref() {
-            Some("gltf" | "glb") => gltf::load(path, radiometric, progress),
+            Some("gltf" | "glb") => gltf::load(path, reading, progress),
             _ => {
                 let names = built_in::names();
                 let likeness = |known: &&str| strsim::jaro(known, name);
@@ -95,7 +110,7 @@ impl Scene {
             LightKind::Spot { .. } => lacks(Effect::SpotLights),
             LightKind::Directional { .. } => lacks(Effect::DirectionalLights),
             LightKind::Disc { .. } => lacks(Effect::DiscLights),
-            LightKind::Environment { .. } => lacks(Effect::Environment),
+            LightKind::Environment { .. } | LightKind::Sky(_) => lacks(Effect::Environment),
         });
         if lacks(Effect::VertexColours) {
             scene.meshes.iter_mut().for_each(|mesh| {
@@ -118,6 +133,15 @@ impl Scene {
             }
             if lacks(Effect::Media) {
                 material.layers.medium = material.layers.medium.map(|_| Medium::CLEAR);
+            }
+            if lacks(Effect::DiffuseTransmission) {
+                material.layers.diffuse_transmission = 0.0;
+            }
+            if lacks(Effect::Iridescence) {
+                material.layers.iridescence = 0.0;
+            }
+            if lacks(Effect::Dispersion) {
+                material.layers.dispersion = 0.0;
             }
             if lacks(Effect::ClearCoat) {
                 material.layers.coat = 0.0;
@@ -179,6 +203,22 @@ impl Scene {
         let (min, max) = self.meshes.par_iter().map(of_mesh).reduce(|| nothing, joined);
         // Threads decide which of 0 and -0 comes first; the sum turns both into 0.
         (min + DVec3::ZERO, max + DVec3::ZERO)
+    }
+
+    /// Metres from a place to the nearest triangle in a unit direction, if there is one.
+    pub fn distance_along(&self, origin: DVec3, direction: DVec3) -> Option<f64> {
+        let of_triangle = |[a, b, c]: [DVec3; 3]| {
+            // Moller and Trumbore (1997).
+            let (ab, ac, from) = (b - a, c - a, origin - a);
+            let p = direction.cross(ac);
+            let scale = 1.0 / ab.dot(p);
+            let q = from.cross(ab);
+            let (u, v, t) = (scale * from.dot(p), scale * direction.dot(q), scale * ac.dot(q));
+            (u >= 0.0 && v >= 0.0 && u + v <= 1.0 && t > 0.0).then_some(t)
+        };
+        let of_mesh =
+            |mesh: &Mesh| (0..mesh.triangles.len()).filter_map(|triangle| of_triangle(mesh.corners(triangle))).min_by(f64::total_cmp);
+        self.meshes.par_iter().filter_map(of_mesh).min_by(f64::total_cmp)
     }
 
     /// Whether anything shines.

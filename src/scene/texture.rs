@@ -22,7 +22,7 @@ pub enum Filter {
     Nearest,
 }
 
-#[derive(Debug, Clone)]
+#[derive(Debug, Clone, PartialEq)]
 pub struct Texture {
     pub name: String,
     pub width: u32,

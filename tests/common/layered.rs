@@ -6,10 +6,10 @@ use super::plates::{COSINES, Place, Plates};
 use super::prelude::*;
 use photonmill::scene::material::{Coverage, Layers, Medium, NormalMap};
 use photonmill::scene::texture::Filter;
-use photonmill::verify::judge::lobes::{Frame, Inputs, Kind as Lobe, Lobes, Wall};
+use photonmill::verify::judge::lobes::{Film, Frame, Inputs, Kind as Lobe, Lobes, Wall};
 use photonmill::verify::judge::random;
 
-pub const LOBES: [Lobe; 5] = [Lobe::Diffuse, Lobe::Reflection, Lobe::Transmission, Lobe::Coat, Lobe::Sheen];
+pub const LOBES: [Lobe; 6] = [Lobe::Diffuse, Lobe::Reflection, Lobe::Transmission, Lobe::Coat, Lobe::Sheen, Lobe::DiffuseTransmission];
 
 /// A dielectric that reflects nothing by itself: a Lambertian surface of this albedo, if no more is asked for.
 pub fn dull(albedo: f32) -> Material {
@@ -44,6 +44,14 @@ pub fn inputs(material: &Material) -> Inputs {
         specular: f64::from(of.specular),
         specular_colour: of.specular_colour.as_dvec3(),
         transmission: f64::from(of.transmission),
+        diffuse_transmission: f64::from(of.diffuse_transmission),
+        diffuse_transmission_colour: of.diffuse_transmission_colour.as_dvec3(),
+        film: Film {
+            share: of.iridescence.into(),
+            ior: of.film_ior.into(),
+            thickness: of.film_thickness[1].into(),
+            bound: of.film_bound(),
+        },
         wall: of.medium.map_or(Wall::Thin, |_| Wall::Solid { from: 1.0, to: f64::from(of.ior) }),
         coat: f64::from(of.coat),
         coat_alpha: squared(of.coat_roughness),
@@ -83,7 +91,22 @@ pub fn mixtures() -> Vec<Material> {
         Layers { sheen_colour, sheen_roughness: 0.3, ..plastic(0.8) },
         Layers { sheen_colour, sheen_roughness: 1.0, ..metal(0.4) },
         Layers { sheen_colour, sheen_roughness: 0.6, coat: 0.7, coat_roughness: 0.5, metallic: 0.3, ..plastic(0.5) },
+        Layers { iridescence: 1.0, film_ior: 1.4, film_thickness: [0.0, 380.0], ..plastic(0.5) },
+        Layers { iridescence: 0.8, film_ior: 1.9, film_thickness: [0.0, 250.0], ..metal(0.4) },
+        Layers {
+            iridescence: 1.0,
+            film_ior: 1.3,
+            film_thickness: [0.0, 500.0],
+            metallic: 0.4,
+            coat: 0.6,
+            coat_roughness: 0.5,
+            ..plastic(0.8)
+        },
+        Layers { iridescence: 0.7, film_ior: 1.8, film_thickness: [0.0, 300.0], transmission: 0.7, ..plastic(0.4) },
+        Layers { iridescence: 0.9, film_ior: 1.3, film_thickness: [0.0, 400.0], transmission: 0.9, medium: CLEAR, ..plastic(0.4) },
         Layers { transmission: 0.6, ..plastic(0.5) },
+        Layers { diffuse_transmission: 0.6, diffuse_transmission_colour: Vec3::new(0.3, 0.9, 0.6), ..plastic(0.5) },
+        Layers { diffuse_transmission: 1.0, sheen_colour, sheen_roughness: 0.6, coat: 0.7, coat_roughness: 0.5, ..plastic(0.7) },
         Layers { transmission: 1.0, coat: 1.0, coat_roughness: 0.4, ..plastic(0.35) },
         Layers { transmission: 0.8, medium: CLEAR, ..plastic(0.4) },
         Layers { transmission: 1.0, medium: CLEAR, sheen_colour, sheen_roughness: 0.5, ior: 1.2, ..plastic(0.3) },
@@ -115,8 +138,9 @@ pub enum Mixtures {
 }
 
 impl Mixtures {
-    fn has(self, Layers { coat, sheen_colour, transmission, .. }: Layers) -> bool {
+    fn has(self, Layers { coat, sheen_colour, transmission, diffuse_transmission, .. }: Layers) -> bool {
         let is_covered = coat > 0.0 || sheen_colour != Vec3::ZERO;
+        let transmission = transmission.max(diffuse_transmission);
         match self {
             Mixtures::Bare => transmission == 0.0 && !is_covered,
             Mixtures::Covered => transmission == 0.0 && is_covered,
@@ -411,7 +435,9 @@ pub fn backs_in_the_sun(gpu: &Gpu) -> Check<Complaint> {
 /// Opaque ones: mixtures of more than one lobe, white dielectrics, and white metals.
 pub fn opaque() -> Vec<Material> {
     let mixed = mixtures().into_iter().filter(|Material { layers, .. }| {
-        layers.transmission == 0.0 && (layers.coat > 0.0 || layers.sheen_colour != Vec3::ZERO || layers.metallic == 0.5)
+        layers.transmission == 0.0
+            && layers.diffuse_transmission == 0.0
+            && (layers.coat > 0.0 || layers.sheen_colour != Vec3::ZERO || layers.metallic == 0.5)
     });
     let white = [plastic(0.0), plastic(0.3), plastic(0.6), plastic(1.0), Layers { coat: 1.0, ..plastic(0.0) }];
     let metals = METALS.map(|(alpha, _)| metal(alpha.sqrt() as f32));
@@ -529,7 +555,8 @@ pub fn transmission_in_half_a_dome(gpu: &Gpu) -> Check<Complaint> {
     let wo = DVec3::new(0.8, 0.6, 0.0);
     let mut half = dome(1);
     half.triangles.retain(|corners| corners.map(|k| half.positions[k as usize].x).iter().sum::<f64>() < 0.0);
-    for layers in [Layers { transmission: 0.6, ..plastic(0.4) }, Layers { transmission: 1.0, medium: CLEAR, ..plastic(0.4) }] {
+    let paper = Layers { diffuse_transmission: 0.7, diffuse_transmission_colour: Vec3::new(0.3, 0.9, 0.6), ..plastic(0.4) };
+    for layers in [Layers { transmission: 0.6, ..plastic(0.4) }, Layers { transmission: 1.0, medium: CLEAR, ..plastic(0.4) }, paper] {
         let material = layered(Vec3::new(0.8, 0.5, 0.2), &layers);
         let scene = scene_of(vec![level(0.0, [0.1; 2], true, 0), half.clone()], vec![material.clone(), shining(0.0)], Vec::new());
         let camera = Camera::looking_at("eye", wo, DVec3::ZERO, DVec3::Y, 1e-3);

@@ -22,6 +22,7 @@ pub mod prelude;
 pub mod program;
 pub mod rectangles;
 pub mod reference;
+pub mod rich_file;
 pub mod sheets;
 pub mod sources;
 

@@ -117,9 +117,12 @@ layout(constant_id = 46) const uint CHAIN_STEPS = MAX_BOUNCES;
 // Of a camera path beyond LOSSLESS_DEPTH.
 const float MAX_SURVIVAL = 0.95;
 
-// Random numbers of a place that are no vertex's: light at a receiver, then roulette at each depth.
+// Random numbers of a place that are no vertex's: light at a receiver, then roulette at each depth, then the channel.
 const uint RECEIVER_BLOCK = 1 + VERTEX_BLOCKS * MAX_BOUNCES;
 const uint ROULETTE_BLOCK = RECEIVER_BLOCK + 1;
+const uint CHANNEL_BLOCK = ROULETTE_BLOCK + MAX_BOUNCES;
+// A place on the camera's lens.
+const uint LENS_BLOCK = CHANNEL_BLOCK + 1;
 
 // What shines where the path leaves the scene.
 void see_sky(uint emitter_count)
@@ -129,7 +132,7 @@ void see_sky(uint emitter_count)
         if (HAS_LAYERS) {
             light_density = sky_light_density(emitter_count, chain.from, chain.from_normal, chain.direction);
         }
-        add_emission(environment_radiance(emitter_count), light_density);
+        add_emission(environment_radiance(emitter_count, chain.direction), light_density);
     }
 }
 
@@ -208,7 +211,15 @@ bool follow(uint index, uint number, uint pixel_count, Draws draws, uint emitter
         Scatter scatter;
         float matt = 1.0;
         if (is_layered) {
-            float eta = index_ratio(surface, chain.media);
+            uint channel = 1;
+            if (HAS_DISPERSION) {
+                if (is_dispersive(surface, chain.media)) {
+                    // Once a path: of one channel it stays.
+                    channel = choose_channel(chain.weight, stratified(number, SAMPLES, words_of(index, CHANNEL_BLOCK, draws)).x);
+                    chain.weight = light_of_channel(chain.weight, channel);
+                }
+            }
+            float eta = index_ratio(surface, chain.media, channel);
             surface.ns = normal_of_refraction(surface, wo, eta, depth);
             lobes = lobes_of(surface, wo, eta);
             // The eye does not see the back of what has one side.

@@ -37,7 +37,7 @@ vec3 passing_at(Hit hit, vec3 wo, uint media)
     if (HAS_PANES) {
         if (layered_materials[triangles[hit.triangle].material].transmission > 0.0) {
             Surface surface = surface_at(hit, wo);
-            return lobes_of(surface, wo, index_ratio(surface, media)).passing;
+            return lobes_of(surface, wo, index_ratio(surface, media, 1)).passing;
         }
     }
     SurfaceMaterial material = materials[triangles[hit.triangle].material];

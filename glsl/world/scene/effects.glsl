@@ -24,6 +24,12 @@ layout(constant_id = 61) const bool HAS_PANES = false;
 layout(constant_id = 58) const bool HAS_PASSING = false;
 // Media that absorb, or lie in one another.
 layout(constant_id = 59) const bool HAS_MEDIA = false;
+// Solids whose index of refraction differs from colour to colour.
+layout(constant_id = 62) const bool HAS_DISPERSION = false;
+// Surfaces that scatter light evenly to their other side.
+layout(constant_id = 63) const bool HAS_DIFFUSE_TRANSMISSION = false;
+// Thin films.
+layout(constant_id = 64) const bool HAS_IRIDESCENCE = false;
 layout(constant_id = 10) const bool HAS_TWO_SIDED = true;
 layout(constant_id = 11) const bool HAS_GLOSSY = true;
 layout(constant_id = 12) const bool HAS_MIRROR = true;
@@ -35,6 +41,8 @@ layout(constant_id = 17) const bool HAS_SPOT_LIGHTS = true;
 layout(constant_id = 18) const bool HAS_DIRECTIONAL_LIGHTS = true;
 layout(constant_id = 19) const bool HAS_DISC_LIGHTS = true;
 layout(constant_id = 20) const bool HAS_ENVIRONMENT = true;
+// The environment is a picture.
+layout(constant_id = 70) const bool HAS_SKY_PICTURE = false;
 // Rays towards lights from a visible point, each to a light of its own choice; 0 where the photon maps
 // hold direct light too.
 layout(constant_id = 21) const uint SHADOW_RAYS = 1;

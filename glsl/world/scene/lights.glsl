@@ -71,6 +71,8 @@ float spot_integral(Emitter light)
     return light.size + (light.outer_versine - light.size) * (1.0 / 3.0);
 }
 
+#include "world/scene/sky.glsl"
+
 struct Emission {
     vec3 position;
     vec3 direction;
@@ -136,7 +138,15 @@ Emission sample_emission(Emitter light, float scene_radius, vec4 u, vec4 w)
     if (HAS_ENVIRONMENT) {
         if (light.kind == EMITTER_ENVIRONMENT) {
             emission.is_far = true;
-            emission.direction = sample_sphere(w.x, w.y);
+            if (HAS_SKY_PICTURE) {
+                SkySample found = sample_sky_table(light, w.xy);
+                emission.direction = -found.wi;
+                // Over the density of an even choice of all directions; the strength is in the flux.
+                vec3 texel = sample_texture(textures[light.triangle], place_in_sky(light, found.wi)).xyz;
+                emission.flux *= texel * divide(0.07957747154594767, found.density);
+            } else {
+                emission.direction = sample_sphere(w.x, w.y);
+            }
         }
     }
     if (emission.is_far) {
@@ -176,15 +186,16 @@ float lamp_density(Triangle shining, vec3 normal, vec3 position, vec3 point, flo
     return angle > 0.0 ? divide(1.0, angle) : divide(squared, max(cosine * area, 1e-30));
 }
 
-float environment_density(vec3 position, vec3 ns, vec3 wi)
+float environment_density(Emitter sky, vec3 position, vec3 ns, vec3 wi)
 {
+    float open = open_sky_density(sky, ns, wi);
     if (HAS_OPENINGS) {
         if (openings[0].radius != 0.0) {
             float sum = sum_of_versines(position);
-            return sky_density(position, ns, wi, sum > 0.0 ? OPENING_SHARE : 0.0, sum).density;
+            return sky_density(position, SkySample(wi, open), sum > 0.0 ? OPENING_SHARE : 0.0, sum).density;
         }
     }
-    return max(dot(wi, ns), 0.0) * 0.31830988618379067;
+    return open;
 }
 
 // `light` has the probability with which it was chosen; u is for its area.
@@ -262,21 +273,30 @@ Arriving sample_light(Emitter light, vec3 position, vec3 ns, vec2 u)
                 is_open = openings[0].radius == 0.0;
             }
             if (is_open) {
-                vec3 local = sample_cosine_hemisphere(u.x, u.y);
-                arriving.wi = to_frame(local, ns);
-                arriving.radiance *= divide(3.14159265358979324, max(local.z, 1e-6));
+                if (HAS_SKY_PICTURE) {
+                    SkySample sampled = sample_open_sky(light, ns, u);
+                    arriving.wi = sampled.wi;
+                    arriving.radiance *= divide(1.0, max(sampled.density, 1e-30));
+                } else {
+                    vec3 local = sample_cosine_hemisphere(u.x, u.y);
+                    arriving.wi = to_frame(local, ns);
+                    arriving.radiance *= divide(3.14159265358979324, max(local.z, 1e-6));
+                }
             } else {
-                SampledSky sampled = sample_sky(position, ns, u.xy);
+                SampledSky sampled = sample_sky(light, position, ns, u.xy);
                 arriving.wi = sampled.wi;
                 arriving.is_beside = !sampled.is_aimed;
                 arriving.radiance *= divide(1.0, max(sampled.density, 1e-6));
+            }
+            if (HAS_SKY_PICTURE) {
+                arriving.radiance *= sample_texture(textures[light.triangle], place_in_sky(light, arriving.wi)).xyz;
             }
         }
     }
     if (HAS_LAYERS) {
         if (HAS_ENVIRONMENT) {
             if (light.kind == EMITTER_ENVIRONMENT) {
-                arriving.density = environment_density(position, ns, arriving.wi);
+                arriving.density = environment_density(light, position, ns, arriving.wi);
             }
         }
         if (HAS_TRIANGLE_LIGHTS) {
@@ -304,12 +324,12 @@ Arriving sample_light(Emitter light, vec3 position, vec3 ns, vec2 u)
 }
 
 // Radiance from beyond the scene.
-vec3 environment_radiance(uint emitter_count)
+vec3 environment_radiance(uint emitter_count, vec3 direction)
 {
     if (HAS_ENVIRONMENT && emitter_count != 0) {
         // It stands last among the emitters.
         Emitter light = emitters[emitter_count - 1];
-        return light.kind == EMITTER_ENVIRONMENT ? light.strength : vec3(0.0);
+        return light.kind == EMITTER_ENVIRONMENT ? sky_radiance(light, direction) : vec3(0.0);
     }
     return vec3(0.0);
 }
@@ -319,7 +339,7 @@ float sky_light_density(uint emitter_count, vec3 position, vec3 ns, vec3 wi)
 {
     if (HAS_ENVIRONMENT && emitter_count != 0) {
         Emitter light = emitters[emitter_count - 1];
-        return light.kind == EMITTER_ENVIRONMENT ? light.probability * environment_density(position, ns, wi) : 0.0;
+        return light.kind == EMITTER_ENVIRONMENT ? light.probability * environment_density(light, position, ns, wi) : 0.0;
     }
     return 0.0;
 }

@@ -25,10 +25,11 @@ struct SampledSky {
     bool is_aimed; // it leads to an opening, by whichever way it was found
 };
 
-// Density of that sampling in a direction, 1/sr, and whether it leads to an opening.
-SampledSky sky_density(vec3 position, vec3 ns, vec3 wi, float share, float sum)
+// Density of that sampling in a direction, 1/sr, and whether it leads to an opening; `open` has the density of what is not aimed.
+SampledSky sky_density(vec3 position, SkySample open, float share, float sum)
 {
-    float density = (1.0 - share) * max(dot(wi, ns), 0.0) * 0.31830988618379067;
+    vec3 wi = open.wi;
+    float density = (1.0 - share) * open.density;
     bool is_aimed = false;
     if (share > 0.0) {
         float cones = 0.0;
@@ -51,12 +52,11 @@ float sum_of_versines(vec3 position)
     return sum;
 }
 
-// Towards the openings or, by the cosine, anywhere.
-SampledSky sample_sky(vec3 position, vec3 ns, vec2 u)
+// Towards the openings or anywhere.
+SampledSky sample_sky(Emitter sky, vec3 position, vec3 ns, vec2 u)
 {
     float sum = sum_of_versines(position);
     float share = sum > 0.0 ? OPENING_SHARE : 0.0;
-    vec3 wi = vec3(0.0);
     if (u.x < share) {
         float left = divide(u.x, share) * sum;
         uint chosen = 0;
@@ -71,11 +71,10 @@ SampledSky sample_sky(vec3 position, vec3 ns, vec2 u)
             left -= own;
         }
         versine *= u.x;
-        wi = to_frame(direction_at(1.0 - versine, versine * (2.0 - versine), u.y), normalize(openings[chosen].centre - position));
-    } else {
-        wi = to_frame(sample_cosine_hemisphere(divide(u.x - share, 1.0 - share), u.y), ns);
+        vec3 wi = to_frame(direction_at(1.0 - versine, versine * (2.0 - versine), u.y), normalize(openings[chosen].centre - position));
+        return sky_density(position, SkySample(wi, open_sky_density(sky, ns, wi)), share, sum);
     }
-    return sky_density(position, ns, wi, share, sum);
+    return sky_density(position, sample_open_sky(sky, ns, vec2(divide(u.x - share, 1.0 - share), u.y)), share, sum);
 }
 
 // Moves a photon from beyond the scene, which keeps its direction: it starts on the discs that cover the openings, or stays.

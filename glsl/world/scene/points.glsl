@@ -33,6 +33,10 @@ void write_matt_lobes(uint place, Lobes lobes)
     if (HAS_SHEEN) {
         has_cover = true;
     }
+    if (HAS_IRIDESCENCE) {
+        has_cover = true;
+        lobes.cover.film = lobes.film;
+    }
     if (has_cover) {
         matt_covers[place] = lobes.cover;
     }

@@ -2,6 +2,9 @@
 
 #include "world/step.glsl"
 
+// Of a photon's random numbers: behind those of its bounces.
+const uint CHANNEL_BLOCK = EMISSION_BLOCKS + MAX_BOUNCES;
+
 Step no_step()
 {
     return Step(false, false, false, false, Photon(vec3(0.0), 0, vec3(0.0), 0));
@@ -25,8 +28,18 @@ Step step_path(inout LightPath path, uint bounce)
         }
         Lobes lobes;
         bool has_matt = !is_specular(surface);
+        vec3 entering = arriving;
         if (is_layered) {
-            float eta = index_ratio(surface, path.media);
+            uint channel = 1;
+            if (HAS_DISPERSION) {
+                if (is_dispersive(surface, path.media)) {
+                    // Once a path: of one channel it stays.
+                    uvec4 block = uvec4(path.photon, push.draws.round, CHANNEL_BLOCK, push.draws.domain);
+                    channel = choose_channel(arriving, philox_floats(block, push.draws.seed).x);
+                    entering = light_of_channel(arriving, channel);
+                }
+            }
+            float eta = index_ratio(surface, path.media, channel);
             surface.ns = normal_of_refraction(surface, wo, eta, bounce);
             lobes = lobes_of(surface, wo, eta);
             has_matt = surface.scatters && layered_materials[triangles[hit.triangle].material].is_matt != 0;
@@ -46,7 +59,7 @@ Step step_path(inout LightPath path, uint bounce)
             scatter = sample_scatter(surface, wo, u.yzw, bounce, false, 0.0);
         }
         bool specular = scatter.is_specular;
-        vec3 flux = arriving * scatter.weight;
+        vec3 flux = entering * scatter.weight;
         if (HAS_SMOOTH_NORMALS) {
             // Mirrors and glass keep a photon's flux whatever their normals: all that meets the mesh goes on.
             bool keeps_flux = scatter.passes || (specular && scatter.density == 0.0);

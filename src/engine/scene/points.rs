@@ -10,8 +10,8 @@ use crate::plan::scene::ScenePlan;
 use crate::plan::sensor::Sensor;
 use crate::records::{Draws, GoOnPush, ReceivePush, ViewPush};
 use crate::rng::{mix32, words};
-use crate::scene::Camera;
 use crate::scene::geometry::Geometry;
+use crate::scene::{Camera, Lens, Projection};
 
 /// Runs of `count` items, `step` long.
 pub(super) fn runs(count: u32, step: u32) -> impl Iterator<Item = (u32, u32)> {
@@ -59,7 +59,10 @@ pub fn see(commands: &mut Commands, round: Round, camera: Option<&Camera>) -> Re
         match plan.sensor {
             Sensor::Picture { width, height } => {
                 let camera = camera.expect("a picture has a camera");
-                let half_height = (0.5 * camera.vertical_view).tan();
+                // Parallel rays start where they cross the picture: normalised lengths.
+                let is_orthographic = matches!(camera.projection, Projection::Orthographic { .. });
+                let half_height = camera.half_height() / if is_orthographic { geometry.unit } else { 1.0 };
+                let lens = camera.lens.unwrap_or(Lens { radius: 0.0, focus: 1.0 });
                 let half_width = half_height * f64::from(width) / f64::from(height);
                 let push = ViewPush {
                     draws: draws(DOMAIN_CAMERA),
@@ -72,6 +75,9 @@ pub fn see(commands: &mut Commands, round: Round, camera: Option<&Camera>) -> Re
                     forward: camera.forward.as_vec3(),
                     right: (half_width * camera.right).as_vec3(),
                     up: (half_height * camera.up).as_vec3(),
+                    is_orthographic: u32::from(is_orthographic),
+                    lens_radius: (lens.radius / geometry.unit) as f32,
+                    focus: (lens.focus / geometry.unit) as f32,
                     emitter_count,
                     // Each sample has its share of the pixel's light; exact, as their number is a power of two.
                     film_scale: (plan.film_scale / f64::from(plan.samples())) as f32,

@@ -16,6 +16,7 @@ use crate::plan::radius::{RADIUS_RANGE, TrialPhotons};
 use crate::plan::scene::{MapPlan, TESTS_PER_POINT};
 use crate::plan::sensor::Sensor;
 use crate::records::{CellPush, ClearancePush, RadiusClassPush};
+use crate::scene::Projection;
 
 /// Of the 8 directions in which it is looked how much is clear around a point, all but the farthest: a corner of a room is as
 /// clear as its middle, and what is nearly closed is not.
@@ -87,6 +88,9 @@ fn grids(counts: &[u32], usual: u32) -> Vec<Range<u32>> {
     grids
 }
 
+/// How far behind the picture the eye of parallel rays stands, in units of the scene.
+const FAR: f64 = 16_384.0;
+
 /// From the finest grid to the widest, each for the points that had too few photons in the one before.
 fn of_map(commands: &mut Commands, round: Round, buffers: &PhotonBuffers, map: &MapPlan, view: &View) -> Result<()> {
     let Round { resources, plan, geometry, .. } = round;
@@ -99,7 +103,13 @@ fn of_map(commands: &mut Commands, round: Round, buffers: &PhotonBuffers, map: &
     let widest = map.radius / trial.factor.unwrap_or(1.0) * classes.widest();
     let (eye, pixel_share) = match (plan.sensor, view.camera) {
         (Sensor::Picture { height, .. }, Some(camera)) => {
-            (geometry.to_local(camera.eye), (0.5 * camera.vertical_view).tan() / f64::from(height))
+            // Parallel rays are those of an eye far behind.
+            let distance = match camera.projection {
+                Projection::Perspective { .. } => 0.0,
+                Projection::Orthographic { .. } => FAR * geometry.unit,
+            };
+            let share = camera.half_height() / if distance > 0.0 { distance } else { 1.0 };
+            (geometry.to_local(camera.eye - distance * camera.forward), share / f64::from(height))
         }
         _ => (glam::Vec3::ZERO, 0.0),
     };

@@ -19,7 +19,6 @@ use crate::output::command;
 use crate::plan::scene::ScenePlan;
 use crate::plan::sensor::Sensor;
 use crate::scene::geometry::Geometry;
-use crate::scene::light::LightKind;
 use crate::scene::open_box::open_box;
 use crate::scene::{Camera, Light, Mesh, Scene};
 use crate::settings::scene::{Effect, SceneSettings};
@@ -173,7 +172,7 @@ fn quoted(name: &str) -> String {
 fn unknown_to_paths(scene: &Scene) -> bool {
     let kinds = scene.lobe_kinds();
     let is_specular = |mesh: &Mesh| kinds[mesh.material].is_sharp();
-    let is_point_like = |light: &Light| !matches!(light.kind, LightKind::Environment { .. });
+    let is_point_like = |light: &Light| !light.kind.is_environment();
     scene.lights.iter().any(is_point_like) && scene.meshes.iter().any(is_specular)
 }
 

@@ -7,12 +7,13 @@ use glam::{DVec3, Vec2, Vec3};
 use rayon::prelude::*;
 
 use super::lamp_pieces::{Brightness, Cut, Lamp, Piece, Shining, cut};
-use super::{Geometry, area, refuse};
+use super::{Geometry, MAX_TEXELS, area, refuse, texture_record};
 use crate::constants::*;
 use crate::error::Result;
-use crate::records::{Emitter, LayeredMaterial, SurfaceMaterial, Triangle};
+use crate::records::{Emitter, LayeredMaterial, SurfaceMaterial, TextureInfo, Triangle};
 use crate::scene::Scene;
 use crate::scene::light::LightKind;
+use crate::scene::sky::Sky;
 use crate::settings::EmissionLaw;
 
 const MAX_EMITTERS: usize = 1 << 22;
@@ -23,10 +24,21 @@ impl Geometry {
     pub(super) fn add_emitters(&mut self, scene: &Scene) -> Result<()> {
         let mut found = self.shining_triangles(scene);
         let mut sky = Vec3::ZERO;
+        let mut pictured = None;
         for light in &scene.lights {
-            if let LightKind::Environment { radiance } = light.kind {
-                sky += radiance;
-                continue;
+            match &light.kind {
+                LightKind::Environment { radiance } => {
+                    sky += *radiance;
+                    continue;
+                }
+                LightKind::Sky(picture) => {
+                    if pictured.is_some() {
+                        return Err(refuse(scene, &light.name, "is the scene's second picture of a sky; allowed is one".into()));
+                    }
+                    pictured = Some(picture);
+                    continue;
+                }
+                _ => {}
             }
             let emitter = self.emitter_of(&light.kind);
             if !(emitter.emitter.strength.is_finite() && emitter.weight.is_finite() && emitter.emitter.position.is_finite()) {
@@ -38,6 +50,13 @@ impl Geometry {
             found.push(emitter);
         }
         // One environment, the sum of all, comes last, where the kernels look for it.
+        if let Some(picture) = pictured {
+            if sky != Vec3::ZERO {
+                return Err(refuse(scene, "the sky", "is both a colour and a picture; leave one out".into()));
+            }
+            let sky = self.add_sky(scene, picture)?;
+            found.push(sky);
+        }
         found.push(self.emitter_of(&LightKind::Environment { radiance: sky }));
         found.retain(|found| found.weight > 0.0);
         if found.len() > MAX_EMITTERS {
@@ -130,6 +149,43 @@ impl Geometry {
         if piece == Piece::WHOLE { [a, b, c] } else { piece.corners([a, b, c].map(Vec3::as_dvec3)).map(DVec3::as_vec3) }
     }
 
+    /// The emitter of a sky from a picture, which becomes the last two textures: its texels, and the words of its table.
+    fn add_sky(&mut self, scene: &Scene, sky: &Sky) -> Result<Found> {
+        let table = sky.table();
+        let first_texel = self.texels.len() as u32;
+        let words = sky.texture.texels.count() + table.words.len();
+        if self.texels.len() + words > MAX_TEXELS {
+            let reason = format!(
+                "has {words} texels and places for its samples, beside {first_texel} of textures; at most {MAX_TEXELS} can be kept"
+            );
+            return Err(refuse(scene, "the environment", reason));
+        }
+        let picture = self.textures.len() as u32;
+        self.textures.push(TextureInfo { first_texel, ..texture_record(&sky.texture) });
+        self.texels.par_extend(sky.texture.texels.words());
+        self.textures.push(TextureInfo {
+            width: table.columns,
+            height: table.rows,
+            first_texel: self.texels.len() as u32,
+            ..TextureInfo::default()
+        });
+        self.texels.extend(&table.words);
+        self.sky_most = table.most;
+        let all = PI * self.radius * self.radius * sky.strength.as_dvec3();
+        let turn = sky.turn.as_quat();
+        let emitter = Emitter {
+            kind: EMITTER_ENVIRONMENT,
+            triangle: picture,
+            strength: sky.strength,
+            position: turn.xyz(),
+            size: turn.w,
+            outer_versine: table.share as f32,
+            ..Emitter::default()
+        };
+        let weight = (all * table.integral).element_sum();
+        Ok(Found { emitter, flux: 2.0 * TAU * all, weight, brightest: table.most_over_density })
+    }
+
     fn emitter_of(&self, kind: &LightKind) -> Found {
         let area_unit = self.unit * self.unit;
         let (own, flux) = match *kind {
@@ -174,12 +230,19 @@ impl Geometry {
                 };
                 (own, flux)
             }
-            LightKind::Environment { radiance } => {
-                (Emitter { strength: radiance, ..Emitter::default() }, 2.0 * TAU * PI * self.radius * self.radius * radiance.as_dvec3())
-            }
+            LightKind::Sky(_) => unreachable!("a picture is added by itself"),
+            LightKind::Environment { radiance } => (
+                Emitter { strength: radiance, triangle: NONE, ..Emitter::default() },
+                2.0 * TAU * PI * self.radius * self.radius * radiance.as_dvec3(),
+            ),
         };
         let emitter = Emitter { kind: kind.code(), ..own };
         Found { emitter, flux, weight: flux.element_sum(), brightest: 1.0 }
+    }
+
+    /// Whether the environment is a picture.
+    pub fn has_sky_picture(&self) -> bool {
+        self.emitters.last().is_some_and(|emitter| emitter.kind == EMITTER_ENVIRONMENT && emitter.triangle != NONE)
     }
 
     /// Radiance of the brightest thing that a camera can see, W/m2/sr, or the irradiance a sixteenth of the scene's
@@ -202,7 +265,7 @@ impl Geometry {
         };
         let shines = self.materials.iter().zip(&self.layered_materials).map(of_material);
         let environment = self.emitters.iter().filter(|emitter| emitter.kind == EMITTER_ENVIRONMENT);
-        shines.chain(environment.map(|emitter| emitter.strength))
+        shines.chain(environment.map(|emitter| if emitter.triangle == NONE { emitter.strength } else { self.sky_most * emitter.strength }))
     }
 }
 

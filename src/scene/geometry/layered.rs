@@ -15,10 +15,10 @@ const MAX_MEDIA: usize = 255;
 pub(super) fn records(scene: &Scene, unit: f64) -> Result<Vec<LayeredMaterial>, usize> {
     let mut records: Vec<LayeredMaterial> = scene.materials.iter().zip(scene.lobe_kinds()).map(record).collect();
     // Solids of equal media share a number.
-    let mut media: Vec<(f32, Medium)> = Vec::new();
+    let mut media: Vec<(f32, f32, Medium)> = Vec::new();
     for (material, record) in scene.materials.iter().zip(&mut records) {
         if let Some(medium) = material.enclosed_medium() {
-            let own = (material.layers.ior, medium);
+            let own = (material.layers.ior, material.layers.ior_spread(), medium);
             let known = media.iter().position(|of| *of == own).unwrap_or_else(|| {
                 media.push(own);
                 media.len() - 1
@@ -28,8 +28,9 @@ pub(super) fn records(scene: &Scene, unit: f64) -> Result<Vec<LayeredMaterial>, 
     }
     // Black after some way is black after any: the limit keeps products finite.
     let absorption = |transmittance: f32, metres: f32| (-f64::from(transmittance).ln() / f64::from(metres) * unit).clamp(0.0, 1e30) as f32;
-    for ((ior, medium), record) in media.iter().zip(&mut records) {
+    for ((ior, spread, medium), record) in media.iter().zip(&mut records) {
         record.medium_ior = ior.max(1e-3);
+        record.medium_spread = *spread;
         record.medium_absorption = Vec3::from(medium.transmittance.to_array().map(|share| absorption(share, medium.metres)));
     }
     if media.len() <= MAX_MEDIA { Ok(records) } else { Err(media.len()) }
@@ -55,6 +56,15 @@ fn record((material, kinds): (&Material, LobeKinds)) -> LayeredMaterial {
         medium: 0,
         medium_absorption: Vec3::ZERO,
         medium_ior: 1.0,
+        ior_spread: of.ior_spread(),
+        medium_spread: 0.0,
+        iridescence: of.iridescence,
+        film_ior: of.film_ior,
+        film_least: of.film_thickness[0],
+        film_most: of.film_thickness[1],
+        film_bound: of.film_bound() as f32,
+        diffuse_transmission: of.diffuse_transmission,
+        diffuse_transmission_colour: of.diffuse_transmission_colour,
         coat: of.coat,
         coat_roughness: of.coat_roughness,
         sheen_colour: of.sheen_colour,
@@ -82,6 +92,10 @@ pub(super) fn add_lookups(scene: &Scene, records: &mut [LayeredMaterial], textur
             (LAYER_SPECULAR, of.specular_texture),
             (LAYER_SPECULAR_COLOUR, of.specular_colour_texture),
             (LAYER_TRANSMISSION, of.transmission_texture),
+            (LAYER_DIFFUSE_TRANSMISSION, of.diffuse_transmission_texture),
+            (LAYER_DIFFUSE_TRANSMISSION_COLOUR, of.diffuse_transmission_colour_texture),
+            (LAYER_IRIDESCENCE, of.iridescence_texture),
+            (LAYER_IRIDESCENCE_THICKNESS, of.film_thickness_texture),
             (LAYER_COAT, of.coat_texture),
             (LAYER_COAT_ROUGHNESS, of.coat_roughness_texture),
             (LAYER_COAT_NORMAL, map(of.coat_normal_map)),

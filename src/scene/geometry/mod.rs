@@ -21,7 +21,7 @@ use super::material::TextureUse;
 use super::overlap;
 use super::planes::{Planes, for_equals, hash_of};
 use super::texture::{Filter, LINEAR_OF_SRGB, Texels, Wrap};
-use super::{Material, Mesh, Progress, Scene, Surface};
+use super::{Material, Mesh, Progress, Scene, Surface, Texture};
 use crate::constants::*;
 use crate::error::{Error, Result};
 use crate::records::{
@@ -61,6 +61,8 @@ pub struct Geometry {
     pub texels: Vec<u32>,
     /// What shines, the environment last.
     pub emitters: Vec<Emitter>,
+    /// Largest value of the picture of a sky, in its texels' units.
+    pub sky_most: f32,
     /// W of a photon of relative flux 1 that stands for all light, over `unit`^2.
     pub flux_unit: f64,
     /// W of all emitters, all channels together, over `unit`^2.
@@ -235,6 +237,7 @@ impl Geometry {
             textures,
             texels,
             emitters: Vec::new(),
+            sky_most: 0.0,
             flux_unit: 1.0,
             power: 0.0,
             left_out,
@@ -385,32 +388,36 @@ fn pack_textures(scene: &Scene) -> (Vec<TextureInfo>, Vec<u32>) {
     for material in &scene.materials {
         material.textures().for_each(|of| is_used[of.texture] = true);
     }
-    let code = |wrap: Wrap| match wrap {
-        Wrap::Repeat => 0,
-        Wrap::MirroredRepeat => 1,
-        Wrap::Clamp => 2,
-    };
     let codes = if scene.textures.is_empty() { &[][..] } else { &LINEAR_OF_SRGB[..] };
     let mut texels: Vec<u32> = codes.iter().map(|value| value.to_bits()).collect();
     let mut infos = Vec::with_capacity(scene.textures.len());
     for (texture, is_used) in scene.textures.iter().zip(is_used) {
-        infos.push(TextureInfo {
-            width: texture.width,
-            height: texture.height,
-            first_texel: texels.len() as u32,
-            wrap: code(texture.wrap[0]) | code(texture.wrap[1]) << 2 | u32::from(texture.filter == Filter::Nearest) << 4,
-            encoding: match texture.texels {
-                Texels::Srgb(_) => TEXELS_SRGB,
-                Texels::SharedExponent(_) => TEXELS_SHARED_EXPONENT,
-                Texels::Linear(_) => TEXELS_LINEAR,
-            },
-            ..TextureInfo::default()
-        });
+        infos.push(TextureInfo { first_texel: texels.len() as u32, ..texture_record(texture) });
         if is_used {
             texels.par_extend(texture.texels.words());
         }
     }
     (infos, texels)
+}
+
+/// But for where its texels begin.
+fn texture_record(texture: &Texture) -> TextureInfo {
+    let code = |wrap: Wrap| match wrap {
+        Wrap::Repeat => 0,
+        Wrap::MirroredRepeat => 1,
+        Wrap::Clamp => 2,
+    };
+    TextureInfo {
+        width: texture.width,
+        height: texture.height,
+        wrap: code(texture.wrap[0]) | code(texture.wrap[1]) << 2 | u32::from(texture.filter == Filter::Nearest) << 4,
+        encoding: match texture.texels {
+            Texels::Srgb(_) => TEXELS_SRGB,
+            Texels::SharedExponent(_) => TEXELS_SHARED_EXPONENT,
+            Texels::Linear(_) => TEXELS_LINEAR,
+        },
+        ..TextureInfo::default()
+    }
 }
 
 /// A unit vector in 2 x 16 bits (Cigolle et al. 2014). Twin of `glsl/math/directions.glsl`.

@@ -5,33 +5,48 @@ use gltf::khr_lights_punctual::Kind;
 
 use super::{Loader, named, printable};
 use crate::error::Result;
-use crate::scene::Camera;
 use crate::scene::light::{Light, LightKind};
+use crate::scene::{Camera, Projection};
+
+/// Share of a sharp cone that is fully lit.
+const SHARP: f32 = 0.999;
 
 impl Loader {
     pub(super) fn read_camera(&mut self, camera: &gltf::Camera, node: &gltf::Node, to_world: DMat4) {
         let name = named("camera", node.name().or(camera.name()), camera.index());
-        let gltf::camera::Projection::Perspective(perspective) = camera.projection() else {
-            self.leave_out("orthographic cameras", &format!("camera '{name}'"));
-            return;
+        let owner = format!("camera '{name}'");
+        let (projection, aspect) = match camera.projection() {
+            gltf::camera::Projection::Perspective(perspective) => {
+                let vertical_view = perspective.yfov();
+                // Within the angles for which a pinhole picture means something.
+                if !(0.002..3.12).contains(&vertical_view) {
+                    self.leave_out(format!("a camera with a vertical view of {vertical_view} radians"), &owner);
+                    return;
+                }
+                (Projection::Perspective { vertical_view: vertical_view.into() }, perspective.aspect_ratio())
+            }
+            gltf::camera::Projection::Orthographic(orthographic) => {
+                // A sign turns the picture over, and means no more than its size to most writers.
+                let (x, y) = (orthographic.xmag().abs(), orthographic.ymag().abs());
+                if !(x.is_normal() && y.is_normal()) {
+                    self.leave_out(format!("an orthographic camera of {x} by {y} metres"), &owner);
+                    return;
+                }
+                // Nodes scale what it sees.
+                let scale = to_world.transform_vector3(DVec3::Y).length();
+                (Projection::Orthographic { half_height: f64::from(y) * scale }, Some(x / y))
+            }
         };
-        let vertical_view = perspective.yfov();
-        // Within the angles for which a pinhole picture means something.
-        if !(0.002..3.12).contains(&vertical_view) {
-            self.leave_out(format!("a camera with a vertical view of {vertical_view} radians"), &format!("camera '{name}'"));
-            return;
-        }
         let eye = to_world.transform_point3(DVec3::ZERO);
         let target = eye + to_world.transform_vector3(DVec3::NEG_Z).normalize_or(DVec3::NEG_Z);
         let up = to_world.transform_vector3(DVec3::Y);
         // Where the file leaves the aspect open, so does the camera.
-        let aspect = perspective.aspect_ratio();
         let is_usable = |aspect: &f32| aspect.is_finite() && *aspect > 0.0;
         if let Some(aspect) = aspect.filter(|aspect| !is_usable(aspect)) {
-            self.leave_out(format!("an aspect ratio of {aspect}"), &format!("camera '{name}'"));
+            self.leave_out(format!("an aspect ratio of {aspect}"), &owner);
         }
-        let camera = Camera::looking_at(&name, eye, target, up, vertical_view.into());
-        self.scene.cameras.push(Camera { aspect: aspect.filter(is_usable).map(f64::from), ..camera });
+        let camera = Camera::looking_at(&name, eye, target, up, 1.0);
+        self.scene.cameras.push(Camera { projection, aspect: aspect.filter(is_usable).map(f64::from), ..camera });
     }
 
     pub(super) fn read_light(&mut self, light: &gltf::khr_lights_punctual::Light, node: &str, to_world: DMat4) -> Result<()> {
@@ -48,7 +63,9 @@ impl Loader {
             Kind::Point => LightKind::Point { position, intensity: strength },
             Kind::Directional => LightKind::Directional { direction, irradiance: strength },
             Kind::Spot { inner_cone_angle, outer_cone_angle } => {
-                let (inner_angle, outer_angle) = (inner_cone_angle, outer_cone_angle);
+                // glTF wants the inner one smaller; Blender writes both alike for a sharp edge.
+                let (inner_angle, outer_angle) =
+                    (if inner_cone_angle == outer_cone_angle { SHARP * outer_cone_angle } else { inner_cone_angle }, outer_cone_angle);
                 let is_cone = inner_angle >= 0.0 && inner_angle < outer_angle && outer_angle <= std::f32::consts::FRAC_PI_2 + 1e-6;
                 self.require(is_cone, &what, || {
                     format!("has cones of {inner_angle} and {outer_angle} radians; the inner must be smaller, the outer at most half pi")

@@ -9,7 +9,7 @@ use serde_json::Value;
 
 use crate::text::echo;
 
-const REMEDY: &str = "correct it, or export the file again";
+pub(super) const REMEDY: &str = "correct it, or export the file again";
 /// Which list a member's number is a place in.
 const LISTS: [(&str, &str); 16] = [
     ("buffer", "buffers"),
@@ -63,7 +63,11 @@ pub(super) fn root(json: Value) -> Result<Root, String> {
 pub(super) fn faults(root: &Root, text: &[u8]) -> Result<(), String> {
     let mut first = None;
     root.validate(root, Path::new, &mut |path, fault| {
-        first.get_or_insert_with(|| (path().0, fault));
+        // An accessor without a view holds zeros.
+        let is_allowed = |path: &str| fault == Fault::Missing && path.starts_with("accessors[") && path.ends_with("].bufferView");
+        if first.is_none() {
+            first = Some((path().0, fault)).filter(|(path, _)| !is_allowed(path));
+        }
     });
     let Some((path, fault)) = first else { return Ok(()) };
     let json = json(text)?;

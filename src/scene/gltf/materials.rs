@@ -33,6 +33,59 @@ struct ClearCoat {
     clearcoat_normal_texture: Option<NormalTexture>,
 }
 
+/// KHR_materials_diffuse_transmission.
+#[derive(Deserialize)]
+#[serde(default, rename_all = "camelCase")]
+struct DiffuseTransmission {
+    diffuse_transmission_factor: f32,
+    diffuse_transmission_texture: Option<Info>,
+    diffuse_transmission_color_factor: [f32; 3],
+    diffuse_transmission_color_texture: Option<Info>,
+}
+
+impl Default for DiffuseTransmission {
+    fn default() -> DiffuseTransmission {
+        DiffuseTransmission {
+            diffuse_transmission_factor: 0.0,
+            diffuse_transmission_texture: None,
+            diffuse_transmission_color_factor: [1.0; 3],
+            diffuse_transmission_color_texture: None,
+        }
+    }
+}
+
+/// KHR_materials_dispersion.
+#[derive(Default, Deserialize)]
+#[serde(default)]
+struct Dispersion {
+    dispersion: f32,
+}
+
+/// KHR_materials_iridescence.
+#[derive(Deserialize)]
+#[serde(default, rename_all = "camelCase")]
+struct Iridescence {
+    iridescence_factor: f32,
+    iridescence_texture: Option<Info>,
+    iridescence_ior: f32,
+    iridescence_thickness_minimum: f32,
+    iridescence_thickness_maximum: f32,
+    iridescence_thickness_texture: Option<Info>,
+}
+
+impl Default for Iridescence {
+    fn default() -> Iridescence {
+        Iridescence {
+            iridescence_factor: 0.0,
+            iridescence_texture: None,
+            iridescence_ior: 1.3,
+            iridescence_thickness_minimum: 100.0,
+            iridescence_thickness_maximum: 400.0,
+            iridescence_thickness_texture: None,
+        }
+    }
+}
+
 /// KHR_materials_sheen.
 #[derive(Default, Deserialize)]
 #[serde(default, rename_all = "camelCase")]
@@ -137,14 +190,44 @@ impl Reader<'_> {
             layers.transmission = self.factor("transmission factor", transmission.transmission_factor.0, 1.0)?;
             layers.transmission_texture = self.texture(transmission.transmission_texture.as_ref(), Meaning::Numbers)?;
         }
+        if let Some(beyond) = self.extension::<DiffuseTransmission>(extensions, "KHR_materials_diffuse_transmission")? {
+            layers.diffuse_transmission = self.factor("diffuse transmission factor", beyond.diffuse_transmission_factor, 1.0)?;
+            layers.diffuse_transmission_texture = self.texture(beyond.diffuse_transmission_texture.as_ref(), Meaning::Numbers)?;
+            layers.diffuse_transmission_colour =
+                self.colour("diffuse transmission colour", beyond.diffuse_transmission_color_factor, 1.0)?;
+            layers.diffuse_transmission_colour_texture =
+                self.texture(beyond.diffuse_transmission_color_texture.as_ref(), Meaning::Colours)?;
+        }
         if let Some(volume) = &extensions.volume {
             let medium = self.medium(volume)?;
             // No light goes into an opaque surface.
-            layers.medium = medium.filter(|_| layers.transmission > 0.0);
+            layers.medium = medium.filter(|_| layers.transmission > 0.0 || layers.diffuse_transmission > 0.0);
             // The index 0 stands for one without end: there is no angle of refraction, and but for a specular factor or colour no light.
             if ior == 0.0 && layers.medium.take().is_some() {
                 self.loader.leave_out("volumes behind the ior 0 (nothing is refracted there; such a surface is a thin wall)", &self.object);
             }
+        }
+        if let Some(Dispersion { dispersion }) = self.extension(extensions, "KHR_materials_dispersion")? {
+            let dispersion = self.factor("dispersion", dispersion, ANY)?;
+            if layers.medium.is_some() && layers.transmission > 0.0 {
+                layers.dispersion = dispersion;
+            } else if dispersion > 0.0 {
+                self.loader
+                    .leave_out("dispersion of what light does not enter (a thin wall, or a surface without transmission)", &self.object);
+            }
+        }
+        if let Some(film) = self.extension::<Iridescence>(extensions, "KHR_materials_iridescence")? {
+            layers.iridescence = self.factor("iridescence factor", film.iridescence_factor, 1.0)?;
+            layers.iridescence_texture = self.texture(film.iridescence_texture.as_ref(), Meaning::Numbers)?;
+            layers.film_ior = film.iridescence_ior;
+            let reason = || format!("has a film of the index of refraction {}; it must be from 1 to 100", film.iridescence_ior);
+            self.loader.require((1.0..=100.0).contains(&film.iridescence_ior), &self.object, reason)?;
+            let thickness = [film.iridescence_thickness_minimum, film.iridescence_thickness_maximum];
+            for nanometres in thickness {
+                self.factor("thickness of its film", nanometres, ANY)?;
+            }
+            layers.film_thickness = thickness;
+            layers.film_thickness_texture = self.texture(film.iridescence_thickness_texture.as_ref(), Meaning::Numbers)?;
         }
         if let Some(coat) = self.extension::<ClearCoat>(extensions, "KHR_materials_clearcoat")? {
             layers.coat = self.factor("clear coat factor", coat.clearcoat_factor, 1.0)?;

@@ -15,6 +15,7 @@ use super::{Loader, called, node_name};
 use crate::error::Result;
 use crate::scene::Mesh;
 use crate::scene::material::TextureUse;
+use crate::scene::mesh::Source;
 
 /// Of all instances together: as many as the GPU's buffers of 4 GiB hold.
 const MAX_TRIANGLES: usize = 100_000_000;
@@ -26,6 +27,8 @@ pub(super) struct Part<'a> {
     pub(super) primitive: gltf::Primitive<'a>,
     /// Of its node, or of its mesh.
     pub(super) name: String,
+    pub(super) node: usize,
+    pub(super) mesh: usize,
     pub(super) to_world: DMat4,
     /// Its joints' matrices.
     pub(super) skin: Option<Arc<Vec<DMat4>>>,
@@ -223,7 +226,9 @@ impl Loader {
             };
         }
         let (name, material) = (name.clone(), part.material);
-        let mesh = Mesh { name, positions, normals, uvs, colours, alphas, tangents, coat_tangents, triangles, material };
+        let vertices = if let Vertices::Some(vertices) = vertices { vertices } else { Vec::new() };
+        let source = Some(Source { node: part.node, mesh: part.mesh, primitive: primitive.index(), vertices });
+        let mesh = Mesh { name, positions, normals, uvs, colours, alphas, tangents, coat_tangents, triangles, material, source };
         Ok((mesh, is_turned_anyhow))
     }
 

@@ -1,15 +1,21 @@
 //! Scenes from `.gltf` and `.glb` files (glTF 2.0).
 //!
-//! Read: meshes with node transforms and instances, skins in the pose of their nodes and morph targets by their weights at rest,
-//! quantized or not, smooth normals, tangents, two sets of texture coordinates and their transforms, vertex colours, materials as
-//! [`super::Surface::Layered`] with all that [`super::material::Layers`] has, KHR_lights_punctual, perspective cameras. Whatever
-//! else the file holds is named in a warning.
+//! Read: meshes with node transforms and instances, skins and morph targets in the pose at rest or at a time of the first animation,
+//! quantized or compressed or not, smooth normals, tangents, two sets of texture coordinates and their transforms, vertex colours,
+//! materials as [`super::Surface::Layered`] with all that [`super::material::Layers`] has, KHR_lights_punctual, cameras in perspective
+//! and orthographic ones. Whatever else the file holds is named in a warning.
 
 mod accessor;
+mod animation;
+mod compressed;
+mod draco;
+mod image_light;
+mod ktx2;
 mod lights;
 mod malformed;
 mod materials;
 mod meshes;
+pub mod source;
 mod tangents;
 mod textures;
 mod unread;
@@ -21,24 +27,36 @@ use std::sync::Arc;
 
 use base64::Engine;
 use base64::engine::general_purpose::STANDARD as BASE64;
-use glam::DMat4;
+use glam::{DMat4, DQuat, DVec3};
 use gltf::Document;
 use rayon::prelude::*;
+use serde_json::{Value, json};
 
 use super::light::LUMENS_PER_WATT;
-use super::{Material, Mesh, Progress, Scene};
+use super::{Material, Mesh, Progress, Reading, Scene};
 use crate::error::{Error, Result};
 use crate::text::{counted, refusal, some_of};
+use accessor::Vertices;
+use animation::Pose;
+use compressed::Target;
 use meshes::Part;
 use textures::Wanted;
 
 /// Larger files are refused: their triangles would not fit a device's buffers either.
 const MAX_FILE_BYTES: u64 = 4 << 30;
-const READ_EXTENSIONS: [&str; 12] = [
+const READ_EXTENSIONS: [&str; 22] = [
+    "EXT_lights_image_based",
+    "EXT_mesh_gpu_instancing",
+    "EXT_meshopt_compression",
+    "EXT_texture_webp",
+    "KHR_draco_mesh_compression",
     "KHR_lights_punctual",
     "KHR_materials_clearcoat",
+    "KHR_materials_diffuse_transmission",
+    "KHR_materials_dispersion",
     "KHR_materials_emissive_strength",
     "KHR_materials_ior",
+    "KHR_materials_iridescence",
     "KHR_materials_pbrSpecularGlossiness",
     "KHR_materials_sheen",
     "KHR_materials_specular",
@@ -46,21 +64,17 @@ const READ_EXTENSIONS: [&str; 12] = [
     "KHR_materials_unlit",
     "KHR_materials_volume",
     "KHR_mesh_quantization",
+    "KHR_meshopt_compression",
+    "KHR_texture_basisu",
     "KHR_texture_transform",
 ];
 /// What a surface has besides its base: a file that needs one of these is read without it, and a warning says so.
-const OPTIONAL_EXTENSIONS: [&str; 5] = [
-    "KHR_materials_anisotropy",
-    "KHR_materials_diffuse_transmission",
-    "KHR_materials_dispersion",
-    "KHR_materials_iridescence",
-    "KHR_materials_variants",
-];
+const OPTIONAL_EXTENSIONS: [&str; 2] = ["KHR_materials_anisotropy", "KHR_materials_variants"];
 /// Nodes within nodes; deeper ones would be a cycle.
 const MAX_DEPTH: usize = 512;
 
 /// Reads a file.
-pub fn load(path: &Path, radiometric: bool, progress: Progress) -> Result<Scene> {
+pub fn load(path: &Path, reading: Reading, progress: Progress) -> Result<Scene> {
     progress("reading the file", 0.0);
     let refuse = |reason: String| Error::Scene { path: path.to_owned(), object: "the file".into(), reason: one_line(&reason) };
     let content = read_file(path).map_err(refuse)?;
@@ -69,7 +83,13 @@ pub fn load(path: &Path, radiometric: bool, progress: Progress) -> Result<Scene>
     let malformed::Parts { json: text, binary } = malformed::parts(content).map_err(refuse)?;
     let mut json = malformed::json(&text).map_err(refuse)?;
     let mut left_out = LeftOut::default();
-    unread::take_out(&mut json, &mut left_out);
+    unread::take_out(&mut json, reading.at.is_some(), &mut left_out);
+    let image_light = image_light::of(&json);
+    let buffer_count = json["buffers"].as_array().map_or(0, Vec::len);
+    let unpacked = compressed::unpack(path, &mut json, binary.as_deref(), Target { buffer: buffer_count, start: 0 })?;
+    if let (false, Some(buffers)) = (unpacked.is_empty(), json.get_mut("buffers").and_then(Value::as_array_mut)) {
+        buffers.push(json!({"byteLength": unpacked.len()}));
+    }
     let mut root = malformed::root(json).map_err(refuse)?;
     let version = root.asset.version.as_str();
     if !version.starts_with("2.") {
@@ -104,12 +124,19 @@ pub fn load(path: &Path, radiometric: bool, progress: Progress) -> Result<Scene>
         materials: HashMap::new(),
         material_places: HashMap::new(),
         is_quantized: document.extensions_used().any(|extension| extension == "KHR_mesh_quantization"),
-        unit: if radiometric { 1.0 } else { 1.0 / LUMENS_PER_WATT },
+        unit: if reading.radiometric { 1.0 } else { 1.0 / LUMENS_PER_WATT },
     };
-    loader.read_buffers(&document, binary)?;
-    let parts = loader.read_nodes(&document)?;
+    loader.read_buffers(&document, binary, (buffer_count, unpacked))?;
+    let poses = match reading.at {
+        Some(time) => loader.read_poses(&document, time)?,
+        None => HashMap::new(),
+    };
+    let parts = loader.read_nodes(&document, &poses)?;
     loader.read_textures(&document, progress)?;
     loader.read_meshes(&parts, progress)?;
+    if let Some(light) = image_light {
+        loader.read_image_light(&document, light)?;
+    }
     for extension in document.extensions_used().filter(|extension| !READ_EXTENSIONS.contains(extension)) {
         loader.leave_out(format!("the extension {extension}"), "");
     }
@@ -119,11 +146,29 @@ pub fn load(path: &Path, radiometric: bool, progress: Progress) -> Result<Scene>
 /// How to write a file that does without an extension.
 fn remedy(extension: &str) -> &'static str {
     match extension {
-        "KHR_draco_mesh_compression" => "export it without compression (in Blender's glTF export: untick Data > Compression)",
-        "EXT_meshopt_compression" | "KHR_meshopt_compression" => "write it without compression (gltfpack: without -c, -cc and -cz)",
-        "KHR_texture_basisu" | "EXT_texture_webp" | "EXT_texture_avif" | "MSFT_texture_dds" => "export its textures as PNG or JPEG",
+        "EXT_texture_avif" | "MSFT_texture_dds" => "export its textures as PNG or JPEG",
         _ => "export it without",
     }
+}
+
+/// The content of a data URI, or of a file beside the scene at `path`; or what is wrong with it.
+fn read_uri(path: &Path, uri: &str) -> std::result::Result<Vec<u8>, String> {
+    if let Some(embedded) = uri.strip_prefix("data:") {
+        let text = embedded.split_once(";base64,").map(|(_, text)| text);
+        return text.and_then(|text| BASE64.decode(text).ok()).ok_or_else(|| "has a data URI that is not base64".into());
+    }
+    if uri.contains(':') {
+        return Err(format!("lies at {uri}; only files beside this one are read"));
+    }
+    let name = percent_decoded(uri).ok_or_else(|| format!("has a name that cannot be decoded: {uri}"))?;
+    let folder = path.parent().filter(|folder| *folder != Path::new("")).unwrap_or(Path::new("."));
+    let place = folder.join(&name);
+    // A link may lead out as well as a name.
+    let leads_out = || matches!((place.canonicalize(), folder.canonicalize()), (Ok(place), Ok(folder)) if !place.starts_with(&folder));
+    if leaves_folder(Path::new(&name)) || leads_out() {
+        return Err(format!("lies at {uri}, outside the scene's folder, and is not read; copy it into that folder"));
+    }
+    read_file(&place).map_err(|reason| format!("lies at {uri}, which {reason}"))
 }
 
 /// A name without line breaks and other control characters, nor those that are not seen and change the order of what is.
@@ -204,8 +249,13 @@ impl Loader {
         self.left_out.add(what, owner);
     }
 
-    fn read_buffers(&mut self, document: &Document, mut blob: Option<Vec<u8>>) -> Result<()> {
+    /// `unpacked`: the number of the buffer that holds what was compressed, and its bytes.
+    fn read_buffers(&mut self, document: &Document, mut blob: Option<Vec<u8>>, mut unpacked: (usize, Vec<u8>)) -> Result<()> {
         for buffer in document.buffers() {
+            if buffer.index() == unpacked.0 {
+                self.buffers.push(std::mem::take(&mut unpacked.1));
+                continue;
+            }
             let what = format!("buffer {}", buffer.index());
             let bytes = match buffer.source() {
                 gltf::buffer::Source::Bin => {
@@ -220,25 +270,12 @@ impl Loader {
         Ok(())
     }
 
-    /// A data URI, or a file beside this one.
     fn read_uri(&self, uri: &str, what: &str) -> Result<Vec<u8>> {
-        if let Some(embedded) = uri.strip_prefix("data:") {
-            let text = embedded.split_once(";base64,").map(|(_, text)| text);
-            return text.and_then(|text| BASE64.decode(text).ok()).ok_or_else(|| self.refuse(what, "has a data URI that is not base64"));
-        }
-        self.require(!uri.contains(':'), what, || format!("lies at {uri}; only files beside this one are read"))?;
-        let name = percent_decoded(uri).ok_or_else(|| self.refuse(what, format!("has a name that cannot be decoded: {uri}")))?;
-        let folder = self.path.parent().filter(|folder| *folder != Path::new("")).unwrap_or(Path::new("."));
-        let place = folder.join(&name);
-        // A link may lead out as well as a name.
-        let leads_out = || matches!((place.canonicalize(), folder.canonicalize()), (Ok(place), Ok(folder)) if !place.starts_with(&folder));
-        let reason = || format!("lies at {uri}, outside the scene's folder, and is not read; copy it into that folder");
-        self.require(!leaves_folder(Path::new(&name)) && !leads_out(), what, reason)?;
-        read_file(&place).map_err(|reason| self.refuse(what, format!("lies at {uri}, which {reason}")))
+        read_uri(&self.path, uri).map_err(|reason| self.refuse(what, reason))
     }
 
     /// Reads cameras, lights and the materials of the primitives that it lists.
-    fn read_nodes<'a>(&mut self, document: &'a Document) -> Result<Vec<Part<'a>>> {
+    fn read_nodes<'a>(&mut self, document: &'a Document, poses: &HashMap<usize, Pose>) -> Result<Vec<Part<'a>>> {
         let Some(scene) = document.default_scene().or_else(|| document.scenes().next()) else {
             return Err(self.refuse("the file", "holds no scene"));
         };
@@ -248,7 +285,7 @@ impl Loader {
         let mut nodes = Vec::new();
         let mut to_world = HashMap::new();
         for node in scene.nodes() {
-            self.place_node(node, DMat4::IDENTITY, 0, &mut nodes, &mut to_world)?;
+            self.place_node(node, poses, DMat4::IDENTITY, 0, &mut nodes, &mut to_world)?;
         }
         let mut skins = HashMap::new();
         let mut parts = Vec::new();
@@ -264,10 +301,15 @@ impl Loader {
                     }),
                     None => None,
                 };
-                let weights = node.weights().or(mesh.weights()).unwrap_or_default().to_vec();
-                for primitive in mesh.primitives() {
-                    let (name, skin, weights) = (name.clone(), skin.clone(), weights.clone());
-                    self.list_primitive(document, Part { primitive, name, to_world: own, skin, weights, material: 0 }, &mut parts)?;
+                let posed = poses.get(&node.index()).and_then(|pose| pose.weights.as_deref());
+                let weights = posed.or(node.weights()).or(mesh.weights()).unwrap_or_default().to_vec();
+                for to_node in self.instances(document, node, &what)? {
+                    for primitive in mesh.primitives() {
+                        let (name, skin, weights) = (name.clone(), skin.clone(), weights.clone());
+                        let (node, mesh, to_world) = (node.index(), mesh.index(), own * to_node);
+                        let part = Part { primitive, name, node, mesh, to_world, skin, weights, material: 0 };
+                        self.list_primitive(document, part, &mut parts)?;
+                    }
                 }
             }
             if let Some(camera) = node.camera() {
@@ -300,6 +342,7 @@ impl Loader {
     fn place_node<'a>(
         &self,
         node: gltf::Node<'a>,
+        poses: &HashMap<usize, Pose>,
         parent: DMat4,
         depth: usize,
         nodes: &mut Vec<gltf::Node<'a>>,
@@ -307,13 +350,56 @@ impl Loader {
     ) -> Result<()> {
         let what = node_name(&node);
         self.require(depth <= MAX_DEPTH, &what, || format!("lies more than {MAX_DEPTH} nodes deep, or within itself"))?;
-        let matrix = DMat4::from_cols_array_2d(&node.transform().matrix().map(|column| column.map(f64::from)));
+        let matrix = match poses.get(&node.index()) {
+            Some(pose) => pose.matrix(node.transform()),
+            None => DMat4::from_cols_array_2d(&node.transform().matrix().map(|column| column.map(f64::from))),
+        };
         let own = parent * matrix;
         self.require(own.is_finite(), &what, || "has a transform that is not finite".into())?;
         let is_new = to_world.insert(node.index(), own).is_none();
         self.require(is_new, &what, || "has two parents; a node has one place in a scene".into())?;
         nodes.push(node.clone());
-        node.children().try_for_each(|child| self.place_node(child, own, depth + 1, nodes, to_world))
+        node.children().try_for_each(|child| self.place_node(child, poses, own, depth + 1, nodes, to_world))
+    }
+
+    /// Transforms of a node's instances (EXT_mesh_gpu_instancing); of a node without them, one that does nothing.
+    fn instances(&self, document: &Document, node: &gltf::Node, what: &str) -> Result<Vec<DMat4>> {
+        let Some(attributes) = node.extension_value("EXT_mesh_gpu_instancing").map(|extension| &extension["attributes"]) else {
+            return Ok(vec![DMat4::IDENTITY]);
+        };
+        let accessor = |name: &str| -> Result<Option<gltf::Accessor>> {
+            let Some(number) = attributes.get(name) else { return Ok(None) };
+            let found = number.as_u64().and_then(|number| document.accessors().nth(usize::try_from(number).ok()?));
+            found.map(Some).ok_or_else(|| self.refuse(what, format!("has instances with {name} in accessor {number}, which is not there")))
+        };
+        let rows = |accessor: gltf::Accessor| {
+            accessor::read(self, &accessor, &Vertices::All, what, |row: [f32; 3]| DVec3::from(row.map(f64::from)))
+        };
+        let translations = accessor("TRANSLATION")?.map(rows).transpose()?;
+        let scales = accessor("SCALE")?.map(rows).transpose()?;
+        let turn = |of: [f32; 4]| DQuat::from_array(of.map(f64::from)).normalize();
+        let rotations = accessor("ROTATION")?.map(|of| accessor::read(self, &of, &Vertices::All, what, turn)).transpose()?;
+        let counts: BTreeSet<usize> =
+            [translations.as_ref().map(Vec::len), scales.as_ref().map(Vec::len), rotations.as_ref().map(Vec::len)]
+                .into_iter()
+                .flatten()
+                .collect();
+        let (Some(count), true) = (counts.first().copied(), counts.len() <= 1) else {
+            return Err(
+                self.refuse(what, format!("has instances with {counts:?} values; TRANSLATION, ROTATION and SCALE must have as many each"))
+            );
+        };
+        if let Some(place) = rotations.iter().flatten().position(|turn| !turn.is_finite()) {
+            return Err(self.refuse(what, format!("has an instance {place} with a rotation of length 0")));
+        }
+        let of = |place: usize| {
+            DMat4::from_scale_rotation_translation(
+                scales.as_ref().map_or(DVec3::ONE, |all| all[place]),
+                rotations.as_ref().map_or(DQuat::IDENTITY, |all| all[place]),
+                translations.as_ref().map_or(DVec3::ZERO, |all| all[place]),
+            )
+        };
+        Ok((0..count).map(of).collect())
     }
 
     /// Meshes that bound a medium and are not closed, alone or with others of their material.

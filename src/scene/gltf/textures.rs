@@ -8,7 +8,7 @@ use gltf::texture::{MagFilter, WrappingMode};
 use image::{DynamicImage, ImageDecoder, ImageFormat, RgbaImage};
 use rayon::prelude::*;
 
-use super::{Loader, accessor, called, one_line};
+use super::{Loader, accessor, called, ktx2, one_line};
 use crate::error::{Error, Result};
 use crate::scene::texture::{Filter, Texels, Texture, Wrap};
 use crate::scene::{Progress, geometry};
@@ -80,7 +80,7 @@ impl Loader {
         for image in document.images() {
             let Some(places) = places_of_images.remove(&image.index()) else { continue };
             let (what, bytes) = self.encoded_image(&image)?;
-            let (width, height) = self.decoder(&what, &bytes)?.dimensions();
+            let (width, height) = self.dimensions(&what, &bytes)?;
             texel_count += u64::from(width) * u64::from(height) * places.len() as u64;
             let reason = || format!("makes more than {MAX_TEXELS} texels, the most that are read; use smaller pictures");
             self.require(texel_count <= MAX_TEXELS, &what, reason)?;
@@ -104,7 +104,7 @@ impl Loader {
     }
 
     /// Its name in complaints, and the bytes of the picture's file.
-    fn encoded_image(&self, image: &gltf::Image) -> Result<(String, Cow<'_, [u8]>)> {
+    pub(super) fn encoded_image(&self, image: &gltf::Image) -> Result<(String, Cow<'_, [u8]>)> {
         let what = called("texture image", image.name(), image.index());
         let bytes = match image.source() {
             gltf::image::Source::View { view, .. } => Cow::Borrowed(accessor::view_bytes(self, &view, &what)?),
@@ -113,23 +113,35 @@ impl Loader {
         Ok((what, bytes))
     }
 
-    fn undecodable(&self, what: &str, error: &image::ImageError) -> Error {
+    fn undecodable(&self, what: &str, error: impl ToString) -> Error {
         self.refuse(what, format!("cannot be decoded ({})", one_line(&error.to_string())))
     }
 
-    /// Of a picture's file.
+    fn dimensions(&self, what: &str, bytes: &[u8]) -> Result<(u32, u32)> {
+        match ktx2::is_one(bytes) {
+            true => ktx2::dimensions(bytes).map_err(|error| self.undecodable(what, error)),
+            false => Ok(self.decoder(what, bytes)?.dimensions()),
+        }
+    }
+
+    /// Of a picture's file that is not KTX 2.
     fn decoder<'b>(&self, what: &str, bytes: &'b [u8]) -> Result<impl ImageDecoder + use<'b>> {
         let reader = image::ImageReader::new(std::io::Cursor::new(bytes)).with_guessed_format();
         let mut reader = reader.map_err(|error| self.refuse(what, error.to_string()))?;
-        let is_read = matches!(reader.format(), Some(ImageFormat::Png | ImageFormat::Jpeg));
-        self.require(is_read, what, || "cannot be decoded: it is neither PNG nor JPEG, the formats that glTF allows; convert it".into())?;
+        let is_read = matches!(reader.format(), Some(ImageFormat::Png | ImageFormat::Jpeg | ImageFormat::WebP));
+        self.require(is_read, what, || {
+            "cannot be decoded: it is neither PNG, JPEG, WebP nor KTX 2, the formats that are read; convert it".into()
+        })?;
         self.require(has_its_end(bytes), what, || "is cut off: a JPEG without its end; export it again".into())?;
         reader.limits(image_limits());
-        reader.into_decoder().map_err(|error| self.undecodable(what, &error))
+        reader.into_decoder().map_err(|error| self.undecodable(what, error))
     }
 
-    fn decoded(&self, what: &str, bytes: &[u8]) -> Result<RgbaImage> {
-        let undecodable = |error: image::ImageError| self.undecodable(what, &error);
+    pub(super) fn decoded(&self, what: &str, bytes: &[u8]) -> Result<RgbaImage> {
+        if ktx2::is_one(bytes) {
+            return ktx2::decoded(bytes).map_err(|error| self.undecodable(what, error));
+        }
+        let undecodable = |error: image::ImageError| self.undecodable(what, error);
         let decoder = self.decoder(what, bytes)?;
         image_limits().reserve(decoder.total_bytes()).map_err(undecodable)?;
         Ok(DynamicImage::from_decoder(decoder).map_err(undecodable)?.into_rgba8())

@@ -5,14 +5,17 @@ use std::collections::BTreeSet;
 use gltf::json::texture::{VALID_MAG_FILTERS, VALID_MIN_FILTERS};
 use serde_json::{Value, json};
 
-use super::{LeftOut, READ_EXTENSIONS, called, named};
+use super::{LeftOut, READ_EXTENSIONS, called, image_light, named};
 use crate::text::echo;
 
 const SPEC_GLOSS: &str = "KHR_materials_pbrSpecularGlossiness";
 /// Each of these says that it must not stand beside [`SPEC_GLOSS`].
-const NOT_BESIDE_SPEC_GLOSS: [&str; 6] = [
+const NOT_BESIDE_SPEC_GLOSS: [&str; 9] = [
     "KHR_materials_clearcoat",
+    "KHR_materials_diffuse_transmission",
+    "KHR_materials_dispersion",
     "KHR_materials_ior",
+    "KHR_materials_iridescence",
     "KHR_materials_sheen",
     "KHR_materials_specular",
     "KHR_materials_transmission",
@@ -20,10 +23,15 @@ const NOT_BESIDE_SPEC_GLOSS: [&str; 6] = [
 ];
 
 /// Lists keep their length, as their members are named by numbers.
-pub(super) fn take_out(root: &mut Value, left_out: &mut LeftOut) {
-    let animations = root.as_object_mut().and_then(|root| root.remove("animations"));
-    if animations.is_some_and(|animations| items(&animations).next().is_some()) {
-        left_out.add("animations", "");
+pub(super) fn take_out(root: &mut Value, is_posed: bool, left_out: &mut LeftOut) {
+    take_animations(root, is_posed, left_out);
+    // Pictures that only an extension names.
+    for (_, texture) in items_mut(root, "textures") {
+        for name in ["EXT_texture_webp", "KHR_texture_basisu"] {
+            if let Some(source) = texture["extensions"][name].get("source").cloned() {
+                texture["source"] = source;
+            }
+        }
     }
     let nodes = nodes_of_scene(root);
     let mut materials = BTreeSet::new();
@@ -55,7 +63,8 @@ pub(super) fn take_out(root: &mut Value, left_out: &mut LeftOut) {
     }
     let of_textures =
         |member: &str| -> BTreeSet<usize> { textures.iter().filter_map(|texture| number(&root["textures"][*texture][member])).collect() };
-    let (images, samplers) = (of_textures("source"), of_textures("sampler"));
+    let (mut images, samplers) = (of_textures("source"), of_textures("sampler"));
+    images.extend(image_light::images(root));
     for (list, used, blank) in
         [("textures", &textures, json!({})), ("images", &images, json!({"uri": ""})), ("samplers", &samplers, json!({}))]
     {
@@ -72,6 +81,32 @@ pub(super) fn take_out(root: &mut Value, left_out: &mut LeftOut) {
             take(sampler, "", member);
         }
     }
+}
+
+/// All animations; where a pose is asked for all but the first, of which only what moves nodes is left.
+fn take_animations(root: &mut Value, is_posed: bool, left_out: &mut LeftOut) {
+    let animations = root.as_object_mut().and_then(|root| root.remove("animations"));
+    let Some(Value::Array(mut animations)) = animations.filter(|animations| items(animations).next().is_some()) else { return };
+    if !is_posed {
+        left_out.add("animations (--at SECONDS takes a pose of the first)", "");
+        return;
+    }
+    if animations.len() > 1 {
+        left_out.add("animations beside the first", "");
+    }
+    animations.truncate(1);
+    if let Some(Value::Array(channels)) = animations[0].get_mut("channels") {
+        let moves_node = |channel: &Value| {
+            let target = &channel["target"];
+            target["node"].is_number() && matches!(target["path"].as_str(), Some("translation" | "rotation" | "scale" | "weights"))
+        };
+        let before = channels.len();
+        channels.retain(moves_node);
+        if channels.len() < before {
+            left_out.add("what animations move besides nodes", "");
+        }
+    }
+    root["animations"] = animations.into();
 }
 
 fn nodes_of_scene(root: &Value) -> BTreeSet<usize> {

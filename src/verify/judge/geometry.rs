@@ -68,6 +68,8 @@ pub struct Geometry<'a> {
     scene: &'a Scene,
     pub triangles: Vec<Triangle<'a>>,
     bvh: Bvh2,
+    /// Of each material ([`crate::scene::material::Layers::film_bound`]).
+    pub film_bounds: Vec<f64>,
     /// How far off a surface its rays start, metres.
     pub offset: f64,
 }
@@ -158,7 +160,8 @@ impl<'a> Geometry<'a> {
             0 => Bvh2::default(),
             _ => build_bvh2(&boxes, BvhBuildParams::medium_build(), &mut Duration::default()),
         };
-        Geometry { scene, triangles, bvh, offset }
+        let film_bounds = scene.materials.iter().map(|material| material.layers.film_bound()).collect();
+        Geometry { scene, triangles, bvh, film_bounds, offset }
     }
 
     /// A ray that leaves a surface with this normal, on the side that it points to.

@@ -3,7 +3,7 @@
 use glam::{DVec3, DVec4};
 
 use super::geometry::{Geometry, Hit, Triangle, Vertex};
-use super::lobes::{Frame, Inputs, Lobes, Wall};
+use super::lobes::{Film, Frame, Inputs, Lobes, Wall};
 use super::material::fresnel;
 use super::media::{Media, is_solid};
 use super::microfacets::is_delta;
@@ -57,7 +57,8 @@ impl<'a> Geometry<'a> {
     }
 
     /// The lobes of a layered surface that is seen from within `media`, by a path that has met `depth` surfaces before.
-    pub fn lobes(&self, hit: &Hit, vertex: &Vertex, media: &Media<'a>, depth: u32) -> Lobes {
+    /// `channel`: the only one that it has light in.
+    pub fn lobes(&self, hit: &Hit, vertex: &Vertex, media: &Media<'a>, channel: Option<usize>, depth: u32) -> Lobes {
         let (triangle, wo) = (&self.triangles[hit.triangle], vertex.wo);
         let (material, layers) = (triangle.material, &triangle.material.layers);
         let texel = |texture: Option<TextureUse>| self.texel(texture, triangle, hit.weights);
@@ -66,7 +67,7 @@ impl<'a> Geometry<'a> {
         let alpha = squared(layers.roughness, metallic_roughness.y);
         let wall = if is_solid(material) {
             let before = media.clone().before(material, vertex.is_front);
-            Wall::Solid { from: before.index(), to: before.beyond(material, vertex.is_front).index() }
+            Wall::Solid { from: before.index(channel), to: before.beyond(material, vertex.is_front).index(channel) }
         } else {
             Wall::Thin
         };
@@ -91,6 +92,18 @@ impl<'a> Geometry<'a> {
             specular_colour: layers.specular_colour.as_dvec3() * texel(layers.specular_colour_texture).truncate(),
             transmission: f64::from(layers.transmission) * texel(layers.transmission_texture).x,
             wall,
+            diffuse_transmission: f64::from(layers.diffuse_transmission) * texel(layers.diffuse_transmission_texture).w,
+            diffuse_transmission_colour: layers.diffuse_transmission_colour.as_dvec3()
+                * texel(layers.diffuse_transmission_colour_texture).truncate(),
+            film: Film {
+                share: f64::from(layers.iridescence) * texel(layers.iridescence_texture).x,
+                ior: f64::from(layers.film_ior),
+                thickness: {
+                    let [least, most] = layers.film_thickness.map(f64::from);
+                    least + (most - least) * texel(layers.film_thickness_texture).y
+                },
+                bound: self.film_bounds[triangle.mesh.material],
+            },
             coat: f64::from(layers.coat) * texel(layers.coat_texture).x,
             coat_alpha: squared(layers.coat_roughness, texel(layers.coat_roughness_texture).y),
             sheen_colour: layers.sheen_colour.as_dvec3() * texel(layers.sheen_colour_texture).truncate(),

@@ -9,6 +9,7 @@ use super::material::{around, sample_lobe};
 use super::{Random, uniform};
 use crate::scene::Scene;
 use crate::scene::light::LightKind;
+use crate::scene::sky::Sky;
 use crate::settings::EmissionLaw;
 
 enum Emitter<'a> {
@@ -23,6 +24,73 @@ pub struct Emitters<'a> {
     cumulative: Vec<f64>,
     /// The probability that a triangle is chosen.
     of_triangles: Vec<f64>,
+    sky: Option<SkyCells<'a>>,
+}
+
+/// The texels of a sky, from which half of the samples come; the others leave by the cosine.
+struct SkyCells<'a> {
+    sky: &'a Sky,
+    /// The share of each and all before it.
+    cumulative: Vec<f64>,
+    /// Integral of the radiance over all directions, all channels together.
+    total: f64,
+}
+
+impl SkyCells<'_> {
+    fn new(sky: &Sky) -> SkyCells<'_> {
+        let (width, height) = (i64::from(sky.texture.width), i64::from(sky.texture.height));
+        let value = |i: i64, j: i64| {
+            let place = j.clamp(0, height - 1) * width + i.rem_euclid(width);
+            (sky.texture.texels.at(place as usize).truncate() * sky.strength).as_dvec3().element_sum()
+        };
+        let mut total = 0.0;
+        let mut below = 0.0;
+        let mut cumulative = Vec::with_capacity((width * height) as usize);
+        for (j, i) in (0..height).flat_map(|j| (0..width).map(move |i| (j, i))) {
+            let angle = SkyCells::solid_angle(sky, j);
+            total += angle * value(i, j);
+            // What shines within a texel comes from its neighbours, too.
+            let near: f64 = (-1..2).flat_map(|dj| (-1..2).map(move |di| (di, dj))).map(|(di, dj)| value(i + di, j + dj)).sum();
+            below += angle * near;
+            cumulative.push(below);
+        }
+        cumulative.iter_mut().for_each(|share| *share /= below.max(f64::MIN_POSITIVE));
+        SkyCells { sky, cumulative, total }
+    }
+
+    fn solid_angle(sky: &Sky, row: i64) -> f64 {
+        let edge = |row: i64| (PI * row as f64 / f64::from(sky.texture.height)).cos();
+        2.0 * PI / f64::from(sky.texture.width) * (edge(row) - edge(row + 1))
+    }
+
+    fn density_of(&self, cell: usize) -> f64 {
+        let share = self.cumulative[cell] - if cell > 0 { self.cumulative[cell - 1] } else { 0.0 };
+        share / SkyCells::solid_angle(self.sky, cell as i64 / i64::from(self.sky.texture.width))
+    }
+
+    fn sample(&self, ns: DVec3, rng: &mut Random) -> DVec3 {
+        if uniform(rng) < 0.5 {
+            return sample_lobe(ns, 1.0, rng);
+        }
+        let u = uniform(rng);
+        let cell = self.cumulative.partition_point(|share| *share <= u).min(self.cumulative.len() - 1);
+        let (width, height) = (self.sky.texture.width as usize, f64::from(self.sky.texture.height));
+        let edge = |row: usize| (PI * row as f64 / height).cos();
+        let row = cell / width;
+        let cosine = edge(row) + uniform(rng) * (edge(row + 1) - edge(row));
+        let azimuth = 2.0 * PI * (((cell % width) as f64 + uniform(rng)) / width as f64 - 0.5);
+        let sine = (1.0 - cosine * cosine).max(0.0).sqrt();
+        self.sky.turn * DVec3::new(sine * azimuth.cos(), cosine, sine * azimuth.sin())
+    }
+
+    fn density(&self, ns: DVec3, wi: DVec3) -> f64 {
+        let local = self.sky.turn.inverse() * wi;
+        let (width, height) = (self.sky.texture.width as usize, self.sky.texture.height as usize);
+        let place = |share: f64, count: usize| ((share * count as f64).max(0.0) as usize).min(count - 1);
+        let column = place(0.5 + local.z.atan2(local.x) / (2.0 * PI), width);
+        let row = place(local.y.clamp(-1.0, 1.0).acos() / PI, height);
+        0.5 * self.density_of(row * width + column) + 0.5 * wi.dot(ns).max(0.0) / PI
+    }
 }
 
 /// The last place where a path was scattered, as far as it matters to the light that its ray meets.
@@ -68,7 +136,7 @@ fn sum(colour: Vec3) -> f64 {
 }
 
 /// Watts, roughly for some; no estimate depends on it but by its noise.
-fn power(light: &LightKind, scene_radius: f64) -> f64 {
+fn power(light: &LightKind, scene_radius: f64, sky: Option<&SkyCells>) -> f64 {
     let cross_section = PI * scene_radius * scene_radius;
     match light {
         LightKind::Point { intensity, .. } => 4.0 * PI * sum(*intensity),
@@ -76,6 +144,7 @@ fn power(light: &LightKind, scene_radius: f64) -> f64 {
         LightKind::Directional { irradiance, .. } => cross_section * sum(*irradiance),
         LightKind::Disc { power, .. } => sum(*power),
         LightKind::Environment { radiance } => 4.0 * PI * cross_section * sum(*radiance),
+        LightKind::Sky(_) => cross_section * sky.map_or(0.0, |sky| sky.total),
     }
 }
 
@@ -109,7 +178,8 @@ impl<'a> Emitters<'a> {
             let emission = if material.layers.is_unlit { 0.0 } else { sum(material.emission) };
             (Emitter::Triangle(number), sides * PI * triangle.area * emission)
         });
-        let of_lights = scene.lights.iter().map(|light| (Emitter::Light(&light.kind), power(&light.kind, radius)));
+        let sky = scene.lights.iter().find_map(|light| if let LightKind::Sky(sky) = &light.kind { Some(SkyCells::new(sky)) } else { None });
+        let of_lights = scene.lights.iter().map(|light| (Emitter::Light(&light.kind), power(&light.kind, radius, sky.as_ref())));
         let (emitters, powers): (Vec<_>, Vec<_>) = of_triangles.chain(of_lights).filter(|(_, power)| *power > 0.0).unzip();
         let total: f64 = powers.iter().sum();
         let mut of_triangles = vec![0.0; geometry.triangles.len()];
@@ -123,7 +193,7 @@ impl<'a> Emitters<'a> {
             below += power / total;
             below
         });
-        Emitters { cumulative: cumulative.collect(), emitters, of_triangles }
+        Emitters { cumulative: cumulative.collect(), emitters, of_triangles, sky }
     }
 
     fn probability(&self, emitter: usize) -> f64 {
@@ -171,6 +241,12 @@ impl<'a> Emitters<'a> {
                     let arriving = from(place, &|w| power.as_dvec3() * disc_intensity(*law, w.dot(*normal)));
                     Arriving { density: area_density(PI * radius * radius, position, place, *normal), ..arriving }
                 }
+                LightKind::Sky(sky) => {
+                    let cells = self.sky.as_ref()?;
+                    let wi = cells.sample(ns, rng);
+                    let density = cells.density(ns, wi).max(f64::MIN_POSITIVE);
+                    Arriving { wi, irradiance: sky.radiance(wi) / density, place: None, density }
+                }
                 LightKind::Environment { radiance } => {
                     let wi = sample_lobe(ns, 1.0, rng);
                     let cosine = wi.dot(ns);
@@ -196,6 +272,10 @@ impl<'a> Emitters<'a> {
             Emitter::Light(LightKind::Environment { radiance }) => {
                 let density = direction.dot(from.axis).max(0.0) / PI;
                 from.weight(self.probability(number) * density) * radiance.as_dvec3()
+            }
+            Emitter::Light(LightKind::Sky(sky)) => {
+                let density = self.sky.as_ref().map_or(0.0, |cells| cells.density(from.axis, direction));
+                from.weight(self.probability(number) * density) * sky.radiance(direction)
             }
             _ => DVec3::ZERO,
         };

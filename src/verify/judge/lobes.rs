@@ -11,6 +11,7 @@ use super::material::{around, fresnel, mirrored, sample_lobe};
 use super::microfacets::{ggx_distribution, ggx_visibility, is_delta, schlick, sheen_distribution, sheen_masking, slant};
 use super::{Random, uniform};
 use crate::constants::MAP_ALPHA_PER_MILLE;
+use crate::scene::film;
 
 /// What F0 and F90 of a clear coat are.
 const COAT_F0: f64 = 0.04;
@@ -25,6 +26,14 @@ pub enum Kind {
     Transmission,
     Coat,
     Sheen,
+    DiffuseTransmission,
+}
+
+impl Kind {
+    /// Whether it scatters to the side away from the eye.
+    pub fn is_beyond(self) -> bool {
+        matches!(self, Kind::Transmission | Kind::DiffuseTransmission)
+    }
 }
 
 /// What a lobe is to a path that follows it.
@@ -47,6 +56,30 @@ pub enum Wall {
     },
 }
 
+/// A thin film on the base.
+#[derive(Debug, Clone, Copy, PartialEq)]
+pub struct Film {
+    /// How much of it is there.
+    pub share: f64,
+    pub ior: f64,
+    /// Nanometres.
+    pub thickness: f64,
+    /// [`crate::scene::material::Layers::film_bound`].
+    pub bound: f64,
+}
+
+impl Film {
+    pub const NONE: Film = Film { share: 0.0, ior: 1.0, thickness: 0.0, bound: 0.0 };
+
+    /// What it makes of `bare` reflectance over a base of this F0.
+    fn over(&self, bare: DVec3, f0: DVec3, cosine: f64) -> DVec3 {
+        if self.share == 0.0 {
+            return bare;
+        }
+        bare.lerp(film::reflectance(f0, self.ior, self.thickness, cosine), self.share)
+    }
+}
+
 /// A material at a point, its textures included.
 #[derive(Debug, Clone, Copy, PartialEq)]
 pub struct Inputs {
@@ -58,6 +91,10 @@ pub struct Inputs {
     pub specular: f64,
     pub specular_colour: DVec3,
     pub transmission: f64,
+    /// Share of the diffuse lobes.
+    pub diffuse_transmission: f64,
+    pub diffuse_transmission_colour: DVec3,
+    pub film: Film,
     pub wall: Wall,
     pub coat: f64,
     /// Squared roughness.
@@ -89,7 +126,7 @@ pub struct Lobes {
     coat_leaves: f64,
     sheen_leaves: f64,
     /// Of being chosen.
-    chances: [(Kind, f64); 5],
+    chances: [(Kind, f64); 6],
 }
 
 /// Where a path goes on.
@@ -124,6 +161,16 @@ impl Inputs {
     /// Whether light enters what lies behind.
     fn transmits(&self) -> bool {
         self.transmission > 0.0 && self.metalness < 1.0
+    }
+
+    /// Of diffuse reflection: (1 - m) (1 - t) (1 - d) b.
+    fn diffuse_colour(&self) -> DVec3 {
+        (1.0 - self.metalness) * (1.0 - self.transmission) * (1.0 - self.diffuse_transmission) * self.base_colour
+    }
+
+    /// Of diffuse transmission.
+    fn colour_beyond(&self) -> DVec3 {
+        (1.0 - self.metalness) * (1.0 - self.transmission) * self.diffuse_transmission * self.diffuse_transmission_colour
     }
 
     /// F0 of a dielectric whose reflectance along the normal is this.
@@ -163,9 +210,9 @@ impl Lobes {
         let coat_leaves = (1.0 - inputs.coat_albedo(frame.n.dot(frame.wo))).max(0.0);
         let sheen_leaves = (1.0 - inputs.sheen_albedo(frame.n.dot(frame.wo))).max(0.0);
         let mut lobes =
-            Lobes { inputs, frame, f0, f0_transmission, diffuse: 0.0, coat_leaves, sheen_leaves, chances: [(Kind::Diffuse, 0.0); 5] };
+            Lobes { inputs, frame, f0, f0_transmission, diffuse: 0.0, coat_leaves, sheen_leaves, chances: [(Kind::Diffuse, 0.0); 6] };
         let n_v = frame.n.dot(frame.wo);
-        if (1.0 - inputs.metalness) * (1.0 - inputs.transmission) * inputs.base_colour.max_element() > 0.0 {
+        if inputs.diffuse_colour().max_element() > 0.0 || inputs.colour_beyond().max_element() > 0.0 {
             let norm: f64 = COSINES.iter().map(|(cosine, weight)| 2.0 * weight * cosine * lobes.reaches_diffuse(*cosine)).sum();
             lobes.diffuse = if norm > 0.0 { lobes.reaches_diffuse(n_v) / norm } else { 0.0 };
         }
@@ -180,25 +227,32 @@ impl Lobes {
         let dielectric = 1.0 - metalness;
         let both = albedo.a + albedo.b;
         let through = self.fresnel_of_transmission(n_v);
-        let reflection = metalness * (base_colour * albedo.a + albedo.b)
+        let mut reflection = metalness * (base_colour * albedo.a + albedo.b)
             + dielectric * (1.0 - transmission) * (self.f0 * albedo.a + self.inputs.specular * albedo.b)
             + dielectric * transmission * through * both;
+        if self.inputs.film.share > 0.0 {
+            // Elsewhere the film may reflect what it does not here.
+            reflection = self.reflectance(n_v).max(DVec3::splat(0.02)) * both;
+        }
         let transmitted = dielectric * transmission * base_colour * (1.0 - through) * both;
         // The norm of diffuse reflection is left out here.
-        let diffuse = dielectric * (1.0 - transmission) * base_colour * self.reaches_diffuse(n_v);
+        let diffuse = self.inputs.diffuse_colour() * self.reaches_diffuse(n_v);
+        let beyond = self.inputs.colour_beyond() * self.reaches_diffuse(n_v);
         let under_coat = self.coat_leaves;
         let under = under_coat * self.sheen_leaves;
         let albedos = [
-            (Kind::Diffuse, if self.diffuse > 0.0 { diffuse.max_element() * self.sheen_leaves } else { 0.0 }),
+            (Kind::Diffuse, diffuse.max_element() * self.sheen_leaves),
             (Kind::Reflection, reflection.max_element() * under),
             (Kind::Transmission, transmitted.max_element() * under),
             (Kind::Coat, self.inputs.coat_albedo(self.frame.coat_n.dot(self.frame.wo))),
             (Kind::Sheen, self.inputs.sheen_albedo(n_v) * under_coat),
+            (Kind::DiffuseTransmission, beyond.max_element() * self.sheen_leaves),
         ];
         let largest = albedos.iter().fold(0.0f64, |largest, (_, albedo)| largest.max(*albedo));
         let raised = albedos.map(|(kind, albedo)| {
             let is_there = match kind {
-                Kind::Diffuse => self.diffuse > 0.0,
+                Kind::Diffuse => diffuse.max_element() > 0.0,
+                Kind::DiffuseTransmission => beyond.max_element() > 0.0,
                 Kind::Reflection => reflection.max_element() > 0.0,
                 Kind::Transmission => dielectric * transmission * base_colour.max_element() > 0.0,
                 Kind::Coat => self.inputs.coat > 0.0,
@@ -214,7 +268,9 @@ impl Lobes {
     /// What reaches the diffuse lobe at a cosine, or gets out of it: (1 - E) (1 - C).
     fn reaches_diffuse(&self, cosine: f64) -> f64 {
         let albedo = ggx(cosine, self.inputs.alpha);
-        let reflected = self.f0.max_element() * albedo.a + self.inputs.specular * albedo.b;
+        let Film { share, bound, .. } = self.inputs.film;
+        let (f0, f90) = (self.f0.max_element(), self.inputs.specular);
+        let reflected = (f0 + share * (bound - f0)) * albedo.a + (f90 + share * (1.0 - f90)) * albedo.b;
         (1.0 - reflected).max(0.0) * (1.0 - self.inputs.coat_albedo(cosine)).max(0.0)
     }
 
@@ -230,13 +286,20 @@ impl Lobes {
     /// Ft.
     fn fresnel_of_transmission(&self, v_h: f64) -> DVec3 {
         let (f0, f90) = (self.f0_transmission, self.inputs.specular);
+        let film = self.inputs.film;
         match self.inputs.wall {
-            Wall::Thin => f0 + (f90 - f0) * schlick(v_h),
-            Wall::Solid { from, to } if from == to => DVec3::ZERO,
+            Wall::Thin => film.over(f0 + (f90 - f0) * schlick(v_h), f0, v_h),
+            Wall::Solid { from, to } if from == to => film.over(DVec3::ZERO, f0, v_h),
             Wall::Solid { from, to } => {
                 let (reflected, least) = (fresnel(v_h, from, to), along_normal(from, to));
                 // In total reflection, and for an index of 0, which reflects all.
-                if reflected >= 1.0 || least >= 1.0 { DVec3::ONE } else { f0 + (f90 - f0) * ((reflected - least) / (1.0 - least)) }
+                if reflected >= 1.0 || least >= 1.0 {
+                    return DVec3::ONE;
+                }
+                // By the angle in the rarer medium, so that it is the same from both sides.
+                let ratio = (from / to).max(1.0);
+                let outside = (1.0 - ratio * ratio * (1.0 - v_h * v_h)).max(0.0).sqrt();
+                film.over(f0 + (f90 - f0) * ((reflected - least) / (1.0 - least)), f0, outside)
             }
         }
     }
@@ -246,7 +309,8 @@ impl Lobes {
         let Inputs { base_colour, metalness, transmission, specular, .. } = self.inputs;
         let grazing = schlick(v_h);
         let metal = base_colour + (1.0 - base_colour) * grazing;
-        let opaque = self.f0 + (specular - self.f0) * grazing;
+        let metal = self.inputs.film.over(metal, base_colour, v_h);
+        let opaque = self.inputs.film.over(self.f0 + (specular - self.f0) * grazing, self.f0, v_h);
         let clear = if transmission > 0.0 { self.fresnel_of_transmission(v_h) } else { DVec3::ZERO };
         metalness * metal + (1.0 - metalness) * ((1.0 - transmission) * opaque + transmission * clear)
     }
@@ -283,7 +347,7 @@ impl Lobes {
 
     pub fn is_delta(&self, kind: Kind) -> bool {
         match kind {
-            Kind::Diffuse | Kind::Sheen => false,
+            Kind::Diffuse | Kind::Sheen | Kind::DiffuseTransmission => false,
             Kind::Reflection => is_delta(self.inputs.alpha),
             Kind::Transmission => is_delta(self.inputs.alpha) || self.same_index(),
             Kind::Coat => is_delta(self.inputs.coat_alpha),
@@ -303,7 +367,7 @@ impl Lobes {
             Kind::Reflection => by_alpha(self.inputs.alpha),
             Kind::Coat => by_alpha(self.inputs.coat_alpha),
             Kind::Transmission if self.inputs.wall == Wall::Thin && self.is_delta(kind) => Class::Passing,
-            Kind::Transmission => Class::Sharp,
+            Kind::Transmission | Kind::DiffuseTransmission => Class::Sharp,
         }
     }
 
@@ -311,14 +375,14 @@ impl Lobes {
     pub fn axis(&self, kind: Kind) -> DVec3 {
         match kind {
             Kind::Coat => self.frame.coat_n,
-            Kind::Transmission => -self.frame.n,
+            _ if kind.is_beyond() => -self.frame.n,
             _ => self.frame.n,
         }
     }
 
     /// Whether a lobe scatters that way at all.
     fn reaches(&self, kind: Kind, wi: DVec3) -> bool {
-        let ng = if kind == Kind::Transmission { -self.frame.ng } else { self.frame.ng };
+        let ng = if kind.is_beyond() { -self.frame.ng } else { self.frame.ng };
         wi.dot(ng) > 0.0 && wi.dot(self.axis(kind)) > 0.0
     }
 
@@ -326,6 +390,7 @@ impl Lobes {
     fn half(&self, kind: Kind, wi: DVec3) -> Option<DVec3> {
         let Frame { wo, n, .. } = self.frame;
         match (kind, self.inputs.wall) {
+            (Kind::DiffuseTransmission, _) => Some(wo),
             (Kind::Transmission, Wall::Thin) => Some((wo + mirrored_in(wi, n)).normalize()),
             (Kind::Transmission, Wall::Solid { from, to }) => {
                 let h = (from * wo + to * wi).normalize();
@@ -342,7 +407,7 @@ impl Lobes {
             return DVec3::ZERO;
         }
         let Frame { wo, n, coat_n, .. } = self.frame;
-        let Inputs { base_colour, metalness, transmission, alpha, coat_alpha, sheen_colour, sheen_s, .. } = self.inputs;
+        let Inputs { alpha, coat_alpha, sheen_colour, sheen_s, .. } = self.inputs;
         // Sheen has no bound at the horizon.
         let (n_v, n_l) = (n.dot(wo).max(1e-9), n.dot(wi).abs());
         let Some(h) = self.half(kind, wi) else { return DVec3::ZERO };
@@ -352,7 +417,11 @@ impl Lobes {
         match kind {
             Kind::Diffuse => {
                 let share = self.diffuse * self.reaches_diffuse(n_l) * self.under_sheen(wi);
-                (1.0 - metalness) * (1.0 - transmission) * FRAC_1_PI * share * base_colour
+                FRAC_1_PI * share * self.inputs.diffuse_colour()
+            }
+            Kind::DiffuseTransmission => {
+                let share = self.diffuse * self.reaches_diffuse(n_l) * self.under_sheen(wi);
+                FRAC_1_PI * share * self.inputs.colour_beyond()
             }
             Kind::Reflection => d_v() * under() * self.reflectance(v_h),
             Kind::Transmission => {
@@ -388,7 +457,7 @@ impl Lobes {
         let Some(h) = self.half(kind, wi) else { return 0.0 };
         let (alpha, n_v) = (self.inputs.alpha, n.dot(wo));
         match (kind, self.inputs.wall) {
-            (Kind::Diffuse, _) => FRAC_1_PI * n.dot(wi),
+            (Kind::Diffuse | Kind::DiffuseTransmission, _) => FRAC_1_PI * n.dot(wi).abs(),
             (Kind::Sheen, _) => 0.5 * FRAC_1_PI,
             (Kind::Coat, _) => mirrored_density(self.inputs.coat_alpha, coat_n, h, coat_n.dot(wo)),
             (Kind::Transmission, Wall::Solid { from, to }) => {
@@ -408,6 +477,7 @@ impl Lobes {
         let alpha = self.inputs.alpha;
         let wi = match (kind, self.inputs.wall) {
             (Kind::Diffuse, _) => sample_lobe(n, 1.0, rng),
+            (Kind::DiffuseTransmission, _) => sample_lobe(-n, 1.0, rng),
             (Kind::Sheen, _) => {
                 let (height, azimuth) = (1.0 - uniform(rng), TAU * uniform(rng));
                 let sine = (1.0 - height * height).max(0.0).sqrt();

@@ -18,13 +18,36 @@ pub struct Media<'a>(Vec<&'a Material>);
 /// Whether a material encloses a medium.
 pub fn is_solid(material: &Material) -> bool {
     let layers = &material.layers;
-    material.surface == Surface::Layered && layers.transmission > 0.0 && layers.medium.is_some() && !layers.is_unlit
+    let lets_in = layers.transmission > 0.0 || layers.diffuse_transmission > 0.0;
+    material.surface == Surface::Layered && lets_in && layers.medium.is_some() && !layers.is_unlit
+}
+
+/// Index of refraction for a channel: blue has most (KHR_materials_dispersion); without one that of yellow.
+fn index_of(solid: &Material, channel: Option<usize>) -> f64 {
+    let ior = f64::from(solid.layers.ior);
+    match channel {
+        Some(channel) if is_dispersive(solid) => {
+            let abbe_number = 20.0 / f64::from(solid.layers.dispersion);
+            let between_red_and_blue = (ior - 1.0) / abbe_number;
+            (ior + (channel as f64 - 1.0) * 0.5 * between_red_and_blue).clamp(1.0, 100.0)
+        }
+        _ => ior,
+    }
+}
+
+fn is_dispersive(solid: &Material) -> bool {
+    solid.layers.dispersion > 0.0 && solid.layers.ior > 1.0
 }
 
 impl<'a> Media<'a> {
     /// Index of refraction.
-    pub fn index(&self) -> f64 {
-        self.0.last().map_or(1.0, |solid| f64::from(solid.layers.ior))
+    pub fn index(&self, channel: Option<usize>) -> f64 {
+        self.0.last().map_or(1.0, |solid| index_of(solid, channel))
+    }
+
+    /// Whether colours have different ones.
+    pub fn is_dispersive(&self) -> bool {
+        self.0.last().is_some_and(|solid| is_dispersive(solid))
     }
 
     /// Share of light that is left after a way.

@@ -21,10 +21,11 @@ mod path;
 pub mod radiosity;
 mod verdict;
 
+use std::f64::consts::PI;
 use std::ops::{Add, Index, IndexMut};
 
 use bytemuck::{Pod, Zeroable};
-use glam::DVec3;
+use glam::{DVec2, DVec3};
 use rand_pcg::rand_core::{Rng, SeedableRng};
 use rayon::prelude::*;
 
@@ -111,7 +112,12 @@ impl<'a> Judge<'a> {
             Estimate::of(samples_per_pixel, || {
                 let x = 2.0 * (column + uniform(&mut rng)) / f64::from(width) - 1.0;
                 let y = 1.0 - 2.0 * (row + uniform(&mut rng)) / f64::from(height);
-                self.radiance(camera.eye, camera.direction(x, y, aspect), &mut rng)
+                let on_lens = camera.lens.map_or(DVec2::ZERO, |_| {
+                    let (radius, azimuth) = (uniform(&mut rng).sqrt(), 2.0 * PI * uniform(&mut rng));
+                    radius * DVec2::new(azimuth.cos(), azimuth.sin())
+                });
+                let (origin, direction) = camera.ray(x, y, aspect, on_lens);
+                self.radiance(origin, direction, &mut rng)
             })
         };
         Image { width, height, pixels: (0..width * height).into_par_iter().map(pixel).collect() }

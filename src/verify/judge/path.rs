@@ -6,7 +6,7 @@ use glam::DVec3;
 
 use super::geometry::{Hit, Ray, Vertex};
 use super::light::{Arriving, Scattering};
-use super::lobes::{Class, Kind};
+use super::lobes::Class;
 use super::material::sample_lobe;
 use super::media::{Media, is_solid};
 use super::{Judge, Part, Parts, Random, uniform};
@@ -29,6 +29,8 @@ struct Prefix<'a> {
     was_spread: bool,
     last: Scattering,
     media: Media<'a>,
+    /// The only one with light, once colours have parted.
+    channel: Option<usize>,
 }
 
 impl Prefix<'_> {
@@ -55,6 +57,12 @@ impl Prefix<'_> {
             Class::Sharp => self.is_caustic = true,
             Class::Matt => self.matt_count += 1,
         }
+    }
+
+    /// Colours part, and each has a chance of a third.
+    fn keep_channel(&mut self, channel: usize) {
+        self.beta *= 3.0 * DVec3::AXES[channel];
+        self.channel = Some(channel);
     }
 
     /// Goes on where the ray meets a surface, into a direction with this weight and density. Whether it survives roulette.
@@ -90,7 +98,7 @@ impl<'a> Judge<'a> {
 
     fn start(&self, position: DVec3, last: Scattering, matt_count: u32) -> Prefix<'a> {
         let media = if self.has_solids { Media::around(&self.geometry, position) } else { Media::default() };
-        Prefix { beta: DVec3::ONE, saw_sharp: false, is_caustic: false, matt_count, was_spread: matt_count > 0, last, media }
+        Prefix { beta: DVec3::ONE, saw_sharp: false, is_caustic: false, matt_count, was_spread: matt_count > 0, last, media, channel: None }
     }
 
     fn follow(&self, mut ray: Ray, mut prefix: Prefix<'a>, rng: &mut Random) -> Parts {
@@ -190,7 +198,13 @@ impl<'a> Judge<'a> {
         rng: &mut Random,
     ) -> Option<DVec3> {
         let material = self.material(hit);
-        let lobes = self.geometry.lobes(hit, vertex, &prefix.media, *bounce);
+        if prefix.channel.is_none() && is_solid(material) {
+            let before = prefix.media.clone().before(material, vertex.is_front);
+            if before.is_dispersive() || before.beyond(material, vertex.is_front).is_dispersive() {
+                prefix.keep_channel(((3.0 * uniform(rng)) as usize).min(2));
+            }
+        }
+        let lobes = self.geometry.lobes(hit, vertex, &prefix.media, prefix.channel, *bounce);
         let (kind, chance) = lobes.choose(rng)?;
         let class = lobes.class(kind);
         if class == Class::Passing {
@@ -204,12 +218,12 @@ impl<'a> Judge<'a> {
         prefix.add(class);
         if is_solid(material) {
             let media = std::mem::take(&mut prefix.media).before(material, vertex.is_front);
-            prefix.media = if kind == Kind::Transmission { media.beyond(material, vertex.is_front) } else { media };
+            prefix.media = if kind.is_beyond() { media.beyond(material, vertex.is_front) } else { media };
         }
         let axis = lobes.axis(kind);
         if !lobes.is_delta(kind) {
             prefix.was_spread = true;
-            let ng = if kind == Kind::Transmission { -vertex.ng } else { vertex.ng };
+            let ng = if kind.is_beyond() { -vertex.ng } else { vertex.ng };
             let bsdf = |wi| (lobes.evaluate(kind, wi), lobes.density(kind, wi));
             let light = self.direct_light(prefix, (vertex.position, ng), axis, bsdf, rng);
             parts[prefix.part()] += prefix.beta * light;
@@ -275,7 +289,7 @@ impl<'a> Judge<'a> {
         let coverage = self.geometry.coverage(triangle, hit.weights);
         let layers = &triangle.material.layers;
         let is_clear = layers.transmission > 0.0 && !is_solid(triangle.material) && !layers.is_unlit;
-        let wall = if is_clear { self.geometry.lobes(hit, &vertex, &prefix.media, 0).passed() } else { DVec3::ZERO };
+        let wall = if is_clear { self.geometry.lobes(hit, &vertex, &prefix.media, prefix.channel, 0).passed() } else { DVec3::ZERO };
         1.0 - coverage + coverage * wall
     }
 }

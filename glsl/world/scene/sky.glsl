@@ -1,0 +1,127 @@
+// Skies: one radiance for all directions, or a picture of them and a table that samples it (src/scene/sky.rs). A light sample leaves by the
+// cosine or by the table, and weighs by the density of both together (the balance heuristic, Veach 1997, section 9.2).
+
+// A direction, and its density, 1/sr.
+struct SkySample {
+    vec3 wi;
+    float density;
+};
+
+// By a unit quaternion (x, y, z; w), or back by its inverse (-x, -y, -z; w).
+vec3 turned(vec3 v, vec3 axis, float w)
+{
+    return v + 2.0 * cross(axis, cross(axis, v) + w * v);
+}
+
+// Place in the picture of a direction, both coordinates from 0 to 1.
+vec2 place_in_sky(Emitter sky, vec3 wi)
+{
+    vec3 local = turned(wi, -sky.position, sky.size);
+    float turns = atan(local.z, local.x) * 0.15915494309189535;
+    float angle = atan(sqrt(local.x * local.x + local.z * local.z), local.y) * 0.31830988618379067;
+    return vec2(0.5 + turns, angle);
+}
+
+// Radiance from a direction.
+vec3 sky_radiance(Emitter sky, vec3 wi)
+{
+    if (HAS_SKY_PICTURE) {
+        return sky.strength * sample_texture(textures[sky.triangle], place_in_sky(sky, wi)).xyz;
+    }
+    return sky.strength;
+}
+
+float share_word(uint place)
+{
+    return uintBitsToFloat(texel_word(place));
+}
+
+// Solid angle of each cell of a row of the table, which ends at two angles to the vertical.
+float solid_angle_of_cells(TextureInfo table, uint row)
+{
+    uint edges = table.first_texel + table.height;
+    return divide(6.28318530717958648 * abs(share_word(edges + row + 1) - share_word(edges + row)), float(table.width));
+}
+
+// Share that ends at a word of cumulative shares, which begin at `first`.
+float share_at(uint first, uint number)
+{
+    return share_word(first + number) - (number == 0 ? 0.0 : share_word(first + number - 1));
+}
+
+// Density with which the table chooses a direction, 1/sr.
+float sky_table_density(Emitter sky, vec3 wi)
+{
+    TextureInfo table = textures[sky.triangle + 1];
+    vec2 place = place_in_sky(sky, wi) * vec2(table.width, table.height);
+    uint column = min(uint(max(place.x, 0.0)), table.width - 1), row = min(uint(max(place.y, 0.0)), table.height - 1);
+    float share = share_at(table.first_texel, row) * share_at(table.first_texel + 2 * table.height + 1 + row * table.width, column);
+    return divide(share, solid_angle_of_cells(table, row));
+}
+
+// The first of `count` cumulative shares above u, which becomes uniform within that share.
+uint pick_share(uint first, uint count, inout float u)
+{
+    uint low = 0, high = count - 1;
+    while (low < high) {
+        uint middle = (low + high) / 2;
+        if (share_word(first + middle) > u) {
+            high = middle;
+        } else {
+            low = middle + 1;
+        }
+    }
+    float share = share_at(first, low);
+    u = clamp(divide(u - (share_word(first + low) - share), share), 0.0, 0.99999994);
+    return low;
+}
+
+// Its density is that of the cell that was chosen: next to one far brighter, rounding may place a direction in the other.
+SkySample sample_sky_table(Emitter sky, vec2 u)
+{
+    TextureInfo table = textures[sky.triangle + 1];
+    uint row = pick_share(table.first_texel, table.height, u.y);
+    uint cells = table.first_texel + 2 * table.height + 1 + row * table.width;
+    uint column = pick_share(cells, table.width, u.x);
+    float share = share_at(table.first_texel, row) * share_at(cells, column);
+    uint edges = table.first_texel + table.height;
+    float first = share_word(edges + row);
+    float versine = first + u.y * (share_word(edges + row + 1) - first);
+    float height = row < table.height / 2 ? 1.0 - versine : versine - 1.0;
+    float turns = divide(float(column) + u.x, float(table.width));
+    vec3 local = direction_at(height, versine * (2.0 - versine), turns < 0.5 ? turns + 0.5 : turns - 0.5).xzy;
+    return SkySample(turned(local, sky.position, sky.size), divide(share, solid_angle_of_cells(table, row)));
+}
+
+float cosine_density(vec3 ns, vec3 wi)
+{
+    return max(dot(wi, ns), 0.0) * 0.31830988618379067;
+}
+
+// Density of light samples towards the sky that are aimed at no opening.
+float open_sky_density(Emitter sky, vec3 ns, vec3 wi)
+{
+    float density = cosine_density(ns, wi);
+    if (HAS_SKY_PICTURE) {
+        density = (1.0 - sky.outer_versine) * density + sky.outer_versine * sky_table_density(sky, wi);
+    }
+    return density;
+}
+
+// Such a sample.
+SkySample sample_open_sky(Emitter sky, vec3 ns, vec2 u)
+{
+    if (HAS_SKY_PICTURE) {
+        float by_table = sky.outer_versine;
+        if (u.x < by_table) {
+            SkySample found = sample_sky_table(sky, vec2(divide(u.x, by_table), u.y));
+            found.density = (1.0 - by_table) * cosine_density(ns, found.wi) + by_table * found.density;
+            return found;
+        }
+        u.x = divide(u.x - by_table, 1.0 - by_table);
+        vec3 wi = to_frame(sample_cosine_hemisphere(u.x, u.y), ns);
+        return SkySample(wi, open_sky_density(sky, ns, wi));
+    }
+    vec3 wi = to_frame(sample_cosine_hemisphere(u.x, u.y), ns);
+    return SkySample(wi, cosine_density(ns, wi));
+}

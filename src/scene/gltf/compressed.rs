@@ -1,0 +1,396 @@
+//! What a file has compressed, unpacked into one more buffer before anything else is read: buffer views by meshoptimizer
+//! (EXT_meshopt_compression and its later name, KHR_meshopt_compression), primitives by Draco (KHR_draco_mesh_compression).
+
+use std::borrow::Cow;
+use std::collections::{HashMap, HashSet};
+use std::path::Path;
+
+use meshopt::{decode_filter_color, decode_filter_exp, decode_filter_oct, decode_filter_quat, decode_index_buffer, decode_index_sequence};
+use rayon::prelude::*;
+use serde::Deserialize;
+use serde_json::{Value, json};
+
+use super::malformed::REMEDY;
+use super::{draco, named, one_line, read_uri};
+use crate::error::{Error, Result};
+
+const MESHOPT: [&str; 2] = ["EXT_meshopt_compression", "KHR_meshopt_compression"];
+const DRACO: &str = "KHR_draco_mesh_compression";
+/// Of all together, unpacked: a few bytes must not unfold into many gigabytes.
+const MAX_BYTES: u64 = 2 << 30;
+
+/// What the extension says of a view.
+#[derive(Deserialize)]
+#[serde(rename_all = "camelCase")]
+struct View {
+    buffer: usize,
+    #[serde(default)]
+    byte_offset: usize,
+    byte_length: usize,
+    byte_stride: usize,
+    count: usize,
+    mode: Mode,
+    #[serde(default)]
+    filter: Filter,
+}
+
+#[derive(Deserialize, PartialEq, Clone, Copy)]
+#[serde(rename_all = "UPPERCASE")]
+enum Mode {
+    Attributes,
+    Triangles,
+    Indices,
+}
+
+#[derive(Deserialize, PartialEq, Clone, Copy, Default)]
+#[serde(rename_all = "UPPERCASE")]
+enum Filter {
+    #[default]
+    None,
+    Octahedral,
+    Quaternion,
+    Exponential,
+    Color,
+}
+
+/// The buffer that takes what is unpacked, and how many bytes it has already.
+#[derive(Clone, Copy)]
+pub(super) struct Target {
+    pub(super) buffer: usize,
+    pub(super) start: usize,
+}
+
+/// A file that may have something compressed.
+struct Packed<'a> {
+    path: &'a Path,
+    binary: Option<&'a [u8]>,
+    target: Target,
+    unpacked: Vec<u8>,
+}
+
+/// Unpacks all that is compressed, leads the JSON there, and gives the bytes that belong into the target; none if nothing is. `binary` is
+/// the binary part of a `.glb` file.
+pub(super) fn unpack(path: &Path, json: &mut Value, binary: Option<&[u8]>, target: Target) -> Result<Vec<u8>> {
+    let mut packed = Packed { path, binary, target, unpacked: Vec::new() };
+    packed.unpack_views(json)?;
+    packed.unpack_primitives(json)?;
+    Ok(packed.unpacked)
+}
+
+/// Takes what compression a file no longer needs off its lists.
+pub(super) fn forget(json: &mut Value) {
+    for list in ["extensionsUsed", "extensionsRequired"] {
+        let Some(names) = json.get_mut(list).and_then(Value::as_array_mut) else { continue };
+        names.retain(|name| name.as_str().is_none_or(|name| name != DRACO && !MESHOPT.contains(&name)));
+        // Empty lists are not allowed.
+        if names.is_empty() {
+            json.as_object_mut().expect("it has a list").remove(list);
+        }
+    }
+}
+
+fn members<'a>(root: &'a Value, list: &str) -> impl Iterator<Item = (usize, &'a Value)> {
+    root[list].as_array().into_iter().flatten().enumerate()
+}
+
+fn place(value: &Value) -> Option<usize> {
+    value.as_u64().and_then(|number| usize::try_from(number).ok())
+}
+
+impl Packed<'_> {
+    fn refuse(&self, object: &str, reason: impl AsRef<str>) -> Error {
+        Error::Scene { path: self.path.to_owned(), object: object.to_owned(), reason: one_line(reason.as_ref()) }
+    }
+
+    /// The buffers of these numbers, each read once.
+    fn buffers(&self, json: &Value, numbers: impl Iterator<Item = usize>) -> Result<HashMap<usize, Cow<'_, [u8]>>> {
+        let mut read = HashMap::new();
+        let count = members(json, "buffers").count();
+        for number in numbers {
+            if read.contains_key(&number) {
+                continue;
+            }
+            let what = format!("buffer {number}");
+            let bytes = match (json["buffers"][number]["uri"].as_str(), self.binary) {
+                _ if number >= count => return Err(self.refuse(&what, format!("is named by what is compressed; there are {count}"))),
+                (Some(uri), _) => Cow::Owned(read_uri(self.path, uri).map_err(|reason| self.refuse(&what, reason))?),
+                (None, Some(binary)) if number == 0 => Cow::Borrowed(binary),
+                _ => return Err(self.refuse(&what, "is the file's binary part, and there is none")),
+            };
+            read.insert(number, bytes);
+        }
+        Ok(read)
+    }
+
+    /// Keeps unpacked bytes, and gives where they begin.
+    fn keep(&mut self, bytes: &[u8], what: &str) -> Result<usize> {
+        let start = self.unpacked.len();
+        if (start + bytes.len()) as u64 > MAX_BYTES {
+            return Err(self.refuse(what, format!("unpacks to more than the {MAX_BYTES} bytes that all together may have")));
+        }
+        self.unpacked.extend(bytes);
+        self.unpacked.resize(self.unpacked.len().next_multiple_of(4), 0);
+        Ok(self.target.start + start)
+    }
+
+    fn unpack_views(&mut self, json: &mut Value) -> Result<()> {
+        let packed = |list: &str| -> Vec<(usize, Value)> {
+            let of = |(place, object): (usize, &Value)| {
+                MESHOPT.iter().find_map(|name| object["extensions"].get(name)).map(|found| (place, found.clone()))
+            };
+            members(json, list).filter_map(of).collect()
+        };
+        let views = packed("bufferViews");
+        if views.is_empty() {
+            return Ok(());
+        }
+        // Buffers that stand for what is unpacked.
+        let holds = |place: &usize| views.iter().any(|(_, view)| view["buffer"].as_u64() == Some(*place as u64));
+        let has_file = |place: &usize| json["buffers"][place]["uri"].is_string();
+        let stand_ins: Vec<usize> =
+            packed("buffers").into_iter().map(|(place, _)| place).filter(|place| !has_file(place) && !holds(place)).collect();
+        let parse = |(number, view): &(usize, Value)| {
+            let what = format!("compressed buffer view {number}");
+            let view = View::deserialize(view).map_err(|error| self.refuse(&what, format!("is not valid: {error}; {REMEDY}")))?;
+            let count = members(json, "buffers").count();
+            if view.buffer >= count {
+                return Err(self.refuse(&what, format!("lies in buffer {} of {count}", view.buffer)));
+            }
+            Ok((*number, what, view))
+        };
+        let parsed = views.iter().map(parse).collect::<Result<Vec<_>>>()?;
+        let buffers = self.buffers(json, parsed.iter().map(|(_, _, view)| view.buffer))?;
+        let decode = |(_, what, view): &(usize, String, View)| {
+            decoded_view(&buffers[&view.buffer], view).map_err(|reason| self.refuse(what, reason))
+        };
+        let decoded = parsed.par_iter().map(decode).collect::<Result<Vec<_>>>()?;
+        drop(buffers);
+        for ((number, what, _), bytes) in parsed.iter().zip(decoded) {
+            let start = self.keep(&bytes, what)?;
+            let view = &mut json["bufferViews"][number];
+            view["buffer"] = json!(self.target.buffer);
+            view["byteOffset"] = json!(start);
+            view["byteLength"] = json!(bytes.len());
+            drop_extensions(view, &MESHOPT);
+        }
+        for buffer in stand_ins {
+            json["buffers"][buffer] = json!({"byteLength": 0, "uri": "data:application/octet-stream;base64,"});
+        }
+        Ok(())
+    }
+
+    fn unpack_primitives(&mut self, json: &mut Value) -> Result<()> {
+        struct Primitive {
+            mesh: usize,
+            number: usize,
+            what: String,
+            view: usize,
+        }
+        let mut found: Vec<Primitive> = Vec::new();
+        for (mesh, of) in members(json, "meshes") {
+            for (number, primitive) in members(of, "primitives") {
+                let Some(extension) = primitive["extensions"].get(DRACO) else { continue };
+                let what = format!("mesh '{}', primitive {number}", named("mesh", of["name"].as_str(), mesh));
+                let view = place(&extension["bufferView"]).filter(|view| json["bufferViews"].get(view).is_some());
+                let Some(view) = view else {
+                    let view = &extension["bufferView"];
+                    return Err(self.refuse(&what, format!("is compressed in the buffer view {view}, which is not there; {REMEDY}")));
+                };
+                found.push(Primitive { mesh, number, what, view });
+            }
+        }
+        if found.is_empty() {
+            return Ok(());
+        }
+        let views = || found.iter().map(|primitive| &json["bufferViews"][primitive.view]);
+        let buffers = self.buffers(json, views().filter_map(|view| place(&view["buffer"])))?;
+        // Primitives may share what is compressed.
+        let mut firsts: HashMap<usize, &Primitive> = HashMap::new();
+        for primitive in &found {
+            firsts.entry(primitive.view).or_insert(primitive);
+        }
+        let decode = |(number, primitive): (&usize, &&Primitive)| {
+            let view = &json["bufferViews"][*number];
+            let start = place(&view["byteOffset"]).unwrap_or(0);
+            let end = place(&view["byteLength"]).and_then(|length| start.checked_add(length));
+            let bytes = place(&view["buffer"]).and_then(|buffer| buffers[&buffer].get(start..end?));
+            let bytes = bytes.ok_or_else(|| self.refuse(&primitive.what, "is compressed in a buffer view that runs past its buffer"))?;
+            let decoded = draco::decoded(bytes).map_err(|reason| self.refuse(&primitive.what, format!("{reason}; {REMEDY}")))?;
+            Ok((*number, decoded))
+        };
+        let decoded = firsts.par_iter().map(decode).collect::<Result<HashMap<_, _>>>()?;
+        drop(buffers);
+        let mut indices_of: HashMap<usize, usize> = HashMap::new();
+        let mut taken = HashSet::new();
+        let mut accessor_of: HashMap<(usize, u64), usize> = HashMap::new();
+        for Primitive { mesh, number, what, view } in &found {
+            let draco::Decoded { indices, points, attributes } = &decoded[view];
+            let indices = match indices_of.get(view) {
+                Some(known) => *known,
+                None => {
+                    let accessor = json!({"componentType": 5125, "count": indices.len(), "type": "SCALAR"});
+                    let old = place(&json["meshes"][mesh]["primitives"][number]["indices"]).filter(|old| taken.insert(*old));
+                    let added = self.set_accessor(json, old, accessor, None, (bytemuck::cast_slice(indices), what))?;
+                    *indices_of.entry(*view).or_insert(added)
+                }
+            };
+            let primitive = json["meshes"][mesh]["primitives"][number].clone();
+            let names = primitive["extensions"][DRACO]["attributes"].as_object().cloned().unwrap_or_default();
+            for (name, id) in names {
+                let Some(old) = place(&primitive["attributes"][&name]) else { continue };
+                let like = json["accessors"].get(old).cloned();
+                let found = id.as_u64().and_then(|id| Some((id, attributes.get(&id)?)));
+                let (Some(like), Some((id, attribute))) = (like, found) else {
+                    return Err(self.refuse(what, format!("has a compressed {name} of the number {id}, which is not there; {REMEDY}")));
+                };
+                let is_alike = matches!(
+                    (like["type"].as_str(), attribute.components),
+                    (Some("SCALAR"), 1) | (Some("VEC2"), 2) | (Some("VEC3"), 3) | (Some("VEC4"), 4)
+                );
+                if !is_alike {
+                    let reason = format!("has a compressed {name} of {} numbers, and {} was announced", attribute.components, like["type"]);
+                    return Err(self.refuse(what, format!("{reason}; {REMEDY}")));
+                }
+                let added = match accessor_of.get(&(*view, id)) {
+                    Some(known) => *known,
+                    None => {
+                        let mut accessor = like;
+                        accessor["count"] = json!(points);
+                        accessor["componentType"] = json!(attribute.component_type);
+                        for member in ["byteOffset", "sparse"] {
+                            accessor.as_object_mut().expect("it has a type").remove(member);
+                        }
+                        let old = Some(old).filter(|old| taken.insert(*old));
+                        let added = self.set_accessor(json, old, accessor, Some(attribute.stride), (&attribute.bytes, what))?;
+                        *accessor_of.entry((*view, id)).or_insert(added)
+                    }
+                };
+                json["meshes"][mesh]["primitives"][number]["attributes"][&name] = json!(added);
+            }
+            let primitive = &mut json["meshes"][mesh]["primitives"][number];
+            primitive["indices"] = json!(indices);
+            // Strips are unpacked to triangles.
+            primitive["mode"] = json!(4);
+            drop_extensions(primitive, &[DRACO]);
+        }
+        Ok(())
+    }
+
+    /// Gives an accessor a view of its own, of vertices with the bytes from one to the next, or of indices. It takes the place of the
+    /// old one, or one more where that has been taken.
+    fn set_accessor(
+        &mut self,
+        json: &mut Value,
+        old: Option<usize>,
+        mut accessor: Value,
+        stride: Option<usize>,
+        (bytes, what): (&[u8], &str),
+    ) -> Result<usize> {
+        let start = self.keep(bytes, what)?;
+        let mut view = json!({"buffer": self.target.buffer, "byteOffset": start, "byteLength": bytes.len()});
+        if let Some(stride) = stride {
+            view["byteStride"] = json!(stride);
+        }
+        let lists = ["bufferViews", "accessors"].map(|list| members(json, list).count());
+        accessor["bufferView"] = json!(lists[0]);
+        let number = old.filter(|old| *old < lists[1]).unwrap_or(lists[1]);
+        let mut put = |list: &str, place: usize, member: Value| match json.get_mut(list).and_then(Value::as_array_mut) {
+            Some(members) if place < members.len() => members[place] = member,
+            Some(members) => members.push(member),
+            None => json[list] = json!([member]),
+        };
+        put("bufferViews", lists[0], view);
+        put("accessors", number, accessor);
+        Ok(number)
+    }
+}
+
+fn drop_extensions(object: &mut Value, names: &[&str]) {
+    let Some(extensions) = object.get_mut("extensions").and_then(Value::as_object_mut) else { return };
+    extensions.retain(|name, _| !names.contains(&name.as_str()));
+    if extensions.is_empty() {
+        object.as_object_mut().expect("it has extensions").remove("extensions");
+    }
+}
+
+/// Or what is wrong with it.
+fn decoded_view(buffer: &[u8], view: &View) -> std::result::Result<Vec<u8>, String> {
+    let View { count, byte_stride: stride, .. } = *view;
+    let end = view.byte_offset.checked_add(view.byte_length);
+    let encoded = end.and_then(|end| buffer.get(view.byte_offset..end));
+    let encoded = encoded.ok_or_else(|| format!("runs past the {} bytes of its buffer", buffer.len()))?;
+    let is_stride = match view.mode {
+        Mode::Attributes => stride % 4 == 0 && (4..=256).contains(&stride),
+        Mode::Triangles | Mode::Indices => matches!(stride, 2 | 4),
+    };
+    if !is_stride {
+        return Err(format!("has {stride} bytes an element, which its mode does not allow"));
+    }
+    if view.mode == Mode::Triangles && count % 3 != 0 {
+        return Err(format!("has {count} indices, no whole triangles"));
+    }
+    let bytes = (count as u64).saturating_mul(stride as u64);
+    if bytes > MAX_BYTES {
+        return Err(format!("claims {bytes} bytes; allowed are {MAX_BYTES}"));
+    }
+    let is_filtered = match view.filter {
+        Filter::None => true,
+        Filter::Octahedral | Filter::Color => view.mode == Mode::Attributes && matches!(stride, 4 | 8),
+        Filter::Quaternion => view.mode == Mode::Attributes && stride == 8,
+        Filter::Exponential => view.mode == Mode::Attributes,
+    };
+    if !is_filtered {
+        return Err(format!("has a filter that is not for {stride} bytes an element"));
+    }
+    let broken = || format!("cannot be decoded; {REMEDY}");
+    let indices: Vec<u32> = match view.mode {
+        Mode::Attributes => return attributes(encoded, count, stride, view.filter).ok_or_else(broken),
+        Mode::Triangles => decode_index_buffer(encoded, count).map_err(|_| broken())?,
+        Mode::Indices => decode_index_sequence(encoded, count).map_err(|_| broken())?,
+    };
+    Ok(match stride {
+        2 => indices.iter().flat_map(|index| (*index as u16).to_le_bytes()).collect(),
+        _ => indices.iter().flat_map(|index| index.to_le_bytes()).collect(),
+    })
+}
+
+/// As many words as the library's decoder asks for, when it is compiled, in an element.
+#[derive(Clone)]
+struct Element<const N: usize>([u32; N]);
+
+impl<const N: usize> Default for Element<N> {
+    fn default() -> Self {
+        Element([0; N])
+    }
+}
+
+fn words<const N: usize>(encoded: &[u8], count: usize) -> Option<Vec<u32>> {
+    let elements = meshopt::decode_vertex_buffer::<Element<N>>(encoded, count).ok()?;
+    Some(elements.into_iter().flat_map(|element| element.0).collect())
+}
+
+/// Every width that the extension allows, up to 256 bytes.
+macro_rules! words_of {
+    ($width:expr, $encoded:expr, $count:expr, $($n:literal)*) => {
+        match $width { $($n => words::<$n>($encoded, $count),)* _ => None }
+    };
+}
+
+/// Elements of `stride` bytes, a multiple of four; `None` if the stream is no such.
+#[rustfmt::skip]
+fn attributes(encoded: &[u8], count: usize, stride: usize, filter: Filter) -> Option<Vec<u8>> {
+    let mut words = words_of!(stride / 4, encoded, count,
+        1 2 3 4 5 6 7 8 9 10 11 12 13 14 15 16 17 18 19 20 21 22 23 24 25 26 27 28 29 30 31 32
+        33 34 35 36 37 38 39 40 41 42 43 44 45 46 47 48 49 50 51 52 53 54 55 56 57 58 59 60 61 62 63 64)?;
+    let decoded: &mut [u8] = bytemuck::cast_slice_mut(&mut words);
+    match (filter, stride) {
+        (Filter::None, _) => {}
+        (Filter::Octahedral, 4) => decode_filter_oct::<i8>(bytemuck::cast_slice_mut(decoded)),
+        (Filter::Octahedral, _) => decode_filter_oct::<i16>(bytemuck::cast_slice_mut(decoded)),
+        (Filter::Quaternion, _) => decode_filter_quat(bytemuck::cast_slice_mut(decoded)),
+        (Filter::Exponential, _) => decode_filter_exp::<1>(bytemuck::cast_slice_mut(decoded)),
+        (Filter::Color, 4) => decode_filter_color::<i8>(bytemuck::cast_slice_mut(decoded)),
+        (Filter::Color, _) => decode_filter_color::<i16>(bytemuck::cast_slice_mut(decoded)),
+    }
+    Some(decoded.to_vec())
+}

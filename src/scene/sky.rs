@@ -1,0 +1,344 @@
+//! A sky from a picture of all directions (equirectangular), and how light is sampled from it: a table of cells, each chosen by what
+//! it sends, as in Pharr, Jakob and Humphreys (2016), section 14.2.4. Kernels have both in `glsl/world/scene/sky.glsl`.
+
+use std::f64::consts::{PI, TAU};
+use std::ops::RangeInclusive;
+use std::path::Path;
+
+use glam::{DQuat, DVec2, DVec3, Vec3};
+use image::{ImageDecoder, ImageFormat};
+use rayon::prelude::*;
+
+use super::texture::{Filter, Texels, Texture, Wrap};
+use crate::error::{Error, Result};
+use crate::text::{counted, refusal};
+
+/// Of one picture: half of what all textures together may have.
+const MAX_TEXELS: u64 = 1 << 26;
+/// Cells of the table in a row, and rows: parts of a small picture's texels, several texels of a large one's. What differs within a
+/// cell is noise, and no bias.
+const COLUMNS: RangeInclusive<u32> = 512..=2048;
+const ROWS: RangeInclusive<u32> = 256..=1024;
+/// Values that a random choice of a row, or of a cell in it, can take.
+const CHOICES: f64 = (1 << 24) as f64;
+/// Most of the light samples that leave the cosine's directions for the table's, however small the sun.
+const MOST_BY_TABLE: f64 = 0.75;
+
+/// Left to right from -x over -z, +x and +z (y is up): +x is in the middle; from the top row, which is up, to the bottom.
+#[derive(Debug, Clone, PartialEq)]
+pub struct Sky {
+    pub texture: Texture,
+    /// W/m2/sr of a texel of 1.
+    pub strength: Vec3,
+    /// From the picture's axes to the scene's.
+    pub turn: DQuat,
+    /// What the picture holds that is no radiance.
+    pub warnings: Vec<String>,
+}
+
+/// Rows of equal angle and cells of equal azimuth.
+pub struct Table {
+    pub columns: u32,
+    pub rows: u32,
+    /// For the kernels: the rows' cumulative shares; then each row's edges as 1 - |cosine| of the angle to the vertical; then for each
+    /// row the cumulative shares of its cells.
+    pub words: Vec<u32>,
+    /// Integral of the picture over all directions, per channel, in texels' units.
+    pub integral: DVec3,
+    /// The most that a channel of a texel exceeds 4 pi times the density with which its cell is chosen.
+    pub most_over_density: f64,
+    /// The largest value of a texel.
+    pub most: f32,
+    /// Share of light samples that the table should choose.
+    pub share: f64,
+}
+
+impl Sky {
+    /// Reads a Radiance (`.hdr`) or OpenEXR (`.exr`) file.
+    pub fn read(path: &Path) -> Result<Sky> {
+        let refuse = |reason: String| Error::Scene { path: path.to_owned(), object: "the environment".into(), reason };
+        let reader = std::fs::File::open(path).map_err(|error| refuse(format!("cannot be read ({})", refusal(&error))))?;
+        let mut reader = image::ImageReader::new(std::io::BufReader::new(reader))
+            .with_guessed_format()
+            .map_err(|error| refuse(format!("cannot be read ({})", refusal(&error))))?;
+        if !matches!(reader.format(), Some(ImageFormat::Hdr | ImageFormat::OpenExr)) {
+            return Err(refuse("is neither a Radiance (.hdr) nor an OpenEXR (.exr) picture; convert it to one of them".into()));
+        }
+        let mut limits = image::Limits::default();
+        limits.max_alloc = Some(16 * MAX_TEXELS + (64 << 20));
+        reader.limits(limits);
+        let undecodable = |error: image::ImageError| refuse(format!("cannot be decoded ({})", one_line(&error.to_string())));
+        // Of its lines the library keeps the exposure for itself.
+        let exposure = exposure(path);
+        let decoder = reader.into_decoder().map_err(undecodable)?;
+        let (width, height) = decoder.dimensions();
+        if width == 0 || height == 0 || u64::from(width) * u64::from(height) > MAX_TEXELS {
+            return Err(refuse(format!("is {width} x {height}; allowed are up to {MAX_TEXELS} pixels: make it smaller")));
+        }
+        let picture = image::DynamicImage::from_decoder(decoder).map_err(undecodable)?.into_rgb32f();
+        let colours: Vec<Vec3> = bytemuck::allocation::cast_vec(picture.into_raw());
+        let mut sky = Sky::of(path.file_name().unwrap_or_default().to_string_lossy(), width, height, colours);
+        sky.strength /= exposure;
+        Ok(sky)
+    }
+
+    /// From pixels, row by row from the top. What is no number, infinite or negative is black, and a warning counts it.
+    pub fn of(name: impl Into<String>, width: u32, height: u32, mut colours: Vec<Vec3>) -> Sky {
+        let clean = |colour: &mut Vec3| {
+            let counts = [usize::from(!colour.is_finite()), usize::from(colour.is_finite() && colour.min_element() < 0.0)];
+            *colour = if colour.is_finite() { colour.max(Vec3::ZERO) } else { Vec3::ZERO };
+            (counts, colour.max_element())
+        };
+        let joined = |a: ([usize; 2], f32), b: ([usize; 2], f32)| ([a.0[0] + b.0[0], a.0[1] + b.0[1]], a.1.max(b.1));
+        let ([infinite, negative], most) = colours.par_iter_mut().map(clean).reduce(|| ([0; 2], 0.0), joined);
+        let mut warnings = Vec::new();
+        if infinite > 0 {
+            warnings.push(format!("{} of the environment infinite or no number; black instead", counted(infinite, "pixel")));
+        }
+        if negative > 0 {
+            warnings.push(format!("{} of the environment with negative values; 0 instead", counted(negative, "pixel")));
+        }
+        if width != 2 * height {
+            let size = format!("{width} x {height}");
+            warnings.push(format!(
+                "the environment is {size}; a picture of all directions is twice as wide as high, and this one is stretched"
+            ));
+        }
+        // The largest texel has the largest exponent that there is, so that dark ones keep their digits beside the sun.
+        let power = if most > 0.0 { f64::from(most).log2().floor() as i32 - 14 } else { 0 };
+        let (shrink, grow) = (2f64.powi(-power), 2f64.powi(power));
+        colours.par_iter_mut().for_each(|colour| *colour = (colour.as_dvec3() * shrink).as_vec3());
+        let texture = Texture {
+            name: name.into(),
+            width,
+            height,
+            texels: Texels::from(colours),
+            wrap: [Wrap::Repeat, Wrap::Clamp],
+            filter: Filter::Bilinear,
+        };
+        Sky { texture, strength: Vec3::splat(grow as f32), turn: DQuat::IDENTITY, warnings }
+    }
+
+    /// Turned about the vertical, counter-clockwise as seen from above.
+    pub fn turned(self, degrees: f64) -> Sky {
+        Sky { turn: DQuat::from_rotation_y(degrees.to_radians()) * self.turn, ..self }
+    }
+
+    /// Radiance from a unit direction, W/m2/sr.
+    pub fn radiance(&self, direction: DVec3) -> DVec3 {
+        let local = self.turn.inverse() * direction;
+        let turns = local.z.atan2(local.x) / TAU;
+        let angle = local.x.hypot(local.z).atan2(local.y);
+        (self.texture.sample(DVec2::new(0.5 + turns, angle / PI)).truncate() * self.strength).as_dvec3()
+    }
+
+    /// What samples it.
+    pub fn table(&self) -> Table {
+        let (width, height) = (self.texture.width, self.texture.height);
+        // An even number of rows: each lies above or below the horizon.
+        let cells = |size: u32, allowed: RangeInclusive<u32>| (size * allowed.start().div_ceil(size)).min(*allowed.end());
+        let (columns, rows) = (cells(width, COLUMNS), cells(height, ROWS).next_multiple_of(2));
+        let texel = |i: i64, j: usize| {
+            let place = j * width as usize + i.rem_euclid(i64::from(width)) as usize;
+            self.texture.texels.at(place).truncate().as_dvec3()
+        };
+        let edge_cosine = |edge: u32| (PI * f64::from(edge) / f64::from(rows)).cos();
+        let cells_of = |row: u32| {
+            let near_rows = near(row, rows, height);
+            let total: f64 = near_rows.iter().map(|(_, share)| share).sum();
+            // The mean of the rows, then of the texels whose tents reach into a cell; and the largest of them.
+            let column = |i: i64| {
+                let of = |sums: (DVec3, f64), &(j, share): &(i64, f64)| {
+                    let value = texel(i, j.clamp(0, i64::from(height) - 1) as usize);
+                    (sums.0 + share / total * value, sums.1.max(value.max_element()))
+                };
+                near_rows.iter().fold((DVec3::ZERO, 0.0), of)
+            };
+            let means: Vec<(DVec3, f64)> = (0..i64::from(width)).map(column).collect();
+            let cell = |of: u32| {
+                let near_columns = near(of, columns, width);
+                let total: f64 = near_columns.iter().map(|(_, share)| share).sum();
+                let add = |sums: (DVec3, f64), &(i, share): &(i64, f64)| {
+                    let (mean, most) = means[i.rem_euclid(i64::from(width)) as usize];
+                    (sums.0 + share / total * mean, sums.1.max(most))
+                };
+                near_columns.iter().fold((DVec3::ZERO, 0.0), add)
+            };
+            (0..columns).map(cell).collect::<Vec<(DVec3, f64)>>()
+        };
+        // By row, so that the cells of all at once need no memory.
+        struct Row {
+            sum: DVec3,
+            squares: f64,
+            words: Vec<u32>,
+            most_over_share: f64,
+            most: f64,
+        }
+        let of_row = |row: u32| {
+            let cells = cells_of(row);
+            let weights: Vec<f64> = cells.iter().map(|(mean, _)| mean.element_sum()).collect();
+            let shares = shares(&weights);
+            let over_share = cells.iter().zip(&shares).map(|((_, most), share)| most / share).fold(0.0, f64::max);
+            Row {
+                sum: cells.iter().map(|(mean, _)| mean).sum(),
+                squares: weights.iter().map(|weight| weight * weight).sum(),
+                words: cumulative(&shares),
+                most_over_share: over_share,
+                most: cells.iter().map(|(_, most)| *most).fold(0.0, f64::max),
+            }
+        };
+        let found: Vec<Row> = (0..rows).into_par_iter().map(of_row).collect();
+        let solid_angle = |row: u32| TAU / f64::from(columns) * (edge_cosine(row) - edge_cosine(row + 1));
+        let row_shares = shares(&found.iter().zip(0..).map(|(of, row)| of.sum.element_sum() * solid_angle(row)).collect::<Vec<_>>());
+        let integral: DVec3 = found.iter().zip(0..).map(|(of, row)| of.sum * solid_angle(row)).sum();
+        let squares: f64 = found.iter().zip(0..).map(|(of, row)| of.squares * solid_angle(row)).sum();
+        let over_density = |((of, share), row): ((&Row, &f64), u32)| of.most_over_share / share * solid_angle(row) / (2.0 * TAU);
+        let most_over_density = found.iter().zip(&row_shares).zip(0..).map(over_density).fold(0.0, f64::max);
+        let edges = (0..=rows).map(|edge| {
+            let half = 0.5 * PI * f64::from(edge.min(rows - edge)) / f64::from(rows);
+            (2.0 * half.sin().powi(2)) as f32
+        });
+        let mut words = cumulative(&row_shares);
+        words.extend(edges.map(f32::to_bits));
+        found.iter().for_each(|of| words.extend(&of.words));
+        // The second moment over the square of the mean: 1 of an even sky, large where a sun stands.
+        let peak = 2.0 * TAU * squares / integral.element_sum().powi(2);
+        Table {
+            columns,
+            rows,
+            words,
+            integral,
+            most_over_density,
+            most: found.iter().map(|of| of.most).fold(0.0, f64::max) as f32,
+            share: if peak.is_finite() { (MOST_BY_TABLE * (1.0 - 1.0 / peak)).max(0.0) } else { 0.0 },
+        }
+    }
+}
+
+/// Texels whose tents reach into cell `of` out of `cells` along a picture of `size`, and how much of them lies there.
+fn near(of: u32, cells: u32, size: u32) -> Vec<(i64, f64)> {
+    let width = f64::from(size) / f64::from(cells);
+    let (from, to) = (f64::from(of) * width, f64::from(of + 1) * width);
+    // Of a tent of area 1 about 0, what lies below a place.
+    let below = |place: f64| {
+        let place = place.clamp(-1.0, 1.0);
+        0.5 + place - 0.5 * place * place.abs()
+    };
+    let share = |texel: i64| {
+        let middle = texel as f64 + 0.5;
+        below(to - middle) - below(from - middle)
+    };
+    let texels = from.floor() as i64 - 1..=to.ceil() as i64;
+    texels.map(|texel| (texel, share(texel))).filter(|(_, share)| *share > 0.0).collect()
+}
+
+/// Whole choices out of 2^24 over 2^24, at least one each, by weight; even where nothing weighs.
+fn shares(weights: &[f64]) -> Vec<f64> {
+    let sum: f64 = weights.iter().sum();
+    let free = CHOICES - weights.len() as f64;
+    let (mut before, mut dealt) = (0.0, 0.0);
+    let of_weight = |(number, weight): (usize, &f64)| {
+        before += if sum > 0.0 { weight / sum } else { 1.0 / weights.len() as f64 };
+        let until = if number + 1 == weights.len() { free } else { (before * free).round().clamp(dealt, free) };
+        let own = until - dealt;
+        dealt = until;
+        (own + 1.0) / CHOICES
+    };
+    weights.iter().enumerate().map(of_weight).collect()
+}
+
+fn cumulative(shares: &[f64]) -> Vec<u32> {
+    let mut before = 0.0;
+    let mut add = |share: &f64| {
+        before += share;
+        (before as f32).to_bits()
+    };
+    shares.iter().map(&mut add).collect()
+}
+
+/// What a Radiance file's lines say that its values were multiplied by; 1 for others.
+fn exposure(path: &Path) -> f32 {
+    let decoder = std::fs::File::open(path).ok().and_then(|file| image::codecs::hdr::HdrDecoder::new(std::io::BufReader::new(file)).ok());
+    decoder.and_then(|decoder| decoder.metadata().exposure).filter(|exposure| exposure.is_normal() && *exposure > 0.0).unwrap_or(1.0)
+}
+
+fn one_line(text: &str) -> String {
+    text.split_whitespace().collect::<Vec<_>>().join(" ")
+}
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+
+    fn sky(width: u32, height: u32, colour: impl Fn(u32, u32) -> Vec3) -> Sky {
+        let colours = (0..height).flat_map(|j| (0..width).map(move |i| (i, j))).map(|(i, j)| colour(i, j)).collect();
+        Sky::of("sky", width, height, colours)
+    }
+
+    #[test]
+    fn the_picture_lies_where_the_guide_says() {
+        let sky = sky(8, 4, |i, j| Vec3::new(i as f32, j as f32, 1.0));
+        let near = |direction: DVec3, expected: DVec3| {
+            let found = sky.radiance(direction.normalize());
+            assert!((found - expected).abs().max_element() < 0.01 * expected.length(), "{direction}: {found}, not {expected}");
+        };
+        near(DVec3::X, DVec3::new(3.5, 1.5, 1.0));
+        near(DVec3::Z, DVec3::new(5.5, 1.5, 1.0));
+        near(DVec3::NEG_Z, DVec3::new(1.5, 1.5, 1.0));
+        near(DVec3::new(1e-9, 1.0, 0.0), DVec3::new(3.5, 0.0, 1.0));
+        near(DVec3::new(1e-9, -1.0, 0.0), DVec3::new(3.5, 3.0, 1.0));
+        // What was seen along +x turns to -z, counter-clockwise from above.
+        let turned = sky.clone().turned(90.0);
+        assert!((turned.radiance(DVec3::NEG_Z) - sky.radiance(DVec3::X)).abs().max_element() < 1e-6);
+    }
+
+    #[test]
+    fn radiances_of_any_size_keep_their_digits() {
+        for scale in [1e-20f32, 1e-3, 1.0, 1e9, 1e30] {
+            let sky = sky(4, 2, |i, _| Vec3::new(1.0, 1e-3, 1.0) * scale * if i == 0 { 1e6 } else { 1.0 });
+            let found = sky.radiance(DVec3::X + 1e-9 * DVec3::Z) / f64::from(scale);
+            assert!((found - DVec3::new(1.0, 1e-3, 1.0)).abs().max_element() < 0.002, "{scale}: {found}");
+        }
+    }
+
+    #[test]
+    fn what_is_no_radiance_is_counted() {
+        let bad = [f32::NAN, f32::INFINITY, -1.0, 2.0];
+        let sky = sky(4, 2, |i, _| Vec3::splat(bad[i as usize]));
+        assert_eq!(sky.warnings.len(), 2, "{:?}", sky.warnings);
+        assert!(sky.warnings[0].starts_with("4 pixels") && sky.warnings[1].starts_with("2 pixels"), "{:?}", sky.warnings);
+        assert!(sky.table().integral.is_finite());
+    }
+
+    /// Every cell that can shine is chosen, shares sum to 1, and the integral is that of the picture.
+    #[test]
+    fn tables_hold_all_light() {
+        for (width, height, bright) in [(1u32, 1u32, 0u32), (2, 1, 1), (7, 5, 17), (64, 32, 1000), (4096, 2048, 5_000_000)] {
+            let sky = sky(width, height, |i, j| if j * width + i == bright { Vec3::new(3.0, 2.0, 1.0) } else { Vec3::ZERO });
+            let table = sky.table();
+            let value = |place: usize| f32::from_bits(table.words[place]);
+            let (rows, columns) = (table.rows as usize, table.columns as usize);
+            assert_eq!(table.words.len(), 2 * rows + 1 + rows * columns);
+            assert_eq!(value(rows - 1), 1.0);
+            assert_eq!(value(2 * rows + columns), 1.0);
+            let row = bright / width;
+            let angle = |row: u32| (PI * f64::from(row) / f64::from(height)).cos();
+            let exact = TAU / f64::from(width) * (angle(row) - angle(row + 1));
+            let found = table.integral.x / 3.0 * f64::from(sky.strength.x);
+            assert!((found / exact - 1.0).abs() < 0.05 || height < 8, "{width} x {height}: {found}, {exact}");
+            assert!(table.most_over_density.is_finite() && table.most_over_density > 0.0);
+        }
+        let dark = sky(16, 8, |_, _| Vec3::ZERO).table();
+        assert_eq!((dark.integral, dark.most_over_density, dark.share), (DVec3::ZERO, 0.0, 0.0));
+        let even = sky(16, 8, |_, _| Vec3::ONE).table();
+        // A texel of 1 is stored as 2^14.
+        assert!(even.share.abs() < 1e-6 && (even.integral.x / 16384.0 / (2.0 * TAU) - 1.0).abs() < 1e-6, "{}", even.integral);
+    }
+
+    #[test]
+    fn shares_are_whole_choices_that_leave_none_out() {
+        let found = shares(&[0.0, 1.0, 1e-30, 3.0]);
+        assert!(found.iter().all(|share| *share >= 1.0 / CHOICES));
+        assert!((found.iter().sum::<f64>() - 1.0).abs() < 1e-12 && (found[3] - 0.75).abs() < 1e-6);
+    }
+}

@@ -1,0 +1,251 @@
+//! What only extensions of glTF bring, and poses of animations.
+
+use std::sync::Arc;
+
+use crate::common::gltf_file::{data_uri, floats};
+use crate::common::prelude::*;
+use crate::common::rich_file::{animated, compressed, draco_square, instanced, ktx2, with_image_light, with_ktx2, with_webp};
+use glam::dvec3;
+use photonmill::scene::Reading;
+use serde_json::{Value, json};
+
+fn open(value: &Value, at: Option<f64>) -> Result<Scene, Error> {
+    let folder = tempfile::tempdir().unwrap();
+    let path = folder.path().join("scene.gltf");
+    std::fs::write(&path, value.to_string()).unwrap();
+    Scene::open_with(path.to_str().unwrap(), Reading { radiometric: false, at }, &mut |_, _| {})
+}
+
+fn assert_refused(value: &Value, at: Option<f64>, words: &[&str]) {
+    let line = open(value, at).map(|_| "was read".to_owned()).unwrap_or_else(|error| error.to_string());
+    assert!(line.lines().count() == 1 && words.iter().all(|word| line.contains(word)), "{words:?}: {line}");
+}
+
+/// Corners of the first square: (1, 2, 3) and twice as large at rest.
+#[test]
+fn nodes_stand_where_the_animation_puts_them() {
+    let corners = |at: Option<f64>| {
+        let scene = open(&animated(), at).unwrap();
+        let corner = |mesh: usize, vertex: usize| scene.meshes[mesh].positions[vertex];
+        (corner(0, 0), corner(0, 1) - corner(0, 0), corner(1, 1) - corner(1, 0))
+    };
+    let half = std::f64::consts::FRAC_1_SQRT_2;
+    let near = |found: DVec3, expected: DVec3| assert!(found.distance(expected) < 1e-3, "{found}, not {expected}");
+    for (at, place, side) in [
+        (None, dvec3(1.0, 2.0, 3.0), dvec3(2.0, 0.0, 0.0)),
+        (Some(-5.0), DVec3::ZERO, dvec3(2.0, 0.0, 0.0)),
+        // Half of its quarter turn, which takes 2 s.
+        (Some(1.0), DVec3::ZERO, dvec3(2.0 * half, 2.0 * half, 0.0)),
+        (Some(1.5), dvec3(5.0, 0.0, 0.0), dvec3(2.0 * (PI * 0.375).cos(), 2.0 * (PI * 0.375).sin(), 0.0)),
+        (Some(3.0), dvec3(10.0, 10.0, 0.0), dvec3(0.0, 2.0, 0.0)),
+        (Some(1e9), dvec3(10.0, 20.0, 0.0), dvec3(0.0, 2.0, 0.0)),
+    ] {
+        let found = corners(at);
+        near(found.0, place);
+        near(found.1, side);
+        // One key is for all times.
+        near(found.2, DVec3::X * if at.is_some() { 5.0 } else { 1.0 });
+    }
+    let warning = open(&animated(), Some(1.0)).unwrap().warnings.join("\n");
+    assert!(warning.contains("animations beside the first") && warning.contains("besides nodes"), "{warning}");
+    assert!(open(&animated(), None).unwrap().warnings.join("\n").contains("--at"));
+}
+
+#[test]
+fn faults_of_animations_are_named() {
+    let mut value = animated();
+    let times = value["animations"][0]["samplers"][0]["input"].as_u64().unwrap() as usize;
+    value["accessors"][times]["count"] = json!(2);
+    assert_refused(&value, Some(1.0), &["animation 'move'", "node 'wall'", "9 numbers for 2 keys"]);
+    assert!(open(&value, None).is_ok(), "an animation that nobody asks for refuses nothing");
+    let mut value = animated();
+    value["animations"][0]["samplers"][0]["input"] = value["animations"][0]["samplers"][1]["output"].clone();
+    assert_refused(&value, Some(1.0), &["animation 'move'", "Scalar"]);
+    let mut value = animated();
+    // Places as times: they run back.
+    let places = value["animations"][0]["samplers"][0]["output"].as_u64().unwrap() as usize;
+    value["accessors"][places] =
+        json!({"bufferView": value["accessors"][places]["bufferView"], "componentType": 5126, "count": 9, "type": "SCALAR"});
+    value["animations"][0]["samplers"][0]["input"] = json!(places);
+    assert_refused(&value, Some(1.0), &["a key at 10 s before one at 0 s", "must rise"]);
+    let mut value = animated();
+    value["animations"][0]["channels"][0]["sampler"] = json!(99);
+    assert_refused(&value, Some(1.0), &["animations[0].channels[0].sampler", "99"]);
+    value.as_object_mut().unwrap().remove("animations");
+    assert_refused(&value, Some(1.0), &["--at", "has none"]);
+    assert!(Scene::open_with("cornell", Reading { radiometric: false, at: Some(0.0) }, &mut |_, _| {}).is_err());
+}
+
+/// The node stands at (1, 2, 3), twice as large.
+#[test]
+fn instances_stand_where_their_attributes_say() {
+    let scene = open(&instanced(), None).unwrap();
+    let corners: Vec<(DVec3, DVec3)> = scene.meshes.iter().map(|mesh| (mesh.positions[0], mesh.positions[2])).collect();
+    let expected = [
+        (dvec3(1.0, 2.0, 3.0), dvec3(5.0, 6.0, 3.0)),
+        (dvec3(11.0, 2.0, 3.0), dvec3(15.0, 6.0, 3.0)),
+        // Half a turn about y.
+        (dvec3(1.0, 16.0, 3.0), dvec3(-3.0, 20.0, 3.0)),
+    ];
+    assert_eq!(corners.len(), 3);
+    for (found, expected) in corners.iter().zip(expected) {
+        assert!(found.0.distance(expected.0) < 1e-5 && found.1.distance(expected.1) < 1e-5, "{found:?}, not {expected:?}");
+    }
+    assert!(scene.warnings.is_empty(), "{:?}", scene.warnings);
+    let mut value = instanced();
+    let scales = value["nodes"][0]["extensions"]["EXT_mesh_gpu_instancing"]["attributes"]["SCALE"].as_u64().unwrap() as usize;
+    value["accessors"][scales]["count"] = json!(2);
+    assert_refused(&value, None, &["node 'wall'", "{2, 3}", "as many"]);
+    value["nodes"][0]["extensions"]["EXT_mesh_gpu_instancing"]["attributes"] = json!({"SCALE": 77});
+    assert_refused(&value, None, &["SCALE", "77"]);
+    value["nodes"][0]["extensions"]["EXT_mesh_gpu_instancing"]["attributes"] = json!({});
+    assert_refused(&value, None, &["node 'wall'", "as many"]);
+}
+
+/// A claim of a billion instances without their numbers is refused, and a hundred thousand are read.
+#[test]
+fn very_many_instances_are_read_or_refused() {
+    let mut value = instanced();
+    let attributes = &value["nodes"][0]["extensions"]["EXT_mesh_gpu_instancing"]["attributes"];
+    let places = attributes["TRANSLATION"].as_u64().unwrap() as usize;
+    value["nodes"][0]["extensions"]["EXT_mesh_gpu_instancing"]["attributes"] = json!({"TRANSLATION": places});
+    value["accessors"][places]["count"] = json!(1_000_000_000);
+    assert_refused(&value, None, &["node 'wall'", "runs past"]);
+    let count = 100_000;
+    let bytes = floats(&(0..3 * count).map(|k| k as f32).collect::<Vec<f32>>());
+    value["accessors"][places]["count"] = json!(count);
+    value["accessors"][places]["bufferView"] = json!(4);
+    value["bufferViews"][4] = json!({"buffer": 1, "byteLength": bytes.len()});
+    let buffer = json!({"byteLength": bytes.len(), "uri": data_uri("application/octet-stream", &bytes)});
+    value["buffers"] = json!([value["buffers"][0], buffer]);
+    assert_eq!(open(&value, None).unwrap().triangle_count(), 2 * count);
+}
+
+#[test]
+fn compressed_views_hold_what_was_compressed() {
+    let plain = open(&crate::common::gltf_file::square(), None).unwrap();
+    for extension in ["EXT_meshopt_compression", "KHR_meshopt_compression"] {
+        let scene = open(&compressed(extension), None).unwrap();
+        assert_eq!(format!("{:?}", scene.meshes), format!("{:?}", plain.meshes));
+        assert!(scene.warnings.is_empty(), "{:?}", scene.warnings);
+    }
+    for (place, new, words) in [
+        ("/bufferViews/0/extensions/EXT_meshopt_compression/byteLength", json!(9), &["compressed buffer view 0", "cannot be decoded"]),
+        ("/bufferViews/0/extensions/EXT_meshopt_compression/byteLength", json!(1 << 20), &["compressed buffer view 0", "runs past"]),
+        ("/bufferViews/0/extensions/EXT_meshopt_compression/count", json!(1u64 << 40), &["compressed buffer view 0", "allowed are"]),
+        ("/bufferViews/0/extensions/EXT_meshopt_compression/byteStride", json!(13), &["compressed buffer view 0", "13 bytes"]),
+        ("/bufferViews/0/extensions/EXT_meshopt_compression/mode", json!("ALL"), &["compressed buffer view 0", "ALL"]),
+        ("/bufferViews/0/extensions/EXT_meshopt_compression/buffer", json!(7), &["compressed buffer view 0", "buffer 7 of 2"]),
+        ("/bufferViews/1/extensions/EXT_meshopt_compression/filter", json!("QUATERNION"), &["compressed buffer view 1", "filter"]),
+    ] {
+        let mut value = compressed("EXT_meshopt_compression");
+        *value.pointer_mut(place).unwrap_or_else(|| panic!("{place}")) = new;
+        assert_refused(&value, None, words);
+    }
+}
+
+#[test]
+fn webp_pictures_are_read() {
+    let scene = open(&with_webp(), None).unwrap();
+    let texture = &scene.textures[scene.materials[0].base_colour_texture.unwrap().texture];
+    assert_eq!([0, 1].map(|texel| texture.texels.at(texel).truncate()), [Vec3::X, Vec3::Y]);
+    assert!(scene.warnings.is_empty(), "{:?}", scene.warnings);
+}
+
+/// Corners of all triangles in the world, however they are numbered.
+fn corners(scene: &Scene) -> Vec<String> {
+    let of = |mesh: &Mesh| {
+        let corner = |vertex: u32| {
+            let vertex = vertex as usize;
+            let uv = mesh.uvs[0].get(vertex).copied().unwrap_or_default();
+            format!("{:.3} {:.3}", mesh.positions[vertex], uv)
+        };
+        let triangle = |triangle: &[u32; 3]| {
+            let mut corners = triangle.map(corner);
+            let first = (0..3).min_by_key(|k| corners[*k].clone()).unwrap();
+            corners.rotate_left(first);
+            corners.join(", ")
+        };
+        mesh.triangles.iter().map(triangle).collect::<Vec<_>>()
+    };
+    let mut all: Vec<String> = scene.meshes.iter().flat_map(of).collect();
+    all.sort();
+    all
+}
+
+#[test]
+fn draco_meshes_hold_what_was_compressed() {
+    let plain = open(&crate::common::gltf_file::square(), None).unwrap();
+    let scene = open(&draco_square(), None).unwrap();
+    assert_eq!(corners(&scene), corners(&plain));
+    assert!(scene.warnings.is_empty(), "{:?}", scene.warnings);
+    let extension = "/meshes/0/primitives/0/extensions/KHR_draco_mesh_compression";
+    for (place, new, words) in [
+        ("bufferView", json!(99), &["mesh 'square', primitive 0", "buffer view 99"]),
+        ("bufferView", json!("none"), &["mesh 'square', primitive 0", "none"]),
+        ("bufferView", json!(1), &["mesh 'square', primitive 0", "Draco stream that cannot be decoded"]),
+        ("attributes/POSITION", json!(77), &["compressed POSITION of the number 77", "not there"]),
+        ("attributes/POSITION", json!(2), &["compressed POSITION of 2 numbers", "VEC3"]),
+    ] {
+        let mut value = draco_square();
+        *value.pointer_mut(&format!("{extension}/{place}")).unwrap_or_else(|| panic!("{place}")) = new;
+        assert_refused(&value, None, words);
+    }
+}
+
+#[test]
+fn ktx2_pictures_are_read() {
+    let scene = open(&with_ktx2(&ktx2(&[[255, 0, 0, 255], [0, 255, 0, 255]])), None).unwrap();
+    let texture = &scene.textures[scene.materials[0].base_colour_texture.unwrap().texture];
+    assert_eq!((texture.width, texture.height), (8, 4));
+    assert_eq!([0, 3, 4, 31].map(|texel| texture.texels.at(texel).truncate()), [Vec3::X, Vec3::X, Vec3::Y, Vec3::Y]);
+    assert!(scene.warnings.is_empty(), "{:?}", scene.warnings);
+    let whole = ktx2(&[[1, 2, 3, 4]]);
+    let mut broken = whole.clone();
+    broken[116] = 1;
+    for bytes in [&whole[..30], &whole[..whole.len() - 3], &broken] {
+        assert_refused(&with_ktx2(bytes), None, &["texture image", "cannot be decoded"]);
+    }
+}
+
+#[test]
+fn skies_of_six_sides_are_read() {
+    let sky = |value: &Value| {
+        let scene = open(value, None).unwrap();
+        assert!(scene.warnings.is_empty(), "{:?}", scene.warnings);
+        let found = scene.lights.iter().find_map(|light| match &light.kind {
+            LightKind::Sky(sky) => Some(Arc::clone(sky)),
+            _ => None,
+        });
+        found.unwrap()
+    };
+    let near = |found: DVec3, expected: DVec3| assert!(found.distance(expected) < 0.02 * expected.length(), "{found}, not {expected}");
+    let axes = [DVec3::X, DVec3::NEG_X, DVec3::Y, DVec3::NEG_Y, DVec3::Z, DVec3::NEG_Z];
+    let plain = sky(&with_image_light());
+    for (place, axis) in axes.iter().enumerate() {
+        near(plain.radiance(*axis), 2.0 * (place as f64 + 1.0) * DVec3::X);
+    }
+    // Upper left texels, by OpenGL's directions.
+    let corners =
+        [dvec3(8., 7., 7.), dvec3(-8., 7., -7.), dvec3(-7., 8., -7.), dvec3(-7., -8., 7.), dvec3(-7., 7., 8.), dvec3(7., 7., -8.)];
+    for corner in corners {
+        let found = plain.radiance(corner.normalize());
+        assert!(found.y > 3.0, "{corner}: {found}");
+    }
+    let mut value = with_image_light();
+    let half = std::f64::consts::FRAC_1_SQRT_2;
+    // A quarter about y takes z to x.
+    value["extensions"]["EXT_lights_image_based"]["lights"][0]["rotation"] = json!([0, half, 0, half]);
+    near(sky(&value).radiance(DVec3::X), 10.0 * DVec3::X);
+    for (place, new, words) in [
+        ("rotation", json!([0, 0, 0, 0]), &["environment 'studio'", "rotation", "length"][..]),
+        ("intensity", json!(-1), &["environment 'studio'", "intensity -1", "0 or more"]),
+        ("specularImages", json!([]), &["environment 'studio'", "no pictures"]),
+        ("specularImages", json!([[0, 1, 2, 3, 4, 99]]), &["environment 'studio'", "picture 99 of 6"]),
+        ("specularImages", json!([[0, 1]]), &["environment 'studio'", "not valid"]),
+    ] {
+        let mut value = with_image_light();
+        value["extensions"]["EXT_lights_image_based"]["lights"][0][place] = new;
+        assert_refused(&value, None, words);
+    }
+}

@@ -1,0 +1,206 @@
+//! Skies from pictures: what they light, against sums over all directions, the path tracer, and photons against rays.
+
+use std::sync::Arc;
+
+use crate::common::estimate_check;
+use crate::common::lit::{BOTH, assert_builders_agree, mean_red, received, red};
+use crate::common::prelude::*;
+use crate::unknown::room_without_floor;
+use glam::dvec3;
+use photonmill::engine::scene::{RunResult, Target, render};
+use photonmill::scene::sky::Sky;
+
+/// A picture of so many pixels by their colours.
+fn sky(width: u32, height: u32, colour: impl Fn(u32, u32) -> Vec3) -> Sky {
+    let colours = (0..height).flat_map(|j| (0..width).map(move |i| (i, j))).map(|(i, j)| colour(i, j)).collect();
+    Sky::of("sky", width, height, colours)
+}
+
+/// Brighter above, blue to one side, with one pixel of a low sun that has two thirds of the light.
+fn sunny(width: u32, sun: f32) -> Sky {
+    let (i_sun, j_sun) = (width * 5 / 8, width / 8);
+    sky(width, width / 2, |i, j| {
+        let (x, y) = (i as f32 / width as f32, 2.0 * j as f32 / width as f32);
+        let sky = Vec3::new(1.0 - 0.8 * y, 0.9 - 0.5 * y, 0.3 + x);
+        if (i, j) == (i_sun, j_sun) { sky + Vec3::new(sun, 0.9 * sun, 0.7 * sun) } else { sky }
+    })
+}
+
+/// Irradiance on a surface with this normal that sees what lies above the horizon of `ground`: a sum over all directions.
+fn irradiance(sky: &Sky, normal: DVec3, ground: DVec3) -> DVec3 {
+    const ROWS: u32 = 1024;
+    let row = |j: u32| {
+        let angle = PI * (f64::from(j) + 0.5) / f64::from(ROWS);
+        let part = |i: u32| {
+            let turn = PI * (f64::from(i) + 0.5) / f64::from(ROWS);
+            let wi = dvec3(angle.sin() * turn.cos(), angle.cos(), angle.sin() * turn.sin());
+            let seen = f64::from(u8::from(wi.dot(ground) > 0.0));
+            seen * wi.dot(normal).max(0.0) * angle.sin() * (PI / f64::from(ROWS)).powi(2) * sky.radiance(wi)
+        };
+        (0..2 * ROWS).map(part).sum::<DVec3>()
+    };
+    (0..ROWS).map(row).sum()
+}
+
+fn floor_under(sky: Sky) -> Scene {
+    scene_of(vec![level(0.0, [4.0, 4.0], true, 0)], vec![matt(0.0)], vec![LightKind::Sky(Arc::new(sky))])
+}
+
+fn settings(illumination: Illumination) -> SceneSettings {
+    SceneSettings { photons: 40_000, rounds: 32, illumination, ..SceneSettings::default() }
+}
+
+/// Colours of the irradiance on surfaces that face all ways, beside a small floor.
+pub fn facing_all_ways(gpu: &Gpu) -> Check<Complaint> {
+    for (width, sun, degrees) in [(2, 0.0, 0.0), (64, 0.0, 30.0), (64, 3000.0, 0.0), (256, 50_000.0, -100.0)] {
+        let sky = sunny(width, sun).turned(degrees);
+        let scene = scene_of(vec![level(-0.5, [1e-3; 2], true, 0)], vec![matt(0.0)], vec![LightKind::Sky(Arc::new(sky.clone()))]);
+        let normals = [DVec3::Y, DVec3::X, DVec3::Z, dvec3(-0.6, 0.0, 0.8), DVec3::NEG_Y];
+        let points = normals.map(|normal| (DVec3::ZERO, normal));
+        let lit = received(gpu, &scene, &settings(Illumination::Split), &points);
+        for (point, normal) in normals.into_iter().enumerate() {
+            let (found, error) = (lit.film.mean(point, &lit.plan), lit.film.standard_error(point, &lit.plan));
+            let exact = irradiance(&sky, normal, normal);
+            for channel in 0..3 {
+                let (found, error, exact) = (found[channel], error[channel], exact[channel]);
+                let what = format!("{width} pixels, sun {sun}, {degrees} degrees, {normal}, channel {channel}");
+                // The sum over directions errs a little about a sun.
+                estimate_check(&what, found, exact, error.hypot(1e-3 * exact))?;
+                if error > 0.1 * exact {
+                    return Err(Complaint::new(Kind::TooNoisy, format!("{what}: {found} +- {error}")));
+                }
+            }
+        }
+    }
+    Ok(())
+}
+
+#[test]
+fn surfaces_that_face_all_ways_are_lit_as_sums_over_the_picture_say() {
+    let Some(gpu) = device() else { return };
+    assert_holds("all ways", facing_all_ways(&gpu));
+}
+
+/// Photons and shadow rays bring the same.
+pub fn photons_and_rays(gpu: &Gpu) -> Check<Complaint> {
+    let sky = sunny(64, 3000.0).turned(20.0);
+    let exact = irradiance(&sky, DVec3::Y, DVec3::Y);
+    let scene = floor_under(sky);
+    let points = [(DVec3::ZERO, DVec3::Y), (dvec3(0.5, 0.0, -0.3), DVec3::Y)];
+    for illumination in BOTH {
+        let lit = received(gpu, &scene, &settings(illumination), &points);
+        for point in 0..points.len() {
+            let (found, error) = red(&lit, point);
+            estimate_check(&format!("{illumination:?}, point {point}"), found, exact.x, error.hypot(1e-3 * exact.x))?;
+            require(error < 0.2 * exact.x, || format!("{found} +- {error}")).map_err(|text| Complaint::new(Kind::TooNoisy, text))?;
+        }
+    }
+    Ok(())
+}
+
+#[test]
+fn photons_of_a_picture_bring_what_rays_bring() {
+    let Some(gpu) = device() else { return };
+    assert_holds("photons and rays", photons_and_rays(&gpu));
+    let points = [(DVec3::ZERO, DVec3::Y)];
+    for illumination in BOTH {
+        assert_builders_agree(&gpu, &floor_under(sunny(64, 3000.0)), &settings(illumination), &points);
+    }
+}
+
+/// An even picture lights as one colour does.
+#[test]
+fn an_even_picture_is_one_colour() {
+    let Some(gpu) = device() else { return };
+    let colour = Vec3::new(0.25, 1.0, 2.0);
+    let found = received(&gpu, &floor_under(sky(16, 8, |_, _| colour)), &settings(Illumination::Split), &[(DVec3::ZERO, DVec3::Y)]);
+    let (mean, error) = (found.film.mean(0, &found.plan), found.film.standard_error(0, &found.plan));
+    for channel in 0..3 {
+        assert_holds("an even sky", z_check("irradiance", mean[channel], PI * f64::from(colour[channel]), error[channel].max(1e-5)));
+    }
+}
+
+/// A scene with a ball of glass, a mirror and layered plates under a picture: each part is what the path tracer finds.
+#[test]
+fn every_part_of_the_light_is_what_the_path_tracer_finds() {
+    let Some(gpu) = device() else { return };
+    let meshes = vec![
+        level(0.0, [4.0, 4.0], true, 0),
+        Mesh::sphere("glass", dvec3(0.0, 0.5, 0.0), 0.4, 32, 1),
+        Mesh::parallelogram("mirror", dvec3(-1.5, 0.0, -1.5), DVec3::X * 3.0, DVec3::Y * 1.5, 2),
+        Mesh::sphere("coat", dvec3(1.0, 0.3, 0.3), 0.3, 24, 3),
+    ];
+    let layered = Material { surface: Surface::Layered, ..matt(0.6) };
+    let scene = scene_of(meshes, vec![matt(0.5), glass(1.5), mirror(0.9), layered], vec![LightKind::Sky(Arc::new(sunny(16, 40.0)))]);
+    let camera = Camera::looking_at("eye", dvec3(0.5, 1.6, 2.8), dvec3(0.0, 0.3, 0.0), DVec3::Y, 0.8);
+    let judge = Judge::new(&scene, 32);
+    let image = judge.image(&camera, 12, 9, 4000, 1);
+    for part in [Part::Direct, Part::Specular, Part::Caustic, Part::Indirect] {
+        let settings = SceneSettings { photons: 60_000, rounds: 64, part, ..SceneSettings::default() };
+        let lit = render(&gpu, &scene, &settings, Target::Picture(&camera, [12, 9])).unwrap();
+        let of = |parts: &photonmill::verify::judge::Parts| match part {
+            Part::Direct => parts.direct.x,
+            Part::Specular => parts.specular.x,
+            Part::Caustic => parts.caustic.x,
+            _ => parts.indirect.x,
+        };
+        let count = image.pixels.len() as f64;
+        let expected = image.pixels.iter().map(|pixel| of(&pixel.mean)).sum::<f64>() / count;
+        let judged = image.pixels.iter().map(|pixel| of(&pixel.standard_error).powi(2)).sum::<f64>().sqrt() / count;
+        let own = (0..image.pixels.len()).map(|pixel| red(&lit, pixel).1.powi(2)).sum::<f64>().sqrt() / count;
+        println!("{part:?}: {} and {expected} +- {judged}, {own}", mean_red(&lit));
+        let what = format!("{part:?}");
+        assert_holds(&what, z_check(&what, mean_red(&lit), expected, own.hypot(judged).hypot(0.005 * expected)));
+        assert!(own.hypot(judged) < 0.1 * expected, "{what}: {expected} +- {judged}, {own}");
+    }
+}
+
+/// A room with a hole of 1 % of its walls.
+fn room_under(sky: Sky) -> Scene {
+    let meshes = [room_without_floor(0.447), vec![level(0.0, [4.0, 4.0], true, 0)]].concat();
+    scene_of(meshes, vec![matt(0.5)], vec![LightKind::Sky(Arc::new(sky))])
+}
+
+/// A sunny sky is aimed at the window, too: the variance is less than a tenth, and the light the path tracer's.
+#[test]
+fn a_sunny_sky_comes_in_through_a_small_window() {
+    let Some(gpu) = device() else { return };
+    let scene = room_under(sunny(32, 300.0));
+    let points: Vec<_> = [-1.5, -0.5, 0.5, 1.5].iter().flat_map(|x| [-1.5, 0.0, 1.5].map(|z| (dvec3(*x, 0.0, z), DVec3::Y))).collect();
+    let judged = Judge::new(&scene, 32).irradiance_at(&points, 40_000, 1);
+    for part in [Part::Direct, Part::Indirect] {
+        let lit = |aim: bool| -> RunResult {
+            let settings = SceneSettings { photons: 20_000, rounds: 32, part, aim, ..SceneSettings::default() };
+            render(&gpu, &scene, &settings, Target::Points(&points)).unwrap()
+        };
+        let [aimed, other] = [true, false].map(lit);
+        let [little, much] = [&aimed, &other].map(|lit| lit.film.relative_error(&lit.plan));
+        println!("{part:?}: {:.2} % and {:.2} %", 100.0 * little, 100.0 * much);
+        assert!((much / little).powi(2) > 10.0, "{part:?}: {little} and {much}");
+        let (mut found, mut expected, mut errors) = (0.0, 0.0, 0.0);
+        for (point, judged) in judged.iter().enumerate() {
+            let (mean, error) = red(&aimed, point);
+            let (judges, judges_error) = match part {
+                Part::Direct => (judged.mean.direct.x, judged.standard_error.direct.x),
+                _ => (judged.mean.indirect.x, judged.standard_error.indirect.x),
+            };
+            (found, expected, errors) = (found + mean, expected + judges, errors + error.hypot(judges_error));
+        }
+        assert_holds(format!("{part:?}"), z_check("all points", found, expected, errors));
+    }
+}
+
+/// A sky that is black, or almost, makes no number that is none.
+#[test]
+fn black_skies_and_single_texels_leave_no_odd_number() {
+    let Some(gpu) = device() else { return };
+    let ball = Mesh::sphere("ball", dvec3(0.0, 0.5, 0.0), 0.4, 16, 1);
+    for (width, height, bright) in [(1, 1, 0), (3, 2, 9), (64, 32, 64 * 20 + 5), (512, 1, 100)] {
+        let picture = sky(width, height, |i, j| if j * width + i == bright { Vec3::splat(1e12) } else { Vec3::ZERO });
+        let mut scene = floor_under(picture);
+        scene.materials.push(glass(1.5));
+        scene.meshes.push(ball.clone());
+        let lit = received(&gpu, &scene, &SceneSettings { rounds: 2, photons: 2000, ..SceneSettings::default() }, &[(DVec3::X, DVec3::Y)]);
+        assert!(lit.film.mean(0, &lit.plan).is_finite(), "{width} x {height}");
+    }
+}
