@@ -254,7 +254,7 @@ struct TriangleColours {
 };
 
 // What layered materials need at a triangle's corners: texture coordinates of the mesh's first and second set; tangents, octahedral, for
-// the normal map and for that of the coat. Bits 0 and 3 of `turned`: their bitangents are -(normal x tangent).
+// normal map and anisotropy, and for the normal map of the coat. Bits 0 and 3 of `turned`: their bitangents are -(normal x tangent).
 struct TriangleLayers {
     vec2 first_a;
     vec2 first_b;
@@ -299,6 +299,9 @@ struct LayeredMaterial {
     // Share of what enters it that is scattered evenly beyond, and its colour.
     float diffuse_transmission;
     vec3 diffuse_transmission_colour;
+    // How much rougher the base is along a direction: 0 to 1, and cosine and sine of what turns the direction from the tangent.
+    float anisotropy;
+    vec2 anisotropy_turn;
     float coat;
     float coat_roughness;
     vec3 sheen_colour;
@@ -814,6 +817,9 @@ struct LobeCase {
     vec3 base_colour;
     float metallic;
     float alpha;
+    uint is_stretched;
+    float alpha_along;
+    vec3 tangent;
     float ior;
     float specular;
     float transmission;

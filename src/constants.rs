@@ -88,7 +88,8 @@ constants! {
     LAYER_DIFFUSE_TRANSMISSION_COLOUR = 11;
     LAYER_IRIDESCENCE = 12;
     LAYER_IRIDESCENCE_THICKNESS = 13;
-    LAYER_COUNT = 14;
+    LAYER_ANISOTROPY = 14;
+    LAYER_COUNT = 15;
     /// What a texel's four bytes are; see `scene::texture::Texels`.
     TEXELS_SRGB = 0;
     TEXELS_SHARED_EXPONENT = 1;

@@ -410,7 +410,7 @@ fn as_gltf(material: &Material) -> Material {
 }
 
 /// The uses of textures that a material has, taken out of it.
-fn take_textures(material: &mut Material) -> [Option<TextureUse>; 16] {
+fn take_textures(material: &mut Material) -> [Option<TextureUse>; 17] {
     let layers = &mut material.layers;
     let one = |map: &mut Option<NormalMap>| map.as_mut().map(|map| std::mem::replace(&mut map.texture, TextureUse::of(0, 0)));
     [
@@ -427,6 +427,7 @@ fn take_textures(material: &mut Material) -> [Option<TextureUse>; 16] {
         layers.sheen_colour_texture.take(),
         layers.diffuse_transmission_texture.take(),
         layers.iridescence_texture.take(),
+        layers.anisotropy_texture.take(),
         layers.film_thickness_texture.take(),
         layers.diffuse_transmission_colour_texture.take(),
         layers.sheen_roughness_texture.take(),
@@ -641,6 +642,9 @@ fn layered_materials_round_trip() {
         metallic: 0.25,
         roughness: 0.3,
         metallic_roughness_texture: used(false),
+        anisotropy: 0.55,
+        anisotropy_rotation: -1.2,
+        anisotropy_texture: used(false),
         ior: 1.1,
         specular: 0.9,
         specular_texture: used(false),
@@ -687,6 +691,7 @@ fn layered_materials_round_trip() {
         Layers { ior: 0.0, ..usual },
         Layers { diffuse_transmission: 0.5, ..usual },
         Layers { iridescence: 0.5, ..usual },
+        Layers { anisotropy: 0.5, ..usual },
         Layers { film_thickness: [0.0, 400.0], ..usual },
         Layers { diffuse_transmission_colour: tinted, ..usual },
         Layers { dispersion: 0.5, transmission: 0.5, medium, ..usual },

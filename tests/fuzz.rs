@@ -76,8 +76,9 @@ fn check_scene(scene: &Scene) {
             assert!(has_one_each(count, vertices), "{name}: {count} of {vertices}");
         }
         assert!(mesh.alphas.iter().all(|alpha| (0.0..=1.0).contains(alpha)), "{name}: alphas");
-        for (map, tangents) in [(material.normal_map, &mesh.tangents), (material.layers.coat_normal_map, &mesh.coat_tangents)] {
-            assert_eq!(tangents.len(), if map.is_some() { mesh.triangles.len() } else { 0 }, "{name}");
+        let (needed, needed_by_coat) = (material.tangent_coordinates().is_some(), material.layers.coat_normal_map.is_some());
+        for (is_needed, tangents) in [(needed, &mesh.tangents), (needed_by_coat, &mesh.coat_tangents)] {
+            assert_eq!(tangents.len(), if is_needed { mesh.triangles.len() } else { 0 }, "{name}");
             let is_unit = |tangent: &DVec4| tangent.truncate().is_normalized() && tangent.w.abs() == 1.0;
             assert!(tangents.as_flattened().iter().all(is_unit), "{name}: tangents");
         }
@@ -91,6 +92,7 @@ fn check_scene(scene: &Scene) {
             layers.transmission,
             layers.diffuse_transmission,
             layers.iridescence,
+            layers.anisotropy,
             layers.coat,
         ];
         let more = [layers.coat_roughness, layers.sheen_roughness].into_iter().chain(base_colour.to_array());
@@ -176,6 +178,8 @@ fn square_with(coordinates: [f32; 8]) -> Value {
     glow["extensions"]["KHR_materials_clearcoat"] = json!({"clearcoatFactor": 0.5, "clearcoatNormalTexture": {"index": 0}});
     glow["extensions"]["KHR_materials_iridescence"] = json!({"iridescenceFactor": 1, "iridescenceIor": 1,
         "iridescenceThicknessMinimum": 0, "iridescenceThicknessMaximum": 1e30, "iridescenceThicknessTexture": {"index": 0}});
+    glow["extensions"]["KHR_materials_anisotropy"] =
+        json!({"anisotropyStrength": 1, "anisotropyRotation": 1e3, "anisotropyTexture": {"index": 0}});
     glow["extensions"]["KHR_materials_diffuse_transmission"] =
         json!({"diffuseTransmissionFactor": 1, "diffuseTransmissionColorTexture": {"index": 0}});
     glow["extensions"]["KHR_materials_sheen"] = json!({"sheenColorFactor": [1, 0, 0.5], "sheenRoughnessTexture": turned});

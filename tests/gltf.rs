@@ -99,12 +99,11 @@ fn what_is_left_out_is_named_once() {
     let mut value = square();
     with_image(&mut value, &data_uri("image/png", &encoded(&RgbImage::new(1, 1), ImageFormat::Png)));
     value["materials"][0]["occlusionTexture"] = json!({"index": 0});
-    let anisotropy =
-        json!({"KHR_materials_anisotropy": {"anisotropyStrength": 1}, "KHR_materials_volume": {"thicknessTexture": {"index": 0}}});
-    value["materials"].as_array_mut().unwrap().push(json!({"occlusionTexture": {"index": 0}, "extensions": anisotropy}));
+    let extensions = json!({"EXT_materials_fur": {"length": 1}, "KHR_materials_volume": {"thicknessTexture": {"index": 0}}});
+    value["materials"].as_array_mut().unwrap().push(json!({"occlusionTexture": {"index": 0}, "extensions": extensions}));
     use_material(&mut value, 1);
     value["animations"] = json!([{"channels": [], "samplers": []}]);
-    value["extensionsUsed"].as_array_mut().unwrap().extend([json!("KHR_materials_anisotropy"), json!("EXT_unheard_of")]);
+    value["extensionsUsed"].as_array_mut().unwrap().extend([json!("EXT_materials_fur"), json!("EXT_unheard_of")]);
     value["cameras"][0] = json!({"type": "orthographic", "orthographic": {"xmag": 0, "ymag": 1, "zfar": 9, "znear": 0.1}});
     value["meshes"][0]["primitives"][0]["attributes"]["COLOR_1"] = json!(1);
     let scene = load(&value).unwrap();
@@ -113,7 +112,7 @@ fn what_is_left_out_is_named_once() {
         "occlusion textures (what they guess is computed): material 'glow', material 'material 1'",
         "thickness textures (rays measure the thickness): material 'material 1'",
         "animations",
-        "the extension KHR_materials_anisotropy: material 'material 1'",
+        "the extension EXT_materials_fur: material 'material 1'",
         "the extension EXT_unheard_of",
         "an orthographic camera of 0 by 1 metres: camera 'eye'",
         "second sets of vertex colours: mesh 'wall'",
@@ -511,17 +510,15 @@ fn morph_targets_shift_vertices_by_their_weights_at_rest() {
     assert_refused(&value, &["mesh 'wall'", "3 positions in a morph target for 4 vertices"]);
 }
 
-/// A surface without its grain is a surface still.
+/// The materials that the file shows by itself are read.
 #[test]
-fn what_a_file_needs_for_looks_alone_is_left_out_by_name() {
+fn variants_of_materials_are_left_out_by_name() {
     let mut value = square();
-    for extension in ["KHR_materials_anisotropy", "KHR_materials_variants"] {
-        value["extensionsUsed"].as_array_mut().unwrap().push(json!(extension));
-    }
-    value["extensionsRequired"] = json!(["KHR_materials_anisotropy"]);
+    value["extensionsUsed"].as_array_mut().unwrap().push(json!("KHR_materials_variants"));
+    value["extensionsRequired"] = json!(["KHR_materials_variants"]);
     let scene = load(&value).unwrap();
     let [warning] = &scene.warnings[..] else { panic!("{:?}", scene.warnings) };
-    assert!(warning.contains("the extension KHR_materials_anisotropy; the extension KHR_materials_variants"), "{warning}");
+    assert!(warning.contains("the extension KHR_materials_variants"), "{warning}");
 }
 
 /// Integers stand for themselves, or for parts of their range.
@@ -855,8 +852,8 @@ fn rgba_png(width: u32, height: u32, of: impl Fn(u32, u32) -> [u8; 4]) -> String
 /// The square with one material, textures 0 to 15 of one picture each, and no warning of extensions.
 fn with_material(material: Value) -> Value {
     let mut value = square();
-    value["images"] = (0..16u8).map(|k| json!({"uri": rgba_png(1, 1, |_, _| [k, 2 * k, 3 * k, 200])})).collect();
-    value["textures"] = (0..16).map(|k| json!({"source": k})).collect();
+    value["images"] = (0..17u8).map(|k| json!({"uri": rgba_png(1, 1, |_, _| [k, 2 * k, 3 * k, 200])})).collect();
+    value["textures"] = (0..17).map(|k| json!({"source": k})).collect();
     value["materials"] = json!([material]);
     value["extensionsUsed"] = json!(["KHR_lights_punctual"]);
     value
@@ -876,6 +873,7 @@ fn everything_of_a_material_is_read() {
             "KHR_materials_emissive_strength": {"emissiveStrength": 4},
             "KHR_materials_ior": {"ior": 1.25},
             "KHR_materials_dispersion": {"dispersion": 2.5},
+            "KHR_materials_anisotropy": {"anisotropyStrength": 0.25, "anisotropyRotation": -1.5, "anisotropyTexture": texture(16)},
             "KHR_materials_iridescence": {"iridescenceFactor": 0.5, "iridescenceTexture": texture(14), "iridescenceIor": 1.75,
                 "iridescenceThicknessMinimum": 50, "iridescenceThicknessMaximum": 650, "iridescenceThicknessTexture": texture(15)},
             "KHR_materials_diffuse_transmission": {"diffuseTransmissionFactor": 0.75, "diffuseTransmissionTexture": texture(12),
@@ -895,6 +893,8 @@ fn everything_of_a_material_is_read() {
     let [hole, warning] = &without.warnings[..] else { panic!("{:?}", without.warnings) };
     assert!(hole.starts_with("solids with holes (mesh 'wall')"), "{hole}");
     assert!(warning.contains("normal maps on meshes without texture coordinates: material 'all' on mesh 'wall'"), "{warning}");
+    let stretched = "anisotropy on meshes without tangents and texture coordinates: material 'all' on mesh 'wall'";
+    assert!(warning.contains(stretched), "{warning}");
     assert!(warning.contains("(its textures have their value at 0 0): material 'all' on mesh 'wall'"), "{warning}");
     // Another one has.
     use_material(&mut value, 0);
@@ -928,11 +928,13 @@ fn everything_of_a_material_is_read() {
     used(layers.sheen_roughness_texture, 11, false);
     used(layers.iridescence_texture, 14, false);
     used(layers.film_thickness_texture, 15, false);
+    used(layers.anisotropy_texture, 16, false);
+    assert_eq!((layers.anisotropy, layers.anisotropy_rotation), (0.25, -1.5));
     assert_eq!((layers.iridescence, layers.film_ior, layers.film_thickness), (0.5, 1.75, [50.0, 650.0]));
     used(layers.diffuse_transmission_texture, 12, false);
     used(layers.diffuse_transmission_colour_texture, 13, true);
     assert_eq!((layers.diffuse_transmission, layers.diffuse_transmission_colour), (0.75, Vec3::new(1.0, 0.25, 0.5)));
-    assert_eq!((scene.textures.len(), material.textures().count()), (16, 16));
+    assert_eq!((scene.textures.len(), material.textures().count()), (17, 17));
 
     assert_eq!((material.surface, material.two_sided, material.coverage), (Surface::Layered, true, Coverage::Blend { alpha: 0.75 }));
     assert_eq!((material.base_colour, material.emission), (Vec3::new(0.125, 0.25, 0.5), Vec3::new(2.0, 1.0, 4.0)));
@@ -945,7 +947,7 @@ fn everything_of_a_material_is_read() {
 
     // What this mesh has no coordinates for is taken from its own copy of the material alone.
     let own = &scene.materials[scene.meshes[0].material];
-    let without = Material { normal_map: None, layers: Layers { coat_normal_map: None, ..layers }, ..material.clone() };
+    let without = Material { normal_map: None, layers: Layers { coat_normal_map: None, anisotropy: 0.0, ..layers }, ..material.clone() };
     assert_eq!(*own, without);
 }
 
@@ -954,7 +956,18 @@ fn everything_of_a_material_is_read() {
 fn materials_that_say_nothing_have_the_defaults() {
     let scene = load(&with_material(json!({"name": "plain"}))).unwrap();
     assert_eq!(scene.materials[0], Material::layered("plain", Vec3::ONE, Layers::default()));
-    let empty = ["volume", "specular", "clearcoat", "sheen", "ior", "transmission", "dispersion", "diffuse_transmission", "iridescence"];
+    let empty = [
+        "volume",
+        "specular",
+        "clearcoat",
+        "sheen",
+        "ior",
+        "transmission",
+        "dispersion",
+        "diffuse_transmission",
+        "iridescence",
+        "anisotropy",
+    ];
     let empty: serde_json::Map<String, Value> = empty.iter().map(|name| (format!("KHR_materials_{name}"), json!({}))).collect();
     let scene = load(&with_material(json!({"name": "empty", "extensions": empty}))).unwrap();
     assert_eq!(scene.materials[0], Material::layered("empty", Vec3::ONE, Layers::default()));
@@ -1053,6 +1066,7 @@ fn specular_and_glossiness_stand_alone() {
         ("dispersion", json!({"dispersion": 1})),
         ("ior", json!({"ior": 2})),
         ("iridescence", json!({"iridescenceFactor": 1})),
+        ("anisotropy", json!({"anisotropyStrength": 1})),
         ("sheen", json!({"sheenColorFactor": [1, 1, 1]})),
         ("specular", json!({"specularFactor": 0})),
         ("transmission", json!({"transmissionFactor": 1})),
@@ -1158,7 +1172,7 @@ fn factors_out_of_range_are_refused() {
         (with("clearcoat", "clearcoatFactor", json!(2)), &["clear coat factor 2", "from 0 to 1"]),
         (with("clearcoat", "clearcoatRoughnessFactor", json!(2)), &["clear coat roughness 2", "from 0 to 1"]),
         (with("clearcoat", "clearcoatFactor", json!("much")), &["KHR_materials_clearcoat that cannot be read", "much"]),
-        (with("clearcoat", "clearcoatTexture", json!({"index": 99})), &["texture 99 of 16"]),
+        (with("clearcoat", "clearcoatTexture", json!({"index": 99})), &["texture 99 of 17"]),
         (with("clearcoat", "clearcoatNormalTexture", json!({"index": 0, "scale": 1e9})), &["normal scale 1e9", "within 1e6"]),
         (with("sheen", "sheenColorFactor", json!([0, 0, 2])), &["sheen colour 0 0 2", "from 0 to 1"]),
         (with("diffuse_transmission", "diffuseTransmissionFactor", json!(2)), &["diffuse transmission factor 2", "from 0 to 1"]),
@@ -1166,6 +1180,8 @@ fn factors_out_of_range_are_refused() {
             with("diffuse_transmission", "diffuseTransmissionColorFactor", json!([0, 2, 0])),
             &["diffuse transmission colour 0 2 0", "from 0 to 1"],
         ),
+        (with("anisotropy", "anisotropyStrength", json!(-0.5)), &["anisotropy strength -0.5", "from 0 to 1"]),
+        (with("anisotropy", "anisotropyRotation", json!(1e9)), &["anisotropy rotation 1e9", "within 1e6"]),
         (with("iridescence", "iridescenceFactor", json!(2)), &["iridescence factor 2", "from 0 to 1"]),
         (with("iridescence", "iridescenceIor", json!(0.5)), &["film of the index of refraction 0.5", "from 1 to 100"]),
         (with("iridescence", "iridescenceThicknessMaximum", json!(-1)), &["thickness of its film -1", "0 or more and finite"]),

@@ -80,6 +80,10 @@ fn materials_are_described_in_words() {
             "dielectric, ior 1.5, roughness 1, diffuse transmission 0.5 of colour 1 (texture 'wood')",
         ),
         (
+            with("anisotropy", json!({"anisotropyStrength": 0.5, "anisotropyRotation": 1.5707964, "anisotropyTexture": texture})),
+            "dielectric, ior 1.5, roughness 1, anisotropy 0.5 (texture 'wood') turned by 90 degrees",
+        ),
+        (
             with("iridescence", json!({"iridescenceFactor": 0.5, "iridescenceThicknessTexture": texture})),
             "dielectric, ior 1.5, roughness 1, iridescence 0.5, a film of 100 to 400 nm (texture 'wood') and ior 1.3",
         ),
@@ -149,7 +153,7 @@ fn a_file_is_described_as_text_and_as_json() {
     let place = Place::new();
     let mut value = square_with(&json!([
         {"name": "floor", "pbrMetallicRoughness": {"baseColorTexture": {"index": 0}, "metallicRoughnessTexture": {"index": 0}}},
-        {"name": "brushed", "extensions": {"KHR_materials_anisotropy": {}}}
+        {"name": "brushed", "extensions": {"EXT_materials_fur": {}}}
     ]));
     // Its indices are the zeros that the first position has.
     value["meshes"][0]["primitives"][1]["indices"] = json!(4);
@@ -175,7 +179,7 @@ cameras
     eye
 warnings
     1 triangle without area left out (mesh 'wall')
-    ignored: the extension KHR_materials_anisotropy: material 'brushed'
+    ignored: the extension EXT_materials_fur: material 'brushed'
 ";
     assert_eq!(stdout, expected);
 

@@ -552,6 +552,7 @@ fn lamps_of_all_sizes_light_lobes_of_all_widths() {
                 base_colour: COLOUR.as_dvec3(),
                 metalness: 1.0,
                 alpha,
+                stretch: None,
                 ior: 1.5,
                 specular: 1.0,
                 specular_colour: DVec3::ONE,

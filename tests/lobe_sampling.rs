@@ -55,6 +55,12 @@ fn pane(alpha: f32, cosine: f64) -> LobeCase {
     LobeCase { transmission: 1.0, ..plastic(alpha, cosine) }
 }
 
+/// The same with anisotropy, along a direction that is neither towards the eye nor across.
+fn stretched(strength: f32, case: LobeCase) -> LobeCase {
+    let tangent = (frame(AXIS, DVec3::X) * DVec3::new(0.96, -0.28, 0.0)).normalize().as_vec3();
+    LobeCase { is_stretched: 1, alpha_along: case.alpha + strength * strength * (1.0 - case.alpha), tangent, ..case }
+}
+
 /// A lobe by itself.
 struct Subject {
     what: &'static str,
@@ -63,7 +69,7 @@ struct Subject {
     case: fn(f32, f64) -> LobeCase,
 }
 
-const SUBJECTS: [Subject; 6] = [
+const SUBJECTS: [Subject; 8] = [
     Subject {
         what: "reflection of a metal",
         kind: Kind::Reflection,
@@ -97,6 +103,18 @@ const SUBJECTS: [Subject; 6] = [
         cosines: &COSINES,
         case: |alpha, cosine| LobeCase { is_solid: 1, eta: 1.5, ..pane(alpha, cosine) },
     },
+    Subject {
+        what: "reflection of an anisotropic metal",
+        kind: Kind::Reflection,
+        cosines: &COSINES,
+        case: |alpha, cosine| LobeCase { metallic: 1.0, ..stretched(0.7, plastic(alpha, cosine)) },
+    },
+    Subject {
+        what: "refraction into anisotropic glass",
+        kind: Kind::Transmission,
+        cosines: &COSINES,
+        case: |alpha, cosine| LobeCase { is_solid: 1, eta: 1.0 / 1.5, ..stretched(0.4, pane(alpha, cosine)) },
+    },
 ];
 
 fn unit(v: Vec3) -> DVec3 {
@@ -114,6 +132,7 @@ fn judged(case: &LobeCase) -> Lobes {
         base_colour: case.base_colour.as_dvec3(),
         metalness: case.metallic.into(),
         alpha: case.alpha.into(),
+        stretch: (case.is_stretched != 0).then(|| (unit(case.tangent), case.alpha_along.into())),
         ior: case.ior.into(),
         specular: case.specular.into(),
         specular_colour: DVec3::ONE,
@@ -144,15 +163,18 @@ fn sharpened(w: Vec3) -> DVec3 {
     w
 }
 
-/// A lobe of GGX as the half vectors see it. Their place is (psi / (pi / 2), azimuth) with tan(angle) = alpha tan(psi): lobes of every
-/// width are equally wide there.
+/// A lobe of GGX as the half vectors see it. Their place is (psi / (pi / 2), azimuth), with their slopes over alpha in polar coordinates
+/// (tan(psi), azimuth): lobes of every width are equally wide there.
 struct Facets<'a> {
     lobes: &'a Lobes,
     kind: Kind,
     wo: DVec3,
     n: DVec3,
     frame: DMat3,
+    /// The lesser one.
     alpha: f64,
+    /// Along the frame's first axis and its second.
+    alphas: DVec2,
     /// Index on this side over the other one, where light is refracted.
     eta: Option<f64>,
 }
@@ -162,7 +184,12 @@ impl Facets<'_> {
         let (n, alpha) = if kind == Kind::Coat { (case.coat_normal, case.coat_alpha) } else { (case.ns, case.alpha) };
         let (wo, n) = (unit(case.wo), unit(n));
         let is_refracted = kind == Kind::Transmission && case.is_solid != 0;
-        Facets { lobes, kind, wo, n, frame: frame(n, wo), alpha: alpha.into(), eta: is_refracted.then(|| case.eta.into()) }
+        let (alpha, eta) = (f64::from(alpha), is_refracted.then(|| case.eta.into()));
+        let (frame, along) = match case.is_stretched != 0 && kind != Kind::Coat {
+            true => (frame(n, unit(case.tangent)), case.alpha_along.into()),
+            false => (frame(n, wo), alpha),
+        };
+        Facets { lobes, kind, wo, n, frame, alpha, alphas: DVec2::new(along, alpha), eta }
     }
 
     /// Of any length.
@@ -179,7 +206,8 @@ impl Facets<'_> {
 
     fn place(&self, wi: DVec3) -> (f64, f64) {
         let h = self.frame.transpose() * self.half(wi);
-        (h.truncate().length().atan2(self.alpha * h.z) / FRAC_PI_2, h.y.atan2(h.x))
+        let scaled = h.truncate() / self.alphas;
+        (scaled.length().atan2(h.z) / FRAC_PI_2, scaled.to_angle())
     }
 
     /// Where a half vector sends light, and the solid angle there over its own.
@@ -205,10 +233,9 @@ impl Facets<'_> {
     /// The judge's density, per area of places.
     fn density(&self, x: f64, azimuth: f64) -> f64 {
         let (psi_sin, psi_cos) = (FRAC_PI_2 * x).sin_cos();
-        let slope = self.alpha * psi_sin / psi_cos;
-        let cos = 1.0 / (1.0 + slope * slope).sqrt();
-        let local = cos * DVec3::new(slope * azimuth.cos(), slope * azimuth.sin(), 1.0);
-        let solid_angle = slope * cos.powi(3) * self.alpha / (psi_cos * psi_cos) * FRAC_PI_2;
+        let slope = psi_sin / psi_cos;
+        let local = (slope * self.alphas * DVec2::from_angle(azimuth)).extend(1.0).normalize();
+        let solid_angle = slope * local.z.powi(3) * self.alphas.element_product() / (psi_cos * psi_cos) * FRAC_PI_2;
         self.lit(self.frame * local).map_or(0.0, |(wi, spread)| self.lobes.density(self.kind, wi) * spread * solid_angle)
     }
 
@@ -350,6 +377,7 @@ fn ask(gpu: &Gpu, math: Math, passing: bool, cases: &[LobeCase], samples: usize)
         .set("HAS_SHEEN", 1)
         .set("HAS_DIFFUSE_TRANSMISSION", 1)
         .set("HAS_IRIDESCENCE", 1)
+        .set("HAS_ANISOTROPY", 1)
         .set("HAS_PASSING", u32::from(passing));
     let commands = &mut Commands::new(gpu, constants, Instant::now()).unwrap();
     fn one<T: bytemuck::Pod>(gpu: &Gpu) -> photonmill::gpu::Buffer<T> {
@@ -441,7 +469,7 @@ fn tilted(normal: Vec3, aside: Vec3) -> Vec3 {
 }
 
 /// Surfaces of many lobes.
-fn mixtures() -> [(&'static str, LobeCase); 3] {
+fn mixtures() -> [(&'static str, LobeCase); 4] {
     let sheen = Vec3::new(0.3, 0.25, 0.1);
     let all = LobeCase {
         coat: 0.7,
@@ -458,6 +486,7 @@ fn mixtures() -> [(&'static str, LobeCase); 3] {
     [
         ("a thin wall of all lobes", LobeCase { ng: tilted(all.ng, Vec3::X), coat_normal: tilted(all.ns, Vec3::Z), ..all }),
         ("matt lobes", LobeCase { alpha: 0.5, coat_alpha: 0.4, transmission: 0.0, sheen_alpha: 0.1, coverage: 0.2, ..all }),
+        ("anisotropic plastic", stretched(0.6, LobeCase { metallic: 0.2, coat: 0.3, coat_alpha: 0.3, ..plastic(0.3, 0.6) })),
         (
             "coated glass",
             LobeCase { is_solid: 1, eta: 1.0 / 1.5, transmission: 0.8, coat: 0.4, sheen: Vec3::ZERO, coverage: 1.0, ..plastic(0.3, 0.8) },
@@ -552,7 +581,31 @@ struct Fault {
 
 const SAMPLING: &str = "material/layered_sampling.glsl";
 
-const FAULTS: [Fault; 9] = [
+const FAULTS: [Fault; 12] = [
+    Fault {
+        what: "facets of a stretch 2 % too large",
+        file: "material/ggx.glsl",
+        from: "alpha.x = facets.is_stretched ? facets.alpha_along : facets.alpha;",
+        to: "alpha.x = facets.is_stretched ? 1.02 * facets.alpha_along : facets.alpha;",
+        subject: Some(6),
+        noticed: "chi-square",
+    },
+    Fault {
+        what: "stretched facets that shadow as even ones",
+        file: "material/ggx.glsl",
+        from: "return sqrt(dot(beside, beside) + cosine * cosine);",
+        to: "return ggx_root(facets.alpha, cosine);",
+        subject: Some(6),
+        noticed: "weights are off",
+    },
+    Fault {
+        what: "a density of stretched facets along the wrong axis",
+        file: "material/ggx.glsl",
+        from: "ratio * h.x * h.x + divide(h.y * h.y, ratio)",
+        to: "ratio * h.y * h.y + divide(h.x * h.x, ratio)",
+        subject: Some(7),
+        noticed: "densities are off",
+    },
     Fault {
         what: "facets of an alpha 2 % too large",
         file: "material/ggx.glsl",
@@ -572,8 +625,8 @@ const FAULTS: [Fault; 9] = [
     Fault {
         what: "a weight with the masking of an alpha 1 % too large",
         file: SAMPLING,
-        from: "4.0 * ggx_visibility(alpha,",
-        to: "4.0 * ggx_visibility(1.01 * alpha,",
+        from: "4.0 * facet_visibility(facets,",
+        to: "4.0 * facet_visibility(even_facets(facets.n, 1.01 * facets.alpha),",
         subject: Some(1),
         noticed: "weights are off",
     },
@@ -604,8 +657,8 @@ const FAULTS: [Fault; 9] = [
     Fault {
         what: "a BTDF without the squared index",
         file: "material/layered_lobes.glsl",
-        from: "return Weighed(eta * eta * both",
-        to: "return Weighed(both",
+        from: "float value = eta * eta * both",
+        to: "float value = both",
         subject: Some(4),
         noticed: "the BRDF is off",
     },

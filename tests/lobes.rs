@@ -15,6 +15,7 @@ fn plastic(roughness: f64) -> Inputs {
         base_colour: DVec3::ONE,
         metalness: 0.0,
         alpha: roughness * roughness,
+        stretch: None,
         ior: 1.5,
         specular: 1.0,
         specular_colour: DVec3::ONE,
@@ -50,6 +51,7 @@ fn wo(cosine: f64) -> DVec3 {
     DVec3::new((1.0 - cosine * cosine).sqrt(), 0.0, cosine)
 }
 
+#[expect(clippy::large_types_passed_by_value, reason = "the lobes keep it")]
 fn lobes(inputs: Inputs, wo: DVec3) -> Lobes {
     Lobes::new(inputs, Frame { wo, ng: DVec3::Z, n: DVec3::Z, coat_n: DVec3::Z })
 }

@@ -4,6 +4,7 @@
 mod common;
 
 mod aim;
+mod anisotropy;
 mod architecture;
 mod bake;
 mod bench;

@@ -250,6 +250,7 @@ fn layered_scene() -> Scene {
         grey(glass),
         grey(Layers { diffuse_transmission: 1.0, specular: 0.0, ..plastic }),
         Material::layered("plate", Vec3::ZERO, Layers { iridescence: 1.0, film_ior: 2.0, film_thickness: [0.0, 300.0], ..plastic }),
+        Material::layered("plate", Vec3::ONE, Layers { metallic: 1.0, roughness: 0.2, anisotropy: 1.0, ..plastic }),
         grey(Layers { ior: 1.5, dispersion: 20.0, medium: Some(Medium::CLEAR), ..glass }),
     ];
     for (place, material) in materials.into_iter().enumerate() {
@@ -262,7 +263,7 @@ fn layered_scene() -> Scene {
         let plate = Mesh::parallelogram("plate", corner, DVec3::X * size, DVec3::Y * size, number);
         let behind = Mesh::parallelogram("plate", corner - DVec3::Z * 0.3, DVec3::Y * size, DVec3::X * size + tilt, number);
         let tangents = vec![[DVec4::new(1.0, 0.0, 0.0, 1.0); 3]; 2];
-        scene.meshes.push(Mesh { tangents: if material.normal_map.is_some() { tangents } else { Vec::new() }, ..plate });
+        scene.meshes.push(Mesh { tangents: if material.tangent_coordinates().is_some() { tangents } else { Vec::new() }, ..plate });
         // The back of the slab.
         scene.meshes.extend(material.enclosed_medium().map(|_| behind));
         scene.materials.push(material);
@@ -280,6 +281,7 @@ fn part_that_shows(effect: Effect) -> Part {
         | Effect::SmoothNormals
         | Effect::Environment
         | Effect::Transmission
+        | Effect::Anisotropy
         | Effect::Media
         | Effect::Dispersion => Part::Specular,
         Effect::Indirect => Part::Indirect,
@@ -296,11 +298,12 @@ fn an_effect_that_the_scene_needs_is_missed_when_it_is_left_out() {
     effects_are_missed(&gpu, &layered_scene(), &of_layers);
 }
 
-const OF_LAYERS: [Effect; 10] = [
+const OF_LAYERS: [Effect; 11] = [
     Effect::Layers,
     Effect::Transmission,
     Effect::DiffuseTransmission,
     Effect::Iridescence,
+    Effect::Anisotropy,
     Effect::Media,
     Effect::Dispersion,
     Effect::ClearCoat,

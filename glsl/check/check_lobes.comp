@@ -31,7 +31,7 @@ Surface surface_of(LobeCase at)
     surface.parameter = 0.0;
     surface.base_colour = at.base_colour;
     surface.emission = vec3(0.0);
-    surface.layers = Layers(at.metallic, at.alpha, at.ior, 0.0, at.specular, vec3(1.0), at.transmission, at.is_solid != 0, 0,
+    surface.layers = Layers(at.metallic, at.alpha, at.is_stretched != 0, at.alpha_along, at.tangent, at.ior, 0.0, at.specular, vec3(1.0), at.transmission, at.is_solid != 0, 0,
                             at.diffuse_transmission, at.diffuse_transmission_colour, at.iridescence, at.film_ior, at.film_thickness, at.film_bound,
                             at.coat, at.coat_alpha, at.coat_normal, at.sheen,
                             at.sheen_alpha, at.coverage, false);

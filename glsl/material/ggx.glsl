@@ -1,5 +1,19 @@
 // GGX with correlated Smith masking (Heitz 2014), in frames whose z is the normal. Cosines are above 0.
 
+// Microfacets about a normal. Stretched ones are rougher along a tangent than across it (Burley 2012, section 5.4).
+struct Facets {
+    vec3 n;
+    float alpha;
+    bool is_stretched;
+    float alpha_along;
+    vec3 tangent;
+};
+
+Facets even_facets(vec3 n, float alpha)
+{
+    return Facets(n, alpha, false, alpha, vec3(0.0));
+}
+
 vec3 to_local(vec3 w, vec3 n)
 {
     vec3 tangent = to_frame(vec3(1.0, 0.0, 0.0), n), bitangent = to_frame(vec3(0.0, 1.0, 0.0), n);
@@ -31,15 +45,69 @@ float ggx_visibility(float alpha, float cos_l, float cos_v)
     return divide(0.5, cos_l * ggx_root(alpha, cos_v) + cos_v * ggx_root(alpha, cos_l));
 }
 
-// Masking of one direction over its cosine.
-float ggx_masking(float alpha, float cosine)
+vec3 to_facets(Facets facets, vec3 w)
 {
-    return divide(2.0, cosine + ggx_root(alpha, cosine));
+    if (HAS_ANISOTROPY) {
+        if (facets.is_stretched) {
+            return vec3(dot(w, facets.tangent), dot(w, cross(facets.n, facets.tangent)), dot(w, facets.n));
+        }
+    }
+    return to_local(w, facets.n);
+}
+
+vec3 from_facets(Facets facets, vec3 local)
+{
+    if (HAS_ANISOTROPY) {
+        if (facets.is_stretched) {
+            return local.x * facets.tangent + local.y * cross(facets.n, facets.tangent) + local.z * facets.n;
+        }
+    }
+    return to_frame(local, facets.n);
+}
+
+// D of a local normal, 1/sr.
+float facet_density(Facets facets, vec3 h)
+{
+    if (HAS_ANISOTROPY) {
+        if (facets.is_stretched) {
+            float product = facets.alpha * facets.alpha_along, ratio = divide(facets.alpha, facets.alpha_along);
+            float spread = ratio * h.x * h.x + divide(h.y * h.y, ratio) + product * h.z * h.z;
+            return divide(product, 3.14159265358979324 * spread * spread);
+        }
+    }
+    return ggx_density(h, facets.alpha);
+}
+
+float facet_root(Facets facets, vec3 w, float cosine)
+{
+    if (HAS_ANISOTROPY) {
+        if (facets.is_stretched) {
+            vec2 beside = vec2(facets.alpha_along, facets.alpha) * vec2(dot(w, facets.tangent), dot(w, cross(facets.n, facets.tangent)));
+            return sqrt(dot(beside, beside) + cosine * cosine);
+        }
+    }
+    return ggx_root(facets.alpha, cosine);
+}
+
+// Masking of both directions over 4 n.l n.v.
+float facet_visibility(Facets facets, vec3 wi, vec3 wo, float cos_l, float cos_v)
+{
+    return divide(0.5, cos_l * facet_root(facets, wo, cos_v) + cos_v * facet_root(facets, wi, cos_l));
+}
+
+// Masking of one direction over its cosine.
+float facet_masking(Facets facets, vec3 w, float cosine)
+{
+    return divide(2.0, cosine + facet_root(facets, w, cosine));
 }
 
 // A normal as often as v sees it (Dupuy and Benyoub 2023). Its density is masking * max(v.h, 0) * D.
-vec3 sample_visible_normal(vec3 v, float alpha, vec2 u)
+vec3 sample_visible_normal(Facets facets, vec3 v, vec2 u)
 {
+    vec2 alpha = vec2(facets.alpha);
+    if (HAS_ANISOTROPY) {
+        alpha.x = facets.is_stretched ? facets.alpha_along : facets.alpha;
+    }
     vec3 stretched = normalize(vec3(alpha * v.xy, v.z));
     float z = (1.0 - u.x) * (1.0 + stretched.z) - stretched.z;
     vec3 h = direction_at(z, (1.0 - z) * (1.0 + z), u.y) + stretched;

@@ -94,10 +94,26 @@ bool is_matt(float alpha)
     return alpha >= MAP_ALPHA;
 }
 
-// Rays follow what a solid reflects however rough it is: what it transmits they follow too.
+// Rays follow what a solid reflects however rough it is: what it transmits they follow too. And they follow what is sharp across a
+// tangent if not along it.
 bool is_matt_reflection(Lobes lobes, Layers layers)
 {
-    return is_matt(layers.alpha) && lobes.exact_share == 0.0;
+    bool is_stretched = false;
+    if (HAS_ANISOTROPY) {
+        is_stretched = layers.is_stretched;
+    }
+    return is_matt(layers.alpha) && lobes.exact_share == 0.0 && !is_stretched;
+}
+
+Facets base_facets(Surface surface)
+{
+    Layers layers = surface.layers;
+    return Facets(surface.ns, layers.alpha, layers.is_stretched, layers.alpha_along, layers.tangent);
+}
+
+Facets coat_facets(Surface surface)
+{
+    return even_facets(surface.layers.coat_normal, surface.layers.coat_alpha);
 }
 
 // Smooth normals do not keep phase space: without an end, some of what enters a coarse ball of glass is reflected in it for ever. What
@@ -280,21 +296,22 @@ struct Weighed {
     float along;
 };
 
-Weighed weigh_reflection(float alpha, vec3 n, vec3 wo, vec3 wi)
+Weighed weigh_reflection(Facets facets, vec3 wo, vec3 wi)
 {
-    float cos_l = dot(wi, n), cos_v = dot(wo, n);
+    float cos_l = dot(wi, facets.n), cos_v = dot(wo, facets.n);
     if (cos_l <= 0.0 || cos_v <= 0.0) {
         return Weighed(0.0, 0.0, 1.0);
     }
     vec3 h = normalize(wo + wi);
-    float density = ggx_density(to_local(h, n), alpha);
-    return Weighed(density * ggx_visibility(alpha, cos_l, cos_v) * cos_l, 0.25 * density * ggx_masking(alpha, cos_v), dot(wo, h));
+    float density = facet_density(facets, to_facets(facets, h));
+    float value = density * facet_visibility(facets, wi, wo, cos_l, cos_v) * cos_l;
+    return Weighed(value, 0.25 * density * facet_masking(facets, wo, cos_v), dot(wo, h));
 }
 
 // Refraction of Walter et al. (2007), of radiance towards wo.
-Weighed weigh_refraction(float alpha, float eta, vec3 n, vec3 wo, vec3 wi)
+Weighed weigh_refraction(Facets facets, float eta, vec3 wo, vec3 wi)
 {
-    float cos_l = -dot(wi, n), cos_v = dot(wo, n);
+    float cos_l = -dot(wi, facets.n), cos_v = dot(wo, facets.n);
     // On the side of wo: eta wo + wi points away from the rarer medium.
     vec3 h = eta * wo + wi;
     float squared = dot(h, h);
@@ -302,16 +319,17 @@ Weighed weigh_refraction(float alpha, float eta, vec3 n, vec3 wo, vec3 wi)
         return Weighed(0.0, 0.0, 1.0);
     }
     h *= inversesqrt(squared);
-    h = dot(h, n) < 0.0 ? -h : h;
+    h = dot(h, facets.n) < 0.0 ? -h : h;
     float v_h = dot(wo, h), l_h = -dot(wi, h);
     if (v_h <= 0.0 || l_h <= 0.0) {
         return Weighed(0.0, 0.0, 1.0);
     }
-    float density = ggx_density(to_local(h, n), alpha);
+    float density = facet_density(facets, to_facets(facets, h));
     float spread = eta * v_h - l_h;
     float jacobian = divide(l_h, max(spread * spread, 1e-12));
     float both = density * v_h * jacobian;
-    return Weighed(eta * eta * both * 4.0 * ggx_visibility(alpha, cos_l, cos_v) * cos_l, both * ggx_masking(alpha, cos_v), v_h);
+    float value = eta * eta * both * 4.0 * facet_visibility(facets, wi, wo, cos_l, cos_v) * cos_l;
+    return Weighed(value, both * facet_masking(facets, wo, cos_v), v_h);
 }
 
 // What arrives from a direction, as matt and as sharp lobes weigh it: BRDF times cosine.
@@ -333,11 +351,11 @@ float density_of_matt_lobes(Surface surface, Lobes lobes, vec3 wo, vec3 wi)
     Layers layers = surface.layers;
     float density = (lobes.diffuse_chance + lobes.sheen_chance) * (0.31830988618379067 * max(dot(wi, surface.ns), 0.0));
     if (is_matt_reflection(lobes, layers)) {
-        density += lobes.reflection_chance * weigh_reflection(layers.alpha, surface.ns, wo, wi).density;
+        density += lobes.reflection_chance * weigh_reflection(base_facets(surface), wo, wi).density;
     }
     if (HAS_COATS) {
         if (is_matt(layers.coat_alpha)) {
-            density += lobes.coat_chance * weigh_reflection(layers.coat_alpha, layers.coat_normal, wo, wi).density;
+            density += lobes.coat_chance * weigh_reflection(coat_facets(surface), wo, wi).density;
         }
     }
     return density;
@@ -368,9 +386,9 @@ LobeLight weigh_light(Surface surface, Lobes lobes, vec3 wo, vec3 wi, float ligh
         vec3 reflected = is_beyond ? wi - 2.0 * cosine * surface.ns : wi;
         Weighed found;
         if (is_refracted) {
-            found = weigh_refraction(layers.alpha, lobes.eta, surface.ns, wo, wi);
+            found = weigh_refraction(base_facets(surface), lobes.eta, wo, wi);
         } else {
-            found = weigh_reflection(layers.alpha, surface.ns, wo, reflected);
+            found = weigh_reflection(base_facets(surface), wo, reflected);
         }
         if (found.density > 0.0) {
             vec3 colour = base_lobe_colour(lobes, layers.is_solid, found.along, is_beyond) * below_cover(lobes.cover, lit);
@@ -386,7 +404,7 @@ LobeLight weigh_light(Surface surface, Lobes lobes, vec3 wo, vec3 wi, float ligh
     if (HAS_COATS) {
         if (!is_beyond && layers.coat_alpha >= DELTA_ALPHA && !is_matt(layers.coat_alpha) && lobes.coat_chance > 0.0) {
             // Its own cosine is that to its own normal.
-            Weighed found = weigh_reflection(layers.coat_alpha, layers.coat_normal, wo, wi);
+            Weighed found = weigh_reflection(coat_facets(surface), wo, wi);
             if (found.density > 0.0) {
                 float share = light_share(light_density, lobes.coat_chance * found.density);
                 light.sharp += vec3(coat_colour(layers.coat, found.along) * found.value * share);

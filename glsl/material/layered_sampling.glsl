@@ -71,19 +71,22 @@ Scatter sample_facet(Surface surface, Lobes lobes, vec3 wo, vec2 u, ChosenLobe c
     Layers layers = surface.layers;
     bool is_coat = chosen.lobe == LOBE_COAT, is_beyond = chosen.lobe == LOBE_TRANSMISSION;
     bool is_refracted = is_beyond && layers.is_solid;
-    vec3 n = is_coat ? layers.coat_normal : surface.ns;
-    float alpha = is_coat ? layers.coat_alpha : layers.alpha;
+    Facets facets = base_facets(surface);
+    if (is_coat) {
+        facets = coat_facets(surface);
+    }
+    vec3 n = facets.n;
     bool goes_straight = is_refracted && abs(lobes.eta - 1.0) < SAME_INDEX;
-    bool is_delta = alpha < DELTA_ALPHA || goes_straight;
+    bool is_delta = facets.alpha < DELTA_ALPHA || goes_straight;
 
     vec3 h = n;
     float density = 0.0;
     float cos_v = max(dot(wo, n), 1e-6);
-    float masking = ggx_masking(alpha, cos_v);
+    float masking = facet_masking(facets, wo, cos_v);
     if (!is_delta) {
-        vec3 local = sample_visible_normal(to_local(wo, n), alpha, u);
-        density = chosen.chance * masking * ggx_density(local, alpha);
-        h = to_frame(local, n);
+        vec3 local = sample_visible_normal(facets, to_facets(facets, wo), u);
+        density = chosen.chance * masking * facet_density(facets, local);
+        h = from_facets(facets, local);
     }
     float along = clamp(dot(wo, h), 0.0, 1.0);
     vec3 wi = 2.0 * along * h - wo;
@@ -106,12 +109,12 @@ Scatter sample_facet(Surface surface, Lobes lobes, vec3 wo, vec2 u, ChosenLobe c
         wi = goes_straight ? wi : on_side(wi, side);
     } else {
         is_alive = is_alive && cos_l > 0.0;
-        weight *= divide(4.0 * ggx_visibility(alpha, max(cos_l, 1e-6), cos_v) * cos_l, masking);
+        weight *= divide(4.0 * facet_visibility(facets, wi, wo, max(cos_l, 1e-6), cos_v) * cos_l, masking);
     }
     is_alive = is_alive && (goes_straight || dot(wi, side) > 0.0);
     weight *= carries_radiance && is_refracted ? lobes.eta * lobes.eta : 1.0;
     vec3 colour = vec3(coat_colour(layers.coat, along));
-    bool is_sharp = !is_matt(alpha);
+    bool is_sharp = !is_matt(facets.alpha);
     if (!is_coat) {
         LayerAlbedos lit = albedos_at(layers.alpha, lobes.cover, abs(dot(wi, surface.ns)));
         colour = base_lobe_colour(lobes, layers.is_solid, along, is_beyond) * below_cover(lobes.cover, lit);

@@ -9,7 +9,10 @@ const float LEAST_MAPPED_COSINE = 0.01;
 
 struct Layers {
     float metallic;
-    float alpha;
+    float alpha; // of a stretched base, across its tangent
+    bool is_stretched;
+    float alpha_along;
+    vec3 tangent;
     float ior;
     float ior_spread;
     float specular;

@@ -137,13 +137,26 @@ TriangleLayers layers_of_triangle(uint index)
     return triangle_layers[min(index, uint(triangle_layers.length()) - 1)];
 }
 
-// A normal map's normal about the unit normal n on the side of wo; `tangents` are those of the corners.
-vec3 mapped_normal(vec3 texel, float scale, vec3 n, uvec3 tangents, bool is_turned, float u, float v, vec3 wo, bool front)
+// Tangents of the corners, and whether bitangents are -(normal x tangent).
+struct CornerTangents {
+    uvec3 packed;
+    bool is_turned;
+};
+
+// Tangent, bitangent and normal of the front, from the unit normal n of either side.
+mat3 tangent_frame(CornerTangents at, vec3 n, bool front, float u, float v)
+{
+    vec3 normal = front ? n : -n;
+    vec3 tangent = (1.0 - u - v) * unpack_normal(at.packed.x) + u * unpack_normal(at.packed.y) + v * unpack_normal(at.packed.z);
+    return mat3(tangent, at.is_turned ? cross(tangent, normal) : cross(normal, tangent), normal);
+}
+
+// A normal map's normal about the unit normal n on the side of wo.
+vec3 mapped_normal(vec3 texel, float scale, vec3 n, CornerTangents tangents, float u, float v, vec3 wo, bool front)
 {
     vec3 code = 2.0 * texel - 1.0;
-    vec3 normal = front ? n : -n;
-    vec3 tangent = (1.0 - u - v) * unpack_normal(tangents.x) + u * unpack_normal(tangents.y) + v * unpack_normal(tangents.z);
-    vec3 bitangent = is_turned ? cross(tangent, normal) : cross(normal, tangent);
+    mat3 frame = tangent_frame(tangents, n, front, u, v);
+    vec3 tangent = frame[0], bitangent = frame[1], normal = frame[2];
     vec3 way = scale * code.x * tangent + scale * code.y * bitangent + code.z * normal;
     float squared = dot(way, way);
     vec3 mapped = squared > 0.0 ? way * inversesqrt(squared) : normal;
@@ -174,6 +187,25 @@ uint look_up_layers(LayeredMaterial material, Hit hit, out vec4 values[LAYER_COU
     return found;
 }
 
+CornerTangents base_tangents(TriangleLayers at)
+{
+    return CornerTangents(uvec3(at.tangent_a, at.tangent_b, at.tangent_c), (at.turned & 1u) != 0);
+}
+
+// Anisotropy: `texel` has the direction of its stretch in the frame of tangent and bitangent, and its strength. A line of facets has a
+// width, as it is no delta.
+void stretch_facets(inout Layers layers, LayeredMaterial material, vec3 texel, mat3 frame, vec3 ns)
+{
+    vec2 code = 2.0 * texel.rg - 1.0, turn = material.anisotropy_turn;
+    vec3 way = (turn.x * code.x - turn.y * code.y) * frame[0] + (turn.y * code.x + turn.x * code.y) * frame[1];
+    way -= dot(way, ns) * ns;
+    float strength = material.anisotropy * texel.b, squared = dot(way, way);
+    layers.is_stretched = true;
+    layers.alpha = max(layers.alpha, DELTA_ALPHA);
+    layers.alpha_along = layers.alpha + strength * strength * (1.0 - layers.alpha);
+    layers.tangent = squared > 1e-12 ? way * inversesqrt(squared) : to_frame(vec3(1.0, 0.0, 0.0), ns);
+}
+
 // Layers and shading normal of a layered surface, whose other fields are known; `alpha` is that of its base colour's texture.
 void add_layers(inout Surface surface, Hit hit, uint material_index, vec3 wo, float alpha)
 {
@@ -184,6 +216,9 @@ void add_layers(inout Surface surface, Hit hit, uint material_index, vec3 wo, fl
     layers.metallic = material.metallic * values[LAYER_METALLIC_ROUGHNESS].b;
     float roughness = material.roughness * values[LAYER_METALLIC_ROUGHNESS].g;
     layers.alpha = roughness * roughness;
+    layers.is_stretched = false;
+    layers.alpha_along = layers.alpha;
+    layers.tangent = vec3(0.0);
     layers.ior = material.ior;
     layers.ior_spread = 0.0;
     layers.specular = material.specular * values[LAYER_SPECULAR].a;
@@ -235,17 +270,23 @@ void add_layers(inout Surface surface, Hit hit, uint material_index, vec3 wo, fl
         layers.coverage = coverage_by(hit.triangle, alpha, hit.u, hit.v);
     }
     layers.is_unlit = material.is_unlit != 0;
+    vec3 smooth_ns = surface.ns;
     if (HAS_NORMAL_MAPS) {
         TriangleLayers at = layers_of_triangle(hit.triangle);
-        vec3 smooth_ns = surface.ns;
         if ((found & (1u << LAYER_NORMAL)) != 0) {
-            surface.ns = mapped_normal(values[LAYER_NORMAL].rgb, material.normal_scale, smooth_ns, uvec3(at.tangent_a, at.tangent_b, at.tangent_c),
-                                       (at.turned & 1u) != 0, hit.u, hit.v, wo, surface.front);
+            surface.ns = mapped_normal(values[LAYER_NORMAL].rgb, material.normal_scale, smooth_ns, base_tangents(at), hit.u, hit.v, wo, surface.front);
         }
         if ((found & (1u << LAYER_COAT_NORMAL)) != 0) {
-            layers.coat_normal = mapped_normal(values[LAYER_COAT_NORMAL].rgb, material.coat_normal_scale, smooth_ns,
-                                               uvec3(at.coat_tangent_a, at.coat_tangent_b, at.coat_tangent_c), (at.turned & 8u) != 0, hit.u, hit.v, wo,
+            CornerTangents tangents = CornerTangents(uvec3(at.coat_tangent_a, at.coat_tangent_b, at.coat_tangent_c), (at.turned & 8u) != 0);
+            layers.coat_normal = mapped_normal(values[LAYER_COAT_NORMAL].rgb, material.coat_normal_scale, smooth_ns, tangents, hit.u, hit.v, wo,
                                                surface.front);
+        }
+    }
+    if (HAS_ANISOTROPY) {
+        if (material.anisotropy > 0.0) {
+            vec3 texel = (found & (1u << LAYER_ANISOTROPY)) != 0 ? values[LAYER_ANISOTROPY].rgb : vec3(1.0, 0.5, 1.0);
+            mat3 frame = tangent_frame(base_tangents(layers_of_triangle(hit.triangle)), smooth_ns, surface.front, hit.u, hit.v);
+            stretch_facets(layers, material, texel, frame, surface.ns);
         }
     }
     surface.layers = layers;

@@ -384,6 +384,11 @@ impl Document {
             set(&mut value, "iridescenceThicknessTexture", of.film_thickness_texture);
             value
         };
+        let stretch = |of: &Layers| {
+            let mut value = json!({"anisotropyStrength": of.anisotropy, "anisotropyRotation": of.anisotropy_rotation});
+            set(&mut value, "anisotropyTexture", of.anisotropy_texture);
+            value
+        };
         let coat = |of: &Layers| {
             let mut value = json!({"clearcoatFactor": of.coat, "clearcoatRoughnessFactor": of.coat_roughness});
             set(&mut value, "clearcoatTexture", of.coat_texture);
@@ -406,6 +411,7 @@ impl Document {
             ("KHR_materials_transmission", own_and_usual(&transmission)),
             ("KHR_materials_diffuse_transmission", own_and_usual(&beyond)),
             ("KHR_materials_iridescence", own_and_usual(&film)),
+            ("KHR_materials_anisotropy", own_and_usual(&stretch)),
             ("KHR_materials_clearcoat", own_and_usual(&coat)),
             ("KHR_materials_sheen", own_and_usual(&sheen)),
         ] {

@@ -285,9 +285,17 @@ fn of_base(layers: &Layers, textures: &[Texture]) -> Vec<String> {
     parts
 }
 
-/// Film, coat and sheen.
+/// Anisotropy, film, coat and sheen.
 fn of_layers_above(layers: &Layers, textures: &[Texture]) -> Vec<String> {
     let mut parts = Vec::new();
+    if layers.anisotropy > 0.0 {
+        let (strength, texture) = (number(layers.anisotropy), by_texture(layers.anisotropy_texture, textures));
+        let turn = match layers.anisotropy_rotation {
+            0.0 => String::new(),
+            radians => format!(" turned by {} degrees", number(radians.to_degrees())),
+        };
+        parts.push(format!("anisotropy {strength}{texture}{turn}"));
+    }
     if layers.iridescence > 0.0 {
         let [share, shades] = [layers.iridescence_texture, layers.film_thickness_texture].map(|used| by_texture(used, textures));
         let [least, most] = layers.film_thickness.map(number);

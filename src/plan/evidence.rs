@@ -165,6 +165,7 @@ impl<'a> Facts<'a> {
                 let is_found = |material: &Material| is_layered_with(material, |of| of.diffuse_transmission > 0.0);
                 found("translucent", &is_found, "no diffuse transmission")
             }
+            Effect::Anisotropy => found("anisotropic", &|material| is_layered_with(material, |of| of.anisotropy > 0.0), "no anisotropy"),
             Effect::Iridescence => found("iridescent", &|material| is_layered_with(material, |of| of.iridescence > 0.0), "no iridescence"),
             Effect::Dispersion => found("dispersive", &Material::is_dispersive, "no dispersion"),
             Effect::ClearCoat => found("clear-coated", &|material| is_layered_with(material, |of| of.coat > 0.0), "no clear coat"),

@@ -228,6 +228,7 @@ fn constants(
         ("HAS_MEDIA", flag(Effect::Media)),
         ("HAS_DIFFUSE_TRANSMISSION", flag(Effect::DiffuseTransmission)),
         ("HAS_IRIDESCENCE", flag(Effect::Iridescence)),
+        ("HAS_ANISOTROPY", flag(Effect::Anisotropy)),
         ("HAS_DISPERSION", flag(Effect::Dispersion)),
         ("HAS_COATS", flag(Effect::ClearCoat)),
         ("HAS_SHEEN", flag(Effect::Sheen)),

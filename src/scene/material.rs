@@ -64,11 +64,6 @@ impl TextureUse {
     pub fn of(texture: usize, uv_set: usize) -> TextureUse {
         TextureUse { texture, uv_set, transform: UvTransform::NONE }
     }
-
-    /// Whether both are looked up at the same place.
-    pub fn has_coordinates_of(&self, other: &TextureUse) -> bool {
-        (self.uv_set, self.transform) == (other.uv_set, other.transform)
-    }
 }
 
 /// Normals in the frame of tangent, bitangent and normal, as codes from -1 to 1; `scale` multiplies the first two.
@@ -113,6 +108,11 @@ pub struct Layers {
     pub roughness: f32,
     /// Roughness in green, metalness in blue.
     pub metallic_roughness_texture: Option<TextureUse>,
+    /// How much rougher the base is along one direction than across it, 0 to 1; the texture has it in blue.
+    pub anisotropy: f32,
+    /// Radians that turn the direction counter-clockwise from the tangent; the texture has a direction in red and green, from -1 to 1.
+    pub anisotropy_rotation: f32,
+    pub anisotropy_texture: Option<TextureUse>,
     /// Of the dielectric; 0: it reflects as if the index were infinite.
     pub ior: f32,
     /// Scales what the dielectric reflects; the texture has it in alpha.
@@ -168,6 +168,7 @@ impl Layers {
     pub fn without_textures(&self) -> Layers {
         Layers {
             metallic_roughness_texture: None,
+            anisotropy_texture: None,
             specular_texture: None,
             specular_colour_texture: None,
             transmission_texture: None,
@@ -192,6 +193,9 @@ impl Default for Layers {
             metallic: 1.0,
             roughness: 1.0,
             metallic_roughness_texture: None,
+            anisotropy: 0.0,
+            anisotropy_rotation: 0.0,
+            anisotropy_texture: None,
             ior: 1.5,
             specular: 1.0,
             specular_texture: None,
@@ -287,7 +291,12 @@ impl LobeKinds {
         let squared = |(least, most): (f32, f32)| (least * least, most * most);
         let map_alpha = MAP_ALPHA_PER_MILLE as f32 / 1000.0;
         let delta_alpha = 1.0 / DELTA_ALPHA_INVERSE as f32;
-        let alpha = squared(range(of.roughness, of.metallic_roughness_texture, 1));
+        // Rays follow a stretched base, whose facets have a width.
+        let is_stretched = of.anisotropy > 0.0;
+        let mut alpha = squared(range(of.roughness, of.metallic_roughness_texture, 1));
+        if is_stretched {
+            alpha = (alpha.0.max(delta_alpha), alpha.1.max(delta_alpha));
+        }
         let coat_alpha = squared(range(of.coat_roughness, of.coat_roughness_texture, 1));
         let metallic = range(of.metallic, of.metallic_roughness_texture, 2);
         let transmission = range(of.transmission, of.transmission_texture, 0);
@@ -304,13 +313,14 @@ impl LobeKinds {
         }
         let matt = is_diffuse
             || of.sheen_colour != Vec3::ZERO
-            || (reflects && alpha.1 >= map_alpha && !(transmits && !is_pane && transmission.0 >= 1.0))
+            || (reflects && alpha.1 >= map_alpha && !is_stretched && !(transmits && !is_pane && transmission.0 >= 1.0))
             || (of.coat > 0.0 && coat_alpha.1 >= map_alpha);
         // A surface without a lobe is black; light still arrives there.
         let is_black = !matt && !reflects && !transmits && !is_beyond && of.coat == 0.0;
         LobeKinds {
             matt: matt || is_black,
-            sharp_reflection: (reflects && (alpha.0 < map_alpha || (transmits && !is_pane))) || (of.coat > 0.0 && coat_alpha.0 < map_alpha),
+            sharp_reflection: (reflects && (alpha.0 < map_alpha || is_stretched || (transmits && !is_pane)))
+                || (of.coat > 0.0 && coat_alpha.0 < map_alpha),
             sharp_transmission: is_beyond || (transmits && !(is_pane && alpha.1 < delta_alpha)),
             passing: !is_covered || (transmits && is_pane && alpha.0 < delta_alpha),
             pane: transmits && is_pane && alpha.0 < delta_alpha,
@@ -386,6 +396,7 @@ impl Material {
             self.base_colour_texture,
             self.emission_texture,
             layers.metallic_roughness_texture,
+            layers.anisotropy_texture,
             layers.specular_texture,
             layers.specular_colour_texture,
             layers.transmission_texture,
@@ -399,6 +410,13 @@ impl Material {
             layers.sheen_roughness_texture,
         ];
         textures.into_iter().chain(maps).flatten()
+    }
+
+    /// Which set of texture coordinates its tangents follow, and how they are transformed; `None`: it needs no tangents.
+    pub fn tangent_coordinates(&self) -> Option<(usize, UvTransform)> {
+        let of_texture = |used: TextureUse| (used.uv_set, used.transform);
+        let stretched = || self.layers.anisotropy_texture.map_or((0, UvTransform::NONE), of_texture);
+        self.normal_map.map(|map| of_texture(map.texture)).or_else(|| (self.layers.anisotropy > 0.0).then(stretched))
     }
 
     /// Whether it uses textures beside those of base colour and emission.

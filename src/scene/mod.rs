@@ -137,6 +137,9 @@ impl Scene {
             if lacks(Effect::DiffuseTransmission) {
                 material.layers.diffuse_transmission = 0.0;
             }
+            if lacks(Effect::Anisotropy) {
+                material.layers.anisotropy = 0.0;
+            }
             if lacks(Effect::Iridescence) {
                 material.layers.iridescence = 0.0;
             }

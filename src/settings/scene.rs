@@ -71,6 +71,7 @@ named! {
         Transmission = "transmission",
         DiffuseTransmission = "diffuse-transmission",
         Iridescence = "iridescence",
+        Anisotropy = "anisotropy",
         Media = "media",
         Dispersion = "dispersion",
         ClearCoat = "clear-coat",

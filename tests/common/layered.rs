@@ -40,6 +40,7 @@ pub fn inputs(material: &Material) -> Inputs {
         base_colour: material.base_colour.as_dvec3(),
         metalness: f64::from(of.metallic),
         alpha: squared(of.roughness),
+        stretch: None,
         ior: f64::from(of.ior),
         specular: f64::from(of.specular),
         specular_colour: of.specular_colour.as_dvec3(),
@@ -66,7 +67,7 @@ pub fn lobes_at(material: &Material, place: &Place, n: DVec3) -> Lobes {
 }
 
 /// Radiance towards the eye under a sun of 1 W/m2 in this direction: each lobe times the cosine to its own normal.
-fn in_the_sun(lobes: &Lobes, sun: DVec3) -> DVec3 {
+pub fn in_the_sun(lobes: &Lobes, sun: DVec3) -> DVec3 {
     LOBES.into_iter().map(|kind| lobes.evaluate(kind, sun) * lobes.axis(kind).dot(sun).max(0.0)).sum()
 }
 
@@ -156,16 +157,16 @@ impl Mixtures {
 pub const CLEAR: Option<Medium> = Some(Medium::CLEAR);
 
 /// Towards the suns: before all plates, below them, and behind them. No plate is in the way of another's light.
-const SUNS: [DVec3; 3] = [DVec3::new(0.35, 0.92, 0.17), DVec3::new(0.6, -0.75, -0.2), DVec3::new(0.1, -0.3, -1.0)];
+pub const SUNS: [DVec3; 3] = [DVec3::new(0.35, 0.92, 0.17), DVec3::new(0.6, -0.75, -0.2), DVec3::new(0.1, -0.3, -1.0)];
 
 /// Only light that comes straight from the sun, nothing of which is random.
-fn straight() -> SceneSettings {
+pub fn straight() -> SceneSettings {
     let without = vec![Effect::Indirect, Effect::ReflectiveCaustics, Effect::RefractiveCaustics, Effect::SpecularChains];
     SceneSettings { rounds: 1, shadow_rays: 1, without, ..SceneSettings::default() }
 }
 
 /// What is seen of each plate against what should be, channel by channel. Nothing of it is random.
-fn compare(what: &str, found: &[DVec3], expected: &[DVec3], tolerance: f64) -> Check<Complaint> {
+pub fn compare(what: &str, found: &[DVec3], expected: &[DVec3], tolerance: f64) -> Check<Complaint> {
     let off = |found: DVec3, expected: DVec3| (found - expected) / expected.max(DVec3::splat(1e-3));
     let worst = pairs(found, expected).map(|(found, expected)| off(*found, *expected).abs().max_element()).fold(0.0, f64::max);
     println!("{what}: up to {worst:.1e} off");
@@ -211,7 +212,7 @@ pub fn lobes_in_the_sun(gpu: &Gpu, materials: &[Material], is_inside: bool) -> C
 }
 
 /// A texture of one row, linear.
-fn row_of_texels(texels: &[[u8; 4]], filter: Filter) -> Texture {
+pub fn row_of_texels(texels: &[[u8; 4]], filter: Filter) -> Texture {
     let wrap = [Wrap::Repeat; 2];
     Texture { name: "row".into(), width: texels.len() as u32, height: 1, texels: Texels::Linear(texels.to_vec()), wrap, filter }
 }

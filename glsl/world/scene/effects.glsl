@@ -30,6 +30,8 @@ layout(constant_id = 62) const bool HAS_DISPERSION = false;
 layout(constant_id = 63) const bool HAS_DIFFUSE_TRANSMISSION = false;
 // Thin films.
 layout(constant_id = 64) const bool HAS_IRIDESCENCE = false;
+// Microfacets that are rougher along a tangent.
+layout(constant_id = 65) const bool HAS_ANISOTROPY = false;
 layout(constant_id = 10) const bool HAS_TWO_SIDED = true;
 layout(constant_id = 11) const bool HAS_GLOSSY = true;
 layout(constant_id = 12) const bool HAS_MIRROR = true;

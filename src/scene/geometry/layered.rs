@@ -1,6 +1,6 @@
 //! Records of layered materials: their factors, where their textures are looked up, and what triangles have for these.
 
-use glam::{DMat2, DVec2, DVec3, DVec4, Vec3};
+use glam::{DMat2, DVec2, DVec3, DVec4, Vec2, Vec3};
 
 use super::{at_corners, pack_normal};
 use crate::constants::*;
@@ -51,6 +51,8 @@ fn record((material, kinds): (&Material, LobeKinds)) -> LayeredMaterial {
         specular: of.specular,
         specular_colour: of.specular_colour,
         transmission: of.transmission,
+        anisotropy: of.anisotropy,
+        anisotropy_turn: Vec2::from_angle(of.anisotropy_rotation),
         is_solid: u32::from(of.medium.is_some()),
         // Of all materials together.
         medium: 0,
@@ -89,6 +91,7 @@ pub(super) fn add_lookups(scene: &Scene, records: &mut [LayeredMaterial], textur
         let map = |map: Option<NormalMap>| map.map(|map| map.texture);
         let lookups = [
             (LAYER_METALLIC_ROUGHNESS, of.metallic_roughness_texture),
+            (LAYER_ANISOTROPY, of.anisotropy_texture),
             (LAYER_SPECULAR, of.specular_texture),
             (LAYER_SPECULAR_COLOUR, of.specular_colour_texture),
             (LAYER_TRANSMISSION, of.transmission_texture),
@@ -129,7 +132,7 @@ fn lookup(texture: TextureInfo, layer: u32, used: TextureUse) -> TextureInfo {
 
 /// Whether any triangle has something for them.
 pub(super) fn is_needed(scene: &Scene) -> bool {
-    scene.materials.iter().any(Material::has_layer_textures)
+    scene.materials.iter().any(|material| material.has_layer_textures() || material.layers.anisotropy > 0.0)
 }
 
 pub(super) fn of_triangle(mesh: &Mesh, triangle: usize, part: Option<&[DVec3; 3]>) -> TriangleLayers {

@@ -22,7 +22,16 @@ const MAX_TRANSFORM: f32 = 1e6;
 /// Of factors without an upper limit of their own.
 const ANY: f32 = f32::MAX;
 
-/// KHR_materials_clearcoat, which the `gltf` crate leaves as it stands in the file, as it does the next.
+/// KHR_materials_anisotropy.
+#[derive(Default, Deserialize)]
+#[serde(default, rename_all = "camelCase")]
+struct Anisotropy {
+    anisotropy_strength: f32,
+    anisotropy_rotation: f32,
+    anisotropy_texture: Option<Info>,
+}
+
+/// KHR_materials_clearcoat, which the `gltf` crate leaves as it stands in the file, as it does the others here.
 #[derive(Default, Deserialize)]
 #[serde(default, rename_all = "camelCase")]
 struct ClearCoat {
@@ -179,6 +188,13 @@ impl Reader<'_> {
                 layers.roughness = self.factor("roughness factor", pbr.roughness_factor.0, 1.0)?;
                 layers.metallic_roughness_texture = self.texture(pbr.metallic_roughness_texture.as_ref(), Meaning::Numbers)?;
             }
+        }
+        if let Some(stretch) = self.extension::<Anisotropy>(extensions, "KHR_materials_anisotropy")? {
+            layers.anisotropy = self.factor("anisotropy strength", stretch.anisotropy_strength, 1.0)?;
+            layers.anisotropy_rotation = stretch.anisotropy_rotation;
+            let reason = || format!("has the anisotropy rotation {:e}; it must be within {MAX_TRANSFORM:e}", stretch.anisotropy_rotation);
+            self.loader.require(stretch.anisotropy_rotation.abs() <= MAX_TRANSFORM, &self.object, reason)?;
+            layers.anisotropy_texture = self.texture(stretch.anisotropy_texture.as_ref(), Meaning::Numbers)?;
         }
         if let Some(specular) = &extensions.specular {
             layers.specular = self.factor("specular factor", specular.specular_factor.0, 1.0)?;

@@ -14,7 +14,7 @@ use super::tangents::{self, Surface};
 use super::{Loader, called, node_name};
 use crate::error::Result;
 use crate::scene::Mesh;
-use crate::scene::material::TextureUse;
+use crate::scene::material::{TextureUse, UvTransform};
 use crate::scene::mesh::Source;
 
 /// Of all instances together: as many as the GPU's buffers of 4 GiB hold.
@@ -94,7 +94,7 @@ impl Loader {
         Ok(())
     }
 
-    /// The place of a primitive's material; of one without those normal maps that it has no texture coordinates for.
+    /// The place of a primitive's material; of one without those normal maps, and the anisotropy, that it has no texture coordinates for.
     fn material_of(&mut self, document: &Document, primitive: &gltf::Primitive, owner: &str) -> Result<usize> {
         let number = primitive.material().index();
         let mut material = match self.materials.get(&number) {
@@ -115,14 +115,24 @@ impl Loader {
         if is_useless != [false; 2] {
             self.leave_out("normal maps on meshes without texture coordinates", &named);
         }
+        // Of the file, or by texture coordinates.
+        let has_tangents = primitive.get(&Semantic::Normals).is_some() && primitive.get(&Semantic::Tangents).is_some();
+        let lacks_tangents = material.layers.anisotropy > 0.0
+            && !has_tangents
+            && material.tangent_coordinates().is_some_and(|(set, _)| primitive.get(&Semantic::TexCoords(set as u32)).is_none());
+        if lacks_tangents {
+            material.layers.anisotropy = 0.0;
+            self.leave_out("anisotropy on meshes without tangents and texture coordinates", &named);
+        }
+        let [of_base, of_coat] = is_useless;
         let materials = &mut self.scene.materials;
-        Ok(*self.material_places.entry((number, is_useless)).or_insert_with(|| {
+        Ok(*self.material_places.entry((number, [of_base, of_coat, lacks_tangents])).or_insert_with(|| {
             materials.push(material);
             materials.len() - 1
         }))
     }
 
-    /// And whether a normal map of it turns normals in any direction, as nothing says in which.
+    /// And whether it has a normal map, or anisotropy, and nothing says in which directions.
     pub(super) fn read_primitive(&self, part: &Part) -> Result<(Mesh, bool)> {
         let Part { primitive, name, to_world, .. } = part;
         let what = part.what();
@@ -174,7 +184,8 @@ impl Loader {
 
         // Tangents belong to the mesh's own space, as normal maps were made there.
         let material = &self.scene.materials[part.material];
-        let maps = [material.normal_map, material.layers.coat_normal_map].map(|map| map.map(|map| map.texture));
+        let of_coat = material.layers.coat_normal_map.map(|map| (map.texture.uv_set, map.texture.transform));
+        let maps = [material.tangent_coordinates(), of_coat];
         let mut of_file: Option<Vec<DVec4>> = None;
         // Those of a mesh without normals are to be ignored.
         if let Some(own) = primitive.get(&Semantic::Tangents).filter(|_| maps != [None; 2] && !normals.is_empty()) {
@@ -186,15 +197,15 @@ impl Loader {
         }
         let surface = Surface { positions: &positions, normals: &normals, triangles: &triangles };
         let mut is_turned_anyhow = false;
-        let tangents = |map: Option<TextureUse>| match (map, &of_file) {
+        let tangents = |map: Option<(usize, UvTransform)>| match (map, &of_file) {
             (None, _) => Vec::new(),
             // The file's are those of the first map.
-            (Some(map), Some(tangents)) if maps[0].is_none_or(|first| first.has_coordinates_of(&map)) => {
+            (Some(map), Some(tangents)) if maps[0].is_none_or(|first| first == map) => {
                 triangles.iter().map(|triangle| triangle.map(|vertex| tangents[vertex as usize])).collect()
             }
-            (Some(map), _) => {
-                is_turned_anyhow |= !surface.has_directions(&uvs[map.uv_set], map.transform);
-                surface.tangents(&uvs[map.uv_set], map.transform)
+            (Some((set, transform)), _) => {
+                is_turned_anyhow |= !surface.has_directions(&uvs[set], transform);
+                surface.tangents(&uvs[set], transform)
             }
         };
         let mut tangents = maps.map(tangents);

@@ -44,13 +44,14 @@ use textures::Wanted;
 
 /// Larger files are refused: their triangles would not fit a device's buffers either.
 const MAX_FILE_BYTES: u64 = 4 << 30;
-const READ_EXTENSIONS: [&str; 22] = [
+const READ_EXTENSIONS: [&str; 23] = [
     "EXT_lights_image_based",
     "EXT_mesh_gpu_instancing",
     "EXT_meshopt_compression",
     "EXT_texture_webp",
     "KHR_draco_mesh_compression",
     "KHR_lights_punctual",
+    "KHR_materials_anisotropy",
     "KHR_materials_clearcoat",
     "KHR_materials_diffuse_transmission",
     "KHR_materials_dispersion",
@@ -68,8 +69,8 @@ const READ_EXTENSIONS: [&str; 22] = [
     "KHR_texture_basisu",
     "KHR_texture_transform",
 ];
-/// What a surface has besides its base: a file that needs one of these is read without it, and a warning says so.
-const OPTIONAL_EXTENSIONS: [&str; 2] = ["KHR_materials_anisotropy", "KHR_materials_variants"];
+/// A file that needs one of these is read without it, and a warning says so: it names other materials to choose from.
+const OPTIONAL_EXTENSIONS: [&str; 1] = ["KHR_materials_variants"];
 /// Nodes within nodes; deeper ones would be a cycle.
 const MAX_DEPTH: usize = 512;
 
@@ -226,8 +227,8 @@ pub(super) struct Loader {
     texture_places: HashMap<Wanted, usize>,
     /// Materials that meshes use, by their number in the file; `None`: that of primitives that name none.
     materials: HashMap<Option<usize>, Material>,
-    /// Their places in the scene, by which of their two normal maps they are without.
-    material_places: HashMap<(Option<usize>, [bool; 2]), usize>,
+    /// Their places in the scene, by what they are without: normal map, that of the coat, anisotropy.
+    material_places: HashMap<(Option<usize>, [bool; 3]), usize>,
     /// Whether the file says that vertices may be whole numbers.
     is_quantized: bool,
     /// Watts in one unit of a punctual light.
@@ -330,7 +331,7 @@ impl Loader {
                 let (mesh, is_turned_anyhow) = read?;
                 if is_turned_anyhow {
                     let owner = format!("material '{}' on mesh '{}'", self.scene.materials[mesh.material].name, mesh.name);
-                    self.leave_out("that normal maps lie on meshes without tangents (they turn normals in any direction)", &owner);
+                    self.leave_out("that normal maps or anisotropy lie on meshes without tangents (their directions are any)", &owner);
                 }
                 self.scene.meshes.push(mesh);
             }

@@ -10,7 +10,8 @@ use crate::text::echo;
 
 const SPEC_GLOSS: &str = "KHR_materials_pbrSpecularGlossiness";
 /// Each of these says that it must not stand beside [`SPEC_GLOSS`].
-const NOT_BESIDE_SPEC_GLOSS: [&str; 9] = [
+const NOT_BESIDE_SPEC_GLOSS: [&str; 10] = [
+    "KHR_materials_anisotropy",
     "KHR_materials_clearcoat",
     "KHR_materials_diffuse_transmission",
     "KHR_materials_dispersion",

@@ -1,13 +1,13 @@
 //! Layered materials at a point of a scene: what their textures, coverage and normal maps come to.
 
-use glam::{DVec3, DVec4};
+use glam::{DVec2, DVec3, DVec4};
 
 use super::geometry::{Geometry, Hit, Triangle, Vertex};
 use super::lobes::{Film, Frame, Inputs, Lobes, Wall};
 use super::material::fresnel;
 use super::media::{Media, is_solid};
 use super::microfacets::is_delta;
-use crate::constants::SMOOTH_TOTAL_REFLECTIONS;
+use crate::constants::{DELTA_ALPHA_INVERSE, SMOOTH_TOTAL_REFLECTIONS};
 use crate::scene::Surface;
 use crate::scene::material::{Coverage, NormalMap, TextureUse};
 
@@ -15,6 +15,12 @@ use crate::scene::material::{Coverage, NormalMap, TextureUse};
 const LEAST_COSINE: f64 = 0.01;
 /// What sheen's squared roughness is at least.
 const LEAST_SHEEN: f64 = 0.01;
+
+/// From a tangent with the sign of the bitangent, and the front's normal.
+fn tangent_and_bitangent(tangent: DVec4, front: DVec3) -> [DVec3; 2] {
+    let along = tangent.truncate();
+    [along, tangent.w.signum() * front.cross(along)]
+}
 
 /// A normal that the eye sees: moved towards it where it would face away.
 fn towards_eye(n: DVec3, wo: DVec3) -> DVec3 {
@@ -47,13 +53,25 @@ impl<'a> Geometry<'a> {
     ) -> DVec3 {
         let (Some(map), false) = (map, tangents.is_empty()) else { return normal };
         let front = if is_front { normal } else { -normal };
-        let tangent = triangle.mixed(tangents[triangle.index], weights);
-        let along = tangent.truncate();
-        let across = tangent.w.signum() * front.cross(along);
+        let [along, across] = tangent_and_bitangent(triangle.mixed(tangents[triangle.index], weights), front);
         let code = 2.0 * self.texel(Some(map.texture), triangle, weights).truncate() - 1.0;
         let scale = f64::from(map.scale);
         let turned = (scale * (code.x * along + code.y * across) + code.z * front).normalize_or(front);
         towards_eye(if is_front { turned } else { -turned }, wo)
+    }
+
+    /// Where an anisotropic base is rougher, about the normal `n`, and how much; `front` is the front's normal by the mesh.
+    fn stretch(&self, (triangle, weights): (&Triangle, DVec3), front: DVec3, n: DVec3, alpha: f64) -> (DVec3, f64) {
+        let layers = &triangle.material.layers;
+        // Without a picture: along the tangent, at full strength.
+        let texel = layers.anisotropy_texture.map(|_| self.texel(layers.anisotropy_texture, triangle, weights).truncate());
+        let DVec3 { x, y, z: strength } = texel.unwrap_or(DVec3::new(1.0, 0.5, 1.0));
+        let code = DVec2::from_angle(layers.anisotropy_rotation.into()).rotate(2.0 * DVec2::new(x, y) - 1.0);
+        let corners = triangle.mesh.tangents.get(triangle.index).copied().unwrap_or([DVec4::new(1.0, 0.0, 0.0, 1.0); 3]);
+        let [along, across] = tangent_and_bitangent(triangle.mixed(corners, weights), front);
+        let way = (code.x * along + code.y * across).reject_from_normalized(n);
+        let tangent = if way.length() > 1e-6 { way.normalize() } else { n.any_orthonormal_vector() };
+        (tangent, alpha + (f64::from(layers.anisotropy) * strength).powi(2) * (1.0 - alpha))
     }
 
     /// The lobes of a layered surface that is seen from within `media`, by a path that has met `depth` surfaces before.
@@ -64,7 +82,11 @@ impl<'a> Geometry<'a> {
         let texel = |texture: Option<TextureUse>| self.texel(texture, triangle, hit.weights);
         let metallic_roughness = texel(layers.metallic_roughness_texture);
         let squared = |roughness: f32, texel: f64| (f64::from(roughness) * texel).powi(2);
-        let alpha = squared(layers.roughness, metallic_roughness.y);
+        let mut alpha = squared(layers.roughness, metallic_roughness.y);
+        if layers.anisotropy > 0.0 {
+            // A line of facets has a width, as it is no delta.
+            alpha = alpha.max(1.0 / f64::from(DELTA_ALPHA_INVERSE));
+        }
         let wall = if is_solid(material) {
             let before = media.clone().before(material, vertex.is_front);
             Wall::Solid { from: before.index(channel), to: before.beyond(material, vertex.is_front).index(channel) }
@@ -83,7 +105,9 @@ impl<'a> Geometry<'a> {
         {
             n = vertex.ng;
         }
+        let front = if vertex.is_front { vertex.ns } else { -vertex.ns };
         let inputs = Inputs {
+            stretch: (layers.anisotropy > 0.0).then(|| self.stretch(place, front, n, alpha)),
             base_colour: vertex.base_colour,
             metalness: f64::from(layers.metallic) * metallic_roughness.z,
             alpha,

@@ -8,7 +8,7 @@ use glam::DVec3;
 
 use super::albedo::{gauss_legendre, ggx, sheen};
 use super::material::{around, fresnel, mirrored, sample_lobe};
-use super::microfacets::{ggx_distribution, ggx_visibility, is_delta, schlick, sheen_distribution, sheen_masking, slant};
+use super::microfacets::{Facets, is_delta, schlick, sheen_distribution, sheen_masking};
 use super::{Random, uniform};
 use crate::constants::MAP_ALPHA_PER_MILLE;
 use crate::scene::film;
@@ -87,6 +87,8 @@ pub struct Inputs {
     pub metalness: f64,
     /// Squared roughness.
     pub alpha: f64,
+    /// Of an anisotropic base: a unit vector in the surface, and the alpha along it. That across it is [`Inputs::alpha`].
+    pub stretch: Option<(DVec3, f64)>,
     pub ior: f64,
     pub specular: f64,
     pub specular_colour: DVec3,
@@ -136,22 +138,6 @@ pub struct Scattered {
     pub weight: DVec3,
     /// Per solid angle; infinite for a delta.
     pub density: f64,
-}
-
-/// Density of half vectors that are sampled as they are seen from the eye, over 4 v.h: that of their mirror directions.
-fn mirrored_density(alpha: f64, n: DVec3, h: DVec3, n_v: f64) -> f64 {
-    0.5 * ggx_distribution(alpha, n, h) / (n_v + slant(alpha, n_v))
-}
-
-/// A half vector as it is seen from the eye (Dupuy and Benyoub 2023).
-fn visible_normal(alpha: f64, n: DVec3, wo: DVec3, rng: &mut Random) -> DVec3 {
-    let (x, y) = n.any_orthonormal_pair();
-    let stretched = DVec3::new(alpha * wo.dot(x), alpha * wo.dot(y), wo.dot(n)).normalize();
-    let azimuth = TAU * uniform(rng);
-    let height = (1.0 - uniform(rng)) * (1.0 + stretched.z) - stretched.z;
-    let sine = (1.0 - height * height).max(0.0).sqrt();
-    let h = stretched + DVec3::new(sine * azimuth.cos(), sine * azimuth.sin(), height);
-    around(n, DVec3::new(alpha * h.x, alpha * h.y, h.z).normalize())
 }
 
 /// (1 - E) (1 - C) is smooth enough for few places.
@@ -364,6 +350,7 @@ impl Lobes {
             Kind::Diffuse | Kind::Sheen => Class::Matt,
             // Rays follow all that a solid does.
             Kind::Reflection if matches!(self.inputs.wall, Wall::Solid { .. }) && self.inputs.transmits() => Class::Sharp,
+            Kind::Reflection if self.inputs.stretch.is_some() => Class::Sharp,
             Kind::Reflection => by_alpha(self.inputs.alpha),
             Kind::Coat => by_alpha(self.inputs.coat_alpha),
             Kind::Transmission if self.inputs.wall == Wall::Thin && self.is_delta(kind) => Class::Passing,
@@ -378,6 +365,15 @@ impl Lobes {
             _ if kind.is_beyond() => -self.frame.n,
             _ => self.frame.n,
         }
+    }
+
+    /// What reflects and transmits under coat and sheen.
+    fn base(&self) -> Facets {
+        Facets { n: self.frame.n, alpha: self.inputs.alpha, stretch: self.inputs.stretch }
+    }
+
+    fn coat(&self) -> Facets {
+        Facets { n: self.frame.coat_n, alpha: self.inputs.coat_alpha, stretch: None }
     }
 
     /// Whether a lobe scatters that way at all.
@@ -406,13 +402,13 @@ impl Lobes {
         if !self.reaches(kind, wi) || self.is_delta(kind) {
             return DVec3::ZERO;
         }
-        let Frame { wo, n, coat_n, .. } = self.frame;
-        let Inputs { alpha, coat_alpha, sheen_colour, sheen_s, .. } = self.inputs;
+        let Frame { wo, n, .. } = self.frame;
+        let Inputs { sheen_colour, sheen_s, .. } = self.inputs;
         // Sheen has no bound at the horizon.
         let (n_v, n_l) = (n.dot(wo).max(1e-9), n.dot(wi).abs());
         let Some(h) = self.half(kind, wi) else { return DVec3::ZERO };
         let v_h = wo.dot(h);
-        let d_v = || ggx_distribution(alpha, n, h) * ggx_visibility(alpha, n_v, n_l);
+        let d_v = |facets: Facets| facets.distribution(h) * facets.visibility(wo, wi);
         let under = || self.under_coat(wi) * self.under_sheen(wi);
         match kind {
             Kind::Diffuse => {
@@ -423,7 +419,7 @@ impl Lobes {
                 let share = self.diffuse * self.reaches_diffuse(n_l) * self.under_sheen(wi);
                 FRAC_1_PI * share * self.inputs.colour_beyond()
             }
-            Kind::Reflection => d_v() * under() * self.reflectance(v_h),
+            Kind::Reflection => d_v(self.base()) * under() * self.reflectance(v_h),
             Kind::Transmission => {
                 let stretch = match self.inputs.wall {
                     Wall::Thin => 1.0,
@@ -432,12 +428,9 @@ impl Lobes {
                         4.0 * v_h * -l_h * (from / (from * v_h + to * l_h)).powi(2)
                     }
                 };
-                d_v() * under() * stretch * self.transmittance(v_h)
+                d_v(self.base()) * under() * stretch * self.transmittance(v_h)
             }
-            Kind::Coat => {
-                let visibility = ggx_visibility(coat_alpha, coat_n.dot(wo), coat_n.dot(wi));
-                DVec3::splat(ggx_distribution(coat_alpha, coat_n, h) * visibility * self.coat_reflectance(v_h))
-            }
+            Kind::Coat => DVec3::splat(d_v(self.coat()) * self.coat_reflectance(v_h)),
             Kind::Sheen => {
                 let masking = 1.0 + sheen_masking(sheen_s, n_v) + sheen_masking(sheen_s, n_l);
                 let distribution = sheen_distribution(sheen_s, n.cross(h).length_squared());
@@ -453,18 +446,17 @@ impl Lobes {
         if !self.reaches(kind, wi) || self.is_delta(kind) {
             return 0.0;
         }
-        let Frame { wo, n, coat_n, .. } = self.frame;
+        let Frame { wo, n, .. } = self.frame;
         let Some(h) = self.half(kind, wi) else { return 0.0 };
-        let (alpha, n_v) = (self.inputs.alpha, n.dot(wo));
         match (kind, self.inputs.wall) {
             (Kind::Diffuse | Kind::DiffuseTransmission, _) => FRAC_1_PI * n.dot(wi).abs(),
             (Kind::Sheen, _) => 0.5 * FRAC_1_PI,
-            (Kind::Coat, _) => mirrored_density(self.inputs.coat_alpha, coat_n, h, coat_n.dot(wo)),
+            (Kind::Coat, _) => self.coat().mirrored_density(wo, h),
             (Kind::Transmission, Wall::Solid { from, to }) => {
                 let (v_h, l_h) = (wo.dot(h), wi.dot(h));
-                mirrored_density(alpha, n, h, n_v) * 4.0 * v_h * -l_h * (to / (from * v_h + to * l_h)).powi(2)
+                self.base().mirrored_density(wo, h) * 4.0 * v_h * -l_h * (to / (from * v_h + to * l_h)).powi(2)
             }
-            _ => mirrored_density(alpha, n, h, n_v),
+            _ => self.base().mirrored_density(wo, h),
         }
     }
 
@@ -473,8 +465,7 @@ impl Lobes {
         if self.is_delta(kind) {
             return self.follow_delta(kind);
         }
-        let Frame { wo, n, coat_n, .. } = self.frame;
-        let alpha = self.inputs.alpha;
+        let Frame { wo, n, .. } = self.frame;
         let wi = match (kind, self.inputs.wall) {
             (Kind::Diffuse, _) => sample_lobe(n, 1.0, rng),
             (Kind::DiffuseTransmission, _) => sample_lobe(-n, 1.0, rng),
@@ -483,10 +474,10 @@ impl Lobes {
                 let sine = (1.0 - height * height).max(0.0).sqrt();
                 around(n, DVec3::new(sine * azimuth.cos(), sine * azimuth.sin(), height))
             }
-            (Kind::Coat, _) => mirrored(wo, visible_normal(self.inputs.coat_alpha, coat_n, wo, rng)),
-            (Kind::Reflection, _) => mirrored(wo, visible_normal(alpha, n, wo, rng)),
-            (Kind::Transmission, Wall::Thin) => mirrored_in(mirrored(wo, visible_normal(alpha, n, wo, rng)), n),
-            (Kind::Transmission, Wall::Solid { from, to }) => refracted(wo, visible_normal(alpha, n, wo, rng), from / to)?,
+            (Kind::Coat, _) => mirrored(wo, self.coat().visible_normal(wo, rng)),
+            (Kind::Reflection, _) => mirrored(wo, self.base().visible_normal(wo, rng)),
+            (Kind::Transmission, Wall::Thin) => mirrored_in(mirrored(wo, self.base().visible_normal(wo, rng)), n),
+            (Kind::Transmission, Wall::Solid { from, to }) => refracted(wo, self.base().visible_normal(wo, rng), from / to)?,
         };
         let density = self.density(kind, wi);
         let weight = self.evaluate(kind, wi) * (wi.dot(self.axis(kind)) / density);
