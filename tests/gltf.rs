@@ -202,7 +202,7 @@ fn what_no_mesh_uses_refuses_nothing() {
         |v| v["materials"][0]["occlusionTexture"] = json!({"index": 99}),
         |v| v["materials"][0]["occlusionTexture"] = json!({"index": 7, "strength": []}),
         |v| v["materials"][0]["extensions"] = json!({"KHR_materials_volume": {"thicknessTexture": {"index": 99}}}),
-        |v| v["materials"][0]["extensions"] = json!({"KHR_materials_anisotropy": {"anisotropyTexture": {"index": 99}}}),
+        |v| v["materials"][0]["extensions"] = json!({"EXT_materials_fur": {"furTexture": {"index": 99}}}),
     ];
     let picture = |v: &mut Value| v["images"][7] = json!({"uri": data_uri("image/png", b"no picture")});
     for (place, spoil) in spoils.iter().enumerate() {
@@ -249,7 +249,7 @@ fn faults_of_the_json_have_place_value_and_remedy() {
         (|v| v["textures"][3]["sampler"] = json!(4), &["textures[3].sampler is 4", "list samplers has 1 members"]),
         (
             |v| v["materials"][0]["pbrMetallicRoughness"]["baseColorTexture"]["index"] = json!(30),
-            &["baseColorTexture.index is 30", "list textures has 16 members"],
+            &["baseColorTexture.index is 30", "list textures has 17 members"],
         ),
         (|v| v["accessors"][0]["min"] = json!(null), &[".min is missing", "add it"]),
         (
@@ -812,8 +812,7 @@ fn what_has_no_effect_is_a_warning() {
         assert_eq!(warnings(&value), expected, "{mode} {cutoff} {alpha}");
     }
 
-    let anyhow =
-        "ignored: that normal maps lie on meshes without tangents (they turn normals in any direction): material 'bumpy' on mesh 'wall'";
+    let anyhow = "ignored: that normal maps or anisotropy lie on meshes without tangents (they have arbitrary directions): material 'bumpy' on mesh 'wall'";
     for (coordinates, expected) in [
         ([0.5; 8], anyhow),
         ([0., 0., 1., 0., 2., 0., 3., 0.], anyhow),

@@ -195,6 +195,7 @@ impl ScenePlan {
             buffer::<T>(name, if is_kept { content.len() as u64 } else { 0 }, why)
         }
         let (textured, layered) = (self.keeps(Effect::Textures), self.keeps(Effect::Layers));
+        let has_tangents = textured || self.keeps(Effect::Anisotropy);
         let has_texels = textured || (self.keeps(Effect::Environment) && geometry.has_sky_picture());
         let (nodes, regions, shares) = self.lights().map_or((0, 0, 0), |of| (of.nodes.len(), of.regions.len(), of.shares.len()));
         vec![
@@ -206,7 +207,7 @@ impl ScenePlan {
             of("vertex colours", &geometry.colours, self.keeps(Effect::VertexColours), "the triangles' vertex colours"),
             of("materials", &geometry.materials, true, "materials"),
             of("layered materials", &geometry.layered_materials, layered, "layers of materials"),
-            of("layers of triangles", &geometry.triangle_layers, layered && textured, "texture coordinates and tangents of layers"),
+            of("layers of triangles", &geometry.triangle_layers, layered && has_tangents, "texture coordinates and tangents of layers"),
             buffer::<Vec2>("albedos", if layered { albedo::TABLE.len() as u64 } else { 0 }, "directional albedos"),
             of("textures", &geometry.textures, has_texels, "sizes of textures"),
             of("emitters", &geometry.emitters, true, "emitters"),

@@ -331,7 +331,10 @@ impl Loader {
                 let (mesh, is_turned_anyhow) = read?;
                 if is_turned_anyhow {
                     let owner = format!("material '{}' on mesh '{}'", self.scene.materials[mesh.material].name, mesh.name);
-                    self.leave_out("that normal maps or anisotropy lie on meshes without tangents (their directions are any)", &owner);
+                    self.leave_out(
+                        "that normal maps or anisotropy lie on meshes without tangents (they have arbitrary directions)",
+                        &owner,
+                    );
                 }
                 self.scene.meshes.push(mesh);
             }
