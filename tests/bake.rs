@@ -718,7 +718,7 @@ fn layered_materials_round_trip() {
         if k == 0 {
             mesh.colours = vec![DVec3::X, DVec3::Y, DVec3::Z, DVec3::ONE];
         }
-        if material.normal_map.is_some() {
+        if material.tangent_coordinates().is_some() {
             mesh.tangents = vec![[DVec4::new(0.6, 0.8, 0.0, -1.0); 3]; 2];
         }
         mesh

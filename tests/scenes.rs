@@ -400,7 +400,7 @@ fn an_environment_lights_the_scene_and_is_seen() {
     place.write("dark.gltf", square(|v| v["scenes"][0]["nodes"] = json!([0, 1])));
     let run = format!("render dark.gltf {TINY} -o a.exr --environment 2,1,0.5");
     let (_, stderr) = place.succeed(&run);
-    assert!(!stderr.contains("nothing in this scene shines"), "it is lit: {stderr}");
+    assert!(!stderr.contains("nothing in this scene emits light"), "it is lit: {stderr}");
     // A white wall under an even sky is as bright as the sky.
     let pixels = place.pixels("a.exr");
     let mean = |channel: usize| pixels.iter().skip(channel).step_by(3).sum::<f32>() / 256.0;
@@ -417,7 +417,7 @@ fn a_scene_without_light_has_a_sky_and_a_line_says_so() {
     let Some(place) = place_with_device() else { return };
     place.write("dark.gltf", square(|v| v["scenes"][0]["nodes"] = json!([0, 1])));
     let (_, stderr) = place.succeed(&format!("render dark.gltf {TINY} -o a.exr"));
-    assert_eq!(stderr.matches("nothing in this scene shines").count(), 1, "{stderr}");
+    assert_eq!(stderr.matches("nothing in this scene emits light").count(), 1, "{stderr}");
     let pixels = place.pixels("a.exr");
     let mean = pixels.iter().sum::<f32>() / pixels.len() as f32;
     assert!((mean - 1.0).abs() < 0.05, "a white wall under a sky of 1: {mean}");
@@ -533,6 +533,8 @@ fn a_picture_of_the_sky_is_turned_scaled_and_refused() {
     // A wall that faces the sun: 100 klx and less, of which a white wall returns 1 / pi, over 683 lm/W.
     let bright = mean("--sun 180,30")[1];
     assert!((20.0..80.0).contains(&bright), "{bright}");
+    let halved = mean("--sun 180,30 --environment-strength 0.5")[1];
+    assert!((halved / bright - 0.5).abs() < 0.02, "{halved}, {bright}");
     std::fs::write(place.at("text.hdr"), "no picture").unwrap();
     for (options, words) in [
         ("--environment none.exr", "none.exr"),
@@ -542,8 +544,16 @@ fn a_picture_of_the_sky_is_turned_scaled_and_refused() {
         ("--environment sky.jpg", ".hdr or .exr"),
         ("--environment 1 --environment-rotate 5", "turns a picture"),
         ("--environment sky.exr --environment-strength -1", "must be 0 to 1e9"),
-        ("--aperture -1", "must be 0 or more"),
-        ("--aperture 0.1 --focus 0", "more than 0"),
+        ("--environment text.hdr", "--environment text.hdr: is neither"),
+        ("--environment inf", "0 or more and finite"),
+        ("--environment 3e38", "must be at most 1e30 W/m2/sr"),
+        ("--environment 1e29 --environment-strength 100", "must be at most 1e30 W/m2/sr"),
+        ("--environment sky.exr --environment-strength 1e9 --sun 30,inf", "the elevation above 0"),
+        ("--sun 30,20 --environment-rotate 90", "change the azimuth of --sun"),
+        ("--aperture -1", "must be 0 to 1e6 metres"),
+        ("--aperture inf", "must be 0 to 1e6 metres"),
+        ("--aperture 0.1 --focus 0", "above 0"),
+        ("--aperture 0.1 --focus inf", "at most 1e12 metres, which is as good as infinity"),
         ("--at 1", "has none"),
     ] {
         let line = place.refusal(&format!("render dark.gltf {TINY} -o b.exr {options}")).unwrap();

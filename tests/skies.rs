@@ -190,6 +190,32 @@ fn a_sunny_sky_comes_in_through_a_small_window() {
     }
 }
 
+/// Where the sun itself shines in, rays that are aimed at the window take none from those that are aimed at the sun.
+#[test]
+fn a_sun_that_shines_in_has_as_many_rays_as_without_openings() {
+    let Some(gpu) = device() else { return };
+    // 11 degrees from the vertical, so that its light falls on the floor half a metre beside the middle.
+    let (i_sun, j_sun) = (160, 8);
+    let picture = sky(256, 128, |i, j| if (i, j) == (i_sun, j_sun) { Vec3::splat(20_000.0) } else { Vec3::ONE });
+    let (angle, turn) = (PI * (f64::from(j_sun) + 0.5) / 128.0, TAU * ((f64::from(i_sun) + 0.5) / 256.0 - 0.5));
+    let middle = -3.0 * angle.tan() * dvec3(turn.cos(), 0.0, turn.sin());
+    let near = |x: i32| (-2..=2).map(move |z| (middle + 0.1 * dvec3(f64::from(x), 0.0, f64::from(z)), DVec3::Y));
+    let points: Vec<_> = (-2..=2).flat_map(near).collect();
+    let scene = room_under(picture);
+    let [aimed, other] = [true, false].map(|aim| {
+        let settings = SceneSettings { rounds: 64, shadow_rays: 4, part: Part::Direct, aim, ..SceneSettings::default() };
+        render(&gpu, &scene, &settings, Target::Points(&points)).unwrap()
+    });
+    assert_eq!(aimed.plan.trial.as_ref().map(|trial| trial.openings.len()), Some(1));
+    let [little, much] = [&aimed, &other].map(|lit| lit.film.relative_error(&lit.plan));
+    println!("{:.2} % and {:.2} %", 100.0 * little, 100.0 * much);
+    assert!(little < 1.1 * much, "{little} and {much}");
+    for point in 0..points.len() {
+        let ((a, own), (b, others)) = (red(&aimed, point), red(&other, point));
+        assert_holds(format!("point {point}"), z_check("aimed", a, b, own.hypot(others)));
+    }
+}
+
 /// A sky that is black, or almost, makes no number that is none.
 #[test]
 fn black_skies_and_single_texels_leave_no_odd_number() {

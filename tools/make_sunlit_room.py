@@ -1,7 +1,7 @@
 #!/usr/bin/env python3
 """tools/make_sunlit_room.py ROOM.gltf: a room of 5 x 4 x 3 m whose only light comes in through a window, 1 % of its walls.
 
-Needs nothing but Python. Light it with --sun or --environment; the sun of --sun 215,33 falls on the ball of glass on the floor.
+Needs nothing but Python. Light it with --sun or --environment; the sun of --sun 100,33 falls on the ball of glass on the floor.
 """
 
 import base64
@@ -93,7 +93,7 @@ def main():
         indices = accessor([[k] for corners in triangles if not flat(corners) for k in corners], "SCALAR", 5125, "I")
         scene["meshes"].append({"name": name, "primitives": [{"attributes": attributes, "indices": indices, "material": number}]})
     # In a corner, towards the other side.
-    turn, lean = 0.62, -0.2
+    turn, lean = 0.62, -0.28
     rotation = [math.cos(turn / 2) * math.sin(lean / 2), math.sin(turn / 2) * math.cos(lean / 2), -math.sin(turn / 2) * math.sin(lean / 2),
                 math.cos(turn / 2) * math.cos(lean / 2)]
     scene["nodes"] = [{"mesh": k} for k in range(len(scene["meshes"]))]

@@ -91,7 +91,7 @@ mod tests {
 
     #[test]
     fn a_picture_has_the_aspect_of_its_camera_unless_both_sides_are_given() {
-        let camera = |aspect| Camera { aspect, ..Camera::around(DVec3::ZERO, DVec3::ONE) };
+        let camera = |aspect| Camera { aspect, ..Camera::around(DVec3::ZERO, DVec3::ONE, 1.0) };
         let of = |text: &str, aspect| PictureSize::of(Some(parse_size(text).unwrap()), &camera(aspect)).unwrap();
         let default = |aspect| PictureSize::of(None, &camera(aspect)).unwrap();
         assert_eq!(default(None), (640, 480, None));
@@ -113,7 +113,7 @@ mod tests {
     #[test]
     fn extreme_aspects_give_a_picture_or_a_refusal() {
         for aspect in [1e-30, 1e-4, 1e4, 1e30] {
-            let camera = Camera { aspect: Some(aspect), ..Camera::around(DVec3::ZERO, DVec3::ONE) };
+            let camera = Camera { aspect: Some(aspect), ..Camera::around(DVec3::ZERO, DVec3::ONE, 1.0) };
             let (width, height, _) = PictureSize::of(None, &camera).unwrap();
             assert!(is_allowed(width, height), "{width} x {height}");
             let given = PictureSize::of(Some(PictureSize::Width(65_535)), &camera);

@@ -35,20 +35,22 @@ pub(super) struct SceneArgs {
     #[arg(long, value_name = "SECONDS", value_parser = parse_number::<f64>, allow_hyphen_values = true, help_heading = "Scene")]
     at: Option<f64>,
     /// Light from beyond the scene in place of the file's own: W/m2/sr, one number or three for red, green and blue, or a picture of
-    /// all directions (equirectangular, .hdr or .exr) [default: the file's; 1 if nothing in the file shines]
+    /// all directions (equirectangular, .hdr or .exr) [default: the file's; 1 if nothing in the file emits light]
     #[arg(long, value_name = "R,G,B|FILE", value_parser = parse_environment, allow_hyphen_values = true, help_heading = "Scene")]
     environment: Option<EnvironmentArg>,
     /// Add a sun, degrees clockwise from -z as seen from above and above the horizon, and the clear sky that belongs to it unless
     /// --environment is given
     #[arg(long, value_name = "AZIMUTH,ELEVATION", value_parser = parse_sun, allow_hyphen_values = true, help_heading = "Scene")]
     sun: Option<[f64; 2]>,
-    /// Turn the environment's picture about the vertical, degrees, counter-clockwise as seen from above
+    /// Turn the environment's picture about the vertical, degrees, counter-clockwise as seen from above; not the sky of --sun
     #[arg(long, value_name = "DEGREES", value_parser = parse_number::<f64>, allow_hyphen_values = true, help_heading = "Scene")]
     environment_rotate: Option<f64>,
-    /// Multiply the environment's light
+    /// Multiply the environment's light, or that of --sun and its sky
     #[arg(long, value_name = "FACTOR", value_parser = parse_number::<f32>, allow_hyphen_values = true, help_heading = "Scene")]
     environment_strength: Option<f32>,
 }
+
+const ENVIRONMENT: &str = "--environment";
 
 #[derive(Debug, Clone)]
 enum EnvironmentArg {
@@ -209,6 +211,12 @@ value_enum!(PartArg => Part {
     Indirect,
 });
 
+/// Metres. Rays through a lens are computed in 24 bits.
+const MOST_APERTURE: f64 = 1e6;
+const MOST_FOCUS: f64 = 1e12;
+/// W/m2/sr. The power of a large scene under more is no number.
+const MOST_RADIANCE: f32 = 1e30;
+
 /// Most rounds of a run with a stop criterion other than --total-photons.
 const MOST_ROUNDS: u32 = 65_536;
 
@@ -238,7 +246,7 @@ impl SceneArgs {
             complain(&format!("warning: {warning}"));
         }
         if !is_lit && self.environment.is_none() && self.sun.is_none() {
-            complain("note: nothing in this scene shines; a sky of 1 W/m2/sr lights it (--environment 0 for black)");
+            complain("note: nothing in this scene emits light; a sky of 1 W/m2/sr lights it (--environment 0 for black)");
         }
         Ok(scene)
     }
@@ -247,7 +255,7 @@ impl SceneArgs {
         let own = match &self.environment {
             Some(EnvironmentArg::Colour(radiance)) => Some(LightKind::Environment { radiance: Vec3::from(*radiance) }),
             Some(EnvironmentArg::Picture(path)) => {
-                let sky = Sky::read(path)?;
+                let sky = Sky::read(path).map_err(|reason| Error::setting(ENVIRONMENT, path.display(), reason))?;
                 scene.warnings.extend(sky.warnings.iter().cloned());
                 Some(LightKind::Sky(Arc::new(sky)))
             }
@@ -257,13 +265,13 @@ impl SceneArgs {
         };
         if let Some(kind) = own {
             scene.lights.retain(|light| !light.kind.is_environment());
-            scene.lights.push(Light { name: "--environment".into(), kind });
+            scene.lights.push(Light { name: ENVIRONMENT.into(), kind });
         }
-        if let Some([azimuth, elevation]) = self.sun {
-            scene.lights.push(Light { name: "--sun".into(), kind: daylight::sun(azimuth, elevation) });
-        }
+        let is_of_sun = self.sun.is_some() && self.environment.is_none();
         let mut environment = scene.lights.iter_mut().map(|light| &mut light.kind).find(|kind| kind.is_environment());
         if let Some(degrees) = self.environment_rotate {
+            let reason = "turns a picture, and not the sky of --sun; change the azimuth of --sun";
+            require(!is_of_sun, "--environment-rotate", degrees, reason)?;
             let Some(LightKind::Sky(sky)) = &mut environment else {
                 let reason = "turns a picture, and the environment is none; give --environment FILE";
                 return Err(Error::setting("--environment-rotate", degrees, reason));
@@ -271,14 +279,27 @@ impl SceneArgs {
             *sky = Arc::new(Sky::clone(sky).turned(degrees));
         }
         if let Some(factor) = self.environment_strength {
-            match environment {
+            match &mut environment {
                 Some(LightKind::Environment { radiance }) => *radiance *= factor,
-                Some(LightKind::Sky(sky)) => *sky = Arc::new(Sky { strength: sky.strength * factor, ..Sky::clone(sky) }),
+                Some(LightKind::Sky(sky)) => Arc::make_mut(sky).strength *= factor,
                 _ => {
                     let reason = "multiplies an environment, and there is none; give --environment";
                     return Err(Error::setting("--environment-strength", factor, reason));
                 }
             }
+        }
+        let brightest = match environment {
+            Some(LightKind::Environment { radiance }) => radiance.max_element(),
+            Some(LightKind::Sky(sky)) => sky.brightest(),
+            _ => 0.0,
+        };
+        require(brightest <= MOST_RADIANCE, ENVIRONMENT, brightest, format!("must be at most {MOST_RADIANCE:e} W/m2/sr"))?;
+        if let Some([azimuth, elevation]) = self.sun {
+            let mut kind = daylight::sun(azimuth, elevation);
+            if let (true, Some(factor), LightKind::Directional { irradiance, .. }) = (is_of_sun, self.environment_strength, &mut kind) {
+                *irradiance *= factor;
+            }
+            scene.lights.push(Light { name: "--sun".into(), kind });
         }
         Ok(())
     }
@@ -329,8 +350,11 @@ impl PictureArgs {
         self.check_lens()?;
         let scene = self.scene.open(reporter)?;
         let mut camera = camera(&scene, self.camera.as_deref())?;
-        camera.lens = self.lens(&scene, &camera, reporter)?;
         let (width, height) = PictureSize::resolve(self.size, &camera, reporter)?;
+        if scene.cameras.is_empty() {
+            camera = scene.camera_around(f64::from(width) / f64::from(height));
+        }
+        camera.lens = self.lens(&scene, &camera, reporter)?;
         let geometry = geometry(&scene, settings, reporter)?;
         Ok(Subject { scene, camera, width, height, geometry })
     }
@@ -340,10 +364,11 @@ impl PictureArgs {
     /// Before a scene is read, which may take long.
     fn check_lens(&self) -> Result<()> {
         if let Some(aperture) = self.aperture {
-            require(aperture.is_finite() && aperture >= 0.0, "--aperture", aperture, "must be 0 or more metres")?;
+            require((0.0..=MOST_APERTURE).contains(&aperture), "--aperture", aperture, format!("must be 0 to {MOST_APERTURE:e} metres"))?;
         }
         if let Some(focus) = self.focus {
-            require(focus.is_finite() && focus > 0.0, "--focus", focus, "must be more than 0 metres")?;
+            let allowed = || format!("must be above 0 and at most {MOST_FOCUS:e} metres, which is as good as infinity");
+            require(focus > 0.0 && focus <= MOST_FOCUS, "--focus", focus, allowed())?;
         }
         Ok(())
     }

@@ -132,7 +132,7 @@ pub(super) fn parse_colour(text: &str) -> Parsed<[f32; 3]> {
         Ok([grey]) => [grey; 3],
         Err(_) => parse_numbers::<f32, 3>(text).map_err(|_| "must be one number, or three separated by commas".to_owned())?,
     };
-    if all.iter().all(|value| value.is_finite() && *value >= 0.0) { Ok(all) } else { Err("must be 0 or more".to_owned()) }
+    if all.iter().all(|value| value.is_finite() && *value >= 0.0) { Ok(all) } else { Err("must be 0 or more and finite".to_owned()) }
 }
 
 pub(super) fn parse_threads(text: &str) -> Parsed<usize> {

@@ -49,13 +49,15 @@ impl Camera {
         Camera { aspect: Some(aspect), ..self }
     }
 
-    /// A camera in front of the scene (towards +z) that sees all of a box.
-    pub fn around(min: DVec3, max: DVec3) -> Camera {
+    /// A camera in front of the scene (towards +z) that sees all of a box in a picture of this width over height.
+    pub fn around(min: DVec3, max: DVec3, aspect: f64) -> Camera {
         let vertical_view: f64 = 40f64.to_radians();
         let centre = 0.5 * (min + max);
         let radius = 0.5 * (max - min).length();
         let direction = DVec3::new(0.35, 0.3, 1.0).normalize();
-        let distance = 1.05 * radius / (0.5 * vertical_view).sin();
+        // The lesser half of the angles that the picture shows.
+        let half_view = ((0.5 * vertical_view).tan() * aspect.min(1.0)).atan();
+        let distance = 1.05 * radius / half_view.sin();
         Camera::looking_at("default", centre + distance * direction, centre, DVec3::Y, vertical_view)
     }
 
@@ -100,11 +102,12 @@ mod tests {
     #[test]
     fn the_default_camera_sees_every_corner() {
         let (min, max) = (DVec3::new(-1.0, 0.0, 2.0), DVec3::new(3.0, 1.0, 9.0));
-        let camera = Camera::around(min, max);
-        for corner in 0..8 {
+        for (aspect, corner) in [0.1, 0.5, 1.0, 3.0].into_iter().flat_map(|aspect| (0..8).map(move |corner| (aspect, corner))) {
+            let camera = Camera::around(min, max, aspect);
             let side = |axis: usize| if corner >> axis & 1 == 1 { max[axis] } else { min[axis] };
-            let to = (DVec3::new(side(0), side(1), side(2)) - camera.eye).normalize();
-            assert!(to.dot(camera.forward).acos() < camera.half_height().atan(), "corner {corner}");
+            let to = DVec3::new(side(0), side(1), side(2)) - camera.eye;
+            let place = DVec2::new(to.dot(camera.right) / aspect, to.dot(camera.up)) / to.dot(camera.forward) / camera.half_height();
+            assert!(place.abs().max_element() < 1.0, "aspect {aspect}, corner {corner}: {place}");
         }
     }
 

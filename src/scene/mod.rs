@@ -7,6 +7,7 @@ pub mod bvh;
 pub mod camera;
 pub mod closed_forms;
 pub mod daylight;
+mod file;
 pub mod film;
 pub mod geometry;
 pub mod gltf;
@@ -184,10 +185,13 @@ impl Scene {
 
     /// Its first camera, or one that sees all of it.
     pub fn first_camera(&self) -> Camera {
-        self.cameras.first().cloned().unwrap_or_else(|| {
-            let (min, max) = self.bounds();
-            Camera::around(min, max)
-        })
+        self.cameras.first().cloned().unwrap_or_else(|| self.camera_around(1.0))
+    }
+
+    /// A camera that sees all of it in a picture of this width over height.
+    pub fn camera_around(&self, aspect: f64) -> Camera {
+        let (min, max) = self.bounds();
+        Camera::around(min, max, aspect)
     }
 
     pub fn triangle_count(&self) -> usize {

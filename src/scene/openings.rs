@@ -8,7 +8,7 @@ use crate::records::{CausticTarget, TrialRay};
 use crate::rng::mix32;
 use crate::scene::geometry::Geometry;
 
-/// Of shadow rays and photons from beyond the scene that are aimed at openings. Twin of `glsl/world/scene/openings.glsl`.
+/// Of photons from beyond the scene, and of shadow rays that the table of a sky leaves, those that are aimed at openings. Twin of `glsl/world/scene/openings.glsl`.
 pub const OPENING_SHARE: f64 = 0.75;
 /// Where more rays than this share leave, the scene is open: there is nothing to aim at.
 const OPEN: f64 = 0.125;

@@ -2,16 +2,21 @@
 //! it sends, as in Pharr, Jakob and Humphreys (2016), section 14.2.4. Kernels have both in `glsl/world/scene/sky.glsl`.
 
 use std::f64::consts::{PI, TAU};
+use std::io::{Cursor, Read};
 use std::ops::RangeInclusive;
 use std::path::Path;
 
 use glam::{DQuat, DVec2, DVec3, Vec3};
-use image::{ImageDecoder, ImageFormat};
+use image::codecs::hdr::HdrDecoder;
+use image::codecs::openexr::OpenExrDecoder;
+use image::{ColorType, ImageDecoder};
 use rayon::prelude::*;
 
 use super::texture::{Filter, Texels, Texture, Wrap};
-use crate::error::{Error, Result};
-use crate::text::{counted, refusal};
+use crate::text::{counted, echo};
+
+/// First bytes of an OpenEXR file.
+const EXR_MAGIC: [u8; 4] = [0x76, 0x2f, 0x31, 0x01];
 
 /// Of one picture: half of what all textures together may have.
 const MAX_TEXELS: u64 = 1 << 26;
@@ -54,32 +59,39 @@ pub struct Table {
 }
 
 impl Sky {
-    /// Reads a Radiance (`.hdr`) or OpenEXR (`.exr`) file.
-    pub fn read(path: &Path) -> Result<Sky> {
-        let refuse = |reason: String| Error::Scene { path: path.to_owned(), object: "the environment".into(), reason };
-        let reader = std::fs::File::open(path).map_err(|error| refuse(format!("cannot be read ({})", refusal(&error))))?;
-        let mut reader = image::ImageReader::new(std::io::BufReader::new(reader))
-            .with_guessed_format()
-            .map_err(|error| refuse(format!("cannot be read ({})", refusal(&error))))?;
-        if !matches!(reader.format(), Some(ImageFormat::Hdr | ImageFormat::OpenExr)) {
-            return Err(refuse("is neither a Radiance (.hdr) nor an OpenEXR (.exr) picture; convert it to one of them".into()));
+    /// Reads a Radiance (`.hdr`) or OpenEXR (`.exr`) file; an error says what is wrong with it, and what to do.
+    pub fn read(path: &Path) -> Result<Sky, String> {
+        let content = super::file::read(path)?;
+        let name = path.file_name().unwrap_or_default().to_string_lossy();
+        if content.starts_with(b"#?") {
+            let header = RadianceHeader::parse(&content)?;
+            let start = format!("#?RADIANCE\n\n-Y {} +X {}\n", header.height, header.width);
+            let pixels = Cursor::new(start.as_bytes()).chain(&content[header.length..]);
+            let (width, height, mut colours) = decoded(HdrDecoder::new(pixels).map_err(undecodable)?)?;
+            if header.is_upside_down {
+                let rows: Vec<Vec3> = colours.chunks(width as usize).rev().flatten().copied().collect();
+                colours = rows;
+            }
+            if header.is_mirrored {
+                colours.chunks_mut(width as usize).for_each(<[Vec3]>::reverse);
+            }
+            let mut sky = Sky::of(name, width, height, colours);
+            sky.strength /= header.exposure;
+            return Ok(sky);
         }
-        let mut limits = image::Limits::default();
-        limits.max_alloc = Some(16 * MAX_TEXELS + (64 << 20));
-        reader.limits(limits);
-        let undecodable = |error: image::ImageError| refuse(format!("cannot be decoded ({})", one_line(&error.to_string())));
-        // Of its lines the library keeps the exposure for itself.
-        let exposure = exposure(path);
-        let decoder = reader.into_decoder().map_err(undecodable)?;
-        let (width, height) = decoder.dimensions();
-        if width == 0 || height == 0 || u64::from(width) * u64::from(height) > MAX_TEXELS {
-            return Err(refuse(format!("is {width} x {height}; allowed are up to {MAX_TEXELS} pixels: make it smaller")));
+        if content.starts_with(&EXR_MAGIC) {
+            let decoder = OpenExrDecoder::with_alpha_preference(Cursor::new(&content), Some(false)).map_err(undecodable)?;
+            let (width, height, colours) = decoded(decoder)?;
+            return Ok(Sky::of(name, width, height, colours));
         }
-        let picture = image::DynamicImage::from_decoder(decoder).map_err(undecodable)?.into_rgb32f();
-        let colours: Vec<Vec3> = bytemuck::allocation::cast_vec(picture.into_raw());
-        let mut sky = Sky::of(path.file_name().unwrap_or_default().to_string_lossy(), width, height, colours);
-        sky.strength /= exposure;
-        Ok(sky)
+        Err("is neither a Radiance (.hdr) nor an OpenEXR (.exr) picture; convert it to one of them".into())
+    }
+
+    /// The radiance of its brightest texel, W/m2/sr.
+    pub fn brightest(&self) -> f32 {
+        let texel = |place: usize| self.texture.texels.at(place).max_element();
+        let count = (self.texture.width * self.texture.height) as usize;
+        (0..count).into_par_iter().map(texel).reduce(|| 0.0, f32::max) * self.strength.max_element()
     }
 
     /// From pixels, row by row from the top. What is no number, infinite or negative is black, and a warning counts it.
@@ -142,6 +154,7 @@ impl Sky {
             let place = j * width as usize + i.rem_euclid(i64::from(width)) as usize;
             self.texture.texels.at(place).truncate().as_dvec3()
         };
+        let near_columns: Vec<Vec<(i64, f64)>> = (0..columns).map(|column| near(column, columns, width)).collect();
         let edge_cosine = |edge: u32| (PI * f64::from(edge) / f64::from(rows)).cos();
         let cells_of = |row: u32| {
             let near_rows = near(row, rows, height);
@@ -155,8 +168,7 @@ impl Sky {
                 near_rows.iter().fold((DVec3::ZERO, 0.0), of)
             };
             let means: Vec<(DVec3, f64)> = (0..i64::from(width)).map(column).collect();
-            let cell = |of: u32| {
-                let near_columns = near(of, columns, width);
+            let cell = |near_columns: &Vec<(i64, f64)>| {
                 let total: f64 = near_columns.iter().map(|(_, share)| share).sum();
                 let add = |sums: (DVec3, f64), &(i, share): &(i64, f64)| {
                     let (mean, most) = means[i.rem_euclid(i64::from(width)) as usize];
@@ -164,7 +176,7 @@ impl Sky {
                 };
                 near_columns.iter().fold((DVec3::ZERO, 0.0), add)
             };
-            (0..columns).map(cell).collect::<Vec<(DVec3, f64)>>()
+            near_columns.iter().map(cell).collect::<Vec<(DVec3, f64)>>()
         };
         // By row, so that the cells of all at once need no memory.
         struct Row {
@@ -256,14 +268,89 @@ fn cumulative(shares: &[f64]) -> Vec<u32> {
     shares.iter().map(&mut add).collect()
 }
 
-/// What a Radiance file's lines say that its values were multiplied by; 1 for others.
-fn exposure(path: &Path) -> f32 {
-    let decoder = std::fs::File::open(path).ok().and_then(|file| image::codecs::hdr::HdrDecoder::new(std::io::BufReader::new(file)).ok());
-    decoder.and_then(|decoder| decoder.metadata().exposure).filter(|exposure| exposure.is_normal() && *exposure > 0.0).unwrap_or(1.0)
+/// The lines before a Radiance file's pixels.
+struct RadianceHeader {
+    width: u32,
+    height: u32,
+    is_upside_down: bool,
+    is_mirrored: bool,
+    /// What its values were multiplied by.
+    exposure: f32,
+    /// Bytes.
+    length: usize,
 }
 
-fn one_line(text: &str) -> String {
-    text.split_whitespace().collect::<Vec<_>>().join(" ")
+impl RadianceHeader {
+    fn parse(content: &[u8]) -> Result<RadianceHeader, String> {
+        let mut rest = content;
+        let mut next_line = || -> Result<String, String> {
+            let end = rest.iter().position(|byte| *byte == b'\n').ok_or(CUT_OFF)?;
+            let line = String::from_utf8_lossy(&rest[..end]).trim().to_owned();
+            rest = &rest[end + 1..];
+            Ok(line)
+        };
+        let mut exposure = 1.0f32;
+        loop {
+            let line = next_line()?;
+            if line.is_empty() {
+                break;
+            }
+            match line.split_once('=').map(|(name, value)| (name.trim(), value.trim())) {
+                Some(("FORMAT", format)) if format != "32-bit_rle_rgbe" => {
+                    return Err(format!("has pixels of the format {}; only 32-bit_rle_rgbe is read: convert it to RGB", echo(format)));
+                }
+                Some(("EXPOSURE", value)) => {
+                    exposure *= value.parse::<f32>().unwrap_or(f32::NAN);
+                    if !(exposure.is_normal() && exposure > 0.0) {
+                        return Err(format!("has the line EXPOSURE={}; the product of all must be above 0 and finite", echo(value)));
+                    }
+                }
+                _ => {}
+            }
+        }
+        let size = next_line()?;
+        let words: Vec<&str> = size.split_whitespace().collect();
+        let (height, width) = match words[..] {
+            ["-Y" | "+Y", height, "-X" | "+X", width] => (height.parse().ok(), width.parse().ok()),
+            _ => (None, None),
+        };
+        let (Some(height), Some(width)) = (height, width) else {
+            return Err(format!("has the size '{}'; it must be as -Y 512 +X 1024: save it again, row by row", echo(&size)));
+        };
+        let length = content.len() - rest.len();
+        Ok(RadianceHeader { width, height, is_upside_down: words[0] == "+Y", is_mirrored: words[2] == "-X", exposure, length })
+    }
+}
+
+const CUT_OFF: &str = "is cut off; export it again";
+
+/// In plain words, or the library's.
+fn undecodable(error: image::ImageError) -> String {
+    let text = error.to_string().split_whitespace().collect::<Vec<_>>().join(" ");
+    if text.contains("whole buffer") || text.contains("missing bytes") || text.contains("EOF") {
+        return CUT_OFF.into();
+    }
+    if text.contains("rgb channels") {
+        return "has no layer of plain names R, G and B; export it as an OpenEXR picture of a single layer".into();
+    }
+    format!("cannot be decoded ({text}); convert it, or export it again")
+}
+
+/// Width, height and pixels.
+fn decoded(mut decoder: impl ImageDecoder) -> Result<(u32, u32, Vec<Vec3>), String> {
+    let (width, height) = decoder.dimensions();
+    if width == 0 || height == 0 || u64::from(width) * u64::from(height) > MAX_TEXELS {
+        return Err(format!("is {width} x {height}; allowed are 1 to {MAX_TEXELS} pixels"));
+    }
+    let mut limits = image::Limits::default();
+    limits.max_alloc = Some(16 * MAX_TEXELS + (64 << 20));
+    decoder.set_limits(limits).map_err(undecodable)?;
+    if decoder.color_type() != ColorType::Rgb32F {
+        return Err("has no colours; convert it to RGB".into());
+    }
+    let mut colours = vec![Vec3::ZERO; width as usize * height as usize];
+    decoder.read_image(bytemuck::cast_slice_mut(&mut colours)).map_err(undecodable)?;
+    Ok((width, height, colours))
 }
 
 #[cfg(test)]
@@ -290,6 +377,55 @@ mod tests {
         // What was seen along +x turns to -z, counter-clockwise from above.
         let turned = sky.clone().turned(90.0);
         assert!((turned.radiance(DVec3::NEG_Z) - sky.radiance(DVec3::X)).abs().max_element() < 1e-6);
+    }
+
+    /// A Radiance file of 8 x 2 pixels, each with another red, and these lines.
+    fn radiance_file(lines: &str) -> Vec<u8> {
+        let pixels = (0..16u8).flat_map(|k| [8 * k + 1, 128, 64, 129]);
+        lines.bytes().chain(pixels).collect()
+    }
+
+    fn read(content: &[u8]) -> Result<Sky, String> {
+        let folder = tempfile::tempdir().unwrap();
+        let path = folder.path().join("a.hdr");
+        std::fs::write(&path, content).unwrap();
+        Sky::read(&path)
+    }
+
+    /// Rows from below, and from the right, exposures and ends of lines as other programs write them.
+    #[test]
+    fn radiance_files_of_all_programs_are_read() {
+        let red = |lines: &str| -> Vec<f32> {
+            let sky = read(&radiance_file(lines)).unwrap();
+            (0..16).map(|place| sky.texture.texels.at(place).x * sky.strength.x).collect()
+        };
+        let usual = red("#?RADIANCE\nFORMAT=32-bit_rle_rgbe\n\n-Y 2 +X 8\n");
+        assert_eq!((usual[0], usual[15]), (2.0 * 1.0 / 256.0, 2.0 * 121.0 / 256.0));
+        assert_eq!(red("#?RGBE\r\nFORMAT = 32-bit_rle_rgbe\r\n\r\n-Y 2 +X 8\r\n"), usual);
+        let halves = red("#?RADIANCE\nEXPOSURE=4\nEXPOSURE= 0.5\n\n-Y 2 +X 8\n");
+        assert!(halves.iter().zip(&usual).all(|(half, whole)| 2.0 * half == *whole), "{halves:?}");
+        let turned = red("#?RADIANCE\n\n+Y 2 -X 8\n");
+        assert!(turned.iter().rev().eq(&usual), "{turned:?}");
+        let upside_down = red("#?RADIANCE\n\n+Y 2 +X 8\n");
+        assert_eq!((&upside_down[..8], &upside_down[8..]), (&usual[8..], &usual[..8]));
+    }
+
+    #[test]
+    fn pictures_that_are_no_skies_are_refused_in_plain_words() {
+        for (lines, words) in [
+            ("#?RADIANCE\n\n+X 8 -Y 2\n", "has the size '+X 8 -Y 2'; it must be as -Y 512 +X 1024"),
+            ("#?RADIANCE\n\n-Y 0 +X 8\n", "is 8 x 0; allowed are 1 to"),
+            ("#?RADIANCE\n\n-Y 100000 +X 100000\n", "is 100000 x 100000; allowed are 1 to"),
+            ("#?RADIANCE\nFORMAT=32-bit_rle_xyze\n\n-Y 2 +X 8\n", "format 32-bit_rle_xyze; only 32-bit_rle_rgbe is read"),
+            ("#?RADIANCE\nEXPOSURE=0\n\n-Y 2 +X 8\n", "EXPOSURE=0; the product of all must be above 0"),
+            ("#?RADIANCE\nEXPOSURE=1e30\nEXPOSURE=1e30\n\n-Y 2 +X 8\n", "EXPOSURE=1e30; the product"),
+            ("#?RADIANCE\n\n-Y 20 +X 8\n", "is cut off; export it again"),
+            ("#?RADIANCE\n", "is cut off"),
+            ("P6\n8 2\n255\n", "neither a Radiance (.hdr) nor an OpenEXR (.exr) picture"),
+        ] {
+            let reason = read(&radiance_file(lines)).unwrap_err();
+            assert!(reason.contains(words), "{lines:?}: {reason}");
+        }
     }
 
     #[test]

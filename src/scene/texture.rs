@@ -94,21 +94,26 @@ impl From<Vec<Vec3>> for Texels {
 const EXPONENT_BIAS: i32 = 15;
 const MANTISSA_BITS: i32 = 9;
 
+/// Exact; the exponent is that of a normal number.
+fn power_of_two(exponent: i32) -> f32 {
+    f32::from_bits(((exponent + 127) as u32) << 23)
+}
+
 fn shared_exponent(colour: Vec3) -> u32 {
     let most = (511.0 / 512.0) * 65_536.0;
     let colour = colour.clamp(Vec3::ZERO, Vec3::splat(most));
-    let unit = |exponent: i32| 2f32.powi(exponent - EXPONENT_BIAS - MANTISSA_BITS);
+    let units = |exponent: i32| power_of_two(EXPONENT_BIAS + MANTISSA_BITS - exponent);
     let largest = colour.max_element();
-    let power = if largest > 0.0 { largest.log2().floor() as i32 + 1 + EXPONENT_BIAS } else { 0 };
-    // The logarithm is rounded, and the largest channel may round up to the next power.
-    let exponent = (power.max(1) - 1..).find(|exponent| (largest / unit(*exponent)).round() < 512.0).expect("the last one is large enough");
-    let [red, green, blue] = (colour / unit(exponent)).round().to_array().map(|mantissa| mantissa as u32);
+    // The largest channel is below that power of two, and may round up to it.
+    let power = ((largest.to_bits() >> 23) as i32 - 126 + EXPONENT_BIAS).max(0);
+    let exponent = power + i32::from((largest * units(power)).round() >= 512.0);
+    let [red, green, blue] = (colour * units(exponent)).round().to_array().map(|mantissa| mantissa as u32);
     red | green << 9 | blue << 18 | (exponent as u32) << 27
 }
 
 fn of_shared_exponent(word: u32) -> Vec3 {
     let mantissa = |shift: u32| (word >> shift & 511) as f32;
-    Vec3::new(mantissa(0), mantissa(9), mantissa(18)) * 2f32.powi((word >> 27) as i32 - EXPONENT_BIAS - MANTISSA_BITS)
+    Vec3::new(mantissa(0), mantissa(9), mantissa(18)) * power_of_two((word >> 27) as i32 - EXPONENT_BIAS - MANTISSA_BITS)
 }
 
 impl Wrap {

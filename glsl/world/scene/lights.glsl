@@ -188,14 +188,14 @@ float lamp_density(Triangle shining, vec3 normal, vec3 position, vec3 point, flo
 
 float environment_density(Emitter sky, vec3 position, vec3 ns, vec3 wi)
 {
-    float open = open_sky_density(sky, ns, wi);
+    float others = cosine_density(ns, wi);
     if (HAS_OPENINGS) {
         if (openings[0].radius != 0.0) {
             float sum = sum_of_versines(position);
-            return sky_density(position, SkySample(wi, open), sum > 0.0 ? OPENING_SHARE : 0.0, sum).density;
+            others = density_with_cones(position, ns, wi, sum > 0.0 ? OPENING_SHARE : 0.0, sum).density;
         }
     }
-    return open;
+    return density_with_table(sky, wi, others);
 }
 
 // `light` has the probability with which it was chosen; u is for its area.

@@ -5,7 +5,7 @@
 // Of radius 0: there are no more.
 layout(set = 0, binding = 13, scalar) readonly buffer Openings { CausticTarget openings[]; };
 
-// Of what is aimed. Twin of src/scene/openings.rs.
+// Of photons, and of shadow rays that no table chooses. Twin of src/scene/openings.rs.
 const float OPENING_SHARE = 0.75;
 
 // Versine of half the angle that an opening takes up as seen from a place; 0 if the place lies in it.
@@ -25,11 +25,19 @@ struct SampledSky {
     bool is_aimed; // it leads to an opening, by whichever way it was found
 };
 
-// Density of that sampling in a direction, 1/sr, and whether it leads to an opening; `open` has the density of what is not aimed.
-SampledSky sky_density(vec3 position, SkySample open, float share, float sum)
+float sum_of_versines(vec3 position)
 {
-    vec3 wi = open.wi;
-    float density = (1.0 - share) * open.density;
+    float sum = 0.0;
+    for (uint k = 0; k < MAX_OPENINGS && openings[k].radius > 0.0; k++) {
+        sum += opening_versine(k, position);
+    }
+    return sum;
+}
+
+// Density of samples of which a share is aimed at the openings, whose versines have this sum, and the others follow the cosine.
+SampledSky density_with_cones(vec3 position, vec3 ns, vec3 wi, float share, float sum)
+{
+    float density = (1.0 - share) * cosine_density(ns, wi);
     bool is_aimed = false;
     if (share > 0.0) {
         float cones = 0.0;
@@ -43,20 +51,23 @@ SampledSky sky_density(vec3 position, SkySample open, float share, float sum)
     return SampledSky(wi, density, is_aimed);
 }
 
-float sum_of_versines(vec3 position)
-{
-    float sum = 0.0;
-    for (uint k = 0; k < MAX_OPENINGS && openings[k].radius > 0.0; k++) {
-        sum += opening_versine(k, position);
-    }
-    return sum;
-}
-
-// Towards the openings or anywhere.
+// By the picture's table, towards the openings, or by the cosine. Aimed samples are a share of those that the table leaves, so that a sun
+// in the picture has as many as without openings.
 SampledSky sample_sky(Emitter sky, vec3 position, vec3 ns, vec2 u)
 {
     float sum = sum_of_versines(position);
     float share = sum > 0.0 ? OPENING_SHARE : 0.0;
+    if (HAS_SKY_PICTURE) {
+        float by_table = table_share(sky);
+        if (u.x < by_table) {
+            SkySample found = sample_sky_table(sky, vec2(divide(u.x, by_table), u.y));
+            SampledSky sampled = density_with_cones(position, ns, found.wi, share, sum);
+            sampled.density = (1.0 - by_table) * sampled.density + by_table * found.density;
+            return sampled;
+        }
+        u.x = divide(u.x - by_table, 1.0 - by_table);
+    }
+    vec3 wi;
     if (u.x < share) {
         float left = divide(u.x, share) * sum;
         uint chosen = 0;
@@ -71,10 +82,13 @@ SampledSky sample_sky(Emitter sky, vec3 position, vec3 ns, vec2 u)
             left -= own;
         }
         versine *= u.x;
-        vec3 wi = to_frame(direction_at(1.0 - versine, versine * (2.0 - versine), u.y), normalize(openings[chosen].centre - position));
-        return sky_density(position, SkySample(wi, open_sky_density(sky, ns, wi)), share, sum);
+        wi = to_frame(direction_at(1.0 - versine, versine * (2.0 - versine), u.y), normalize(openings[chosen].centre - position));
+    } else {
+        wi = to_frame(sample_cosine_hemisphere(divide(u.x - share, 1.0 - share), u.y), ns);
     }
-    return sky_density(position, sample_open_sky(sky, ns, vec2(divide(u.x - share, 1.0 - share), u.y)), share, sum);
+    SampledSky sampled = density_with_cones(position, ns, wi, share, sum);
+    sampled.density = density_with_table(sky, wi, sampled.density);
+    return sampled;
 }
 
 // Moves a photon from beyond the scene, which keeps its direction: it starts on the discs that cover the openings, or stays.

@@ -98,30 +98,33 @@ float cosine_density(vec3 ns, vec3 wi)
     return max(dot(wi, ns), 0.0) * 0.31830988618379067;
 }
 
-// Density of light samples towards the sky that are aimed at no opening.
-float open_sky_density(Emitter sky, vec3 ns, vec3 wi)
+// Share of light samples that the table chooses.
+float table_share(Emitter sky)
 {
-    float density = cosine_density(ns, wi);
-    if (HAS_SKY_PICTURE) {
-        density = (1.0 - sky.outer_versine) * density + sky.outer_versine * sky_table_density(sky, wi);
-    }
-    return density;
+    return HAS_SKY_PICTURE ? sky.outer_versine : 0.0;
 }
 
-// Such a sample.
+// Density of light samples of which those that the table does not choose have this density.
+float density_with_table(Emitter sky, vec3 wi, float others)
+{
+    if (HAS_SKY_PICTURE) {
+        others = (1.0 - sky.outer_versine) * others + sky.outer_versine * sky_table_density(sky, wi);
+    }
+    return others;
+}
+
+// A light sample where there are no openings to aim at.
 SkySample sample_open_sky(Emitter sky, vec3 ns, vec2 u)
 {
     if (HAS_SKY_PICTURE) {
-        float by_table = sky.outer_versine;
+        float by_table = table_share(sky);
         if (u.x < by_table) {
             SkySample found = sample_sky_table(sky, vec2(divide(u.x, by_table), u.y));
             found.density = (1.0 - by_table) * cosine_density(ns, found.wi) + by_table * found.density;
             return found;
         }
         u.x = divide(u.x - by_table, 1.0 - by_table);
-        vec3 wi = to_frame(sample_cosine_hemisphere(u.x, u.y), ns);
-        return SkySample(wi, open_sky_density(sky, ns, wi));
     }
     vec3 wi = to_frame(sample_cosine_hemisphere(u.x, u.y), ns);
-    return SkySample(wi, cosine_density(ns, wi));
+    return SkySample(wi, density_with_table(sky, wi, cosine_density(ns, wi)));
 }

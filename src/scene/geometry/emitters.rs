@@ -60,7 +60,7 @@ impl Geometry {
         found.push(self.emitter_of(&LightKind::Environment { radiance: sky }));
         found.retain(|found| found.weight > 0.0);
         if found.len() > MAX_EMITTERS {
-            let reason = format!("has {} triangles and lights that shine, at most {MAX_EMITTERS} can be chosen from", found.len());
+            let reason = format!("has {} triangles and lights that emit, at most {MAX_EMITTERS} can be chosen from", found.len());
             return Err(refuse(scene, "the scene", reason));
         }
         self.power = found.iter().map(|found| found.weight).sum();

@@ -32,18 +32,17 @@ use gltf::Document;
 use rayon::prelude::*;
 use serde_json::{Value, json};
 
+use super::file::read as read_file;
 use super::light::LUMENS_PER_WATT;
 use super::{Material, Mesh, Progress, Reading, Scene};
 use crate::error::{Error, Result};
-use crate::text::{counted, refusal, some_of};
+use crate::text::{counted, some_of};
 use accessor::Vertices;
 use animation::Pose;
 use compressed::Target;
 use meshes::Part;
 use textures::Wanted;
 
-/// Larger files are refused: their triangles would not fit a device's buffers either.
-const MAX_FILE_BYTES: u64 = 4 << 30;
 const READ_EXTENSIONS: [&str; 23] = [
     "EXT_lights_image_based",
     "EXT_mesh_gpu_instancing",
@@ -184,19 +183,6 @@ fn printable(name: &str) -> String {
 /// What a file or a decoder says, without its line breaks.
 fn one_line(text: &str) -> String {
     printable(&text.lines().map(str::trim).collect::<Vec<_>>().join(" "))
-}
-
-/// The content of a file, or what is wrong with it.
-fn read_file(path: &Path) -> std::result::Result<Vec<u8>, String> {
-    let unreadable = |error: std::io::Error| format!("cannot be read ({})", refusal(&error));
-    let facts = std::fs::metadata(path).map_err(unreadable)?;
-    if !facts.is_file() {
-        return Err("is no file".into());
-    }
-    if facts.len() > MAX_FILE_BYTES {
-        return Err(format!("has {} bytes, and at most {MAX_FILE_BYTES} are read", facts.len()));
-    }
-    std::fs::read(path).map_err(unreadable)
 }
 
 /// What the file holds and the scene does not, and which materials, meshes, ... have it.
