@@ -97,28 +97,30 @@ fn rust_type(glsl: &str) -> &str {
     }
 }
 
-/// Charts of the guide, under `tools`.
-const CHARTS: [&str; 9] = [
-    "study/open-box-overview",
-    "study/open-box-radius",
-    "study/open-box-paper",
-    "study/cornell-spheres-overview",
-    "bench/compaction-lavapipe",
-    "bench/peers",
-    "bench/h200/compaction",
-    "bench/h200-scale/scale-photons",
-    "bench/h200-scale/scale-triangles",
+/// Charts and pictures of the guide.
+const CHARTS: [&str; 10] = [
+    "tools/study/open-box-overview.svg",
+    "tools/study/open-box-radius.svg",
+    "tools/study/open-box-paper.svg",
+    "tools/study/cornell-spheres-overview.svg",
+    "tools/bench/compaction-lavapipe.svg",
+    "tools/bench/peers.svg",
+    "tools/bench/h200/compaction.svg",
+    "tools/bench/h200-scale/scale-photons.svg",
+    "tools/bench/h200-scale/scale-triangles.svg",
+    "src/guide/sunlit-room.png",
 ];
 
 /// Markdown that defines a link for each chart, named as its file. The link is the chart itself, as rustdoc keeps no files
 /// beside its pages.
 fn charts() -> String {
-    let definition = |chart: &str| {
-        let path = format!("tools/{chart}.svg");
+    let definition = |path: &str| {
         println!("cargo:rerun-if-changed={path}");
-        let svg = fs::read(&path).unwrap_or_else(|error| panic!("{path}: {error}"));
-        let name = chart.rsplit('/').next().expect("a path has a last part");
-        format!("[{name}]: data:image/svg+xml;base64,{}\n", BASE64.encode(svg))
+        let content = fs::read(path).unwrap_or_else(|error| panic!("{path}: {error}"));
+        let (stem, ending) = path.rsplit_once('.').expect("a file's name has an ending");
+        let name = stem.rsplit('/').next().expect("a path has a last part");
+        let kind = if ending == "svg" { "svg+xml" } else { ending };
+        format!("[{name}]: data:image/{kind};base64,{}\n", BASE64.encode(content))
     };
     CHARTS.map(definition).concat() + "\n"
 }

@@ -250,8 +250,9 @@ fn guide_links_check(path: &str, text: &str, for_rustdoc: &[(String, String)], b
         let has_twin = match target.strip_suffix(".md") {
             Some(page) => for_rustdoc.contains(&(label.clone(), format!("crate::guide::{page}"))),
             None => {
-                let chart = target.trim_start_matches("../../tools/").trim_end_matches(".svg");
-                chart.ends_with(label.as_str()) && build.contains(&format!("\"{chart}\""))
+                let path = target.strip_prefix("../../").map_or_else(|| format!("src/guide/{target}"), ToOwned::to_owned);
+                let stem = path.rsplit_once('.').map_or("", |(stem, _)| stem);
+                stem.ends_with(label.as_str()) && build.contains(&format!("\"{path}\""))
             }
         };
         require(has_twin, || format!("{path}: rustdoc knows no [{label}]"))?;

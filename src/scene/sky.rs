@@ -2,7 +2,7 @@
 //! it sends, as in Pharr, Jakob and Humphreys (2016), section 14.2.4. Kernels have both in `glsl/world/scene/sky.glsl`.
 
 use std::f64::consts::{PI, TAU};
-use std::io::{Cursor, Read};
+use std::io::Cursor;
 use std::ops::RangeInclusive;
 use std::path::Path;
 
@@ -61,13 +61,13 @@ pub struct Table {
 impl Sky {
     /// Reads a Radiance (`.hdr`) or OpenEXR (`.exr`) file; an error says what is wrong with it, and what to do.
     pub fn read(path: &Path) -> Result<Sky, String> {
-        let content = super::file::read(path)?;
+        let mut content = super::file::read(path)?;
         let name = path.file_name().unwrap_or_default().to_string_lossy();
         if content.starts_with(b"#?") {
             let header = RadianceHeader::parse(&content)?;
-            let start = format!("#?RADIANCE\n\n-Y {} +X {}\n", header.height, header.width);
-            let pixels = Cursor::new(start.as_bytes()).chain(&content[header.length..]);
-            let (width, height, mut colours) = decoded(HdrDecoder::new(pixels).map_err(undecodable)?)?;
+            // As the library has it.
+            content.splice(..header.length, format!("#?RADIANCE\n\n-Y {} +X {}\n", header.height, header.width).into_bytes());
+            let (width, height, mut colours) = decoded(HdrDecoder::new(content.as_slice()).map_err(undecodable)?)?;
             if header.is_upside_down {
                 let rows: Vec<Vec3> = colours.chunks(width as usize).rev().flatten().copied().collect();
                 colours = rows;
@@ -119,12 +119,11 @@ impl Sky {
         // The largest texel has the largest exponent that there is, so that dark ones keep their digits beside the sun.
         let power = if most > 0.0 { f64::from(most).log2().floor() as i32 - 14 } else { 0 };
         let (shrink, grow) = (2f64.powi(-power), 2f64.powi(power));
-        colours.par_iter_mut().for_each(|colour| *colour = (colour.as_dvec3() * shrink).as_vec3());
         let texture = Texture {
             name: name.into(),
             width,
             height,
-            texels: Texels::from(colours),
+            texels: Texels::scaled(&colours, shrink),
             wrap: [Wrap::Repeat, Wrap::Clamp],
             filter: Filter::Bilinear,
         };

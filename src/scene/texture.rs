@@ -90,6 +90,14 @@ impl From<Vec<Vec3>> for Texels {
     }
 }
 
+impl Texels {
+    /// Colours times a factor.
+    pub(super) fn scaled(colours: &[Vec3], factor: f64) -> Texels {
+        let texel = |colour: &Vec3| shared_exponent((colour.as_dvec3() * factor).as_vec3());
+        Texels::SharedExponent(colours.par_iter().map(texel).collect())
+    }
+}
+
 /// Of the exponents, and bits of each channel.
 const EXPONENT_BIAS: i32 = 15;
 const MANTISSA_BITS: i32 = 9;
