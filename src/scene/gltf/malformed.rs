@@ -125,6 +125,14 @@ pub(super) fn missing_members(root: &Root) -> Result<(), String> {
             }
         }
     }
+    for (number, animation) in root.animations.iter().enumerate() {
+        let mut nodes = animation.channels.iter().map(|channel| channel.target.node.value()).enumerate();
+        if let Some((place, node)) = nodes.find(|(_, node)| *node >= root.nodes.len()) {
+            let path = format!("animations[{number}].channels[{place}].target.node");
+            let count = root.nodes.len();
+            return Err(format!("is not valid glTF: {path} is {node}, and the list nodes has {count} members, counted from 0; {REMEDY}"));
+        }
+    }
     for (number, image) in root.images.iter().enumerate() {
         if image.uri.is_none() && (image.buffer_view.is_none() || image.mime_type.is_none()) {
             return Err(format!("has an image {number} with neither a URI nor a buffer view and its MIME type"));

@@ -288,13 +288,14 @@ impl Loader {
         for node in scene.nodes() {
             self.place_node(node, poses, DMat4::IDENTITY, 0, &mut nodes, &mut to_world)?;
         }
+        self.require_few_parts(document, &nodes)?;
         let mut skins = HashMap::new();
         let mut parts = Vec::new();
         for node in &nodes {
             let what = node_name(node);
             let own = to_world[&node.index()];
             if let Some(mesh) = node.mesh() {
-                let name = named("mesh", node.name().or(mesh.name()), mesh.index());
+                let name: Arc<str> = named("mesh", node.name().or(mesh.name()), mesh.index()).into();
                 let skin = match node.skin() {
                     Some(skin) => Some(match skins.entry(skin.index()) {
                         Entry::Occupied(known) => Arc::clone(known.get()),
@@ -303,7 +304,7 @@ impl Loader {
                     None => None,
                 };
                 let posed = poses.get(&node.index()).and_then(|pose| pose.weights.as_deref());
-                let weights = posed.or(node.weights()).or(mesh.weights()).unwrap_or_default().to_vec();
+                let weights: Arc<[f32]> = posed.or(node.weights()).or(mesh.weights()).unwrap_or_default().into();
                 for to_node in self.instances(document, node, &what)? {
                     for primitive in mesh.primitives() {
                         let (name, skin, weights) = (name.clone(), skin.clone(), weights.clone());
@@ -366,23 +367,35 @@ impl Loader {
         node.children().try_for_each(|child| self.place_node(child, poses, own, depth + 1, nodes, to_world))
     }
 
-    /// Transforms of a node's instances (EXT_mesh_gpu_instancing); of a node without them, one that does nothing.
-    fn instances(&self, document: &Document, node: &gltf::Node, what: &str) -> Result<Vec<DMat4>> {
+    /// TRANSLATION, ROTATION and SCALE of a node's instances (EXT_mesh_gpu_instancing); `None` of a node without instances.
+    fn instance_accessors<'a>(
+        &self,
+        document: &'a Document,
+        node: &gltf::Node,
+        what: &str,
+    ) -> Result<Option<[Option<gltf::Accessor<'a>>; 3]>> {
         let Some(attributes) = node.extension_value("EXT_mesh_gpu_instancing").map(|extension| &extension["attributes"]) else {
-            return Ok(vec![DMat4::IDENTITY]);
+            return Ok(None);
         };
-        let accessor = |name: &str| -> Result<Option<gltf::Accessor>> {
+        let accessor = |name: &str| -> Result<Option<gltf::Accessor<'a>>> {
             let Some(number) = attributes.get(name) else { return Ok(None) };
             let found = number.as_u64().and_then(|number| document.accessors().nth(usize::try_from(number).ok()?));
             found.map(Some).ok_or_else(|| self.refuse(what, format!("has instances with {name} in accessor {number}, which is not there")))
         };
+        Ok(Some([accessor("TRANSLATION")?, accessor("ROTATION")?, accessor("SCALE")?]))
+    }
+
+    /// Transforms of a node's instances; of a node without them, one that does nothing.
+    fn instances(&self, document: &Document, node: &gltf::Node, what: &str) -> Result<Vec<DMat4>> {
+        let Some([translations, rotations, scales]) = self.instance_accessors(document, node, what)? else {
+            return Ok(vec![DMat4::IDENTITY]);
+        };
         let rows = |accessor: gltf::Accessor| {
             accessor::read(self, &accessor, &Vertices::All, what, |row: [f32; 3]| DVec3::from(row.map(f64::from)))
         };
-        let translations = accessor("TRANSLATION")?.map(rows).transpose()?;
-        let scales = accessor("SCALE")?.map(rows).transpose()?;
+        let (translations, scales) = (translations.map(rows).transpose()?, scales.map(rows).transpose()?);
         let turn = |of: [f32; 4]| DQuat::from_array(of.map(f64::from)).normalize();
-        let rotations = accessor("ROTATION")?.map(|of| accessor::read(self, &of, &Vertices::All, what, turn)).transpose()?;
+        let rotations = rotations.map(|of| accessor::read(self, &of, &Vertices::All, what, turn)).transpose()?;
         let counts: BTreeSet<usize> =
             [translations.as_ref().map(Vec::len), scales.as_ref().map(Vec::len), rotations.as_ref().map(Vec::len)]
                 .into_iter()

@@ -14,7 +14,7 @@ use crate::scene::texture::{Filter, Texels, Texture, Wrap};
 use crate::scene::{Progress, geometry};
 
 /// Of all textures together: half a GiB.
-const MAX_TEXELS: u64 = geometry::MAX_TEXELS as u64 - 256;
+pub(super) const MAX_TEXELS: u64 = geometry::MAX_TEXELS as u64 - 256;
 
 /// What the numbers of a picture mean.
 #[derive(Debug, Clone, Copy, PartialEq, Eq, Hash)]
