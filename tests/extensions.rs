@@ -126,6 +126,23 @@ fn very_many_instances_are_read_or_refused() {
     assert_eq!(open(&value, None).unwrap().triangle_count(), 2 * count);
 }
 
+#[test]
+fn hidden_nodes_hide_all_below_them() {
+    let mut value = animated();
+    value["extensionsRequired"] = json!(["KHR_node_visibility"]);
+    value["nodes"][5]["children"] = json!([2, 1]);
+    value["scenes"][0]["nodes"] = json!([0, 3, 4, 5]);
+    let shown = open(&value, Some(1.0)).unwrap();
+    assert_eq!((shown.meshes.len(), shown.lights.len(), shown.cameras.len()), (2, 3, 1));
+    value["nodes"][5]["extensions"] = json!({"KHR_node_visibility": {"visible": false}});
+    for at in [None, Some(1.0)] {
+        let hidden = open(&value, at).unwrap();
+        assert_eq!((hidden.meshes.len(), hidden.lights.len(), hidden.cameras.len()), (1, 2, 0));
+    }
+    value["nodes"][5]["extensions"] = json!({"KHR_node_visibility": {"visible": true}});
+    assert_eq!(open(&value, None).unwrap().meshes.len(), 2);
+}
+
 /// Without triangles a primitive takes memory all the same.
 #[test]
 fn too_many_primitives_are_refused_before_they_are_listed() {
@@ -213,6 +230,65 @@ fn draco_meshes_hold_what_was_compressed() {
         *value.pointer_mut(&format!("{extension}/{place}")).unwrap_or_else(|| panic!("{place}")) = new;
         assert_refused(&value, None, words);
     }
+}
+
+/// A compressed mesh that shares its accessors with one that is not leaves that one as it is.
+#[test]
+fn draco_meshes_do_not_change_what_shares_their_accessors() {
+    let plain = crate::common::gltf_file::square();
+    let mut value = draco_square();
+    // The same numbers twice: compressed, and plain in accessors that hold other places.
+    let mut bytes = crate::common::gltf_file::square_buffer();
+    bytes[..48].copy_from_slice(&floats(&[0., 0., 0., 7., 0., 0., 7., 7., 0., 0., 7., 0.]));
+    value["buffers"].as_array_mut().unwrap().push(json!({"byteLength": bytes.len(), "uri": data_uri("application/octet-stream", &bytes)}));
+    for (number, view) in plain["bufferViews"].as_array().unwrap().iter().enumerate() {
+        let mut view = view.clone();
+        view["buffer"] = json!(1);
+        value["bufferViews"].as_array_mut().unwrap().push(view);
+        value["accessors"][number]["bufferView"] = json!(2 + number);
+    }
+    let mut primitive = value["meshes"][0]["primitives"][0].clone();
+    primitive.as_object_mut().unwrap().remove("extensions");
+    value["meshes"].as_array_mut().unwrap().push(json!({"primitives": [primitive]}));
+    value["nodes"].as_array_mut().unwrap().push(json!({"mesh": 1}));
+    value["scenes"][0]["nodes"].as_array_mut().unwrap().push(json!(5));
+    let scene = open(&value, None).unwrap();
+    assert_eq!([0, 1].map(|mesh| scene.meshes[mesh].area(0)), [2.0, 24.5]);
+    // Nor is what no node uses unpacked.
+    value["scenes"][0]["nodes"] = json!([5]);
+    value["bufferViews"][0]["byteLength"] = json!(5);
+    assert_eq!(open(&value, None).unwrap().meshes.len(), 1);
+    let mut value = compressed("EXT_meshopt_compression");
+    let unused = value["bufferViews"][0].clone();
+    value["bufferViews"].as_array_mut().unwrap().push(unused);
+    value["bufferViews"][4]["extensions"]["EXT_meshopt_compression"]["byteLength"] = json!(3);
+    assert_eq!(open(&value, None).unwrap().meshes.len(), 1);
+}
+
+/// A few bytes are not unpacked again and again: views together have a limit, and one stream is decoded once.
+#[test]
+fn what_is_compressed_has_a_limit_of_all_together() {
+    let mut value = compressed("EXT_meshopt_compression");
+    value["bufferViews"][0]["extensions"]["EXT_meshopt_compression"]["count"] = json!(1 << 26);
+    let unpacked = value["bufferViews"][0].clone();
+    for number in 0..40 {
+        value["bufferViews"].as_array_mut().unwrap().push(unpacked.clone());
+        value["accessors"]
+            .as_array_mut()
+            .unwrap()
+            .push(json!({"bufferView": 4 + number, "componentType": 5126, "count": 4, "type": "VEC3"}));
+        value["meshes"][0]["primitives"].as_array_mut().unwrap().push(json!({"attributes": {"POSITION": 4 + number}, "indices": 3}));
+    }
+    assert_refused(&value, None, &["compressed buffer view 5", "with those before it", "2147483648"]);
+    let mut value = draco_square();
+    for number in 1..40 {
+        let view = value["bufferViews"][0].clone();
+        value["bufferViews"].as_array_mut().unwrap().push(view);
+        let mut primitive = value["meshes"][0]["primitives"][0].clone();
+        primitive["extensions"]["KHR_draco_mesh_compression"]["bufferView"] = json!(1 + number);
+        value["meshes"][0]["primitives"].as_array_mut().unwrap().push(primitive);
+    }
+    assert_eq!(open(&value, None).unwrap().triangle_count(), 80);
 }
 
 #[test]

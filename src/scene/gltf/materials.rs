@@ -270,16 +270,17 @@ impl Reader<'_> {
     /// A factor from 0 to `high`.
     fn factor(&self, what: &str, value: f32, high: f32) -> Result<f32> {
         let reason = || format!("has the {what} {value}; it must be {}", range(high));
-        self.loader.require(value.is_finite() && (0.0..=high).contains(&value), &self.object, reason)?;
-        Ok(value)
+        within(value, high).ok_or_else(|| self.loader.refuse(&self.object, reason()))
     }
 
     /// A colour with each channel from 0 to `high`.
     fn colour(&self, what: &str, value: [f32; 3], high: f32) -> Result<Vec3> {
         let [red, green, blue] = value;
-        let is_ok = value.iter().all(|channel| channel.is_finite() && (0.0..=high).contains(channel));
-        self.loader.require(is_ok, &self.object, || format!("has the {what} {red} {green} {blue}; each must be {}", range(high)))?;
-        Ok(value.into())
+        let reason = || format!("has the {what} {red} {green} {blue}; each must be {}", range(high));
+        match value.map(|channel| within(channel, high)) {
+            [Some(red), Some(green), Some(blue)] => Ok(Vec3::new(red, green, blue)),
+            _ => Err(self.loader.refuse(&self.object, reason())),
+        }
     }
 
     /// `None`: a thin wall.
@@ -356,6 +357,13 @@ impl Reader<'_> {
     fn parsed<T: DeserializeOwned>(&self, name: &str, value: &Value) -> Result<T> {
         T::deserialize(value).map_err(|error| self.loader.refuse(&self.object, format!("has a {name} that cannot be read ({error})")))
     }
+}
+
+/// A number from 0 to `high`, or what is off that by no more than rounding makes of it.
+fn within(value: f32, high: f32) -> Option<f32> {
+    const ROUNDING: f32 = 1e-5;
+    let near = value.clamp(0.0, high);
+    (value == near || (value - near).abs() <= ROUNDING).then_some(near)
 }
 
 /// From 0.

@@ -95,7 +95,8 @@ impl Loader {
             self.leave_out("second sets of vertex colours", &owner);
         }
         let Some(positions) = primitive.get(&Semantic::Positions) else {
-            return Err(self.refuse(&part.what(), "has no positions"));
+            self.leave_out("primitives without positions", &owner);
+            return Ok(());
         };
         if positions.data_type() != DataType::F32 && !self.is_quantized {
             self.leave_out("that KHR_mesh_quantization is not named (positions of whole numbers are read all the same)", &owner);

@@ -44,7 +44,9 @@ use textures::Wanted;
 
 /// Larger files are refused: their triangles would not fit a device's buffers either.
 const MAX_FILE_BYTES: u64 = 4 << 30;
-const READ_EXTENSIONS: [&str; 23] = [
+/// Hides nodes and all below them.
+const VISIBILITY: &str = "KHR_node_visibility";
+const READ_EXTENSIONS: [&str; 24] = [
     "EXT_lights_image_based",
     "EXT_mesh_gpu_instancing",
     "EXT_meshopt_compression",
@@ -66,6 +68,7 @@ const READ_EXTENSIONS: [&str; 23] = [
     "KHR_materials_volume",
     "KHR_mesh_quantization",
     "KHR_meshopt_compression",
+    VISIBILITY,
     "KHR_texture_basisu",
     "KHR_texture_transform",
 ];
@@ -84,7 +87,7 @@ pub fn load(path: &Path, reading: Reading, progress: Progress) -> Result<Scene> 
     let malformed::Parts { json: text, binary } = malformed::parts(content).map_err(refuse)?;
     let mut json = malformed::json(&text).map_err(refuse)?;
     let mut left_out = LeftOut::default();
-    unread::take_out(&mut json, reading.at.is_some(), &mut left_out);
+    let shown = unread::take_out(&mut json, reading.at.is_some(), &mut left_out);
     let image_light = image_light::of(&json);
     let buffer_count = json["buffers"].as_array().map_or(0, Vec::len);
     let unpacked = compressed::unpack(path, &mut json, binary.as_deref(), Target { buffer: buffer_count, start: 0 })?;
@@ -132,7 +135,7 @@ pub fn load(path: &Path, reading: Reading, progress: Progress) -> Result<Scene> 
         Some(time) => loader.read_poses(&document, time)?,
         None => HashMap::new(),
     };
-    let parts = loader.read_nodes(&document, &poses)?;
+    let parts = loader.read_nodes(&document, &poses, &shown)?;
     loader.read_textures(&document, progress)?;
     loader.read_meshes(&parts, progress)?;
     if let Some(light) = image_light {
@@ -275,8 +278,8 @@ impl Loader {
         read_uri(&self.path, uri).map_err(|reason| self.refuse(what, reason))
     }
 
-    /// Reads cameras, lights and the materials of the primitives that it lists.
-    fn read_nodes<'a>(&mut self, document: &'a Document, poses: &HashMap<usize, Pose>) -> Result<Vec<Part<'a>>> {
+    /// Reads cameras, lights and the materials of the primitives that it lists, of the nodes `shown`.
+    fn read_nodes<'a>(&mut self, document: &'a Document, poses: &HashMap<usize, Pose>, shown: &BTreeSet<usize>) -> Result<Vec<Part<'a>>> {
         let Some(scene) = document.default_scene().or_else(|| document.scenes().next()) else {
             return Err(self.refuse("the file", "holds no scene"));
         };
@@ -288,6 +291,8 @@ impl Loader {
         for node in scene.nodes() {
             self.place_node(node, poses, DMat4::IDENTITY, 0, &mut nodes, &mut to_world)?;
         }
+        // Where hidden ones stand may move joints.
+        nodes.retain(|node| shown.contains(&node.index()));
         self.require_few_parts(document, &nodes)?;
         let mut skins = HashMap::new();
         let mut parts = Vec::new();
