@@ -320,17 +320,19 @@ impl Reader<'_> {
             let count = self.document.textures().len();
             return Err(self.loader.refuse(&self.object, format!("uses texture {number} of {count}")));
         };
-        let Some(texture) = self.loader.texture_place(&texture, meaning) else {
-            return Err(self
-                .loader
-                .refuse(&self.object, format!("uses texture {number}, which has no PNG or JPEG picture; export it with one")));
+        let Some(place) = self.loader.texture_place(&texture, meaning) else {
+            let extensions: Vec<&str> =
+                texture.extensions().into_iter().flat_map(|extensions| extensions.keys()).map(String::as_str).collect();
+            let only = if extensions.is_empty() { String::new() } else { format!(" but by {}", extensions.join(", ")) };
+            let reason = format!("uses texture {number}, which has no picture{only}; export it as PNG, JPEG, WebP or KTX 2");
+            return Err(self.loader.refuse(&self.object, reason));
         };
         let set = transform.and_then(|transform| transform.tex_coord).unwrap_or(set);
         if set > 1 {
             self.loader.leave_out("texture coordinates beyond the second set (the first is used)", &self.object);
         }
         Ok(TextureUse {
-            texture,
+            texture: place,
             uv_set: if set == 1 { 1 } else { 0 },
             transform: transform.map_or(Ok(UvTransform::NONE), |transform| self.uv_transform(transform))?,
         })

@@ -72,8 +72,37 @@ const READ_EXTENSIONS: [&str; 24] = [
     "KHR_texture_basisu",
     "KHR_texture_transform",
 ];
-/// A file that needs one of these is read without it, and a warning says so: it names other materials to choose from.
-const OPTIONAL_EXTENSIONS: [&str; 1] = ["KHR_materials_variants"];
+/// A file that needs one of these is read without it, and a warning says so: each adds to a scene that has a meaning without it, as other
+/// materials to choose from, other looks of a surface, facts, sounds, what moves or may be touched.
+const OPTIONAL_EXTENSIONS: [&str; 27] = [
+    "ADOBE_materials_clearcoat_specular",
+    "ADOBE_materials_clearcoat_tint",
+    "ADOBE_materials_thin_transparency",
+    "AGI_articulations",
+    "AGI_stk_metadata",
+    "CESIUM_primitive_outline",
+    "EXT_instance_features",
+    "EXT_mesh_features",
+    "EXT_mesh_manifold",
+    "EXT_structural_metadata",
+    "KHR_animation_pointer",
+    "KHR_audio_emitter",
+    "KHR_implicit_shapes",
+    "KHR_interactivity",
+    "KHR_materials_diffuse_roughness",
+    "KHR_materials_variants",
+    "KHR_materials_volume_scatter",
+    "KHR_node_hoverability",
+    "KHR_node_selectability",
+    "KHR_physics_rigid_bodies",
+    "KHR_xmp",
+    "KHR_xmp_json_ld",
+    "MSFT_audio_emitter",
+    "MSFT_lod",
+    "NV_materials_mdl",
+    "VRMC_materials_mtoon",
+    "VRMC_vrm",
+];
 /// Nodes within nodes; deeper ones would be a cycle.
 const MAX_DEPTH: usize = 512;
 
@@ -150,8 +179,18 @@ pub fn load(path: &Path, reading: Reading, progress: Progress) -> Result<Scene> 
 /// How to write a file that does without an extension.
 fn remedy(extension: &str) -> &'static str {
     match extension {
-        "EXT_texture_avif" | "MSFT_texture_dds" => "export its textures as PNG or JPEG",
-        _ => "export it without",
+        "EXT_texture_avif" => "convert its textures, as `gltf-transform png IN.glb OUT.glb` does, or export them as PNG or JPEG",
+        "MSFT_texture_dds" => "export its textures as PNG or JPEG",
+        "KHR_techniques_webgl" | "KHR_materials_common" | "KHR_materials_cmnBlinnPhong" => {
+            "export its materials as metallic-roughness ones"
+        }
+        name if name.starts_with("KHR_gaussian_splatting") => "export it as triangles; splats are not read",
+        name if name.contains("compression") => "export it uncompressed, or compressed by Draco or meshoptimizer",
+        name if name.starts_with("EXT_lights") || name.starts_with("KHR_lights") => {
+            "export its lights as KHR_lights_punctual, or as surfaces that emit"
+        }
+        name if name.contains("_materials_") => "export its materials without it, by the settings of the program that wrote it",
+        _ => "switch it off in the export settings of the program that wrote it",
     }
 }
 
@@ -213,6 +252,16 @@ impl LeftOut {
         if !owner.is_empty() {
             owners.insert(owner.to_owned());
         }
+    }
+
+    /// All of it in one line.
+    fn listed(&self) -> Option<String> {
+        let named = |(what, owners): (&String, &BTreeSet<String>)| match owners.is_empty() {
+            true => what.clone(),
+            false => format!("{what}: {}", some_of(owners.iter())),
+        };
+        let list: Vec<String> = self.0.iter().map(named).collect();
+        (!list.is_empty()).then(|| format!("ignored: {}", list.join("; ")))
     }
 }
 
@@ -459,19 +508,15 @@ impl Loader {
         let with_flat = self.scene.meshes.iter().zip(&dropped).filter(|(_, dropped)| **dropped > 0);
         let flat: BTreeSet<String> = with_flat.map(|(mesh, _)| format!("mesh '{}'", mesh.name)).collect();
         self.scene.meshes.retain(|mesh| !mesh.triangles.is_empty());
-        self.require(self.scene.triangle_count() > 0, "the scene", || "holds no triangle".into())?;
+        let ignored = self.left_out.listed();
+        self.require(self.scene.triangle_count() > 0, "the scene", || {
+            ["holds no triangle".to_owned()].into_iter().chain(ignored.clone()).collect::<Vec<_>>().join("; ")
+        })?;
         if !flat.is_empty() {
             let count: usize = dropped.iter().sum();
             self.scene.warnings.push(format!("{} without area left out ({})", counted(count, "triangle"), some_of(flat.iter())));
         }
-        if !self.left_out.0.is_empty() {
-            let named = |(what, owners): (&String, &BTreeSet<String>)| match owners.is_empty() {
-                true => what.clone(),
-                false => format!("{what}: {}", some_of(owners.iter())),
-            };
-            let list: Vec<String> = self.left_out.0.iter().map(named).collect();
-            self.scene.warnings.push(format!("ignored: {}", list.join("; ")));
-        }
+        self.scene.warnings.extend(ignored);
         Ok(self.scene)
     }
 }
