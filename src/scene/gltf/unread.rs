@@ -31,8 +31,8 @@ const NOT_BESIDE_SPEC_GLOSS: [&str; 10] = [
 /// Lists keep their length, as their members are named by numbers. Gives the numbers of the scene's nodes that are not hidden.
 pub(super) fn take_out(root: &mut Value, is_posed: bool, left_out: &mut LeftOut) -> BTreeSet<usize> {
     // Lists that may be missing.
-    for (_, scene) in items_mut(root, "scenes").filter(|(_, scene)| scene["nodes"].is_null()) {
-        scene["nodes"] = json!([]);
+    for scene in items_mut(root, "scenes").filter_map(|(_, scene)| scene.as_object_mut()) {
+        scene.entry("nodes").or_insert_with(|| json!([]));
     }
     let nodes = nodes_of_scene(root);
     take_animations(root, is_posed, &nodes, left_out);
