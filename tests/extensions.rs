@@ -237,6 +237,7 @@ fn draco_meshes_hold_what_was_compressed() {
 fn draco_meshes_do_not_change_what_shares_their_accessors() {
     let plain = crate::common::gltf_file::square();
     let mut value = draco_square();
+    value["accessors"][0]["max"] = json!([0.5, 1, 0]);
     // The same numbers twice: compressed, and plain in accessors that hold other places.
     let mut bytes = crate::common::gltf_file::square_buffer();
     bytes[..48].copy_from_slice(&floats(&[0., 0., 0., 7., 0., 0., 7., 7., 0., 0., 7., 0.]));
@@ -254,6 +255,18 @@ fn draco_meshes_do_not_change_what_shares_their_accessors() {
     value["scenes"][0]["nodes"].as_array_mut().unwrap().push(json!(5));
     let scene = open(&value, None).unwrap();
     assert_eq!([0, 1].map(|mesh| scene.meshes[mesh].area(0)), [2.0, 24.5]);
+    // Each of them has bounds of its own in the file that a bake writes.
+    let folder = tempfile::tempdir().unwrap();
+    let path = folder.path().join("scene.gltf");
+    std::fs::write(&path, value.to_string()).unwrap();
+    let file = photonmill::scene::gltf::source::File::open(&path).unwrap();
+    let positions = |mesh: usize| file.json["meshes"][mesh]["primitives"][0]["attributes"]["POSITION"].as_u64().unwrap() as usize;
+    assert_eq!(positions(1), 0);
+    let unpacked = file.elements(positions(0), "the square").unwrap();
+    for (bound, choose) in [("min", f64::min as fn(f64, f64) -> f64), ("max", f64::max)] {
+        let of = |k: usize| (0..unpacked.count).map(|vertex| unpacked.number(vertex, k)).reduce(choose).unwrap();
+        assert_eq!(file.json["accessors"][positions(0)][bound], json!([of(0), of(1), of(2)]));
+    }
     // Nor is what no node uses unpacked.
     value["scenes"][0]["nodes"] = json!([5]);
     value["bufferViews"][0]["byteLength"] = json!(5);

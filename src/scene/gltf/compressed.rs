@@ -202,9 +202,8 @@ impl<'a> Packed<'a> {
     fn unpack_primitives(&mut self, json: &mut Value) -> Result<()> {
         let found = self.packed_primitives(json)?;
         let decoded = self.decoded_streams(json, &found)?;
-        let users = users(json, &found);
-        // Accessors that something else uses as well stay as they are.
-        let replaceable = |old: &usize| users.get(old).is_some_and(|users| users.len() == 1);
+        // They stay as they are.
+        let mut taken = plain_accessors(json);
         let mut indices_of: HashMap<Stream, usize> = HashMap::new();
         let mut accessor_of: HashMap<(Stream, u64), usize> = HashMap::new();
         for Primitive { mesh, number, what, stream } in &found {
@@ -213,7 +212,7 @@ impl<'a> Packed<'a> {
                 Some(known) => *known,
                 None => {
                     let accessor = json!({"componentType": 5125, "count": indices.len(), "type": "SCALAR"});
-                    let old = place(&json["meshes"][mesh]["primitives"][number]["indices"]).filter(replaceable);
+                    let old = place(&json["meshes"][mesh]["primitives"][number]["indices"]).filter(|old| taken.insert(*old));
                     let added = self.set_accessor(json, old, accessor, None, (bytemuck::cast_slice(indices), what))?;
                     *indices_of.entry(*stream).or_insert(added)
                 }
@@ -241,14 +240,12 @@ impl<'a> Packed<'a> {
                         let mut accessor = like;
                         accessor["count"] = json!(points);
                         accessor["componentType"] = json!(attribute.component_type);
-                        // Compression moves vertices, and only those of positions must be said.
-                        for member in ["byteOffset", "sparse", "min", "max"] {
+                        for member in ["byteOffset", "sparse"] {
                             accessor.as_object_mut().expect("it has a type").remove(member);
                         }
-                        if name == "POSITION" {
-                            [accessor["min"], accessor["max"]] = attribute.bounds().map(|bound| json!(bound));
-                        }
-                        let old = Some(old).filter(replaceable);
+                        // Compression moves vertices.
+                        [accessor["min"], accessor["max"]] = attribute.bounds().map(|bound| json!(bound));
+                        let old = Some(old).filter(|old| taken.insert(*old));
                         let added = self.set_accessor(json, old, accessor, Some(attribute.stride), (&attribute.bytes, what))?;
                         *accessor_of.entry((*stream, id)).or_insert(added)
                     }
@@ -315,7 +312,7 @@ impl<'a> Packed<'a> {
     }
 
     /// Gives an accessor a view of its own, of vertices with the bytes from one to the next, or of indices. It takes the place of the
-    /// old one, if one is given.
+    /// old one, or is one more.
     fn set_accessor(
         &mut self,
         json: &mut Value,
@@ -347,36 +344,23 @@ fn too_large() -> String {
     format!("unpacks to more than the {MAX_BYTES} bytes that all together may have")
 }
 
-/// What an accessor is for: an attribute in a stream by its number, the stream's indices, or (`None`) what is not compressed.
-type User = Option<(Stream, Option<u64>)>;
-
-/// By the accessors' numbers.
-fn users(json: &Value, found: &[Primitive]) -> HashMap<usize, HashSet<User>> {
-    let streams: HashMap<(usize, usize), Stream> = found.iter().map(|of| ((of.mesh, of.number), of.stream)).collect();
-    let mut users: HashMap<usize, HashSet<_>> = HashMap::new();
-    let mut add = |accessor: &Value, user: User| {
-        if let Some(accessor) = place(accessor) {
-            users.entry(accessor).or_default().insert(user);
-        }
-    };
-    for (mesh, of) in members(json, "meshes") {
-        for (number, primitive) in members(of, "primitives") {
-            let stream = streams.get(&(mesh, number));
-            add(&primitive["indices"], stream.map(|stream| (*stream, None)));
-            for (name, accessor) in entries(&primitive["attributes"]) {
-                let id = primitive["extensions"][DRACO]["attributes"][name].as_u64();
-                add(accessor, stream.zip(id).map(|(stream, id)| (*stream, Some(id))));
-            }
-            members(primitive, "targets").flat_map(|(_, target)| entries(target)).for_each(|(_, accessor)| add(accessor, None));
-        }
+/// Numbers of accessors that something uses which Draco has not compressed.
+fn plain_accessors(json: &Value) -> HashSet<usize> {
+    let mut found = HashSet::new();
+    for (_, primitive) in members(json, "meshes").flat_map(|(_, mesh)| members(mesh, "primitives")) {
+        let compressed = primitive["extensions"].get(DRACO);
+        found.extend(place(&primitive["indices"]).filter(|_| compressed.is_none()));
+        let is_plain = |name: &String| compressed.is_none_or(|compressed| compressed["attributes"].get(name).is_none());
+        found.extend(entries(&primitive["attributes"]).filter(|(name, _)| is_plain(name)).filter_map(|(_, accessor)| place(accessor)));
+        found.extend(members(primitive, "targets").flat_map(|(_, target)| entries(target)).filter_map(|(_, accessor)| place(accessor)));
     }
     for (_, sampler) in members(json, "animations").flat_map(|(_, animation)| members(animation, "samplers")) {
-        ["input", "output"].iter().for_each(|member| add(&sampler[member], None));
+        found.extend(["input", "output"].iter().filter_map(|member| place(&sampler[member])));
     }
-    members(json, "skins").for_each(|(_, skin)| add(&skin["inverseBindMatrices"], None));
+    found.extend(members(json, "skins").filter_map(|(_, skin)| place(&skin["inverseBindMatrices"])));
     let of_instances = members(json, "nodes").flat_map(|(_, node)| entries(&node["extensions"]["EXT_mesh_gpu_instancing"]["attributes"]));
-    of_instances.for_each(|(_, accessor)| add(accessor, None));
-    users
+    found.extend(of_instances.filter_map(|(_, accessor)| place(accessor)));
+    found
 }
 
 fn drop_extensions(object: &mut Value, names: &[&str]) {
