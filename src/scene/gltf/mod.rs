@@ -508,15 +508,15 @@ impl Loader {
         let with_flat = self.scene.meshes.iter().zip(&dropped).filter(|(_, dropped)| **dropped > 0);
         let flat: BTreeSet<String> = with_flat.map(|(mesh, _)| format!("mesh '{}'", mesh.name)).collect();
         self.scene.meshes.retain(|mesh| !mesh.triangles.is_empty());
-        let ignored = self.left_out.listed();
-        self.require(self.scene.triangle_count() > 0, "the scene", || {
-            ["holds no triangle".to_owned()].into_iter().chain(ignored.clone()).collect::<Vec<_>>().join("; ")
-        })?;
         if !flat.is_empty() {
             let count: usize = dropped.iter().sum();
             self.scene.warnings.push(format!("{} without area left out ({})", counted(count, "triangle"), some_of(flat.iter())));
         }
-        self.scene.warnings.extend(ignored);
+        self.scene.warnings.extend(self.left_out.listed());
+        self.require(self.scene.triangle_count() > 0, "the scene", || {
+            let left_out = self.scene.warnings.iter().map(|warning| format!("; {warning}"));
+            "holds no triangle".to_owned() + &left_out.collect::<String>()
+        })?;
         Ok(self.scene)
     }
 }
