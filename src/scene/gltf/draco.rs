@@ -5,6 +5,9 @@ use std::collections::HashMap;
 use draco_core::decode_limits::DecodeLimits;
 use draco_core::{DataType, DecoderBuffer, FaceIndex, Mesh, MeshDecoder, PointIndex};
 
+/// Of one mesh: more would not be read anyhow, and a decoder needs memory beside what it decodes.
+const MAX_COUNT: u64 = 100_000_000;
+
 /// A mesh as accessors have it.
 pub(super) struct Decoded {
     pub(super) indices: Vec<u32>,
@@ -60,7 +63,10 @@ impl Attribute {
 
 /// What takes no more bytes than that; or what is wrong with it.
 pub(super) fn decoded(bytes: &[u8], most_bytes: u64) -> Result<Decoded, String> {
-    let limits = DecodeLimits::default().with_max_points(most_bytes).with_max_faces(most_bytes / 12).with_max_decoded_bytes(most_bytes);
+    let limits = DecodeLimits::default()
+        .with_max_points(most_bytes.min(MAX_COUNT))
+        .with_max_faces((most_bytes / 12).min(MAX_COUNT))
+        .with_max_decoded_bytes(most_bytes);
     let mut mesh = Mesh::new();
     let decoded = MeshDecoder::new().decode(&mut DecoderBuffer::new(bytes).with_limits(limits), &mut mesh);
     decoded.map_err(|error| format!("has a Draco stream that cannot be decoded ({error})"))?;
