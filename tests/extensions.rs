@@ -4,7 +4,9 @@ use std::sync::Arc;
 
 use crate::common::gltf_file::{data_uri, floats};
 use crate::common::prelude::*;
-use crate::common::rich_file::{animated, compressed, draco_square, instanced, ktx2, with_image_light, with_ktx2, with_webp};
+use crate::common::rich_file::{
+    animated, compressed, draco_square, instanced, ktx2, ktx2_in_zstandard, with_image_light, with_ktx2, with_webp,
+};
 use glam::dvec3;
 use photonmill::scene::Reading;
 use serde_json::{Value, json};
@@ -71,6 +73,9 @@ fn faults_of_animations_are_named() {
     let mut value = animated();
     value["animations"][0]["channels"][0]["sampler"] = json!(99);
     assert_refused(&value, Some(1.0), &["animations[0].channels[0].sampler", "99"]);
+    let mut value = animated();
+    value["animations"][0]["channels"][1]["target"]["node"] = json!(77);
+    assert_refused(&value, Some(1.0), &["animations[0].channels[1].target.node is 77", "list nodes has 6 members"]);
     value.as_object_mut().unwrap().remove("animations");
     assert_refused(&value, Some(1.0), &["--at", "has none"]);
     assert!(Scene::open_with("cornell", Reading { radiometric: false, at: Some(0.0) }, &mut |_, _| {}).is_err());
@@ -102,14 +107,14 @@ fn instances_stand_where_their_attributes_say() {
     assert_refused(&value, None, &["node 'wall'", "as many"]);
 }
 
-/// A claim of a billion instances without their numbers is refused, and a hundred thousand are read.
+/// A claim of a million instances without their numbers is refused, and a hundred thousand are read.
 #[test]
 fn very_many_instances_are_read_or_refused() {
     let mut value = instanced();
     let attributes = &value["nodes"][0]["extensions"]["EXT_mesh_gpu_instancing"]["attributes"];
     let places = attributes["TRANSLATION"].as_u64().unwrap() as usize;
     value["nodes"][0]["extensions"]["EXT_mesh_gpu_instancing"]["attributes"] = json!({"TRANSLATION": places});
-    value["accessors"][places]["count"] = json!(1_000_000_000);
+    value["accessors"][places]["count"] = json!(1_000_000);
     assert_refused(&value, None, &["node 'wall'", "runs past"]);
     let count = 100_000;
     let bytes = floats(&(0..3 * count).map(|k| k as f32).collect::<Vec<f32>>());
@@ -119,6 +124,40 @@ fn very_many_instances_are_read_or_refused() {
     let buffer = json!({"byteLength": bytes.len(), "uri": data_uri("application/octet-stream", &bytes)});
     value["buffers"] = json!([value["buffers"][0], buffer]);
     assert_eq!(open(&value, None).unwrap().triangle_count(), 2 * count);
+}
+
+#[test]
+fn hidden_nodes_hide_all_below_them() {
+    let mut value = animated();
+    value["extensionsRequired"] = json!(["KHR_node_visibility"]);
+    value["nodes"][5]["children"] = json!([2, 1]);
+    value["scenes"][0]["nodes"] = json!([0, 3, 4, 5]);
+    let shown = open(&value, Some(1.0)).unwrap();
+    assert_eq!((shown.meshes.len(), shown.lights.len(), shown.cameras.len()), (2, 3, 1));
+    value["nodes"][5]["extensions"] = json!({"KHR_node_visibility": {"visible": false}});
+    for at in [None, Some(1.0)] {
+        let hidden = open(&value, at).unwrap();
+        assert_eq!((hidden.meshes.len(), hidden.lights.len(), hidden.cameras.len()), (1, 2, 0));
+    }
+    value["nodes"][5]["extensions"] = json!({"KHR_node_visibility": {"visible": true}});
+    assert_eq!(open(&value, None).unwrap().meshes.len(), 2);
+}
+
+/// Without triangles a primitive takes memory all the same.
+#[test]
+fn too_many_primitives_are_refused_before_they_are_listed() {
+    let mut value = crate::common::gltf_file::square();
+    let primitive = json!({"attributes": {"POSITION": 0}, "indices": 4});
+    value["accessors"].as_array_mut().unwrap().push(json!({"bufferView": 3, "componentType": 5123, "count": 2, "type": "SCALAR"}));
+    value["meshes"][0]["primitives"] = json!(vec![primitive; 2000]);
+    value["nodes"] = json!(vec![json!({"mesh": 0}); 2000]);
+    value["scenes"][0]["nodes"] = json!((0..2000).collect::<Vec<usize>>());
+    assert_refused(&value, None, &["node 1000", "over 2000000 primitives", "join meshes"]);
+    // A claim of instances, before they are looked for.
+    let mut value = instanced();
+    let places = value["nodes"][0]["extensions"]["EXT_mesh_gpu_instancing"]["attributes"]["TRANSLATION"].as_u64().unwrap() as usize;
+    value["accessors"][places]["count"] = json!(1_000_000_000);
+    assert_refused(&value, None, &["node 'wall'", "over 2000000 primitives"]);
 }
 
 #[test]
@@ -193,6 +232,78 @@ fn draco_meshes_hold_what_was_compressed() {
     }
 }
 
+/// A compressed mesh that shares its accessors with one that is not leaves that one as it is.
+#[test]
+fn draco_meshes_do_not_change_what_shares_their_accessors() {
+    let plain = crate::common::gltf_file::square();
+    let mut value = draco_square();
+    value["accessors"][0]["max"] = json!([0.5, 1, 0]);
+    // The same numbers twice: compressed, and plain in accessors that hold other places.
+    let mut bytes = crate::common::gltf_file::square_buffer();
+    bytes[..48].copy_from_slice(&floats(&[0., 0., 0., 7., 0., 0., 7., 7., 0., 0., 7., 0.]));
+    value["buffers"].as_array_mut().unwrap().push(json!({"byteLength": bytes.len(), "uri": data_uri("application/octet-stream", &bytes)}));
+    for (number, view) in plain["bufferViews"].as_array().unwrap().iter().enumerate() {
+        let mut view = view.clone();
+        view["buffer"] = json!(1);
+        value["bufferViews"].as_array_mut().unwrap().push(view);
+        value["accessors"][number]["bufferView"] = json!(2 + number);
+    }
+    let mut primitive = value["meshes"][0]["primitives"][0].clone();
+    primitive.as_object_mut().unwrap().remove("extensions");
+    value["meshes"].as_array_mut().unwrap().push(json!({"primitives": [primitive]}));
+    value["nodes"].as_array_mut().unwrap().push(json!({"mesh": 1}));
+    value["scenes"][0]["nodes"].as_array_mut().unwrap().push(json!(5));
+    let scene = open(&value, None).unwrap();
+    assert_eq!([0, 1].map(|mesh| scene.meshes[mesh].area(0)), [2.0, 24.5]);
+    // Each of them has bounds of its own in the file that a bake writes.
+    let folder = tempfile::tempdir().unwrap();
+    let path = folder.path().join("scene.gltf");
+    std::fs::write(&path, value.to_string()).unwrap();
+    let file = photonmill::scene::gltf::source::File::open(&path).unwrap();
+    let positions = |mesh: usize| file.json["meshes"][mesh]["primitives"][0]["attributes"]["POSITION"].as_u64().unwrap() as usize;
+    assert_eq!(positions(1), 0);
+    let unpacked = file.elements(positions(0), "the square").unwrap();
+    for (bound, choose) in [("min", f64::min as fn(f64, f64) -> f64), ("max", f64::max)] {
+        let of = |k: usize| (0..unpacked.count).map(|vertex| unpacked.number(vertex, k)).reduce(choose).unwrap();
+        assert_eq!(file.json["accessors"][positions(0)][bound], json!([of(0), of(1), of(2)]));
+    }
+    // Nor is what no node uses unpacked.
+    value["scenes"][0]["nodes"] = json!([5]);
+    value["bufferViews"][0]["byteLength"] = json!(5);
+    assert_eq!(open(&value, None).unwrap().meshes.len(), 1);
+    let mut value = compressed("EXT_meshopt_compression");
+    let unused = value["bufferViews"][0].clone();
+    value["bufferViews"].as_array_mut().unwrap().push(unused);
+    value["bufferViews"][4]["extensions"]["EXT_meshopt_compression"]["byteLength"] = json!(3);
+    assert_eq!(open(&value, None).unwrap().meshes.len(), 1);
+}
+
+/// A few bytes are not unpacked again and again: views together have a limit, and one stream is decoded once.
+#[test]
+fn what_is_compressed_has_a_limit_of_all_together() {
+    let mut value = compressed("EXT_meshopt_compression");
+    value["bufferViews"][0]["extensions"]["EXT_meshopt_compression"]["count"] = json!(1 << 26);
+    let unpacked = value["bufferViews"][0].clone();
+    for number in 0..40 {
+        value["bufferViews"].as_array_mut().unwrap().push(unpacked.clone());
+        value["accessors"]
+            .as_array_mut()
+            .unwrap()
+            .push(json!({"bufferView": 4 + number, "componentType": 5126, "count": 4, "type": "VEC3"}));
+        value["meshes"][0]["primitives"].as_array_mut().unwrap().push(json!({"attributes": {"POSITION": 4 + number}, "indices": 3}));
+    }
+    assert_refused(&value, None, &["compressed buffer view 5", "with those before it", "2147483648"]);
+    let mut value = draco_square();
+    for number in 1..40 {
+        let view = value["bufferViews"][0].clone();
+        value["bufferViews"].as_array_mut().unwrap().push(view);
+        let mut primitive = value["meshes"][0]["primitives"][0].clone();
+        primitive["extensions"]["KHR_draco_mesh_compression"]["bufferView"] = json!(1 + number);
+        value["meshes"][0]["primitives"].as_array_mut().unwrap().push(primitive);
+    }
+    assert_eq!(open(&value, None).unwrap().triangle_count(), 80);
+}
+
 #[test]
 fn ktx2_pictures_are_read() {
     let scene = open(&with_ktx2(&ktx2(&[[255, 0, 0, 255], [0, 255, 0, 255]])), None).unwrap();
@@ -205,6 +316,44 @@ fn ktx2_pictures_are_read() {
     broken[116] = 1;
     for bytes in [&whole[..30], &whole[..whole.len() - 3], &broken] {
         assert_refused(&with_ktx2(bytes), None, &["texture image", "cannot be decoded"]);
+    }
+}
+
+/// Whatever the head of a picture claims, it is read or refused in a line, and takes no memory that the picture does not need.
+#[test]
+fn heads_of_ktx2_pictures_are_not_believed() {
+    let blocks = [[255, 0, 0, 255], [0, 255, 0, 255]];
+    for whole in [ktx2(&blocks), ktx2_in_zstandard(&blocks)] {
+        assert!(open(&with_ktx2(&whole), None).is_ok());
+        for at in (12..104).step_by(4) {
+            for number in [u64::MAX, 1 << 63, 1 << 40, 1 << 33, 0x7fff_ffff, 1 << 16] {
+                for width in [4, 8] {
+                    let mut bytes = whole.clone();
+                    bytes[at..at + width].copy_from_slice(&number.to_le_bytes()[..width]);
+                    if let Err(error) = open(&with_ktx2(&bytes), None) {
+                        assert_eq!(error.to_string().lines().count(), 1, "{at}: {error}");
+                    }
+                }
+            }
+        }
+    }
+    // A key that ends where no word ends.
+    let mut bytes = ktx2(&blocks);
+    let keys = bytes.len() as u32;
+    bytes.extend(9u32.to_le_bytes());
+    bytes.extend(b"KTXwriter\0\0\0");
+    bytes[56..60].copy_from_slice(&keys.to_le_bytes());
+    bytes[60..64].copy_from_slice(&13u32.to_le_bytes());
+    assert!(open(&with_ktx2(&bytes), None).is_ok());
+    for (at, value, words) in [
+        (12, 43, &["texture image", "Vulkan's format 43", "toktx --encode uastc"][..]),
+        (80 + 24 + 12, 1, &["colour model 1", "toktx --encode uastc"]),
+        (36, 6, &["6 faces", "one picture"]),
+        (88, 77, &["bytes that it does not have"]),
+    ] {
+        let mut bytes = ktx2(&blocks);
+        bytes[at] = value;
+        assert_refused(&with_ktx2(&bytes), None, words);
     }
 }
 

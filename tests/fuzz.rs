@@ -677,7 +677,7 @@ fn extensions_with_changed_members_are_read_or_refused() {
         rich_file::with_webp(),
         rich_file::draco_square(),
         rich_file::with_image_light(),
-        rich_file::with_ktx2(&rich_file::ktx2(&[[1, 2, 3, 4], [5, 6, 7, 8]])),
+        rich_file::with_ktx2(&rich_file::ktx2_in_zstandard(&[[1, 2, 3, 4], [5, 6, 7, 8]])),
     ];
     let mut random = Random(SEED);
     let mut read = 0;

@@ -2,6 +2,7 @@
 
 use crate::common::gltf_file::{data_uri, encoded, square};
 use crate::common::prelude::*;
+use crate::common::rich_file::animated;
 use image::{ImageFormat, RgbImage};
 use serde_json::{Value, json};
 
@@ -146,6 +147,18 @@ fn textures_are_named_with_what_is_unusual_about_them() {
     }
     let json = text(&place.run("info a.gltf --json").stdout);
     assert!(json.contains("0.3,") && !json.contains("0.30000"), "{json}");
+}
+
+#[test]
+fn a_pose_is_described() {
+    let place = Place::new();
+    place.write("a.gltf", animated().to_string());
+    let said = |command: &str| text(&place.run(command).stdout);
+    assert!(said("info a.gltf").contains("animations (--at SECONDS takes a pose of the first)"));
+    let posed = said("info a.gltf --at 1");
+    assert!(posed.contains("what animations move besides nodes") && !posed.contains("--at SECONDS"), "{posed}");
+    assert!(said("info a.gltf --at -1").contains("what animations move besides nodes"));
+    assert!(place.refusal("info cornell --at 1").unwrap().contains("--at"));
 }
 
 #[test]

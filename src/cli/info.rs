@@ -9,6 +9,7 @@ use serde::Serialize;
 
 use super::progress::{ProgressArgs, ProgressReporter};
 use super::scene::stages;
+use super::values::parse_number;
 use super::{JsonOrStdoutArg, help, optional_file, say};
 use crate::error::Result;
 use crate::output::destination::write_all;
@@ -24,6 +25,9 @@ pub(super) struct InfoArgs {
     json: JsonOrStdoutArg,
     #[arg(value_name = "SCENE", help = help::scene())]
     scene: String,
+    /// Take nodes, skins and morph targets as the file's first animation has them at this time [default: at rest]
+    #[arg(long, value_name = "SECONDS", value_parser = parse_number::<f64>, allow_hyphen_values = true, help_heading = "Scene")]
+    at: Option<f64>,
     #[command(flatten)]
     progress: ProgressArgs,
 }
@@ -75,7 +79,7 @@ struct LightEntry {
 pub(super) fn run(args: &InfoArgs) -> Result<()> {
     let json = optional_file("--json", args.json.json.as_ref())?;
     let reporter = ProgressReporter::new(&args.progress);
-    let scene = Scene::open_with(&args.scene, Reading::default(), &mut stages(&args.scene, &reporter))?;
+    let scene = Scene::open_with(&args.scene, Reading { at: args.at, ..Reading::default() }, &mut stages(&args.scene, &reporter))?;
     reporter.finish();
     let contents = Contents::of(&scene);
     if let Some(json) = json {

@@ -162,6 +162,19 @@ pub fn ktx2(blocks: &[[u8; 4]]) -> Vec<u8> {
     bytes
 }
 
+/// The same with its blocks in a frame of Zstandard, which holds them as they are: fewer than 16 of them.
+pub fn ktx2_in_zstandard(blocks: &[[u8; 4]]) -> Vec<u8> {
+    let mut bytes = ktx2(blocks);
+    let texels = bytes.split_off(80 + 24 + 44);
+    // Its mark, one byte for its length, one block, which is the last.
+    bytes.extend([0x28, 0xb5, 0x2f, 0xfd, 0x20, texels.len() as u8]);
+    bytes.extend(&(1 | (texels.len() as u32) << 3).to_le_bytes()[..3]);
+    bytes.extend(&texels);
+    bytes[44] = 2;
+    bytes[88..96].copy_from_slice(&(texels.len() as u64 + 9).to_le_bytes());
+    bytes
+}
+
 /// The square with a picture that only KHR_texture_basisu names.
 pub fn with_ktx2(picture: &[u8]) -> Value {
     let mut value = with_webp();

@@ -137,7 +137,9 @@ fn elements<'a>(loader: &'a Loader, accessor: &Accessor, dimensions: Dimensions,
     let mut elements = match accessor.view() {
         Some(view) => slice(loader, &view, accessor.offset(), count, size, what)?,
         // Without a view the accessor holds zeros; a count that no file backs must not fill memory.
-        None if count <= loader.file_bytes => Elements { bytes: &[0u8; 64], stride: 0, size, count, replaced: HashMap::new() },
+        None if count <= loader.file_bytes + loader.buffers.iter().map(Vec::len).sum::<usize>() => {
+            Elements { bytes: &[0u8; 64], stride: 0, size, count, replaced: HashMap::new() }
+        }
         None => return Err(loader.refuse(what, format!("claims {count} elements that the file does not hold"))),
     };
     if let Some(sparse) = accessor.sparse() {

@@ -2,7 +2,7 @@
 //! (EXT_meshopt_compression and its later name, KHR_meshopt_compression), primitives by Draco (KHR_draco_mesh_compression).
 
 use std::borrow::Cow;
-use std::collections::{HashMap, HashSet};
+use std::collections::{BTreeMap, HashMap, HashSet};
 use std::path::Path;
 
 use meshopt::{decode_filter_color, decode_filter_exp, decode_filter_oct, decode_filter_quat, decode_index_buffer, decode_index_sequence};
@@ -60,6 +60,18 @@ pub(super) struct Target {
     pub(super) start: usize,
 }
 
+/// Bytes that hold a mesh: their buffer, where they begin and where they end.
+type Stream = (usize, usize, usize);
+
+/// One that Draco has compressed.
+struct Primitive {
+    mesh: usize,
+    number: usize,
+    /// Its name in complaints.
+    what: String,
+    stream: Stream,
+}
+
 /// A file that may have something compressed.
 struct Packed<'a> {
     path: &'a Path,
@@ -93,17 +105,21 @@ fn members<'a>(root: &'a Value, list: &str) -> impl Iterator<Item = (usize, &'a 
     root[list].as_array().into_iter().flatten().enumerate()
 }
 
+fn entries(object: &Value) -> impl Iterator<Item = (&String, &Value)> {
+    object.as_object().into_iter().flatten()
+}
+
 fn place(value: &Value) -> Option<usize> {
     value.as_u64().and_then(|number| usize::try_from(number).ok())
 }
 
-impl Packed<'_> {
+impl<'a> Packed<'a> {
     fn refuse(&self, object: &str, reason: impl AsRef<str>) -> Error {
         Error::Scene { path: self.path.to_owned(), object: object.to_owned(), reason: one_line(reason.as_ref()) }
     }
 
     /// The buffers of these numbers, each read once.
-    fn buffers(&self, json: &Value, numbers: impl Iterator<Item = usize>) -> Result<HashMap<usize, Cow<'_, [u8]>>> {
+    fn buffers(&self, json: &Value, numbers: impl Iterator<Item = usize>) -> Result<HashMap<usize, Cow<'a, [u8]>>> {
         let mut read = HashMap::new();
         let count = members(json, "buffers").count();
         for number in numbers {
@@ -126,7 +142,7 @@ impl Packed<'_> {
     fn keep(&mut self, bytes: &[u8], what: &str) -> Result<usize> {
         let start = self.unpacked.len();
         if (start + bytes.len()) as u64 > MAX_BYTES {
-            return Err(self.refuse(what, format!("unpacks to more than the {MAX_BYTES} bytes that all together may have")));
+            return Err(self.refuse(what, too_large()));
         }
         self.unpacked.extend(bytes);
         self.unpacked.resize(self.unpacked.len().next_multiple_of(4), 0);
@@ -141,9 +157,6 @@ impl Packed<'_> {
             members(json, list).filter_map(of).collect()
         };
         let views = packed("bufferViews");
-        if views.is_empty() {
-            return Ok(());
-        }
         // Buffers that stand for what is unpacked.
         let holds = |place: &usize| views.iter().any(|(_, view)| view["buffer"].as_u64() == Some(*place as u64));
         let has_file = |place: &usize| json["buffers"][place]["uri"].is_string();
@@ -159,19 +172,26 @@ impl Packed<'_> {
             Ok((*number, what, view))
         };
         let parsed = views.iter().map(parse).collect::<Result<Vec<_>>>()?;
+        let mut claimed = 0u64;
+        for (_, what, View { count, byte_stride, .. }) in &parsed {
+            claimed = (*count as u64).saturating_mul(*byte_stride as u64).saturating_add(claimed);
+            if claimed > MAX_BYTES {
+                let reason = format!("claims, with those before it, {claimed} bytes; allowed are {MAX_BYTES} for all that is compressed");
+                return Err(self.refuse(what, reason));
+            }
+        }
         let buffers = self.buffers(json, parsed.iter().map(|(_, _, view)| view.buffer))?;
-        let decode = |(_, what, view): &(usize, String, View)| {
-            decoded_view(&buffers[&view.buffer], view).map_err(|reason| self.refuse(what, reason))
-        };
-        let decoded = parsed.par_iter().map(decode).collect::<Result<Vec<_>>>()?;
-        drop(buffers);
-        for ((number, what, _), bytes) in parsed.iter().zip(decoded) {
-            let start = self.keep(&bytes, what)?;
-            let view = &mut json["bufferViews"][number];
-            view["buffer"] = json!(self.target.buffer);
-            view["byteOffset"] = json!(start);
-            view["byteLength"] = json!(bytes.len());
-            drop_extensions(view, &MESHOPT);
+        for batch in parsed.chunks(rayon::current_num_threads()) {
+            let decoded: Vec<_> = batch.par_iter().map(|(_, _, view)| decoded_view(&buffers[&view.buffer], view)).collect();
+            for ((number, what, _), decoded) in batch.iter().zip(decoded) {
+                let bytes = decoded.map_err(|reason| self.refuse(what, reason))?;
+                let start = self.keep(&bytes, what)?;
+                let view = &mut json["bufferViews"][number];
+                view["buffer"] = json!(self.target.buffer);
+                view["byteOffset"] = json!(start);
+                view["byteLength"] = json!(bytes.len());
+                drop_extensions(view, &MESHOPT);
+            }
         }
         for buffer in stand_ins {
             json["buffers"][buffer] = json!({"byteLength": 0, "uri": "data:application/octet-stream;base64,"});
@@ -180,58 +200,21 @@ impl Packed<'_> {
     }
 
     fn unpack_primitives(&mut self, json: &mut Value) -> Result<()> {
-        struct Primitive {
-            mesh: usize,
-            number: usize,
-            what: String,
-            view: usize,
-        }
-        let mut found: Vec<Primitive> = Vec::new();
-        for (mesh, of) in members(json, "meshes") {
-            for (number, primitive) in members(of, "primitives") {
-                let Some(extension) = primitive["extensions"].get(DRACO) else { continue };
-                let what = format!("mesh '{}', primitive {number}", named("mesh", of["name"].as_str(), mesh));
-                let view = place(&extension["bufferView"]).filter(|view| json["bufferViews"].get(view).is_some());
-                let Some(view) = view else {
-                    let view = &extension["bufferView"];
-                    return Err(self.refuse(&what, format!("is compressed in the buffer view {view}, which is not there; {REMEDY}")));
-                };
-                found.push(Primitive { mesh, number, what, view });
-            }
-        }
-        if found.is_empty() {
-            return Ok(());
-        }
-        let views = || found.iter().map(|primitive| &json["bufferViews"][primitive.view]);
-        let buffers = self.buffers(json, views().filter_map(|view| place(&view["buffer"])))?;
-        // Primitives may share what is compressed.
-        let mut firsts: HashMap<usize, &Primitive> = HashMap::new();
-        for primitive in &found {
-            firsts.entry(primitive.view).or_insert(primitive);
-        }
-        let decode = |(number, primitive): (&usize, &&Primitive)| {
-            let view = &json["bufferViews"][*number];
-            let start = place(&view["byteOffset"]).unwrap_or(0);
-            let end = place(&view["byteLength"]).and_then(|length| start.checked_add(length));
-            let bytes = place(&view["buffer"]).and_then(|buffer| buffers[&buffer].get(start..end?));
-            let bytes = bytes.ok_or_else(|| self.refuse(&primitive.what, "is compressed in a buffer view that runs past its buffer"))?;
-            let decoded = draco::decoded(bytes).map_err(|reason| self.refuse(&primitive.what, format!("{reason}; {REMEDY}")))?;
-            Ok((*number, decoded))
-        };
-        let decoded = firsts.par_iter().map(decode).collect::<Result<HashMap<_, _>>>()?;
-        drop(buffers);
-        let mut indices_of: HashMap<usize, usize> = HashMap::new();
-        let mut taken = HashSet::new();
-        let mut accessor_of: HashMap<(usize, u64), usize> = HashMap::new();
-        for Primitive { mesh, number, what, view } in &found {
-            let draco::Decoded { indices, points, attributes } = &decoded[view];
-            let indices = match indices_of.get(view) {
+        let found = self.packed_primitives(json)?;
+        let decoded = self.decoded_streams(json, &found)?;
+        // They stay as they are.
+        let mut taken = plain_accessors(json);
+        let mut indices_of: HashMap<Stream, usize> = HashMap::new();
+        let mut accessor_of: HashMap<(Stream, u64), usize> = HashMap::new();
+        for Primitive { mesh, number, what, stream } in &found {
+            let draco::Decoded { indices, points, attributes } = &decoded[stream];
+            let indices = match indices_of.get(stream) {
                 Some(known) => *known,
                 None => {
                     let accessor = json!({"componentType": 5125, "count": indices.len(), "type": "SCALAR"});
                     let old = place(&json["meshes"][mesh]["primitives"][number]["indices"]).filter(|old| taken.insert(*old));
                     let added = self.set_accessor(json, old, accessor, None, (bytemuck::cast_slice(indices), what))?;
-                    *indices_of.entry(*view).or_insert(added)
+                    *indices_of.entry(*stream).or_insert(added)
                 }
             };
             let primitive = json["meshes"][mesh]["primitives"][number].clone();
@@ -251,7 +234,7 @@ impl Packed<'_> {
                     let reason = format!("has a compressed {name} of {} numbers, and {} was announced", attribute.components, like["type"]);
                     return Err(self.refuse(what, format!("{reason}; {REMEDY}")));
                 }
-                let added = match accessor_of.get(&(*view, id)) {
+                let added = match accessor_of.get(&(*stream, id)) {
                     Some(known) => *known,
                     None => {
                         let mut accessor = like;
@@ -260,9 +243,11 @@ impl Packed<'_> {
                         for member in ["byteOffset", "sparse"] {
                             accessor.as_object_mut().expect("it has a type").remove(member);
                         }
+                        // Compression moves vertices.
+                        [accessor["min"], accessor["max"]] = attribute.bounds().map(|bound| json!(bound));
                         let old = Some(old).filter(|old| taken.insert(*old));
                         let added = self.set_accessor(json, old, accessor, Some(attribute.stride), (&attribute.bytes, what))?;
-                        *accessor_of.entry((*view, id)).or_insert(added)
+                        *accessor_of.entry((*stream, id)).or_insert(added)
                     }
                 };
                 json["meshes"][mesh]["primitives"][number]["attributes"][&name] = json!(added);
@@ -276,8 +261,58 @@ impl Packed<'_> {
         Ok(())
     }
 
+    /// All primitives that are compressed.
+    fn packed_primitives(&self, json: &Value) -> Result<Vec<Primitive>> {
+        let mut found: Vec<Primitive> = Vec::new();
+        for (mesh, of) in members(json, "meshes") {
+            for (number, primitive) in members(of, "primitives") {
+                let Some(extension) = primitive["extensions"].get(DRACO) else { continue };
+                let what = format!("mesh '{}', primitive {number}", named("mesh", of["name"].as_str(), mesh));
+                let view = place(&extension["bufferView"]).and_then(|view| json["bufferViews"].get(view));
+                let Some(view) = view else {
+                    let view = &extension["bufferView"];
+                    return Err(self.refuse(&what, format!("is compressed in the buffer view {view}, which is not there; {REMEDY}")));
+                };
+                let start = place(&view["byteOffset"]).unwrap_or(0);
+                let end = place(&view["byteLength"]).and_then(|length| start.checked_add(length));
+                let stream = place(&view["buffer"]).zip(end).map(|(buffer, end)| (buffer, start, end));
+                let stream =
+                    stream.ok_or_else(|| self.refuse(&what, format!("is compressed in a buffer view that says no place; {REMEDY}")))?;
+                found.push(Primitive { mesh, number, what, stream });
+            }
+        }
+        Ok(found)
+    }
+
+    /// Decodes each stream once, however many primitives it is for.
+    fn decoded_streams(&self, json: &Value, found: &[Primitive]) -> Result<HashMap<Stream, draco::Decoded>> {
+        let buffers = self.buffers(json, found.iter().map(|primitive| primitive.stream.0))?;
+        let mut streams: BTreeMap<Stream, (&[u8], &str)> = BTreeMap::new();
+        for Primitive { stream, what, .. } in found {
+            let (buffer, start, end) = *stream;
+            let bytes = buffers[&buffer].get(start..end);
+            let bytes = bytes.ok_or_else(|| self.refuse(what, "is compressed in a buffer view that runs past its buffer"))?;
+            streams.entry(*stream).or_insert((bytes, what));
+        }
+        let streams: Vec<_> = streams.into_iter().collect();
+        let mut left = MAX_BYTES - self.unpacked.len() as u64;
+        let mut decoded = HashMap::new();
+        for batch in streams.chunks(rayon::current_num_threads()) {
+            let share = left / batch.len() as u64;
+            let within_share: Vec<_> = batch.par_iter().map(|(_, (bytes, _))| draco::decoded(bytes, share)).collect();
+            for ((stream, (bytes, what)), own) in batch.iter().zip(within_share) {
+                // What needs more than its share is decoded alone.
+                let own = own.or_else(|_| draco::decoded(bytes, left));
+                let own = own.map_err(|reason| self.refuse(what, format!("{reason}; {REMEDY}")))?;
+                left = left.checked_sub(own.bytes()).ok_or_else(|| self.refuse(what, too_large()))?;
+                decoded.insert(*stream, own);
+            }
+        }
+        Ok(decoded)
+    }
+
     /// Gives an accessor a view of its own, of vertices with the bytes from one to the next, or of indices. It takes the place of the
-    /// old one, or one more where that has been taken.
+    /// old one, or is one more.
     fn set_accessor(
         &mut self,
         json: &mut Value,
@@ -305,6 +340,29 @@ impl Packed<'_> {
     }
 }
 
+fn too_large() -> String {
+    format!("unpacks to more than the {MAX_BYTES} bytes that all together may have")
+}
+
+/// Numbers of accessors that something uses which Draco has not compressed.
+fn plain_accessors(json: &Value) -> HashSet<usize> {
+    let mut found = HashSet::new();
+    for (_, primitive) in members(json, "meshes").flat_map(|(_, mesh)| members(mesh, "primitives")) {
+        let compressed = primitive["extensions"].get(DRACO);
+        found.extend(place(&primitive["indices"]).filter(|_| compressed.is_none()));
+        let is_plain = |name: &String| compressed.is_none_or(|compressed| compressed["attributes"].get(name).is_none());
+        found.extend(entries(&primitive["attributes"]).filter(|(name, _)| is_plain(name)).filter_map(|(_, accessor)| place(accessor)));
+        found.extend(members(primitive, "targets").flat_map(|(_, target)| entries(target)).filter_map(|(_, accessor)| place(accessor)));
+    }
+    for (_, sampler) in members(json, "animations").flat_map(|(_, animation)| members(animation, "samplers")) {
+        found.extend(["input", "output"].iter().filter_map(|member| place(&sampler[member])));
+    }
+    found.extend(members(json, "skins").filter_map(|(_, skin)| place(&skin["inverseBindMatrices"])));
+    let of_instances = members(json, "nodes").flat_map(|(_, node)| entries(&node["extensions"]["EXT_mesh_gpu_instancing"]["attributes"]));
+    found.extend(of_instances.filter_map(|(_, accessor)| place(accessor)));
+    found
+}
+
 fn drop_extensions(object: &mut Value, names: &[&str]) {
     let Some(extensions) = object.get_mut("extensions").and_then(Value::as_object_mut) else { return };
     extensions.retain(|name, _| !names.contains(&name.as_str()));
@@ -328,10 +386,6 @@ fn decoded_view(buffer: &[u8], view: &View) -> std::result::Result<Vec<u8>, Stri
     }
     if view.mode == Mode::Triangles && count % 3 != 0 {
         return Err(format!("has {count} indices, no whole triangles"));
-    }
-    let bytes = (count as u64).saturating_mul(stride as u64);
-    if bytes > MAX_BYTES {
-        return Err(format!("claims {bytes} bytes; allowed are {MAX_BYTES}"));
     }
     let is_filtered = match view.filter {
         Filter::None => true,

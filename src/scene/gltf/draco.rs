@@ -5,9 +5,8 @@ use std::collections::HashMap;
 use draco_core::decode_limits::DecodeLimits;
 use draco_core::{DataType, DecoderBuffer, FaceIndex, Mesh, MeshDecoder, PointIndex};
 
-/// Of one mesh: more would not be read anyhow.
+/// Of one mesh: more would not be read anyhow, and a decoder needs memory beside what it decodes.
 const MAX_COUNT: u64 = 100_000_000;
-const MAX_BYTES: u64 = 1 << 30;
 
 /// A mesh as accessors have it.
 pub(super) struct Decoded {
@@ -27,15 +26,54 @@ pub(super) struct Attribute {
     pub(super) component_type: u32,
 }
 
-/// Or what is wrong with it.
-pub(super) fn decoded(bytes: &[u8]) -> Result<Decoded, String> {
-    let limits = DecodeLimits::default().with_max_points(MAX_COUNT).with_max_faces(MAX_COUNT).with_max_decoded_bytes(MAX_BYTES);
+impl Decoded {
+    pub(super) fn bytes(&self) -> u64 {
+        let attributes: usize = self.attributes.values().map(|attribute| attribute.bytes.len()).sum();
+        (size_of_val(&self.indices[..]) + attributes) as u64
+    }
+}
+
+impl Attribute {
+    /// The smallest and the largest number of each component, as accessors say them.
+    pub(super) fn bounds(&self) -> [Vec<f64>; 2] {
+        let width = match self.component_type {
+            5120 | 5121 => 1,
+            5122 | 5123 => 2,
+            _ => 4,
+        };
+        let number = |bytes: &[u8]| {
+            let bits = bytes.iter().rev().fold(0, |value, byte| value << 8 | u32::from(*byte));
+            match self.component_type {
+                5120 => f64::from(bits as u8 as i8),
+                5122 => f64::from(bits as u16 as i16),
+                5126 => f64::from(f32::from_bits(bits)),
+                _ => f64::from(bits),
+            }
+        };
+        let of = |choose: fn(f64, f64) -> f64| -> Vec<f64> {
+            let component = |k: usize| {
+                let all = self.bytes.chunks_exact(self.stride.max(1)).map(|point| number(&point[k * width..(k + 1) * width]));
+                all.filter(|number| number.is_finite()).reduce(choose).unwrap_or(0.0)
+            };
+            (0..usize::from(self.components)).map(component).collect()
+        };
+        [of(f64::min), of(f64::max)]
+    }
+}
+
+/// What takes no more bytes than that; or what is wrong with it.
+pub(super) fn decoded(bytes: &[u8], most_bytes: u64) -> Result<Decoded, String> {
+    let limits = DecodeLimits::default()
+        .with_max_points(most_bytes.min(MAX_COUNT))
+        .with_max_faces((most_bytes / 12).min(MAX_COUNT))
+        .with_max_decoded_bytes(most_bytes);
     let mut mesh = Mesh::new();
     let decoded = MeshDecoder::new().decode(&mut DecoderBuffer::new(bytes).with_limits(limits), &mut mesh);
     decoded.map_err(|error| format!("has a Draco stream that cannot be decoded ({error})"))?;
     let points = mesh.num_points();
     let corners = (0..mesh.num_faces() as u32).flat_map(|face| mesh.face(FaceIndex(face)));
     let indices: Vec<u32> = corners.map(|point| point.0).collect();
+    let mut left = most_bytes.saturating_sub(size_of_val(&indices[..]) as u64);
     let mut attributes = HashMap::new();
     for number in 0..mesh.num_attributes() {
         let attribute = mesh.attribute(number);
@@ -50,6 +88,7 @@ pub(super) fn decoded(bytes: &[u8]) -> Result<Decoded, String> {
         };
         let size = width * usize::from(attribute.num_components());
         let stride = size.next_multiple_of(4);
+        left = left.checked_sub((points * stride) as u64).ok_or("has a Draco stream of more bytes than may be unpacked")?;
         let (values, step) = (attribute.buffer().data(), attribute.byte_stride().max(0) as usize);
         let mut bytes = vec![0; points * stride];
         for (point, own) in bytes.chunks_exact_mut(stride.max(1)).enumerate() {

@@ -11,7 +11,7 @@ use crate::text::echo;
 
 pub(super) const REMEDY: &str = "correct it, or export the file again";
 /// Which list a member's number is a place in.
-const LISTS: [(&str, &str); 16] = [
+const LISTS: [(&str, &str); 17] = [
     ("buffer", "buffers"),
     ("bufferView", "bufferViews"),
     ("camera", "cameras"),
@@ -20,6 +20,7 @@ const LISTS: [(&str, &str); 16] = [
     ("indices", "accessors"),
     ("inverseBindMatrices", "accessors"),
     ("joints", "nodes"),
+    ("light", "extensions/KHR_lights_punctual/lights"),
     ("material", "materials"),
     ("mesh", "meshes"),
     ("nodes", "nodes"),
@@ -45,14 +46,34 @@ pub(super) fn parts(content: &[u8]) -> Result<Parts<'_>, String> {
     Ok(Parts { json: glb.json, binary: glb.bin.map(Cow::into_owned) })
 }
 
+/// Whole numbers are integers in it, however they are written, as `3.0`.
 pub(super) fn json(text: &[u8]) -> Result<Value, String> {
-    serde_json::from_slice(text).map_err(|error| {
+    let mut value = serde_json::from_slice(text).map_err(|error| {
         const AROUND: usize = 25;
         let line = text.split(|byte| *byte == b'\n').nth(error.line().saturating_sub(1)).unwrap_or_default();
         let place = error.column().min(line.len());
         let found = String::from_utf8_lossy(&line[place.saturating_sub(AROUND)..(place + AROUND).min(line.len())]);
         format!("is not valid JSON: {error}, near '{}'; {REMEDY} (JSON has no NaN and no infinity)", found.trim())
-    })
+    })?;
+    make_whole(&mut value);
+    Ok(value)
+}
+
+fn make_whole(value: &mut Value) {
+    // Beyond, not every integer is a number of double precision.
+    const MOST: f64 = (1u64 << 53) as f64;
+    match value {
+        Value::Number(number) => {
+            let float = number.as_f64().filter(|float| number.is_f64() && float.fract() == 0.0 && float.abs() < MOST);
+            // -0 is no integer.
+            if let Some(float) = float.filter(|float| *float != 0.0 || float.is_sign_positive()) {
+                *number = (float as i64).into();
+            }
+        }
+        Value::Array(members) => members.iter_mut().for_each(make_whole),
+        Value::Object(members) => members.values_mut().for_each(make_whole),
+        _ => {}
+    }
 }
 
 pub(super) fn root(json: Value) -> Result<Root, String> {
@@ -63,15 +84,17 @@ pub(super) fn root(json: Value) -> Result<Root, String> {
 pub(super) fn faults(root: &Root, text: &[u8]) -> Result<(), String> {
     let mut first = None;
     root.validate(root, Path::new, &mut |path, fault| {
-        // An accessor without a view holds zeros.
-        let is_allowed = |path: &str| fault == Fault::Missing && path.starts_with("accessors[") && path.ends_with("].bufferView");
+        // An accessor without a view holds zeros, and a primitive without positions is left out.
+        let is_optional = |path: &str| path.starts_with("accessors[") && path.ends_with("].bufferView") || path.ends_with("[\"POSITION\"]");
+        let is_allowed = |path: &str| fault == Fault::Missing && is_optional(path);
         if first.is_none() {
             first = Some((path().0, fault)).filter(|(path, _)| !is_allowed(path));
         }
     });
     let Some((path, fault)) = first else { return Ok(()) };
     let json = json(text)?;
-    let pointer = format!("/{}", path.replace(['.', '['], "/").replace([']', '"'], ""));
+    let pointer = pointer(&json, &path);
+    let path = if pointer.contains("/extensions/") { readable(&pointer) } else { path };
     let found = json.pointer(&pointer).map_or_else(|| "a name that glTF does not have".to_owned(), echo);
     // The last name of `meshes[0].primitives[1].mode` is `mode`.
     let member = pointer.rsplit('/').find(|part| part.parse::<usize>().is_err()).unwrap_or_default();
@@ -79,7 +102,8 @@ pub(super) fn faults(root: &Root, text: &[u8]) -> Result<(), String> {
         Fault::Missing => format!("{path} is missing; add it"),
         Fault::IndexOutOfBounds => {
             let list = LISTS.iter().find(|(name, _)| *name == member).map_or(member, |(_, list)| *list);
-            let count = json[list].as_array().map_or(0, Vec::len);
+            let count = json.pointer(&format!("/{list}")).and_then(Value::as_array).map_or(0, Vec::len);
+            let list = list.replace('/', ".");
             format!("{path} is {found}, and the list {list} has {count} members, counted from 0; correct the number")
         }
         Fault::Invalid => match allowed(&path, member) {
@@ -89,6 +113,25 @@ pub(super) fn faults(root: &Root, text: &[u8]) -> Result<(), String> {
         Fault::Oversize | Fault::Unsupported => format!("{path} is {found}: {}; correct it", fault.to_string().to_lowercase()),
     };
     Err(format!("is not valid glTF: {reason}, or export the file again"))
+}
+
+/// A path of the `gltf` crate as a JSON pointer. The crate has names of its own for extensions: `ior` for `KHR_materials_ior`.
+fn pointer(json: &Value, path: &str) -> String {
+    let letters = |name: &str| name.replace('_', "").to_lowercase();
+    let mut found = String::new();
+    for part in path.replace(['.', '['], "/").replace([']', '"'], "").split('/') {
+        let names = json.pointer(&found).and_then(Value::as_object).filter(|_| found.ends_with("/extensions"));
+        let name = names.and_then(|names| names.keys().find(|name| letters(name).ends_with(&letters(part))));
+        found = format!("{found}/{}", name.map_or(part, String::as_str));
+    }
+    found
+}
+
+/// A JSON pointer as a path: `nodes[0].mesh` for `/nodes/0/mesh`.
+fn readable(pointer: &str) -> String {
+    let part = |part: &str| if part.parse::<usize>().is_ok() { format!("[{part}]") } else { format!(".{part}") };
+    let path: String = pointer.split('/').skip(1).map(part).collect();
+    path.trim_start_matches('.').to_owned()
 }
 
 /// The values of a member.
@@ -123,6 +166,14 @@ pub(super) fn missing_members(root: &Root) -> Result<(), String> {
             if let Some(accessor) = accessors.find(|accessor| *accessor >= root.accessors.len()) {
                 return Err(format!("has a mesh {number} whose primitive {place} uses accessor {accessor} of {}", root.accessors.len()));
             }
+        }
+    }
+    for (number, animation) in root.animations.iter().enumerate() {
+        let mut nodes = animation.channels.iter().map(|channel| channel.target.node.value()).enumerate();
+        if let Some((place, node)) = nodes.find(|(_, node)| *node >= root.nodes.len()) {
+            let path = format!("animations[{number}].channels[{place}].target.node");
+            let count = root.nodes.len();
+            return Err(format!("is not valid glTF: {path} is {node}, and the list nodes has {count} members, counted from 0; {REMEDY}"));
         }
     }
     for (number, image) in root.images.iter().enumerate() {

@@ -270,16 +270,17 @@ impl Reader<'_> {
     /// A factor from 0 to `high`.
     fn factor(&self, what: &str, value: f32, high: f32) -> Result<f32> {
         let reason = || format!("has the {what} {value}; it must be {}", range(high));
-        self.loader.require(value.is_finite() && (0.0..=high).contains(&value), &self.object, reason)?;
-        Ok(value)
+        within(value, high).ok_or_else(|| self.loader.refuse(&self.object, reason()))
     }
 
     /// A colour with each channel from 0 to `high`.
     fn colour(&self, what: &str, value: [f32; 3], high: f32) -> Result<Vec3> {
         let [red, green, blue] = value;
-        let is_ok = value.iter().all(|channel| channel.is_finite() && (0.0..=high).contains(channel));
-        self.loader.require(is_ok, &self.object, || format!("has the {what} {red} {green} {blue}; each must be {}", range(high)))?;
-        Ok(value.into())
+        let reason = || format!("has the {what} {red} {green} {blue}; each must be {}", range(high));
+        match value.map(|channel| within(channel, high)) {
+            [Some(red), Some(green), Some(blue)] => Ok(Vec3::new(red, green, blue)),
+            _ => Err(self.loader.refuse(&self.object, reason())),
+        }
     }
 
     /// `None`: a thin wall.
@@ -319,17 +320,19 @@ impl Reader<'_> {
             let count = self.document.textures().len();
             return Err(self.loader.refuse(&self.object, format!("uses texture {number} of {count}")));
         };
-        let Some(texture) = self.loader.texture_place(&texture, meaning) else {
-            return Err(self
-                .loader
-                .refuse(&self.object, format!("uses texture {number}, which has no PNG or JPEG picture; export it with one")));
+        let Some(place) = self.loader.texture_place(&texture, meaning) else {
+            let extensions: Vec<&str> =
+                texture.extensions().into_iter().flat_map(|extensions| extensions.keys()).map(String::as_str).collect();
+            let only = if extensions.is_empty() { String::new() } else { format!(" but by {}", extensions.join(", ")) };
+            let reason = format!("uses texture {number}, which has no picture{only}; export it as PNG, JPEG, WebP or KTX 2");
+            return Err(self.loader.refuse(&self.object, reason));
         };
         let set = transform.and_then(|transform| transform.tex_coord).unwrap_or(set);
         if set > 1 {
             self.loader.leave_out("texture coordinates beyond the second set (the first is used)", &self.object);
         }
         Ok(TextureUse {
-            texture,
+            texture: place,
             uv_set: if set == 1 { 1 } else { 0 },
             transform: transform.map_or(Ok(UvTransform::NONE), |transform| self.uv_transform(transform))?,
         })
@@ -356,6 +359,13 @@ impl Reader<'_> {
     fn parsed<T: DeserializeOwned>(&self, name: &str, value: &Value) -> Result<T> {
         T::deserialize(value).map_err(|error| self.loader.refuse(&self.object, format!("has a {name} that cannot be read ({error})")))
     }
+}
+
+/// A number from 0 to `high`, or what is off that by no more than rounding makes of it.
+fn within(value: f32, high: f32) -> Option<f32> {
+    const ROUNDING: f32 = 1e-5;
+    let near = value.clamp(0.0, high);
+    (value == near || (value - near).abs() <= ROUNDING).then_some(near)
 }
 
 /// From 0.

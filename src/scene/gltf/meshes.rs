@@ -19,6 +19,8 @@ use crate::scene::mesh::Source;
 
 /// Of all instances together: as many as the GPU's buffers of 4 GiB hold.
 const MAX_TRIANGLES: usize = 100_000_000;
+/// Of all instances together: each takes a kilobyte, however small it is.
+const MAX_PARTS: usize = 2_000_000;
 /// Texture coordinates beyond that have no digits left for a place in the picture.
 const MAX_UV: f64 = 1e6;
 
@@ -26,14 +28,14 @@ const MAX_UV: f64 = 1e6;
 pub(super) struct Part<'a> {
     pub(super) primitive: gltf::Primitive<'a>,
     /// Of its node, or of its mesh.
-    pub(super) name: String,
+    pub(super) name: Arc<str>,
     pub(super) node: usize,
     pub(super) mesh: usize,
     pub(super) to_world: DMat4,
     /// Its joints' matrices.
     pub(super) skin: Option<Arc<Vec<DMat4>>>,
     /// By how much each morph target shifts it at rest.
-    pub(super) weights: Vec<f32>,
+    pub(super) weights: Arc<[f32]>,
     /// Its place in the scene.
     pub(super) material: usize,
 }
@@ -65,6 +67,22 @@ impl Loader {
         skin.joints().zip(&to_joint).map(matrix).collect()
     }
 
+    /// Refuses more primitives, once for each node and instance, than are read, before any is listed.
+    pub(super) fn require_few_parts(&self, document: &Document, nodes: &[gltf::Node]) -> Result<()> {
+        let mut count = 0usize;
+        for node in nodes {
+            let Some(mesh) = node.mesh() else { continue };
+            let what = node_name(node);
+            let instances = self
+                .instance_accessors(document, node, &what)?
+                .map_or(1, |accessors| accessors.iter().flatten().map(gltf::Accessor::count).max().unwrap_or(0));
+            count = count.saturating_add(mesh.primitives().len().saturating_mul(instances));
+            let reason = || format!("brings the scene over {MAX_PARTS} primitives, counted for each node and instance; join meshes");
+            self.require(count <= MAX_PARTS, &what, reason)?;
+        }
+        Ok(())
+    }
+
     /// Takes note of a primitive if it makes triangles, and of what it has that is not read.
     pub(super) fn list_primitive<'a>(&mut self, document: &Document, mut part: Part<'a>, parts: &mut Vec<Part<'a>>) -> Result<()> {
         let owner = format!("mesh '{}'", part.name);
@@ -77,7 +95,8 @@ impl Loader {
             self.leave_out("second sets of vertex colours", &owner);
         }
         let Some(positions) = primitive.get(&Semantic::Positions) else {
-            return Err(self.refuse(&part.what(), "has no positions"));
+            self.leave_out("primitives without positions", &owner);
+            return Ok(());
         };
         if positions.data_type() != DataType::F32 && !self.is_quantized {
             self.leave_out("that KHR_mesh_quantization is not named (positions of whole numbers are read all the same)", &owner);
@@ -236,7 +255,7 @@ impl Loader {
                     .unzip(),
             };
         }
-        let (name, material) = (name.clone(), part.material);
+        let (name, material) = (name.to_string(), part.material);
         let vertices = if let Vertices::Some(vertices) = vertices { vertices } else { Vec::new() };
         let source = Some(Source { node: part.node, mesh: part.mesh, primitive: primitive.index(), vertices });
         let mesh = Mesh { name, positions, normals, uvs, colours, alphas, tangents, coat_tangents, triangles, material, source };

@@ -43,7 +43,9 @@ use compressed::Target;
 use meshes::Part;
 use textures::Wanted;
 
-const READ_EXTENSIONS: [&str; 23] = [
+/// Hides nodes and all below them.
+const VISIBILITY: &str = "KHR_node_visibility";
+const READ_EXTENSIONS: [&str; 24] = [
     "EXT_lights_image_based",
     "EXT_mesh_gpu_instancing",
     "EXT_meshopt_compression",
@@ -65,11 +67,41 @@ const READ_EXTENSIONS: [&str; 23] = [
     "KHR_materials_volume",
     "KHR_mesh_quantization",
     "KHR_meshopt_compression",
+    VISIBILITY,
     "KHR_texture_basisu",
     "KHR_texture_transform",
 ];
-/// A file that needs one of these is read without it, and a warning says so: it names other materials to choose from.
-const OPTIONAL_EXTENSIONS: [&str; 1] = ["KHR_materials_variants"];
+/// A file that needs one of these is read without it, and a warning says so: each adds to a scene that has a meaning without it, as other
+/// materials to choose from, other looks of a surface, facts, sounds, what moves or may be touched.
+const OPTIONAL_EXTENSIONS: [&str; 27] = [
+    "ADOBE_materials_clearcoat_specular",
+    "ADOBE_materials_clearcoat_tint",
+    "ADOBE_materials_thin_transparency",
+    "AGI_articulations",
+    "AGI_stk_metadata",
+    "CESIUM_primitive_outline",
+    "EXT_instance_features",
+    "EXT_mesh_features",
+    "EXT_mesh_manifold",
+    "EXT_structural_metadata",
+    "KHR_animation_pointer",
+    "KHR_audio_emitter",
+    "KHR_implicit_shapes",
+    "KHR_interactivity",
+    "KHR_materials_diffuse_roughness",
+    "KHR_materials_variants",
+    "KHR_materials_volume_scatter",
+    "KHR_node_hoverability",
+    "KHR_node_selectability",
+    "KHR_physics_rigid_bodies",
+    "KHR_xmp",
+    "KHR_xmp_json_ld",
+    "MSFT_audio_emitter",
+    "MSFT_lod",
+    "NV_materials_mdl",
+    "VRMC_materials_mtoon",
+    "VRMC_vrm",
+];
 /// Nodes within nodes; deeper ones would be a cycle.
 const MAX_DEPTH: usize = 512;
 
@@ -83,7 +115,7 @@ pub fn load(path: &Path, reading: Reading, progress: Progress) -> Result<Scene> 
     let malformed::Parts { json: text, binary } = malformed::parts(content).map_err(refuse)?;
     let mut json = malformed::json(&text).map_err(refuse)?;
     let mut left_out = LeftOut::default();
-    unread::take_out(&mut json, reading.at.is_some(), &mut left_out);
+    let shown = unread::take_out(&mut json, reading.at.is_some(), &mut left_out);
     let image_light = image_light::of(&json);
     let buffer_count = json["buffers"].as_array().map_or(0, Vec::len);
     let unpacked = compressed::unpack(path, &mut json, binary.as_deref(), Target { buffer: buffer_count, start: 0 })?;
@@ -131,7 +163,7 @@ pub fn load(path: &Path, reading: Reading, progress: Progress) -> Result<Scene> 
         Some(time) => loader.read_poses(&document, time)?,
         None => HashMap::new(),
     };
-    let parts = loader.read_nodes(&document, &poses)?;
+    let parts = loader.read_nodes(&document, &poses, &shown)?;
     loader.read_textures(&document, progress)?;
     loader.read_meshes(&parts, progress)?;
     if let Some(light) = image_light {
@@ -146,8 +178,18 @@ pub fn load(path: &Path, reading: Reading, progress: Progress) -> Result<Scene> 
 /// How to write a file that does without an extension.
 fn remedy(extension: &str) -> &'static str {
     match extension {
-        "EXT_texture_avif" | "MSFT_texture_dds" => "export its textures as PNG or JPEG",
-        _ => "export it without",
+        "EXT_texture_avif" => "convert its textures, as `gltf-transform png IN.glb OUT.glb` does, or export them as PNG or JPEG",
+        "MSFT_texture_dds" => "export its textures as PNG or JPEG",
+        "KHR_techniques_webgl" | "KHR_materials_common" | "KHR_materials_cmnBlinnPhong" => {
+            "export its materials as metallic-roughness ones"
+        }
+        name if name.starts_with("KHR_gaussian_splatting") => "export it as triangles; splats are not read",
+        name if name.contains("compression") => "export it uncompressed, or compressed by Draco or meshoptimizer",
+        name if name.starts_with("EXT_lights") || name.starts_with("KHR_lights") => {
+            "export its lights as KHR_lights_punctual, or as surfaces that emit"
+        }
+        name if name.contains("_materials_") => "export its materials without it, by the settings of the program that wrote it",
+        _ => "switch it off in the export settings of the program that wrote it",
     }
 }
 
@@ -196,6 +238,16 @@ impl LeftOut {
         if !owner.is_empty() {
             owners.insert(owner.to_owned());
         }
+    }
+
+    /// All of it in one line.
+    fn listed(&self) -> Option<String> {
+        let named = |(what, owners): (&String, &BTreeSet<String>)| match owners.is_empty() {
+            true => what.clone(),
+            false => format!("{what}: {}", some_of(owners.iter())),
+        };
+        let list: Vec<String> = self.0.iter().map(named).collect();
+        (!list.is_empty()).then(|| format!("ignored: {}", list.join("; ")))
     }
 }
 
@@ -261,8 +313,8 @@ impl Loader {
         read_uri(&self.path, uri).map_err(|reason| self.refuse(what, reason))
     }
 
-    /// Reads cameras, lights and the materials of the primitives that it lists.
-    fn read_nodes<'a>(&mut self, document: &'a Document, poses: &HashMap<usize, Pose>) -> Result<Vec<Part<'a>>> {
+    /// Reads cameras, lights and the materials of the primitives that it lists, of the nodes `shown`.
+    fn read_nodes<'a>(&mut self, document: &'a Document, poses: &HashMap<usize, Pose>, shown: &BTreeSet<usize>) -> Result<Vec<Part<'a>>> {
         let Some(scene) = document.default_scene().or_else(|| document.scenes().next()) else {
             return Err(self.refuse("the file", "holds no scene"));
         };
@@ -274,13 +326,16 @@ impl Loader {
         for node in scene.nodes() {
             self.place_node(node, poses, DMat4::IDENTITY, 0, &mut nodes, &mut to_world)?;
         }
+        // Where hidden ones stand may move joints.
+        nodes.retain(|node| shown.contains(&node.index()));
+        self.require_few_parts(document, &nodes)?;
         let mut skins = HashMap::new();
         let mut parts = Vec::new();
         for node in &nodes {
             let what = node_name(node);
             let own = to_world[&node.index()];
             if let Some(mesh) = node.mesh() {
-                let name = named("mesh", node.name().or(mesh.name()), mesh.index());
+                let name: Arc<str> = named("mesh", node.name().or(mesh.name()), mesh.index()).into();
                 let skin = match node.skin() {
                     Some(skin) => Some(match skins.entry(skin.index()) {
                         Entry::Occupied(known) => Arc::clone(known.get()),
@@ -289,7 +344,7 @@ impl Loader {
                     None => None,
                 };
                 let posed = poses.get(&node.index()).and_then(|pose| pose.weights.as_deref());
-                let weights = posed.or(node.weights()).or(mesh.weights()).unwrap_or_default().to_vec();
+                let weights: Arc<[f32]> = posed.or(node.weights()).or(mesh.weights()).unwrap_or_default().into();
                 for to_node in self.instances(document, node, &what)? {
                     for primitive in mesh.primitives() {
                         let (name, skin, weights) = (name.clone(), skin.clone(), weights.clone());
@@ -352,23 +407,35 @@ impl Loader {
         node.children().try_for_each(|child| self.place_node(child, poses, own, depth + 1, nodes, to_world))
     }
 
-    /// Transforms of a node's instances (EXT_mesh_gpu_instancing); of a node without them, one that does nothing.
-    fn instances(&self, document: &Document, node: &gltf::Node, what: &str) -> Result<Vec<DMat4>> {
+    /// TRANSLATION, ROTATION and SCALE of a node's instances (EXT_mesh_gpu_instancing); `None` of a node without instances.
+    fn instance_accessors<'a>(
+        &self,
+        document: &'a Document,
+        node: &gltf::Node,
+        what: &str,
+    ) -> Result<Option<[Option<gltf::Accessor<'a>>; 3]>> {
         let Some(attributes) = node.extension_value("EXT_mesh_gpu_instancing").map(|extension| &extension["attributes"]) else {
-            return Ok(vec![DMat4::IDENTITY]);
+            return Ok(None);
         };
-        let accessor = |name: &str| -> Result<Option<gltf::Accessor>> {
+        let accessor = |name: &str| -> Result<Option<gltf::Accessor<'a>>> {
             let Some(number) = attributes.get(name) else { return Ok(None) };
             let found = number.as_u64().and_then(|number| document.accessors().nth(usize::try_from(number).ok()?));
             found.map(Some).ok_or_else(|| self.refuse(what, format!("has instances with {name} in accessor {number}, which is not there")))
         };
+        Ok(Some([accessor("TRANSLATION")?, accessor("ROTATION")?, accessor("SCALE")?]))
+    }
+
+    /// Transforms of a node's instances; of a node without them, one that does nothing.
+    fn instances(&self, document: &Document, node: &gltf::Node, what: &str) -> Result<Vec<DMat4>> {
+        let Some([translations, rotations, scales]) = self.instance_accessors(document, node, what)? else {
+            return Ok(vec![DMat4::IDENTITY]);
+        };
         let rows = |accessor: gltf::Accessor| {
             accessor::read(self, &accessor, &Vertices::All, what, |row: [f32; 3]| DVec3::from(row.map(f64::from)))
         };
-        let translations = accessor("TRANSLATION")?.map(rows).transpose()?;
-        let scales = accessor("SCALE")?.map(rows).transpose()?;
+        let (translations, scales) = (translations.map(rows).transpose()?, scales.map(rows).transpose()?);
         let turn = |of: [f32; 4]| DQuat::from_array(of.map(f64::from)).normalize();
-        let rotations = accessor("ROTATION")?.map(|of| accessor::read(self, &of, &Vertices::All, what, turn)).transpose()?;
+        let rotations = rotations.map(|of| accessor::read(self, &of, &Vertices::All, what, turn)).transpose()?;
         let counts: BTreeSet<usize> =
             [translations.as_ref().map(Vec::len), scales.as_ref().map(Vec::len), rotations.as_ref().map(Vec::len)]
                 .into_iter()
@@ -427,19 +494,15 @@ impl Loader {
         let with_flat = self.scene.meshes.iter().zip(&dropped).filter(|(_, dropped)| **dropped > 0);
         let flat: BTreeSet<String> = with_flat.map(|(mesh, _)| format!("mesh '{}'", mesh.name)).collect();
         self.scene.meshes.retain(|mesh| !mesh.triangles.is_empty());
-        self.require(self.scene.triangle_count() > 0, "the scene", || "holds no triangle".into())?;
         if !flat.is_empty() {
             let count: usize = dropped.iter().sum();
             self.scene.warnings.push(format!("{} without area left out ({})", counted(count, "triangle"), some_of(flat.iter())));
         }
-        if !self.left_out.0.is_empty() {
-            let named = |(what, owners): (&String, &BTreeSet<String>)| match owners.is_empty() {
-                true => what.clone(),
-                false => format!("{what}: {}", some_of(owners.iter())),
-            };
-            let list: Vec<String> = self.left_out.0.iter().map(named).collect();
-            self.scene.warnings.push(format!("ignored: {}", list.join("; ")));
-        }
+        self.scene.warnings.extend(self.left_out.listed());
+        self.require(self.scene.triangle_count() > 0, "the scene", || {
+            let left_out = self.scene.warnings.iter().map(|warning| format!("; {warning}"));
+            "holds no triangle".to_owned() + &left_out.collect::<String>()
+        })?;
         Ok(self.scene)
     }
 }

@@ -8,13 +8,16 @@ use gltf::texture::{MagFilter, WrappingMode};
 use image::{DynamicImage, ImageDecoder, ImageFormat, RgbaImage};
 use rayon::prelude::*;
 
-use super::{Loader, accessor, called, ktx2, one_line};
+use super::{Loader, accessor, called, ktx2};
 use crate::error::{Error, Result};
 use crate::scene::texture::{Filter, Texels, Texture, Wrap};
 use crate::scene::{Progress, geometry};
 
 /// Of all textures together: half a GiB.
-const MAX_TEXELS: u64 = geometry::MAX_TEXELS as u64 - 256;
+pub(super) const MAX_TEXELS: u64 = geometry::MAX_TEXELS as u64 - 256;
+
+/// Of one picture as its file has it: a few bytes must not unfold into gigabytes.
+const MAX_BYTES: u64 = 1 << 30;
 
 /// What the numbers of a picture mean.
 #[derive(Debug, Clone, Copy, PartialEq, Eq, Hash)]
@@ -113,13 +116,23 @@ impl Loader {
         Ok((what, bytes))
     }
 
-    fn undecodable(&self, what: &str, error: impl ToString) -> Error {
-        self.refuse(what, format!("cannot be decoded ({})", one_line(&error.to_string())))
+    fn undecodable(&self, what: &str, error: &image::ImageError) -> Error {
+        let reason = match error {
+            image::ImageError::Limits(_) => format!("more than {} MiB as pixels; export it smaller", MAX_BYTES >> 20),
+            image::ImageError::Unsupported(_) => "a kind of pixels that is not read; export it as 8-bit RGB or RGBA".into(),
+            // What decoders say is for those who make them.
+            _ => "its data is broken or cut off; export it again".into(),
+        };
+        self.refuse(what, format!("cannot be decoded: {reason}"))
+    }
+
+    fn broken_ktx2(&self, what: &str, reason: &str) -> Error {
+        self.refuse(what, format!("cannot be decoded: {reason}"))
     }
 
     fn dimensions(&self, what: &str, bytes: &[u8]) -> Result<(u32, u32)> {
         match ktx2::is_one(bytes) {
-            true => ktx2::dimensions(bytes).map_err(|error| self.undecodable(what, error)),
+            true => ktx2::dimensions(bytes).map_err(|reason| self.broken_ktx2(what, &reason)),
             false => Ok(self.decoder(what, bytes)?.dimensions()),
         }
     }
@@ -134,14 +147,14 @@ impl Loader {
         })?;
         self.require(has_its_end(bytes), what, || "is cut off: a JPEG without its end; export it again".into())?;
         reader.limits(image_limits());
-        reader.into_decoder().map_err(|error| self.undecodable(what, error))
+        reader.into_decoder().map_err(|error| self.undecodable(what, &error))
     }
 
     pub(super) fn decoded(&self, what: &str, bytes: &[u8]) -> Result<RgbaImage> {
         if ktx2::is_one(bytes) {
-            return ktx2::decoded(bytes).map_err(|error| self.undecodable(what, error));
+            return ktx2::decoded(bytes).map_err(|reason| self.broken_ktx2(what, &reason));
         }
-        let undecodable = |error: image::ImageError| self.undecodable(what, error);
+        let undecodable = |error: image::ImageError| self.undecodable(what, &error);
         let decoder = self.decoder(what, bytes)?;
         image_limits().reserve(decoder.total_bytes()).map_err(undecodable)?;
         Ok(DynamicImage::from_decoder(decoder).map_err(undecodable)?.into_rgba8())
@@ -178,8 +191,7 @@ fn roughness_code(factor: f32, glossiness: u8) -> u8 {
 
 fn image_limits() -> image::Limits {
     let mut limits = image::Limits::default();
-    // A picture of a few bytes must not unfold into gigabytes.
-    limits.max_alloc = Some(1 << 30);
+    limits.max_alloc = Some(MAX_BYTES);
     limits
 }
 

@@ -2,10 +2,15 @@
 
 use std::collections::BTreeSet;
 
+use gltf::json::mesh::Semantic;
 use gltf::json::texture::{VALID_MAG_FILTERS, VALID_MIN_FILTERS};
+use gltf::json::validation::Checked;
+use serde::Deserialize;
+use serde::de::IntoDeserializer;
+use serde::de::value::Error as Fault;
 use serde_json::{Value, json};
 
-use super::{LeftOut, READ_EXTENSIONS, called, image_light, named};
+use super::{LeftOut, READ_EXTENSIONS, VISIBILITY, called, image_light, named};
 use crate::text::echo;
 
 const SPEC_GLOSS: &str = "KHR_materials_pbrSpecularGlossiness";
@@ -23,9 +28,14 @@ const NOT_BESIDE_SPEC_GLOSS: [&str; 10] = [
     "KHR_materials_volume",
 ];
 
-/// Lists keep their length, as their members are named by numbers.
-pub(super) fn take_out(root: &mut Value, is_posed: bool, left_out: &mut LeftOut) {
-    take_animations(root, is_posed, left_out);
+/// Lists keep their length, as their members are named by numbers. Gives the numbers of the scene's nodes that are not hidden.
+pub(super) fn take_out(root: &mut Value, is_posed: bool, left_out: &mut LeftOut) -> BTreeSet<usize> {
+    // Lists that may be missing.
+    for scene in items_mut(root, "scenes").filter_map(|(_, scene)| scene.as_object_mut()) {
+        scene.entry("nodes").or_insert_with(|| json!([]));
+    }
+    let nodes = nodes_of_scene(root);
+    take_animations(root, is_posed, &nodes, left_out);
     // Pictures that only an extension names.
     for (_, texture) in items_mut(root, "textures") {
         for name in ["EXT_texture_webp", "KHR_texture_basisu"] {
@@ -34,12 +44,13 @@ pub(super) fn take_out(root: &mut Value, is_posed: bool, left_out: &mut LeftOut)
             }
         }
     }
-    let nodes = nodes_of_scene(root);
     let mut materials = BTreeSet::new();
-    for node in nodes {
-        let json = &root["nodes"][node];
+    let mut meshes = BTreeSet::new();
+    for node in &nodes {
+        let (node, json) = (*node, &root["nodes"][*node]);
         name_unread_extensions(json, &called("node", json["name"].as_str(), node), left_out);
         let Some(mesh) = number(&json["mesh"]) else { continue };
+        meshes.insert(mesh);
         let name = json["name"].as_str().or(root["meshes"][mesh]["name"].as_str());
         let owner = format!("mesh '{}'", named("mesh", name, mesh));
         for primitive in items(&root["meshes"][mesh]["primitives"]) {
@@ -73,6 +84,23 @@ pub(super) fn take_out(root: &mut Value, is_posed: bool, left_out: &mut LeftOut)
             *unused = blank.clone();
         }
     }
+    for (place, mesh) in items_mut(root, "meshes") {
+        if meshes.contains(&place) {
+            take_out_of_mesh(mesh, &format!("mesh '{}'", named("mesh", mesh["name"].as_str(), place)), left_out);
+        } else {
+            *mesh = json!({"primitives": []});
+        }
+    }
+    allow_missing_members(root);
+    let accessors = accessors(root, &nodes);
+    for (_, unused) in items_mut(root, "accessors").filter(|(place, _)| !accessors.contains(place)) {
+        *unused = json!({"componentType": 5121, "count": 1, "type": "SCALAR"});
+    }
+    let views = views(root);
+    for (_, unused) in items_mut(root, "bufferViews").filter(|(place, _)| !views.contains(place)) {
+        // What it has compressed is not unpacked.
+        take(unused, "", "extensions");
+    }
     for (place, sampler) in items_mut(root, "samplers") {
         for (member, allowed) in [("magFilter", VALID_MAG_FILTERS), ("minFilter", VALID_MIN_FILTERS)] {
             let is_valid = |value: &Value| allowed.iter().any(|allowed| value.as_u64() == Some(u64::from(*allowed)));
@@ -82,10 +110,11 @@ pub(super) fn take_out(root: &mut Value, is_posed: bool, left_out: &mut LeftOut)
             take(sampler, "", member);
         }
     }
+    nodes
 }
 
 /// All animations; where a pose is asked for all but the first, of which only what moves nodes is left.
-fn take_animations(root: &mut Value, is_posed: bool, left_out: &mut LeftOut) {
+fn take_animations(root: &mut Value, is_posed: bool, nodes: &BTreeSet<usize>, left_out: &mut LeftOut) {
     let animations = root.as_object_mut().and_then(|root| root.remove("animations"));
     let Some(Value::Array(mut animations)) = animations.filter(|animations| items(animations).next().is_some()) else { return };
     if !is_posed {
@@ -106,20 +135,87 @@ fn take_animations(root: &mut Value, is_posed: bool, left_out: &mut LeftOut) {
         if channels.len() < before {
             left_out.add("what animations move besides nodes", "");
         }
+        // Meshes that are not in the scene are taken out.
+        let is_elsewhere = |node: usize| root["nodes"].get(node).is_some() && !nodes.contains(&node);
+        channels.retain(|channel| channel["target"]["path"] != "weights" || !number(&channel["target"]["node"]).is_some_and(is_elsewhere));
     }
     root["animations"] = animations.into();
 }
 
+/// Without those that are hidden, and all below these.
 fn nodes_of_scene(root: &Value) -> BTreeSet<usize> {
     let scene = number(&root["scene"]).unwrap_or(0);
     let mut found = BTreeSet::new();
     let mut next: Vec<usize> = items(&root["scenes"][scene]["nodes"]).filter_map(number).collect();
     while let Some(node) = next.pop() {
-        if found.insert(node) {
+        if root["nodes"][node]["extensions"][VISIBILITY]["visible"] != false && found.insert(node) {
             next.extend(items(&root["nodes"][node]["children"]).filter_map(number));
         }
     }
     found
+}
+
+/// Numbers of all that the scene reads.
+fn accessors(root: &Value, nodes: &BTreeSet<usize>) -> BTreeSet<usize> {
+    let members = |object: &Value| -> Vec<usize> { object.as_object().into_iter().flatten().filter_map(|(_, of)| number(of)).collect() };
+    let mut found = BTreeSet::new();
+    for primitive in items(&root["meshes"]).flat_map(|mesh| items(&mesh["primitives"])) {
+        found.extend(members(&primitive["attributes"]));
+        found.extend(number(&primitive["indices"]));
+        found.extend(items(&primitive["targets"]).flat_map(members));
+    }
+    for node in nodes.iter().map(|node| &root["nodes"][*node]) {
+        found.extend(members(&node["extensions"]["EXT_mesh_gpu_instancing"]["attributes"]));
+        found.extend(number(&node["skin"]).and_then(|skin| number(&root["skins"][skin]["inverseBindMatrices"])));
+    }
+    for sampler in items(&root["animations"]).flat_map(|animation| items(&animation["samplers"])) {
+        found.extend(["input", "output"].iter().filter_map(|member| number(&sampler[member])));
+    }
+    found
+}
+
+/// Buffer views of accessors, pictures and compressed primitives.
+fn views(root: &Value) -> BTreeSet<usize> {
+    let of_accessor = |accessor: &Value| {
+        let sparse = &accessor["sparse"];
+        [number(&accessor["bufferView"]), number(&sparse["indices"]["bufferView"]), number(&sparse["values"]["bufferView"])]
+    };
+    let of_primitive = |primitive: &Value| number(&primitive["extensions"]["KHR_draco_mesh_compression"]["bufferView"]);
+    let mut found: BTreeSet<usize> = items(&root["accessors"]).flat_map(of_accessor).flatten().collect();
+    found.extend(items(&root["images"]).filter_map(|image| number(&image["bufferView"])));
+    found.extend(items(&root["meshes"]).flat_map(|mesh| items(&mesh["primitives"])).filter_map(of_primitive));
+    found
+}
+
+/// Attributes that glTF does not have, and those of an application.
+fn take_out_of_mesh(mesh: &mut Value, owner: &str, left_out: &mut LeftOut) {
+    for (_, primitive) in items_mut(mesh, "primitives") {
+        let Some(attributes) = primitive.get_mut("attributes").and_then(Value::as_object_mut) else { continue };
+        attributes.retain(|name, _| {
+            let is_known = matches!(Checked::<Semantic>::deserialize(name.as_str().into_deserializer()), Ok::<_, Fault>(Checked::Valid(_)));
+            if !is_known {
+                left_out.add(format!("attributes that glTF does not have ({})", echo(name)), owner);
+            }
+            is_known && !name.starts_with('_')
+        });
+    }
+}
+
+/// Puts in what glTF asks for and nothing here reads: bounds of positions, what cameras clip.
+fn allow_missing_members(root: &mut Value) {
+    let primitives = || items(&root["meshes"]).flat_map(|mesh| items(&mesh["primitives"]));
+    let positions: BTreeSet<usize> = primitives().filter_map(|primitive| number(&primitive["attributes"]["POSITION"])).collect();
+    for (_, accessor) in items_mut(root, "accessors").filter(|(place, _)| positions.contains(place)) {
+        if let Some(accessor) = accessor.as_object_mut() {
+            accessor.extend([("min".to_owned(), json!([0, 0, 0])), ("max".to_owned(), json!([0, 0, 0]))]);
+        }
+    }
+    for (_, camera) in items_mut(root, "cameras") {
+        for (kind, members) in [("perspective", &["znear"][..]), ("orthographic", &["znear", "zfar"])] {
+            let Some(numbers) = camera.get_mut(kind).and_then(Value::as_object_mut) else { continue };
+            numbers.extend(members.iter().map(|member| ((*member).to_owned(), json!(1))));
+        }
+    }
 }
 
 fn take_out_of_material(material: &mut Value, owner: &str, left_out: &mut LeftOut) {
