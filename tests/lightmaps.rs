@@ -404,6 +404,8 @@ fn a_second_bake_finds_the_coordinates() {
         let second = first.again(atlas);
         assert!(first.layout.objects.iter().all(|object| object.set.is_none()));
         assert!(second.layout.objects.iter().all(|object| object.set == Some(1)), "{:?}", second.layout.warnings);
+        let sizes = |baked: &Baked| baked.layout.objects.iter().map(|object| [object.width, object.height]).collect::<Vec<_>>();
+        assert_eq!(sizes(&first), sizes(&second));
         let (before, after) = (first.file(), second.file());
         assert_eq!(before.binary, after.binary);
         assert_holds("the second bake", only_adds(&before, &after));

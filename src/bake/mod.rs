@@ -48,6 +48,7 @@
 //! scene's textures, TEXCOORD_1 those of the lightmap. Where a material's textures use both sets of a
 //! mesh that had to be unwrapped, its second set moves to TEXCOORD_2.
 
+mod bleeding;
 mod document;
 mod files;
 mod gutters;
