@@ -729,8 +729,8 @@ fn what_cannot_be_baked_is_refused_in_one_line() {
         ("bake unlit.glb -o out --environment 0 --texels-per-metre 4 --radius .05", nothing),
         ("bake mirror.glb -o out --environment 0", nothing),
         ("bake model.glb -o out --environment 0 --json out/model.glb", &["--json", "-o writes it too"]),
-        ("bake model.glb -o out --environment 0 --csv out/large_error.exr", &["--csv", "-o writes it too"]),
-        ("bake open-box -o out --texels-per-metre 4 --json out/scene.bin", &["--json", "-o writes it too"]),
+        ("bake model.glb -o out --environment 0 --json out/large_error.exr", &["--json", "-o writes it too"]),
+        ("bake cornell -o out --texels-per-metre 4 --json out/scene.bin", &["--json", "-o writes it too"]),
         ("bake model.glb -o out --exposure 1", &["--exposure 1", "add --preview"]),
     ] {
         let refused = place.refusal(line);
