@@ -404,6 +404,8 @@ fn a_second_bake_finds_the_coordinates() {
         let second = first.again(atlas);
         assert!(first.layout.objects.iter().all(|object| object.set.is_none()));
         assert!(second.layout.objects.iter().all(|object| object.set == Some(1)), "{:?}", second.layout.warnings);
+        let sizes = |baked: &Baked| baked.layout.objects.iter().map(|object| [object.width, object.height]).collect::<Vec<_>>();
+        assert_eq!(sizes(&first), sizes(&second));
         let (before, after) = (first.file(), second.file());
         assert_eq!(before.binary, after.binary);
         assert_holds("the second bake", only_adds(&before, &after));
@@ -504,6 +506,8 @@ fn primitives_of_a_node_share_a_map() {
         let said = &after.json["nodes"][0]["extras"][KEY];
         let expected = if second_set == Some(over_itself) { 2 } else { 1 };
         assert_eq!(said["texCoord"], expected, "{said}");
+        let is_named = baked.warnings.iter().any(|warning| warning.contains("'square'") && warning.contains("TEXCOORD_1"));
+        assert_eq!(is_named, expected == 2, "{:?}", baked.warnings);
         assert_eq!(baked.again(Atlas::Off).layout.objects[0].set, Some(expected));
     }
 }
@@ -704,6 +708,66 @@ fn every_file_is_printed_with_what_it_is_for() {
         let refused = place.refusal(line);
         assert!(refused.as_ref().is_ok_and(|said| needles.iter().all(|needle| said.contains(needle))), "{line}: {refused:?}");
     }
+}
+
+/// What the program refuses before it looks for a device.
+#[test]
+fn what_cannot_be_baked_is_refused_in_one_line() {
+    let place = Place::new();
+    let model = |materials: Value| {
+        let mut made = instances();
+        made.json["materials"] = materials;
+        made.binary(&[])
+    };
+    place.write("model.glb", model(json!([{"name": "white"}])));
+    place.write("unlit.glb", model(json!([{"extensions": {"KHR_materials_unlit": {}}}])));
+    place.write("mirror.glb", model(json!([{"pbrMetallicRoughness": {"roughnessFactor": 0}}])));
+    std::fs::create_dir(place.at("out")).unwrap();
+    let nothing: &[&str] = &["the scene has nothing to bake"];
+    for (line, needles) in [
+        ("bake unlit.glb -o out --environment 0", nothing),
+        ("bake unlit.glb -o out --environment 0 --texels-per-metre 4 --radius .05", nothing),
+        ("bake mirror.glb -o out --environment 0", nothing),
+        ("bake model.glb -o out --environment 0 --json out/model.glb", &["--json", "-o writes it too"]),
+        ("bake model.glb -o out --environment 0 --json out/large_error.exr", &["--json", "-o writes it too"]),
+        ("bake cornell -o out --texels-per-metre 4 --json out/scene.bin", &["--json", "-o writes it too"]),
+        ("bake model.glb -o out --exposure 1", &["--exposure 1", "add --preview"]),
+    ] {
+        let refused = place.refusal(line);
+        assert!(refused.as_ref().is_ok_and(|said| needles.iter().all(|needle| said.contains(needle))), "{line}: {refused:?}");
+    }
+}
+
+/// The sky's light is in the maps, and a file that is kept loses nothing that it had.
+#[test]
+fn only_scenes_that_are_written_anew_lose_their_sky() {
+    let folder = tempfile::tempdir().unwrap();
+    let path = folder.path().join("model.glb");
+    std::fs::write(&path, instances().binary(&[])).unwrap();
+    let (mut scene, file) = (open(&path), File::open(&path).unwrap());
+    scene.lights.push(Light { name: "sky".into(), kind: LightKind::Environment { radiance: Vec3::ONE } });
+    let warnings = |file: Option<&File>| Layout::of_file(&scene, file, 4.0, MAX_SIDE).unwrap().warnings;
+    assert_eq!(warnings(Some(&file)), Vec::<String>::new());
+    assert!(matches!(&warnings(None)[..], [warning] if warning.contains("scene.gltf omits")));
+}
+
+/// A `.glb` file whose buffer lies beside it has no place for what is added.
+#[test]
+fn a_binary_file_without_a_binary_part_gets_a_buffer_beside_it() {
+    let place = Place::new();
+    let mut made = instances();
+    made.json["buffers"][0] = json!({"byteLength": made.bytes.len(), "uri": "geometry.bin"});
+    std::fs::create_dir(place.at("in")).unwrap();
+    place.write("in/geometry.bin", &made.bytes);
+    place.write("in/model.glb", binary_file(&made.json, &[], &[]));
+    let baked = Baked::new(&place.at("in/model.glb"), Atlas::Off);
+    let after = File::open(&baked.folder.path().join("model.glb")).unwrap();
+    assert_eq!(
+        (&after.json["buffers"][0]["uri"], &after.json["buffers"][1]["uri"]),
+        (&json!("geometry.bin"), &json!("model_lightmap.bin"))
+    );
+    assert_holds("its texels", leads_to_its_light(&baked, &after.json, &after));
+    assert_valid(&baked.folder.path().join("model.glb"));
 }
 
 /// Compressed meshes get coordinates too, and are then no longer compressed.

@@ -57,6 +57,14 @@ pub fn write(folder: &Folder, scene: &Scene, layout: &Layout, maps: &[Map], expo
     write_all(files.map(|(name, content)| (folder.file(&name), content)))
 }
 
+/// Names of the files of a built-in scene's bake.
+pub fn names(scene: &Scene, layout: &Layout) -> Vec<String> {
+    let names = Names::new(scene, layout);
+    let pictures = (0..layout.objects.len()).flat_map(|object| ENDINGS.map(|ending| format!("{}{ending}", names.stem(object))));
+    let textures = document::textures_used(scene).into_iter().map(|index| names.texture(index));
+    pictures.chain(textures).chain([GEOMETRY, RADIANCE_SCENE, LIGHTMAP_SCENE].map(str::to_owned)).collect()
+}
+
 /// The user's file with lightmap coordinates, ready to be written with the light. What is wrong with the file is found here, before
 /// there is light.
 pub struct IntoFile<'a> {
@@ -68,7 +76,7 @@ pub struct IntoFile<'a> {
     beside: Vec<Beside>,
     /// Its name, which the copy has too.
     name: String,
-    /// Of what a `.gltf` file needs beside it.
+    /// Of what the file needs beside it, unless it goes into its binary part.
     buffer_name: String,
     preview_name: String,
     /// Of the pages.
@@ -105,6 +113,13 @@ impl<'a> IntoFile<'a> {
         let lost = lost.map(|reason| format!("a file that the scene names {reason}: it is not copied"));
         let warnings = extended.warnings.iter().cloned().chain(lost).collect();
         Ok(IntoFile { file, scene, layout, pages, extended, beside, name, buffer_name, preview_name, pictures, errors, warnings })
+    }
+
+    /// Names of the files that may be written.
+    pub fn names(&self, has_preview: bool) -> Vec<String> {
+        let beside = self.beside.iter().map(|beside| &beside.name);
+        let own = [&self.name, &self.buffer_name].into_iter().chain(has_preview.then_some(&self.preview_name));
+        own.chain(beside).chain(&self.pictures).chain(&self.errors).cloned().collect()
     }
 
     /// Writes everything, or nothing. With `preview_exposure` also a copy for viewers that shows the radiance times that.

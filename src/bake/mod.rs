@@ -48,6 +48,7 @@
 //! scene's textures, TEXCOORD_1 those of the lightmap. Where a material's textures use both sets of a
 //! mesh that had to be unwrapped, its second set moves to TEXCOORD_2.
 
+mod bleeding;
 mod document;
 mod files;
 mod gutters;
@@ -64,12 +65,12 @@ use std::collections::BTreeMap;
 use glam::{DVec2, DVec3, Vec3};
 use rayon::prelude::*;
 
-pub use files::{IntoFile, Written, preview, write};
+pub use files::{IntoFile, Written, names, preview, write};
 pub use texels::{CoveredTexel, SurfacePoint};
 
 use crate::error::{Error, Result};
 use crate::scene::gltf::source::File;
-use crate::scene::light::LightKind;
+use crate::scene::light::{Light, LightKind};
 use crate::scene::{Mesh, Scene};
 use crate::text::some_of;
 
@@ -179,7 +180,7 @@ impl Layout {
             let allowed = format!("needs {texel_count} texels in all, but at most {MAX_TEXELS} can be baked; choose a smaller value");
             return Err(Error::setting(OPTION, texels_per_metre, allowed));
         }
-        let warnings = warnings(scene, &unwrapped, max_side);
+        let warnings = warnings(scene, &unwrapped, max_side, file.is_none());
         let mut meshes: Vec<Option<MeshLightmap>> = vec![None; scene.meshes.len()];
         let mut layout_objects = Vec::new();
         let with_maps: Vec<(Object, Vec<MeshLightmap>)> = unwrapped.into_par_iter().map(|object| object.with_texels(scene)).collect();
@@ -251,8 +252,8 @@ impl Object {
     }
 }
 
-/// One line a subject, however many meshes it concerns.
-fn warnings(scene: &Scene, unwrapped: &[objects::Unwrapped], max_side: u32) -> Vec<String> {
+/// One line a subject, however many meshes it concerns. `is_written_anew`: the scene has no file that is kept.
+fn warnings(scene: &Scene, unwrapped: &[objects::Unwrapped], max_side: u32, is_written_anew: bool) -> Vec<String> {
     let mut warnings = Vec::new();
     let mut refused: BTreeMap<&str, Vec<String>> = BTreeMap::new();
     let mut coarse = Vec::new();
@@ -274,10 +275,8 @@ fn warnings(scene: &Scene, unwrapped: &[objects::Unwrapped], max_side: u32) -> V
             some_of(coarse.iter())
         ));
     }
-    if unwrapped.is_empty() {
-        warnings.push("every surface is a mirror or a dielectric: there is nothing to bake".into());
-    }
-    if scene.lights.iter().any(|light| matches!(light.kind, LightKind::Disc { .. } | LightKind::Environment { .. } | LightKind::Sky(_))) {
+    let is_left_out = |light: &Light| matches!(light.kind, LightKind::Disc { .. } | LightKind::Environment { .. } | LightKind::Sky(_));
+    if is_written_anew && scene.lights.iter().any(is_left_out) {
         warnings.push("glTF has no disc or environment lights: the lightmaps contain their light, but scene.gltf omits them".into());
     }
     warnings

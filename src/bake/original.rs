@@ -18,6 +18,7 @@ use crate::error::{Error, Result};
 use crate::scene::Scene;
 use crate::scene::gltf::source::{Elements, File, binary_file};
 use crate::scene::mesh::Source;
+use crate::text::some_of;
 
 /// The member of a node's `extras` that says which lightmap it has.
 pub const KEY: &str = "photonmill_lightmap";
@@ -37,7 +38,7 @@ const LEAST_USED: f64 = 0.5;
 /// A file with lightmap coordinates.
 pub struct Extended {
     pub json: Value,
-    /// What is added to the binary part of a `.glb` file, or what another file holds.
+    /// What is added to the binary part of a `.glb` file, or what a file beside it holds.
     pub bytes: Vec<u8>,
     pub warnings: Vec<String>,
 }
@@ -61,6 +62,7 @@ pub fn extended(file: &File, scene: &Scene, layout: &Layout, pages: &Pages, pict
         made.insert(index, (place, set));
     }
     let mut of_nodes: BTreeMap<usize, Vec<Value>> = BTreeMap::new();
+    let mut beyond_second = Vec::new();
     for (index, object) in layout.objects.iter().enumerate() {
         let node = source(index).node;
         let set = object.set.unwrap_or_else(|| {
@@ -70,12 +72,19 @@ pub fn extended(file: &File, scene: &Scene, layout: &Layout, pages: &Pages, pict
             }
             set
         });
+        if set > 1 {
+            beyond_second.push(format!("'{}'", object.name));
+        }
         let (offset, scale) = pages.transform(layout, index);
         let page = pages.places[index].page;
         of_nodes.entry(node).or_default().push(json!({
             "irradiance": pictures[page], "error": errors[page], "unit": "W/m2",
             "texCoord": set, "offset": offset.to_array(), "scale": scale.to_array(),
         }));
+    }
+    if !beyond_second.is_empty() {
+        let names = some_of(beyond_second.iter());
+        added.warnings.insert(format!("the lightmap coordinates of {names} are no second UV set (TEXCOORD_1), the only one that many engines take for lightmaps; remove the second set from the file and bake again to get one"));
     }
     for (node, mut lightmaps) in of_nodes {
         let json = &mut added.json["nodes"][node];
@@ -95,23 +104,23 @@ pub fn extended(file: &File, scene: &Scene, layout: &Layout, pages: &Pages, pict
     Ok(added.finish())
 }
 
-/// Its name and content: a `.glb` file of a `.glb` file, else the document and the added buffer.
+/// Names and contents: the file, and before it the added buffer where that has no place in the file's binary part.
 pub fn files(file: &File, extended: &Extended, name: &str, buffer_name: &str) -> Vec<(String, Vec<u8>)> {
-    if file.is_binary {
-        let mut binary = file.binary.clone().unwrap_or_default();
+    let mut json = extended.json.clone();
+    let mut binary = file.binary.clone().unwrap_or_default();
+    let mut beside = None;
+    if file.is_binary && new_buffer(file) == 0 {
         binary.resize(binary.len().next_multiple_of(4), 0);
         binary.extend(&extended.bytes);
-        // Without a free binary part the buffer is in the JSON.
-        let binary = if new_buffer(file) == 0 { binary } else { file.binary.clone().unwrap_or_default() };
-        return vec![(name.to_owned(), binary_file(&extended.json, &binary, &file.other_chunks))];
-    }
-    let mut json = extended.json.clone();
-    if !extended.bytes.is_empty() {
+    } else if !extended.bytes.is_empty() {
         json["buffers"][new_buffer(file)]["uri"] = json!(buffer_name);
+        beside = Some((buffer_name.to_owned(), extended.bytes.clone()));
     }
-    let text = serde_json::to_vec_pretty(&json).expect("a document is plain data");
-    let buffer = (!extended.bytes.is_empty()).then(|| (buffer_name.to_owned(), extended.bytes.clone()));
-    buffer.into_iter().chain([(name.to_owned(), text)]).collect()
+    let content = match file.is_binary {
+        true => binary_file(&json, &binary, &file.other_chunks),
+        false => serde_json::to_vec_pretty(&json).expect("a document is plain data"),
+    };
+    beside.into_iter().chain([(name.to_owned(), content)]).collect()
 }
 
 /// The buffer that takes what is added: the binary part, or one more.
@@ -315,11 +324,6 @@ impl Added<'_> {
             }
             let buffer = self.buffer;
             self.json["buffers"][buffer]["byteLength"] = json!(length);
-            if self.file.is_binary && buffer > 0 {
-                use base64::Engine;
-                let text = base64::engine::general_purpose::STANDARD.encode(&self.bytes);
-                self.json["buffers"][buffer]["uri"] = json!(format!("data:application/octet-stream;base64,{text}"));
-            }
         }
         Extended { json: self.json, bytes: self.bytes, warnings: self.warnings.into_iter().collect() }
     }

@@ -1,11 +1,11 @@
 //! Lightmap coordinates of an object: a set of its own that is fit for a lightmap, else charts by the crate `uvunwrap`
 //! (conformal maps, split where they distort, packed with padding).
 
-use glam::{DVec2, DVec3};
-use uvunwrap::{Density, MeshInput, Options, Packing};
+use glam::{DVec2, DVec3, Vec2};
+use uvunwrap::{Atlas, Density, MeshInput, Options, Packing};
 
 use super::raster::Lattice;
-use super::{MAX_SIDE, MIN_SIDE};
+use super::{MAX_SIDE, MIN_SIDE, bleeding};
 use crate::scene::Mesh;
 
 /// The meshes of an object with lightmap coordinates that share one map.
@@ -130,7 +130,8 @@ fn existing_set(meshes: &[&Mesh], set: usize, uvs: &[Vec<DVec2>], texels_per_met
     let is_part = extent.x * extent.y < LEAST_SHARE;
     let (low, extent) = if is_part { (low, extent) } else { (DVec2::ZERO, DVec2::ONE) };
     let sides = texels_per_metre * extent * metres / (area - flat);
-    let side = |wanted: f64| wanted.ceil().clamp(MIN_SIDE.into(), max_side.into()) as u32;
+    // Rounded, so that the coordinates of an earlier bake give its map again.
+    let side = |wanted: f64| wanted.round().clamp(MIN_SIDE.into(), max_side.into()) as u32;
     let (width, height) = (side(sides.x), side(sides.y));
     let in_map = |uv: &DVec2| ((*uv - low) / extent).clamp(DVec2::ZERO, DVec2::ONE);
     let part = |(mesh, uvs): (&&Mesh, &Vec<DVec2>)| Part {
@@ -142,7 +143,10 @@ fn existing_set(meshes: &[&Mesh], set: usize, uvs: &[Vec<DVec2>], texels_per_met
     if overlap(&parts, width, height) {
         return Err("overlaps itself");
     }
-    let is_coarse = sides.max_element() > max_side.into();
+    if bleeding::bleeds(meshes, &parts, width, height) {
+        return Err("has fewer than two free texels between charts, so that light would bleed");
+    }
+    let is_coarse = sides.max_element().round() > max_side.into();
     Ok(Unwrapped { parts, width, height, set: Some(set), offset: -low / extent, scale: 1.0 / extent, refused: None, is_coarse })
 }
 
@@ -193,23 +197,30 @@ fn charts(meshes: &[&Mesh], texels_per_metre: f64, max_side: u32) -> Result<Unwr
         packing: if is_large { Packing::Fast } else { Packing::Shape },
         max_chart_area: if is_large { (share * area / (extent * extent)) as f32 } else { 0.0 },
         max_area_distortion: MAX_DISTORTION,
-        max_chart_size: max_side - 2 * PADDING,
         ..Options::default()
     };
-    let generate = |density: Density| {
-        uvunwrap::generate(&inputs, &Options { density, ..options }).map_err(|error| format!("cannot be unwrapped ({error})"))
+    let wanted = wanted as f32;
+    let generate = |density: Density| uvunwrap::generate(&inputs, &Options { density, ..options });
+    // Near a square, with charts no longer than allowed.
+    let square = || {
+        let density = Density::Fixed { texels_per_unit: wanted, page_size: None };
+        uvunwrap::generate(&inputs, &Options { density, max_chart_size: max_side - 2 * PADDING, ..options })
+            .ok()
+            // A map as long as the longest chart may be has charts that were made smaller.
+            .filter(|atlas| atlas.width.max(atlas.height) < max_side)
     };
-    let largest = Density::Auto { page_size: max_side };
+    // In another arrangement, as wide as is allowed.
+    let wide = || {
+        let density = Density::Fixed { texels_per_unit: wanted, page_size: Some(max_side) };
+        generate(density).ok().filter(|atlas| atlas.page_count <= 1).map(cropped)
+    };
     // What cannot fit is not tried: the map would be of any size.
     let fits = texels_per_metre * area.sqrt() < max_side.into();
-    let (atlas, is_coarse) = match fits {
-        true => {
-            let atlas = generate(Density::Fixed { texels_per_unit: wanted as f32, page_size: None })?;
-            // A map as long as the longest chart may be has charts that were made smaller.
-            if atlas.width.max(atlas.height) < max_side { (atlas, false) } else { (generate(largest)?, true) }
-        }
-        false => (generate(largest)?, true),
+    let atlas = match if fits { square().or_else(wide) } else { None } {
+        Some(atlas) => atlas,
+        None => generate(Density::Auto { page_size: max_side }).map_err(|error| format!("cannot be unwrapped ({error})"))?,
     };
+    let is_coarse = atlas.texels_per_unit < wanted;
     if atlas.page_count > 1 {
         return Err(format!(
             "unwraps into {} pieces, too many for a lightmap of {max_side} texels per side; split the mesh",
@@ -226,4 +237,17 @@ fn charts(meshes: &[&Mesh], texels_per_metre: f64, max_side: u32) -> Result<Unwr
     };
     let parts = atlas.meshes.iter().map(part).collect();
     Ok(Unwrapped { parts, width, height, set: None, offset: DVec2::ZERO, scale: DVec2::ONE, refused: None, is_coarse })
+}
+
+/// A page without its free columns and rows.
+fn cropped(mut atlas: Atlas) -> Atlas {
+    let size = Vec2::new(atlas.width as f32, atlas.height as f32);
+    let vertices = || atlas.meshes.iter().flat_map(|mesh| &mesh.vertices);
+    let used = vertices().map(|vertex| Vec2::from(vertex.uv) * size).fold(Vec2::ZERO, Vec2::max);
+    let side = |used: f32, side: u32| (used.ceil() as u32 + PADDING).min(side);
+    let (width, height) = (side(used.x, atlas.width), side(used.y, atlas.height));
+    let grow = size / Vec2::new(width as f32, height as f32);
+    atlas.meshes.iter_mut().flat_map(|mesh| &mut mesh.vertices).for_each(|vertex| vertex.uv = (Vec2::from(vertex.uv) * grow).to_array());
+    (atlas.width, atlas.height) = (width, height);
+    atlas
 }

@@ -68,18 +68,32 @@ pub(super) fn run(args: &BakeArgs, cancelled: &AtomicBool) -> Result<End> {
         return Err(Error::setting("--atlas", size, format!("is for scenes from a file, and {name} is built in; leave it out")));
     }
 
+    if let Some(stops) = args.exposure.filter(|_| !is_built_in && !args.preview) {
+        return Err(Error::setting("--exposure", stops, "is for the preview; add --preview, or leave it out"));
+    }
+
     let reporter = ProgressReporter::new(&args.messages.progress);
     let scene = args.scene.open(&reporter)?;
     let file = if is_built_in { None } else { Some(File::open(Path::new(name))?) };
+    let area = baked_area(&scene);
+    if area == 0.0 {
+        let reason =
+            "has nothing to bake: every surface is a mirror, lets light through or is unlit, or has no area; add one that scatters light";
+        return Err(Error::Scene { path: name.into(), object: "the scene".into(), reason: reason.into() });
+    }
     reporter.status("laying out the lightmaps");
     let atlas = if is_built_in { Atlas::Off } else { args.atlas.unwrap_or(Atlas::Auto) };
-    let density = args.texels_per_metre.unwrap_or_else(|| usual_density(&scene));
+    let density = args.texels_per_metre.unwrap_or((USUAL_TEXELS / area).sqrt());
     let layout = Layout::of_file(&scene, file.as_ref(), density, atlas.max_side())?;
     layout.warnings.iter().for_each(|warning| complain(&format!("warning: {warning}")));
     let pages = Pages::new(&layout, atlas);
     // Before the light, as it says what is wrong with the file.
     let into_file = file.as_ref().map(|file| IntoFile::new(&folder, file, &scene, &layout, &pages)).transpose()?;
     into_file.iter().flat_map(|into| &into.warnings).for_each(|warning| complain(&format!("warning: {warning}")));
+    let names = into_file.as_ref().map_or_else(|| bake::names(&scene, &layout), |into_file| into_file.names(args.preview));
+    for name in names {
+        check_distinct(&[&[folder.file(&name)], report_files.as_slice()].concat())?;
+    }
     let geometry = geometry(&scene, &settings, &reporter)?;
     // Each round estimates one point of every texel, another one each time.
     let phases: Vec<Vec<Receiver>> =
@@ -135,11 +149,11 @@ fn built_in_files(layout: &Layout) -> Vec<Written> {
 /// Texels of all maps together, unless the user asks for a density.
 const USUAL_TEXELS: f64 = 65_536.0;
 
-fn usual_density(scene: &Scene) -> f64 {
+/// Of the surfaces that get lightmaps, square metres.
+fn baked_area(scene: &Scene) -> f64 {
     let kinds = scene.lobe_kinds();
     let baked = scene.meshes.iter().filter(|mesh| kinds[mesh.material].matt);
-    let area: f64 = baked.map(|mesh| (0..mesh.triangles.len()).map(|triangle| mesh.area(triangle)).sum::<f64>()).sum();
-    (USUAL_TEXELS / area.max(f64::MIN_POSITIVE)).sqrt()
+    baked.map(|mesh| (0..mesh.triangles.len()).map(|triangle| mesh.area(triangle)).sum::<f64>()).sum()
 }
 
 fn receivers(layout: &Layout, phase: usize, geometry: &Geometry) -> Vec<Receiver> {

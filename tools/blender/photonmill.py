@@ -14,10 +14,13 @@ import json
 import math
 import os
 import queue
+import shlex
+import signal
 import subprocess
 import threading
 
 import bpy
+import mathutils
 
 bl_info = {
     "name": "photonmill",
@@ -43,7 +46,9 @@ class Failure(Exception):
 
 def emitted_radiance(lamp, matrix):
     """W/m2/sr of an area lamp, per channel, and its area in m2. Blender's watts leave by one side."""
-    area = lamp.area(matrix_world=matrix)
+    corners = [matrix @ mathutils.Vector(corner) for corner in outline(lamp)]
+    # Fans of triangles around the first corner.
+    area = 0.5 * sum((b - corners[0]).cross(c - corners[0]).length for b, c in zip(corners[1:], corners[2:]))
     power = lamp.energy * 2 ** getattr(lamp, "exposure", 0.0)
     if not getattr(lamp, "normalize", True):
         power *= area
@@ -139,6 +144,23 @@ def render_world(world, path, height, made):
     bpy.ops.render.render(write_still=True, scene=scene.name)
 
 
+def sharp_lamps(scene):
+    """Names of the lamps whose size glTF leaves out."""
+    with bpy.context.temp_override(scene=scene, view_layer=scene.view_layers[0]):
+        objects = {instance.object.original for instance in bpy.context.evaluated_depsgraph_get().object_instances}
+    lamps = [(thing.name, thing.data) for thing in objects if thing.type == "LIGHT" and not thing.hide_render]
+    size = lambda lamp: {"AREA": 0, "SUN": getattr(lamp, "angle", 0)}.get(lamp.type, getattr(lamp, "shadow_soft_size", 0))
+    return sorted(name for name, lamp in lamps if size(lamp) > 0)
+
+
+def warn_of_sharp_lamps(scene):
+    names = sharp_lamps(scene)
+    if not names:
+        return []
+    listed = ", ".join(f"'{name}'" for name in names[:5]) + (f" and {len(names) - 5} more" if len(names) > 5 else "")
+    return [f"glTF has no size of point lamps, spots and suns: the shadows of {listed} are sharp; use area lamps for soft ones"]
+
+
 def export(scene, folder, sky_height=1024):
     """Writes scene.glb and, where the world is a picture, world.exr; gives photonmill's arguments."""
     os.makedirs(folder, exist_ok=True)
@@ -201,15 +223,19 @@ def command(scene, what, folder, program, arguments, sky_height):
 
 
 class Run:
-    """photonmill in the background; `poll` says how far it is."""
+    """photonmill in the background; `poll` says how far it is. `warnings` is what is to be said besides its own."""
 
-    def __init__(self, line):
+    def __init__(self, line, warnings=()):
+        # On Windows only a group of its own can be interrupted alone.
+        flags = getattr(subprocess, "CREATE_NEW_PROCESS_GROUP", 0)
+        pipes = {"stdout": subprocess.DEVNULL, "stderr": subprocess.PIPE, "text": True, "encoding": "utf-8", "errors": "replace"}
         try:
-            self.process = subprocess.Popen(line, stdout=subprocess.DEVNULL, stderr=subprocess.PIPE, text=True, encoding="utf-8", errors="replace")
+            self.process = subprocess.Popen(line, creationflags=flags, **pipes)
         except OSError as error:
             raise Failure(f"{line[0]} cannot be started ({error.strerror}); set its path in the add-on's preferences") from None
         self.lines = queue.Queue()
-        self.warnings = []
+        self.warnings = list(warnings)
+        self.is_ending = False
         self.last = "photonmill ended without a word"
         self.share, self.status, self.error = 0.0, "", ""
         threading.Thread(target=self.read, daemon=True).start()
@@ -231,9 +257,10 @@ class Run:
                 self.status = said.get("message", self.status)
         elif line:
             line = line.removeprefix("photonmill: ")
-            self.last = line
             if line.startswith("warning: "):
                 self.warnings.append(line.removeprefix("warning: "))
+            else:
+                self.last = line
 
     def poll(self, wait=0.0):
         """True when it has ended well; raises a Failure when it has not."""
@@ -243,15 +270,21 @@ class Run:
             except queue.Empty:
                 return False
             if line is None:
-                # Code 3: it ended early and wrote what it had.
-                if self.process.wait() not in (0, 3):
+                # Interrupted, it says of what the results are; before the first one it ends with an error.
+                is_partial = self.is_ending and self.last.startswith("ended early")
+                if self.process.wait() != 0 and not is_partial:
                     raise Failure(self.last)
                 return True
             self.take(line)
 
     def stop(self):
-        self.process.kill()
-        self.process.wait()
+        """Ends it with what it has; the second time, at once."""
+        if self.is_ending:
+            self.process.kill()
+            self.process.wait()
+        else:
+            self.is_ending = True
+            self.process.send_signal(getattr(signal, "CTRL_BREAK_EVENT", signal.SIGTERM))
 
 
 def finish(run):
@@ -263,14 +296,16 @@ def finish(run):
 def render(scene, folder, program="photonmill", arguments=(), sky_height=1024):
     """Renders the scene, waits, and gives the picture (linear, W/m2/sr)."""
     line, result = command(scene, "render", folder, program, arguments, sky_height)
-    finish(Run(line))
+    for warning in finish(Run(line, warn_of_sharp_lamps(scene))).warnings:
+        print(f"photonmill: warning: {warning}")
     return load_picture(scene, result)
 
 
 def bake(scene, folder, program="photonmill", arguments=(), sky_height=1024):
     """Bakes the scene, waits, and gives the new scene that shows its lightmaps."""
     line, result = command(scene, "bake", folder, program, arguments, sky_height)
-    finish(Run(line))
+    for warning in finish(Run(line, warn_of_sharp_lamps(scene))).warnings:
+        print(f"photonmill: warning: {warning}")
     return load_lightmaps(scene, result)
 
 
@@ -296,14 +331,15 @@ def load_lightmaps(scene, folder):
     with bpy.context.temp_override(scene=baked, view_layer=baked.view_layers[0], collection=baked.collection):
         bpy.ops.import_scene.gltf(filepath=os.path.join(folder, "scene.glb"))
     new = [thing for thing in bpy.data.objects if thing not in before]
+    pictures = {}
     for thing in new:
         for collection in list(thing.users_collection):
             if collection != baked.collection and collection.name not in {c.name for c in baked.collection.children_recursive}:
                 collection.objects.unlink(thing)
         if not thing.users_collection:
             baked.collection.objects.link(thing)
-        if KEY in thing and thing.type == "MESH":
-            show_lightmap(thing, folder)
+        for shown, lightmap in lightmaps_of(thing):
+            show_lightmap(shown, lightmap, folder, pictures)
         if thing.type == "LIGHT":
             # Its light is in the maps.
             thing.hide_render = True
@@ -312,15 +348,48 @@ def load_lightmaps(scene, folder):
     return baked
 
 
-def show_lightmap(thing, folder):
-    lightmap = thing[KEY]
-    image = bpy.data.images.load(os.path.join(folder, lightmap["irradiance"]), check_existing=True)
+def lightmaps_of(thing):
+    """The objects whose light an object names, each with its lightmap."""
+    if KEY not in thing:
+        return []
+    lightmaps = thing[KEY]
+    if not isinstance(lightmaps, (list, tuple)):
+        return [(thing, lightmaps)] if thing.type == "MESH" else []
+    # Of EXT_mesh_gpu_instancing: one for each instance, which are children, the last ones that were made.
+    instances = sorted((child for child in thing.children if child.type == "MESH"), key=lambda child: child.session_uid)
+    if len(instances) < len(lightmaps):
+        raise Failure(f"{thing.name} has {len(lightmaps)} lightmaps but {len(instances)} instances; make them objects of their own and bake again")
+    return list(zip(instances[len(instances) - len(lightmaps):], lightmaps))
+
+
+def picture_of(path, pictures):
+    """A picture of this bake: one of an earlier bake may have had the same name, and is kept."""
+    if path not in pictures:
+        pictures[path] = bpy.data.images.load(path, check_existing=False)
+        # The next bake may write over the file.
+        pictures[path].pack()
+    return pictures[path]
+
+
+def usual_material(pictures):
+    """That of surfaces without one, as glTF has it."""
+    if None not in pictures:
+        material = bpy.data.materials.new("photonmill default")
+        material.use_nodes = True
+        shader = next(node for node in material.node_tree.nodes if node.type == "BSDF_PRINCIPLED")
+        shader.inputs["Base Color"].default_value = (1, 1, 1, 1)
+        pictures[None] = material
+    return pictures[None]
+
+
+def show_lightmap(thing, lightmap, folder, pictures):
+    image = picture_of(os.path.join(folder, lightmap["irradiance"]), pictures)
     layer = thing.data.uv_layers[int(lightmap["texCoord"])].name
+    if not thing.material_slots:
+        thing.data.materials.append(None)
     for slot in thing.material_slots:
-        if slot.material is None:
-            continue
         # Objects that share a mesh have light of their own.
-        material = slot.material.copy()
+        material = (slot.material or usual_material(pictures)).copy()
         slot.link = "OBJECT"
         slot.material = material
         nodes, link = material.node_tree.nodes, material.node_tree.links.new
@@ -396,11 +465,16 @@ class Settings(bpy.types.PropertyGroup):
         if what == "bake":
             own += ["--texels-per-metre", f"{self.density:g}"] if self.density > 0 else []
             own += ["--atlas", str(self.atlas)] if self.atlas > 0 else []
-        return own + self.more.split()
+        try:
+            # Windows separates the parts of paths by what escapes elsewhere.
+            more = [part.strip("\"'") for part in shlex.split(self.more, posix=False)] if os.name == "nt" else shlex.split(self.more)
+        except ValueError as error:
+            raise Failure(f"More {self.more}: cannot be split into options ({error}); close every quote") from None
+        return own + more
 
 
 class Work:
-    """Runs photonmill; with a window in the background, Esc ends it."""
+    """Runs photonmill; with a window in the background, Esc ends it, with what it has."""
 
     bl_options = {"REGISTER"}
     what = ""
@@ -414,13 +488,14 @@ class Work:
         program = bpy.path.abspath(addon.preferences.program) if addon else "photonmill"
         line, self.result = command(context.scene, self.what, folder, program, settings.arguments(self.what), settings.sky)
         self.scene = context.scene
-        self.run = Run(line)
+        self.run = Run(line, warn_of_sharp_lamps(context.scene))
 
     def end(self, context):
         for warning in self.run.warnings:
             self.report({"WARNING"}, warning)
         loaded = self.load(context)
-        self.report({"INFO"}, f"photonmill: {loaded.name}{self.run.error}")
+        early = ", ended early" if self.run.is_ending else ""
+        self.report({"INFO"}, f"photonmill: {loaded.name}{self.run.error}{early}")
         return {"FINISHED"}
 
     def execute(self, context):
@@ -444,15 +519,17 @@ class Work:
         return {"RUNNING_MODAL"}
 
     def modal(self, context, event):
-        if event.type == "ESC":
+        if event.type == "ESC" and event.value == "PRESS":
+            was_ending = self.run.is_ending
             self.run.stop()
-            return self.leave(context, {"CANCELLED"})
+            return self.leave(context, {"CANCELLED"}) if was_ending else {"RUNNING_MODAL"}
         if event.type != "TIMER":
             return {"PASS_THROUGH"}
         try:
             if not self.run.poll():
                 context.window_manager.progress_update(self.run.share)
-                context.workspace.status_text_set(f"photonmill: {self.run.status} (Esc ends it)")
+                hint = "ending; Esc again gives up what it has" if self.run.is_ending else "Esc ends it with what it has"
+                context.workspace.status_text_set(f"photonmill: {self.run.status} ({hint})")
                 return {"PASS_THROUGH"}
             return self.leave(context, self.end(context))
         except Failure as failure:

@@ -18,6 +18,7 @@ import photonmill
 PROGRAM = "photonmill"
 SIZE = 48
 QUICK = ["--error", "1%", "--time", "60s"]
+COARSE = ["--texels-per-metre", "3", "--photons", "20000", "--rounds", "2"]
 
 
 def material(name, colour):
@@ -86,6 +87,18 @@ def by_cycles(scene, folder, samples=512):
     scene.render.image_settings.color_depth = "32"
     bpy.ops.render.render(write_still=True)
     return bpy.data.images.load(scene.render.filepath, check_existing=False)
+
+
+def images(scene):
+    """Lightmaps of a scene's materials, by name."""
+    nodes = [node for thing in scene.objects if thing.type == "MESH" for slot in thing.material_slots for node in slot.material.node_tree.nodes]
+    return {node.image.name: node.image for node in nodes if node.type == "TEX_IMAGE"}
+
+
+def shown(scene):
+    """The mean of each of them."""
+    mean = lambda values: sum(values) / len(values)
+    return {name: mean([value for row in pixels(image) for pixel in row for value in pixel]) for name, image in images(scene).items()}
 
 
 def blocks(image, count=6):
@@ -200,16 +213,84 @@ class AddOn(unittest.TestCase):
         self.assertLess(abs(total - 1), 0.03)
         self.assertLess(worst, 0.15)
 
+    def test_a_second_bake_shows_its_own_light(self):
+        made = lamp("AREA", 120, (0, 0, 2.5), size=1)
+        first = photonmill.bake(self.scene, self.folder.name, PROGRAM, COARSE)
+        before = shown(first)
+        made.data.energy = 1200
+        second = photonmill.bake(self.scene, self.folder.name, PROGRAM, COARSE)
+        self.assertEqual(before, shown(first))
+        after = shown(second)
+        self.assertTrue(before and not before.keys() & after.keys())
+        floor = lambda lights: next(light for name, light in lights.items() if name.startswith("floor"))
+        self.assertAlmostEqual(floor(after) / floor(before), 10, delta=0.1)
+
+    def test_objects_without_a_material_show_their_light(self):
+        lamp("AREA", 120, (0, 0, 2.5), size=1)
+        self.scene.objects["floor"].data.materials.clear()
+        bpy.ops.mesh.primitive_cube_add(size=0.5, location=(-1, 0, 0.25))
+        bpy.context.object.data.materials.append(None)
+        baked = photonmill.bake(self.scene, self.folder.name, PROGRAM, COARSE)
+        self.assertLessEqual({"floor", "Sphere", "Cube"}, {name.split(".")[0] for name in images(baked)})
+
+    def test_instances_of_one_node_have_light_of_their_own(self):
+        mesh = bpy.data.meshes.new("square")
+        mesh.from_pydata([(0, 0, 0), (1, 0, 0), (1, 1, 0)], [], [(0, 1, 2)])
+        mesh.uv_layers.new(name="first")
+        mesh.uv_layers.new(name="second")
+        parent = bpy.data.objects.new("parent", None)
+        children = [bpy.data.objects.new(f"Node_{k}", mesh) for k in (0, 1, 10, 2)]
+        for child in children:
+            child.parent = parent
+        self.assertEqual(photonmill.lightmaps_of(parent), [])
+        parent[photonmill.KEY] = [{"irradiance": f"{k}.exr"} for k in range(3)]
+        found = [(thing.name, lightmap["irradiance"]) for thing, lightmap in photonmill.lightmaps_of(parent)]
+        self.assertEqual(found, [("Node_1", "0.exr"), ("Node_10", "1.exr"), ("Node_2", "2.exr")])
+        parent[photonmill.KEY] = [{"irradiance": f"{k}.exr"} for k in range(5)]
+        with self.assertRaisesRegex(photonmill.Failure, "parent has 5 lightmaps but 4 instances"):
+            photonmill.lightmaps_of(parent)
+
+    def test_sizes_of_lamps_that_gltf_leaves_out_are_named(self):
+        lamp("AREA", 120, (0, 0, 2.5), size=1)
+        lamp("POINT", 10, (0, 0, 2), shadow_soft_size=0)
+        self.assertEqual(photonmill.warn_of_sharp_lamps(self.scene), [])
+        for name, kind, settings in [("bulb", "POINT", {"shadow_soft_size": 0.2}), ("beam", "SPOT", {"shadow_soft_size": 0.1}), ("sun", "SUN", {"angle": 0.01})]:
+            lamp(kind, 10, (0, 0, 2), **settings).name = name
+        [warning] = photonmill.warn_of_sharp_lamps(self.scene)
+        self.assertIn("'beam', 'bulb', 'sun'", warning)
+
+    def test_what_is_finished_is_kept(self):
+        lamp("AREA", 120, (0, 0, 2.5), size=1)
+        line, result = photonmill.command(self.scene, "render", self.folder.name, PROGRAM, ["--photons", "2000", "--rounds", "1000000"], 16)
+        run = photonmill.Run(line)
+        while run.share == 0:
+            self.assertFalse(run.poll(0.1))
+        run.stop()
+        photonmill.finish(run)
+        self.assertGreater(sum(blocks(photonmill.load_picture(self.scene, result))), 0)
+        # At once where it is asked again.
+        run = photonmill.Run(line)
+        while run.share == 0:
+            run.poll(0.1)
+        run.stop()
+        run.stop()
+        self.assertIsNotNone(run.process.poll())
+
     def test_operators_work_without_a_window(self):
         photonmill.register()
         try:
             lamp("AREA", 120, (0, 0, 2.5), size=1)
             self.scene.photonmill.folder = self.folder.name
-            self.scene.photonmill.more = "--photons 5000"
+            report = os.path.join(self.folder.name, "the report.json")
+            self.scene.photonmill.more = f"--photons 5000 --json '{report}'"
             self.scene.photonmill.minutes = 0.2
             os.environ["PATH"] = os.path.dirname(PROGRAM) + os.pathsep + os.environ["PATH"]
             bpy.ops.render.photonmill()
             self.assertIn("photonmill Scene", bpy.data.images)
+            self.assertTrue(os.path.exists(report))
+            self.scene.photonmill.more = "--json 'open"
+            with self.assertRaisesRegex(RuntimeError, "close every quote"):
+                bpy.ops.render.photonmill()
         finally:
             photonmill.unregister()
 

@@ -10,6 +10,10 @@ export async function load(folder, name) {
   const lit = [];
   gltf.scene.traverse((node) => node.userData.photonmill_lightmap && lit.push(node));
   for (const node of lit) {
+    // Of EXT_mesh_gpu_instancing: three.js draws all instances with one material, which has one lightmap.
+    if (Array.isArray(node.userData.photonmill_lightmap)) {
+      throw new Error(`node '${node.name}' has a lightmap for each of its instances, and this loader shows one a node: make the instances nodes of their own and bake again`);
+    }
     const { irradiance, texCoord, offset, scale } = node.userData.photonmill_lightmap;
     if (!pictures.has(irradiance)) {
       pictures.set(irradiance, await new EXRLoader().setDataType(THREE.FloatType).loadAsync(`${folder}/${irradiance}`));
