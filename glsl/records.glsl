@@ -367,12 +367,14 @@ struct Emitter {
     // Of a triangle the weights of its second and third corner where the piece that shines begins, and the piece's width over the
     // triangle's (`scene::geometry::lamp_pieces`).
     vec3 position;
-    // Its axis or normal; a directional light's flight.
+    // Its axis or normal; a directional light's flight; towards the brightest part of a sky's picture.
     vec3 direction;
     // Radius of a disc; versine (1 - cosine) of a spot's inner cone, of which a narrow one keeps its digits.
     float size;
-    // Versine of a spot's outer cone.
+    // Versine of a spot's outer cone; of a sky, the share of light samples that its table chooses.
     float outer_versine;
+    // Of a cone around the brightest part of a sky's picture.
+    float sun_versine;
 };
 
 // A node of the tree of lights (`scene::light_tree`): those within a sphere.

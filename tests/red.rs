@@ -581,7 +581,7 @@ const FAULTS: [Fault; 138] = [
         kernels: &["view"], noticed_by: &[(OverlappingSlabs, TooBright)] },
     Fault { what: "mirrored normal maps are not mirrored",
         file: "material/surface.glsl",
-        from: "is_turned ? cross(tangent, normal) : cross(normal, tangent),",
+        from: "at.is_turned ? cross(tangent, normal) : cross(normal, tangent),",
         to: "cross(normal, tangent),",
         kernels: &["view"], noticed_by: &[(NormalMaps, TooBright)] },
     Fault { what: "textures are looked up by the first set of coordinates alone",

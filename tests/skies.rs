@@ -206,7 +206,7 @@ fn a_sun_that_shines_in_has_as_many_rays_as_without_openings() {
         let settings = SceneSettings { rounds: 64, shadow_rays: 4, part: Part::Direct, aim, ..SceneSettings::default() };
         render(&gpu, &scene, &settings, Target::Points(&points)).unwrap()
     });
-    assert_eq!(aimed.plan.trial.as_ref().map(|trial| trial.openings.len()), Some(1));
+    assert!(aimed.plan.trial.as_ref().is_some_and(|trial| !trial.openings.is_empty()));
     let [little, much] = [&aimed, &other].map(|lit| lit.film.relative_error(&lit.plan));
     println!("{:.2} % and {:.2} %", 100.0 * little, 100.0 * much);
     assert!(little < 1.1 * much, "{little} and {much}");

@@ -26,6 +26,8 @@ const COLUMNS: RangeInclusive<u32> = 512..=2048;
 const ROWS: RangeInclusive<u32> = 256..=1024;
 /// Values that a random choice of a row, or of a cell in it, can take.
 const CHOICES: f64 = (1 << 24) as f64;
+/// Of the brightest cell, what others have at least that belong to the brightest part.
+const BRIGHT: f64 = 1.0 / 16.0;
 /// Most of the light samples that leave the cosine's directions for the table's, however small the sun.
 const MOST_BY_TABLE: f64 = 0.75;
 
@@ -56,6 +58,8 @@ pub struct Table {
     pub most: f32,
     /// Share of light samples that the table should choose.
     pub share: f64,
+    /// A cone around the brightest part, in the picture's axes: its axis, and 1 - cosine of its half angle.
+    pub sun: (DVec3, f64),
 }
 
 impl Sky {
@@ -184,6 +188,7 @@ impl Sky {
             words: Vec<u32>,
             most_over_share: f64,
             most: f64,
+            weights: Vec<f64>,
         }
         let of_row = |row: u32| {
             let cells = cells_of(row);
@@ -196,6 +201,7 @@ impl Sky {
                 words: cumulative(&shares),
                 most_over_share: over_share,
                 most: cells.iter().map(|(_, most)| *most).fold(0.0, f64::max),
+                weights,
             }
         };
         let found: Vec<Row> = (0..rows).into_par_iter().map(of_row).collect();
@@ -221,9 +227,31 @@ impl Sky {
             integral,
             most_over_density,
             most: found.iter().map(|of| of.most).fold(0.0, f64::max) as f32,
+            sun: sun(&found.iter().map(|of| of.weights.as_slice()).collect::<Vec<_>>()),
             share: if peak.is_finite() { (MOST_BY_TABLE * (1.0 - 1.0 / peak)).max(0.0) } else { 0.0 },
         }
     }
+}
+
+/// The axis of a cone around the cells that are nearly as bright as the brightest, and 1 - cosine of its half angle.
+fn sun(rows: &[&[f64]]) -> (DVec3, f64) {
+    let direction = |row: usize, column: f64| {
+        let angle = PI * (row as f64 + 0.5) / rows.len() as f64;
+        let turn = TAU * ((column + 0.5) / rows[row].len() as f64 - 0.5);
+        DVec3::new(angle.sin() * turn.cos(), angle.cos(), angle.sin() * turn.sin())
+    };
+    let brightest = |row: &[f64]| row.iter().copied().enumerate().max_by(|a, b| a.1.total_cmp(&b.1)).expect("rows have cells");
+    let of_rows = rows.iter().map(|row| brightest(row)).enumerate();
+    let (row, (column, most)) = of_rows.max_by(|a, b| a.1.1.total_cmp(&b.1.1)).expect("a table has rows");
+    let axis = direction(row, column as f64);
+    let least_cosine = |(row, cells): (usize, &&[f64])| {
+        let bright = cells.iter().enumerate().filter(|(_, weight)| **weight >= BRIGHT * most);
+        bright.map(|(column, _)| axis.dot(direction(row, column as f64))).fold(1.0, f64::min)
+    };
+    let cosine = rows.par_iter().enumerate().map(least_cosine).reduce(|| 1.0, f64::min);
+    // And to the corners of their cells.
+    let half = cosine.clamp(-1.0, 1.0).acos() + PI / rows.len() as f64 + PI / rows[0].len() as f64;
+    (axis, 1.0 - half.min(PI).cos())
 }
 
 /// Texels whose tents reach into cell `of` out of `cells` along a picture of `size`, and how much of them lies there.
@@ -468,6 +496,21 @@ mod tests {
         let even = sky(16, 8, |_, _| Vec3::ONE).table();
         // A texel of 1 is stored as 2^14.
         assert!(even.share.abs() < 1e-6 && (even.integral.x / 16384.0 / (2.0 * TAU) - 1.0).abs() < 1e-6, "{}", even.integral);
+    }
+
+    /// A sun has a narrow cone, and a sky of several bright parts a wide one.
+    #[test]
+    fn the_brightest_part_has_a_cone() {
+        let with = |bright: &[(u32, u32)]| {
+            sky(64, 32, |i, j| Vec3::splat(if bright.contains(&(i, j)) { 1000.0 } else { 1.0 })).turned(90.0).table().sun
+        };
+        let (axis, versine) = with(&[(40, 8)]);
+        let (angle, turn) = (PI * 8.5 / 32.0, TAU * (40.5 / 64.0 - 0.5));
+        let exact = DVec3::new(angle.sin() * turn.cos(), angle.cos(), angle.sin() * turn.sin());
+        assert!(axis.dot(exact) > 0.99 && versine < 0.03, "{axis}, {versine}");
+        let (_, wide) = with(&[(40, 8), (8, 8)]);
+        assert!(wide > 0.9, "{wide}");
+        assert_eq!(with(&[]).1, 2.0);
     }
 
     #[test]

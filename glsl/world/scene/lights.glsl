@@ -188,14 +188,15 @@ float lamp_density(Triangle shining, vec3 normal, vec3 position, vec3 point, flo
 
 float environment_density(Emitter sky, vec3 position, vec3 ns, vec3 wi)
 {
-    float others = cosine_density(ns, wi);
+    float by_table = sky.outer_versine, others = cosine_density(ns, wi);
     if (HAS_OPENINGS) {
         if (openings[0].radius != 0.0) {
             float sum = sum_of_versines(position);
+            by_table = table_share(sky, position);
             others = density_with_cones(position, ns, wi, sum > 0.0 ? OPENING_SHARE : 0.0, sum).density;
         }
     }
-    return density_with_table(sky, wi, others);
+    return density_with_table(sky, by_table, wi, others);
 }
 
 // `light` has the probability with which it was chosen; u is for its area.

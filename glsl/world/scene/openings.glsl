@@ -51,14 +51,36 @@ SampledSky density_with_cones(vec3 position, vec3 ns, vec3 wi, float share, floa
     return SampledSky(wi, density, is_aimed);
 }
 
+// Whether two cones share a direction, by the versines of their half angles and the one between their axes.
+bool cones_meet(float a, float b, float between)
+{
+    // Both half angles together are half a turn.
+    return a + b >= 2.0 || between <= 1.0 - (1.0 - a) * (1.0 - b) + sqrt(a * (2.0 - a) * b * (2.0 - b));
+}
+
+// Share of light samples that the table of a sky chooses: none where no opening shows the brightest part of the picture.
+float table_share(Emitter sky, vec3 position)
+{
+    float share = 0.0;
+    if (HAS_SKY_PICTURE) {
+        for (uint k = 0; k < MAX_OPENINGS && openings[k].radius > 0.0; k++) {
+            float own = opening_versine(k, position);
+            if (own == 0.0 || cones_meet(own, sky.sun_versine, versine_between(sky.direction, normalize(openings[k].centre - position)))) {
+                share = sky.outer_versine;
+            }
+        }
+    }
+    return share;
+}
+
 // By the picture's table, towards the openings, or by the cosine. Aimed samples are a share of those that the table leaves, so that a sun
-// in the picture has as many as without openings.
+// that shines in has as many as without openings.
 SampledSky sample_sky(Emitter sky, vec3 position, vec3 ns, vec2 u)
 {
     float sum = sum_of_versines(position);
     float share = sum > 0.0 ? OPENING_SHARE : 0.0;
+    float by_table = table_share(sky, position);
     if (HAS_SKY_PICTURE) {
-        float by_table = table_share(sky);
         if (u.x < by_table) {
             SkySample found = sample_sky_table(sky, vec2(divide(u.x, by_table), u.y));
             SampledSky sampled = density_with_cones(position, ns, found.wi, share, sum);
@@ -87,7 +109,7 @@ SampledSky sample_sky(Emitter sky, vec3 position, vec3 ns, vec2 u)
         wi = to_frame(sample_cosine_hemisphere(divide(u.x - share, 1.0 - share), u.y), ns);
     }
     SampledSky sampled = density_with_cones(position, ns, wi, share, sum);
-    sampled.density = density_with_table(sky, wi, sampled.density);
+    sampled.density = density_with_table(sky, by_table, wi, sampled.density);
     return sampled;
 }
 

@@ -98,17 +98,11 @@ float cosine_density(vec3 ns, vec3 wi)
     return max(dot(wi, ns), 0.0) * 0.31830988618379067;
 }
 
-// Share of light samples that the table chooses.
-float table_share(Emitter sky)
-{
-    return HAS_SKY_PICTURE ? sky.outer_versine : 0.0;
-}
-
-// Density of light samples of which those that the table does not choose have this density.
-float density_with_table(Emitter sky, vec3 wi, float others)
+// Density of light samples of which the table chooses a share, and the others have this density.
+float density_with_table(Emitter sky, float by_table, vec3 wi, float others)
 {
     if (HAS_SKY_PICTURE) {
-        others = (1.0 - sky.outer_versine) * others + sky.outer_versine * sky_table_density(sky, wi);
+        others = (1.0 - by_table) * others + by_table * sky_table_density(sky, wi);
     }
     return others;
 }
@@ -117,7 +111,7 @@ float density_with_table(Emitter sky, vec3 wi, float others)
 SkySample sample_open_sky(Emitter sky, vec3 ns, vec2 u)
 {
     if (HAS_SKY_PICTURE) {
-        float by_table = table_share(sky);
+        float by_table = sky.outer_versine;
         if (u.x < by_table) {
             SkySample found = sample_sky_table(sky, vec2(divide(u.x, by_table), u.y));
             found.density = (1.0 - by_table) * cosine_density(ns, found.wi) + by_table * found.density;
@@ -126,5 +120,5 @@ SkySample sample_open_sky(Emitter sky, vec3 ns, vec2 u)
         u.x = divide(u.x - by_table, 1.0 - by_table);
     }
     vec3 wi = to_frame(sample_cosine_hemisphere(u.x, u.y), ns);
-    return SkySample(wi, density_with_table(sky, wi, cosine_density(ns, wi)));
+    return SkySample(wi, density_with_table(sky, sky.outer_versine, wi, cosine_density(ns, wi)));
 }

@@ -180,6 +180,8 @@ impl Geometry {
             position: turn.xyz(),
             size: turn.w,
             outer_versine: table.share as f32,
+            direction: (sky.turn * table.sun.0).as_vec3(),
+            sun_versine: table.sun.1 as f32,
             ..Emitter::default()
         };
         let weight = (all * table.integral).element_sum();
