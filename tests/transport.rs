@@ -250,7 +250,7 @@ fn layered_scene() -> Scene {
         grey(glass),
         grey(Layers { diffuse_transmission: 1.0, specular: 0.0, ..plastic }),
         Material::layered("plate", Vec3::ZERO, Layers { iridescence: 1.0, film_ior: 2.0, film_thickness: [0.0, 300.0], ..plastic }),
-        Material::layered("plate", Vec3::ONE, Layers { metallic: 1.0, roughness: 0.1, anisotropy: 1.0, ..plastic }),
+        Material::layered("plate", Vec3::ONE, Layers { metallic: 1.0, anisotropy: 1.0, ..plastic }),
         grey(Layers { ior: 1.5, dispersion: 20.0, medium: Some(Medium::CLEAR), ..glass }),
     ];
     for (place, material) in materials.into_iter().enumerate() {
@@ -281,7 +281,6 @@ fn part_that_shows(effect: Effect) -> Part {
         | Effect::SmoothNormals
         | Effect::Environment
         | Effect::Transmission
-        | Effect::Anisotropy
         | Effect::Media
         | Effect::Dispersion => Part::Specular,
         Effect::Indirect => Part::Indirect,

@@ -27,7 +27,7 @@ const ROWS: RangeInclusive<u32> = 256..=1024;
 /// Values that a random choice of a row, or of a cell in it, can take.
 const CHOICES: f64 = (1 << 24) as f64;
 /// Of the brightest cell, what others have at least that belong to the brightest part.
-const BRIGHT: f64 = 1.0 / 16.0;
+const BRIGHT: f64 = 0.25;
 /// Most of the light samples that leave the cosine's directions for the table's, however small the sun.
 const MOST_BY_TABLE: f64 = 0.75;
 

@@ -51,11 +51,13 @@ SampledSky density_with_cones(vec3 position, vec3 ns, vec3 wi, float share, floa
     return SampledSky(wi, density, is_aimed);
 }
 
-// Whether two cones share a direction, by the versines of their half angles and the one between their axes.
-bool cones_meet(float a, float b, float between)
+// From 0 where two cones share no direction to 1 where the narrower one lies in the other, by the versines of their half angles and of the
+// angle between their axes.
+float overlap_of_cones(float a, float b, float between)
 {
-    // Both half angles together are half a turn.
-    return a + b >= 2.0 || between <= 1.0 - (1.0 - a) * (1.0 - b) + sqrt(a * (2.0 - a) * b * (2.0 - b));
+    float sines = sqrt(a * (2.0 - a) * b * (2.0 - b));
+    // Both half angles together are half a turn, or one of them is none.
+    return a + b >= 2.0 || sines < 1e-12 ? 1.0 : clamp(divide(1.0 - (1.0 - a) * (1.0 - b) + sines - between, 2.0 * sines), 0.0, 1.0);
 }
 
 // Share of light samples that the table of a sky chooses: none where no opening shows the brightest part of the picture.
@@ -65,9 +67,11 @@ float table_share(Emitter sky, vec3 position)
     if (HAS_SKY_PICTURE) {
         for (uint k = 0; k < MAX_OPENINGS && openings[k].radius > 0.0; k++) {
             float own = opening_versine(k, position);
-            if (own == 0.0 || cones_meet(own, sky.sun_versine, versine_between(sky.direction, normalize(openings[k].centre - position)))) {
-                share = sky.outer_versine;
+            float overlap = 1.0;
+            if (own > 0.0) {
+                overlap = overlap_of_cones(own, sky.sun_versine, versine_between(sky.direction, normalize(openings[k].centre - position)));
             }
+            share = max(share, overlap * sky.outer_versine);
         }
     }
     return share;
