@@ -46,13 +46,14 @@ fn commands(text: &str) -> Vec<String> {
 }
 
 /// Commands that start so are not run, and why.
-const NOT_RUN: [(&str, &str); 9] = [
+const NOT_RUN: [(&str, &str); 10] = [
     ("tools/setup && tools/test", "runs this test"),
     ("tools/test", "runs this test"),
     ("tools/bench/run ", "writes into the repository"),
     ("tools/bench_peers", "installs other programs"),
     ("tools/fuzz/run ", "needs a nightly toolchain"),
     ("tools/sanitize", "needs a nightly toolchain"),
+    ("tools/sample_models ", "needs a collection of files"),
     ("tools/blender/test_addon.py", "needs Blender's Python module"),
     ("node tools/viewers/try.mjs", "needs Chromium and three.js"),
     ("photonmill selfcheck", "takes half a minute at any size; `every_closed_form_holds` runs the same"),

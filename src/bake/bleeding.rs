@@ -5,7 +5,7 @@ use std::collections::HashMap;
 use glam::{DVec2, DVec3};
 use rayon::prelude::*;
 
-use super::unwrap::Part;
+use super::part::Part;
 use super::{SurfacePoint, gutters, texels};
 use crate::scene::Mesh;
 

@@ -56,6 +56,7 @@ mod names;
 mod objects;
 pub mod original;
 pub mod pages;
+pub mod part;
 mod raster;
 mod texels;
 pub mod unwrap;

@@ -5,7 +5,8 @@ use std::collections::{BTreeMap, BTreeSet};
 use glam::DVec2;
 use rayon::prelude::*;
 
-use super::unwrap::{self, Part};
+use super::part::Part;
+use super::unwrap;
 use super::{MIN_SIDE, MeshLightmap, Object, gutters, texels};
 use crate::error::{Error, Result};
 use crate::scene::gltf::source::File;

@@ -4,6 +4,7 @@
 use glam::{DVec2, DVec3, Vec2};
 use uvunwrap::{Atlas, Density, MeshInput, Options, Packing};
 
+use super::part::Part;
 use super::raster::Lattice;
 use super::{MAX_SIDE, MIN_SIDE, bleeding};
 use crate::scene::Mesh;
@@ -24,44 +25,6 @@ pub struct Unwrapped {
     pub refused: Option<&'static str>,
     /// The map is as large as may be and has fewer texels per metre than asked for.
     pub is_coarse: bool,
-}
-
-/// One mesh of it.
-#[derive(Debug, Clone)]
-pub struct Part {
-    /// The vertex that each vertex was before vertices were doubled along seams; empty where none was.
-    pub vertices: Vec<u32>,
-    /// The same triangles in the same order.
-    pub triangles: Vec<[u32; 3]>,
-    /// Coordinates of the map, from 0 to 1, one a vertex.
-    pub uvs: Vec<DVec2>,
-}
-
-impl Part {
-    /// A mesh with vertices doubled.
-    pub fn of(&self, mesh: &Mesh) -> Mesh {
-        if self.vertices.is_empty() {
-            return mesh.clone();
-        }
-        fn kept<T: Copy>(of_vertices: &[T], vertices: &[u32]) -> Vec<T> {
-            if of_vertices.is_empty() { Vec::new() } else { vertices.iter().map(|vertex| of_vertices[*vertex as usize]).collect() }
-        }
-        let vertices = &self.vertices;
-        Mesh {
-            name: mesh.name.clone(),
-            positions: kept(&mesh.positions, vertices),
-            normals: kept(&mesh.normals, vertices),
-            uvs: mesh.uvs.each_ref().map(|set| kept(set, vertices)),
-            colours: kept(&mesh.colours, vertices),
-            alphas: kept(&mesh.alphas, vertices),
-            // Triangles keep their order.
-            tangents: mesh.tangents.clone(),
-            coat_tangents: mesh.coat_tangents.clone(),
-            triangles: self.triangles.clone(),
-            material: mesh.material,
-            source: None,
-        }
-    }
 }
 
 /// Free texels around each chart; so charts are twice as far apart.
