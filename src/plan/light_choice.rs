@@ -54,11 +54,12 @@ pub struct LightChoice {
     pub flux_scale: f64,
 }
 
-/// What clusters do at a point: its coordinates and those of its normal, shares of its light, and these as a unit vector.
+/// What clusters do at a point: its coordinates and those of its normal, shares of its light, these as a unit vector, and the light.
 struct Sample {
     place: [f32; 6],
     shares: Vec<u32>,
     direction: Vec<f64>,
+    light: f64,
 }
 
 impl Sample {
@@ -72,7 +73,7 @@ impl Sample {
         let length = shares.iter().map(|share| f64::from(*share).powi(2)).sum::<f64>().sqrt();
         let direction = shares.iter().map(|share| f64::from(*share) / length).collect();
         let (at, normal) = (point.position, point.normal);
-        Some(Sample { place: [at.x, at.y, at.z, normal.x, normal.y, normal.z], shares, direction })
+        Some(Sample { place: [at.x, at.y, at.z, normal.x, normal.y, normal.z], shares, direction, light: f64::from(sum) })
     }
 }
 
@@ -225,12 +226,15 @@ fn add(sum: &mut [f64], of: &[f64]) {
 }
 
 /// The two rows of a region. The variance of a point's light is least for shares in proportion to the root of the mean square of
-/// what each cluster adds.
+/// what each cluster adds. Points count by their light, between counting alike, as relative errors would have it, and by its square, as
+/// absolute ones would: a patch of sun among points that see the sky keeps its rays.
 fn rows(samples: &[Sample], members: &[usize], around: &[usize], power: &[f64]) -> Vec<f32> {
     let mut squares = vec![0.0; power.len()];
     for (members, weight) in [(members, 1.0), (around, OF_SURROUNDINGS)] {
+        let light: f64 = members.iter().map(|member| samples[*member].light).sum();
         for member in members {
-            let add = |(sum, share): (&mut f64, &u32)| *sum += weight / members.len() as f64 * f64::from(*share).powi(2);
+            let weight = weight * samples[*member].light / light;
+            let add = |(sum, share): (&mut f64, &u32)| *sum += weight * f64::from(*share).powi(2);
             squares.iter_mut().zip(&samples[*member].shares).for_each(add);
         }
     }

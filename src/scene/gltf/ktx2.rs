@@ -3,7 +3,7 @@
 use basisu::{DecodeFlags, TargetFormat, Transcoder};
 use image::RgbaImage;
 
-use super::textures::MAX_TEXELS;
+use super::MAX_TEXELS;
 
 /// How to make one that is read.
 const REMEDY: &str = "encode it as UASTC or ETC1S, as `toktx --encode uastc` does, or export it as PNG";

@@ -102,6 +102,8 @@ const OPTIONAL_EXTENSIONS: [&str; 27] = [
     "VRMC_materials_mtoon",
     "VRMC_vrm",
 ];
+/// Of all textures together: half a GiB.
+const MAX_TEXELS: u64 = super::geometry::MAX_TEXELS as u64 - 256;
 /// Nodes within nodes; deeper ones would be a cycle.
 const MAX_DEPTH: usize = 512;
 

@@ -8,13 +8,10 @@ use gltf::texture::{MagFilter, WrappingMode};
 use image::{DynamicImage, ImageDecoder, ImageFormat, RgbaImage};
 use rayon::prelude::*;
 
-use super::{Loader, accessor, called, ktx2};
+use super::{Loader, MAX_TEXELS, accessor, called, ktx2};
 use crate::error::{Error, Result};
+use crate::scene::Progress;
 use crate::scene::texture::{Filter, Texels, Texture, Wrap};
-use crate::scene::{Progress, geometry};
-
-/// Of all textures together: half a GiB.
-pub(super) const MAX_TEXELS: u64 = geometry::MAX_TEXELS as u64 - 256;
 
 /// Of one picture as its file has it: a few bytes must not unfold into gigabytes.
 const MAX_BYTES: u64 = 1 << 30;
