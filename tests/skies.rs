@@ -136,7 +136,7 @@ fn every_part_of_the_light_is_what_the_path_tracer_finds() {
     let judge = Judge::new(&scene, 32);
     let image = judge.image(&camera, 12, 9, 4000, 1);
     for part in [Part::Direct, Part::Specular, Part::Caustic, Part::Indirect] {
-        let settings = SceneSettings { photons: 60_000, rounds: 64, part, ..SceneSettings::default() };
+        let settings = SceneSettings { photons: 60_000, rounds: 32, part, ..SceneSettings::default() };
         let lit = render(&gpu, &scene, &settings, Target::Picture(&camera, [12, 9])).unwrap();
         let of = |parts: &photonmill::verify::judge::Parts| match part {
             Part::Direct => parts.direct.x,
