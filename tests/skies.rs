@@ -216,6 +216,24 @@ fn a_sun_that_shines_in_has_as_many_rays_as_without_openings() {
     }
 }
 
+/// A patch of sun among points that see the sky alone keeps its shadow rays, though aimed rays find the sky from all of them.
+#[test]
+fn a_patch_of_sun_keeps_its_rays_beside_an_aimed_sky() {
+    let Some(gpu) = device() else { return };
+    let way = dvec3(0.25, -1.0, 0.1).normalize();
+    let mut scene = room_under(sky(4, 2, |_, _| Vec3::splat(300.0)));
+    scene.lights.push(lamp(LightKind::Directional { direction: way, irradiance: Vec3::splat(100.0) }));
+    // Too few lie in the sun to make a region of their own.
+    let along = |k: u32| -1.9 + 3.8 * (f64::from(k) + 0.5) / 9.0;
+    let points: Vec<_> = (0..9 * 9).map(|k| (dvec3(along(k % 9), 0.0, along(k / 9)), DVec3::Y)).collect();
+    let settings = SceneSettings { rounds: 32, shadow_rays: 4, part: Part::Direct, ..SceneSettings::default() };
+    let lit = render(&gpu, &scene, &settings, Target::Points(&points)).unwrap();
+    let error = lit.film.relative_error(&lit.plan);
+    println!("{:.2} %", 100.0 * error);
+    // 10.7 % where all points count alike in the choice of lights.
+    assert!(error < 0.08, "{error}");
+}
+
 /// A sky that is black, or almost, makes no number that is none.
 #[test]
 fn black_skies_and_single_texels_leave_no_odd_number() {
