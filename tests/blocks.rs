@@ -4,12 +4,12 @@ use std::sync::atomic::{AtomicBool, Ordering};
 use std::time::Duration;
 
 use crate::common::prelude::*;
+use photonmill::engine::End;
 use photonmill::engine::blocks::Share;
 use photonmill::engine::room;
 use photonmill::engine::saved::{SavedFilm, SavedRun};
 use photonmill::engine::scene::{self, RunResult, View, trial};
 use photonmill::engine::watch::{Keep, SaveRun};
-use photonmill::engine::End;
 
 /// Keeps the latest of what is saved.
 #[derive(Default)]
@@ -65,8 +65,9 @@ fn parts_of_a_run_come_to_the_bits_of_one() {
         assert_eq!((whole.end, whole.film.rounds, saved.missing()), (End::Rounds, 12, 0));
         assert_eq!((whole.ledger().emitted, &whole.fates), (12 * (2000 + if saved.fates[1].emitted > 0 { 1000 } else { 0 }), &saved.fates));
         for of in [2, 5] {
-            let parts: Vec<SavedRun> =
-                (0..of.min(12 / block)).map(|number| kept(&gpu, name, &settings, Part { share: Share { number, of }, ..Part::default() }).1).collect();
+            let parts: Vec<SavedRun> = (0..of.min(12 / block))
+                .map(|number| kept(&gpu, name, &settings, Part { share: Share { number, of }, ..Part::default() }).1)
+                .collect();
             let (last, others) = parts.split_last().unwrap();
             let mut merged = last.clone();
             others.iter().for_each(|part| merged.merge(part).unwrap());
@@ -90,7 +91,8 @@ fn parts_of_a_run_come_to_the_bits_of_one() {
 #[test]
 fn parts_of_the_box_come_to_the_bits_of_one() {
     let gpu = device();
-    let settings = RoomSettings { photons: 501, rounds: 9, mesh: 8, rng: Rng::Philox, shininess: [Some(2.0); 5], ..RoomSettings::default() };
+    let settings =
+        RoomSettings { photons: 501, rounds: 9, mesh: 8, rng: Rng::Philox, shininess: [Some(2.0); 5], ..RoomSettings::default() };
     let run = |gpu: Option<&Gpu>, rounds, share, resume| {
         let (never, mut latest) = (AtomicBool::new(false), Latest::default());
         let resume = Option::map(resume, |run| (PathBuf::from("a file"), run));
@@ -233,11 +235,8 @@ fn damaged_files_are_refused() {
     // Files whose checksum is right, and whose header lies.
     let SavedFilm::Scene(film) = &saved.film else { panic!("a scene's film") };
     type Lie = fn(&mut SavedRun);
-    let lies: [Lie; 3] = [
-        |run| run.sensor = Some(square_picture(3)),
-        |run| run.share = Share { number: 4, of: 3 },
-        |run| run.done.insert(17),
-    ];
+    let lies: [Lie; 3] =
+        [|run| run.sensor = Some(square_picture(3)), |run| run.share = Share { number: 4, of: 3 }, |run| run.done.insert(17)];
     for (number, lie) in lies.iter().enumerate() {
         let mut lying = saved.clone();
         lie(&mut lying);
@@ -254,7 +253,7 @@ fn the_films_unit_is_the_same_in_short_and_long_runs() {
         let settings = SceneSettings { rounds, ..by_rounds() };
         scene_plan_within(&Limits::of_host(), &spheres, &settings, square_picture(4)).unwrap().film.scale
     };
-    assert_eq!(unit(1), unit(1 << 20));
+    assert_eq!(unit(1), unit(1 << 16));
     let shift = |rounds| {
         let settings = RoomSettings { rounds, shininess: [Some(2.0); 5], ..RoomSettings::default() };
         RoomPlan::new(&open_box(&settings), &settings, &Limits::of_host()).unwrap().film_shift

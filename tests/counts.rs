@@ -69,8 +69,7 @@ fn a_scene_costs_what_it_did() {
     let Some(gpu) = device() else { return };
     let scene = built_in::by_name("cornell-spheres").unwrap();
     let geometry = Geometry::new(&scene).unwrap();
-    let settings =
-        SceneSettings { photons: 1000, caustic_photons: 500, bounces: 5, rounds: 2, math: Math::Strict, ..by_rounds() };
+    let settings = SceneSettings { photons: 1000, caustic_photons: 500, bounces: 5, rounds: 2, math: Math::Strict, ..by_rounds() };
     let sensor = Sensor::Picture { width: 16, height: 12 };
     let plan = ScenePlan::new(&scene, &geometry, &settings, sensor, &engine::limits(gpu.facts())).unwrap();
     let device_bytes = plan.bytes;

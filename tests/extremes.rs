@@ -160,12 +160,8 @@ fn standard_errors_survive_a_mean_far_above_them() {
     let half = u64::from(settings.rounds) / 2;
     let square = |value: u64| u128::from(value) * u128::from(value);
     let squares = u128::from(half) * (square(low) + square(high));
-    let of_blocks = BlockSums {
-        rounds: settings.rounds,
-        blocks: settings.rounds,
-        sums: vec![half * (low + high); 3],
-        squares: vec![squares; 3],
-    };
+    let of_blocks =
+        BlockSums { rounds: settings.rounds, blocks: settings.rounds, sums: vec![half * (low + high); 3], squares: vec![squares; 3] };
     let film = SceneFilm {
         plan: plan.film.clone(),
         of_blocks,

@@ -386,8 +386,7 @@ fn thin_walls_and_sheets_let_no_light_through() {
     };
     for illumination in BOTH {
         for radius in [0.3, 0.02] {
-            let settings =
-                SceneSettings { illumination, photons: 20_000, rounds: 4, radius: Some(radius), alpha: 1.0, ..by_rounds() };
+            let settings = SceneSettings { illumination, photons: 20_000, rounds: 4, radius: Some(radius), alpha: 1.0, ..by_rounds() };
             for (what, rooms) in [("a 4096th", &two_walls), ("a sheet", &sheet)] {
                 let what = format!("{what}, {illumination:?}, radius {radius}");
                 let points: Vec<_> = points
@@ -411,8 +410,7 @@ fn a_lit_floor_does_not_light_the_foot_of_the_wall() {
     corner.lights = vec![lamp(sun(DVec3::NEG_Y))];
     corner.meshes.push(Mesh::parallelogram("wall", DVec3::new(-2.0, 0.0, -2.0), DVec3::Y * 2.0, DVec3::Z * 4.0, 0));
     for illumination in BOTH {
-        let settings =
-            SceneSettings { illumination, photons: 100_000, radius: Some(0.3), alpha: 1.0, rounds: 2, ..by_rounds() };
+        let settings = SceneSettings { illumination, photons: 100_000, radius: Some(0.3), alpha: 1.0, rounds: 2, ..by_rounds() };
         let points =
             [(DVec3::new(-1.99, 0.0, 0.0), DVec3::Y), (DVec3::new(-2.0, 0.01, 0.0), DVec3::X), (DVec3::new(-2.0, 0.0, 0.0), DVec3::X)];
         let lit = received(&gpu, &corner, &settings, &points);
@@ -443,8 +441,7 @@ fn every_power_of_two_is_the_same_light_to_the_bit() {
         let radius = settings.radius.map(|radius| radius * 2f64.powi(k));
         received(&gpu, &scene, &SceneSettings { radius, ..settings.clone() }, &points)
     };
-    let settings =
-        SceneSettings { photons: 1500, caustic_photons: 1500, rounds: 2, shadow_rays: 4, radius: Some(0.1), ..by_rounds() };
+    let settings = SceneSettings { photons: 1500, caustic_photons: 1500, rounds: 2, shadow_rays: 4, radius: Some(0.1), ..by_rounds() };
     let expected = of(0, &settings);
     assert!(mean_red(&expected) > 0.5);
     for k in -20..=20 {

@@ -423,8 +423,7 @@ fn baked_box(gpu: &Device, illumination: Illumination, has_set: bool) -> BakedBo
     let plan = ScenePlan::new(&scene, &geometry, &settings, sensor, &engine::limits(gpu.facts())).unwrap();
     let lit = light(gpu, &View { geometry: &geometry, camera: None, phases: &phases }, plan);
     let errors = lit.film.stated_errors();
-    let estimate =
-        |texel: usize| TexelEstimate { irradiance: lit.film.mean(texel).as_vec3(), standard_error: errors(texel).as_vec3() };
+    let estimate = |texel: usize| TexelEstimate { irradiance: lit.film.mean(texel).as_vec3(), standard_error: errors(texel).as_vec3() };
     let estimates = (0..layout.texel_count()).map(estimate).collect();
     BakedBox { layout, estimates }
 }

@@ -33,14 +33,8 @@ pub fn sheet_over_a_floor(gpu: &Gpu) -> Check<Complaint> {
     let way = DVec3::new(0.5, -0.8, 0.2).normalize();
     let meshes = vec![level(height, [side; 2], true, 0), level(0.0, [0.4; 2], true, 1)];
     let scene = scene_of(meshes, vec![paper(0.7, colour, 0.0, None), matt(0.0)], vec![sun(way)]);
-    let settings = SceneSettings {
-        part: Part::Caustic,
-        caustic_photons: 100_000,
-        caustic_radius: Some(0.05),
-        alpha: 1.0,
-        rounds: 16,
-        ..by_rounds()
-    };
+    let settings =
+        SceneSettings { part: Part::Caustic, caustic_photons: 100_000, caustic_radius: Some(0.05), alpha: 1.0, rounds: 16, ..by_rounds() };
     let lit = received(gpu, &scene, &settings, &[(DVec3::ZERO, DVec3::Y)]);
     let (found, error) = (means(&lit)[0], standard_errors(&lit)[0]);
     for channel in 0..3 {

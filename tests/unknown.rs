@@ -295,8 +295,7 @@ fn light_that_the_ground_scatters_into_a_room_is_said_to_be_missing() {
     let truth = Judge::new(&scene, 16).irradiance_at(&points, 40_000, 1);
     let found: f64 = (0..points.len()).map(|point| red(&lit, point).0).sum();
     let missing = truth.iter().map(|point| point.mean.indirect.x).sum::<f64>() - found;
-    let errors: f64 =
-        (0..points.len()).map(|point| lit.film.stated_error(point).x + truth[point].standard_error.indirect.x).sum();
+    let errors: f64 = (0..points.len()).map(|point| lit.film.stated_error(point).x + truth[point].standard_error.indirect.x).sum();
     let dim = lit.film.unknown(0.95).dim;
     println!("{missing:.4} is missing beside {found:.4} +- {errors:.4}: {dim:?}");
     // Even if all errors went the same way.

@@ -80,7 +80,13 @@ impl LatestBlocks {
 
     /// How far errors of places go together in a film of so many blocks: `value` makes what counts of a kept place of what is kept of
     /// it, `size` numbers.
-    pub fn degrees_of_freedom(&self, size: usize, places: usize, blocks: u32, value: impl Fn(usize, &[f32]) -> Vec<f64>) -> DegreesOfFreedom {
+    pub fn degrees_of_freedom(
+        &self,
+        size: usize,
+        places: usize,
+        blocks: u32,
+        value: impl Fn(usize, &[f32]) -> Vec<f64>,
+    ) -> DegreesOfFreedom {
         let weighted = |block: &KeptBlock| -> Vec<f64> {
             let kept = block.values.chunks_exact(size).take(kept_count(places)).enumerate();
             kept.filter_map(|(number, values)| Some(value(kept_place(number, places)?, values))).flatten().collect()

@@ -19,6 +19,7 @@ use crate::ledger::{Fates, Ledger, Losses};
 use crate::plan::sensor::Sensor;
 use crate::settings::Math;
 use crate::settings::stop::Stop;
+use crate::text::counted;
 use crate::timings::{HostClock, Timings};
 
 /// What a run leaves behind.
@@ -260,6 +261,13 @@ impl<'a> RunState<'a> {
             end: None,
             task,
         };
+        if share.count(state.wanted()) == 0 {
+            let allowed = format!(
+                "has nothing to do: the run has {} in all; ask for more --rounds, or for fewer shards",
+                counted(state.wanted(), "block")
+            );
+            return Err(Error::setting("--shard", share, allowed));
+        }
         if let Some((_, saved)) = control.keep.resume.take() {
             state.emitted = saved.fates.iter().map(|fates| fates.emitted).sum();
             state.emitted_of_blocks = state.emitted;
@@ -459,7 +467,8 @@ impl<'a> RunState<'a> {
         let most_rounds = if self.share.of > 1 { self.share.count(self.wanted()) * rounds_per_block } else { self.task.rounds };
         let rounds =
             if self.is_whole() || self.is_short() { f64::from(self.rounds()) } else { self.emitted as f64 / photons_per_round as f64 };
-        let progress = self.watch.progress(rounds, most_rounds, photons_per_round, sum_of(&self.fates_of_blocks).plus(&sum_of(&self.fates_of_rest)));
+        let progress =
+            self.watch.progress(rounds, most_rounds, photons_per_round, sum_of(&self.fates_of_blocks).plus(&sum_of(&self.fates_of_rest)));
         if counts_photons {
             Progress { done: self.emitted, total: photons_per_round * u64::from(most_rounds), ..progress }
         } else {

@@ -111,13 +111,7 @@ pub(super) fn ending<Plan, Film>(run: &RunResult<Plan, Film>, error: &FilmError,
 
 /// Noise, bias, and both together, a line each, in per cent. What nothing has reached counts in the bounds,
 /// and so does light that limits kept.
-pub(super) fn errors(
-    error: &FilmError,
-    bias: Option<&Bias>,
-    lost: f64,
-    (measure, confidence): (Measure, f64),
-    point: &str,
-) -> String {
+pub(super) fn errors(error: &FilmError, bias: Option<&Bias>, lost: f64, (measure, confidence): (Measure, f64), point: &str) -> String {
     let mut text = String::new();
     let (percent, sure) = (|share: f64| 100.0 * share, 100.0 * confidence);
     let measure = match measure {
@@ -127,8 +121,7 @@ pub(super) fn errors(
     let known = Some((error.noise, error.bound(confidence))).filter(|(noise, bound)| noise.is_finite() && bound.is_finite());
     match known {
         Some((noise, bound)) => {
-            writeln!(text, "noise: {:.2} % ({measure}), at most {:.2} % ({sure} % confidence)", percent(noise), percent(bound))
-                .unwrap();
+            writeln!(text, "noise: {:.2} % ({measure}), at most {:.2} % ({sure} % confidence)", percent(noise), percent(bound)).unwrap();
         }
         None if error.rounds == 1 => text.push_str("noise: unknown after a single round\n"),
         None if error.blocks < 2 => {

@@ -135,7 +135,8 @@ impl RoomPlan {
         let faintest = relative_flux.iter().fold(1.0f32, |a, b| a.min(*b));
         let is_seen = channel_count == 1 || f64::from(faintest) * ((1u64 << film_shift) as f64) >= MIN_FIXED_POINT;
         let [floor, left] = settings.light_power;
-        let allowed = "differ too much for the film's integer sums over so many photons; choose closer values, or ask for fewer photons * bounces";
+        let allowed =
+            "differ too much for the film's integer sums over so many photons; choose closer values, or ask for fewer photons * bounces";
         require(is_seen, "--light-power", format!("{floor},{left}"), allowed)?;
 
         let points: Vec<Point> = scene

@@ -188,8 +188,7 @@ fn leaning(angle: f64) -> Mesh {
 pub fn leaning_plane(gpu: &Gpu, illumination: Illumination) -> Check<Complaint> {
     let lean = 40f64.to_radians();
     let plane = scene_of(vec![leaning(lean)], vec![matt(0.8)], vec![sun(DVec3::NEG_Y)]);
-    let settings =
-        SceneSettings { photons: 20_000, rounds: 32, bounces: 1, radius: Some(0.5), alpha: 1.0, illumination, ..by_rounds() };
+    let settings = SceneSettings { photons: 20_000, rounds: 32, bounces: 1, radius: Some(0.5), alpha: 1.0, illumination, ..by_rounds() };
     for (what, degrees, cosine) in [("above", 30f64, lean.cos()), ("below", -70.0, 1.0)] {
         let eye = DVec3::new(degrees.to_radians().sin(), degrees.to_radians().cos(), 0.0);
         let camera = Camera::looking_at("eye", eye, DVec3::ZERO, DVec3::Z, 2e-4);
@@ -352,8 +351,7 @@ pub fn ground_by_a_coarse_sphere(gpu: &Gpu, material: Material, segments: u32) -
     scene.meshes.push(Mesh::parallelogram("lamp", DVec3::new(-4.0, 3.0, -4.0), x * 8.0, z * 8.0, 2));
     let places = [-2.0, -1.0, 0.0, 1.0, 2.0];
     let points: Vec<_> = places.iter().flat_map(|x| places.map(|z| (DVec3::new(*x, -1.2, z), DVec3::Y))).collect();
-    let settings =
-        SceneSettings { caustic_photons: 200_000, caustic_radius: Some(0.2), rounds: 8, part: Part::Caustic, ..by_rounds() };
+    let settings = SceneSettings { caustic_photons: 200_000, caustic_radius: Some(0.2), rounds: 8, part: Part::Caustic, ..by_rounds() };
     let lit = received(gpu, &scene, &settings, &points);
     let truth = Judge::new(&scene, 64).irradiance_at(&points, 40_000, 1);
     let count = points.len() as f64;
@@ -451,14 +449,8 @@ pub fn tiny_plates(gpu: &Gpu) -> Check<Complaint> {
     room.materials.push(matt(0.0));
     room.meshes.extend(places.iter().map(|at| Mesh::parallelogram("plate", *at, DVec3::Z * width, DVec3::X * width, 1)));
     let points: Vec<_> = places.iter().map(|at| (*at + dvec3(0.4, 0.0, 0.3) * width, DVec3::Y)).collect();
-    let settings = SceneSettings {
-        photons: 100_000,
-        rounds: 4,
-        radius: Some(0.4),
-        alpha: 1.0,
-        illumination: Illumination::Photons,
-        ..by_rounds()
-    };
+    let settings =
+        SceneSettings { photons: 100_000, rounds: 4, radius: Some(0.4), alpha: 1.0, illumination: Illumination::Photons, ..by_rounds() };
     let lit = render(gpu, &room, &settings, Target::Points(&points))?;
     println!("plates: {} of 2 pi", mean_red(&lit) / TAU);
     // Five hundred photons in all.

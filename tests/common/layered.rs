@@ -540,8 +540,7 @@ pub fn photons_land_beside_lobes(gpu: &Gpu) -> Check<Complaint> {
     let metallic_roughness_texture = Some(TextureUse::of(0, 0));
     scene.materials = vec![layered(Vec3::ONE, &Layers { metallic_roughness_texture, ..metal(1.0) }), dull(0.0)];
     scene.meshes[0].uvs[0] = scene.meshes[0].positions.iter().map(|place| DVec2::new(0.5 + 0.5 * place.x, 0.5)).collect();
-    let settings =
-        SceneSettings { illumination: Illumination::Photons, photons: 100_000, rounds: 4, radius: Some(0.1), ..by_rounds() };
+    let settings = SceneSettings { illumination: Illumination::Photons, photons: 100_000, rounds: 4, radius: Some(0.1), ..by_rounds() };
     let points = [DVec3::X * 0.01, DVec3::new(2.0, -1.0, 2.0)].map(|point| (point, DVec3::Y));
     let lit = received(gpu, &scene, &settings, &points);
     for (place, (found, error)) in pairs(means(&lit), standard_errors(&lit)).enumerate() {

@@ -4,9 +4,9 @@ use std::cell::OnceCell;
 use std::time::Instant;
 
 use super::RunResult;
+use crate::constants::{KEPT_BLOCKS, TALLY_COPIES};
 use crate::engine;
 use crate::engine::error_bound::FilmError;
-use crate::constants::{KEPT_BLOCKS, TALLY_COPIES};
 use crate::engine::film::{KeptBlock, wide};
 use crate::engine::nonfinite_values::NonfiniteValues;
 use crate::engine::room::film::RoomFilm;
@@ -94,7 +94,9 @@ impl<'a> World for RoomOnGpu<'a> {
         let count = film.sums.len();
         film.rounds = state.rounds();
         film.blocks = state.rounds();
-        let Some(RoundBuffers { totals, low_squares, high_squares, latest_blocks }) = resources.rounds.as_ref().filter(|_| state.rounds() > 0) else {
+        let Some(RoundBuffers { totals, low_squares, high_squares, latest_blocks }) =
+            resources.rounds.as_ref().filter(|_| state.rounds() > 0)
+        else {
             film.sums = commands.read(&resources.film, count)?;
             return Ok(film);
         };
@@ -126,7 +128,8 @@ impl<'a> World for RoomOnGpu<'a> {
 
 /// Goes on with a film.
 fn restore(commands: &mut Commands, resources: &RoomResources, plan: &RoomPlan, film: &RoomFilm) -> Result<()> {
-    let RoundBuffers { totals, low_squares, high_squares, latest_blocks } = resources.rounds.as_ref().expect("a plan that is kept has them");
+    let RoundBuffers { totals, low_squares, high_squares, latest_blocks } =
+        resources.rounds.as_ref().expect("a plan that is kept has them");
     commands.upload(totals, &film.sums)?;
     commands.upload(low_squares, &film.squares.iter().map(|square| *square as u64).collect::<Vec<u64>>())?;
     commands.upload(high_squares, &film.squares.iter().map(|square| (*square >> 64) as u64).collect::<Vec<u64>>())?;

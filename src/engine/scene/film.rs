@@ -372,7 +372,11 @@ impl SceneFilm {
         }
         let worst = ((WORST * squares.len() as f64).ceil() as usize).clamp(1, squares.len());
         squares.sort_unstable_by(|a, b| b.total_cmp(a));
-        Some(ErrorPlaces { worst_pixels: worst as u64, of_worst_pixels: squares[..worst].iter().sum::<f64>() / sum, of_parts: self.error_of_parts(measure)? })
+        Some(ErrorPlaces {
+            worst_pixels: worst as u64,
+            of_worst_pixels: squares[..worst].iter().sum::<f64>() / sum,
+            of_parts: self.error_of_parts(measure)?,
+        })
     }
 
     /// The share of each part of light in the squared error, from the spread of the latest blocks at some pixels; parts are taken for

@@ -40,7 +40,9 @@ fn found(plan: &ScenePlan) -> Hash {
     let constants: Vec<_> = plan.constants.iter().filter(|(name, _)| !WITHOUT_EFFECT.contains(name)).collect();
     hash.add_text(&format!("{constants:?} {:?} {:?} {:?}", plan.film.scale, plan.film.limit, plan.film.rounds_per_block));
     for MapPlan { name, photons, bounces, stored, radius, classes, flux_gain, flux_scale, through_openings, .. } in plan.maps() {
-        hash.add_text(&format!("{name} {photons} {bounces} {stored} {radius:?} {classes:?} {flux_gain:?} {flux_scale:?} {through_openings}"));
+        hash.add_text(&format!(
+            "{name} {photons} {bounces} {stored} {radius:?} {classes:?} {flux_gain:?} {flux_scale:?} {through_openings}"
+        ));
     }
     hash.add(&plan.targets);
     hash.add(&plan.openings());

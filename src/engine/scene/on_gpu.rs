@@ -155,8 +155,9 @@ impl<'a> World for SceneOnGpu<'a> {
             totals::clear(commands, totals);
         }
         commands.submit()?;
-        let mut counted =
-            read_backs.into_iter().map(|(tallies, totals)| Fates::counted(&tallies::sums(&tallies.take()), Some(totals::sum(&totals.take()))));
+        let mut counted = read_backs
+            .into_iter()
+            .map(|(tallies, totals)| Fates::counted(&tallies::sums(&tallies.take()), Some(totals::sum(&totals.take()))));
         for which in self.plan.maps().map(|map| usize::from(map.caustic_only)) {
             let (all, of_blocks) = (counted.next().expect("each map is read"), counted.next().expect("each map is read twice"));
             state.count(which, all, of_blocks);

@@ -139,9 +139,7 @@ impl Subject {
                 let settings = SceneSettings { rounds, seed, ..settings.clone() };
                 let lit = self.light(gpu, settings, &mut control)?;
                 let channels = if self.camera.is_some() { 3 } else { 1 };
-                let values = (0..lit.film.pixels())
-                    .flat_map(|pixel| lit.film.mean(pixel).to_array().into_iter().take(channels))
-                    .collect();
+                let values = (0..lit.film.pixels()).flat_map(|pixel| lit.film.mean(pixel).to_array().into_iter().take(channels)).collect();
                 let global = lit.fates[0].ledger();
                 // A caustic map's photons end at the first surface that scatters, so the cap is the global map's.
                 Shot { photons: lit.ledger().emitted, ..shot(values, &lit.timings, global) }
