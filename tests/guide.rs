@@ -91,7 +91,7 @@ fn short(arguments: &[&str]) -> Vec<String> {
         Some(&"render") => &[("--size", "16x12")],
         Some(&"bake") => &[("--texels-per-metre", "2")],
         Some(&"probe") => &[],
-        Some(&"plan" | &"info" | &"devices") => return arguments.iter().map(ToString::to_string).collect(),
+        Some(&"plan" | &"info" | &"compare" | &"devices") => return arguments.iter().map(ToString::to_string).collect(),
         _ => &[("--mesh", "8")],
     };
     shrunk(arguments, &[&of_run, &there[..], more].concat())
@@ -122,7 +122,7 @@ fn run(folder: &Path, command: &str) -> Check {
     let arguments: Vec<&str> = words.collect();
     let mut run = short(&arguments);
     match std::env::var("PHOTONMILL_DEVICE") {
-        Ok(device) if !matches!(arguments.first(), Some(&"info" | &"devices")) => run.extend(["--device".to_owned(), device]),
+        Ok(device) if !matches!(arguments.first(), Some(&"info" | &"compare" | &"devices")) => run.extend(["--device".to_owned(), device]),
         _ => {}
     }
     program(folder, &run)?;
@@ -202,7 +202,7 @@ fn options(text: &str) -> BTreeSet<String> {
 
 #[test]
 fn options_of_readme_and_guide_exist() {
-    let names = ["", "render", "bake", "probe", "plan", "info", "devices", "selfcheck", "study", "bench", "paper"];
+    let names = ["", "render", "bake", "probe", "plan", "info", "compare", "devices", "selfcheck", "study", "bench", "paper"];
     let help = |name: &str| {
         let output = Place::new().run(&format!("{name} --help"));
         assert!(output.status.success(), "{name}");
