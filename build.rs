@@ -141,7 +141,24 @@ const PACKED: [(&str, &[&str]); 5] = [
     ("crate::photon::Origin", &["origins", "tree_origins"]),
     ("crate::photon::MapPhoton", &["map", "sorted_map", "landed"]),
     ("crate::path::StoredPath", &["paths", "next_paths"]),
-    ("u64", &["film", "film_totals", "low_squares", "high_squares", "pass_sums", "estimates", "film_sums", "film_squares", "part_totals"]),
+    (
+        "u64",
+        &[
+            "film",
+            "film_totals",
+            "low_squares",
+            "high_squares",
+            "pass_sums",
+            "estimates",
+            "film_sums",
+            "film_squares",
+            "part_totals",
+            "sums_of_block",
+            "surface_sums_of_block",
+            "surface_sums",
+            "surface_squares",
+        ],
+    ),
 ];
 
 /// Set 0 of each world: the buffers of its scene, in the order of their bindings.

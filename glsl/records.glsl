@@ -735,7 +735,9 @@ struct ResolvePush {
     uint pixel_count;
     // Visible points that photons may have lit.
     uint points_per_pixel;
-    uint round;
+    uint block;
+    // 1: it is the last round of its block.
+    uint ends_block;
 };
 
 struct EndRoundPush {

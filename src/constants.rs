@@ -25,8 +25,8 @@ constants! {
     RNG_PHILOX = 2;
     /// `RNG`: Owen-scrambled Sobol' points.
     RNG_SOBOL = 3;
-    /// Rounds of which some places are kept, and places that are.
-    KEPT_ROUNDS = 256;
+    /// Blocks of which some places are kept, and places that are.
+    KEPT_BLOCKS = 256;
     KEPT_PLACES = 1024;
     /// Draws of one emission: disc radius, disc angle, cosine, azimuth.
     EMISSION_DRAWS = 4;

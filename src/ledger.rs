@@ -1,6 +1,6 @@
 //! The photon ledger: integer counts of how every emitted photon ended, whose sum equals the photons emitted.
 
-use serde::Serialize;
+use serde::{Deserialize, Serialize};
 
 use crate::constants::TALLY_ROWS;
 use crate::records::Tally;
@@ -50,38 +50,40 @@ impl std::fmt::Display for Ledger {
     }
 }
 
-/// Relative flux per channel; [`crate::plan::scene::MapPlan::photon_flux`] makes watts of it.
-pub type RelativeFlux = [f64; 3];
+/// Relative flux per channel in units of 2^-`TOTAL_FLUX_BITS`; [`crate::plan::scene::MapPlan::photon_flux`] makes watts of it.
+pub type FluxUnits = [u64; 3];
 
 /// What the photons of a scene's map lose to limits, and how many photons the map has held.
-#[derive(Debug, Clone, Copy, PartialEq, Default)]
+#[derive(Debug, Clone, Copy, PartialEq, Eq, Default, Serialize, Deserialize)]
 pub struct Totals {
     /// Entries of the map over all chunks.
     pub stored: u64,
     /// Photons still under way after the last bounce that is allowed, and their flux.
     pub cut_off: u64,
-    pub cut_flux: RelativeFlux,
+    pub cut_flux: FluxUnits,
     /// Photons whose flux a shading normal would have raised beyond `MAX_SHADING_GAIN`, and what they lost.
     pub clamped: u64,
-    pub clamped_flux: RelativeFlux,
+    pub clamped_flux: FluxUnits,
     /// Photons that were under way when the run was interrupted, in a round that does not count. They are among those cut off.
     pub interrupted: u64,
 }
 
 impl Totals {
-    pub fn add(&mut self, other: &Totals) {
-        self.stored += other.stored;
-        self.cut_off += other.cut_off;
-        self.clamped += other.clamped;
+    /// Counts of both, by what adds or takes away.
+    fn combine(&mut self, other: &Totals, combine: fn(&mut u64, u64)) {
+        combine(&mut self.stored, other.stored);
+        combine(&mut self.cut_off, other.cut_off);
+        combine(&mut self.clamped, other.clamped);
+        combine(&mut self.interrupted, other.interrupted);
         for channel in 0..3 {
-            self.cut_flux[channel] += other.cut_flux[channel];
-            self.clamped_flux[channel] += other.clamped_flux[channel];
+            combine(&mut self.cut_flux[channel], other.cut_flux[channel]);
+            combine(&mut self.clamped_flux[channel], other.clamped_flux[channel]);
         }
     }
 }
 
 /// Fates bounce by bounce, from which the ledger follows.
-#[derive(Debug, Clone, PartialEq, Default)]
+#[derive(Debug, Clone, PartialEq, Eq, Default, Serialize, Deserialize)]
 pub struct Fates {
     pub emitted: u64,
     /// Photons that survived each bounce, which stores them in the room, and that were absorbed, escaped and dropped there.
@@ -91,7 +93,7 @@ pub struct Fates {
     pub totals: Option<Totals>,
 }
 
-#[derive(Debug, Clone, Copy, PartialEq, Eq, Default, Serialize)]
+#[derive(Debug, Clone, Copy, PartialEq, Eq, Default, Serialize, Deserialize)]
 pub struct BounceFates {
     pub stored: u64,
     pub absorbed: u64,
@@ -109,10 +111,6 @@ impl Fates {
         Fates { totals: Some(Totals::default()), ..Fates::new(bounces.min(TALLY_ROWS)) }
     }
 
-    pub fn add_totals(&mut self, totals: &Totals) {
-        self.totals.get_or_insert_default().add(totals);
-    }
-
     /// Counts photons as cut off that were under way when a run was interrupted.
     pub fn interrupt(&mut self) {
         let Ledger { emitted, absorbed, escaped, cut_off, dropped, .. } = self.ledger();
@@ -122,14 +120,37 @@ impl Fates {
         totals.interrupted += open;
     }
 
-    pub fn add(&mut self, emitted: u64, tallies: &[Tally]) {
-        assert_eq!(tallies.len(), self.bounces.len());
-        self.emitted += emitted;
-        for (sum, tally) in self.bounces.iter_mut().zip(tallies) {
-            sum.stored += u64::from(tally.stored);
-            sum.absorbed += u64::from(tally.absorbed);
-            sum.escaped += u64::from(tally.escaped);
-            sum.dropped += u64::from(tally.dropped);
+    /// What kernels have counted; nobody knows yet of how many photons.
+    pub fn counted(tallies: &[Tally], totals: Option<Totals>) -> Fates {
+        let fates = |tally: &Tally| BounceFates {
+            stored: tally.stored.into(),
+            absorbed: tally.absorbed.into(),
+            escaped: tally.escaped.into(),
+            dropped: tally.dropped.into(),
+        };
+        Fates { emitted: 0, bounces: tallies.iter().map(fates).collect(), totals }
+    }
+
+    pub fn add(&mut self, other: &Fates) {
+        self.combine(other, |sum, count| *sum += count);
+    }
+
+    /// Takes away what is among these.
+    pub fn subtract(&mut self, other: &Fates) {
+        self.combine(other, |sum, count| *sum -= count);
+    }
+
+    fn combine(&mut self, other: &Fates, combine: fn(&mut u64, u64)) {
+        assert_eq!(other.bounces.len(), self.bounces.len());
+        combine(&mut self.emitted, other.emitted);
+        for (fates, other) in self.bounces.iter_mut().zip(&other.bounces) {
+            combine(&mut fates.stored, other.stored);
+            combine(&mut fates.absorbed, other.absorbed);
+            combine(&mut fates.escaped, other.escaped);
+            combine(&mut fates.dropped, other.dropped);
+        }
+        if let Some(other) = &other.totals {
+            self.totals.get_or_insert_default().combine(other, combine);
         }
     }
 
@@ -222,7 +243,7 @@ mod tests {
         let closed = [tally(60, 20, 20, 0), tally(30, 15, 14, 1)];
         let ledger = |tallies: &[Tally]| {
             let mut fates = Fates::new(2);
-            fates.add(100, tallies);
+            fates.add(&Fates { emitted: 100, ..Fates::counted(tallies, None) });
             fates.ledger()
         };
         assert!(ledger(&closed).closes());
@@ -236,7 +257,7 @@ mod tests {
     fn totals_exceed_32_bits() {
         let mut fates = Fates::new(1);
         for _ in 0..4 {
-            fates.add(u64::from(u32::MAX), &[tally(u32::MAX, 0, 0, 0)]);
+            fates.add(&Fates { emitted: u64::from(u32::MAX), ..Fates::counted(&[tally(u32::MAX, 0, 0, 0)], None) });
         }
         assert_eq!(fates.ledger().stored, 4 * u64::from(u32::MAX));
         assert!(fates.ledger().closes());

@@ -16,7 +16,7 @@
 //! let scene = Scene::open("cornell", false)?;
 //! let camera = scene.first_camera();
 //! let run = render(&gpu, &scene, &SceneSettings::default(), Target::Picture(&camera, [320, 240]))?;
-//! let radiance: Vec<glam::DVec3> = run.film.means(&run.plan).collect();
+//! let radiance: Vec<glam::DVec3> = run.film.means().collect();
 //! println!("{} pixels; {}", radiance.len(), run.ledger());
 //! # Ok::<(), photonmill::error::Error>(())
 //! ```

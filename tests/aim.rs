@@ -148,7 +148,7 @@ fn pictures_agree(photons: u32, pairs: u64, share: f64) {
         let total = |aim, photons, seed| {
             let settings = SceneSettings { seed, caustic_radius: Some(0.05), bounces: 32, ..settings(photons, aim) };
             let lit = seen(&gpu, &scene, &settings, &scene.cameras[0], [48, 48]);
-            lit.film.part_totals[2] as f64 / lit.plan.film_scale
+            lit.film.part_totals[2] as f64 / lit.plan.film.scale
         };
         let pairs: Vec<[f64; 2]> = (0..pairs).map(|seed| [total(false, photons, 1 + seed), total(true, photons / 10, 1 + seed)]).collect();
         let (all, _) = mean_and_error(&pairs.iter().map(|[all, _]| *all).collect::<Vec<_>>());

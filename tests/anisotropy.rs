@@ -93,7 +93,7 @@ pub fn metals_under_the_sky(gpu: &Gpu) -> Check<Complaint> {
         }
     }
     let without = vec![Effect::Indirect, Effect::ReflectiveCaustics, Effect::RefractiveCaustics];
-    let settings = SceneSettings { samples: 16, rounds: 64, shadow_rays: 4, without, ..SceneSettings::default() };
+    let settings = SceneSettings { samples: 16, rounds: 64, shadow_rays: 4, without, ..by_rounds() };
     let (found, errors) = plates.seen(gpu, &settings);
     for (k, ((found, error), expected)) in pairs(pairs(found, errors), expected).enumerate() {
         println!("plate {k}: {} +- {}, {expected} expected", found.x, error.x);
@@ -148,7 +148,7 @@ fn brushed_balls_agree_with_the_judge() {
         row_of_texels(&[[150, 120, 250, 255], [110, 140, 240, 255]], Filter::Nearest),
     ];
     scene.cameras.push(Camera::looking_at("camera", DVec3::new(0.0, 0.5, 1.7), DVec3::new(0.0, 0.2, 0.0), DVec3::Y, 0.7));
-    let settings = SceneSettings { photons: 20_000, caustic_photons: 20_000, samples: 4, rounds: 32, ..SceneSettings::default() };
+    let settings = SceneSettings { photons: 20_000, caustic_photons: 20_000, samples: 4, rounds: 32, ..by_rounds() };
     let camera = scene.first_camera();
     let lit = scene::render(&gpu, &scene, &settings, Target::Picture(&camera, [SIZE; 2])).unwrap();
     let judged = Judge::new(&scene, 64).image(&camera, SIZE, SIZE, 512, 77);

@@ -106,8 +106,7 @@ fn the_roofline_counts_every_dispatch() {
     let scene = scene("cornell-spheres");
     let geometry = Geometry::new(&scene).unwrap();
     for illumination in BOTH {
-        let settings =
-            SceneSettings { photons: 600, caustic_photons: 500, bounces: 3, chunk: Some(400), illumination, ..SceneSettings::default() };
+        let settings = SceneSettings { photons: 600, caustic_photons: 500, bounces: 3, chunk: Some(400), illumination, ..by_rounds() };
         let job = Job { name: "cornell-spheres", scene: &scene, geometry: &geometry, size: (8, 8), settings };
         check("cornell-spheres", &scene::time(&gpu, rates, &job, &never).unwrap());
     }

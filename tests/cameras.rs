@@ -17,7 +17,7 @@ fn eye(projection: Projection, lens: Option<Lens>) -> Camera {
 }
 
 fn red_of(gpu: &Gpu, scene: &Scene, camera: &Camera, side: u32, rounds: u32) -> Vec<f64> {
-    let settings = SceneSettings { rounds, photons: 1000, samples: 4, ..SceneSettings::default() };
+    let settings = SceneSettings { rounds, photons: 1000, samples: 4, ..by_rounds() };
     means(&seen(gpu, scene, &settings, camera, [side, side])).iter().map(|mean| mean.x).collect()
 }
 
@@ -86,13 +86,13 @@ fn both_see_what_the_path_tracer_sees() {
     let parallel = Camera { projection: Projection::Orthographic { half_height: 0.7 }, ..camera };
     for camera in [lens, parallel] {
         let judged = Judge::new(&scene, 32).image(&camera, 8, 8, 600, 1);
-        let settings = SceneSettings { photons: 20_000, rounds: 32, samples: 4, ..SceneSettings::default() };
+        let settings = SceneSettings { photons: 20_000, rounds: 32, samples: 4, ..by_rounds() };
         let lit = seen(&gpu, &scene, &settings, &camera, [8, 8]);
         let (mut found, mut expected, mut squares) = (0.0, 0.0, 0.0);
         for (pixel, judged) in judged.pixels.iter().enumerate() {
-            found += lit.film.mean(pixel, &lit.plan).x;
+            found += lit.film.mean(pixel).x;
             expected += judged.mean.total().x;
-            squares += lit.film.standard_error(pixel, &lit.plan).x.powi(2) + judged.total_standard_error.x.powi(2);
+            squares += lit.film.standard_error(pixel).x.powi(2) + judged.total_standard_error.x.powi(2);
         }
         let what = format!("{:?}", camera.projection);
         assert_holds(&what, z_check(&what, found, expected, squares.sqrt().hypot(0.01 * expected)));

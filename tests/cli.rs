@@ -197,7 +197,7 @@ fn a_run_says_how_wrong_it_is() {
     assert_eq!(last["ledger"]["emitted"], last["photons"]);
     assert!(last["error"].as_f64().unwrap() <= last["error_wanted"].as_f64().unwrap() && last["seconds_left"].is_number(), "{last}");
     let report = place.json("a.json");
-    assert_eq!((&report["end"], &report["rounds"], &report["cancelled"]), (&"error".into(), &30.into(), &false.into()));
+    assert_eq!((&report["end"], &report["rounds"], &report["cancelled"]), (&"error".into(), &16.into(), &false.into()));
     let known = |value: &Value| value.as_f64().unwrap();
     let (noise, bias) = (known(&report["error_bound"]), known(&report["bias"]["upper"]));
     let lost = known(&report["losses"]["relative"]);
@@ -357,7 +357,7 @@ fn values_are_shown_as_typed() {
         ),
         ("study cornell -o s", "--budget 0.1s, --side 01, --repeats 01"),
         ("bench", "--time -1h"),
-        ("compare a.exr b.exr --errors-a a.exr", "--fail-above -00.5, --error-rounds 01"),
+        ("compare a.exr b.exr --errors-a a.exr", "--fail-above -00.5, --error-blocks 01"),
         ("paper -o p", "--longest -90ms, --large 05000, --repeats 01001"),
     ];
     let place = Place::new();

@@ -84,7 +84,7 @@ fn families_tell_chance_from_error() {
 }
 
 fn settings() -> SceneSettings {
-    SceneSettings { photons: 1000, rounds: 2, shadow_rays: 32, ..SceneSettings::default() }
+    SceneSettings { photons: 1000, rounds: 2, shadow_rays: 32, ..by_rounds() }
 }
 
 #[test]

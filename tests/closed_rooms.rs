@@ -125,7 +125,7 @@ fn parallel_plates_send_light_to_and_fro() {
     let scene = scene_of(meshes, vec![shining(below as f32), matt(above as f32), mirror(1.0)], vec![]);
     let mut family = Family::default();
     for illumination in BOTH {
-        let shadow_rays = SceneSettings::default().shadow_rays;
+        let shadow_rays = by_rounds().shadow_rays;
         let settings = SceneSettings { caustic_photons: 20_000, shadow_rays, ..fixed_radius(illumination, 30_000, 1, 48, 0.15) };
         let points = [grid(0.2, DVec3::NEG_Y, 6), grid(-0.2, DVec3::Y, 6)].concat();
         assert_builders_agree(&gpu, &scene, &settings, &points);
@@ -187,7 +187,7 @@ fn bounces_in_a_sphere_are_a_geometric_series() {
     let mut family = Family::default();
     for rho in [0.5f32, 0.9, 0.99] {
         let scene = scene_of(vec![hollow_sphere(12)], vec![matt(rho)], vec![lamp.clone()]);
-        let settings = SceneSettings { photons: 1 << 17, bounces: 15, rounds: 1, radius: Some(0.05), ..SceneSettings::default() };
+        let settings = SceneSettings { photons: 1 << 17, bounces: 15, rounds: 1, radius: Some(0.05), ..by_rounds() };
         let floor = [(DVec3::NEG_Y * 0.95, DVec3::Y)];
         assert_builders_agree(&gpu, &scene, &SceneSettings { radius: Some(0.5), ..settings.clone() }, &floor);
         let lit = received(&gpu, &scene, &settings, &[(DVec3::ZERO, DVec3::Y)]);

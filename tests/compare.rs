@@ -141,31 +141,31 @@ fn false_alarms_are_as_rare_as_stated() {
     assert!(alarms <= 12, "{alarms} of 400");
 }
 
-/// Errors from the spread of few rounds are uncertain: z-scores are then larger than normal ones, and Student's distribution knows it.
+/// Errors from the spread of few blocks are uncertain: z-scores are then larger than normal ones, and Student's distribution knows it.
 #[test]
-fn errors_of_few_rounds_need_their_number() {
-    const ROUNDS: u32 = 6;
+fn errors_of_few_blocks_need_their_number() {
+    const BLOCKS: u32 = 6;
     let exact = linear(SIZE, SIZE, |_, _| Vec3::ONE);
     let (mut a, mut of_a) = (exact.clone(), exact.clone());
     for pixel in 0..(SIZE * SIZE) as usize {
         for channel in 0..3 {
-            let of_round = |round: u32| 1.0 + 0.1 * normal(50 + round, 3 * pixel as u32 + channel as u32);
-            let rounds: Vec<f64> = (0..ROUNDS).map(of_round).collect();
-            let mean = rounds.iter().sum::<f64>() / f64::from(ROUNDS);
-            let squares: f64 = rounds.iter().map(|value| (value - mean).powi(2)).sum();
+            let of_block = |block: u32| 1.0 + 0.1 * normal(50 + block, 3 * pixel as u32 + channel as u32);
+            let blocks: Vec<f64> = (0..BLOCKS).map(of_block).collect();
+            let mean = blocks.iter().sum::<f64>() / f64::from(BLOCKS);
+            let squares: f64 = blocks.iter().map(|value| (value - mean).powi(2)).sum();
             a.pixels[pixel][channel] = mean as f32;
-            of_a.pixels[pixel][channel] = (squares / f64::from(ROUNDS * (ROUNDS - 1))).sqrt() as f32;
+            of_a.pixels[pixel][channel] = (squares / f64::from(BLOCKS * (BLOCKS - 1))).sqrt() as f32;
         }
     }
     let pair = Pair::new(&a, &exact).unwrap();
-    let of = |rounds| ZScores::of(&pair, [Some(&of_a), None], rounds).unwrap();
-    let (without, with) = (of(None), of(Some(ROUNDS)));
+    let of = |blocks| ZScores::of(&pair, [Some(&of_a), None], blocks).unwrap();
+    let (without, with) = (of(None), of(Some(BLOCKS)));
     assert!(!without.agree && without.largest.p < 1e-6, "{:?}", without.largest);
     assert!(with.agree && with.largest.p > 0.01, "{:?}", with.largest);
     // Student's distribution with five degrees of freedom has 10.19 % beyond 2 and 3.01 % beyond 3.
     assert!((with.expected_beyond_2 - 0.1019).abs() < 1e-4 && (with.expected_beyond_3 - 0.0301).abs() < 1e-4);
     assert!((with.beyond_2 - 0.1019).abs() < 0.015 && (with.beyond_3 - 0.0301).abs() < 0.008, "{} {}", with.beyond_2, with.beyond_3);
-    // Of many rounds it is the normal one.
+    // Of many blocks it is the normal one.
     let many = of(Some(1 << 20));
     assert!((many.largest.p / without.largest.p - 1.0).abs() < 0.01, "{:?}", many.largest);
 }
@@ -351,7 +351,7 @@ fn compared(place: &Place, line: &str) -> (String, String) {
 #[test]
 fn a_comparison_is_printed_and_written() {
     let place = place_with_pictures();
-    let (stdout, stderr) = compared(&place, "a.exr b.exr --errors-a e.exr --error-rounds 64 -o z.png --show z --json j.json");
+    let (stdout, stderr) = compared(&place, "a.exr b.exr --errors-a e.exr --error-blocks 64 -o z.png --show z --json j.json");
     assert!(stderr.is_empty(), "{stderr}");
     for line in [
         "a.exr against the reference b.exr: 16 x 12 pixels of linear values",
@@ -443,10 +443,10 @@ fn what_cannot_be_compared_is_refused_in_one_line() {
         ("a.exr b.exr --errors-b small.exr", &["--errors-b small.exr: is 8 x 12", "16 x 12", "same render"]),
         ("a.exr b.exr --errors-b rgb.png", &["--errors-b rgb.png: has display values", "render --error-image"]),
         ("a.exr b.exr --errors-a negative.exr", &["--errors-a negative.exr: is negative at column 3, row 2", "render --error-image"]),
-        ("a.exr b.exr --errors-a unknown.exr", &["--errors-a unknown.exr: has no finite error", "two rounds"]),
+        ("a.exr b.exr --errors-a unknown.exr", &["--errors-a unknown.exr: has no finite error", "two blocks"]),
         ("rgb.png rgb.png --errors-a e.exr", &["--errors-a e.exr: is for linear pictures", "rgb.png", ".exr"]),
-        ("a.exr b.exr --error-rounds 5", &["--error-rounds 5: needs --errors-a"]),
-        ("a.exr b.exr --errors-a e.exr --error-rounds 1", &["--error-rounds 1: must be from 2 to 1048576"]),
+        ("a.exr b.exr --error-blocks 5", &["--error-blocks 5: needs --errors-a"]),
+        ("a.exr b.exr --errors-a e.exr --error-blocks 1", &["--error-blocks 1: must be from 2 to 1048576"]),
         ("a.exr b.exr -o d.exr", &["-o d.exr: must be a file name that ends in .png"]),
         ("a.exr b.exr --show flip", &["--show flip: needs -o FILE"]),
         ("a.exr b.exr --show z -o d.png", &["--show z: needs --errors-a"]),

@@ -108,7 +108,7 @@ fn unlit() -> Material {
 /// Of the ray from an eye: means and errors of what is seen of a white screen, and at which height each colour sees it.
 fn heights_seen(gpu: &Gpu, meshes: &[Mesh], materials: Vec<Material>, [eye, target]: [DVec3; 2], screen: Mesh) -> [(f64, f64, f64); 3] {
     let without = vec![Effect::Indirect, Effect::ReflectiveCaustics, Effect::RefractiveCaustics];
-    let settings = SceneSettings { rounds: 16, samples: 16, without, ..SceneSettings::default() };
+    let settings = SceneSettings { rounds: 16, samples: 16, without, ..by_rounds() };
     let see = |screen: Mesh| {
         let scene = Scene { meshes: [meshes, &[screen]].concat(), materials: materials.clone(), ..Scene::default() };
         let camera = Camera::looking_at("ray", eye, target, DVec3::Z, 1e-5);
@@ -200,7 +200,7 @@ pub fn prism_photons(gpu: &Gpu) -> Check<Complaint> {
         caustic_radius: Some(radius),
         alpha: 1.0,
         rounds: 16,
-        ..SceneSettings::default()
+        ..by_rounds()
     };
     let lit = received(gpu, &scene, &settings, &heights);
     for (place, (found, error)) in pairs(means(&lit), standard_errors(&lit)).enumerate() {
@@ -237,7 +237,7 @@ fn glass_without_dispersion_keeps_its_bits() {
     let scene = scene_of(meshes, vec![clear, matt(0.5)], vec![LightKind::Environment { radiance: Vec3::ONE }]);
     let camera = Camera::looking_at("eye", DVec3::new(0.0, 1.0, 3.0), DVec3::Y * 0.4, DVec3::Y, 0.6);
     let sums = [vec![], vec![Effect::Dispersion]].map(|with| {
-        let settings = SceneSettings { photons: 5000, rounds: 2, math: Math::Strict, with, ..SceneSettings::default() };
+        let settings = SceneSettings { photons: 5000, rounds: 2, math: Math::Strict, with, ..by_rounds() };
         seen(&gpu, &scene, &settings, &camera, [16, 16]).film.sums.clone()
     });
     assert!(sums[0].iter().any(|sum| *sum > 0));
@@ -260,7 +260,7 @@ fn dispersive_balls_agree_with_the_judge() {
     ];
     let mut scene = scene_of(meshes, materials, vec![LightKind::Environment { radiance: Vec3::splat(0.5) }]);
     scene.cameras.push(Camera::looking_at("camera", DVec3::new(0.1, 0.6, 1.3), DVec3::new(0.0, 0.3, 0.0), DVec3::Y, 0.8));
-    let settings = SceneSettings { photons: 20_000, caustic_photons: 20_000, samples: 4, rounds: 32, ..SceneSettings::default() };
+    let settings = SceneSettings { photons: 20_000, caustic_photons: 20_000, samples: 4, rounds: 32, ..by_rounds() };
     let camera = scene.first_camera();
     let lit = scene::render(&gpu, &scene, &settings, Target::Picture(&camera, [SIZE; 2])).unwrap();
     let judged = Judge::new(&scene, 64).image(&camera, SIZE, SIZE, 1024, 77);

@@ -44,7 +44,7 @@ fn no_run_is_persistent_where_lanes_vote_wrong() {
 
     let scene = Scene::open("cornell", false).unwrap();
     let plan = |builder| {
-        let settings = SceneSettings { builder, ..SceneSettings::default() };
+        let settings = SceneSettings { builder, ..by_rounds() };
         scene_plan_within(&limits(gpu.facts()), &scene, &settings, square_picture(8))
     };
     assert_eq!(plan(None).unwrap().builder(), Builder::Ballot);

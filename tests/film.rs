@@ -6,7 +6,7 @@ use crate::common::prelude::*;
 use photonmill::cpu;
 use photonmill::cpu::splat::Splats;
 use photonmill::cpu::trace::Block;
-use photonmill::engine::film::RoundSums;
+use photonmill::engine::film::BlockSums;
 use photonmill::engine::room::film::RoomFilm;
 use photonmill::engine::room::{self};
 use pulp::Arch;
@@ -465,7 +465,7 @@ fn counted_on(gpu: Option<&Gpu>, settings: &RoomSettings, start: f32, count: u32
         None => (0..count).for_each(|_| cpu::estimate::gather_brute(&plan, &photon, &mut sums)),
         Some(gpu) => sums = gathered(gpu, &plan, &photon, count, Some(&sums)),
     }
-    RoomFilm { of_rounds: RoundSums { sums, ..RoundSums::default() }, ..RoomFilm::new(&plan) }.units(plan.points.len() - 1)
+    RoomFilm { of_blocks: BlockSums { sums, ..BlockSums::default() }, ..RoomFilm::new(&plan) }.units(plan.points.len() - 1)
 }
 
 /// Ten photons more than 2^24, and than so many that the lost part alone would have stopped, are ten more in a pair.
@@ -532,8 +532,8 @@ fn the_error_of_f32_sums_is_measured() {
     for (k, builder) in ["device, slices first", "cpu, one by one"].into_iter().enumerate() {
         let [f32_error, pair_error] = [&f32, &compensated].map(|film| relative_error(&film[k], &integer[k]));
         println!("{builder}: f32 off by {f32_error:.1e}, pairs by {pair_error:.1e}");
-        // The integers round each photon to 2^-31, which is all that they and the pairs differ by.
-        assert!(pair_error < 1e-9, "{builder}: {pair_error}");
+        // The integers round each photon to 2^-23, which is all that they and the pairs differ by.
+        assert!(pair_error < 1e-7, "{builder}: {pair_error}");
         assert!(f32_error > 10.0 * pair_error && f32_error < 1e-2, "{builder}: {f32_error}");
     }
 }

@@ -52,7 +52,7 @@ fn plan(folder: &Path, name: &str, content: &[u8]) -> Fate {
         let geometry = Geometry::new(&scene)?;
         let sensor = Sensor::Picture { width: 16, height: 16 };
         let plan = ScenePlan::new(&scene, &geometry, &SceneSettings::default(), sensor, &Limits::of_host())?;
-        assert!(plan.film_scale.is_finite() && plan.film_scale > 0.0, "film scale {}", plan.film_scale);
+        assert!(plan.film.scale.is_finite() && plan.film.scale > 0.0, "film scale {}", plan.film.scale);
         assert!(plan.bytes <= Limits::of_host().memory_bytes, "{} bytes", plan.bytes);
         check_records(&geometry);
         Ok(geometry.triangles.len())

@@ -1178,7 +1178,7 @@ fn surfaces_of_ior_zero_reflect_their_specular_factor() {
         let wall = scene.materials.len() - 1;
         scene.meshes.push(Mesh::parallelogram("wall", DVec3::new(-8.0, -8.0, 2.0), 20.0 * DVec3::X, 20.0 * DVec3::Y, wall));
         let camera = Camera::looking_at("ray", DVec3::new(2.1, 3.2, 8.0), DVec3::new(2.1, 3.2, 3.0), DVec3::Y, 0.003);
-        let settings = SceneSettings { photons: 1000, rounds: 4, ..SceneSettings::default() };
+        let settings = SceneSettings { photons: 1000, rounds: 4, ..by_rounds() };
         let found = mean_red(&seen(&gpu, &scene, &settings, &camera, [32, 32]));
         let expected = f64::from(specular + 2.0 * (1.0 - specular));
         // Deltas are chosen by chance where there are two.

@@ -84,7 +84,9 @@ fn short(arguments: &[&str]) -> Vec<String> {
     if arguments.contains(&"--replay") {
         return arguments.iter().map(ToString::to_string).collect();
     }
-    let of_run = [("--photons", "500"), ("--rounds", "2")];
+    // It takes two blocks of rounds to know an error.
+    let rounds = if arguments.contains(&"--error-image") { "8" } else { "2" };
+    let of_run = [("--photons", "500"), ("--rounds", rounds)];
     let only_if_there = [("--error", "60%"), ("--samples", "2"), ("--counters", "2")];
     let there: Vec<_> = only_if_there.into_iter().filter(|(option, _)| arguments.contains(option)).collect();
     let more: &[(&str, &str)] = match arguments.first() {

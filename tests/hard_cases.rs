@@ -13,7 +13,7 @@ use photonmill::verify::selfcheck::measure::{irradiance, radiance};
 
 /// Short runs of the Cornell box.
 pub fn settings() -> SceneSettings {
-    SceneSettings { photons: 4000, caustic_photons: 4000, rounds: 2, shadow_rays: 8, ..SceneSettings::default() }
+    SceneSettings { photons: 4000, caustic_photons: 4000, rounds: 2, shadow_rays: 8, ..by_rounds() }
 }
 
 fn cornell() -> Scene {
@@ -386,8 +386,7 @@ fn thin_walls_and_sheets_let_no_light_through() {
     };
     for illumination in BOTH {
         for radius in [0.3, 0.02] {
-            let settings =
-                SceneSettings { illumination, photons: 20_000, rounds: 4, radius: Some(radius), alpha: 1.0, ..SceneSettings::default() };
+            let settings = SceneSettings { illumination, photons: 20_000, rounds: 4, radius: Some(radius), alpha: 1.0, ..by_rounds() };
             for (what, rooms) in [("a 4096th", &two_walls), ("a sheet", &sheet)] {
                 let what = format!("{what}, {illumination:?}, radius {radius}");
                 let points: Vec<_> = points
@@ -411,8 +410,7 @@ fn a_lit_floor_does_not_light_the_foot_of_the_wall() {
     corner.lights = vec![lamp(sun(DVec3::NEG_Y))];
     corner.meshes.push(Mesh::parallelogram("wall", DVec3::new(-2.0, 0.0, -2.0), DVec3::Y * 2.0, DVec3::Z * 4.0, 0));
     for illumination in BOTH {
-        let settings =
-            SceneSettings { illumination, photons: 100_000, radius: Some(0.3), alpha: 1.0, rounds: 2, ..SceneSettings::default() };
+        let settings = SceneSettings { illumination, photons: 100_000, radius: Some(0.3), alpha: 1.0, rounds: 2, ..by_rounds() };
         let points =
             [(DVec3::new(-1.99, 0.0, 0.0), DVec3::Y), (DVec3::new(-2.0, 0.01, 0.0), DVec3::X), (DVec3::new(-2.0, 0.0, 0.0), DVec3::X)];
         let lit = received(&gpu, &corner, &settings, &points);
@@ -443,8 +441,7 @@ fn every_power_of_two_is_the_same_light_to_the_bit() {
         let radius = settings.radius.map(|radius| radius * 2f64.powi(k));
         received(&gpu, &scene, &SceneSettings { radius, ..settings.clone() }, &points)
     };
-    let settings =
-        SceneSettings { photons: 1500, caustic_photons: 1500, rounds: 2, shadow_rays: 4, radius: Some(0.1), ..SceneSettings::default() };
+    let settings = SceneSettings { photons: 1500, caustic_photons: 1500, rounds: 2, shadow_rays: 4, radius: Some(0.1), ..by_rounds() };
     let expected = of(0, &settings);
     assert!(mean_red(&expected) > 0.5);
     for k in -20..=20 {
@@ -487,7 +484,7 @@ fn the_open_box_of_any_power_of_two_stores_the_same_photons() {
 #[test]
 fn ten_thousand_sizes_away_the_light_is_the_same_to_the_bit() {
     let Some(gpu) = device() else { return };
-    let settings = SceneSettings { photons: 1500, caustic_photons: 1500, rounds: 2, ..SceneSettings::default() };
+    let settings = SceneSettings { photons: 1500, caustic_photons: 1500, rounds: 2, ..by_rounds() };
     let of = |way: DVec3| {
         let (scene, points) = cornell_at(|at| (at * 1_048_576.0).round() / 1_048_576.0 + way);
         received(&gpu, &scene, &settings, &points)
@@ -513,7 +510,7 @@ fn axis_parallel_rays_meet_the_same_by_tree_and_list() {
     let flush = [(DVec3::new(0.5, 0.0, 0.5), DVec3::Y), (DVec3::new(0.0, 0.5, 0.5), DVec3::X)];
     room.lights.extend(flush.map(|(centre, normal)| lamp(disc(centre, normal, 0.3, EmissionLaw::Uniform))));
     let lit = |with: &[Effect], without: &[Effect], room: &Scene| {
-        let of_photons = SceneSettings { illumination: Illumination::Photons, photons: 60_000, ..SceneSettings::default() };
+        let of_photons = SceneSettings { illumination: Illumination::Photons, photons: 60_000, ..by_rounds() };
         let settings = SceneSettings { with: with.to_vec(), without: without.to_vec(), rounds: 2, bounces: 4, ..of_photons };
         received(&gpu, room, &settings, &POINTS)
     };
@@ -544,7 +541,7 @@ fn flat_doubled_and_reordered_triangles_change_no_bit() {
     let mut plain = cornell();
     plain.materials.iter_mut().for_each(|material| material.emission = Vec3::ZERO);
     plain.lights = vec![lamp(point(DVec3::new(0.4, 0.8, 0.6)))];
-    let settings = SceneSettings { photons: 20_000, rounds: 2, ..SceneSettings::default() };
+    let settings = SceneSettings { photons: 20_000, rounds: 2, ..by_rounds() };
     let of = |spoil: &dyn Fn(&mut Mesh)| {
         let mut scene = plain.clone();
         scene.meshes.iter_mut().for_each(spoil);
@@ -665,7 +662,7 @@ fn a_furnace_glows_alike_however_it_is_turned() {
 fn an_eye_on_a_surface_sees_numbers() {
     let Some(gpu) = device() else { return };
     let cornell = cornell();
-    let settings = SceneSettings { photons: 500, rounds: 1, ..SceneSettings::default() };
+    let settings = SceneSettings { photons: 500, rounds: 1, ..by_rounds() };
     for (eye, target) in [
         (DVec3::new(0.5, 0.0, 0.9), DVec3::new(0.5, 0.5, 0.0)),
         (DVec3::ZERO, DVec3::ONE),

@@ -158,7 +158,7 @@ fn a_sun_in_a_plate_is_a_power_of_the_cosine() {
                     continue;
                 }
                 let camera = Camera::looking_at("eye", eye, DVec3::ZERO, DVec3::Z, 1e-9);
-                let settings = SceneSettings { photons: 1, rounds: 1, shadow_rays: 1, part: Part::Direct, ..SceneSettings::default() };
+                let settings = SceneSettings { photons: 1, rounds: 1, shadow_rays: 1, part: Part::Direct, ..by_rounds() };
                 let lit = seen(&gpu, &plate(surface, sun()), &settings, &camera, [4, 4]);
                 let found = mean_red(&lit);
                 let what = format!("{surface:?}, {off} off");
@@ -210,7 +210,7 @@ fn over_glass(ior: f32, depth: f64) -> Scene {
 /// Radiance along one ray and the number of samples.
 fn along(gpu: &Gpu, scene: &Scene, eye: DVec3) -> (f64, f64) {
     let camera = Camera::looking_at("ray", eye, DVec3::ZERO, DVec3::Z, 1e-6);
-    let settings = SceneSettings { photons: 1, caustic_photons: 1, rounds: 4, part: Part::Specular, ..SceneSettings::default() };
+    let settings = SceneSettings { photons: 1, caustic_photons: 1, rounds: 4, part: Part::Specular, ..by_rounds() };
     let lit = seen(gpu, scene, &settings, &camera, [64, 64]);
     (mean_red(&lit), 4.0 * 64.0 * 64.0)
 }
@@ -325,7 +325,7 @@ fn twenty_large_textures_are_read_each_from_its_own_buffer() {
     }
     // Three pixels a square.
     let camera = Camera::looking_at("eye", DVec3::new(10.0, 0.5, 60.0), DVec3::new(10.0, 0.5, 0.0), DVec3::Y, 2.0 * (0.5f64 / 60.0).atan());
-    let settings = SceneSettings { rounds: 1, part: Part::Direct, ..SceneSettings::default() };
+    let settings = SceneSettings { rounds: 1, part: Part::Direct, ..by_rounds() };
     let found = means(&seen(&gpu, &wall, &settings, &camera, [60, 3]));
     for k in 0..20 {
         let (found, expected) = (found[60 + 3 * k + 1], wall.textures[k].texels.at(0).truncate().as_dvec3());

@@ -71,7 +71,7 @@ fn films_gain_no_light() {
         let scene =
             scene_of(vec![ball], vec![Material::layered("ball", Vec3::ONE, layers)], vec![LightKind::Environment { radiance: Vec3::ONE }]);
         let camera = Camera::looking_at("eye", DVec3::Z * 20.0, DVec3::ZERO, DVec3::Y, 0.04);
-        let settings = SceneSettings { photons: 20_000, caustic_photons: 20_000, samples: 16, rounds: 16, ..SceneSettings::default() };
+        let settings = SceneSettings { photons: 20_000, caustic_photons: 20_000, samples: 16, rounds: 16, ..by_rounds() };
         let lit = seen(&gpu, &scene, &settings, &camera, [8, 8]);
         for channel in 0..3 {
             let (mean, error) = mean_and_error(&means(&lit).iter().map(|mean| mean[channel]).collect::<Vec<_>>());
@@ -101,7 +101,7 @@ fn films_agree_with_the_judge() {
     let meshes = vec![level(0.0, [2.4, 2.4], true, 0), level(1.2, [0.6, 0.6], false, 1), ball(-0.5, 2), ball(0.0, 3), ball(0.5, 4)];
     let mut scene = scene_of(meshes, materials, vec![LightKind::Environment { radiance: Vec3::splat(0.4) }]);
     scene.cameras.push(Camera::looking_at("camera", DVec3::new(0.0, 0.5, 1.7), DVec3::new(0.0, 0.2, 0.0), DVec3::Y, 0.7));
-    let settings = SceneSettings { photons: 20_000, caustic_photons: 20_000, samples: 4, rounds: 32, ..SceneSettings::default() };
+    let settings = SceneSettings { photons: 20_000, caustic_photons: 20_000, samples: 4, rounds: 32, ..by_rounds() };
     let camera = scene.first_camera();
     let lit = scene::render(&gpu, &scene, &settings, Target::Picture(&camera, [SIZE; 2])).unwrap();
     let judged = Judge::new(&scene, 64).image(&camera, SIZE, SIZE, 512, 77);

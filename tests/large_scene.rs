@@ -40,7 +40,7 @@ fn a_million_triangles_load_and_render() {
     let geometry = Geometry::new(&loaded).unwrap();
     let built = began.elapsed() - read;
 
-    let settings = SceneSettings { photons: 100_000, caustic_photons: 100_000, rounds: 4, ..SceneSettings::default() };
+    let settings = SceneSettings { photons: 100_000, caustic_photons: 100_000, rounds: 4, ..by_rounds() };
     let sensor = Sensor::Picture { width: 256, height: 256 };
     let plan = ScenePlan::new(&loaded, &geometry, &settings, sensor, &engine::limits(gpu.facts())).unwrap();
     let view = View { geometry: &geometry, camera: loaded.cameras.first(), phases: &[] };

@@ -62,7 +62,7 @@ fn photons_by_sight_bring_as_much_light_as_by_power() {
     scene.meshes.push(Mesh::parallelogram("cove", corner, y, x, 2));
     scene.meshes.push(Mesh::parallelogram("small", DVec3::new(1.0, 2.5, 1.0), DVec3::X * 0.1, DVec3::Z * 0.1, 3));
     scene.materials.push(Material { emission: Vec3::splat(50.0), ..matt(0.0) });
-    let usual = SceneSettings { photons: 1 << 14, rounds: 96, radius: Some(0.3), alpha: 1.0, ..SceneSettings::default() };
+    let usual = SceneSettings { photons: 1 << 14, rounds: 96, radius: Some(0.3), alpha: 1.0, ..by_rounds() };
     for settings in
         [SceneSettings { part: Part::Indirect, ..usual.clone() }, SceneSettings { illumination: Illumination::Photons, ..usual }]
     {
@@ -97,11 +97,11 @@ fn a_dark_room_beside_a_bright_one_is_not_known_to_be_dark() {
     scene.meshes.extend(dark_room(2.0 * ROOM));
     let dark = points().into_iter().map(|(at, normal)| (at + 2.0 * ROOM, normal));
     let all: Vec<_> = points().into_iter().chain(dark).collect();
-    let found = lit(&gpu, &scene, &SceneSettings { rounds: 4, photons: 3000, ..SceneSettings::default() }, &all, Some(&|_| {}));
-    let unknown = found.film.unknown(&found.plan, 0.95);
+    let found = lit(&gpu, &scene, &SceneSettings { rounds: 4, photons: 3000, ..by_rounds() }, &all, Some(&|_| {}));
+    let unknown = found.film.unknown(0.95);
     println!("{unknown:?}");
     assert_eq!((unknown.asked, unknown.unreached), (120, 60));
-    assert!(unknown.upper_bound > 0.0 && (60..120).all(|point| found.film.stated_error(point, &found.plan) == DVec3::INFINITY));
+    assert!(unknown.upper_bound > 0.0 && (60..120).all(|point| found.film.stated_error(point) == DVec3::INFINITY));
 }
 
 /// The choice knows no builder, chunk or part: films are the same to the bit, and parts add up to the whole.
@@ -111,7 +111,7 @@ fn lights_are_chosen_alike_by_every_builder_chunk_and_part() {
     let mut scene = rooms(&[1.0, 30.0]);
     scene.materials[0].surface = Surface::Glossy { exponent: 20.0 };
     let camera = Camera::looking_at("camera", DVec3::new(-1.8, 1.7, 1.9), DVec3::Y, DVec3::Y, 1.2);
-    let settings = SceneSettings { photons: 4000, rounds: 2, samples: 2, ..SceneSettings::default() };
+    let settings = SceneSettings { photons: 4000, rounds: 2, samples: 2, ..by_rounds() };
     let lit = |settings: SceneSettings| scene::render(&gpu, &scene, &settings, Target::Picture(&camera, [24, 18])).unwrap();
     let whole = lit(settings.clone());
     assert_eq!(whole.plan.lights().map(|lights| lights.clusters), Some(4));
@@ -134,7 +134,7 @@ fn lights_are_chosen_alike_by_every_builder_chunk_and_part() {
 #[test]
 fn one_lamp_is_not_chosen() {
     let Some(gpu) = device() else { return };
-    let settings = SceneSettings { rounds: 1, photons: 1000, caustic_photons: 1000, ..SceneSettings::default() };
+    let settings = SceneSettings { rounds: 1, photons: 1000, caustic_photons: 1000, ..by_rounds() };
     for (name, scene, clusters) in [("cornell", scene("cornell"), 0), ("two rooms", rooms(&[1.0, 2.0]), 4), ("pieces", cut_lamp(9), 64)] {
         let camera = scene.first_camera();
         let lit = scene::render(&gpu, &scene, &settings, Target::Picture(&camera, [8, 8])).unwrap();
@@ -207,7 +207,7 @@ fn lights_are_chosen_as_often_as_is_said() {
         mesh.positions.iter_mut().for_each(|position| *position += ROOM);
         mesh
     }));
-    let settings = SceneSettings { rounds: 1, photons: 1000, ..SceneSettings::default() };
+    let settings = SceneSettings { rounds: 1, photons: 1000, ..by_rounds() };
     let plan = lit(&gpu, &scene, &settings, &points(), Some(&|_| {})).plan;
     let geometry = Geometry::new(&scene).unwrap();
     let lights = plan.lights().expect("there are many lights");
@@ -253,7 +253,7 @@ fn no_light_is_impossible_and_probabilities_add_up_to_one() {
     lamps.positions.iter_mut().for_each(|position| *position += DVec3::new(0.0, 1.5, 6.0));
     scene.meshes.push(lamps);
     scene.lights = every_kind_of_light(1.0, 1e-3, EmissionLaw::Cosine);
-    let settings = SceneSettings { rounds: 1, photons: 1000, ..SceneSettings::default() };
+    let settings = SceneSettings { rounds: 1, photons: 1000, ..by_rounds() };
     let below_lamps = grid(1.0, DVec3::Y, 6).into_iter().map(|(at, normal)| (at + DVec3::Z * 6.0, normal));
     let all: Vec<_> = points().into_iter().chain(below_lamps).collect();
     let plan = lit(&gpu, &scene, &settings, &all, Some(&|_| {})).plan;
@@ -307,7 +307,7 @@ fn glowing_panes_shine_both_ways() {
     let camera = scene.first_camera();
     let judged = Judge::new(&scene, 64).image(&camera, 16, 16, 512, 5);
     for illumination in [Illumination::Photons, Illumination::Split] {
-        let settings = SceneSettings { photons: 20_000, rounds: 32, radius: Some(0.1), illumination, ..SceneSettings::default() };
+        let settings = SceneSettings { photons: 20_000, rounds: 32, radius: Some(0.1), illumination, ..by_rounds() };
         let lit = scene::render(&gpu, &scene, &settings, Target::Picture(&camera, [16; 2])).unwrap();
         let verdict = Verdict::new(&means(&lit), &standard_errors(&lit), 32, &judged, None);
         assert!(verdict.agrees(), "{illumination:?}: {verdict}");

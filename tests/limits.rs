@@ -14,7 +14,7 @@ use photonmill::plan::radius::{mean_squared_radius, squared_radius};
 use photonmill::settings::stop::Stop;
 
 fn settings() -> SceneSettings {
-    SceneSettings { photons: 8000, caustic_photons: 8000, rounds: 8, shadow_rays: 1, ..SceneSettings::default() }
+    SceneSettings { photons: 8000, caustic_photons: 8000, rounds: 8, shadow_rays: 1, ..by_rounds() }
 }
 
 /// A closed room whose walls all shine.
@@ -171,7 +171,7 @@ fn radii_take_no_sum_over_earlier_rounds() {
 fn run(gpu: &Gpu, scene: &Scene, settings: &SceneSettings, cancelled: &AtomicBool) -> Result<RunResult, Error> {
     let (geometry, plan) = scene_plan(gpu, scene, settings, square_picture(64))?;
     let view = View { geometry: &geometry, camera: Some(&scene.first_camera()), phases: &[] };
-    scene::light(gpu, &view, plan, &mut Control { cancelled, progress: &mut |_| {} })
+    scene::light(gpu, &view, plan, &mut Control { cancelled, progress: &mut |_| {}, ..Control::default() })
 }
 
 /// Rounds that would take many minutes end in their middle when they are asked to.

@@ -9,6 +9,7 @@ mod architecture;
 mod bake;
 mod bench;
 mod bias;
+mod blocks;
 mod calibration;
 mod cameras;
 mod cli;

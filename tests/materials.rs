@@ -43,12 +43,12 @@ fn runs(gpu: &Gpu, scene: &Scene, settings: &SceneSettings, size: [u32; 2]) -> R
     let all: Vec<RunResult> = (1..=SEEDS).map(of).collect();
     let pixels = all[0].film.pixels();
     let share = 1.0 / f64::from(SEEDS);
-    let means = (0..pixels).map(|place| all.iter().map(|lit| share * lit.film.mean(place, &lit.plan)).sum()).collect();
-    let squared = |place: usize| all.iter().map(|lit| lit.film.standard_error(place, &lit.plan).powf(2.0)).sum::<DVec3>();
+    let means = (0..pixels).map(|place| all.iter().map(|lit| share * lit.film.mean(place)).sum()).collect();
+    let squared = |place: usize| all.iter().map(|lit| lit.film.standard_error(place).powf(2.0)).sum::<DVec3>();
     let errors = (0..pixels).map(|place| share * squared(place).map(f64::sqrt)).collect();
     let parts = std::array::from_fn(|part| {
         let of_run =
-            |lit: &RunResult| lit.film.part_totals[part] as f64 / (lit.plan.film_scale * f64::from(lit.film.rounds) * pixels as f64);
+            |lit: &RunResult| lit.film.part_totals[part] as f64 / (lit.plan.film.scale * f64::from(lit.film.rounds) * pixels as f64);
         let values: Vec<f64> = all.iter().map(of_run).collect();
         mean_and_error(&values)
     });
@@ -123,7 +123,7 @@ fn pictures_of_each_lobe_agree_with_the_judge() {
     let mut wrong = Vec::new();
     for (name, material) in balls().into_iter().filter(|(name, _)| only.as_ref().is_none_or(|only| only == name)) {
         let scene = stage(vec![(material, DVec3::new(0.0, 0.45, 0.1), 0.4)]);
-        let settings = SceneSettings { photons: 10_000, caustic_photons: 10_000, rounds: 16, ..SceneSettings::default() };
+        let settings = SceneSettings { photons: 10_000, caustic_photons: 10_000, rounds: 16, ..by_rounds() };
         let size = [24, 24];
         let found = runs(&gpu, &scene, &settings, size);
         let judged = Judge::new(&scene, 64).image(&scene.first_camera(), size[0], size[1], 512, 77);
@@ -159,7 +159,7 @@ fn a_picture_of_all_lobes_agrees_with_the_judge() {
         DVec3::new(0.42 * (k % 5) as f64 - 0.84 + 0.21 * (k / 5) as f64, 0.2 + 0.42 * (k / 5) as f64, 0.3 - 0.3 * (k / 5) as f64)
     };
     let scene = stage(pairs_of_lobes().into_iter().enumerate().map(|(k, material)| (material, place(k), 0.2)).collect());
-    let settings = SceneSettings { photons: 10_000, caustic_photons: 10_000, rounds: 8, ..SceneSettings::default() };
+    let settings = SceneSettings { photons: 10_000, caustic_photons: 10_000, rounds: 8, ..by_rounds() };
     let size = [32, 24];
     let found = runs(&gpu, &scene, &settings, size);
     let judged = Judge::new(&scene, 64).image(&scene.first_camera(), size[0], size[1], 256, 77);

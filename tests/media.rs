@@ -48,7 +48,7 @@ fn slab_check(gpu: &Gpu, materials: Vec<Material>, slabs: Vec<Mesh>, angle: f64,
     let camera = Camera::looking_at("ray", eye, DVec3::ZERO, DVec3::Y, 1e-3);
     // No photon map knows any of it.
     let without = vec![Effect::Indirect, Effect::ReflectiveCaustics, Effect::RefractiveCaustics];
-    let settings = SceneSettings { rounds: 64, without, ..SceneSettings::default() };
+    let settings = SceneSettings { rounds: 64, without, ..by_rounds() };
     let lit = scene::render(gpu, &scene, &settings, Target::Picture(&camera, [8, 8])).unwrap();
     let (found, error) = mean_and_error(&means(&lit).iter().map(|mean| mean.x).collect::<Vec<_>>());
     let r = reflectance(angle.cos(), 1.5);
@@ -116,7 +116,7 @@ pub fn eye_in_glass(gpu: &Gpu) -> Check<Complaint> {
     let materials = vec![solid("glass", 1.5, Vec3::ONE)];
     let scene = scene_of(slab(9.0, -1.0, 1.0, 0), materials, vec![LightKind::Environment { radiance: Vec3::ONE }]);
     let camera = Camera::looking_at("eye", DVec3::ZERO, DVec3::new(0.3, 0.1, 1.0), DVec3::Y, 0.1);
-    let settings = SceneSettings { rounds: 4, ..SceneSettings::default() };
+    let settings = SceneSettings { rounds: 4, ..by_rounds() };
     let lit = scene::render(gpu, &scene, &settings, Target::Picture(&camera, [8, 8])).unwrap();
     estimate_check("an eye in glass", mean_red(&lit), 2.25, 1e-4)
 }
@@ -139,7 +139,7 @@ pub fn lamp_in_a_medium(gpu: &Gpu) -> Check<Complaint> {
     meshes.push(level(-0.5, [1.0; 2], true, 2));
     let materials = two_media().into_iter().chain([matt(0.0)]).collect();
     let scene = scene_of(meshes, materials, vec![point(DVec3::Y * 0.3)]);
-    let settings = SceneSettings { rounds: 1, part: Part::Direct, ..SceneSettings::default() };
+    let settings = SceneSettings { rounds: 1, part: Part::Direct, ..by_rounds() };
     let found = means(&received(gpu, &scene, &settings, &[(DVec3::Y * -0.5, DVec3::Y)]))[0].x;
     // Nothing is random.
     estimate_check("a lamp in a medium", found, 0.1f64.powf(0.8) / 0.64, 1e-5)
@@ -189,7 +189,7 @@ fn what_lies_in_a_medium_agrees_with_the_judge() {
     let mut scene = scene_of(meshes, materials, vec![LightKind::Environment { radiance: Vec3::splat(0.5) }]);
     scene.materials[0].two_sided = true;
     scene.cameras.push(Camera::looking_at("camera", DVec3::new(0.1, 0.6, 1.3), DVec3::new(0.0, 0.3, 0.0), DVec3::Y, 0.8));
-    let settings = SceneSettings { photons: 20_000, caustic_photons: 20_000, samples: 4, rounds: 32, ..SceneSettings::default() };
+    let settings = SceneSettings { photons: 20_000, caustic_photons: 20_000, samples: 4, rounds: 32, ..by_rounds() };
     let camera = scene.first_camera();
     let lit = scene::render(&gpu, &scene, &settings, Target::Picture(&camera, [SIZE; 2])).unwrap();
     let judged = Judge::new(&scene, 64).image(&camera, SIZE, SIZE, 1024, 77);

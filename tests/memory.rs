@@ -53,7 +53,7 @@ fn scenes_take_what_their_plan_says() {
         let scene: Scene = built_in::by_name(name).unwrap();
         let geometry = Geometry::new(&scene).unwrap();
         for illumination in BOTH {
-            let small = SceneSettings { photons: 777, caustic_photons: 555, bounces: 5, rounds: 2, ..SceneSettings::default() };
+            let small = SceneSettings { photons: 777, caustic_photons: 555, bounces: 5, rounds: 2, ..by_rounds() };
             let final_gather = illumination == Illumination::Split;
             let settings = SceneSettings { chunk: Some(500), illumination, final_gather, ..small };
             let sensor = Sensor::Picture { width: 7, height: 5 };
@@ -64,7 +64,7 @@ fn scenes_take_what_their_plan_says() {
             assert_holds(name, check("a picture", bytes, stated, &[]));
         }
         let receivers = [vec![Default::default(); 9], vec![Default::default(); 9]];
-        let settings = SceneSettings { photons: 300, rounds: 2, ..SceneSettings::default() };
+        let settings = SceneSettings { photons: 300, rounds: 2, ..by_rounds() };
         let plan = ScenePlan::new(&scene, &geometry, &settings, Sensor::Receivers { count: 9 }, &limits).unwrap();
         let stated = plan.bytes_of(2);
         let view = View { geometry: &geometry, camera: None, phases: &receivers };

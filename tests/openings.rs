@@ -33,7 +33,7 @@ fn lit(gpu: &Gpu, scene: &Scene, settings: &SceneSettings) -> RunResult {
 }
 
 fn settings(part: Part, aim: bool) -> SceneSettings {
-    SceneSettings { photons: 20_000, rounds: 32, part, aim, ..SceneSettings::default() }
+    SceneSettings { photons: 20_000, rounds: 32, part, aim, ..by_rounds() }
 }
 
 /// The light is what a path tracer finds, and its variance less than a tenth of that of rays and photons that are not aimed.
@@ -47,7 +47,7 @@ fn a_small_window_lights_a_room_in_a_tenth_of_the_time() {
     for part in [Part::Direct, Part::Indirect] {
         let [aimed, other] = [true, false].map(|aim| lit(&gpu, &scene, &settings(part, aim)));
         assert_eq!(aimed.plan.trial.as_ref().map(|trial| trial.openings.len()), Some(1), "{part:?}");
-        let [little, much] = [&aimed, &other].map(|lit| lit.film.relative_error(&lit.plan));
+        let [little, much] = [&aimed, &other].map(|lit| lit.film.relative_error());
         println!("{part:?}: {:.2} % and {:.2} %", 100.0 * little, 100.0 * much);
         assert!((much / little).powi(2) > 10.0, "{part:?}: {little} and {much}");
         for (point, judged) in judged.iter().enumerate() {
@@ -105,8 +105,8 @@ pub fn second_opening(gpu: &Gpu) -> Check<Complaint> {
     // Of the hole: from the middle of the point's view of it.
     let way = dvec3(0.15, 0.125, 0.0);
     let missing = 0.0009 * way.x * way.y / way.length_squared().powi(2);
-    let lit = render(gpu, &room, &SceneSettings::default(), Target::Points(&points)).unwrap();
-    let hidden = lit.film.unknown(&lit.plan, 0.95).hidden;
+    let lit = render(gpu, &room, &by_rounds(), Target::Points(&points)).unwrap();
+    let hidden = lit.film.unknown(0.95).hidden;
     println!("{hidden:?}, {missing} may be missing; {:?}", red(&lit, 200));
     assert_eq!(lit.plan.trial.as_ref().map(|trial| trial.openings.len()), Some(1));
     let (found, error) = red(&lit, 200);
@@ -114,7 +114,7 @@ pub fn second_opening(gpu: &Gpu) -> Check<Complaint> {
     if hidden.points < 150 || hidden.upper_bound < missing {
         return Err(Complaint::new(Kind::TooDark, format!("{missing} W/m2 may be missing, and {hidden:?} is known")));
     }
-    assert!(lit.film.unknown(&lit.plan, 0.95).text("point", "W/m2", 0.95, 16).contains("some part of the sky"));
+    assert!(lit.film.unknown(0.95).text("point", "W/m2", 0.95, 16).contains("some part of the sky"));
     Ok(())
 }
 
@@ -125,8 +125,8 @@ fn a_second_opening_that_few_points_see_is_said_to_be_hidden() {
     // In a picture it is next to nothing beside the light of all pixels.
     let eye = Camera::looking_at("eye", dvec3(-1.9, 2.0, -1.9), dvec3(0.5, 0.5, 0.5), DVec3::Y, 1.0);
     let bright = Scene { materials: vec![matt(0.5)], ..room_under_the_sky(0.447) };
-    let seen = render(&gpu, &bright, &SceneSettings::default(), Target::Picture(&eye, [64, 64])).unwrap();
-    let hidden = seen.film.unknown(&seen.plan, 0.95).hidden;
+    let seen = render(&gpu, &bright, &by_rounds(), Target::Picture(&eye, [64, 64])).unwrap();
+    let hidden = seen.film.unknown(0.95).hidden;
     assert!(hidden.of_mean < 0.01, "{hidden:?}");
 }
 

@@ -33,7 +33,7 @@ fn slanting(angle: f64, distance: f64) -> (DVec3, DVec3) {
 
 /// No photons: rays from the eye alone.
 fn rays(rounds: u32) -> SceneSettings {
-    SceneSettings { photons: 1, caustic_photons: 1, bounces: 1, shadow_rays: 1, part: Part::Specular, rounds, ..SceneSettings::default() }
+    SceneSettings { photons: 1, caustic_photons: 1, bounces: 1, shadow_rays: 1, part: Part::Specular, rounds, ..by_rounds() }
 }
 
 /// What a smooth surface reflects of an even sky, with nothing but black below: F = 0.04 at normal incidence, 0.0892 at

@@ -55,7 +55,7 @@ fn irradiance(gpu: &Gpu, scene: &Scene, settings: &SceneSettings, points: &[(DVe
 }
 
 fn settings() -> SceneSettings {
-    mapped(20_000, 16, SceneSettings::default().bounces, 0.3)
+    mapped(20_000, 16, by_rounds().bounces, 0.3)
 }
 
 /// Complains where a scene is not lit as another at some points.
@@ -140,7 +140,7 @@ fn a_lamp_in_the_plane_of_the_ceiling_shines() {
             assert_holds("in the ceiling", z_check("in the ceiling", *found, *expected, error.hypot(*other)));
         }
         let place = |at: DVec3| if is_turned { tilted(at) } else { at };
-        let direct = SceneSettings { rounds: 1, part: Part::Direct, shadow_rays: 1, ..SceneSettings::default() };
+        let direct = SceneSettings { rounds: 1, part: Part::Direct, shadow_rays: 1, ..by_rounds() };
         for eye in [DVec3::new(0.1, 0.3, 0.2), DVec3::new(1.9, 0.4, -1.7), DVec3::new(-1.9, 2.8, 0.3)] {
             let angle = 0.05 / eye.distance(DVec3::Y * 3.0);
             let camera = Camera::looking_at("eye", place(eye), place(DVec3::Y * 3.0), DVec3::X, angle);
@@ -244,7 +244,7 @@ fn the_judge_counts_an_overlap_once() {
 fn short_rays_see_what_counts() {
     let Some(gpu) = device() else { return };
     let lamp = point(DVec3::Y * 2.0);
-    let settings = SceneSettings { photons: 1, rounds: 1, shadow_rays: 1, ..SceneSettings::default() };
+    let settings = SceneSettings { photons: 1, rounds: 1, shadow_rays: 1, ..by_rounds() };
     for (what, lift) in [("on the floor", 0.0), ("above the floor", 3e-6), ("below the floor", -3e-6)] {
         let floor = level(0.0, [10.0; 2], true, 0);
         let mut rug = level(0.0, [2.0; 2], true, 1);

@@ -12,7 +12,7 @@ use photonmill::engine::scene::{self, RunResult, View};
 const SENSOR: Sensor = Sensor::Picture { width: 24, height: 24 };
 
 fn paranoid() -> SceneSettings {
-    SceneSettings { photons: 3000, caustic_photons: 3000, rounds: 2, paranoid: true, ..SceneSettings::default() }
+    SceneSettings { photons: 3000, caustic_photons: 3000, rounds: 2, paranoid: true, ..by_rounds() }
 }
 
 fn plan_of(gpu: &Gpu, scene: &Scene, geometry: &Geometry, settings: &SceneSettings) -> ScenePlan {

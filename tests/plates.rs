@@ -36,7 +36,7 @@ fn backs_are_not_there_for_the_eye() {
 fn alphas_of_vertices_are_looked_up_without_colours() {
     let sheet = Mesh { alphas: vec![0.5; 4], ..level(0.0, [1.0; 2], true, 0) };
     let scene = scene_of(vec![sheet], vec![layered::dull(0.5)], vec![sun(DVec3::NEG_Y)]);
-    let plan = scene_plan_within(&Limits::of_host(), &scene, &SceneSettings::default(), square_picture(1)).unwrap();
+    let plan = scene_plan_within(&Limits::of_host(), &scene, &by_rounds(), square_picture(1)).unwrap();
     assert!(plan.keeps(Effect::VertexColours));
     assert!(scene.without(&[Effect::VertexColours]).meshes[0].alphas.is_empty());
 }

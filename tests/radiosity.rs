@@ -410,7 +410,7 @@ fn baked_box(gpu: &Device, illumination: Illumination, has_set: bool) -> BakedBo
         caustic_radius: Some(DISC_RADIUS),
         alpha: 1.0,
         shadow_rays: 16,
-        ..SceneSettings::default()
+        ..by_rounds()
     };
     let geometry = Geometry::new(&scene).unwrap();
     let receiver = |sample: &photonmill::bake::TexelSample| Receiver {
@@ -422,9 +422,8 @@ fn baked_box(gpu: &Device, illumination: Illumination, has_set: bool) -> BakedBo
     let sensor = Sensor::Receivers { count: layout.texel_count() as u32 };
     let plan = ScenePlan::new(&scene, &geometry, &settings, sensor, &engine::limits(gpu.facts())).unwrap();
     let lit = light(gpu, &View { geometry: &geometry, camera: None, phases: &phases }, plan);
-    let errors = lit.film.stated_errors(&lit.plan);
-    let estimate =
-        |texel: usize| TexelEstimate { irradiance: lit.film.mean(texel, &lit.plan).as_vec3(), standard_error: errors(texel).as_vec3() };
+    let errors = lit.film.stated_errors();
+    let estimate = |texel: usize| TexelEstimate { irradiance: lit.film.mean(texel).as_vec3(), standard_error: errors(texel).as_vec3() };
     let estimates = (0..layout.texel_count()).map(estimate).collect();
     BakedBox { layout, estimates }
 }

@@ -307,14 +307,14 @@ const PHOTONS: u32 = 1 << 14;
 fn lit_rooms(gpu: &Gpu, seed: u64, with_bias: bool) -> Vec<Found> {
     let rooms = rooms(seed);
     let (scene, points) = scene_of_rooms(&rooms, seed);
-    let settings = SceneSettings { photons: PHOTONS, rounds: ROUNDS, seed, ..SceneSettings::default() };
+    let settings = SceneSettings { photons: PHOTONS, rounds: ROUNDS, seed, ..by_rounds() };
     let (geometry, target) = (Geometry::new(&scene).unwrap(), Target::Points(&points));
     let view = View { geometry: &geometry, camera: None, phases: &target.phases(&geometry) };
     let lit = light(gpu, &view, trial::plan(gpu, &scene, &view, &settings, target.sensor()).unwrap());
     let radii = mean_squared_radius(settings.alpha, ROUNDS).sqrt();
     let bias = with_bias.then(|| bias::measure(gpu, &scene, &view, &lit.plan, (radii, 1), &AtomicBool::new(false)).unwrap().unwrap());
     // The same at all points, as it is stated for all of them.
-    let bias = bias.map_or(0.0, |bias| bias.relative * lit.film.root_mean_square(&lit.plan));
+    let bias = bias.map_or(0.0, |bias| bias.relative / lit.film.measure().relative_to_mean(1.0) / (3.0 * lit.film.pixels() as f64).sqrt());
     let mut all = Vec::new();
     for room in &rooms {
         for (own, expected) in pairs(&room.points, expected(room)) {
@@ -322,7 +322,7 @@ fn lit_rooms(gpu: &Gpu, seed: u64, with_bias: bool) -> Vec<Found> {
             let channel = point % 3;
             all.push(expected.map(|light| {
                 let [expected, tolerance] = light.map(|light| light[channel]);
-                let [found, noise] = [lit.film.mean(point, &lit.plan), lit.film.stated_error(point, &lit.plan)].map(|light| light[channel]);
+                let [found, noise] = [lit.film.mean(point), lit.film.stated_error(point)].map(|light| light[channel]);
                 Found { seed, point, place: place(room, *own, rooms.len() > 1), expected, tolerance, found, noise, bias }
             }));
         }

@@ -687,7 +687,7 @@ fn strict() -> RoomSettings {
 }
 
 fn small() -> SceneSettings {
-    SceneSettings { photons: 3000, rounds: 2, shadow_rays: 2, illumination: Illumination::Photons, ..SceneSettings::default() }
+    SceneSettings { photons: 3000, rounds: 2, shadow_rays: 2, illumination: Illumination::Photons, ..by_rounds() }
 }
 
 /// Photons of the CPU builder, by their number: of builders that are asked for, nothing else differs.

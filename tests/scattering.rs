@@ -40,7 +40,7 @@ struct Traced {
 impl Tracer<'_> {
     fn trace_photons(&self, scene: &Scene, photons: (u32, u32)) -> Traced {
         // One bounce more than is traced: what the last one leaves is cut off. All effects are there.
-        let all = SceneSettings { bounces: 2, illumination: Illumination::Photons, with: Effect::ALL.to_vec(), ..SceneSettings::default() };
+        let all = SceneSettings { bounces: 2, illumination: Illumination::Photons, with: Effect::ALL.to_vec(), ..by_rounds() };
         let settings = SceneSettings { photons: photons.0 + photons.1, chunk: Some(photons.1), math: self.math, ..all };
         let (geometry, plan) = scene_plan(self.gpu, scene, &settings, Sensor::Receivers { count: 1 }).unwrap();
         let map = plan.global.as_ref().expect("a lit scene has a map");

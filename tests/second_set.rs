@@ -40,7 +40,7 @@ const UP: DVec3 = DVec3::Y;
 const DOWN: DVec3 = DVec3::NEG_Y;
 
 fn usual() -> SceneSettings {
-    SceneSettings { photons: 1 << 13, ..SceneSettings::default() }
+    SceneSettings { photons: 1 << 13, ..by_rounds() }
 }
 
 fn points(scene: Scene, asked: Vec<(DVec3, DVec3, f64)>) -> Setup {
@@ -404,13 +404,13 @@ fn found(gpu: &Gpu, setup: &Setup) -> Vec<[f64; 3]> {
         Asked::Points(asked) => {
             let points: Vec<(DVec3, DVec3)> = asked.iter().map(|(at, normal, _)| (*at, *normal)).collect();
             let lit = render(gpu, &setup.scene, &setup.settings, Target::Points(&points)).unwrap();
-            let found = |k: usize| [asked[k].2, lit.film.mean(k, &lit.plan).x, lit.film.stated_error(k, &lit.plan).x];
+            let found = |k: usize| [asked[k].2, lit.film.mean(k).x, lit.film.stated_error(k).x];
             (0..asked.len()).map(found).collect()
         }
         Asked::Picture(camera, size, expected) => {
             let lit = render(gpu, &setup.scene, &setup.settings, Target::Picture(camera, *size)).unwrap();
             // Pixels share their photons: as if their errors were one.
-            let errors = (0..lit.film.pixels()).map(|pixel| lit.film.stated_error(pixel, &lit.plan).x);
+            let errors = (0..lit.film.pixels()).map(|pixel| lit.film.stated_error(pixel).x);
             vec![[*expected, mean_red(&lit), errors.sum::<f64>() / lit.film.pixels() as f64]]
         }
     }

@@ -186,7 +186,7 @@ fn settings_are_accepted_exactly_within_their_ranges() {
 }
 
 fn any_transport_settings(random: &mut Random) -> SceneSettings {
-    let mut settings = SceneSettings::default();
+    let mut settings = by_rounds();
     for _ in 0..=random.below(3) {
         match random.below(13) {
             0 => settings.photons = random.count(1, 1 << 31),

@@ -47,7 +47,7 @@ fn floor_under(sky: Sky) -> Scene {
 }
 
 fn settings(illumination: Illumination) -> SceneSettings {
-    SceneSettings { photons: 40_000, rounds: 32, illumination, ..SceneSettings::default() }
+    SceneSettings { photons: 40_000, rounds: 32, illumination, ..by_rounds() }
 }
 
 /// Colours of the irradiance on surfaces that face all ways, beside a small floor.
@@ -59,7 +59,7 @@ pub fn facing_all_ways(gpu: &Gpu) -> Check<Complaint> {
         let points = normals.map(|normal| (DVec3::ZERO, normal));
         let lit = received(gpu, &scene, &settings(Illumination::Split), &points);
         for (point, normal) in normals.into_iter().enumerate() {
-            let (found, error) = (lit.film.mean(point, &lit.plan), lit.film.standard_error(point, &lit.plan));
+            let (found, error) = (lit.film.mean(point), lit.film.standard_error(point));
             let exact = irradiance(&sky, normal, normal);
             for channel in 0..3 {
                 let (found, error, exact) = (found[channel], error[channel], exact[channel]);
@@ -114,7 +114,7 @@ fn an_even_picture_is_one_colour() {
     let Some(gpu) = device() else { return };
     let colour = Vec3::new(0.25, 1.0, 2.0);
     let found = received(&gpu, &floor_under(sky(16, 8, |_, _| colour)), &settings(Illumination::Split), &[(DVec3::ZERO, DVec3::Y)]);
-    let (mean, error) = (found.film.mean(0, &found.plan), found.film.standard_error(0, &found.plan));
+    let (mean, error) = (found.film.mean(0), found.film.standard_error(0));
     for channel in 0..3 {
         assert_holds("an even sky", z_check("irradiance", mean[channel], PI * f64::from(colour[channel]), error[channel].max(1e-5)));
     }
@@ -136,7 +136,7 @@ fn every_part_of_the_light_is_what_the_path_tracer_finds() {
     let judge = Judge::new(&scene, 32);
     let image = judge.image(&camera, 12, 9, 4000, 1);
     for part in [Part::Direct, Part::Specular, Part::Caustic, Part::Indirect] {
-        let settings = SceneSettings { photons: 60_000, rounds: 32, part, ..SceneSettings::default() };
+        let settings = SceneSettings { photons: 60_000, rounds: 32, part, ..by_rounds() };
         let lit = render(&gpu, &scene, &settings, Target::Picture(&camera, [12, 9])).unwrap();
         let of = |parts: &photonmill::verify::judge::Parts| match part {
             Part::Direct => parts.direct.x,
@@ -170,11 +170,11 @@ fn a_sunny_sky_comes_in_through_a_small_window() {
     let judged = Judge::new(&scene, 32).irradiance_at(&points, 40_000, 1);
     for part in [Part::Direct, Part::Indirect] {
         let lit = |aim: bool| -> RunResult {
-            let settings = SceneSettings { photons: 20_000, rounds: 32, part, aim, ..SceneSettings::default() };
+            let settings = SceneSettings { photons: 20_000, rounds: 32, part, aim, ..by_rounds() };
             render(&gpu, &scene, &settings, Target::Points(&points)).unwrap()
         };
         let [aimed, other] = [true, false].map(lit);
-        let [little, much] = [&aimed, &other].map(|lit| lit.film.relative_error(&lit.plan));
+        let [little, much] = [&aimed, &other].map(|lit| lit.film.relative_error());
         println!("{part:?}: {:.2} % and {:.2} %", 100.0 * little, 100.0 * much);
         assert!((much / little).powi(2) > 10.0, "{part:?}: {little} and {much}");
         let (mut found, mut expected, mut errors) = (0.0, 0.0, 0.0);
@@ -203,11 +203,11 @@ fn a_sun_that_shines_in_has_as_many_rays_as_without_openings() {
     let points: Vec<_> = (-2..=2).flat_map(near).collect();
     let scene = room_under(picture);
     let [aimed, other] = [true, false].map(|aim| {
-        let settings = SceneSettings { rounds: 64, shadow_rays: 4, part: Part::Direct, aim, ..SceneSettings::default() };
+        let settings = SceneSettings { rounds: 64, shadow_rays: 4, part: Part::Direct, aim, ..by_rounds() };
         render(&gpu, &scene, &settings, Target::Points(&points)).unwrap()
     });
     assert!(aimed.plan.trial.as_ref().is_some_and(|trial| !trial.openings.is_empty()));
-    let [little, much] = [&aimed, &other].map(|lit| lit.film.relative_error(&lit.plan));
+    let [little, much] = [&aimed, &other].map(|lit| lit.film.relative_error());
     println!("{:.2} % and {:.2} %", 100.0 * little, 100.0 * much);
     assert!(little < 1.1 * much, "{little} and {much}");
     for point in 0..points.len() {
@@ -226,9 +226,9 @@ fn a_patch_of_sun_keeps_its_rays_beside_an_aimed_sky() {
     // Too few lie in the sun to make a region of their own.
     let along = |k: u32| -1.9 + 3.8 * (f64::from(k) + 0.5) / 9.0;
     let points: Vec<_> = (0..9 * 9).map(|k| (dvec3(along(k % 9), 0.0, along(k / 9)), DVec3::Y)).collect();
-    let settings = SceneSettings { rounds: 32, shadow_rays: 4, part: Part::Direct, ..SceneSettings::default() };
+    let settings = SceneSettings { rounds: 32, shadow_rays: 4, part: Part::Direct, ..by_rounds() };
     let lit = render(&gpu, &scene, &settings, Target::Points(&points)).unwrap();
-    let error = lit.film.relative_error(&lit.plan);
+    let error = lit.film.relative_error();
     println!("{:.2} %", 100.0 * error);
     // 10.7 % where all points count alike in the choice of lights.
     assert!(error < 0.08, "{error}");
@@ -244,7 +244,7 @@ fn black_skies_and_single_texels_leave_no_odd_number() {
         let mut scene = floor_under(picture);
         scene.materials.push(glass(1.5));
         scene.meshes.push(ball.clone());
-        let lit = received(&gpu, &scene, &SceneSettings { rounds: 2, photons: 2000, ..SceneSettings::default() }, &[(DVec3::X, DVec3::Y)]);
-        assert!(lit.film.mean(0, &lit.plan).is_finite(), "{width} x {height}");
+        let lit = received(&gpu, &scene, &SceneSettings { rounds: 2, photons: 2000, ..by_rounds() }, &[(DVec3::X, DVec3::Y)]);
+        assert!(lit.film.mean(0).is_finite(), "{width} x {height}");
     }
 }

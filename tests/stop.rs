@@ -7,8 +7,9 @@ use crate::common::prelude::*;
 use photonmill::engine::error_bound::error_bound;
 use photonmill::engine::room::film::{estimate_walls, irradiance_weights};
 use photonmill::engine::room::{self, RunResult};
-use photonmill::engine::scene::{self, Target, View, trial};
+use photonmill::engine::scene::{self, SceneFilm, Target, View, trial};
 use photonmill::engine::{End, Progress};
+use photonmill::plan::film::FilmPlan;
 use photonmill::plan::scene::ScenePlan;
 use photonmill::settings::stop::Stop;
 use statrs::distribution::{Binomial, DiscreteCDF};
@@ -35,7 +36,7 @@ const SCENES: [&str; 10] = [
 /// A fixed radius: the error in question is noise.
 fn settings(error: f64, seed: u64) -> SceneSettings {
     let stop = Stop { error: Some(error), confidence: CONFIDENCE, ..Stop::default() };
-    let few = SceneSettings { photons: 300, caustic_photons: 300, shadow_rays: 1, alpha: 1.0, ..SceneSettings::default() };
+    let few = SceneSettings { photons: 300, caustic_photons: 300, shadow_rays: 1, alpha: 1.0, ..by_rounds() };
     SceneSettings { rounds: 20_000, seed, stop, ..few }
 }
 
@@ -43,27 +44,36 @@ fn root_mean_square(values: impl Iterator<Item = DVec3>) -> f64 {
     values.map(DVec3::length_squared).sum::<f64>().sqrt()
 }
 
+/// What a run found, what it claims, and the relative error that an error of 1 in one value makes.
+type Claim = (Vec<DVec3>, f64, f64);
+
 /// True relative errors of runs, against the mean of all others; whose own error is taken off.
-fn true_errors(runs: &[(Vec<DVec3>, f64)]) -> Vec<f64> {
+fn true_errors(runs: &[Claim]) -> Vec<f64> {
     let others = runs.len() as f64 - 1.0;
-    let sums: Vec<DVec3> = (0..runs[0].0.len()).map(|pixel| runs.iter().map(|(means, _)| means[pixel]).sum()).collect();
-    let off = |(means, _): &(Vec<DVec3>, f64)| {
+    let sums: Vec<DVec3> = (0..runs[0].0.len()).map(|pixel| runs.iter().map(|(means, ..)| means[pixel]).sum()).collect();
+    let unit = runs.iter().map(|(.., unit)| unit).sum::<f64>() / runs.len() as f64;
+    let off = |(means, ..): &Claim| {
         let truth = |pixel: usize| (sums[pixel] - means[pixel]) / others;
         let off = root_mean_square((0..means.len()).map(|pixel| means[pixel] - truth(pixel)));
-        off / (1.0 + 1.0 / others).sqrt() / root_mean_square((0..means.len()).map(truth))
+        off / (1.0 + 1.0 / others).sqrt() * unit
     };
     runs.iter().map(off).collect()
 }
 
+/// A picture's claim: of what surfaces scatter.
+fn claim(lit: &scene::RunResult) -> Claim {
+    (lit.film.surface_means().collect(), lit.film.error(CONFIDENCE).bound(CONFIDENCE), lit.film.measure().relative_to_mean(1.0))
+}
+
 /// How often the true error is within `claim` times what a run claims.
-fn coverage(runs: &[(Vec<DVec3>, f64)], claim: f64) -> f64 {
-    let within = pairs(runs, &true_errors(runs)).filter(|((_, bound), off)| **off <= claim * bound).count();
+fn coverage(runs: &[Claim], claim: f64) -> f64 {
+    let within = pairs(runs, &true_errors(runs)).filter(|((_, bound, _), off)| **off <= claim * bound).count();
     within as f64 / runs.len() as f64
 }
 
 /// Claims over true errors, on the mean.
-fn width(runs: &[(Vec<DVec3>, f64)]) -> f64 {
-    runs.iter().map(|(_, bound)| bound).sum::<f64>() / true_errors(runs).iter().sum::<f64>()
+fn width(runs: &[Claim]) -> f64 {
+    runs.iter().map(|(_, bound, _)| bound).sum::<f64>() / true_errors(runs).iter().sum::<f64>()
 }
 
 fn coverage_check(name: &str, coverage: f64) -> Check {
@@ -71,7 +81,7 @@ fn coverage_check(name: &str, coverage: f64) -> Check {
 }
 
 /// Of a few runs: no fewer are within `claim` times their claims than one set of runs in a thousand has.
-fn scene_check(name: &str, runs: &[(Vec<DVec3>, f64)], claim: f64) -> Check {
+fn scene_check(name: &str, runs: &[Claim], claim: f64) -> Check {
     let within = coverage(runs, claim);
     let chance = Binomial::new(CONFIDENCE, runs.len() as u64).unwrap().cdf((within * runs.len() as f64).round() as u64);
     require(chance > 1e-3, || format!("{name}: {:.0} % of the errors are within the claim", 100.0 * within))
@@ -79,7 +89,7 @@ fn scene_check(name: &str, runs: &[(Vec<DVec3>, f64)], claim: f64) -> Check {
 
 /// What ends a run: the bound of its noise, and what is too rare to have been seen.
 fn watched_error(lit: &scene::RunResult) -> f64 {
-    let error = lit.film.error(&lit.plan, CONFIDENCE);
+    let error = lit.film.error(CONFIDENCE);
     error.bound(CONFIDENCE).hypot(error.unseen)
 }
 
@@ -88,7 +98,8 @@ fn as_far_as_shown(gpu: &Gpu, scene: &Scene, settings: &SceneSettings) -> scene:
     let geometry = Geometry::new(scene).unwrap();
     let view = View { geometry: &geometry, camera: Some(&scene.first_camera()), phases: &[] };
     let plan = trial::plan(gpu, scene, &view, settings, square_picture(SIZE)).unwrap();
-    scene::light(gpu, &view, ScenePlan { rare_radiance: 0.0, ..plan }, &mut Control::default()).unwrap()
+    let film = FilmPlan { rare_radiance: 0.0, ..plan.film.clone() };
+    scene::light(gpu, &view, ScenePlan { film, ..plan }, &mut Control::default()).unwrap()
 }
 
 /// The claims of so many runs a scene. Their truth is the mean of the others.
@@ -107,13 +118,13 @@ fn claims_hold(seeds: u64) {
             if is_rare { as_far_as_shown(&gpu, &scene, settings) } else { seen(&gpu, &scene, settings, &camera, [SIZE; 2]) }
         };
         let wanted = watched_error(&run(&SceneSettings { rounds: 60, stop: Stop::default(), ..settings(1.0, 0) })).min(1.0);
-        let runs: Vec<(Vec<DVec3>, f64)> = (1..=seeds)
+        let runs: Vec<Claim> = (1..=seeds)
             .map(|seed| {
                 let lit = run(&settings(wanted, seed));
-                let bound = lit.film.error(&lit.plan, CONFIDENCE).bound(CONFIDENCE);
+                let bound = lit.film.error(CONFIDENCE).bound(CONFIDENCE);
                 assert_eq!(lit.end, End::Error, "{name}, {bound}");
-                assert!(bound <= wanted && lit.film.rounds >= 30, "{name}: {bound} of {wanted} after {} rounds", lit.film.rounds);
-                (means(&lit), bound)
+                assert!(bound <= wanted && lit.film.blocks >= 16, "{name}: {bound} of {wanted} after {} blocks", lit.film.blocks);
+                claim(&lit)
             })
             .collect();
         println!(
@@ -153,10 +164,10 @@ fn mirror_ball() -> Scene {
 }
 
 /// Whether the tail of a run's noise is known, and whether its error is within its claim.
-fn judged(lit: &scene::RunResult, plan: &ScenePlan, truth: &[DVec3]) -> (bool, bool) {
-    let (error, found) = (lit.film.error(plan, CONFIDENCE), means(lit));
+fn judged(film: &SceneFilm, truth: &[DVec3]) -> (bool, bool) {
+    let (error, found): (_, Vec<DVec3>) = (film.error(CONFIDENCE), film.surface_means().collect());
     let off = root_mean_square(pairs(&found, truth).map(|(mean, truth)| *mean - *truth));
-    let is_within = off <= error.bound(CONFIDENCE) * root_mean_square(found.iter().copied());
+    let is_within = film.measure().relative_to_mean(off) <= error.bound(CONFIDENCE);
     (error.tail_is_known(CONFIDENCE), is_within)
 }
 
@@ -168,8 +179,8 @@ fn claims_hold_once_the_tail_is_known() {
         let settings = SceneSettings { rounds, stop: Stop { confidence: CONFIDENCE, ..Stop::default() }, ..settings(1.0, seed) };
         scene::render(&gpu, &mirror_ball(), &settings, Target::Picture(&mirror_ball().first_camera(), [2 * SIZE; 2])).unwrap()
     };
-    let truth = means(&lit(800, 1000));
-    for (rounds, least_known) in [(16, 1), (64, 15)] {
+    let truth: Vec<DVec3> = lit(800, 1000).film.surface_means().collect();
+    for (rounds, least_known) in [(16, 1), (256, 15)] {
         let runs: Vec<scene::RunResult> = (1..=20).map(|seed| lit(rounds, seed)).collect();
         let check = |runs: &mut dyn Iterator<Item = (bool, bool)>| {
             let known: Vec<bool> = runs.filter(|(is_known, _)| *is_known).map(|(_, is_within)| is_within).collect();
@@ -178,9 +189,12 @@ fn claims_hold_once_the_tail_is_known() {
             assert!(known.len() >= least_known, "{rounds} rounds: {}", known.len());
             coverage_check(&format!("{rounds} rounds"), within as f64 / known.len() as f64)
         };
-        assert_holds("the mirror ball", check(&mut runs.iter().map(|lit| judged(lit, &lit.plan, &truth))));
+        assert_holds("the mirror ball", check(&mut runs.iter().map(|lit| judged(&lit.film, &truth))));
         if rounds == 16 {
-            let careless = |lit: &scene::RunResult| judged(lit, &ScenePlan { rare_radiance: 0.0, ..lit.plan.clone() }, &truth);
+            let careless = |lit: &scene::RunResult| {
+                let plan = FilmPlan { rare_radiance: 0.0, ..lit.film.plan.clone() };
+                judged(&SceneFilm { plan, ..lit.film.clone() }, &truth)
+            };
             assert_complains("runs that trust what they have seen", check(&mut runs.iter().map(careless)));
         }
     }
@@ -193,10 +207,10 @@ fn a_run_goes_on_while_what_is_unseen_may_be_more_than_is_wanted() {
     let wanted = 1.0;
     for seed in 1..=4 {
         let lit = seen(&gpu, &mirror_ball(), &settings(wanted, seed), &mirror_ball().first_camera(), [SIZE; 2]);
-        let error = lit.film.error(&lit.plan, CONFIDENCE);
+        let error = lit.film.error(CONFIDENCE);
         println!("{} rounds: at most {:.3}, unseen {:.3}", lit.film.rounds, error.bound(CONFIDENCE), error.unseen);
         assert_eq!(lit.end, End::Error);
-        assert!(lit.film.rounds > 30 && error.unseen > 0.0 && watched_error(&lit) <= wanted);
+        assert!(lit.film.blocks > 16 && error.unseen > 0.0 && watched_error(&lit) <= wanted);
     }
 }
 
@@ -210,7 +224,7 @@ fn in_box(gpu: Option<&Gpu>, error: Option<f64>, rounds: u32, seed: u64) -> (Run
 fn run_box(gpu: Option<&Gpu>, settings: &RoomSettings) -> (RunResult, Vec<Progress>) {
     let (never, mut told) = (AtomicBool::new(false), Vec::new());
     let mut tell = |progress: &Progress| told.push(progress.clone());
-    let mut control = Control { cancelled: &never, progress: &mut tell };
+    let mut control = Control { cancelled: &never, progress: &mut tell, ..Control::default() };
     let outcome = match gpu {
         Some(gpu) => room::on_gpu(gpu, &open_box(settings), settings, &mut control).unwrap(),
         None => room::on_cpu(&open_box(settings), settings, &mut control).unwrap(),
@@ -226,7 +240,7 @@ fn irradiances(outcome: &RunResult) -> Vec<DVec3> {
 /// The relative error that a film of the box has not more of.
 fn bound_in_box(outcome: &RunResult) -> f64 {
     let weights = irradiance_weights(&open_box(&outcome.plan.settings), &outcome.plan);
-    let error = outcome.film.error(&weights, 1.0, CONFIDENCE);
+    let error = outcome.film.error(&weights, 1.0, &outcome.plan.settings.stop);
     error_bound(error.noise, error.freedom, CONFIDENCE)
 }
 
@@ -236,13 +250,15 @@ fn errors_of_the_box_lie_within_the_claim_as_often_as_claimed() {
     let gpu = device();
     for gpu in [None, gpu.as_deref()] {
         let wanted = bound_in_box(&in_box(gpu, None, 60, 1000).0);
-        let runs: Vec<(Vec<DVec3>, f64)> = (1..=20)
+        let runs: Vec<Claim> = (1..=20)
             .map(|seed| {
                 let outcome = in_box(gpu, Some(wanted), 20_000, seed).0;
                 let bound = bound_in_box(&outcome);
                 assert_eq!(outcome.end, End::Error, "{bound}");
-                assert!(bound <= wanted && outcome.film.rounds >= 30, "{bound} of {wanted} after {} rounds", outcome.film.rounds);
-                (irradiances(&outcome), bound)
+                assert!(bound <= wanted && outcome.film.rounds >= 16, "{bound} of {wanted} after {} rounds", outcome.film.rounds);
+                let found = irradiances(&outcome);
+                let unit = (found.len() as f64).sqrt() / found.iter().map(|irradiance| irradiance.x).sum::<f64>();
+                (found, bound, unit)
             })
             .collect();
         let (all, half) = (coverage(&runs, 1.0), coverage(&runs, 0.5));
@@ -261,22 +277,26 @@ fn a_run_of_the_box_ends_at_what_is_reached_first() {
         let small = RoomSettings { photons: 1001, mesh: 8, rng: Rng::Philox, chunk: Some(100), ..RoomSettings::default() };
         let settings = |stop| RoomSettings { rounds: 1000, stop, ..small.clone() };
         let (outcome, told) = run_box(gpu, &settings(Stop { photons: Some(5100), error: Some(1e-6), ..Stop::default() }));
-        assert_eq!((outcome.end, outcome.film.rounds, outcome.is_cancelled()), (End::Photons, 5, false));
-        let emitted = outcome.fates[0].emitted;
-        assert!((5100..6006).contains(&emitted) && outcome.film.emitted == emitted, "{emitted}");
+        // A run of so many photons goes on to the end of its round.
+        assert_eq!((outcome.end, outcome.film.rounds, outcome.is_cancelled()), (End::Photons, 6, false));
+        assert_eq!((outcome.fates[0].emitted, outcome.film.emitted, outcome.left_out), (6006, 6006, 0));
         let ledger = told.last().unwrap().ledger;
         assert!(ledger.closes() && ledger == outcome.ledger(), "{ledger:?}");
-        // Five whole rounds have the errors that they have alone, and the rest is light.
-        let whole = run_box(gpu, &RoomSettings { rounds: 5, ..settings(Stop::default()) }).0;
-        assert_eq!((whole.end, &whole.film.squares), (End::Rounds, &outcome.film.squares));
-        let rest: u64 = outcome.film.unfinished.iter().sum();
-        assert_eq!(outcome.film.sums.iter().sum::<u64>(), whole.film.sums.iter().sum::<u64>() + rest);
-        assert!(rest > 0);
 
-        let (outcome, _) = run_box(gpu, &settings(Stop { seconds: Some(0.001), ..Stop::default() }));
-        assert_eq!(outcome.end, End::Time);
+        // What time has cut short is all there is, where it was the first round, and otherwise nothing.
+        let long = RoomSettings { photons: 1_000_000, rounds: 2, ..settings(Stop { seconds: Some(0.001), ..Stop::default() }) };
+        let (outcome, _) = run_box(gpu, &long);
+        assert_eq!((outcome.end, outcome.film.rounds, outcome.left_out), (End::Time, 0, 0));
+        let emitted = outcome.film.emitted;
+        assert!((1..1_000_000).contains(&emitted) && outcome.fates[0].emitted == emitted, "{emitted}");
+        assert!(outcome.film.sums.iter().sum::<u64>() > 0 && outcome.film.flux_error(0).is_infinite());
+        let (outcome, _) = run_box(gpu, &settings(Stop { seconds: Some(0.3), ..Stop::default() }));
+        let rounds = outcome.film.rounds;
+        assert_eq!((outcome.end, outcome.film.emitted), (End::Time, u64::from(rounds) * 1001));
+        let whole = run_box(gpu, &RoomSettings { rounds, ..settings(Stop::default()) }).0;
+        assert!(rounds > 1 && whole.film == outcome.film && whole.fates == outcome.fates, "{rounds}");
         let (outcome, _) = run_box(gpu, &settings(Stop { error: Some(0.9), seconds: Some(1000.0), ..Stop::default() }));
-        assert_eq!((outcome.end, outcome.film.rounds), (End::Error, 30));
+        assert_eq!((outcome.end, outcome.film.rounds), (End::Error, 16));
     }
 }
 
@@ -312,7 +332,7 @@ fn watched(gpu: &Gpu, name: &str, settings: &SceneSettings) -> (scene::RunResult
     let geometry = Geometry::new(&scene).unwrap();
     let (never, mut told) = (AtomicBool::new(false), Vec::new());
     let mut tell = |progress: &Progress| told.push(progress.clone());
-    let mut control = Control { cancelled: &never, progress: &mut tell };
+    let mut control = Control { cancelled: &never, progress: &mut tell, ..Control::default() };
     let view = View { geometry: &geometry, camera: Some(&scene.first_camera()), phases: &[] };
     let plan = trial::plan(gpu, &scene, &view, settings, square_picture(16)).unwrap();
     (scene::light(gpu, &view, plan, &mut control).unwrap(), told)
@@ -335,7 +355,7 @@ fn a_run_ends_at_its_time_or_its_error_whichever_comes_first() {
     assert!(before.iter().all(|progress| progress.seconds < 0.5), "{told:?}");
     assert_eq!(u64::from(lit.film.rounds), told.last().unwrap().done);
     let (lit, _) = watched(&gpu, "cornell", &stop(Some(0.9), Some(1000.0)));
-    assert_eq!((lit.end, lit.film.rounds), (End::Error, 30));
+    assert_eq!((lit.end, lit.film.rounds), (End::Error, 16));
     let (lit, _) = watched(&gpu, "cornell", &SceneSettings { rounds: 7, ..stop(Some(1e-6), Some(1000.0)) });
     assert_eq!((lit.end, lit.film.rounds), (End::Rounds, 7));
 }

@@ -280,8 +280,8 @@ fn fast_and_strict_differ_by_far_less_than_the_noise() {
     let settings = SceneSettings { rounds: 4, ..small() };
     let lit = [Math::Fast, Math::Strict].map(|math| picture(&gpu, &scene, &SceneSettings { math, ..settings.clone() }));
     let rms = |f: &dyn Fn(usize) -> f64| (0..lit[0].film.pixels()).map(|pixel| f(pixel).powi(2)).sum::<f64>().sqrt();
-    let difference = rms(&|pixel| (lit[0].film.mean(pixel, &lit[0].plan) - lit[1].film.mean(pixel, &lit[1].plan)).length());
-    let noise = rms(&|pixel| lit[1].film.standard_error(pixel, &lit[1].plan).length());
+    let difference = rms(&|pixel| (lit[0].film.mean(pixel) - lit[1].film.mean(pixel)).length());
+    let noise = rms(&|pixel| lit[1].film.standard_error(pixel).length());
     println!("difference over noise: {:.2e}", difference / noise);
     assert!(difference < 1e-3 * noise, "{difference} against {noise}");
 }

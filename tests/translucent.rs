@@ -33,14 +33,8 @@ pub fn sheet_over_a_floor(gpu: &Gpu) -> Check<Complaint> {
     let way = DVec3::new(0.5, -0.8, 0.2).normalize();
     let meshes = vec![level(height, [side; 2], true, 0), level(0.0, [0.4; 2], true, 1)];
     let scene = scene_of(meshes, vec![paper(0.7, colour, 0.0, None), matt(0.0)], vec![sun(way)]);
-    let settings = SceneSettings {
-        part: Part::Caustic,
-        caustic_photons: 100_000,
-        caustic_radius: Some(0.05),
-        alpha: 1.0,
-        rounds: 16,
-        ..SceneSettings::default()
-    };
+    let settings =
+        SceneSettings { part: Part::Caustic, caustic_photons: 100_000, caustic_radius: Some(0.05), alpha: 1.0, rounds: 16, ..by_rounds() };
     let lit = received(gpu, &scene, &settings, &[(DVec3::ZERO, DVec3::Y)]);
     let (found, error) = (means(&lit)[0], standard_errors(&lit)[0]);
     for channel in 0..3 {
@@ -67,7 +61,7 @@ fn white_paper_is_not_seen_in_a_furnace() {
         let meshes = vec![Mesh::sphere("ball", DVec3::ZERO, 0.5, 32, 0), level(-0.6, [2.0; 2], true, 0)];
         let scene = scene_of(meshes, vec![white(medium)], vec![LightKind::Environment { radiance: Vec3::ONE }]);
         let camera = Camera::looking_at("eye", DVec3::new(0.0, 1.5, 4.0), DVec3::Y * -0.1, DVec3::Y, 0.2);
-        let settings = SceneSettings { photons: 100_000, caustic_photons: 100_000, samples: 4, rounds: 16, ..SceneSettings::default() };
+        let settings = SceneSettings { photons: 100_000, caustic_photons: 100_000, samples: 4, rounds: 16, ..by_rounds() };
         let lit = seen(&gpu, &scene, &settings, &camera, [12, 12]);
         let (mean, error) = mean_and_error(&means(&lit).iter().map(|mean| mean.x).collect::<Vec<_>>());
         println!("white paper, {medium:?}: {mean} +- {error}");
@@ -95,7 +89,7 @@ fn translucent_things_agree_with_the_judge() {
     ];
     let mut scene = scene_of(meshes, materials, vec![LightKind::Environment { radiance: Vec3::splat(0.3) }]);
     scene.cameras.push(Camera::looking_at("camera", DVec3::new(0.1, 0.5, 1.7), DVec3::new(0.0, 0.4, 0.0), DVec3::Y, 0.8));
-    let settings = SceneSettings { photons: 20_000, caustic_photons: 20_000, samples: 4, rounds: 32, ..SceneSettings::default() };
+    let settings = SceneSettings { photons: 20_000, caustic_photons: 20_000, samples: 4, rounds: 32, ..by_rounds() };
     let camera = scene.first_camera();
     let lit = scene::render(&gpu, &scene, &settings, Target::Picture(&camera, [SIZE; 2])).unwrap();
     let judged = Judge::new(&scene, 64).image(&camera, SIZE, SIZE, 512, 77);

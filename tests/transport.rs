@@ -16,7 +16,7 @@ use photonmill::verify::judge::Verdict;
 const SIZE: u32 = 24;
 
 fn small() -> SceneSettings {
-    SceneSettings { photons: 3000, caustic_photons: 3000, rounds: 3, shadow_rays: 2, ..SceneSettings::default() }
+    SceneSettings { photons: 3000, caustic_photons: 3000, rounds: 3, shadow_rays: 2, ..by_rounds() }
 }
 
 pub fn picture(gpu: &Gpu, scene: &Scene, settings: &SceneSettings) -> RunResult {
@@ -116,7 +116,7 @@ fn every_pixel_of_walls_that_shine_is_the_same() {
         material.emission = Vec3::ONE;
     }
     for (width, height) in [(1, 1), (13, 7), (64, 64), (67, 9), (5, 67), (131, 70)] {
-        let sums = seen(&gpu, &room, &small(), &room.first_camera(), [width, height]).film.of_rounds.sums;
+        let sums = seen(&gpu, &room, &small(), &room.first_camera(), [width, height]).film.of_blocks.sums;
         assert_eq!(sums.len() as u32, 3 * width * height);
         assert!(sums[0] > 0 && sums.iter().all(|sum| *sum == sums[0]), "{width} x {height}");
     }
@@ -333,8 +333,8 @@ fn effects_are_missed(gpu: &Gpu, scene: &Scene, effects: &[Effect]) {
         // Somewhere, or over the whole picture, the two differ by more than their errors.
         let (mut worst, mut sum, mut variance) = (0.0f64, 0.0, 0.0);
         for pixel in 0..reference.film.pixels() {
-            let difference = reference.film.mean(pixel, &reference.plan) - without.film.mean(pixel, &without.plan);
-            let error = reference.film.standard_error(pixel, &reference.plan) + without.film.standard_error(pixel, &without.plan);
+            let difference = reference.film.mean(pixel) - without.film.mean(pixel);
+            let error = reference.film.standard_error(pixel) + without.film.standard_error(pixel);
             worst = worst.max((difference.abs() / error.max(DVec3::splat(1e-9))).max_element());
             sum += difference.element_sum();
             variance += error.length_squared();
@@ -407,7 +407,7 @@ fn samples_of_a_pixel_leave_little_noise() {
     let error = |samples, shadow_rays, rounds| {
         let settings = SceneSettings { part: Part::Direct, samples, shadow_rays, rounds, ..small() };
         let lit = picture(&gpu, &scene("cornell"), &settings);
-        lit.film.relative_error(&lit.plan)
+        lit.film.relative_error()
     };
     let (by_chance, even) = (error(1, 1, 64), error(16, 1, 4));
     println!("64 paths a pixel: {:.2} % of error by rounds, {:.2} % by samples", 100.0 * by_chance, 100.0 * even);
@@ -424,7 +424,7 @@ fn a_furnace_is_equally_bright_everywhere() {
         (DVec3::new(0.0, 0.37, 0.998), DVec3::X),
         (DVec3::new(0.31, 0.44, 0.52), DVec3::new(0.6, 0.0, 0.8)),
     ];
-    let settings = SceneSettings { rounds: 40, photons: 20_000, bounces: 200, ..SceneSettings::default() };
+    let settings = SceneSettings { rounds: 40, photons: 20_000, bounces: 200, ..by_rounds() };
     for kernel in [Kernel::Box, Kernel::Cone, Kernel::Epanechnikov] {
         for illumination in [Illumination::Split, Illumination::Photons] {
             let settings = SceneSettings { kernel, illumination, ..settings.clone() };
@@ -451,11 +451,11 @@ fn radiance_and_irradiance_of_a_wall_agree() {
     // One pixel that looks at a small patch of the back wall.
     let target = DVec3::new(0.8, 0.75, 0.0);
     scene.cameras = vec![Camera::looking_at("patch", DVec3::new(0.6, 0.5, 2.0), target, DVec3::Y, 0.002)];
-    let settings = SceneSettings { rounds: 60, photons: 4000, shadow_rays: 8, ..SceneSettings::default() };
+    let settings = SceneSettings { rounds: 60, photons: 4000, shadow_rays: 8, ..by_rounds() };
     for final_gather in [false, true] {
         let settings = SceneSettings { final_gather, ..settings.clone() };
         let lit = seen(&gpu, &scene, &settings, &scene.cameras[0], [1, 1]);
-        let (radiance, radiance_error) = (lit.film.mean(0, &lit.plan), lit.film.standard_error(0, &lit.plan));
+        let (radiance, radiance_error) = (lit.film.mean(0), lit.film.standard_error(0));
         let other = SceneSettings { seed: 9, ..settings };
         let (irradiance, irradiance_error) = irradiance(&gpu, &scene, &other, &[(target, DVec3::Z)])[0];
         for channel in 0..3 {
@@ -482,7 +482,7 @@ fn no_light_leaks_through_thin_walls() {
     scene.meshes.push(Mesh::parallelogram("thin, lit side", DVec3::X * 0.5, z, y, 0));
     scene.meshes.push(Mesh::parallelogram("thin, dark side", DVec3::X * 0.502, y, z, 0));
     scene.meshes.push(Mesh::parallelogram("lamp", DVec3::new(0.1, 0.9, 0.3), DVec3::X * 0.2, z * 0.2, 1));
-    let settings = SceneSettings { radius: Some(0.1), photons: 20_000, rounds: 6, ..SceneSettings::default() };
+    let settings = SceneSettings { radius: Some(0.1), photons: 20_000, rounds: 6, ..by_rounds() };
     let lit_side = (DVec3::new(0.5, 0.5, 0.5), DVec3::NEG_X);
     let dark = [
         (DVec3::new(0.502, 0.5, 0.5), DVec3::X),
@@ -541,10 +541,10 @@ fn stated_errors_are_the_spread_over_seeds() {
     let pixels = runs[0].film.pixels();
     let (mut stated, mut spread) = (0.0, 0.0);
     for pixel in 0..pixels {
-        let means: Vec<DVec3> = runs.iter().map(|lit| lit.film.mean(pixel, &lit.plan)).collect();
+        let means: Vec<DVec3> = runs.iter().map(|lit| lit.film.mean(pixel)).collect();
         let mean = means.iter().sum::<DVec3>() / means.len() as f64;
         spread += means.iter().map(|value| (*value - mean).length_squared()).sum::<f64>() / (means.len() - 1) as f64;
-        stated += runs.iter().map(|lit| lit.film.standard_error(pixel, &lit.plan).length_squared()).sum::<f64>() / runs.len() as f64;
+        stated += runs.iter().map(|lit| lit.film.standard_error(pixel).length_squared()).sum::<f64>() / runs.len() as f64;
     }
     let ratio = (stated / spread).sqrt();
     assert!((0.9..1.1).contains(&ratio), "stated errors are {ratio} of the spread");
@@ -562,7 +562,7 @@ fn pictures_agree_with_the_judge() {
         ("caustic-sphere", 20_000, 64, 768),
     ] {
         let scene = scene(name);
-        let settings = SceneSettings { photons, caustic_photons: photons, rounds, ..SceneSettings::default() };
+        let settings = SceneSettings { photons, caustic_photons: photons, rounds, ..by_rounds() };
         let lit = picture(&gpu, &scene, &settings);
         let judged = Judge::new(&scene, settings.bounces).image(&scene.first_camera(), SIZE, SIZE, samples, 77);
         let (means, errors) = (means(&lit), standard_errors(&lit));

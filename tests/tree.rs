@@ -4,7 +4,7 @@
 use crate::common::prelude::*;
 use photonmill::cpu;
 use photonmill::cpu::tree::Tree;
-use photonmill::engine::film::RoundSums;
+use photonmill::engine::film::BlockSums;
 use photonmill::engine::room::film::{RoomFilm, estimate_walls};
 
 fn by_tree(settings: &RoomSettings) -> RoomSettings {
@@ -296,8 +296,8 @@ fn the_estimate_has_no_bias() {
                 };
                 let map: Vec<Photon> =
                     (0..4000).map(place).filter(|photon| photon.position.truncate().abs().max_element() <= 0.25).collect();
-                let of_rounds = RoundSums { sums: gathered_on_cpu(&plan, &map), ..RoundSums::default() };
-                let film = RoomFilm { of_rounds, emitted: u64::from(settings.photons), ..RoomFilm::new(&plan) };
+                let of_blocks = BlockSums { sums: gathered_on_cpu(&plan, &map), ..BlockSums::default() };
+                let film = RoomFilm { of_blocks, emitted: u64::from(settings.photons), ..RoomFilm::new(&plan) };
                 let back = estimate_walls(&film, &scene, &plan).pop().unwrap();
                 // 4000 photons a square metre at 2 W in all.
                 back.radiosity.iter().sum::<f64>() / 9.0 / 2.0

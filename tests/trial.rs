@@ -49,10 +49,10 @@ fn a_room_on_a_plain_is_lit_as_it_is_without_the_plain() {
     let phases = [receivers(&geometry, &points)];
     let view = View { geometry: &geometry, camera: None, phases: &phases };
     let sensor = Sensor::Receivers { count: points.len() as u32 };
-    let settings = SceneSettings { photons: 1 << 14, rounds: 12, part: Part::Indirect, ..SceneSettings::default() };
+    let settings = SceneSettings { photons: 1 << 14, rounds: 12, part: Part::Indirect, ..by_rounds() };
     let mean = |plan: ScenePlan| {
         let lit = light(&gpu, &view, plan);
-        (0..points.len()).map(|point| lit.film.mean(point, &lit.plan).x).sum::<f64>() / points.len() as f64
+        (0..points.len()).map(|point| lit.film.mean(point).x).sum::<f64>() / points.len() as f64
     };
     let judged = Judge::new(&scene, 32).irradiance_at(&points, 3000, 1);
     let expected = judged.iter().map(|point| point.mean.indirect.x).sum::<f64>() / points.len() as f64;
@@ -82,7 +82,7 @@ fn tried(gpu: &Gpu, scene: &Scene, geometry: &Geometry, settings: &SceneSettings
 #[test]
 fn built_in_scenes_keep_about_the_radius_of_their_area() {
     let Some(gpu) = device() else { return };
-    let settings = SceneSettings::default();
+    let settings = by_rounds();
     let mut off = Vec::new();
     for name in ["open-box", "cornell", "cornell-spheres", "caustic-sphere", "furnace"] {
         let scene = scene(name);
@@ -111,7 +111,7 @@ fn a_trial_knows_no_seed_builder_or_split() {
         let plan = tried(&gpu, &scene, &geometry, settings);
         plan.maps().map(|map| (map.radius.to_bits(), map.radius_from)).collect::<Vec<_>>()
     };
-    let settings = SceneSettings::default();
+    let settings = by_rounds();
     let expected = radii(&settings);
     for builder in [Builder::Atomic, Builder::Ballot] {
         assert_eq!(
@@ -147,7 +147,7 @@ fn a_radius_wider_than_what_it_lies_in_is_warned_of() {
     let warning = |points: Vec<(DVec3, DVec3)>| {
         let phases = [receivers(&geometry, &points)];
         let view = View { geometry: &geometry, camera: None, phases: &phases };
-        let settings = SceneSettings { photons: 1 << 10, ..SceneSettings::default() };
+        let settings = SceneSettings { photons: 1 << 10, ..by_rounds() };
         let plan = trial::plan(&gpu, &scene, &view, &settings, Sensor::Receivers { count: points.len() as u32 }).unwrap();
         scene_report::radius_warning(&plan, &geometry, "point")
     };
@@ -167,7 +167,7 @@ fn a_room_too_small_for_its_scene_has_an_unknown_bias() {
         let points: Vec<_> = (0..8).map(|k| (dvec3(0.4 * f64::from(k) - 1.4, 0.0, 0.1), DVec3::Y)).collect();
         let phases = [receivers(&geometry, &points)];
         let view = View { geometry: &geometry, camera: None, phases: &phases };
-        let settings = SceneSettings { photons: 1 << 12, ..SceneSettings::default() };
+        let settings = SceneSettings { photons: 1 << 12, ..by_rounds() };
         let plan = trial::plan(&gpu, &scene, &view, &settings, Sensor::Receivers { count: points.len() as u32 }).unwrap();
         let bias = scene::bias::measure(&gpu, &scene, &view, &plan, (1.0, 2), &AtomicBool::new(false)).unwrap().unwrap();
         assert_eq!(bias.is_known(), is_known, "{width} m: {bias:?}");
@@ -189,7 +189,7 @@ fn radii_by_density_change_no_bit_by_builder_chunk_or_part() {
     let Some(gpu) = device() else { return };
     let scene = scene("cornell-spheres");
     let camera = scene.first_camera();
-    let settings = SceneSettings { photons: 4000, caustic_photons: 2000, rounds: 2, ..SceneSettings::default() };
+    let settings = SceneSettings { photons: 4000, caustic_photons: 2000, rounds: 2, ..by_rounds() };
     let lit = |settings: SceneSettings| scene::render(&gpu, &scene, &settings, Target::Picture(&camera, [24, 18])).unwrap();
     let whole = lit(settings.clone());
     assert!(whole.plan.has_classes() && whole.plan.maps().any(|map| whole.film.classes(map).is_some_and(|(first, last)| first < last)));
@@ -211,7 +211,7 @@ fn one_radius_may_be_given() {
     let Some(gpu) = device() else { return };
     let scene = scene("cornell-spheres");
     let camera = scene.first_camera();
-    let settings = SceneSettings { photons: 20_000, caustic_photons: 20_000, rounds: 4, ..SceneSettings::default() };
+    let settings = SceneSettings { photons: 20_000, caustic_photons: 20_000, rounds: 4, ..by_rounds() };
     let part_totals = |settings: SceneSettings| {
         let lit = scene::render(&gpu, &scene, &settings, Target::Picture(&camera, [32, 24])).unwrap();
         lit.film.part_totals.iter().map(|total| *total as f64).collect::<Vec<_>>()

@@ -13,7 +13,8 @@ layout(set = 1, binding = 3, scalar) buffer HighSquares { uvec2 high_squares[]; 
 #include "dispatch/dispatch.glsl"
 #include "film/wide.glsl"
 #include "rng/hash.glsl"
-#include "film/latest_rounds.glsl"
+#include "film/kept_places.glsl"
+#include "film/latest_blocks.glsl"
 
 void main()
 {
@@ -30,6 +31,6 @@ void main()
     uint point_count = push.sum_count / push.channel_count;
     uint kept = kept_number(sum / push.channel_count, point_count);
     if (sum % push.channel_count == 0 && kept != NONE) {
-        latest_rounds[first_of_round(push.round, point_count) + kept] = float_of(of_round);
+        latest_blocks[first_of_block(push.round, point_count) + kept] = float_of(of_round);
     }
 }

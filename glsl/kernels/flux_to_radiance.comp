@@ -24,6 +24,8 @@ layout(set = 1, binding = 2, scalar) buffer Estimates { uvec2 estimates[]; };
 #include "gather/radius_class.glsl"
 #include "film/wide.glsl"
 #include "world/scene/film_units.glsl"
+#include "film/kept_places.glsl"
+#include "film/kept_parts.glsl"
 #include "world/scene/tiles.glsl"
 #include "world/scene/no_point.glsl"
 #include "world/scene/one_hit.glsl"
@@ -139,10 +141,14 @@ void main()
         note_unless(is_finite(radiance), NONFINITE_ESTIMATE, 0, push.round, pixel);
         uint part = part_number(point.arrivals, arrival);
         uint chance = mix32(push.rounding + position_bits(point.position));
+        uint kept = kept_number(pixel, push.pixel_count);
         for (uint channel = 0; channel < 3; channel++) {
             uvec2 units = to_film_units(radiance[channel], push.film_scale, push.film_limit, chance);
             sums[channel] = add64(sums[channel], units);
             totals[part] = add64(totals[part], units);
+            if (kept != NONE) {
+                add_to_kept(kept, part, channel, units);
+            }
         }
         is_lit = true;
     }

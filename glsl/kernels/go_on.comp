@@ -26,6 +26,8 @@ void main()
     chain.starts_nowhere = (path.state & 4u) != 0;
     chain.sees_emission = (path.state & 8u) != 0;
     chain.ends_at_light = (path.state & 64u) != 0;
+    bool met_surface = (path.state & 128u) != 0;
+    chain.met_surface = met_surface;
     chain.media = path.media;
     chain.density = path.density;
     chain.from = path.from;
@@ -36,6 +38,7 @@ void main()
     }
     note_unless(is_finite(chain.light[0]) && is_finite(chain.light[1]) && is_finite(chain.light[2]), NONFINITE_LIGHT, push.draws.domain,
                 push.draws.round, index);
-    write_pass_sum(path.place, chain.light, push.film_scale, push.film_limit, mix32(push.rounding + depth), true);
+    note_surface(chain.met_surface && !met_surface);
+    write_pass_sum(path.place, index, push.pixel_count, chain.light, chain.seen, push.film_scale, push.film_limit, mix32(push.rounding + depth), true);
     write_missing_points(index, number, push.pixel_count);
 }

@@ -66,6 +66,6 @@ void main()
     }
     note_unless(is_finite(chain.light[0]) && is_finite(chain.light[1]) && is_finite(chain.light[2]), NONFINITE_LIGHT, push.draws.domain,
                 push.draws.round, index);
-    write_pass_sum(index, chain.light, push.film_scale, push.film_limit, push.rounding, false);
+    write_pass_sum(index, index, push.point_count, chain.light, chain.seen, push.film_scale, push.film_limit, push.rounding, false);
     write_missing_points(index, 0, push.point_count);
 }

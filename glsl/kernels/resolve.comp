@@ -1,5 +1,6 @@
-// Ends a round: what the paths of each pixel found and what their points were lit by is added up, and the film takes the
-// sum and its square. Of some pixels the sum itself is kept, for the latest rounds.
+// Ends a round: what the paths of each pixel found and what their points were lit by joins the sums of its block. At the end of a
+// block the film takes these sums and their squares, and they are empty for the next one. All of that twice for a
+// picture: of all light, and of what surfaces scatter, which errors refer to. Of some pixels the parts of a block's light are kept.
 // Dispatched by src/engine/scene/estimate.rs once a round. One thread = one pixel or receiver.
 #include "records.glsl"
 
@@ -8,12 +9,20 @@ layout(set = 1, binding = 0, scalar) readonly buffer PassSums { uvec2 pass_sums[
 layout(set = 1, binding = 1, scalar) readonly buffer Estimates { uvec2 estimates[]; };
 layout(set = 1, binding = 2, scalar) buffer FilmSums { uvec2 film_sums[]; };
 layout(set = 1, binding = 3, scalar) buffer FilmSquares { uvec4 film_squares[]; };
+// Of all pixels, then of kept places (film/kept_parts.glsl).
+layout(set = 1, binding = 5, scalar) buffer PartTotals { uint part_totals[]; };
+layout(set = 1, binding = 6, scalar) buffer SumsOfBlock { uvec2 sums_of_block[]; };
+layout(set = 1, binding = 7, scalar) buffer SurfaceSumsOfBlock { uvec2 surface_sums_of_block[]; };
+layout(set = 1, binding = 8, scalar) buffer SurfaceSums { uvec2 surface_sums[]; };
+layout(set = 1, binding = 9, scalar) buffer SurfaceSquares { uvec4 surface_squares[]; };
 
 #include "dispatch/dispatch.glsl"
 #include "world/scene/effects.glsl"
 #include "film/wide.glsl"
 #include "rng/hash.glsl"
-#include "film/latest_rounds.glsl"
+#include "film/kept_places.glsl"
+#include "film/latest_blocks.glsl"
+#include "film/kept_parts.glsl"
 
 void main()
 {
@@ -21,20 +30,43 @@ void main()
     if (pixel >= push.end_pixel) {
         return;
     }
-    uint kept = kept_number(pixel, push.pixel_count);
+    bool ends_block = push.ends_block != 0;
+    uint kept = ends_block ? kept_number(pixel, push.pixel_count) : NONE;
     for (uint channel = 0; channel < 3; channel++) {
+        uint place = 3 * pixel + channel;
         uvec2 sum = uvec2(0);
         for (uint number = 0; number < SAMPLES; number++) {
-            sum = add64(sum, pass_sums[3 * (SAMPLES * pixel + number) + channel]);
+            sum = add64(sum, pass_sums[place_of_sums(SAMPLES * pixel + number) + channel]);
         }
         for (uint k = 0; k < push.points_per_pixel; k++) {
             sum = add64(sum, estimates[3 * (k * push.pixel_count + pixel) + channel]);
         }
-        uint place = 3 * pixel + channel;
-        film_sums[place] = add64(film_sums[place], sum);
-        film_squares[place] = add128(film_squares[place], square64(sum));
+        uvec2 surface = sum;
+        if (HAS_SEEN_LIGHT) {
+            for (uint number = 0; number < SAMPLES; number++) {
+                sum = add64(sum, pass_sums[place_of_sums(SAMPLES * pixel + number) + 3 + channel]);
+            }
+            surface = add64(surface_sums_of_block[place], surface);
+            surface_sums_of_block[place] = ends_block ? uvec2(0) : surface;
+        }
+        sum = add64(sums_of_block[place], sum);
+        sums_of_block[place] = ends_block ? uvec2(0) : sum;
+        if (ends_block) {
+            film_sums[place] = add64(film_sums[place], sum);
+            film_squares[place] = add128(film_squares[place], square64(sum));
+            if (HAS_SEEN_LIGHT) {
+                surface_sums[place] = add64(surface_sums[place], surface);
+                surface_squares[place] = add128(surface_squares[place], square64(surface));
+            }
+        }
         if (kept != NONE) {
-            latest_rounds[3 * (first_of_round(push.round, push.pixel_count) + kept) + channel] = float_of(sum);
+            for (uint part = 0; part < PART_COUNT; part++) {
+                uint from = place_of_part(kept, part, channel);
+                uint to = (PART_COUNT * (first_of_block(push.block, push.pixel_count) + kept) + part) * 3 + channel;
+                latest_blocks[to] = float_of(uvec2(part_totals[from], part_totals[from + 1]));
+                part_totals[from] = 0;
+                part_totals[from + 1] = 0;
+            }
         }
     }
 }

@@ -31,7 +31,7 @@ void main()
         way = push.forward;
     }
     if (push.lens_radius > 0.0) {
-        vec2 at = stratified(number, SAMPLES, words_of(pixel, LENS_BLOCK, push.draws)).xy;
+        vec2 at = stratified_at(number, pixel, LENS_BLOCK, push.draws).xy;
         vec3 start = sample_disc(vec3(0.0), push.forward, push.lens_radius, at);
         origin += start;
         way = push.focus * way - start;
@@ -47,6 +47,7 @@ void main()
     }
     note_unless(is_finite(chain.light[0]) && is_finite(chain.light[1]) && is_finite(chain.light[2]), NONFINITE_LIGHT, push.draws.domain,
                 push.draws.round, pixel);
-    write_pass_sum(SAMPLES * pixel + number, chain.light, push.film_scale, push.film_limit, push.rounding, false);
+    note_surface(chain.met_surface);
+    write_pass_sum(SAMPLES * pixel + number, pixel, push.width * push.height, chain.light, chain.seen, push.film_scale, push.film_limit, push.rounding, false);
     write_missing_points(pixel, number, push.width * push.height);
 }

@@ -60,7 +60,8 @@ pub(super) fn run(args: &BakeArgs, cancelled: &AtomicBool) -> Result<End> {
     settings.validate()?;
     let folder = Folder::open("-o", &args.output)?;
     let reports = args.report.open()?;
-    let report_files = reports.destinations();
+    let mut keeper = args.transport.keep.open(&args.transport.stop)?;
+    let report_files = [reports.destinations(), keeper.destinations()].concat();
     check_distinct(&report_files)?;
     let name = args.scene.scene.as_str();
     let is_built_in = built_in::by_name(name).is_some();
@@ -101,7 +102,7 @@ pub(super) fn run(args: &BakeArgs, cancelled: &AtomicBool) -> Result<End> {
     let sensor = Sensor::Receivers { count: layout.texel_count() as u32 };
     let job = Job { scene: &scene, geometry: &geometry, settings: &settings, sensor, camera: None, phases: &phases, point: "texel" };
     let gpu = args.device.open(&reporter)?;
-    let lit = job.run(&gpu, &args.transport.stop, &reporter, cancelled)?;
+    let lit = job.run(&gpu, &args.transport.stop, &mut keeper, &reporter, cancelled)?;
 
     let estimates = estimates(&lit);
     let stops = args.exposure.unwrap_or_else(|| usual_exposure(&estimates));
@@ -123,6 +124,7 @@ pub(super) fn run(args: &BakeArgs, cancelled: &AtomicBool) -> Result<End> {
     let line = |file: &Written| format!("\nwrote {}: {}", args.output.join(&file.name).display(), file.purpose);
     let files: String = files.iter().map(line).collect();
     say_beside(&report_files, &format!("{text}\n{lightmaps} of {texels}{exposure}{files}"))?;
+    keeper.finish()?;
     Ok(End::of(&lit))
 }
 
@@ -169,9 +171,9 @@ fn receivers(layout: &Layout, phase: usize, geometry: &Geometry) -> Vec<Receiver
 }
 
 fn estimates(lit: &RunResult) -> Vec<TexelEstimate> {
-    let errors = lit.film.stated_errors(&lit.plan);
+    let errors = lit.film.stated_errors();
     (0..lit.film.pixels())
-        .map(|texel| TexelEstimate { irradiance: lit.film.mean(texel, &lit.plan).as_vec3(), standard_error: errors(texel).as_vec3() })
+        .map(|texel| TexelEstimate { irradiance: lit.film.mean(texel).as_vec3(), standard_error: errors(texel).as_vec3() })
         .collect()
 }
 

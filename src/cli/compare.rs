@@ -38,10 +38,10 @@ pub(super) struct CompareArgs {
     /// Standard errors of B; without one of the two, that picture is taken as exact
     #[arg(long, value_name = "FILE", help_heading = "Checks")]
     errors_b: Option<PathBuf>,
-    /// Rounds that the errors come from, of the picture that has fewer; errors of few rounds are uncertain, and z-scores then
-    /// follow Student's distribution [default: so many that they follow a normal one]
+    /// Blocks of rounds that the errors come from, of the picture that has fewer; errors of few blocks are uncertain, and z-scores
+    /// then follow Student's distribution [default: so many that they follow a normal one]
     #[arg(long, value_name = "N", value_parser = parse_integer::<u32>, allow_hyphen_values = true, help_heading = "Checks")]
-    error_rounds: Option<u32>,
+    error_blocks: Option<u32>,
     /// End with exit code 1 if the RMSE is above so many per cent of the reference's mean
     #[arg(long, value_name = "PERCENT", value_parser = parse_percent, allow_hyphen_values = true, help_heading = "Checks")]
     fail_above: Option<f64>,
@@ -59,7 +59,7 @@ value_enum!(ShowArg => Show {
 });
 
 /// As many as a render has.
-const MAX_ROUNDS: u32 = 1 << 20;
+const MAX_BLOCKS: u32 = 1 << 20;
 /// The standard errors of A and of B, by the option that names them.
 const ERRORS: [&str; 2] = ["--errors-a", "--errors-b"];
 
@@ -69,9 +69,9 @@ pub(super) fn run(args: &CompareArgs) -> Result<()> {
     }
     let show = args.show.map_or(Show::default(), Show::from);
     let has_errors = args.errors_a.is_some() || args.errors_b.is_some();
-    if let Some(rounds) = args.error_rounds {
-        within("--error-rounds", rounds, 2..=MAX_ROUNDS, "rounds that a standard error comes from")?;
-        require(has_errors, "--error-rounds", rounds, "needs --errors-a, --errors-b or both")?;
+    if let Some(blocks) = args.error_blocks {
+        within("--error-blocks", blocks, 2..=MAX_BLOCKS, "blocks of rounds that a standard error comes from")?;
+        require(has_errors, "--error-blocks", blocks, "needs --errors-a, --errors-b or both")?;
     }
     require(args.show.is_none() || args.output.is_some(), "--show", show.name(), "needs -o FILE, the picture that shows it")?;
     require(show != Show::Z || has_errors, "--show", show.name(), "needs --errors-a, --errors-b or both")?;
@@ -132,7 +132,7 @@ fn z_scores(args: &CompareArgs, pair: &Pair) -> Result<ZScores> {
         let picture = Picture::read(path).map_err(refuse)?;
         z_scores::check(&picture, pair).map_err(refuse)?;
         *errors = Some(picture);
-        refusal = Some(refuse("has no finite error above 0, so that there is no z-score; render two rounds or more".to_owned()));
+        refusal = Some(refuse("has no finite error above 0, so that there is no z-score; render two blocks of rounds or more".to_owned()));
     }
-    ZScores::of(pair, errors.each_ref().map(Option::as_ref), args.error_rounds).ok_or_else(|| refusal.expect("an option names errors"))
+    ZScores::of(pair, errors.each_ref().map(Option::as_ref), args.error_blocks).ok_or_else(|| refusal.expect("an option names errors"))
 }

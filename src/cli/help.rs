@@ -57,6 +57,13 @@ Examples:
   photonmill probe scene.glb --points points.txt -o irradiance.csv --error 1%
       Irradiance at the points of a file, until the error is at most 1 %";
 
+pub(super) const MERGE: &str = "\
+Examples:
+  photonmill render scene.glb --rounds 256 --shard 1/2 --checkpoint one.pmr
+  photonmill render scene.glb --rounds 256 --shard 2/2 --checkpoint two.pmr
+  photonmill merge one.pmr two.pmr -o picture.exr
+      A run in two parts, which two machines may do";
+
 pub(super) const PLAN: &str = "\
 Examples:
   photonmill plan scene.glb

@@ -6,6 +6,7 @@ use clap::Args;
 
 use super::complain;
 use super::interrupt::interruptible;
+use super::keep::Keeper;
 use super::progress::{ProgressArgs, ProgressReporter};
 use super::stop::{StopArgs, bias_before, goals, rounds_after, up_to};
 use crate::engine::Control;
@@ -70,8 +71,21 @@ impl Job<'_> {
 
     /// Plans the job, its default radii by a trial round, runs all rounds and reports progress; where asked, measures the bias
     /// too.
-    pub(super) fn run(&self, gpu: &Gpu, stop: &StopArgs, reporter: &ProgressReporter, cancelled: &AtomicBool) -> Result<RunResult> {
-        let Job { scene, geometry, settings, sensor, camera, phases, point } = *self;
+    pub(super) fn run(
+        &self,
+        gpu: &Gpu,
+        stop: &StopArgs,
+        keeper: &mut Keeper,
+        reporter: &ProgressReporter,
+        cancelled: &AtomicBool,
+    ) -> Result<RunResult> {
+        let Job { scene, geometry, sensor, camera, phases, point, .. } = *self;
+        let is_picture = matches!(sensor, Sensor::Picture { .. });
+        let settings = &self.settings.in_whole_blocks(is_picture);
+        if settings.rounds != self.settings.rounds {
+            let block = settings.rounds_per_block(is_picture);
+            reporter.note(&format!("--rounds {} is taken as {}: whole blocks of {block}", self.settings.rounds, settings.rounds));
+        }
         let view = View { geometry, camera, phases };
         let mut plan = scene::trial::plan(gpu, scene, &view, settings, sensor)?;
         if let Some(warning) = scene_report::radius_warning(&plan, geometry, point) {
@@ -87,7 +101,8 @@ impl Job<'_> {
         plan.settings.stop.bias = before.map(|bias| bias.upper);
 
         reporter.status("making the pipelines");
-        let mut control = Control { cancelled, progress: &mut |progress| reporter.report(progress, "round") };
+        let keep = keeper.keep(&scene.name);
+        let mut control = Control { cancelled, progress: &mut |progress| reporter.report(progress, "round"), keep };
         let mut lit = interruptible(|| scene::light(gpu, &view, plan, &mut control))?;
         if lit.is_cancelled() {
             complain(&format!("ended early: the results are of {} of {}", counted(lit.film.rounds, "round"), settings.rounds));

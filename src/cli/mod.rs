@@ -8,6 +8,8 @@ mod help;
 mod info;
 mod interrupt;
 mod job;
+mod keep;
+mod merge;
 mod options;
 mod paper;
 mod picture_size;
@@ -61,6 +63,9 @@ enum Command {
     /// Compute the irradiance at given points of a scene
     #[command(after_help = help::PROBE)]
     Probe(probe::ProbeArgs),
+    /// Add the parts of a run that --shard or --checkpoint left, to the bits of one run
+    #[command(after_help = help::MERGE)]
+    Merge(merge::MergeArgs),
     /// Print which effects a scene needs, and why
     #[command(after_help = help::PLAN)]
     Plan(plan::PlanArgs),
@@ -203,6 +208,7 @@ pub fn main() -> u8 {
         Some(Command::Render(args)) => render::run(&args, &cancelled),
         Some(Command::Bake(args)) => bake::run(&args, &cancelled),
         Some(Command::Probe(args)) => probe::run(&args, &cancelled),
+        Some(Command::Merge(args)) => merge::run(&args).map(|()| End::Finished),
         Some(Command::Plan(args)) => plan::run(&args).map(|()| End::Finished),
         Some(Command::Info(args)) => info::run(&args).map(|()| End::Finished),
         Some(Command::Compare(args)) => compare::run(&args).map(|()| End::Finished),

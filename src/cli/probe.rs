@@ -53,7 +53,8 @@ pub(super) fn run(args: &ProbeArgs, cancelled: &AtomicBool) -> Result<End> {
     settings.validate()?;
     let output = Destination::open("-o", &args.output)?;
     let reports = args.report.open()?;
-    let all = [vec![output.clone()], reports.destinations()].concat();
+    let mut keeper = args.transport.keep.open(&args.transport.stop)?;
+    let all = [vec![output.clone()], reports.destinations(), keeper.destinations()].concat();
     check_distinct(&all)?;
     let points = read_points(&args.points)?;
 
@@ -73,7 +74,7 @@ pub(super) fn run(args: &ProbeArgs, cancelled: &AtomicBool) -> Result<End> {
     let sensor = Sensor::Receivers { count: points.len() as u32 };
     let job = Job { scene: &scene, geometry: &geometry, settings: &settings, sensor, camera: None, phases: &phases, point: "point" };
     let gpu = args.device.open(&reporter)?;
-    let lit = job.run(&gpu, &args.transport.stop, &reporter, cancelled)?;
+    let lit = job.run(&gpu, &args.transport.stop, &mut keeper, &reporter, cancelled)?;
     reporter.finish();
 
     let text = scene_report::text(&scene.name, &lit, job.point, args.messages.explain);
@@ -84,6 +85,7 @@ pub(super) fn run(args: &ProbeArgs, cancelled: &AtomicBool) -> Result<End> {
         return say_beside(&all, &text).and(Err(error));
     }
     say_beside(&all, &format!("{}{wrote}", text.trim_end()))?;
+    keeper.finish()?;
     Ok(End::of(&lit))
 }
 
@@ -91,9 +93,9 @@ pub(super) fn run(args: &ProbeArgs, cancelled: &AtomicBool) -> Result<End> {
 fn table(lit: &RunResult) -> Vec<u8> {
     let mut table = csv::Writer::from_writer(Vec::new());
     table.write_record(["red", "green", "blue", "red_error", "green_error", "blue_error"]).expect("memory takes what is written");
-    let errors = lit.film.stated_errors(&lit.plan);
+    let errors = lit.film.stated_errors();
     for point in 0..lit.film.pixels() {
-        let (mean, error) = (lit.film.mean(point, &lit.plan), errors(point));
+        let (mean, error) = (lit.film.mean(point), errors(point));
         table
             .write_record([mean.x, mean.y, mean.z, error.x, error.y, error.z].map(|value| value.to_string()))
             .expect("memory takes what is written");

@@ -2,23 +2,26 @@
 
 use std::path::PathBuf;
 use std::sync::atomic::AtomicBool;
+use std::time::Duration;
 
 use clap::Args;
-use glam::DVec3;
 
 use super::job::{Job, MessageArgs};
+use super::keep::Snapshot;
 use super::options::{ReportArgs, TimedDeviceArgs};
 use super::progress::ProgressReporter;
 use super::scene::{FilterArg, PictureArgs, Subject, ToneArg};
-use super::values::{parse_integer, parse_photon_name, parse_stops};
+use super::values::{parse_integer, parse_photon_name, parse_seconds, parse_stops};
 use super::{End, optional_file, say, say_beside};
 use crate::engine;
 use crate::engine::replay::PhotonName;
+use crate::engine::saved::{SavedFilm, SavedRun};
 use crate::engine::scene::{RunResult, replay};
 use crate::error::{Result, require};
-use crate::output::colour::{ColourPicture, Format, Tone};
+use crate::output::colour::{Format, Tone};
 use crate::output::destination::{Destination, check_distinct, write_all};
 use crate::output::scene_report;
+use crate::output::show::Show;
 use crate::plan::scene::ScenePlan;
 use crate::scene::{Camera, Scene};
 use crate::settings::scene::{Filter, Part, SceneSettings};
@@ -27,8 +30,11 @@ use crate::verify::judge::{Judge, Verdict};
 #[derive(Args)]
 pub(super) struct RenderArgs {
     /// Picture: an .exr holds linear radiance in W/m2/sr, a .png is sRGB, for the eye
-    #[arg(short, long, alias = "out", value_name = "FILE", required_unless_present = "replay", help_heading = "Output")]
+    #[arg(short, long, alias = "out", value_name = "FILE", required_unless_present_any = ["replay", "shard"], help_heading = "Output")]
     output: Option<PathBuf>,
+    /// Also write the picture so far at this interval: 10s, 5m
+    #[arg(long, value_name = "TIME", value_parser = parse_seconds, allow_hyphen_values = true, requires = "output", help_heading = "Output")]
+    snapshot: Option<f64>,
     #[command(flatten)]
     report: ReportArgs,
     /// Write the standard error of each pixel as an .exr, W/m2/sr; infinite where unknown: after a single round, or where no
@@ -78,8 +84,8 @@ pub(super) fn run(args: &RenderArgs, cancelled: &AtomicBool) -> Result<End> {
     if let Some(name) = args.replay {
         return show_photon(args, &settings, name);
     }
-    let output = args.output.as_ref().expect("clap asks for it");
-    let format = Format::of("-o", output)?;
+    let output = args.output.as_ref();
+    let format = output.map(|output| Format::of("-o", output)).transpose()?;
     if let Some(samples) = args.judge {
         let range = format!("must be from 2 to {MAX_JUDGE_SAMPLES} samples per pixel");
         require((2..=MAX_JUDGE_SAMPLES).contains(&samples), "--judge", samples, range)?;
@@ -87,18 +93,22 @@ pub(super) fn run(args: &RenderArgs, cancelled: &AtomicBool) -> Result<End> {
         require(is_known, "--judge", samples, "needs --filter box, and two rounds or more to know the error")?;
     }
     if let Some(exposure) = args.exposure {
-        require(format == Format::Png, "--exposure", exposure, "is for PNG only: an EXR holds linear radiance")?;
+        require(format == Some(Format::Png), "--exposure", exposure, "is for PNG only: an EXR holds linear radiance")?;
     }
     if args.tone.is_some() {
-        require(format == Format::Png, "--tone", output.display(), "is for PNG only: an EXR holds linear radiance")?;
+        let name = output.map_or_else(String::new, |output| output.display().to_string());
+        require(format == Some(Format::Png), "--tone", name, "is for PNG only: an EXR holds linear radiance")?;
     }
-    let picture = Destination::open("-o", output)?;
+    let picture = optional_file("-o", output)?;
     let errors = optional_file("--error-image", args.error_image.as_ref())?;
     if let Some(path) = &args.error_image {
         require(Format::of("--error-image", path)? == Format::Exr, "--error-image", path.display(), "must end in .exr")?;
     }
     let reports = args.report.open()?;
-    let all: Vec<Destination> = [vec![picture.clone()], errors.clone().into_iter().collect(), reports.destinations()].concat();
+    let stop = &args.picture.transport.stop;
+    let mut keeper = args.picture.transport.keep.open(stop)?;
+    let files = [&picture, &errors].into_iter().flatten().cloned().collect();
+    let all: Vec<Destination> = [files, reports.destinations(), keeper.destinations()].concat();
     check_distinct(&all)?;
 
     let reporter = ProgressReporter::new(&args.messages.progress);
@@ -106,27 +116,36 @@ pub(super) fn run(args: &RenderArgs, cancelled: &AtomicBool) -> Result<End> {
     let Subject { scene, camera, width, height, geometry } = &subject;
     let job = Job { scene, geometry, settings: &settings, sensor: subject.sensor(), camera: Some(camera), phases: &[], point: "pixel" };
     let gpu = args.device.open(&reporter)?;
-    let lit = job.run(&gpu, &args.picture.transport.stop, &reporter, cancelled)?;
-
     let size = (*width, *height);
-    let image = picture_of(&lit, size, |pixel| lit.film.mean(pixel, &lit.plan));
-    let stops = args.exposure.unwrap_or_else(|| image.usual_exposure());
-    let text = scene_report::text(&scene.name, &lit, job.point, args.messages.explain);
-    let mut files = vec![(picture, image.encode(format, stops, args.tone.map_or(Tone::default(), Tone::from)))];
-    if let Some(errors) = errors {
-        files.push((errors, picture_of(&lit, size, lit.film.stated_errors(&lit.plan)).encode(Format::Exr, 0.0, Tone::Linear)));
+    let show = Show { size, exposure: args.exposure, tone: args.tone.map_or(Tone::default(), Tone::from) };
+    let mut snapshot = |run: &SavedRun| match (&run.film, &picture, format) {
+        (SavedFilm::Scene(film), Some(picture), Some(format)) => write_all([(picture.clone(), show.picture(film, format).0)]),
+        _ => Ok(()),
+    };
+    if let Some(seconds) = args.snapshot {
+        require((0.001..=1e6).contains(&seconds), "--snapshot", seconds, "must be from 1ms to 1000000s")?;
+        keeper.set_snapshot(Some(Snapshot { every: Duration::from_secs_f64(seconds), write: &mut snapshot }));
     }
+    let lit = job.run(&gpu, stop, &mut keeper, &reporter, cancelled)?;
+
+    let text = scene_report::text(&scene.name, &lit, job.point, args.messages.explain);
+    let mut files = Vec::new();
+    let mut shown = String::new();
+    if let (Some(picture), Some(format), Some(output)) = (&picture, format, output) {
+        let (bytes, stops) = show.picture(&lit.film, format);
+        files.push((picture.clone(), bytes));
+        let exposure = if format == Format::Png { format!(" at {stops:+.2} stops") } else { String::new() };
+        shown = format!("\nwrote {}{exposure}", output.display());
+    }
+    files.extend(errors.map(|errors| (errors, show.errors(&lit.film))));
     files.extend(reports.files(&lit, || scene_report::json(&scene.name, &lit)));
     let written = write_all(files);
-    let shown = match format {
-        Format::Png => format!(" at {stops:+.2} stops"),
-        Format::Exr => String::new(),
-    };
     reporter.finish();
     if let Err(error) = written {
         return say_beside(&all, &text).and(Err(error));
     }
-    say_beside(&all, &format!("{text}\nwrote {}{shown}", output.display()))?;
+    say_beside(&all, &format!("{text}{shown}"))?;
+    let kept = keeper.finish();
     if let Some(samples) = args.judge {
         // The picture is there, so Ctrl-C may end the program here.
         let reporter = ProgressReporter::new(&args.messages.progress);
@@ -135,6 +154,7 @@ pub(super) fn run(args: &RenderArgs, cancelled: &AtomicBool) -> Result<End> {
         reporter.finish();
         say_beside(&all, &format!("judge: {verdict}"))?;
     }
+    kept?;
     Ok(End::of(&lit))
 }
 
@@ -160,12 +180,7 @@ fn verdict(lit: &RunResult, scene: &Scene, camera: &Camera, (width, height): (u3
     // Of the same scene, without what was left out, and with other random numbers than the photons'.
     let scene = scene.without(&settings.without);
     let judged = Judge::new(&scene, settings.bounces).image(camera, width, height, samples, !settings.seed);
-    let means: Vec<_> = lit.film.means(&lit.plan).collect();
-    let errors: Vec<_> = (0..lit.film.pixels()).map(|pixel| lit.film.standard_error(pixel, &lit.plan)).collect();
+    let means: Vec<_> = lit.film.means().collect();
+    let errors: Vec<_> = (0..lit.film.pixels()).map(|pixel| lit.film.standard_error(pixel)).collect();
     Verdict::new(&means, &errors, lit.film.rounds.min(samples), &judged, part)
-}
-
-/// A value of each pixel.
-fn picture_of(lit: &RunResult, (width, height): (u32, u32), value: impl Fn(usize) -> DVec3) -> ColourPicture {
-    ColourPicture { width, height, pixels: (0..lit.film.pixels()).map(|pixel| value(pixel).as_vec3()).collect() }
 }

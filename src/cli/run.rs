@@ -6,6 +6,7 @@ use std::time::Instant;
 
 use clap::Args;
 
+use super::keep::{KeepArgs, Keeper};
 use super::options::{CommonArgs, ReportArgs, Reports, TimedDeviceArgs};
 use super::progress::{ProgressArgs, ProgressReporter};
 use super::stop::{StopArgs, bias_before, goals, rounds_after, up_to};
@@ -78,6 +79,8 @@ pub(super) struct RunArgs {
 
     #[command(flatten)]
     stop: StopArgs,
+    #[command(flatten)]
+    keep: KeepArgs,
 
     /// Experiment of the paper that sets the defaults [default: modified]
     #[arg(long, value_enum, value_name = "NAME", help_heading = "Photons")]
@@ -86,7 +89,7 @@ pub(super) struct RunArgs {
     #[arg(long, value_name = "N", value_parser = parse_integer::<u32>, allow_hyphen_values = true, help_heading = "Photons")]
     photons: Option<u32>,
     /// Number of rounds, whose photons are summed [default: 1; 100 with --preset rounds; as many as needed with --error,
-    /// --time or --total-photons, 16777216 at most]
+    /// --time or --total-photons, 1048576 at most]
     #[arg(long, value_name = "N", value_parser = parse_within(1..=u32::MAX), allow_hyphen_values = true, help_heading = "Photons")]
     rounds: Option<u32>,
     /// Maximum number of bounces of a photon [default: 15; 2 with --preset naive]
@@ -241,7 +244,8 @@ pub(super) fn run(args: &RunArgs, cancelled: &AtomicBool) -> Result<End> {
     if let Some(name) = args.replay {
         return show_photon(args, &settings, &scene, name);
     }
-    let outputs = Outputs::open(args, &scene)?;
+    let mut keeper = args.keep.open(&args.stop)?;
+    let outputs = Outputs::open(args, &scene, &keeper)?;
     if let Some(warning) = settings.warning() {
         complain(&format!("warning: {warning}"));
     }
@@ -265,7 +269,8 @@ pub(super) fn run(args: &RunArgs, cancelled: &AtomicBool) -> Result<End> {
     let before = bias_before(&settings.stop, args.stop.bias, false, &reporter, |rounds| measure(&settings, rounds))?;
     let settings = RoomSettings { stop: Stop { bias: before.map(|bias| bias.upper), ..settings.stop }, ..settings };
     reporter.status("making the pipelines");
-    let mut control = Control { cancelled, progress: &mut |progress| reporter.report(progress, "photon") };
+    let keep = keeper.keep("open-box");
+    let mut control = Control { cancelled, progress: &mut |progress| reporter.report(progress, "photon"), keep };
     let mut outcome = room::run(gpu.as_ref(), &scene, &settings, &mut control)?;
     outcome.bias = before;
     if before.is_none() && args.stop.bias && !outcome.is_cancelled() {
@@ -279,6 +284,7 @@ pub(super) fn run(args: &RunArgs, cancelled: &AtomicBool) -> Result<End> {
         complain(&format!("ended after {emitted} of {total} photons; the results are of these"));
     }
     outputs.write(outcome, &scene)?;
+    keeper.finish()?;
     Ok(end)
 }
 
@@ -332,7 +338,7 @@ struct Outputs {
 }
 
 impl Outputs {
-    fn open(args: &RunArgs, scene: &RoomScene) -> Result<Outputs> {
+    fn open(args: &RunArgs, scene: &RoomScene, keeper: &Keeper) -> Result<Outputs> {
         let folder = |option, path: &Option<PathBuf>| path.as_ref().map(|path| Folder::open(option, path)).transpose();
         let outputs = Outputs {
             picture: (Destination::open("-o", &args.output)?, Format::of("-o", &args.output)?),
@@ -343,6 +349,7 @@ impl Outputs {
         let folders = [&outputs.irradiance, &outputs.radiosity].into_iter().flatten();
         let mut all = vec![outputs.picture.0.clone()];
         all.extend(outputs.reports.destinations());
+        all.extend(keeper.destinations());
         all.extend(folders.flat_map(|folder| lightmap::destinations(folder, scene)));
         check_distinct(&all)?;
         Ok(outputs)

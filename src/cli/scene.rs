@@ -6,6 +6,7 @@ use std::sync::Arc;
 use clap::Args;
 use glam::{DVec2, Vec3};
 
+use super::keep::KeepArgs;
 use super::options::CommonArgs;
 use super::picture_size::{PictureSize, parse_size};
 use super::progress::ProgressReporter;
@@ -82,6 +83,8 @@ fn parse_environment(text: &str) -> std::result::Result<EnvironmentArg, String> 
 pub(super) struct TransportArgs {
     #[command(flatten)]
     pub(super) stop: StopArgs,
+    #[command(flatten)]
+    pub(super) keep: KeepArgs,
 
     /// Photons of the global map, per round [default: 131072]
     #[arg(long, value_name = "N", value_parser = parse_integer::<u32>, allow_hyphen_values = true, help_heading = "Photons")]
@@ -93,6 +96,10 @@ pub(super) struct TransportArgs {
     /// --total-photons as many as needed]
     #[arg(long, value_name = "N", value_parser = parse_integer::<u32>, allow_hyphen_values = true, help_heading = "Photons")]
     rounds: Option<u32>,
+    /// Rounds of a block, a power of two. Samples are even over a block, and errors come from the spread of blocks; --rounds is
+    /// rounded up to whole blocks [default: 4, less with more --samples]
+    #[arg(long, value_name = "N", value_parser = parse_integer::<u32>, allow_hyphen_values = true, help_heading = "Photons")]
+    block: Option<u32>,
     /// Cut photons off after this many bounces [default: none; Russian roulette ends paths]
     #[arg(long, value_name = "N", value_parser = parse_integer::<u32>, allow_hyphen_values = true, help_heading = "Photons")]
     bounces: Option<u32>,
@@ -315,6 +322,7 @@ impl TransportArgs {
         SceneSettings {
             photons,
             caustic_photons,
+            block: self.block.or(usual.block),
             rounds: self.rounds.unwrap_or_else(|| most_rounds(&stop, photons.min(caustic_photons)).unwrap_or(usual.rounds)),
             stop,
             bounces: self.bounces.unwrap_or(usual.bounces),

@@ -3,19 +3,23 @@
 use clap::Args;
 
 use super::progress::ProgressReporter;
-use super::values::{parse_percent, parse_seconds, parse_within};
+use super::values::{parse_percent, parse_seconds, parse_within, value_enum};
 use crate::engine::bias::Bias;
-use crate::error::{Error, Result};
-use crate::settings::stop::Stop;
+use crate::engine::blocks::Share;
+use crate::error::{Error, Result, require};
+use crate::settings::stop::{Measure, Stop};
 use crate::text::counted;
 
 #[derive(Args)]
 #[command(next_help_heading = "When to stop")]
 pub(super) struct StopArgs {
-    /// Stop once the relative error of the result (RMSE over the root mean square of the result) is at most this: 2% (2 is the
-    /// same)
+    /// Stop once the relative error is at most this: 2% (2 is the same). It is of light that surfaces scatter; lamps, the sky and
+    /// unlit surfaces that are seen directly are left out
     #[arg(long, value_name = "PERCENT", value_parser = parse_percent, allow_hyphen_values = true)]
     error: Option<f64>,
+    /// What the error is: the RMSE over the mean, or the root of relMSE, whose epsilon is (1 % of the mean)^2 [default: rmse]
+    #[arg(long, value_enum, value_name = "MEASURE")]
+    measure: Option<MeasureArg>,
     /// Confidence level of the error bound [default: 95%]
     #[arg(long, value_name = "PERCENT", value_parser = parse_percent, allow_hyphen_values = true)]
     confidence: Option<f64>,
@@ -30,11 +34,32 @@ pub(super) struct StopArgs {
     pub(super) bias: bool,
 }
 
+value_enum!(MeasureArg => Measure {
+    /// The root of the mean square of errors, over the mean
+    Rmse,
+    /// The root of the mean of squares of errors, each over the square of its value and of a hundredth of the mean
+    #[value(name = "relmse")]
+    RelMse,
+});
+
 impl StopArgs {
+    /// Refuses what only all shards together can know.
+    pub(super) fn check_shard(&self, shard: Share) -> Result<()> {
+        let only_merged = "cannot be known to one shard; give --rounds, leave it out with --shard, and look at the error of the merge";
+        if let Some(error) = self.error {
+            return Err(Error::setting("--error", format!("{}%", 100.0 * error), only_merged));
+        }
+        if let Some(photons) = self.total_photons {
+            return Err(Error::setting("--total-photons", photons, only_merged));
+        }
+        require(!self.bias, "--shard", shard, "cannot be measured with --bias; leave --bias out")
+    }
+
     pub(super) fn stop(&self) -> Stop {
         let usual = Stop::default();
         Stop {
             error: self.error,
+            measure: self.measure.map_or(usual.measure, Measure::from),
             confidence: self.confidence.unwrap_or(usual.confidence),
             seconds: self.time,
             photons: self.total_photons,

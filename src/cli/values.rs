@@ -8,6 +8,7 @@ use std::str::FromStr;
 use clap::ValueEnum;
 use clap::builder::{PossibleValue, PossibleValuesParser, TypedValueParser};
 
+use crate::engine::blocks::Share;
 use crate::engine::replay::PhotonName;
 use crate::settings::scene::Effect;
 use crate::settings::{Builder, Math, WALL_NAMES};
@@ -118,6 +119,15 @@ pub(super) fn parse_seconds(text: &str) -> Parsed<f64> {
     let units = [("ms", 1e-3), ("s", 1.0), ("m", 60.0), ("h", 3600.0)];
     let (number, unit) = units.iter().find_map(|(name, unit)| Some((text.strip_suffix(name)?, *unit))).unwrap_or((text, 1.0));
     number.trim().parse().map(|count: f64| count * unit).map_err(|_| "must be a time, such as 2s, 500ms or 3m".to_owned())
+}
+
+/// `3/8`, counted from 1.
+pub(super) fn parse_share(text: &str) -> Parsed<Share> {
+    let share = text.split_once('/').and_then(|(number, of)| {
+        let (number, of): (u32, u32) = (number.trim().parse().ok()?, of.trim().parse().ok()?);
+        (1..=of).contains(&number).then(|| Share { number: number - 1, of })
+    });
+    share.ok_or_else(|| "must be K/N, a shard and their number, such as 3/8: K is from 1 to N".to_owned())
 }
 
 pub(super) fn parse_shininess(text: &str) -> Parsed<[f32; 5]> {

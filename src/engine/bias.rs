@@ -21,7 +21,7 @@ use super::watch::{Control, End};
 use crate::error::Result;
 use crate::settings::stop::Stop;
 
-/// Root mean square over a result's pixels and channels, over that of the result.
+/// Root mean square over a result's pixels and channels where there is light, over their mean: as errors by `Measure::Rmse`.
 #[derive(Debug, Clone, Copy, PartialEq, Serialize)]
 pub struct Bias {
     pub relative: f64,
@@ -143,11 +143,9 @@ pub fn difference(confidence: f64, factor: f64, mut batch: impl FnMut(f64, u32) 
         differences.push(whole.iter().zip(&smaller).map(|(whole, smaller)| (whole - smaller) as f32).collect::<Vec<f32>>());
         wholes.push(whole.iter().map(|value| *value as f32).collect::<Vec<f32>>());
     }
-    let (wholes, differences) = (products(&wholes), products(&differences));
-    let share = |left_out: Option<usize>| {
-        let (light, off) = (off_diagonal_mean(&wholes, left_out), off_diagonal_mean(&differences, left_out));
-        if light > 0.0 { off / light } else { 0.0 }
-    };
+    let light = squared_light(&wholes);
+    let differences = products(&differences);
+    let share = |left_out: Option<usize>| if light > 0.0 { off_diagonal_mean(&differences, left_out) / light } else { 0.0 };
     let batches = wholes.len();
     let without: Vec<f64> = (0..batches).map(|number| share(Some(number))).collect();
     let mean = without.iter().sum::<f64>() / batches as f64;
@@ -157,6 +155,13 @@ pub fn difference(confidence: f64, factor: f64, mut batch: impl FnMut(f64, u32) 
     let half_width = student.inverse_cdf(0.5 + 0.5 * confidence) * standard_error;
     let squared = share(None);
     Ok(Some([squared - half_width, squared, squared + half_width].map(|squared| squared.max(0.0).sqrt())))
+}
+
+/// The square of the mean of all values that are lit in any batch, times their number.
+fn squared_light(wholes: &[Vec<f32>]) -> f64 {
+    let sums = |value: usize| wholes.iter().map(|whole| f64::from(whole[value])).sum::<f64>();
+    let lit: Vec<f64> = (0..wholes[0].len()).map(sums).filter(|sum| *sum > 0.0).collect();
+    (lit.iter().sum::<f64>() / wholes.len() as f64).powi(2) / (lit.len() as f64).max(1.0)
 }
 
 /// Scalar products of all pairs.

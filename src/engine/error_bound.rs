@@ -1,15 +1,19 @@
 //! The error of a result: what a film tells of it, and the bound that it has not more of, with a confidence.
 
+use serde::Serialize;
 use statrs::distribution::{ContinuousCDF, FisherSnedecor};
 
 use super::degrees_of_freedom::DegreesOfFreedom;
 use super::unknown::Unknown;
+use crate::constants::PART_COUNT;
 
 /// What a film of so many rounds tells of its error, relative to its light.
 #[derive(Debug, Clone, PartialEq)]
 pub struct FilmError {
     pub rounds: u32,
-    /// Standard error; infinite of fewer than two rounds.
+    /// Whole blocks, of which the spread tells the noise.
+    pub blocks: u32,
+    /// Standard error; infinite of fewer than two blocks.
     pub noise: f64,
     pub freedom: DegreesOfFreedom,
     /// What nothing has reached.
@@ -17,6 +21,18 @@ pub struct FilmError {
     /// What light may add that is so rare that no round may have shown it, with the confidence that was asked for: as many hits
     /// of the brightest lamp in mirrors and glass as a run may miss. Infinite where all else is black.
     pub unseen: f64,
+    /// Where the noise sits; `None` where that is not known.
+    pub places: Option<ErrorPlaces>,
+}
+
+/// Where the error of the noise sits, as shares of its square.
+#[derive(Debug, Clone, Copy, PartialEq, Serialize)]
+pub struct ErrorPlaces {
+    /// One in a hundred, and the share of these.
+    pub worst_pixels: u64,
+    pub of_worst_pixels: f64,
+    /// Of direct light, what is seen over mirrors and through glass, caustics, indirect light.
+    pub of_parts: [f64; PART_COUNT as usize],
 }
 
 impl FilmError {
@@ -55,10 +71,12 @@ mod tests {
     fn a_tail_is_known_once_the_noise_covers_what_is_unseen() {
         let error = |rounds: u32| FilmError {
             rounds,
+            blocks: rounds,
             noise: 0.4 / f64::from(rounds).sqrt(),
             freedom: DegreesOfFreedom::least(rounds),
             unknown: Unknown::default(),
             unseen: 8.0 / f64::from(rounds),
+            places: None,
         };
         assert!(!error(16).tail_is_known(0.95) && error(256).tail_is_known(0.95));
         // The bound itself is of what rounds have shown.

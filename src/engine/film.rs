@@ -1,60 +1,132 @@
-//! The core of all films: exact sums over rounds and of the squares of what each round left, whose spread tells the error.
-//! Sums are integers, so that it does not matter in which order photons, chunks, rounds or devices add to them.
+//! The core of all films: exact sums over blocks of rounds and of the squares of what each block left, whose spread tells the
+//! error. Sums are integers, so that it does not matter in which order photons, chunks, blocks or devices add to them.
 
 use super::degrees_of_freedom::DegreesOfFreedom;
-use crate::constants::KEPT_ROUNDS;
-use crate::plan::latest_rounds::{kept_count, kept_place};
+use crate::constants::KEPT_BLOCKS;
+use crate::plan::latest_blocks::{kept_count, kept_place};
 
-/// Sums over rounds, place by place.
+/// Sums over blocks, place by place.
 #[derive(Debug, Clone, PartialEq, Default)]
-pub struct RoundSums {
-    /// Rounds that have ended.
+pub struct BlockSums {
+    /// Rounds that the sums hold: of whole blocks, or of one that was cut short where there is no whole one.
     pub rounds: u32,
+    /// Whole blocks.
+    pub blocks: u32,
     pub sums: Vec<u64>,
-    /// Of what each of these rounds left; empty where nobody asks for the error.
+    /// Of what each whole block left; empty where nobody asks for the error.
     pub squares: Vec<u128>,
-    /// What each of the latest [`KEPT_ROUNDS`] rounds left at [`kept_count`] places, round after round.
-    pub latest: Vec<f32>,
 }
 
-impl RoundSums {
-    /// Adds what a round left: each place has so many sums, of which the first is kept.
-    pub fn end_round(&mut self, of_round: &[u64], channel_count: usize) {
-        self.sums.iter_mut().zip(of_round).for_each(|(sum, of_round)| *sum += of_round);
-        self.squares.iter_mut().zip(of_round).for_each(|(squares, of_round)| *squares += u128::from(*of_round).pow(2));
-        if !self.latest.is_empty() {
-            let places = of_round.len() / channel_count;
-            let first = self.rounds as usize % KEPT_ROUNDS as usize * kept_count(places);
-            for (number, place) in (0..kept_count(places)).filter_map(|number| Some((number, kept_place(number, places)?))) {
-                let sum = of_round[place * channel_count];
-                self.latest[first + number] = (sum >> 32) as f32 * 4_294_967_296.0 + (sum as u32) as f32;
-            }
-        }
-        self.rounds += 1;
+/// What a block left at [`kept_count`] places.
+#[derive(Debug, Clone, PartialEq)]
+pub struct KeptBlock {
+    pub number: u32,
+    pub values: Vec<f32>,
+}
+
+/// What the latest [`KEPT_BLOCKS`] blocks left, by their numbers: of blocks whose numbers differ by a multiple of that the higher one.
+#[derive(Debug, Clone, PartialEq, Default)]
+pub struct LatestBlocks(Vec<KeptBlock>);
+
+impl BlockSums {
+    /// Adds what a block of so many rounds left.
+    pub fn end_block(&mut self, rounds: u32, of_block: &[u64]) {
+        self.sums.iter_mut().zip(of_block).for_each(|(sum, of_block)| *sum += of_block);
+        self.squares.iter_mut().zip(of_block).for_each(|(squares, of_block)| *squares += u128::from(*of_block).pow(2));
+        self.rounds += rounds;
+        self.blocks += 1;
     }
 
-    /// How far errors of places go together, in whose sum each counts by its weight; each has so many values that are kept.
-    pub fn degrees_of_freedom(&self, channels: usize, places: usize, weight: impl Fn(usize) -> f64) -> DegreesOfFreedom {
-        let kept = self.latest.chunks_exact(channels * kept_count(places)).take(self.rounds as usize);
-        let weights: Vec<f64> = (0..kept_count(places)).map(|number| kept_place(number, places).map_or(0.0, &weight)).collect();
-        let weighted = |values: &[f32]| values.iter().enumerate().map(|(k, value)| weights[k / channels] * f64::from(*value)).collect();
-        DegreesOfFreedom::of(&kept.map(weighted).collect::<Vec<_>>(), self.rounds)
+    /// Adds the blocks of another part of the same run.
+    pub fn merge(&mut self, other: &BlockSums) {
+        self.rounds += other.rounds;
+        self.blocks += other.blocks;
+        self.sums.iter_mut().zip(&other.sums).for_each(|(sum, others)| *sum += others);
+        self.squares.iter_mut().zip(&other.squares).for_each(|(squares, others)| *squares += others);
     }
 
-    /// Variance of a place's sum over all rounds, of which `sum` is what those that have ended left; infinite of fewer than two.
-    pub fn variance(&self, place: usize, sum: u64) -> f64 {
-        if self.rounds < 2 || self.squares.is_empty() {
+    /// Variance of a place's sum; infinite of fewer than two blocks.
+    pub fn variance(&self, place: usize) -> f64 {
+        if self.blocks < 2 || self.squares.is_empty() {
             return f64::INFINITY;
         }
-        let (rounds, sum) = (f64::from(self.rounds), u128::from(sum));
-        // sum^2 <= rounds * squares, so what is left of the squares is not negative but for the division's remainder; and sums
+        let (blocks, sum) = (f64::from(self.blocks), u128::from(self.sums[place]));
+        // sum^2 <= blocks * squares, so what is left of the squares is not negative but for the division's remainder; and sums
         // are at most 2^63.
-        let deviation = self.squares[place].saturating_sub(sum * sum / u128::from(self.rounds)) as f64;
-        deviation * rounds / (rounds - 1.0)
+        let deviation = self.squares[place].saturating_sub(sum * sum / u128::from(self.blocks)) as f64;
+        deviation * blocks / (blocks - 1.0)
     }
+}
+
+impl LatestBlocks {
+    pub fn push(&mut self, block: KeptBlock) {
+        let slot = |number: u32| number % KEPT_BLOCKS;
+        match self.0.iter().position(|kept| slot(kept.number) == slot(block.number)) {
+            Some(place) if self.0[place].number > block.number => return,
+            Some(place) => drop(self.0.remove(place)),
+            None => {}
+        }
+        let place = self.0.partition_point(|kept| kept.number < block.number);
+        self.0.insert(place, block);
+    }
+
+    pub fn merge(&mut self, other: &LatestBlocks) {
+        other.iter().for_each(|block| self.push(block.clone()));
+    }
+
+    pub fn iter(&self) -> impl Iterator<Item = &KeptBlock> {
+        self.0.iter()
+    }
+
+    /// How far errors of places go together in a film of so many blocks: `value` makes what counts of a kept place of what is kept of
+    /// it, `size` numbers.
+    pub fn degrees_of_freedom(
+        &self,
+        size: usize,
+        places: usize,
+        blocks: u32,
+        value: impl Fn(usize, &[f32]) -> Vec<f64>,
+    ) -> DegreesOfFreedom {
+        let weighted = |block: &KeptBlock| -> Vec<f64> {
+            let kept = block.values.chunks_exact(size).take(kept_count(places)).enumerate();
+            kept.filter_map(|(number, values)| Some(value(kept_place(number, places)?, values))).flatten().collect()
+        };
+        DegreesOfFreedom::of(&self.0.iter().map(weighted).collect::<Vec<_>>(), blocks)
+    }
+}
+
+/// A value of a film as it is kept of a block. Twin of `float_of` in `glsl/film/latest_blocks.glsl`.
+pub fn kept_value(sum: u64) -> f32 {
+    (sum >> 32) as f32 * 4_294_967_296.0 + (sum as u32) as f32
+}
+
+/// Lower and upper 64 bits of each.
+pub fn halves(squares: &[u128]) -> Vec<u64> {
+    squares.iter().flat_map(|square| [*square as u64, (*square >> 64) as u64]).collect()
 }
 
 /// A sum of squares from its lower and upper 64 bits.
 pub fn wide(low: u64, high: u64) -> u128 {
     u128::from(low) | u128::from(high) << 64
+}
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+
+    #[test]
+    fn the_latest_blocks_are_kept_in_whatever_order_they_come() {
+        let kept = |numbers: &[u32]| {
+            let mut latest = LatestBlocks::default();
+            numbers.iter().for_each(|number| latest.push(KeptBlock { number: *number, values: vec![*number as f32] }));
+            latest
+        };
+        let all: Vec<u32> = (0..600).collect();
+        let in_order = kept(&all);
+        let numbers: Vec<u32> = in_order.iter().map(|block| block.number).collect();
+        assert!(numbers.into_iter().eq(344..600));
+        let backwards: Vec<u32> = all.iter().rev().copied().collect();
+        let (even, odd): (Vec<u32>, Vec<u32>) = all.iter().partition(|number| *number % 2 == 0);
+        assert!(kept(&backwards) == in_order && kept(&[odd, even].concat()) == in_order);
+    }
 }

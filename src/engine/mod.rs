@@ -2,16 +2,20 @@
 //! index them, and estimate densities with the kernels of `glsl` (or, of the box, their twins in `cpu`); what stands beside them here is the same for both.
 
 pub mod bias;
+pub mod blocks;
 pub mod choose_builder;
 pub mod degrees_of_freedom;
 pub mod error_bound;
 pub mod film;
+pub mod identity;
+pub mod measure_of_error;
 pub mod nonfinite_values;
 pub mod planned;
 pub mod prefix_sum;
 pub mod replay;
 pub mod room;
 pub mod run;
+pub mod saved;
 pub mod scene;
 pub mod tallies;
 pub mod totals;

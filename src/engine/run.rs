@@ -1,17 +1,22 @@
 //! The one loop over rounds, of every run: until something ends it, with the fate of every photon.
 
+use std::collections::BTreeMap;
 use std::sync::atomic::Ordering;
 use std::time::Instant;
 
 use super::bias::Bias;
+use super::blocks::{Blocks, Share};
 use super::error_bound::FilmError;
+use super::identity::Identity;
 use super::nonfinite_values::NonfiniteValues;
+use super::saved::{SavedFilm, SavedRun};
 use super::watch::{Control, End, Progress, Watch};
+use crate::constants::KEPT_BLOCKS;
 use crate::error::{Error, Result};
 use crate::gpu::check::strict_math;
 use crate::gpu::{Commands, Constants, DeviceFacts, Gpu, Module};
 use crate::ledger::{Fates, Ledger, Losses};
-use crate::records::Tally;
+use crate::plan::sensor::Sensor;
 use crate::settings::Math;
 use crate::settings::stop::Stop;
 use crate::timings::{HostClock, Timings};
@@ -31,6 +36,8 @@ pub struct RunResult<Plan, Film> {
     pub bias: Option<Bias>,
     /// Light that limits kept from the result.
     pub losses: Losses,
+    /// Photons of a block that was cut short: they are in neither the film nor its errors nor the fates.
+    pub left_out: u64,
     pub dispatches: u64,
     pub submissions: u64,
     /// Pipelines that the run made.
@@ -65,14 +72,19 @@ impl<Plan, Film> RunResult<Plan, Film> {
 pub struct Task<'a> {
     /// The device, and its pipelines before the run; `None` for the CPU.
     pub device: Option<(&'a Gpu, usize)>,
+    /// Of a run that is kept.
+    pub identity: Option<Identity>,
+    /// `None` for the paper's box.
+    pub sensor: Option<Sensor>,
     pub stop: Stop,
     /// How fast the radius shrinks; 1 keeps it.
     pub alpha: f64,
     pub rounds: u32,
+    pub rounds_per_block: u32,
     pub bounces: u32,
     /// Of all maps.
     pub photons_per_round: u64,
-    /// Parts of a round after each of which a run may end. What a round left that ended in its middle counts in the mean.
+    /// Parts of a round after each of which a run may end.
     pub parts_per_round: u32,
     /// At most.
     pub photons_per_part: u64,
@@ -96,16 +108,18 @@ pub trait Recorder {
 /// What is lit: the paper's box or a scene, on a device or on the CPU.
 pub trait World {
     type Recorder: Recorder;
-    type Film;
+    type Film: Clone + Into<SavedFilm>;
 
     /// Records a part of the round under way, and tells `state` of its photons. Fails with [`Error::Interrupted`] where the round
     /// was cut short and nothing of it counts.
     fn trace(&mut self, recorder: &mut Self::Recorder, state: &mut RunState, part: u32) -> Result<()>;
+    /// The round that was recorded is the last of its block: notes what counts of it, as what follows may be cut short.
+    fn end_block(&mut self, recorder: &mut Self::Recorder, state: &RunState) -> Result<()>;
     /// Whether what is recorded must run now, as there is no room for another part, or it would take long.
     fn is_full(&self, recorder: &Self::Recorder) -> bool;
     /// Runs what is recorded and counts the fates of its photons.
     fn collect(&mut self, recorder: &mut Self::Recorder, state: &mut RunState) -> Result<()>;
-    /// What all photons so far have left.
+    /// What all whole blocks have left, or where there is none, all photons so far.
     fn film(&mut self, recorder: &mut Self::Recorder, state: &RunState) -> Result<Self::Film>;
     fn error(&self, film: &Self::Film) -> FilmError;
     /// Light that limits kept from a film.
@@ -118,14 +132,24 @@ pub trait World {
 pub struct RunState<'a> {
     task: Task<'a>,
     watch: Watch,
-    /// Of each map, as far as they are collected.
-    pub fates: Vec<Fates>,
-    /// Photons of each map that were handed out since.
+    /// Of each map in whole blocks, and in the block under way, as far as they are collected.
+    fates_of_blocks: Vec<Fates>,
+    fates_of_rest: Vec<Fates>,
+    /// Photons of each map that were handed out since, and those of them that whole blocks have.
     open: Vec<u64>,
-    /// Photons handed out.
-    pub emitted: u64,
-    /// Rounds that have ended; the number of the one under way.
-    pub rounds: u32,
+    open_of_blocks: Vec<u64>,
+    /// Photons handed out, and those of whole blocks.
+    emitted: u64,
+    emitted_of_blocks: u64,
+    /// Blocks that are done, the number of the one under way, and rounds of it that have ended.
+    pub done: Blocks,
+    block: u32,
+    rounds_of_block: u32,
+    /// Of the blocks of which the film keeps more, the latest number by its place.
+    pub kept: BTreeMap<u32, u32>,
+    share: Share,
+    /// When the run was saved last.
+    saved: Instant,
     /// Submissions at the latest look.
     submissions: u64,
     end: Option<End>,
@@ -139,33 +163,36 @@ pub fn run<W: World, Plan: Clone>(
     task: Task,
     control: &mut Control,
 ) -> Result<RunResult<Plan, W::Film>> {
-    let mut state = RunState::new(task, &recorder);
+    let mut state = RunState::new(task, &recorder, control)?;
     while state.end.is_none() {
+        let mut is_cut = false;
         let round = recorder.round(|recorder| {
             for part in 0..state.task.parts_per_round {
                 if part > 0 && state.pause(&mut world, recorder, control)? {
+                    is_cut = true;
                     return Ok(());
                 }
                 world.trace(recorder, &mut state, part)?;
             }
-            state.rounds += 1;
-            Ok(())
+            state.end_round(&mut world, recorder)
         });
         match round {
             // A round cut short is no part of the film; without a first round there is none.
-            Err(Error::Interrupted) if state.rounds > 0 => {
+            Err(Error::Interrupted) if state.rounds() > 0 => {
                 state.collect(&mut world, &mut recorder, true)?;
                 state.end = Some(if control.cancelled.load(Ordering::Relaxed) { End::Cancelled } else { End::Time });
             }
             Err(error) => return Err(error),
-            // Within the round.
-            Ok(()) if state.end.is_some() => break,
+            Ok(()) if is_cut => break,
             Ok(()) => {
                 state.pause(&mut world, &mut recorder, control)?;
             }
         }
     }
     let film = world.film(&mut recorder, &state)?;
+    if let Some(save) = control.keep.save.as_mut().filter(|_| !state.done.is_empty()) {
+        save.save(&state.saved_run(film.clone().into()), true)?;
+    }
     let nonfinite_values = world.nonfinite_values(&mut recorder)?;
     let device = state.task.device;
     if let Some((gpu, _)) = device {
@@ -173,9 +200,10 @@ pub fn run<W: World, Plan: Clone>(
     }
     let [dispatches, submissions] = recorder.counts();
     Ok(RunResult {
-        losses: world.losses(&film, &state.fates),
+        losses: world.losses(&film, state.fates()),
         film,
-        fates: state.fates,
+        left_out: if state.blocks() > 0 { state.emitted - state.emitted_of_blocks } else { 0 },
+        fates: state.fates().to_vec(),
         device: device.map(|(gpu, _)| gpu.facts().clone()),
         end: state.end.expect("the run has ended"),
         bias: None,
@@ -211,16 +239,68 @@ pub fn commands<'gpu>(
 }
 
 impl<'a> RunState<'a> {
-    fn new(task: Task<'a>, recorder: &impl Recorder) -> RunState<'a> {
-        RunState {
-            watch: Watch::new(task.stop, task.alpha, recorder.started()),
-            fates: task.fates.clone(),
+    /// Goes on with what was saved, if anything was.
+    fn new(task: Task<'a>, recorder: &impl Recorder, control: &mut Control) -> Result<RunState<'a>> {
+        let share = control.keep.share;
+        let mut state = RunState {
+            watch: Watch::new(task.stop, task.alpha, task.rounds_per_block, recorder.started()),
+            fates_of_blocks: task.fates.clone(),
+            fates_of_rest: task.fates.clone(),
             open: vec![0; task.fates.len()],
+            open_of_blocks: vec![0; task.fates.len()],
             emitted: 0,
-            rounds: 0,
+            emitted_of_blocks: 0,
+            done: Blocks::default(),
+            block: 0,
+            rounds_of_block: 0,
+            kept: BTreeMap::new(),
+            share,
+            saved: Instant::now(),
             submissions: recorder.counts()[1],
             end: None,
             task,
+        };
+        if let Some((_, saved)) = control.keep.resume.take() {
+            state.emitted = saved.fates.iter().map(|fates| fates.emitted).sum();
+            state.emitted_of_blocks = state.emitted;
+            state.kept = saved.film.latest().iter().map(|block| (block.number % KEPT_BLOCKS, block.number)).collect();
+            (state.fates_of_blocks, state.done) = (saved.fates, saved.done);
+            state.watch.go_on(state.blocks());
+        }
+        state.begin_block();
+        Ok(state)
+    }
+
+    /// Blocks that the run is to have.
+    fn wanted(&self) -> u32 {
+        self.task.rounds.div_ceil(self.task.rounds_per_block)
+    }
+
+    /// Takes the next block that is to be done; without one the run has ended.
+    fn begin_block(&mut self) {
+        self.rounds_of_block = 0;
+        let from = if self.done.contains(self.block) { self.block } else { 0 };
+        match self.share.next(from, &self.done, self.wanted()) {
+            Some(block) => self.block = block,
+            None => self.end = Some(self.end_of_rounds()),
+        }
+    }
+
+    fn end_of_rounds(&self) -> End {
+        if self.watch.has_photons(self.emitted) { End::Photons } else { End::Rounds }
+    }
+
+    /// The run as far as whole blocks are done.
+    fn saved_run(&self, film: SavedFilm) -> SavedRun {
+        let Task { identity, sensor, .. } = &self.task;
+        SavedRun {
+            identity: identity.clone().expect("what is kept has an identity"),
+            share: self.share,
+            wanted: self.wanted(),
+            done: self.done.clone(),
+            sensor: *sensor,
+            fates: self.fates_of_blocks.clone(),
+            film,
         }
     }
 
@@ -229,55 +309,128 @@ impl<'a> RunState<'a> {
         self.watch.deadline()
     }
 
+    /// Whole blocks.
+    pub fn blocks(&self) -> u32 {
+        self.done.count()
+    }
+
+    /// Rounds that have ended.
+    pub fn rounds(&self) -> u32 {
+        self.blocks() * self.task.rounds_per_block + self.rounds_of_block
+    }
+
+    /// The number of the round under way.
+    pub fn round(&self) -> u32 {
+        self.block * self.task.rounds_per_block + self.rounds_of_block
+    }
+
+    /// Whether the round under way is the last of its block.
+    pub fn ends_block(&self) -> bool {
+        self.rounds_of_block + 1 == self.task.rounds_per_block
+    }
+
     /// So many photons of a map are handed out.
     pub fn hand_out(&mut self, map: usize, photons: u32) {
         self.open[map] += u64::from(photons);
         self.emitted += u64::from(photons);
     }
 
-    /// Counts the fates of all photons of a map that were handed out.
-    pub fn count(&mut self, map: usize, tallies: &[Tally]) {
-        self.fates[map].add(std::mem::take(&mut self.open[map]), tallies);
+    /// Counts the fates of all photons of a map that were handed out, and of those of whole blocks among them.
+    pub fn count(&mut self, map: usize, mut all: Fates, mut of_blocks: Fates) {
+        all.emitted = std::mem::take(&mut self.open[map]);
+        of_blocks.emitted = std::mem::take(&mut self.open_of_blocks[map]);
+        let rest = &mut self.fates_of_rest[map];
+        if of_blocks.emitted == 0 {
+            rest.add(&all);
+            return;
+        }
+        // What was under way before has become a part of a whole block.
+        all.subtract(&of_blocks);
+        let before = std::mem::replace(rest, all);
+        self.fates_of_blocks[map].add(&before);
+        self.fates_of_blocks[map].add(&of_blocks);
+    }
+
+    /// Of the photons that the film is of: of whole blocks, or where there is none, of all.
+    pub fn fates(&self) -> &[Fates] {
+        if self.blocks() > 0 { &self.fates_of_blocks } else { &self.fates_of_rest }
+    }
+
+    /// Photons that the film is of.
+    pub fn emitted(&self) -> u64 {
+        if self.blocks() > 0 { self.emitted_of_blocks } else { self.emitted }
+    }
+
+    fn end_round<W: World>(&mut self, world: &mut W, recorder: &mut W::Recorder) -> Result<()> {
+        if self.ends_block() {
+            world.end_block(recorder, self)?;
+            let latest = self.kept.entry(self.block % KEPT_BLOCKS).or_insert(self.block);
+            *latest = self.block.max(*latest);
+            self.open_of_blocks.copy_from_slice(&self.open);
+            self.emitted_of_blocks = self.emitted;
+            self.done.insert(self.block);
+            self.begin_block();
+        } else {
+            self.rounds_of_block += 1;
+            // A run of less than a block.
+            if self.rounds() == self.task.rounds {
+                self.end = Some(self.end_of_rounds());
+            }
+        }
+        Ok(())
     }
 
     /// Whether the run is between two rounds.
-    pub fn is_whole(&self) -> bool {
-        self.emitted == u64::from(self.rounds) * self.task.photons_per_round
+    fn is_whole(&self) -> bool {
+        self.emitted == u64::from(self.rounds()) * self.task.photons_per_round
+    }
+
+    /// Whether it is between two blocks.
+    fn is_between_blocks(&self) -> bool {
+        self.is_whole() && self.rounds_of_block == 0
     }
 
     /// Whether the time was up in the first round, so that it ended with the photons that it had.
     fn is_short(&self) -> bool {
-        self.emitted < u64::from(self.rounds) * self.task.photons_per_round
+        self.emitted < u64::from(self.rounds()) * self.task.photons_per_round
     }
 
     /// Runs what is recorded where that is due, looks at it, and says whether the run ends.
     fn pause<W: World>(&mut self, world: &mut W, recorder: &mut W::Recorder, control: &mut Control) -> Result<bool> {
-        if !self.is_due(world, recorder) {
-            return Ok(false);
+        let saves = control.keep.save.is_some() && self.is_between_blocks() && self.saved.elapsed() >= control.keep.every;
+        if !saves && !self.is_due(world, recorder) {
+            return Ok(self.end.is_some());
         }
         self.collect(world, recorder, false)?;
-        if self.is_whole() && self.watch.is_due(self.rounds) {
+        let whole = self.is_between_blocks();
+        if whole && self.watch.is_due(self.blocks()) {
             let film = world.film(recorder, self)?;
-            self.watch.look(&world.error(&film), world.losses(&film, &self.fates).relative);
+            self.watch.look(&world.error(&film), world.losses(&film, self.fates()).relative);
             self.watch.check_losses(self.task.bounces)?;
+        }
+        if saves {
+            let film = world.film(recorder, self)?;
+            control.keep.save.iter_mut().try_for_each(|save| save.save(&self.saved_run(film.clone().into()), false))?;
+            self.saved = Instant::now();
         }
         self.submissions = recorder.counts()[1];
         (control.progress)(&self.progress());
         self.end = if self.is_short() {
             Some(End::Time)
-        } else if self.rounds == self.task.rounds {
-            Some(if self.watch.has_photons(self.emitted) { End::Photons } else { End::Rounds })
+        } else if self.end.is_some() {
+            self.end
         } else {
             let cancelled = control.cancelled.load(Ordering::Relaxed).then_some(End::Cancelled);
-            self.watch.end(self.rounds, self.emitted).or(cancelled)
+            let done = if whole { self.watch.end(self.blocks(), self.emitted) } else { None };
+            done.or(self.watch.is_late().then_some(End::Time)).or(cancelled)
         };
         Ok(self.end.is_some())
     }
 
     /// Whether what is recorded should run now.
     fn is_due<W: World>(&self, world: &W, recorder: &W::Recorder) -> bool {
-        let is_last = self.rounds == self.task.rounds || self.is_short();
-        let may_end = self.watch.has_photons(self.emitted) || (self.is_whole() && self.watch.may_end(self.rounds, self.emitted));
+        let is_last = self.end.is_some() || self.is_short();
+        let may_end = self.is_between_blocks() && self.watch.may_end(self.blocks(), self.emitted);
         // Tallies are 32-bit on the device.
         let open = self.open.iter().max().copied().unwrap_or(0);
         let tallies_full = open + self.task.photons_per_part > u64::from(u32::MAX);
@@ -289,10 +442,10 @@ impl<'a> RunState<'a> {
     /// Runs what is recorded and counts the fates of its photons. Those of a round that was cut short may still be under way.
     fn collect<W: World>(&mut self, world: &mut W, recorder: &mut W::Recorder, interrupted: bool) -> Result<()> {
         world.collect(recorder, self)?;
-        for fates in &mut self.fates {
-            if interrupted {
-                fates.interrupt();
-            }
+        if interrupted {
+            self.fates_of_rest.iter_mut().for_each(Fates::interrupt);
+        }
+        for fates in self.fates_of_blocks.iter().chain(&self.fates_of_rest) {
             let ledger = fates.ledger();
             if !ledger.closes() || ledger.dropped != 0 {
                 return Err(Error::LedgerOpen { ledger });
@@ -302,10 +455,12 @@ impl<'a> RunState<'a> {
     }
 
     fn progress(&self) -> Progress {
-        let Task { rounds: most_rounds, photons_per_round, counts_photons, .. } = self.task;
+        let Task { rounds_per_block, photons_per_round, counts_photons, .. } = self.task;
+        let most_rounds = if self.share.of > 1 { self.share.count(self.wanted()) * rounds_per_block } else { self.task.rounds };
         let rounds =
-            if self.is_whole() || self.is_short() { f64::from(self.rounds) } else { self.emitted as f64 / photons_per_round as f64 };
-        let progress = self.watch.progress(rounds, most_rounds, photons_per_round, sum_of(&self.fates));
+            if self.is_whole() || self.is_short() { f64::from(self.rounds()) } else { self.emitted as f64 / photons_per_round as f64 };
+        let progress =
+            self.watch.progress(rounds, most_rounds, photons_per_round, sum_of(&self.fates_of_blocks).plus(&sum_of(&self.fates_of_rest)));
         if counts_photons {
             Progress { done: self.emitted, total: photons_per_round * u64::from(most_rounds), ..progress }
         } else {

@@ -1,6 +1,6 @@
 //! What a scene's photons lose to limits, and how many its maps have held: twin of `glsl/ledger/totals.glsl`.
 
-use crate::constants::{TALLY_COPIES, TOTAL_FLUX_BITS, TOTAL_WORDS};
+use crate::constants::{TALLY_COPIES, TOTAL_WORDS};
 use crate::gpu::{Buffer, Commands};
 use crate::ledger::Totals;
 
@@ -24,7 +24,6 @@ pub fn sum(words: &[u32]) -> Totals {
             clamped[channel] += wide(copy[8 + 2 * channel], copy[9 + 2 * channel]);
         }
     }
-    let flux = |sums: [u64; 3]| sums.map(|sum| sum as f64 / f64::from(1u32 << TOTAL_FLUX_BITS));
-    (sum.cut_flux, sum.clamped_flux) = (flux(cut), flux(clamped));
+    (sum.cut_flux, sum.clamped_flux) = (cut, clamped);
     sum
 }

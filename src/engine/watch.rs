@@ -1,10 +1,14 @@
 //! When a run ends before its last round: at an error (`--error`), at a time, or at a number of photons, whichever comes first.
 
+use std::path::PathBuf;
 use std::sync::atomic::AtomicBool;
 use std::time::{Duration, Instant};
 
+use super::blocks::Share;
 use super::error_bound::{FilmError, error_bound};
-use crate::error::{Error, Result};
+use super::identity::Identity;
+use super::saved::SavedRun;
+use crate::error::{Error, Result, require};
 use crate::ledger::Ledger;
 use crate::plan::radius::mean_squared_radius;
 use crate::settings::stop::Stop;
@@ -16,13 +20,63 @@ pub struct Control<'a> {
     pub cancelled: &'a AtomicBool,
     /// Told from time to time how far the run has come.
     pub progress: &'a mut dyn FnMut(&Progress),
+    pub keep: Keep<'a>,
+}
+
+/// Takes a run as far as whole blocks are done.
+pub trait SaveRun {
+    /// `is_last`: the run has ended. An error ends it.
+    fn save(&mut self, run: &SavedRun, is_last: bool) -> Result<()>;
+}
+
+/// What of a run is kept, gone on with, and shared.
+#[derive(Default)]
+pub struct Keep<'a> {
+    /// What the scene is called.
+    pub scene: &'a str,
+    /// The part of the run that is to be done.
+    pub share: Share,
+    /// A run of the same identity that this one goes on with, and the name of its file.
+    pub resume: Option<(PathBuf, SavedRun)>,
+    /// Between two calls of `save`, which is also called at the end.
+    pub every: Duration,
+    pub save: Option<&'a mut dyn SaveRun>,
 }
 
 impl<'a> Control<'a> {
     /// Watches nothing but `cancelled`.
     pub fn quiet(cancelled: &'a AtomicBool) -> Control<'a> {
         // A closure without captures takes no memory, so none is lost.
-        Control { cancelled, progress: Box::leak(Box::new(|_: &Progress| {})) }
+        Control { cancelled, progress: Box::leak(Box::new(|_: &Progress| {})), keep: Keep::default() }
+    }
+}
+
+impl Keep<'_> {
+    /// Whether more than the result is asked for.
+    pub fn is_used(&self) -> bool {
+        self.save.is_some() || self.resume.is_some() || self.share.of > 1
+    }
+
+    /// Whether the first block to be done may be another than block 0.
+    pub fn begins_later(&self) -> bool {
+        self.share.number > 0 || self.resume.is_some()
+    }
+
+    /// The identity of the run, which takes a while to find out, where anybody asks. Fails where the file that it is to go on with is
+    /// of another one.
+    pub fn identity(&self, of_run: impl FnOnce(&str) -> Identity) -> Result<Option<Identity>> {
+        if self.save.is_none() && self.resume.is_none() {
+            return Ok(None);
+        }
+        let identity = of_run(self.scene);
+        if let Some((path, saved)) = &self.resume {
+            if let Some(difference) = identity.differs_from(&saved.identity) {
+                return Err(Error::setting("--resume", path.display(), difference));
+            }
+            let other = format!("is shard {} of its run, and this is {}; give the shard's own file", saved.share, self.share);
+            require(saved.share == self.share, "--resume", path.display(), other)?;
+        }
+        Ok(Some(identity))
     }
 }
 
@@ -63,16 +117,18 @@ pub enum End {
     Cancelled,
 }
 
-/// Rounds before the error is looked at first: a spread of fewer says little. Looks come at rounds that grow by a
-/// quarter, as each is one more chance to stop too early.
-const FIRST_LOOK: u32 = 30;
+/// Blocks before the error is looked at first: a spread of fewer says little. Looks come at numbers of blocks that grow by a
+/// quarter, as each is one more chance to stop too early; they are the same in every run.
+const FIRST_LOOK: u32 = 16;
 
 /// Watches a run: how long it has taken, and how large its error still is.
 pub struct Watch {
     stop: Stop,
     /// How fast the radius shrinks (`mean_squared_radius`); 1 keeps it.
     alpha: f64,
+    rounds_per_block: u32,
     started: Instant,
+    /// In blocks.
     next_look: u32,
     /// The latest look.
     seen: Option<Look>,
@@ -93,18 +149,25 @@ struct Look {
 
 impl Watch {
     /// Of a run that began at `started`.
-    pub fn new(stop: Stop, alpha: f64, started: Instant) -> Watch {
-        Watch { stop, alpha, started, next_look: FIRST_LOOK, seen: None }
+    pub fn new(stop: Stop, alpha: f64, rounds_per_block: u32, started: Instant) -> Watch {
+        Watch { stop, alpha, rounds_per_block, started, next_look: FIRST_LOOK, seen: None }
     }
 
-    /// Whether the film should be read after so many rounds.
-    pub fn is_due(&self, rounds: u32) -> bool {
-        rounds >= self.next_look
+    /// Looks at no film of fewer blocks: those that were done before have been looked at.
+    pub fn go_on(&mut self, blocks: u32) {
+        while self.next_look < blocks {
+            self.next_look += (self.next_look / 4).max(1);
+        }
+    }
+
+    /// Whether the film should be read after so many blocks.
+    pub fn is_due(&self, blocks: u32) -> bool {
+        blocks >= self.next_look
     }
 
     /// Whether the run must be looked at now, as it may have done enough.
-    pub fn may_end(&self, rounds: u32, photons: u64) -> bool {
-        (self.stop.error.is_some() && self.is_due(rounds)) || self.has_photons(photons)
+    pub fn may_end(&self, blocks: u32, photons: u64) -> bool {
+        (self.stop.error.is_some() && self.is_due(blocks)) || self.has_photons(photons)
     }
 
     /// When the run's time is up.
@@ -114,10 +177,10 @@ impl Watch {
 
     /// Takes what a film tells, and what limits kept from it, relative to it.
     pub fn look(&mut self, error: &FilmError, lost: f64) {
-        let FilmError { rounds, noise, freedom, ref unknown, unseen } = *error;
+        let FilmError { rounds, blocks, noise, freedom, ref unknown, unseen, .. } = *error;
         let noise = error_bound(noise, freedom, self.stop.confidence);
         self.seen = Some(Look { rounds, noise, unknown: unknown.relative, unseen, lost });
-        self.next_look = rounds + (rounds / 4).max(1);
+        self.next_look = blocks + (blocks / 4).max(1);
     }
 
     /// Noise, bias, what is unknown and what is unseen together at the latest look.
@@ -149,17 +212,19 @@ impl Watch {
         self.stop.photons.is_some_and(|wanted| photons >= wanted)
     }
 
-    /// Whether the run has done enough after so many whole rounds and photons.
-    pub fn end(&self, rounds: u32, photons: u64) -> Option<End> {
+    /// Whether the run has done enough after so many blocks and photons.
+    pub fn end(&self, blocks: u32, photons: u64) -> Option<End> {
+        let rounds = blocks * self.rounds_per_block;
         let small_enough = |wanted: f64| self.error().is_some_and(|(at, error)| at == rounds && error <= wanted);
         if self.stop.error.is_some_and(small_enough) {
             return Some(End::Error);
         }
-        if self.has_photons(photons) {
-            return Some(End::Photons);
-        }
-        let over = self.stop.seconds.is_some_and(|seconds| self.started.elapsed() >= Duration::from_secs_f64(seconds));
-        over.then_some(End::Time)
+        self.has_photons(photons).then_some(End::Photons)
+    }
+
+    /// Whether the run's time is up.
+    pub fn is_late(&self) -> bool {
+        self.deadline().is_some_and(|deadline| Instant::now() >= deadline)
     }
 
     /// How far the run has come, in rounds, which have so many photons each.

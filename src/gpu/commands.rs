@@ -277,7 +277,8 @@ impl<'gpu> Commands<'gpu> {
         Ok(())
     }
 
-    fn copy<T>(&mut self, from: &Buffer<T>, to: &Buffer<T>, count: u64) {
+    /// Copies the first `count` elements of a buffer into another.
+    pub fn copy<T>(&mut self, from: &Buffer<T>, to: &Buffer<T>, count: u64) {
         for buffer in [from, to] {
             assert!(count <= buffer.count(), "{}: {count} elements of {}", buffer.any().name(), buffer.count());
         }

@@ -73,6 +73,7 @@ pub fn on_scene(subcommand: &str, settings: &SceneSettings) -> String {
     line.differing("photons", settings.photons, usual.photons);
     line.differing("caustic-photons", settings.caustic_photons, settings.photons);
     line.differing("rounds", settings.rounds, usual.rounds);
+    settings.block.into_iter().for_each(|block| line.option("block", block));
     line.differing("bounces", settings.bounces, usual.bounces);
     line.differing("seed", settings.seed, usual.seed);
     settings.radius.into_iter().for_each(|radius| line.option("radius", radius));

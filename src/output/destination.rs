@@ -136,6 +136,21 @@ pub fn check_not_read<'a>(destinations: &[Destination], inputs: impl IntoIterato
     }
 }
 
+/// Writes a file that must survive whatever happens next: under another name first, and on the disk before it takes the place of the
+/// one before it.
+pub fn write_synced(destination: &Destination, content: &[u8]) -> Result<()> {
+    let write = || -> std::io::Result<()> {
+        let target = destination.target();
+        let mut file = temporary_in(parent(&target))?;
+        file.write_all(content)?;
+        file.as_file().sync_all()?;
+        file.persist(&target).map_err(|refused| refused.error)?;
+        // The new name too.
+        std::fs::File::open(parent(&target))?.sync_all()
+    };
+    write().map_err(|error| destination.refuse(error.kind()))
+}
+
 /// Writes every file, or none: all are there under temporary names before the first gets its own. If one cannot be
 /// written, all go to a new folder elsewhere, which the error names.
 pub fn write_all(files: impl IntoIterator<Item = (Destination, Vec<u8>)>) -> Result<()> {

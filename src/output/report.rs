@@ -7,14 +7,14 @@ use serde::Serialize;
 
 use crate::constants::MAX_BOUNCES;
 use crate::engine::bias::Bias;
-use crate::engine::error_bound::FilmError;
+use crate::engine::error_bound::{ErrorPlaces, FilmError};
 use crate::engine::nonfinite_values::NonfiniteValues;
 use crate::engine::run::RunResult;
 use crate::engine::unknown::Unknown;
 use crate::engine::watch::End;
 use crate::gpu::DeviceFacts;
 use crate::ledger::{Ledger, Losses};
-use crate::settings::stop::Stop;
+use crate::settings::stop::{Measure, Stop};
 use crate::text::counted;
 use crate::timings::{Row, Timings};
 
@@ -26,18 +26,23 @@ pub(super) struct Common<'a, Settings> {
     device: &'a str,
     driver: &'a str,
     settings: &'a Settings,
-    /// Why it ended, and rounds that are whole.
+    /// Why it ended, and rounds that the result holds.
     end: End,
     rounds: u32,
+    /// Whole blocks of rounds, of which the spread tells the errors; and photons of one that was cut short.
+    blocks: u32,
+    photons_left_out: u64,
     /// Light that limits kept from the result.
     losses: Losses,
-    /// Root mean square of the standard errors over that of the values; null where fewer than two rounds leave it unknown.
+    /// Of the noise, as the settings' `measure` says; null where fewer than two blocks leave it unknown.
     relative_error: f64,
     /// What it is not above, with the confidence of the settings; null also while all is black and need not be.
     error_bound: Option<f64>,
     /// What nothing has reached.
     unknown: &'a Unknown,
     tail: Tail,
+    /// Where the noise sits; null where that is not known.
+    noise_sits: Option<ErrorPlaces>,
     /// Of the radius, relative to the result; null without `--bias`.
     bias: Option<Bias>,
     /// Nonfinite values that `--paranoid` found; null without it.
@@ -50,9 +55,15 @@ pub(super) struct Common<'a, Settings> {
 /// Of the noise: whether the rounds have shown how far it reaches, and what may be missing from them, relative to the result; null
 /// while all is black.
 #[derive(Serialize)]
-struct Tail {
+pub(super) struct Tail {
     known: bool,
     unseen: f64,
+}
+
+impl Tail {
+    pub(super) fn of(error: &FilmError, confidence: f64) -> Tail {
+        Tail { known: error.tail_is_known(confidence), unseen: error.unseen }
+    }
 }
 
 /// `driver` is that of a run without a device.
@@ -70,11 +81,14 @@ pub(super) fn common<'a, Plan, Film, Settings>(
         settings,
         end: run.end,
         rounds: error.rounds,
+        blocks: error.blocks,
+        photons_left_out: run.left_out,
         losses: run.losses,
         relative_error: error.noise,
         error_bound: Some(error.bound(confidence)).filter(|bound| bound.is_finite()),
         unknown: &error.unknown,
-        tail: Tail { known: error.tail_is_known(confidence), unseen: error.unseen },
+        tail: Tail::of(error, confidence),
+        noise_sits: error.places,
         bias: run.bias,
         nonfinite_values: run.nonfinite_values.as_ref(),
         timings: run.timings.rows(),
@@ -84,26 +98,39 @@ pub(super) fn common<'a, Plan, Film, Settings>(
 }
 
 /// Errors and timings, as the text reports of both worlds end. A point is what the result is of, and `unit` its unit.
-pub(super) fn ending<Plan, Film>(run: &RunResult<Plan, Film>, error: &FilmError, confidence: f64, (point, unit): (&str, &str)) -> String {
+pub(super) fn ending<Plan, Film>(run: &RunResult<Plan, Film>, error: &FilmError, stop: &Stop, (point, unit): (&str, &str)) -> String {
     let found = run.nonfinite_values.as_ref().map_or_else(String::new, |values| values.text() + "\n");
-    let errors = errors(error, run.bias.as_ref(), run.losses.relative, confidence);
-    let unknown = error.unknown.text(point, unit, confidence, error.rounds);
-    format!("{found}{errors}{unknown}\n{}", timing_table(&run.timings, run.device.as_ref()))
+    let left_out = match run.left_out {
+        0 => String::new(),
+        photons => format!("left out: {} of a block of rounds that was cut short\n", counted(photons, "photon")),
+    };
+    let errors = errors(error, run.bias.as_ref(), run.losses.relative, (stop.measure, stop.confidence), point);
+    let unknown = error.unknown.text(point, unit, stop.confidence, error.rounds);
+    format!("{found}{left_out}{errors}{unknown}\n{}", timing_table(&run.timings, run.device.as_ref()))
 }
 
-/// Noise, bias, and both together, a line each, in per cent of the result's RMS. What nothing has reached counts in the bounds,
+/// Noise, bias, and both together, a line each, in per cent. What nothing has reached counts in the bounds,
 /// and so does light that limits kept.
-fn errors(error: &FilmError, bias: Option<&Bias>, lost: f64, confidence: f64) -> String {
+pub(super) fn errors(error: &FilmError, bias: Option<&Bias>, lost: f64, (measure, confidence): (Measure, f64), point: &str) -> String {
     let mut text = String::new();
     let (percent, sure) = (|share: f64| 100.0 * share, 100.0 * confidence);
+    let measure = match measure {
+        Measure::Rmse => "RMSE over the mean",
+        Measure::RelMse => "root of relMSE",
+    };
     let known = Some((error.noise, error.bound(confidence))).filter(|(noise, bound)| noise.is_finite() && bound.is_finite());
     match known {
         Some((noise, bound)) => {
-            writeln!(text, "noise: {:.2} % relative RMS error, at most {:.2} % ({sure} % confidence)", percent(noise), percent(bound))
-                .unwrap();
+            writeln!(text, "noise: {:.2} % ({measure}), at most {:.2} % ({sure} % confidence)", percent(noise), percent(bound)).unwrap();
         }
         None if error.rounds == 1 => text.push_str("noise: unknown after a single round\n"),
+        None if error.blocks < 2 => {
+            writeln!(text, "noise: unknown, as fewer than two blocks of rounds are whole; use more --rounds or a smaller --block").unwrap();
+        }
         None => text.push_str("noise: unknown\n"),
+    }
+    if let Some(places) = &error.places {
+        text.push_str(&sits(places, point));
     }
     if !error.tail_is_known(confidence) {
         let most = if error.unseen.is_finite() { format!("{:.2} %", percent(error.unseen)) } else { "any share".to_owned() };
@@ -143,6 +170,20 @@ fn errors(error: &FilmError, bias: Option<&Bias>, lost: f64, confidence: f64) ->
         writeln!(text, "{what}: {:.2} %, at most {:.2} %", percent(error), percent(most)).unwrap();
     }
     text
+}
+
+/// Where the noise sits, as shares of its square.
+fn sits(places: &ErrorPlaces, point: &str) -> String {
+    let names = ["direct light", "light over mirrors and glass", "caustics", "indirect light"];
+    let mut parts: Vec<(f64, &str)> = places.of_parts.into_iter().zip(names).filter(|(share, _)| *share >= 0.005).collect();
+    parts.sort_by(|a, b| b.0.total_cmp(&a.0));
+    let parts: Vec<String> = parts.into_iter().map(|(share, name)| format!("{name} {:.0} %", 100.0 * share)).collect();
+    format!(
+        "        its square sits in {}; {:.0} % of it in the worst {}\n",
+        parts.join(", "),
+        100.0 * places.of_worst_pixels,
+        counted(places.worst_pixels, point)
+    )
 }
 
 /// Light that limits kept from the result; `bounces` is the cap.
@@ -217,7 +258,8 @@ mod tests {
     fn a_report_says_that_the_tail_is_not_known() {
         let text = |unseen| {
             let freedom = DegreesOfFreedom::least(16);
-            errors(&FilmError { rounds: 16, noise: 0.1, freedom, unknown: Unknown::default(), unseen }, None, 0.0, 0.95)
+            let error = FilmError { rounds: 16, blocks: 16, noise: 0.1, freedom, unknown: Unknown::default(), unseen, places: None };
+            errors(&error, None, 0.0, (Measure::Rmse, 0.95), "pixel")
         };
         assert!(text(0.5).contains("not known yet") && text(0.5).contains("may add 50.00 % (95 % confidence)"), "{}", text(0.5));
         assert!(text(f64::INFINITY).contains("may add any share"), "{}", text(f64::INFINITY));

@@ -103,7 +103,7 @@ pub fn error(outcome: &RunResult, scene: &RoomScene) -> FilmError {
     let RunResult { plan, film, .. } = outcome;
     // W of a photon of relative flux 1.
     let watts = plan.flux_unit / film.emitted.max(1) as f64;
-    let error = film.error(&irradiance_weights(scene, plan), watts, plan.settings.stop.confidence);
+    let error = film.error(&irradiance_weights(scene, plan), watts, &plan.settings.stop);
     let is_lit = (0..film.point_count()).any(|point| !film.is_unreached(point));
     if is_lit { error } else { FilmError { noise: f64::INFINITY, ..error } }
 }
@@ -130,8 +130,7 @@ pub fn text(outcome: &RunResult, error: &FilmError) -> String {
     )
     .unwrap();
     if let Some(why) = end_in_words(outcome.end, &settings.stop) {
-        let unfinished = if outcome.film.unfinished.is_empty() { "" } else { " and part of another" };
-        writeln!(text, "ended {why}: {}{unfinished} of at most {}", counted(outcome.film.rounds, "round"), settings.rounds).unwrap();
+        writeln!(text, "ended {why}: {} of at most {}", counted(outcome.film.rounds, "round"), settings.rounds).unwrap();
     }
     for decision in &outcome.plan.decisions {
         let verb = if decision.kept { "with" } else { "without" };
@@ -140,6 +139,6 @@ pub fn text(outcome: &RunResult, error: &FilmError) -> String {
     text.push('\n');
     text.push_str(&ledger(&outcome.ledger()));
     text.push_str(&losses(&outcome.losses, settings.bounces));
-    text.push_str(&ending(outcome, error, settings.stop.confidence, ("texel", "W/m2")));
+    text.push_str(&ending(outcome, error, &settings.stop, ("texel", "W/m2")));
     text
 }

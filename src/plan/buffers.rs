@@ -4,7 +4,7 @@ use bytemuck::Pod;
 use glam::{UVec2, Vec2, Vec4};
 
 use super::RoomPlan;
-use super::latest_rounds::kept_values;
+use super::latest_blocks::{kept_count, kept_values};
 use super::scene::{MapPlan, ScenePlan};
 use super::sensor::Sensor;
 use crate::constants::{
@@ -56,8 +56,11 @@ fn nonfinite_values() -> PlannedBuffer {
     buffer::<u32>("nonfinite values", kinds * NONFINITE_KIND_WORDS as u64, "the nonfinite values that --paranoid found")
 }
 
-/// Words that kernels count clamped values and lost camera paths in (`glsl/world/scene/film_units.glsl`).
-pub const ANOMALY_WORDS: usize = 8;
+/// Words that kernels count clamped values, lost camera paths and samples of surfaces in (`glsl/world/scene/film_units.glsl`).
+pub const ANOMALY_WORDS: usize = 10;
+
+/// Values of a place that are kept of a block: three channels of each part of light.
+pub const PART_VALUES: u64 = 3 * PART_COUNT as u64;
 
 /// Sums of each level of a prefix sum over `items`: sums of blocks of the level below, down to one block.
 pub fn block_sum_counts(items: u64, group_size: u32) -> Vec<u64> {
@@ -114,6 +117,7 @@ impl RoomPlan {
             buffer::<u32>("counters", self.counter_array_length(), "lengths of the photon map and of the lists of paths"),
             buffer::<DispatchArgs>("dispatch args", 1, "the size of the next dispatch"),
             buffer::<Tally>("tallies", bounces * u64::from(TALLY_COPIES), "fates of photons"),
+            buffer::<Tally>("tallies of rounds", bounces * u64::from(TALLY_COPIES), "fates as the latest whole round left them"),
             buffer::<u64>("film", sums, "sums of the round under way"),
             nonfinite_values(),
         ];
@@ -167,11 +171,7 @@ impl RoomPlan {
                 buffer::<u64>("film totals", sums, "sums of all rounds"),
                 buffer::<u64>("low squares", sums, "lower halves of their squares"),
                 buffer::<u64>("high squares", sums, "upper halves of their squares"),
-                buffer::<f32>(
-                    "latest rounds",
-                    kept_values(self.points.len(), self.settings.rounds) as u64,
-                    "some points of the latest rounds",
-                ),
+                buffer::<f32>("latest blocks", kept_values(self.points.len()) as u64, "some points of the latest rounds"),
             ]);
         }
         buffers
@@ -229,16 +229,18 @@ impl ScenePlan {
     /// What grows with the pixels or receivers.
     pub(super) fn sensor_buffers(&self) -> Vec<PlannedBuffer> {
         let (pixels, points) = (u64::from(self.sensor.pixels()), u64::from(self.visible_points()));
+        let seen = if self.film.sees_light { pixels } else { 0 };
         let mut buffers = vec![
-            buffer::<u64>("film sums", 3 * pixels, "sums of all rounds"),
+            buffer::<u64>("block sums", 3 * pixels, "sums of the block under way"),
+            buffer::<u64>("film sums", 3 * pixels, "sums of all blocks"),
             buffer::<u64>("film squares", 6 * pixels, "sums of their squares"),
-            buffer::<f32>(
-                "latest rounds",
-                3 * kept_values(pixels as usize, self.settings.rounds) as u64,
-                "some pixels of the latest rounds",
-            ),
+            buffer::<u64>("surface block sums", 3 * seen, "the same of light that surfaces scatter"),
+            buffer::<u64>("surface sums", 3 * seen, "sums of all blocks of it"),
+            buffer::<u64>("surface squares", 6 * seen, "sums of their squares"),
+            buffer::<f32>("latest blocks", PART_VALUES * kept_values(pixels as usize) as u64, "some pixels of the latest blocks"),
             buffer::<u32>("one hits", u64::from(HIT_KINDS) * pixels, "what one hit would add where none has"),
-            buffer::<u64>("pass sums", 3 * pixels * u64::from(self.samples()), "samples of pixels in a round"),
+            buffer::<u32>("one hits of blocks", u64::from(HIT_KINDS) * pixels, "the same as the latest whole block left it"),
+            buffer::<u64>("pass sums", 3 * (pixels + seen) * u64::from(self.samples()), "samples of pixels in a round"),
             buffer::<VisiblePoint>("visible points", points, "where photons are looked up"),
             buffer::<MattLobes>("matt lobes", if self.keeps(Effect::Layers) { points } else { 0 }, "how layered points weigh light"),
             buffer::<MattCover>("matt covers", if self.has_covers() { points } else { 0 }, "coats, sheen and films of visible points"),
@@ -284,6 +286,10 @@ impl ScenePlan {
             buffer::<Tally>("caustic tallies", tallies, "fates of the caustic map's photons"),
             buffer::<u32>("global totals", totals, "what limits cost the global map"),
             buffer::<u32>("caustic totals", totals, "what limits cost the caustic map"),
+            buffer::<Tally>("global tallies of blocks", tallies, "fates as the latest whole block left them"),
+            buffer::<Tally>("caustic tallies of blocks", tallies, "fates as the latest whole block left them"),
+            buffer::<u32>("global totals of blocks", totals, "what limits cost as the latest whole block left it"),
+            buffer::<u32>("caustic totals of blocks", totals, "what limits cost as the latest whole block left it"),
         ];
         buffers.extend(block_sums("sums of cells", buckets + 1, self.settings.group_size));
         if self.builder() == Builder::Scan {
@@ -296,10 +302,13 @@ impl ScenePlan {
 
     /// What kernels count, whatever the sizes.
     fn count_buffers(&self) -> Vec<PlannedBuffer> {
+        let kept = PART_VALUES * kept_count(self.sensor.pixels() as usize) as u64;
         vec![
             buffer::<u32>("camera path counts", 1, "how many camera paths a dispatch leaves"),
-            buffer::<u64>("part totals", u64::from(PART_COUNT), "light of each part of a path"),
+            buffer::<u64>("part totals", u64::from(PART_COUNT) + kept, "light of each part of a path, and in some pixels"),
+            buffer::<u64>("part totals of blocks", u64::from(PART_COUNT), "the same as the latest whole block left it"),
             buffer::<u32>("anomalies", ANOMALY_WORDS as u64, "clamped values and lost camera paths"),
+            buffer::<u32>("anomalies of blocks", ANOMALY_WORDS as u64, "the same as the latest whole block left them"),
             nonfinite_values(),
         ]
     }

@@ -4,7 +4,8 @@
 pub mod buffers;
 pub mod capacity;
 pub mod evidence;
-pub mod latest_rounds;
+pub mod film;
+pub mod latest_blocks;
 pub mod light_choice;
 mod maps;
 pub mod planning;

@@ -6,6 +6,7 @@ use std::time::{Duration, Instant};
 use super::Limits;
 use super::buffers::{PlannedBuffer, bytes_of};
 use super::evidence::{EffectDecision, Facts};
+use super::film::FilmPlan;
 use super::light_choice::LightChoice;
 use super::maps::Maps;
 use super::radius::Trial;
@@ -16,14 +17,15 @@ use crate::error::{Error, Result, require};
 use crate::photon::MapPhoton;
 use crate::scene::geometry::Geometry;
 use crate::scene::{LobeKinds, Scene, Surface, openings};
-use crate::settings::scene::{Effect, Illumination, SceneSettings};
+use crate::settings::scene::{Effect, Illumination, MAX_ROUNDS, SceneSettings};
 use crate::settings::{Builder, Math};
 
 /// Triangles up to which a list may be asked for: a path tests it some hundred times, and loops are short.
 const MAX_LIST_TRIANGLES: usize = 256;
-/// Bits of a film unit below the scene's mean radiance: as many as leave so many above it, within these.
-const FILM_BITS: (i32, i32) = (24, 32);
-const FILM_HEADROOM_BITS: i32 = 24;
+/// Bits of a film unit below the scene's mean radiance.
+const FILM_BITS: i32 = 24;
+/// Most units that all rounds may add to a pixel: a run may go on to `MAX_ROUNDS`.
+const MOST_UNITS: f64 = (1u64 << 62) as f64;
 /// A photon in its map, sorted and unsorted, and its place in its bucket.
 const MAP_ENTRY_BYTES: u64 = 2 * size_of::<MapPhoton>() as u64 + 4;
 
@@ -47,6 +49,9 @@ impl ScenePlan {
         let count = geometry.triangles.len();
         let few = format!("is for scenes of {MAX_LIST_TRIANGLES} triangles at most, and this one has {count}");
         require(!settings.leaves_out(Effect::Bvh) || count <= MAX_LIST_TRIANGLES, "--without", "bvh", few)?;
+        let block = settings.rounds_per_block(matches!(sensor, Sensor::Picture { .. }));
+        let whole = format!("must be whole blocks of {block} rounds (--block), or fewer than one has");
+        require(settings.rounds < block || settings.rounds.is_multiple_of(block), "--rounds", settings.rounds, whole)?;
         let facts = Facts::new(scene, geometry, settings, sensor);
         let decisions: Vec<EffectDecision> = Effect::ALL.iter().map(|effect| facts.decide(*effect, settings)).collect();
         let keeps = |effect: Effect| decisions.iter().any(|decision| decision.effect == effect && decision.kept);
@@ -60,14 +65,34 @@ impl ScenePlan {
             (true, false, true) if split => GATHER_GLOSSY,
             _ => GATHER_NONE,
         };
-        let samples = if matches!(sensor, Sensor::Picture { .. }) { settings.samples } else { 1 };
+        let is_picture = matches!(sensor, Sensor::Picture { .. });
+        let samples = if is_picture { settings.samples } else { 1 };
         // A software device counts loop iterations.
         let chain_steps = if limits.loop_iterations > LOOP_LIMIT { MAX_BOUNCES } else { SEGMENT_BOUNCES };
         let mut constants = constants(geometry, &settings, &facts, &maps, &keeps);
         constants.extend([("SAMPLES", samples), ("GATHER_RAYS", gather_rays), ("CHAIN_STEPS", chain_steps)]);
+        constants.extend([("ROUNDS_PER_BLOCK", settings.rounds_per_block(is_picture)), ("HAS_SEEN_LIGHT", u32::from(is_picture))]);
         let clusters = trial.as_ref().and_then(|trial| trial.lights.as_ref()).map_or(0, |lights| lights.clusters);
         constants.push(("LIGHT_CLUSTERS", clusters));
         let Maps { global, caustic, caustic_surfaces, targets, arrivals } = maps;
+        let points_per_pixel = samples * if gather_rays == GATHER_NONE { 1 } else { 2 };
+        let arrival_sets = if split { 2 } else { 3 };
+        let limit = MOST_UNITS / f64::from(MAX_ROUNDS);
+        let film = FilmPlan {
+            scale: 1.0,
+            limit,
+            point_limit: limit / f64::from((points_per_pixel * arrival_sets).next_power_of_two()),
+            rounds_per_block: settings.rounds_per_block(is_picture),
+            samples,
+            // What is seen straight is rounded by itself.
+            roundings_per_round: f64::from((PART_COUNT + 1) * samples + points_per_pixel * arrival_sets),
+            sees_light: is_picture,
+            rare_radiance: 0.0,
+            alpha: settings.alpha,
+            widest_radii: [0.0; 2],
+            confidence: settings.stop.confidence,
+            measure: settings.stop.measure,
+        };
         let mut plan = ScenePlan {
             settings,
             sensor,
@@ -78,41 +103,38 @@ impl ScenePlan {
             caustic,
             caustic_surfaces,
             targets,
-            points_per_pixel: samples * if gather_rays == GATHER_NONE { 1 } else { 2 },
-            arrival_sets: if split { 2 } else { 3 },
+            points_per_pixel,
+            arrival_sets,
             arrivals,
             chain_steps,
-            film_scale: 1.0,
-            film_limit: 1.0,
-            rare_radiance: 0.0,
+            film,
             work_per_submission: limits.pair_tests_per_submission,
             bytes: 0,
             planned_in: Duration::ZERO,
         };
-        plan.set_film(geometry);
-        let shows_lamps = plan.keeps(Effect::SpecularChains) && facts.has_kind(LobeKinds::is_sharp);
-        if shows_lamps && matches!(sensor, Sensor::Picture { .. }) && plan.settings.part as u32 & PART_SPECULAR != 0 {
-            // A path of one channel stands for three.
-            let of_channel = if plan.keeps(Effect::Dispersion) { 3.0 } else { 1.0 };
-            plan.rare_radiance = of_channel * geometry.brightest_shown();
-        }
+        plan.set_film(geometry, &facts);
         plan.check_sizes(geometry, limits)?;
         plan.decisions = plan.decisions.iter().map(|decision| plan.given(decision, geometry)).collect();
         plan.planned_in = began.elapsed();
         Ok(plan)
     }
 
-    /// A unit far below the scene's mean radiance, and sums that cannot overflow.
-    fn set_film(&mut self, geometry: &Geometry) {
+    /// A unit far below the scene's mean radiance, and sums that cannot overflow however long the run goes on.
+    fn set_film(&mut self, geometry: &Geometry, facts: &Facts) {
         let mean = (geometry.power / 3.0 / (PI * geometry.area)).max(f64::MIN_POSITIVE);
-        let limit = 2f64.powi(62) / f64::from(self.settings.rounds);
-        let bits = (limit.log2() as i32 - FILM_HEADROOM_BITS).clamp(FILM_BITS.0, FILM_BITS.1);
-        let by_mean = bits - mean.log2().floor() as i32;
+        let by_mean = FILM_BITS - mean.log2().floor() as i32;
         // A picture of a lamp may be far above the mean.
         let brightest = 4.0 * geometry.brightest().max(mean);
-        let by_brightest = (limit / brightest).log2().floor() as i32;
-        self.film_scale = 2f64.powi(by_mean.min(by_brightest).clamp(-112, 126));
-        self.film_limit = limit;
+        let by_brightest = (self.film.limit / brightest).log2().floor() as i32;
+        self.film.scale = 2f64.powi(by_mean.min(by_brightest).clamp(-112, 126));
+        let shows_lamps = self.keeps(Effect::SpecularChains) && facts.has_kind(LobeKinds::is_sharp);
+        if shows_lamps && self.film.sees_light && self.settings.part as u32 & PART_SPECULAR != 0 {
+            // A path of one channel stands for three.
+            let of_channel = if self.keeps(Effect::Dispersion) { 3.0 } else { 1.0 };
+            self.film.rare_radiance = of_channel * geometry.brightest_shown();
+        }
+        let widest = |map: &Option<MapPlan>| map.as_ref().map_or(0.0, |map| self.widest_radius(map, 0));
+        self.film.widest_radii = [widest(&self.global), widest(&self.caustic)];
     }
 
     fn check_sizes(&mut self, geometry: &Geometry, limits: &Limits) -> Result<()> {

@@ -13,7 +13,7 @@ use crate::photon::StoredPhoton;
 use crate::records::{IndexPush, Point};
 use crate::rng::Streams;
 use crate::scene::room::RoomScene;
-use crate::settings::{Builder, Gather, RoomSettings, Sums};
+use crate::settings::{Builder, Gather, MAX_NEAREST_SUMMED, MOST_ROUNDS, RoomSettings, Sums};
 
 /// A run of photons of one light inside a chunk.
 #[derive(Debug, Clone, Copy, PartialEq, Eq)]
@@ -69,6 +69,8 @@ pub struct RoomPlan {
     /// Whether entries of the photon map say which photon they are: the nearest photons are told apart by it, and so are
     /// photons that somebody lists.
     pub keeps_origins: bool,
+    /// Whether the run may go on later, or is a part of one.
+    pub is_kept: bool,
     /// Invocations that share a point of a gather over the grid.
     pub lanes: u32,
     /// Whether they test a slice of its candidates only, lest they loop for too long.
@@ -111,6 +113,8 @@ const MAX_CELLS_PER_AXIS: u32 = 128;
 /// Tests of a point in cells of the radius, from which on cells of half of it pay: lavapipe gathers 1.4 x faster with 100
 /// times as many.
 const DENSE: u64 = 512;
+/// Events to which any run may go on.
+const EVENTS_OF_SCALE: u64 = 1 << 40;
 /// Fixed-point units that the faintest photon must be worth: a thousandth is lost to rounding at most.
 const MIN_FIXED_POINT: f64 = 512.0;
 
@@ -131,7 +135,8 @@ impl RoomPlan {
         let faintest = relative_flux.iter().fold(1.0f32, |a, b| a.min(*b));
         let is_seen = channel_count == 1 || f64::from(faintest) * ((1u64 << film_shift) as f64) >= MIN_FIXED_POINT;
         let [floor, left] = settings.light_power;
-        let allowed = "differ too much for the film's integer sums over so many photons; choose closer values, or ask for fewer photons * rounds * bounces";
+        let allowed =
+            "differ too much for the film's integer sums over so many photons; choose closer values, or ask for fewer photons * bounces";
         require(is_seen, "--light-power", format!("{floor},{left}"), allowed)?;
 
         let points: Vec<Point> = scene
@@ -165,6 +170,7 @@ impl RoomPlan {
             pair_tests_per_submission: limits.pair_tests_per_submission,
             persistence: Persistence::new(capacity::loops_to_begin(settings.rng), capacity::LOOPS_PER_BOUNCE, settings.bounces, limits),
             keeps_origins: settings.nearest.is_some(),
+            is_kept: false,
             lanes: capacity::lanes(settings, limits, work.tests_per_point(chunk_photons)),
             slices_candidates: false,
         };
@@ -231,7 +237,7 @@ impl RoomPlan {
 
     /// Whether rounds are told apart, so that their spread tells the error: floats go on over all rounds.
     pub fn keeps_squares(&self) -> bool {
-        self.settings.rounds > 1 && self.settings.sums == Sums::Integer
+        (self.settings.rounds > 1 || self.is_kept) && self.settings.sums == Sums::Integer
     }
 
     /// Photons that one dispatch traces from their light to their end, in a fraction of a second.
@@ -311,11 +317,16 @@ fn deal(photons: u32, powers: &[f64]) -> Vec<u32> {
 ///
 /// Of nearest photons a round adds fewer than K, each scaled up by 2^[`NEAREST_GAIN_BITS`] at most, and
 /// their flux has no more bits to give than [`NEAREST_BITS`].
+///
+/// The scale is the same for all numbers of rounds up to [`MOST_ROUNDS`] and [`EVENTS_OF_SCALE`], so that a run can go on.
 fn film_shift(settings: &RoomSettings) -> u32 {
-    let (events, most) = match settings.nearest {
-        Some(nearest) => ((u64::from(settings.rounds) * u64::from(nearest)) << NEAREST_GAIN_BITS, NEAREST_BITS),
-        None => (settings.total_photons() * u64::from(settings.bounces), 31),
+    let of_round = settings.nearest.map_or(u64::from(settings.photons) * u64::from(settings.bounces), u64::from);
+    let (fits, gain, most) = match settings.nearest {
+        Some(_) => (MAX_NEAREST_SUMMED, NEAREST_GAIN_BITS, NEAREST_BITS),
+        None => (EVENTS_OF_SCALE, 0, 31),
     };
+    let rounds = (fits / of_round).min(MOST_ROUNDS.into()).max(settings.rounds.into());
+    let events = (rounds * of_round) << gain;
     let bits = u64::BITS - (events - 1).leading_zeros();
     (63 - bits).min(most)
 }
@@ -370,7 +381,7 @@ mod tests {
         }
         for (rounds, nearest) in [(1, 2), (1, 1024), (100, 50), (1 << 21, 1024), (1 << 30, 2)] {
             let settings = RoomSettings { photons: 2, rounds, gather: Gather::KdTree, nearest: Some(nearest), ..RoomSettings::default() };
-            assert!(u64::from(rounds) * u64::from(nearest) <= crate::settings::MAX_NEAREST_SUMMED);
+            assert!(u64::from(rounds) * u64::from(nearest) <= MAX_NEAREST_SUMMED);
             let shift = film_shift(&settings);
             // With half a unit of rounding each round.
             let most = (u128::from(nearest - 1) << (NEAREST_GAIN_BITS + shift)) + 1;

@@ -6,6 +6,7 @@ use serde::Serialize;
 
 use super::capacity::Persistence;
 use super::evidence::EffectDecision;
+use super::film::FilmPlan;
 use super::light_choice::LightChoice;
 use super::radius::{self, Classes, RADIUS_RANGE, RadiusFrom, Trial};
 use super::sensor::Sensor;
@@ -102,12 +103,7 @@ pub struct ScenePlan {
     pub arrivals: u32,
     /// Surfaces that one dispatch follows a camera path over.
     pub chain_steps: u32,
-    /// Film units in 1 W/m2/sr or W/m2, a power of two, and the most that one round may add.
-    pub film_scale: f64,
-    pub film_limit: f64,
-    /// Radiance of the brightest that a camera path may meet over mirrors and glass, W/m2/sr, all channels together; 0 where none
-    /// can. Such hits are rare and bright: they are the tail of the noise.
-    pub rare_radiance: f64,
+    pub film: FilmPlan,
     /// Rays or pair tests after which commands are handed to the device.
     pub work_per_submission: u64,
     /// Bytes of all buffers, with one set of receivers; see [`ScenePlan::bytes_of`].
@@ -223,17 +219,6 @@ impl ScenePlan {
     /// Photons that one dispatch traces from their light to their end, in a fraction of a second.
     pub fn photons_per_dispatch(&self) -> u32 {
         (self.work_per_submission / (RAY_COST * FLIGHTS_PER_PHOTON)).clamp(1, u64::from(u32::MAX)) as u32
-    }
-
-    /// What each arrival at a visible point may add, so that all of a pixel's stay below the film's limit together.
-    pub fn point_limit(&self) -> f64 {
-        self.film_limit / f64::from((self.points_per_pixel * self.arrival_sets).next_power_of_two())
-    }
-
-    /// How often at most a pixel's light is rounded to the film's unit in a round: each part of a path's direct light, and each
-    /// map's at each visible point.
-    pub fn roundings_per_round(&self) -> f64 {
-        f64::from(PART_COUNT * self.samples() + self.points_per_pixel * self.arrival_sets)
     }
 
     /// Visible points of one lookup, which has a work group of them along x.

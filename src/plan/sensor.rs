@@ -1,9 +1,9 @@
 //! What light is asked of: a camera's picture, or points.
 
-use serde::Serialize;
+use serde::{Deserialize, Serialize};
 
 /// What light is asked of.
-#[derive(Debug, Clone, Copy, PartialEq, Eq, Serialize)]
+#[derive(Debug, Clone, Copy, PartialEq, Eq, Serialize, Deserialize)]
 #[serde(rename_all = "lowercase")]
 pub enum Sensor {
     /// A camera's picture.

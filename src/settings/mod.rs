@@ -6,7 +6,7 @@
 macro_rules! named {
     ($(#[$doc:meta])* pub enum $type:ident { $($(#[$note:meta])* $value:ident = $name:literal),* $(,)? }) => {
         $(#[$doc])*
-        #[derive(Debug, Clone, Copy, PartialEq, Eq, PartialOrd, Ord, Hash, serde::Serialize)]
+        #[derive(Debug, Clone, Copy, PartialEq, Eq, PartialOrd, Ord, Hash, serde::Serialize, serde::Deserialize)]
         pub enum $type {
             $($(#[$note])* #[serde(rename = $name)] $value),*
         }
@@ -365,7 +365,7 @@ const MIN_RADIUS_SHARE: f64 = 1.0 / 65_536.0;
 /// The same in metres.
 pub const MIN_RADIUS: f64 = 2.0 * HALF_WIDTH * MIN_RADIUS_SHARE;
 /// Rounds of a run that ends by itself.
-const MOST_ROUNDS: u32 = 1 << 24;
+pub const MOST_ROUNDS: u32 = 1 << 20;
 /// Photons * bounces that a film sum can hold with 16 bits after the binary point.
 pub const MAX_EVENTS: u64 = 1 << 47;
 /// Rounds * nearest photons that a film sum can hold, each scaled up by 2^`NEAREST_GAIN_BITS`, with 10 bits after

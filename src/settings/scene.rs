@@ -107,8 +107,11 @@ pub struct SceneSettings {
     pub photons: u32,
     /// Photons of the caustic map, each pass.
     pub caustic_photons: u32,
-    /// Independent passes, of which the result is the mean.
+    /// Independent passes, of which the result is the mean: whole blocks, or less than one.
     pub rounds: u32,
+    /// Rounds of a block, a power of two, over all of which samples are even; `None`: so many that a pixel has
+    /// [`SAMPLES_PER_BLOCK`] samples in it. What is known of errors comes from the spread of blocks.
+    pub block: Option<u32>,
     /// Bounces after which a photon is cut off; by default roulette ends it long before, which is null in JSON.
     #[serde(serialize_with = "cap")]
     pub bounces: u32,
@@ -159,6 +162,7 @@ impl Default for SceneSettings {
             photons: 1 << 17,
             caustic_photons: 1 << 17,
             rounds: 16,
+            block: None,
             bounces: MAX_BOUNCES,
             seed: 1,
             radius: None,
@@ -186,6 +190,9 @@ impl Default for SceneSettings {
 }
 
 pub const MAX_ROUNDS: u32 = 1 << 20;
+/// Camera paths through a pixel in a block of rounds, at least.
+pub const SAMPLES_PER_BLOCK: u32 = 4;
+pub const MAX_BLOCK: u32 = 1 << 10;
 /// A visible point's rays are one loop.
 const MAX_SHADOW_RAYS: u32 = 64;
 /// A pixel's paths are summed by one invocation.
@@ -203,6 +210,10 @@ impl SceneSettings {
             require(Builder::ON_GPU.contains(&builder), "--variant", builder.name(), allowed)?;
         }
         within("--shadow-rays", self.shadow_rays, 1..=MAX_SHADOW_RAYS, "shadow rays from each visible point, each round")?;
+        if let Some(block) = self.block {
+            let is_allowed = block.is_power_of_two() && block <= MAX_BLOCK;
+            require(is_allowed, "--block", block, format!("must be a power of two up to {MAX_BLOCK}"))?;
+        }
         let is_share = self.samples.is_power_of_two() && self.samples <= MAX_SAMPLES;
         require(is_share, "--samples", self.samples, format!("must be a power of two up to {MAX_SAMPLES}"))?;
         for (option, radius) in [("--radius", self.radius), ("--caustic-radius", self.caustic_radius)] {
@@ -219,6 +230,19 @@ impl SceneSettings {
             Some(both) => Err(Error::setting("--without", both.name(), "is also in --with; choose one of the two")),
             None => Ok(()),
         }
+    }
+
+    /// Rounds of a block of a picture, or of points that are asked about.
+    pub fn rounds_per_block(&self, of_picture: bool) -> u32 {
+        let samples = if of_picture { self.samples } else { 1 };
+        self.block.unwrap_or((SAMPLES_PER_BLOCK / samples).max(1))
+    }
+
+    /// With as many rounds as whole blocks have, unless there are fewer than one has.
+    pub fn in_whole_blocks(&self, of_picture: bool) -> SceneSettings {
+        let block = self.rounds_per_block(of_picture);
+        let rounds = if self.rounds > block { self.rounds.next_multiple_of(block) } else { self.rounds };
+        SceneSettings { rounds, ..self.clone() }
     }
 
     pub fn forces(&self, effect: Effect) -> bool {

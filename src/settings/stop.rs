@@ -4,10 +4,23 @@ use serde::Serialize;
 
 use crate::error::{Result, require};
 
+named! {
+    /// What `error` is of. Both are roots of means over pixels, texels or points and their three channels, of light that surfaces
+    /// scatter: what shines by itself and is seen straight is left out (a lamp, the sky, what is unlit).
+    pub enum Measure {
+        /// The root of the mean square of errors, over the mean.
+        Rmse = "rmse",
+        /// The root of the mean of squares of errors, each over the square of its value and of a hundredth of the mean.
+        RelMse = "relmse",
+    }
+}
+
 #[derive(Debug, Clone, Copy, PartialEq, Serialize)]
 pub struct Stop {
-    /// Relative error that is good enough: root mean square over that of the result.
+    /// Relative error that is good enough.
     pub error: Option<f64>,
+    /// What it is of.
+    pub measure: Measure,
     /// Chance that the error is no larger than stated.
     pub confidence: f64,
     /// Wall time.
@@ -21,7 +34,7 @@ pub struct Stop {
 
 impl Default for Stop {
     fn default() -> Stop {
-        Stop { error: None, confidence: 0.95, seconds: None, photons: None, bias: None }
+        Stop { error: None, measure: Measure::Rmse, confidence: 0.95, seconds: None, photons: None, bias: None }
     }
 }
 

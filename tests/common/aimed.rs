@@ -103,7 +103,7 @@ pub fn scene(kind: &str) -> Scene {
 }
 
 pub fn settings(photons: u32, aim: bool) -> SceneSettings {
-    let caustic = SceneSettings { part: Part::Caustic, caustic_radius: Some(0.2), alpha: 1.0, ..SceneSettings::default() };
+    let caustic = SceneSettings { part: Part::Caustic, caustic_radius: Some(0.2), alpha: 1.0, ..by_rounds() };
     SceneSettings { caustic_photons: photons, aim, bounces: 12, rounds: 1, ..caustic }
 }
 

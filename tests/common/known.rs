@@ -36,7 +36,7 @@ pub fn lamp_in_a_box(gpu: &Gpu, illumination: Illumination) -> Check<Complaint> 
     side("right", corner + x, height, z, 0);
     side("back", corner, height, x, 0);
     side("front", corner + z, x, height, 0);
-    let settings = SceneSettings { photons: 20_000, rounds: 4, illumination, ..SceneSettings::default() };
+    let settings = SceneSettings { photons: 20_000, rounds: 4, illumination, ..by_rounds() };
     let points = [(DVec3::new(0.5, 0.0, 0.5), DVec3::Y), (DVec3::new(0.5, 1.0, 0.5), DVec3::NEG_Y)];
     match mean_red(&received(gpu, &room, &settings, &points)) {
         0.0 => Ok(()),
@@ -51,7 +51,7 @@ pub fn shelf(gpu: &Gpu) -> Check<Complaint> {
     room.materials = vec![matt(0.7), Material { emission: Vec3::splat(10.0), ..matt(0.5) }];
     room.meshes.push(Mesh::parallelogram("shelf", DVec3::Y * 0.001, DVec3::Z, DVec3::X, 0));
     room.meshes.push(Mesh::parallelogram("lamp", DVec3::new(0.4, 0.9, 0.4), DVec3::X * 0.2, DVec3::Z * 0.2, 1));
-    let settings = SceneSettings { radius: Some(0.1), photons: 20_000, rounds: 4, ..SceneSettings::default() };
+    let settings = SceneSettings { radius: Some(0.1), photons: 20_000, rounds: 4, ..by_rounds() };
     let points = [(DVec3::new(0.3, 0.001, 0.3), DVec3::Y), (DVec3::new(0.3, 0.0, 0.3), DVec3::Y)];
     let found = means(&received(gpu, &room, &settings, &points));
     assert!(found[0].x > 0.1, "the shelf has {}", found[0]);
@@ -82,7 +82,7 @@ pub fn spot(gpu: &Gpu) -> Check<Complaint> {
     let shares = [0.0, 0.1, 0.25, 0.5, 0.75, 1.0];
     let cosines = shares.map(|share| outer + share * (inner - outer));
     let points = cosines.map(|cosine| (DVec3::X * (1.0 - cosine * cosine).sqrt() / cosine, DVec3::Y));
-    let settings = SceneSettings { rounds: 1, part: Part::Direct, ..SceneSettings::default() };
+    let settings = SceneSettings { rounds: 1, part: Part::Direct, ..by_rounds() };
     let found = means(&received(gpu, &floor, &settings, &points));
     for ((share, cosine), found) in pairs(pairs(shares, cosines), found) {
         let exact = 2.0 * share * share * cosine.powi(3);
@@ -125,7 +125,7 @@ pub fn wrapped_texture(gpu: &Gpu, wrap: [Wrap; 2], is_transformed: bool) -> Chec
     // Five pixels a texel: the middle one of a row is within a tenth of the texel's middle.
     let eye = DVec3::Z * 20.0;
     let camera = Camera::looking_at("eye", eye, DVec3::ZERO, DVec3::Y, 2.0 * (5.0f64 / 20.0).atan());
-    let settings = SceneSettings { rounds: 1, part: Part::Direct, ..SceneSettings::default() };
+    let settings = SceneSettings { rounds: 1, part: Part::Direct, ..by_rounds() };
     let found = means(&seen(gpu, &sign, &settings, &camera, [75, 50]));
     for j in 0..10 {
         for i in 0..15 {
@@ -153,7 +153,7 @@ pub fn vertex_colours(gpu: &Gpu) -> Check<Complaint> {
     scene.meshes.push(level(-1.0, [1.0; 2], true, 0));
     // A square of 2 m fills the picture, seen from far so that all pixels are looked at straight.
     let camera = Camera::looking_at("above", DVec3::Y * 200.0, DVec3::ZERO, DVec3::Z, 2.0 * (1.0f64 / 200.0).atan());
-    let settings = SceneSettings { rounds: 4, part: Part::Direct, ..SceneSettings::default() };
+    let settings = SceneSettings { rounds: 4, part: Part::Direct, ..by_rounds() };
     let lit = seen(gpu, &scene, &settings, &camera, [8, 8]);
     let Mesh { positions, triangles, colours, .. } = &scene.meshes[0];
     for pixel in 0..64u32 {
@@ -168,7 +168,7 @@ pub fn vertex_colours(gpu: &Gpu) -> Check<Complaint> {
             let [a, b, c] = triangle.map(|vertex| colours[vertex as usize]);
             (v >= 0.0 && w >= 0.0 && v + w <= 1.0).then(|| 0.8 * (a * (1.0 - v - w) + b * v + c * w))
         });
-        let (found, expected) = (lit.film.mean(pixel as usize, &lit.plan), expected.expect("the floor fills the picture"));
+        let (found, expected) = (lit.film.mean(pixel as usize), expected.expect("the floor fills the picture"));
         // A pixel is an eighth of the floor, over which the filter takes the mean of four rounds' places.
         let off = (found - expected).abs().max_element();
         if !on_diagonal && (off > 0.08 || off.is_nan()) {
@@ -188,8 +188,7 @@ fn leaning(angle: f64) -> Mesh {
 pub fn leaning_plane(gpu: &Gpu, illumination: Illumination) -> Check<Complaint> {
     let lean = 40f64.to_radians();
     let plane = scene_of(vec![leaning(lean)], vec![matt(0.8)], vec![sun(DVec3::NEG_Y)]);
-    let settings =
-        SceneSettings { photons: 20_000, rounds: 32, bounces: 1, radius: Some(0.5), alpha: 1.0, illumination, ..SceneSettings::default() };
+    let settings = SceneSettings { photons: 20_000, rounds: 32, bounces: 1, radius: Some(0.5), alpha: 1.0, illumination, ..by_rounds() };
     for (what, degrees, cosine) in [("above", 30f64, lean.cos()), ("below", -70.0, 1.0)] {
         let eye = DVec3::new(degrees.to_radians().sin(), degrees.to_radians().cos(), 0.0);
         let camera = Camera::looking_at("eye", eye, DVec3::ZERO, DVec3::Z, 2e-4);
@@ -246,7 +245,7 @@ pub fn none_returns(what: &str, lit: &RunResult) -> Check<Complaint> {
 
 /// Direct light of a picture of so many pixels a side, by the tree and by the list of all triangles.
 fn by_tree_and_list(gpu: &Gpu, scene: &Scene, camera: &Camera, side: u32) -> [RunResult; 2] {
-    let usual = || SceneSettings { rounds: 1, part: Part::Direct, ..SceneSettings::default() };
+    let usual = || SceneSettings { rounds: 1, part: Part::Direct, ..by_rounds() };
     let by_tree = SceneSettings { with: vec![Effect::Bvh], ..usual() };
     let by_list = SceneSettings { without: vec![Effect::Bvh], ..usual() };
     let [tree, list] = [by_tree, by_list].map(|settings| seen(gpu, scene, &settings, camera, [side; 2]));
@@ -314,9 +313,9 @@ pub fn coarse_sphere_in_a_furnace(gpu: &Gpu, material: Material, segments: u32) 
     let scene = coarse_sphere(material, segments, LightKind::Environment { radiance: Vec3::ONE });
     let camera = Camera::looking_at("front", DVec3::new(0.3, 0.4, 4.0), DVec3::ZERO, DVec3::Y, 0.55);
     // One sample a round: of more, some would look for what the glass reflects, with weights of their own.
-    let settings = SceneSettings { samples: 1, rounds: 16, photons: 1000, ..SceneSettings::default() };
+    let settings = SceneSettings { samples: 1, rounds: 16, photons: 1000, ..by_rounds() };
     let lit = seen(gpu, &scene, &settings, &camera, [48, 48]);
-    let pixels = (0..lit.film.pixels()).map(|pixel| lit.film.mean(pixel, &lit.plan).x);
+    let pixels = (0..lit.film.pixels()).map(|pixel| lit.film.mean(pixel).x);
     let darkest = pixels.fold(f64::INFINITY, f64::min);
     println!("{segments} segments: {} on the mean, {darkest} at the darkest pixel", mean_red(&lit));
     estimate_check("the sphere", mean_red(&lit), 1.0, 0.0001)?;
@@ -327,7 +326,7 @@ pub fn coarse_sphere_in_a_furnace(gpu: &Gpu, material: Material, segments: u32) 
 pub fn coarse_sphere_in_the_sun(gpu: &Gpu, material: Material, segments: u32) -> Check<Complaint> {
     let sun = LightKind::Directional { direction: DVec3::new(0.2, -1.0, 0.3).normalize(), irradiance: Vec3::ONE };
     let scene = coarse_sphere(material, segments, sun);
-    let settings = SceneSettings { photons: 50_000, rounds: 1, illumination: Illumination::Photons, ..SceneSettings::default() };
+    let settings = SceneSettings { photons: 50_000, rounds: 1, illumination: Illumination::Photons, ..by_rounds() };
     let lit = received(gpu, &scene, &settings, &[(DVec3::new(3.005, -3.0, 3.005), DVec3::Y)]);
     let ledger = lit.fates[0].ledger();
     assert!(ledger.closes(), "{ledger}");
@@ -352,8 +351,7 @@ pub fn ground_by_a_coarse_sphere(gpu: &Gpu, material: Material, segments: u32) -
     scene.meshes.push(Mesh::parallelogram("lamp", DVec3::new(-4.0, 3.0, -4.0), x * 8.0, z * 8.0, 2));
     let places = [-2.0, -1.0, 0.0, 1.0, 2.0];
     let points: Vec<_> = places.iter().flat_map(|x| places.map(|z| (DVec3::new(*x, -1.2, z), DVec3::Y))).collect();
-    let settings =
-        SceneSettings { caustic_photons: 200_000, caustic_radius: Some(0.2), rounds: 8, part: Part::Caustic, ..SceneSettings::default() };
+    let settings = SceneSettings { caustic_photons: 200_000, caustic_radius: Some(0.2), rounds: 8, part: Part::Caustic, ..by_rounds() };
     let lit = received(gpu, &scene, &settings, &points);
     let truth = Judge::new(&scene, 64).irradiance_at(&points, 40_000, 1);
     let count = points.len() as f64;
@@ -375,11 +373,11 @@ pub fn glass_in_a_furnace(gpu: &Gpu, samples: u32, final_gather: bool) -> Check<
     let faces = [(corner, x, z), (corner, y, x), (corner, z, y), (far, -z, -x), (far, -x, -y), (far, -y, -z)];
     room.meshes.extend(faces.map(|(origin, u, v)| Mesh::parallelogram("block", origin, u, v, 1)));
     room.meshes.push(Mesh::parallelogram("mirror", DVec3::new(0.4, 0.1, 0.2), x, y, 2));
-    let settings = SceneSettings { samples, final_gather, shadow_rays: 2, photons: 20_000, rounds: 8, ..SceneSettings::default() };
+    let settings = SceneSettings { samples, final_gather, shadow_rays: 2, photons: 20_000, rounds: 8, ..by_rounds() };
     let lit = seen(gpu, &room, &settings, &room.cameras[0], [24, 24]);
     // Emission over what a wall absorbs.
     let expected = 1.0 / (1.0 - 0.5);
-    let errors = (0..lit.film.pixels()).map(|pixel| lit.film.standard_error(pixel, &lit.plan).x.powi(2)).sum::<f64>();
+    let errors = (0..lit.film.pixels()).map(|pixel| lit.film.standard_error(pixel).x.powi(2)).sum::<f64>();
     let error = errors.sqrt() / lit.film.pixels() as f64;
     println!("{samples} samples, gather {final_gather}: {} +- {error}, {expected} expected", mean_red(&lit));
     assert!(error < 0.005 * expected, "{error}");
@@ -409,14 +407,14 @@ pub fn room_beside_a_hall(gpu: &Gpu, by_density: bool) -> Check<Complaint> {
     let geometry = Geometry::new(&scene).unwrap();
     let target = Target::Points(&points);
     let view = View { geometry: &geometry, camera: None, phases: &target.phases(&geometry) };
-    let settings = SceneSettings { photons: 1 << 15, rounds: 48, illumination: Illumination::Photons, ..SceneSettings::default() };
+    let settings = SceneSettings { photons: 1 << 15, rounds: 48, illumination: Illumination::Photons, ..by_rounds() };
     let mut plan = trial::plan(gpu, &scene, &view, &settings, target.sensor())?;
     if !by_density {
         plan.global.as_mut().expect("photons are asked for").classes = None;
         plan.constants.iter_mut().filter(|(name, _)| *name == "HAS_RADIUS_CLASSES").for_each(|(_, value)| *value = 0);
     }
     let lit = light(gpu, &view, plan);
-    let mean = |point: usize| lit.film.mean(point, &lit.plan).x;
+    let mean = |point: usize| lit.film.mean(point).x;
     let ratios: Vec<f64> = (0..room.len()).map(|point| mean(4 * hall.len() + point) / mean(point) / 2500.0).collect();
     let count = ratios.len() as f64;
     let (ratio, deviation) = (ratios.iter().sum::<f64>() / count, (ratios.iter().map(|r| (r - 1.0).powi(2)).sum::<f64>() / count).sqrt());
@@ -435,7 +433,7 @@ pub fn behind_a_wall(gpu: &Gpu, walls: Vec<Mesh>, radius: Option<f64>) -> Check<
     let behind = [1e-5, 1e-4, 1e-3, 1e-2, 0.05];
     let points: Vec<_> =
         behind.iter().flat_map(|behind| [0.01, 0.3, 0.6, 0.999].map(|z| (dvec3(0.5 + behind, 0.0, z), DVec3::Y))).collect();
-    let settings = SceneSettings { photons: 30_000, rounds: 4, radius, ..SceneSettings::default() };
+    let settings = SceneSettings { photons: 30_000, rounds: 4, radius, ..by_rounds() };
     let found = means(&render(gpu, &room, &settings, Target::Points(&points))?);
     let (point, leaked) = pairs(&points, &found).max_by(|a, b| a.1.x.total_cmp(&b.1.x)).expect("points are asked for");
     if *leaked == DVec3::ZERO { Ok(()) } else { Err(Complaint::new(Kind::Leak, format!("{leaked} W/m2 at {}", point.0))) }
@@ -451,14 +449,8 @@ pub fn tiny_plates(gpu: &Gpu) -> Check<Complaint> {
     room.materials.push(matt(0.0));
     room.meshes.extend(places.iter().map(|at| Mesh::parallelogram("plate", *at, DVec3::Z * width, DVec3::X * width, 1)));
     let points: Vec<_> = places.iter().map(|at| (*at + dvec3(0.4, 0.0, 0.3) * width, DVec3::Y)).collect();
-    let settings = SceneSettings {
-        photons: 100_000,
-        rounds: 4,
-        radius: Some(0.4),
-        alpha: 1.0,
-        illumination: Illumination::Photons,
-        ..SceneSettings::default()
-    };
+    let settings =
+        SceneSettings { photons: 100_000, rounds: 4, radius: Some(0.4), alpha: 1.0, illumination: Illumination::Photons, ..by_rounds() };
     let lit = render(gpu, &room, &settings, Target::Points(&points))?;
     println!("plates: {} of 2 pi", mean_red(&lit) / TAU);
     // Five hundred photons in all.
@@ -486,11 +478,11 @@ pub fn beside_a_box(gpu: &Gpu, radius: Option<f64>) -> Check<Complaint> {
             .map(|(x, z)| (dvec3(x, 0.0, z), DVec3::Y))
     };
     let points: Vec<_> = [0.001, 0.004, 0.01, 0.02].into_iter().flat_map(around).collect();
-    let settings = SceneSettings { photons: 30_000, rounds: 32, radius, part: Part::Indirect, ..SceneSettings::default() };
+    let settings = SceneSettings { photons: 30_000, rounds: 32, radius, part: Part::Indirect, ..by_rounds() };
     let lit = render(gpu, &room, &settings, Target::Points(&points))?;
     for (place, (point, _)) in points.iter().enumerate() {
-        let error = lit.film.stated_error(place, &lit.plan).x;
-        estimate_check(&format!("{point}, radius {radius:?}"), lit.film.mean(place, &lit.plan).x, PI, error)?;
+        let error = lit.film.stated_error(place).x;
+        estimate_check(&format!("{point}, radius {radius:?}"), lit.film.mean(place).x, PI, error)?;
     }
     // The points lie within each other's discs, so that their mean is little better known than one of them.
     estimate_check("all around the box", mean_red(&lit), PI, 0.02 * PI)

@@ -72,7 +72,7 @@ pub fn lit(
 }
 
 pub fn direct(rounds: u32) -> SceneSettings {
-    SceneSettings { rounds, part: Part::Direct, paranoid: true, ..SceneSettings::default() }
+    SceneSettings { rounds, part: Part::Direct, paranoid: true, ..by_rounds() }
 }
 
 /// Whether the first points of a run have the light of another run within both errors, and no more than so many times its variance,
@@ -155,13 +155,13 @@ pub fn screened(mut rooms: Scene) -> Scene {
 
 /// All light of the first of these rooms, from defaults but for fewer photons, compared with that of the room alone.
 pub fn scattered_light(gpu: &Gpu, ratio: f32, by_sight: bool) -> Check<Complaint> {
-    let settings = SceneSettings { photons: 1 << 15, paranoid: true, ..SceneSettings::default() };
+    let settings = SceneSettings { photons: 1 << 15, paranoid: true, ..by_rounds() };
     let all = |scene: &Scene| match by_sight {
         true => scene::render(gpu, scene, &settings, Target::Points(&points())).unwrap(),
         false => lit(gpu, scene, &settings, &points(), None),
     };
     let [alone, found] = [all(&rooms(&[1.0])), all(&rooms(&[1.0, ratio]))];
-    let unknown = found.film.unknown(&found.plan, 0.95);
+    let unknown = found.film.unknown(0.95);
     if unknown.unreached > 0 || !unknown.absent.is_empty() {
         return Err(Complaint::new(Kind::TooDark, unknown.text("point", "W/m2", 0.95, found.film.rounds)));
     }
@@ -176,7 +176,7 @@ pub fn scattered_light(gpu: &Gpu, ratio: f32, by_sight: bool) -> Check<Complaint
 /// A lamp that lights no point itself, but the ceiling that lights them, beside a room whose lamp is so many times as strong.
 pub fn hidden_lamp(gpu: &Gpu, ratio: f32, by_sight: bool) -> Check<Complaint> {
     let floor: Vec<_> = points().into_iter().take(25).collect();
-    let settings = SceneSettings { photons: 1 << 14, rounds: 24, radius: Some(0.4), part: Part::Indirect, ..SceneSettings::default() };
+    let settings = SceneSettings { photons: 1 << 14, rounds: 24, radius: Some(0.4), part: Part::Indirect, ..by_rounds() };
     let change: &dyn Fn(&mut ScenePlan) = &|_| {};
     let alone = lit(gpu, &screened(rooms(&[1.0])), &settings, &floor, None);
     let found = lit(gpu, &screened(rooms(&[1.0, ratio])), &settings, &floor, by_sight.then_some(change));
@@ -208,7 +208,7 @@ pub fn bright_spot(gpu: &Gpu, wrap: Wrap, illumination: Illumination) -> Check<C
     let scene = screen(wrap);
     let (texture, mesh) = (&scene.textures[0], &scene.meshes[1]);
     let points: Vec<_> = [(0.1, 0.0), (-0.9, 0.4), (0.6, 0.8)].map(|(x, z)| (dvec3(x, 0.0, z), DVec3::Y)).into();
-    let settings = SceneSettings { illumination, photons: 1 << 14, rounds: 64, radius: Some(0.1), alpha: 1.0, ..SceneSettings::default() };
+    let settings = SceneSettings { illumination, photons: 1 << 14, rounds: 64, radius: Some(0.1), alpha: 1.0, ..by_rounds() };
     let found = lit(gpu, &scene, &settings, &points, None);
     // Between four places a texel samples are linear.
     let steps = 1024;
@@ -222,7 +222,7 @@ pub fn bright_spot(gpu: &Gpu, wrap: Wrap, illumination: Illumination) -> Check<C
             f64::from(radiance.x) * way.y * way.y / way.length_squared().powi(2)
         };
         let right = (0..steps * steps).map(of_place).sum::<f64>() * 4.0 / (steps * steps) as f64;
-        let (mean, error) = (found.film.mean(number, &found.plan).x, found.film.stated_error(number, &found.plan).x);
+        let (mean, error) = (found.film.mean(number).x, found.film.stated_error(number).x);
         println!("{wrap:?}, {illumination:?}: {mean:.4} +- {error:.4}, {right:.4} is right");
         // Written so that NaN complains.
         if !((mean - right).abs() <= 4.0 * error && error < 0.1 * right) {

@@ -162,7 +162,7 @@ pub const SUNS: [DVec3; 3] = [DVec3::new(0.35, 0.92, 0.17), DVec3::new(0.6, -0.7
 /// Only light that comes straight from the sun, nothing of which is random.
 pub fn straight() -> SceneSettings {
     let without = vec![Effect::Indirect, Effect::ReflectiveCaustics, Effect::RefractiveCaustics, Effect::SpecularChains];
-    SceneSettings { rounds: 1, shadow_rays: 1, without, ..SceneSettings::default() }
+    SceneSettings { rounds: 1, shadow_rays: 1, without, ..by_rounds() }
 }
 
 /// What is seen of each plate against what should be, channel by channel. Nothing of it is random.
@@ -493,7 +493,7 @@ fn dome(material: usize) -> Mesh {
 /// Light straight from the sky or a dome, by samples of it and of the lobes.
 fn under_samples() -> SceneSettings {
     let without = vec![Effect::Indirect, Effect::ReflectiveCaustics, Effect::RefractiveCaustics];
-    SceneSettings { samples: 16, rounds: 24, shadow_rays: 4, without, ..SceneSettings::default() }
+    SceneSettings { samples: 16, rounds: 24, shadow_rays: 4, without, ..by_rounds() }
 }
 
 /// Opaque plates under a sky that is 1 everywhere, or within a dome that shines as much: white dielectrics send all of it back, white
@@ -540,8 +540,7 @@ pub fn photons_land_beside_lobes(gpu: &Gpu) -> Check<Complaint> {
     let metallic_roughness_texture = Some(TextureUse::of(0, 0));
     scene.materials = vec![layered(Vec3::ONE, &Layers { metallic_roughness_texture, ..metal(1.0) }), dull(0.0)];
     scene.meshes[0].uvs[0] = scene.meshes[0].positions.iter().map(|place| DVec2::new(0.5 + 0.5 * place.x, 0.5)).collect();
-    let settings =
-        SceneSettings { illumination: Illumination::Photons, photons: 100_000, rounds: 4, radius: Some(0.1), ..SceneSettings::default() };
+    let settings = SceneSettings { illumination: Illumination::Photons, photons: 100_000, rounds: 4, radius: Some(0.1), ..by_rounds() };
     let points = [DVec3::X * 0.01, DVec3::new(2.0, -1.0, 2.0)].map(|point| (point, DVec3::Y));
     let lit = received(gpu, &scene, &settings, &points);
     for (place, (found, error)) in pairs(means(&lit), standard_errors(&lit)).enumerate() {
@@ -584,7 +583,7 @@ pub fn photons_on_a_plate(gpu: &Gpu) -> Check<Complaint> {
     let camera = Camera::looking_at("eye", wo, DVec3::ZERO, DVec3::Y, 1e-4);
     let lit = seen(gpu, &plate, &mapped(20_000, 32, 1, 0.5), &camera, [1, 1]);
     let expected = in_the_sun(&lobes_at(&material, &Place::of_normal(DVec3::Y, wo), DVec3::Y), way);
-    let (found, error) = (lit.film.mean(0, &lit.plan), lit.film.standard_error(0, &lit.plan));
+    let (found, error) = (lit.film.mean(0), lit.film.standard_error(0));
     println!("photons on a plate: {found} +- {error}, {expected} expected");
     assert!((error / expected).max_element() < 0.02, "{error}");
     (0..3).try_for_each(|channel| estimate_check("photons on a plate", found[channel], expected[channel], error[channel]))
@@ -620,14 +619,14 @@ pub fn clear_furnace(gpu: &Gpu, is_lossless: bool) -> Check<Complaint> {
     let scene = scene_of(meshes, materials, vec![LightKind::Environment { radiance: Vec3::ONE }]);
     let camera = Camera::looking_at("front", DVec3::Z * 100.0, DVec3::ZERO, DVec3::Y, 0.02);
     let without = vec![Effect::Indirect, Effect::ReflectiveCaustics, Effect::RefractiveCaustics];
-    let settings = SceneSettings { samples: 16, rounds: 16, shadow_rays: 2, without, ..SceneSettings::default() };
+    let settings = SceneSettings { samples: 16, rounds: 16, shadow_rays: 2, without, ..by_rounds() };
     let size = [8 * count as u32, 8];
     let lit = seen(gpu, &scene, &settings, &camera, size);
     let judged = (!is_lossless).then(|| Judge::new(&scene, 64).image(&camera, size[0], size[1], 64, 5));
     for k in 0..count {
         let pixels = || (0..8).flat_map(move |row| (0..8).map(move |column| 8 * (row * count + k) + column));
-        let mean = pixels().map(|at| lit.film.mean(at, &lit.plan).x).sum::<f64>() / 64.0;
-        let error = pixels().map(|at| lit.film.standard_error(at, &lit.plan).x.powi(2)).sum::<f64>().sqrt() / 64.0;
+        let mean = pixels().map(|at| lit.film.mean(at).x).sum::<f64>() / 64.0;
+        let error = pixels().map(|at| lit.film.standard_error(at).x.powi(2)).sum::<f64>().sqrt() / 64.0;
         let (expected, own) = judged.as_ref().map_or((1.0, 0.0), |judged| {
             let of = |at: usize| judged.pixels[at].mean.direct.x + judged.pixels[at].mean.specular.x + judged.pixels[at].mean.caustic.x;
             let squared = |at: usize| judged.pixels[at].total_standard_error.x.powi(2);

@@ -6,6 +6,11 @@ use super::prelude::*;
 use photonmill::engine::scene::{self, RunResult, Target, View};
 use photonmill::verify::selfcheck::Estimate;
 
+/// The default settings with blocks of one round: few rounds tell the error well.
+pub fn by_rounds() -> SceneSettings {
+    SceneSettings { block: Some(1), ..SceneSettings::default() }
+}
+
 /// Builders of a scene that trace in ways of their own.
 const SCENE_BUILDERS: [Builder; 2] = [Builder::Ballot, Builder::Persistent];
 pub const BOTH: [Illumination; 2] = [Illumination::Split, Illumination::Photons];
@@ -82,22 +87,22 @@ pub fn seen(gpu: &Gpu, scene: &Scene, settings: &SceneSettings, camera: &Camera,
 
 /// Red mean and standard error of a pixel or point.
 pub fn red(lit: &RunResult, place: usize) -> (f64, f64) {
-    (lit.film.mean(place, &lit.plan).x, lit.film.standard_error(place, &lit.plan).x)
+    (lit.film.mean(place).x, lit.film.standard_error(place).x)
 }
 
 /// Mean of the red channel over all pixels or points.
 pub fn mean_red(lit: &RunResult) -> f64 {
-    lit.film.means(&lit.plan).map(|mean| mean.x).sum::<f64>() / lit.film.pixels() as f64
+    lit.film.means().map(|mean| mean.x).sum::<f64>() / lit.film.pixels() as f64
 }
 
 /// Standard error of every pixel or point.
 pub fn standard_errors(lit: &RunResult) -> Vec<DVec3> {
-    (0..lit.film.pixels()).map(|place| lit.film.standard_error(place, &lit.plan)).collect()
+    (0..lit.film.pixels()).map(|place| lit.film.standard_error(place)).collect()
 }
 
 /// Mean of every pixel or point.
 pub fn means(lit: &RunResult) -> Vec<DVec3> {
-    lit.film.means(&lit.plan).collect()
+    lit.film.means().collect()
 }
 
 /// Irradiance at points, W/m2, of each of several runs of other seeds.
@@ -192,12 +197,12 @@ pub fn flights(photons: u32, bounces: u32) -> SceneSettings {
 /// All light from photons within a fixed radius.
 pub fn mapped(photons: u32, rounds: u32, bounces: u32, radius: f64) -> SceneSettings {
     let radius = Some(radius);
-    SceneSettings { illumination: Illumination::Photons, photons, rounds, bounces, radius, alpha: 1.0, ..SceneSettings::default() }
+    SceneSettings { illumination: Illumination::Photons, photons, rounds, bounces, radius, alpha: 1.0, ..by_rounds() }
 }
 
 /// A fixed radius for both maps, which have as many photons.
 pub fn fixed_radius(illumination: Illumination, photons: u32, rounds: u32, bounces: u32, radius: f64) -> SceneSettings {
-    let caustic = SceneSettings { caustic_photons: photons, caustic_radius: Some(radius), shadow_rays: 1, ..SceneSettings::default() };
+    let caustic = SceneSettings { caustic_photons: photons, caustic_radius: Some(radius), shadow_rays: 1, ..by_rounds() };
     SceneSettings { illumination, photons, rounds, bounces, radius: Some(radius), alpha: 1.0, ..caustic }
 }
 

@@ -78,7 +78,7 @@ impl Plates {
         let camera = Camera::looking_at("eye", EYE, DVec3::ZERO, DVec3::Y, 2.0 * (half_height / EYE.z).atan());
         let lit = seen(gpu, &self.scene, settings, &camera, size.map(|pixels| pixels as u32));
         let pixels = || self.places.iter().map(|place| (size[1] - 1 - 2 * place.row) * size[0] + 2 * place.column);
-        (pixels().map(|at| lit.film.mean(at, &lit.plan)).collect(), pixels().map(|at| lit.film.standard_error(at, &lit.plan)).collect())
+        (pixels().map(|at| lit.film.mean(at)).collect(), pixels().map(|at| lit.film.standard_error(at)).collect())
     }
 }
 

@@ -28,8 +28,8 @@ pub use photonmill::verify::judge::Judge;
 pub use super::aimed::mean_and_error;
 pub use super::family::Family;
 pub use super::lit::{
-    BOTH, assert_builders_agree, beam, cone, disc, every_kind_of_light, fixed_radius, flights, glass, grid, irradiances, lamp, level,
-    mapped, matt, mean_red, means, mirror, moved, point, radiances, received, red, same_light, scene, scene_of, scene_plan,
+    BOTH, assert_builders_agree, beam, by_rounds, cone, disc, every_kind_of_light, fixed_radius, flights, glass, grid, irradiances, lamp,
+    level, mapped, matt, mean_red, means, mirror, moved, point, radiances, received, red, same_light, scene, scene_of, scene_plan,
     scene_plan_within, seen, shaft, shining, square_picture, standard_errors, sun, tessellated,
 };
 pub use super::program::{Place, text};

@@ -136,7 +136,7 @@ pub fn lamp_between_sheets(gpu: &Gpu) -> Check<Complaint> {
     let meshes = [0.0, 0.3, 0.6, 1.2].map(|height| level(height, [1.0; 2], true, usize::from(height > 0.0)));
     let half = Material { two_sided: true, ..blended(0.5, dull(0.0)) };
     let scene = scene_of(meshes.into(), vec![matt(0.0), half], vec![point(DVec3::Y)]);
-    let settings = SceneSettings { rounds: 1, part: Part::Direct, ..SceneSettings::default() };
+    let settings = SceneSettings { rounds: 1, part: Part::Direct, ..by_rounds() };
     let found = means(&received(gpu, &scene, &settings, &[(DVec3::ZERO, DVec3::Y)]))[0].x;
     // Nothing is random.
     estimate_check("a lamp between sheets", found, 0.25, 1e-5)
@@ -181,7 +181,7 @@ pub fn floor_through_sheets(gpu: &Gpu) -> Check<Complaint> {
     let half_height = 0.125 * PITCH * size[1] as f64;
     let camera = Camera::looking_at("above", middle + DVec3::Y * 1e3, middle, DVec3::NEG_Z, 2.0 * (half_height / 1e3).atan());
     let without = vec![Effect::Direct];
-    let settings = SceneSettings { samples: 64, rounds: 32, part: Part::Direct, without, ..SceneSettings::default() };
+    let settings = SceneSettings { samples: 64, rounds: 32, part: Part::Direct, without, ..by_rounds() };
     let lit = seen(gpu, &scene, &settings, &camera, size.map(|pixels| pixels as u32));
     let pixels: Vec<usize> = (0..stacks.len()).map(|k| 4 * (k / COLUMNS) * size[0] + 4 * (k % COLUMNS)).collect();
     compare("the floor", &stacks, &lit, &pixels, 1.0)
@@ -190,7 +190,7 @@ pub fn floor_through_sheets(gpu: &Gpu) -> Check<Complaint> {
 /// All of it is direct light.
 fn compare(what: &str, stacks: &[Stack], lit: &RunResult, places: &[usize], cosine: f64) -> Check<Complaint> {
     for (stack, &place) in pairs(stacks, places) {
-        let (found, error) = (lit.film.mean(place, &lit.plan), lit.film.standard_error(place, &lit.plan));
+        let (found, error) = (lit.film.mean(place), lit.film.standard_error(place));
         let expected = (stack.share)(cosine);
         println!("{what}, {}: {found} +- {error}, {expected} expected", stack.what);
         assert!(error.max_element() < 0.04, "{error}");

@@ -13,5 +13,7 @@
 #include "world/scene/direct.glsl"
 #include "world/scene/no_point.glsl"
 #include "world/scene/one_hit.glsl"
+#include "film/kept_places.glsl"
+#include "film/kept_parts.glsl"
 #include "world/scene/points.glsl"
 #include "world/scene/camera_path.glsl"

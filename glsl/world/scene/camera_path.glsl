@@ -18,7 +18,9 @@ struct Chain {
     vec3 from;
     vec3 from_normal;
     uint point_count; // visible points found
+    bool met_surface; // the eye's path, which scatters light
     vec3 light[3]; // direct, specular, indirect
+    vec3 seen; // what shines by itself and is met by the eye's ray, before any surface that scatters
 };
 
 // The path of this thread. No argument: drivers keep copies of one that has arrays.
@@ -27,7 +29,7 @@ Chain chain;
 void start_chain(vec3 position, vec3 direction, vec3 weight, vec2 choices)
 {
     chain = Chain(position, direction, weight, choices, false, false, false, true, false, 0, 0.0, vec3(0.0), vec3(0.0), 0,
-                  vec3[](vec3(0.0), vec3(0.0), vec3(0.0)));
+                  false, vec3[](vec3(0.0), vec3(0.0), vec3(0.0)), vec3(0.0));
 }
 
 // The part of the picture that light of the current vertex belongs to, when it arrived in this way.
@@ -44,6 +46,26 @@ void add_light(vec3 radiance)
     if ((PARTS & part) != 0) {
         uint place = part == PART_DIRECT ? 0 : (part == PART_SPECULAR ? 1 : 2);
         chain.light[place] += chain.weight * radiance;
+    }
+}
+
+// Whether the eye's ray has met nothing but gaps so far.
+bool is_straight()
+{
+    return !chain.saw_specular && !chain.gathers && !chain.ends_at_light;
+}
+
+// What shines by itself at the next vertex. Seen straight it is no light of surfaces.
+void add_shining(vec3 radiance)
+{
+    bool is_seen = false;
+    if (HAS_SEEN_LIGHT) {
+        is_seen = is_straight() && (PARTS & PART_DIRECT) != 0;
+    }
+    if (is_seen) {
+        chain.seen += chain.weight * radiance;
+    } else {
+        add_light(radiance);
     }
 }
 
@@ -95,7 +117,7 @@ void add_emission(vec3 radiance, float light_density)
             share = divide(chain.density, chain.density + float(SHADOW_RAYS) * light_density);
         }
     }
-    add_light(share * radiance);
+    add_shining(share * radiance);
 }
 
 bool gathers_here(Surface surface)
@@ -215,7 +237,7 @@ bool follow(uint index, uint number, uint pixel_count, Draws draws, uint emitter
             if (HAS_DISPERSION) {
                 if (is_dispersive(surface, chain.media)) {
                     // Once a path: of one channel it stays.
-                    channel = choose_channel(chain.weight, stratified(number, SAMPLES, words_of(index, CHANNEL_BLOCK, draws)).x);
+                    channel = choose_channel(chain.weight, stratified_at(number, index, CHANNEL_BLOCK, draws).x);
                     chain.weight = light_of_channel(chain.weight, channel);
                 }
             }
@@ -224,7 +246,7 @@ bool follow(uint index, uint number, uint pixel_count, Draws draws, uint emitter
             lobes = lobes_of(surface, wo, eta);
             // The eye does not see the back of what has one side.
             bool is_culled = !surface.scatters && !chain.gathers && !chain.ends_at_light;
-            scatter = sample_layered(surface, lobes, wo, stratified(number, SAMPLES, words_of(index, block, draws)).zxy, true);
+            scatter = sample_layered(surface, lobes, wo, stratified_at(number, index, block, draws).zxy, true);
             if (is_culled || scatter.passes) {
                 chain.weight *= is_culled ? vec3(1.0) : scatter.weight;
                 // It stops light samples.
@@ -237,12 +259,16 @@ bool follow(uint index, uint number, uint pixel_count, Draws draws, uint emitter
             }
             matt = matt_chance(lobes, surface.layers);
             if (surface.layers.is_unlit && !chain.gathers && !chain.ends_at_light) {
-                add_light(surface.base_colour);
+                add_shining(surface.base_colour);
             }
         }
         see_lamp(surface, hit, emitter_count);
         if (!surface.scatters || chain.ends_at_light) {
             return false;
+        }
+        if (HAS_SEEN_LIGHT) {
+            bool is_unlit = is_layered && surface.layers.is_unlit;
+            chain.met_surface = chain.met_surface || (is_straight() && !is_unlit);
         }
         bool specular = is_layered ? scatter.is_specular : is_specular(surface);
         vec3 scale = is_layered ? vec3(1.0) : surface.base_colour * scatter_scale(surface.kind, surface.parameter);
@@ -306,8 +332,8 @@ bool follow(uint index, uint number, uint pixel_count, Draws draws, uint emitter
         if (ends) {
             return false;
         }
-        uint count = SAMPLES; // build.rs cannot reflect a constant that is compared with `>=`
-        vec3 u = stratified(number, count, words_of(index, block, draws)).zxy;
+        uint count = SAMPLES * ROUNDS_PER_BLOCK; // build.rs cannot reflect a constant that is compared with `>=`
+        vec3 u = stratified_at(number, index, block, draws).zxy;
         float mirror_chance = 0.0;
         if (count >= MIRROR_SAMPLES && specular && depth < 2 && !chain.gathers) {
             mirror_chance = MIRROR_CHANCES[depth];
@@ -322,7 +348,7 @@ bool follow(uint index, uint number, uint pixel_count, Draws draws, uint emitter
         if (depth >= ROULETTE_DEPTH) {
             float most = depth < LOSSLESS_DEPTH ? 1.0 : MAX_SURVIVAL;
             float survival = min(max(scatter.weight.x, max(scatter.weight.y, scatter.weight.z)), most);
-            if (stratified(number, count, words_of(index, ROULETTE_BLOCK + depth, draws)).x >= survival) {
+            if (stratified_at(number, index, ROULETTE_BLOCK + depth, draws).x >= survival) {
                 return false;
             }
             scatter.weight = divide(scatter.weight, survival);
@@ -358,7 +384,7 @@ layout(set = 1, binding = 10, scalar) buffer CameraPathCounts { uint camera_path
 void put_off(uint place, uint depth)
 {
     uint flags = uint(chain.saw_specular) | uint(chain.gathers) << 1 | uint(chain.starts_nowhere) << 2 | uint(chain.sees_emission) << 3
-               | uint(chain.ends_at_light) << 6;
+               | uint(chain.ends_at_light) << 6 | uint(chain.met_surface) << 7;
     next_camera_paths[atomicAdd(camera_path_counts[0], 1)] =
         CameraPath(chain.position, place, chain.direction, flags | chain.point_count << 4 | depth << 8, chain.weight, chain.media, chain.density, chain.from,
                    chain.from_normal);

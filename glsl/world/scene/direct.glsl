@@ -146,7 +146,7 @@ const uint SAMPLES_PER_UNSEEN = 4;
 vec3 sharp_light = vec3(0.0);
 
 // What arrives straight from lights, times lobe and cosine: irradiance where there is no lobe. The rays of all samples of
-// the place `index` share a block of random numbers.
+// the place `index` in a block of rounds share random numbers.
 vec3 direct_light(Target point, uint emitter_count, Draws draws, uint index, uint number, uint block)
 {
     vec3 sum = vec3(0.0);
@@ -159,6 +159,8 @@ vec3 direct_light(Target point, uint emitter_count, Draws draws, uint index, uin
         return sum;
     }
     uvec4 words = words_of(index, block, draws);
+    number = number_in_block(number, SAMPLES, draws);
+    uint sample_count = SAMPLES * ROUNDS_PER_BLOCK;
     uint ray_count = SHADOW_RAYS;
     uint unseen_row = 0;
     if (LIGHT_CLUSTERS != 0) {
@@ -167,7 +169,7 @@ vec3 direct_light(Target point, uint emitter_count, Draws draws, uint index, uin
         ray_count += uint(asks_unseen);
     }
     for (uint ray = 0; ray < ray_count; ray++) {
-        vec3 u = stratified(number * SHADOW_RAYS + ray, SAMPLES * SHADOW_RAYS, words);
+        vec3 u = stratified(number * SHADOW_RAYS + ray, sample_count * SHADOW_RAYS, words);
         Emitter light;
         float by_power = 0.0;
         float count = 1.0;
@@ -175,7 +177,7 @@ vec3 direct_light(Target point, uint emitter_count, Draws draws, uint index, uin
             uint row = unseen_row - LIGHT_CLUSTERS;
             if (ray == SHADOW_RAYS) {
                 row = unseen_row;
-                u = stratified(number, SAMPLES, uvec4(mix32(words.x), mix32(words.y), mix32(words.z), mix32(words.w)));
+                u = stratified(number, sample_count, uvec4(mix32(words.x), mix32(words.y), mix32(words.z), mix32(words.w)));
                 // For the samples that cast none.
                 count = float(SAMPLES_PER_UNSEEN * SHADOW_RAYS);
             }

@@ -51,6 +51,21 @@ layout(constant_id = 21) const uint SHADOW_RAYS = 1;
 // Paths from the eye through a pixel in a round, a power of two. Each looks caustics up, and what it sees in mirrors or
 // glass; of a surface that is seen straight, the first one looks up the global map and gathers for all.
 layout(constant_id = 41) const uint SAMPLES = 1;
+// Rounds of a block, a power of two: samples of a place are even over all of them together, and no block knows of another.
+layout(constant_id = 71) const uint ROUNDS_PER_BLOCK = 1;
+// The eye may meet what shines by itself: of a picture.
+layout(constant_id = 72) const bool HAS_SEEN_LIGHT = false;
+
+// Where the sums of a sample stand among those of all: three channels of what surfaces scatter, then of what is seen straight.
+uint place_of_sums(uint sample_place)
+{
+    uint size = 3;
+    if (HAS_SEEN_LIGHT) {
+        size = 6;
+    }
+    return size * sample_place;
+}
+
 layout(constant_id = 22) const uint KERNEL = KERNEL_BOX;
 layout(constant_id = 23) const bool HAS_EDGE_CORRECTION = true;
 // Photons of a caustic map of its own; without one the global map holds caustics too.

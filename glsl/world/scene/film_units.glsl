@@ -4,7 +4,8 @@
 
 // Counts: [0] values that are no number, [1] values clamped to the film's largest, [2] estimates on a mesh too dense
 // for its area to be found, [3] camera paths cut off after MAX_BOUNCES; sums of two words, low word first: [4] what clamped
-// values lost, in 1/1024 of the film's largest, [6] the weights of cut paths, in 2^-20.
+// values lost, in 1/1024 of the film's largest, [6] the weights of cut paths, in 2^-20,
+// [8] samples of pixels that meet a surface.
 layout(set = 1, binding = 0, scalar) buffer Anomalies { uint anomalies[]; };
 
 void add_to_anomaly(uint word, uint amount)
@@ -18,6 +19,17 @@ void note_cut_path(float weight)
 {
     atomicAdd(anomalies[3], 1);
     add_to_anomaly(6, uint(min(weight * 1048576.0, 2147483648.0)));
+}
+
+// Counts a sample of a pixel whose path meets a surface that scatters light.
+void note_surface(bool met)
+{
+    if (HAS_SEEN_LIGHT) {
+        uint count = subgroupAdd(met ? 1u : 0u);
+        if (subgroupElect() && count != 0) {
+            add_to_anomaly(8, count);
+        }
+    }
 }
 
 // A value in film units as a 64-bit integer (low word, high word), at most `limit` units.

@@ -1,8 +1,8 @@
-// Random numbers of the paths that start at one place in a round, a pixel's or a receiver's.
+// Random numbers of the paths that start at one place, a pixel's or a receiver's.
 
-// Samples of a block are points of the Sobol' sequence, scrambled for the place, the round and the block (Burley 2020): each
-// is as likely anywhere and all together lie evenly, the first two numbers most of all. No block knows of another, so rounds
-// are as independent as by chance alone.
+// Samples are points of the Sobol' sequence, scrambled for the place, the block of rounds and the vertex (Burley 2020): each is as
+// likely anywhere, and those of all rounds of a block together lie evenly, the first two numbers most of all. Nothing of a block
+// depends on another, so blocks are as independent as by chance alone.
 
 vec4 scrambled(uint number, uvec4 words)
 {
@@ -13,21 +13,33 @@ vec4 scrambled(uint number, uvec4 words)
     return vec4(unit_float(point.x), unit_float(point.y), unit_float(point.z), unit_float(point.w));
 }
 
-// Whose bits scramble a block of a place.
-uvec4 words_of(uint index, uint block, Draws draws)
+// The number of a sample among those of all rounds of its block, of which each has `count`.
+uint number_in_block(uint number, uint count, Draws draws)
 {
-    return philox(uvec4(index, draws.round, block, draws.domain), draws.seed);
+    return draws.round % ROUNDS_PER_BLOCK * count + number;
 }
 
-// Where sample `number` of a place starts: four numbers of block 0.
+// Whose bits scramble the samples of a place for a vertex, in all rounds of a block.
+uvec4 words_of(uint index, uint vertex, Draws draws)
+{
+    return philox(uvec4(index, draws.round / ROUNDS_PER_BLOCK, vertex, draws.domain), draws.seed);
+}
+
+// Where sample `number` of a place starts: four numbers of vertex 0.
 vec4 stratified_start(uint number, uint index, Draws draws)
 {
-    return scrambled(number, words_of(index, 0, draws));
+    return scrambled(number_in_block(number, SAMPLES, draws), words_of(index, 0, draws));
 }
 
-// Three numbers of any other block for sample `number` of `count`, shuffled, so that two blocks meet as by chance.
+// Three numbers for sample `number` of `count`, shuffled, so that two vertices meet as by chance.
 vec3 stratified(uint number, uint count, uvec4 words)
 {
     uint mask = count > 1 ? (2u << findMSB(count - 1)) - 1 : 0;
     return scrambled(owen_scramble(number, words.w) & mask, words).xyz;
+}
+
+// The same at a vertex of sample `number` of a place.
+vec3 stratified_at(uint number, uint index, uint vertex, Draws draws)
+{
+    return stratified(number_in_block(number, SAMPLES, draws), SAMPLES * ROUNDS_PER_BLOCK, words_of(index, vertex, draws));
 }

@@ -5,45 +5,46 @@ use std::f64::consts::PI;
 use std::ops::{Deref, DerefMut};
 
 use crate::engine::error_bound::FilmError;
-use crate::engine::film::RoundSums;
+use crate::engine::film::{BlockSums, KeptBlock, LatestBlocks, kept_value};
+use crate::engine::measure_of_error::ErrorMeasure;
 use crate::engine::unknown::{Unknown, most_hits};
 use crate::plan::RoomPlan;
-use crate::plan::latest_rounds::kept_values;
+use crate::plan::latest_blocks::{kept_count, kept_place};
 use crate::scene::room::RoomScene;
 use crate::settings::Sums;
+use crate::settings::stop::{Measure, Stop};
 
 /// Sums of a run, point by point, and what they are worth.
 #[derive(Debug, Clone, PartialEq)]
 pub struct RoomFilm {
     /// `channel_count` sums a point, in fixed-point units: relative flux, then the paper's illumination
     /// power (photons within the radius times their Phong weight). With one channel the two are the same. With
-    /// `--nearest` it is what the disc of the radius would hold at the density of the nearest photons. No squares of a run
-    /// of a single round.
-    pub of_rounds: RoundSums,
+    /// `--nearest` it is what the disc of the radius would hold at the density of the nearest photons. A block is a round. No squares
+    /// of a run of a single one.
+    pub of_blocks: BlockSums,
+    /// Of relative flux.
+    pub latest: LatestBlocks,
     /// What the bits of a sum mean.
     pub kind: Sums,
-    /// What of the sums a round left that was ended in its middle. Such a round counts in the mean, and in no error, as
-    /// less light is in it than in others. Empty where every round is whole.
-    pub unfinished: Vec<u64>,
     pub channel_count: u32,
     /// Fixed-point units in 1.
     pub scale: f64,
-    /// Photons emitted so far, and in a whole round.
+    /// Photons whose light it holds, and those of a round.
     pub emitted: u64,
     pub photons_per_round: u32,
 }
 
 impl Deref for RoomFilm {
-    type Target = RoundSums;
+    type Target = BlockSums;
 
-    fn deref(&self) -> &RoundSums {
-        &self.of_rounds
+    fn deref(&self) -> &BlockSums {
+        &self.of_blocks
     }
 }
 
 impl DerefMut for RoomFilm {
-    fn deref_mut(&mut self) -> &mut RoundSums {
-        &mut self.of_rounds
+    fn deref_mut(&mut self) -> &mut BlockSums {
+        &mut self.of_blocks
     }
 }
 
@@ -52,10 +53,9 @@ impl RoomFilm {
     pub fn new(plan: &RoomPlan) -> RoomFilm {
         let count = plan.points.len() * plan.channel_count as usize;
         let squares = if plan.keeps_squares() { vec![0; count] } else { Vec::new() };
-        let latest = if plan.keeps_squares() { vec![0.0; kept_values(plan.points.len(), plan.settings.rounds)] } else { Vec::new() };
         RoomFilm {
-            of_rounds: RoundSums { rounds: 0, sums: vec![0; count], squares, latest },
-            unfinished: Vec::new(),
+            of_blocks: BlockSums { rounds: 0, blocks: 0, sums: vec![0; count], squares },
+            latest: LatestBlocks::default(),
             kind: plan.settings.sums,
             channel_count: plan.channel_count,
             scale: plan.film_scale(),
@@ -66,69 +66,81 @@ impl RoomFilm {
 
     /// Adds what a whole round left, and empties it for the next. Twin of `glsl/kernels/end_round.comp`. Sums of floats
     /// go on over all rounds instead, as their additions are what is looked at.
-    pub fn end_round(&mut self, of_round: &mut [u64]) {
+    pub fn end_round(&mut self, number: u32, of_round: &mut [u64]) {
         if self.kind != Sums::Integer {
             self.rounds += 1;
+            self.blocks += 1;
             self.sums.copy_from_slice(of_round);
             return;
         }
-        self.of_rounds.end_round(of_round, self.channel_count as usize);
+        self.of_blocks.end_block(1, of_round);
+        if !self.squares.is_empty() {
+            let (channels, places) = (self.channel_count as usize, self.point_count());
+            let values = (0..kept_count(places)).map(|k| kept_place(k, places).map_or(0.0, |place| kept_value(of_round[place * channels])));
+            let values = values.collect();
+            self.latest.push(KeptBlock { number, values });
+        }
         of_round.fill(0);
     }
 
-    /// Adds what a round left that will not be finished.
-    pub fn add_unfinished(&mut self, part: Vec<u64>) {
-        if self.kind != Sums::Integer {
-            self.sums = part;
-            return;
-        }
-        self.sums.iter_mut().zip(&part).for_each(|(sum, part)| *sum += part);
-        self.unfinished = part;
+    /// Adds the rounds of another part of the same run.
+    pub fn merge(&mut self, other: &RoomFilm) {
+        self.of_blocks.merge(&other.of_blocks);
+        self.latest.merge(&other.latest);
+        self.emitted += other.emitted;
     }
 
     /// Standard error of [`RoomFilm::flux`], from the variance between rounds; infinite where fewer than two are whole.
     pub fn flux_error(&self, point: usize) -> f64 {
         let place = point * self.channel_count as usize;
-        let sum = self.sums[place] - self.unfinished.get(place).copied().unwrap_or(0);
-        let of_mean = self.variance(place, sum).sqrt() / f64::from(self.rounds) / self.scale;
-        of_mean * self.emitted as f64 / f64::from(self.photons_per_round)
+        self.variance(place).sqrt() / self.scale
     }
 
-    /// Root mean square over points of the standard error of irradiance, over that of irradiance. `weights` are
-    /// [`irradiance_weights`].
-    pub fn relative_error(&self, weights: &[f64]) -> f64 {
-        let square_sum = |of_point: &dyn Fn(usize) -> f64| -> f64 {
-            weights.iter().enumerate().filter(|(_, weight)| **weight > 0.0).map(|(point, weight)| (weight * of_point(point)).powi(2)).sum()
-        };
-        let means = square_sum(&|point| self.flux(point));
-        if means > 0.0 { (square_sum(&|point| self.flux_error(point)) / means).sqrt() } else { 0.0 }
+    /// How errors of irradiance add up. `weights` are [`irradiance_weights`].
+    fn measure(&self, weights: &[f64], measure: Measure) -> ErrorMeasure {
+        let sum = weights.iter().enumerate().map(|(point, weight)| weight * self.flux(point)).sum();
+        ErrorMeasure::new(measure, weights.iter().filter(|weight| **weight > 0.0).count() as f64, sum)
+    }
+
+    /// Relative error of irradiance, as the measure adds it up. `weights` are [`irradiance_weights`].
+    pub fn relative_error(&self, weights: &[f64], measure: Measure) -> f64 {
+        let measure = self.measure(weights, measure);
+        let of_point = |(point, weight): (usize, &f64)| measure.relative(weight * self.flux_error(point), weight * self.flux(point));
+        weights.iter().enumerate().filter(|(_, weight)| **weight > 0.0).map(|point| of_point(point).powi(2)).sum::<f64>().sqrt()
     }
 
     /// What it tells of its error; `unit` makes W/m2 of flux times weight.
-    pub fn error(&self, weights: &[f64], unit: f64, confidence: f64) -> FilmError {
+    pub fn error(&self, weights: &[f64], unit: f64, stop: &Stop) -> FilmError {
+        let measure = self.measure(weights, stop.measure);
+        let weighted = |point: usize, values: &[f32]| {
+            let weight = weights[point];
+            vec![measure.relative(weight * f64::from(values[0]), weight * self.flux(point))]
+        };
         FilmError {
             rounds: self.rounds,
-            noise: self.relative_error(weights),
-            freedom: self.degrees_of_freedom(1, weights.len(), |point| weights[point]),
-            unknown: self.unknown(weights, unit, confidence),
+            blocks: self.blocks,
+            noise: self.relative_error(weights, stop.measure),
+            freedom: self.latest.degrees_of_freedom(1, weights.len(), self.blocks, weighted),
+            unknown: self.unknown(weights, unit, stop),
             unseen: 0.0,
+            places: None,
         }
     }
 
     /// Points of walls that reflect, but where no photon was stored: what is known of them is a bound. Of relative flux, a
     /// photon has 1 at most; `unit` makes W/m2 of flux times weight.
-    pub fn unknown(&self, weights: &[f64], unit: f64, confidence: f64) -> Unknown {
+    pub fn unknown(&self, weights: &[f64], unit: f64, stop: &Stop) -> Unknown {
+        let measure = self.measure(weights, stop.measure);
         let mut unknown = Unknown { asked: weights.iter().filter(|weight| **weight > 0.0).count() as u64, ..Unknown::default() };
-        let (mut bounds, mut result) = (0.0, 0.0);
+        let mut bounds = 0.0;
         for (point, weight) in weights.iter().enumerate().filter(|(_, weight)| **weight > 0.0) {
-            result += (weight * self.flux(point)).powi(2);
             if self.is_unreached(point) {
-                let most = weight * most_hits(confidence);
+                let most = weight * most_hits(stop.confidence);
                 unknown.add_unreached(unit * most);
-                bounds += most * most;
+                bounds += measure.relative(most, 0.0).powi(2);
             }
         }
-        unknown.relative_to(bounds, result)
+        unknown.with_relative(f64::sqrt(bounds))
     }
 
     /// [`RoomFilm::flux_error`], but infinite where nothing was found on a wall that reflects.

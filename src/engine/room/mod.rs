@@ -20,14 +20,16 @@ pub use replay::{photons_on_cpu, photons_on_gpu, replay};
 
 use crate::engine::Control;
 use crate::engine::error_bound::FilmError;
+use crate::engine::identity::{Hash, Identity};
 use crate::engine::room::film::{RoomFilm, irradiance_weights};
 use crate::engine::run::{self, Task};
-use crate::error::Result;
-use crate::gpu::Gpu;
+use crate::engine::watch::Keep;
+use crate::error::{Result, require};
+use crate::gpu::{DeviceFacts, Gpu};
 use crate::ledger::{Fates, Losses};
 use crate::plan::RoomPlan;
 use crate::scene::room::RoomScene;
-use crate::settings::{Builder, RoomSettings};
+use crate::settings::{Builder, RoomSettings, Sums};
 
 /// What a run leaves behind.
 pub type RunResult = run::RunResult<RoomPlan, RoomFilm>;
@@ -40,13 +42,17 @@ pub fn run(gpu: Option<&Gpu>, scene: &RoomScene, settings: &RoomSettings, contro
     }
 }
 
-fn task<'a>(plan: &RoomPlan, device: Option<(&'a Gpu, usize)>) -> Task<'a> {
+fn task<'a>(plan: &RoomPlan, device: Option<(&'a Gpu, usize)>, identity: Option<Identity>) -> Task<'a> {
     Task {
         device,
+        identity,
+        sensor: None,
         stop: plan.settings.stop,
         // The paper's radius never shrinks.
         alpha: 1.0,
         rounds: plan.settings.rounds,
+        // Rounds are independent of one another.
+        rounds_per_block: 1,
         bounces: plan.settings.bounces,
         photons_per_round: plan.settings.photons.into(),
         parts_per_round: plan.chunks_per_round,
@@ -56,9 +62,24 @@ fn task<'a>(plan: &RoomPlan, device: Option<(&'a Gpu, usize)>) -> Task<'a> {
     }
 }
 
+/// What a run of the box computes, where it is kept.
+fn identity(keep: &Keep, scene: &RoomScene, plan: &RoomPlan, device: Option<&DeviceFacts>) -> Result<Option<Identity>> {
+    let settings = &plan.settings;
+    let identity = keep.identity(|name| {
+        let (mut content, mut found) = (Hash::default(), Hash::default());
+        content.add_text(&format!("{scene:?}"));
+        found.add_text(&format!("{} {} {:?} {:?}", plan.channel_count, plan.film_shift, plan.light_photons, plan.relative_flux));
+        Identity::new(name, content, settings, found, device, settings.math)
+    })?;
+    let is_kept = identity.is_some() || keep.share.of > 1;
+    let allowed = "must be integer with --checkpoint, --resume and --shard, whose sums are the same to the bit in any order";
+    require(!is_kept || settings.sums == Sums::Integer, "--sums", format!("{:?}", settings.sums).to_lowercase(), allowed)?;
+    Ok(identity)
+}
+
 /// What a film tells of its error. `weights` are [`irradiance_weights`], made at the first look.
 fn error(film: &RoomFilm, scene: &RoomScene, plan: &RoomPlan, weights: &OnceCell<Vec<f64>>) -> FilmError {
-    film.error(weights.get_or_init(|| irradiance_weights(scene, plan)), 1.0, plan.settings.stop.confidence)
+    film.error(weights.get_or_init(|| irradiance_weights(scene, plan)), 1.0, &plan.settings.stop)
 }
 
 /// Light that the cap on bounces kept from the result.

@@ -13,6 +13,7 @@ use crate::engine::error_bound::FilmError;
 use crate::engine::nonfinite_values::{NonfiniteValues, What};
 use crate::engine::room::film::RoomFilm;
 use crate::engine::run::{self, RunState, World};
+use crate::engine::saved::{SavedFilm, SavedRun};
 use crate::error::{Error, Result};
 use crate::ledger::{Fates, Losses};
 use crate::photon::Photon;
@@ -30,6 +31,8 @@ struct RoomOnCpu<'a> {
     blocks: Vec<Block>,
     /// Fates of the latest chunk.
     tallies: Vec<Tally>,
+    /// The same where that chunk ended its round.
+    of_rounds: Fates,
     /// `None` where points gather.
     splats: Option<Splats<'a>>,
     /// What the round under way has left so far.
@@ -42,13 +45,18 @@ struct RoomOnCpu<'a> {
 /// Runs on the CPU, on `settings.threads` threads.
 pub fn on_cpu(scene: &RoomScene, settings: &RoomSettings, control: &mut Control) -> Result<RunResult> {
     let clock = HostClock::start("run");
-    let plan = &plan(scene, settings)?;
+    let plan = &RoomPlan { is_kept: control.keep.is_used(), ..plan(scene, settings)? };
+    let identity = super::identity(&control.keep, scene, plan, None)?;
     let pool = thread_pool(settings)?;
-    let film = RoomFilm::new(plan);
+    let film = match &control.keep.resume {
+        Some((_, SavedRun { film: SavedFilm::Room(film), .. })) => film.clone(),
+        _ => RoomFilm::new(plan),
+    };
     let world = RoomOnCpu {
         tracer: Tracer::new(scene, plan),
         blocks: Vec::new(),
         tallies: Vec::new(),
+        of_rounds: Fates::new(plan.settings.bounces),
         splats: adds_by_splatting(plan).then(|| pool.install(|| Splats::new(plan, Arch::new()))),
         sums: vec![0; film.sums.len()],
         film,
@@ -58,7 +66,7 @@ pub fn on_cpu(scene: &RoomScene, settings: &RoomSettings, control: &mut Control)
         plan,
         pool,
     };
-    run::run(world, clock, plan, super::task(plan, None), control)
+    run::run(world, clock, plan, super::task(plan, None, identity), control)
 }
 
 impl World for RoomOnCpu<'_> {
@@ -68,8 +76,9 @@ impl World for RoomOnCpu<'_> {
     fn trace(&mut self, clock: &mut HostClock, state: &mut RunState, chunk: u32) -> Result<()> {
         let ranges = self.plan.chunk(chunk);
         clock.time("build", |_| {
-            self.pool.install(|| self.tracer.trace(state.rounds, &ranges, &mut self.blocks));
-            self.tallies = tallies_of(&self.blocks, state.rounds, self.plan, &mut self.nonfinite_values);
+            let round = state.round();
+            self.pool.install(|| self.tracer.trace(round, &ranges, &mut self.blocks));
+            self.tallies = tallies_of(&self.blocks, state.round(), self.plan, &mut self.nonfinite_values);
         });
         match &mut self.splats {
             Some(splats) => clock.time("gather", |_| self.pool.install(|| splats.add(&self.blocks))),
@@ -79,9 +88,14 @@ impl World for RoomOnCpu<'_> {
         if chunk + 1 == self.plan.chunks_per_round {
             clock.time("film", |_| {
                 self.flush();
-                self.film.end_round(&mut self.sums);
+                self.film.end_round(state.round(), &mut self.sums);
             });
         }
+        Ok(())
+    }
+
+    fn end_block(&mut self, _: &mut HostClock, _: &RunState) -> Result<()> {
+        self.of_rounds = Fates::counted(&self.tallies, None);
         Ok(())
     }
 
@@ -90,15 +104,16 @@ impl World for RoomOnCpu<'_> {
     }
 
     fn collect(&mut self, _: &mut HostClock, state: &mut RunState) -> Result<()> {
-        state.count(0, &self.tallies);
+        let all = Fates::counted(&self.tallies, None);
+        state.count(0, all.clone(), std::mem::replace(&mut self.of_rounds, Fates::new(self.plan.settings.bounces)));
         Ok(())
     }
 
     fn film(&mut self, _: &mut HostClock, state: &RunState) -> Result<RoomFilm> {
-        let mut film = RoomFilm { emitted: state.emitted, ..self.film.clone() };
-        if !state.is_whole() {
+        let mut film = RoomFilm { emitted: state.emitted(), ..self.film.clone() };
+        if state.rounds() == 0 {
             self.flush();
-            film.add_unfinished(self.sums.clone());
+            film.sums.copy_from_slice(&self.sums);
         }
         Ok(film)
     }

@@ -4,18 +4,21 @@ use std::cell::OnceCell;
 use std::time::Instant;
 
 use super::RunResult;
+use crate::constants::{KEPT_BLOCKS, TALLY_COPIES};
 use crate::engine;
 use crate::engine::error_bound::FilmError;
-use crate::engine::film::{RoundSums, wide};
+use crate::engine::film::{KeptBlock, wide};
 use crate::engine::nonfinite_values::NonfiniteValues;
 use crate::engine::room::film::RoomFilm;
 use crate::engine::room::resources::{RoomResources, RoundBuffers};
 use crate::engine::room::{estimate, index, trace};
 use crate::engine::run::{self, RunState, World};
+use crate::engine::saved::SavedFilm;
 use crate::engine::{Control, tallies};
 use crate::error::Result;
 use crate::gpu::{Commands, Constants, Gpu, Module};
 use crate::ledger::{Fates, Losses};
+use crate::plan::latest_blocks::kept_count;
 use crate::plan::{RoomPlan, photons_of};
 use crate::scene::room::RoomScene;
 use crate::settings::RoomSettings;
@@ -30,14 +33,19 @@ struct RoomOnGpu<'a> {
 /// Runs on the GPU.
 pub fn on_gpu(gpu: &Gpu, scene: &RoomScene, settings: &RoomSettings, control: &mut Control) -> Result<RunResult> {
     let started = Instant::now();
-    let plan = RoomPlan::new(scene, settings, &engine::limits(gpu.facts()))?;
+    let plan = RoomPlan { is_kept: control.keep.is_used(), ..RoomPlan::new(scene, settings, &engine::limits(gpu.facts()))? };
+    let identity = super::identity(&control.keep, scene, &plan, Some(gpu.facts()))?;
     estimate::check_sums(&plan, gpu.facts())?;
     let (mut commands, pipelines_before) = run::commands(gpu, &modules(&plan, gpu), constants(&plan), settings.math, started)?;
     let resources = commands.scope("set-up", |commands| RoomResources::new(gpu, commands, scene, &plan))?;
     commands.warm_up()?;
     commands.submit()?;
+    if let Some((_, saved)) = &control.keep.resume {
+        let SavedFilm::Room(film) = &saved.film else { unreachable!("identities of two worlds differ") };
+        restore(&mut commands, &resources, &plan, film)?;
+    }
     let world = RoomOnGpu { scene, plan: &plan, resources, weights: OnceCell::new() };
-    run::run(world, commands, &plan, super::task(&plan, Some((gpu, pipelines_before))), control)
+    run::run(world, commands, &plan, super::task(&plan, Some((gpu, pipelines_before)), identity), control)
 }
 
 impl<'a> World for RoomOnGpu<'a> {
@@ -47,40 +55,60 @@ impl<'a> World for RoomOnGpu<'a> {
     fn trace(&mut self, commands: &mut Commands<'a>, state: &mut RunState, chunk: u32) -> Result<()> {
         let RoomOnGpu { resources, plan, .. } = self;
         let ranges = plan.chunk(chunk);
-        trace::chunk(commands, resources, plan, state.rounds, &ranges)?;
+        trace::chunk(commands, resources, plan, state.round(), &ranges)?;
         index::build(commands, resources, plan, photons_of(&ranges))?;
         estimate::gather(commands, resources, plan, photons_of(&ranges))?;
         state.hand_out(0, photons_of(&ranges));
-        if chunk + 1 == plan.chunks_per_round { estimate::end_round(commands, resources, plan, state.rounds) } else { Ok(()) }
+        if chunk + 1 == plan.chunks_per_round { estimate::end_round(commands, resources, plan, state.round()) } else { Ok(()) }
     }
 
     fn is_full(&self, commands: &Commands<'a>) -> bool {
         commands.work() >= self.plan.pair_tests_per_submission || commands.timestamps_left() < trace::timestamps_per_chunk(self.plan)
     }
 
+    fn end_block(&mut self, commands: &mut Commands<'a>, _: &RunState) -> Result<()> {
+        // Of whole rounds alone nothing else is ever read.
+        if self.plan.chunks_per_round > 1 {
+            let RoomResources { tallies, tallies_of_rounds, .. } = &self.resources;
+            commands.copy(tallies, tallies_of_rounds, tallies.count());
+        }
+        Ok(())
+    }
+
     fn collect(&mut self, commands: &mut Commands<'a>, state: &mut RunState) -> Result<()> {
-        let tallies = tallies::read(commands, &self.resources.tallies, self.plan.settings.bounces)?;
-        tallies::clear(commands, &self.resources.tallies);
-        state.count(0, &tallies);
+        let RoomResources { tallies, tallies_of_rounds, .. } = &self.resources;
+        let copies = (self.plan.settings.bounces * TALLY_COPIES) as usize;
+        let of_rounds = commands.copy_out(tallies_of_rounds, if self.plan.chunks_per_round > 1 { copies } else { 0 })?;
+        let all = commands.read(tallies, copies)?;
+        tallies::clear(commands, tallies);
+        let all = Fates::counted(&tallies::sums(&all), None);
+        let of_rounds = of_rounds.take();
+        let of_rounds = if of_rounds.is_empty() { all.clone() } else { Fates::counted(&tallies::sums(&of_rounds), None) };
+        state.count(0, all, of_rounds);
         Ok(())
     }
 
     fn film(&mut self, commands: &mut Commands<'a>, state: &RunState) -> Result<RoomFilm> {
         let RoomOnGpu { resources, plan, .. } = self;
-        let mut film = RoomFilm { emitted: state.emitted, ..RoomFilm::new(plan) };
+        let mut film = RoomFilm { emitted: state.emitted(), ..RoomFilm::new(plan) };
         let count = film.sums.len();
-        let Some(RoundBuffers { totals, low_squares, high_squares, latest_rounds }) = &resources.rounds else {
-            film.of_rounds = RoundSums { rounds: state.rounds, sums: commands.read(&resources.film, count)?, ..RoundSums::default() };
+        film.rounds = state.rounds();
+        film.blocks = state.rounds();
+        let Some(RoundBuffers { totals, low_squares, high_squares, latest_blocks }) =
+            resources.rounds.as_ref().filter(|_| state.rounds() > 0)
+        else {
+            film.sums = commands.read(&resources.film, count)?;
             return Ok(film);
         };
         let sums = commands.copy_out(totals, count)?;
         let (low, high) = (commands.copy_out(low_squares, count)?, commands.copy_out(high_squares, count)?);
-        let latest = commands.copy_out(latest_rounds, film.latest.len())?;
+        let values = commands.copy_out(latest_blocks, latest_blocks.count() as usize)?;
         commands.submit()?;
-        let squares = low.take().into_iter().zip(high.take()).map(|(low, high)| wide(low, high)).collect();
-        film.of_rounds = RoundSums { rounds: state.rounds, sums: sums.take(), squares, latest: latest.take() };
-        if !state.is_whole() {
-            film.add_unfinished(commands.read(&resources.film, count)?);
+        film.sums = sums.take();
+        film.squares = low.take().into_iter().zip(high.take()).map(|(low, high)| wide(low, high)).collect();
+        let (values, kept) = (values.take(), kept_count(plan.points.len()));
+        for (slot, number) in &state.kept {
+            film.latest.push(KeptBlock { number: *number, values: values[*slot as usize * kept..][..kept].to_vec() });
         }
         Ok(film)
     }
@@ -96,6 +124,22 @@ impl<'a> World for RoomOnGpu<'a> {
     fn nonfinite_values(&mut self, commands: &mut Commands<'a>) -> Result<Option<NonfiniteValues>> {
         NonfiniteValues::found(commands, &self.resources.nonfinite_values, self.plan.settings.paranoid)
     }
+}
+
+/// Goes on with a film.
+fn restore(commands: &mut Commands, resources: &RoomResources, plan: &RoomPlan, film: &RoomFilm) -> Result<()> {
+    let RoundBuffers { totals, low_squares, high_squares, latest_blocks } =
+        resources.rounds.as_ref().expect("a plan that is kept has them");
+    commands.upload(totals, &film.sums)?;
+    commands.upload(low_squares, &film.squares.iter().map(|square| *square as u64).collect::<Vec<u64>>())?;
+    commands.upload(high_squares, &film.squares.iter().map(|square| (*square >> 64) as u64).collect::<Vec<u64>>())?;
+    let kept = kept_count(plan.points.len());
+    let mut values = vec![0.0; latest_blocks.count() as usize];
+    for block in film.latest.iter() {
+        values[(block.number % KEPT_BLOCKS) as usize * kept..][..kept].copy_from_slice(&block.values);
+    }
+    commands.upload(latest_blocks, &values)?;
+    commands.submit()
 }
 
 /// Specialization constants of a plan.

@@ -37,6 +37,8 @@ buffers! {
             (plan.settings.builder == Builder::Scan).then(|| OrderBuffers::made(planned)).transpose()?,
         /// Ledger of the submission under way; see `tallies`.
         tallies: Buffer<Tally> = planned.zeroed(commands, "tallies")?,
+        /// The same as the latest whole round left it.
+        tallies_of_rounds: Buffer<Tally> = planned.zeroed(commands, "tallies of rounds")?,
         /// The grid; `None` where the gather has another index or none.
         index: Option<IndexBuffers> = plan.gathers_by_grid().then(|| IndexBuffers::made(planned)).transpose()?,
         /// The kd-tree; `None` where the gather has another index or none.
@@ -74,7 +76,7 @@ buffers! {
         /// Lower and upper 64 bits of the sums of squares.
         low_squares: Buffer<u64> = planned.zeroed(commands, "low squares")?,
         high_squares: Buffer<u64> = planned.zeroed(commands, "high squares")?,
-        latest_rounds: Buffer<f32> = planned.zeroed(commands, "latest rounds")?,
+        latest_blocks: Buffer<f32> = planned.zeroed(commands, "latest blocks")?,
     }
 }
 

@@ -49,6 +49,7 @@ pub fn batch(
     let given = |map: &MapPlan| (map.radius_from != RadiusFrom::Trial).then_some(factor * map.radius * view.geometry.unit);
     let settings = SceneSettings {
         rounds,
+        block: Some(1),
         alpha: 1.0,
         seed,
         radius: plan.global.as_ref().and_then(given),
@@ -60,5 +61,5 @@ pub fn batch(
     let trial = plan.trial.as_ref().map(|trial| Trial { factor: Some(factor), ..trial.clone() });
     let plan = ScenePlan::with_trial(scene, view.geometry, &settings, plan.sensor, &engine::limits(gpu.facts()), trial)?;
     let lit = light(gpu, view, plan, control)?;
-    Ok((lit.end, lit.film.values(&lit.plan)))
+    Ok((lit.end, lit.film.surface_means().flat_map(|mean| mean.to_array()).collect()))
 }

@@ -138,8 +138,8 @@ pub fn flux_to_radiance(commands: &mut Commands, round: Round, traced: [u32; 2])
             arrivals: plan.arrivals,
             round: round.number,
             rounding: rounding(plan, round.number),
-            film_scale: plan.film_scale as f32,
-            film_limit: plan.point_limit() as f32,
+            film_scale: plan.film.scale as f32,
+            film_limit: plan.film.point_limit as f32,
             global_radius: radius(&plan.global),
             caustic_radius: radius(&plan.caustic),
             first_caustic_cut: plan.first_cut(true),
@@ -163,15 +163,28 @@ pub fn flux_to_radiance(commands: &mut Commands, round: Round, traced: [u32; 2])
     Ok(())
 }
 
-/// Ends a round: light that was found goes to the film.
-pub fn resolve(commands: &mut Commands, round: Round) -> Result<()> {
+/// Ends a round: light that was found joins its block, and at the end of that the film.
+pub fn resolve(commands: &mut Commands, round: Round, ends_block: bool) -> Result<()> {
     let Round { resources, plan, .. } = round;
-    let SceneResources { pass_sums, estimates, film_sums, film_squares, latest_rounds, .. } = resources;
+    let SceneResources { pass_sums, estimates, sums_of_block, film_sums, film_squares, .. } = resources;
+    let SceneResources { surface_sums_of_block, surface_sums, surface_squares, part_totals, latest_blocks, .. } = resources;
     let pixel_count = plan.sensor.pixels();
     let points_per_pixel = if resources.photons.is_some() { plan.points_per_pixel } else { 0 };
+    let block = round.number / plan.film.rounds_per_block;
     for (first_pixel, end_pixel) in runs(pixel_count, plan.pixels_at_once(1)) {
-        let push = ResolvePush { first_pixel, end_pixel, pixel_count, points_per_pixel, round: round.number };
-        let kernel = Resolve { pass_sums, estimates, film_sums, film_squares, latest_rounds };
+        let push = ResolvePush { first_pixel, end_pixel, pixel_count, points_per_pixel, block, ends_block: u32::from(ends_block) };
+        let kernel = Resolve {
+            pass_sums,
+            estimates,
+            sums_of_block,
+            film_sums,
+            film_squares,
+            surface_sums_of_block,
+            surface_sums,
+            surface_squares,
+            part_totals,
+            latest_blocks,
+        };
         commands.dispatch(kernel, &push, Extent::Items(u64::from(end_pixel - first_pixel)))?;
         add_work(commands, plan, u64::from(end_pixel - first_pixel) * u64::from(plan.samples() + points_per_pixel))?;
     }

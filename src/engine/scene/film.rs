@@ -1,18 +1,21 @@
-//! The film of all rounds: the mean of each pixel and its standard error, from integer sums.
+//! The film of a scene: the mean of each pixel and its standard error, from integer sums over blocks of rounds.
 
 use std::ops::Deref;
 
 use glam::DVec3;
 
 use crate::constants::{
-    HIT_BRIGHT_PHOTON, HIT_CAUSTIC_PHOTON, HIT_GLOBAL_PHOTON, HIT_KINDS, HIT_SHADOW_RAY, HIT_UNSEEN_LIGHT, RADIUS_CLASSES,
+    HIT_BRIGHT_PHOTON, HIT_CAUSTIC_PHOTON, HIT_GLOBAL_PHOTON, HIT_KINDS, HIT_SHADOW_RAY, HIT_UNSEEN_LIGHT, PART_COUNT, RADIUS_CLASSES,
 };
-use crate::engine::error_bound::FilmError;
-use crate::engine::film::RoundSums;
+use crate::engine::error_bound::{ErrorPlaces, FilmError};
+use crate::engine::film::{BlockSums, LatestBlocks};
+use crate::engine::measure_of_error::ErrorMeasure;
 use crate::engine::unknown::{Uncounted, Unknown, most_hits};
-use crate::plan::buffers::ANOMALY_WORDS;
+use crate::plan::buffers::{ANOMALY_WORDS, PART_VALUES};
+use crate::plan::film::FilmPlan;
+use crate::plan::latest_blocks::kept_place;
 use crate::plan::radius::mean_squared_radius;
-use crate::plan::scene::{MapPlan, ScenePlan};
+use crate::plan::scene::MapPlan;
 
 /// Names of the kinds of `HIT_...`, but for those of light that no error counts.
 const KINDS: [&str; 3] = ["shadow ray", "photon of the caustic map", "photon of the global map"];
@@ -20,18 +23,26 @@ const KINDS: [&str; 3] = ["shadow ray", "photon of the caustic map", "photon of 
 const REACHED: u32 = u32::MAX;
 /// Of a pixel's light, what bright photons may add that is worth counting.
 const WORTH_COUNTING: f64 = 0.1;
+/// Of all pixels, those that are told of as the worst.
+const WORST: f64 = 0.01;
 
-/// Exact sums over rounds, three channels a pixel, in film units, and what else a run leaves of its light.
+/// Exact sums over blocks, three channels a pixel, in film units, and what else a run leaves of its light.
 #[derive(Debug, Clone)]
 pub struct SceneFilm {
-    pub of_rounds: RoundSums,
+    pub plan: FilmPlan,
+    pub of_blocks: BlockSums,
+    /// Of light that surfaces scatter; `None` where nothing else is seen, as of points.
+    pub of_surfaces: Option<BlockSums>,
+    /// Parts of that light at some pixels.
+    pub latest: LatestBlocks,
     /// For each pixel and kind of light what one hit would have added to a round, or that something has hit
     /// (`glsl/world/scene/one_hit.glsl`).
     pub one_hits: Vec<u32>,
     /// Light of each part (direct, specular, caustic, indirect) over all pixels and channels, film units.
     pub part_totals: Vec<u64>,
     /// Values that were no number, values clamped to the film's largest, estimates on a mesh too dense for the area within the
-    /// radius to be found, camera paths that were cut off; then what was clamped and what was cut off, 64 bits each.
+    /// radius to be found, camera paths that were cut off; then, 64 bits each, what was clamped, what was cut off, and samples that
+    /// met a surface.
     pub anomalies: [u32; ANOMALY_WORDS],
     /// Visible points of each class of radii in the first round: of the global map, then of the caustic map.
     pub class_counts: Vec<u32>,
@@ -42,27 +53,63 @@ pub struct SceneFilm {
 /// Films are equal that hold the same light, whatever else was asked for and not found.
 impl PartialEq for SceneFilm {
     fn eq(&self, other: &SceneFilm) -> bool {
-        self.of_rounds == other.of_rounds
+        (&self.of_blocks, &self.of_surfaces, &self.latest) == (&other.of_blocks, &other.of_surfaces, &other.latest)
     }
 }
 
 impl Deref for SceneFilm {
-    type Target = RoundSums;
+    type Target = BlockSums;
 
-    fn deref(&self) -> &RoundSums {
-        &self.of_rounds
+    fn deref(&self) -> &BlockSums {
+        &self.of_blocks
     }
 }
 
 impl SceneFilm {
+    /// Adds the blocks of another part of the same run.
+    pub fn merge(&mut self, other: &SceneFilm) {
+        self.of_blocks.merge(&other.of_blocks);
+        self.of_surfaces.iter_mut().zip(&other.of_surfaces).for_each(|(surfaces, others)| surfaces.merge(others));
+        self.latest.merge(&other.latest);
+        // The most that one hit would have added, and what has hit is more than any.
+        self.one_hits.iter_mut().zip(&other.one_hits).for_each(|(most, other)| *most = (*most).max(*other));
+        self.part_totals.iter_mut().zip(&other.part_totals).for_each(|(total, other)| *total += other);
+        self.stored.iter_mut().zip(&other.stored).for_each(|(stored, other)| *stored += other);
+        for word in 0..4 {
+            self.anomalies[word] = self.anomalies[word].saturating_add(other.anomalies[word]);
+        }
+        for word in (4..ANOMALY_WORDS).step_by(2) {
+            let sum = wide_count(&self.anomalies, word) + wide_count(&other.anomalies, word);
+            (self.anomalies[word], self.anomalies[word + 1]) = (sum as u32, (sum >> 32) as u32);
+        }
+    }
+
     pub fn pixels(&self) -> usize {
         self.sums.len() / 3
     }
 
     /// Radiance (W/m2/sr) or irradiance (W/m2) of a pixel.
-    pub fn mean(&self, pixel: usize, plan: &ScenePlan) -> DVec3 {
-        let unit = plan.film_scale * f64::from(self.rounds.max(1));
-        DVec3::from_array([0, 1, 2].map(|channel| self.sums[3 * pixel + channel] as f64 / unit))
+    pub fn mean(&self, pixel: usize) -> DVec3 {
+        self.mean_of(&self.of_blocks, pixel)
+    }
+
+    fn mean_of(&self, light: &BlockSums, pixel: usize) -> DVec3 {
+        let unit = self.plan.scale * f64::from(self.rounds.max(1));
+        DVec3::from_array([0, 1, 2].map(|channel| light.sums[3 * pixel + channel] as f64 / unit))
+    }
+
+    /// Light that errors refer to: what surfaces scatter, sums and squares.
+    fn surfaces(&self) -> &BlockSums {
+        self.of_surfaces.as_ref().unwrap_or(&self.of_blocks)
+    }
+
+    /// Radiance of what surfaces scatter.
+    pub fn surface_mean(&self, pixel: usize) -> DVec3 {
+        self.mean_of(self.surfaces(), pixel)
+    }
+
+    pub fn surface_means(&self) -> impl Iterator<Item = DVec3> {
+        (0..self.pixels()).map(|pixel| self.surface_mean(pixel))
     }
 
     /// The first and the last class that a point of this map has.
@@ -74,35 +121,57 @@ impl SceneFilm {
     }
 
     /// Of every pixel.
-    pub fn means(&self, plan: &ScenePlan) -> impl Iterator<Item = DVec3> {
-        (0..self.pixels()).map(|pixel| self.mean(pixel, plan))
+    pub fn means(&self) -> impl Iterator<Item = DVec3> {
+        (0..self.pixels()).map(|pixel| self.mean(pixel))
     }
 
     /// The same, channel by channel.
-    pub fn values(&self, plan: &ScenePlan) -> Vec<f64> {
-        self.means(plan).flat_map(|mean| mean.to_array()).collect()
+    pub fn values(&self) -> Vec<f64> {
+        self.means().flat_map(|mean| mean.to_array()).collect()
     }
 
-    /// Standard error of the mean, from the variance between rounds; of a single round nothing is known,
-    /// and it is infinite. Where a channel lies below the film's unit few rounds may not show that it is rounded at random
+    /// Standard error of the mean, from the variance between blocks; of a single block nothing is known,
+    /// and it is infinite. Where a channel lies below the film's unit few blocks may not show that it is rounded at random
     /// to 0 or 1: then the variance is at least what that rounding has.
-    pub fn standard_error(&self, pixel: usize, plan: &ScenePlan) -> DVec3 {
+    pub fn standard_error(&self, pixel: usize) -> DVec3 {
+        self.error_of(&self.of_blocks, pixel)
+    }
+
+    /// The same of what surfaces scatter.
+    pub fn surface_error(&self, pixel: usize) -> DVec3 {
+        self.error_of(self.surfaces(), pixel)
+    }
+
+    fn error_of(&self, light: &BlockSums, pixel: usize) -> DVec3 {
         let rounds = f64::from(self.rounds);
-        let is_lit = self.sums[3 * pixel..][..3] != [0; 3];
+        let is_lit = light.sums[3 * pixel..][..3] != [0; 3];
         DVec3::from_array([0, 1, 2].map(|channel| {
             let place = 3 * pixel + channel;
-            let sum = self.sums[place];
             // That of a fraction f is f (1 - f), at most f and at most 1/4; a sum of 0 may be of any fraction below 1 / rounds.
-            let rounding = (sum as f64).max(1.0).min(0.25 * plan.roundings_per_round() * rounds);
-            let variance = self.variance(place, sum).max(if is_lit { rounding } else { 0.0 });
-            variance.sqrt() / rounds / plan.film_scale
+            let rounding = (light.sums[place] as f64).max(1.0).min(0.25 * self.plan.roundings_per_round * rounds);
+            let variance = light.variance(place).max(if is_lit { rounding } else { 0.0 });
+            variance.sqrt() / rounds / self.plan.scale
         }))
     }
 
-    /// Of all pixels and channels.
-    pub fn root_mean_square(&self, plan: &ScenePlan) -> f64 {
-        let squares: f64 = self.means(plan).map(DVec3::length_squared).sum();
+    /// Root mean square of all pixels and channels.
+    pub fn root_mean_square(&self) -> f64 {
+        let squares: f64 = self.means().map(DVec3::length_squared).sum();
         (squares / (3 * self.pixels()).max(1) as f64).sqrt()
+    }
+
+    /// Samples that met a surface, over those of a pixel: as many pixels as show surfaces, by their shares.
+    fn pixels_of_surfaces(&self) -> f64 {
+        if self.of_surfaces.is_none() {
+            return self.pixels() as f64;
+        }
+        wide_count(&self.anomalies, 8) as f64 / (f64::from(self.plan.samples) * f64::from(self.rounds.max(1)))
+    }
+
+    /// How errors of its values add up.
+    pub fn measure(&self) -> ErrorMeasure {
+        let sum = self.surface_means().map(DVec3::element_sum).sum();
+        ErrorMeasure::new(self.plan.measure, 3.0 * self.pixels_of_surfaces(), sum)
     }
 
     fn kinds(&self, pixel: usize) -> &[u32] {
@@ -119,16 +188,16 @@ impl SceneFilm {
     /// spread over rounds says nothing of a kind of light that has arrived elsewhere, but not here: its upper bound is part of the
     /// error. Nor does it say much of few hits: the next one may have in any channel what those had in the brightest, so that much
     /// is part of the error too. The report names the kinds that have reached no pixel at all.
-    pub fn stated_errors<'a>(&'a self, plan: &'a ScenePlan) -> impl Fn(usize) -> DVec3 + 'a {
-        let mut scales = self.bound_scales(plan, plan.settings.stop.confidence);
+    pub fn stated_errors(&self) -> impl Fn(usize) -> DVec3 {
+        let mut scales = self.bound_scales(self.plan.confidence);
         let is_nowhere = |kind: &usize| self.stored[*kind] == 0;
         self.absent().into_iter().filter(is_nowhere).for_each(|kind| scales[kind] = 0.0);
         move |pixel| {
-            if self.is_unreached(pixel) || self.may_be_clamped(pixel, plan) {
+            if self.is_unreached(pixel) || self.may_be_clamped(pixel) {
                 return DVec3::INFINITY;
             }
             let unknown: f64 = (0..KINDS.len()).map(|kind| self.most_light(pixel, kind, &scales).powi(2)).sum();
-            let (mean, error) = (self.mean(pixel, plan), self.standard_error(pixel, plan));
+            let (mean, error) = (self.mean(pixel), self.standard_error(pixel));
             // Of n hits the relative variance of the mean is about 1 / n.
             let one_hit = (error * error / mean).to_array().into_iter().filter(|hit| hit.is_finite()).fold(0.0, f64::max);
             error.map(|error| (error * error + one_hit * one_hit + unknown).sqrt())
@@ -136,13 +205,13 @@ impl SceneFilm {
     }
 
     /// Whether the run clamped values, and this pixel has as much light as one of them.
-    fn may_be_clamped(&self, pixel: usize, plan: &ScenePlan) -> bool {
-        let largest = plan.point_limit().min(plan.film_limit / f64::from(plan.samples()));
+    fn may_be_clamped(&self, pixel: usize) -> bool {
+        let largest = self.plan.point_limit.min(self.plan.limit / f64::from(self.plan.samples));
         self.anomalies[1] > 0 && self.sums[3 * pixel..][..3].iter().any(|sum| *sum as f64 >= largest)
     }
 
-    pub fn stated_error(&self, pixel: usize, plan: &ScenePlan) -> DVec3 {
-        self.stated_errors(plan)(pixel)
+    pub fn stated_error(&self, pixel: usize) -> DVec3 {
+        self.stated_errors()(pixel)
     }
 
     /// Kinds of light that some pixels ask for, and that have reached none.
@@ -156,13 +225,14 @@ impl SceneFilm {
 
     /// Factors, by kind of light, that make an upper bound of what one hit would add, where there was none: the most hits that may be
     /// expected, over the rounds and, for photons, the squares of their radii.
-    fn bound_scales(&self, plan: &ScenePlan, confidence: f64) -> [f64; KINDS.len()] {
+    fn bound_scales(&self, confidence: f64) -> [f64; KINDS.len()] {
         // Rounds with larger discs would have had more hits.
-        let shrunk = mean_squared_radius(plan.settings.alpha, self.rounds);
-        let per_disc = |map: &Option<MapPlan>| map.as_ref().map_or(0.0, |map| 1.0 / (plan.widest_radius(map, 0).powi(2) * shrunk));
+        let shrunk = mean_squared_radius(self.plan.alpha, self.rounds);
+        let [of_global, of_caustic] =
+            self.plan.widest_radii.map(|radius| if radius > 0.0 { 1.0 / (radius * radius * shrunk) } else { 0.0 });
         let mut scales = [most_hits(confidence) / f64::from(self.rounds.max(1)); KINDS.len()];
-        scales[HIT_CAUSTIC_PHOTON as usize] *= per_disc(&plan.caustic);
-        scales[HIT_GLOBAL_PHOTON as usize] *= per_disc(&plan.global);
+        scales[HIT_CAUSTIC_PHOTON as usize] *= of_caustic;
+        scales[HIT_GLOBAL_PHOTON as usize] *= of_global;
         scales
     }
 
@@ -182,93 +252,161 @@ impl SceneFilm {
     }
 
     /// Lights that the trial has not seen from a pixel, and towards which surfaces have stopped every ray since.
-    fn hidden(&self, plan: &ScenePlan, confidence: f64) -> Uncounted {
+    fn hidden(&self, confidence: f64) -> Uncounted {
         let stopped = || self.missed(HIT_UNSEEN_LIGHT).map(|(_, hit)| hit);
         let most = most_hits(confidence) / f64::from(self.rounds.max(1)) * stopped().fold(0.0, f64::max);
         // All of them together have as few hits as one.
-        Uncounted { points: stopped().count() as u64, upper_bound: most, of_mean: over(most, self.total(plan)) }
+        Uncounted { points: stopped().count() as u64, upper_bound: most, of_mean: over(most, self.total()) }
     }
 
     /// Pixels that only dim photons have met, where bright ones may add what is worth counting. Photons are shared: the same hit may be
     /// missing in all of them.
-    fn dim(&self, plan: &ScenePlan, scales: &[f64; KINDS.len()]) -> Uncounted {
+    fn dim(&self, scales: &[f64; KINDS.len()]) -> Uncounted {
         let bound = |(pixel, hit): (usize, f64)| (pixel, scales[HIT_GLOBAL_PHOTON as usize] * hit);
-        let is_worth_it = |(pixel, most): &(usize, f64)| *most > WORTH_COUNTING * self.mean(*pixel, plan).max_element();
+        let is_worth_it = |(pixel, most): &(usize, f64)| *most > WORTH_COUNTING * self.mean(*pixel).max_element();
         let bounds = || self.missed(HIT_BRIGHT_PHOTON).map(bound).filter(is_worth_it).map(|(_, most)| most);
         Uncounted {
             points: bounds().count() as u64,
             upper_bound: bounds().fold(0.0, f64::max),
-            of_mean: over(bounds().sum(), self.total(plan)),
+            of_mean: over(bounds().sum(), self.total()),
         }
     }
 
-    /// Light of all pixels, each in its brightest channel.
-    fn total(&self, plan: &ScenePlan) -> f64 {
-        self.means(plan).map(DVec3::max_element).sum()
+    /// Light of surfaces in all pixels, each in its brightest channel.
+    fn total(&self) -> f64 {
+        self.surface_means().map(DVec3::max_element).sum()
     }
 
     /// Pixels, and kinds of light, of which no hit is all that is known.
-    pub fn unknown(&self, plan: &ScenePlan, confidence: f64) -> Unknown {
-        let scales = self.bound_scales(plan, confidence);
+    pub fn unknown(&self, confidence: f64) -> Unknown {
+        let scales = self.bound_scales(confidence);
         let bound = |pixel: usize, kind: usize| self.most_light(pixel, kind, &scales);
         let pixels = || 0..self.pixels();
         let absent = self.absent();
         let names = absent.iter().map(|kind| KINDS[*kind]).collect();
-        let (hidden, dim) = (self.hidden(plan, confidence), self.dim(plan, &scales));
+        let (hidden, dim) = (self.hidden(confidence), self.dim(&scales));
         let mut unknown = Unknown { absent: names, hidden, dim, ..Unknown::default() };
-        let (mut bounds, mut result, mut shadow_rays) = (0.0, 0.0, 0.0);
+        let measure = self.measure();
+        let square = |most: f64, pixel: usize| {
+            let values = self.surface_mean(pixel).to_array();
+            values.into_iter().map(|value| measure.relative(most, value).powi(2)).sum::<f64>()
+        };
+        let (mut bounds, mut shadow_rays) = (0.0, 0.0f64);
         for pixel in pixels() {
-            result += self.mean(pixel, plan).length_squared();
             unknown.asked += u64::from(self.kinds(pixel).iter().any(|bits| *bits != 0));
             if self.is_unreached(pixel) {
                 // Hits of all kinds together are as few as those of one.
                 let most = (0..KINDS.len()).map(|kind| bound(pixel, kind)).fold(0.0, f64::max);
                 unknown.add_unreached(most);
-                bounds += 3.0 * most * most;
+                bounds += square(most, pixel);
                 continue;
             }
             for kind in &absent {
                 let most = bound(pixel, *kind);
                 if *kind == HIT_SHADOW_RAY as usize {
-                    shadow_rays = most.max(shadow_rays);
+                    shadow_rays = square(most, pixel).max(shadow_rays);
                 } else {
-                    bounds += 3.0 * most * most;
+                    bounds += square(most, pixel);
                 }
             }
         }
         // Each pixel has shadow rays of its own, and those of all have missed: the worst is that one pixel alone might have
         // been hit. Photons are shared, so that all pixels may be in the dark for the same reason.
-        bounds += 3.0 * shadow_rays * shadow_rays;
-        unknown.relative_to(bounds, result)
+        bounds += shadow_rays;
+        unknown.with_relative(bounds.sqrt())
     }
 
     /// The most that hits of the brightest lamp in mirrors and glass may add to one pixel, where no round had any, relative to the
     /// result.
-    fn unseen(&self, plan: &ScenePlan, confidence: f64) -> f64 {
-        let hit = plan.rare_radiance / (f64::from(plan.samples()) * f64::from(self.rounds.max(1)));
-        if hit == 0.0 { 0.0 } else { most_hits(confidence) * hit / self.means(plan).map(DVec3::length_squared).sum::<f64>().sqrt() }
+    fn unseen(&self, confidence: f64) -> f64 {
+        let hit = self.plan.rare_radiance / (f64::from(self.plan.samples) * f64::from(self.rounds.max(1)));
+        self.measure().relative_to_mean(most_hits(confidence) * hit)
     }
 
-    /// What it tells of its error.
-    pub fn error(&self, plan: &ScenePlan, confidence: f64) -> FilmError {
-        let (noise, unknown) = (self.relative_error(plan), self.unknown(plan, confidence));
-        let freedom = self.degrees_of_freedom(3, self.pixels(), |_| 1.0);
-        FilmError { rounds: self.rounds, noise, freedom, unknown, unseen: self.unseen(plan, confidence) }
+    /// What it tells of its error, that of what surfaces scatter.
+    pub fn error(&self, confidence: f64) -> FilmError {
+        let measure = self.measure();
+        let value = |place: usize, parts: &[f32]| {
+            let mean = self.surface_mean(place);
+            let of_channel = |channel: usize| {
+                let sum: f64 = parts.iter().skip(channel).step_by(3).map(|part| f64::from(*part)).sum();
+                // As an error counts that goes with it.
+                sum * measure.relative(1.0, mean[channel])
+            };
+            [0, 1, 2].map(of_channel).to_vec()
+        };
+        FilmError {
+            rounds: self.rounds,
+            blocks: self.blocks,
+            noise: self.relative_error(),
+            freedom: self.latest.degrees_of_freedom(PART_VALUES as usize, self.pixels(), self.blocks, value),
+            unknown: self.unknown(confidence),
+            unseen: self.unseen(confidence),
+            places: self.error_places(&measure),
+        }
     }
 
-    /// Root mean square over pixels and channels of standard error and of the mean; of pixels that nothing has reached see
+    /// The relative error of the noise, as the film's measure adds it up; of pixels that nothing has reached see
     /// [`SceneFilm::unknown`].
-    pub fn relative_error(&self, plan: &ScenePlan) -> f64 {
-        if self.rounds < 2 {
-            return if self.sums.iter().all(|sum| *sum == 0) { 0.0 } else { f64::INFINITY };
+    pub fn relative_error(&self) -> f64 {
+        if self.blocks < 2 {
+            return if self.surfaces().sums.iter().all(|sum| *sum == 0) { 0.0 } else { f64::INFINITY };
         }
-        let (mut errors, mut means) = (0.0, 0.0);
-        for pixel in 0..self.pixels() {
-            errors += self.standard_error(pixel, plan).length_squared();
-            means += self.mean(pixel, plan).length_squared();
-        }
-        if means > 0.0 { (errors / means).sqrt() } else { 0.0 }
+        self.squared_errors(&self.measure()).sum::<f64>().sqrt()
     }
+
+    /// What each pixel adds to the square of the relative error.
+    fn squared_errors(&self, measure: &ErrorMeasure) -> impl Iterator<Item = f64> {
+        (0..self.pixels()).map(move |pixel| {
+            let (error, mean) = (self.surface_error(pixel), self.surface_mean(pixel));
+            [0, 1, 2].map(|channel| measure.relative(error[channel], mean[channel]).powi(2)).into_iter().sum()
+        })
+    }
+
+    /// Where the error of the noise sits; `None` where it is not known.
+    fn error_places(&self, measure: &ErrorMeasure) -> Option<ErrorPlaces> {
+        let mut squares: Vec<f64> = if self.blocks < 2 { Vec::new() } else { self.squared_errors(measure).collect() };
+        let sum: f64 = squares.iter().sum();
+        if sum == 0.0 || !sum.is_finite() {
+            return None;
+        }
+        let worst = ((WORST * squares.len() as f64).ceil() as usize).clamp(1, squares.len());
+        squares.sort_unstable_by(|a, b| b.total_cmp(a));
+        Some(ErrorPlaces {
+            worst_pixels: worst as u64,
+            of_worst_pixels: squares[..worst].iter().sum::<f64>() / sum,
+            of_parts: self.error_of_parts(measure)?,
+        })
+    }
+
+    /// The share of each part of light in the squared error, from the spread of the latest blocks at some pixels; parts are taken for
+    /// independent. `None` where these pixels had no spread.
+    fn error_of_parts(&self, measure: &ErrorMeasure) -> Option<[f64; PART_COUNT as usize]> {
+        let mut variances = [0.0; PART_COUNT as usize];
+        let mut sums = vec![[0.0f64; 2]; self.latest.iter().next()?.values.len()];
+        for block in self.latest.iter() {
+            for ([sum, squares], value) in sums.iter_mut().zip(&block.values) {
+                *sum += f64::from(*value);
+                *squares += f64::from(*value).powi(2);
+            }
+        }
+        let count = self.latest.iter().count() as f64;
+        for (place, sums) in sums.chunks_exact(PART_VALUES as usize).enumerate() {
+            let Some(pixel) = kept_place(place, self.pixels()) else { continue };
+            let mean = self.surface_mean(pixel);
+            for (k, [sum, squares]) in sums.iter().enumerate() {
+                let variance = (squares - sum * sum / count).max(0.0);
+                variances[k / 3] += measure.relative(variance.sqrt(), mean[k % 3]).powi(2);
+            }
+        }
+        let all: f64 = variances.iter().sum();
+        (all > 0.0 && all.is_finite()).then(|| variances.map(|variance| variance / all))
+    }
+}
+
+/// A count of two words.
+fn wide_count(words: &[u32], word: usize) -> u64 {
+    u64::from(words[word]) | u64::from(words[word + 1]) << 32
 }
 
 /// Of a result, which may be black.

@@ -2,8 +2,8 @@
 //! change, values beyond what the film holds, camera paths cut off among mirrors. Every watt of it is counted, and bounds a bias.
 
 use super::SceneFilm;
-use crate::constants::{ARRIVED_DIRECT, PART_COUNT};
-use crate::ledger::{Fates, Losses, RelativeFlux};
+use crate::constants::{ARRIVED_DIRECT, PART_COUNT, TOTAL_FLUX_BITS};
+use crate::ledger::{Fates, FluxUnits, Losses};
 use crate::plan::scene::ScenePlan;
 use crate::scene::geometry::Geometry;
 
@@ -18,9 +18,9 @@ pub fn losses(geometry: &Geometry, plan: &ScenePlan, fates: &[Fates], film: &Sce
         let of_map = &fates[usize::from(map.caustic_only)];
         let Some(totals) = of_map.totals.filter(|_| of_map.emitted > 0) else { continue };
         // Sums over all photons traced, each of which stands for that share of a round.
-        let watts = |flux: RelativeFlux| {
+        let watts = |flux: FluxUnits| {
             let unit = geometry.flux_unit * map.flux_scale / (of_map.emitted as f64 * map.flux_gain) * area_unit;
-            flux.iter().sum::<f64>() * unit
+            flux.iter().map(|units| *units as f64).sum::<f64>() / f64::from(1u32 << TOTAL_FLUX_BITS) * unit
         };
         let (cut_off, clamped) = (watts(totals.cut_flux), watts(totals.clamped_flux));
         losses.cut_off += cut_off;
@@ -42,11 +42,12 @@ pub fn losses(geometry: &Geometry, plan: &ScenePlan, fates: &[Fates], film: &Sce
         losses.relative += Losses::SAFETY * share * of_part;
     }
     let paths = f64::from(plan.sensor.pixels()) * f64::from(plan.samples()) * f64::from(film.rounds.max(1));
-    let mean = film.root_mean_square(plan);
+    // Of what surfaces scatter, over all pixels.
+    let mean = film.surface_means().map(|mean| mean.element_sum()).sum::<f64>() / (3 * film.pixels()).max(1) as f64;
     if mean > 0.0 {
         let wide = |word: usize| (u64::from(anomalies[word]) | u64::from(anomalies[word + 1]) << 32) as f64;
         losses.relative += wide(6) / 1_048_576.0 / paths * geometry.brightest() / mean;
-        losses.relative += wide(4) / 1024.0 * plan.film_limit / plan.film_scale / paths / mean;
+        losses.relative += wide(4) / 1024.0 * plan.film.limit / plan.film.scale / paths / mean;
     }
     losses
 }

@@ -16,6 +16,7 @@
 pub mod bias;
 pub mod estimate;
 pub mod film;
+mod identity;
 pub mod index;
 mod light_trial;
 pub mod losses;

@@ -5,21 +5,23 @@ use std::sync::atomic::AtomicBool;
 use std::time::{Duration, Instant};
 
 use super::film::SceneFilm;
+use super::identity::identity;
 use super::losses::losses;
 use super::resources::{PhotonBuffers, SceneResources};
 use super::{Round, RunResult, View, estimate, index, points, radius_class, trace};
-use crate::constants::{HIT_CAUSTIC_PHOTON, HIT_GLOBAL_PHOTON, HIT_KINDS, PART_COUNT, RADIUS_CLASSES, TALLY_COPIES};
+use crate::constants::{HIT_CAUSTIC_PHOTON, HIT_GLOBAL_PHOTON, HIT_KINDS, KEPT_BLOCKS, PART_COUNT, RADIUS_CLASSES, TALLY_COPIES};
 use crate::engine::error_bound::FilmError;
-use crate::engine::film::{RoundSums, wide};
+use crate::engine::film::{BlockSums, KeptBlock, LatestBlocks, halves, wide};
 use crate::engine::nonfinite_values::NonfiniteValues;
 use crate::engine::run::{self, RunState, Task, World};
+use crate::engine::saved::SavedFilm;
 use crate::engine::{Control, tallies, totals};
 use crate::error::Result;
 use crate::gpu::kernels::*;
 use crate::gpu::{Commands, Constants, DeviceFacts, Gpu, Interrupt, Kernel, Module};
 use crate::ledger::{Fates, Losses};
-use crate::plan::buffers::ANOMALY_WORDS;
-use crate::plan::latest_rounds::kept_values;
+use crate::plan::buffers::{ANOMALY_WORDS, PART_VALUES};
+use crate::plan::latest_blocks::kept_count;
 use crate::plan::scene::{MapPlan, ScenePlan};
 use crate::plan::sensor::Sensor;
 use crate::records::CellPush;
@@ -61,7 +63,8 @@ struct SceneOnGpu<'a> {
     plan: &'a ScenePlan,
     resources: SceneResources,
     /// Grids that the points of the global and of the caustic map need, each by the classes of radii that it serves.
-    grids: [Vec<Range<u32>>; 2],
+    /// `None` until they are known.
+    grids: Option<[Vec<Range<u32>>; 2]>,
     cancelled: &'a AtomicBool,
 }
 
@@ -77,12 +80,16 @@ pub fn light(gpu: &Gpu, view: &View, plan: ScenePlan, control: &mut Control) -> 
     let resources = commands.scope("set-up", |commands| SceneResources::new(gpu, commands, view.geometry, &plan, view.phases))?;
     commands.warm_up()?;
     commands.submit()?;
+    let identity = control.keep.identity(|name| identity(name, view, &plan, gpu.facts()))?;
     let photons_per_round = plan.maps().map(|map| u64::from(map.photons)).sum();
     let task = Task {
         device: Some((gpu, pipelines_before)),
+        identity,
+        sensor: Some(plan.sensor),
         stop: plan.settings.stop,
         alpha: plan.settings.alpha,
         rounds: plan.settings.rounds,
+        rounds_per_block: plan.film.rounds_per_block,
         bounces: plan.settings.bounces,
         photons_per_round,
         parts_per_round: 1,
@@ -91,13 +98,16 @@ pub fn light(gpu: &Gpu, view: &View, plan: ScenePlan, control: &mut Control) -> 
         // Of the global map and of the caustic map.
         fates: vec![Fates::of_scene(plan.settings.bounces); 2],
     };
-    let world = SceneOnGpu {
-        view,
-        plan: &plan,
-        resources,
-        grids: [radius_class::one_grid(), radius_class::one_grid()],
-        cancelled: control.cancelled,
-    };
+    let mut world = SceneOnGpu { view, plan: &plan, resources, grids: None, cancelled: control.cancelled };
+    if !plan.has_classes() {
+        world.grids = Some([radius_class::one_grid(), radius_class::one_grid()]);
+    } else if control.keep.begins_later() {
+        world.find_radii(&mut commands)?;
+    }
+    if let Some((_, saved)) = &control.keep.resume {
+        let SavedFilm::Scene(film) = &saved.film else { unreachable!("identities of two worlds differ") };
+        world.restore(&mut commands, film)?;
+    }
     run::run(world, commands, &plan, task, control)
 }
 
@@ -108,7 +118,7 @@ impl<'a> World for SceneOnGpu<'a> {
     /// There must be a first round: when the time is up in it, it ends with the photons that it has by then.
     fn trace(&mut self, commands: &mut Commands<'a>, state: &mut RunState, _: u32) -> Result<()> {
         let deadline = state.deadline();
-        let is_first = state.rounds == 0;
+        let is_first = state.rounds() == 0;
         commands.set_interrupt(Some(Interrupt { cancelled: self.cancelled, deadline: deadline.filter(|_| !is_first) }));
         let traced = self.one_round(commands, deadline.filter(|_| is_first), state);
         commands.set_interrupt(None);
@@ -119,47 +129,85 @@ impl<'a> World for SceneOnGpu<'a> {
         commands.timestamps_left() < TIMESTAMPS_PER_ROUND || 2 * commands.work() >= commands.paced(self.plan.work_per_submission)
     }
 
+    fn end_block(&mut self, commands: &mut Commands<'a>, _: &RunState) -> Result<()> {
+        let SceneResources { one_hits, part_totals, anomalies, of_blocks, photons, .. } = &self.resources;
+        commands.copy(one_hits, &of_blocks.one_hits, one_hits.count());
+        commands.copy(part_totals, &of_blocks.part_totals, PART_COUNT.into());
+        commands.copy(anomalies, &of_blocks.anomalies, anomalies.count());
+        for which in self.plan.maps().map(|map| usize::from(map.caustic_only)) {
+            let photons = photons.as_ref().expect("maps have photons");
+            commands.copy(&photons.tallies[which], &photons.tallies_of_blocks[which], photons.tallies[which].count());
+            commands.copy(&photons.totals[which], &photons.totals_of_blocks[which], photons.totals[which].count());
+        }
+        Ok(())
+    }
+
     fn collect(&mut self, commands: &mut Commands<'a>, state: &mut RunState) -> Result<()> {
         let Some(photons) = &self.resources.photons else { return commands.submit() };
         let copies = (self.plan.tally_rows() * TALLY_COPIES) as usize;
         let mut read_backs = Vec::new();
-        for map in self.plan.maps() {
-            let which = usize::from(map.caustic_only);
+        for which in self.plan.maps().map(|map| usize::from(map.caustic_only)) {
             let (tallies, totals) = (&photons.tallies[which], &photons.totals[which]);
-            read_backs.push((which, commands.copy_out(tallies, copies)?, commands.copy_out(totals, totals::WORDS as usize)?));
+            for (tallies, totals) in [(tallies, totals), (&photons.tallies_of_blocks[which], &photons.totals_of_blocks[which])] {
+                read_backs.push((commands.copy_out(tallies, copies)?, commands.copy_out(totals, totals::WORDS as usize)?));
+            }
             tallies::clear(commands, tallies);
             totals::clear(commands, totals);
         }
         commands.submit()?;
-        for (which, tallies, totals) in read_backs {
-            state.count(which, &tallies::sums(&tallies.take()));
-            state.fates[which].add_totals(&totals::sum(&totals.take()));
+        let mut counted = read_backs
+            .into_iter()
+            .map(|(tallies, totals)| Fates::counted(&tallies::sums(&tallies.take()), Some(totals::sum(&totals.take()))));
+        for which in self.plan.maps().map(|map| usize::from(map.caustic_only)) {
+            let (all, of_blocks) = (counted.next().expect("each map is read"), counted.next().expect("each map is read twice"));
+            state.count(which, all, of_blocks);
         }
         Ok(())
     }
 
     fn film(&mut self, commands: &mut Commands<'a>, state: &RunState) -> Result<SceneFilm> {
-        let SceneResources { film_sums, film_squares, latest_rounds, one_hits, part_totals, anomalies, class_counts, .. } = &self.resources;
+        let SceneResources { film_sums, film_squares, surface_sums, surface_squares, latest_blocks, class_counts, .. } = &self.resources;
+        let SceneResources { sums_of_block, surface_sums_of_block, one_hits, part_totals, anomalies, of_blocks, .. } = &self.resources;
+        let plan = &self.plan.film;
         let pixels = self.plan.sensor.pixels() as usize;
-        let sums = commands.copy_out(film_sums, 3 * pixels)?;
-        let words = commands.copy_out(film_squares, 6 * pixels)?;
-        let latest = commands.copy_out(latest_rounds, 3 * kept_values(pixels, self.plan.settings.rounds))?;
+        // Where a block is whole, nothing counts of the one under way.
+        let is_whole = state.blocks() > 0;
+        let (sums, of_surfaces) = if is_whole { (film_sums, surface_sums) } else { (sums_of_block, surface_sums_of_block) };
+        let (one_hits, part_totals, anomalies) =
+            if is_whole { (&of_blocks.one_hits, &of_blocks.part_totals, &of_blocks.anomalies) } else { (one_hits, part_totals, anomalies) };
+        let seen = if plan.sees_light { pixels } else { 0 };
+        let sums = commands.copy_out(sums, 3 * pixels)?;
+        let squares = commands.copy_out(film_squares, 6 * pixels)?;
+        let of_surfaces = commands.copy_out(of_surfaces, 3 * seen)?;
+        let squares_of_surfaces = commands.copy_out(surface_squares, 6 * seen)?;
+        let kept = PART_VALUES as usize * kept_count(pixels);
+        let latest = commands.copy_out(latest_blocks, latest_blocks.count() as usize)?;
         let one_hits = commands.copy_out(one_hits, HIT_KINDS as usize * pixels)?;
         let part_totals = commands.copy_out(part_totals, PART_COUNT as usize)?;
         let anomalies = commands.copy_out(anomalies, ANOMALY_WORDS)?;
         let class_counts = commands.copy_out(class_counts, 2 * RADIUS_CLASSES as usize)?;
         commands.submit()?;
         let mut stored = [0; 3];
-        for (map, fates) in self.plan.maps().zip(&state.fates) {
+        for map in self.plan.maps() {
+            let fates = &state.fates()[usize::from(map.caustic_only)];
             stored[if map.caustic_only { HIT_CAUSTIC_PHOTON } else { HIT_GLOBAL_PHOTON } as usize] = fates.ledger().stored;
         }
+        let of_blocks = |sums: Vec<u64>, squares: Vec<u64>| BlockSums {
+            rounds: if is_whole { state.blocks() * plan.rounds_per_block } else { state.rounds() },
+            blocks: state.blocks(),
+            sums,
+            squares: squares.chunks_exact(2).map(|words| wide(words[0], words[1])).collect(),
+        };
+        let values = latest.take();
+        let mut latest = LatestBlocks::default();
+        for (slot, number) in &state.kept {
+            latest.push(KeptBlock { number: *number, values: values[*slot as usize * kept..][..kept].to_vec() });
+        }
         Ok(SceneFilm {
-            of_rounds: RoundSums {
-                rounds: state.rounds,
-                sums: sums.take(),
-                squares: words.take().chunks_exact(2).map(|words| wide(words[0], words[1])).collect(),
-                latest: latest.take(),
-            },
+            plan: plan.clone(),
+            of_blocks: of_blocks(sums.take(), squares.take()),
+            of_surfaces: plan.sees_light.then(|| of_blocks(of_surfaces.take(), squares_of_surfaces.take())),
+            latest,
             one_hits: one_hits.take(),
             part_totals: part_totals.take(),
             anomalies: anomalies.take().try_into().expect("so many words were read"),
@@ -169,7 +217,7 @@ impl<'a> World for SceneOnGpu<'a> {
     }
 
     fn error(&self, film: &SceneFilm) -> FilmError {
-        film.error(self.plan, self.plan.settings.stop.confidence)
+        film.error(self.plan.film.confidence)
     }
 
     fn losses(&self, film: &SceneFilm, fates: &[Fates]) -> Losses {
@@ -182,17 +230,63 @@ impl<'a> World for SceneOnGpu<'a> {
 }
 
 impl SceneOnGpu<'_> {
+    /// Finds the radii of visible points, which those of round 0 decide, where that round is not the first to be done.
+    fn find_radii(&mut self, commands: &mut Commands) -> Result<()> {
+        let SceneOnGpu { view, plan, resources, grids, .. } = self;
+        let Some(photons) = &resources.photons else { return Ok(()) };
+        let round = Round { resources, geometry: view.geometry, plan, number: 0 };
+        *grids = Some(commands.scope("radii", |commands| {
+            points::see(commands, round, view.camera)?;
+            radius_class::find(commands, round, photons, view)
+        })?);
+        // Nothing of what was seen counts.
+        commands.clear(&resources.one_hits);
+        commands.clear(&resources.part_totals);
+        commands.clear(&resources.anomalies);
+        Ok(())
+    }
+
+    /// Goes on with a film.
+    fn restore(&self, commands: &mut Commands, film: &SceneFilm) -> Result<()> {
+        let SceneResources { film_sums, film_squares, surface_sums, surface_squares, latest_blocks, .. } = &self.resources;
+        let SceneResources { one_hits, part_totals, anomalies, of_blocks, .. } = &self.resources;
+        for (sums, squares, found) in
+            [(film_sums, film_squares, Some(&film.of_blocks)), (surface_sums, surface_squares, film.of_surfaces.as_ref())]
+        {
+            let Some(found) = found else { continue };
+            commands.upload(sums, &found.sums)?;
+            commands.upload(squares, &halves(&found.squares))?;
+        }
+        let kept = PART_VALUES as usize * kept_count(film.pixels());
+        let mut values = vec![0.0; latest_blocks.count() as usize];
+        for block in film.latest.iter() {
+            values[(block.number % KEPT_BLOCKS) as usize * kept..][..kept].copy_from_slice(&block.values);
+        }
+        commands.upload(latest_blocks, &values)?;
+        for one_hits in [one_hits, &of_blocks.one_hits] {
+            commands.upload(one_hits, &film.one_hits)?;
+        }
+        for part_totals in [part_totals, &of_blocks.part_totals] {
+            commands.upload(part_totals, &film.part_totals)?;
+        }
+        for anomalies in [anomalies, &of_blocks.anomalies] {
+            commands.upload(anomalies, &film.anomalies)?;
+        }
+        commands.submit()
+    }
+
     /// One round. When its time is up, it takes no further chunk of photons.
     fn one_round(&mut self, commands: &mut Commands, deadline: Option<Instant>, state: &mut RunState) -> Result<()> {
         let SceneOnGpu { view, plan, resources, grids, .. } = self;
-        let round = Round { resources, geometry: view.geometry, plan, number: state.rounds };
+        let round = Round { resources, geometry: view.geometry, plan, number: state.round() };
         commands.scope("visible points", |commands| points::see(commands, round, view.camera))?;
         if let Some(photons) = &resources.photons {
             let sums = 3 * u64::from(plan.visible_points()) * u64::from(plan.arrival_sets);
             commands.fill(&resources.estimates, 0, sums, 0);
-            if state.rounds == 0 && plan.has_classes() {
-                *grids = commands.scope("radii", |commands| radius_class::find(commands, round, photons, view))?;
-            }
+            let grids = match grids {
+                Some(grids) => grids,
+                None => grids.insert(commands.scope("radii", |commands| radius_class::find(commands, round, photons, view))?),
+            };
             let mut traced = [0; 2];
             for map in plan.maps() {
                 let in_round = MapInRound { photons, map, grids: &grids[usize::from(map.caustic_only)] };
@@ -203,7 +297,7 @@ impl SceneOnGpu<'_> {
         }
         // What is on the film counts, whatever ends the run from here on.
         commands.set_interrupt(None);
-        commands.scope("resolve", |commands| estimate::resolve(commands, round))
+        commands.scope("resolve", |commands| estimate::resolve(commands, round, state.ends_block()))
     }
 }
 

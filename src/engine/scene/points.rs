@@ -80,8 +80,8 @@ pub fn see(commands: &mut Commands, round: Round, camera: Option<&Camera>) -> Re
                     focus: (lens.focus / geometry.unit) as f32,
                     emitter_count,
                     // Each sample has its share of the pixel's light; exact, as their number is a power of two.
-                    film_scale: (plan.film_scale / f64::from(plan.samples())) as f32,
-                    film_limit: (plan.film_limit / f64::from(plan.samples())) as f32,
+                    film_scale: (plan.film.scale / f64::from(plan.samples())) as f32,
+                    film_limit: (plan.film.limit / f64::from(plan.samples())) as f32,
                 };
                 let kernel = camera_kernel!(View, resources, next_camera_paths: camera_paths);
                 commands.dispatch(kernel, &push, Extent::Items(u64::from(end - first) * u64::from(plan.samples())))?;
@@ -96,8 +96,8 @@ pub fn see(commands: &mut Commands, round: Round, camera: Option<&Camera>) -> Re
                     end_point: end,
                     point_count: plan.sensor.pixels(),
                     emitter_count,
-                    film_scale: plan.film_scale as f32,
-                    film_limit: plan.film_limit as f32,
+                    film_scale: plan.film.scale as f32,
+                    film_limit: plan.film.limit as f32,
                     radius: if radius.is_finite() { radius as f32 } else { 1.0 / 1024.0 },
                 };
                 let kernel = camera_kernel!(Receive, resources, receivers: receivers, next_camera_paths: camera_paths);
@@ -127,8 +127,8 @@ fn go_on(commands: &mut Commands, resources: &SceneResources, geometry: &Geometr
             path_count,
             pixel_count: plan.sensor.pixels(),
             emitter_count: geometry.emitters.len() as u32,
-            film_scale: (plan.film_scale / f64::from(plan.samples())) as f32,
-            film_limit: (plan.film_limit / f64::from(plan.samples())) as f32,
+            film_scale: (plan.film.scale / f64::from(plan.samples())) as f32,
+            film_limit: (plan.film.limit / f64::from(plan.samples())) as f32,
             rounding: rounding(plan, round),
         };
         let kernel = camera_kernel!(GoOn, resources, camera_paths: &resources.camera_paths[parity], next_camera_paths: &resources.camera_paths[1 - parity]);

@@ -96,7 +96,7 @@ pub fn measure(lab: &mut Lab, name: &str) -> Result<Found> {
                 let lit = job(settings.clone()).light(lab.gpu, SceneSettings { rounds, ..settings }, lab.cancelled)?;
                 let all = Reference { counts: not_straight, ..search.reference.clone() };
                 let shown = all.mean_over(|place| f64::from(u8::from(!search.reference.counts[place])));
-                let error = (all.squared_error(&lit.film.values(&lit.plan)).max(0.0) / all.mean_square()).sqrt();
+                let error = (all.squared_error(&lit.film.values()).max(0.0) / all.mean_square()).sqrt();
                 how += &format!(
                     "; excludes the {:.2} % of pixels that show the light source through glass (error with them: {:.2} %)",
                     100.0 * shown,
@@ -122,6 +122,7 @@ fn candidates(lab: &Lab, name: &str, geometry: &Geometry) -> Vec<SceneSettings> 
         radius: Some(usual_radius(geometry, spread) * geometry.unit),
         alpha: 1.0,
         builder: Some(Builder::Persistent),
+        block: Some(1),
         ..SceneSettings::default()
     };
     let many = match name {
@@ -148,11 +149,12 @@ fn leave_out_lamps(lab: &Lab, scene: &Scene, size: u32, reference: &mut Referenc
         photons: 1,
         caustic_photons: 1,
         rounds: 2,
+        block: Some(1),
         ..SceneSettings::default()
     };
     let job = Job { name: "lamps alone", scene: &scene, geometry: &geometry, size: (size, size), settings: settings.clone() };
     let lit = job.light(lab.gpu, settings, lab.cancelled)?;
-    let shows: Vec<bool> = (0..lit.film.pixels()).map(|pixel| lit.film.mean(pixel, &lit.plan) != DVec3::ZERO).collect();
+    let shows: Vec<bool> = (0..lit.film.pixels()).map(|pixel| lit.film.mean(pixel) != DVec3::ZERO).collect();
     for (place, counts) in reference.counts.iter_mut().enumerate() {
         *counts = *counts && !shows[place / 3];
     }
@@ -182,8 +184,8 @@ fn of_film(lit: &RunResult, judge: &Reference) -> Reference {
     let pixels = 0..lit.film.pixels();
     let reference = Reference {
         method: String::new(),
-        values: lit.film.values(&lit.plan),
-        standard_errors: pixels.flat_map(|pixel| lit.film.standard_error(pixel, &lit.plan).to_array()).collect(),
+        values: lit.film.values(),
+        standard_errors: pixels.flat_map(|pixel| lit.film.standard_error(pixel).to_array()).collect(),
         counts: judge.counts.clone(),
         relative_error: 0.0,
     };

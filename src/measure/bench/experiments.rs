@@ -170,7 +170,7 @@ fn index(lab: &mut Lab) -> Result<Found> {
         scene: &scene,
         geometry: &geometry,
         size: (64, 64),
-        settings: SceneSettings { photons, bounces: 16, illumination: Illumination::Photons, ..SceneSettings::default() },
+        settings: SceneSettings { photons, bounces: 16, illumination: Illumination::Photons, block: Some(1), ..SceneSettings::default() },
     };
     let share = stored_share(lab, &job(FEW))?;
     let of_scene = scene::time(lab.gpu, &lab.rates, &job((wanted / share) as u32), lab.cancelled)?;
@@ -197,7 +197,7 @@ fn gather(lab: &mut Lab) -> Result<Found> {
         scene: &scene,
         geometry: &geometry,
         size,
-        settings: SceneSettings { photons, radius, ..SceneSettings::default() },
+        settings: SceneSettings { photons, radius, block: Some(1), ..SceneSettings::default() },
     };
     let survey = |job: &Job| survey(lab.gpu, job, |plan| plan.global.as_ref());
     let photons = (wanted / stored_share(lab, &job(FEW, None, (64, 64)))?) as u32;
@@ -221,7 +221,7 @@ fn gather(lab: &mut Lab) -> Result<Found> {
 fn cornell(lab: &mut Lab) -> Result<Found> {
     let (scene, geometry) = named("cornell")?;
     let photons = lab.choose(FEW, 1 << 16, 1 << 22);
-    let settings = SceneSettings { photons, bounces: 16, illumination: Illumination::Photons, ..SceneSettings::default() };
+    let settings = SceneSettings { photons, bounces: 16, illumination: Illumination::Photons, block: Some(1), ..SceneSettings::default() };
     let job = Job { name: "cornell, photons alone", scene: &scene, geometry: &geometry, size: lab.image_size(), settings };
     photons_per_second(lab, &job, "global/trace", "every hit stored")
 }
@@ -229,7 +229,7 @@ fn cornell(lab: &mut Lab) -> Result<Found> {
 fn mesh(lab: &mut Lab) -> Result<Found> {
     let scene = ball_room(lab.choose(2_500, 25_000, 250_000));
     let geometry = Geometry::new(&scene)?;
-    let settings = SceneSettings { photons: lab.choose(FEW, 1 << 16, 1 << 21), ..SceneSettings::default() };
+    let settings = SceneSettings { photons: lab.choose(FEW, 1 << 16, 1 << 21), block: Some(1), ..SceneSettings::default() };
     let job = Job { name: BALL_ROOM, scene: &scene, geometry: &geometry, size: lab.image_size(), settings };
     photons_per_second(lab, &job, "global", &format!("{} triangles", geometry.triangles.len()))
 }
@@ -251,7 +251,7 @@ fn effects(lab: &mut Lab) -> Result<Found> {
         scene: &scene,
         geometry: &geometry,
         size: lab.image_size(),
-        settings: SceneSettings { photons, with: with.to_vec(), without: without.to_vec(), ..SceneSettings::default() },
+        settings: SceneSettings { photons, with: with.to_vec(), without: without.to_vec(), block: Some(1), ..SceneSettings::default() },
     };
     let usual = job(&[], &[]);
     let plan = usual.plan(lab.gpu, &usual.settings)?;

@@ -180,7 +180,7 @@ fn of_photons(lab: &Lab, size: u64) -> Result<Step> {
 fn of_triangles(lab: &Lab, size: u64) -> Result<Step> {
     let scene = ball_room(size as u32);
     let geometry = Geometry::new(&scene)?;
-    let settings = SceneSettings { photons: lab.choose(1 << 12, 1 << 15, 1 << 20), ..SceneSettings::default() };
+    let settings = SceneSettings { photons: lab.choose(1 << 12, 1 << 15, 1 << 20), block: Some(1), ..SceneSettings::default() };
     let job = Job { name: BALL_ROOM, scene: &scene, geometry: &geometry, size: lab.image_size(), settings };
     let timed = scene::time(lab.gpu, &lab.rates, &job, lab.cancelled)?;
     let shown = ["visible points", "global/trace", "global/index", "global/gather"];

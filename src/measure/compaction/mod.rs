@@ -224,6 +224,7 @@ impl Trial<'_> {
             chunk: Some(self.photons),
             bounces: self.request.bounces,
             illumination: Illumination::Photons,
+            block: Some(1),
             ..SceneSettings::default()
         };
         let plan = ScenePlan::new(scene, geometry, &settings, Sensor::Receivers { count: 1 }, &engine::limits(self.gpu.facts()))?;

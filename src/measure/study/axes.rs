@@ -172,6 +172,7 @@ pub fn of_the_papers_rounds(mesh: u32) -> Vec<Group> {
         radius: Some(0.05),
         illumination: Illumination::Photons,
         alpha,
+        block: Some(1),
         ..SceneSettings::default()
     };
     let shrinking = [(1.0, "radius 0.05 m, box as triangles"), (2.0 / 3.0, "radius shrinking from 0.05 m (alpha 2/3), box as triangles")]
@@ -188,7 +189,7 @@ const REMOVABLE: [Effect; 5] =
 /// map in metres, if it has one, `has_few_triangles` says whether a list of them may be tested from end to end, and
 /// `is_picture` whether a camera looks.
 pub fn of_scene(photons: u32, kept: &[Effect], radius: Option<f64>, has_few_triangles: bool, is_picture: bool) -> Vec<Group> {
-    let base = SceneSettings { photons, caustic_photons: photons, ..SceneSettings::default() };
+    let base = SceneSettings { photons, caustic_photons: photons, block: Some(1), ..SceneSettings::default() };
     let mut sweep = Sweep::new(base, "persistent, shrinking radius, shadow rays", Line::Scene);
     sweep.each(Axis::Builder, BUILDERS, |s, builder| s.builder = Some(builder));
     sweep.each(Axis::Photons, photon_counts(photons), |s, photons| (s.photons, s.caustic_photons) = (photons, photons));

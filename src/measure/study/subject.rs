@@ -139,9 +139,7 @@ impl Subject {
                 let settings = SceneSettings { rounds, seed, ..settings.clone() };
                 let lit = self.light(gpu, settings, &mut control)?;
                 let channels = if self.camera.is_some() { 3 } else { 1 };
-                let values = (0..lit.film.pixels())
-                    .flat_map(|pixel| lit.film.mean(pixel, &lit.plan).to_array().into_iter().take(channels))
-                    .collect();
+                let values = (0..lit.film.pixels()).flat_map(|pixel| lit.film.mean(pixel).to_array().into_iter().take(channels)).collect();
                 let global = lit.fates[0].ledger();
                 // A caustic map's photons end at the first surface that scatters, so the cap is the global map's.
                 Shot { photons: lit.ledger().emitted, ..shot(values, &lit.timings, global) }
@@ -194,7 +192,7 @@ fn shot(values: Vec<f64>, timings: &Timings, ledger: Ledger) -> Shot {
 }
 
 fn scene_axes(gpu: &Gpu, scene: &Scene, geometry: &Geometry, request: &Request, is_picture: bool) -> Result<Vec<Group>> {
-    let settings = SceneSettings { photons: request.photons, caustic_photons: request.photons, ..SceneSettings::default() };
+    let settings = SceneSettings { photons: request.photons, caustic_photons: request.photons, block: Some(1), ..SceneSettings::default() };
     let sensor = Sensor::Picture { width: request.size, height: request.size };
     let plan = ScenePlan::new(scene, geometry, &settings, sensor, &engine::limits(gpu.facts()))?;
     let kept: Vec<Effect> = plan.decisions.iter().filter(|decision| decision.kept).map(|decision| decision.effect).collect();

@@ -179,7 +179,7 @@ impl ZScores {
             Some(p) => format!("the mean z-score is farther from 0 than by chance (p = {})", number(p)),
             None if self.degrees_of_freedom.is_some() => "the largest z-score is larger than by chance".to_owned(),
             None => {
-                "the largest z-score is larger than by chance, unless the errors are of few rounds (then add --error-rounds)".to_owned()
+                "the largest z-score is larger than by chance, unless the errors are of few blocks (then add --error-blocks)".to_owned()
             }
         };
         format!("the pictures DISAGREE beyond their errors: {reason}")

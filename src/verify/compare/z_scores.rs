@@ -80,9 +80,9 @@ pub fn check(errors: &Picture, pair: &Pair) -> Result<(), String> {
 
 impl ZScores {
     /// From the errors of one picture or both; those of the other count as 0. Errors are themselves estimates: where they are the
-    /// spread of a few `rounds`, z-scores follow Student's distribution, else a normal one. None where no z-score exists.
-    pub fn of(pair: &Pair, errors: [Option<&Picture>; 2], rounds: Option<u32>) -> Option<ZScores> {
-        let degrees_of_freedom = rounds.map(|rounds| f64::from(rounds) - 1.0);
+    /// spread of a few `blocks` of rounds, z-scores follow Student's distribution, else a normal one. None where no z-score exists.
+    pub fn of(pair: &Pair, errors: [Option<&Picture>; 2], blocks: Option<u32>) -> Option<ZScores> {
+        let degrees_of_freedom = blocks.map(|blocks| f64::from(blocks) - 1.0);
         let both_tails = |z: f64| both_tails(z, degrees_of_freedom);
         let variance = |pixel: usize| {
             let stated = errors.iter().flatten().map(|errors| errors.pixels[pixel].as_dvec3());

@@ -39,6 +39,7 @@ fn settings(illumination: Illumination, radius: f64) -> SceneSettings {
         radius: Some(radius),
         alpha: 1.0,
         illumination,
+        block: Some(1),
         ..SceneSettings::default()
     }
 }

@@ -1,7 +1,7 @@
-//! What is kept of the latest rounds of a film, from which follows how far errors of its places go together
-//! ([`crate::engine::degrees_of_freedom`]): some places, evenly spread. Twin of `glsl/film/latest_rounds.glsl`.
+//! What is kept of the latest blocks of a film, from which follows how far errors of its places go together
+//! ([`crate::engine::degrees_of_freedom`]): some places, evenly spread. Twin of `glsl/film/latest_blocks.glsl`.
 
-use crate::constants::{KEPT_PLACES, KEPT_ROUNDS};
+use crate::constants::{KEPT_BLOCKS, KEPT_PLACES};
 use crate::rng::mix32;
 
 fn kept_step(places: usize) -> usize {
@@ -21,8 +21,8 @@ pub fn kept_place(number: usize, places: usize) -> Option<usize> {
 }
 
 /// Values of a channel that are kept of a run.
-pub fn kept_values(places: usize, rounds: u32) -> usize {
-    kept_count(places) * rounds.min(KEPT_ROUNDS) as usize
+pub fn kept_values(places: usize) -> usize {
+    kept_count(places) * KEPT_BLOCKS as usize
 }
 
 #[cfg(test)]
@@ -41,6 +41,6 @@ mod tests {
         // Of a picture of 1024 x 1024 in no order of columns.
         let columns: BTreeSet<usize> = (0..1024).filter_map(|number| kept_place(number, 1 << 20)).map(|place| place % 1024).collect();
         assert!(columns.len() > 512, "{} columns", columns.len());
-        assert_eq!(kept_values(64, 1000), 64 * 256);
+        assert_eq!(kept_values(64), 64 * 256);
     }
 }

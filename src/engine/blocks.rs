@@ -1,0 +1,148 @@
+//! Which blocks of a run are done, and which of them are whose to do.
+
+use std::ops::Range;
+
+use serde::{Deserialize, Serialize};
+
+/// Numbers of blocks, as ranges in order that do not touch.
+#[derive(Debug, Clone, PartialEq, Eq, Default, Serialize, Deserialize)]
+pub struct Blocks(Vec<Range<u32>>);
+
+/// Every so many-th block of a run, from block `number` on: all of them, where nothing is shared.
+#[derive(Debug, Clone, Copy, PartialEq, Eq, Serialize, Deserialize)]
+pub struct Share {
+    pub number: u32,
+    pub of: u32,
+}
+
+impl Default for Share {
+    fn default() -> Share {
+        Share { number: 0, of: 1 }
+    }
+}
+
+impl Share {
+    /// How many of the blocks below `end` it has.
+    pub fn count(self, end: u32) -> u32 {
+        end.saturating_sub(self.number).div_ceil(self.of)
+    }
+
+    /// Its first block from `from` on that is not done and lies below `end`.
+    pub fn next(self, from: u32, done: &Blocks, end: u32) -> Option<u32> {
+        let first = self.number + from.saturating_sub(self.number).next_multiple_of(self.of);
+        (first..end).step_by(self.of as usize).find(|block| !done.contains(*block))
+    }
+
+    /// Those below `end` that are not done.
+    pub fn missing(self, done: &Blocks, end: u32) -> u32 {
+        (self.number..end).step_by(self.of as usize).filter(|block| !done.contains(*block)).count() as u32
+    }
+}
+
+/// As the command line counts them, from 1.
+impl std::fmt::Display for Share {
+    fn fmt(&self, f: &mut std::fmt::Formatter) -> std::fmt::Result {
+        write!(f, "{}/{}", self.number + 1, self.of)
+    }
+}
+
+impl Blocks {
+    pub fn count(&self) -> u32 {
+        self.0.iter().map(|range| range.end - range.start).sum()
+    }
+
+    pub fn is_empty(&self) -> bool {
+        self.0.is_empty()
+    }
+
+    pub fn contains(&self, block: u32) -> bool {
+        let place = self.0.partition_point(|range| range.end <= block);
+        self.0.get(place).is_some_and(|range| range.contains(&block))
+    }
+
+    pub fn ranges(&self) -> impl Iterator<Item = Range<u32>> {
+        self.0.iter().cloned()
+    }
+
+    pub fn iter(&self) -> impl Iterator<Item = u32> {
+        self.ranges().flatten()
+    }
+
+    /// The one behind the last.
+    pub fn end(&self) -> u32 {
+        self.0.last().map_or(0, |range| range.end)
+    }
+
+    /// Adds one that is not among them.
+    pub fn insert(&mut self, block: u32) {
+        assert!(!self.contains(block), "block {block} is done twice");
+        let place = self.0.partition_point(|range| range.end < block);
+        match self.0.get_mut(place) {
+            Some(range) if range.end == block => range.end += 1,
+            Some(range) if range.start == block + 1 => range.start = block,
+            _ => self.0.insert(place, block..block + 1),
+        }
+        if self.0.get(place + 1).is_some_and(|next| next.start == self.0[place].end) {
+            self.0[place].end = self.0.remove(place + 1).end;
+        }
+    }
+
+    /// Adds others; fails with one that is among both.
+    pub fn merge(&mut self, others: &Blocks) -> Result<(), u32> {
+        if let Some(block) = others.iter().find(|block| self.contains(*block)) {
+            return Err(block);
+        }
+        others.iter().for_each(|block| self.insert(block));
+        Ok(())
+    }
+
+    /// Whether they are what files may hold: ranges in order that do not touch.
+    pub fn is_valid(&self) -> bool {
+        self.0.iter().all(|range| range.start < range.end) && self.0.windows(2).all(|pair| pair[0].end < pair[1].start)
+    }
+}
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+
+    fn blocks(numbers: impl IntoIterator<Item = u32>) -> Blocks {
+        let mut blocks = Blocks::default();
+        numbers.into_iter().for_each(|number| blocks.insert(number));
+        blocks
+    }
+
+    #[test]
+    fn blocks_in_any_order_are_the_same_set() {
+        for (numbers, ranges) in [(vec![3, 1, 2, 0], vec![0..4]), (vec![5, 0, 2, 1, 7], vec![0..3, 5..6, 7..8])] {
+            let found = blocks(numbers.clone());
+            assert_eq!(found, Blocks(ranges));
+            assert!(found.is_valid() && found.count() as usize == numbers.len());
+            assert!((0..9).all(|block| found.contains(block) == numbers.contains(&block)));
+        }
+        assert!(!Blocks(vec![0..2, 2..3]).is_valid() && !Blocks(vec![3..3]).is_valid());
+    }
+
+    #[test]
+    fn shares_partition_the_blocks() {
+        for of in [1, 2, 3, 8] {
+            let shares = || (0..of).map(|number| Share { number, of });
+            let of_share = |share: Share| -> Vec<u32> {
+                let mut done = Blocks::default();
+                while let Some(block) = share.next(0, &done, 21) {
+                    done.insert(block);
+                }
+                done.iter().collect()
+            };
+            let mut all = Blocks::default();
+            for share in shares() {
+                let own = of_share(share);
+                assert_eq!((own.len() as u32, share.missing(&Blocks::default(), 21)), (share.count(21), share.count(21)));
+                assert!(all.merge(&blocks(own)).is_ok());
+            }
+            assert_eq!(all, blocks(0..21));
+            assert_eq!(all.merge(&blocks([4])), Err(4));
+        }
+        assert_eq!(Share { number: 1, of: 4 }.next(6, &Blocks::default(), 21), Some(9));
+    }
+}

@@ -1,0 +1,320 @@
+//! Runs as files: the sums of whole blocks, with which a run can go on, or be added to others of the same identity.
+
+use serde::{Deserialize, Serialize};
+use sha2::{Digest, Sha256};
+
+use super::blocks::{Blocks, Share};
+use super::film::{BlockSums, KeptBlock, LatestBlocks};
+use super::identity::Identity;
+use super::room::film::RoomFilm;
+use super::scene::film::SceneFilm;
+use crate::ledger::Fates;
+use crate::plan::film::FilmPlan;
+use crate::plan::sensor::Sensor;
+use crate::settings::Sums;
+
+/// A run as far as whole blocks of it are done.
+#[derive(Debug, Clone, PartialEq)]
+pub struct SavedRun {
+    pub identity: Identity,
+    /// Which part of the run it is; all of it after a merge.
+    pub share: Share,
+    /// The blocks that the run was to have, and those that are done.
+    pub wanted: u32,
+    pub done: Blocks,
+    pub sensor: Option<Sensor>,
+    /// Of the photons of each map.
+    pub fates: Vec<Fates>,
+    pub film: SavedFilm,
+}
+
+/// Of either world.
+#[derive(Debug, Clone, PartialEq)]
+pub enum SavedFilm {
+    Room(RoomFilm),
+    Scene(Box<SceneFilm>),
+}
+
+impl From<RoomFilm> for SavedFilm {
+    fn from(film: RoomFilm) -> SavedFilm {
+        SavedFilm::Room(film)
+    }
+}
+
+impl From<SceneFilm> for SavedFilm {
+    fn from(film: SceneFilm) -> SavedFilm {
+        SavedFilm::Scene(Box::new(film))
+    }
+}
+
+impl SavedFilm {
+    fn blocks(&self) -> &BlockSums {
+        match self {
+            SavedFilm::Room(film) => film,
+            SavedFilm::Scene(film) => film,
+        }
+    }
+
+    pub fn latest(&self) -> &LatestBlocks {
+        match self {
+            SavedFilm::Room(film) => &film.latest,
+            SavedFilm::Scene(film) => &film.latest,
+        }
+    }
+}
+
+impl SavedRun {
+    /// Adds the blocks of another part of the same run; fails with a block that both have.
+    pub fn merge(&mut self, other: &SavedRun) -> Result<(), u32> {
+        self.done.merge(&other.done)?;
+        self.wanted = self.wanted.max(other.wanted);
+        self.share = Share::default();
+        self.fates.iter_mut().zip(&other.fates).for_each(|(fates, others)| fates.add(others));
+        match (&mut self.film, &other.film) {
+            (SavedFilm::Room(film), SavedFilm::Room(others)) => film.merge(others),
+            (SavedFilm::Scene(film), SavedFilm::Scene(others)) => film.merge(others),
+            _ => unreachable!("identities of two worlds differ"),
+        }
+        Ok(())
+    }
+
+    /// Blocks that it should have and does not.
+    pub fn missing(&self) -> u32 {
+        self.share.missing(&self.done, self.wanted)
+    }
+}
+
+/// The first bytes of a file.
+const MAGIC: &[u8; 16] = b"photonmill run\r\n";
+/// Of what follows them. A change that older programs cannot read makes it another one.
+const FORMAT: u32 = 1;
+/// Of the checksum at the end.
+const CHECKSUM_BYTES: usize = 32;
+
+/// What stands before the sums, as JSON.
+#[derive(Serialize, Deserialize)]
+struct Header {
+    format: u32,
+    program: String,
+    identity: Identity,
+    share: Share,
+    wanted: u32,
+    done: Blocks,
+    sensor: Option<Sensor>,
+    fates: Vec<Fates>,
+    film: FilmHeader,
+    rounds: u32,
+    /// Arrays behind it in this order, little-endian: name, type of the elements, how many.
+    arrays: Vec<(String, String, u64)>,
+}
+
+#[derive(Serialize, Deserialize)]
+enum FilmHeader {
+    Room { channel_count: u32, scale: f64, emitted: u64, photons_per_round: u32 },
+    Scene { plan: FilmPlan, anomalies: Vec<u32>, stored: Vec<u64> },
+}
+
+/// Arrays of a file that is written.
+#[derive(Default)]
+struct Arrays {
+    list: Vec<(String, String, u64)>,
+    bytes: Vec<u8>,
+}
+
+/// What files hold arrays of.
+trait Element: Copy {
+    const NAME: &'static str;
+    const BYTES: usize;
+    fn put(self, bytes: &mut Vec<u8>);
+    fn take(bytes: &[u8]) -> Self;
+}
+
+macro_rules! elements {
+    ($($kind:ident),*) => { $(impl Element for $kind {
+        const NAME: &'static str = stringify!($kind);
+        const BYTES: usize = size_of::<$kind>();
+
+        fn put(self, bytes: &mut Vec<u8>) {
+            bytes.extend_from_slice(&self.to_le_bytes());
+        }
+
+        fn take(bytes: &[u8]) -> $kind {
+            $kind::from_le_bytes(bytes.try_into().expect("so many bytes were cut out"))
+        }
+    })* };
+}
+
+elements!(u32, u64, u128, f32);
+
+impl Arrays {
+    fn add<T: Element>(&mut self, name: &str, values: &[T]) {
+        self.list.push((name.to_owned(), T::NAME.to_owned(), values.len() as u64));
+        self.bytes.reserve(values.len() * T::BYTES);
+        values.iter().for_each(|value| value.put(&mut self.bytes));
+    }
+
+    fn add_sums(&mut self, name: &str, sums: &BlockSums) {
+        self.add(name, &sums.sums);
+        self.add(&format!("{name} squares"), &sums.squares);
+    }
+}
+
+/// Arrays of a file that is read, one after the other.
+struct Reader<'a> {
+    list: std::slice::Iter<'a, (String, String, u64)>,
+    bytes: &'a [u8],
+}
+
+impl Reader<'_> {
+    fn next<T: Element>(&mut self, name: &str) -> Result<Vec<T>, String> {
+        let (_, _, count) = self
+            .list
+            .next()
+            .filter(|(found, kind, _)| found == name && kind == T::NAME)
+            .ok_or_else(|| format!("holds no {name} where they should be"))?;
+        let bytes = usize::try_from(*count).ok().and_then(|count| count.checked_mul(T::BYTES)).filter(|bytes| *bytes <= self.bytes.len());
+        let (own, rest) = self.bytes.split_at(bytes.ok_or_else(|| format!("ends in its {name}"))?);
+        self.bytes = rest;
+        Ok(own.chunks_exact(T::BYTES).map(T::take).collect())
+    }
+
+    fn next_sums(&mut self, name: &str, rounds: u32, blocks: u32) -> Result<BlockSums, String> {
+        let (sums, squares) = (self.next(name)?, self.next(&format!("{name} squares"))?);
+        Ok(BlockSums { rounds, blocks, sums, squares })
+    }
+}
+
+impl SavedRun {
+    pub fn to_bytes(&self) -> Vec<u8> {
+        let mut arrays = Arrays::default();
+        arrays.add_sums("sums", self.film.blocks());
+        let latest = self.film.latest();
+        arrays.add("kept blocks", &latest.iter().map(|block| block.number).collect::<Vec<u32>>());
+        arrays.add("kept values", &latest.iter().flat_map(|block| block.values.iter().copied()).collect::<Vec<f32>>());
+        let film = match &self.film {
+            SavedFilm::Room(film) => FilmHeader::Room {
+                channel_count: film.channel_count,
+                scale: film.scale,
+                emitted: film.emitted,
+                photons_per_round: film.photons_per_round,
+            },
+            SavedFilm::Scene(film) => {
+                arrays.add_sums("surfaces", film.of_surfaces.as_ref().unwrap_or(&BlockSums::default()));
+                arrays.add("one hits", &film.one_hits);
+                arrays.add("part totals", &film.part_totals);
+                arrays.add("class counts", &film.class_counts);
+                FilmHeader::Scene { plan: film.plan.clone(), anomalies: film.anomalies.to_vec(), stored: film.stored.to_vec() }
+            }
+        };
+        let header = Header {
+            format: FORMAT,
+            program: env!("CARGO_PKG_VERSION").to_owned(),
+            identity: self.identity.clone(),
+            share: self.share,
+            wanted: self.wanted,
+            done: self.done.clone(),
+            sensor: self.sensor,
+            fates: self.fates.clone(),
+            film,
+            rounds: self.film.blocks().rounds,
+            arrays: arrays.list,
+        };
+        let header = serde_json::to_vec(&header).expect("a header is plain data");
+        let mut bytes = Vec::with_capacity(MAGIC.len() + 8 + header.len() + arrays.bytes.len() + CHECKSUM_BYTES);
+        bytes.extend_from_slice(MAGIC);
+        bytes.extend_from_slice(&(header.len() as u64).to_le_bytes());
+        bytes.extend_from_slice(&header);
+        bytes.extend_from_slice(&arrays.bytes);
+        let checksum = Sha256::digest(&bytes);
+        bytes.extend_from_slice(&checksum);
+        bytes
+    }
+
+    /// Fails with what is wrong with the file.
+    pub fn from_bytes(bytes: &[u8]) -> Result<SavedRun, String> {
+        let rest = bytes.strip_prefix(MAGIC).ok_or("is no saved run of photonmill; give a file that --checkpoint wrote")?;
+        let damaged = || "is cut off or was changed, as its checksum shows; use an older copy, or begin the run anew".to_owned();
+        let (content, checksum) = bytes.split_at_checked(bytes.len().saturating_sub(CHECKSUM_BYTES)).ok_or_else(damaged)?;
+        if content.len() < MAGIC.len() + 8 || Sha256::digest(content).as_slice() != checksum {
+            return Err(damaged());
+        }
+        let rest = &rest[..rest.len() - CHECKSUM_BYTES];
+        let (length, rest) = rest.split_at(8);
+        let length = usize::try_from(u64::take(length)).map_err(|_| damaged())?;
+        let (header, arrays) = rest.split_at_checked(length).ok_or_else(damaged)?;
+        SavedRun::check_format(header)?;
+        let header: Header = serde_json::from_slice(header).map_err(|error| format!("has a header that is not understood ({error})"))?;
+        SavedRun::from_parts(header, arrays)
+    }
+
+    /// Before anything else of the header is read, which may look otherwise in another format.
+    fn check_format(header: &[u8]) -> Result<(), String> {
+        let header: serde_json::Value = serde_json::from_slice(header).map_err(|_| "has no header".to_owned())?;
+        let (format, program) = (&header["format"], header["program"].as_str().unwrap_or("unknown"));
+        if format.as_u64() == Some(FORMAT.into()) {
+            return Ok(());
+        }
+        let own = env!("CARGO_PKG_VERSION");
+        Err(format!("is of format {format} (photonmill {program}), and this is photonmill {own}, which reads format {FORMAT}"))
+    }
+
+    fn from_parts(header: Header, bytes: &[u8]) -> Result<SavedRun, String> {
+        let Header { identity, share, wanted, done, sensor, fates, film, rounds, arrays, .. } = header;
+        let wrong = |what: &str| Err(format!("contradicts itself: {what}"));
+        if !done.is_valid() || share.of == 0 || share.number >= share.of {
+            return wrong("its blocks or its share");
+        }
+        let mut reader = Reader { list: arrays.iter(), bytes };
+        let of_blocks = reader.next_sums("sums", rounds, done.count())?;
+        let (numbers, values): (Vec<u32>, Vec<f32>) = (reader.next("kept blocks")?, reader.next("kept values")?);
+        if numbers.is_empty() != values.is_empty() || (!numbers.is_empty() && !values.len().is_multiple_of(numbers.len())) {
+            return wrong("its kept blocks");
+        }
+        let mut latest = LatestBlocks::default();
+        let size = values.len() / numbers.len().max(1);
+        numbers.iter().zip(values.chunks_exact(size.max(1))).for_each(|(number, values)| {
+            latest.push(KeptBlock { number: *number, values: values.to_vec() });
+        });
+        let (film, rounds_per_block, values) = match film {
+            FilmHeader::Room { channel_count, scale, emitted, photons_per_round } => {
+                let values = channel_count as usize;
+                (RoomFilm { of_blocks, latest, kind: Sums::Integer, channel_count, scale, emitted, photons_per_round }.into(), 1, values)
+            }
+            FilmHeader::Scene { plan, anomalies, stored } => {
+                let of_surfaces = reader.next_sums("surfaces", rounds, done.count())?;
+                let rounds_per_block = plan.rounds_per_block;
+                if plan.sees_light != !of_surfaces.sums.is_empty() || plan.sees_light && of_surfaces.sums.len() != of_blocks.sums.len() {
+                    return wrong("its sums of surfaces");
+                }
+                let film = SceneFilm {
+                    of_surfaces: plan.sees_light.then_some(of_surfaces),
+                    plan,
+                    of_blocks,
+                    latest,
+                    one_hits: reader.next("one hits")?,
+                    part_totals: reader.next("part totals")?,
+                    anomalies: anomalies.try_into().or(Err("holds other counts than this program knows"))?,
+                    class_counts: reader.next("class counts")?,
+                    stored: stored.try_into().or(Err("holds other counts than this program knows"))?,
+                };
+                if film.one_hits.len() != film.pixels() * crate::constants::HIT_KINDS as usize {
+                    return wrong("what one hit would add");
+                }
+                (film.into(), rounds_per_block, 3)
+            }
+        };
+        let saved = SavedRun { identity, share, wanted, done, sensor, fates, film };
+        let sums: &BlockSums = saved.film.blocks();
+        if values == 0 || !sums.sums.len().is_multiple_of(values) || sums.squares.len() != sums.sums.len() {
+            return wrong("its sums");
+        }
+        if saved.done.count().checked_mul(rounds_per_block) != Some(rounds) {
+            return wrong("its rounds");
+        }
+        let pixels = saved.sensor.map(|sensor| sensor.pixels() as usize);
+        if pixels.is_some_and(|pixels| pixels * 3 != sums.sums.len()) {
+            return wrong("its size");
+        }
+        Ok(saved)
+    }
+}

@@ -1,0 +1,56 @@
+//! What a run on a scene computes: the scene as the kernels read it, who looks at it, and what the trial found.
+
+use super::View;
+use crate::engine::identity::{Hash, Identity};
+use crate::gpu::DeviceFacts;
+use crate::plan::scene::{MapPlan, ScenePlan};
+use crate::scene::geometry::Geometry;
+
+/// Specialization constants that change no bit of a block.
+const WITHOUT_EFFECT: [&str; 3] = ["HAS_SLOTS", "CHAIN_STEPS", "PARANOID"];
+
+pub fn identity(scene: &str, view: &View, plan: &ScenePlan, facts: &DeviceFacts) -> Identity {
+    Identity::new(scene, content(view, plan), &plan.settings, found(plan), Some(facts), plan.settings.math)
+}
+
+fn content(view: &View, plan: &ScenePlan) -> Hash {
+    let Geometry { centre, unit, nodes, triangles, planes, normals, uvs, colours, materials, .. } = view.geometry;
+    let Geometry { layered_materials, triangle_layers, textures, texels, emitters, flux_unit, power, .. } = view.geometry;
+    let mut hash = Hash::default();
+    hash.add_text(&format!("{centre:?} {unit:?} {flux_unit:?} {power:?}"));
+    hash.add(nodes);
+    hash.add(triangles);
+    hash.add(planes);
+    hash.add(normals);
+    hash.add(uvs);
+    hash.add(colours);
+    hash.add(materials);
+    hash.add(layered_materials);
+    hash.add(triangle_layers);
+    hash.add(textures);
+    hash.add(texels);
+    hash.add(emitters);
+    hash.add_text(&format!("{:?} {:?}", plan.sensor, view.camera));
+    view.phases.iter().for_each(|phase| hash.add(phase));
+    hash
+}
+
+fn found(plan: &ScenePlan) -> Hash {
+    let mut hash = Hash::default();
+    let constants: Vec<_> = plan.constants.iter().filter(|(name, _)| !WITHOUT_EFFECT.contains(name)).collect();
+    hash.add_text(&format!("{constants:?} {:?} {:?} {:?}", plan.film.scale, plan.film.limit, plan.film.rounds_per_block));
+    for MapPlan { name, photons, bounces, stored, radius, classes, flux_gain, flux_scale, through_openings, .. } in plan.maps() {
+        hash.add_text(&format!(
+            "{name} {photons} {bounces} {stored} {radius:?} {classes:?} {flux_gain:?} {flux_scale:?} {through_openings}"
+        ));
+    }
+    hash.add(&plan.targets);
+    hash.add(&plan.openings());
+    if let Some(lights) = plan.lights() {
+        hash.add(&lights.nodes);
+        hash.add(&lights.regions);
+        hash.add(&lights.shares);
+        hash.add(&lights.emitters);
+    }
+    hash
+}

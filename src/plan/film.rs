@@ -1,0 +1,33 @@
+//! What a film is read by: its unit, and how it was made as far as its errors ask.
+
+use serde::{Deserialize, Serialize};
+
+use crate::settings::stop::Measure;
+
+/// Of a scene's film, which holds it, so that a film can be read without the scene.
+#[derive(Debug, Clone, PartialEq, Serialize, Deserialize)]
+pub struct FilmPlan {
+    /// Film units in 1 W/m2/sr or W/m2, a power of two, and the most units that one round may add to a pixel.
+    pub scale: f64,
+    pub limit: f64,
+    /// What each arrival at a visible point may add, so that all of a pixel's stay below the limit together.
+    pub point_limit: f64,
+    pub rounds_per_block: u32,
+    /// Paths from the camera through a pixel, or from a receiver, in a round.
+    pub samples: u32,
+    /// How often at most a pixel's light is rounded to the film's unit in a round: each part of a path's direct light, and each
+    /// map's at each visible point.
+    pub roundings_per_round: f64,
+    /// Whether the eye may meet what shines by itself: of a picture.
+    pub sees_light: bool,
+    /// Radiance of the brightest that a camera path may meet over mirrors and glass, W/m2/sr, all channels together; 0 where none
+    /// can. Such hits are rare and bright: they are the tail of the noise.
+    pub rare_radiance: f64,
+    /// How fast radii shrink, and the widest ones of the global and of the caustic map in the first round, normalised; 0 where
+    /// there is no such map.
+    pub alpha: f64,
+    pub widest_radii: [f64; 2],
+    /// With which errors are stated, and what the relative one is of.
+    pub confidence: f64,
+    pub measure: Measure,
+}

@@ -1,0 +1,262 @@
+//! Blocks of rounds: samples that are even over them, errors from their spread, and runs in parts that come to the bits of one.
+
+use std::sync::atomic::{AtomicBool, Ordering};
+use std::time::Duration;
+
+use crate::common::prelude::*;
+use photonmill::engine::End;
+use photonmill::engine::blocks::Share;
+use photonmill::engine::room;
+use photonmill::engine::saved::{SavedFilm, SavedRun};
+use photonmill::engine::scene::{self, RunResult, View, trial};
+use photonmill::engine::watch::{Keep, SaveRun};
+
+/// Keeps the latest of what is saved.
+#[derive(Default)]
+struct Latest(Option<SavedRun>);
+
+impl SaveRun for Latest {
+    fn save(&mut self, run: &SavedRun, _: bool) -> Result<(), Error> {
+        self.0 = Some(run.clone());
+        Ok(())
+    }
+}
+
+/// What a part of a run is.
+#[derive(Default)]
+struct Part {
+    share: Share,
+    resume: Option<SavedRun>,
+    /// Cancelled once so many rounds are done.
+    most_rounds: Option<u64>,
+}
+
+/// A small picture of a scene, and what of it was saved.
+fn kept(gpu: &Gpu, name: &str, settings: &SceneSettings, part: Part) -> (RunResult, SavedRun) {
+    let scene = scene(name);
+    let geometry = Geometry::new(&scene).unwrap();
+    let view = View { geometry: &geometry, camera: Some(&scene.first_camera()), phases: &[] };
+    let plan = trial::plan(gpu, &scene, &view, settings, square_picture(8)).unwrap();
+    let (cancelled, mut latest) = (AtomicBool::new(false), Latest::default());
+    let mut watch = |progress: &engine::Progress| {
+        if part.most_rounds.is_some_and(|most| progress.done >= most) {
+            cancelled.store(true, Ordering::Relaxed);
+        }
+    };
+    let resume = part.resume.map(|run| (PathBuf::from("a file"), run));
+    let keep = Keep { scene: name, share: part.share, resume, every: Duration::ZERO, save: Some(&mut latest) };
+    let lit = scene::light(gpu, &view, plan, &mut Control { cancelled: &cancelled, progress: &mut watch, keep }).unwrap();
+    (lit, latest.0.expect("a block was done"))
+}
+
+fn small(block: u32, rounds: u32) -> SceneSettings {
+    SceneSettings { photons: 2000, caustic_photons: 1000, shadow_rays: 2, block: Some(block), rounds, ..SceneSettings::default() }
+}
+
+/// Radii by the trial's photons, caustics, lamps seen directly and in mirrors, and samples of a pixel.
+const SCENES: [&str; 3] = ["cornell-spheres", "caustic-sphere", "cornell"];
+
+#[test]
+fn parts_of_a_run_come_to_the_bits_of_one() {
+    let Some(gpu) = device() else { return };
+    for (name, block, samples) in [(SCENES[0], 2, 1), (SCENES[1], 1, 2), (SCENES[2], 4, 1)] {
+        let settings = SceneSettings { samples, ..small(block, 12) };
+        let (whole, saved) = kept(&gpu, name, &settings, Part::default());
+        assert_eq!((whole.end, whole.film.rounds, saved.missing()), (End::Rounds, 12, 0));
+        assert_eq!((whole.ledger().emitted, &whole.fates), (12 * (2000 + if saved.fates[1].emitted > 0 { 1000 } else { 0 }), &saved.fates));
+        for of in [2, 5] {
+            let parts: Vec<SavedRun> = (0..of.min(12 / block))
+                .map(|number| kept(&gpu, name, &settings, Part { share: Share { number, of }, ..Part::default() }).1)
+                .collect();
+            let (last, others) = parts.split_last().unwrap();
+            let mut merged = last.clone();
+            others.iter().for_each(|part| merged.merge(part).unwrap());
+            assert_eq!(merged.done.count() * block, 12);
+            assert!(merged == saved, "{name}: {of} parts make another film or ledger");
+            assert_eq!(merged.to_bytes(), saved.to_bytes());
+            assert!(merged.merge(last).is_err(), "a part is added twice");
+        }
+        // And in two sessions, of which the second reads what the first wrote.
+        let (_, half) = kept(&gpu, name, &SceneSettings { rounds: 4, ..settings.clone() }, Part::default());
+        let read = SavedRun::from_bytes(&half.to_bytes()).unwrap();
+        assert!(read == half);
+        let (on, saved_on) = kept(&gpu, name, &settings, Part { resume: Some(read), ..Part::default() });
+        assert!(on.film == whole.film && on.fates == whole.fates && saved_on == saved, "{name}: what went on differs");
+        // What is done already is read, and nothing is run.
+        let (again, _) = kept(&gpu, name, &settings, Part { resume: Some(saved.clone()), ..Part::default() });
+        assert!(again.film == whole.film && again.film.error(0.95) == whole.film.error(0.95));
+    }
+}
+
+#[test]
+fn parts_of_the_box_come_to_the_bits_of_one() {
+    let gpu = device();
+    let settings =
+        RoomSettings { photons: 501, rounds: 9, mesh: 8, rng: Rng::Philox, shininess: [Some(2.0); 5], ..RoomSettings::default() };
+    let run = |gpu: Option<&Gpu>, rounds, share, resume| {
+        let (never, mut latest) = (AtomicBool::new(false), Latest::default());
+        let resume = Option::map(resume, |run| (PathBuf::from("a file"), run));
+        let keep = Keep { scene: "open-box", share, resume, every: Duration::ZERO, save: Some(&mut latest) };
+        let mut control = Control { cancelled: &never, progress: &mut |_| {}, keep };
+        let settings = RoomSettings { rounds, ..settings.clone() };
+        room::run(gpu, &open_box(&settings), &settings, &mut control).unwrap();
+        latest.0.unwrap()
+    };
+    for gpu in [None, gpu.as_deref()] {
+        let whole = run(gpu, 9, Share::default(), None);
+        let mut merged = run(gpu, 9, Share { number: 2, of: 3 }, None);
+        (0..2).for_each(|number| merged.merge(&run(gpu, 9, Share { number, of: 3 }, None)).unwrap());
+        assert!(merged == whole && merged.to_bytes() == whole.to_bytes());
+        let half = SavedRun::from_bytes(&run(gpu, 4, Share::default(), None).to_bytes()).unwrap();
+        assert!(run(gpu, 9, Share::default(), Some(half)) == whole);
+    }
+}
+
+/// A block that is cut short leaves nothing, unless it is all there is.
+#[test]
+fn a_block_cut_short_leaves_nothing() {
+    let Some(gpu) = device() else { return };
+    let settings = SceneSettings { rounds: 64, ..small(4, 64) };
+    let (cut, saved) = kept(&gpu, SCENES[0], &settings, Part { most_rounds: Some(10), ..Part::default() });
+    assert_eq!(cut.end, End::Cancelled);
+    let (blocks, photons) = (cut.film.blocks, 3000);
+    assert!((2..16).contains(&blocks) && cut.film.rounds == 4 * blocks, "{blocks}");
+    let (whole, _) = kept(&gpu, SCENES[0], &SceneSettings { rounds: 4 * blocks, ..settings.clone() }, Part::default());
+    assert!(cut.film == whole.film && cut.fates == whole.fates && saved.fates == whole.fates);
+    assert!(cut.ledger().closes() && cut.ledger().emitted == u64::from(4 * blocks) * photons);
+    assert!(cut.left_out.is_multiple_of(photons) && cut.left_out < 4 * photons, "{}", cut.left_out);
+    // Fewer rounds than a block has are all there is.
+    let few = seen(&gpu, &scene("cornell"), &small(4, 3), &scene("cornell").first_camera(), [8; 2]);
+    assert_eq!((few.end, few.film.rounds, few.film.blocks, few.left_out), (End::Rounds, 3, 0, 0));
+    assert!(few.film.relative_error().is_infinite() && mean_red(&few) > 0.0);
+    let more = seen(&gpu, &scene("cornell"), &small(4, 4), &scene("cornell").first_camera(), [8; 2]);
+    assert!((mean_red(&few) / mean_red(&more) - 1.0).abs() < 0.2);
+}
+
+/// The mean square error of pixels on the edge of a lamp over some seeds: that of positions in a pixel.
+fn edge_error(gpu: &Gpu, block: u32) -> f64 {
+    let lamp = Scene { name: "a lamp".into(), ..scene_of(vec![level(0.0, [1.0; 2], true, 0)], vec![shining(1.0)], vec![]) };
+    // The edges cross pixels at odd places.
+    let camera = Camera::looking_at("above", DVec3::new(0.013, 2.0, 0.007), DVec3::new(0.013, 0.0, 0.007), DVec3::Z, 0.93);
+    let of = |rounds: u32, seed| {
+        let settings = SceneSettings { rounds, seed, block: Some(block), photons: 1, ..SceneSettings::default() };
+        means(&seen(gpu, &lamp, &settings, &camera, [16; 2]))
+    };
+    let truth = of(4096, 99);
+    let squares = (1..9).flat_map(|seed| {
+        let found = of(16, seed);
+        pairs(&found, &truth).map(|(found, truth)| (found.x - truth.x).powi(2)).collect::<Vec<f64>>()
+    });
+    squares.sum()
+}
+
+#[test]
+fn samples_are_even_over_a_block() {
+    let Some(gpu) = device() else { return };
+    let [by_rounds, even] = [1, 16].map(|block| edge_error(&gpu, block));
+    println!("mean square error of a lamp's edges, 16 rounds by themselves over a block of 16: {:.2}", by_rounds / even);
+    // Of n even samples the variance falls as n^-1.5 at an edge, of independent ones as n^-1.
+    assert!(by_rounds > 3.0 * even && even > 0.0, "{by_rounds} and {even}");
+}
+
+/// Stated errors are those of block sums: as large as the spread of whole runs.
+#[test]
+fn the_spread_of_blocks_is_the_error() {
+    let Some(gpu) = device() else { return };
+    for block in [1, 4, 8] {
+        let cornell = scene("cornell");
+        let of = |seed| {
+            let settings = SceneSettings { seed, photons: 300, shadow_rays: 1, alpha: 1.0, radius: Some(0.2), ..small(block, 16 * block) };
+            seen(&gpu, &cornell, &settings, &cornell.first_camera(), [8; 2])
+        };
+        let runs: Vec<RunResult> = (1..13).map(of).collect();
+        let (mut spread, mut stated) = (0.0, 0.0);
+        for pixel in 0..64 {
+            let values: Vec<f64> = runs.iter().map(|lit| lit.film.surface_mean(pixel).x).collect();
+            let mean = values.iter().sum::<f64>() / 12.0;
+            spread += values.iter().map(|value| (value - mean).powi(2)).sum::<f64>() / 11.0;
+            stated += runs.iter().map(|lit| lit.film.surface_error(pixel).x.powi(2)).sum::<f64>() / 12.0;
+        }
+        println!("blocks of {block}: stated variance over that of runs {:.3}", stated / spread);
+        assert!((0.75..1.33).contains(&(stated / spread)), "{block}: {stated} and {spread}");
+        assert!(runs.iter().all(|lit| lit.film.blocks == 16));
+    }
+}
+
+/// Emission that is seen directly is no part of the error, and neither is how much of the picture shows it.
+#[test]
+fn errors_are_of_what_surfaces_scatter() {
+    let Some(gpu) = device() else { return };
+    let cornell = scene("cornell");
+    let bright = |factor: f32| {
+        let mut room = cornell.clone();
+        // The back of the lamp would light nothing, so only what is seen of it grows.
+        room.materials.iter_mut().for_each(|material| material.emission *= factor);
+        room
+    };
+    let error = |scene: &Scene, camera: &Camera, size| {
+        let lit = seen(&gpu, scene, &small(1, 32), camera, size);
+        (lit.film.error(0.95).noise, lit)
+    };
+    let camera = cornell.first_camera();
+    let (usual, lit) = error(&cornell, &camera, [16; 2]);
+    assert!((error(&bright(4.0), &camera, [16; 2]).0 / usual - 1.0).abs() < 1e-3, "scale");
+    // The lamp is in the picture, and its pixels are no light of surfaces.
+    let shows_lamp = (0..lit.film.pixels()).any(|pixel| lit.film.mean(pixel).x > 2.0 * lit.film.surface_mean(pixel).x);
+    assert!(shows_lamp);
+    // Sky around the same surfaces: four times as many pixels, all black or lit by themselves.
+    let plane = |half: f64| Camera::looking_at("above", DVec3::new(0.0, 3.0, 0.0), DVec3::ZERO, DVec3::Z, half);
+    let mut floor = scene("disc-over-plane");
+    floor.lights.push(Light { name: "sky".into(), kind: LightKind::Environment { radiance: Vec3::splat(50.0) } });
+    let floor = Scene { meshes: vec![level(0.0, [1.0; 2], true, 0)], materials: vec![matt(0.5)], lights: floor.lights, ..floor };
+    let [near, far] = [(0.66, 12), (1.2, 24)].map(|(angle, size)| error(&floor, &plane(angle), [size; 2]));
+    let share = |lit: &RunResult| lit.film.surface_means().filter(|mean| mean.x > 0.0).count();
+    println!("error {:.4} of {} pixels, {:.4} of {}", near.0, share(&near.1), far.0, share(&far.1));
+    assert!((far.0 / near.0 - 1.0).abs() < 0.35, "{} and {}", near.0, far.0);
+}
+
+/// A checkpoint that is damaged anywhere is refused, and nothing panics.
+#[test]
+fn damaged_files_are_refused() {
+    let Some(gpu) = device() else { return };
+    let (_, saved) = kept(&gpu, "cornell", &small(1, 2), Part::default());
+    let bytes = saved.to_bytes();
+    assert!(SavedRun::from_bytes(&bytes).unwrap() == saved);
+    for length in [0, 5, 16, 23, 24, 100, bytes.len() / 2, bytes.len() - 1] {
+        assert!(SavedRun::from_bytes(&bytes[..length]).is_err(), "{length} bytes");
+    }
+    let mut place = 7;
+    while place < bytes.len() {
+        let mut damaged = bytes.clone();
+        damaged[place] ^= 0x10;
+        assert!(SavedRun::from_bytes(&damaged).is_err(), "byte {place}");
+        place += 1 + place / 3;
+    }
+    // Files whose checksum is right, and whose header lies.
+    let SavedFilm::Scene(film) = &saved.film else { panic!("a scene's film") };
+    type Lie = fn(&mut SavedRun);
+    let lies: [Lie; 3] =
+        [|run| run.sensor = Some(square_picture(3)), |run| run.share = Share { number: 4, of: 3 }, |run| run.done.insert(17)];
+    for (number, lie) in lies.iter().enumerate() {
+        let mut lying = saved.clone();
+        lie(&mut lying);
+        assert!(SavedRun::from_bytes(&lying.to_bytes()).is_err(), "lie {number}");
+    }
+    assert_eq!(film.blocks, 2);
+}
+
+/// The film's unit follows from the scene alone, so that any run can go on.
+#[test]
+fn the_films_unit_is_the_same_in_short_and_long_runs() {
+    let spheres = scene("cornell-spheres");
+    let unit = |rounds| {
+        let settings = SceneSettings { rounds, ..by_rounds() };
+        scene_plan_within(&Limits::of_host(), &spheres, &settings, square_picture(4)).unwrap().film.scale
+    };
+    assert_eq!(unit(1), unit(1 << 20));
+    let shift = |rounds| {
+        let settings = RoomSettings { rounds, shininess: [Some(2.0); 5], ..RoomSettings::default() };
+        RoomPlan::new(&open_box(&settings), &settings, &Limits::of_host()).unwrap().film_shift
+    };
+    assert_eq!(shift(1), shift(100_000));
+}
