@@ -37,6 +37,14 @@ pub enum Error {
     #[error("{}: {object} {reason}", echo(path.display()))]
     Scene { path: PathBuf, object: String, reason: String },
 
+    /// A picture that is compared cannot be used.
+    #[error("{}: {reason}", echo(path.display()))]
+    Picture { path: PathBuf, reason: String },
+
+    /// Two pictures differ by more than the user allows.
+    #[error("--fail-above {allowed}: the RMSE of {} is {found}", echo(path.display()))]
+    PictureAbove { allowed: String, path: PathBuf, found: String },
+
     /// There is no Vulkan loader, or no device behind it.
     #[error("no Vulkan device: {reason}; {INSTALL_VULKAN}")]
     NoVulkan { reason: String },
@@ -100,6 +108,7 @@ impl Error {
             | Error::Output { .. }
             | Error::Saved { .. }
             | Error::Scene { .. }
+            | Error::Picture { .. }
             | Error::DeviceAbsent { .. }
             | Error::NoValidationLayer => 2,
             Error::Interrupted => 130,

@@ -34,7 +34,7 @@
 //!
 //! ```text
 //! constants, error, text, records, rng, ledger, timings < settings, path, photon < scene < plan < cpu, gpu < engine < output
-//! output < bake < measure < cli;  scene < verify::judge;  engine < verify::selfcheck
+//! output < bake < measure < cli;  scene < verify::judge;  engine < verify::selfcheck;  output < verify::compare < cli
 //! ```
 //!
 //! `tests/architecture.rs` checks it.

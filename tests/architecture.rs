@@ -34,7 +34,7 @@ const LINE: &[&[&str]] = &[
     &["engine::room", "engine::scene"],
     &["engine::choose_builder"],
     &["output", "verify::selfcheck"],
-    &["bake", "measure::compaction", "measure::line_fit"],
+    &["bake", "measure::compaction", "measure::line_fit", "verify::compare"],
     &["measure::paper"],
     &["measure::study"],
     &["measure::bench"],

@@ -357,6 +357,7 @@ fn values_are_shown_as_typed() {
         ),
         ("study cornell -o s", "--budget 0.1s, --side 01, --repeats 01"),
         ("bench", "--time -1h"),
+        ("compare a.exr b.exr --errors-a a.exr", "--fail-above -00.5, --error-blocks 01"),
         ("paper -o p", "--longest -90ms, --large 05000, --repeats 01001"),
     ];
     let place = Place::new();
@@ -388,6 +389,7 @@ fn long_values_are_not_repeated_whole() {
         "render cornell -o a.png --fixed-radius LONG",
         "probe cornell --points LONG -o a.csv",
         "bench --only LONG",
+        "compare LONG.exr b.exr",
     ] {
         let refusal = place.refusal(&line.replace("LONG", &long)).unwrap();
         assert!(refusal.len() < 600 && refusal.contains("777...777"), "{line}: {refusal}");
@@ -452,6 +454,7 @@ fn names_that_the_file_system_refuses_are_found_at_once() {
         ("bake SCENE -o -", "-o"),
         ("probe SCENE -o LONG --points -", "-o"),
         ("plan cornell --json LONG", "--json"),
+        ("compare a.exr b.exr --json LONG", "--json"),
         ("devices --json LONG", "--json"),
         ("selfcheck --json LONG", "--json"),
         ("study cornell -o LONG", "-o"),
@@ -536,7 +539,7 @@ fn help_is_grouped_alike_everywhere() {
         Density estimate|Implementation|Checks|Messages|Device|Examples";
     let place = Place::new();
     let mut places: HashMap<String, (String, String)> = HashMap::new();
-    for command in ["", "devices", "render", "bake", "probe", "plan", "info", "selfcheck", "study", "bench", "paper"] {
+    for command in ["", "devices", "render", "bake", "probe", "plan", "info", "compare", "selfcheck", "study", "bench", "paper"] {
         let help = text(&place.run(&format!("{command} --help")).stdout);
         let groups = groups(&help);
         let order: Vec<_> = groups.iter().map(|(heading, _)| HEADINGS.split('|').position(|known| known == heading)).collect();

@@ -84,16 +84,16 @@ fn short(arguments: &[&str]) -> Vec<String> {
     if arguments.contains(&"--replay") {
         return arguments.iter().map(ToString::to_string).collect();
     }
-    // What is kept has two blocks of rounds, one for each of two shards.
-    let is_kept = ["--checkpoint", "--resume", "--shard"].iter().any(|option| arguments.contains(option));
-    let of_run = [("--photons", "500"), ("--rounds", if is_kept { "8" } else { "2" })];
+    // What is kept has two blocks of rounds, one for each of two shards, and it takes two to know an error.
+    let has_blocks = ["--checkpoint", "--resume", "--shard", "--error-image"].iter().any(|option| arguments.contains(option));
+    let of_run = [("--photons", "500"), ("--rounds", if has_blocks { "8" } else { "2" })];
     let only_if_there = [("--error", "60%"), ("--samples", "2"), ("--counters", "2")];
     let there: Vec<_> = only_if_there.into_iter().filter(|(option, _)| arguments.contains(option)).collect();
     let more: &[(&str, &str)] = match arguments.first() {
         Some(&"render") => &[("--size", "16x12")],
         Some(&"bake") => &[("--texels-per-metre", "2")],
         Some(&"probe") => &[],
-        Some(&"plan" | &"info" | &"devices" | &"merge") => return arguments.iter().map(ToString::to_string).collect(),
+        Some(&"plan" | &"info" | &"compare" | &"devices" | &"merge") => return arguments.iter().map(ToString::to_string).collect(),
         _ => &[("--mesh", "8")],
     };
     shrunk(arguments, &[&of_run, &there[..], more].concat())
@@ -124,7 +124,7 @@ fn run(folder: &Path, command: &str) -> Check {
     let arguments: Vec<&str> = words.collect();
     let mut run = short(&arguments);
     match std::env::var("PHOTONMILL_DEVICE") {
-        Ok(device) if !matches!(arguments.first(), Some(&"info" | &"devices")) => run.extend(["--device".to_owned(), device]),
+        Ok(device) if !matches!(arguments.first(), Some(&"info" | &"compare" | &"devices")) => run.extend(["--device".to_owned(), device]),
         _ => {}
     }
     program(folder, &run)?;
@@ -228,7 +228,7 @@ fn options(text: &str) -> BTreeSet<String> {
 
 #[test]
 fn options_of_readme_and_guide_exist() {
-    let names = ["", "render", "bake", "probe", "merge", "plan", "info", "devices", "selfcheck", "study", "bench", "paper"];
+    let names = ["", "render", "bake", "probe", "merge", "plan", "info", "compare", "devices", "selfcheck", "study", "bench", "paper"];
     let help = |name: &str| {
         let output = Place::new().run(&format!("{name} --help"));
         assert!(output.status.success(), "{name}");

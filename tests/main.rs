@@ -15,6 +15,7 @@ mod cameras;
 mod cli;
 mod closed_form;
 mod closed_rooms;
+mod compare;
 mod counts;
 mod cpu;
 mod dispersion;

@@ -78,6 +78,17 @@ Examples:
   photonmill info scene.glb --json info.json
       The same as JSON";
 
+pub(super) const COMPARE: &str = "\
+Examples:
+  photonmill compare picture.exr reference.exr
+      RMSE, relMSE, bias, the largest deviation and FLIP
+  photonmill compare picture.exr reference.exr --errors-a error.exr -o z.png --show z
+      Also z-scores, whether the pictures agree within the errors, and where they do not
+  photonmill compare picture.png expected.png --fail-above 1%
+      For scripts: exit code 1 if the RMSE is above 1 % of the reference's mean
+
+Without --fail-above the exit code is 0 however far apart the pictures are.";
+
 pub(super) const DEVICES: &str = "\
 Examples:
   photonmill devices

@@ -2,6 +2,7 @@
 
 mod bake;
 mod bench;
+mod compare;
 mod devices;
 mod help;
 mod info;
@@ -71,6 +72,9 @@ enum Command {
     /// Print what a scene's file holds, and what became of its materials
     #[command(after_help = help::INFO)]
     Info(info::InfoArgs),
+    /// Compare two pictures: deviations, bias, FLIP, and whether they agree within their errors
+    #[command(after_help = help::COMPARE)]
+    Compare(compare::CompareArgs),
     /// List the Vulkan devices and their limits
     #[command(after_help = help::DEVICES)]
     Devices(devices::DevicesArgs),
@@ -207,6 +211,7 @@ pub fn main() -> u8 {
         Some(Command::Merge(args)) => merge::run(&args).map(|()| End::Finished),
         Some(Command::Plan(args)) => plan::run(&args).map(|()| End::Finished),
         Some(Command::Info(args)) => info::run(&args).map(|()| End::Finished),
+        Some(Command::Compare(args)) => compare::run(&args).map(|()| End::Finished),
         Some(Command::Selfcheck(args)) => interruptible(|| selfcheck::run(&args, &cancelled)),
         Some(Command::Study(args)) => interruptible(|| study::run(&args, &cancelled)),
         Some(Command::Bench(args)) => interruptible(|| bench::run(&args, &cancelled)),

@@ -135,6 +135,11 @@ pub fn linear_png(width: u32, height: u32, values: impl Iterator<Item = Vec3>) -
     eight_bits(width, height, ExtendedColorType::Rgb8, &codes)
 }
 
+/// Codes as they are.
+pub fn png_of_codes(width: u32, height: u32, codes: &[[u8; 3]]) -> Vec<u8> {
+    eight_bits(width, height, ExtendedColorType::Rgb8, codes.as_flattened())
+}
+
 /// A PNG of codes, row by row.
 pub(super) fn eight_bits(width: u32, height: u32, kind: ExtendedColorType, codes: &[u8]) -> Vec<u8> {
     let mut file = Vec::new();
@@ -142,7 +147,8 @@ pub(super) fn eight_bits(width: u32, height: u32, kind: ExtendedColorType, codes
     file
 }
 
-fn luminance(colour: Vec3) -> f32 {
+/// Relative luminance of linear sRGB.
+pub fn luminance(colour: Vec3) -> f32 {
     colour.dot(Vec3::new(0.2126, 0.7152, 0.0722))
 }
 

@@ -63,6 +63,13 @@ impl Destination {
         Error::Output { option: self.option, path: self.path.clone(), reason: reason.to_string() }
     }
 
+    /// The file by the one name that all of its names lead to.
+    fn file(&self) -> PathBuf {
+        let target = self.target();
+        let place = std::fs::canonicalize(parent(&target)).unwrap_or_else(|_| parent(&target).to_owned());
+        place.join(target.file_name().unwrap_or_default())
+    }
+
     /// The file itself, where the path is a link to it.
     fn target(&self) -> PathBuf {
         std::fs::canonicalize(&self.path).unwrap_or_else(|_| self.path.clone())
@@ -108,10 +115,7 @@ impl Folder {
 pub fn check_distinct(destinations: &[Destination]) -> Result<()> {
     let mut seen: HashMap<PathBuf, &Destination> = HashMap::new();
     for destination in destinations {
-        let target = destination.target();
-        let place = std::fs::canonicalize(parent(&target)).unwrap_or_else(|_| parent(&target).to_owned());
-        let file = place.join(target.file_name().unwrap_or_default());
-        if let Some(first) = seen.insert(file, destination) {
+        if let Some(first) = seen.insert(destination.file(), destination) {
             return Err(if destination.is_standard_output() {
                 let allowed = format!("{} - already is standard output; name a file for one of the two", first.option);
                 Error::setting(destination.option, "-", allowed)
@@ -121,6 +125,15 @@ pub fn check_distinct(destinations: &[Destination]) -> Result<()> {
         }
     }
     Ok(())
+}
+
+/// Refuses an output in a file that is read.
+pub fn check_not_read<'a>(destinations: &[Destination], inputs: impl IntoIterator<Item = &'a Path>) -> Result<()> {
+    let inputs: Vec<PathBuf> = inputs.into_iter().filter_map(|input| std::fs::canonicalize(input).ok()).collect();
+    match destinations.iter().find(|destination| !destination.is_standard_output() && inputs.contains(&destination.file())) {
+        Some(destination) => Err(destination.refuse("it is also read")),
+        None => Ok(()),
+    }
 }
 
 /// Writes a file that must survive whatever happens next: under another name first, and on the disk before it takes the place of the

@@ -2,24 +2,16 @@
 //! it sends, as in Pharr, Jakob and Humphreys (2016), section 14.2.4. Kernels have both in `glsl/world/scene/sky.glsl`.
 
 use std::f64::consts::{PI, TAU};
-use std::io::Cursor;
 use std::ops::RangeInclusive;
 use std::path::Path;
 
 use glam::{DQuat, DVec2, DVec3, Vec3};
-use image::codecs::hdr::HdrDecoder;
-use image::codecs::openexr::OpenExrDecoder;
-use image::{ColorType, ImageDecoder};
 use rayon::prelude::*;
 
+use super::linear_picture::{self, LinearPicture};
 use super::texture::{Filter, Texels, Texture, Wrap};
-use crate::text::{counted, echo};
+use crate::text::counted;
 
-/// First bytes of an OpenEXR file.
-const EXR_MAGIC: [u8; 4] = [0x76, 0x2f, 0x31, 0x01];
-
-/// Of one picture: half of what all textures together may have.
-const MAX_TEXELS: u64 = 1 << 26;
 /// Cells of the table in a row, and rows: parts of a small picture's texels, several texels of a large one's. What differs within a
 /// cell is noise, and no bias.
 const COLUMNS: RangeInclusive<u32> = 512..=2048;
@@ -65,30 +57,15 @@ pub struct Table {
 impl Sky {
     /// Reads a Radiance (`.hdr`) or OpenEXR (`.exr`) file; an error says what is wrong with it, and what to do.
     pub fn read(path: &Path) -> Result<Sky, String> {
-        let mut content = super::file::read(path)?;
+        let content = super::file::read(path)?;
+        if !linear_picture::is_one(&content) {
+            return Err("is neither a Radiance (.hdr) nor an OpenEXR (.exr) picture; convert it to one of them".into());
+        }
+        let LinearPicture { width, height, colours, exposure, .. } = LinearPicture::decode(content)?;
         let name = path.file_name().unwrap_or_default().to_string_lossy();
-        if content.starts_with(b"#?") {
-            let header = RadianceHeader::parse(&content)?;
-            // As the library has it.
-            content.splice(..header.length, format!("#?RADIANCE\n\n-Y {} +X {}\n", header.height, header.width).into_bytes());
-            let (width, height, mut colours) = decoded(HdrDecoder::new(content.as_slice()).map_err(undecodable)?)?;
-            if header.is_upside_down {
-                let rows: Vec<Vec3> = colours.chunks(width as usize).rev().flatten().copied().collect();
-                colours = rows;
-            }
-            if header.is_mirrored {
-                colours.chunks_mut(width as usize).for_each(<[Vec3]>::reverse);
-            }
-            let mut sky = Sky::of(name, width, height, colours);
-            sky.strength /= header.exposure;
-            return Ok(sky);
-        }
-        if content.starts_with(&EXR_MAGIC) {
-            let decoder = OpenExrDecoder::with_alpha_preference(Cursor::new(&content), Some(false)).map_err(undecodable)?;
-            let (width, height, colours) = decoded(decoder)?;
-            return Ok(Sky::of(name, width, height, colours));
-        }
-        Err("is neither a Radiance (.hdr) nor an OpenEXR (.exr) picture; convert it to one of them".into())
+        let mut sky = Sky::of(name, width, height, colours);
+        sky.strength /= exposure;
+        Ok(sky)
     }
 
     /// The radiance of its brightest texel, W/m2/sr.
@@ -293,91 +270,6 @@ fn cumulative(shares: &[f64]) -> Vec<u32> {
         (before as f32).to_bits()
     };
     shares.iter().map(&mut add).collect()
-}
-
-/// The lines before a Radiance file's pixels.
-struct RadianceHeader {
-    width: u32,
-    height: u32,
-    is_upside_down: bool,
-    is_mirrored: bool,
-    /// What its values were multiplied by.
-    exposure: f32,
-    /// Bytes.
-    length: usize,
-}
-
-impl RadianceHeader {
-    fn parse(content: &[u8]) -> Result<RadianceHeader, String> {
-        let mut rest = content;
-        let mut next_line = || -> Result<String, String> {
-            let end = rest.iter().position(|byte| *byte == b'\n').ok_or(CUT_OFF)?;
-            let line = String::from_utf8_lossy(&rest[..end]).trim().to_owned();
-            rest = &rest[end + 1..];
-            Ok(line)
-        };
-        let mut exposure = 1.0f32;
-        loop {
-            let line = next_line()?;
-            if line.is_empty() {
-                break;
-            }
-            match line.split_once('=').map(|(name, value)| (name.trim(), value.trim())) {
-                Some(("FORMAT", format)) if format != "32-bit_rle_rgbe" => {
-                    return Err(format!("has pixels of the format {}; only 32-bit_rle_rgbe is read: convert it to RGB", echo(format)));
-                }
-                Some(("EXPOSURE", value)) => {
-                    exposure *= value.parse::<f32>().unwrap_or(f32::NAN);
-                    if !(exposure.is_normal() && exposure > 0.0) {
-                        return Err(format!("has the line EXPOSURE={}; the product of all must be above 0 and finite", echo(value)));
-                    }
-                }
-                _ => {}
-            }
-        }
-        let size = next_line()?;
-        let words: Vec<&str> = size.split_whitespace().collect();
-        let (height, width) = match words[..] {
-            ["-Y" | "+Y", height, "-X" | "+X", width] => (height.parse().ok(), width.parse().ok()),
-            _ => (None, None),
-        };
-        let (Some(height), Some(width)) = (height, width) else {
-            return Err(format!("has the size '{}'; it must be as -Y 512 +X 1024: save it again, row by row", echo(&size)));
-        };
-        let length = content.len() - rest.len();
-        Ok(RadianceHeader { width, height, is_upside_down: words[0] == "+Y", is_mirrored: words[2] == "-X", exposure, length })
-    }
-}
-
-const CUT_OFF: &str = "is cut off; export it again";
-
-/// In plain words, or the library's.
-fn undecodable(error: image::ImageError) -> String {
-    let text = error.to_string().split_whitespace().collect::<Vec<_>>().join(" ");
-    if text.contains("whole buffer") || text.contains("missing bytes") || text.contains("EOF") {
-        return CUT_OFF.into();
-    }
-    if text.contains("rgb channels") {
-        return "has no layer of plain names R, G and B; export it as an OpenEXR picture of a single layer".into();
-    }
-    format!("cannot be decoded ({text}); convert it, or export it again")
-}
-
-/// Width, height and pixels.
-fn decoded(mut decoder: impl ImageDecoder) -> Result<(u32, u32, Vec<Vec3>), String> {
-    let (width, height) = decoder.dimensions();
-    if width == 0 || height == 0 || u64::from(width) * u64::from(height) > MAX_TEXELS {
-        return Err(format!("is {width} x {height}; allowed are 1 to {MAX_TEXELS} pixels"));
-    }
-    let mut limits = image::Limits::default();
-    limits.max_alloc = Some(16 * MAX_TEXELS + (64 << 20));
-    decoder.set_limits(limits).map_err(undecodable)?;
-    if decoder.color_type() != ColorType::Rgb32F {
-        return Err("has no colours; convert it to RGB".into());
-    }
-    let mut colours = vec![Vec3::ZERO; width as usize * height as usize];
-    decoder.read_image(bytemuck::cast_slice_mut(&mut colours)).map_err(undecodable)?;
-    Ok((width, height, colours))
 }
 
 #[cfg(test)]

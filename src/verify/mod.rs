@@ -1,5 +1,6 @@
 //! What is known without the engine, and the engine held against it: a path tracer that shares nothing with it, closed forms,
-//! radiosity.
+//! radiosity; and any picture against another one.
 
+pub mod compare;
 pub mod judge;
 pub mod selfcheck;
