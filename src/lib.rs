@@ -3,7 +3,7 @@
 //!
 //! The [`guide`] holds what a user needs: [the paper's box](guide::paper), [scenes](guide::scenes),
 //! [materials](guide::materials), [accuracy](guide::accuracy), a [study](guide::study) of what accuracy costs,
-//! [performance](guide::performance), [hard cases](guide::hard_cases) and [file formats](guide::formats).
+//! [performance](guide::performance), [scale](guide::scale), [hard cases](guide::hard_cases) and [file formats](guide::formats).
 //! [Architecture](guide::architecture) explains how the program is built, why its results repeat, and how it is tested.
 //!
 //! ```no_run

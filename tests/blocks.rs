@@ -253,7 +253,7 @@ fn the_films_unit_is_the_same_in_short_and_long_runs() {
         let settings = SceneSettings { rounds, ..by_rounds() };
         scene_plan_within(&Limits::of_host(), &spheres, &settings, square_picture(4)).unwrap().film.scale
     };
-    assert_eq!(unit(1), unit(1 << 20));
+    assert_eq!(unit(1), unit(1 << 16));
     let shift = |rounds| {
         let settings = RoomSettings { rounds, shininess: [Some(2.0); 5], ..RoomSettings::default() };
         RoomPlan::new(&open_box(&settings), &settings, &Limits::of_host()).unwrap().film_shift

@@ -84,16 +84,16 @@ fn short(arguments: &[&str]) -> Vec<String> {
     if arguments.contains(&"--replay") {
         return arguments.iter().map(ToString::to_string).collect();
     }
-    // It takes two blocks of rounds to know an error.
-    let rounds = if arguments.contains(&"--error-image") { "8" } else { "2" };
-    let of_run = [("--photons", "500"), ("--rounds", rounds)];
+    // What is kept has two blocks of rounds, one for each of two shards, and it takes two to know an error.
+    let has_blocks = ["--checkpoint", "--resume", "--shard", "--error-image"].iter().any(|option| arguments.contains(option));
+    let of_run = [("--photons", "500"), ("--rounds", if has_blocks { "8" } else { "2" })];
     let only_if_there = [("--error", "60%"), ("--samples", "2"), ("--counters", "2")];
     let there: Vec<_> = only_if_there.into_iter().filter(|(option, _)| arguments.contains(option)).collect();
     let more: &[(&str, &str)] = match arguments.first() {
         Some(&"render") => &[("--size", "16x12")],
         Some(&"bake") => &[("--texels-per-metre", "2")],
         Some(&"probe") => &[],
-        Some(&"plan" | &"info" | &"compare" | &"devices") => return arguments.iter().map(ToString::to_string).collect(),
+        Some(&"plan" | &"info" | &"compare" | &"devices" | &"merge") => return arguments.iter().map(ToString::to_string).collect(),
         _ => &[("--mesh", "8")],
     };
     shrunk(arguments, &[&of_run, &there[..], more].concat())
@@ -109,7 +109,7 @@ fn program(folder: &Path, arguments: &[String]) -> Check {
 
 /// Files and folders that the command says it writes.
 fn outputs<'a>(arguments: &[&'a str]) -> Vec<&'a str> {
-    let options = ["-o", "--json", "--trace", "--error-image", "--irradiance", "--radiosity"];
+    let options = ["-o", "--json", "--trace", "--error-image", "--irradiance", "--radiosity", "--checkpoint"];
     let values = arguments.windows(2).filter(|pair| options.contains(&pair[0])).map(|pair| pair[1]);
     values.filter(|value| *value != "-").collect()
 }
@@ -191,8 +191,32 @@ fn commands_that_are_wrong_are_noticed() {
     assert_eq!(shrunk(&["--rounds", "25", "-o", "x"], &[("--rounds", "2"), ("--mesh", "8")]), ["--rounds", "2", "-o", "x", "--mesh", "8"]);
 }
 
-/// Options of the project's other tools and of cargo.
-const OTHER_OPTIONS: [&str; 8] = ["--help", "--ignored", "--limit", "--open", "--plot", "--quick", "--release", "--test"];
+/// Options of the project's other tools, of cargo and of Slurm.
+const OTHER_OPTIONS: [&str; 23] = [
+    "--again",
+    "--array",
+    "--dependency",
+    "--gres",
+    "--help",
+    "--ignored",
+    "--install",
+    "--limit",
+    "--open",
+    "--open-mode",
+    "--out",
+    "--parsable",
+    "--partition",
+    "--plot",
+    "--quick",
+    "--release",
+    "--requeue",
+    "--sbatch",
+    "--sbatch-merge",
+    "--shards",
+    "--signal",
+    "--test",
+    "--wrap",
+];
 
 /// Words of a text that are options.
 fn options(text: &str) -> BTreeSet<String> {
@@ -204,7 +228,7 @@ fn options(text: &str) -> BTreeSet<String> {
 
 #[test]
 fn options_of_readme_and_guide_exist() {
-    let names = ["", "render", "bake", "probe", "plan", "info", "compare", "devices", "selfcheck", "study", "bench", "paper"];
+    let names = ["", "render", "bake", "probe", "merge", "plan", "info", "compare", "devices", "selfcheck", "study", "bench", "paper"];
     let help = |name: &str| {
         let output = Place::new().run(&format!("{name} --help"));
         assert!(output.status.success(), "{name}");
@@ -228,7 +252,7 @@ fn readme_is_short_and_in_order() {
     assert!(readme.len() <= 12_000, "{} bytes", readme.len());
     let headings: Vec<&str> = readme.lines().filter(|line| line.starts_with('#')).collect();
     let wanted = "# photonmill|## Try it|## Your own scene|## How wrong is it, and when to stop|## The paper's box|\
-        ## What is guaranteed|## Speed against peers|## Limits and platforms|## More";
+        ## What is guaranteed|## Scale|## Speed against peers|## Limits and platforms|## More";
     assert_eq!(headings.join("|"), wanted);
     let commands = commands(&readme);
     assert_eq!(commands[..2], ["tools/setup && cargo run --release -- --variant atomic", "tools/setup && tools/test"]);

@@ -12,7 +12,7 @@ use serde_json::{Value, json};
 const EFFECTS: &str = "direct indirect glossy layers transmission diffuse-transmission iridescence anisotropy media dispersion clear-coat sheen normal-maps alpha reflective-caustics \
     refractive-caustics specular-chains textures vertex-colours environment mesh-lights point-lights spot-lights directional-lights disc-lights bvh two-sided smooth-normals";
 const BLENDER: &str = concat!(env!("CARGO_MANIFEST_DIR"), "/tests/scenes/blender.glb");
-const TINY: &str = "--size 16x16 --photons 2000 --rounds 2";
+const TINY: &str = "--size 16x16 --photons 2000 --rounds 2 --block 1";
 
 /// A folder for runs on a device; `None` where `PHOTONMILL_NO_GPU=1` asks to go without.
 fn place_with_device() -> Option<Place> {

@@ -60,9 +60,9 @@ fn true_errors(runs: &[Claim]) -> Vec<f64> {
     runs.iter().map(off).collect()
 }
 
-/// A picture's claim: of what surfaces scatter.
+/// A picture's claim, of what surfaces scatter: what has ended the run.
 fn claim(lit: &scene::RunResult) -> Claim {
-    (lit.film.surface_means().collect(), lit.film.error(CONFIDENCE).bound(CONFIDENCE), lit.film.measure().relative_to_mean(1.0))
+    (lit.film.surface_means().collect(), watched_error(lit), lit.film.measure().relative_to_mean(1.0))
 }
 
 /// How often the true error is within `claim` times what a run claims.
@@ -117,7 +117,9 @@ fn claims_hold(seeds: u64) {
         let run = |settings: &SceneSettings| {
             if is_rare { as_far_as_shown(&gpu, &scene, settings) } else { seen(&gpu, &scene, settings, &camera, [SIZE; 2]) }
         };
-        let wanted = watched_error(&run(&SceneSettings { rounds: 60, stop: Stop::default(), ..settings(1.0, 0) })).min(1.0);
+        // Of lamps in mirrors and glass, so many that what none has shown is small beside what they have.
+        let rounds = if name == "cornell-spheres" { 600 } else { 60 };
+        let wanted = watched_error(&run(&SceneSettings { rounds, stop: Stop::default(), ..settings(1.0, 0) })).min(1.0);
         let runs: Vec<Claim> = (1..=seeds)
             .map(|seed| {
                 let lit = run(&settings(wanted, seed));

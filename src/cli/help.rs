@@ -59,9 +59,9 @@ Examples:
 
 pub(super) const MERGE: &str = "\
 Examples:
-  photonmill render scene.glb --rounds 256 --shard 1/2 --checkpoint one.pmr
-  photonmill render scene.glb --rounds 256 --shard 2/2 --checkpoint two.pmr
-  photonmill merge one.pmr two.pmr -o picture.exr
+  photonmill render scene.glb --rounds 256 --shard 1/2 --checkpoint one.pms
+  photonmill render scene.glb --rounds 256 --shard 2/2 --checkpoint two.pms
+  photonmill merge one.pms two.pms -o picture.exr
       A run in two parts, which two machines may do";
 
 pub(super) const PLAN: &str = "\

@@ -19,6 +19,7 @@ use crate::ledger::{Fates, Ledger, Losses};
 use crate::plan::sensor::Sensor;
 use crate::settings::Math;
 use crate::settings::stop::Stop;
+use crate::text::counted;
 use crate::timings::{HostClock, Timings};
 
 /// What a run leaves behind.
@@ -260,6 +261,13 @@ impl<'a> RunState<'a> {
             end: None,
             task,
         };
+        if share.count(state.wanted()) == 0 {
+            let allowed = format!(
+                "has nothing to do: the run has {} in all; ask for more --rounds, or for fewer shards",
+                counted(state.wanted(), "block")
+            );
+            return Err(Error::setting("--shard", share, allowed));
+        }
         if let Some((_, saved)) = control.keep.resume.take() {
             state.emitted = saved.fates.iter().map(|fates| fates.emitted).sum();
             state.emitted_of_blocks = state.emitted;

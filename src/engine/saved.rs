@@ -283,7 +283,8 @@ impl SavedRun {
             FilmHeader::Scene { plan, anomalies, stored } => {
                 let of_surfaces = reader.next_sums("surfaces", rounds, done.count())?;
                 let rounds_per_block = plan.rounds_per_block;
-                if plan.sees_light != !of_surfaces.sums.is_empty() || plan.sees_light && of_surfaces.sums.len() != of_blocks.sums.len() {
+                let seen = if plan.sees_light { of_blocks.sums.len() } else { 0 };
+                if [of_surfaces.sums.len(), of_surfaces.squares.len()] != [seen; 2] {
                     return wrong("its sums of surfaces");
                 }
                 let film = SceneFilm {

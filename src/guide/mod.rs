@@ -36,6 +36,10 @@ pub mod performance {}
 pub mod hard_cases {}
 
 #[doc = include_str!("links.md")]
+#[doc = include_str!("scale.md")]
+pub mod scale {}
+
+#[doc = include_str!("links.md")]
 #[doc = include_str!("formats.md")]
 pub mod formats {}
 

@@ -10,7 +10,7 @@ use crate::engine::error_bound::{ErrorPlaces, FilmError};
 use crate::engine::saved::SavedRun;
 use crate::engine::scene::SceneFilm;
 use crate::engine::unknown::Unknown;
-use crate::ledger::Ledger;
+use crate::ledger::{Fates, Ledger};
 use crate::text::counted;
 
 #[derive(Serialize)]
@@ -46,7 +46,7 @@ pub fn json(run: &SavedRun, film: &SceneFilm, missing: &[String]) -> Vec<u8> {
         blocks: error.blocks,
         blocks_wanted: run.wanted,
         missing,
-        ledgers: run.fates.iter().map(|fates| fates.ledger()).collect(),
+        ledgers: run.fates.iter().map(Fates::ledger).collect(),
         relative_error: error.noise,
         error_bound: Some(error.bound(confidence)).filter(|bound| bound.is_finite()),
         unknown: &error.unknown,

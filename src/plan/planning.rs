@@ -17,15 +17,16 @@ use crate::error::{Error, Result, require};
 use crate::photon::MapPhoton;
 use crate::scene::geometry::Geometry;
 use crate::scene::{LobeKinds, Scene, Surface, openings};
-use crate::settings::scene::{Effect, Illumination, MAX_ROUNDS, SceneSettings};
+use crate::settings::scene::{Effect, Illumination, SceneSettings};
 use crate::settings::{Builder, Math};
 
 /// Triangles up to which a list may be asked for: a path tests it some hundred times, and loops are short.
 const MAX_LIST_TRIANGLES: usize = 256;
 /// Bits of a film unit below the scene's mean radiance.
 const FILM_BITS: i32 = 24;
-/// Most units that all rounds may add to a pixel: a run may go on to `MAX_ROUNDS`.
+/// Most units that all rounds may add to a pixel, and rounds to which any run may go on with the same unit.
 const MOST_UNITS: f64 = (1u64 << 62) as f64;
+const ROUNDS_OF_UNIT: u32 = 1 << 16;
 /// A photon in its map, sorted and unsorted, and its place in its bucket.
 const MAP_ENTRY_BYTES: u64 = 2 * size_of::<MapPhoton>() as u64 + 4;
 
@@ -77,7 +78,7 @@ impl ScenePlan {
         let Maps { global, caustic, caustic_surfaces, targets, arrivals } = maps;
         let points_per_pixel = samples * if gather_rays == GATHER_NONE { 1 } else { 2 };
         let arrival_sets = if split { 2 } else { 3 };
-        let limit = MOST_UNITS / f64::from(MAX_ROUNDS);
+        let limit = MOST_UNITS / f64::from(settings.rounds.max(ROUNDS_OF_UNIT));
         let film = FilmPlan {
             scale: 1.0,
             limit,

@@ -139,7 +139,7 @@ pub const CASES: [Case; 122] = [
     Case { number: "L7", failure: "Absorption by the way inside, and of solids in one another", shown: Tests(&["slabs_absorb_by_the_way_inside", "nested_solids_of_one_index_make_one_slab", "what_lies_in_a_medium_agrees_with_the_judge"]) },
     Case { number: "L8", failure: "Light that coarse glass with smooth normals catches for ever", shown: Tests(&["coarse_glass_with_smooth_normals_loses_no_light", "coarse_layered_glass_loses_no_light"]) },
     Case { number: "M1", failure: "Parts of a run of unequal size that are averaged as equal", shown: Tests(&["work_groups_and_chunks_give_the_same_bits"]) },
-    Case { number: "M2", failure: "A part of a run that is counted twice", shown: Absent { why: "runs cannot be merged; a study reads earlier results, each point once", words: &["shard", "merge_runs"] } },
+    Case { number: "M2", failure: "A part of a run that is counted twice", shown: Tests(&["parts_of_a_run_come_to_the_bits_of_one", "parts_of_the_box_come_to_the_bits_of_one"]) },
     Case { number: "M3", failure: "Photon numbers beyond 32 bits", shown: Tests(&["photons_of_the_largest_numbers_are_their_own", "a_billion_photons_have_the_exact_share"]) },
     Case { number: "F1", failure: "Lamps, walls and points too near each other", shown: Tests(&["what_is_too_near_is_right_within_what_is_stated"]) },
     Case { number: "F2", failure: "Lamps and objects too far apart, or too small for their scene", shown: Tests(&["what_is_too_far_is_right_within_what_is_stated"]) },

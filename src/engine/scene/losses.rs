@@ -1,6 +1,8 @@
 //! Light that limits keep from the result: photons cut off after their last bounce, flux beyond what a shading normal may
 //! change, values beyond what the film holds, camera paths cut off among mirrors. Every watt of it is counted, and bounds a bias.
 
+use glam::DVec3;
+
 use super::SceneFilm;
 use crate::constants::{ARRIVED_DIRECT, PART_COUNT, TOTAL_FLUX_BITS};
 use crate::ledger::{Fates, FluxUnits, Losses};
@@ -43,7 +45,7 @@ pub fn losses(geometry: &Geometry, plan: &ScenePlan, fates: &[Fates], film: &Sce
     }
     let paths = f64::from(plan.sensor.pixels()) * f64::from(plan.samples()) * f64::from(film.rounds.max(1));
     // Of what surfaces scatter, over all pixels.
-    let mean = film.surface_means().map(|mean| mean.element_sum()).sum::<f64>() / (3 * film.pixels()).max(1) as f64;
+    let mean = film.surface_means().map(DVec3::element_sum).sum::<f64>() / (3 * film.pixels()).max(1) as f64;
     if mean > 0.0 {
         let wide = |word: usize| (u64::from(anomalies[word]) | u64::from(anomalies[word + 1]) << 32) as f64;
         losses.relative += wide(6) / 1_048_576.0 / paths * geometry.brightest() / mean;
