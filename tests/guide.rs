@@ -85,7 +85,7 @@ fn short(arguments: &[&str]) -> Vec<String> {
         return arguments.iter().map(ToString::to_string).collect();
     }
     // What is kept has two blocks of rounds, one for each of two shards, and it takes two to know an error.
-    let has_blocks = ["--checkpoint", "--resume", "--shard", "--error-image"].iter().any(|option| arguments.contains(option));
+    let has_blocks = ["--checkpoint", "--resume", "--shard", "--error-image", "--judge"].iter().any(|option| arguments.contains(option));
     let of_run = [("--photons", "500"), ("--rounds", if has_blocks { "8" } else { "2" })];
     let only_if_there = [("--error", "60%"), ("--samples", "2"), ("--counters", "2")];
     let there: Vec<_> = only_if_there.into_iter().filter(|(option, _)| arguments.contains(option)).collect();

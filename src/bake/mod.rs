@@ -28,7 +28,7 @@
 //! | file | holds |
 //! |---|---|
 //! | `NAME_irradiance.exr` | irradiance, W/m2, 32-bit floats, linear |
-//! | `NAME_error.exr` | its standard error, W/m2, 32-bit floats; infinite where unknown: after a single round, or where no light has reached a texel though some may |
+//! | `NAME_error.exr` | its standard error, W/m2, 32-bit floats; infinite where unknown: before two blocks of rounds are whole, or where no light has reached a texel though some may |
 //! | `NAME.png` | irradiance / pi times the exposure, sRGB: a white surface as it would look |
 //! | `NAME_radiance.png` | the radiance that leaves the mesh, times the exposure, sRGB |
 //! | `NAME_lightmap.png` | irradiance over the mesh's own brightest, linear: for engines |

@@ -24,7 +24,7 @@ use crate::text::{counted, echo, refusal};
 #[derive(Args)]
 pub(super) struct ProbeArgs {
     /// CSV with one line per point: irradiance of red, green and blue in W/m2, and their standard errors, `inf`
-    /// where unknown: after a single round, or where no light has reached the point though some may; `-` is standard output
+    /// where unknown: before two blocks of rounds are whole, or where no light has reached the point though some may; `-` is standard output
     #[arg(short, long, alias = "out", value_name = "FILE", help_heading = "Output")]
     output: PathBuf,
     #[command(flatten)]

@@ -37,8 +37,8 @@ pub(super) struct RenderArgs {
     snapshot: Option<f64>,
     #[command(flatten)]
     report: ReportArgs,
-    /// Write the standard error of each pixel as an .exr, W/m2/sr; infinite where unknown: after a single round, or where no
-    /// light has reached the pixel though some may
+    /// Write the standard error of each pixel as an .exr, W/m2/sr; infinite where unknown: before two blocks of rounds are
+    /// whole, or where no light has reached the pixel though some may
     #[arg(long, value_name = "FILE", help_heading = "Output")]
     error_image: Option<PathBuf>,
     /// Exposure of a PNG in stops, each of which doubles the brightness [default: what makes the mean middle grey]
@@ -89,8 +89,10 @@ pub(super) fn run(args: &RenderArgs, cancelled: &AtomicBool) -> Result<End> {
     if let Some(samples) = args.judge {
         let range = format!("must be from 2 to {MAX_JUDGE_SAMPLES} samples per pixel");
         require((2..=MAX_JUDGE_SAMPLES).contains(&samples), "--judge", samples, range)?;
-        let is_known = settings.filter == Filter::Box && settings.rounds >= 2;
-        require(is_known, "--judge", samples, "needs --filter box, and two rounds or more to know the error")?;
+        let block = settings.rounds_per_block(true);
+        let is_known = settings.filter == Filter::Box && settings.rounds >= 2 * block;
+        let needs = format!("needs --filter box, and {} rounds or more, which are two blocks, to know the error", 2 * block);
+        require(is_known, "--judge", samples, needs)?;
     }
     if let Some(exposure) = args.exposure {
         require(format == Some(Format::Png), "--exposure", exposure, "is for PNG only: an EXR holds linear radiance")?;
@@ -182,5 +184,5 @@ fn verdict(lit: &RunResult, scene: &Scene, camera: &Camera, (width, height): (u3
     let judged = Judge::new(&scene, settings.bounces).image(camera, width, height, samples, !settings.seed);
     let means: Vec<_> = lit.film.means().collect();
     let errors: Vec<_> = (0..lit.film.pixels()).map(|pixel| lit.film.standard_error(pixel)).collect();
-    Verdict::new(&means, &errors, lit.film.rounds.min(samples), &judged, part)
+    Verdict::new(&means, &errors, lit.film.blocks.min(samples), &judged, part)
 }
