@@ -150,6 +150,7 @@ const PACKED: [(&str, &[&str]); 5] = [
             "high_squares",
             "pass_sums",
             "estimates",
+            "differences",
             "film_sums",
             "film_squares",
             "part_totals",

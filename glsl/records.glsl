@@ -729,6 +729,11 @@ struct FluxToRadiancePush {
     float caustic_flux;
 };
 
+struct EndDifferencePush {
+    uint row_length;
+    uint block;
+};
+
 struct ResolvePush {
     uint first_pixel;
     uint end_pixel;

@@ -28,6 +28,10 @@ constants! {
     /// Blocks of which some places are kept, and places that are.
     KEPT_BLOCKS = 256;
     KEPT_PLACES = 1024;
+    /// Sums of what a smaller radius changes (`engine::differences`): blocks whose numbers differ by a multiple of the first share a
+    /// row, and each row has so many sums a channel.
+    DIFFERENCE_ROWS = 32;
+    DIFFERENCE_SUMS = 4096;
     /// Draws of one emission: disc radius, disc angle, cosine, azimuth.
     EMISSION_DRAWS = 4;
     /// Draws of one bounce: roulette, cosine, azimuth.

@@ -4,12 +4,13 @@ use std::sync::OnceLock;
 use std::sync::atomic::AtomicBool;
 
 use crate::common::prelude::*;
-use photonmill::engine::bias::{self, Batches, Bias};
+use photonmill::engine::bias::{Bias, BiasFrom};
+use photonmill::engine::bias_batches::{self, Batches};
 use photonmill::engine::room;
 use photonmill::engine::room::film::estimate_walls;
 use photonmill::engine::scene::{self, View};
 use photonmill::plan::radius::mean_squared_radius;
-use photonmill::settings::stop::Stop;
+use photonmill::settings::stop::{Measure, Stop};
 use photonmill::verify::judge::radiosity::{Law, Radiosity, WALLS, on_wall};
 
 const CONFIDENCE: f64 = 0.9;
@@ -130,7 +131,7 @@ fn the_allowance_covers_edges_shadows_and_bumps() {
         let points: Vec<f64> = (0..800).map(|k| (f64::from(k) + 0.5) / 100.0 - if at_edge { 0.0 } else { 4.0 }).collect();
         let has_surface = |x: f64| if at_edge { x > 0.0 } else { everywhere(x) };
         let at = |radius: f64| disc_means(&light, has_surface, radius, &points);
-        let bias = bias::extrapolate(CONFIDENCE, 1, |factor, _| Ok(Some(at(factor)))).unwrap().unwrap();
+        let bias = bias_batches::extrapolate(Measure::Rmse, CONFIDENCE, 1, |factor, _| Ok(Some(at(factor)))).unwrap().unwrap();
         let (found, truth) = (at(1.0), at(0.0));
         let square_sum = |values: &mut dyn Iterator<Item = f64>| values.map(|value| value * value).sum::<f64>();
         let off = square_sum(&mut pairs(&found, &truth).map(|(found, truth)| found - truth));
@@ -184,7 +185,7 @@ fn scene_intervals_hold(seeds: u64, cases: &[(&str, Illumination, f64)], rounds:
         let long = RunResult::new(scene(name), illumination, radius, 20_000, 99, &gpu);
         let [lower, middle, upper] = long.difference(&gpu, 0.2, rounds).map(|difference| difference / (1.0 - 0.04));
         let biases: Vec<Bias> =
-            (1..=seeds).map(|seed| RunResult::new(scene(name), illumination, radius, 4000, seed, &gpu).bias(&gpu, 1)).collect();
+            (1..=seeds).map(|seed| RunResult::new(scene(name), illumination, radius, 4000, seed, &gpu).bias_of_blocks(&gpu, 16)).collect();
         println!("{name}: {lower:.4} to {upper:.4}");
         report(&format!("{name}, {illumination:?}, radius {radius}"), &biases, middle);
         assert_holds(name, coverage_check(&biases, middle));
@@ -217,13 +218,13 @@ fn the_bias_of_a_shrinking_radius_lies_in_the_scaled_interval() {
         if factor < 1.0 {
             return long.batch(&gpu, ROUNDS, factor, number);
         }
-        let seed = bias::seed(long.plan.settings.seed, number);
+        let seed = bias_batches::seed(long.plan.settings.seed, number);
         let settings = SceneSettings { rounds: ROUNDS, alpha, seed, ..long.plan.settings.clone() };
         let (_, plan) = scene_plan(&gpu, &long.scene, &settings, long.plan.sensor)?;
         let lit = scene::light(&gpu, &long.view(), plan, &mut Control::default())?;
         Ok(Some(lit.film.surface_means().flat_map(|mean| mean.to_array()).collect()))
     };
-    let truth = bias::difference(CONFIDENCE, 0.2, batch).unwrap().unwrap()[1];
+    let truth = bias_batches::difference(Measure::Rmse, CONFIDENCE, 0.2, batch).unwrap().unwrap()[1];
     let of_seed = |seed| RunResult::new(scene("disc-over-plane"), Illumination::Photons, 0.15, 4000, seed, &gpu).bias(&gpu, 2);
     let first: Vec<Bias> = (1..=10).map(of_seed).collect();
     let scaled: Vec<Bias> = first.iter().map(|bias| bias.scaled(mean_squared_radius(alpha, ROUNDS))).collect();
@@ -275,14 +276,25 @@ impl RunResult {
         scene::bias::measure(gpu, &self.scene, &self.view(), &self.plan, (1.0, rounds), &NEVER).unwrap().unwrap()
     }
 
+    /// As so many blocks of a run tell it.
+    fn bias_of_blocks(&self, gpu: &Gpu, blocks: u32) -> Bias {
+        let settings = SceneSettings { rounds: blocks, alpha: 1.0, ..self.plan.settings.clone() };
+        let (_, plan) = scene_plan(gpu, &self.scene, &settings, self.plan.sensor).unwrap();
+        let bias = scene::light(gpu, &self.view(), plan, &mut Control::default()).unwrap().error().bias.unwrap();
+        assert_eq!(bias.from, BiasFrom::Blocks(blocks));
+        bias
+    }
+
     /// From light at a radius that is so many times smaller.
     fn difference(&self, gpu: &Gpu, factor: f64, rounds: u32) -> [f64; 3] {
-        bias::difference(CONFIDENCE, factor, |factor, number| self.batch(gpu, rounds, factor, number)).unwrap().unwrap()
+        bias_batches::difference(Measure::Rmse, CONFIDENCE, factor, |factor, number| self.batch(gpu, rounds, factor, number))
+            .unwrap()
+            .unwrap()
     }
 
     /// Values of a batch at radii times a factor.
     fn batch(&self, gpu: &Gpu, rounds: u32, factor: f64, number: u32) -> photonmill::error::Result<Option<Vec<f64>>> {
-        let batches = Batches { seed: self.plan.settings.seed, confidence: CONFIDENCE, rounds, cancelled: &NEVER };
+        let batches = Batches { seed: self.plan.settings.seed, measure: Measure::Rmse, confidence: CONFIDENCE, rounds, cancelled: &NEVER };
         batches.values(factor, number, |batch, control| scene::bias::batch(gpu, &self.scene, &self.view(), &self.plan, batch, control))
     }
 }

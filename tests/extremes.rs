@@ -166,6 +166,7 @@ fn standard_errors_survive_a_mean_far_above_them() {
         plan: plan.film.clone(),
         of_blocks,
         of_surfaces: None,
+        differences: Default::default(),
         latest: LatestBlocks::default(),
         one_hits: vec![0; 3],
         part_totals: Vec::new(),

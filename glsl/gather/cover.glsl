@@ -162,9 +162,11 @@ float kernel_over(Polygon polygon, out float left)
         sum += kernel_over_edge(polygon.from[k], polygon.to[k], enters, left);
     }
     left = is_empty ? -1.0 : left;
-    // No edge in the disc: all of it or nothing, not the rounding of sectors that cancel.
+    // No edge in the disc: all of it or nothing, not the rounding of sectors that cancel. Which of the two, sectors tell: the direction of
+    // a short edge is all rounding, and so is the side of it that the middle lies on.
+    float whole = 3.14159265358979324 * kernel_norm();
     if (!enters) {
-        return left > 0.0 ? 3.14159265358979324 * kernel_norm() : 0.0;
+        return sum > 0.5 * whole ? whole : 0.0;
     }
     return sum;
 }

@@ -25,6 +25,21 @@ uint point_of(uint item, uint slice)
 layout(set = 1, binding = 14, scalar) readonly buffer MattLobesOfPoints { MattLobes matt_lobes[]; };
 layout(set = 1, binding = 16, scalar) readonly buffer MattCoversOfPoints { MattCover matt_covers[]; };
 
+// Weight of a photon that far from the point and that high above its plane.
+float kernel_at(float distance_squared, float height, float radius)
+{
+    float height_squared = height * height;
+    return kernel_weight(clamp(divide(distance_squared - height_squared, radius * radius - height_squared), 0.0, 1.0));
+}
+
+// 32 bits before the binary point and 32 behind it, rounded up by chance.
+uvec2 fixed_point(float flux, float chance)
+{
+    float whole = floor(flux);
+    precise float fraction = (flux - whole) * 4294967296.0 + chance;
+    return uvec2(uint(fraction), uint(whole));
+}
+
 void gather_photons()
 {
     uint slice = push.first_slice + gl_WorkGroupID.y;
@@ -91,6 +106,9 @@ void gather_photons()
     [[unroll]] for (uint k = 0; k < 9; k++) {
         sums[k] = uvec2(0);
     }
+    // The same of photons nearer than that, all arrivals together.
+    uvec2 near_sums[3] = uvec2[](uvec2(0), uvec2(0), uvec2(0));
+    float near_radius = radius * NEAR_SHARE;
     bool found = false;
     uint passed = 0; // candidates in the rows before this one
     for (int z = range.first.z; z <= range.last.z; z++) {
@@ -125,9 +143,16 @@ void gather_photons()
                     }
                     if (counts && cosine > 0.0) {
                         float weight = lobe_weight(point.surface, point.exponent, ns, wo, wi);
+                        bool is_near = false;
+                        if (HAS_DIFFERENCES) {
+                            is_near = distance_squared <= near_radius * near_radius
+                                      && (is_alike || belongs(normal, photon_normal, height, near_radius));
+                        }
+                        float near_gain = 1.0;
                         if (KERNEL != KERNEL_BOX) {
-                            float height_squared = height * height;
-                            weight *= kernel_weight(clamp(divide(distance_squared - height_squared, radius * radius - height_squared), 0.0, 1.0));
+                            float share = kernel_at(distance_squared, height, radius);
+                            weight *= share;
+                            near_gain = is_near ? divide(kernel_at(distance_squared, height, near_radius), share) : 0.0;
                         }
                         if (HAS_SMOOTH_NORMALS) {
                             weight *= is_flat ? 1.0 : shading_gain(cosine, dot(wi, photon_normal));
@@ -140,15 +165,19 @@ void gather_photons()
                         note_unless(is_finite(flux), NONFINITE_ESTIMATE, 0, push.round, index % push.pixel_count);
                         float chance = chance_of(mix32(point_bits + position_bits(position)));
                         [[unroll]] for (uint channel = 0; channel < 3; channel++) {
-                            float whole = floor(flux[channel]);
-                            precise float fraction = (flux[channel] - whole) * 4294967296.0 + chance;
-                            uvec2 amount = uvec2(uint(fraction), uint(whole));
+                            uvec2 amount = fixed_point(flux[channel], chance);
                             if (HAS_ALL_ARRIVALS) {
                                 [[unroll]] for (uint arrival = 0; arrival < 3; arrival++) {
                                     sums[3 * arrival + channel] = add64(sums[3 * arrival + channel], arrival == light.w >> 30 ? amount : uvec2(0));
                                 }
                             } else {
                                 sums[channel] = add64(sums[channel], amount);
+                            }
+                            if (is_near) {
+                                if (KERNEL != KERNEL_BOX) {
+                                    amount = fixed_point(flux[channel] * near_gain, chance);
+                                }
+                                near_sums[channel] = add64(near_sums[channel], amount);
                             }
                         }
                         found = true;
@@ -175,6 +204,14 @@ void gather_photons()
         [[unroll]] for (uint k = 0; k < 9; k++) {
             if (k < sum_count && sums[k] != uvec2(0)) {
                 add_to_film(first + k / 3 * 3 * push.point_count + k % 3, sums[k]);
+            }
+        }
+        if (HAS_DIFFERENCES) {
+            uint near = 3 * (near_set(push.map_class == CAUSTIC_CLASS) * push.point_count + index);
+            for (uint channel = 0; channel < 3; channel++) {
+                if (near_sums[channel] != uvec2(0)) {
+                    add_to_film(near + channel, near_sums[channel]);
+                }
             }
         }
     }

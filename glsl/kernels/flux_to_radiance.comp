@@ -1,5 +1,6 @@
 // What the photon maps found at each visible point, as light: flux over the area that really lies on the surface, times
-// reflectance, in film units. It takes the place of the point's first sums. Notes which pixels photons have reached, and bright ones.
+// reflectance, in film units. It takes the place of the point's first sums. Notes which pixels photons have reached, bright
+// ones, and what a smaller radius would change.
 // Dispatched by src/engine/scene/estimate.rs once a round. One thread = one visible point.
 #extension GL_EXT_control_flow_attributes : require
 #extension GL_KHR_shader_subgroup_basic : require
@@ -21,11 +22,13 @@ layout(set = 1, binding = 2, scalar) buffer Estimates { uvec2 estimates[]; };
 #include "gather/belongs.glsl"
 #include "gather/disc_cuts.glsl"
 #include "gather/cover.glsl"
+#include "gather/near.glsl"
 #include "gather/radius_class.glsl"
 #include "film/wide.glsl"
 #include "world/scene/film_units.glsl"
 #include "film/kept_places.glsl"
 #include "film/kept_parts.glsl"
+#include "film/differences.glsl"
 #include "world/scene/tiles.glsl"
 #include "world/scene/no_point.glsl"
 #include "world/scene/one_hit.glsl"
@@ -40,17 +43,17 @@ vec3 gathered_flux(uint place)
     return flux;
 }
 
-// Area in which photons were looked for, weighted by the kernel.
-float estimate_area(VisiblePoint point, uint pixel, uint cut, float radius)
+// Area in which photons were looked for, or those within a share of the radius, weighted by the kernel.
+float estimate_area(VisiblePoint point, uint pixel, uint cut, float radius, float share)
 {
     Cuts cuts = cuts_of(cut, plane_normal(point.plane), radius);
-    radius = min(radius, cuts.reach);
+    radius = min(radius, cuts.reach) * share;
     float area = 3.14159265358979324 * kernel_norm() * radius * radius;
     if (HAS_EDGE_CORRECTION) {
         bool whole;
         float covered = covered_area(point.position, point.plane, radius, cuts, whole);
         note_unless(is_finite(covered), NONFINITE_ESTIMATE, 0, push.round, pixel);
-        if (whole) {
+        if (whole && share == 1.0) {
             atomicAdd(anomalies[2], 1);
         }
         // Photons were found, so some surface is there; rounding may call a sliver nothing. The least area is
@@ -68,6 +71,28 @@ void note_brightness(uint pixel, vec3 flux, vec3 one_photon)
     } else {
         note_miss(pixel, HIT_BRIGHT_PHOTON, one_photon);
     }
+}
+
+// The areas of a map: within the radius, and where asked within the smaller one. In a loop, as the code for an area is long.
+vec2 areas_around(VisiblePoint point, uint place, bool is_caustic, bool with_near)
+{
+    float radius = is_caustic ? push.caustic_radius : push.global_radius;
+    if (HAS_RADIUS_CLASSES) {
+        radius = radius_of_class(radius, radius_class(place, is_caustic ? CAUSTIC_CLASS : GLOBAL_CLASS));
+    }
+    uint cut = place + (is_caustic ? push.first_caustic_cut : 0);
+    vec2 areas = vec2(0.0);
+    uint count = with_near ? 2 : 1;
+    for (uint k = 0; k < count; k++) {
+        float area = estimate_area(point, place % push.pixel_count, cut, radius, k == 0 ? 1.0 : NEAR_SHARE);
+        areas = k == 0 ? vec2(area, 0.0) : vec2(areas.x, area);
+    }
+    return areas;
+}
+
+float density_in(float area, bool is_caustic)
+{
+    return divide(is_caustic ? push.caustic_flux : push.global_flux, area);
 }
 
 // Part of the picture (direct, specular, caustic, indirect) that an arrival adds to.
@@ -91,6 +116,7 @@ void main()
     }
     uvec2 sums[3] = uvec2[](uvec2(0), uvec2(0), uvec2(0));
     bool is_lit = false;
+    vec3 change = vec3(0.0); // of a smaller radius
     uint first_arrival = 1;
     if (HAS_ALL_ARRIVALS) {
         first_arrival = 0;
@@ -117,18 +143,22 @@ void main()
         } else if (is_new) {
             note_hit(pixel, kind);
         }
+        float for_all = !is_caustic && (point.arrivals & SEEN_FOR_ALL) != 0 ? float(SAMPLES) : 1.0;
         float area = is_caustic ? 0.0 : global_area;
         float widest = is_caustic ? push.caustic_radius : push.global_radius;
         if (area == 0.0) {
-            float radius = widest;
-            if (HAS_RADIUS_CLASSES) {
-                radius = radius_of_class(widest, radius_class(place, is_caustic ? CAUSTIC_CLASS : GLOBAL_CLASS));
+            vec3 near_flux = vec3(0.0);
+            if (HAS_DIFFERENCES) {
+                near_flux = gathered_flux(near_set(is_caustic) * push.point_count + place);
             }
-            area = estimate_area(point, pixel, place + (is_caustic ? push.first_caustic_cut : 0), radius);
+            vec2 areas = areas_around(point, place, is_caustic, near_flux != vec3(0.0));
+            area = areas.x;
+            if (near_flux != vec3(0.0)) {
+                change += for_all * point.weight * (near_flux * density_in(areas.y, is_caustic));
+            }
         }
         global_area = is_caustic ? global_area : area;
-        float for_all = !is_caustic && (point.arrivals & SEEN_FOR_ALL) != 0 ? float(SAMPLES) : 1.0;
-        float density = divide(is_caustic ? push.caustic_flux : push.global_flux, area);
+        float density = density_in(area, is_caustic);
         vec3 one_photon = for_all * point.weight * (density * widest * widest);
         if (flux == vec3(0.0)) {
             note_miss(pixel, kind, one_photon);
@@ -151,6 +181,7 @@ void main()
             }
         }
         is_lit = true;
+        change -= radiance;
     }
     for (uint part = 0; part < PART_COUNT; part++) {
         add_part_total(part, totals[part]);
@@ -160,5 +191,8 @@ void main()
         for (uint channel = 0; channel < 3; channel++) {
             estimates[3 * place + channel] = sums[channel];
         }
+    }
+    if (HAS_DIFFERENCES && is_lit) {
+        add_difference(place % push.pixel_count, push.pixel_count, change * push.film_scale, push.film_limit);
     }
 }

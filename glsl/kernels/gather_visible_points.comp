@@ -28,6 +28,7 @@ layout(push_constant, scalar) uniform Push { SceneGatherPush push; };
 #include "gather/bucket_rows.glsl"
 #include "gather/radius_class.glsl"
 #include "gather/disc_cuts.glsl"
+#include "gather/near.glsl"
 #include "gather/visible_points.glsl"
 
 void main()

@@ -8,12 +8,13 @@ use super::complain;
 use super::interrupt::interruptible;
 use super::keep::Keeper;
 use super::progress::{ProgressArgs, ProgressReporter};
-use super::stop::{StopArgs, bias_before, goals, rounds_after, up_to};
+use super::stop::{StopArgs, bias_before, check_bias, goals, rounds_after, up_to};
 use crate::engine::Control;
 use crate::engine::scene::{self, RunResult, View};
 use crate::error::Result;
 use crate::gpu::Gpu;
 use crate::output::scene_report;
+use crate::plan::film::BiasPlan;
 use crate::plan::radius::mean_squared_radius;
 use crate::plan::scene::{MapPlan, ScenePlan};
 use crate::plan::sensor::Sensor;
@@ -96,8 +97,10 @@ impl Job<'_> {
             interruptible(|| scene::bias::measure(gpu, scene, &view, plan, factor_and_rounds, cancelled))
         };
         let alpha = settings.alpha;
-        // The error asked for is noise and bias together, so the bias must be known beforehand.
-        let before = bias_before(&settings.stop, stop.bias, alpha < 1.0, reporter, |rounds| measure(&plan, (1.0, rounds)))?;
+        check_bias(&settings.stop, plan.film.bias)?;
+        // The error asked for is noise and bias together, so what blocks do not tell must be known beforehand.
+        let takes_extra_runs = stop.bias && plan.film.bias == BiasPlan::ExtraRuns;
+        let before = bias_before(&settings.stop, takes_extra_runs, alpha < 1.0, reporter, |rounds| measure(&plan, (1.0, rounds)))?;
         plan.settings.stop.bias = before.map(|bias| bias.upper);
 
         reporter.status("making the pipelines");
@@ -112,7 +115,7 @@ impl Job<'_> {
         lit.bias = match before {
             Some(bias) => Some(bias.scaled(shrunk)),
             // At the radius whose square is the mean of the rounds' squares.
-            None if stop.bias => {
+            None if takes_extra_runs => {
                 reporter.status("measuring the bias");
                 measure(&lit.plan, (shrunk.sqrt(), rounds_after(lit.film.rounds)))?
             }

@@ -7,6 +7,7 @@ use super::values::{parse_percent, parse_seconds, parse_within, value_enum};
 use crate::engine::bias::Bias;
 use crate::engine::blocks::Share;
 use crate::error::{Error, Result, require};
+use crate::plan::film::BiasPlan;
 use crate::settings::stop::{Measure, Stop};
 use crate::text::counted;
 
@@ -29,7 +30,8 @@ pub(super) struct StopArgs {
     /// Stop once this many photons have been traced, summed over all rounds and maps
     #[arg(long, value_name = "N", value_parser = parse_within(1..=u64::MAX), allow_hyphen_values = true)]
     total_photons: Option<u64>,
-    /// Also measure the bias, which is the blur by the search radius, in extra runs; with --error it counts as part of the error
+    /// Measure the bias, which is the blur by the search radius, in extra runs: of the paper's box, and with --measure relmse. Else
+    /// all blocks of a run tell it. With --error it counts as part of the error
     #[arg(long)]
     pub(super) bias: bool,
 }
@@ -86,13 +88,24 @@ pub(super) fn up_to(stop: &Stop, rounds: u32) -> String {
 
 /// Rounds of a batch after a run of so many: all batches at both radii together do about as many as the run.
 pub(super) fn rounds_after(rounds: u32) -> u32 {
-    rounds.div_ceil(2 * crate::engine::bias::BATCHES).max(1)
+    rounds.div_ceil(2 * crate::engine::bias_batches::BATCHES).max(1)
 }
 
 /// Rounds of a batch at first, and how often it is made again with four times as many, as long as the interval leaves
 /// open whether the error wanted can be reached.
 const FIRST_ROUNDS: u32 = 2;
 const REFINEMENTS: u32 = 4;
+
+/// Refuses an error of a scene whose bias is unknown, and that nothing else would end.
+pub(super) fn check_bias(stop: &Stop, bias: BiasPlan) -> Result<()> {
+    let ends_otherwise = stop.seconds.is_some() || stop.photons.is_some();
+    let Some(wanted) = stop.error.filter(|_| bias == BiasPlan::Nothing && !ends_otherwise) else { return Ok(()) };
+    let allowed = format!(
+        "cannot be reached: the bias is unknown, because {}; leave out what makes the scene so wide, give a --radius, or add --time",
+        Bias::UNKNOWN
+    );
+    Err(Error::setting("--error", format!("{}%", 100.0 * wanted), allowed))
+}
 
 /// Measures the bias of the first round's radius if it is asked for and the run ends at an error, of which it is a part.
 /// `shrinks` says whether later radii are smaller.
@@ -104,25 +117,14 @@ pub(super) fn bias_before(
     mut measure: impl FnMut(u32) -> Result<Option<Bias>>,
 ) -> Result<Option<Bias>> {
     let Some(wanted) = stop.error.filter(|_| is_asked) else { return Ok(None) };
-    let ends_otherwise = stop.seconds.is_some() || stop.photons.is_some();
     let mut rounds = FIRST_ROUNDS;
     for refinement in 0..=REFINEMENTS {
         reporter.step(&format!(
             "measuring the bias first: {} batches of {} at two radii",
-            crate::engine::bias::BATCHES,
+            crate::engine::bias_batches::BATCHES,
             counted(rounds, "round")
         ));
         let Some(bias) = measure(rounds)? else { return Ok(None) };
-        if !bias.is_known() && !ends_otherwise {
-            return Err(Error::setting(
-                "--error",
-                format!("{}%", 100.0 * wanted),
-                format!(
-                    "cannot be reached with --bias: {}; use --final-gather without --bias, leave out what makes the scene so wide, or add --time",
-                    Bias::UNKNOWN
-                ),
-            ));
-        }
         // More than half of the error wanted is then left for noise.
         let is_decided = bias.upper <= 0.85 * wanted || bias.lower > wanted || refinement == REFINEMENTS;
         // Where the radius shrinks the bias need not be known as well: it will be small enough some day.

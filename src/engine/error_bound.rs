@@ -3,6 +3,7 @@
 use serde::Serialize;
 use statrs::distribution::{ContinuousCDF, FisherSnedecor};
 
+use super::bias::Bias;
 use super::degrees_of_freedom::DegreesOfFreedom;
 use super::unknown::Unknown;
 use crate::constants::PART_COUNT;
@@ -21,6 +22,8 @@ pub struct FilmError {
     /// What light may add that is so rare that no round may have shown it, with the confidence that was asked for: as many hits
     /// of the brightest lamp in mirrors and glass as a run may miss. Infinite where all else is black.
     pub unseen: f64,
+    /// Of the radius; `None` where it was not measured.
+    pub bias: Option<Bias>,
     /// Where the noise sits; `None` where that is not known.
     pub places: Option<ErrorPlaces>,
 }
@@ -40,6 +43,13 @@ impl FilmError {
     /// nothing has reached. Infinite where that is all there is.
     pub fn bound(&self, confidence: f64) -> f64 {
         error_bound(self.noise, self.freedom, confidence).hypot(self.unknown.relative)
+    }
+
+    /// The relative error that the film has not more of, bias and light that limits kept from it included.
+    pub fn bound_of_all(&self, confidence: f64, lost: f64) -> f64 {
+        let noise = [self.noise, error_bound(self.noise, self.freedom, confidence)];
+        let bias = self.bias.map_or([0.0; 2], |bias| [bias.relative, bias.upper]).map(|bias| bias + lost);
+        bound_of_both(noise, bias).hypot(self.unknown.relative)
     }
 
     /// Whether rounds have shown the tail of the noise: what they may not have shown is no more than the bound of what they have.
@@ -63,9 +73,30 @@ pub fn error_bound(relative_error: f64, freedom: DegreesOfFreedom, confidence: f
     distribution.inverse_cdf(confidence).sqrt() * relative_error * (1.0 + (0.5 / freedom.estimate).sqrt())
 }
 
+/// The bound of noise and bias together, each as it was found and its own bound. Squares add up, and so do the squares of how far
+/// these may lie above what was found, as the one may be found too small where the other is not.
+pub fn bound_of_both([noise, most_noise]: [f64; 2], [bias, most_bias]: [f64; 2]) -> f64 {
+    if most_noise.is_infinite() || most_bias.is_infinite() {
+        return f64::INFINITY;
+    }
+    let above = |found: f64, most: f64| most * most - found * found;
+    (noise * noise + bias * bias + above(noise, most_noise).hypot(above(bias, most_bias))).sqrt()
+}
+
 #[cfg(test)]
 mod tests {
     use super::*;
+
+    #[test]
+    fn bounds_of_noise_and_bias_go_together() {
+        // One alone is its own bound, and what is known exactly adds its square.
+        assert_eq!((bound_of_both([2.0, 3.0], [0.0; 2]), bound_of_both([0.0; 2], [2.0, 3.0])), (3.0, 3.0));
+        assert!((bound_of_both([2.0, 3.0], [4.0, 4.0]) - 5.0).abs() < 1e-12);
+        let both = bound_of_both([2.0, 3.0], [1.0, 2.0]);
+        assert!(both > 3.0 && both < 3f64.hypot(2.0), "{both}");
+        assert_eq!(bound_of_both([f64::INFINITY; 2], [0.0; 2]), f64::INFINITY);
+        assert_eq!(bound_of_both([1.0, 2.0], [0.0, f64::INFINITY]), f64::INFINITY);
+    }
 
     #[test]
     fn a_tail_is_known_once_the_noise_covers_what_is_unseen() {
@@ -76,6 +107,7 @@ mod tests {
             freedom: DegreesOfFreedom::least(rounds),
             unknown: Unknown::default(),
             unseen: 8.0 / f64::from(rounds),
+            bias: None,
             places: None,
         };
         assert!(!error(16).tail_is_known(0.95) && error(256).tail_is_known(0.95));

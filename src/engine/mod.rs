@@ -2,9 +2,11 @@
 //! index them, and estimate densities with the kernels of `glsl` (or, of the box, their twins in `cpu`); what stands beside them here is the same for both.
 
 pub mod bias;
+pub mod bias_batches;
 pub mod blocks;
 pub mod choose_builder;
 pub mod degrees_of_freedom;
+pub mod differences;
 pub mod error_bound;
 pub mod film;
 pub mod identity;

@@ -33,7 +33,7 @@ pub struct RunResult<Plan, Film> {
     /// `None` for the CPU builder.
     pub device: Option<DeviceFacts>,
     pub end: End,
-    /// The bias of the radius; `None` where it was not measured.
+    /// The bias of the radius from extra runs; `None` without these.
     pub bias: Option<Bias>,
     /// Light that limits kept from the result.
     pub losses: Losses,
@@ -414,7 +414,7 @@ impl<'a> RunState<'a> {
         if whole && self.watch.is_due(self.blocks()) {
             let film = world.film(recorder, self)?;
             self.watch.look(&world.error(&film), world.losses(&film, self.fates()).relative);
-            self.watch.check_losses(self.task.bounces)?;
+            self.watch.check_error(self.task.bounces)?;
         }
         if saves {
             let film = world.film(recorder, self)?;

@@ -4,12 +4,14 @@ use serde::{Deserialize, Serialize};
 use sha2::{Digest, Sha256};
 
 use super::blocks::{Blocks, Share};
+use super::differences::Differences;
 use super::film::{BlockSums, KeptBlock, LatestBlocks};
 use super::identity::Identity;
 use super::room::film::RoomFilm;
 use super::scene::film::SceneFilm;
 use crate::ledger::Fates;
-use crate::plan::film::FilmPlan;
+use crate::plan::differences::difference_count;
+use crate::plan::film::{BiasPlan, FilmPlan};
 use crate::plan::sensor::Sensor;
 use crate::settings::Sums;
 
@@ -203,6 +205,7 @@ impl SavedRun {
                 arrays.add("one hits", &film.one_hits);
                 arrays.add("part totals", &film.part_totals);
                 arrays.add("class counts", &film.class_counts);
+                arrays.add("differences", &film.differences.0);
                 FilmHeader::Scene { plan: film.plan.clone(), anomalies: film.anomalies.to_vec(), stored: film.stored.to_vec() }
             }
         };
@@ -296,10 +299,15 @@ impl SavedRun {
                     part_totals: reader.next("part totals")?,
                     anomalies: anomalies.try_into().or(Err("holds other counts than this program knows"))?,
                     class_counts: reader.next("class counts")?,
+                    differences: Differences(reader.next("differences")?),
                     stored: stored.try_into().or(Err("holds other counts than this program knows"))?,
                 };
                 if film.one_hits.len() != film.pixels() * crate::constants::HIT_KINDS as usize {
                     return wrong("what one hit would add");
+                }
+                let measured = if film.plan.bias == BiasPlan::Blocks { difference_count(film.pixels()) } else { 0 };
+                if film.differences.0.len() != measured {
+                    return wrong("what tells its bias");
                 }
                 (film.into(), rounds_per_block, 3)
             }

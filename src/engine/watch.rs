@@ -5,7 +5,7 @@ use std::sync::atomic::AtomicBool;
 use std::time::{Duration, Instant};
 
 use super::blocks::Share;
-use super::error_bound::{FilmError, error_bound};
+use super::error_bound::{FilmError, bound_of_both, error_bound};
 use super::identity::Identity;
 use super::saved::SavedRun;
 use crate::error::{Error, Result, require};
@@ -138,11 +138,13 @@ pub struct Watch {
 #[derive(Clone, Copy)]
 struct Look {
     rounds: u32,
-    /// Bound of the noise.
-    noise: f64,
+    /// As it was found, and its bound.
+    noise: [f64; 2],
     unknown: f64,
     /// What is too rare to have been seen.
     unseen: f64,
+    /// Lower end, estimate and upper end, as far as the film tells the bias; else 0.
+    bias: [f64; 3],
     /// What limits have kept from the result ([`crate::ledger::Losses`]).
     lost: f64,
 }
@@ -178,34 +180,49 @@ impl Watch {
     /// Takes what a film tells, and what limits kept from it, relative to it.
     pub fn look(&mut self, error: &FilmError, lost: f64) {
         let FilmError { rounds, blocks, noise, freedom, ref unknown, unseen, .. } = *error;
-        let noise = error_bound(noise, freedom, self.stop.confidence);
-        self.seen = Some(Look { rounds, noise, unknown: unknown.relative, unseen, lost });
+        let noise = [noise, error_bound(noise, freedom, self.stop.confidence)];
+        let bias = error.bias.map_or([0.0; 3], |bias| [bias.lower, bias.relative, bias.upper]);
+        self.seen = Some(Look { rounds, noise, unknown: unknown.relative, unseen, bias, lost });
         self.next_look = blocks + (blocks / 4).max(1);
     }
 
     /// Noise, bias, what is unknown and what is unseen together at the latest look.
     fn error(&self) -> Option<(u32, f64)> {
-        self.seen.map(|Look { rounds, noise, unknown, unseen, lost }| {
-            (rounds, noise.hypot(unknown).hypot(unseen).hypot(self.bias(rounds) + lost))
+        self.seen.map(|look| {
+            let Look { rounds, noise, unknown, unseen, lost, .. } = look;
+            (rounds, bound_of_both(noise, self.bias(&look).map(|bias| bias + lost)).hypot(unknown).hypot(unseen))
         })
     }
 
-    /// Refuses an error that cannot be reached, as limits alone keep more light from the result, and that nothing else would end.
-    pub fn check_losses(&self, bounces: u32) -> Result<()> {
+    /// Refuses an error that cannot be reached, and that nothing else would end: where limits alone keep more light from the result, or
+    /// the bias of a radius that never shrinks is more.
+    pub fn check_error(&self, bounces: u32) -> Result<()> {
         if self.stop.seconds.is_some() || self.stop.photons.is_some() {
             return Ok(());
         }
-        let lost = self.seen.map_or(0.0, |look| look.lost);
-        let Some(wanted) = self.stop.error.filter(|wanted| lost > *wanted) else { return Ok(()) };
-        let allowed = format!(
-            "cannot be reached, because photons are cut off after {bounces} bounces, and what they carry may add up to {:.2} % of the result; allow more --bounces",
-            100.0 * lost
-        );
-        Err(Error::setting("--error", format!("{}%", 100.0 * wanted), allowed))
+        let (Some(wanted), Some(look)) = (self.stop.error, self.seen) else { return Ok(()) };
+        let refused = |allowed: String| Err(Error::setting("--error", format!("{}%", 100.0 * wanted), allowed));
+        if look.lost > wanted {
+            return refused(format!(
+                "cannot be reached, because photons are cut off after {bounces} bounces, and what they carry may add up to {:.2} % of the result; allow more --bounces",
+                100.0 * look.lost
+            ));
+        }
+        let [lower, _, upper] = look.bias;
+        if self.alpha == 1.0 && lower > wanted {
+            return refused(format!(
+                "cannot be reached: the bias of the radius alone is {:.2} % to {:.2} %, and the radius never shrinks; use a smaller --radius",
+                100.0 * lower,
+                100.0 * upper
+            ));
+        }
+        Ok(())
     }
 
-    fn bias(&self, rounds: u32) -> f64 {
-        self.stop.bias.map_or(0.0, |bias| bias * mean_squared_radius(self.alpha, rounds))
+    /// The bias at a look and its bound: of the first round's radius as extra runs told it, which is a bound, or as the film does.
+    fn bias(&self, look: &Look) -> [f64; 2] {
+        let [_, found, most] = look.bias;
+        self.stop.bias.map_or([found, most], |bias| [bias * mean_squared_radius(self.alpha, look.rounds); 2])
     }
 
     pub fn has_photons(&self, photons: u64) -> bool {
@@ -254,14 +271,14 @@ impl Watch {
 
     /// Rounds after which the error will be what is wanted: the square of the noise falls as 1 / rounds, the bias as
     /// rounds^(alpha - 1), what nothing has reached as 1 / (rounds and area of the discs), and what is unseen as 1 / rounds.
-    fn rounds_wanted(&self, wanted: f64, Look { rounds, noise, unknown, unseen, lost }: Look, most: f64) -> f64 {
-        let (at, bias) = (f64::from(rounds), self.bias(rounds));
+    fn rounds_wanted(&self, wanted: f64, look: Look, most: f64) -> f64 {
+        let Look { rounds, noise, unknown, unseen, lost, .. } = look;
+        let (at, bias) = (f64::from(rounds), self.bias(&look));
         let error = |rounds: f64| {
             let unknown = unknown * (at / rounds).powf(self.alpha);
-            (noise * (at / rounds).sqrt())
-                .hypot(unknown)
-                .hypot(unseen * at / rounds)
-                .hypot(bias * (at / rounds).powf(1.0 - self.alpha) + lost)
+            let noise = noise.map(|noise| noise * (at / rounds).sqrt());
+            let bias = bias.map(|bias| bias * (at / rounds).powf(1.0 - self.alpha) + lost);
+            bound_of_both(noise, bias).hypot(unknown).hypot(unseen * at / rounds)
         };
         let (mut less, mut more) = (at.min(most), most);
         if error(less) <= wanted {

@@ -6,6 +6,7 @@ use serde::Serialize;
 use serde_json::{Map, Value};
 
 use super::report::{Tail, errors, ledger};
+use crate::engine::bias::Bias;
 use crate::engine::error_bound::{ErrorPlaces, FilmError};
 use crate::engine::saved::SavedRun;
 use crate::engine::scene::SceneFilm;
@@ -33,6 +34,7 @@ struct Report<'a> {
     unknown: &'a Unknown,
     tail: Tail,
     noise_sits: Option<ErrorPlaces>,
+    bias: Option<Bias>,
 }
 
 pub fn json(run: &SavedRun, film: &SceneFilm, missing: &[String]) -> Vec<u8> {
@@ -52,6 +54,7 @@ pub fn json(run: &SavedRun, film: &SceneFilm, missing: &[String]) -> Vec<u8> {
         unknown: &error.unknown,
         tail: Tail::of(&error, confidence),
         noise_sits: error.places,
+        bias: error.bias,
     };
     serde_json::to_vec_pretty(&report).expect("a report is plain data")
 }
@@ -75,7 +78,7 @@ pub fn text(run: &SavedRun, files: usize, film: Option<&SceneFilm>) -> String {
     if let Some(film) = film {
         let FilmError { rounds, ref unknown, .. } = film.error(film.plan.confidence);
         let confidence = film.plan.confidence;
-        text.push_str(&errors(&film.error(confidence), None, 0.0, (film.plan.measure, confidence), "pixel"));
+        text.push_str(&errors(&film.error(confidence), 0.0, (film.plan.measure, confidence), "pixel"));
         text.push_str(&unknown.text("pixel", "W/m2/sr", confidence, rounds));
     }
     text

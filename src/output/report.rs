@@ -6,7 +6,7 @@ use std::fmt::Write;
 use serde::Serialize;
 
 use crate::constants::MAX_BOUNCES;
-use crate::engine::bias::Bias;
+use crate::engine::bias::{Bias, BiasFrom};
 use crate::engine::error_bound::{ErrorPlaces, FilmError};
 use crate::engine::nonfinite_values::NonfiniteValues;
 use crate::engine::run::RunResult;
@@ -43,7 +43,7 @@ pub(super) struct Common<'a, Settings> {
     tail: Tail,
     /// Where the noise sits; null where that is not known.
     noise_sits: Option<ErrorPlaces>,
-    /// Of the radius, relative to the result; null without `--bias`.
+    /// Of the radius, relative to the result; null where it was not measured.
     bias: Option<Bias>,
     /// Nonfinite values that `--paranoid` found; null without it.
     nonfinite_values: Option<&'a NonfiniteValues>,
@@ -89,7 +89,7 @@ pub(super) fn common<'a, Plan, Film, Settings>(
         unknown: &error.unknown,
         tail: Tail::of(error, confidence),
         noise_sits: error.places,
-        bias: run.bias,
+        bias: error.bias,
         nonfinite_values: run.nonfinite_values.as_ref(),
         timings: run.timings.rows(),
         dispatches: run.dispatches,
@@ -104,14 +104,14 @@ pub(super) fn ending<Plan, Film>(run: &RunResult<Plan, Film>, error: &FilmError,
         0 => String::new(),
         photons => format!("left out: {} of a block of rounds that was cut short\n", counted(photons, "photon")),
     };
-    let errors = errors(error, run.bias.as_ref(), run.losses.relative, (stop.measure, stop.confidence), point);
+    let errors = errors(error, run.losses.relative, (stop.measure, stop.confidence), point);
     let unknown = error.unknown.text(point, unit, stop.confidence, error.rounds);
     format!("{found}{left_out}{errors}{unknown}\n{}", timing_table(&run.timings, run.device.as_ref()))
 }
 
 /// Noise, bias, and both together, a line each, in per cent. What nothing has reached counts in the bounds,
 /// and so does light that limits kept.
-pub(super) fn errors(error: &FilmError, bias: Option<&Bias>, lost: f64, (measure, confidence): (Measure, f64), point: &str) -> String {
+pub(super) fn errors(error: &FilmError, lost: f64, (measure, confidence): (Measure, f64), point: &str) -> String {
     let mut text = String::new();
     let (percent, sure) = (|share: f64| 100.0 * share, 100.0 * confidence);
     let measure = match measure {
@@ -140,33 +140,40 @@ pub(super) fn errors(error: &FilmError, bias: Option<&Bias>, lost: f64, (measure
         )
         .unwrap();
     }
-    if bias.is_some_and(|bias| !bias.is_known()) {
-        writeln!(text, "bias of the radius: unknown, because {}", Bias::UNKNOWN).unwrap();
-        return text;
+    if let Some(Bias { relative, lower, upper, from, .. }) = &error.bias {
+        let from = match from {
+            BiasFrom::NoMap => None,
+            BiasFrom::Nothing => {
+                writeln!(text, "bias of the radius: unknown, because {}", Bias::UNKNOWN).unwrap();
+                return text;
+            }
+            BiasFrom::Blocks(blocks) => Some(counted(blocks, "block")),
+            BiasFrom::Batches { batches, rounds, seconds } => {
+                Some(format!("{batches} extra batches of {} in {seconds:.2} s", counted(rounds, "round")))
+            }
+        };
+        if let Some(from) = from {
+            writeln!(
+                text,
+                "bias of the radius: {:.2} %, from {:.2} % to {:.2} % ({sure} % confidence; from {from} at two radii, which do not show what is much narrower than both)",
+                percent(*relative),
+                percent(*lower),
+                percent(*upper),
+            )
+            .unwrap();
+        }
     }
-    if bias.is_some_and(|bias| bias.batches == 0) {
-        text.push_str("bias of the radius: none, because no light comes from a photon map\n");
-    } else if let Some(Bias { relative, lower, upper, batches, rounds_per_batch, seconds, .. }) = bias {
-        writeln!(
-            text,
-            "bias of the radius: {:.2} %, from {:.2} % to {:.2} % ({sure} % confidence; measured in {seconds:.2} s from {batches} batches of {} at two radii, which do not show what is much narrower than both)",
-            percent(*relative),
-            percent(*lower),
-            percent(*upper),
-            counted(rounds_per_batch, "round")
-        )
-        .unwrap();
-    }
-    let (relative, upper) = bias.map_or((0.0, 0.0), |bias| (bias.relative, bias.upper));
+    let measured = error.bias.filter(|bias| bias.from != BiasFrom::NoMap);
+    let relative = measured.map_or(0.0, |bias| bias.relative);
     // Below what the per cents show, light cut off is stated by itself only.
-    let what = match (bias.is_some(), lost >= 5e-5) {
+    let what = match (measured.is_some(), lost >= 5e-5) {
         (true, true) => "noise, bias and light cut off",
         (true, false) => "noise and bias",
         (false, true) => "noise and light cut off",
         (false, false) => return text,
     };
-    if let Some((noise, bound)) = known {
-        let (error, most) = (noise.hypot(relative + lost / Losses::SAFETY), bound.hypot(upper + lost));
+    if let Some((noise, _)) = known {
+        let (error, most) = (noise.hypot(relative + lost / Losses::SAFETY), error.bound_of_all(confidence, lost));
         writeln!(text, "{what}: {:.2} %, at most {:.2} %", percent(error), percent(most)).unwrap();
     }
     text
@@ -258,8 +265,9 @@ mod tests {
     fn a_report_says_that_the_tail_is_not_known() {
         let text = |unseen| {
             let freedom = DegreesOfFreedom::least(16);
-            let error = FilmError { rounds: 16, blocks: 16, noise: 0.1, freedom, unknown: Unknown::default(), unseen, places: None };
-            errors(&error, None, 0.0, (Measure::Rmse, 0.95), "pixel")
+            let error =
+                FilmError { rounds: 16, blocks: 16, noise: 0.1, freedom, unknown: Unknown::default(), unseen, bias: None, places: None };
+            errors(&error, 0.0, (Measure::Rmse, 0.95), "pixel")
         };
         assert!(text(0.5).contains("not known yet") && text(0.5).contains("may add 50.00 % (95 % confidence)"), "{}", text(0.5));
         assert!(text(f64::INFINITY).contains("may add any share"), "{}", text(f64::INFINITY));

@@ -186,7 +186,7 @@ pub fn plan_json(plan: &ScenePlan) -> Vec<u8> {
 pub fn json(scene: &str, lit: &RunResult) -> Vec<u8> {
     let RunResult { plan, film, fates, timings, .. } = lit;
     let confidence = plan.settings.stop.confidence;
-    let error = film.error(confidence);
+    let error = lit.error();
     let report = Report {
         scene,
         common: common(lit, &plan.settings, &error, confidence, ""),
@@ -252,6 +252,6 @@ pub fn text(scene: &str, lit: &RunResult, point: &str, explain: bool) -> String 
         Sensor::Picture { .. } => "W/m2/sr",
         Sensor::Receivers { .. } => "W/m2",
     };
-    text.push_str(&ending(lit, &lit.film.error(settings.stop.confidence), &settings.stop, (point, unit)));
+    text.push_str(&ending(lit, &lit.error(), &settings.stop, (point, unit)));
     text
 }

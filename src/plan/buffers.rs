@@ -4,6 +4,8 @@ use bytemuck::Pod;
 use glam::{UVec2, Vec2, Vec4};
 
 use super::RoomPlan;
+use super::differences::{difference_count, row_length};
+use super::film::BiasPlan;
 use super::latest_blocks::{kept_count, kept_values};
 use super::scene::{MapPlan, ScenePlan};
 use super::sensor::Sensor;
@@ -184,6 +186,11 @@ impl RoomPlan {
 }
 
 impl ScenePlan {
+    /// Sets of three sums of a visible point: of each arrival, and of what lies within a smaller radius of each map.
+    pub fn sum_sets(&self) -> u32 {
+        self.arrival_sets + if self.film.bias == BiasPlan::Blocks { 1 + u32::from(self.caustic.is_some()) } else { 0 }
+    }
+
     /// Every buffer of a run, with one set of receivers where points are asked.
     pub fn buffers(&self, geometry: &Geometry) -> Vec<PlannedBuffer> {
         [self.scene_buffers(geometry), self.sensor_buffers(), self.photon_buffers(), self.count_buffers()].concat()
@@ -230,6 +237,8 @@ impl ScenePlan {
     pub(super) fn sensor_buffers(&self) -> Vec<PlannedBuffer> {
         let (pixels, points) = (u64::from(self.sensor.pixels()), u64::from(self.visible_points()));
         let seen = if self.film.sees_light { pixels } else { 0 };
+        let measures_bias = self.film.bias == BiasPlan::Blocks;
+        let difference_words = (difference_count(pixels as usize) + row_length(pixels as usize)) as u64;
         let mut buffers = vec![
             buffer::<u64>("block sums", 3 * pixels, "sums of the block under way"),
             buffer::<u64>("film sums", 3 * pixels, "sums of all blocks"),
@@ -244,7 +253,8 @@ impl ScenePlan {
             buffer::<VisiblePoint>("visible points", points, "where photons are looked up"),
             buffer::<MattLobes>("matt lobes", if self.keeps(Effect::Layers) { points } else { 0 }, "how layered points weigh light"),
             buffer::<MattCover>("matt covers", if self.has_covers() { points } else { 0 }, "coats, sheen and films of visible points"),
-            buffer::<u64>("estimates", 3 * points * u64::from(self.arrival_sets), "what photons add there"),
+            buffer::<u64>("estimates", 3 * points * u64::from(self.sum_sets()), "what photons add there"),
+            buffer::<u64>("differences", if measures_bias { difference_words } else { 0 }, "sums that tell the bias"),
         ];
         let classed = if self.has_classes() { points } else { 0 };
         buffers.extend([

@@ -4,6 +4,19 @@ use serde::{Deserialize, Serialize};
 
 use crate::settings::stop::Measure;
 
+/// What tells the bias of a scene's radii.
+#[derive(Debug, Clone, Copy, PartialEq, Eq, Serialize, Deserialize)]
+pub enum BiasPlan {
+    /// There is none, as no light comes from a photon map.
+    NoMap,
+    /// Nothing: radii are as small as they may be, and still wider than what many points lie in.
+    Nothing,
+    /// The blocks of the run, which are also estimated within a smaller radius.
+    Blocks,
+    /// Extra runs, where they are asked for: relMSE weighs pixels by what they turn out to hold, which sums over pixels cannot.
+    ExtraRuns,
+}
+
 /// Of a scene's film, which holds it, so that a film can be read without the scene.
 #[derive(Debug, Clone, PartialEq, Serialize, Deserialize)]
 pub struct FilmPlan {
@@ -30,4 +43,5 @@ pub struct FilmPlan {
     /// With which errors are stated, and what the relative one is of.
     pub confidence: f64,
     pub measure: Measure,
+    pub bias: BiasPlan,
 }

@@ -3,6 +3,7 @@
 
 pub mod buffers;
 pub mod capacity;
+pub mod differences;
 pub mod evidence;
 pub mod film;
 pub mod latest_blocks;

@@ -6,7 +6,7 @@ use std::time::{Duration, Instant};
 use super::Limits;
 use super::buffers::{PlannedBuffer, bytes_of};
 use super::evidence::{EffectDecision, Facts};
-use super::film::FilmPlan;
+use super::film::{BiasPlan, FilmPlan};
 use super::light_choice::LightChoice;
 use super::maps::Maps;
 use super::radius::Trial;
@@ -18,6 +18,7 @@ use crate::photon::MapPhoton;
 use crate::scene::geometry::Geometry;
 use crate::scene::{LobeKinds, Scene, Surface, openings};
 use crate::settings::scene::{Effect, Illumination, SceneSettings};
+use crate::settings::stop::Measure;
 use crate::settings::{Builder, Math};
 
 /// Triangles up to which a list may be asked for: a path tests it some hundred times, and loops are short.
@@ -93,6 +94,7 @@ impl ScenePlan {
             widest_radii: [0.0; 2],
             confidence: settings.stop.confidence,
             measure: settings.stop.measure,
+            bias: BiasPlan::NoMap,
         };
         let mut plan = ScenePlan {
             settings,
@@ -114,6 +116,7 @@ impl ScenePlan {
             planned_in: Duration::ZERO,
         };
         plan.set_film(geometry, &facts);
+        plan.constants.push(("HAS_DIFFERENCES", u32::from(plan.film.bias == BiasPlan::Blocks)));
         plan.check_sizes(geometry, limits)?;
         plan.decisions = plan.decisions.iter().map(|decision| plan.given(decision, geometry)).collect();
         plan.planned_in = began.elapsed();
@@ -136,6 +139,12 @@ impl ScenePlan {
         }
         let widest = |map: &Option<MapPlan>| map.as_ref().map_or(0.0, |map| self.widest_radius(map, 0));
         self.film.widest_radii = [widest(&self.global), widest(&self.caustic)];
+        self.film.bias = match self.film.measure {
+            _ if self.maps().next().is_none() => BiasPlan::NoMap,
+            _ if self.bias_is_unknown() => BiasPlan::Nothing,
+            Measure::Rmse => BiasPlan::Blocks,
+            Measure::RelMse => BiasPlan::ExtraRuns,
+        };
     }
 
     fn check_sizes(&mut self, geometry: &Geometry, limits: &Limits) -> Result<()> {

@@ -55,6 +55,8 @@ layout(constant_id = 41) const uint SAMPLES = 1;
 layout(constant_id = 71) const uint ROUNDS_PER_BLOCK = 1;
 // The eye may meet what shines by itself: of a picture.
 layout(constant_id = 72) const bool HAS_SEEN_LIGHT = false;
+// Whether photons are also counted within a smaller radius, which tells the bias (film/differences.glsl).
+layout(constant_id = 73) const bool HAS_DIFFERENCES = false;
 
 // Where the sums of a sample stand among those of all: three channels of what surfaces scatter, then of what is seen straight.
 uint place_of_sums(uint sample_place)

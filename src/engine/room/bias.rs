@@ -1,8 +1,10 @@
 //! The bias of the paper's radius, from batches of the run's own kind.
 
+use crate::settings::stop::Stop;
 use std::sync::atomic::AtomicBool;
 
-use crate::engine::bias::{Batches, Bias};
+use crate::engine::bias::Bias;
+use crate::engine::bias_batches::Batches;
 use crate::engine::room::film::estimate_walls;
 use crate::error::Result;
 use crate::gpu::Gpu;
@@ -19,7 +21,8 @@ pub fn measure_bias(
     cancelled: &AtomicBool,
 ) -> Result<Option<Bias>> {
     let radius = settings.radius.max(ROOM_BELOW * MIN_RADIUS);
-    let batches = Batches { seed: settings.seed, confidence: settings.stop.confidence, rounds, cancelled };
+    let Stop { measure, confidence, .. } = settings.stop;
+    let batches = Batches { seed: settings.seed, measure, confidence, rounds, cancelled };
     batches.measure(|batch, control| {
         let settings =
             RoomSettings { rounds: batch.rounds, radius: batch.factor * radius, seed: batch.seed, stop: batch.stop, ..settings.clone() };

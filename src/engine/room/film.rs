@@ -117,6 +117,7 @@ impl RoomFilm {
             vec![measure.relative(weight * f64::from(values[0]), weight * self.flux(point))]
         };
         FilmError {
+            bias: None,
             rounds: self.rounds,
             blocks: self.blocks,
             noise: self.relative_error(weights, stop.measure),

@@ -4,7 +4,8 @@ use std::sync::atomic::AtomicBool;
 
 use super::{View, light};
 use crate::engine;
-use crate::engine::bias::{Batch, Batches, Bias};
+use crate::engine::bias::Bias;
+use crate::engine::bias_batches::{Batch, Batches};
 use crate::engine::{Control, End};
 use crate::error::Result;
 use crate::gpu::Gpu;
@@ -33,7 +34,7 @@ pub fn measure(
     }
     let room = plan.maps().map(|map| ROOM_BELOW * RADIUS_RANGE.0 / map.radius).fold(0.0, f64::max);
     let factor = factor.max(room);
-    Batches { seed: plan.settings.seed, confidence, rounds, cancelled }
+    Batches { seed: plan.settings.seed, measure: plan.settings.stop.measure, confidence, rounds, cancelled }
         .measure(|of, control| batch(gpu, scene, view, plan, &Batch { factor: factor * of.factor, ..*of }, control))
 }
 

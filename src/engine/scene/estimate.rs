@@ -8,10 +8,13 @@ use super::radius_class::map_class;
 use super::resources::{PhotonBuffers, SceneResources};
 use crate::constants::MAX_GROUPS;
 use crate::error::Result;
-use crate::gpu::kernels::{CrowdSize, DiscCuts, FluxToRadiance, GatherVisiblePointsTwoWords, GatherVisiblePointsU64, Resolve};
+use crate::gpu::kernels::{
+    CrowdSize, DiscCuts, EndDifference, FluxToRadiance, GatherVisiblePointsTwoWords, GatherVisiblePointsU64, Resolve,
+};
 use crate::gpu::{Commands, Extent};
+use crate::plan::differences::row_length;
 use crate::plan::scene::{MapPlan, TESTS_PER_POINT};
-use crate::records::{CellPush, CrowdSizePush, DiscCutsPush, FluxToRadiancePush, ResolvePush, SceneGatherPush};
+use crate::records::{CellPush, CrowdSizePush, DiscCutsPush, EndDifferencePush, FluxToRadiancePush, ResolvePush, SceneGatherPush};
 
 /// Finds the walls at which each visible point's density estimates from a map end.
 pub fn cut_discs(commands: &mut Commands, round: Round, map: &MapPlan) -> Result<()> {
@@ -111,18 +114,8 @@ pub fn gather(
 /// Turns what the maps found at all visible points into light; so many photons of the global and of the caustic map were traced.
 pub fn flux_to_radiance(commands: &mut Commands, round: Round, traced: [u32; 2]) -> Result<()> {
     let Round { resources, geometry, plan, .. } = round;
-    let SceneResources {
-        scene,
-        visible_points,
-        estimates,
-        radius_classes,
-        disc_cuts,
-        one_hits,
-        part_totals,
-        anomalies,
-        nonfinite_values,
-        ..
-    } = resources;
+    let SceneResources { scene, visible_points, estimates, differences, radius_classes, disc_cuts, .. } = resources;
+    let SceneResources { one_hits, part_totals, anomalies, nonfinite_values, .. } = resources;
     let radius = |map: &Option<MapPlan>| map.as_ref().map_or(1.0, |map| plan.widest_radius(map, round.number)) as f32;
     let flux =
         |map: &Option<MapPlan>| map.as_ref().map_or(0.0, |map| map.photon_flux_of(geometry, traced[usize::from(map.caustic_only)])) as f32;
@@ -151,6 +144,7 @@ pub fn flux_to_radiance(commands: &mut Commands, round: Round, traced: [u32; 2])
             anomalies,
             visible_points,
             estimates,
+            differences,
             radius_classes,
             disc_cuts,
             one_hits,
@@ -189,4 +183,12 @@ pub fn resolve(commands: &mut Commands, round: Round, ends_block: bool) -> Resul
         add_work(commands, plan, u64::from(end_pixel - first_pixel) * u64::from(plan.samples() + points_per_pixel))?;
     }
     Ok(())
+}
+
+/// Ends a block: what a smaller radius would change in it joins the sums of all blocks.
+pub fn end_difference(commands: &mut Commands, round: Round) -> Result<()> {
+    let Round { resources, plan, .. } = round;
+    let (row_length, block) = (row_length(plan.sensor.pixels() as usize) as u32, round.number / plan.film.rounds_per_block);
+    let kernel = EndDifference { differences: &resources.differences };
+    commands.dispatch(kernel, &EndDifferencePush { row_length, block }, Extent::Items(u64::from(row_length)))
 }

@@ -7,12 +7,14 @@ use glam::DVec3;
 use crate::constants::{
     HIT_BRIGHT_PHOTON, HIT_CAUSTIC_PHOTON, HIT_GLOBAL_PHOTON, HIT_KINDS, HIT_SHADOW_RAY, HIT_UNSEEN_LIGHT, PART_COUNT, RADIUS_CLASSES,
 };
+use crate::engine::bias::Bias;
+use crate::engine::differences::Differences;
 use crate::engine::error_bound::{ErrorPlaces, FilmError};
 use crate::engine::film::{BlockSums, LatestBlocks};
 use crate::engine::measure_of_error::ErrorMeasure;
 use crate::engine::unknown::{Uncounted, Unknown, most_hits};
 use crate::plan::buffers::{ANOMALY_WORDS, PART_VALUES};
-use crate::plan::film::FilmPlan;
+use crate::plan::film::{BiasPlan, FilmPlan};
 use crate::plan::latest_blocks::kept_place;
 use crate::plan::radius::mean_squared_radius;
 use crate::plan::scene::MapPlan;
@@ -35,6 +37,8 @@ pub struct SceneFilm {
     pub of_surfaces: Option<BlockSums>,
     /// Parts of that light at some pixels.
     pub latest: LatestBlocks,
+    /// What a smaller radius would change; empty where blocks do not tell the bias.
+    pub differences: Differences,
     /// For each pixel and kind of light what one hit would have added to a round, or that something has hit
     /// (`glsl/world/scene/one_hit.glsl`).
     pub one_hits: Vec<u32>,
@@ -53,7 +57,8 @@ pub struct SceneFilm {
 /// Films are equal that hold the same light, whatever else was asked for and not found.
 impl PartialEq for SceneFilm {
     fn eq(&self, other: &SceneFilm) -> bool {
-        (&self.of_blocks, &self.of_surfaces, &self.latest) == (&other.of_blocks, &other.of_surfaces, &other.latest)
+        (&self.of_blocks, &self.of_surfaces, &self.latest, &self.differences)
+            == (&other.of_blocks, &other.of_surfaces, &other.latest, &other.differences)
     }
 }
 
@@ -71,6 +76,7 @@ impl SceneFilm {
         self.of_blocks.merge(&other.of_blocks);
         self.of_surfaces.iter_mut().zip(&other.of_surfaces).for_each(|(surfaces, others)| surfaces.merge(others));
         self.latest.merge(&other.latest);
+        self.differences.merge(&other.differences);
         // The most that one hit would have added, and what has hit is more than any.
         self.one_hits.iter_mut().zip(&other.one_hits).for_each(|(most, other)| *most = (*most).max(*other));
         self.part_totals.iter_mut().zip(&other.part_totals).for_each(|(total, other)| *total += other);
@@ -342,7 +348,21 @@ impl SceneFilm {
             freedom: self.latest.degrees_of_freedom(PART_VALUES as usize, self.pixels(), self.blocks, value),
             unknown: self.unknown(confidence),
             unseen: self.unseen(confidence),
+            bias: self.bias(confidence, &measure),
             places: self.error_places(&measure),
+        }
+    }
+
+    /// The bias of the radii; `None` where only extra runs can tell it, or there is no whole block.
+    fn bias(&self, confidence: f64, measure: &ErrorMeasure) -> Option<Bias> {
+        match self.plan.bias {
+            BiasPlan::NoMap => Some(Bias::none(confidence)),
+            BiasPlan::Nothing => Some(Bias::unknown(confidence)),
+            BiasPlan::Blocks if self.blocks > 0 => {
+                let relative = measure.relative_to_mean(1.0 / (self.plan.scale * f64::from(self.plan.rounds_per_block)));
+                Some(self.differences.bias(self.pixels(), relative, confidence))
+            }
+            BiasPlan::Blocks | BiasPlan::ExtraRuns => None,
         }
     }
 

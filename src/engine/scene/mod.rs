@@ -9,7 +9,7 @@
 //! radii             in the first round: each point's, by the density of the trial's photons
 //! global            where walls end what a visible point looks through; photons of the global map: traced, sorted, gathered there
 //! caustic           the same with photons that took mirrors and glass only, and were aimed at these
-//! flux to radiance  from flux over the area that lies on the surface, times reflectance
+//! flux to radiance  from flux over the area that lies on the surface, times reflectance; within a smaller radius too, for the bias
 //! resolve           all light of a pixel: to the film
 //! ```
 
@@ -34,6 +34,7 @@ use glam::DVec3;
 pub use film::SceneFilm;
 pub use on_gpu::{constants, light, modules};
 
+use crate::engine::error_bound::FilmError;
 use crate::engine::{Control, run};
 use crate::error::Result;
 use crate::gpu::Gpu;
@@ -47,6 +48,14 @@ use resources::SceneResources;
 
 /// What a run leaves behind: the fates are those of the global map's photons and of the caustic map's.
 pub type RunResult = run::RunResult<ScenePlan, SceneFilm>;
+
+impl RunResult {
+    /// What its film tells of its error, with the bias that extra runs found.
+    pub fn error(&self) -> FilmError {
+        let error = self.film.error(self.film.plan.confidence);
+        FilmError { bias: self.bias.or(error.bias), ..error }
+    }
+}
 
 /// What is lit and what looks at it.
 pub struct View<'a> {

@@ -10,6 +10,7 @@ use super::losses::losses;
 use super::resources::{PhotonBuffers, SceneResources};
 use super::{Round, RunResult, View, estimate, index, points, radius_class, trace};
 use crate::constants::{HIT_CAUSTIC_PHOTON, HIT_GLOBAL_PHOTON, HIT_KINDS, KEPT_BLOCKS, PART_COUNT, RADIUS_CLASSES, TALLY_COPIES};
+use crate::engine::differences::Differences;
 use crate::engine::error_bound::FilmError;
 use crate::engine::film::{BlockSums, KeptBlock, LatestBlocks, halves, wide};
 use crate::engine::nonfinite_values::NonfiniteValues;
@@ -21,6 +22,8 @@ use crate::gpu::kernels::*;
 use crate::gpu::{Commands, Constants, DeviceFacts, Gpu, Interrupt, Kernel, Module};
 use crate::ledger::{Fates, Losses};
 use crate::plan::buffers::{ANOMALY_WORDS, PART_VALUES};
+use crate::plan::differences::difference_count;
+use crate::plan::film::BiasPlan;
 use crate::plan::latest_blocks::kept_count;
 use crate::plan::scene::{MapPlan, ScenePlan};
 use crate::plan::sensor::Sensor;
@@ -39,6 +42,9 @@ pub fn modules(plan: &ScenePlan, facts: &DeviceFacts) -> Vec<Module> {
         modules.extend([CrowdSize::MODULE, FluxToRadiance::MODULE]);
         modules.extend([trace::modules(plan), index::modules()].concat());
         modules.push(if facts.int64_atomics { GatherVisiblePointsU64::MODULE } else { GatherVisiblePointsTwoWords::MODULE });
+        if plan.film.bias == BiasPlan::Blocks {
+            modules.push(EndDifference::MODULE);
+        }
         if plan.cuts_discs() {
             modules.push(DiscCuts::MODULE);
         }
@@ -167,7 +173,8 @@ impl<'a> World for SceneOnGpu<'a> {
 
     fn film(&mut self, commands: &mut Commands<'a>, state: &RunState) -> Result<SceneFilm> {
         let SceneResources { film_sums, film_squares, surface_sums, surface_squares, latest_blocks, class_counts, .. } = &self.resources;
-        let SceneResources { sums_of_block, surface_sums_of_block, one_hits, part_totals, anomalies, of_blocks, .. } = &self.resources;
+        let SceneResources { differences, sums_of_block, surface_sums_of_block, one_hits, part_totals, anomalies, of_blocks, .. } =
+            &self.resources;
         let plan = &self.plan.film;
         let pixels = self.plan.sensor.pixels() as usize;
         // Where a block is whole, nothing counts of the one under way.
@@ -186,6 +193,8 @@ impl<'a> World for SceneOnGpu<'a> {
         let part_totals = commands.copy_out(part_totals, PART_COUNT as usize)?;
         let anomalies = commands.copy_out(anomalies, ANOMALY_WORDS)?;
         let class_counts = commands.copy_out(class_counts, 2 * RADIUS_CLASSES as usize)?;
+        let measured = if plan.bias == BiasPlan::Blocks { difference_count(pixels) } else { 0 };
+        let differences = commands.copy_out(differences, measured)?;
         commands.submit()?;
         let mut stored = [0; 3];
         for map in self.plan.maps() {
@@ -208,6 +217,7 @@ impl<'a> World for SceneOnGpu<'a> {
             of_blocks: of_blocks(sums.take(), squares.take()),
             of_surfaces: plan.sees_light.then(|| of_blocks(of_surfaces.take(), squares_of_surfaces.take())),
             latest,
+            differences: Differences(differences.take()),
             one_hits: one_hits.take(),
             part_totals: part_totals.take(),
             anomalies: anomalies.take().try_into().expect("so many words were read"),
@@ -249,7 +259,8 @@ impl SceneOnGpu<'_> {
     /// Goes on with a film.
     fn restore(&self, commands: &mut Commands, film: &SceneFilm) -> Result<()> {
         let SceneResources { film_sums, film_squares, surface_sums, surface_squares, latest_blocks, .. } = &self.resources;
-        let SceneResources { one_hits, part_totals, anomalies, of_blocks, .. } = &self.resources;
+        let SceneResources { differences, one_hits, part_totals, anomalies, of_blocks, .. } = &self.resources;
+        commands.upload(differences, &film.differences.0)?;
         for (sums, squares, found) in
             [(film_sums, film_squares, Some(&film.of_blocks)), (surface_sums, surface_squares, film.of_surfaces.as_ref())]
         {
@@ -281,7 +292,7 @@ impl SceneOnGpu<'_> {
         let round = Round { resources, geometry: view.geometry, plan, number: state.round() };
         commands.scope("visible points", |commands| points::see(commands, round, view.camera))?;
         if let Some(photons) = &resources.photons {
-            let sums = 3 * u64::from(plan.visible_points()) * u64::from(plan.arrival_sets);
+            let sums = 3 * u64::from(plan.visible_points()) * u64::from(plan.sum_sets());
             commands.fill(&resources.estimates, 0, sums, 0);
             let grids = match grids {
                 Some(grids) => grids,
@@ -297,6 +308,9 @@ impl SceneOnGpu<'_> {
         }
         // What is on the film counts, whatever ends the run from here on.
         commands.set_interrupt(None);
+        if plan.film.bias == BiasPlan::Blocks && state.ends_block() {
+            estimate::end_difference(commands, round)?;
+        }
         commands.scope("resolve", |commands| estimate::resolve(commands, round, state.ends_block()))
     }
 }

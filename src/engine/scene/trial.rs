@@ -17,7 +17,7 @@ use rayon::prelude::*;
 use super::resources::SceneResources;
 use super::{Round, View, constants, light_trial, modules, points, trace, trial_rays};
 use crate::engine;
-use crate::engine::bias;
+use crate::engine::bias_batches;
 use crate::error::Result;
 use crate::gpu::kernels::{Clearance, TrialRays};
 use crate::gpu::{Commands, Extent, Gpu, Kernel, Memory};
@@ -80,7 +80,7 @@ fn run(gpu: &Gpu, scene: &Scene, view: &View, run: &ScenePlan, lights: Option<Li
         photons: PHOTONS,
         caustic_photons: PHOTONS,
         rounds: 1,
-        seed: bias::seed(SEED, 0),
+        seed: bias_batches::seed(SEED, 0),
         // Parts of a picture have the radii and lights of the whole, so that they add up to it.
         part: Part::All,
         stop: Stop::default(),
