@@ -9,7 +9,7 @@ use photonmill::engine::room::film::{estimate_walls, irradiance_weights};
 use photonmill::engine::room::{self, RunResult};
 use photonmill::engine::scene::{self, SceneFilm, Target, View, trial};
 use photonmill::engine::{End, Progress};
-use photonmill::plan::film::FilmPlan;
+use photonmill::plan::film::{BiasPlan, FilmPlan};
 use photonmill::plan::scene::{MapPlan, ScenePlan};
 use photonmill::plan::sensor::Sensor;
 use photonmill::settings::stop::Stop;
@@ -96,12 +96,14 @@ fn watched_error(lit: &scene::RunResult) -> f64 {
     error.bound_of_all(CONFIDENCE, lit.losses.relative).hypot(error.unseen)
 }
 
-/// A picture by a run that takes what its rounds have shown for all that there is.
-fn as_far_as_shown(gpu: &Gpu, scene: &Scene, settings: &SceneSettings) -> scene::RunResult {
+/// A picture by a run that knows of no bias, and where asked takes what its rounds have shown for all that there is.
+fn of_noise(gpu: &Gpu, scene: &Scene, settings: &SceneSettings, as_far_as_shown: bool) -> scene::RunResult {
     let geometry = Geometry::new(scene).unwrap();
     let view = View { geometry: &geometry, camera: Some(&scene.first_camera()), phases: &[] };
-    let plan = trial::plan(gpu, scene, &view, settings, square_picture(SIZE)).unwrap();
-    let film = FilmPlan { rare_radiance: 0.0, ..plan.film.clone() };
+    let mut plan = trial::plan(gpu, scene, &view, settings, square_picture(SIZE)).unwrap();
+    plan.constants.iter_mut().filter(|(name, _)| *name == "HAS_DIFFERENCES").for_each(|(_, value)| *value = 0);
+    let rare_radiance = if as_far_as_shown { 0.0 } else { plan.film.rare_radiance };
+    let film = FilmPlan { rare_radiance, bias: BiasPlan::NoMap, ..plan.film.clone() };
     scene::light(gpu, &view, ScenePlan { film, ..plan }, &mut Control::default()).unwrap()
 }
 
@@ -111,15 +113,12 @@ fn claims_hold(seeds: u64) {
     let (mut coverages, mut widths) = (Vec::new(), Vec::new());
     for name in SCENES {
         let scene = scene(name);
-        let camera = scene.first_camera();
         // Of aimed photons so little noise is left there that the lamp's image in the glass is nearly all of it. One path in
         // thousands meets it, so that the tail of the noise is not known for thousands of rounds: these runs claim what their
         // rounds have shown.
         let is_rare = name == "caustic-sphere";
         let settings = |error, seed| SceneSettings { aim: !is_rare, ..settings(error, seed) };
-        let run = |settings: &SceneSettings| {
-            if is_rare { as_far_as_shown(&gpu, &scene, settings) } else { seen(&gpu, &scene, settings, &camera, [SIZE; 2]) }
-        };
+        let run = |settings: &SceneSettings| of_noise(&gpu, &scene, settings, is_rare);
         // Of lamps in mirrors and glass, so many that what none has shown is small beside what they have.
         let rounds = if name == "cornell-spheres" { 600 } else { 60 };
         let wanted = watched_error(&run(&SceneSettings { rounds, stop: Stop::default(), ..settings(1.0, 0) })).min(1.0);
