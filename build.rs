@@ -151,6 +151,7 @@ const PACKED: [(&str, &[&str]); 5] = [
             "pass_sums",
             "estimates",
             "differences",
+            "near_sums",
             "film_sums",
             "film_squares",
             "part_totals",

@@ -96,14 +96,20 @@ fn watched_error(lit: &scene::RunResult) -> f64 {
     error.bound_of_all(CONFIDENCE, lit.losses.relative).hypot(error.unseen)
 }
 
+/// A plan that knows of no bias.
+fn without_differences(mut plan: ScenePlan) -> ScenePlan {
+    plan.constants.iter_mut().filter(|(name, _)| *name == "HAS_DIFFERENCES").for_each(|(_, value)| *value = 0);
+    plan.film.bias = BiasPlan::NoMap;
+    plan
+}
+
 /// A picture by a run that knows of no bias, and where asked takes what its rounds have shown for all that there is.
 fn of_noise(gpu: &Gpu, scene: &Scene, settings: &SceneSettings, as_far_as_shown: bool) -> scene::RunResult {
     let geometry = Geometry::new(scene).unwrap();
     let view = View { geometry: &geometry, camera: Some(&scene.first_camera()), phases: &[] };
-    let mut plan = trial::plan(gpu, scene, &view, settings, square_picture(SIZE)).unwrap();
-    plan.constants.iter_mut().filter(|(name, _)| *name == "HAS_DIFFERENCES").for_each(|(_, value)| *value = 0);
+    let plan = without_differences(trial::plan(gpu, scene, &view, settings, square_picture(SIZE)).unwrap());
     let rare_radiance = if as_far_as_shown { 0.0 } else { plan.film.rare_radiance };
-    let film = FilmPlan { rare_radiance, bias: BiasPlan::NoMap, ..plan.film.clone() };
+    let film = FilmPlan { rare_radiance, ..plan.film.clone() };
     scene::light(gpu, &view, ScenePlan { film, ..plan }, &mut Control::default()).unwrap()
 }
 
@@ -401,7 +407,8 @@ fn watched(gpu: &Gpu, name: &str, settings: &SceneSettings) -> (scene::RunResult
     let mut tell = |progress: &Progress| told.push(progress.clone());
     let mut control = Control { cancelled: &never, progress: &mut tell, ..Control::default() };
     let view = View { geometry: &geometry, camera: Some(&scene.first_camera()), phases: &[] };
-    let plan = trial::plan(gpu, &scene, &view, settings, square_picture(16)).unwrap();
+    // Bias of a radius that stays does not fall.
+    let plan = without_differences(trial::plan(gpu, &scene, &view, settings, square_picture(16)).unwrap());
     (scene::light(gpu, &view, plan, &mut control).unwrap(), told)
 }
 

@@ -3,12 +3,19 @@
 // 1 / sqrt(2), as `SMALLER` there.
 const float NEAR_SHARE = 0.70710678118654752;
 
-// Which sums of visible points hold what lies that near, of the global and of the caustic map: behind those of the arrivals.
-uint near_set(bool is_caustic)
+// What lies that near of visible points, all arrivals together: of the global map, then of the caustic map. Two words a sum.
+layout(set = 1, binding = 21, scalar) buffer NearSums { uint near_sums[]; };
+
+uint place_of_near(uint point, uint point_count, bool is_caustic)
 {
-    uint arrival_sets = 2;
-    if (HAS_ALL_ARRIVALS) {
-        arrival_sets = 3;
+    return 6 * (point + (is_caustic ? point_count : 0));
+}
+
+void add_to_near(uint place, uvec2 amount)
+{
+    uint before = atomicAdd(near_sums[place], amount.x);
+    uint high = amount.y + (before > 0xffffffffu - amount.x ? 1 : 0);
+    if (high != 0) {
+        atomicAdd(near_sums[place + 1], high);
     }
-    return arrival_sets + (is_caustic ? 1 : 0);
 }

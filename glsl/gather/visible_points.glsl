@@ -107,7 +107,7 @@ void gather_photons()
         sums[k] = uvec2(0);
     }
     // The same of photons nearer than that, all arrivals together.
-    uvec2 near_sums[3] = uvec2[](uvec2(0), uvec2(0), uvec2(0));
+    uvec2 nearer[3] = uvec2[](uvec2(0), uvec2(0), uvec2(0));
     float near_radius = radius * NEAR_SHARE;
     bool found = false;
     uint passed = 0; // candidates in the rows before this one
@@ -177,7 +177,7 @@ void gather_photons()
                                 if (KERNEL != KERNEL_BOX) {
                                     amount = fixed_point(flux[channel] * near_gain, chance);
                                 }
-                                near_sums[channel] = add64(near_sums[channel], amount);
+                                nearer[channel] = add64(nearer[channel], amount);
                             }
                         }
                         found = true;
@@ -207,10 +207,10 @@ void gather_photons()
             }
         }
         if (HAS_DIFFERENCES) {
-            uint near = 3 * (near_set(push.map_class == CAUSTIC_CLASS) * push.point_count + index);
+            uint place = place_of_near(index, push.point_count, push.map_class == CAUSTIC_CLASS);
             for (uint channel = 0; channel < 3; channel++) {
-                if (near_sums[channel] != uvec2(0)) {
-                    add_to_film(near + channel, near_sums[channel]);
+                if (nearer[channel] != uvec2(0)) {
+                    add_to_near(place + 2 * channel, nearer[channel]);
                 }
             }
         }

@@ -43,6 +43,16 @@ vec3 gathered_flux(uint place)
     return flux;
 }
 
+vec3 near_flux_of(uint place, bool is_caustic)
+{
+    uint first = place_of_near(place, push.point_count, is_caustic);
+    vec3 flux;
+    for (uint channel = 0; channel < 3; channel++) {
+        flux[channel] = float(near_sums[first + 2 * channel + 1]) + float(near_sums[first + 2 * channel]) * (1.0 / 4294967296.0);
+    }
+    return flux;
+}
+
 // Area in which photons were looked for, or those within a share of the radius, weighted by the kernel.
 float estimate_area(VisiblePoint point, uint pixel, uint cut, float radius, float share)
 {
@@ -149,7 +159,7 @@ void main()
         if (area == 0.0) {
             vec3 near_flux = vec3(0.0);
             if (HAS_DIFFERENCES) {
-                near_flux = gathered_flux(near_set(is_caustic) * push.point_count + place);
+                near_flux = near_flux_of(place, is_caustic);
             }
             vec2 areas = areas_around(point, place, is_caustic, near_flux != vec3(0.0));
             area = areas.x;

@@ -186,9 +186,10 @@ impl RoomPlan {
 }
 
 impl ScenePlan {
-    /// Sets of three sums of a visible point: of each arrival, and of what lies within a smaller radius of each map.
-    pub fn sum_sets(&self) -> u32 {
-        self.arrival_sets + if self.film.bias == BiasPlan::Blocks { 1 + u32::from(self.caustic.is_some()) } else { 0 }
+    /// Sums of what lies within a smaller radius of visible points, three channels of each map.
+    pub fn near_sums(&self) -> u64 {
+        let maps = if self.film.bias == BiasPlan::Blocks { 1 + u64::from(self.caustic.is_some()) } else { 0 };
+        3 * u64::from(self.visible_points()) * maps
     }
 
     /// Every buffer of a run, with one set of receivers where points are asked.
@@ -253,7 +254,8 @@ impl ScenePlan {
             buffer::<VisiblePoint>("visible points", points, "where photons are looked up"),
             buffer::<MattLobes>("matt lobes", if self.keeps(Effect::Layers) { points } else { 0 }, "how layered points weigh light"),
             buffer::<MattCover>("matt covers", if self.has_covers() { points } else { 0 }, "coats, sheen and films of visible points"),
-            buffer::<u64>("estimates", 3 * points * u64::from(self.sum_sets()), "what photons add there"),
+            buffer::<u64>("estimates", 3 * points * u64::from(self.arrival_sets), "what photons add there"),
+            buffer::<u64>("near sums", self.near_sums(), "the same within a smaller radius"),
             buffer::<u64>("differences", if measures_bias { difference_words } else { 0 }, "sums that tell the bias"),
         ];
         let classed = if self.has_classes() { points } else { 0 };

@@ -51,8 +51,8 @@ pub fn gather(
 ) -> Result<()> {
     let Round { resources, plan, number: round, .. } = round;
     let PhotonBuffers { cells, sorted_map, crowded, dispatch_args, .. } = photons;
-    let SceneResources { scene, visible_points, matt_lobes, matt_covers, estimates, radius_classes, disc_cuts, nonfinite_values, .. } =
-        resources;
+    let SceneResources { scene, visible_points, matt_lobes, matt_covers, estimates, near_sums, .. } = resources;
+    let SceneResources { radius_classes, disc_cuts, nonfinite_values, .. } = resources;
     let point_count = plan.visible_points();
     let (lanes, step) = (map.lanes, plan.points_at_once());
     let (width, height) = plan.sensor.size();
@@ -64,6 +64,7 @@ pub fn gather(
                 matt_lobes,
                 matt_covers,
                 film: estimates,
+                near_sums,
                 cells,
                 sorted_map,
                 crowded,
@@ -114,7 +115,7 @@ pub fn gather(
 /// Turns what the maps found at all visible points into light; so many photons of the global and of the caustic map were traced.
 pub fn flux_to_radiance(commands: &mut Commands, round: Round, traced: [u32; 2]) -> Result<()> {
     let Round { resources, geometry, plan, .. } = round;
-    let SceneResources { scene, visible_points, estimates, differences, radius_classes, disc_cuts, .. } = resources;
+    let SceneResources { scene, visible_points, estimates, near_sums, differences, radius_classes, disc_cuts, .. } = resources;
     let SceneResources { one_hits, part_totals, anomalies, nonfinite_values, .. } = resources;
     let radius = |map: &Option<MapPlan>| map.as_ref().map_or(1.0, |map| plan.widest_radius(map, round.number)) as f32;
     let flux =
@@ -144,6 +145,7 @@ pub fn flux_to_radiance(commands: &mut Commands, round: Round, traced: [u32; 2])
             anomalies,
             visible_points,
             estimates,
+            near_sums,
             differences,
             radius_classes,
             disc_cuts,

@@ -292,8 +292,11 @@ impl SceneOnGpu<'_> {
         let round = Round { resources, geometry: view.geometry, plan, number: state.round() };
         commands.scope("visible points", |commands| points::see(commands, round, view.camera))?;
         if let Some(photons) = &resources.photons {
-            let sums = 3 * u64::from(plan.visible_points()) * u64::from(plan.sum_sets());
+            let sums = 3 * u64::from(plan.visible_points()) * u64::from(plan.arrival_sets);
             commands.fill(&resources.estimates, 0, sums, 0);
+            if plan.film.bias == BiasPlan::Blocks {
+                commands.fill(&resources.near_sums, 0, plan.near_sums(), 0);
+            }
             let grids = match grids {
                 Some(grids) => grids,
                 None => grids.insert(commands.scope("radii", |commands| radius_class::find(commands, round, photons, view))?),
@@ -308,10 +311,12 @@ impl SceneOnGpu<'_> {
         }
         // What is on the film counts, whatever ends the run from here on.
         commands.set_interrupt(None);
-        if plan.film.bias == BiasPlan::Blocks && state.ends_block() {
-            estimate::end_difference(commands, round)?;
-        }
-        commands.scope("resolve", |commands| estimate::resolve(commands, round, state.ends_block()))
+        commands.scope("resolve", |commands| {
+            if plan.film.bias == BiasPlan::Blocks && state.ends_block() {
+                estimate::end_difference(commands, round)?;
+            }
+            estimate::resolve(commands, round, state.ends_block())
+        })
     }
 }
 

@@ -71,6 +71,8 @@ buffers! {
         /// Of light that surfaces scatter; of a picture.
         surface_sums: Buffer<u64> = planned.zeroed(commands, "surface sums")?,
         surface_squares: Buffer<u64> = planned.zeroed(commands, "surface squares")?,
+        /// Within a smaller radius.
+        near_sums: Buffer<u64> = planned.one("near sums")?,
         differences: Buffer<u64> = planned.zeroed(commands, "differences")?,
         latest_blocks: Buffer<f32> = planned.zeroed(commands, "latest blocks")?,
         /// What is known of pixels that some kind of light has not reached; see `glsl/world/scene/one_hit.glsl`.

@@ -15,6 +15,7 @@ use crate::engine::{self, Control};
 use crate::error::Result;
 use crate::gpu::{Commands, Gpu};
 use crate::photon::MapPhoton;
+use crate::plan::film::BiasPlan;
 use crate::plan::scene::{MapPlan, ScenePlan};
 use crate::plan::sensor::Sensor;
 use crate::records::{LightPath, VisiblePoint};
@@ -166,7 +167,7 @@ impl Model<'_> {
         let pixels = f64::from(self.plan.sensor.pixels());
         let samples = pixels * f64::from(self.plan.samples());
         let points = f64::from(self.plan.visible_points());
-        let sums = 24.0 * points * f64::from(self.plan.arrival_sets);
+        let sums = 24.0 * points * f64::from(self.plan.arrival_sets) + 8.0 * self.plan.near_sums() as f64;
         let shadow_rays = f64::from(self.plan.constant("SHADOW_RAYS"));
         let (item, items, cost) = match pass {
             "visible points" => {
@@ -192,7 +193,13 @@ impl Model<'_> {
                 return self.work_of_map(self.plan.maps().find(|known| known.name == map)?, stage);
             }
         };
-        Some(Work { item, items, dispatches: 1.0, cost })
+        // At the end of a block differences of two radii are added up, too.
+        let ends = if pass == "resolve" && self.plan.film.bias == BiasPlan::Blocks {
+            1.0 / f64::from(self.plan.film.rounds_per_block)
+        } else {
+            0.0
+        };
+        Some(Work { item, items, dispatches: 1.0 + ends, cost })
     }
 
     fn work_of_map(&self, map: &MapPlan, stage: &str) -> Option<Work> {
