@@ -24,6 +24,7 @@ void add_difference(uint pixel, uint pixel_count, vec3 units, float limit)
     uint sum = pixel_count == sum_count ? pixel : hash % sum_count;
     for (uint channel = 0; channel < 3; channel++) {
         if (!is_finite(units[channel])) {
+            // The light itself is no number either, and is counted where it joins the film.
             continue;
         }
         uvec2 amount = signed64(sign * units[channel], limit);

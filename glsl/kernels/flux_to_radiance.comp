@@ -33,12 +33,16 @@ layout(set = 1, binding = 2, scalar) buffer Estimates { uvec2 estimates[]; };
 #include "world/scene/no_point.glsl"
 #include "world/scene/one_hit.glsl"
 
+float flux_of(uvec2 sum)
+{
+    return float(sum.y) + float(sum.x) * (1.0 / 4294967296.0);
+}
+
 vec3 gathered_flux(uint place)
 {
     vec3 flux;
     for (uint channel = 0; channel < 3; channel++) {
-        uvec2 sum = estimates[3 * place + channel];
-        flux[channel] = float(sum.y) + float(sum.x) * (1.0 / 4294967296.0);
+        flux[channel] = flux_of(estimates[3 * place + channel]);
     }
     return flux;
 }
@@ -48,7 +52,7 @@ vec3 near_flux_of(uint place, bool is_caustic)
     uint first = place_of_near(place, push.point_count, is_caustic);
     vec3 flux;
     for (uint channel = 0; channel < 3; channel++) {
-        flux[channel] = float(near_sums[first + 2 * channel + 1]) + float(near_sums[first + 2 * channel]) * (1.0 / 4294967296.0);
+        flux[channel] = flux_of(uvec2(near_sums[first + 2 * channel], near_sums[first + 2 * channel + 1]));
     }
     return flux;
 }

@@ -16,7 +16,7 @@ use std::f64::consts::FRAC_1_SQRT_2;
 use serde::Serialize;
 use statrs::distribution::{ContinuousCDF, StudentsT};
 
-/// Root mean square over a result's pixels and channels where there is light, over their mean: as errors by `Measure::Rmse`.
+/// Relative to a result's light, as its measure of errors adds it up.
 #[derive(Debug, Clone, Copy, PartialEq, Serialize)]
 pub struct Bias {
     pub relative: f64,
@@ -44,9 +44,10 @@ pub enum BiasFrom {
 /// How far the law c r^2 may be off, either way: the true bias over what is extrapolated.
 ///
 /// Of light without noise (`tests/bias.rs`) it is 1.00 where light is a parabola, 1.12 along the edge of a lit surface,
-/// 1.05, 1.2 and 1.6 on bumps of a deviation of r, r/2 and r/4, and 1.82 along the edge of a shadow. Of scenes it was 1.0 to
-/// 1.3, and 1.8 of a caustic that is narrower than its radius. Whatever is much narrower than r at both radii is not seen at all.
-const ALLOWANCE: (f64, f64) = (0.9, 1.9);
+/// 1.05, 1.2 and 1.6 on bumps of a deviation of r, r/2 and r/4, and 1.82 along the edge of a shadow. Of scenes it was 1.2 to
+/// 1.5 at radii of 0.15 of the scene, and 2.0 of a caustic narrower than that. Whatever is much narrower than r at both radii is not seen
+/// at all.
+const ALLOWANCE: (f64, f64) = (0.9, 2.1);
 
 /// The smaller radius over the larger one, and how many times their difference the bias of the larger one is.
 pub const SMALLER: f64 = FRAC_1_SQRT_2;

@@ -1,15 +1,16 @@
 //! What a smaller radius would change, from all blocks of a run: sums that tell the bias of the radius ([`super::bias`]).
 //!
-//! Each round is also estimated within a share of its radii. What is wanted of the differences D_b, one picture a block, is scalar products of different blocks, whose mean is |E D|^2. A picture a block is more than can be kept, so each is kept
-//! as a count sketch (Charikar, Chen and Farach-Colton 2002): every pixel goes to one of some sums, with a sign of its own. Scalar
-//! products of sketches have the mean of those of the pictures, and the sketch of a sum is the sum of sketches. Sums are integers, so
-//! that shards add up to the bits of one run.
+//! Each round is also estimated within a share of its radii. Each block b so has a picture D_b of what that changes. The bias follows from
+//! scalar products of different blocks, whose mean is |E D|^2. A picture a block is more than can be kept, so each is kept as a count
+//! sketch (Charikar, Chen and Farach-Colton 2002): every pixel goes to one of some sums, with a sign of its own. Scalar products of
+//! sketches have the mean of those of the pictures, and the sketch of a sum is the sum of sketches. Sums are integers, so that shards
+//! add up to the bits of one run.
 
 use super::bias::{Bias, BiasFrom, Groups};
 use crate::plan::differences::row_length;
 
-/// Of a film in film units, as `glsl/film/differences.glsl` and `glsl/kernels/end_difference.comp` leave them: for each row three channels of each sum, then how many
-/// blocks it has. Two's complement. Empty where nobody measures.
+/// Of a film in film units, as `glsl/film/differences.glsl` and `glsl/kernels/end_difference.comp` leave them: for each row three
+/// channels of each sum, then how many blocks it has. Two's complement. Empty where nobody measures.
 #[derive(Debug, Clone, PartialEq, Default)]
 pub struct Differences(pub Vec<u64>);
 

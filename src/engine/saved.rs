@@ -89,7 +89,7 @@ impl SavedRun {
 /// The first bytes of a file.
 const MAGIC: &[u8; 16] = b"photonmill run\r\n";
 /// Of what follows them. A change that older programs cannot read makes it another one.
-const FORMAT: u32 = 1;
+const FORMAT: u32 = 2;
 /// Of the checksum at the end.
 const CHECKSUM_BYTES: usize = 32;
 

@@ -31,6 +31,7 @@ struct Report<'a> {
     /// As for a run; null where not known.
     relative_error: f64,
     error_bound: Option<f64>,
+    total_bound: Option<f64>,
     unknown: &'a Unknown,
     tail: Tail,
     noise_sits: Option<ErrorPlaces>,
@@ -51,6 +52,7 @@ pub fn json(run: &SavedRun, film: &SceneFilm, missing: &[String]) -> Vec<u8> {
         ledgers: run.fates.iter().map(Fates::ledger).collect(),
         relative_error: error.noise,
         error_bound: Some(error.bound(confidence)).filter(|bound| bound.is_finite()),
+        total_bound: Some(error.bound_of_all(confidence, 0.0)).filter(|bound| bound.is_finite()),
         unknown: &error.unknown,
         tail: Tail::of(&error, confidence),
         noise_sits: error.places,

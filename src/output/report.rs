@@ -38,6 +38,8 @@ pub(super) struct Common<'a, Settings> {
     relative_error: f64,
     /// What it is not above, with the confidence of the settings; null also while all is black and need not be.
     error_bound: Option<f64>,
+    /// What noise, bias and light that limits kept from the result are together not above; null where that is not known.
+    total_bound: Option<f64>,
     /// What nothing has reached.
     unknown: &'a Unknown,
     tail: Tail,
@@ -86,6 +88,7 @@ pub(super) fn common<'a, Plan, Film, Settings>(
         losses: run.losses,
         relative_error: error.noise,
         error_bound: Some(error.bound(confidence)).filter(|bound| bound.is_finite()),
+        total_bound: Some(error.bound_of_all(confidence, run.losses.relative)).filter(|bound| bound.is_finite()),
         unknown: &error.unknown,
         tail: Tail::of(error, confidence),
         noise_sits: error.places,
