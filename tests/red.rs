@@ -476,7 +476,7 @@ const FAULTS: [Fault; 138] = [
         file: "kernels/trial_rays.comp", from: "position, normal, uint(escapes));", to: "position, normal, 1);",
         kernels: &["trial_rays"], noticed_by: &[(HiddenLamp, TooDark)] },
     Fault { what: "a surface that is tiny beside the radius is taken for a larger one",
-        file: "kernels/flux_to_radiance.comp", from: "area * (1.0 / 262144.0)", to: "area * (1.0 / 4096.0)",
+        file: "kernels/flux_to_radiance.comp", from: "areas * (1.0 / 262144.0)", to: "areas * (1.0 / 4096.0)",
         kernels: &["flux_to_radiance"], noticed_by: &[(TinyPlates, TooDark)] },
     Fault { what: "8-bit codes of textures are taken for linear values",
         file: "material/textures.glsl", from: "return uintBitsToFloat(texels[code & 255]);", to: "return float(code & 255) * (1.0 / 255.0);",

@@ -76,22 +76,27 @@ struct Cover {
     vec3 normal;
     uint plane; // of a visible point; NONE: of a receiver, that is to be found
     float radius;
+    float near_radius; // a smaller one that is asked about too; 0: none is
     float reach; // half the edge of the box that is looked through
     uint sum; // kernel's integral, in units of 2^-24 of the squared radius: integers add up alike in whatever order
+    uint near_sum; // within the smaller radius, in units of its square
     uint nearest; // plane of the nearest surface
     float distance; // to it
     Cuts cuts;
 };
 
-// Whether photons of a plane, or the receiver itself, may lie on it for this place.
-bool may_cover(Cover cover, uint plane, vec3 side, float height)
+// Whether photons of a plane, or the receiver itself, may lie on it for this place and radius.
+bool may_cover(Cover cover, uint plane, vec3 side, float height, float radius)
 {
+    if (abs(height) >= radius) {
+        return false;
+    }
     if (cover.plane != NONE) {
-        return plane == cover.plane || belongs(cover.normal, side, height, cover.radius);
+        return plane == cover.plane || belongs(cover.normal, side, height, radius);
     }
     float cosine = dot(cover.normal, side);
     float sine = sqrt(max(1.0 - cosine * cosine, 0.0));
-    return cosine >= RECEIVER_NORMAL_COSINE && abs(height) <= cover.radius * (sine + 1.0 / 1024.0);
+    return cosine >= RECEIVER_NORMAL_COSINE && abs(height) <= radius * (sine + 1.0 / 1024.0);
 }
 
 const uint MOST_EDGES = 3 + CUT_LINES;
@@ -176,6 +181,22 @@ uint saturated_sum(uint a, uint b)
     return a > 0xffffffffu - b ? 0xffffffffu : a + b;
 }
 
+// The part of a triangle within a radius, in units of 2^-24 of its square, and how far the middle lies at least to the left of its edges.
+uint triangle_within(Cover cover, Triangle triangle, vec3 front, float height, float radius, out float left)
+{
+    // In the triangle's own plane, in units of the disc that the sphere cuts out of it.
+    float disc = sqrt((radius - height) * (radius + height));
+    vec3 centre = cover.position - height * front;
+    vec3 x = normalize(triangle.b - triangle.a);
+    vec3 y = cross(front, x);
+    Polygon part = as_polygon(flat_place(triangle.a - centre, x, y, disc), flat_place(triangle.b - centre, x, y, disc),
+                              flat_place(triangle.c - centre, x, y, disc));
+    cut_off_walls(part, cover.cuts, x, y, disc, height * front);
+    float whole = kernel_over(part, left);
+    float share = divide(disc, radius);
+    return uint(roundEven(max(whole, 0.0) * share * share * 16777216.0));
+}
+
 // Adds the part of a triangle that belongs.
 void cover_triangle(inout Cover cover, uint index)
 {
@@ -193,22 +214,16 @@ void cover_triangle(inout Cover cover, uint index)
     }
     vec3 side = plane_normal(plane);
     float height = plane_height(plane, cover.position);
-    if (abs(height) >= radius || !may_cover(cover, plane, side, height)) {
+    if (!may_cover(cover, plane, side, height, radius)) {
         return;
     }
-    // In the triangle's own plane, in units of the disc that the sphere cuts out of it.
-    float disc = sqrt((radius - height) * (radius + height));
-    vec3 centre = cover.position - height * front;
-    vec3 x = normalize(triangle.b - triangle.a);
-    vec3 y = cross(front, x);
-    Polygon part = as_polygon(flat_place(triangle.a - centre, x, y, disc), flat_place(triangle.b - centre, x, y, disc),
-                              flat_place(triangle.c - centre, x, y, disc));
-    cut_off_walls(part, cover.cuts, x, y, disc, height * front);
     float left;
-    float whole = kernel_over(part, left);
-    float share = divide(disc, radius);
-    uint sum = uint(roundEven(max(whole, 0.0) * share * share * 16777216.0));
+    uint sum = triangle_within(cover, triangle, front, height, radius, left);
     cover.sum = saturated_sum(cover.sum, sum);
+    if (cover.near_radius > 0.0 && sum != 0 && may_cover(cover, plane, side, height, cover.near_radius)) {
+        float near_left;
+        cover.near_sum = saturated_sum(cover.near_sum, triangle_within(cover, triangle, front, height, cover.near_radius, near_left));
+    }
     // A triangle that the place lies on, or within rounding of its edge, is nearer than any that it lies beside, and below it however
     // little of the disc it is.
     bool is_below = left > -1.0 / 1024.0;
@@ -244,32 +259,41 @@ bool cover_triangles(inout Cover cover)
     return false;
 }
 
-Cover around(vec3 position, vec3 normal, uint plane, float radius, Cuts cuts)
+Cover around(vec3 position, vec3 normal, uint plane, float radius, float near_radius, Cuts cuts)
 {
     // A little wider than the sphere, for the rounding of the boxes.
-    return Cover(position, normal, plane, radius, radius * (1.0 + 1.0 / 1024.0), 0, NONE, 2.0 * radius, cuts);
+    return Cover(position, normal, plane, radius, near_radius, radius * (1.0 + 1.0 / 1024.0), 0, 0, NONE, 2.0 * radius, cuts);
 }
 
-// Integral of the kernel over all surface that belongs to an estimate: the area, with the box kernel. Whole is set
-// if it could not be found: then the whole disc stands for it, up to the walls.
-float covered_area(vec3 position, uint plane, float radius, Cuts cuts, out bool whole)
+// The same of a disc without edges, up to the walls.
+float disc_area(Cover cover, float radius)
 {
-    Cover cover = around(position, plane_normal(plane), plane, radius, cuts);
+    // A triangle around the disc.
+    Polygon part = as_polygon(vec2(4.0, 0.0), vec2(-4.0, 6.0), vec2(-4.0, -6.0));
+    vec3 x = to_frame(vec3(1.0, 0.0, 0.0), cover.normal), y = to_frame(vec3(0.0, 1.0, 0.0), cover.normal);
+    cut_off_walls(part, cover.cuts, x, y, radius, vec3(0.0));
+    float left;
+    return kernel_over(part, left) * radius * radius;
+}
+
+// Integrals of the kernel over all surface that belongs to an estimate, and to one of a smaller radius, 0: none is asked for. With the
+// box kernel they are areas. Both from one walk, as a device's loops may turn no more often (lavapipe counts all turns of a shader).
+// Whole is set if they could not be found: then the whole disc stands for them, up to the walls.
+vec2 covered_areas(vec3 position, uint plane, float radius, float near_radius, Cuts cuts, out bool whole)
+{
+    Cover cover = around(position, plane_normal(plane), plane, radius, near_radius, cuts);
     whole = cover_triangles(cover);
     if (whole) {
-        // A triangle around the disc.
-        Polygon part = as_polygon(vec2(4.0, 0.0), vec2(-4.0, 6.0), vec2(-4.0, -6.0));
-        cut_off_walls(part, cuts, to_frame(vec3(1.0, 0.0, 0.0), cover.normal), to_frame(vec3(0.0, 1.0, 0.0), cover.normal), radius, vec3(0.0));
-        float left;
-        return kernel_over(part, left) * radius * radius;
+        return vec2(disc_area(cover, radius), near_radius > 0.0 ? disc_area(cover, near_radius) : 0.0);
     }
-    return float(cover.sum) * (1.0 / 16777216.0) * radius * radius;
+    vec2 sums = vec2(float(cover.sum), float(cover.near_sum)) * (1.0 / 16777216.0);
+    return vec2(sums.x * radius * radius, sums.y * near_radius * near_radius);
 }
 
 // Plane of the surface that a receiver lies on; NONE: it lies on none.
 uint plane_below(vec3 position, vec3 normal, float radius)
 {
-    Cover cover = around(position, normal, NONE, radius, no_cuts(radius));
+    Cover cover = around(position, normal, NONE, radius, 0.0, no_cuts(radius));
     cover_triangles(cover);
     return cover.nearest;
 }

@@ -57,24 +57,29 @@ vec3 near_flux_of(uint place, bool is_caustic)
     return flux;
 }
 
-// Area in which photons were looked for, or those within a share of the radius, weighted by the kernel.
-float estimate_area(VisiblePoint point, uint pixel, uint cut, float radius, float share)
+// Areas in which the photons of a map were looked for, weighted by the kernel: within the radius, and where asked within the smaller one.
+vec2 areas_around(VisiblePoint point, uint place, bool is_caustic, bool with_near)
 {
-    Cuts cuts = cuts_of(cut, plane_normal(point.plane), radius);
-    radius = min(radius, cuts.reach) * share;
-    float area = 3.14159265358979324 * kernel_norm() * radius * radius;
+    float radius = is_caustic ? push.caustic_radius : push.global_radius;
+    if (HAS_RADIUS_CLASSES) {
+        radius = radius_of_class(radius, radius_class(place, is_caustic ? CAUSTIC_CLASS : GLOBAL_CLASS));
+    }
+    Cuts cuts = cuts_of(place + (is_caustic ? push.first_caustic_cut : 0), plane_normal(point.plane), radius);
+    radius = min(radius, cuts.reach);
+    float near_radius = with_near ? radius * NEAR_SHARE : 0.0;
+    vec2 areas = 3.14159265358979324 * kernel_norm() * vec2(radius * radius, near_radius * near_radius);
     if (HAS_EDGE_CORRECTION) {
         bool whole;
-        float covered = covered_area(point.position, point.plane, radius, cuts, whole);
-        note_unless(is_finite(covered), NONFINITE_ESTIMATE, 0, push.round, pixel);
-        if (whole && share == 1.0) {
+        vec2 covered = covered_areas(point.position, point.plane, radius, near_radius, cuts, whole);
+        note_unless(is_finite(covered.x) && is_finite(covered.y), NONFINITE_ESTIMATE, 0, push.round, place % push.pixel_count);
+        if (whole) {
             atomicAdd(anomalies[2], 1);
         }
         // Photons were found, so some surface is there; rounding may call a sliver nothing. The least area is
         // 200 of the units that gather/cover.glsl sums areas in.
-        return max(covered, area * (1.0 / 262144.0));
+        return max(covered, areas * (1.0 / 262144.0));
     }
-    return area;
+    return areas;
 }
 
 // The brightest photon of the global map carries 1. Caustics are left out: they are local, so that most points lack those of some lamp.
@@ -85,23 +90,6 @@ void note_brightness(uint pixel, vec3 flux, vec3 one_photon)
     } else {
         note_miss(pixel, HIT_BRIGHT_PHOTON, one_photon);
     }
-}
-
-// The areas of a map: within the radius, and where asked within the smaller one. In a loop, as the code for an area is long.
-vec2 areas_around(VisiblePoint point, uint place, bool is_caustic, bool with_near)
-{
-    float radius = is_caustic ? push.caustic_radius : push.global_radius;
-    if (HAS_RADIUS_CLASSES) {
-        radius = radius_of_class(radius, radius_class(place, is_caustic ? CAUSTIC_CLASS : GLOBAL_CLASS));
-    }
-    uint cut = place + (is_caustic ? push.first_caustic_cut : 0);
-    vec2 areas = vec2(0.0);
-    uint count = with_near ? 2 : 1;
-    for (uint k = 0; k < count; k++) {
-        float area = estimate_area(point, place % push.pixel_count, cut, radius, k == 0 ? 1.0 : NEAR_SHARE);
-        areas = k == 0 ? vec2(area, 0.0) : vec2(areas.x, area);
-    }
-    return areas;
 }
 
 float density_in(float area, bool is_caustic)
