@@ -120,11 +120,15 @@ vec2 flat_place(vec3 way, vec3 x, vec3 y, float unit)
 }
 
 // Keeps the part whose product with `normal` is at most `most` (Sutherland and Hodgman 1974) of a polygon of so many edges; one more
-// leads along the line. Loops over edges are unrolled: the triangles of a fine mesh are as many as a device's loops may turn.
+// leads along the line. Loops over edges are unrolled, for which they need a constant end: the triangles of a fine mesh are as many as a
+// device's loops may turn.
 void cut_off(inout Polygon polygon, uint edges, vec2 normal, float most)
 {
     vec2 leaves = vec2(0.0), returns = vec2(0.0);
-    [[unroll]] for (uint k = 0; k < edges; k++) {
+    [[unroll]] for (uint k = 0; k < MOST_EDGES; k++) {
+        if (k >= edges) {
+            continue;
+        }
         vec2 from = polygon.from[k], to = polygon.to[k];
         float from_beyond = dot(from, normal) - most, to_beyond = dot(to, normal) - most;
         if ((from_beyond <= 0.0) != (to_beyond <= 0.0)) {
